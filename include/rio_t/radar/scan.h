@@ -1,0 +1,23 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "rio_t/core/time.h"
+
+namespace rio_t {
+
+/// One detection, in the radar frame R of the calibration T_IR (RIO axes: x right, y forward, z up).
+struct RadarPoint {
+  Eigen::Vector3d position_R = Eigen::Vector3d::Zero();  ///< [m]
+  double doppler = 0.0;  ///< range rate [m/s]: positive = receding, so v_d = -u . v_R for a static target
+  double snr_db = 0.0;   ///< signal to noise [dB]; the intensity as the driver gives it where it has no SNR
+};
+
+/// One scan of the radar. All points are finite (the decoder drops and counts the others).
+struct RadarScan {
+  Time stamp;  ///< as stamped, in the IMU clock; measured at stamp - t_O
+  std::vector<RadarPoint> points;
+};
+
+}  // namespace rio_t

@@ -1,0 +1,35 @@
+#!/usr/bin/env bash
+# Installs with apt what is missing to build, test and run rio_t on Debian 12. Does nothing when all is there.
+set -euo pipefail
+
+packages=(
+  build-essential cmake catkin python3-ament-package
+  libroscpp-dev libroslib-dev librosbag-dev librosbag-storage-dev libnodelet-dev pluginlib-dev
+  libstd-msgs-dev libstd-srvs-dev libsensor-msgs-dev libgeometry-msgs-dev libnav-msgs-dev libdiagnostic-msgs-dev
+  libdiagnostic-updater-dev libtf2-dev libtf2-ros-dev libpcl-conversions-dev libpcl-dev
+  ros-message-generation ros-message-runtime libeigen3-dev libceres-dev libyaml-cpp-dev
+  librostest-dev libgtest-dev libbenchmark-dev
+  python3-roslaunch python3-rosbag python3-rostest python3-numpy python3-matplotlib
+)
+
+missing=()
+for package in "${packages[@]}"; do
+  dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null | grep -qx installed || missing+=("$package")
+done
+[ ${#missing[@]} -eq 0 ] && exit 0
+
+if ! command -v apt-get >/dev/null; then
+  echo "install_dependencies: no apt-get here; install by hand: ${missing[*]}" >&2
+  exit 1
+fi
+as_root=()
+[ "$(id -u)" -eq 0 ] || as_root=(sudo)
+echo "Installing ${#missing[@]} packages: ${missing[*]}"
+log=$(mktemp)
+if ! { "${as_root[@]}" apt-get update && "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+       apt-get install -y --no-install-recommends "${missing[@]}"; } >"$log" 2>&1; then
+  tail -n 20 "$log" >&2
+  echo "install_dependencies: apt-get failed, whole log in $log" >&2
+  exit 1
+fi
+rm -f "$log"

@@ -1,0 +1,14 @@
+#!/usr/bin/env bash
+# Installs, builds and runs every test; ends with one line that counts them. Exit status 1 if one fails.
+set -uo pipefail
+cd "$(dirname "$0")/.."
+export PATH=/usr/bin:$PATH
+build=${RIO_T_BUILD_DIR:-build}
+
+scripts/build.sh || exit 1
+cmake --build "$build" --parallel "$(nproc)" --target tests || exit 1
+source "$build/devel/setup.bash"
+rm -rf "$build/test_results"
+export RIO_T_DATA_DIR=${RIO_T_DATA_DIR:-$(realpath -m ../shared/data)}
+(cd "$build" && ctest --output-on-failure)
+python3 scripts/count_tests.py "$build/test_results"
