@@ -1,0 +1,32 @@
+#pragma once
+
+#include <Eigen/Geometry>
+
+#include "rio_t/imu/noise.h"
+#include "rio_t/imu/static_initializer.h"
+#include "rio_t/radar/ego_velocity.h"
+#include "rio_t/radar/feasibility.h"
+#include "rio_t/smoother/options.h"
+
+namespace rio_t {
+
+/// T_IR, the pose of the radar in the IMU frame, as every radar package gives it.
+struct Extrinsics {
+  Eigen::Vector3d l_I = Eigen::Vector3d::Zero();                  ///< radar origin in I [m]
+  Eigen::Quaterniond q_IR = Eigen::Quaterniond::Identity();  ///< turns R into I
+};
+
+/// Everything that the estimator is told. Defaults are for an ADIS16448 and a TI IWR6843AOP.
+struct OdometryOptions {
+  double gravity = 9.81;  ///< [m/s^2] magnitude
+  ImuNoise imu_noise;
+  Extrinsics T_IR;
+  StaticInitializerOptions initialization;
+  EgoVelocityOptions ego_velocity;
+  FeasibilityOptions feasibility;
+  SmootherOptions smoother;
+  double max_imu_gap = 0.1;        ///< [s] between samples; a longer one is reported and bridged
+  std::size_t max_queued_scans = 50;  ///< scans that may wait for the IMU or the solver
+};
+
+}  // namespace rio_t

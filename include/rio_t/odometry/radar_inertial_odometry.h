@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rio_t/core/pose.h"
+#include "rio_t/odometry/navigation_state.h"
+#include "rio_t/odometry/options.h"
+
+namespace rio_t {
+
+/// What became of one scan.
+struct ScanResult {
+  RadarScan scan;            ///< as fed
+  EgoVelocity ego_velocity;
+  bool used = false;
+  std::string rejected_because;  ///< snake case, empty where used; keys of `scans_rejected`
+
+  // The newest state of the window after this scan; only where used.
+  NavigationState state;
+  double time_offset = 0.0;        ///< t_O [s]
+  double time_offset_sigma = 0.0;  ///< [s]
+  int solver_iterations = 0;
+  bool solver_converged = false;
+  std::vector<StampedPose> left_window;  ///< optimised poses that this scan pushed out, oldest first
+};
+
+/// The whole pipeline: IMU and scans in, odometry and time offset out.
+///
+/// Two halves that may run in two threads. `addImu` is the navigation half: it carries the newest optimised state
+/// forward and never waits for the solver. `process` is the optimisation half. In one thread, call `process` after
+/// each `addImu` and each `addScan`; then the same input gives the same output, bit for bit.
+/// `addImu` and `addScan` may be called from different threads, `process` from one thread at a time.
+class RadarInertialOdometry {
+ public:
+  explicit RadarInertialOdometry(const OdometryOptions& options);
+  ~RadarInertialOdometry();
+  RadarInertialOdometry(RadarInertialOdometry&&) noexcept;
+  RadarInertialOdometry& operator=(RadarInertialOdometry&&) noexcept;
+
+  /// State at this sample, from the newest optimised state: what a live user gets. None before initialisation.
+  /// A sample that is not later than the one before, or not finite, is dropped and counted in `faults()`.
+  std::optional<NavigationState> addImu(const ImuMeasurement& imu);
+
+  /// Queues a scan. It waits until the IMU covers its time of measurement.
+  void addScan(RadarScan scan);
+
+  /// Works off what can be worked off: initialisation, ego-velocity, window. One result for each scan finished.
+  std::vector<ScanResult> process();
+
+  /// At the end of the data: finishes what still waits (rejected as "imu_not_covering" where the IMU never came),
+  /// and empties the window; the poses still in it are in `left_window` of the last result.
+  std::vector<ScanResult> finish();
+
+  bool initialized() const;
+  /// While not initialised: what is being waited for, for people.
+  std::string waitingFor() const;
+  /// Faults of the input so far, by name in snake case, e.g. "imu_out_of_order", "imu_not_finite", "imu_gap".
+  std::map<std::string, std::uint64_t> faults() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace rio_t

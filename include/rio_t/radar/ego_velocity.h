@@ -1,0 +1,66 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "rio_t/radar/scan.h"
+
+namespace rio_t {
+
+struct EgoVelocityOptions {
+  double min_range = 0.25;             ///< [m]
+  double max_range = 100.0;            ///< [m]
+  double min_snr_db = 3.0;             ///< [dB]
+  double max_azimuth = 1.0471975512;   ///< [rad] from the y (forward) axis, either side
+  double max_elevation = 1.0471975512; ///< [rad] either side
+
+  double zero_velocity_threshold = 0.05;        ///< [m/s] a Doppler below counts as zero
+  double zero_velocity_outlier_fraction = 0.25; ///< share of Dopplers that may exceed it at rest
+  double zero_velocity_sigma = 0.025;           ///< [m/s] per axis, reported at rest
+
+  double ransac_inlier_threshold = 0.15;   ///< [m/s] Doppler residual
+  double ransac_outlier_probability = 0.4;
+  double ransac_success_probability = 0.9999;
+  std::uint32_t ransac_seed = 1;           ///< restarted at each scan: same scan, same answer
+
+  double doppler_quantization = 0.125;     ///< [m/s] step of the radar's Doppler; 0 = none
+  Eigen::Vector3d added_sigma = {0.05, 0.025, 0.05};  ///< [m/s] right, forward, up; added in quadrature
+  double max_condition_number = 1000.0;    ///< of H'H (unit directions)
+  double max_sigma = 0.5;                  ///< [m/s] largest axis of the estimate
+};
+
+/// Why a scan gave a velocity, or none.
+enum class EgoVelocityStatus {
+  kMoving,            ///< least squares on the RANSAC inliers
+  kZeroVelocity,      ///< at rest: zero with a small covariance
+  kTooFewPoints,      ///< fewer than 3 points after the filter
+  kTooFewInliers,     ///< RANSAC found no plane that enough points agree on
+  kIllConditioned,    ///< the directions do not span 3D
+  kSigmaTooLarge,     ///< uncertainty above max_sigma
+};
+bool isValid(EgoVelocityStatus status);           ///< kMoving or kZeroVelocity
+std::string toString(EgoVelocityStatus status);   ///< snake case, e.g. "too_few_points"
+
+struct EgoVelocity {
+  EgoVelocityStatus status = EgoVelocityStatus::kTooFewPoints;
+  Eigen::Vector3d v_R = Eigen::Vector3d::Zero();           ///< radar velocity, radar frame [m/s]
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();    ///< [m^2/s^2], radar frame
+  std::vector<std::size_t> inliers;                        ///< indices into the scan's points
+  std::size_t points_used = 0;                             ///< points that passed the filter
+};
+
+/// Ego-velocity of one scan: filter, zero-velocity test, 3-point RANSAC, least squares.
+/// A static target in direction u gives v_d = -u . v_R (Kellner et al., ITSC 2013).
+class EgoVelocityEstimator {
+ public:
+  explicit EgoVelocityEstimator(const EgoVelocityOptions& options) : options_(options) {}
+  EgoVelocity estimate(const RadarScan& scan) const;
+
+ private:
+  EgoVelocityOptions options_;  // read-only after construction
+};
+
+}  // namespace rio_t

@@ -1,0 +1,31 @@
+#pragma once
+
+namespace rio_t {
+
+/// How the radar factor accounts for the time between stamp and measurement.
+enum class TimeOffsetModel {
+  kConstantAcceleration,  ///< the paper's eq. (5): one acceleration sample times t_O; states at the stamps
+  kImu,                   ///< the IMU itself over the shift; states at the estimated measurement times
+};
+
+struct SmootherOptions {
+  double window = 1.0;                 ///< [s] length of the fixed-lag window
+  double huber_threshold = 1.5;        ///< on the whitened radar residual's norm; 0 = no robust loss
+  int max_iterations = 6;              ///< of the solver, each scan
+
+  bool estimate_time_offset = true;    ///< false: LC-RIO, offset fixed at time_offset_initial
+  TimeOffsetModel time_offset_model = TimeOffsetModel::kConstantAcceleration;
+  double time_offset_initial = 0.0;    ///< [s]
+  double time_offset_sigma = 0.075;    ///< [s] prior
+  double time_offset_noise = 1.0e-3;   ///< [s/sqrt(s)] random walk of the offset
+  double max_time_offset = 0.25;       ///< [s] bound on |t_O|
+
+  double prior_sigma_orientation = 0.02;  ///< [rad] roll and pitch of the first state
+  double prior_sigma_yaw = 1.0e-3;        ///< [rad] yaw defines the world frame
+  double prior_sigma_position = 1.0e-3;   ///< [m] position defines the world frame
+  double prior_sigma_velocity = 0.02;     ///< [m/s]
+  double prior_sigma_gyro_bias = 2.0e-3;  ///< [rad/s]
+  double prior_sigma_accel_bias = 0.1;    ///< [m/s^2]
+};
+
+}  // namespace rio_t
