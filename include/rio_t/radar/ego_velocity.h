@@ -10,57 +10,73 @@
 
 namespace rio_t {
 
+/// How the velocity is solved for from the RANSAC inliers.
+enum class EgoVelocitySolver {
+  kLeastSquares,       ///< plain least squares: all weight on the Doppler, directions taken as exact
+  kErrorsInVariables,  ///< weighted by direction noise, and compensated for the attenuation it causes
+};
+std::string toString(EgoVelocitySolver solver);  ///< "ls" or "eiv"
+/// Inverse of toString. Throws std::invalid_argument, naming the choices, for anything else.
+EgoVelocitySolver egoVelocitySolverFromString(const std::string& name);
+
 struct EgoVelocityOptions {
-  double min_range = 0.25;             ///< [m]
-  double max_range = 100.0;            ///< [m]
-  double min_snr_db = 3.0;             ///< [dB]
-  double max_azimuth = 1.0471975512;   ///< [rad] from the y (forward) axis, either side
-  double max_elevation = 1.0471975512; ///< [rad] either side
+  double min_range = 0.25;              ///< [m]
+  double max_range = 100.0;             ///< [m]
+  double min_snr_db = 3.0;              ///< [dB]
+  double max_azimuth = 1.0471975512;    ///< [rad] from the y (forward) axis, either side
+  double max_elevation = 1.0471975512;  ///< [rad] either side
 
-  double zero_velocity_threshold = 0.05;        ///< [m/s] a Doppler below counts as zero
-  double zero_velocity_outlier_fraction = 0.25; ///< share of Dopplers that may exceed it at rest
-  double zero_velocity_sigma = 0.025;           ///< [m/s] per axis, reported at rest
+  double zero_velocity_threshold = 0.05;         ///< [m/s] a Doppler below counts as zero
+  double zero_velocity_outlier_fraction = 0.25;  ///< share of Dopplers that may exceed it at rest
+  double zero_velocity_sigma = 0.025;            ///< [m/s] per axis, reported at rest
 
-  double ransac_inlier_threshold = 0.15;   ///< [m/s] Doppler residual
+  double ransac_inlier_threshold = 0.15;  ///< [m/s] Doppler residual
   double ransac_outlier_probability = 0.4;
   double ransac_success_probability = 0.9999;
-  std::uint32_t ransac_seed = 1;           ///< restarted at each scan: same scan, same answer
+  std::uint32_t ransac_seed = 1;  ///< restarted at each scan: same scan, same answer
 
-  double doppler_quantization = 0.125;     ///< [m/s] step of the radar's Doppler; 0 = none
+  EgoVelocitySolver solver = EgoVelocitySolver::kErrorsInVariables;
+  double azimuth_sigma = 0.035;   ///< [rad] noise of a point's azimuth; only for kErrorsInVariables
+  double elevation_sigma = 0.07;  ///< [rad] noise of a point's elevation; only for kErrorsInVariables
+  double doppler_sigma = 0.02;    ///< [m/s] noise of the Doppler besides its quantisation
+
+  double doppler_quantization = 0.125;                ///< [m/s] step of the radar's Doppler; 0 = none
   Eigen::Vector3d added_sigma = {0.05, 0.025, 0.05};  ///< [m/s] right, forward, up; added in quadrature
-  double max_condition_number = 1000.0;    ///< of H'H (unit directions)
-  double max_sigma = 0.5;                  ///< [m/s] largest axis of the estimate
+  double max_condition_number = 1000.0;               ///< of H'H (unit directions)
+  double max_sigma = 0.5;                             ///< [m/s] largest axis of the estimate
 };
 
 /// Why a scan gave a velocity, or none.
 enum class EgoVelocityStatus {
-  kMoving,            ///< least squares on the RANSAC inliers
-  kZeroVelocity,      ///< at rest: zero with a small covariance
-  kTooFewPoints,      ///< fewer than 3 points after the filter
-  kTooFewInliers,     ///< RANSAC found no plane that enough points agree on
-  kIllConditioned,    ///< the directions do not span 3D
-  kSigmaTooLarge,     ///< uncertainty above max_sigma
+  kMoving,          ///< least squares on the RANSAC inliers
+  kZeroVelocity,    ///< at rest: zero with a small covariance
+  kTooFewPoints,    ///< fewer than 3 points after the filter
+  kTooFewInliers,   ///< RANSAC found no plane that enough points agree on
+  kIllConditioned,  ///< the directions do not span 3D
+  kSigmaTooLarge,   ///< uncertainty above max_sigma
 };
-bool isValid(EgoVelocityStatus status);           ///< kMoving or kZeroVelocity
-std::string toString(EgoVelocityStatus status);   ///< snake case, e.g. "too_few_points"
+bool isValid(EgoVelocityStatus status);          ///< kMoving or kZeroVelocity
+std::string toString(EgoVelocityStatus status);  ///< snake case, e.g. "too_few_points"
 
 struct EgoVelocity {
   EgoVelocityStatus status = EgoVelocityStatus::kTooFewPoints;
-  Eigen::Vector3d v_R = Eigen::Vector3d::Zero();           ///< radar velocity, radar frame [m/s]
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();    ///< [m^2/s^2], radar frame
-  std::vector<std::size_t> inliers;                        ///< indices into the scan's points
-  std::size_t points_used = 0;                             ///< points that passed the filter
+  Eigen::Vector3d v_R = Eigen::Vector3d::Zero();         ///< radar velocity, radar frame [m/s]
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< [m^2/s^2], radar frame
+  std::vector<std::size_t> inliers;                      ///< indices into the scan's points
+  std::size_t points_used = 0;                           ///< points that passed the filter
 };
 
 /// Ego-velocity of one scan: filter, zero-velocity test, 3-point RANSAC, least squares.
 /// A static target in direction u gives v_d = -u . v_R (Kellner et al., ITSC 2013).
 class EgoVelocityEstimator {
  public:
-  explicit EgoVelocityEstimator(const EgoVelocityOptions& options) : options_(options) {}
+  /// Throws std::invalid_argument, naming the option, where one is out of its range.
+  explicit EgoVelocityEstimator(const EgoVelocityOptions& options);
   EgoVelocity estimate(const RadarScan& scan) const;
 
  private:
   EgoVelocityOptions options_;  // read-only after construction
+  int ransac_iterations_;       // read-only after construction
 };
 
 }  // namespace rio_t

@@ -18,7 +18,8 @@ class FeasibilityCheck {
  public:
   explicit FeasibilityCheck(const FeasibilityOptions& options) : options_(options) {}
   /// True where `v_R` at `stamp` can follow what came before; a feasible velocity joins the average.
-  /// A rejected one does not, but the average ages, so that the check never locks out for longer than the window.
+  /// A rejected one does not, but the average ages, so that the check never locks out for longer than the
+  /// window.
   bool accept(Time stamp, const Eigen::Vector3d& v_R);
 
  private:
