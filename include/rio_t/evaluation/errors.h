@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "rio_t/evaluation/trajectory.h"
+
+/// Trajectory errors with the definitions of evo (github.com/MichaelGrupp/evo), so that the figures can be
+/// compared with published ones. See Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM Systems",
+/// IROS 2012.
+namespace rio_t {
+
+/// How the estimate is moved onto the truth before poses are compared.
+enum class Alignment {
+  kNone,
+  kOrigin,  ///< the first matched poses coincide
+  kYaw,     ///< least squares over positions, rotation about the vertical of W only (4 degrees of freedom)
+  kSe3,     ///< least squares over positions (Umeyama 1991, without scale)
+};
+
+struct Statistics {
+  double rmse = 0.0;
+  double mean = 0.0;
+  double median = 0.0;
+  double max = 0.0;
+};
+
+/// Rigid motion from the world of the estimate (E) to the world of the truth (T).
+struct RigidTransform {
+  Eigen::Quaterniond q_TE = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d t_T = Eigen::Vector3d::Zero();
+};
+
+/// Transform that aligns the estimate to the truth over `matches`, of which there must be one for kOrigin,
+/// two with horizontal distance for kYaw, three that are not on a line for kSe3; throws std::invalid_argument
+/// otherwise.
+RigidTransform alignment(const Trajectory& truth, const Trajectory& estimate,
+                         const std::vector<Match>& matches, Alignment kind);
+Trajectory transformed(const RigidTransform& T_TE, const Trajectory& estimate);
+
+/// ATE (evo's APE): distance of positions [m] and angle between orientations [deg] after alignment.
+struct AbsoluteError {
+  Statistics translation_m;
+  Statistics rotation_deg;
+  std::size_t matched_poses = 0;
+};
+
+/// Throws std::invalid_argument if no poses match, or too few for the alignment.
+AbsoluteError absoluteError(const Trajectory& truth, const Trajectory& estimate, Alignment kind,
+                            double max_difference = kDefaultMaxDifference);
+
+enum class DeltaUnit { kMetres, kSeconds };
+
+struct RelativeErrorOptions {
+  double delta = 1.0;  ///< length of a piece, > 0 [m or s]; metres are travelled by the estimate
+  DeltaUnit unit = DeltaUnit::kMetres;
+  /// false: pieces follow each other, each ends with the first pose at or beyond `delta`; the first starts
+  /// where `delta` was first reached (evo's convention). true: from every pose to the one nearest to `delta`
+  /// further on, if that is within a tenth of `delta`.
+  bool all_pairs = false;
+};
+
+/// RPE: error of the motion between two poses, translation [m] and rotation [deg] per piece. No alignment.
+struct RelativeError {
+  Statistics translation_m;
+  Statistics rotation_deg;
+  std::size_t pairs = 0;  ///< zero when the estimate is shorter than a piece; the statistics are zero then
+};
+
+/// Throws std::invalid_argument if no poses match or `delta` is not positive.
+/// With the defaults, the rmse are t_rel [m/m] and r_rel [deg/m] of the RIO-T paper.
+RelativeError relativeError(const Trajectory& truth, const Trajectory& estimate,
+                            const RelativeErrorOptions& options = RelativeErrorOptions{},
+                            double max_difference = kDefaultMaxDifference);
+
+/// Error of the last matched pose with the first ones aligned, and per metre of the truth's path.
+struct Drift {
+  double path_m = 0.0;  ///< length of the truth's path between the first and last match
+  double final_m = 0.0;
+  double final_horizontal_m = 0.0;
+  double final_yaw_deg = 0.0;  ///< estimate minus truth, in (-180, 180]
+  double per_metre = 0.0;      ///< final_m / path_m; zero if the truth does not move
+};
+
+/// Throws std::invalid_argument if no poses match.
+Drift drift(const Trajectory& truth, const Trajectory& estimate,
+            double max_difference = kDefaultMaxDifference);
+
+}  // namespace rio_t

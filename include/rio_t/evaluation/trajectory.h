@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstddef>
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "rio_t/core/pose.h"
+
+namespace rio_t {
+
+/// Poses of the IMU frame I in a world frame W, stamps strictly increasing.
+using Trajectory = std::vector<StampedPose>;
+
+/// Reads a TUM trajectory: `stamp x y z qx qy qz qw` a line, seconds and metres; `#` comments and blank lines
+/// are skipped. Stamps keep their nanoseconds. Quaternions are normalised; they must be unit to 1 %. Throws
+/// std::runtime_error naming the file, the line number and what was expected.
+Trajectory readTum(const std::string& path);
+/// The same from a stream; `name` stands for the file in messages.
+Trajectory readTum(std::istream& in, const std::string& name);
+
+/// Writes the format above, stamps with nine decimals. Throws std::runtime_error if the file cannot be
+/// written.
+void writeTum(const std::string& path, const Trajectory& trajectory);
+/// One line of it, for programs that write as they go.
+void writeTumLine(std::ostream& out, const StampedPose& pose);
+
+/// Exact time of a decimal text such as `1700000010.012222` or `1.700000010012222e+09`, rounded to the
+/// nearest nanosecond. Never goes through double. Throws std::invalid_argument if the text is no such number.
+Time parseTime(const std::string& text);
+
+/// Largest difference of the stamps of two poses that are compared, by default [s]. It is evo's default, so
+/// that figures agree with evo's without options on either side; the nearest pose wins anyhow, so it only
+/// matters in gaps and at the ends.
+constexpr double kDefaultMaxDifference = 0.01;
+
+/// Positions of two poses of (about) the same time in their trajectories.
+struct Match {
+  std::size_t truth = 0;
+  std::size_t estimate = 0;
+};
+
+/// For every pose of the shorter trajectory the pose of the longer one with the nearest stamp (the earlier of
+/// two equally near), if it is at most `max_difference` [s] away. Equal lengths count the estimate as the
+/// shorter. The convention of evo's `associate_trajectories`: a pose of the longer one may be used twice.
+std::vector<Match> associate(const Trajectory& truth, const Trajectory& estimate,
+                             double max_difference = kDefaultMaxDifference);
+
+}  // namespace rio_t

@@ -1,0 +1,160 @@
+#include "rio_t/evaluation/trajectory.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <limits>
+#include <sstream>
+#include <stdexcept>
+
+namespace rio_t {
+namespace {
+
+constexpr const char* kLineFormat = "`stamp x y z qx qy qz qw` (8 numbers, separated by spaces)";
+
+[[noreturn]] void fail(const std::string& name, std::size_t line, const std::string& what) {
+  throw std::runtime_error(name + ":" + std::to_string(line) + ": " + what);
+}
+
+double parseNumber(const std::string& word) {
+  char* end = nullptr;
+  const double value = std::strtod(word.c_str(), &end);
+  if (end == word.c_str() || *end != '\0' || !std::isfinite(value)) {
+    throw std::invalid_argument("'" + word + "' is not a finite number");
+  }
+  return value;
+}
+
+/// Nothing if the line holds no pose.
+bool parseLine(const std::string& line, StampedPose& pose) {
+  std::istringstream words(line);
+  std::vector<std::string> fields;
+  for (std::string word; words >> word;) fields.push_back(word);
+  if (fields.empty() || fields.front().front() == '#') return false;
+  if (fields.size() != 8) throw std::invalid_argument("found " + std::to_string(fields.size()) + " fields");
+  pose.time = parseTime(fields[0]);
+  std::array<double, 7> v{};
+  for (std::size_t i = 0; i < v.size(); ++i) v[i] = parseNumber(fields[i + 1]);
+  pose.p_W = {v[0], v[1], v[2]};
+  pose.q_WI = Eigen::Quaterniond(v[6], v[3], v[4], v[5]);
+  if (std::abs(pose.q_WI.norm() - 1.0) > 0.01) {
+    throw std::invalid_argument("the quaternion has norm " + std::to_string(pose.q_WI.norm()) + ", not 1");
+  }
+  pose.q_WI.normalize();
+  return true;
+}
+
+bool isDigit(char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; }
+
+}  // namespace
+
+Time parseTime(const std::string& text) {
+  const auto refuse = [&text]() -> std::invalid_argument {
+    return std::invalid_argument("'" + text + "' is not a time in seconds within +-9.2e9");
+  };
+  std::size_t at = 0;
+  const bool negative = !text.empty() && text[0] == '-';
+  if (negative || (!text.empty() && text[0] == '+')) ++at;
+
+  std::string digits;
+  for (; at < text.size() && isDigit(text[at]); ++at) digits += text[at];
+  long point = static_cast<long>(digits.size());  // the decimal point stands before digits[point]
+  if (at < text.size() && text[at] == '.') {
+    for (++at; at < text.size() && isDigit(text[at]); ++at) digits += text[at];
+  }
+  if (digits.empty()) throw refuse();
+  if (at < text.size() && (text[at] == 'e' || text[at] == 'E')) {  // as numpy.savetxt and evo write
+    const std::string exponent = text.substr(at + 1);
+    char* end = nullptr;
+    const long shift = std::strtol(exponent.c_str(), &end, 10);
+    if (end == exponent.c_str() || *end != '\0' || std::abs(shift) > 400) throw refuse();
+    point += shift;
+    at = text.size();
+  }
+  if (at != text.size()) throw refuse();
+
+  // Digits before the ninth decimal make up the nanoseconds; the next one rounds.
+  const long last = point + 9;
+  std::int64_t ns = 0;
+  for (long i = 0; i < last; ++i) {
+    const int digit = i < static_cast<long>(digits.size()) ? digits[static_cast<std::size_t>(i)] - '0' : 0;
+    if (ns > (std::numeric_limits<std::int64_t>::max() - 10) / 10) throw refuse();
+    ns = 10 * ns + digit;
+  }
+  if (last >= 0 && last < static_cast<long>(digits.size()) && digits[static_cast<std::size_t>(last)] >= '5')
+    ++ns;
+  return Time::fromNanoseconds(negative ? -ns : ns);
+}
+
+Trajectory readTum(std::istream& in, const std::string& name) {
+  Trajectory trajectory;
+  std::size_t number = 0;
+  for (std::string line; std::getline(in, line);) {
+    ++number;
+    StampedPose pose;
+    try {
+      if (!parseLine(line, pose)) continue;
+    } catch (const std::invalid_argument& error) {
+      fail(name, number, std::string(error.what()) + "; expected " + kLineFormat);
+    }
+    if (!trajectory.empty() && pose.time <= trajectory.back().time) {
+      fail(name, number, "the stamp does not come after the one before it; expected increasing stamps");
+    }
+    trajectory.push_back(pose);
+  }
+  if (in.bad()) throw std::runtime_error(name + ": cannot be read to the end");
+  return trajectory;
+}
+
+Trajectory readTum(const std::string& path) {
+  std::ifstream file(path);
+  if (!file) throw std::runtime_error(path + ": cannot be opened; expected a trajectory file (TUM format)");
+  return readTum(file, path);
+}
+
+void writeTumLine(std::ostream& out, const StampedPose& pose) {
+  // Sign, seconds and nanoseconds apart: no double holds all digits of a stamp.
+  const std::int64_t ns = pose.time.nanoseconds();
+  const std::int64_t second = 1000000000;
+  std::array<char, 256> text{};
+  std::snprintf(text.data(), text.size(), "%s%lld.%09lld %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n",
+                ns < 0 ? "-" : "", static_cast<long long>(std::abs(ns / second)),
+                static_cast<long long>(std::abs(ns % second)), pose.p_W.x(), pose.p_W.y(), pose.p_W.z(),
+                pose.q_WI.x(), pose.q_WI.y(), pose.q_WI.z(), pose.q_WI.w());
+  out << text.data();
+}
+
+void writeTum(const std::string& path, const Trajectory& trajectory) {
+  std::ofstream file(path);
+  for (const StampedPose& pose : trajectory) writeTumLine(file, pose);
+  file.flush();
+  if (!file) throw std::runtime_error(path + ": cannot be written");
+}
+
+std::vector<Match> associate(const Trajectory& truth, const Trajectory& estimate, double max_difference) {
+  const bool truth_is_longer = truth.size() >= estimate.size();
+  const Trajectory& shorter = truth_is_longer ? estimate : truth;
+  const Trajectory& longer = truth_is_longer ? truth : estimate;
+
+  std::vector<Match> matches;
+  if (longer.empty()) return matches;
+  matches.reserve(shorter.size());
+  std::size_t nearest = 0;
+  for (std::size_t i = 0; i < shorter.size(); ++i) {
+    const Time t = shorter[i].time;
+    // Stamps increase, so the search goes on where the last one ended.
+    while (nearest + 1 < longer.size() &&
+           std::abs(longer[nearest + 1].time - t) < std::abs(longer[nearest].time - t)) {
+      ++nearest;
+    }
+    if (std::abs(longer[nearest].time - t) > max_difference) continue;
+    matches.push_back(truth_is_longer ? Match{nearest, i} : Match{i, nearest});
+  }
+  return matches;
+}
+
+}  // namespace rio_t
