@@ -35,10 +35,15 @@ struct EgoVelocityOptions {
   double ransac_success_probability = 0.9999;
   std::uint32_t ransac_seed = 1;  ///< restarted at each scan: same scan, same answer
 
+  std::size_t min_inliers = 5;       ///< one velocity has three unknowns; the rest are witnesses
+  double min_inlier_fraction = 0.4;  ///< of the points after the filter; fewer agree by chance
+
   EgoVelocitySolver solver = EgoVelocitySolver::kErrorsInVariables;
-  double azimuth_sigma = 0.035;   ///< [rad] noise of a point's azimuth; only for kErrorsInVariables
-  double elevation_sigma = 0.07;  ///< [rad] noise of a point's elevation; only for kErrorsInVariables
-  double doppler_sigma = 0.02;    ///< [m/s] noise of the Doppler besides its quantisation
+  // Noise of a point, for kErrorsInVariables. The defaults are what the Doppler residuals of a walk with an
+  // IWR6843AOP show (0.022 rad, 0.045 rad, 0.032 m/s), rounded up: the solver takes them as upper bounds.
+  double azimuth_sigma = 0.03;    ///< [rad]
+  double elevation_sigma = 0.05;  ///< [rad]
+  double doppler_sigma = 0.035;   ///< [m/s] besides the quantisation
 
   double doppler_quantization = 0.125;                ///< [m/s] step of the radar's Doppler; 0 = none
   Eigen::Vector3d added_sigma = {0.05, 0.025, 0.05};  ///< [m/s] right, forward, up; added in quadrature

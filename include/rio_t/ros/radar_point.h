@@ -1,6 +1,5 @@
 #pragma once
 
-#define PCL_NO_PRECOMPILE
 #include <pcl/point_types.h>
 #include <pcl/register_point_struct.h>
 

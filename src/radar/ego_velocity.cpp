@@ -1,0 +1,273 @@
+#include "rio_t/radar/ego_velocity.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <random>
+#include <stdexcept>
+
+#include "velocity_solver.h"
+
+namespace rio_t {
+namespace {
+
+void require(bool holds, const char* option, const char* expected) {
+  if (!holds) throw std::invalid_argument(std::string("ego velocity: ") + option + " must be " + expected);
+}
+
+void validate(const EgoVelocityOptions& o) {
+  // Written so that NaN fails.
+  require(o.min_range >= 0.0, "min_range", "at least 0 m");
+  require(o.max_range > o.min_range, "max_range", "above min_range");
+  require(std::isfinite(o.min_snr_db), "min_snr_db", "finite");
+  require(o.max_azimuth > 0.0, "max_azimuth", "above 0 rad");
+  require(o.max_elevation > 0.0, "max_elevation", "above 0 rad");
+  require(o.zero_velocity_threshold >= 0.0, "zero_velocity_threshold", "at least 0 m/s");
+  require(o.zero_velocity_outlier_fraction >= 0.0 && o.zero_velocity_outlier_fraction < 1.0,
+          "zero_velocity_outlier_fraction", "in [0, 1)");
+  require(o.zero_velocity_sigma > 0.0, "zero_velocity_sigma", "above 0 m/s");
+  require(o.ransac_inlier_threshold > 0.0, "ransac_inlier_threshold", "above 0 m/s");
+  require(o.ransac_outlier_probability >= 0.0 && o.ransac_outlier_probability < 1.0,
+          "ransac_outlier_probability", "in [0, 1)");
+  require(o.ransac_success_probability > 0.0 && o.ransac_success_probability < 1.0,
+          "ransac_success_probability", "in (0, 1)");
+  require(o.min_inlier_fraction >= 0.0 && o.min_inlier_fraction <= 1.0, "min_inlier_fraction", "in [0, 1]");
+  require(o.azimuth_sigma >= 0.0 && o.azimuth_sigma < 0.5, "azimuth_sigma", "in [0, 0.5) rad");
+  require(o.elevation_sigma >= 0.0 && o.elevation_sigma < 0.5, "elevation_sigma", "in [0, 0.5) rad");
+  require(o.doppler_sigma >= 0.0, "doppler_sigma", "at least 0 m/s");
+  require(o.doppler_quantization >= 0.0, "doppler_quantization", "at least 0 m/s");
+  require((o.added_sigma.array() >= 0.0).all(), "added_sigma", "at least 0 m/s");
+  require(o.max_condition_number > 1.0, "max_condition_number", "above 1");
+  require(o.max_sigma > 0.0, "max_sigma", "above 0 m/s");
+}
+
+/// Draws needed so that one of them is free of outliers with the wanted probability (Fischler and Bolles,
+/// 1981).
+int ransacIterations(const EgoVelocityOptions& o) {
+  constexpr int kMax = 1000;
+  const double clean_draw = std::pow(1.0 - o.ransac_outlier_probability, 3);
+  if (clean_draw >= 1.0) return 1;
+  const double n = std::ceil(std::log(1.0 - o.ransac_success_probability) / std::log1p(-clean_draw));
+  return static_cast<int>(std::clamp(n, 1.0, static_cast<double>(kMax)));
+}
+
+std::vector<Direction> filter(const RadarScan& scan, const EgoVelocityOptions& o) {
+  std::vector<Direction> directions;
+  directions.reserve(scan.points.size());
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const RadarPoint& p = scan.points[i];
+    const double range = p.position_R.norm();
+    // At range zero there is no direction, whatever min_range says. NaN fails every comparison.
+    if (!(range > 0.0 && range >= o.min_range && range <= o.max_range)) continue;
+    if (!(p.snr_db >= o.min_snr_db) || !std::isfinite(p.doppler)) continue;
+    const Eigen::Vector3d u = p.position_R / range;
+    if (std::abs(std::atan2(u.x(), u.y())) > o.max_azimuth) continue;
+    if (std::abs(std::asin(std::clamp(u.z(), -1.0, 1.0))) > o.max_elevation) continue;
+    directions.push_back({u, p.doppler, i});
+  }
+  return directions;
+}
+
+/// Draws of indices without std::uniform_int_distribution, whose results differ between standard libraries.
+class IndexDraw {
+ public:
+  explicit IndexDraw(std::uint32_t seed) : engine_(seed) {}
+  /// In [0, n), n < 2^32.
+  std::size_t below(std::size_t n) {
+    return static_cast<std::size_t>((static_cast<std::uint64_t>(engine_()) * n) >> 32U);
+  }
+
+ private:
+  std::mt19937 engine_;
+};
+
+/// Velocity on which three directions agree; none where they lie (nearly) in a plane.
+bool solveThree(const Direction& a, const Direction& b, const Direction& c, Eigen::Vector3d& v_R) {
+  const Eigen::Vector3d bc = b.u_R.cross(c.u_R);
+  const double determinant = a.u_R.dot(bc);
+  if (std::abs(determinant) < 1e-4) return false;
+  v_R = (a.doppler * bc + b.doppler * c.u_R.cross(a.u_R) + c.doppler * a.u_R.cross(b.u_R)) / -determinant;
+  return true;
+}
+
+/// Velocity with the smallest truncated sum of squared residuals (MSAC: as RANSAC, but among velocities with
+/// equally many inliers the better fit wins). `points` has at least three. False: no three directions span
+/// 3D.
+bool ransac(const std::vector<Direction>& points, const EgoVelocityOptions& o, int iterations,
+            Eigen::Vector3d& v_R) {
+  const double limit = o.ransac_inlier_threshold * o.ransac_inlier_threshold;
+  const std::size_t n = points.size();
+  IndexDraw draw(o.ransac_seed);
+  double best = std::numeric_limits<double>::infinity();
+  for (int iteration = 0; iteration < iterations; ++iteration) {
+    const std::size_t i = draw.below(n);
+    std::size_t j = draw.below(n - 1);
+    if (j >= i) ++j;
+    std::size_t k = draw.below(n - 2);
+    if (k >= std::min(i, j)) ++k;
+    if (k >= std::max(i, j)) ++k;
+    Eigen::Vector3d v;
+    if (!solveThree(points[i], points[j], points[k], v)) continue;
+    double cost = 0.0;
+    for (const Direction& p : points) {
+      const double r = p.doppler + p.u_R.dot(v);
+      cost += std::min(r * r, limit);
+      if (cost >= best) break;
+    }
+    if (cost < best) {
+      best = cost;
+      v_R = v;
+    }
+  }
+  return best < std::numeric_limits<double>::infinity();
+}
+
+/// Points that agree with `v_R`: within the threshold, or within three sigma where the noise of the direction
+/// alone is larger than the threshold, as it is at speed.
+void selectInliers(const std::vector<Direction>& points, const Eigen::Vector3d& v_R,
+                   const EgoVelocityOptions& o, std::vector<Direction>& inliers) {
+  const bool knows_noise = o.solver == EgoVelocitySolver::kErrorsInVariables;
+  const double limit = o.ransac_inlier_threshold * o.ransac_inlier_threshold;
+  inliers.clear();
+  for (const Direction& p : points) {
+    const double r = p.doppler + p.u_R.dot(v_R);
+    if (r * r <= limit || (knows_noise && r * r <= 9.0 * residualVariance(p, v_R, o))) inliers.push_back(p);
+  }
+}
+
+VelocitySolution solve(const std::vector<Direction>& inliers, const EgoVelocityOptions& o) {
+  const VelocitySolution least_squares = solveLeastSquares(inliers, o);
+  if (!least_squares.solved || o.solver == EgoVelocitySolver::kLeastSquares) return least_squares;
+  return solveErrorsInVariables(inliers, least_squares.v_R, o);
+}
+
+/// Covariance at rest. A bin of width q reads zero for every |u . v| < q/2, and reads the same for all points
+/// at once, so more points do not average it away: all that is known is that v lies in the region where every
+/// inlier reads zero. That region lies in the ellipsoid v' M v < q^2/4, M = mean of u u'; a uniform density
+/// over an ellipsoid in 3D has the covariance M^-1 (q^2/4) / 5. False: the directions leave some velocity
+/// unseen.
+bool restCovariance(const std::vector<Direction>& inliers, const EgoVelocityOptions& o,
+                    Eigen::Matrix3d& covariance) {
+  Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
+  for (const Direction& p : inliers) mean += p.u_R * p.u_R.transpose();
+  mean /= static_cast<double>(inliers.size());
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(mean);
+  if (!(eigen.eigenvalues()[0] * o.max_condition_number > eigen.eigenvalues()[2])) return false;
+  const double q2 = o.doppler_quantization * o.doppler_quantization;
+  covariance = o.zero_velocity_sigma * o.zero_velocity_sigma * Eigen::Matrix3d::Identity() +
+               (q2 / 20.0) * eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
+                   eigen.eigenvectors().transpose();
+  return true;
+}
+
+double largestSigma(const Eigen::Matrix3d& covariance) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(covariance, Eigen::EigenvaluesOnly);
+  return std::sqrt(eigen.eigenvalues()[2]);
+}
+
+void storeInliers(const std::vector<Direction>& inliers, EgoVelocity& result) {
+  result.inliers.reserve(inliers.size());
+  for (const Direction& p : inliers) result.inliers.push_back(p.index);
+}
+
+}  // namespace
+
+EgoVelocityEstimator::EgoVelocityEstimator(const EgoVelocityOptions& options)
+    : options_(options), ransac_iterations_(ransacIterations(options)) {
+  validate(options);
+}
+
+EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan) const {
+  const EgoVelocityOptions& o = options_;
+  EgoVelocity result;
+  const std::vector<Direction> points = filter(scan, o);
+  result.points_used = points.size();
+  const auto n = static_cast<double>(points.size());
+  if (points.size() < 3) {
+    result.status = EgoVelocityStatus::kTooFewPoints;
+    return result;
+  }
+
+  std::vector<Direction> inliers;
+  inliers.reserve(points.size());
+  std::copy_if(points.begin(), points.end(), std::back_inserter(inliers),
+               [&](const Direction& p) { return std::abs(p.doppler) <= o.zero_velocity_threshold; });
+  if (n - static_cast<double>(inliers.size()) <= o.zero_velocity_outlier_fraction * n) {
+    storeInliers(inliers, result);
+    result.status = !restCovariance(inliers, o, result.covariance)  ? EgoVelocityStatus::kIllConditioned
+                    : largestSigma(result.covariance) > o.max_sigma ? EgoVelocityStatus::kSigmaTooLarge
+                                                                    : EgoVelocityStatus::kZeroVelocity;
+    return result;
+  }
+
+  Eigen::Vector3d v_R;
+  if (!ransac(points, o, ransac_iterations_, v_R)) {
+    result.status = EgoVelocityStatus::kIllConditioned;
+    return result;
+  }
+  selectInliers(points, v_R, o, inliers);
+  VelocitySolution solution = solve(inliers, o);
+  if (solution.solved) {
+    selectInliers(points, solution.v_R, o, inliers);
+    solution = solve(inliers, o);
+  }
+  storeInliers(inliers, result);
+  if (inliers.size() < o.min_inliers || static_cast<double>(inliers.size()) < o.min_inlier_fraction * n) {
+    result.status = EgoVelocityStatus::kTooFewInliers;
+    return result;
+  }
+  if (!solution.solved) {
+    result.status = EgoVelocityStatus::kIllConditioned;
+    return result;
+  }
+  result.v_R = solution.v_R;
+  result.covariance = solution.covariance;
+  result.covariance.diagonal() += o.added_sigma.cwiseAbs2();
+  result.status = largestSigma(result.covariance) > o.max_sigma ? EgoVelocityStatus::kSigmaTooLarge
+                                                                : EgoVelocityStatus::kMoving;
+  return result;
+}
+
+bool isValid(EgoVelocityStatus status) {
+  return status == EgoVelocityStatus::kMoving || status == EgoVelocityStatus::kZeroVelocity;
+}
+
+std::string toString(EgoVelocityStatus status) {
+  switch (status) {
+    case EgoVelocityStatus::kMoving:
+      return "moving";
+    case EgoVelocityStatus::kZeroVelocity:
+      return "zero_velocity";
+    case EgoVelocityStatus::kTooFewPoints:
+      return "too_few_points";
+    case EgoVelocityStatus::kTooFewInliers:
+      return "too_few_inliers";
+    case EgoVelocityStatus::kIllConditioned:
+      return "ill_conditioned";
+    case EgoVelocityStatus::kSigmaTooLarge:
+      return "sigma_too_large";
+  }
+  throw std::invalid_argument("ego velocity: not a status");
+}
+
+std::string toString(EgoVelocitySolver solver) {
+  switch (solver) {
+    case EgoVelocitySolver::kLeastSquares:
+      return "ls";
+    case EgoVelocitySolver::kErrorsInVariables:
+      return "eiv";
+  }
+  throw std::invalid_argument("ego velocity: not a solver");
+}
+
+EgoVelocitySolver egoVelocitySolverFromString(const std::string& name) {
+  if (name == "ls") return EgoVelocitySolver::kLeastSquares;
+  if (name == "eiv") return EgoVelocitySolver::kErrorsInVariables;
+  throw std::invalid_argument("ego velocity: solver must be ls or eiv, not '" + name + "'");
+}
+
+}  // namespace rio_t
