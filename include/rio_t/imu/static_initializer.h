@@ -22,8 +22,8 @@ struct StaticInitialization {
   Time time;                                            ///< of the last sample used
   Eigen::Quaterniond q_WI = Eigen::Quaterniond::Identity();  ///< levelled, yaw zero
   Eigen::Vector3d b_g = Eigen::Vector3d::Zero();        ///< mean gyro [rad/s]
-  double samples = 0;
-  double duration = 0;                                  ///< [s]
+  std::size_t samples = 0;
+  double duration = 0.0;                                ///< [s]
 };
 
 /// Waits for `duration` seconds of rest; any mounting (gravity on any axis).

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <ceres/sized_cost_function.h>
+
+namespace rio_t {
+
+/// The offset changes slowly, paper eq. (8)-(10): residual (t_O,k - t_O,k-1) / sigma. Blocks: t_O,k-1, t_O,k.
+class ConstantOffsetFactor final : public ceres::SizedCostFunction<1, 1, 1> {
+ public:
+  /// `sigma`: standard deviation of the change between the two states [s].
+  explicit ConstantOffsetFactor(double sigma) : weight_(1.0 / sigma) {}
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
+
+ private:
+  double weight_;
+};
+
+}  // namespace rio_t

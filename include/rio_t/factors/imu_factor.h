@@ -1,0 +1,35 @@
+#pragma once
+
+#include <ceres/sized_cost_function.h>
+
+#include "rio_t/factors/state_block.h"
+#include "rio_t/imu/noise.h"
+#include "rio_t/imu/preintegration.h"
+
+namespace rio_t {
+
+/// Preintegrated IMU between the states i and j, with bias random walk. Blocks: state i, state j.
+///
+/// Paper eq. (12); Forster et al. eq. (45). With d = b_i - b at integration, T the time between:
+///   e_R  = Log((dR Exp(dR_dbg d_g))^T R_i^T R_j)
+///   e_p  = R_i^T (p_j - p_i - v_i T - g T^2 / 2) - (dp + dp_dbg d_g + dp_dba d_a)
+///   e_v  = R_i^T (v_j - v_i - g T) - (dv + dv_dbg d_g + dv_dba d_a)
+///   e_bg = b_g,j - b_g,i,   e_ba = b_a,j - b_a,i
+/// all whitened with the covariance of the preintegration.
+class ImuFactor final : public ceres::SizedCostFunction<15, StateBlock::kSize, StateBlock::kSize> {
+ public:
+  ImuFactor(const Preintegration& preintegration, const ImuNoise& noise, const Eigen::Vector3d& g_W);
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
+
+ private:
+  Preintegration pre_;
+  Eigen::Vector3d g_W_;
+  Eigen::Matrix<double, 9, 9> whitening_;  ///< W with W'W = covariance^-1
+  double gyro_walk_weight_;
+  double accel_walk_weight_;
+};
+
+/// Mean of state j given state i: where the IMU carries it (right side of the factor set to zero).
+StateBlock predict(const StateBlock& state_i, const Preintegration& preintegration, const Eigen::Vector3d& g_W);
+
+}  // namespace rio_t

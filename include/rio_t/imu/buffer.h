@@ -1,0 +1,66 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <deque>
+
+#include "rio_t/imu/measurement.h"
+
+namespace rio_t {
+
+/// The recent IMU samples in time order, read as a piecewise linear signal.
+class ImuBuffer {
+ public:
+  /// Throws std::invalid_argument where `imu` is not later than the newest sample.
+  void add(const ImuMeasurement& imu);
+  /// Drops what lies before `time`, but keeps the sample that interpolation at `time` needs.
+  void dropBefore(Time time);
+  void clear() { samples_.clear(); }
+
+  bool empty() const { return samples_.empty(); }
+  std::size_t size() const { return samples_.size(); }
+  Time oldest() const { return samples_.front().time; }
+  Time newest() const { return samples_.back().time; }
+  bool covers(Time time) const { return !empty() && oldest() <= time && time <= newest(); }
+
+  /// Linear interpolation; outside of the samples the nearest one, with `time` as its time. Not on an empty buffer.
+  ImuMeasurement at(Time time) const;
+
+  /// Mean angular acceleration over [time - half_width, time + half_width] [rad/s^2], clipped to the samples.
+  Eigen::Vector3d angularAcceleration(Time time, double half_width) const;
+
+  /// Calls step(dt, angular_velocity, acceleration) for each interval between samples from `from` to `to`, with the
+  /// mean of both ends; the ends at `from` and `to` are interpolated. Backwards with dt < 0 where `to` < `from`.
+  template <typename Step>
+  void forEachInterval(Time from, Time to, Step&& step) const;
+
+ private:
+  std::size_t firstAfter(Time time) const;  ///< index of the first sample later than `time`; size() if none
+
+  std::deque<ImuMeasurement> samples_;
+};
+
+template <typename Step>
+void ImuBuffer::forEachInterval(Time from, Time to, Step&& step) const {
+  if (empty() || from == to) return;
+  const auto interval = [&](const ImuMeasurement& a, const ImuMeasurement& b) {
+    const double dt = b.time - a.time;
+    if (dt == 0.0) return;
+    step(dt, Eigen::Vector3d(0.5 * (a.angular_velocity + b.angular_velocity)),
+         Eigen::Vector3d(0.5 * (a.acceleration + b.acceleration)));
+  };
+  ImuMeasurement previous = at(from);
+  if (from < to) {
+    for (std::size_t i = firstAfter(from); i < samples_.size() && samples_[i].time < to; ++i) {
+      interval(previous, samples_[i]);
+      previous = samples_[i];
+    }
+  } else {
+    for (std::size_t i = firstAfter(from); i-- > 0 && samples_[i].time > to;) {
+      interval(previous, samples_[i]);
+      previous = samples_[i];
+    }
+  }
+  interval(previous, at(to));
+}
+
+}  // namespace rio_t

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <deque>
+#include <optional>
+
+#include "rio_t/imu/measurement.h"
+#include "rio_t/imu/noise.h"
+#include "rio_t/odometry/navigation_state.h"
+
+namespace rio_t {
+
+/// Carries the newest optimised state forward with the IMU: the paper's navigation thread. Not thread-safe.
+class Navigator {
+ public:
+  /// `g_W`: gravity in W [m/s^2].
+  Navigator(const ImuNoise& noise, const Eigen::Vector3d& g_W) : noise_(noise), g_W_(g_W) {}
+
+  /// State at this sample; none before the first anchor. Samples must be in time order.
+  std::optional<NavigationState> add(const ImuMeasurement& imu);
+
+  /// New optimised state, usually some 100 ms before the newest sample: everything since is integrated again.
+  void anchor(const NavigationState& state);
+
+ private:
+  void propagate(const ImuMeasurement& from, const ImuMeasurement& to);
+
+  ImuNoise noise_;         // read-only after construction
+  Eigen::Vector3d g_W_;    // read-only after construction
+  std::deque<ImuMeasurement> history_;
+  std::optional<NavigationState> state_;
+};
+
+}  // namespace rio_t

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <ceres/loss_function.h>
+
+#include <deque>
+#include <memory>
+#include <vector>
+
+#include "rio_t/core/pose.h"
+#include "rio_t/factors/constant_offset_factor.h"
+#include "rio_t/factors/imu_factor.h"
+#include "rio_t/factors/prior_factor.h"
+#include "rio_t/factors/radar_velocity_factor.h"
+#include "rio_t/factors/state_manifold.h"
+#include "rio_t/imu/buffer.h"
+#include "rio_t/smoother/chain.h"
+#include "rio_t/smoother/options.h"
+
+namespace rio_t {
+
+/// One node of the window as others see it.
+struct NodeEstimate {
+  Time time;
+  StateBlock x;
+  double t_O = 0.0;  ///< [s]
+};
+
+struct SolveReport {
+  int iterations = 0;
+  bool converged = false;
+};
+
+/// The paper's factor graph over the last `window` seconds, solved with Ceres; what leaves is marginalised.
+///
+/// Nodes are in the order of their times, whatever the order of arrival. Not thread-safe.
+class FixedLagSmoother {
+ public:
+  enum class AddResult { kAdded, kOlderThanWindow, kDuplicateStamp };
+
+  /// `imu` must outlive the smoother and keep what `imuNeededSince` says. `g_W` is gravity in W [m/s^2].
+  FixedLagSmoother(const SmootherOptions& options, const ImuNoise& noise, const Eigen::Vector3d& g_W,
+                   const ImuBuffer& imu);
+
+  /// Starts (or starts again) with one node at `time`; its prior comes from the options, with yaw and position
+  /// defining W.
+  void initialize(Time time, const StateBlock& x);
+
+  /// Where a scan stamped `stamp` puts its node: the stamp (constant_acceleration), or the time of measurement as
+  /// now estimated (imu). The IMU must cover it before `add`.
+  Time nodeTime(Time stamp) const;
+
+  AddResult add(const RadarVelocityMeasurement& z);
+  SolveReport optimize();
+  /// Marginalises what is older than the window; the nodes that left, oldest first.
+  std::vector<NodeEstimate> marginalize();
+
+  std::size_t size() const { return nodes_.size(); }
+  NodeEstimate node(std::size_t k) const { return {nodes_[k].time, nodes_[k].x, nodes_[k].t_O}; }
+  NodeEstimate newest() const { return node(nodes_.size() - 1); }
+  /// Marginal covariance of the newest node, at the present values.
+  NodeMatrix newestCovariance() const;
+  /// Samples of the IMU before this time are not needed any more.
+  Time imuNeededSince() const;
+
+ private:
+  struct RadarTerm {
+    Time stamp;
+    std::unique_ptr<ceres::CostFunction> cost;
+  };
+  struct Node {
+    Time time;
+    StateBlock x;
+    double t_O = 0.0;
+    std::unique_ptr<ImuFactor> imu_from_previous;                ///< null for the first node
+    std::unique_ptr<ConstantOffsetFactor> offset_from_previous;  ///< null for the first node
+    std::vector<RadarTerm> radar;
+  };
+
+  Node makeNode(Time time, const Node& previous) const;
+  void linkToPrevious(std::size_t k);
+  std::unique_ptr<ceres::CostFunction> makeRadarFactor(const RadarVelocityMeasurement& z, Time node_time) const;
+  ChainSystem linearize(std::size_t count) const;
+
+  SmootherOptions options_;   // these four: read-only after construction
+  ImuNoise noise_;
+  Eigen::Vector3d g_W_;
+  const ImuBuffer* imu_;
+  std::unique_ptr<ceres::LossFunction> loss_;  // null: none
+  StateManifold manifold_;
+  std::unique_ptr<PriorFactor> prior_;  // on the first node
+  std::deque<Node> nodes_;
+};
+
+}  // namespace rio_t

@@ -1,0 +1,90 @@
+#include "rio_t/factors/imu_factor.h"
+
+#include <Eigen/Cholesky>
+
+#include "rio_t/core/so3.h"
+
+namespace rio_t {
+
+ImuFactor::ImuFactor(const Preintegration& preintegration, const ImuNoise& noise, const Eigen::Vector3d& g_W)
+    : pre_(preintegration), g_W_(g_W) {
+  // W = L^-1 where L L' is the covariance.
+  whitening_.setIdentity();
+  pre_.covariance.llt().matrixL().solveInPlace(whitening_);
+  const double root_dt = std::sqrt(pre_.delta.dt);
+  gyro_walk_weight_ = 1.0 / (noise.gyro_random_walk * root_dt);
+  accel_walk_weight_ = 1.0 / (noise.accel_random_walk * root_dt);
+}
+
+bool ImuFactor::Evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
+  const StateView i(parameters[0]);
+  const StateView j(parameters[1]);
+  const ImuDelta& d = pre_.delta;
+  const double T = d.dt;
+  const Eigen::Vector3d d_bg = i.b_g - pre_.b_g;
+  const Eigen::Vector3d d_ba = i.b_a - pre_.b_a;
+
+  const Eigen::Vector3d dR_correction = d.dR_dbg * d_bg;
+  const Eigen::Matrix3d R_i_T = i.q_WI.toRotationMatrix().transpose();
+  const Eigen::Vector3d e_R = so3::log((d.dR * so3::exp(dR_correction)).conjugate() * i.q_WI.conjugate() * j.q_WI);
+  const Eigen::Vector3d p_I = R_i_T * (j.p_W - i.p_W - T * i.v_W - 0.5 * T * T * g_W_);
+  const Eigen::Vector3d v_I = R_i_T * (j.v_W - i.v_W - T * g_W_);
+
+  Eigen::Matrix<double, 9, 1> e;
+  e << e_R, p_I - (d.dp + d.dp_dbg * d_bg + d.dp_dba * d_ba), v_I - (d.dv + d.dv_dbg * d_bg + d.dv_dba * d_ba);
+  Eigen::Map<Eigen::Matrix<double, 15, 1>> r(residuals);
+  r.head<9>().noalias() = whitening_.triangularView<Eigen::Lower>() * e;
+  r.segment<3>(9) = gyro_walk_weight_ * (j.b_g - i.b_g);
+  r.segment<3>(12) = accel_walk_weight_ * (j.b_a - i.b_a);
+  if (jacobians == nullptr) return true;
+
+  using S = StateBlock;
+  const Eigen::Matrix3d Jr_inv = so3::rightJacobianInverse(e_R);
+  if (jacobians[0] != nullptr) {
+    Eigen::Map<StateJacobian<15>> J(jacobians[0]);
+    Eigen::Matrix<double, 9, S::kSize> E = Eigen::Matrix<double, 9, S::kSize>::Zero();
+    E.block<3, 3>(0, S::kQStored) = -Jr_inv * (j.q_WI.conjugate() * i.q_WI).toRotationMatrix();
+    E.block<3, 3>(0, S::kBgStored) = -Jr_inv * so3::exp(e_R).toRotationMatrix().transpose() *
+                                     so3::rightJacobian(dR_correction) * d.dR_dbg;
+    E.block<3, 3>(3, S::kQStored) = so3::hat(p_I);
+    E.block<3, 3>(3, S::kPStored) = -R_i_T;
+    E.block<3, 3>(3, S::kVStored) = -T * R_i_T;
+    E.block<3, 3>(3, S::kBgStored) = -d.dp_dbg;
+    E.block<3, 3>(3, S::kBaStored) = -d.dp_dba;
+    E.block<3, 3>(6, S::kQStored) = so3::hat(v_I);
+    E.block<3, 3>(6, S::kVStored) = -R_i_T;
+    E.block<3, 3>(6, S::kBgStored) = -d.dv_dbg;
+    E.block<3, 3>(6, S::kBaStored) = -d.dv_dba;
+    J.setZero();
+    J.topRows<9>().noalias() = whitening_.triangularView<Eigen::Lower>() * E;
+    J.block<3, 3>(9, S::kBgStored).diagonal().setConstant(-gyro_walk_weight_);
+    J.block<3, 3>(12, S::kBaStored).diagonal().setConstant(-accel_walk_weight_);
+  }
+  if (jacobians[1] != nullptr) {
+    Eigen::Map<StateJacobian<15>> J(jacobians[1]);
+    Eigen::Matrix<double, 9, S::kSize> E = Eigen::Matrix<double, 9, S::kSize>::Zero();
+    E.block<3, 3>(0, S::kQStored) = Jr_inv;
+    E.block<3, 3>(3, S::kPStored) = R_i_T;
+    E.block<3, 3>(6, S::kVStored) = R_i_T;
+    J.setZero();
+    J.topRows<9>().noalias() = whitening_.triangularView<Eigen::Lower>() * E;
+    J.block<3, 3>(9, S::kBgStored).diagonal().setConstant(gyro_walk_weight_);
+    J.block<3, 3>(12, S::kBaStored).diagonal().setConstant(accel_walk_weight_);
+  }
+  return true;
+}
+
+StateBlock predict(const StateBlock& state_i, const Preintegration& preintegration, const Eigen::Vector3d& g_W) {
+  const ImuDelta& d = preintegration.delta;
+  const Eigen::Vector3d d_bg = state_i.b_g() - preintegration.b_g;
+  const Eigen::Vector3d d_ba = state_i.b_a() - preintegration.b_a;
+  const Eigen::Quaterniond q_WI = state_i.q_WI();
+  const double T = d.dt;
+  StateBlock state_j = state_i;
+  state_j.q_WI() = (q_WI * d.dR * so3::exp(d.dR_dbg * d_bg)).normalized();
+  state_j.p_W() += T * state_i.v_W() + 0.5 * T * T * g_W + q_WI * (d.dp + d.dp_dbg * d_bg + d.dp_dba * d_ba);
+  state_j.v_W() += T * g_W + q_WI * (d.dv + d.dv_dbg * d_bg + d.dv_dba * d_ba);
+  return state_j;
+}
+
+}  // namespace rio_t

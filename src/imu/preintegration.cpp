@@ -1,0 +1,65 @@
+#include "rio_t/imu/preintegration.h"
+
+#include "rio_t/core/so3.h"
+
+namespace rio_t {
+
+void ImuDelta::step(double step_dt, const Eigen::Vector3d& omega, const Eigen::Vector3d& a) {
+  const Eigen::Vector3d half_angle = 0.5 * step_dt * omega;
+  const Eigen::Quaterniond half = so3::exp(half_angle);
+  const Eigen::Matrix3d half_T = half.toRotationMatrix().transpose();
+  const Eigen::Matrix3d R_mid = (dR * half).toRotationMatrix();
+  const Eigen::Vector3d a_i = R_mid * a;
+
+  // How the midpoint rotation moves with the gyro bias.
+  const Eigen::Matrix3d mid_dbg = half_T * dR_dbg - 0.5 * step_dt * so3::rightJacobian(half_angle);
+  const Eigen::Matrix3d a_dbg = -R_mid * so3::hat(a) * mid_dbg;
+
+  dp += dv * step_dt + 0.5 * step_dt * step_dt * a_i;
+  dp_dbg += dv_dbg * step_dt + 0.5 * step_dt * step_dt * a_dbg;
+  dp_dba += dv_dba * step_dt - 0.5 * step_dt * step_dt * R_mid;
+  dv += step_dt * a_i;
+  dv_dbg += step_dt * a_dbg;
+  dv_dba -= step_dt * R_mid;
+  dR_dbg = half_T * half_T * dR_dbg - step_dt * so3::rightJacobian(2.0 * half_angle);
+  dR = (dR * half * half).normalized();
+  dt += step_dt;
+}
+
+Preintegration preintegrate(const ImuBuffer& buffer, Time from, Time to, const Eigen::Vector3d& b_g,
+                            const Eigen::Vector3d& b_a, const ImuNoise& noise) {
+  Preintegration result;
+  result.b_g = b_g;
+  result.b_a = b_a;
+  const double gyro_variance = noise.gyro_density * noise.gyro_density;
+  const double accel_variance = noise.accel_density * noise.accel_density;
+
+  buffer.forEachInterval(from, to, [&](double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
+    const Eigen::Vector3d omega = gyro - b_g;
+    const Eigen::Vector3d a = accel - b_a;
+    const Eigen::Quaterniond half = so3::exp(0.5 * dt * omega);
+    const Eigen::Matrix3d half_T = half.toRotationMatrix().transpose();
+    const Eigen::Matrix3d R_mid = (result.delta.dR * half).toRotationMatrix();
+
+    // Error propagation (theta, p, v): P <- A P A' + Q, where A is identity but for the blocks below.
+    const Eigen::Matrix3d A_tt = half_T * half_T;
+    const Eigen::Matrix3d A_vt = -dt * R_mid * so3::hat(a) * half_T;
+    Eigen::Matrix<double, 9, 9> A = Eigen::Matrix<double, 9, 9>::Identity();
+    A.block<3, 3>(0, 0) = A_tt;
+    A.block<3, 3>(3, 0) = 0.5 * dt * A_vt;
+    A.block<3, 3>(3, 6) = dt * Eigen::Matrix3d::Identity();
+    A.block<3, 3>(6, 0) = A_vt;
+    result.covariance = A * result.covariance * A.transpose();
+    result.covariance.diagonal().segment<3>(0).array() += gyro_variance * dt;
+    // White acceleration noise over dt: position and velocity errors are correlated (double integration).
+    result.covariance.diagonal().segment<3>(3).array() += accel_variance * dt * dt * dt / 3.0;
+    result.covariance.block<3, 3>(3, 6).diagonal().array() += accel_variance * dt * dt / 2.0;
+    result.covariance.block<3, 3>(6, 3).diagonal().array() += accel_variance * dt * dt / 2.0;
+    result.covariance.diagonal().segment<3>(6).array() += accel_variance * dt;
+
+    result.delta.step(dt, omega, a);
+  });
+  return result;
+}
+
+}  // namespace rio_t

@@ -1,0 +1,83 @@
+#include "rio_t/imu/static_initializer.h"
+
+#include <cmath>
+#include <cstdio>
+
+namespace rio_t {
+namespace {
+
+struct Statistics {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  Eigen::Vector3d std = Eigen::Vector3d::Zero();
+};
+
+Statistics statistics(const std::vector<ImuMeasurement>& samples, Eigen::Vector3d ImuMeasurement::*member) {
+  Statistics result;
+  for (const ImuMeasurement& sample : samples) result.mean += sample.*member;
+  result.mean /= static_cast<double>(samples.size());
+  for (const ImuMeasurement& sample : samples) result.std += (sample.*member - result.mean).cwiseAbs2();
+  result.std = (result.std / static_cast<double>(samples.size())).cwiseSqrt();
+  return result;
+}
+
+std::string format(const char* text, double value, double limit) {
+  char line[200];
+  std::snprintf(line, sizeof line, text, value, limit);
+  return line;
+}
+
+}  // namespace
+
+Eigen::Quaterniond levelingRotation(const Eigen::Vector3d& f_I) {
+  return Eigen::Quaterniond::FromTwoVectors(f_I, Eigen::Vector3d::UnitZ());
+}
+
+StaticInitializer::StaticInitializer(const StaticInitializerOptions& options, double gravity)
+    : options_(options), gravity_(gravity) {}
+
+std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement& imu) {
+  samples_.push_back(imu);
+  const double collected = imu.time - samples_.front().time;
+  if (collected < options_.duration || samples_.size() < 10) {
+    // A reason that was reported stays until rest has been seen for a whole duration.
+    if (waiting_for_.rfind("rest", 0) != 0) {
+      waiting_for_ = format("standing still: %.1f of %.1f s seen", collected, options_.duration);
+    }
+    return std::nullopt;
+  }
+
+  const Statistics gyro = statistics(samples_, &ImuMeasurement::angular_velocity);
+  const Statistics accel = statistics(samples_, &ImuMeasurement::acceleration);
+  const double gravity_error = accel.mean.norm() - gravity_;
+  std::string fault;
+  if (gyro.std.maxCoeff() > options_.max_gyro_std) {
+    fault = format("rest: the gyro moves by %.3f rad/s (std), at most %.3f allowed", gyro.std.maxCoeff(),
+                   options_.max_gyro_std);
+  } else if (accel.std.maxCoeff() > options_.max_accel_std) {
+    fault = format("rest: the accelerometer moves by %.2f m/s^2 (std), at most %.2f allowed", accel.std.maxCoeff(),
+                   options_.max_accel_std);
+  } else if (gyro.mean.norm() > options_.max_gyro_mean) {
+    fault = format("rest: mean gyro %.3f rad/s, at most %.3f allowed: turning, or not in rad/s?", gyro.mean.norm(),
+                   options_.max_gyro_mean);
+  } else if (std::abs(gravity_error) > options_.max_gravity_error) {
+    fault = format("rest: mean accelerometer %.2f m/s^2 instead of gravity %.2f: accelerating, or not in m/s^2?",
+                   accel.mean.norm(), gravity_);
+  }
+  if (!fault.empty()) {
+    waiting_for_ = fault;
+    samples_.erase(samples_.begin(), samples_.begin() + static_cast<std::ptrdiff_t>(samples_.size() / 4 + 1));
+    return std::nullopt;
+  }
+
+  StaticInitialization result;
+  result.time = imu.time;
+  result.q_WI = levelingRotation(accel.mean);
+  result.b_g = gyro.mean;
+  result.samples = samples_.size();
+  result.duration = collected;
+  waiting_for_.clear();
+  samples_.clear();
+  return result;
+}
+
+}  // namespace rio_t

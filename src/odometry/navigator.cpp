@@ -1,0 +1,83 @@
+#include "rio_t/odometry/navigator.h"
+
+#include "rio_t/core/so3.h"
+#include "rio_t/factors/state_block.h"
+
+namespace rio_t {
+namespace {
+
+/// How far back an anchor may lie [s]; bounds the history.
+constexpr double kHistory = 5.0;
+
+}  // namespace
+
+std::optional<NavigationState> Navigator::add(const ImuMeasurement& imu) {
+  if (state_) {
+    propagate(history_.empty() ? imu : history_.back(), imu);
+  }
+  history_.push_back(imu);
+  while (imu.time - history_.front().time > kHistory) history_.pop_front();
+  return state_;
+}
+
+void Navigator::anchor(const NavigationState& state) {
+  state_ = state;
+  ImuMeasurement previous;
+  bool first = true;
+  for (const ImuMeasurement& imu : history_) {
+    if (imu.time > state.time) {
+      if (first) {
+        // No sample at the anchor's time is kept: hold the first one back to it.
+        previous = imu;
+      }
+      propagate(previous, imu);
+    }
+    previous = imu;
+    first = false;
+  }
+}
+
+void Navigator::propagate(const ImuMeasurement& from, const ImuMeasurement& to) {
+  NavigationState& x = *state_;
+  const double dt = to.time - x.time;
+  if (dt <= 0.0) return;
+  // Where the state lies between two samples, the signal is interpolated at the state.
+  const double span = to.time - from.time;
+  const double share = span > 0.0 ? std::min(1.0, dt / span) : 1.0;
+  const Eigen::Vector3d gyro = to.angular_velocity - 0.5 * share * (to.angular_velocity - from.angular_velocity);
+  const Eigen::Vector3d accel = to.acceleration - 0.5 * share * (to.acceleration - from.acceleration);
+  const Eigen::Vector3d omega = gyro - x.b_g;
+  const Eigen::Vector3d a = accel - x.b_a;
+
+  const Eigen::Quaterniond half = so3::exp(0.5 * dt * omega);
+  const Eigen::Matrix3d R_mid = (x.q_WI * half).toRotationMatrix();
+  const Eigen::Vector3d a_W = R_mid * a + g_W_;
+
+  // Error propagation P <- A P A' + Q; A is identity but for a few blocks.
+  const Eigen::Matrix3d half_T = half.toRotationMatrix().transpose();
+  using S = StateBlock;
+  StateCovariance A = StateCovariance::Identity();
+  const Eigen::Matrix3d A_vt = -dt * R_mid * so3::hat(a) * half_T;
+  A.block<3, 3>(S::kTheta, S::kTheta) = half_T * half_T;
+  A.block<3, 3>(S::kTheta, S::kBg).diagonal().setConstant(-dt);
+  A.block<3, 3>(S::kP, S::kTheta) = 0.5 * dt * A_vt;
+  A.block<3, 3>(S::kP, S::kV).diagonal().setConstant(dt);
+  A.block<3, 3>(S::kV, S::kTheta) = A_vt;
+  A.block<3, 3>(S::kV, S::kBa) = -dt * R_mid;
+  x.covariance = (A * x.covariance * A.transpose()).eval();
+  const auto addNoise = [&](int first, double density) {
+    x.covariance.diagonal().segment<3>(first).array() += density * density * dt;
+  };
+  addNoise(S::kTheta, noise_.gyro_density);
+  addNoise(S::kV, noise_.accel_density);
+  addNoise(S::kBg, noise_.gyro_random_walk);
+  addNoise(S::kBa, noise_.accel_random_walk);
+
+  x.p_W += dt * x.v_W + 0.5 * dt * dt * a_W;
+  x.v_W += dt * a_W;
+  x.q_WI = (x.q_WI * half * half).normalized();
+  x.angular_velocity = to.angular_velocity - x.b_g;
+  x.time = to.time;
+}
+
+}  // namespace rio_t

@@ -1,0 +1,262 @@
+#include "rio_t/odometry/radar_inertial_odometry.h"
+
+#include <cmath>
+#include <deque>
+#include <mutex>
+#include <utility>
+
+#include "rio_t/odometry/navigator.h"
+#include "rio_t/smoother/fixed_lag_smoother.h"
+
+namespace rio_t {
+namespace {
+
+/// The IMU must be this far past a scan's node [s], so that the factor's time may still move a little.
+constexpr double kImuMargin = 0.01;
+/// A scan stamped further ahead of the newest IMU sample is nonsense, not early [s].
+constexpr double kMaxStampAhead = 1.0;
+
+/// Counters of faults by name; shared by both halves.
+class FaultCounters {
+ public:
+  void count(const std::string& name) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++counts_[name];
+  }
+  std::map<std::string, std::uint64_t> get() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return counts_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<std::string, std::uint64_t> counts_;  // guarded by mutex_
+};
+
+}  // namespace
+
+struct RadarInertialOdometry::Impl {
+  explicit Impl(const OdometryOptions& options_in)
+      : options(options_in),
+        g_W(0.0, 0.0, -options.gravity),
+        navigator(options.imu_noise, g_W),
+        initializer(options.initialization, options.gravity),
+        ego_velocity_estimator(options.ego_velocity),
+        feasibility(options.feasibility),
+        smoother(options.smoother, options.imu_noise, g_W, imu) {
+    waiting_for = initializer.waitingFor();
+  }
+
+  void drainInbox();
+  void tryInitialize(const ImuMeasurement& sample);
+  std::optional<ScanResult> tryScan(const RadarScan& scan, bool imu_has_ended);
+  void useInWindow(ScanResult& result);
+  NavigationState newestState(const NodeMatrix& covariance) const;
+
+  const OdometryOptions options;
+  const Eigen::Vector3d g_W;
+  FaultCounters faults;
+
+  // The navigation half; guarded by navigation_mutex, held for microseconds.
+  std::mutex navigation_mutex;
+  Navigator navigator;
+  std::optional<Time> newest_imu;
+
+  // From the feeding threads to the optimisation half; guarded by inbox_mutex.
+  mutable std::mutex inbox_mutex;
+  std::vector<ImuMeasurement> imu_inbox;
+  std::vector<RadarScan> scan_inbox;
+  bool is_initialized = false;
+  std::string waiting_for;
+
+  // The optimisation half; only the thread in process() touches these.
+  ImuBuffer imu;
+  StaticInitializer initializer;
+  EgoVelocityEstimator ego_velocity_estimator;
+  FeasibilityCheck feasibility;
+  FixedLagSmoother smoother;
+  std::deque<RadarScan> waiting_scans;
+  std::vector<ImuMeasurement> imu_drained;
+};
+
+RadarInertialOdometry::RadarInertialOdometry(const OdometryOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+RadarInertialOdometry::~RadarInertialOdometry() = default;
+RadarInertialOdometry::RadarInertialOdometry(RadarInertialOdometry&&) noexcept = default;
+RadarInertialOdometry& RadarInertialOdometry::operator=(RadarInertialOdometry&&) noexcept = default;
+
+std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasurement& sample) {
+  Impl& m = *impl_;
+  if (!sample.angular_velocity.allFinite() || !sample.acceleration.allFinite()) {
+    m.faults.count("imu_not_finite");
+    return std::nullopt;
+  }
+  std::optional<NavigationState> state;
+  {
+    const std::lock_guard<std::mutex> lock(m.navigation_mutex);
+    if (m.newest_imu && sample.time <= *m.newest_imu) {
+      m.faults.count("imu_out_of_order");
+      return std::nullopt;
+    }
+    if (m.newest_imu && sample.time - *m.newest_imu > m.options.max_imu_gap) m.faults.count("imu_gap");
+    m.newest_imu = sample.time;
+    state = m.navigator.add(sample);
+  }
+  const std::lock_guard<std::mutex> lock(m.inbox_mutex);
+  m.imu_inbox.push_back(sample);
+  return state;
+}
+
+void RadarInertialOdometry::addScan(RadarScan scan) {
+  const std::lock_guard<std::mutex> lock(impl_->inbox_mutex);
+  impl_->scan_inbox.push_back(std::move(scan));
+}
+
+std::vector<ScanResult> RadarInertialOdometry::process() {
+  Impl& m = *impl_;
+  m.drainInbox();
+  std::vector<ScanResult> results;
+  for (auto scan = m.waiting_scans.begin(); scan != m.waiting_scans.end();) {
+    if (std::optional<ScanResult> result = m.tryScan(*scan, false)) {
+      results.push_back(std::move(*result));
+      scan = m.waiting_scans.erase(scan);
+    } else {
+      ++scan;
+    }
+  }
+  while (m.waiting_scans.size() > m.options.max_queued_scans) {
+    ScanResult result;
+    result.scan = std::move(m.waiting_scans.front());
+    result.rejected_because = "queue_full";
+    results.push_back(std::move(result));
+    m.waiting_scans.pop_front();
+  }
+  return results;
+}
+
+std::vector<ScanResult> RadarInertialOdometry::finish() {
+  Impl& m = *impl_;
+  std::vector<ScanResult> results = process();
+  for (const RadarScan& scan : m.waiting_scans) results.push_back(*m.tryScan(scan, true));
+  m.waiting_scans.clear();
+  if (!initialized()) return results;
+  // The poses still in the window belong to the last scan.
+  if (results.empty()) results.emplace_back();
+  for (std::size_t k = 0; k < m.smoother.size(); ++k) {
+    const NodeEstimate node = m.smoother.node(k);
+    results.back().left_window.push_back({node.time, node.x.p_W(), node.x.q_WI()});
+  }
+  return results;
+}
+
+void RadarInertialOdometry::Impl::drainInbox() {
+  imu_drained.clear();
+  {
+    const std::lock_guard<std::mutex> lock(inbox_mutex);
+    std::swap(imu_drained, imu_inbox);
+    for (RadarScan& scan : scan_inbox) waiting_scans.push_back(std::move(scan));
+    scan_inbox.clear();
+  }
+  for (const ImuMeasurement& sample : imu_drained) {
+    imu.add(sample);
+    if (smoother.size() == 0) tryInitialize(sample);
+  }
+  if (smoother.size() > 0) imu.dropBefore(smoother.imuNeededSince());
+}
+
+void RadarInertialOdometry::Impl::tryInitialize(const ImuMeasurement& sample) {
+  const std::optional<StaticInitialization> rest = initializer.add(sample);
+  if (rest) {
+    StateBlock x;
+    x.q_WI() = rest->q_WI;
+    x.b_g() = rest->b_g;
+    smoother.initialize(rest->time, x);
+    const NavigationState state = newestState(smoother.newestCovariance());
+    const std::lock_guard<std::mutex> lock(navigation_mutex);
+    navigator.anchor(state);
+  } else {
+    imu.dropBefore(sample.time - 2.0 * options.smoother.max_time_offset);
+  }
+  const std::lock_guard<std::mutex> lock(inbox_mutex);
+  is_initialized = rest.has_value();
+  waiting_for = initializer.waitingFor();
+}
+
+std::optional<ScanResult> RadarInertialOdometry::Impl::tryScan(const RadarScan& scan, bool imu_has_ended) {
+  ScanResult result;
+  const auto rejected = [&](const char* reason) {
+    result.rejected_because = reason;
+    result.scan = scan;
+    return result;
+  };
+  if (smoother.size() == 0) return rejected("before_initialization");
+
+  const Time node_time = smoother.nodeTime(scan.stamp);
+  if (node_time - imu.newest() > kMaxStampAhead) return rejected("stamp_ahead_of_imu");
+  if (!imu.covers(node_time + kImuMargin)) {
+    if (imu_has_ended) return rejected("imu_not_covering");
+    if (node_time > imu.newest() - kImuMargin) return std::nullopt;  // wait for the IMU
+    return rejected("older_than_window");
+  }
+
+  result.ego_velocity = ego_velocity_estimator.estimate(scan);
+  if (!isValid(result.ego_velocity.status)) return rejected(toString(result.ego_velocity.status).c_str());
+  if (!feasibility.accept(scan.stamp, result.ego_velocity.v_R)) return rejected("infeasible_velocity");
+
+  const Eigen::Matrix3d R_RI = options.T_IR.q_IR.conjugate().toRotationMatrix();
+  switch (smoother.add({scan.stamp, result.ego_velocity.v_R, result.ego_velocity.covariance, R_RI, options.T_IR.l_I})) {
+    case FixedLagSmoother::AddResult::kOlderThanWindow:
+      return rejected("older_than_window");
+    case FixedLagSmoother::AddResult::kDuplicateStamp:
+      return rejected("duplicate_stamp");
+    case FixedLagSmoother::AddResult::kAdded:
+      break;
+  }
+  result.scan = scan;
+  useInWindow(result);
+  return result;
+}
+
+void RadarInertialOdometry::Impl::useInWindow(ScanResult& result) {
+  const SolveReport solve = smoother.optimize();
+  result.used = true;
+  result.solver_iterations = solve.iterations;
+  result.solver_converged = solve.converged;
+  for (const NodeEstimate& node : smoother.marginalize()) {
+    result.left_window.push_back({node.time, node.x.p_W(), node.x.q_WI()});
+  }
+  const NodeMatrix covariance = smoother.newestCovariance();
+  result.state = newestState(covariance);
+  result.time_offset = smoother.newest().t_O;
+  result.time_offset_sigma =
+      options.smoother.estimate_time_offset ? std::sqrt(covariance(StateBlock::kTangent, StateBlock::kTangent)) : 0.0;
+  const std::lock_guard<std::mutex> lock(navigation_mutex);
+  navigator.anchor(result.state);
+}
+
+NavigationState RadarInertialOdometry::Impl::newestState(const NodeMatrix& covariance) const {
+  const NodeEstimate newest = smoother.newest();
+  NavigationState state;
+  state.time = newest.time;
+  state.q_WI = newest.x.q_WI();
+  state.p_W = newest.x.p_W();
+  state.v_W = newest.x.v_W();
+  state.b_g = newest.x.b_g();
+  state.b_a = newest.x.b_a();
+  state.angular_velocity = imu.at(newest.time).angular_velocity - state.b_g;
+  state.covariance = covariance.topLeftCorner<StateBlock::kTangent, StateBlock::kTangent>();
+  return state;
+}
+
+bool RadarInertialOdometry::initialized() const {
+  const std::lock_guard<std::mutex> lock(impl_->inbox_mutex);
+  return impl_->is_initialized;
+}
+
+std::string RadarInertialOdometry::waitingFor() const {
+  const std::lock_guard<std::mutex> lock(impl_->inbox_mutex);
+  return impl_->waiting_for;
+}
+
+std::map<std::string, std::uint64_t> RadarInertialOdometry::faults() const { return impl_->faults.get(); }
+
+}  // namespace rio_t
