@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace rio_t {
+
+/// The value of a parameter wherever it came from: a YAML file, the command line, the ROS parameter server.
+struct ParameterValue {
+  struct Map {};  ///< nested keys: no parameter takes any, but the fault must be nameable
+  using List = std::vector<ParameterValue>;
+  std::variant<std::monostate, bool, std::int64_t, double, std::string, List, Map> data;
+
+  /// For messages: `0.25`, `"text"`, `[1, 2]`, `nothing`.
+  std::string describe() const;
+};
+
+/// What plain (unquoted) YAML text stands for: truth value, integer, number, nothing, else text.
+ParameterValue parsePlainScalar(const std::string& text);
+
+/// One key with its value. `origin` says where it was read, for messages: "config/irs.yaml:12", "--set".
+struct ParameterEntry {
+  std::string key;
+  ParameterValue value;
+  std::string origin;
+};
+using ParameterEntries = std::vector<ParameterEntry>;
+
+/// Reads a flat YAML file; throws std::runtime_error with one line naming file, line and what was expected.
+ParameterEntries readParameterFile(const std::string& path);
+
+/// Reads `key=value` with the value as YAML (`--set`); throws std::invalid_argument.
+ParameterEntry parseAssignment(const std::string& text);
+
+}  // namespace rio_t

@@ -1,0 +1,188 @@
+#include "parameter_list.h"
+
+#include <cmath>
+#include <locale>
+#include <optional>
+#include <sstream>
+
+namespace rio_t {
+namespace {
+
+std::string boundText(double bound) {
+  std::string text = numberText(bound);
+  if (text.size() > 2 && text.compare(text.size() - 2, 2, ".0") == 0) text.resize(text.size() - 2);
+  return text;
+}
+
+std::optional<double> asNumber(const ParameterValue& value) {
+  if (const double* real = std::get_if<double>(&value.data)) return *real;
+  if (const std::int64_t* whole = std::get_if<std::int64_t>(&value.data)) return static_cast<double>(*whole);
+  // Python's YAML reader, which fills the parameter server, takes 1e-3 for text (it wants 1.0e-3).
+  if (const std::string* text = std::get_if<std::string>(&value.data)) {
+    if (text->find_first_of("eE") == std::string::npos) return std::nullopt;
+    const ParameterValue plain = parsePlainScalar(*text);
+    if (const double* real = std::get_if<double>(&plain.data)) return *real;
+  }
+  return std::nullopt;
+}
+
+/// `count` numbers in `range`, or nothing.
+std::optional<std::vector<double>> asNumbers(const ParameterValue& value, std::size_t count, Range range) {
+  const ParameterValue::List* list = std::get_if<ParameterValue::List>(&value.data);
+  if (list == nullptr || list->size() != count) return std::nullopt;
+  std::vector<double> numbers;
+  for (const ParameterValue& element : *list) {
+    const std::optional<double> x = asNumber(element);
+    if (!x || !range.contains(*x)) return std::nullopt;
+    numbers.push_back(*x);
+  }
+  return numbers;
+}
+
+std::string listText(std::initializer_list<double> numbers) {
+  std::string text = "[";
+  for (const double x : numbers) text += (text.size() > 1 ? ", " : "") + numberText(x);
+  return text + "]";
+}
+
+}  // namespace
+
+std::string numberText(double value) {
+  std::string text;
+  for (int digits = 1; digits <= 17; ++digits) {
+    std::ostringstream stream;
+    stream.imbue(std::locale::classic());
+    stream.precision(digits);
+    stream << value;
+    text = stream.str();
+    std::istringstream back(text);
+    back.imbue(std::locale::classic());
+    double read = 0.0;
+    back >> read;
+    if (read == value) break;
+  }
+  if (text.find('.') == std::string::npos) {
+    const std::size_t exponent = text.find('e');
+    text.insert(exponent == std::string::npos ? text.size() : exponent, ".0");
+  }
+  return text;
+}
+
+std::string quotedText(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') result += '\\';
+    result += c;
+  }
+  return result + '"';
+}
+
+bool Range::contains(double x) const {
+  return (min_open ? x > min : x >= min) && (max_open ? x < max : x <= max) && std::isfinite(x);
+}
+
+std::string Range::text() const {
+  std::string text;
+  if (std::isfinite(min)) text += (min_open ? " above " : " of at least ") + boundText(min);
+  if (std::isfinite(max)) {
+    text += (text.empty() ? "" : " and") + std::string(max_open ? " below " : " at most ") + boundText(max);
+  }
+  return text;
+}
+
+void ParameterList::add(const std::string& key, const std::string& unit, const std::string& expected,
+                        const std::string& meaning, std::function<bool(const ParameterValue&)> set,
+                        std::function<std::string()> print) {
+  all_.push_back({{key, group_, unit, expected, meaning}, std::move(set), std::move(print)});
+}
+
+void ParameterList::number(const std::string& key, const std::string& unit, Range range, double& member,
+                           const std::string& meaning) {
+  add(
+      key, unit, "a finite number" + range.text(), meaning,
+      [range, &member](const ParameterValue& value) {
+        const std::optional<double> x = asNumber(value);
+        if (!x || !range.contains(*x)) return false;
+        member = *x;
+        return true;
+      },
+      [&member] { return numberText(member); });
+}
+
+void ParameterList::boolean(const std::string& key, bool& member, const std::string& meaning) {
+  add(
+      key, "", "true or false", meaning,
+      [&member](const ParameterValue& value) {
+        const bool* x = std::get_if<bool>(&value.data);
+        if (x == nullptr) return false;
+        member = *x;
+        return true;
+      },
+      [&member] { return std::string(member ? "true" : "false"); });
+}
+
+void ParameterList::vector3(const std::string& key, const std::string& unit, Range range,
+                            Eigen::Vector3d& member, const std::string& meaning) {
+  const std::string each = range.text();
+  add(
+      key, unit, "a list of 3 finite numbers" + (each.empty() ? "" : ", each" + each), meaning,
+      [range, &member](const ParameterValue& value) {
+        const auto x = asNumbers(value, 3, range);
+        if (!x) return false;
+        member = Eigen::Vector3d((*x)[0], (*x)[1], (*x)[2]);
+        return true;
+      },
+      [&member] {
+        return listText({member.x(), member.y(), member.z()});
+      });
+}
+
+void ParameterList::rotation(const std::string& key, Eigen::Quaterniond& member, const std::string& meaning) {
+  add(
+      key, "", "a list of 4 finite numbers x, y, z, w of norm 1 (to 0.001)", meaning,
+      [&member](const ParameterValue& value) {
+        const auto x = asNumbers(value, 4, Range{});
+        if (!x) return false;
+        const Eigen::Quaterniond q((*x)[3], (*x)[0], (*x)[1], (*x)[2]);
+        if (std::abs(q.norm() - 1.0) > 1e-3) return false;
+        // Typed with fewer digits than a double has; one that is exact stays as it is.
+        member = std::abs(q.norm() - 1.0) < 1e-15 ? q : q.normalized();
+        return true;
+      },
+      [&member] {
+        return listText({member.x(), member.y(), member.z(), member.w()});
+      });
+}
+
+void ParameterList::text(const std::string& key, std::string& member, const std::string& meaning) {
+  add(
+      key, "", "text, not empty", meaning,
+      [&member](const ParameterValue& value) {
+        const std::string* x = std::get_if<std::string>(&value.data);
+        if (x == nullptr || x->empty()) return false;
+        member = *x;
+        return true;
+      },
+      [&member] { return quotedText(member); });
+}
+
+void ParameterList::textOrEmpty(const std::string& key, std::string& member, const std::string& meaning) {
+  add(
+      key, "", "text, may be empty", meaning,
+      [&member](const ParameterValue& value) {
+        const std::string* x = std::get_if<std::string>(&value.data);
+        if (x == nullptr) return false;
+        member = *x;
+        return true;
+      },
+      [&member] { return quotedText(member); });
+}
+
+void ParameterList::word(const std::string& key, const std::vector<std::string>& words, std::string& member,
+                         const std::string& meaning) {
+  std::vector<std::pair<std::string, std::string>> choices;
+  for (const std::string& each : words) choices.emplace_back(each, each);
+  choice<std::string>(key, choices, member, meaning);
+}
+
+}  // namespace rio_t

@@ -1,0 +1,236 @@
+#include "parameter_list.h"
+
+// Each key once: its unit, its range, its member and its meaning. Loading, checking, the fault messages and
+// config/estimator.yaml all come from here.
+namespace rio_t {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+Range anyNumber() { return {}; }
+Range atLeast(double min) { return {min, anyNumber().max, false, false}; }
+Range above(double min) { return {min, anyNumber().max, true, false}; }
+Range above(double min, double max) { return {min, max, true, false}; }
+Range between(double min, double max) { return {min, max, false, false}; }
+Range inside(double min, double max) { return {min, max, true, true}; }
+
+void listTopics(ParameterList& list, Config& c) {
+  list.group("Topics");
+  list.text("imu_topic", c.imu_topic, "sensor_msgs/Imu");
+  list.text("radar_topic", c.radar_topic, "sensor_msgs/PointCloud2");
+  list.textOrEmpty(
+      "trigger_topic", c.trigger_topic,
+      "std_msgs/Header, stamped in the IMU clock when a scan starts; only read with stamp_source: trigger");
+  list.textOrEmpty("ground_truth_topic", c.ground_truth_topic,
+                   "geometry_msgs/PoseStamped of the IMU, for the errors in summary.yaml; bag runner only");
+}
+
+void listStamps(ParameterList& list, Config& c) {
+  list.group("Stamps of the scans");
+  list.choice<StampSource>(
+      "stamp_source",
+      {{"header", StampSource::kHeader},
+       {"trigger", StampSource::kTrigger},
+       {"arrival", StampSource::kArrival}},
+      c.stamp_source,
+      "header of the cloud, its trigger message, or its time of arrival carried over into the IMU clock");
+  list.number("radar_stamp_shift", "s", anyNumber(), c.radar_stamp_shift,
+              "added to the stamp of every scan; a known delay goes here with a minus sign");
+}
+
+void listFrames(ParameterList& list, Config& c) {
+  list.group("Frames");
+  list.text("odom_frame", c.odom_frame, "world frame, z up, starts at the IMU");
+  list.text("base_link_frame", c.base_link_frame, "frame of the IMU");
+  list.text("radar_frame", c.radar_frame, "frame of the radar: x right, y forward, z up");
+  list.boolean("publish_tf", c.publish_tf, "publish odom_frame -> base_link_frame; live node only");
+}
+
+void listPointCloud(ParameterList& list, Config& c) {
+  list.group("Point cloud: a preset, and what differs from it (\"\" and 0: as in the preset)");
+  list.word("radar_format", pointCloudPresets(), c.radar_format,
+            "layout of the cloud: names, axes, sign and power");
+  list.word("radar_coordinates", {"", "cartesian", "spherical"}, c.radar_overrides.coordinates,
+            "positions as x, y, z or as azimuth, elevation, range");
+  list.word("radar_axes", {"", "rfu", "flu"}, c.radar_overrides.axes,
+            "x right, y forward, z up (rfu) or x forward, y left, z up (flu)");
+  list.textOrEmpty("radar_field_x", c.radar_overrides.x, "name of the field, as the next ones");
+  list.textOrEmpty("radar_field_y", c.radar_overrides.y, "position [m]");
+  list.textOrEmpty("radar_field_z", c.radar_overrides.z, "position [m]");
+  list.textOrEmpty("radar_field_azimuth", c.radar_overrides.azimuth,
+                   "from forward to the lateral axis [rad]");
+  list.textOrEmpty("radar_field_elevation", c.radar_overrides.elevation, "positive up [rad]");
+  list.textOrEmpty("radar_field_range", c.radar_overrides.range, "distance [m]");
+  list.textOrEmpty("radar_field_doppler", c.radar_overrides.doppler, "range rate [m/s]");
+  list.integer("radar_doppler_sign", between(-1, 1), c.radar_overrides.doppler_sign,
+               "+1: the field is positive for receding targets, -1: for approaching ones");
+  list.textOrEmpty("radar_field_power", c.radar_overrides.power, "signal to noise, in radar_power_unit");
+  list.word("radar_power_unit", {"", "snr_db", "snr_decidb", "snr_linear", "not_snr"},
+            c.radar_overrides.power_unit,
+            "not_snr: the field is not read and radar_min_snr_db does not apply");
+  list.word("radar_cloud_size", {"", "declared", "from_data"}, c.radar_overrides.size,
+            "number of points: width * height, or what the data hold (drivers that leave those at zero)");
+}
+
+void listExtrinsics(ParameterList& list, Config& c) {
+  list.group("T_IR: pose of the radar (x right, y forward, z up) in the IMU frame");
+  list.vector3("extrinsics_translation", "m", between(-100, 100), c.odometry.T_IR.l_I,
+               "origin of the radar in the IMU frame, x, y, z");
+  list.rotation("extrinsics_rotation_xyzw", c.odometry.T_IR.q_IR, "turns radar vectors into the IMU frame");
+}
+
+void listImu(ParameterList& list, Config& c) {
+  list.group("IMU");
+  list.number("gravity", "m/s^2", between(9.5, 10.0), c.odometry.gravity,
+              "magnitude of gravity at the place");
+  list.number("imu_accel_noise_density", "m/s^2/sqrt(Hz)", above(0), c.odometry.imu_noise.accel_density,
+              "white noise of the accelerometer");
+  list.number("imu_gyro_noise_density", "rad/s/sqrt(Hz)", above(0), c.odometry.imu_noise.gyro_density,
+              "white noise of the gyro");
+  list.number("imu_accel_random_walk", "m/s^3/sqrt(Hz)", above(0), c.odometry.imu_noise.accel_random_walk,
+              "random walk of the accelerometer's bias");
+  list.number("imu_gyro_random_walk", "rad/s^2/sqrt(Hz)", above(0), c.odometry.imu_noise.gyro_random_walk,
+              "random walk of the gyro's bias");
+  list.number("max_imu_gap", "s", above(0), c.odometry.max_imu_gap,
+              "longest time between samples that is not reported");
+}
+
+void listInitialization(ParameterList& list, Config& c) {
+  StaticInitializerOptions& init = c.odometry.initialization;
+  list.group("Initialisation at rest");
+  list.number("init_duration", "s", above(0), init.duration,
+              "rest that is averaged for attitude and gyro bias");
+  list.number("init_max_gyro_std", "rad/s", above(0), init.max_gyro_std,
+              "of an axis; above, the platform moves");
+  list.number("init_max_accel_std", "m/s^2", above(0), init.max_accel_std,
+              "of an axis; above, the platform moves");
+  list.number("init_max_gyro_mean", "rad/s", above(0), init.max_gyro_mean,
+              "of an axis; a larger mean is a rotation, not a bias");
+  list.number("init_max_gravity_error", "m/s^2", above(0), init.max_gravity_error,
+              "difference of the mean accelerometer's norm from gravity");
+}
+
+void listEgoVelocity(ParameterList& list, Config& c) {
+  EgoVelocityOptions& radar = c.odometry.ego_velocity;
+  list.group("Radar: which points count, and the velocity from them");
+  list.number("radar_min_range", "m", atLeast(0), radar.min_range, "nearer points are left out");
+  list.number("radar_max_range", "m", above(0), radar.max_range, "farther points are left out");
+  list.number("radar_min_snr_db", "dB", anyNumber(), radar.min_snr_db, "weaker points are left out");
+  list.number("radar_max_azimuth", "rad", above(0, kPi), radar.max_azimuth,
+              "field of view to either side of forward");
+  list.number("radar_max_elevation", "rad", above(0, kPi / 2), radar.max_elevation,
+              "field of view up and down");
+  list.number("zero_velocity_threshold", "m/s", atLeast(0), radar.zero_velocity_threshold,
+              "a Doppler below counts as zero");
+  list.number("zero_velocity_outlier_fraction", "", between(0, 1), radar.zero_velocity_outlier_fraction,
+              "share of Dopplers that may exceed it at rest");
+  list.number("zero_velocity_sigma", "m/s", above(0), radar.zero_velocity_sigma,
+              "standard deviation per axis, at rest");
+  list.number("ransac_inlier_threshold", "m/s", above(0), radar.ransac_inlier_threshold,
+              "Doppler residual of an inlier");
+  list.number("ransac_outlier_probability", "", Range{0, 1, false, true}, radar.ransac_outlier_probability,
+              "share of outliers that is reckoned with");
+  list.number("ransac_success_probability", "", inside(0, 1), radar.ransac_success_probability,
+              "of drawing inliers only, once; sets the number of draws");
+  list.integer("ransac_seed", atLeast(0), radar.ransac_seed,
+               "restarted at each scan: same scan, same answer");
+  list.choice<EgoVelocitySolver>(
+      "ego_velocity_solver",
+      {{"ls", EgoVelocitySolver::kLeastSquares}, {"eiv", EgoVelocitySolver::kErrorsInVariables}},
+      radar.solver,
+      "plain least squares, or weighted by direction noise and freed of its bias (errors in variables)");
+  list.number("radar_azimuth_sigma", "rad", atLeast(0), radar.azimuth_sigma,
+              "noise of a point's azimuth; eiv only");
+  list.number("radar_elevation_sigma", "rad", atLeast(0), radar.elevation_sigma,
+              "noise of a point's elevation; eiv only");
+  list.number("radar_doppler_sigma", "m/s", atLeast(0), radar.doppler_sigma,
+              "noise of the Doppler besides its steps");
+  list.number("radar_doppler_step", "m/s", atLeast(0), radar.doppler_quantization,
+              "step in which the radar gives the Doppler; 0: none");
+  list.vector3("ego_velocity_added_sigma", "m/s", atLeast(0), radar.added_sigma,
+               "added in quadrature: right, forward, up");
+  list.number("ego_velocity_max_condition_number", "", atLeast(1), radar.max_condition_number,
+              "of H'H over the unit directions; above, they do not span space");
+  list.number("ego_velocity_max_sigma", "m/s", above(0), radar.max_sigma,
+              "largest axis of the estimate; above, the scan is rejected");
+}
+
+void listFeasibility(ParameterList& list, Config& c) {
+  list.group("Radar: jumps of the velocity that no platform can make");
+  list.number("feasibility_window", "s", above(0), c.odometry.feasibility.window,
+              "length of the sliding average");
+  list.number("feasibility_max_acceleration", "m/s^2", above(0), c.odometry.feasibility.max_acceleration,
+              "the velocity cannot leave the average faster");
+  list.number("feasibility_margin", "m/s", atLeast(0), c.odometry.feasibility.margin, "always allowed");
+}
+
+void listTimeOffset(ParameterList& list, Config& c) {
+  SmootherOptions& smoother = c.odometry.smoother;
+  list.group("Time offset: a scan stamped s was measured at s - offset");
+  list.boolean("estimate_time_offset", smoother.estimate_time_offset, "false: fixed at time_offset_initial");
+  list.choice<TimeOffsetModel>(
+      "time_offset_model",
+      {{"constant_acceleration", TimeOffsetModel::kConstantAcceleration}, {"imu", TimeOffsetModel::kImu}},
+      smoother.time_offset_model,
+      "the paper's, one acceleration times the offset; or the IMU itself over the offset");
+  list.number("time_offset_initial", "s", anyNumber(), smoother.time_offset_initial,
+              "where the estimate starts");
+  list.number("time_offset_sigma", "s", above(0), smoother.time_offset_sigma,
+              "standard deviation of that start");
+  list.number("time_offset_noise", "s/sqrt(s)", atLeast(0), smoother.time_offset_noise,
+              "random walk of the offset");
+  list.number("max_time_offset", "s", above(0, 1), smoother.max_time_offset,
+              "bound on its size, either sign");
+}
+
+void listSmoother(ParameterList& list, Config& c) {
+  SmootherOptions& smoother = c.odometry.smoother;
+  list.group("Smoother");
+  list.number("window", "s", above(0, 60), smoother.window,
+              "length; what leaves it is marginalised into a prior");
+  list.number("huber_threshold", "", atLeast(0), smoother.huber_threshold,
+              "on the norm of the whitened radar residual; 0: no robust loss");
+  list.integer("max_iterations", between(1, 1000), smoother.max_iterations, "of the solver, each scan");
+  list.number("prior_sigma_orientation", "rad", above(0), smoother.prior_sigma_orientation,
+              "of the first state: roll and pitch");
+  list.number("prior_sigma_yaw", "rad", above(0), smoother.prior_sigma_yaw,
+              "of the first state; yaw defines the world frame");
+  list.number("prior_sigma_position", "m", above(0), smoother.prior_sigma_position,
+              "of the first state; it defines the world frame");
+  list.number("prior_sigma_velocity", "m/s", above(0), smoother.prior_sigma_velocity, "of the first state");
+  list.number("prior_sigma_gyro_bias", "rad/s", above(0), smoother.prior_sigma_gyro_bias,
+              "of the first state");
+  list.number("prior_sigma_accel_bias", "m/s^2", above(0), smoother.prior_sigma_accel_bias,
+              "of the first state");
+  list.integer("max_queued_scans", atLeast(1), c.odometry.max_queued_scans,
+               "scans that may wait for the IMU or the solver");
+}
+
+void listBag(ParameterList& list, Config& c) {
+  list.group("Bag runner");
+  list.number("bag_start", "s", atLeast(0), c.bag_start, "of the bag that is left out at its beginning");
+  list.number("bag_duration", "s", atLeast(0), c.bag_duration, "of the bag that is played; 0: to its end");
+  list.textOrEmpty("ground_truth", c.ground_truth,
+                   "TUM file with the poses of the IMU; empty: ground_truth_topic, if the bag has it");
+}
+
+}  // namespace
+
+ParameterList parametersOf(Config& config) {
+  ParameterList list;
+  listTopics(list, config);
+  listStamps(list, config);
+  listFrames(list, config);
+  listPointCloud(list, config);
+  listExtrinsics(list, config);
+  listImu(list, config);
+  listInitialization(list, config);
+  listEgoVelocity(list, config);
+  listFeasibility(list, config);
+  listTimeOffset(list, config);
+  listSmoother(list, config);
+  listBag(list, config);
+  return list;
+}
+
+}  // namespace rio_t
