@@ -1,9 +1,10 @@
 #include "rio_t/radar/ego_velocity.h"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <iterator>
+#include <functional>
 #include <limits>
 #include <random>
 #include <stdexcept>
@@ -33,6 +34,7 @@ void validate(const EgoVelocityOptions& o) {
           "ransac_outlier_probability", "in [0, 1)");
   require(o.ransac_success_probability > 0.0 && o.ransac_success_probability < 1.0,
           "ransac_success_probability", "in (0, 1)");
+  require(o.prior_gate > 0.0, "prior_gate", "above 0");
   require(o.min_inlier_fraction >= 0.0 && o.min_inlier_fraction <= 1.0, "min_inlier_fraction", "in [0, 1]");
   require(o.azimuth_sigma >= 0.0 && o.azimuth_sigma < 0.5, "azimuth_sigma", "in [0, 0.5) rad");
   require(o.elevation_sigma >= 0.0 && o.elevation_sigma < 0.5, "elevation_sigma", "in [0, 0.5) rad");
@@ -92,15 +94,27 @@ bool solveThree(const Direction& a, const Direction& b, const Direction& c, Eige
   return true;
 }
 
-/// Velocity with the smallest truncated sum of squared residuals (MSAC: as RANSAC, but among velocities with
-/// equally many inliers the better fit wins). `points` has at least three. False: no three directions span
-/// 3D.
-bool ransac(const std::vector<Direction>& points, const EgoVelocityOptions& o, int iterations,
-            Eigen::Vector3d& v_R) {
+/// The velocity that most points agree with, among rest and those of three random points each. Each point
+/// costs its squared residual up to the threshold (MSAC), so that among equally many inliers the better fit
+/// wins. `points` has at least three.
+Eigen::Vector3d ransac(const std::vector<Direction>& points, const EgoVelocityOptions& o, int iterations) {
   const double limit = o.ransac_inlier_threshold * o.ransac_inlier_threshold;
+  Eigen::Vector3d best_v_R = Eigen::Vector3d::Zero();
+  double best = std::numeric_limits<double>::infinity();
+  const auto offer = [&](const Eigen::Vector3d& v_R) {
+    double cost = 0.0;
+    for (const Direction& p : points) {
+      const double r = p.doppler + p.u_R.dot(v_R);
+      cost += std::min(r * r, limit);
+      if (cost >= best) return;
+    }
+    best = cost;
+    best_v_R = v_R;
+  };
+  offer(Eigen::Vector3d::Zero());
+
   const std::size_t n = points.size();
   IndexDraw draw(o.ransac_seed);
-  double best = std::numeric_limits<double>::infinity();
   for (int iteration = 0; iteration < iterations; ++iteration) {
     const std::size_t i = draw.below(n);
     std::size_t j = draw.below(n - 1);
@@ -108,20 +122,10 @@ bool ransac(const std::vector<Direction>& points, const EgoVelocityOptions& o, i
     std::size_t k = draw.below(n - 2);
     if (k >= std::min(i, j)) ++k;
     if (k >= std::max(i, j)) ++k;
-    Eigen::Vector3d v;
-    if (!solveThree(points[i], points[j], points[k], v)) continue;
-    double cost = 0.0;
-    for (const Direction& p : points) {
-      const double r = p.doppler + p.u_R.dot(v);
-      cost += std::min(r * r, limit);
-      if (cost >= best) break;
-    }
-    if (cost < best) {
-      best = cost;
-      v_R = v;
-    }
+    Eigen::Vector3d v_R;
+    if (solveThree(points[i], points[j], points[k], v_R)) offer(v_R);
   }
-  return best < std::numeric_limits<double>::infinity();
+  return best_v_R;
 }
 
 /// Points that agree with `v_R`: within the threshold, or within three sigma where the noise of the direction
@@ -137,10 +141,29 @@ void selectInliers(const std::vector<Direction>& points, const Eigen::Vector3d& 
   }
 }
 
-VelocitySolution solve(const std::vector<Direction>& inliers, const EgoVelocityOptions& o) {
-  const VelocitySolution least_squares = solveLeastSquares(inliers, o);
-  if (!least_squares.solved || o.solver == EgoVelocitySolver::kLeastSquares) return least_squares;
-  return solveErrorsInVariables(inliers, least_squares.v_R, o);
+bool contradicts(const VelocitySolution& solution, const VelocityPrior& prior, const EgoVelocityOptions& o) {
+  const Eigen::Matrix3d covariance = prior.covariance + solution.covariance;
+  const Eigen::Vector3d d = solution.v_R - prior.v_R;
+  return d.dot(covariance.inverse() * d) > o.prior_gate * o.prior_gate;
+}
+
+/// Where the prior speaks against the velocity that `inliers` give, and enough points support one that it
+/// does not speak against, replaces `inliers` by those points.
+void heedPrior(const std::vector<Direction>& points, const VelocityPrior& prior, const EgoVelocityOptions& o,
+               std::vector<Direction>& inliers) {
+  const VelocitySolution unaided = solveLeastSquares(inliers, o);
+  if (unaided.solved && !contradicts(unaided, prior, o)) return;
+  std::vector<Direction> supporters;
+  supporters.reserve(points.size());
+  selectInliers(points, prior.v_R, o, supporters);
+  VelocitySolution aided = solveLeastSquares(supporters, o);
+  if (!aided.solved) return;
+  selectInliers(points, aided.v_R, o, supporters);
+  aided = solveLeastSquares(supporters, o);
+  const double needed = o.min_inlier_fraction * static_cast<double>(points.size());
+  if (!aided.solved || static_cast<double>(supporters.size()) < needed || contradicts(aided, prior, o))
+    return;
+  inliers = supporters;
 }
 
 /// Covariance at rest. A bin of width q reads zero for every |u . v| < q/2, and reads the same for all points
@@ -169,11 +192,6 @@ double largestSigma(const Eigen::Matrix3d& covariance) {
   return std::sqrt(eigen.eigenvalues()[2]);
 }
 
-void storeInliers(const std::vector<Direction>& inliers, EgoVelocity& result) {
-  result.inliers.reserve(inliers.size());
-  for (const Direction& p : inliers) result.inliers.push_back(p.index);
-}
-
 }  // namespace
 
 EgoVelocityEstimator::EgoVelocityEstimator(const EgoVelocityOptions& options)
@@ -181,7 +199,8 @@ EgoVelocityEstimator::EgoVelocityEstimator(const EgoVelocityOptions& options)
   validate(options);
 }
 
-EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan) const {
+EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
+                                           const std::optional<VelocityPrior>& prior) const {
   const EgoVelocityOptions& o = options_;
   EgoVelocity result;
   const std::vector<Direction> points = filter(scan, o);
@@ -192,43 +211,56 @@ EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan) const {
     return result;
   }
 
+  const auto reads_zero = [&](const Direction& p) {
+    return std::abs(p.doppler) <= o.zero_velocity_threshold;
+  };
+  const auto most_read_zero = [&](const std::vector<Direction>& some) {
+    const auto zeros = static_cast<double>(std::count_if(some.begin(), some.end(), reads_zero));
+    return zeros >= (1.0 - o.zero_velocity_outlier_fraction) * static_cast<double>(some.size());
+  };
+
   std::vector<Direction> inliers;
-  inliers.reserve(points.size());
-  std::copy_if(points.begin(), points.end(), std::back_inserter(inliers),
-               [&](const Direction& p) { return std::abs(p.doppler) <= o.zero_velocity_threshold; });
-  if (n - static_cast<double>(inliers.size()) <= o.zero_velocity_outlier_fraction * n) {
-    storeInliers(inliers, result);
-    result.status = !restCovariance(inliers, o, result.covariance)  ? EgoVelocityStatus::kIllConditioned
-                    : largestSigma(result.covariance) > o.max_sigma ? EgoVelocityStatus::kSigmaTooLarge
-                                                                    : EgoVelocityStatus::kZeroVelocity;
-    return result;
+  bool rest = most_read_zero(points);
+  if (rest) {
+    inliers = points;
+  } else {
+    inliers.reserve(points.size());
+    selectInliers(points, ransac(points, o, ransac_iterations_), o, inliers);
+    if (prior) heedPrior(points, *prior, o, inliers);
+    // At rest in front of an object that moves, too many points disagree for the test above, but not these.
+    rest = most_read_zero(inliers);
+  }
+  if (rest) {
+    inliers.erase(std::remove_if(inliers.begin(), inliers.end(), std::not_fn(reads_zero)), inliers.end());
   }
 
-  Eigen::Vector3d v_R;
-  if (!ransac(points, o, ransac_iterations_, v_R)) {
-    result.status = EgoVelocityStatus::kIllConditioned;
-    return result;
+  VelocitySolution solution;
+  if (rest) {
+    solution.solved = restCovariance(inliers, o, solution.covariance);
+  } else {
+    solution = solveLeastSquares(inliers, o);
+    if (solution.solved) {
+      selectInliers(points, solution.v_R, o, inliers);
+      solution = o.solver == EgoVelocitySolver::kLeastSquares
+                     ? solveLeastSquares(inliers, o)
+                     : solveErrorsInVariables(inliers, solution.v_R, o);
+    }
+    solution.covariance.diagonal() += o.added_sigma.cwiseAbs2();
   }
-  selectInliers(points, v_R, o, inliers);
-  VelocitySolution solution = solve(inliers, o);
-  if (solution.solved) {
-    selectInliers(points, solution.v_R, o, inliers);
-    solution = solve(inliers, o);
-  }
-  storeInliers(inliers, result);
+
+  result.inliers.reserve(inliers.size());
+  for (const Direction& p : inliers) result.inliers.push_back(p.index);
   if (inliers.size() < o.min_inliers || static_cast<double>(inliers.size()) < o.min_inlier_fraction * n) {
     result.status = EgoVelocityStatus::kTooFewInliers;
-    return result;
-  }
-  if (!solution.solved) {
+  } else if (!solution.solved) {
     result.status = EgoVelocityStatus::kIllConditioned;
-    return result;
+  } else {
+    result.v_R = solution.v_R;
+    result.covariance = solution.covariance;
+    result.status = largestSigma(result.covariance) > o.max_sigma ? EgoVelocityStatus::kSigmaTooLarge
+                    : rest                                        ? EgoVelocityStatus::kZeroVelocity
+                                                                  : EgoVelocityStatus::kMoving;
   }
-  result.v_R = solution.v_R;
-  result.covariance = solution.covariance;
-  result.covariance.diagonal() += o.added_sigma.cwiseAbs2();
-  result.status = largestSigma(result.covariance) > o.max_sigma ? EgoVelocityStatus::kSigmaTooLarge
-                                                                : EgoVelocityStatus::kMoving;
   return result;
 }
 

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,11 +29,13 @@ struct EgoVelocityOptions {
 
   double zero_velocity_threshold = 0.05;         ///< [m/s] a Doppler below counts as zero
   double zero_velocity_outlier_fraction = 0.25;  ///< share of Dopplers that may exceed it at rest
-  double zero_velocity_sigma = 0.025;            ///< [m/s] per axis, reported at rest
+  double zero_velocity_sigma = 0.025;            ///< [m/s] per axis at rest, besides the Doppler bin
 
   double ransac_inlier_threshold = 0.15;  ///< [m/s] Doppler residual
   double ransac_outlier_probability = 0.4;
   double ransac_success_probability = 0.9999;
+  double prior_gate =
+      4.0;  ///< [sigma] farther from the prior a velocity contradicts it; only where one is given
   std::uint32_t ransac_seed = 1;  ///< restarted at each scan: same scan, same answer
 
   std::size_t min_inliers = 5;       ///< one velocity has three unknowns; the rest are witnesses
@@ -45,18 +48,23 @@ struct EgoVelocityOptions {
   double elevation_sigma = 0.05;  ///< [rad]
   double doppler_sigma = 0.035;   ///< [m/s] besides the quantisation
 
-  double doppler_quantization = 0.125;                ///< [m/s] step of the radar's Doppler; 0 = none
-  Eigen::Vector3d added_sigma = {0.05, 0.025, 0.05};  ///< [m/s] right, forward, up; added in quadrature
-  double max_condition_number = 1000.0;               ///< of H'H (unit directions)
-  double max_sigma = 0.5;                             ///< [m/s] largest axis of the estimate
+  double doppler_quantization = 0.125;  ///< [m/s] step of the radar's Doppler; 0 = none
+  /// [m/s] right, forward, up; added in quadrature while moving. The solver's covariance is honest for noise
+  /// that is independent from point to point (its NEES is 3 in simulation). This is for what points share:
+  /// things that move so slowly that they pass as inliers, a velocity that changes within the radar frame (20
+  /// ms at 1 m/s^2), a quantisation error common to a bin. The peers' 0.05, 0.025, 0.05 also stands for the
+  /// noise that is modelled here.
+  Eigen::Vector3d added_sigma = {0.02, 0.02, 0.02};
+  double max_condition_number = 1000.0;  ///< of H'H (unit directions)
+  double max_sigma = 0.5;                ///< [m/s] largest axis of the estimate
 };
 
 /// Why a scan gave a velocity, or none.
 enum class EgoVelocityStatus {
-  kMoving,          ///< least squares on the RANSAC inliers
-  kZeroVelocity,    ///< at rest: zero with a small covariance
+  kMoving,          ///< solved for from the inliers
+  kZeroVelocity,    ///< at rest: zero, with what the Doppler bin hides as covariance
   kTooFewPoints,    ///< fewer than 3 points after the filter
-  kTooFewInliers,   ///< RANSAC found no plane that enough points agree on
+  kTooFewInliers,   ///< no velocity that enough points agree on
   kIllConditioned,  ///< the directions do not span 3D
   kSigmaTooLarge,   ///< uncertainty above max_sigma
 };
@@ -71,13 +79,24 @@ struct EgoVelocity {
   std::size_t points_used = 0;                           ///< points that passed the filter
 };
 
+/// What is known of the velocity before the scan is looked at, e.g. from the IMU.
+struct VelocityPrior {
+  Eigen::Vector3d v_R = Eigen::Vector3d::Zero();         ///< radar velocity, radar frame [m/s]
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< [m^2/s^2], positive definite
+};
+
 /// Ego-velocity of one scan: filter, zero-velocity test, 3-point RANSAC, least squares.
 /// A static target in direction u gives v_d = -u . v_R (Kellner et al., ITSC 2013).
 class EgoVelocityEstimator {
  public:
   /// Throws std::invalid_argument, naming the option, where one is out of its range.
   explicit EgoVelocityEstimator(const EgoVelocityOptions& options);
-  EgoVelocity estimate(const RadarScan& scan) const;
+
+  /// A prior helps to tell the static world from an object that moves and fills half of the view, which one
+  /// scan cannot: where the RANSAC velocity contradicts the prior, and `min_inlier_fraction` of the points
+  /// agree with a velocity that does not, those points are the inliers. The velocity and its covariance come
+  /// from the points alone, so fusing the result with the prior does not count anything twice.
+  EgoVelocity estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior = std::nullopt) const;
 
  private:
   EgoVelocityOptions options_;  // read-only after construction
