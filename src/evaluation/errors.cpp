@@ -86,37 +86,41 @@ Eigen::Matrix3d leastSquaresYaw(const Points& truth, const Points& estimate) {
   return Eigen::AngleAxisd(std::atan2(across, along), Eigen::Vector3d::UnitZ()).toRotationMatrix();
 }
 
-/// How far along the estimate each match is, in the unit of the pieces.
-std::vector<double> progress(const Trajectory& estimate, const std::vector<Match>& matches, DeltaUnit unit) {
-  std::vector<double> at(matches.size(), 0.0);
+/// Length of the estimate's step to each match from the one before, in the unit of the pieces; the first is
+/// zero.
+std::vector<double> steps(const Trajectory& estimate, const std::vector<Match>& matches, DeltaUnit unit) {
+  std::vector<double> lengths(matches.size(), 0.0);
   for (std::size_t i = 1; i < matches.size(); ++i) {
     const StampedPose& a = estimate[matches[i - 1].estimate];
     const StampedPose& b = estimate[matches[i].estimate];
-    at[i] = at[i - 1] + (unit == DeltaUnit::kMetres ? (b.p_W - a.p_W).norm() : b.time - a.time);
+    lengths[i] = unit == DeltaUnit::kMetres ? (b.p_W - a.p_W).norm() : b.time - a.time;
   }
-  return at;
+  return lengths;
 }
 
 using Pair = std::pair<std::size_t, std::size_t>;
 
 /// Each piece begins where the one before ended.
-std::vector<Pair> consecutivePairs(const std::vector<double>& at, double delta) {
+std::vector<Pair> consecutivePairs(const std::vector<double>& lengths, double delta) {
   std::vector<Pair> pairs;
   bool started = false;
   std::size_t last = 0;
-  double begin = at.front();
-  for (std::size_t i = 0; i < at.size(); ++i) {
-    if (at[i] - begin < delta) continue;
+  double sum = 0.0;
+  for (std::size_t i = 0; i < lengths.size(); ++i) {
+    sum += lengths[i];
+    if (sum < delta) continue;
     if (started) pairs.emplace_back(last, i);
     started = true;
     last = i;
-    begin = at[i];
+    sum = 0.0;
   }
   return pairs;
 }
 
 /// From every pose to the first of those nearest to `delta` further on.
-std::vector<Pair> allPairs(const std::vector<double>& at, double delta) {
+std::vector<Pair> allPairs(const std::vector<double>& lengths, double delta) {
+  std::vector<double> at(lengths.size());
+  std::partial_sum(lengths.begin(), lengths.end(), at.begin());
   const double tolerance = 0.1 * delta;
   std::vector<Pair> pairs;
   for (std::size_t i = 0; i + 1 < at.size(); ++i) {
@@ -183,9 +187,12 @@ RelativeError relativeError(const Trajectory& truth, const Trajectory& estimate,
                             const RelativeErrorOptions& options, double max_difference) {
   if (!(options.delta > 0.0)) throw std::invalid_argument("relative error: delta must be greater than zero");
   const std::vector<Match> matches = requireMatches(truth, estimate, max_difference);
-  const std::vector<double> at = progress(estimate, matches, options.unit);
+  const std::vector<double> lengths = steps(estimate, matches, options.unit);
+  // Stamps are whole nanoseconds: half of one absorbs the rounding of sums, or equal periods would make
+  // unequal pieces. Metres are compared as they are, as evo does.
+  const double delta = options.unit == DeltaUnit::kSeconds ? options.delta - 0.5e-9 : options.delta;
   const std::vector<Pair> pairs =
-      options.all_pairs ? allPairs(at, options.delta) : consecutivePairs(at, options.delta);
+      options.all_pairs ? allPairs(lengths, options.delta) : consecutivePairs(lengths, delta);
 
   std::vector<double> metres;
   std::vector<double> degrees;

@@ -50,6 +50,16 @@ bool parseLine(const std::string& line, StampedPose& pose) {
 
 bool isDigit(char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; }
 
+/// Stamps as the doubles nearest to their decimal text, which is what evo compares.
+std::vector<double> evoSeconds(const Trajectory& trajectory) {
+  std::vector<double> seconds;
+  seconds.reserve(trajectory.size());
+  for (const StampedPose& pose : trajectory) {
+    seconds.push_back(static_cast<double>(static_cast<long double>(pose.time.nanoseconds()) / 1e9L));
+  }
+  return seconds;
+}
+
 }  // namespace
 
 Time parseTime(const std::string& text) {
@@ -137,22 +147,22 @@ void writeTum(const std::string& path, const Trajectory& trajectory) {
 
 std::vector<Match> associate(const Trajectory& truth, const Trajectory& estimate, double max_difference) {
   const bool truth_is_longer = truth.size() >= estimate.size();
-  const Trajectory& shorter = truth_is_longer ? estimate : truth;
-  const Trajectory& longer = truth_is_longer ? truth : estimate;
+  const std::vector<double> shorter = evoSeconds(truth_is_longer ? estimate : truth);
+  const std::vector<double> longer = evoSeconds(truth_is_longer ? truth : estimate);
 
   std::vector<Match> matches;
   if (longer.empty()) return matches;
   matches.reserve(shorter.size());
-  std::size_t nearest = 0;
   for (std::size_t i = 0; i < shorter.size(); ++i) {
-    const Time t = shorter[i].time;
-    // Stamps increase, so the search goes on where the last one ended.
-    while (nearest + 1 < longer.size() &&
-           std::abs(longer[nearest + 1].time - t) < std::abs(longer[nearest].time - t)) {
-      ++nearest;
+    const double t = shorter[i];
+    auto nearest = std::lower_bound(longer.begin(), longer.end(), t);
+    if (nearest == longer.end() ||
+        (nearest != longer.begin() && std::abs(*(nearest - 1) - t) <= std::abs(*nearest - t))) {
+      nearest = std::lower_bound(longer.begin(), nearest, *(nearest - 1));  // the first of equal doubles
     }
-    if (std::abs(longer[nearest].time - t) > max_difference) continue;
-    matches.push_back(truth_is_longer ? Match{nearest, i} : Match{i, nearest});
+    if (std::abs(*nearest - t) > max_difference) continue;
+    const auto j = static_cast<std::size_t>(nearest - longer.begin());
+    matches.push_back(truth_is_longer ? Match{j, i} : Match{i, j});
   }
   return matches;
 }

@@ -1,0 +1,281 @@
+/// Errors of trajectories, and of a time offset, against the truth. Figures agree with evo's.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <iostream>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "rio_t/evaluation/errors.h"
+#include "rio_t/evaluation/offset_error.h"
+
+namespace {
+
+using namespace rio_t;
+
+constexpr const char* kUsage =
+    R"(usage: rosrun rio_t evaluate GROUND_TRUTH.txt ESTIMATE.txt... [options]
+       rosrun rio_t evaluate --time-offset FILE.csv --true-offset SECONDS [options]
+
+Errors of estimated trajectories (TUM format: stamp x y z qx qy qz qw) with the definitions of evo:
+  APE   distance and angle to the truth, aligned at the first pose (origin), or by least squares over yaw and
+        position, or over rotation and position (SE3, no scale)
+  RPE   error of the motion over 1 m of the estimate's path and over 1 s; the rmse over 1 m are t_rel and r_rel
+  drift error of the last pose, aligned at the first, per metre of the truth's path
+
+  --max-difference S   largest difference of the stamps of two poses that are compared [s]; default 0.01, as evo
+  --time-offset FILE   estimates of the radar's time offset, a table with columns stamp,offset_s,sigma_s
+  --true-offset S      their constant truth [s]
+  --skip S             leave out the first S seconds of the offsets (convergence); default 0
+  --yaml               for machines
+  --help               this text
+
+Exit status: 0, or 1 with one line on stderr.
+)";
+
+struct Arguments {
+  std::vector<std::string> trajectories;  ///< truth first
+  std::string time_offset;
+  std::optional<double> true_offset;
+  double skip = 0.0;
+  double max_difference = kDefaultMaxDifference;
+  bool yaml = false;
+  bool help = false;
+};
+
+/// What one estimate is reported with; alignments that its shape does not allow are left out.
+struct Evaluation {
+  std::string file;
+  AbsoluteError origin;
+  std::optional<AbsoluteError> yaw;
+  std::optional<AbsoluteError> se3;
+  RelativeError metre;
+  RelativeError metre_all;
+  RelativeError second;
+  Drift drift;
+};
+
+Arguments parse(int argc, char** argv) {
+  Arguments arguments;
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const std::string& word = words[i];
+    const auto value = [&words, &i, &word]() -> std::string {
+      if (i + 1 >= words.size()) throw std::invalid_argument(word + " needs a value; see --help");
+      return words[++i];
+    };
+    const auto seconds = [&value, &word](double least) {
+      const std::string text = value();
+      char* end = nullptr;
+      const double number = std::strtod(text.c_str(), &end);
+      if (end == text.c_str() || *end != '\0' || !std::isfinite(number) || number < least) {
+        throw std::invalid_argument(word + " is '" + text + "', expected seconds" +
+                                    (least == 0.0 ? ", zero or more" : ""));
+      }
+      return number;
+    };
+    if (word == "--help" || word == "-h") {
+      arguments.help = true;
+    } else if (word == "--yaml") {
+      arguments.yaml = true;
+    } else if (word == "--max-difference") {
+      arguments.max_difference = seconds(0.0);
+    } else if (word == "--skip") {
+      arguments.skip = seconds(0.0);
+    } else if (word == "--time-offset") {
+      arguments.time_offset = value();
+    } else if (word == "--true-offset") {
+      arguments.true_offset = seconds(-1e9);
+    } else if (word.size() > 1 && word[0] == '-') {
+      throw std::invalid_argument("unknown option " + word + "; see --help");
+    } else {
+      arguments.trajectories.push_back(word);
+    }
+  }
+  if (arguments.help) return arguments;
+  if (arguments.time_offset.empty() == arguments.true_offset.has_value()) {
+    throw std::invalid_argument("--time-offset and --true-offset go together; see --help");
+  }
+  if (arguments.trajectories.size() == 1) {
+    throw std::invalid_argument("only one trajectory given, expected GROUND_TRUTH ESTIMATE...; see --help");
+  }
+  if (arguments.trajectories.empty() && arguments.time_offset.empty()) {
+    throw std::invalid_argument("nothing to evaluate, expected GROUND_TRUTH ESTIMATE...; see --help");
+  }
+  return arguments;
+}
+
+Evaluation evaluate(const Trajectory& truth, const std::string& truth_file, const std::string& file,
+                    double max_difference) {
+  const Trajectory estimate = readTum(file);
+  const auto aligned = [&](Alignment kind) -> std::optional<AbsoluteError> {
+    try {
+      return absoluteError(truth, estimate, kind, max_difference);
+    } catch (const std::invalid_argument&) {
+      return std::nullopt;  // on a line, or at rest: the origin still aligns
+    }
+  };
+  RelativeErrorOptions metre_all;
+  metre_all.all_pairs = true;
+  RelativeErrorOptions second;
+  second.unit = DeltaUnit::kSeconds;
+  try {
+    return {file,
+            absoluteError(truth, estimate, Alignment::kOrigin, max_difference),
+            aligned(Alignment::kYaw),
+            aligned(Alignment::kSe3),
+            relativeError(truth, estimate, RelativeErrorOptions{}, max_difference),
+            relativeError(truth, estimate, metre_all, max_difference),
+            relativeError(truth, estimate, second, max_difference),
+            drift(truth, estimate, max_difference)};
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(file + " against " + truth_file + ": " + error.what());
+  }
+}
+
+void printRow(const char* name, const Statistics& s, const char* unit, std::size_t count) {
+  std::printf("  %-22s %10.6f %10.6f %10.6f %10.6f  %-4s %7zu\n", name, s.rmse, s.mean, s.median, s.max, unit,
+              count);
+}
+
+void printAbsolute(const char* name, const std::optional<AbsoluteError>& error) {
+  if (!error) {
+    std::printf("  %-22s not possible: the path is too straight\n", name);
+    return;
+  }
+  printRow(name, error->translation_m, "m", error->matched_poses);
+  printRow("", error->rotation_deg, "deg", error->matched_poses);
+}
+
+void printRelative(const char* name, const RelativeError& error) {
+  if (error.pairs == 0) {
+    std::printf("  %-22s no pairs: the path is too short\n", name);
+    return;
+  }
+  printRow(name, error.translation_m, "m", error.pairs);
+  printRow("", error.rotation_deg, "deg", error.pairs);
+}
+
+void printTable(const Evaluation& e) {
+  std::printf("%s\n  %-22s %10s %10s %10s %10s  %-4s %7s\n", e.file.c_str(), "", "rmse", "mean", "median",
+              "max", "", "count");
+  printAbsolute("APE origin (ATE)", e.origin);
+  printAbsolute("APE yaw", e.yaw);
+  printAbsolute("APE SE3", e.se3);
+  printRelative("RPE 1 m (t_rel, r_rel)", e.metre);
+  printRelative("RPE 1 m, all pairs", e.metre_all);
+  printRelative("RPE 1 s", e.second);
+  std::printf("  %-22s %.3f m (%.3f m horizontal), yaw %.2f deg after %.2f m: %.2f %%\n\n",
+              "drift at the end", e.drift.final_m, e.drift.final_horizontal_m, e.drift.final_yaw_deg,
+              e.drift.path_m, 100.0 * e.drift.per_metre);
+}
+
+void printTable(const std::string& file, double truth, const OffsetError& e) {
+  std::printf("%s against %.3f ms, %zu samples\n", file.c_str(), 1e3 * truth, e.samples);
+  std::printf("  error [ms]             mean %.3f, rmse %.3f, max %.3f, at the end %.3f (sigma %.3f)\n",
+              1e3 * e.mean, 1e3 * e.rmse, 1e3 * e.max, 1e3 * e.final_error, 1e3 * e.final_sigma);
+  std::printf("  within 1, 2, 3 sigma   %.1f %%, %.1f %%, %.1f %% (honest: 68.3, 95.4, 99.7)\n",
+              100.0 * e.share_1_sigma, 100.0 * e.share_2_sigma, 100.0 * e.share_3_sigma);
+  std::printf("  mean (error/sigma)^2   %.3f (honest: 1)\n", e.mean_normalised_square);
+}
+
+/// Single-quoted, so that any file name is one YAML string.
+std::string quoted(const std::string& text) {
+  std::string result = "'";
+  for (const char c : text) result += c == '\'' ? std::string("''") : std::string(1, c);
+  return result + "'";
+}
+
+void yamlRow(const std::string& key, const Statistics& s, const char* count_name, std::size_t count) {
+  std::printf("    %s: {rmse: %.9g, mean: %.9g, median: %.9g, max: %.9g, %s: %zu}\n", key.c_str(), s.rmse,
+              s.mean, s.median, s.max, count_name, count);
+}
+
+void yamlAbsolute(const std::string& key, const std::optional<AbsoluteError>& error) {
+  if (!error) return;
+  yamlRow(key + "_m", error->translation_m, "poses", error->matched_poses);
+  yamlRow(key + "_deg", error->rotation_deg, "poses", error->matched_poses);
+}
+
+void yamlRelative(const std::string& key, const RelativeError& error) {
+  yamlRow(key + "_m", error.translation_m, "pairs", error.pairs);
+  yamlRow(key + "_deg", error.rotation_deg, "pairs", error.pairs);
+}
+
+void printYaml(const Evaluation& e) {
+  std::printf("  - file: %s\n    matched_poses: %zu\n", quoted(e.file).c_str(), e.origin.matched_poses);
+  yamlAbsolute("ape_origin", e.origin);
+  yamlAbsolute("ape_yaw", e.yaw);
+  yamlAbsolute("ape_se3", e.se3);
+  yamlRelative("rpe_1m", e.metre);
+  yamlRelative("rpe_1m_all_pairs", e.metre_all);
+  yamlRelative("rpe_1s", e.second);
+  std::printf(
+      "    drift: {path_m: %.9g, final_m: %.9g, final_horizontal_m: %.9g, final_yaw_deg: %.9g, per_metre: "
+      "%.9g}\n",
+      e.drift.path_m, e.drift.final_m, e.drift.final_horizontal_m, e.drift.final_yaw_deg, e.drift.per_metre);
+}
+
+void printYaml(const std::string& file, double truth, const OffsetError& e) {
+  std::printf("time_offset:\n  file: %s\n  true_s: %.9g\n  samples: %zu\n", quoted(file).c_str(), truth,
+              e.samples);
+  std::printf("  mean_error_s: %.9g\n  rmse_s: %.9g\n  max_error_s: %.9g\n  final_error_s: %.9g\n", e.mean,
+              e.rmse, e.max, e.final_error);
+  std::printf("  final_sigma_s: %.9g\n  share_1_sigma: %.9g\n  share_2_sigma: %.9g\n  share_3_sigma: %.9g\n",
+              e.final_sigma, e.share_1_sigma, e.share_2_sigma, e.share_3_sigma);
+  std::printf("  mean_normalised_square: %.9g\n", e.mean_normalised_square);
+}
+
+void run(const Arguments& arguments) {
+  // All is computed before anything is printed: a failure leaves no half output.
+  std::vector<Evaluation> evaluations;
+  if (!arguments.trajectories.empty()) {
+    const std::string& truth_file = arguments.trajectories.front();
+    const Trajectory truth = readTum(truth_file);
+    for (std::size_t i = 1; i < arguments.trajectories.size(); ++i) {
+      evaluations.push_back(evaluate(truth, truth_file, arguments.trajectories[i], arguments.max_difference));
+    }
+  }
+  std::optional<OffsetError> offset;
+  if (!arguments.time_offset.empty()) {
+    const std::vector<OffsetSample> samples = readTimeOffsets(arguments.time_offset);
+    try {
+      offset = offsetError(samples, *arguments.true_offset, arguments.skip);
+    } catch (const std::invalid_argument& error) {
+      throw std::runtime_error(arguments.time_offset + ": " + error.what());
+    }
+  }
+
+  if (arguments.yaml) {
+    if (!evaluations.empty()) {
+      std::printf("ground_truth: %s\nmax_difference_s: %.9g\nestimates:\n",
+                  quoted(arguments.trajectories.front()).c_str(), arguments.max_difference);
+    }
+    for (const Evaluation& evaluation : evaluations) printYaml(evaluation);
+    if (offset) printYaml(arguments.time_offset, *arguments.true_offset, *offset);
+    return;
+  }
+  for (const Evaluation& evaluation : evaluations) printTable(evaluation);
+  if (offset) printTable(arguments.time_offset, *arguments.true_offset, *offset);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    const Arguments arguments = parse(argc, argv);
+    if (arguments.help) {
+      std::cout << kUsage;
+    } else {
+      run(arguments);
+    }
+    return EXIT_SUCCESS;
+  } catch (const std::exception& error) {
+    std::cerr << "evaluate: " << error.what() << '\n';
+    return EXIT_FAILURE;
+  }
+}
