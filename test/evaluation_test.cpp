@@ -63,8 +63,7 @@ bool contains(const std::string& text, const std::string& part) {
 
 std::string testData(const std::string& name) { return std::string(RIO_T_SOURCE_DIR) + "/test/data/" + name; }
 
-// --- Time from text
-// ---------------------------------------------------------------------------------------------
+// --- Time from text ---
 
 TEST(ParseTime, KeepsEveryNanosecond) {
   EXPECT_EQ(parseTime("1700000010.012222").nanoseconds(), 1700000010012222000);
@@ -96,8 +95,7 @@ TEST(ParseTime, RefusesWhatIsNoTime) {
   }
 }
 
-// --- Files
-// ------------------------------------------------------------------------------------------------------
+// --- Files ---
 
 TEST(Tum, ReadsPosesCommentsAndBlankLines) {
   const Trajectory trajectory = read(
@@ -164,8 +162,7 @@ TEST(Tum, WritesWhatItReads) {
   }
 }
 
-// --- Association
-// ------------------------------------------------------------------------------------------------
+// --- Association ---
 
 std::vector<std::pair<std::size_t, std::size_t>> pairs(const std::vector<Match>& matches) {
   std::vector<std::pair<std::size_t, std::size_t>> result;
@@ -222,8 +219,7 @@ TEST(Associate, TruthAtTwentyHertzMatchesAnEstimateAtImuRateByDefault) {
   }
 }
 
-// --- Absolute error
-// ---------------------------------------------------------------------------------------------
+// --- Absolute error ---
 
 TEST(AbsoluteError, OfTheTruthItselfIsZero) {
   for (const Alignment kind : {Alignment::kNone, Alignment::kOrigin, Alignment::kYaw, Alignment::kSe3}) {
@@ -328,10 +324,9 @@ TEST(AbsoluteError, RefusesWhatCannotBeCompared) {
   EXPECT_THROW(absoluteError(helix(), {pose(99, {0, 0, 0})}, Alignment::kOrigin), std::invalid_argument);
 }
 
-// --- Relative error
-// ---------------------------------------------------------------------------------------------
+// --- Relative error ---
 
-/// 1 m/s along x, at 10 Hz; binary fractions of a metre, so that sums are exact.
+/// 1 m/s along x, at 8 Hz; binary fractions of a metre, so that sums are exact.
 Trajectory straight(int poses, double scale = 1.0, double yaw_deg_per_s = 0.0) {
   Trajectory trajectory;
   for (int i = 0; i < poses; ++i) {
@@ -360,17 +355,16 @@ TEST(RelativeError, PiecesFollowEachOtherFromTheFirstFullMetre) {
 TEST(RelativeError, AllPairsStartAtEveryPoseThatHasAMetreAhead) {
   RelativeErrorOptions all;
   all.all_pairs = true;
-  // 9 m and 0.875 m are within a tenth of 1 m of the end only where a full metre is left (0.875 is an eighth
-  // off).
+  // Steps of 1/8 m: a pose with less than a full metre ahead is at least an eighth off, more than a tenth.
   EXPECT_EQ(relativeError(straight(81), straight(81), all).pairs, 73u);
   EXPECT_EQ(relativeError(straight(9), straight(9), all).pairs, 1u);
   EXPECT_EQ(relativeError(straight(8), straight(8), all).pairs, 0u);
 }
 
 TEST(RelativeError, ScaleErrorShowsPerMetre) {
-  // The estimate runs 1/4 too far: its metre of eight poses is 0.8 m of truth.
   const RelativeError error = relativeError(straight(81), straight(81, 1.25));
-  // Steps of 0.15625 m: seven of them are 1.09375 m, against 0.875 m of truth.
+  // The estimate's steps are 1.25/8 m: the seventh completes its metre, with 1.09375 m against 0.875 m of
+  // truth.
   EXPECT_NEAR(error.translation_m.rmse, 0.21875, kExact);
   EXPECT_NEAR(error.translation_m.max, 0.21875, kExact);
   EXPECT_NEAR(error.rotation_deg.max, 0.0, 1e-6);
@@ -386,14 +380,14 @@ TEST(RelativeError, TurnRateErrorShowsPerSecond) {
 }
 
 TEST(RelativeError, SecondsAreCountedInWholePeriodsWhateverTheirRounding) {
-  Trajectory standing;  // 20 Hz: 0.05 is no binary fraction
-  for (int i = 0; i <= 2000; ++i) standing.push_back(pose(0.05 * i, {0, 0, 0}));
+  Trajectory standing;  // 100 s at 25 Hz: 0.04 is no binary fraction
+  for (int i = 0; i <= 2500; ++i) standing.push_back(pose(0.04 * i, {0, 0, 0}));
   RelativeErrorOptions second;
   second.unit = DeltaUnit::kSeconds;
   EXPECT_EQ(relativeError(standing, standing, second).pairs, 99u);
   second.all_pairs = true;
-  EXPECT_EQ(relativeError(standing, standing, second).pairs,
-            1981u + 2u);  // within a tenth: two more at the end
+  // 2476 poses have a full second ahead, two more have 0.96 s and 0.92 s, which is within a tenth.
+  EXPECT_EQ(relativeError(standing, standing, second).pairs, 2478u);
   EXPECT_EQ(relativeError(standing, standing).pairs, 0u);
 }
 
@@ -432,8 +426,7 @@ TEST(Drift, AtRestIsNotPerMetre) {
   EXPECT_NEAR(drift(truth, estimate).final_m, 1.0, kExact);
 }
 
-// --- Known figures
-// ----------------------------------------------------------------------------------------------
+// --- Known figures ---
 
 struct Figures {
   double rmse, mean, max;
@@ -565,8 +558,7 @@ TEST_P(EvoComparison, GivesTheSameFigures) {
 INSTANTIATE_TEST_SUITE_P(Figures, EvoComparison, testing::ValuesIn(kEvo),
                          [](const testing::TestParamInfo<EvoFigures>& evo) { return evo.param.name; });
 
-// --- Time offset
-// ------------------------------------------------------------------------------------------------
+// --- Time offset ---
 
 std::vector<OffsetSample> readOffsets(const std::string& text) {
   std::istringstream in(text);
