@@ -75,6 +75,14 @@ TEST(ParseTime, KeepsEveryNanosecond) {
   EXPECT_EQ(parseTime("-1.5").nanoseconds(), -1500000000);
 }
 
+TEST(ParseTime, IsTheInverseOfFormatTime) {
+  EXPECT_EQ(formatTime(Time::fromNanoseconds(1700000010000000001)), "1700000010.000000001");
+  for (const std::int64_t ns : {std::int64_t{0}, std::int64_t{-1}, std::int64_t{-1500000000},
+                                std::int64_t{9200000000123456789}, std::int64_t{-9200000000123456789}}) {
+    EXPECT_EQ(parseTime(formatTime(Time::fromNanoseconds(ns))).nanoseconds(), ns);
+  }
+}
+
 TEST(ParseTime, RoundsBeyondNanoseconds) {
   EXPECT_EQ(parseTime("1.0000000004").nanoseconds(), 1000000000);
   EXPECT_EQ(parseTime("1.0000000005").nanoseconds(), 1000000001);
@@ -322,6 +330,21 @@ TEST(AbsoluteError, RefusesWhatCannotBeCompared) {
   EXPECT_THROW(absoluteError(helix(), {}, Alignment::kNone), std::invalid_argument);
   EXPECT_THROW(absoluteError({}, helix(), Alignment::kOrigin), std::invalid_argument);
   EXPECT_THROW(absoluteError(helix(), {pose(99, {0, 0, 0})}, Alignment::kOrigin), std::invalid_argument);
+}
+
+TEST(PoseErrors, TellWhereTheErrorIs) {
+  const Trajectory truth = {pose(0, {0, 0, 0}), pose(1, {1, 0, 0}, 170), pose(2, {2, 0, 0})};
+  const Trajectory estimate = {pose(0.001, {0, 0, 0}), pose(1.001, {1, 0.5, 0}, -170),
+                               pose(2.001, {2, 0, 0})};
+  const std::vector<PoseError> errors =
+      poseErrors(truth, moved(estimate, so3::exp({0.2, 0.3, 1.0}), {7, 8, 9}), Alignment::kOrigin);
+  ASSERT_EQ(errors.size(), 3u);
+  EXPECT_EQ(errors[1].time, at(1.001));
+  EXPECT_LT((errors[1].p_T - Eigen::Vector3d(1, 0.5, 0)).norm(), kExact);
+  EXPECT_EQ(errors[1].truth_T, Eigen::Vector3d(1, 0, 0));
+  EXPECT_NEAR(errors[1].angle_deg, 20.0, 1e-6);
+  EXPECT_NEAR(errors[1].yaw_deg, 20.0, 1e-6);
+  EXPECT_NEAR(errors[2].yaw_deg, 0.0, 1e-6);
 }
 
 // --- Relative error ---

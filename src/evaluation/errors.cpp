@@ -14,7 +14,8 @@
 namespace rio_t {
 namespace {
 
-constexpr double kDegrees = 180.0 / 3.14159265358979323846;
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kDegrees = 180.0 / kPi;
 
 /// Angle between two orientations [deg].
 double angleDegrees(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
@@ -25,6 +26,11 @@ double angleDegrees(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
 double yaw(const Eigen::Quaterniond& q) {
   const Eigen::Vector3d x = q * Eigen::Vector3d::UnitX();
   return std::atan2(x.y(), x.x());
+}
+
+/// Heading of `estimate` minus that of `truth`, the short way round [deg].
+double yawDegrees(const Eigen::Quaterniond& truth, const Eigen::Quaterniond& estimate) {
+  return kDegrees * std::remainder(yaw(estimate) - yaw(truth), 2.0 * kPi);
 }
 
 Statistics statistics(std::vector<double> values) {
@@ -170,17 +176,30 @@ Trajectory transformed(const RigidTransform& T_TE, const Trajectory& estimate) {
   return result;
 }
 
-AbsoluteError absoluteError(const Trajectory& truth, const Trajectory& estimate, Alignment kind,
-                            double max_difference) {
+std::vector<PoseError> poseErrors(const Trajectory& truth, const Trajectory& estimate, Alignment kind,
+                                  double max_difference) {
   const std::vector<Match> matches = requireMatches(truth, estimate, max_difference);
   const Trajectory aligned = transformed(alignment(truth, estimate, matches, kind), estimate);
+  std::vector<PoseError> errors;
+  errors.reserve(matches.size());
+  for (const Match& match : matches) {
+    const StampedPose& t = truth[match.truth];
+    const StampedPose& e = aligned[match.estimate];
+    errors.push_back({e.time, e.p_W, t.p_W, angleDegrees(t.q_WI, e.q_WI), yawDegrees(t.q_WI, e.q_WI)});
+  }
+  return errors;
+}
+
+AbsoluteError absoluteError(const Trajectory& truth, const Trajectory& estimate, Alignment kind,
+                            double max_difference) {
   std::vector<double> metres;
   std::vector<double> degrees;
-  for (const Match& match : matches) {
-    metres.push_back((aligned[match.estimate].p_W - truth[match.truth].p_W).norm());
-    degrees.push_back(angleDegrees(truth[match.truth].q_WI, aligned[match.estimate].q_WI));
+  for (const PoseError& error : poseErrors(truth, estimate, kind, max_difference)) {
+    metres.push_back((error.p_T - error.truth_T).norm());
+    degrees.push_back(error.angle_deg);
   }
-  return {statistics(std::move(metres)), statistics(std::move(degrees)), matches.size()};
+  const std::size_t count = metres.size();
+  return {statistics(std::move(metres)), statistics(std::move(degrees)), count};
 }
 
 RelativeError relativeError(const Trajectory& truth, const Trajectory& estimate,
@@ -211,17 +230,15 @@ RelativeError relativeError(const Trajectory& truth, const Trajectory& estimate,
 
 Drift drift(const Trajectory& truth, const Trajectory& estimate, double max_difference) {
   const std::vector<Match> matches = requireMatches(truth, estimate, max_difference);
-  const Trajectory aligned = transformed(alignment(truth, estimate, matches, Alignment::kOrigin), estimate);
-  const StampedPose& t = truth[matches.back().truth];
-  const StampedPose& e = aligned[matches.back().estimate];
+  const PoseError last = poseErrors(truth, estimate, Alignment::kOrigin, max_difference).back();
   Drift result;
   for (std::size_t i = matches.front().truth + 1; i <= matches.back().truth; ++i) {
     result.path_m += (truth[i].p_W - truth[i - 1].p_W).norm();
   }
-  const Eigen::Vector3d error = e.p_W - t.p_W;
+  const Eigen::Vector3d error = last.p_T - last.truth_T;
   result.final_m = error.norm();
   result.final_horizontal_m = error.head<2>().norm();
-  result.final_yaw_deg = kDegrees * std::remainder(yaw(e.q_WI) - yaw(t.q_WI), 2.0 * std::acos(-1.0));
+  result.final_yaw_deg = last.yaw_deg;
   if (result.path_m > 0.0) result.per_metre = result.final_m / result.path_m;
   return result;
 }

@@ -126,16 +126,20 @@ Trajectory readTum(const std::string& path) {
   return readTum(file, path);
 }
 
-void writeTumLine(std::ostream& out, const StampedPose& pose) {
-  // Sign, seconds and nanoseconds apart: no double holds all digits of a stamp.
-  const std::int64_t ns = pose.time.nanoseconds();
+std::string formatTime(Time time) {
+  const std::int64_t ns = time.nanoseconds();
   const std::int64_t second = 1000000000;
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%s%lld.%09lld", ns < 0 ? "-" : "",
+                static_cast<long long>(std::abs(ns / second)), static_cast<long long>(std::abs(ns % second)));
+  return text.data();
+}
+
+void writeTumLine(std::ostream& out, const StampedPose& pose) {
   std::array<char, 256> text{};
-  std::snprintf(text.data(), text.size(), "%s%lld.%09lld %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n",
-                ns < 0 ? "-" : "", static_cast<long long>(std::abs(ns / second)),
-                static_cast<long long>(std::abs(ns % second)), pose.p_W.x(), pose.p_W.y(), pose.p_W.z(),
-                pose.q_WI.x(), pose.q_WI.y(), pose.q_WI.z(), pose.q_WI.w());
-  out << text.data();
+  std::snprintf(text.data(), text.size(), " %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n", pose.p_W.x(), pose.p_W.y(),
+                pose.p_W.z(), pose.q_WI.x(), pose.q_WI.y(), pose.q_WI.z(), pose.q_WI.w());
+  out << formatTime(pose.time) << text.data();
 }
 
 void writeTum(const std::string& path, const Trajectory& trajectory) {

@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <fstream>
+#include <iomanip>
 #include <iostream>
 #include <optional>
 #include <stdexcept>
@@ -31,6 +33,7 @@ Errors of estimated trajectories (TUM format: stamp x y z qx qy qz qw) with the 
   --time-offset FILE   estimates of the radar's time offset, a table with columns stamp,offset_s,sigma_s
   --true-offset S      their constant truth [s]
   --skip S             leave out the first S seconds of the offsets (convergence); default 0
+  --errors FILE        write the error of every matched pose (origin aligned) of the one estimate as a table
   --yaml               for machines
   --help               this text
 
@@ -39,6 +42,7 @@ Exit status: 0, or 1 with one line on stderr.
 
 struct Arguments {
   std::vector<std::string> trajectories;  ///< truth first
+  std::string errors_file;
   std::string time_offset;
   std::optional<double> true_offset;
   double skip = 0.0;
@@ -86,6 +90,8 @@ Arguments parse(int argc, char** argv) {
       arguments.max_difference = seconds(0.0);
     } else if (word == "--skip") {
       arguments.skip = seconds(0.0);
+    } else if (word == "--errors") {
+      arguments.errors_file = value();
     } else if (word == "--time-offset") {
       arguments.time_offset = value();
     } else if (word == "--true-offset") {
@@ -100,6 +106,9 @@ Arguments parse(int argc, char** argv) {
   if (arguments.time_offset.empty() == arguments.true_offset.has_value()) {
     throw std::invalid_argument("--time-offset and --true-offset go together; see --help");
   }
+  if (!arguments.errors_file.empty() && arguments.trajectories.size() != 2) {
+    throw std::invalid_argument("--errors goes with exactly one estimate; see --help");
+  }
   if (arguments.trajectories.size() == 1) {
     throw std::invalid_argument("only one trajectory given, expected GROUND_TRUTH ESTIMATE...; see --help");
   }
@@ -109,9 +118,8 @@ Arguments parse(int argc, char** argv) {
   return arguments;
 }
 
-Evaluation evaluate(const Trajectory& truth, const std::string& truth_file, const std::string& file,
-                    double max_difference) {
-  const Trajectory estimate = readTum(file);
+Evaluation evaluate(const Trajectory& truth, const std::string& truth_file, const Trajectory& estimate,
+                    const std::string& file, double max_difference) {
   const auto aligned = [&](Alignment kind) -> std::optional<AbsoluteError> {
     try {
       return absoluteError(truth, estimate, kind, max_difference);
@@ -230,6 +238,22 @@ void printYaml(const std::string& file, double truth, const OffsetError& e) {
   std::printf("  mean_normalised_square: %.9g\n", e.mean_normalised_square);
 }
 
+void writeErrors(const std::string& file, const Trajectory& truth, const Trajectory& estimate,
+                 double max_difference) {
+  std::ofstream out(file);
+  out << std::setprecision(9) << "stamp,x,y,z,truth_x,truth_y,truth_z,angle_deg,yaw_deg\n";
+  for (const PoseError& e : poseErrors(truth, estimate, Alignment::kOrigin, max_difference)) {
+    out << formatTime(e.time);
+    for (const double value : {e.p_T.x(), e.p_T.y(), e.p_T.z(), e.truth_T.x(), e.truth_T.y(), e.truth_T.z(),
+                               e.angle_deg, e.yaw_deg}) {
+      out << ',' << value;
+    }
+    out << '\n';
+  }
+  out.flush();
+  if (!out) throw std::runtime_error(file + ": cannot be written");
+}
+
 void run(const Arguments& arguments) {
   // All is computed before anything is printed: a failure leaves no half output.
   std::vector<Evaluation> evaluations;
@@ -237,7 +261,12 @@ void run(const Arguments& arguments) {
     const std::string& truth_file = arguments.trajectories.front();
     const Trajectory truth = readTum(truth_file);
     for (std::size_t i = 1; i < arguments.trajectories.size(); ++i) {
-      evaluations.push_back(evaluate(truth, truth_file, arguments.trajectories[i], arguments.max_difference));
+      const std::string& file = arguments.trajectories[i];
+      const Trajectory estimate = readTum(file);
+      evaluations.push_back(evaluate(truth, truth_file, estimate, file, arguments.max_difference));
+      if (!arguments.errors_file.empty()) {
+        writeErrors(arguments.errors_file, truth, estimate, arguments.max_difference);
+      }
     }
   }
   std::optional<OffsetError> offset;

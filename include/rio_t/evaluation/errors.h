@@ -38,6 +38,19 @@ RigidTransform alignment(const Trajectory& truth, const Trajectory& estimate,
                          const std::vector<Match>& matches, Alignment kind);
 Trajectory transformed(const RigidTransform& T_TE, const Trajectory& estimate);
 
+/// Error of one matched pose after alignment; what the statistics are made of, for plots.
+struct PoseError {
+  Time time;                ///< of the estimate
+  Eigen::Vector3d p_T;      ///< estimate, moved into the world of the truth [m]
+  Eigen::Vector3d truth_T;  ///< [m]
+  double angle_deg = 0.0;   ///< between the orientations, in [0, 180]
+  double yaw_deg = 0.0;     ///< heading of the estimate minus that of the truth, in [-180, 180]
+};
+
+/// Throws std::invalid_argument if no poses match, or too few for the alignment.
+std::vector<PoseError> poseErrors(const Trajectory& truth, const Trajectory& estimate, Alignment kind,
+                                  double max_difference = kDefaultMaxDifference);
+
 /// ATE (evo's APE): distance of positions [m] and angle between orientations [deg] after alignment.
 struct AbsoluteError {
   Statistics translation_m;
@@ -45,7 +58,7 @@ struct AbsoluteError {
   std::size_t matched_poses = 0;
 };
 
-/// Throws std::invalid_argument if no poses match, or too few for the alignment.
+/// Throws as poseErrors does.
 AbsoluteError absoluteError(const Trajectory& truth, const Trajectory& estimate, Alignment kind,
                             double max_difference = kDefaultMaxDifference);
 
@@ -78,7 +91,7 @@ struct Drift {
   double path_m = 0.0;  ///< length of the truth's path between the first and last match
   double final_m = 0.0;
   double final_horizontal_m = 0.0;
-  double final_yaw_deg = 0.0;  ///< estimate minus truth, in (-180, 180]
+  double final_yaw_deg = 0.0;  ///< estimate minus truth, in [-180, 180]
   double per_metre = 0.0;      ///< final_m / path_m; zero if the truth does not move
 };
 

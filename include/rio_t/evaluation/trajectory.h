@@ -28,6 +28,8 @@ void writeTumLine(std::ostream& out, const StampedPose& pose);
 /// Exact time of a decimal text such as `1700000010.012222` or `1.700000010012222e+09`, rounded to the
 /// nearest nanosecond. Never goes through double. Throws std::invalid_argument if the text is no such number.
 Time parseTime(const std::string& text);
+/// Its inverse: seconds with nine decimals, exact.
+std::string formatTime(Time time);
 
 /// Largest difference of the stamps of two poses that are compared, by default [s]. It is evo's default, so
 /// that figures agree with evo's without options on either side; the nearest pose wins anyhow, so it only
