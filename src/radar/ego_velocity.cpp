@@ -113,6 +113,7 @@ Eigen::Vector3d ransac(const std::vector<Direction>& points, const EgoVelocityOp
   };
   offer(Eigen::Vector3d::Zero());
 
+  bool spans_space = false;
   const std::size_t n = points.size();
   IndexDraw draw(o.ransac_seed);
   for (int iteration = 0; iteration < iterations; ++iteration) {
@@ -123,9 +124,11 @@ Eigen::Vector3d ransac(const std::vector<Direction>& points, const EgoVelocityOp
     if (k >= std::min(i, j)) ++k;
     if (k >= std::max(i, j)) ++k;
     Eigen::Vector3d v_R;
-    if (solveThree(points[i], points[j], points[k], v_R)) offer(v_R);
+    if (!solveThree(points[i], points[j], points[k], v_R)) continue;
+    spans_space = true;
+    offer(v_R);
   }
-  return best_v_R;
+  return spans_space ? std::make_optional(best_v_R) : std::nullopt;
 }
 
 /// Points that agree with `v_R`: within the threshold, or within three sigma where the noise of the direction
@@ -224,8 +227,13 @@ EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
   if (rest) {
     inliers = points;
   } else {
+    const std::optional<Eigen::Vector3d> consensus = ransac(points, o, ransac_iterations_);
+    if (!consensus) {
+      result.status = EgoVelocityStatus::kIllConditioned;
+      return result;
+    }
     inliers.reserve(points.size());
-    selectInliers(points, ransac(points, o, ransac_iterations_), o, inliers);
+    selectInliers(points, *consensus, o, inliers);
     if (prior) heedPrior(points, *prior, o, inliers);
     // At rest in front of an object that moves, too many points disagree for the test above, but not these.
     rest = most_read_zero(inliers);

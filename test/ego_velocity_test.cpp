@@ -1,0 +1,420 @@
+#include "rio_t/radar/ego_velocity.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <set>
+#include <stdexcept>
+
+namespace rio_t {
+namespace {
+
+/// Random numbers that are the same with every standard library.
+class Random {
+ public:
+  explicit Random(std::uint32_t seed) : engine_(seed) {}
+  double uniform(double low, double high) {
+    return low + (high - low) * (static_cast<double>(engine_()) + 0.5) / 4294967296.0;
+  }
+  double normal() {  // Box-Muller
+    return std::sqrt(-2.0 * std::log(uniform(0, 1))) * std::cos(2.0 * M_PI * uniform(0, 1));
+  }
+
+ private:
+  std::mt19937 engine_;
+};
+
+Eigen::Vector3d direction(double azimuth, double elevation) {
+  return {std::cos(elevation) * std::sin(azimuth), std::cos(elevation) * std::cos(azimuth),
+          std::sin(elevation)};
+}
+
+struct Noise {
+  double azimuth = 0.0, elevation = 0.0;     // [rad]
+  double doppler = 0.0, quantization = 0.0;  // [m/s]
+};
+
+/// Static targets all over the field of view, seen at `v_R`.
+RadarScan staticScene(const Eigen::Vector3d& v_R, int points, const Noise& noise, Random& random,
+                      double elevation_spread = 0.35) {
+  RadarScan scan;
+  for (int i = 0; i < points; ++i) {
+    const double azimuth = random.uniform(-0.9, 0.9);
+    const double elevation = random.uniform(-elevation_spread, elevation_spread);
+    RadarPoint p;
+    p.doppler = -direction(azimuth, elevation).dot(v_R) + noise.doppler * random.normal();
+    if (noise.quantization > 0) p.doppler = noise.quantization * std::round(p.doppler / noise.quantization);
+    p.position_R = random.uniform(1.0, 9.0) * direction(azimuth + noise.azimuth * random.normal(),
+                                                        elevation + noise.elevation * random.normal());
+    p.snr_db = 15.0;
+    scan.points.push_back(p);
+  }
+  return scan;
+}
+
+/// Estimation without anything that widens the covariance, for tests of the solver.
+EgoVelocityOptions bareOptions(EgoVelocitySolver solver) {
+  EgoVelocityOptions o;
+  o.solver = solver;
+  o.added_sigma.setZero();
+  return o;
+}
+
+const Eigen::Vector3d kVelocity(0.4, 1.2, -0.3);
+
+TEST(EgoVelocity, ExactWithoutNoise) {
+  for (const EgoVelocitySolver solver :
+       {EgoVelocitySolver::kLeastSquares, EgoVelocitySolver::kErrorsInVariables}) {
+    EgoVelocityOptions o = bareOptions(solver);
+    o.azimuth_sigma = o.elevation_sigma = o.doppler_sigma = o.doppler_quantization = 0.0;
+    Random random(1);
+    const EgoVelocity e = EgoVelocityEstimator(o).estimate(staticScene(kVelocity, 30, {}, random));
+    EXPECT_EQ(e.status, EgoVelocityStatus::kMoving);
+    EXPECT_LT((e.v_R - kVelocity).norm(), 1e-9) << toString(solver);
+    EXPECT_EQ(e.inliers.size(), 30u);
+    EXPECT_EQ(e.points_used, 30u);
+  }
+}
+
+TEST(EgoVelocity, SignAndAxes) {
+  // Driving forward, a target ahead approaches: negative range rate, positive y velocity.
+  RadarScan scan;
+  for (const double azimuth : {-0.6, -0.3, 0.0, 0.3, 0.6}) {
+    for (const double elevation : {-0.3, 0.0, 0.3}) {
+      scan.points.push_back({4.0 * direction(azimuth, elevation), -direction(azimuth, elevation).y(), 20.0});
+    }
+  }
+  const EgoVelocity e = EgoVelocityEstimator(EgoVelocityOptions()).estimate(scan);
+  EXPECT_EQ(e.status, EgoVelocityStatus::kMoving);
+  EXPECT_NEAR(e.v_R.y(), 1.0, 0.02);
+  EXPECT_NEAR(e.v_R.x(), 0.0, 0.02);
+  EXPECT_NEAR(e.v_R.z(), 0.0, 0.05);
+}
+
+TEST(EgoVelocity, FortyPercentOutliers) {
+  Random random(2);
+  const EgoVelocityEstimator estimator{EgoVelocityOptions()};
+  for (int trial = 0; trial < 200; ++trial) {
+    RadarScan scan = staticScene(kVelocity, 50, {0.01, 0.02, 0.01, 0.125}, random);
+    for (std::size_t i = 0; i < scan.points.size(); i += 5) {  // two of five
+      for (const std::size_t k : {i, i + 1}) {
+        const double sign = random.uniform(-1, 1) < 0 ? -1 : 1;
+        scan.points[k].doppler += sign * random.uniform(0.6, 3.0);
+      }
+    }
+    const EgoVelocity e = estimator.estimate(scan);
+    ASSERT_EQ(e.status, EgoVelocityStatus::kMoving) << trial;
+    for (const std::size_t i : e.inliers) EXPECT_GE(i % 5, 2u) << "outlier taken, trial " << trial;
+    EXPECT_GE(e.inliers.size(), 28u);
+    EXPECT_LT((e.v_R - kVelocity).norm(), 0.15) << trial;
+  }
+}
+
+TEST(EgoVelocity, SameScanSameAnswer) {
+  Random random(3);
+  const RadarScan scan = staticScene(kVelocity, 40, {0.03, 0.05, 0.03, 0.125}, random);
+  const EgoVelocityEstimator estimator{EgoVelocityOptions()};
+  const EgoVelocity first = estimator.estimate(scan);
+  estimator.estimate(staticScene(-kVelocity, 25, {}, random));  // must leave no trace
+  const EgoVelocity again = estimator.estimate(scan);
+  EXPECT_EQ(first.v_R, again.v_R);
+  EXPECT_EQ(first.covariance, again.covariance);
+  EXPECT_EQ(first.inliers, again.inliers);
+}
+
+TEST(EgoVelocity, FilterLeavesOutWhatItShould) {
+  Random random(4);
+  RadarScan scan = staticScene(kVelocity, 20, {}, random);
+  const std::size_t good = scan.points.size();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  scan.points.push_back({Eigen::Vector3d::Zero(), 0.0, 20.0});   // at the origin
+  scan.points.push_back({direction(0, 0) * 0.1, 0.0, 20.0});     // too near
+  scan.points.push_back({direction(0, 0) * 200.0, 0.0, 20.0});   // too far
+  scan.points.push_back({direction(0, 0) * 3.0, 0.0, 1.0});      // too weak
+  scan.points.push_back({direction(1.2, 0) * 3.0, 0.0, 20.0});   // to the side
+  scan.points.push_back({direction(-1.2, 0) * 3.0, 0.0, 20.0});  // to the other
+  scan.points.push_back({direction(3.1, 0) * 3.0, 0.0, 20.0});   // behind
+  scan.points.push_back({direction(0, 1.2) * 3.0, 0.0, 20.0});   // above
+  scan.points.push_back({direction(0, -1.2) * 3.0, 0.0, 20.0});  // below
+  scan.points.push_back({direction(0, 0) * 3.0, nan, 20.0});     // not finite, in every member
+  scan.points.push_back({direction(0, 0) * 3.0, 0.0, nan});
+  scan.points.push_back({Eigen::Vector3d(nan, 1, 1), 0.0, 20.0});
+  const EgoVelocity e = EgoVelocityEstimator(EgoVelocityOptions()).estimate(scan);
+  EXPECT_EQ(e.points_used, good);
+  for (const std::size_t i : e.inliers) EXPECT_LT(i, good);
+
+  EgoVelocityOptions no_min_range;  // a point without direction must not pass even then
+  no_min_range.min_range = 0.0;
+  EXPECT_EQ(EgoVelocityEstimator(no_min_range).estimate(scan).points_used, good + 1);
+}
+
+TEST(EgoVelocity, RestWithSomethingMoving) {
+  Random random(5);
+  RadarScan scan = staticScene(Eigen::Vector3d::Zero(), 40, {}, random);
+  for (std::size_t i = 0; i < 9; ++i) scan.points[i].doppler = 0.7;  // under a quarter
+  const EgoVelocity e = EgoVelocityEstimator(EgoVelocityOptions()).estimate(scan);
+  EXPECT_EQ(e.status, EgoVelocityStatus::kZeroVelocity);
+  EXPECT_EQ(e.v_R, Eigen::Vector3d::Zero());
+  EXPECT_EQ(e.inliers.size(), 31u);
+  for (const std::size_t i : e.inliers) EXPECT_GE(i, 9u);
+}
+
+TEST(EgoVelocity, RestWithALargeObjectMoving) {
+  // More than a quarter moves, so the first test for rest fails; RANSAC then finds that the rest stands
+  // still.
+  Random random(6);
+  RadarScan scan = staticScene(Eigen::Vector3d::Zero(), 40, {}, random);
+  for (std::size_t i = 0; i < 15; ++i) scan.points[i].doppler = 0.7 + 0.1 * static_cast<double>(i % 5);
+  const EgoVelocity e = EgoVelocityEstimator(EgoVelocityOptions()).estimate(scan);
+  EXPECT_EQ(e.status, EgoVelocityStatus::kZeroVelocity);
+  EXPECT_EQ(e.inliers.size(), 25u);
+}
+
+// A bin of width q hides every velocity below about q/2; the covariance at rest has to admit that.
+TEST(EgoVelocity, CoarseDopplerDoesNotFakeRest) {
+  EgoVelocityOptions o;
+  o.doppler_quantization = 0.5;
+  o.max_sigma = 1.0;
+  const EgoVelocityEstimator estimator(o);
+  Random random(7);
+  double squares = 0.0;
+  int rests = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    const Eigen::Vector3d v(random.uniform(-0.3, 0.3), random.uniform(-0.3, 0.3), random.uniform(-0.3, 0.3));
+    const EgoVelocity e = estimator.estimate(staticScene(v, 40, {0, 0, 0, 0.5}, random));
+    if (e.status != EgoVelocityStatus::kZeroVelocity) continue;
+    ++rests;
+    squares += v.dot(e.covariance.llt().solve(v));
+  }
+  EXPECT_GT(rests, 200);  // the case is there
+  EXPECT_LT(squares / rests, 3.0);
+  EXPECT_GT(squares / rests, 0.5);  // honest, not useless
+}
+
+TEST(EgoVelocity, FineDopplerAtRestKeepsTheSigmaGiven) {
+  EgoVelocityOptions o;
+  o.doppler_quantization = 0.0;
+  Random random(8);
+  const EgoVelocity e =
+      EgoVelocityEstimator(o).estimate(staticScene(Eigen::Vector3d::Zero(), 40, {}, random));
+  EXPECT_EQ(e.status, EgoVelocityStatus::kZeroVelocity);
+  const double variance = o.zero_velocity_sigma * o.zero_velocity_sigma;
+  EXPECT_LT((e.covariance - variance * Eigen::Matrix3d::Identity()).norm(), 1e-12);
+}
+
+TEST(EgoVelocity, TooFewPoints) {
+  const EgoVelocityEstimator estimator{EgoVelocityOptions()};
+  EXPECT_EQ(estimator.estimate(RadarScan()).status, EgoVelocityStatus::kTooFewPoints);
+  Random random(9);
+  EXPECT_EQ(estimator.estimate(staticScene(kVelocity, 2, {}, random)).status,
+            EgoVelocityStatus::kTooFewPoints);
+}
+
+TEST(EgoVelocity, TooFewInliers) {
+  Random random(10);
+  RadarScan scan = staticScene(kVelocity, 40, {}, random);
+  for (RadarPoint& p : scan.points) p.doppler = random.uniform(-4.0, 4.0);
+  const EgoVelocity e = EgoVelocityEstimator(EgoVelocityOptions()).estimate(scan);
+  EXPECT_EQ(e.status, EgoVelocityStatus::kTooFewInliers);
+  EXPECT_FALSE(isValid(e.status));
+  EXPECT_EQ(e.v_R, Eigen::Vector3d::Zero());  // a velocity that must not be used is not given
+
+  // Three points agree on any velocity; that is no evidence.
+  EXPECT_EQ(EgoVelocityEstimator(EgoVelocityOptions()).estimate(staticScene(kVelocity, 3, {}, random)).status,
+            EgoVelocityStatus::kTooFewInliers);
+}
+
+TEST(EgoVelocity, IllConditioned) {
+  Random random(11);
+  const EgoVelocityEstimator estimator{EgoVelocityOptions()};
+  const RadarScan flat = staticScene(kVelocity, 40, {}, random, 0.0);  // all on the horizon: z is not seen
+  EXPECT_EQ(estimator.estimate(flat).status, EgoVelocityStatus::kIllConditioned);
+  // At rest as well: what is not seen is not known to be zero.
+  const RadarScan flat_rest = staticScene(Eigen::Vector3d::Zero(), 40, {}, random, 0.0);
+  EXPECT_EQ(estimator.estimate(flat_rest).status, EgoVelocityStatus::kIllConditioned);
+}
+
+TEST(EgoVelocity, SigmaTooLarge) {
+  EgoVelocityOptions o;
+  o.max_sigma = 0.03;
+  Random random(12);
+  const EgoVelocity e =
+      EgoVelocityEstimator(o).estimate(staticScene(kVelocity, 12, {0.02, 0.04, 0.03, 0.125}, random));
+  EXPECT_EQ(e.status, EgoVelocityStatus::kSigmaTooLarge);
+}
+
+TEST(EgoVelocity, StatusAndSolverNames) {
+  std::set<std::string> names;
+  for (const EgoVelocityStatus status :
+       {EgoVelocityStatus::kMoving, EgoVelocityStatus::kZeroVelocity, EgoVelocityStatus::kTooFewPoints,
+        EgoVelocityStatus::kTooFewInliers, EgoVelocityStatus::kIllConditioned,
+        EgoVelocityStatus::kSigmaTooLarge}) {
+    names.insert(toString(status));
+  }
+  EXPECT_EQ(names.size(), 6u);
+  for (const EgoVelocitySolver solver :
+       {EgoVelocitySolver::kLeastSquares, EgoVelocitySolver::kErrorsInVariables}) {
+    EXPECT_EQ(egoVelocitySolverFromString(toString(solver)), solver);
+  }
+  EXPECT_THROW(egoVelocitySolverFromString("odr"), std::invalid_argument);
+}
+
+TEST(EgoVelocity, RefusesSenselessOptions) {
+  const auto refused = [](void (*spoil)(EgoVelocityOptions&)) {
+    EgoVelocityOptions o;
+    spoil(o);
+    EXPECT_THROW(EgoVelocityEstimator{o}, std::invalid_argument);
+  };
+  refused([](EgoVelocityOptions& o) { o.max_range = 0.1; });
+  refused([](EgoVelocityOptions& o) { o.ransac_success_probability = 1.0; });
+  refused([](EgoVelocityOptions& o) { o.ransac_outlier_probability = 1.0; });
+  refused(
+      [](EgoVelocityOptions& o) { o.ransac_inlier_threshold = std::numeric_limits<double>::quiet_NaN(); });
+  refused([](EgoVelocityOptions& o) { o.doppler_quantization = -0.1; });
+  refused([](EgoVelocityOptions& o) { o.added_sigma.z() = -1.0; });
+}
+
+// --- Bias and honesty
+// -----------------------------------------------------------------------------------------------
+
+struct MonteCarlo {
+  Eigen::Vector3d bias = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rms = Eigen::Vector3d::Zero();
+  double nees = 0.0;
+};
+
+MonteCarlo monteCarlo(const EgoVelocityOptions& options, const Eigen::Vector3d& v, const Noise& noise,
+                      double elevation_spread) {
+  constexpr int kTrials = 4000;
+  const EgoVelocityEstimator estimator(options);
+  Random random(20);
+  MonteCarlo result;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    // Velocities around v, so that the quantisation is not the same each time.
+    const Eigen::Vector3d truth =
+        v + 0.1 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+    const EgoVelocity e = estimator.estimate(staticScene(truth, 45, noise, random, elevation_spread));
+    EXPECT_EQ(e.status, EgoVelocityStatus::kMoving);
+    const Eigen::Vector3d error = e.v_R - truth;
+    result.bias += error / kTrials;
+    result.rms += error.cwiseAbs2() / kTrials;
+    result.nees += error.dot(e.covariance.llt().solve(error)) / kTrials;
+  }
+  result.rms = result.rms.cwiseSqrt();
+  return result;
+}
+
+// Little spread in elevation and noisy elevations: where least squares falls short of the vertical velocity
+// most.
+const Noise kDirectionNoise{0.03, 0.05, 0.03, 0.125};
+const Eigen::Vector3d kClimb(0.2, 1.5, 0.6);
+
+TEST(EgoVelocityBias, LeastSquaresFallsShort) {
+  const MonteCarlo ls =
+      monteCarlo(bareOptions(EgoVelocitySolver::kLeastSquares), kClimb, kDirectionNoise, 0.25);
+  EXPECT_LT(ls.bias.z(), -0.04);  // of 0.6 m/s: the reason for the other solver
+  EXPECT_GT(ls.nees, 4.0);
+}
+
+TEST(EgoVelocityBias, ErrorsInVariablesDoesNot) {
+  const EgoVelocityOptions o = bareOptions(EgoVelocitySolver::kErrorsInVariables);
+  const MonteCarlo ls =
+      monteCarlo(bareOptions(EgoVelocitySolver::kLeastSquares), kClimb, kDirectionNoise, 0.25);
+  const MonteCarlo eiv = monteCarlo(o, kClimb, kDirectionNoise, 0.25);
+  EXPECT_LT(eiv.bias.cwiseAbs().maxCoeff(), 0.01);
+  EXPECT_LT(eiv.rms.z(), 0.9 * ls.rms.z());
+  EXPECT_NEAR(eiv.nees, 3.0, 0.5);
+}
+
+TEST(EgoVelocityBias, NoWorseWhereDirectionsAreGood) {
+  // The options promise more noise than there is: the compensation must notice.
+  const Noise good{0.005, 0.008, 0.01, 0.125};
+  const MonteCarlo ls = monteCarlo(bareOptions(EgoVelocitySolver::kLeastSquares), kVelocity, good, 0.35);
+  const MonteCarlo eiv =
+      monteCarlo(bareOptions(EgoVelocitySolver::kErrorsInVariables), kVelocity, good, 0.35);
+  EXPECT_LT(eiv.bias.cwiseAbs().maxCoeff(), 0.01);
+  EXPECT_LT(eiv.rms.z(), 1.1 * ls.rms.z());
+  EXPECT_LT(eiv.nees, 3.6);
+  EXPECT_GT(eiv.nees, 2.0);
+}
+
+TEST(EgoVelocityBias, FastPlatform) {
+  const Eigen::Vector3d fast(0.5, 5.0, 1.0);
+  const MonteCarlo ls =
+      monteCarlo(bareOptions(EgoVelocitySolver::kLeastSquares), fast, kDirectionNoise, 0.35);
+  const MonteCarlo eiv =
+      monteCarlo(bareOptions(EgoVelocitySolver::kErrorsInVariables), fast, kDirectionNoise, 0.35);
+  EXPECT_LT(eiv.rms.z(), ls.rms.z());
+  EXPECT_LT(eiv.rms.y(), ls.rms.y());
+  EXPECT_LT(eiv.bias.cwiseAbs().maxCoeff(), 0.02);
+  EXPECT_NEAR(eiv.nees, 3.0, 0.6);
+}
+
+TEST(EgoVelocityBias, DefaultCovarianceIsNotTooSmall) {
+  const MonteCarlo result = monteCarlo(EgoVelocityOptions(), kClimb, kDirectionNoise, 0.25);
+  EXPECT_LT(result.nees, 3.0);
+  EXPECT_GT(result.nees, 0.8);  // nor so large that it says nothing
+}
+
+// --- The prior
+// ------------------------------------------------------------------------------------------------------
+
+/// 22 static points, and 25 of an object that fills one side and moves.
+RadarScan sceneWithObject(const Eigen::Vector3d& v_R, const Eigen::Vector3d& object_v_R, Random& random) {
+  RadarScan scan = staticScene(v_R, 22, {0.01, 0.02, 0.01, 0.125}, random);
+  for (int i = 0; i < 25; ++i) {
+    const Eigen::Vector3d u = direction(random.uniform(0.2, 0.9), random.uniform(-0.35, 0.35));
+    scan.points.push_back({3.0 * u, 0.125 * std::round(-u.dot(v_R - object_v_R) / 0.125), 20.0});
+  }
+  return scan;
+}
+
+TEST(EgoVelocityPrior, TellsTheStaticWorldFromAnObject) {
+  const EgoVelocityEstimator estimator{EgoVelocityOptions()};
+  Random random(30);
+  VelocityPrior prior;
+  prior.covariance = 0.05 * 0.05 * Eigen::Matrix3d::Identity();
+  int unaided_wrong = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    const RadarScan scan = sceneWithObject(kVelocity, {0.8, 0.9, 0.0}, random);
+    prior.v_R = kVelocity + 0.05 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+    if ((estimator.estimate(scan).v_R - kVelocity).norm() > 0.3) ++unaided_wrong;
+    const EgoVelocity aided = estimator.estimate(scan, prior);
+    ASSERT_TRUE(isValid(aided.status)) << trial;
+    EXPECT_LT((aided.v_R - kVelocity).norm(), 0.3) << trial;
+  }
+  EXPECT_GT(unaided_wrong, 50);  // the scene is as hard as it is meant to be
+}
+
+TEST(EgoVelocityPrior, AWrongOneIsOverruled) {
+  const EgoVelocityEstimator estimator{EgoVelocityOptions()};
+  Random random(31);
+  const RadarScan scan = staticScene(kVelocity, 40, {0.01, 0.02, 0.01, 0.125}, random);
+  VelocityPrior prior;
+  prior.covariance = 1e-6 * Eigen::Matrix3d::Identity();  // and sure of itself
+  const EgoVelocity unaided = estimator.estimate(scan);
+  for (const double off : {0.2, 0.5, 2.0}) {
+    prior.v_R = kVelocity + Eigen::Vector3d(off, -off, 0);
+    const EgoVelocity aided = estimator.estimate(scan, prior);
+    EXPECT_EQ(aided.v_R, unaided.v_R) << off;
+  }
+}
+
+TEST(EgoVelocityPrior, AGoodOneAddsNoInformation) {
+  const EgoVelocityEstimator estimator{EgoVelocityOptions()};
+  Random random(32);
+  const RadarScan scan = staticScene(kVelocity, 40, {0.01, 0.02, 0.01, 0.125}, random);
+  VelocityPrior prior;
+  prior.v_R = kVelocity;
+  prior.covariance = 1e-4 * Eigen::Matrix3d::Identity();
+  const EgoVelocity unaided = estimator.estimate(scan);
+  const EgoVelocity aided = estimator.estimate(scan, prior);
+  EXPECT_EQ(aided.v_R, unaided.v_R);
+  EXPECT_EQ(aided.covariance, unaided.covariance);
+}
+
+}  // namespace
+}  // namespace rio_t
