@@ -1,0 +1,42 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "rio_t/imu/measurement.h"
+#include "rio_t/imu/noise.h"
+#include "rio_t/simulation/motion.h"
+
+namespace rio_t::simulation {
+
+struct ImuModelOptions {
+  double rate = 409.0;  ///< [Hz]
+  ImuNoise noise;  ///< a sample gets density * sqrt(rate); a bias walks by random_walk / sqrt(rate) a sample
+  /// Biases at the start; drawn from the sigmas where not given.
+  std::optional<Eigen::Vector3d> accel_bias;  ///< [m/s^2]
+  std::optional<Eigen::Vector3d> gyro_bias;   ///< [rad/s]
+  double accel_bias_sigma = 0.05;             ///< [m/s^2] per axis
+  double gyro_bias_sigma = 0.003;             ///< [rad/s] per axis
+  double accel_saturation = 176.5;            ///< [m/s^2] per axis (18 g, ADIS16448)
+  double gyro_saturation = 17.45;             ///< [rad/s] per axis (1000 deg/s)
+  double gravity = 9.81;                      ///< [m/s^2]
+
+  /// No noise and no bias; rate, saturation and gravity stay.
+  void removeErrors();
+};
+
+struct ImuData {
+  std::vector<ImuMeasurement> samples;
+  /// True biases of each sample, in I.
+  std::vector<Eigen::Vector3d> b_a;  ///< [m/s^2]
+  std::vector<Eigen::Vector3d> b_g;  ///< [rad/s]
+};
+
+/// Samples of an IMU carried along `motion`: values of the instant of their stamp, not averages over the
+/// interval. Stamps count from `start` (the start of the motion) and lie on whole nanoseconds. Throws
+/// std::invalid_argument for options out of range.
+ImuData simulateImu(const Motion& motion, const ImuModelOptions& options, std::uint64_t seed, Time start);
+
+}  // namespace rio_t::simulation

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "rio_t/odometry/options.h"
+#include "rio_t/simulation/motion.h"
+#include "rio_t/simulation/time_offset.h"
+
+namespace rio_t::simulation {
+
+struct RadarModelOptions {
+  double rate = 10.0;  ///< [Hz] of triggers
+  double frame_length =
+      0.0;                ///< [s] the Doppler is the mean over it, centred at the measurement; 0 = an instant
+  double latency = 0.06;  ///< [s] from stamp to arrival (record time)
+  double latency_sigma = 0.0;  ///< [s] scatter of it; never arrives before the stamp
+
+  double points_mean = 43.0;    ///< points a scan
+  double points_sigma = 8.0;    ///< their scatter
+  int points_max = 70;          ///< the sensor's limit
+  double min_range = 0.25;      ///< [m]
+  double max_range = 12.0;      ///< [m]
+  double fov_azimuth = 60.0;    ///< [deg] half angle
+  double fov_elevation = 45.0;  ///< [deg] half angle
+
+  double range_noise = 0.03;     ///< [m] sigma
+  double azimuth_noise = 2.5;    ///< [deg] sigma
+  double elevation_noise = 4.5;  ///< [deg] sigma
+  double doppler_noise = 0.02;   ///< [m/s] sigma, before quantisation
+  double doppler_step = 0.125;   ///< [m/s] quantisation; 0 = none
+
+  double ghost_share = 0.03;   ///< of the points: anywhere, any Doppler
+  double moving_share = 0.10;  ///< of the time: a walking person in view
+  double dropout_share = 0.0;  ///< of the scans: triggered, never delivered
+  struct Interval {
+    double start;     ///< [s] from the start of the bag
+    double duration;  ///< [s]
+  };
+  std::vector<Interval> blackouts;  ///< no scan with a stamp inside is delivered
+
+  /// Exact points of static reflectors only, every scan delivered but for blackouts.
+  void removeErrors();
+};
+
+struct SimulatedPoint {
+  Eigen::Vector3d position_R =
+      Eigen::Vector3d::Zero();  ///< as measured [m], RIO axes: x right, y forward, z up
+  double doppler = 0.0;         ///< range rate [m/s], positive = receding
+  double snr_db = 0.0;
+  double noise_db = 0.0;
+};
+
+struct SimulatedScan {
+  std::uint32_t seq = 0;
+  Time stamp;                ///< trigger
+  Time measured;             ///< stamp - t_O
+  Time arrival;              ///< when a driver would publish it
+  double time_offset = 0.0;  ///< true t_O of this scan [s]
+  bool delivered = true;
+  Eigen::Vector3d v_R = Eigen::Vector3d::Zero();  ///< true velocity of the radar at `measured`, in R [m/s]
+  std::vector<SimulatedPoint> points;             ///< empty if not delivered
+};
+
+/// True velocity of the radar in R [m/s]: R_RI (R_IW v_W + omega_I x l).
+Eigen::Vector3d radarVelocity(const MotionState& state, const Extrinsics& T_IR);
+
+/// Static reflectors scattered around the path of `motion`, in W [m], within radar range wherever the path
+/// leads.
+std::vector<Eigen::Vector3d> makeScene(const Motion& motion, std::uint64_t seed);
+
+/// Scans of a radar carried along `motion`; scans whose measurement time is not inside the motion are left
+/// out. Each scan draws from a sequence of its own, so that a lost scan leaves the others as they are. Throws
+/// std::invalid_argument for options out of range.
+std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarModelOptions& options,
+                                         const TimeOffsetProfile& time_offset, const Extrinsics& T_IR,
+                                         std::uint64_t seed, Time start);
+
+}  // namespace rio_t::simulation

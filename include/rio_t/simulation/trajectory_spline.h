@@ -1,0 +1,59 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "rio_t/evaluation/trajectory.h"
+
+namespace rio_t::simulation {
+
+/// Pose of the IMU frame I in W and its derivatives.
+struct MotionState {
+  Eigen::Vector3d p_W = Eigen::Vector3d::Zero();             ///< [m]
+  Eigen::Vector3d v_W = Eigen::Vector3d::Zero();             ///< [m/s]
+  Eigen::Vector3d a_W = Eigen::Vector3d::Zero();             ///< [m/s^2], gravity not included
+  Eigen::Quaterniond q_WI = Eigen::Quaterniond::Identity();  ///< turns I into W
+  Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();  ///< angular velocity of I against W, in I [rad/s]
+  Eigen::Vector3d alpha_I = Eigen::Vector3d::Zero();  ///< its time derivative [rad/s^2]
+};
+
+struct SplineFitOptions {
+  double knot_spacing = 0.05;  ///< [s]
+  /// Half-power frequency of the smoothing [Hz]: slower motion passes, faster (motion-capture noise) does
+  /// not.
+  double cutoff = 5.0;
+};
+
+/// A smooth motion through the poses of a trajectory.
+///
+/// Position and quaternion are one uniform B-spline of degree 5 in R^7; the quaternion is normalised where it
+/// is read. All derivatives are analytic and everything up to the fourth one is continuous, so acceleration
+/// and angular acceleration have no kinks. The fit is linear: least squares over the poses plus a penalty on
+/// the third derivative, which acts as the zero-phase low-pass 1 / (1 + (f / cutoff)^6) (Eilers and Marx,
+/// "Flexible Smoothing with B-splines and Penalties", 1996).
+class TrajectorySpline {
+ public:
+  /// Throws std::invalid_argument for fewer than four poses, stamps that do not increase, options that are
+  /// not positive, or neighbouring poses more than 90 degrees apart.
+  explicit TrajectorySpline(const Trajectory& poses, const SplineFitOptions& options = SplineFitOptions{});
+
+  /// Seconds from the first to the last pose.
+  double duration() const { return duration_; }
+  /// At `t` seconds after the first pose, 0 <= t <= duration (1 us of grace). Throws std::out_of_range
+  /// outside.
+  MotionState at(double t) const;
+
+  /// RMS distance of the given poses from the spline: what the smoothing took away.
+  double positionResidual() const { return position_residual_; }  ///< [m]
+  double rotationResidual() const { return rotation_residual_; }  ///< [rad]
+
+ private:
+  // All read-only after construction.
+  double duration_ = 0.0;
+  double knot_spacing_;
+  Eigen::Matrix<double, 7, Eigen::Dynamic> coefficients_;  // p_W, then q_WI as x y z w
+  double position_residual_ = 0.0;
+  double rotation_residual_ = 0.0;
+};
+
+}  // namespace rio_t::simulation

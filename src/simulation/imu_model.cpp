@@ -1,0 +1,74 @@
+#include "rio_t/simulation/imu_model.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "rio_t/simulation/random.h"
+
+namespace rio_t::simulation {
+namespace {
+
+constexpr std::uint64_t kBiasStream = 10;
+constexpr std::uint64_t kNoiseStream = 11;
+
+Eigen::Vector3d saturated(const Eigen::Vector3d& value, double limit) {
+  return value.cwiseMax(-limit).cwiseMin(limit);
+}
+
+void check(const ImuModelOptions& options) {
+  if (!(options.rate > 0.0)) throw std::invalid_argument("IMU rate must be positive");
+  const ImuNoise& n = options.noise;
+  if (n.accel_density < 0.0 || n.gyro_density < 0.0 || n.accel_random_walk < 0.0 ||
+      n.gyro_random_walk < 0.0) {
+    throw std::invalid_argument("IMU noise cannot be negative");
+  }
+  if (!(options.accel_saturation > 0.0) || !(options.gyro_saturation > 0.0)) {
+    throw std::invalid_argument("IMU saturation must be positive");
+  }
+}
+
+}  // namespace
+
+void ImuModelOptions::removeErrors() {
+  noise = {0.0, 0.0, 0.0, 0.0};
+  accel_bias = Eigen::Vector3d::Zero();
+  gyro_bias = Eigen::Vector3d::Zero();
+}
+
+ImuData simulateImu(const Motion& motion, const ImuModelOptions& options, std::uint64_t seed, Time start) {
+  check(options);
+  Random bias_random(seed, kBiasStream);
+  Random random(seed, kNoiseStream);
+  const Eigen::Vector3d drawn_b_a = options.accel_bias_sigma * bias_random.gaussianVector();
+  const Eigen::Vector3d drawn_b_g = options.gyro_bias_sigma * bias_random.gaussianVector();
+  Eigen::Vector3d b_a = options.accel_bias.value_or(drawn_b_a);
+  Eigen::Vector3d b_g = options.gyro_bias.value_or(drawn_b_g);
+  const double root_rate = std::sqrt(options.rate);
+  const Eigen::Vector3d g_W(0.0, 0.0, -options.gravity);
+
+  ImuData data;
+  const auto count = static_cast<std::size_t>(std::floor(motion.duration() * options.rate)) + 1;
+  data.samples.reserve(count);
+  data.b_a.reserve(count);
+  data.b_g.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    ImuMeasurement sample;
+    sample.time = start + static_cast<double>(i) / options.rate;
+    // The motion is asked at the rounded stamp, so that stamp and value agree to the last bit.
+    const MotionState state = motion.at(sample.time - start);
+    sample.angular_velocity =
+        saturated(state.omega_I + b_g + options.noise.gyro_density * root_rate * random.gaussianVector(),
+                  options.gyro_saturation);
+    sample.acceleration = saturated(state.q_WI.conjugate() * (state.a_W - g_W) + b_a +
+                                        options.noise.accel_density * root_rate * random.gaussianVector(),
+                                    options.accel_saturation);
+    data.samples.push_back(sample);
+    data.b_a.push_back(b_a);
+    data.b_g.push_back(b_g);
+    b_a += options.noise.accel_random_walk / root_rate * random.gaussianVector();
+    b_g += options.noise.gyro_random_walk / root_rate * random.gaussianVector();
+  }
+  return data;
+}
+
+}  // namespace rio_t::simulation

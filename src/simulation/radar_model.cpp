@@ -1,0 +1,319 @@
+#include "rio_t/simulation/radar_model.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include "rio_t/simulation/random.h"
+
+namespace rio_t::simulation {
+namespace {
+
+constexpr double kPi = 3.141592653589793;
+constexpr double kDegree = kPi / 180.0;
+constexpr std::uint64_t kSceneStream = 20;
+constexpr std::uint64_t kScanStream = 21;
+constexpr std::uint64_t kPersonStream = 22;
+constexpr std::uint64_t kDropoutStream = 23;
+constexpr std::uint64_t kLatencyStream = 24;
+
+void check(const RadarModelOptions& o) {
+  const auto require = [](bool ok, const char* what) {
+    if (!ok) throw std::invalid_argument(std::string("radar: ") + what);
+  };
+  const auto is_share = [](double share) { return share >= 0.0 && share <= 1.0; };
+  require(o.rate > 0.0, "rate must be positive");
+  require(o.frame_length >= 0.0, "frame length cannot be negative");
+  require(o.latency >= 0.0 && o.latency_sigma >= 0.0, "latency cannot be negative");
+  require(o.points_mean > 0.0 && o.points_sigma >= 0.0 && o.points_max > 0,
+          "number of points must be positive");
+  require(o.min_range >= 0.0 && o.max_range > o.min_range, "maximum range must be above the minimum");
+  require(o.fov_azimuth > 0.0 && o.fov_azimuth <= 90.0, "azimuth limit must be in (0, 90] degrees");
+  require(o.fov_elevation > 0.0 && o.fov_elevation <= 90.0, "elevation limit must be in (0, 90] degrees");
+  require(
+      o.range_noise >= 0.0 && o.azimuth_noise >= 0.0 && o.elevation_noise >= 0.0 && o.doppler_noise >= 0.0,
+      "noise cannot be negative");
+  require(o.doppler_step >= 0.0, "Doppler quantisation cannot be negative");
+  require(is_share(o.ghost_share) && is_share(o.moving_share) && is_share(o.dropout_share),
+          "shares must be in [0, 1]");
+}
+
+// Where the radar is and how it moves.
+struct RadarState {
+  Eigen::Vector3d p_W;
+  Eigen::Quaterniond q_WR;
+  Eigen::Vector3d v_W;
+};
+
+RadarState radarState(const MotionState& imu, const Extrinsics& T_IR) {
+  return {imu.p_W + imu.q_WI * T_IR.l_I, imu.q_WI * T_IR.q_IR,
+          imu.v_W + imu.q_WI * imu.omega_I.cross(T_IR.l_I)};
+}
+
+double azimuth(const Eigen::Vector3d& p_R) { return std::atan2(p_R.x(), p_R.y()); }
+double elevation(const Eigen::Vector3d& p_R) { return std::atan2(p_R.z(), std::hypot(p_R.x(), p_R.y())); }
+
+Eigen::Vector3d fromPolar(double range, double az, double el) {
+  return range * Eigen::Vector3d(std::cos(el) * std::sin(az), std::cos(el) * std::cos(az), std::sin(el));
+}
+
+bool visible(const Eigen::Vector3d& p_R, const RadarModelOptions& o) {
+  const double range2 = p_R.squaredNorm();
+  if (range2 > o.max_range * o.max_range || range2 < o.min_range * o.min_range) return false;
+  return std::abs(azimuth(p_R)) <= o.fov_azimuth * kDegree &&
+         std::abs(elevation(p_R)) <= o.fov_elevation * kDegree;
+}
+
+// Range rate of something at p_W that moves with v_W. Relative velocity along the line of sight needs no
+// frame.
+double rangeRate(const RadarState& radar, const Eigen::Vector3d& p_W, const Eigen::Vector3d& v_W) {
+  return (p_W - radar.p_W).normalized().dot(v_W - radar.v_W);
+}
+
+// Somebody who walks past.
+struct Person {
+  double from, until;   // [s]
+  Eigen::Vector3d p_W;  // at `from`
+  Eigen::Vector3d v_W;
+};
+
+std::vector<Person> makePersons(const Motion& motion, const RadarModelOptions& o, const Extrinsics& T_IR,
+                                std::uint64_t seed) {
+  std::vector<Person> persons;
+  if (o.moving_share <= 0.0) return persons;
+  Random random(seed, kPersonStream);
+  constexpr double kMeanVisit = 3.0;  // [s]
+  const double mean_absence = kMeanVisit * (1.0 - o.moving_share) / o.moving_share;
+  double t = mean_absence * random.uniform(0.0, 1.0);
+  while (t < motion.duration()) {
+    Person person;
+    person.from = t;
+    person.until = std::min(t + kMeanVisit * random.uniform(0.5, 1.5), motion.duration());
+    const RadarState radar = radarState(motion.at(t), T_IR);
+    person.p_W =
+        radar.p_W + radar.q_WR * fromPolar(random.uniform(2.5, 6.0), random.uniform(-40.0, 40.0) * kDegree,
+                                           random.uniform(-10.0, 10.0) * kDegree);
+    const double heading = random.uniform(-kPi, kPi);
+    person.v_W = random.uniform(0.7, 1.6) * Eigen::Vector3d(std::cos(heading), std::sin(heading), 0.0);
+    t = person.until + mean_absence * random.uniform(0.5, 1.5);
+    persons.push_back(person);
+  }
+  return persons;
+}
+
+// All that is needed to take a scan at one moment.
+class Sensor {
+ public:
+  Sensor(const Motion& motion, const RadarModelOptions& options, const Extrinsics& T_IR, std::uint64_t seed)
+      : motion_(motion),
+        options_(options),
+        T_IR_(T_IR),
+        scene_W_(makeScene(motion, seed)),
+        persons_(makePersons(motion, options, T_IR, seed)) {}
+
+  std::vector<SimulatedPoint> measure(double t, Random& random) const {
+    const Frame frame = frameAt(t);
+    const int wanted = std::clamp(
+        static_cast<int>(std::lround(options_.points_mean + options_.points_sigma * random.gaussian())), 1,
+        options_.points_max);
+
+    std::vector<Echo> echoes = personEchoes(t, frame, random);
+    const std::vector<Echo> room = sceneEchoes(frame, wanted - static_cast<int>(echoes.size()), random);
+    echoes.insert(echoes.end(), room.begin(), room.end());
+
+    std::vector<SimulatedPoint> points;
+    points.reserve(echoes.size());
+    for (const Echo& echo : echoes) {
+      points.push_back(random.chance(options_.ghost_share) ? ghost(random) : detect(frame, echo, random));
+    }
+    return points;
+  }
+
+ private:
+  // The radar at the measurement time and, for a Doppler averaged over the frame, around it.
+  struct Frame {
+    RadarState middle;
+    std::array<RadarState, 3> nodes;  // three-point Gauss over the frame
+  };
+  struct Echo {
+    Eigen::Vector3d p_W;
+    Eigen::Vector3d v_W;
+    double snr_db;
+  };
+
+  Frame frameAt(double t) const {
+    const auto at = [&](double time) {
+      return radarState(motion_.at(std::clamp(time, 0.0, motion_.duration())), T_IR_);
+    };
+    const double reach = 0.5 * std::sqrt(0.6) * options_.frame_length;
+    Frame frame;
+    frame.middle = at(t);
+    frame.nodes = {at(t - reach), frame.middle, at(t + reach)};
+    return frame;
+  }
+
+  double trueDoppler(const Frame& frame, const Echo& echo) const {
+    if (options_.frame_length <= 0.0) return rangeRate(frame.middle, echo.p_W, echo.v_W);
+    return (5.0 * rangeRate(frame.nodes[0], echo.p_W, echo.v_W) +
+            8.0 * rangeRate(frame.nodes[1], echo.p_W, echo.v_W) +
+            5.0 * rangeRate(frame.nodes[2], echo.p_W, echo.v_W)) /
+           18.0;
+  }
+
+  std::vector<Echo> personEchoes(double t, const Frame& frame, Random& random) const {
+    std::vector<Echo> echoes;
+    for (const Person& person : persons_) {
+      if (t < person.from || t > person.until) continue;
+      const Eigen::Vector3d middle_W = person.p_W + person.v_W * (t - person.from);
+      const int count = 6 + static_cast<int>(random.uniform(0.0, 8.0));
+      for (int i = 0; i < count; ++i) {
+        const Eigen::Vector3d p_W =
+            middle_W + random.gaussianVector().cwiseProduct(Eigen::Vector3d(0.15, 0.15, 0.4));
+        const double snr_db = 18.0 + 3.0 * random.gaussian();
+        if (visible(frame.middle.q_WR.conjugate() * (p_W - frame.middle.p_W), options_)) {
+          echoes.push_back({p_W, person.v_W, snr_db});
+        }
+      }
+    }
+    return echoes;
+  }
+
+  // The `wanted` strongest of the visible reflectors; strength falls with range and fluctuates from scan to
+  // scan.
+  std::vector<Echo> sceneEchoes(const Frame& frame, int wanted, Random& random) const {
+    std::vector<Echo> echoes;
+    if (wanted <= 0) return echoes;
+    const Eigen::Quaterniond q_RW = frame.middle.q_WR.conjugate();
+    const double reach2 = options_.max_range * options_.max_range;
+    for (const Eigen::Vector3d& p_W : scene_W_) {
+      const Eigen::Vector3d d_W = p_W - frame.middle.p_W;
+      if (d_W.squaredNorm() > reach2 || !visible(q_RW * d_W, options_)) continue;
+      // Flatter than the radar equation: far things are larger (walls), and drivers compress.
+      echoes.push_back(
+          {p_W, Eigen::Vector3d::Zero(), 22.0 - 10.0 * std::log10(d_W.norm()) + 6.0 * random.gaussian()});
+    }
+    const auto kept = std::min(echoes.size(), static_cast<std::size_t>(wanted));
+    std::partial_sort(echoes.begin(), echoes.begin() + static_cast<std::ptrdiff_t>(kept), echoes.end(),
+                      [](const Echo& a, const Echo& b) { return a.snr_db > b.snr_db; });
+    echoes.resize(kept);
+    return echoes;
+  }
+
+  double quantised(double doppler) const {
+    if (options_.doppler_step <= 0.0) return doppler;
+    return options_.doppler_step * std::round(doppler / options_.doppler_step);
+  }
+
+  SimulatedPoint detect(const Frame& frame, const Echo& echo, Random& random) const {
+    const Eigen::Vector3d p_R = frame.middle.q_WR.conjugate() * (echo.p_W - frame.middle.p_W);
+    SimulatedPoint point;
+    const double range = std::max(options_.min_range, p_R.norm() + options_.range_noise * random.gaussian());
+    const double az = azimuth(p_R) + options_.azimuth_noise * kDegree * random.gaussian();
+    const double el = elevation(p_R) + options_.elevation_noise * kDegree * random.gaussian();
+    point.position_R = fromPolar(range, az, el);
+    point.doppler = quantised(trueDoppler(frame, echo) + options_.doppler_noise * random.gaussian());
+    point.snr_db = std::max(6.0, echo.snr_db);
+    point.noise_db = 40.0 + 2.0 * random.gaussian();
+    return point;
+  }
+
+  // Multipath and interference: where and how fast says nothing.
+  SimulatedPoint ghost(Random& random) const {
+    SimulatedPoint point;
+    const double range = random.uniform(options_.min_range, options_.max_range);
+    const double az = options_.fov_azimuth * kDegree * random.uniform(-1.0, 1.0);
+    const double el = options_.fov_elevation * kDegree * random.uniform(-1.0, 1.0);
+    point.position_R = fromPolar(range, az, el);
+    point.doppler = quantised(random.uniform(-2.5, 2.5));
+    point.snr_db = random.uniform(6.0, 16.0);
+    point.noise_db = 40.0 + 2.0 * random.gaussian();
+    return point;
+  }
+
+  // All read-only after construction.
+  const Motion& motion_;
+  const RadarModelOptions& options_;
+  const Extrinsics& T_IR_;
+  std::vector<Eigen::Vector3d> scene_W_;
+  std::vector<Person> persons_;
+};
+
+bool inBlackout(double stamp, const RadarModelOptions& options) {
+  return std::any_of(
+      options.blackouts.begin(), options.blackouts.end(),
+      [&](const RadarModelOptions::Interval& b) { return stamp >= b.start && stamp < b.start + b.duration; });
+}
+
+}  // namespace
+
+void RadarModelOptions::removeErrors() {
+  range_noise = azimuth_noise = elevation_noise = doppler_noise = doppler_step = 0.0;
+  ghost_share = moving_share = dropout_share = latency_sigma = 0.0;
+}
+
+Eigen::Vector3d radarVelocity(const MotionState& state, const Extrinsics& T_IR) {
+  return T_IR.q_IR.conjugate() * (state.q_WI.conjugate() * state.v_W + state.omega_I.cross(T_IR.l_I));
+}
+
+std::vector<Eigen::Vector3d> makeScene(const Motion& motion, std::uint64_t seed) {
+  constexpr double kStationDistance = 4.0;  // [m]
+  constexpr double kRadius = 13.0;          // [m] a little beyond the range of such a radar
+  constexpr int kPerStation = 400;
+  Random random(seed, kSceneStream);
+  std::vector<Eigen::Vector3d> stations;
+  std::vector<Eigen::Vector3d> scene_W;
+  for (double t = 0.0; t < motion.duration(); t += 0.1) {
+    const Eigen::Vector3d p_W = motion.at(t).p_W;
+    const bool covered = std::any_of(stations.begin(), stations.end(), [&](const Eigen::Vector3d& s) {
+      return (s - p_W).head<2>().norm() < kStationDistance;
+    });
+    if (covered) continue;
+    stations.push_back(p_W);
+    for (int i = 0; i < kPerStation; ++i) {
+      const double radius = kRadius * std::sqrt(random.uniform());  // even over the disc
+      const double direction = random.uniform(-kPi, kPi);
+      const double height = random.uniform(-2.0, 3.5);
+      scene_W.push_back(p_W +
+                        Eigen::Vector3d(radius * std::cos(direction), radius * std::sin(direction), height));
+    }
+  }
+  return scene_W;
+}
+
+std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarModelOptions& options,
+                                         const TimeOffsetProfile& time_offset, const Extrinsics& T_IR,
+                                         std::uint64_t seed, Time start) {
+  check(options);
+  constexpr double kFirstTrigger = 0.05;  // [s]
+  const Sensor sensor(motion, options, T_IR, seed);
+  std::vector<SimulatedScan> scans;
+  std::uint32_t seq = 0;
+  for (std::uint32_t k = 0;; ++k) {
+    const double stamp = kFirstTrigger + k / options.rate;
+    if (stamp > motion.duration()) break;
+    SimulatedScan scan;
+    scan.stamp = start + stamp;
+    scan.time_offset = time_offset.at(stamp);
+    scan.measured = scan.stamp - scan.time_offset;
+    const double measured = scan.measured - start;
+    if (measured < 0.0 || measured > motion.duration()) continue;
+    scan.seq = seq++;
+    Random latency_random(seed, kLatencyStream, k);
+    scan.arrival =
+        scan.stamp + std::max(0.0, options.latency + options.latency_sigma * latency_random.gaussian());
+    scan.v_R = radarVelocity(motion.at(measured), T_IR);
+    Random dropout_random(seed, kDropoutStream, k);
+    scan.delivered = !inBlackout(stamp, options) && !dropout_random.chance(options.dropout_share);
+    if (scan.delivered) {
+      Random random(seed, kScanStream, k);
+      scan.points = sensor.measure(measured, random);
+    }
+    scans.push_back(std::move(scan));
+  }
+  return scans;
+}
+
+}  // namespace rio_t::simulation
