@@ -96,8 +96,9 @@ bool solveThree(const Direction& a, const Direction& b, const Direction& c, Eige
 
 /// The velocity that most points agree with, among rest and those of three random points each. Each point
 /// costs its squared residual up to the threshold (MSAC), so that among equally many inliers the better fit
-/// wins. `points` has at least three.
-Eigen::Vector3d ransac(const std::vector<Direction>& points, const EgoVelocityOptions& o, int iterations) {
+/// wins. `points` has at least three. None where no three drawn span 3D.
+std::optional<Eigen::Vector3d> ransac(const std::vector<Direction>& points, const EgoVelocityOptions& o,
+                                      int iterations) {
   const double limit = o.ransac_inlier_threshold * o.ransac_inlier_threshold;
   Eigen::Vector3d best_v_R = Eigen::Vector3d::Zero();
   double best = std::numeric_limits<double>::infinity();
