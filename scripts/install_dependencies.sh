@@ -9,7 +9,7 @@ packages=(
   libdiagnostic-updater-dev libtf2-dev libtf2-ros-dev libpcl-conversions-dev libpcl-dev
   ros-message-generation ros-message-runtime ros-std-msgs libeigen3-dev libceres-dev libyaml-cpp-dev
   librostest-dev libgtest-dev libbenchmark-dev
-  python3-roslaunch python3-rosbag python3-rostest python3-numpy python3-matplotlib
+  python3-roslaunch python3-rosbag python3-rostest python3-numpy python3-matplotlib python3-yaml
 )
 
 missing=()
