@@ -181,7 +181,7 @@ std::vector<std::pair<std::size_t, std::size_t>> pairs(const std::vector<Match>&
 Trajectory stamps(const std::vector<double>& seconds) {
   Trajectory trajectory;
   for (const double s : seconds)
-    trajectory.push_back({Time::fromSeconds(s), {}, Eigen::Quaterniond::Identity()});
+    trajectory.push_back({Time::fromSeconds(s), Eigen::Vector3d::Zero(), Eigen::Quaterniond::Identity()});
   return trajectory;
 }
 
