@@ -1,0 +1,273 @@
+#include "rio_t/ros/simulation_bag.h"
+
+#include <geometry_msgs/PoseStamped.h>
+#include <geometry_msgs/TwistStamped.h>
+#include <gtest/gtest.h>
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+#include <sensor_msgs/Imu.h>
+#include <sensor_msgs/PointCloud2.h>
+#include <std_msgs/Header.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <map>
+
+#include "rio_t/simulation/motions.h"
+
+namespace rio_t {
+namespace {
+
+using simulation::Motion;
+using simulation::SensorData;
+using simulation::SimulationOptions;
+
+// A file that is gone when the test is over, whatever happened.
+class TemporaryFile {
+ public:
+  TemporaryFile() {
+    char name[] = "/tmp/rio_t_simulation_bag_XXXXXX";
+    const int descriptor = mkstemp(name);
+    if (descriptor < 0) throw std::runtime_error("no temporary file");
+    close(descriptor);
+    path_ = name;
+  }
+  ~TemporaryFile() { std::remove(path_.c_str()); }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+std::string contentOf(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+// What the tests write: 25 s with lost scans.
+struct Written {
+  explicit Written(const SimulationBagOptions& options, std::uint64_t seed = 1)
+      : motion(simulation::makeMotion({"medium", seed, 25.0, simulation::RestOptions{}})) {
+    simulated.seed = seed;
+    simulated.time_offset.constant = 0.03;
+    simulated.radar.blackouts = {{15.0, 1.0}};
+    data = simulation::simulate(motion, simulated);
+    writeSimulationBag(file.path(), motion, data, simulated.start, options);
+  }
+
+  Motion motion;
+  SimulationOptions simulated;
+  SensorData data;
+  TemporaryFile file;
+};
+
+std::map<std::string, std::pair<std::string, std::size_t>> topicsOf(const std::string& path) {
+  rosbag::Bag bag(path, rosbag::bagmode::Read);
+  std::map<std::string, std::pair<std::string, std::size_t>> topics;
+  for (const rosbag::MessageInstance& message : rosbag::View(bag)) {
+    topics[message.getTopic()].first = message.getDataType();
+    ++topics[message.getTopic()].second;
+  }
+  return topics;
+}
+
+template <typename Message>
+struct Received {
+  Message message;
+  ros::Time record_time;
+};
+
+template <typename Message>
+std::vector<Received<Message>> read(const std::string& path, const std::string& topic) {
+  rosbag::Bag bag(path, rosbag::bagmode::Read);
+  std::vector<Received<Message>> messages;
+  for (const rosbag::MessageInstance& instance : rosbag::View(bag, rosbag::TopicQuery(topic))) {
+    const auto message = instance.instantiate<Message>();
+    if (message == nullptr) throw std::runtime_error(topic + " is of another type");
+    messages.push_back({*message, instance.getTime()});
+  }
+  return messages;
+}
+
+float floatAt(const sensor_msgs::PointCloud2& cloud, std::size_t point, std::size_t offset) {
+  float value = 0.0F;
+  std::memcpy(&value, cloud.data.data() + point * cloud.point_step + offset, sizeof(value));
+  return value;
+}
+
+using Fields = std::vector<std::pair<std::string, std::uint32_t>>;
+
+Fields fieldsOf(const sensor_msgs::PointCloud2& cloud) {
+  Fields fields;
+  for (const sensor_msgs::PointField& field : cloud.fields) {
+    EXPECT_EQ(field.datatype, sensor_msgs::PointField::FLOAT32);
+    EXPECT_EQ(field.count, 1u);
+    fields.emplace_back(field.name, field.offset);
+  }
+  return fields;
+}
+
+std::int64_t nanoseconds(const ros::Time& time) { return static_cast<std::int64_t>(time.toNSec()); }
+
+TEST(SimulationBag, IrsTopicsAndTypes) {
+  const Written bag{SimulationBagOptions{}};
+  const auto topics = topicsOf(bag.file.path());
+  ASSERT_EQ(topics.size(), 5u);
+  EXPECT_EQ(topics.at("/sensor_platform/imu").first, "sensor_msgs/Imu");
+  EXPECT_EQ(topics.at("/sensor_platform/radar/scan").first, "sensor_msgs/PointCloud2");
+  EXPECT_EQ(topics.at("/sensor_platform/radar/trigger").first, "std_msgs/Header");
+  EXPECT_EQ(topics.at("/ground_truth/pose").first, "geometry_msgs/PoseStamped");
+  EXPECT_EQ(topics.at("/ground_truth/twist").first, "geometry_msgs/TwistStamped");
+  EXPECT_EQ(topics.at("/sensor_platform/imu").second, bag.data.imu.samples.size());
+  EXPECT_EQ(topics.at("/ground_truth/pose").second, 1251u);
+  // The blackout of one second takes ten scans, their triggers remain.
+  EXPECT_EQ(topics.at("/sensor_platform/radar/trigger").second, 250u);
+  EXPECT_EQ(topics.at("/sensor_platform/radar/scan").second, 240u);
+}
+
+TEST(SimulationBag, IrsScansSurviveTheBag) {
+  const Written bag{SimulationBagOptions{}};
+  const auto scans = read<sensor_msgs::PointCloud2>(bag.file.path(), "/sensor_platform/radar/scan");
+  const Fields expected = {{"x", 0},         {"y", 4},     {"z", 8}, {"snr_db", 12}, {"v_doppler_mps", 16},
+                           {"noise_db", 20}, {"range", 24}};
+  for (const auto& [cloud, record_time] : scans) {
+    const simulation::SimulatedScan& scan = bag.data.scans.at(cloud.header.seq);
+    ASSERT_EQ(fieldsOf(cloud), expected);
+    EXPECT_EQ(cloud.point_step, 28u);
+    EXPECT_EQ(cloud.height, 1u);
+    EXPECT_EQ(cloud.header.frame_id, "radar");
+    EXPECT_EQ(nanoseconds(cloud.header.stamp), scan.stamp.nanoseconds());
+    EXPECT_EQ(nanoseconds(record_time) - scan.stamp.nanoseconds(), 60'000'000);
+    ASSERT_EQ(cloud.width, scan.points.size());
+    ASSERT_EQ(cloud.data.size(), cloud.width * 28u);
+    for (std::size_t i = 0; i < scan.points.size(); ++i) {
+      const simulation::SimulatedPoint& point = scan.points[i];
+      EXPECT_EQ(floatAt(cloud, i, 0), static_cast<float>(point.position_R.x()));
+      EXPECT_EQ(floatAt(cloud, i, 4), static_cast<float>(point.position_R.y()));
+      EXPECT_EQ(floatAt(cloud, i, 8), static_cast<float>(point.position_R.z()));
+      EXPECT_EQ(floatAt(cloud, i, 12), static_cast<float>(point.snr_db));
+      EXPECT_EQ(floatAt(cloud, i, 16), static_cast<float>(point.doppler));
+      EXPECT_EQ(floatAt(cloud, i, 20), static_cast<float>(point.noise_db));
+      EXPECT_EQ(floatAt(cloud, i, 24), static_cast<float>(point.position_R.norm()));
+    }
+  }
+  const auto triggers = read<std_msgs::Header>(bag.file.path(), "/sensor_platform/radar/trigger");
+  for (const auto& [trigger, record_time] : triggers) {
+    EXPECT_EQ(nanoseconds(trigger.stamp), bag.data.scans.at(trigger.seq).stamp.nanoseconds());
+    EXPECT_EQ(trigger.frame_id, "radar");
+  }
+}
+
+TEST(SimulationBag, ImuAndTruthSurviveTheBag) {
+  const Written bag{SimulationBagOptions{}};
+  const auto imu = read<sensor_msgs::Imu>(bag.file.path(), "/sensor_platform/imu");
+  ASSERT_EQ(imu.size(), bag.data.imu.samples.size());
+  for (std::size_t i = 0; i < imu.size(); ++i) {
+    const ImuMeasurement& sample = bag.data.imu.samples[i];
+    const sensor_msgs::Imu& message = imu[i].message;
+    ASSERT_EQ(nanoseconds(message.header.stamp), sample.time.nanoseconds());
+    ASSERT_EQ(message.header.seq, i);
+    ASSERT_EQ(message.angular_velocity.x, sample.angular_velocity.x());
+    ASSERT_EQ(message.angular_velocity.y, sample.angular_velocity.y());
+    ASSERT_EQ(message.angular_velocity.z, sample.angular_velocity.z());
+    ASSERT_EQ(message.linear_acceleration.x, sample.acceleration.x());
+    ASSERT_EQ(message.linear_acceleration.y, sample.acceleration.y());
+    ASSERT_EQ(message.linear_acceleration.z, sample.acceleration.z());
+    ASSERT_EQ(message.orientation_covariance[0], -1.0);
+  }
+  EXPECT_EQ(imu.front().message.header.frame_id, "base_link");
+
+  const auto poses = read<geometry_msgs::PoseStamped>(bag.file.path(), "/ground_truth/pose");
+  const auto twists = read<geometry_msgs::TwistStamped>(bag.file.path(), "/ground_truth/twist");
+  ASSERT_EQ(poses.size(), twists.size());
+  const std::size_t i = 900;  // at 18 s, moving
+  const simulation::MotionState truth = bag.motion.at(18.0);
+  EXPECT_EQ(nanoseconds(poses[i].message.header.stamp) - bag.simulated.start.nanoseconds(), 18'000'000'000);
+  EXPECT_EQ(poses[i].message.header.frame_id, "world");
+  EXPECT_EQ(poses[i].message.pose.position.x, truth.p_W.x());
+  EXPECT_EQ(poses[i].message.pose.position.z, truth.p_W.z());
+  EXPECT_EQ(poses[i].message.pose.orientation.w, truth.q_WI.w());
+  EXPECT_EQ(poses[i].message.pose.orientation.y, truth.q_WI.y());
+  EXPECT_EQ(twists[i].message.twist.linear.y, truth.v_W.y());
+  const Eigen::Vector3d omega_W = truth.q_WI * truth.omega_I;
+  EXPECT_EQ(twists[i].message.twist.angular.z, omega_W.z());
+  EXPECT_GT(truth.v_W.norm(), 0.01);
+}
+
+TEST(SimulationBag, RecordTimesAreArrivalTimesInOrder) {
+  SimulationBagOptions options;
+  options.record_offset = 338524.89;
+  const Written bag{options};
+  rosbag::Bag file(bag.file.path(), rosbag::bagmode::Read);
+  const auto imu = read<sensor_msgs::Imu>(bag.file.path(), "/sensor_platform/imu");
+  EXPECT_NEAR((imu.front().record_time - imu.front().message.header.stamp).toSec(), 338524.89 + 0.001, 1e-8);
+  // Written in that order too: a reader of the raw file, too, sees no message early.
+  ros::Time before;
+  for (const rosbag::MessageInstance& message : rosbag::View(file)) {
+    EXPECT_GE(message.getTime(), before);
+    before = message.getTime();
+  }
+}
+
+TEST(SimulationBag, TiMmwaveTopicsFieldsAndAxes) {
+  SimulationBagOptions options;
+  options.format = BagFormat::kTiMmwave;
+  const Written bag{options};
+  const auto topics = topicsOf(bag.file.path());
+  ASSERT_EQ(topics.size(), 5u);
+  EXPECT_EQ(topics.at("/ti_mmwave/radar_scan_pcl").first, "sensor_msgs/PointCloud2");
+  EXPECT_EQ(topics.at("/sensor_platform/radar_right/trigger").first, "std_msgs/Header");
+  const Fields expected = {{"x", 0}, {"y", 4}, {"z", 8}, {"intensity", 16}, {"velocity", 20}};
+  const auto scans = read<sensor_msgs::PointCloud2>(bag.file.path(), "/ti_mmwave/radar_scan_pcl");
+  ASSERT_EQ(scans.size(), 240u);
+  for (const auto& [cloud, record_time] : scans) {
+    const simulation::SimulatedScan& scan = bag.data.scans.at(cloud.header.seq);
+    ASSERT_EQ(fieldsOf(cloud), expected);
+    EXPECT_EQ(cloud.point_step, 32u);
+    EXPECT_TRUE(cloud.header.stamp.isZero());
+    EXPECT_EQ(cloud.header.frame_id, "");
+    ASSERT_EQ(cloud.width, scan.points.size());
+    for (std::size_t i = 0; i < scan.points.size(); ++i) {
+      // (x, y, z) of RIO = (-y, x, z) of ti_mmwave
+      EXPECT_EQ(-floatAt(cloud, i, 4), static_cast<float>(scan.points[i].position_R.x()));
+      EXPECT_EQ(floatAt(cloud, i, 0), static_cast<float>(scan.points[i].position_R.y()));
+      EXPECT_EQ(floatAt(cloud, i, 8), static_cast<float>(scan.points[i].position_R.z()));
+      EXPECT_EQ(floatAt(cloud, i, 16), static_cast<float>(scan.points[i].snr_db));
+      EXPECT_EQ(floatAt(cloud, i, 20), static_cast<float>(scan.points[i].doppler));
+    }
+  }
+  for (const auto& [trigger, time] :
+       read<std_msgs::Header>(bag.file.path(), "/sensor_platform/radar_right/trigger")) {
+    EXPECT_EQ(nanoseconds(trigger.stamp), bag.data.scans.at(trigger.seq).stamp.nanoseconds());
+  }
+}
+
+TEST(SimulationBag, SameRequestSameBytesOtherSeedOtherBytes) {
+  const Written first{SimulationBagOptions{}};
+  const Written second{SimulationBagOptions{}};
+  const Written other(SimulationBagOptions{}, 2);
+  const std::string content = contentOf(first.file.path());
+  EXPECT_GT(content.size(), 1'000'000u);
+  EXPECT_TRUE(content == contentOf(second.file.path()));
+  EXPECT_FALSE(content == contentOf(other.file.path()));
+}
+
+TEST(SimulationBag, NamesTheFileThatCannotBeWritten) {
+  const Motion motion = simulation::makeMotion({"easy", 1, 25.0, simulation::RestOptions{}});
+  const SimulationOptions options;
+  try {
+    writeSimulationBag("/nowhere/at/all.bag", motion, simulation::simulate(motion, options), options.start,
+                       SimulationBagOptions{});
+    FAIL() << "no exception";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("/nowhere/at/all.bag"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace rio_t
