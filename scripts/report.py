@@ -20,6 +20,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter  # noqa: E402
 import yaml  # noqa: E402
 
 TRUTH, ESTIMATE, OPTIMIZED, REJECTED = "#222222", "#1f6fb4", "#e07b00", "#b02a37"
@@ -299,6 +300,9 @@ def draw_offset(table, true_offset):
     axes[0].set_ylim(low - margin, high + margin)
     axes[1].semilogy(t, sigma, color=ESTIMATE, linewidth=1.5, label="sigma")
     finish_axes(axes[0], "time offset [ms]")
+    axes[1].yaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if sigma.max() < 100 * sigma.min() else (1,)))
+    axes[1].yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes[1].yaxis.set_minor_formatter(NullFormatter())
     finish_axes(axes[1], "[ms]")
     axes[1].set_xlabel("time [s]")
     return figure
