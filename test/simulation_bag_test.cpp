@@ -52,7 +52,7 @@ std::string contentOf(const std::string& path) {
 // What the tests write: 25 s with lost scans.
 struct Written {
   explicit Written(const SimulationBagOptions& options, std::uint64_t seed = 1)
-      : motion(simulation::makeMotion({"medium", seed, 25.0, simulation::RestOptions{}})) {
+      : motion(simulation::makeMotion({"medium", seed, 25.0, simulation::MotionRestOptions{}})) {
     simulated.seed = seed;
     simulated.time_offset.constant = 0.03;
     simulated.radar.blackouts = {{15.0, 1.0}};
@@ -258,7 +258,7 @@ TEST(SimulationBag, SameRequestSameBytesOtherSeedOtherBytes) {
 }
 
 TEST(SimulationBag, NamesTheFileThatCannotBeWritten) {
-  const Motion motion = simulation::makeMotion({"easy", 1, 25.0, simulation::RestOptions{}});
+  const Motion motion = simulation::makeMotion({"easy", 1, 25.0, simulation::MotionRestOptions{}});
   const SimulationOptions options;
   try {
     writeSimulationBag("/nowhere/at/all.bag", motion, simulation::simulate(motion, options), options.start,

@@ -16,7 +16,7 @@ namespace {
 constexpr double kGravity = 9.81;
 
 Motion builtIn(const std::string& name, std::uint64_t seed = 1, double duration = 0.0) {
-  return makeMotion({name, seed, duration, RestOptions{}});
+  return makeMotion({name, seed, duration, MotionRestOptions{}});
 }
 
 SimulationOptions withoutErrors() {

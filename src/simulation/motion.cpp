@@ -15,21 +15,21 @@ double pace(double u) { return u * u * u * u * (35.0 + u * (-84.0 + u * (70.0 - 
 double paceDerivative(double u) { return 140.0 * u * u * u * (1.0 - u) * (1.0 - u) * (1.0 - u); }
 
 // A ramp covers half of the path time that full speed would.
-double rampCost(const RestOptions& rest) {
+double rampCost(const MotionRestOptions& rest) {
   return 0.5 * rest.ramp * ((rest.static_start > 0.0 ? 1 : 0) + (rest.static_end > 0.0 ? 1 : 0));
 }
 
 }  // namespace
 
-double Motion::durationWithRest(double path_duration, const RestOptions& rest) {
+double Motion::durationWithRest(double path_duration, const MotionRestOptions& rest) {
   return path_duration + rest.static_start + rest.static_end + rampCost(rest);
 }
 
-double Motion::pathDuration(double duration, const RestOptions& rest) {
+double Motion::pathDuration(double duration, const MotionRestOptions& rest) {
   return duration - rest.static_start - rest.static_end - rampCost(rest);
 }
 
-Motion::Motion(TrajectorySpline path, const RestOptions& rest)
+Motion::Motion(TrajectorySpline path, const MotionRestOptions& rest)
     : path_(std::move(path)), rest_(rest), duration_(durationWithRest(path_.duration(), rest)) {
   if (rest.static_start < 0.0 || rest.static_end < 0.0) {
     throw std::invalid_argument("motion: rest at start and end cannot be negative");

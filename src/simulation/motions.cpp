@@ -247,7 +247,7 @@ Motion makeMotion(const MotionRequest& request) {
     for (const MotionDescription& m : known) names += (names.empty() ? "" : ", ") + m.name;
     throw std::invalid_argument("motion '" + request.name + "' is not known; known are: " + names);
   }
-  RestOptions rest = request.rest;
+  MotionRestOptions rest = request.rest;
   if (request.name == "start_in_motion") rest.static_start = 0.0;
   const double duration = request.duration > 0.0 ? request.duration : found->default_duration;
   const double path_duration = Motion::pathDuration(duration, rest);

@@ -1,4 +1,5 @@
 // Writes a bag with known truth. See `simulate --help`.
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstdlib>
@@ -29,7 +30,7 @@ struct Request {
   double ground_truth_file_rate = 400.0;
   double start_time = 1.7e9;
   bool noise_free = false;
-  RestOptions rest;
+  MotionRestOptions rest;
   SplineFitOptions fit;
   SimulationOptions simulation;
   SimulationBagOptions bag;

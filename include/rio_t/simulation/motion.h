@@ -5,7 +5,7 @@
 namespace rio_t::simulation {
 
 /// Rest before and after a motion. Zero means none: the motion then starts (or ends) at its full speed.
-struct RestOptions {
+struct MotionRestOptions {
   double static_start = 12.0;  ///< [s]
   double static_end = 3.0;     ///< [s]
   double ramp = 2.0;           ///< [s] from rest to full speed and back
@@ -19,7 +19,7 @@ struct RestOptions {
 class Motion {
  public:
   /// Throws std::invalid_argument for negative times or a spline shorter than the ramps take of it.
-  Motion(TrajectorySpline path, const RestOptions& rest);
+  Motion(TrajectorySpline path, const MotionRestOptions& rest);
 
   /// Seconds from the first moment of rest to the last.
   double duration() const { return duration_; }
@@ -27,11 +27,11 @@ class Motion {
   MotionState at(double t) const;
 
   const TrajectorySpline& path() const { return path_; }
-  const RestOptions& rest() const { return rest_; }
+  const MotionRestOptions& rest() const { return rest_; }
 
   /// Duration of a motion whose spline lasts `path_duration` seconds, and the other way round.
-  static double durationWithRest(double path_duration, const RestOptions& rest);
-  static double pathDuration(double duration, const RestOptions& rest);
+  static double durationWithRest(double path_duration, const MotionRestOptions& rest);
+  static double pathDuration(double duration, const MotionRestOptions& rest);
 
  private:
   struct PathTime {
@@ -43,7 +43,7 @@ class Motion {
 
   // All read-only after construction.
   TrajectorySpline path_;
-  RestOptions rest_;
+  MotionRestOptions rest_;
   double duration_;
 };
 

@@ -20,8 +20,8 @@ const std::vector<MotionDescription>& builtInMotions();
 struct MotionRequest {
   std::string name;
   std::uint64_t seed = 0;
-  double duration = 0.0;  ///< [s] with rest; 0 = the motion's default
-  RestOptions rest;       ///< `start_in_motion` ignores `static_start`
+  double duration = 0.0;   ///< [s] with rest; 0 = the motion's default
+  MotionRestOptions rest;  ///< `start_in_motion` ignores `static_start`
 };
 
 /// Builds a built-in motion: the same request gives the same motion. Starts near the origin, IMU level at
