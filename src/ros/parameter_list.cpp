@@ -59,7 +59,9 @@ std::string numberText(double value) {
     back.imbue(std::locale::classic());
     double read = 0.0;
     back >> read;
-    if (read == value) break;
+    // As many digits as it needs, and as stand before the point: 60, not 6e+01.
+    const bool whole_part_shown = std::abs(value) < std::pow(10.0, digits) || std::abs(value) >= 1e15;
+    if (read == value && whole_part_shown) break;
   }
   if (text.find('.') == std::string::npos) {
     const std::size_t exponent = text.find('e');
@@ -171,8 +173,9 @@ void ParameterList::textOrEmpty(const std::string& key, std::string& member, con
       key, "", "text, may be empty", meaning,
       [&member](const ParameterValue& value) {
         const std::string* x = std::get_if<std::string>(&value.data);
-        if (x == nullptr) return false;
-        member = *x;
+        const bool nothing = std::holds_alternative<std::monostate>(value.data);  // `key:` and no more
+        if (x == nullptr && !nothing) return false;
+        member = nothing ? std::string() : *x;
         return true;
       },
       [&member] { return quotedText(member); });

@@ -132,8 +132,14 @@ void listEgoVelocity(ParameterList& list, Config& c) {
               "share of outliers that is reckoned with");
   list.number("ransac_success_probability", "", inside(0, 1), radar.ransac_success_probability,
               "of drawing inliers only, once; sets the number of draws");
+  list.number("ego_velocity_prior_gate", "", above(0), radar.prior_gate,
+              "standard deviations; farther from what the IMU predicts, a velocity contradicts it");
   list.integer("ransac_seed", atLeast(0), radar.ransac_seed,
                "restarted at each scan: same scan, same answer");
+  list.integer("ego_velocity_min_inliers", atLeast(3), radar.min_inliers,
+               "one velocity has three unknowns, the others are witnesses");
+  list.number("ego_velocity_min_inlier_fraction", "", between(0, 1), radar.min_inlier_fraction,
+              "of the points that count; fewer agree by chance");
   list.choice<EgoVelocitySolver>(
       "ego_velocity_solver",
       {{"ls", EgoVelocitySolver::kLeastSquares}, {"eiv", EgoVelocitySolver::kErrorsInVariables}},

@@ -1,6 +1,6 @@
 #include "rio_t/ros/parameters.h"
 
-#include <ros/package.h>
+#include <rospack/rospack.h>
 
 #include <algorithm>
 #include <cmath>
@@ -63,8 +63,20 @@ std::string joinFaults(const std::vector<std::string>& faults) {
   return text;
 }
 
+/// Folder of the package in the workspace that is sourced; empty if there is none. Asks rospack itself, since
+/// ros::package complains on stderr where it finds nothing.
+std::string packageFolder() {
+  rospack::Rospack packages;
+  packages.setQuiet(true);
+  std::vector<std::string> search_path;
+  std::string folder;
+  if (!packages.getSearchPathFromEnv(search_path)) return "";
+  packages.crawl(search_path, false);
+  return packages.find("rio_t", folder) ? folder : "";
+}
+
 std::string configFolder() {
-  const std::string package = ros::package::getPath("rio_t");
+  const std::string package = packageFolder();
   if (!package.empty() && std::filesystem::is_directory(package + "/config")) return package + "/config";
   return RIO_T_SOURCE_DIR "/config";  // run from the build folder, no workspace sourced
 }

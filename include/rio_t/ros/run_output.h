@@ -1,0 +1,77 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <fstream>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rio_t/evaluation/trajectory.h"
+#include "rio_t/odometry/radar_inertial_odometry.h"
+
+namespace rio_t {
+
+/// Errors against ground truth, as evo gives them.
+struct TruthErrors {
+  double ate_m = 0.0;               ///< rmse, origins aligned
+  std::optional<double> t_rel;      ///< [m/m] over 1 m, rmse; none if the estimate is shorter
+  std::optional<double> r_rel_deg;  ///< [deg/m] likewise
+};
+
+/// What a run comes to; `summary.yaml` has one key for each member.
+struct RunSummary {
+  std::uint64_t imu_count = 0;
+  std::uint64_t scans_total = 0;  ///< used and rejected
+  std::uint64_t scans_used = 0;
+  std::map<std::string, std::uint64_t> scans_rejected;  ///< by reason
+  std::map<std::string, std::uint64_t> input_faults;    ///< by name
+  double path_length_m = 0.0;                           ///< of the optimised poses
+  double end_to_start_2d_m = 0.0;                       ///< of the causal trajectory, horizontal
+  double end_to_start_3d_m = 0.0;
+  double final_offset_s = 0.0;
+  double final_offset_sigma_s = 0.0;
+  std::optional<TruthErrors> truth;
+  double estimation_seconds = 0.0;  ///< reading, decoding and estimating, wall clock
+  double realtime_factor = 0.0;     ///< seconds of data in a second of that
+};
+
+/// Appends `value` with that many decimals (at most 12), with a point whatever the locale; "nan", "inf".
+void appendFixed(std::string* text, double value, int decimals);
+/// Appends seconds with nine decimals, exactly.
+void appendStamp(std::string* text, Time time);
+
+/// The files of a run: trajectory.txt and trajectory_optimized.txt (TUM), time_offset.csv, ego_velocity.csv,
+/// biases.csv, summary.yaml. The same calls write the same bytes.
+class RunOutput {
+ public:
+  /// Makes the folder and opens the files; throws std::runtime_error naming what cannot be written. A summary
+  /// of an earlier run is removed, so that one of a run that failed is never taken for its own.
+  explicit RunOutput(const std::string& folder);
+
+  void addState(const NavigationState& state);
+  void addResult(const ScanResult& result);
+  void finish(const RunSummary& summary);  ///< throws std::runtime_error where the disk is full
+
+  static std::vector<std::string> fileNames();
+
+ private:
+  /// A file with a large buffer of its own.
+  struct File {
+    std::string path;
+    std::ofstream stream;
+    std::string buffer;
+
+    void open(const std::string& path_in);
+    void flush();
+    void endLine();
+  };
+
+  void addPose(File& file, Time time, const Eigen::Vector3d& p_W, const Eigen::Quaterniond& q_WI);
+
+  std::string folder_;
+  File trajectory_, optimized_, time_offset_, ego_velocity_, biases_;
+};
+
+}  // namespace rio_t

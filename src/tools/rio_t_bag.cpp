@@ -1,0 +1,10 @@
+// Plays a bag through the estimator. See `rio_t_bag --help`.
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "rio_t/ros/bag_tool.h"
+
+int main(int argc, char** argv) {
+  return rio_t::runBagTool(std::vector<std::string>(argv + 1, argv + argc), std::cout, std::cerr);
+}

@@ -1,0 +1,465 @@
+#include "rio_t/ros/bag_runner.h"
+
+#include <geometry_msgs/PoseStamped.h>
+#include <gtest/gtest.h>
+#include <rosbag/bag.h>
+#include <sensor_msgs/Imu.h>
+#include <sensor_msgs/PointCloud2.h>
+#include <sensor_msgs/point_cloud2_iterator.h>
+#include <std_msgs/Header.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "rio_t/ros/bag_tool.h"
+
+namespace rio_t {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string contents(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+/// The summary without the keys that time the run, which stand at its end.
+std::string untimed(const std::string& summary) {
+  return summary.substr(0, summary.find("estimation_seconds"));
+}
+
+struct Outcome {
+  int status = 0;
+  std::string out, err;
+};
+
+Outcome runTool(const std::vector<std::string>& words) {
+  std::ostringstream out, err;
+  const int status = runBagTool(words, out, err);
+  return {status, out.str(), err.str()};
+}
+
+/// What a test bag holds.
+struct BagContents {
+  double duration = 8.0;  ///< [s]
+  bool imu = true;
+  bool radar = true;
+  int points = 30;       ///< of each scan
+  double doppler = 0.0;  ///< of each point [m/s], alternating sign
+  bool stamped = true;
+  bool imu_stamped = true;
+  double shaking = 0.0;  ///< amplitude of the gyro [rad/s]
+  std::string doppler_field = "v_doppler_mps";
+  bool ground_truth = false;
+};
+
+/// A platform at rest with the IRS topics, recorded by a clock 100 s ahead.
+class BagRunner : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ =
+        (fs::temp_directory_path() /
+         ("rio_t_bag_runner_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name())))
+            .string();
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    bag_ = folder_ + "/test.bag";
+    out_ = folder_ + "/out";
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  void writeBag(const BagContents& what) const {
+    rosbag::Bag bag(bag_, rosbag::bagmode::Write);
+    const int steps = static_cast<int>(what.duration * 200.0);
+    for (int k = 0; k < steps; ++k) {
+      const double t = 0.005 * k;
+      const ros::Time stamp = ros::Time(1000.0) + ros::Duration(t);
+      const ros::Time record = stamp + ros::Duration(100.001);
+      if (what.imu) {
+        sensor_msgs::Imu imu;
+        if (what.imu_stamped) imu.header.stamp = stamp;
+        imu.linear_acceleration.z = 9.81;
+        imu.angular_velocity.x = what.shaking * std::sin(20.0 * t);
+        bag.write("/sensor_platform/imu", record, imu);
+      }
+      if (what.radar && k % 20 == 0) writeCloud(what, stamp, record, k / 20, &bag);
+      if (what.ground_truth && k % 4 == 0) {
+        geometry_msgs::PoseStamped pose;
+        pose.header.stamp = stamp;
+        pose.pose.position.x = 5.0;
+        pose.pose.orientation.w = 1.0;
+        bag.write("/ground_truth/pose", record, pose);
+      }
+    }
+    std_msgs::Header other;
+    other.stamp = ros::Time(1000.0);
+    bag.write("/other", ros::Time(1100.0), other);
+  }
+
+  void writeCloud(const BagContents& what, const ros::Time& stamp, const ros::Time& record, int seq,
+                  rosbag::Bag* bag) const {
+    sensor_msgs::PointCloud2 cloud;
+    if (what.stamped) cloud.header.stamp = stamp;
+    cloud.header.seq = static_cast<std::uint32_t>(seq);
+    sensor_msgs::PointCloud2Modifier modifier(cloud);
+    modifier.setPointCloud2Fields(5, "x", 1, sensor_msgs::PointField::FLOAT32, "y", 1,
+                                  sensor_msgs::PointField::FLOAT32, "z", 1, sensor_msgs::PointField::FLOAT32,
+                                  "snr_db", 1, sensor_msgs::PointField::FLOAT32, what.doppler_field.c_str(),
+                                  1, sensor_msgs::PointField::FLOAT32);
+    modifier.resize(static_cast<std::size_t>(what.points));
+    sensor_msgs::PointCloud2Iterator<float> x(cloud, "x");
+    for (int i = 0; i < what.points; ++i, ++x) {
+      const double azimuth = 0.9 * std::sin(1.0 + 2.4 * i);
+      x[0] = static_cast<float>(4.0 * std::sin(azimuth));
+      x[1] = static_cast<float>(4.0 * std::cos(azimuth));
+      x[2] = static_cast<float>(1.5 * std::sin(0.7 * i));
+      x[3] = 20.0F;
+      x[4] = static_cast<float>((i % 2 == 0 ? 1.0 : -1.0) * what.doppler);
+    }
+    bag->write("/sensor_platform/radar/scan", record + ros::Duration(0.0005), cloud);
+  }
+
+  Outcome run(const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> words = {"--bag", bag_, "--config", "irs", "--output-dir", out_};
+    words.insert(words.end(), more.begin(), more.end());
+    return runTool(words);
+  }
+
+  /// One line on stderr that holds every part, and exit status 1.
+  void expectError(const Outcome& outcome, const std::vector<std::string>& parts) const {
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    for (const std::string& part : parts)
+      EXPECT_NE(outcome.err.find(part), std::string::npos) << part << " not in: " << outcome.err;
+  }
+
+  std::string folder_, bag_, out_;
+};
+
+TEST_F(BagRunner, AtRestItStaysAndWritesEveryFile) {
+  writeBag({});
+  const Outcome outcome = run({"__name:=rio_t_bag", "__log:=/dev/null"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  for (const std::string& name : RunOutput::fileNames())
+    EXPECT_GT(fs::file_size(out_ + "/" + name), 0u) << name;
+  for (const char* row : {"path", "end to start", "time offset", "scans", "speed", "files in"}) {
+    EXPECT_NE(outcome.out.find(row), std::string::npos) << row;
+  }
+  EXPECT_EQ(contents(out_ + "/time_offset.csv").rfind("stamp,offset_s,sigma_s\n100", 0), 0u);
+  EXPECT_EQ(contents(out_ + "/ego_velocity.csv")
+                .rfind("stamp,vx,vy,vz,sigma_x,sigma_y,sigma_z,inliers,points,status\n1000.000000000,", 0),
+            0u);
+  EXPECT_EQ(contents(out_ + "/biases.csv").rfind("stamp,bgx,bgy,bgz,bax,bay,baz\n100", 0), 0u);
+  for (const StampedPose& pose : readTum(out_ + "/trajectory.txt")) EXPECT_LT(pose.p_W.norm(), 0.02);
+}
+
+TEST_F(BagRunner, EveryScanIsAccountedFor) {
+  writeBag({});
+  BagRun bag_run{bag_, out_, Config{}, nullptr};
+  const RunSummary summary = runBag(bag_run);
+  EXPECT_EQ(summary.imu_count, 1600u);
+  EXPECT_EQ(summary.scans_total, 80u);
+  std::uint64_t rejected = 0;
+  for (const auto& [reason, count] : summary.scans_rejected) rejected += count;
+  EXPECT_EQ(summary.scans_used + rejected, summary.scans_total);
+  EXPECT_GT(summary.scans_used, 40u);
+  const std::string yaml = contents(out_ + "/summary.yaml");
+  for (const char* key :
+       {"imu_count: 1600\n", "scans_total: 80\n", "scans_used: ", "scans_rejected: {",
+        "path_length_m: ", "end_to_start_2d_m: ", "end_to_start_3d_m: ", "final_offset_s: ",
+        "final_offset_sigma_s: ", "saved: [trajectory.txt", "estimation_seconds: ", "realtime_factor: "}) {
+    EXPECT_NE(yaml.find(key), std::string::npos) << key;
+  }
+  EXPECT_EQ(yaml.find("ate_m"), std::string::npos);
+}
+
+TEST_F(BagRunner, SameBagSameBytes) {
+  writeBag({});
+  ASSERT_EQ(run().status, 0);
+  const std::string first = out_;
+  out_ = folder_ + "/again";
+  ASSERT_EQ(run().status, 0);
+  for (const std::string& name : RunOutput::fileNames()) {
+    if (name == "summary.yaml") continue;
+    EXPECT_EQ(contents(first + "/" + name), contents(out_ + "/" + name)) << name;
+  }
+  EXPECT_EQ(untimed(contents(first + "/summary.yaml")), untimed(contents(out_ + "/summary.yaml")));
+}
+
+TEST_F(BagRunner, GroundTruthComesFromTheTopicOrAFile) {
+  BagContents what;
+  what.ground_truth = true;
+  writeBag(what);
+  Outcome outcome = run();
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(contents(out_ + "/summary.yaml").find("\nate_m: 0.0"), std::string::npos);
+
+  std::ofstream(folder_ + "/truth.txt") << "1004.0 0 0 0 0 0 0 1\n1005.0 3 0 0 0 0 0 1\n";
+  outcome = run({"--set", "ground_truth=" + folder_ + "/truth.txt"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  // The estimate rests, the truth moved 3 m: rmse of 0 and 3.
+  EXPECT_NE(contents(out_ + "/summary.yaml").find("\nate_m: 2.1"), std::string::npos);
+
+  expectError(run({"--set", "ground_truth=" + folder_ + "/none.txt"}), {folder_ + "/none.txt"});
+  std::ofstream(folder_ + "/elsewhen.txt") << "5.0 0 0 0 0 0 0 1\n6.0 3 0 0 0 0 0 1\n";
+  expectError(run({"--set", "ground_truth=" + folder_ + "/elsewhen.txt"}), {"ground truth", "elsewhen.txt"});
+}
+
+TEST_F(BagRunner, APartOfTheBagCanBePlayed) {
+  writeBag({});
+  BagRun bag_run{bag_, out_, Config{}, nullptr};
+  bag_run.config.bag_start = 1.0;
+  bag_run.config.bag_duration = 5.0;
+  const RunSummary summary = runBag(bag_run);
+  EXPECT_NEAR(static_cast<double>(summary.imu_count), 1000.0, 2.0);
+  EXPECT_NEAR(static_cast<double>(summary.scans_total), 50.0, 1.0);
+  expectError(run({"--set", "bag_start=100"}), {"bag_start", "behind its end"});
+}
+
+TEST_F(BagRunner, MissingBagFolderAndUnreadableBagAreNamed) {
+  expectError(run(), {bag_, "no such file"});
+  EXPECT_FALSE(fs::exists(out_));
+  bag_ = folder_;
+  expectError(run(), {folder_, "folder"});
+  bag_ = folder_ + "/text.bag";
+  std::ofstream(bag_) << "not a bag at all, but long enough to be looked at\n";
+  expectError(run(), {bag_, "cannot be read as a ROS 1 bag"});
+  std::ofstream(bag_, std::ios::trunc).close();
+  expectError(run(), {bag_});
+}
+
+TEST_F(BagRunner, AnUnindexedBagIsToldToBeReindexed) {
+  writeBag({});
+  // A recording that was cut off has no index: its header says that the index starts at 0.
+  std::string bytes = contents(bag_);
+  const std::size_t at = bytes.find("index_pos=");
+  ASSERT_NE(at, std::string::npos);
+  for (std::size_t i = 0; i < 8; ++i) bytes[at + 10 + i] = 0;
+  std::ofstream(bag_, std::ios::binary) << bytes;
+  expectError(run(), {bag_, "rosbag reindex"});
+}
+
+TEST_F(BagRunner, ATruncatedOrDamagedBagIsNamed) {
+  writeBag({});
+  const std::string bytes = contents(bag_);
+  std::ofstream(bag_, std::ios::binary) << bytes.substr(0, bytes.size() / 2);
+  expectError(run(), {bag_});
+  // Damage in the middle of the data.
+  std::string damaged = bytes;
+  for (std::size_t i = 0; i < 2000; ++i) damaged[bytes.size() / 2 + i] = static_cast<char>(i * 37);
+  std::ofstream(bag_, std::ios::binary | std::ios::trunc) << damaged;
+  const Outcome outcome = run();
+  if (outcome.status != 0) expectError(outcome, {bag_});
+}
+
+TEST_F(BagRunner, MissingTopicsListThoseOfTheBag) {
+  BagContents what;
+  what.radar = false;
+  writeBag(what);
+  expectError(run(), {"no topic /sensor_platform/radar/scan", "radar_topic",
+                      "/sensor_platform/imu (sensor_msgs/Imu)", "/other (std_msgs/Header)"});
+  expectError(run({"--set", "radar_topic=/r", "--set", "imu_topic=/i"}), {"no topic /i", "no topic /r"});
+  writeBag({});
+  expectError(run({"--set", "stamp_source=trigger"}),
+              {"no topic /sensor_platform/radar/trigger", "trigger_topic"});
+}
+
+TEST_F(BagRunner, WrongTypesAreNamed) {
+  writeBag({});
+  expectError(run({"--set", "radar_topic=/sensor_platform/imu"}),
+              {"/sensor_platform/imu (radar_topic) is sensor_msgs/Imu", "expected sensor_msgs/PointCloud2"});
+  expectError(run({"--set", "ground_truth_topic=/other"}),
+              {"/other (ground_truth_topic) is std_msgs/Header"});
+}
+
+TEST_F(BagRunner, AWrongCloudFormatIsNamed) {
+  BagContents what;
+  what.doppler_field = "speed";
+  writeBag(what);
+  expectError(run(), {"/sensor_platform/radar/scan", "v_doppler_mps", "speed"});
+  EXPECT_EQ(run({"--set", "radar_field_doppler=speed"}).status, 0);
+}
+
+TEST_F(BagRunner, ZeroStampsAreNamedWithTheOtherSources) {
+  BagContents what;
+  what.stamped = false;
+  writeBag(what);
+  expectError(run(), {"/sensor_platform/radar/scan", "zero", "trigger", "arrival"});
+  EXPECT_EQ(run({"--set", "stamp_source=arrival"}).status, 0);
+  what.stamped = true;
+  what.imu_stamped = false;
+  writeBag(what);
+  expectError(run(), {"/sensor_platform/imu", "zero"});
+}
+
+TEST_F(BagRunner, NoDataInThePartPlayedIsNamed) {
+  BagContents what;
+  what.duration = 1.0;
+  writeBag(what);
+  {
+    rosbag::Bag bag(bag_, rosbag::bagmode::Append);
+    std_msgs::Header late;
+    late.stamp = ros::Time(1200.0);
+    bag.write("/other", ros::Time(1200.0), late);
+  }
+  expectError(run({"--set", "bag_start=50"}), {"no messages on topic /sensor_platform/imu"});
+}
+
+TEST_F(BagRunner, NeverInitialisedSaysWhatItWaitedFor) {
+  BagContents what;
+  what.duration = 2.0;
+  writeBag(what);
+  expectError(run(), {"never initialised, waited for", "init_duration"});
+  what.duration = 8.0;
+  what.shaking = 1.0;
+  writeBag(what);
+  expectError(run(), {"never initialised, waited for", "gyro"});
+}
+
+TEST_F(BagRunner, EveryScanRejectedSaysWhy) {
+  BagContents what;
+  what.points = 2;
+  writeBag(what);
+  expectError(run(), {"every one of the 80 scans was rejected", "too_few_points"});
+  EXPECT_FALSE(fs::exists(out_ + "/summary.yaml"));
+  what.points = 0;
+  writeBag(what);
+  expectError(run(), {"every one of the 80 scans was rejected", "too_few_points"});
+}
+
+TEST_F(BagRunner, ASummaryOfAnEarlierRunDoesNotOutliveAFailure) {
+  writeBag({});
+  ASSERT_EQ(run().status, 0);
+  ASSERT_TRUE(fs::exists(out_ + "/summary.yaml"));
+  BagContents what;
+  what.points = 2;
+  writeBag(what);
+  EXPECT_EQ(run().status, 1);
+  EXPECT_FALSE(fs::exists(out_ + "/summary.yaml"));
+}
+
+TEST_F(BagRunner, WrongParametersAndArgumentsAreNamed) {
+  writeBag({});
+  expectError(run({"--set", "widnow=1"}), {"widnow", "window"});
+  expectError(run({"--set", "window=fast"}), {"window", "finite number"});
+  expectError(run({"--config", "isr"}), {"isr", "irs"});
+  expectError(run({"--fast"}), {"unknown argument --fast"});
+  expectError(run({"--set"}), {"--set", "expected a value"});
+  expectError(run({"--bag="}), {"--bag", "expected a value"});
+  expectError(runTool({"--config", "irs"}), {"missing argument --bag --output-dir"});
+  expectError(runTool({}), {"missing argument --bag --config --output-dir"});
+}
+
+TEST_F(BagRunner, AnOutputFolderThatCannotBeIsNamed) {
+  writeBag({});
+  std::ofstream(folder_ + "/file") << "in the way";
+  out_ = folder_ + "/file";
+  expectError(run(), {"output folder", folder_ + "/file"});
+  out_ = folder_ + "/file/below";
+  expectError(run(), {"output folder", folder_ + "/file/below"});
+}
+
+TEST_F(BagRunner, HelpAndConfigurationNeedNoBag) {
+  const Outcome help = runTool({"--help"});
+  EXPECT_EQ(help.status, 0);
+  EXPECT_NE(help.out.find("--output-dir"), std::string::npos);
+  const Outcome printed = runTool({"--print-config"});
+  EXPECT_EQ(printed.status, 0);
+  EXPECT_EQ(printed.out, toYaml(Config{}));
+  EXPECT_NE(runTool({"--print-config", "--set", "window=2.0"}).out.find("\nwindow: 2.0\n"),
+            std::string::npos);
+}
+
+TEST(RunOutput, NumbersAreFixedAndStampsExact) {
+  const auto fixed = [](double value, int decimals) {
+    std::string text;
+    appendFixed(&text, value, decimals);
+    return text;
+  };
+  EXPECT_EQ(fixed(1.25, 3), "1.250");
+  EXPECT_EQ(fixed(-0.0625, 4), "-0.0625");
+  EXPECT_EQ(fixed(-1e-12, 6), "0.000000") << "no negative zero";
+  EXPECT_EQ(fixed(0.9999999, 6), "1.000000");
+  EXPECT_EQ(fixed(12.0, 0), "12");
+  EXPECT_EQ(fixed(1e20, 2), "100000000000000000000.00");
+  EXPECT_EQ(fixed(std::nan(""), 2), ".nan");
+  std::string stamp;
+  appendStamp(&stamp, Time::fromNanoseconds(1700000000000000007));
+  EXPECT_EQ(stamp, "1700000000.000000007");
+}
+
+// --- The real sensors
+// ----------------------------------------------------------------------------------------
+
+class RealBag : public testing::Test {
+ protected:
+  void SetUp() override {
+    const char* folder = std::getenv("RIO_T_DATA_DIR");
+    bag_ = (folder != nullptr ? std::string(folder) : std::string(RIO_T_SOURCE_DIR) + "/../shared/data") +
+           "/real/ti_mmwave_rospkg_demo.bag";
+    if (!fs::exists(bag_)) GTEST_SKIP() << "the real bag is not here: " << bag_;
+    out_ = (fs::temp_directory_path() / "rio_t_real_bag").string();
+    fs::remove_all(out_);
+  }
+  void TearDown() override { fs::remove_all(out_); }
+
+  RunSummary play(const std::string& folder) const {
+    const Config config = makeConfig(readParameterFile(findConfigFile("ti_mmwave")));
+    return runBag({bag_, folder, config, nullptr});
+  }
+
+  std::string bag_, out_;
+};
+
+TEST_F(RealBag, TriggerStampsEndWhereTheyStarted) {
+  const RunSummary summary = play(out_);
+  EXPECT_EQ(summary.imu_count, 8270u);
+  EXPECT_EQ(summary.scans_total, 412u);
+  EXPECT_LE(summary.end_to_start_2d_m, 0.10);
+  EXPECT_LE(summary.end_to_start_3d_m, 1.4);
+  EXPECT_NEAR(summary.path_length_m, 20.5, 1.5);
+  EXPECT_GT(summary.final_offset_s, -0.020);
+  EXPECT_LT(summary.final_offset_s, 0.0);
+  EXPECT_GT(summary.final_offset_sigma_s, 0.0);
+  EXPECT_LT(summary.final_offset_sigma_s, 0.020);
+}
+
+TEST_F(RealBag, NearlyEveryScanOfTheWalkIsUsed) {
+  play(out_);
+  // Walking from 13.5 s to 33.5 s.
+  std::ifstream csv(out_ + "/ego_velocity.csv");
+  std::string line;
+  std::getline(csv, line);
+  int walking = 0, used = 0;
+  double first = 0.0;
+  while (std::getline(csv, line)) {
+    const double stamp = std::stod(line);
+    if (first == 0.0) first = stamp;
+    if (stamp - first < 13.5 || stamp - first > 33.5) continue;
+    const std::string status = line.substr(line.rfind(',') + 1);
+    ++walking;
+    if (status == "moving" || status == "zero_velocity") ++used;
+  }
+  EXPECT_GE(walking, 190);
+  EXPECT_GE(used, 0.95 * walking);
+}
+
+TEST_F(RealBag, SameBytesTwice) {
+  play(out_ + "/a");
+  play(out_ + "/b");
+  for (const std::string& name : RunOutput::fileNames()) {
+    const std::string a = contents(out_ + "/a/" + name), b = contents(out_ + "/b/" + name);
+    EXPECT_FALSE(a.empty()) << name;
+    EXPECT_EQ(untimed(a), untimed(b)) << name;
+  }
+}
+
+}  // namespace
+}  // namespace rio_t

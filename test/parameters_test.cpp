@@ -1,0 +1,342 @@
+#include "rio_t/ros/parameters.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <set>
+#include <sstream>
+
+namespace rio_t {
+namespace {
+
+const std::string kConfigFolder = std::string(RIO_T_SOURCE_DIR) + "/config";
+
+std::string contents(const std::string& path) {
+  std::ifstream file(path);
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+/// A file in the test's own folder, gone at the end.
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(const std::string& text)
+      : path_((std::filesystem::temp_directory_path() /
+               ("rio_t_parameters_" +
+                std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) + ".yaml"))
+                  .string()) {
+    std::ofstream(path_) << text;
+  }
+  ~TemporaryFile() { std::filesystem::remove(path_); }
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+Config fromAssignments(const std::vector<std::string>& assignments) {
+  ParameterEntries entries;
+  for (const std::string& each : assignments) entries.push_back(parseAssignment(each));
+  return makeConfig(entries);
+}
+
+std::vector<std::string> faultsOf(const std::vector<std::string>& assignments) {
+  try {
+    fromAssignments(assignments);
+  } catch (const ConfigError& error) {
+    return error.faults();
+  }
+  return {};
+}
+
+/// The one fault of one wrong value.
+std::string faultOf(const std::string& assignment) {
+  const std::vector<std::string> faults = faultsOf({assignment});
+  return faults.size() == 1 ? faults.front() : "not one fault but " + std::to_string(faults.size());
+}
+
+std::string messageOfFile(const std::string& text) {
+  const TemporaryFile file(text);
+  try {
+    makeConfig(readParameterFile(file.path()));
+  } catch (const std::runtime_error& error) {
+    std::string message = error.what();
+    const std::size_t at = message.find(file.path());
+    return at == std::string::npos ? message : message.replace(at, file.path().size(), "FILE");
+  }
+  return "nothing wrong";
+}
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+TEST(Parameters, EveryKindOfValueIsRead) {
+  const Config config =
+      fromAssignments({"window=2", "max_iterations=9", "estimate_time_offset=false", "imu_topic=/imu",
+                       "stamp_source=arrival", "time_offset_model=imu",
+                       "ground_truth=", "extrinsics_translation=[1, -2.5, 3e-1]", "time_offset_noise=1e-4"});
+  EXPECT_EQ(config.odometry.smoother.window, 2.0);
+  EXPECT_EQ(config.odometry.smoother.max_iterations, 9);
+  EXPECT_FALSE(config.odometry.smoother.estimate_time_offset);
+  EXPECT_EQ(config.imu_topic, "/imu");
+  EXPECT_EQ(config.stamp_source, StampSource::kArrival);
+  EXPECT_EQ(config.odometry.smoother.time_offset_model, TimeOffsetModel::kImu);
+  EXPECT_EQ(config.odometry.T_IR.l_I, Eigen::Vector3d(1.0, -2.5, 0.3));
+  EXPECT_EQ(config.odometry.smoother.time_offset_noise, 1e-4);
+}
+
+TEST(Parameters, TheKeysThatUsersRelyOnExist) {
+  std::set<std::string> keys;
+  for (const ParameterDescription& about : parameterDescriptions()) {
+    EXPECT_TRUE(keys.insert(about.key).second) << about.key << " twice";
+    EXPECT_FALSE(about.description.empty()) << about.key;
+    EXPECT_FALSE(about.expected.empty()) << about.key;
+  }
+  for (const char* key : {"estimate_time_offset", "stamp_source", "radar_stamp_shift", "bag_start",
+                          "bag_duration", "ground_truth", "time_offset_model", "window", "max_time_offset",
+                          "time_offset_initial", "time_offset_sigma", "time_offset_noise"}) {
+    EXPECT_EQ(keys.count(key), 1u) << key;
+  }
+}
+
+TEST(Parameters, LaterEntriesHold) {
+  EXPECT_EQ(fromAssignments({"window=2.0", "window=3.0"}).odometry.smoother.window, 3.0);
+}
+
+TEST(Parameters, WrongTypesAreNamedWithWhatWasExpected) {
+  EXPECT_EQ(faultOf("window=fast"),
+            "--set: window: expected a finite number above 0 and at most 60 [s], got \"fast\"");
+  EXPECT_TRUE(contains(faultOf("window=\"1.0\""), "expected a finite number"));
+  EXPECT_TRUE(contains(faultOf("window="), "got nothing"));
+  EXPECT_TRUE(contains(faultOf("window=[1.0]"), "got [1]"));
+  EXPECT_TRUE(contains(faultOf("window={a: 1}"), "got nested keys"));
+  EXPECT_TRUE(contains(faultOf("max_iterations=2.5"), "expected a whole number"));
+  EXPECT_TRUE(contains(faultOf("estimate_time_offset=1"), "expected true or false, got 1"));
+  EXPECT_TRUE(contains(faultOf("imu_topic=3"), "expected text, not empty, got 3"));
+  EXPECT_TRUE(contains(faultOf("imu_topic=\"\""), "expected text, not empty, got \"\""));
+  EXPECT_TRUE(contains(faultOf("extrinsics_translation=[1, 2]"), "expected a list of 3 finite numbers"));
+  EXPECT_TRUE(contains(faultOf("extrinsics_translation=[1, 2, x]"), "expected a list of 3 finite numbers"));
+  EXPECT_TRUE(contains(faultOf("extrinsics_translation=1"), "expected a list of 3 finite numbers"));
+}
+
+TEST(Parameters, ValuesOutOfRangeAreRefused) {
+  EXPECT_TRUE(contains(faultOf("window=0"), "above 0"));
+  EXPECT_TRUE(contains(faultOf("window=-1"), "above 0"));
+  EXPECT_TRUE(contains(faultOf("max_time_offset=1.01"), "at most 1"));
+  EXPECT_TRUE(contains(faultOf("max_iterations=0"), "of at least 1"));
+  EXPECT_TRUE(contains(faultOf("max_iterations=99999999999"), "whole number"));
+  EXPECT_TRUE(contains(faultOf("ransac_success_probability=1"), "below 1"));
+  EXPECT_TRUE(contains(faultOf("ego_velocity_added_sigma=[0.1, -0.1, 0.1]"), "each of at least 0"));
+  EXPECT_NO_THROW(fromAssignments({"window=60", "max_time_offset=1.0", "ransac_outlier_probability=0"}));
+}
+
+TEST(Parameters, OnlyFiniteNumbersAreTaken) {
+  for (const char* value : {".nan", ".inf", "-.inf", "nan", "1e999"}) {
+    EXPECT_TRUE(contains(faultOf(std::string("radar_stamp_shift=") + value), "finite")) << value;
+    EXPECT_TRUE(contains(faultOf("extrinsics_translation=[0, 0, " + std::string(value) + "]"), "finite"))
+        << value;
+  }
+}
+
+TEST(Parameters, UnknownChoicesListTheChoices) {
+  EXPECT_TRUE(contains(faultOf("stamp_source=heaader"), "one of header, trigger, arrival, got \"heaader\""));
+  EXPECT_TRUE(contains(faultOf("time_offset_model=spline"), "one of constant_acceleration, imu"));
+  EXPECT_TRUE(contains(faultOf("radar_format=lidar"), "one of irs, ti_mmwave"));
+}
+
+TEST(Parameters, RotationsMustBeUnitAndAreNormalised) {
+  EXPECT_TRUE(contains(faultOf("extrinsics_rotation_xyzw=[0, 0, 0, 0]"), "norm 1"));
+  EXPECT_TRUE(contains(faultOf("extrinsics_rotation_xyzw=[0, 0, 0, 1.01]"), "norm 1"));
+  const Config config = fromAssignments({"extrinsics_rotation_xyzw=[0.69946, 0.71461, 0.00723, 0.00524]"});
+  EXPECT_NEAR(config.odometry.T_IR.q_IR.norm(), 1.0, 1e-15);
+  EXPECT_NEAR(config.odometry.T_IR.q_IR.x(), 0.69946, 1e-4);
+  EXPECT_NEAR(config.odometry.T_IR.q_IR.w(), 0.00524, 1e-6);
+}
+
+TEST(Parameters, UnknownKeysAreErrorsWithTheNearestKey) {
+  EXPECT_TRUE(contains(faultOf("widnow=1.0"), "unknown parameter \"widnow\"; did you mean \"window\"?"));
+  EXPECT_TRUE(contains(faultOf("estimate_timeoffset=true"), "did you mean \"estimate_time_offset\"?"));
+}
+
+TEST(Parameters, ContradictionsAreRefused) {
+  EXPECT_TRUE(contains(faultsOf({"radar_min_range=10", "radar_max_range=5"}).at(0), "radar_min_range"));
+  EXPECT_TRUE(contains(faultsOf({"time_offset_initial=-0.3"}).at(0), "max_time_offset"));
+  EXPECT_TRUE(contains(faultsOf({"stamp_source=trigger", "trigger_topic=\"\""}).at(0), "trigger_topic"));
+  EXPECT_NO_THROW(fromAssignments({"trigger_topic=\"\""}));
+}
+
+TEST(Parameters, AllFaultsAreReportedAtOnce) {
+  const std::vector<std::string> faults =
+      faultsOf({"window=fast", "widnow=1", "stamp_source=never", "max_iterations=0", "imu_topic=/imu"});
+  ASSERT_EQ(faults.size(), 4u);
+  try {
+    fromAssignments({"window=fast", "widnow=1", "stamp_source=never", "max_iterations=0"});
+    FAIL();
+  } catch (const ConfigError& error) {
+    const std::string message = error.what();
+    EXPECT_TRUE(contains(message, "4 faults")) << message;
+    for (const std::string& fault : faults) EXPECT_TRUE(contains(message, fault)) << fault;
+  }
+}
+
+TEST(Parameters, AWrongFileIsOneLineWithFileLineAndExpectation) {
+  EXPECT_EQ(messageOfFile("imu_topic: /imu\n\nwindow: fast\n"),
+            "FILE:3: window: expected a finite number above 0 and at most 60 [s], got \"fast\"");
+  EXPECT_TRUE(contains(messageOfFile("imu_topic: /imu\nwindow: [1\n"), "FILE:3: not YAML"));
+  EXPECT_TRUE(contains(messageOfFile("window: 1.0\n: :\n  - x: [\n"), "not YAML"));
+  EXPECT_TRUE(contains(messageOfFile("- 1\n- 2\n"), "FILE:1: expected one `key: value` a line"));
+  EXPECT_TRUE(contains(messageOfFile("just text\n"), "FILE:1: expected one `key: value` a line"));
+  EXPECT_TRUE(contains(messageOfFile("window: 1.0\ngravity: 9.8\nwindow: 2.0\n"),
+                       "FILE:3: window: expected each key once"));
+  EXPECT_TRUE(contains(messageOfFile("radar:\n  topic: /x\n"), "FILE:1: unknown parameter \"radar\""));
+  for (const char* text : {"window: fast\n", "a: [\n", "- 1\n"}) {
+    EXPECT_FALSE(contains(messageOfFile(text), "\n")) << text;
+  }
+  EXPECT_EQ(messageOfFile(""), "nothing wrong");
+  EXPECT_EQ(messageOfFile("# only a comment\n"), "nothing wrong");
+}
+
+TEST(Parameters, MissingFilesAndFoldersAreNamed) {
+  EXPECT_THROW(readParameterFile("/nonexistent/x.yaml"), std::runtime_error);
+  try {
+    readParameterFile("/");
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_TRUE(contains(error.what(), "folder")) << error.what();
+  }
+  EXPECT_THROW(parseAssignment("window"), std::invalid_argument);
+  EXPECT_THROW(parseAssignment("=1"), std::invalid_argument);
+  EXPECT_THROW(parseAssignment("window=[1"), std::invalid_argument);
+}
+
+TEST(Parameters, ConfigurationsAreFoundByNameAndByPath) {
+  EXPECT_TRUE(std::filesystem::equivalent(findConfigFile("irs"), kConfigFolder + "/irs.yaml"));
+  EXPECT_TRUE(std::filesystem::equivalent(findConfigFile("irs.yaml"), kConfigFolder + "/irs.yaml"));
+  EXPECT_EQ(findConfigFile(kConfigFolder + "/irs.yaml"), kConfigFolder + "/irs.yaml");
+  try {
+    findConfigFile("isr");
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_TRUE(contains(error.what(), "estimator, irs, ti_mmwave")) << error.what();
+  }
+  EXPECT_THROW(findConfigFile("./nonexistent.yaml"), std::runtime_error);
+}
+
+TEST(Parameters, ScalarsMeanWhatTheyMeanOnTheParameterServer) {
+  EXPECT_TRUE(std::holds_alternative<bool>(parsePlainScalar("yes").data));
+  EXPECT_TRUE(std::holds_alternative<std::int64_t>(parsePlainScalar("-12").data));
+  EXPECT_TRUE(std::holds_alternative<double>(parsePlainScalar("1.5e-3").data));
+  EXPECT_TRUE(std::holds_alternative<double>(parsePlainScalar(".5").data));
+  EXPECT_TRUE(std::holds_alternative<std::string>(parsePlainScalar("/topic").data));
+  EXPECT_TRUE(std::holds_alternative<std::string>(parsePlainScalar("1.2.3").data));
+  EXPECT_TRUE(std::holds_alternative<std::monostate>(parsePlainScalar("~").data));
+  // The server's reader gives 1e-3 as text; a number all the same.
+  const Config config = makeConfig({{"window", ParameterValue{std::string("1e-1")}, "server"}});
+  EXPECT_EQ(config.odometry.smoother.window, 0.1);
+}
+
+TEST(Parameters, CommittedFileIsWhatTheProgramPrints) {
+  EXPECT_EQ(contents(kConfigFolder + "/estimator.yaml"), toYaml(Config{}))
+      << "run `rio_t_bag --print-config > config/estimator.yaml`";
+}
+
+TEST(Parameters, PrintedConfigurationReadsBack) {
+  const Config config = fromAssignments(
+      {"window=0.3333333333333333", "stamp_source=arrival", "ground_truth=\"a \\\"b\\\".txt\"",
+       "imu_gyro_random_walk=1.2345678901234567e-7", "radar_doppler_sign=-1", "radar_axes=flu",
+       "extrinsics_rotation_xyzw=[0.5, -0.5, 0.5, -0.5]",
+       "extrinsics_translation=[0.1, 0.2, 0.30000000000000004]"});
+  const TemporaryFile file(toYaml(config));
+  const Config back = makeConfig(readParameterFile(file.path()));
+  EXPECT_EQ(toYaml(back), toYaml(config));
+  EXPECT_EQ(back.odometry.smoother.window, 0.3333333333333333);
+  EXPECT_EQ(back.odometry.imu_noise.gyro_random_walk, 1.2345678901234567e-7);
+  EXPECT_EQ(back.odometry.T_IR.l_I.z(), 0.30000000000000004);
+  EXPECT_EQ(back.ground_truth, "a \"b\".txt");
+}
+
+TEST(Parameters, SensorConfigurationsLoad) {
+  const Config irs = makeConfig(readParameterFile(kConfigFolder + "/irs.yaml"));
+  EXPECT_EQ(pointCloudFormat(irs).doppler, "v_doppler_mps");
+  EXPECT_EQ(irs.stamp_source, StampSource::kHeader);
+  const Config ti = makeConfig(readParameterFile(kConfigFolder + "/ti_mmwave.yaml"));
+  EXPECT_EQ(pointCloudFormat(ti).doppler, "velocity");
+  EXPECT_EQ(pointCloudFormat(ti).axes, PointAxes::kForwardLeftUp);
+  EXPECT_EQ(ti.stamp_source, StampSource::kTrigger);
+  EXPECT_EQ(ti.odometry.T_IR.l_I, Eigen::Vector3d(0.03, 0.03, -0.06));
+}
+
+TEST(Parameters, OverridesChangeThePresetInAnyOrder) {
+  const Config config =
+      fromAssignments({"radar_field_doppler=speed", "radar_doppler_sign=-1", "radar_axes=rfu",
+                       "radar_power_unit=not_snr", "radar_cloud_size=from_data", "radar_format=ti_mmwave"});
+  const PointCloudFormat preset = pointCloudPreset("ti_mmwave");
+  const PointCloudFormat format = pointCloudFormat(config);
+  EXPECT_EQ(format.doppler, "speed");
+  EXPECT_EQ(format.doppler_sign, -1);
+  EXPECT_EQ(format.axes, PointAxes::kRightForwardUp);
+  EXPECT_EQ(format.power_unit, PowerUnit::kNotSnr);
+  EXPECT_TRUE(format.size_from_data);
+  EXPECT_EQ(format.x, preset.x);
+  for (const std::string& name : pointCloudPresets()) {
+    EXPECT_EQ(pointCloudFormat(fromAssignments({"radar_format=" + name})).name, name);
+  }
+}
+
+// --- Every member of the options has a key -----------------------------------------------------------------
+
+/// Stands for a value of any type in a braced list.
+struct Anything {
+  template <typename T>
+  operator T() const;  // never defined: only asked for
+};
+
+template <typename T, typename Enable, typename... Values>
+struct TakesImpl : std::false_type {};
+template <typename T, typename... Values>
+struct TakesImpl<T, std::void_t<decltype(T{std::declval<Values>()...})>, Values...> : std::true_type {};
+
+/// Number of members of an aggregate: the longest braced list that it takes.
+template <typename T, typename... Values>
+constexpr std::size_t memberCount() {
+  if constexpr (TakesImpl<T, void, Values..., Anything>::value) {
+    return memberCount<T, Values..., Anything>();
+  } else {
+    return sizeof...(Values);
+  }
+}
+
+struct TwoMembers {
+  double a = 0.0;
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+};
+static_assert(memberCount<TwoMembers>() == 2, "");
+
+std::size_t keysChanging(const std::string& group) {
+  std::size_t count = 0;
+  for (const ParameterDescription& about : parameterDescriptions()) {
+    if (about.group.rfind(group, 0) == 0) ++count;
+  }
+  return count;
+}
+
+TEST(Parameters, EveryMemberOfTheOptionsHasAKey) {
+  EXPECT_EQ(keysChanging("Smoother") + keysChanging("Time offset"), memberCount<SmootherOptions>() + 1)
+      << "with max_queued_scans; a member of SmootherOptions lacks a key in src/ros/parameter_registry.cpp";
+  EXPECT_EQ(keysChanging("Radar: which points"), memberCount<EgoVelocityOptions>());
+  EXPECT_EQ(keysChanging("Radar: jumps"), memberCount<FeasibilityOptions>());
+  EXPECT_EQ(keysChanging("Initialisation"), memberCount<StaticInitializerOptions>());
+  EXPECT_EQ(keysChanging("IMU"), memberCount<ImuNoise>() + 2) << "with gravity and max_imu_gap";
+  EXPECT_EQ(keysChanging("T_IR"), memberCount<Extrinsics>());
+  EXPECT_EQ(memberCount<OdometryOptions>(), 9u)
+      << "a new member needs keys in src/ros/parameter_registry.cpp";
+  EXPECT_EQ(memberCount<PointCloudFormat>() - 1, memberCount<PointCloudOverrides>()) << "all but its name";
+}
+
+}  // namespace
+}  // namespace rio_t
