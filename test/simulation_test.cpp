@@ -384,6 +384,14 @@ TEST(ImuModel, NoiseAndBiasWalkHaveTheirDensities) {
   EXPECT_NEAR(std::sqrt(walk_g / n * options.rate), 1e-3, 1.2e-5);
 }
 
+TEST(ImuModel, DefaultNoiseIsTheMeasuredOneWhateverTheEstimatorExpects) {
+  const ImuModelOptions options;
+  EXPECT_EQ(options.noise.accel_density, 2.4e-3);
+  EXPECT_EQ(options.noise.gyro_density, 2.0e-4);
+  EXPECT_EQ(options.noise.accel_random_walk, 1.0e-4);
+  EXPECT_EQ(options.noise.gyro_random_walk, 4.0e-6);
+}
+
 TEST(ImuModel, SaturatesPerAxis) {
   const Motion motion = builtIn("difficult");
   ImuModelOptions options;

@@ -30,7 +30,8 @@ void check(const ImuModelOptions& options) {
 }  // namespace
 
 void ImuModelOptions::removeErrors() {
-  noise = {0.0, 0.0, 0.0, 0.0};
+  noise.accel_density = noise.gyro_density = 0.0;
+  noise.accel_random_walk = noise.gyro_random_walk = 0.0;
   accel_bias = Eigen::Vector3d::Zero();
   gyro_bias = Eigen::Vector3d::Zero();
 }

@@ -11,9 +11,21 @@
 
 namespace rio_t::simulation {
 
+/// The noise of an ADIS16448 as measured on a real bag. Fixed here, apart from the defaults of the estimator:
+/// what the estimator is told to expect may be tuned, and the simulated world must not change with it.
+inline ImuNoise measuredImuNoise() {
+  ImuNoise noise;
+  noise.accel_density = 2.4e-3;
+  noise.gyro_density = 2.0e-4;
+  noise.accel_random_walk = 1.0e-4;
+  noise.gyro_random_walk = 4.0e-6;
+  return noise;
+}
+
 struct ImuModelOptions {
   double rate = 409.0;  ///< [Hz]
-  ImuNoise noise;  ///< a sample gets density * sqrt(rate); a bias walks by random_walk / sqrt(rate) a sample
+  /// a sample gets density * sqrt(rate); a bias walks by random_walk / sqrt(rate) a sample
+  ImuNoise noise = measuredImuNoise();
   /// Biases at the start; drawn from the sigmas where not given.
   std::optional<Eigen::Vector3d> accel_bias;  ///< [m/s^2]
   std::optional<Eigen::Vector3d> gyro_bias;   ///< [rad/s]
