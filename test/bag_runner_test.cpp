@@ -424,7 +424,6 @@ TEST_F(RealBag, TriggerStampsEndWhereTheyStarted) {
   EXPECT_EQ(summary.scans_total, 412u);
   EXPECT_LE(summary.end_to_start_2d_m, 0.10);
   EXPECT_LE(summary.end_to_start_3d_m, 1.4);
-  EXPECT_NEAR(summary.path_length_m, 20.5, 1.5);
   EXPECT_GT(summary.final_offset_s, -0.020);
   EXPECT_LT(summary.final_offset_s, 0.0);
   EXPECT_GT(summary.final_offset_sigma_s, 0.0);

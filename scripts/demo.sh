@@ -1,0 +1,68 @@
+#!/usr/bin/env bash
+# Shows what rio_t does, from a bare clone: installs, builds, estimates, prints a short table, draws a report.
+#   scripts/demo.sh               a simulated hand-held run, wild, with a time offset that the estimator is not told;
+#                                 also the real bag, if $RIO_T_DATA_DIR (default ../shared/data) has it
+#   scripts/demo.sh BAG [CONFIG]  your bag; CONFIG is irs (default), ti_mmwave or a YAML file
+# Results go to results/.
+set -euo pipefail
+case "${1:-}" in -h | --help) sed -n '2,6s/^# \?//p' "$0"; exit 0 ;; esac
+[ $# -le 2 ] || { echo "demo.sh: expected at most BAG and CONFIG" >&2; exit 1; }
+bag=${1:+$(realpath -m -- "$1")}
+if [ -n "$bag" ] && [ ! -f "$bag" ]; then
+  echo "demo.sh: $bag: no such bag" >&2
+  exit 1
+fi
+config=${2:-irs}
+if [ -f "$config" ]; then config=$(realpath -- "$config"); fi
+
+cd "$(dirname "$0")/.."
+export PATH=/usr/bin:$PATH
+build=${RIO_T_BUILD_DIR:-build}
+data=${RIO_T_DATA_DIR:-../shared/data}
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+echo "Building (a few minutes the first time) ..."
+if ! scripts/build.sh >"$log" 2>&1; then
+  tail -n 30 "$log" >&2
+  echo "demo.sh: the build failed, see above" >&2
+  exit 1
+fi
+programs=$build/devel/lib/rio_t
+
+# show NAME BAG CONFIG [TRUE_OFFSET]: one run, its table, its report.
+show() {
+  local name=$1 run_bag=$2 run_config=$3 true_offset=${4:-} folder=results/$1
+  echo
+  "$programs/rio_t_bag" --bag "$run_bag" --config "$run_config" --output-dir "$folder"
+  if [ -n "$true_offset" ]; then
+    awk -v s="$true_offset" 'BEGIN { printf "  %-16s%.2f ms, which the estimator was not told\n", "true offset", 1000 * s }'
+  fi
+  if [ -f scripts/report.py ]; then
+    local options=()
+    [ -z "$true_offset" ] || options+=(--true-offset "$true_offset" --ground-truth "results/$name.truth.txt")
+    if python3 scripts/report.py --evaluate "$programs/evaluate" "${options[@]}" "$folder" >"$log" 2>&1; then
+      echo "  report          $folder/report/report.html"
+    else
+      echo "  report          not drawn: $(tail -n 1 "$log")"
+    fi
+  fi
+}
+
+mkdir -p results
+if [ -n "$bag" ]; then
+  show "$(basename "$bag" .bag)" "$bag" "$config"
+  exit 0
+fi
+
+offset=${RIO_T_DEMO_OFFSET:-0.037}
+"$programs/simulate" --motion difficult --time-offset "$offset" --seed 7 --out results/simulated.bag \
+  --ground-truth results/simulated.truth.txt >"$log" 2>&1 || { cat "$log" >&2; exit 1; }
+show simulated results/simulated.bag irs "$offset"
+
+real=$data/real/ti_mmwave_rospkg_demo.bag
+if [ -f "$real" ]; then
+  show real "$real" ti_mmwave
+else
+  echo
+  echo "No real bag at $real; set RIO_T_DATA_DIR to the folder that holds real/ti_mmwave_rospkg_demo.bag to run it too."
+fi
