@@ -73,6 +73,7 @@ std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement&
   result.time = imu.time;
   result.q_WI = levelingRotation(accel.mean);
   result.b_g = gyro.mean;
+  result.b_a = accel.mean * (gravity_error / accel.mean.norm());
   result.samples = samples_.size();
   result.duration = collected;
   waiting_for_.clear();

@@ -1,5 +1,6 @@
 #include "rio_t/odometry/radar_inertial_odometry.h"
 
+#include <algorithm>
 #include <cmath>
 #include <deque>
 #include <mutex>
@@ -39,6 +40,7 @@ struct RadarInertialOdometry::Impl {
   explicit Impl(const OdometryOptions& options_in)
       : options(options_in),
         g_W(0.0, 0.0, -options.gravity),
+        R_RI(options.T_IR.q_IR.conjugate().toRotationMatrix()),
         navigator(options.imu_noise, g_W),
         initializer(options.initialization, options.gravity),
         ego_velocity_estimator(options.ego_velocity),
@@ -49,12 +51,17 @@ struct RadarInertialOdometry::Impl {
 
   void drainInbox();
   void tryInitialize(const ImuMeasurement& sample);
+  bool contradicts(const VelocityPrior& prior, const EgoVelocity& measured) const;
+  bool isAtRest(Time time) const;
+  /// Empty, or why the scan has no velocity to use.
+  std::string measureVelocity(const RadarScan& scan, bool at_rest, EgoVelocity& measured);
   std::optional<ScanResult> tryScan(const RadarScan& scan, bool imu_has_ended);
-  void useInWindow(ScanResult& result);
+  void updateWindow(ScanResult& result);
   NavigationState newestState(const NodeMatrix& covariance) const;
 
   const OdometryOptions options;
   const Eigen::Vector3d g_W;
+  const Eigen::Matrix3d R_RI;
   FaultCounters faults;
 
   // The navigation half; guarded by navigation_mutex, held for microseconds.
@@ -76,6 +83,7 @@ struct RadarInertialOdometry::Impl {
   FeasibilityCheck feasibility;
   FixedLagSmoother smoother;
   std::deque<RadarScan> waiting_scans;
+  Time last_used;  ///< stamp of the last scan that went into the window
   std::vector<ImuMeasurement> imu_drained;
 };
 
@@ -169,7 +177,10 @@ void RadarInertialOdometry::Impl::tryInitialize(const ImuMeasurement& sample) {
     StateBlock x;
     x.q_WI() = rest->q_WI;
     x.b_g() = rest->b_g;
-    smoother.initialize(rest->time, x);
+    x.b_a() = rest->b_a;
+    // A mean over T seconds leaves density / sqrt(T), besides what the bias does by itself.
+    smoother.initialize(rest->time, x, options.imu_noise.gyro_density / std::sqrt(rest->duration));
+    last_used = rest->time;
     const NavigationState state = newestState(smoother.newestCovariance());
     const std::lock_guard<std::mutex> lock(navigation_mutex);
     navigator.anchor(state);
@@ -183,9 +194,9 @@ void RadarInertialOdometry::Impl::tryInitialize(const ImuMeasurement& sample) {
 
 std::optional<ScanResult> RadarInertialOdometry::Impl::tryScan(const RadarScan& scan, bool imu_has_ended) {
   ScanResult result;
-  const auto rejected = [&](const char* reason) {
+  result.scan = scan;
+  const auto rejected = [&](const std::string& reason) {
     result.rejected_because = reason;
-    result.scan = scan;
     return result;
   };
   if (smoother.size() == 0) return rejected("before_initialization");
@@ -198,27 +209,53 @@ std::optional<ScanResult> RadarInertialOdometry::Impl::tryScan(const RadarScan& 
     return rejected("older_than_window");
   }
 
-  result.ego_velocity = ego_velocity_estimator.estimate(scan);
-  if (!isValid(result.ego_velocity.status)) return rejected(toString(result.ego_velocity.status).c_str());
-  if (!feasibility.accept(scan.stamp, result.ego_velocity.v_R)) return rejected("infeasible_velocity");
-
-  const Eigen::Matrix3d R_RI = options.T_IR.q_IR.conjugate().toRotationMatrix();
-  switch (smoother.add({scan.stamp, result.ego_velocity.v_R, result.ego_velocity.covariance, R_RI, options.T_IR.l_I})) {
-    case FixedLagSmoother::AddResult::kOlderThanWindow:
-      return rejected("older_than_window");
-    case FixedLagSmoother::AddResult::kDuplicateStamp:
-      return rejected("duplicate_stamp");
-    case FixedLagSmoother::AddResult::kAdded:
-      break;
+  const bool at_rest = isAtRest(node_time);
+  result.rejected_because = measureVelocity(scan, at_rest, result.ego_velocity);
+  if (result.rejected_because.empty()) {
+    result.rejected_because = toString(smoother.add({scan.stamp, result.ego_velocity.v_R,
+                                                     result.ego_velocity.covariance, R_RI, options.T_IR.l_I}));
   }
-  result.scan = scan;
-  useInWindow(result);
+  result.used = result.rejected_because.empty();
+  if (result.used) last_used = scan.stamp;
+  result.updated = result.used;
+  if (at_rest) {
+    result.updated |= smoother.addRest(scan.stamp, options.rest.velocity_sigma) == FixedLagSmoother::AddResult::kAdded;
+  }
+  if (result.updated) updateWindow(result);
   return result;
 }
 
-void RadarInertialOdometry::Impl::useInWindow(ScanResult& result) {
+std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, bool at_rest, EgoVelocity& measured) {
+  std::optional<VelocityPrior> prior = smoother.predictRadarVelocity(scan.stamp, R_RI, options.T_IR.l_I);
+  if (at_rest) {
+    prior.emplace();
+    prior->covariance.diagonal().setConstant(options.rest.velocity_sigma * options.rest.velocity_sigma);
+  }
+  measured = ego_velocity_estimator.estimate(scan, prior);
+  if (!isValid(measured.status)) return toString(measured.status);
+  if (!feasibility.accept(scan.stamp, measured.v_R)) return "infeasible_velocity";
+  const bool gate_is_open = std::abs(scan.stamp - last_used) > options.smoother.innovation_gate_timeout;
+  if (prior && !gate_is_open && contradicts(*prior, measured)) return "innovation";
+  return "";
+}
+
+bool RadarInertialOdometry::Impl::isAtRest(Time time) const {
+  const NodeEstimate newest = smoother.newest();
+  return rio_t::isAtRest(imu, time, {newest.x.q_WI(), newest.x.v_W(), newest.x.b_g(), newest.x.b_a(), g_W},
+                         options.rest);
+}
+
+bool RadarInertialOdometry::Impl::contradicts(const VelocityPrior& prior, const EgoVelocity& measured) const {
+  const Eigen::Vector3d innovation = measured.v_R - prior.v_R;
+  const double model_error = options.smoother.innovation_model_error;
+  const Eigen::Matrix3d S =
+      prior.covariance + measured.covariance + model_error * model_error * Eigen::Matrix3d::Identity();
+  const double gate = options.smoother.innovation_gate;
+  return gate > 0.0 && innovation.dot(S.ldlt().solve(innovation)) > gate * gate;
+}
+
+void RadarInertialOdometry::Impl::updateWindow(ScanResult& result) {
   const SolveReport solve = smoother.optimize();
-  result.used = true;
   result.solver_iterations = solve.iterations;
   result.solver_converged = solve.converged;
   for (const NodeEstimate& node : smoother.marginalize()) {

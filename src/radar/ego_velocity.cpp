@@ -164,7 +164,7 @@ void heedPrior(const std::vector<Direction>& points, const VelocityPrior& prior,
   if (!aided.solved) return;
   selectInliers(points, aided.v_R, o, supporters);
   aided = solveLeastSquares(supporters, o);
-  const double needed = o.min_inlier_fraction * static_cast<double>(points.size());
+  const double needed = o.prior_min_inlier_fraction * static_cast<double>(points.size());
   if (!aided.solved || static_cast<double>(supporters.size()) < needed || contradicts(aided, prior, o))
     return;
   inliers = supporters;

@@ -21,8 +21,8 @@ struct Linearization {
 
 Linearization evaluate(const ceres::CostFunction& cost, const double* block0, const double* block1) {
   const int rows = cost.num_residuals();
-  Linearization lin{Residual(rows), RowMatrix(rows, cost.parameter_block_sizes()[0]),
-                    RowMatrix(rows, cost.parameter_block_sizes()[1])};
+  const std::vector<int>& sizes = cost.parameter_block_sizes();
+  Linearization lin{Residual(rows), RowMatrix(rows, sizes[0]), RowMatrix(rows, sizes.size() > 1 ? sizes[1] : 0)};
   const double* blocks[] = {block0, block1};
   double* jacobians[] = {lin.J0.data(), lin.J1.data()};
   if (!cost.Evaluate(blocks, lin.r.data(), jacobians)) throw std::runtime_error("chain: a factor cannot be evaluated");
@@ -62,6 +62,13 @@ void ChainSystem::addStateAndOffset(std::size_t k, const ceres::CostFunction& co
   diagonal[k].bottomLeftCorner<1, kState>() += weight * J_t.transpose() * J;
   diagonal[k](kState, kState) += weight * J_t.squaredNorm();
   gradient[k](kState) += weight * J_t.dot(lin.r);
+}
+
+void ChainSystem::addState(std::size_t k, const ceres::CostFunction& cost, const double* state) {
+  const Linearization lin = evaluate(cost, state, nullptr);
+  const Tangents J = tangent(lin.J0);
+  diagonal[k].topLeftCorner<kState, kState>() += J.transpose() * J;
+  gradient[k].head<kState>() += J.transpose() * lin.r;
 }
 
 void ChainSystem::addOffsetPair(std::size_t k, const ceres::CostFunction& cost, const double* t_O,

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace rio_t {
 namespace {
@@ -26,6 +27,21 @@ ceres::Problem::Options borrowingProblem() {
   return options;
 }
 
+using StateMatrix = Eigen::Matrix<double, StateBlock::kTangent, StateBlock::kTangent>;
+
+/// Whitened Jacobians of the IMU factor with respect to the tangents of both states.
+std::pair<StateMatrix, StateMatrix> tangentJacobians(const ImuFactor& factor, const StateBlock& i,
+                                                     const StateBlock& j) {
+  const double* blocks[] = {i.data(), j.data()};
+  Eigen::Matrix<double, StateBlock::kTangent, 1> residual;
+  StateJacobian<StateBlock::kTangent> J[2];
+  double* jacobians[] = {J[0].data(), J[1].data()};
+  factor.Evaluate(blocks, residual.data(), jacobians);
+  StateMatrix T[2];
+  for (int b = 0; b < 2; ++b) T[b] << J[b].leftCols<3>(), J[b].rightCols<StateBlock::kTangent - 3>();
+  return {T[0], T[1]};
+}
+
 }  // namespace
 
 FixedLagSmoother::FixedLagSmoother(const SmootherOptions& options, const ImuNoise& noise, const Eigen::Vector3d& g_W,
@@ -34,7 +50,7 @@ FixedLagSmoother::FixedLagSmoother(const SmootherOptions& options, const ImuNois
   if (options_.huber_threshold > 0.0) loss_ = std::make_unique<ceres::HuberLoss>(options_.huber_threshold);
 }
 
-void FixedLagSmoother::initialize(Time time, const StateBlock& x) {
+void FixedLagSmoother::initialize(Time time, const StateBlock& x, double gyro_bias_sigma) {
   NodePrior prior;
   prior.x0 = x;
   prior.t_O0 = options_.time_offset_initial;
@@ -46,7 +62,7 @@ void FixedLagSmoother::initialize(Time time, const StateBlock& x) {
   const auto set = [&](int first, double sigma) { prior.J.diagonal().segment<3>(first).setConstant(1.0 / sigma); };
   set(StateBlock::kP, options_.prior_sigma_position);
   set(StateBlock::kV, options_.prior_sigma_velocity);
-  set(StateBlock::kBg, options_.prior_sigma_gyro_bias);
+  set(StateBlock::kBg, std::hypot(options_.prior_sigma_gyro_bias, gyro_bias_sigma));
   set(StateBlock::kBa, options_.prior_sigma_accel_bias);
   prior.J(StateBlock::kTangent, StateBlock::kTangent) = 1.0 / options_.time_offset_sigma;
   prior_ = std::make_unique<PriorFactor>(prior);
@@ -57,10 +73,50 @@ void FixedLagSmoother::initialize(Time time, const StateBlock& x) {
   node.x = x;
   node.t_O = options_.time_offset_initial;
   nodes_.push_back(std::move(node));
+  newest_covariance_ = covarianceOfLast(linearize());
 }
 
 Time FixedLagSmoother::nodeTime(Time stamp) const {
   return options_.time_offset_model == TimeOffsetModel::kImu ? stamp - nodes_.back().t_O : stamp;
+}
+
+std::optional<VelocityPrior> FixedLagSmoother::predictRadarVelocity(Time stamp, const Eigen::Matrix3d& R_RI,
+                                                                    const Eigen::Vector3d& l_I) const {
+  const Node& newest = nodes_.back();
+  const Time time = nodeTime(stamp);
+  if (time < newest.time) return std::nullopt;
+
+  StateBlock x = newest.x;
+  NodeMatrix P = newest_covariance_;
+  if (time > newest.time) {
+    const Preintegration pre = preintegrate(*imu_, newest.time, time, newest.x.b_g(), newest.x.b_a(), noise_);
+    x = predict(newest.x, pre, g_W_);
+    // The whitened factor says J_i d_i + J_j d_j ~ N(0, 1): so d_j = A d_i + noise with A = -J_j^-1 J_i.
+    const auto [J_i, J_j] = tangentJacobians(ImuFactor(pre, noise_, g_W_), newest.x, x);
+    const StateMatrix J_j_inverse = J_j.inverse();
+    NodeMatrix A = NodeMatrix::Identity();
+    A.topLeftCorner<StateBlock::kTangent, StateBlock::kTangent>() = -J_j_inverse * J_i;
+    P = (A * P * A.transpose()).eval();
+    P.topLeftCorner<StateBlock::kTangent, StateBlock::kTangent>() += J_j_inverse * J_j_inverse.transpose();
+    P(StateBlock::kTangent, StateBlock::kTangent) += offsetVariance(time - newest.time);
+  }
+
+  // A measurement of zero with unit covariance has the predicted velocity as its residual.
+  RadarVelocityMeasurement zero;
+  zero.stamp = stamp;
+  zero.R_RI = R_RI;
+  zero.l_I = l_I;
+  VelocityPrior prior;
+  const double* blocks[] = {x.data(), &newest.t_O};
+  StateJacobian<3> J_x;
+  Eigen::Vector3d J_t;
+  double* jacobians[] = {J_x.data(), J_t.data()};
+  makeRadarFactor(zero, time)->Evaluate(blocks, prior.v_R.data(), jacobians);
+  Eigen::Matrix<double, 3, kNodeTangent> J;
+  J << J_x.leftCols<3>(), J_x.rightCols<StateBlock::kTangent - 3>(), J_t;
+  if (!options_.estimate_time_offset) J.rightCols<1>().setZero();
+  prior.covariance = J * P * J.transpose();
+  return prior;
 }
 
 FixedLagSmoother::AddResult FixedLagSmoother::add(const RadarVelocityMeasurement& z) {
@@ -69,10 +125,23 @@ FixedLagSmoother::AddResult FixedLagSmoother::add(const RadarVelocityMeasurement
       if (term.stamp == z.stamp) return AddResult::kDuplicateStamp;
     }
   }
-  const Time time = nodeTime(z.stamp);
+  Node* node = nodeAt(nodeTime(z.stamp));
+  if (node == nullptr) return AddResult::kOlderThanWindow;
+  node->radar.push_back({z.stamp, makeRadarFactor(z, node->time)});
+  return AddResult::kAdded;
+}
+
+FixedLagSmoother::AddResult FixedLagSmoother::addRest(Time stamp, double velocity_sigma) {
+  Node* node = nodeAt(nodeTime(stamp));
+  if (node == nullptr) return AddResult::kOlderThanWindow;
+  node->rest = std::make_unique<RestFactor>(velocity_sigma);
+  return AddResult::kAdded;
+}
+
+FixedLagSmoother::Node* FixedLagSmoother::nodeAt(Time time) {
   const auto later =
       std::find_if(nodes_.begin(), nodes_.end(), [&](const Node& node) { return node.time > time; });
-  if (later == nodes_.begin()) return AddResult::kOlderThanWindow;
+  if (later == nodes_.begin()) return nullptr;
 
   // The factor of the imu model reaches its time of measurement from any node, so neighbours can share one.
   const double spacing = options_.time_offset_model == TimeOffsetModel::kImu ? kMinNodeSpacing : 0.0;
@@ -84,8 +153,7 @@ FixedLagSmoother::AddResult FixedLagSmoother::add(const RadarVelocityMeasurement
     linkToPrevious(k);
     if (k + 1 < nodes_.size()) linkToPrevious(k + 1);  // its IMU factor now starts at the new node
   }
-  nodes_[k].radar.push_back({z.stamp, makeRadarFactor(z, nodes_[k].time)});
-  return AddResult::kAdded;
+  return &nodes_[k];
 }
 
 FixedLagSmoother::Node FixedLagSmoother::makeNode(Time time, const Node& previous) const {
@@ -102,8 +170,12 @@ void FixedLagSmoother::linkToPrevious(std::size_t k) {
   Node& node = nodes_[k];
   node.imu_from_previous = std::make_unique<ImuFactor>(
       preintegrate(*imu_, previous.time, node.time, previous.x.b_g(), previous.x.b_a(), noise_), noise_, g_W_);
-  node.offset_from_previous = std::make_unique<ConstantOffsetFactor>(options_.time_offset_noise *
-                                                                     std::sqrt(node.time - previous.time));
+  node.offset_from_previous =
+      std::make_unique<ConstantOffsetFactor>(std::sqrt(offsetVariance(node.time - previous.time)));
+}
+
+double FixedLagSmoother::offsetVariance(double dt) const {
+  return options_.time_offset_noise * options_.time_offset_noise * dt;
 }
 
 std::unique_ptr<ceres::CostFunction> FixedLagSmoother::makeRadarFactor(const RadarVelocityMeasurement& z,
@@ -127,6 +199,7 @@ SolveReport FixedLagSmoother::optimize() {
     for (const RadarTerm& term : node.radar) {
       problem.AddResidualBlock(term.cost.get(), loss_.get(), node.x.data(), &node.t_O);
     }
+    if (node.rest) problem.AddResidualBlock(node.rest.get(), nullptr, node.x.data());
     if (k == 0) continue;
     problem.AddResidualBlock(node.imu_from_previous.get(), nullptr, nodes_[k - 1].x.data(), node.x.data());
     problem.AddResidualBlock(node.offset_from_previous.get(), nullptr, &nodes_[k - 1].t_O, &node.t_O);
@@ -136,15 +209,20 @@ SolveReport FixedLagSmoother::optimize() {
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   options.max_num_iterations = options_.max_iterations;
   options.num_threads = 1;
+  // Warm-started problems are near their solution: begin as Gauss-Newton. With the default radius the weakly
+  // observable directions (offset, biases) take a dozen iterations instead of two or three.
+  options.initial_trust_region_radius = 1e12;
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
 
   for (Node& node : nodes_) node.t_O = std::clamp(node.t_O, -options_.max_time_offset, options_.max_time_offset);
+  newest_covariance_ = covarianceOfLast(linearize());
   return {static_cast<int>(summary.iterations.size()), summary.termination_type == ceres::CONVERGENCE};
 }
 
-ChainSystem FixedLagSmoother::linearize(std::size_t count) const {
+ChainSystem FixedLagSmoother::linearize() const {
+  const std::size_t count = nodes_.size();
   ChainSystem system(count);
   const bool offset_known = !options_.estimate_time_offset;
   system.addStateAndOffset(0, *prior_, nodes_[0].x.data(), &nodes_[0].t_O, nullptr, false);
@@ -153,6 +231,7 @@ ChainSystem FixedLagSmoother::linearize(std::size_t count) const {
     for (const RadarTerm& term : node.radar) {
       system.addStateAndOffset(k, *term.cost, node.x.data(), &node.t_O, loss_.get(), offset_known);
     }
+    if (node.rest) system.addState(k, *node.rest, node.x.data());
     if (k == 0) continue;
     system.addStatePair(k - 1, *node.imu_from_previous, nodes_[k - 1].x.data(), node.x.data());
     system.addOffsetPair(k - 1, *node.offset_from_previous, &nodes_[k - 1].t_O, &node.t_O);
@@ -171,6 +250,7 @@ std::vector<NodeEstimate> FixedLagSmoother::marginalize() {
     for (const RadarTerm& term : first.radar) {
       system.addStateAndOffset(0, *term.cost, first.x.data(), &first.t_O, loss_.get(), !options_.estimate_time_offset);
     }
+    if (first.rest) system.addState(0, *first.rest, first.x.data());
     system.addStatePair(0, *second.imu_from_previous, first.x.data(), second.x.data());
     system.addOffsetPair(0, *second.offset_from_previous, &first.t_O, &second.t_O);
     const NodeInformation remaining = eliminateFirst(system.diagonal[0], system.coupling[0], system.gradient[0],
@@ -185,7 +265,17 @@ std::vector<NodeEstimate> FixedLagSmoother::marginalize() {
   return left;
 }
 
-NodeMatrix FixedLagSmoother::newestCovariance() const { return covarianceOfLast(linearize(nodes_.size())); }
+std::string toString(FixedLagSmoother::AddResult result) {
+  switch (result) {
+    case FixedLagSmoother::AddResult::kAdded:
+      return "";
+    case FixedLagSmoother::AddResult::kOlderThanWindow:
+      return "older_than_window";
+    case FixedLagSmoother::AddResult::kDuplicateStamp:
+      return "duplicate_stamp";
+  }
+  return "";
+}
 
 Time FixedLagSmoother::imuNeededSince() const {
   // Offsets move a radar factor's time by at most the bound to either side of its stamp, and the stamp lies within

@@ -33,6 +33,12 @@ class ImuBuffer {
   template <typename Step>
   void forEachInterval(Time from, Time to, Step&& step) const;
 
+  /// Calls visit(sample) for each sample later than `from` and not later than `to`.
+  template <typename Visit>
+  void forEachSample(Time from, Time to, Visit&& visit) const {
+    for (std::size_t i = firstAfter(from); i < samples_.size() && samples_[i].time <= to; ++i) visit(samples_[i]);
+  }
+
  private:
   std::size_t firstAfter(Time time) const;  ///< index of the first sample later than `time`; size() if none
 

@@ -22,6 +22,9 @@ struct StaticInitialization {
   Time time;                                            ///< of the last sample used
   Eigen::Quaterniond q_WI = Eigen::Quaterniond::Identity();  ///< levelled, yaw zero
   Eigen::Vector3d b_g = Eigen::Vector3d::Zero();        ///< mean gyro [rad/s]
+  /// What the mean specific force has beyond gravity [m/s^2]: the part of the bias along the vertical. The horizontal
+  /// part cannot be told from a tilt.
+  Eigen::Vector3d b_a = Eigen::Vector3d::Zero();
   std::size_t samples = 0;
   double duration = 0.0;                                ///< [s]
 };

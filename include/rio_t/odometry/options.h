@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 
 #include "rio_t/imu/noise.h"
+#include "rio_t/imu/rest_detector.h"
 #include "rio_t/imu/static_initializer.h"
 #include "rio_t/radar/ego_velocity.h"
 #include "rio_t/radar/feasibility.h"
@@ -24,6 +25,7 @@ struct OdometryOptions {
   StaticInitializerOptions initialization;
   EgoVelocityOptions ego_velocity;
   FeasibilityOptions feasibility;
+  RestOptions rest;
   SmootherOptions smoother;
   double max_imu_gap = 0.1;        ///< [s] between samples; a longer one is reported and bridged
   std::size_t max_queued_scans = 50;  ///< scans that may wait for the IMU or the solver

@@ -17,10 +17,12 @@ namespace rio_t {
 struct ScanResult {
   RadarScan scan;            ///< as fed
   EgoVelocity ego_velocity;
-  bool used = false;
+  bool used = false;             ///< its velocity went into the window
   std::string rejected_because;  ///< snake case, empty where used; keys of `scans_rejected`
 
-  // The newest state of the window after this scan; only where used.
+  /// The window was solved again: the scan was used, or the platform is at rest. What follows is set only then.
+  bool updated = false;
+  // The newest state of the window.
   NavigationState state;
   double time_offset = 0.0;        ///< t_O [s]
   double time_offset_sigma = 0.0;  ///< [s]

@@ -24,8 +24,8 @@ struct EgoVelocityOptions {
   double min_range = 0.25;              ///< [m]
   double max_range = 100.0;             ///< [m]
   double min_snr_db = 3.0;              ///< [dB]
-  double max_azimuth = 1.0471975512;    ///< [rad] from the y (forward) axis, either side
-  double max_elevation = 1.0471975512;  ///< [rad] either side
+  double max_azimuth = 1.5707963268;    ///< [rad] from the y (forward) axis, either side; the noise model weighs points at the edge
+  double max_elevation = 1.5707963268;  ///< [rad] either side
 
   double zero_velocity_threshold = 0.05;         ///< [m/s] a Doppler below counts as zero
   double zero_velocity_outlier_fraction = 0.25;  ///< share of Dopplers that may exceed it at rest
@@ -40,6 +40,7 @@ struct EgoVelocityOptions {
 
   std::size_t min_inliers = 5;       ///< one velocity has three unknowns; the rest are witnesses
   double min_inlier_fraction = 0.4;  ///< of the points after the filter; fewer agree by chance
+  double prior_min_inlier_fraction = 0.15;  ///< likewise, for points that agree with the prior
 
   EgoVelocitySolver solver = EgoVelocitySolver::kErrorsInVariables;
   // Noise of a point, for kErrorsInVariables. The defaults are what the Doppler residuals of a walk with an
@@ -93,7 +94,7 @@ class EgoVelocityEstimator {
   explicit EgoVelocityEstimator(const EgoVelocityOptions& options);
 
   /// A prior helps to tell the static world from an object that moves and fills half of the view, which one
-  /// scan cannot: where the RANSAC velocity contradicts the prior, and `min_inlier_fraction` of the points
+  /// scan cannot: where the RANSAC velocity contradicts the prior, and `prior_min_inlier_fraction` of the points
   /// agree with a velocity that does not, those points are the inliers. The velocity and its covariance come
   /// from the points alone, so fusing the result with the prior does not count anything twice.
   EgoVelocity estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior = std::nullopt) const;

@@ -20,10 +20,11 @@ struct ChainSystem {
   /// `nodes` nodes without any information.
   explicit ChainSystem(std::size_t nodes);
 
-  /// Adds `cost` on the blocks (state k, t_O,k), or (t_O,k, t_O,k+1), or (state k, state k+1), at their values.
+  /// Adds `cost` on the blocks (state k, t_O,k), or (state k), or (t_O,k, t_O,k+1), or (state k, state k+1), at their values.
   /// `loss` may be null. Where `offset_known`, derivatives with respect to t_O are left out.
   void addStateAndOffset(std::size_t k, const ceres::CostFunction& cost, const double* state, const double* t_O,
                          const ceres::LossFunction* loss, bool offset_known);
+  void addState(std::size_t k, const ceres::CostFunction& cost, const double* state);
   void addOffsetPair(std::size_t k, const ceres::CostFunction& cost, const double* t_O, const double* next_t_O);
   void addStatePair(std::size_t k, const ceres::CostFunction& cost, const double* state, const double* next_state);
 };

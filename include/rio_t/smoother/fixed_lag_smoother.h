@@ -4,6 +4,8 @@
 
 #include <deque>
 #include <memory>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "rio_t/core/pose.h"
@@ -11,8 +13,10 @@
 #include "rio_t/factors/imu_factor.h"
 #include "rio_t/factors/prior_factor.h"
 #include "rio_t/factors/radar_velocity_factor.h"
+#include "rio_t/factors/rest_factor.h"
 #include "rio_t/factors/state_manifold.h"
 #include "rio_t/imu/buffer.h"
+#include "rio_t/radar/ego_velocity.h"
 #include "rio_t/smoother/chain.h"
 #include "rio_t/smoother/options.h"
 
@@ -42,14 +46,20 @@ class FixedLagSmoother {
                    const ImuBuffer& imu);
 
   /// Starts (or starts again) with one node at `time`; its prior comes from the options, with yaw and position
-  /// defining W.
-  void initialize(Time time, const StateBlock& x);
+  /// defining W. `gyro_bias_sigma` [rad/s]: of the mean that b_g comes from, added to the option's.
+  void initialize(Time time, const StateBlock& x, double gyro_bias_sigma);
 
   /// Where a scan stamped `stamp` puts its node: the stamp (constant_acceleration), or the time of measurement as
   /// now estimated (imu). The IMU must cover it before `add`.
   Time nodeTime(Time stamp) const;
 
+  /// Radar velocity that a scan stamped `stamp` should show, with the uncertainty of the state, of the IMU since and
+  /// of the offset. None for a scan older than the newest node. R_RI turns I into R, `l_I` is the radar in I [m].
+  std::optional<VelocityPrior> predictRadarVelocity(Time stamp, const Eigen::Matrix3d& R_RI,
+                                                    const Eigen::Vector3d& l_I) const;
   AddResult add(const RadarVelocityMeasurement& z);
+  /// The platform is at rest at the time of measurement of a scan stamped `stamp`; `velocity_sigma` [m/s].
+  AddResult addRest(Time stamp, double velocity_sigma);
   SolveReport optimize();
   /// Marginalises what is older than the window; the nodes that left, oldest first.
   std::vector<NodeEstimate> marginalize();
@@ -57,8 +67,8 @@ class FixedLagSmoother {
   std::size_t size() const { return nodes_.size(); }
   NodeEstimate node(std::size_t k) const { return {nodes_[k].time, nodes_[k].x, nodes_[k].t_O}; }
   NodeEstimate newest() const { return node(nodes_.size() - 1); }
-  /// Marginal covariance of the newest node, at the present values.
-  NodeMatrix newestCovariance() const;
+  /// Marginal covariance of the newest node after the last `optimize` (or `initialize`).
+  const NodeMatrix& newestCovariance() const { return newest_covariance_; }
   /// Samples of the IMU before this time are not needed any more.
   Time imuNeededSince() const;
 
@@ -74,12 +84,16 @@ class FixedLagSmoother {
     std::unique_ptr<ImuFactor> imu_from_previous;                ///< null for the first node
     std::unique_ptr<ConstantOffsetFactor> offset_from_previous;  ///< null for the first node
     std::vector<RadarTerm> radar;
+    std::unique_ptr<RestFactor> rest;  ///< null where the platform is not known to be at rest
   };
 
+  /// The node at `time`, made if need be; null where `time` lies before the window.
+  Node* nodeAt(Time time);
   Node makeNode(Time time, const Node& previous) const;
   void linkToPrevious(std::size_t k);
   std::unique_ptr<ceres::CostFunction> makeRadarFactor(const RadarVelocityMeasurement& z, Time node_time) const;
-  ChainSystem linearize(std::size_t count) const;
+  ChainSystem linearize() const;
+  double offsetVariance(double dt) const;  ///< that t_O gains in dt [s] by its random walk [s^2]
 
   SmootherOptions options_;   // these four: read-only after construction
   ImuNoise noise_;
@@ -89,6 +103,10 @@ class FixedLagSmoother {
   StateManifold manifold_;
   std::unique_ptr<PriorFactor> prior_;  // on the first node
   std::deque<Node> nodes_;
+  NodeMatrix newest_covariance_ = NodeMatrix::Zero();
 };
+
+/// Empty for kAdded, else why not, in snake case.
+std::string toString(FixedLagSmoother::AddResult result);
 
 }  // namespace rio_t

@@ -12,6 +12,11 @@ struct SmootherOptions {
   double window = 1.0;                 ///< [s] length of the fixed-lag window
   double huber_threshold = 1.5;        ///< on the whitened radar residual's norm; 0 = no robust loss
   int max_iterations = 6;              ///< of the solver, each scan
+  /// [sigma] farther from what the IMU predicts, offset uncertainty included, a scan is rejected; 0 = no gate.
+  double innovation_gate = 4.0;
+  /// [m/s] per axis, added to that prediction in the gate only: extrinsics and IMU scale that are a little wrong.
+  double innovation_model_error = 0.1;
+  double innovation_gate_timeout = 3.0;  ///< [s] without a scan after which the next is taken all the same
 
   bool estimate_time_offset = true;    ///< false: LC-RIO, offset fixed at time_offset_initial
   TimeOffsetModel time_offset_model = TimeOffsetModel::kConstantAcceleration;
@@ -24,7 +29,7 @@ struct SmootherOptions {
   double prior_sigma_yaw = 1.0e-3;        ///< [rad] yaw defines the world frame
   double prior_sigma_position = 1.0e-3;   ///< [m] position defines the world frame
   double prior_sigma_velocity = 0.02;     ///< [m/s]
-  double prior_sigma_gyro_bias = 2.0e-3;  ///< [rad/s]
+  double prior_sigma_gyro_bias = 1.0e-4;  ///< [rad/s] besides the noise of the mean at rest
   double prior_sigma_accel_bias = 0.1;    ///< [m/s^2]
 };
 

@@ -1,0 +1,131 @@
+// Every factor: analytic Jacobians against numeric ones on the manifold, and residuals that are zero at the truth.
+#include <cmath>
+
+#include "numeric_jacobian.h"
+#include "rio_t/core/so3.h"
+#include "rio_t/factors/constant_offset_factor.h"
+#include "rio_t/factors/imu_factor.h"
+#include "rio_t/factors/prior_factor.h"
+#include "rio_t/factors/radar_velocity_factor.h"
+#include "synthetic_motion.h"
+
+namespace rio_t {
+namespace {
+
+std::vector<double> values(const StateBlock& x) { return {x.data(), x.data() + StateBlock::kSize}; }
+
+StateBlock moved(const StateBlock& x, double size) {
+  StateTangent delta;
+  for (int i = 0; i < StateBlock::kTangent; ++i) delta(i) = size * std::sin(1.0 + 2.3 * i);
+  StateBlock y;
+  boxplus(x.data(), delta.data(), y.data());
+  return y;
+}
+
+RadarVelocityMeasurement measurement(Time stamp) {
+  RadarVelocityMeasurement z;
+  z.stamp = stamp;
+  z.v_R = {0.3, 1.1, -0.2};
+  z.covariance << 0.01, 0.002, 0.0, 0.002, 0.004, 0.001, 0.0, 0.001, 0.02;
+  z.R_RI = so3::exp({0.3, -1.2, 2.0}).toRotationMatrix();
+  z.l_I = {0.03, -0.5, 0.2};
+  return z;
+}
+
+TEST(StateBlock, BoxminusInvertsBoxplus) {
+  const StateBlock x = SyntheticMotion().state(1.0);
+  StateTangent delta;
+  for (int i = 0; i < StateBlock::kTangent; ++i) delta(i) = 0.3 * std::cos(1.7 * i);
+  StateBlock y;
+  boxplus(x.data(), delta.data(), y.data());
+  EXPECT_LT((boxminus(y.data(), x.data()) - delta).norm(), 1e-12);
+}
+
+TEST(ImuFactor, JacobiansAreCorrect) {
+  const SyntheticMotion motion;
+  const ImuBuffer imu = motion.imu(0.9, 1.3, 400.0);
+  const StateBlock x_i = motion.state(1.0);
+  const Preintegration pre = preintegrate(imu, motion.time(1.0), motion.time(1.1), x_i.b_g() + Eigen::Vector3d(1e-3, 2e-3, -1e-3),
+                                          x_i.b_a(), ImuNoise());
+  const ImuFactor factor(pre, ImuNoise(), motion.g_W);
+  expectJacobiansCorrect(factor, {values(moved(x_i, 0.1)), values(moved(motion.state(1.1), -0.2))}, 1e-6, 1e-4);
+}
+
+TEST(ImuFactor, ResidualIsZeroAtTheTruth) {
+  const SyntheticMotion motion;
+  const ImuBuffer imu = motion.imu(0.9, 1.3, 2000.0);
+  const StateBlock x_i = motion.state(1.0);
+  const Preintegration pre =
+      preintegrate(imu, motion.time(1.0), motion.time(1.1), x_i.b_g(), x_i.b_a(), ImuNoise());
+  const StateBlock x_j = predict(x_i, pre, motion.g_W);
+  EXPECT_LT(boxminus(x_j.data(), motion.state(1.1).data()).norm(), 2e-6);
+  Eigen::Matrix<double, 15, 1> r;
+  const double* blocks[] = {x_i.data(), x_j.data()};
+  ImuFactor(pre, ImuNoise(), motion.g_W).Evaluate(blocks, r.data(), nullptr);
+  EXPECT_LT(r.norm(), 1e-7);
+}
+
+TEST(ConstantAccelerationRadarFactor, JacobiansAreCorrect) {
+  const SyntheticMotion motion;
+  const ImuBuffer imu = motion.imu(0.9, 1.3, 400.0);
+  const ConstantAccelerationRadarFactor factor(measurement(motion.time(1.0)), imu.at(motion.time(1.0)), motion.g_W);
+  expectJacobiansCorrect(factor, {values(moved(motion.state(1.0), 0.1)), {0.04}});
+}
+
+TEST(ConstantAccelerationRadarFactor, AtRestTheCorrectedAccelerationIsZero) {
+  // The sign of gravity: a level accelerometer at rest reads +g, so the offset must not matter.
+  RadarVelocityMeasurement z = measurement(Time::fromSeconds(1.0));
+  z.v_R.setZero();
+  ImuMeasurement imu;
+  imu.acceleration = {0.0, 0.0, 9.81};
+  const StateBlock x;
+  const double t_O = 0.1;
+  const double* blocks[] = {x.data(), &t_O};
+  Eigen::Vector3d r;
+  ConstantAccelerationRadarFactor(z, imu, {0.0, 0.0, -9.81}).Evaluate(blocks, r.data(), nullptr);
+  EXPECT_LT(r.norm(), 1e-12);
+}
+
+TEST(ImuRadarFactor, JacobiansAreCorrectForwardsAndBackwards) {
+  const SyntheticMotion motion;
+  const ImuBuffer imu = motion.imu(0.5, 1.6, 400.0);
+  for (const double t_O : {-0.11, -0.0113, 0.0037, 0.0521, 0.2031}) {
+    const ImuRadarFactor factor(measurement(motion.time(1.0)), motion.time(0.98), imu, 0.25, motion.g_W);
+    // The derivative in t_O is that of the continuous motion, the residual that of 400 Hz samples: 0.5 % apart.
+    expectJacobiansCorrect(factor, {values(moved(motion.state(0.98), 0.05)), {t_O}}, 5e-3, 1e-3);
+    expectJacobiansCorrect(factor, {values(moved(motion.state(0.98), 0.05)), {t_O}}, 5e-3, 1e-3);
+  }
+}
+
+TEST(ImuRadarFactor, ResidualIsZeroAtTheTrueOffset) {
+  const SyntheticMotion motion;
+  const ImuBuffer imu = motion.imu(0.5, 1.6, 400.0);
+  for (const double t_O : {-0.1, 0.0, 0.03, 0.2}) {
+    RadarVelocityMeasurement z = measurement(motion.time(1.0));
+    z.v_R = motion.radarVelocity(1.0 - t_O, z.R_RI, z.l_I);
+    z.covariance.setIdentity();
+    const StateBlock x = motion.state(1.02);
+    const double* blocks[] = {x.data(), &t_O};
+    Eigen::Vector3d r;
+    ImuRadarFactor(z, motion.time(1.02), imu, 0.25, motion.g_W).Evaluate(blocks, r.data(), nullptr);
+    EXPECT_LT(r.norm(), 1e-4) << "offset " << t_O;
+  }
+}
+
+TEST(ConstantOffsetFactor, JacobiansAreCorrect) {
+  expectJacobiansCorrect(ConstantOffsetFactor(3e-3), {{0.01}, {-0.02}}, 1e-6, 1e-3);
+}
+
+TEST(PriorFactor, JacobiansAreCorrect) {
+  NodePrior prior;
+  prior.x0 = SyntheticMotion().state(1.0);
+  prior.t_O0 = 0.02;
+  for (int i = 0; i < kNodeTangent; ++i) {
+    prior.r0(i) = std::sin(0.7 * i);
+    for (int j = 0; j < kNodeTangent; ++j) prior.J(i, j) = std::sin(1.0 + 3.1 * i + 1.7 * j);
+  }
+  expectJacobiansCorrect(PriorFactor(prior), {values(moved(prior.x0, 0.4)), {-0.01}});
+}
+
+}  // namespace
+}  // namespace rio_t

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <ceres/cost_function.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "rio_t/factors/state_block.h"
+
+namespace rio_t {
+
+/// Compares the Jacobians of a factor with central differences on the manifold: blocks of 16 are states, moved with
+/// boxplus; blocks of 1 are offsets. `tolerance` is relative to the largest entry of the block's Jacobian.
+inline void expectJacobiansCorrect(const ceres::CostFunction& cost, std::vector<std::vector<double>> blocks,
+                                   double tolerance = 1e-6, double step = 1e-5) {
+  const int rows = cost.num_residuals();
+  std::vector<const double*> parameters;
+  for (const auto& block : blocks) parameters.push_back(block.data());
+  std::vector<Eigen::Matrix<double, -1, -1, Eigen::RowMajor>> analytic;
+  std::vector<double*> jacobians;
+  for (const auto& block : blocks) analytic.emplace_back(rows, block.size());
+  for (auto& J : analytic) jacobians.push_back(J.data());
+  Eigen::VectorXd r(rows);
+  ASSERT_TRUE(cost.Evaluate(parameters.data(), r.data(), jacobians.data()));
+
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    const bool is_state = blocks[b].size() == StateBlock::kSize;
+    const int tangent = is_state ? StateBlock::kTangent : 1;
+    Eigen::MatrixXd expected(rows, tangent);
+    Eigen::MatrixXd actual(rows, tangent);
+    const std::vector<double> at = blocks[b];
+    for (int i = 0; i < tangent; ++i) {
+      Eigen::VectorXd moved[2] = {Eigen::VectorXd(rows), Eigen::VectorXd(rows)};
+      for (int side = 0; side < 2; ++side) {
+        const double h = side == 0 ? -step : step;
+        if (is_state) {
+          StateTangent delta = StateTangent::Zero();
+          delta(i) = h;
+          boxplus(at.data(), delta.data(), blocks[b].data());
+        } else {
+          blocks[b][0] = at[0] + h;
+        }
+        ASSERT_TRUE(cost.Evaluate(parameters.data(), moved[side].data(), nullptr));
+      }
+      blocks[b] = at;
+      parameters[b] = blocks[b].data();
+      expected.col(i) = (moved[1] - moved[0]) / (2.0 * step);
+      actual.col(i) = analytic[b].col(is_state && i >= 3 ? i + 1 : i);
+    }
+    const double scale = std::max(1.0, expected.cwiseAbs().maxCoeff());
+    EXPECT_LT((actual - expected).cwiseAbs().maxCoeff() / scale, tolerance)
+        << "block " << b << "\nanalytic\n" << actual << "\nnumeric\n" << expected;
+  }
+}
+
+}  // namespace rio_t
