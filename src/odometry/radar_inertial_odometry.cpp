@@ -83,6 +83,7 @@ struct RadarInertialOdometry::Impl {
   FeasibilityCheck feasibility;
   FixedLagSmoother smoother;
   std::deque<RadarScan> waiting_scans;
+  Time initialized_at;
   Time last_used;  ///< stamp of the last scan that went into the window
   std::vector<ImuMeasurement> imu_drained;
 };
@@ -180,6 +181,7 @@ void RadarInertialOdometry::Impl::tryInitialize(const ImuMeasurement& sample) {
     x.b_a() = rest->b_a;
     // A mean over T seconds leaves density / sqrt(T), besides what the bias does by itself.
     smoother.initialize(rest->time, x, options.imu_noise.gyro_density / std::sqrt(rest->duration));
+    initialized_at = rest->time;
     last_used = rest->time;
     const NavigationState state = newestState(smoother.newestCovariance());
     const std::lock_guard<std::mutex> lock(navigation_mutex);
@@ -202,6 +204,7 @@ std::optional<ScanResult> RadarInertialOdometry::Impl::tryScan(const RadarScan& 
   if (smoother.size() == 0) return rejected("before_initialization");
 
   const Time node_time = smoother.nodeTime(scan.stamp);
+  if (node_time < initialized_at) return rejected("before_initialization");
   if (node_time - imu.newest() > kMaxStampAhead) return rejected("stamp_ahead_of_imu");
   if (!imu.covers(node_time + kImuMargin)) {
     if (imu_has_ended) return rejected("imu_not_covering");

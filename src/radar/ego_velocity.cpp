@@ -170,11 +170,13 @@ void heedPrior(const std::vector<Direction>& points, const VelocityPrior& prior,
   inliers = supporters;
 }
 
-/// Covariance at rest. A bin of width q reads zero for every |u . v| < q/2, and reads the same for all points
-/// at once, so more points do not average it away: all that is known is that v lies in the region where every
-/// inlier reads zero. That region lies in the ellipsoid v' M v < q^2/4, M = mean of u u'; a uniform density
-/// over an ellipsoid in 3D has the covariance M^-1 (q^2/4) / 5. False: the directions leave some velocity
-/// unseen.
+/// Covariance at rest, where every inlier reads the zero bin, of width q. Two things bound the velocity:
+/// - a point reads zero only while |u . v| < q/2, and so v lies in the ellipsoid v' M v < q^2/4, M = mean of u u';
+///   a uniform density over an ellipsoid in 3D has the covariance M^-1 (q^2/4) / 5. More points do not help.
+/// - noise of sigma s carries readings over the edge of the bin, the sooner the faster the platform creeps: the
+///   likelihood P(v) that a point reads zero has the curvature -(log P)'' = 2 z phi(z) / (s^2 P(0)) at rest,
+///   z = q / (2 s), for each of the n points (1/s^2 as q goes to 0, nothing where q is much above s).
+/// False: the directions leave some velocity unseen.
 bool restCovariance(const std::vector<Direction>& inliers, const EgoVelocityOptions& o,
                     Eigen::Matrix3d& covariance) {
   Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
@@ -183,9 +185,18 @@ bool restCovariance(const std::vector<Direction>& inliers, const EgoVelocityOpti
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
   eigen.computeDirect(mean);
   if (!(eigen.eigenvalues()[0] * o.max_condition_number > eigen.eigenvalues()[2])) return false;
-  const double q2 = o.doppler_quantization * o.doppler_quantization;
+  const double q = o.doppler_quantization;
+  const double s = o.doppler_sigma;
+  const auto n = static_cast<double>(inliers.size());
+  const double z = s > 0.0 ? q / (2.0 * s) : 0.0;
+  double scale = s * s / n;  // of M^-1; this is without a bin
+  if (q > 0.0) {
+    const double phi = std::exp(-0.5 * z * z) / std::sqrt(2.0 * M_PI);
+    const double curvature = s > 0.0 ? 2.0 * z * phi / (s * s * std::erf(z / std::sqrt(2.0))) : 0.0;
+    scale = 1.0 / (20.0 / (q * q) + n * curvature);
+  }
   covariance = o.zero_velocity_sigma * o.zero_velocity_sigma * Eigen::Matrix3d::Identity() +
-               (q2 / 20.0) * eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
+               scale * eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
                    eigen.eigenvectors().transpose();
   return true;
 }

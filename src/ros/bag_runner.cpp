@@ -185,10 +185,12 @@ class Player {
       }
       if (result.used) {
         ++summary_.scans_used;
-        summary_.final_offset_s = result.time_offset;
-        summary_.final_offset_sigma_s = result.time_offset_sigma;
       } else if (!result.rejected_because.empty()) {
         ++summary_.scans_rejected[result.rejected_because];
+      }
+      if (result.updated) {
+        summary_.final_offset_s = result.time_offset;
+        summary_.final_offset_sigma_s = result.time_offset_sigma;
       }
     }
   }

@@ -44,6 +44,15 @@ void listFrames(ParameterList& list, Config& c) {
   list.text("base_link_frame", c.base_link_frame, "frame of the IMU");
   list.text("radar_frame", c.radar_frame, "frame of the radar: x right, y forward, z up");
   list.boolean("publish_tf", c.publish_tf, "publish odom_frame -> base_link_frame; live node only");
+  list.boolean("invert_tf", c.invert_tf,
+               "publish base_link_frame -> odom_frame instead, where base_link_frame has another parent");
+}
+
+void listLiveNode(ParameterList& list, Config& c) {
+  list.group("Live node");
+  list.integer("path_max_poses", between(1, 1e6), c.path_max_poses, "of ~path, the newest ones");
+  list.text("trajectory_file", c.trajectory_file,
+            "TUM file that ~save_trajectory writes; a relative path counts from the node's working folder");
 }
 
 void listPointCloud(ParameterList& list, Config& c) {
@@ -74,6 +83,10 @@ void listPointCloud(ParameterList& list, Config& c) {
 
 void listExtrinsics(ParameterList& list, Config& c) {
   list.group("T_IR: pose of the radar (x right, y forward, z up) in the IMU frame");
+  list.choice<ExtrinsicsSource>(
+      "extrinsics_source", {{"parameters", ExtrinsicsSource::kParameters}, {"tf", ExtrinsicsSource::kTf}},
+      c.extrinsics_source,
+      "the two below, or tf (live node only): from the cloud's frame_id, with the cloud's axes, to base_link_frame");
   list.vector3("extrinsics_translation", "m", between(-100, 100), c.odometry.T_IR.l_I,
                "origin of the radar in the IMU frame, x, y, z");
   list.rotation("extrinsics_rotation_xyzw", c.odometry.T_IR.q_IR, "turns radar vectors into the IMU frame");
@@ -110,6 +123,21 @@ void listInitialization(ParameterList& list, Config& c) {
               "difference of the mean accelerometer's norm from gravity");
 }
 
+void listRest(ParameterList& list, Config& c) {
+  RestOptions& rest = c.odometry.rest;
+  list.group("Rest on the way, as the IMU sees it");
+  list.boolean("rest_enabled", rest.enabled, "hold velocity and angular rate at zero while at rest");
+  list.number("rest_window", "s", above(0), rest.window, "that the platform must have been still for");
+  list.number("rest_max_gyro_std", "rad/s", above(0), rest.max_gyro_std, "of an axis over the window");
+  list.number("rest_max_accel_std", "m/s^2", above(0), rest.max_accel_std, "of an axis over the window");
+  list.number("rest_max_rate", "rad/s", above(0), rest.max_rate, "mean gyro without bias");
+  list.number("rest_max_accel_error", "m/s^2", above(0), rest.max_accel_error,
+              "mean accelerometer without bias and gravity");
+  list.number("rest_max_speed", "m/s", above(0), rest.max_speed,
+              "estimated; faster, stillness is a smooth ride and not rest");
+  list.number("rest_velocity_sigma", "m/s", above(0), rest.velocity_sigma, "of the zero velocity, per axis");
+}
+
 void listEgoVelocity(ParameterList& list, Config& c) {
   EgoVelocityOptions& radar = c.odometry.ego_velocity;
   list.group("Radar: which points count, and the velocity from them");
@@ -140,6 +168,8 @@ void listEgoVelocity(ParameterList& list, Config& c) {
                "one velocity has three unknowns, the others are witnesses");
   list.number("ego_velocity_min_inlier_fraction", "", between(0, 1), radar.min_inlier_fraction,
               "of the points that count; fewer agree by chance");
+  list.number("ego_velocity_prior_min_inlier_fraction", "", between(0, 1), radar.prior_min_inlier_fraction,
+              "likewise, for points that agree with what the IMU predicts");
   list.choice<EgoVelocitySolver>(
       "ego_velocity_solver",
       {{"ls", EgoVelocitySolver::kLeastSquares}, {"eiv", EgoVelocitySolver::kErrorsInVariables}},
@@ -197,6 +227,12 @@ void listSmoother(ParameterList& list, Config& c) {
   list.number("huber_threshold", "", atLeast(0), smoother.huber_threshold,
               "on the norm of the whitened radar residual; 0: no robust loss");
   list.integer("max_iterations", between(1, 1000), smoother.max_iterations, "of the solver, each scan");
+  list.number("innovation_gate", "", atLeast(0), smoother.innovation_gate,
+              "standard deviations from the IMU's prediction; farther, a scan is rejected; 0: no gate");
+  list.number("innovation_model_error", "m/s", atLeast(0), smoother.innovation_model_error,
+              "per axis, added to that prediction in the gate only: what extrinsics and IMU scale are wrong");
+  list.number("innovation_gate_timeout", "s", above(0), smoother.innovation_gate_timeout,
+              "without a scan, after which the next is taken all the same");
   list.number("prior_sigma_orientation", "rad", above(0), smoother.prior_sigma_orientation,
               "of the first state: roll and pitch");
   list.number("prior_sigma_yaw", "rad", above(0), smoother.prior_sigma_yaw,
@@ -231,10 +267,12 @@ ParameterList parametersOf(Config& config) {
   listExtrinsics(list, config);
   listImu(list, config);
   listInitialization(list, config);
+  listRest(list, config);
   listEgoVelocity(list, config);
   listFeasibility(list, config);
   listTimeOffset(list, config);
   listSmoother(list, config);
+  listLiveNode(list, config);
   listBag(list, config);
   return list;
 }

@@ -177,7 +177,7 @@ void RunOutput::addResult(const ScanResult& result) {
            std::to_string(result.ego_velocity.points_used) + ',' +
            (result.used ? toString(result.ego_velocity.status) : result.rejected_because);
   ego_velocity_.endLine();
-  if (!result.used) return;
+  if (!result.updated) return;
 
   line = &time_offset_.buffer;
   appendStamp(line, result.scan.stamp);

@@ -18,6 +18,12 @@ enum class StampSource {
 };
 std::string toString(StampSource source);
 
+/// Where the live node takes T_IR from.
+enum class ExtrinsicsSource {
+  kParameters,  ///< "parameters": extrinsics_translation and extrinsics_rotation_xyzw
+  kTf,          ///< "tf": the transform from the cloud's frame_id to base_link_frame
+};
+
 /// What is changed of the preset `radar_format`. Empty text and a sign of zero leave it as it is.
 struct PointCloudOverrides {
   std::string coordinates;
@@ -45,6 +51,11 @@ struct Config {
   std::string base_link_frame = "base_link";
   std::string radar_frame = "radar";
   bool publish_tf = true;
+  bool invert_tf = false;
+  std::size_t path_max_poses = 2000;
+  std::string trajectory_file = "rio_t_trajectory.txt";
+
+  ExtrinsicsSource extrinsics_source = ExtrinsicsSource::kParameters;
 
   std::string radar_format = "irs";
   PointCloudOverrides radar_overrides;

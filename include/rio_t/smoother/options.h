@@ -19,10 +19,10 @@ struct SmootherOptions {
   double innovation_gate_timeout = 3.0;  ///< [s] without a scan after which the next is taken all the same
 
   bool estimate_time_offset = true;    ///< false: LC-RIO, offset fixed at time_offset_initial
-  TimeOffsetModel time_offset_model = TimeOffsetModel::kConstantAcceleration;
+  TimeOffsetModel time_offset_model = TimeOffsetModel::kImu;
   double time_offset_initial = 0.0;    ///< [s]
   double time_offset_sigma = 0.075;    ///< [s] prior
-  double time_offset_noise = 1.0e-3;   ///< [s/sqrt(s)] random walk of the offset
+  double time_offset_noise = 1.0e-4;   ///< [s/sqrt(s)] random walk of the offset
   double max_time_offset = 0.25;       ///< [s] bound on |t_O|
 
   double prior_sigma_orientation = 0.02;  ///< [rad] roll and pitch of the first state
