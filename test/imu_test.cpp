@@ -1,0 +1,246 @@
+// Buffer, preintegration, static initialisation, rest.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "rio_t/core/so3.h"
+#include "rio_t/imu/buffer.h"
+#include "rio_t/imu/preintegration.h"
+#include "rio_t/imu/rest_detector.h"
+#include "rio_t/imu/static_initializer.h"
+#include "synthetic_motion.h"
+
+namespace rio_t {
+namespace {
+
+/// Deterministic noise of unit variance: a sum of twelve uniforms, the same with every standard library.
+class Noise {
+ public:
+  double operator()() {
+    double sum = -6.0;
+    for (int i = 0; i < 12; ++i) sum += static_cast<double>(engine_()) / 4294967296.0;
+    return sum;
+  }
+  Eigen::Vector3d vector() {
+    const double x = (*this)(), y = (*this)(), z = (*this)();
+    return {x, y, z};
+  }
+
+ private:
+  std::mt19937 engine_{7};
+};
+
+TEST(ImuBuffer, InterpolatesBetweenSamplesAndHoldsTheEnds) {
+  ImuBuffer buffer;
+  buffer.add({Time::fromSeconds(1.0), {1, 0, 0}, {0, 0, 0}});
+  buffer.add({Time::fromSeconds(2.0), {3, 0, 0}, {0, 4, 0}});
+  EXPECT_DOUBLE_EQ(buffer.at(Time::fromSeconds(1.25)).angular_velocity.x(), 1.5);
+  EXPECT_DOUBLE_EQ(buffer.at(Time::fromSeconds(1.25)).acceleration.y(), 1.0);
+  EXPECT_DOUBLE_EQ(buffer.at(Time::fromSeconds(0.0)).angular_velocity.x(), 1.0);
+  EXPECT_DOUBLE_EQ(buffer.at(Time::fromSeconds(9.0)).angular_velocity.x(), 3.0);
+  EXPECT_EQ(buffer.at(Time::fromSeconds(1.25)).time, Time::fromSeconds(1.25));
+}
+
+TEST(ImuBuffer, RefusesASampleThatIsNotLater) {
+  ImuBuffer buffer;
+  buffer.add({Time::fromSeconds(1.0), {}, {}});
+  EXPECT_THROW(buffer.add({Time::fromSeconds(1.0), {}, {}}), std::invalid_argument);
+}
+
+TEST(ImuBuffer, DroppingKeepsWhatInterpolationNeeds) {
+  ImuBuffer buffer;
+  for (int i = 0; i < 10; ++i) buffer.add({Time::fromSeconds(i), {static_cast<double>(i), 0, 0}, {}});
+  buffer.dropBefore(Time::fromSeconds(4.5));
+  EXPECT_EQ(buffer.oldest(), Time::fromSeconds(4.0));
+  EXPECT_DOUBLE_EQ(buffer.at(Time::fromSeconds(4.5)).angular_velocity.x(), 4.5);
+}
+
+TEST(ImuBuffer, IntervalsCoverTheSpanBothWays) {
+  const ImuBuffer buffer = SyntheticMotion().imu(0.0, 1.0, 100.0);
+  const SyntheticMotion motion;
+  double forward = 0.0, backward = 0.0;
+  int steps = 0;
+  buffer.forEachInterval(motion.time(0.1234), motion.time(0.5678), [&](double dt, const auto&, const auto&) {
+    EXPECT_GT(dt, 0.0);
+    forward += dt;
+    ++steps;
+  });
+  buffer.forEachInterval(motion.time(0.5678), motion.time(0.1234), [&](double dt, const auto&, const auto&) {
+    EXPECT_LT(dt, 0.0);
+    backward += dt;
+  });
+  EXPECT_NEAR(forward, 0.4444, 1e-9);
+  EXPECT_NEAR(backward, -0.4444, 1e-9);
+  EXPECT_EQ(steps, 45);
+}
+
+TEST(Preintegration, AgreesWithDenseIntegration) {
+  // 400 Hz against 20 kHz of the same motion: what is left is the error of the midpoint rule.
+  const SyntheticMotion motion;
+  const Preintegration coarse = preintegrate(motion.imu(0.0, 1.0, 400.0), motion.time(0.1), motion.time(0.9),
+                                             motion.b_g, motion.b_a, ImuNoise());
+  const Preintegration dense = preintegrate(motion.imu(0.0, 1.0, 20000.0), motion.time(0.1), motion.time(0.9),
+                                            motion.b_g, motion.b_a, ImuNoise());
+  EXPECT_NEAR(coarse.delta.dt, 0.8, 1e-9);
+  EXPECT_LT(so3::log(coarse.delta.dR.conjugate() * dense.delta.dR).norm(), 1e-5);
+  EXPECT_LT((coarse.delta.dv - dense.delta.dv).norm(), 1e-4);
+  EXPECT_LT((coarse.delta.dp - dense.delta.dp).norm(), 1e-4);
+}
+
+TEST(Preintegration, ForwardThenBackwardIsTheIdentity) {
+  const SyntheticMotion motion;
+  const ImuBuffer imu = motion.imu(0.0, 1.0, 400.0);
+  ImuDelta delta;
+  const auto step = [&](double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
+    delta.step(dt, gyro - motion.b_g, accel - motion.b_a);
+  };
+  imu.forEachInterval(motion.time(0.2), motion.time(0.7), step);
+  imu.forEachInterval(motion.time(0.7), motion.time(0.2), step);
+  EXPECT_NEAR(delta.dt, 0.0, 1e-12);
+  EXPECT_LT(so3::log(delta.dR).norm(), 1e-12);
+  EXPECT_LT(delta.dv.norm(), 1e-12);
+  EXPECT_LT(delta.dp.norm(), 1e-12);
+}
+
+TEST(Preintegration, BiasJacobiansPredictReintegration) {
+  const SyntheticMotion motion;
+  const ImuBuffer imu = motion.imu(0.0, 1.0, 400.0);
+  const auto at = [&](const Eigen::Vector3d& d_bg, const Eigen::Vector3d& d_ba) {
+    return preintegrate(imu, motion.time(0.1), motion.time(0.9), motion.b_g + d_bg, motion.b_a + d_ba, ImuNoise()).delta;
+  };
+  const ImuDelta delta = at(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+  const double h = 1e-5;
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d d = h * Eigen::Vector3d::Unit(i);
+    const ImuDelta g_plus = at(d, Eigen::Vector3d::Zero()), g_minus = at(-d, Eigen::Vector3d::Zero());
+    const ImuDelta a_plus = at(Eigen::Vector3d::Zero(), d), a_minus = at(Eigen::Vector3d::Zero(), -d);
+    EXPECT_LT((so3::log(g_minus.dR.conjugate() * g_plus.dR) / (2 * h) - delta.dR_dbg.col(i)).norm(), 1e-7);
+    EXPECT_LT(((g_plus.dv - g_minus.dv) / (2 * h) - delta.dv_dbg.col(i)).norm(), 1e-6);
+    EXPECT_LT(((g_plus.dp - g_minus.dp) / (2 * h) - delta.dp_dbg.col(i)).norm(), 1e-6);
+    EXPECT_LT(((a_plus.dv - a_minus.dv) / (2 * h) - delta.dv_dba.col(i)).norm(), 1e-7);
+    EXPECT_LT(((a_plus.dp - a_minus.dp) / (2 * h) - delta.dp_dba.col(i)).norm(), 1e-7);
+  }
+}
+
+TEST(Preintegration, CovarianceIsThatOfManyNoisyRuns) {
+  const SyntheticMotion motion;
+  ImuNoise noise;
+  noise.gyro_density = 2e-3;
+  noise.accel_density = 2e-2;
+  const double rate = 100.0;
+  const ImuBuffer clean = motion.imu(0.0, 0.5, rate);
+  const Preintegration expected =
+      preintegrate(clean, motion.time(0.0), motion.time(0.5), motion.b_g, motion.b_a, noise);
+  Noise draw;
+  Eigen::Matrix<double, 9, 9> sum = Eigen::Matrix<double, 9, 9>::Zero();
+  const int runs = 2000;
+  for (int run = 0; run < runs; ++run) {
+    ImuBuffer noisy;
+    clean.forEachSample(motion.time(-1.0), motion.time(1.0), [&](ImuMeasurement sample) {
+      sample.angular_velocity += noise.gyro_density * std::sqrt(rate) * draw.vector();
+      sample.acceleration += noise.accel_density * std::sqrt(rate) * draw.vector();
+      noisy.add(sample);
+    });
+    const Preintegration p = preintegrate(noisy, motion.time(0.0), motion.time(0.5), motion.b_g, motion.b_a, noise);
+    Eigen::Matrix<double, 9, 1> e;
+    e << so3::log(expected.delta.dR.conjugate() * p.delta.dR), p.delta.dp - expected.delta.dp,
+        p.delta.dv - expected.delta.dv;
+    sum += e * e.transpose();
+  }
+  // Whitened, the sample covariance is the identity up to its own spread, 1/sqrt(runs) = 2 % an entry, and up to the
+  // end samples, which the trapezoid counts half: 1 % at 50 samples.
+  Eigen::Matrix<double, 9, 9> whitening = Eigen::Matrix<double, 9, 9>::Identity();
+  expected.covariance.llt().matrixL().solveInPlace(whitening);
+  const Eigen::Matrix<double, 9, 9> whitened = whitening * (sum / runs) * whitening.transpose();
+  EXPECT_LT((whitened - Eigen::Matrix<double, 9, 9>::Identity()).cwiseAbs().maxCoeff(), 0.15) << whitened;
+}
+
+TEST(Levelling, AnyMountingPutsGravityDown) {
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double sign : {1.0, -1.0}) {
+      const Eigen::Vector3d f_I = sign * 9.81 * Eigen::Vector3d::Unit(axis);
+      EXPECT_LT((levelingRotation(f_I) * f_I - Eigen::Vector3d(0, 0, 9.81)).norm(), 1e-9) << axis << " " << sign;
+    }
+  }
+}
+
+StaticInitializerOptions twoSeconds() {
+  StaticInitializerOptions options;
+  options.duration = 2.0;
+  return options;
+}
+
+/// Feeds `seconds` of rest with noise; the result, if it came.
+std::optional<StaticInitialization> feed(StaticInitializer& initializer, double from, double seconds,
+                                         const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel,
+                                         double extra = 0.0) {
+  Noise draw;
+  for (int i = 0; i < static_cast<int>(seconds * 200.0); ++i) {
+    const double t = from + i / 200.0;
+    const auto result = initializer.add({Time::fromSeconds(t), gyro + (0.002 + extra) * draw.vector(),
+                                         accel + 0.02 * draw.vector()});
+    if (result) return result;
+  }
+  return std::nullopt;
+}
+
+TEST(StaticInitializer, SixMountingsWithBias) {
+  const Eigen::Vector3d b_g(0.01, -0.02, 0.005);
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double sign : {1.0, -1.0}) {
+      StaticInitializer initializer(twoSeconds(), 9.81);
+      const Eigen::Vector3d up_I = sign * Eigen::Vector3d::Unit(axis);
+      const auto result = feed(initializer, 100.0, 3.0, b_g, 9.91 * up_I);
+      ASSERT_TRUE(result) << initializer.waitingFor();
+      EXPECT_LT((result->q_WI * up_I - Eigen::Vector3d::UnitZ()).norm(), 1e-3);
+      EXPECT_LT((result->b_g - b_g).norm(), 5e-4);
+      EXPECT_LT((result->b_a - 0.1 * up_I).norm(), 5e-3);
+      EXPECT_NEAR(result->duration, 2.0, 0.01);
+    }
+  }
+}
+
+TEST(StaticInitializer, SaysWhatItWaitsForAndRecoversFromMotion) {
+  StaticInitializer initializer(twoSeconds(), 9.81);
+  EXPECT_FALSE(feed(initializer, 0.0, 4.0, Eigen::Vector3d::Zero(), {0, 0, 9.81}, 0.3));
+  EXPECT_NE(initializer.waitingFor().find("gyro moves"), std::string::npos) << initializer.waitingFor();
+  EXPECT_TRUE(feed(initializer, 4.0, 5.0, Eigen::Vector3d::Zero(), {0, 0, 9.81}));
+}
+
+TEST(StaticInitializer, NamesWrongUnits) {
+  StaticInitializer in_g(twoSeconds(), 9.81);
+  EXPECT_FALSE(feed(in_g, 0.0, 3.0, Eigen::Vector3d::Zero(), {0, 0, 1.0}));
+  EXPECT_NE(in_g.waitingFor().find("not in m/s^2"), std::string::npos) << in_g.waitingFor();
+  StaticInitializer turning(twoSeconds(), 9.81);
+  EXPECT_FALSE(feed(turning, 0.0, 3.0, {0, 0, 0.5}, {0, 0, 9.81}));
+  EXPECT_NE(turning.waitingFor().find("not in rad/s"), std::string::npos) << turning.waitingFor();
+}
+
+ImuBuffer still(const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
+  ImuBuffer buffer;
+  Noise draw;
+  for (int i = 0; i <= 200; ++i) {
+    buffer.add({Time::fromSeconds(i / 200.0), gyro + 0.002 * draw.vector(), accel + 0.02 * draw.vector()});
+  }
+  return buffer;
+}
+
+TEST(Rest, IsSeenAndToldFromMotion) {
+  RestContext context;
+  context.g_W = {0, 0, -9.81};
+  context.b_g = {0.01, 0, 0};
+  const Time end = Time::fromSeconds(1.0);
+  EXPECT_TRUE(isAtRest(still({0.01, 0, 0}, {0, 0, 9.81}), end, context, RestOptions()));
+  EXPECT_FALSE(isAtRest(still({0.01, 0, 0.01}, {0, 0, 9.81}), end, context, RestOptions())) << "turning";
+  EXPECT_FALSE(isAtRest(still({0.01, 0, 0}, {0.3, 0, 9.81}), end, context, RestOptions())) << "speeding up";
+  RestContext riding = context;
+  riding.v_W = {1.0, 0, 0};
+  EXPECT_FALSE(isAtRest(still({0.01, 0, 0}, {0, 0, 9.81}), end, riding, RestOptions())) << "a smooth ride";
+  RestOptions off;
+  off.enabled = false;
+  EXPECT_FALSE(isAtRest(still({0.01, 0, 0}, {0, 0, 9.81}), end, context, off));
+}
+
+}  // namespace
+}  // namespace rio_t

@@ -1,0 +1,124 @@
+// The whole pipeline without ROS: faults of the input, causality, repeatability.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "rio_t/odometry/radar_inertial_odometry.h"
+
+namespace rio_t {
+namespace {
+
+/// At rest on the ground: gravity up, no rotation.
+ImuMeasurement restSample(double t) { return {Time::fromSeconds(t), Eigen::Vector3d::Zero(), {0.0, 0.0, 9.81}}; }
+
+RadarScan restScan(double t) {
+  RadarScan scan;
+  scan.stamp = Time::fromSeconds(t);
+  for (int i = 0; i < 20; ++i) {
+    scan.points.push_back({{3.0 * std::sin(0.3 * i), 4.0, std::cos(1.7 * i)}, 0.0, 20.0});
+  }
+  return scan;
+}
+
+class AtRest : public ::testing::Test {
+ protected:
+  AtRest() : odometry(OdometryOptions()) {}
+  /// Feeds rest at 200 Hz up to `until`; the results of the scans finished on the way.
+  std::vector<ScanResult> run(double until) {
+    std::vector<ScanResult> results;
+    for (; time < until - 1e-6; time += 0.005) {
+      if (const auto state = odometry.addImu(restSample(time))) states.push_back(*state);
+      for (ScanResult& result : odometry.process()) results.push_back(std::move(result));
+    }
+    return results;
+  }
+  RadarInertialOdometry odometry;
+  double time = 100.0;
+  std::vector<NavigationState> states;
+};
+
+TEST_F(AtRest, SaysWhatItWaitsForThenStaysWhereItIs) {
+  run(101.0);
+  EXPECT_FALSE(odometry.initialized());
+  EXPECT_NE(odometry.waitingFor().find("standing still"), std::string::npos) << odometry.waitingFor();
+  run(104.0);
+  ASSERT_TRUE(odometry.initialized());
+  for (int i = 0; i < 20; ++i) {
+    odometry.addScan(restScan(time - 0.05));
+    for (const ScanResult& result : run(time + 0.1)) EXPECT_TRUE(result.used) << result.rejected_because;
+  }
+  EXPECT_LT(states.back().p_W.norm(), 1e-3);
+  EXPECT_EQ(states.back().time, Time::fromSeconds(time - 0.005));
+}
+
+TEST_F(AtRest, AScanWaitsUntilTheImuCoversIt) {
+  run(104.0);
+  odometry.addScan(restScan(104.1));
+  EXPECT_TRUE(odometry.process().empty());
+  EXPECT_TRUE(run(104.1).empty());
+  const auto results = run(104.2);
+  ASSERT_EQ(results.size(), 1u);
+  EXPECT_TRUE(results[0].used) << results[0].rejected_because;
+}
+
+TEST_F(AtRest, EveryScanIsAccountedFor) {
+  odometry.addScan(restScan(100.0));
+  EXPECT_EQ(run(100.1).at(0).rejected_because, "before_initialization");
+  run(104.0);
+  odometry.addScan(restScan(100.0));
+  EXPECT_EQ(run(104.1).at(0).rejected_because, "before_initialization");
+  odometry.addScan(restScan(110.0));
+  EXPECT_EQ(run(104.2).at(0).rejected_because, "stamp_ahead_of_imu");
+  RadarScan empty;
+  empty.stamp = Time::fromSeconds(104.15);
+  odometry.addScan(empty);
+  EXPECT_EQ(run(104.3).at(0).rejected_because, "too_few_points");
+  odometry.addScan(restScan(104.2));
+  odometry.addScan(restScan(104.2));
+  const auto twice = run(104.4);
+  ASSERT_EQ(twice.size(), 2u);
+  EXPECT_TRUE(twice[0].used);
+  EXPECT_EQ(twice[1].rejected_because, "duplicate_stamp");
+  odometry.addScan(restScan(104.9));
+  EXPECT_TRUE(run(104.5).empty());
+  EXPECT_EQ(odometry.finish().at(0).rejected_because, "imu_not_covering");
+}
+
+TEST_F(AtRest, TooManyWaitingScansAreReportedNotLost) {
+  run(104.0);
+  OdometryOptions options;
+  std::size_t finished = 0;
+  for (std::size_t i = 0; i < options.max_queued_scans + 3; ++i) {
+    odometry.addScan(restScan(104.2 + 1e-3 * static_cast<double>(i)));
+    for (const ScanResult& result : odometry.process()) {
+      EXPECT_EQ(result.rejected_because, "queue_full");
+      ++finished;
+    }
+  }
+  EXPECT_EQ(finished, 3u);
+}
+
+TEST_F(AtRest, BadImuSamplesAreDroppedAndCounted) {
+  run(104.0);
+  EXPECT_FALSE(odometry.addImu(restSample(103.0)));
+  ImuMeasurement bad = restSample(time);
+  bad.acceleration.x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(odometry.addImu(bad));
+  EXPECT_TRUE(odometry.addImu(restSample(time + 0.5)));
+  const auto faults = odometry.faults();
+  EXPECT_EQ(faults.at("imu_out_of_order"), 1u);
+  EXPECT_EQ(faults.at("imu_not_finite"), 1u);
+  EXPECT_EQ(faults.at("imu_gap"), 1u);
+}
+
+TEST_F(AtRest, UncertaintyGrowsWithoutRadar) {
+  run(104.0);
+  const double before = states.back().covariance(3, 3);
+  run(109.0);
+  EXPECT_GT(states.back().covariance(3, 3), 100.0 * before);
+  EXPECT_TRUE(states.back().covariance.allFinite());
+}
+
+}  // namespace
+}  // namespace rio_t
