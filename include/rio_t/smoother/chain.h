@@ -8,7 +8,7 @@
 #include "rio_t/factors/prior_factor.h"
 
 /// The linearised window: a chain of nodes in which each factor touches one node or two neighbours.
-/// Marginalisation and covariance are block elimination along this chain (docs/method.md, eq. 19-24).
+/// Marginalisation and covariance are block elimination along this chain (docs/method.md, eq. 23-27).
 namespace rio_t {
 
 /// Normal equations H delta = -b of the chain.

@@ -4,7 +4,7 @@ namespace rio_t {
 
 /// How the radar factor accounts for the time between stamp and measurement.
 enum class TimeOffsetModel {
-  kConstantAcceleration,  ///< the paper's eq. (5): one acceleration sample times t_O; states at the stamps
+  kConstantAcceleration,  ///< the paper's eq. (4)-(5): one acceleration sample times t_O; states at the stamps
   kImu,                   ///< the IMU itself over the shift; states at the estimated measurement times
 };
 
