@@ -20,7 +20,8 @@ struct RadarVelocityMeasurement {
   Eigen::Vector3d l_I = Eigen::Vector3d::Zero();            ///< radar origin in I [m]
 };
 
-/// The paper's model, eq. (4)-(5) (docs/method.md, eq. 13): one acceleration for the whole shift. Blocks: state at the stamp, t_O.
+/// The paper's model, eq. (4)-(5) (docs/method.md, eq. 13): one acceleration stands for the whole shift.
+/// Blocks: state at the stamp, t_O.
 ///   h = R_RI (R_IW v_W + (omega - b_g) x l - t_O a_c),   a_c = a - b_a + R_IW g_W,
 /// with the IMU sample (omega, a) at the stamp. Residual: h - z, whitened.
 class ConstantAccelerationRadarFactor final : public ceres::SizedCostFunction<3, StateBlock::kSize, 1> {
