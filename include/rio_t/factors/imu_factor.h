@@ -10,8 +10,8 @@ namespace rio_t {
 
 /// Preintegrated IMU between the states i and j, with bias random walk. Blocks: state i, state j.
 ///
-/// docs/method.md, eq. 12; paper eq. (11); Forster et al. eq. (45). With d = b_i - b at integration and T the time
-/// between:
+/// docs/method.md, eq. 12; paper eq. (11); Forster et al. eq. (45). With d = b_i - b at integration and T the
+/// time between:
 ///   e_R  = Log((dR Exp(dR_dbg d_g))^T R_i^T R_j)
 ///   e_p  = R_i^T (p_j - p_i - v_i T - g T^2 / 2) - (dp + dp_dbg d_g + dp_dba d_a)
 ///   e_v  = R_i^T (v_j - v_i - g T) - (dv + dv_dbg d_g + dv_dba d_a)
