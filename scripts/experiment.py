@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The paper's experiments on simulated or given bags: tables as Markdown and CSV, figures as PNG.
 
-  shifts      stamps shifted by 0, 2.5, ... 15 ms: the estimate must follow (Fig. 4); also arrival against trigger stamps
+  shifts      stamps shifted by 0, 2.5, ... 15 ms: the estimate must follow (Fig. 4); arrival against trigger stamps
   delay       100 ms of delay in passes, each starting from the estimate of the one before
   table1      RIO-T against LC-RIO, which does not estimate the offset (Table I)
   table2      LC-RIO with the stamps of the bag and with stamps corrected by RIO-T's estimate (Table II)
@@ -35,9 +35,9 @@ DEFAULT_SHIFTS = [2.5 * i for i in range(7)]  # ms
 DELAY, PASSES = 100.0, 3                      # ms
 # ms; the middle of the 18.5 ms frame that an IRS stamp begins, and two delays of systems without a trigger.
 FRAME_OFFSET, DELAYED_OFFSETS = -9.25, (30.0, 100.0)
-DEFAULT_MOTIONS = {"shifts": ["difficult"], "delay": ["difficult"], "table1": ["easy", "medium", "difficult", "gym_loop"],
-                   "table2": ["easy", "medium", "difficult", "gym_loop"],
-                   "montecarlo": ["easy", "medium", "difficult"]}
+HANDHELD = ["easy", "medium", "difficult"]
+DEFAULT_MOTIONS = {"shifts": ["difficult"], "delay": ["difficult"], "table1": HANDHELD + ["gym_loop"],
+                   "table2": HANDHELD + ["gym_loop"], "montecarlo": HANDHELD}
 # What an experiment varies itself.
 OWN_KEYS = ("time_offset_model", "estimate_time_offset", "radar_stamp_shift")
 NORMAL_95 = 1.959964
@@ -258,8 +258,10 @@ class Page:
             figure.savefig(folder / file_name, dpi=120, bbox_inches="tight")
             text.append(f"![{file_name}]({file_name})")
         (folder / f"{name}.md").write_text("\n\n".join(text) + "\n")
-        print("\n\n".join(f"{table.title}\n{table.markdown()}" for table in self.tables))
-        print(f"\nin {folder}: {', '.join([f'{name}.md'] + [t.name + '.csv' for t in self.tables] + [f for _, f in self.figures])}")
+        shown = [table for table in self.tables if not table.name.endswith("_runs")]
+        print("\n\n".join(f"{table.title}\n{table.markdown()}" for table in shown))
+        files = [f"{name}.md"] + [f"{table.name}.csv" for table in self.tables] + [file for _, file in self.figures]
+        print(f"\nin {folder}: {', '.join(files)}")
 
 
 def plots():
@@ -279,26 +281,25 @@ def tidy(axes, x_label, y_label):
 
 
 def draw_curves(source, panels):
-    """`panels`: for each model (name, [(label, Run, added to the estimate, end it should reach or None)])."""
+    """`panels`: for each model (name, [(label, Run, added to the estimate, end it should reach)])."""
     plt = plots()
     figure, axes = plt.subplots(1, len(panels), figsize=(6 * len(panels), 4.6), sharey=True, squeeze=False)
     colours = plt.get_cmap("viridis")
-    ends = [v for _, curves in panels for _, run, added, goal in curves for v in (run.offset + added, goal) if v is not None]
+    ends = [v for _, curves in panels for _, run, added, goal in curves for v in (run.offset + added, goal)]
     for axis, (model, curves) in zip(axes[0], panels):
         begin = min(run.curve[0][0] for _, run, _, _ in curves)
         for i, (label, run, added, goal) in enumerate(curves):
             colour = colours(0.9 * i / max(1, len(curves) - 1))
-            axis.plot([t - begin for t, _, _ in run.curve], [offset + added for _, offset, _ in run.curve], color=colour,
-                      linewidth=1.4, label=label)
-            if goal is not None:
-                axis.axhline(goal, color=colour, linewidth=0.9, linestyle=":")
+            # Wide below, narrow above: passes that agree lie on each other.
+            axis.plot([t - begin for t, _, _ in run.curve], [offset + added for _, offset, _ in run.curve],
+                      color=colour, linewidth=max(1.2, 3.6 - 1.2 * i), label=label)
+            axis.axhline(goal, color=colour, linewidth=0.9, linestyle=":")
         axis.set_title(model, loc="left", fontsize=10)
         tidy(axis, "time [s]", "time offset [ms]" if axis is axes[0][0] else "")
     margin = 0.35 * max(max(ends) - min(ends), 5.0)
     axes[0][0].set_ylim(min(ends) - margin, max(ends) + margin)
     axes[0][-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
-    dotted = "dotted: the value to be reached"
-    figure.suptitle(source.name + (f", seed {source.seed}" if source.seed is not None else "") + "; " + dotted, fontsize=10)
+    figure.suptitle(f"{label_of(source)}; dotted: the value to be reached", fontsize=10)
     return figure
 
 
@@ -341,7 +342,6 @@ def stamps_apart(trigger, arrival):
 
 def shifts(lab, sources, options):
     values = options.shifts
-    kinds = [(f"{shift:g}", {"radar_stamp_shift": seconds(shift)}) for shift in values]
     work, keys = [], []
     for source in sources:
         for model in MODELS:
@@ -354,7 +354,8 @@ def shifts(lab, sources, options):
     runs = dict(zip(keys, lab.map(work)))
 
     page = Page("Estimate of the time offset under shifted stamps")
-    page.notes.append(f"shifts {', '.join(label for label, _ in kinds)} ms are added to the stamps of the radar (radar_stamp_shift)")
+    page.notes.append(f"shifts {', '.join(f'{shift:g}' for shift in values)} ms are added to the stamps of the radar "
+                      "(radar_stamp_shift)")
     page.notes.append("the paper's mean step is 2.37 ms for shifts of 2.5 ms")
     rows, single, arrival_rows = [], [], []
     for source in sources:
@@ -420,10 +421,11 @@ def delay(lab, sources, options):
         return function
 
     keys = [(source, model) for source in sources for model in MODELS]
-    results = lab.map([(source, PASSES + (source.offset is None), passes(model, source.offset)) for source, model in keys])
+    results = lab.map([(source, PASSES + (source.offset is None), passes(model, source.offset))
+                       for source, model in keys])
     page = Page("A delay of 100 ms in passes")
-    page.notes.append("stamps are shifted so that the whole offset is 100 ms; each pass takes the estimates of the passes "
-                      "before off the stamps (radar_stamp_shift)")
+    page.notes.append("stamps are shifted so that the whole offset is 100 ms; each pass takes the estimates of the "
+                      "passes before off the stamps (radar_stamp_shift)")
     page.notes.append("paper: 66.2, 94.3 and 99.5 ms after passes 1, 2 and 3")
     rows = []
     for (source, model), (start, runs) in zip(keys, results):
@@ -457,8 +459,8 @@ def percent(new, old):
 
 def need_truth(source, run):
     if "ate_m" not in run.summary:
-        raise ExperimentError(f"{source.bag}: no ground truth in the bag; name its topic with --set ground_truth_topic=..., "
-                              "or a TUM file with --set ground_truth=FILE")
+        raise ExperimentError(f"{source.bag}: no ground truth in the bag; name its topic with "
+                              "--set ground_truth_topic=..., or a TUM file with --set ground_truth=FILE")
 
 
 def compared_table(names, baseline, methods, runs):
@@ -481,7 +483,8 @@ def compared_table(names, baseline, methods, runs):
 
 
 def runs_table(name, keys, results):
-    rows = [[source.name, seed_text(source.seed), fixed(source.offset, 2), method, fixed(run.offset, 3), fixed(run.sigma, 3)] +
+    rows = [[source.name, seed_text(source.seed), fixed(source.offset, 2), method, fixed(run.offset, 3),
+             fixed(run.sigma or math.nan, 3)] +
             [fixed(run.figure(key), decimals + 1) for key, _, decimals in METRICS]
             for (source, method), run in zip(keys, results)]
     return Table(name, "Each run", ["sequence", "seed", "true offset [ms]", "method", "offset [ms]", "sigma [ms]"] +
@@ -499,7 +502,8 @@ def table1(lab, sources, options):
         need_truth(source, run)
         runs.setdefault(source.name, {}).setdefault(method, []).append(run)
     page = Page("Table I: RIO-T against LC-RIO")
-    page.notes.append("LC-RIO is the same graph with the offset held at zero (estimate_time_offset: false); changes are against it")
+    page.notes.append("LC-RIO is the same graph with the offset held at zero (estimate_time_offset: false); changes "
+                      "are against it")
     page.notes.append("paper, ATE of LC-RIO and RIO-T: Gym 0.274, 0.278; Mocap easy 0.124, 0.128; medium 0.128, 0.130; "
                       "difficult 0.489, 0.420 m")
     columns, rows, ate = compared_table(list(runs), "LC-RIO", methods, runs)
@@ -530,10 +534,10 @@ def table2(lab, sources, options):
             keys.append((source, method))
             flat.append(run)
     page = Page("Table II: stamps corrected by RIO-T's estimate")
-    page.notes.append(f"the offset is what the model `{MODELS[0]}` estimates at the end of the same bag; it is taken off the stamps "
-                      "(radar_stamp_shift)")
-    page.notes.append("paper, ATE of LC-RIO without and with correction: Gym 0.274, 0.278; Mocap difficult 0.489, 0.267 m; "
-                      "mean of three 0.348, 0.251 m")
+    page.notes.append(f"the offset is what the model `{MODELS[0]}` estimates at the end of the same bag; it is taken "
+                      "off the stamps (radar_stamp_shift)")
+    page.notes.append("paper, ATE of LC-RIO without and with correction: Gym 0.274, 0.278; Mocap difficult 0.489, "
+                      "0.267 m; mean of three 0.348, 0.251 m")
     columns, rows, ate = compared_table(list(runs), original, [original, corrected], runs)
     page.tables += [Table("table2", "Mean of the runs", columns, rows), runs_table("table2_runs", keys, flat)]
     page.figures.append((draw_bars(list(ate), [original, corrected], ate, "ATE [m]"), "table2.png"))
@@ -547,7 +551,8 @@ def montecarlo(lab, sources, options):
     keys = [(source, method) for source in sources for method in methods]
     results = lab.map([(source, 1, one_run_or_fault(settings[method])) for source, method in keys])
     page = Page("Monte-Carlo over seeds")
-    page.notes.append("covered: share of the runs whose 95 % interval (estimate at the end +- 1.96 sigma) holds the true offset")
+    page.notes.append("covered: share of the runs whose 95 % interval (estimate at the end +- 1.96 sigma) holds the "
+                      "true offset")
     groups, single = {}, []
     for (source, method), run in zip(keys, results):
         group = groups.setdefault((source.name, source.offset, method), {"runs": [], "failed": 0})
@@ -574,7 +579,8 @@ def montecarlo(lab, sources, options):
                      fixed(spread(ates), 3), fixed(statistics.median(ates) if ates else math.nan, 3),
                      fixed(max(ates, default=math.nan), 3), fixed(mean(errors), 3, sign=True), fixed(spread(errors), 3),
                      fixed(mean([abs(e) for e in errors]), 3), fixed(max(map(abs, errors), default=math.nan), 3),
-                     fixed(mean([run.sigma for run, _ in runs]) if errors else math.nan, 3), fixed(100 * mean(covered), 0)])
+                     fixed(mean([run.sigma for run, _ in runs]) if errors else math.nan, 3),
+                     fixed(100 * mean(covered), 0)])
     page.tables.append(Table("montecarlo", "Errors by motion and offset", [
         "motion", "true offset [ms]", "method", "runs", "failed", "ATE mean [m]", "ATE sd [m]", "ATE median [m]",
         "ATE max [m]", "offset error mean [ms]", "sd [ms]", "mean size [ms]", "max size [ms]", "mean sigma [ms]",
@@ -596,11 +602,10 @@ def draw_spread(groups):
         for g, case in enumerate(cases):
             runs = groups[case + (method,)]["runs"]
             x = [g + 0.26 * (i - 1)] * len(runs)
-            label = method if g == 0 else None
-            axes[1].plot(x, [run.figure("ate_m") for run, _ in runs], "o", color=colour, alpha=0.55, markersize=4, label=label)
+            style = {"color": colour, "alpha": 0.55, "markersize": 4, "label": method if g == 0 else None}
+            axes[1].plot(x, [run.figure("ate_m") for run, _ in runs], "o", **style)
             if method != "LC-RIO":
-                axes[0].plot(x, [max(abs(error), 1e-3) for _, error in runs], "o", color=colour, alpha=0.55, markersize=4,
-                             label=label)
+                axes[0].plot(x, [max(abs(error), 1e-3) for _, error in runs], "o", **style)
     axes[0].set_yscale("log")
     axes[1].set_yscale("log")
     axes[1].set_xticks(range(len(cases)))
@@ -660,16 +665,22 @@ def parse(words):
     parser.add_argument("--bag", metavar="BAG", type=pathlib.Path, action="append", default=[],
                         help="run on this bag instead of simulated ones; may be repeated; not for montecarlo")
     parser.add_argument("--config", metavar="CONFIG", default="irs", help="configuration of rio_t_bag (irs)")
-    parser.add_argument("--set", metavar="key=value", action="append", default=[], help="parameter of rio_t_bag; may be repeated")
-    parser.add_argument("--seeds", metavar="N", type=count, help="simulated runs of each motion, seeds 1 to N (3; montecarlo 10)")
+    parser.add_argument("--set", metavar="key=value", action="append", default=[],
+                        help="parameter of rio_t_bag; may be repeated")
+    parser.add_argument("--seeds", metavar="N", type=count,
+                        help="simulated runs of each motion, seeds 1 to N (3; montecarlo 10)")
     parser.add_argument("--motion", metavar="NAME", action="append",
-                        help="simulated motion; may be repeated (shifts, delay: difficult; tables also easy, medium, gym_loop)")
+                        help="simulated motion; may be repeated (shifts, delay: difficult; tables: easy, medium, "
+                             "difficult, gym_loop; montecarlo: easy, medium, difficult)")
     parser.add_argument("--time-offset", metavar="S", type=finite, action="append",
-                        help="true offset of the simulated bags [s] (-0.00925; montecarlo also 0.03 and 0.1, may be repeated)")
-    parser.add_argument("--duration", metavar="S", type=positive, help="length of the simulated bags [s] (the motion's own)")
+                        help="true offset of the simulated bags [s] (-0.00925; montecarlo also 0.03 and 0.1; may be "
+                             "repeated there)")
+    parser.add_argument("--duration", metavar="S", type=positive,
+                        help="length of the simulated bags [s] (the motion's own)")
     parser.add_argument("--shifts", metavar="MS,MS,...", type=shift_list, default=DEFAULT_SHIFTS,
                         help="of the experiment `shifts` [ms] (0,2.5,...,15)")
-    parser.add_argument("--jobs", metavar="N", type=count, default=os.cpu_count() or 1, help="runs side by side (all cores)")
+    parser.add_argument("--jobs", metavar="N", type=count, default=os.cpu_count() or 1,
+                        help="runs side by side (all cores)")
     parser.add_argument("--programs", metavar="DIR", type=pathlib.Path, help="where rio_t_bag and simulate are")
     parser.add_argument("--check", action="store_true", help="only check the arguments")
     options = parser.parse_args(words)
@@ -706,7 +717,8 @@ def find_programs(given):
     for folder in candidates:
         if all(os.access(folder / name, os.X_OK) for name in ("rio_t_bag", "simulate")):
             return folder
-    raise ExperimentError("the programs rio_t_bag and simulate are not found: run scripts/build.sh, or give --programs DIR")
+    raise ExperimentError("the programs rio_t_bag and simulate are not found: run scripts/build.sh, or give "
+                          "--programs DIR")
 
 
 def sources_of(options):
@@ -729,11 +741,18 @@ def describe(sources, options):
     else:
         motions = dict.fromkeys(s.motion for s in sources)
         offsets = dict.fromkeys(f"{s.offset:g}" for s in sources)
-        notes = [f"simulated motions {', '.join(motions)}; seeds 1 to {options.seeds}; true offset {', '.join(offsets)} ms"
-                 + (f"; {options.duration:g} s each" if options.duration else "") + f"; configuration {options.config}"]
+        duration = f"; {options.duration:g} s each" if options.duration else ""
+        notes = [f"simulated motions {', '.join(motions)}; seeds 1 to {options.seeds}; true offset "
+                 f"{', '.join(offsets)} ms{duration}; configuration {options.config}"]
     if options.set:
         notes.append(f"parameters: {', '.join(options.set)}")
     return notes
+
+
+def own_words(words):
+    """The command line, quoted, without what experiment.sh adds."""
+    without = [w for i, w in enumerate(words) if w != "--programs" and (i == 0 or words[i - 1] != "--programs")]
+    return [shlex.quote(word) for word in without]
 
 
 def main(words):
@@ -745,11 +764,11 @@ def main(words):
         sources = sources_of(options)
         options.output.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".runs_", dir=options.output) as scratch:
-            lab = Laboratory(programs, pathlib.Path(scratch), options.config, options.set, options.duration, options.jobs,
-                             sys.stderr.isatty())
+            lab = Laboratory(programs, pathlib.Path(scratch), options.config, options.set, options.duration,
+                             options.jobs, sys.stderr.isatty())
             page = globals()[options.experiment](lab, sources, options)
         page.notes = describe(sources, options) + page.notes
-        page.write(options.output, options.experiment, "scripts/experiment.sh " + " ".join(shlex.quote(w) for w in words))
+        page.write(options.output, options.experiment, " ".join(["scripts/experiment.sh"] + own_words(words)))
     except (ExperimentError, OSError) as error:
         print(f"experiment.sh: {error}", file=sys.stderr)
         return 1
