@@ -14,14 +14,11 @@
 #include <stdexcept>
 
 #include "rio_t/evaluation/errors.h"
+#include "rio_t/ros/conversions.h"
 #include "rio_t/ros/stamping.h"
 
 namespace rio_t {
 namespace {
-
-Time toTime(const ros::Time& time) { return Time::fromNanoseconds(static_cast<std::int64_t>(time.toNSec())); }
-
-Eigen::Vector3d toVector(const geometry_msgs::Vector3& v) { return {v.x, v.y, v.z}; }
 
 std::runtime_error bagError(const std::string& bag, const std::string& what) {
   return std::runtime_error("bag " + bag + ": " + what);
@@ -147,12 +144,7 @@ class Player {
 
  private:
   void addImu(const sensor_msgs::Imu& message, Time record) {
-    ImuMeasurement imu;
-    imu.time = toTime(message.header.stamp);
-    if (imu.time == Time())
-      throw std::runtime_error("topic " + config_.imu_topic + ": the stamp in the header is zero");
-    imu.angular_velocity = toVector(message.angular_velocity);
-    imu.acceleration = toVector(message.linear_acceleration);
+    const ImuMeasurement imu = toImuMeasurement(message, config_.imu_topic);
     ++summary_.imu_count;
     stamper_.addImu(imu.time, record);
     if (const std::optional<NavigationState> state = odometry_.addImu(imu)) {

@@ -126,7 +126,7 @@ void listInitialization(ParameterList& list, Config& c) {
 void listRest(ParameterList& list, Config& c) {
   RestOptions& rest = c.odometry.rest;
   list.group("Rest on the way, as the IMU sees it");
-  list.boolean("rest_enabled", rest.enabled, "hold velocity and angular rate at zero while at rest");
+  list.boolean("rest_enabled", rest.enabled, "hold the velocity at zero while at rest");
   list.number("rest_window", "s", above(0), rest.window, "that the platform must have been still for");
   list.number("rest_max_gyro_std", "rad/s", above(0), rest.max_gyro_std, "of an axis over the window");
   list.number("rest_max_accel_std", "m/s^2", above(0), rest.max_accel_std, "of an axis over the window");
@@ -153,7 +153,7 @@ void listEgoVelocity(ParameterList& list, Config& c) {
   list.number("zero_velocity_outlier_fraction", "", between(0, 1), radar.zero_velocity_outlier_fraction,
               "share of Dopplers that may exceed it at rest");
   list.number("zero_velocity_sigma", "m/s", above(0), radar.zero_velocity_sigma,
-              "standard deviation per axis, at rest");
+              "standard deviation per axis, at rest, besides what radar_doppler_step hides");
   list.number("ransac_inlier_threshold", "m/s", above(0), radar.ransac_inlier_threshold,
               "Doppler residual of an inlier");
   list.number("ransac_outlier_probability", "", Range{0, 1, false, true}, radar.ransac_outlier_probability,
@@ -169,7 +169,7 @@ void listEgoVelocity(ParameterList& list, Config& c) {
   list.number("ego_velocity_min_inlier_fraction", "", between(0, 1), radar.min_inlier_fraction,
               "of the points that count; fewer agree by chance");
   list.number("ego_velocity_prior_min_inlier_fraction", "", between(0, 1), radar.prior_min_inlier_fraction,
-              "likewise, for points that agree with what the IMU predicts");
+              "likewise, to side with points that agree with what the IMU predicts");
   list.choice<EgoVelocitySolver>(
       "ego_velocity_solver",
       {{"ls", EgoVelocitySolver::kLeastSquares}, {"eiv", EgoVelocitySolver::kErrorsInVariables}},
@@ -213,7 +213,7 @@ void listTimeOffset(ParameterList& list, Config& c) {
               "where the estimate starts");
   list.number("time_offset_sigma", "s", above(0), smoother.time_offset_sigma,
               "standard deviation of that start");
-  list.number("time_offset_noise", "s/sqrt(s)", atLeast(0), smoother.time_offset_noise,
+  list.number("time_offset_noise", "s/sqrt(s)", above(0), smoother.time_offset_noise,
               "random walk of the offset");
   list.number("max_time_offset", "s", above(0, 1), smoother.max_time_offset,
               "bound on its size, either sign");
@@ -232,7 +232,7 @@ void listSmoother(ParameterList& list, Config& c) {
   list.number("innovation_model_error", "m/s", atLeast(0), smoother.innovation_model_error,
               "per axis, added to that prediction in the gate only: what extrinsics and IMU scale are wrong");
   list.number("innovation_gate_timeout", "s", above(0), smoother.innovation_gate_timeout,
-              "without a scan, after which the next is taken all the same");
+              "without a scan used, after which the next is taken all the same");
   list.number("prior_sigma_orientation", "rad", above(0), smoother.prior_sigma_orientation,
               "of the first state: roll and pitch");
   list.number("prior_sigma_yaw", "rad", above(0), smoother.prior_sigma_yaw,

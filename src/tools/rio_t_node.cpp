@@ -1,0 +1,18 @@
+// The live odometry as a node of its own; parameters are private (~), see config/estimator.yaml.
+#include <ros/ros.h>
+
+#include <exception>
+
+#include "rio_t/ros/live_odometry.h"
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "rio_t");
+  try {
+    const rio_t::LiveOdometry odometry(ros::NodeHandle(), ros::NodeHandle("~"), ros::this_node::getName());
+    ros::spin();
+  } catch (const std::exception& error) {
+    ROS_FATAL_STREAM(ros::this_node::getName() << ": " << error.what());
+    return 1;
+  }
+  return 0;
+}
