@@ -760,6 +760,7 @@ def main(words):
         options = parse(words)
         if options.check:
             return 0
+        plots()  # fails now rather than after the runs
         programs = find_programs(options.programs)
         sources = sources_of(options)
         options.output.mkdir(parents=True, exist_ok=True)
@@ -769,7 +770,7 @@ def main(words):
             page = globals()[options.experiment](lab, sources, options)
         page.notes = describe(sources, options) + page.notes
         page.write(options.output, options.experiment, " ".join(["scripts/experiment.sh"] + own_words(words)))
-    except (ExperimentError, OSError) as error:
+    except (ExperimentError, OSError, ImportError) as error:
         print(f"experiment.sh: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
