@@ -333,7 +333,7 @@ TEST(Parameters, EveryMemberOfTheOptionsHasAKey) {
   EXPECT_EQ(keysChanging("Initialisation"), memberCount<StaticInitializerOptions>());
   EXPECT_EQ(keysChanging("Rest on the way"), memberCount<RestOptions>());
   EXPECT_EQ(keysChanging("IMU"), memberCount<ImuNoise>() + 2) << "with gravity and max_imu_gap";
-  EXPECT_EQ(keysChanging("T_IR"), memberCount<Extrinsics>());
+  EXPECT_EQ(keysChanging("T_IR"), memberCount<Extrinsics>() + 1) << "with extrinsics_source";
   EXPECT_EQ(memberCount<OdometryOptions>(), 10u)
       << "a new member needs keys in src/ros/parameter_registry.cpp";
   EXPECT_EQ(memberCount<PointCloudFormat>() - 1, memberCount<PointCloudOverrides>()) << "all but its name";

@@ -24,8 +24,8 @@ struct EgoVelocityOptions {
   double min_range = 0.25;              ///< [m]
   double max_range = 100.0;             ///< [m]
   double min_snr_db = 3.0;              ///< [dB]
-  double max_azimuth = 1.5707963268;    ///< [rad] from the y (forward) axis, either side; the noise model weighs points at the edge
-  double max_elevation = 1.5707963268;  ///< [rad] either side
+  double max_azimuth = 1.570796;    ///< [rad] from the y (forward) axis, either side; the noise model weighs points at the edge
+  double max_elevation = 1.570796;  ///< [rad] either side
 
   double zero_velocity_threshold = 0.05;         ///< [m/s] a Doppler below counts as zero
   double zero_velocity_outlier_fraction = 0.25;  ///< share of Dopplers that may exceed it at rest
