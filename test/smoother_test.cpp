@@ -210,11 +210,11 @@ TEST_F(Smoother, PredictsTheVelocityOfTheNextScan) {
   const RadarVelocityMeasurement z = measurement(0.7, 0.02);
   const auto prior = smoother.predictRadarVelocity(z.stamp, z.R_RI, z.l_I);
   ASSERT_TRUE(prior);
-  EXPECT_LT((prior->v_R - z.v_R).norm(), 2e-3);
+  EXPECT_LT((prior->velocity.v_R - z.v_R).norm(), 2e-3);
   // An offset that is less known makes the prediction less certain, where the platform accelerates.
   options.time_offset_sigma = 0.1;
   const auto unsure = make(options).predictRadarVelocity(z.stamp, z.R_RI, z.l_I);
-  EXPECT_GT(unsure->covariance.trace(), 4.0 * prior->covariance.trace());
+  EXPECT_GT(unsure->velocity.covariance.trace(), 4.0 * prior->velocity.covariance.trace());
 }
 
 }  // namespace

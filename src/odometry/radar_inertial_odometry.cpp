@@ -45,6 +45,7 @@ struct RadarInertialOdometry::Impl {
         initializer(options.initialization, options.gravity),
         ego_velocity_estimator(options.ego_velocity),
         feasibility(options.feasibility),
+        offset_monitor(options.offset_monitor),
         smoother(options.smoother, options.imu_noise, g_W, imu) {
     waiting_for = initializer.waitingFor();
   }
@@ -81,6 +82,7 @@ struct RadarInertialOdometry::Impl {
   StaticInitializer initializer;
   EgoVelocityEstimator ego_velocity_estimator;
   FeasibilityCheck feasibility;
+  OffsetMonitor offset_monitor;
   FixedLagSmoother smoother;
   std::deque<RadarScan> waiting_scans;
   Time initialized_at;
@@ -229,14 +231,22 @@ std::optional<ScanResult> RadarInertialOdometry::Impl::tryScan(const RadarScan& 
 }
 
 std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, bool at_rest, EgoVelocity& measured) {
-  std::optional<VelocityPrior> prior = smoother.predictRadarVelocity(scan.stamp, R_RI, options.T_IR.l_I);
+  const auto prediction = smoother.predictRadarVelocity(scan.stamp, R_RI, options.T_IR.l_I);
+  std::optional<VelocityPrior> prior;
+  if (prediction) prior = prediction->velocity;
   if (at_rest) {
-    prior.emplace();
+    prior = VelocityPrior();
     prior->covariance.diagonal().setConstant(options.rest.velocity_sigma * options.rest.velocity_sigma);
   }
   measured = ego_velocity_estimator.estimate(scan, prior);
   if (!isValid(measured.status)) return toString(measured.status);
   if (!feasibility.accept(scan.stamp, measured.v_R)) return "infeasible_velocity";
+  if (prediction && options.smoother.estimate_time_offset && measured.status == EgoVelocityStatus::kMoving &&
+      offset_monitor.stepped(scan.stamp, measured.v_R - prediction->velocity.v_R,
+                             prediction->covariance_at_offset + measured.covariance, prediction->dv_dt_O)) {
+    smoother.loosenTimeOffset();
+    faults.count("time_offset_step");
+  }
   const bool gate_is_open = std::abs(scan.stamp - last_used) > options.smoother.innovation_gate_timeout;
   if (prior && !gate_is_open && contradicts(*prior, measured)) return "innovation";
   return "";

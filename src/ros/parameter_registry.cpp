@@ -217,6 +217,14 @@ void listTimeOffset(ParameterList& list, Config& c) {
               "random walk of the offset");
   list.number("max_time_offset", "s", above(0, 1), smoother.max_time_offset,
               "bound on its size, either sign");
+  OffsetMonitorOptions& monitor = c.odometry.offset_monitor;
+  list.boolean("time_offset_step_detection", monitor.enabled,
+               "find the offset anew where the scans say that it stepped, e.g. after a driver restart");
+  list.number("time_offset_step_memory", "s", above(0), monitor.memory, "of the average over scans");
+  list.number("time_offset_step_significance", "", above(0), monitor.significance,
+              "standard deviations of the change that the scans ask for");
+  list.number("time_offset_step_min", "s", above(0), monitor.min_change,
+              "smaller steps are left to the random walk");
 }
 
 void listSmoother(ParameterList& list, Config& c) {

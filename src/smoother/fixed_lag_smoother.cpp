@@ -80,8 +80,9 @@ Time FixedLagSmoother::nodeTime(Time stamp) const {
   return options_.time_offset_model == TimeOffsetModel::kImu ? stamp - nodes_.back().t_O : stamp;
 }
 
-std::optional<VelocityPrior> FixedLagSmoother::predictRadarVelocity(Time stamp, const Eigen::Matrix3d& R_RI,
-                                                                    const Eigen::Vector3d& l_I) const {
+std::optional<RadarVelocityPrediction> FixedLagSmoother::predictRadarVelocity(Time stamp,
+                                                                              const Eigen::Matrix3d& R_RI,
+                                                                              const Eigen::Vector3d& l_I) const {
   const Node& newest = nodes_.back();
   const Time time = nodeTime(stamp);
   if (time < newest.time) return std::nullopt;
@@ -106,17 +107,21 @@ std::optional<VelocityPrior> FixedLagSmoother::predictRadarVelocity(Time stamp, 
   zero.stamp = stamp;
   zero.R_RI = R_RI;
   zero.l_I = l_I;
-  VelocityPrior prior;
+  RadarVelocityPrediction prediction;
   const double* blocks[] = {x.data(), &newest.t_O};
   StateJacobian<3> J_x;
   Eigen::Vector3d J_t;
   double* jacobians[] = {J_x.data(), J_t.data()};
-  makeRadarFactor(zero, time)->Evaluate(blocks, prior.v_R.data(), jacobians);
+  makeRadarFactor(zero, time)->Evaluate(blocks, prediction.velocity.v_R.data(), jacobians);
   Eigen::Matrix<double, 3, kNodeTangent> J;
   J << J_x.leftCols<3>(), J_x.rightCols<StateBlock::kTangent - 3>(), J_t;
   if (!options_.estimate_time_offset) J.rightCols<1>().setZero();
-  prior.covariance = J * P * J.transpose();
-  return prior;
+  prediction.velocity.covariance = J * P * J.transpose();
+  const auto J_state = J.leftCols<StateBlock::kTangent>();
+  prediction.covariance_at_offset =
+      J_state * P.topLeftCorner<StateBlock::kTangent, StateBlock::kTangent>() * J_state.transpose();
+  prediction.dv_dt_O = J_t;
+  return prediction;
 }
 
 FixedLagSmoother::AddResult FixedLagSmoother::add(const RadarVelocityMeasurement& z) {
@@ -151,6 +156,10 @@ FixedLagSmoother::Node* FixedLagSmoother::nodeAt(Time time) {
   } else if (k == nodes_.size() || nodes_[k].time - time > spacing) {
     nodes_.insert(later, makeNode(time, nodes_[k - 1]));
     linkToPrevious(k);
+    if (offset_has_stepped_ && k + 1 == nodes_.size()) {
+      nodes_[k].offset_from_previous = std::make_unique<ConstantOffsetFactor>(options_.time_offset_sigma);
+      offset_has_stepped_ = false;
+    }
     if (k + 1 < nodes_.size()) linkToPrevious(k + 1);  // its IMU factor now starts at the new node
   }
   return &nodes_[k];

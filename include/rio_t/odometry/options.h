@@ -5,6 +5,7 @@
 #include "rio_t/imu/noise.h"
 #include "rio_t/imu/rest_detector.h"
 #include "rio_t/imu/static_initializer.h"
+#include "rio_t/odometry/offset_monitor.h"
 #include "rio_t/radar/ego_velocity.h"
 #include "rio_t/radar/feasibility.h"
 #include "rio_t/smoother/options.h"
@@ -27,6 +28,7 @@ struct OdometryOptions {
   FeasibilityOptions feasibility;
   RestOptions rest;
   SmootherOptions smoother;
+  OffsetMonitorOptions offset_monitor;
   double max_imu_gap = 0.1;        ///< [s] between samples; a longer one is reported and bridged
   std::size_t max_queued_scans = 50;  ///< scans that may wait for the IMU or the solver
 };

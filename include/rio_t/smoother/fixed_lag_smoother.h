@@ -34,6 +34,13 @@ struct SolveReport {
   bool converged = false;
 };
 
+/// What a scan should show, see FixedLagSmoother::predictRadarVelocity.
+struct RadarVelocityPrediction {
+  VelocityPrior velocity;                                        ///< with the uncertainty of everything
+  Eigen::Matrix3d covariance_at_offset = Eigen::Matrix3d::Zero();  ///< the same, were the offset known [m^2/s^2]
+  Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();             ///< of v_R with respect to t_O [m/s^2]
+};
+
 /// The paper's factor graph over the last `window` seconds, solved with Ceres; what leaves is marginalised.
 ///
 /// Nodes are in the order of their times, whatever the order of arrival. Not thread-safe.
@@ -55,11 +62,13 @@ class FixedLagSmoother {
 
   /// Radar velocity that a scan stamped `stamp` should show, with the uncertainty of the state, of the IMU since and
   /// of the offset. None for a scan older than the newest node. R_RI turns I into R, `l_I` is the radar in I [m].
-  std::optional<VelocityPrior> predictRadarVelocity(Time stamp, const Eigen::Matrix3d& R_RI,
-                                                    const Eigen::Vector3d& l_I) const;
+  std::optional<RadarVelocityPrediction> predictRadarVelocity(Time stamp, const Eigen::Matrix3d& R_RI,
+                                                              const Eigen::Vector3d& l_I) const;
   AddResult add(const RadarVelocityMeasurement& z);
   /// The platform is at rest at the time of measurement of a scan stamped `stamp`; `velocity_sigma` [m/s].
   AddResult addRest(Time stamp, double velocity_sigma);
+  /// Forgets how well t_O is known from the next node on, where it must have stepped: its prior sigma comes back.
+  void loosenTimeOffset() { offset_has_stepped_ = true; }
   SolveReport optimize();
   /// Marginalises what is older than the window; the nodes that left, oldest first.
   std::vector<NodeEstimate> marginalize();
@@ -103,6 +112,7 @@ class FixedLagSmoother {
   StateManifold manifold_;
   std::unique_ptr<PriorFactor> prior_;  // on the first node
   std::deque<Node> nodes_;
+  bool offset_has_stepped_ = false;
   NodeMatrix newest_covariance_ = NodeMatrix::Zero();
 };
 

@@ -1,0 +1,48 @@
+#include "rio_t/odometry/offset_monitor.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace rio_t {
+namespace {
+
+/// Scans at 10 Hz whose acceleration turns about, with an offset error and made-up noise of 0.03 m/s.
+/// Seconds until a step is seen; 60 where none is.
+double secondsToStep(double offset_error, double acceleration, double noise = 0.03) {
+  OffsetMonitor monitor{OffsetMonitorOptions()};
+  const Eigen::Matrix3d S = 0.05 * 0.05 * Eigen::Matrix3d::Identity();
+  for (int i = 0; i < 600; ++i) {
+    const Eigen::Vector3d J = acceleration * Eigen::Vector3d(std::sin(0.31 * i), std::cos(0.23 * i), 0.3);
+    const Eigen::Vector3d e(std::sin(2.1 * i * i), std::cos(1.3 * i * i), std::sin(0.7 * i * i + 1.0));
+    if (monitor.stepped(Time::fromSeconds(0.1 * i), offset_error * J + std::sqrt(2.0) * noise * e, S, J)) return 0.1 * i;
+  }
+  return 60.0;
+}
+
+TEST(OffsetMonitor, IsQuietWhereTheOffsetIsRight) {
+  EXPECT_EQ(secondsToStep(0.0, 2.0), 60.0);
+  EXPECT_EQ(secondsToStep(0.0, 0.0), 60.0) << "no excitation";
+}
+
+TEST(OffsetMonitor, SeesAStepOfEitherSign) {
+  EXPECT_LT(secondsToStep(0.05, 2.0), 5.0);
+  EXPECT_LT(secondsToStep(-0.05, 2.0), 5.0);
+  EXPECT_LT(secondsToStep(0.05, 0.7), 20.0);
+}
+
+TEST(OffsetMonitor, LeavesSmallChangesToTheRandomWalk) { EXPECT_EQ(secondsToStep(0.003, 5.0, 0.005), 60.0); }
+
+TEST(OffsetMonitor, DoesNotSpeakWithoutExcitation) { EXPECT_EQ(secondsToStep(0.05, 0.0), 60.0); }
+
+TEST(OffsetMonitor, CanBeTurnedOff) {
+  OffsetMonitorOptions options;
+  options.enabled = false;
+  OffsetMonitor monitor(options);
+  for (int i = 0; i < 200; ++i) {
+    EXPECT_FALSE(monitor.stepped(Time::fromSeconds(0.1 * i), {1, 0, 0}, 1e-4 * Eigen::Matrix3d::Identity(), {2, 0, 0}));
+  }
+}
+
+}  // namespace
+}  // namespace rio_t
