@@ -1,0 +1,244 @@
+#!/usr/bin/env python3
+"""The live node and nodelet against the bag runner, and each of their promises, on a simulated bag."""
+import os
+import shutil
+import tempfile
+import unittest
+
+import numpy
+import rosbag
+import rospy
+from geometry_msgs.msg import TransformStamped
+from std_srvs.srv import Empty, Trigger
+from tf2_msgs.msg import TFMessage
+
+import live_tester as tester
+
+OK, WARN, ERROR = 0, 1, 2
+# Of the optimised poses: the same numbers come out, but for the first scan after the initialisation, which one may
+# take and the other not. Of the live poses: the anchor may come some IMU samples later than in the bag runner.
+OPTIMIZED_BOUND_M = 1e-3
+LIVE_BOUND_M = 0.05
+
+
+class LiveTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.mkdtemp(prefix="rio_t_live_")
+        cls.bag = os.path.join(cls.folder, "run.bag")
+        cls.check(tester.run(tester.program("rio_t", "simulate"), "--motion", "medium", "--seed", 3, "--duration", 14,
+                             "--static-start", 5, "--static-end", 1, "--time-offset", 0.03, "--out", cls.bag))
+        output = os.path.join(cls.folder, "run")
+        cls.check(tester.run(tester.program("rio_t", "rio_t_bag"), "--bag", cls.bag, "--config", "irs", "--output-dir",
+                             output))
+        cls.live = tester.read_tum(os.path.join(output, "trajectory.txt"))
+        cls.optimized = tester.read_tum(os.path.join(output, "trajectory_optimized.txt"))
+        cls.saved = os.path.join(cls.folder, "saved.txt")
+        with rosbag.Bag(cls.bag) as bag:
+            cls.imu_stamps = [m.header.stamp.to_nsec() for _, m, _ in bag.read_messages([tester.IMU])]
+            cls.scan_stamps = [m.header.stamp.to_nsec() for _, m, _ in bag.read_messages([tester.RADAR])]
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.folder)
+
+    @classmethod
+    def check(cls, outcome):
+        if outcome.returncode != 0:
+            raise AssertionError(f"{outcome.args}: {outcome.stdout}")
+
+    def call(self, service, kind):
+        rospy.wait_for_service(service, tester.DEADLINE)
+        return rospy.ServiceProxy(service, kind)()
+
+    def whole_bag(self, listener, *play_arguments):
+        """Plays the bag and waits for the last odometry."""
+        with tester.play(self.bag, *play_arguments) as player:
+            self.assertEqual(player.wait(), 0)
+        listener.wait_for_stamp("odom", self.imu_stamps[-1])
+        # The last scan may wait for IMU samples that the bag does not hold.
+        listener.wait_for_stamp("odom_optimized", self.scan_stamps[-3])
+
+    def compare_with_bag_runner(self, listener):
+        odom = {m.header.stamp.to_nsec(): m.pose.pose.position for m in listener.messages["odom"]}
+        common = sorted(odom.keys() & self.live.keys())
+        self.assertGreater(len(common), 0.99 * len(self.live))
+        worst = max(numpy.linalg.norm(self.live[t][:3] - [odom[t].x, odom[t].y, odom[t].z]) for t in common)
+        self.assertLess(worst, LIVE_BOUND_M)
+
+        response = self.call("/rio_t/save_trajectory", Trigger)
+        self.assertTrue(response.success, response.message)
+        saved = tester.read_tum(self.saved)
+        newest = max(saved)  # still in the window: will yet change
+        common = sorted((saved.keys() & self.optimized.keys()) - {newest})
+        self.assertGreater(len(common), 60)
+        worst = max(numpy.linalg.norm(saved[t][:3] - self.optimized[t][:3]) for t in common)
+        self.assertLess(worst, OPTIMIZED_BOUND_M)
+
+    def test_node_equals_bag_runner_and_keeps_the_topic_contract(self):
+        with tester.Listener() as listener, tester.node("config:=irs", "trajectory_file:=" + self.saved):
+            listener.wait_until_heard()
+            self.whole_bag(listener)
+            self.compare_with_bag_runner(listener)
+            messages = listener.messages
+
+            # One odometry for each IMU sample from the first on; each optimised state, in order.
+            odom_stamps = [m.header.stamp.to_nsec() for m in messages["odom"]]
+            first = self.imu_stamps.index(odom_stamps[0])
+            self.assertEqual(odom_stamps, self.imu_stamps[first:])
+            for name in ("odom_optimized", "time_offset", "ego_velocity"):
+                stamps = [m.header.stamp.to_nsec() for m in messages[name]]
+                self.assertEqual(stamps, sorted(set(stamps)), name)
+                self.assertGreater(len(stamps), 60, name)
+
+            for message in messages["odom"][::50] + messages["odom_optimized"]:
+                self.assertEqual((message.header.frame_id, message.child_frame_id), ("odom", "base_link"))
+                for covariance in (message.pose.covariance, message.twist.covariance):
+                    matrix = numpy.array(covariance).reshape(6, 6)
+                    numpy.testing.assert_array_equal(matrix, matrix.T)
+                    self.assertGreater(numpy.linalg.eigvalsh(matrix)[0], 0.0)
+            for name in ("ego_velocity", "inliers", "points"):
+                self.assertEqual({m.header.frame_id for m in messages[name]}, {"radar"}, name)
+            self.assertEqual({m.header.frame_id for m in messages["imu_bias"]}, {"base_link"})
+            self.assertEqual(messages["path"][-1].header.frame_id, "odom")
+            points = {m.header.stamp.to_nsec(): m.width for m in messages["points"]}
+            for message in messages["inliers"]:
+                self.assertLessEqual(message.width, points[message.header.stamp.to_nsec()])
+            self.assertTrue(all(m.sigma > 0.0 for m in messages["time_offset"]))
+            self.assertEqual({m.observable for m in messages["time_offset"]}, {False, True})  # rest and motion
+            last = messages["time_offset"][-1]
+            self.assertLess(abs(last.offset - 0.03), 4.0 * last.sigma)
+
+            # tf says what the odometry says.
+            said = {t.header.stamp.to_nsec(): t for t in listener.tf}
+            self.assertEqual({(t.header.frame_id, t.child_frame_id) for t in listener.tf}, {("odom", "base_link")})
+            shown = [m for m in messages["odom"] if m.header.stamp.to_nsec() in said]
+            self.assertGreater(len(shown), 0.9 * len(odom_stamps))
+            for message in shown[::50]:
+                self.assertEqual(said[message.header.stamp.to_nsec()].transform.translation.x,
+                                 message.pose.pose.position.x)
+            listener.wait_for_diagnosis("odometry", "running", OK)
+            listener.wait_for("no scan was lost", lambda: listener.value("input", "scans") == str(len(self.scan_stamps)))
+            self.assertIsNone(listener.value("input", "dropped_queue_full"))
+
+    def test_nodelet_equals_bag_runner_also_when_loaded_again_after_unloading_while_busy(self):
+        nodelet = tester.program("nodelet", "nodelet")
+        def load():
+            return tester.Process(nodelet, "load", "rio_t/RioTNodelet", "manager", "__name:=rio_t", "_config:=irs",
+                                  "_trajectory_file:=" + self.saved)
+        with tester.Process(nodelet, "manager", "__name:=manager") as manager:
+            with tester.Listener() as listener, load() as loader:
+                listener.wait_until_heard()
+                with tester.play(self.bag):
+                    listener.wait_for("odometry", lambda: len(listener.messages["odom_optimized"]) > 10)
+                    loader.stop()  # unloads, while the bag plays on
+                self.assertIsNone(manager.process.poll(), "the manager died")
+            with tester.Listener() as listener, load():
+                listener.wait_until_heard()
+                self.whole_bag(listener)
+                self.compare_with_bag_runner(listener)
+            self.assertIsNone(manager.process.poll(), "the manager died")
+
+    def test_reset_starts_again(self):
+        with tester.Listener() as listener, tester.node("config:=irs"):
+            listener.wait_until_heard()
+            # At rate 1 the rest at the start lasts long enough to initialise, to be reset, and to wait again.
+            with tester.play(self.bag, (tester.IMU, tester.RADAR), 1.0):
+                listener.wait_for("odometry", lambda: len(listener.messages["odom"]) > 0)
+                before = len(listener.messages["odom"])
+                self.call("/rio_t/reset", Empty)
+                listener.wait_for("the reset", lambda: listener.value("odometry", "resets") == "1")
+                self.assertEqual(listener.diagnostics["odometry"].level, WARN)
+                self.assertIn("standing still", listener.diagnostics["odometry"].message)
+                self.assertEqual(listener.value("odometry", "last_reset_because"), "asked for by ~reset")
+                self.assertGreater(before, 0)
+
+    def test_looping_bag_resets_and_runs_again(self):
+        with tester.Listener() as listener, tester.node("config:=irs"):
+            listener.wait_until_heard()
+            with tester.play(self.bag, (tester.IMU, tester.RADAR), 4.0, "--loop"):
+                listener.wait_for_stamp("odom", self.imu_stamps[-1])
+                passed = len(listener.messages["odom"])
+                listener.wait_for_diagnosis("odometry", "initialising", WARN)
+                self.assertIn("jumped back", listener.value("odometry", "last_reset_because"))
+                listener.wait_for("odometry of the second time round",
+                                  lambda: len(listener.messages["odom"]) > passed + 500)
+                again = [m.header.stamp.to_nsec() for m in listener.messages["odom"][passed:]]
+                self.assertLess(again[0], self.imu_stamps[-1])
+                self.assertEqual(again, sorted(again))
+
+    def test_absent_trigger_is_told(self):
+        with tester.Listener() as listener, tester.node("config:=irs", "stamp_source:=trigger"):
+            listener.wait_until_heard()
+            with tester.play(self.bag):
+                listener.wait_for_diagnosis("input", "no trigger yet on /sensor_platform/radar/trigger", ERROR)
+                listener.wait_for("scans given up",
+                                  lambda: int(listener.value("input", "dropped_trigger_missing") or 0) > 10)
+
+    def test_trigger_stamps(self):
+        with tester.Listener() as listener, tester.node("config:=irs", "stamp_source:=trigger",
+                                                        "trajectory_file:=" + self.saved):
+            listener.wait_until_heard()
+            self.whole_bag(listener, (tester.IMU, tester.RADAR, "/sensor_platform/radar/trigger"))
+            self.compare_with_bag_runner(listener)  # in this bag headers and triggers have the same stamps
+
+    def test_extrinsics_from_tf(self):
+        # Of config/irs.yaml, as the transform from the cloud's frame to base_link.
+        with rosbag.Bag(self.bag) as bag:
+            cloud_frame = next(m for _, m, _ in bag.read_messages([tester.RADAR])).header.frame_id
+        transform = TransformStamped()
+        transform.header.frame_id, transform.child_frame_id = "base_link", cloud_frame
+        translation, rotation = transform.transform.translation, transform.transform.rotation
+        translation.x, translation.y, translation.z = 0.03, 0.03, -0.06
+        rotation.x, rotation.y, rotation.z, rotation.w = 0.69946, 0.71461, 0.00723, 0.00524
+        parameters = ("config:=irs", "extrinsics_source:=tf", "radar_frame:=radar_shown",
+                      "trajectory_file:=" + self.saved)
+        rospy.set_param("/rio_t/extrinsics_translation", [9.0, 9.0, 9.0])  # not to be read
+        with tester.Listener() as listener, tester.node(*parameters):
+            listener.wait_until_heard()
+            with tester.play(self.bag, (tester.IMU, tester.RADAR), 8.0) as player:
+                listener.wait_for_diagnosis("odometry", "waiting for tf from " + cloud_frame, WARN)
+                player.stop()
+            self.assertEqual(listener.messages["odom"], [])
+            publisher = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
+            publisher.publish(TFMessage([transform]))
+            self.whole_bag(listener)
+            saved = self.call("/rio_t/save_trajectory", Trigger)
+            self.assertTrue(saved.success, saved.message)
+            poses = tester.read_tum(self.saved)
+            common = sorted((poses.keys() & self.optimized.keys()) - {max(poses)})
+            worst = max(numpy.linalg.norm(poses[t][:3] - self.optimized[t][:3]) for t in common)
+            # The IMU samples before the first scan are missed, so the initialisation is not the same.
+            self.assertLess(worst, LIVE_BOUND_M)
+            publisher.unregister()
+
+    def test_wrong_parameters_are_named_and_end_the_node(self):
+        outcome = tester.run(tester.program("rio_t", "rio_t_node"), "__name:=rio_t", "_config:=irs", "_windou:=1.0",
+                             "_gravity:=heavy")
+        self.assertEqual(outcome.returncode, 1, outcome.stdout)
+        self.assertIn("/rio_t/windou", outcome.stdout)
+        self.assertIn('did you mean "window"', outcome.stdout)
+        self.assertIn("/rio_t/gravity", outcome.stdout)
+        outcome = tester.run(tester.program("rio_t", "rio_t_node"), "__name:=rio_t_2", "_config:=no_such")
+        self.assertEqual(outcome.returncode, 1, outcome.stdout)
+        self.assertIn("no_such", outcome.stdout)
+
+    def test_launch_file_plays_a_bag_to_the_nodelet(self):
+        with tester.Listener() as listener, \
+                tester.Process(shutil.which("roslaunch"), "--wait", "rio_t", "irs.launch", "bag:=" + self.bag, "bag_rate:=4",
+                               "nodelet:=true") as launch:
+            listener.wait_for_stamp("odom", self.imu_stamps[-1])
+            launch.stop()
+
+    def setUp(self):
+        # Each test starts without what others left on the server.
+        for name in ("/rio_t", "/rio_t_2"):
+            if rospy.has_param(name):
+                rospy.delete_param(name)
+
+
+if __name__ == "__main__":
+    import rostest
+    rospy.init_node("live_rostest")
+    rospy.set_param("/use_sim_time", True)  # for the nodes started from here on; the tester keeps to the wall clock
+    rostest.rosrun("rio_t", "live_rostest", LiveTest)
