@@ -12,6 +12,8 @@ import traceback
 import unittest
 import xml.sax.saxutils
 
+import yaml
+
 MODELS = {"imu", "constant_acceleration"}
 SHORT = ["--seeds", "1", "--duration", "30"]
 
@@ -75,6 +77,15 @@ class Experiment(unittest.TestCase):
         self.assertEqual(rows["RIO-T imu"]["covered [%]"], f"{50 * inside}")
         self.assertEqual(rows["RIO-T imu"]["runs"], "2")
         self.assertEqual(rows["LC-RIO"]["covered [%]"], "", "LC-RIO states no offset")
+
+    def test_small_errors_are_numbers_to_yaml(self):
+        offsets = self.folder / "time_offset.csv"
+        offsets.write_text("stamp,offset_s,sigma_s\n1.0,0.00001,0.001\n2.0,0.00001,0.001\n")
+        command = [f"{PROGRAMS}/evaluate", "--yaml", "--time-offset", str(offsets), "--true-offset", "-2e-5"]
+        done = subprocess.run(command, stdout=subprocess.PIPE, universal_newlines=True, check=True)
+        result = yaml.safe_load(done.stdout)["time_offset"]
+        self.assertEqual(result["true_s"], -2e-5)
+        self.assertAlmostEqual(result["final_error_s"], 3e-5, delta=1e-12)
 
     def test_faults_are_one_line(self):
         for arguments, expected in (

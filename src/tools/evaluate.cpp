@@ -198,8 +198,9 @@ std::string quoted(const std::string& text) {
   return result + "'";
 }
 
+// Numbers as %#.9g: with a point, without which YAML 1.1 takes 2e-05 for text.
 void yamlRow(const std::string& key, const Statistics& s, const char* count_name, std::size_t count) {
-  std::printf("    %s: {rmse: %.9g, mean: %.9g, median: %.9g, max: %.9g, %s: %zu}\n", key.c_str(), s.rmse,
+  std::printf("    %s: {rmse: %#.9g, mean: %#.9g, median: %#.9g, max: %#.9g, %s: %zu}\n", key.c_str(), s.rmse,
               s.mean, s.median, s.max, count_name, count);
 }
 
@@ -223,19 +224,21 @@ void printYaml(const Evaluation& e) {
   yamlRelative("rpe_1m_all_pairs", e.metre_all);
   yamlRelative("rpe_1s", e.second);
   std::printf(
-      "    drift: {path_m: %.9g, final_m: %.9g, final_horizontal_m: %.9g, final_yaw_deg: %.9g, per_metre: "
-      "%.9g}\n",
+      "    drift: {path_m: %#.9g, final_m: %#.9g, final_horizontal_m: %#.9g, final_yaw_deg: %#.9g, "
+      "per_metre: "
+      "%#.9g}\n",
       e.drift.path_m, e.drift.final_m, e.drift.final_horizontal_m, e.drift.final_yaw_deg, e.drift.per_metre);
 }
 
 void printYaml(const std::string& file, double truth, const OffsetError& e) {
-  std::printf("time_offset:\n  file: %s\n  true_s: %.9g\n  samples: %zu\n", quoted(file).c_str(), truth,
+  std::printf("time_offset:\n  file: %s\n  true_s: %#.9g\n  samples: %zu\n", quoted(file).c_str(), truth,
               e.samples);
-  std::printf("  mean_error_s: %.9g\n  rmse_s: %.9g\n  max_error_s: %.9g\n  final_error_s: %.9g\n", e.mean,
-              e.rmse, e.max, e.final_error);
-  std::printf("  final_sigma_s: %.9g\n  share_1_sigma: %.9g\n  share_2_sigma: %.9g\n  share_3_sigma: %.9g\n",
-              e.final_sigma, e.share_1_sigma, e.share_2_sigma, e.share_3_sigma);
-  std::printf("  mean_normalised_square: %.9g\n", e.mean_normalised_square);
+  std::printf("  mean_error_s: %#.9g\n  rmse_s: %#.9g\n  max_error_s: %#.9g\n  final_error_s: %#.9g\n",
+              e.mean, e.rmse, e.max, e.final_error);
+  std::printf(
+      "  final_sigma_s: %#.9g\n  share_1_sigma: %#.9g\n  share_2_sigma: %#.9g\n  share_3_sigma: %#.9g\n",
+      e.final_sigma, e.share_1_sigma, e.share_2_sigma, e.share_3_sigma);
+  std::printf("  mean_normalised_square: %#.9g\n", e.mean_normalised_square);
 }
 
 void writeErrors(const std::string& file, const Trajectory& truth, const Trajectory& estimate,
@@ -281,7 +284,7 @@ void run(const Arguments& arguments) {
 
   if (arguments.yaml) {
     if (!evaluations.empty()) {
-      std::printf("ground_truth: %s\nmax_difference_s: %.9g\nestimates:\n",
+      std::printf("ground_truth: %s\nmax_difference_s: %#.9g\nestimates:\n",
                   quoted(arguments.trajectories.front()).c_str(), arguments.max_difference);
     }
     for (const Evaluation& evaluation : evaluations) printYaml(evaluation);
