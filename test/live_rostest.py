@@ -59,13 +59,15 @@ class LiveTest(unittest.TestCase):
         # The last scan may wait for IMU samples that the bag does not hold.
         listener.wait_for_stamp("odom_optimized", self.scan_stamps[-3])
 
-    def compare_with_bag_runner(self, listener):
+    def compare_live(self, listener, least=0.99):
         odom = {m.header.stamp.to_nsec(): m.pose.pose.position for m in listener.messages["odom"]}
         common = sorted(odom.keys() & self.live.keys())
-        self.assertGreater(len(common), 0.99 * len(self.live))
+        self.assertGreater(len(common), least * len(self.live))
         worst = max(numpy.linalg.norm(self.live[t][:3] - [odom[t].x, odom[t].y, odom[t].z]) for t in common)
         self.assertLess(worst, LIVE_BOUND_M)
 
+    def compare_with_bag_runner(self, listener):
+        self.compare_live(listener)
         response = self.call("/rio_t/save_trajectory", Trigger)
         self.assertTrue(response.success, response.message)
         saved = tester.read_tum(self.saved)
@@ -191,8 +193,7 @@ class LiveTest(unittest.TestCase):
         translation, rotation = transform.transform.translation, transform.transform.rotation
         translation.x, translation.y, translation.z = 0.03, 0.03, -0.06
         rotation.x, rotation.y, rotation.z, rotation.w = 0.69946, 0.71461, 0.00723, 0.00524
-        parameters = ("config:=irs", "extrinsics_source:=tf", "radar_frame:=radar_shown",
-                      "trajectory_file:=" + self.saved)
+        parameters = ("config:=irs", "extrinsics_source:=tf", "radar_frame:=radar_shown")
         rospy.set_param("/rio_t/extrinsics_translation", [9.0, 9.0, 9.0])  # not to be read
         with tester.Listener() as listener, tester.node(*parameters):
             listener.wait_until_heard()
@@ -203,13 +204,8 @@ class LiveTest(unittest.TestCase):
             publisher = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
             publisher.publish(TFMessage([transform]))
             self.whole_bag(listener)
-            saved = self.call("/rio_t/save_trajectory", Trigger)
-            self.assertTrue(saved.success, saved.message)
-            poses = tester.read_tum(self.saved)
-            common = sorted((poses.keys() & self.optimized.keys()) - {max(poses)})
-            worst = max(numpy.linalg.norm(poses[t][:3] - self.optimized[t][:3]) for t in common)
-            # The IMU samples before the first scan are missed, so the initialisation is not the same.
-            self.assertLess(worst, LIVE_BOUND_M)
+            # The IMU samples before the first scan (0.1 of 11 s) are missed, and the initialisation is not quite the same.
+            self.compare_live(listener, least=0.98)
             publisher.unregister()
 
     def test_wrong_parameters_are_named_and_end_the_node(self):
