@@ -575,15 +575,18 @@ def montecarlo(lab, sources, options):
         ates = [run.figure("ate_m") for run, _ in runs]
         errors = [error for _, error in runs] if method != "LC-RIO" else []
         covered = [float(abs(error) <= NORMAL_95 * run.sigma) for run, error in runs] if errors else []
-        rows.append([name, fixed(offset, 2), method, len(runs), group["failed"], fixed(mean(ates), 3),
+        # A run that initialised only at the end has small errors and says nothing.
+        used = [100 * run.figure("scans_used") / max(1.0, run.figure("scans_total")) for run, _ in runs]
+        rows.append([name, fixed(offset, 2), method, len(runs), group["failed"],
+                     fixed(min(used, default=math.nan), 0), fixed(mean(ates), 3),
                      fixed(spread(ates), 3), fixed(statistics.median(ates) if ates else math.nan, 3),
                      fixed(max(ates, default=math.nan), 3), fixed(mean(errors), 3, sign=True), fixed(spread(errors), 3),
                      fixed(mean([abs(e) for e in errors]), 3), fixed(max(map(abs, errors), default=math.nan), 3),
                      fixed(mean([run.sigma for run, _ in runs]) if errors else math.nan, 3),
                      fixed(100 * mean(covered), 0)])
     page.tables.append(Table("montecarlo", "Errors by motion and offset", [
-        "motion", "true offset [ms]", "method", "runs", "failed", "ATE mean [m]", "ATE sd [m]", "ATE median [m]",
-        "ATE max [m]", "offset error mean [ms]", "sd [ms]", "mean size [ms]", "max size [ms]", "mean sigma [ms]",
+        "motion", "true offset [ms]", "method", "runs", "failed", "least scans used [%]", "ATE mean [m]", "ATE sd [m]",
+        "ATE median [m]", "ATE max [m]", "offset error mean [ms]", "sd [ms]", "mean size [ms]", "max size [ms]", "mean sigma [ms]",
         "covered [%]"], rows))
     page.tables.append(Table("montecarlo_runs", "Each run", [
         "motion", "seed", "true offset [ms]", "method", "offset error [ms]", "sigma [ms]", "ATE [m]", "t_rel [m/m]",
