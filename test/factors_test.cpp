@@ -1,4 +1,5 @@
-// Every factor: analytic Jacobians against numeric ones on the manifold, and residuals that are zero at the truth.
+// Every factor: analytic Jacobians against numeric ones on the manifold, and residuals that are zero at the
+// truth.
 #include <cmath>
 
 #include "numeric_jacobian.h"
@@ -45,10 +46,12 @@ TEST(ImuFactor, JacobiansAreCorrect) {
   const SyntheticMotion motion;
   const ImuBuffer imu = motion.imu(0.9, 1.3, 400.0);
   const StateBlock x_i = motion.state(1.0);
-  const Preintegration pre = preintegrate(imu, motion.time(1.0), motion.time(1.1), x_i.b_g() + Eigen::Vector3d(1e-3, 2e-3, -1e-3),
-                                          x_i.b_a(), ImuNoise());
+  const Preintegration pre =
+      preintegrate(imu, motion.time(1.0), motion.time(1.1), x_i.b_g() + Eigen::Vector3d(1e-3, 2e-3, -1e-3),
+                   x_i.b_a(), ImuNoise());
   const ImuFactor factor(pre, ImuNoise(), motion.g_W);
-  expectJacobiansCorrect(factor, {values(moved(x_i, 0.1)), values(moved(motion.state(1.1), -0.2))}, 1e-6, 1e-4);
+  expectJacobiansCorrect(factor, {values(moved(x_i, 0.1)), values(moved(motion.state(1.1), -0.2))}, 1e-6,
+                         1e-4);
 }
 
 TEST(ImuFactor, ResidualIsZeroAtTheTruth) {
@@ -68,7 +71,8 @@ TEST(ImuFactor, ResidualIsZeroAtTheTruth) {
 TEST(ConstantAccelerationRadarFactor, JacobiansAreCorrect) {
   const SyntheticMotion motion;
   const ImuBuffer imu = motion.imu(0.9, 1.3, 400.0);
-  const ConstantAccelerationRadarFactor factor(measurement(motion.time(1.0)), imu.at(motion.time(1.0)), motion.g_W);
+  const ConstantAccelerationRadarFactor factor(measurement(motion.time(1.0)), imu.at(motion.time(1.0)),
+                                               motion.g_W);
   expectJacobiansCorrect(factor, {values(moved(motion.state(1.0), 0.1)), {0.04}});
 }
 
@@ -91,7 +95,8 @@ TEST(ImuRadarFactor, JacobiansAreCorrectForwardsAndBackwards) {
   const ImuBuffer imu = motion.imu(0.5, 1.6, 400.0);
   for (const double t_O : {-0.11, -0.0113, 0.0037, 0.0521, 0.2031}) {
     const ImuRadarFactor factor(measurement(motion.time(1.0)), motion.time(0.98), imu, 0.25, motion.g_W);
-    // The derivative in t_O is that of the continuous motion, the residual that of 400 Hz samples: 0.5 % apart.
+    // The derivative in t_O is that of the continuous motion, the residual that of 400 Hz samples: 0.5 %
+    // apart.
     expectJacobiansCorrect(factor, {values(moved(motion.state(0.98), 0.05)), {t_O}}, 5e-3, 1e-3);
     expectJacobiansCorrect(factor, {values(moved(motion.state(0.98), 0.05)), {t_O}}, 5e-3, 1e-3);
   }

@@ -107,7 +107,9 @@ TEST(Preintegration, BiasJacobiansPredictReintegration) {
   const SyntheticMotion motion;
   const ImuBuffer imu = motion.imu(0.0, 1.0, 400.0);
   const auto at = [&](const Eigen::Vector3d& d_bg, const Eigen::Vector3d& d_ba) {
-    return preintegrate(imu, motion.time(0.1), motion.time(0.9), motion.b_g + d_bg, motion.b_a + d_ba, ImuNoise()).delta;
+    return preintegrate(imu, motion.time(0.1), motion.time(0.9), motion.b_g + d_bg, motion.b_a + d_ba,
+                        ImuNoise())
+        .delta;
   };
   const ImuDelta delta = at(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
   const double h = 1e-5;
@@ -142,14 +144,15 @@ TEST(Preintegration, CovarianceIsThatOfManyNoisyRuns) {
       sample.acceleration += noise.accel_density * std::sqrt(rate) * draw.vector();
       noisy.add(sample);
     });
-    const Preintegration p = preintegrate(noisy, motion.time(0.0), motion.time(0.5), motion.b_g, motion.b_a, noise);
+    const Preintegration p =
+        preintegrate(noisy, motion.time(0.0), motion.time(0.5), motion.b_g, motion.b_a, noise);
     Eigen::Matrix<double, 9, 1> e;
     e << so3::log(expected.delta.dR.conjugate() * p.delta.dR), p.delta.dp - expected.delta.dp,
         p.delta.dv - expected.delta.dv;
     sum += e * e.transpose();
   }
-  // Whitened, the sample covariance is the identity up to its own spread, 1/sqrt(runs) = 2 % an entry, and up to the
-  // end samples, which the trapezoid counts half: 1 % at 50 samples.
+  // Whitened, the sample covariance is the identity up to its own spread, 1/sqrt(runs) = 2 % an entry, and up
+  // to the end samples, which the trapezoid counts half: 1 % at 50 samples.
   Eigen::Matrix<double, 9, 9> whitening = Eigen::Matrix<double, 9, 9>::Identity();
   expected.covariance.llt().matrixL().solveInPlace(whitening);
   const Eigen::Matrix<double, 9, 9> whitened = whitening * (sum / runs) * whitening.transpose();
@@ -160,7 +163,8 @@ TEST(Levelling, AnyMountingPutsGravityDown) {
   for (int axis = 0; axis < 3; ++axis) {
     for (const double sign : {1.0, -1.0}) {
       const Eigen::Vector3d f_I = sign * 9.81 * Eigen::Vector3d::Unit(axis);
-      EXPECT_LT((levelingRotation(f_I) * f_I - Eigen::Vector3d(0, 0, 9.81)).norm(), 1e-9) << axis << " " << sign;
+      EXPECT_LT((levelingRotation(f_I) * f_I - Eigen::Vector3d(0, 0, 9.81)).norm(), 1e-9)
+          << axis << " " << sign;
     }
   }
 }
@@ -178,8 +182,8 @@ std::optional<StaticInitialization> feed(StaticInitializer& initializer, double 
   Noise draw;
   for (int i = 0; i < static_cast<int>(seconds * 200.0); ++i) {
     const double t = from + i / 200.0;
-    const auto result = initializer.add({Time::fromSeconds(t), gyro + (0.002 + extra) * draw.vector(),
-                                         accel + 0.02 * draw.vector()});
+    const auto result = initializer.add(
+        {Time::fromSeconds(t), gyro + (0.002 + extra) * draw.vector(), accel + 0.02 * draw.vector()});
     if (result) return result;
   }
   return std::nullopt;

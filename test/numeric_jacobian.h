@@ -10,8 +10,9 @@
 
 namespace rio_t {
 
-/// Compares the Jacobians of a factor with central differences on the manifold: blocks of 16 are states, moved with
-/// boxplus; blocks of 1 are offsets. `tolerance` is relative to the largest entry of the block's Jacobian.
+/// Compares the Jacobians of a factor with central differences on the manifold: blocks of 16 are states,
+/// moved with boxplus; blocks of 1 are offsets. `tolerance` is relative to the largest entry of the block's
+/// Jacobian.
 inline void expectJacobiansCorrect(const ceres::CostFunction& cost, std::vector<std::vector<double>> blocks,
                                    double tolerance = 1e-6, double step = 1e-5) {
   const int rows = cost.num_residuals();
@@ -49,8 +50,9 @@ inline void expectJacobiansCorrect(const ceres::CostFunction& cost, std::vector<
       actual.col(i) = analytic[b].col(is_state && i >= 3 ? i + 1 : i);
     }
     const double scale = std::max(1.0, expected.cwiseAbs().maxCoeff());
-    EXPECT_LT((actual - expected).cwiseAbs().maxCoeff() / scale, tolerance)
-        << "block " << b << "\nanalytic\n" << actual << "\nnumeric\n" << expected;
+    EXPECT_LT((actual - expected).cwiseAbs().maxCoeff() / scale, tolerance) << "block " << b << "\nanalytic\n"
+                                                                            << actual << "\nnumeric\n"
+                                                                            << expected;
   }
 }
 

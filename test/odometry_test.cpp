@@ -10,7 +10,9 @@ namespace rio_t {
 namespace {
 
 /// At rest on the ground: gravity up, no rotation.
-ImuMeasurement restSample(double t) { return {Time::fromSeconds(t), Eigen::Vector3d::Zero(), {0.0, 0.0, 9.81}}; }
+ImuMeasurement restSample(double t) {
+  return {Time::fromSeconds(t), Eigen::Vector3d::Zero(), {0.0, 0.0, 9.81}};
+}
 
 RadarScan restScan(double t) {
   RadarScan scan;

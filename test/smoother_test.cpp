@@ -1,4 +1,5 @@
-// The chain: marginalisation and covariance against dense linear algebra. The smoother: a known motion is recovered.
+// The chain: marginalisation and covariance against dense linear algebra. The smoother: a known motion is
+// recovered.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -33,7 +34,8 @@ struct DenseChain {
       if (k + 1 == nodes) continue;
       for (int i = 0; i < kNodeTangent * kNodeTangent; ++i) chain.coupling[k](i) = 0.1 * wave(7000 * k + i);
       H.block(k * kNodeTangent, (k + 1) * kNodeTangent, kNodeTangent, kNodeTangent) = chain.coupling[k];
-      H.block((k + 1) * kNodeTangent, k * kNodeTangent, kNodeTangent, kNodeTangent) = chain.coupling[k].transpose();
+      H.block((k + 1) * kNodeTangent, k * kNodeTangent, kNodeTangent, kNodeTangent) =
+          chain.coupling[k].transpose();
     }
   }
   ChainSystem chain;
@@ -65,7 +67,8 @@ TEST(Chain, ThePriorCarriesInformationAndGradient) {
   for (int i = 0; i < kNodeTangent; ++i) information.s(i) = wave(40 + i);
   const NodePrior prior = priorFromInformation(information, StateBlock(), 0.02);
   const NodeVector scale = information.S.diagonal().cwiseSqrt();
-  const NodeMatrix error = scale.cwiseInverse().asDiagonal() * (prior.J.transpose() * prior.J - information.S) *
+  const NodeMatrix error = scale.cwiseInverse().asDiagonal() *
+                           (prior.J.transpose() * prior.J - information.S) *
                            scale.cwiseInverse().asDiagonal();
   EXPECT_LT(error.norm(), 1e-10);
   EXPECT_LT((prior.J.transpose() * prior.r0 - information.s).cwiseQuotient(scale).norm(), 1e-9);
@@ -85,7 +88,8 @@ TEST(Chain, CovarianceOfTheLastNodeIsThatOfTheFullInverse) {
   const DenseChain dense(4);
   const Eigen::MatrixXd covariance = dense.H.inverse();
   const NodeMatrix last = covarianceOfLast(dense.chain);
-  EXPECT_LT((last - covariance.bottomRightCorner<kNodeTangent, kNodeTangent>()).norm(), 1e-12 + 1e-9 * last.norm());
+  EXPECT_LT((last - covariance.bottomRightCorner<kNodeTangent, kNodeTangent>()).norm(),
+            1e-12 + 1e-9 * last.norm());
 }
 
 class Smoother : public ::testing::Test {
@@ -174,8 +178,10 @@ TEST_F(Smoother, AShortWindowEqualsALongOneWhereTheProblemIsNearlyLinear) {
 TEST_F(Smoother, ALateScanIsInsertedAtItsTime) {
   SmootherOptions options;
   FixedLagSmoother in_order = make(options), late = make(options);
-  for (const double stamp : {0.7, 0.8, 0.9, 1.0}) EXPECT_EQ(in_order.add(measurement(stamp, 0.0)), FixedLagSmoother::AddResult::kAdded);
-  for (const double stamp : {0.7, 0.9, 1.0, 0.8}) EXPECT_EQ(late.add(measurement(stamp, 0.0)), FixedLagSmoother::AddResult::kAdded);
+  for (const double stamp : {0.7, 0.8, 0.9, 1.0})
+    EXPECT_EQ(in_order.add(measurement(stamp, 0.0)), FixedLagSmoother::AddResult::kAdded);
+  for (const double stamp : {0.7, 0.9, 1.0, 0.8})
+    EXPECT_EQ(late.add(measurement(stamp, 0.0)), FixedLagSmoother::AddResult::kAdded);
   for (int i = 0; i < 3; ++i) {
     in_order.optimize();
     late.optimize();

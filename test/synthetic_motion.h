@@ -9,8 +9,8 @@
 
 namespace rio_t {
 
-/// A smooth motion with closed-form derivatives, for tests: position is a sum of sines, orientation a spin about a
-/// fixed axis with a varying angle after a constant tilt. Biases are constant.
+/// A smooth motion with closed-form derivatives, for tests: position is a sum of sines, orientation a spin
+/// about a fixed axis with a varying angle after a constant tilt. Biases are constant.
 struct SyntheticMotion {
   Eigen::Vector3d g_W{0.0, 0.0, -9.81};
   Eigen::Vector3d b_g{0.004, -0.003, 0.002};

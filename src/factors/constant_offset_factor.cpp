@@ -2,7 +2,8 @@
 
 namespace rio_t {
 
-bool ConstantOffsetFactor::Evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
+bool ConstantOffsetFactor::Evaluate(double const* const* parameters, double* residuals,
+                                    double** jacobians) const {
   residuals[0] = weight_ * (parameters[1][0] - parameters[0][0]);
   if (jacobians == nullptr) return true;
   if (jacobians[0] != nullptr) jacobians[0][0] = -weight_;

@@ -26,12 +26,14 @@ bool ImuFactor::Evaluate(double const* const* parameters, double* residuals, dou
 
   const Eigen::Vector3d dR_correction = d.dR_dbg * d_bg;
   const Eigen::Matrix3d R_i_T = i.q_WI.toRotationMatrix().transpose();
-  const Eigen::Vector3d e_R = so3::log((d.dR * so3::exp(dR_correction)).conjugate() * i.q_WI.conjugate() * j.q_WI);
+  const Eigen::Vector3d e_R =
+      so3::log((d.dR * so3::exp(dR_correction)).conjugate() * i.q_WI.conjugate() * j.q_WI);
   const Eigen::Vector3d p_I = R_i_T * (j.p_W - i.p_W - T * i.v_W - 0.5 * T * T * g_W_);
   const Eigen::Vector3d v_I = R_i_T * (j.v_W - i.v_W - T * g_W_);
 
   Eigen::Matrix<double, 9, 1> e;
-  e << e_R, p_I - (d.dp + d.dp_dbg * d_bg + d.dp_dba * d_ba), v_I - (d.dv + d.dv_dbg * d_bg + d.dv_dba * d_ba);
+  e << e_R, p_I - (d.dp + d.dp_dbg * d_bg + d.dp_dba * d_ba),
+      v_I - (d.dv + d.dv_dbg * d_bg + d.dv_dba * d_ba);
   Eigen::Map<Eigen::Matrix<double, 15, 1>> r(residuals);
   r.head<9>().noalias() = whitening_.triangularView<Eigen::Lower>() * e;
   r.segment<3>(9) = gyro_walk_weight_ * (j.b_g - i.b_g);
@@ -44,8 +46,8 @@ bool ImuFactor::Evaluate(double const* const* parameters, double* residuals, dou
     Eigen::Map<StateJacobian<15>> J(jacobians[0]);
     Eigen::Matrix<double, 9, S::kSize> E = Eigen::Matrix<double, 9, S::kSize>::Zero();
     E.block<3, 3>(0, S::kQStored) = -Jr_inv * (j.q_WI.conjugate() * i.q_WI).toRotationMatrix();
-    E.block<3, 3>(0, S::kBgStored) = -Jr_inv * so3::exp(e_R).toRotationMatrix().transpose() *
-                                     so3::rightJacobian(dR_correction) * d.dR_dbg;
+    E.block<3, 3>(0, S::kBgStored) =
+        -Jr_inv * so3::exp(e_R).toRotationMatrix().transpose() * so3::rightJacobian(dR_correction) * d.dR_dbg;
     E.block<3, 3>(3, S::kQStored) = so3::hat(p_I);
     E.block<3, 3>(3, S::kPStored) = -R_i_T;
     E.block<3, 3>(3, S::kVStored) = -T * R_i_T;
@@ -74,7 +76,8 @@ bool ImuFactor::Evaluate(double const* const* parameters, double* residuals, dou
   return true;
 }
 
-StateBlock predict(const StateBlock& state_i, const Preintegration& preintegration, const Eigen::Vector3d& g_W) {
+StateBlock predict(const StateBlock& state_i, const Preintegration& preintegration,
+                   const Eigen::Vector3d& g_W) {
   const ImuDelta& d = preintegration.delta;
   const Eigen::Vector3d d_bg = state_i.b_g() - preintegration.b_g;
   const Eigen::Vector3d d_ba = state_i.b_a() - preintegration.b_a;

@@ -9,8 +9,8 @@
 namespace rio_t {
 namespace {
 
-/// Half width of the window over which the angular acceleration is averaged [s]: about a radar frame, so that the
-/// noise of single gyro samples does not pass for information about the offset.
+/// Half width of the window over which the angular acceleration is averaged [s]: about a radar frame, so that
+/// the noise of single gyro samples does not pass for information about the offset.
 constexpr double kAngularAccelerationHalfWidth = 0.01;
 
 Eigen::Matrix3d whitening(const Eigen::Matrix3d& covariance) {
@@ -66,9 +66,10 @@ bool ImuRadarFactor::Evaluate(double const* const* parameters, double* residuals
   const Time tau = z_.stamp - t_O;
 
   ImuDelta delta;
-  imu_->forEachInterval(state_time_, tau, [&](double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
-    delta.step(dt, gyro - x.b_g, accel - x.b_a);
-  });
+  imu_->forEachInterval(state_time_, tau,
+                        [&](double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
+                          delta.step(dt, gyro - x.b_g, accel - x.b_a);
+                        });
   const ImuMeasurement at_tau = imu_->at(tau);
   const Eigen::Vector3d omega = at_tau.angular_velocity - x.b_g;
 

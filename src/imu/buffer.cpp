@@ -6,7 +6,8 @@
 namespace rio_t {
 
 void ImuBuffer::add(const ImuMeasurement& imu) {
-  if (!empty() && imu.time <= newest()) throw std::invalid_argument("ImuBuffer: sample not later than the newest");
+  if (!empty() && imu.time <= newest())
+    throw std::invalid_argument("ImuBuffer: sample not later than the newest");
   samples_.push_back(imu);
 }
 

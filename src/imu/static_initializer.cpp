@@ -54,14 +54,15 @@ std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement&
     fault = format("rest: the gyro moves by %.3f rad/s (std), at most %.3f allowed", gyro.std.maxCoeff(),
                    options_.max_gyro_std);
   } else if (accel.std.maxCoeff() > options_.max_accel_std) {
-    fault = format("rest: the accelerometer moves by %.2f m/s^2 (std), at most %.2f allowed", accel.std.maxCoeff(),
-                   options_.max_accel_std);
+    fault = format("rest: the accelerometer moves by %.2f m/s^2 (std), at most %.2f allowed",
+                   accel.std.maxCoeff(), options_.max_accel_std);
   } else if (gyro.mean.norm() > options_.max_gyro_mean) {
-    fault = format("rest: mean gyro %.3f rad/s, at most %.3f allowed: turning, or not in rad/s?", gyro.mean.norm(),
-                   options_.max_gyro_mean);
+    fault = format("rest: mean gyro %.3f rad/s, at most %.3f allowed: turning, or not in rad/s?",
+                   gyro.mean.norm(), options_.max_gyro_mean);
   } else if (std::abs(gravity_error) > options_.max_gravity_error) {
-    fault = format("rest: mean accelerometer %.2f m/s^2 instead of gravity %.2f: accelerating, or not in m/s^2?",
-                   accel.mean.norm(), gravity_);
+    fault =
+        format("rest: mean accelerometer %.2f m/s^2 instead of gravity %.2f: accelerating, or not in m/s^2?",
+               accel.mean.norm(), gravity_);
   }
   if (!fault.empty()) {
     waiting_for_ = fault;

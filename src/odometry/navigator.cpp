@@ -44,7 +44,8 @@ void Navigator::propagate(const ImuMeasurement& from, const ImuMeasurement& to) 
   // Where the state lies between two samples, the signal is interpolated at the state.
   const double span = to.time - from.time;
   const double share = span > 0.0 ? std::min(1.0, dt / span) : 1.0;
-  const Eigen::Vector3d gyro = to.angular_velocity - 0.5 * share * (to.angular_velocity - from.angular_velocity);
+  const Eigen::Vector3d gyro =
+      to.angular_velocity - 0.5 * share * (to.angular_velocity - from.angular_velocity);
   const Eigen::Vector3d accel = to.acceleration - 0.5 * share * (to.acceleration - from.acceleration);
   const Eigen::Vector3d omega = gyro - x.b_g;
   const Eigen::Vector3d a = accel - x.b_a;

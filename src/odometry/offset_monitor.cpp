@@ -6,7 +6,12 @@
 
 namespace rio_t {
 
-void OffsetMonitor::clear() { *this = OffsetMonitor(options_); }
+bool OffsetMonitor::movedFar(double t_O, double sigma) {
+  const double limit = options_.relinearization;
+  if (!options_.enabled || std::abs(t_O - t_O_learnt_at_) < limit || sigma > 0.5 * limit) return false;
+  t_O_learnt_at_ = t_O;
+  return true;
+}
 
 bool OffsetMonitor::stepped(Time stamp, const Eigen::Vector3d& innovation, const Eigen::Matrix3d& S,
                             const Eigen::Vector3d& J) {
@@ -22,11 +27,13 @@ bool OffsetMonitor::stepped(Time stamp, const Eigen::Vector3d& innovation, const
   if (count_ < 30.0 || information_ <= 0.0) return false;
 
   const double change = projection_ / information_;
-  // The scatter that the change itself does not explain; S is a bound on the safe side, so it may well be below 1.
+  // The scatter that the change itself does not explain; S is a bound on the safe side, so it may well be
+  // below 1.
   const double scatter = std::max(0.2, (squares_ - change * projection_) / count_);
   const double sigma = std::sqrt(scatter / information_);
-  if (std::abs(change) < options_.significance * sigma || std::abs(change) < options_.min_change) return false;
-  clear();
+  if (std::abs(change) < options_.significance * sigma || std::abs(change) < options_.min_change)
+    return false;
+  *this = OffsetMonitor(options_, t_O_learnt_at_);
   return true;
 }
 

@@ -45,7 +45,7 @@ struct RadarInertialOdometry::Impl {
         initializer(options.initialization, options.gravity),
         ego_velocity_estimator(options.ego_velocity),
         feasibility(options.feasibility),
-        offset_monitor(options.offset_monitor),
+        offset_monitor(options.offset_monitor, options.smoother.time_offset_initial),
         smoother(options.smoother, options.imu_noise, g_W, imu) {
     waiting_for = initializer.waitingFor();
   }
@@ -90,7 +90,8 @@ struct RadarInertialOdometry::Impl {
   std::vector<ImuMeasurement> imu_drained;
 };
 
-RadarInertialOdometry::RadarInertialOdometry(const OdometryOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+RadarInertialOdometry::RadarInertialOdometry(const OdometryOptions& options)
+    : impl_(std::make_unique<Impl>(options)) {}
 RadarInertialOdometry::~RadarInertialOdometry() = default;
 RadarInertialOdometry::RadarInertialOdometry(RadarInertialOdometry&&) noexcept = default;
 RadarInertialOdometry& RadarInertialOdometry::operator=(RadarInertialOdometry&&) noexcept = default;
@@ -217,20 +218,22 @@ std::optional<ScanResult> RadarInertialOdometry::Impl::tryScan(const RadarScan& 
   const bool at_rest = isAtRest(node_time);
   result.rejected_because = measureVelocity(scan, at_rest, result.ego_velocity);
   if (result.rejected_because.empty()) {
-    result.rejected_because = toString(smoother.add({scan.stamp, result.ego_velocity.v_R,
-                                                     result.ego_velocity.covariance, R_RI, options.T_IR.l_I}));
+    result.rejected_because = toString(smoother.add(
+        {scan.stamp, result.ego_velocity.v_R, result.ego_velocity.covariance, R_RI, options.T_IR.l_I}));
   }
   result.used = result.rejected_because.empty();
   if (result.used) last_used = scan.stamp;
   result.updated = result.used;
   if (at_rest) {
-    result.updated |= smoother.addRest(scan.stamp, options.rest.velocity_sigma) == FixedLagSmoother::AddResult::kAdded;
+    result.updated |=
+        smoother.addRest(scan.stamp, options.rest.velocity_sigma) == FixedLagSmoother::AddResult::kAdded;
   }
   if (result.updated) updateWindow(result);
   return result;
 }
 
-std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, bool at_rest, EgoVelocity& measured) {
+std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, bool at_rest,
+                                                         EgoVelocity& measured) {
   const auto prediction = smoother.predictRadarVelocity(scan.stamp, R_RI, options.T_IR.l_I);
   std::optional<VelocityPrior> prior;
   if (prediction) prior = prediction->velocity;
@@ -277,8 +280,13 @@ void RadarInertialOdometry::Impl::updateWindow(ScanResult& result) {
   const NodeMatrix covariance = smoother.newestCovariance();
   result.state = newestState(covariance);
   result.time_offset = smoother.newest().t_O;
-  result.time_offset_sigma =
-      options.smoother.estimate_time_offset ? std::sqrt(covariance(StateBlock::kTangent, StateBlock::kTangent)) : 0.0;
+  result.time_offset_sigma = options.smoother.estimate_time_offset
+                                 ? std::sqrt(covariance(StateBlock::kTangent, StateBlock::kTangent))
+                                 : 0.0;
+  if (options.smoother.estimate_time_offset &&
+      offset_monitor.movedFar(result.time_offset, result.time_offset_sigma)) {
+    smoother.loosenTimeOffset();
+  }
   const std::lock_guard<std::mutex> lock(navigation_mutex);
   navigator.anchor(result.state);
 }

@@ -225,6 +225,8 @@ void listTimeOffset(ParameterList& list, Config& c) {
               "standard deviations of the change that the scans ask for");
   list.number("time_offset_step_min", "s", above(0), monitor.min_change,
               "smaller steps are left to the random walk");
+  list.number("time_offset_relinearization", "s", above(0), monitor.relinearization,
+              "an estimate that came this far, and is sure to half of it, forgets what it learnt on the way");
 }
 
 void listSmoother(ParameterList& list, Config& c) {

@@ -10,7 +10,8 @@ namespace rio_t {
 namespace {
 
 constexpr int kState = StateBlock::kTangent;
-using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kNodeTangent, kNodeTangent>;
+using RowMatrix =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kNodeTangent, kNodeTangent>;
 using Residual = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kNodeTangent, 1>;
 using Tangents = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kNodeTangent, kNodeTangent>;
 
@@ -22,10 +23,12 @@ struct Linearization {
 Linearization evaluate(const ceres::CostFunction& cost, const double* block0, const double* block1) {
   const int rows = cost.num_residuals();
   const std::vector<int>& sizes = cost.parameter_block_sizes();
-  Linearization lin{Residual(rows), RowMatrix(rows, sizes[0]), RowMatrix(rows, sizes.size() > 1 ? sizes[1] : 0)};
+  Linearization lin{Residual(rows), RowMatrix(rows, sizes[0]),
+                    RowMatrix(rows, sizes.size() > 1 ? sizes[1] : 0)};
   const double* blocks[] = {block0, block1};
   double* jacobians[] = {lin.J0.data(), lin.J1.data()};
-  if (!cost.Evaluate(blocks, lin.r.data(), jacobians)) throw std::runtime_error("chain: a factor cannot be evaluated");
+  if (!cost.Evaluate(blocks, lin.r.data(), jacobians))
+    throw std::runtime_error("chain: a factor cannot be evaluated");
   return lin;
 }
 
@@ -108,8 +111,8 @@ NodeInformation eliminateFirst(const NodeMatrix& H00, const NodeMatrix& H01, con
 }
 
 NodePrior priorFromInformation(const NodeInformation& information, const StateBlock& x0, double t_O0) {
-  // The entries differ by many orders of magnitude (metres, biases): scale to a unit diagonal first, so that "carries
-  // no information" does not depend on the units.
+  // The entries differ by many orders of magnitude (metres, biases): scale to a unit diagonal first, so that
+  // "carries no information" does not depend on the units.
   const NodeVector scale = information.S.diagonal().cwiseMax(0.0).cwiseSqrt();
   const NodeVector inverse = (scale.array() > 0.0).select(scale.cwiseInverse(), NodeVector::Zero());
   const NodeMatrix scaled = inverse.asDiagonal() * information.S * inverse.asDiagonal();
@@ -134,8 +137,8 @@ NodeMatrix covarianceOfLast(const ChainSystem& system) {
   NodeInformation information;
   information.S = system.diagonal.front();
   for (std::size_t k = 0; k + 1 < system.diagonal.size(); ++k) {
-    information = eliminateFirst(information.S, system.coupling[k], NodeVector::Zero(), system.diagonal[k + 1],
-                                 NodeVector::Zero());
+    information = eliminateFirst(information.S, system.coupling[k], NodeVector::Zero(),
+                                 system.diagonal[k + 1], NodeVector::Zero());
   }
   const NodeMatrix covariance = information.S.ldlt().solve(NodeMatrix::Identity());
   return 0.5 * (covariance + covariance.transpose());

@@ -10,8 +10,8 @@
 namespace rio_t {
 namespace {
 
-/// Nodes of the imu model nearer than this share one node [s]: the factor bridges the rest, and an IMU factor over
-/// no time would weigh infinitely.
+/// Nodes of the imu model nearer than this share one node [s]: the factor bridges the rest, and an IMU factor
+/// over no time would weigh infinitely.
 constexpr double kMinNodeSpacing = 0.005;
 
 ceres::Problem::Options borrowingProblem() {
@@ -44,8 +44,8 @@ std::pair<StateMatrix, StateMatrix> tangentJacobians(const ImuFactor& factor, co
 
 }  // namespace
 
-FixedLagSmoother::FixedLagSmoother(const SmootherOptions& options, const ImuNoise& noise, const Eigen::Vector3d& g_W,
-                                   const ImuBuffer& imu)
+FixedLagSmoother::FixedLagSmoother(const SmootherOptions& options, const ImuNoise& noise,
+                                   const Eigen::Vector3d& g_W, const ImuBuffer& imu)
     : options_(options), noise_(noise), g_W_(g_W), imu_(&imu) {
   if (options_.huber_threshold > 0.0) loss_ = std::make_unique<ceres::HuberLoss>(options_.huber_threshold);
 }
@@ -59,7 +59,9 @@ void FixedLagSmoother::initialize(Time time, const StateBlock& x, double gyro_bi
   // theta lives in I, the sigmas are given in W.
   prior.J.block<3, 3>(StateBlock::kTheta, StateBlock::kTheta) =
       sigma_W.cwiseInverse().asDiagonal() * x.q_WI().toRotationMatrix();
-  const auto set = [&](int first, double sigma) { prior.J.diagonal().segment<3>(first).setConstant(1.0 / sigma); };
+  const auto set = [&](int first, double sigma) {
+    prior.J.diagonal().segment<3>(first).setConstant(1.0 / sigma);
+  };
   set(StateBlock::kP, options_.prior_sigma_position);
   set(StateBlock::kV, options_.prior_sigma_velocity);
   set(StateBlock::kBg, std::hypot(options_.prior_sigma_gyro_bias, gyro_bias_sigma));
@@ -80,9 +82,8 @@ Time FixedLagSmoother::nodeTime(Time stamp) const {
   return options_.time_offset_model == TimeOffsetModel::kImu ? stamp - nodes_.back().t_O : stamp;
 }
 
-std::optional<RadarVelocityPrediction> FixedLagSmoother::predictRadarVelocity(Time stamp,
-                                                                              const Eigen::Matrix3d& R_RI,
-                                                                              const Eigen::Vector3d& l_I) const {
+std::optional<RadarVelocityPrediction> FixedLagSmoother::predictRadarVelocity(
+    Time stamp, const Eigen::Matrix3d& R_RI, const Eigen::Vector3d& l_I) const {
   const Node& newest = nodes_.back();
   const Time time = nodeTime(stamp);
   if (time < newest.time) return std::nullopt;
@@ -168,8 +169,8 @@ FixedLagSmoother::Node* FixedLagSmoother::nodeAt(Time time) {
 FixedLagSmoother::Node FixedLagSmoother::makeNode(Time time, const Node& previous) const {
   Node node;
   node.time = time;
-  node.x = predict(previous.x, preintegrate(*imu_, previous.time, time, previous.x.b_g(), previous.x.b_a(), noise_),
-                   g_W_);
+  node.x = predict(
+      previous.x, preintegrate(*imu_, previous.time, time, previous.x.b_g(), previous.x.b_a(), noise_), g_W_);
   node.t_O = previous.t_O;
   return node;
 }
@@ -178,7 +179,8 @@ void FixedLagSmoother::linkToPrevious(std::size_t k) {
   const Node& previous = nodes_[k - 1];
   Node& node = nodes_[k];
   node.imu_from_previous = std::make_unique<ImuFactor>(
-      preintegrate(*imu_, previous.time, node.time, previous.x.b_g(), previous.x.b_a(), noise_), noise_, g_W_);
+      preintegrate(*imu_, previous.time, node.time, previous.x.b_g(), previous.x.b_a(), noise_), noise_,
+      g_W_);
   node.offset_from_previous =
       std::make_unique<ConstantOffsetFactor>(std::sqrt(offsetVariance(node.time - previous.time)));
 }
@@ -225,7 +227,8 @@ SolveReport FixedLagSmoother::optimize() {
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
 
-  for (Node& node : nodes_) node.t_O = std::clamp(node.t_O, -options_.max_time_offset, options_.max_time_offset);
+  for (Node& node : nodes_)
+    node.t_O = std::clamp(node.t_O, -options_.max_time_offset, options_.max_time_offset);
   newest_covariance_ = covarianceOfLast(linearize());
   return {static_cast<int>(summary.iterations.size()), summary.termination_type == ceres::CONVERGENCE};
 }
@@ -257,13 +260,14 @@ std::vector<NodeEstimate> FixedLagSmoother::marginalize() {
     const Node& second = nodes_[1];
     system.addStateAndOffset(0, *prior_, first.x.data(), &first.t_O, nullptr, false);
     for (const RadarTerm& term : first.radar) {
-      system.addStateAndOffset(0, *term.cost, first.x.data(), &first.t_O, loss_.get(), !options_.estimate_time_offset);
+      system.addStateAndOffset(0, *term.cost, first.x.data(), &first.t_O, loss_.get(),
+                               !options_.estimate_time_offset);
     }
     if (first.rest) system.addState(0, *first.rest, first.x.data());
     system.addStatePair(0, *second.imu_from_previous, first.x.data(), second.x.data());
     system.addOffsetPair(0, *second.offset_from_previous, &first.t_O, &second.t_O);
-    const NodeInformation remaining = eliminateFirst(system.diagonal[0], system.coupling[0], system.gradient[0],
-                                                     system.diagonal[1], system.gradient[1]);
+    const NodeInformation remaining = eliminateFirst(
+        system.diagonal[0], system.coupling[0], system.gradient[0], system.diagonal[1], system.gradient[1]);
     prior_ = std::make_unique<PriorFactor>(priorFromInformation(remaining, second.x, second.t_O));
 
     left.push_back(node(0));
@@ -287,8 +291,8 @@ std::string toString(FixedLagSmoother::AddResult result) {
 }
 
 Time FixedLagSmoother::imuNeededSince() const {
-  // Offsets move a radar factor's time by at most the bound to either side of its stamp, and the stamp lies within
-  // the bound of the node.
+  // Offsets move a radar factor's time by at most the bound to either side of its stamp, and the stamp lies
+  // within the bound of the node.
   return nodes_.front().time - 2.0 * options_.max_time_offset;
 }
 

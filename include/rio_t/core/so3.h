@@ -5,8 +5,8 @@
 #include <cmath>
 
 /// Rotations: exponential and logarithm of SO(3) with their Jacobians.
-/// Source: Forster et al., "On-Manifold Preintegration for Real-Time Visual-Inertial Odometry", TRO 2017, eq. (1)-(11).
-/// Perturbations are on the right everywhere: R <- R Exp(delta).
+/// Source: Forster et al., "On-Manifold Preintegration for Real-Time Visual-Inertial Odometry", TRO 2017, eq.
+/// (1)-(11). Perturbations are on the right everywhere: R <- R Exp(delta).
 namespace rio_t::so3 {
 
 /// Cross-product matrix: hat(a) * b = a x b.

@@ -7,8 +7,8 @@ namespace rio_t {
 
 /// A point in time of the IMU clock, in whole nanoseconds since the epoch of that clock.
 ///
-/// Nanoseconds, not double seconds: at a Unix epoch a double resolves 0.24 us, so a stamp would not survive the
-/// way from message to estimate and back unchanged. Differences are double seconds.
+/// Nanoseconds, not double seconds: at a Unix epoch a double resolves 0.24 us, so a stamp would not survive
+/// the way from message to estimate and back unchanged. Differences are double seconds.
 class Time {
  public:
   constexpr Time() = default;

@@ -31,6 +31,7 @@ class ImuFactor final : public ceres::SizedCostFunction<15, StateBlock::kSize, S
 };
 
 /// Mean of state j given state i: where the IMU carries it (right side of the factor set to zero).
-StateBlock predict(const StateBlock& state_i, const Preintegration& preintegration, const Eigen::Vector3d& g_W);
+StateBlock predict(const StateBlock& state_i, const Preintegration& preintegration,
+                   const Eigen::Vector3d& g_W);
 
 }  // namespace rio_t

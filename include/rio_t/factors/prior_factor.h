@@ -15,7 +15,7 @@ using NodeMatrix = Eigen::Matrix<double, kNodeTangent, kNodeTangent>;
 /// The prior at the start, and what marginalisation leaves of all that has left the window.
 struct NodePrior {
   StateBlock x0;
-  double t_O0 = 0.0;                      ///< [s]
+  double t_O0 = 0.0;  ///< [s]
   NodeMatrix J = NodeMatrix::Zero();
   NodeVector r0 = NodeVector::Zero();
 };

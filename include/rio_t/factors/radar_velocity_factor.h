@@ -13,11 +13,11 @@ namespace rio_t {
 
 /// One ego-velocity of the radar, as the factors need it.
 struct RadarVelocityMeasurement {
-  Time stamp;                                               ///< measured at stamp - t_O
-  Eigen::Vector3d v_R = Eigen::Vector3d::Zero();            ///< radar velocity, in R [m/s]
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity(); ///< in R [m^2/s^2]
-  Eigen::Matrix3d R_RI = Eigen::Matrix3d::Identity();       ///< turns I into R
-  Eigen::Vector3d l_I = Eigen::Vector3d::Zero();            ///< radar origin in I [m]
+  Time stamp;                                                ///< measured at stamp - t_O
+  Eigen::Vector3d v_R = Eigen::Vector3d::Zero();             ///< radar velocity, in R [m/s]
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  ///< in R [m^2/s^2]
+  Eigen::Matrix3d R_RI = Eigen::Matrix3d::Identity();        ///< turns I into R
+  Eigen::Vector3d l_I = Eigen::Vector3d::Zero();             ///< radar origin in I [m]
 };
 
 /// The paper's model, eq. (4)-(5) (docs/method.md, eq. 13): one acceleration stands for the whole shift.
@@ -38,14 +38,15 @@ class ConstantAccelerationRadarFactor final : public ceres::SizedCostFunction<3,
 };
 
 /// The IMU itself over the shift (docs/method.md, eq. 14-18). Blocks: state at `state_time`, t_O.
-///   h = R_RI [ dR^T (R_IW (v_W + g_W T) + dv) + (omega(tau) - b_g) x l ],   tau = stamp - t_O,   T = tau - state_time,
-/// where dR, dv integrate the IMU from the state to tau, forwards or backwards, at the current biases. Exact for any
-/// shift that the IMU covers; the nearer the state is to tau, the cheaper. Residual: h - z, whitened.
+///   h = R_RI [ dR^T (R_IW (v_W + g_W T) + dv) + (omega(tau) - b_g) x l ],   tau = stamp - t_O,   T = tau -
+///   state_time,
+/// where dR, dv integrate the IMU from the state to tau, forwards or backwards, at the current biases. Exact
+/// for any shift that the IMU covers; the nearer the state is to tau, the cheaper. Residual: h - z, whitened.
 /// `imu` must outlive the factor and keep the samples between state_time and stamp -+ max_time_offset.
 class ImuRadarFactor final : public ceres::SizedCostFunction<3, StateBlock::kSize, 1> {
  public:
-  ImuRadarFactor(const RadarVelocityMeasurement& z, Time state_time, const ImuBuffer& imu, double max_time_offset,
-                 const Eigen::Vector3d& g_W);
+  ImuRadarFactor(const RadarVelocityMeasurement& z, Time state_time, const ImuBuffer& imu,
+                 double max_time_offset, const Eigen::Vector3d& g_W);
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
 
  private:

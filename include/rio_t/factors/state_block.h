@@ -7,13 +7,13 @@ namespace rio_t {
 
 /// State of the platform at one time, as one block of parameters for the solver.
 ///
-/// Storage (16): q_WI (x y z w), p_W, v_W, b_g, b_a. Tangent (15), see `boxplus`: theta, p, v, b_g, b_a, where
-/// theta perturbs on the right: R_WI <- R_WI Exp(theta). The time offset t_O is a block of its own.
+/// Storage (16): q_WI (x y z w), p_W, v_W, b_g, b_a. Tangent (15), see `boxplus`: theta, p, v, b_g, b_a,
+/// where theta perturbs on the right: R_WI <- R_WI Exp(theta). The time offset t_O is a block of its own.
 class StateBlock {
  public:
   static constexpr int kSize = 16;
   static constexpr int kTangent = 15;
-  enum Tangent { kTheta = 0, kP = 3, kV = 6, kBg = 9, kBa = 12 };      ///< first index in the tangent
+  enum Tangent { kTheta = 0, kP = 3, kV = 6, kBg = 9, kBa = 12 };  ///< first index in the tangent
   enum Storage { kQStored = 0, kPStored = 4, kVStored = 7, kBgStored = 10, kBaStored = 13 };
 
   StateBlock() : values_{{0, 0, 0, 1}} {}
@@ -26,11 +26,21 @@ class StateBlock {
   Eigen::Map<Eigen::Vector3d> v_W() { return Eigen::Map<Eigen::Vector3d>(data() + kVStored); }
   Eigen::Map<Eigen::Vector3d> b_g() { return Eigen::Map<Eigen::Vector3d>(data() + kBgStored); }
   Eigen::Map<Eigen::Vector3d> b_a() { return Eigen::Map<Eigen::Vector3d>(data() + kBaStored); }
-  Eigen::Map<const Eigen::Quaterniond> q_WI() const { return Eigen::Map<const Eigen::Quaterniond>(data() + kQStored); }
-  Eigen::Map<const Eigen::Vector3d> p_W() const { return Eigen::Map<const Eigen::Vector3d>(data() + kPStored); }
-  Eigen::Map<const Eigen::Vector3d> v_W() const { return Eigen::Map<const Eigen::Vector3d>(data() + kVStored); }
-  Eigen::Map<const Eigen::Vector3d> b_g() const { return Eigen::Map<const Eigen::Vector3d>(data() + kBgStored); }
-  Eigen::Map<const Eigen::Vector3d> b_a() const { return Eigen::Map<const Eigen::Vector3d>(data() + kBaStored); }
+  Eigen::Map<const Eigen::Quaterniond> q_WI() const {
+    return Eigen::Map<const Eigen::Quaterniond>(data() + kQStored);
+  }
+  Eigen::Map<const Eigen::Vector3d> p_W() const {
+    return Eigen::Map<const Eigen::Vector3d>(data() + kPStored);
+  }
+  Eigen::Map<const Eigen::Vector3d> v_W() const {
+    return Eigen::Map<const Eigen::Vector3d>(data() + kVStored);
+  }
+  Eigen::Map<const Eigen::Vector3d> b_g() const {
+    return Eigen::Map<const Eigen::Vector3d>(data() + kBgStored);
+  }
+  Eigen::Map<const Eigen::Vector3d> b_a() const {
+    return Eigen::Map<const Eigen::Vector3d>(data() + kBaStored);
+  }
 
  private:
   std::array<double, kSize> values_;
@@ -57,9 +67,9 @@ StateTangent boxminus(const double* y, const double* x);
 
 /// Jacobian of a residual with respect to a state block, as the solver wants it: N rows, 16 columns.
 ///
-/// The factors write derivatives with respect to the tangent: columns 0-2 hold theta, column 3 stays zero, and the
-/// rest stands where it is stored. `StateManifold` has the matching "plus Jacobian" (a selection), so the solver sees
-/// the exact tangent derivative, and no factor needs quaternion derivatives.
+/// The factors write derivatives with respect to the tangent: columns 0-2 hold theta, column 3 stays zero,
+/// and the rest stands where it is stored. `StateManifold` has the matching "plus Jacobian" (a selection), so
+/// the solver sees the exact tangent derivative, and no factor needs quaternion derivatives.
 template <int N>
 using StateJacobian = Eigen::Matrix<double, N, StateBlock::kSize, Eigen::RowMajor>;
 

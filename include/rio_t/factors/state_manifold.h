@@ -5,8 +5,10 @@
 
 #include "rio_t/factors/state_block.h"
 
-/// The one place that knows which Ceres is there: manifolds since 2.1, local parameterizations before (Noetic: 1.14).
-#define RIO_T_CERES_HAS_MANIFOLD (CERES_VERSION_MAJOR > 2 || (CERES_VERSION_MAJOR == 2 && CERES_VERSION_MINOR >= 1))
+/// The one place that knows which Ceres is there: manifolds since 2.1, local parameterizations before
+/// (Noetic: 1.14).
+#define RIO_T_CERES_HAS_MANIFOLD \
+  (CERES_VERSION_MAJOR > 2 || (CERES_VERSION_MAJOR == 2 && CERES_VERSION_MINOR >= 1))
 
 #if RIO_T_CERES_HAS_MANIFOLD
 #include <ceres/manifold.h>

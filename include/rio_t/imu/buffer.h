@@ -22,21 +22,24 @@ class ImuBuffer {
   Time newest() const { return samples_.back().time; }
   bool covers(Time time) const { return !empty() && oldest() <= time && time <= newest(); }
 
-  /// Linear interpolation; outside of the samples the nearest one, with `time` as its time. Not on an empty buffer.
+  /// Linear interpolation; outside of the samples the nearest one, with `time` as its time. Not on an empty
+  /// buffer.
   ImuMeasurement at(Time time) const;
 
   /// Mean angular acceleration over [time - half_width, time + half_width] [rad/s^2], clipped to the samples.
   Eigen::Vector3d angularAcceleration(Time time, double half_width) const;
 
-  /// Calls step(dt, angular_velocity, acceleration) for each interval between samples from `from` to `to`, with the
-  /// mean of both ends; the ends at `from` and `to` are interpolated. Backwards with dt < 0 where `to` < `from`.
+  /// Calls step(dt, angular_velocity, acceleration) for each interval between samples from `from` to `to`,
+  /// with the mean of both ends; the ends at `from` and `to` are interpolated. Backwards with dt < 0 where
+  /// `to` < `from`.
   template <typename Step>
   void forEachInterval(Time from, Time to, Step&& step) const;
 
   /// Calls visit(sample) for each sample later than `from` and not later than `to`.
   template <typename Visit>
   void forEachSample(Time from, Time to, Visit&& visit) const {
-    for (std::size_t i = firstAfter(from); i < samples_.size() && samples_[i].time <= to; ++i) visit(samples_[i]);
+    for (std::size_t i = firstAfter(from); i < samples_.size() && samples_[i].time <= to; ++i)
+      visit(samples_[i]);
   }
 
  private:

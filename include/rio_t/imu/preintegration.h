@@ -9,15 +9,16 @@ namespace rio_t {
 
 /// Motion between two times from the IMU alone, free of the state it starts from, with bias Jacobians.
 ///
-/// Forster et al., TRO 2017, eq. (33) with midpoint rotation instead of Euler: with T the time and g the gravity,
+/// Forster et al., TRO 2017, eq. (33) with midpoint rotation instead of Euler: with T the time and g the
+/// gravity,
 ///   R_j = R_i dR,   v_j = v_i + g T + R_i dv,   p_j = p_i + v_i T + g T^2 / 2 + R_i dp.
 /// Steps with dt < 0 integrate backwards.
 struct ImuDelta {
-  double dt = 0.0;                                               ///< T [s]
-  Eigen::Quaterniond dR = Eigen::Quaterniond::Identity();        ///< R_i^T R_j
-  Eigen::Vector3d dv = Eigen::Vector3d::Zero();                  ///< in I_i [m/s]
-  Eigen::Vector3d dp = Eigen::Vector3d::Zero();                  ///< in I_i [m]
-  Eigen::Matrix3d dR_dbg = Eigen::Matrix3d::Zero();  ///< dR(b + d) = dR(b) Exp(dR_dbg d)
+  double dt = 0.0;                                         ///< T [s]
+  Eigen::Quaterniond dR = Eigen::Quaterniond::Identity();  ///< R_i^T R_j
+  Eigen::Vector3d dv = Eigen::Vector3d::Zero();            ///< in I_i [m/s]
+  Eigen::Vector3d dp = Eigen::Vector3d::Zero();            ///< in I_i [m]
+  Eigen::Matrix3d dR_dbg = Eigen::Matrix3d::Zero();        ///< dR(b + d) = dR(b) Exp(dR_dbg d)
   Eigen::Matrix3d dv_dbg = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d dv_dba = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d dp_dbg = Eigen::Matrix3d::Zero();

@@ -14,8 +14,9 @@ struct RestOptions {
   double max_rate = 3.0e-3;      ///< [rad/s] mean gyro without bias
   double max_accel_error = 0.1;  ///< [m/s^2] mean accelerometer without bias and gravity
   double max_speed = 0.1;        ///< [m/s] estimated; faster, stillness is a smooth ride and not rest
-  /// [m/s] per axis, of the velocity zero that rest stands for: a hand that holds still drifts by some cm/s. It also
-  /// turns by some mrad/s, more than the gyro bias is known at the start: so rest says nothing of the bias.
+  /// [m/s] per axis, of the velocity zero that rest stands for: a hand that holds still drifts by some cm/s.
+  /// It also turns by some mrad/s, more than the gyro bias is known at the start: so rest says nothing of the
+  /// bias.
   double velocity_sigma = 0.05;
 };
 
@@ -30,8 +31,8 @@ struct RestContext {
 
 /// Whether the IMU is at rest over the window that ends at `time`.
 ///
-/// The IMU sees rest that a radar cannot: a Doppler bin hides slow motion, and an object that moves can fill the view.
-/// The IMU alone cannot tell rest from uniform motion; hence the context.
+/// The IMU sees rest that a radar cannot: a Doppler bin hides slow motion, and an object that moves can fill
+/// the view. The IMU alone cannot tell rest from uniform motion; hence the context.
 bool isAtRest(const ImuBuffer& imu, Time time, const RestContext& context, const RestOptions& options);
 
 }  // namespace rio_t

@@ -10,23 +10,23 @@
 namespace rio_t {
 
 struct StaticInitializerOptions {
-  double duration = 3.0;                ///< [s] of rest that is averaged
-  double max_gyro_std = 0.05;           ///< [rad/s] per axis over the duration: above, the platform moves
-  double max_accel_std = 0.5;           ///< [m/s^2] likewise
-  double max_gyro_mean = 0.1;           ///< [rad/s] a larger mean is a rotation, not a bias
-  double max_gravity_error = 0.5;       ///< [m/s^2] | |mean accelerometer| - gravity |
+  double duration = 3.0;           ///< [s] of rest that is averaged
+  double max_gyro_std = 0.05;      ///< [rad/s] per axis over the duration: above, the platform moves
+  double max_accel_std = 0.5;      ///< [m/s^2] likewise
+  double max_gyro_mean = 0.1;      ///< [rad/s] a larger mean is a rotation, not a bias
+  double max_gravity_error = 0.5;  ///< [m/s^2] | |mean accelerometer| - gravity |
 };
 
 /// What standing still tells (method notes, "Initialisation").
 struct StaticInitialization {
-  Time time;                                            ///< of the last sample used
+  Time time;                                                 ///< of the last sample used
   Eigen::Quaterniond q_WI = Eigen::Quaterniond::Identity();  ///< levelled, yaw zero
-  Eigen::Vector3d b_g = Eigen::Vector3d::Zero();        ///< mean gyro [rad/s]
-  /// What the mean specific force has beyond gravity [m/s^2]: the part of the bias along the vertical. The horizontal
-  /// part cannot be told from a tilt.
+  Eigen::Vector3d b_g = Eigen::Vector3d::Zero();             ///< mean gyro [rad/s]
+  /// What the mean specific force has beyond gravity [m/s^2]: the part of the bias along the vertical. The
+  /// horizontal part cannot be told from a tilt.
   Eigen::Vector3d b_a = Eigen::Vector3d::Zero();
   std::size_t samples = 0;
-  double duration = 0.0;                                ///< [s]
+  double duration = 0.0;  ///< [s]
 };
 
 /// Waits for `duration` seconds of rest; any mounting (gravity on any axis).
@@ -45,8 +45,9 @@ class StaticInitializer {
   std::string waiting_for_ = "the first IMU sample";
 };
 
-/// Shortest rotation that turns the measured specific force at rest, in I, onto the upward axis of W; yaw zero
-/// in the sense that no rotation about the vertical is added. Works for every direction of `f_I`, also straight down.
+/// Shortest rotation that turns the measured specific force at rest, in I, onto the upward axis of W; yaw
+/// zero in the sense that no rotation about the vertical is added. Works for every direction of `f_I`, also
+/// straight down.
 Eigen::Quaterniond levelingRotation(const Eigen::Vector3d& f_I);
 
 }  // namespace rio_t

@@ -6,18 +6,19 @@
 
 namespace rio_t {
 
-/// Covariance of the error state, in the order theta (right perturbation of R_WI, so in I), p_W, v_W, b_g, b_a.
+/// Covariance of the error state, in the order theta (right perturbation of R_WI, so in I), p_W, v_W, b_g,
+/// b_a.
 using StateCovariance = Eigen::Matrix<double, 15, 15>;
 
 /// Where the platform is: what is published at IMU rate.
 struct NavigationState {
   Time time;
-  Eigen::Quaterniond q_WI = Eigen::Quaterniond::Identity();  ///< turns I into W
-  Eigen::Vector3d p_W = Eigen::Vector3d::Zero();                  ///< origin of I in W [m]
-  Eigen::Vector3d v_W = Eigen::Vector3d::Zero();                  ///< velocity of I in W, in W [m/s]
-  Eigen::Vector3d b_g = Eigen::Vector3d::Zero();                  ///< gyro bias, in I [rad/s]
-  Eigen::Vector3d b_a = Eigen::Vector3d::Zero();                  ///< accelerometer bias, in I [m/s^2]
-  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();     ///< of I, in I, bias removed [rad/s]
+  Eigen::Quaterniond q_WI = Eigen::Quaterniond::Identity();    ///< turns I into W
+  Eigen::Vector3d p_W = Eigen::Vector3d::Zero();               ///< origin of I in W [m]
+  Eigen::Vector3d v_W = Eigen::Vector3d::Zero();               ///< velocity of I in W, in W [m/s]
+  Eigen::Vector3d b_g = Eigen::Vector3d::Zero();               ///< gyro bias, in I [rad/s]
+  Eigen::Vector3d b_a = Eigen::Vector3d::Zero();               ///< accelerometer bias, in I [m/s^2]
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< of I, in I, bias removed [rad/s]
   StateCovariance covariance = StateCovariance::Zero();
 };
 

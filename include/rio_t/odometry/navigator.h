@@ -24,8 +24,8 @@ class Navigator {
  private:
   void propagate(const ImuMeasurement& from, const ImuMeasurement& to);
 
-  ImuNoise noise_;         // read-only after construction
-  Eigen::Vector3d g_W_;    // read-only after construction
+  ImuNoise noise_;       // read-only after construction
+  Eigen::Vector3d g_W_;  // read-only after construction
   std::deque<ImuMeasurement> history_;
   std::optional<NavigationState> state_;
 };

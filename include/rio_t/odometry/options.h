@@ -14,7 +14,7 @@ namespace rio_t {
 
 /// T_IR, the pose of the radar in the IMU frame, as every radar package gives it.
 struct Extrinsics {
-  Eigen::Vector3d l_I = Eigen::Vector3d::Zero();                  ///< radar origin in I [m]
+  Eigen::Vector3d l_I = Eigen::Vector3d::Zero();             ///< radar origin in I [m]
   Eigen::Quaterniond q_IR = Eigen::Quaterniond::Identity();  ///< turns R into I
 };
 
@@ -29,7 +29,7 @@ struct OdometryOptions {
   RestOptions rest;
   SmootherOptions smoother;
   OffsetMonitorOptions offset_monitor;
-  double max_imu_gap = 0.1;        ///< [s] between samples; a longer one is reported and bridged
+  double max_imu_gap = 0.1;           ///< [s] between samples; a longer one is reported and bridged
   std::size_t max_queued_scans = 50;  ///< scans that may wait for the IMU or the solver
 };
 

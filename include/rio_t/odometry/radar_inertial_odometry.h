@@ -15,12 +15,13 @@ namespace rio_t {
 
 /// What became of one scan.
 struct ScanResult {
-  RadarScan scan;            ///< as fed
+  RadarScan scan;  ///< as fed
   EgoVelocity ego_velocity;
   bool used = false;             ///< its velocity went into the window
   std::string rejected_because;  ///< snake case, empty where used; keys of `scans_rejected`
 
-  /// The window was solved again: the scan was used, or the platform is at rest. What follows is set only then.
+  /// The window was solved again: the scan was used, or the platform is at rest. What follows is set only
+  /// then.
   bool updated = false;
   // The newest state of the window.
   NavigationState state;
@@ -33,9 +34,9 @@ struct ScanResult {
 
 /// The whole pipeline: IMU and scans in, odometry and time offset out.
 ///
-/// Two halves that may run in two threads. `addImu` is the navigation half: it carries the newest optimised state
-/// forward and never waits for the solver. `process` is the optimisation half. In one thread, call `process` after
-/// each `addImu` and each `addScan`; then the same input gives the same output, bit for bit.
+/// Two halves that may run in two threads. `addImu` is the navigation half: it carries the newest optimised
+/// state forward and never waits for the solver. `process` is the optimisation half. In one thread, call
+/// `process` after each `addImu` and each `addScan`; then the same input gives the same output, bit for bit.
 /// `addImu` and `addScan` may be called from different threads, `process` from one thread at a time.
 class RadarInertialOdometry {
  public:
@@ -44,18 +45,20 @@ class RadarInertialOdometry {
   RadarInertialOdometry(RadarInertialOdometry&&) noexcept;
   RadarInertialOdometry& operator=(RadarInertialOdometry&&) noexcept;
 
-  /// State at this sample, from the newest optimised state: what a live user gets. None before initialisation.
-  /// A sample that is not later than the one before, or not finite, is dropped and counted in `faults()`.
+  /// State at this sample, from the newest optimised state: what a live user gets. None before
+  /// initialisation. A sample that is not later than the one before, or not finite, is dropped and counted in
+  /// `faults()`.
   std::optional<NavigationState> addImu(const ImuMeasurement& imu);
 
   /// Queues a scan. It waits until the IMU covers its time of measurement.
   void addScan(RadarScan scan);
 
-  /// Works off what can be worked off: initialisation, ego-velocity, window. One result for each scan finished.
+  /// Works off what can be worked off: initialisation, ego-velocity, window. One result for each scan
+  /// finished.
   std::vector<ScanResult> process();
 
-  /// At the end of the data: finishes what still waits (rejected as "imu_not_covering" where the IMU never came),
-  /// and empties the window; the poses still in it are in `left_window` of the last result.
+  /// At the end of the data: finishes what still waits (rejected as "imu_not_covering" where the IMU never
+  /// came), and empties the window; the poses still in it are in `left_window` of the last result.
   std::vector<ScanResult> finish();
 
   bool initialized() const;

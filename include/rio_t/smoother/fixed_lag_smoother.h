@@ -36,9 +36,10 @@ struct SolveReport {
 
 /// What a scan should show, see FixedLagSmoother::predictRadarVelocity.
 struct RadarVelocityPrediction {
-  VelocityPrior velocity;                                        ///< with the uncertainty of everything
-  Eigen::Matrix3d covariance_at_offset = Eigen::Matrix3d::Zero();  ///< the same, were the offset known [m^2/s^2]
-  Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();             ///< of v_R with respect to t_O [m/s^2]
+  VelocityPrior velocity;  ///< with the uncertainty of everything
+  Eigen::Matrix3d covariance_at_offset =
+      Eigen::Matrix3d::Zero();                        ///< the same, were the offset known [m^2/s^2]
+  Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();  ///< of v_R with respect to t_O [m/s^2]
 };
 
 /// The paper's factor graph over the last `window` seconds, solved with Ceres; what leaves is marginalised.
@@ -52,22 +53,24 @@ class FixedLagSmoother {
   FixedLagSmoother(const SmootherOptions& options, const ImuNoise& noise, const Eigen::Vector3d& g_W,
                    const ImuBuffer& imu);
 
-  /// Starts (or starts again) with one node at `time`; its prior comes from the options, with yaw and position
-  /// defining W. `gyro_bias_sigma` [rad/s]: of the mean that b_g comes from, added to the option's.
+  /// Starts (or starts again) with one node at `time`; its prior comes from the options, with yaw and
+  /// position defining W. `gyro_bias_sigma` [rad/s]: of the mean that b_g comes from, added to the option's.
   void initialize(Time time, const StateBlock& x, double gyro_bias_sigma);
 
-  /// Where a scan stamped `stamp` puts its node: the stamp (constant_acceleration), or the time of measurement as
-  /// now estimated (imu). The IMU must cover it before `add`.
+  /// Where a scan stamped `stamp` puts its node: the stamp (constant_acceleration), or the time of
+  /// measurement as now estimated (imu). The IMU must cover it before `add`.
   Time nodeTime(Time stamp) const;
 
-  /// Radar velocity that a scan stamped `stamp` should show, with the uncertainty of the state, of the IMU since and
-  /// of the offset. None for a scan older than the newest node. R_RI turns I into R, `l_I` is the radar in I [m].
+  /// Radar velocity that a scan stamped `stamp` should show, with the uncertainty of the state, of the IMU
+  /// since and of the offset. None for a scan older than the newest node. R_RI turns I into R, `l_I` is the
+  /// radar in I [m].
   std::optional<RadarVelocityPrediction> predictRadarVelocity(Time stamp, const Eigen::Matrix3d& R_RI,
                                                               const Eigen::Vector3d& l_I) const;
   AddResult add(const RadarVelocityMeasurement& z);
   /// The platform is at rest at the time of measurement of a scan stamped `stamp`; `velocity_sigma` [m/s].
   AddResult addRest(Time stamp, double velocity_sigma);
-  /// Forgets how well t_O is known from the next node on, where it must have stepped: its prior sigma comes back.
+  /// Forgets how well t_O is known from the next node on, where it must have stepped: its prior sigma comes
+  /// back.
   void loosenTimeOffset() { offset_has_stepped_ = true; }
   SolveReport optimize();
   /// Marginalises what is older than the window; the nodes that left, oldest first.
@@ -100,11 +103,12 @@ class FixedLagSmoother {
   Node* nodeAt(Time time);
   Node makeNode(Time time, const Node& previous) const;
   void linkToPrevious(std::size_t k);
-  std::unique_ptr<ceres::CostFunction> makeRadarFactor(const RadarVelocityMeasurement& z, Time node_time) const;
+  std::unique_ptr<ceres::CostFunction> makeRadarFactor(const RadarVelocityMeasurement& z,
+                                                       Time node_time) const;
   ChainSystem linearize() const;
   double offsetVariance(double dt) const;  ///< that t_O gains in dt [s] by its random walk [s^2]
 
-  SmootherOptions options_;   // these four: read-only after construction
+  SmootherOptions options_;  // these four: read-only after construction
   ImuNoise noise_;
   Eigen::Vector3d g_W_;
   const ImuBuffer* imu_;

@@ -4,26 +4,29 @@ namespace rio_t {
 
 /// How the radar factor accounts for the time between stamp and measurement.
 enum class TimeOffsetModel {
-  kConstantAcceleration,  ///< the paper's eq. (4)-(5): one acceleration sample times t_O; states at the stamps
+  kConstantAcceleration,  ///< the paper's eq. (4)-(5): one acceleration sample times t_O; states at the
+                          ///< stamps
   kImu,                   ///< the IMU itself over the shift; states at the estimated measurement times
 };
 
 struct SmootherOptions {
-  double window = 1.0;                 ///< [s] length of the fixed-lag window
-  double huber_threshold = 1.5;        ///< on the whitened radar residual's norm; 0 = no robust loss
-  int max_iterations = 6;              ///< of the solver, each scan
-  /// [sigma] farther from what the IMU predicts, offset uncertainty included, a scan is rejected; 0 = no gate.
+  double window = 1.0;           ///< [s] length of the fixed-lag window
+  double huber_threshold = 1.5;  ///< on the whitened radar residual's norm; 0 = no robust loss
+  int max_iterations = 6;        ///< of the solver, each scan
+  /// [sigma] farther from what the IMU predicts, offset uncertainty included, a scan is rejected; 0 = no
+  /// gate.
   double innovation_gate = 4.0;
-  /// [m/s] per axis, added to that prediction in the gate only: extrinsics and IMU scale that are a little wrong.
+  /// [m/s] per axis, added to that prediction in the gate only: extrinsics and IMU scale that are a little
+  /// wrong.
   double innovation_model_error = 0.1;
   double innovation_gate_timeout = 3.0;  ///< [s] without a scan after which the next is taken all the same
 
-  bool estimate_time_offset = true;    ///< false: LC-RIO, offset fixed at time_offset_initial
+  bool estimate_time_offset = true;  ///< false: LC-RIO, offset fixed at time_offset_initial
   TimeOffsetModel time_offset_model = TimeOffsetModel::kImu;
-  double time_offset_initial = 0.0;    ///< [s]
-  double time_offset_sigma = 0.075;    ///< [s] prior
-  double time_offset_noise = 1.0e-4;   ///< [s/sqrt(s)] random walk of the offset
-  double max_time_offset = 0.25;       ///< [s] bound on |t_O|
+  double time_offset_initial = 0.0;   ///< [s]
+  double time_offset_sigma = 0.075;   ///< [s] prior
+  double time_offset_noise = 1.0e-4;  ///< [s/sqrt(s)] random walk of the offset
+  double max_time_offset = 0.25;      ///< [s] bound on |t_O|
 
   double prior_sigma_orientation = 0.02;  ///< [rad] roll and pitch of the first state
   double prior_sigma_yaw = 1.0e-3;        ///< [rad] yaw defines the world frame
