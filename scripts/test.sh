@@ -7,7 +7,9 @@ build=${RIO_T_BUILD_DIR:-build}
 
 scripts/build.sh || exit 1
 cmake --build "$build" --parallel "$(nproc)" --target tests || exit 1
+set +u  # catkin's own hooks read variables that a shell without ROS does not have
 source "$build/devel/setup.bash"
+set -u
 rm -rf "$build/test_results"
 export RIO_T_DATA_DIR=${RIO_T_DATA_DIR:-$(realpath -m ../shared/data)}
 (cd "$build" && ctest --output-on-failure)
