@@ -122,5 +122,18 @@ TEST_F(AtRest, UncertaintyGrowsWithoutRadar) {
   EXPECT_TRUE(states.back().covariance.allFinite());
 }
 
+TEST_F(AtRest, NothingIsLearntOfTheOffset) {
+  run(104.0);
+  ScanResult last;
+  while (time < 134.0) {
+    odometry.addScan(restScan(time));
+    for (ScanResult& result : run(time + 0.1)) last = std::move(result);
+  }
+  ASSERT_TRUE(last.used) << last.rejected_because;
+  const OdometryOptions options;
+  EXPECT_NEAR(last.time_offset, options.smoother.time_offset_initial, 1e-4);
+  EXPECT_GE(last.time_offset_sigma, options.smoother.time_offset_sigma * (1.0 - 1e-6));
+}
+
 }  // namespace
 }  // namespace rio_t

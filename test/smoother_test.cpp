@@ -195,6 +195,22 @@ TEST_F(Smoother, ALateScanIsInsertedAtItsTime) {
   EXPECT_EQ(late.add(measurement(0.9, 0.0)), FixedLagSmoother::AddResult::kDuplicateStamp);
 }
 
+TEST_F(Smoother, ScansThatSayNothingOfTheOffsetLeaveIt) {
+  SmootherOptions options;
+  FixedLagSmoother smoother = make(options);
+  for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
+    RadarVelocityMeasurement z = measurement(stamp, 0.0);
+    z.informs_offset = false;
+    smoother.add(z);
+    smoother.optimize();
+    smoother.marginalize();
+  }
+  EXPECT_NEAR(smoother.newest().t_O, 0.0, 1e-9);
+  const NodeMatrix& P = smoother.newestCovariance();
+  EXPECT_GE(std::sqrt(P(StateBlock::kTangent, StateBlock::kTangent)),
+            options.time_offset_sigma * (1.0 - 1e-9));
+}
+
 TEST_F(Smoother, WithoutEstimationTheOffsetStays) {
   SmootherOptions options;
   options.estimate_time_offset = false;

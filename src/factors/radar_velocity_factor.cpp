@@ -47,7 +47,11 @@ bool ConstantAccelerationRadarFactor::Evaluate(double const* const* parameters, 
     J.middleCols<3>(StateBlock::kBgStored) = W_R * so3::hat(z_.l_I);
     J.middleCols<3>(StateBlock::kBaStored) = t_O * W_R;
   }
-  if (jacobians[1] != nullptr) Eigen::Map<Eigen::Vector3d>{jacobians[1]} = -W_R * a_c;
+  if (jacobians[1] != nullptr) {
+    Eigen::Map<Eigen::Vector3d> J(jacobians[1]);
+    J.setZero();
+    if (z_.informs_offset) J = -W_R * a_c;
+  }
   return true;
 }
 
@@ -91,9 +95,13 @@ bool ImuRadarFactor::Evaluate(double const* const* parameters, double* residuals
     J.middleCols<3>(StateBlock::kBaStored) = W_R * dR_T * delta.dv_dba;
   }
   if (jacobians[1] != nullptr) {
-    const Eigen::Vector3d a_c = at_tau.acceleration - x.b_a + dR_T * R_IW * g_W_;
-    const Eigen::Vector3d alpha = imu_->angularAcceleration(tau, kAngularAccelerationHalfWidth);
-    Eigen::Map<Eigen::Vector3d>{jacobians[1]} = -W_R * (a_c - omega.cross(v_tau) + alpha.cross(z_.l_I));
+    Eigen::Map<Eigen::Vector3d> J(jacobians[1]);
+    J.setZero();
+    if (z_.informs_offset) {
+      const Eigen::Vector3d a_c = at_tau.acceleration - x.b_a + dR_T * R_IW * g_W_;
+      const Eigen::Vector3d alpha = imu_->angularAcceleration(tau, kAngularAccelerationHalfWidth);
+      J = -W_R * (a_c - omega.cross(v_tau) + alpha.cross(z_.l_I));
+    }
   }
   return true;
 }

@@ -54,8 +54,9 @@ struct RadarInertialOdometry::Impl {
   void tryInitialize(const ImuMeasurement& sample);
   bool contradicts(const VelocityPrior& prior, const EgoVelocity& measured) const;
   bool isAtRest(Time time) const;
-  /// Empty, or why the scan has no velocity to use.
-  std::string measureVelocity(const RadarScan& scan, bool at_rest, EgoVelocity& measured);
+  /// Empty, or why the scan has no velocity to use; and whether that velocity tells the offset.
+  std::string measureVelocity(const RadarScan& scan, bool at_rest, EgoVelocity& measured,
+                              bool& informs_offset);
   std::optional<ScanResult> tryScan(const RadarScan& scan, bool imu_has_ended);
   void updateWindow(ScanResult& result);
   NavigationState newestState(const NodeMatrix& covariance) const;
@@ -216,10 +217,12 @@ std::optional<ScanResult> RadarInertialOdometry::Impl::tryScan(const RadarScan& 
   }
 
   const bool at_rest = isAtRest(node_time);
-  result.rejected_because = measureVelocity(scan, at_rest, result.ego_velocity);
+  bool informs_offset = false;
+  result.rejected_because = measureVelocity(scan, at_rest, result.ego_velocity, informs_offset);
   if (result.rejected_because.empty()) {
-    result.rejected_because = toString(smoother.add(
-        {scan.stamp, result.ego_velocity.v_R, result.ego_velocity.covariance, R_RI, options.T_IR.l_I}));
+    result.rejected_because =
+        toString(smoother.add({scan.stamp, result.ego_velocity.v_R, result.ego_velocity.covariance, R_RI,
+                               options.T_IR.l_I, informs_offset}));
   }
   result.used = result.rejected_because.empty();
   if (result.used) last_used = scan.stamp;
@@ -233,7 +236,7 @@ std::optional<ScanResult> RadarInertialOdometry::Impl::tryScan(const RadarScan& 
 }
 
 std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, bool at_rest,
-                                                         EgoVelocity& measured) {
+                                                         EgoVelocity& measured, bool& informs_offset) {
   const auto prediction = smoother.predictRadarVelocity(scan.stamp, R_RI, options.T_IR.l_I);
   std::optional<VelocityPrior> prior;
   if (prediction) prior = prediction->velocity;
@@ -244,7 +247,10 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
   measured = ego_velocity_estimator.estimate(scan, prior);
   if (!isValid(measured.status)) return toString(measured.status);
   if (!feasibility.accept(scan.stamp, measured.v_R)) return "infeasible_velocity";
-  if (prediction && options.smoother.estimate_time_offset && measured.status == EgoVelocityStatus::kMoving &&
+  const bool moving = !at_rest && measured.status == EgoVelocityStatus::kMoving;
+  informs_offset =
+      moving && (!prediction || prediction->dv_dt_O.norm() > options.smoother.time_offset_min_acceleration);
+  if (prediction && informs_offset && options.smoother.estimate_time_offset &&
       offset_monitor.stepped(scan.stamp, measured.v_R - prediction->velocity.v_R,
                              prediction->covariance_at_offset + measured.covariance, prediction->dv_dt_O)) {
     smoother.loosenTimeOffset();

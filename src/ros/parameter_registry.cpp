@@ -86,7 +86,8 @@ void listExtrinsics(ParameterList& list, Config& c) {
   list.choice<ExtrinsicsSource>(
       "extrinsics_source", {{"parameters", ExtrinsicsSource::kParameters}, {"tf", ExtrinsicsSource::kTf}},
       c.extrinsics_source,
-      "the two below, or tf (live node only): from the cloud's frame_id, with the cloud's axes, to base_link_frame");
+      "the two below, or tf (live node only): from the cloud's frame_id, with the cloud's axes, to "
+      "base_link_frame");
   list.vector3("extrinsics_translation", "m", between(-100, 100), c.odometry.T_IR.l_I,
                "origin of the radar in the IMU frame, x, y, z");
   list.rotation("extrinsics_rotation_xyzw", c.odometry.T_IR.q_IR, "turns radar vectors into the IMU frame");
@@ -215,6 +216,8 @@ void listTimeOffset(ParameterList& list, Config& c) {
               "standard deviation of that start");
   list.number("time_offset_noise", "s/sqrt(s)", above(0), smoother.time_offset_noise,
               "random walk of the offset");
+  list.number("time_offset_min_acceleration", "m/s^2", atLeast(0), smoother.time_offset_min_acceleration,
+              "of the radar; below, a scan says nothing of the offset, which then holds still");
   list.number("max_time_offset", "s", above(0, 1), smoother.max_time_offset,
               "bound on its size, either sign");
   OffsetMonitorOptions& monitor = c.odometry.offset_monitor;

@@ -18,7 +18,12 @@ struct RadarVelocityMeasurement {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  ///< in R [m^2/s^2]
   Eigen::Matrix3d R_RI = Eigen::Matrix3d::Identity();        ///< turns I into R
   Eigen::Vector3d l_I = Eigen::Vector3d::Zero();             ///< radar origin in I [m]
+  bool informs_offset = true;  ///< false: the platform does not accelerate enough to tell the offset
 };
+
+// A factor whose measurement does not inform the offset takes t_O as it is: its derivative with respect to
+// t_O is zero. At rest and at constant velocity that derivative is the noise of the accelerometer, and some
+// thousand scans of it would pass for knowledge of the offset.
 
 /// The paper's model, eq. (4)-(5) (docs/method.md, eq. 13): one acceleration stands for the whole shift.
 /// Blocks: state at the stamp, t_O.

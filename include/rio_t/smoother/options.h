@@ -26,7 +26,10 @@ struct SmootherOptions {
   double time_offset_initial = 0.0;   ///< [s]
   double time_offset_sigma = 0.075;   ///< [s] prior
   double time_offset_noise = 1.0e-4;  ///< [s/sqrt(s)] random walk of the offset
-  double max_time_offset = 0.25;      ///< [s] bound on |t_O|
+  /// [m/s^2] below, a scan says nothing of the offset: at rest and at constant velocity there is only noise
+  /// to see.
+  double time_offset_min_acceleration = 0.2;
+  double max_time_offset = 0.25;  ///< [s] bound on |t_O|
 
   double prior_sigma_orientation = 0.02;  ///< [rad] roll and pitch of the first state
   double prior_sigma_yaw = 1.0e-3;        ///< [rad] yaw defines the world frame
