@@ -8,6 +8,7 @@
 #include "rio_t/core/so3.h"
 #include "rio_t/smoother/chain.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
+#include "rio_t/smoother/initial_prior.h"
 #include "synthetic_motion.h"
 
 namespace rio_t {
@@ -110,7 +111,7 @@ class Smoother : public ::testing::Test {
 
   FixedLagSmoother make(SmootherOptions options) const {
     FixedLagSmoother smoother(options, ImuNoise(), motion.g_W, imu);
-    smoother.initialize(motion.time(0.5), motion.state(0.5), 1e-4);
+    smoother.initialize(motion.time(0.5), priorAtRest(options, motion.state(0.5), 1e-4));
     return smoother;
   }
 

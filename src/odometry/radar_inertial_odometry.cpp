@@ -8,6 +8,7 @@
 
 #include "rio_t/odometry/navigator.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
+#include "rio_t/smoother/initial_prior.h"
 
 namespace rio_t {
 namespace {
@@ -184,7 +185,8 @@ void RadarInertialOdometry::Impl::tryInitialize(const ImuMeasurement& sample) {
     x.b_g() = rest->b_g;
     x.b_a() = rest->b_a;
     // A mean over T seconds leaves density / sqrt(T), besides what the bias does by itself.
-    smoother.initialize(rest->time, x, options.imu_noise.gyro_density / std::sqrt(rest->duration));
+    const double gyro_bias_sigma = options.imu_noise.gyro_density / std::sqrt(rest->duration);
+    smoother.initialize(rest->time, priorAtRest(options.smoother, x, gyro_bias_sigma));
     initialized_at = rest->time;
     last_used = rest->time;
     const NavigationState state = newestState(smoother.newestCovariance());

@@ -50,30 +50,13 @@ FixedLagSmoother::FixedLagSmoother(const SmootherOptions& options, const ImuNois
   if (options_.huber_threshold > 0.0) loss_ = std::make_unique<ceres::HuberLoss>(options_.huber_threshold);
 }
 
-void FixedLagSmoother::initialize(Time time, const StateBlock& x, double gyro_bias_sigma) {
-  NodePrior prior;
-  prior.x0 = x;
-  prior.t_O0 = options_.time_offset_initial;
-  const Eigen::Vector3d sigma_W(options_.prior_sigma_orientation, options_.prior_sigma_orientation,
-                                options_.prior_sigma_yaw);
-  // theta lives in I, the sigmas are given in W.
-  prior.J.block<3, 3>(StateBlock::kTheta, StateBlock::kTheta) =
-      sigma_W.cwiseInverse().asDiagonal() * x.q_WI().toRotationMatrix();
-  const auto set = [&](int first, double sigma) {
-    prior.J.diagonal().segment<3>(first).setConstant(1.0 / sigma);
-  };
-  set(StateBlock::kP, options_.prior_sigma_position);
-  set(StateBlock::kV, options_.prior_sigma_velocity);
-  set(StateBlock::kBg, std::hypot(options_.prior_sigma_gyro_bias, gyro_bias_sigma));
-  set(StateBlock::kBa, options_.prior_sigma_accel_bias);
-  prior.J(StateBlock::kTangent, StateBlock::kTangent) = 1.0 / options_.time_offset_sigma;
+void FixedLagSmoother::initialize(Time time, const NodePrior& prior) {
   prior_ = std::make_unique<PriorFactor>(prior);
-
   nodes_.clear();
   Node node;
   node.time = time;
-  node.x = x;
-  node.t_O = options_.time_offset_initial;
+  node.x = prior.x0;
+  node.t_O = prior.t_O0;
   nodes_.push_back(std::move(node));
   newest_covariance_ = covarianceOfLast(linearize());
 }

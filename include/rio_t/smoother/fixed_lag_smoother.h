@@ -53,9 +53,8 @@ class FixedLagSmoother {
   FixedLagSmoother(const SmootherOptions& options, const ImuNoise& noise, const Eigen::Vector3d& g_W,
                    const ImuBuffer& imu);
 
-  /// Starts (or starts again) with one node at `time`; its prior comes from the options, with yaw and
-  /// position defining W. `gyro_bias_sigma` [rad/s]: of the mean that b_g comes from, added to the option's.
-  void initialize(Time time, const StateBlock& x, double gyro_bias_sigma);
+  /// Starts (or starts again) with one node at `time`, at the prior's own x0 and t_O0.
+  void initialize(Time time, const NodePrior& prior);
 
   /// Where a scan stamped `stamp` puts its node: the stamp (constant_acceleration), or the time of
   /// measurement as now estimated (imu). The IMU must cover it before `add`.
