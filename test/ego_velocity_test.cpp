@@ -142,11 +142,14 @@ TEST(EgoVelocity, FilterLeavesOutWhatItShould) {
   scan.points.push_back({direction(0, 0) * 3.0, nan, 20.0});     // not finite, in every member
   scan.points.push_back({direction(0, 0) * 3.0, 0.0, nan});
   scan.points.push_back({Eigen::Vector3d(nan, 1, 1), 0.0, 20.0});
-  const EgoVelocity e = EgoVelocityEstimator(EgoVelocityOptions()).estimate(scan);
+  EgoVelocityOptions o;
+  o.max_azimuth = 1.0;
+  o.max_elevation = 1.0;
+  const EgoVelocity e = EgoVelocityEstimator(o).estimate(scan);
   EXPECT_EQ(e.points_used, good);
   for (const std::size_t i : e.inliers) EXPECT_LT(i, good);
 
-  EgoVelocityOptions no_min_range;  // a point without direction must not pass even then
+  EgoVelocityOptions no_min_range = o;  // a point without direction must not pass even then
   no_min_range.min_range = 0.0;
   EXPECT_EQ(EgoVelocityEstimator(no_min_range).estimate(scan).points_used, good + 1);
 }
@@ -194,9 +197,10 @@ TEST(EgoVelocity, CoarseDopplerDoesNotFakeRest) {
   EXPECT_GT(squares / rests, 0.5);  // honest, not useless
 }
 
-TEST(EgoVelocity, FineDopplerAtRestKeepsTheSigmaGiven) {
+TEST(EgoVelocity, ExactDopplerAtRestKeepsTheSigmaGiven) {
   EgoVelocityOptions o;
   o.doppler_quantization = 0.0;
+  o.doppler_sigma = 0.0;
   Random random(8);
   const EgoVelocity e =
       EgoVelocityEstimator(o).estimate(staticScene(Eigen::Vector3d::Zero(), 40, {}, random));
