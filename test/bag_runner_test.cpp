@@ -8,6 +8,7 @@
 #include <sensor_msgs/point_cloud2_iterator.h>
 #include <std_msgs/Header.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -158,6 +159,10 @@ TEST_F(BagRunner, AtRestItStaysAndWritesEveryFile) {
             0u);
   EXPECT_EQ(contents(out_ + "/biases.csv").rfind("stamp,bgx,bgy,bgz,bax,bay,baz\n100", 0), 0u);
   for (const StampedPose& pose : readTum(out_ + "/trajectory.txt")) EXPECT_LT(pose.p_W.norm(), 0.02);
+  const std::string navigation = contents(out_ + "/navigation.csv");
+  EXPECT_EQ(navigation.rfind("stamp,vx,vy,vz,sigma_px,", 0), 0u);
+  // Ten lines a second, from the initialisation at 3 s to the end at 8 s.
+  EXPECT_NEAR(static_cast<double>(std::count(navigation.begin(), navigation.end(), '\n')), 51.0, 2.0);
 }
 
 TEST_F(BagRunner, EveryScanIsAccountedFor) {

@@ -8,10 +8,14 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "rio_t/factors/state_block.h"
+#include "rio_t/ros/conversions.h"
+
 namespace rio_t {
 namespace {
 
 constexpr std::size_t kBufferSize = 1 << 18;
+constexpr double kNavigationPeriod = 0.0999;  // [s] between lines of navigation.csv
 
 void appendDigits(std::string* text, std::uint64_t value, int at_least) {
   char digits[24];
@@ -129,7 +133,8 @@ void RunOutput::File::endLine() {
 }
 
 std::vector<std::string> RunOutput::fileNames() {
-  return {"trajectory.txt", "trajectory_optimized.txt", "time_offset.csv", "ego_velocity.csv", "biases.csv",
+  return {"trajectory.txt",  "trajectory_optimized.txt", "navigation.csv",
+          "time_offset.csv", "ego_velocity.csv",         "biases.csv",
           "summary.yaml"};
 }
 
@@ -143,9 +148,12 @@ RunOutput::RunOutput(const std::string& folder) : folder_(folder) {
   std::filesystem::remove(folder + "/summary.yaml", error);
   trajectory_.open(folder + "/trajectory.txt");
   optimized_.open(folder + "/trajectory_optimized.txt");
+  navigation_.open(folder + "/navigation.csv");
   time_offset_.open(folder + "/time_offset.csv");
   ego_velocity_.open(folder + "/ego_velocity.csv");
   biases_.open(folder + "/biases.csv");
+  navigation_.buffer =
+      "stamp,vx,vy,vz,sigma_px,sigma_py,sigma_pz,sigma_rx,sigma_ry,sigma_rz,sigma_vx,sigma_vy,sigma_vz\n";
   time_offset_.buffer = "stamp,offset_s,sigma_s\n";
   ego_velocity_.buffer = "stamp,vx,vy,vz,sigma_x,sigma_y,sigma_z,inliers,points,status\n";
   biases_.buffer = "stamp,bgx,bgy,bgz,bax,bay,baz\n";
@@ -163,6 +171,20 @@ void RunOutput::addPose(File& file, Time time, const Eigen::Vector3d& p_W, const
 
 void RunOutput::addState(const NavigationState& state) {
   addPose(trajectory_, state.time, state.p_W, state.q_WI);
+  // Also where time runs back (a bag that loops): a line, then ten a second again.
+  if (last_navigation_ && std::abs(state.time - *last_navigation_) < kNavigationPeriod) return;
+  last_navigation_ = state.time;
+  const auto sigmas = [](const auto& variances) {
+    return Eigen::Vector3d(variances.cwiseMax(0.0).cwiseSqrt());
+  };
+  const Covariance6 pose = poseCovariance(state);
+  std::string* line = &navigation_.buffer;
+  appendStamp(line, state.time);
+  appendVector(line, state.v_W, 6);
+  appendVector(line, sigmas(pose.diagonal().head<3>()), 6);
+  appendVector(line, sigmas(pose.diagonal().tail<3>()), 6);
+  appendVector(line, sigmas(state.covariance.diagonal().segment<3>(StateBlock::kV)), 6);
+  navigation_.endLine();
 }
 
 void RunOutput::addResult(const ScanResult& result) {
@@ -195,7 +217,8 @@ void RunOutput::addResult(const ScanResult& result) {
 }
 
 void RunOutput::finish(const RunSummary& summary) {
-  for (File* file : {&trajectory_, &optimized_, &time_offset_, &ego_velocity_, &biases_}) file->flush();
+  for (File* file : {&trajectory_, &optimized_, &navigation_, &time_offset_, &ego_velocity_, &biases_})
+    file->flush();
   File yaml;
   yaml.open(folder_ + "/summary.yaml");
   yaml.buffer = summaryText(summary);

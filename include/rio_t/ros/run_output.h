@@ -42,8 +42,12 @@ void appendFixed(std::string* text, double value, int decimals);
 /// Appends seconds with nine decimals, exactly.
 void appendStamp(std::string* text, Time time);
 
-/// The files of a run: trajectory.txt and trajectory_optimized.txt (TUM), time_offset.csv, ego_velocity.csv,
-/// biases.csv, summary.yaml. The same calls write the same bytes.
+/// The files of a run: trajectory.txt and trajectory_optimized.txt (TUM), navigation.csv, time_offset.csv,
+/// ego_velocity.csv, biases.csv, summary.yaml. The same calls write the same bytes.
+///
+/// navigation.csv has the velocity that goes with trajectory.txt, and how sure the estimate is of itself, ten
+/// times a second: v_W [m/s], and standard deviations of p_W [m], of a rotation about the axes of W [rad],
+/// and of v_W [m/s].
 class RunOutput {
  public:
   /// Makes the folder and opens the files; throws std::runtime_error naming what cannot be written. A summary
@@ -71,7 +75,8 @@ class RunOutput {
   void addPose(File& file, Time time, const Eigen::Vector3d& p_W, const Eigen::Quaterniond& q_WI);
 
   std::string folder_;
-  File trajectory_, optimized_, time_offset_, ego_velocity_, biases_;
+  File trajectory_, optimized_, navigation_, time_offset_, ego_velocity_, biases_;
+  std::optional<Time> last_navigation_;  // of the last line in navigation.csv
 };
 
 }  // namespace rio_t
