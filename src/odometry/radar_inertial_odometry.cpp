@@ -87,6 +87,7 @@ struct RadarInertialOdometry::Impl {
   OffsetMonitor offset_monitor;
   FixedLagSmoother smoother;
   std::deque<RadarScan> waiting_scans;
+  std::optional<Start> start;
   Time initialized_at;
   Time last_used;  ///< stamp of the last scan that went into the window
   std::vector<ImuMeasurement> imu_drained;
@@ -186,7 +187,8 @@ void RadarInertialOdometry::Impl::tryInitialize(const ImuMeasurement& sample) {
     x.b_a() = rest->b_a;
     // A mean over T seconds leaves density / sqrt(T), besides what the bias does by itself.
     const double gyro_bias_sigma = options.imu_noise.gyro_density / std::sqrt(rest->duration);
-    smoother.initialize(rest->time, priorAtRest(options.smoother, x, gyro_bias_sigma));
+    start = Start{rest->time, priorAtRest(options.smoother, x, gyro_bias_sigma)};
+    smoother.initialize(start->time, start->prior);
     initialized_at = rest->time;
     last_used = rest->time;
     const NavigationState state = newestState(smoother.newestCovariance());
@@ -317,6 +319,8 @@ bool RadarInertialOdometry::initialized() const {
   const std::lock_guard<std::mutex> lock(impl_->inbox_mutex);
   return impl_->is_initialized;
 }
+
+std::optional<RadarInertialOdometry::Start> RadarInertialOdometry::start() const { return impl_->start; }
 
 std::string RadarInertialOdometry::waitingFor() const {
   const std::lock_guard<std::mutex> lock(impl_->inbox_mutex);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "rio_t/core/pose.h"
+#include "rio_t/factors/prior_factor.h"
 #include "rio_t/odometry/navigation_state.h"
 #include "rio_t/odometry/options.h"
 
@@ -62,6 +63,13 @@ class RadarInertialOdometry {
   std::vector<ScanResult> finish();
 
   bool initialized() const;
+  /// Where the graph begins and what was known there; none before initialisation. Call it from the thread
+  /// that calls `process`.
+  struct Start {
+    Time time;
+    NodePrior prior;
+  };
+  std::optional<Start> start() const;
   /// While not initialised: what is being waited for, for people.
   std::string waitingFor() const;
   /// Faults of the input so far, by name in snake case, e.g. "imu_out_of_order", "imu_not_finite", "imu_gap".
