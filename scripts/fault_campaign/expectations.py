@@ -1,0 +1,120 @@
+"""What must happen in a faulty run. Each expectation says itself in words, and tells what of it did not hold."""
+import dataclasses
+import re
+
+import numpy
+
+RECOVERY = 5.0             # [s] after the end of a fault everything must be as without it
+RECOVERED = (1.5, 0.05)    # times the velocity error of the fault-free run, plus [m/s]
+HONEST = 4.0               # standard deviations, or 1.3 times what the fault-free run shows
+SILENCE = 0.5              # [s] that the output may end before the IMU does
+
+
+@dataclasses.dataclass
+class Survives:
+    """Runs to the end with a bounded error, says how sure it is, recovers, and counts what was wrong.
+
+    velocity, position: bounds on the error [m/s, m] at any time, against the truth or the fault-free run.
+    counted: patterns of names in summary.yaml (input_faults, scans_rejected), each of which must be there.
+    grows: the stated uncertainty of the velocity at the end of the fault is at least that many times the one before.
+    world_goes_on: false where the estimate starts again, so that positions are not comparable.
+    """
+    velocity: float
+    position: float
+    counted: tuple = ()
+    grows: float = None
+    recovers: bool = True
+    world_goes_on: bool = True
+
+    def words(self):
+        text = f"error < {self.velocity:g} m/s"
+        if self.world_goes_on:
+            text += f", {self.position:g} m"
+        if self.grows:
+            text += f", sigma grows {self.grows:g} times"
+        if self.recovers:
+            text += f", recovers in {RECOVERY:g} s"
+        if self.counted:
+            text += ", counts " + " ".join(self.counted)
+        return text
+
+    def judge(self, outcome, begin, end):
+        """(what happened, [what of it is wrong])"""
+        if outcome.status != 0:
+            return "exit status %d: %s" % (outcome.status, last_line(outcome.messages)), ["does not run"]
+        wrong, happened = list(common(outcome)), []
+        errors = outcome.errors
+        if errors is None:
+            return "no output", wrong + ["no output"]
+        after = errors.part(begin, numpy.inf)
+        if len(after.time) == 0:
+            return "no output after the fault", wrong + ["no output after the fault"]
+        happened.append(f"{after.velocity.max():.2f} m/s")
+        if after.velocity.max() > self.velocity:
+            wrong.append(f"velocity error {after.velocity.max():.2f} m/s")
+        if self.world_goes_on:
+            happened.append(f"{after.position.max():.2f} m")
+            if after.position.max() > self.position:
+                wrong.append(f"position error {after.position.max():.2f} m")
+            usual = outcome.reference.ratio.max() if outcome.reference is not None else 0.0
+            happened.append(f"{errors.ratio.max():.1f} sigma")
+            if errors.ratio.max() > max(HONEST, 1.3 * usual):
+                wrong.append(f"error of {errors.ratio.max():.1f} sigma (without the fault {usual:.1f})")
+        if self.grows:
+            before = errors.part(begin - 1.0, begin - 0.1).velocity_sigma
+            worst = errors.part(begin, end + 0.3).velocity_sigma
+            grown = worst.max() / before.mean() if len(before) and len(worst) else 0.0
+            happened.append(f"sigma times {grown:.1f}")
+            if grown < self.grows:
+                wrong.append(f"sigma grew {grown:.1f} times only")
+        over = end + RECOVERY < outcome.length
+        if self.recovers and over:
+            rms = lambda part: numpy.sqrt(numpy.mean(numpy.square(part.velocity))) if len(part.time) else numpy.nan
+            recovered = rms(errors.part(end + RECOVERY, numpy.inf))
+            usual = rms(outcome.reference.part(end + RECOVERY, numpy.inf)) if outcome.reference is not None else 0.0
+            happened.append(f"then {recovered:.3f} m/s")
+            if not recovered <= RECOVERED[0] * usual + RECOVERED[1]:
+                wrong.append(f"not recovered: {recovered:.3f} m/s, without the fault {usual:.3f}")
+        counts = outcome.counted()
+        for pattern in self.counted:
+            found = {name: n for name, n in counts.items() if re.fullmatch(pattern, name)}
+            if not found:
+                wrong.append(f"{pattern} not counted ({', '.join(counts) or 'nothing'})")
+            happened.append(" ".join(f"{name} {n}" for name, n in found.items()))
+        return ", ".join(h for h in happened if h), wrong
+
+
+@dataclasses.dataclass
+class Refuses:
+    """Ends with exit status 1 and one line that says what is wrong and what was expected."""
+    message: str
+
+    def words(self):
+        return f"exit status 1, says \"{self.message}\""
+
+    def judge(self, outcome, begin, end):
+        line = last_line(outcome.messages)
+        wrong = []
+        if outcome.status != 1:
+            wrong.append(f"exit status {outcome.status}")
+        if not re.search(self.message, outcome.messages):
+            wrong.append("does not say so")
+        return line or f"exit status {outcome.status}", wrong
+
+
+def last_line(text):
+    lines = text.strip().splitlines()
+    return lines[-1] if lines else ""
+
+
+def common(outcome):
+    """What holds for every run that ends well."""
+    if outcome.not_a_number:
+        yield "nan or inf in " + ", ".join(outcome.not_a_number)
+    summary = outcome.summary
+    accounted = summary.get("scans_used", 0) + sum((summary.get("scans_rejected") or {}).values())
+    if accounted != summary.get("scans_total"):
+        yield f"{summary.get('scans_total')} scans came, {accounted} accounted for"
+    silent = outcome.last_imu - outcome.run.time[-1] if outcome.run is not None else 0.0
+    if silent > SILENCE:
+        yield f"output ends {silent:.1f} s before the IMU"
