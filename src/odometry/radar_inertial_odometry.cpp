@@ -6,9 +6,9 @@
 #include <mutex>
 #include <utility>
 
+#include "rio_t/odometry/initializer.h"
 #include "rio_t/odometry/navigator.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
-#include "rio_t/smoother/initial_prior.h"
 
 namespace rio_t {
 namespace {
@@ -43,7 +43,7 @@ struct RadarInertialOdometry::Impl {
         g_W(0.0, 0.0, -options.gravity),
         R_RI(options.T_IR.q_IR.conjugate().toRotationMatrix()),
         navigator(options.imu_noise, g_W),
-        initializer(options.initialization, options.gravity),
+        initializer(options),
         ego_velocity_estimator(options.ego_velocity),
         feasibility(options.feasibility),
         offset_monitor(options.offset_monitor, options.smoother.time_offset_initial),
@@ -53,6 +53,7 @@ struct RadarInertialOdometry::Impl {
 
   void drainInbox();
   void tryInitialize(const ImuMeasurement& sample);
+  void begin(Time time, const NodePrior& prior);
   bool contradicts(const VelocityPrior& prior, const EgoVelocity& measured) const;
   bool isAtRest(Time time) const;
   /// Empty, or why the scan has no velocity to use; and whether that velocity tells the offset.
@@ -81,7 +82,7 @@ struct RadarInertialOdometry::Impl {
 
   // The optimisation half; only the thread in process() touches these.
   ImuBuffer imu;
-  StaticInitializer initializer;
+  Initializer initializer;
   EgoVelocityEstimator ego_velocity_estimator;
   FeasibilityCheck feasibility;
   OffsetMonitor offset_monitor;
@@ -179,27 +180,25 @@ void RadarInertialOdometry::Impl::drainInbox() {
 }
 
 void RadarInertialOdometry::Impl::tryInitialize(const ImuMeasurement& sample) {
-  const std::optional<StaticInitialization> rest = initializer.add(sample);
-  if (rest) {
-    StateBlock x;
-    x.q_WI() = rest->q_WI;
-    x.b_g() = rest->b_g;
-    x.b_a() = rest->b_a;
-    // A mean over T seconds leaves density / sqrt(T), besides what the bias does by itself.
-    const double gyro_bias_sigma = options.imu_noise.gyro_density / std::sqrt(rest->duration);
-    start = Start{rest->time, priorAtRest(options.smoother, x, gyro_bias_sigma)};
-    smoother.initialize(start->time, start->prior);
-    initialized_at = rest->time;
-    last_used = rest->time;
-    const NavigationState state = newestState(smoother.newestCovariance());
-    const std::lock_guard<std::mutex> lock(navigation_mutex);
-    navigator.anchor(state);
+  const std::optional<Initialization> found = initializer.add(sample, imu);
+  if (found) {
+    start = found;
+    begin(found->time, found->prior);
   } else {
-    imu.dropBefore(sample.time - 2.0 * options.smoother.max_time_offset);
+    imu.dropBefore(sample.time - initializer.imuHistory());
   }
   const std::lock_guard<std::mutex> lock(inbox_mutex);
-  is_initialized = rest.has_value();
+  is_initialized = found.has_value();
   waiting_for = initializer.waitingFor();
+}
+
+void RadarInertialOdometry::Impl::begin(Time time, const NodePrior& prior) {
+  smoother.initialize(time, prior);
+  initialized_at = time;
+  last_used = time;
+  const NavigationState state = newestState(smoother.newestCovariance());
+  const std::lock_guard<std::mutex> lock(navigation_mutex);
+  navigator.anchor(state);
 }
 
 std::optional<ScanResult> RadarInertialOdometry::Impl::tryScan(const RadarScan& scan, bool imu_has_ended) {
@@ -209,7 +208,11 @@ std::optional<ScanResult> RadarInertialOdometry::Impl::tryScan(const RadarScan& 
     result.rejected_because = reason;
     return result;
   };
-  if (smoother.size() == 0) return rejected("before_initialization");
+  if (smoother.size() == 0) {
+    result.ego_velocity = ego_velocity_estimator.estimate(scan);
+    initializer.addVelocity(scan.stamp, result.ego_velocity);
+    return rejected("before_initialization");
+  }
 
   const Time node_time = smoother.nodeTime(scan.stamp);
   if (node_time < initialized_at) return rejected("before_initialization");

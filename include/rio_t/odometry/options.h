@@ -5,6 +5,7 @@
 #include "rio_t/imu/noise.h"
 #include "rio_t/imu/rest_detector.h"
 #include "rio_t/imu/static_initializer.h"
+#include "rio_t/odometry/motion_initializer.h"
 #include "rio_t/odometry/offset_monitor.h"
 #include "rio_t/radar/ego_velocity.h"
 #include "rio_t/radar/feasibility.h"
@@ -18,12 +19,22 @@ struct Extrinsics {
   Eigen::Quaterniond q_IR = Eigen::Quaterniond::Identity();  ///< turns R into I
 };
 
+/// How the first state is found.
+enum class InitMode {
+  kStatic,  ///< "static": wait for rest, however long
+  kMotion,  ///< "motion": from radar velocities and IMU at once, moving or not
+  kAuto,    ///< "auto": from rest; where there was none for `init_motion_after`, as kMotion
+};
+
 /// Everything that the estimator is told. Defaults are for an ADIS16448 and a TI IWR6843AOP.
 struct OdometryOptions {
   double gravity = 9.81;  ///< [m/s^2] magnitude
   ImuNoise imu_noise;
   Extrinsics T_IR;
+  InitMode init_mode = InitMode::kAuto;
+  double init_motion_after = 5.0;  ///< [s] of IMU without rest, for kAuto
   StaticInitializerOptions initialization;
+  MotionInitializerOptions motion_initialization;
   EgoVelocityOptions ego_velocity;
   FeasibilityOptions feasibility;
   RestOptions rest;

@@ -9,6 +9,7 @@
 
 #include "rio_t/core/pose.h"
 #include "rio_t/factors/prior_factor.h"
+#include "rio_t/odometry/initializer.h"
 #include "rio_t/odometry/navigation_state.h"
 #include "rio_t/odometry/options.h"
 
@@ -65,10 +66,7 @@ class RadarInertialOdometry {
   bool initialized() const;
   /// Where the graph begins and what was known there; none before initialisation. Call it from the thread
   /// that calls `process`.
-  struct Start {
-    Time time;
-    NodePrior prior;
-  };
+  using Start = Initialization;
   std::optional<Start> start() const;
   /// While not initialised: what is being waited for, for people.
   std::string waitingFor() const;

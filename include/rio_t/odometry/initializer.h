@@ -1,0 +1,46 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "rio_t/imu/static_initializer.h"
+#include "rio_t/odometry/motion_initializer.h"
+#include "rio_t/odometry/options.h"
+
+namespace rio_t {
+
+/// Where a first state came from.
+enum class InitializedFrom { kRest, kMotion };
+std::string toString(InitializedFrom from);  ///< "rest" or "motion"
+
+struct Initialization {
+  Time time;
+  NodePrior prior;
+  InitializedFrom from = InitializedFrom::kRest;
+};
+
+/// The first state by `init_mode`: from rest where there is some, else from motion. Not thread-safe.
+class Initializer {
+ public:
+  explicit Initializer(const OdometryOptions& options);
+
+  /// `imu` ends with the sample `newest`, which comes once each, in time order, and reaches imuHistory()
+  /// back.
+  std::optional<Initialization> add(const ImuMeasurement& newest, const ImuBuffer& imu);
+  /// Velocity of a scan before there is a state.
+  void addVelocity(Time stamp, const EgoVelocity& velocity) { motion_.add(stamp, velocity); }
+
+  /// What is being waited for, for people.
+  std::string waitingFor() const;
+  double imuHistory() const { return motion_.imuHistory(); }  ///< [s]
+
+ private:
+  bool mayStartInMotion() const;
+
+  OdometryOptions options_;  // read-only after construction
+  StaticInitializer rest_;
+  MotionInitializer motion_;
+  std::optional<Time> first_, newest_;
+};
+
+}  // namespace rio_t

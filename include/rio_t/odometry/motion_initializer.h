@@ -1,0 +1,97 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rio_t/factors/prior_factor.h"
+#include "rio_t/factors/radar_velocity_factor.h"
+#include "rio_t/imu/buffer.h"
+#include "rio_t/imu/noise.h"
+#include "rio_t/radar/ego_velocity.h"
+#include "rio_t/smoother/options.h"
+
+namespace rio_t {
+
+struct OdometryOptions;
+
+struct MotionInitializerOptions {
+  double window = 2.5;  ///< [s] of radar velocities that are used
+  /// [m/s^2] | |g| - gravity | of the linear solution, which is not told the size of gravity: farther off,
+  /// units, extrinsics or signs are wrong.
+  double max_gravity_error = 2.0;
+  double max_outlier_fraction = 0.3;  ///< of the velocities, farther than 4 sigma from the solution
+  double sigma_gyro_bias = 0.01;      ///< [rad/s] of b_g around zero before the first scan, per axis
+  double sigma_accel_bias = 0.1;      ///< [m/s^2] of b_a around zero, likewise
+};
+
+/// What is kept of the pose where the state is found anew. Where it is found for the first time, W is defined
+/// by it.
+struct PoseAnchor {
+  Eigen::Quaterniond q_WI = Eigen::Quaterniond::Identity();  ///< heading is kept, tilt is replaced
+  Eigen::Vector3d p_W = Eigen::Vector3d::Zero();             ///< [m]
+  double sigma_yaw = 1.0e-3;                                 ///< [rad]
+  double sigma_position = 1.0e-3;                            ///< [m]
+};
+
+/// First state of a platform that moves.
+struct MotionInitialization {
+  Time time;        ///< of the state: the newest velocity's stamp
+  NodePrior prior;  ///< the state, t_O and what is known of them, correlations included
+};
+
+/// Finds the first state of a platform that never rests, from some seconds of radar velocities and IMU
+/// (docs/method.md, section 3.2).
+///
+/// Let dR, dv integrate the IMU from the state's time to a scan T later (T <= 0), and v_k be the velocity of
+/// I, in I, that the scan shows. Then dR v_k - dv = v_I + g_I T: a straight line over T whose slope is the
+/// gravity in I. From there a least squares finds roll, pitch, velocity, biases and t_O together, with the
+/// factor of the smoother; an unknown t_O widens what it tells, and is found where the motion shows it.
+/// None of the scans must go into the smoother again. Not thread-safe.
+class MotionInitializer {
+ public:
+  explicit MotionInitializer(const OdometryOptions& options);
+
+  /// Velocity of one scan, estimated without a prior. Invalid ones are ignored.
+  void add(Time stamp, const EgoVelocity& velocity);
+  /// The state, as soon as a window of velocities is there, covered by the IMU, and both agree. Where they do
+  /// not, the older half of the window is dropped, and waitingFor() says why.
+  std::optional<MotionInitialization> solve(const ImuBuffer& imu, const PoseAnchor& anchor);
+  void clear();
+
+  /// What is being waited for, for people.
+  const std::string& waitingFor() const { return waiting_for_; }
+  /// How far back the IMU must reach for solve() [s].
+  double imuHistory() const;
+
+ private:
+  using Velocities = std::vector<RadarVelocityMeasurement>;
+
+  /// The velocities of the window that ends with `time`, as far as the IMU covers them without a gap.
+  Velocities windowUntil(Time time, const ImuBuffer& imu) const;
+  /// Gravity and velocity at `time`, in I, as the line through all velocities; biases zero, t_O as
+  /// configured.
+  struct Line {
+    Eigen::Vector3d g_I, v_I;
+  };
+  Line fitLine(const Velocities& velocities, Time time, const ImuBuffer& imu) const;
+  /// Improves `prior.x0` and `prior.t_O0` around which it starts, and adds what the velocities tell. The
+  /// share of outliers.
+  double refine(const Velocities& velocities, Time time, const ImuBuffer& imu, NodePrior& prior) const;
+
+  // Read-only after construction.
+  MotionInitializerOptions options_;
+  SmootherOptions smoother_;
+  ImuNoise noise_;
+  Eigen::Vector3d g_W_;
+  Eigen::Matrix3d R_RI_;
+  Eigen::Vector3d l_I_;
+  double max_imu_gap_;
+
+  Velocities velocities_;  // by stamp
+  std::optional<Time> tried_at_;
+  std::string waiting_for_ = "the first radar velocity";
+};
+
+}  // namespace rio_t

@@ -1,0 +1,48 @@
+#include "rio_t/odometry/initializer.h"
+
+#include <cmath>
+
+#include "rio_t/smoother/initial_prior.h"
+
+namespace rio_t {
+
+std::string toString(InitializedFrom from) { return from == InitializedFrom::kRest ? "rest" : "motion"; }
+
+Initializer::Initializer(const OdometryOptions& options)
+    : options_(options), rest_(options.initialization, options.gravity), motion_(options) {}
+
+bool Initializer::mayStartInMotion() const {
+  if (options_.init_mode != InitMode::kAuto) return options_.init_mode == InitMode::kMotion;
+  return first_ && *newest_ - *first_ >= options_.init_motion_after;
+}
+
+std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, const ImuBuffer& imu) {
+  if (!first_) first_ = newest.time;
+  newest_ = newest.time;
+  if (options_.init_mode != InitMode::kMotion) {
+    if (const std::optional<StaticInitialization> rest = rest_.add(newest)) {
+      StateBlock x;
+      x.q_WI() = rest->q_WI;
+      x.b_g() = rest->b_g;
+      x.b_a() = rest->b_a;
+      // A mean over T seconds leaves density / sqrt(T), besides what the bias does by itself.
+      const double gyro_bias_sigma = options_.imu_noise.gyro_density / std::sqrt(rest->duration);
+      return Initialization{rest->time, priorAtRest(options_.smoother, x, gyro_bias_sigma),
+                            InitializedFrom::kRest};
+    }
+  }
+  if (!mayStartInMotion()) return std::nullopt;
+  PoseAnchor origin;  // W begins here
+  origin.sigma_yaw = options_.smoother.prior_sigma_yaw;
+  origin.sigma_position = options_.smoother.prior_sigma_position;
+  const std::optional<MotionInitialization> motion = motion_.solve(imu, origin);
+  if (!motion) return std::nullopt;
+  return Initialization{motion->time, motion->prior, InitializedFrom::kMotion};
+}
+
+std::string Initializer::waitingFor() const {
+  if (options_.init_mode == InitMode::kMotion) return motion_.waitingFor();
+  return mayStartInMotion() ? rest_.waitingFor() + "; or " + motion_.waitingFor() : rest_.waitingFor();
+}
+
+}  // namespace rio_t
