@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "rio_t/odometry/radar_inertial_odometry.h"
+#include "rio_t/smoother/batch_smoother.h"
+
+namespace rio_t {
+
+/// The whole run solved at once.
+struct BatchResult {
+  /// State at each IMU sample from the start on, carried between the nodes by the IMU.
+  std::vector<NavigationState> trajectory;
+  /// Those of the online run, with the states, offsets and sigmas of the batch; each has the pose of its node
+  /// in `left_window` unless a scan before has it already. Sorted by stamp.
+  std::vector<ScanResult> scans;
+  BatchSolution solution;
+  std::size_t readmitted = 0;  ///< scans that the online gate rejected and the batch took
+};
+
+/// Remembers an online run, then solves the graph over all of it at once (docs/method.md, section 10).
+///
+/// Which points and which scans are outliers is decided online; only scans that the innovation gate rejected
+/// are judged again, by the batch's own prediction. The online states are where the batch begins.
+class BatchOdometry {
+ public:
+  BatchOdometry(const OdometryOptions& options, const BatchOptions& batch);
+
+  /// Every sample that the online run took; in time order, the others are dropped as there.
+  void addImu(const ImuMeasurement& imu);
+  /// `offset_stepped`: the online run found the offset anew at this scan. The points are not kept.
+  void addResult(ScanResult result, bool offset_stepped);
+
+  /// `start`: of the online run. Throws std::runtime_error where no scan was used.
+  BatchResult solve(const RadarInertialOdometry::Start& start) const;
+
+ private:
+  struct Scan {
+    ScanResult result;
+    bool offset_stepped = false;
+  };
+
+  /// The graph, and for each of its scans the index in scans_.
+  struct Run {
+    BatchProblem problem;
+    std::vector<std::size_t> source;
+  };
+
+  RadarVelocityMeasurement measurement(const ScanResult& result) const;
+  Run makeRun(const RadarInertialOdometry::Start& start, const BatchSmoother& smoother) const;
+  /// Adds what the batch does not reject; how many that are.
+  std::size_t readmit(const BatchSmoother& smoother, const BatchSolution& solution, Run& run) const;
+  bool accepts(const BatchSmoother& smoother, const BatchSolution& solution,
+               RadarVelocityMeasurement& z) const;
+  /// Whether the platform accelerates enough for `z` to tell the offset.
+  bool informsOffset(const BatchSmoother& smoother, const NodeEstimate& node,
+                     const RadarVelocityMeasurement& z) const;
+  bool isAtRest(const NodeEstimate& node) const;
+  std::vector<NavigationState> trajectory(const BatchSolution& solution) const;
+  std::vector<ScanResult> results(const Run& run, const BatchSolution& solution) const;
+
+  OdometryOptions options_;  // read-only after construction
+  BatchOptions batch_;       // read-only after construction
+  Eigen::Vector3d g_W_;      // read-only after construction
+  ImuBuffer imu_;
+  std::vector<Scan> scans_;
+};
+
+}  // namespace rio_t

@@ -1,0 +1,245 @@
+#include "rio_t/odometry/batch_odometry.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "rio_t/imu/preintegration.h"
+#include "rio_t/imu/rest_detector.h"
+#include "rio_t/odometry/navigator.h"
+
+namespace rio_t {
+namespace {
+
+constexpr int kState = StateBlock::kTangent;
+
+NavigationState navigationState(const NodeEstimate& node, const NodeMatrix& covariance,
+                                const ImuBuffer& imu) {
+  NavigationState state;
+  state.time = node.time;
+  state.q_WI = node.x.q_WI();
+  state.p_W = node.x.p_W();
+  state.v_W = node.x.v_W();
+  state.b_g = node.x.b_g();
+  state.b_a = node.x.b_a();
+  state.angular_velocity = imu.at(node.time).angular_velocity - state.b_g;
+  state.covariance = covariance.topLeftCorner<kState, kState>();
+  return state;
+}
+
+StateBlock stateBlock(const NavigationState& state) {
+  StateBlock x;
+  x.q_WI() = state.q_WI;
+  x.p_W() = state.p_W;
+  x.v_W() = state.v_W;
+  x.b_g() = state.b_g;
+  x.b_a() = state.b_a;
+  return x;
+}
+
+}  // namespace
+
+BatchOdometry::BatchOdometry(const OdometryOptions& options, const BatchOptions& batch)
+    : options_(options), batch_(batch), g_W_(0.0, 0.0, -options.gravity) {}
+
+void BatchOdometry::addImu(const ImuMeasurement& imu) {
+  if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite()) return;
+  if (imu_.empty() || imu.time > imu_.newest()) imu_.add(imu);
+}
+
+void BatchOdometry::addResult(ScanResult result, bool offset_stepped) {
+  if (!result.used && result.rejected_because.empty()) return;  // only carries the last poses
+  result.scan.points = {};
+  result.left_window.clear();
+  scans_.push_back({std::move(result), offset_stepped});
+}
+
+BatchResult BatchOdometry::solve(const RadarInertialOdometry::Start& start) const {
+  const BatchSmoother smoother(options_.smoother, batch_, options_.imu_noise, g_W_, imu_);
+  Run run = makeRun(start, smoother);
+  if (run.problem.scans.empty()) throw std::runtime_error("batch: the online run used no scan");
+  BatchResult batch;
+  batch.solution = smoother.solve(run.problem);
+  batch.readmitted = readmit(smoother, batch.solution, run);
+  if (batch.readmitted > 0) {
+    const int iterations = batch.solution.iterations;
+    run.problem.guess = batch.solution.nodes;
+    batch.solution = smoother.solve(run.problem);
+    batch.solution.iterations += iterations;
+  }
+  batch.trajectory = trajectory(batch.solution);
+  batch.scans = results(run, batch.solution);
+  return batch;
+}
+
+RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) const {
+  RadarVelocityMeasurement z;
+  z.stamp = result.scan.stamp;
+  z.v_R = result.ego_velocity.v_R;
+  z.covariance = result.ego_velocity.covariance;
+  z.R_RI = options_.T_IR.q_IR.conjugate().toRotationMatrix();
+  z.l_I = options_.T_IR.l_I;
+  z.informs_offset = result.ego_velocity.status == EgoVelocityStatus::kMoving;
+  return z;
+}
+
+BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& start,
+                                          const BatchSmoother& smoother) const {
+  Run run;
+  BatchProblem& problem = run.problem;
+  problem.start = start.time;
+  problem.prior = start.prior;
+  problem.guess.push_back({start.time, start.prior.x0, start.prior.t_O0});
+  bool stepped = false;  // a step found at a scan that is not in the graph counts for the next
+  for (std::size_t i = 0; i < scans_.size(); ++i) {
+    const ScanResult& result = scans_[i].result;
+    stepped |= scans_[i].offset_stepped;
+    if (!result.updated) continue;
+    const NodeEstimate node{result.state.time, stateBlock(result.state), result.time_offset};
+    if (node.time > problem.guess.back().time) problem.guess.push_back(node);
+    BatchScan scan;
+    scan.stamp = result.scan.stamp;
+    scan.t_O = result.time_offset;
+    scan.offset_stepped = std::exchange(stepped, false);
+    const bool at_rest = isAtRest(node);
+    if (at_rest) scan.rest_velocity_sigma = options_.rest.velocity_sigma;
+    if (result.used) {
+      scan.velocity = measurement(result);
+      scan.velocity->informs_offset &= !at_rest && informsOffset(smoother, node, *scan.velocity);
+    }
+    problem.scans.push_back(scan);
+    run.source.push_back(i);
+  }
+  return run;
+}
+
+std::size_t BatchOdometry::readmit(const BatchSmoother& smoother, const BatchSolution& solution,
+                                   Run& run) const {
+  BatchProblem& problem = run.problem;
+  for (std::size_t j = 0; j < problem.scans.size(); ++j)
+    problem.scans[j].t_O = solution.nodes[solution.node_of_scan[j]].t_O;
+
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < scans_.size(); ++i) {
+    const ScanResult& result = scans_[i].result;
+    if (result.rejected_because != "innovation") continue;
+    RadarVelocityMeasurement z = measurement(result);
+    if (!accepts(smoother, solution, z)) continue;
+    ++count;
+    const auto known = std::find(run.source.begin(), run.source.end(), i);  // at rest it is in the graph
+    if (known != run.source.end()) {
+      problem.scans[static_cast<std::size_t>(known - run.source.begin())].velocity = z;
+      continue;
+    }
+    BatchScan scan;
+    scan.stamp = z.stamp;
+    scan.t_O = solution.nodes[nearestNode(solution.nodes, z.stamp)].t_O;
+    scan.velocity = z;
+    problem.scans.push_back(scan);
+    run.source.push_back(i);
+  }
+  return count;
+}
+
+bool BatchOdometry::accepts(const BatchSmoother& smoother, const BatchSolution& solution,
+                            RadarVelocityMeasurement& z) const {
+  const double t_O = solution.nodes[nearestNode(solution.nodes, z.stamp)].t_O;
+  const bool at_stamp = options_.smoother.time_offset_model == TimeOffsetModel::kConstantAcceleration;
+  const std::size_t k = nearestNode(solution.nodes, at_stamp ? z.stamp : z.stamp - t_O);
+  const NodeEstimate& node = solution.nodes[k];
+  const auto residual = smoother.residual(node, solution.covariances[k], z);
+  const double model_error = options_.smoother.innovation_model_error;
+  const double gate = options_.smoother.innovation_gate;
+  const Eigen::Matrix3d S =
+      residual.prediction_covariance + z.covariance + model_error * model_error * Eigen::Matrix3d::Identity();
+  z.informs_offset &= !isAtRest(node) && informsOffset(smoother, node, z);
+  return residual.value.dot(S.ldlt().solve(residual.value)) <= gate * gate;
+}
+
+bool BatchOdometry::informsOffset(const BatchSmoother& smoother, const NodeEstimate& node,
+                                  const RadarVelocityMeasurement& z) const {
+  const auto residual = smoother.residual(node, NodeMatrix::Zero(), z);
+  return residual.dh_dt_O.norm() > options_.smoother.time_offset_min_acceleration;
+}
+
+bool BatchOdometry::isAtRest(const NodeEstimate& node) const {
+  return rio_t::isAtRest(imu_, node.time, {node.x.q_WI(), node.x.v_W(), node.x.b_g(), node.x.b_a(), g_W_},
+                         options_.rest);
+}
+
+std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solution) const {
+  const std::vector<NodeEstimate>& nodes = solution.nodes;
+  std::vector<NavigationState> states;
+  for (std::size_t k = 0; k + 1 < nodes.size(); ++k) {
+    const NodeEstimate& node = nodes[k];
+    const NodeEstimate& next = nodes[k + 1];
+    // What the IMU alone would miss the next node by is spread over the way to it.
+    const StateBlock missed_by = carried(node.x, node.time, next.time, imu_, g_W_);
+    const StateTangent miss = boxminus(next.x.data(), missed_by.data());
+    if (k == 0) states.push_back(navigationState(node, solution.covariances[0], imu_));
+    NodeEstimate at = node;
+    Time carried_to = node.time;
+    StateBlock x = node.x;
+    imu_.forEachSample(node.time, next.time, [&](const ImuMeasurement& sample) {
+      x = carried(x, carried_to, sample.time, imu_, g_W_);
+      carried_to = sample.time;
+      const double share = (sample.time - node.time) / (next.time - node.time);
+      const StateTangent part = share * miss;
+      at.time = sample.time;
+      boxplus(x.data(), part.data(), at.x.data());
+      const NodeMatrix covariance =
+          (1.0 - share) * solution.covariances[k] + share * solution.covariances[k + 1];
+      states.push_back(navigationState(at, covariance, imu_));
+    });
+  }
+  // Behind the last scan there is the IMU alone.
+  Navigator navigator(options_.imu_noise, g_W_);
+  navigator.anchor(navigationState(nodes.back(), solution.covariances.back(), imu_));
+  imu_.forEachSample(nodes.back().time - 0.1, imu_.newest(), [&](const ImuMeasurement& sample) {
+    const std::optional<NavigationState> state = navigator.add(sample);
+    if (state && state->time > nodes.back().time) states.push_back(*state);
+  });
+  return states;
+}
+
+std::vector<ScanResult> BatchOdometry::results(const Run& run, const BatchSolution& solution) const {
+  std::vector<ScanResult> results;
+  for (const Scan& scan : scans_) {
+    results.push_back(scan.result);
+    results.back().updated = false;
+  }
+  std::vector<std::size_t> node_of(results.size());
+  for (std::size_t j = 0; j < run.source.size(); ++j) {
+    const std::size_t k = solution.node_of_scan[j];
+    const NodeMatrix& P = solution.covariances[k];
+    ScanResult& result = results[run.source[j]];
+    node_of[run.source[j]] = k;
+    result.updated = true;
+    result.used = run.problem.scans[j].velocity.has_value();
+    if (result.used) result.rejected_because.clear();
+    result.state = navigationState(solution.nodes[k], P, imu_);
+    result.time_offset = solution.nodes[k].t_O;
+    result.time_offset_sigma = options_.smoother.estimate_time_offset ? std::sqrt(P(kState, kState)) : 0.0;
+  }
+  std::vector<std::size_t> order(results.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return results[a].scan.stamp < results[b].scan.stamp;
+  });
+  std::vector<ScanResult> sorted;
+  std::size_t next = 0;  // node whose pose comes next
+  for (const std::size_t i : order) {
+    const bool last = i == order.back();
+    const std::size_t until = last ? solution.nodes.size() : results[i].updated ? node_of[i] + 1 : next;
+    for (; next < until; ++next) {
+      const NodeEstimate& node = solution.nodes[next];
+      results[i].left_window.push_back({node.time, node.x.p_W(), node.x.q_WI()});
+    }
+    sorted.push_back(std::move(results[i]));
+  }
+  return sorted;
+}
+
+}  // namespace rio_t

@@ -1,0 +1,179 @@
+#include "rio_t/smoother/batch_smoother.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numeric>
+#include <stdexcept>
+#include <utility>
+
+#include "rio_t/factors/state_manifold.h"
+#include "rio_t/imu/preintegration.h"
+#include "rio_t/smoother/chain_marginals.h"
+#include "rio_t/smoother/window_solver.h"
+
+namespace rio_t {
+namespace {
+
+/// Scans of the imu model nearer than this share one node [s]: an IMU factor over no time would weigh
+/// infinitely.
+constexpr double kMinNodeSpacing = 0.005;
+/// Squared length of the step that is left, in standard deviations, below which the solution stands.
+constexpr double kConverged = 1e-6;
+
+void takeStep(const ChainSolution& step, Window& window) {
+  for (std::size_t k = 0; k < window.nodes.size(); ++k) {
+    WindowNode& node = window.nodes[k];
+    boxplus(node.x.data(), step.delta[k].data(), node.x.data());
+    if (window.offset_known) continue;
+    node.t_O = std::clamp(node.t_O + step.delta[k](StateBlock::kTangent), -window.max_time_offset,
+                          window.max_time_offset);
+  }
+}
+
+}  // namespace
+
+std::size_t nearestNode(const std::vector<NodeEstimate>& nodes, Time time) {
+  const auto after = std::lower_bound(nodes.begin(), nodes.end(), time,
+                                      [](const NodeEstimate& node, Time t) { return node.time < t; });
+  const auto k = static_cast<std::size_t>(after - nodes.begin());
+  if (k == 0) return k;
+  return after == nodes.end() || time - nodes[k - 1].time < after->time - time ? k - 1 : k;
+}
+
+StateBlock carried(const StateBlock& x, Time from, Time to, const ImuBuffer& imu,
+                   const Eigen::Vector3d& g_W) {
+  Preintegration pre;
+  pre.b_g = x.b_g();
+  pre.b_a = x.b_a();
+  imu.forEachInterval(from, to, [&](double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
+    pre.delta.step(dt, gyro - pre.b_g, accel - pre.b_a);
+  });
+  return predict(x, pre, g_W);
+}
+
+BatchSmoother::BatchSmoother(const SmootherOptions& options, const BatchOptions& batch, const ImuNoise& noise,
+                             const Eigen::Vector3d& g_W, const ImuBuffer& imu)
+    : options_(options), batch_(batch), noise_(noise), g_W_(g_W), imu_(&imu) {}
+
+std::unique_ptr<RadarCost> BatchSmoother::makeRadarFactor(const RadarVelocityMeasurement& z,
+                                                          Time node_time) const {
+  if (atMeasurement())
+    return std::make_unique<ImuRadarFactor>(z, node_time, *imu_, options_.max_time_offset, g_W_);
+  return std::make_unique<ConstantAccelerationRadarFactor>(z, imu_->at(z.stamp), g_W_);
+}
+
+BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std::vector<double>& t_O,
+                                          const std::vector<NodeEstimate>& guess) const {
+  const std::size_t scans = problem.scans.size();
+  std::vector<Time> times(scans);
+  for (std::size_t i = 0; i < scans; ++i) {
+    const Time time = atMeasurement() ? problem.scans[i].stamp - t_O[i] : problem.scans[i].stamp;
+    times[i] = std::clamp(time, problem.start, std::max(problem.start, imu_->newest()));
+  }
+  std::vector<std::size_t> order(scans);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return times[a] < times[b]; });
+  const auto stateAt = [&](Time time) {
+    const NodeEstimate& near = guess[nearestNode(guess, time)];
+    return carried(near.x, near.time, time, *imu_, g_W_);
+  };
+
+  Graph graph;
+  graph.node_of_scan.resize(scans);
+  Window& window = graph.window;
+  window.prior = std::make_unique<PriorFactor>(problem.prior);
+  if (options_.huber_threshold > 0.0)
+    window.loss = std::make_unique<ceres::HuberLoss>(options_.huber_threshold);
+  window.offset_known = !options_.estimate_time_offset;
+  window.max_time_offset = options_.max_time_offset;
+  window.nodes.emplace_back();
+  window.nodes.back().time = problem.start;
+  window.nodes.back().x = stateAt(problem.start);
+  window.nodes.back().t_O = window.offset_known || scans == 0 ? problem.prior.t_O0 : t_O[order.front()];
+  for (const std::size_t i : order) {
+    const BatchScan& scan = problem.scans[i];
+    const WindowNode& previous = window.nodes.back();
+    const double dt = times[i] - previous.time;
+    if (dt > (atMeasurement() ? kMinNodeSpacing : 0.0)) {
+      WindowNode node;
+      node.time = times[i];
+      node.x = stateAt(node.time);
+      node.t_O = t_O[i];
+      node.imu_from_previous = std::make_unique<ImuFactor>(
+          preintegrate(*imu_, previous.time, node.time, previous.x.b_g(), previous.x.b_a(), noise_), noise_,
+          g_W_);
+      node.offset_from_previous = std::make_unique<ConstantOffsetFactor>(
+          scan.offset_stepped ? options_.time_offset_sigma : options_.time_offset_noise * std::sqrt(dt));
+      window.nodes.push_back(std::move(node));
+    }
+    WindowNode& node = window.nodes.back();
+    graph.node_of_scan[i] = window.nodes.size() - 1;
+    if (scan.velocity) node.radar.push_back({scan.stamp, makeRadarFactor(*scan.velocity, node.time)});
+    if (scan.rest_velocity_sigma) node.rest = std::make_unique<RestFactor>(*scan.rest_velocity_sigma);
+  }
+  return graph;
+}
+
+BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
+  if (problem.guess.empty()) throw std::invalid_argument("batch: no state to begin from");
+  std::vector<double> t_O;
+  for (const BatchScan& scan : problem.scans) t_O.push_back(scan.t_O);
+
+  BatchSolution solution;
+  ChainSolution step;
+  Graph graph = place(problem, t_O, problem.guess);
+  solution.placements = 1;
+  for (;;) {
+    solution.iterations += solveWithCeres(graph.window, batch_.max_iterations).iterations;
+    // Ceres does not take the step at which it stops; the chain takes those that are left.
+    double left = std::numeric_limits<double>::infinity();
+    for (;; ++solution.iterations) {
+      linearize(graph.window, &solution.normal_equations);
+      if (!rio_t::solve(solution.normal_equations, 0.0, &step))
+        throw std::runtime_error("batch: the data do not determine every state");
+      left = step.decrease;
+      if (left < kConverged || left > 1.0 || solution.iterations >= batch_.max_iterations) break;
+      takeStep(step, graph.window);
+    }
+
+    solution.nodes.clear();
+    for (const WindowNode& node : graph.window.nodes) solution.nodes.push_back({node.time, node.x, node.t_O});
+    double moved = 0.0;  // [s]
+    for (std::size_t i = 0; i < t_O.size(); ++i)
+      moved = std::max(moved, std::abs(solution.nodes[graph.node_of_scan[i]].t_O - t_O[i]));
+    const bool placed = !atMeasurement() || moved <= batch_.placement_tolerance;
+    solution.converged = placed && left < kConverged;
+    if (solution.converged || solution.iterations >= batch_.max_iterations) break;
+    if (placed) continue;
+    for (std::size_t i = 0; i < t_O.size(); ++i) t_O[i] = solution.nodes[graph.node_of_scan[i]].t_O;
+    graph = place(problem, t_O, solution.nodes);
+    ++solution.placements;
+  }
+  solution.node_of_scan = std::move(graph.node_of_scan);
+  solution.covariances = marginalCovariances(solution.normal_equations);
+  return solution;
+}
+
+BatchSmoother::Residual BatchSmoother::residual(const NodeEstimate& node, const NodeMatrix& covariance,
+                                                const RadarVelocityMeasurement& z) const {
+  RadarVelocityMeasurement unit = z;
+  unit.covariance.setIdentity();
+  unit.informs_offset = true;
+  // The paper's factor stands at the stamp itself.
+  const StateBlock x = atMeasurement() ? node.x : carried(node.x, node.time, z.stamp, *imu_, g_W_);
+  const double* blocks[] = {x.data(), &node.t_O};
+  StateJacobian<3> J_x;
+  Residual result;
+  double* jacobians[] = {J_x.data(), result.dh_dt_O.data()};
+  makeRadarFactor(unit, node.time)->Evaluate(blocks, result.value.data(), jacobians);
+  Eigen::Matrix<double, 3, kNodeTangent> J;
+  J << J_x.leftCols<3>(), J_x.rightCols<StateBlock::kTangent - 3>(), result.dh_dt_O;
+  if (!options_.estimate_time_offset) J.rightCols<1>().setZero();
+  result.prediction_covariance = J * covariance * J.transpose();
+  return result;
+}
+
+}  // namespace rio_t

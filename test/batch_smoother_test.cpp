@@ -1,0 +1,251 @@
+// The batch against dense linear algebra, against the fixed-lag smoother that keeps everything, and against
+// the truth.
+#include "rio_t/smoother/batch_smoother.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+#include "rio_t/core/so3.h"
+#include "rio_t/smoother/chain_marginals.h"
+#include "rio_t/smoother/initial_prior.h"
+#include "synthetic_motion.h"
+
+namespace rio_t {
+namespace {
+
+double wave(int i) { return std::sin(1.0 + 2.71 * i) + 0.4 * std::cos(0.9 * i * i); }
+
+Eigen::MatrixXd dense(const ChainSystem& chain) {
+  const int n = static_cast<int>(chain.diagonal.size());
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n * kNodeTangent, n * kNodeTangent);
+  for (int k = 0; k < n; ++k) {
+    H.block<kNodeTangent, kNodeTangent>(k * kNodeTangent, k * kNodeTangent) = chain.diagonal[k];
+    if (k + 1 == n) continue;
+    H.block<kNodeTangent, kNodeTangent>(k * kNodeTangent, (k + 1) * kNodeTangent) = chain.coupling[k];
+    H.block<kNodeTangent, kNodeTangent>((k + 1) * kNodeTangent, k * kNodeTangent) =
+        chain.coupling[k].transpose();
+  }
+  return H;
+}
+
+/// Largest difference of corresponding blocks, in standard deviations squared.
+double difference(const std::vector<NodeMatrix>& marginals, const Eigen::MatrixXd& covariance) {
+  double largest = 0.0;
+  for (int k = 0; k < static_cast<int>(marginals.size()); ++k) {
+    const NodeMatrix block = covariance.block<kNodeTangent, kNodeTangent>(k * kNodeTangent, k * kNodeTangent);
+    const NodeVector scale = block.diagonal().cwiseSqrt().cwiseInverse();
+    const NodeMatrix scaled = scale.asDiagonal() * (marginals[k] - block) * scale.asDiagonal();
+    largest = std::max(largest, scaled.cwiseAbs().maxCoeff());
+  }
+  return largest;
+}
+
+TEST(ChainMarginals, AreTheBlocksOfTheDenseInverse) {
+  constexpr int kNodes = 5;
+  ChainSystem chain(kNodes);
+  for (int k = 0; k < kNodes; ++k) {
+    NodeMatrix A;
+    for (int i = 0; i < A.size(); ++i) A(i) = wave(100 * k + i);
+    chain.diagonal[k] = 4.0 * (A * A.transpose() + NodeMatrix::Identity());
+    if (k + 1 == kNodes) continue;
+    for (int i = 0; i < kNodeTangent * kNodeTangent; ++i) chain.coupling[k](i) = 0.1 * wave(7000 * k + i);
+  }
+  EXPECT_LT(difference(marginalCovariances(chain), dense(chain).inverse()), 1e-9);
+}
+
+TEST(ChainMarginals, AnOpenStateIsRefused) {
+  ChainSystem chain(2);
+  chain.diagonal[0].setIdentity();
+  EXPECT_THROW(marginalCovariances(chain), std::runtime_error);
+}
+
+class Batch : public ::testing::Test {
+ protected:
+  static constexpr double kEnd = 4.0;
+
+  Batch() : imu(motion.imu(0.0, kEnd + 0.5, 400.0)) {}
+
+  /// `error` [m/s] scales a made-up error of each axis.
+  RadarVelocityMeasurement measurement(double stamp, double t_O, double error = 0.0) const {
+    RadarVelocityMeasurement z;
+    z.stamp = motion.time(stamp);
+    z.R_RI = so3::exp({0.3, -1.2, 2.0}).toRotationMatrix();
+    z.l_I = {0.03, -0.1, 0.05};
+    const int i = static_cast<int>(std::lround(100.0 * stamp));
+    z.v_R = motion.radarVelocity(stamp - t_O, z.R_RI, z.l_I) +
+            error * Eigen::Vector3d(wave(i), wave(i + 1), wave(i + 2));
+    z.covariance = 0.02 * 0.02 * Eigen::Matrix3d::Identity();
+    return z;
+  }
+
+  BatchProblem problem(const SmootherOptions& options) const {
+    BatchProblem problem;
+    problem.start = motion.time(0.5);
+    problem.prior = priorAtRest(options, motion.state(0.5), 1e-4);
+    problem.guess = {{problem.start, motion.state(0.5), options.time_offset_initial}};
+    return problem;
+  }
+
+  BatchSmoother make(const SmootherOptions& options) const {
+    return {options, BatchOptions(), ImuNoise(), motion.g_W, imu};
+  }
+
+  SyntheticMotion motion;
+  ImuBuffer imu;
+};
+
+TEST_F(Batch, EqualsTheFixedLagSmootherThatKeepsEverything) {
+  for (const TimeOffsetModel model : {TimeOffsetModel::kConstantAcceleration, TimeOffsetModel::kImu}) {
+    for (const double huber : {0.0, 1.5}) {
+      SmootherOptions options;
+      options.time_offset_model = model;
+      options.huber_threshold = huber;
+      options.window = 100.0;
+      options.time_offset_initial = options.time_offset_sigma = 0.02;
+      options.max_iterations = 50;
+      FixedLagSmoother online(options, ImuNoise(), motion.g_W, imu);
+      BatchProblem whole = problem(options);
+      online.initialize(whole.start, whole.prior);
+      for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
+        BatchScan scan;
+        scan.velocity = measurement(stamp, 0.02, 0.03);
+        scan.stamp = scan.velocity->stamp;
+        if (stamp < 1.0) scan.rest_velocity_sigma = 3.0;
+        // Where the window puts its node: elsewhere is the same scan, but another split of the IMU's noise.
+        scan.t_O = model == TimeOffsetModel::kImu ? scan.stamp - online.nodeTime(scan.stamp) : 0.02;
+        whole.scans.push_back(scan);
+        online.add(*scan.velocity);
+        if (scan.rest_velocity_sigma) online.addRest(scan.stamp, *scan.rest_velocity_sigma);
+        for (int i = 0; i < 3; ++i) online.optimize();
+        ASSERT_TRUE(online.marginalize().empty());
+      }
+      BatchOptions fixed_nodes;
+      fixed_nodes.placement_tolerance = 1.0;
+      const BatchSolution batch =
+          BatchSmoother(options, fixed_nodes, ImuNoise(), motion.g_W, imu).solve(whole);
+      EXPECT_TRUE(batch.converged);
+      EXPECT_EQ(batch.placements, 1);
+      ASSERT_EQ(batch.nodes.size(), online.size());
+      for (std::size_t k = 0; k < online.size(); ++k) {
+        const NodeEstimate node = online.node(k);
+        ASSERT_EQ(batch.nodes[k].time, node.time);
+        NodeVector apart;
+        apart << boxminus(batch.nodes[k].x.data(), node.x.data()), batch.nodes[k].t_O - node.t_O;
+        const NodeVector sigma = batch.covariances[k].diagonal().cwiseSqrt();
+        EXPECT_LT(apart.cwiseQuotient(sigma).norm(), 0.01) << "node " << k;
+      }
+      const NodeVector last = batch.covariances.back().diagonal();
+      EXPECT_LT((online.newestCovariance().diagonal().cwiseQuotient(last).array() - 1.0).abs().maxCoeff(),
+                1e-3);
+    }
+  }
+}
+
+TEST_F(Batch, CovarianceIsThatOfTheDenseInverse) {
+  SmootherOptions options;
+  BatchProblem whole = problem(options);
+  for (double stamp = 0.7; stamp < 2.0; stamp += 0.1) {
+    BatchScan scan;
+    scan.velocity = measurement(stamp, 0.01, 0.03);
+    scan.stamp = scan.velocity->stamp;
+    whole.scans.push_back(scan);
+  }
+  const BatchSolution batch = make(options).solve(whole);
+  // Scaled to a unit diagonal: metres and biases together are beyond what a dense inverse can hold.
+  const Eigen::MatrixXd H = dense(batch.normal_equations);
+  const Eigen::VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * H * scale.asDiagonal();
+  const Eigen::MatrixXd covariance = scale.asDiagonal() * scaled.inverse() * scale.asDiagonal();
+  EXPECT_LT(difference(batch.covariances, covariance), 1e-6);
+  for (const NodeMatrix& P : batch.covariances)
+    EXPECT_GT(Eigen::SelfAdjointEigenSolver<NodeMatrix>(P).eigenvalues().minCoeff(), 0.0);
+}
+
+TEST_F(Batch, PlacesItsNodesWhereTheOffsetPutsThem) {
+  // From zero, with an offset that the nodes must follow by as much as the time between two scans.
+  for (const double t_O : {-0.05, 0.1, 0.2}) {
+    SmootherOptions options;
+    options.time_offset_sigma = 1.0;  // so that the prior does not pull at these few scans
+    BatchProblem whole = problem(options);
+    for (double stamp = 0.8; stamp < kEnd; stamp += 0.1) {
+      BatchScan scan;
+      scan.velocity = measurement(stamp, t_O);
+      scan.stamp = scan.velocity->stamp;
+      whole.scans.push_back(scan);
+    }
+    const BatchSolution batch = make(options).solve(whole);
+    EXPECT_TRUE(batch.converged);
+    EXPECT_GT(batch.placements, 1);
+    for (std::size_t i = 0; i < whole.scans.size(); ++i) {
+      const NodeEstimate& node = batch.nodes[batch.node_of_scan[i]];
+      EXPECT_NEAR(node.t_O, t_O, 1e-4);
+      EXPECT_NEAR(node.time - (whole.scans[i].stamp - node.t_O), 0.0, 1.1e-4);
+      const StateBlock truth = motion.state(node.time - motion.start);
+      EXPECT_LT((node.x.p_W() - truth.p_W()).norm(), 3e-3);
+      EXPECT_LT(so3::log(node.x.q_WI().conjugate() * truth.q_WI()).norm(), 3e-3);
+    }
+  }
+}
+
+TEST_F(Batch, KnowsThePastBetterThanTheWindowDid) {
+  SmootherOptions options;
+  FixedLagSmoother online(options, ImuNoise(), motion.g_W, imu);
+  BatchProblem whole = problem(options);
+  online.initialize(whole.start, whole.prior);
+  NodeVector then = NodeVector::Zero();
+  for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
+    BatchScan scan;
+    scan.velocity = measurement(stamp, 0.01);
+    scan.stamp = scan.velocity->stamp;
+    whole.scans.push_back(scan);
+    online.add(*scan.velocity);
+    online.optimize();
+    online.marginalize();
+    if (whole.scans.size() == 5) then = online.newestCovariance().diagonal();
+  }
+  const BatchSolution batch = make(options).solve(whole);
+  const NodeVector now = batch.covariances[batch.node_of_scan[4]].diagonal();
+  for (const int i : {0, 1, 6, 7, 8, 12, 13, 14, 15}) EXPECT_LT(now(i), 0.95 * then(i)) << i;
+}
+
+TEST_F(Batch, AStepOfTheOffsetIsFollowedWhereItIsTold) {
+  SmootherOptions options;
+  BatchProblem whole = problem(options);
+  for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
+    const bool after = stamp > 2.25;
+    BatchScan scan;
+    scan.velocity = measurement(stamp, after ? 0.06 : 0.01);
+    scan.stamp = scan.velocity->stamp;
+    scan.offset_stepped = after && stamp < 2.35;
+    whole.scans.push_back(scan);
+  }
+  const BatchSolution batch = make(options).solve(whole);
+  EXPECT_NEAR(batch.nodes[1].t_O, 0.01, 3e-4);
+  EXPECT_NEAR(batch.nodes.back().t_O, 0.06, 3e-4);
+}
+
+TEST_F(Batch, WithoutEstimationTheOffsetStays) {
+  SmootherOptions options;
+  options.estimate_time_offset = false;
+  options.time_offset_initial = 0.01;
+  BatchProblem whole = problem(options);
+  for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
+    BatchScan scan;
+    scan.velocity = measurement(stamp, 0.03);
+    scan.stamp = scan.velocity->stamp;
+    scan.t_O = 0.01;
+    whole.scans.push_back(scan);
+  }
+  for (const NodeEstimate& node : make(options).solve(whole).nodes) EXPECT_DOUBLE_EQ(node.t_O, 0.01);
+}
+
+TEST_F(Batch, NothingToBeginFromIsRefused) {
+  BatchProblem nothing = problem(SmootherOptions());
+  nothing.guess.clear();
+  EXPECT_THROW(make(SmootherOptions()).solve(nothing), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace rio_t
