@@ -1,5 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <thread>
+
+#include "rio_t/ros/bounded_trajectory.h"
+#include "rio_t/ros/current_session.h"
+#include "rio_t/ros/live_session.h"
 #include "rio_t/ros/offset_observability.h"
 #include "rio_t/ros/scan_queue.h"
 
@@ -61,6 +67,105 @@ TEST(OffsetObservability, RejectedScansShowNothing) { EXPECT_FALSE(observableAt(
 TEST(OffsetObservability, IsOfTheLastSecondOnly) {
   EXPECT_TRUE(observableAt(2.0, 0.0, true, 5));
   EXPECT_FALSE(observableAt(2.0, 0.0, true, 15));
+}
+
+CurrentSession::Session freshSession() { return std::make_shared<LiveSession>(Config(), Config().odometry); }
+
+TEST(CurrentSession, NothingIsSaidForASessionThatWasReplaced) {
+  CurrentSession current;
+  const auto old = freshSession();
+  EXPECT_FALSE(current.replace(old));
+  int said = 0;
+  const auto speak = [&](const CurrentSession::Session& session) {
+    return current.speak(CurrentSession::Speaker::kOptimisation, session, [&] { ++said; });
+  };
+  EXPECT_TRUE(speak(old));
+  EXPECT_EQ(current.replace(freshSession()), old);
+  EXPECT_FALSE(speak(old));
+  EXPECT_TRUE(speak(current.get()));
+  EXPECT_EQ(said, 2);
+}
+
+TEST(CurrentSession, ReplacingWaitsForWhoIsSpeaking) {
+  for (const auto speaker : {CurrentSession::Speaker::kNavigation, CurrentSession::Speaker::kOptimisation}) {
+    CurrentSession current;
+    const auto old = freshSession();
+    current.replace(old);
+    std::atomic<bool> speaking{false}, replaced{false};
+    bool replaced_meanwhile = false;
+    std::thread thread([&] {
+      current.speak(speaker, old, [&] {
+        speaking = true;
+        // Long enough for a replacement that does not wait.
+        for (int k = 0; k < 2000; ++k) std::this_thread::yield();
+        replaced_meanwhile = replaced;
+      });
+    });
+    while (!speaking) std::this_thread::yield();
+    current.replace(freshSession());
+    replaced = true;
+    thread.join();
+    EXPECT_FALSE(replaced_meanwhile);
+  }
+}
+
+TEST(CurrentSession, SpeakersDoNotWaitForEachOther) {
+  CurrentSession current;
+  const auto session = freshSession();
+  current.replace(session);
+  bool both = false;
+  current.speak(CurrentSession::Speaker::kOptimisation, session, [&] {
+    std::thread([&] { both = current.speak(CurrentSession::Speaker::kNavigation, session, [] {}); }).join();
+  });
+  EXPECT_TRUE(both);
+}
+
+TEST(LiveSession, TellsWhenTheImuPilesUpBeforeAStuckOptimisation) {
+  const auto session = freshSession();
+  int k = 0;
+  const auto feed = [&](std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i)
+      session->addImu({Time::fromSeconds(0.0025 * ++k), Eigen::Vector3d::Zero(), {0.0, 0.0, 9.81}});
+  };
+  feed(LiveSession::kMaxWaitingImu - 1);
+  EXPECT_FALSE(session->imuPilesUp());
+  feed(1);
+  EXPECT_TRUE(session->imuPilesUp());
+  bool more = false;
+  session->process(&more);
+  EXPECT_FALSE(session->imuPilesUp());
+  feed(LiveSession::kMaxWaitingImu - 1);
+  EXPECT_FALSE(session->imuPilesUp());
+}
+
+TEST(BoundedTrajectory, KeepsEveryPoseUpToItsCapacity) {
+  BoundedTrajectory bounded(5);
+  EXPECT_TRUE(bounded.poses().empty());
+  for (int k = 0; k < 5; ++k) bounded.add({Time::fromSeconds(k), Eigen::Vector3d(k, 0.0, 0.0), {}});
+  ASSERT_EQ(bounded.poses().size(), 5U);
+  EXPECT_EQ(bounded.poses()[3].p_W.x(), 3.0);
+  EXPECT_EQ(bounded.stride(), 1U);
+}
+
+TEST(BoundedTrajectory, ThinsOutEvenlyAndReachesFromTheFirstPoseToTheLast) {
+  for (const std::size_t capacity : {2U, 3U, 8U, 9U}) {
+    BoundedTrajectory bounded(capacity);
+    for (int k = 0; k < 200; ++k) {
+      bounded.add({Time::fromSeconds(k), Eigen::Vector3d::Zero(), {}});
+      const Trajectory poses = bounded.poses();
+      EXPECT_LE(poses.size(), capacity + 1);
+      EXPECT_EQ(poses.front().time, Time::fromSeconds(0.0));
+      EXPECT_EQ(poses.back().time, Time::fromSeconds(k));
+      for (std::size_t i = 0; i + 1 < poses.size(); ++i) {
+        EXPECT_EQ(poses[i].time, Time::fromSeconds(static_cast<double>(i * bounded.stride())));
+      }
+    }
+    EXPECT_GT(bounded.poses().size(), capacity / 2);
+  }
+}
+
+TEST(BoundedTrajectory, RefusesACapacityThatCannotHoldBothEnds) {
+  EXPECT_THROW(BoundedTrajectory(1), std::invalid_argument);
 }
 
 }  // namespace

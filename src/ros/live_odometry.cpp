@@ -104,9 +104,9 @@ void LiveOdometry::subscribe() {
   diagnostics_.emplace(node_, private_node_, name_);
   diagnostics_->setHardwareID("none");
   using Status = LiveMonitor::Status;
-  diagnostics_->add("odometry", [this](Status& s) { monitor_.describeOdometry(s, session().get()); });
-  diagnostics_->add("input", [this](Status& s) { monitor_.describeInput(s, session().get()); });
-  diagnostics_->add("solver", [this](Status& s) { monitor_.describeSolver(s, session().get()); });
+  diagnostics_->add("odometry", [this](Status& s) { monitor_.describeOdometry(s, session_.get().get()); });
+  diagnostics_->add("input", [this](Status& s) { monitor_.describeInput(s, session_.get().get()); });
+  diagnostics_->add("solver", [this](Status& s) { monitor_.describeSolver(s, session_.get().get()); });
   diagnostics_->add("time offset", [this](Status& s) { monitor_.describeTimeOffset(s); });
   // A wall timer, and no update() that looks at ROS time: also a clock that stands still is worth a
   // diagnosis.
@@ -114,11 +114,6 @@ void LiveOdometry::subscribe() {
     diagnostics_->force_update();
   };
   diagnostics_timer_ = service_node.createWallTimer(ros::WallDuration(kDiagnosticPeriod), tell);
-}
-
-LiveOdometry::Session LiveOdometry::session() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return session_;
 }
 
 void LiveOdometry::wakeSolver() {
@@ -133,21 +128,26 @@ void LiveOdometry::startSession(const Extrinsics& T_IR) {
   publisher_.extrinsics(T_IR);
   OdometryOptions options = config_.odometry;
   options.T_IR = T_IR;
-  Session fresh = std::make_shared<LiveSession>(config_, options);
   monitor_.waitFor("");
-  const std::lock_guard<std::mutex> lock(mutex_);
-  options_ = options;
-  session_ = std::move(fresh);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    options_ = options;
+  }
+  session_.replace(std::make_shared<LiveSession>(config_, options));
 }
 
 void LiveOdometry::reset(const std::string& reason) {
   ROS_WARN_STREAM(name_ << ": reset: " << reason << "; starts again, stand still");
+  // Where it still waits for its extrinsics there is nothing to forget.
+  if (session_.get()) {
+    OdometryOptions options;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      options = options_;
+    }
+    session_.replace(std::make_shared<LiveSession>(config_, options));
+  }
   monitor_.reset(reason);
-  Session old;  // ends outside the lock
-  const std::lock_guard<std::mutex> lock(mutex_);
-  if (!session_) return;  // still waiting for its extrinsics: nothing to forget
-  old = std::move(session_);
-  session_ = std::make_shared<LiveSession>(config_, options_);
 }
 
 void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
@@ -160,15 +160,21 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
       newest_imu_.reset();
     }
     if (!newest_imu_ || imu.time > *newest_imu_) newest_imu_ = imu.time;
-    const Session now = session();
+    const Session now = session_.get();
     if (!now) {
       monitor_.dropped("imu_before_extrinsics");
       return;
     }
     const double rate_sigma = now->rateSigma(imu.time);
     if (const std::optional<NavigationState> state = now->addImu(imu)) {
-      publisher_.odometry(*state, rate_sigma);
-      monitor_.odometry(secondsSince(start));
+      session_.speak(Speaker::kNavigation, now, [&] {
+        publisher_.odometry(*state, rate_sigma);
+        monitor_.odometry(secondsSince(start));
+      });
+    }
+    if (now->imuPilesUp()) {
+      reset("the optimisation thread took none of the last " + std::to_string(LiveSession::kMaxWaitingImu) +
+            " IMU samples");
     }
     account(now->stampWithImu(imu.time, toTime(event.getReceiptTime())));
     {
@@ -193,8 +199,8 @@ void LiveOdometry::onScan(const Event<sensor_msgs::PointCloud2>& event) {
       throw std::runtime_error("topic " + config_.radar_topic + ": " + error.what());
     }
     if (decoded.dropped_not_finite > 0) monitor_.dropped("points_not_finite", decoded.dropped_not_finite);
-    if (!session()) lookUpExtrinsics(message.header.frame_id);
-    const Session now = session();
+    if (!session_.get()) lookUpExtrinsics(message.header.frame_id);
+    const Session now = session_.get();
     if (!now) {
       monitor_.dropped("scan_before_extrinsics");
       return;
@@ -210,7 +216,7 @@ void LiveOdometry::onScan(const Event<sensor_msgs::PointCloud2>& event) {
 
 void LiveOdometry::onTrigger(const Event<std_msgs::Header>& event) {
   monitor_.trigger();
-  const Session now = session();
+  const Session now = session_.get();
   if (!now) return;
   const std_msgs::Header& trigger = *event.getConstMessage();
   account(now->addTrigger(trigger.seq, toTime(trigger.stamp), toTime(event.getReceiptTime())));
@@ -258,13 +264,17 @@ bool LiveOdometry::onReset(std_srvs::Empty::Request& /*request*/, std_srvs::Empt
 
 bool LiveOdometry::onSaveTrajectory(std_srvs::Trigger::Request& /*request*/,
                                     std_srvs::Trigger::Response& response) {
-  const Session now = session();
-  const Trajectory trajectory = now ? now->trajectory() : Trajectory();
+  const Session now = session_.get();
+  std::size_t stride = 1;
+  const Trajectory trajectory = now ? now->trajectory(&stride) : Trajectory();
   try {
     if (trajectory.empty()) throw std::runtime_error("no optimised pose yet");
     writeTum(config_.trajectory_file, trajectory);
     response.success = 1U;
     response.message = std::to_string(trajectory.size()) + " poses in " + config_.trajectory_file;
+    if (stride > 1)
+      response.message += ", one in " + std::to_string(stride) + ": more than " +
+                          std::to_string(LiveSession::kMaxPoses) + " are not kept";
   } catch (const std::exception& error) {
     response.success = 0U;
     response.message = error.what();
@@ -275,16 +285,15 @@ bool LiveOdometry::onSaveTrajectory(std_srvs::Trigger::Request& /*request*/,
 void LiveOdometry::solve() {
   Session published;  // whose results ~path holds
   while (true) {
-    Session now;
     double rate_sigma = 0.0;
     {
       std::unique_lock<std::mutex> lock(mutex_);
       work_to_do_.wait(lock, [this] { return has_work_ || stopping_; });
       if (stopping_) return;
       has_work_ = false;
-      now = session_;
       rate_sigma = rate_sigma_;
     }
+    const Session now = session_.get();
     if (!now) continue;
     if (published != now) {
       if (published) publisher_.clearPath();
@@ -293,15 +302,17 @@ void LiveOdometry::solve() {
     try {
       bool more = false;
       for (const LiveSession::Result& result : now->process(&more)) {
-        if (session() != now) break;  // reset meanwhile: not of this world any more
-        publisher_.result(result, rate_sigma);
-        monitor_.result(result);
+        const bool current = session_.speak(Speaker::kOptimisation, now, [&] {
+          publisher_.result(result, rate_sigma);
+          monitor_.result(result);
+        });
+        if (!current) break;  // reset meanwhile: not of this world any more
       }
       if (more) wakeSolver();  // one scan at a time, so that stopping and resets are heeded between them
     } catch (const std::exception& error) {
       monitor_.solverFailed(error.what());
       ROS_ERROR_STREAM(name_ << ": the estimator failed: " << error.what());
-      if (session() == now) reset(std::string("the estimator failed: ") + error.what());
+      if (session_.get() == now) reset(std::string("the estimator failed: ") + error.what());
     }
   }
 }

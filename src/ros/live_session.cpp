@@ -19,6 +19,11 @@ LiveSession::LiveSession(const Config& config, const OdometryOptions& options)
       queue_(options.max_queued_scans),
       observability_(kObservabilityWindow, kObservableSigma) {}
 
+std::optional<NavigationState> LiveSession::addImu(const ImuMeasurement& imu) {
+  ++waiting_imu_;
+  return odometry_.addImu(imu);
+}
+
 double LiveSession::rateSigma(Time sample) {
   if (!first_imu_) first_imu_ = sample;
   ++imu_count_;
@@ -67,6 +72,7 @@ std::vector<LiveSession::Result> LiveSession::process(bool* more) {
     odometry_.addScan(std::move(item->scan));
   }
   std::vector<Result> results;
+  waiting_imu_ = 0;
   for (ScanResult& scan_result : odometry_.process()) {
     Result result;
     observability_.add(scan_result);
@@ -78,7 +84,7 @@ std::vector<LiveSession::Result> LiveSession::process(bool* more) {
     }
     if (scan_result.updated) {
       const std::lock_guard<std::mutex> lock(trajectory_mutex_);
-      left_window_.insert(left_window_.end(), scan_result.left_window.begin(), scan_result.left_window.end());
+      for (const StampedPose& pose : scan_result.left_window) left_window_.add(pose);
       newest_ = StampedPose{scan_result.state.time, scan_result.state.p_W, scan_result.state.q_WI};
     }
     result.result = std::move(scan_result);
@@ -87,9 +93,10 @@ std::vector<LiveSession::Result> LiveSession::process(bool* more) {
   return results;
 }
 
-Trajectory LiveSession::trajectory() const {
+Trajectory LiveSession::trajectory(std::size_t* stride) const {
   const std::lock_guard<std::mutex> lock(trajectory_mutex_);
-  Trajectory all = left_window_;
+  if (stride != nullptr) *stride = left_window_.stride();
+  Trajectory all = left_window_.poses();
   if (newest_) all.push_back(*newest_);
   return all;
 }

@@ -20,6 +20,7 @@
 #include <string>
 #include <thread>
 
+#include "rio_t/ros/current_session.h"
 #include "rio_t/ros/live_monitor.h"
 #include "rio_t/ros/live_publisher.h"
 #include "rio_t/ros/live_session.h"
@@ -42,7 +43,8 @@ class LiveOdometry {
   LiveOdometry& operator=(const LiveOdometry&) = delete;
 
  private:
-  using Session = std::shared_ptr<LiveSession>;
+  using Session = CurrentSession::Session;
+  using Speaker = CurrentSession::Speaker;
   template <typename Message>
   using Event = ros::MessageEvent<const Message>;
 
@@ -56,8 +58,8 @@ class LiveOdometry {
   /// Takes T_IR from tf, once it is there; the session starts with it. `cloud_frame`: of the cloud's header.
   void lookUpExtrinsics(const std::string& cloud_frame);
   void startSession(const Extrinsics& T_IR);
+  /// When it returns, nothing more is published of what was before. Any thread.
   void reset(const std::string& reason);
-  Session session() const;
   void account(const LiveSession::Stamped& stamped);
   void wakeSolver();
   void solve();  ///< body of the optimisation thread
@@ -73,9 +75,10 @@ class LiveOdometry {
   std::optional<tf2_ros::TransformListener> tf_listener_;
   std::optional<diagnostic_updater::Updater> diagnostics_;  // input thread
 
-  mutable std::mutex mutex_;  // guards what follows, held for microseconds
+  CurrentSession session_;  // thread-safe; null until the extrinsics are known
+
+  std::mutex mutex_;  // guards what follows, held for microseconds
   std::condition_variable work_to_do_;
-  Session session_;          // null until the extrinsics are known
   OdometryOptions options_;  // with the extrinsics that hold
   bool has_work_ = false;
   bool stopping_ = false;

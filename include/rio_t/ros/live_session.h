@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <deque>
 #include <map>
@@ -10,6 +11,7 @@
 
 #include "rio_t/evaluation/trajectory.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
+#include "rio_t/ros/bounded_trajectory.h"
 #include "rio_t/ros/offset_observability.h"
 #include "rio_t/ros/scan_queue.h"
 #include "rio_t/ros/stamping.h"
@@ -35,7 +37,11 @@ class LiveSession {
   LiveSession(const Config& config, const OdometryOptions& options);
 
   /// IMU thread. Empty before the first optimised state.
-  std::optional<NavigationState> addImu(const ImuMeasurement& imu) { return odometry_.addImu(imu); }
+  std::optional<NavigationState> addImu(const ImuMeasurement& imu);
+  /// The optimisation thread has taken none of the last `kMaxWaitingImu` samples: it must be stuck, and what
+  /// waits for it would grow without end. Any thread.
+  bool imuPilesUp() const { return waiting_imu_ >= kMaxWaitingImu; }
+  static constexpr std::size_t kMaxWaitingImu = 20000;  ///< 49 s at 409 Hz
   /// White noise of one gyro sample [rad/s], from its density and the rate seen so far. IMU thread.
   double rateSigma(Time sample);
 
@@ -55,8 +61,10 @@ class LiveSession {
   /// tells whether there was one.
   std::vector<Result> process(bool* more);
 
-  /// Optimised poses so far: those that left the window, and the newest.
-  Trajectory trajectory() const;
+  /// Optimised poses so far, those that left the window, and the newest. Of more than `kMaxPoses`, one in so
+  /// many is kept: `stride` says of how many.
+  Trajectory trajectory(std::size_t* stride = nullptr) const;
+  static constexpr std::size_t kMaxPoses = 36000;  ///< an hour at 10 Hz, 3 MB
   const RadarInertialOdometry& odometry() const { return odometry_; }
   std::size_t queuedScans() const { return queue_.size(); }
 
@@ -65,6 +73,7 @@ class LiveSession {
 
   const double gyro_density_;
   RadarInertialOdometry odometry_;
+  std::atomic<std::size_t> waiting_imu_{0};  // samples since the optimisation thread last took them
 
   std::optional<Time> first_imu_;  // IMU thread only, as the next
   std::uint64_t imu_count_ = 0;
@@ -80,7 +89,7 @@ class LiveSession {
   OffsetObservability observability_;
 
   mutable std::mutex trajectory_mutex_;
-  Trajectory left_window_;  // guarded by trajectory_mutex_, as the next
+  BoundedTrajectory left_window_{kMaxPoses};  // guarded by trajectory_mutex_, as the next
   std::optional<StampedPose> newest_;
 };
 
