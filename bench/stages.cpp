@@ -1,0 +1,134 @@
+// Times the stages of the product without a change to it: these definitions take the place of the libraries'
+// (a program's symbols come before those of its shared libraries), time the call, and pass it on.
+#include <dlfcn.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <utility>
+
+#include "rio_t/odometry/navigator.h"
+#include "rio_t/odometry/radar_inertial_odometry.h"
+#include "rio_t/ros/point_cloud.h"
+#include "rio_t/ros/run_output.h"
+#include "rio_t/smoother/chain.h"
+#include "rio_t/smoother/fixed_lag_smoother.h"
+#include "stage_clock.h"
+
+namespace rio_t {
+namespace {
+
+using bench::Stage;
+using Scope = bench::StageClock::Scope;
+
+/// The library's function of the same name as `own`, a function or member function of this program.
+template <typename Function>
+Function libraryFunction(Function own) {
+  void* address = nullptr;
+  std::memcpy(&address, &own, sizeof(address));  // a pointer to a member function begins with the address
+  Dl_info info;
+  void* found = nullptr;
+  if (dladdr(address, &info) != 0 && info.dli_sname != nullptr) found = dlsym(RTLD_NEXT, info.dli_sname);
+  if (found == nullptr) {
+    std::fprintf(stderr, "bag_benchmark: a timed function of the libraries was not found: %s\n", dlerror());
+    std::abort();
+  }
+  std::memcpy(&own, &found, sizeof(found));
+  return own;
+}
+
+}  // namespace
+
+DecodedScan decode(const sensor_msgs::PointCloud2& message, const PointCloudFormat& format) {
+  static const auto original = libraryFunction(&decode);
+  const Scope scope(Stage::kDecode);
+  return original(message, format);
+}
+
+RadarScan toRadarScan(const pcl::PointCloud<RadarPointPcl>& cloud, Time stamp) {
+  static const auto original = libraryFunction(&toRadarScan);
+  const Scope scope(Stage::kDecode);
+  return original(cloud, stamp);
+}
+
+EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
+                                           const std::optional<VelocityPrior>& prior) const {
+  static const auto original = libraryFunction(&EgoVelocityEstimator::estimate);
+  const Scope scope(Stage::kEgoVelocity);
+  return (this->*original)(scan, prior);
+}
+
+std::optional<RadarVelocityPrediction> FixedLagSmoother::predictRadarVelocity(
+    Time stamp, const Eigen::Matrix3d& R_RI, const Eigen::Vector3d& l_I) const {
+  static const auto original = libraryFunction(&FixedLagSmoother::predictRadarVelocity);
+  const Scope scope(Stage::kPrediction);
+  return (this->*original)(stamp, R_RI, l_I);
+}
+
+FixedLagSmoother::AddResult FixedLagSmoother::add(const RadarVelocityMeasurement& z) {
+  static const auto original = libraryFunction(&FixedLagSmoother::add);
+  const Scope scope(Stage::kFactors);
+  return (this->*original)(z);
+}
+
+FixedLagSmoother::AddResult FixedLagSmoother::addRest(Time stamp, double velocity_sigma) {
+  static const auto original = libraryFunction(&FixedLagSmoother::addRest);
+  const Scope scope(Stage::kFactors);
+  return (this->*original)(stamp, velocity_sigma);
+}
+
+SolveReport FixedLagSmoother::optimize() {
+  static const auto original = libraryFunction(&FixedLagSmoother::optimize);
+  const Scope scope(Stage::kSolve);
+  return (this->*original)();
+}
+
+NodeMatrix covarianceOfLast(const ChainSystem& system) {
+  static const auto original = libraryFunction(&covarianceOfLast);
+  const Scope scope(Stage::kCovariance);
+  return original(system);
+}
+
+std::vector<NodeEstimate> FixedLagSmoother::marginalize() {
+  static const auto original = libraryFunction(&FixedLagSmoother::marginalize);
+  const Scope scope(Stage::kMarginalise);
+  return (this->*original)();
+}
+
+void Navigator::anchor(const NavigationState& state) {
+  static const auto original = libraryFunction(&Navigator::anchor);
+  const Scope scope(Stage::kAnchor);
+  (this->*original)(state);
+}
+
+std::optional<NavigationState> Navigator::add(const ImuMeasurement& imu) {
+  static const auto original = libraryFunction(&Navigator::add);
+  const Scope scope(Stage::kNavigation);
+  return (this->*original)(imu);
+}
+
+std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasurement& imu) {
+  static const auto original = libraryFunction(&RadarInertialOdometry::addImu);
+  const Scope scope(Stage::kPipeline);
+  return (this->*original)(imu);
+}
+
+std::vector<ScanResult> RadarInertialOdometry::process() {
+  static const auto original = libraryFunction(&RadarInertialOdometry::process);
+  const Scope scope(Stage::kPipeline);
+  return (this->*original)();
+}
+
+void RunOutput::addState(const NavigationState& state) {
+  static const auto original = libraryFunction(&RunOutput::addState);
+  const Scope scope(Stage::kOutput);
+  (this->*original)(state);
+}
+
+void RunOutput::addResult(const ScanResult& result) {
+  static const auto original = libraryFunction(&RunOutput::addResult);
+  const Scope scope(Stage::kOutput);
+  (this->*original)(result);
+}
+
+}  // namespace rio_t
