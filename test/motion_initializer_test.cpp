@@ -269,17 +269,33 @@ TEST(Initializer, StartsInMotionOnlyWhereToldTo) {
   EXPECT_NEAR(automatic->second, later.options.init_motion_after, 0.2);
 }
 
-TEST(Initializer, PrefersRest) {
-  Rig rig("start_in_motion", 11, 0.0);
+/// The IMU of a platform at rest.
+void still(Rig& rig) {
   for (ImuMeasurement& sample : rig.data.imu.samples) {
     sample.angular_velocity.setZero();
     sample.acceleration = {0.0, 0.0, 9.81};
+  }
+}
+
+TEST(Initializer, PrefersRest) {
+  Rig rig("start_in_motion", 11, 0.0);
+  still(rig);
+  for (simulation::SimulatedScan& scan : rig.data.scans) {
+    for (simulation::SimulatedPoint& point : scan.points) point.doppler = 0.0;
   }
   std::string waiting_for;
   const auto found = startBy(InitMode::kAuto, rig, &waiting_for);
   ASSERT_TRUE(found);
   EXPECT_EQ(found->first, InitializedFrom::kRest);
   EXPECT_NEAR(found->second, rig.options.initialization.duration, 0.1);
+}
+
+TEST(Initializer, DoesNotTakeASmoothRideForRest) {
+  Rig rig("ground_vehicle", 12, 0.0);
+  still(rig);  // straight on, at constant speed
+  std::string waiting_for;
+  EXPECT_FALSE(startBy(InitMode::kStatic, rig, &waiting_for));
+  EXPECT_NE(waiting_for.find("radar"), std::string::npos) << waiting_for;
 }
 
 }  // namespace

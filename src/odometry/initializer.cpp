@@ -20,7 +20,12 @@ std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, con
   if (!first_) first_ = newest.time;
   newest_ = newest.time;
   if (options_.init_mode != InitMode::kMotion) {
-    if (const std::optional<StaticInitialization> rest = rest_.add(newest)) {
+    const std::optional<StaticInitialization> rest = rest_.add(newest);
+    // A smooth ride looks like rest to the IMU, and like motion to the radar.
+    radar_contradicts_rest_ =
+        rest ? motion_.isMoving(rest->time - rest->duration, rest->time, options_.rest.max_speed)
+             : radar_contradicts_rest_;
+    if (rest && !radar_contradicts_rest_) {
       StateBlock x;
       x.q_WI() = rest->q_WI;
       x.b_g() = rest->b_g;
@@ -42,7 +47,9 @@ std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, con
 
 std::string Initializer::waitingFor() const {
   if (options_.init_mode == InitMode::kMotion) return motion_.waitingFor();
-  return mayStartInMotion() ? rest_.waitingFor() + "; or " + motion_.waitingFor() : rest_.waitingFor();
+  const std::string rest =
+      rest_.waitingFor() + (radar_contradicts_rest_ ? " (what looked like it, moved by the radar)" : "");
+  return mayStartInMotion() ? rest + "; or " + motion_.waitingFor() : rest;
 }
 
 }  // namespace rio_t

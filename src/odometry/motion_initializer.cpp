@@ -62,6 +62,18 @@ void MotionInitializer::add(Time stamp, const EgoVelocity& velocity) {
   if (velocities_.size() > kMaxVelocities) velocities_.erase(velocities_.begin());
 }
 
+bool MotionInitializer::isMoving(Time from, Time to, double max_speed) const {
+  std::size_t scans = 0;
+  std::size_t moving = 0;
+  for (const RadarVelocityMeasurement& z : velocities_) {
+    if (z.stamp < from || to < z.stamp) continue;
+    ++scans;
+    const double sigmas = std::sqrt(z.v_R.dot(z.covariance.ldlt().solve(z.v_R)));
+    if (z.v_R.norm() > max_speed && sigmas > kOutlier) ++moving;
+  }
+  return 2 * moving > scans;
+}
+
 std::optional<MotionInitialization> MotionInitializer::solve(const ImuBuffer& imu, const PoseAnchor& anchor) {
   if (velocities_.empty() || imu.empty()) return std::nullopt;
   const auto outOfReach = [&](const RadarVelocityMeasurement& z) {

@@ -19,7 +19,7 @@ struct Initialization {
   InitializedFrom from = InitializedFrom::kRest;
 };
 
-/// The first state by `init_mode`: from rest where there is some, else from motion. Not thread-safe.
+/// The first state by `init_mode`: from rest where IMU and radar see some, else from motion. Not thread-safe.
 class Initializer {
  public:
   explicit Initializer(const OdometryOptions& options);
@@ -41,6 +41,7 @@ class Initializer {
   StaticInitializer rest_;
   MotionInitializer motion_;
   std::optional<Time> first_, newest_;
+  bool radar_contradicts_rest_ = false;
 };
 
 }  // namespace rio_t

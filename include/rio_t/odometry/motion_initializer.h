@@ -59,6 +59,9 @@ class MotionInitializer {
   /// not, the older half of the window is dropped, and waitingFor() says why.
   std::optional<MotionInitialization> solve(const ImuBuffer& imu, const PoseAnchor& anchor);
   void clear();
+  /// Whether most of the scans stamped within [from, to] show a speed above `max_speed` [m/s], and are sure
+  /// of it.
+  bool isMoving(Time from, Time to, double max_speed) const;
 
   /// What is being waited for, for people.
   const std::string& waitingFor() const { return waiting_for_; }
