@@ -12,8 +12,11 @@
 #include <filesystem>
 #include <set>
 #include <stdexcept>
+#include <tuple>
+#include <utility>
 
 #include "rio_t/evaluation/errors.h"
+#include "rio_t/odometry/batch_odometry.h"
 #include "rio_t/ros/conversions.h"
 #include "rio_t/ros/stamping.h"
 
@@ -100,15 +103,76 @@ boost::shared_ptr<Message> read(const rosbag::MessageInstance& instance) {
   return message;
 }
 
-/// Feeds the estimator message by message and keeps the accounts.
+/// Writes what a run gives, and keeps the accounts.
+class RunLog {
+ public:
+  /// `output` may be null. `taken_off` [s]: the stamps are earlier, and the offset smaller, by so much.
+  RunLog(RunOutput* output, double taken_off) : output_(output), taken_off_(taken_off) {}
+
+  void addState(const NavigationState& state) {
+    if (output_ != nullptr) output_->addState(state);
+    trajectory_.push_back({state.time, state.p_W, state.q_WI});
+  }
+
+  void addResult(ScanResult result) {
+    if (taken_off_ != 0.0) {
+      result.scan.stamp = result.scan.stamp + taken_off_;
+      if (result.updated) result.time_offset += taken_off_;
+    }
+    if (output_ != nullptr) output_->addResult(result);
+    for (const StampedPose& pose : result.left_window) {
+      if (newest_optimized_) path_length_m_ += (pose.p_W - newest_optimized_->p_W).norm();
+      newest_optimized_ = pose;
+    }
+    if (result.used) {
+      ++used_;
+    } else if (!result.rejected_because.empty()) {
+      ++rejected_[result.rejected_because];
+    }
+    if (result.updated) {
+      final_offset_s_ = result.time_offset;
+      final_offset_sigma_s_ = result.time_offset_sigma;
+    }
+  }
+
+  /// Sets what the log knows.
+  void fill(RunSummary* summary) const {
+    summary->scans_used = used_;
+    summary->scans_rejected = rejected_;
+    summary->path_length_m = path_length_m_;
+    summary->final_offset_s = final_offset_s_;
+    summary->final_offset_sigma_s = final_offset_sigma_s_;
+    if (trajectory_.empty()) return;
+    const Eigen::Vector3d moved = trajectory_.back().p_W - trajectory_.front().p_W;
+    summary->end_to_start_2d_m = moved.head<2>().norm();
+    summary->end_to_start_3d_m = moved.norm();
+  }
+
+  Trajectory takeTrajectory() { return std::move(trajectory_); }
+
+ private:
+  RunOutput* output_;
+  double taken_off_;
+  Trajectory trajectory_;
+  std::uint64_t used_ = 0;
+  std::map<std::string, std::uint64_t> rejected_;
+  std::optional<StampedPose> newest_optimized_;
+  double path_length_m_ = 0.0;
+  double final_offset_s_ = 0.0;
+  double final_offset_sigma_s_ = 0.0;
+};
+
+/// Feeds the estimator message by message.
 class Player {
  public:
-  Player(const Config& config, RunOutput* output)
+  /// `recorder`: keeps the run for a batch; may be null.
+  Player(const Config& config, RunLog* log, BatchOdometry* recorder)
       : config_(config),
         format_(pointCloudFormat(config)),
         stamper_(stampingOptions(config)),
         odometry_(config.odometry),
-        output_(output) {}
+        log_(log),
+        recorder_(recorder) {}
 
   void play(const rosbag::MessageInstance& instance) {
     const std::string& topic = instance.getTopic();
@@ -128,35 +192,35 @@ class Player {
   void finish() {
     for (RadarScan& scan : stamper_.finish()) odometry_.addScan(std::move(scan));
     account(odometry_.finish());
-    for (const auto& [reason, count] : stamper_.givenUp()) summary_.scans_rejected[reason] += count;
-    summary_.input_faults = odometry_.faults();
-    if (points_not_finite_ > 0) summary_.input_faults["points_not_finite"] = points_not_finite_;
-    if (first_) {
-      const Eigen::Vector3d moved = last_.p_W - first_->p_W;
-      summary_.end_to_start_2d_m = moved.head<2>().norm();
-      summary_.end_to_start_3d_m = moved.norm();
-    }
   }
 
-  const RunSummary& summary() const { return summary_; }
-  const Trajectory& trajectory() const { return trajectory_; }
+  RunSummary summary() const {
+    RunSummary summary;
+    log_->fill(&summary);
+    countInput(&summary);
+    return summary;
+  }
+  /// Sets what was read, and what of it never became a scan.
+  void countInput(RunSummary* summary) const {
+    summary->imu_count = imu_count_;
+    summary->scans_total = scans_total_;
+    for (const auto& [reason, count] : stamper_.givenUp()) summary->scans_rejected[reason] += count;
+    summary->input_faults = odometry_.faults();
+    if (points_not_finite_ > 0) summary->input_faults["points_not_finite"] = points_not_finite_;
+  }
   const RadarInertialOdometry& odometry() const { return odometry_; }
 
  private:
   void addImu(const sensor_msgs::Imu& message, Time record) {
     const ImuMeasurement imu = toImuMeasurement(message, config_.imu_topic);
-    ++summary_.imu_count;
+    ++imu_count_;
     stamper_.addImu(imu.time, record);
-    if (const std::optional<NavigationState> state = odometry_.addImu(imu)) {
-      output_->addState(*state);
-      trajectory_.push_back({state->time, state->p_W, state->q_WI});
-      if (!first_) first_ = trajectory_.back();
-      last_ = trajectory_.back();
-    }
+    if (recorder_ != nullptr) recorder_->addImu(imu);
+    if (const std::optional<NavigationState> state = odometry_.addImu(imu)) log_->addState(*state);
   }
 
   void addCloud(const sensor_msgs::PointCloud2& message, Time record) {
-    ++summary_.scans_total;
+    ++scans_total_;
     DecodedScan decoded;
     try {
       decoded = decode(message, format_);
@@ -168,39 +232,39 @@ class Player {
                      toRadarScan(decoded.cloud, Time()));
   }
 
-  void account(const std::vector<ScanResult>& results) {
-    for (const ScanResult& result : results) {
-      output_->addResult(result);
-      for (const StampedPose& pose : result.left_window) {
-        if (newest_optimized_) summary_.path_length_m += (pose.p_W - newest_optimized_->p_W).norm();
-        newest_optimized_ = pose;
-      }
-      if (result.used) {
-        ++summary_.scans_used;
-      } else if (!result.rejected_because.empty()) {
-        ++summary_.scans_rejected[result.rejected_because];
-      }
-      if (result.updated) {
-        summary_.final_offset_s = result.time_offset;
-        summary_.final_offset_sigma_s = result.time_offset_sigma;
-      }
+  void account(std::vector<ScanResult> results) {
+    if (results.empty()) return;
+    if (!start_) start_ = odometry_.start();
+    bool stepped = false;
+    if (recorder_ != nullptr) {
+      const auto faults = odometry_.faults();
+      const auto steps = faults.find("time_offset_step");
+      const std::uint64_t count = steps == faults.end() ? 0 : steps->second;
+      stepped = std::exchange(offset_steps_, count) != count;
+    }
+    for (ScanResult& result : results) {
+      if (recorder_ != nullptr) recorder_->addResult(result, std::exchange(stepped, false));
+      log_->addResult(std::move(result));
     }
   }
 
+ public:
+  /// Of the first initialisation.
+  const std::optional<RadarInertialOdometry::Start>& start() const { return start_; }
+
+ private:
   const Config& config_;
   const PointCloudFormat format_;
   ScanStamper stamper_;
   RadarInertialOdometry odometry_;
-  RunOutput* output_;
-  RunSummary summary_;
-  Trajectory trajectory_;
-  std::optional<StampedPose> first_, newest_optimized_;
-  StampedPose last_;
-  std::uint64_t points_not_finite_ = 0;
+  RunLog* log_;
+  BatchOdometry* recorder_;
+  std::optional<RadarInertialOdometry::Start> start_;
+  std::uint64_t imu_count_ = 0, scans_total_ = 0, points_not_finite_ = 0, offset_steps_ = 0;
 };
 
 void checkOutcome(const std::string& bag, const Config& config, const Player& player) {
-  const RunSummary& summary = player.summary();
+  const RunSummary summary = player.summary();
   if (summary.imu_count == 0)
     throw bagError(bag, "no messages on topic " + config.imu_topic + " (imu_topic) in the part played");
   if (summary.scans_total == 0)
@@ -244,6 +308,156 @@ TruthErrors errorsAgainst(const Trajectory& truth, const Trajectory& estimate) {
   return errors;
 }
 
+/// One bag with its configuration: what all modes share, and the modes.
+class BagJob {
+ public:
+  /// Opens and checks the bag, and makes the output folder.
+  explicit BagJob(const BagRun& run) : run_(run), started_(std::chrono::steady_clock::now()) {
+    const Config& config = run.config;
+    openBag(run.bag, &bag_);
+    std::vector<Wanted> wanted = {{"imu_topic", config.imu_topic, "sensor_msgs/Imu"},
+                                  {"radar_topic", config.radar_topic, "sensor_msgs/PointCloud2"}};
+    if (config.stamp_source == StampSource::kTrigger)
+      wanted.push_back({"trigger_topic", config.trigger_topic, "std_msgs/Header"});
+    for (const Wanted& want : wanted) topics_.push_back(want.topic);
+    const std::map<std::string, std::string> types = topicTypes(bag_);
+    truth_in_bag_ = config.ground_truth.empty() && types.count(config.ground_truth_topic) != 0;
+    if (truth_in_bag_)
+      wanted.push_back({"ground_truth_topic", config.ground_truth_topic, "geometry_msgs/PoseStamped"});
+    checkTopics(run.bag, types, wanted);
+    std::tie(begin_, end_) = playedSpan(run.bag, bag_, config);
+    // Before the work, so that a wrong path costs no time.
+    if (!config.ground_truth.empty()) truth_ = readTum(config.ground_truth);
+    output_.emplace(run.output_folder);
+    started_ = std::chrono::steady_clock::now();
+  }
+
+  RunSummary execute() {
+    switch (run_.config.mode) {
+      case RunMode::kOnline:
+        return online();
+      case RunMode::kBatch:
+        return batch();
+      case RunMode::kRefine:
+        return refine();
+    }
+    throw std::invalid_argument("not a RunMode");
+  }
+
+ private:
+  RunSummary online() {
+    RunLog log(&*output_, 0.0);
+    Player player(run_.config, &log, nullptr);
+    play(player, run_.config, 0.0, 1.0);
+    return finish(player.summary(), log, *output_);
+  }
+
+  RunSummary batch() {
+    const OdometryOptions& options = run_.config.odometry;
+    BatchOptions batch_options;
+    batch_options.max_iterations = run_.config.batch_max_iterations;
+    BatchOdometry recorder(options, batch_options);
+    RunOutput online_output(run_.output_folder + "/online");
+    RunLog online_log(&online_output, 0.0);
+    Player player(run_.config, &online_log, &recorder);
+    play(player, run_.config, 0.0, 0.9);
+    finish(player.summary(), online_log, online_output);
+
+    const BatchResult result = recorder.solve(*player.start());
+    RunLog log(&*output_, 0.0);
+    for (const NavigationState& state : result.trajectory) log.addState(state);
+    for (const ScanResult& scan : result.scans) log.addResult(scan);
+    RunSummary summary;
+    summary.mode = "batch";
+    summary.batch = BatchSummary{result.solution.iterations, result.solution.placements,
+                                 result.solution.converged, result.readmitted};
+    log.fill(&summary);
+    player.countInput(&summary);
+    return finish(std::move(summary), log, *output_);
+  }
+
+  /// The offset found is taken off the stamps, and the rest is estimated from the prior of the first pass:
+  /// the data are the same in each pass, and a prior from the pass before would count them twice.
+  RunSummary refine() {
+    const int passes = run_.config.refine_passes;
+    std::vector<double> offsets, sigmas;
+    double taken_off = 0.0;  // [s]
+    for (int pass = 1;; ++pass) {
+      Config config = run_.config;
+      config.radar_stamp_shift -= taken_off;
+      if (pass > 1) config.odometry.smoother.time_offset_initial = 0.0;
+      const bool last = pass == passes;
+      std::optional<RunOutput> earlier;
+      if (!last) earlier.emplace(run_.output_folder + "/pass_" + std::to_string(pass));
+      RunOutput& output = last ? *output_ : *earlier;
+      RunLog log(&output, taken_off);
+      Player player(config, &log, nullptr);
+      play(player, config, (pass - 1.0) / passes, static_cast<double>(pass) / passes);
+      RunSummary summary = player.summary();
+      offsets.push_back(taken_off = summary.final_offset_s);
+      sigmas.push_back(summary.final_offset_sigma_s);
+      if (last) {
+        summary.mode = "refine";
+        summary.pass_offsets_s = offsets;
+        summary.pass_offset_sigmas_s = sigmas;
+      }
+      summary = finish(std::move(summary), log, output);
+      if (last) return summary;
+    }
+  }
+
+  /// The whole bag; progress goes from `from` to `to`.
+  void play(Player& player, const Config& config, double from, double to) {
+    const double length = (end_ - begin_).toSec();
+    try {
+      rosbag::View view(bag_, rosbag::TopicQuery(topics_), begin_, end_);
+      double told = -1.0;
+      for (const rosbag::MessageInstance& instance : view) {
+        player.play(instance);
+        if (!run_.progress) continue;
+        const double done = length > 0.0 ? (instance.getTime() - begin_).toSec() / length : 1.0;
+        if (done - told > 0.01) run_.progress(from + (to - from) * (told = done));
+      }
+      player.finish();
+    } catch (const std::exception& error) {
+      throw bagError(run_.bag, error.what());
+    }
+    checkOutcome(run_.bag, config, player);
+  }
+
+  /// Adds speed and errors, and saves.
+  RunSummary finish(RunSummary summary, RunLog& log, RunOutput& output) {
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - started_;
+    if (&output == &*output_ && run_.progress) run_.progress(1.0);
+    summary.estimation_seconds = took.count();
+    summary.realtime_factor = (end_ - begin_).toSec() / took.count();
+    const Trajectory trajectory = log.takeTrajectory();
+    std::optional<std::runtime_error> truth_error;
+    if (truth_in_bag_ && truth_.empty()) truth_ = readPoses(bag_, run_.config.ground_truth_topic);
+    if (truth_in_bag_ || !run_.config.ground_truth.empty()) {
+      try {
+        summary.truth = errorsAgainst(truth_, trajectory);
+      } catch (const std::exception& error) {
+        const std::string name =
+            truth_in_bag_ ? "topic " + run_.config.ground_truth_topic : run_.config.ground_truth;
+        truth_error.emplace("ground truth " + name + ": " + error.what());
+      }
+    }
+    output.finish(summary);
+    if (truth_error) throw *truth_error;  // the estimate is saved all the same
+    return summary;
+  }
+
+  const BagRun& run_;
+  rosbag::Bag bag_;
+  std::vector<std::string> topics_;
+  ros::Time begin_, end_;
+  bool truth_in_bag_ = false;
+  Trajectory truth_;
+  std::optional<RunOutput> output_;
+  std::chrono::steady_clock::time_point started_;
+};
+
 std::string decimal(double value, int decimals) {
   std::string text;
   appendFixed(&text, value, decimals);
@@ -252,64 +466,7 @@ std::string decimal(double value, int decimals) {
 
 }  // namespace
 
-RunSummary runBag(const BagRun& run) {
-  const Config& config = run.config;
-  rosbag::Bag bag;
-  openBag(run.bag, &bag);
-
-  std::vector<Wanted> wanted = {{"imu_topic", config.imu_topic, "sensor_msgs/Imu"},
-                                {"radar_topic", config.radar_topic, "sensor_msgs/PointCloud2"}};
-  if (config.stamp_source == StampSource::kTrigger)
-    wanted.push_back({"trigger_topic", config.trigger_topic, "std_msgs/Header"});
-  std::vector<std::string> topics;
-  for (const Wanted& want : wanted) topics.push_back(want.topic);
-  const std::map<std::string, std::string> types = topicTypes(bag);
-  const bool truth_in_bag = config.ground_truth.empty() && types.count(config.ground_truth_topic) != 0;
-  if (truth_in_bag)
-    wanted.push_back({"ground_truth_topic", config.ground_truth_topic, "geometry_msgs/PoseStamped"});
-  checkTopics(run.bag, types, wanted);
-  const auto [begin, end] = playedSpan(run.bag, bag, config);
-  // Before the work, so that a wrong path costs no time.
-  Trajectory truth = config.ground_truth.empty() ? Trajectory() : readTum(config.ground_truth);
-
-  RunOutput output(run.output_folder);
-  Player player(config, &output);
-  const double length = (end - begin).toSec();
-  const auto started = std::chrono::steady_clock::now();
-  try {
-    rosbag::View view(bag, rosbag::TopicQuery(topics), begin, end);
-    double told = -1.0;
-    for (const rosbag::MessageInstance& instance : view) {
-      player.play(instance);
-      if (!run.progress) continue;
-      const double done = length > 0.0 ? (instance.getTime() - begin).toSec() / length : 1.0;
-      if (done - told > 0.01) run.progress(told = done);
-    }
-    player.finish();
-    if (run.progress) run.progress(1.0);
-  } catch (const std::exception& error) {
-    throw bagError(run.bag, error.what());
-  }
-  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - started;
-  checkOutcome(run.bag, config, player);
-
-  RunSummary summary = player.summary();
-  summary.estimation_seconds = took.count();
-  summary.realtime_factor = length / took.count();
-  std::optional<std::runtime_error> truth_error;
-  if (truth_in_bag) truth = readPoses(bag, config.ground_truth_topic);
-  if (truth_in_bag || !config.ground_truth.empty()) {
-    try {
-      summary.truth = errorsAgainst(truth, player.trajectory());
-    } catch (const std::exception& error) {
-      const std::string name = truth_in_bag ? "topic " + config.ground_truth_topic : config.ground_truth;
-      truth_error.emplace("ground truth " + name + ": " + error.what());
-    }
-  }
-  output.finish(summary);
-  if (truth_error) throw *truth_error;  // the estimate is saved all the same
-  return summary;
-}
+RunSummary runBag(const BagRun& run) { return BagJob(run).execute(); }
 
 std::string describeRun(const RunSummary& summary, const std::string& files) {
   std::string table;
@@ -324,6 +481,18 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
       std::to_string(summary.scans_used) + " of " + std::to_string(summary.scans_total) + " used";
   for (const auto& [reason, count] : summary.scans_rejected)
     scans += ", " + std::to_string(count) + " " + reason;
+  if (summary.batch) {
+    row("batch", (summary.batch->converged ? "converged after " : "NOT converged after ") +
+                     std::to_string(summary.batch->iterations) + " iterations, nodes placed " +
+                     std::to_string(summary.batch->placements) + " times, " +
+                     std::to_string(summary.batch->scans_readmitted) + " scans taken back");
+  }
+  if (!summary.pass_offsets_s.empty()) {
+    std::string offsets;
+    for (const double offset : summary.pass_offsets_s)
+      offsets += (offsets.empty() ? "" : ", ") + decimal(1e3 * offset, 2);
+    row("after passes", offsets + " ms");
+  }
   row("path", decimal(summary.path_length_m, 2) + " m");
   row("end to start", decimal(summary.end_to_start_2d_m, 3) + " m" + percent(summary.end_to_start_2d_m) +
                           " horizontal, " + decimal(summary.end_to_start_3d_m, 3) + " m" +

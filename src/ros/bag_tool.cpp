@@ -23,6 +23,7 @@ const char* const kHelp =
     "                          time_offset.csv, ego_velocity.csv, biases.csv, summary.yaml\n"
     "  --set key=value         sets a parameter on top of the configuration, e.g. --set "
     "stamp_source=arrival\n"
+    "                          mode=batch solves the whole bag at once, mode=refine plays it in passes\n"
     "  --print-config          prints every parameter with unit, range and meaning\n"
     "  --help                  prints this\n";
 

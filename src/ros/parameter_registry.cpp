@@ -263,6 +263,13 @@ void listSmoother(ParameterList& list, Config& c) {
 
 void listBag(ParameterList& list, Config& c) {
   list.group("Bag runner");
+  list.choice<RunMode>(
+      "mode", {{"online", RunMode::kOnline}, {"batch", RunMode::kBatch}, {"refine", RunMode::kRefine}}, c.mode,
+      "as a live user has it; the whole bag solved at once; or passes, each with the offset found before taken "
+      "off the stamps");
+  list.integer("refine_passes", between(1, 100), c.refine_passes, "of mode: refine");
+  list.integer("batch_max_iterations", between(1, 10000), c.batch_max_iterations,
+               "of the solver, with mode: batch");
   list.number("bag_start", "s", atLeast(0), c.bag_start, "of the bag that is left out at its beginning");
   list.number("bag_duration", "s", atLeast(0), c.bag_duration, "of the bag that is played; 0: to its end");
   list.textOrEmpty("ground_truth", c.ground_truth,

@@ -47,11 +47,18 @@ std::string mapText(const std::map<std::string, std::uint64_t>& counts) {
   return text + "}";
 }
 
+std::string listText(const std::vector<double>& values, int decimals) {
+  std::string text = "[";
+  for (const double value : values) text += (text.size() > 1 ? ", " : "") + fixedText(value, decimals);
+  return text + "]";
+}
+
 std::string summaryText(const RunSummary& summary) {
   std::string yaml;
   const auto line = [&](const char* key, const std::string& value) {
     yaml += std::string(key) + ": " + value + "\n";
   };
+  line("mode", summary.mode);
   line("imu_count", std::to_string(summary.imu_count));
   line("scans_total", std::to_string(summary.scans_total));
   line("scans_used", std::to_string(summary.scans_used));
@@ -62,6 +69,16 @@ std::string summaryText(const RunSummary& summary) {
   line("end_to_start_3d_m", fixedText(summary.end_to_start_3d_m, 6));
   line("final_offset_s", fixedText(summary.final_offset_s, 9));
   line("final_offset_sigma_s", fixedText(summary.final_offset_sigma_s, 9));
+  if (!summary.pass_offsets_s.empty()) {
+    line("pass_offsets_s", listText(summary.pass_offsets_s, 9));
+    line("pass_offset_sigmas_s", listText(summary.pass_offset_sigmas_s, 9));
+  }
+  if (summary.batch) {
+    line("batch_iterations", std::to_string(summary.batch->iterations));
+    line("batch_placements", std::to_string(summary.batch->placements));
+    line("batch_converged", summary.batch->converged ? "true" : "false");
+    line("scans_readmitted", std::to_string(summary.batch->scans_readmitted));
+  }
   if (summary.truth) {
     line("ate_m", fixedText(summary.truth->ate_m, 9));
     if (summary.truth->t_rel) line("t_rel", fixedText(*summary.truth->t_rel, 9));

@@ -18,6 +18,13 @@ enum class StampSource {
 };
 std::string toString(StampSource source);
 
+/// How the bag runner goes through a bag.
+enum class RunMode {
+  kOnline,  ///< "online": as a live user has it
+  kBatch,   ///< "batch": the whole bag solved at once, after an online pass
+  kRefine,  ///< "refine": online passes, each with the offset found before taken off the stamps
+};
+
 /// Where the live node takes T_IR from.
 enum class ExtrinsicsSource {
   kParameters,  ///< "parameters": extrinsics_translation and extrinsics_rotation_xyzw
@@ -62,6 +69,9 @@ struct Config {
 
   OdometryOptions odometry;
 
+  RunMode mode = RunMode::kOnline;
+  int refine_passes = 3;
+  int batch_max_iterations = 100;
   double bag_start = 0.0;     ///< [s]
   double bag_duration = 0.0;  ///< [s] 0: to the end
   std::string ground_truth;   ///< TUM file; empty: the topic

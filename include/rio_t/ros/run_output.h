@@ -20,8 +20,20 @@ struct TruthErrors {
   std::optional<double> r_rel_deg;  ///< [deg/m] likewise
 };
 
+/// How the solver ended where the whole run was solved at once.
+struct BatchSummary {
+  int iterations = 0;
+  int placements = 0;  ///< how often the nodes were placed
+  bool converged = false;
+  std::uint64_t scans_readmitted = 0;  ///< rejected by the online gate, taken by the batch
+};
+
 /// What a run comes to; `summary.yaml` has one key for each member.
 struct RunSummary {
+  std::string mode = "online";
+  std::vector<double> pass_offsets_s;        ///< after each pass; only with mode refine
+  std::vector<double> pass_offset_sigmas_s;  ///< likewise
+  std::optional<BatchSummary> batch;         ///< only with mode batch
   std::uint64_t imu_count = 0;
   std::uint64_t scans_total = 0;  ///< used and rejected
   std::uint64_t scans_used = 0;
