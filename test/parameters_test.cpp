@@ -117,11 +117,40 @@ TEST(Parameters, WrongTypesAreNamedWithWhatWasExpected) {
   EXPECT_TRUE(contains(faultOf("window={a: 1}"), "got nested keys"));
   EXPECT_TRUE(contains(faultOf("max_iterations=2.5"), "expected a whole number"));
   EXPECT_TRUE(contains(faultOf("estimate_time_offset=1"), "expected true or false, got 1"));
-  EXPECT_TRUE(contains(faultOf("imu_topic=3"), "expected text, not empty, got 3"));
-  EXPECT_TRUE(contains(faultOf("imu_topic=\"\""), "expected text, not empty, got \"\""));
+  EXPECT_TRUE(contains(faultOf("imu_topic=3"), "expected one line of text, not empty, got 3"));
+  EXPECT_TRUE(contains(faultOf("imu_topic=\"\""), "expected one line of text, not empty, got \"\""));
   EXPECT_TRUE(contains(faultOf("extrinsics_translation=[1, 2]"), "expected a list of 3 finite numbers"));
   EXPECT_TRUE(contains(faultOf("extrinsics_translation=[1, 2, x]"), "expected a list of 3 finite numbers"));
   EXPECT_TRUE(contains(faultOf("extrinsics_translation=1"), "expected a list of 3 finite numbers"));
+}
+
+TEST(Parameters, ListsInListsAndListsThatHoldThemselvesAreRefused) {
+  EXPECT_TRUE(contains(faultOf("extrinsics_translation=[[1, 2, 3], 0, 0]"), "got [nested keys, 0, 0]"));
+  EXPECT_TRUE(contains(faultOf("extrinsics_translation=&x [*x, 0, 0]"), "got [nested keys, 0, 0]"));
+}
+
+TEST(Parameters, LongTextIsReadLikeShort) {
+  const std::string digits(1000000, '1');
+  EXPECT_TRUE(contains(faultOf("window=" + digits), "expected a finite number"));
+  EXPECT_TRUE(contains(faultOf("window=" + digits + "x"), "expected a finite number"));
+  EXPECT_TRUE(contains(faultOf(digits + "=1"), "unknown parameter"));
+}
+
+TEST(Parameters, TextIsOneLine) {
+  EXPECT_TRUE(contains(faultOf("imu_topic=\"/imu\\n/other\""), "expected one line of text"));
+  EXPECT_TRUE(contains(faultOf("ground_truth=\"a\\0b\""), "expected one line of text"));
+  EXPECT_EQ(fromAssignments({"ground_truth=\"größe\""}).ground_truth, "größe");
+}
+
+TEST(Parameters, NumbersAreToldFromTextLikeIt) {
+  const auto isNumber = [](const std::string& text) {
+    const ParameterValue value = parsePlainScalar(text);
+    return std::holds_alternative<double>(value.data) || std::holds_alternative<std::int64_t>(value.data);
+  };
+  for (const char* text : {"0", "-1", "+1", "1.", ".5", "-.5", "1.5e3", "1E-3", "1.e+3", ".5e0"})
+    EXPECT_TRUE(isNumber(text)) << text;
+  for (const char* text : {"-", ".", "-.", "e3", ".e3", "1e", "1e+", "1.5e3.0", "1 2", "0x10", "1,5", "--1"})
+    EXPECT_FALSE(isNumber(text)) << text;
 }
 
 TEST(Parameters, ValuesOutOfRangeAreRefused) {

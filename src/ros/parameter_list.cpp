@@ -1,5 +1,6 @@
 #include "parameter_list.h"
 
+#include <algorithm>
 #include <cmath>
 #include <locale>
 #include <optional>
@@ -27,7 +28,8 @@ std::optional<double> asNumber(const ParameterValue& value) {
 }
 
 /// `count` numbers in `range`, or nothing.
-std::optional<std::vector<double>> asNumbers(const ParameterValue& value, std::size_t count, Range range) {
+std::optional<std::vector<double>> asNumbers(const ParameterValue& value, std::size_t count,
+                                             const Range& range) {
   const ParameterValue::List* list = std::get_if<ParameterValue::List>(&value.data);
   if (list == nullptr || list->size() != count) return std::nullopt;
   std::vector<double> numbers;
@@ -37,6 +39,12 @@ std::optional<std::vector<double>> asNumbers(const ParameterValue& value, std::s
     numbers.push_back(*x);
   }
   return numbers;
+}
+
+/// Topics, frames and file names have no use for line breaks and the like, and must not break a line of what
+/// is written for people.
+bool isOneLine(const std::string& text) {
+  return std::none_of(text.begin(), text.end(), [](char c) { return (c >= 0 && c < ' ') || c == '\x7f'; });
 }
 
 std::string listText(std::initializer_list<double> numbers) {
@@ -158,10 +166,10 @@ void ParameterList::rotation(const std::string& key, Eigen::Quaterniond& member,
 
 void ParameterList::text(const std::string& key, std::string& member, const std::string& meaning) {
   add(
-      key, "", "text, not empty", meaning,
+      key, "", "one line of text, not empty", meaning,
       [&member](const ParameterValue& value) {
         const std::string* x = std::get_if<std::string>(&value.data);
-        if (x == nullptr || x->empty()) return false;
+        if (x == nullptr || x->empty() || !isOneLine(*x)) return false;
         member = *x;
         return true;
       },
@@ -170,11 +178,11 @@ void ParameterList::text(const std::string& key, std::string& member, const std:
 
 void ParameterList::textOrEmpty(const std::string& key, std::string& member, const std::string& meaning) {
   add(
-      key, "", "text, may be empty", meaning,
+      key, "", "one line of text, may be empty", meaning,
       [&member](const ParameterValue& value) {
         const std::string* x = std::get_if<std::string>(&value.data);
         const bool nothing = std::holds_alternative<std::monostate>(value.data);  // `key:` and no more
-        if (x == nullptr && !nothing) return false;
+        if (x == nullptr ? !nothing : !isOneLine(*x)) return false;
         member = nothing ? std::string() : *x;
         return true;
       },

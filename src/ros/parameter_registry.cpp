@@ -34,7 +34,8 @@ void listStamps(ParameterList& list, Config& c) {
        {"arrival", StampSource::kArrival}},
       c.stamp_source,
       "header of the cloud, its trigger message, or its time of arrival carried over into the IMU clock");
-  list.number("radar_stamp_shift", "s", anyNumber(), c.radar_stamp_shift,
+  // The bounds keep sums and differences of stamps within 64 bits of nanoseconds.
+  list.number("radar_stamp_shift", "s", between(-2e9, 2e9), c.radar_stamp_shift,
               "added to the stamp of every scan; a known delay goes here with a minus sign");
 }
 

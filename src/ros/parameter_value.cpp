@@ -9,7 +9,6 @@
 #include <limits>
 #include <locale>
 #include <map>
-#include <regex>
 #include <sstream>
 #include <stdexcept>
 
@@ -29,16 +28,59 @@ bool isOneOf(const std::string& text, std::initializer_list<const char*> words) 
   return std::any_of(words.begin(), words.end(), [&](const char* word) { return text == word; });
 }
 
+ParameterValue fromYamlScalar(const YAML::Node& node) {
+  if (node.Tag() == "!") return {node.Scalar()};  // quoted: text, whatever it looks like
+  return parsePlainScalar(node.Scalar());
+}
+
 ParameterValue fromYaml(const YAML::Node& node) {
   if (!node.IsDefined() || node.IsNull()) return {};
-  if (node.IsScalar()) {
-    if (node.Tag() == "!") return {node.Scalar()};  // quoted: text, whatever it looks like
-    return parsePlainScalar(node.Scalar());
-  }
+  if (node.IsScalar()) return fromYamlScalar(node);
   if (node.IsMap()) return {ParameterValue::Map{}};
   ParameterValue::List list;
-  for (const auto& element : node) list.push_back(fromYaml(element));
+  for (const auto& element : node) {
+    // No deeper: no parameter takes lists of lists, and by its anchors a list may hold itself.
+    if (element.IsScalar()) {
+      list.push_back(fromYamlScalar(element));
+    } else if (element.IsNull()) {
+      list.push_back({});
+    } else {
+      list.push_back({ParameterValue::Map{}});
+    }
+  }
   return {std::move(list)};
+}
+
+// By hand, since std::regex takes one stack frame a letter and a parameter file may have long lines.
+
+std::size_t skipDigits(const std::string& text, std::size_t at) {
+  while (at < text.size() && text[at] >= '0' && text[at] <= '9') ++at;
+  return at;
+}
+
+std::size_t skipSign(const std::string& text, std::size_t at) {
+  return at < text.size() && (text[at] == '+' || text[at] == '-') ? at + 1 : at;
+}
+
+/// [-+]?[0-9]+
+bool looksWhole(const std::string& text) {
+  const std::size_t begin = skipSign(text, 0);
+  return begin < text.size() && skipDigits(text, begin) == text.size();
+}
+
+/// [-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?
+bool looksReal(const std::string& text) {
+  const std::size_t begin = skipSign(text, 0);
+  std::size_t at = skipDigits(text, begin);
+  std::size_t digits = at - begin;
+  if (at < text.size() && text[at] == '.') {
+    const std::size_t end = skipDigits(text, at + 1);
+    digits += end - at - 1;
+    at = end;
+  }
+  if (digits == 0) return false;
+  if (at == text.size()) return true;
+  return (text[at] == 'e' || text[at] == 'E') && looksWhole(text.substr(at + 1));
 }
 
 }  // namespace
@@ -77,12 +119,10 @@ ParameterValue parsePlainScalar(const std::string& text) {
     return {std::numeric_limits<double>::infinity()};
   if (isOneOf(text, {"-.inf", "-.Inf", "-.INF", "-inf"})) return {-std::numeric_limits<double>::infinity()};
 
-  static const std::regex integer("[-+]?[0-9]+");
-  static const std::regex number("[-+]?([0-9]+\\.?[0-9]*|\\.[0-9]+)([eE][-+]?[0-9]+)?");
   std::int64_t whole = 0;
-  if (std::regex_match(text, integer) && parseWhole(text, &whole)) return {whole};
+  if (looksWhole(text) && parseWhole(text, &whole)) return {whole};
   double real = 0.0;
-  if (std::regex_match(text, number)) {
+  if (looksReal(text)) {
     if (parseWhole(text, &real)) return {real};
     return {std::numeric_limits<double>::infinity()};  // 1e999
   }
@@ -96,22 +136,25 @@ ParameterEntries readParameterFile(const std::string& path) {
   std::ifstream file(path);
   if (!file)
     throw std::runtime_error(path + ": cannot be read; expected a YAML file with one `key: value` a line");
+  return readParameters(file, path);
+}
 
+ParameterEntries readParameters(std::istream& yaml, const std::string& name) {
   YAML::Node root;
   try {
-    root = YAML::Load(file);
+    root = YAML::Load(yaml);
   } catch (const YAML::Exception& error) {
-    throw std::runtime_error(path + ":" + std::to_string(error.mark.line + 1) + ": not YAML (" + error.msg +
+    throw std::runtime_error(name + ":" + std::to_string(error.mark.line + 1) + ": not YAML (" + error.msg +
                              "); expected one `key: value` a line");
   }
   if (!root.IsDefined() || root.IsNull()) return {};
-  if (!root.IsMap()) throw std::runtime_error(path + ":1: expected one `key: value` a line");
+  if (!root.IsMap()) throw std::runtime_error(name + ":1: expected one `key: value` a line");
 
   ParameterEntries entries;
   std::map<std::string, int> line_of;
   for (const auto& item : root) {
     const int line = item.first.Mark().line + 1;
-    const std::string origin = path + ":" + std::to_string(line);
+    const std::string origin = name + ":" + std::to_string(line);
     if (!item.first.IsScalar())
       throw std::runtime_error(origin + ": expected `key: value`, the key is no text");
     const std::string key = item.first.Scalar();

@@ -29,8 +29,10 @@ std::size_t editDistance(const std::string& a, const std::string& b) {
 }
 
 std::string unknownKey(const ParameterEntry& entry, const std::vector<Parameter>& all) {
+  const std::string looked_for = entry.key.substr(0, 100);  // the time grows with the length
+  const auto distance = [&](const Parameter& each) { return editDistance(each.description.key, looked_for); };
   const auto nearest = std::min_element(all.begin(), all.end(), [&](const Parameter& a, const Parameter& b) {
-    return editDistance(a.description.key, entry.key) < editDistance(b.description.key, entry.key);
+    return distance(a) < distance(b);
   });
   return entry.origin + ": unknown parameter \"" + entry.key + "\"; did you mean \"" +
          nearest->description.key + "\"? (config/estimator.yaml lists all)";

@@ -21,7 +21,11 @@ ParameterValue toParameterValue(XmlRpc::XmlRpcValue& value) {
       break;
     case XmlRpc::XmlRpcValue::TypeArray: {
       ParameterValue::List list;
-      for (int k = 0; k < value.size(); ++k) list.push_back(toParameterValue(value[k]));
+      for (int k = 0; k < value.size(); ++k) {
+        // No deeper: no parameter takes lists of lists.
+        const bool is_list = value[k].getType() == XmlRpc::XmlRpcValue::TypeArray;
+        list.push_back(is_list ? ParameterValue{ParameterValue::Map{}} : toParameterValue(value[k]));
+      }
       result.data = std::move(list);
       break;
     }

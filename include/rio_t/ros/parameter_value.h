@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <iosfwd>
 #include <string>
 #include <variant>
 #include <vector>
@@ -9,7 +10,8 @@ namespace rio_t {
 
 /// The value of a parameter wherever it came from: a YAML file, the command line, the ROS parameter server.
 struct ParameterValue {
-  struct Map {};  ///< nested keys: no parameter takes any, but the fault must be nameable
+  struct Map {
+  };  ///< nested keys, or a list in a list: no parameter takes any, but the fault must be nameable
   using List = std::vector<ParameterValue>;
   std::variant<std::monostate, bool, std::int64_t, double, std::string, List, Map> data;
 
@@ -30,6 +32,8 @@ using ParameterEntries = std::vector<ParameterEntry>;
 
 /// Reads a flat YAML file; throws std::runtime_error with one line naming file, line and what was expected.
 ParameterEntries readParameterFile(const std::string& path);
+/// The same of an open stream; `name` stands for the file in messages.
+ParameterEntries readParameters(std::istream& yaml, const std::string& name);
 
 /// Reads `key=value` with the value as YAML (`--set`); throws std::invalid_argument.
 ParameterEntry parseAssignment(const std::string& text);
