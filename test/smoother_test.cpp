@@ -24,9 +24,10 @@ NodeMatrix positiveDefinite(int seed) {
 
 /// A chain of `nodes` nodes with made-up information, and the same as one dense system.
 struct DenseChain {
-  explicit DenseChain(int nodes) : chain(static_cast<std::size_t>(nodes)) {
-    H = Eigen::MatrixXd::Zero(nodes * kNodeTangent, nodes * kNodeTangent);
-    b = Eigen::VectorXd::Zero(nodes * kNodeTangent);
+  explicit DenseChain(int nodes)
+      : chain(static_cast<std::size_t>(nodes)),
+        H(Eigen::MatrixXd::Zero(nodes * kNodeTangent, nodes * kNodeTangent)),
+        b(Eigen::VectorXd::Zero(nodes * kNodeTangent)) {
     for (int k = 0; k < nodes; ++k) {
       chain.diagonal[k] = 4.0 * positiveDefinite(100 * k);
       for (int i = 0; i < kNodeTangent; ++i) chain.gradient[k](i) = wave(900 * k + i);

@@ -40,7 +40,7 @@ LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& p
   if (config_.extrinsics_source == ExtrinsicsSource::kTf) {
     monitor_.waitFor("the first scan, whose frame_id names the radar for tf");
     tf_.emplace();
-    tf_listener_.emplace(*tf_, node_);
+    tf_listener_ = std::make_unique<tf2_ros::TransformListener>(*tf_, node_);
   } else {
     startSession(config_.odometry.T_IR);
   }

@@ -9,17 +9,18 @@
 
 namespace rio_t {
 
-LivePublisher::LivePublisher(const Config& config, ros::NodeHandle private_node) : config_(config) {
-  // Deep where a message stands for itself (seconds of odometry survive a busy subscriber), shallow where the
-  // newest tells all.
-  odom_ = private_node.advertise<nav_msgs::Odometry>("odom", 2000);
-  odom_optimized_ = private_node.advertise<nav_msgs::Odometry>("odom_optimized", 200);
-  time_offset_ = private_node.advertise<TimeOffset>("time_offset", 200);
-  ego_velocity_ = private_node.advertise<geometry_msgs::TwistWithCovarianceStamped>("ego_velocity", 200);
-  imu_bias_ = private_node.advertise<ImuBias>("imu_bias", 200);
-  points_ = private_node.advertise<sensor_msgs::PointCloud2>("points", 20);
-  inliers_ = private_node.advertise<sensor_msgs::PointCloud2>("inliers", 20);
-  path_ = private_node.advertise<nav_msgs::Path>("path", 1, true);
+// Queues are deep where a message stands for itself (seconds of odometry survive a busy subscriber), shallow
+// where the newest tells all.
+LivePublisher::LivePublisher(const Config& config, ros::NodeHandle private_node)
+    : config_(config),
+      odom_(private_node.advertise<nav_msgs::Odometry>("odom", 2000)),
+      odom_optimized_(private_node.advertise<nav_msgs::Odometry>("odom_optimized", 200)),
+      time_offset_(private_node.advertise<TimeOffset>("time_offset", 200)),
+      ego_velocity_(private_node.advertise<geometry_msgs::TwistWithCovarianceStamped>("ego_velocity", 200)),
+      points_(private_node.advertise<sensor_msgs::PointCloud2>("points", 20)),
+      inliers_(private_node.advertise<sensor_msgs::PointCloud2>("inliers", 20)),
+      path_(private_node.advertise<nav_msgs::Path>("path", 1, true)),
+      imu_bias_(private_node.advertise<ImuBias>("imu_bias", 200)) {
   path_message_.header.frame_id = config_.odom_frame;
   if (config_.publish_tf) {
     tf_.emplace();

@@ -20,16 +20,16 @@ using sensor_msgs::PointField;
 // -------------------------------------------------------------------------------------------
 
 template <typename Choice, std::size_t N>
-using Names = std::pair<Choice, const char*>[N];
+using Names = std::array<std::pair<Choice, const char*>, N>;
 
-constexpr Names<PointAxes, 2> kAxes = {{PointAxes::kRightForwardUp, "rfu"},
-                                       {PointAxes::kForwardLeftUp, "flu"}};
-constexpr Names<PointCoordinates, 2> kCoordinates = {{PointCoordinates::kCartesian, "cartesian"},
-                                                     {PointCoordinates::kSpherical, "spherical"}};
-constexpr Names<PowerUnit, 4> kPowerUnits = {{PowerUnit::kSnrDb, "snr_db"},
-                                             {PowerUnit::kSnrDeciDb, "snr_decidb"},
-                                             {PowerUnit::kSnrLinear, "snr_linear"},
-                                             {PowerUnit::kNotSnr, "not_snr"}};
+constexpr Names<PointAxes, 2> kAxes = {
+    {{PointAxes::kRightForwardUp, "rfu"}, {PointAxes::kForwardLeftUp, "flu"}}};
+constexpr Names<PointCoordinates, 2> kCoordinates = {
+    {{PointCoordinates::kCartesian, "cartesian"}, {PointCoordinates::kSpherical, "spherical"}}};
+constexpr Names<PowerUnit, 4> kPowerUnits = {{{PowerUnit::kSnrDb, "snr_db"},
+                                              {PowerUnit::kSnrDeciDb, "snr_decidb"},
+                                              {PowerUnit::kSnrLinear, "snr_linear"},
+                                              {PowerUnit::kNotSnr, "not_snr"}}};
 
 template <typename Choice, std::size_t N>
 std::string nameOf(Choice choice, const Names<Choice, N>& names) {

@@ -72,7 +72,7 @@ class LiveOdometry {
   LiveMonitor monitor_;      // thread-safe
   LivePublisher publisher_;  // see there
   std::optional<tf2_ros::Buffer> tf_;
-  std::optional<tf2_ros::TransformListener> tf_listener_;
+  std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
   std::optional<diagnostic_updater::Updater> diagnostics_;  // input thread
 
   CurrentSession session_;  // thread-safe; null until the extrinsics are known

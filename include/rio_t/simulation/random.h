@@ -25,7 +25,7 @@ class Random {
   bool chance(double probability) { return uniform() < probability; }
 
  private:
-  std::uint64_t state_[4];
+  std::uint64_t state_[4] = {};
 };
 
 }  // namespace rio_t::simulation
