@@ -1,0 +1,173 @@
+// The time offset over whole simulated runs: found in one pass from far away, followed when it drifts, found
+// again after a step, and left alone where the motion does not show it.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <optional>
+
+#include "rio_t/odometry/batch_odometry.h"
+#include "simulated_run.h"
+
+namespace rio_t {
+namespace {
+
+constexpr double kStart = 5.0;                   // [s] of rest
+constexpr double kFullSpeed = kStart + 2.0;      // [s] after the ramp
+constexpr double kFarAlong = kFullSpeed + 10.0;  // [s] after ten seconds of motion
+
+struct OffsetAt {
+  double error = 0.0;  ///< [s] estimate minus truth
+  double sigma = 0.0;  ///< [s]
+  double value = 0.0;  ///< [s]
+};
+
+OffsetAt offsetAt(const SimulatedRun& run, const ScanResult& result) {
+  const double truth = run.setup.time_offset.at(run.seconds(result.scan.stamp));
+  return {result.time_offset - truth, result.time_offset_sigma, result.time_offset};
+}
+
+/// Of the last scan before `time` [s].
+OffsetAt offsetAt(const SimulatedRun& run, double time) {
+  OffsetAt offset;
+  for (const ScanResult& result : run.results) {
+    if (result.updated && run.seconds(result.scan.stamp) <= time) offset = offsetAt(run, result);
+  }
+  return offset;
+}
+
+/// Mean of (error / sigma)^2 from `from` on, and the largest |error / sigma|.
+struct Consistency {
+  double mean_square = 0.0;
+  double largest = 0.0;
+};
+Consistency consistency(const SimulatedRun& run, double from) {
+  Consistency c;
+  int count = 0;
+  for (const ScanResult& result : run.results) {
+    if (!result.updated || run.seconds(result.scan.stamp) < from) continue;
+    const OffsetAt offset = offsetAt(run, result);
+    const double normalised = offset.error / offset.sigma;
+    c.mean_square += normalised * normalised;
+    c.largest = std::max(c.largest, std::abs(normalised));
+    ++count;
+  }
+  c.mean_square /= count;
+  return c;
+}
+
+TEST(TemporalCalibration, FarOffsetsAreFoundInOnePass) {
+  double sum = 0.0;
+  int count = 0;
+  for (const double truth : {-0.05, 0.1, 0.2}) {
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      SimulatedRun run("difficult", seed, 40.0, kStart);
+      run.setup.time_offset.constant = truth;
+      run.run();
+      const OffsetAt early = offsetAt(run, kFarAlong);
+      EXPECT_LT(std::abs(early.error), 2.0 * early.sigma) << truth << " s, seed " << seed;
+      EXPECT_LT(early.sigma, 2.0e-3);
+      sum += std::abs(early.error);
+      ++count;
+      const OffsetAt end = offsetAt(run, 40.0);
+      EXPECT_LT(std::abs(end.error), 0.5e-3) << truth << " s, seed " << seed;
+      std::size_t rejected = 0;
+      for (const ScanResult& result : run.results) rejected += result.rejected_because == "innovation";
+      EXPECT_LE(rejected, 4u) << "good scans, while the offset was wrong";
+    }
+  }
+  EXPECT_LT(sum / count, 0.5e-3) << "mean size of the error after ten seconds of motion";
+}
+
+TEST(TemporalCalibration, ASlowDriftIsFollowed) {
+  // 20 ms in ten minutes. What does not follow is 3 ms off at the end: more than four sigma.
+  const double drift = 0.02 / 600.0;
+  for (const double noise : {1.0e-4, 2.0e-4}) {
+    for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+      SimulatedRun run("difficult", seed, 95.0, kStart);
+      run.setup.time_offset.constant = 0.01;
+      run.setup.time_offset.drift = drift;
+      run.options.smoother.time_offset_noise = noise;
+      run.run();
+      const Consistency c = consistency(run, 20.0);
+      EXPECT_LT(c.largest, 3.0) << "seed " << seed << ", noise " << noise;
+      // A random walk lags behind a drift by drift sigma^2 / noise^2; the rest is the noise, one sigma of it.
+      const OffsetAt end = offsetAt(run, 95.0);
+      const double lag = drift * end.sigma / (noise * noise);  // [sigma]
+      EXPECT_LT(c.mean_square, 1.0 + lag * lag) << "seed " << seed << ", noise " << noise;
+      EXPECT_NEAR(end.value - offsetAt(run, 35.0).value, 60.0 * drift, 0.5 * 60.0 * drift);
+    }
+  }
+}
+
+TEST(TemporalCalibration, AStepIsFoundAgain) {
+  for (const double step : {0.05, -0.05}) {
+    for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+      SimulatedRun run("difficult", seed, 55.0, kStart);
+      run.setup.time_offset.constant = step > 0.0 ? -0.00925 : 0.05;
+      run.setup.time_offset.steps = {{35.0, step}};
+      run.run();
+      EXPECT_EQ(run.odometry->faults()["time_offset_step"], 1u);
+      const OffsetAt before = offsetAt(run, 34.9);
+      EXPECT_LT(std::abs(before.error), 1.5e-3);
+      const OffsetAt after = offsetAt(run, 55.0);  // 20 s later
+      EXPECT_LT(std::abs(after.error), 1.5e-3) << "step " << step << ", seed " << seed;
+      EXPECT_LT(std::abs(after.error), 2.0 * after.sigma);
+    }
+  }
+}
+
+TEST(TemporalCalibration, CoastingTeachesNothing) {
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    SimulatedRun run("constant_speed", seed, 60.0, kStart);
+    run.setup.time_offset.constant = 0.02;
+    run.run();
+    const OffsetAt begin = offsetAt(run, 10.0);
+    const OffsetAt end = offsetAt(run, 60.0);
+    // The ramp tells something, the ride does not.
+    EXPECT_LT(begin.sigma, 0.5 * run.options.smoother.time_offset_sigma);
+    EXPECT_GT(end.sigma, 0.99 * begin.sigma);
+    EXPECT_LT(std::abs(end.value - begin.value), 0.05 * begin.sigma);
+    EXPECT_LT(std::abs(end.error), 2.0 * end.sigma);
+  }
+}
+
+TEST(TemporalCalibration, TheBatchSaysTheSameOfTheOffset) {
+  SimulatedRun run("difficult", 1, 40.0, kStart);
+  run.setup.time_offset.constant = 0.1;
+  run.run();
+  BatchOdometry batch(run.options, BatchOptions());
+  for (const ImuMeasurement& sample : simulation::simulate(run.motion, run.setup).imu.samples)
+    batch.addImu(sample);
+  for (const ScanResult& result : run.results) batch.addResult(result, false);
+  const BatchResult whole = batch.solve(*run.odometry->start());
+  EXPECT_TRUE(whole.solution.converged);
+  ASSERT_EQ(whole.scans.size(), run.results.size());
+
+  const OffsetAt online = offsetAt(run, 40.0);
+  run.results = whole.scans;
+  const OffsetAt end = offsetAt(run, 40.0);
+  EXPECT_NEAR(end.value, online.value, 0.3 * online.sigma);
+  EXPECT_NEAR(end.sigma / online.sigma, 1.0, 0.1);
+  // What came later tells of the beginning, too.
+  const OffsetAt begin = offsetAt(run, kFullSpeed);
+  EXPECT_LT(std::abs(begin.error), 3.0 * begin.sigma);
+  EXPECT_LT(begin.sigma, 2.0e-3);
+
+  // The states between the nodes: one for each sample, without jumps.
+  ASSERT_GE(whole.trajectory.size(), run.states.size());
+  for (std::size_t i = 1; i < whole.trajectory.size(); ++i) {
+    const NavigationState& a = whole.trajectory[i - 1];
+    const NavigationState& b = whole.trajectory[i];
+    ASSERT_LT(a.time, b.time);
+    const Eigen::Vector3d expected = a.p_W + 0.5 * (b.time - a.time) * (a.v_W + b.v_W);
+    ASSERT_LT((b.p_W - expected).norm(), 1.0e-3) << run.seconds(b.time) << " s";
+  }
+  const auto size = [&](const NavigationState& state) { return run.velocityError(state); };
+  const double online_rms = run.rms(kFullSpeed, 40.0, size);
+  run.states = whole.trajectory;
+  EXPECT_LT(run.rms(kFullSpeed, 40.0, size), online_rms);
+}
+
+}  // namespace
+}  // namespace rio_t
