@@ -2,13 +2,15 @@
 """The live node against the bag runner: plays a bag to it with roslaunch, records what goes in and what comes out, and
 checks that nothing is lost, that the result is as good, and how long it took.
 
-usage: bench/live_against_bag.py BAG CONFIG [--rate R] [--nodelet] [--set key=value]...    (in a sourced workspace)
+usage: bench/live_against_bag.py BAG CONFIG [--rate R] [--nodelet] [--no-clock] [--set key=value]...
+in a sourced workspace, e.g. after `source build/devel/setup.bash`
 
 Exit status 1 where a check fails. Latencies are judged at rate 1 only: other rates are not what a robot has.
 """
 import argparse
 import os
 import re
+import struct
 import subprocess
 import sys
 import tempfile
@@ -16,49 +18,76 @@ import time
 
 import numpy
 import rosbag
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import Odometry
+from rio_t.msg import TimeOffset
 
 from live_tools import DEADLINE, is_running, program, start, start_master, stop, wait_for
 
 ATE_BOUND = 0.10  # of the bag runner's
 
 
-def play(bag, config, rate, nodelet, topics, recorded):
-    """Plays the bag to the live node and records the topics, by the wall clock of this machine."""
+class Listener:
+    """Keeps when each message came and what it said. Raw, so that it keeps up, and without a limit to its queue:
+    `rosbag record` drops messages where the machine is busy."""
+
+    def __init__(self, topics):
+        self.raw = {topic: [] for topic in topics}
+        self.diagnostics = {}  # the last: {task: {key: value}}
+        for topic in topics:
+            rospy.Subscriber(topic, rospy.AnyMsg, self._keep, self.raw[topic], buff_size=2**24, tcp_nodelay=True)
+        rospy.Subscriber("/diagnostics", DiagnosticArray, self._keep_diagnostics)
+
+    @staticmethod
+    def _keep(message, messages):
+        messages.append((time.monotonic(), message._buff))
+
+    def _keep_diagnostics(self, message):
+        for status in message.status:
+            self.diagnostics[status.name.split(": ")[-1]] = {value.key: value.value for value in status.values}
+
+    def receipts(self, topic):
+        """{stamp of the header [ns]: time of receipt [s]}"""
+        stamps = ((struct.unpack_from("<II", raw, 4), received) for received, raw in self.raw[topic])
+        return {seconds * 10**9 + nanoseconds: received for (seconds, nanoseconds), received in stamps}
+
+    def messages(self, topic, kind):
+        """{stamp of the header [ns]: message}"""
+        parsed = (kind().deserialize(raw) for _, raw in self.raw[topic])
+        return {message.header.stamp.to_nsec(): message for message in parsed}
+
+
+def play(bag, config, rate, nodelet, clock, topics):
+    """Plays the bag to the live node; what was heard meanwhile."""
     processes = [start_master()]
     try:
-        # Before roslaunch sets use_sim_time: so the recorder keeps to the wall clock.
-        processes.append(start(program("rosbag", "record"), "--tcpnodelay", "--buffsize=0", "-O", recorded,
-                               "__name:=recorder", *topics))
-        wait_for("rosbag record", lambda: is_running("/recorder"))
-        processes.append(start("roslaunch", "rio_t", "rio_t.launch", f"bag:={bag}", f"config:={config}", f"bag_rate:={rate}",
-                               f"nodelet:={str(nodelet).lower()}"))
-        wait_for("rosbag play", lambda: is_running("/bag_player"))
+        # Before use_sim_time is set: the listener keeps to the clock of the wall.
+        rospy.init_node("listener", disable_signals=True)
+        listener = Listener(topics)
+        launch = ["roslaunch", "rio_t", "rio_t.launch", f"config:={config}", f"nodelet:={str(nodelet).lower()}"]
+        if clock:
+            launch += [f"bag:={bag}", f"bag_rate:={rate}"]
+        processes.append(start(*launch))
+        wait_for("the node's diagnostics", lambda: "input" in listener.diagnostics)
+        if not clock:
+            processes.append(start(program("rosbag", "play"), "--quiet", "--delay=3", f"--rate={rate}",
+                                   "__name:=bag_player", bag))
+            wait_for("rosbag play", lambda: is_running("/bag_player"))
         with rosbag.Bag(bag) as data:
             length = data.get_end_time() - data.get_start_time()
         wait_for("the end of the bag", lambda: not is_running("/bag_player"), length / rate + DEADLINE)
         time.sleep(2.0)  # the last scans, and diagnostics once more
+        return listener
     finally:
         for process in reversed(processes):
             stop(process)
 
 
-def read(recorded, names):
-    """{topic: {stamp [ns]: (time of receipt [s], message)}} and the last diagnostics, {task: {key: value}}."""
-    messages, diagnostics = {name: {} for name in names}, {}
-    with rosbag.Bag(recorded) as recording:
-        for topic, message, received in recording.read_messages(list(names) + ["/diagnostics"]):
-            if topic == "/diagnostics":
-                for status in message.status:
-                    diagnostics[status.name.split(": ")[-1]] = {value.key: value.value for value in status.values}
-            else:
-                messages[topic][message.header.stamp.to_nsec()] = (received.to_sec(), message)
-    return messages, diagnostics
-
-
 def write_tum(path, odometry):
     with open(path, "w") as file:
         for stamp in sorted(odometry):
-            p, q = odometry[stamp][1].pose.pose.position, odometry[stamp][1].pose.pose.orientation
+            p, q = odometry[stamp].pose.pose.position, odometry[stamp].pose.pose.orientation
             file.write(f"{stamp // 10**9}.{stamp % 10**9:09d} {p.x:.9f} {p.y:.9f} {p.z:.9f} "
                        f"{q.x:.9f} {q.y:.9f} {q.z:.9f} {q.w:.9f}\n")
 
@@ -103,6 +132,7 @@ def main():
     parser.add_argument("config")
     parser.add_argument("--rate", type=float, default=1.0)
     parser.add_argument("--nodelet", action="store_true")
+    parser.add_argument("--no-clock", action="store_true", help="as sensors do: no /clock, the node lives in wall time")
     parser.add_argument("--set", action="append", default=[], metavar="key=value")
     arguments = parser.parse_args()
     bag = os.path.abspath(arguments.bag)
@@ -122,17 +152,20 @@ def main():
 
     imu_topic, radar_topic = value_of(yaml, "imu_topic"), value_of(yaml, "radar_topic")
     odom, offset = "/rio_t/odom", "/rio_t/time_offset"
-    recorded = os.path.join(folder, "recorded.bag")
-    play(bag, config, arguments.rate, arguments.nodelet, (imu_topic, radar_topic, odom, offset, "/diagnostics"), recorded)
-    messages, diagnostics = read(recorded, (imu_topic, radar_topic, odom, offset))
-    if not messages[odom] or not messages[offset]:
-        sys.exit(f"live_against_bag.py: nothing came on {odom} or {offset}; recording: {recorded}")
+    listener = play(bag, config, arguments.rate, arguments.nodelet, not arguments.no_clock,
+                    (imu_topic, radar_topic, odom, offset))
+    live, offsets = listener.messages(odom, Odometry), listener.messages(offset, TimeOffset)
+    diagnostics = listener.diagnostics
+    if not live or not offsets:
+        sys.exit(f"live_against_bag.py: nothing came on {odom} or {offset}; diagnostics: {diagnostics}")
 
     table = Table()
-    print(f"{bag}, {arguments.config} {' '.join(arguments.set)}, rate {arguments.rate:g}")
+    print(f"{os.path.basename(bag)}, {' '.join([arguments.config, *arguments.set])}, rate {arguments.rate:g}"
+          + (", no clock" if arguments.no_clock else ""))
     with rosbag.Bag(bag) as data:
         imu = sorted(message.header.stamp.to_nsec() for _, message, _ in data.read_messages([imu_topic]))
-    live = messages[odom]
+    came = int(diagnostics["input"]["imu_messages"])
+    table.row("IMU messages that came", f"{came} of {len(imu)}", came == len(imu))
     by_runner = read_tum(os.path.join(runner, "trajectory.txt"))
     expected = [stamp for stamp in imu if stamp >= min(live)]
     missing = [stamp for stamp in expected if stamp not in live]
@@ -142,7 +175,7 @@ def main():
     table.row("first ~odom", f"{1e3 * later:+.1f} ms after the bag runner's", abs(later) < 0.5)
     with open(os.path.join(runner, "time_offset.csv")) as lines:
         updates = len(lines.readlines()) - 1
-    table.row("optimised states", f"{len(messages[offset])}, bag runner {updates}", abs(len(messages[offset]) - updates) <= 2)
+    table.row("optimised states", f"{len(offsets)}, bag runner {updates}", abs(len(offsets) - updates) <= 2)
     drops = {key: int(value) for key, value in diagnostics.get("input", {}).items()
              if key in ("dropped_queue_full", "fault_imu_gap", "fault_imu_out_of_order", "dropped_imu_not_usable")}
     table.row("lost or out of order", ", ".join(f"{v} {k}" for k, v in drops.items()) or "none",
@@ -167,17 +200,18 @@ def main():
                   abs(ratio - 1.0) <= ATE_BOUND)
     with open(os.path.join(runner, "summary.yaml")) as file:
         final = float(value_of(file.read(), "final_offset_s"))
-    newest = messages[offset][max(messages[offset])][1]
+    newest = offsets[max(offsets)]
     table.row("time offset at the end", f"{1e3 * newest.offset:.2f} ms live (sigma {1e3 * newest.sigma:.2f}), "
               f"{1e3 * final:.2f} ms bag runner", abs(newest.offset - final) < max(1e-3, newest.sigma))
 
     limits = {"IMU message to ~odom": (imu_topic, odom, 1.0, 5.0), "scan to optimised state": (radar_topic, offset, None, 20.0)}
     for name, (source, result, median_limit, most_limit) in limits.items():
-        pairs = sorted(messages[source].keys() & messages[result].keys())
+        begin, end = listener.receipts(source), listener.receipts(result)
+        pairs = sorted(begin.keys() & end.keys())
         if not pairs:
             table.row(name, "not known: the scans carry no stamp that the results repeat (stamp_source)")
             continue
-        ms = [1e3 * (messages[result][stamp][0] - messages[source][stamp][0]) for stamp in pairs]
+        ms = [1e3 * (end[stamp] - begin[stamp]) for stamp in pairs]
         median, most = numpy.percentile(ms, [50, 99])
         good = (median_limit is None or median < median_limit) and most < most_limit
         table.row(name, f"{len(ms)} messages, median {median:.2f} ms, 99 % below {most:.2f} ms, worst {max(ms):.2f} ms",
