@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Installs with apt what is missing to build, test and run rio_t on Debian 12. Does nothing when all is there.
+# Installs with apt what is missing to build, test and run rio_t on Debian 12, and the packages given as arguments.
+# Does nothing when all is there.
 set -euo pipefail
 
 packages=(
@@ -14,6 +15,8 @@ packages=(
   python3-nav-msgs python3-diagnostic-msgs python3-std-srvs python3-tf2-msgs python3-sensor-msgs python3-nodelet
   python3-numpy python3-matplotlib python3-yaml
 )
+
+packages+=("$@")  # what the calling script needs besides
 
 missing=()
 for package in "${packages[@]}"; do

@@ -128,7 +128,7 @@ class LiveTest(unittest.TestCase):
         def load():
             return tester.Process(nodelet, "load", "rio_t/RioTNodelet", "manager", "__name:=rio_t", "_config:=irs",
                                   "_trajectory_file:=" + self.saved)
-        with tester.Process(nodelet, "manager", "__name:=manager") as manager:
+        with tester.Process(*tester.preloaded(), nodelet, "manager", "__name:=manager") as manager:
             with tester.Listener() as listener, load() as loader:
                 listener.wait_until_heard()
                 with tester.play(self.bag):
@@ -220,9 +220,9 @@ class LiveTest(unittest.TestCase):
         self.assertIn("no_such", outcome.stdout)
 
     def test_launch_file_plays_a_bag_to_the_nodelet(self):
-        with tester.Listener() as listener, \
-                tester.Process(shutil.which("roslaunch"), "--wait", "rio_t", "irs.launch", "bag:=" + self.bag, "bag_rate:=4",
-                               "nodelet:=true") as launch:
+        words = ("--wait", "rio_t", "irs.launch", "bag:=" + self.bag, f"bag_rate:={4.0 / tester.SLOWNESS}",
+                 "nodelet:=true", "launch_prefix:=" + " ".join(tester.preloaded()))
+        with tester.Listener() as listener, tester.Process(shutil.which("roslaunch"), *words) as launch:
             listener.wait_for_stamp("odom", self.imu_stamps[-1])
             launch.stop()
 

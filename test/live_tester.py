@@ -16,7 +16,10 @@ from tf2_msgs.msg import TFMessage
 
 from rio_t.msg import ImuBias, TimeOffset
 
-DEADLINE = 40.0  # [s] for anything; far more than needed, so that only a fault reaches it
+SLOWNESS = float(os.environ.get("RIO_T_TEST_SLOWNESS", "1"))  # of the programs as built: sanitizers take time
+DEADLINE = 40.0 * SLOWNESS  # [s] for anything; far more than needed, so that only a fault reaches it
+# A library that programs of others need first, before they can load ours: the runtime of a sanitizer.
+PRELOAD = os.environ.get("RIO_T_TEST_PRELOAD", "")
 IMU, RADAR = "/sensor_platform/imu", "/sensor_platform/radar/scan"
 TOPICS = {"odom": Odometry, "odom_optimized": Odometry, "time_offset": TimeOffset, "imu_bias": ImuBias, "path": Path,
           "ego_velocity": TwistWithCovarianceStamped, "inliers": PointCloud2, "points": PointCloud2}
@@ -24,6 +27,11 @@ TOPICS = {"odom": Odometry, "odom_optimized": Odometry, "time_offset": TimeOffse
 
 def program(package, name):
     return find_node(package, name)[0]
+
+
+def preloaded():
+    """Words that start another's program which will load our nodelet."""
+    return ["env", "LD_PRELOAD=" + PRELOAD] if PRELOAD else []
 
 
 def run(*words):
@@ -143,5 +151,5 @@ def node(*parameters):
 def play(bag, topics=(IMU, RADAR), rate=4.0, *more):
     """rosbag play, which starts when each of the topics has its subscriber."""
     return Process(program("rosbag", "play"), "--clock", "--hz=1000", "--quiet", "--wait-for-subscribers",
-                   f"--rate={rate}", *more, bag, "--topics", *topics, stdin=subprocess.DEVNULL,
+                   f"--rate={rate / SLOWNESS}", *more, bag, "--topics", *topics, stdin=subprocess.DEVNULL,
                    stdout=subprocess.DEVNULL)

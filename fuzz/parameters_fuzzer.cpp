@@ -1,0 +1,46 @@
+// Parameter files, whatever they hold: read, or refused with a std::runtime_error; what was accepted survives
+// being printed and read again, and the estimator takes it. See scripts/fuzz.sh.
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <sstream>
+
+#include "rio_t/odometry/radar_inertial_odometry.h"
+#include "rio_t/ros/parameters.h"
+
+namespace {
+
+void require(bool holds, const char* what) {
+  if (holds) return;
+  std::fprintf(stderr, "does not hold: %s\n", what);
+  std::abort();
+}
+
+rio_t::ParameterEntries read(const std::string& yaml) {
+  std::istringstream stream(yaml);
+  return rio_t::readParameters(stream, "file");
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string text(reinterpret_cast<const char*>(data), size);
+  try {
+    rio_t::makeConfig({rio_t::parseAssignment(text)});
+  } catch (const std::invalid_argument&) {
+  } catch (const rio_t::ConfigError&) {
+  }
+
+  rio_t::Config config;
+  try {
+    config = rio_t::makeConfig(read(text));
+  } catch (const std::runtime_error&) {
+    return 0;
+  }
+  // From here on nothing may throw.
+  const std::string printed = rio_t::toYaml(config);
+  require(rio_t::toYaml(rio_t::makeConfig(read(printed))) == printed, "what is printed reads back the same");
+  rio_t::pointCloudFormat(config);
+  rio_t::RadarInertialOdometry{config.odometry};
+  return 0;
+}
