@@ -94,6 +94,26 @@ TEST(Chain, CovarianceOfTheLastNodeIsThatOfTheFullInverse) {
             1e-12 + 1e-9 * last.norm());
 }
 
+TEST(Chain, SolutionIsThatOfTheFullSystem) {
+  const DenseChain dense(4);
+  Eigen::MatrixXd H = dense.H;
+  for (const double damping : {0.0, 0.3}) {
+    H.diagonal() = (1.0 + damping) * dense.H.diagonal();
+    const Eigen::VectorXd full = H.ldlt().solve(-dense.b);
+    ChainSolution solution;
+    ASSERT_TRUE(solve(dense.chain, damping, &solution));
+    for (int k = 0; k < 4; ++k) {
+      EXPECT_LT((solution.delta[k] - full.segment<kNodeTangent>(k * kNodeTangent)).norm(),
+                1e-9 * full.norm());
+    }
+    EXPECT_NEAR(solution.decrease, full.dot(H * full), 1e-9 * solution.decrease);
+  }
+  DenseChain indefinite(2);
+  indefinite.chain.diagonal[1].setZero();
+  ChainSolution solution;
+  EXPECT_FALSE(solve(indefinite.chain, 0.0, &solution));
+}
+
 class Smoother : public ::testing::Test {
  protected:
   static constexpr double kEnd = 4.0;
@@ -136,6 +156,35 @@ TEST_F(Smoother, RecoversTheOffsetWithTheImuModel) {
     EXPECT_LT((newest.x.p_W() - truth.p_W()).norm(), 5e-3);
     EXPECT_LT((newest.x.v_W() - truth.v_W()).norm(), 5e-3);
     EXPECT_LT(so3::log(newest.x.q_WI().conjugate() * truth.q_WI()).norm(), 5e-3);
+  }
+}
+
+TEST_F(Smoother, BothSolversFindTheSame) {
+  SmootherOptions options;
+  options.max_iterations = 100;
+  FixedLagSmoother chain = make(options);
+  options.solver = WindowSolverKind::kCeres;
+  FixedLagSmoother ceres = make(options);
+  for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
+    // From 0 to 120 ms is far enough for steps that fail, and noise enough for the loss to matter.
+    RadarVelocityMeasurement z = measurement(stamp, 0.12);
+    z.v_R += 0.03 * Eigen::Vector3d(std::sin(50 * stamp), std::sin(71 * stamp), std::cos(93 * stamp));
+    for (FixedLagSmoother* smoother : {&chain, &ceres}) {
+      smoother->add(z);
+      smoother->optimize();
+      smoother->marginalize();
+    }
+    const NodeEstimate a = chain.newest();
+    const NodeEstimate b = ceres.newest();
+    const NodeMatrix& P = ceres.newestCovariance();
+    const NodeVector sigma = P.diagonal().cwiseSqrt();
+    NodeVector difference;
+    difference << boxminus(a.x.data(), b.x.data()), a.t_O - b.t_O;
+    EXPECT_LT(difference.cwiseQuotient(sigma).cwiseAbs().maxCoeff(), 0.03) << "at " << stamp;
+    EXPECT_LT(
+        (chain.newestCovariance().diagonal().cwiseSqrt() - sigma).cwiseQuotient(sigma).cwiseAbs().maxCoeff(),
+        0.02)
+        << "at " << stamp;
   }
 }
 

@@ -1,6 +1,5 @@
 #include "rio_t/smoother/chain.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -10,103 +9,118 @@ namespace rio_t {
 namespace {
 
 constexpr int kState = StateBlock::kTangent;
-using RowMatrix =
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kNodeTangent, kNodeTangent>;
-using Residual = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kNodeTangent, 1>;
-using Tangents = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kNodeTangent, kNodeTangent>;
+constexpr int kStored = StateBlock::kSize;
+constexpr int kLinear = kState - 3;  // of the tangent after theta
 
-struct Linearization {
-  Residual r;
-  RowMatrix J0, J1;  // as the solver's: row-major, in storage columns
-};
-
-Linearization evaluate(const ceres::CostFunction& cost, const double* block0, const double* block1) {
-  const int rows = cost.num_residuals();
-  const std::vector<int>& sizes = cost.parameter_block_sizes();
-  Linearization lin{Residual(rows), RowMatrix(rows, sizes[0]),
-                    RowMatrix(rows, sizes.size() > 1 ? sizes[1] : 0)};
-  const double* blocks[] = {block0, block1};
-  double* jacobians[] = {lin.J0.data(), lin.J1.data()};
-  if (!cost.Evaluate(blocks, lin.r.data(), jacobians))
-    throw std::runtime_error("chain: a factor cannot be evaluated");
-  return lin;
+/// Adds what stands in the order of storage, with an empty fourth row and column (see StateJacobian), to the
+/// part of a node's matrix that belongs to the states.
+void addStored(const Eigen::Matrix<double, kStored, kStored>& stored, NodeMatrix& H) {
+  H.topLeftCorner<3, 3>() += stored.topLeftCorner<3, 3>();
+  H.block<3, kLinear>(0, 3) += stored.topRightCorner<3, kLinear>();
+  H.block<kLinear, 3>(3, 0) += stored.bottomLeftCorner<kLinear, 3>();
+  H.block<kLinear, kLinear>(3, 3) += stored.bottomRightCorner<kLinear, kLinear>();
 }
 
-/// Drops the empty fourth column (see StateJacobian).
-Tangents tangent(const RowMatrix& J) {
-  Tangents T(J.rows(), kState);
-  T.leftCols<3>() = J.leftCols<3>();
-  T.rightCols<kState - 3>() = J.rightCols<kState - 3>();
-  return T;
+template <typename Stored, typename Tangent>
+void addStoredVector(const Stored& stored, Tangent&& tangent) {
+  tangent.template head<3>() += stored.template head<3>();
+  tangent.template segment<kLinear>(3) += stored.template tail<kLinear>();
+}
+
+template <typename CostFunction>
+void evaluate(const CostFunction& cost, const double* block0, const double* block1, double* residual,
+              double* J0, double* J1) {
+  const double* blocks[] = {block0, block1};
+  double* jacobians[] = {J0, J1};
+  if (!cost.Evaluate(blocks, residual, jacobians))
+    throw std::runtime_error("chain: a factor cannot be evaluated");
 }
 
 }  // namespace
 
-ChainSystem::ChainSystem(std::size_t nodes)
-    : diagonal(nodes, NodeMatrix::Zero()),
-      coupling(nodes > 0 ? nodes - 1 : 0, NodeMatrix::Zero()),
-      gradient(nodes, NodeVector::Zero()) {}
+void ChainSystem::reset(std::size_t nodes) {
+  diagonal.assign(nodes, NodeMatrix::Zero());
+  coupling.assign(nodes > 0 ? nodes - 1 : 0, NodeMatrix::Zero());
+  gradient.assign(nodes, NodeVector::Zero());
+  cost = 0.0;
+}
 
-void ChainSystem::addStateAndOffset(std::size_t k, const ceres::CostFunction& cost, const double* state,
-                                    const double* t_O, const ceres::LossFunction* loss, bool offset_known) {
-  Linearization lin = evaluate(cost, state, t_O);
-  double weight = 1.0;
+template <int Rows>
+void ChainSystem::addStateAndOffset(std::size_t k,
+                                    const ceres::SizedCostFunction<Rows, kStored, 1>& cost_function,
+                                    const double* state, const double* t_O, const ceres::LossFunction* loss,
+                                    bool offset_known) {
+  Eigen::Matrix<double, Rows, 1> r, J_t;
+  StateJacobian<Rows> J;
+  evaluate(cost_function, state, t_O, r.data(), J.data(), J_t.data());
+  double rho[3] = {r.squaredNorm(), 1.0, 0.0};
+  if (loss != nullptr) loss->Evaluate(rho[0], rho);
+  cost += 0.5 * rho[0];
   if (loss != nullptr) {
-    double rho[3];
-    loss->Evaluate(lin.r.squaredNorm(), rho);
-    weight = rho[1];
+    const double root = std::sqrt(rho[1]);
+    r *= root;
+    J *= root;
+    J_t *= root;
   }
-  const Tangents J = tangent(lin.J0);
-  diagonal[k].topLeftCorner<kState, kState>() += weight * J.transpose() * J;
-  gradient[k].head<kState>() += weight * J.transpose() * lin.r;
+  NodeMatrix& H = diagonal[k];
+  addStored(J.transpose().lazyProduct(J), H);
+  addStoredVector((J.transpose().lazyProduct(r)).eval(), gradient[k]);
   if (offset_known) return;
-  const Residual J_t = lin.J1.col(0);
-  diagonal[k].topRightCorner<kState, 1>() += weight * J.transpose() * J_t;
-  diagonal[k].bottomLeftCorner<1, kState>() += weight * J_t.transpose() * J;
-  diagonal[k](kState, kState) += weight * J_t.squaredNorm();
-  gradient[k](kState) += weight * J_t.dot(lin.r);
+  const Eigen::Matrix<double, kStored, 1> cross = J.transpose().lazyProduct(J_t);
+  addStoredVector(cross, H.col(kState));
+  addStoredVector(cross, H.row(kState).transpose());
+  H(kState, kState) += J_t.squaredNorm();
+  gradient[k](kState) += J_t.dot(r);
+}
+template void ChainSystem::addStateAndOffset<3>(std::size_t, const ceres::SizedCostFunction<3, kStored, 1>&,
+                                                const double*, const double*, const ceres::LossFunction*,
+                                                bool);
+template void ChainSystem::addStateAndOffset<kNodeTangent>(
+    std::size_t, const ceres::SizedCostFunction<kNodeTangent, kStored, 1>&, const double*, const double*,
+    const ceres::LossFunction*, bool);
+
+void ChainSystem::addState(std::size_t k, const RestFactor& factor, const double* state) {
+  Eigen::Vector3d r;
+  StateJacobian<3> J;
+  evaluate(factor, state, nullptr, r.data(), J.data(), nullptr);
+  cost += 0.5 * r.squaredNorm();
+  addStored(J.transpose().lazyProduct(J), diagonal[k]);
+  addStoredVector((J.transpose().lazyProduct(r)).eval(), gradient[k]);
 }
 
-void ChainSystem::addState(std::size_t k, const ceres::CostFunction& cost, const double* state) {
-  const Linearization lin = evaluate(cost, state, nullptr);
-  const Tangents J = tangent(lin.J0);
-  diagonal[k].topLeftCorner<kState, kState>() += J.transpose() * J;
-  gradient[k].head<kState>() += J.transpose() * lin.r;
-}
-
-void ChainSystem::addOffsetPair(std::size_t k, const ceres::CostFunction& cost, const double* t_O,
+void ChainSystem::addOffsetPair(std::size_t k, const ConstantOffsetFactor& factor, const double* t_O,
                                 const double* next_t_O) {
-  const Linearization lin = evaluate(cost, t_O, next_t_O);
-  const double a = lin.J0(0, 0);
-  const double b = lin.J1(0, 0);
+  double r, a, b;
+  evaluate(factor, t_O, next_t_O, &r, &a, &b);
+  cost += 0.5 * r * r;
   diagonal[k](kState, kState) += a * a;
   diagonal[k + 1](kState, kState) += b * b;
   coupling[k](kState, kState) += a * b;
-  gradient[k](kState) += a * lin.r(0);
-  gradient[k + 1](kState) += b * lin.r(0);
+  gradient[k](kState) += a * r;
+  gradient[k + 1](kState) += b * r;
 }
 
-void ChainSystem::addStatePair(std::size_t k, const ceres::CostFunction& cost, const double* state,
+void ChainSystem::addStatePair(std::size_t k, const ImuFactor& factor, const double* state,
                                const double* next_state) {
-  const Linearization lin = evaluate(cost, state, next_state);
-  const Tangents J0 = tangent(lin.J0);
-  const Tangents J1 = tangent(lin.J1);
-  diagonal[k].topLeftCorner<kState, kState>() += J0.transpose() * J0;
-  diagonal[k + 1].topLeftCorner<kState, kState>() += J1.transpose() * J1;
-  coupling[k].topLeftCorner<kState, kState>() += J0.transpose() * J1;
-  gradient[k].head<kState>() += J0.transpose() * lin.r;
-  gradient[k + 1].head<kState>() += J1.transpose() * lin.r;
+  Eigen::Matrix<double, 15, 1> r;
+  StateJacobian<15> J0, J1;
+  evaluate(factor, state, next_state, r.data(), J0.data(), J1.data());
+  cost += 0.5 * r.squaredNorm();
+  addStored(J0.transpose().lazyProduct(J0), diagonal[k]);
+  addStored(J1.transpose().lazyProduct(J1), diagonal[k + 1]);
+  addStored(J0.transpose().lazyProduct(J1), coupling[k]);
+  addStoredVector((J0.transpose().lazyProduct(r)).eval(), gradient[k]);
+  addStoredVector((J1.transpose().lazyProduct(r)).eval(), gradient[k + 1]);
 }
 
 NodeInformation eliminateFirst(const NodeMatrix& H00, const NodeMatrix& H01, const NodeVector& b0,
                                const NodeMatrix& H11, const NodeVector& b1) {
-  const Eigen::LDLT<NodeMatrix> factor(H00);
+  const Eigen::LLT<NodeMatrix> factor(H00);
   if (factor.info() != Eigen::Success) throw std::runtime_error("chain: a node cannot be eliminated");
-  const NodeMatrix gain = factor.solve(H01);  // H00^-1 H01
+  const NodeMatrix gain = factor.matrixL().solve(H01);
   NodeInformation result;
-  result.S = H11 - H01.transpose() * gain;
-  result.S = (0.5 * (result.S + result.S.transpose())).eval();
-  result.s = b1 - gain.transpose() * b0;
+  result.S = H11 - gain.transpose() * gain;
+  result.s = b1 - gain.transpose() * factor.matrixL().solve(b0);
   return result;
 }
 
@@ -133,15 +147,43 @@ NodePrior priorFromInformation(const NodeInformation& information, const StateBl
   return prior;
 }
 
-NodeMatrix covarianceOfLast(const ChainSystem& system) {
-  NodeInformation information;
-  information.S = system.diagonal.front();
-  for (std::size_t k = 0; k + 1 < system.diagonal.size(); ++k) {
-    information = eliminateFirst(information.S, system.coupling[k], NodeVector::Zero(),
-                                 system.diagonal[k + 1], NodeVector::Zero());
+bool solve(const ChainSystem& system, double damping, ChainSolution* solution) {
+  const std::size_t count = system.diagonal.size();
+  ChainSolution& x = *solution;
+  x.delta.resize(count);
+  x.factor.resize(count);
+  x.gain.resize(count);
+  NodeMatrix S;
+  for (std::size_t k = 0; k < count; ++k) {
+    S = system.diagonal[k];
+    if (damping > 0.0) S.diagonal() *= 1.0 + damping;
+    x.delta[k] = -system.gradient[k];
+    if (k > 0) {
+      S.noalias() -= x.gain[k - 1].transpose() * x.gain[k - 1];
+      x.delta[k].noalias() -= x.gain[k - 1].transpose() * x.delta[k - 1];
+    }
+    x.newest.compute(S);
+    if (x.newest.info() != Eigen::Success) return false;
+    x.factor[k] = x.newest.matrixLLT();
+    const auto L = x.factor[k].triangularView<Eigen::Lower>();
+    L.solveInPlace(x.delta[k]);  // L^-1 (-b), until the way back
+    if (k + 1 == count) break;
+    x.gain[k] = system.coupling[k];
+    L.solveInPlace(x.gain[k]);
   }
-  const NodeMatrix covariance = information.S.ldlt().solve(NodeMatrix::Identity());
-  return 0.5 * (covariance + covariance.transpose());
+  x.decrease = 0.0;
+  for (std::size_t k = count; k-- > 0;) {
+    if (k + 1 < count) x.delta[k].noalias() -= x.gain[k] * x.delta[k + 1];
+    x.factor[k].triangularView<Eigen::Lower>().transpose().solveInPlace(x.delta[k]);
+    x.decrease -= x.delta[k].dot(system.gradient[k]);
+  }
+  return true;
+}
+
+NodeMatrix covarianceOfLast(const ChainSystem& system) {
+  ChainSolution solution;
+  if (!solve(system, 0.0, &solution)) throw std::runtime_error("chain: the window is not determined");
+  return solution.newest.solve(NodeMatrix::Identity());
 }
 
 }  // namespace rio_t

@@ -1,8 +1,5 @@
 #include "rio_t/smoother/fixed_lag_smoother.h"
 
-#include <ceres/problem.h>
-#include <ceres/solver.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -13,19 +10,6 @@ namespace {
 /// Nodes of the imu model nearer than this share one node [s]: the factor bridges the rest, and an IMU factor
 /// over no time would weigh infinitely.
 constexpr double kMinNodeSpacing = 0.005;
-
-ceres::Problem::Options borrowingProblem() {
-  ceres::Problem::Options options;
-  options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-#if RIO_T_CERES_HAS_MANIFOLD
-  options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-#else
-  options.local_parameterization_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-#endif
-  options.disable_all_safety_checks = true;
-  return options;
-}
 
 using StateMatrix = Eigen::Matrix<double, StateBlock::kTangent, StateBlock::kTangent>;
 
@@ -47,27 +31,30 @@ std::pair<StateMatrix, StateMatrix> tangentJacobians(const ImuFactor& factor, co
 FixedLagSmoother::FixedLagSmoother(const SmootherOptions& options, const ImuNoise& noise,
                                    const Eigen::Vector3d& g_W, const ImuBuffer& imu)
     : options_(options), noise_(noise), g_W_(g_W), imu_(&imu) {
-  if (options_.huber_threshold > 0.0) loss_ = std::make_unique<ceres::HuberLoss>(options_.huber_threshold);
+  window_.offset_known = !options_.estimate_time_offset;
+  window_.max_time_offset = options_.max_time_offset;
+  if (options_.huber_threshold > 0.0)
+    window_.loss = std::make_unique<ceres::HuberLoss>(options_.huber_threshold);
 }
 
 void FixedLagSmoother::initialize(Time time, const NodePrior& prior) {
-  prior_ = std::make_unique<PriorFactor>(prior);
-  nodes_.clear();
-  Node node;
+  window_.prior = std::make_unique<PriorFactor>(prior);
+  window_.nodes.clear();
+  WindowNode node;
   node.time = time;
   node.x = prior.x0;
   node.t_O = prior.t_O0;
-  nodes_.push_back(std::move(node));
-  newest_covariance_ = covarianceOfLast(linearize());
+  window_.nodes.push_back(std::move(node));
+  newest_covariance_ = rio_t::newestCovariance(window_);
 }
 
 Time FixedLagSmoother::nodeTime(Time stamp) const {
-  return options_.time_offset_model == TimeOffsetModel::kImu ? stamp - nodes_.back().t_O : stamp;
+  return options_.time_offset_model == TimeOffsetModel::kImu ? stamp - window_.nodes.back().t_O : stamp;
 }
 
 std::optional<RadarVelocityPrediction> FixedLagSmoother::predictRadarVelocity(
     Time stamp, const Eigen::Matrix3d& R_RI, const Eigen::Vector3d& l_I) const {
-  const Node& newest = nodes_.back();
+  const WindowNode& newest = window_.nodes.back();
   const Time time = nodeTime(stamp);
   if (time < newest.time) return std::nullopt;
 
@@ -109,48 +96,49 @@ std::optional<RadarVelocityPrediction> FixedLagSmoother::predictRadarVelocity(
 }
 
 FixedLagSmoother::AddResult FixedLagSmoother::add(const RadarVelocityMeasurement& z) {
-  for (const Node& node : nodes_) {
+  for (const WindowNode& node : window_.nodes) {
     for (const RadarTerm& term : node.radar) {
       if (term.stamp == z.stamp) return AddResult::kDuplicateStamp;
     }
   }
-  Node* node = nodeAt(nodeTime(z.stamp));
+  WindowNode* node = nodeAt(nodeTime(z.stamp));
   if (node == nullptr) return AddResult::kOlderThanWindow;
   node->radar.push_back({z.stamp, makeRadarFactor(z, node->time)});
   return AddResult::kAdded;
 }
 
 FixedLagSmoother::AddResult FixedLagSmoother::addRest(Time stamp, double velocity_sigma) {
-  Node* node = nodeAt(nodeTime(stamp));
+  WindowNode* node = nodeAt(nodeTime(stamp));
   if (node == nullptr) return AddResult::kOlderThanWindow;
   node->rest = std::make_unique<RestFactor>(velocity_sigma);
   return AddResult::kAdded;
 }
 
-FixedLagSmoother::Node* FixedLagSmoother::nodeAt(Time time) {
-  const auto later =
-      std::find_if(nodes_.begin(), nodes_.end(), [&](const Node& node) { return node.time > time; });
-  if (later == nodes_.begin()) return nullptr;
+WindowNode* FixedLagSmoother::nodeAt(Time time) {
+  const auto later = std::find_if(window_.nodes.begin(), window_.nodes.end(),
+                                  [&](const WindowNode& node) { return node.time > time; });
+  if (later == window_.nodes.begin()) return nullptr;
 
   // The factor of the imu model reaches its time of measurement from any node, so neighbours can share one.
   const double spacing = options_.time_offset_model == TimeOffsetModel::kImu ? kMinNodeSpacing : 0.0;
-  std::size_t k = static_cast<std::size_t>(later - nodes_.begin());
-  if (time - nodes_[k - 1].time <= spacing) {
+  std::size_t k = static_cast<std::size_t>(later - window_.nodes.begin());
+  if (time - window_.nodes[k - 1].time <= spacing) {
     k = k - 1;
-  } else if (k == nodes_.size() || nodes_[k].time - time > spacing) {
-    nodes_.insert(later, makeNode(time, nodes_[k - 1]));
+  } else if (k == window_.nodes.size() || window_.nodes[k].time - time > spacing) {
+    window_.nodes.insert(later, makeNode(time, window_.nodes[k - 1]));
     linkToPrevious(k);
-    if (offset_has_stepped_ && k + 1 == nodes_.size()) {
-      nodes_[k].offset_from_previous = std::make_unique<ConstantOffsetFactor>(options_.time_offset_sigma);
+    if (offset_has_stepped_ && k + 1 == window_.nodes.size()) {
+      window_.nodes[k].offset_from_previous =
+          std::make_unique<ConstantOffsetFactor>(options_.time_offset_sigma);
       offset_has_stepped_ = false;
     }
-    if (k + 1 < nodes_.size()) linkToPrevious(k + 1);  // its IMU factor now starts at the new node
+    if (k + 1 < window_.nodes.size()) linkToPrevious(k + 1);  // its IMU factor now starts at the new node
   }
-  return &nodes_[k];
+  return &window_.nodes[k];
 }
 
-FixedLagSmoother::Node FixedLagSmoother::makeNode(Time time, const Node& previous) const {
-  Node node;
+WindowNode FixedLagSmoother::makeNode(Time time, const WindowNode& previous) const {
+  WindowNode node;
   node.time = time;
   node.x = predict(
       previous.x, preintegrate(*imu_, previous.time, time, previous.x.b_g(), previous.x.b_a(), noise_), g_W_);
@@ -159,8 +147,8 @@ FixedLagSmoother::Node FixedLagSmoother::makeNode(Time time, const Node& previou
 }
 
 void FixedLagSmoother::linkToPrevious(std::size_t k) {
-  const Node& previous = nodes_[k - 1];
-  Node& node = nodes_[k];
+  const WindowNode& previous = window_.nodes[k - 1];
+  WindowNode& node = window_.nodes[k];
   node.imu_from_previous = std::make_unique<ImuFactor>(
       preintegrate(*imu_, previous.time, node.time, previous.x.b_g(), previous.x.b_a(), noise_), noise_,
       g_W_);
@@ -172,8 +160,8 @@ double FixedLagSmoother::offsetVariance(double dt) const {
   return options_.time_offset_noise * options_.time_offset_noise * dt;
 }
 
-std::unique_ptr<ceres::CostFunction> FixedLagSmoother::makeRadarFactor(const RadarVelocityMeasurement& z,
-                                                                       Time node_time) const {
+std::unique_ptr<RadarCost> FixedLagSmoother::makeRadarFactor(const RadarVelocityMeasurement& z,
+                                                             Time node_time) const {
   if (options_.time_offset_model == TimeOffsetModel::kImu) {
     return std::make_unique<ImuRadarFactor>(z, node_time, *imu_, options_.max_time_offset, g_W_);
   }
@@ -181,69 +169,27 @@ std::unique_ptr<ceres::CostFunction> FixedLagSmoother::makeRadarFactor(const Rad
 }
 
 SolveReport FixedLagSmoother::optimize() {
-  ceres::Problem problem(borrowingProblem());
-  for (Node& node : nodes_) {
-    addStateBlock(problem, node.x.data(), manifold_);
-    problem.AddParameterBlock(&node.t_O, 1);
-    if (!options_.estimate_time_offset) problem.SetParameterBlockConstant(&node.t_O);
+  if (options_.solver == WindowSolverKind::kCeres) {
+    const SolveReport report = solveWithCeres(window_, options_.max_iterations);
+    newest_covariance_ = rio_t::newestCovariance(window_);
+    return report;
   }
-  problem.AddResidualBlock(prior_.get(), nullptr, nodes_.front().x.data(), &nodes_.front().t_O);
-  for (std::size_t k = 0; k < nodes_.size(); ++k) {
-    Node& node = nodes_[k];
-    for (const RadarTerm& term : node.radar) {
-      problem.AddResidualBlock(term.cost.get(), loss_.get(), node.x.data(), &node.t_O);
-    }
-    if (node.rest) problem.AddResidualBlock(node.rest.get(), nullptr, node.x.data());
-    if (k == 0) continue;
-    problem.AddResidualBlock(node.imu_from_previous.get(), nullptr, nodes_[k - 1].x.data(), node.x.data());
-    problem.AddResidualBlock(node.offset_from_previous.get(), nullptr, &nodes_[k - 1].t_O, &node.t_O);
-  }
-
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  options.max_num_iterations = options_.max_iterations;
-  options.num_threads = 1;
-  // Warm-started problems are near their solution: begin as Gauss-Newton. With the default radius the weakly
-  // observable directions (offset, biases) take a dozen iterations instead of two or three.
-  options.initial_trust_region_radius = 1e12;
-  options.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem, &summary);
-
-  for (Node& node : nodes_)
-    node.t_O = std::clamp(node.t_O, -options_.max_time_offset, options_.max_time_offset);
-  newest_covariance_ = covarianceOfLast(linearize());
-  return {static_cast<int>(summary.iterations.size()), summary.termination_type == ceres::CONVERGENCE};
-}
-
-ChainSystem FixedLagSmoother::linearize() const {
-  const std::size_t count = nodes_.size();
-  ChainSystem system(count);
-  const bool offset_known = !options_.estimate_time_offset;
-  system.addStateAndOffset(0, *prior_, nodes_[0].x.data(), &nodes_[0].t_O, nullptr, false);
-  for (std::size_t k = 0; k < count; ++k) {
-    const Node& node = nodes_[k];
-    for (const RadarTerm& term : node.radar) {
-      system.addStateAndOffset(k, *term.cost, node.x.data(), &node.t_O, loss_.get(), offset_known);
-    }
-    if (node.rest) system.addState(k, *node.rest, node.x.data());
-    if (k == 0) continue;
-    system.addStatePair(k - 1, *node.imu_from_previous, nodes_[k - 1].x.data(), node.x.data());
-    system.addOffsetPair(k - 1, *node.offset_from_previous, &nodes_[k - 1].t_O, &node.t_O);
-  }
-  return system;
+  const SolveReport report = solver_.solve(window_, options_.max_iterations);
+  newest_covariance_ = solver_.newestCovariance();
+  return report;
 }
 
 std::vector<NodeEstimate> FixedLagSmoother::marginalize() {
   std::vector<NodeEstimate> left;
-  while (nodes_.size() > 2 && nodes_.back().time - nodes_.front().time > options_.window) {
+  while (window_.nodes.size() > 2 &&
+         window_.nodes.back().time - window_.nodes.front().time > options_.window) {
     // Only the factors that touch the leaving node; the radar factors of its neighbour stay in the window.
     ChainSystem system(2);
-    const Node& first = nodes_[0];
-    const Node& second = nodes_[1];
-    system.addStateAndOffset(0, *prior_, first.x.data(), &first.t_O, nullptr, false);
+    const WindowNode& first = window_.nodes[0];
+    const WindowNode& second = window_.nodes[1];
+    system.addStateAndOffset(0, *window_.prior, first.x.data(), &first.t_O, nullptr, false);
     for (const RadarTerm& term : first.radar) {
-      system.addStateAndOffset(0, *term.cost, first.x.data(), &first.t_O, loss_.get(),
+      system.addStateAndOffset(0, *term.cost, first.x.data(), &first.t_O, window_.loss.get(),
                                !options_.estimate_time_offset);
     }
     if (first.rest) system.addState(0, *first.rest, first.x.data());
@@ -251,12 +197,12 @@ std::vector<NodeEstimate> FixedLagSmoother::marginalize() {
     system.addOffsetPair(0, *second.offset_from_previous, &first.t_O, &second.t_O);
     const NodeInformation remaining = eliminateFirst(
         system.diagonal[0], system.coupling[0], system.gradient[0], system.diagonal[1], system.gradient[1]);
-    prior_ = std::make_unique<PriorFactor>(priorFromInformation(remaining, second.x, second.t_O));
+    window_.prior = std::make_unique<PriorFactor>(priorFromInformation(remaining, second.x, second.t_O));
 
     left.push_back(node(0));
-    nodes_.pop_front();
-    nodes_.front().imu_from_previous.reset();
-    nodes_.front().offset_from_previous.reset();
+    window_.nodes.pop_front();
+    window_.nodes.front().imu_from_previous.reset();
+    window_.nodes.front().offset_from_previous.reset();
   }
   return left;
 }
@@ -276,7 +222,7 @@ std::string toString(FixedLagSmoother::AddResult result) {
 Time FixedLagSmoother::imuNeededSince() const {
   // Offsets move a radar factor's time by at most the bound to either side of its stamp, and the stamp lies
   // within the bound of the node.
-  return nodes_.front().time - 2.0 * options_.max_time_offset;
+  return window_.nodes.front().time - 2.0 * options_.max_time_offset;
 }
 
 }  // namespace rio_t

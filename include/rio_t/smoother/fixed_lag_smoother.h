@@ -1,24 +1,17 @@
 #pragma once
 
-#include <ceres/loss_function.h>
-
-#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "rio_t/core/pose.h"
-#include "rio_t/factors/constant_offset_factor.h"
-#include "rio_t/factors/imu_factor.h"
-#include "rio_t/factors/prior_factor.h"
 #include "rio_t/factors/radar_velocity_factor.h"
-#include "rio_t/factors/rest_factor.h"
-#include "rio_t/factors/state_manifold.h"
 #include "rio_t/imu/buffer.h"
 #include "rio_t/radar/ego_velocity.h"
-#include "rio_t/smoother/chain.h"
 #include "rio_t/smoother/options.h"
+#include "rio_t/smoother/window.h"
+#include "rio_t/smoother/window_solver.h"
 
 namespace rio_t {
 
@@ -29,11 +22,6 @@ struct NodeEstimate {
   double t_O = 0.0;  ///< [s]
 };
 
-struct SolveReport {
-  int iterations = 0;
-  bool converged = false;
-};
-
 /// What a scan should show, see FixedLagSmoother::predictRadarVelocity.
 struct RadarVelocityPrediction {
   VelocityPrior velocity;  ///< with the uncertainty of everything
@@ -42,7 +30,7 @@ struct RadarVelocityPrediction {
   Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();  ///< of v_R with respect to t_O [m/s^2]
 };
 
-/// The paper's factor graph over the last `window` seconds, solved with Ceres; what leaves is marginalised.
+/// The paper's factor graph over the last `window` seconds; what leaves is marginalised.
 ///
 /// Nodes are in the order of their times, whatever the order of arrival. Not thread-safe.
 class FixedLagSmoother {
@@ -75,46 +63,30 @@ class FixedLagSmoother {
   /// Marginalises what is older than the window; the nodes that left, oldest first.
   std::vector<NodeEstimate> marginalize();
 
-  std::size_t size() const { return nodes_.size(); }
-  NodeEstimate node(std::size_t k) const { return {nodes_[k].time, nodes_[k].x, nodes_[k].t_O}; }
-  NodeEstimate newest() const { return node(nodes_.size() - 1); }
+  std::size_t size() const { return window_.nodes.size(); }
+  NodeEstimate node(std::size_t k) const {
+    return {window_.nodes[k].time, window_.nodes[k].x, window_.nodes[k].t_O};
+  }
+  NodeEstimate newest() const { return node(window_.nodes.size() - 1); }
   /// Marginal covariance of the newest node after the last `optimize` (or `initialize`).
   const NodeMatrix& newestCovariance() const { return newest_covariance_; }
   /// Samples of the IMU before this time are not needed any more.
   Time imuNeededSince() const;
 
  private:
-  struct RadarTerm {
-    Time stamp;
-    std::unique_ptr<ceres::CostFunction> cost;
-  };
-  struct Node {
-    Time time;
-    StateBlock x;
-    double t_O = 0.0;
-    std::unique_ptr<ImuFactor> imu_from_previous;                ///< null for the first node
-    std::unique_ptr<ConstantOffsetFactor> offset_from_previous;  ///< null for the first node
-    std::vector<RadarTerm> radar;
-    std::unique_ptr<RestFactor> rest;  ///< null where the platform is not known to be at rest
-  };
-
   /// The node at `time`, made if need be; null where `time` lies before the window.
-  Node* nodeAt(Time time);
-  Node makeNode(Time time, const Node& previous) const;
+  WindowNode* nodeAt(Time time);
+  WindowNode makeNode(Time time, const WindowNode& previous) const;
   void linkToPrevious(std::size_t k);
-  std::unique_ptr<ceres::CostFunction> makeRadarFactor(const RadarVelocityMeasurement& z,
-                                                       Time node_time) const;
-  ChainSystem linearize() const;
+  std::unique_ptr<RadarCost> makeRadarFactor(const RadarVelocityMeasurement& z, Time node_time) const;
   double offsetVariance(double dt) const;  ///< that t_O gains in dt [s] by its random walk [s^2]
 
-  SmootherOptions options_;  // these four: read-only after construction
+  SmootherOptions options_;  // these: read-only after construction
   ImuNoise noise_;
   Eigen::Vector3d g_W_;
   const ImuBuffer* imu_;
-  std::unique_ptr<ceres::LossFunction> loss_;  // null: none
-  StateManifold manifold_;
-  std::unique_ptr<PriorFactor> prior_;  // on the first node
-  std::deque<Node> nodes_;
+  Window window_;
+  WindowSolver solver_;
   bool offset_has_stepped_ = false;
   NodeMatrix newest_covariance_ = NodeMatrix::Zero();
 };
