@@ -198,6 +198,65 @@ TEST_F(BagRunner, SameBagSameBytes) {
   EXPECT_EQ(untimed(contents(first + "/summary.yaml")), untimed(contents(out_ + "/summary.yaml")));
 }
 
+TEST_F(BagRunner, TheWholeBagAtOnceKeepsTheOnlineRunBesideIt) {
+  BagContents what;
+  what.ground_truth = true;
+  writeBag(what);
+  const Outcome outcome = run({"--set", "mode=batch"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("converged after"), std::string::npos) << outcome.out;
+  const std::string yaml = contents(out_ + "/summary.yaml");
+  for (const char* line : {"mode: batch\n", "imu_count: 1600\n", "scans_total: 80\n",
+                           "batch_converged: true\n", "scans_readmitted: 0\n", "\nate_m: 0.0"})
+    EXPECT_NE(yaml.find(line), std::string::npos) << line << yaml;
+  const std::string online = contents(out_ + "/online/summary.yaml");
+  EXPECT_NE(online.find("mode: online\n"), std::string::npos);
+  EXPECT_EQ(online.find("batch"), std::string::npos);
+  for (const std::string& name : RunOutput::fileNames()) {
+    EXPECT_GT(fs::file_size(out_ + "/" + name), 0u) << name;
+    EXPECT_GT(fs::file_size(out_ + "/online/" + name), 0u) << name;
+  }
+  // One state a sample, from the same sample on; one line a scan in the same order.
+  const Trajectory whole = readTum(out_ + "/trajectory.txt"),
+                   causal = readTum(out_ + "/online/trajectory.txt");
+  EXPECT_NEAR(static_cast<double>(whole.size()), static_cast<double>(causal.size()), 1.0);
+  EXPECT_EQ(whole.back().time, causal.back().time);
+  for (const StampedPose& pose : whole) EXPECT_LT(pose.p_W.norm(), 0.02);
+  EXPECT_EQ(contents(out_ + "/ego_velocity.csv"), contents(out_ + "/online/ego_velocity.csv"));
+  EXPECT_EQ(readTum(out_ + "/trajectory_optimized.txt").size(),
+            readTum(out_ + "/online/trajectory_optimized.txt").size());
+}
+
+TEST_F(BagRunner, PassesTakeTheOffsetOffTheStampsAndGiveItBack) {
+  writeBag({});
+  const std::vector<std::string> initial = {"--set", "time_offset_initial=0.02"};
+  ASSERT_EQ(run(initial).status, 0);
+  const std::string online = out_;
+  out_ = folder_ + "/refined";
+  const Outcome outcome =
+      run({"--set", "time_offset_initial=0.02", "--set", "mode=refine", "--set", "refine_passes=2"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("after passes"), std::string::npos) << outcome.out;
+  // At rest nothing is learnt: what was believed at first stays, whichever way it is told the estimator.
+  const std::string yaml = contents(out_ + "/summary.yaml");
+  EXPECT_NE(yaml.find("mode: refine\n"), std::string::npos);
+  EXPECT_NE(yaml.find("pass_offsets_s: [0.020"), std::string::npos) << yaml;
+  EXPECT_NE(yaml.find("final_offset_s: 0.020"), std::string::npos) << yaml;
+  EXPECT_EQ(untimed(contents(out_ + "/pass_1/summary.yaml")), untimed(contents(online + "/summary.yaml")));
+  EXPECT_FALSE(fs::exists(out_ + "/pass_2"));
+  // The stamps in the files are those of the bag in every pass.
+  const auto stamps = [](const std::string& path) {
+    std::ifstream file(path);
+    std::string line, all;
+    while (std::getline(file, line)) all += line.substr(0, line.find(',')) + "\n";
+    return all;
+  };
+  EXPECT_EQ(stamps(out_ + "/ego_velocity.csv"), stamps(online + "/ego_velocity.csv"));
+  EXPECT_EQ(stamps(out_ + "/time_offset.csv"), stamps(online + "/time_offset.csv"));
+  expectError(run({"--set", "mode=fast"}), {"mode", "online, batch, refine"});
+  expectError(run({"--set", "refine_passes=0"}), {"refine_passes"});
+}
+
 TEST_F(BagRunner, GroundTruthComesFromTheTopicOrAFile) {
   BagContents what;
   what.ground_truth = true;
@@ -453,6 +512,18 @@ TEST_F(RealBag, NearlyEveryScanOfTheWalkIsUsed) {
   }
   EXPECT_GE(walking, 190);
   EXPECT_GE(used, 0.95 * walking);
+}
+
+TEST_F(RealBag, OnlineEndsNearTheBatch) {
+  Config config = makeConfig(readParameterFile(findConfigFile("ti_mmwave")));
+  config.mode = RunMode::kBatch;
+  const RunSummary batch = runBag({bag_, out_, config, nullptr});
+  const RunSummary online = play(out_ + "/again");
+  ASSERT_TRUE(batch.batch.has_value());
+  EXPECT_TRUE(batch.batch->converged);
+  EXPECT_NEAR(online.final_offset_s, batch.final_offset_s, 0.3 * online.final_offset_sigma_s);
+  EXPECT_NEAR(online.end_to_start_2d_m, batch.end_to_start_2d_m, 0.05);
+  EXPECT_NEAR(online.end_to_start_3d_m, batch.end_to_start_3d_m, 0.05);
 }
 
 TEST_F(RealBag, SameBytesTwice) {
