@@ -6,9 +6,11 @@ import sys
 import tempfile
 import time
 
-# Limits. The node may still fill what is bounded after the first minute (~path, saved poses: some 3 MB in an hour).
+# Limits. What is bounded may still fill after the first minute: ~path in 200 s, the poses kept for ~save_trajectory in
+# an hour, some 4 MB together (docs/architecture.md, "Bounds").
 MEMORY_GROWTH_MB = 5.0  # from the first minute of data to the end
-MEMORY_SLOPE_MB = 0.1   # a minute of data, over the second half
+MEMORY_SLOPE_MB = 0.1   # a minute of data, over the second half and not before ...
+SLOPE_AFTER = 300.0     # [s] of data
 LATENCY_DRIFT = 1.5     # mean of the last quarter over that of the second quarter
 LATENCY_NOISE_MS = 0.5  # differences below say nothing
 
@@ -166,11 +168,12 @@ def judge(record, newest):
 
     after = record[record[:, 0] >= 60.0]
     growth = after[-1, 1] - after[0, 1]
-    half = record[record[:, 0] >= 0.5 * record[-1, 0]]
-    slope = 60.0 * numpy.polyfit(half[:, 0], half[:, 1], 1)[0]
     row("memory", f"{after[0, 1]:.1f} MB after a minute, {after[-1, 1]:.1f} MB at the end, {after[:, 1].max():.1f} MB at most",
         growth <= MEMORY_GROWTH_MB)
-    row("slope, second half", f"{1024.0 * slope:.1f} kB a minute", slope <= MEMORY_SLOPE_MB)
+    half = record[record[:, 0] >= max(0.5 * record[-1, 0], SLOPE_AFTER)]
+    if len(half) > 10:
+        slope = 60.0 * numpy.polyfit(half[:, 0], half[:, 1], 1)[0]
+        row("its slope, second half", f"{1024.0 * slope:.1f} kB a minute", slope <= MEMORY_SLOPE_MB)
     for name, count, total in (("IMU to ~odom", 2, 3), ("scan to optimised state", 4, 5)):
         early, late = (mean_latency(record, *part, count, total) for part in ((0.25, 0.5), (0.75, 1.0)))
         good = late <= max(LATENCY_DRIFT * early, early + LATENCY_NOISE_MS)
