@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """The paper's experiments on simulated or given bags: tables as Markdown and CSV, figures as PNG.
 
-  shifts      stamps shifted by 0, 2.5, ... 15 ms: the estimate must follow (Fig. 4); arrival against trigger stamps
-  delay       100 ms of delay in passes, each starting from the estimate of the one before
+  shifts      stamps shifted by 0, 2.5, ... 15 ms: the estimate must follow, online and in a batch (Fig. 4); arrival
+              against trigger stamps
+  delay       100 ms of delay in passes, each with the estimate of the one before taken off the stamps
   table1      RIO-T against LC-RIO, which does not estimate the offset (Table I)
   table2      LC-RIO with the stamps of the bag and with stamps corrected by RIO-T's estimate (Table II)
   montecarlo  seeds x motions x offsets: mean, spread, and whether the stated uncertainty is honest
@@ -39,7 +40,7 @@ HANDHELD = ["easy", "medium", "difficult"]
 DEFAULT_MOTIONS = {"shifts": ["difficult"], "delay": ["difficult"], "table1": HANDHELD + ["gym_loop"],
                    "table2": HANDHELD + ["gym_loop"], "montecarlo": HANDHELD}
 # What an experiment varies itself.
-OWN_KEYS = ("time_offset_model", "estimate_time_offset", "radar_stamp_shift")
+OWN_KEYS = ("time_offset_model", "estimate_time_offset", "radar_stamp_shift", "mode", "refine_passes")
 NORMAL_95 = 1.959964
 
 
@@ -68,6 +69,7 @@ class Run:
     summary: dict
     curve: list     # (stamp [s], offset, sigma) after each scan
     scans: list     # (stamp [s], points) of each scan
+    before: list = dataclasses.field(default_factory=list)  # Runs: the online pass of a batch, the earlier passes
 
     def figure(self, key):
         return float(self.summary.get(key, math.nan))
@@ -76,6 +78,19 @@ class Run:
 def read_csv(path):
     with open(path, newline="") as file:
         return list(csv.DictReader(file))
+
+
+def read_run(folder):
+    """What rio_t_bag left in the folder, with the passes that it keeps in folders below."""
+    import yaml
+    summary = yaml.safe_load((folder / "summary.yaml").read_text())
+    curve = [(float(row["stamp"]), 1e3 * float(row["offset_s"]), 1e3 * float(row["sigma_s"]))
+             for row in read_csv(folder / "time_offset.csv")]
+    scans = [(float(row["stamp"]), row["points"]) for row in read_csv(folder / "ego_velocity.csv")]
+    names = ["online"] + [f"pass_{i}" for i in range(1, len(summary.get("pass_offsets_s", [])))]
+    before = [read_run(folder / name) for name in names if (folder / name).is_dir()]
+    return Run(1e3 * float(summary["final_offset_s"]), 1e3 * float(summary["final_offset_sigma_s"]), summary, curve,
+               scans, before)
 
 
 class Laboratory:
@@ -109,22 +124,16 @@ class Laboratory:
         return pathlib.Path(bag)
 
     def run(self, bag, settings):
-        import yaml
         folder = pathlib.Path(tempfile.mkdtemp(prefix="run_", dir=self.scratch))
         arguments = ["--bag", bag, "--config", self.config, "--output-dir", folder]
         for setting in self.settings + [f"{key}={value}" for key, value in settings.items()]:
             arguments += ["--set", setting]
         try:
             self.execute("rio_t_bag", arguments)
-            summary = yaml.safe_load((folder / "summary.yaml").read_text())
-            curve = [(float(row["stamp"]), 1e3 * float(row["offset_s"]), 1e3 * float(row["sigma_s"]))
-                     for row in read_csv(folder / "time_offset.csv")]
-            scans = [(float(row["stamp"]), row["points"]) for row in read_csv(folder / "ego_velocity.csv")]
+            return read_run(folder)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
             self.tick()
-        return Run(1e3 * float(summary["final_offset_s"]), 1e3 * float(summary["final_offset_sigma_s"]), summary,
-                   curve, scans)
 
     def tick(self):
         with self.lock:
@@ -281,17 +290,20 @@ def tidy(axes, x_label, y_label):
 
 
 def draw_curves(source, panels):
-    """`panels`: for each model (name, [(label, Run, added to the estimate, end it should reach)])."""
+    """`panels`: for each model (name, [(label, Run, Run of the batch or None, end it should reach)])."""
     plt = plots()
     figure, axes = plt.subplots(1, len(panels), figsize=(6 * len(panels), 4.6), sharey=True, squeeze=False)
     colours = plt.get_cmap("viridis")
-    ends = [v for _, curves in panels for _, run, added, goal in curves for v in (run.offset + added, goal)]
+    ends = [v for _, curves in panels for _, run, _, goal in curves for v in (run.offset, goal)]
     for axis, (model, curves) in zip(axes[0], panels):
         begin = min(run.curve[0][0] for _, run, _, _ in curves)
-        for i, (label, run, added, goal) in enumerate(curves):
+        for i, (label, run, batch, goal) in enumerate(curves):
             colour = colours(0.9 * i / max(1, len(curves) - 1))
+            if batch is not None:
+                axis.plot([t - begin for t, _, _ in batch.curve], [offset for _, offset, _ in batch.curve],
+                          color="#999999", linewidth=1.2, label="batch" if i + 1 == len(curves) else None)
             # Wide below, narrow above: passes that agree lie on each other.
-            axis.plot([t - begin for t, _, _ in run.curve], [offset + added for _, offset, _ in run.curve],
+            axis.plot([t - begin for t, _, _ in run.curve], [offset for _, offset, _ in run.curve],
                       color=colour, linewidth=max(1.2, 3.6 - 1.2 * i), label=label)
             axis.axhline(goal, color=colour, linewidth=0.9, linestyle=":")
         axis.set_title(model, loc="left", fontsize=10)
@@ -347,32 +359,39 @@ def shifts(lab, sources, options):
         for model in MODELS:
             for shift in values:
                 keys.append((source.name, source.seed, model, shift))
-                work.append((source, 1, one_run(rio_t(model, shift))))
+                work.append((source, 1, one_run(rio_t(model, shift, mode="batch"))))
             for stamps in () if "stamp_source" in options.set_keys else ("trigger", "arrival"):
                 keys.append((source.name, source.seed, model, stamps))
                 work.append((source, 1, one_run_or_fault(rio_t(model, stamp_source=stamps))))
     runs = dict(zip(keys, lab.map(work)))
+    # A batch keeps the online run that it began from.
+    batches = {key: run for key, run in runs.items() if key[-1] not in ("trigger", "arrival")}
+    runs.update({key: run.before[0] for key, run in batches.items()})
 
     page = Page("Estimate of the time offset under shifted stamps")
     page.notes.append(f"shifts {', '.join(f'{shift:g}' for shift in values)} ms are added to the stamps of the radar "
                       "(radar_stamp_shift)")
     page.notes.append("the paper's mean step is 2.37 ms for shifts of 2.5 ms")
+    page.notes.append("batch: the whole bag solved at once (mode: batch), its estimate at the end; grey in the figure")
     rows, single, arrival_rows = [], [], []
     for source in sources:
         at = lambda model, what: runs[source.name, source.seed, model, what]  # noqa: E731
         for model in MODELS:
             last = None
             for shift in values:
-                run = at(model, shift)
+                run, batch = at(model, shift), batches[source.name, source.seed, model, shift]
                 step = None if last is None else run.offset - last
                 error = None if source.offset is None else run.offset - source.offset - shift
                 single.append([source.name, seed_text(source.seed), model, f"{shift:g}", fixed(run.offset, 3),
-                               fixed(run.sigma, 3), fixed(step, 3), fixed(error, 3, sign=True)])
+                               fixed(run.sigma, 3), fixed(step, 3), fixed(error, 3, sign=True), fixed(batch.offset, 3),
+                               fixed(batch.sigma, 3)])
                 last = run.offset
             steps = [at(model, b).offset - at(model, a).offset for a, b in zip(values, values[1:])]
+            ends = [batches[source.name, source.seed, model, shift].offset for shift in values]
+            batch_steps = [b - a for a, b in zip(ends, ends[1:])]
             rows.append([source.name, seed_text(source.seed), model, fixed(at(model, values[0]).offset, 3),
-                         fixed(mean(steps), 3), fixed(min(steps), 3), fixed(max(steps), 3),
-                         fixed((values[-1] - values[0]) / (len(values) - 1), 3)])
+                         fixed(mean(steps), 3), fixed(min(steps), 3), fixed(max(steps), 3), fixed(ends[0], 3),
+                         fixed(mean(batch_steps), 3), fixed((values[-1] - values[0]) / (len(values) - 1), 3)])
             if "stamp_source" in options.set_keys:
                 continue
             trigger, arrival = at(model, "trigger"), at(model, "arrival")
@@ -387,9 +406,10 @@ def shifts(lab, sources, options):
                 page.notes.append(f"{label_of(source)}: arrival against trigger stamps not run ({fault})")
     page.tables.append(Table("shifts_steps", "Mean step between consecutive shifts", [
         "sequence", "seed", "model", "first estimate [ms]", "mean step [ms]", "least step [ms]", "largest step [ms]",
-        "true step [ms]"], rows))
+        "first batch [ms]", "mean batch step [ms]", "true step [ms]"], rows))
     page.tables.append(Table("shifts", "Estimate at the end, each shift", [
-        "sequence", "seed", "model", "shift [ms]", "estimate [ms]", "sigma [ms]", "step [ms]", "error [ms]"], single))
+        "sequence", "seed", "model", "shift [ms]", "estimate [ms]", "sigma [ms]", "step [ms]", "error [ms]",
+        "batch [ms]", "batch sigma [ms]"], single))
     if arrival_rows:
         page.tables.append(Table("shifts_arrival", "Stamps of arrival against stamps of the trigger", [
             "sequence", "seed", "model", "trigger [ms]", "arrival [ms]", "difference [ms]", "stamps apart [ms]",
@@ -399,8 +419,8 @@ def shifts(lab, sources, options):
     for model in MODELS:
         first = runs[source.name, source.seed, model, values[0]]
         base = source.offset if source.offset is not None else first.offset - values[0]
-        panels.append((model, [(f"{shift:g} ms", runs[source.name, source.seed, model, shift], 0.0, base + shift)
-                               for shift in values]))
+        panels.append((model, [(f"{shift:g} ms", runs[source.name, source.seed, model, shift],
+                                batches[source.name, source.seed, model, shift], base + shift) for shift in values]))
     page.figures.append((draw_curves(source, panels), "shifts.png"))
     return page
 
@@ -412,35 +432,31 @@ def delay(lab, sources, options):
         def function(laboratory, bag):
             # Without a known truth the estimate of the bag as it is counts as zero delay, as in the paper.
             start = laboratory.run(bag, rio_t(model)).offset if base is None else base
-            runs, total = [], 0.0
-            for _ in range(PASSES):
-                run = laboratory.run(bag, rio_t(model, DELAY - start - total))
-                runs.append((run, total))
-                total += run.offset
-            return start, runs
+            last = laboratory.run(bag, rio_t(model, DELAY - start, mode="refine", refine_passes=PASSES))
+            return start, last.before + [last]
         return function
 
     keys = [(source, model) for source in sources for model in MODELS]
-    results = lab.map([(source, PASSES + (source.offset is None), passes(model, source.offset))
+    results = lab.map([(source, 1 + (source.offset is None), passes(model, source.offset))
                        for source, model in keys])
     page = Page("A delay of 100 ms in passes")
-    page.notes.append("stamps are shifted so that the whole offset is 100 ms; each pass takes the estimates of the "
-                      "passes before off the stamps (radar_stamp_shift)")
+    page.notes.append("stamps are shifted so that the whole offset is 100 ms (radar_stamp_shift); each pass takes the "
+                      "estimate of the pass before off the stamps (mode: refine)")
     page.notes.append("paper: 66.2, 94.3 and 99.5 ms after passes 1, 2 and 3")
     rows = []
     for (source, model), (start, runs) in zip(keys, results):
-        totals = [run.offset + before for run, before in runs]
+        totals = [run.offset for run in runs]
         rows.append([source.name, seed_text(source.seed), model, fixed(start, 3)] + [fixed(t, 3) for t in totals] +
                     [fixed(totals[-1] - DELAY, 3, sign=True)])
     for model in MODELS:
         of_model = [runs for (_, m), (_, runs) in zip(keys, results) if m == model]
-        totals = [mean([runs[i][0].offset + runs[i][1] for runs in of_model]) for i in range(PASSES)]
+        totals = [mean([runs[i].offset for runs in of_model]) for i in range(PASSES)]
         rows.append(["mean", "", model, ""] + [fixed(t, 3) for t in totals] + [fixed(totals[-1] - DELAY, 3, sign=True)])
     page.tables.append(Table("delay", "Estimate of the delay after each pass", [
         "sequence", "seed", "model", "offset of the bag [ms]"] + [f"pass {i + 1} [ms]" for i in range(PASSES)] + [
             "error at the end [ms]"], rows))
     first = sources[0]
-    panels = [(model, [(f"pass {i + 1}", run, before, DELAY) for i, (run, before) in enumerate(runs)])
+    panels = [(model, [(f"pass {i + 1}", run, None, DELAY) for i, run in enumerate(runs)])
               for (source, model), (_, runs) in zip(keys, results) if source is first]
     page.figures.append((draw_curves(first, panels), "delay.png"))
     return page

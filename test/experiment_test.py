@@ -55,6 +55,8 @@ class Experiment(unittest.TestCase):
             self.assertAlmostEqual(float(row["error [ms]"]), float(row["estimate [ms]"]) - truth, delta=0.0015)
             self.assertLess(abs(float(row["error [ms]"])), 4 * float(row["sigma [ms]"]))
             self.assertLess(float(row["sigma [ms]"]), 3.0)
+            self.assertLess(abs(float(row["batch [ms]"]) - truth), 4 * float(row["batch sigma [ms]"]))
+        self.assertAlmostEqual(float(steps["imu"]["mean batch step [ms]"]), 5.0, delta=0.2)
         arrival = {row["model"]: row for row in table(self.folder / "shifts_arrival.csv")}
         # The simulated radar delivers 60 ms after the trigger.
         self.assertAlmostEqual(float(arrival["imu"]["stamps apart [ms]"]), 60.0, delta=2.0)
@@ -63,6 +65,18 @@ class Experiment(unittest.TestCase):
         for fact in ("seeds 1 to 1", "true offset 20 ms", "experiment.sh shifts --shifts 0,5", "shifts.png"):
             self.assertIn(fact, page)
         self.assertGreater((self.folder / "shifts.png").stat().st_size, 10000)
+
+    def test_passes_come_to_the_delay(self):
+        self.succeed("delay", *SHORT)
+        rows = {(row["sequence"], row["model"]): row for row in table(self.folder / "delay.csv")}
+        passes = [float(rows["difficult", "imu"][f"pass {i} [ms]"]) for i in (1, 2, 3)]
+        self.assertLess(abs(passes[2] - 100.0), 2.0)
+        # The paper's model needs its passes: each comes nearer.
+        paper = [float(rows["difficult", "constant_acceleration"][f"pass {i} [ms]"]) for i in (1, 2, 3)]
+        self.assertLess(paper[0], 95.0)
+        self.assertLess(paper[0], paper[1])
+        self.assertLess(abs(paper[2] - 100.0), abs(paper[0] - 100.0))
+        self.assertGreater((self.folder / "delay.png").stat().st_size, 10000)
 
     def test_monte_carlo_counts_its_runs(self):
         self.succeed("montecarlo", "--motion", "difficult", "--time-offset", "0.03", "--seeds", "2", "--duration", "25")
