@@ -66,7 +66,7 @@ struct Rig {
       for (; next != data.scans.end() && next->stamp < sample.time; ++next) {
         if (next->stamp - setup.start > begin) initializer.add(next->stamp, estimator.estimate(scan(*next)));
       }
-      if (const auto found = initializer.solve(imu, anchor)) return found;
+      if (const auto found = initializer.solve(imu, [&](Time) { return anchor; })) return found;
     }
     return std::nullopt;
   }
@@ -219,7 +219,7 @@ TEST(MotionInitializer, DoesNotBridgeAGapOfTheImu) {
 TEST(MotionInitializer, SaysWhatItWaitsForAndBearsNonsense) {
   Rig rig("start_in_motion", 9, 0.0);
   MotionInitializer initializer(rig.options);
-  EXPECT_FALSE(initializer.solve(rig.imu, PoseAnchor()));  // no IMU at all
+  EXPECT_FALSE(initializer.solve(rig.imu, [](Time) { return PoseAnchor(); }));  // no IMU at all
   EXPECT_NE(initializer.waitingFor().find("radar velocity"), std::string::npos);
   EgoVelocity none;
   none.status = EgoVelocityStatus::kTooFewPoints;

@@ -40,7 +40,7 @@ std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, con
   PoseAnchor origin;  // W begins here
   origin.sigma_yaw = options_.smoother.prior_sigma_yaw;
   origin.sigma_position = options_.smoother.prior_sigma_position;
-  const std::optional<MotionInitialization> motion = motion_.solve(imu, origin);
+  const std::optional<MotionInitialization> motion = motion_.solve(imu, [&](Time) { return origin; });
   if (!motion) return std::nullopt;
   return Initialization{motion->time, motion->prior, InitializedFrom::kMotion};
 }

@@ -74,7 +74,8 @@ bool MotionInitializer::isMoving(Time from, Time to, double max_speed) const {
   return 2 * moving > scans;
 }
 
-std::optional<MotionInitialization> MotionInitializer::solve(const ImuBuffer& imu, const PoseAnchor& anchor) {
+std::optional<MotionInitialization> MotionInitializer::solve(
+    const ImuBuffer& imu, const std::function<PoseAnchor(Time)>& anchorAt) {
   if (velocities_.empty() || imu.empty()) return std::nullopt;
   const auto outOfReach = [&](const RadarVelocityMeasurement& z) {
     return std::abs(z.stamp - imu.newest()) > imuHistory();
@@ -104,6 +105,7 @@ std::optional<MotionInitialization> MotionInitializer::solve(const ImuBuffer& im
   MotionInitialization result;
   result.time = time;
   if (std::abs(gravity_error) < options_.max_gravity_error) {
+    const PoseAnchor anchor = anchorAt(time);
     StateBlock& x = result.prior.x0;
     x.q_WI() = withGravity(anchor.q_WI, line.g_I);
     x.p_W() = anchor.p_W;

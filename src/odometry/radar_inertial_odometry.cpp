@@ -8,6 +8,7 @@
 
 #include "rio_t/odometry/initializer.h"
 #include "rio_t/odometry/navigator.h"
+#include "rio_t/odometry/pose_doubt.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
 
 namespace rio_t {
@@ -44,9 +45,11 @@ struct RadarInertialOdometry::Impl {
         R_RI(options.T_IR.q_IR.conjugate().toRotationMatrix()),
         navigator(options.imu_noise, g_W),
         initializer(options),
+        recovery(options),
         ego_velocity_estimator(options.ego_velocity),
         feasibility(options.feasibility),
         offset_monitor(options.offset_monitor, options.smoother.time_offset_initial),
+        health_monitor(options.health, options.smoother.innovation_gate),
         smoother(options.smoother, options.imu_noise, g_W, imu) {
     waiting_for = initializer.waitingFor();
   }
@@ -54,6 +57,14 @@ struct RadarInertialOdometry::Impl {
   void drainInbox();
   void tryInitialize(const ImuMeasurement& sample);
   void begin(Time time, const NodePrior& prior);
+  /// The poses of the window that is given up go to `left`.
+  bool tryReinitialize(std::vector<StampedPose>& left);
+  PoseAnchor anchorAt(Time time) const;
+  void updateHealth();
+  void publishNewest();
+  void judgePrediction(const RadarScan& scan, const VelocityPrior& prior, const EgoVelocity& measured);
+  /// Of the innovation, for the gate [m^2/s^2].
+  Eigen::Matrix3d innovationCovariance(const VelocityPrior& prior, const EgoVelocity& measured) const;
   bool contradicts(const VelocityPrior& prior, const EgoVelocity& measured) const;
   bool isAtRest(Time time) const;
   /// Empty, or why the scan has no velocity to use; and whether that velocity tells the offset.
@@ -79,17 +90,21 @@ struct RadarInertialOdometry::Impl {
   std::vector<RadarScan> scan_inbox;
   bool is_initialized = false;
   std::string waiting_for;
+  Health health = Health::kOk;
 
   // The optimisation half; only the thread in process() touches these.
   ImuBuffer imu;
   Initializer initializer;
+  MotionInitializer recovery;  ///< from divergence
   EgoVelocityEstimator ego_velocity_estimator;
   FeasibilityCheck feasibility;
   OffsetMonitor offset_monitor;
+  HealthMonitor health_monitor;
   FixedLagSmoother smoother;
   std::deque<RadarScan> waiting_scans;
   std::optional<Start> start;
   Time initialized_at;
+  PoseDoubt pose_doubt;
   Time last_used;  ///< stamp of the last scan that went into the window
   std::vector<ImuMeasurement> imu_drained;
 };
@@ -146,6 +161,7 @@ std::vector<ScanResult> RadarInertialOdometry::process() {
     results.push_back(std::move(result));
     m.waiting_scans.pop_front();
   }
+  m.updateHealth();
   return results;
 }
 
@@ -176,7 +192,10 @@ void RadarInertialOdometry::Impl::drainInbox() {
     imu.add(sample);
     if (smoother.size() == 0) tryInitialize(sample);
   }
-  if (smoother.size() > 0) imu.dropBefore(smoother.imuNeededSince());
+  if (smoother.size() == 0) return;
+  const bool keep_for_recovery = options.health.on_divergence == OnDivergence::kReinitialize;
+  const Time needed = smoother.imuNeededSince();
+  imu.dropBefore(keep_for_recovery ? std::min(needed, imu.newest() - recovery.imuHistory()) : needed);
 }
 
 void RadarInertialOdometry::Impl::tryInitialize(const ImuMeasurement& sample) {
@@ -196,9 +215,59 @@ void RadarInertialOdometry::Impl::begin(Time time, const NodePrior& prior) {
   smoother.initialize(time, prior);
   initialized_at = time;
   last_used = time;
+  health_monitor.startedAt(time);
+  publishNewest();
+}
+
+void RadarInertialOdometry::Impl::publishNewest() {
   const NavigationState state = newestState(smoother.newestCovariance());
   const std::lock_guard<std::mutex> lock(navigation_mutex);
   navigator.anchor(state);
+}
+
+bool RadarInertialOdometry::Impl::tryReinitialize(std::vector<StampedPose>& left) {
+  const auto found = recovery.solve(imu, [this](Time time) { return anchorAt(time); });
+  if (!found) return false;
+  for (std::size_t k = 0; k < smoother.size(); ++k) {
+    const NodeEstimate node = smoother.node(k);
+    if (node.time < found->time) left.push_back({node.time, node.x.p_W(), node.x.q_WI()});
+  }
+  pose_doubt = PoseDoubt(newestState(smoother.newestCovariance()));
+  begin(found->time, found->prior);
+  offset_monitor = OffsetMonitor(options.offset_monitor, found->prior.t_O0);
+  updateHealth();
+  faults.count("reinitialized");
+  return true;
+}
+
+PoseAnchor RadarInertialOdometry::Impl::anchorAt(Time time) const {
+  // From the newest node before, as the navigator goes: what is published goes on from where it is.
+  std::size_t k = smoother.size() - 1;
+  while (k > 0 && smoother.node(k).time > time) --k;
+  const NodeEstimate node = smoother.node(k);
+  StateBlock x = node.x;
+  if (node.time < time)
+    x = predict(x, preintegrate(imu, node.time, time, x.b_g(), x.b_a(), options.imu_noise), g_W);
+  PoseAnchor anchor;  // how well it is known is kept by pose_doubt
+  anchor.q_WI = x.q_WI();
+  anchor.p_W = x.p_W();
+  anchor.sigma_yaw = options.smoother.prior_sigma_yaw;
+  anchor.sigma_position = options.smoother.prior_sigma_position;
+  return anchor;
+}
+
+void RadarInertialOdometry::Impl::updateHealth() {
+  std::optional<NavigationState> state;
+  {
+    const std::lock_guard<std::mutex> lock(navigation_mutex);
+    state = navigator.state();
+  }
+  if (!state || imu.empty()) return;
+  const bool was_diverged = health_monitor.health() == Health::kDiverged;
+  const Health now = health_monitor.judge(imu.newest(), *state);
+  if (now == Health::kDiverged && !was_diverged) faults.count("diverged");
+  const std::lock_guard<std::mutex> lock(inbox_mutex);
+  health = now;
 }
 
 std::optional<ScanResult> RadarInertialOdometry::Impl::tryScan(const RadarScan& scan, bool imu_has_ended) {
@@ -223,6 +292,8 @@ std::optional<ScanResult> RadarInertialOdometry::Impl::tryScan(const RadarScan& 
     return rejected("older_than_window");
   }
 
+  if (health_monitor.wantsReinitialization(imu.newest()))
+    result.reinitialized = tryReinitialize(result.left_window);
   const bool at_rest = isAtRest(node_time);
   bool informs_offset = false;
   result.rejected_because = measureVelocity(scan, at_rest, result.ego_velocity, informs_offset);
@@ -239,6 +310,9 @@ std::optional<ScanResult> RadarInertialOdometry::Impl::tryScan(const RadarScan& 
         smoother.addRest(scan.stamp, options.rest.velocity_sigma) == FixedLagSmoother::AddResult::kAdded;
   }
   if (result.updated) updateWindow(result);
+  updateHealth();
+  if (!result.updated && health_monitor.health() == Health::kDiverged) publishNewest();
+  result.health = health_monitor.health();
   return result;
 }
 
@@ -251,7 +325,9 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
     prior = VelocityPrior();
     prior->covariance.diagonal().setConstant(options.rest.velocity_sigma * options.rest.velocity_sigma);
   }
-  measured = ego_velocity_estimator.estimate(scan, prior);
+  const bool heed_prior = health_monitor.health() != Health::kDiverged;
+  measured = ego_velocity_estimator.estimate(scan, heed_prior ? prior : std::nullopt);
+  if (prior) judgePrediction(scan, *prior, measured);
   if (!isValid(measured.status)) return toString(measured.status);
   if (!feasibility.accept(scan.stamp, measured.v_R)) return "infeasible_velocity";
   const bool moving = !at_rest && measured.status == EgoVelocityStatus::kMoving;
@@ -261,6 +337,7 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
       offset_monitor.stepped(scan.stamp, measured.v_R - prediction->velocity.v_R,
                              prediction->covariance_at_offset + measured.covariance, prediction->dv_dt_O)) {
     smoother.loosenTimeOffset();
+    health_monitor.offsetStepped(scan.stamp);
     faults.count("time_offset_step");
   }
   const bool gate_is_open = std::abs(scan.stamp - last_used) > options.smoother.innovation_gate_timeout;
@@ -274,13 +351,26 @@ bool RadarInertialOdometry::Impl::isAtRest(Time time) const {
                          options.rest);
 }
 
+void RadarInertialOdometry::Impl::judgePrediction(const RadarScan& scan, const VelocityPrior& prior,
+                                                  const EgoVelocity& measured) {
+  // Where few points agree, they may be those that side with a wrong prediction: what says the scan alone?
+  const EgoVelocity alone = speaksForItself(measured) ? measured : ego_velocity_estimator.estimate(scan);
+  if (!speaksForItself(alone)) return;
+  recovery.add(scan.stamp, alone);
+  health_monitor.addInnovation(scan.stamp, alone.v_R - prior.v_R, innovationCovariance(prior, alone));
+}
+
+Eigen::Matrix3d RadarInertialOdometry::Impl::innovationCovariance(const VelocityPrior& prior,
+                                                                  const EgoVelocity& measured) const {
+  const double model_error = options.smoother.innovation_model_error;
+  return prior.covariance + measured.covariance + model_error * model_error * Eigen::Matrix3d::Identity();
+}
+
 bool RadarInertialOdometry::Impl::contradicts(const VelocityPrior& prior, const EgoVelocity& measured) const {
   const Eigen::Vector3d innovation = measured.v_R - prior.v_R;
-  const double model_error = options.smoother.innovation_model_error;
-  const Eigen::Matrix3d S =
-      prior.covariance + measured.covariance + model_error * model_error * Eigen::Matrix3d::Identity();
   const double gate = options.smoother.innovation_gate;
-  return gate > 0.0 && innovation.dot(S.ldlt().solve(innovation)) > gate * gate;
+  return gate > 0.0 &&
+         innovation.dot(innovationCovariance(prior, measured).ldlt().solve(innovation)) > gate * gate;
 }
 
 void RadarInertialOdometry::Impl::updateWindow(ScanResult& result) {
@@ -292,6 +382,7 @@ void RadarInertialOdometry::Impl::updateWindow(ScanResult& result) {
   }
   const NodeMatrix covariance = smoother.newestCovariance();
   result.state = newestState(covariance);
+  health_monitor.updated(result.state.time);
   result.time_offset = smoother.newest().t_O;
   result.time_offset_sigma = options.smoother.estimate_time_offset
                                  ? std::sqrt(covariance(StateBlock::kTangent, StateBlock::kTangent))
@@ -315,6 +406,8 @@ NavigationState RadarInertialOdometry::Impl::newestState(const NodeMatrix& covar
   state.b_a = newest.x.b_a();
   state.angular_velocity = imu.at(newest.time).angular_velocity - state.b_g;
   state.covariance = covariance.topLeftCorner<StateBlock::kTangent, StateBlock::kTangent>();
+  pose_doubt.addTo(state);
+  health_monitor.widen(state);
   return state;
 }
 
@@ -324,6 +417,11 @@ bool RadarInertialOdometry::initialized() const {
 }
 
 std::optional<RadarInertialOdometry::Start> RadarInertialOdometry::start() const { return impl_->start; }
+
+Health RadarInertialOdometry::health() const {
+  const std::lock_guard<std::mutex> lock(impl_->inbox_mutex);
+  return impl_->health;
+}
 
 std::string RadarInertialOdometry::waitingFor() const {
   const std::lock_guard<std::mutex> lock(impl_->inbox_mutex);

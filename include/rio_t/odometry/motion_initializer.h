@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -57,7 +58,9 @@ class MotionInitializer {
   void add(Time stamp, const EgoVelocity& velocity);
   /// The state, as soon as a window of velocities is there, covered by the IMU, and both agree. Where they do
   /// not, the older half of the window is dropped, and waitingFor() says why.
-  std::optional<MotionInitialization> solve(const ImuBuffer& imu, const PoseAnchor& anchor);
+  /// `anchor` gives the pose at the time of the state.
+  std::optional<MotionInitialization> solve(const ImuBuffer& imu,
+                                            const std::function<PoseAnchor(Time)>& anchor);
   void clear();
   /// Whether most of the scans stamped within [from, to] show a speed above `max_speed` [m/s], and are sure
   /// of it.

@@ -20,6 +20,8 @@ class Navigator {
 
   /// New optimised state, usually some 100 ms before the newest sample: everything since is integrated again.
   void anchor(const NavigationState& state);
+  /// At the newest sample; none before the first anchor.
+  const std::optional<NavigationState>& state() const { return state_; }
 
  private:
   void propagate(const ImuMeasurement& from, const ImuMeasurement& to);

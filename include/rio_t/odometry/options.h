@@ -5,6 +5,7 @@
 #include "rio_t/imu/noise.h"
 #include "rio_t/imu/rest_detector.h"
 #include "rio_t/imu/static_initializer.h"
+#include "rio_t/odometry/health_monitor.h"
 #include "rio_t/odometry/motion_initializer.h"
 #include "rio_t/odometry/offset_monitor.h"
 #include "rio_t/radar/ego_velocity.h"
@@ -40,6 +41,7 @@ struct OdometryOptions {
   RestOptions rest;
   SmootherOptions smoother;
   OffsetMonitorOptions offset_monitor;
+  HealthOptions health;
   double max_imu_gap = 0.1;           ///< [s] between samples; a longer one is reported and bridged
   std::size_t max_queued_scans = 50;  ///< scans that may wait for the IMU or the solver
 };

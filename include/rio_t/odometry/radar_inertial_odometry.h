@@ -31,6 +31,8 @@ struct ScanResult {
   double time_offset_sigma = 0.0;  ///< [s]
   int solver_iterations = 0;
   bool solver_converged = false;
+  Health health = Health::kOk;           ///< after this scan; set always
+  bool reinitialized = false;            ///< the state was found anew before this scan
   std::vector<StampedPose> left_window;  ///< optimised poses that this scan pushed out, oldest first
 };
 
@@ -64,6 +66,9 @@ class RadarInertialOdometry {
   std::vector<ScanResult> finish();
 
   bool initialized() const;
+  /// Whether the estimate can be trusted, as of the last `process`. Any thread. Each time that it diverges or
+  /// is found anew is counted in `faults()`, as "diverged" and "reinitialized".
+  Health health() const;
   /// Where the graph begins and what was known there; none before initialisation. Call it from the thread
   /// that calls `process`.
   using Start = Initialization;

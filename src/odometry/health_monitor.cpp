@@ -1,0 +1,108 @@
+#include "rio_t/odometry/health_monitor.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "rio_t/factors/state_block.h"
+
+namespace rio_t {
+namespace {
+
+constexpr double kDefaultGate = 4.0;      // [sigma]
+constexpr double kMajority = 0.6;         // of the points
+constexpr std::size_t kMinScans = 8;      // fewer prove nothing
+constexpr double kMinSpan = 0.7;          // of the window, that they must reach over
+constexpr std::size_t kMaxScans = 1000;   // bounds the memory
+constexpr double kStepsApart = 20.0;      // [s] nearer, a step of the offset explains nothing
+constexpr double kMaxSpeed = 200.0;       // [m/s] no platform with such a radar
+constexpr double kMetresPerSecond2 = 10;  // an attitude that is off by x turns x g into velocity each second
+
+}  // namespace
+
+std::string toString(Health health) {
+  switch (health) {
+    case Health::kOk:
+      return "ok";
+    case Health::kCoasting:
+      return "coasting";
+    case Health::kDiverged:
+      return "diverged";
+  }
+  return "";
+}
+
+bool speaksForItself(const EgoVelocity& velocity) {
+  return isValid(velocity.status) && static_cast<double>(velocity.inliers.size()) >=
+                                         kMajority * static_cast<double>(velocity.points_used);
+}
+
+HealthMonitor::HealthMonitor(const HealthOptions& options, double gate)
+    : options_(options), gate_(gate > 0.0 ? gate : kDefaultGate) {}
+
+void HealthMonitor::addInnovation(Time stamp, const Eigen::Vector3d& d, const Eigen::Matrix3d& S) {
+  const double squared_sigmas = d.dot(S.ldlt().solve(d));
+  entries_.push_back({stamp, std::min(1.0, squared_sigmas / (gate_ * gate_)), d.squaredNorm()});
+  while (entries_.size() > kMaxScans || std::abs(stamp - entries_.front().stamp) > options_.window)
+    entries_.pop_front();
+}
+
+std::optional<double> HealthMonitor::contradiction() const {
+  if (entries_.size() < kMinScans ||
+      entries_.back().stamp - entries_.front().stamp < kMinSpan * options_.window)
+    return std::nullopt;
+  double sum = 0.0;
+  for (const Entry& entry : entries_) sum += entry.contradiction;
+  return sum / static_cast<double>(entries_.size());
+}
+
+void HealthMonitor::offsetStepped(Time stamp) {
+  // A divergence makes false steps, one after the other: they must not hide it.
+  if (!offset_stepped_ || std::abs(stamp - *offset_stepped_) > kStepsApart) entries_.clear();
+  offset_stepped_ = stamp;
+}
+
+void HealthMonitor::startedAt(Time time) {
+  entries_.clear();
+  last_update_ = time;
+  if (diverged_at_) diverged_at_ = time;
+}
+
+bool HealthMonitor::wantsReinitialization(Time now) const {
+  return options_.on_divergence == OnDivergence::kReinitialize && diverged_at_ &&
+         now - *diverged_at_ > options_.reinitialize_after;
+}
+
+Health HealthMonitor::judge(Time now, const NavigationState& state) {
+  if (const std::optional<double> share = contradiction()) {
+    if (!diverged_at_ && *share > options_.max_contradiction) {
+      diverged_at_ = now;
+      contradicted_since_ = entries_.front().stamp;
+    } else if (diverged_at_ && *share < 0.5 * options_.max_contradiction) {
+      diverged_at_.reset();
+    }
+  }
+  const double variance = state.covariance.diagonal().segment<3>(StateBlock::kV).maxCoeff();
+  const double max_sigma = options_.max_velocity_sigma;
+  const bool known = state.p_W.allFinite() && state.v_W.allFinite() && state.v_W.norm() < kMaxSpeed &&
+                     variance < max_sigma * max_sigma;  // false for NaN
+  health_ = diverged_at_ || !known                         ? Health::kDiverged
+            : now - last_update_ > options_.coasting_after ? Health::kCoasting
+                                                           : Health::kOk;
+  return health_;
+}
+
+void HealthMonitor::widen(NavigationState& state) const {
+  if (!diverged_at_ || entries_.empty()) return;
+  double square = 0.0;
+  for (const Entry& entry : entries_) square += entry.square / static_cast<double>(entries_.size());
+  const double seconds = std::max(1.0, entries_.back().stamp - contradicted_since_);
+  const auto add = [&](int first, double variance) {
+    state.covariance.diagonal().segment<3>(first).array() += variance;
+  };
+  add(StateBlock::kV, square);
+  add(StateBlock::kP, square * seconds * seconds);
+  add(StateBlock::kTheta, square / (kMetresPerSecond2 * kMetresPerSecond2));
+}
+
+}  // namespace rio_t

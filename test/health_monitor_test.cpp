@@ -1,0 +1,261 @@
+// Divergence is detected where radar and IMU contradict each other, never where they do not, and told.
+#include "rio_t/odometry/health_monitor.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "rio_t/core/so3.h"
+#include "simulated_run.h"
+
+namespace rio_t {
+namespace {
+
+Time at(double seconds) { return Time::fromSeconds(seconds); }
+
+NavigationState knownState() {
+  NavigationState state;
+  state.covariance.diagonal().setConstant(1e-4);
+  return state;
+}
+
+/// Scans at 10 Hz with an innovation of `sigmas` along x; the health after the last.
+Health feed(HealthMonitor& monitor, double from, double to, double sigmas) {
+  Health health = monitor.health();
+  for (int k = 0; from + 0.1 * k < to; ++k) {
+    const Time stamp = at(from + 0.1 * k);
+    monitor.addInnovation(stamp, Eigen::Vector3d(0.1 * sigmas, 0.0, 0.0), 0.01 * Eigen::Matrix3d::Identity());
+    monitor.updated(stamp);
+    health = monitor.judge(stamp, knownState());
+  }
+  return health;
+}
+
+TEST(HealthMonitor, ManyScansMustContradict) {
+  HealthMonitor monitor(HealthOptions(), 4.0);
+  EXPECT_EQ(feed(monitor, 0.0, 10.0, 2.0), Health::kOk);
+  EXPECT_EQ(feed(monitor, 10.0, 11.0, 10.0), Health::kOk);  // half of the window
+  EXPECT_EQ(feed(monitor, 11.0, 12.0, 10.0), Health::kDiverged);
+  // And agree, to be trusted again.
+  EXPECT_EQ(feed(monitor, 12.0, 13.0, 1.0), Health::kDiverged);
+  EXPECT_EQ(feed(monitor, 13.0, 14.0, 1.0), Health::kOk);
+}
+
+TEST(HealthMonitor, FewScansProveNothing) {
+  HealthMonitor monitor(HealthOptions(), 4.0);
+  for (int k = 0; k < 5; ++k) {
+    monitor.addInnovation(at(0.4 * k), Eigen::Vector3d(9.0, 0.0, 0.0), Eigen::Matrix3d::Identity());
+    monitor.updated(at(0.4 * k));
+    EXPECT_EQ(monitor.judge(at(0.4 * k), knownState()), Health::kOk);
+  }
+}
+
+TEST(HealthMonitor, CoastsWithoutScansAndDivergesWhereNothingIsKnown) {
+  HealthMonitor monitor(HealthOptions(), 4.0);
+  feed(monitor, 0.0, 5.0, 1.0);
+  EXPECT_EQ(monitor.judge(at(5.5), knownState()), Health::kOk);
+  EXPECT_EQ(monitor.judge(at(6.5), knownState()), Health::kCoasting);
+  NavigationState vague = knownState();
+  vague.covariance(7, 7) = 1.1;
+  EXPECT_EQ(monitor.judge(at(6.5), vague), Health::kDiverged);
+  NavigationState broken = knownState();
+  broken.v_W.x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(monitor.judge(at(6.5), broken), Health::kDiverged);
+  broken = knownState();
+  broken.covariance(6, 6) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(monitor.judge(at(6.5), broken), Health::kDiverged);
+  EXPECT_FALSE(monitor.wantsReinitialization(at(100.0)));  // no scan contradicts
+}
+
+TEST(HealthMonitor, AStepOfTheOffsetExplainsOnce) {
+  HealthMonitor monitor(HealthOptions(), 4.0);
+  feed(monitor, 0.0, 5.0, 1.0);
+  feed(monitor, 5.0, 6.2, 10.0);
+  monitor.offsetStepped(at(6.2));
+  EXPECT_EQ(feed(monitor, 6.2, 7.0, 10.0), Health::kOk);
+  monitor.offsetStepped(at(7.0));
+  EXPECT_EQ(feed(monitor, 7.0, 8.5, 10.0), Health::kDiverged);
+}
+
+TEST(HealthMonitor, ReinitialisesLateAndIsThenOnTrial) {
+  HealthMonitor monitor(HealthOptions(), 4.0);
+  feed(monitor, 0.0, 2.0, 10.0);  // diverged at 1.4 s
+  ASSERT_EQ(monitor.health(), Health::kDiverged);
+  EXPECT_FALSE(monitor.wantsReinitialization(at(6.0)));
+  EXPECT_TRUE(monitor.wantsReinitialization(at(7.0)));
+  monitor.startedAt(at(7.0));
+  EXPECT_FALSE(monitor.wantsReinitialization(at(11.9)));
+  EXPECT_EQ(feed(monitor, 7.0, 8.0, 1.0), Health::kDiverged);
+  EXPECT_EQ(feed(monitor, 8.0, 9.0, 1.0), Health::kOk);
+  HealthOptions report;
+  report.on_divergence = OnDivergence::kReport;
+  HealthMonitor reporter(report, 4.0);
+  EXPECT_EQ(feed(reporter, 0.0, 20.0, 10.0), Health::kDiverged);
+  EXPECT_FALSE(reporter.wantsReinitialization(at(20.0)));
+}
+
+TEST(HealthMonitor, TheCovarianceGrowsWithWhatContradicts) {
+  HealthMonitor monitor(HealthOptions(), 4.0);
+  NavigationState state = knownState();
+  feed(monitor, 0.0, 1.0, 20.0);
+  monitor.widen(state);
+  EXPECT_EQ(state.covariance, knownState().covariance);
+  feed(monitor, 1.0, 3.0, 20.0);
+  monitor.widen(state);
+  EXPECT_GT(std::sqrt(state.covariance(6, 6)), 2.0);  // the innovations are 2 m/s
+  NavigationState later = knownState();
+  feed(monitor, 3.0, 6.0, 20.0);
+  monitor.widen(later);
+  EXPECT_GT(later.covariance(3, 3), 2.0 * state.covariance(3, 3));
+}
+
+constexpr double kFault = 22.0;  // [s]
+
+struct Diverged {
+  double first = -1.0, last = -1.0;  ///< [s], stamps of scans
+  int reinitialized = 0;
+};
+Diverged divergedIn(const SimulatedRun& run) {
+  Diverged diverged;
+  for (const ScanResult& result : run.results) {
+    if (result.reinitialized) ++diverged.reinitialized;
+    if (result.health != Health::kDiverged) continue;
+    diverged.last = run.seconds(result.scan.stamp);
+    if (diverged.first < 0.0) diverged.first = diverged.last;
+  }
+  return diverged;
+}
+
+TEST(Divergence, IsNeverRaisedOnHealthyData) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    for (const double offset : {-0.05, 0.0, 0.03, 0.1}) {
+      for (const double step : {0.0, -0.05, 0.08}) {
+        if (step != 0.0 && offset != 0.03) continue;
+        SimulatedRun run("difficult", seed, 45.0);
+        run.setup.time_offset.constant = offset;
+        if (step != 0.0) run.setup.time_offset.steps.push_back({30.0, step});
+        run.run();
+        EXPECT_EQ(run.odometry->faults().count("diverged"), 0U)
+            << "seed " << seed << ", offset " << offset << ", step " << step << ", at "
+            << divergedIn(run).first << " s";
+        EXPECT_EQ(run.odometry->health(), Health::kOk);
+      }
+    }
+  }
+}
+
+TEST(Divergence, AnImuThatTurnsOnItsMountIsTold) {
+  for (const OnDivergence policy : {OnDivergence::kReport, OnDivergence::kReinitialize}) {
+    SimulatedRun run("difficult", 1, 40.0);
+    run.options.health.on_divergence = policy;
+    run.run([&](simulation::SensorData& data) {
+      const Eigen::Quaterniond turn = so3::exp({0.5, 0.3, 0.4});
+      for (ImuMeasurement& sample : data.imu.samples) {
+        if (run.seconds(sample.time) < kFault) continue;
+        sample.angular_velocity = turn * sample.angular_velocity;
+        sample.acceleration = turn * sample.acceleration;
+      }
+    });
+    const Diverged diverged = divergedIn(run);
+    EXPECT_GT(diverged.first, kFault);
+    EXPECT_LT(diverged.first, kFault + 4.0);
+    EXPECT_GE(run.odometry->faults().at("diverged"), 1U);
+  }
+}
+
+TEST(Divergence, ADopplerThatChangesItsSignIsToldAndBridged) {
+  SimulatedRun run("difficult", 2, 40.0);
+  run.run([&](simulation::SensorData& data) {
+    for (simulation::SimulatedScan& scan : data.scans) {
+      const double t = run.seconds(scan.stamp);
+      if (t < kFault || t > kFault + 4.0) continue;
+      for (simulation::SimulatedPoint& point : scan.points) point.doppler = -point.doppler;
+    }
+  });
+  const Diverged diverged = divergedIn(run);
+  EXPECT_GT(diverged.first, kFault);
+  EXPECT_LT(diverged.first, kFault + 2.5);
+  EXPECT_LT(diverged.last, kFault + 4.0 + 2.0);
+  // Shorter than reinitialize_after: the IMU carried it, and nothing was believed to the radar.
+  EXPECT_EQ(diverged.reinitialized, 0);
+  EXPECT_LT(run.rms(kFault + 1.0, kFault + 4.0, [&](const auto& s) { return run.velocityError(s); }), 0.3);
+  EXPECT_LT(run.rms(kFault + 6.0, 40.0, [&](const auto& s) { return run.velocityError(s); }), 0.05);
+}
+
+TEST(Divergence, AnAccelerometerBiasThatJumpsIsToldAndOvercome) {
+  for (const std::uint64_t seed : {1U, 2U}) {
+    SimulatedRun run("difficult", seed, 50.0);
+    run.run([&](simulation::SensorData& data) {
+      for (ImuMeasurement& sample : data.imu.samples)
+        if (run.seconds(sample.time) >= kFault) sample.acceleration.x() += 1.0;
+    });
+    const Diverged diverged = divergedIn(run);
+    EXPECT_GT(diverged.first, kFault);
+    EXPECT_LT(diverged.first, kFault + 3.0);
+    EXPECT_GE(diverged.reinitialized, 1);
+    EXPECT_EQ(run.odometry->faults().at("reinitialized"), static_cast<std::uint64_t>(diverged.reinitialized));
+    EXPECT_EQ(run.odometry->health(), Health::kOk);
+    EXPECT_LT(run.rms(45.0, 50.0, [&](const auto& s) { return run.velocityError(s); }), 0.1);
+    // While diverged the covariance covers the error, and where the state is found anew the position and the
+    // heading go on.
+    for (std::size_t k = 1; k < run.states.size(); ++k) {
+      const NavigationState& state = run.states[k];
+      const double t = run.seconds(state.time);
+      ASSERT_TRUE(state.covariance.allFinite());
+      if (t > diverged.first + 0.3 && t < diverged.last) {
+        const double sigma = std::sqrt(state.covariance.diagonal().segment<3>(6).sum());
+        EXPECT_LT(run.velocityError(state), 4.0 * sigma) << "at " << t << " s";
+      }
+      const NavigationState& before = run.states[k - 1];
+      EXPECT_LT((state.p_W - before.p_W).norm(), 5.0) << "at " << t << " s";
+      const double turn_z = so3::log(state.q_WI * before.q_WI.conjugate()).z();
+      EXPECT_LT(std::abs(turn_z), 0.05) << "at " << t << " s";
+    }
+  }
+}
+
+TEST(Divergence, ABlackoutIsCoastingAndNotDivergence) {
+  SimulatedRun run("difficult", 3, 40.0);
+  run.setup.radar.blackouts.push_back({kFault, 5.0});
+  run.run();
+  EXPECT_EQ(run.odometry->faults().count("diverged"), 0U);
+  for (const ScanResult& result : run.results)
+    EXPECT_EQ(result.health, Health::kOk) << "at " << run.seconds(result.scan.stamp);
+  EXPECT_EQ(run.odometry->health(), Health::kOk);
+}
+
+TEST(Divergence, CoastingIsToldBetweenScans) {
+  SimulatedRun run("difficult", 3, 30.0);
+  run.setup.radar.blackouts.push_back({kFault, 100.0});
+  run.run();
+  EXPECT_EQ(run.odometry->health(), Health::kCoasting);
+}
+
+/// Error after `settled` seconds, for a start in motion and at rest alike.
+TEST(StartInMotion, IsSoonAsGoodAsAStartAtRest) {
+  for (const char* name : {"difficult", "drone"}) {
+    for (const double offset : {-0.00925, 0.1}) {
+      SimulatedRun moving(name, 4, 40.0, 0.0);
+      moving.setup.time_offset.constant = offset;
+      moving.run();
+      ASSERT_TRUE(moving.odometry->start());
+      EXPECT_EQ(moving.odometry->start()->from, InitializedFrom::kMotion);
+      SimulatedRun resting(name, 4, 52.0, 12.0);
+      resting.setup.time_offset.constant = offset;
+      resting.run();
+      EXPECT_EQ(resting.odometry->start()->from, InitializedFrom::kRest);
+      const auto velocity = [](const SimulatedRun& run, double from) {
+        return run.rms(from, 60.0, [&](const auto& s) { return run.velocityError(s); });
+      };
+      const auto tilt = [](const SimulatedRun& run, double from) {
+        return run.rms(from, 60.0, [&](const auto& s) { return run.tiltError(s); });
+      };
+      EXPECT_LT(velocity(moving, 15.0), 1.5 * velocity(resting, 24.0) + 0.005) << name << " " << offset;
+      EXPECT_LT(tilt(moving, 15.0), tilt(resting, 24.0) + 0.003) << name << " " << offset;
+      EXPECT_NEAR(moving.results.back().time_offset, offset, 0.003) << name << " " << offset;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace rio_t
