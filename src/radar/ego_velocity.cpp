@@ -171,9 +171,11 @@ void heedPrior(const std::vector<Direction>& points, const VelocityPrior& prior,
 }
 
 /// Covariance at rest, where every inlier reads the zero bin, of width q. Two things bound the velocity:
-/// - a point reads zero only while |u . v| < q/2, and so v lies in the ellipsoid v' M v < q^2/4, M = mean of u u';
+/// - a point reads zero only while |u . v| < q/2, and so v lies in the ellipsoid v' M v < q^2/4, M = mean of
+/// u u';
 ///   a uniform density over an ellipsoid in 3D has the covariance M^-1 (q^2/4) / 5. More points do not help.
-/// - noise of sigma s carries readings over the edge of the bin, the sooner the faster the platform creeps: the
+/// - noise of sigma s carries readings over the edge of the bin, the sooner the faster the platform creeps:
+/// the
 ///   likelihood P(v) that a point reads zero has the curvature -(log P)'' = 2 z phi(z) / (s^2 P(0)) at rest,
 ///   z = q / (2 s), for each of the n points (1/s^2 as q goes to 0, nothing where q is much above s).
 /// False: the directions leave some velocity unseen.

@@ -21,10 +21,11 @@ std::string toString(EgoVelocitySolver solver);  ///< "ls" or "eiv"
 EgoVelocitySolver egoVelocitySolverFromString(const std::string& name);
 
 struct EgoVelocityOptions {
-  double min_range = 0.25;              ///< [m]
-  double max_range = 100.0;             ///< [m]
-  double min_snr_db = 3.0;              ///< [dB]
-  double max_azimuth = 1.570796;    ///< [rad] from the y (forward) axis, either side; the noise model weighs points at the edge
+  double min_range = 0.25;   ///< [m]
+  double max_range = 100.0;  ///< [m]
+  double min_snr_db = 3.0;   ///< [dB]
+  double max_azimuth =
+      1.570796;  ///< [rad] from the y (forward) axis, either side; the noise model weighs points at the edge
   double max_elevation = 1.570796;  ///< [rad] either side
 
   double zero_velocity_threshold = 0.05;         ///< [m/s] a Doppler below counts as zero
@@ -38,8 +39,8 @@ struct EgoVelocityOptions {
       4.0;  ///< [sigma] farther from the prior a velocity contradicts it; only where one is given
   std::uint32_t ransac_seed = 1;  ///< restarted at each scan: same scan, same answer
 
-  std::size_t min_inliers = 5;       ///< one velocity has three unknowns; the rest are witnesses
-  double min_inlier_fraction = 0.4;  ///< of the points after the filter; fewer agree by chance
+  std::size_t min_inliers = 5;              ///< one velocity has three unknowns; the rest are witnesses
+  double min_inlier_fraction = 0.4;         ///< of the points after the filter; fewer agree by chance
   double prior_min_inlier_fraction = 0.15;  ///< likewise, for points that agree with the prior
 
   EgoVelocitySolver solver = EgoVelocitySolver::kErrorsInVariables;
@@ -50,10 +51,11 @@ struct EgoVelocityOptions {
   double doppler_sigma = 0.035;   ///< [m/s] besides the quantisation
 
   double doppler_quantization = 0.125;  ///< [m/s] step of the radar's Doppler; 0 = none
-  /// [m/s] right, forward, up; added in quadrature while moving. The solver's covariance is honest for noise that is
-  /// independent from point to point (its NEES is 3 in simulation). This is for what points share: things that move
-  /// so slowly that they pass as inliers, a velocity that changes within the radar frame (20 ms at 1 m/s^2), multipath.
-  /// On a walk with an IWR6843AOP the velocity errors are 0.06 m/s and last for several scans.
+  /// [m/s] right, forward, up; added in quadrature while moving. The solver's covariance is honest for noise
+  /// that is independent from point to point (its NEES is 3 in simulation). This is for what points share:
+  /// things that move so slowly that they pass as inliers, a velocity that changes within the radar frame (20
+  /// ms at 1 m/s^2), multipath. On a walk with an IWR6843AOP the velocity errors are 0.06 m/s and last for
+  /// several scans.
   Eigen::Vector3d added_sigma = {0.04, 0.04, 0.04};
   double max_condition_number = 1000.0;  ///< of H'H (unit directions)
   double max_sigma = 0.5;                ///< [m/s] largest axis of the estimate
@@ -93,9 +95,10 @@ class EgoVelocityEstimator {
   explicit EgoVelocityEstimator(const EgoVelocityOptions& options);
 
   /// A prior helps to tell the static world from an object that moves and fills half of the view, which one
-  /// scan cannot: where the RANSAC velocity contradicts the prior, and `prior_min_inlier_fraction` of the points
-  /// agree with a velocity that does not, those points are the inliers. The velocity and its covariance come
-  /// from the points alone, so fusing the result with the prior does not count anything twice.
+  /// scan cannot: where the RANSAC velocity contradicts the prior, and `prior_min_inlier_fraction` of the
+  /// points agree with a velocity that does not, those points are the inliers. The velocity and its
+  /// covariance come from the points alone, so fusing the result with the prior does not count anything
+  /// twice.
   EgoVelocity estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior = std::nullopt) const;
 
  private:
