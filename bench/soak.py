@@ -81,6 +81,8 @@ def make_bag(path, minutes):
 
 
 def run(bag, minutes, rate):
+    with rosbag.Bag(bag) as data:  # takes its time: before the player runs
+        first_stamp = data.get_start_time()
     processes, record = [start_master()], []
     try:
         rospy.init_node("soak", disable_signals=True)
@@ -95,7 +97,6 @@ def run(bag, minutes, rate):
                        f"--rate={rate}", "__name:=bag_player", bag, "--topics", "/sensor_platform/imu",
                        "/sensor_platform/radar/scan")
         processes.append(player)
-        first_stamp = rosbag.Bag(bag).get_start_time()
         progress = sys.stderr.isatty()
         clock = Clock()
         while player.poll() is None:
