@@ -93,6 +93,7 @@ def run_case(programs, bag, name, folder, keep):
     outcome = judge.read_outcome(folder / "run", status, errors, truth, origin, case.shift)
     outcome.reference = judge.errors_against(truth, judge.read_run(usual_folder), origin)
     outcome.last_imu = 1e-9 * [m for m in faulty if m.kind == "imu"][-1].stamp - case.shift
+    outcome.has_truth = bag.truth is not None
     outcome.length = 1e-9 * (messages[-1].record - messages[0].record)
     begin, end = case.when
     return case.expect.judge(outcome, begin, min(end, 1e6))
@@ -226,11 +227,12 @@ def main():
         # One after the other: each has a roscore and real time to itself.
         if not arguments.no_live and not arguments.bag:
             for case in filter(wanted, live.CASES):
-                happened, wrong = live.run(case, bags[0], arguments.programs, scratch / "live")
+                happened, wrong = live.run(case, bags[0], scratch / "live")
                 rows.append((case.name, "live", case.must, happened, wrong))
                 print_result(*rows[-1])
         write_table(scratch / "table.md", rows)
     finally:
+        live.stop_ros()
         if not arguments.output:
             shutil.rmtree(scratch, ignore_errors=True)
     failed = sum(1 for row in rows if row[4])

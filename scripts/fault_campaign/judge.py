@@ -123,6 +123,7 @@ class Outcome:
     reference: Errors = None  # of the run without the fault
     last_imu: float = None    # [s] stamp of the last IMU sample, on the time of the bag without fault
     length: float = 0.0       # [s] of the bag without fault
+    has_truth: bool = True    # else the fault-free run stands for it
 
     def counted(self):
         """Every count of something that went wrong."""
