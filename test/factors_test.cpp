@@ -68,6 +68,45 @@ TEST(ImuFactor, ResidualIsZeroAtTheTruth) {
   EXPECT_LT(r.norm(), 1e-7);
 }
 
+TEST(ImuFactor, TransitionSaysTheSameAsTheFactor) {
+  const SyntheticMotion motion;
+  const ImuBuffer imu = motion.imu(0.9, 1.3, 400.0);
+  const StateBlock x_i = motion.state(1.0);
+  const ImuNoise noise;
+  const Preintegration pre = preintegrate(imu, motion.time(1.0), motion.time(1.1),
+                                          x_i.b_g() + Eigen::Vector3d(1e-3, 2e-3, -1e-3), x_i.b_a(), noise);
+  const ImuTransition step = transition(x_i, pre, noise);
+
+  // A against central differences of the prediction, on the manifold.
+  Eigen::Matrix<double, StateBlock::kTangent, StateBlock::kTangent> numeric;
+  for (int i = 0; i < StateBlock::kTangent; ++i) {
+    StateBlock end[2];
+    for (const double h : {-1e-5, 1e-5}) {
+      StateTangent delta = StateTangent::Zero();
+      delta(i) = h;
+      StateBlock x;
+      boxplus(x_i.data(), delta.data(), x.data());
+      end[h > 0] = predict(x, pre, motion.g_W);
+    }
+    numeric.col(i) = boxminus(end[1].data(), end[0].data()) / 2e-5;
+  }
+  EXPECT_LT((step.A - numeric).cwiseAbs().maxCoeff(), 1e-7);
+
+  // The factor: J_i d_i + J_j d_j ~ N(0, 1).
+  const StateBlock x_j = predict(x_i, pre, motion.g_W);
+  const double* blocks[] = {x_i.data(), x_j.data()};
+  StateJacobian<15> J_i, J_j;
+  double* jacobians[] = {J_i.data(), J_j.data()};
+  Eigen::Matrix<double, 15, 1> r;
+  ImuFactor(pre, noise, motion.g_W).Evaluate(blocks, r.data(), jacobians);
+  Eigen::Matrix<double, 15, 15> T_i, T_j;
+  T_i << J_i.leftCols<3>(), J_i.rightCols<12>();
+  T_j << J_j.leftCols<3>(), J_j.rightCols<12>();
+  const Eigen::Matrix<double, 15, 15> whitened_Q = T_j * step.Q * T_j.transpose();
+  EXPECT_LT((whitened_Q - Eigen::Matrix<double, 15, 15>::Identity()).cwiseAbs().maxCoeff(), 1e-6);
+  EXPECT_LT((T_i + T_j * step.A).norm(), 1e-6 * T_i.norm());
+}
+
 TEST(ConstantAccelerationRadarFactor, JacobiansAreCorrect) {
   const SyntheticMotion motion;
   const ImuBuffer imu = motion.imu(0.9, 1.3, 400.0);

@@ -5,6 +5,22 @@
 #include "rio_t/core/so3.h"
 
 namespace rio_t {
+namespace {
+
+using NineRows = Eigen::Matrix<double, 9, StateBlock::kSize, Eigen::RowMajor>;
+
+/// L E for the lower triangle L, by rows: at this size Eigen's triangular product costs several times as
+/// much.
+NineRows lowerTimes(const Eigen::Matrix<double, 9, 9>& L, const NineRows& E) {
+  NineRows result;
+  for (int i = 0; i < 9; ++i) {
+    result.row(i) = L(i, 0) * E.row(0);
+    for (int j = 1; j <= i; ++j) result.row(i) += L(i, j) * E.row(j);
+  }
+  return result;
+}
+
+}  // namespace
 
 ImuFactor::ImuFactor(const Preintegration& preintegration, const ImuNoise& noise, const Eigen::Vector3d& g_W)
     : pre_(preintegration), g_W_(g_W) {
@@ -44,7 +60,7 @@ bool ImuFactor::Evaluate(double const* const* parameters, double* residuals, dou
   const Eigen::Matrix3d Jr_inv = so3::rightJacobianInverse(e_R);
   if (jacobians[0] != nullptr) {
     Eigen::Map<StateJacobian<15>> J(jacobians[0]);
-    Eigen::Matrix<double, 9, S::kSize> E = Eigen::Matrix<double, 9, S::kSize>::Zero();
+    NineRows E = NineRows::Zero();
     E.block<3, 3>(0, S::kQStored) = -Jr_inv * (j.q_WI.conjugate() * i.q_WI).toRotationMatrix();
     E.block<3, 3>(0, S::kBgStored) =
         -Jr_inv * so3::exp(e_R).toRotationMatrix().transpose() * so3::rightJacobian(dR_correction) * d.dR_dbg;
@@ -58,22 +74,53 @@ bool ImuFactor::Evaluate(double const* const* parameters, double* residuals, dou
     E.block<3, 3>(6, S::kBgStored) = -d.dv_dbg;
     E.block<3, 3>(6, S::kBaStored) = -d.dv_dba;
     J.setZero();
-    J.topRows<9>().noalias() = whitening_.triangularView<Eigen::Lower>() * E;
+    J.topRows<9>() = lowerTimes(whitening_, E);
     J.block<3, 3>(9, S::kBgStored).diagonal().setConstant(-gyro_walk_weight_);
     J.block<3, 3>(12, S::kBaStored).diagonal().setConstant(-accel_walk_weight_);
   }
   if (jacobians[1] != nullptr) {
     Eigen::Map<StateJacobian<15>> J(jacobians[1]);
-    Eigen::Matrix<double, 9, S::kSize> E = Eigen::Matrix<double, 9, S::kSize>::Zero();
+    NineRows E = NineRows::Zero();
     E.block<3, 3>(0, S::kQStored) = Jr_inv;
     E.block<3, 3>(3, S::kPStored) = R_i_T;
     E.block<3, 3>(6, S::kVStored) = R_i_T;
     J.setZero();
-    J.topRows<9>().noalias() = whitening_.triangularView<Eigen::Lower>() * E;
+    J.topRows<9>() = lowerTimes(whitening_, E);
     J.block<3, 3>(9, S::kBgStored).diagonal().setConstant(gyro_walk_weight_);
     J.block<3, 3>(12, S::kBaStored).diagonal().setConstant(accel_walk_weight_);
   }
   return true;
+}
+
+ImuTransition transition(const StateBlock& state_i, const Preintegration& preintegration,
+                         const ImuNoise& noise) {
+  const ImuDelta& d = preintegration.delta;
+  const double T = d.dt;
+  const Eigen::Matrix3d R_i = state_i.q_WI().toRotationMatrix();
+  const Eigen::Vector3d d_bg = state_i.b_g() - preintegration.b_g;
+  const Eigen::Vector3d d_ba = state_i.b_a() - preintegration.b_a;
+  const Eigen::Vector3d correction = d.dR_dbg * d_bg;
+  using S = StateBlock;
+  ImuTransition result;
+  result.A.setIdentity();
+  result.A.block<3, 3>(S::kTheta, S::kTheta) = (d.dR * so3::exp(correction)).toRotationMatrix().transpose();
+  result.A.block<3, 3>(S::kTheta, S::kBg) = so3::rightJacobian(correction) * d.dR_dbg;
+  result.A.block<3, 3>(S::kP, S::kTheta) = -R_i * so3::hat(d.dp + d.dp_dbg * d_bg + d.dp_dba * d_ba);
+  result.A.block<3, 3>(S::kP, S::kV).diagonal().setConstant(T);
+  result.A.block<3, 3>(S::kP, S::kBg) = R_i * d.dp_dbg;
+  result.A.block<3, 3>(S::kP, S::kBa) = R_i * d.dp_dba;
+  result.A.block<3, 3>(S::kV, S::kTheta) = -R_i * so3::hat(d.dv + d.dv_dbg * d_bg + d.dv_dba * d_ba);
+  result.A.block<3, 3>(S::kV, S::kBg) = R_i * d.dv_dbg;
+  result.A.block<3, 3>(S::kV, S::kBa) = R_i * d.dv_dba;
+
+  Eigen::Matrix<double, 9, 9> turn = Eigen::Matrix<double, 9, 9>::Identity();  // p and v errors stand in I_i
+  turn.block<3, 3>(S::kP, S::kP) = R_i;
+  turn.block<3, 3>(S::kV, S::kV) = R_i;
+  result.Q.setZero();
+  result.Q.topLeftCorner<9, 9>() = turn * preintegration.covariance * turn.transpose();
+  result.Q.diagonal().segment<3>(S::kBg).setConstant(noise.gyro_random_walk * noise.gyro_random_walk * T);
+  result.Q.diagonal().segment<3>(S::kBa).setConstant(noise.accel_random_walk * noise.accel_random_walk * T);
+  return result;
 }
 
 StateBlock predict(const StateBlock& state_i, const Preintegration& preintegration,

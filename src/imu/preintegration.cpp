@@ -1,6 +1,7 @@
 #include "rio_t/imu/preintegration.h"
 
 #include "rio_t/core/so3.h"
+#include "rio_t/imu/error_step.h"
 
 namespace rio_t {
 
@@ -41,15 +42,7 @@ Preintegration preintegrate(const ImuBuffer& buffer, Time from, Time to, const E
     const Eigen::Matrix3d half_T = half.toRotationMatrix().transpose();
     const Eigen::Matrix3d R_mid = (result.delta.dR * half).toRotationMatrix();
 
-    // Error propagation (theta, p, v): P <- A P A' + Q, where A is identity but for the blocks below.
-    const Eigen::Matrix3d A_tt = half_T * half_T;
-    const Eigen::Matrix3d A_vt = -dt * R_mid * so3::hat(a) * half_T;
-    Eigen::Matrix<double, 9, 9> A = Eigen::Matrix<double, 9, 9>::Identity();
-    A.block<3, 3>(0, 0) = A_tt;
-    A.block<3, 3>(3, 0) = 0.5 * dt * A_vt;
-    A.block<3, 3>(3, 6) = dt * Eigen::Matrix3d::Identity();
-    A.block<3, 3>(6, 0) = A_vt;
-    result.covariance = A * result.covariance * A.transpose();
+    ErrorStep(dt, half_T, R_mid, a).propagate(result.covariance);
     result.covariance.diagonal().segment<3>(0).array() += gyro_variance * dt;
     // White acceleration noise over dt: position and velocity errors are correlated (double integration).
     result.covariance.diagonal().segment<3>(3).array() += accel_variance * dt * dt * dt / 3.0;

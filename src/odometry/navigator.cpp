@@ -2,6 +2,7 @@
 
 #include "rio_t/core/so3.h"
 #include "rio_t/factors/state_block.h"
+#include "rio_t/imu/error_step.h"
 
 namespace rio_t {
 namespace {
@@ -54,18 +55,8 @@ void Navigator::propagate(const ImuMeasurement& from, const ImuMeasurement& to) 
   const Eigen::Matrix3d R_mid = (x.q_WI * half).toRotationMatrix();
   const Eigen::Vector3d a_W = R_mid * a + g_W_;
 
-  // Error propagation P <- A P A' + Q; A is identity but for a few blocks.
-  const Eigen::Matrix3d half_T = half.toRotationMatrix().transpose();
+  ErrorStep(dt, half.toRotationMatrix().transpose(), R_mid, a).propagate(x.covariance);
   using S = StateBlock;
-  StateCovariance A = StateCovariance::Identity();
-  const Eigen::Matrix3d A_vt = -dt * R_mid * so3::hat(a) * half_T;
-  A.block<3, 3>(S::kTheta, S::kTheta) = half_T * half_T;
-  A.block<3, 3>(S::kTheta, S::kBg).diagonal().setConstant(-dt);
-  A.block<3, 3>(S::kP, S::kTheta) = 0.5 * dt * A_vt;
-  A.block<3, 3>(S::kP, S::kV).diagonal().setConstant(dt);
-  A.block<3, 3>(S::kV, S::kTheta) = A_vt;
-  A.block<3, 3>(S::kV, S::kBa) = -dt * R_mid;
-  x.covariance = (A * x.covariance * A.transpose()).eval();
   const auto addNoise = [&](int first, double density) {
     x.covariance.diagonal().segment<3>(first).array() += density * density * dt;
   };

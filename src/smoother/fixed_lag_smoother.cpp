@@ -11,21 +11,6 @@ namespace {
 /// over no time would weigh infinitely.
 constexpr double kMinNodeSpacing = 0.005;
 
-using StateMatrix = Eigen::Matrix<double, StateBlock::kTangent, StateBlock::kTangent>;
-
-/// Whitened Jacobians of the IMU factor with respect to the tangents of both states.
-std::pair<StateMatrix, StateMatrix> tangentJacobians(const ImuFactor& factor, const StateBlock& i,
-                                                     const StateBlock& j) {
-  const double* blocks[] = {i.data(), j.data()};
-  Eigen::Matrix<double, StateBlock::kTangent, 1> residual;
-  StateJacobian<StateBlock::kTangent> J[2];
-  double* jacobians[] = {J[0].data(), J[1].data()};
-  factor.Evaluate(blocks, residual.data(), jacobians);
-  StateMatrix T[2];
-  for (int b = 0; b < 2; ++b) T[b] << J[b].leftCols<3>(), J[b].rightCols<StateBlock::kTangent - 3>();
-  return {T[0], T[1]};
-}
-
 }  // namespace
 
 FixedLagSmoother::FixedLagSmoother(const SmootherOptions& options, const ImuNoise& noise,
@@ -61,15 +46,14 @@ std::optional<RadarVelocityPrediction> FixedLagSmoother::predictRadarVelocity(
   StateBlock x = newest.x;
   NodeMatrix P = newest_covariance_;
   if (time > newest.time) {
-    const Preintegration pre = preintegrate(*imu_, newest.time, time, newest.x.b_g(), newest.x.b_a(), noise_);
+    const Preintegration& pre = preintegrateFrom(newest, time);
     x = predict(newest.x, pre, g_W_);
-    // The whitened factor says J_i d_i + J_j d_j ~ N(0, 1): so d_j = A d_i + noise with A = -J_j^-1 J_i.
-    const auto [J_i, J_j] = tangentJacobians(ImuFactor(pre, noise_, g_W_), newest.x, x);
-    const StateMatrix J_j_inverse = J_j.inverse();
-    NodeMatrix A = NodeMatrix::Identity();
-    A.topLeftCorner<StateBlock::kTangent, StateBlock::kTangent>() = -J_j_inverse * J_i;
-    P = (A * P * A.transpose()).eval();
-    P.topLeftCorner<StateBlock::kTangent, StateBlock::kTangent>() += J_j_inverse * J_j_inverse.transpose();
+    const ImuTransition step = transition(newest.x, pre, noise_);
+    auto P_xx = P.topLeftCorner<StateBlock::kTangent, StateBlock::kTangent>();
+    auto P_xt = P.topRightCorner<StateBlock::kTangent, 1>();
+    P_xx = (step.A.lazyProduct(P_xx).eval().lazyProduct(step.A.transpose()) + step.Q).eval();
+    P_xt = (step.A * P_xt).eval();
+    P.bottomLeftCorner<1, StateBlock::kTangent>() = P_xt.transpose();
     P(StateBlock::kTangent, StateBlock::kTangent) += offsetVariance(time - newest.time);
   }
 
@@ -140,8 +124,7 @@ WindowNode* FixedLagSmoother::nodeAt(Time time) {
 WindowNode FixedLagSmoother::makeNode(Time time, const WindowNode& previous) const {
   WindowNode node;
   node.time = time;
-  node.x = predict(
-      previous.x, preintegrate(*imu_, previous.time, time, previous.x.b_g(), previous.x.b_a(), noise_), g_W_);
+  node.x = predict(previous.x, preintegrateFrom(previous, time), g_W_);
   node.t_O = previous.t_O;
   return node;
 }
@@ -149,11 +132,18 @@ WindowNode FixedLagSmoother::makeNode(Time time, const WindowNode& previous) con
 void FixedLagSmoother::linkToPrevious(std::size_t k) {
   const WindowNode& previous = window_.nodes[k - 1];
   WindowNode& node = window_.nodes[k];
-  node.imu_from_previous = std::make_unique<ImuFactor>(
-      preintegrate(*imu_, previous.time, node.time, previous.x.b_g(), previous.x.b_a(), noise_), noise_,
-      g_W_);
+  node.imu_from_previous = std::make_unique<ImuFactor>(preintegrateFrom(previous, node.time), noise_, g_W_);
   node.offset_from_previous =
       std::make_unique<ConstantOffsetFactor>(std::sqrt(offsetVariance(node.time - previous.time)));
+}
+
+const Preintegration& FixedLagSmoother::preintegrateFrom(const WindowNode& node, Time to) const {
+  LastPreintegration& last = last_preintegration_;
+  if (last.from != node.time || last.to != to || last.value.b_g != node.x.b_g() ||
+      last.value.b_a != node.x.b_a()) {
+    last = {node.time, to, preintegrate(*imu_, node.time, to, node.x.b_g(), node.x.b_a(), noise_)};
+  }
+  return last.value;
 }
 
 double FixedLagSmoother::offsetVariance(double dt) const {

@@ -13,7 +13,7 @@ namespace rio_t {
 namespace {
 
 /// Squared length of a step, in standard deviations, below which it is the last one.
-constexpr double kConverged = 1e-4;
+constexpr double kConverged = 1e-3;
 constexpr double kFirstDamping = 1e-4;
 
 ceres::Problem::Options borrowingProblem() {

@@ -34,4 +34,12 @@ class ImuFactor final : public ceres::SizedCostFunction<15, StateBlock::kSize, S
 StateBlock predict(const StateBlock& state_i, const Preintegration& preintegration,
                    const Eigen::Vector3d& g_W);
 
+/// How an error of state i goes into the predicted state j: d_j = A d_i + noise with covariance Q, in
+/// tangents. The same as the whitened factor says, J_i d_i + J_j d_j ~ N(0, 1), solved for d_j.
+struct ImuTransition {
+  Eigen::Matrix<double, StateBlock::kTangent, StateBlock::kTangent> A, Q;
+};
+ImuTransition transition(const StateBlock& state_i, const Preintegration& preintegration,
+                         const ImuNoise& noise);
+
 }  // namespace rio_t

@@ -55,13 +55,15 @@ NodeInformation eliminateFirst(const NodeMatrix& H00, const NodeMatrix& H01, con
 /// carries no information gives no rows.
 NodePrior priorFromInformation(const NodeInformation& information, const StateBlock& x0, double t_O0);
 
+using RowMajorNodeMatrix = Eigen::Matrix<double, kNodeTangent, kNodeTangent, Eigen::RowMajor>;
+
 /// Solution of a chain; keeps its memory from call to call.
 struct ChainSolution {
   std::vector<NodeVector> delta;
   double decrease = 0.0;           ///< delta' H delta = -b' delta: the squared length of the step in sigmas
   Eigen::LLT<NodeMatrix> newest;   ///< of the last node's information after all others are eliminated
   std::vector<NodeMatrix> factor;  ///< lower triangles L_k of the eliminated nodes
-  std::vector<NodeMatrix> gain;    ///< L_k^-1 H_k,k+1
+  std::vector<RowMajorNodeMatrix> gain;  ///< L_k^-1 H_k,k+1
 };
 /// Solves (H + damping diag(H)) delta = -b. False where that matrix is not positive definite.
 bool solve(const ChainSystem& system, double damping, ChainSolution* solution);

@@ -78,6 +78,9 @@ class FixedLagSmoother {
   WindowNode* nodeAt(Time time);
   WindowNode makeNode(Time time, const WindowNode& previous) const;
   void linkToPrevious(std::size_t k);
+  /// From `node` to `to` with the biases of `node`. A scan asks for the same one three times: for its
+  /// prediction, its node and its factor.
+  const Preintegration& preintegrateFrom(const WindowNode& node, Time to) const;
   std::unique_ptr<RadarCost> makeRadarFactor(const RadarVelocityMeasurement& z, Time node_time) const;
   double offsetVariance(double dt) const;  ///< that t_O gains in dt [s] by its random walk [s^2]
 
@@ -87,6 +90,11 @@ class FixedLagSmoother {
   const ImuBuffer* imu_;
   Window window_;
   WindowSolver solver_;
+  struct LastPreintegration {
+    Time from, to;
+    Preintegration value;
+  };
+  mutable LastPreintegration last_preintegration_;  // a cache; changes no result
   bool offset_has_stepped_ = false;
   NodeMatrix newest_covariance_ = NodeMatrix::Zero();
 };
