@@ -30,10 +30,14 @@ std::size_t editDistance(const std::string& a, const std::string& b) {
 
 std::string unknownKey(const ParameterEntry& entry, const std::vector<Parameter>& all) {
   const std::string looked_for = entry.key.substr(0, 100);  // the time grows with the length
-  const auto distance = [&](const Parameter& each) { return editDistance(each.description.key, looked_for); };
-  const auto nearest = std::min_element(all.begin(), all.end(), [&](const Parameter& a, const Parameter& b) {
-    return distance(a) < distance(b);
-  });
+  const Parameter* nearest = nullptr;
+  std::size_t least = 0;
+  for (const Parameter& each : all) {
+    const std::size_t distance = editDistance(each.description.key, looked_for);
+    if (nearest != nullptr && distance >= least) continue;
+    nearest = &each;
+    least = distance;
+  }
   return entry.origin + ": unknown parameter \"" + entry.key + "\"; did you mean \"" +
          nearest->description.key + "\"? (config/estimator.yaml lists all)";
 }
