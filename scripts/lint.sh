@@ -1,0 +1,39 @@
+#!/usr/bin/env bash
+# clang-format, clang-tidy and cppcheck over our sources; exit status 1 at any finding.
+#   scripts/lint.sh            all
+#   scripts/lint.sh FILE...    these sources only
+# RIO_T_BUILD_DIR: where the compile commands are made, else build-lint/.
+set -euo pipefail
+case "${1:-}" in -h | --help) sed -n '2,5s/^# \?//p' "$0"; exit 0 ;; esac
+cd "$(dirname "$0")/.."
+export PATH=/usr/bin:$PATH
+build=${RIO_T_BUILD_DIR:-build-lint}
+scripts/install_dependencies.sh clang-format-14 clang-tidy-14 clang-14 cppcheck
+
+# The messages' headers are all that must be made.
+cmake -S . -B "$build" -DCMAKE_EXPORT_COMPILE_COMMANDS=ON -DPYTHON_EXECUTABLE=/usr/bin/python3 \
+  -DPython3_EXECUTABLE=/usr/bin/python3 >"$build.log" 2>&1 || { cat "$build.log" >&2; exit 1; }
+rm -f "$build.log"
+cmake --build "$build" --target rio_t_generate_messages_cpp >/dev/null
+
+if [ $# -gt 0 ]; then
+  files=("$@")
+else
+  mapfile -t files < <(find include src test fuzz bench -name '*.h' -o -name '*.cpp' | sort)
+fi
+# Sources that this build knows: headers are seen with those that include them.
+mapfile -t sources < <(printf '%s\n' "${files[@]}" | grep '\.cpp$' | while read -r file; do
+  if grep -q "\"file\": \"$PWD/$file\"" "$build/compile_commands.json"; then echo "$file"; fi
+done)
+
+clean=true
+clang-format-14 --dry-run --Werror "${files[@]}" || clean=false
+printf '%s\0' "${sources[@]}" |
+  xargs -0 -n 1 -P "$(nproc)" clang-tidy-14 --quiet -p "$build" 2> >(grep -v 'warnings\? generated\.$' >&2) || clean=false
+cppcheck --quiet --enable=warning,performance,portability --inline-suppr --std=c++17 --language=c++ --library=googletest -j "$(nproc)" \
+  --suppressions-list=scripts/cppcheck.txt --error-exitcode=1 -I include "${sources[@]}" || clean=false
+if ! $clean; then
+  echo "lint.sh: findings, see above" >&2
+  exit 1
+fi
+echo "lint.sh: ${#files[@]} files, ${#sources[@]} of them with clang-tidy and cppcheck: no finding"
