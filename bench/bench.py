@@ -102,7 +102,7 @@ def show(result):
           f"{allocations['whole_program']:.0f} in the whole program")
     solve = detail["solve_ms"]
     print(f"  window solve    {solve['p50']:.3f} ms median, {solve['p99']:.3f} ms 99 %, {solve['max']:.3f} ms worst, "
-          f"of {solve['count']}")
+          f"of {solve['count']}, CPU time")
     total = detail["estimation_seconds"]
     print(f"  stages          (instrumented run, {total:.3f} s)    ms      %   us a call  allocations a call")
     for name, cost in sorted(detail["stages"].items(), key=lambda item: -item[1]["seconds"]):

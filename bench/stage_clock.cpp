@@ -1,6 +1,18 @@
 #include "stage_clock.h"
 
+#include <ctime>
+#include <iterator>
+
 namespace rio_t::bench {
+namespace {
+
+double threadCpuSeconds() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+}  // namespace
 
 const char* name(Stage stage) {
   static constexpr const char* kNames[] = {
@@ -18,6 +30,7 @@ StageClock& StageClock::instance() {
 StageClock::Scope::Scope(Stage stage) : stage_(stage), parent_(instance().current_) {
   instance().current_ = this;
   allocations_before_ = bench::allocations();
+  if (stage_ == Stage::kSolve) cpu_before_ = threadCpuSeconds();
   start_ = std::chrono::steady_clock::now();
 }
 
@@ -30,7 +43,7 @@ StageClock::Scope::~Scope() {
   cost.allocations += count - allocations_within_;
   ++cost.calls;
   if (stage_ == Stage::kSolve && clock.solves_.size() < clock.solves_.capacity())
-    clock.solves_.push_back(seconds);
+    clock.solves_.push_back(threadCpuSeconds() - cpu_before_);
   if (parent_ != nullptr) {
     parent_->seconds_within_ += seconds;
     parent_->allocations_within_ += count;

@@ -42,7 +42,8 @@ class StageClock {
   static StageClock& instance();
 
   const StageCost& cost(Stage stage) const { return costs_[static_cast<std::size_t>(stage)]; }
-  /// Duration of each call of Stage::kSolve [s], the stages within it included.
+  /// CPU time of each call of Stage::kSolve [s], the stages within it included: of the thread, so that the
+  /// quantiles are not those of whatever else the machine does.
   const std::vector<double>& solves() const { return solves_; }
 
   /// Times a stage from here to the end of the block.
@@ -59,6 +60,7 @@ class StageClock {
     double seconds_within_ = 0.0;
     std::uint64_t allocations_within_ = 0;
     std::uint64_t allocations_before_;
+    double cpu_before_ = 0.0;  ///< [s] of the thread; of Stage::kSolve only, it costs a system call
     std::chrono::steady_clock::time_point start_;
   };
 
