@@ -12,7 +12,7 @@
 namespace rio_t {
 namespace {
 
-/// Squared length of a step, in standard deviations, below which it is the last one.
+/// Squared length of a step in standard deviations, below which it is the last one (eq. 23a).
 constexpr double kConverged = 1e-3;
 constexpr double kFirstDamping = 1e-4;
 

@@ -17,7 +17,7 @@ struct SolveReport {
 /// and analysing a sparse matrix for each scan, and the covariance falls out of the last elimination.
 ///
 /// Gauss-Newton from where the nodes are; Levenberg-Marquardt damping only after a step that raised the cost.
-/// Ends where a step is shorter than a hundredth of a standard deviation in every direction (that step is
+/// Ends where a step is shorter than 0.03 standard deviations in every direction (that step is
 /// still taken), or after `max_iterations`. Keeps its memory from call to call.
 class WindowSolver {
  public:
