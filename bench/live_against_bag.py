@@ -136,7 +136,7 @@ def main():
     parser.add_argument("--set", action="append", default=[], metavar="key=value")
     arguments = parser.parse_args()
     bag = os.path.abspath(arguments.bag)
-    folder = tempfile.mkdtemp(prefix="rio_t_live_")
+    folder = tempfile.mkdtemp(prefix="rio_t_live_against_bag_")
 
     # One file with every parameter, so that both sides have the same.
     words = [program("rio_t", "rio_t_bag"), "--config", arguments.config]
