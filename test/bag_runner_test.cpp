@@ -384,7 +384,18 @@ TEST_F(BagRunner, NeverInitialisedSaysWhatItWaitedFor) {
   what.duration = 8.0;
   what.shaking = 1.0;
   writeBag(what);
-  expectError(run(), {"never initialised, waited for", "gyro"});
+  expectError(run({"--set", "init_mode=static"}), {"never initialised, waited for", "gyro"});
+}
+
+TEST_F(BagRunner, StartsInMotionWhereThereIsNoRest) {
+  BagContents what;
+  what.shaking = 1.0;
+  writeBag(what);
+  ASSERT_EQ(run().status, 0);
+  const std::string summary = contents(out_ + "/summary.yaml");
+  EXPECT_NE(summary.find("initialized_from: motion\n"), std::string::npos) << summary;
+  EXPECT_NE(summary.find("health_at_end: ok\ndivergences: 0\nreinitializations: 0\n"), std::string::npos)
+      << summary;
 }
 
 TEST_F(BagRunner, EveryScanRejectedSaysWhy) {

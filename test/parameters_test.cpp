@@ -360,11 +360,14 @@ TEST(Parameters, EveryMemberOfTheOptionsHasAKey) {
       << "with max_queued_scans; a member of SmootherOptions lacks a key in src/ros/parameter_registry.cpp";
   EXPECT_EQ(keysChanging("Radar: which points"), memberCount<EgoVelocityOptions>());
   EXPECT_EQ(keysChanging("Radar: jumps"), memberCount<FeasibilityOptions>());
-  EXPECT_EQ(keysChanging("Initialisation"), memberCount<StaticInitializerOptions>());
+  EXPECT_EQ(keysChanging("Initialisation"),
+            memberCount<StaticInitializerOptions>() + memberCount<MotionInitializerOptions>() + 2)
+      << "with init_mode and init_motion_after";
+  EXPECT_EQ(keysChanging("Health"), memberCount<HealthOptions>());
   EXPECT_EQ(keysChanging("Rest on the way"), memberCount<RestOptions>());
   EXPECT_EQ(keysChanging("IMU"), memberCount<ImuNoise>() + 2) << "with gravity and max_imu_gap";
   EXPECT_EQ(keysChanging("T_IR"), memberCount<Extrinsics>() + 1) << "with extrinsics_source";
-  EXPECT_EQ(memberCount<OdometryOptions>(), 11u)
+  EXPECT_EQ(memberCount<OdometryOptions>(), 15u)
       << "a new member needs keys in src/ros/parameter_registry.cpp";
   EXPECT_EQ(memberCount<PointCloudFormat>() - 1, memberCount<PointCloudOverrides>()) << "all but its name";
 }

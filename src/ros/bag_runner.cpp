@@ -206,6 +206,15 @@ class Player {
     summary->scans_total = scans_total_;
     for (const auto& [reason, count] : stamper_.givenUp()) summary->scans_rejected[reason] += count;
     summary->input_faults = odometry_.faults();
+    // These two are judgements of the estimate, with keys of their own.
+    const auto take = [&](const char* name) {
+      const auto node = summary->input_faults.extract(name);
+      return node.empty() ? std::uint64_t{0} : node.mapped();
+    };
+    summary->divergences = take("diverged");
+    summary->reinitializations = take("reinitialized");
+    summary->health_at_end = toString(odometry_.health());
+    if (const auto start = odometry_.start()) summary->initialized_from = toString(start->from);
     if (points_not_finite_ > 0) summary->input_faults["points_not_finite"] = points_not_finite_;
   }
   const RadarInertialOdometry& odometry() const { return odometry_; }
@@ -513,6 +522,12 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
     for (const auto& [name, count] : summary.input_faults)
       faults += (faults.empty() ? "" : ", ") + std::to_string(count) + " " + name;
     row("input faults", faults);
+  }
+  row("started from", summary.initialized_from);
+  if (summary.divergences > 0 || summary.health_at_end != "ok") {
+    row("DO NOT TRUST", "diverged " + std::to_string(summary.divergences) + " times, found anew " +
+                            std::to_string(summary.reinitializations) + " times, at the end " +
+                            summary.health_at_end);
   }
   row("speed", decimal(summary.estimation_seconds, 2) + " s, " + decimal(summary.realtime_factor, 0) +
                    " times real time");

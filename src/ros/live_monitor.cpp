@@ -12,10 +12,6 @@ namespace {
 
 using diagnostic_msgs::DiagnosticStatus;
 
-// Above these the estimate is of no use to anybody, whatever it says.
-constexpr double kDivergedSpeed = 100.0;        // [m/s]
-constexpr double kDivergedVelocitySigma = 1.0;  // [m/s]
-
 double velocitySigma(const NavigationState& state) {
   const Eigen::Vector3d variances = state.covariance.diagonal().segment<3>(StateBlock::kV);
   return std::sqrt(std::max(0.0, variances.maxCoeff()));
@@ -108,17 +104,27 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) c
     return;
   }
   const NavigationState& state = last_update_->result.state;
-  const double sigma = velocitySigma(state);
-  const bool finite = state.p_W.allFinite() && state.v_W.allFinite() && std::isfinite(sigma);
-  const double without_radar = last_used_ ? last_scan_ - *last_used_ : 0.0;
+  const RadarInertialOdometry& odometry = session->odometry();
+  const Health health = odometry.health();
+  const std::map<std::string, std::uint64_t> faults = odometry.faults();
+  const auto count = [&](const char* name) {
+    const auto found = faults.find(name);
+    return found == faults.end() ? std::uint64_t{0} : found->second;
+  };
+  status.add("initialized_from", toString(odometry.start()->from));
+  status.add("health", toString(health));
+  status.add("divergences", count("diverged"));
+  status.add("reinitializations", count("reinitialized"));
   status.add("speed_m_s", state.v_W.norm());
-  status.add("velocity_sigma_m_s", sigma);
-  status.add("seconds_since_a_scan_was_used", without_radar);
-  if (!finite || state.v_W.norm() > kDivergedSpeed || sigma > kDivergedVelocitySigma) {
-    status.summary(DiagnosticStatus::ERROR, "diverged: do not trust the estimate; call ~reset at rest");
-  } else if (without_radar > config_.odometry.smoother.innovation_gate_timeout) {
+  status.add("velocity_sigma_m_s", velocitySigma(state));
+  status.add("seconds_since_a_scan_was_used", last_used_ ? last_scan_ - *last_used_ : 0.0);
+  if (health == Health::kDiverged) {
     status.summary(DiagnosticStatus::ERROR,
-                   "no scan was used for seconds: the IMU alone carries the estimate");
+                   config_.odometry.health.on_divergence == OnDivergence::kReinitialize
+                       ? "diverged: do not trust the estimate; finding the state anew"
+                       : "diverged: do not trust the estimate; call ~reset");
+  } else if (health == Health::kCoasting) {
+    status.summary(DiagnosticStatus::ERROR, "no scan is used: the IMU alone carries the estimate");
   } else {
     status.summary(DiagnosticStatus::OK, "running");
   }
@@ -145,7 +151,10 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   status.add("scans_used", used_);
   for (const auto& [reason, count] : dropped_) status.add("dropped_" + reason, count);
   if (session != nullptr) {
-    for (const auto& [name, count] : session->odometry().faults()) status.add("fault_" + name, count);
+    for (const auto& [name, count] : session->odometry().faults()) {
+      // Told with the odometry.
+      if (name != "diverged" && name != "reinitialized") status.add("fault_" + name, count);
+    }
   }
   const bool wants_trigger = config_.stamp_source == StampSource::kTrigger;
   if (wants_trigger) status.add("trigger_rate_hz", trigger_rate);

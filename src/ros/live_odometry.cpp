@@ -282,6 +282,17 @@ bool LiveOdometry::onSaveTrajectory(std_srvs::Trigger::Request& /*request*/,
   return true;
 }
 
+void LiveOdometry::tellHealth(const ScanResult& result) const {
+  if (result.reinitialized) {
+    ROS_WARN_STREAM(name_ << ": found the state anew in motion; position and heading go on");
+  }
+  if (result.health == Health::kDiverged) {
+    ROS_ERROR_STREAM_THROTTLE(kWarnPeriod,
+                              name_ << ": diverged, radar and IMU contradict each other: do not trust the "
+                                       "estimate (see diagnostics, on_divergence)");
+  }
+}
+
 void LiveOdometry::solve() {
   Session published;  // whose results ~path holds
   while (true) {
@@ -304,6 +315,7 @@ void LiveOdometry::solve() {
       for (const LiveSession::Result& result : now->process(&more)) {
         const bool current = session_.speak(Speaker::kOptimisation, now, [&] {
           publisher_.result(result, rate_sigma);
+          tellHealth(result.result);
           monitor_.result(result);
         });
         if (!current) break;  // reset meanwhile: not of this world any more

@@ -112,7 +112,14 @@ void listImu(ParameterList& list, Config& c) {
 
 void listInitialization(ParameterList& list, Config& c) {
   StaticInitializerOptions& init = c.odometry.initialization;
-  list.group("Initialisation at rest");
+  list.group("Initialisation");
+  list.choice<InitMode>(
+      "init_mode", {{"static", InitMode::kStatic}, {"motion", InitMode::kMotion}, {"auto", InitMode::kAuto}},
+      c.odometry.init_mode,
+      "wait for rest; start from radar and IMU at once, moving or not; or wait for rest for "
+      "init_motion_after");
+  list.number("init_motion_after", "s", atLeast(0), c.odometry.init_motion_after,
+              "without rest, after which auto starts in motion");
   list.number("init_duration", "s", above(0), init.duration,
               "rest that is averaged for attitude and gyro bias");
   list.number("init_max_gyro_std", "rad/s", above(0), init.max_gyro_std,
@@ -123,6 +130,34 @@ void listInitialization(ParameterList& list, Config& c) {
               "of an axis; a larger mean is a rotation, not a bias");
   list.number("init_max_gravity_error", "m/s^2", above(0), init.max_gravity_error,
               "difference of the mean accelerometer's norm from gravity");
+  MotionInitializerOptions& motion = c.odometry.motion_initialization;
+  list.number("init_motion_window", "s", between(1, 10), motion.window,
+              "of radar velocities that a start in motion uses");
+  list.number("init_motion_max_gravity_error", "m/s^2", above(0), motion.max_gravity_error,
+              "of what radar and IMU show together as gravity; more, and units or extrinsics are wrong");
+  list.number("init_motion_max_outlier_fraction", "", between(0, 1), motion.max_outlier_fraction,
+              "of the radar velocities that may not fit the IMU");
+  list.number("init_motion_sigma_gyro_bias", "rad/s", above(0), motion.sigma_gyro_bias,
+              "of an axis, around zero: in motion nothing tells the biases beforehand");
+  list.number("init_motion_sigma_accel_bias", "m/s^2", above(0), motion.sigma_accel_bias,
+              "of an axis, around zero");
+}
+
+void listHealth(ParameterList& list, Config& c) {
+  HealthOptions& health = c.odometry.health;
+  list.group("Health: ok, coasting or diverged");
+  list.choice<OnDivergence>(
+      "on_divergence", {{"report", OnDivergence::kReport}, {"reinitialize", OnDivergence::kReinitialize}},
+      health.on_divergence,
+      "say so and go on; or also find the state anew in motion where it lasts: position and heading go on");
+  list.number("reinitialize_after", "s", atLeast(0), health.reinitialize_after,
+              "of divergence; for so long the IMU alone is worth more than a radar that contradicts it");
+  list.number("divergence_window", "s", above(0, 60), health.window, "of scans that are judged");
+  list.number("divergence_max_contradiction", "", inside(0, 1), health.max_contradiction,
+              "mean over the window of the squared innovation in units of innovation_gate, at most 1 a scan");
+  list.number("divergence_max_velocity_sigma", "m/s", above(0), health.max_velocity_sigma,
+              "of an axis; above, the velocity counts as not known");
+  list.number("coasting_after", "s", above(0), health.coasting_after, "without a scan used");
 }
 
 void listRest(ParameterList& list, Config& c) {
@@ -229,8 +264,6 @@ void listTimeOffset(ParameterList& list, Config& c) {
               "standard deviations of the change that the scans ask for");
   list.number("time_offset_step_min", "s", above(0), monitor.min_change,
               "smaller steps are left to the random walk");
-  list.number("time_offset_relinearization", "s", above(0), monitor.relinearization,
-              "an estimate that came this far, and is sure to half of it, forgets what it learnt on the way");
 }
 
 void listSmoother(ParameterList& list, Config& c) {
@@ -268,8 +301,10 @@ void listSmoother(ParameterList& list, Config& c) {
 void listBag(ParameterList& list, Config& c) {
   list.group("Bag runner");
   list.choice<RunMode>(
-      "mode", {{"online", RunMode::kOnline}, {"batch", RunMode::kBatch}, {"refine", RunMode::kRefine}}, c.mode,
-      "as a live user has it; the whole bag solved at once; or passes, each with the offset found before taken "
+      "mode", {{"online", RunMode::kOnline}, {"batch", RunMode::kBatch}, {"refine", RunMode::kRefine}},
+      c.mode,
+      "as a live user has it; the whole bag solved at once; or passes, each with the offset found before "
+      "taken "
       "off the stamps");
   list.integer("refine_passes", between(1, 100), c.refine_passes, "of mode: refine");
   list.integer("batch_max_iterations", between(1, 10000), c.batch_max_iterations,
@@ -296,6 +331,7 @@ ParameterList parametersOf(Config& config) {
   listFeasibility(list, config);
   listTimeOffset(list, config);
   listSmoother(list, config);
+  listHealth(list, config);
   listLiveNode(list, config);
   listBag(list, config);
   return list;

@@ -64,6 +64,10 @@ std::string summaryText(const RunSummary& summary) {
   line("scans_used", std::to_string(summary.scans_used));
   line("scans_rejected", mapText(summary.scans_rejected));
   line("input_faults", mapText(summary.input_faults));
+  line("initialized_from", summary.initialized_from.empty() ? "none" : summary.initialized_from);
+  line("health_at_end", summary.health_at_end);
+  line("divergences", std::to_string(summary.divergences));
+  line("reinitializations", std::to_string(summary.reinitializations));
   line("path_length_m", fixedText(summary.path_length_m, 6));
   line("end_to_start_2d_m", fixedText(summary.end_to_start_2d_m, 6));
   line("end_to_start_3d_m", fixedText(summary.end_to_start_3d_m, 6));

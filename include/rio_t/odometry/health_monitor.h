@@ -36,7 +36,7 @@ struct HealthOptions {
   double coasting_after = 1.0;      ///< [s]
 };
 
-/// Judges the estimate by its innovations (docs/method.md, section 8.1). Not thread-safe.
+/// Judges the estimate by its innovations (docs/method.md, section 12). Not thread-safe.
 class HealthMonitor {
  public:
   /// `gate` [sigma]: where a scan contradicts the prediction in full; 0: 4.

@@ -43,7 +43,7 @@ struct MotionInitialization {
 };
 
 /// Finds the first state of a platform that never rests, from some seconds of radar velocities and IMU
-/// (docs/method.md, section 3.2).
+/// (docs/method.md, section 11).
 ///
 /// Let dR, dv integrate the IMU from the state's time to a scan T later (T <= 0), and v_k be the velocity of
 /// I, in I, that the scan shows. Then dR v_k - dv = v_I + g_I T: a straight line over T whose slope is the

@@ -62,6 +62,7 @@ class LiveOdometry {
   void reset(const std::string& reason);
   void account(const LiveSession::Stamped& stamped);
   void wakeSolver();
+  void tellHealth(const ScanResult& result) const;
   void solve();  ///< body of the optimisation thread
 
   const std::string name_;

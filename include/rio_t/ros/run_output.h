@@ -39,8 +39,12 @@ struct RunSummary {
   std::uint64_t scans_used = 0;
   std::map<std::string, std::uint64_t> scans_rejected;  ///< by reason
   std::map<std::string, std::uint64_t> input_faults;    ///< by name
-  double path_length_m = 0.0;                           ///< of the optimised poses
-  double end_to_start_2d_m = 0.0;                       ///< of the causal trajectory, horizontal
+  std::string initialized_from;                         ///< "rest" or "motion"; empty: never initialised
+  std::string health_at_end = "ok";                     ///< "ok", "coasting", "diverged"
+  std::uint64_t divergences = 0;
+  std::uint64_t reinitializations = 0;
+  double path_length_m = 0.0;      ///< of the optimised poses
+  double end_to_start_2d_m = 0.0;  ///< of the causal trajectory, horizontal
   double end_to_start_3d_m = 0.0;
   double final_offset_s = 0.0;
   double final_offset_sigma_s = 0.0;
