@@ -63,15 +63,19 @@ void MotionInitializer::add(Time stamp, const EgoVelocity& velocity) {
 }
 
 bool MotionInitializer::isMoving(Time from, Time to, double max_speed) const {
-  std::size_t scans = 0;
-  std::size_t moving = 0;
+  std::vector<double> axes[3];
   for (const RadarVelocityMeasurement& z : velocities_) {
     if (z.stamp < from || to < z.stamp) continue;
-    ++scans;
-    const double sigmas = std::sqrt(z.v_R.dot(z.covariance.ldlt().solve(z.v_R)));
-    if (z.v_R.norm() > max_speed && sigmas > kOutlier) ++moving;
+    for (int i = 0; i < 3; ++i) axes[i].push_back(z.v_R[i]);
   }
-  return 2 * moving > scans;
+  if (axes[0].empty()) return false;
+  Eigen::Vector3d median;
+  for (int i = 0; i < 3; ++i) {
+    const auto middle = axes[i].begin() + static_cast<std::ptrdiff_t>(axes[i].size() / 2);
+    std::nth_element(axes[i].begin(), middle, axes[i].end());
+    median[i] = *middle;
+  }
+  return median.norm() > max_speed;
 }
 
 std::optional<MotionInitialization> MotionInitializer::solve(

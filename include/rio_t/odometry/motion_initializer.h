@@ -62,8 +62,8 @@ class MotionInitializer {
   std::optional<MotionInitialization> solve(const ImuBuffer& imu,
                                             const std::function<PoseAnchor(Time)>& anchor);
   void clear();
-  /// Whether most of the scans stamped within [from, to] show a speed above `max_speed` [m/s], and are sure
-  /// of it.
+  /// Whether the scans stamped within [from, to], by the median of each axis, show a speed above `max_speed`
+  /// [m/s]. False without scans.
   bool isMoving(Time from, Time to, double max_speed) const;
 
   /// What is being waited for, for people.
