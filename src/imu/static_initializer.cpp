@@ -6,6 +6,8 @@
 namespace rio_t {
 namespace {
 
+constexpr double kWrongUnits = 0.4;  // of gravity that the mean accelerometer is off
+
 struct Statistics {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   Eigen::Vector3d std = Eigen::Vector3d::Zero();
@@ -49,10 +51,19 @@ std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement&
   const Statistics gyro = statistics(samples_, &ImuMeasurement::angular_velocity);
   const Statistics accel = statistics(samples_, &ImuMeasurement::acceleration);
   const double gravity_error = accel.mean.norm() - gravity_;
+  // Whatever people and drones do, the accelerometer reads about gravity on the mean.
+  double mean_size = 0.0;
+  for (const ImuMeasurement& sample : samples_) mean_size += sample.acceleration.norm();
+  mean_size /= static_cast<double>(samples_.size());
   std::string fault;
-  if (gyro.std.maxCoeff() > options_.max_gyro_std) {
-    fault = format("rest: the gyro moves by %.3f rad/s (std), at most %.3f allowed", gyro.std.maxCoeff(),
-                   options_.max_gyro_std);
+  if (std::abs(mean_size - gravity_) > kWrongUnits * gravity_) {
+    fault = format(
+        "rest: the accelerometer reads %.2f m/s^2 on the mean, expected gravity %.2f m/s^2: gravity removed, "
+        "or not in m/s^2?",
+        mean_size, gravity_);
+  } else if (gyro.std.maxCoeff() > options_.max_gyro_std) {
+    fault = format("rest: the gyro moves by %.3f rad/s (std), at most %.3f allowed: moving, or not in rad/s?",
+                   gyro.std.maxCoeff(), options_.max_gyro_std);
   } else if (accel.std.maxCoeff() > options_.max_accel_std) {
     fault = format("rest: the accelerometer moves by %.2f m/s^2 (std), at most %.2f allowed",
                    accel.std.maxCoeff(), options_.max_accel_std);
