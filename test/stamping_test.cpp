@@ -51,6 +51,21 @@ std::vector<RadarScan> runTriggers(ScanStamper& stamper, double delay, std::uint
   return all;
 }
 
+TEST(ClockMap, FollowsAClockThatJumpsEitherWay) {
+  for (const double jump : {-30.0, 30.0}) {
+    ClockMap clocks;
+    for (int i = 0; i < 100; ++i) clocks.add(imuTime(0.01 * i), recordTime(0.01 * i + 0.002));
+    for (int i = 100; i < 130; ++i) clocks.add(imuTime(0.01 * i), recordTime(0.01 * i + 0.002 + jump));
+    EXPECT_NEAR(*clocks.toImuClock(recordTime(1.302 + jump)) - imuTime(1.3), 0.0, 1e-6) << jump;
+  }
+}
+
+TEST(ClockMap, AFewLateSamplesAreNoJump) {
+  ClockMap clocks;
+  for (int i = 0; i < 100; ++i) clocks.add(imuTime(0.01 * i), recordTime(0.01 * i + (i > 90 ? 0.8 : 0.0)));
+  EXPECT_NEAR(*clocks.toImuClock(recordTime(1.0)) - imuTime(1.0), 0.0, 1e-6);
+}
+
 TEST(Stamping, HeaderStampsAreKeptToTheNanosecondAndShifted) {
   StampingOptions with_shift = options(StampSource::kHeader);
   with_shift.shift = -0.0025;

@@ -11,11 +11,18 @@ constexpr std::size_t kTriggersKept = 64;  // some seconds of them
 // One scan without its seq is a lost trigger; several in a row, and the two count from different starts.
 constexpr std::size_t kUnmatchedMeansUnlike = 5;
 constexpr double kClockMapSpan = 60.0;  // [s]
+// No transport delays the IMU by more for so many samples; and if one did, its scans would be as late.
+constexpr std::int64_t kJump_ns = 500'000'000;
+constexpr int kJumpSamples = 20;
 
 }  // namespace
 
 void ClockMap::add(Time stamp, Time record) {
   const std::int64_t difference = record.nanoseconds() - stamp.nanoseconds();
+  if (smallest_ns_ != kNothing) {
+    far_above_ = difference - std::min(smallest_ns_, smallest_before_ns_) > kJump_ns ? far_above_ + 1 : 0;
+    if (far_above_ >= kJumpSamples) *this = ClockMap();
+  }
   if (smallest_ns_ == kNothing) {
     minute_begin_ = stamp;
   } else if (std::abs(stamp - minute_begin_) > kClockMapSpan) {

@@ -18,6 +18,8 @@ namespace rio_t {
 /// Carries times of the recording (or receiving) clock over into the IMU clock. A message is recorded after
 /// it was stamped, so the smallest difference seen between the two is the clocks' difference and the shortest
 /// delay of the IMU. The minimum is over the last one to two minutes, so that it follows clocks that drift.
+/// Where the differences stay far above it, or the stamps run back, one of the clocks has jumped, and the
+/// minimum starts anew.
 class ClockMap {
  public:
   void add(Time stamp, Time record);
@@ -29,6 +31,7 @@ class ClockMap {
   std::int64_t smallest_ns_ = kNothing;         // record minus stamp, of the current minute
   std::int64_t smallest_before_ns_ = kNothing;  // of the minute before
   Time minute_begin_;                           // in the IMU clock
+  int far_above_ = 0;                           // samples in a row
 };
 
 struct StampingOptions {
