@@ -216,13 +216,28 @@ class Player {
     summary->health_at_end = toString(odometry_.health());
     if (const auto start = odometry_.start()) summary->initialized_from = toString(start->from);
     if (points_not_finite_ > 0) summary->input_faults["points_not_finite"] = points_not_finite_;
+    for (const auto& [kind, what] : not_usable_) {
+      (kind == "imu_not_usable" ? summary->input_faults : summary->scans_rejected)[kind] += what.count;
+      summary->warnings.push_back(what.why + " (messages: " + std::to_string(what.count) + ")");
+    }
   }
   const RadarInertialOdometry& odometry() const { return odometry_; }
 
  private:
+  struct NotUsable {
+    std::string why;  // the first of them
+    std::uint64_t count = 0;
+  };
+
   void addImu(const sensor_msgs::Imu& message, Time record) {
-    const ImuMeasurement imu = toImuMeasurement(message, config_.imu_topic);
     ++imu_count_;
+    ImuMeasurement imu;
+    try {
+      imu = toImuMeasurement(message, config_.imu_topic);
+    } catch (const std::exception& error) {
+      notUsable("imu_not_usable", error.what());
+      return;
+    }
     stamper_.addImu(imu.time, record);
     if (recorder_ != nullptr) recorder_->addImu(imu);
     if (const std::optional<NavigationState> state = odometry_.addImu(imu)) log_->addState(*state);
@@ -234,11 +249,21 @@ class Player {
     try {
       decoded = decode(message, format_);
     } catch (const std::exception& error) {
-      throw std::runtime_error("topic " + config_.radar_topic + ": " + error.what());
+      notUsable("cloud_not_usable", "topic " + config_.radar_topic + ": " + error.what());
+      return;
     }
     points_not_finite_ += decoded.dropped_not_finite;
-    stamper_.addScan(message.header.seq, toTime(message.header.stamp), record,
-                     toRadarScan(decoded.cloud, Time()));
+    try {
+      stamper_.addScan(message.header.seq, toTime(message.header.stamp), record,
+                       toRadarScan(decoded.cloud, Time()));
+    } catch (const std::exception& error) {
+      notUsable("stamp_zero", error.what());
+    }
+  }
+
+  /// One bad message among good ones is counted; `why` is told at the end, the first one of each kind.
+  void notUsable(const std::string& kind, const std::string& why) {
+    ++not_usable_.try_emplace(kind, NotUsable{why, 0}).first->second.count;
   }
 
   void account(std::vector<ScanResult> results) {
@@ -270,6 +295,7 @@ class Player {
   BatchOdometry* recorder_;
   std::optional<RadarInertialOdometry::Start> start_;
   std::uint64_t imu_count_ = 0, scans_total_ = 0, points_not_finite_ = 0, offset_steps_ = 0;
+  std::map<std::string, NotUsable> not_usable_;  // by kind
 };
 
 void checkOutcome(const std::string& bag, const Config& config, const Player& player) {
@@ -278,6 +304,16 @@ void checkOutcome(const std::string& bag, const Config& config, const Player& pl
     throw bagError(bag, "no messages on topic " + config.imu_topic + " (imu_topic) in the part played");
   if (summary.scans_total == 0)
     throw bagError(bag, "no messages on topic " + config.radar_topic + " (radar_topic) in the part played");
+  // Where none of a topic's messages can be used, what was wrong with the first is what is wrong.
+  const auto countOf = [](const std::map<std::string, std::uint64_t>& counts, const char* name) {
+    const auto found = counts.find(name);
+    return found == counts.end() ? 0 : found->second;
+  };
+  const std::uint64_t bad_scans =
+      countOf(summary.scans_rejected, "cloud_not_usable") + countOf(summary.scans_rejected, "stamp_zero");
+  if (bad_scans == summary.scans_total ||
+      countOf(summary.input_faults, "imu_not_usable") == summary.imu_count)
+    throw bagError(bag, summary.warnings.front());
   if (!player.odometry().initialized()) {
     throw bagError(bag, "never initialised, waited for " + player.odometry().waitingFor() + " (" +
                             std::to_string(summary.imu_count) + " IMU samples, init_duration " +

@@ -85,7 +85,7 @@ void showProgress(double done) {
   if (done >= 1.0) std::fprintf(stderr, "\n");
 }
 
-int run(const Arguments& arguments, std::ostream& out) {
+int run(const Arguments& arguments, std::ostream& out, std::ostream& err) {
   if (arguments.help) {
     out << kHelp;
     return 0;
@@ -101,6 +101,7 @@ int run(const Arguments& arguments, std::ostream& out) {
   BagRun bag_run{arguments.bag, arguments.output_folder, config, nullptr};
   if (isatty(STDERR_FILENO) != 0) bag_run.progress = showProgress;
   const RunSummary summary = runBag(bag_run);
+  for (const std::string& warning : summary.warnings) err << "rio_t_bag: warning: " << warning << "\n";
   out << arguments.bag << "\n" << describeRun(summary, arguments.output_folder);
   return 0;
 }
@@ -109,7 +110,7 @@ int run(const Arguments& arguments, std::ostream& out) {
 
 int runBagTool(const std::vector<std::string>& words, std::ostream& out, std::ostream& err) {
   try {
-    return run(parse(words), out);
+    return run(parse(words), out, err);
   } catch (const std::exception& error) {
     err << "rio_t_bag: " << error.what() << "\n";
     return 1;

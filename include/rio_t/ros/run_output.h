@@ -39,6 +39,7 @@ struct RunSummary {
   std::uint64_t scans_used = 0;
   std::map<std::string, std::uint64_t> scans_rejected;  ///< by reason
   std::map<std::string, std::uint64_t> input_faults;    ///< by name
+  std::vector<std::string> warnings;                    ///< for people; not in the file
   std::string initialized_from;                         ///< "rest" or "motion"; empty: never initialised
   std::string health_at_end = "ok";                     ///< "ok", "coasting", "diverged"
   std::uint64_t divergences = 0;
