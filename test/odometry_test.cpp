@@ -114,6 +114,56 @@ TEST_F(AtRest, BadImuSamplesAreDroppedAndCounted) {
   EXPECT_EQ(faults.at("imu_gap"), 1u);
 }
 
+TEST_F(AtRest, ASilentRadarIsCountedOnceEachTime) {
+  run(104.0);
+  EXPECT_EQ(odometry.faults().at("radar_gap"), 1u) << "none came yet";
+  odometry.addScan(restScan(time - 0.05));
+  run(106.0);
+  EXPECT_EQ(odometry.faults().at("radar_gap"), 2u);
+}
+
+TEST_F(AtRest, AClockThatJumpsStartsTheEstimateAgain) {
+  run(104.0);
+  odometry.addScan(restScan(103.95));
+  run(104.1);
+  for (const double jump : {-50.0, 1000.0}) {
+    time += jump;
+    states.clear();
+    const double begin = time;
+    run(begin + 0.6);
+    EXPECT_TRUE(states.empty());
+    EXPECT_FALSE(odometry.initialized());
+    run(begin + 4.0);
+    ASSERT_TRUE(odometry.initialized()) << odometry.waitingFor();
+    ASSERT_FALSE(states.empty());
+    EXPECT_GT(states.front().time, Time::fromSeconds(begin));
+    EXPECT_LT(states.back().p_W.norm(), 1e-3);
+    odometry.addScan(restScan(time - 0.05));
+    const auto results = run(time + 0.1);
+    ASSERT_EQ(results.size(), 1u);
+    EXPECT_TRUE(results[0].used) << results[0].rejected_because;
+  }
+  EXPECT_EQ(odometry.faults().at("imu_clock_restart"), 2u);
+}
+
+TEST_F(AtRest, OneStampFarAheadDoesNotSilenceTheImu) {
+  run(104.0);
+  EXPECT_FALSE(odometry.addImu(restSample(1e6)));
+  EXPECT_TRUE(odometry.addImu(restSample(time)));
+  EXPECT_EQ(odometry.faults().at("imu_stamp_jump"), 1u);
+}
+
+TEST_F(AtRest, UncertaintyGrowsOverAnImuGap) {
+  run(104.0);
+  const StateCovariance before = states.back().covariance;
+  const auto after = odometry.addImu(restSample(time + 1.0));
+  ASSERT_TRUE(after);
+  // Half a radian and metres a second may have come together in a second.
+  EXPECT_GT(std::sqrt(after->covariance(0, 0)), 0.3);
+  EXPECT_GT(std::sqrt(after->covariance(6, 6)), 1.0);
+  EXPECT_LT(std::sqrt(before(0, 0)), 0.05);
+}
+
 TEST_F(AtRest, UncertaintyGrowsWithoutRadar) {
   run(104.0);
   const double before = states.back().covariance(3, 3);

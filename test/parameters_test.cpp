@@ -365,9 +365,11 @@ TEST(Parameters, EveryMemberOfTheOptionsHasAKey) {
       << "with init_mode and init_motion_after";
   EXPECT_EQ(keysChanging("Health"), memberCount<HealthOptions>());
   EXPECT_EQ(keysChanging("Rest on the way"), memberCount<RestOptions>());
-  EXPECT_EQ(keysChanging("IMU"), memberCount<ImuNoise>() + 2) << "with gravity and max_imu_gap";
+  EXPECT_EQ(keysChanging("IMU"), memberCount<ImuNoise>() + 1) << "with gravity";
+  EXPECT_EQ(keysChanging("What sensors"), memberCount<ImuGateOptions>() + 2)
+      << "with max_imu_gap, max_radar_gap";
   EXPECT_EQ(keysChanging("T_IR"), memberCount<Extrinsics>() + 1) << "with extrinsics_source";
-  EXPECT_EQ(memberCount<OdometryOptions>(), 15u)
+  EXPECT_EQ(memberCount<OdometryOptions>(), 17u)
       << "a new member needs keys in src/ros/parameter_registry.cpp";
   EXPECT_EQ(memberCount<PointCloudFormat>() - 1, memberCount<PointCloudOverrides>()) << "all but its name";
 }

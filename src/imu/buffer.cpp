@@ -32,6 +32,8 @@ ImuMeasurement ImuBuffer::at(Time time) const {
     const double share = (time - a.time) / (b.time - a.time);
     result.angular_velocity = a.angular_velocity + share * (b.angular_velocity - a.angular_velocity);
     result.acceleration = a.acceleration + share * (b.acceleration - a.acceleration);
+    result.gyro_doubt = b.gyro_doubt;
+    result.accel_doubt = b.accel_doubt;
   }
   result.time = time;
   return result;

@@ -64,12 +64,25 @@ void Navigator::propagate(const ImuMeasurement& from, const ImuMeasurement& to) 
   addNoise(S::kV, noise_.accel_density);
   addNoise(S::kBg, noise_.gyro_random_walk);
   addNoise(S::kBa, noise_.accel_random_walk);
+  if (to.gyro_doubt > 0.0 || to.accel_doubt > 0.0) addDoubt(to, dt);
 
   x.p_W += dt * x.v_W + 0.5 * dt * dt * a_W;
   x.v_W += dt * a_W;
   x.q_WI = (x.q_WI * half * half).normalized();
   x.angular_velocity = to.angular_velocity - x.b_g;
   x.time = to.time;
+}
+
+void Navigator::addDoubt(const ImuMeasurement& imu, double dt) {
+  using S = StateBlock;
+  StateCovariance& P = state_->covariance;
+  const double q = imu.accel_doubt;
+  P.diagonal().segment<3>(S::kTheta).array() += imu.gyro_doubt * dt;
+  P.diagonal().segment<3>(S::kV).array() += q * dt;
+  // A gap is one long step: what the velocity gains on the way moves the position too.
+  P.diagonal().segment<3>(S::kP).array() += q * dt * dt * dt / 3.0;
+  P.block<3, 3>(S::kP, S::kV).diagonal().array() += q * dt * dt / 2.0;
+  P.block<3, 3>(S::kV, S::kP).diagonal().array() += q * dt * dt / 2.0;
 }
 
 }  // namespace rio_t

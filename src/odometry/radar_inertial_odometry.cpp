@@ -43,6 +43,7 @@ struct RadarInertialOdometry::Impl {
       : options(options_in),
         g_W(0.0, 0.0, -options.gravity),
         R_RI(options.T_IR.q_IR.conjugate().toRotationMatrix()),
+        imu_gate(options.max_imu_gap, options.imu_gate),
         navigator(options.imu_noise, g_W),
         initializer(options),
         recovery(options),
@@ -50,11 +51,15 @@ struct RadarInertialOdometry::Impl {
         feasibility(options.feasibility),
         offset_monitor(options.offset_monitor, options.smoother.time_offset_initial),
         health_monitor(options.health, options.smoother.innovation_gate),
-        smoother(options.smoother, options.imu_noise, g_W, imu) {
+        smoother(emptySmoother()) {
     waiting_for = initializer.waitingFor();
   }
 
+  FixedLagSmoother emptySmoother() const { return {options.smoother, options.imu_noise, g_W, imu}; }
   void drainInbox();
+  void startAgain();
+  void watchRadar(bool scan_came);
+  void anchorNavigator(const NavigationState& state);
   void tryInitialize(const ImuMeasurement& sample);
   void begin(Time time, const NodePrior& prior);
   /// The poses of the window that is given up go to `left`.
@@ -73,6 +78,9 @@ struct RadarInertialOdometry::Impl {
   std::optional<ScanResult> tryScan(const RadarScan& scan, bool imu_has_ended);
   void updateWindow(ScanResult& result);
   NavigationState newestState(const NodeMatrix& covariance) const;
+  /// Nothing observes the yaw: what it lost where the IMU was blind stays lost, whatever a window that was
+  /// linearised at other yaws makes of it.
+  void keepYawDoubt(NavigationState& state) const;
 
   const OdometryOptions options;
   const Eigen::Vector3d g_W;
@@ -81,13 +89,15 @@ struct RadarInertialOdometry::Impl {
 
   // The navigation half; guarded by navigation_mutex, held for microseconds.
   std::mutex navigation_mutex;
+  ImuGate imu_gate;
   Navigator navigator;
-  std::optional<Time> newest_imu;
+  std::uint64_t clock_restarts = 0;  ///< how often the time of the IMU started again
 
   // From the feeding threads to the optimisation half; guarded by inbox_mutex.
   mutable std::mutex inbox_mutex;
   std::vector<ImuMeasurement> imu_inbox;
   std::vector<RadarScan> scan_inbox;
+  std::uint64_t inbox_clock_restarts = 0;  ///< imu_inbox is from after that many
   bool is_initialized = false;
   std::string waiting_for;
   Health health = Health::kOk;
@@ -105,8 +115,13 @@ struct RadarInertialOdometry::Impl {
   std::optional<Start> start;
   Time initialized_at;
   PoseDoubt pose_doubt;
-  Time last_used;  ///< stamp of the last scan that went into the window
+  Time last_used;          ///< stamp of the last scan that went into the window
+  double yaw_doubt = 0.0;  ///< [rad^2] gained since the start where the IMU was blind
+  Eigen::Vector3d yaw_doubt_at = Eigen::Vector3d::Zero();  ///< where it was gained last, in W [m]
   std::vector<ImuMeasurement> imu_drained;
+  std::uint64_t clock_restarts_done = 0;
+  std::optional<Time> radar_heard;  ///< IMU time when a scan came last
+  bool radar_is_silent = false;
 };
 
 RadarInertialOdometry::RadarInertialOdometry(const OdometryOptions& options)
@@ -115,24 +130,29 @@ RadarInertialOdometry::~RadarInertialOdometry() = default;
 RadarInertialOdometry::RadarInertialOdometry(RadarInertialOdometry&&) noexcept = default;
 RadarInertialOdometry& RadarInertialOdometry::operator=(RadarInertialOdometry&&) noexcept = default;
 
-std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasurement& sample) {
+std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasurement& measured) {
   Impl& m = *impl_;
-  if (!sample.angular_velocity.allFinite() || !sample.acceleration.allFinite()) {
-    m.faults.count("imu_not_finite");
-    return std::nullopt;
-  }
+  ImuMeasurement sample = measured;
   std::optional<NavigationState> state;
+  std::uint64_t clock_restarts = 0;
   {
     const std::lock_guard<std::mutex> lock(m.navigation_mutex);
-    if (m.newest_imu && sample.time <= *m.newest_imu) {
-      m.faults.count("imu_out_of_order");
-      return std::nullopt;
+    const ImuGate::Verdict verdict = m.imu_gate.check(sample);
+    for (const char* fault : verdict.faults) m.faults.count(fault);
+    if (verdict.decision == ImuGate::Decision::kDrop) return std::nullopt;
+    if (verdict.decision == ImuGate::Decision::kRestart) {
+      m.navigator = Navigator(m.options.imu_noise, m.g_W);
+      ++m.clock_restarts;
     }
-    if (m.newest_imu && sample.time - *m.newest_imu > m.options.max_imu_gap) m.faults.count("imu_gap");
-    m.newest_imu = sample.time;
+    clock_restarts = m.clock_restarts;
     state = m.navigator.add(sample);
   }
   const std::lock_guard<std::mutex> lock(m.inbox_mutex);
+  if (m.inbox_clock_restarts != clock_restarts) {
+    m.inbox_clock_restarts = clock_restarts;
+    m.imu_inbox.clear();
+    m.is_initialized = false;
+  }
   m.imu_inbox.push_back(sample);
   return state;
 }
@@ -182,20 +202,67 @@ std::vector<ScanResult> RadarInertialOdometry::finish() {
 
 void RadarInertialOdometry::Impl::drainInbox() {
   imu_drained.clear();
+  bool clock_restarted = false;
+  bool scan_came = false;
   {
     const std::lock_guard<std::mutex> lock(inbox_mutex);
+    clock_restarted = inbox_clock_restarts != clock_restarts_done;
+    clock_restarts_done = inbox_clock_restarts;
+    scan_came = !scan_inbox.empty();
     std::swap(imu_drained, imu_inbox);
     for (RadarScan& scan : scan_inbox) waiting_scans.push_back(std::move(scan));
     scan_inbox.clear();
   }
+  if (clock_restarted) startAgain();
   for (const ImuMeasurement& sample : imu_drained) {
+    if (sample.gyro_doubt > 0.0 && smoother.size() > 0) {
+      yaw_doubt += sample.gyro_doubt * (sample.time - imu.newest());
+      yaw_doubt_at = smoother.newest().x.p_W();
+    }
     imu.add(sample);
     if (smoother.size() == 0) tryInitialize(sample);
   }
+  watchRadar(scan_came);
   if (smoother.size() == 0) return;
   const bool keep_for_recovery = options.health.on_divergence == OnDivergence::kReinitialize;
   const Time needed = smoother.imuNeededSince();
   imu.dropBefore(keep_for_recovery ? std::min(needed, imu.newest() - recovery.imuHistory()) : needed);
+}
+
+/// The IMU's clock jumped: nothing before can be related to what comes. The scans that wait are rejected, as
+/// those before an initialisation.
+void RadarInertialOdometry::Impl::startAgain() {
+  imu.clear();
+  // Nobody stands still because a clock jumped.
+  OdometryOptions at_once = options;
+  at_once.init_motion_after = 0.0;
+  initializer = Initializer(at_once);
+  feasibility = FeasibilityCheck(options.feasibility);
+  offset_monitor = OffsetMonitor(options.offset_monitor, options.smoother.time_offset_initial);
+  smoother = emptySmoother();
+  recovery.clear();
+  health_monitor = HealthMonitor(options.health, options.smoother.innovation_gate);
+  pose_doubt = PoseDoubt();
+  radar_heard.reset();
+}
+
+/// Counts times without radar, by the IMU's clock at the arrival of scans: the scans' own stamps may be
+/// wrong.
+void RadarInertialOdometry::Impl::watchRadar(bool scan_came) {
+  if (imu.empty()) return;
+  if (scan_came || !radar_heard) {
+    radar_heard = imu.newest();
+    radar_is_silent = false;
+  } else if (!radar_is_silent && imu.newest() - *radar_heard > options.max_radar_gap) {
+    faults.count("radar_gap");
+    radar_is_silent = true;
+  }
+}
+
+void RadarInertialOdometry::Impl::anchorNavigator(const NavigationState& state) {
+  const std::lock_guard<std::mutex> lock(navigation_mutex);
+  // Else the navigator lives already in another time.
+  if (clock_restarts == clock_restarts_done) navigator.anchor(state);
 }
 
 void RadarInertialOdometry::Impl::tryInitialize(const ImuMeasurement& sample) {
@@ -213,6 +280,7 @@ void RadarInertialOdometry::Impl::tryInitialize(const ImuMeasurement& sample) {
 
 void RadarInertialOdometry::Impl::begin(Time time, const NodePrior& prior) {
   smoother.initialize(time, prior);
+  yaw_doubt = 0.0;
   initialized_at = time;
   last_used = time;
   health_monitor.startedAt(time);
@@ -220,9 +288,7 @@ void RadarInertialOdometry::Impl::begin(Time time, const NodePrior& prior) {
 }
 
 void RadarInertialOdometry::Impl::publishNewest() {
-  const NavigationState state = newestState(smoother.newestCovariance());
-  const std::lock_guard<std::mutex> lock(navigation_mutex);
-  navigator.anchor(state);
+  anchorNavigator(newestState(smoother.newestCovariance()));
 }
 
 bool RadarInertialOdometry::Impl::tryReinitialize(std::vector<StampedPose>& left) {
@@ -391,8 +457,7 @@ void RadarInertialOdometry::Impl::updateWindow(ScanResult& result) {
       offset_monitor.movedFar(result.time_offset, result.time_offset_sigma)) {
     smoother.loosenTimeOffset();
   }
-  const std::lock_guard<std::mutex> lock(navigation_mutex);
-  navigator.anchor(result.state);
+  anchorNavigator(result.state);
 }
 
 NavigationState RadarInertialOdometry::Impl::newestState(const NodeMatrix& covariance) const {
@@ -406,9 +471,26 @@ NavigationState RadarInertialOdometry::Impl::newestState(const NodeMatrix& covar
   state.b_a = newest.x.b_a();
   state.angular_velocity = imu.at(newest.time).angular_velocity - state.b_g;
   state.covariance = covariance.topLeftCorner<StateBlock::kTangent, StateBlock::kTangent>();
+  keepYawDoubt(state);
   pose_doubt.addTo(state);
   health_monitor.widen(state);
   return state;
+}
+
+void RadarInertialOdometry::Impl::keepYawDoubt(NavigationState& state) const {
+  if (yaw_doubt == 0.0) return;
+  const Eigen::Vector3d up_W = Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d up_I = state.q_WI.conjugate() * up_W;
+  const double missing =
+      yaw_doubt - up_I.dot(state.covariance.block<3, 3>(StateBlock::kTheta, StateBlock::kTheta) * up_I);
+  if (missing <= 0.0) return;
+  // How the state moves when W turns about the vertical through the place where the yaw was lost.
+  Eigen::Matrix<double, StateBlock::kTangent, 1> turn =
+      Eigen::Matrix<double, StateBlock::kTangent, 1>::Zero();
+  turn.segment<3>(StateBlock::kTheta) = up_I;
+  turn.segment<3>(StateBlock::kP) = up_W.cross(state.p_W - yaw_doubt_at);
+  turn.segment<3>(StateBlock::kV) = up_W.cross(state.v_W);
+  state.covariance += missing * turn * turn.transpose();
 }
 
 bool RadarInertialOdometry::initialized() const {

@@ -106,8 +106,26 @@ void listImu(ParameterList& list, Config& c) {
               "random walk of the accelerometer's bias");
   list.number("imu_gyro_random_walk", "rad/s^2/sqrt(Hz)", above(0), c.odometry.imu_noise.gyro_random_walk,
               "random walk of the gyro's bias");
+}
+
+void listGaps(ParameterList& list, Config& c) {
+  ImuGateOptions& gate = c.odometry.imu_gate;
+  list.group("What sensors may leave out");
   list.number("max_imu_gap", "s", above(0), c.odometry.max_imu_gap,
-              "longest time between samples that is not reported");
+              "between samples; over a longer gap the uncertainty grows, and it is reported");
+  list.number("max_bridged_imu_gap", "s", above(0), gate.max_bridged_gap,
+              "after a longer one, or where the stamps run back, the estimate starts again");
+  list.number("imu_jump_patience", "s", above(0), gate.jump_patience,
+              "samples stamped elsewhere are dropped this long, then it is their clock that jumped");
+  list.number("imu_accel_range", "m/s^2", atLeast(0), gate.accel_range,
+              "largest reading of an axis; 0: found from flat tops");
+  list.number("imu_gyro_range", "rad/s", atLeast(0), gate.gyro_range,
+              "largest reading of an axis; 0: found from flat tops");
+  list.number("imu_unseen_accel_density", "m/s^2/sqrt(Hz)", above(0), gate.unseen_accel_density,
+              "noise that stands for the motion in gaps and beyond the range");
+  list.number("imu_unseen_gyro_density", "rad/s/sqrt(Hz)", above(0), gate.unseen_gyro_density, "likewise");
+  list.number("max_radar_gap", "s", above(0), c.odometry.max_radar_gap,
+              "without a scan that is not reported");
 }
 
 void listInitialization(ParameterList& list, Config& c) {
@@ -325,6 +343,7 @@ ParameterList parametersOf(Config& config) {
   listPointCloud(list, config);
   listExtrinsics(list, config);
   listImu(list, config);
+  listGaps(list, config);
   listInitialization(list, config);
   listRest(list, config);
   listEgoVelocity(list, config);

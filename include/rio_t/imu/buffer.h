@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <deque>
+#include <type_traits>
 
 #include "rio_t/imu/measurement.h"
 
@@ -31,7 +32,8 @@ class ImuBuffer {
 
   /// Calls step(dt, angular_velocity, acceleration) for each interval between samples from `from` to `to`,
   /// with the mean of both ends; the ends at `from` and `to` are interpolated. Backwards with dt < 0 where
-  /// `to` < `from`.
+  /// `to` < `from`. A step that takes a fourth argument gets the later of the two ends, whose doubts are
+  /// those of the interval.
   template <typename Step>
   void forEachInterval(Time from, Time to, Step&& step) const;
 
@@ -54,8 +56,13 @@ void ImuBuffer::forEachInterval(Time from, Time to, Step&& step) const {
   const auto interval = [&](const ImuMeasurement& a, const ImuMeasurement& b) {
     const double dt = b.time - a.time;
     if (dt == 0.0) return;
-    step(dt, Eigen::Vector3d(0.5 * (a.angular_velocity + b.angular_velocity)),
-         Eigen::Vector3d(0.5 * (a.acceleration + b.acceleration)));
+    const Eigen::Vector3d gyro = 0.5 * (a.angular_velocity + b.angular_velocity);
+    const Eigen::Vector3d accel = 0.5 * (a.acceleration + b.acceleration);
+    if constexpr (std::is_invocable_v<Step, double, Eigen::Vector3d, Eigen::Vector3d, ImuMeasurement>) {
+      step(dt, gyro, accel, dt > 0.0 ? b : a);
+    } else {
+      step(dt, gyro, accel);
+    }
   };
   ImuMeasurement previous = at(from);
   if (from < to) {

@@ -12,6 +12,11 @@ struct ImuMeasurement {
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< [rad/s], bias included
   /// Specific force [m/s^2], bias included: +g on the upward axis at rest.
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();
+
+  // What the interval that ends with this sample does not show (a gap, saturated axes), as squared densities
+  // of white noise per axis. They add to those of ImuNoise; see ImuGate.
+  double gyro_doubt = 0.0;   ///< [rad^2/s]
+  double accel_doubt = 0.0;  ///< [m^2/s^3]
 };
 
 }  // namespace rio_t

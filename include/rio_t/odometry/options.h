@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 
+#include "rio_t/imu/gate.h"
 #include "rio_t/imu/noise.h"
 #include "rio_t/imu/rest_detector.h"
 #include "rio_t/imu/static_initializer.h"
@@ -42,7 +43,10 @@ struct OdometryOptions {
   SmootherOptions smoother;
   OffsetMonitorOptions offset_monitor;
   HealthOptions health;
-  double max_imu_gap = 0.1;           ///< [s] between samples; a longer one is reported and bridged
+  /// [s] between samples; over a longer one the uncertainty grows, and it is reported
+  double max_imu_gap = 0.04;
+  ImuGateOptions imu_gate;
+  double max_radar_gap = 0.5;         ///< [s] without a scan that is not reported
   std::size_t max_queued_scans = 50;  ///< scans that may wait for the IMU or the solver
 };
 

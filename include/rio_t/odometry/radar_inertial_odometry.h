@@ -50,8 +50,9 @@ class RadarInertialOdometry {
   RadarInertialOdometry& operator=(RadarInertialOdometry&&) noexcept;
 
   /// State at this sample, from the newest optimised state: what a live user gets. None before
-  /// initialisation. A sample that is not later than the one before, or not finite, is dropped and counted in
-  /// `faults()`.
+  /// initialisation. Samples that are out of place in time, or not finite, are dropped and counted in
+  /// `faults()`, as are gaps and saturated samples, over which the uncertainty grows (see ImuGate). Where the
+  /// IMU's clock jumps, all starts again with an initialisation.
   std::optional<NavigationState> addImu(const ImuMeasurement& imu);
 
   /// Queues a scan. It waits until the IMU covers its time of measurement.

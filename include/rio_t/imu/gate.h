@@ -1,0 +1,57 @@
+#pragma once
+
+#include <vector>
+
+#include "rio_t/imu/measurement.h"
+#include "rio_t/imu/saturation_detector.h"
+#include "rio_t/imu/stamp_watch.h"
+
+namespace rio_t {
+
+struct ImuGateOptions {
+  double max_bridged_gap = 3.0;  ///< [s] after a longer one nothing is known: the estimate starts again
+  double jump_patience = 0.5;  ///< [s] of stamps that run elsewhere, after which their clock must have jumped
+  double accel_range = 0.0;    ///< [m/s^2] largest reading of an axis; 0: found from flat tops
+  double gyro_range = 0.0;     ///< [rad/s] likewise
+  /// Motion that the IMU does not see, in gaps and beyond its range, as white noise: what people and drones
+  /// do.
+  double unseen_accel_density = 2.0;  ///< [m/s^2/sqrt(Hz)]
+  double unseen_gyro_density = 0.5;   ///< [rad/s/sqrt(Hz)]
+};
+
+/// The door for IMU samples: drops what cannot be used, and writes into the others how much of the motion
+/// they miss. Not thread-safe.
+///
+/// A signal with a correlation time tau deviates from the straight line over a gap of T << tau by far less
+/// than over a long one; so the density of a gap is the full one times min(1, T / tau), tau = 0.5 s.
+class ImuGate {
+ public:
+  enum class Decision {
+    kTake,
+    kDrop,
+    kRestart,  ///< take it, and forget all before it: the clock jumped, or the IMU was silent for too long
+  };
+  struct Verdict {
+    Decision decision = Decision::kTake;
+    std::vector<const char*> faults;  ///< snake case: "imu_not_finite", "imu_out_of_order", "imu_stamp_jump",
+                                      ///< "imu_clock_restart", "imu_gap", "imu_saturated"
+  };
+
+  /// `max_gap` [s] between samples: a longer one is reported, and what it hides is doubted.
+  ImuGate(double max_gap, const ImuGateOptions& options);
+  /// Sets the doubts of `imu` where it is taken.
+  Verdict check(ImuMeasurement& imu);
+
+ private:
+  void doubtGyro(ImuMeasurement& imu, double share) const;
+  void doubtAccel(ImuMeasurement& imu, double share) const;
+
+  double max_gap_;  // read-only after construction, as the next
+  ImuGateOptions options_;
+  StampWatch stamps_;
+  SaturationDetector saturation_;
+  std::optional<Time> newest_;
+  SaturationDetector::Saturated was_saturated_;
+};
+
+}  // namespace rio_t

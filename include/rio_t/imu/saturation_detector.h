@@ -1,0 +1,37 @@
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "rio_t/imu/measurement.h"
+
+namespace rio_t {
+
+/// Finds samples of an IMU that stand at the end of its range. Not thread-safe.
+///
+/// Where the range is not told, it shows as a flat top: an axis reads its largest value of some seconds,
+/// either sign, five times in a row, far from what it read at first. Once seen, that value is the end of the
+/// range until a sample exceeds it.
+class SaturationDetector {
+ public:
+  /// Largest readings [m/s^2, rad/s]; 0: not known.
+  SaturationDetector(double accel_range, double gyro_range);
+  struct Saturated {
+    bool accel = false, gyro = false;
+  };
+  Saturated check(const ImuMeasurement& imu);
+
+ private:
+  struct Axis {
+    std::optional<double> first, last, limit;
+    double largest = 0.0, largest_before = 0.0;  ///< of |reading|, in this stretch and the one before
+    int stretch = 0;                             ///< samples of this stretch
+    int repeated = 0;
+    bool isSaturated(double reading, double range, double far_from_first);
+  };
+
+  double accel_range_, gyro_range_;  // read-only after construction
+  std::array<Axis, 6> axes_;         ///< accelerometer, gyro
+};
+
+}  // namespace rio_t

@@ -1,0 +1,61 @@
+#include "rio_t/imu/gate.h"
+
+#include <algorithm>
+
+namespace rio_t {
+namespace {
+
+constexpr double kCorrelationTime = 0.5;  // [s] tau of the motion
+
+}  // namespace
+
+ImuGate::ImuGate(double max_gap, const ImuGateOptions& options)
+    : max_gap_(max_gap),
+      options_(options),
+      stamps_(options.max_bridged_gap, options.jump_patience),
+      saturation_(options.accel_range, options.gyro_range) {}
+
+ImuGate::Verdict ImuGate::check(ImuMeasurement& imu) {
+  if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite())
+    return {Decision::kDrop, {"imu_not_finite"}};
+
+  Verdict verdict;
+  switch (stamps_.check(imu.time)) {
+    case StampWatch::Verdict::kGood:
+      break;
+    case StampWatch::Verdict::kBehind:
+      return {Decision::kDrop, {"imu_out_of_order"}};
+    case StampWatch::Verdict::kAhead:
+      return {Decision::kDrop, {"imu_stamp_jump"}};
+    case StampWatch::Verdict::kRestart:
+      verdict = {Decision::kRestart, {"imu_clock_restart"}};
+      newest_.reset();
+      break;
+  }
+  const double gap = newest_ ? imu.time - *newest_ : 0.0;
+  newest_ = imu.time;
+  if (gap > max_gap_) {
+    verdict.faults.push_back("imu_gap");
+    doubtGyro(imu, std::min(1.0, gap / kCorrelationTime));
+    doubtAccel(imu, std::min(1.0, gap / kCorrelationTime));
+  }
+  // The interval before and the one after a saturated sample both hide something.
+  const SaturationDetector::Saturated saturated = saturation_.check(imu);
+  if (saturated.accel || saturated.gyro) verdict.faults.push_back("imu_saturated");
+  if (saturated.gyro || was_saturated_.gyro) doubtGyro(imu, 1.0);
+  if (saturated.accel || was_saturated_.accel) doubtAccel(imu, 1.0);
+  was_saturated_ = saturated;
+  return verdict;
+}
+
+void ImuGate::doubtGyro(ImuMeasurement& imu, double share) const {
+  const double density = share * options_.unseen_gyro_density;
+  imu.gyro_doubt = std::max(imu.gyro_doubt, density * density);
+}
+
+void ImuGate::doubtAccel(ImuMeasurement& imu, double share) const {
+  const double density = share * options_.unseen_accel_density;
+  imu.accel_doubt = std::max(imu.accel_doubt, density * density);
+}
+
+}  // namespace rio_t

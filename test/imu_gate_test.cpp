@@ -1,0 +1,188 @@
+// What IMU samples are let through, and how much they are believed.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "rio_t/imu/gate.h"
+#include "rio_t/imu/preintegration.h"
+#include "synthetic_motion.h"
+
+namespace rio_t {
+namespace {
+
+using Decision = ImuGate::Decision;
+using Faults = std::vector<const char*>;
+
+std::string names(const Faults& faults) {
+  std::string all;
+  for (const char* fault : faults) all += (all.empty() ? "" : " ") + std::string(fault);
+  return all;
+}
+
+/// A gate that has seen a second of a motion at 100 Hz.
+class Gate : public ::testing::Test {
+ protected:
+  Gate() : gate(0.04, ImuGateOptions()) {
+    for (; t < 1.0; t += 0.01) EXPECT_EQ(feed(t), "");
+  }
+  /// The faults that are told.
+  std::string feed(double seconds) { return feed(motion.imuSample(seconds)); }
+  std::string feed(const ImuMeasurement& imu) {
+    sample = imu;
+    const ImuGate::Verdict verdict = gate.check(sample);
+    decision = verdict.decision;
+    return names(verdict.faults);
+  }
+  SyntheticMotion motion;
+  ImuGate gate;
+  double t = 0.0;
+  ImuMeasurement sample;
+  Decision decision = Decision::kTake;
+};
+
+TEST_F(Gate, GoodSamplesPassUnchanged) {
+  EXPECT_EQ(feed(1.0), "");
+  EXPECT_EQ(decision, Decision::kTake);
+  EXPECT_EQ(sample.gyro_doubt, 0.0);
+  EXPECT_EQ(sample.accel_doubt, 0.0);
+}
+
+TEST_F(Gate, SamplesOutOfPlaceAreDroppedAndTheOthersGoOn) {
+  EXPECT_EQ(feed(0.5), "imu_out_of_order");
+  EXPECT_EQ(decision, Decision::kDrop);
+  EXPECT_EQ(feed(0.99), "imu_out_of_order") << "a stamp twice";
+  EXPECT_EQ(feed(1000.0), "imu_stamp_jump");
+  EXPECT_EQ(decision, Decision::kDrop);
+  EXPECT_EQ(feed(-1000.0), "imu_out_of_order");
+  ImuMeasurement bad = motion.imuSample(1.0);
+  bad.angular_velocity.y() = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(feed(bad), "imu_not_finite");
+  EXPECT_EQ(decision, Decision::kDrop);
+  EXPECT_EQ(feed(1.0), "");
+  EXPECT_EQ(decision, Decision::kTake);
+}
+
+TEST_F(Gate, StampsThatRunElsewhereMakeAJumpOnlyAfterAWhile) {
+  for (const double jump : {500.0, -700.0, 300.0}) {
+    t += jump;
+    const double begin = t;
+    for (; t < begin + 0.495; t += 0.01) {
+      feed(t);
+      ASSERT_EQ(decision, Decision::kDrop) << t;
+    }
+    EXPECT_EQ(feed(t), "imu_clock_restart");
+    EXPECT_EQ(decision, Decision::kRestart);
+    EXPECT_EQ(sample.gyro_doubt, 0.0);
+    EXPECT_EQ(feed(t + 0.01), "");
+    EXPECT_EQ(decision, Decision::kTake);
+    t += 0.02;
+  }
+}
+
+TEST_F(Gate, AShortGlitchOfTheStampsIsAGap) {
+  for (double glitch = 0.0; glitch < 0.3; glitch += 0.01) EXPECT_EQ(feed(101.0 + glitch), "imu_stamp_jump");
+  EXPECT_EQ(feed(1.3), "imu_gap");
+  EXPECT_EQ(decision, Decision::kTake);
+  EXPECT_GT(sample.gyro_doubt, 0.0);
+}
+
+TEST_F(Gate, DoubtGrowsWithTheGap) {
+  EXPECT_EQ(feed(1.05), "imu_gap");
+  const double small = sample.accel_doubt;
+  EXPECT_GT(small, 0.0);
+  EXPECT_EQ(feed(2.0), "imu_gap");
+  EXPECT_NEAR(sample.accel_doubt,
+              ImuGateOptions().unseen_accel_density * ImuGateOptions().unseen_accel_density, 1e-12);
+  EXPECT_LT(small, 0.1 * sample.accel_doubt);
+}
+
+// An accelerometer that ends at 1 m/s^2 beyond what it first read shows flat tops; the noise at rest does
+// not.
+TEST(Saturation, FlatTopsAreFoundWithoutKnowingTheRange) {
+  SyntheticMotion motion;
+  SaturationDetector detector(0.0, 0.0);
+  const Eigen::Vector3d limit =
+      motion.imuSample(0.0).acceleration.cwiseAbs() + Eigen::Vector3d::Constant(1.0);
+  int beyond = 0, found = 0, false_alarms = 0;
+  for (int i = 0; i < 2000; ++i) {
+    ImuMeasurement imu = motion.imuSample(0.005 * i);
+    const bool clipped = (imu.acceleration.cwiseAbs().array() >= limit.array()).any();
+    imu.acceleration = imu.acceleration.cwiseMin(limit).cwiseMax(-limit);
+    const bool saturated = detector.check(imu).accel;
+    beyond += clipped ? 1 : 0;
+    found += clipped && saturated ? 1 : 0;
+    false_alarms += !clipped && saturated ? 1 : 0;
+  }
+  ASSERT_GT(beyond, 100);
+  EXPECT_GT(found, beyond - 20) << "of " << beyond;
+  EXPECT_EQ(false_alarms, 0);
+}
+
+TEST(Saturation, ARestingSensorWithCoarseStepsIsNotSaturated) {
+  SaturationDetector detector(0.0, 0.0);
+  ImuMeasurement imu;
+  for (int i = 0; i < 1000; ++i) {
+    imu.acceleration = {0.0, 0.01 * (i / 7 % 3), 9.81 + 0.01 * (i / 5 % 2)};
+    imu.angular_velocity = {0.0, 7e-4 * (i / 4 % 3), 0.0};
+    const auto saturated = detector.check(imu);
+    ASSERT_FALSE(saturated.accel || saturated.gyro) << i;
+  }
+}
+
+TEST(Saturation, ALargerReadingTakesTheLimitBack) {
+  SaturationDetector detector(0.0, 0.0);
+  ImuMeasurement imu;
+  const auto gyro = [&](double rate) {
+    imu.angular_velocity.x() = rate;
+    return detector.check(imu).gyro;
+  };
+  EXPECT_FALSE(gyro(0.0));
+  for (int i = 0; i < 4; ++i) EXPECT_FALSE(gyro(1.0));
+  EXPECT_TRUE(gyro(1.0));
+  EXPECT_FALSE(gyro(0.5));
+  EXPECT_TRUE(gyro(-1.0)) << "the limit is known now, for both signs";
+  EXPECT_FALSE(gyro(1.5));
+  EXPECT_FALSE(gyro(1.0));
+}
+
+TEST(Saturation, AToldRangeHolds) {
+  SaturationDetector detector(20.0, 5.0);
+  ImuMeasurement imu;
+  EXPECT_FALSE(detector.check(imu).gyro);
+  imu.angular_velocity.z() = -5.0;
+  EXPECT_TRUE(detector.check(imu).gyro);
+  EXPECT_FALSE(detector.check(imu).accel);
+  imu.angular_velocity.z() = 0.0;
+  imu.acceleration.x() = 19.99;
+  EXPECT_TRUE(detector.check(imu).accel);
+  imu.acceleration.x() = 19.0;
+  for (int i = 0; i < 8; ++i) EXPECT_FALSE(detector.check(imu).accel) << "flat, but not at the range";
+}
+
+TEST(Preintegration, DoubtOfAnIntervalWidensWhatCrossesIt) {
+  const SyntheticMotion motion;
+  const auto covariance = [&](double gyro_doubt, double accel_doubt) {
+    ImuBuffer buffer;
+    for (int i = 0; i <= 20; ++i) {
+      ImuMeasurement imu = motion.imuSample(0.01 * i);
+      if (i == 10) {
+        imu.gyro_doubt = gyro_doubt;
+        imu.accel_doubt = accel_doubt;
+      }
+      buffer.add(imu);
+    }
+    // The middle of the doubtful interval, which ends at 0.1 s, is an end here.
+    return preintegrate(buffer, motion.time(0.0), motion.time(0.095), motion.b_g, motion.b_a, ImuNoise())
+        .covariance;
+  };
+  const auto usual = covariance(0.0, 0.0);
+  const auto doubtful = covariance(0.04, 9.0);
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_NEAR(doubtful(k, k) - usual(k, k), 0.04 * 0.005, 1e-9);
+    EXPECT_GT(doubtful(6 + k, 6 + k) - usual(6 + k, 6 + k), 9.0 * 0.005 - 1e-9);
+  }
+}
+
+}  // namespace
+}  // namespace rio_t
