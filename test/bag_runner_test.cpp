@@ -363,6 +363,26 @@ TEST_F(BagRunner, ZeroStampsAreNamedWithTheOtherSources) {
   expectError(run(), {"/sensor_platform/imu", "zero"});
 }
 
+TEST_F(BagRunner, ABadMessageAmongGoodOnesIsCountedAndSaid) {
+  writeBag({});
+  {
+    rosbag::Bag bag(bag_, rosbag::bagmode::Append);
+    sensor_msgs::PointCloud2 empty;  // without a stamp
+    bag.write("/sensor_platform/radar/scan", ros::Time(1005.0), empty);
+    sensor_msgs::Imu unstamped;
+    bag.write("/sensor_platform/imu", ros::Time(1005.0), unstamped);
+  }
+  const Outcome outcome = run();
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("/sensor_platform/radar/scan"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("/sensor_platform/imu: the stamp in the header is zero"), std::string::npos);
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 2) << outcome.err;
+  const std::string yaml = contents(out_ + "/summary.yaml");
+  EXPECT_NE(yaml.find("stamp_zero: 1"), std::string::npos) << yaml;
+  EXPECT_NE(yaml.find("imu_not_usable: 1"), std::string::npos) << yaml;
+  EXPECT_NE(yaml.find("scans_total: 81"), std::string::npos) << yaml;
+}
+
 TEST_F(BagRunner, NoDataInThePartPlayedIsNamed) {
   BagContents what;
   what.duration = 1.0;
