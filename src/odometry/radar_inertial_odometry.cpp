@@ -479,18 +479,26 @@ NavigationState RadarInertialOdometry::Impl::newestState(const NodeMatrix& covar
 
 void RadarInertialOdometry::Impl::keepYawDoubt(NavigationState& state) const {
   if (yaw_doubt == 0.0) return;
+  using S = StateBlock;
+  using Direction = Eigen::Matrix<double, S::kTangent, 1>;
   const Eigen::Vector3d up_W = Eigen::Vector3d::UnitZ();
   const Eigen::Vector3d up_I = state.q_WI.conjugate() * up_W;
-  const double missing =
-      yaw_doubt - up_I.dot(state.covariance.block<3, 3>(StateBlock::kTheta, StateBlock::kTheta) * up_I);
-  if (missing <= 0.0) return;
-  // How the state moves when W turns about the vertical through the place where the yaw was lost.
-  Eigen::Matrix<double, StateBlock::kTangent, 1> turn =
-      Eigen::Matrix<double, StateBlock::kTangent, 1>::Zero();
-  turn.segment<3>(StateBlock::kTheta) = up_I;
-  turn.segment<3>(StateBlock::kP) = up_W.cross(state.p_W - yaw_doubt_at);
-  turn.segment<3>(StateBlock::kV) = up_W.cross(state.v_W);
-  state.covariance += missing * turn * turn.transpose();
+  const Eigen::Vector3d from_there = state.p_W - yaw_doubt_at;
+  const double missing = yaw_doubt - up_I.dot(state.covariance.block<3, 3>(S::kTheta, S::kTheta) * up_I);
+  if (missing > 0.0) {
+    // How the state moves when W turns about the vertical through the place where the yaw was lost.
+    Direction turn = Direction::Zero();
+    turn.segment<3>(S::kTheta) = up_I;
+    turn.segment<3>(S::kP) = up_W.cross(from_there);
+    turn.segment<3>(S::kV) = up_W.cross(state.v_W);
+    state.covariance += missing * turn * turn.transpose();
+  }
+  // A yaw that may be wrong by a radian also shortens: with psi of variance s^2, 1 - cos(psi) is about psi^2
+  // / 2, whose mean square is 3 s^4 / 4. Not beyond what a turn can do.
+  Direction shorten = Direction::Zero();
+  shorten.segment<2>(S::kP) = from_there.head<2>();
+  shorten.segment<2>(S::kV) = state.v_W.head<2>();
+  state.covariance += std::min(0.75 * yaw_doubt * yaw_doubt, 1.5) * shorten * shorten.transpose();
 }
 
 bool RadarInertialOdometry::initialized() const {

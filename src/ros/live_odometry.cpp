@@ -12,9 +12,6 @@
 namespace rio_t {
 namespace {
 
-/// The IMU's stamps may be this much out of order [s]; farther back, time itself has jumped (a bag that
-/// loops).
-constexpr double kTimeJump = 1.0;
 constexpr double kWarnPeriod = 5.0;        // [s] between warnings of one kind
 constexpr double kDiagnosticPeriod = 1.0;  // [s]
 // Queues deep enough for seconds of input: nothing is lost while a callback is late.
@@ -36,7 +33,8 @@ LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& p
       private_node_(private_node),
       monitor_(config_),
       publisher_(config_, private_node),
-      options_(config_.odometry) {
+      options_(config_.odometry),
+      imu_stamps_(options_.imu_gate.max_bridged_gap, options_.imu_gate.jump_patience) {
   if (config_.extrinsics_source == ExtrinsicsSource::kTf) {
     monitor_.waitFor("the first scan, whose frame_id names the radar for tf");
     tf_.emplace();
@@ -112,8 +110,24 @@ void LiveOdometry::subscribe() {
   // diagnosis.
   const boost::function<void(const ros::WallTimerEvent&)> tell = [this](const ros::WallTimerEvent&) {
     diagnostics_->force_update();
+    tellFaults();
   };
   diagnostics_timer_ = service_node.createWallTimer(ros::WallDuration(kDiagnosticPeriod), tell);
+}
+
+void LiveOdometry::tellFaults() {
+  const Session now = session_.get();
+  if (!now) return;
+  if (faults_of_.lock() != now) {
+    faults_of_ = now;
+    faults_told_.clear();
+  }
+  for (const auto& [fault, count] : now->odometry().faults()) {
+    Told& told = faults_told_[fault];
+    if (count == told.count || secondsSince(told.at) < kWarnPeriod) continue;
+    ROS_WARN_STREAM(name_ << ": input fault " << fault << ", " << count << " so far");
+    told = {count, std::chrono::steady_clock::now()};
+  }
 }
 
 void LiveOdometry::wakeSolver() {
@@ -136,8 +150,8 @@ void LiveOdometry::startSession(const Extrinsics& T_IR) {
   session_.replace(std::make_shared<LiveSession>(config_, options));
 }
 
-void LiveOdometry::reset(const std::string& reason) {
-  ROS_WARN_STREAM(name_ << ": reset: " << reason << "; starts again, stand still");
+void LiveOdometry::reset(const std::string& reason, bool at_once) {
+  ROS_WARN_STREAM(name_ << ": reset: " << reason << "; starts again" << (at_once ? "" : ", stand still"));
   // Where it still waits for its extrinsics there is nothing to forget.
   if (session_.get()) {
     OdometryOptions options;
@@ -145,6 +159,7 @@ void LiveOdometry::reset(const std::string& reason) {
       const std::lock_guard<std::mutex> lock(mutex_);
       options = options_;
     }
+    if (at_once) options.init_motion_after = 0.0;
     session_.replace(std::make_shared<LiveSession>(config_, options));
   }
   monitor_.reset(reason);
@@ -155,11 +170,16 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
   monitor_.imu();
   try {
     const ImuMeasurement imu = toImuMeasurement(*event.getConstMessage(), config_.imu_topic);
-    if (newest_imu_ && *newest_imu_ - imu.time > kTimeJump) {
-      reset("the IMU's stamps jumped back by " + std::to_string(*newest_imu_ - imu.time) + " s");
-      newest_imu_.reset();
+    // The same judgement as the session's own, so that the whole session starts again, with what it stamps
+    // by.
+    const StampWatch::Verdict stamp = imu_stamps_.check(imu.time);
+    if (stamp == StampWatch::Verdict::kRestart) {
+      const double jump = imu.time - *newest_imu_;
+      reset(std::string("the IMU's stamps jumped ") + (jump < 0.0 ? "back" : "ahead") + " by " +
+                std::to_string(std::abs(jump)) + " s",
+            true);
     }
-    if (!newest_imu_ || imu.time > *newest_imu_) newest_imu_ = imu.time;
+    if (stamp == StampWatch::Verdict::kGood || stamp == StampWatch::Verdict::kRestart) newest_imu_ = imu.time;
     const Session now = session_.get();
     if (!now) {
       monitor_.dropped("imu_before_extrinsics");

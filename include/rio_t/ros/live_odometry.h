@@ -13,7 +13,9 @@
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_listener.h>
 
+#include <chrono>
 #include <condition_variable>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -59,9 +61,11 @@ class LiveOdometry {
   void lookUpExtrinsics(const std::string& cloud_frame);
   void startSession(const Extrinsics& T_IR);
   /// When it returns, nothing more is published of what was before. Any thread.
-  void reset(const std::string& reason);
+  /// `at_once`: does not wait for rest first.
+  void reset(const std::string& reason, bool at_once = false);
   void account(const LiveSession::Stamped& stamped);
   void wakeSolver();
+  void tellFaults();  ///< what is new among the faults of the input; input thread
   void tellHealth(const ScanResult& result) const;
   void solve();  ///< body of the optimisation thread
 
@@ -85,7 +89,15 @@ class LiveOdometry {
   bool stopping_ = false;
   double rate_sigma_ = 0.0;
 
-  std::optional<Time> newest_imu_;  // IMU thread only
+  struct Told {
+    std::uint64_t count = 0;
+    std::chrono::steady_clock::time_point at;
+  };
+  std::map<std::string, Told> faults_told_;  // input thread only, as the next
+  std::weak_ptr<LiveSession> faults_of_;     // whose faults these are
+
+  StampWatch imu_stamps_;           // IMU thread only, as the next
+  std::optional<Time> newest_imu_;  // of the good stamps
 
   ros::Subscriber imu_subscriber_, scan_subscriber_, trigger_subscriber_;
   ros::ServiceServer reset_server_, save_server_;
