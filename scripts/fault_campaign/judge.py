@@ -130,6 +130,8 @@ class Outcome:
         counts = dict(self.summary.get("input_faults") or {})
         for name, count in (self.summary.get("scans_rejected") or {}).items():
             counts[name] = counts.get(name, 0) + count
+        if self.summary.get("divergences"):
+            counts["diverged"] = self.summary["divergences"]
         return counts
 
 
