@@ -226,6 +226,21 @@ TEST_F(Smoother, AShortWindowEqualsALongOneWhereTheProblemIsNearlyLinear) {
   EXPECT_NEAR(std::log(a.newestCovariance()(15, 15) / b.newestCovariance()(15, 15)), 0.0, 0.1);
 }
 
+TEST_F(Smoother, APositionThatIsHardlyKnownStopsNothing) {
+  SmootherOptions options;
+  options.prior_sigma_position = 1e5;  // beside an IMU factor that knows it to a tenth of a millimetre
+  FixedLagSmoother smoother = make(options);
+  for (double stamp = 0.7; stamp < kEnd; stamp += 0.02) {
+    smoother.add(measurement(stamp, 0.03));
+    smoother.optimize();
+    smoother.marginalize();
+  }
+  EXPECT_NEAR(smoother.newest().t_O, 0.03, 2e-4);
+  const NodeMatrix& P = smoother.newestCovariance();
+  EXPECT_GT(std::sqrt(P(StateBlock::kP, StateBlock::kP)), 10.0);
+  EXPECT_LT(std::sqrt(P(StateBlock::kV, StateBlock::kV)), 0.1);
+}
+
 TEST_F(Smoother, ALateScanIsInsertedAtItsTime) {
   SmootherOptions options;
   FixedLagSmoother in_order = make(options), late = make(options);

@@ -13,6 +13,11 @@ constexpr int kStored = StateBlock::kSize;
 constexpr int kLinear = kState - 3;  // of the tangent after theta
 /// Smallest diagonal of a scaled Cholesky factor that still says something, as a square root of 1e-12.
 constexpr double kWellDetermined = 1e-6;
+/// After a long way hardly anything is known of the position: 1/(200 m)^2 beside the 1/(4 um)^2 of an IMU
+/// factor over 5 ms is within the rounding of a double, and an elimination may come out indefinite. Then the
+/// diagonal is lifted by as little as it takes.
+constexpr double kSmallestLift = 1e-15;
+constexpr double kLargestLift = 1e-9;
 
 /// Adds what stands in the order of storage, with an empty fourth row and column (see StateJacobian), to the
 /// part of a node's matrix that belongs to the states.
@@ -151,8 +156,13 @@ void ChainSystem::addStatePair(std::size_t k, const ImuFactor& factor, const dou
 
 NodeInformation eliminateFirst(const NodeMatrix& H00, const NodeMatrix& H01, const NodeVector& b0,
                                const NodeMatrix& H11, const NodeVector& b1) {
-  const Eigen::LLT<NodeMatrix> factor(H00);
-  if (factor.info() != Eigen::Success) throw std::runtime_error("chain: a node cannot be eliminated");
+  Eigen::LLT<NodeMatrix> factor(H00);
+  for (double lift = kSmallestLift; factor.info() != Eigen::Success; lift *= 10.0) {
+    if (lift > kLargestLift) throw std::runtime_error("chain: a node cannot be eliminated");
+    NodeMatrix lifted = H00;
+    lifted.diagonal() *= 1.0 + lift;
+    factor.compute(lifted);
+  }
   RowMajorNodeMatrix gain = H01;
   forwardSubstitute(factor.matrixLLT(), gain);
   NodeInformation result;
@@ -223,9 +233,16 @@ bool solve(const ChainSystem& system, double damping, ChainSolution* solution) {
   return true;
 }
 
+bool solveUndamped(const ChainSystem& system, ChainSolution* solution) {
+  bool solved = solve(system, 0.0, solution);
+  for (double lift = kSmallestLift; !solved && lift <= kLargestLift; lift *= 10.0)
+    solved = solve(system, lift, solution);
+  return solved;
+}
+
 NodeMatrix covarianceOfLast(const ChainSystem& system) {
   ChainSolution solution;
-  if (!solve(system, 0.0, &solution)) throw std::runtime_error("chain: the window is not determined");
+  if (!solveUndamped(system, &solution)) throw std::runtime_error("chain: the window is not determined");
   return solution.newest.solve(NodeMatrix::Identity());
 }
 

@@ -63,7 +63,8 @@ SolveReport WindowSolver::solve(Window& window, int max_iterations) {
   double damping = 0.0;
   linearize(window, &system_);
   for (report.iterations = 1;; ++report.iterations) {
-    const bool solved = rio_t::solve(system_, damping, &solution_);
+    const bool solved =
+        damping == 0.0 ? solveUndamped(system_, &solution_) : rio_t::solve(system_, damping, &solution_);
     report.converged = solved && damping == 0.0 && solution_.decrease < kConverged;
     if (report.converged) takeStep(solution_, window);
     if (report.converged || report.iterations >= max_iterations) break;

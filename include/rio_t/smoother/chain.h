@@ -68,6 +68,9 @@ struct ChainSolution {
 /// Solves (H + damping diag(H)) delta = -b. False where that matrix is not positive definite.
 bool solve(const ChainSystem& system, double damping, ChainSolution* solution);
 
+/// The same without damping, but for the little that a matrix needs which only rounding made indefinite.
+bool solveUndamped(const ChainSystem& system, ChainSolution* solution);
+
 /// Marginal covariance of the last node of the chain.
 NodeMatrix covarianceOfLast(const ChainSystem& system);
 
