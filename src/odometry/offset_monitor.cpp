@@ -6,13 +6,6 @@
 
 namespace rio_t {
 
-bool OffsetMonitor::movedFar(double t_O, double sigma) {
-  const double limit = options_.relinearization;
-  if (!options_.enabled || std::abs(t_O - t_O_learnt_at_) < limit || sigma > 0.5 * limit) return false;
-  t_O_learnt_at_ = t_O;
-  return true;
-}
-
 bool OffsetMonitor::stepped(Time stamp, const Eigen::Vector3d& innovation, const Eigen::Matrix3d& S,
                             const Eigen::Vector3d& J) {
   if (!options_.enabled) return false;
@@ -33,7 +26,7 @@ bool OffsetMonitor::stepped(Time stamp, const Eigen::Vector3d& innovation, const
   const double sigma = std::sqrt(scatter / information_);
   if (std::abs(change) < options_.significance * sigma || std::abs(change) < options_.min_change)
     return false;
-  *this = OffsetMonitor(options_, t_O_learnt_at_);
+  *this = OffsetMonitor(options_);
   return true;
 }
 

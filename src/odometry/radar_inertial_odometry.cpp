@@ -49,7 +49,7 @@ struct RadarInertialOdometry::Impl {
         recovery(options),
         ego_velocity_estimator(options.ego_velocity),
         feasibility(options.feasibility),
-        offset_monitor(options.offset_monitor, options.smoother.time_offset_initial),
+        offset_monitor(options.offset_monitor),
         health_monitor(options.health, options.smoother.innovation_gate),
         smoother(emptySmoother()) {
     waiting_for = initializer.waitingFor();
@@ -238,7 +238,7 @@ void RadarInertialOdometry::Impl::startAgain() {
   at_once.init_motion_after = 0.0;
   initializer = Initializer(at_once);
   feasibility = FeasibilityCheck(options.feasibility);
-  offset_monitor = OffsetMonitor(options.offset_monitor, options.smoother.time_offset_initial);
+  offset_monitor = OffsetMonitor(options.offset_monitor);
   smoother = emptySmoother();
   recovery.clear();
   health_monitor = HealthMonitor(options.health, options.smoother.innovation_gate);
@@ -300,7 +300,7 @@ bool RadarInertialOdometry::Impl::tryReinitialize(std::vector<StampedPose>& left
   }
   pose_doubt = PoseDoubt(newestState(smoother.newestCovariance()));
   begin(found->time, found->prior);
-  offset_monitor = OffsetMonitor(options.offset_monitor, found->prior.t_O0);
+  offset_monitor = OffsetMonitor(options.offset_monitor);
   updateHealth();
   faults.count("reinitialized");
   return true;
@@ -453,10 +453,6 @@ void RadarInertialOdometry::Impl::updateWindow(ScanResult& result) {
   result.time_offset_sigma = options.smoother.estimate_time_offset
                                  ? std::sqrt(covariance(StateBlock::kTangent, StateBlock::kTangent))
                                  : 0.0;
-  if (options.smoother.estimate_time_offset &&
-      offset_monitor.movedFar(result.time_offset, result.time_offset_sigma)) {
-    smoother.loosenTimeOffset();
-  }
   anchorNavigator(result.state);
 }
 

@@ -11,8 +11,6 @@ struct OffsetMonitorOptions {
   double memory = 4.0;         ///< [s] time constant of the average over scans
   double significance = 6.0;   ///< [sigma] of the offset that the innovations ask for, by itself
   double min_change = 5.0e-3;  ///< [s] smaller steps are left to the random walk of the offset
-  /// [s] An estimate that has come this far, and is sure to half of it, forgets what it learnt on the way.
-  double relinearization = 0.02;
 };
 
 /// Watches whether the scans still agree with the time offset: a driver that restarts may step it by many
@@ -23,17 +21,12 @@ struct OffsetMonitorOptions {
 /// variance 1 / sum(J' S^-1 J), scaled by how the innovations scatter against S (docs/method.md).
 class OffsetMonitor {
  public:
-  /// `t_O` [s]: where the estimate starts.
-  OffsetMonitor(const OffsetMonitorOptions& options, double t_O) : options_(options), t_O_learnt_at_(t_O) {}
+  explicit OffsetMonitor(const OffsetMonitorOptions& options) : options_(options) {}
 
   /// `innovation` [m/s], its covariance `S` without the offset's own uncertainty, `J` [m/s^2]; true where the
   /// offset must have stepped, and then the average starts anew.
   bool stepped(Time stamp, const Eigen::Vector3d& innovation, const Eigen::Matrix3d& S,
                const Eigen::Vector3d& J);
-  /// `t_O`, `sigma` [s]: the newest estimate; true where what was learnt of the offset was learnt too far
-  /// from it. The states that the window then had were placed and corrected with a wrong offset, and that
-  /// leaves a bias of some 5 % of the way: the paper's remedy is a second pass, this is the same on the way.
-  bool movedFar(double t_O, double sigma);
 
  private:
   OffsetMonitorOptions options_;  // read-only after construction
@@ -42,7 +35,6 @@ class OffsetMonitor {
   double projection_ = 0.0;   ///< sum J' S^-1 nu, fading
   double squares_ = 0.0;      ///< sum nu' S^-1 nu, fading
   double count_ = 0.0;        ///< sum 3, fading
-  double t_O_learnt_at_;      ///< [s]
 };
 
 }  // namespace rio_t
