@@ -6,9 +6,11 @@
 #include <mutex>
 #include <utility>
 
+#include "rio_t/odometry/fault_counters.h"
 #include "rio_t/odometry/initializer.h"
 #include "rio_t/odometry/navigator.h"
 #include "rio_t/odometry/pose_doubt.h"
+#include "rio_t/odometry/yaw_doubt.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
 
 namespace rio_t {
@@ -18,23 +20,6 @@ namespace {
 constexpr double kImuMargin = 0.01;
 /// A scan stamped further ahead of the newest IMU sample is nonsense, not early [s].
 constexpr double kMaxStampAhead = 1.0;
-
-/// Counters of faults by name; shared by both halves.
-class FaultCounters {
- public:
-  void count(const std::string& name) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    ++counts_[name];
-  }
-  std::map<std::string, std::uint64_t> get() const {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return counts_;
-  }
-
- private:
-  mutable std::mutex mutex_;
-  std::map<std::string, std::uint64_t> counts_;  // guarded by mutex_
-};
 
 }  // namespace
 
@@ -78,9 +63,6 @@ struct RadarInertialOdometry::Impl {
   std::optional<ScanResult> tryScan(const RadarScan& scan, bool imu_has_ended);
   void updateWindow(ScanResult& result);
   NavigationState newestState(const NodeMatrix& covariance) const;
-  /// Nothing observes the yaw: what it lost where the IMU was blind stays lost, whatever a window that was
-  /// linearised at other yaws makes of it.
-  void keepYawDoubt(NavigationState& state) const;
 
   const OdometryOptions options;
   const Eigen::Vector3d g_W;
@@ -115,9 +97,8 @@ struct RadarInertialOdometry::Impl {
   std::optional<Start> start;
   Time initialized_at;
   PoseDoubt pose_doubt;
-  Time last_used;          ///< stamp of the last scan that went into the window
-  double yaw_doubt = 0.0;  ///< [rad^2] gained since the start where the IMU was blind
-  Eigen::Vector3d yaw_doubt_at = Eigen::Vector3d::Zero();  ///< where it was gained last, in W [m]
+  YawDoubt yaw_doubt;
+  Time last_used;  ///< stamp of the last scan that went into the window
   std::vector<ImuMeasurement> imu_drained;
   std::uint64_t clock_restarts_done = 0;
   std::optional<Time> radar_heard;  ///< IMU time when a scan came last
@@ -185,157 +166,7 @@ std::vector<ScanResult> RadarInertialOdometry::process() {
   return results;
 }
 
-std::vector<ScanResult> RadarInertialOdometry::finish() {
-  Impl& m = *impl_;
-  std::vector<ScanResult> results = process();
-  for (const RadarScan& scan : m.waiting_scans) results.push_back(*m.tryScan(scan, true));
-  m.waiting_scans.clear();
-  if (!initialized()) return results;
-  // The poses still in the window belong to the last scan.
-  if (results.empty()) results.emplace_back();
-  for (std::size_t k = 0; k < m.smoother.size(); ++k) {
-    const NodeEstimate node = m.smoother.node(k);
-    results.back().left_window.push_back({node.time, node.x.p_W(), node.x.q_WI()});
-  }
-  return results;
-}
-
-void RadarInertialOdometry::Impl::drainInbox() {
-  imu_drained.clear();
-  bool clock_restarted = false;
-  bool scan_came = false;
-  {
-    const std::lock_guard<std::mutex> lock(inbox_mutex);
-    clock_restarted = inbox_clock_restarts != clock_restarts_done;
-    clock_restarts_done = inbox_clock_restarts;
-    scan_came = !scan_inbox.empty();
-    std::swap(imu_drained, imu_inbox);
-    for (RadarScan& scan : scan_inbox) waiting_scans.push_back(std::move(scan));
-    scan_inbox.clear();
-  }
-  if (clock_restarted) startAgain();
-  for (const ImuMeasurement& sample : imu_drained) {
-    if (sample.gyro_doubt > 0.0 && smoother.size() > 0) {
-      yaw_doubt += sample.gyro_doubt * (sample.time - imu.newest());
-      yaw_doubt_at = smoother.newest().x.p_W();
-    }
-    imu.add(sample);
-    if (smoother.size() == 0) tryInitialize(sample);
-  }
-  watchRadar(scan_came);
-  if (smoother.size() == 0) return;
-  const bool keep_for_recovery = options.health.on_divergence == OnDivergence::kReinitialize;
-  const Time needed = smoother.imuNeededSince();
-  imu.dropBefore(keep_for_recovery ? std::min(needed, imu.newest() - recovery.imuHistory()) : needed);
-}
-
-/// The IMU's clock jumped: nothing before can be related to what comes. The scans that wait are rejected, as
-/// those before an initialisation.
-void RadarInertialOdometry::Impl::startAgain() {
-  imu.clear();
-  // Nobody stands still because a clock jumped.
-  OdometryOptions at_once = options;
-  at_once.init_motion_after = 0.0;
-  initializer = Initializer(at_once);
-  feasibility = FeasibilityCheck(options.feasibility);
-  offset_monitor = OffsetMonitor(options.offset_monitor);
-  smoother = emptySmoother();
-  recovery.clear();
-  health_monitor = HealthMonitor(options.health, options.smoother.innovation_gate);
-  pose_doubt = PoseDoubt();
-  radar_heard.reset();
-}
-
-/// Counts times without radar, by the IMU's clock at the arrival of scans: the scans' own stamps may be
-/// wrong.
-void RadarInertialOdometry::Impl::watchRadar(bool scan_came) {
-  if (imu.empty()) return;
-  if (scan_came || !radar_heard) {
-    radar_heard = imu.newest();
-    radar_is_silent = false;
-  } else if (!radar_is_silent && imu.newest() - *radar_heard > options.max_radar_gap) {
-    faults.count("radar_gap");
-    radar_is_silent = true;
-  }
-}
-
-void RadarInertialOdometry::Impl::anchorNavigator(const NavigationState& state) {
-  const std::lock_guard<std::mutex> lock(navigation_mutex);
-  // Else the navigator lives already in another time.
-  if (clock_restarts == clock_restarts_done) navigator.anchor(state);
-}
-
-void RadarInertialOdometry::Impl::tryInitialize(const ImuMeasurement& sample) {
-  const std::optional<Initialization> found = initializer.add(sample, imu);
-  if (found) {
-    start = found;
-    begin(found->time, found->prior);
-  } else {
-    imu.dropBefore(sample.time - initializer.imuHistory());
-  }
-  const std::lock_guard<std::mutex> lock(inbox_mutex);
-  is_initialized = found.has_value();
-  waiting_for = initializer.waitingFor();
-}
-
-void RadarInertialOdometry::Impl::begin(Time time, const NodePrior& prior) {
-  smoother.initialize(time, prior);
-  yaw_doubt = 0.0;
-  initialized_at = time;
-  last_used = time;
-  health_monitor.startedAt(time);
-  publishNewest();
-}
-
-void RadarInertialOdometry::Impl::publishNewest() {
-  anchorNavigator(newestState(smoother.newestCovariance()));
-}
-
-bool RadarInertialOdometry::Impl::tryReinitialize(std::vector<StampedPose>& left) {
-  const auto found = recovery.solve(imu, [this](Time time) { return anchorAt(time); });
-  if (!found) return false;
-  for (std::size_t k = 0; k < smoother.size(); ++k) {
-    const NodeEstimate node = smoother.node(k);
-    if (node.time < found->time) left.push_back({node.time, node.x.p_W(), node.x.q_WI()});
-  }
-  pose_doubt = PoseDoubt(newestState(smoother.newestCovariance()));
-  begin(found->time, found->prior);
-  offset_monitor = OffsetMonitor(options.offset_monitor);
-  updateHealth();
-  faults.count("reinitialized");
-  return true;
-}
-
-PoseAnchor RadarInertialOdometry::Impl::anchorAt(Time time) const {
-  // From the newest node before, as the navigator goes: what is published goes on from where it is.
-  std::size_t k = smoother.size() - 1;
-  while (k > 0 && smoother.node(k).time > time) --k;
-  const NodeEstimate node = smoother.node(k);
-  StateBlock x = node.x;
-  if (node.time < time)
-    x = predict(x, preintegrate(imu, node.time, time, x.b_g(), x.b_a(), options.imu_noise), g_W);
-  PoseAnchor anchor;  // how well it is known is kept by pose_doubt
-  anchor.q_WI = x.q_WI();
-  anchor.p_W = x.p_W();
-  anchor.sigma_yaw = options.smoother.prior_sigma_yaw;
-  anchor.sigma_position = options.smoother.prior_sigma_position;
-  return anchor;
-}
-
-void RadarInertialOdometry::Impl::updateHealth() {
-  std::optional<NavigationState> state;
-  {
-    const std::lock_guard<std::mutex> lock(navigation_mutex);
-    state = navigator.state();
-  }
-  if (!state || imu.empty()) return;
-  const bool was_diverged = health_monitor.health() == Health::kDiverged;
-  const Health now = health_monitor.judge(imu.newest(), *state);
-  if (now == Health::kDiverged && !was_diverged) faults.count("diverged");
-  const std::lock_guard<std::mutex> lock(inbox_mutex);
-  health = now;
-}
-
+/// The way of a scan: when, how fast, into the window, out.
 std::optional<ScanResult> RadarInertialOdometry::Impl::tryScan(const RadarScan& scan, bool imu_has_ended) {
   ScanResult result;
   result.scan = scan;
@@ -411,6 +242,172 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
   return "";
 }
 
+void RadarInertialOdometry::Impl::updateWindow(ScanResult& result) {
+  const SolveReport solve = smoother.optimize();
+  result.solver_iterations = solve.iterations;
+  result.solver_converged = solve.converged;
+  for (const NodeEstimate& node : smoother.marginalize()) {
+    result.left_window.push_back({node.time, node.x.p_W(), node.x.q_WI()});
+  }
+  const NodeMatrix covariance = smoother.newestCovariance();
+  result.state = newestState(covariance);
+  health_monitor.updated(result.state.time);
+  result.time_offset = smoother.newest().t_O;
+  result.time_offset_sigma = options.smoother.estimate_time_offset
+                                 ? std::sqrt(covariance(StateBlock::kTangent, StateBlock::kTangent))
+                                 : 0.0;
+  anchorNavigator(result.state);
+}
+
+std::vector<ScanResult> RadarInertialOdometry::finish() {
+  Impl& m = *impl_;
+  std::vector<ScanResult> results = process();
+  for (const RadarScan& scan : m.waiting_scans) results.push_back(*m.tryScan(scan, true));
+  m.waiting_scans.clear();
+  if (!initialized()) return results;
+  // The poses still in the window belong to the last scan.
+  if (results.empty()) results.emplace_back();
+  for (std::size_t k = 0; k < m.smoother.size(); ++k) {
+    const NodeEstimate node = m.smoother.node(k);
+    results.back().left_window.push_back({node.time, node.x.p_W(), node.x.q_WI()});
+  }
+  return results;
+}
+
+void RadarInertialOdometry::Impl::drainInbox() {
+  imu_drained.clear();
+  bool clock_restarted = false;
+  bool scan_came = false;
+  {
+    const std::lock_guard<std::mutex> lock(inbox_mutex);
+    clock_restarted = inbox_clock_restarts != clock_restarts_done;
+    clock_restarts_done = inbox_clock_restarts;
+    scan_came = !scan_inbox.empty();
+    std::swap(imu_drained, imu_inbox);
+    for (RadarScan& scan : scan_inbox) waiting_scans.push_back(std::move(scan));
+    scan_inbox.clear();
+  }
+  if (clock_restarted) startAgain();
+  for (const ImuMeasurement& sample : imu_drained) {
+    if (sample.gyro_doubt > 0.0 && smoother.size() > 0)
+      yaw_doubt.add(sample.gyro_doubt * (sample.time - imu.newest()), smoother.newest().x.p_W());
+    imu.add(sample);
+    if (smoother.size() == 0) tryInitialize(sample);
+  }
+  watchRadar(scan_came);
+  if (smoother.size() == 0) return;
+  const bool keep_for_recovery = options.health.on_divergence == OnDivergence::kReinitialize;
+  const Time needed = smoother.imuNeededSince();
+  imu.dropBefore(keep_for_recovery ? std::min(needed, imu.newest() - recovery.imuHistory()) : needed);
+}
+
+/// The IMU's clock jumped: nothing before can be related to what comes. The scans that wait are rejected, as
+/// those before an initialisation.
+void RadarInertialOdometry::Impl::startAgain() {
+  imu.clear();
+  // Nobody stands still because a clock jumped.
+  OdometryOptions at_once = options;
+  at_once.init_motion_after = 0.0;
+  initializer = Initializer(at_once);
+  feasibility = FeasibilityCheck(options.feasibility);
+  offset_monitor = OffsetMonitor(options.offset_monitor);
+  smoother = emptySmoother();
+  recovery.clear();
+  health_monitor = HealthMonitor(options.health, options.smoother.innovation_gate);
+  pose_doubt = PoseDoubt();
+  radar_heard.reset();
+}
+
+/// Counts times without radar, by the IMU's clock at the arrival of scans: the scans' own stamps may be
+/// wrong.
+void RadarInertialOdometry::Impl::watchRadar(bool scan_came) {
+  if (imu.empty()) return;
+  if (scan_came || !radar_heard) {
+    radar_heard = imu.newest();
+    radar_is_silent = false;
+  } else if (!radar_is_silent && imu.newest() - *radar_heard > options.max_radar_gap) {
+    faults.count("radar_gap");
+    radar_is_silent = true;
+  }
+}
+
+void RadarInertialOdometry::Impl::anchorNavigator(const NavigationState& state) {
+  const std::lock_guard<std::mutex> lock(navigation_mutex);
+  // Else the navigator lives already in another time.
+  if (clock_restarts == clock_restarts_done) navigator.anchor(state);
+}
+
+void RadarInertialOdometry::Impl::tryInitialize(const ImuMeasurement& sample) {
+  const std::optional<Initialization> found = initializer.add(sample, imu);
+  if (found) {
+    start = found;
+    begin(found->time, found->prior);
+  } else {
+    imu.dropBefore(sample.time - initializer.imuHistory());
+  }
+  const std::lock_guard<std::mutex> lock(inbox_mutex);
+  is_initialized = found.has_value();
+  waiting_for = initializer.waitingFor();
+}
+
+void RadarInertialOdometry::Impl::begin(Time time, const NodePrior& prior) {
+  smoother.initialize(time, prior);
+  yaw_doubt = YawDoubt();
+  initialized_at = time;
+  last_used = time;
+  health_monitor.startedAt(time);
+  publishNewest();
+}
+
+void RadarInertialOdometry::Impl::publishNewest() {
+  anchorNavigator(newestState(smoother.newestCovariance()));
+}
+
+bool RadarInertialOdometry::Impl::tryReinitialize(std::vector<StampedPose>& left) {
+  const auto found = recovery.solve(imu, [this](Time time) { return anchorAt(time); });
+  if (!found) return false;
+  for (std::size_t k = 0; k < smoother.size(); ++k) {
+    const NodeEstimate node = smoother.node(k);
+    if (node.time < found->time) left.push_back({node.time, node.x.p_W(), node.x.q_WI()});
+  }
+  pose_doubt = PoseDoubt(newestState(smoother.newestCovariance()));
+  begin(found->time, found->prior);
+  offset_monitor = OffsetMonitor(options.offset_monitor);
+  updateHealth();
+  faults.count("reinitialized");
+  return true;
+}
+
+PoseAnchor RadarInertialOdometry::Impl::anchorAt(Time time) const {
+  // From the newest node before, as the navigator goes: what is published goes on from where it is.
+  std::size_t k = smoother.size() - 1;
+  while (k > 0 && smoother.node(k).time > time) --k;
+  const NodeEstimate node = smoother.node(k);
+  StateBlock x = node.x;
+  if (node.time < time)
+    x = predict(x, preintegrate(imu, node.time, time, x.b_g(), x.b_a(), options.imu_noise), g_W);
+  PoseAnchor anchor;  // how well it is known is kept by pose_doubt
+  anchor.q_WI = x.q_WI();
+  anchor.p_W = x.p_W();
+  anchor.sigma_yaw = options.smoother.prior_sigma_yaw;
+  anchor.sigma_position = options.smoother.prior_sigma_position;
+  return anchor;
+}
+
+void RadarInertialOdometry::Impl::updateHealth() {
+  std::optional<NavigationState> state;
+  {
+    const std::lock_guard<std::mutex> lock(navigation_mutex);
+    state = navigator.state();
+  }
+  if (!state || imu.empty()) return;
+  const bool was_diverged = health_monitor.health() == Health::kDiverged;
+  const Health now = health_monitor.judge(imu.newest(), *state);
+  if (now == Health::kDiverged && !was_diverged) faults.count("diverged");
+  const std::lock_guard<std::mutex> lock(inbox_mutex);
+  health = now;
+}
+
 bool RadarInertialOdometry::Impl::isAtRest(Time time) const {
   const NodeEstimate newest = smoother.newest();
   return rio_t::isAtRest(imu, time, {newest.x.q_WI(), newest.x.v_W(), newest.x.b_g(), newest.x.b_a(), g_W},
@@ -439,23 +436,6 @@ bool RadarInertialOdometry::Impl::contradicts(const VelocityPrior& prior, const 
          innovation.dot(innovationCovariance(prior, measured).ldlt().solve(innovation)) > gate * gate;
 }
 
-void RadarInertialOdometry::Impl::updateWindow(ScanResult& result) {
-  const SolveReport solve = smoother.optimize();
-  result.solver_iterations = solve.iterations;
-  result.solver_converged = solve.converged;
-  for (const NodeEstimate& node : smoother.marginalize()) {
-    result.left_window.push_back({node.time, node.x.p_W(), node.x.q_WI()});
-  }
-  const NodeMatrix covariance = smoother.newestCovariance();
-  result.state = newestState(covariance);
-  health_monitor.updated(result.state.time);
-  result.time_offset = smoother.newest().t_O;
-  result.time_offset_sigma = options.smoother.estimate_time_offset
-                                 ? std::sqrt(covariance(StateBlock::kTangent, StateBlock::kTangent))
-                                 : 0.0;
-  anchorNavigator(result.state);
-}
-
 NavigationState RadarInertialOdometry::Impl::newestState(const NodeMatrix& covariance) const {
   const NodeEstimate newest = smoother.newest();
   NavigationState state;
@@ -467,34 +447,10 @@ NavigationState RadarInertialOdometry::Impl::newestState(const NodeMatrix& covar
   state.b_a = newest.x.b_a();
   state.angular_velocity = imu.at(newest.time).angular_velocity - state.b_g;
   state.covariance = covariance.topLeftCorner<StateBlock::kTangent, StateBlock::kTangent>();
-  keepYawDoubt(state);
+  yaw_doubt.addTo(state);
   pose_doubt.addTo(state);
   health_monitor.widen(state);
   return state;
-}
-
-void RadarInertialOdometry::Impl::keepYawDoubt(NavigationState& state) const {
-  if (yaw_doubt == 0.0) return;
-  using S = StateBlock;
-  using Direction = Eigen::Matrix<double, S::kTangent, 1>;
-  const Eigen::Vector3d up_W = Eigen::Vector3d::UnitZ();
-  const Eigen::Vector3d up_I = state.q_WI.conjugate() * up_W;
-  const Eigen::Vector3d from_there = state.p_W - yaw_doubt_at;
-  const double missing = yaw_doubt - up_I.dot(state.covariance.block<3, 3>(S::kTheta, S::kTheta) * up_I);
-  if (missing > 0.0) {
-    // How the state moves when W turns about the vertical through the place where the yaw was lost.
-    Direction turn = Direction::Zero();
-    turn.segment<3>(S::kTheta) = up_I;
-    turn.segment<3>(S::kP) = up_W.cross(from_there);
-    turn.segment<3>(S::kV) = up_W.cross(state.v_W);
-    state.covariance += missing * turn * turn.transpose();
-  }
-  // A yaw that may be wrong by a radian also shortens: with psi of variance s^2, 1 - cos(psi) is about psi^2
-  // / 2, whose mean square is 3 s^4 / 4. Not beyond what a turn can do.
-  Direction shorten = Direction::Zero();
-  shorten.segment<2>(S::kP) = from_there.head<2>();
-  shorten.segment<2>(S::kV) = state.v_W.head<2>();
-  state.covariance += std::min(0.75 * yaw_doubt * yaw_doubt, 1.5) * shorten * shorten.transpose();
 }
 
 bool RadarInertialOdometry::initialized() const {

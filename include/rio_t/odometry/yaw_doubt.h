@@ -1,0 +1,22 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "rio_t/odometry/navigation_state.h"
+
+namespace rio_t {
+
+/// What the yaw lost where the IMU was blind (a gap, saturation). Nothing observes the yaw: it stays lost,
+/// whatever a window that was linearised at other yaws makes of it, and so it only adds to what is published.
+class YawDoubt {
+ public:
+  /// `variance` [rad^2] gained at the place `p_W` [m].
+  void add(double variance, const Eigen::Vector3d& p_W);
+  void addTo(NavigationState& state) const;
+
+ private:
+  double variance_ = 0.0;                                ///< [rad^2] since the start
+  Eigen::Vector3d lost_at_W_ = Eigen::Vector3d::Zero();  ///< [m] where the last of it was gained
+};
+
+}  // namespace rio_t
