@@ -71,9 +71,9 @@ class Experiment(unittest.TestCase):
         rows = {(row["sequence"], row["model"]): row for row in table(self.folder / "delay.csv")}
         passes = [float(rows["difficult", "imu"][f"pass {i} [ms]"]) for i in (1, 2, 3)]
         self.assertLess(abs(passes[2] - 100.0), 2.0)
-        # The paper's model needs its passes: each comes nearer.
+        # The paper's model needs its passes: the first misses what is asked of the third, each comes nearer.
         paper = [float(rows["difficult", "constant_acceleration"][f"pass {i} [ms]"]) for i in (1, 2, 3)]
-        self.assertLess(paper[0], 95.0)
+        self.assertLess(paper[0], 98.0)
         self.assertLess(paper[0], paper[1])
         self.assertLess(abs(paper[2] - 100.0), abs(paper[0] - 100.0))
         self.assertGreater((self.folder / "delay.png").stat().st_size, 10000)
