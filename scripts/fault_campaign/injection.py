@@ -227,19 +227,23 @@ def imu_stamps_repeated(messages, site):
     return edit(messages, "imu", site.covers, repeat)
 
 
-def imu_saturated(accel=None, gyro=None):
-    """Readings of each axis end at these: m/s^2 to either side of what it reads at rest, and rad/s."""
+def imu_saturated(accel=False, gyro=False, share=0.6):
+    """Readings of all axes end at that share of what the motion of this bag reaches in a hundredth of the time; the
+    accelerometer's beyond what it reads at rest."""
     def inject(messages, site):
-        rest = [m for m in messages if m.kind == "imu"][:200]
-        middle = numpy.mean([vector(m.content.linear_acceleration) for m in rest], axis=0)
-        limit = numpy.abs(middle) + accel if accel is not None else None
+        samples = [m for m in messages if m.kind == "imu"]
+        accels = numpy.array([vector(m.content.linear_acceleration) for m in samples])
+        gyros = numpy.array([vector(m.content.angular_velocity) for m in samples])
+        rest = accels[:200].mean(axis=0)
+        accel_limit = numpy.abs(rest).max() + share * numpy.percentile(numpy.abs(accels - rest).max(axis=1), 99)
+        gyro_limit = share * numpy.percentile(numpy.abs(gyros).max(axis=1), 99)
         def clip(m):
-            if accel is not None:
+            if accel:
                 a = m.content.linear_acceleration
-                set_vector(a, numpy.clip(vector(a), -limit, limit))
-            if gyro is not None:
+                set_vector(a, numpy.clip(vector(a), -accel_limit, accel_limit))
+            if gyro:
                 w = m.content.angular_velocity
-                set_vector(w, numpy.clip(vector(w), -gyro, gyro))
+                set_vector(w, numpy.clip(vector(w), -gyro_limit, gyro_limit))
         return edit(messages, "imu", site.covers, clip)
     return inject
 
