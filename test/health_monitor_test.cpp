@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "rio_t/core/so3.h"
+#include "rio_t/factors/state_block.h"
 #include "simulated_run.h"
 
 namespace rio_t {
@@ -65,6 +66,24 @@ TEST(HealthMonitor, CoastsWithoutScansAndDivergesWhereNothingIsKnown) {
   broken.covariance(6, 6) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(monitor.judge(at(6.5), broken), Health::kDiverged);
   EXPECT_FALSE(monitor.wantsReinitialization(at(100.0)));  // no scan contradicts
+}
+
+// An IMU gap loses the heading for good, and with it v_W; the motion is known all the same.
+TEST(HealthMonitor, ALostHeadingIsNoDivergence) {
+  HealthMonitor monitor(HealthOptions(), 4.0);
+  NavigationState state = knownState();
+  state.q_WI = so3::exp({0.3, -0.2, 1.0});
+  state.v_W = {3.0, 1.0, 0.5};
+  monitor.updated(at(0.0));
+  Eigen::Matrix<double, StateBlock::kTangent, 1> turn =
+      Eigen::Matrix<double, StateBlock::kTangent, 1>::Zero();
+  turn.segment<3>(StateBlock::kTheta) = state.q_WI.conjugate() * Eigen::Vector3d::UnitZ();
+  turn.segment<3>(StateBlock::kV) = Eigen::Vector3d::UnitZ().cross(state.v_W);
+  state.covariance += 0.7 * 0.7 * turn * turn.transpose();
+  EXPECT_GT(std::sqrt(state.covariance(7, 7)), 2.0);
+  EXPECT_EQ(monitor.judge(at(0.1), state), Health::kOk);
+  state.covariance.diagonal().segment<3>(StateBlock::kV).array() += 1.0;
+  EXPECT_EQ(monitor.judge(at(0.2), state), Health::kDiverged);
 }
 
 TEST(HealthMonitor, AStepOfTheOffsetExplainsOnce) {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "rio_t/core/so3.h"
+#include "rio_t/imu/gap_bridge.h"
 #include "rio_t/imu/gate.h"
 #include "rio_t/imu/preintegration.h"
 #include "synthetic_motion.h"
@@ -32,12 +34,14 @@ class Gate : public ::testing::Test {
     sample = imu;
     const ImuGate::Verdict verdict = gate.check(sample);
     decision = verdict.decision;
+    bridge = verdict.bridge;
     return names(verdict.faults);
   }
   SyntheticMotion motion;
   ImuGate gate;
   double t = 0.0;
   ImuMeasurement sample;
+  std::vector<ImuMeasurement> bridge;
   Decision decision = Decision::kTake;
 };
 
@@ -95,6 +99,58 @@ TEST_F(Gate, DoubtGrowsWithTheGap) {
   EXPECT_NEAR(sample.accel_doubt,
               ImuGateOptions().unseen_accel_density * ImuGateOptions().unseen_accel_density, 1e-12);
   EXPECT_LT(small, 0.1 * sample.accel_doubt);
+}
+
+TEST_F(Gate, OverAShortGapTheBridgeIsAlmostStraight) {
+  EXPECT_EQ(feed(1.02), "");
+  EXPECT_TRUE(bridge.empty());
+  const ImuMeasurement before = sample;
+  EXPECT_EQ(feed(1.12), "imu_gap");
+  ASSERT_EQ(bridge.size(), 4u) << "one each 0.02 s";
+  for (std::size_t i = 0; i < bridge.size(); ++i) {
+    const double share = 0.2 * static_cast<double>(i + 1);
+    EXPECT_NEAR(bridge[i].time - before.time, 0.1 * share, 1e-9);
+    EXPECT_TRUE(bridge[i].is_bridge);
+    EXPECT_EQ(bridge[i].gyro_doubt, sample.gyro_doubt);
+    const Eigen::Vector3d turn = sample.angular_velocity - before.angular_velocity;
+    // 1 - 1 / cosh(T / (2 tau)), in the middle
+    EXPECT_LT((bridge[i].angular_velocity - before.angular_velocity - share * turn).norm(),
+              0.005 * std::max(before.angular_velocity.norm(), sample.angular_velocity.norm()));
+  }
+  EXPECT_FALSE(sample.is_bridge);
+}
+
+// What a gap leaves out is not known; that gravity does not let go in the meantime is.
+TEST(GapBridge, OverALongGapGravityTurnsWithThePlatformAndTheRestDiesAway) {
+  const double tau = kMotionCorrelationTime;
+  GapBridge bridge;
+  ImuMeasurement imu;
+  const Eigen::Vector3d gravity(0.0, 6.0, 7.0);
+  for (int i = 0; i < 2000; ++i) {
+    imu.time = Time::fromNanoseconds(1) + 0.005 * i;
+    imu.acceleration = gravity;
+    bridge.follow(imu);
+  }
+  imu.time = imu.time + 0.005;
+  imu.acceleration = gravity + Eigen::Vector3d(4.0, 0.0, 0.0);
+  imu.angular_velocity = {0.0, 0.0, 2.0};
+  bridge.follow(imu);
+  ImuMeasurement next = imu;
+  next.time = imu.time + 2.5;
+  next.acceleration = {0.0, -9.0, -3.0};
+  next.angular_velocity.setZero();
+  Eigen::Vector3d turned = Eigen::Vector3d::Zero();
+  const auto samples = bridge.until(next);
+  ASSERT_EQ(samples.size(), 124u);
+  for (const ImuMeasurement& sample : samples) turned += 0.02 * sample.angular_velocity;
+  // The half step next to each end belongs to the trapezia of the ends.
+  EXPECT_NEAR(turned.z(), 2.0 * tau * std::tanh(2.5 / (2.0 * tau)) - 0.02, 0.002)
+      << "2 rad/s for one correlation time, not for 2.5 s";
+  const Eigen::Vector3d expected = so3::exp({0.0, 0.0, -2.0 * tau}) * gravity;
+  EXPECT_LT((samples.back().acceleration - expected).norm(), 0.3) << samples.back().acceleration.transpose();
+  EXPECT_LT((samples[60].acceleration - expected).norm(), 0.1 * 4.0 + 0.1 * gravity.norm())
+      << "hardly any acceleration besides";
+  EXPECT_GT((samples[0].acceleration - gravity).x(), 3.5);
 }
 
 // An accelerometer that ends at 1 m/s^2 beyond what it first read shows flat tops; the noise at rest does

@@ -70,7 +70,7 @@ TEST_F(AtRest, EveryScanIsAccountedFor) {
   run(104.0);
   odometry.addScan(restScan(100.0));
   EXPECT_EQ(run(104.1).at(0).rejected_because, "before_initialization");
-  odometry.addScan(restScan(110.0));
+  odometry.addScan(restScan(108.0));
   EXPECT_EQ(run(104.2).at(0).rejected_because, "stamp_ahead_of_imu");
   RadarScan empty;
   empty.stamp = Time::fromSeconds(104.15);
@@ -85,6 +85,17 @@ TEST_F(AtRest, EveryScanIsAccountedFor) {
   odometry.addScan(restScan(104.9));
   EXPECT_TRUE(run(104.5).empty());
   EXPECT_EQ(odometry.finish().at(0).rejected_because, "imu_not_covering");
+}
+
+// The IMU may fall silent for as long as its gaps are bridged; the radar goes on meanwhile.
+TEST_F(AtRest, ScansOfAnImuGapWaitForItsEnd) {
+  run(104.0);
+  odometry.addScan(restScan(106.0));
+  EXPECT_TRUE(odometry.process().empty());
+  time = 106.5;
+  const auto results = run(106.6);
+  ASSERT_EQ(results.size(), 1u);
+  EXPECT_TRUE(results[0].used) << results[0].rejected_because;
 }
 
 TEST_F(AtRest, TooManyWaitingScansAreReportedNotLost) {

@@ -2,9 +2,10 @@
 
 Why these bounds. Without radar the IMU carries the estimate: a tilt that is known to half a degree turns into
 0.1 m/s^2, so that T seconds cost up to 0.1 T m/s and 0.05 T^2 m on top of the usual (0.3 m/s, 0.6 m: what the causal
-output shows at its worst without a fault). Without IMU for T seconds the platform may do anything that platforms do,
-a few m/s^2 and rad/s: the attitude may be off by 45 degrees, gravity then adds 7 m/s^2, so 8 T m/s and 4 T^2 m until the
-next scan; radar and gravity bring velocity and tilt back within a second, the heading stays lost and is said to be.
+output shows at its worst without a fault). Without IMU for T seconds the platform may turn by 45 degrees and more that nobody
+saw: what moved forward then moves sideways, and until the next scan gravity adds to it. Radar and gravity bring velocity
+and tilt back; the heading stays lost, is said to be, and turns what is walked afterwards. 1.5 T m/s and 2 T m on top of
+the usual.
 Scans with errors in them must not cost more than scans that are not there.
 """
 import dataclasses
@@ -33,7 +34,7 @@ def without_radar(seconds, **more):
 
 
 def without_imu(seconds, **more):
-    return Survives(VELOCITY + 8.0 * seconds, POSITION + 4.0 * seconds**2, **more)
+    return Survives(VELOCITY + 1.5 * seconds, POSITION + 2.0 * seconds, **more)
 
 
 def lasting(seconds, begin=20.0):

@@ -229,13 +229,14 @@ def imu_stamps_repeated(messages, site):
 
 def imu_saturated(accel=False, gyro=False, share=0.6):
     """Readings of all axes end at that share of what the motion of this bag reaches in a hundredth of the time; the
-    accelerometer's beyond what it reads at rest."""
+    accelerometer's beyond gravity, on the axis that is upright at rest."""
     def inject(messages, site):
         samples = [m for m in messages if m.kind == "imu"]
         accels = numpy.array([vector(m.content.linear_acceleration) for m in samples])
         gyros = numpy.array([vector(m.content.angular_velocity) for m in samples])
         rest = accels[:200].mean(axis=0)
-        accel_limit = numpy.abs(rest).max() + share * numpy.percentile(numpy.abs(accels - rest).max(axis=1), 99)
+        up = numpy.abs(rest).argmax()  # where gravity leaves the least of the range
+        accel_limit = abs(rest[up]) + share * numpy.percentile(numpy.abs(accels[:, up] - rest[up]), 99)
         gyro_limit = share * numpy.percentile(numpy.abs(gyros).max(axis=1), 99)
         def clip(m):
             if accel:

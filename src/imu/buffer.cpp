@@ -34,6 +34,7 @@ ImuMeasurement ImuBuffer::at(Time time) const {
     result.acceleration = a.acceleration + share * (b.acceleration - a.acceleration);
     result.gyro_doubt = b.gyro_doubt;
     result.accel_doubt = b.accel_doubt;
+    result.is_bridge = a.is_bridge || b.is_bridge;
   }
   result.time = time;
   return result;

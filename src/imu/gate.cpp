@@ -3,11 +3,6 @@
 #include <algorithm>
 
 namespace rio_t {
-namespace {
-
-constexpr double kCorrelationTime = 0.5;  // [s] tau of the motion
-
-}  // namespace
 
 ImuGate::ImuGate(double max_gap, const ImuGateOptions& options)
     : max_gap_(max_gap),
@@ -30,14 +25,15 @@ ImuGate::Verdict ImuGate::check(ImuMeasurement& imu) {
     case StampWatch::Verdict::kRestart:
       verdict = {Decision::kRestart, {"imu_clock_restart"}};
       newest_.reset();
+      bridge_ = GapBridge();
       break;
   }
   const double gap = newest_ ? imu.time - *newest_ : 0.0;
   newest_ = imu.time;
   if (gap > max_gap_) {
     verdict.faults.push_back("imu_gap");
-    doubtGyro(imu, std::min(1.0, gap / kCorrelationTime));
-    doubtAccel(imu, std::min(1.0, gap / kCorrelationTime));
+    doubtGyro(imu, std::min(1.0, gap / kMotionCorrelationTime));
+    doubtAccel(imu, std::min(1.0, gap / kMotionCorrelationTime));
   }
   // The interval before and the one after a saturated sample both hide something.
   const SaturationDetector::Saturated saturated = saturation_.check(imu);
@@ -45,6 +41,8 @@ ImuGate::Verdict ImuGate::check(ImuMeasurement& imu) {
   if (saturated.gyro || was_saturated_.gyro) doubtGyro(imu, 1.0);
   if (saturated.accel || was_saturated_.accel) doubtAccel(imu, 1.0);
   was_saturated_ = saturated;
+  if (gap > max_gap_) verdict.bridge = bridge_.until(imu);
+  bridge_.follow(imu);
   return verdict;
 }
 

@@ -7,6 +7,7 @@ bool isAtRest(const ImuBuffer& imu, Time time, const RestContext& context, const
     return false;
   }
   double count = 0.0;
+  bool is_measured = true;
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel = Eigen::Vector3d::Zero();
   Eigen::Vector3d gyro_square = Eigen::Vector3d::Zero();
@@ -21,8 +22,9 @@ bool isAtRest(const ImuBuffer& imu, Time time, const RestContext& context, const
     gyro_square += rate.cwiseAbs2();
     accel_square += acceleration.cwiseAbs2();
     count += 1.0;
+    is_measured &= !sample.is_bridge;
   });
-  if (count < 10.0) return false;  // too few to speak of a spread
+  if (!is_measured || count < 10.0) return false;  // too few to speak of a spread
   gyro /= count;
   accel /= count;
   const Eigen::Vector3d gyro_variance = gyro_square / count - gyro.cwiseAbs2();

@@ -42,11 +42,20 @@ StateBlock stateBlock(const NavigationState& state) {
 }  // namespace
 
 BatchOdometry::BatchOdometry(const OdometryOptions& options, const BatchOptions& batch)
-    : options_(options), batch_(batch), g_W_(0.0, 0.0, -options.gravity) {}
+    : options_(options),
+      batch_(batch),
+      g_W_(0.0, 0.0, -options.gravity),
+      imu_gate_(options.max_imu_gap, options.imu_gate) {}
 
-void BatchOdometry::addImu(const ImuMeasurement& imu) {
-  if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite()) return;
-  if (imu_.empty() || imu.time > imu_.newest()) imu_.add(imu);
+void BatchOdometry::addImu(ImuMeasurement imu) {
+  const ImuGate::Verdict verdict = imu_gate_.check(imu);
+  if (verdict.decision == ImuGate::Decision::kDrop) return;
+  if (verdict.decision == ImuGate::Decision::kRestart)
+    throw std::runtime_error(
+        "batch: the IMU's clock jumped or it was silent for longer than max_bridged_imu_gap; "
+        "no single graph goes over that: use mode online, or bag_start and bag_duration");
+  for (const ImuMeasurement& unseen : verdict.bridge) imu_.add(unseen);
+  imu_.add(imu);
 }
 
 void BatchOdometry::addResult(ScanResult result, bool offset_stepped) {
@@ -191,7 +200,7 @@ std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solu
       boxplus(x.data(), part.data(), at.x.data());
       const NodeMatrix covariance =
           (1.0 - share) * solution.covariances[k] + share * solution.covariances[k + 1];
-      states.push_back(navigationState(at, covariance, imu_));
+      if (!sample.is_bridge) states.push_back(navigationState(at, covariance, imu_));
     });
   }
   // Behind the last scan there is the IMU alone.
@@ -199,7 +208,7 @@ std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solu
   navigator.anchor(navigationState(nodes.back(), solution.covariances.back(), imu_));
   imu_.forEachSample(nodes.back().time - 0.1, imu_.newest(), [&](const ImuMeasurement& sample) {
     const std::optional<NavigationState> state = navigator.add(sample);
-    if (state && state->time > nodes.back().time) states.push_back(*state);
+    if (state && state->time > nodes.back().time && !sample.is_bridge) states.push_back(*state);
   });
   return states;
 }

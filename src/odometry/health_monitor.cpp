@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rio_t/core/so3.h"
 #include "rio_t/factors/state_block.h"
 
 namespace rio_t {
@@ -17,6 +18,16 @@ constexpr std::size_t kMaxScans = 1000;   // bounds the memory
 constexpr double kStepsApart = 20.0;      // [s] nearer, a step of the offset explains nothing
 constexpr double kMaxSpeed = 200.0;       // [m/s] no platform with such a radar
 constexpr double kMetresPerSecond2 = 10;  // an attitude that is off by x turns x g into velocity each second
+
+/// Of the velocity in I [m^2/s^2]: a heading that an IMU gap lost makes v_W vague for good, and is no
+/// divergence.
+Eigen::Matrix3d bodyVelocityCovariance(const NavigationState& state) {
+  const Eigen::Matrix3d R_IW = state.q_WI.conjugate().toRotationMatrix();
+  Eigen::Matrix<double, 3, StateBlock::kTangent> J = Eigen::Matrix<double, 3, StateBlock::kTangent>::Zero();
+  J.middleCols<3>(StateBlock::kTheta) = so3::hat(R_IW * state.v_W);
+  J.middleCols<3>(StateBlock::kV) = R_IW;
+  return J * state.covariance * J.transpose();
+}
 
 }  // namespace
 
@@ -82,7 +93,7 @@ Health HealthMonitor::judge(Time now, const NavigationState& state) {
       diverged_at_.reset();
     }
   }
-  const double variance = state.covariance.diagonal().segment<3>(StateBlock::kV).maxCoeff();
+  const double variance = bodyVelocityCovariance(state).diagonal().maxCoeff();
   const double max_sigma = options_.max_velocity_sigma;
   const bool known = state.p_W.allFinite() && state.v_W.allFinite() && state.v_W.norm() < kMaxSpeed &&
                      variance < max_sigma * max_sigma;  // false for NaN

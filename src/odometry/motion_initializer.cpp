@@ -41,8 +41,7 @@ MotionInitializer::MotionInitializer(const OdometryOptions& options)
       noise_(options.imu_noise),
       g_W_(0.0, 0.0, -options.gravity),
       R_RI_(options.T_IR.q_IR.conjugate().toRotationMatrix()),
-      l_I_(options.T_IR.l_I),
-      max_imu_gap_(options.max_imu_gap) {}
+      l_I_(options.T_IR.l_I) {}
 
 double MotionInitializer::imuHistory() const {
   return options_.window + 2.0 * smoother_.max_time_offset + kMaxLatency;
@@ -150,9 +149,10 @@ std::optional<MotionInitialization> MotionInitializer::solve(
 MotionInitializer::Velocities MotionInitializer::windowUntil(Time time, const ImuBuffer& imu) const {
   const double reach = smoother_.max_time_offset;
   Time covered = imu.oldest();  // without a gap from here on
-  imu.forEachInterval(imu.oldest(), imu.newest(), [&, at = imu.oldest()](double dt, auto&&...) mutable {
-    at = at + dt;
-    if (dt > max_imu_gap_) covered = at;
+  bool in_gap = false;
+  imu.forEachSample(imu.oldest(), imu.newest(), [&](const ImuMeasurement& sample) {
+    if (in_gap || sample.is_bridge) covered = sample.time;
+    in_gap = sample.is_bridge;
   });
   const Time first = std::max(time - options_.window, covered + reach);
   Velocities result;

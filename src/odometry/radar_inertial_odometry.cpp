@@ -8,6 +8,7 @@
 
 #include "rio_t/odometry/fault_counters.h"
 #include "rio_t/odometry/initializer.h"
+#include "rio_t/odometry/innovation_gate.h"
 #include "rio_t/odometry/navigator.h"
 #include "rio_t/odometry/pose_doubt.h"
 #include "rio_t/odometry/yaw_doubt.h"
@@ -18,8 +19,12 @@ namespace {
 
 /// The IMU must be this far past a scan's node [s], so that the factor's time may still move a little.
 constexpr double kImuMargin = 0.01;
-/// A scan stamped further ahead of the newest IMU sample is nonsense, not early [s].
+/// A scan stamped further ahead of the newest IMU sample is nonsense, not early [s]; unless the IMU may still
+/// come.
 constexpr double kMaxStampAhead = 1.0;
+/// Where roll and pitch are known no better [rad], the prediction is not linear in them, and its covariance
+/// too small to reject anything by.
+constexpr double kMaxTiltSigma = 0.1;
 
 }  // namespace
 
@@ -35,6 +40,7 @@ struct RadarInertialOdometry::Impl {
         ego_velocity_estimator(options.ego_velocity),
         feasibility(options.feasibility),
         offset_monitor(options.offset_monitor),
+        innovation_gate(options.smoother),
         health_monitor(options.health, options.smoother.innovation_gate),
         smoother(emptySmoother()) {
     waiting_for = initializer.waitingFor();
@@ -53,9 +59,6 @@ struct RadarInertialOdometry::Impl {
   void updateHealth();
   void publishNewest();
   void judgePrediction(const RadarScan& scan, const VelocityPrior& prior, const EgoVelocity& measured);
-  /// Of the innovation, for the gate [m^2/s^2].
-  Eigen::Matrix3d innovationCovariance(const VelocityPrior& prior, const EgoVelocity& measured) const;
-  bool contradicts(const VelocityPrior& prior, const EgoVelocity& measured) const;
   bool isAtRest(Time time) const;
   /// Empty, or why the scan has no velocity to use; and whether that velocity tells the offset.
   std::string measureVelocity(const RadarScan& scan, bool at_rest, EgoVelocity& measured,
@@ -91,6 +94,7 @@ struct RadarInertialOdometry::Impl {
   EgoVelocityEstimator ego_velocity_estimator;
   FeasibilityCheck feasibility;
   OffsetMonitor offset_monitor;
+  InnovationGate innovation_gate;
   HealthMonitor health_monitor;
   FixedLagSmoother smoother;
   std::deque<RadarScan> waiting_scans;
@@ -98,7 +102,6 @@ struct RadarInertialOdometry::Impl {
   Time initialized_at;
   PoseDoubt pose_doubt;
   YawDoubt yaw_doubt;
-  Time last_used;  ///< stamp of the last scan that went into the window
   std::vector<ImuMeasurement> imu_drained;
   std::uint64_t clock_restarts_done = 0;
   std::optional<Time> radar_heard;  ///< IMU time when a scan came last
@@ -115,10 +118,11 @@ std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasuremen
   Impl& m = *impl_;
   ImuMeasurement sample = measured;
   std::optional<NavigationState> state;
+  std::vector<ImuMeasurement> bridge;
   std::uint64_t clock_restarts = 0;
   {
     const std::lock_guard<std::mutex> lock(m.navigation_mutex);
-    const ImuGate::Verdict verdict = m.imu_gate.check(sample);
+    ImuGate::Verdict verdict = m.imu_gate.check(sample);
     for (const char* fault : verdict.faults) m.faults.count(fault);
     if (verdict.decision == ImuGate::Decision::kDrop) return std::nullopt;
     if (verdict.decision == ImuGate::Decision::kRestart) {
@@ -126,6 +130,8 @@ std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasuremen
       ++m.clock_restarts;
     }
     clock_restarts = m.clock_restarts;
+    bridge = std::move(verdict.bridge);
+    for (const ImuMeasurement& unseen : bridge) m.navigator.add(unseen);
     state = m.navigator.add(sample);
   }
   const std::lock_guard<std::mutex> lock(m.inbox_mutex);
@@ -134,6 +140,7 @@ std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasuremen
     m.imu_inbox.clear();
     m.is_initialized = false;
   }
+  m.imu_inbox.insert(m.imu_inbox.end(), bridge.begin(), bridge.end());
   m.imu_inbox.push_back(sample);
   return state;
 }
@@ -182,7 +189,8 @@ std::optional<ScanResult> RadarInertialOdometry::Impl::tryScan(const RadarScan& 
 
   const Time node_time = smoother.nodeTime(scan.stamp);
   if (node_time < initialized_at) return rejected("before_initialization");
-  if (node_time - imu.newest() > kMaxStampAhead) return rejected("stamp_ahead_of_imu");
+  if (node_time - imu.newest() > std::max(kMaxStampAhead, options.imu_gate.max_bridged_gap))
+    return rejected("stamp_ahead_of_imu");
   if (!imu.covers(node_time + kImuMargin)) {
     if (imu_has_ended) return rejected("imu_not_covering");
     if (node_time > imu.newest() - kImuMargin) return std::nullopt;  // wait for the IMU
@@ -200,7 +208,7 @@ std::optional<ScanResult> RadarInertialOdometry::Impl::tryScan(const RadarScan& 
                                options.T_IR.l_I, informs_offset}));
   }
   result.used = result.rejected_because.empty();
-  if (result.used) last_used = scan.stamp;
+  if (result.used) innovation_gate.used(scan.stamp);
   result.updated = result.used;
   if (at_rest) {
     result.updated |=
@@ -222,6 +230,7 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
     prior = VelocityPrior();
     prior->covariance.diagonal().setConstant(options.rest.velocity_sigma * options.rest.velocity_sigma);
   }
+  const bool tilt_is_known = !prediction || prediction->tilt_sigma < kMaxTiltSigma;
   const bool heed_prior = health_monitor.health() != Health::kDiverged;
   measured = ego_velocity_estimator.estimate(scan, heed_prior ? prior : std::nullopt);
   if (prior) judgePrediction(scan, *prior, measured);
@@ -230,15 +239,14 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
   const bool moving = !at_rest && measured.status == EgoVelocityStatus::kMoving;
   informs_offset =
       moving && (!prediction || prediction->dv_dt_O.norm() > options.smoother.time_offset_min_acceleration);
-  if (prediction && informs_offset && options.smoother.estimate_time_offset &&
+  if (prediction && tilt_is_known && informs_offset && options.smoother.estimate_time_offset &&
       offset_monitor.stepped(scan.stamp, measured.v_R - prediction->velocity.v_R,
                              prediction->covariance_at_offset + measured.covariance, prediction->dv_dt_O)) {
     smoother.loosenTimeOffset();
     health_monitor.offsetStepped(scan.stamp);
     faults.count("time_offset_step");
   }
-  const bool gate_is_open = std::abs(scan.stamp - last_used) > options.smoother.innovation_gate_timeout;
-  if (prior && !gate_is_open && contradicts(*prior, measured)) return "innovation";
+  if (prior && innovation_gate.rejects(scan.stamp, *prior, measured, tilt_is_known)) return "innovation";
   return "";
 }
 
@@ -292,7 +300,7 @@ void RadarInertialOdometry::Impl::drainInbox() {
     if (sample.gyro_doubt > 0.0 && smoother.size() > 0)
       yaw_doubt.add(sample.gyro_doubt * (sample.time - imu.newest()), smoother.newest().x.p_W());
     imu.add(sample);
-    if (smoother.size() == 0) tryInitialize(sample);
+    if (smoother.size() == 0 && !sample.is_bridge) tryInitialize(sample);
   }
   watchRadar(scan_came);
   if (smoother.size() == 0) return;
@@ -354,7 +362,7 @@ void RadarInertialOdometry::Impl::begin(Time time, const NodePrior& prior) {
   smoother.initialize(time, prior);
   yaw_doubt = YawDoubt();
   initialized_at = time;
-  last_used = time;
+  innovation_gate.used(time);
   health_monitor.startedAt(time);
   publishNewest();
 }
@@ -420,20 +428,7 @@ void RadarInertialOdometry::Impl::judgePrediction(const RadarScan& scan, const V
   const EgoVelocity alone = speaksForItself(measured) ? measured : ego_velocity_estimator.estimate(scan);
   if (!speaksForItself(alone)) return;
   recovery.add(scan.stamp, alone);
-  health_monitor.addInnovation(scan.stamp, alone.v_R - prior.v_R, innovationCovariance(prior, alone));
-}
-
-Eigen::Matrix3d RadarInertialOdometry::Impl::innovationCovariance(const VelocityPrior& prior,
-                                                                  const EgoVelocity& measured) const {
-  const double model_error = options.smoother.innovation_model_error;
-  return prior.covariance + measured.covariance + model_error * model_error * Eigen::Matrix3d::Identity();
-}
-
-bool RadarInertialOdometry::Impl::contradicts(const VelocityPrior& prior, const EgoVelocity& measured) const {
-  const Eigen::Vector3d innovation = measured.v_R - prior.v_R;
-  const double gate = options.smoother.innovation_gate;
-  return gate > 0.0 &&
-         innovation.dot(innovationCovariance(prior, measured).ldlt().solve(innovation)) > gate * gate;
+  health_monitor.addInnovation(scan.stamp, alone.v_R - prior.v_R, innovation_gate.covariance(prior, alone));
 }
 
 NavigationState RadarInertialOdometry::Impl::newestState(const NodeMatrix& covariance) const {

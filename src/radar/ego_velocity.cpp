@@ -14,6 +14,13 @@
 namespace rio_t {
 namespace {
 
+/// Of a prior that outweighs a majority of the points [m/s]: sharper than a moving object and the world
+/// differ.
+constexpr double kMaxSharpSigma = 0.1;
+/// Log-likelihood ratio of a point that a velocity explains to one that it does not: a Gaussian of 0.05 m/s
+/// against a uniform density over some m/s.
+constexpr double kEvidenceOfAPoint = 4.0;
+
 void require(bool holds, const char* option, const char* expected) {
   if (!holds) throw std::invalid_argument(std::string("ego velocity: ") + option + " must be " + expected);
 }
@@ -145,18 +152,31 @@ void selectInliers(const std::vector<Direction>& points, const Eigen::Vector3d& 
   }
 }
 
-bool contradicts(const VelocitySolution& solution, const VelocityPrior& prior, const EgoVelocityOptions& o) {
-  const Eigen::Matrix3d covariance = prior.covariance + solution.covariance;
-  const Eigen::Vector3d d = solution.v_R - prior.v_R;
-  return d.dot(covariance.inverse() * d) > o.prior_gate * o.prior_gate;
+double largestSigma(const Eigen::Matrix3d& covariance) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(covariance, Eigen::EigenvaluesOnly);
+  return std::sqrt(eigen.eigenvalues()[2]);
 }
 
-/// Where the prior speaks against the velocity that `inliers` give, and enough points support one that it
-/// does not speak against, replaces `inliers` by those points.
+/// Squared sigmas between a velocity and the prior.
+double squaredDistance(const VelocitySolution& solution, const VelocityPrior& prior) {
+  const Eigen::Matrix3d covariance = prior.covariance + solution.covariance;
+  const Eigen::Vector3d d = solution.v_R - prior.v_R;
+  return d.dot(covariance.inverse() * d);
+}
+
+/// Replaces `inliers` by the points that support a velocity near the prior, where that is the better choice.
+/// A sharp prior that speaks against the velocity of `inliers` outweighs even a majority of the points. A
+/// vague one is weighed against their number: it must not find a minority that sides with it where it is
+/// wrong.
 void heedPrior(const std::vector<Direction>& points, const VelocityPrior& prior, const EgoVelocityOptions& o,
                std::vector<Direction>& inliers) {
+  const double gate = o.prior_gate * o.prior_gate;
+  const bool is_sharp = largestSigma(prior.covariance) < kMaxSharpSigma;
   const VelocitySolution unaided = solveLeastSquares(inliers, o);
-  if (unaided.solved && !contradicts(unaided, prior, o)) return;
+  const double d2_unaided =
+      unaided.solved ? squaredDistance(unaided, prior) : std::numeric_limits<double>::max();
+  if (is_sharp && d2_unaided <= gate) return;
   std::vector<Direction> supporters;
   supporters.reserve(points.size());
   selectInliers(points, prior.v_R, o, supporters);
@@ -164,10 +184,13 @@ void heedPrior(const std::vector<Direction>& points, const VelocityPrior& prior,
   if (!aided.solved) return;
   selectInliers(points, aided.v_R, o, supporters);
   aided = solveLeastSquares(supporters, o);
-  const double needed = o.prior_min_inlier_fraction * static_cast<double>(points.size());
-  if (!aided.solved || static_cast<double>(supporters.size()) < needed || contradicts(aided, prior, o))
+  if (!aided.solved || static_cast<double>(supporters.size()) <
+                           o.prior_min_inlier_fraction * static_cast<double>(points.size()))
     return;
-  inliers = supporters;
+  const double d2_aided = squaredDistance(aided, prior);
+  const double fewer = static_cast<double>(inliers.size()) - static_cast<double>(supporters.size());
+  if (is_sharp ? d2_aided <= gate : kEvidenceOfAPoint * fewer < 0.5 * (d2_unaided - d2_aided))
+    inliers = supporters;
 }
 
 /// Covariance at rest, where every inlier reads the zero bin, of width q. Two things bound the velocity:
@@ -201,12 +224,6 @@ bool restCovariance(const std::vector<Direction>& inliers, const EgoVelocityOpti
                scale * eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
                    eigen.eigenvectors().transpose();
   return true;
-}
-
-double largestSigma(const Eigen::Matrix3d& covariance) {
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
-  eigen.computeDirect(covariance, Eigen::EigenvaluesOnly);
-  return std::sqrt(eigen.eigenvalues()[2]);
 }
 
 }  // namespace

@@ -76,6 +76,10 @@ std::optional<RadarVelocityPrediction> FixedLagSmoother::predictRadarVelocity(
   prediction.covariance_at_offset =
       J_state * P.topLeftCorner<StateBlock::kTangent, StateBlock::kTangent>() * J_state.transpose();
   prediction.dv_dt_O = J_t;
+  const Eigen::Matrix<double, 2, 3> horizontal = x.q_WI().toRotationMatrix().topRows<2>();
+  const Eigen::Matrix2d tilt =
+      horizontal * P.block<3, 3>(StateBlock::kTheta, StateBlock::kTheta) * horizontal.transpose();
+  prediction.tilt_sigma = std::sqrt(tilt.diagonal().maxCoeff());
   return prediction;
 }
 

@@ -14,6 +14,9 @@ namespace {
 
 /// Squared length of a step in standard deviations, below which it is the last one (eq. 23a).
 constexpr double kConverged = 1e-3;
+/// Of a step that is tried where the whole one raises the cost. A tilt that is lost makes steps of a radian,
+/// over which the graph is not linear but the direction is right; damping would shorten them to a hundredth.
+constexpr double kShortestShare = 0.06;
 constexpr double kFirstDamping = 1e-4;
 
 ceres::Problem::Options borrowingProblem() {
@@ -29,13 +32,14 @@ ceres::Problem::Options borrowingProblem() {
   return options;
 }
 
-void takeStep(const ChainSolution& solution, Window& window) {
+void takeStep(const ChainSolution& solution, double share, Window& window) {
   for (std::size_t k = 0; k < window.nodes.size(); ++k) {
     WindowNode& node = window.nodes[k];
-    boxplus(node.x.data(), solution.delta[k].data(), node.x.data());
+    const NodeVector delta = share * solution.delta[k];
+    boxplus(node.x.data(), delta.data(), node.x.data());
     if (window.offset_known) continue;
-    node.t_O = std::clamp(node.t_O + solution.delta[k](StateBlock::kTangent), -window.max_time_offset,
-                          window.max_time_offset);
+    node.t_O =
+        std::clamp(node.t_O + delta(StateBlock::kTangent), -window.max_time_offset, window.max_time_offset);
   }
 }
 
@@ -66,9 +70,12 @@ SolveReport WindowSolver::solve(Window& window, int max_iterations) {
     const bool solved =
         damping == 0.0 ? solveUndamped(system_, &solution_) : rio_t::solve(system_, damping, &solution_);
     report.converged = solved && damping == 0.0 && solution_.decrease < kConverged;
-    if (report.converged) takeStep(solution_, window);
+    if (report.converged) takeStep(solution_, 1.0, window);
     if (report.converged || report.iterations >= max_iterations) break;
+    const double cost = system_.cost;
     if (solved && stepLowersCost(window)) {
+      report.converged = damping == 0.0 && cost - system_.cost < 0.5 * kConverged;
+      if (report.converged) break;
       damping = damping > kFirstDamping ? 0.1 * damping : 0.0;
     } else {
       damping = std::max(kFirstDamping, 10.0 * damping);
@@ -88,15 +95,17 @@ bool WindowSolver::stepLowersCost(Window& window) {
     states_before_[k] = window.nodes[k].x;
     offsets_before_[k] = window.nodes[k].t_O;
   }
-  takeStep(solution_, window);
-  linearize(window, &candidate_);
-  if (candidate_.cost <= system_.cost) {
-    std::swap(system_, candidate_);
-    return true;
-  }
-  for (std::size_t k = 0; k < count; ++k) {
-    window.nodes[k].x = states_before_[k];
-    window.nodes[k].t_O = offsets_before_[k];
+  for (double share = 1.0; share > kShortestShare; share *= 0.5) {
+    takeStep(solution_, share, window);
+    linearize(window, &candidate_);
+    if (candidate_.cost <= system_.cost) {
+      std::swap(system_, candidate_);
+      return true;
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      window.nodes[k].x = states_before_[k];
+      window.nodes[k].t_O = offsets_before_[k];
+    }
   }
   return false;
 }

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "rio_t/imu/gap_bridge.h"
 #include "rio_t/imu/measurement.h"
 #include "rio_t/imu/saturation_detector.h"
 #include "rio_t/imu/stamp_watch.h"
@@ -20,10 +21,11 @@ struct ImuGateOptions {
 };
 
 /// The door for IMU samples: drops what cannot be used, and writes into the others how much of the motion
-/// they miss. Not thread-safe.
+/// they miss; over a gap it builds a bridge. Not thread-safe.
 ///
 /// A signal with a correlation time tau deviates from the straight line over a gap of T << tau by far less
-/// than over a long one; so the density of a gap is the full one times min(1, T / tau), tau = 0.5 s.
+/// than over a long one; so the density of a gap is the full one times min(1, T / tau), tau that of the
+/// motion.
 class ImuGate {
  public:
   enum class Decision {
@@ -33,8 +35,9 @@ class ImuGate {
   };
   struct Verdict {
     Decision decision = Decision::kTake;
-    std::vector<const char*> faults;  ///< snake case: "imu_not_finite", "imu_out_of_order", "imu_stamp_jump",
+    std::vector<const char*> faults = {};  ///< snake case: "imu_not_finite", "imu_out_of_order", "imu_stamp_jump",
                                       ///< "imu_clock_restart", "imu_gap", "imu_saturated"
+    std::vector<ImuMeasurement> bridge = {};  ///< to be taken first: stands for what a gap before this sample hid
   };
 
   /// `max_gap` [s] between samples: a longer one is reported, and what it hides is doubted.
@@ -50,6 +53,7 @@ class ImuGate {
   ImuGateOptions options_;
   StampWatch stamps_;
   SaturationDetector saturation_;
+  GapBridge bridge_;
   std::optional<Time> newest_;
   SaturationDetector::Saturated was_saturated_;
 };

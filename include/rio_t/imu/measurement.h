@@ -17,6 +17,8 @@ struct ImuMeasurement {
   // of white noise per axis. They add to those of ImuNoise; see ImuGate.
   double gyro_doubt = 0.0;   ///< [rad^2/s]
   double accel_doubt = 0.0;  ///< [m^2/s^3]
+
+  bool is_bridge = false;  ///< not measured: see GapBridge
 };
 
 }  // namespace rio_t

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "rio_t/imu/gate.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
 #include "rio_t/smoother/batch_smoother.h"
 
@@ -29,8 +30,9 @@ class BatchOdometry {
  public:
   BatchOdometry(const OdometryOptions& options, const BatchOptions& batch);
 
-  /// Every sample that the online run took; in time order, the others are dropped as there.
-  void addImu(const ImuMeasurement& imu);
+  /// Every sample that the online run got; dropped, doubted and bridged as there. Throws std::runtime_error
+  /// where the time of the IMU starts again.
+  void addImu(ImuMeasurement imu);
   /// `offset_stepped`: the online run found the offset anew at this scan. The points are not kept.
   void addResult(ScanResult result, bool offset_stepped);
 
@@ -65,6 +67,7 @@ class BatchOdometry {
   OdometryOptions options_;  // read-only after construction
   BatchOptions batch_;       // read-only after construction
   Eigen::Vector3d g_W_;      // read-only after construction
+  ImuGate imu_gate_;
   ImuBuffer imu_;
   std::vector<Scan> scans_;
 };

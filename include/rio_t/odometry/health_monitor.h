@@ -32,7 +32,7 @@ struct HealthOptions {
   double window = 2.0;  ///< [s] of scans that are judged
   /// Mean over the window of min(1, d' S^-1 d / gate^2): the share of scans that contradict the prediction.
   double max_contradiction = 0.65;
-  double max_velocity_sigma = 1.0;  ///< [m/s] of an axis
+  double max_velocity_sigma = 1.0;  ///< [m/s] of an axis of I
   double coasting_after = 1.0;      ///< [s]
 };
 

@@ -93,7 +93,6 @@ class MotionInitializer {
   Eigen::Vector3d g_W_;
   Eigen::Matrix3d R_RI_;
   Eigen::Vector3d l_I_;
-  double max_imu_gap_;
 
   Velocities velocities_;  // by stamp
   std::optional<Time> tried_at_;

@@ -96,9 +96,9 @@ class EgoVelocityEstimator {
 
   /// A prior helps to tell the static world from an object that moves and fills half of the view, which one
   /// scan cannot: where the RANSAC velocity contradicts the prior, and `prior_min_inlier_fraction` of the
-  /// points agree with a velocity that does not, those points are the inliers. The velocity and its
-  /// covariance come from the points alone, so fusing the result with the prior does not count anything
-  /// twice.
+  /// points agree with a velocity that does not, those points are the inliers. A prior that is vague (above
+  /// 0.1 m/s) is only one witness more besides the points. The velocity and its covariance come from the
+  /// points alone, so fusing the result with the prior does not count anything twice.
   EgoVelocity estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior = std::nullopt) const;
 
  private:

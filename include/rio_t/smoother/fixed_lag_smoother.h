@@ -28,6 +28,7 @@ struct RadarVelocityPrediction {
   Eigen::Matrix3d covariance_at_offset =
       Eigen::Matrix3d::Zero();                        ///< the same, were the offset known [m^2/s^2]
   Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();  ///< of v_R with respect to t_O [m/s^2]
+  double tilt_sigma = 0.0;                            ///< of roll and pitch, the larger [rad]
 };
 
 /// The paper's factor graph over the last `window` seconds; what leaves is marginalised.

@@ -19,7 +19,7 @@ struct SmootherOptions {
   double window = 1.0;           ///< [s] length of the fixed-lag window
   double huber_threshold = 1.5;  ///< on the whitened radar residual's norm; 0 = no robust loss
   WindowSolverKind solver = WindowSolverKind::kChain;
-  int max_iterations = 6;  ///< of the solver, each scan
+  int max_iterations = 30;  ///< of the solver, each scan
   /// [sigma] farther from what the IMU predicts, offset uncertainty included, a scan is rejected; 0 = no
   /// gate.
   double innovation_gate = 4.0;

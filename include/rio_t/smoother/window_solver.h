@@ -16,9 +16,10 @@ struct SolveReport {
 /// section 6). It takes the same steps as `solveWithCeres` without setting up a problem, ordering unknowns
 /// and analysing a sparse matrix for each scan, and the covariance falls out of the last elimination.
 ///
-/// Gauss-Newton from where the nodes are; Levenberg-Marquardt damping only after a step that raised the cost.
-/// Ends where a step is shorter than 0.03 standard deviations in every direction (that step is
-/// still taken), or after `max_iterations`. Keeps its memory from call to call.
+/// Gauss-Newton from where the nodes are; where a step raises the cost, a half of it and less, then
+/// Levenberg-Marquardt damping. Ends where a step is shorter than 0.03 standard deviations in every direction
+/// (that step is still taken), where one changes the cost no more than such a step would, or after
+/// `max_iterations`. Keeps its memory from call to call.
 class WindowSolver {
  public:
   SolveReport solve(Window& window, int max_iterations);
@@ -26,7 +27,7 @@ class WindowSolver {
   const NodeMatrix& newestCovariance() const { return covariance_; }
 
  private:
-  bool stepLowersCost(Window& window);  ///< takes the step, and takes it back where it does not
+  bool stepLowersCost(Window& window);  ///< takes the step or a share of it; none where none does
 
   ChainSystem system_;     // at the nodes
   ChainSystem candidate_;  // at the nodes after a step
