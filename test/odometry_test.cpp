@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "rio_t/odometry/navigator.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
 
 namespace rio_t {
@@ -162,6 +163,30 @@ TEST_F(AtRest, OneStampFarAheadDoesNotSilenceTheImu) {
   EXPECT_FALSE(odometry.addImu(restSample(1e6)));
   EXPECT_TRUE(odometry.addImu(restSample(time)));
   EXPECT_EQ(odometry.faults().at("imu_stamp_jump"), 1u);
+}
+
+// What the IMU read since is not kept for ever: better an old anchor than one with a hole behind it.
+TEST(Navigator, AnAnchorOlderThanItsHistoryIsNotTaken) {
+  Navigator navigator(ImuNoise(), {0.0, 0.0, -9.81});
+  ImuMeasurement imu;
+  imu.acceleration = {0.0, 0.0, 9.81};
+  NavigationState state;
+  state.time = Time::fromSeconds(100.0);
+  imu.time = state.time;
+  navigator.add(imu);
+  navigator.anchor(state);
+  for (int i = 1; i <= 4000; ++i) {
+    imu.time = state.time + 0.01 * i;
+    navigator.add(imu);
+  }
+  state.p_W.x() = 7.0;
+  state.time = imu.time - 31.0;
+  navigator.anchor(state);
+  EXPECT_EQ(navigator.state()->p_W.x(), 0.0);
+  state.time = imu.time - 29.0;
+  navigator.anchor(state);
+  EXPECT_EQ(navigator.state()->p_W.x(), 7.0);
+  EXPECT_EQ(navigator.state()->time, imu.time);
 }
 
 TEST_F(AtRest, UncertaintyGrowsOverAnImuGap) {

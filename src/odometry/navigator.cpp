@@ -7,8 +7,8 @@
 namespace rio_t {
 namespace {
 
-/// How far back an anchor may lie [s]; bounds the history.
-constexpr double kHistory = 5.0;
+/// How far back an anchor may lie [s]; bounds the history. A solver that is later has no say.
+constexpr double kHistory = 30.0;
 
 }  // namespace
 
@@ -22,6 +22,7 @@ std::optional<NavigationState> Navigator::add(const ImuMeasurement& imu) {
 }
 
 void Navigator::anchor(const NavigationState& state) {
+  if (state_ && history_.back().time - state.time > kHistory) return;
   state_ = state;
   ImuMeasurement previous;
   bool first = true;

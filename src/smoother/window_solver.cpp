@@ -69,12 +69,12 @@ SolveReport WindowSolver::solve(Window& window, int max_iterations) {
   for (report.iterations = 1;; ++report.iterations) {
     const bool solved =
         damping == 0.0 ? solveUndamped(system_, &solution_) : rio_t::solve(system_, damping, &solution_);
-    report.converged = solved && damping == 0.0 && solution_.decrease < kConverged;
-    if (report.converged) takeStep(solution_, 1.0, window);
+    report.converged = solved && solution_.decrease < kConverged;
+    if (report.converged && damping == 0.0) takeStep(solution_, 1.0, window);
     if (report.converged || report.iterations >= max_iterations) break;
     const double cost = system_.cost;
     if (solved && stepLowersCost(window)) {
-      report.converged = damping == 0.0 && cost - system_.cost < 0.5 * kConverged;
+      report.converged = cost - system_.cost < 0.5 * kConverged;
       if (report.converged) break;
       damping = damping > kFirstDamping ? 0.1 * damping : 0.0;
     } else {

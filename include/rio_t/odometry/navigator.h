@@ -19,6 +19,7 @@ class Navigator {
   std::optional<NavigationState> add(const ImuMeasurement& imu);
 
   /// New optimised state, usually some 100 ms before the newest sample: everything since is integrated again.
+  /// One more than 30 s old is not taken.
   void anchor(const NavigationState& state);
   /// At the newest sample; none before the first anchor.
   const std::optional<NavigationState>& state() const { return state_; }
