@@ -180,7 +180,8 @@ TEST_F(Smoother, BothSolversFindTheSame) {
     const NodeVector sigma = P.diagonal().cwiseSqrt();
     NodeVector difference;
     difference << boxminus(a.x.data(), b.x.data()), a.t_O - b.t_O;
-    EXPECT_LT(difference.cwiseQuotient(sigma).cwiseAbs().maxCoeff(), 0.03) << "at " << stamp;
+    // Each ends where its last step is shorter than that (eq. 23a).
+    EXPECT_LT(difference.cwiseQuotient(sigma).cwiseAbs().maxCoeff(), 0.1) << "at " << stamp;
     EXPECT_LT(
         (chain.newestCovariance().diagonal().cwiseSqrt() - sigma).cwiseQuotient(sigma).cwiseAbs().maxCoeff(),
         0.02)

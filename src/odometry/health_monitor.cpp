@@ -19,14 +19,18 @@ constexpr double kStepsApart = 20.0;      // [s] nearer, a step of the offset ex
 constexpr double kMaxSpeed = 200.0;       // [m/s] no platform with such a radar
 constexpr double kMetresPerSecond2 = 10;  // an attitude that is off by x turns x g into velocity each second
 
-/// Of the velocity in I [m^2/s^2]: a heading that an IMU gap lost makes v_W vague for good, and is no
-/// divergence.
-Eigen::Matrix3d bodyVelocityCovariance(const NavigationState& state) {
-  const Eigen::Matrix3d R_IW = state.q_WI.conjugate().toRotationMatrix();
-  Eigen::Matrix<double, 3, StateBlock::kTangent> J = Eigen::Matrix<double, 3, StateBlock::kTangent>::Zero();
-  J.middleCols<3>(StateBlock::kTheta) = so3::hat(R_IW * state.v_W);
-  J.middleCols<3>(StateBlock::kV) = R_IW;
-  return J * state.covariance * J.transpose();
+/// Of the velocity in I [m^2/s^2]: a heading that an IMU gap lost makes v_W vague for good, and is no divergence.
+/// With the error delta of the state, that of the velocity is R_IW (delta_v + A delta_theta).
+Eigen::Vector3d bodyVelocityVariance(const NavigationState& state) {
+  using S = StateBlock;
+  const Eigen::Matrix3d R_WI = state.q_WI.toRotationMatrix();
+  const Eigen::Matrix3d A = so3::hat(state.v_W) * R_WI;
+  const auto P_vt = state.covariance.block<3, 3>(S::kV, S::kTheta);
+  const Eigen::Matrix3d AP = A * state.covariance.block<3, 3>(S::kTheta, S::kTheta);
+  const Eigen::Matrix3d cross = P_vt * A.transpose();
+  const Eigen::Matrix3d sum =
+      state.covariance.block<3, 3>(S::kV, S::kV) + cross + cross.transpose() + AP * A.transpose();
+  return (R_WI.transpose() * sum * R_WI).diagonal();
 }
 
 }  // namespace
@@ -93,7 +97,7 @@ Health HealthMonitor::judge(Time now, const NavigationState& state) {
       diverged_at_.reset();
     }
   }
-  const double variance = bodyVelocityCovariance(state).diagonal().maxCoeff();
+  const double variance = bodyVelocityVariance(state).maxCoeff();
   const double max_sigma = options_.max_velocity_sigma;
   const bool known = state.p_W.allFinite() && state.v_W.allFinite() && state.v_W.norm() < kMaxSpeed &&
                      variance < max_sigma * max_sigma;  // false for NaN

@@ -13,7 +13,7 @@ namespace rio_t {
 namespace {
 
 /// Squared length of a step in standard deviations, below which it is the last one (eq. 23a).
-constexpr double kConverged = 1e-3;
+constexpr double kConverged = 1e-2;
 /// Of a step that is tried where the whole one raises the cost. A tilt that is lost makes steps of a radian,
 /// over which the graph is not linear but the direction is right; damping would shorten them to a hundredth.
 constexpr double kShortestShare = 0.06;
@@ -65,15 +65,18 @@ void linearize(const Window& window, ChainSystem* system) {
 SolveReport WindowSolver::solve(Window& window, int max_iterations) {
   SolveReport report;
   double damping = 0.0;
+  bool is_of_system = false;  // solution_, without damping
   linearize(window, &system_);
   for (report.iterations = 1;; ++report.iterations) {
     const bool solved =
         damping == 0.0 ? solveUndamped(system_, &solution_) : rio_t::solve(system_, damping, &solution_);
+    is_of_system = solved && damping == 0.0;
     report.converged = solved && solution_.decrease < kConverged;
     if (report.converged && damping == 0.0) takeStep(solution_, 1.0, window);
     if (report.converged || report.iterations >= max_iterations) break;
     const double cost = system_.cost;
     if (solved && stepLowersCost(window)) {
+      is_of_system = false;
       report.converged = cost - system_.cost < 0.5 * kConverged;
       if (report.converged) break;
       damping = damping > kFirstDamping ? 0.1 * damping : 0.0;
@@ -81,9 +84,8 @@ SolveReport WindowSolver::solve(Window& window, int max_iterations) {
       damping = std::max(kFirstDamping, 10.0 * damping);
     }
   }
-  covariance_ = damping == 0.0 && solution_.newest.info() == Eigen::Success
-                    ? NodeMatrix(solution_.newest.solve(NodeMatrix::Identity()))
-                    : covarianceOfLast(system_);
+  covariance_ =
+      is_of_system ? NodeMatrix(solution_.newest.solve(NodeMatrix::Identity())) : covarianceOfLast(system_);
   return report;
 }
 

@@ -17,7 +17,7 @@ struct SolveReport {
 /// and analysing a sparse matrix for each scan, and the covariance falls out of the last elimination.
 ///
 /// Gauss-Newton from where the nodes are; where a step raises the cost, a half of it and less, then
-/// Levenberg-Marquardt damping. Ends where a step is shorter than 0.03 standard deviations in every direction
+/// Levenberg-Marquardt damping. Ends where a step is shorter than 0.1 standard deviations in every direction
 /// (that step is still taken), where none lowers the cost by more than such a step would, or after
 /// `max_iterations`. Keeps its memory from call to call.
 class WindowSolver {
