@@ -25,7 +25,7 @@ ImuGate::Verdict ImuGate::check(ImuMeasurement& imu) {
     case StampWatch::Verdict::kRestart:
       verdict = {Decision::kRestart, {"imu_clock_restart"}};
       newest_.reset();
-      bridge_ = GapBridge();
+      bridge_.reset();
       break;
   }
   const double gap = newest_ ? imu.time - *newest_ : 0.0;

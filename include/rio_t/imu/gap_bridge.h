@@ -24,6 +24,8 @@ class GapBridge {
  public:
   /// `imu` is taken: to know gravity in the IMU frame, within about a m/s^2, where a gap begins.
   void follow(const ImuMeasurement& imu);
+  /// Starts again, as if nothing had been followed.
+  void reset() { newest_.reset(); }
   /// Samples between the last one that was followed and `next`, without those two; `is_bridge` is set, doubts
   /// are those of `next`. None before the first sample.
   std::vector<ImuMeasurement> until(const ImuMeasurement& next) const;
