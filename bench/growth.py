@@ -8,9 +8,6 @@ import subprocess
 import sys
 import tempfile
 
-import numpy
-import rosbag
-
 RUNS = 5  # of each case; for each stage the fastest counts, the others were disturbed
 COLUMNS = (("reading, output", ("reading and the rest", "output", "pipeline")), ("decode", ("decode",)),
            ("ego-velocity", ("ego-velocity",)), ("factors", ("prediction", "factors")),
@@ -41,24 +38,8 @@ class Bench:
         return path
 
     def bag_of_points(self, points):
-        """A simulated minute with so many points in every scan. The simulator's scene shows some hundred; more are
-        copies of them, moved by 2 % of their range."""
-        path = os.path.join(self.folder, f"points_{points}.bag")
-        random = numpy.random.default_rng(5)
-        with rosbag.Bag(self.bag("--duration", "60", "--points", "100")) as source, rosbag.Bag(path, "w") as bag:
-            for topic, message, time in source.read_messages(["/sensor_platform/imu", "/sensor_platform/radar/scan"]):
-                if topic.endswith("scan") and message.width > 0:
-                    # x y z and four more, all float32
-                    seen = numpy.frombuffer(message.data, numpy.float32).reshape(message.width, message.point_step // 4)
-                    enough = points <= len(seen)
-                    chosen = seen[random.choice(len(seen), points, replace=not enough)]
-                    if not enough:
-                        ranges = numpy.linalg.norm(chosen[:, :3], axis=1, keepdims=True)
-                        chosen[:, :3] += (0.02 * ranges * random.standard_normal((points, 3))).astype(numpy.float32)
-                    message.data, message.width = chosen.tobytes(), points
-                    message.row_step = points * message.point_step
-                bag.write(topic, message, time)
-        return path
+        """A simulated minute with so many points in every scan."""
+        return self.bag("--duration", "60", "--points", str(points), "--points-max", str(points), "--points-sigma", "0")
 
     def cost(self, bag, *assignments):
         """Microseconds a scan, by stage and in sum; the window solve's quantiles."""

@@ -515,6 +515,22 @@ TEST(RadarModel, FrameLengthAveragesTheDoppler) {
   EXPECT_GT(largest, 0.02);  // the frame does matter in this motion
 }
 
+TEST(RadarModel, ShowsAsManyPointsAsAreAskedFor) {
+  for (const int points : {20, 120, 1000}) {
+    SimulationOptions options = withoutErrors();
+    options.radar.points_mean = points;
+    options.radar.points_sigma = 0.0;
+    options.radar.points_max = points;
+    double mean = 0.0;
+    const SensorData data = simulate(builtIn("difficult"), options);
+    for (const SimulatedScan& scan : data.scans)
+      mean += static_cast<double>(scan.points.size()) / static_cast<double>(data.scans.size());
+    EXPECT_NEAR(mean, points, 0.02 * points);
+    options.radar.points_max = points - 1;
+    EXPECT_THROW(simulate(builtIn("difficult"), options), std::invalid_argument);
+  }
+}
+
 TEST(RadarModel, QuantisesTheDoppler) {
   SimulationOptions options;
   options.radar.doppler_step = 0.125;

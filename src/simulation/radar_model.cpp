@@ -30,6 +30,8 @@ void check(const RadarModelOptions& o) {
   require(o.latency >= 0.0 && o.latency_sigma >= 0.0, "latency cannot be negative");
   require(o.points_mean > 0.0 && o.points_sigma >= 0.0 && o.points_max > 0,
           "number of points must be positive");
+  require(o.points_mean <= o.points_max,
+          "mean number of points (points) must not be above its limit (points-max)");
   require(o.min_range >= 0.0 && o.max_range > o.min_range, "maximum range must be above the minimum");
   require(o.fov_azimuth > 0.0 && o.fov_azimuth <= 90.0, "azimuth limit must be in (0, 90] degrees");
   require(o.fov_elevation > 0.0 && o.fov_elevation <= 90.0, "elevation limit must be in (0, 90] degrees");
@@ -111,7 +113,7 @@ class Sensor {
       : motion_(motion),
         options_(options),
         T_IR_(T_IR),
-        scene_W_(makeScene(motion, seed)),
+        scene_W_(makeScene(motion, seed, options.points_mean)),
         persons_(makePersons(motion, options, T_IR, seed)) {}
 
   std::vector<SimulatedPoint> measure(double t, Random& random) const {
@@ -258,10 +260,11 @@ Eigen::Vector3d radarVelocity(const MotionState& state, const Extrinsics& T_IR) 
   return T_IR.q_IR.conjugate() * (state.q_WI.conjugate() * state.v_W + state.omega_I.cross(T_IR.l_I));
 }
 
-std::vector<Eigen::Vector3d> makeScene(const Motion& motion, std::uint64_t seed) {
+std::vector<Eigen::Vector3d> makeScene(const Motion& motion, std::uint64_t seed, double points_mean) {
   constexpr double kStationDistance = 4.0;  // [m]
   constexpr double kRadius = 13.0;          // [m] a little beyond the range of such a radar
-  constexpr int kPerStation = 400;
+  // About a quarter of them is in view.
+  const int per_station = std::max(400, static_cast<int>(std::ceil(8.0 * points_mean)));
   Random random(seed, kSceneStream);
   std::vector<Eigen::Vector3d> stations;
   std::vector<Eigen::Vector3d> scene_W;
@@ -272,7 +275,7 @@ std::vector<Eigen::Vector3d> makeScene(const Motion& motion, std::uint64_t seed)
     });
     if (covered) continue;
     stations.push_back(p_W);
-    for (int i = 0; i < kPerStation; ++i) {
+    for (int i = 0; i < per_station; ++i) {
       const double radius = kRadius * std::sqrt(random.uniform());  // even over the disc
       const double direction = random.uniform(-kPi, kPi);
       const double height = random.uniform(-2.0, 3.5);

@@ -67,8 +67,8 @@ struct SimulatedScan {
 Eigen::Vector3d radarVelocity(const MotionState& state, const Extrinsics& T_IR);
 
 /// Static reflectors scattered around the path of `motion`, in W [m], within radar range wherever the path
-/// leads.
-std::vector<Eigen::Vector3d> makeScene(const Motion& motion, std::uint64_t seed);
+/// leads, and dense enough for `points_mean` points a scan.
+std::vector<Eigen::Vector3d> makeScene(const Motion& motion, std::uint64_t seed, double points_mean);
 
 /// Scans of a radar carried along `motion`; scans whose measurement time is not inside the motion are left
 /// out. Each scan draws from a sequence of its own, so that a lost scan leaves the others as they are. Throws
