@@ -11,8 +11,8 @@ build=${RIO_T_BUILD_DIR:-build-lint}
 scripts/install_dependencies.sh clang-format-14 clang-tidy-14 clang-14 cppcheck
 
 # The messages' headers are all that must be made.
-cmake -S . -B "$build" -DCMAKE_EXPORT_COMPILE_COMMANDS=ON -DPYTHON_EXECUTABLE=/usr/bin/python3 \
-  -DPython3_EXECUTABLE=/usr/bin/python3 >"$build.log" 2>&1 || { cat "$build.log" >&2; exit 1; }
+cmake -S . -B "$build" -DCMAKE_EXPORT_COMPILE_COMMANDS=ON -DRIO_T_FUZZ=ON \
+  -DPYTHON_EXECUTABLE=/usr/bin/python3 -DPython3_EXECUTABLE=/usr/bin/python3 >"$build.log" 2>&1 || { cat "$build.log" >&2; exit 1; }
 rm -f "$build.log"
 cmake --build "$build" --target rio_t_generate_messages_cpp >/dev/null
 
