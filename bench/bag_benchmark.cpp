@@ -37,9 +37,8 @@ void run(const std::string& bag, const std::string& config, const std::string& o
   std::string stages;
   const auto describe = [&](Stage stage, const StageCost& cost) {
     char line[200];
-    std::snprintf(line, sizeof(line),
-                  "    \"%s\": {\"seconds\": %.6f, \"calls\": %llu, \"allocations\": %llu}", name(stage),
-                  cost.seconds, static_cast<unsigned long long>(cost.calls),
+    std::snprintf(line, sizeof(line), R"(    "%s": {"seconds": %.6f, "calls": %llu, "allocations": %llu})",
+                  name(stage), cost.seconds, static_cast<unsigned long long>(cost.calls),
                   static_cast<unsigned long long>(cost.allocations));
     stages += (stages.empty() ? "" : ",\n") + std::string(line);
   };

@@ -5,11 +5,13 @@
 
 #include "stage_clock.h"
 
-// The C library's own names of the same functions (glibc).
+// The C library's own names of the same functions (glibc), hence reserved.
+// NOLINTBEGIN(bugprone-reserved-identifier)
 extern "C" void* __libc_malloc(std::size_t size);
 extern "C" void* __libc_calloc(std::size_t count, std::size_t size);
 extern "C" void* __libc_realloc(void* memory, std::size_t size);
 extern "C" void* __libc_memalign(std::size_t alignment, std::size_t size);
+// NOLINTEND(bugprone-reserved-identifier)
 
 namespace {
 

@@ -26,11 +26,12 @@ template <typename Function>
 Function libraryFunction(Function own) {
   void* address = nullptr;
   std::memcpy(&address, &own, sizeof(address));  // a pointer to a member function begins with the address
-  Dl_info info;
+  Dl_info info{};
   void* found = nullptr;
   if (dladdr(address, &info) != 0 && info.dli_sname != nullptr) found = dlsym(RTLD_NEXT, info.dli_sname);
   if (found == nullptr) {
-    std::fprintf(stderr, "bag_benchmark: a timed function of the libraries was not found: %s\n", dlerror());
+    std::fprintf(stderr, "bag_benchmark: a timed function of the libraries was not found: %s\n",
+                 info.dli_sname != nullptr ? info.dli_sname : "it has no symbol");
     std::abort();
   }
   std::memcpy(&own, &found, sizeof(found));

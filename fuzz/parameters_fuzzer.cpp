@@ -41,6 +41,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string printed = rio_t::toYaml(config);
   require(rio_t::toYaml(rio_t::makeConfig(read(printed))) == printed, "what is printed reads back the same");
   rio_t::pointCloudFormat(config);
-  rio_t::RadarInertialOdometry{config.odometry};
+  const rio_t::RadarInertialOdometry odometry(config.odometry);
   return 0;
 }

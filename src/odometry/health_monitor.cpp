@@ -19,8 +19,8 @@ constexpr double kStepsApart = 20.0;      // [s] nearer, a step of the offset ex
 constexpr double kMaxSpeed = 200.0;       // [m/s] no platform with such a radar
 constexpr double kMetresPerSecond2 = 10;  // an attitude that is off by x turns x g into velocity each second
 
-/// Of the velocity in I [m^2/s^2]: a heading that an IMU gap lost makes v_W vague for good, and is no divergence.
-/// With the error delta of the state, that of the velocity is R_IW (delta_v + A delta_theta).
+/// Of the velocity in I [m^2/s^2]: a heading that an IMU gap lost makes v_W vague for good, and is no
+/// divergence. With the error delta of the state, that of the velocity is R_IW (delta_v + A delta_theta).
 Eigen::Vector3d bodyVelocityVariance(const NavigationState& state) {
   using S = StateBlock;
   const Eigen::Matrix3d R_WI = state.q_WI.toRotationMatrix();

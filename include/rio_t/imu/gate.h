@@ -35,9 +35,11 @@ class ImuGate {
   };
   struct Verdict {
     Decision decision = Decision::kTake;
-    std::vector<const char*> faults = {};  ///< snake case: "imu_not_finite", "imu_out_of_order", "imu_stamp_jump",
-                                      ///< "imu_clock_restart", "imu_gap", "imu_saturated"
-    std::vector<ImuMeasurement> bridge = {};  ///< to be taken first: stands for what a gap before this sample hid
+    /// Snake case: "imu_not_finite", "imu_out_of_order", "imu_stamp_jump", "imu_clock_restart", "imu_gap",
+    /// "imu_saturated".
+    std::vector<const char*> faults = {};
+    /// To be taken first: stands for what a gap before this sample hid.
+    std::vector<ImuMeasurement> bridge = {};
   };
 
   /// `max_gap` [s] between samples: a longer one is reported, and what it hides is doubted.

@@ -65,8 +65,8 @@ class HealthMonitor {
  private:
   struct Entry {
     Time stamp;
-    double contradiction;  ///< 0..1
-    double square;         ///< d'd [m^2/s^2]
+    double contradiction = 0.0;  ///< 0..1
+    double square = 0.0;         ///< d'd [m^2/s^2]
   };
   /// Mean over the window; none before it is full.
   std::optional<double> contradiction() const;
