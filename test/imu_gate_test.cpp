@@ -153,6 +153,24 @@ TEST(GapBridge, OverALongGapGravityTurnsWithThePlatformAndTheRestDiesAway) {
   EXPECT_GT((samples[0].acceleration - gravity).x(), 3.5);
 }
 
+TEST(GapBridge, AGapOfAnHourGivesFiniteSamples) {
+  GapBridge bridge;
+  ImuMeasurement imu;
+  imu.time = Time::fromNanoseconds(1);
+  imu.acceleration = {0.0, 0.0, 9.8};
+  imu.angular_velocity = {0.0, 0.0, 2.0};
+  bridge.follow(imu);
+  ImuMeasurement next = imu;
+  next.time = imu.time + 3600.0;
+  const auto samples = bridge.until(next);
+  ASSERT_FALSE(samples.empty());
+  for (const ImuMeasurement& sample : samples) {
+    ASSERT_TRUE(sample.angular_velocity.allFinite());
+    ASSERT_TRUE(sample.acceleration.allFinite());
+  }
+  EXPECT_NEAR(samples.back().angular_velocity.z(), 2.0, 0.1) << "as the end of the gap has it";
+}
+
 // An accelerometer that ends at 1 m/s^2 beyond what it first read shows flat tops; the noise at rest does
 // not.
 TEST(Saturation, FlatTopsAreFoundWithoutKnowingTheRange) {

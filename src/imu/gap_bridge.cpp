@@ -12,6 +12,9 @@ constexpr double kStep = 0.02;  // [s] between samples that are made up
 constexpr double kGravityTime =
     1.5;  // [s] of the accelerometer that show gravity: a few swings of the motion
 
+/// sinh(a) / sinh(b) for 0 <= a <= b, b > 0; each by itself overflows from 711 on, a gap of six minutes.
+double sinhRatio(double a, double b) { return std::exp(a - b) * std::expm1(-2.0 * a) / std::expm1(-2.0 * b); }
+
 }  // namespace
 
 void GapBridge::follow(const ImuMeasurement& imu) {
@@ -30,9 +33,9 @@ std::vector<ImuMeasurement> GapBridge::until(const ImuMeasurement& next) const {
   const double gap = next.time - newest_->time;
   const int steps = static_cast<int>(std::ceil(gap / kStep));
   const double dt = gap / steps;
-  const double whole = std::sinh(gap / kMotionCorrelationTime);
-  const auto before = [&](int i) { return std::sinh((steps - i) * dt / kMotionCorrelationTime) / whole; };
-  const auto after = [&](int i) { return std::sinh(i * dt / kMotionCorrelationTime) / whole; };
+  const double step = dt / kMotionCorrelationTime;
+  const auto before = [&](int i) { return sinhRatio((steps - i) * step, steps * step); };
+  const auto after = [&](int i) { return sinhRatio(i * step, steps * step); };
 
   // How the platform turns, and gravity with it.
   std::vector<ImuMeasurement> bridge;
