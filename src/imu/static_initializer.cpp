@@ -77,6 +77,7 @@ std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement&
   }
   if (!fault.empty()) {
     waiting_for_ = fault;
+    has_seen_motion_ = true;
     samples_.erase(samples_.begin(), samples_.begin() + static_cast<std::ptrdiff_t>(samples_.size() / 4 + 1));
     return std::nullopt;
   }

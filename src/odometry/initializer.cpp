@@ -13,7 +13,10 @@ Initializer::Initializer(const OdometryOptions& options)
 
 bool Initializer::mayStartInMotion() const {
   if (options_.init_mode != InitMode::kAuto) return options_.init_mode == InitMode::kMotion;
-  return first_ && *newest_ - *first_ >= options_.init_motion_after;
+  // Not while a long init_duration is still under way at rest.
+  return first_ && *newest_ - *first_ >= options_.init_motion_after &&
+         (rest_.hasSeenMotion() || radar_contradicts_rest_ ||
+          motion_.isMoving(*newest_ - options_.init_motion_after, *newest_, options_.rest.max_speed));
 }
 
 std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, const ImuBuffer& imu) {

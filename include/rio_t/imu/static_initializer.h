@@ -37,12 +37,15 @@ class StaticInitializer {
   std::optional<StaticInitialization> add(const ImuMeasurement& imu);
   /// What is being waited for, for people: "collecting 1.2 of 3.0 s at rest", "motion: gyro std ...".
   const std::string& waitingFor() const { return waiting_for_; }
+  /// Whether some duration was seen that was no rest.
+  bool hasSeenMotion() const { return has_seen_motion_; }
 
  private:
   StaticInitializerOptions options_;  // read-only after construction
   double gravity_;                    // read-only after construction
   std::vector<ImuMeasurement> samples_;
   std::string waiting_for_ = "the first IMU sample";
+  bool has_seen_motion_ = false;
 };
 
 /// Shortest rotation that turns the measured specific force at rest, in I, onto the upward axis of W; yaw
