@@ -53,7 +53,7 @@ class RadarInertialOdometry {
   /// initialisation. Samples that are out of place in time, or not finite, are dropped and counted in
   /// `faults()`, as are gaps and saturated samples, over which the uncertainty grows (see ImuGate). Where the
   /// IMU's clock jumps, all starts again with an initialisation.
-  std::optional<NavigationState> addImu(const ImuMeasurement& imu);
+  std::optional<NavigationState> addImu(const ImuMeasurement& measured);
 
   /// Queues a scan. It waits until the IMU covers its time of measurement.
   void addScan(RadarScan scan);
