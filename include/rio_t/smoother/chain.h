@@ -60,9 +60,11 @@ using RowMajorNodeMatrix = Eigen::Matrix<double, kNodeTangent, kNodeTangent, Eig
 /// Solution of a chain; keeps its memory from call to call.
 struct ChainSolution {
   std::vector<NodeVector> delta;
-  double decrease = 0.0;           ///< delta' H delta = -b' delta: the squared length of the step in sigmas
-  Eigen::LLT<NodeMatrix> newest;   ///< of the last node's information after all others are eliminated
-  std::vector<NodeMatrix> factor;  ///< lower triangles L_k of the eliminated nodes
+  double decrease = 0.0;  ///< delta' H delta = -b' delta: the squared length of the step in sigmas
+  /// Of the last node's information after all others are eliminated. Never empty: Eigen leaves the state of
+  /// an empty one unset, and a move would read it.
+  Eigen::LLT<NodeMatrix> newest{NodeMatrix(NodeMatrix::Identity())};
+  std::vector<NodeMatrix> factor;        ///< lower triangles L_k of the eliminated nodes
   std::vector<RowMajorNodeMatrix> gain;  ///< L_k^-1 H_k,k+1
 };
 /// Solves (H + damping diag(H)) delta = -b. False where that matrix is not positive definite.
