@@ -113,7 +113,13 @@ class BagRunner : public testing::Test {
                                   "snr_db", 1, sensor_msgs::PointField::FLOAT32, what.doppler_field.c_str(),
                                   1, sensor_msgs::PointField::FLOAT32);
     modifier.resize(static_cast<std::size_t>(what.points));
-    sensor_msgs::PointCloud2Iterator<float> x(cloud, "x");
+    // An iterator refers to the first byte at once, which an empty cloud does not have.
+    if (what.points > 0) writePoints(what, &cloud);
+    bag->write("/sensor_platform/radar/scan", record + ros::Duration(0.0005), cloud);
+  }
+
+  static void writePoints(const BagContents& what, sensor_msgs::PointCloud2* cloud) {
+    sensor_msgs::PointCloud2Iterator<float> x(*cloud, "x");
     for (int i = 0; i < what.points; ++i, ++x) {
       const double azimuth = 0.9 * std::sin(1.0 + 2.4 * i);
       x[0] = static_cast<float>(4.0 * std::sin(azimuth));
@@ -122,7 +128,6 @@ class BagRunner : public testing::Test {
       x[3] = 20.0F;
       x[4] = static_cast<float>((i % 2 == 0 ? 1.0 : -1.0) * what.doppler);
     }
-    bag->write("/sensor_platform/radar/scan", record + ros::Duration(0.0005), cloud);
   }
 
   Outcome run(const std::vector<std::string>& more = {}) const {
