@@ -75,7 +75,10 @@ void checkTopics(const std::string& bag, const std::map<std::string, std::string
   if (faults.empty()) return;
   if (missing) {
     std::string known;
-    for (const auto& [topic, type] : types) known += (known.empty() ? "" : ", ") + topic + " (" + type + ")";
+    for (const auto& [topic, type] : types) {
+      if (!known.empty()) known += ", ";
+      known.append(topic).append(" (").append(type).append(")");
+    }
     faults += "; the bag has " + (known.empty() ? "no topics" : known);
   }
   throw bagError(bag, faults);
@@ -97,7 +100,7 @@ std::pair<ros::Time, ros::Time> playedSpan(const std::string& path, const rosbag
 
 template <typename Message>
 boost::shared_ptr<Message> read(const rosbag::MessageInstance& instance) {
-  const boost::shared_ptr<Message> message = instance.instantiate<Message>();
+  boost::shared_ptr<Message> message = instance.instantiate<Message>();
   if (!message)
     throw std::runtime_error("topic " + instance.getTopic() + ": a message of another version of its type");
   return message;

@@ -30,11 +30,7 @@ void assign(const Eigen::Quaterniond& from, geometry_msgs::Quaternion* to) {
 template <typename Array>
 void assign(const Covariance6& from, Array* to) {
   // Symmetric in theory; in the message also to the last bit.
-  for (int row = 0; row < 6; ++row) {
-    for (int column = 0; column < 6; ++column) {
-      (*to)[static_cast<std::size_t>(6 * row + column)] = 0.5 * (from(row, column) + from(column, row));
-    }
-  }
+  Eigen::Map<Covariance6>(to->data()) = 0.5 * (from + from.transpose());
 }
 
 }  // namespace

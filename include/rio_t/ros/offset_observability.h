@@ -25,7 +25,7 @@ class OffsetObservability {
  private:
   struct Sample {
     Time time;
-    double information;  // [1/s^2]
+    double information = 0.0;  // [1/s^2]
   };
 
   double window_, max_sigma_;

@@ -79,12 +79,12 @@ class ScanStamper {
 
  private:
   struct Trigger {
-    std::uint32_t seq;
+    std::uint32_t seq = 0;
     Time stamp, record;
-    bool used;
+    bool used = false;
   };
   struct Held {
-    std::uint32_t seq;
+    std::uint32_t seq = 0;
     Time header_stamp, record;
     RadarScan scan;
   };
