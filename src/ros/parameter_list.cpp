@@ -192,6 +192,7 @@ void ParameterList::textOrEmpty(const std::string& key, std::string& member, con
 void ParameterList::word(const std::string& key, const std::vector<std::string>& words, std::string& member,
                          const std::string& meaning) {
   std::vector<std::pair<std::string, std::string>> choices;
+  choices.reserve(words.size());
   for (const std::string& each : words) choices.emplace_back(each, each);
   choice<std::string>(key, choices, member, meaning);
 }

@@ -57,7 +57,7 @@ std::vector<std::string> contradictions(const Config& config) {
                      numberText(smoother.time_offset_initial));
   }
   if (config.stamp_source == StampSource::kTrigger && config.trigger_topic.empty()) {
-    faults.push_back("trigger_topic: expected a topic, since stamp_source is trigger, got \"\"");
+    faults.emplace_back("trigger_topic: expected a topic, since stamp_source is trigger, got \"\"");
   }
   return faults;
 }
@@ -186,7 +186,7 @@ std::string findConfigFile(const std::string& name_or_path) {
   }
   const std::string folder = configFolder();
   for (const char* extension : {"", ".yaml"}) {
-    const std::string path = folder + "/" + name_or_path + extension;
+    std::string path = folder + "/" + name_or_path + extension;
     if (fs::is_regular_file(path)) return path;
   }
   std::vector<std::string> names;

@@ -22,7 +22,7 @@ class LivePublisher {
 
   void odometry(const NavigationState& state, double rate_sigma);  ///< ~odom and tf
   /// ~odom_optimized, ~time_offset, ~imu_bias, ~path, ~ego_velocity, ~points, ~inliers.
-  void result(const LiveSession::Result& result, double rate_sigma);
+  void result(const LiveSession::Result& live, double rate_sigma);
   /// base_link_frame -> radar_frame, for display.
   void extrinsics(const Extrinsics& T_IR);
   void clearPath();  ///< optimisation thread
