@@ -21,7 +21,8 @@ ParameterValue toParameterValue(XmlRpc::XmlRpcValue& value) {
       break;
     case XmlRpc::XmlRpcValue::TypeArray: {
       ParameterValue::List list;
-      for (int k = 0; k < value.size(); ++k) {
+      // begin() and end() are those of a struct's members.
+      for (int k = 0; k < value.size(); ++k) {  // NOLINT(modernize-loop-convert)
         // No deeper: no parameter takes lists of lists.
         const bool is_list = value[k].getType() == XmlRpc::XmlRpcValue::TypeArray;
         list.push_back(is_list ? ParameterValue{ParameterValue::Map{}} : toParameterValue(value[k]));
@@ -50,7 +51,7 @@ ParameterEntries toParameterEntries(XmlRpc::XmlRpcValue& map, const std::string&
 }
 
 Config configFromRos(const ros::NodeHandle& private_node) {
-  const std::string name_space = private_node.getNamespace();
+  const std::string& name_space = private_node.getNamespace();
   ParameterEntries entries;
   if (private_node.hasParam("config")) {
     std::string file;

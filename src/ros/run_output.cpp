@@ -2,11 +2,11 @@
 
 #include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <locale>
 #include <sstream>
 #include <stdexcept>
+#include <system_error>
 
 #include "rio_t/factors/state_block.h"
 #include "rio_t/ros/conversions.h"
@@ -136,8 +136,10 @@ void appendStamp(std::string* text, Time time) {
 void RunOutput::File::open(const std::string& path_in) {
   path = path_in;
   stream.open(path, std::ios::binary | std::ios::trunc);
-  if (!stream)
-    throw std::runtime_error("output " + path + ": cannot be written (" + std::strerror(errno) + ")");
+  if (!stream) {
+    const std::string reason = std::error_code(errno, std::generic_category()).message();
+    throw std::runtime_error("output " + path + ": cannot be written (" + reason + ")");
+  }
   buffer.reserve(kBufferSize + 1024);
 }
 
