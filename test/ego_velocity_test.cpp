@@ -255,10 +255,10 @@ TEST(EgoVelocity, StatusAndSolverNames) {
   for (const EgoVelocityStatus status :
        {EgoVelocityStatus::kMoving, EgoVelocityStatus::kZeroVelocity, EgoVelocityStatus::kTooFewPoints,
         EgoVelocityStatus::kTooFewInliers, EgoVelocityStatus::kIllConditioned,
-        EgoVelocityStatus::kSigmaTooLarge}) {
+        EgoVelocityStatus::kSigmaTooLarge, EgoVelocityStatus::kAmbiguous}) {
     names.insert(toString(status));
   }
-  EXPECT_EQ(names.size(), 6u);
+  EXPECT_EQ(names.size(), 7u);
   for (const EgoVelocitySolver solver :
        {EgoVelocitySolver::kLeastSquares, EgoVelocitySolver::kErrorsInVariables}) {
     EXPECT_EQ(egoVelocitySolverFromString(toString(solver)), solver);
@@ -435,6 +435,24 @@ TEST(EgoVelocityPrior, AVagueOneIsOneWitnessMore) {
     EXPECT_LT((aided.v_R - kVelocity).norm(), 0.3) << trial;
   }
   EXPECT_GT(unaided_wrong, 25);
+}
+
+TEST(EgoVelocityPrior, WhereItCannotDecideTheScanIsAmbiguous) {
+  const EgoVelocityEstimator estimator{EgoVelocityOptions()};
+  Random random(34);
+  const Eigen::Vector3d object_v_R(0.8, 0.9, 0.0);
+  VelocityPrior prior;
+  prior.v_R = kVelocity;
+  for (int trial = 0; trial < 50; ++trial) {
+    // Two thirds are of the object: more than the world, not all there is.
+    RadarScan scan = staticScene(kVelocity, 12, {0.01, 0.02, 0.01, 0.125}, random);
+    const RadarScan object = sceneWithObject(kVelocity, object_v_R, random);
+    scan.points.insert(scan.points.end(), object.points.end() - 25, object.points.end());
+    prior.covariance = 0.4 * 0.4 * Eigen::Matrix3d::Identity();
+    EXPECT_EQ(estimator.estimate(scan, prior).status, EgoVelocityStatus::kAmbiguous) << trial;
+    prior.covariance = 0.05 * 0.05 * Eigen::Matrix3d::Identity();
+    EXPECT_LT((estimator.estimate(scan, prior).v_R - kVelocity).norm(), 0.3) << trial;
+  }
 }
 
 TEST(EgoVelocityPrior, AGoodOneAddsNoInformation) {

@@ -17,6 +17,8 @@ namespace {
 /// Of a prior that outweighs a majority of the points [m/s]: sharper than a moving object and the world
 /// differ.
 constexpr double kMaxSharpSigma = 0.1;
+/// Of the points, that leave nothing else to be the static world.
+constexpr double kClearMajority = 0.85;
 /// Log-likelihood ratio of a point that a velocity explains to one that it does not: a Gaussian of 0.05 m/s
 /// against a uniform density over some m/s.
 constexpr double kEvidenceOfAPoint = 4.0;
@@ -168,29 +170,34 @@ double squaredDistance(const VelocitySolution& solution, const VelocityPrior& pr
 /// Replaces `inliers` by the points that support a velocity near the prior, where that is the better choice.
 /// A sharp prior that speaks against the velocity of `inliers` outweighs even a majority of the points. A
 /// vague one is weighed against their number: it must not find a minority that sides with it where it is
-/// wrong.
-void heedPrior(const std::vector<Direction>& points, const VelocityPrior& prior, const EgoVelocityOptions& o,
+/// wrong. False where a vague prior speaks against neither of two velocities and most points do not decide:
+/// the scan is ambiguous.
+bool heedPrior(const std::vector<Direction>& points, const VelocityPrior& prior, const EgoVelocityOptions& o,
                std::vector<Direction>& inliers) {
   const double gate = o.prior_gate * o.prior_gate;
+  const auto n = static_cast<double>(points.size());
   const bool is_sharp = largestSigma(prior.covariance) < kMaxSharpSigma;
   const VelocitySolution unaided = solveLeastSquares(inliers, o);
   const double d2_unaided =
       unaided.solved ? squaredDistance(unaided, prior) : std::numeric_limits<double>::max();
-  if (is_sharp && d2_unaided <= gate) return;
+  if (is_sharp && d2_unaided <= gate) return true;
   std::vector<Direction> supporters;
   supporters.reserve(points.size());
   selectInliers(points, prior.v_R, o, supporters);
   VelocitySolution aided = solveLeastSquares(supporters, o);
-  if (!aided.solved) return;
+  if (!aided.solved) return true;
   selectInliers(points, aided.v_R, o, supporters);
   aided = solveLeastSquares(supporters, o);
-  if (!aided.solved || static_cast<double>(supporters.size()) <
-                           o.prior_min_inlier_fraction * static_cast<double>(points.size()))
-    return;
+  if (!aided.solved || static_cast<double>(supporters.size()) < o.prior_min_inlier_fraction * n) return true;
   const double d2_aided = squaredDistance(aided, prior);
   const double fewer = static_cast<double>(inliers.size()) - static_cast<double>(supporters.size());
-  if (is_sharp ? d2_aided <= gate : kEvidenceOfAPoint * fewer < 0.5 * (d2_unaided - d2_aided))
+  if (is_sharp ? d2_aided <= gate : kEvidenceOfAPoint * fewer < 0.5 * (d2_unaided - d2_aided)) {
     inliers = supporters;
+    return true;
+  }
+  if (is_sharp || d2_unaided > gate || d2_aided > gate) return true;
+  const bool is_clear = static_cast<double>(inliers.size()) > kClearMajority * n;
+  return is_clear || squaredDistance(unaided, {aided.v_R, aided.covariance}) <= gate;
 }
 
 /// Covariance at rest, where every inlier reads the zero bin, of width q. Two things bound the velocity:
@@ -265,7 +272,10 @@ EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
     }
     inliers.reserve(points.size());
     selectInliers(points, *consensus, o, inliers);
-    if (prior) heedPrior(points, *prior, o, inliers);
+    if (prior && !heedPrior(points, *prior, o, inliers)) {
+      result.status = EgoVelocityStatus::kAmbiguous;
+      return result;
+    }
     // At rest in front of an object that moves, too many points disagree for the test above, but not these.
     rest = most_read_zero(inliers);
   }
@@ -321,6 +331,8 @@ std::string toString(EgoVelocityStatus status) {
       return "ill_conditioned";
     case EgoVelocityStatus::kSigmaTooLarge:
       return "sigma_too_large";
+    case EgoVelocityStatus::kAmbiguous:
+      return "ambiguous";
   }
   throw std::invalid_argument("ego velocity: not a status");
 }

@@ -69,6 +69,7 @@ enum class EgoVelocityStatus {
   kTooFewInliers,   ///< no velocity that enough points agree on
   kIllConditioned,  ///< the directions do not span 3D
   kSigmaTooLarge,   ///< uncertainty above max_sigma
+  kAmbiguous,       ///< two velocities, and a prior too vague to decide between them
 };
 bool isValid(EgoVelocityStatus status);          ///< kMoving or kZeroVelocity
 std::string toString(EgoVelocityStatus status);  ///< snake case, e.g. "too_few_points"
