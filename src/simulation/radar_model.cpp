@@ -77,9 +77,9 @@ double rangeRate(const RadarState& radar, const Eigen::Vector3d& p_W, const Eige
 
 // Somebody who walks past.
 struct Person {
-  double from, until;   // [s]
-  Eigen::Vector3d p_W;  // at `from`
-  Eigen::Vector3d v_W;
+  double from = 0.0, until = 0.0;                 // [s]
+  Eigen::Vector3d p_W = Eigen::Vector3d::Zero();  // at `from`
+  Eigen::Vector3d v_W = Eigen::Vector3d::Zero();
 };
 
 std::vector<Person> makePersons(const Motion& motion, const RadarModelOptions& o, const Extrinsics& T_IR,
@@ -141,9 +141,9 @@ class Sensor {
     std::array<RadarState, 3> nodes;  // three-point Gauss over the frame
   };
   struct Echo {
-    Eigen::Vector3d p_W;
-    Eigen::Vector3d v_W;
-    double snr_db;
+    Eigen::Vector3d p_W = Eigen::Vector3d::Zero();
+    Eigen::Vector3d v_W = Eigen::Vector3d::Zero();
+    double snr_db = 0.0;
   };
 
   Frame frameAt(double t) const {
@@ -279,8 +279,8 @@ std::vector<Eigen::Vector3d> makeScene(const Motion& motion, std::uint64_t seed,
       const double radius = kRadius * std::sqrt(random.uniform());  // even over the disc
       const double direction = random.uniform(-kPi, kPi);
       const double height = random.uniform(-2.0, 3.5);
-      scene_W.push_back(p_W +
-                        Eigen::Vector3d(radius * std::cos(direction), radius * std::sin(direction), height));
+      scene_W.emplace_back(
+          p_W + Eigen::Vector3d(radius * std::cos(direction), radius * std::sin(direction), height));
     }
   }
   return scene_W;

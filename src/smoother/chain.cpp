@@ -106,7 +106,7 @@ void ChainSystem::addState(std::size_t k, const RestFactor& factor, const double
 
 void ChainSystem::addOffsetPair(std::size_t k, const ConstantOffsetFactor& factor, const double* t_O,
                                 const double* next_t_O) {
-  double r, a, b;
+  double r = 0.0, a = 0.0, b = 0.0;
   evaluate(factor, t_O, next_t_O, &r, &a, &b);
   cost += 0.5 * r * r;
   diagonal[k](kState, kState) += a * a;
@@ -187,7 +187,7 @@ NodePrior priorFromInformation(const NodeInformation& information, const StateBl
     return prior;
   }
   const Eigen::SelfAdjointEigenSolver<NodeMatrix> eigen(scaled);
-  const NodeVector lambda = eigen.eigenvalues();
+  const NodeVector& lambda = eigen.eigenvalues();
   const double floor = 1e-12 * std::max(lambda.maxCoeff(), 0.0);
 
   for (int i = 0; i < kNodeTangent; ++i) {
