@@ -495,13 +495,12 @@ TEST(RunOutput, NumbersAreFixedAndStampsExact) {
   EXPECT_EQ(stamp, "1700000000.000000007");
 }
 
-// --- The real sensors
-// ----------------------------------------------------------------------------------------
+// --- The real sensors ---
 
 class RealBag : public testing::Test {
  protected:
   void SetUp() override {
-    const char* folder = std::getenv("RIO_T_DATA_DIR");
+    const char* folder = std::getenv("RIO_T_DATA_DIR");  // NOLINT(concurrency-mt-unsafe): nobody sets it
     bag_ = (folder != nullptr ? std::string(folder) : std::string(RIO_T_SOURCE_DIR) + "/../shared/data") +
            "/real/ti_mmwave_rospkg_demo.bag";
     if (!fs::exists(bag_)) GTEST_SKIP() << "the real bag is not here: " << bag_;

@@ -18,9 +18,9 @@ namespace {
 double wave(int i) { return std::sin(1.0 + 2.71 * i) + 0.4 * std::cos(0.9 * i * i); }
 
 Eigen::MatrixXd dense(const ChainSystem& chain) {
-  const int n = static_cast<int>(chain.diagonal.size());
+  const auto n = static_cast<Eigen::Index>(chain.diagonal.size());
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n * kNodeTangent, n * kNodeTangent);
-  for (int k = 0; k < n; ++k) {
+  for (Eigen::Index k = 0; k < n; ++k) {
     H.block<kNodeTangent, kNodeTangent>(k * kNodeTangent, k * kNodeTangent) = chain.diagonal[k];
     if (k + 1 == n) continue;
     H.block<kNodeTangent, kNodeTangent>(k * kNodeTangent, (k + 1) * kNodeTangent) = chain.coupling[k];
@@ -33,7 +33,7 @@ Eigen::MatrixXd dense(const ChainSystem& chain) {
 /// Largest difference of corresponding blocks, in standard deviations squared.
 double difference(const std::vector<NodeMatrix>& marginals, const Eigen::MatrixXd& covariance) {
   double largest = 0.0;
-  for (int k = 0; k < static_cast<int>(marginals.size()); ++k) {
+  for (Eigen::Index k = 0; k < static_cast<Eigen::Index>(marginals.size()); ++k) {
     const NodeMatrix block = covariance.block<kNodeTangent, kNodeTangent>(k * kNodeTangent, k * kNodeTangent);
     const NodeVector scale = block.diagonal().cwiseSqrt().cwiseInverse();
     const NodeMatrix scaled = scale.asDiagonal() * (marginals[k] - block) * scale.asDiagonal();

@@ -549,7 +549,7 @@ class EvoComparison : public testing::TestWithParam<EvoFigures> {};
 
 TEST_P(EvoComparison, GivesTheSameFigures) {
   const EvoFigures& evo = GetParam();
-  const char* folder = std::getenv("RIO_T_DATA_DIR");
+  const char* folder = std::getenv("RIO_T_DATA_DIR");  // NOLINT(concurrency-mt-unsafe): nobody sets it
   const std::string data = folder != nullptr ? folder : std::string(RIO_T_SOURCE_DIR) + "/../shared/data";
   for (const std::string& file : {data + evo.truth, data + evo.estimate}) {
     if (!std::ifstream(file)) GTEST_SKIP() << file << " is absent (folder: RIO_T_DATA_DIR)";
