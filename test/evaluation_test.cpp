@@ -174,6 +174,7 @@ TEST(Tum, WritesWhatItReads) {
 
 std::vector<std::pair<std::size_t, std::size_t>> pairs(const std::vector<Match>& matches) {
   std::vector<std::pair<std::size_t, std::size_t>> result;
+  result.reserve(matches.size());
   for (const Match& match : matches) result.emplace_back(match.truth, match.estimate);
   return result;
 }
