@@ -182,7 +182,7 @@ std::optional<StaticInitialization> feed(StaticInitializer& initializer, double 
   Noise draw;
   for (int i = 0; i < static_cast<int>(seconds * 200.0); ++i) {
     const double t = from + i / 200.0;
-    const auto result = initializer.add(
+    auto result = initializer.add(
         {Time::fromSeconds(t), gyro + (0.002 + extra) * draw.vector(), accel + 0.02 * draw.vector()});
     if (result) return result;
   }
