@@ -66,7 +66,7 @@ struct Rig {
       for (; next != data.scans.end() && next->stamp < sample.time; ++next) {
         if (next->stamp - setup.start > begin) initializer.add(next->stamp, estimator.estimate(scan(*next)));
       }
-      if (const auto found = initializer.solve(imu, [&](Time) { return anchor; })) return found;
+      if (auto found = initializer.solve(imu, [&](Time) { return anchor; })) return found;
     }
     return std::nullopt;
   }
