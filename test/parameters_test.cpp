@@ -276,7 +276,7 @@ TEST(Parameters, CommittedFileIsWhatTheProgramPrints) {
 
 TEST(Parameters, PrintedConfigurationReadsBack) {
   const Config config = fromAssignments(
-      {"window=0.3333333333333333", "stamp_source=arrival", "ground_truth=\"a \\\"b\\\".txt\"",
+      {"window=0.3333333333333333", "stamp_source=arrival", R"(ground_truth="a \"b\".txt")",
        "imu_gyro_random_walk=1.2345678901234567e-7", "radar_doppler_sign=-1", "radar_axes=flu",
        "extrinsics_rotation_xyzw=[0.5, -0.5, 0.5, -0.5]",
        "extrinsics_translation=[0.1, 0.2, 0.30000000000000004]"});
@@ -344,7 +344,7 @@ struct TwoMembers {
   double a = 0.0;
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
 };
-static_assert(memberCount<TwoMembers>() == 2, "");
+static_assert(memberCount<TwoMembers>() == 2);
 
 std::size_t keysChanging(const std::string& group) {
   std::size_t count = 0;
