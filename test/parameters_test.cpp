@@ -275,11 +275,11 @@ TEST(Parameters, CommittedFileIsWhatTheProgramPrints) {
 }
 
 TEST(Parameters, PrintedConfigurationReadsBack) {
-  const Config config = fromAssignments(
-      {"window=0.3333333333333333", "stamp_source=arrival", R"(ground_truth="a \"b\".txt")",
-       "imu_gyro_random_walk=1.2345678901234567e-7", "radar_doppler_sign=-1", "radar_axes=flu",
-       "extrinsics_rotation_xyzw=[0.5, -0.5, 0.5, -0.5]",
-       "extrinsics_translation=[0.1, 0.2, 0.30000000000000004]"});
+  const Config config =
+      fromAssignments({"window=0.3333333333333333", "stamp_source=arrival", R"(ground_truth="a \"b\".txt")",
+                       "imu_gyro_random_walk=1.2345678901234567e-7", "radar_doppler_sign=-1",
+                       "radar_axes=flu", "extrinsics_rotation_xyzw=[0.5, -0.5, 0.5, -0.5]",
+                       "extrinsics_translation=[0.1, 0.2, 0.30000000000000004]"});
   const TemporaryFile file(toYaml(config));
   const Config back = makeConfig(readParameterFile(file.path()));
   EXPECT_EQ(toYaml(back), toYaml(config));
