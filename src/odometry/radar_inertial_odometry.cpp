@@ -432,16 +432,7 @@ void RadarInertialOdometry::Impl::judgePrediction(const RadarScan& scan, const V
 }
 
 NavigationState RadarInertialOdometry::Impl::newestState(const NodeMatrix& covariance) const {
-  const NodeEstimate newest = smoother.newest();
-  NavigationState state;
-  state.time = newest.time;
-  state.q_WI = newest.x.q_WI();
-  state.p_W = newest.x.p_W();
-  state.v_W = newest.x.v_W();
-  state.b_g = newest.x.b_g();
-  state.b_a = newest.x.b_a();
-  state.angular_velocity = imu.at(newest.time).angular_velocity - state.b_g;
-  state.covariance = covariance.topLeftCorner<StateBlock::kTangent, StateBlock::kTangent>();
+  NavigationState state = navigationState(smoother.newest(), covariance, imu);
   yaw_doubt.addTo(state);
   pose_doubt.addTo(state);
   health_monitor.widen(state);

@@ -113,7 +113,7 @@ void listGaps(ParameterList& list, Config& c) {
   list.group("What sensors may leave out");
   list.number("max_imu_gap", "s", above(0), c.odometry.max_imu_gap,
               "between samples; over a longer gap the uncertainty grows, and it is reported");
-  list.number("max_bridged_imu_gap", "s", above(0), gate.max_bridged_gap,
+  list.number("max_bridged_imu_gap", "s", above(0, 60), gate.max_bridged_gap,
               "after a longer one, or where the stamps run back, the estimate starts again");
   list.number("imu_jump_patience", "s", above(0), gate.jump_patience,
               "samples stamped elsewhere are dropped this long, then it is their clock that jumped");

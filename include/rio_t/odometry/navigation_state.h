@@ -3,6 +3,8 @@
 #include <Eigen/Geometry>
 
 #include "rio_t/core/time.h"
+#include "rio_t/imu/buffer.h"
+#include "rio_t/smoother/fixed_lag_smoother.h"
 
 namespace rio_t {
 
@@ -21,5 +23,8 @@ struct NavigationState {
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< of I, in I, bias removed [rad/s]
   StateCovariance covariance = StateCovariance::Zero();
 };
+
+/// The state at a node with its covariance; `imu` must cover its time.
+NavigationState navigationState(const NodeEstimate& node, const NodeMatrix& covariance, const ImuBuffer& imu);
 
 }  // namespace rio_t
