@@ -10,8 +10,8 @@ packages=(
   libdiagnostic-updater-dev libtf2-dev libtf2-ros-dev libpcl-conversions-dev libpcl-dev
   ros-message-generation ros-message-runtime ros-std-msgs libeigen3-dev libceres-dev libyaml-cpp-dev
   librostest-dev libgtest-dev libbenchmark-dev
-  # rosbag play, the nodelet manager, rviz, and messages for Python: rostopic echo and the rostests
-  python3-roslaunch python3-rosbag python3-rostest python3-rostopic python3-rosservice rosout libnodeletlib-tools rviz
+  # rosrun, rosbag play, the nodelet manager, rviz, and messages for Python: rostopic echo and the rostests
+  rosbash rospack-tools python3-roslaunch python3-rosbag python3-rostest python3-rostopic python3-rosservice rosout libnodeletlib-tools rviz
   python3-nav-msgs python3-diagnostic-msgs python3-std-srvs python3-tf2-msgs python3-sensor-msgs python3-nodelet
   python3-numpy python3-matplotlib python3-yaml
 )
