@@ -6,10 +6,7 @@
 namespace rio_t {
 namespace {
 
-/// Share of the points that agree in a scan that sees nothing but the static world: no object fills the rest
-/// of the view.
-constexpr double kUnanimous = 0.85;
-constexpr double kUnanimousTime = 0.5;  // [s] of them: one may be chance
+constexpr double kUnanimousTime = 0.5;  // [s] of scans that are unanimous: one may be chance
 
 }  // namespace
 

@@ -17,8 +17,6 @@ namespace {
 /// Of a prior that outweighs a majority of the points [m/s]: sharper than a moving object and the world
 /// differ.
 constexpr double kMaxSharpSigma = 0.1;
-/// Of the points, that leave nothing else to be the static world.
-constexpr double kClearMajority = 0.85;
 /// Log-likelihood ratio of a point that a velocity explains to one that it does not: a Gaussian of 0.05 m/s
 /// against a uniform density over some m/s.
 constexpr double kEvidenceOfAPoint = 4.0;
@@ -196,8 +194,8 @@ bool heedPrior(const std::vector<Direction>& points, const VelocityPrior& prior,
     return true;
   }
   if (is_sharp || d2_unaided > gate || d2_aided > gate) return true;
-  const bool is_clear = static_cast<double>(inliers.size()) > kClearMajority * n;
-  return is_clear || squaredDistance(unaided, {aided.v_R, aided.covariance}) <= gate;
+  const bool is_unanimous = static_cast<double>(inliers.size()) > kUnanimous * n;
+  return is_unanimous || squaredDistance(unaided, {aided.v_R, aided.covariance}) <= gate;
 }
 
 /// Covariance at rest, where every inlier reads the zero bin, of width q. Two things bound the velocity:

@@ -82,6 +82,10 @@ struct EgoVelocity {
   std::size_t points_used = 0;                           ///< points that passed the filter
 };
 
+/// Share of the points that, where they agree, leave nothing else to be the static world: no object fills
+/// more of the view.
+constexpr double kUnanimous = 0.85;
+
 /// What is known of the velocity before the scan is looked at, e.g. from the IMU.
 struct VelocityPrior {
   Eigen::Vector3d v_R = Eigen::Vector3d::Zero();         ///< radar velocity, radar frame [m/s]
