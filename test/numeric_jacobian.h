@@ -17,9 +17,12 @@ inline void expectJacobiansCorrect(const ceres::CostFunction& cost, std::vector<
                                    double tolerance = 1e-6, double step = 1e-5) {
   const int rows = cost.num_residuals();
   std::vector<const double*> parameters;
+  parameters.reserve(blocks.size());
   for (const auto& block : blocks) parameters.push_back(block.data());
   std::vector<Eigen::Matrix<double, -1, -1, Eigen::RowMajor>> analytic;
   std::vector<double*> jacobians;
+  analytic.reserve(blocks.size());
+  jacobians.reserve(blocks.size());
   for (const auto& block : blocks) analytic.emplace_back(rows, block.size());
   for (auto& J : analytic) jacobians.push_back(J.data());
   Eigen::VectorXd r(rows);

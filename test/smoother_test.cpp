@@ -22,22 +22,24 @@ NodeMatrix positiveDefinite(int seed) {
   return A * A.transpose() + 0.5 * NodeMatrix::Identity();
 }
 
+/// Of node k in a dense system.
+Eigen::Index firstRow(Eigen::Index k) { return k * kNodeTangent; }
+
 /// A chain of `nodes` nodes with made-up information, and the same as one dense system.
 struct DenseChain {
   explicit DenseChain(int nodes)
       : chain(static_cast<std::size_t>(nodes)),
-        H(Eigen::MatrixXd::Zero(nodes * kNodeTangent, nodes * kNodeTangent)),
-        b(Eigen::VectorXd::Zero(nodes * kNodeTangent)) {
+        H(Eigen::MatrixXd::Zero(firstRow(nodes), firstRow(nodes))),
+        b(Eigen::VectorXd::Zero(firstRow(nodes))) {
     for (int k = 0; k < nodes; ++k) {
       chain.diagonal[k] = 4.0 * positiveDefinite(100 * k);
       for (int i = 0; i < kNodeTangent; ++i) chain.gradient[k](i) = wave(900 * k + i);
-      H.block(k * kNodeTangent, k * kNodeTangent, kNodeTangent, kNodeTangent) = chain.diagonal[k];
-      b.segment(k * kNodeTangent, kNodeTangent) = chain.gradient[k];
+      H.block(firstRow(k), firstRow(k), kNodeTangent, kNodeTangent) = chain.diagonal[k];
+      b.segment(firstRow(k), kNodeTangent) = chain.gradient[k];
       if (k + 1 == nodes) continue;
       for (int i = 0; i < kNodeTangent * kNodeTangent; ++i) chain.coupling[k](i) = 0.1 * wave(7000 * k + i);
-      H.block(k * kNodeTangent, (k + 1) * kNodeTangent, kNodeTangent, kNodeTangent) = chain.coupling[k];
-      H.block((k + 1) * kNodeTangent, k * kNodeTangent, kNodeTangent, kNodeTangent) =
-          chain.coupling[k].transpose();
+      H.block(firstRow(k), firstRow(k + 1), kNodeTangent, kNodeTangent) = chain.coupling[k];
+      H.block(firstRow(k + 1), firstRow(k), kNodeTangent, kNodeTangent) = chain.coupling[k].transpose();
     }
   }
   ChainSystem chain;
@@ -89,7 +91,8 @@ TEST(Chain, ASingularPriorLeavesTheUnknownFree) {
 TEST(Chain, CovarianceOfTheLastNodeIsThatOfTheFullInverse) {
   const DenseChain dense(4);
   const Eigen::MatrixXd covariance = dense.H.inverse();
-  const NodeMatrix last = covarianceOfLast(dense.chain);
+  ChainSolution solution;
+  const NodeMatrix last = covarianceOfLast(dense.chain, &solution);
   EXPECT_LT((last - covariance.bottomRightCorner<kNodeTangent, kNodeTangent>()).norm(),
             1e-12 + 1e-9 * last.norm());
 }
@@ -103,8 +106,7 @@ TEST(Chain, SolutionIsThatOfTheFullSystem) {
     ChainSolution solution;
     ASSERT_TRUE(solve(dense.chain, damping, &solution));
     for (int k = 0; k < 4; ++k) {
-      EXPECT_LT((solution.delta[k] - full.segment<kNodeTangent>(k * kNodeTangent)).norm(),
-                1e-9 * full.norm());
+      EXPECT_LT((solution.delta[k] - full.segment<kNodeTangent>(firstRow(k))).norm(), 1e-9 * full.norm());
     }
     EXPECT_NEAR(solution.decrease, full.dot(H * full), 1e-9 * solution.decrease);
   }

@@ -20,6 +20,7 @@ StampingOptions options(StampSource source) {
 /// Stamps in seconds after 1000 s, rounded to microseconds.
 std::vector<double> seconds(const std::vector<RadarScan>& scans) {
   std::vector<double> result;
+  result.reserve(scans.size());
   for (const RadarScan& scan : scans) result.push_back(std::round((scan.stamp - imuTime(0)) * 1e6) / 1e6);
   return result;
 }
