@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "count_allocations.h"
 #include "rio_t/ros/bag_runner.h"
 #include "stage_clock.h"
 

@@ -1,9 +1,8 @@
 // Counts what this process allocates on the heap: the C library's functions, taken over in this program only.
+#include "count_allocations.h"
+
 #include <cerrno>
 #include <cstddef>
-#include <cstdint>
-
-#include "stage_clock.h"
 
 // The C library's own names of the same functions (glibc), hence reserved.
 // NOLINTBEGIN(bugprone-reserved-identifier)
@@ -15,7 +14,7 @@ extern "C" void* __libc_memalign(std::size_t alignment, std::size_t size);
 
 namespace {
 
-std::uint64_t count = 0;  // of the thread that the benchmark has; a race would only miscount
+std::uint64_t count = 0;  // of the one thread that such a program has; a race would only miscount
 
 }  // namespace
 

@@ -3,6 +3,8 @@
 #include <ctime>
 #include <iterator>
 
+#include "count_allocations.h"
+
 namespace rio_t::bench {
 namespace {
 

@@ -8,9 +8,6 @@
 
 namespace rio_t::bench {
 
-/// Allocations on the heap by this process so far.
-std::uint64_t allocations();
-
 /// What the time of a run is spent on. `kRest` is what no other has: reading the bag, mostly.
 enum class Stage {
   kRest,

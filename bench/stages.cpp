@@ -52,11 +52,13 @@ RadarScan toRadarScan(const pcl::PointCloud<RadarPointPcl>& cloud, Time stamp) {
   return original(cloud, stamp);
 }
 
-EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
-                                           const std::optional<VelocityPrior>& prior) const {
-  static const auto original = libraryFunction(&EgoVelocityEstimator::estimate);
+void EgoVelocityEstimator::estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior,
+                                    EgoVelocityWorkspace* workspace, EgoVelocity* estimated) const {
+  using Estimate = void (EgoVelocityEstimator::*)(const RadarScan&, const std::optional<VelocityPrior>&,
+                                                  EgoVelocityWorkspace*, EgoVelocity*) const;
+  static const auto original = libraryFunction<Estimate>(&EgoVelocityEstimator::estimate);
   const Scope scope(Stage::kEgoVelocity);
-  return (this->*original)(scan, prior);
+  (this->*original)(scan, prior, workspace, estimated);
 }
 
 std::optional<RadarVelocityPrediction> FixedLagSmoother::predictRadarVelocity(
@@ -84,13 +86,13 @@ SolveReport FixedLagSmoother::optimize() {
   return (this->*original)();
 }
 
-NodeMatrix covarianceOfLast(const ChainSystem& system) {
+NodeMatrix covarianceOfLast(const ChainSystem& system, ChainSolution* solution) {
   static const auto original = libraryFunction(&covarianceOfLast);
   const Scope scope(Stage::kCovariance);
-  return original(system);
+  return original(system, solution);
 }
 
-std::vector<NodeEstimate> FixedLagSmoother::marginalize() {
+const std::vector<NodeEstimate>& FixedLagSmoother::marginalize() {
   static const auto original = libraryFunction(&FixedLagSmoother::marginalize);
   const Scope scope(Stage::kMarginalise);
   return (this->*original)();
@@ -114,10 +116,11 @@ std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasuremen
   return (this->*original)(imu);
 }
 
-std::vector<ScanResult> RadarInertialOdometry::process() {
-  static const auto original = libraryFunction(&RadarInertialOdometry::process);
+void RadarInertialOdometry::process(const ResultHandler& handle) {
+  using Process = void (RadarInertialOdometry::*)(const ResultHandler&);
+  static const auto original = libraryFunction<Process>(&RadarInertialOdometry::process);
   const Scope scope(Stage::kPipeline);
-  return (this->*original)();
+  (this->*original)(handle);
 }
 
 void RunOutput::addState(const NavigationState& state) {

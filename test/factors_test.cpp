@@ -8,6 +8,8 @@
 #include "rio_t/factors/imu_factor.h"
 #include "rio_t/factors/prior_factor.h"
 #include "rio_t/factors/radar_velocity_factor.h"
+#include "rio_t/factors/rest_factor.h"
+#include "rio_t/smoother/factor_pool.h"
 #include "synthetic_motion.h"
 
 namespace rio_t {
@@ -158,6 +160,69 @@ TEST(ImuRadarFactor, ResidualIsZeroAtTheTrueOffset) {
 
 TEST(ConstantOffsetFactor, JacobiansAreCorrect) {
   expectJacobiansCorrect(ConstantOffsetFactor(3e-3), {{0.01}, {-0.02}}, 1e-6, 1e-3);
+}
+
+TEST(RestFactor, JacobiansAreCorrect) {
+  expectJacobiansCorrect(RestFactor(0.05), {values(moved(SyntheticMotion().state(1.0), 0.1))});
+}
+
+/// Residual and Jacobians of `cost`, in one row.
+Eigen::VectorXd evaluated(const ceres::CostFunction& cost, const std::vector<const double*>& blocks) {
+  const int rows = cost.num_residuals();
+  Eigen::VectorXd r(rows);
+  std::vector<Eigen::VectorXd> J;
+  for (const int size : cost.parameter_block_sizes()) J.emplace_back(rows * size);
+  std::vector<double*> jacobians;
+  for (Eigen::VectorXd& j : J) jacobians.push_back(j.data());
+  EXPECT_TRUE(cost.Evaluate(blocks.data(), r.data(), jacobians.data()));
+  for (const Eigen::VectorXd& j : J) {
+    Eigen::VectorXd both(r.size() + j.size());
+    both << r, j;
+    r = both;
+  }
+  return r;
+}
+
+TEST(FactorPool, ARecycledFactorIsAsOneMadeAnew) {
+  const SyntheticMotion motion;
+  const ImuBuffer imu = motion.imu(0.5, 1.6, 400.0);
+  const auto preintegrated = [&](double from, double to) {
+    const StateBlock x = motion.state(from);
+    return preintegrate(imu, motion.time(from), motion.time(to), x.b_g(), x.b_a(), ImuNoise());
+  };
+  RadarVelocityMeasurement other = measurement(motion.time(1.2));
+  other.covariance *= 3.0;
+  other.informs_offset = false;
+  const StateBlock x = motion.state(0.98);
+  const StateBlock next = motion.state(1.08);
+  const double t_O = 0.03;
+  const double next_t_O = 0.04;
+  for (const TimeOffsetModel model : {TimeOffsetModel::kImu, TimeOffsetModel::kConstantAcceleration}) {
+    SmootherOptions options;
+    options.time_offset_model = model;
+    // One pool hands out new factors, the other ones that stood for something else.
+    FactorPool fresh(options, ImuNoise(), motion.g_W, imu);
+    FactorPool used(options, ImuNoise(), motion.g_W, imu);
+    WindowNode node = used.node();
+    node.imu_from_previous = used.imuFactor(preintegrated(1.1, 1.3));
+    node.offset_from_previous = used.offsetFactor(1.0);
+    node.rest = used.restFactor(2.0);
+    node.radar.push_back({other.stamp, used.radarFactor(other, motion.time(1.21))});
+    const void* recycled = node.imu_from_previous.get();
+    used.recycle(std::move(node));
+
+    const auto imu_factor = used.imuFactor(preintegrated(0.98, 1.08));
+    EXPECT_EQ(imu_factor.get(), recycled);
+    EXPECT_EQ(evaluated(*imu_factor, {x.data(), next.data()}),
+              evaluated(*fresh.imuFactor(preintegrated(0.98, 1.08)), {x.data(), next.data()}));
+    EXPECT_EQ(evaluated(*used.offsetFactor(1e-3), {&t_O, &next_t_O}),
+              evaluated(*fresh.offsetFactor(1e-3), {&t_O, &next_t_O}));
+    EXPECT_EQ(evaluated(*used.restFactor(0.05), {x.data()}), evaluated(*fresh.restFactor(0.05), {x.data()}));
+    const RadarVelocityMeasurement z = measurement(motion.time(1.0));
+    EXPECT_EQ(evaluated(*used.radarFactor(z, motion.time(0.98)), {x.data(), &t_O}),
+              evaluated(*fresh.radarFactor(z, motion.time(0.98)), {x.data(), &t_O}));
+    EXPECT_TRUE(used.node().radar.empty());
+  }
 }
 
 TEST(PriorFactor, JacobiansAreCorrect) {

@@ -21,10 +21,13 @@ Eigen::Matrix3d whitening(const Eigen::Matrix3d& covariance) {
 
 }  // namespace
 
-ConstantAccelerationRadarFactor::ConstantAccelerationRadarFactor(const RadarVelocityMeasurement& z,
-                                                                 const ImuMeasurement& imu,
-                                                                 const Eigen::Vector3d& g_W)
-    : z_(z), imu_(imu), g_W_(g_W), whitening_(whitening(z.covariance)) {}
+void ConstantAccelerationRadarFactor::set(const RadarVelocityMeasurement& z, const ImuMeasurement& imu,
+                                          const Eigen::Vector3d& g_W) {
+  z_ = z;
+  imu_ = imu;
+  g_W_ = g_W;
+  whitening_ = whitening(z.covariance);
+}
 
 bool ConstantAccelerationRadarFactor::Evaluate(double const* const* parameters, double* residuals,
                                                double** jacobians) const {
@@ -55,14 +58,15 @@ bool ConstantAccelerationRadarFactor::Evaluate(double const* const* parameters, 
   return true;
 }
 
-ImuRadarFactor::ImuRadarFactor(const RadarVelocityMeasurement& z, Time state_time, const ImuBuffer& imu,
-                               double max_time_offset, const Eigen::Vector3d& g_W)
-    : z_(z),
-      state_time_(state_time),
-      imu_(&imu),
-      max_time_offset_(max_time_offset),
-      g_W_(g_W),
-      whitening_(whitening(z.covariance)) {}
+void ImuRadarFactor::set(const RadarVelocityMeasurement& z, Time state_time, const ImuBuffer& imu,
+                         double max_time_offset, const Eigen::Vector3d& g_W) {
+  z_ = z;
+  state_time_ = state_time;
+  imu_ = &imu;
+  max_time_offset_ = max_time_offset;
+  g_W_ = g_W;
+  whitening_ = whitening(z.covariance);
+}
 
 bool ImuRadarFactor::Evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
   const StateView x(parameters[0]);

@@ -1,5 +1,7 @@
 #include "rio_t/odometry/navigator.h"
 
+#include <algorithm>
+
 #include "rio_t/core/so3.h"
 #include "rio_t/factors/state_block.h"
 #include "rio_t/imu/error_step.h"
@@ -24,18 +26,11 @@ std::optional<NavigationState> Navigator::add(const ImuMeasurement& imu) {
 void Navigator::anchor(const NavigationState& state) {
   if (state_ && history_.back().time - state.time > kHistory) return;
   state_ = state;
-  ImuMeasurement previous;
-  bool first = true;
-  for (const ImuMeasurement& imu : history_) {
-    if (imu.time > state.time) {
-      if (first) {
-        // No sample at the anchor's time is kept: hold the first one back to it.
-        previous = imu;
-      }
-      propagate(previous, imu);
-    }
-    previous = imu;
-    first = false;
+  const auto later = std::upper_bound(history_.begin(), history_.end(), state.time,
+                                      [](Time time, const ImuMeasurement& imu) { return time < imu.time; });
+  for (const ImuMeasurement* imu = later; imu != history_.end(); ++imu) {
+    // Where no sample at the anchor's time is kept, the first one is held back to it.
+    propagate(imu == history_.begin() ? *imu : *(imu - 1), *imu);
   }
 }
 

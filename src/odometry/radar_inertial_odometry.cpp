@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <mutex>
 #include <utility>
 
@@ -26,6 +25,17 @@ constexpr double kMaxStampAhead = 1.0;
 /// too small to reject anything by.
 constexpr double kMaxTiltSigma = 0.1;
 
+/// As made anew, but with the memory of its lists.
+void clear(ScanResult& result) {
+  std::vector<std::size_t> inliers = std::move(result.ego_velocity.inliers);
+  std::vector<StampedPose> left_window = std::move(result.left_window);
+  inliers.clear();
+  left_window.clear();
+  result = ScanResult();
+  result.ego_velocity.inliers = std::move(inliers);
+  result.left_window = std::move(left_window);
+}
+
 }  // namespace
 
 struct RadarInertialOdometry::Impl {
@@ -33,6 +43,7 @@ struct RadarInertialOdometry::Impl {
       : options(options_in),
         g_W(0.0, 0.0, -options.gravity),
         R_RI(options.T_IR.q_IR.conjugate().toRotationMatrix()),
+        max_stamp_ahead(std::max(kMaxStampAhead, options.imu_gate.max_bridged_gap)),
         imu_gate(options.max_imu_gap, options.imu_gate),
         navigator(options.imu_noise, g_W),
         initializer(options),
@@ -63,13 +74,18 @@ struct RadarInertialOdometry::Impl {
   /// Empty, or why the scan has no velocity to use; and whether that velocity tells the offset.
   std::string measureVelocity(const RadarScan& scan, bool at_rest, EgoVelocity& measured,
                               bool& informs_offset);
-  std::optional<ScanResult> tryScan(const RadarScan& scan, bool imu_has_ended);
-  void updateWindow(ScanResult& result);
+  /// The IMU that covers the scan may still come.
+  bool mustWait(const RadarScan& scan) const;
+  /// Sets `result` to what became of the scan, and moves the scan there.
+  void finishScan(RadarScan& scan, bool imu_has_ended);
+  void useScan(const RadarScan& scan, bool imu_has_ended);
+  void updateWindow();
   NavigationState newestState(const NodeMatrix& covariance) const;
 
   const OdometryOptions options;
   const Eigen::Vector3d g_W;
   const Eigen::Matrix3d R_RI;
+  const double max_stamp_ahead;  ///< [s]
   FaultCounters faults;
 
   // The navigation half; guarded by navigation_mutex, held for microseconds.
@@ -97,7 +113,10 @@ struct RadarInertialOdometry::Impl {
   InnovationGate innovation_gate;
   HealthMonitor health_monitor;
   FixedLagSmoother smoother;
-  std::deque<RadarScan> waiting_scans;
+  std::vector<RadarScan> waiting_scans;  ///< oldest first
+  ScanResult result;                     ///< of the scan at hand, as the next two; they keep their memory
+  EgoVelocity velocity_alone;
+  EgoVelocityWorkspace ego_velocity_workspace;
   std::optional<Start> start;
   Time initialized_at;
   PoseDoubt pose_doubt;
@@ -114,9 +133,9 @@ RadarInertialOdometry::~RadarInertialOdometry() = default;
 RadarInertialOdometry::RadarInertialOdometry(RadarInertialOdometry&&) noexcept = default;
 RadarInertialOdometry& RadarInertialOdometry::operator=(RadarInertialOdometry&&) noexcept = default;
 
-std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasurement& measured) {
+std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasurement& imu) {
   Impl& m = *impl_;
-  ImuMeasurement sample = measured;
+  ImuMeasurement sample = imu;
   std::optional<NavigationState> state;
   std::vector<ImuMeasurement> bridge;
   std::uint64_t clock_restarts = 0;
@@ -151,51 +170,61 @@ void RadarInertialOdometry::addScan(RadarScan scan) {
 }
 
 std::vector<ScanResult> RadarInertialOdometry::process() {
-  Impl& m = *impl_;
-  m.drainInbox();
   std::vector<ScanResult> results;
-  for (auto scan = m.waiting_scans.begin(); scan != m.waiting_scans.end();) {
-    if (std::optional<ScanResult> result = m.tryScan(*scan, false)) {
-      results.push_back(std::move(*result));
-      scan = m.waiting_scans.erase(scan);
-    } else {
-      ++scan;
-    }
-  }
-  while (m.waiting_scans.size() > m.options.max_queued_scans) {
-    ScanResult result;
-    result.scan = std::move(m.waiting_scans.front());
-    result.rejected_because = "queue_full";
-    results.push_back(std::move(result));
-    m.waiting_scans.pop_front();
-  }
-  m.updateHealth();
+  process([&](ScanResult& result) { results.push_back(std::move(result)); });
   return results;
 }
 
+void RadarInertialOdometry::process(const ResultHandler& handle) {
+  Impl& m = *impl_;
+  m.drainInbox();
+  for (auto scan = m.waiting_scans.begin(); scan != m.waiting_scans.end();) {
+    if (m.mustWait(*scan)) {
+      ++scan;
+      continue;
+    }
+    m.finishScan(*scan, false);
+    scan = m.waiting_scans.erase(scan);
+    handle(m.result);
+  }
+  while (m.waiting_scans.size() > m.options.max_queued_scans) {
+    clear(m.result);
+    m.result.scan = std::move(m.waiting_scans.front());
+    m.result.rejected_because = "queue_full";
+    m.waiting_scans.erase(m.waiting_scans.begin());
+    handle(m.result);
+  }
+  m.updateHealth();
+}
+
+bool RadarInertialOdometry::Impl::mustWait(const RadarScan& scan) const {
+  if (smoother.size() == 0) return false;
+  const Time node_time = smoother.nodeTime(scan.stamp);
+  return node_time >= initialized_at && node_time > imu.newest() - kImuMargin &&
+         node_time - imu.newest() <= max_stamp_ahead;
+}
+
+void RadarInertialOdometry::Impl::finishScan(RadarScan& scan, bool imu_has_ended) {
+  clear(result);
+  useScan(scan, imu_has_ended);
+  result.health = health_monitor.health();
+  result.scan = std::move(scan);
+}
+
 /// The way of a scan: when, how fast, into the window, out.
-std::optional<ScanResult> RadarInertialOdometry::Impl::tryScan(const RadarScan& scan, bool imu_has_ended) {
-  ScanResult result;
-  result.scan = scan;
-  const auto rejected = [&](const std::string& reason) {
-    result.rejected_because = reason;
-    return result;
-  };
+void RadarInertialOdometry::Impl::useScan(const RadarScan& scan, bool imu_has_ended) {
+  const auto reject = [&](const char* reason) { result.rejected_because = reason; };
   if (smoother.size() == 0) {
-    result.ego_velocity = ego_velocity_estimator.estimate(scan);
+    ego_velocity_estimator.estimate(scan, std::nullopt, &ego_velocity_workspace, &result.ego_velocity);
     initializer.addVelocity(scan.stamp, result.ego_velocity);
-    return rejected("before_initialization");
+    return reject("before_initialization");
   }
 
   const Time node_time = smoother.nodeTime(scan.stamp);
-  if (node_time < initialized_at) return rejected("before_initialization");
-  if (node_time - imu.newest() > std::max(kMaxStampAhead, options.imu_gate.max_bridged_gap))
-    return rejected("stamp_ahead_of_imu");
-  if (!imu.covers(node_time + kImuMargin)) {
-    if (imu_has_ended) return rejected("imu_not_covering");
-    if (node_time > imu.newest() - kImuMargin) return std::nullopt;  // wait for the IMU
-    return rejected("older_than_window");
-  }
+  if (node_time < initialized_at) return reject("before_initialization");
+  if (node_time - imu.newest() > max_stamp_ahead) return reject("stamp_ahead_of_imu");
+  if (!imu.covers(node_time + kImuMargin))
+    return reject(imu_has_ended ? "imu_not_covering" : "older_than_window");
 
   if (health_monitor.wantsReinitialization(imu.newest()))
     result.reinitialized = tryReinitialize(result.left_window);
@@ -214,11 +243,9 @@ std::optional<ScanResult> RadarInertialOdometry::Impl::tryScan(const RadarScan& 
     result.updated |=
         smoother.addRest(scan.stamp, options.rest.velocity_sigma) == FixedLagSmoother::AddResult::kAdded;
   }
-  if (result.updated) updateWindow(result);
+  if (result.updated) updateWindow();
   updateHealth();
   if (!result.updated && health_monitor.health() == Health::kDiverged) publishNewest();
-  result.health = health_monitor.health();
-  return result;
 }
 
 std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, bool at_rest,
@@ -232,7 +259,8 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
   }
   const bool tilt_is_known = !prediction || prediction->tilt_sigma < kMaxTiltSigma;
   const bool heed_prior = health_monitor.health() != Health::kDiverged;
-  measured = ego_velocity_estimator.estimate(scan, heed_prior ? prior : std::nullopt);
+  ego_velocity_estimator.estimate(scan, heed_prior ? prior : std::nullopt, &ego_velocity_workspace,
+                                  &measured);
   if (prior) judgePrediction(scan, *prior, measured);
   if (!isValid(measured.status)) return toString(measured.status);
   if (!feasibility.accept(scan.stamp, measured.v_R)) return "infeasible_velocity";
@@ -250,7 +278,7 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
   return "";
 }
 
-void RadarInertialOdometry::Impl::updateWindow(ScanResult& result) {
+void RadarInertialOdometry::Impl::updateWindow() {
   const SolveReport solve = smoother.optimize();
   result.solver_iterations = solve.iterations;
   result.solver_converged = solve.converged;
@@ -270,7 +298,10 @@ void RadarInertialOdometry::Impl::updateWindow(ScanResult& result) {
 std::vector<ScanResult> RadarInertialOdometry::finish() {
   Impl& m = *impl_;
   std::vector<ScanResult> results = process();
-  for (const RadarScan& scan : m.waiting_scans) results.push_back(*m.tryScan(scan, true));
+  for (RadarScan& scan : m.waiting_scans) {
+    m.finishScan(scan, true);
+    results.push_back(std::move(m.result));
+  }
   m.waiting_scans.clear();
   if (!initialized()) return results;
   // The poses still in the window belong to the last scan.
@@ -425,7 +456,9 @@ bool RadarInertialOdometry::Impl::isAtRest(Time time) const {
 void RadarInertialOdometry::Impl::judgePrediction(const RadarScan& scan, const VelocityPrior& prior,
                                                   const EgoVelocity& measured) {
   // Where few points agree, they may be those that side with a wrong prediction: what says the scan alone?
-  const EgoVelocity alone = speaksForItself(measured) ? measured : ego_velocity_estimator.estimate(scan);
+  if (!speaksForItself(measured))
+    ego_velocity_estimator.estimate(scan, std::nullopt, &ego_velocity_workspace, &velocity_alone);
+  const EgoVelocity& alone = speaksForItself(measured) ? measured : velocity_alone;
   if (!speaksForItself(alone)) return;
   recovery.add(scan.stamp, alone);
   health_monitor.addInnovation(scan.stamp, alone.v_R - prior.v_R, innovation_gate.covariance(prior, alone));

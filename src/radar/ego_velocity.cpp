@@ -8,6 +8,7 @@
 #include <limits>
 #include <random>
 #include <stdexcept>
+#include <utility>
 
 #include "velocity_solver.h"
 
@@ -62,8 +63,8 @@ int ransacIterations(const EgoVelocityOptions& o) {
   return static_cast<int>(std::clamp(n, 1.0, static_cast<double>(kMax)));
 }
 
-std::vector<Direction> filter(const RadarScan& scan, const EgoVelocityOptions& o) {
-  std::vector<Direction> directions;
+void filter(const RadarScan& scan, const EgoVelocityOptions& o, std::vector<RadarDirection>& directions) {
+  directions.clear();
   directions.reserve(scan.points.size());
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const RadarPoint& p = scan.points[i];
@@ -76,7 +77,6 @@ std::vector<Direction> filter(const RadarScan& scan, const EgoVelocityOptions& o
     if (std::abs(std::asin(std::clamp(u.z(), -1.0, 1.0))) > o.max_elevation) continue;
     directions.push_back({u, p.doppler, i});
   }
-  return directions;
 }
 
 /// Draws of indices without std::uniform_int_distribution, whose results differ between standard libraries.
@@ -93,7 +93,8 @@ class IndexDraw {
 };
 
 /// Velocity on which three directions agree; none where they lie (nearly) in a plane.
-bool solveThree(const Direction& a, const Direction& b, const Direction& c, Eigen::Vector3d& v_R) {
+bool solveThree(const RadarDirection& a, const RadarDirection& b, const RadarDirection& c,
+                Eigen::Vector3d& v_R) {
   const Eigen::Vector3d bc = b.u_R.cross(c.u_R);
   const double determinant = a.u_R.dot(bc);
   if (std::abs(determinant) < 1e-4) return false;
@@ -104,14 +105,14 @@ bool solveThree(const Direction& a, const Direction& b, const Direction& c, Eige
 /// The velocity that most points agree with, among rest and those of three random points each. Each point
 /// costs its squared residual up to the threshold (MSAC), so that among equally many inliers the better fit
 /// wins. `points` has at least three. None where no three drawn span 3D.
-std::optional<Eigen::Vector3d> ransac(const std::vector<Direction>& points, const EgoVelocityOptions& o,
+std::optional<Eigen::Vector3d> ransac(const std::vector<RadarDirection>& points, const EgoVelocityOptions& o,
                                       int iterations) {
   const double limit = o.ransac_inlier_threshold * o.ransac_inlier_threshold;
   Eigen::Vector3d best_v_R = Eigen::Vector3d::Zero();
   double best = std::numeric_limits<double>::infinity();
   const auto offer = [&](const Eigen::Vector3d& v_R) {
     double cost = 0.0;
-    for (const Direction& p : points) {
+    for (const RadarDirection& p : points) {
       const double r = p.doppler + p.u_R.dot(v_R);
       cost += std::min(r * r, limit);
       if (cost >= best) return;
@@ -141,12 +142,12 @@ std::optional<Eigen::Vector3d> ransac(const std::vector<Direction>& points, cons
 
 /// Points that agree with `v_R`: within the threshold, or within three sigma where the noise of the direction
 /// alone is larger than the threshold, as it is at speed.
-void selectInliers(const std::vector<Direction>& points, const Eigen::Vector3d& v_R,
-                   const EgoVelocityOptions& o, std::vector<Direction>& inliers) {
+void selectInliers(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
+                   const EgoVelocityOptions& o, std::vector<RadarDirection>& inliers) {
   const bool knows_noise = o.solver == EgoVelocitySolver::kErrorsInVariables;
   const double limit = o.ransac_inlier_threshold * o.ransac_inlier_threshold;
   inliers.clear();
-  for (const Direction& p : points) {
+  for (const RadarDirection& p : points) {
     const double r = p.doppler + p.u_R.dot(v_R);
     if (r * r <= limit || (knows_noise && r * r <= 9.0 * residualVariance(p, v_R, o))) inliers.push_back(p);
   }
@@ -165,13 +166,15 @@ double squaredDistance(const VelocitySolution& solution, const VelocityPrior& pr
   return d.dot(covariance.inverse() * d);
 }
 
-/// Replaces `inliers` by the points that support a velocity near the prior, where that is the better choice.
+/// Replaces `inliers` by the points that support a velocity near the prior, where that is the better choice;
+/// `supporters` is memory for them.
 /// A sharp prior that speaks against the velocity of `inliers` outweighs even a majority of the points. A
 /// vague one is weighed against their number: it must not find a minority that sides with it where it is
 /// wrong. False where a vague prior speaks against neither of two velocities and most points do not decide:
 /// the scan is ambiguous.
-bool heedPrior(const std::vector<Direction>& points, const VelocityPrior& prior, const EgoVelocityOptions& o,
-               std::vector<Direction>& inliers) {
+bool heedPrior(const std::vector<RadarDirection>& points, const VelocityPrior& prior,
+               const EgoVelocityOptions& o, std::vector<RadarDirection>& inliers,
+               std::vector<RadarDirection>& supporters) {
   const double gate = o.prior_gate * o.prior_gate;
   const auto n = static_cast<double>(points.size());
   const bool is_sharp = largestSigma(prior.covariance) < kMaxSharpSigma;
@@ -179,7 +182,6 @@ bool heedPrior(const std::vector<Direction>& points, const VelocityPrior& prior,
   const double d2_unaided =
       unaided.solved ? squaredDistance(unaided, prior) : std::numeric_limits<double>::max();
   if (is_sharp && d2_unaided <= gate) return true;
-  std::vector<Direction> supporters;
   supporters.reserve(points.size());
   selectInliers(points, prior.v_R, o, supporters);
   VelocitySolution aided = solveLeastSquares(supporters, o);
@@ -207,10 +209,10 @@ bool heedPrior(const std::vector<Direction>& points, const VelocityPrior& prior,
 ///   likelihood P(v) that a point reads zero has the curvature -(log P)'' = 2 z phi(z) / (s^2 P(0)) at rest,
 ///   z = q / (2 s), for each of the n points (1/s^2 as q goes to 0, nothing where q is much above s).
 /// False: the directions leave some velocity unseen.
-bool restCovariance(const std::vector<Direction>& inliers, const EgoVelocityOptions& o,
+bool restCovariance(const std::vector<RadarDirection>& inliers, const EgoVelocityOptions& o,
                     Eigen::Matrix3d& covariance) {
   Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
-  for (const Direction& p : inliers) mean += p.u_R * p.u_R.transpose();
+  for (const RadarDirection& p : inliers) mean += p.u_R * p.u_R.transpose();
   mean /= static_cast<double>(inliers.size());
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
   eigen.computeDirect(mean);
@@ -231,6 +233,14 @@ bool restCovariance(const std::vector<Direction>& inliers, const EgoVelocityOpti
   return true;
 }
 
+/// As made anew, but with its memory.
+void clear(EgoVelocity& velocity) {
+  std::vector<std::size_t> memory = std::move(velocity.inliers);
+  memory.clear();
+  velocity = EgoVelocity();
+  velocity.inliers = std::move(memory);
+}
+
 }  // namespace
 
 EgoVelocityEstimator::EgoVelocityEstimator(const EgoVelocityOptions& options)
@@ -240,25 +250,35 @@ EgoVelocityEstimator::EgoVelocityEstimator(const EgoVelocityOptions& options)
 
 EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
                                            const std::optional<VelocityPrior>& prior) const {
-  const EgoVelocityOptions& o = options_;
+  EgoVelocityWorkspace workspace;
   EgoVelocity result;
-  const std::vector<Direction> points = filter(scan, o);
+  estimate(scan, prior, &workspace, &result);
+  return result;
+}
+
+void EgoVelocityEstimator::estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior,
+                                    EgoVelocityWorkspace* workspace, EgoVelocity* estimated) const {
+  const EgoVelocityOptions& o = options_;
+  std::vector<RadarDirection>& points = workspace->points;
+  std::vector<RadarDirection>& inliers = workspace->inliers;
+  EgoVelocity& result = *estimated;
+  clear(result);
+  filter(scan, o, points);
   result.points_used = points.size();
   const auto n = static_cast<double>(points.size());
   if (points.size() < 3) {
     result.status = EgoVelocityStatus::kTooFewPoints;
-    return result;
+    return;
   }
 
-  const auto reads_zero = [&](const Direction& p) {
+  const auto reads_zero = [&](const RadarDirection& p) {
     return std::abs(p.doppler) <= o.zero_velocity_threshold;
   };
-  const auto most_read_zero = [&](const std::vector<Direction>& some) {
+  const auto most_read_zero = [&](const std::vector<RadarDirection>& some) {
     const auto zeros = static_cast<double>(std::count_if(some.begin(), some.end(), reads_zero));
     return zeros >= (1.0 - o.zero_velocity_outlier_fraction) * static_cast<double>(some.size());
   };
 
-  std::vector<Direction> inliers;
   bool rest = most_read_zero(points);
   if (rest) {
     inliers = points;
@@ -266,13 +286,13 @@ EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
     const std::optional<Eigen::Vector3d> consensus = ransac(points, o, ransac_iterations_);
     if (!consensus) {
       result.status = EgoVelocityStatus::kIllConditioned;
-      return result;
+      return;
     }
     inliers.reserve(points.size());
     selectInliers(points, *consensus, o, inliers);
-    if (prior && !heedPrior(points, *prior, o, inliers)) {
+    if (prior && !heedPrior(points, *prior, o, inliers, workspace->supporters)) {
       result.status = EgoVelocityStatus::kAmbiguous;
-      return result;
+      return;
     }
     // At rest in front of an object that moves, too many points disagree for the test above, but not these.
     rest = most_read_zero(inliers);
@@ -296,7 +316,7 @@ EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
   }
 
   result.inliers.reserve(inliers.size());
-  for (const Direction& p : inliers) result.inliers.push_back(p.index);
+  for (const RadarDirection& p : inliers) result.inliers.push_back(p.index);
   if (inliers.size() < o.min_inliers || static_cast<double>(inliers.size()) < o.min_inlier_fraction * n) {
     result.status = EgoVelocityStatus::kTooFewInliers;
   } else if (!solution.solved) {
@@ -308,7 +328,6 @@ EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
                     : rest                                        ? EgoVelocityStatus::kZeroVelocity
                                                                   : EgoVelocityStatus::kMoving;
   }
-  return result;
 }
 
 bool isValid(EgoVelocityStatus status) {

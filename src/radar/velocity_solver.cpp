@@ -74,17 +74,18 @@ double degreesOfFreedom(std::size_t points) { return points > 3 ? static_cast<do
 
 }  // namespace
 
-double residualVariance(const Direction& point, const Eigen::Vector3d& v_R,
+double residualVariance(const RadarDirection& point, const Eigen::Vector3d& v_R,
                         const EgoVelocityOptions& options) {
   return quantizationVariance(options) + noiseVariance(Angles(point.u_R), v_R, options);
 }
 
-VelocitySolution solveLeastSquares(const std::vector<Direction>& points, const EgoVelocityOptions& options) {
+VelocitySolution solveLeastSquares(const std::vector<RadarDirection>& points,
+                                   const EgoVelocityOptions& options) {
   VelocitySolution solution;
   if (points.size() < 3) return solution;
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  for (const Direction& p : points) {
+  for (const RadarDirection& p : points) {
     normal += p.u_R * p.u_R.transpose();
     right -= p.u_R * p.doppler;
   }
@@ -95,7 +96,7 @@ VelocitySolution solveLeastSquares(const std::vector<Direction>& points, const E
                                   eigen.eigenvectors().transpose();
   solution.v_R = inverse * right;
   double squares = 0.0;
-  for (const Direction& p : points) squares += square(p.doppler + p.u_R.dot(solution.v_R));
+  for (const RadarDirection& p : points) squares += square(p.doppler + p.u_R.dot(solution.v_R));
   const double variance = std::max(squares / degreesOfFreedom(points.size()), quantizationVariance(options));
   solution.covariance = variance * inverse;
   solution.solved = true;
@@ -117,7 +118,7 @@ VelocitySolution solveLeastSquares(const std::vector<Direction>& points, const E
 //   counting as kPriorPoints points), so that a better radar is not overcompensated.
 // - Fuller's modification: the compensation is reduced by the share 1/n, without which the estimate has no
 // moments.
-VelocitySolution solveErrorsInVariables(const std::vector<Direction>& points, const Eigen::Vector3d& v_R,
+VelocitySolution solveErrorsInVariables(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
                                         const EgoVelocityOptions& options) {
   constexpr int kIterations = 3;
   constexpr double kPriorPoints = 10.0;
@@ -139,7 +140,7 @@ VelocitySolution solveErrorsInVariables(const std::vector<Direction>& points, co
     Eigen::Matrix3d score = Eigen::Matrix3d::Zero();  // covariance of the score
     Eigen::Vector3d right = Eigen::Vector3d::Zero();
     double excess = 0.0, promised = 0.0;
-    for (const Direction& p : points) {
+    for (const RadarDirection& p : points) {
       const Angles measured(p.u_R);
       const double residual = p.doppler + p.u_R.dot(v);
       const Eigen::Vector3d by_az = measured.byAzimuth();
@@ -179,7 +180,7 @@ VelocitySolution solveErrorsInVariables(const std::vector<Direction>& points, co
   // Residuals larger than promised widen the covariance; smaller ones do not narrow it below the
   // quantisation.
   double chi2 = 0.0;
-  for (const Direction& p : points) {
+  for (const RadarDirection& p : points) {
     const double variance = quantization_variance + scale * noiseVariance(Angles(p.u_R), v, options);
     chi2 += square(p.doppler + p.u_R.dot(v)) / variance;
   }

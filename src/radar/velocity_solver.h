@@ -8,13 +8,6 @@
 
 namespace rio_t {
 
-/// A detection as the solvers see it.
-struct Direction {
-  Eigen::Vector3d u_R;    ///< unit vector to the target
-  double doppler = 0;     ///< range rate [m/s]
-  std::size_t index = 0;  ///< into the scan's points
-};
-
 struct VelocitySolution {
   bool solved = false;  ///< false: the directions do not span 3D
   Eigen::Vector3d v_R = Eigen::Vector3d::Zero();
@@ -22,16 +15,17 @@ struct VelocitySolution {
 };
 
 /// Variance of the Doppler residual d + u . v that the options promise for this direction [m^2/s^2].
-double residualVariance(const Direction& point, const Eigen::Vector3d& v_R,
+double residualVariance(const RadarDirection& point, const Eigen::Vector3d& v_R,
                         const EgoVelocityOptions& options);
 
 /// v = -(H'H)^-1 H'd, covariance s^2 (H'H)^-1; s^2 is the residual variance, at least the quantisation's
 /// q^2/12.
-VelocitySolution solveLeastSquares(const std::vector<Direction>& points, const EgoVelocityOptions& options);
+VelocitySolution solveLeastSquares(const std::vector<RadarDirection>& points,
+                                   const EgoVelocityOptions& options);
 
 /// Least squares that knows that directions are noisy, see the source. `v_R` is where the weights are first
 /// taken: a RANSAC or least-squares velocity.
-VelocitySolution solveErrorsInVariables(const std::vector<Direction>& points, const Eigen::Vector3d& v_R,
+VelocitySolution solveErrorsInVariables(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
                                         const EgoVelocityOptions& options);
 
 }  // namespace rio_t

@@ -117,7 +117,8 @@ class RunLog {
     trajectory_.push_back({state.time, state.p_W, state.q_WI});
   }
 
-  void addResult(ScanResult result) {
+  /// Puts what was taken off the stamps back on.
+  void addResult(ScanResult& result) {
     if (taken_off_ != 0.0) {
       result.scan.stamp = result.scan.stamp + taken_off_;
       if (result.updated) result.time_offset += taken_off_;
@@ -189,12 +190,12 @@ class Player {
       stamper_.addTrigger(trigger->seq, toTime(trigger->stamp), record);
     }
     for (RadarScan& scan : stamper_.take()) odometry_.addScan(std::move(scan));
-    account(odometry_.process());
+    odometry_.process([this](ScanResult& result) { account(result); });
   }
 
   void finish() {
     for (RadarScan& scan : stamper_.finish()) odometry_.addScan(std::move(scan));
-    account(odometry_.finish());
+    for (ScanResult& result : odometry_.finish()) account(result);
   }
 
   RunSummary summary() const {
@@ -269,20 +270,15 @@ class Player {
     ++not_usable_.try_emplace(kind, NotUsable{why, 0}).first->second.count;
   }
 
-  void account(std::vector<ScanResult> results) {
-    if (results.empty()) return;
+  void account(ScanResult& result) {
     if (!start_) start_ = odometry_.start();
-    bool stepped = false;
     if (recorder_ != nullptr) {
       const auto faults = odometry_.faults();
       const auto steps = faults.find("time_offset_step");
       const std::uint64_t count = steps == faults.end() ? 0 : steps->second;
-      stepped = std::exchange(offset_steps_, count) != count;
+      recorder_->addResult(result, std::exchange(offset_steps_, count) != count);
     }
-    for (ScanResult& result : results) {
-      if (recorder_ != nullptr) recorder_->addResult(result, std::exchange(stepped, false));
-      log_->addResult(std::move(result));
-    }
+    log_->addResult(result);
   }
 
  public:
@@ -414,7 +410,7 @@ class BagJob {
     const BatchResult result = recorder.solve(*player.start());
     RunLog log(&*output_, 0.0);
     for (const NavigationState& state : result.trajectory) log.addState(state);
-    for (const ScanResult& scan : result.scans) log.addResult(scan);
+    for (ScanResult scan : result.scans) log.addResult(scan);
     RunSummary summary;
     summary.mode = "batch";
     summary.batch = BatchSummary{result.solution.iterations, result.solution.placements,

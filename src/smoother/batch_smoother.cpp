@@ -11,6 +11,7 @@
 #include "rio_t/factors/state_manifold.h"
 #include "rio_t/imu/preintegration.h"
 #include "rio_t/smoother/chain_marginals.h"
+#include "rio_t/smoother/factor_pool.h"
 #include "rio_t/smoother/window_solver.h"
 
 namespace rio_t {
@@ -57,13 +58,6 @@ BatchSmoother::BatchSmoother(const SmootherOptions& options, const BatchOptions&
                              const Eigen::Vector3d& g_W, const ImuBuffer& imu)
     : options_(options), batch_(batch), noise_(noise), g_W_(g_W), imu_(&imu) {}
 
-std::unique_ptr<RadarCost> BatchSmoother::makeRadarFactor(const RadarVelocityMeasurement& z,
-                                                          Time node_time) const {
-  if (atMeasurement())
-    return std::make_unique<ImuRadarFactor>(z, node_time, *imu_, options_.max_time_offset, g_W_);
-  return std::make_unique<ConstantAccelerationRadarFactor>(z, imu_->at(z.stamp), g_W_);
-}
-
 BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std::vector<double>& t_O,
                                           const std::vector<NodeEstimate>& guess) const {
   const std::size_t scans = problem.scans.size();
@@ -81,6 +75,7 @@ BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std
     return carried(near.x, near.time, time, *imu_, g_W_);
   };
 
+  FactorPool pool(options_, noise_, g_W_, *imu_);
   Graph graph;
   graph.node_of_scan.resize(scans);
   Window& window = graph.window;
@@ -102,17 +97,16 @@ BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std
       node.time = times[i];
       node.x = stateAt(node.time);
       node.t_O = t_O[i];
-      node.imu_from_previous = std::make_unique<ImuFactor>(
-          preintegrate(*imu_, previous.time, node.time, previous.x.b_g(), previous.x.b_a(), noise_), noise_,
-          g_W_);
-      node.offset_from_previous = std::make_unique<ConstantOffsetFactor>(
+      node.imu_from_previous = pool.imuFactor(
+          preintegrate(*imu_, previous.time, node.time, previous.x.b_g(), previous.x.b_a(), noise_));
+      node.offset_from_previous = pool.offsetFactor(
           scan.offset_stepped ? options_.time_offset_sigma : options_.time_offset_noise * std::sqrt(dt));
       window.nodes.push_back(std::move(node));
     }
     WindowNode& node = window.nodes.back();
     graph.node_of_scan[i] = window.nodes.size() - 1;
-    if (scan.velocity) node.radar.push_back({scan.stamp, makeRadarFactor(*scan.velocity, node.time)});
-    if (scan.rest_velocity_sigma) node.rest = std::make_unique<RestFactor>(*scan.rest_velocity_sigma);
+    if (scan.velocity) node.radar.push_back({scan.stamp, pool.radarFactor(*scan.velocity, node.time)});
+    if (scan.rest_velocity_sigma) node.rest = pool.restFactor(*scan.rest_velocity_sigma);
   }
   return graph;
 }
@@ -168,7 +162,9 @@ BatchSmoother::Residual BatchSmoother::residual(const NodeEstimate& node, const 
   StateJacobian<3> J_x;
   Residual result;
   double* jacobians[] = {J_x.data(), result.dh_dt_O.data()};
-  makeRadarFactor(unit, node.time)->Evaluate(blocks, result.value.data(), jacobians);
+  FactorPool(options_, noise_, g_W_, *imu_)
+      .radarFactor(unit, node.time)
+      ->Evaluate(blocks, result.value.data(), jacobians);
   Eigen::Matrix<double, 3, kNodeTangent> J;
   J << J_x.leftCols<3>(), J_x.rightCols<StateBlock::kTangent - 3>(), result.dh_dt_O;
   if (!options_.estimate_time_offset) J.rightCols<1>().setZero();

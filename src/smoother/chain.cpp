@@ -240,10 +240,9 @@ bool solveUndamped(const ChainSystem& system, ChainSolution* solution) {
   return solved;
 }
 
-NodeMatrix covarianceOfLast(const ChainSystem& system) {
-  ChainSolution solution;
-  if (!solveUndamped(system, &solution)) throw std::runtime_error("chain: the window is not determined");
-  return solution.newest.solve(NodeMatrix::Identity());
+NodeMatrix covarianceOfLast(const ChainSystem& system, ChainSolution* solution) {
+  if (!solveUndamped(system, solution)) throw std::runtime_error("chain: the window is not determined");
+  return solution->newest.solve(NodeMatrix::Identity());
 }
 
 }  // namespace rio_t

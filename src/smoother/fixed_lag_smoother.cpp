@@ -15,7 +15,7 @@ constexpr double kMinNodeSpacing = 0.005;
 
 FixedLagSmoother::FixedLagSmoother(const SmootherOptions& options, const ImuNoise& noise,
                                    const Eigen::Vector3d& g_W, const ImuBuffer& imu)
-    : options_(options), noise_(noise), g_W_(g_W), imu_(&imu) {
+    : options_(options), noise_(noise), g_W_(g_W), imu_(&imu), pool_(options, noise, g_W, imu) {
   window_.offset_known = !options_.estimate_time_offset;
   window_.max_time_offset = options_.max_time_offset;
   if (options_.huber_threshold > 0.0)
@@ -25,7 +25,7 @@ FixedLagSmoother::FixedLagSmoother(const SmootherOptions& options, const ImuNois
 void FixedLagSmoother::initialize(Time time, const NodePrior& prior) {
   window_.prior = std::make_unique<PriorFactor>(prior);
   window_.nodes.clear();
-  WindowNode node;
+  WindowNode node = pool_.node();
   node.time = time;
   node.x = prior.x0;
   node.t_O = prior.t_O0;
@@ -67,7 +67,9 @@ std::optional<RadarVelocityPrediction> FixedLagSmoother::predictRadarVelocity(
   StateJacobian<3> J_x;
   Eigen::Vector3d J_t;
   double* jacobians[] = {J_x.data(), J_t.data()};
-  makeRadarFactor(zero, time)->Evaluate(blocks, prediction.velocity.v_R.data(), jacobians);
+  std::unique_ptr<RadarCost> factor = pool_.radarFactor(zero, time);
+  factor->Evaluate(blocks, prediction.velocity.v_R.data(), jacobians);
+  pool_.recycle(std::move(factor));
   Eigen::Matrix<double, 3, kNodeTangent> J;
   J << J_x.leftCols<3>(), J_x.rightCols<StateBlock::kTangent - 3>(), J_t;
   if (!options_.estimate_time_offset) J.rightCols<1>().setZero();
@@ -91,14 +93,15 @@ FixedLagSmoother::AddResult FixedLagSmoother::add(const RadarVelocityMeasurement
   }
   WindowNode* node = nodeAt(nodeTime(z.stamp));
   if (node == nullptr) return AddResult::kOlderThanWindow;
-  node->radar.push_back({z.stamp, makeRadarFactor(z, node->time)});
+  node->radar.push_back({z.stamp, pool_.radarFactor(z, node->time)});
   return AddResult::kAdded;
 }
 
 FixedLagSmoother::AddResult FixedLagSmoother::addRest(Time stamp, double velocity_sigma) {
   WindowNode* node = nodeAt(nodeTime(stamp));
   if (node == nullptr) return AddResult::kOlderThanWindow;
-  node->rest = std::make_unique<RestFactor>(velocity_sigma);
+  pool_.recycle(std::move(node->rest));
+  node->rest = pool_.restFactor(velocity_sigma);
   return AddResult::kAdded;
 }
 
@@ -116,8 +119,8 @@ WindowNode* FixedLagSmoother::nodeAt(Time time) {
     window_.nodes.insert(later, makeNode(time, window_.nodes[k - 1]));
     linkToPrevious(k);
     if (offset_has_stepped_ && k + 1 == window_.nodes.size()) {
-      window_.nodes[k].offset_from_previous =
-          std::make_unique<ConstantOffsetFactor>(options_.time_offset_sigma);
+      pool_.recycle(std::move(window_.nodes[k].offset_from_previous));
+      window_.nodes[k].offset_from_previous = pool_.offsetFactor(options_.time_offset_sigma);
       offset_has_stepped_ = false;
     }
     if (k + 1 < window_.nodes.size()) linkToPrevious(k + 1);  // its IMU factor now starts at the new node
@@ -125,8 +128,8 @@ WindowNode* FixedLagSmoother::nodeAt(Time time) {
   return &window_.nodes[k];
 }
 
-WindowNode FixedLagSmoother::makeNode(Time time, const WindowNode& previous) const {
-  WindowNode node;
+WindowNode FixedLagSmoother::makeNode(Time time, const WindowNode& previous) {
+  WindowNode node = pool_.node();
   node.time = time;
   node.x = predict(previous.x, preintegrateFrom(previous, time), g_W_);
   node.t_O = previous.t_O;
@@ -136,9 +139,10 @@ WindowNode FixedLagSmoother::makeNode(Time time, const WindowNode& previous) con
 void FixedLagSmoother::linkToPrevious(std::size_t k) {
   const WindowNode& previous = window_.nodes[k - 1];
   WindowNode& node = window_.nodes[k];
-  node.imu_from_previous = std::make_unique<ImuFactor>(preintegrateFrom(previous, node.time), noise_, g_W_);
-  node.offset_from_previous =
-      std::make_unique<ConstantOffsetFactor>(std::sqrt(offsetVariance(node.time - previous.time)));
+  pool_.recycle(std::move(node.imu_from_previous));
+  pool_.recycle(std::move(node.offset_from_previous));
+  node.imu_from_previous = pool_.imuFactor(preintegrateFrom(previous, node.time));
+  node.offset_from_previous = pool_.offsetFactor(std::sqrt(offsetVariance(node.time - previous.time)));
 }
 
 const Preintegration& FixedLagSmoother::preintegrateFrom(const WindowNode& node, Time to) const {
@@ -154,14 +158,6 @@ double FixedLagSmoother::offsetVariance(double dt) const {
   return options_.time_offset_noise * options_.time_offset_noise * dt;
 }
 
-std::unique_ptr<RadarCost> FixedLagSmoother::makeRadarFactor(const RadarVelocityMeasurement& z,
-                                                             Time node_time) const {
-  if (options_.time_offset_model == TimeOffsetModel::kImu) {
-    return std::make_unique<ImuRadarFactor>(z, node_time, *imu_, options_.max_time_offset, g_W_);
-  }
-  return std::make_unique<ConstantAccelerationRadarFactor>(z, imu_->at(z.stamp), g_W_);
-}
-
 SolveReport FixedLagSmoother::optimize() {
   if (options_.solver == WindowSolverKind::kCeres) {
     const SolveReport report = solveWithCeres(window_, options_.max_iterations);
@@ -173,12 +169,13 @@ SolveReport FixedLagSmoother::optimize() {
   return report;
 }
 
-std::vector<NodeEstimate> FixedLagSmoother::marginalize() {
-  std::vector<NodeEstimate> left;
+const std::vector<NodeEstimate>& FixedLagSmoother::marginalize() {
+  left_.clear();
   while (window_.nodes.size() > 2 &&
          window_.nodes.back().time - window_.nodes.front().time > options_.window) {
     // Only the factors that touch the leaving node; the radar factors of its neighbour stay in the window.
-    ChainSystem system(2);
+    ChainSystem& system = leaving_;
+    system.reset(2);
     const WindowNode& first = window_.nodes[0];
     const WindowNode& second = window_.nodes[1];
     system.addStateAndOffset(0, *window_.prior, first.x.data(), &first.t_O, nullptr, false);
@@ -191,14 +188,15 @@ std::vector<NodeEstimate> FixedLagSmoother::marginalize() {
     system.addOffsetPair(0, *second.offset_from_previous, &first.t_O, &second.t_O);
     const NodeInformation remaining = eliminateFirst(
         system.diagonal[0], system.coupling[0], system.gradient[0], system.diagonal[1], system.gradient[1]);
-    window_.prior = std::make_unique<PriorFactor>(priorFromInformation(remaining, second.x, second.t_O));
+    window_.prior->set(priorFromInformation(remaining, second.x, second.t_O));
 
-    left.push_back(node(0));
-    window_.nodes.pop_front();
-    window_.nodes.front().imu_from_previous.reset();
-    window_.nodes.front().offset_from_previous.reset();
+    left_.push_back(node(0));
+    pool_.recycle(std::move(window_.nodes.front()));
+    window_.nodes.erase(window_.nodes.begin());
+    pool_.recycle(std::move(window_.nodes.front().imu_from_previous));
+    pool_.recycle(std::move(window_.nodes.front().offset_from_previous));
   }
-  return left;
+  return left_;
 }
 
 std::string toString(FixedLagSmoother::AddResult result) {

@@ -84,8 +84,8 @@ SolveReport WindowSolver::solve(Window& window, int max_iterations) {
       damping = std::max(kFirstDamping, 10.0 * damping);
     }
   }
-  covariance_ =
-      is_of_system ? NodeMatrix(solution_.newest.solve(NodeMatrix::Identity())) : covarianceOfLast(system_);
+  covariance_ = is_of_system ? NodeMatrix(solution_.newest.solve(NodeMatrix::Identity()))
+                             : covarianceOfLast(system_, &solution_);
   return report;
 }
 
@@ -114,8 +114,9 @@ bool WindowSolver::stepLowersCost(Window& window) {
 
 NodeMatrix newestCovariance(const Window& window) {
   ChainSystem system;
+  ChainSolution solution;
   linearize(window, &system);
-  return covarianceOfLast(system);
+  return covarianceOfLast(system, &solution);
 }
 
 SolveReport solveWithCeres(Window& window, int max_iterations) {

@@ -19,15 +19,19 @@ namespace rio_t {
 /// all whitened with the covariance of the preintegration.
 class ImuFactor final : public ceres::SizedCostFunction<15, StateBlock::kSize, StateBlock::kSize> {
  public:
-  ImuFactor(const Preintegration& preintegration, const ImuNoise& noise, const Eigen::Vector3d& g_W);
+  ImuFactor(const Preintegration& preintegration, const ImuNoise& noise, const Eigen::Vector3d& g_W) {
+    set(preintegration, noise, g_W);
+  }
+  /// As if made anew.
+  void set(const Preintegration& preintegration, const ImuNoise& noise, const Eigen::Vector3d& g_W);
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
 
  private:
   Preintegration pre_;
   Eigen::Vector3d g_W_;
   Eigen::Matrix<double, 9, 9> whitening_;  ///< W with W'W = covariance^-1
-  double gyro_walk_weight_;
-  double accel_walk_weight_;
+  double gyro_walk_weight_ = 0.0;
+  double accel_walk_weight_ = 0.0;
 };
 
 /// Mean of state j given state i: where the IMU carries it (right side of the factor set to zero).

@@ -24,6 +24,7 @@ struct NodePrior {
 class PriorFactor final : public ceres::SizedCostFunction<kNodeTangent, StateBlock::kSize, 1> {
  public:
   explicit PriorFactor(const NodePrior& prior) : prior_(prior) {}
+  void set(const NodePrior& prior) { prior_ = prior; }  ///< as if made anew
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
   const NodePrior& prior() const { return prior_; }
 

@@ -32,7 +32,11 @@ struct RadarVelocityMeasurement {
 class ConstantAccelerationRadarFactor final : public ceres::SizedCostFunction<3, StateBlock::kSize, 1> {
  public:
   ConstantAccelerationRadarFactor(const RadarVelocityMeasurement& z, const ImuMeasurement& imu,
-                                  const Eigen::Vector3d& g_W);
+                                  const Eigen::Vector3d& g_W) {
+    set(z, imu, g_W);
+  }
+  /// As if made anew.
+  void set(const RadarVelocityMeasurement& z, const ImuMeasurement& imu, const Eigen::Vector3d& g_W);
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
 
  private:
@@ -51,14 +55,19 @@ class ConstantAccelerationRadarFactor final : public ceres::SizedCostFunction<3,
 class ImuRadarFactor final : public ceres::SizedCostFunction<3, StateBlock::kSize, 1> {
  public:
   ImuRadarFactor(const RadarVelocityMeasurement& z, Time state_time, const ImuBuffer& imu,
-                 double max_time_offset, const Eigen::Vector3d& g_W);
+                 double max_time_offset, const Eigen::Vector3d& g_W) {
+    set(z, state_time, imu, max_time_offset, g_W);
+  }
+  /// As if made anew.
+  void set(const RadarVelocityMeasurement& z, Time state_time, const ImuBuffer& imu, double max_time_offset,
+           const Eigen::Vector3d& g_W);
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
 
  private:
   RadarVelocityMeasurement z_;
   Time state_time_;
-  const ImuBuffer* imu_;
-  double max_time_offset_;
+  const ImuBuffer* imu_ = nullptr;
+  double max_time_offset_ = 0.0;
   Eigen::Vector3d g_W_;
   Eigen::Matrix3d whitening_;
 };

@@ -10,11 +10,12 @@ namespace rio_t {
 class RestFactor final : public ceres::SizedCostFunction<3, StateBlock::kSize> {
  public:
   /// `velocity_sigma` [m/s], per axis.
-  explicit RestFactor(double velocity_sigma) : weight_(1.0 / velocity_sigma) {}
+  explicit RestFactor(double velocity_sigma) { set(velocity_sigma); }
+  void set(double velocity_sigma) { weight_ = 1.0 / velocity_sigma; }  ///< as if made anew
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
 
  private:
-  double weight_;
+  double weight_ = 0.0;
 };
 
 }  // namespace rio_t

@@ -1,9 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <deque>
+#include <cstddef>
 #include <type_traits>
 
+#include "rio_t/core/sliding_queue.h"
 #include "rio_t/imu/measurement.h"
 
 namespace rio_t {
@@ -47,7 +48,7 @@ class ImuBuffer {
  private:
   std::size_t firstAfter(Time time) const;  ///< index of the first sample later than `time`; size() if none
 
-  std::deque<ImuMeasurement> samples_;
+  SlidingQueue<ImuMeasurement> samples_;
 };
 
 template <typename Step>

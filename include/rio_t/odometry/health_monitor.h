@@ -1,10 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <deque>
 #include <optional>
 #include <string>
 
+#include "rio_t/core/sliding_queue.h"
 #include "rio_t/core/time.h"
 #include "rio_t/odometry/navigation_state.h"
 #include "rio_t/radar/ego_velocity.h"
@@ -73,7 +73,7 @@ class HealthMonitor {
 
   HealthOptions options_;  // read-only after construction
   double gate_;            // read-only after construction
-  std::deque<Entry> entries_;
+  SlidingQueue<Entry> entries_;
   Time last_update_;
   std::optional<Time> offset_stepped_;
   std::optional<Time> diverged_at_;  ///< since when the scans contradict, or since the last start after that

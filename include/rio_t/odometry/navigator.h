@@ -1,8 +1,8 @@
 #pragma once
 
-#include <deque>
 #include <optional>
 
+#include "rio_t/core/sliding_queue.h"
 #include "rio_t/imu/measurement.h"
 #include "rio_t/imu/noise.h"
 #include "rio_t/odometry/navigation_state.h"
@@ -31,7 +31,7 @@ class Navigator {
 
   ImuNoise noise_;       // read-only after construction
   Eigen::Vector3d g_W_;  // read-only after construction
-  std::deque<ImuMeasurement> history_;
+  SlidingQueue<ImuMeasurement> history_;
   std::optional<NavigationState> state_;
 };
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -53,13 +54,17 @@ class RadarInertialOdometry {
   /// initialisation. Samples that are out of place in time, or not finite, are dropped and counted in
   /// `faults()`, as are gaps and saturated samples, over which the uncertainty grows (see ImuGate). Where the
   /// IMU's clock jumps, all starts again with an initialisation.
-  std::optional<NavigationState> addImu(const ImuMeasurement& measured);
+  std::optional<NavigationState> addImu(const ImuMeasurement& imu);
 
   /// Queues a scan. It waits until the IMU covers its time of measurement.
   void addScan(RadarScan scan);
 
-  /// Works off what can be worked off: initialisation, ego-velocity, window. One result for each scan
-  /// finished.
+  /// Takes what became of a scan. The result is used again for the next one; to keep it, move it away.
+  using ResultHandler = std::function<void(ScanResult&)>;
+  /// Works off what can be worked off: initialisation, ego-velocity, window. Calls `handle` for each scan
+  /// finished. Allocates nothing once its buffers have grown to what the data need.
+  void process(const ResultHandler& handle);
+  /// The same, with the results in a list.
   std::vector<ScanResult> process();
 
   /// At the end of the data: finishes what still waits (rejected as "imu_not_covering" where the IMU never

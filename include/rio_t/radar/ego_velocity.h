@@ -92,6 +92,19 @@ struct VelocityPrior {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< [m^2/s^2], positive definite
 };
 
+/// A detection as the solvers see it.
+struct RadarDirection {
+  Eigen::Vector3d u_R;    ///< unit vector to the target
+  double doppler = 0;     ///< range rate [m/s]
+  std::size_t index = 0;  ///< into the scan's points
+};
+
+/// Memory that estimates share, so that none allocates once it has seen its largest scan; one for each
+/// thread.
+struct EgoVelocityWorkspace {
+  std::vector<RadarDirection> points, inliers, supporters;
+};
+
 /// Ego-velocity of one scan: filter, zero-velocity test, 3-point RANSAC, least squares.
 /// A static target in direction u gives v_d = -u . v_R (Kellner et al., ITSC 2013).
 class EgoVelocityEstimator {
@@ -104,6 +117,9 @@ class EgoVelocityEstimator {
   /// points agree with a velocity that does not, those points are the inliers. A prior that is vague (above
   /// 0.1 m/s) is only one witness more besides the points. The velocity and its covariance come from the
   /// points alone, so fusing the result with the prior does not count anything twice.
+  void estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior,
+                EgoVelocityWorkspace* workspace, EgoVelocity* estimated) const;
+  /// The same with memory of its own.
   EgoVelocity estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior = std::nullopt) const;
 
  private:

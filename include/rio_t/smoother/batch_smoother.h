@@ -80,7 +80,6 @@ class BatchSmoother {
   };
   Graph place(const BatchProblem& problem, const std::vector<double>& t_O,
               const std::vector<NodeEstimate>& guess) const;
-  std::unique_ptr<RadarCost> makeRadarFactor(const RadarVelocityMeasurement& z, Time node_time) const;
 
   SmootherOptions options_;  // all read-only after construction
   BatchOptions batch_;

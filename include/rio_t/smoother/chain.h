@@ -73,7 +73,7 @@ bool solve(const ChainSystem& system, double damping, ChainSolution* solution);
 /// The same without damping, but for the little that a matrix needs which only rounding made indefinite.
 bool solveUndamped(const ChainSystem& system, ChainSolution* solution);
 
-/// Marginal covariance of the last node of the chain.
-NodeMatrix covarianceOfLast(const ChainSystem& system);
+/// Marginal covariance of the last node of the chain; `solution` is solved anew.
+NodeMatrix covarianceOfLast(const ChainSystem& system, ChainSolution* solution);
 
 }  // namespace rio_t

@@ -9,6 +9,7 @@
 #include "rio_t/factors/radar_velocity_factor.h"
 #include "rio_t/imu/buffer.h"
 #include "rio_t/radar/ego_velocity.h"
+#include "rio_t/smoother/factor_pool.h"
 #include "rio_t/smoother/options.h"
 #include "rio_t/smoother/window.h"
 #include "rio_t/smoother/window_solver.h"
@@ -61,8 +62,8 @@ class FixedLagSmoother {
   /// back.
   void loosenTimeOffset() { offset_has_stepped_ = true; }
   SolveReport optimize();
-  /// Marginalises what is older than the window; the nodes that left, oldest first.
-  std::vector<NodeEstimate> marginalize();
+  /// Marginalises what is older than the window; the nodes that left, oldest first, until the next call.
+  const std::vector<NodeEstimate>& marginalize();
 
   std::size_t size() const { return window_.nodes.size(); }
   NodeEstimate node(std::size_t k) const {
@@ -77,12 +78,11 @@ class FixedLagSmoother {
  private:
   /// The node at `time`, made if need be; null where `time` lies before the window.
   WindowNode* nodeAt(Time time);
-  WindowNode makeNode(Time time, const WindowNode& previous) const;
+  WindowNode makeNode(Time time, const WindowNode& previous);
   void linkToPrevious(std::size_t k);
   /// From `node` to `to` with the biases of `node`. A scan asks for the same one three times: for its
   /// prediction, its node and its factor.
   const Preintegration& preintegrateFrom(const WindowNode& node, Time to) const;
-  std::unique_ptr<RadarCost> makeRadarFactor(const RadarVelocityMeasurement& z, Time node_time) const;
   double offsetVariance(double dt) const;  ///< that t_O gains in dt [s] by its random walk [s^2]
 
   SmootherOptions options_;  // these: read-only after construction
@@ -95,7 +95,11 @@ class FixedLagSmoother {
     Time from, to;
     Preintegration value;
   };
-  mutable LastPreintegration last_preintegration_;  // a cache; changes no result
+  // These two change no result.
+  mutable LastPreintegration last_preintegration_;
+  mutable FactorPool pool_;
+  ChainSystem leaving_{2};  // a node that leaves and its neighbour
+  std::vector<NodeEstimate> left_;
   bool offset_has_stepped_ = false;
   NodeMatrix newest_covariance_ = NodeMatrix::Zero();
 };

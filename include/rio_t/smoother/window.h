@@ -3,7 +3,6 @@
 #include <ceres/loss_function.h>
 #include <ceres/sized_cost_function.h>
 
-#include <deque>
 #include <memory>
 #include <vector>
 
@@ -38,7 +37,7 @@ struct WindowNode {
 /// The factor graph: a chain of nodes in the order of their times, with a prior on the first.
 struct Window {
   std::unique_ptr<PriorFactor> prior;
-  std::deque<WindowNode> nodes;
+  std::vector<WindowNode> nodes;
   std::unique_ptr<ceres::LossFunction> loss;  ///< on the radar; null: none
   bool offset_known = false;                  ///< t_O is held
   double max_time_offset = 0.0;               ///< [s] bound on |t_O|
