@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "noise.h"
 #include "rio_t/core/so3.h"
 #include "rio_t/imu/buffer.h"
 #include "rio_t/imu/preintegration.h"
@@ -13,23 +14,6 @@
 
 namespace rio_t {
 namespace {
-
-/// Deterministic noise of unit variance: a sum of twelve uniforms, the same with every standard library.
-class Noise {
- public:
-  double operator()() {
-    double sum = -6.0;
-    for (int i = 0; i < 12; ++i) sum += static_cast<double>(engine_()) / 4294967296.0;
-    return sum;
-  }
-  Eigen::Vector3d vector() {
-    const double x = (*this)(), y = (*this)(), z = (*this)();
-    return {x, y, z};
-  }
-
- private:
-  std::mt19937 engine_{7};
-};
 
 TEST(ImuBuffer, InterpolatesBetweenSamplesAndHoldsTheEnds) {
   ImuBuffer buffer;

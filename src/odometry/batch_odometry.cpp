@@ -65,7 +65,7 @@ BatchResult BatchOdometry::solve(const RadarInertialOdometry::Start& start) cons
     batch.solution.iterations += iterations;
   }
   batch.trajectory = trajectory(batch.solution);
-  batch.scans = results(run, batch.solution);
+  batch.scans = results(run, smoother, batch.solution);
   return batch;
 }
 
@@ -199,7 +199,24 @@ std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solu
   return states;
 }
 
-std::vector<ScanResult> BatchOdometry::results(const Run& run, const BatchSolution& solution) const {
+VarianceFactor BatchOdometry::varianceFactor(const Run& run, const BatchSmoother& smoother,
+                                             const BatchSolution& solution) const {
+  VarianceFactor factor;
+  for (std::size_t j = 0; j < run.problem.scans.size(); ++j) {
+    const std::optional<RadarVelocityMeasurement>& z = run.problem.scans[j].velocity;
+    if (!z || !z->informs_offset) continue;
+    const std::size_t k = solution.node_of_scan[j];
+    const auto residual = smoother.residual(solution.nodes[k], solution.covariances[k], *z);
+    // The solution has been drawn towards z: what is left scatters less than z does.
+    const Eigen::Matrix3d S = z->covariance - residual.prediction_covariance;
+    factor.add(residual.value.dot(S.ldlt().solve(residual.value)));
+  }
+  return factor;
+}
+
+std::vector<ScanResult> BatchOdometry::results(const Run& run, const BatchSmoother& smoother,
+                                               const BatchSolution& solution) const {
+  const double factor = varianceFactor(run, smoother, solution).value();
   std::vector<ScanResult> results;
   for (const Scan& scan : scans_) {
     results.push_back(scan.result);
@@ -216,7 +233,8 @@ std::vector<ScanResult> BatchOdometry::results(const Run& run, const BatchSoluti
     if (result.used) result.rejected_because.clear();
     result.state = navigationState(solution.nodes[k], P, imu_);
     result.time_offset = solution.nodes[k].t_O;
-    result.time_offset_sigma = options_.smoother.estimate_time_offset ? std::sqrt(P(kState, kState)) : 0.0;
+    result.time_offset_sigma =
+        options_.smoother.estimate_time_offset ? std::sqrt(factor * P(kState, kState)) : 0.0;
   }
   std::vector<std::size_t> order(results.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;

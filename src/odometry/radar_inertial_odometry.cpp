@@ -9,6 +9,7 @@
 #include "rio_t/odometry/initializer.h"
 #include "rio_t/odometry/innovation_gate.h"
 #include "rio_t/odometry/navigator.h"
+#include "rio_t/odometry/offset_uncertainty.h"
 #include "rio_t/odometry/pose_doubt.h"
 #include "rio_t/odometry/yaw_doubt.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
@@ -110,6 +111,7 @@ struct RadarInertialOdometry::Impl {
   EgoVelocityEstimator ego_velocity_estimator;
   FeasibilityCheck feasibility;
   OffsetMonitor offset_monitor;
+  OffsetUncertainty offset_uncertainty;
   InnovationGate innovation_gate;
   HealthMonitor health_monitor;
   FixedLagSmoother smoother;
@@ -271,10 +273,15 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
       offset_monitor.stepped(scan.stamp, measured.v_R - prediction->velocity.v_R,
                              prediction->covariance_at_offset + measured.covariance, prediction->dv_dt_O)) {
     smoother.loosenTimeOffset();
+    offset_uncertainty.offsetStepped();
     health_monitor.offsetStepped(scan.stamp);
     faults.count("time_offset_step");
   }
   if (prior && innovation_gate.rejects(scan.stamp, *prior, measured, tilt_is_known)) return "innovation";
+  if (prediction && informs_offset && tilt_is_known) {
+    offset_uncertainty.add(scan.stamp, measured.v_R - prediction->velocity.v_R,
+                           prediction->velocity.covariance + measured.covariance, prediction->dv_dt_O);
+  }
   return "";
 }
 
@@ -289,9 +296,10 @@ void RadarInertialOdometry::Impl::updateWindow() {
   result.state = newestState(covariance);
   health_monitor.updated(result.state.time);
   result.time_offset = smoother.newest().t_O;
-  result.time_offset_sigma = options.smoother.estimate_time_offset
-                                 ? std::sqrt(covariance(StateBlock::kTangent, StateBlock::kTangent))
-                                 : 0.0;
+  result.time_offset_sigma =
+      options.smoother.estimate_time_offset
+          ? offset_uncertainty.sigma(covariance(StateBlock::kTangent, StateBlock::kTangent))
+          : 0.0;
   anchorNavigator(result.state);
 }
 
@@ -350,6 +358,7 @@ void RadarInertialOdometry::Impl::startAgain() {
   initializer = Initializer(at_once);
   feasibility = FeasibilityCheck(options.feasibility);
   offset_monitor = OffsetMonitor(options.offset_monitor);
+  offset_uncertainty = OffsetUncertainty();
   smoother = emptySmoother();
   recovery.clear();
   health_monitor = HealthMonitor(options.health, options.smoother.innovation_gate);

@@ -7,6 +7,7 @@
 
 #include "rio_t/imu/gate.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
+#include "rio_t/odometry/variance_factor.h"
 #include "rio_t/smoother/batch_smoother.h"
 
 namespace rio_t {
@@ -62,7 +63,11 @@ class BatchOdometry {
                      const RadarVelocityMeasurement& z) const;
   bool isAtRest(const NodeEstimate& node) const;
   std::vector<NavigationState> trajectory(const BatchSolution& solution) const;
-  std::vector<ScanResult> results(const Run& run, const BatchSolution& solution) const;
+  std::vector<ScanResult> results(const Run& run, const BatchSmoother& smoother,
+                                  const BatchSolution& solution) const;
+  /// How the velocities that tell the offset scatter around the solution.
+  VarianceFactor varianceFactor(const Run& run, const BatchSmoother& smoother,
+                                const BatchSolution& solution) const;
 
   OdometryOptions options_;  // read-only after construction
   BatchOptions batch_;       // read-only after construction
