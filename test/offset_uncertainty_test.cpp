@@ -28,12 +28,12 @@ struct Scans {
 };
 
 TEST(OffsetUncertainty, BeginsWithTheMarginalSigma) {
-  EXPECT_DOUBLE_EQ(OffsetUncertainty().sigma(4.0e-6), 2.0e-3);
+  EXPECT_DOUBLE_EQ(OffsetUncertainty(1.5).sigma(4.0e-6), 2.0e-3);
 }
 
 TEST(OffsetUncertainty, FollowsTheScatterBothWays) {
   for (const double scale : {0.4, 1.0, 1.5}) {
-    OffsetUncertainty u;
+    OffsetUncertainty u(1.5);
     Scans scans;
     scans.feed(u, 120.0, scale * kPromised, 0.0);
     EXPECT_NEAR(u.sigma(1.0e-4), scale * 1.0e-2, 0.1 * scale * 1.0e-2);
@@ -45,7 +45,7 @@ TEST(OffsetUncertainty, FollowsTheScatterBothWays) {
 }
 
 TEST(OffsetUncertainty, OneScanFarOffIsNoNoise) {
-  OffsetUncertainty u;
+  OffsetUncertainty u(1.5);
   Scans scans;
   scans.feed(u, 60.0, kPromised, 0.0);
   const double before = u.sigma(1.0e-4);
@@ -57,7 +57,7 @@ TEST(OffsetUncertainty, OneScanFarOffIsNoNoise) {
 TEST(OffsetUncertainty, WidensWhereTheScansAskForAChangeAllTheTime) {
   const double marginal = 0.2e-3;
   const double lag = 2.0e-3;
-  OffsetUncertainty u;
+  OffsetUncertainty u(1.5);
   Scans scans;
   scans.feed(u, 60.0, 0.5 * kPromised, 0.0);
   const double before = u.sigma(marginal * marginal);

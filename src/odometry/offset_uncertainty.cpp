@@ -18,12 +18,17 @@ void OffsetUncertainty::add(Time stamp, const Eigen::Vector3d& d, const Eigen::M
   last_ = stamp;
   const auto weight = S.ldlt();
   factor_.fade(std::exp(-elapsed / kFactorMemory));
-  factor_.add(d.dot(weight.solve(d)));
+  const double squared_sigmas = d.dot(weight.solve(d));
+  factor_.add(squared_sigmas);
   const double fade = std::exp(-elapsed / kLagMemory);
+  // Weighed as in the window: else what the estimate does not heed would ask for a change for good.
+  const double length = std::sqrt(squared_sigmas);
+  const double share = huber_threshold_ > 0.0 && length > huber_threshold_ ? huber_threshold_ / length : 1.0;
   const Eigen::Vector3d weighted_J = weight.solve(J);
-  information_ = fade * information_ + J.dot(weighted_J);
-  spread_ = fade * fade * spread_ + J.dot(weighted_J);
-  projection_ = fade * projection_ + d.dot(weighted_J);
+  const double information = J.dot(weighted_J);
+  information_ = fade * information_ + share * information;
+  spread_ = fade * fade * spread_ + share * share * information;
+  projection_ = fade * projection_ + share * d.dot(weighted_J);
 }
 
 void OffsetUncertainty::offsetStepped() {
@@ -38,7 +43,8 @@ double OffsetUncertainty::sigma(double variance) const {
   if (information_ > 0.0) {
     const double change = projection_ / information_;
     const double change_variance = factor * spread_ / (information_ * information_);
-    square += std::max(0.0, change * change - change_variance);
+    // Akaike's criterion: a change is worth its while where its square exceeds twice its variance.
+    square += std::max(0.0, change * change - 2.0 * change_variance);
   }
   return std::sqrt(square);
 }

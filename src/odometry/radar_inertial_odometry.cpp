@@ -52,6 +52,7 @@ struct RadarInertialOdometry::Impl {
         ego_velocity_estimator(options.ego_velocity),
         feasibility(options.feasibility),
         offset_monitor(options.offset_monitor),
+        offset_uncertainty(options.smoother.huber_threshold),
         innovation_gate(options.smoother),
         health_monitor(options.health, options.smoother.innovation_gate),
         smoother(emptySmoother()) {
@@ -358,7 +359,7 @@ void RadarInertialOdometry::Impl::startAgain() {
   initializer = Initializer(at_once);
   feasibility = FeasibilityCheck(options.feasibility);
   offset_monitor = OffsetMonitor(options.offset_monitor);
-  offset_uncertainty = OffsetUncertainty();
+  offset_uncertainty = OffsetUncertainty(options.smoother.huber_threshold);
   smoother = emptySmoother();
   recovery.clear();
   health_monitor = HealthMonitor(options.health, options.smoother.innovation_gate);

@@ -13,6 +13,8 @@ namespace rio_t {
 /// drifts. Not thread-safe.
 class OffsetUncertainty {
  public:
+  /// `huber_threshold` on d' S^-1 d, as on the radar factors; 0: no robust loss.
+  explicit OffsetUncertainty(double huber_threshold) : huber_threshold_(huber_threshold) {}
   /// A scan that was used and tells the offset: its innovation `d` [m/s], the covariance S of that, and
   /// `J` = d(velocity)/d(t_O) [m/s^2].
   void add(Time stamp, const Eigen::Vector3d& d, const Eigen::Matrix3d& S, const Eigen::Vector3d& J);
@@ -23,6 +25,7 @@ class OffsetUncertainty {
   double sigma(double variance) const;
 
  private:
+  double huber_threshold_;  // read-only after construction
   Time last_;
   VarianceFactor factor_;     ///< of the last minute
   double information_ = 0.0;  ///< sum of J' S^-1 J, fading [1/s^2]
