@@ -134,6 +134,33 @@ TEST_F(AtRest, ASilentRadarIsCountedOnceEachTime) {
   EXPECT_EQ(odometry.faults().at("radar_gap"), 2u);
 }
 
+TEST_F(AtRest, WithoutScansTheWindowMovesOn) {
+  run(104.0);
+  std::vector<StampedPose> left;
+  const auto scanAndRun = [&](double until) {
+    odometry.addScan(restScan(time - 0.05));
+    const std::vector<ScanResult> results = run(until);
+    ASSERT_EQ(results.size(), 1u);
+    EXPECT_TRUE(results[0].used) << results[0].rejected_because;
+    left.insert(left.end(), results[0].left_window.begin(), results[0].left_window.end());
+  };
+  while (time < 106.0) scanAndRun(time + 0.1);
+  EXPECT_TRUE(run(160.0).empty());
+  // Else all of the IMU since the last scan would have to be kept.
+  scanAndRun(160.1);
+  ASSERT_FALSE(left.empty());
+  EXPECT_GT(left.back().time - Time::fromSeconds(0.0), 145.0);
+  for (std::size_t i = 1; i < left.size(); ++i) {
+    EXPECT_GT(left[i].time - left[i - 1].time, 0.0);
+    EXPECT_LT(left[i].time - left[i - 1].time, 5.1);
+  }
+  // And a scan that is late finds its place.
+  odometry.addScan(restScan(time - 0.9));
+  const std::vector<ScanResult> late = run(160.2);
+  ASSERT_EQ(late.size(), 1u);
+  EXPECT_TRUE(late[0].used) << late[0].rejected_because;
+}
+
 TEST_F(AtRest, AClockThatJumpsStartsTheEstimateAgain) {
   run(104.0);
   odometry.addScan(restScan(103.95));

@@ -25,6 +25,10 @@ constexpr double kMaxStampAhead = 1.0;
 /// Where roll and pitch are known no better [rad], the prediction is not linear in them, and its covariance
 /// too small to reject anything by.
 constexpr double kMaxTiltSigma = 0.1;
+/// Without a scan the window moves on in such steps [s], or the IMU that it needs would grow without end; and
+/// stays so far behind, for scans that are late.
+constexpr double kSilentStep = 5.0;
+constexpr double kLateScan = 1.0;
 
 /// As made anew, but with the memory of its lists.
 void clear(ScanResult& result) {
@@ -63,6 +67,7 @@ struct RadarInertialOdometry::Impl {
   void drainInbox();
   void startAgain();
   void watchRadar(bool scan_came);
+  void carryWindow();
   void anchorNavigator(const NavigationState& state);
   void tryInitialize(const ImuMeasurement& sample);
   void begin(Time time, const NodePrior& prior);
@@ -125,6 +130,8 @@ struct RadarInertialOdometry::Impl {
   PoseDoubt pose_doubt;
   YawDoubt yaw_doubt;
   std::vector<ImuMeasurement> imu_drained;
+  std::vector<StampedPose>
+      left_in_silence;  ///< poses that no scan pushed out of the window; for the next result
   std::uint64_t clock_restarts_done = 0;
   std::optional<Time> radar_heard;  ///< IMU time when a scan came last
   bool radar_is_silent = false;
@@ -209,6 +216,7 @@ bool RadarInertialOdometry::Impl::mustWait(const RadarScan& scan) const {
 
 void RadarInertialOdometry::Impl::finishScan(RadarScan& scan, bool imu_has_ended) {
   clear(result);
+  result.left_window.swap(left_in_silence);
   useScan(scan, imu_has_ended);
   result.health = health_monitor.health();
   result.scan = std::move(scan);
@@ -315,6 +323,8 @@ std::vector<ScanResult> RadarInertialOdometry::finish() {
   if (!initialized()) return results;
   // The poses still in the window belong to the last scan.
   if (results.empty()) results.emplace_back();
+  for (const StampedPose& pose : m.left_in_silence) results.back().left_window.push_back(pose);
+  m.left_in_silence.clear();
   for (std::size_t k = 0; k < m.smoother.size(); ++k) {
     const NodeEstimate node = m.smoother.node(k);
     results.back().left_window.push_back({node.time, node.x.p_W(), node.x.q_WI()});
@@ -344,6 +354,7 @@ void RadarInertialOdometry::Impl::drainInbox() {
   }
   watchRadar(scan_came);
   if (smoother.size() == 0) return;
+  carryWindow();
   const bool keep_for_recovery = options.health.on_divergence == OnDivergence::kReinitialize;
   const Time needed = smoother.imuNeededSince();
   imu.dropBefore(keep_for_recovery ? std::min(needed, imu.newest() - recovery.imuHistory()) : needed);
@@ -361,6 +372,7 @@ void RadarInertialOdometry::Impl::startAgain() {
   offset_monitor = OffsetMonitor(options.offset_monitor);
   offset_uncertainty = OffsetUncertainty(options.smoother.huber_threshold);
   smoother = emptySmoother();
+  left_in_silence.clear();
   recovery.clear();
   health_monitor = HealthMonitor(options.health, options.smoother.innovation_gate);
   pose_doubt = PoseDoubt();
@@ -378,6 +390,16 @@ void RadarInertialOdometry::Impl::watchRadar(bool scan_came) {
     faults.count("radar_gap");
     radar_is_silent = true;
   }
+}
+
+/// Of a silent radar, see kSilentStep.
+void RadarInertialOdometry::Impl::carryWindow() {
+  const Time time = imu.newest() - (kLateScan + 2.0 * options.smoother.max_time_offset);
+  if (!waiting_scans.empty() || time - smoother.newest().time < kSilentStep) return;
+  smoother.carryTo(time);
+  smoother.optimize();
+  for (const NodeEstimate& node : smoother.marginalize())
+    left_in_silence.push_back({node.time, node.x.p_W(), node.x.q_WI()});
 }
 
 void RadarInertialOdometry::Impl::anchorNavigator(const NavigationState& state) {

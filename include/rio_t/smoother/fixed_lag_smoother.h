@@ -58,6 +58,9 @@ class FixedLagSmoother {
   AddResult add(const RadarVelocityMeasurement& z);
   /// The platform is at rest at the time of measurement of a scan stamped `stamp`; `velocity_sigma` [m/s].
   AddResult addRest(Time stamp, double velocity_sigma);
+  /// A node at `time` without a measurement, later than the newest: so the window moves on while no scan
+  /// comes.
+  void carryTo(Time time) { nodeAt(time); }
   /// Forgets how well t_O is known from the next node on, where it must have stepped: its prior sigma comes
   /// back.
   void loosenTimeOffset() { offset_has_stepped_ = true; }
