@@ -171,8 +171,10 @@ Eigen::VectorXd evaluated(const ceres::CostFunction& cost, const std::vector<con
   const int rows = cost.num_residuals();
   Eigen::VectorXd r(rows);
   std::vector<Eigen::VectorXd> J;
+  J.reserve(cost.parameter_block_sizes().size());
   for (const int size : cost.parameter_block_sizes()) J.emplace_back(rows * size);
   std::vector<double*> jacobians;
+  jacobians.reserve(J.size());
   for (Eigen::VectorXd& j : J) jacobians.push_back(j.data());
   EXPECT_TRUE(cost.Evaluate(blocks.data(), r.data(), jacobians.data()));
   for (const Eigen::VectorXd& j : J) {
