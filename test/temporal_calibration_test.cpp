@@ -72,7 +72,7 @@ TEST(TemporalCalibration, TheSigmaIsNeitherTooSmallNorTooLarge) {
     within += c.share_within_interval / kSeeds;
   }
   EXPECT_GT(within, 0.85);
-  // The options' noise alone makes this 0.05.
+  // The options' noise alone makes this 0.12.
   EXPECT_GT(mean_square, 0.15);
   EXPECT_LT(mean_square, 1.5);
 }
