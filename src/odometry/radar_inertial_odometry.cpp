@@ -130,8 +130,8 @@ struct RadarInertialOdometry::Impl {
   PoseDoubt pose_doubt;
   YawDoubt yaw_doubt;
   std::vector<ImuMeasurement> imu_drained;
-  std::vector<StampedPose>
-      left_in_silence;  ///< poses that no scan pushed out of the window; for the next result
+  /// Poses that no scan pushed out of the window; for the next result.
+  std::vector<StampedPose> left_in_silence;
   std::uint64_t clock_restarts_done = 0;
   std::optional<Time> radar_heard;  ///< IMU time when a scan came last
   bool radar_is_silent = false;
