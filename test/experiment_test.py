@@ -10,8 +10,10 @@ import sys
 import tempfile
 import traceback
 import unittest
+import unittest.mock
 import xml.sax.saxutils
 
+import numpy
 import yaml
 
 MODELS = {"imu", "constant_acceleration"}
@@ -26,6 +28,124 @@ def run(*arguments):
 def table(path):
     with open(path, newline="") as file:
         return list(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
+def rotations(vectors):
+    """Exp of rotation vectors (n, 3), by Rodrigues: the product under test has only the logarithm."""
+    result = []
+    for vector in vectors:
+        angle = numpy.linalg.norm(vector)
+        x, y, z = vector / angle if angle > 0 else vector
+        K = numpy.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        result.append(numpy.eye(3) + numpy.sin(angle) * K + (1 - numpy.cos(angle)) * K @ K)
+    return numpy.array(result)
+
+
+def quaternions(matrices):
+    """x y z w of matrices whose angle is below 180 deg."""
+    w = numpy.sqrt(1 + numpy.trace(matrices, axis1=1, axis2=2)) / 2
+    v = numpy.stack([matrices[:, 2, 1] - matrices[:, 1, 2], matrices[:, 0, 2] - matrices[:, 2, 0],
+                     matrices[:, 1, 0] - matrices[:, 0, 1]], -1) / (4 * w[:, None])
+    return numpy.hstack([v, w[:, None]])
+
+
+class MadeUp:
+    """A known motion at 400 Hz, and an estimate ten times a second with known errors in a world of its own."""
+    SIGMAS = numpy.array([0.1, 0.2, 0.4, 0.01, 0.03, 0.002, 0.05, 0.1, 0.3])
+    TURN, SHIFT = 2.5, numpy.array([10.0, -20.0, 3.0])  # of the world of the estimate: heading [rad], origin [m]
+
+    def __init__(self, seconds, attitude=(0.4, -0.3, 1.0)):
+        time = numpy.arange(0, seconds + 2, 0.0025)
+        self.truth = nees.Poses(time, self.position(time), quaternions(self.rotation(time, attitude)))
+        self.time = numpy.arange(0.7013, seconds, 0.1)
+        self.turn = rotations([numpy.array([0, 0, self.TURN])])[0]
+        self.R = self.turn @ self.rotation(self.time, attitude)
+        self.velocity = numpy.stack([2 * numpy.cos(self.time), -1.5 * numpy.sin(3 * self.time),
+                                     0.4 * numpy.cos(2 * self.time)], -1) @ self.turn.T
+        self.no_error = numpy.zeros((len(self.time), 9))
+
+    @staticmethod
+    def position(t):
+        return numpy.stack([2 * numpy.sin(t), 0.5 * numpy.cos(3 * t), 0.2 * numpy.sin(2 * t)], -1)
+
+    @staticmethod
+    def rotation(t, attitude):
+        return rotations(numpy.outer(1 + 0.3 * numpy.sin(t), attitude))
+
+    def noise(self, seed=0):
+        """Errors of the SIGMAS, nil at the first stamp, where the worlds are brought together."""
+        errors = numpy.random.default_rng(seed).normal(size=self.no_error.shape) * self.SIGMAS
+        errors[0] = 0
+        return errors
+
+    def result(self, errors, sigmas=SIGMAS, offsets=((5.0, 0.032, 0.001), )):
+        estimate = nees.Poses(self.time, self.position(self.time) @ self.turn.T + self.SHIFT + errors[:, :3],
+                              quaternions(rotations(errors[:, 3:6]) @ self.R))
+        sigmas = numpy.broadcast_to(sigmas, errors.shape)
+        return nees.consistency(estimate, self.velocity + errors[:, 6:], sigmas, numpy.array(offsets), self.truth, 0.03)
+
+
+class Nees(unittest.TestCase):
+    def test_honest_sigmas_give_one(self):
+        data = MadeUp(400)
+        figures = data.result(data.noise()).nees
+        for part in ("position", "z", "velocity", "tilt", "yaw"):
+            self.assertAlmostEqual(figures[part], 1.0, delta=0.08, msg=part)
+
+    def test_sigmas_half_of_the_errors_give_four(self):
+        data = MadeUp(400)
+        figures = data.result(data.noise(1), 0.5 * MadeUp.SIGMAS).nees
+        for part in ("position", "z", "velocity", "tilt", "yaw"):
+            self.assertAlmostEqual(figures[part], 4.0, delta=0.32, msg=part)
+
+    def test_place_and_heading_of_the_start_are_no_error(self):
+        data = MadeUp(20)
+        result = data.result(data.no_error)
+        # What is left is the interpolation of the truth.
+        self.assertLess(numpy.abs(result.ratios * MadeUp.SIGMAS).max(), 3e-5)
+        self.assertGreaterEqual(result.time[0], data.time[0] + 1.0)
+
+    def test_roll_and_pitch_of_the_start_stay_errors(self):
+        data = MadeUp(20)
+        errors = data.no_error.copy()
+        errors[:, 3:5] = 0.01, -0.03
+        figures = data.result(errors).nees
+        self.assertAlmostEqual(figures["tilt"], 1.0, delta=0.01)
+        self.assertLess(figures["position"], 1e-3)
+
+    def test_yaw_is_about_the_vertical_of_the_world(self):
+        data = MadeUp(20, attitude=(1.5, 0.0, 0.0))  # lies on its side: its z axis is horizontal
+        errors = data.no_error.copy()
+        errors[1:, 5] = 0.02
+        figures = data.result(errors, numpy.full(9, 0.01)).nees
+        self.assertAlmostEqual(figures["yaw"], 4.0, delta=0.01)
+        self.assertLess(figures["tilt"], 1e-6)
+
+    def test_each_axis_has_its_own_sigma(self):
+        data = MadeUp(20)
+        for column, part, share in ((0, "position", 3), (2, "z", 1), (3, "tilt", 2), (5, "yaw", 1), (7, "velocity", 3)):
+            errors = data.no_error.copy()
+            errors[1:, column] = 3 * MadeUp.SIGMAS[column]
+            self.assertAlmostEqual(data.result(errors).nees[part], 9 / share, delta=0.01, msg=part)
+
+    def test_offset_counts_where_it_is_estimated(self):
+        data = MadeUp(20)
+        offsets = [(1.0, 0.5, 0.001), (3.0, 0.03, 0.0), (5.0, 0.032, 0.001), (6.0, 0.026, 0.001)]
+        result = data.result(data.no_error, offsets=offsets)
+        self.assertAlmostEqual(result.nees["offset"], (2**2 + 4**2) / 2)
+        self.assertAlmostEqual(result.offset_quantile(1.0), 4.0)
+        nothing = data.result(data.no_error, offsets=[(3.0, 0.03, 0.0)])
+        self.assertTrue(numpy.isnan(nothing.nees["offset"]) and numpy.isnan(nothing.offset_quantile(0.95)))
+
+    def test_what_cannot_be_judged_is_told(self):
+        data = MadeUp(20)
+        for change, expected in ((dict(sigmas=numpy.zeros(9)), "sigma"), (dict(late=True), "does not reach")):
+            with self.subTest(expected), numpy.errstate(all="ignore"):
+                if change.pop("late", False):
+                    data.truth = nees.Poses(data.truth.time[:400], data.truth.position[:400],
+                                            data.truth.quaternion[:400])
+                with self.assertRaisesRegex(nees.NeesError, expected):
+                    data.result(data.no_error, **change)
 
 
 class Experiment(unittest.TestCase):
@@ -125,12 +245,16 @@ class JUnit(unittest.TextTestResult):
         super().__init__(*arguments)
         self.cases = {}
 
+    @staticmethod
+    def name(test):
+        return tuple(test.id().split(".")[-2:])
+
     def stopTest(self, test):
-        self.cases.setdefault(test.id().split(".")[-1], None)
+        self.cases.setdefault(self.name(test), None)
         super().stopTest(test)
 
     def note(self, test, error):
-        self.cases[test.id().split(".")[-1]] = "".join(traceback.format_exception(*error))
+        self.cases[self.name(test)] = "".join(traceback.format_exception(*error))
 
     def addFailure(self, test, err):
         self.note(test, err)
@@ -146,9 +270,9 @@ class JUnit(unittest.TextTestResult):
         super().addSubTest(test, subtest, err)
 
     def write(self, path):
-        cases = [f"<testcase classname=\"Experiment\" name={xml.sax.saxutils.quoteattr(name)}>" +
+        cases = [f"<testcase classname=\"{group}\" name={xml.sax.saxutils.quoteattr(name)}>" +
                  (f"<failure>{xml.sax.saxutils.escape(why)}</failure>" if why else "") + "</testcase>"
-                 for name, why in self.cases.items()]
+                 for (group, name), why in self.cases.items()]
         failures = sum(why is not None for why in self.cases.values())
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(f"<testsuite name=\"experiment_test\" tests=\"{len(cases)}\" failures=\"{failures}\" "
@@ -159,7 +283,10 @@ if __name__ == "__main__":
     if len(sys.argv) != 4:
         sys.exit(__doc__.strip())
     RESULTS, EXPERIMENT, PROGRAMS = sys.argv[1:]
-    suite = unittest.defaultTestLoader.loadTestsFromTestCase(Experiment)
+    sys.path.insert(0, str(pathlib.Path(EXPERIMENT).parent))
+    import nees
+    loader = unittest.defaultTestLoader
+    suite = unittest.TestSuite(loader.loadTestsFromTestCase(case) for case in (Nees, Experiment))
     outcome = unittest.TextTestRunner(resultclass=JUnit).run(suite)
     outcome.write(pathlib.Path(RESULTS))
     sys.exit(not outcome.wasSuccessful())
