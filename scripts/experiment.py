@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The paper's experiments on simulated or given bags: tables as Markdown and CSV, figures as PNG.
+"""The paper's experiments and more, on simulated or given bags: tables as Markdown and CSV, figures as PNG.
 
   shifts      stamps shifted by 0, 2.5, ... 15 ms: the estimate must follow, online and in a batch (Fig. 4); arrival
               against trigger stamps
@@ -7,8 +7,11 @@
   table1      RIO-T against LC-RIO, which does not estimate the offset (Table I)
   table2      LC-RIO with the stamps of the bag and with stamps corrected by RIO-T's estimate (Table II)
   montecarlo  seeds x motions x offsets: mean, spread, and whether the stated uncertainty is honest
+  consistency seeds x motions: errors of position, velocity, tilt, yaw and offset over their stated sigmas, at all
+              times (NEES); 1 is honest, `!` marks what is below 0.5 or above 2
 
-Both models of the offset run side by side: `imu` (ours) and `constant_acceleration` (the paper's).
+Both models of the offset run side by side: `imu` (ours) and `constant_acceleration` (the paper's). Only `consistency`
+runs one model, that of the configuration or of --set time_offset_model=...
 """
 import argparse
 import concurrent.futures
@@ -27,9 +30,13 @@ import threading
 import time
 from typing import Optional
 
+# Also where another program reads this file, as the one in catkin's devel space does.
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+
 # numpy, matplotlib and yaml are imported where they are used: a wrong argument is told before they are installed.
 
-EXPERIMENTS = ("shifts", "delay", "table1", "table2", "montecarlo")
+EXPERIMENTS = ("shifts", "delay", "table1", "table2", "montecarlo", "consistency")
+SIMULATED_ONLY = ("montecarlo", "consistency")  # these draw their bags, of more than one offset if asked
 MODELS = ("imu", "constant_acceleration")
 COLOURS = {"imu": "#1f6fb4", "constant_acceleration": "#e07b00", "LC-RIO": "#777777"}
 DEFAULT_SHIFTS = [2.5 * i for i in range(7)]  # ms
@@ -38,10 +45,15 @@ DELAY, PASSES = 100.0, 3                      # ms
 FRAME_OFFSET, DELAYED_OFFSETS = -9.25, (30.0, 100.0)
 HANDHELD = ["easy", "medium", "difficult"]
 DEFAULT_MOTIONS = {"shifts": ["difficult"], "delay": ["difficult"], "table1": HANDHELD + ["gym_loop"],
-                   "table2": HANDHELD + ["gym_loop"], "montecarlo": HANDHELD}
+                   "table2": HANDHELD + ["gym_loop"], "montecarlo": HANDHELD,
+                   "consistency": ["difficult", "medium", "drone", "ground_vehicle", "gym_loop", "start_in_motion"]}
+DEFAULT_OFFSETS = {"montecarlo": [FRAME_OFFSET, *DELAYED_OFFSETS], "consistency": [30.0]}
+DEFAULT_SEEDS = {"montecarlo": 10, "consistency": 5}
 # What an experiment varies itself.
 OWN_KEYS = ("time_offset_model", "estimate_time_offset", "radar_stamp_shift", "mode", "refine_passes")
+OWN_SIMULATION = ("motion", "trajectory", "out", "ground-truth", "seed", "duration", "time-offset")
 NORMAL_95 = 1.959964
+HONEST = (0.5, 2.0)  # NEES per degree of freedom beyond these is marked
 
 
 class ExperimentError(Exception):
@@ -93,12 +105,18 @@ def read_run(folder):
                scans, before)
 
 
+def truth_of(bag):
+    """The TUM file beside a simulated bag."""
+    return pathlib.Path(bag).with_suffix(".tum")
+
+
 class Laboratory:
     """Runs the programs. Bags and files of runs live in a scratch folder and are removed once read."""
 
-    def __init__(self, programs, scratch, config, settings, duration, jobs, show_progress):
-        self.programs, self.scratch, self.config, self.settings = programs, scratch, config, settings
-        self.duration, self.jobs, self.show_progress = duration, jobs, show_progress
+    def __init__(self, programs, scratch, options, show_progress):
+        self.programs, self.scratch, self.show_progress = programs, scratch, show_progress
+        self.config, self.settings, self.jobs = options.config, options.set, options.jobs
+        self.duration, self.simulation = options.duration, options.simulate
         self.stopped = threading.Event()
         self.lock = threading.Lock()
         self.done, self.total, self.started = 0, 0, time.monotonic()
@@ -117,20 +135,20 @@ class Laboratory:
         handle, bag = tempfile.mkstemp(prefix=f"{source.name}_", suffix=".bag", dir=self.scratch)
         os.close(handle)
         arguments = ["--motion", source.motion, "--seed", source.seed, "--time-offset", repr(1e-3 * source.offset),
-                     "--out", bag]
+                     "--out", bag, "--ground-truth", truth_of(bag), *self.simulation]
         if self.duration is not None:
             arguments += ["--duration", repr(self.duration)]
         self.execute("simulate", arguments)
         return pathlib.Path(bag)
 
-    def run(self, bag, settings):
+    def run(self, bag, settings, read=read_run):
         folder = pathlib.Path(tempfile.mkdtemp(prefix="run_", dir=self.scratch))
         arguments = ["--bag", bag, "--config", self.config, "--output-dir", folder]
         for setting in self.settings + [f"{key}={value}" for key, value in settings.items()]:
             arguments += ["--set", setting]
         try:
             self.execute("rio_t_bag", arguments)
-            return read_run(folder)
+            return read(folder)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
             self.tick()
@@ -169,6 +187,7 @@ class Laboratory:
                     users[id(source)] -= 1
                     if users[id(source)] == 0:
                         source.bag.unlink()
+                        truth_of(source.bag).unlink()
                         source.bag = None
 
         with concurrent.futures.ThreadPoolExecutor(self.jobs) as pool:
@@ -219,9 +238,11 @@ class Table:
     title: str
     columns: list
     rows: list
+    marks: set = dataclasses.field(default_factory=set)  # (row, column) that the page, not the CSV, marks with `!`
 
     def markdown(self):
-        cells = [self.columns] + [[str(cell) for cell in row] for row in self.rows]
+        cells = [self.columns] + [[f"{cell} !" if (i, j) in self.marks else str(cell) for j, cell in enumerate(row)]
+                                  for i, row in enumerate(self.rows)]
         widths = [max(len(row[i]) for row in cells) for i in range(len(self.columns))]
         lines = ["| " + " | ".join(cell.ljust(width) for cell, width in zip(row, widths)) + " |" for row in cells]
         lines.insert(1, "| " + " | ".join("-" * width for width in widths) + " |")
@@ -251,6 +272,7 @@ class Page:
     notes: list = dataclasses.field(default_factory=list)
     tables: list = dataclasses.field(default_factory=list)
     figures: list = dataclasses.field(default_factory=list)
+    conclusion: str = ""  # the last line
 
     def write(self, folder, name, command):
         notes = self.notes + [f"command: `{command}`"]
@@ -266,11 +288,15 @@ class Page:
         for figure, file_name in self.figures:
             figure.savefig(folder / file_name, dpi=120, bbox_inches="tight")
             text.append(f"![{file_name}]({file_name})")
+        if self.conclusion:
+            text.append(self.conclusion)
         (folder / f"{name}.md").write_text("\n\n".join(text) + "\n")
         shown = [table for table in self.tables if not table.name.endswith("_runs")]
         print("\n\n".join(f"{table.title}\n{table.markdown()}" for table in shown))
         files = [f"{name}.md"] + [f"{table.name}.csv" for table in self.tables] + [file for _, file in self.figures]
         print(f"\nin {folder}: {', '.join(files)}")
+        if self.conclusion:
+            print(self.conclusion)
 
 
 def plots():
@@ -636,6 +662,114 @@ def draw_spread(groups):
     return figure
 
 
+def judged(text):
+    return text != "" and not HONEST[0] <= float(text) <= HONEST[1]
+
+
+def consistency(lab, sources, options):
+    import nees
+    del options
+
+    def work(source):
+        def function(laboratory, bag):
+            def read(folder):
+                return read_run(folder), nees.read_consistency(folder, truth_of(bag), 1e-3 * source.offset)
+            try:
+                return laboratory.run(bag, {}, read)
+            except (ExperimentError, nees.NeesError) as error:
+                return str(error)
+        return function
+
+    results = lab.map([(source, 1, work(source)) for source in sources])
+    if all(isinstance(result, str) for result in results):
+        raise ExperimentError(f"no run has a result: {results[0]}")
+    page = Page("Consistency: errors over their stated sigmas")
+    page.notes.append("NEES per degree of freedom: the mean over axes and time of (error / sigma)^2, 1 for an honest "
+                      f"estimator; `!` marks what is outside {HONEST[0]:g} to {HONEST[1]:g}")
+    page.notes.append("the truth is moved to the estimate at the first stamp by translation and yaw only; the "
+                      f"{nees.SETTLING:g} s after it are left out")
+    page.notes.append("axes are those of the world: tilt is the rotation error about x and y, yaw about z")
+    page.notes.append("errors of one run are alike over time, so a run is little more than one sample of yaw or offset: "
+                      "of an honest estimator, the mean of five runs is outside the limits three times in ten")
+    columns = [f"{part} NEES" for part in nees.PARTS]
+    groups, single, single_marks = {}, [], set()
+    for source, result in zip(sources, results):
+        group = groups.setdefault((source.name, source.offset), [])
+        key = [source.name, fixed(source.offset, 2), source.seed]
+        if isinstance(result, str):
+            single.append(key + [""] * (len(columns) + 5) + [result])
+            continue
+        run, figures = result
+        need_truth(source, run)
+        group.append(result)
+        cells = [fixed(figures.nees[part], 3) for part in nees.PARTS]
+        single_marks |= {(len(single), 3 + i) for i, cell in enumerate(cells) if judged(cell)}
+        single.append(key + cells + [
+            fixed(figures.offset_quantile(0.95), 2), fixed(figures.offset_quantile(1.0), 2),
+            fixed(run.offset - source.offset, 3, sign=True), fixed(run.sigma, 3), fixed(run.figure("ate_m"), 4),
+            remark_of(run)])
+    for name, title, middle in (("consistency", "Mean of the runs", mean),
+                                ("consistency_median", "Median of the runs", median)):
+        rows, marks = [], set()
+        for (motion, offset), group in groups.items():
+            failed = sum(s.name == motion and s.offset == offset for s in sources) - len(group)
+            of = lambda figure: middle([figure(run, figures) for run, figures in group])  # noqa: E731,B023
+            cells = [fixed(of(lambda _, figures: figures.nees[part]), 2) for part in nees.PARTS]  # noqa: B023
+            marks |= {(len(rows), 4 + i) for i, cell in enumerate(cells) if judged(cell)}
+            rows.append([motion, fixed(offset, 2), len(group), failed, *cells,
+                         fixed(of(lambda _, figures: figures.offset_quantile(0.95)), 2),
+                         fixed(of(lambda run, _: run.offset - offset), 3, sign=True),  # noqa: B023
+                         fixed(of(lambda run, _: abs(run.offset - offset)), 3),  # noqa: B023
+                         fixed(of(lambda run, _: run.sigma), 3), fixed(of(lambda run, _: run.figure("ate_m")), 3)])
+        page.tables.append(Table(name, title, [
+            "motion", "true offset [ms]", "runs", "failed", *columns, "offset error/sigma, 95 % of time",
+            "offset error at end [ms]", "size [ms]", "sigma at end [ms]", "ATE [m]"], rows, marks))
+    page.tables.append(Table("consistency_runs", "Each run", [
+        "motion", "true offset [ms]", "seed", *columns, "offset error/sigma, 95 % of time", "largest",
+        "offset error at end [ms]", "sigma at end [ms]", "ATE [m]", "remark, or why there is no result"], single,
+        single_marks))
+    page.figures.append((draw_nees(groups, nees.PARTS), "consistency.png"))
+    told = []
+    for table in page.tables[:2]:
+        given = sum(cell != "" for row in table.rows for cell in row[4:4 + len(columns)])
+        told.append(f"{len(table.marks)} of {given} {'means' if table is page.tables[0] else 'medians'}")
+    page.conclusion = f"{' and '.join(told)} of NEES are outside {HONEST[0]:g} to {HONEST[1]:g}"
+    return page
+
+
+def median(values):
+    return statistics.median(values) if values else math.nan
+
+
+def remark_of(run):
+    said = []
+    if run.summary.get("health_at_end") not in (None, "ok"):
+        said.append(f"health at the end: {run.summary['health_at_end']}")
+    for key in ("divergences", "reinitializations"):
+        if run.summary.get(key):
+            said.append(f"{run.summary[key]} {key}")
+    return ", ".join(said)
+
+
+def draw_nees(groups, parts):
+    plt = plots()
+    figure, axis = plt.subplots(figsize=(max(7, 1.5 * len(groups) + 2), 4.6))
+    colours = plt.get_cmap("viridis")
+    axis.axhspan(*HONEST, color="#eeeeee")
+    axis.axhline(1.0, color="#999999", linewidth=0.9)
+    for i, part in enumerate(parts):
+        points = [(g + 0.12 * (i - (len(parts) - 1) / 2), figures.nees[part])
+                  for g, group in enumerate(groups.values()) for _, figures in group]
+        axis.plot([x for x, _ in points], [max(y, 1e-3) for _, y in points], "o", markersize=4, alpha=0.7,
+                  color=colours(0.9 * i / (len(parts) - 1)), label=part)
+    axis.set_yscale("log")
+    axis.set_xticks(range(len(groups)))
+    axis.set_xticklabels([f"{name}\n{offset:g} ms" for name, offset in groups], fontsize=8)
+    tidy(axis, "motion and true offset; a dot is a run", "NEES per degree of freedom")
+    axis.legend(frameon=False, fontsize=8, ncol=len(parts), loc="lower right", bbox_to_anchor=(1.0, 1.0))
+    return figure
+
+
 # --- Arguments ---
 
 
@@ -677,53 +811,88 @@ def shift_list(text):
     return values
 
 
+def own_setting(experiment, key):
+    """Whether the experiment sets the parameter itself."""
+    if experiment == "consistency":
+        return key in ("mode", "radar_stamp_shift", "refine_passes")
+    return key in OWN_KEYS
+
+
+def simulation_words(text):
+    try:
+        words = shlex.split(text)
+    except ValueError as error:
+        raise ExperimentError(f"--simulate '{text}': {str(error).lower()}") from error
+    for word in words:
+        if word.startswith("--") and word[2:].partition("=")[0] in OWN_SIMULATION:
+            raise ExperimentError(f"--simulate: the experiment sets {word.partition('=')[0]} itself")
+    return words
+
+
+def join_simulate(words):
+    """So that the value of --simulate may begin with a dash."""
+    joined = []
+    for word in words:
+        if joined and joined[-1] == "--simulate":
+            joined[-1] = f"--simulate={word}"
+        else:
+            joined.append(word)
+    return joined
+
+
 def parse(words):
     parser = Parser(prog="experiment.sh", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("experiment", choices=EXPERIMENTS, metavar="|".join(EXPERIMENTS))
     parser.add_argument("--output", metavar="DIR", type=pathlib.Path, help="where to write (results/EXPERIMENT)")
     parser.add_argument("--bag", metavar="BAG", type=pathlib.Path, action="append", default=[],
-                        help="run on this bag instead of simulated ones; may be repeated; not for montecarlo")
+                        help="run on this bag instead of simulated ones; may be repeated; not for montecarlo "
+                             "and consistency")
     parser.add_argument("--config", metavar="CONFIG", default="irs", help="configuration of rio_t_bag (irs)")
     parser.add_argument("--set", metavar="key=value", action="append", default=[],
                         help="parameter of rio_t_bag; may be repeated")
     parser.add_argument("--seeds", metavar="N", type=count,
-                        help="simulated runs of each motion, seeds 1 to N (3; montecarlo 10)")
+                        help="simulated runs of each motion, seeds 1 to N (3; montecarlo 10; consistency 5)")
     parser.add_argument("--motion", metavar="NAME", action="append",
                         help="simulated motion; may be repeated (shifts, delay: difficult; tables: easy, medium, "
-                             "difficult, gym_loop; montecarlo: easy, medium, difficult)")
+                             "difficult, gym_loop; montecarlo: easy, medium, difficult; consistency: difficult, "
+                             "medium, drone, ground_vehicle, gym_loop, start_in_motion)")
     parser.add_argument("--time-offset", metavar="S", type=finite, action="append",
-                        help="true offset of the simulated bags [s] (-0.00925; montecarlo also 0.03 and 0.1; may be "
-                             "repeated there)")
+                        help="true offset of the simulated bags [s] (-0.00925; montecarlo also 0.03 and 0.1; "
+                             "consistency 0.03; may be repeated for these two)")
     parser.add_argument("--duration", metavar="S", type=positive,
                         help="length of the simulated bags [s] (the motion's own)")
+    parser.add_argument("--simulate", metavar="OPTIONS", default="",
+                        help="more options for the simulated bags, as one word: \"--imu-rate 100 --points 30\"; "
+                             "simulate --help lists them")
     parser.add_argument("--shifts", metavar="MS,MS,...", type=shift_list, default=DEFAULT_SHIFTS,
                         help="of the experiment `shifts` [ms] (0,2.5,...,15)")
     parser.add_argument("--jobs", metavar="N", type=count, default=os.cpu_count() or 1,
                         help="runs side by side (all cores)")
     parser.add_argument("--programs", metavar="DIR", type=pathlib.Path, help="where rio_t_bag and simulate are")
     parser.add_argument("--check", action="store_true", help="only check the arguments")
-    options = parser.parse_args(words)
+    options = parser.parse_args(join_simulate(words))
     for bag in options.bag:
         if not bag.is_file():
             raise ExperimentError(f"--bag {bag}: no such file")
-    if options.bag and options.experiment == "montecarlo":
-        raise ExperimentError("--bag: montecarlo draws its bags itself")
+    if options.bag and options.experiment in SIMULATED_ONLY:
+        raise ExperimentError(f"--bag: {options.experiment} draws its bags itself")
+    options.simulate = simulation_words(options.simulate)
     if options.bag:
-        for name in ("seeds", "motion", "time_offset", "duration"):
-            if getattr(options, name) is not None:
+        for name in ("seeds", "motion", "time_offset", "duration", "simulate"):
+            if getattr(options, name) not in (None, []):
                 raise ExperimentError(f"--{name.replace('_', '-')}: for simulated bags only, not with --bag")
-    if options.time_offset and len(options.time_offset) > 1 and options.experiment != "montecarlo":
-        raise ExperimentError("--time-offset: more than one is for montecarlo only")
+    if options.time_offset and len(options.time_offset) > 1 and options.experiment not in SIMULATED_ONLY:
+        raise ExperimentError("--time-offset: more than one is for montecarlo and consistency only")
     options.set_keys = set()
     for setting in options.set:
         key, equals, _ = setting.partition("=")
         if not equals or not key:
             raise ExperimentError(f"--set {setting}: expected key=value")
-        if key in OWN_KEYS:
+        if own_setting(options.experiment, key):
             raise ExperimentError(f"--set {setting}: the experiment sets {key} itself")
         options.set_keys.add(key)
     options.output = options.output or pathlib.Path("results") / options.experiment
-    options.seeds = options.seeds or (10 if options.experiment == "montecarlo" else 3)
+    options.seeds = options.seeds or DEFAULT_SEEDS.get(options.experiment, 3)
     return options
 
 
@@ -747,7 +916,7 @@ def sources_of(options):
             if names.count(name) > 1:
                 raise ExperimentError(f"--bag: two bags are called {name}")
         return [Source(name, bag=bag) for name, bag in zip(names, options.bag)]
-    default = [FRAME_OFFSET] + (list(DELAYED_OFFSETS) if options.experiment == "montecarlo" else [])
+    default = DEFAULT_OFFSETS.get(options.experiment, [FRAME_OFFSET])
     offsets = [1e3 * s for s in options.time_offset] if options.time_offset else default
     motions = list(dict.fromkeys(options.motion or DEFAULT_MOTIONS[options.experiment]))
     return [Source(motion, seed, motion, offset) for motion in motions for offset in dict.fromkeys(offsets)
@@ -763,6 +932,8 @@ def describe(sources, options):
         duration = f"; {options.duration:g} s each" if options.duration else ""
         notes = [f"simulated motions {', '.join(motions)}; seeds 1 to {options.seeds}; true offset "
                  f"{', '.join(offsets)} ms{duration}; configuration {options.config}"]
+    if options.simulate:
+        notes.append(f"simulated with {shlex.join(options.simulate)}")
     if options.set:
         notes.append(f"parameters: {', '.join(options.set)}")
     return notes
@@ -784,8 +955,7 @@ def main(words):
         sources = sources_of(options)
         options.output.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".runs_", dir=options.output) as scratch:
-            lab = Laboratory(programs, pathlib.Path(scratch), options.config, options.set, options.duration,
-                             options.jobs, sys.stderr.isatty())
+            lab = Laboratory(programs, pathlib.Path(scratch), options, sys.stderr.isatty())
             page = globals()[options.experiment](lab, sources, options)
         page.notes = describe(sources, options) + page.notes
         page.write(options.output, options.experiment, " ".join(["scripts/experiment.sh"] + own_words(words)))

@@ -212,6 +212,53 @@ class Experiment(unittest.TestCase):
         self.assertEqual(rows["RIO-T imu"]["runs"], "2")
         self.assertEqual(rows["LC-RIO"]["covered [%]"], "", "LC-RIO states no offset")
 
+    def test_consistency_means_its_runs(self):
+        done = self.succeed("consistency", "--motion", "difficult", "--motion", "drone", "--seeds", "2", "--duration",
+                            "30", "--simulate", "--points 30", "--set", "time_offset_model=imu")
+        parts = ("position", "z", "velocity", "tilt", "yaw", "offset")
+        rows, medians, single = [table(self.folder / f"consistency{name}.csv") for name in ("", "_median", "_runs")]
+        self.assertEqual([row["motion"] for row in rows], ["difficult", "drone"])
+        outside = 0
+        for row, middle in zip(rows, medians):
+            self.assertEqual((row["runs"], row["failed"], row["true offset [ms]"]), ("2", "0", "30.00"))
+            runs = [run for run in single if run["motion"] == row["motion"]]
+            self.assertEqual([run["seed"] for run in runs], ["1", "2"])
+            for part in parts:
+                figure = float(row[f"{part} NEES"])
+                self.assertAlmostEqual(figure, sum(float(run[f"{part} NEES"]) for run in runs) / 2, delta=0.006)
+                self.assertEqual(row[f"{part} NEES"], middle[f"{part} NEES"])  # of two runs
+                # Wide: it is only asked that nothing is in another frame or unit.
+                self.assertTrue(0.003 < figure < 30, (part, figure))
+                outside += not 0.5 <= figure <= 2
+            self.assertLess(float(row["size [ms]"]), 5.0)
+            self.assertGreaterEqual(float(runs[0]["largest"]), float(runs[0]["offset error/sigma, 95 % of time"]))
+        page = (self.folder / "consistency.md").read_text()
+        first = page[page.index("## Mean"):page.index("## Median")]
+        self.assertEqual(first.count(" !"), outside)
+        last = f"{outside} of 12 means and {outside} of 12 medians of NEES are outside 0.5 to 2"
+        self.assertEqual(done.stdout.splitlines()[-1], last)
+        for fact in (last, "simulated with --points 30", "consistency.png"):
+            self.assertIn(fact, page)
+
+    def test_options_reach_the_simulator(self):
+        offsets = {}
+        for points in ("20", "60"):
+            self.succeed("consistency", "--motion", "easy", "--seeds", "1", "--duration", "25",
+                         f"--simulate=--points {points}")
+            offsets[points] = float(table(self.folder / "consistency_runs.csv")[0]["sigma at end [ms]"])
+        self.assertGreater(offsets["20"], offsets["60"])
+
+    def test_a_run_without_result_is_counted(self):
+        import experiment
+        data = MadeUp(20)
+        good = (experiment.Run(31.0, 0.5, {"ate_m": 0.1, "health_at_end": "diverged"}, [], []), data.result(data.noise()))
+        lab = unittest.mock.Mock(map=lambda work: [good, "it broke", good])
+        page = experiment.consistency(lab, [experiment.Source("easy", seed, "easy", 30.0) for seed in (1, 2, 3)], None)
+        self.assertEqual(page.tables[0].rows[0][:4], ["easy", "30.00", 2, 1])
+        self.assertEqual([row[-1] for row in page.tables[2].rows],
+                         ["health at the end: diverged", "it broke", "health at the end: diverged"])
+        self.assertEqual({len(row) for row in page.tables[2].rows}, {len(page.tables[2].columns)})
+
     def test_small_errors_are_numbers_to_yaml(self):
         offsets = self.folder / "time_offset.csv"
         offsets.write_text("stamp,offset_s,sigma_s\n1.0,0.00001,0.001\n2.0,0.00001,0.001\n")
@@ -227,6 +274,16 @@ class Experiment(unittest.TestCase):
                 (["shifts", "--set", "time_offset_model=imu"], "sets time_offset_model itself"),
                 (["shifts", "--shifts", "5,5"], "--shifts"),
                 (["montecarlo", "--seeds", "0"], "--seeds"),
+                (["consistency", "--bag", EXPERIMENT], "consistency draws its bags itself"),
+                (["consistency", "--set", "mode=batch"], "sets mode itself"),
+                (["shifts", "--bag", EXPERIMENT, "--simulate", "--noise-free"], "--simulate: for simulated bags only"),
+                (["shifts", "--simulate", "--seed 3"], "sets --seed itself"),
+                (["shifts", "--simulate", "--points '3"], "no closing quotation"),
+                (["consistency", "--motion", "easy", "--simulate", "--pionts 3"], "--pionts"),
+                (["consistency", "--motion", "easy", "--seeds", "1", "--set", "wimdow=1"], "wimdow"),
+                # It ends less than 1 s after its start.
+                (["consistency", "--motion", "easy", "--seeds", "1", "--duration", "5.5", "--simulate",
+                  "--static-start 0 --static-end 0"], "no pose later than 1 s"),
                 (["dance"], "dance"),
                 (["table1", "--seeds", "1", "--motion", "dance"], "'dance' is not known"),
                 (["table1", *SHORT, "--motion", "easy", "--set", "wimdow=1"], "wimdow")):
