@@ -4,14 +4,11 @@
 #include <algorithm>
 
 #include "rio_t/core/so3.h"
+#include "rio_t/factors/offset_derivative.h"
 #include "rio_t/imu/preintegration.h"
 
 namespace rio_t {
 namespace {
-
-/// Half width of the window over which the angular acceleration is averaged [s]: about a radar frame, so that
-/// the noise of single gyro samples does not pass for information about the offset.
-constexpr double kAngularAccelerationHalfWidth = 0.01;
 
 Eigen::Matrix3d whitening(const Eigen::Matrix3d& covariance) {
   Eigen::Matrix3d W = Eigen::Matrix3d::Identity();
@@ -21,10 +18,11 @@ Eigen::Matrix3d whitening(const Eigen::Matrix3d& covariance) {
 
 }  // namespace
 
-void ConstantAccelerationRadarFactor::set(const RadarVelocityMeasurement& z, const ImuMeasurement& imu,
+void ConstantAccelerationRadarFactor::set(const RadarVelocityMeasurement& z, const ImuBuffer& imu,
                                           const Eigen::Vector3d& g_W) {
   z_ = z;
-  imu_ = imu;
+  imu_ = imu.at(z.stamp);
+  imu_.acceleration = imu.mean(z.stamp, kOffsetHalfWidth).acceleration;
   g_W_ = g_W;
   whitening_ = whitening(z.covariance);
 }
@@ -32,7 +30,7 @@ void ConstantAccelerationRadarFactor::set(const RadarVelocityMeasurement& z, con
 bool ConstantAccelerationRadarFactor::Evaluate(double const* const* parameters, double* residuals,
                                                double** jacobians) const {
   const StateView x(parameters[0]);
-  const double t_O = parameters[1][0];
+  const double t_O = z_.held_t_O.value_or(parameters[1][0]);
   const Eigen::Matrix3d R_IW = x.q_WI.toRotationMatrix().transpose();
   const Eigen::Vector3d v_I = R_IW * x.v_W;
   const Eigen::Vector3d g_I = R_IW * g_W_;
@@ -53,7 +51,7 @@ bool ConstantAccelerationRadarFactor::Evaluate(double const* const* parameters, 
   if (jacobians[1] != nullptr) {
     Eigen::Map<Eigen::Vector3d> J(jacobians[1]);
     J.setZero();
-    if (z_.informs_offset) J = -W_R * a_c;
+    if (!z_.held_t_O) J = -W_R * a_c;
   }
   return true;
 }
@@ -70,7 +68,7 @@ void ImuRadarFactor::set(const RadarVelocityMeasurement& z, Time state_time, con
 
 bool ImuRadarFactor::Evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
   const StateView x(parameters[0]);
-  const double t_O = std::clamp(parameters[1][0], -max_time_offset_, max_time_offset_);
+  const double t_O = std::clamp(z_.held_t_O.value_or(parameters[1][0]), -max_time_offset_, max_time_offset_);
   const Time tau = z_.stamp - t_O;
 
   ImuDelta delta;
@@ -101,10 +99,8 @@ bool ImuRadarFactor::Evaluate(double const* const* parameters, double* residuals
   if (jacobians[1] != nullptr) {
     Eigen::Map<Eigen::Vector3d> J(jacobians[1]);
     J.setZero();
-    if (z_.informs_offset) {
-      const Eigen::Vector3d a_c = at_tau.acceleration - x.b_a + dR_T * R_IW * g_W_;
-      const Eigen::Vector3d alpha = imu_->angularAcceleration(tau, kAngularAccelerationHalfWidth);
-      J = -W_R * (a_c - omega.cross(v_tau) + alpha.cross(z_.l_I));
+    if (!z_.held_t_O) {
+      J = -W_R * velocityRate(imu_->mean(tau, kOffsetHalfWidth), x.b_g, x.b_a, v_tau, dR_T * R_IW * g_W_, z_.l_I).a_I;
     }
   }
   return true;

@@ -34,17 +34,49 @@ ImuMeasurement ImuBuffer::at(Time time) const {
     result.acceleration = a.acceleration + share * (b.acceleration - a.acceleration);
     result.gyro_doubt = b.gyro_doubt;
     result.accel_doubt = b.accel_doubt;
+    result.gyro_noise = b.gyro_noise;
+    result.accel_noise = b.accel_noise;
     result.is_bridge = a.is_bridge || b.is_bridge;
   }
   result.time = time;
   return result;
 }
 
-Eigen::Vector3d ImuBuffer::angularAcceleration(Time time, double half_width) const {
-  const Time from = std::max(time - half_width, oldest());
-  const Time to = std::min(time + half_width, newest());
-  if (to <= from) return Eigen::Vector3d::Zero();
-  return (at(to).angular_velocity - at(from).angular_velocity) / (to - from);
+ImuMean ImuBuffer::mean(Time time, double half_width) const {
+  struct Half {
+    Eigen::Vector3d gyro = Eigen::Vector3d::Zero();
+    Eigen::Vector3d accel = Eigen::Vector3d::Zero();
+    double duration = 0.0;
+  };
+  ImuMean result;
+  const Time middle = std::clamp(time, oldest(), newest());
+  const auto half = [&](Time from, Time to) {
+    Half sums;
+    forEachInterval(from, to, [&](double dt, const auto& gyro, const auto& accel, const auto& later) {
+      sums.gyro += dt * gyro;
+      sums.accel += dt * accel;
+      sums.duration += dt;
+      result.gyro_variance = std::max(result.gyro_variance, later.gyro_noise + later.gyro_doubt);
+      result.accel_variance = std::max(result.accel_variance, later.accel_noise + later.accel_doubt);
+    });
+    return sums;
+  };
+  const Half before = half(std::max(middle - half_width, oldest()), middle);
+  const Half after = half(middle, std::min(middle + half_width, newest()));
+  result.duration = before.duration + after.duration;
+  if (result.duration == 0.0) {
+    const ImuMeasurement sample = at(time);
+    result.angular_velocity = sample.angular_velocity;
+    result.acceleration = sample.acceleration;
+    return result;
+  }
+  result.angular_velocity = (before.gyro + after.gyro) / result.duration;
+  result.acceleration = (before.accel + after.accel) / result.duration;
+  if (before.duration > 0.0 && after.duration > 0.0) {
+    result.angular_acceleration =
+        (after.gyro / after.duration - before.gyro / before.duration) / (0.5 * result.duration);
+  }
+  return result;
 }
 
 }  // namespace rio_t

@@ -41,6 +41,15 @@ ImuGate::Verdict ImuGate::check(ImuMeasurement& imu) {
   if (saturated.gyro || was_saturated_.gyro) doubtGyro(imu, 1.0);
   if (saturated.accel || was_saturated_.accel) doubtAccel(imu, 1.0);
   was_saturated_ = saturated;
+  if (saturated.accel || saturated.gyro) {
+    accel_noise_.interrupt();
+    gyro_noise_.interrupt();
+  } else {
+    accel_noise_.add(imu.time, imu.acceleration);
+    gyro_noise_.add(imu.time, imu.angular_velocity);
+  }
+  imu.accel_noise = accel_noise_.squaredDensity();
+  imu.gyro_noise = gyro_noise_.squaredDensity();
   if (gap > max_gap_) verdict.bridge = bridge_.until(imu);
   bridge_.follow(imu);
   return verdict;

@@ -33,8 +33,8 @@ Preintegration preintegrate(const ImuBuffer& buffer, Time from, Time to, const E
   result.b_g = b_g;
   result.b_a = b_a;
   buffer.forEachInterval(from, to, [&](double dt, const auto& gyro, const auto& accel, const auto& later) {
-    const double gyro_variance = noise.gyro_density * noise.gyro_density + later.gyro_doubt;
-    const double accel_variance = noise.accel_density * noise.accel_density + later.accel_doubt;
+    const double gyro_variance = noise.gyroVariance(later);
+    const double accel_variance = noise.accelVariance(later);
     const Eigen::Vector3d omega = gyro - b_g;
     const Eigen::Vector3d a = accel - b_a;
     const Eigen::Quaterniond half = so3::exp(0.5 * dt * omega);

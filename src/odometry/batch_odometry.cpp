@@ -76,7 +76,6 @@ RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) co
   z.covariance = result.ego_velocity.covariance;
   z.R_RI = options_.T_IR.q_IR.conjugate().toRotationMatrix();
   z.l_I = options_.T_IR.l_I;
-  z.informs_offset = result.ego_velocity.status == EgoVelocityStatus::kMoving;
   return z;
 }
 
@@ -102,7 +101,7 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
     if (at_rest) scan.rest_velocity_sigma = options_.rest.velocity_sigma;
     if (result.used) {
       scan.velocity = measurement(result);
-      scan.velocity->informs_offset &= !at_rest && informsOffset(smoother, node, *scan.velocity);
+      if (!informsOffset(smoother, node, *scan.velocity, result.ego_velocity)) scan.velocity->held_t_O = node.t_O;
     }
     problem.scans.push_back(scan);
     run.source.push_back(i);
@@ -121,7 +120,7 @@ std::size_t BatchOdometry::readmit(const BatchSmoother& smoother, const BatchSol
     const ScanResult& result = scans_[i].result;
     if (result.rejected_because != "innovation") continue;
     RadarVelocityMeasurement z = measurement(result);
-    if (!accepts(smoother, solution, z)) continue;
+    if (!accepts(smoother, solution, result.ego_velocity, z)) continue;
     ++count;
     const auto known = std::find(run.source.begin(), run.source.end(), i);  // at rest it is in the graph
     if (known != run.source.end()) {
@@ -139,7 +138,7 @@ std::size_t BatchOdometry::readmit(const BatchSmoother& smoother, const BatchSol
 }
 
 bool BatchOdometry::accepts(const BatchSmoother& smoother, const BatchSolution& solution,
-                            RadarVelocityMeasurement& z) const {
+                            const EgoVelocity& measured, RadarVelocityMeasurement& z) const {
   const double t_O = solution.nodes[nearestNode(solution.nodes, z.stamp)].t_O;
   const bool at_stamp = options_.smoother.time_offset_model == TimeOffsetModel::kConstantAcceleration;
   const std::size_t k = nearestNode(solution.nodes, at_stamp ? z.stamp : z.stamp - t_O);
@@ -149,14 +148,14 @@ bool BatchOdometry::accepts(const BatchSmoother& smoother, const BatchSolution& 
   const double gate = options_.smoother.innovation_gate;
   const Eigen::Matrix3d S =
       residual.prediction_covariance + z.covariance + model_error * model_error * Eigen::Matrix3d::Identity();
-  z.informs_offset &= !isAtRest(node) && informsOffset(smoother, node, z);
+  if (!informsOffset(smoother, node, z, measured)) z.held_t_O = node.t_O;
   return residual.value.dot(S.ldlt().solve(residual.value)) <= gate * gate;
 }
 
 bool BatchOdometry::informsOffset(const BatchSmoother& smoother, const NodeEstimate& node,
-                                  const RadarVelocityMeasurement& z) const {
-  const auto residual = smoother.residual(node, NodeMatrix::Zero(), z);
-  return residual.dh_dt_O.norm() > options_.smoother.time_offset_min_acceleration;
+                                  const RadarVelocityMeasurement& z, const EgoVelocity& measured) const {
+  return measured.status == EgoVelocityStatus::kMoving && !isAtRest(node) &&
+         smoother.residual(node, NodeMatrix::Zero(), z).informs_offset;
 }
 
 bool BatchOdometry::isAtRest(const NodeEstimate& node) const {
@@ -204,7 +203,7 @@ VarianceFactor BatchOdometry::varianceFactor(const Run& run, const BatchSmoother
   VarianceFactor factor;
   for (std::size_t j = 0; j < run.problem.scans.size(); ++j) {
     const std::optional<RadarVelocityMeasurement>& z = run.problem.scans[j].velocity;
-    if (!z || !z->informs_offset) continue;
+    if (!z || z->held_t_O) continue;
     const std::size_t k = solution.node_of_scan[j];
     const auto residual = smoother.residual(solution.nodes[k], solution.covariances[k], *z);
     // The solution has been drawn towards z: what is left scatters less than z does.

@@ -6,8 +6,10 @@
 #include <cstdio>
 #include <iterator>
 
+#include "rio_t/factors/offset_derivative.h"
 #include "rio_t/imu/preintegration.h"
 #include "rio_t/odometry/options.h"
+#include "rio_t/smoother/batch_smoother.h"
 #include "rio_t/smoother/chain.h"
 
 namespace rio_t {
@@ -57,7 +59,7 @@ void MotionInitializer::add(Time stamp, const EgoVelocity& velocity) {
   const auto after = std::lower_bound(velocities_.begin(), velocities_.end(), stamp,
                                       [](const RadarVelocityMeasurement& z, Time t) { return z.stamp < t; });
   if (after != velocities_.end() && after->stamp == stamp) return;
-  velocities_.insert(after, {stamp, velocity.v_R, velocity.covariance, R_RI_, l_I_, true});
+  velocities_.insert(after, {stamp, velocity.v_R, velocity.covariance, R_RI_, l_I_});
   if (velocities_.size() > kMaxVelocities) velocities_.erase(velocities_.begin());
 }
 
@@ -213,14 +215,15 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
       const double added = noise_.accel_density * noise_.accel_density * T + tilt * tilt * T * T * T / 3.0;
       const Eigen::Matrix3d covariance = z.covariance + added * Eigen::Matrix3d::Identity();
       z.covariance.setIdentity();
+      const Time tau = z.stamp - t_O;
+      const VelocityRate rate = velocityRate(imu, tau, carried(x, time, tau, imu, g_W_), g_W_, z.l_I);
+      if (!smoother_.estimate_time_offset || !rate.informsOffset(smoother_.time_offset_min_acceleration))
+        z.held_t_O = t_O;
       Eigen::Vector3d e;
       StateJacobian<3> J_x;
       Eigen::Vector3d J_t;
       double* jacobians[] = {J_x.data(), J_t.data()};
       ImuRadarFactor(z, time, imu, smoother_.max_time_offset, g_W_).Evaluate(blocks, e.data(), jacobians);
-      const bool tells_offset =
-          smoother_.estimate_time_offset && J_t.norm() > smoother_.time_offset_min_acceleration;
-      if (!tells_offset) J_t.setZero();
       Eigen::Matrix<double, 3, kNodeTangent> J;
       J << J_x.leftCols<3>(), J_x.rightCols<StateBlock::kTangent - 3>(), J_t;
       const Eigen::Matrix<double, 3, kNodeTangent> weighted_J = covariance.ldlt().solve(J);

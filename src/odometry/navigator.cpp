@@ -53,32 +53,24 @@ void Navigator::propagate(const ImuMeasurement& from, const ImuMeasurement& to) 
 
   ErrorStep(dt, half.toRotationMatrix().transpose(), R_mid, a).propagate(x.covariance);
   using S = StateBlock;
-  const auto addNoise = [&](int first, double density) {
-    x.covariance.diagonal().segment<3>(first).array() += density * density * dt;
+  const auto addNoise = [&](int first, double variance) {
+    x.covariance.diagonal().segment<3>(first).array() += variance * dt;
   };
-  addNoise(S::kTheta, noise_.gyro_density);
-  addNoise(S::kV, noise_.accel_density);
-  addNoise(S::kBg, noise_.gyro_random_walk);
-  addNoise(S::kBa, noise_.accel_random_walk);
-  if (to.gyro_doubt > 0.0 || to.accel_doubt > 0.0) addDoubt(to, dt);
+  const double accel_variance = noise_.accelVariance(to);
+  addNoise(S::kTheta, noise_.gyroVariance(to));
+  addNoise(S::kV, accel_variance);
+  addNoise(S::kBg, noise_.gyro_random_walk * noise_.gyro_random_walk);
+  addNoise(S::kBa, noise_.accel_random_walk * noise_.accel_random_walk);
+  // A gap is one long step: what the velocity gains on the way moves the position too.
+  addNoise(S::kP, accel_variance * dt * dt / 3.0);
+  x.covariance.block<3, 3>(S::kP, S::kV).diagonal().array() += accel_variance * dt * dt / 2.0;
+  x.covariance.block<3, 3>(S::kV, S::kP).diagonal().array() += accel_variance * dt * dt / 2.0;
 
   x.p_W += dt * x.v_W + 0.5 * dt * dt * a_W;
   x.v_W += dt * a_W;
   x.q_WI = (x.q_WI * half * half).normalized();
   x.angular_velocity = to.angular_velocity - x.b_g;
   x.time = to.time;
-}
-
-void Navigator::addDoubt(const ImuMeasurement& imu, double dt) {
-  using S = StateBlock;
-  StateCovariance& P = state_->covariance;
-  const double q = imu.accel_doubt;
-  P.diagonal().segment<3>(S::kTheta).array() += imu.gyro_doubt * dt;
-  P.diagonal().segment<3>(S::kV).array() += q * dt;
-  // A gap is one long step: what the velocity gains on the way moves the position too.
-  P.diagonal().segment<3>(S::kP).array() += q * dt * dt * dt / 3.0;
-  P.block<3, 3>(S::kP, S::kV).diagonal().array() += q * dt * dt / 2.0;
-  P.block<3, 3>(S::kV, S::kP).diagonal().array() += q * dt * dt / 2.0;
 }
 
 }  // namespace rio_t

@@ -5,6 +5,7 @@
 #include <mutex>
 #include <utility>
 
+#include "rio_t/factors/offset_derivative.h"
 #include "rio_t/odometry/fault_counters.h"
 #include "rio_t/odometry/initializer.h"
 #include "rio_t/odometry/innovation_gate.h"
@@ -17,8 +18,9 @@
 namespace rio_t {
 namespace {
 
-/// The IMU must be this far past a scan's node [s], so that the factor's time may still move a little.
-constexpr double kImuMargin = 0.01;
+/// The IMU must be this far past a scan's node [s]: the derivative with respect to t_O looks so far ahead, and
+/// the factor's time may still move a little.
+constexpr double kImuMargin = kOffsetHalfWidth + 0.01;
 /// A scan stamped further ahead of the newest IMU sample is nonsense, not early [s]; unless the IMU may still
 /// come.
 constexpr double kMaxStampAhead = 1.0;
@@ -78,9 +80,9 @@ struct RadarInertialOdometry::Impl {
   void publishNewest();
   void judgePrediction(const RadarScan& scan, const VelocityPrior& prior, const EgoVelocity& measured);
   bool isAtRest(Time time) const;
-  /// Empty, or why the scan has no velocity to use; and whether that velocity tells the offset.
+  /// Empty, or why the scan has no velocity to use; and the offset that it holds on to, where it tells none.
   std::string measureVelocity(const RadarScan& scan, bool at_rest, EgoVelocity& measured,
-                              bool& informs_offset);
+                              std::optional<double>& held_t_O);
   /// The IMU that covers the scan may still come.
   bool mustWait(const RadarScan& scan) const;
   /// Sets `result` to what became of the scan, and moves the scan there.
@@ -234,18 +236,18 @@ void RadarInertialOdometry::Impl::useScan(const RadarScan& scan, bool imu_has_en
   const Time node_time = smoother.nodeTime(scan.stamp);
   if (node_time < initialized_at) return reject("before_initialization");
   if (node_time - imu.newest() > max_stamp_ahead) return reject("stamp_ahead_of_imu");
-  if (!imu.covers(node_time + kImuMargin))
+  if (!imu.covers(imu_has_ended ? node_time : node_time + kImuMargin))
     return reject(imu_has_ended ? "imu_not_covering" : "older_than_window");
 
   if (health_monitor.wantsReinitialization(imu.newest()))
     result.reinitialized = tryReinitialize(result.left_window);
   const bool at_rest = isAtRest(node_time);
-  bool informs_offset = false;
-  result.rejected_because = measureVelocity(scan, at_rest, result.ego_velocity, informs_offset);
+  std::optional<double> held_t_O;
+  result.rejected_because = measureVelocity(scan, at_rest, result.ego_velocity, held_t_O);
   if (result.rejected_because.empty()) {
     result.rejected_because =
         toString(smoother.add({scan.stamp, result.ego_velocity.v_R, result.ego_velocity.covariance, R_RI,
-                               options.T_IR.l_I, informs_offset}));
+                               options.T_IR.l_I, held_t_O}));
   }
   result.used = result.rejected_because.empty();
   if (result.used) innovation_gate.used(scan.stamp);
@@ -260,7 +262,8 @@ void RadarInertialOdometry::Impl::useScan(const RadarScan& scan, bool imu_has_en
 }
 
 std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, bool at_rest,
-                                                         EgoVelocity& measured, bool& informs_offset) {
+                                                         EgoVelocity& measured,
+                                                         std::optional<double>& held_t_O) {
   const auto prediction = smoother.predictRadarVelocity(scan.stamp, R_RI, options.T_IR.l_I);
   std::optional<VelocityPrior> prior;
   if (prediction) prior = prediction->velocity;
@@ -276,12 +279,12 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
   if (!isValid(measured.status)) return toString(measured.status);
   if (!feasibility.accept(scan.stamp, measured.v_R)) return "infeasible_velocity";
   const bool moving = !at_rest && measured.status == EgoVelocityStatus::kMoving;
-  informs_offset =
-      moving && (!prediction || prediction->dv_dt_O.norm() > options.smoother.time_offset_min_acceleration);
+  const bool informs_offset = moving && prediction && prediction->informs_offset;
+  if (!informs_offset) held_t_O = prediction ? prediction->t_O : smoother.newest().t_O;
   if (prediction && tilt_is_known && informs_offset && options.smoother.estimate_time_offset &&
       offset_monitor.stepped(scan.stamp, measured.v_R - prediction->velocity.v_R,
                              prediction->covariance_at_offset + measured.covariance, prediction->dv_dt_O)) {
-    smoother.loosenTimeOffset();
+    smoother.loosenTimeOffset(scan.stamp);
     offset_uncertainty.offsetStepped();
     health_monitor.offsetStepped(scan.stamp);
     faults.count("time_offset_step");

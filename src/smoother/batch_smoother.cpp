@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "rio_t/factors/offset_derivative.h"
 #include "rio_t/factors/state_manifold.h"
 #include "rio_t/imu/preintegration.h"
 #include "rio_t/smoother/chain_marginals.h"
@@ -155,20 +156,25 @@ BatchSmoother::Residual BatchSmoother::residual(const NodeEstimate& node, const 
                                                 const RadarVelocityMeasurement& z) const {
   RadarVelocityMeasurement unit = z;
   unit.covariance.setIdentity();
-  unit.informs_offset = true;
+  unit.held_t_O.reset();
   // The paper's factor stands at the stamp itself.
   const StateBlock x = atMeasurement() ? node.x : carried(node.x, node.time, z.stamp, *imu_, g_W_);
   const double* blocks[] = {x.data(), &node.t_O};
   StateJacobian<3> J_x;
   Residual result;
-  double* jacobians[] = {J_x.data(), result.dh_dt_O.data()};
+  Eigen::Vector3d J_t;
+  double* jacobians[] = {J_x.data(), J_t.data()};
   FactorPool(options_, noise_, g_W_, *imu_)
       .radarFactor(unit, node.time)
       ->Evaluate(blocks, result.value.data(), jacobians);
   Eigen::Matrix<double, 3, kNodeTangent> J;
-  J << J_x.leftCols<3>(), J_x.rightCols<StateBlock::kTangent - 3>(), result.dh_dt_O;
+  J << J_x.leftCols<3>(), J_x.rightCols<StateBlock::kTangent - 3>(), J_t;
   if (!options_.estimate_time_offset) J.rightCols<1>().setZero();
   result.prediction_covariance = J * covariance * J.transpose();
+  const Time tau = z.stamp - node.t_O;
+  result.informs_offset =
+      velocityRate(*imu_, tau, carried(node.x, node.time, tau, *imu_, g_W_), g_W_, z.l_I)
+          .informsOffset(options_.time_offset_min_acceleration);
   return result;
 }
 

@@ -43,7 +43,7 @@ std::unique_ptr<RadarCost> FactorPool::radarFactor(const RadarVelocityMeasuremen
     return renewed<ImuRadarFactor>(takeOne(radar_factors_), z, node_time, *imu_, options_.max_time_offset,
                                    g_W_);
   }
-  return renewed<ConstantAccelerationRadarFactor>(takeOne(radar_factors_), z, imu_->at(z.stamp), g_W_);
+  return renewed<ConstantAccelerationRadarFactor>(takeOne(radar_factors_), z, *imu_, g_W_);
 }
 
 WindowNode FactorPool::node() {
@@ -59,6 +59,7 @@ void FactorPool::recycle(WindowNode node) {
   recycle(std::move(node.rest));
   for (RadarTerm& term : node.radar) recycle(std::move(term.cost));
   node.radar.clear();  // keeps its memory
+  node.offset_step_variance = 0.0;
   nodes_.push_back(std::move(node));
 }
 

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "rio_t/factors/offset_derivative.h"
+#include "rio_t/smoother/chain_marginals.h"
+
 namespace rio_t {
 namespace {
 
@@ -31,30 +34,46 @@ void FixedLagSmoother::initialize(Time time, const NodePrior& prior) {
   node.t_O = prior.t_O0;
   window_.nodes.push_back(std::move(node));
   newest_covariance_ = rio_t::newestCovariance(window_);
+  offset_stepped_at_.reset();
+  offset_step_is_new_ = false;
 }
 
 Time FixedLagSmoother::nodeTime(Time stamp) const {
   return options_.time_offset_model == TimeOffsetModel::kImu ? stamp - window_.nodes.back().t_O : stamp;
 }
 
+std::size_t FixedLagSmoother::nodeBefore(Time time) const {
+  std::size_t k = window_.nodes.size() - 1;
+  while (k > 0 && window_.nodes[k].time > time) --k;
+  return k;
+}
+
+NodeMatrix FixedLagSmoother::covarianceOf(std::size_t k) const {
+  if (k + 1 == window_.nodes.size()) return newest_covariance_;
+  ChainSystem system;
+  linearize(window_, &system);
+  return marginalCovariances(system)[k];
+}
+
 std::optional<RadarVelocityPrediction> FixedLagSmoother::predictRadarVelocity(
     Time stamp, const Eigen::Matrix3d& R_RI, const Eigen::Vector3d& l_I) const {
-  const WindowNode& newest = window_.nodes.back();
   const Time time = nodeTime(stamp);
-  if (time < newest.time) return std::nullopt;
+  if (time < window_.nodes.front().time) return std::nullopt;
+  const std::size_t k = nodeBefore(time);
+  const WindowNode& node = window_.nodes[k];
 
-  StateBlock x = newest.x;
-  NodeMatrix P = newest_covariance_;
-  if (time > newest.time) {
-    const Preintegration& pre = preintegrateFrom(newest, time);
-    x = predict(newest.x, pre, g_W_);
-    const ImuTransition step = transition(newest.x, pre, noise_);
+  StateBlock x = node.x;
+  NodeMatrix P = covarianceOf(k);
+  if (time > node.time) {
+    const Preintegration& pre = preintegrateFrom(node, time);
+    x = predict(node.x, pre, g_W_);
+    const ImuTransition step = transition(node.x, pre, noise_);
     auto P_xx = P.topLeftCorner<StateBlock::kTangent, StateBlock::kTangent>();
     auto P_xt = P.topRightCorner<StateBlock::kTangent, 1>();
     P_xx = (step.A.lazyProduct(P_xx).eval().lazyProduct(step.A.transpose()) + step.Q).eval();
     P_xt = (step.A * P_xt).eval();
     P.bottomLeftCorner<1, StateBlock::kTangent>() = P_xt.transpose();
-    P(StateBlock::kTangent, StateBlock::kTangent) += offsetVariance(time - newest.time);
+    P(StateBlock::kTangent, StateBlock::kTangent) += offsetVariance(time - node.time);
   }
 
   // A measurement of zero with unit covariance has the predicted velocity as its residual.
@@ -63,7 +82,9 @@ std::optional<RadarVelocityPrediction> FixedLagSmoother::predictRadarVelocity(
   zero.R_RI = R_RI;
   zero.l_I = l_I;
   RadarVelocityPrediction prediction;
-  const double* blocks[] = {x.data(), &newest.t_O};
+  // The offset of the newest node, by which the scan was placed.
+  prediction.t_O = window_.nodes.back().t_O;
+  const double* blocks[] = {x.data(), &prediction.t_O};
   StateJacobian<3> J_x;
   Eigen::Vector3d J_t;
   double* jacobians[] = {J_x.data(), J_t.data()};
@@ -78,6 +99,8 @@ std::optional<RadarVelocityPrediction> FixedLagSmoother::predictRadarVelocity(
   prediction.covariance_at_offset =
       J_state * P.topLeftCorner<StateBlock::kTangent, StateBlock::kTangent>() * J_state.transpose();
   prediction.dv_dt_O = J_t;
+  prediction.informs_offset =
+      velocityRate(*imu_, time, x, g_W_, l_I).informsOffset(options_.time_offset_min_acceleration);
   const Eigen::Matrix<double, 2, 3> horizontal = x.q_WI().toRotationMatrix().topRows<2>();
   const Eigen::Matrix2d tilt =
       horizontal * P.block<3, 3>(StateBlock::kTheta, StateBlock::kTheta) * horizontal.transpose();
@@ -91,14 +114,14 @@ FixedLagSmoother::AddResult FixedLagSmoother::add(const RadarVelocityMeasurement
       if (term.stamp == z.stamp) return AddResult::kDuplicateStamp;
     }
   }
-  WindowNode* node = nodeAt(nodeTime(z.stamp));
+  WindowNode* node = nodeOf(z.stamp);
   if (node == nullptr) return AddResult::kOlderThanWindow;
   node->radar.push_back({z.stamp, pool_.radarFactor(z, node->time)});
   return AddResult::kAdded;
 }
 
 FixedLagSmoother::AddResult FixedLagSmoother::addRest(Time stamp, double velocity_sigma) {
-  WindowNode* node = nodeAt(nodeTime(stamp));
+  WindowNode* node = nodeOf(stamp);
   if (node == nullptr) return AddResult::kOlderThanWindow;
   pool_.recycle(std::move(node->rest));
   node->rest = pool_.restFactor(velocity_sigma);
@@ -118,14 +141,33 @@ WindowNode* FixedLagSmoother::nodeAt(Time time) {
   } else if (k == window_.nodes.size() || window_.nodes[k].time - time > spacing) {
     window_.nodes.insert(later, makeNode(time, window_.nodes[k - 1]));
     linkToPrevious(k);
-    if (offset_has_stepped_ && k + 1 == window_.nodes.size()) {
-      pool_.recycle(std::move(window_.nodes[k].offset_from_previous));
-      window_.nodes[k].offset_from_previous = pool_.offsetFactor(options_.time_offset_sigma);
-      offset_has_stepped_ = false;
-    }
     if (k + 1 < window_.nodes.size()) linkToPrevious(k + 1);  // its IMU factor now starts at the new node
   }
   return &window_.nodes[k];
+}
+
+WindowNode* FixedLagSmoother::nodeOf(Time stamp) {
+  WindowNode* node = nodeAt(nodeTime(stamp));
+  if (node != nullptr && offset_stepped_at_ && stamp >= *offset_stepped_at_) {
+    placeOffsetStep(static_cast<std::size_t>(node - window_.nodes.data()));
+  }
+  return node;
+}
+
+/// A scan behind the step may have been measured before nodes that the old offset placed: the step then lies
+/// before it, too.
+void FixedLagSmoother::placeOffsetStep(std::size_t k) {
+  std::vector<WindowNode>& nodes = window_.nodes;
+  const auto loose = std::find_if(nodes.begin() + 1, nodes.end(), [](const WindowNode& node) { return node.offset_step_variance > 0.0; });
+  const bool lies_before = loose != nodes.end() && loose - nodes.begin() <= static_cast<std::ptrdiff_t>(k);
+  if (k == 0 || lies_before || (loose == nodes.end() && !offset_step_is_new_)) return;
+  offset_step_is_new_ = false;
+  if (loose != nodes.end()) {
+    loose->offset_step_variance = 0.0;
+    linkToPrevious(static_cast<std::size_t>(loose - nodes.begin()));
+  }
+  nodes[k].offset_step_variance = options_.time_offset_sigma * options_.time_offset_sigma;
+  linkToPrevious(k);
 }
 
 WindowNode FixedLagSmoother::makeNode(Time time, const WindowNode& previous) {
@@ -142,7 +184,7 @@ void FixedLagSmoother::linkToPrevious(std::size_t k) {
   pool_.recycle(std::move(node.imu_from_previous));
   pool_.recycle(std::move(node.offset_from_previous));
   node.imu_from_previous = pool_.imuFactor(preintegrateFrom(previous, node.time));
-  node.offset_from_previous = pool_.offsetFactor(std::sqrt(offsetVariance(node.time - previous.time)));
+  node.offset_from_previous = pool_.offsetFactor(std::sqrt(offsetVariance(node.time - previous.time) + node.offset_step_variance));
 }
 
 const Preintegration& FixedLagSmoother::preintegrateFrom(const WindowNode& node, Time to) const {

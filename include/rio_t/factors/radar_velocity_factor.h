@@ -3,6 +3,7 @@
 #include <ceres/sized_cost_function.h>
 
 #include <Eigen/Geometry>
+#include <optional>
 
 #include "rio_t/core/time.h"
 #include "rio_t/factors/state_block.h"
@@ -18,25 +19,24 @@ struct RadarVelocityMeasurement {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  ///< in R [m^2/s^2]
   Eigen::Matrix3d R_RI = Eigen::Matrix3d::Identity();        ///< turns I into R
   Eigen::Vector3d l_I = Eigen::Vector3d::Zero();             ///< radar origin in I [m]
-  bool informs_offset = true;  ///< false: the platform does not accelerate enough to tell the offset
+  /// Set: the scan says nothing of the offset (VelocityRate::informsOffset), and the factor takes this value
+  /// for it [s], whatever t_O is. At constant velocity the derivative with respect to t_O is noise of the
+  /// IMU, and a thousand scans of it would pass for knowledge.
+  std::optional<double> held_t_O = std::nullopt;
 };
-
-// A factor whose measurement does not inform the offset takes t_O as it is: its derivative with respect to
-// t_O is zero. At rest and at constant velocity that derivative is the noise of the accelerometer, and some
-// thousand scans of it would pass for knowledge of the offset.
 
 /// The paper's model, eq. (4)-(5) (docs/method.md, eq. 13): one acceleration stands for the whole shift.
 /// Blocks: state at the stamp, t_O.
 ///   h = R_RI (R_IW v_W + (omega - b_g) x l - t_O a_c),   a_c = a - b_a + R_IW g_W,
-/// with the IMU sample (omega, a) at the stamp. Residual: h - z, whitened.
+/// with omega at the stamp, and for a the mean over 2 kOffsetHalfWidth around it. Residual: h - z, whitened.
 class ConstantAccelerationRadarFactor final : public ceres::SizedCostFunction<3, StateBlock::kSize, 1> {
  public:
-  ConstantAccelerationRadarFactor(const RadarVelocityMeasurement& z, const ImuMeasurement& imu,
+  ConstantAccelerationRadarFactor(const RadarVelocityMeasurement& z, const ImuBuffer& imu,
                                   const Eigen::Vector3d& g_W) {
     set(z, imu, g_W);
   }
   /// As if made anew.
-  void set(const RadarVelocityMeasurement& z, const ImuMeasurement& imu, const Eigen::Vector3d& g_W);
+  void set(const RadarVelocityMeasurement& z, const ImuBuffer& imu, const Eigen::Vector3d& g_W);
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
 
  private:

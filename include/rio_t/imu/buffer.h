@@ -9,6 +9,16 @@
 
 namespace rio_t {
 
+/// What the IMU read on the mean over some time, biases included, in I.
+struct ImuMean {
+  double duration = 0.0;                                           ///< [s]
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();      ///< [rad/s]
+  Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();          ///< specific force [m/s^2]
+  Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();  ///< from half to half [rad/s^2]
+  double gyro_variance = 0.0;   ///< noise and doubt, the largest squared density [rad^2/s]
+  double accel_variance = 0.0;  ///< likewise [m^2/s^3]
+};
+
 /// The recent IMU samples in time order, read as a piecewise linear signal.
 class ImuBuffer {
  public:
@@ -28,8 +38,8 @@ class ImuBuffer {
   /// buffer.
   ImuMeasurement at(Time time) const;
 
-  /// Mean angular acceleration over [time - half_width, time + half_width] [rad/s^2], clipped to the samples.
-  Eigen::Vector3d angularAcceleration(Time time, double half_width) const;
+  /// The IMU over [time - half_width, time + half_width], clipped to the samples. Not on an empty buffer.
+  ImuMean mean(Time time, double half_width) const;
 
   /// Calls step(dt, angular_velocity, acceleration) for each interval between samples from `from` to `to`,
   /// with the mean of both ends; the ends at `from` and `to` are interpolated. Backwards with dt < 0 where

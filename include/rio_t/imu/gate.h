@@ -4,6 +4,7 @@
 
 #include "rio_t/imu/gap_bridge.h"
 #include "rio_t/imu/measurement.h"
+#include "rio_t/imu/noise_meter.h"
 #include "rio_t/imu/saturation_detector.h"
 #include "rio_t/imu/stamp_watch.h"
 
@@ -44,7 +45,7 @@ class ImuGate {
 
   /// `max_gap` [s] between samples: a longer one is reported, and what it hides is doubted.
   ImuGate(double max_gap, const ImuGateOptions& options);
-  /// Sets the doubts of `imu` where it is taken.
+  /// Sets the doubts and the noise of `imu` where it is taken.
   Verdict check(ImuMeasurement& imu);
 
  private:
@@ -56,6 +57,7 @@ class ImuGate {
   StampWatch stamps_;
   SaturationDetector saturation_;
   GapBridge bridge_;
+  NoiseMeter accel_noise_, gyro_noise_;
   std::optional<Time> newest_;
   SaturationDetector::Saturated was_saturated_;
 };

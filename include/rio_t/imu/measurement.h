@@ -18,6 +18,11 @@ struct ImuMeasurement {
   double gyro_doubt = 0.0;   ///< [rad^2/s]
   double accel_doubt = 0.0;  ///< [m^2/s^3]
 
+  // White noise that the sensor shows by itself (NoiseMeter), as squared densities per axis. Where they are
+  // larger than those of ImuNoise they replace them: a vibrating frame is noisier than a data sheet.
+  double gyro_noise = 0.0;   ///< [rad^2/s]
+  double accel_noise = 0.0;  ///< [m^2/s^3]
+
   bool is_bridge = false;  ///< not measured: see GapBridge
 };
 

@@ -1,5 +1,9 @@
 #pragma once
 
+#include <algorithm>
+
+#include "rio_t/imu/measurement.h"
+
 namespace rio_t {
 
 /// Continuous-time noise of the IMU.
@@ -11,6 +15,15 @@ struct ImuNoise {
   double gyro_density = 2.0e-4;       ///< [rad/s/sqrt(Hz)]
   double accel_random_walk = 1.0e-4;  ///< [m/s^3/sqrt(Hz)]
   double gyro_random_walk = 4.0e-6;   ///< [rad/s^2/sqrt(Hz)]
+
+  /// Squared densities for the interval that ends with `imu`: as told or as measured, whichever is larger,
+  /// and what the interval does not show.
+  double accelVariance(const ImuMeasurement& imu) const {
+    return std::max(accel_density * accel_density, imu.accel_noise) + imu.accel_doubt;
+  }
+  double gyroVariance(const ImuMeasurement& imu) const {
+    return std::max(gyro_density * gyro_density, imu.gyro_noise) + imu.gyro_doubt;
+  }
 };
 
 }  // namespace rio_t

@@ -57,10 +57,10 @@ class BatchOdometry {
   /// Adds what the batch does not reject; how many that are.
   std::size_t readmit(const BatchSmoother& smoother, const BatchSolution& solution, Run& run) const;
   bool accepts(const BatchSmoother& smoother, const BatchSolution& solution,
-               RadarVelocityMeasurement& z) const;
+               const EgoVelocity& measured, RadarVelocityMeasurement& z) const;
   /// Whether the platform accelerates enough for `z` to tell the offset.
   bool informsOffset(const BatchSmoother& smoother, const NodeEstimate& node,
-                     const RadarVelocityMeasurement& z) const;
+                     const RadarVelocityMeasurement& z, const EgoVelocity& measured) const;
   bool isAtRest(const NodeEstimate& node) const;
   std::vector<NavigationState> trajectory(const BatchSolution& solution) const;
   std::vector<ScanResult> results(const Run& run, const BatchSmoother& smoother,

@@ -26,8 +26,6 @@ class Navigator {
 
  private:
   void propagate(const ImuMeasurement& from, const ImuMeasurement& to);
-  /// Of the step of `dt` [s] that ended with `imu`.
-  void addDoubt(const ImuMeasurement& imu, double dt);
 
   ImuNoise noise_;       // read-only after construction
   Eigen::Vector3d g_W_;  // read-only after construction

@@ -65,7 +65,7 @@ class BatchSmoother {
   struct Residual {
     Eigen::Vector3d value;                  ///< [m/s]
     Eigen::Matrix3d prediction_covariance;  ///< of h alone [m^2/s^2]
-    Eigen::Vector3d dh_dt_O;                ///< [m/s^2]
+    bool informs_offset = false;            ///< h changes with t_O by motion, not by noise of the IMU
   };
   Residual residual(const NodeEstimate& node, const NodeMatrix& covariance,
                     const RadarVelocityMeasurement& z) const;

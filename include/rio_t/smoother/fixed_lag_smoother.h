@@ -28,6 +28,8 @@ struct RadarVelocityPrediction {
   Eigen::Matrix3d covariance_at_offset =
       Eigen::Matrix3d::Zero();                        ///< the same, were the offset known [m^2/s^2]
   Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();  ///< of v_R with respect to t_O [m/s^2]
+  double t_O = 0.0;                                   ///< at which all this holds [s]
+  bool informs_offset = false;                        ///< dv_dt_O is motion, not noise of the IMU
   double tilt_sigma = 0.0;                            ///< of roll and pitch, the larger [rad]
 };
 
@@ -50,8 +52,8 @@ class FixedLagSmoother {
   Time nodeTime(Time stamp) const;
 
   /// Radar velocity that a scan stamped `stamp` should show, with the uncertainty of the state, of the IMU
-  /// since and of the offset. None for a scan older than the newest node. R_RI turns I into R, `l_I` is the
-  /// radar in I [m].
+  /// since and of the offset: from the newest node before it. None for a scan older than the window. R_RI
+  /// turns I into R, `l_I` is the radar in I [m].
   std::optional<RadarVelocityPrediction> predictRadarVelocity(Time stamp, const Eigen::Matrix3d& R_RI,
                                                               const Eigen::Vector3d& l_I) const;
   AddResult add(const RadarVelocityMeasurement& z);
@@ -60,9 +62,12 @@ class FixedLagSmoother {
   /// A node at `time` without a measurement, later than the newest: so the window moves on while no scan
   /// comes.
   void carryTo(Time time) { nodeAt(time); }
-  /// Forgets how well t_O is known from the next node on, where it must have stepped: its prior sigma comes
-  /// back.
-  void loosenTimeOffset() { offset_has_stepped_ = true; }
+  /// The offset stepped before the scan stamped `stamp`: from that scan on t_O is as uncertain as at the
+  /// start.
+  void loosenTimeOffset(Time stamp) {
+    offset_stepped_at_ = stamp;
+    offset_step_is_new_ = true;
+  }
   SolveReport optimize();
   /// Marginalises what is older than the window; the nodes that left, oldest first, until the next call.
   const std::vector<NodeEstimate>& marginalize();
@@ -80,6 +85,14 @@ class FixedLagSmoother {
  private:
   /// The node at `time`, made if need be; null where `time` lies before the window.
   WindowNode* nodeAt(Time time);
+  /// The node of a scan, at its time of measurement; null likewise.
+  WindowNode* nodeOf(Time stamp);
+  /// Index of the newest node that is not later than `time`; `time` is not before the window.
+  std::size_t nodeBefore(Time time) const;
+  /// Marginal covariance of node k.
+  NodeMatrix covarianceOf(std::size_t k) const;
+  /// Moves the link that a step of the offset loosened, so that the scan of node k lies behind it.
+  void placeOffsetStep(std::size_t k);
   WindowNode makeNode(Time time, const WindowNode& previous);
   void linkToPrevious(std::size_t k);
   /// From `node` to `to` with the biases of `node`. A scan asks for the same one three times: for its
@@ -102,7 +115,8 @@ class FixedLagSmoother {
   mutable FactorPool pool_;
   ChainSystem leaving_{2};  // a node that leaves and its neighbour
   std::vector<NodeEstimate> left_;
-  bool offset_has_stepped_ = false;
+  std::optional<Time> offset_stepped_at_;  ///< stamp of the first scan behind the latest step
+  bool offset_step_is_new_ = false;        ///< no node lies behind it yet
   NodeMatrix newest_covariance_ = NodeMatrix::Zero();
 };
 

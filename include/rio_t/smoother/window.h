@@ -28,6 +28,7 @@ struct WindowNode {
   Time time;
   StateBlock x;
   double t_O = 0.0;                                            ///< [s]
+  double offset_step_variance = 0.0;                           ///< of a step of t_O before this node [s^2]
   std::unique_ptr<ImuFactor> imu_from_previous;                ///< null for the first node
   std::unique_ptr<ConstantOffsetFactor> offset_from_previous;  ///< null for the first node
   std::vector<RadarTerm> radar;
