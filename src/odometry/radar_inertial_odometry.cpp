@@ -280,6 +280,8 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
   if (!feasibility.accept(scan.stamp, measured.v_R)) return "infeasible_velocity";
   const bool moving = !at_rest && measured.status == EgoVelocityStatus::kMoving;
   const bool informs_offset = moving && prediction && prediction->informs_offset;
+  // An offset that is wrong by c shows as (J + noise) c; nothing else tells of the noise's part.
+  if (informs_offset) measured.covariance.diagonal().array() += prediction->rate_variance;
   if (!informs_offset) held_t_O = prediction ? prediction->t_O : smoother.newest().t_O;
   if (prediction && tilt_is_known && informs_offset && options.smoother.estimate_time_offset &&
       offset_monitor.stepped(scan.stamp, measured.v_R - prediction->velocity.v_R,

@@ -99,8 +99,9 @@ std::optional<RadarVelocityPrediction> FixedLagSmoother::predictRadarVelocity(
   prediction.covariance_at_offset =
       J_state * P.topLeftCorner<StateBlock::kTangent, StateBlock::kTangent>() * J_state.transpose();
   prediction.dv_dt_O = J_t;
-  prediction.informs_offset =
-      velocityRate(*imu_, time, x, g_W_, l_I).informsOffset(options_.time_offset_min_acceleration);
+  const VelocityRate rate = velocityRate(*imu_, time, x, g_W_, l_I);
+  prediction.informs_offset = rate.informsOffset(options_.time_offset_min_acceleration);
+  prediction.rate_variance = rate.variance * P(StateBlock::kTangent, StateBlock::kTangent);
   const Eigen::Matrix<double, 2, 3> horizontal = x.q_WI().toRotationMatrix().topRows<2>();
   const Eigen::Matrix2d tilt =
       horizontal * P.block<3, 3>(StateBlock::kTheta, StateBlock::kTheta) * horizontal.transpose();

@@ -29,6 +29,8 @@ struct RadarVelocityPrediction {
       Eigen::Matrix3d::Zero();                        ///< the same, were the offset known [m^2/s^2]
   Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();  ///< of v_R with respect to t_O [m/s^2]
   double t_O = 0.0;                                   ///< at which all this holds [s]
+  /// Per axis, of the noise in dv_dt_O times the error of the offset: not in the covariances [m^2/s^2].
+  double rate_variance = 0.0;
   bool informs_offset = false;                        ///< dv_dt_O is motion, not noise of the IMU
   double tilt_sigma = 0.0;                            ///< of roll and pitch, the larger [rad]
 };
