@@ -384,6 +384,150 @@ TEST(ImuModel, NoiseAndBiasWalkHaveTheirDensities) {
   EXPECT_NEAR(std::sqrt(walk_g / n * options.rate), 1e-3, 1.2e-5);
 }
 
+// What the vibration adds to the samples of 400 s of rest: those with it minus those without it.
+std::vector<ImuMeasurement> vibrationAtRest(const ImuModelOptions& vibrating) {
+  MotionRestOptions rest;
+  rest.static_start = 400.0;
+  const Motion motion = makeMotion({"easy", 1, 420.0, rest});
+  ImuModelOptions still = vibrating;
+  still.accel_vibration = still.gyro_vibration = still.vibration_frequency = 0.0;
+  const ImuData without = simulateImu(motion, still, 3, Time());
+  std::vector<ImuMeasurement> samples = simulateImu(motion, vibrating, 3, Time()).samples;
+  samples.resize(static_cast<std::size_t>(400.0 * vibrating.rate));
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    samples[i].acceleration -= without.samples[i].acceleration;
+    samples[i].angular_velocity -= without.samples[i].angular_velocity;
+  }
+  return samples;
+}
+
+struct Sigmas {
+  double accel = 0.0, gyro = 0.0;
+};
+
+Sigmas sigmasOf(const std::vector<ImuMeasurement>& samples) {
+  Sigmas squares;
+  for (const ImuMeasurement& sample : samples) {
+    squares.accel += sample.acceleration.squaredNorm();
+    squares.gyro += sample.angular_velocity.squaredNorm();
+  }
+  const double n = 3.0 * static_cast<double>(samples.size());
+  return {std::sqrt(squares.accel / n), std::sqrt(squares.gyro / n)};
+}
+
+// Share of the accelerometer's power within `reach` [Hz] of `frequency`, over all stretches of 20 s.
+double shareOfPower(const std::vector<ImuMeasurement>& samples, double rate, double frequency, double reach) {
+  constexpr double kStretch = 20.0;  // [s]; lines of its spectrum are 1 / 20 Hz apart
+  const auto n = static_cast<std::size_t>(kStretch * rate);
+  double inside = 0.0, all = 0.0;
+  for (std::size_t first = 0; first + n <= samples.size(); first += n) {
+    for (std::size_t i = first; i < first + n; ++i) all += samples[i].acceleration.squaredNorm();
+    const double step = rate / static_cast<double>(n);
+    const int lines = static_cast<int>(std::lround(reach / step));
+    for (int line = -lines; line <= lines; ++line) {
+      const double turn = 2.0 * 3.141592653589793 * (std::round(frequency / step) + line) * step / rate;
+      const double c = std::cos(turn), s = std::sin(turn);
+      Eigen::Vector3d in_phase = Eigen::Vector3d::Zero(), quadrature = Eigen::Vector3d::Zero();
+      double x = 1.0, y = 0.0;
+      for (std::size_t i = first; i < first + n; ++i) {
+        in_phase += x * samples[i].acceleration;
+        quadrature += y * samples[i].acceleration;
+        const double turned = c * x - s * y;
+        y = s * x + c * y;
+        x = turned;
+      }
+      // Parseval; twice, because half of the power is at the negative frequency.
+      inside += 2.0 * (in_phase.squaredNorm() + quadrature.squaredNorm()) / static_cast<double>(n);
+    }
+  }
+  return inside / all;
+}
+
+TEST(ImuModel, WhiteVibrationHasItsSigmaAtRestAndNoLine) {
+  ImuModelOptions options;
+  options.accel_vibration = 3.0;
+  options.gyro_vibration = 0.2;
+  const std::vector<ImuMeasurement> vibration = vibrationAtRest(options);
+  const Sigmas sigmas = sigmasOf(vibration);
+  // 490800 numbers give a sigma to 0.1 %; five times that.
+  EXPECT_NEAR(sigmas.accel, 3.0, 0.005 * 3.0);
+  EXPECT_NEAR(sigmas.gyro, 0.2, 0.005 * 0.2);
+  double product = 0.0;
+  for (std::size_t i = 1; i < vibration.size(); ++i) {
+    product += vibration[i].acceleration.dot(vibration[i - 1].acceleration);
+  }
+  EXPECT_NEAR(product / (3.0 * static_cast<double>(vibration.size())) / 9.0, 0.0, 0.0075);
+  EXPECT_NEAR(shareOfPower(vibration, options.rate, 60.0, 2.0), 4.05 / (0.5 * options.rate), 0.003);
+}
+
+TEST(ImuModel, NarrowVibrationHasItsSigmaAtRestAndItsFrequency) {
+  // 300 Hz are seen at 409 - 300.
+  for (const auto& [frequency, seen] : {std::pair(60.0, 60.0), std::pair(300.0, 109.0)}) {
+    ImuModelOptions options;
+    options.accel_vibration = 3.0;
+    options.gyro_vibration = 0.2;
+    options.vibration_frequency = frequency;
+    const std::vector<ImuMeasurement> vibration = vibrationAtRest(options);
+    const Sigmas sigmas = sigmasOf(vibration);
+    // Squares stay alike for a quarter of a second: 4800 free numbers give a sigma to 1 %; five times that.
+    EXPECT_NEAR(sigmas.accel, 3.0, 0.05 * 3.0) << frequency;
+    EXPECT_NEAR(sigmas.gyro, 0.2, 0.05 * 0.2) << frequency;
+    // Within its reach a Lorentz line of coherence T holds 2 / pi atan(2 pi T reach) of the power: 0.96, and
+    // 0.39 with half a line of the spectrum more at both ends. A steady tone would hold all of it.
+    EXPECT_NEAR(shareOfPower(vibration, options.rate, seen, 5.0), 0.96, 0.02) << frequency;
+    EXPECT_NEAR(shareOfPower(vibration, options.rate, seen, 0.2), 0.39, 0.06) << frequency;
+    EXPECT_LT(shareOfPower(vibration, options.rate, seen + 30.0, 5.0), 0.02) << frequency;
+  }
+}
+
+TEST(ImuModel, VibrationLeavesAllOtherNoiseAsItWas) {
+  const Motion motion = builtIn("medium", 1, 30.0);
+  SimulationOptions options;
+  const SensorData still = simulate(motion, options);
+  for (const double frequency : {0.0, 60.0}) {
+    options.imu.vibration_frequency = frequency;
+    options.imu.accel_vibration = 3.0;
+    options.imu.gyro_vibration = 0.0;
+    const SensorData accel = simulate(motion, options);
+    options.imu.accel_vibration = 0.0;
+    options.imu.gyro_vibration = 0.2;
+    const SensorData gyro = simulate(motion, options);
+    options.imu.accel_vibration = 3.0;
+    const SensorData both = simulate(motion, options);
+    for (std::size_t i = 0; i < still.imu.samples.size(); ++i) {
+      // Noise of both sensors and walks of both biases come in turn from one sequence: one draw more or less
+      // would shift all that follow.
+      ASSERT_EQ(accel.imu.samples[i].angular_velocity, still.imu.samples[i].angular_velocity) << i;
+      ASSERT_EQ(gyro.imu.samples[i].acceleration, still.imu.samples[i].acceleration) << i;
+      ASSERT_NE(accel.imu.samples[i].acceleration, still.imu.samples[i].acceleration) << i;
+      ASSERT_NE(gyro.imu.samples[i].angular_velocity, still.imu.samples[i].angular_velocity) << i;
+      ASSERT_EQ(both.imu.samples[i].acceleration, accel.imu.samples[i].acceleration) << i;
+      ASSERT_EQ(both.imu.samples[i].angular_velocity, gyro.imu.samples[i].angular_velocity) << i;
+      ASSERT_EQ(both.imu.b_a[i], still.imu.b_a[i]) << i;
+      ASSERT_EQ(both.imu.b_g[i], still.imu.b_g[i]) << i;
+    }
+    ASSERT_EQ(both.scans.size(), still.scans.size());
+    EXPECT_EQ(both.scans.back().points.back().doppler, still.scans.back().points.back().doppler);
+  }
+  options.imu.removeErrors();
+  const MotionState state = motion.at(20.0);
+  const ImuMeasurement exact = simulateImu(motion, options.imu, 1, Time()).samples[8180];
+  EXPECT_LT((exact.angular_velocity - state.omega_I).norm(), 1e-12);
+}
+
+TEST(ImuModel, RefusesNegativeVibration) {
+  const Motion motion = builtIn("easy", 1, 30.0);
+  ImuModelOptions options;
+  options.accel_vibration = -1.0;
+  EXPECT_THROW(simulateImu(motion, options, 1, Time()), std::invalid_argument);
+  options = ImuModelOptions{};
+  options.gyro_vibration = -0.1;
+  EXPECT_THROW(simulateImu(motion, options, 1, Time()), std::invalid_argument);
+  options = ImuModelOptions{};
+  options.vibration_frequency = -60.0;
+  EXPECT_THROW(simulateImu(motion, options, 1, Time()), std::invalid_argument);
+}
+
 TEST(ImuModel, DefaultNoiseIsTheMeasuredOneWhateverTheEstimatorExpects) {
   const ImuModelOptions options;
   EXPECT_EQ(options.noise.accel_density, 2.4e-3);

@@ -110,7 +110,8 @@ class Options {
     number("start-time", "S", "stamp of the first IMU sample", r.start_time, Range::kPositive);
     number("record-offset", "S", "clock of the recorder minus clock of the IMU", r.bag.record_offset);
     number("gravity", "M/S^2", "magnitude", imu.gravity, Range::kPositive);
-    flag("noise-free", "no noise, bias, quantisation, ghosts, moving objects or lost scans (blackouts stay)",
+    flag("noise-free",
+         "no noise, vibration, bias, quantisation, ghosts, moving objects or lost scans (blackouts stay)",
          r.noise_free);
 
     section("Time offset t_O: a scan stamped s was measured at s - t_O");
@@ -141,6 +142,14 @@ class Options {
     });
     number("accel-bias-sigma", "M/S^2", "of the random bias", imu.accel_bias_sigma, Range::kNotNegative);
     number("gyro-bias-sigma", "RAD/S", "of the random bias", imu.gyro_bias_sigma, Range::kNotNegative);
+    number("vibration", "M/S^2",
+           "sigma of what a vibrating frame adds to each axis and sample of the accelerometer, at rest too",
+           imu.accel_vibration, Range::kNotNegative);
+    number("vibration-gyro", "RAD/S", "sigma of what it adds to the gyro", imu.gyro_vibration,
+           Range::kNotNegative);
+    number("vibration-frequency", "HZ",
+           "the vibration is a narrow band there and aliases above half the IMU rate; 0 = it is white",
+           imu.vibration_frequency, Range::kNotNegative);
     number("accel-saturation", "M/S^2", "largest reading of an axis", imu.accel_saturation, Range::kPositive);
     number("gyro-saturation", "RAD/S", "largest reading of an axis", imu.gyro_saturation, Range::kPositive);
 

@@ -34,8 +34,15 @@ struct ImuModelOptions {
   double accel_saturation = 176.5;            ///< [m/s^2] per axis (18 g, ADIS16448)
   double gyro_saturation = 17.45;             ///< [rad/s] per axis (1000 deg/s)
   double gravity = 9.81;                      ///< [m/s^2]
+  /// What a vibrating frame adds to every sample, at rest too, each axis on its own. The radar feels nothing.
+  double accel_vibration = 0.0;  ///< [m/s^2] sigma per axis and sample
+  double gyro_vibration = 0.0;   ///< [rad/s] sigma per axis and sample
+  /// [Hz] 0: white from sample to sample. Above: a line 0.6 Hz wide there, as a motor makes it; its amplitude
+  /// and phase hold for about half a second. Above half the rate it aliases: no filter stands before a
+  /// sample.
+  double vibration_frequency = 0.0;
 
-  /// No noise and no bias; rate, saturation and gravity stay.
+  /// No noise, no vibration and no bias; rate, saturation and gravity stay.
   void removeErrors();
 };
 
