@@ -259,6 +259,29 @@ TEST(Motions, HaveTheirCharacter) {
   EXPECT_GT(builtIn("start_in_motion").at(0.0).v_W.norm(), 0.05);
 }
 
+TEST(Motions, ConstantSpeedKeepsTheSpeedItIsGiven) {
+  for (const double speed : {0.2, 5.0, 20.0}) {
+    const Motion motion = makeMotion({"constant_speed", 1, 0.0, MotionRestOptions{}, speed});
+    EXPECT_NEAR(motion.duration(), 90.0, 1e-6);
+    for (double t = 14.5; t < 84.5; t += 0.1) {
+      const MotionState state = motion.at(t);
+      ASSERT_NEAR(state.v_W.x(), speed, 1e-6 * speed) << t;
+      ASSERT_LT(state.v_W.tail<2>().norm() + state.omega_I.norm(), 1e-9) << t;
+    }
+    // Two ramps of 2 s at half of the speed.
+    EXPECT_NEAR(motion.at(90.0).p_W.x(), speed * 73.0, 1e-6 * speed * 73.0);
+  }
+}
+
+TEST(Motions, SpeedIsRefusedWhereItMeansNothing) {
+  for (const MotionDescription& motion : builtInMotions()) {
+    if (motion.name == "constant_speed") continue;
+    EXPECT_THROW(makeMotion({motion.name, 1, 0.0, MotionRestOptions{}, 2.0}), std::invalid_argument);
+  }
+  EXPECT_THROW(makeMotion({"constant_speed", 1, 0.0, MotionRestOptions{}, 0.0}), std::invalid_argument);
+  EXPECT_THROW(makeMotion({"constant_speed", 1, 0.0, MotionRestOptions{}, -1.0}), std::invalid_argument);
+}
+
 TEST(Motions, UnknownNameAndTooShortDurationAreRefused) {
   EXPECT_THROW(builtIn("waltz"), std::invalid_argument);
   EXPECT_THROW(builtIn("easy", 1, 18.0), std::invalid_argument);

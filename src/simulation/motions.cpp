@@ -202,15 +202,16 @@ PoseFunction groundVehicle(Random& random, double duration) {
   };
 }
 
-PoseFunction constantSpeed() {
-  return [](double t) {
+PoseFunction constantSpeed(double speed) {
+  return [=](double t) {
     StampedPose pose;
-    pose.p_W = {1.0 * t, 0.0, 0.0};
+    pose.p_W = {speed * t, 0.0, 0.0};
     return pose;
   };
 }
 
-PoseFunction poseFunction(const std::string& name, Random& random, double duration) {
+PoseFunction poseFunction(const MotionRequest& request, Random& random, double duration) {
+  const std::string& name = request.name;
   if (name == "easy") return handHeld({0.7, 0.5, 0.30, 0.30, 0.0}, random, duration);
   if (name == "medium" || name == "start_in_motion") {
     return handHeld({1.0, 1.0, 0.45, 0.45, 0.006}, random, duration);
@@ -219,7 +220,7 @@ PoseFunction poseFunction(const std::string& name, Random& random, double durati
   if (name == "gym_loop") return gymLoop(random, duration);
   if (name == "drone") return drone(random, duration);
   if (name == "ground_vehicle") return groundVehicle(random, duration);
-  return constantSpeed();
+  return constantSpeed(request.speed.value_or(1.0));
 }
 
 }  // namespace
@@ -232,7 +233,7 @@ const std::vector<MotionDescription>& builtInMotions() {
       {"gym_loop", "one walked lap of a hall, about 1 m/s, ends where it began", 100.0},
       {"drone", "multicopter: up to 3 m/s, leans into its acceleration", 90.0},
       {"ground_vehicle", "planar, 1 to 5 m/s, up to 0.45 rad/s about the vertical", 90.0},
-      {"constant_speed", "straight line at 1 m/s without rotation", 90.0},
+      {"constant_speed", "straight line without rotation, at 1 m/s or --speed", 90.0},
       {"start_in_motion", "medium, but moving from the first sample on", 90.0},
   };
   return motions;
@@ -247,6 +248,11 @@ Motion makeMotion(const MotionRequest& request) {
     for (const MotionDescription& m : known) names += (names.empty() ? "" : ", ") + m.name;
     throw std::invalid_argument("motion '" + request.name + "' is not known; known are: " + names);
   }
+  if (request.speed && request.name != "constant_speed") {
+    throw std::invalid_argument("speed: only the motion constant_speed can be given one, '" + request.name +
+                                "' has its own");
+  }
+  if (request.speed && !(*request.speed > 0.0)) throw std::invalid_argument("speed: must be positive");
   MotionRestOptions rest = request.rest;
   if (request.name == "start_in_motion") rest.static_start = 0.0;
   const double duration = request.duration > 0.0 ? request.duration : found->default_duration;
@@ -257,7 +263,7 @@ Motion makeMotion(const MotionRequest& request) {
   }
 
   Random random(request.seed, kMotionStream);
-  const PoseFunction pose_at = poseFunction(request.name, random, path_duration);
+  const PoseFunction pose_at = poseFunction(request, random, path_duration);
   Trajectory poses;
   const auto count = static_cast<std::size_t>(std::ceil(path_duration / kSampleStep));
   const Eigen::Vector3d origin = pose_at(0.0).p_W;

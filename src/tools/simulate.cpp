@@ -6,6 +6,7 @@
 #include <functional>
 #include <iomanip>
 #include <iostream>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -27,6 +28,7 @@ struct Request {
   std::string out;
   std::string ground_truth;
   double duration = 0.0;
+  std::optional<double> speed;
   double ground_truth_file_rate = 400.0;
   double start_time = 1.7e9;
   bool noise_free = false;
@@ -36,12 +38,19 @@ struct Request {
   SimulationBagOptions bag;
 };
 
-double parseNumber(const std::string& text) {
+enum class Range { kAny, kNotNegative, kPositive, kShare };
+
+double parseNumber(const std::string& text, Range range = Range::kAny) {
   char* end = nullptr;
   errno = 0;
   const double value = std::strtod(text.c_str(), &end);
   if (text.empty() || *end != '\0' || errno == ERANGE || !std::isfinite(value)) {
     throw std::invalid_argument("'" + text + "' is not a number");
+  }
+  if (range == Range::kNotNegative && value < 0.0) throw std::invalid_argument("'" + text + "' is below 0");
+  if (range == Range::kPositive && value <= 0.0) throw std::invalid_argument("'" + text + "' is not above 0");
+  if (range == Range::kShare && (value < 0.0 || value > 1.0)) {
+    throw std::invalid_argument("'" + text + "' is not within 0 and 1");
   }
   return value;
 }
@@ -101,6 +110,8 @@ class Options {
     number("duration", "S",
            "length of the bag with rest; 0 = the motion's own (with --trajectory: of the file)", r.duration,
            Range::kNotNegative);
+    add("speed", "M/S", "speed of the motion constant_speed; the others have their own", "1",
+        [&r](const std::string& v) { r.speed = parseNumber(v, Range::kPositive); });
     number("static-start", "S", "rest at the start; 0 = starts in motion", r.rest.static_start,
            Range::kNotNegative);
     number("static-end", "S", "rest at the end; 0 = ends in motion", r.rest.static_end, Range::kNotNegative);
@@ -245,7 +256,6 @@ class Options {
   }
 
  private:
-  enum class Range { kAny, kNotNegative, kPositive, kShare };
   using Setter = std::function<void(const std::string&)>;
   struct Option {
     std::string name;
@@ -276,16 +286,8 @@ class Options {
 
   void number(const std::string& name, const std::string& unit, const std::string& help, double& target,
               Range range = Range::kAny) {
-    add(name, unit, help, shown(target), [&target, range](const std::string& v) {
-      const double value = parseNumber(v);
-      if (range == Range::kNotNegative && value < 0.0) throw std::invalid_argument("'" + v + "' is below 0");
-      if (range == Range::kPositive && value <= 0.0)
-        throw std::invalid_argument("'" + v + "' is not above 0");
-      if (range == Range::kShare && (value < 0.0 || value > 1.0)) {
-        throw std::invalid_argument("'" + v + "' is not within 0 and 1");
-      }
-      target = value;
-    });
+    add(name, unit, help, shown(target),
+        [&target, range](const std::string& v) { target = parseNumber(v, range); });
   }
 
   const Option* find(const std::string& argument) const {
@@ -327,13 +329,17 @@ Motion motionOf(const Request& request) {
   }
   if (request.out.empty()) throw std::invalid_argument("--out: the bag to write is not given (see --help)");
   if (!request.trajectory.empty()) {
+    if (request.speed) {
+      throw std::invalid_argument(
+          "--speed: only --motion constant_speed can be given one, a trajectory has its own");
+    }
     try {
       return motionFromFile(request);
     } catch (const std::invalid_argument& error) {
       throw std::invalid_argument("--trajectory " + request.trajectory + ": " + error.what());
     }
   }
-  return makeMotion({request.motion, request.simulation.seed, request.duration, request.rest});
+  return makeMotion({request.motion, request.simulation.seed, request.duration, request.rest, request.speed});
 }
 
 std::string triple(const Eigen::Vector3d& v) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,11 +23,14 @@ struct MotionRequest {
   std::uint64_t seed = 0;
   double duration = 0.0;   ///< [s] with rest; 0 = the motion's default
   MotionRestOptions rest;  ///< `start_in_motion` ignores `static_start`
+  /// [m/s] of `constant_speed`, 1 if not given. The other motions have speeds of their own.
+  std::optional<double> speed = std::nullopt;
 };
 
 /// Builds a built-in motion: the same request gives the same motion. Starts near the origin, IMU level at
 /// rest for all but the tilted hand-held ones. Throws std::invalid_argument for an unknown name (the message
-/// lists the known ones) or a duration that leaves less than 5 s between the rests.
+/// lists the known ones), a duration that leaves less than 5 s between the rests, or a speed that is not
+/// positive or that the motion cannot take.
 Motion makeMotion(const MotionRequest& request);
 
 }  // namespace rio_t::simulation
