@@ -816,6 +816,74 @@ TEST(RadarModel, APersonWalksThroughTheViewForItsShareOfTheTime) {
   EXPECT_LT(share, 0.36);
 }
 
+// Persons in a scan without errors. Theirs are the first points, those of one after those of the other, and
+// all of one share a horizontal velocity.
+int personsIn(const SimulatedScan& scan, const Eigen::Quaterniond& q_WR) {
+  int persons = 0;
+  std::vector<Eigen::Vector2d> directions;  // of the person that is being read
+  std::vector<double> speeds;               // away from the radar's place
+  for (const SimulatedPoint& point : scan.points) {
+    const Eigen::Vector3d direction_R = point.position_R.normalized();
+    const double speed = point.doppler + direction_R.dot(scan.v_R);
+    if (std::abs(speed) < 1e-6) break;  // the room begins
+    directions.emplace_back((q_WR * direction_R).head<2>());
+    speeds.push_back(speed);
+    Eigen::MatrixXd H(static_cast<Eigen::Index>(speeds.size()), 2);
+    for (Eigen::Index i = 0; i < H.rows(); ++i)
+      H.row(i) = directions[static_cast<std::size_t>(i)].transpose();
+    const Eigen::Map<const Eigen::VectorXd> y(speeds.data(), H.rows());
+    const bool fits = (H * H.colPivHouseholderQr().solve(y) - y).norm() < 1e-6;
+    if (fits && speeds.size() > 1) continue;
+    ++persons;
+    directions.erase(directions.begin(), directions.end() - 1);
+    speeds.erase(speeds.begin(), speeds.end() - 1);
+  }
+  return persons;
+}
+
+TEST(RadarModel, ACrowdIsInViewAtOnceAndOnTheSameVisits) {
+  SimulationOptions options = withoutErrors();
+  options.radar.moving_share = 0.3;
+  options.radar.points_mean = 150.0;
+  options.radar.points_max = 200;
+  const Motion motion = makeMotion({"constant_speed", 1, 200.0, MotionRestOptions{}, 0.2});
+  const SensorData alone = simulate(motion, options);
+  for (const int crowd : {1, 6}) {
+    options.radar.crowd = crowd;
+    const SensorData data = simulate(motion, options);
+    ASSERT_EQ(data.scans.size(), alone.scans.size());
+    int visits = 0, before = 0;
+    double disturbed = 0.0;
+    for (std::size_t k = 0; k < data.scans.size(); ++k) {
+      const int persons = personsIn(data.scans[k], options.T_IR.q_IR);  // the IMU is level all the way
+      const bool visited = personsIn(alone.scans[k], options.T_IR.q_IR) > 0;
+      ASSERT_LE(persons, crowd) << k;
+      // Nobody has left the view yet when a visit begins.
+      if (before == 0 && visited) {
+        EXPECT_EQ(persons, crowd) << k;
+        ++visits;
+      }
+      disturbed += persons > 0 ? 1.0 : 0.0;
+      before = persons;
+    }
+    EXPECT_GT(visits, 12);
+    EXPECT_NEAR(disturbed / static_cast<double>(data.scans.size()), 0.3, crowd > 1 ? 0.06 : 0.1);
+  }
+}
+
+TEST(RadarModel, ACrowdStaysWithinTheLimitOfPoints) {
+  SimulationOptions options = withoutErrors();
+  options.radar.moving_share = 0.5;
+  options.radar.crowd = 20;
+  std::size_t most = 0;
+  for (const SimulatedScan& scan : simulate(builtIn("medium"), options).scans) {
+    most = std::max(most, scan.points.size());
+  }
+  EXPECT_EQ(most, static_cast<std::size_t>(options.radar.points_max));
+  options.radar.crowd = 0;
+  EXPECT_THROW(simulate(builtIn("medium"), options), std::invalid_argument);
+}
+
 TEST(RadarModel, DropsScansInTheirShareAndLeavesTheOthersAlone) {
   SimulationOptions options;
   const Motion motion = builtIn("medium");

@@ -19,6 +19,7 @@ constexpr std::uint64_t kScanStream = 21;
 constexpr std::uint64_t kPersonStream = 22;
 constexpr std::uint64_t kDropoutStream = 23;
 constexpr std::uint64_t kLatencyStream = 24;
+constexpr std::uint64_t kCrowdStream = 25;
 
 void check(const RadarModelOptions& o) {
   const auto require = [](bool ok, const char* what) {
@@ -41,6 +42,7 @@ void check(const RadarModelOptions& o) {
   require(o.doppler_step >= 0.0, "Doppler quantisation cannot be negative");
   require(is_share(o.ghost_share) && is_share(o.moving_share) && is_share(o.dropout_share),
           "shares must be in [0, 1]");
+  require(o.crowd >= 1, "a crowd must be one person or more");
 }
 
 // Where the radar is and how it moves.
@@ -82,6 +84,19 @@ struct Person {
   Eigen::Vector3d v_W = Eigen::Vector3d::Zero();
 };
 
+Person makePerson(const RadarState& radar, double from, double until, Random& random) {
+  Person person;
+  person.from = from;
+  person.until = until;
+  person.p_W =
+      radar.p_W + radar.q_WR * fromPolar(random.uniform(2.5, 6.0), random.uniform(-40.0, 40.0) * kDegree,
+                                         random.uniform(-10.0, 10.0) * kDegree);
+  const double heading = random.uniform(-kPi, kPi);
+  person.v_W = random.uniform(0.7, 1.6) * Eigen::Vector3d(std::cos(heading), std::sin(heading), 0.0);
+  return person;
+}
+
+// Visits of `crowd` persons each, who come and go together.
 std::vector<Person> makePersons(const Motion& motion, const RadarModelOptions& o, const Extrinsics& T_IR,
                                 std::uint64_t seed) {
   std::vector<Person> persons;
@@ -90,18 +105,14 @@ std::vector<Person> makePersons(const Motion& motion, const RadarModelOptions& o
   constexpr double kMeanVisit = 3.0;  // [s]
   const double mean_absence = kMeanVisit * (1.0 - o.moving_share) / o.moving_share;
   double t = mean_absence * random.uniform(0.0, 1.0);
-  while (t < motion.duration()) {
-    Person person;
-    person.from = t;
-    person.until = std::min(t + kMeanVisit * random.uniform(0.5, 1.5), motion.duration());
+  for (std::uint64_t visit = 0; t < motion.duration(); ++visit) {
+    const double until = std::min(t + kMeanVisit * random.uniform(0.5, 1.5), motion.duration());
     const RadarState radar = radarState(motion.at(t), T_IR);
-    person.p_W =
-        radar.p_W + radar.q_WR * fromPolar(random.uniform(2.5, 6.0), random.uniform(-40.0, 40.0) * kDegree,
-                                           random.uniform(-10.0, 10.0) * kDegree);
-    const double heading = random.uniform(-kPi, kPi);
-    person.v_W = random.uniform(0.7, 1.6) * Eigen::Vector3d(std::cos(heading), std::sin(heading), 0.0);
-    t = person.until + mean_absence * random.uniform(0.5, 1.5);
-    persons.push_back(person);
+    persons.push_back(makePerson(radar, t, until, random));
+    // From a sequence of their own, so that the visits and their first persons are the same for any crowd.
+    Random crowd_random(seed, kCrowdStream, visit);
+    for (int i = 1; i < o.crowd; ++i) persons.push_back(makePerson(radar, t, until, crowd_random));
+    t = until + mean_absence * random.uniform(0.5, 1.5);
   }
   return persons;
 }
@@ -180,6 +191,10 @@ class Sensor {
         }
       }
     }
+    // The few points of a single person are kept whatever the limit: bags of old seeds stay as they are.
+    if (options_.crowd > 1 && echoes.size() > static_cast<std::size_t>(options_.points_max)) {
+      keepStrongest(echoes, options_.points_max);
+    }
     return echoes;
   }
 
@@ -197,11 +212,16 @@ class Sensor {
       echoes.push_back(
           {p_W, Eigen::Vector3d::Zero(), 22.0 - 10.0 * std::log10(d_W.norm()) + 6.0 * random.gaussian()});
     }
+    keepStrongest(echoes, wanted);
+    return echoes;
+  }
+
+  // Strongest first.
+  static void keepStrongest(std::vector<Echo>& echoes, int wanted) {
     const auto kept = std::min(echoes.size(), static_cast<std::size_t>(wanted));
     std::partial_sort(echoes.begin(), echoes.begin() + static_cast<std::ptrdiff_t>(kept), echoes.end(),
                       [](const Echo& a, const Echo& b) { return a.snr_db > b.snr_db; });
     echoes.resize(kept);
-    return echoes;
   }
 
   double quantised(double doppler) const {

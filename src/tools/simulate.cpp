@@ -186,13 +186,7 @@ class Options {
     number("latency-sigma", "S", "scatter of it", radar.latency_sigma, Range::kNotNegative);
     number("points", "N", "mean number of points a scan", radar.points_mean, Range::kPositive);
     number("points-sigma", "N", "scatter of it", radar.points_sigma, Range::kNotNegative);
-    add("points-max", "N", "limit of it", shown(radar.points_max), [&radar](const std::string& v) {
-      const double n = parseNumber(v);
-      if (n < 1.0 || n > 100000.0 || n != std::floor(n)) {
-        throw std::invalid_argument("'" + v + "' is not a whole number from 1 to 100000");
-      }
-      radar.points_max = static_cast<int>(n);
-    });
+    count("points-max", "limit of it", radar.points_max);
     number("min-range", "M", "nearest point", radar.min_range, Range::kNotNegative);
     number("max-range", "M", "farthest point", radar.max_range, Range::kPositive);
     number("fov-azimuth", "DEG", "half angle of view", radar.fov_azimuth, Range::kPositive);
@@ -203,8 +197,9 @@ class Options {
     number("doppler-noise", "M/S", "sigma, before quantisation", radar.doppler_noise, Range::kNotNegative);
     number("doppler-step", "M/S", "quantisation; 0 = none", radar.doppler_step, Range::kNotNegative);
     number("ghosts", "SHARE", "of the points: anywhere, any Doppler", radar.ghost_share, Range::kShare);
-    number("moving", "SHARE", "of the time: a person walks through the view", radar.moving_share,
+    number("moving", "SHARE", "of the time: persons walk through the view", radar.moving_share,
            Range::kShare);
+    count("crowd", "so many persons at once; their points take the place of the room's", radar.crowd);
     number("dropouts", "SHARE", "of the scans: triggered, never delivered", radar.dropout_share,
            Range::kShare);
     add("blackout", "S,S", "START,DURATION without scans; may be repeated", "none",
@@ -288,6 +283,16 @@ class Options {
               Range range = Range::kAny) {
     add(name, unit, help, shown(target),
         [&target, range](const std::string& v) { target = parseNumber(v, range); });
+  }
+
+  void count(const std::string& name, const std::string& help, int& target) {
+    add(name, "N", help, shown(target), [&target](const std::string& v) {
+      const double n = parseNumber(v);
+      if (n < 1.0 || n > 100000.0 || n != std::floor(n)) {
+        throw std::invalid_argument("'" + v + "' is not a whole number from 1 to 100000");
+      }
+      target = static_cast<int>(n);
+    });
   }
 
   const Option* find(const std::string& argument) const {

@@ -32,7 +32,8 @@ struct RadarModelOptions {
   double doppler_step = 0.125;   ///< [m/s] quantisation; 0 = none
 
   double ghost_share = 0.03;   ///< of the points: anywhere, any Doppler
-  double moving_share = 0.10;  ///< of the time: a walking person in view
+  double moving_share = 0.10;  ///< of the time: walking persons in view
+  int crowd = 1;               ///< so many at once; their points take the place of the room's
   double dropout_share = 0.0;  ///< of the scans: triggered, never delivered
   struct Interval {
     double start;     ///< [s] from the start of the bag
