@@ -259,6 +259,48 @@ TEST(Motions, HaveTheirCharacter) {
   EXPECT_GT(builtIn("start_in_motion").at(0.0).v_W.norm(), 0.05);
 }
 
+TEST(Motions, AWalkIsLongAndTurnsAndSteps) {
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    const Motion motion = builtIn("walk", seed);
+    const double from = 14.0, until = motion.duration() - 5.0;  // at full speed
+    double length = 0.0, low = 1e9, high = -1e9, path_to_last_turn = 0.0, yaw_rate = 0.0;
+    int steps = 0, turns = 0;
+    double vertical_speed = 0.0;
+    constexpr double kStep = 0.01;
+    for (double t = from; t < until; t += kStep) {
+      const MotionState state = motion.at(t);
+      length += kStep * state.v_W.head<2>().norm();
+      low = std::min(low, state.p_W.z());
+      high = std::max(high, state.p_W.z());
+      ASSERT_LT(std::acos(std::min(1.0, (state.q_WI * Eigen::Vector3d::UnitZ()).z())), 0.3) << t;
+      // Looks where it goes.
+      ASSERT_GT((state.q_WI.conjugate() * state.v_W).normalized().x(), 0.9) << t;
+      if (vertical_speed < 0.0 && state.v_W.z() >= 0.0) ++steps;
+      vertical_speed = state.v_W.z();
+      // Sway alone stays far below.
+      if (std::abs(yaw_rate) < 0.5 && std::abs(state.omega_I.z()) >= 0.5) {
+        if (turns++ > 0) {
+          EXPECT_GT(length - path_to_last_turn, 4.5) << t;
+          EXPECT_LT(length - path_to_last_turn, 21.0) << t;
+        }
+        path_to_last_turn = length;
+      }
+      yaw_rate = state.omega_I.z();
+    }
+    EXPECT_NEAR(length, 345.0, 15.0);
+    EXPECT_NEAR(length / (until - from), 1.25, 0.05);
+    EXPECT_NEAR(steps / (until - from), 2.0, 0.05);
+    EXPECT_NEAR(high - low, 0.025, 0.002);
+    EXPECT_GT(turns, 20);
+    const Peaks peaks = peaksOf(motion);
+    EXPECT_NEAR(peaks.rate, 1.0, 0.15);
+    EXPECT_LT(peaks.speed, 1.7);
+    // 0.0125 m at 4 pi rad/s are 2 m/s^2 upwards.
+    EXPECT_GT(peaks.acceleration, 1.8);
+    EXPECT_LT(peaks.acceleration, 3.0);
+  }
+}
+
 TEST(Motions, ConstantSpeedKeepsTheSpeedItIsGiven) {
   for (const double speed : {0.2, 5.0, 20.0}) {
     const Motion motion = makeMotion({"constant_speed", 1, 0.0, MotionRestOptions{}, speed});

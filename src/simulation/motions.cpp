@@ -168,6 +168,32 @@ PoseFunction drone(Random& random, double duration) {
   };
 }
 
+// Dead reckoning of a speed and a yaw rate in the plane by the midpoint rule, straight between the samples.
+PoseFunction planar(const std::function<double(double)>& speed, const std::function<double(double)>& yaw_rate,
+                    double duration) {
+  // One pose a sample and one to spare.
+  std::vector<StampedPose> poses(static_cast<std::size_t>(duration / kSampleStep) + 3);
+  double heading = 0.0;
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    poses[i].p_W = p;
+    poses[i].q_WI = attitude({0.0, 0.0, heading});
+    const double t = (static_cast<double>(i) + 0.5) * kSampleStep;
+    const double yaw_step = yaw_rate(t) * kSampleStep;
+    const double middle = heading + 0.5 * yaw_step;
+    p += speed(t) * kSampleStep * Eigen::Vector3d(std::cos(middle), std::sin(middle), 0.0);
+    heading += yaw_step;
+  }
+  return [poses](double t) {
+    const std::size_t i = std::min(poses.size() - 2, static_cast<std::size_t>(t / kSampleStep));
+    const double u = t / kSampleStep - static_cast<double>(i);
+    StampedPose pose;
+    pose.p_W = (1.0 - u) * poses[i].p_W + u * poses[i + 1].p_W;
+    pose.q_WI = poses[i].q_WI.slerp(u, poses[i + 1].q_WI);
+    return pose;
+  };
+}
+
 // Planar, no side slip, up to 5 m/s.
 PoseFunction groundVehicle(Random& random, double duration) {
   const Waves pace(random, 3, 0.02, 0.1, 1.0);
@@ -178,26 +204,71 @@ PoseFunction groundVehicle(Random& random, double duration) {
     pace_peak = std::max(pace_peak, std::abs(pace(t)));
     turn_peak = std::max(turn_peak, std::abs(turn(t)));
   }
-  // Dead reckoning of speed and yaw rate by the midpoint rule, one pose a sample and one to spare.
-  std::vector<StampedPose> poses(static_cast<std::size_t>(duration / kSampleStep) + 3);
-  double heading = 0.0;
-  Eigen::Vector3d p = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    poses[i].p_W = p;
-    poses[i].q_WI = attitude({0.0, 0.0, heading});
-    const double t = (static_cast<double>(i) + 0.5) * kSampleStep;
-    const double speed = 3.0 + 2.0 * pace(t) / pace_peak;
-    const double yaw_step = 0.45 * turn(t) / turn_peak * kSampleStep;
-    const double middle = heading + 0.5 * yaw_step;
-    p += speed * kSampleStep * Eigen::Vector3d(std::cos(middle), std::sin(middle), 0.0);
-    heading += yaw_step;
+  return planar([&](double t) { return 3.0 + 2.0 * pace(t) / pace_peak; },
+                [&](double t) { return 0.45 * turn(t) / turn_peak; }, duration);
+}
+
+// Corridors: straight stretches with turns of about a right angle between them.
+class Corridors {
+ public:
+  Corridors(Random& random, double duration) {
+    for (double t = 0.0; t < duration;) {
+      Turn turn;
+      turn.start = t + random.uniform(2.0, 14.0) / kWalkingSpeed;
+      const double angle = random.uniform(75.0, 105.0) * kPi / 180.0;
+      const double peak = random.uniform(0.7, 0.9);
+      turn.length = 2.0 * angle / peak;  // the mean of sin^2 is a half
+      turn.rate = random.chance(0.5) ? peak : -peak;
+      turns_.push_back(turn);
+      t = turn.start + turn.length;
+    }
   }
-  return [poses](double t) {
-    const std::size_t i = std::min(poses.size() - 2, static_cast<std::size_t>(t / kSampleStep));
-    const double u = t / kSampleStep - static_cast<double>(i);
-    StampedPose pose;
-    pose.p_W = (1.0 - u) * poses[i].p_W + u * poses[i + 1].p_W;
-    pose.q_WI = poses[i].q_WI.slerp(u, poses[i + 1].q_WI);
+
+  double yawRate(double t) const {
+    const Turn* turn = turnAt(t);
+    return turn != nullptr ? turn->rate * shape(*turn, t) : 0.0;
+  }
+  // Slower in the turns.
+  double speed(double t) const {
+    const Turn* turn = turnAt(t);
+    return kWalkingSpeed * (turn != nullptr ? 1.0 - 0.3 * shape(*turn, t) : 1.0);
+  }
+
+ private:
+  static constexpr double kWalkingSpeed = 1.3;  // [m/s]
+  struct Turn {
+    double start, length;  // [s]
+    double rate;           // peak [rad/s]
+  };
+  static double shape(const Turn& turn, double t) {
+    const double s = std::sin(kPi * (t - turn.start) / turn.length);
+    return s * s;
+  }
+  const Turn* turnAt(double t) const {
+    const auto found = std::find_if(turns_.begin(), turns_.end(), [t](const Turn& turn) {
+      return t >= turn.start && t < turn.start + turn.length;
+    });
+    return found != turns_.end() ? &*found : nullptr;
+  }
+
+  std::vector<Turn> turns_;
+};
+
+// A sensor held in front of somebody who walks through a building. Steps heave it by 2.5 cm from lowest to
+// highest, and nod, swing and roll it; their rate wanders about 2 Hz.
+PoseFunction walk(Random& random, double duration) {
+  const Corridors corridors(random, duration);
+  const Waves hurry(random, 3, 0.02, 0.1, 0.003);
+  const PoseFunction body = planar([&](double t) { return corridors.speed(t) + hurry(t); },
+                                   [&](double t) { return corridors.yawRate(t); }, duration);
+  const Waves stride(random, 3, 0.02, 0.1, 0.005);
+  const VectorFunction sway = withPeakRate(waves(random, 3, 0.2, 0.9, {0.5, 0.5, 1.0}), 0.15, duration);
+  return [=](double t) {
+    const double step = 2.0 * kPi * (2.0 * t + stride(t));
+    const double swing = std::sin(0.5 * step);  // left and right foot
+    StampedPose pose = body(t);
+    pose.p_W += pose.q_WI * Eigen::Vector3d(0.0, 0.012 * swing, 0.0125 * std::sin(step));
+    pose.q_WI = pose.q_WI * attitude(sway(t) + Eigen::Vector3d(0.015 * swing, 0.008 * std::cos(step), 0.0));
     return pose;
   };
 }
@@ -220,6 +291,7 @@ PoseFunction poseFunction(const MotionRequest& request, Random& random, double d
   if (name == "gym_loop") return gymLoop(random, duration);
   if (name == "drone") return drone(random, duration);
   if (name == "ground_vehicle") return groundVehicle(random, duration);
+  if (name == "walk") return walk(random, duration);
   return constantSpeed(request.speed.value_or(1.0));
 }
 
@@ -231,6 +303,8 @@ const std::vector<MotionDescription>& builtInMotions() {
       {"medium", "hand-held walk: up to 1 m/s and 1 rad/s", 90.0},
       {"difficult", "hand-held, wild: up to 2 m/s, 3 rad/s and over 5 m/s^2", 90.0},
       {"gym_loop", "one walked lap of a hall, about 1 m/s, ends where it began", 100.0},
+      {"walk", "hand-held, through corridors: 1.3 m/s, a turn every 5 to 20 m, steps that heave 2.5 cm",
+       300.0},
       {"drone", "multicopter: up to 3 m/s, leans into its acceleration", 90.0},
       {"ground_vehicle", "planar, 1 to 5 m/s, up to 0.45 rad/s about the vertical", 90.0},
       {"constant_speed", "straight line without rotation, at 1 m/s or --speed", 90.0},
