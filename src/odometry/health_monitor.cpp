@@ -57,8 +57,12 @@ HealthMonitor::HealthMonitor(const HealthOptions& options, double gate)
 
 void HealthMonitor::addInnovation(Time stamp, const Eigen::Vector3d& d, const Eigen::Matrix3d& S) {
   const double squared_sigmas = d.dot(S.ldlt().solve(d));
-  entries_.push_back({stamp, std::min(1.0, squared_sigmas / (gate_ * gate_)), d.squaredNorm()});
-  while (entries_.size() > kMaxScans || std::abs(stamp - entries_.front().stamp) > options_.window)
+  add({stamp, std::min(1.0, squared_sigmas / (gate_ * gate_)), d.squaredNorm()});
+}
+
+void HealthMonitor::add(const Entry& entry) {
+  entries_.push_back(entry);
+  while (entries_.size() > kMaxScans || std::abs(entry.stamp - entries_.front().stamp) > options_.window)
     entries_.pop_front();
 }
 
@@ -108,9 +112,16 @@ Health HealthMonitor::judge(Time now, const NavigationState& state) {
 }
 
 void HealthMonitor::widen(NavigationState& state) const {
-  if (!diverged_at_ || entries_.empty()) return;
-  double square = 0.0;
-  for (const Entry& entry : entries_) square += entry.square / static_cast<double>(entries_.size());
+  if (!diverged_at_) return;
+  double sum = 0.0;
+  double count = 0.0;
+  for (const Entry& entry : entries_) {
+    if (!entry.square) continue;
+    sum += *entry.square;
+    count += 1.0;
+  }
+  if (count == 0.0) return;
+  const double square = sum / count;
   const double seconds = std::max(1.0, entries_.back().stamp - contradicted_since_);
   const auto add = [&](int first, double variance) {
     state.covariance.diagonal().segment<3>(first).array() += variance;

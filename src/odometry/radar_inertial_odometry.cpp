@@ -32,6 +32,13 @@ constexpr double kMaxTiltSigma = 0.1;
 constexpr double kSilentStep = 5.0;
 constexpr double kLateScan = 1.0;
 
+/// How many of `some` are not in `others`; both ascend.
+std::size_t countOthers(const std::vector<std::size_t>& some, const std::vector<std::size_t>& others) {
+  return static_cast<std::size_t>(std::count_if(some.begin(), some.end(), [&](std::size_t index) {
+    return !std::binary_search(others.begin(), others.end(), index);
+  }));
+}
+
 /// As made anew, but with the memory of its lists.
 void clear(ScanResult& result) {
   std::vector<std::size_t> inliers = std::move(result.ego_velocity.inliers);
@@ -283,7 +290,9 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
   // An offset that is wrong by c shows as (J + noise) c; nothing else tells of the noise's part.
   if (informs_offset) measured.covariance.diagonal().array() += prediction->rate_variance;
   if (!informs_offset) held_t_O = prediction ? prediction->t_O : smoother.newest().t_O;
-  if (prediction && tilt_is_known && informs_offset && options.smoother.estimate_time_offset &&
+  // Of a minority that sides with the prediction the noise is larger than its covariance says.
+  if (prediction && tilt_is_known && informs_offset && speaksForItself(measured) &&
+      options.smoother.estimate_time_offset &&
       offset_monitor.stepped(scan.stamp, measured.v_R - prediction->velocity.v_R,
                              prediction->covariance_at_offset + measured.covariance, prediction->dv_dt_O)) {
     smoother.loosenTimeOffset(scan.stamp);
@@ -496,9 +505,14 @@ void RadarInertialOdometry::Impl::judgePrediction(const RadarScan& scan, const V
   if (!speaksForItself(measured))
     ego_velocity_estimator.estimate(scan, std::nullopt, &ego_velocity_workspace, &velocity_alone);
   const EgoVelocity& alone = speaksForItself(measured) ? measured : velocity_alone;
-  if (!speaksForItself(alone)) return;
-  recovery.add(scan.stamp, alone);
-  health_monitor.addInnovation(scan.stamp, alone.v_R - prior.v_R, innovation_gate.covariance(prior, alone));
+  if (!speaksForItself(alone)) return health_monitor.addUndecided(scan.stamp);
+  // A crowd may outnumber the static world. What then sides with the prediction alone is its witness: noise
+  // does not give so many of them.
+  const bool is_outvoted = countOthers(measured.inliers, alone.inliers) >= options.ego_velocity.min_inliers;
+  if (is_outvoted && !isValid(measured.status)) return health_monitor.addUndecided(scan.stamp);
+  const EgoVelocity& judge = is_outvoted ? measured : alone;
+  if (!is_outvoted) recovery.add(scan.stamp, alone);
+  health_monitor.addInnovation(scan.stamp, judge.v_R - prior.v_R, innovation_gate.covariance(prior, judge));
 }
 
 NavigationState RadarInertialOdometry::Impl::newestState(const NodeMatrix& covariance) const {

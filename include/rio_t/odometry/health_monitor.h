@@ -45,6 +45,8 @@ class HealthMonitor {
   /// A scan that by itself has a velocity most of its points agree on, against its prediction: innovation d
   /// [m/s] and its covariance S [m^2/s^2].
   void addInnovation(Time stamp, const Eigen::Vector3d& d, const Eigen::Matrix3d& S);
+  /// A scan the points of which do not agree, or side with the prediction: it contradicts nothing.
+  void addUndecided(Time stamp) { add({stamp, 0.0, std::nullopt}); }
   /// The window was updated at `time`.
   void updated(Time time) { last_update_ = time; }
   /// The time offset was found to have stepped, which explains what contradicted so far; once in a while.
@@ -66,8 +68,9 @@ class HealthMonitor {
   struct Entry {
     Time stamp;
     double contradiction = 0.0;  ///< 0..1
-    double square = 0.0;         ///< d'd [m^2/s^2]
+    std::optional<double> square;  ///< d'd [m^2/s^2]; none where the scan has no velocity
   };
+  void add(const Entry& entry);
   /// Mean over the window; none before it is full.
   std::optional<double> contradiction() const;
 
