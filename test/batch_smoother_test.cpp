@@ -83,7 +83,7 @@ class Batch : public ::testing::Test {
   BatchProblem problem(const SmootherOptions& options) const {
     BatchProblem problem;
     problem.start = motion.time(0.5);
-    problem.prior = priorAtRest(options, motion.state(0.5), 1e-4);
+    problem.prior = priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0);
     problem.guess = {{problem.start, motion.state(0.5), options.time_offset_initial}};
     return problem;
   }

@@ -134,7 +134,7 @@ class Smoother : public ::testing::Test {
 
   FixedLagSmoother make(SmootherOptions options) const {
     FixedLagSmoother smoother(options, ImuNoise(), motion.g_W, imu);
-    smoother.initialize(motion.time(0.5), priorAtRest(options, motion.state(0.5), 1e-4));
+    smoother.initialize(motion.time(0.5), priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0));
     return smoother;
   }
 

@@ -26,6 +26,7 @@ ImuGate::Verdict ImuGate::check(ImuMeasurement& imu) {
       verdict = {Decision::kRestart, {"imu_clock_restart"}};
       newest_.reset();
       bridge_.reset();
+      gyro_axes_ = {};
       break;
   }
   const double gap = newest_ ? imu.time - *newest_ : 0.0;
@@ -41,7 +42,12 @@ ImuGate::Verdict ImuGate::check(ImuMeasurement& imu) {
   if (saturated.gyro || was_saturated_.gyro) doubtGyro(imu, 1.0);
   if (saturated.accel || was_saturated_.accel) doubtAccel(imu, 1.0);
   was_saturated_ = saturated;
-  if (saturated.accel || saturated.gyro) {
+  const bool is_stuck = replaceStuck(imu);
+  if (is_stuck) {
+    verdict.faults.push_back("imu_stuck");
+    doubtGyro(imu, 1.0);
+  }
+  if (saturated.accel || saturated.gyro || is_stuck) {
     accel_noise_.interrupt();
     gyro_noise_.interrupt();
   } else {
@@ -53,6 +59,17 @@ ImuGate::Verdict ImuGate::check(ImuMeasurement& imu) {
   if (gap > max_gap_) verdict.bridge = bridge_.until(imu);
   bridge_.follow(imu);
   return verdict;
+}
+
+bool ImuGate::replaceStuck(ImuMeasurement& imu) {
+  bool is_stuck = false;
+  for (int k = 0; k < 3; ++k) {
+    const std::optional<double> likely = gyro_axes_[static_cast<std::size_t>(k)].check(imu.time, imu.angular_velocity[k]);
+    if (!likely) continue;
+    imu.angular_velocity[k] = *likely;
+    is_stuck = true;
+  }
+  return is_stuck;
 }
 
 void ImuGate::doubtGyro(ImuMeasurement& imu, double share) const {

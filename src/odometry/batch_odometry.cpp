@@ -48,11 +48,14 @@ void BatchOdometry::addResult(ScanResult result, bool offset_stepped) {
   if (!result.used && result.rejected_because.empty()) return;  // only carries the last poses
   result.scan.points = {};
   result.left_window.clear();
+  variance_factor_ = result.variance_factor;
   scans_.push_back({std::move(result), offset_stepped});
 }
 
 BatchResult BatchOdometry::solve(const RadarInertialOdometry::Start& start) const {
-  const BatchSmoother smoother(options_.smoother, batch_, options_.imu_noise, g_W_, imu_);
+  ImuNoise noise = options_.imu_noise;
+  noise.accel_density *= std::sqrt(variance_factor_);
+  const BatchSmoother smoother(options_.smoother, batch_, noise, g_W_, imu_);
   Run run = makeRun(start, smoother);
   if (run.problem.scans.empty()) throw std::runtime_error("batch: the online run used no scan");
   BatchResult batch;
@@ -65,7 +68,7 @@ BatchResult BatchOdometry::solve(const RadarInertialOdometry::Start& start) cons
     batch.solution.iterations += iterations;
   }
   batch.trajectory = trajectory(batch.solution);
-  batch.scans = results(run, smoother, batch.solution);
+  batch.scans = results(run, batch.solution);
   return batch;
 }
 
@@ -74,6 +77,8 @@ RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) co
   z.stamp = result.scan.stamp;
   z.v_R = result.ego_velocity.v_R;
   z.covariance = result.ego_velocity.covariance;
+  if (result.ego_velocity.status == EgoVelocityStatus::kMoving)
+    z.covariance *= variance_factor_ / result.variance_factor;
   z.R_RI = options_.T_IR.q_IR.conjugate().toRotationMatrix();
   z.l_I = options_.T_IR.l_I;
   return z;
@@ -198,24 +203,7 @@ std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solu
   return states;
 }
 
-VarianceFactor BatchOdometry::varianceFactor(const Run& run, const BatchSmoother& smoother,
-                                             const BatchSolution& solution) const {
-  VarianceFactor factor;
-  for (std::size_t j = 0; j < run.problem.scans.size(); ++j) {
-    const std::optional<RadarVelocityMeasurement>& z = run.problem.scans[j].velocity;
-    if (!z || z->held_t_O) continue;
-    const std::size_t k = solution.node_of_scan[j];
-    const auto residual = smoother.residual(solution.nodes[k], solution.covariances[k], *z);
-    // The solution has been drawn towards z: what is left scatters less than z does.
-    const Eigen::Matrix3d S = z->covariance - residual.prediction_covariance;
-    factor.add(residual.value.dot(S.ldlt().solve(residual.value)));
-  }
-  return factor;
-}
-
-std::vector<ScanResult> BatchOdometry::results(const Run& run, const BatchSmoother& smoother,
-                                               const BatchSolution& solution) const {
-  const double factor = varianceFactor(run, smoother, solution).value();
+std::vector<ScanResult> BatchOdometry::results(const Run& run, const BatchSolution& solution) const {
   std::vector<ScanResult> results;
   for (const Scan& scan : scans_) {
     results.push_back(scan.result);
@@ -233,7 +221,7 @@ std::vector<ScanResult> BatchOdometry::results(const Run& run, const BatchSmooth
     result.state = navigationState(solution.nodes[k], P, imu_);
     result.time_offset = solution.nodes[k].t_O;
     result.time_offset_sigma =
-        options_.smoother.estimate_time_offset ? std::sqrt(factor * P(kState, kState)) : 0.0;
+        options_.smoother.estimate_time_offset ? std::sqrt(P(kState, kState)) : 0.0;
   }
   std::vector<std::size_t> order(results.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;

@@ -33,10 +33,11 @@ std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, con
       x.q_WI() = rest->q_WI;
       x.b_g() = rest->b_g;
       x.b_a() = rest->b_a;
-      // A mean over T seconds leaves density / sqrt(T), besides what the bias does by itself.
-      const double gyro_bias_sigma = options_.imu_noise.gyro_density / std::sqrt(rest->duration);
-      return Initialization{rest->time, priorAtRest(options_.smoother, x, gyro_bias_sigma),
-                            InitializedFrom::kRest};
+      return Initialization{
+          rest->time,
+          priorAtRest(options_.smoother, options_.imu_noise, x, options_.gravity, rest->duration),
+          InitializedFrom::kRest,
+          {}};
     }
   }
   if (!mayStartInMotion()) return std::nullopt;
@@ -45,7 +46,7 @@ std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, con
   origin.sigma_position = options_.smoother.prior_sigma_position;
   const std::optional<MotionInitialization> motion = motion_.solve(imu, [&](Time) { return origin; });
   if (!motion) return std::nullopt;
-  return Initialization{motion->time, motion->prior, InitializedFrom::kMotion};
+  return Initialization{motion->time, motion->prior, InitializedFrom::kMotion, motion->variance_factor};
 }
 
 std::string Initializer::waitingFor() const {

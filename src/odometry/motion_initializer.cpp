@@ -22,6 +22,7 @@ constexpr double kMaxLatency = 1.0;           // [s] of a scan, that the IMU is 
 constexpr int kMaxIterations = 15;
 constexpr double kConverged = 1.0e-4;  // [sigma]
 constexpr double kOutlier = 4.0;       // [sigma]
+constexpr double kUnknowns = 7.0;  // that the velocities determine: velocity, gravity in I, t_O
 
 std::string format(const char* text, double value, double limit) {
   char line[200];
@@ -126,7 +127,12 @@ std::optional<MotionInitialization> MotionInitializer::solve(
     set(StateBlock::kBg, options_.sigma_gyro_bias);
     set(StateBlock::kBa, options_.sigma_accel_bias);
     result.prior.J(StateBlock::kTangent, StateBlock::kTangent) = 1.0 / smoother_.time_offset_sigma;
-    outliers = refine(window, time, imu, result.prior);
+    const NodePrior known = result.prior;
+    outliers = refine(window, time, imu, 1.0, result.prior, &result.variance_factor);
+    if (outliers <= options_.max_outlier_fraction) {
+      result.prior = known;
+      refine(window, time, imu, result.variance_factor.value(), result.prior, nullptr);
+    }
     if (outliers <= options_.max_outlier_fraction) {
       waiting_for_.clear();
       clear();
@@ -196,24 +202,27 @@ MotionInitializer::Line MotionInitializer::fitLine(const Velocities& velocities,
 }
 
 double MotionInitializer::refine(const Velocities& velocities, Time time, const ImuBuffer& imu,
-                                 NodePrior& prior) const {
+                                 double factor, NodePrior& prior, VarianceFactor* found) const {
   const PriorFactor known(prior);
   StateBlock x = prior.x0;
   double t_O = prior.t_O0;
   NodeInformation information;
+  const double n = static_cast<double>(velocities.size());
   double outliers = 1.0;
+  double mean_square = 0.0;
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
     const double* blocks[] = {x.data(), &t_O};
     ChainSystem system(1);
     system.addStateAndOffset(0, known, x.data(), &t_O, nullptr, false);
     information = {system.diagonal[0], system.gradient[0]};
     outliers = 0.0;
+    mean_square = 0.0;
     for (RadarVelocityMeasurement z : velocities) {
       // What the IMU adds over the way from the state: noise of the accelerometer, and of the tilt.
       const double T = std::abs(z.stamp - time);
       const double tilt = noise_.gyro_density * g_W_.norm();
       const double added = noise_.accel_density * noise_.accel_density * T + tilt * tilt * T * T * T / 3.0;
-      const Eigen::Matrix3d covariance = z.covariance + added * Eigen::Matrix3d::Identity();
+      const Eigen::Matrix3d covariance = factor * (z.covariance + added * Eigen::Matrix3d::Identity());
       z.covariance.setIdentity();
       const Time tau = z.stamp - t_O;
       const VelocityRate rate = velocityRate(imu, tau, carried(x, time, tau, imu, g_W_), g_W_, z.l_I);
@@ -228,7 +237,8 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
       J << J_x.leftCols<3>(), J_x.rightCols<StateBlock::kTangent - 3>(), J_t;
       const Eigen::Matrix<double, 3, kNodeTangent> weighted_J = covariance.ldlt().solve(J);
       const double distance = std::sqrt(e.dot(covariance.ldlt().solve(e)));
-      if (distance > kOutlier) outliers += 1.0 / static_cast<double>(velocities.size());
+      if (distance > kOutlier) outliers += 1.0 / n;
+      mean_square += std::min(distance, kOutlier) * std::min(distance, kOutlier) / n;
       const double huber = smoother_.huber_threshold;
       const double weight = huber > 0.0 && distance > huber ? huber / distance : 1.0;
       information.S += weight * J.transpose() * weighted_J;
@@ -241,6 +251,11 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
     t_O = std::clamp(t_O + step[StateBlock::kTangent], -smoother_.max_time_offset, smoother_.max_time_offset);
   }
   prior = priorFromInformation(information, x, t_O);
+  if (found != nullptr) {
+    // The solution is drawn towards the velocities: what is left scatters less.
+    const double left = 3.0 * n / (3.0 * n - kUnknowns);
+    for (std::size_t i = 0; i < velocities.size(); ++i) found->add(time, left * mean_square);
+  }
   return outliers;
 }
 

@@ -12,6 +12,7 @@
 #include "rio_t/odometry/navigator.h"
 #include "rio_t/odometry/offset_uncertainty.h"
 #include "rio_t/odometry/pose_doubt.h"
+#include "rio_t/odometry/variance_factor.h"
 #include "rio_t/odometry/yaw_doubt.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
 
@@ -87,6 +88,8 @@ struct RadarInertialOdometry::Impl {
   void publishNewest();
   void judgePrediction(const RadarScan& scan, const VelocityPrior& prior, const EgoVelocity& measured);
   bool isAtRest(Time time) const;
+  /// With the noise that the scans before show.
+  void measureAt(const RadarScan& scan, const std::optional<VelocityPrior>& prior, EgoVelocity& measured);
   /// Empty, or why the scan has no velocity to use; and the offset that it holds on to, where it tells none.
   std::string measureVelocity(const RadarScan& scan, bool at_rest, EgoVelocity& measured,
                               std::optional<double>& held_t_O);
@@ -96,6 +99,7 @@ struct RadarInertialOdometry::Impl {
   void finishScan(RadarScan& scan, bool imu_has_ended);
   void useScan(const RadarScan& scan, bool imu_has_ended);
   void updateWindow();
+  ImuNoise imuNoise() const;  ///< likewise
   NavigationState newestState(const NodeMatrix& covariance) const;
 
   const OdometryOptions options;
@@ -127,6 +131,7 @@ struct RadarInertialOdometry::Impl {
   FeasibilityCheck feasibility;
   OffsetMonitor offset_monitor;
   OffsetUncertainty offset_uncertainty;
+  VarianceFactor variance_factor;
   InnovationGate innovation_gate;
   HealthMonitor health_monitor;
   FixedLagSmoother smoother;
@@ -240,14 +245,17 @@ void RadarInertialOdometry::Impl::useScan(const RadarScan& scan, bool imu_has_en
     return reject("before_initialization");
   }
 
+  // First of all: a new start may move the offset, and with it the time of measurement.
+  if (health_monitor.wantsReinitialization(imu.newest()))
+    result.reinitialized = tryReinitialize(result.left_window);
   const Time node_time = smoother.nodeTime(scan.stamp);
   if (node_time < initialized_at) return reject("before_initialization");
   if (node_time - imu.newest() > max_stamp_ahead) return reject("stamp_ahead_of_imu");
   if (!imu.covers(imu_has_ended ? node_time : node_time + kImuMargin))
     return reject(imu_has_ended ? "imu_not_covering" : "older_than_window");
 
-  if (health_monitor.wantsReinitialization(imu.newest()))
-    result.reinitialized = tryReinitialize(result.left_window);
+  result.variance_factor = variance_factor.value();
+  smoother.setImuNoise(imuNoise());
   const bool at_rest = isAtRest(node_time);
   std::optional<double> held_t_O;
   result.rejected_because = measureVelocity(scan, at_rest, result.ego_velocity, held_t_O);
@@ -268,6 +276,18 @@ void RadarInertialOdometry::Impl::useScan(const RadarScan& scan, bool imu_has_en
   if (!result.updated && health_monitor.health() == Health::kDiverged) publishNewest();
 }
 
+void RadarInertialOdometry::Impl::measureAt(const RadarScan& scan, const std::optional<VelocityPrior>& prior,
+                                            EgoVelocity& measured) {
+  ego_velocity_estimator.estimate(scan, prior, &ego_velocity_workspace, &measured);
+  if (measured.status == EgoVelocityStatus::kMoving) measured.covariance *= variance_factor.value();
+}
+
+ImuNoise RadarInertialOdometry::Impl::imuNoise() const {
+  ImuNoise noise = options.imu_noise;
+  noise.accel_density *= std::sqrt(variance_factor.value());
+  return noise;
+}
+
 std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, bool at_rest,
                                                          EgoVelocity& measured,
                                                          std::optional<double>& held_t_O) {
@@ -280,8 +300,7 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
   }
   const bool tilt_is_known = !prediction || prediction->tilt_sigma < kMaxTiltSigma;
   const bool heed_prior = health_monitor.health() != Health::kDiverged;
-  ego_velocity_estimator.estimate(scan, heed_prior ? prior : std::nullopt, &ego_velocity_workspace,
-                                  &measured);
+  measureAt(scan, heed_prior ? prior : std::nullopt, measured);
   if (prior) judgePrediction(scan, *prior, measured);
   if (!isValid(measured.status)) return toString(measured.status);
   if (!feasibility.accept(scan.stamp, measured.v_R)) return "infeasible_velocity";
@@ -301,9 +320,11 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
     faults.count("time_offset_step");
   }
   if (prior && innovation_gate.rejects(scan.stamp, *prior, measured, tilt_is_known)) return "innovation";
-  if (prediction && informs_offset && tilt_is_known) {
-    offset_uncertainty.add(scan.stamp, measured.v_R - prediction->velocity.v_R,
-                           prediction->velocity.covariance + measured.covariance, prediction->dv_dt_O);
+  if (prediction && moving && tilt_is_known && speaksForItself(measured)) {
+    const Eigen::Vector3d d = measured.v_R - prediction->velocity.v_R;
+    const Eigen::Matrix3d S = prediction->velocity.covariance + measured.covariance;
+    if (informs_offset) offset_uncertainty.add(scan.stamp, d, S, prediction->dv_dt_O);
+    variance_factor.add(scan.stamp, result.variance_factor * d.dot(S.ldlt().solve(d)));
   }
   return "";
 }
@@ -385,6 +406,7 @@ void RadarInertialOdometry::Impl::startAgain() {
   feasibility = FeasibilityCheck(options.feasibility);
   offset_monitor = OffsetMonitor(options.offset_monitor);
   offset_uncertainty = OffsetUncertainty(options.smoother.huber_threshold);
+  variance_factor = VarianceFactor();
   smoother = emptySmoother();
   left_in_silence.clear();
   recovery.clear();
@@ -419,13 +441,16 @@ void RadarInertialOdometry::Impl::carryWindow() {
 void RadarInertialOdometry::Impl::anchorNavigator(const NavigationState& state) {
   const std::lock_guard<std::mutex> lock(navigation_mutex);
   // Else the navigator lives already in another time.
-  if (clock_restarts == clock_restarts_done) navigator.anchor(state);
+  if (clock_restarts != clock_restarts_done) return;
+  navigator.setNoise(imuNoise());
+  navigator.anchor(state);
 }
 
 void RadarInertialOdometry::Impl::tryInitialize(const ImuMeasurement& sample) {
   const std::optional<Initialization> found = initializer.add(sample, imu);
   if (found) {
     start = found;
+    variance_factor = found->variance_factor;
     begin(found->time, found->prior);
   } else {
     imu.dropBefore(sample.time - initializer.imuHistory());
@@ -456,6 +481,7 @@ bool RadarInertialOdometry::Impl::tryReinitialize(std::vector<StampedPose>& left
     if (node.time < found->time) left.push_back({node.time, node.x.p_W(), node.x.q_WI()});
   }
   pose_doubt = PoseDoubt(newestState(smoother.newestCovariance()));
+  variance_factor = found->variance_factor;
   begin(found->time, found->prior);
   offset_monitor = OffsetMonitor(options.offset_monitor);
   updateHealth();
@@ -503,7 +529,7 @@ void RadarInertialOdometry::Impl::judgePrediction(const RadarScan& scan, const V
                                                   const EgoVelocity& measured) {
   // Where few points agree, they may be those that side with a wrong prediction: what says the scan alone?
   if (!speaksForItself(measured))
-    ego_velocity_estimator.estimate(scan, std::nullopt, &ego_velocity_workspace, &velocity_alone);
+    measureAt(scan, std::nullopt, velocity_alone);
   const EgoVelocity& alone = speaksForItself(measured) ? measured : velocity_alone;
   if (!speaksForItself(alone)) return health_monitor.addUndecided(scan.stamp);
   // A crowd may outnumber the static world. What then sides with the prediction alone is its witness: noise

@@ -301,8 +301,6 @@ void listSmoother(ParameterList& list, Config& c) {
               "per axis, added to that prediction in the gate only: what extrinsics and IMU scale are wrong");
   list.number("innovation_gate_timeout", "s", above(0), smoother.innovation_gate_timeout,
               "without a scan used, after which the next is taken all the same");
-  list.number("prior_sigma_orientation", "rad", above(0), smoother.prior_sigma_orientation,
-              "of the first state: roll and pitch");
   list.number("prior_sigma_yaw", "rad", above(0), smoother.prior_sigma_yaw,
               "of the first state; yaw defines the world frame");
   list.number("prior_sigma_position", "m", above(0), smoother.prior_sigma_position,

@@ -25,6 +25,11 @@ FixedLagSmoother::FixedLagSmoother(const SmootherOptions& options, const ImuNois
     window_.loss = std::make_unique<ceres::HuberLoss>(options_.huber_threshold);
 }
 
+void FixedLagSmoother::setImuNoise(const ImuNoise& noise) {
+  noise_ = noise;
+  last_preintegration_ = {};
+}
+
 void FixedLagSmoother::initialize(Time time, const NodePrior& prior) {
   window_.prior = std::make_unique<PriorFactor>(prior);
   window_.nodes.clear();

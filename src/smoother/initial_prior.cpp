@@ -2,26 +2,39 @@
 
 #include <cmath>
 
+#include "rio_t/core/so3.h"
+#include "rio_t/smoother/chain.h"
+
 namespace rio_t {
 
-NodePrior priorAtRest(const SmootherOptions& options, const StateBlock& x, double gyro_bias_sigma) {
-  NodePrior prior;
-  prior.x0 = x;
-  prior.t_O0 = options.time_offset_initial;
-  const Eigen::Vector3d sigma_W(options.prior_sigma_orientation, options.prior_sigma_orientation,
-                                options.prior_sigma_yaw);
-  // theta lives in I, the sigmas are given in W.
-  prior.J.block<3, 3>(StateBlock::kTheta, StateBlock::kTheta) =
-      sigma_W.cwiseInverse().asDiagonal() * x.q_WI().toRotationMatrix();
-  const auto set = [&](int first, double sigma) {
-    prior.J.diagonal().segment<3>(first).setConstant(1.0 / sigma);
+NodePrior priorAtRest(const SmootherOptions& options, const ImuNoise& noise, const StateBlock& x,
+                      double gravity, double duration) {
+  using S = StateBlock;
+  NodeInformation known;
+  const auto add = [&](const Eigen::MatrixXd& rows, int first, double sigma) {
+    known.S.block(first, first, rows.cols(), rows.cols()) += rows.transpose() * rows / (sigma * sigma);
   };
-  set(StateBlock::kP, options.prior_sigma_position);
-  set(StateBlock::kV, options.prior_sigma_velocity);
-  set(StateBlock::kBg, std::hypot(options.prior_sigma_gyro_bias, gyro_bias_sigma));
-  set(StateBlock::kBa, options.prior_sigma_accel_bias);
-  prior.J(StateBlock::kTangent, StateBlock::kTangent) = 1.0 / options.time_offset_sigma;
-  return prior;
+  const auto addVector = [&](int first, double sigma) { add(Eigen::Matrix3d::Identity(), first, sigma); };
+
+  // Theta lives in I, yaw is about the vertical of W.
+  const Eigen::Matrix3d R_WI = x.q_WI().toRotationMatrix();
+  add(R_WI.row(2), S::kTheta, options.prior_sigma_yaw);
+  addVector(S::kP, options.prior_sigma_position);
+  addVector(S::kV, options.prior_sigma_velocity);
+  // A mean over T seconds leaves density / sqrt(T), besides what the bias does by itself.
+  const double root_T = std::sqrt(duration);
+  addVector(S::kBg, std::hypot(options.prior_sigma_gyro_bias, noise.gyro_density / root_T));
+  addVector(S::kBa, options.prior_sigma_accel_bias);
+  known.S(S::kTangent, S::kTangent) = 1.0 / (options.time_offset_sigma * options.time_offset_sigma);
+
+  // The mean accelerometer, R_IW (0, 0, g) + b_a: also the platform may have gained velocity meanwhile.
+  const double gained = std::sqrt(2.0) * options.prior_sigma_velocity / duration;
+  const double sigma = std::hypot(noise.accel_density / root_T, gained);
+  Eigen::Matrix<double, 3, S::kTangent> J = Eigen::Matrix<double, 3, S::kTangent>::Zero();
+  J.middleCols<3>(S::kTheta) = so3::hat(gravity * R_WI.row(2).transpose());
+  J.middleCols<3>(S::kBa).setIdentity();
+  add(J, 0, sigma);
+  return priorFromInformation(known, x, options.time_offset_initial);
 }
 
 }  // namespace rio_t

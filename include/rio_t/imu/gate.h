@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "rio_t/imu/gap_bridge.h"
@@ -7,6 +8,7 @@
 #include "rio_t/imu/noise_meter.h"
 #include "rio_t/imu/saturation_detector.h"
 #include "rio_t/imu/stamp_watch.h"
+#include "rio_t/imu/stuck_axis_detector.h"
 
 namespace rio_t {
 
@@ -37,7 +39,7 @@ class ImuGate {
   struct Verdict {
     Decision decision = Decision::kTake;
     /// Snake case: "imu_not_finite", "imu_out_of_order", "imu_stamp_jump", "imu_clock_restart", "imu_gap",
-    /// "imu_saturated".
+    /// "imu_saturated", "imu_stuck".
     std::vector<const char*> faults = {};
     /// To be taken first: stands for what a gap before this sample hid.
     std::vector<ImuMeasurement> bridge = {};
@@ -45,10 +47,12 @@ class ImuGate {
 
   /// `max_gap` [s] between samples: a longer one is reported, and what it hides is doubted.
   ImuGate(double max_gap, const ImuGateOptions& options);
-  /// Sets the doubts and the noise of `imu` where it is taken.
+  /// Sets the doubts and the noise of `imu` where it is taken, and replaces what a stuck axis reads.
   Verdict check(ImuMeasurement& imu);
 
  private:
+  /// Replaces the readings of axes that are stuck; whether there were any.
+  bool replaceStuck(ImuMeasurement& imu);
   void doubtGyro(ImuMeasurement& imu, double share) const;
   void doubtAccel(ImuMeasurement& imu, double share) const;
 
@@ -56,6 +60,7 @@ class ImuGate {
   ImuGateOptions options_;
   StampWatch stamps_;
   SaturationDetector saturation_;
+  std::array<StuckAxisDetector, 3> gyro_axes_;
   GapBridge bridge_;
   NoiseMeter accel_noise_, gyro_noise_;
   std::optional<Time> newest_;

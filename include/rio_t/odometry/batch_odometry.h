@@ -7,7 +7,6 @@
 
 #include "rio_t/imu/gate.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
-#include "rio_t/odometry/variance_factor.h"
 #include "rio_t/smoother/batch_smoother.h"
 
 namespace rio_t {
@@ -63,15 +62,12 @@ class BatchOdometry {
                      const RadarVelocityMeasurement& z, const EgoVelocity& measured) const;
   bool isAtRest(const NodeEstimate& node) const;
   std::vector<NavigationState> trajectory(const BatchSolution& solution) const;
-  std::vector<ScanResult> results(const Run& run, const BatchSmoother& smoother,
-                                  const BatchSolution& solution) const;
-  /// How the velocities that tell the offset scatter around the solution.
-  VarianceFactor varianceFactor(const Run& run, const BatchSmoother& smoother,
-                                const BatchSolution& solution) const;
+  std::vector<ScanResult> results(const Run& run, const BatchSolution& solution) const;
 
   OdometryOptions options_;  // read-only after construction
   BatchOptions batch_;       // read-only after construction
   Eigen::Vector3d g_W_;      // read-only after construction
+  double variance_factor_ = 1.0;  ///< of the online run at its end
   ImuGate imu_gate_;
   ImuBuffer imu_;
   std::vector<Scan> scans_;

@@ -10,6 +10,7 @@
 #include "rio_t/factors/radar_velocity_factor.h"
 #include "rio_t/imu/buffer.h"
 #include "rio_t/imu/noise.h"
+#include "rio_t/odometry/variance_factor.h"
 #include "rio_t/radar/ego_velocity.h"
 #include "rio_t/smoother/options.h"
 
@@ -40,6 +41,7 @@ struct PoseAnchor {
 struct MotionInitialization {
   Time time;        ///< of the state: the newest velocity's stamp
   NodePrior prior;  ///< the state, t_O and what is known of them, correlations included
+  VarianceFactor variance_factor;  ///< of the velocities around it
 };
 
 /// Finds the first state of a platform that never rests, from some seconds of radar velocities and IMU
@@ -82,9 +84,11 @@ class MotionInitializer {
     Eigen::Vector3d g_I, v_I;
   };
   Line fitLine(const Velocities& velocities, Time time, const ImuBuffer& imu) const;
-  /// Improves `prior.x0` and `prior.t_O0` around which it starts, and adds what the velocities tell. The
-  /// share of outliers.
-  double refine(const Velocities& velocities, Time time, const ImuBuffer& imu, NodePrior& prior) const;
+  /// Improves `prior.x0` and `prior.t_O0` around which it starts, and adds what the velocities tell, with
+  /// their noise and the accelerometer's multiplied by `factor`. The share of outliers; `found` (may be null) gets how the
+  /// velocities scatter around the solution.
+  double refine(const Velocities& velocities, Time time, const ImuBuffer& imu, double factor,
+                NodePrior& prior, VarianceFactor* found) const;
 
   // Read-only after construction.
   MotionInitializerOptions options_;

@@ -21,13 +21,15 @@ class Navigator {
   /// New optimised state, usually some 100 ms before the newest sample: everything since is integrated again.
   /// One more than 30 s old is not taken.
   void anchor(const NavigationState& state);
+  /// Noise of the IMU from here on.
+  void setNoise(const ImuNoise& noise) { noise_ = noise; }
   /// At the newest sample; none before the first anchor.
   const std::optional<NavigationState>& state() const { return state_; }
 
  private:
   void propagate(const ImuMeasurement& from, const ImuMeasurement& to);
 
-  ImuNoise noise_;       // read-only after construction
+  ImuNoise noise_;
   Eigen::Vector3d g_W_;  // read-only after construction
   SlidingQueue<ImuMeasurement> history_;
   std::optional<NavigationState> state_;

@@ -3,14 +3,12 @@
 #include <Eigen/Core>
 
 #include "rio_t/core/time.h"
-#include "rio_t/odometry/variance_factor.h"
 
 namespace rio_t {
 
-/// How far the time offset may be off, by what the scans say and not only by what the options promise
-/// (docs/method.md, section 7): its marginal variance times the variance factor of the innovations, and where
-/// they ask for a change, always the same way, the square of that. So lags an estimate behind an offset that
-/// drifts. Not thread-safe.
+/// How far the time offset may be off (docs/method.md, eq. 32b): its marginal variance, and the square of the
+/// lag, where the scans ask for a change all the time. An estimate lags behind an offset that drifts. Not
+/// thread-safe.
 class OffsetUncertainty {
  public:
   /// `huber_threshold` on d' S^-1 d, as on the radar factors; 0: no robust loss.
@@ -27,7 +25,6 @@ class OffsetUncertainty {
  private:
   double huber_threshold_;  // read-only after construction
   Time last_;
-  VarianceFactor factor_;     ///< of the last minute
   double information_ = 0.0;  ///< sum of J' S^-1 J, fading [1/s^2]
   double spread_ = 0.0;       ///< the same with the squares of the weights that fade
   double projection_ = 0.0;   ///< sum of J' S^-1 d, fading [1/s]

@@ -1,24 +1,25 @@
 #pragma once
 
+#include "rio_t/core/time.h"
+
 namespace rio_t {
 
-/// How the radar's velocities scatter against the noise that the options give them: the variance factor
-/// (variance of unit weight) of adjustment theory, e.g. Mikhail and Ackermann, Observations and Least
-/// Squares, 1976. Those options are a bound on the safe side for one radar and too small for another, and
-/// every marginal covariance follows them.
+/// How far the noise of radar and accelerometer is from what the options say: the variance factor (variance
+/// of unit weight) of adjustment theory, e.g. Mikhail and Ackermann, Observations and Least Squares, 1976.
+/// Both noises are multiplied by it, so that no weight changes against another, but every covariance is what
+/// the scans show. Noise of the gyro, priors and random walks stay as told. Not thread-safe.
 class VarianceFactor {
  public:
-  /// A residual or innovation of 3 axes, and its squared length in its own sigmas: 3 on the mean where the
-  /// options are right.
-  void add(double squared_sigmas);
-  /// Forgets all but this share of what was added.
-  void fade(double share);
-  /// 1 to begin with, and for as long as few were added.
+  /// An innovation of 3 axes at `stamp`, and its squared length in sigmas as if the factor were 1: 3 on the
+  /// mean where the options are right. Old innovations fade.
+  void add(Time stamp, double squared_sigmas);
+  /// 1 to begin with.
   double value() const;
 
  private:
-  double squares_ = 0.0;  ///< sum of squared_sigmas / 3
-  double count_ = 0.0;
+  Time last_;
+  double squares_ = 0.0;  ///< fading sum of squared_sigmas / 3
+  double count_ = 0.0;    ///< the same sum of ones
 };
 
 }  // namespace rio_t

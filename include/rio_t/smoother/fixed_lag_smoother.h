@@ -46,6 +46,8 @@ class FixedLagSmoother {
   FixedLagSmoother(const SmootherOptions& options, const ImuNoise& noise, const Eigen::Vector3d& g_W,
                    const ImuBuffer& imu);
 
+  /// Noise of the IMU from here on.
+  void setImuNoise(const ImuNoise& noise);
   /// Starts (or starts again) with one node at `time`, at the prior's own x0 and t_O0.
   void initialize(Time time, const NodePrior& prior);
 
@@ -102,7 +104,7 @@ class FixedLagSmoother {
   const Preintegration& preintegrateFrom(const WindowNode& node, Time to) const;
   double offsetVariance(double dt) const;  ///< that t_O gains in dt [s] by its random walk [s^2]
 
-  SmootherOptions options_;  // these: read-only after construction
+  SmootherOptions options_;  // read-only after construction, as the next but one and the one after
   ImuNoise noise_;
   Eigen::Vector3d g_W_;
   const ImuBuffer* imu_;

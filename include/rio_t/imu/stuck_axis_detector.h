@@ -1,0 +1,24 @@
+#pragma once
+
+#include <optional>
+
+#include "rio_t/core/time.h"
+
+namespace rio_t {
+
+/// Follows one axis of a gyro and tells a reading that sticks from a fast motion: it jumps away from one
+/// sample to the next, as no mass can, and then repeats itself to the last bit. Not thread-safe.
+class StuckAxisDetector {
+ public:
+  /// Takes a reading [rad/s]. None where it may be used; else what the axis most likely read instead: the
+  /// last good reading, fading with the correlation time of the motion.
+  std::optional<double> check(Time time, double reading);
+
+ private:
+  std::optional<double> good_;  ///< the last reading that was used
+  Time good_at_;
+  std::optional<double> stuck_at_;  ///< the reading that jumped away, while it repeats
+  double usual_jump_ = 0.0;         ///< largest between neighbours lately [rad/s]
+};
+
+}  // namespace rio_t

@@ -1,0 +1,34 @@
+#include "rio_t/imu/stuck_axis_detector.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "rio_t/imu/gap_bridge.h"
+
+namespace rio_t {
+namespace {
+
+/// [rad/s] No platform that carries a radar turns faster by this within a sample: at 100 Hz that is 200
+/// rad/s^2, at 400 Hz 800 rad/s^2, and a hand that shakes with 3 rad/s at 3 Hz reaches 60 rad/s^2.
+constexpr double kSmallestJump = 2.0;
+constexpr double kUnusual = 5.0;       // times the usual jump: a vibrating gyro is not stuck
+constexpr double kForgetting = 0.999;  // of the usual jump, each sample
+
+}  // namespace
+
+std::optional<double> StuckAxisDetector::check(Time time, double reading) {
+  const double jump = good_ ? std::abs(reading - *good_) : 0.0;
+  const bool repeats = stuck_at_ && reading == *stuck_at_;
+  const bool jumps_away = !stuck_at_ && jump > std::max(kSmallestJump, kUnusual * usual_jump_);
+  if (repeats || jumps_away) {
+    stuck_at_ = reading;
+    return *good_ * std::exp(-std::max(0.0, time - good_at_) / kMotionCorrelationTime);
+  }
+  if (!stuck_at_) usual_jump_ = std::max(kForgetting * usual_jump_, jump);
+  stuck_at_.reset();
+  good_ = reading;
+  good_at_ = time;
+  return std::nullopt;
+}
+
+}  // namespace rio_t
