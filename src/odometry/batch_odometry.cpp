@@ -48,13 +48,13 @@ void BatchOdometry::addResult(ScanResult result, bool offset_stepped) {
   if (!result.used && result.rejected_because.empty()) return;  // only carries the last poses
   result.scan.points = {};
   result.left_window.clear();
-  variance_factor_ = result.variance_factor;
+  model_error_scale_ = result.model_error_scale;
   scans_.push_back({std::move(result), offset_stepped});
 }
 
 BatchResult BatchOdometry::solve(const RadarInertialOdometry::Start& start) const {
   ImuNoise noise = options_.imu_noise;
-  noise.accel_density *= std::sqrt(variance_factor_);
+  noise.accel_density *= std::sqrt(model_error_scale_);
   const BatchSmoother smoother(options_.smoother, batch_, noise, g_W_, imu_);
   Run run = makeRun(start, smoother);
   if (run.problem.scans.empty()) throw std::runtime_error("batch: the online run used no scan");
@@ -78,7 +78,8 @@ RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) co
   z.v_R = result.ego_velocity.v_R;
   z.covariance = result.ego_velocity.covariance;
   if (result.ego_velocity.status == EgoVelocityStatus::kMoving)
-    z.covariance *= variance_factor_ / result.variance_factor;
+    z.covariance.diagonal() +=
+        (model_error_scale_ - result.model_error_scale) * options_.ego_velocity.added_sigma.cwiseAbs2();
   z.R_RI = options_.T_IR.q_IR.conjugate().toRotationMatrix();
   z.l_I = options_.T_IR.l_I;
   return z;

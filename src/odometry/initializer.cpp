@@ -46,7 +46,7 @@ std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, con
   origin.sigma_position = options_.smoother.prior_sigma_position;
   const std::optional<MotionInitialization> motion = motion_.solve(imu, [&](Time) { return origin; });
   if (!motion) return std::nullopt;
-  return Initialization{motion->time, motion->prior, InitializedFrom::kMotion, motion->variance_factor};
+  return Initialization{motion->time, motion->prior, InitializedFrom::kMotion, motion->model_error_scale};
 }
 
 std::string Initializer::waitingFor() const {

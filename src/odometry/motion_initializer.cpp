@@ -22,6 +22,7 @@ constexpr double kMaxLatency = 1.0;           // [s] of a scan, that the IMU is 
 constexpr int kMaxIterations = 15;
 constexpr double kConverged = 1.0e-4;  // [sigma]
 constexpr double kOutlier = 4.0;       // [sigma]
+constexpr int kScaleRounds = 3;        // of finding the state and the size of the errors around it
 constexpr double kUnknowns = 7.0;  // that the velocities determine: velocity, gravity in I, t_O
 
 std::string format(const char* text, double value, double limit) {
@@ -44,7 +45,8 @@ MotionInitializer::MotionInitializer(const OdometryOptions& options)
       noise_(options.imu_noise),
       g_W_(0.0, 0.0, -options.gravity),
       R_RI_(options.T_IR.q_IR.conjugate().toRotationMatrix()),
-      l_I_(options.T_IR.l_I) {}
+      l_I_(options.T_IR.l_I),
+      added_variance_(options.ego_velocity.added_sigma.cwiseAbs2()) {}
 
 double MotionInitializer::imuHistory() const {
   return options_.window + 2.0 * smoother_.max_time_offset + kMaxLatency;
@@ -128,10 +130,9 @@ std::optional<MotionInitialization> MotionInitializer::solve(
     set(StateBlock::kBa, options_.sigma_accel_bias);
     result.prior.J(StateBlock::kTangent, StateBlock::kTangent) = 1.0 / smoother_.time_offset_sigma;
     const NodePrior known = result.prior;
-    outliers = refine(window, time, imu, 1.0, result.prior, &result.variance_factor);
-    if (outliers <= options_.max_outlier_fraction) {
+    for (int round = 0; round < kScaleRounds && (round == 0 || outliers <= options_.max_outlier_fraction); ++round) {
       result.prior = known;
-      refine(window, time, imu, result.variance_factor.value(), result.prior, nullptr);
+      outliers = refine(window, time, imu, result.model_error_scale, result.prior);
     }
     if (outliers <= options_.max_outlier_fraction) {
       waiting_for_.clear();
@@ -202,7 +203,7 @@ MotionInitializer::Line MotionInitializer::fitLine(const Velocities& velocities,
 }
 
 double MotionInitializer::refine(const Velocities& velocities, Time time, const ImuBuffer& imu,
-                                 double factor, NodePrior& prior, VarianceFactor* found) const {
+                                 ModelErrorScale& scale, NodePrior& prior) const {
   const PriorFactor known(prior);
   StateBlock x = prior.x0;
   double t_O = prior.t_O0;
@@ -210,6 +211,7 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
   const double n = static_cast<double>(velocities.size());
   double outliers = 1.0;
   double mean_square = 0.0;
+  double mean_share = 0.0;
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
     const double* blocks[] = {x.data(), &t_O};
     ChainSystem system(1);
@@ -217,12 +219,19 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
     information = {system.diagonal[0], system.gradient[0]};
     outliers = 0.0;
     mean_square = 0.0;
+    mean_share = 0.0;
     for (RadarVelocityMeasurement z : velocities) {
       // What the IMU adds over the way from the state: noise of the accelerometer, and of the tilt.
       const double T = std::abs(z.stamp - time);
       const double tilt = noise_.gyro_density * g_W_.norm();
-      const double added = noise_.accel_density * noise_.accel_density * T + tilt * tilt * T * T * T / 3.0;
-      const Eigen::Matrix3d covariance = factor * (z.covariance + added * Eigen::Matrix3d::Identity());
+      const double measured = imu.mean(z.stamp, T).accel_variance;
+      const double told = scale.value() * noise_.accel_density * noise_.accel_density;
+      Eigen::Vector3d scaled = scale.value() * added_variance_;
+      if (told > measured) scaled.array() += told * T;
+      Eigen::Matrix3d covariance = z.covariance;
+      covariance.diagonal() += scaled - added_variance_;
+      covariance.diagonal().array() += tilt * tilt * T * T * T / 3.0 + (told > measured ? 0.0 : measured * T);
+      const Eigen::LDLT<Eigen::Matrix3d> whitening = covariance.ldlt();
       z.covariance.setIdentity();
       const Time tau = z.stamp - t_O;
       const VelocityRate rate = velocityRate(imu, tau, carried(x, time, tau, imu, g_W_), g_W_, z.l_I);
@@ -235,9 +244,10 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
       ImuRadarFactor(z, time, imu, smoother_.max_time_offset, g_W_).Evaluate(blocks, e.data(), jacobians);
       Eigen::Matrix<double, 3, kNodeTangent> J;
       J << J_x.leftCols<3>(), J_x.rightCols<StateBlock::kTangent - 3>(), J_t;
-      const Eigen::Matrix<double, 3, kNodeTangent> weighted_J = covariance.ldlt().solve(J);
-      const double distance = std::sqrt(e.dot(covariance.ldlt().solve(e)));
+      const Eigen::Matrix<double, 3, kNodeTangent> weighted_J = whitening.solve(J);
+      const double distance = std::sqrt(e.dot(whitening.solve(e)));
       if (distance > kOutlier) outliers += 1.0 / n;
+      mean_share += whitening.solve(Eigen::Matrix3d(scaled.asDiagonal())).trace() / (3.0 * n);
       mean_square += std::min(distance, kOutlier) * std::min(distance, kOutlier) / n;
       const double huber = smoother_.huber_threshold;
       const double weight = huber > 0.0 && distance > huber ? huber / distance : 1.0;
@@ -251,11 +261,9 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
     t_O = std::clamp(t_O + step[StateBlock::kTangent], -smoother_.max_time_offset, smoother_.max_time_offset);
   }
   prior = priorFromInformation(information, x, t_O);
-  if (found != nullptr) {
-    // The solution is drawn towards the velocities: what is left scatters less.
-    const double left = 3.0 * n / (3.0 * n - kUnknowns);
-    for (std::size_t i = 0; i < velocities.size(); ++i) found->add(time, left * mean_square);
-  }
+  // The solution is drawn towards the velocities: what is left scatters less.
+  const double left = 3.0 * n / (3.0 * n - kUnknowns);
+  for (std::size_t i = 0; i < velocities.size(); ++i) scale.add(time, left * mean_square, mean_share);
   return outliers;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <Eigen/Cholesky>
 #include <mutex>
 #include <utility>
 
@@ -12,7 +13,7 @@
 #include "rio_t/odometry/navigator.h"
 #include "rio_t/odometry/offset_uncertainty.h"
 #include "rio_t/odometry/pose_doubt.h"
-#include "rio_t/odometry/variance_factor.h"
+#include "rio_t/odometry/model_error_scale.h"
 #include "rio_t/odometry/yaw_doubt.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
 
@@ -131,7 +132,7 @@ struct RadarInertialOdometry::Impl {
   FeasibilityCheck feasibility;
   OffsetMonitor offset_monitor;
   OffsetUncertainty offset_uncertainty;
-  VarianceFactor variance_factor;
+  ModelErrorScale model_error_scale;
   InnovationGate innovation_gate;
   HealthMonitor health_monitor;
   FixedLagSmoother smoother;
@@ -254,7 +255,7 @@ void RadarInertialOdometry::Impl::useScan(const RadarScan& scan, bool imu_has_en
   if (!imu.covers(imu_has_ended ? node_time : node_time + kImuMargin))
     return reject(imu_has_ended ? "imu_not_covering" : "older_than_window");
 
-  result.variance_factor = variance_factor.value();
+  result.model_error_scale = model_error_scale.value();
   smoother.setImuNoise(imuNoise());
   const bool at_rest = isAtRest(node_time);
   std::optional<double> held_t_O;
@@ -279,12 +280,15 @@ void RadarInertialOdometry::Impl::useScan(const RadarScan& scan, bool imu_has_en
 void RadarInertialOdometry::Impl::measureAt(const RadarScan& scan, const std::optional<VelocityPrior>& prior,
                                             EgoVelocity& measured) {
   ego_velocity_estimator.estimate(scan, prior, &ego_velocity_workspace, &measured);
-  if (measured.status == EgoVelocityStatus::kMoving) measured.covariance *= variance_factor.value();
+  if (measured.status == EgoVelocityStatus::kMoving) {
+    measured.covariance.diagonal() +=
+        (model_error_scale.value() - 1.0) * options.ego_velocity.added_sigma.cwiseAbs2();
+  }
 }
 
 ImuNoise RadarInertialOdometry::Impl::imuNoise() const {
   ImuNoise noise = options.imu_noise;
-  noise.accel_density *= std::sqrt(variance_factor.value());
+  noise.accel_density *= std::sqrt(model_error_scale.value());
   return noise;
 }
 
@@ -324,7 +328,12 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
     const Eigen::Vector3d d = measured.v_R - prediction->velocity.v_R;
     const Eigen::Matrix3d S = prediction->velocity.covariance + measured.covariance;
     if (informs_offset) offset_uncertainty.add(scan.stamp, d, S, prediction->dv_dt_O);
-    variance_factor.add(scan.stamp, result.variance_factor * d.dot(S.ldlt().solve(d)));
+    // The state's variance grows about as the root of the accelerometer's.
+    const Eigen::Matrix3d scaled =
+        0.5 * prediction->velocity.covariance +
+        Eigen::Matrix3d((model_error_scale.value() * options.ego_velocity.added_sigma.cwiseAbs2()).asDiagonal());
+    const Eigen::LDLT<Eigen::Matrix3d> weight = S.ldlt();
+    model_error_scale.add(scan.stamp, d.dot(weight.solve(d)), weight.solve(scaled).trace() / 3.0);
   }
   return "";
 }
@@ -406,7 +415,7 @@ void RadarInertialOdometry::Impl::startAgain() {
   feasibility = FeasibilityCheck(options.feasibility);
   offset_monitor = OffsetMonitor(options.offset_monitor);
   offset_uncertainty = OffsetUncertainty(options.smoother.huber_threshold);
-  variance_factor = VarianceFactor();
+  model_error_scale = ModelErrorScale();
   smoother = emptySmoother();
   left_in_silence.clear();
   recovery.clear();
@@ -450,7 +459,7 @@ void RadarInertialOdometry::Impl::tryInitialize(const ImuMeasurement& sample) {
   const std::optional<Initialization> found = initializer.add(sample, imu);
   if (found) {
     start = found;
-    variance_factor = found->variance_factor;
+    model_error_scale = found->model_error_scale;
     begin(found->time, found->prior);
   } else {
     imu.dropBefore(sample.time - initializer.imuHistory());
@@ -481,7 +490,7 @@ bool RadarInertialOdometry::Impl::tryReinitialize(std::vector<StampedPose>& left
     if (node.time < found->time) left.push_back({node.time, node.x.p_W(), node.x.q_WI()});
   }
   pose_doubt = PoseDoubt(newestState(smoother.newestCovariance()));
-  variance_factor = found->variance_factor;
+  model_error_scale = found->model_error_scale;
   begin(found->time, found->prior);
   offset_monitor = OffsetMonitor(options.offset_monitor);
   updateHealth();

@@ -67,7 +67,7 @@ class BatchOdometry {
   OdometryOptions options_;  // read-only after construction
   BatchOptions batch_;       // read-only after construction
   Eigen::Vector3d g_W_;      // read-only after construction
-  double variance_factor_ = 1.0;  ///< of the online run at its end
+  double model_error_scale_ = 1.0;  ///< of the online run at its end
   ImuGate imu_gate_;
   ImuBuffer imu_;
   std::vector<Scan> scans_;

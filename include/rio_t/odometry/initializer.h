@@ -17,7 +17,7 @@ struct Initialization {
   Time time;
   NodePrior prior;
   InitializedFrom from = InitializedFrom::kRest;
-  VarianceFactor variance_factor;  ///< of the velocities that it was found from
+  ModelErrorScale model_error_scale;  ///< of the velocities that it was found from
 };
 
 /// The first state by `init_mode`: from rest where IMU and radar see some, else from motion. Not thread-safe.

@@ -10,7 +10,7 @@
 #include "rio_t/factors/radar_velocity_factor.h"
 #include "rio_t/imu/buffer.h"
 #include "rio_t/imu/noise.h"
-#include "rio_t/odometry/variance_factor.h"
+#include "rio_t/odometry/model_error_scale.h"
 #include "rio_t/radar/ego_velocity.h"
 #include "rio_t/smoother/options.h"
 
@@ -41,7 +41,7 @@ struct PoseAnchor {
 struct MotionInitialization {
   Time time;        ///< of the state: the newest velocity's stamp
   NodePrior prior;  ///< the state, t_O and what is known of them, correlations included
-  VarianceFactor variance_factor;  ///< of the velocities around it
+  ModelErrorScale model_error_scale;  ///< of the velocities around it
 };
 
 /// Finds the first state of a platform that never rests, from some seconds of radar velocities and IMU
@@ -85,10 +85,10 @@ class MotionInitializer {
   };
   Line fitLine(const Velocities& velocities, Time time, const ImuBuffer& imu) const;
   /// Improves `prior.x0` and `prior.t_O0` around which it starts, and adds what the velocities tell, with
-  /// their noise and the accelerometer's multiplied by `factor`. The share of outliers; `found` (may be null) gets how the
-  /// velocities scatter around the solution.
-  double refine(const Velocities& velocities, Time time, const ImuBuffer& imu, double factor,
-                NodePrior& prior, VarianceFactor* found) const;
+  /// model errors of that `scale`, which is improved by what the velocities scatter around the solution. The
+  /// share of outliers.
+  double refine(const Velocities& velocities, Time time, const ImuBuffer& imu, ModelErrorScale& scale,
+                NodePrior& prior) const;
 
   // Read-only after construction.
   MotionInitializerOptions options_;
@@ -97,6 +97,7 @@ class MotionInitializer {
   Eigen::Vector3d g_W_;
   Eigen::Matrix3d R_RI_;
   Eigen::Vector3d l_I_;
+  Eigen::Vector3d added_variance_;  ///< of a velocity, in its covariance [m^2/s^2]
 
   Velocities velocities_;  // by stamp
   std::optional<Time> tried_at_;

@@ -21,7 +21,7 @@ struct ScanResult {
   RadarScan scan;  ///< as fed
   EgoVelocity ego_velocity;
   bool used = false;             ///< its velocity went into the window
-  double variance_factor = 1.0;  ///< by which the covariance of a moving ego_velocity is multiplied
+  double model_error_scale = 1.0;  ///< see ModelErrorScale; in the covariance of ego_velocity
   std::string rejected_because;  ///< snake case, empty where used; keys of `scans_rejected`
 
   /// The window was solved again: the scan was used, or the platform is at rest. What follows is set only

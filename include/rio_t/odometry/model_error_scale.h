@@ -1,0 +1,26 @@
+#pragma once
+
+#include "rio_t/core/time.h"
+
+namespace rio_t {
+
+/// How large the errors of the models are, against what the options say. Noise is measured (NoiseMeter,
+/// PointNoise); what is left is scale and misalignment of the IMU and what the points of a scan share: the
+/// squares of `imu_accel_noise_density` and `ego_velocity_added_sigma`. Both are multiplied by this factor,
+/// such that the innovations of the radar are as large as their covariances say: the variance factor of
+/// adjustment theory (Mikhail and Ackermann, Observations and Least Squares, 1976) for a part of the noise, by
+/// Fisher scoring, one innovation a step (docs/method.md, eq. 32a). Not thread-safe.
+class ModelErrorScale {
+ public:
+  /// An innovation of 3 axes at `stamp`: its squared length in sigmas, 3 on the mean where the scale is
+  /// right, and the share of its variance that the scale multiplies. Old ones fade.
+  void add(Time stamp, double squared_sigmas, double share);
+  double value() const { return value_; }  ///< of the squares; 1 to begin with
+
+ private:
+  double value_ = 1.0;
+  Time last_;
+  double information_ = 0.0;  ///< of the scale's logarithm, fading
+};
+
+}  // namespace rio_t

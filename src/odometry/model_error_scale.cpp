@@ -1,0 +1,30 @@
+#include "rio_t/odometry/model_error_scale.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace rio_t {
+namespace {
+
+/// Information of the options about the logarithm: their sigmas are right within a factor of 1.6.
+constexpr double kBelief = 1.0;
+/// [s] The errors change with the surroundings and with the kind of motion.
+constexpr double kMemory = 60.0;
+/// Bounds: a tenth and ten times the sigmas of the options. Below, the measured noise is all there is.
+constexpr double kSmallest = 0.01;
+constexpr double kLargest = 100.0;
+/// One innovation counts at most as four sigma: it may be an outlier.
+constexpr double kLargestSquare = 16.0;
+
+}  // namespace
+
+void ModelErrorScale::add(Time stamp, double squared_sigmas, double share) {
+  const double fade = std::exp(-std::clamp(stamp - last_, 0.0, 10.0 * kMemory) / kMemory);
+  last_ = stamp;
+  information_ = fade * information_ + 1.5 * share * share;
+  const double excess = std::clamp(squared_sigmas, 0.0, kLargestSquare) - 3.0;
+  value_ *= std::exp(0.5 * share * excess / (kBelief + information_));
+  value_ = std::clamp(value_, kSmallest, kLargest);
+}
+
+}  // namespace rio_t
