@@ -77,9 +77,8 @@ RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) co
   z.stamp = result.scan.stamp;
   z.v_R = result.ego_velocity.v_R;
   z.covariance = result.ego_velocity.covariance;
-  if (result.ego_velocity.status == EgoVelocityStatus::kMoving)
-    z.covariance.diagonal() +=
-        (model_error_scale_ - result.model_error_scale) * options_.ego_velocity.added_sigma.cwiseAbs2();
+  z.covariance.diagonal() +=
+      (model_error_scale_ / result.model_error_scale - 1.0) * result.ego_velocity.told_variance;
   z.R_RI = options_.T_IR.q_IR.conjugate().toRotationMatrix();
   z.l_I = options_.T_IR.l_I;
   return z;

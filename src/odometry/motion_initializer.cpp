@@ -45,8 +45,7 @@ MotionInitializer::MotionInitializer(const OdometryOptions& options)
       noise_(options.imu_noise),
       g_W_(0.0, 0.0, -options.gravity),
       R_RI_(options.T_IR.q_IR.conjugate().toRotationMatrix()),
-      l_I_(options.T_IR.l_I),
-      added_variance_(options.ego_velocity.added_sigma.cwiseAbs2()) {}
+      l_I_(options.T_IR.l_I) {}
 
 double MotionInitializer::imuHistory() const {
   return options_.window + 2.0 * smoother_.max_time_offset + kMaxLatency;
@@ -60,15 +59,15 @@ void MotionInitializer::clear() {
 void MotionInitializer::add(Time stamp, const EgoVelocity& velocity) {
   if (!isValid(velocity.status)) return;
   const auto after = std::lower_bound(velocities_.begin(), velocities_.end(), stamp,
-                                      [](const RadarVelocityMeasurement& z, Time t) { return z.stamp < t; });
+                                      [](const Velocity& z, Time t) { return z.stamp < t; });
   if (after != velocities_.end() && after->stamp == stamp) return;
-  velocities_.insert(after, {stamp, velocity.v_R, velocity.covariance, R_RI_, l_I_});
+  velocities_.insert(after, Velocity{{stamp, velocity.v_R, velocity.covariance, R_RI_, l_I_}, velocity.told_variance});
   if (velocities_.size() > kMaxVelocities) velocities_.erase(velocities_.begin());
 }
 
 bool MotionInitializer::isMoving(Time from, Time to, double max_speed) const {
   std::vector<double> axes[3];
-  for (const RadarVelocityMeasurement& z : velocities_) {
+  for (const Velocity& z : velocities_) {
     if (z.stamp < from || to < z.stamp) continue;
     for (int i = 0; i < 3; ++i) axes[i].push_back(z.v_R[i]);
   }
@@ -85,14 +84,14 @@ bool MotionInitializer::isMoving(Time from, Time to, double max_speed) const {
 std::optional<MotionInitialization> MotionInitializer::solve(
     const ImuBuffer& imu, const std::function<PoseAnchor(Time)>& anchorAt) {
   if (velocities_.empty() || imu.empty()) return std::nullopt;
-  const auto outOfReach = [&](const RadarVelocityMeasurement& z) {
+  const auto outOfReach = [&](const Velocity& z) {
     return std::abs(z.stamp - imu.newest()) > imuHistory();
   };
   velocities_.erase(std::remove_if(velocities_.begin(), velocities_.end(), outOfReach), velocities_.end());
   // Any offset within the bound must be covered by the IMU.
   const Time covered = imu.newest() - smoother_.max_time_offset;
   const auto after = std::upper_bound(velocities_.begin(), velocities_.end(), covered,
-                                      [](Time t, const RadarVelocityMeasurement& z) { return t < z.stamp; });
+                                      [](Time t, const Velocity& z) { return t < z.stamp; });
   if (after == velocities_.begin() || std::prev(after)->stamp == tried_at_) return std::nullopt;
   const Time time = std::prev(after)->stamp;
   tried_at_ = time;
@@ -165,7 +164,7 @@ MotionInitializer::Velocities MotionInitializer::windowUntil(Time time, const Im
   });
   const Time first = std::max(time - options_.window, covered + reach);
   Velocities result;
-  for (const RadarVelocityMeasurement& z : velocities_) {
+  for (const Velocity& z : velocities_) {
     if (first <= z.stamp && z.stamp <= time) result.push_back(z);
   }
   return result;
@@ -178,7 +177,7 @@ MotionInitializer::Line MotionInitializer::fitLine(const Velocities& velocities,
   double mean_TT = 0.0;
   Eigen::Vector3d mean_y = Eigen::Vector3d::Zero();
   Eigen::Vector3d mean_Ty = Eigen::Vector3d::Zero();
-  for (const RadarVelocityMeasurement& z : velocities) {
+  for (const Velocity& z : velocities) {
     const Time tau = z.stamp - smoother_.time_offset_initial;
     ImuDelta delta;
     imu.forEachInterval(time, tau, [&](double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
@@ -220,16 +219,16 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
     outliers = 0.0;
     mean_square = 0.0;
     mean_share = 0.0;
-    for (RadarVelocityMeasurement z : velocities) {
+    for (Velocity z : velocities) {
       // What the IMU adds over the way from the state: noise of the accelerometer, and of the tilt.
       const double T = std::abs(z.stamp - time);
       const double tilt = noise_.gyro_density * g_W_.norm();
       const double measured = imu.mean(z.stamp, T).accel_variance;
       const double told = scale.value() * noise_.accel_density * noise_.accel_density;
-      Eigen::Vector3d scaled = scale.value() * added_variance_;
+      Eigen::Vector3d scaled = scale.value() * z.told_variance;
       if (told > measured) scaled.array() += told * T;
       Eigen::Matrix3d covariance = z.covariance;
-      covariance.diagonal() += scaled - added_variance_;
+      covariance.diagonal() += scaled - z.told_variance;
       covariance.diagonal().array() += tilt * tilt * T * T * T / 3.0 + (told > measured ? 0.0 : measured * T);
       const Eigen::LDLT<Eigen::Matrix3d> whitening = covariance.ldlt();
       z.covariance.setIdentity();

@@ -280,10 +280,8 @@ void RadarInertialOdometry::Impl::useScan(const RadarScan& scan, bool imu_has_en
 void RadarInertialOdometry::Impl::measureAt(const RadarScan& scan, const std::optional<VelocityPrior>& prior,
                                             EgoVelocity& measured) {
   ego_velocity_estimator.estimate(scan, prior, &ego_velocity_workspace, &measured);
-  if (measured.status == EgoVelocityStatus::kMoving) {
-    measured.covariance.diagonal() +=
-        (model_error_scale.value() - 1.0) * options.ego_velocity.added_sigma.cwiseAbs2();
-  }
+  measured.covariance.diagonal() += (model_error_scale.value() - 1.0) * measured.told_variance;
+  measured.told_variance *= model_error_scale.value();
 }
 
 ImuNoise RadarInertialOdometry::Impl::imuNoise() const {
@@ -331,7 +329,7 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
     // The state's variance grows about as the root of the accelerometer's.
     const Eigen::Matrix3d scaled =
         0.5 * prediction->velocity.covariance +
-        Eigen::Matrix3d((model_error_scale.value() * options.ego_velocity.added_sigma.cwiseAbs2()).asDiagonal());
+        Eigen::Matrix3d(measured.told_variance.asDiagonal());
     const Eigen::LDLT<Eigen::Matrix3d> weight = S.ldlt();
     model_error_scale.add(scan.stamp, d.dot(weight.solve(d)), weight.solve(scaled).trace() / 3.0);
   }

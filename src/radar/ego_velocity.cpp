@@ -312,7 +312,8 @@ void EgoVelocityEstimator::estimate(const RadarScan& scan, const std::optional<V
                      ? solveLeastSquares(inliers, o)
                      : solveErrorsInVariables(inliers, solution.v_R, o);
     }
-    solution.covariance.diagonal() += o.added_sigma.cwiseAbs2();
+    result.told_variance = o.added_sigma.cwiseAbs2();
+    solution.covariance.diagonal() += result.told_variance;
   }
 
   result.inliers.reserve(inliers.size());

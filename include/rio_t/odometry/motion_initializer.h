@@ -74,7 +74,10 @@ class MotionInitializer {
   double imuHistory() const;
 
  private:
-  using Velocities = std::vector<RadarVelocityMeasurement>;
+  struct Velocity : RadarVelocityMeasurement {
+    Eigen::Vector3d told_variance;  ///< see EgoVelocity
+  };
+  using Velocities = std::vector<Velocity>;
 
   /// The velocities of the window that ends with `time`, as far as the IMU covers them without a gap.
   Velocities windowUntil(Time time, const ImuBuffer& imu) const;
@@ -97,7 +100,6 @@ class MotionInitializer {
   Eigen::Vector3d g_W_;
   Eigen::Matrix3d R_RI_;
   Eigen::Vector3d l_I_;
-  Eigen::Vector3d added_variance_;  ///< of a velocity, in its covariance [m^2/s^2]
 
   Velocities velocities_;  // by stamp
   std::optional<Time> tried_at_;

@@ -78,6 +78,9 @@ struct EgoVelocity {
   EgoVelocityStatus status = EgoVelocityStatus::kTooFewPoints;
   Eigen::Vector3d v_R = Eigen::Vector3d::Zero();         ///< radar velocity, radar frame [m/s]
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< [m^2/s^2], radar frame
+  /// The part of the covariance's diagonal that is told and not measured: `added_sigma` squared, or none at
+  /// rest [m^2/s^2].
+  Eigen::Vector3d told_variance = Eigen::Vector3d::Zero();
   std::vector<std::size_t> inliers;                      ///< indices into the scan's points
   std::size_t points_used = 0;                           ///< points that passed the filter
 };
