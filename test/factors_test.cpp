@@ -2,10 +2,12 @@
 // truth.
 #include <cmath>
 
+#include "noise.h"
 #include "numeric_jacobian.h"
 #include "rio_t/core/so3.h"
 #include "rio_t/factors/constant_offset_factor.h"
 #include "rio_t/factors/imu_factor.h"
+#include "rio_t/factors/offset_derivative.h"
 #include "rio_t/factors/prior_factor.h"
 #include "rio_t/factors/radar_velocity_factor.h"
 #include "rio_t/factors/rest_factor.h"
@@ -112,8 +114,7 @@ TEST(ImuFactor, TransitionSaysTheSameAsTheFactor) {
 TEST(ConstantAccelerationRadarFactor, JacobiansAreCorrect) {
   const SyntheticMotion motion;
   const ImuBuffer imu = motion.imu(0.9, 1.3, 400.0);
-  const ConstantAccelerationRadarFactor factor(measurement(motion.time(1.0)), imu.at(motion.time(1.0)),
-                                               motion.g_W);
+  const ConstantAccelerationRadarFactor factor(measurement(motion.time(1.0)), imu, motion.g_W);
   expectJacobiansCorrect(factor, {values(moved(motion.state(1.0), 0.1)), {0.04}});
 }
 
@@ -121,8 +122,9 @@ TEST(ConstantAccelerationRadarFactor, AtRestTheCorrectedAccelerationIsZero) {
   // The sign of gravity: a level accelerometer at rest reads +g, so the offset must not matter.
   RadarVelocityMeasurement z = measurement(Time::fromSeconds(1.0));
   z.v_R.setZero();
-  ImuMeasurement imu;
-  imu.acceleration = {0.0, 0.0, 9.81};
+  ImuBuffer imu;
+  for (const double t : {0.9, 1.1})
+    imu.add({Time::fromSeconds(t), Eigen::Vector3d::Zero(), Eigen::Vector3d(0.0, 0.0, 9.81)});
   const StateBlock x;
   const double t_O = 0.1;
   const double* blocks[] = {x.data(), &t_O};
@@ -135,12 +137,76 @@ TEST(ImuRadarFactor, JacobiansAreCorrectForwardsAndBackwards) {
   const SyntheticMotion motion;
   const ImuBuffer imu = motion.imu(0.5, 1.6, 400.0);
   for (const double t_O : {-0.11, -0.0113, 0.0037, 0.0521, 0.2031}) {
-    const ImuRadarFactor factor(measurement(motion.time(1.0)), motion.time(0.98), imu, 0.25, motion.g_W);
-    // The derivative in t_O is that of the continuous motion, the residual that of 400 Hz samples: 0.5 %
-    // apart.
-    expectJacobiansCorrect(factor, {values(moved(motion.state(0.98), 0.05)), {t_O}}, 5e-3, 1e-3);
-    expectJacobiansCorrect(factor, {values(moved(motion.state(0.98), 0.05)), {t_O}}, 5e-3, 1e-3);
+    // Held, t_O has no part in it: the derivatives in the state are exact.
+    RadarVelocityMeasurement z = measurement(motion.time(1.0));
+    z.held_t_O = t_O;
+    expectJacobiansCorrect(ImuRadarFactor(z, motion.time(0.98), imu, 0.25, motion.g_W),
+                           {values(moved(motion.state(0.98), 0.05)), {0.2 - t_O}}, 1e-6, 1e-4);
   }
+}
+
+TEST(ImuRadarFactor, TheDerivativeInTheOffsetIsThatOverItsWindow) {
+  const SyntheticMotion motion;
+  const ImuBuffer imu = motion.imu(0.5, 1.6, 400.0);
+  const StateBlock x = moved(motion.state(0.98), 0.05);
+  for (const double t_O : {-0.11, -0.0113, 0.0037, 0.0521, 0.1731}) {
+    const ImuRadarFactor factor(measurement(motion.time(1.0)), motion.time(0.98), imu, 0.5, motion.g_W);
+    const auto residual = [&](double offset, double** jacobians = nullptr) {
+      const double* blocks[] = {x.data(), &offset};
+      Eigen::Vector3d r;
+      factor.Evaluate(blocks, r.data(), jacobians);
+      return r;
+    };
+    Eigen::Vector3d J_t;
+    double* jacobians[] = {nullptr, J_t.data()};
+    residual(t_O, jacobians);
+    // The derivative of the mean with weights that fall linearly: from the mean of one side to that of the
+    // other.
+    constexpr int kSteps = 50;
+    Eigen::Vector3d expected = Eigen::Vector3d::Zero();
+    for (int i = 0; i < kSteps; ++i) {
+      const double away = kOffsetHalfWidth * (i + 0.5) / kSteps;
+      expected += (residual(t_O + away) - residual(t_O - away)) / (kSteps * kOffsetHalfWidth);
+    }
+    // The rotation within the window is of second order in its width.
+    EXPECT_LT((J_t - expected).norm(), 1e-2 * J_t.norm()) << t_O;
+  }
+}
+
+TEST(ImuRadarFactor, AHeldOffsetIsAllThatCounts) {
+  const SyntheticMotion motion;
+  const ImuBuffer imu = motion.imu(0.5, 1.6, 400.0);
+  RadarVelocityMeasurement z = measurement(motion.time(1.0));
+  const StateBlock x = motion.state(0.98);
+  const auto residual = [&](double t_O) {
+    const double* blocks[] = {x.data(), &t_O};
+    Eigen::Vector3d r;
+    ImuRadarFactor(z, motion.time(0.98), imu, 0.25, motion.g_W).Evaluate(blocks, r.data(), nullptr);
+    return r;
+  };
+  const Eigen::Vector3d free = residual(0.02);
+  z.held_t_O = 0.02;
+  EXPECT_EQ(residual(0.02), free);
+  EXPECT_EQ(residual(-0.1), free);
+}
+
+TEST(VelocityRate, NoiseIsNoAcceleration) {
+  Noise noise;
+  int informs = 0;
+  for (int run = 0; run < 200; ++run) {
+    ImuBuffer imu;
+    for (int i = 0; i <= 30; ++i) {
+      ImuMeasurement sample{Time::fromSeconds(0.01 * i), Eigen::Vector3d::Zero(),
+                            Eigen::Vector3d(0.0, 0.0, 9.81) + 2.0 * noise.vector()};
+      sample.accel_noise = 2.0 * 2.0 * 0.01;
+      imu.add(sample);
+    }
+    const VelocityRate rate = velocityRate(imu, Time::fromSeconds(0.15), StateBlock(),
+                                           Eigen::Vector3d(0.0, 0.0, -9.81), Eigen::Vector3d::Zero());
+    EXPECT_NEAR(rate.variance, 4.0 * 0.01 / 0.15, 0.02 * rate.variance);
+    informs += rate.informsOffset(0.2) ? 1 : 0;
+  }
+  EXPECT_EQ(informs, 0);
 }
 
 TEST(ImuRadarFactor, ResidualIsZeroAtTheTrueOffset) {
@@ -194,7 +260,7 @@ TEST(FactorPool, ARecycledFactorIsAsOneMadeAnew) {
   };
   RadarVelocityMeasurement other = measurement(motion.time(1.2));
   other.covariance *= 3.0;
-  other.informs_offset = false;
+  other.held_t_O = 0.01;
   const StateBlock x = motion.state(0.98);
   const StateBlock next = motion.state(1.08);
   const double t_O = 0.03;

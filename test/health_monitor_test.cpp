@@ -42,6 +42,20 @@ TEST(HealthMonitor, ManyScansMustContradict) {
   EXPECT_EQ(feed(monitor, 13.0, 14.0, 1.0), Health::kOk);
 }
 
+TEST(HealthMonitor, ScansThatDecideNothingContradictNothing) {
+  // Half of the scans: a crowd that fills the view.
+  HealthMonitor monitor(HealthOptions(), 4.0);
+  for (int i = 0; i < 40; ++i) {
+    if (i % 2 == 0) {
+      monitor.addInnovation(at(5.0 + 0.1 * i), Eigen::Vector3d(2.0, 0.0, 0.0), 0.01 * Eigen::Matrix3d::Identity());
+    } else {
+      monitor.addUndecided(at(5.0 + 0.1 * i));
+    }
+    monitor.updated(at(5.0 + 0.1 * i));
+    EXPECT_EQ(monitor.judge(at(5.0 + 0.1 * i), knownState()), Health::kOk);
+  }
+}
+
 TEST(HealthMonitor, FewScansProveNothing) {
   HealthMonitor monitor(HealthOptions(), 4.0);
   for (int k = 0; k < 5; ++k) {

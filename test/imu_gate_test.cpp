@@ -258,5 +258,27 @@ TEST(Preintegration, DoubtOfAnIntervalWidensWhatCrossesIt) {
   }
 }
 
+TEST_F(Gate, AStuckGyroAxisIsReplaced) {
+  ImuMeasurement stuck;
+  for (double s = 1.0; s < 1.3; s += 0.01) {
+    stuck = motion.imuSample(s);
+    stuck.angular_velocity.y() = 17.4;
+    EXPECT_NE(feed(stuck).find("imu_stuck"), std::string::npos) << s;
+    EXPECT_LT(sample.angular_velocity.y(), 2.0);
+    EXPECT_EQ(sample.angular_velocity.x(), stuck.angular_velocity.x());
+    EXPECT_GT(sample.gyro_doubt, 0.1);
+  }
+  feed(1.3);
+  EXPECT_EQ(sample.angular_velocity, motion.imuSample(1.3).angular_velocity);
+}
+
+TEST_F(Gate, AFastTurnThatGoesOnIsNotStuck) {
+  // From nothing to 6 rad/s in one sample, as where samples are missing, and then as gyros read: never twice
+  // the same.
+  EXPECT_EQ(feed({motion.time(1.0), {6.0, 0.0, 0.0}, {0.0, 0.0, 9.81}}), "imu_stuck");
+  EXPECT_EQ(feed({motion.time(1.01), {6.1, 0.0, 0.0}, {0.0, 0.0, 9.81}}), "");
+  EXPECT_EQ(sample.angular_velocity.x(), 6.1);
+}
+
 }  // namespace
 }  // namespace rio_t

@@ -6,6 +6,7 @@
 #include "noise.h"
 #include "rio_t/core/so3.h"
 #include "rio_t/imu/buffer.h"
+#include "rio_t/imu/noise_meter.h"
 #include "rio_t/imu/preintegration.h"
 #include "rio_t/imu/rest_detector.h"
 #include "rio_t/imu/static_initializer.h"
@@ -140,6 +141,45 @@ TEST(Preintegration, CovarianceIsThatOfManyNoisyRuns) {
   expected.covariance.llt().matrixL().solveInPlace(whitening);
   const Eigen::Matrix<double, 9, 9> whitened = whitening * (sum / runs) * whitening.transpose();
   EXPECT_LT((whitened - Eigen::Matrix<double, 9, 9>::Identity()).cwiseAbs().maxCoeff(), 0.15) << whitened;
+}
+
+TEST(NoiseMeter, MeasuresTheDensityAtRestAndInMotion) {
+  const SyntheticMotion motion;
+  for (const double rate : {100.0, 400.0}) {
+    for (const bool moving : {false, true}) {
+      for (const double sigma : {0.05, 2.0}) {
+        Noise noise;
+        NoiseMeter meter;
+        for (double t = 0.0; t < 5.0; t += 1.0 / rate) {
+          Eigen::Vector3d value = sigma * noise.vector();
+          if (moving) value += motion.imuSample(t).acceleration;
+          meter.add(motion.time(t), value);
+        }
+        EXPECT_NEAR(std::sqrt(meter.squaredDensity() * rate) / sigma, 1.0, 0.25) << rate << " Hz, " << sigma;
+      }
+    }
+  }
+}
+
+TEST(NoiseMeter, IsNotMovedByAKnockOrAGap) {
+  const double rate = 200.0;
+  Noise noise;
+  NoiseMeter meter;
+  Time time = Time::fromSeconds(10.0);
+  const auto feed = [&](int samples, double sigma) {
+    for (int i = 0; i < samples; ++i) meter.add(time = time + 1.0 / rate, sigma * noise.vector());
+  };
+  EXPECT_EQ(meter.squaredDensity(), 0.0);
+  feed(1000, 0.1);
+  meter.add(time = time + 1.0 / rate, Eigen::Vector3d(40.0, 0.0, 0.0));
+  feed(20, 0.1);
+  EXPECT_LT(std::sqrt(meter.squaredDensity() * rate), 0.2);
+  time = time + 0.5;
+  feed(600, 0.1);
+  EXPECT_LT(std::sqrt(meter.squaredDensity() * rate), 0.13);
+  // A motor that starts is seen within half a second.
+  feed(100, 1.0);
+  EXPECT_GT(std::sqrt(meter.squaredDensity() * rate), 0.4);
 }
 
 TEST(Levelling, AnyMountingPutsGravityDown) {

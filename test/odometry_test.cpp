@@ -1,11 +1,15 @@
 // The whole pipeline without ROS: faults of the input, causality, repeatability.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
+#include <utility>
 
 #include "rio_t/odometry/navigator.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
+#include "simulated_run.h"
 
 namespace rio_t {
 namespace {
@@ -246,6 +250,77 @@ TEST_F(AtRest, NothingIsLearntOfTheOffset) {
   const OdometryOptions options;
   EXPECT_NEAR(last.time_offset, options.smoother.time_offset_initial, 1e-4);
   EXPECT_GE(last.time_offset_sigma, options.smoother.time_offset_sigma * (1.0 - 1e-6));
+}
+
+/// Every tenth scan from 15 s on is wrong by 1.8 m/s, and comes `delay` [s] later than it should: how many of
+/// them were used, of how many.
+std::pair<int, int> wrongScansUsed(double delay) {
+  SimulatedRun run("medium", 3, 40.0, 5.0);
+  std::set<Time> wrong;
+  run.run([&](simulation::SensorData& data) {
+    for (std::size_t i = 150; i < data.scans.size(); i += 10) {
+      simulation::SimulatedScan& scan = data.scans[i];
+      for (simulation::SimulatedPoint& point : scan.points)
+        point.doppler -= point.position_R.normalized().dot(Eigen::Vector3d(1.2, 1.0, 0.9));
+      scan.arrival = scan.arrival + delay;
+      wrong.insert(scan.stamp);
+    }
+    std::stable_sort(data.scans.begin(), data.scans.end(),
+                     [](const auto& a, const auto& b) { return a.arrival < b.arrival; });
+  });
+  int used = 0;
+  int all = 0;
+  for (const ScanResult& result : run.results) {
+    if (wrong.count(result.scan.stamp) == 0) continue;
+    ++all;
+    used += result.used ? 1 : 0;
+  }
+  return {used, all};
+}
+
+TEST(LateScans, PassTheSameGatesAsPunctualOnes) {
+  for (const double delay : {0.0, 0.25, 0.4}) {
+    const auto [used, all] = wrongScansUsed(delay);
+    EXPECT_GT(all, 20);
+    EXPECT_EQ(used, 0) << "of " << all << ", " << delay << " s late";
+  }
+}
+
+/// Wild motion in which a gyro axis reads 17.4 rad/s for 0.3 s.
+TEST(StuckGyro, CostsLittle) {
+  for (const int axis : {0, 1, 2}) {
+    SimulatedRun run("difficult", 1, 60.0, 5.0);
+    run.run([&](simulation::SensorData& data) {
+      for (ImuMeasurement& sample : data.imu.samples) {
+        const double t = run.seconds(sample.time);
+        if (t >= 30.0 && t < 30.3) sample.angular_velocity[axis] = 17.4;
+      }
+    });
+    const double ate = run.rms(10.0, 60.0, [&](const NavigationState& state) {
+      // From the start on, with the heading of the start.
+      const simulation::MotionState origin = run.motion.at(0.0);
+      return ((state.p_W).norm() - (run.truth(state).p_W - origin.p_W).norm());
+    });
+    EXPECT_LT(ate, 0.2) << "axis " << axis;
+    EXPECT_GT(run.odometry->faults()["imu_stuck"], 50u);
+    EXPECT_LT(run.rms(32.0, 60.0, [&](const NavigationState& state) { return run.velocityError(state); }), 0.1);
+  }
+}
+
+/// A walk in which a crowd is in view for 30 % of the time.
+TEST(Crowd, IsNoDivergenceAndNoStepOfTheOffset) {
+  for (const int crowd : {3, 5}) {
+    for (const std::uint64_t seed : {3, 4}) {
+      SimulatedRun run("walk", seed, 100.0, 5.0);
+      run.setup.radar.moving_share = 0.3;
+      run.setup.radar.crowd = crowd;
+      run.run();
+      EXPECT_EQ(run.odometry->faults()["diverged"], 0u) << crowd << " persons, seed " << seed;
+      EXPECT_EQ(run.odometry->faults()["time_offset_step"], 0u) << crowd << " persons, seed " << seed;
+      EXPECT_LT(run.rms(10.0, 100.0, [&](const NavigationState& state) { return run.velocityError(state); }),
+                0.1);
+    }
+  }
 }
 
 }  // namespace

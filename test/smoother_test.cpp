@@ -269,7 +269,7 @@ TEST_F(Smoother, ScansThatSayNothingOfTheOffsetLeaveIt) {
   FixedLagSmoother smoother = make(options);
   for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
     RadarVelocityMeasurement z = measurement(stamp, 0.0);
-    z.informs_offset = false;
+    z.held_t_O = 0.0;
     smoother.add(z);
     smoother.optimize();
     smoother.marginalize();
@@ -306,6 +306,74 @@ TEST_F(Smoother, PredictsTheVelocityOfTheNextScan) {
   options.time_offset_sigma = 0.1;
   const auto unsure = make(options).predictRadarVelocity(z.stamp, z.R_RI, z.l_I);
   EXPECT_GT(unsure->velocity.covariance.trace(), 4.0 * prior->velocity.covariance.trace());
+}
+
+TEST_F(Smoother, PredictsLateScansFromTheNodeBeforeThem) {
+  SmootherOptions options;
+  FixedLagSmoother smoother = make(options);
+  for (double stamp = 0.7; stamp < 1.3; stamp += 0.1) {
+    smoother.add(measurement(stamp, 0.0));
+    smoother.optimize();
+  }
+  const RadarVelocityMeasurement late = measurement(0.95, 0.0);
+  const auto prediction = smoother.predictRadarVelocity(late.stamp, late.R_RI, late.l_I);
+  ASSERT_TRUE(prediction);
+  EXPECT_LT((prediction->velocity.v_R - late.v_R).norm(), 0.02);
+  EXPECT_LT(std::sqrt(prediction->velocity.covariance.trace()), 0.06);
+  EXPECT_FALSE(smoother.predictRadarVelocity(motion.time(0.4), late.R_RI, late.l_I));
+}
+
+TEST_F(Smoother, AStepOfTheOffsetSurvivesANodeThatIsInsertedBeforeIt) {
+  SmootherOptions options;
+  options.window = 2.0;
+  FixedLagSmoother smoother = make(options);
+  const auto use = [&](double stamp, double t_O) {
+    EXPECT_EQ(smoother.add(measurement(stamp, t_O)), FixedLagSmoother::AddResult::kAdded) << stamp;
+    smoother.optimize();
+  };
+  for (double stamp = 0.7; stamp < 2.0; stamp += 0.1) use(stamp, 0.0);
+  ASSERT_NEAR(smoother.newest().t_O, 0.0, 2e-3);
+  // From 2.1 on stamps are 60 ms late. The first one is placed by the old offset.
+  smoother.loosenTimeOffset(motion.time(2.1));
+  use(2.1, 0.06);
+  EXPECT_NEAR(smoother.newest().t_O, 0.06, 0.015);
+  // A scan from before the step, late: between two nodes.
+  use(1.95, 0.0);
+  // One from behind it, measured before the node of the first.
+  use(2.14, 0.06);
+  use(2.2, 0.06);
+  EXPECT_NEAR(smoother.newest().t_O, 0.06, 5e-3);
+  for (std::size_t k = 0; k < smoother.size(); ++k) {
+    if (smoother.node(k).time < motion.time(1.96)) {
+      EXPECT_NEAR(smoother.node(k).t_O, 0.0, 5e-3) << k;
+    }
+  }
+  // A new start knows of no step.
+  smoother.loosenTimeOffset(motion.time(2.3));
+  smoother.initialize(motion.time(2.5), priorAtRest(options, ImuNoise(), motion.state(2.5), 9.81, 3.0));
+  use(2.6, 0.0);
+  use(2.7, 0.0);
+  const NodeMatrix& P = smoother.newestCovariance();
+  EXPECT_LT(std::sqrt(P(StateBlock::kTangent, StateBlock::kTangent)), 0.5 * options.time_offset_sigma);
+}
+
+TEST(PriorAtRest, TiltAndBiasAreKnownTogether) {
+  const SmootherOptions options;
+  StateBlock x;
+  x.q_WI() = so3::exp({0.4, -0.3, 0.9});
+  const NodePrior prior = priorAtRest(options, ImuNoise(), x, 9.81, 3.0);
+  const NodeMatrix P = (prior.J.transpose() * prior.J).inverse();
+  const Eigen::Matrix3d R_WI = x.q_WI().toRotationMatrix();
+  const Eigen::Matrix3d tilt = R_WI * P.topLeftCorner<3, 3>() * R_WI.transpose();
+  // A tilt error is b_a / g.
+  for (int i = 0; i < 2; ++i)
+    EXPECT_NEAR(std::sqrt(tilt(i, i)), options.prior_sigma_accel_bias / 9.81, 3e-4);
+  EXPECT_NEAR(std::sqrt(tilt(2, 2)), options.prior_sigma_yaw, 1e-6);
+  // What the accelerometer reads is known by its noise, though neither of the two is.
+  Eigen::Matrix<double, 3, kNodeTangent> J = Eigen::Matrix<double, 3, kNodeTangent>::Zero();
+  J.leftCols<3>() = so3::hat(9.81 * R_WI.row(2).transpose());
+  J.middleCols<3>(StateBlock::kBa).setIdentity();
+  EXPECT_LT(std::sqrt((J * P * J.transpose()).trace() / 3.0), 0.02);
 }
 
 }  // namespace

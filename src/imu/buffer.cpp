@@ -44,18 +44,28 @@ ImuMeasurement ImuBuffer::at(Time time) const {
 
 ImuMean ImuBuffer::mean(Time time, double half_width) const {
   struct Half {
-    Eigen::Vector3d gyro = Eigen::Vector3d::Zero();
-    Eigen::Vector3d accel = Eigen::Vector3d::Zero();
+    Eigen::Vector3d gyro = Eigen::Vector3d::Zero();  // not weighted, as its duration
     double duration = 0.0;
   };
   ImuMean result;
   const Time middle = std::clamp(time, oldest(), newest());
+  double weights = 0.0;
+  double squared_weights = 0.0;
   const auto half = [&](Time from, Time to) {
     Half sums;
+    double elapsed = 0.0;
+    const double reach = to - from;
+    const bool rises = to == middle;
     forEachInterval(from, to, [&](double dt, const auto& gyro, const auto& accel, const auto& later) {
+      const double away = rises ? reach - elapsed - 0.5 * dt : elapsed + 0.5 * dt;
+      const double weight = dt * (1.0 - away / half_width);
+      elapsed += dt;
       sums.gyro += dt * gyro;
-      sums.accel += dt * accel;
       sums.duration += dt;
+      result.angular_velocity += weight * gyro;
+      result.acceleration += weight * accel;
+      weights += weight;
+      squared_weights += weight * weight / dt;
       result.gyro_variance = std::max(result.gyro_variance, later.gyro_noise + later.gyro_doubt);
       result.accel_variance = std::max(result.accel_variance, later.accel_noise + later.accel_doubt);
     });
@@ -63,18 +73,19 @@ ImuMean ImuBuffer::mean(Time time, double half_width) const {
   };
   const Half before = half(std::max(middle - half_width, oldest()), middle);
   const Half after = half(middle, std::min(middle + half_width, newest()));
-  result.duration = before.duration + after.duration;
-  if (result.duration == 0.0) {
+  if (weights <= 0.0) {
     const ImuMeasurement sample = at(time);
     result.angular_velocity = sample.angular_velocity;
     result.acceleration = sample.acceleration;
     return result;
   }
-  result.angular_velocity = (before.gyro + after.gyro) / result.duration;
-  result.acceleration = (before.accel + after.accel) / result.duration;
+  result.angular_velocity /= weights;
+  result.acceleration /= weights;
+  result.duration = weights * weights / squared_weights;
   if (before.duration > 0.0 && after.duration > 0.0) {
+    result.half_duration = 0.5 * (before.duration + after.duration);
     result.angular_acceleration =
-        (after.gyro / after.duration - before.gyro / before.duration) / (0.5 * result.duration);
+        (after.gyro / after.duration - before.gyro / before.duration) / result.half_duration;
   }
   return result;
 }

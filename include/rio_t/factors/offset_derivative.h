@@ -7,9 +7,10 @@
 
 namespace rio_t {
 
-/// Half of the time over which the IMU is averaged for the derivative with respect to t_O [s]. White noise of
-/// the accelerometer falls with its root; an acceleration at 2 Hz loses 6 % (docs/method.md, section 5.3).
-constexpr double kOffsetHalfWidth = 0.05;
+/// Half of the time over which the IMU is averaged for the derivative with respect to t_O [s]: what shakes at
+/// 8 Hz and above hardly moves a radar, and must not count as acceleration. At 2 Hz, as people move, 13 % are
+/// lost (docs/method.md, section 5.3).
+constexpr double kOffsetHalfWidth = 0.1;
 
 /// How the radar's velocity changes with the time of measurement, d/dtau, in I: what a change of t_O shows,
 /// with the opposite sign (docs/method.md, eq. 18).

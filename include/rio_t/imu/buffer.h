@@ -9,12 +9,14 @@
 
 namespace rio_t {
 
-/// What the IMU read on the mean over some time, biases included, in I.
+/// What the IMU read on the mean around a time, with weights that fall linearly to zero to both sides; biases
+/// included, in I.
 struct ImuMean {
-  double duration = 0.0;                                           ///< [s]
+  double duration = 0.0;       ///< of an even mean with the same noise [s]
+  double half_duration = 0.0;  ///< of either side; 0 where there is only one [s]
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();      ///< [rad/s]
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();          ///< specific force [m/s^2]
-  Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();  ///< from half to half [rad/s^2]
+  Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();  ///< of that mean [rad/s^2]
   double gyro_variance = 0.0;   ///< noise and doubt, the largest squared density [rad^2/s]
   double accel_variance = 0.0;  ///< likewise [m^2/s^3]
 };
@@ -38,7 +40,7 @@ class ImuBuffer {
   /// buffer.
   ImuMeasurement at(Time time) const;
 
-  /// The IMU over [time - half_width, time + half_width], clipped to the samples. Not on an empty buffer.
+  /// The IMU over [time - half_width, time + half_width], as far as there are samples. Not on an empty buffer.
   ImuMean mean(Time time, double half_width) const;
 
   /// Calls step(dt, angular_velocity, acceleration) for each interval between samples from `from` to `to`,

@@ -1,0 +1,87 @@
+// What is published as sigma is what the errors are: the whole pipeline on simulated sensors, over seeds.
+// `scripts/experiment.sh consistency` prints the same for more motions and longer runs.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <string>
+
+#include "rio_t/core/so3.h"
+#include "simulated_run.h"
+
+namespace rio_t {
+namespace {
+
+constexpr double kStart = 5.0;   // [s] of rest
+constexpr double kFrom = 10.0;   // [s] the noise has been measured for three seconds of motion
+constexpr int kSeeds = 6;
+
+/// Mean squares of errors in sigmas, per degree of freedom: 1 where the sigmas are right.
+struct Nees {
+  double position = 0.0, velocity = 0.0, tilt = 0.0, time_offset = 0.0;
+};
+
+/// Of one run, over the states at the times of the scans. W is that of the estimate: its origin and heading
+/// are the truth's at the start, where all these motions begin level with the axes of W.
+Nees neesOf(const SimulatedRun& run) {
+  Nees sum;
+  double count = 0.0;
+  for (const ScanResult& result : run.results) {
+    if (!result.updated || run.seconds(result.state.time) < kFrom) continue;
+    const NavigationState& x = result.state;
+    const simulation::MotionState truth = run.truth(x);
+    const simulation::MotionState origin = run.motion.at(0.0);
+    // The heading at the start defines W.
+    const Eigen::Vector3d forward = origin.q_WI * Eigen::Vector3d::UnitX();
+    const Eigen::Vector3d level_forward =
+        levelingRotation(origin.q_WI.conjugate() * Eigen::Vector3d::UnitZ()) * Eigen::Vector3d::UnitX();
+    const double yaw = std::atan2(level_forward.y(), level_forward.x()) - std::atan2(forward.y(), forward.x());
+    const Eigen::Quaterniond turn = so3::exp(Eigen::Vector3d(0.0, 0.0, yaw));
+    const Eigen::Vector3d e_p = x.p_W - turn * (truth.p_W - origin.p_W);
+    const Eigen::Vector3d e_v = x.v_W - turn * truth.v_W;
+    const Eigen::Matrix3d R_WI = x.q_WI.toRotationMatrix();
+    const Eigen::Vector3d e_R = so3::log(x.q_WI * (turn * truth.q_WI).conjugate());
+    const Eigen::Matrix3d P_R = R_WI * x.covariance.block<3, 3>(0, 0) * R_WI.transpose();
+    for (int i = 0; i < 3; ++i) {
+      sum.position += e_p[i] * e_p[i] / x.covariance(StateBlock::kP + i, StateBlock::kP + i) / 3.0;
+      sum.velocity += e_v[i] * e_v[i] / x.covariance(StateBlock::kV + i, StateBlock::kV + i) / 3.0;
+      if (i < 2) sum.tilt += e_R[i] * e_R[i] / P_R(i, i) / 2.0;
+    }
+    const double e_t = result.time_offset - run.setup.time_offset.constant;
+    sum.time_offset += e_t * e_t / (result.time_offset_sigma * result.time_offset_sigma);
+    count += 1.0;
+  }
+  return {sum.position / count, sum.velocity / count, sum.tilt / count, sum.time_offset / count};
+}
+
+void expectConsistent(const std::string& motion, double vibration) {
+  Nees mean;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    SimulatedRun run(motion, seed, 45.0, kStart);
+    run.setup.time_offset.constant = 0.03;
+    run.setup.imu.accel_vibration = vibration;
+    run.run();
+    const Nees nees = neesOf(run);
+    mean.position += nees.position / kSeeds;
+    mean.velocity += nees.velocity / kSeeds;
+    mean.tilt += nees.tilt / kSeeds;
+    mean.time_offset += nees.time_offset / kSeeds;
+  }
+  std::printf("%s, vibration %.1f: position %.2f, velocity %.2f, tilt %.2f, offset %.2f\n", motion.c_str(),
+              vibration, mean.position, mean.velocity, mean.tilt, mean.time_offset);
+  for (const double nees : {mean.position, mean.velocity, mean.tilt}) {
+    EXPECT_GT(nees, 0.5);
+    EXPECT_LT(nees, 2.0);
+  }
+  // A run is about one sample of it: six of them scatter by 0.6.
+  EXPECT_GT(mean.time_offset, 0.2);
+  EXPECT_LT(mean.time_offset, 2.8);
+}
+
+TEST(Consistency, Medium) { expectConsistent("medium", 0.0); }
+TEST(Consistency, Drone) { expectConsistent("drone", 0.0); }
+TEST(Consistency, GroundVehicle) { expectConsistent("ground_vehicle", 0.0); }
+TEST(Consistency, GroundVehicleThatVibrates) { expectConsistent("ground_vehicle", 0.8); }
+
+}  // namespace
+}  // namespace rio_t
