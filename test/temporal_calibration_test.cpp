@@ -161,7 +161,7 @@ TEST(TemporalCalibration, TheBatchSaysTheSameOfTheOffset) {
     batch.addImu(sample);
   for (const ScanResult& result : run.results) batch.addResult(result, false);
   const BatchResult whole = batch.solve(*run.odometry->start());
-  EXPECT_TRUE(whole.solution.converged);
+  EXPECT_TRUE(whole.solution.converged());
   ASSERT_EQ(whole.scans.size(), run.results.size());
 
   const OffsetAt online = offsetAt(run, 40.0);

@@ -120,7 +120,7 @@ class BagJob {
     RunSummary summary;
     summary.mode = "batch";
     summary.batch = BatchSummary{result.solution.iterations, result.solution.placements,
-                                 result.solution.converged, result.readmitted};
+                                 result.solution.converged(), result.readmitted};
     log.fill(&summary);
     player.countInput(&summary);
     return finish(std::move(summary), log, *output_);
