@@ -80,10 +80,10 @@ FixedLagSmoother::AddResult FixedLagSmoother::addRest(Time stamp, double velocit
   return (this->*original)(stamp, velocity_sigma);
 }
 
-SolveReport FixedLagSmoother::optimize() {
+SolveReport FixedLagSmoother::optimize(double short_step) {
   static const auto original = libraryFunction(&FixedLagSmoother::optimize);
   const Scope scope(Stage::kSolve);
-  return (this->*original)();
+  return (this->*original)(short_step);
 }
 
 NodeMatrix covarianceOfLast(const ChainSystem& system, ChainSolution* solution) {

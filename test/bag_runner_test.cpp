@@ -181,13 +181,24 @@ TEST_F(BagRunner, EveryScanIsAccountedFor) {
   EXPECT_EQ(summary.scans_used + rejected, summary.scans_total);
   EXPECT_GT(summary.scans_used, 40u);
   const std::string yaml = contents(out_ + "/summary.yaml");
-  for (const char* key :
-       {"imu_count: 1600\n", "scans_total: 80\n", "scans_used: ", "scans_rejected: {",
-        "path_length_m: ", "end_to_start_2d_m: ", "end_to_start_3d_m: ", "final_offset_s: ",
-        "final_offset_sigma_s: ", "saved: [trajectory.txt", "estimation_seconds: ", "realtime_factor: "}) {
+  for (const char* key : {"imu_count: 1600\n", "scans_total: 80\n", "scans_used: ", "scans_rejected: {",
+                          "solver_terminations: {converged: ", "path_length_m: ", "end_to_start_2d_m: ",
+                          "end_to_start_3d_m: ", "final_offset_s: ", "final_offset_sigma_s: ",
+                          "saved: [trajectory.txt", "estimation_seconds: ", "realtime_factor: "}) {
     EXPECT_NE(yaml.find(key), std::string::npos) << key;
   }
   EXPECT_EQ(yaml.find("ate_m"), std::string::npos);
+}
+
+TEST_F(BagRunner, WhyTheSolverStoppedIsTold) {
+  RunSummary summary;
+  summary.solver_terminations = {{"at_bound", 253}, {"converged", 66}};
+  RunOutput(out_).finish(summary);
+  EXPECT_NE(contents(out_ + "/summary.yaml").find("solver_terminations: {at_bound: 253, converged: 66}\n"),
+            std::string::npos);
+  EXPECT_NE(describeRun(summary, out_).find("253 of 319 windows at_bound"), std::string::npos);
+  summary.solver_terminations = {{"converged", 66}};
+  EXPECT_EQ(describeRun(summary, out_).find("solver"), std::string::npos);
 }
 
 TEST_F(BagRunner, SameBagSameBytes) {
@@ -211,8 +222,9 @@ TEST_F(BagRunner, TheWholeBagAtOnceKeepsTheOnlineRunBesideIt) {
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_NE(outcome.out.find("converged after"), std::string::npos) << outcome.out;
   const std::string yaml = contents(out_ + "/summary.yaml");
-  for (const char* line : {"mode: batch\n", "imu_count: 1600\n", "scans_total: 80\n",
-                           "batch_converged: true\n", "scans_readmitted: 0\n", "\nate_m: 0.0"})
+  for (const char* line :
+       {"mode: batch\n", "imu_count: 1600\n", "scans_total: 80\n", "batch_converged: true\n",
+        "solver_terminations: {converged: 1}\n", "scans_readmitted: 0\n", "\nate_m: 0.0"})
     EXPECT_NE(yaml.find(line), std::string::npos) << line << yaml;
   const std::string online = contents(out_ + "/online/summary.yaml");
   EXPECT_NE(online.find("mode: online\n"), std::string::npos);

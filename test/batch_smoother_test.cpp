@@ -125,7 +125,7 @@ TEST_F(Batch, EqualsTheFixedLagSmootherThatKeepsEverything) {
       fixed_nodes.placement_tolerance = 1.0;
       const BatchSolution batch =
           BatchSmoother(options, fixed_nodes, ImuNoise(), motion.g_W, imu).solve(whole);
-      EXPECT_TRUE(batch.converged);
+      EXPECT_TRUE(batch.converged());
       EXPECT_EQ(batch.placements, 1);
       ASSERT_EQ(batch.nodes.size(), online.size());
       for (std::size_t k = 0; k < online.size(); ++k) {
@@ -176,7 +176,7 @@ TEST_F(Batch, PlacesItsNodesWhereTheOffsetPutsThem) {
       whole.scans.push_back(scan);
     }
     const BatchSolution batch = make(options).solve(whole);
-    EXPECT_TRUE(batch.converged);
+    EXPECT_TRUE(batch.converged());
     EXPECT_GT(batch.placements, 1);
     for (std::size_t i = 0; i < whole.scans.size(); ++i) {
       const NodeEstimate& node = batch.nodes[batch.node_of_scan[i]];
@@ -224,6 +224,22 @@ TEST_F(Batch, AStepOfTheOffsetIsFollowedWhereItIsTold) {
   const BatchSolution batch = make(options).solve(whole);
   EXPECT_NEAR(batch.nodes[1].t_O, 0.01, 3e-4);
   EXPECT_NEAR(batch.nodes.back().t_O, 0.06, 3e-4);
+}
+
+TEST_F(Batch, ATruthBeyondTheBoundIsTold) {
+  SmootherOptions options;
+  options.max_time_offset = 0.05;
+  BatchProblem whole = problem(options);
+  for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
+    BatchScan scan;
+    scan.velocity = measurement(stamp, 0.08);
+    scan.stamp = scan.velocity->stamp;
+    whole.scans.push_back(scan);
+  }
+  const BatchSolution batch = make(options).solve(whole);
+  EXPECT_EQ(batch.termination, SolverTermination::kAtBound);
+  EXPECT_LT(batch.iterations, 50);
+  EXPECT_NEAR(batch.nodes.back().t_O, 0.05, 1e-9);
 }
 
 TEST_F(Batch, WithoutEstimationTheOffsetStays) {

@@ -1,3 +1,4 @@
+#include <diagnostic_msgs/DiagnosticStatus.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -5,6 +6,7 @@
 
 #include "rio_t/ros/bounded_trajectory.h"
 #include "rio_t/ros/current_session.h"
+#include "rio_t/ros/live_monitor.h"
 #include "rio_t/ros/live_session.h"
 #include "rio_t/ros/offset_observability.h"
 #include "rio_t/ros/scan_queue.h"
@@ -136,6 +138,56 @@ TEST(LiveSession, TellsWhenTheImuPilesUpBeforeAStuckOptimisation) {
   EXPECT_FALSE(session->imuPilesUp());
   feed(LiveSession::kMaxWaitingImu - 1);
   EXPECT_FALSE(session->imuPilesUp());
+}
+
+/// What `diagnostics` says of the solver.
+class SolverDiagnostics : public testing::Test {
+ protected:
+  void windows(SolverTermination termination, int count) {
+    LiveSession::Result result;
+    result.result.updated = true;
+    result.result.solver_termination = termination;
+    for (int k = 0; k < count; ++k) monitor.result(result);
+  }
+  LiveMonitor::Status status() const {
+    LiveMonitor::Status status;
+    monitor.describeSolver(status, nullptr);
+    return status;
+  }
+  void expectWarning(const std::string& part) const {
+    const LiveMonitor::Status now = status();
+    EXPECT_EQ(now.level, diagnostic_msgs::DiagnosticStatus::WARN) << now.message;
+    EXPECT_NE(now.message.find(part), std::string::npos) << now.message;
+  }
+
+  LiveMonitor monitor{Config()};
+};
+
+TEST_F(SolverDiagnostics, WarnWhileMostWindowsEndAtTheBound) {
+  EXPECT_EQ(status().level, diagnostic_msgs::DiagnosticStatus::OK);
+  windows(SolverTermination::kAtBound, 19);
+  EXPECT_EQ(status().level, diagnostic_msgs::DiagnosticStatus::OK) << "too few to judge";
+  windows(SolverTermination::kAtBound, 1);
+  expectWarning("20 of the last 20 windows ended at the bound of the offset: max_time_offset");
+  windows(SolverTermination::kConverged, 9);
+  expectWarning("11 of the last 20 windows");
+  windows(SolverTermination::kConverged, 1);
+  EXPECT_EQ(status().level, diagnostic_msgs::DiagnosticStatus::OK);
+  std::string at_bound;
+  for (const auto& value : status().values)
+    if (value.key == "at_bound") at_bound = value.value;
+  EXPECT_EQ(at_bound, "20");
+}
+
+TEST_F(SolverDiagnostics, WarnOfWhatIsMostFrequent) {
+  windows(SolverTermination::kIterationLimit, 5);
+  windows(SolverTermination::kNoDecrease, 7);
+  windows(SolverTermination::kConverged, 8);
+  expectWarning("7 of the last 20 windows ended without a step that lowers the cost");
+  windows(SolverTermination::kIterationLimit, 12);
+  expectWarning("12 of the last 20 windows ended at max_iterations");
+  monitor.reset("~reset called");
+  EXPECT_EQ(status().level, diagnostic_msgs::DiagnosticStatus::OK);
 }
 
 TEST(BoundedTrajectory, KeepsEveryPoseUpToItsCapacity) {

@@ -1,12 +1,20 @@
-// The chain: marginalisation and covariance against dense linear algebra. The smoother: a known motion is
-// recovered.
+// The chain: marginalisation and covariance against dense linear algebra. The window: its normal equations
+// against Ceres, its minimum and why the solver stopped. The smoother: a known motion is recovered.
+#include <ceres/crs_matrix.h>
+#include <ceres/problem.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <functional>
+#include <memory>
+#include <utility>
 
 #include "rio_t/core/so3.h"
+#include "rio_t/factors/state_manifold.h"
 #include "rio_t/smoother/chain.h"
+#include "rio_t/smoother/chain_marginals.h"
+#include "rio_t/smoother/factor_pool.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
 #include "rio_t/smoother/initial_prior.h"
 #include "synthetic_motion.h"
@@ -116,6 +124,30 @@ TEST(Chain, SolutionIsThatOfTheFullSystem) {
   EXPECT_FALSE(solve(indefinite.chain, 0.0, &solution));
 }
 
+TEST(Chain, AHeldOffsetIsARowAndColumnLess) {
+  const DenseChain dense(3);
+  const Eigen::Index held = firstRow(1) + StateBlock::kTangent;
+  const double step = 0.3;
+  // Without the row of t_O,1, whose column times the step goes to the right side.
+  Eigen::MatrixXd H = dense.H;
+  Eigen::VectorXd b = dense.b + step * H.col(held);
+  H.row(held).setZero();
+  H.col(held).setZero();
+  H(held, held) = 1.0;
+  b(held) = -step;
+  const Eigen::VectorXd full = H.ldlt().solve(-b);
+
+  ChainSystem chain = dense.chain;
+  chain.holdOffset(1, step);
+  ChainSolution solution;
+  ASSERT_TRUE(solve(chain, 0.0, &solution));
+  EXPECT_EQ(solution.delta[1](StateBlock::kTangent), 0.0);
+  solution.delta[1](StateBlock::kTangent) = step;
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_LT((solution.delta[k] - full.segment<kNodeTangent>(firstRow(k))).norm(), 1e-9 * full.norm());
+  }
+}
+
 class Smoother : public ::testing::Test {
  protected:
   static constexpr double kEnd = 4.0;
@@ -141,6 +173,263 @@ class Smoother : public ::testing::Test {
   SyntheticMotion motion;
   ImuBuffer imu;
 };
+
+/// With the Jacobians of the wrong sign.
+class WrongSigned final : public RadarCost {
+ public:
+  explicit WrongSigned(std::unique_ptr<RadarCost> right) : right_(std::move(right)) {}
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    if (!right_->Evaluate(parameters, residuals, jacobians)) return false;
+    if (jacobians == nullptr) return true;
+    if (jacobians[0] != nullptr) Eigen::Map<StateJacobian<3>>{jacobians[0]} *= -1.0;
+    if (jacobians[1] != nullptr) Eigen::Map<Eigen::Vector3d>{jacobians[1]} *= -1.0;
+    return true;
+  }
+
+ private:
+  std::unique_ptr<RadarCost> right_;
+};
+
+class Windows : public Smoother {
+ protected:
+  static constexpr int kNodes = 9;
+  using Solve = std::function<SolveReport(Window&, const SolverLimits&)>;
+
+  /// With every kind of factor, beside its minimum. `t_O` [s] is the true one at node k.
+  Window window(const SmootherOptions& options, const std::function<double(int)>& t_O) const {
+    FactorPool pool(options, ImuNoise(), motion.g_W, imu);
+    Window result;
+    result.prior = std::make_unique<PriorFactor>(priorAtRest(options, motion.state(0.5), 1e-4));
+    result.loss = std::make_unique<ceres::HuberLoss>(options.huber_threshold);
+    result.max_time_offset = options.max_time_offset;
+    for (int k = 0; k < kNodes; ++k) {
+      const double t = 0.5 + 0.1 * k;
+      WindowNode node;
+      node.time = motion.time(t);
+      StateTangent beside;
+      for (int i = 0; i < StateBlock::kTangent; ++i)
+        beside(i) = (i < StateBlock::kBg ? 0.01 : 1e-3) * wave(17 * k + i);
+      const StateBlock truth = motion.state(t);
+      boxplus(truth.data(), beside.data(), node.x.data());
+      RadarVelocityMeasurement z = measurement(t + t_O(k), t_O(k));
+      for (int i = 0; i < 3; ++i) z.v_R(i) += 0.01 * wave(5 * k + i);
+      if (k % 4 == 2) z.v_R.x() += 0.5;  // for the loss
+      node.radar.push_back({z.stamp, pool.radarFactor(z, node.time)});
+      if (k % 3 == 1) node.rest = pool.restFactor(3.0);
+      if (k > 0) {
+        const Time before = result.nodes.back().time;
+        const StateBlock from = motion.state(t - 0.1);
+        node.imu_from_previous =
+            pool.imuFactor(preintegrate(imu, before, node.time, from.b_g(), from.b_a(), ImuNoise()));
+        node.offset_from_previous = pool.offsetFactor(options.time_offset_noise * std::sqrt(0.1));
+      }
+      result.nodes.push_back(std::move(node));
+    }
+    return result;
+  }
+  Window window(const SmootherOptions& options, double t_O) const {
+    return window(options, [=](int) { return t_O; });
+  }
+
+  /// With the means to solve a window.
+  static std::vector<std::pair<const char*, Solve>> solvers() {
+    return {{"chain", [](Window& w, const SolverLimits& limits) { return WindowSolver().solve(w, limits); }},
+            {"ceres", [](Window& w, const SolverLimits& limits) { return solveWithCeres(w, limits); }}};
+  }
+
+  static SolverLimits tight() {
+    SolverLimits limits;
+    limits.max_iterations = 200;
+    limits.short_step = 1e-6;
+    return limits;
+  }
+
+  /// No t_O beyond the bound; no slope, but outwards along the t_O at it. How many stand at it.
+  static int expectMinimum(const Window& window) {
+    ChainSystem system;
+    linearize(window, &system);
+    int at_bound = 0;
+    for (std::size_t k = 0; k < window.nodes.size(); ++k) {
+      const double t_O = window.nodes[k].t_O;
+      NodeVector slope = system.gradient[k].cwiseQuotient(system.diagonal[k].diagonal().cwiseSqrt());
+      EXPECT_LE(std::abs(t_O), window.max_time_offset);
+      if (std::abs(t_O) == window.max_time_offset) {
+        EXPECT_LE(slope(StateBlock::kTangent) * t_O, 0.0) << "node " << k;
+        slope(StateBlock::kTangent) = 0.0;
+        ++at_bound;
+      }
+      EXPECT_LT(slope.norm(), 1e-3) << "node " << k;
+    }
+    return at_bound;
+  }
+
+  /// In marginal standard deviations.
+  static void expectSameNodes(const Window& a, const Window& b, double sigmas) {
+    ChainSystem system;
+    linearize(a, &system);
+    const std::vector<NodeMatrix> covariances = marginalCovariances(system);
+    for (std::size_t k = 0; k < a.nodes.size(); ++k) {
+      NodeVector apart;
+      apart << boxminus(a.nodes[k].x.data(), b.nodes[k].x.data()), a.nodes[k].t_O - b.nodes[k].t_O;
+      const NodeVector sigma = covariances[k].diagonal().cwiseSqrt();
+      EXPECT_LT(apart.cwiseQuotient(sigma).cwiseAbs().maxCoeff(), sigmas) << "node " << k;
+    }
+  }
+};
+
+TEST_F(Windows, TheNormalEquationsAreThoseOfCeres) {
+  for (const TimeOffsetModel model : {TimeOffsetModel::kConstantAcceleration, TimeOffsetModel::kImu}) {
+    SmootherOptions options;
+    options.time_offset_model = model;
+    Window w = window(options, 0.01);
+    int robust = 0, plain = 0;
+    StateManifold manifold;
+    ceres::Problem::Options borrowing;
+    borrowing.cost_function_ownership = borrowing.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+#if RIO_T_CERES_HAS_MANIFOLD
+    borrowing.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+#else
+    borrowing.local_parameterization_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+#endif
+    ceres::Problem problem(borrowing);
+    ceres::Problem::EvaluateOptions order;
+    for (WindowNode& node : w.nodes) {
+      addStateBlock(problem, node.x.data(), manifold);
+      problem.AddParameterBlock(&node.t_O, 1);
+      order.parameter_blocks.push_back(node.x.data());
+      order.parameter_blocks.push_back(&node.t_O);
+    }
+    problem.AddResidualBlock(w.prior.get(), nullptr, w.nodes[0].x.data(), &w.nodes[0].t_O);
+    for (std::size_t k = 0; k < w.nodes.size(); ++k) {
+      WindowNode& node = w.nodes[k];
+      for (const RadarTerm& term : node.radar) {
+        problem.AddResidualBlock(term.cost.get(), w.loss.get(), node.x.data(), &node.t_O);
+        const double* blocks[] = {node.x.data(), &node.t_O};
+        Eigen::Vector3d r;
+        term.cost->Evaluate(blocks, r.data(), nullptr);
+        ++(r.norm() > options.huber_threshold ? robust : plain);
+      }
+      if (node.rest) problem.AddResidualBlock(node.rest.get(), nullptr, node.x.data());
+      if (k == 0) continue;
+      WindowNode& previous = w.nodes[k - 1];
+      problem.AddResidualBlock(node.imu_from_previous.get(), nullptr, previous.x.data(), node.x.data());
+      problem.AddResidualBlock(node.offset_from_previous.get(), nullptr, &previous.t_O, &node.t_O);
+    }
+    EXPECT_GT(robust, 0);
+    EXPECT_GT(plain, 0);
+    double cost = 0.0;
+    std::vector<double> gradient;
+    ceres::CRSMatrix sparse;
+    ASSERT_TRUE(problem.Evaluate(order, &cost, nullptr, &gradient, &sparse));
+    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(sparse.num_rows, sparse.num_cols);
+    for (int row = 0; row < sparse.num_rows; ++row)
+      for (int i = sparse.rows[row]; i < sparse.rows[row + 1]; ++i) J(row, sparse.cols[i]) = sparse.values[i];
+    ASSERT_EQ(J.cols(), firstRow(kNodes));
+    Eigen::MatrixXd H = J.transpose() * J;
+
+    ChainSystem chain;
+    linearize(w, &chain);
+    EXPECT_NEAR(chain.cost, cost, 1e-12 * cost);
+    const Eigen::VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
+    const double size = scale.cwiseProduct(Eigen::Map<Eigen::VectorXd>(gradient.data(), J.cols())).norm();
+    for (int k = 0; k < kNodes; ++k) {
+      const Eigen::Index at = firstRow(k);
+      for (int i = 0; i < kNodeTangent; ++i)
+        EXPECT_NEAR(scale(at + i) * chain.gradient[k](i), scale(at + i) * gradient[at + i], 1e-10 * size);
+      H.block<kNodeTangent, kNodeTangent>(at, at) -= chain.diagonal[k];
+      if (k + 1 == kNodes) continue;
+      H.block<kNodeTangent, kNodeTangent>(at, firstRow(k + 1)) -= chain.coupling[k];
+      H.block<kNodeTangent, kNodeTangent>(firstRow(k + 1), at) -= chain.coupling[k].transpose();
+    }
+    EXPECT_LT((scale.asDiagonal() * H * scale.asDiagonal()).cwiseAbs().maxCoeff(), 1e-10);
+  }
+}
+
+TEST_F(Windows, BothSolversFindTheMinimum) {
+  const SmootherOptions options;
+  Window chain = window(options, 0.05), ceres = window(options, 0.05);
+  EXPECT_EQ(WindowSolver().solve(chain, tight()).termination, SolverTermination::kConverged);
+  EXPECT_EQ(solveWithCeres(ceres, tight()).termination, SolverTermination::kConverged);
+  EXPECT_EQ(expectMinimum(chain), 0);
+  expectSameNodes(chain, ceres, 5e-3);
+  EXPECT_NEAR(chain.nodes.back().t_O, 0.05, 5e-3);
+}
+
+TEST_F(Windows, AWrongJacobianIsNoConvergence) {
+  for (const auto& [name, solve] : solvers()) {
+    Window w = window(SmootherOptions(), 0.05);
+    for (WindowNode& node : w.nodes)
+      for (RadarTerm& term : node.radar) term.cost = std::make_unique<WrongSigned>(std::move(term.cost));
+    const SolveReport report = solve(w, SolverLimits());
+    EXPECT_EQ(report.termination, SolverTermination::kNoDecrease) << name;
+    EXPECT_FALSE(report.converged()) << name;
+  }
+}
+
+TEST_F(Windows, TooFewIterationsAreNoConvergence) {
+  for (const auto& [name, solve] : solvers()) {
+    Window w = window(SmootherOptions(), 0.05);
+    SolverLimits limits;
+    limits.max_iterations = 1;
+    EXPECT_EQ(solve(w, limits).termination, SolverTermination::kIterationLimit) << name;
+  }
+}
+
+TEST_F(Windows, AtItsBoundTheOffsetIsHeldAndTheRestIsSolved) {
+  for (const double bound : {0.05, -0.05}) {
+    for (const auto& [name, solve] : solvers()) {
+      SmootherOptions options;
+      options.max_time_offset = 0.05;
+      options.time_offset_noise = 1e-6;
+      Window w = window(options, 1.6 * bound);
+      EXPECT_EQ(solve(w, SolverLimits()).termination, SolverTermination::kAtBound) << name;
+      EXPECT_EQ(solve(w, tight()).termination, SolverTermination::kAtBound) << name;
+      EXPECT_GT(expectMinimum(w), 0) << name;
+      // The others stand where they would were the offset known to be the bound.
+      options.time_offset_initial = bound;
+      Window known = window(options, 1.6 * bound);
+      known.offset_known = true;
+      for (WindowNode& node : known.nodes) node.t_O = bound;
+      EXPECT_EQ(solve(known, tight()).termination, SolverTermination::kConverged) << name;
+      expectSameNodes(w, known, 5e-3);
+    }
+  }
+}
+
+TEST_F(Windows, TheOffsetLeavesABoundThatIsWidened) {
+  for (const auto& [name, solve] : solvers()) {
+    Window w = window(SmootherOptions(), 0.08);
+    w.max_time_offset = 0.05;
+    EXPECT_EQ(solve(w, SolverLimits()).termination, SolverTermination::kAtBound) << name;
+    w.max_time_offset = 0.25;
+    EXPECT_EQ(solve(w, SolverLimits()).termination, SolverTermination::kConverged) << name;
+    EXPECT_NEAR(w.nodes.back().t_O, 0.08, 5e-3) << name;
+  }
+}
+
+TEST_F(Windows, AnOffsetThatStartsAtTheBoundLeavesIt) {
+  for (const auto& [name, solve] : solvers()) {
+    SmootherOptions options;
+    options.max_time_offset = 0.05;
+    Window w = window(options, 0.02);
+    for (WindowNode& node : w.nodes) node.t_O = 0.05;
+    EXPECT_EQ(solve(w, SolverLimits()).termination, SolverTermination::kConverged) << name;
+    EXPECT_NEAR(w.nodes.back().t_O, 0.02, 5e-3) << name;
+  }
+}
+
+TEST_F(Windows, SomeOffsetsAtTheBoundAndSomeWithin) {
+  for (const auto& [name, solve] : solvers()) {
+    SmootherOptions options;
+    options.max_time_offset = 0.05;
+    options.time_offset_noise = 0.03;
+    Window w = window(options, [](int k) { return 0.02 + 0.01 * k; });
+    EXPECT_EQ(solve(w, tight()).termination, SolverTermination::kAtBound) << name;
+    const int at_bound = expectMinimum(w);
+    EXPECT_GT(at_bound, 1) << name;
+    EXPECT_LT(at_bound, kNodes - 1) << name;
+  }
+}
 
 TEST_F(Smoother, RecoversTheOffsetWithTheImuModel) {
   for (const double t_O : {-0.05, 0.0, 0.03, 0.12}) {
@@ -173,7 +462,7 @@ TEST_F(Smoother, BothSolversFindTheSame) {
     z.v_R += 0.03 * Eigen::Vector3d(std::sin(50 * stamp), std::sin(71 * stamp), std::cos(93 * stamp));
     for (FixedLagSmoother* smoother : {&chain, &ceres}) {
       smoother->add(z);
-      smoother->optimize();
+      EXPECT_TRUE(smoother->optimize(1e-6).converged()) << "at " << stamp;
       smoother->marginalize();
     }
     const NodeEstimate a = chain.newest();
@@ -182,11 +471,10 @@ TEST_F(Smoother, BothSolversFindTheSame) {
     const NodeVector sigma = P.diagonal().cwiseSqrt();
     NodeVector difference;
     difference << boxminus(a.x.data(), b.x.data()), a.t_O - b.t_O;
-    // Each ends where its last step is shorter than that (eq. 23a).
-    EXPECT_LT(difference.cwiseQuotient(sigma).cwiseAbs().maxCoeff(), 0.1) << "at " << stamp;
+    EXPECT_LT(difference.cwiseQuotient(sigma).cwiseAbs().maxCoeff(), 5e-3) << "at " << stamp;
     EXPECT_LT(
         (chain.newestCovariance().diagonal().cwiseSqrt() - sigma).cwiseQuotient(sigma).cwiseAbs().maxCoeff(),
-        0.02)
+        1e-3)
         << "at " << stamp;
   }
 }
@@ -270,6 +558,7 @@ TEST_F(Smoother, ScansThatSayNothingOfTheOffsetLeaveIt) {
   for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
     RadarVelocityMeasurement z = measurement(stamp, 0.0);
     z.held_t_O = 0.0;
+    z.held_t_O = smoother.newest().t_O;
     smoother.add(z);
     smoother.optimize();
     smoother.marginalize();

@@ -220,6 +220,7 @@ std::vector<ScanResult> BatchOdometry::results(const Run& run, const BatchSoluti
     if (result.used) result.rejected_because.clear();
     result.state = navigationState(solution.nodes[k], P, imu_);
     result.time_offset = solution.nodes[k].t_O;
+    result.solver_termination = solution.termination;
     result.time_offset_sigma =
         options_.smoother.estimate_time_offset ? std::sqrt(P(kState, kState)) : 0.0;
   }

@@ -339,7 +339,7 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
 void RadarInertialOdometry::Impl::updateWindow() {
   const SolveReport solve = smoother.optimize();
   result.solver_iterations = solve.iterations;
-  result.solver_converged = solve.converged;
+  result.solver_termination = solve.termination;
   for (const NodeEstimate& node : smoother.marginalize()) {
     result.left_window.push_back({node.time, node.x.p_W(), node.x.q_WI()});
   }

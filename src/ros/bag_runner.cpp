@@ -120,8 +120,9 @@ class BagJob {
     RunSummary summary;
     summary.mode = "batch";
     summary.batch = BatchSummary{result.solution.iterations, result.solution.placements,
-                                 result.solution.converged, result.readmitted};
+                                 result.solution.converged(), result.readmitted};
     log.fill(&summary);
+    summary.solver_terminations = {{toString(result.solution.termination), 1}};
     player.countInput(&summary);
     return finish(std::move(summary), log, *output_);
   }

@@ -53,6 +53,15 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
     row("against truth", errors);
   }
   row("scans", scans);
+  std::uint64_t windows = 0;
+  for (const auto& [reason, count] : summary.solver_terminations) windows += count;
+  std::string unsolved;
+  for (const auto& [reason, count] : summary.solver_terminations) {
+    if (reason == toString(SolverTermination::kConverged)) continue;
+    unsolved += (unsolved.empty() ? "" : ", ") + std::to_string(count) + " of " + std::to_string(windows) +
+                " windows " + reason;
+  }
+  if (!unsolved.empty()) row("solver", unsolved);
   if (!summary.input_faults.empty()) {
     std::string faults;
     for (const auto& [name, count] : summary.input_faults)

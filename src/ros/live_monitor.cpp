@@ -12,9 +12,27 @@ namespace {
 
 using diagnostic_msgs::DiagnosticStatus;
 
+/// Windows by which the solver is judged: 2 s at ten scans a second.
+constexpr std::size_t kWindowsJudged = 20;
+
 double velocitySigma(const NavigationState& state) {
   const Eigen::Vector3d variances = state.covariance.diagonal().segment<3>(StateBlock::kV);
   return std::sqrt(std::max(0.0, variances.maxCoeff()));
+}
+
+/// What to do about windows that keep ending so.
+std::string advice(SolverTermination termination) {
+  switch (termination) {
+    case SolverTermination::kAtBound:
+      return "at the bound of the offset: max_time_offset is too small, or the stamps are wrong";
+    case SolverTermination::kIterationLimit:
+      return "at max_iterations";
+    case SolverTermination::kNoDecrease:
+      return "without a step that lowers the cost";
+    case SolverTermination::kConverged:
+      break;
+  }
+  return "";
 }
 
 }  // namespace
@@ -62,7 +80,10 @@ void LiveMonitor::result(const LiveSession::Result& result) {
   }
   if (!result.result.updated) return;
   ++updates_;
-  if (!result.result.solver_converged) ++not_converged_;
+  const SolverTermination termination = result.result.solver_termination;
+  ++terminations_[termination];
+  last_terminations_.push_back(termination);
+  if (last_terminations_.size() > kWindowsJudged) last_terminations_.pop_front();
   scan_latency_.add(result.latency);
   solver_failure_.clear();
   last_update_ = result;
@@ -78,6 +99,7 @@ void LiveMonitor::reset(const std::string& reason) {
   const std::lock_guard<std::mutex> lock(mutex_);
   ++resets_;
   last_reset_ = reason;
+  last_terminations_.clear();
   last_update_.reset();
   last_used_.reset();
 }
@@ -188,19 +210,34 @@ void LiveMonitor::describeSolver(Status& status, const LiveSession* session) con
   latency("imu_to_odometry", odometry_latency_);
   latency("scan_to_optimised", scan_latency_);
   status.add("updates", updates_);
-  status.add("not_converged", not_converged_);
+  for (const auto& [termination, count] : terminations_) status.add(toString(termination), count);
   if (session != nullptr) status.add("queued_scans", session->queuedScans());
   if (!solver_failure_.empty()) {
     status.summary(DiagnosticStatus::ERROR, solver_failure_);
-  } else if (!last_update_) {
-    status.summary(DiagnosticStatus::OK, "nothing to solve yet");
-  } else {
-    status.add("iterations", last_update_->result.solver_iterations);
-    // Each scan gets a few iterations from where the last one ended: not converging in one of them is no
-    // fault.
-    const bool converged = last_update_->result.solver_converged;
-    status.summary(DiagnosticStatus::OK, converged ? "converged" : "stopped at max_iterations");
+    return;
   }
+  if (!last_update_) {
+    status.summary(DiagnosticStatus::OK, "nothing to solve yet");
+    return;
+  }
+  status.add("iterations", last_update_->result.solver_iterations);
+  status.add("termination", toString(last_terminations_.back()));
+  // A window gets a few iterations from where the last one ended: one of them that does not converge is no
+  // fault.
+  const auto countOf = [&](SolverTermination termination) {
+    return std::count(last_terminations_.begin(), last_terminations_.end(), termination);
+  };
+  const auto full = static_cast<std::ptrdiff_t>(kWindowsJudged);
+  const std::ptrdiff_t converged = countOf(SolverTermination::kConverged);
+  if (last_terminations_.size() < kWindowsJudged || 2 * converged >= full) {
+    status.summary(DiagnosticStatus::OK, "solving");
+    return;
+  }
+  SolverTermination worst = SolverTermination::kAtBound;
+  for (const SolverTermination other : {SolverTermination::kIterationLimit, SolverTermination::kNoDecrease})
+    if (countOf(other) > countOf(worst)) worst = other;
+  status.summary(DiagnosticStatus::WARN, std::to_string(countOf(worst)) + " of the last " +
+                                             std::to_string(full) + " windows ended " + advice(worst));
 }
 
 void LiveMonitor::describeTimeOffset(Status& status) const {

@@ -23,6 +23,7 @@ void RunLog::addResult(ScanResult& result) {
     ++rejected_[result.rejected_because];
   }
   if (result.updated) {
+    ++terminations_[result.solver_termination];
     final_offset_s_ = result.time_offset;
     final_offset_sigma_s_ = result.time_offset_sigma;
   }
@@ -31,6 +32,8 @@ void RunLog::addResult(ScanResult& result) {
 void RunLog::fill(RunSummary* summary) const {
   summary->scans_used = used_;
   summary->scans_rejected = rejected_;
+  for (const auto& [termination, count] : terminations_)
+    summary->solver_terminations[toString(termination)] = count;
   summary->path_length_m = path_length_m_;
   summary->final_offset_s = final_offset_s_;
   summary->final_offset_sigma_s = final_offset_sigma_s_;

@@ -30,6 +30,7 @@ class RunLog {
   Trajectory trajectory_;
   std::uint64_t used_ = 0;
   std::map<std::string, std::uint64_t> rejected_;
+  std::map<SolverTermination, std::uint64_t> terminations_;
   std::optional<StampedPose> newest_optimized_;
   double path_length_m_ = 0.0;
   double final_offset_s_ = 0.0;

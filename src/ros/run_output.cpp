@@ -64,6 +64,7 @@ std::string summaryText(const RunSummary& summary) {
   line("scans_used", std::to_string(summary.scans_used));
   line("scans_rejected", mapText(summary.scans_rejected));
   line("input_faults", mapText(summary.input_faults));
+  line("solver_terminations", mapText(summary.solver_terminations));
   line("initialized_from", summary.initialized_from.empty() ? "none" : summary.initialized_from);
   line("health_at_end", summary.health_at_end);
   line("divergences", std::to_string(summary.divergences));

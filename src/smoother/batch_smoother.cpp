@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <numeric>
 #include <stdexcept>
 #include <utility>
 
 #include "rio_t/factors/offset_derivative.h"
-#include "rio_t/factors/state_manifold.h"
 #include "rio_t/imu/preintegration.h"
 #include "rio_t/smoother/chain_marginals.h"
 #include "rio_t/smoother/factor_pool.h"
@@ -23,16 +21,6 @@ namespace {
 constexpr double kMinNodeSpacing = 0.005;
 /// Squared length of the step that is left, in standard deviations, below which the solution stands.
 constexpr double kConverged = 1e-6;
-
-void takeStep(const ChainSolution& step, Window& window) {
-  for (std::size_t k = 0; k < window.nodes.size(); ++k) {
-    WindowNode& node = window.nodes[k];
-    boxplus(node.x.data(), step.delta[k].data(), node.x.data());
-    if (window.offset_known) continue;
-    node.t_O = std::clamp(node.t_O + step.delta[k](StateBlock::kTangent), -window.max_time_offset,
-                          window.max_time_offset);
-  }
-}
 
 }  // namespace
 
@@ -118,20 +106,22 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
   for (const BatchScan& scan : problem.scans) t_O.push_back(scan.t_O);
 
   BatchSolution solution;
-  ChainSolution step;
+  WindowStep step;
   Graph graph = place(problem, t_O, problem.guess);
   solution.placements = 1;
   for (;;) {
-    solution.iterations += solveWithCeres(graph.window, batch_.max_iterations).iterations;
+    SolverLimits limits;
+    limits.max_iterations = batch_.max_iterations;
+    const SolveReport report = solveWithCeres(graph.window, limits);
+    solution.iterations += report.iterations;
     // Ceres does not take the step at which it stops; the chain takes those that are left.
-    double left = std::numeric_limits<double>::infinity();
     for (;; ++solution.iterations) {
       linearize(graph.window, &solution.normal_equations);
-      if (!rio_t::solve(solution.normal_equations, 0.0, &step))
+      if (!step.solve(graph.window, solution.normal_equations, 0.0))
         throw std::runtime_error("batch: the data do not determine every state");
-      left = step.decrease;
-      if (left < kConverged || left > 1.0 || solution.iterations >= batch_.max_iterations) break;
-      takeStep(step, graph.window);
+      if (step.length() < kConverged || step.length() > 1.0 || solution.iterations >= batch_.max_iterations)
+        break;
+      step.take(1.0, graph.window);
     }
 
     solution.nodes.clear();
@@ -140,8 +130,14 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
     for (std::size_t i = 0; i < t_O.size(); ++i)
       moved = std::max(moved, std::abs(solution.nodes[graph.node_of_scan[i]].t_O - t_O[i]));
     const bool placed = !atMeasurement() || moved <= batch_.placement_tolerance;
-    solution.converged = placed && left < kConverged;
-    if (solution.converged || solution.iterations >= batch_.max_iterations) break;
+    if (placed && step.length() < kConverged) {
+      solution.termination = step.atBound() ? SolverTermination::kAtBound : SolverTermination::kConverged;
+      break;
+    }
+    if (solution.iterations >= batch_.max_iterations) {
+      if (!report.converged()) solution.termination = report.termination;
+      break;
+    }
     if (placed) continue;
     for (std::size_t i = 0; i < t_O.size(); ++i) t_O[i] = solution.nodes[graph.node_of_scan[i]].t_O;
     graph = place(problem, t_O, solution.nodes);

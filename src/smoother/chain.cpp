@@ -154,6 +154,23 @@ void ChainSystem::addStatePair(std::size_t k, const ImuFactor& factor, const dou
   addStoredVector(b1, gradient[k + 1]);
 }
 
+void ChainSystem::holdOffset(std::size_t k, double step) {
+  NodeMatrix& H = diagonal[k];
+  gradient[k] += step * H.col(kState);
+  H.col(kState).setZero();
+  H.row(kState).setZero();
+  H(kState, kState) = 1.0;
+  gradient[k](kState) = 0.0;
+  if (k > 0) {
+    gradient[k - 1] += step * coupling[k - 1].col(kState);
+    coupling[k - 1].col(kState).setZero();
+  }
+  if (k + 1 < diagonal.size()) {
+    gradient[k + 1] += step * coupling[k].row(kState).transpose();
+    coupling[k].row(kState).setZero();
+  }
+}
+
 NodeInformation eliminateFirst(const NodeMatrix& H00, const NodeMatrix& H01, const NodeVector& b0,
                                const NodeMatrix& H11, const NodeVector& b1) {
   Eigen::LLT<NodeMatrix> factor(H00);

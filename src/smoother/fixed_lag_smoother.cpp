@@ -206,13 +206,14 @@ double FixedLagSmoother::offsetVariance(double dt) const {
   return options_.time_offset_noise * options_.time_offset_noise * dt;
 }
 
-SolveReport FixedLagSmoother::optimize() {
+SolveReport FixedLagSmoother::optimize(double short_step) {
+  const SolverLimits limits{options_.max_iterations, short_step};
   if (options_.solver == WindowSolverKind::kCeres) {
-    const SolveReport report = solveWithCeres(window_, options_.max_iterations);
+    const SolveReport report = solveWithCeres(window_, limits);
     newest_covariance_ = rio_t::newestCovariance(window_);
     return report;
   }
-  const SolveReport report = solver_.solve(window_, options_.max_iterations);
+  const SolveReport report = solver_.solve(window_, limits);
   newest_covariance_ = solver_.newestCovariance();
   return report;
 }

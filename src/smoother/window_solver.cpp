@@ -4,6 +4,9 @@
 #include <ceres/solver.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -12,12 +15,15 @@
 namespace rio_t {
 namespace {
 
-/// Squared length of a step in standard deviations, below which it is the last one (eq. 23a).
-constexpr double kConverged = 1e-2;
+/// A t_O that is nearer to its bound stands at it [s].
+constexpr double kAtBound = 1e-9;
+/// Of the active set to settle. Each pass moves whole runs of nodes: a few do.
+constexpr int kMaxPasses = 10;
 /// Of a step that is tried where the whole one raises the cost. A tilt that is lost makes steps of a radian,
 /// over which the graph is not linear but the direction is right; damping would shorten them to a hundredth.
 constexpr double kShortestShare = 0.06;
 constexpr double kFirstDamping = 1e-4;
+constexpr int kOffset = StateBlock::kTangent;
 
 ceres::Problem::Options borrowingProblem() {
   ceres::Problem::Options options;
@@ -32,15 +38,39 @@ ceres::Problem::Options borrowingProblem() {
   return options;
 }
 
-void takeStep(const ChainSolution& solution, double share, Window& window) {
-  for (std::size_t k = 0; k < window.nodes.size(); ++k) {
-    WindowNode& node = window.nodes[k];
-    const NodeVector delta = share * solution.delta[k];
-    boxplus(node.x.data(), delta.data(), node.x.data());
-    if (window.offset_known) continue;
-    node.t_O =
-        std::clamp(node.t_O + delta(StateBlock::kTangent), -window.max_time_offset, window.max_time_offset);
+/// Beyond the bound the radar factors say nothing new.
+class StopBeyondBound final : public ceres::IterationCallback {
+ public:
+  explicit StopBeyondBound(const Window& window) : window_(window) {}
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& /*summary*/) override {
+    const auto beyond = [&](const WindowNode& node) {
+      return std::abs(node.t_O) > window_.max_time_offset + kAtBound;
+    };
+    const bool any = std::any_of(window_.nodes.begin(), window_.nodes.end(), beyond);
+    return any && !window_.offset_known ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
   }
+
+ private:
+  const Window& window_;
+};
+
+/// Moves to their bound, and makes constant, the t_O that `step` holds there, and no others. False: no
+/// change.
+bool holdAtBound(const WindowStep& step, Window& window, ceres::Problem& problem) {
+  bool changed = false;
+  for (std::size_t k = 0; k < window.nodes.size(); ++k) {
+    double* const t_O = &window.nodes[k].t_O;
+    const std::optional<double> bound = step.heldAt(k);
+    if (bound.has_value() == problem.IsParameterBlockConstant(t_O)) continue;
+    changed = true;
+    if (bound) {
+      *t_O = *bound;
+      problem.SetParameterBlockConstant(t_O);
+    } else {
+      problem.SetParameterBlockVariable(t_O);
+    }
+  }
+  return changed;
 }
 
 }  // namespace
@@ -62,30 +92,121 @@ void linearize(const Window& window, ChainSystem* system) {
   }
 }
 
-SolveReport WindowSolver::solve(Window& window, int max_iterations) {
+void WindowStep::take(double share, Window& window) const {
+  for (std::size_t k = 0; k < window.nodes.size(); ++k) {
+    WindowNode& node = window.nodes[k];
+    const NodeVector delta = share * solution_.delta[k];
+    boxplus(node.x.data(), delta.data(), node.x.data());
+    if (window.offset_known) continue;
+    node.t_O = std::clamp(node.t_O + delta(kOffset), -window.max_time_offset, window.max_time_offset);
+  }
+}
+
+bool WindowStep::solve(const Window& window, const ChainSystem& system, double damping) {
+  holdWherePushedOutwards(window, system);
+  for (int pass = 0; pass < kMaxPasses; ++pass) {
+    if (!solveWithHeld(window, system, damping)) return false;
+    const bool released = at_bound_ && releaseWherePulledInwards(system, damping);
+    const bool crossed = !window.offset_known && holdWhereCrossed(window);
+    if (!released && !crossed) return true;
+  }
+  length_ = std::numeric_limits<double>::infinity();
+  return true;
+}
+
+void WindowStep::holdWherePushedOutwards(const Window& window, const ChainSystem& system) {
+  held_.assign(window.nodes.size(), std::nullopt);
+  at_bound_ = false;
+  if (window.offset_known) return;
+  for (std::size_t k = 0; k < held_.size(); ++k) {
+    const double t_O = window.nodes[k].t_O;
+    if (std::abs(t_O) < window.max_time_offset - kAtBound || t_O * system.gradient[k](kOffset) >= 0.0)
+      continue;
+    held_[k] = std::copysign(window.max_time_offset, t_O);
+    at_bound_ = true;
+  }
+}
+
+bool WindowStep::solveWithHeld(const Window& window, const ChainSystem& system, double damping) {
+  const auto solveChain = [&](const ChainSystem& chain) {
+    return damping == 0.0 ? solveUndamped(chain, &solution_) : rio_t::solve(chain, damping, &solution_);
+  };
+  if (!at_bound_) {
+    const bool solved = solveChain(system);
+    length_ = solution_.decrease;
+    return solved;
+  }
+  reduced_ = system;
+  for (std::size_t k = 0; k < held_.size(); ++k)
+    if (held_[k]) reduced_.holdOffset(k, *held_[k] - window.nodes[k].t_O);
+  if (!solveChain(reduced_)) return false;
+  for (std::size_t k = 0; k < held_.size(); ++k)
+    if (held_[k]) solution_.delta[k](kOffset) = *held_[k] - window.nodes[k].t_O;
+  return true;
+}
+
+bool WindowStep::holdWhereCrossed(const Window& window) {
+  bool any = false;
+  for (std::size_t k = 0; k < held_.size(); ++k) {
+    const double t_O = window.nodes[k].t_O + solution_.delta[k](kOffset);
+    if (held_[k] || std::abs(t_O) <= window.max_time_offset + kAtBound) continue;
+    held_[k] = std::copysign(window.max_time_offset, t_O);
+    at_bound_ = any = true;
+  }
+  return any;
+}
+
+bool WindowStep::releaseWherePulledInwards(const ChainSystem& system, double damping) {
+  bool any = false;
+  at_bound_ = false;
+  length_ = 0.0;
+  for (std::size_t k = 0; k < held_.size(); ++k) {
+    const NodeVector& delta = solution_.delta[k];
+    const NodeMatrix& H = system.diagonal[k];
+    NodeVector image = H * delta + damping * H.diagonal().cwiseProduct(delta);
+    if (k > 0) image += system.coupling[k - 1].transpose() * solution_.delta[k - 1];
+    if (k + 1 < held_.size()) image += system.coupling[k] * solution_.delta[k + 1];
+    length_ += delta.dot(image);
+    if (held_[k] && *held_[k] * (system.gradient[k](kOffset) + image(kOffset)) > 0.0) {
+      held_[k].reset();
+      any = true;
+    }
+    at_bound_ = at_bound_ || held_[k];
+  }
+  return any;
+}
+
+SolveReport WindowSolver::solve(Window& window, const SolverLimits& limits) {
   SolveReport report;
   double damping = 0.0;
-  bool is_of_system = false;  // solution_, without damping
+  bool tested = false;        // the undamped step at these nodes is long
+  bool is_of_system = false;  // step_, without damping and with nothing held
   linearize(window, &system_);
   for (report.iterations = 1;; ++report.iterations) {
-    const bool solved =
-        damping == 0.0 ? solveUndamped(system_, &solution_) : rio_t::solve(system_, damping, &solution_);
-    is_of_system = solved && damping == 0.0;
-    report.converged = solved && solution_.decrease < kConverged;
-    if (report.converged && damping == 0.0) takeStep(solution_, 1.0, window);
-    if (report.converged || report.iterations >= max_iterations) break;
-    const double cost = system_.cost;
-    if (solved && stepLowersCost(window)) {
-      is_of_system = false;
-      report.converged = cost - system_.cost < 0.5 * kConverged;
-      if (report.converged) break;
+    const bool solved = step_.solve(window, system_, damping);
+    const bool is_short = solved && step_.length() < limits.short_step;
+    is_of_system = solved && damping == 0.0 && !step_.atBound();
+    if (is_short && damping == 0.0) {
+      step_.take(1.0, window);
+      report.termination = step_.atBound() ? SolverTermination::kAtBound : SolverTermination::kConverged;
+      break;
+    }
+    if (report.iterations >= limits.max_iterations) break;
+    if (damping == 0.0) tested = true;
+    if (is_short && !tested) {
+      damping = 0.0;  // short by the damping, or because little is left to go
+    } else if (solved && stepLowersCost(window)) {
+      is_of_system = tested = false;
       damping = damping > kFirstDamping ? 0.1 * damping : 0.0;
+    } else if (is_short) {
+      report.termination = SolverTermination::kNoDecrease;
+      break;
     } else {
       damping = std::max(kFirstDamping, 10.0 * damping);
     }
   }
-  covariance_ = is_of_system ? NodeMatrix(solution_.newest.solve(NodeMatrix::Identity()))
-                             : covarianceOfLast(system_, &solution_);
+  covariance_ = is_of_system ? NodeMatrix(step_.solution().newest.solve(NodeMatrix::Identity()))
+                             : covarianceOfLast(system_, &step_.solution());
   return report;
 }
 
@@ -98,9 +219,9 @@ bool WindowSolver::stepLowersCost(Window& window) {
     offsets_before_[k] = window.nodes[k].t_O;
   }
   for (double share = 1.0; share > kShortestShare; share *= 0.5) {
-    takeStep(solution_, share, window);
+    step_.take(share, window);
     linearize(window, &candidate_);
-    if (candidate_.cost <= system_.cost) {
+    if (candidate_.cost < system_.cost) {
       std::swap(system_, candidate_);
       return true;
     }
@@ -119,7 +240,7 @@ NodeMatrix newestCovariance(const Window& window) {
   return covarianceOfLast(system, &solution);
 }
 
-SolveReport solveWithCeres(Window& window, int max_iterations) {
+SolveReport solveWithCeres(Window& window, const SolverLimits& limits) {
   StateManifold manifold;
   ceres::Problem problem(borrowingProblem());
   for (WindowNode& node : window.nodes) {
@@ -142,17 +263,57 @@ SolveReport solveWithCeres(Window& window, int max_iterations) {
 
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  options.max_num_iterations = max_iterations;
+  options.max_num_iterations = limits.max_iterations;
+  // Those of Ceres with the short_step that is the default.
+  options.function_tolerance = 1e-4 * limits.short_step;
+  options.gradient_tolerance = 1e-8 * limits.short_step;
+  options.parameter_tolerance = 1e-6 * limits.short_step;
   options.num_threads = 1;
   // Warm-started problems are near their solution: begin as Gauss-Newton. With the default radius the weakly
   // observable directions (offset, biases) take a dozen iterations instead of two or three.
   options.initial_trust_region_radius = 1e12;
   options.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem, &summary);
-  for (WindowNode& node : nodes)
-    node.t_O = std::clamp(node.t_O, -window.max_time_offset, window.max_time_offset);
-  return {static_cast<int>(summary.iterations.size()), summary.termination_type == ceres::CONVERGENCE};
+  StopBeyondBound stop_beyond_bound(window);
+  options.callbacks = {&stop_beyond_bound};
+  options.update_state_every_iteration = true;
+
+  SolveReport report;
+  ChainSystem system;
+  WindowStep step;
+  for (;;) {
+    ceres::Solver::Summary summary;
+    ceres::Solve(options, &problem, &summary);
+    report.iterations += static_cast<int>(summary.iterations.size());
+    for (WindowNode& node : nodes)
+      node.t_O = std::clamp(node.t_O, -window.max_time_offset, window.max_time_offset);
+    linearize(window, &system);
+    const bool solved = step.solve(window, system, 0.0);
+    if (solved && step.length() < limits.short_step) {
+      report.termination = step.atBound() ? SolverTermination::kAtBound : SolverTermination::kConverged;
+      return report;
+    }
+    options.max_num_iterations = limits.max_iterations - report.iterations;
+    if (options.max_num_iterations <= 0 || summary.termination_type == ceres::NO_CONVERGENCE) return report;
+    const bool held_others = !window.offset_known && holdAtBound(step, window, problem);
+    if (!held_others && summary.termination_type != ceres::USER_SUCCESS) {
+      report.termination = SolverTermination::kNoDecrease;
+      return report;
+    }
+  }
+}
+
+std::string toString(SolverTermination termination) {
+  switch (termination) {
+    case SolverTermination::kConverged:
+      return "converged";
+    case SolverTermination::kAtBound:
+      return "at_bound";
+    case SolverTermination::kIterationLimit:
+      return "iteration_limit";
+    case SolverTermination::kNoDecrease:
+      return "no_decrease";
+  }
+  return "";
 }
 
 }  // namespace rio_t

@@ -13,6 +13,7 @@
 #include "rio_t/odometry/initializer.h"
 #include "rio_t/odometry/navigation_state.h"
 #include "rio_t/odometry/options.h"
+#include "rio_t/smoother/solver_termination.h"
 
 namespace rio_t {
 
@@ -32,7 +33,7 @@ struct ScanResult {
   double time_offset = 0.0;        ///< t_O [s]
   double time_offset_sigma = 0.0;  ///< [s]
   int solver_iterations = 0;
-  bool solver_converged = false;
+  SolverTermination solver_termination = SolverTermination::kIterationLimit;
   Health health = Health::kOk;           ///< after this scan; set always
   bool reinitialized = false;            ///< the state was found anew before this scan
   std::vector<StampedPose> left_window;  ///< optimised poses that this scan pushed out, oldest first

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -57,7 +58,9 @@ class LiveMonitor {
   Clock::time_point told_ = Clock::now();
   Latency odometry_latency_, scan_latency_;
   std::map<std::string, std::uint64_t> dropped_;
-  std::uint64_t used_ = 0, updates_ = 0, not_converged_ = 0, resets_ = 0, queue_full_told_ = 0;
+  std::uint64_t used_ = 0, updates_ = 0, resets_ = 0, queue_full_told_ = 0;
+  std::map<SolverTermination, std::uint64_t> terminations_;
+  std::deque<SolverTermination> last_terminations_;  // of the last windows, newest last
   std::string last_reset_, waiting_for_, solver_failure_;
   std::optional<LiveSession::Result> last_update_;
   std::optional<Time> last_used_;  // stamp of the last scan used

@@ -39,9 +39,11 @@ struct RunSummary {
   std::uint64_t scans_used = 0;
   std::map<std::string, std::uint64_t> scans_rejected;  ///< by reason
   std::map<std::string, std::uint64_t> input_faults;    ///< by name
-  std::vector<std::string> warnings;                    ///< for people; not in the file
-  std::string initialized_from;                         ///< "rest" or "motion"; empty: never initialised
-  std::string health_at_end = "ok";                     ///< "ok", "coasting", "diverged"
+  /// Why the solver stopped: windows by reason; with mode batch the one solve of the whole run.
+  std::map<std::string, std::uint64_t> solver_terminations;
+  std::vector<std::string> warnings;  ///< for people; not in the file
+  std::string initialized_from;       ///< "rest" or "motion"; empty: never initialised
+  std::string health_at_end = "ok";   ///< "ok", "coasting", "diverged"
   std::uint64_t divergences = 0;
   std::uint64_t reinitializations = 0;
   double path_length_m = 0.0;      ///< of the optimised poses

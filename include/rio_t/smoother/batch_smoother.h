@@ -10,6 +10,7 @@
 #include "rio_t/smoother/chain.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
 #include "rio_t/smoother/options.h"
+#include "rio_t/smoother/solver_termination.h"
 #include "rio_t/smoother/window.h"
 
 namespace rio_t {
@@ -44,7 +45,8 @@ struct BatchSolution {
   ChainSystem normal_equations;           ///< at the solution
   int iterations = 0;                     ///< of the solver, all placements together
   int placements = 0;                     ///< how often the nodes were placed
-  bool converged = false;
+  SolverTermination termination = SolverTermination::kIterationLimit;
+  bool converged() const { return isConverged(termination); }
 };
 
 /// The graph of FixedLagSmoother over all the data at once: same factors, nothing marginalised, solved with

@@ -39,6 +39,10 @@ struct ChainSystem {
   void addOffsetPair(std::size_t k, const ConstantOffsetFactor& factor, const double* t_O,
                      const double* next_t_O);
   void addStatePair(std::size_t k, const ImuFactor& factor, const double* state, const double* next_state);
+
+  /// Takes t_O,k out, as known to move by `step` [s]: its row and column are empty but for the diagonal, so
+  /// that its delta comes out as zero, and the others are solved given the step.
+  void holdOffset(std::size_t k, double step);
 };
 
 /// What the first node and its coupling say about the second: S = H11 - H10 H00^-1 H01, s = b1 - H10 H00^-1

@@ -72,7 +72,8 @@ class FixedLagSmoother {
     offset_stepped_at_ = stamp;
     offset_step_is_new_ = true;
   }
-  SolveReport optimize();
+  /// `short_step`: see SolverLimits.
+  SolveReport optimize(double short_step = SolverLimits().short_step);
   /// Marginalises what is older than the window; the nodes that left, oldest first, until the next call.
   const std::vector<NodeEstimate>& marginalize();
 
