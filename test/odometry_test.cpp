@@ -64,7 +64,7 @@ TEST_F(AtRest, AScanWaitsUntilTheImuCoversIt) {
   odometry.addScan(restScan(104.1));
   EXPECT_TRUE(odometry.process().empty());
   EXPECT_TRUE(run(104.1).empty());
-  const auto results = run(104.2);
+  const auto results = run(104.25);
   ASSERT_EQ(results.size(), 1u);
   EXPECT_TRUE(results[0].used) << results[0].rejected_because;
 }
@@ -319,6 +319,29 @@ TEST(Crowd, IsNoDivergenceAndNoStepOfTheOffset) {
       EXPECT_EQ(run.odometry->faults()["time_offset_step"], 0u) << crowd << " persons, seed " << seed;
       EXPECT_LT(run.rms(10.0, 100.0, [&](const NavigationState& state) { return run.velocityError(state); }),
                 0.1);
+    }
+  }
+}
+
+/// Straight ahead at 3 m/s on a frame that vibrates, then at rest.
+TEST(Vibration, AfterBrakingThePlatformIsAtRest) {
+  for (const double imu_rate : {100.0, 400.0}) {
+    for (const double vibration : {0.3, 0.8, 2.0}) {
+      simulation::MotionRequest request;
+      request.name = "constant_speed";
+      request.duration = 40.0;
+      request.speed = 3.0;
+      request.rest.static_start = 5.0;
+      request.rest.static_end = 4.0;
+      SimulatedRun run("constant_speed", 1, 40.0, 5.0);
+      run.motion = simulation::makeMotion(request);
+      run.setup.imu.rate = imu_rate;
+      run.setup.imu.accel_vibration = vibration;
+      run.setup.time_offset.constant = 0.03;
+      run.run();
+      const auto error = [&](const NavigationState& state) { return run.velocityError(state); };
+      EXPECT_LT(run.rms(37.5, 40.0, error), 0.05) << vibration << " m/s^2 at " << imu_rate << " Hz";
+      EXPECT_EQ(run.odometry->faults()["diverged"], 0u);
     }
   }
 }

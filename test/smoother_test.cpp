@@ -557,7 +557,6 @@ TEST_F(Smoother, ScansThatSayNothingOfTheOffsetLeaveIt) {
   FixedLagSmoother smoother = make(options);
   for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
     RadarVelocityMeasurement z = measurement(stamp, 0.0);
-    z.held_t_O = 0.0;
     z.held_t_O = smoother.newest().t_O;
     smoother.add(z);
     smoother.optimize();

@@ -11,6 +11,9 @@ namespace {
 
 /// How far back an anchor may lie [s]; bounds the history. A solver that is later has no say.
 constexpr double kHistory = 30.0;
+/// [sigma] A velocity that the IMU gained since rest and that its noise does not explain (chi-squared, 3
+/// degrees of freedom: once in 900 times).
+constexpr double kMoves = 4.0;
 
 }  // namespace
 
@@ -20,12 +23,29 @@ std::optional<NavigationState> Navigator::add(const ImuMeasurement& imu) {
   }
   history_.push_back(imu);
   while (imu.time - history_.front().time > kHistory) history_.pop_front();
-  return state_;
+  return state();
 }
 
-void Navigator::anchor(const NavigationState& state) {
+std::optional<NavigationState> Navigator::state() const {
+  const bool vibrates =
+      !history_.empty() && history_.back().accel_noise > noise_.accel_density * noise_.accel_density;
+  if (!state_ || !rest_ || !vibrates) return state_;
+  constexpr int kV = StateBlock::kV;
+  const Eigen::Vector3d gained = state_->v_W - rest_->v_W;
+  const Eigen::Matrix3d noise =
+      state_->covariance.block<3, 3>(kV, kV) - rest_->covariance.block<3, 3>(kV, kV);
+  const double variance = noise.trace() / 3.0;
+  if (gained.squaredNorm() > kMoves * kMoves * variance) return state_;
+  NavigationState held = *state_;
+  held.v_W = rest_->v_W;
+  held.p_W = rest_->p_W + (state_->time - rest_->time) * rest_->v_W;
+  return held;
+}
+
+void Navigator::anchor(const NavigationState& state, bool at_rest) {
   if (state_ && history_.back().time - state.time > kHistory) return;
   state_ = state;
+  rest_ = at_rest ? state_ : std::nullopt;
   const auto later = std::upper_bound(history_.begin(), history_.end(), state.time,
                                       [](Time time, const ImuMeasurement& imu) { return time < imu.time; });
   for (const ImuMeasurement* imu = later; imu != history_.end(); ++imu) {

@@ -79,7 +79,7 @@ struct RadarInertialOdometry::Impl {
   void startAgain();
   void watchRadar(bool scan_came);
   void carryWindow();
-  void anchorNavigator(const NavigationState& state);
+  void anchorNavigator(const NavigationState& state, bool at_rest = false);
   void tryInitialize(const ImuMeasurement& sample);
   void begin(Time time, const NodePrior& prior);
   /// The poses of the window that is given up go to `left`.
@@ -351,7 +351,8 @@ void RadarInertialOdometry::Impl::updateWindow() {
       options.smoother.estimate_time_offset
           ? offset_uncertainty.sigma(covariance(StateBlock::kTangent, StateBlock::kTangent))
           : 0.0;
-  anchorNavigator(result.state);
+  anchorNavigator(result.state,
+                  result.used && result.ego_velocity.status == EgoVelocityStatus::kZeroVelocity);
 }
 
 std::vector<ScanResult> RadarInertialOdometry::finish() {
@@ -445,12 +446,12 @@ void RadarInertialOdometry::Impl::carryWindow() {
     left_in_silence.push_back({node.time, node.x.p_W(), node.x.q_WI()});
 }
 
-void RadarInertialOdometry::Impl::anchorNavigator(const NavigationState& state) {
+void RadarInertialOdometry::Impl::anchorNavigator(const NavigationState& state, bool at_rest) {
   const std::lock_guard<std::mutex> lock(navigation_mutex);
   // Else the navigator lives already in another time.
   if (clock_restarts != clock_restarts_done) return;
   navigator.setNoise(imuNoise());
-  navigator.anchor(state);
+  navigator.anchor(state, at_rest);
 }
 
 void RadarInertialOdometry::Impl::tryInitialize(const ImuMeasurement& sample) {

@@ -20,11 +20,13 @@ class Navigator {
 
   /// New optimised state, usually some 100 ms before the newest sample: everything since is integrated again.
   /// One more than 30 s old is not taken.
-  void anchor(const NavigationState& state);
+  /// `at_rest`: the radar saw no motion at that time. While the IMU vibrates, what it adds since is noise until
+  /// it is more than that: velocity and position stay where they are.
+  void anchor(const NavigationState& state, bool at_rest = false);
   /// Noise of the IMU from here on.
   void setNoise(const ImuNoise& noise) { noise_ = noise; }
   /// At the newest sample; none before the first anchor.
-  const std::optional<NavigationState>& state() const { return state_; }
+  std::optional<NavigationState> state() const;
 
  private:
   void propagate(const ImuMeasurement& from, const ImuMeasurement& to);
@@ -33,6 +35,7 @@ class Navigator {
   Eigen::Vector3d g_W_;  // read-only after construction
   SlidingQueue<ImuMeasurement> history_;
   std::optional<NavigationState> state_;
+  std::optional<NavigationState> rest_;  ///< the anchor, if the platform was at rest there
 };
 
 }  // namespace rio_t
