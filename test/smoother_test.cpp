@@ -199,7 +199,7 @@ class Windows : public Smoother {
   Window window(const SmootherOptions& options, const std::function<double(int)>& t_O) const {
     FactorPool pool(options, ImuNoise(), motion.g_W, imu);
     Window result;
-    result.prior = std::make_unique<PriorFactor>(priorAtRest(options, motion.state(0.5), 1e-4));
+    result.prior = std::make_unique<PriorFactor>(priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0));
     result.loss = std::make_unique<ceres::HuberLoss>(options.huber_threshold);
     result.max_time_offset = options.max_time_offset;
     for (int k = 0; k < kNodes; ++k) {

@@ -199,7 +199,9 @@ TEST(TemporalCalibration, VibrationTeachesNothing) {
               << imu_rate << " Hz, " << shaken.vibration << " m/s^2, " << shaken.frequency << " Hz, seed "
               << seed << " at " << run.seconds(result.scan.stamp) << " s";
         }
-        if (shaken.frequency == 0.0) EXPECT_GT(offsetAt(run, 60.0).sigma, 0.5 * quiet_sigma);
+        if (shaken.frequency == 0.0) {
+          EXPECT_GT(offsetAt(run, 60.0).sigma, 0.5 * quiet_sigma);
+        }
       }
     }
   }
