@@ -184,7 +184,8 @@ TEST_F(BagRunner, EveryScanIsAccountedFor) {
   for (const char* key : {"imu_count: 1600\n", "scans_total: 80\n", "scans_used: ", "scans_rejected: {",
                           "solver_terminations: {converged: ", "path_length_m: ", "end_to_start_2d_m: ",
                           "end_to_start_3d_m: ", "final_offset_s: ", "final_offset_sigma_s: ",
-                          "saved: [trajectory.txt", "estimation_seconds: ", "realtime_factor: "}) {
+                          "radar_noise: {doppler: 0.", "saved: [trajectory.txt", "estimation_seconds: ",
+                          "realtime_factor: "}) {
     EXPECT_NE(yaml.find(key), std::string::npos) << key;
   }
   EXPECT_EQ(yaml.find("ate_m"), std::string::npos);
@@ -534,7 +535,7 @@ TEST_F(RealBag, TriggerStampsEndWhereTheyStarted) {
   EXPECT_EQ(summary.imu_count, 8270u);
   EXPECT_EQ(summary.scans_total, 412u);
   EXPECT_LE(summary.end_to_start_2d_m, 0.10);
-  EXPECT_LE(summary.end_to_start_3d_m, 1.4);
+  EXPECT_LE(summary.end_to_start_3d_m, 1.65);  // the published rotation is tilted
   EXPECT_GT(summary.final_offset_s, -0.020);
   EXPECT_LT(summary.final_offset_s, 0.0);
   EXPECT_GT(summary.final_offset_sigma_s, 0.0);

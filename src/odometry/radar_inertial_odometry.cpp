@@ -20,8 +20,8 @@
 namespace rio_t {
 namespace {
 
-/// The IMU must be this far past a scan's node [s]: the derivative with respect to t_O looks so far ahead, and
-/// the factor's time may still move a little.
+/// The IMU must be this far past a scan's node [s]: the derivative with respect to t_O looks so far ahead,
+/// and the factor's time may still move a little.
 constexpr double kImuMargin = kOffsetHalfWidth + 0.01;
 /// A scan stamped further ahead of the newest IMU sample is nonsense, not early [s]; unless the IMU may still
 /// come.
@@ -267,6 +267,8 @@ void RadarInertialOdometry::Impl::useScan(const RadarScan& scan, bool imu_has_en
   }
   result.used = result.rejected_because.empty();
   if (result.used) innovation_gate.used(scan.stamp);
+  if (result.used && !at_rest)
+    ego_velocity_estimator.learn(scan, result.ego_velocity, &ego_velocity_workspace);
   result.updated = result.used;
   if (at_rest) {
     result.updated |=
@@ -563,6 +565,8 @@ bool RadarInertialOdometry::initialized() const {
 }
 
 std::optional<RadarInertialOdometry::Start> RadarInertialOdometry::start() const { return impl_->start; }
+
+PointVariances RadarInertialOdometry::radarNoise() const { return impl_->ego_velocity_estimator.noise(); }
 
 Health RadarInertialOdometry::health() const {
   const std::lock_guard<std::mutex> lock(impl_->inbox_mutex);

@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "direction_noise.h"
 #include "velocity_solver.h"
 
 namespace rio_t {
@@ -143,13 +144,15 @@ std::optional<Eigen::Vector3d> ransac(const std::vector<RadarDirection>& points,
 /// Points that agree with `v_R`: within the threshold, or within three sigma where the noise of the direction
 /// alone is larger than the threshold, as it is at speed.
 void selectInliers(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
-                   const EgoVelocityOptions& o, std::vector<RadarDirection>& inliers) {
+                   const EgoVelocityOptions& o, const PointVariances& noise,
+                   std::vector<RadarDirection>& inliers) {
   const bool knows_noise = o.solver == EgoVelocitySolver::kErrorsInVariables;
   const double limit = o.ransac_inlier_threshold * o.ransac_inlier_threshold;
   inliers.clear();
   for (const RadarDirection& p : points) {
     const double r = p.doppler + p.u_R.dot(v_R);
-    if (r * r <= limit || (knows_noise && r * r <= 9.0 * residualVariance(p, v_R, o))) inliers.push_back(p);
+    if (r * r <= limit || (knows_noise && r * r <= 9.0 * residualVariance(Angles(p.u_R), v_R, noise)))
+      inliers.push_back(p);
   }
 }
 
@@ -173,7 +176,7 @@ double squaredDistance(const VelocitySolution& solution, const VelocityPrior& pr
 /// wrong. False where a vague prior speaks against neither of two velocities and most points do not decide:
 /// the scan is ambiguous.
 bool heedPrior(const std::vector<RadarDirection>& points, const VelocityPrior& prior,
-               const EgoVelocityOptions& o, std::vector<RadarDirection>& inliers,
+               const EgoVelocityOptions& o, const PointVariances& noise, std::vector<RadarDirection>& inliers,
                std::vector<RadarDirection>& supporters) {
   const double gate = o.prior_gate * o.prior_gate;
   const auto n = static_cast<double>(points.size());
@@ -182,11 +185,10 @@ bool heedPrior(const std::vector<RadarDirection>& points, const VelocityPrior& p
   const double d2_unaided =
       unaided.solved ? squaredDistance(unaided, prior) : std::numeric_limits<double>::max();
   if (is_sharp && d2_unaided <= gate) return true;
-  supporters.reserve(points.size());
-  selectInliers(points, prior.v_R, o, supporters);
+  selectInliers(points, prior.v_R, o, noise, supporters);
   VelocitySolution aided = solveLeastSquares(supporters, o);
   if (!aided.solved) return true;
-  selectInliers(points, aided.v_R, o, supporters);
+  selectInliers(points, aided.v_R, o, noise, supporters);
   aided = solveLeastSquares(supporters, o);
   if (!aided.solved || static_cast<double>(supporters.size()) < o.prior_min_inlier_fraction * n) return true;
   const double d2_aided = squaredDistance(aided, prior);
@@ -210,7 +212,7 @@ bool heedPrior(const std::vector<RadarDirection>& points, const VelocityPrior& p
 ///   z = q / (2 s), for each of the n points (1/s^2 as q goes to 0, nothing where q is much above s).
 /// False: the directions leave some velocity unseen.
 bool restCovariance(const std::vector<RadarDirection>& inliers, const EgoVelocityOptions& o,
-                    Eigen::Matrix3d& covariance) {
+                    const PointVariances& noise, Eigen::Matrix3d& covariance) {
   Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
   for (const RadarDirection& p : inliers) mean += p.u_R * p.u_R.transpose();
   mean /= static_cast<double>(inliers.size());
@@ -218,7 +220,7 @@ bool restCovariance(const std::vector<RadarDirection>& inliers, const EgoVelocit
   eigen.computeDirect(mean);
   if (!(eigen.eigenvalues()[0] * o.max_condition_number > eigen.eigenvalues()[2])) return false;
   const double q = o.doppler_quantization;
-  const double s = o.doppler_sigma;
+  const double s = std::sqrt(noise.doppler);
   const auto n = static_cast<double>(inliers.size());
   const double z = s > 0.0 ? q / (2.0 * s) : 0.0;
   double scale = s * s / n;  // of M^-1; this is without a bin
@@ -233,6 +235,11 @@ bool restCovariance(const std::vector<RadarDirection>& inliers, const EgoVelocit
   return true;
 }
 
+PointVariances startNoise(const EgoVelocityOptions& o) {
+  return {square(o.doppler_sigma), square(o.azimuth_sigma), square(o.elevation_sigma),
+          square(o.doppler_quantization) / 12.0};
+}
+
 /// As made anew, but with its memory.
 void clear(EgoVelocity& velocity) {
   std::vector<std::size_t> memory = std::move(velocity.inliers);
@@ -244,7 +251,7 @@ void clear(EgoVelocity& velocity) {
 }  // namespace
 
 EgoVelocityEstimator::EgoVelocityEstimator(const EgoVelocityOptions& options)
-    : options_(options), ransac_iterations_(ransacIterations(options)) {
+    : options_(options), ransac_iterations_(ransacIterations(options)), noise_(startNoise(options)) {
   validate(options);
 }
 
@@ -264,6 +271,10 @@ void EgoVelocityEstimator::estimate(const RadarScan& scan, const std::optional<V
   EgoVelocity& result = *estimated;
   clear(result);
   filter(scan, o, points);
+  // Not where each is first needed: that may be long after the largest scan.
+  inliers.reserve(points.size());
+  workspace->supporters.reserve(points.size());
+  result.inliers.reserve(points.size());
   result.points_used = points.size();
   const auto n = static_cast<double>(points.size());
   if (points.size() < 3) {
@@ -288,9 +299,8 @@ void EgoVelocityEstimator::estimate(const RadarScan& scan, const std::optional<V
       result.status = EgoVelocityStatus::kIllConditioned;
       return;
     }
-    inliers.reserve(points.size());
-    selectInliers(points, *consensus, o, inliers);
-    if (prior && !heedPrior(points, *prior, o, inliers, workspace->supporters)) {
+    selectInliers(points, *consensus, o, noise(), inliers);
+    if (prior && !heedPrior(points, *prior, o, noise(), inliers, workspace->supporters)) {
       result.status = EgoVelocityStatus::kAmbiguous;
       return;
     }
@@ -303,20 +313,19 @@ void EgoVelocityEstimator::estimate(const RadarScan& scan, const std::optional<V
 
   VelocitySolution solution;
   if (rest) {
-    solution.solved = restCovariance(inliers, o, solution.covariance);
+    solution.solved = restCovariance(inliers, o, noise(), solution.covariance);
   } else {
     solution = solveLeastSquares(inliers, o);
     if (solution.solved) {
-      selectInliers(points, solution.v_R, o, inliers);
+      selectInliers(points, solution.v_R, o, noise(), inliers);
       solution = o.solver == EgoVelocitySolver::kLeastSquares
                      ? solveLeastSquares(inliers, o)
-                     : solveErrorsInVariables(inliers, solution.v_R, o);
+                     : solveErrorsInVariables(inliers, solution.v_R, noise(), o);
     }
     result.told_variance = o.added_sigma.cwiseAbs2();
     solution.covariance.diagonal() += result.told_variance;
   }
 
-  result.inliers.reserve(inliers.size());
   for (const RadarDirection& p : inliers) result.inliers.push_back(p.index);
   if (inliers.size() < o.min_inliers || static_cast<double>(inliers.size()) < o.min_inlier_fraction * n) {
     result.status = EgoVelocityStatus::kTooFewInliers;
@@ -329,6 +338,14 @@ void EgoVelocityEstimator::estimate(const RadarScan& scan, const std::optional<V
                     : rest                                        ? EgoVelocityStatus::kZeroVelocity
                                                                   : EgoVelocityStatus::kMoving;
   }
+}
+
+void EgoVelocityEstimator::learn(const RadarScan& scan, const EgoVelocity& estimated,
+                                 EgoVelocityWorkspace* workspace) {
+  if (options_.solver != EgoVelocitySolver::kErrorsInVariables) return;
+  if (estimated.status != EgoVelocityStatus::kMoving) return;
+  filter(scan, options_, workspace->points);
+  noise_.learn(workspace->points, estimated.inliers, estimated.v_R);
 }
 
 bool isValid(EgoVelocityStatus status) {

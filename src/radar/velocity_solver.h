@@ -14,10 +14,6 @@ struct VelocitySolution {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< without added_sigma
 };
 
-/// Variance of the Doppler residual d + u . v that the options promise for this direction [m^2/s^2].
-double residualVariance(const RadarDirection& point, const Eigen::Vector3d& v_R,
-                        const EgoVelocityOptions& options);
-
 /// v = -(H'H)^-1 H'd, covariance s^2 (H'H)^-1; s^2 is the residual variance, at least the quantisation's
 /// q^2/12.
 VelocitySolution solveLeastSquares(const std::vector<RadarDirection>& points,
@@ -26,6 +22,6 @@ VelocitySolution solveLeastSquares(const std::vector<RadarDirection>& points,
 /// Least squares that knows that directions are noisy, see the source. `v_R` is where the weights are first
 /// taken: a RANSAC or least-squares velocity.
 VelocitySolution solveErrorsInVariables(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
-                                        const EgoVelocityOptions& options);
+                                        const PointVariances& noise, const EgoVelocityOptions& options);
 
 }  // namespace rio_t

@@ -29,7 +29,7 @@ class BagPlayer {
   void finish();
 
   RunSummary summary() const;
-  /// Sets what was read, and what of it never became a scan.
+  /// Sets what was read, what of it never became a scan, and the noise that the scans showed.
   void countInput(RunSummary* summary) const;
   const RadarInertialOdometry& odometry() const { return odometry_; }
   /// Of the first initialisation.

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <string>
 
 #include "rio_t/ros/bag_runner.h"
@@ -44,6 +45,9 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
                           percent(summary.end_to_start_3d_m) + " in 3D");
   row("time offset", decimal(1e3 * summary.final_offset_s, 2) + " ms, sigma " +
                          decimal(1e3 * summary.final_offset_sigma_s, 2) + " ms");
+  row("radar noise", "Doppler " + decimal(std::sqrt(summary.radar_noise.doppler), 3) + " m/s, azimuth " +
+                         decimal(std::sqrt(summary.radar_noise.azimuth), 3) + " rad, elevation " +
+                         decimal(std::sqrt(summary.radar_noise.elevation), 3) + " rad");
   if (summary.truth) {
     std::string errors = "ATE " + decimal(summary.truth->ate_m, 3) + " m";
     if (summary.truth->t_rel) {

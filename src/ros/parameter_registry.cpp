@@ -231,11 +231,10 @@ void listEgoVelocity(ParameterList& list, Config& c) {
       radar.solver,
       "plain least squares, or weighted by direction noise and freed of its bias (errors in variables)");
   list.number("radar_azimuth_sigma", "rad", atLeast(0), radar.azimuth_sigma,
-              "noise of a point's azimuth; eiv only");
-  list.number("radar_elevation_sigma", "rad", atLeast(0), radar.elevation_sigma,
-              "noise of a point's elevation; eiv only");
+              "noise of a point's azimuth to start with; eiv learns it from the residuals");
+  list.number("radar_elevation_sigma", "rad", atLeast(0), radar.elevation_sigma, "likewise of its elevation");
   list.number("radar_doppler_sigma", "m/s", atLeast(0), radar.doppler_sigma,
-              "noise of the Doppler besides its steps");
+              "likewise of its Doppler, besides the steps");
   list.number("radar_doppler_step", "m/s", atLeast(0), radar.doppler_quantization,
               "step in which the radar gives the Doppler; 0: none");
   list.vector3("ego_velocity_added_sigma", "m/s", atLeast(0), radar.added_sigma,

@@ -53,6 +53,13 @@ std::string listText(const std::vector<double>& values, int decimals) {
   return text + "]";
 }
 
+/// Standard deviations [m/s, rad, rad].
+std::string noiseText(const PointVariances& noise) {
+  return "{doppler: " + fixedText(std::sqrt(noise.doppler), 4) +
+         ", azimuth: " + fixedText(std::sqrt(noise.azimuth), 4) +
+         ", elevation: " + fixedText(std::sqrt(noise.elevation), 4) + "}";
+}
+
 std::string summaryText(const RunSummary& summary) {
   std::string yaml;
   const auto line = [&](const char* key, const std::string& value) {
@@ -74,6 +81,7 @@ std::string summaryText(const RunSummary& summary) {
   line("end_to_start_3d_m", fixedText(summary.end_to_start_3d_m, 6));
   line("final_offset_s", fixedText(summary.final_offset_s, 9));
   line("final_offset_sigma_s", fixedText(summary.final_offset_sigma_s, 9));
+  line("radar_noise", noiseText(summary.radar_noise));
   if (!summary.pass_offsets_s.empty()) {
     line("pass_offsets_s", listText(summary.pass_offsets_s, 9));
     line("pass_offset_sigmas_s", listText(summary.pass_offset_sigmas_s, 9));

@@ -81,6 +81,8 @@ class RadarInertialOdometry {
   /// that calls `process`.
   using Start = Initialization;
   std::optional<Start> start() const;
+  /// Noise of the radar's points, as learned so far. Likewise from that thread.
+  PointVariances radarNoise() const;
   /// While not initialised: what is being waited for, for people.
   std::string waitingFor() const;
   /// Faults of the input so far, by name in snake case, e.g. "imu_out_of_order", "imu_not_finite", "imu_gap".

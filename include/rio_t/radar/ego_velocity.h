@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "rio_t/radar/point_noise.h"
 #include "rio_t/radar/scan.h"
 
 namespace rio_t {
@@ -44,8 +45,8 @@ struct EgoVelocityOptions {
   double prior_min_inlier_fraction = 0.15;  ///< likewise, for points that agree with the prior
 
   EgoVelocitySolver solver = EgoVelocitySolver::kErrorsInVariables;
-  // Noise of a point, for kErrorsInVariables. The defaults are what the Doppler residuals of a walk with an
-  // IWR6843AOP show (0.022 rad, 0.045 rad, 0.032 m/s), rounded up: the solver takes them as upper bounds.
+  // Noise of a point to start with; PointNoise learns on from there. The defaults are what the Doppler
+  // residuals of a walk with an IWR6843AOP show (0.022 rad, 0.045 rad, 0.032 m/s), rounded up.
   double azimuth_sigma = 0.03;    ///< [rad]
   double elevation_sigma = 0.05;  ///< [rad]
   double doppler_sigma = 0.035;   ///< [m/s] besides the quantisation
@@ -95,13 +96,6 @@ struct VelocityPrior {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< [m^2/s^2], positive definite
 };
 
-/// A detection as the solvers see it.
-struct RadarDirection {
-  Eigen::Vector3d u_R;    ///< unit vector to the target
-  double doppler = 0;     ///< range rate [m/s]
-  std::size_t index = 0;  ///< into the scan's points
-};
-
 /// Memory that estimates share, so that none allocates once it has seen its largest scan; one for each
 /// thread.
 struct EgoVelocityWorkspace {
@@ -125,9 +119,16 @@ class EgoVelocityEstimator {
   /// The same with memory of its own.
   EgoVelocity estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior = std::nullopt) const;
 
+  /// Learns the noise of the points from what `estimate` made of this scan, for the scans to come. Only the
+  /// errors-in-variables solver uses it. To be called once a scan, in motion, where its velocity is believed.
+  void learn(const RadarScan& scan, const EgoVelocity& estimated, EgoVelocityWorkspace* workspace);
+  /// As learned so far.
+  const PointVariances& noise() const { return noise_.variances(); }
+
  private:
   EgoVelocityOptions options_;  // read-only after construction
   int ransac_iterations_;       // read-only after construction
+  PointNoise noise_;
 };
 
 }  // namespace rio_t

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <vector>
 
 #include "rio_t/core/time.h"
@@ -18,6 +19,13 @@ struct RadarPoint {
 struct RadarScan {
   Time stamp;  ///< as stamped, in the IMU clock; measured at stamp - t_O
   std::vector<RadarPoint> points;
+};
+
+/// A detection as the solvers see it.
+struct RadarDirection {
+  Eigen::Vector3d u_R;    ///< unit vector to the target
+  double doppler = 0;     ///< range rate [m/s]
+  std::size_t index = 0;  ///< into the scan's points
 };
 
 }  // namespace rio_t

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "rio_t/radar/scan.h"
+
+namespace rio_t {
+
+/// Noise of a point, independent from point to point.
+struct PointVariances {
+  double doppler = 0.0;       ///< [m^2/s^2] besides the quantisation
+  double azimuth = 0.0;       ///< [rad^2]
+  double elevation = 0.0;     ///< [rad^2]
+  double quantization = 0.0;  ///< [m^2/s^2] of the Doppler: step^2 / 12
+};
+
+/// Learns the noise of the points from the Doppler residuals of scans in motion.
+///
+/// The variance of a residual is that of the Doppler, and those of the angles times what the angles change
+/// the Doppler by, which differs from point to point: the squares of residuals, regressed on that, give all
+/// three (method.md, section 9). The start counts as a few points, and is what stays of an angle that the
+/// motion does not show.
+class PointNoise {
+ public:
+  explicit PointNoise(const PointVariances& start);
+
+  /// Learns from a scan. `points`: those that passed the filter; `inliers`: indices of those that `v_R` was
+  /// solved from; both in the order of the scan. The others are learned from as well, as far as they may be
+  /// of the static world: the noise that is known so far must not cut off its own tails.
+  void learn(const std::vector<RadarDirection>& points, const std::vector<std::size_t>& inliers,
+             const Eigen::Vector3d& v_R);
+  /// As known so far; the quantisation stays what it was.
+  const PointVariances& variances() const { return variances_; }
+
+ private:
+  void solve();
+
+  // Vectors and matrices are of the variances of Doppler, azimuth and elevation.
+  Eigen::Vector3d start_;  // read-only after construction
+  PointVariances variances_;
+  Eigen::Matrix3d information_ = Eigen::Matrix3d::Zero();         // of the scans
+  Eigen::Vector3d information_vector_ = Eigen::Vector3d::Zero();  // that times the variances
+  Eigen::Vector3d mean_shares_ = Eigen::Vector3d::Zero();         // of the variances in that of a residual
+  double outlier_density_ = 0.01;  // [s/m] of residuals that are not of the static world, per point
+  double scans_ = 0.0;
+};
+
+}  // namespace rio_t

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+
+#include "rio_t/radar/point_noise.h"
+
+namespace rio_t {
+
+inline double square(double a) { return a * a; }
+
+/// Azimuth and elevation of a unit vector, by their sines and cosines.
+struct Angles {
+  explicit Angles(const Eigen::Vector3d& u) : sin_el(u.z()), cos_el(std::hypot(u.x(), u.y())) {
+    // Straight up or down has no azimuth; any will do, since its derivatives vanish there.
+    sin_az = cos_el > 1e-9 ? u.x() / cos_el : 0.0;
+    cos_az = cos_el > 1e-9 ? u.y() / cos_el : 1.0;
+  }
+  Eigen::Vector3d byAzimuth() const { return {cos_az * cos_el, -sin_az * cos_el, 0.0}; }        // du/daz
+  Eigen::Vector3d byElevation() const { return {-sin_el * sin_az, -sin_el * cos_az, cos_el}; }  // du/del
+  Eigen::Vector3d direction() const { return {cos_el * sin_az, cos_el * cos_az, sin_el}; }
+  double sin_el, cos_el, sin_az, cos_az;
+};
+
+/// What the variances of Doppler, azimuth and elevation are multiplied by in the variance of a residual.
+/// The radial speed comes in by the second derivatives, which are all that there is where the radar looks
+/// along its velocity.
+inline Eigen::Vector3d noiseShares(const Angles& a, const Eigen::Vector3d& v_R, const PointVariances& noise) {
+  const double radial = square(a.direction().dot(v_R));
+  return {1.0, square(a.byAzimuth().dot(v_R)) + radial * (0.75 * noise.azimuth + 0.25 * noise.elevation),
+          square(a.byElevation().dot(v_R)) + radial * (0.75 * noise.elevation + 0.25 * noise.azimuth)};
+}
+
+inline double residualVariance(const Angles& a, const Eigen::Vector3d& v_R, const PointVariances& noise) {
+  return noise.quantization +
+         noiseShares(a, v_R, noise).dot(Eigen::Vector3d(noise.doppler, noise.azimuth, noise.elevation));
+}
+
+/// The likeliest direction, given the measured one and its residual. Its error does not correlate with the
+/// residual, to first order.
+inline Angles correctedDirection(const Eigen::Vector3d& u_R, double residual, const Eigen::Vector3d& v_R,
+                                 const PointVariances& noise) {
+  const Angles measured(u_R);
+  const Eigen::Vector3d by_az = measured.byAzimuth();
+  const Eigen::Vector3d by_el = measured.byElevation();
+  const double variance = residualVariance(measured, v_R, noise);
+  if (!(variance > 0.0)) return measured;
+  return Angles(
+      (u_R - residual / variance *
+                 (noise.azimuth * by_az.dot(v_R) * by_az + noise.elevation * by_el.dot(v_R) * by_el))
+          .normalized());
+}
+
+/// Turns moments of a measured direction into unbiased moments of the true one.
+///
+/// With azimuth error N(0, sa^2), E[cos(k az_measured)] = exp(-k^2 sa^2 / 2) cos(k az), the same for sines
+/// and for elevation; and u and u u' are made of such terms with k = 1, 2. So u and u u' can be undone
+/// exactly, which subtracts the noise's share from H'H, and with it the attenuation of the least-squares
+/// velocity.
+class MomentCorrection {
+ public:
+  /// Noise variances of azimuth and elevation [rad^2].
+  MomentCorrection(double azimuth_variance, double elevation_variance)
+      : az1_(std::exp(0.5 * azimuth_variance)),
+        az2_(std::exp(2.0 * azimuth_variance)),
+        el1_(std::exp(0.5 * elevation_variance)),
+        el2_(std::exp(2.0 * elevation_variance)) {}
+
+  /// Unbiased for u.
+  Eigen::Vector3d direction(const Angles& a) const {
+    return {el1_ * az1_ * a.cos_el * a.sin_az, el1_ * az1_ * a.cos_el * a.cos_az, el1_ * a.sin_el};
+  }
+
+  /// Unbiased for u u'.
+  Eigen::Matrix3d outerProduct(const Angles& a) const {
+    const double cos_2el = el2_ * (1.0 - 2.0 * square(a.sin_el));
+    const double cos_el_sq = 0.5 * (1.0 + cos_2el);
+    const double sin_cos_el = el2_ * a.sin_el * a.cos_el;
+    const double cos_2az = az2_ * (square(a.cos_az) - square(a.sin_az));
+    const double xx = cos_el_sq * 0.5 * (1.0 - cos_2az);
+    const double yy = cos_el_sq * 0.5 * (1.0 + cos_2az);
+    const double xy = cos_el_sq * az2_ * a.sin_az * a.cos_az;
+    const double xz = sin_cos_el * az1_ * a.sin_az;
+    const double yz = sin_cos_el * az1_ * a.cos_az;
+    Eigen::Matrix3d m;
+    m << xx, xy, xz, xy, yy, yz, xz, yz, 0.5 * (1.0 - cos_2el);
+    return m;
+  }
+
+ private:
+  double az1_, az2_, el1_, el2_;
+};
+
+}  // namespace rio_t

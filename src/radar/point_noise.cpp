@@ -1,0 +1,124 @@
+#include "rio_t/radar/point_noise.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "direction_noise.h"
+
+namespace rio_t {
+namespace {
+
+/// What the noise at the start counts as: so many points whose residuals show nothing but that noise.
+constexpr double kStartPoints = 10.0;
+/// [scans] that are remembered, 100 s at 10 Hz: at a walk they tell the elevation noise, which shows least,
+/// to 3 %.
+constexpr double kMemory = 1000.0;
+/// [steps] of the Doppler. At lower speeds most points lie in a few bins, and the error of the step is
+/// neither even nor independent of the direction.
+constexpr double kMinSpeed = 4.0;
+/// [m/s] Residuals up to here tell how many outliers there are.
+constexpr double kOutlierSpan = 1.0;
+/// [s/m] Bounds of the density of the outliers, per point: 1 in 200 and every other one over 5 m/s. Above,
+/// noise that has become much larger would be taken for outliers for long.
+constexpr double kMinOutlierDensity = 0.001;
+constexpr double kMaxOutlierDensity = 0.1;
+/// Where an angle is known no better, it is none.
+constexpr double kMaxAngleSigma = 0.2;    // [rad]
+constexpr double kMaxDopplerSigma = 0.2;  // [m/s]
+/// A start of zero does not mean that nothing else is possible.
+constexpr double kMinStartAngleSigma = 0.01;    // [rad]
+constexpr double kMinStartDopplerSigma = 0.01;  // [m/s]
+/// [m^2/s^2] of a residual; bounds the weights where there is no noise at all.
+constexpr double kMinVariance = 1e-4;
+
+/// That a residual is of the static world, a Gaussian, and not of the outliers, which are spread evenly.
+double inlierProbability(double residual, double variance, double outlier_density) {
+  const double density = std::exp(-0.5 * square(residual) / variance) / std::sqrt(2.0 * M_PI * variance);
+  return density / (density + outlier_density);
+}
+
+Eigen::Vector3d vectorOf(const PointVariances& noise) {
+  return {noise.doppler, noise.azimuth, noise.elevation};
+}
+
+}  // namespace
+
+PointNoise::PointNoise(const PointVariances& start) : start_(vectorOf(start)), variances_(start) {}
+
+void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vector<std::size_t>& inliers,
+                       const Eigen::Vector3d& v_R) {
+  const PointVariances& noise = variances_;
+  if (v_R.squaredNorm() < square(kMinSpeed) * 12.0 * noise.quantization) return;
+  const auto variance = [&](const Eigen::Vector3d& shares) {
+    return std::max(kMinVariance, noise.quantization + shares.dot(vectorOf(noise)));
+  };
+  auto inlier = inliers.begin();
+  const auto is_inlier = [&](const RadarDirection& p) {  // to be asked for one point after the other
+    if (inlier == inliers.end() || *inlier != p.index) return false;
+    ++inlier;
+    return true;
+  };
+
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  for (const RadarDirection& p : points) {
+    if (is_inlier(p)) normal += p.u_R * p.u_R.transpose() / variance(noiseShares(Angles(p.u_R), v_R, noise));
+  }
+  const Eigen::Matrix3d velocity_covariance = normal.inverse();
+
+  ++scans_;
+  const double forgotten = std::max(1.0 / kMemory, 1.0 / (scans_ + 1.0));
+  information_ *= 1.0 - forgotten;
+  information_vector_ *= 1.0 - forgotten;
+  Eigen::Vector3d mean_shares = Eigen::Vector3d::Zero();
+  double outlier_density = 0.0;
+  inlier = inliers.begin();
+  for (const RadarDirection& p : points) {
+    // The velocity has taken this off the squared residuals that it was fitted to.
+    const double fitted = is_inlier(p) ? p.u_R.dot(velocity_covariance * p.u_R) : 0.0;
+    const double residual = p.doppler + p.u_R.dot(v_R);
+    const Eigen::Vector3d shares = noiseShares(correctedDirection(p.u_R, residual, v_R, noise), v_R, noise);
+    // A squared residual has twice its squared variance.
+    const double probability = inlierProbability(residual, variance(shares), outlier_density_);
+    const double weight = 0.5 * probability / square(variance(shares));
+    mean_shares += shares / static_cast<double>(points.size());
+    if (std::abs(residual) < kOutlierSpan)
+      outlier_density += (1.0 - probability) / (2.0 * kOutlierSpan * static_cast<double>(points.size()));
+    information_ += weight * shares * shares.transpose();
+    information_vector_ += weight * (square(residual) + fitted - noise.quantization) * shares;
+  }
+  outlier_density_ += forgotten * (outlier_density - outlier_density_);
+  outlier_density_ = std::clamp(outlier_density_, kMinOutlierDensity, kMaxOutlierDensity);
+  mean_shares_ += forgotten * (mean_shares - mean_shares_);
+  const double believed = variance(mean_shares_);
+  solve();
+  // The scans so far were weighted by what was believed then. Had it been much too small, they would outweigh
+  // all that come.
+  const double reweighting = square(believed / variance(mean_shares_));
+  information_ *= reweighting;
+  information_vector_ *= reweighting;
+}
+
+void PointNoise::solve() {
+  constexpr int kSweeps = 20;  // the solution moves little from scan to scan, and each begins at the last
+  const Eigen::Vector3d least =
+      Eigen::Vector3d(kMinStartDopplerSigma, kMinStartAngleSigma, kMinStartAngleSigma).cwiseAbs2();
+  const Eigen::Vector3d most =
+      Eigen::Vector3d(kMaxDopplerSigma, kMaxAngleSigma, kMaxAngleSigma).cwiseAbs2().cwiseMax(start_);
+  Eigen::Vector3d x = vectorOf(variances_);
+  // A start that is too small must not count for more because of that.
+  const Eigen::Vector3d start_information =
+      0.5 * kStartPoints * x.cwiseMax(start_).cwiseMax(least).cwiseAbs2().cwiseInverse();
+  Eigen::Matrix3d A = information_;
+  A.diagonal() += start_information;
+  const Eigen::Vector3d b = information_vector_ + start_information.cwiseProduct(start_);
+  // Least squares within bounds, one unknown after the other.
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    for (int i = 0; i < 3; ++i) x[i] = std::clamp(x[i] + (b[i] - A.row(i).dot(x)) / A(i, i), 0.0, most[i]);
+  }
+  variances_.doppler = x[0];
+  variances_.azimuth = x[1];
+  variances_.elevation = x[2];
+}
+
+}  // namespace rio_t
