@@ -99,9 +99,10 @@ void listImu(ParameterList& list, Config& c) {
   list.number("gravity", "m/s^2", between(9.5, 10.0), c.odometry.gravity,
               "magnitude of gravity at the place");
   list.number("imu_accel_noise_density", "m/s^2/sqrt(Hz)", above(0), c.odometry.imu_noise.accel_density,
-              "white noise of the accelerometer");
+              "white noise of the accelerometer, to begin with: the innovations scale it, and more counts if "
+              "the samples show more");
   list.number("imu_gyro_noise_density", "rad/s/sqrt(Hz)", above(0), c.odometry.imu_noise.gyro_density,
-              "white noise of the gyro");
+              "white noise of the gyro; more counts if the samples show more");
   list.number("imu_accel_random_walk", "m/s^3/sqrt(Hz)", above(0), c.odometry.imu_noise.accel_random_walk,
               "random walk of the accelerometer's bias");
   list.number("imu_gyro_random_walk", "rad/s^2/sqrt(Hz)", above(0), c.odometry.imu_noise.gyro_random_walk,
@@ -123,7 +124,8 @@ void listGaps(ParameterList& list, Config& c) {
               "largest reading of an axis; 0: found from flat tops");
   list.number("imu_unseen_accel_density", "m/s^2/sqrt(Hz)", above(0), gate.unseen_accel_density,
               "noise that stands for the motion in gaps and beyond the range");
-  list.number("imu_unseen_gyro_density", "rad/s/sqrt(Hz)", above(0), gate.unseen_gyro_density, "likewise");
+  list.number("imu_unseen_gyro_density", "rad/s/sqrt(Hz)", above(0), gate.unseen_gyro_density,
+              "likewise, and while an axis sticks");
   list.number("max_radar_gap", "s", above(0), c.odometry.max_radar_gap,
               "without a scan that is not reported");
 }
@@ -172,7 +174,8 @@ void listHealth(ParameterList& list, Config& c) {
               "of divergence; for so long the IMU alone is worth more than a radar that contradicts it");
   list.number("divergence_window", "s", above(0, 60), health.window, "of scans that are judged");
   list.number("divergence_max_contradiction", "", inside(0, 1), health.max_contradiction,
-              "mean over the window of the squared innovation in units of innovation_gate, at most 1 a scan");
+              "mean over the window of the squared innovation in units of innovation_gate, at most 1 a scan; "
+              "0 without a majority");
   list.number("divergence_max_velocity_sigma", "m/s", above(0), health.max_velocity_sigma,
               "of an axis; above, the velocity counts as not known");
   list.number("coasting_after", "s", above(0), health.coasting_after, "without a scan used");
@@ -220,7 +223,8 @@ void listEgoVelocity(ParameterList& list, Config& c) {
   list.integer("ransac_seed", atLeast(0), radar.ransac_seed,
                "restarted at each scan: same scan, same answer");
   list.integer("ego_velocity_min_inliers", atLeast(3), radar.min_inliers,
-               "one velocity has three unknowns, the others are witnesses");
+               "one velocity has three unknowns, the others are witnesses; so many for the estimate alone "
+               "outvote a majority");
   list.number("ego_velocity_min_inlier_fraction", "", between(0, 1), radar.min_inlier_fraction,
               "of the points that count; fewer agree by chance");
   list.number("ego_velocity_prior_min_inlier_fraction", "", between(0, 1), radar.prior_min_inlier_fraction,
@@ -238,7 +242,7 @@ void listEgoVelocity(ParameterList& list, Config& c) {
   list.number("radar_doppler_step", "m/s", atLeast(0), radar.doppler_quantization,
               "step in which the radar gives the Doppler; 0: none");
   list.vector3("ego_velocity_added_sigma", "m/s", atLeast(0), radar.added_sigma,
-               "added in quadrature: right, forward, up");
+               "added in quadrature, to begin with: right, forward, up; the innovations scale it");
   list.number("ego_velocity_max_condition_number", "", atLeast(1), radar.max_condition_number,
               "of H'H over the unit directions; above, they do not span space");
   list.number("ego_velocity_max_sigma", "m/s", above(0), radar.max_sigma,
@@ -270,7 +274,8 @@ void listTimeOffset(ParameterList& list, Config& c) {
   list.number("time_offset_noise", "s/sqrt(s)", above(0), smoother.time_offset_noise,
               "random walk of the offset");
   list.number("time_offset_min_acceleration", "m/s^2", atLeast(0), smoother.time_offset_min_acceleration,
-              "of the radar; below, a scan says nothing of the offset, which then holds still");
+              "of the radar; below, or below five sigma of the IMU's noise, a scan says nothing of the "
+              "offset, which then holds still");
   list.number("max_time_offset", "s", above(0, 1), smoother.max_time_offset,
               "bound on its size, either sign");
   OffsetMonitorOptions& monitor = c.odometry.offset_monitor;
@@ -304,11 +309,12 @@ void listSmoother(ParameterList& list, Config& c) {
               "of the first state; yaw defines the world frame");
   list.number("prior_sigma_position", "m", above(0), smoother.prior_sigma_position,
               "of the first state; it defines the world frame");
-  list.number("prior_sigma_velocity", "m/s", above(0), smoother.prior_sigma_velocity, "of the first state");
+  list.number("prior_sigma_velocity", "m/s", above(0), smoother.prior_sigma_velocity,
+              "of the first state, and of either end of the rest before it");
   list.number("prior_sigma_gyro_bias", "rad/s", above(0), smoother.prior_sigma_gyro_bias,
-              "of the first state");
+              "of the first state, besides the noise of the mean at rest");
   list.number("prior_sigma_accel_bias", "m/s^2", above(0), smoother.prior_sigma_accel_bias,
-              "of the first state");
+              "of the first state; over gravity, it is the sigma of roll and pitch, too");
   list.integer("max_queued_scans", atLeast(1), c.odometry.max_queued_scans,
                "scans that may wait for the IMU or the solver");
 }
