@@ -121,7 +121,8 @@ void smoother(benchmark::State& state, Timed timed, double window) {
   for (auto _ : state) {
     if (next >= run().velocities.size()) {
       const StateBlock x = run().state(kStart - 0.5);
-      smoother.initialize(run().options.start + (kStart - 0.5), priorAtRest(options, ImuNoise(), x, 9.81, 3.0));
+      smoother.initialize(run().options.start + (kStart - 0.5),
+                          priorAtRest(options, ImuNoise(), x, 9.81, 3.0));
       // Not timed: the window fills.
       for (next = 0; next < 30; ++next) {
         smoother.add(run().velocities[next]);

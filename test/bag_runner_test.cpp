@@ -181,11 +181,11 @@ TEST_F(BagRunner, EveryScanIsAccountedFor) {
   EXPECT_EQ(summary.scans_used + rejected, summary.scans_total);
   EXPECT_GT(summary.scans_used, 40u);
   const std::string yaml = contents(out_ + "/summary.yaml");
-  for (const char* key : {"imu_count: 1600\n", "scans_total: 80\n", "scans_used: ", "scans_rejected: {",
-                          "solver_terminations: {converged: ", "path_length_m: ", "end_to_start_2d_m: ",
-                          "end_to_start_3d_m: ", "final_offset_s: ", "final_offset_sigma_s: ",
-                          "radar_noise: {doppler: 0.", "saved: [trajectory.txt", "estimation_seconds: ",
-                          "realtime_factor: "}) {
+  for (const char* key :
+       {"imu_count: 1600\n", "scans_total: 80\n", "scans_used: ", "scans_rejected: {",
+        "solver_terminations: {converged: ", "path_length_m: ", "end_to_start_2d_m: ", "end_to_start_3d_m: ",
+        "final_offset_s: ", "final_offset_sigma_s: ", "imu_noise: {accel: 0.", "radar_noise: {doppler: 0.",
+        "saved: [trajectory.txt", "estimation_seconds: ", "realtime_factor: "}) {
     EXPECT_NE(yaml.find(key), std::string::npos) << key;
   }
   EXPECT_EQ(yaml.find("ate_m"), std::string::npos);

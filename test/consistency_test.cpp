@@ -12,8 +12,8 @@
 namespace rio_t {
 namespace {
 
-constexpr double kStart = 5.0;   // [s] of rest
-constexpr double kFrom = 10.0;   // [s] the noise has been measured for three seconds of motion
+constexpr double kStart = 5.0;  // [s] of rest
+constexpr double kFrom = 10.0;  // [s] the noise has been measured for three seconds of motion
 constexpr int kSeeds = 6;
 
 /// Mean squares of errors in sigmas, per degree of freedom: 1 where the sigmas are right.
@@ -35,7 +35,8 @@ Nees neesOf(const SimulatedRun& run) {
     const Eigen::Vector3d forward = origin.q_WI * Eigen::Vector3d::UnitX();
     const Eigen::Vector3d level_forward =
         levelingRotation(origin.q_WI.conjugate() * Eigen::Vector3d::UnitZ()) * Eigen::Vector3d::UnitX();
-    const double yaw = std::atan2(level_forward.y(), level_forward.x()) - std::atan2(forward.y(), forward.x());
+    const double yaw =
+        std::atan2(level_forward.y(), level_forward.x()) - std::atan2(forward.y(), forward.x());
     const Eigen::Quaterniond turn = so3::exp(Eigen::Vector3d(0.0, 0.0, yaw));
     const Eigen::Vector3d e_p = x.p_W - turn * (truth.p_W - origin.p_W);
     const Eigen::Vector3d e_v = x.v_W - turn * truth.v_W;

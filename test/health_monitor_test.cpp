@@ -47,7 +47,8 @@ TEST(HealthMonitor, ScansThatDecideNothingContradictNothing) {
   HealthMonitor monitor(HealthOptions(), 4.0);
   for (int i = 0; i < 40; ++i) {
     if (i % 2 == 0) {
-      monitor.addInnovation(at(5.0 + 0.1 * i), Eigen::Vector3d(2.0, 0.0, 0.0), 0.01 * Eigen::Matrix3d::Identity());
+      monitor.addInnovation(at(5.0 + 0.1 * i), Eigen::Vector3d(2.0, 0.0, 0.0),
+                            0.01 * Eigen::Matrix3d::Identity());
     } else {
       monitor.addUndecided(at(5.0 + 0.1 * i));
     }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "noise.h"
 #include "rio_t/core/so3.h"
 #include "rio_t/imu/gap_bridge.h"
 #include "rio_t/imu/gate.h"
@@ -278,6 +279,19 @@ TEST_F(Gate, AFastTurnThatGoesOnIsNotStuck) {
   EXPECT_EQ(feed({motion.time(1.0), {6.0, 0.0, 0.0}, {0.0, 0.0, 9.81}}), "imu_stuck");
   EXPECT_EQ(feed({motion.time(1.01), {6.1, 0.0, 0.0}, {0.0, 0.0, 9.81}}), "");
   EXPECT_EQ(sample.angular_velocity.x(), 6.1);
+}
+
+TEST_F(Gate, NoiseFarAboveWhatWasToldIsSeen) {
+  EXPECT_FALSE(gate.noise().isFarAbove(ImuNoise()));
+  Noise noise;
+  for (int i = 0; i < 300; ++i) {
+    ImuMeasurement shaken = motion.imuSample(1.0 + 0.01 * i);
+    shaken.acceleration += 0.8 * noise.vector();
+    feed(shaken);
+  }
+  EXPECT_TRUE(gate.noise().isFarAbove(ImuNoise()));
+  EXPECT_NEAR(gate.noise().accel_density, 0.08, 0.02);
+  EXPECT_NEAR(sample.accel_noise, std::pow(gate.noise().accel_density, 2), 1e-12);
 }
 
 }  // namespace

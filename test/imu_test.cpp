@@ -161,6 +161,19 @@ TEST(NoiseMeter, MeasuresTheDensityAtRestAndInMotion) {
   }
 }
 
+TEST(NoiseMeter, ASignalThatStoodStillToTheLastBitMayBegin) {
+  for (const double still : {9.81, 9.8125}) {
+    Noise noise;
+    NoiseMeter meter;
+    for (int i = 0; i < 800; ++i) {
+      const double sigma = i < 400 ? 0.0 : 0.4;
+      meter.add(Time::fromSeconds(10.0 + 0.0025 * i),
+                Eigen::Vector3d(0.0, 0.0, still) + sigma * noise.vector());
+    }
+    EXPECT_NEAR(std::sqrt(meter.squaredDensity()), 0.4 * std::sqrt(0.0025), 0.01);
+  }
+}
+
 TEST(NoiseMeter, IsNotMovedByAKnockOrAGap) {
   const double rate = 200.0;
   Noise noise;

@@ -303,7 +303,8 @@ TEST(StuckGyro, CostsLittle) {
     });
     EXPECT_LT(ate, 0.2) << "axis " << axis;
     EXPECT_GT(run.odometry->faults()["imu_stuck"], 50u);
-    EXPECT_LT(run.rms(32.0, 60.0, [&](const NavigationState& state) { return run.velocityError(state); }), 0.1);
+    EXPECT_LT(run.rms(32.0, 60.0, [&](const NavigationState& state) { return run.velocityError(state); }),
+              0.1);
   }
 }
 

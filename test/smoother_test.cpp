@@ -199,7 +199,8 @@ class Windows : public Smoother {
   Window window(const SmootherOptions& options, const std::function<double(int)>& t_O) const {
     FactorPool pool(options, ImuNoise(), motion.g_W, imu);
     Window result;
-    result.prior = std::make_unique<PriorFactor>(priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0));
+    result.prior =
+        std::make_unique<PriorFactor>(priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0));
     result.loss = std::make_unique<ceres::HuberLoss>(options.huber_threshold);
     result.max_time_offset = options.max_time_offset;
     for (int k = 0; k < kNodes; ++k) {
@@ -654,8 +655,7 @@ TEST(PriorAtRest, TiltAndBiasAreKnownTogether) {
   const Eigen::Matrix3d R_WI = x.q_WI().toRotationMatrix();
   const Eigen::Matrix3d tilt = R_WI * P.topLeftCorner<3, 3>() * R_WI.transpose();
   // A tilt error is b_a / g.
-  for (int i = 0; i < 2; ++i)
-    EXPECT_NEAR(std::sqrt(tilt(i, i)), options.prior_sigma_accel_bias / 9.81, 3e-4);
+  for (int i = 0; i < 2; ++i) EXPECT_NEAR(std::sqrt(tilt(i, i)), options.prior_sigma_accel_bias / 9.81, 3e-4);
   EXPECT_NEAR(std::sqrt(tilt(2, 2)), options.prior_sigma_yaw, 1e-6);
   // What the accelerometer reads is known by its noise, though neither of the two is.
   Eigen::Matrix<double, 3, kNodeTangent> J = Eigen::Matrix<double, 3, kNodeTangent>::Zero();

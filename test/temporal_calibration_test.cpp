@@ -188,9 +188,9 @@ TEST(TemporalCalibration, VibrationTeachesNothing) {
   for (const std::uint64_t seed : {1, 2}) {
     for (const double imu_rate : {100.0, 400.0}) {
       const double quiet_sigma = offsetAt(shakenLine(imu_rate, 0.0, 0.0, seed), 60.0).sigma;
-      for (const Shaken& shaken : {Shaken{imu_rate, 0.3, 0.0}, Shaken{imu_rate, 0.8, 0.0},
-                                   Shaken{imu_rate, 2.0, 0.0}, Shaken{imu_rate, 0.8, 37.0},
-                                   Shaken{imu_rate, 0.8, 15.0}}) {
+      for (const Shaken& shaken :
+           {Shaken{imu_rate, 0.3, 0.0}, Shaken{imu_rate, 0.8, 0.0}, Shaken{imu_rate, 2.0, 0.0},
+            Shaken{imu_rate, 0.8, 37.0}, Shaken{imu_rate, 0.8, 15.0}}) {
         const SimulatedRun run = shakenLine(shaken.imu_rate, shaken.vibration, shaken.frequency, seed);
         for (const ScanResult& result : run.results) {
           if (!result.updated || run.seconds(result.scan.stamp) < 20.0) continue;

@@ -100,8 +100,9 @@ bool ImuRadarFactor::Evaluate(double const* const* parameters, double* residuals
     Eigen::Map<Eigen::Vector3d> J(jacobians[1]);
     J.setZero();
     if (!z_.held_t_O) {
-      J = -W_R * velocityRate(imu_->mean(tau, kOffsetHalfWidth), x.b_g, x.b_a, v_tau, dR_T * R_IW * g_W_, z_.l_I)
-               .known();
+      J = -W_R *
+          velocityRate(imu_->mean(tau, kOffsetHalfWidth), x.b_g, x.b_a, v_tau, dR_T * R_IW * g_W_, z_.l_I)
+              .known();
     }
   }
   return true;

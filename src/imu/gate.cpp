@@ -1,6 +1,7 @@
 #include "rio_t/imu/gate.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace rio_t {
 
@@ -61,10 +62,15 @@ ImuGate::Verdict ImuGate::check(ImuMeasurement& imu) {
   return verdict;
 }
 
+MeasuredImuNoise ImuGate::noise() const {
+  return {std::sqrt(accel_noise_.squaredDensity()), std::sqrt(gyro_noise_.squaredDensity())};
+}
+
 bool ImuGate::replaceStuck(ImuMeasurement& imu) {
   bool is_stuck = false;
   for (int k = 0; k < 3; ++k) {
-    const std::optional<double> likely = gyro_axes_[static_cast<std::size_t>(k)].check(imu.time, imu.angular_velocity[k]);
+    const std::optional<double> likely =
+        gyro_axes_[static_cast<std::size_t>(k)].check(imu.time, imu.angular_velocity[k]);
     if (!likely) continue;
     imu.angular_velocity[k] = *likely;
     is_stuck = true;

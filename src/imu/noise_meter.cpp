@@ -14,6 +14,8 @@ constexpr double kVarianceGain = 70.0;  // 1 + 16 + 36 + 16 + 1
 /// A square counts at most this many times the mean: four sigma. A knock is not noise, and a vibration that
 /// begins still multiplies the mean within a few hundredths of a second.
 constexpr double kLargestSquare = 16.0;
+/// [unit^2/Hz] Less is rounding: a thousandth of what the best sensors of this kind show.
+constexpr double kNothing = 1e-10;
 
 }  // namespace
 
@@ -32,7 +34,8 @@ void NoiseMeter::add(Time time, const Eigen::Vector3d& value) {
   const Eigen::Vector3d difference = last_[0] - 4.0 * last_[1] + 6.0 * last_[2] - 4.0 * last_[3] + last_[4];
   Eigen::Vector3d squares = difference.cwiseAbs2() * (spacing / kVarianceGain);
   const double mean = squaredDensity();
-  if (weight_ * spacing > kMemory / 2.0) squares = squares.cwiseMin(kLargestSquare * mean);
+  // A signal that stood still to the last bit has no mean to compare with.
+  if (mean > kNothing && weight_ * spacing > kMemory / 2.0) squares = squares.cwiseMin(kLargestSquare * mean);
   const double fade = std::exp(-spacing / kMemory);
   squares_ = fade * squares_ + squares;
   weight_ = fade * weight_ + 1.0;

@@ -48,7 +48,7 @@ void BatchOdometry::addResult(ScanResult result, bool offset_stepped) {
   if (!result.used && result.rejected_because.empty()) return;  // only carries the last poses
   result.scan.points = {};
   result.left_window.clear();
-  model_error_scale_ = result.model_error_scale;
+  if (result.updated) model_error_scale_ = result.model_error_scale;
   scans_.push_back({std::move(result), offset_stepped});
 }
 
@@ -106,7 +106,8 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
     if (at_rest) scan.rest_velocity_sigma = options_.rest.velocity_sigma;
     if (result.used) {
       scan.velocity = measurement(result);
-      if (!informsOffset(smoother, node, *scan.velocity, result.ego_velocity)) scan.velocity->held_t_O = node.t_O;
+      if (!informsOffset(smoother, node, *scan.velocity, result.ego_velocity))
+        scan.velocity->held_t_O = node.t_O;
     }
     problem.scans.push_back(scan);
     run.source.push_back(i);
@@ -221,8 +222,7 @@ std::vector<ScanResult> BatchOdometry::results(const Run& run, const BatchSoluti
     result.state = navigationState(solution.nodes[k], P, imu_);
     result.time_offset = solution.nodes[k].t_O;
     result.solver_termination = solution.termination;
-    result.time_offset_sigma =
-        options_.smoother.estimate_time_offset ? std::sqrt(P(kState, kState)) : 0.0;
+    result.time_offset_sigma = options_.smoother.estimate_time_offset ? std::sqrt(P(kState, kState)) : 0.0;
   }
   std::vector<std::size_t> order(results.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;

@@ -33,11 +33,13 @@ std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, con
       x.q_WI() = rest->q_WI;
       x.b_g() = rest->b_g;
       x.b_a() = rest->b_a;
-      return Initialization{
-          rest->time,
-          priorAtRest(options_.smoother, options_.imu_noise, x, options_.gravity, rest->duration),
-          InitializedFrom::kRest,
-          {}};
+      ImuNoise noise = options_.imu_noise;
+      noise.accel_density = std::sqrt(noise.accelVariance(newest));
+      noise.gyro_density = std::sqrt(noise.gyroVariance(newest));
+      return Initialization{rest->time,
+                            priorAtRest(options_.smoother, noise, x, options_.gravity, rest->duration),
+                            InitializedFrom::kRest,
+                            {}};
     }
   }
   if (!mayStartInMotion()) return std::nullopt;

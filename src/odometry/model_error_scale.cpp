@@ -8,8 +8,9 @@ namespace {
 
 /// Information of the options about the logarithm: their sigmas are right within a factor of 1.6.
 constexpr double kBelief = 1.0;
-/// [s] The errors change with the surroundings and with the kind of motion.
-constexpr double kMemory = 60.0;
+/// [s] The errors change with the surroundings and with the kind of motion. 200 scans know the scale to 7 %
+/// if it is all there is.
+constexpr double kMemory = 20.0;
 /// Bounds: a tenth and ten times the sigmas of the options. Below, the measured noise is all there is.
 constexpr double kSmallest = 0.01;
 constexpr double kLargest = 100.0;

@@ -23,7 +23,7 @@ constexpr int kMaxIterations = 15;
 constexpr double kConverged = 1.0e-4;  // [sigma]
 constexpr double kOutlier = 4.0;       // [sigma]
 constexpr int kScaleRounds = 3;        // of finding the state and the size of the errors around it
-constexpr double kUnknowns = 7.0;  // that the velocities determine: velocity, gravity in I, t_O
+constexpr double kUnknowns = 7.0;      // that the velocities determine: velocity, gravity in I, t_O
 
 std::string format(const char* text, double value, double limit) {
   char line[200];
@@ -61,7 +61,8 @@ void MotionInitializer::add(Time stamp, const EgoVelocity& velocity) {
   const auto after = std::lower_bound(velocities_.begin(), velocities_.end(), stamp,
                                       [](const Velocity& z, Time t) { return z.stamp < t; });
   if (after != velocities_.end() && after->stamp == stamp) return;
-  velocities_.insert(after, Velocity{{stamp, velocity.v_R, velocity.covariance, R_RI_, l_I_}, velocity.told_variance});
+  velocities_.insert(
+      after, Velocity{{stamp, velocity.v_R, velocity.covariance, R_RI_, l_I_}, velocity.told_variance});
   if (velocities_.size() > kMaxVelocities) velocities_.erase(velocities_.begin());
 }
 
@@ -84,9 +85,7 @@ bool MotionInitializer::isMoving(Time from, Time to, double max_speed) const {
 std::optional<MotionInitialization> MotionInitializer::solve(
     const ImuBuffer& imu, const std::function<PoseAnchor(Time)>& anchorAt) {
   if (velocities_.empty() || imu.empty()) return std::nullopt;
-  const auto outOfReach = [&](const Velocity& z) {
-    return std::abs(z.stamp - imu.newest()) > imuHistory();
-  };
+  const auto outOfReach = [&](const Velocity& z) { return std::abs(z.stamp - imu.newest()) > imuHistory(); };
   velocities_.erase(std::remove_if(velocities_.begin(), velocities_.end(), outOfReach), velocities_.end());
   // Any offset within the bound must be covered by the IMU.
   const Time covered = imu.newest() - smoother_.max_time_offset;
@@ -129,7 +128,8 @@ std::optional<MotionInitialization> MotionInitializer::solve(
     set(StateBlock::kBa, options_.sigma_accel_bias);
     result.prior.J(StateBlock::kTangent, StateBlock::kTangent) = 1.0 / smoother_.time_offset_sigma;
     const NodePrior known = result.prior;
-    for (int round = 0; round < kScaleRounds && (round == 0 || outliers <= options_.max_outlier_fraction); ++round) {
+    for (int round = 0; round < kScaleRounds && (round == 0 || outliers <= options_.max_outlier_fraction);
+         ++round) {
       result.prior = known;
       outliers = refine(window, time, imu, result.model_error_scale, result.prior);
     }

@@ -33,14 +33,18 @@ void OffsetUncertainty::offsetStepped() {
   projection_ = 0.0;
 }
 
-double OffsetUncertainty::sigma(double variance) const {
-  if (information_ <= 0.0) return std::sqrt(variance);
+double OffsetUncertainty::squaredLag() const {
+  if (information_ <= 0.0) return 0.0;
   const double change = projection_ / information_;
   const double change_variance = spread_ / (information_ * information_);
   // Akaike's criterion: a change is worth its while where its square exceeds twice its variance. The square
   // then is larger than that of the lag by its variance.
   const double excess = change * change - change_variance;
-  return std::sqrt(variance + (excess > change_variance ? excess : 0.0));
+  return excess > change_variance ? excess : 0.0;
 }
+
+double OffsetUncertainty::sigma(double variance) const { return std::sqrt(variance + squaredLag()); }
+
+double OffsetUncertainty::walk() const { return std::sqrt(squaredLag() / kMemory); }
 
 }  // namespace rio_t

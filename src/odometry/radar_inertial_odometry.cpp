@@ -1,8 +1,8 @@
 #include "rio_t/odometry/radar_inertial_odometry.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <Eigen/Cholesky>
 #include <mutex>
 #include <utility>
 
@@ -10,10 +10,10 @@
 #include "rio_t/odometry/fault_counters.h"
 #include "rio_t/odometry/initializer.h"
 #include "rio_t/odometry/innovation_gate.h"
+#include "rio_t/odometry/model_error_scale.h"
 #include "rio_t/odometry/navigator.h"
 #include "rio_t/odometry/offset_uncertainty.h"
 #include "rio_t/odometry/pose_doubt.h"
-#include "rio_t/odometry/model_error_scale.h"
 #include "rio_t/odometry/yaw_doubt.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
 
@@ -257,6 +257,7 @@ void RadarInertialOdometry::Impl::useScan(const RadarScan& scan, bool imu_has_en
 
   result.model_error_scale = model_error_scale.value();
   smoother.setImuNoise(imuNoise());
+  smoother.setTimeOffsetNoise(std::hypot(options.smoother.time_offset_noise, offset_uncertainty.walk()));
   const bool at_rest = isAtRest(node_time);
   std::optional<double> held_t_O;
   result.rejected_because = measureVelocity(scan, at_rest, result.ego_velocity, held_t_O);
@@ -328,10 +329,10 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
     const Eigen::Vector3d d = measured.v_R - prediction->velocity.v_R;
     const Eigen::Matrix3d S = prediction->velocity.covariance + measured.covariance;
     if (informs_offset) offset_uncertainty.add(scan.stamp, d, S, prediction->dv_dt_O);
-    // The state's variance grows about as the root of the accelerometer's.
-    const Eigen::Matrix3d scaled =
-        0.5 * prediction->velocity.covariance +
-        Eigen::Matrix3d(measured.told_variance.asDiagonal());
+    // The state's variance grows about as the root of the accelerometer's, unless that is measured.
+    const bool accel_is_told = imuNoise().accelVariance(imu.at(scan.stamp)) > imu.at(scan.stamp).accel_noise;
+    const Eigen::Matrix3d scaled = (accel_is_told ? 0.5 : 0.0) * prediction->velocity.covariance +
+                                   Eigen::Matrix3d(measured.told_variance.asDiagonal());
     const Eigen::LDLT<Eigen::Matrix3d> weight = S.ldlt();
     model_error_scale.add(scan.stamp, d.dot(weight.solve(d)), weight.solve(scaled).trace() / 3.0);
   }
@@ -494,6 +495,7 @@ bool RadarInertialOdometry::Impl::tryReinitialize(std::vector<StampedPose>& left
   model_error_scale = found->model_error_scale;
   begin(found->time, found->prior);
   offset_monitor = OffsetMonitor(options.offset_monitor);
+  offset_uncertainty = OffsetUncertainty(options.smoother.huber_threshold);
   updateHealth();
   faults.count("reinitialized");
   return true;
@@ -538,8 +540,7 @@ bool RadarInertialOdometry::Impl::isAtRest(Time time) const {
 void RadarInertialOdometry::Impl::judgePrediction(const RadarScan& scan, const VelocityPrior& prior,
                                                   const EgoVelocity& measured) {
   // Where few points agree, they may be those that side with a wrong prediction: what says the scan alone?
-  if (!speaksForItself(measured))
-    measureAt(scan, std::nullopt, velocity_alone);
+  if (!speaksForItself(measured)) measureAt(scan, std::nullopt, velocity_alone);
   const EgoVelocity& alone = speaksForItself(measured) ? measured : velocity_alone;
   if (!speaksForItself(alone)) return health_monitor.addUndecided(scan.stamp);
   // A crowd may outnumber the static world. What then sides with the prediction alone is its witness: noise
@@ -567,6 +568,11 @@ bool RadarInertialOdometry::initialized() const {
 std::optional<RadarInertialOdometry::Start> RadarInertialOdometry::start() const { return impl_->start; }
 
 PointVariances RadarInertialOdometry::radarNoise() const { return impl_->ego_velocity_estimator.noise(); }
+
+MeasuredImuNoise RadarInertialOdometry::imuNoise() const {
+  const std::lock_guard<std::mutex> lock(impl_->navigation_mutex);
+  return impl_->imu_gate.noise();
+}
 
 Health RadarInertialOdometry::health() const {
   const std::lock_guard<std::mutex> lock(impl_->inbox_mutex);

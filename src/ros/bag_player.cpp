@@ -47,6 +47,7 @@ RunSummary BagPlayer::summary() const {
 
 void BagPlayer::countInput(RunSummary* summary) const {
   summary->imu_count = imu_count_;
+  summary->imu_noise = odometry_.imuNoise();
   summary->radar_noise = odometry_.radarNoise();
   summary->scans_total = scans_total_;
   for (const auto& [reason, count] : stamper_.givenUp()) summary->scans_rejected[reason] += count;

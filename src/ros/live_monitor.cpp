@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 #include "rio_t/factors/state_block.h"
 
@@ -152,6 +153,15 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) c
   }
 }
 
+std::string noisyImu(const MeasuredImuNoise& noise, const ImuNoise& told) {
+  std::ostringstream text;
+  text << "the IMU vibrates or is noisier than told: accelerometer " << noise.accel_density
+       << " m/s^2/sqrt(Hz), imu_accel_noise_density " << told.accel_density << "; gyro " << noise.gyro_density
+       << " rad/s/sqrt(Hz), imu_gyro_noise_density " << told.gyro_density
+       << ". The estimate takes the measured noise. A softer mount makes it better.";
+  return text.str();
+}
+
 void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const Clock::time_point now = Clock::now();
@@ -178,6 +188,10 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
       if (name != "diverged" && name != "reinitialized") status.add("fault_" + name, count);
     }
   }
+  const ImuNoise& told = config_.odometry.imu_noise;
+  const MeasuredImuNoise noise = session != nullptr ? session->odometry().imuNoise() : MeasuredImuNoise();
+  status.add("imu_accel_noise_measured", noise.accel_density);
+  status.add("imu_gyro_noise_measured", noise.gyro_density);
   const bool wants_trigger = config_.stamp_source == StampSource::kTrigger;
   if (wants_trigger) status.add("trigger_rate_hz", trigger_rate);
 
@@ -195,6 +209,8 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
     status.summary(DiagnosticStatus::WARN, imu_rate == 0.0 ? "the IMU is silent" : "the radar is silent");
   } else if (queue_full > queue_full_told_) {
     status.summary(DiagnosticStatus::WARN, "the solver falls behind, scans were dropped");
+  } else if (noise.isFarAbove(told)) {
+    status.summary(DiagnosticStatus::WARN, noisyImu(noise, told));
   } else {
     status.summary(DiagnosticStatus::OK, "IMU and radar are coming");
   }

@@ -272,7 +272,8 @@ void listTimeOffset(ParameterList& list, Config& c) {
   list.number("time_offset_sigma", "s", above(0), smoother.time_offset_sigma,
               "standard deviation of that start");
   list.number("time_offset_noise", "s/sqrt(s)", above(0), smoother.time_offset_noise,
-              "random walk of the offset");
+              "random walk of the offset; it grows by itself while the scans ask for a change all the time, "
+              "as they do where clocks drift");
   list.number("time_offset_min_acceleration", "m/s^2", atLeast(0), smoother.time_offset_min_acceleration,
               "of the radar; below, or below five sigma of the IMU's noise, a scan says nothing of the "
               "offset, which then holds still");

@@ -81,6 +81,8 @@ std::string summaryText(const RunSummary& summary) {
   line("end_to_start_3d_m", fixedText(summary.end_to_start_3d_m, 6));
   line("final_offset_s", fixedText(summary.final_offset_s, 9));
   line("final_offset_sigma_s", fixedText(summary.final_offset_sigma_s, 9));
+  line("imu_noise", "{accel: " + fixedText(summary.imu_noise.accel_density, 6) +
+                        ", gyro: " + fixedText(summary.imu_noise.gyro_density, 6) + "}");
   line("radar_noise", noiseText(summary.radar_noise));
   if (!summary.pass_offsets_s.empty()) {
     line("pass_offsets_s", listText(summary.pass_offsets_s, 9));

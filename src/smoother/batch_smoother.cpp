@@ -168,9 +168,8 @@ BatchSmoother::Residual BatchSmoother::residual(const NodeEstimate& node, const 
   if (!options_.estimate_time_offset) J.rightCols<1>().setZero();
   result.prediction_covariance = J * covariance * J.transpose();
   const Time tau = z.stamp - node.t_O;
-  result.informs_offset =
-      velocityRate(*imu_, tau, carried(node.x, node.time, tau, *imu_, g_W_), g_W_, z.l_I)
-          .informsOffset(options_.time_offset_min_acceleration);
+  result.informs_offset = velocityRate(*imu_, tau, carried(node.x, node.time, tau, *imu_, g_W_), g_W_, z.l_I)
+                              .informsOffset(options_.time_offset_min_acceleration);
   return result;
 }
 

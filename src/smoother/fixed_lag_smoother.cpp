@@ -164,7 +164,8 @@ WindowNode* FixedLagSmoother::nodeOf(Time stamp) {
 /// before it, too.
 void FixedLagSmoother::placeOffsetStep(std::size_t k) {
   std::vector<WindowNode>& nodes = window_.nodes;
-  const auto loose = std::find_if(nodes.begin() + 1, nodes.end(), [](const WindowNode& node) { return node.offset_step_variance > 0.0; });
+  const auto loose = std::find_if(nodes.begin() + 1, nodes.end(),
+                                  [](const WindowNode& node) { return node.offset_step_variance > 0.0; });
   const bool lies_before = loose != nodes.end() && loose - nodes.begin() <= static_cast<std::ptrdiff_t>(k);
   if (k == 0 || lies_before || (loose == nodes.end() && !offset_step_is_new_)) return;
   offset_step_is_new_ = false;
@@ -190,7 +191,8 @@ void FixedLagSmoother::linkToPrevious(std::size_t k) {
   pool_.recycle(std::move(node.imu_from_previous));
   pool_.recycle(std::move(node.offset_from_previous));
   node.imu_from_previous = pool_.imuFactor(preintegrateFrom(previous, node.time));
-  node.offset_from_previous = pool_.offsetFactor(std::sqrt(offsetVariance(node.time - previous.time) + node.offset_step_variance));
+  node.offset_from_previous =
+      pool_.offsetFactor(std::sqrt(offsetVariance(node.time - previous.time) + node.offset_step_variance));
 }
 
 const Preintegration& FixedLagSmoother::preintegrateFrom(const WindowNode& node, Time to) const {
@@ -263,7 +265,7 @@ std::string toString(FixedLagSmoother::AddResult result) {
 Time FixedLagSmoother::imuNeededSince() const {
   // Offsets move a radar factor's time by at most the bound to either side of its stamp, and the stamp lies
   // within the bound of the node.
-  return window_.nodes.front().time - 2.0 * options_.max_time_offset;
+  return window_.nodes.front().time - (2.0 * options_.max_time_offset + kOffsetHalfWidth);
 }
 
 }  // namespace rio_t

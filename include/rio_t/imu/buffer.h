@@ -40,7 +40,8 @@ class ImuBuffer {
   /// buffer.
   ImuMeasurement at(Time time) const;
 
-  /// The IMU over [time - half_width, time + half_width], as far as there are samples. Not on an empty buffer.
+  /// The IMU over [time - half_width, time + half_width], as far as there are samples. Not on an empty
+  /// buffer.
   ImuMean mean(Time time, double half_width) const;
 
   /// Calls step(dt, angular_velocity, acceleration) for each interval between samples from `from` to `to`,

@@ -5,6 +5,7 @@
 
 #include "rio_t/imu/gap_bridge.h"
 #include "rio_t/imu/measurement.h"
+#include "rio_t/imu/noise.h"
 #include "rio_t/imu/noise_meter.h"
 #include "rio_t/imu/saturation_detector.h"
 #include "rio_t/imu/stamp_watch.h"
@@ -21,6 +22,17 @@ struct ImuGateOptions {
   /// do.
   double unseen_accel_density = 2.0;  ///< [m/s^2/sqrt(Hz)]
   double unseen_gyro_density = 0.5;   ///< [rad/s/sqrt(Hz)]
+};
+
+/// White noise of the IMU as its samples show it, vibration included: densities of the noisiest axis.
+struct MeasuredImuNoise {
+  double accel_density = 0.0;  ///< [m/s^2/sqrt(Hz)]
+  double gyro_density = 0.0;   ///< [rad/s/sqrt(Hz)]
+
+  /// Three times what the options say, or more: too much for a guess of them.
+  bool isFarAbove(const ImuNoise& told) const {
+    return accel_density > 3.0 * told.accel_density || gyro_density > 3.0 * told.gyro_density;
+  }
 };
 
 /// The door for IMU samples: drops what cannot be used, and writes into the others how much of the motion
@@ -49,6 +61,7 @@ class ImuGate {
   ImuGate(double max_gap, const ImuGateOptions& options);
   /// Sets the doubts and the noise of `imu` where it is taken, and replaces what a stuck axis reads.
   Verdict check(ImuMeasurement& imu);
+  MeasuredImuNoise noise() const;
 
  private:
   /// Replaces the readings of axes that are stuck; whether there were any.

@@ -55,8 +55,8 @@ class BatchOdometry {
   Run makeRun(const RadarInertialOdometry::Start& start, const BatchSmoother& smoother) const;
   /// Adds what the batch does not reject; how many that are.
   std::size_t readmit(const BatchSmoother& smoother, const BatchSolution& solution, Run& run) const;
-  bool accepts(const BatchSmoother& smoother, const BatchSolution& solution,
-               const EgoVelocity& measured, RadarVelocityMeasurement& z) const;
+  bool accepts(const BatchSmoother& smoother, const BatchSolution& solution, const EgoVelocity& measured,
+               RadarVelocityMeasurement& z) const;
   /// Whether the platform accelerates enough for `z` to tell the offset.
   bool informsOffset(const BatchSmoother& smoother, const NodeEstimate& node,
                      const RadarVelocityMeasurement& z, const EgoVelocity& measured) const;
@@ -64,9 +64,9 @@ class BatchOdometry {
   std::vector<NavigationState> trajectory(const BatchSolution& solution) const;
   std::vector<ScanResult> results(const Run& run, const BatchSolution& solution) const;
 
-  OdometryOptions options_;  // read-only after construction
-  BatchOptions batch_;       // read-only after construction
-  Eigen::Vector3d g_W_;      // read-only after construction
+  OdometryOptions options_;         // read-only after construction
+  BatchOptions batch_;              // read-only after construction
+  Eigen::Vector3d g_W_;             // read-only after construction
   double model_error_scale_ = 1.0;  ///< of the online run at its end
   ImuGate imu_gate_;
   ImuBuffer imu_;

@@ -67,7 +67,7 @@ class HealthMonitor {
  private:
   struct Entry {
     Time stamp;
-    double contradiction = 0.0;  ///< 0..1
+    double contradiction = 0.0;    ///< 0..1
     std::optional<double> square;  ///< d'd [m^2/s^2]; none where the scan has no velocity
   };
   void add(const Entry& entry);

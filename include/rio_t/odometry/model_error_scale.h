@@ -8,8 +8,8 @@ namespace rio_t {
 /// PointNoise); what is left is scale and misalignment of the IMU and what the points of a scan share: the
 /// squares of `imu_accel_noise_density` and `ego_velocity_added_sigma`. Both are multiplied by this factor,
 /// such that the innovations of the radar are as large as their covariances say: the variance factor of
-/// adjustment theory (Mikhail and Ackermann, Observations and Least Squares, 1976) for a part of the noise, by
-/// Fisher scoring, one innovation a step (docs/method.md, eq. 32a). Not thread-safe.
+/// adjustment theory (Mikhail and Ackermann, Observations and Least Squares, 1976) for a part of the noise,
+/// by Fisher scoring, one innovation a step (docs/method.md, eq. 32a). Not thread-safe.
 class ModelErrorScale {
  public:
   /// An innovation of 3 axes at `stamp`: its squared length in sigmas, 3 on the mean where the scale is

@@ -39,8 +39,8 @@ struct PoseAnchor {
 
 /// First state of a platform that moves.
 struct MotionInitialization {
-  Time time;        ///< of the state: the newest velocity's stamp
-  NodePrior prior;  ///< the state, t_O and what is known of them, correlations included
+  Time time;                          ///< of the state: the newest velocity's stamp
+  NodePrior prior;                    ///< the state, t_O and what is known of them, correlations included
   ModelErrorScale model_error_scale;  ///< of the velocities around it
 };
 

@@ -20,8 +20,8 @@ class Navigator {
 
   /// New optimised state, usually some 100 ms before the newest sample: everything since is integrated again.
   /// One more than 30 s old is not taken.
-  /// `at_rest`: the radar saw no motion at that time. While the IMU vibrates, what it adds since is noise until
-  /// it is more than that: velocity and position stay where they are.
+  /// `at_rest`: the radar saw no motion at that time. While the IMU vibrates, what it adds since is noise
+  /// until it is more than that: velocity and position stay where they are.
   void anchor(const NavigationState& state, bool at_rest = false);
   /// Noise of the IMU from here on.
   void setNoise(const ImuNoise& noise) { noise_ = noise; }

@@ -21,8 +21,12 @@ class OffsetUncertainty {
 
   /// Of the offset [s], given its marginal variance [s^2].
   double sigma(double variance) const;
+  /// Random walk that would follow what the scans ask for [s/sqrt(s)]; 0 where they ask for nothing.
+  double walk() const;
 
  private:
+  double squaredLag() const;  ///< [s^2]
+
   double huber_threshold_;  // read-only after construction
   Time last_;
   double information_ = 0.0;  ///< sum of J' S^-1 J, fading [1/s^2]

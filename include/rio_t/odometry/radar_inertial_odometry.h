@@ -21,9 +21,9 @@ namespace rio_t {
 struct ScanResult {
   RadarScan scan;  ///< as fed
   EgoVelocity ego_velocity;
-  bool used = false;             ///< its velocity went into the window
+  bool used = false;               ///< its velocity went into the window
   double model_error_scale = 1.0;  ///< see ModelErrorScale; in the covariance of ego_velocity
-  std::string rejected_because;  ///< snake case, empty where used; keys of `scans_rejected`
+  std::string rejected_because;    ///< snake case, empty where used; keys of `scans_rejected`
 
   /// The window was solved again: the scan was used, or the platform is at rest. What follows is set only
   /// then.
@@ -83,6 +83,8 @@ class RadarInertialOdometry {
   std::optional<Start> start() const;
   /// Noise of the radar's points, as learned so far. Likewise from that thread.
   PointVariances radarNoise() const;
+  /// Noise that the IMU shows by itself, over the last second. Any thread.
+  MeasuredImuNoise imuNoise() const;
   /// While not initialised: what is being waited for, for people.
   std::string waitingFor() const;
   /// Faults of the input so far, by name in snake case, e.g. "imu_out_of_order", "imu_not_finite", "imu_gap".

@@ -82,8 +82,8 @@ struct EgoVelocity {
   /// The part of the covariance's diagonal that is told and not measured: `added_sigma` squared, or none at
   /// rest [m^2/s^2].
   Eigen::Vector3d told_variance = Eigen::Vector3d::Zero();
-  std::vector<std::size_t> inliers;                      ///< indices into the scan's points
-  std::size_t points_used = 0;                           ///< points that passed the filter
+  std::vector<std::size_t> inliers;  ///< indices into the scan's points
+  std::size_t points_used = 0;       ///< points that passed the filter
 };
 
 /// Share of the points that, where they agree, leave nothing else to be the static world: no object fills

@@ -51,6 +51,7 @@ struct RunSummary {
   double end_to_start_3d_m = 0.0;
   double final_offset_s = 0.0;
   double final_offset_sigma_s = 0.0;
+  MeasuredImuNoise imu_noise;  ///< that the IMU showed at the end
   PointVariances radar_noise;  ///< of the radar's points, as learned; the file has its standard deviations
   std::optional<TruthErrors> truth;
   double estimation_seconds = 0.0;  ///< reading, decoding and estimating, wall clock

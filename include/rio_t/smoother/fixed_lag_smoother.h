@@ -31,8 +31,8 @@ struct RadarVelocityPrediction {
   double t_O = 0.0;                                   ///< at which all this holds [s]
   /// Per axis, of the noise in dv_dt_O times the error of the offset: not in the covariances [m^2/s^2].
   double rate_variance = 0.0;
-  bool informs_offset = false;                        ///< dv_dt_O is motion, not noise of the IMU
-  double tilt_sigma = 0.0;                            ///< of roll and pitch, the larger [rad]
+  bool informs_offset = false;  ///< dv_dt_O is motion, not noise of the IMU
+  double tilt_sigma = 0.0;      ///< of roll and pitch, the larger [rad]
 };
 
 /// The paper's factor graph over the last `window` seconds; what leaves is marginalised.
@@ -48,6 +48,8 @@ class FixedLagSmoother {
 
   /// Noise of the IMU from here on.
   void setImuNoise(const ImuNoise& noise);
+  /// Random walk of t_O from here on [s/sqrt(s)].
+  void setTimeOffsetNoise(double noise) { options_.time_offset_noise = noise; }
   /// Starts (or starts again) with one node at `time`, at the prior's own x0 and t_O0.
   void initialize(Time time, const NodePrior& prior);
 

@@ -32,18 +32,18 @@ struct SmootherOptions {
   TimeOffsetModel time_offset_model = TimeOffsetModel::kImu;
   double time_offset_initial = 0.0;   ///< [s]
   double time_offset_sigma = 0.075;   ///< [s] prior
-  double time_offset_noise = 1.0e-4;  ///< [s/sqrt(s)] random walk of the offset
+  double time_offset_noise = 2.0e-5;  ///< [s/sqrt(s)] random walk of the offset, while it is constant
   /// [m/s^2] below, a scan says nothing of the offset: at rest and at constant velocity there is only noise
   /// to see.
   double time_offset_min_acceleration = 0.2;
   double max_time_offset = 0.25;  ///< [s] bound on |t_O|
 
-  double prior_sigma_yaw = 1.0e-3;        ///< [rad] yaw defines the world frame
-  double prior_sigma_position = 1.0e-3;   ///< [m] position defines the world frame
-  double prior_sigma_velocity = 0.02;     ///< [m/s]
+  double prior_sigma_yaw = 1.0e-3;       ///< [rad] yaw defines the world frame
+  double prior_sigma_position = 1.0e-3;  ///< [m] position defines the world frame
+  double prior_sigma_velocity = 0.02;    ///< [m/s]
   /// [rad/s] besides the noise of the mean at rest: the in-run stability of an ADIS16448, 14.5 deg/h
   double prior_sigma_gyro_bias = 7.0e-5;
-  double prior_sigma_accel_bias = 0.1;    ///< [m/s^2]
+  double prior_sigma_accel_bias = 0.1;  ///< [m/s^2]
 };
 
 }  // namespace rio_t
