@@ -241,6 +241,20 @@ TEST(StaticInitializer, SixMountingsWithBias) {
   }
 }
 
+TEST(StaticInitializer, AnIdlingEngineIsRest) {
+  StaticInitializer initializer(StaticInitializerOptions(), 9.81);
+  Noise noise;
+  std::optional<StaticInitialization> found;
+  for (int i = 0; i < 800 && !found; ++i) {
+    ImuMeasurement sample{Time::fromSeconds(10.0 + 0.005 * i), Eigen::Vector3d(0.01, 0.0, -0.02),
+                          Eigen::Vector3d(0.0, 0.0, 9.81) + 1.5 * noise.vector()};
+    sample.accel_noise = 1.5 * 1.5 * 0.005;
+    found = initializer.add(sample);
+  }
+  ASSERT_TRUE(found) << initializer.waitingFor();
+  EXPECT_LT((found->b_g - Eigen::Vector3d(0.01, 0.0, -0.02)).norm(), 1e-9);
+}
+
 TEST(StaticInitializer, SaysWhatItWaitsForAndRecoversFromMotion) {
   StaticInitializer initializer(twoSeconds(), 9.81);
   EXPECT_FALSE(feed(initializer, 0.0, 4.0, Eigen::Vector3d::Zero(), {0, 0, 9.81}, 0.3));

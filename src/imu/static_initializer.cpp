@@ -22,6 +22,14 @@ Statistics statistics(const std::vector<ImuMeasurement>& samples, Eigen::Vector3
   return result;
 }
 
+/// Takes the white noise that the samples show by themselves off the spread; `seconds` is what they cover.
+void removeNoise(const std::vector<ImuMeasurement>& samples, double ImuMeasurement::*squared_density,
+                 double seconds, Statistics& statistics) {
+  double variance = 0.0;  // of a sample: squared density times rate
+  for (const ImuMeasurement& sample : samples) variance += sample.*squared_density / seconds;
+  statistics.std = (statistics.std.cwiseAbs2().array() - variance).max(0.0).sqrt();
+}
+
 std::string format(const char* text, double value, double limit) {
   char line[200];
   std::snprintf(line, sizeof line, text, value, limit);
@@ -48,8 +56,11 @@ std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement&
     return std::nullopt;
   }
 
-  const Statistics gyro = statistics(samples_, &ImuMeasurement::angular_velocity);
-  const Statistics accel = statistics(samples_, &ImuMeasurement::acceleration);
+  Statistics gyro = statistics(samples_, &ImuMeasurement::angular_velocity);
+  Statistics accel = statistics(samples_, &ImuMeasurement::acceleration);
+  // An engine that idles shakes the IMU, and moves nothing.
+  removeNoise(samples_, &ImuMeasurement::gyro_noise, collected, gyro);
+  removeNoise(samples_, &ImuMeasurement::accel_noise, collected, accel);
   const double gravity_error = accel.mean.norm() - gravity_;
   // Whatever people and drones do, the accelerometer reads about gravity on the mean.
   double mean_size = 0.0;

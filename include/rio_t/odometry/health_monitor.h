@@ -45,8 +45,11 @@ class HealthMonitor {
   /// A scan that by itself has a velocity most of its points agree on, against its prediction: innovation d
   /// [m/s] and its covariance S [m^2/s^2].
   void addInnovation(Time stamp, const Eigen::Vector3d& d, const Eigen::Matrix3d& S);
-  /// A scan the points of which do not agree, or side with the prediction: it contradicts nothing.
-  void addUndecided(Time stamp) { add({stamp, 0.0, std::nullopt}); }
+  /// A scan the points of which do not agree, or side with the prediction: it contradicts nothing. It does not
+  /// end a divergence either.
+  void addUndecided(Time stamp) {
+    if (!diverged_at_) add({stamp, 0.0, std::nullopt});
+  }
   /// The window was updated at `time`.
   void updated(Time time) { last_update_ = time; }
   /// The time offset was found to have stepped, which explains what contradicted so far; once in a while.
