@@ -64,6 +64,15 @@ void HealthMonitor::add(const Entry& entry) {
   entries_.push_back(entry);
   while (entries_.size() > kMaxScans || std::abs(entry.stamp - entries_.front().stamp) > options_.window)
     entries_.pop_front();
+  latest_ = entry.stamp;
+  double sum = 0.0;
+  double count = 0.0;
+  for (const Entry& each : entries_) {
+    if (!each.square) continue;
+    sum += *each.square;
+    count += 1.0;
+  }
+  if (count > 0.0) mean_square_ = sum / count;
 }
 
 std::optional<double> HealthMonitor::contradiction() const {
@@ -112,17 +121,9 @@ Health HealthMonitor::judge(Time now, const NavigationState& state) {
 }
 
 void HealthMonitor::widen(NavigationState& state) const {
-  if (!diverged_at_) return;
-  double sum = 0.0;
-  double count = 0.0;
-  for (const Entry& entry : entries_) {
-    if (!entry.square) continue;
-    sum += *entry.square;
-    count += 1.0;
-  }
-  if (count == 0.0) return;
-  const double square = sum / count;
-  const double seconds = std::max(1.0, entries_.back().stamp - contradicted_since_);
+  if (!diverged_at_ || mean_square_ == 0.0) return;
+  const double square = mean_square_;
+  const double seconds = std::max(1.0, latest_ - contradicted_since_);
   const auto add = [&](int first, double variance) {
     state.covariance.diagonal().segment<3>(first).array() += variance;
   };

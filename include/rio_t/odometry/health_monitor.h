@@ -84,6 +84,8 @@ class HealthMonitor {
   std::optional<Time> offset_stepped_;
   std::optional<Time> diverged_at_;  ///< since when the scans contradict, or since the last start after that
   Time contradicted_since_;
+  Time latest_;  ///< stamp of the newest entry, also after the entries were cleared
+  double mean_square_ = 0.0;  ///< of d, by the latest scans that had a velocity [m^2/s^2]
   Health health_ = Health::kOk;
 };
 
