@@ -314,7 +314,7 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
   // An offset that is wrong by c shows as (J + noise) c; nothing else tells of the noise's part.
   if (informs_offset) measured.covariance.diagonal().array() += prediction->rate_variance;
   if (!informs_offset) held_t_O = prediction ? prediction->t_O : smoother.newest().t_O;
-  // Of a minority that sides with the prediction the noise is larger than its covariance says.
+  // A minority that sides with the prediction has more noise than its covariance says.
   if (prediction && tilt_is_known && informs_offset && speaksForItself(measured) &&
       options.smoother.estimate_time_offset &&
       offset_monitor.stepped(scan.stamp, measured.v_R - prediction->velocity.v_R,

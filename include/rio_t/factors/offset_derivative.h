@@ -21,7 +21,7 @@ struct VelocityRate {
   /// The platform accelerates beyond `min_acceleration` [m/s^2] and beyond what the IMU's noise makes of no
   /// acceleration, so that a scan says something about the offset.
   bool informsOffset(double min_acceleration) const;
-  /// What of `a_I` is surely motion: two sigma less. A rate that just passes informsOffset was lifted there
+  /// The part of `a_I` that is surely motion: two sigma less. A rate that just passes informsOffset was lifted there
   /// by its noise, and would claim more information than it has.
   Eigen::Vector3d known() const;
 };

@@ -67,7 +67,7 @@ class LiveMonitor {
   Time last_scan_;                 // stamp of the last scan finished
 };
 
-/// What to tell a person whose IMU is far noisier than the options say.
+/// The warning for a person whose IMU is far noisier than the options say.
 std::string noisyImu(const MeasuredImuNoise& noise, const ImuNoise& told);
 
 }  // namespace rio_t
