@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "rio_t/imu/preintegration.h"
-#include "rio_t/odometry/navigator.h"
+#include "rio_t/odometry/imu_propagator.h"
 #include "rio_t/odometry/options.h"
 #include "rio_t/ros/point_cloud.h"
 #include "rio_t/simulation/motions.h"
@@ -146,16 +146,16 @@ BENCHMARK_CAPTURE(smoother, marginalisation, Timed::kMarginalise, 1.0)->UseManua
 
 void navigationStep(benchmark::State& state) {
   const std::vector<ImuMeasurement>& samples = run().data.imu.samples;
-  Navigator navigator(ImuNoise(), kGravity);
+  ImuPropagator propagator(ImuNoise(), kGravity);
   NavigationState start;
   start.time = samples.front().time;
-  navigator.anchor(start);
+  propagator.anchor(start);
   std::size_t k = 1;
   for (auto _ : state) {
-    benchmark::DoNotOptimize(navigator.add(samples[k]));
+    benchmark::DoNotOptimize(propagator.add(samples[k]));
     if (++k == samples.size()) {
-      navigator = Navigator(ImuNoise(), kGravity);
-      navigator.anchor(start);
+      propagator = ImuPropagator(ImuNoise(), kGravity);
+      propagator.anchor(start);
       k = 1;
     }
   }
@@ -165,11 +165,11 @@ BENCHMARK(navigationStep);
 void navigationAnchor(benchmark::State& state) {
   // As live: the newest node lies 0.16 s back (0.06 s of latency and a period).
   const std::vector<ImuMeasurement>& samples = run().data.imu.samples;
-  Navigator navigator(ImuNoise(), kGravity);
-  for (std::size_t k = 0; k < 3000; ++k) navigator.add(samples[k]);
+  ImuPropagator propagator(ImuNoise(), kGravity);
+  for (std::size_t k = 0; k < 3000; ++k) propagator.add(samples[k]);
   NavigationState anchor;
   anchor.time = samples[2999].time - 0.16;
-  for (auto _ : state) navigator.anchor(anchor);
+  for (auto _ : state) propagator.anchor(anchor);
 }
 BENCHMARK(navigationAnchor);
 

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <utility>
 
-#include "rio_t/odometry/navigator.h"
+#include "rio_t/odometry/imu_propagator.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
 #include "rio_t/ros/point_cloud.h"
 #include "rio_t/ros/run_output.h"
@@ -98,14 +98,14 @@ const std::vector<NodeEstimate>& FixedLagSmoother::marginalize() {
   return (this->*original)();
 }
 
-void Navigator::anchor(const NavigationState& state) {
-  static const auto original = libraryFunction(&Navigator::anchor);
+void ImuPropagator::anchor(const NavigationState& state) {
+  static const auto original = libraryFunction(&ImuPropagator::anchor);
   const Scope scope(Stage::kAnchor);
   (this->*original)(state);
 }
 
-std::optional<NavigationState> Navigator::add(const ImuMeasurement& imu) {
-  static const auto original = libraryFunction(&Navigator::add);
+std::optional<NavigationState> ImuPropagator::add(const ImuMeasurement& imu) {
+  static const auto original = libraryFunction(&ImuPropagator::add);
   const Scope scope(Stage::kNavigation);
   return (this->*original)(imu);
 }

@@ -10,7 +10,7 @@
 #include "rio_t/factors/offset_derivative.h"
 #include "rio_t/factors/prior_factor.h"
 #include "rio_t/factors/radar_velocity_factor.h"
-#include "rio_t/factors/rest_factor.h"
+#include "rio_t/factors/zero_velocity_factor.h"
 #include "rio_t/smoother/factor_pool.h"
 #include "synthetic_motion.h"
 
@@ -228,8 +228,8 @@ TEST(ConstantOffsetFactor, JacobiansAreCorrect) {
   expectJacobiansCorrect(ConstantOffsetFactor(3e-3), {{0.01}, {-0.02}}, 1e-6, 1e-3);
 }
 
-TEST(RestFactor, JacobiansAreCorrect) {
-  expectJacobiansCorrect(RestFactor(0.05), {values(moved(SyntheticMotion().state(1.0), 0.1))});
+TEST(ZeroVelocityFactor, JacobiansAreCorrect) {
+  expectJacobiansCorrect(ZeroVelocityFactor(0.05), {values(moved(SyntheticMotion().state(1.0), 0.1))});
 }
 
 /// Residual and Jacobians of `cost`, in one row.
@@ -274,7 +274,7 @@ TEST(FactorPool, ARecycledFactorIsAsOneMadeAnew) {
     WindowNode node = used.node();
     node.imu_from_previous = used.imuFactor(preintegrated(1.1, 1.3));
     node.offset_from_previous = used.offsetFactor(1.0);
-    node.rest = used.restFactor(2.0);
+    node.rest = used.zeroVelocityFactor(2.0);
     node.radar.push_back({other.stamp, used.radarFactor(other, motion.time(1.21))});
     const void* recycled = node.imu_from_previous.get();
     used.recycle(std::move(node));
@@ -285,7 +285,7 @@ TEST(FactorPool, ARecycledFactorIsAsOneMadeAnew) {
               evaluated(*fresh.imuFactor(preintegrated(0.98, 1.08)), {x.data(), next.data()}));
     EXPECT_EQ(evaluated(*used.offsetFactor(1e-3), {&t_O, &next_t_O}),
               evaluated(*fresh.offsetFactor(1e-3), {&t_O, &next_t_O}));
-    EXPECT_EQ(evaluated(*used.restFactor(0.05), {x.data()}), evaluated(*fresh.restFactor(0.05), {x.data()}));
+    EXPECT_EQ(evaluated(*used.zeroVelocityFactor(0.05), {x.data()}), evaluated(*fresh.zeroVelocityFactor(0.05), {x.data()}));
     const RadarVelocityMeasurement z = measurement(motion.time(1.0));
     EXPECT_EQ(evaluated(*used.radarFactor(z, motion.time(0.98)), {x.data(), &t_O}),
               evaluated(*fresh.radarFactor(z, motion.time(0.98)), {x.data(), &t_O}));

@@ -7,7 +7,7 @@
 #include <set>
 #include <utility>
 
-#include "rio_t/odometry/navigator.h"
+#include "rio_t/odometry/imu_propagator.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
 #include "simulated_run.h"
 
@@ -197,27 +197,27 @@ TEST_F(AtRest, OneStampFarAheadDoesNotSilenceTheImu) {
 }
 
 // What the IMU read since is not kept for ever: better an old anchor than one with a hole behind it.
-TEST(Navigator, AnAnchorOlderThanItsHistoryIsNotTaken) {
-  Navigator navigator(ImuNoise(), {0.0, 0.0, -9.81});
+TEST(ImuPropagator, AnAnchorOlderThanItsHistoryIsNotTaken) {
+  ImuPropagator propagator(ImuNoise(), {0.0, 0.0, -9.81});
   ImuMeasurement imu;
   imu.acceleration = {0.0, 0.0, 9.81};
   NavigationState state;
   state.time = Time::fromSeconds(100.0);
   imu.time = state.time;
-  navigator.add(imu);
-  navigator.anchor(state);
+  propagator.add(imu);
+  propagator.anchor(state);
   for (int i = 1; i <= 4000; ++i) {
     imu.time = state.time + 0.01 * i;
-    navigator.add(imu);
+    propagator.add(imu);
   }
   state.p_W.x() = 7.0;
   state.time = imu.time - 31.0;
-  navigator.anchor(state);
-  EXPECT_EQ(navigator.state()->p_W.x(), 0.0);
+  propagator.anchor(state);
+  EXPECT_EQ(propagator.state()->p_W.x(), 0.0);
   state.time = imu.time - 29.0;
-  navigator.anchor(state);
-  EXPECT_EQ(navigator.state()->p_W.x(), 7.0);
-  EXPECT_EQ(navigator.state()->time, imu.time);
+  propagator.anchor(state);
+  EXPECT_EQ(propagator.state()->p_W.x(), 7.0);
+  EXPECT_EQ(propagator.state()->time, imu.time);
 }
 
 TEST_F(AtRest, UncertaintyGrowsOverAnImuGap) {

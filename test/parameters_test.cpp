@@ -356,7 +356,7 @@ std::size_t keysChanging(const std::string& group) {
 
 TEST(Parameters, EveryMemberOfTheOptionsHasAKey) {
   EXPECT_EQ(keysChanging("Smoother") + keysChanging("Time offset"),
-            memberCount<SmootherOptions>() + memberCount<OffsetMonitorOptions>() + 1)
+            memberCount<SmootherOptions>() + memberCount<OffsetStepDetectorOptions>() + 1)
       << "with max_queued_scans; a member of SmootherOptions lacks a key in src/ros/parameter_registry.cpp";
   EXPECT_EQ(keysChanging("Radar: which points"), memberCount<EgoVelocityOptions>());
   EXPECT_EQ(keysChanging("Radar: jumps"), memberCount<FeasibilityOptions>());
@@ -366,7 +366,7 @@ TEST(Parameters, EveryMemberOfTheOptionsHasAKey) {
   EXPECT_EQ(keysChanging("Health"), memberCount<HealthOptions>());
   EXPECT_EQ(keysChanging("Rest on the way"), memberCount<RestOptions>());
   EXPECT_EQ(keysChanging("IMU"), memberCount<ImuNoise>() + 1) << "with gravity";
-  EXPECT_EQ(keysChanging("What sensors"), memberCount<ImuGateOptions>() + 2)
+  EXPECT_EQ(keysChanging("What sensors"), memberCount<ImuInputCheckOptions>() + 2)
       << "with max_imu_gap, max_radar_gap";
   EXPECT_EQ(keysChanging("T_IR"), memberCount<Extrinsics>() + 1) << "with extrinsics_source";
   EXPECT_EQ(memberCount<OdometryOptions>(), 17u)

@@ -216,7 +216,7 @@ class Windows : public Smoother {
       for (int i = 0; i < 3; ++i) z.v_R(i) += 0.01 * wave(5 * k + i);
       if (k % 4 == 2) z.v_R.x() += 0.5;  // for the loss
       node.radar.push_back({z.stamp, pool.radarFactor(z, node.time)});
-      if (k % 3 == 1) node.rest = pool.restFactor(3.0);
+      if (k % 3 == 1) node.rest = pool.zeroVelocityFactor(3.0);
       if (k > 0) {
         const Time before = result.nodes.back().time;
         const StateBlock from = motion.state(t - 0.1);

@@ -8,7 +8,7 @@
 
 #include "rio_t/imu/preintegration.h"
 #include "rio_t/imu/rest_detector.h"
-#include "rio_t/odometry/navigator.h"
+#include "rio_t/odometry/imu_propagator.h"
 
 namespace rio_t {
 namespace {
@@ -31,12 +31,12 @@ BatchOdometry::BatchOdometry(const OdometryOptions& options, const BatchOptions&
     : options_(options),
       batch_(batch),
       g_W_(0.0, 0.0, -options.gravity),
-      imu_gate_(options.max_imu_gap, options.imu_gate) {}
+      imu_input_check_(options.max_imu_gap, options.imu_input_check) {}
 
 void BatchOdometry::addImu(ImuMeasurement imu) {
-  const ImuGate::Verdict verdict = imu_gate_.check(imu);
-  if (verdict.decision == ImuGate::Decision::kDrop) return;
-  if (verdict.decision == ImuGate::Decision::kRestart)
+  const ImuInputCheck::Verdict verdict = imu_input_check_.check(imu);
+  if (verdict.decision == ImuInputCheck::Decision::kDrop) return;
+  if (verdict.decision == ImuInputCheck::Decision::kRestart)
     throw std::runtime_error(
         "batch: the IMU's clock jumped or it was silent for longer than max_bridged_imu_gap; "
         "no single graph goes over that: use mode online, or bag_start and bag_duration");
@@ -195,10 +195,10 @@ std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solu
     });
   }
   // Behind the last scan there is the IMU alone.
-  Navigator navigator(options_.imu_noise, g_W_);
-  navigator.anchor(navigationState(nodes.back(), solution.covariances.back(), imu_));
+  ImuPropagator propagator(options_.imu_noise, g_W_);
+  propagator.anchor(navigationState(nodes.back(), solution.covariances.back(), imu_));
   imu_.forEachSample(nodes.back().time - 0.1, imu_.newest(), [&](const ImuMeasurement& sample) {
-    const std::optional<NavigationState> state = navigator.add(sample);
+    const std::optional<NavigationState> state = propagator.add(sample);
     if (state && state->time > nodes.back().time && !sample.is_bridge) states.push_back(*state);
   });
   return states;

@@ -11,7 +11,7 @@
 #include "rio_t/odometry/initializer.h"
 #include "rio_t/odometry/innovation_gate.h"
 #include "rio_t/odometry/model_error_scale.h"
-#include "rio_t/odometry/navigator.h"
+#include "rio_t/odometry/imu_propagator.h"
 #include "rio_t/odometry/offset_uncertainty.h"
 #include "rio_t/odometry/pose_doubt.h"
 #include "rio_t/odometry/yaw_doubt.h"
@@ -59,14 +59,14 @@ struct RadarInertialOdometry::Impl {
       : options(options_in),
         g_W(0.0, 0.0, -options.gravity),
         R_RI(options.T_IR.q_IR.conjugate().toRotationMatrix()),
-        max_stamp_ahead(std::max(kMaxStampAhead, options.imu_gate.max_bridged_gap)),
-        imu_gate(options.max_imu_gap, options.imu_gate),
-        navigator(options.imu_noise, g_W),
+        max_stamp_ahead(std::max(kMaxStampAhead, options.imu_input_check.max_bridged_gap)),
+        imu_input_check(options.max_imu_gap, options.imu_input_check),
+        propagator(options.imu_noise, g_W),
         initializer(options),
         recovery(options),
         ego_velocity_estimator(options.ego_velocity),
         feasibility(options.feasibility),
-        offset_monitor(options.offset_monitor),
+        offset_step_detector(options.offset_step_detector),
         offset_uncertainty(options.smoother.huber_threshold),
         innovation_gate(options.smoother),
         health_monitor(options.health, options.smoother.innovation_gate),
@@ -79,7 +79,7 @@ struct RadarInertialOdometry::Impl {
   void startAgain();
   void watchRadar(bool scan_came);
   void carryWindow();
-  void anchorNavigator(const NavigationState& state, bool at_rest = false);
+  void anchorPropagator(const NavigationState& state, bool at_rest = false);
   void tryInitialize(const ImuMeasurement& sample);
   void begin(Time time, const NodePrior& prior);
   /// The poses of the window that is given up go to `left`.
@@ -111,8 +111,8 @@ struct RadarInertialOdometry::Impl {
 
   // The navigation half; guarded by navigation_mutex, held for microseconds.
   std::mutex navigation_mutex;
-  ImuGate imu_gate;
-  Navigator navigator;
+  ImuInputCheck imu_input_check;
+  ImuPropagator propagator;
   std::uint64_t clock_restarts = 0;  ///< how often the time of the IMU started again
 
   // From the feeding threads to the optimisation half; guarded by inbox_mutex.
@@ -130,7 +130,7 @@ struct RadarInertialOdometry::Impl {
   MotionInitializer recovery;  ///< from divergence
   EgoVelocityEstimator ego_velocity_estimator;
   FeasibilityCheck feasibility;
-  OffsetMonitor offset_monitor;
+  OffsetStepDetector offset_step_detector;
   OffsetUncertainty offset_uncertainty;
   ModelErrorScale model_error_scale;
   InnovationGate innovation_gate;
@@ -166,17 +166,17 @@ std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasuremen
   std::uint64_t clock_restarts = 0;
   {
     const std::lock_guard<std::mutex> lock(m.navigation_mutex);
-    ImuGate::Verdict verdict = m.imu_gate.check(sample);
+    ImuInputCheck::Verdict verdict = m.imu_input_check.check(sample);
     for (const char* fault : verdict.faults) m.faults.count(fault);
-    if (verdict.decision == ImuGate::Decision::kDrop) return std::nullopt;
-    if (verdict.decision == ImuGate::Decision::kRestart) {
-      m.navigator = Navigator(m.options.imu_noise, m.g_W);
+    if (verdict.decision == ImuInputCheck::Decision::kDrop) return std::nullopt;
+    if (verdict.decision == ImuInputCheck::Decision::kRestart) {
+      m.propagator = ImuPropagator(m.options.imu_noise, m.g_W);
       ++m.clock_restarts;
     }
     clock_restarts = m.clock_restarts;
     bridge = std::move(verdict.bridge);
-    for (const ImuMeasurement& unseen : bridge) m.navigator.add(unseen);
-    state = m.navigator.add(sample);
+    for (const ImuMeasurement& unseen : bridge) m.propagator.add(unseen);
+    state = m.propagator.add(sample);
   }
   const std::lock_guard<std::mutex> lock(m.inbox_mutex);
   if (m.inbox_clock_restarts != clock_restarts) {
@@ -304,8 +304,8 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
     prior->covariance.diagonal().setConstant(options.rest.velocity_sigma * options.rest.velocity_sigma);
   }
   const bool tilt_is_known = !prediction || prediction->tilt_sigma < kMaxTiltSigma;
-  const bool heed_prior = health_monitor.health() != Health::kDiverged;
-  measureAt(scan, heed_prior ? prior : std::nullopt, measured);
+  const bool trust_prior = health_monitor.health() != Health::kDiverged;
+  measureAt(scan, trust_prior ? prior : std::nullopt, measured);
   if (prior) judgePrediction(scan, *prior, measured);
   if (!isValid(measured.status)) return toString(measured.status);
   if (!feasibility.accept(scan.stamp, measured.v_R)) return "infeasible_velocity";
@@ -317,7 +317,7 @@ std::string RadarInertialOdometry::Impl::measureVelocity(const RadarScan& scan, 
   // A minority that sides with the prediction has more noise than its covariance says.
   if (prediction && tilt_is_known && informs_offset && speaksForItself(measured) &&
       options.smoother.estimate_time_offset &&
-      offset_monitor.stepped(scan.stamp, measured.v_R - prediction->velocity.v_R,
+      offset_step_detector.stepped(scan.stamp, measured.v_R - prediction->velocity.v_R,
                              prediction->covariance_at_offset + measured.covariance, prediction->dv_dt_O)) {
     smoother.loosenTimeOffset(scan.stamp);
     offset_uncertainty.offsetStepped();
@@ -354,7 +354,7 @@ void RadarInertialOdometry::Impl::updateWindow() {
       options.smoother.estimate_time_offset
           ? offset_uncertainty.sigma(covariance(StateBlock::kTangent, StateBlock::kTangent))
           : 0.0;
-  anchorNavigator(result.state,
+  anchorPropagator(result.state,
                   result.used && result.ego_velocity.status == EgoVelocityStatus::kZeroVelocity);
 }
 
@@ -415,7 +415,7 @@ void RadarInertialOdometry::Impl::startAgain() {
   at_once.init_motion_after = 0.0;
   initializer = Initializer(at_once);
   feasibility = FeasibilityCheck(options.feasibility);
-  offset_monitor = OffsetMonitor(options.offset_monitor);
+  offset_step_detector = OffsetStepDetector(options.offset_step_detector);
   offset_uncertainty = OffsetUncertainty(options.smoother.huber_threshold);
   model_error_scale = ModelErrorScale();
   smoother = emptySmoother();
@@ -449,12 +449,12 @@ void RadarInertialOdometry::Impl::carryWindow() {
     left_in_silence.push_back({node.time, node.x.p_W(), node.x.q_WI()});
 }
 
-void RadarInertialOdometry::Impl::anchorNavigator(const NavigationState& state, bool at_rest) {
+void RadarInertialOdometry::Impl::anchorPropagator(const NavigationState& state, bool at_rest) {
   const std::lock_guard<std::mutex> lock(navigation_mutex);
-  // Else the navigator lives already in another time.
+  // Else the propagator lives already in another time.
   if (clock_restarts != clock_restarts_done) return;
-  navigator.setNoise(imuNoise());
-  navigator.anchor(state, at_rest);
+  propagator.setNoise(imuNoise());
+  propagator.anchor(state, at_rest);
 }
 
 void RadarInertialOdometry::Impl::tryInitialize(const ImuMeasurement& sample) {
@@ -481,7 +481,7 @@ void RadarInertialOdometry::Impl::begin(Time time, const NodePrior& prior) {
 }
 
 void RadarInertialOdometry::Impl::publishNewest() {
-  anchorNavigator(newestState(smoother.newestCovariance()));
+  anchorPropagator(newestState(smoother.newestCovariance()));
 }
 
 bool RadarInertialOdometry::Impl::tryReinitialize(std::vector<StampedPose>& left) {
@@ -494,7 +494,7 @@ bool RadarInertialOdometry::Impl::tryReinitialize(std::vector<StampedPose>& left
   pose_doubt = PoseDoubt(newestState(smoother.newestCovariance()));
   model_error_scale = found->model_error_scale;
   begin(found->time, found->prior);
-  offset_monitor = OffsetMonitor(options.offset_monitor);
+  offset_step_detector = OffsetStepDetector(options.offset_step_detector);
   offset_uncertainty = OffsetUncertainty(options.smoother.huber_threshold);
   updateHealth();
   faults.count("reinitialized");
@@ -502,7 +502,7 @@ bool RadarInertialOdometry::Impl::tryReinitialize(std::vector<StampedPose>& left
 }
 
 PoseAnchor RadarInertialOdometry::Impl::anchorAt(Time time) const {
-  // From the newest node before, as the navigator goes: what is published goes on from where it is.
+  // From the newest node before, as the propagator goes: what is published goes on from where it is.
   std::size_t k = smoother.size() - 1;
   while (k > 0 && smoother.node(k).time > time) --k;
   const NodeEstimate node = smoother.node(k);
@@ -521,7 +521,7 @@ void RadarInertialOdometry::Impl::updateHealth() {
   std::optional<NavigationState> state;
   {
     const std::lock_guard<std::mutex> lock(navigation_mutex);
-    state = navigator.state();
+    state = propagator.state();
   }
   if (!state || imu.empty()) return;
   const bool was_diverged = health_monitor.health() == Health::kDiverged;
@@ -571,7 +571,7 @@ PointVariances RadarInertialOdometry::radarNoise() const { return impl_->ego_vel
 
 MeasuredImuNoise RadarInertialOdometry::imuNoise() const {
   const std::lock_guard<std::mutex> lock(impl_->navigation_mutex);
-  return impl_->imu_gate.noise();
+  return impl_->imu_input_check.noise();
 }
 
 Health RadarInertialOdometry::health() const {

@@ -175,7 +175,7 @@ double squaredDistance(const VelocitySolution& solution, const VelocityPrior& pr
 /// vague one is weighed against their number: it must not find a minority that sides with it where it is
 /// wrong. False where a vague prior speaks against neither of two velocities and most points do not decide:
 /// the scan is ambiguous.
-bool heedPrior(const std::vector<RadarDirection>& points, const VelocityPrior& prior,
+bool selectInliersWithPrior(const std::vector<RadarDirection>& points, const VelocityPrior& prior,
                const EgoVelocityOptions& o, const PointVariances& noise, std::vector<RadarDirection>& inliers,
                std::vector<RadarDirection>& supporters) {
   const double gate = o.prior_gate * o.prior_gate;
@@ -300,7 +300,7 @@ void EgoVelocityEstimator::estimate(const RadarScan& scan, const std::optional<V
       return;
     }
     selectInliers(points, *consensus, o, noise(), inliers);
-    if (prior && !heedPrior(points, *prior, o, noise(), inliers, workspace->supporters)) {
+    if (prior && !selectInliersWithPrior(points, *prior, o, noise(), inliers, workspace->supporters)) {
       result.status = EgoVelocityStatus::kAmbiguous;
       return;
     }

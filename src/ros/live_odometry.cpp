@@ -34,7 +34,7 @@ LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& p
       monitor_(config_),
       publisher_(config_, private_node),
       options_(config_.odometry),
-      imu_stamps_(options_.imu_gate.max_bridged_gap, options_.imu_gate.jump_patience) {
+      imu_stamps_(options_.imu_input_check.max_bridged_gap, options_.imu_input_check.jump_patience) {
   if (config_.extrinsics_source == ExtrinsicsSource::kTf) {
     monitor_.waitFor("the first scan, whose frame_id names the radar for tf");
     tf_.emplace();
@@ -172,14 +172,14 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
     const ImuMeasurement imu = toImuMeasurement(*event.getConstMessage(), config_.imu_topic);
     // The same judgement as the session's own, so that the whole session starts again, with what it stamps
     // by.
-    const StampWatch::Verdict stamp = imu_stamps_.check(imu.time);
-    if (stamp == StampWatch::Verdict::kRestart) {
+    const ClockJumpDetector::Verdict stamp = imu_stamps_.check(imu.time);
+    if (stamp == ClockJumpDetector::Verdict::kRestart) {
       const double jump = imu.time - *newest_imu_;
       reset(std::string("the IMU's stamps jumped ") + (jump < 0.0 ? "back" : "ahead") + " by " +
                 std::to_string(std::abs(jump)) + " s",
             true);
     }
-    if (stamp == StampWatch::Verdict::kGood || stamp == StampWatch::Verdict::kRestart) newest_imu_ = imu.time;
+    if (stamp == ClockJumpDetector::Verdict::kGood || stamp == ClockJumpDetector::Verdict::kRestart) newest_imu_ = imu.time;
     const Session now = session_.get();
     if (!now) {
       monitor_.dropped("imu_before_extrinsics");

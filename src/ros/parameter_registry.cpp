@@ -110,7 +110,7 @@ void listImu(ParameterList& list, Config& c) {
 }
 
 void listGaps(ParameterList& list, Config& c) {
-  ImuGateOptions& gate = c.odometry.imu_gate;
+  ImuInputCheckOptions& gate = c.odometry.imu_input_check;
   list.group("What sensors may leave out");
   list.number("max_imu_gap", "s", above(0), c.odometry.max_imu_gap,
               "between samples; over a longer gap the uncertainty grows, and it is reported");
@@ -279,7 +279,7 @@ void listTimeOffset(ParameterList& list, Config& c) {
               "offset, which then holds still");
   list.number("max_time_offset", "s", above(0, 1), smoother.max_time_offset,
               "bound on its size, either sign");
-  OffsetMonitorOptions& monitor = c.odometry.offset_monitor;
+  OffsetStepDetectorOptions& monitor = c.odometry.offset_step_detector;
   list.boolean("time_offset_step_detection", monitor.enabled,
                "find the offset anew where the scans say that it stepped, e.g. after a driver restart");
   list.number("time_offset_step_memory", "s", above(0), monitor.memory, "of the average over scans");

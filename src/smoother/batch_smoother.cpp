@@ -95,7 +95,7 @@ BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std
     WindowNode& node = window.nodes.back();
     graph.node_of_scan[i] = window.nodes.size() - 1;
     if (scan.velocity) node.radar.push_back({scan.stamp, pool.radarFactor(*scan.velocity, node.time)});
-    if (scan.rest_velocity_sigma) node.rest = pool.restFactor(*scan.rest_velocity_sigma);
+    if (scan.rest_velocity_sigma) node.rest = pool.zeroVelocityFactor(*scan.rest_velocity_sigma);
   }
   return graph;
 }

@@ -95,7 +95,7 @@ template void ChainSystem::addStateAndOffset<kNodeTangent>(
     std::size_t, const ceres::SizedCostFunction<kNodeTangent, kStored, 1>&, const double*, const double*,
     const ceres::LossFunction*, bool);
 
-void ChainSystem::addState(std::size_t k, const RestFactor& factor, const double* state) {
+void ChainSystem::addState(std::size_t k, const ZeroVelocityFactor& factor, const double* state) {
   Eigen::Vector3d r;
   StateJacobian<3> J;
   evaluate(factor, state, nullptr, r.data(), J.data(), nullptr);

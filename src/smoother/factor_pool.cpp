@@ -34,8 +34,8 @@ std::unique_ptr<ConstantOffsetFactor> FactorPool::offsetFactor(double sigma) {
   return renewed<ConstantOffsetFactor>(takeOne(offset_factors_), sigma);
 }
 
-std::unique_ptr<RestFactor> FactorPool::restFactor(double velocity_sigma) {
-  return renewed<RestFactor>(takeOne(rest_factors_), velocity_sigma);
+std::unique_ptr<ZeroVelocityFactor> FactorPool::zeroVelocityFactor(double velocity_sigma) {
+  return renewed<ZeroVelocityFactor>(takeOne(zero_velocity_factors_), velocity_sigma);
 }
 
 std::unique_ptr<RadarCost> FactorPool::radarFactor(const RadarVelocityMeasurement& z, Time node_time) {

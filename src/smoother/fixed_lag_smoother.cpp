@@ -130,7 +130,7 @@ FixedLagSmoother::AddResult FixedLagSmoother::addRest(Time stamp, double velocit
   WindowNode* node = nodeOf(stamp);
   if (node == nullptr) return AddResult::kOlderThanWindow;
   pool_.recycle(std::move(node->rest));
-  node->rest = pool_.restFactor(velocity_sigma);
+  node->rest = pool_.zeroVelocityFactor(velocity_sigma);
   return AddResult::kAdded;
 }
 

@@ -14,7 +14,7 @@ struct ImuMeasurement {
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();
 
   // What the interval that ends with this sample does not show (a gap, saturated axes), as squared densities
-  // of white noise per axis. They add to those of ImuNoise; see ImuGate.
+  // of white noise per axis. They add to those of ImuNoise; see ImuInputCheck.
   double gyro_doubt = 0.0;   ///< [rad^2/s]
   double accel_doubt = 0.0;  ///< [m^2/s^3]
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "rio_t/imu/gate.h"
+#include "rio_t/imu/input_check.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
 #include "rio_t/smoother/batch_smoother.h"
 
@@ -68,7 +68,7 @@ class BatchOdometry {
   BatchOptions batch_;              // read-only after construction
   Eigen::Vector3d g_W_;             // read-only after construction
   double model_error_scale_ = 1.0;  ///< of the online run at its end
-  ImuGate imu_gate_;
+  ImuInputCheck imu_input_check_;
   ImuBuffer imu_;
   std::vector<Scan> scans_;
 };

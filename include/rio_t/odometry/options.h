@@ -2,13 +2,13 @@
 
 #include <Eigen/Geometry>
 
-#include "rio_t/imu/gate.h"
+#include "rio_t/imu/input_check.h"
 #include "rio_t/imu/noise.h"
 #include "rio_t/imu/rest_detector.h"
 #include "rio_t/imu/static_initializer.h"
 #include "rio_t/odometry/health_monitor.h"
 #include "rio_t/odometry/motion_initializer.h"
-#include "rio_t/odometry/offset_monitor.h"
+#include "rio_t/odometry/offset_step_detector.h"
 #include "rio_t/radar/ego_velocity.h"
 #include "rio_t/radar/feasibility.h"
 #include "rio_t/smoother/options.h"
@@ -41,11 +41,11 @@ struct OdometryOptions {
   FeasibilityOptions feasibility;
   RestOptions rest;
   SmootherOptions smoother;
-  OffsetMonitorOptions offset_monitor;
+  OffsetStepDetectorOptions offset_step_detector;
   HealthOptions health;
   /// [s] between samples; over a longer one the uncertainty grows, and it is reported
   double max_imu_gap = 0.04;
-  ImuGateOptions imu_gate;
+  ImuInputCheckOptions imu_input_check;
   double max_radar_gap = 0.5;         ///< [s] without a scan that is not reported
   std::size_t max_queued_scans = 50;  ///< scans that may wait for the IMU or the solver
 };

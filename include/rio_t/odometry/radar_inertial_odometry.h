@@ -54,7 +54,7 @@ class RadarInertialOdometry {
 
   /// State at this sample, from the newest optimised state: what a live user gets. None before
   /// initialisation. Samples that are out of place in time, or not finite, are dropped and counted in
-  /// `faults()`, as are gaps and saturated samples, over which the uncertainty grows (see ImuGate). Where the
+  /// `faults()`, as are gaps and saturated samples, over which the uncertainty grows (see ImuInputCheck). Where the
   /// IMU's clock jumps, all starts again with an initialisation.
   std::optional<NavigationState> addImu(const ImuMeasurement& imu);
 

@@ -96,7 +96,7 @@ class LiveOdometry {
   std::map<std::string, Told> faults_told_;  // input thread only, as the next
   std::weak_ptr<LiveSession> faults_of_;     // whose faults these are
 
-  StampWatch imu_stamps_;           // IMU thread only, as the next
+  ClockJumpDetector imu_stamps_;           // IMU thread only, as the next
   std::optional<Time> newest_imu_;  // of the good stamps
 
   ros::Subscriber imu_subscriber_, scan_subscriber_, trigger_subscriber_;

@@ -9,7 +9,7 @@
 #include "rio_t/factors/constant_offset_factor.h"
 #include "rio_t/factors/imu_factor.h"
 #include "rio_t/factors/prior_factor.h"
-#include "rio_t/factors/rest_factor.h"
+#include "rio_t/factors/zero_velocity_factor.h"
 
 /// The linearised window: a chain of nodes in which each factor touches one node or two neighbours.
 /// Solution, marginalisation and covariance are block elimination along this chain (docs/method.md, section
@@ -35,7 +35,7 @@ struct ChainSystem {
                          const double* state, const double* t_O, const ceres::LossFunction* loss,
                          bool offset_known);
   /// The same on (state k), (t_O,k, t_O,k+1) and (state k, state k+1).
-  void addState(std::size_t k, const RestFactor& factor, const double* state);
+  void addState(std::size_t k, const ZeroVelocityFactor& factor, const double* state);
   void addOffsetPair(std::size_t k, const ConstantOffsetFactor& factor, const double* t_O,
                      const double* next_t_O);
   void addStatePair(std::size_t k, const ImuFactor& factor, const double* state, const double* next_state);

@@ -22,7 +22,7 @@ class FactorPool {
 
   std::unique_ptr<ImuFactor> imuFactor(const Preintegration& preintegration);
   std::unique_ptr<ConstantOffsetFactor> offsetFactor(double sigma);
-  std::unique_ptr<RestFactor> restFactor(double velocity_sigma);
+  std::unique_ptr<ZeroVelocityFactor> zeroVelocityFactor(double velocity_sigma);
   /// Of the model that the options name, for a node at `node_time`.
   std::unique_ptr<RadarCost> radarFactor(const RadarVelocityMeasurement& z, Time node_time);
   /// Without factors.
@@ -31,7 +31,7 @@ class FactorPool {
   // Back into the pool; null is fine.
   void recycle(std::unique_ptr<ImuFactor> factor) { keep(std::move(factor), imu_factors_); }
   void recycle(std::unique_ptr<ConstantOffsetFactor> factor) { keep(std::move(factor), offset_factors_); }
-  void recycle(std::unique_ptr<RestFactor> factor) { keep(std::move(factor), rest_factors_); }
+  void recycle(std::unique_ptr<ZeroVelocityFactor> factor) { keep(std::move(factor), zero_velocity_factors_); }
   void recycle(std::unique_ptr<RadarCost> factor) { keep(std::move(factor), radar_factors_); }
   void recycle(WindowNode node);
 
@@ -51,7 +51,7 @@ class FactorPool {
 
   Spares<ImuFactor> imu_factors_;
   Spares<ConstantOffsetFactor> offset_factors_;
-  Spares<RestFactor> rest_factors_;
+  Spares<ZeroVelocityFactor> zero_velocity_factors_;
   Spares<RadarCost> radar_factors_;  ///< all of one model
   std::vector<WindowNode> nodes_;
 };

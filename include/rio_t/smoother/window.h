@@ -10,7 +10,7 @@
 #include "rio_t/factors/constant_offset_factor.h"
 #include "rio_t/factors/imu_factor.h"
 #include "rio_t/factors/prior_factor.h"
-#include "rio_t/factors/rest_factor.h"
+#include "rio_t/factors/zero_velocity_factor.h"
 #include "rio_t/factors/state_block.h"
 
 namespace rio_t {
@@ -32,7 +32,7 @@ struct WindowNode {
   std::unique_ptr<ImuFactor> imu_from_previous;                ///< null for the first node
   std::unique_ptr<ConstantOffsetFactor> offset_from_previous;  ///< null for the first node
   std::vector<RadarTerm> radar;
-  std::unique_ptr<RestFactor> rest;  ///< null where the platform is not known to be at rest
+  std::unique_ptr<ZeroVelocityFactor> rest;  ///< null where the platform is not known to be at rest
 };
 
 /// The factor graph: a chain of nodes in the order of their times, with a prior on the first.

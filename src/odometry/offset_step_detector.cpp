@@ -1,4 +1,4 @@
-#include "rio_t/odometry/offset_monitor.h"
+#include "rio_t/odometry/offset_step_detector.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -6,7 +6,7 @@
 
 namespace rio_t {
 
-bool OffsetMonitor::stepped(Time stamp, const Eigen::Vector3d& innovation, const Eigen::Matrix3d& S,
+bool OffsetStepDetector::stepped(Time stamp, const Eigen::Vector3d& innovation, const Eigen::Matrix3d& S,
                             const Eigen::Vector3d& J) {
   if (!options_.enabled) return false;
   const double fade = std::exp(-std::clamp(stamp - last_, 0.0, 10.0 * options_.memory) / options_.memory);
@@ -26,7 +26,7 @@ bool OffsetMonitor::stepped(Time stamp, const Eigen::Vector3d& innovation, const
   const double sigma = std::sqrt(scatter / information_);
   if (std::abs(change) < options_.significance * sigma || std::abs(change) < options_.min_change)
     return false;
-  *this = OffsetMonitor(options_);
+  *this = OffsetStepDetector(options_);
   return true;
 }
 

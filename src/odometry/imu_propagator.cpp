@@ -1,4 +1,4 @@
-#include "rio_t/odometry/navigator.h"
+#include "rio_t/odometry/imu_propagator.h"
 
 #include <algorithm>
 
@@ -17,7 +17,7 @@ constexpr double kMoves = 4.0;
 
 }  // namespace
 
-std::optional<NavigationState> Navigator::add(const ImuMeasurement& imu) {
+std::optional<NavigationState> ImuPropagator::add(const ImuMeasurement& imu) {
   if (state_) {
     propagate(history_.empty() ? imu : history_.back(), imu);
   }
@@ -26,7 +26,7 @@ std::optional<NavigationState> Navigator::add(const ImuMeasurement& imu) {
   return state();
 }
 
-std::optional<NavigationState> Navigator::state() const {
+std::optional<NavigationState> ImuPropagator::state() const {
   const bool vibrates =
       !history_.empty() && history_.back().accel_noise > noise_.accel_density * noise_.accel_density;
   if (!state_ || !rest_ || !vibrates) return state_;
@@ -42,7 +42,7 @@ std::optional<NavigationState> Navigator::state() const {
   return held;
 }
 
-void Navigator::anchor(const NavigationState& state, bool at_rest) {
+void ImuPropagator::anchor(const NavigationState& state, bool at_rest) {
   if (state_ && history_.back().time - state.time > kHistory) return;
   state_ = state;
   rest_ = at_rest ? state_ : std::nullopt;
@@ -54,7 +54,7 @@ void Navigator::anchor(const NavigationState& state, bool at_rest) {
   }
 }
 
-void Navigator::propagate(const ImuMeasurement& from, const ImuMeasurement& to) {
+void ImuPropagator::propagate(const ImuMeasurement& from, const ImuMeasurement& to) {
   NavigationState& x = *state_;
   const double dt = to.time - x.time;
   if (dt <= 0.0) return;

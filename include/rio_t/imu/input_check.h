@@ -8,12 +8,12 @@
 #include "rio_t/imu/noise.h"
 #include "rio_t/imu/noise_meter.h"
 #include "rio_t/imu/saturation_detector.h"
-#include "rio_t/imu/stamp_watch.h"
+#include "rio_t/imu/clock_jump_detector.h"
 #include "rio_t/imu/stuck_axis_detector.h"
 
 namespace rio_t {
 
-struct ImuGateOptions {
+struct ImuInputCheckOptions {
   double max_bridged_gap = 3.0;  ///< [s] after a longer one nothing is known: the estimate starts again
   double jump_patience = 0.5;  ///< [s] of stamps that run elsewhere, after which their clock must have jumped
   double accel_range = 0.0;    ///< [m/s^2] largest reading of an axis; 0: found from flat tops
@@ -41,7 +41,7 @@ struct MeasuredImuNoise {
 /// A signal with a correlation time tau deviates from the straight line over a gap of T << tau by far less
 /// than over a long one; so the density of a gap is the full one times min(1, T / tau), tau that of the
 /// motion.
-class ImuGate {
+class ImuInputCheck {
  public:
   enum class Decision {
     kTake,
@@ -58,7 +58,7 @@ class ImuGate {
   };
 
   /// `max_gap` [s] between samples: a longer one is reported, and what it hides is doubted.
-  ImuGate(double max_gap, const ImuGateOptions& options);
+  ImuInputCheck(double max_gap, const ImuInputCheckOptions& options);
   /// Sets the doubts and the noise of `imu` where it is taken, and replaces what a stuck axis reads.
   Verdict check(ImuMeasurement& imu);
   MeasuredImuNoise noise() const;
@@ -70,8 +70,8 @@ class ImuGate {
   void doubtAccel(ImuMeasurement& imu, double share) const;
 
   double max_gap_;  // read-only after construction, as the next
-  ImuGateOptions options_;
-  StampWatch stamps_;
+  ImuInputCheckOptions options_;
+  ClockJumpDetector stamps_;
   SaturationDetector saturation_;
   std::array<StuckAxisDetector, 3> gyro_axes_;
   GapBridge bridge_;

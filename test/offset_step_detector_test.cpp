@@ -1,4 +1,4 @@
-#include "rio_t/odometry/offset_monitor.h"
+#include "rio_t/odometry/offset_step_detector.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@ namespace {
 /// Scans at 10 Hz whose acceleration turns about, with an offset error and made-up noise of 0.03 m/s.
 /// Seconds until a step is seen; 60 where none is.
 double secondsToStep(double offset_error, double acceleration, double noise = 0.03) {
-  OffsetMonitor monitor{OffsetMonitorOptions()};
+  OffsetStepDetector monitor{OffsetStepDetectorOptions()};
   const Eigen::Matrix3d S = 0.05 * 0.05 * Eigen::Matrix3d::Identity();
   for (int i = 0; i < 600; ++i) {
     const Eigen::Vector3d J = acceleration * Eigen::Vector3d(std::sin(0.31 * i), std::cos(0.23 * i), 0.3);
@@ -21,25 +21,25 @@ double secondsToStep(double offset_error, double acceleration, double noise = 0.
   return 60.0;
 }
 
-TEST(OffsetMonitor, IsQuietWhereTheOffsetIsRight) {
+TEST(OffsetStepDetector, IsQuietWhereTheOffsetIsRight) {
   EXPECT_EQ(secondsToStep(0.0, 2.0), 60.0);
   EXPECT_EQ(secondsToStep(0.0, 0.0), 60.0) << "no excitation";
 }
 
-TEST(OffsetMonitor, SeesAStepOfEitherSign) {
+TEST(OffsetStepDetector, SeesAStepOfEitherSign) {
   EXPECT_LT(secondsToStep(0.05, 2.0), 5.0);
   EXPECT_LT(secondsToStep(-0.05, 2.0), 5.0);
   EXPECT_LT(secondsToStep(0.05, 0.7), 20.0);
 }
 
-TEST(OffsetMonitor, LeavesSmallChangesToTheRandomWalk) { EXPECT_EQ(secondsToStep(0.003, 5.0, 0.005), 60.0); }
+TEST(OffsetStepDetector, LeavesSmallChangesToTheRandomWalk) { EXPECT_EQ(secondsToStep(0.003, 5.0, 0.005), 60.0); }
 
-TEST(OffsetMonitor, DoesNotSpeakWithoutExcitation) { EXPECT_EQ(secondsToStep(0.05, 0.0), 60.0); }
+TEST(OffsetStepDetector, DoesNotSpeakWithoutExcitation) { EXPECT_EQ(secondsToStep(0.05, 0.0), 60.0); }
 
-TEST(OffsetMonitor, CanBeTurnedOff) {
-  OffsetMonitorOptions options;
+TEST(OffsetStepDetector, CanBeTurnedOff) {
+  OffsetStepDetectorOptions options;
   options.enabled = false;
-  OffsetMonitor monitor(options);
+  OffsetStepDetector monitor(options);
   for (int i = 0; i < 200; ++i) {
     EXPECT_FALSE(monitor.stepped(Time::fromSeconds(0.1 * i), {1, 0, 0}, 1e-4 * Eigen::Matrix3d::Identity(),
                                  {2, 0, 0}));

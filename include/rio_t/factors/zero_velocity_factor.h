@@ -7,10 +7,10 @@
 namespace rio_t {
 
 /// The platform is at rest: residual v_W / sigma. Block: state.
-class RestFactor final : public ceres::SizedCostFunction<3, StateBlock::kSize> {
+class ZeroVelocityFactor final : public ceres::SizedCostFunction<3, StateBlock::kSize> {
  public:
   /// `velocity_sigma` [m/s], per axis.
-  explicit RestFactor(double velocity_sigma) { set(velocity_sigma); }
+  explicit ZeroVelocityFactor(double velocity_sigma) { set(velocity_sigma); }
   void set(double velocity_sigma) { weight_ = 1.0 / velocity_sigma; }  ///< as if made anew
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
 

@@ -1,8 +1,8 @@
-#include "rio_t/imu/stamp_watch.h"
+#include "rio_t/imu/clock_jump_detector.h"
 
 namespace rio_t {
 
-StampWatch::Verdict StampWatch::check(Time stamp) {
+ClockJumpDetector::Verdict ClockJumpDetector::check(Time stamp) {
   const double step = newest_ ? stamp - *newest_ : 0.0;
   Verdict verdict = Verdict::kGood;
   if (newest_ && (step <= 0.0 || step > max_gap_)) {

@@ -10,10 +10,10 @@
 namespace rio_t {
 
 /// Carries the newest optimised state forward with the IMU: the paper's navigation thread. Not thread-safe.
-class Navigator {
+class ImuPropagator {
  public:
   /// `g_W`: gravity in W [m/s^2].
-  Navigator(const ImuNoise& noise, const Eigen::Vector3d& g_W) : noise_(noise), g_W_(g_W) {}
+  ImuPropagator(const ImuNoise& noise, const Eigen::Vector3d& g_W) : noise_(noise), g_W_(g_W) {}
 
   /// State at this sample; none before the first anchor. Samples must be in time order.
   std::optional<NavigationState> add(const ImuMeasurement& imu);

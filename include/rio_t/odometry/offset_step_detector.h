@@ -6,7 +6,7 @@
 
 namespace rio_t {
 
-struct OffsetMonitorOptions {
+struct OffsetStepDetectorOptions {
   bool enabled = true;
   double memory = 4.0;         ///< [s] time constant of the average over scans
   double significance = 6.0;   ///< [sigma] of the offset that the innovations ask for, by itself
@@ -19,9 +19,9 @@ struct OffsetMonitorOptions {
 /// An offset that is wrong by d shows as innovations nu = J d + noise, J = d(velocity)/d(t_O). The weighted
 /// average over the last scans, sum(J' S^-1 nu) / sum(J' S^-1 J), is the change that they ask for, with the
 /// variance 1 / sum(J' S^-1 J), scaled by how the innovations scatter against S (docs/method.md).
-class OffsetMonitor {
+class OffsetStepDetector {
  public:
-  explicit OffsetMonitor(const OffsetMonitorOptions& options) : options_(options) {}
+  explicit OffsetStepDetector(const OffsetStepDetectorOptions& options) : options_(options) {}
 
   /// `innovation` [m/s], its covariance `S` without the offset's own uncertainty, `J` [m/s^2]; true where the
   /// offset must have stepped, and then the average starts anew.
@@ -29,7 +29,7 @@ class OffsetMonitor {
                const Eigen::Vector3d& J);
 
  private:
-  OffsetMonitorOptions options_;  // read-only after construction
+  OffsetStepDetectorOptions options_;  // read-only after construction
   Time last_;
   double information_ = 0.0;  ///< sum J' S^-1 J, fading
   double projection_ = 0.0;   ///< sum J' S^-1 nu, fading

@@ -1,29 +1,29 @@
-#include "rio_t/imu/gate.h"
+#include "rio_t/imu/input_check.h"
 
 #include <algorithm>
 #include <cmath>
 
 namespace rio_t {
 
-ImuGate::ImuGate(double max_gap, const ImuGateOptions& options)
+ImuInputCheck::ImuInputCheck(double max_gap, const ImuInputCheckOptions& options)
     : max_gap_(max_gap),
       options_(options),
       stamps_(options.max_bridged_gap, options.jump_patience),
       saturation_(options.accel_range, options.gyro_range) {}
 
-ImuGate::Verdict ImuGate::check(ImuMeasurement& imu) {
+ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
   if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite())
     return {Decision::kDrop, {"imu_not_finite"}};
 
   Verdict verdict;
   switch (stamps_.check(imu.time)) {
-    case StampWatch::Verdict::kGood:
+    case ClockJumpDetector::Verdict::kGood:
       break;
-    case StampWatch::Verdict::kBehind:
+    case ClockJumpDetector::Verdict::kBehind:
       return {Decision::kDrop, {"imu_out_of_order"}};
-    case StampWatch::Verdict::kAhead:
+    case ClockJumpDetector::Verdict::kAhead:
       return {Decision::kDrop, {"imu_stamp_jump"}};
-    case StampWatch::Verdict::kRestart:
+    case ClockJumpDetector::Verdict::kRestart:
       verdict = {Decision::kRestart, {"imu_clock_restart"}};
       newest_.reset();
       bridge_.reset();
@@ -62,11 +62,11 @@ ImuGate::Verdict ImuGate::check(ImuMeasurement& imu) {
   return verdict;
 }
 
-MeasuredImuNoise ImuGate::noise() const {
+MeasuredImuNoise ImuInputCheck::noise() const {
   return {std::sqrt(accel_noise_.squaredDensity()), std::sqrt(gyro_noise_.squaredDensity())};
 }
 
-bool ImuGate::replaceStuck(ImuMeasurement& imu) {
+bool ImuInputCheck::replaceStuck(ImuMeasurement& imu) {
   bool is_stuck = false;
   for (int k = 0; k < 3; ++k) {
     const std::optional<double> likely =
@@ -78,12 +78,12 @@ bool ImuGate::replaceStuck(ImuMeasurement& imu) {
   return is_stuck;
 }
 
-void ImuGate::doubtGyro(ImuMeasurement& imu, double share) const {
+void ImuInputCheck::doubtGyro(ImuMeasurement& imu, double share) const {
   const double density = share * options_.unseen_gyro_density;
   imu.gyro_doubt = std::max(imu.gyro_doubt, density * density);
 }
 
-void ImuGate::doubtAccel(ImuMeasurement& imu, double share) const {
+void ImuInputCheck::doubtAccel(ImuMeasurement& imu, double share) const {
   const double density = share * options_.unseen_accel_density;
   imu.accel_doubt = std::max(imu.accel_doubt, density * density);
 }

@@ -7,14 +7,14 @@
 #include "noise.h"
 #include "rio_t/core/so3.h"
 #include "rio_t/imu/gap_bridge.h"
-#include "rio_t/imu/gate.h"
+#include "rio_t/imu/input_check.h"
 #include "rio_t/imu/preintegration.h"
 #include "synthetic_motion.h"
 
 namespace rio_t {
 namespace {
 
-using Decision = ImuGate::Decision;
+using Decision = ImuInputCheck::Decision;
 using Faults = std::vector<const char*>;
 
 std::string names(const Faults& faults) {
@@ -26,20 +26,20 @@ std::string names(const Faults& faults) {
 /// A gate that has seen a second of a motion at 100 Hz.
 class Gate : public ::testing::Test {
  protected:
-  Gate() : gate(0.04, ImuGateOptions()) {
+  Gate() : gate(0.04, ImuInputCheckOptions()) {
     for (; t < 1.0; t += 0.01) EXPECT_EQ(feed(t), "");
   }
   /// The faults that are told.
   std::string feed(double seconds) { return feed(motion.imuSample(seconds)); }
   std::string feed(const ImuMeasurement& imu) {
     sample = imu;
-    const ImuGate::Verdict verdict = gate.check(sample);
+    const ImuInputCheck::Verdict verdict = gate.check(sample);
     decision = verdict.decision;
     bridge = verdict.bridge;
     return names(verdict.faults);
   }
   SyntheticMotion motion;
-  ImuGate gate;
+  ImuInputCheck gate;
   double t = 0.0;
   ImuMeasurement sample;
   std::vector<ImuMeasurement> bridge;
@@ -98,7 +98,7 @@ TEST_F(Gate, DoubtGrowsWithTheGap) {
   EXPECT_GT(small, 0.0);
   EXPECT_EQ(feed(2.0), "imu_gap");
   EXPECT_NEAR(sample.accel_doubt,
-              ImuGateOptions().unseen_accel_density * ImuGateOptions().unseen_accel_density, 1e-12);
+              ImuInputCheckOptions().unseen_accel_density * ImuInputCheckOptions().unseen_accel_density, 1e-12);
   EXPECT_LT(small, 0.1 * sample.accel_doubt);
 }
 

@@ -8,7 +8,7 @@ namespace rio_t {
 
 /// Follows the stamps of a sensor and tells a sample that is out of place from a clock that jumped: the first
 /// stands alone, after the second the stamps go on from where they jumped to. Not thread-safe.
-class StampWatch {
+class ClockJumpDetector {
  public:
   enum class Verdict {
     kGood,     ///< later than the one before, by no more than `max_gap`
@@ -18,7 +18,7 @@ class StampWatch {
   };
 
   /// `max_gap` [s] between good stamps; `patience` [s] of stamps elsewhere that make a jump.
-  StampWatch(double max_gap, double patience) : max_gap_(max_gap), patience_(patience) {}
+  ClockJumpDetector(double max_gap, double patience) : max_gap_(max_gap), patience_(patience) {}
   Verdict check(Time stamp);
 
  private:
