@@ -362,13 +362,12 @@ TEST(EgoVelocityBias, DefaultCovarianceIsNotTooSmall) {
 void learnFrom(EgoVelocityEstimator& estimator, const Eigen::Vector3d& v, const Noise& noise, int scans,
                double ghosts = 0.0, double elevation_spread = 0.35) {
   Random random(40);
-  EgoVelocityWorkspace workspace;
   for (int i = 0; i < scans; ++i) {
     RadarScan scan = staticScene(random.uniform(0.75, 1.25) * v, 45, noise, random, elevation_spread);
     for (RadarPoint& p : scan.points) {
       if (random.uniform(0.0, 1.0) < ghosts) p.doppler = random.uniform(-2.5, 2.5);
     }
-    estimator.learn(scan, estimator.estimate(scan), &workspace);
+    estimator.learn(scan, estimator.estimate(scan));
   }
 }
 
@@ -470,12 +469,11 @@ TEST(EgoVelocityNoise, NoneIsLearnedSafely) {
 
 TEST(EgoVelocityNoise, IsNotLearnedWithoutNeed) {
   const EgoVelocityOptions o = startingAt(0.03, 0.05, 0.035);
-  EgoVelocityWorkspace workspace;
   Random random(42);
   const auto learns = [&](EgoVelocityEstimator estimator, const Eigen::Vector3d& v) {
     const double before = estimator.noise().elevation;
     const RadarScan scan = staticScene(v, 45, kSimulatedRadar, random);
-    estimator.learn(scan, estimator.estimate(scan), &workspace);
+    estimator.learn(scan, estimator.estimate(scan));
     return estimator.noise().elevation != before;
   };
   EXPECT_TRUE(learns(EgoVelocityEstimator(o), kDrive));

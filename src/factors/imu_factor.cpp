@@ -22,9 +22,8 @@ NineRows lowerTimes(const Eigen::Matrix<double, 9, 9>& L, const NineRows& E) {
 
 }  // namespace
 
-void ImuFactor::set(const Preintegration& preintegration, const ImuNoise& noise, const Eigen::Vector3d& g_W) {
-  pre_ = preintegration;
-  g_W_ = g_W;
+ImuFactor::ImuFactor(const Preintegration& preintegration, const ImuNoise& noise, const Eigen::Vector3d& g_W)
+    : pre_(preintegration), g_W_(g_W) {
   // W = L^-1 where L L' is the covariance.
   whitening_.setIdentity();
   pre_.covariance.llt().matrixL().solveInPlace(whitening_);

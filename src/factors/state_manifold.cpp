@@ -1,48 +1,22 @@
 #include "rio_t/factors/state_manifold.h"
 
+#include "rio_t/core/so3.h"
+
 namespace rio_t {
-namespace {
 
-constexpr int kSize = StateBlock::kSize;
-constexpr int kTangent = StateBlock::kTangent;
+StateManifold::StateManifold()
+    : Manifold(StateBlock::kSize, {0, 1, 2, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15}) {}
 
-/// Selects the columns of `StateJacobian` that carry tangent derivatives: all but the fourth.
-bool selection(double* jacobian) {
-  Eigen::Map<Eigen::Matrix<double, kSize, kTangent, Eigen::RowMajor>> J(jacobian);
-  J.setZero();
-  J.topLeftCorner<3, 3>().setIdentity();
-  J.bottomRightCorner<kTangent - 3, kTangent - 3>().setIdentity();
-  return true;
-}
-
-}  // namespace
-
-bool StateManifold::Plus(const double* x, const double* delta, double* x_plus_delta) const {
+void StateManifold::plus(const double* x, const double* delta, double* x_plus_delta) const {
   boxplus(x, delta, x_plus_delta);
-  return true;
 }
 
-#if RIO_T_CERES_HAS_MANIFOLD
-bool StateManifold::PlusJacobian(const double*, double* jacobian) const { return selection(jacobian); }
+Eigen::VectorXd StateManifold::minus(const double* y, const double* x) const { return boxminus(y, x); }
 
-bool StateManifold::Minus(const double* y, const double* x, double* y_minus_x) const {
-  Eigen::Map<StateTangent>{y_minus_x} = boxminus(y, x);
-  return true;
-}
-
-bool StateManifold::MinusJacobian(const double*, double* jacobian) const {
-  Eigen::Map<Eigen::Matrix<double, kTangent, kSize, Eigen::RowMajor>> J(jacobian);
-  J.setZero();
-  J.topLeftCorner<3, 3>().setIdentity();
-  J.bottomRightCorner<kTangent - 3, kTangent - 3>().setIdentity();
-  return true;
-}
-#else
-bool StateManifold::ComputeJacobian(const double*, double* jacobian) const { return selection(jacobian); }
-#endif
-
-void addStateBlock(ceres::Problem& problem, double* block, StateManifold& manifold) {
-  problem.AddParameterBlock(block, kSize, &manifold);
+Eigen::MatrixXd StateManifold::minusJacobian(const double* y, const double* x) const {
+  Eigen::MatrixXd J = Eigen::MatrixXd::Identity(StateBlock::kTangent, StateBlock::kTangent);
+  J.topLeftCorner<3, 3>() = so3::rightJacobianInverse(boxminus(y, x).head<3>());
+  return J;
 }
 
 }  // namespace rio_t

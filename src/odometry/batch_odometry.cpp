@@ -79,8 +79,7 @@ RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) co
   z.covariance = result.ego_velocity.covariance;
   z.covariance.diagonal() +=
       (model_error_scale_ / result.model_error_scale - 1.0) * result.ego_velocity.told_variance;
-  z.R_RI = options_.T_IR.q_IR.conjugate().toRotationMatrix();
-  z.l_I = options_.T_IR.l_I;
+  z.T_IR = options_.T_IR;
   return z;
 }
 
@@ -96,7 +95,7 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
     const ScanResult& result = scans_[i].result;
     stepped |= scans_[i].offset_stepped;
     if (!result.updated) continue;
-    const NodeEstimate node{result.state.time, stateBlock(result.state), result.time_offset};
+    const BatchNode node{result.state.time, stateBlock(result.state), result.time_offset};
     if (node.time > problem.guess.back().time) problem.guess.push_back(node);
     BatchScan scan;
     scan.stamp = result.scan.stamp;
@@ -148,7 +147,7 @@ bool BatchOdometry::accepts(const BatchSmoother& smoother, const BatchSolution& 
   const double t_O = solution.nodes[nearestNode(solution.nodes, z.stamp)].t_O;
   const bool at_stamp = options_.smoother.time_offset_model == TimeOffsetModel::kConstantAcceleration;
   const std::size_t k = nearestNode(solution.nodes, at_stamp ? z.stamp : z.stamp - t_O);
-  const NodeEstimate& node = solution.nodes[k];
+  const BatchNode& node = solution.nodes[k];
   const auto residual = smoother.residual(node, solution.covariances[k], z);
   const double model_error = options_.smoother.innovation_model_error;
   const double gate = options_.smoother.innovation_gate;
@@ -158,28 +157,32 @@ bool BatchOdometry::accepts(const BatchSmoother& smoother, const BatchSolution& 
   return residual.value.dot(S.ldlt().solve(residual.value)) <= gate * gate;
 }
 
-bool BatchOdometry::informsOffset(const BatchSmoother& smoother, const NodeEstimate& node,
+bool BatchOdometry::informsOffset(const BatchSmoother& smoother, const BatchNode& node,
                                   const RadarVelocityMeasurement& z, const EgoVelocity& measured) const {
   return measured.status == EgoVelocityStatus::kMoving && !isAtRest(node) &&
          smoother.residual(node, NodeMatrix::Zero(), z).informs_offset;
 }
 
-bool BatchOdometry::isAtRest(const NodeEstimate& node) const {
+bool BatchOdometry::isAtRest(const BatchNode& node) const {
   return rio_t::isAtRest(imu_, node.time, {node.x.q_WI(), node.x.v_W(), node.x.b_g(), node.x.b_a(), g_W_},
                          options_.rest);
 }
 
+NavigationState BatchOdometry::stateOf(const BatchNode& node, const NodeMatrix& covariance) const {
+  return navigationState({node.time, node.x}, covariance.topLeftCorner<kState, kState>(), imu_);
+}
+
 std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solution) const {
-  const std::vector<NodeEstimate>& nodes = solution.nodes;
+  const std::vector<BatchNode>& nodes = solution.nodes;
   std::vector<NavigationState> states;
   for (std::size_t k = 0; k + 1 < nodes.size(); ++k) {
-    const NodeEstimate& node = nodes[k];
-    const NodeEstimate& next = nodes[k + 1];
+    const BatchNode& node = nodes[k];
+    const BatchNode& next = nodes[k + 1];
     // What the IMU alone would miss the next node by is spread over the way to it.
     const StateBlock missed_by = carried(node.x, node.time, next.time, imu_, g_W_);
     const StateTangent miss = boxminus(next.x.data(), missed_by.data());
-    if (k == 0) states.push_back(navigationState(node, solution.covariances[0], imu_));
-    NodeEstimate at = node;
+    if (k == 0) states.push_back(stateOf(node, solution.covariances[0]));
+    BatchNode at = node;
     Time carried_to = node.time;
     StateBlock x = node.x;
     imu_.forEachSample(node.time, next.time, [&](const ImuMeasurement& sample) {
@@ -191,12 +194,12 @@ std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solu
       boxplus(x.data(), part.data(), at.x.data());
       const NodeMatrix covariance =
           (1.0 - share) * solution.covariances[k] + share * solution.covariances[k + 1];
-      if (!sample.is_bridge) states.push_back(navigationState(at, covariance, imu_));
+      if (!sample.is_bridge) states.push_back(stateOf(at, covariance));
     });
   }
   // Behind the last scan there is the IMU alone.
   ImuPropagator propagator(options_.imu_noise, g_W_);
-  propagator.anchor(navigationState(nodes.back(), solution.covariances.back(), imu_));
+  propagator.anchor(stateOf(nodes.back(), solution.covariances.back()));
   imu_.forEachSample(nodes.back().time - 0.1, imu_.newest(), [&](const ImuMeasurement& sample) {
     const std::optional<NavigationState> state = propagator.add(sample);
     if (state && state->time > nodes.back().time && !sample.is_bridge) states.push_back(*state);
@@ -219,7 +222,7 @@ std::vector<ScanResult> BatchOdometry::results(const Run& run, const BatchSoluti
     result.updated = true;
     result.used = run.problem.scans[j].velocity.has_value();
     if (result.used) result.rejected_because.clear();
-    result.state = navigationState(solution.nodes[k], P, imu_);
+    result.state = stateOf(solution.nodes[k], P);
     result.time_offset = solution.nodes[k].t_O;
     result.solver_termination = solution.termination;
     result.time_offset_sigma = options_.smoother.estimate_time_offset ? std::sqrt(P(kState, kState)) : 0.0;
@@ -235,7 +238,7 @@ std::vector<ScanResult> BatchOdometry::results(const Run& run, const BatchSoluti
     const bool last = i == order.back();
     const std::size_t until = last ? solution.nodes.size() : results[i].updated ? node_of[i] + 1 : next;
     for (; next < until; ++next) {
-      const NodeEstimate& node = solution.nodes[next];
+      const BatchNode& node = solution.nodes[next];
       results[i].left_window.push_back({node.time, node.x.p_W(), node.x.q_WI()});
     }
     sorted.push_back(std::move(results[i]));

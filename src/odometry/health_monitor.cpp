@@ -1,6 +1,5 @@
 #include "rio_t/odometry/health_monitor.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -11,7 +10,6 @@ namespace rio_t {
 namespace {
 
 constexpr double kDefaultGate = 4.0;      // [sigma]
-constexpr double kMajority = 0.6;         // of the points
 constexpr std::size_t kMinScans = 8;      // fewer prove nothing
 constexpr double kMinSpan = 0.7;          // of the window, that they must reach over
 constexpr std::size_t kMaxScans = 1000;   // bounds the memory
@@ -47,17 +45,11 @@ std::string toString(Health health) {
   return "";
 }
 
-bool speaksForItself(const EgoVelocity& velocity) {
-  return isValid(velocity.status) && static_cast<double>(velocity.inliers.size()) >=
-                                         kMajority * static_cast<double>(velocity.points_used);
-}
-
 HealthMonitor::HealthMonitor(const HealthOptions& options, double gate)
     : options_(options), gate_(gate > 0.0 ? gate : kDefaultGate) {}
 
-void HealthMonitor::addInnovation(Time stamp, const Eigen::Vector3d& d, const Eigen::Matrix3d& S) {
-  const double squared_sigmas = d.dot(S.ldlt().solve(d));
-  add({stamp, std::min(1.0, squared_sigmas / (gate_ * gate_)), d.squaredNorm()});
+void HealthMonitor::addInnovation(const Innovation& innovation) {
+  add({innovation.stamp, std::min(1.0, innovation.squaredSigmas() / (gate_ * gate_)), innovation.d.squaredNorm()});
 }
 
 void HealthMonitor::add(const Entry& entry) {

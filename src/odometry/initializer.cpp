@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "rio_t/smoother/initial_prior.h"
+#include "rio_t/smoother/node_prior.h"
 
 namespace rio_t {
 

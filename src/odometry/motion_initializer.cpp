@@ -5,12 +5,16 @@
 #include <cmath>
 #include <cstdio>
 #include <iterator>
+#include <memory>
+#include <stdexcept>
+#include <utility>
 
 #include "rio_t/factors/offset_derivative.h"
 #include "rio_t/imu/preintegration.h"
 #include "rio_t/odometry/options.h"
-#include "rio_t/smoother/batch_smoother.h"
-#include "rio_t/smoother/chain.h"
+#include "rio_t/smoother/carried.h"
+#include "rio_t/graph/marginalization.h"
+#include "rio_t/graph/solver.h"
 
 namespace rio_t {
 namespace {
@@ -20,6 +24,7 @@ constexpr std::size_t kMinVelocities = 8;     // 6 unknowns to start with, and w
 constexpr std::size_t kMaxVelocities = 1000;  // bounds the memory
 constexpr double kMaxLatency = 1.0;           // [s] of a scan, that the IMU is kept for
 constexpr int kMaxIterations = 15;
+constexpr int kMaxRounds = 3;          // of finding the state and which scans tell the offset
 constexpr double kConverged = 1.0e-4;  // [sigma]
 constexpr double kOutlier = 4.0;       // [sigma]
 constexpr int kScaleRounds = 3;        // of finding the state and the size of the errors around it
@@ -44,8 +49,7 @@ MotionInitializer::MotionInitializer(const OdometryOptions& options)
       smoother_(options.smoother),
       noise_(options.imu_noise),
       g_W_(0.0, 0.0, -options.gravity),
-      R_RI_(options.T_IR.q_IR.conjugate().toRotationMatrix()),
-      l_I_(options.T_IR.l_I) {}
+      T_IR_(options.T_IR) {}
 
 double MotionInitializer::imuHistory() const {
   return options_.window + 2.0 * smoother_.max_time_offset + kMaxLatency;
@@ -62,7 +66,7 @@ void MotionInitializer::add(Time stamp, const EgoVelocity& velocity) {
                                       [](const Velocity& z, Time t) { return z.stamp < t; });
   if (after != velocities_.end() && after->stamp == stamp) return;
   velocities_.insert(
-      after, Velocity{{stamp, velocity.v_R, velocity.covariance, R_RI_, l_I_}, velocity.told_variance});
+      after, Velocity{{stamp, velocity.v_R, velocity.covariance, T_IR_}, velocity.told_variance});
   if (velocities_.size() > kMaxVelocities) velocities_.erase(velocities_.begin());
 }
 
@@ -183,7 +187,7 @@ MotionInitializer::Line MotionInitializer::fitLine(const Velocities& velocities,
     imu.forEachInterval(time, tau, [&](double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
       delta.step(dt, gyro, accel);
     });
-    const Eigen::Vector3d v_I = R_RI_.transpose() * z.v_R - imu.at(tau).angular_velocity.cross(l_I_);
+    const Eigen::Vector3d v_I = T_IR_.q_IR * z.v_R - imu.at(tau).angular_velocity.cross(T_IR_.l_I);
     const Eigen::Vector3d y = delta.dR * v_I - delta.dv;
     mean_T += delta.dt;
     mean_TT += delta.dt * delta.dt;
@@ -203,67 +207,84 @@ MotionInitializer::Line MotionInitializer::fitLine(const Velocities& velocities,
 
 double MotionInitializer::refine(const Velocities& velocities, Time time, const ImuBuffer& imu,
                                  ModelErrorScale& scale, NodePrior& prior) const {
-  const PriorFactor known(prior);
-  StateBlock x = prior.x0;
-  double t_O = prior.t_O0;
-  NodeInformation information;
+  Window window;
+  Block& state = window.addNode(time, std::make_shared<StateManifold>(), stored(prior.x0));
+  const std::shared_ptr<Block> offset =
+      window.addCalibration(std::make_shared<ScalarManifold>(), Eigen::VectorXd::Constant(1, prior.t_O0));
+  offset->bound = smoother_.max_time_offset;
+  addPrior(window, {&state, offset.get()}, {prior.J, prior.r0});
+  std::shared_ptr<ceres::LossFunction> loss;
+  if (smoother_.huber_threshold > 0.0) loss = std::make_shared<ceres::HuberLoss>(smoother_.huber_threshold);
+  const RadarMotionModel model{TimeOffsetModel::kImu, smoother_.max_time_offset, g_W_, &imu};
+
+  // Which scans tell the offset depends on the state, and the state on them.
+  std::vector<const Term*> terms;
+  std::vector<bool> informs;
+  Solution solution;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    const std::vector<bool> informed = std::exchange(informs, informOffset(velocities, time, imu, state, offset->x[0]));
+    if (round > 0 && informs == informed) break;
+    for (const Term* term : terms) window.remove(*term);
+    terms.clear();
+    for (std::size_t i = 0; i < velocities.size(); ++i) {
+      RadarVelocityMeasurement z = velocities[i];
+      z.covariance = carriedCovariance(velocities[i], time, imu, scale.value()).whole;
+      if (!informs[i]) z.held_t_O = offset->x[0];
+      terms.push_back(&window.add(std::make_unique<RadarVelocityFactor>(z, time, model), {&state, offset.get()}, loss));
+    }
+    try {
+      solution = rio_t::solve(window, {kMaxIterations, kConverged * kConverged});
+    } catch (const std::runtime_error&) {
+      return 1.0;
+    }
+  }
+
   const double n = static_cast<double>(velocities.size());
-  double outliers = 1.0;
+  double outliers = 0.0;
   double mean_square = 0.0;
   double mean_share = 0.0;
-  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
-    const double* blocks[] = {x.data(), &t_O};
-    ChainSystem system(1);
-    system.addStateAndOffset(0, known, x.data(), &t_O, nullptr, false);
-    information = {system.diagonal[0], system.gradient[0]};
-    outliers = 0.0;
-    mean_square = 0.0;
-    mean_share = 0.0;
-    for (Velocity z : velocities) {
-      // What the IMU adds over the way from the state: noise of the accelerometer, and of the tilt.
-      const double T = std::abs(z.stamp - time);
-      const double tilt = noise_.gyro_density * g_W_.norm();
-      const double measured = imu.mean(z.stamp, T).accel_variance;
-      const double told = scale.value() * noise_.accel_density * noise_.accel_density;
-      Eigen::Vector3d scaled = scale.value() * z.told_variance;
-      if (told > measured) scaled.array() += told * T;
-      Eigen::Matrix3d covariance = z.covariance;
-      covariance.diagonal() += scaled - z.told_variance;
-      covariance.diagonal().array() += tilt * tilt * T * T * T / 3.0 + (told > measured ? 0.0 : measured * T);
-      const Eigen::LDLT<Eigen::Matrix3d> whitening = covariance.ldlt();
-      z.covariance.setIdentity();
-      const Time tau = z.stamp - t_O;
-      const VelocityRate rate = velocityRate(imu, tau, carried(x, time, tau, imu, g_W_), g_W_, z.l_I);
-      if (!smoother_.estimate_time_offset || !rate.informsOffset(smoother_.time_offset_min_acceleration))
-        z.held_t_O = t_O;
-      Eigen::Vector3d e;
-      StateJacobian<3> J_x;
-      Eigen::Vector3d J_t;
-      double* jacobians[] = {J_x.data(), J_t.data()};
-      ImuRadarFactor(z, time, imu, smoother_.max_time_offset, g_W_).Evaluate(blocks, e.data(), jacobians);
-      Eigen::Matrix<double, 3, kNodeTangent> J;
-      J << J_x.leftCols<3>(), J_x.rightCols<StateBlock::kTangent - 3>(), J_t;
-      const Eigen::Matrix<double, 3, kNodeTangent> weighted_J = whitening.solve(J);
-      const double distance = std::sqrt(e.dot(whitening.solve(e)));
-      if (distance > kOutlier) outliers += 1.0 / n;
-      mean_share += whitening.solve(Eigen::Matrix3d(scaled.asDiagonal())).trace() / (3.0 * n);
-      mean_square += std::min(distance, kOutlier) * std::min(distance, kOutlier) / n;
-      const double huber = smoother_.huber_threshold;
-      const double weight = huber > 0.0 && distance > huber ? huber / distance : 1.0;
-      information.S += weight * J.transpose() * weighted_J;
-      information.s += weight * weighted_J.transpose() * e;
-    }
-    const NodeVector step = -information.S.ldlt().solve(information.s);
-    if (!step.allFinite()) return 1.0;
-    if (std::sqrt(step.dot(information.S * step)) < kConverged) break;
-    boxplus(x.data(), step.data(), x.data());
-    t_O = std::clamp(t_O + step[StateBlock::kTangent], -smoother_.max_time_offset, smoother_.max_time_offset);
+  for (std::size_t i = 0; i < velocities.size(); ++i) {
+    const double* blocks[] = {state.x.data(), offset->x.data()};
+    Eigen::Vector3d e;
+    terms[i]->cost->Evaluate(blocks, e.data(), nullptr);
+    const CarriedCovariance covariance = carriedCovariance(velocities[i], time, imu, scale.value());
+    const double square = std::min(e.squaredNorm(), kOutlier * kOutlier);
+    if (e.norm() > kOutlier) outliers += 1.0 / n;
+    mean_square += square / n;
+    mean_share += covariance.whole.ldlt().solve(covariance.scaled).trace() / (3.0 * n);
   }
-  prior = priorFromInformation(information, x, t_O);
+  prior = nodePrior(eliminateFirst(solution.normal_equations, 0), toStateBlock(state.x), offset->x[0]);
   // The solution is drawn towards the velocities: what is left scatters less.
   const double left = 3.0 * n / (3.0 * n - kUnknowns);
   for (std::size_t i = 0; i < velocities.size(); ++i) scale.add(time, left * mean_square, mean_share);
   return outliers;
+}
+
+std::vector<bool> MotionInitializer::informOffset(const Velocities& velocities, Time time, const ImuBuffer& imu,
+                                                  const Block& state, double t_O) const {
+  std::vector<bool> informs;
+  for (const Velocity& z : velocities) {
+    const Time tau = z.stamp - t_O;
+    const StateBlock x = carried(toStateBlock(state.x), time, tau, imu, g_W_);
+    informs.push_back(smoother_.estimate_time_offset &&
+                      velocityRate(imu, tau, x, g_W_, T_IR_.l_I).informsOffset(smoother_.time_offset_min_acceleration));
+  }
+  return informs;
+}
+
+/// What the IMU adds over the way from the state: noise of the accelerometer, and of the tilt.
+MotionInitializer::CarriedCovariance MotionInitializer::carriedCovariance(const Velocity& z, Time time,
+                                                                          const ImuBuffer& imu, double scale) const {
+  const double T = std::abs(z.stamp - time);
+  const double tilt = noise_.gyro_density * g_W_.norm();
+  const double measured = imu.mean(z.stamp, T).accel_variance;
+  const double told = scale * noise_.accel_density * noise_.accel_density;
+  Eigen::Vector3d scaled = scale * z.told_variance;
+  if (told > measured) scaled.array() += told * T;
+  CarriedCovariance covariance{z.covariance, scaled.asDiagonal()};
+  covariance.whole.diagonal() += scaled - z.told_variance;
+  covariance.whole.diagonal().array() += tilt * tilt * T * T * T / 3.0 + (told > measured ? 0.0 : measured * T);
+  return covariance;
 }
 
 }  // namespace rio_t

@@ -2,7 +2,7 @@
 
 namespace rio_t {
 
-NavigationState navigationState(const NodeEstimate& node, const NodeMatrix& covariance,
+NavigationState navigationState(const NodeEstimate& node, const StateCovariance& covariance,
                                 const ImuBuffer& imu) {
   NavigationState state;
   state.time = node.time;
@@ -12,7 +12,7 @@ NavigationState navigationState(const NodeEstimate& node, const NodeMatrix& cova
   state.b_g = node.x.b_g();
   state.b_a = node.x.b_a();
   state.angular_velocity = imu.at(node.time).angular_velocity - state.b_g;
-  state.covariance = covariance.topLeftCorner<StateBlock::kTangent, StateBlock::kTangent>();
+  state.covariance = covariance;
   return state;
 }
 

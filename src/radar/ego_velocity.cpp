@@ -16,6 +16,8 @@
 namespace rio_t {
 namespace {
 
+constexpr double kMajority = 0.6;    // of the points
+constexpr double kUnanimous = 0.85;  // of the points
 /// Of a prior that outweighs a majority of the points [m/s]: sharper than a moving object and the world
 /// differ.
 constexpr double kMaxSharpSigma = 0.1;
@@ -64,8 +66,8 @@ int ransacIterations(const EgoVelocityOptions& o) {
   return static_cast<int>(std::clamp(n, 1.0, static_cast<double>(kMax)));
 }
 
-void filter(const RadarScan& scan, const EgoVelocityOptions& o, std::vector<RadarDirection>& directions) {
-  directions.clear();
+std::vector<RadarDirection> filter(const RadarScan& scan, const EgoVelocityOptions& o) {
+  std::vector<RadarDirection> directions;
   directions.reserve(scan.points.size());
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const RadarPoint& p = scan.points[i];
@@ -78,6 +80,7 @@ void filter(const RadarScan& scan, const EgoVelocityOptions& o, std::vector<Rada
     if (std::abs(std::asin(std::clamp(u.z(), -1.0, 1.0))) > o.max_elevation) continue;
     directions.push_back({u, p.doppler, i});
   }
+  return directions;
 }
 
 /// Draws of indices without std::uniform_int_distribution, whose results differ between standard libraries.
@@ -143,17 +146,18 @@ std::optional<Eigen::Vector3d> ransac(const std::vector<RadarDirection>& points,
 
 /// Points that agree with `v_R`: within the threshold, or within three sigma where the noise of the direction
 /// alone is larger than the threshold, as it is at speed.
-void selectInliers(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
-                   const EgoVelocityOptions& o, const PointVariances& noise,
-                   std::vector<RadarDirection>& inliers) {
+std::vector<RadarDirection> selectInliers(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
+                                          const EgoVelocityOptions& o, const PointVariances& noise) {
   const bool knows_noise = o.solver == EgoVelocitySolver::kErrorsInVariables;
   const double limit = o.ransac_inlier_threshold * o.ransac_inlier_threshold;
-  inliers.clear();
+  std::vector<RadarDirection> inliers;
+  inliers.reserve(points.size());
   for (const RadarDirection& p : points) {
     const double r = p.doppler + p.u_R.dot(v_R);
     if (r * r <= limit || (knows_noise && r * r <= 9.0 * residualVariance(Angles(p.u_R), v_R, noise)))
       inliers.push_back(p);
   }
+  return inliers;
 }
 
 double largestSigma(const Eigen::Matrix3d& covariance) {
@@ -169,15 +173,14 @@ double squaredDistance(const VelocitySolution& solution, const VelocityPrior& pr
   return d.dot(covariance.inverse() * d);
 }
 
-/// Replaces `inliers` by the points that support a velocity near the prior, where that is the better choice;
-/// `supporters` is memory for them.
+/// Replaces `inliers` by the points that support a velocity near the prior, where that is the better choice.
 /// A sharp prior that speaks against the velocity of `inliers` outweighs even a majority of the points. A
 /// vague one is weighed against their number: it must not find a minority that sides with it where it is
 /// wrong. False where a vague prior speaks against neither of two velocities and most points do not decide:
 /// the scan is ambiguous.
 bool selectInliersWithPrior(const std::vector<RadarDirection>& points, const VelocityPrior& prior,
-               const EgoVelocityOptions& o, const PointVariances& noise, std::vector<RadarDirection>& inliers,
-               std::vector<RadarDirection>& supporters) {
+                            const EgoVelocityOptions& o, const PointVariances& noise,
+                            std::vector<RadarDirection>& inliers) {
   const double gate = o.prior_gate * o.prior_gate;
   const auto n = static_cast<double>(points.size());
   const bool is_sharp = largestSigma(prior.covariance) < kMaxSharpSigma;
@@ -185,16 +188,16 @@ bool selectInliersWithPrior(const std::vector<RadarDirection>& points, const Vel
   const double d2_unaided =
       unaided.solved ? squaredDistance(unaided, prior) : std::numeric_limits<double>::max();
   if (is_sharp && d2_unaided <= gate) return true;
-  selectInliers(points, prior.v_R, o, noise, supporters);
+  std::vector<RadarDirection> supporters = selectInliers(points, prior.v_R, o, noise);
   VelocitySolution aided = solveLeastSquares(supporters, o);
   if (!aided.solved) return true;
-  selectInliers(points, aided.v_R, o, noise, supporters);
+  supporters = selectInliers(points, aided.v_R, o, noise);
   aided = solveLeastSquares(supporters, o);
   if (!aided.solved || static_cast<double>(supporters.size()) < o.prior_min_inlier_fraction * n) return true;
   const double d2_aided = squaredDistance(aided, prior);
   const double fewer = static_cast<double>(inliers.size()) - static_cast<double>(supporters.size());
   if (is_sharp ? d2_aided <= gate : kEvidenceOfAPoint * fewer < 0.5 * (d2_unaided - d2_aided)) {
-    inliers = supporters;
+    inliers = std::move(supporters);
     return true;
   }
   if (is_sharp || d2_unaided > gate || d2_aided > gate) return true;
@@ -240,14 +243,6 @@ PointVariances startNoise(const EgoVelocityOptions& o) {
           square(o.doppler_quantization) / 12.0};
 }
 
-/// As made anew, but with its memory.
-void clear(EgoVelocity& velocity) {
-  std::vector<std::size_t> memory = std::move(velocity.inliers);
-  memory.clear();
-  velocity = EgoVelocity();
-  velocity.inliers = std::move(memory);
-}
-
 }  // namespace
 
 EgoVelocityEstimator::EgoVelocityEstimator(const EgoVelocityOptions& options)
@@ -257,29 +252,15 @@ EgoVelocityEstimator::EgoVelocityEstimator(const EgoVelocityOptions& options)
 
 EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
                                            const std::optional<VelocityPrior>& prior) const {
-  EgoVelocityWorkspace workspace;
-  EgoVelocity result;
-  estimate(scan, prior, &workspace, &result);
-  return result;
-}
-
-void EgoVelocityEstimator::estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior,
-                                    EgoVelocityWorkspace* workspace, EgoVelocity* estimated) const {
   const EgoVelocityOptions& o = options_;
-  std::vector<RadarDirection>& points = workspace->points;
-  std::vector<RadarDirection>& inliers = workspace->inliers;
-  EgoVelocity& result = *estimated;
-  clear(result);
-  filter(scan, o, points);
-  // Not where each is first needed: that may be long after the largest scan.
-  inliers.reserve(points.size());
-  workspace->supporters.reserve(points.size());
-  result.inliers.reserve(points.size());
+  const std::vector<RadarDirection> points = filter(scan, o);
+  std::vector<RadarDirection> inliers;
+  EgoVelocity result;
   result.points_used = points.size();
   const auto n = static_cast<double>(points.size());
   if (points.size() < 3) {
     result.status = EgoVelocityStatus::kTooFewPoints;
-    return;
+    return result;
   }
 
   const auto reads_zero = [&](const RadarDirection& p) {
@@ -297,12 +278,12 @@ void EgoVelocityEstimator::estimate(const RadarScan& scan, const std::optional<V
     const std::optional<Eigen::Vector3d> consensus = ransac(points, o, ransac_iterations_);
     if (!consensus) {
       result.status = EgoVelocityStatus::kIllConditioned;
-      return;
+      return result;
     }
-    selectInliers(points, *consensus, o, noise(), inliers);
-    if (prior && !selectInliersWithPrior(points, *prior, o, noise(), inliers, workspace->supporters)) {
+    inliers = selectInliers(points, *consensus, o, noise());
+    if (prior && !selectInliersWithPrior(points, *prior, o, noise(), inliers)) {
       result.status = EgoVelocityStatus::kAmbiguous;
-      return;
+      return result;
     }
     // At rest in front of an object that moves, too many points disagree for the test above, but not these.
     rest = most_read_zero(inliers);
@@ -317,7 +298,7 @@ void EgoVelocityEstimator::estimate(const RadarScan& scan, const std::optional<V
   } else {
     solution = solveLeastSquares(inliers, o);
     if (solution.solved) {
-      selectInliers(points, solution.v_R, o, noise(), inliers);
+      inliers = selectInliers(points, solution.v_R, o, noise());
       solution = o.solver == EgoVelocitySolver::kLeastSquares
                      ? solveLeastSquares(inliers, o)
                      : solveErrorsInVariables(inliers, solution.v_R, noise(), o);
@@ -338,14 +319,22 @@ void EgoVelocityEstimator::estimate(const RadarScan& scan, const std::optional<V
                     : rest                                        ? EgoVelocityStatus::kZeroVelocity
                                                                   : EgoVelocityStatus::kMoving;
   }
+  return result;
 }
 
-void EgoVelocityEstimator::learn(const RadarScan& scan, const EgoVelocity& estimated,
-                                 EgoVelocityWorkspace* workspace) {
+void EgoVelocityEstimator::learn(const RadarScan& scan, const EgoVelocity& estimated) {
   if (options_.solver != EgoVelocitySolver::kErrorsInVariables) return;
   if (estimated.status != EgoVelocityStatus::kMoving) return;
-  filter(scan, options_, workspace->points);
-  noise_.learn(workspace->points, estimated.inliers, estimated.v_R);
+  noise_.learn(filter(scan, options_), estimated.inliers, estimated.v_R);
+}
+
+bool hasMajority(const EgoVelocity& velocity) {
+  return isValid(velocity.status) &&
+         static_cast<double>(velocity.inliers.size()) >= kMajority * static_cast<double>(velocity.points_used);
+}
+
+bool isUnanimous(const EgoVelocity& velocity) {
+  return static_cast<double>(velocity.inliers.size()) > kUnanimous * static_cast<double>(velocity.points_used);
 }
 
 bool isValid(EgoVelocityStatus status) {

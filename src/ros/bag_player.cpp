@@ -30,7 +30,7 @@ void BagPlayer::play(const rosbag::MessageInstance& instance) {
     stamper_.addTrigger(trigger->seq, toTime(trigger->stamp), record);
   }
   for (RadarScan& scan : stamper_.take()) odometry_.addScan(std::move(scan));
-  odometry_.process([this](ScanResult& result) { account(result); });
+  for (ScanResult& result : odometry_.process()) account(result);
 }
 
 void BagPlayer::finish() {

@@ -73,7 +73,7 @@ std::vector<LiveSession::Result> LiveSession::process(bool* more) {
   }
   std::vector<Result> results;
   waiting_imu_ = 0;
-  odometry_.process([&](ScanResult& scan_result) {
+  for (ScanResult& scan_result : odometry_.process()) {
     Result result;
     observability_.add(scan_result);
     result.offset_observable = observability_.observable();
@@ -89,7 +89,7 @@ std::vector<LiveSession::Result> LiveSession::process(bool* more) {
     }
     result.result = std::move(scan_result);
     results.push_back(std::move(result));
-  });
+  }
   return results;
 }
 

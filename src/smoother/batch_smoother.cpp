@@ -7,48 +7,48 @@
 #include <stdexcept>
 #include <utility>
 
+#include "rio_t/factors/constant_offset_factor.h"
+#include "rio_t/factors/imu_factor.h"
 #include "rio_t/factors/offset_derivative.h"
+#include "rio_t/factors/zero_velocity_factor.h"
+#include "rio_t/graph/marginalization.h"
 #include "rio_t/imu/preintegration.h"
-#include "rio_t/smoother/chain_marginals.h"
-#include "rio_t/smoother/factor_pool.h"
-#include "rio_t/smoother/window_solver.h"
 
 namespace rio_t {
 namespace {
 
-/// Scans of the imu model nearer than this share one node [s]: an IMU factor over no time would weigh
-/// infinitely.
-constexpr double kMinNodeSpacing = 0.005;
 /// Squared length of the step that is left, in standard deviations, below which the solution stands.
 constexpr double kConverged = 1e-6;
 
+/// Of each node's state and t_O, which follow each other in the elimination.
+std::vector<NodeMatrix> nodeCovariances(const Elimination& elimination) {
+  const std::vector<std::map<int, Eigen::MatrixXd>> P = elimination.covariances();
+  std::vector<NodeMatrix> result;
+  for (int i = 0; i < static_cast<int>(P.size()); i += 2) {
+    const Eigen::MatrixXd& cross = P[i].at(i + 1);
+    NodeMatrix covariance;
+    covariance << P[i].at(i), cross, cross.transpose(), P[i + 1].at(i + 1);
+    result.push_back(covariance);
+  }
+  return result;
+}
+
 }  // namespace
 
-std::size_t nearestNode(const std::vector<NodeEstimate>& nodes, Time time) {
+std::size_t nearestNode(const std::vector<BatchNode>& nodes, Time time) {
   const auto after = std::lower_bound(nodes.begin(), nodes.end(), time,
-                                      [](const NodeEstimate& node, Time t) { return node.time < t; });
+                                      [](const BatchNode& node, Time t) { return node.time < t; });
   const auto k = static_cast<std::size_t>(after - nodes.begin());
   if (k == 0) return k;
   return after == nodes.end() || time - nodes[k - 1].time < after->time - time ? k - 1 : k;
 }
 
-StateBlock carried(const StateBlock& x, Time from, Time to, const ImuBuffer& imu,
-                   const Eigen::Vector3d& g_W) {
-  Preintegration pre;
-  pre.b_g = x.b_g();
-  pre.b_a = x.b_a();
-  imu.forEachInterval(from, to, [&](double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
-    pre.delta.step(dt, gyro - pre.b_g, accel - pre.b_a);
-  });
-  return predict(x, pre, g_W);
-}
-
 BatchSmoother::BatchSmoother(const SmootherOptions& options, const BatchOptions& batch, const ImuNoise& noise,
                              const Eigen::Vector3d& g_W, const ImuBuffer& imu)
-    : options_(options), batch_(batch), noise_(noise), g_W_(g_W), imu_(&imu) {}
+    : options_(options), batch_(batch), noise_(noise), g_W_(g_W), imu_(&imu), state_manifold_(std::make_shared<StateManifold>()), offset_manifold_(std::make_shared<ScalarManifold>()) {}
 
 BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std::vector<double>& t_O,
-                                          const std::vector<NodeEstimate>& guess) const {
+                                          const std::vector<BatchNode>& guess) const {
   const std::size_t scans = problem.scans.size();
   std::vector<Time> times(scans);
   for (std::size_t i = 0; i < scans; ++i) {
@@ -60,44 +60,60 @@ BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return times[a] < times[b]; });
   const auto stateAt = [&](Time time) {
-    const NodeEstimate& near = guess[nearestNode(guess, time)];
+    const BatchNode& near = guess[nearestNode(guess, time)];
     return carried(near.x, near.time, time, *imu_, g_W_);
   };
 
-  FactorPool pool(options_, noise_, g_W_, *imu_);
+  std::shared_ptr<ceres::LossFunction> loss;
+  if (options_.huber_threshold > 0.0) loss = std::make_shared<ceres::HuberLoss>(options_.huber_threshold);
   Graph graph;
   graph.node_of_scan.resize(scans);
   Window& window = graph.window;
-  window.prior = std::make_unique<PriorFactor>(problem.prior);
-  if (options_.huber_threshold > 0.0)
-    window.loss = std::make_unique<ceres::HuberLoss>(options_.huber_threshold);
-  window.offset_known = !options_.estimate_time_offset;
-  window.max_time_offset = options_.max_time_offset;
-  window.nodes.emplace_back();
-  window.nodes.back().time = problem.start;
-  window.nodes.back().x = stateAt(problem.start);
-  window.nodes.back().t_O = window.offset_known || scans == 0 ? problem.prior.t_O0 : t_O[order.front()];
+  const double first_t_O =
+      !options_.estimate_time_offset || scans == 0 ? problem.prior.t_O0 : t_O[order.front()];
+  graph.nodes.push_back(addNode(window, {problem.start, problem.prior.x0, problem.prior.t_O0}));
+  addPrior(window, {graph.nodes[0].state, graph.nodes[0].offset}, {problem.prior.J, problem.prior.r0});
+  graph.nodes[0].state->x = stored(stateAt(problem.start));
+  graph.nodes[0].offset->x[0] = first_t_O;
   for (const std::size_t i : order) {
     const BatchScan& scan = problem.scans[i];
-    const WindowNode& previous = window.nodes.back();
-    const double dt = times[i] - previous.time;
+    const Node previous = graph.nodes.back();
+    const Time previous_time = *previous.state->time;
+    const double dt = times[i] - previous_time;
     if (dt > (atMeasurement() ? kMinNodeSpacing : 0.0)) {
-      WindowNode node;
-      node.time = times[i];
-      node.x = stateAt(node.time);
-      node.t_O = t_O[i];
-      node.imu_from_previous = pool.imuFactor(
-          preintegrate(*imu_, previous.time, node.time, previous.x.b_g(), previous.x.b_a(), noise_));
-      node.offset_from_previous = pool.offsetFactor(
-          scan.offset_stepped ? options_.time_offset_sigma : options_.time_offset_noise * std::sqrt(dt));
-      window.nodes.push_back(std::move(node));
+      const Node node = addNode(window, {times[i], stateAt(times[i]), t_O[i]});
+      const StateView x(previous.state->x.data());
+      window.add(std::make_unique<ImuFactor>(
+                     preintegrate(*imu_, previous_time, times[i], x.b_g, x.b_a, noise_), noise_, g_W_),
+                 {previous.state, node.state});
+      window.add(std::make_unique<ConstantOffsetFactor>(scan.offset_stepped
+                                                            ? options_.time_offset_sigma
+                                                            : options_.time_offset_noise * std::sqrt(dt)),
+                 {previous.offset, node.offset});
+      graph.nodes.push_back(node);
     }
-    WindowNode& node = window.nodes.back();
-    graph.node_of_scan[i] = window.nodes.size() - 1;
-    if (scan.velocity) node.radar.push_back({scan.stamp, pool.radarFactor(*scan.velocity, node.time)});
-    if (scan.rest_velocity_sigma) node.rest = pool.zeroVelocityFactor(*scan.rest_velocity_sigma);
+    const Node& node = graph.nodes.back();
+    graph.node_of_scan[i] = graph.nodes.size() - 1;
+    if (scan.velocity) {
+      window.add(std::make_unique<RadarVelocityFactor>(*scan.velocity, *node.state->time, model()),
+                 {node.state, node.offset}, loss);
+    }
+    if (scan.rest_velocity_sigma)
+      window.add(std::make_unique<ZeroVelocityFactor>(*scan.rest_velocity_sigma), {node.state});
   }
   return graph;
+}
+
+BatchSmoother::Node BatchSmoother::addNode(Window& window, const BatchNode& node) const {
+  Block& state = window.addNode(node.time, state_manifold_, stored(node.x));
+  Block& offset = window.addNode(node.time, offset_manifold_, Eigen::VectorXd::Constant(1, node.t_O));
+  offset.bound = options_.max_time_offset;
+  if (!options_.estimate_time_offset) window.setConstant(offset, true);
+  return {&state, &offset};
+}
+
+RadarMotionModel BatchSmoother::model() const {
+  return {options_.time_offset_model, options_.max_time_offset, g_W_, imu_};
 }
 
 BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
@@ -106,49 +122,33 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
   for (const BatchScan& scan : problem.scans) t_O.push_back(scan.t_O);
 
   BatchSolution solution;
-  WindowStep step;
   Graph graph = place(problem, t_O, problem.guess);
   solution.placements = 1;
   for (;;) {
-    SolverLimits limits;
-    limits.max_iterations = batch_.max_iterations;
-    const SolveReport report = solveWithCeres(graph.window, limits);
-    solution.iterations += report.iterations;
-    // Ceres does not take the step at which it stops; the chain takes those that are left.
-    for (;; ++solution.iterations) {
-      linearize(graph.window, &solution.normal_equations);
-      if (!step.solve(graph.window, solution.normal_equations, 0.0))
-        throw std::runtime_error("batch: the data do not determine every state");
-      if (step.length() < kConverged || step.length() > 1.0 || solution.iterations >= batch_.max_iterations)
-        break;
-      step.take(1.0, graph.window);
-    }
-
+    Solution solved = rio_t::solve(graph.window, {batch_.max_iterations - solution.iterations, kConverged});
+    solution.iterations += solved.iterations;
     solution.nodes.clear();
-    for (const WindowNode& node : graph.window.nodes) solution.nodes.push_back({node.time, node.x, node.t_O});
+    for (const Node& node : graph.nodes) solution.nodes.push_back(node.estimate());
     double moved = 0.0;  // [s]
     for (std::size_t i = 0; i < t_O.size(); ++i)
       moved = std::max(moved, std::abs(solution.nodes[graph.node_of_scan[i]].t_O - t_O[i]));
     const bool placed = !atMeasurement() || moved <= batch_.placement_tolerance;
-    if (placed && step.length() < kConverged) {
-      solution.termination = step.atBound() ? SolverTermination::kAtBound : SolverTermination::kConverged;
+    const bool is_last = placed || solution.iterations >= batch_.max_iterations;
+    if (is_last) {
+      solution.termination = placed || !solved.converged() ? solved.termination : SolverTermination::kIterationLimit;
+      solution.covariances = nodeCovariances(solved.elimination);
+      solution.normal_equations = std::move(solved.normal_equations);
       break;
     }
-    if (solution.iterations >= batch_.max_iterations) {
-      if (!report.converged()) solution.termination = report.termination;
-      break;
-    }
-    if (placed) continue;
     for (std::size_t i = 0; i < t_O.size(); ++i) t_O[i] = solution.nodes[graph.node_of_scan[i]].t_O;
     graph = place(problem, t_O, solution.nodes);
     ++solution.placements;
   }
   solution.node_of_scan = std::move(graph.node_of_scan);
-  solution.covariances = marginalCovariances(solution.normal_equations);
   return solution;
 }
 
-BatchSmoother::Residual BatchSmoother::residual(const NodeEstimate& node, const NodeMatrix& covariance,
+BatchSmoother::Residual BatchSmoother::residual(const BatchNode& node, const NodeMatrix& covariance,
                                                 const RadarVelocityMeasurement& z) const {
   RadarVelocityMeasurement unit = z;
   unit.covariance.setIdentity();
@@ -160,15 +160,13 @@ BatchSmoother::Residual BatchSmoother::residual(const NodeEstimate& node, const 
   Residual result;
   Eigen::Vector3d J_t;
   double* jacobians[] = {J_x.data(), J_t.data()};
-  FactorPool(options_, noise_, g_W_, *imu_)
-      .radarFactor(unit, node.time)
-      ->Evaluate(blocks, result.value.data(), jacobians);
+  RadarVelocityFactor(unit, node.time, model()).Evaluate(blocks, result.value.data(), jacobians);
   Eigen::Matrix<double, 3, kNodeTangent> J;
   J << J_x.leftCols<3>(), J_x.rightCols<StateBlock::kTangent - 3>(), J_t;
   if (!options_.estimate_time_offset) J.rightCols<1>().setZero();
   result.prediction_covariance = J * covariance * J.transpose();
   const Time tau = z.stamp - node.t_O;
-  result.informs_offset = velocityRate(*imu_, tau, carried(node.x, node.time, tau, *imu_, g_W_), g_W_, z.l_I)
+  result.informs_offset = velocityRate(*imu_, tau, carried(node.x, node.time, tau, *imu_, g_W_), g_W_, z.T_IR.l_I)
                               .informsOffset(options_.time_offset_min_acceleration);
   return result;
 }

@@ -2,270 +2,160 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <stdexcept>
 #include <utility>
 
+#include "rio_t/factors/imu_factor.h"
 #include "rio_t/factors/offset_derivative.h"
-#include "rio_t/smoother/chain_marginals.h"
+#include "rio_t/factors/zero_velocity_factor.h"
 
 namespace rio_t {
-namespace {
 
-/// Nodes of the imu model nearer than this share one node [s]: the factor bridges the rest, and an IMU factor
-/// over no time would weigh infinitely.
-constexpr double kMinNodeSpacing = 0.005;
+StateBlock toStateBlock(const Eigen::VectorXd& stored) {
+  StateBlock x;
+  std::copy(stored.data(), stored.data() + StateBlock::kSize, x.data());
+  return x;
+}
 
-}  // namespace
+Eigen::VectorXd stored(const StateBlock& x) {
+  return Eigen::Map<const Eigen::Matrix<double, StateBlock::kSize, 1>>(x.data());
+}
 
 FixedLagSmoother::FixedLagSmoother(const SmootherOptions& options, const ImuNoise& noise,
                                    const Eigen::Vector3d& g_W, const ImuBuffer& imu)
-    : options_(options), noise_(noise), g_W_(g_W), imu_(&imu), pool_(options, noise, g_W, imu) {
-  window_.offset_known = !options_.estimate_time_offset;
-  window_.max_time_offset = options_.max_time_offset;
-  if (options_.huber_threshold > 0.0)
-    window_.loss = std::make_unique<ceres::HuberLoss>(options_.huber_threshold);
-}
+    : options_(options), noise_(noise), g_W_(g_W), imu_(&imu), manifold_(std::make_shared<StateManifold>()) {}
 
 void FixedLagSmoother::setImuNoise(const ImuNoise& noise) {
   noise_ = noise;
   last_preintegration_ = {};
 }
 
-void FixedLagSmoother::initialize(Time time, const NodePrior& prior) {
-  window_.prior = std::make_unique<PriorFactor>(prior);
-  window_.nodes.clear();
-  WindowNode node = pool_.node();
-  node.time = time;
-  node.x = prior.x0;
-  node.t_O = prior.t_O0;
-  window_.nodes.push_back(std::move(node));
-  newest_covariance_ = rio_t::newestCovariance(window_);
-  offset_stepped_at_.reset();
-  offset_step_is_new_ = false;
+Block& FixedLagSmoother::start(Time time, const StateBlock& x0) {
+  window_ = Window();
+  Block& block = window_.addNode(time, manifold_, stored(x0));
+  nodes_ = {Node{&block}};
+  solution_ = Solution();
+  return block;
 }
 
-Time FixedLagSmoother::nodeTime(Time stamp) const {
-  return options_.time_offset_model == TimeOffsetModel::kImu ? stamp - window_.nodes.back().t_O : stamp;
+NodeEstimate FixedLagSmoother::node(std::size_t k) const {
+  return {nodes_[k].time(), toStateBlock(nodes_[k].block->x)};
 }
 
 std::size_t FixedLagSmoother::nodeBefore(Time time) const {
-  std::size_t k = window_.nodes.size() - 1;
-  while (k > 0 && window_.nodes[k].time > time) --k;
+  std::size_t k = nodes_.size() - 1;
+  while (k > 0 && nodes_[k].time() > time) --k;
   return k;
 }
 
-NodeMatrix FixedLagSmoother::covarianceOf(std::size_t k) const {
-  if (k + 1 == window_.nodes.size()) return newest_covariance_;
-  ChainSystem system;
-  linearize(window_, &system);
-  return marginalCovariances(system)[k];
+Eigen::MatrixXd FixedLagSmoother::covarianceOf(const Block& node,
+                                               const std::vector<const Block*>& calibration) const {
+  std::vector<int> indices = {solution_.normal_equations.indexOf(node)};
+  for (const Block* block : calibration) indices.push_back(solution_.normal_equations.indexOf(*block));
+  if (std::any_of(indices.begin(), indices.end(), [](int i) { return i < 0; }))
+    throw std::logic_error("smoother: asked for the covariance of what was not solved for");
+  return solution_.elimination.covariance(indices);
 }
 
-std::optional<RadarVelocityPrediction> FixedLagSmoother::predictRadarVelocity(
-    Time stamp, const Eigen::Matrix3d& R_RI, const Eigen::Vector3d& l_I) const {
-  const Time time = nodeTime(stamp);
-  if (time < window_.nodes.front().time) return std::nullopt;
-  const std::size_t k = nodeBefore(time);
-  const WindowNode& node = window_.nodes[k];
-
-  StateBlock x = node.x;
-  NodeMatrix P = covarianceOf(k);
-  if (time > node.time) {
-    const Preintegration& pre = preintegrateFrom(node, time);
-    x = predict(node.x, pre, g_W_);
-    const ImuTransition step = transition(node.x, pre, noise_);
-    auto P_xx = P.topLeftCorner<StateBlock::kTangent, StateBlock::kTangent>();
-    auto P_xt = P.topRightCorner<StateBlock::kTangent, 1>();
-    P_xx = (step.A.lazyProduct(P_xx).eval().lazyProduct(step.A.transpose()) + step.Q).eval();
-    P_xt = (step.A * P_xt).eval();
-    P.bottomLeftCorner<1, StateBlock::kTangent>() = P_xt.transpose();
-    P(StateBlock::kTangent, StateBlock::kTangent) += offsetVariance(time - node.time);
-  }
-
-  // A measurement of zero with unit covariance has the predicted velocity as its residual.
-  RadarVelocityMeasurement zero;
-  zero.stamp = stamp;
-  zero.R_RI = R_RI;
-  zero.l_I = l_I;
-  RadarVelocityPrediction prediction;
-  // The offset of the newest node, by which the scan was placed.
-  prediction.t_O = window_.nodes.back().t_O;
-  const double* blocks[] = {x.data(), &prediction.t_O};
-  StateJacobian<3> J_x;
-  Eigen::Vector3d J_t;
-  double* jacobians[] = {J_x.data(), J_t.data()};
-  std::unique_ptr<RadarCost> factor = pool_.radarFactor(zero, time);
-  factor->Evaluate(blocks, prediction.velocity.v_R.data(), jacobians);
-  pool_.recycle(std::move(factor));
-  Eigen::Matrix<double, 3, kNodeTangent> J;
-  J << J_x.leftCols<3>(), J_x.rightCols<StateBlock::kTangent - 3>(), J_t;
-  if (!options_.estimate_time_offset) J.rightCols<1>().setZero();
-  prediction.velocity.covariance = J * P * J.transpose();
-  const auto J_state = J.leftCols<StateBlock::kTangent>();
-  prediction.covariance_at_offset =
-      J_state * P.topLeftCorner<StateBlock::kTangent, StateBlock::kTangent>() * J_state.transpose();
-  prediction.dv_dt_O = J_t;
-  const VelocityRate rate = velocityRate(*imu_, time, x, g_W_, l_I);
-  prediction.informs_offset = rate.informsOffset(options_.time_offset_min_acceleration);
-  prediction.rate_variance = rate.variance * P(StateBlock::kTangent, StateBlock::kTangent);
-  const Eigen::Matrix<double, 2, 3> horizontal = x.q_WI().toRotationMatrix().topRows<2>();
-  const Eigen::Matrix2d tilt =
-      horizontal * P.block<3, 3>(StateBlock::kTheta, StateBlock::kTheta) * horizontal.transpose();
-  prediction.tilt_sigma = std::sqrt(tilt.diagonal().maxCoeff());
-  return prediction;
+Eigen::MatrixXd FixedLagSmoother::newestCovariance(const std::vector<const Block*>& calibration) const {
+  return covarianceOf(*nodes_.back().block, calibration);
 }
 
-FixedLagSmoother::AddResult FixedLagSmoother::add(const RadarVelocityMeasurement& z) {
-  for (const WindowNode& node : window_.nodes) {
-    for (const RadarTerm& term : node.radar) {
-      if (term.stamp == z.stamp) return AddResult::kDuplicateStamp;
-    }
-  }
-  WindowNode* node = nodeOf(z.stamp);
-  if (node == nullptr) return AddResult::kOlderThanWindow;
-  node->radar.push_back({z.stamp, pool_.radarFactor(z, node->time)});
-  return AddResult::kAdded;
+std::optional<PredictedState> FixedLagSmoother::predict(Time time,
+                                                        const std::vector<const Block*>& calibration) const {
+  if (time < nodes_.front().time()) return std::nullopt;
+  const Node& node = nodes_[nodeBefore(time)];
+  PredictedState predicted{toStateBlock(node.block->x), covarianceOf(*node.block, calibration)};
+  if (time == node.time()) return predicted;
+  const Preintegration& pre = preintegrateFrom(node, time);
+  const ImuTransition step = transition(predicted.x, pre, noise_);
+  predicted.x = rio_t::predict(predicted.x, pre, g_W_);
+  constexpr int kState = StateBlock::kTangent;
+  Eigen::MatrixXd& P = predicted.covariance;
+  P.topRows(kState) = (step.A * P.topRows(kState)).eval();
+  P.leftCols(kState) = (P.leftCols(kState) * step.A.transpose()).eval();
+  P.topLeftCorner(kState, kState) += step.Q;
+  return predicted;
 }
 
-FixedLagSmoother::AddResult FixedLagSmoother::addRest(Time stamp, double velocity_sigma) {
-  WindowNode* node = nodeOf(stamp);
-  if (node == nullptr) return AddResult::kOlderThanWindow;
-  pool_.recycle(std::move(node->rest));
-  node->rest = pool_.zeroVelocityFactor(velocity_sigma);
-  return AddResult::kAdded;
-}
-
-WindowNode* FixedLagSmoother::nodeAt(Time time) {
-  const auto later = std::find_if(window_.nodes.begin(), window_.nodes.end(),
-                                  [&](const WindowNode& node) { return node.time > time; });
-  if (later == window_.nodes.begin()) return nullptr;
-
+Block* FixedLagSmoother::nodeAt(Time time) {
+  if (time < nodes_.front().time()) return nullptr;
   // The factor of the imu model reaches its time of measurement from any node, so neighbours can share one.
   const double spacing = options_.time_offset_model == TimeOffsetModel::kImu ? kMinNodeSpacing : 0.0;
-  std::size_t k = static_cast<std::size_t>(later - window_.nodes.begin());
-  if (time - window_.nodes[k - 1].time <= spacing) {
-    k = k - 1;
-  } else if (k == window_.nodes.size() || window_.nodes[k].time - time > spacing) {
-    window_.nodes.insert(later, makeNode(time, window_.nodes[k - 1]));
-    linkToPrevious(k);
-    if (k + 1 < window_.nodes.size()) linkToPrevious(k + 1);  // its IMU factor now starts at the new node
-  }
-  return &window_.nodes[k];
-}
+  const std::size_t before = nodeBefore(time);
+  const std::size_t after = before + 1;
+  if (time - nodes_[before].time() <= spacing) return nodes_[before].block;
+  if (after < nodes_.size() && nodes_[after].time() - time <= spacing) return nodes_[after].block;
 
-WindowNode* FixedLagSmoother::nodeOf(Time stamp) {
-  WindowNode* node = nodeAt(nodeTime(stamp));
-  if (node != nullptr && offset_stepped_at_ && stamp >= *offset_stepped_at_) {
-    placeOffsetStep(static_cast<std::size_t>(node - window_.nodes.data()));
-  }
-  return node;
-}
-
-/// A scan behind the step may have been measured before nodes that the old offset placed: the step then lies
-/// before it, too.
-void FixedLagSmoother::placeOffsetStep(std::size_t k) {
-  std::vector<WindowNode>& nodes = window_.nodes;
-  const auto loose = std::find_if(nodes.begin() + 1, nodes.end(),
-                                  [](const WindowNode& node) { return node.offset_step_variance > 0.0; });
-  const bool lies_before = loose != nodes.end() && loose - nodes.begin() <= static_cast<std::ptrdiff_t>(k);
-  if (k == 0 || lies_before || (loose == nodes.end() && !offset_step_is_new_)) return;
-  offset_step_is_new_ = false;
-  if (loose != nodes.end()) {
-    loose->offset_step_variance = 0.0;
-    linkToPrevious(static_cast<std::size_t>(loose - nodes.begin()));
-  }
-  nodes[k].offset_step_variance = options_.time_offset_sigma * options_.time_offset_sigma;
-  linkToPrevious(k);
-}
-
-WindowNode FixedLagSmoother::makeNode(Time time, const WindowNode& previous) {
-  WindowNode node = pool_.node();
-  node.time = time;
-  node.x = predict(previous.x, preintegrateFrom(previous, time), g_W_);
-  node.t_O = previous.t_O;
-  return node;
+  const StateBlock x = rio_t::predict(toStateBlock(nodes_[before].block->x), preintegrateFrom(nodes_[before], time), g_W_);
+  Block& block = window_.addNode(time, manifold_, stored(x));
+  nodes_.insert(nodes_.begin() + static_cast<std::ptrdiff_t>(after), Node{&block});
+  linkToPrevious(after);
+  if (after + 1 < nodes_.size()) linkToPrevious(after + 1);  // its IMU factor now starts at the new node
+  return &block;
 }
 
 void FixedLagSmoother::linkToPrevious(std::size_t k) {
-  const WindowNode& previous = window_.nodes[k - 1];
-  WindowNode& node = window_.nodes[k];
-  pool_.recycle(std::move(node.imu_from_previous));
-  pool_.recycle(std::move(node.offset_from_previous));
-  node.imu_from_previous = pool_.imuFactor(preintegrateFrom(previous, node.time));
-  node.offset_from_previous =
-      pool_.offsetFactor(std::sqrt(offsetVariance(node.time - previous.time) + node.offset_step_variance));
+  Node& node = nodes_[k];
+  const Node& previous = nodes_[k - 1];
+  if (node.imu_from_previous != nullptr) window_.remove(*node.imu_from_previous);
+  node.imu_from_previous =
+      &window_.add(std::make_unique<ImuFactor>(preintegrateFrom(previous, node.time()), noise_, g_W_),
+                   {previous.block, node.block});
 }
 
-const Preintegration& FixedLagSmoother::preintegrateFrom(const WindowNode& node, Time to) const {
+void FixedLagSmoother::addZeroVelocity(Block& node, double velocity_sigma) {
+  const auto at = std::find_if(nodes_.begin(), nodes_.end(), [&](const Node& n) { return n.block == &node; });
+  if (at->zero_velocity != nullptr) window_.remove(*at->zero_velocity);
+  at->zero_velocity = &window_.add(std::make_unique<ZeroVelocityFactor>(velocity_sigma), {&node});
+}
+
+const Preintegration& FixedLagSmoother::preintegrateFrom(const Node& node, Time to) const {
   LastPreintegration& last = last_preintegration_;
-  if (last.from != node.time || last.to != to || last.value.b_g != node.x.b_g() ||
-      last.value.b_a != node.x.b_a()) {
-    last = {node.time, to, preintegrate(*imu_, node.time, to, node.x.b_g(), node.x.b_a(), noise_)};
-  }
+  const StateView x(node.block->x.data());
+  if (last.from != node.time() || last.to != to || last.value.b_g != x.b_g || last.value.b_a != x.b_a)
+    last = {node.time(), to, preintegrate(*imu_, node.time(), to, x.b_g, x.b_a, noise_)};
   return last.value;
 }
 
-double FixedLagSmoother::offsetVariance(double dt) const {
-  return options_.time_offset_noise * options_.time_offset_noise * dt;
+Solution FixedLagSmoother::optimize(double short_step) {
+  solution_ = solve(window_, {options_.max_iterations, short_step});
+  return solution_;
 }
 
-SolveReport FixedLagSmoother::optimize(double short_step) {
-  const SolverLimits limits{options_.max_iterations, short_step};
-  if (options_.solver == WindowSolverKind::kCeres) {
-    const SolveReport report = solveWithCeres(window_, limits);
-    newest_covariance_ = rio_t::newestCovariance(window_);
-    return report;
+std::vector<const Block*> FixedLagSmoother::leavingWith(const Block& node) const {
+  std::vector<const Block*> leaving = {&node};
+  for (const auto& block : window_.blocks()) {
+    if (!block->is_retired) continue;
+    const bool is_linked_to_others = std::any_of(window_.terms().begin(), window_.terms().end(), [&](const auto& term) {
+      const auto& blocks = term->blocks;
+      return std::find(blocks.begin(), blocks.end(), block.get()) != blocks.end() &&
+             std::any_of(blocks.begin(), blocks.end(), [&](const Block* b) { return b->time && b != &node; });
+    });
+    if (!is_linked_to_others) leaving.push_back(block.get());
   }
-  const SolveReport report = solver_.solve(window_, limits);
-  newest_covariance_ = solver_.newestCovariance();
-  return report;
+  return leaving;
 }
 
-const std::vector<NodeEstimate>& FixedLagSmoother::marginalize() {
-  left_.clear();
-  while (window_.nodes.size() > 2 &&
-         window_.nodes.back().time - window_.nodes.front().time > options_.window) {
-    // Only the factors that touch the leaving node; the radar factors of its neighbour stay in the window.
-    ChainSystem& system = leaving_;
-    system.reset(2);
-    const WindowNode& first = window_.nodes[0];
-    const WindowNode& second = window_.nodes[1];
-    system.addStateAndOffset(0, *window_.prior, first.x.data(), &first.t_O, nullptr, false);
-    for (const RadarTerm& term : first.radar) {
-      system.addStateAndOffset(0, *term.cost, first.x.data(), &first.t_O, window_.loss.get(),
-                               !options_.estimate_time_offset);
-    }
-    if (first.rest) system.addState(0, *first.rest, first.x.data());
-    system.addStatePair(0, *second.imu_from_previous, first.x.data(), second.x.data());
-    system.addOffsetPair(0, *second.offset_from_previous, &first.t_O, &second.t_O);
-    const NodeInformation remaining = eliminateFirst(
-        system.diagonal[0], system.coupling[0], system.gradient[0], system.diagonal[1], system.gradient[1]);
-    window_.prior->set(priorFromInformation(remaining, second.x, second.t_O));
-
-    left_.push_back(node(0));
-    pool_.recycle(std::move(window_.nodes.front()));
-    window_.nodes.erase(window_.nodes.begin());
-    pool_.recycle(std::move(window_.nodes.front().imu_from_previous));
-    pool_.recycle(std::move(window_.nodes.front().offset_from_previous));
+std::vector<NodeEstimate> FixedLagSmoother::marginalize(const std::vector<RandomWalk>& walks) {
+  std::vector<NodeEstimate> left;
+  while (nodes_.size() > 2 && nodes_.back().time() - nodes_.front().time() > options_.window) {
+    const double dt = nodes_[1].time() - nodes_[0].time();
+    std::vector<Walk> gained;
+    for (const RandomWalk& walk : walks) gained.push_back({walk.block, walk.density * walk.density * dt});
+    left.push_back(node(0));
+    rio_t::marginalize(window_, leavingWith(*nodes_.front().block), gained);
+    nodes_.erase(nodes_.begin());
+    nodes_.front().imu_from_previous = nullptr;
   }
-  return left_;
-}
-
-std::string toString(FixedLagSmoother::AddResult result) {
-  switch (result) {
-    case FixedLagSmoother::AddResult::kAdded:
-      return "";
-    case FixedLagSmoother::AddResult::kOlderThanWindow:
-      return "older_than_window";
-    case FixedLagSmoother::AddResult::kDuplicateStamp:
-      return "duplicate_stamp";
-  }
-  return "";
+  return left;
 }
 
 Time FixedLagSmoother::imuNeededSince() const {
   // Offsets move a radar factor's time by at most the bound to either side of its stamp, and the stamp lies
   // within the bound of the node.
-  return window_.nodes.front().time - (2.0 * options_.max_time_offset + kOffsetHalfWidth);
+  return nodes_.front().time() - (2.0 * options_.max_time_offset + kOffsetHalfWidth);
 }
 
 }  // namespace rio_t

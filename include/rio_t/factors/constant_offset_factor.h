@@ -8,8 +8,7 @@ namespace rio_t {
 class ConstantOffsetFactor final : public ceres::SizedCostFunction<1, 1, 1> {
  public:
   /// `sigma`: standard deviation of the change between the two states [s].
-  explicit ConstantOffsetFactor(double sigma) { set(sigma); }
-  void set(double sigma) { weight_ = 1.0 / sigma; }  ///< as if made anew
+  explicit ConstantOffsetFactor(double sigma) : weight_(1.0 / sigma) {}
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
 
  private:

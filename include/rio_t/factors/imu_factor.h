@@ -19,11 +19,7 @@ namespace rio_t {
 /// all whitened with the covariance of the preintegration.
 class ImuFactor final : public ceres::SizedCostFunction<15, StateBlock::kSize, StateBlock::kSize> {
  public:
-  ImuFactor(const Preintegration& preintegration, const ImuNoise& noise, const Eigen::Vector3d& g_W) {
-    set(preintegration, noise, g_W);
-  }
-  /// As if made anew.
-  void set(const Preintegration& preintegration, const ImuNoise& noise, const Eigen::Vector3d& g_W);
+  ImuFactor(const Preintegration& preintegration, const ImuNoise& noise, const Eigen::Vector3d& g_W);
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
 
  private:

@@ -10,8 +10,7 @@ namespace rio_t {
 class ZeroVelocityFactor final : public ceres::SizedCostFunction<3, StateBlock::kSize> {
  public:
   /// `velocity_sigma` [m/s], per axis.
-  explicit ZeroVelocityFactor(double velocity_sigma) { set(velocity_sigma); }
-  void set(double velocity_sigma) { weight_ = 1.0 / velocity_sigma; }  ///< as if made anew
+  explicit ZeroVelocityFactor(double velocity_sigma) : weight_(1.0 / velocity_sigma) {}
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
 
  private:

@@ -58,9 +58,10 @@ class BatchOdometry {
   bool accepts(const BatchSmoother& smoother, const BatchSolution& solution, const EgoVelocity& measured,
                RadarVelocityMeasurement& z) const;
   /// Whether the platform accelerates enough for `z` to tell the offset.
-  bool informsOffset(const BatchSmoother& smoother, const NodeEstimate& node,
+  bool informsOffset(const BatchSmoother& smoother, const BatchNode& node,
                      const RadarVelocityMeasurement& z, const EgoVelocity& measured) const;
-  bool isAtRest(const NodeEstimate& node) const;
+  bool isAtRest(const BatchNode& node) const;
+  NavigationState stateOf(const BatchNode& node, const NodeMatrix& covariance) const;
   std::vector<NavigationState> trajectory(const BatchSolution& solution) const;
   std::vector<ScanResult> results(const Run& run, const BatchSolution& solution) const;
 

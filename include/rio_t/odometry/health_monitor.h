@@ -7,7 +7,7 @@
 #include "rio_t/core/sliding_queue.h"
 #include "rio_t/core/time.h"
 #include "rio_t/odometry/navigation_state.h"
-#include "rio_t/radar/ego_velocity.h"
+#include "rio_t/sensors/innovation.h"
 
 namespace rio_t {
 
@@ -42,9 +42,8 @@ class HealthMonitor {
   /// `gate` [sigma]: where a scan contradicts the prediction in full; 0: 4.
   HealthMonitor(const HealthOptions& options, double gate);
 
-  /// A scan that by itself has a velocity most of its points agree on, against its prediction: innovation d
-  /// [m/s] and its covariance S [m^2/s^2].
-  void addInnovation(Time stamp, const Eigen::Vector3d& d, const Eigen::Matrix3d& S);
+  /// Of a scan that by itself has a velocity most of its points agree on.
+  void addInnovation(const Innovation& innovation);
   /// A scan the points of which do not agree, or side with the prediction: it contradicts nothing. It does not
   /// end a divergence either.
   void addUndecided(Time stamp) {
@@ -88,8 +87,5 @@ class HealthMonitor {
   double mean_square_ = 0.0;  ///< of d, by the latest scans that had a velocity [m^2/s^2]
   Health health_ = Health::kOk;
 };
-
-/// True where most points of the scan agree on the velocity, so that it needs no prior.
-bool speaksForItself(const EgoVelocity& velocity);
 
 }  // namespace rio_t

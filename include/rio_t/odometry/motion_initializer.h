@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
-#include "rio_t/factors/prior_factor.h"
 #include "rio_t/factors/radar_velocity_factor.h"
 #include "rio_t/imu/buffer.h"
 #include "rio_t/imu/noise.h"
 #include "rio_t/odometry/model_error_scale.h"
 #include "rio_t/radar/ego_velocity.h"
+#include "rio_t/smoother/node_prior.h"
 #include "rio_t/smoother/options.h"
 
 namespace rio_t {
@@ -92,14 +92,21 @@ class MotionInitializer {
   /// share of outliers.
   double refine(const Velocities& velocities, Time time, const ImuBuffer& imu, ModelErrorScale& scale,
                 NodePrior& prior) const;
+  /// Which velocities tell the offset.
+  std::vector<bool> informOffset(const Velocities& velocities, Time time, const ImuBuffer& imu, const Block& state,
+                                 double t_O) const;
+  struct CarriedCovariance {
+    Eigen::Matrix3d whole;   ///< of a velocity against the state at `time` [m^2/s^2]
+    Eigen::Matrix3d scaled;  ///< its part that the model errors scale
+  };
+  CarriedCovariance carriedCovariance(const Velocity& z, Time time, const ImuBuffer& imu, double scale) const;
 
   // Read-only after construction.
   MotionInitializerOptions options_;
   SmootherOptions smoother_;
   ImuNoise noise_;
   Eigen::Vector3d g_W_;
-  Eigen::Matrix3d R_RI_;
-  Eigen::Vector3d l_I_;
+  Extrinsics T_IR_;
 
   Velocities velocities_;  // by stamp
   std::optional<Time> tried_at_;

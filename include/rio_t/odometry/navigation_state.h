@@ -25,6 +25,7 @@ struct NavigationState {
 };
 
 /// The state at a node with its covariance; `imu` must cover its time.
-NavigationState navigationState(const NodeEstimate& node, const NodeMatrix& covariance, const ImuBuffer& imu);
+NavigationState navigationState(const NodeEstimate& node, const StateCovariance& covariance,
+                                const ImuBuffer& imu);
 
 }  // namespace rio_t

@@ -1,25 +1,18 @@
 #pragma once
 
-#include <Eigen/Geometry>
-
 #include "rio_t/imu/input_check.h"
 #include "rio_t/imu/noise.h"
 #include "rio_t/imu/rest_detector.h"
 #include "rio_t/imu/static_initializer.h"
 #include "rio_t/odometry/health_monitor.h"
 #include "rio_t/odometry/motion_initializer.h"
-#include "rio_t/odometry/offset_step_detector.h"
 #include "rio_t/radar/ego_velocity.h"
+#include "rio_t/radar/extrinsics.h"
 #include "rio_t/radar/feasibility.h"
+#include "rio_t/sensors/offset_step_detector.h"
 #include "rio_t/smoother/options.h"
 
 namespace rio_t {
-
-/// T_IR, the pose of the radar in the IMU frame, as every radar package gives it.
-struct Extrinsics {
-  Eigen::Vector3d l_I = Eigen::Vector3d::Zero();             ///< radar origin in I [m]
-  Eigen::Quaterniond q_IR = Eigen::Quaterniond::Identity();  ///< turns R into I
-};
 
 /// How the first state is found.
 enum class InitMode {

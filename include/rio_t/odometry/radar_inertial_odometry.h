@@ -1,43 +1,18 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "rio_t/core/pose.h"
-#include "rio_t/factors/prior_factor.h"
 #include "rio_t/odometry/initializer.h"
 #include "rio_t/odometry/navigation_state.h"
 #include "rio_t/odometry/options.h"
-#include "rio_t/smoother/solver_termination.h"
+#include "rio_t/odometry/scan_result.h"
 
 namespace rio_t {
-
-/// What became of one scan.
-struct ScanResult {
-  RadarScan scan;  ///< as fed
-  EgoVelocity ego_velocity;
-  bool used = false;               ///< its velocity went into the window
-  double model_error_scale = 1.0;  ///< see ModelErrorScale; in the covariance of ego_velocity
-  std::string rejected_because;    ///< snake case, empty where used; keys of `scans_rejected`
-
-  /// The window was solved again: the scan was used, or the platform is at rest. What follows is set only
-  /// then.
-  bool updated = false;
-  // The newest state of the window.
-  NavigationState state;
-  double time_offset = 0.0;        ///< t_O [s]
-  double time_offset_sigma = 0.0;  ///< [s]
-  int solver_iterations = 0;
-  SolverTermination solver_termination = SolverTermination::kIterationLimit;
-  Health health = Health::kOk;           ///< after this scan; set always
-  bool reinitialized = false;            ///< the state was found anew before this scan
-  std::vector<StampedPose> left_window;  ///< optimised poses that this scan pushed out, oldest first
-};
 
 /// The whole pipeline: IMU and scans in, odometry and time offset out.
 ///
@@ -61,12 +36,7 @@ class RadarInertialOdometry {
   /// Queues a scan. It waits until the IMU covers its time of measurement.
   void addScan(RadarScan scan);
 
-  /// Takes what became of a scan. The result is used again for the next one; to keep it, move it away.
-  using ResultHandler = std::function<void(ScanResult&)>;
-  /// Works off what can be worked off: initialisation, ego-velocity, window. Calls `handle` for each scan
-  /// finished. Allocates nothing once its buffers have grown to what the data need.
-  void process(const ResultHandler& handle);
-  /// The same, with the results in a list.
+  /// Works off what can be worked off: initialisation, ego-velocity, window. What became of each scan finished.
   std::vector<ScanResult> process();
 
   /// At the end of the data: finishes what still waits (rejected as "imu_not_covering" where the IMU never

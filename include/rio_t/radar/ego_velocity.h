@@ -86,20 +86,15 @@ struct EgoVelocity {
   std::size_t points_used = 0;       ///< points that passed the filter
 };
 
-/// Share of the points that, where they agree, leave nothing else to be the static world: no object fills
-/// more of the view.
-constexpr double kUnanimous = 0.85;
+/// Most points of the scan agree on the velocity, so that it needs no prior.
+bool hasMajority(const EgoVelocity& velocity);
+/// So many points agree that nothing else is left to be the static world: no object fills more of the view.
+bool isUnanimous(const EgoVelocity& velocity);
 
 /// What is known of the velocity before the scan is looked at, e.g. from the IMU.
 struct VelocityPrior {
   Eigen::Vector3d v_R = Eigen::Vector3d::Zero();         ///< radar velocity, radar frame [m/s]
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< [m^2/s^2], positive definite
-};
-
-/// Memory that estimates share, so that none allocates once it has seen its largest scan; one for each
-/// thread.
-struct EgoVelocityWorkspace {
-  std::vector<RadarDirection> points, inliers, supporters;
 };
 
 /// Ego-velocity of one scan: filter, zero-velocity test, 3-point RANSAC, least squares.
@@ -114,14 +109,11 @@ class EgoVelocityEstimator {
   /// points agree with a velocity that does not, those points are the inliers. A prior that is vague (above
   /// 0.1 m/s) is only one witness more besides the points. The velocity and its covariance come from the
   /// points alone, so fusing the result with the prior does not count anything twice.
-  void estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior,
-                EgoVelocityWorkspace* workspace, EgoVelocity* estimated) const;
-  /// The same with memory of its own.
   EgoVelocity estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior = std::nullopt) const;
 
   /// Learns the noise of the points from what `estimate` made of this scan, for the scans to come. Only the
   /// errors-in-variables solver uses it. To be called once a scan, in motion, where its velocity is believed.
-  void learn(const RadarScan& scan, const EgoVelocity& estimated, EgoVelocityWorkspace* workspace);
+  void learn(const RadarScan& scan, const EgoVelocity& estimated);
   /// As learned so far.
   const PointVariances& noise() const { return noise_.variances(); }
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "rio_t/odometry/options.h"
+#include "rio_t/radar/extrinsics.h"
 #include "rio_t/simulation/motion.h"
 #include "rio_t/simulation/time_offset.h"
 

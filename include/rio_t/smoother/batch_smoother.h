@@ -3,15 +3,14 @@
 #include <optional>
 #include <vector>
 
-#include "rio_t/factors/prior_factor.h"
 #include "rio_t/factors/radar_velocity_factor.h"
+#include "rio_t/graph/solver.h"
 #include "rio_t/imu/buffer.h"
 #include "rio_t/imu/noise.h"
-#include "rio_t/smoother/chain.h"
+#include "rio_t/smoother/carried.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
+#include "rio_t/smoother/node_prior.h"
 #include "rio_t/smoother/options.h"
-#include "rio_t/smoother/solver_termination.h"
-#include "rio_t/smoother/window.h"
 
 namespace rio_t {
 
@@ -30,27 +29,34 @@ struct BatchScan {
   bool offset_stepped = false;                       ///< t_O may have stepped since the scan before
 };
 
+/// A state with the offset at its time.
+struct BatchNode {
+  Time time;
+  StateBlock x;
+  double t_O = 0.0;  ///< [s]
+};
+
 struct BatchProblem {
   Time start;       ///< of the first node
   NodePrior prior;  ///< on it
   std::vector<BatchScan> scans;
   /// States to begin from, in the order of their times, at least one; the IMU carries them to the nodes.
-  std::vector<NodeEstimate> guess;
+  std::vector<BatchNode> guess;
 };
 
 struct BatchSolution {
-  std::vector<NodeEstimate> nodes;
+  std::vector<BatchNode> nodes;
   std::vector<std::size_t> node_of_scan;  ///< for each scan of the problem
   std::vector<NodeMatrix> covariances;    ///< marginal, for each node
-  ChainSystem normal_equations;           ///< at the solution
+  NormalEquations normal_equations;       ///< at the solution: state and t_O of each node, by time
   int iterations = 0;                     ///< of the solver, all placements together
   int placements = 0;                     ///< how often the nodes were placed
   SolverTermination termination = SolverTermination::kIterationLimit;
   bool converged() const { return isConverged(termination); }
 };
 
-/// The graph of FixedLagSmoother over all the data at once: same factors, nothing marginalised, solved with
-/// Ceres until the step that is left is shorter than a thousandth of a standard deviation in every direction.
+/// The graph of FixedLagSmoother over all the data at once: same factors, nothing marginalised, and the t_O of each node as
+/// in the paper, so that it may drift over the run (eq. 8-10). Solved until the step that is left is shorter than a thousandth of a standard deviation in every direction.
 /// With the imu model a node stands at the time of measurement of its scan, and the nodes are placed anew
 /// where the offset has moved (docs/method.md, section 10).
 class BatchSmoother {
@@ -69,30 +75,36 @@ class BatchSmoother {
     Eigen::Matrix3d prediction_covariance;  ///< of h alone [m^2/s^2]
     bool informs_offset = false;            ///< h changes with t_O by motion, not by noise of the IMU
   };
-  Residual residual(const NodeEstimate& node, const NodeMatrix& covariance,
+  Residual residual(const BatchNode& node, const NodeMatrix& covariance,
                     const RadarVelocityMeasurement& z) const;
 
  private:
   bool atMeasurement() const { return options_.time_offset_model == TimeOffsetModel::kImu; }
+  struct Node {
+    Block* state;
+    Block* offset;
+    BatchNode estimate() const { return {*state->time, toStateBlock(state->x), offset->x[0]}; }
+  };
   /// The whole run as one window, and the node of each scan.
   struct Graph {
     Window window;
+    std::vector<Node> nodes;
     std::vector<std::size_t> node_of_scan;
   };
   Graph place(const BatchProblem& problem, const std::vector<double>& t_O,
-              const std::vector<NodeEstimate>& guess) const;
+              const std::vector<BatchNode>& guess) const;
+  Node addNode(Window& window, const BatchNode& node) const;
+  RadarMotionModel model() const;
 
   SmootherOptions options_;  // all read-only after construction
   BatchOptions batch_;
   ImuNoise noise_;
   Eigen::Vector3d g_W_;
   const ImuBuffer* imu_;
+  std::shared_ptr<const Manifold> state_manifold_, offset_manifold_;
 };
 
 /// Index of the node nearest to `time`; `nodes` in the order of their times, not empty.
-std::size_t nearestNode(const std::vector<NodeEstimate>& nodes, Time time);
-
-/// `x` at `from`, carried by the IMU to `to`, forwards or backwards, at its own biases.
-StateBlock carried(const StateBlock& x, Time from, Time to, const ImuBuffer& imu, const Eigen::Vector3d& g_W);
+std::size_t nearestNode(const std::vector<BatchNode>& nodes, Time time);
 
 }  // namespace rio_t

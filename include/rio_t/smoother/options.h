@@ -1,24 +1,12 @@
 #pragma once
 
+#include "rio_t/factors/radar_motion.h"
+
 namespace rio_t {
-
-/// How the radar factor accounts for the time between stamp and measurement.
-enum class TimeOffsetModel {
-  kConstantAcceleration,  ///< the paper's eq. (4)-(5): one acceleration sample times t_O; states at the
-                          ///< stamps
-  kImu,                   ///< the IMU itself over the shift; states at the estimated measurement times
-};
-
-/// Both minimise the same window with the same cost functions (smoother/window_solver.h).
-enum class WindowSolverKind {
-  kChain,  ///< block elimination along the chain
-  kCeres,  ///< ceres::Solve, several times slower
-};
 
 struct SmootherOptions {
   double window = 1.0;           ///< [s] length of the fixed-lag window
   double huber_threshold = 1.5;  ///< on the whitened radar residual's norm; 0 = no robust loss
-  WindowSolverKind solver = WindowSolverKind::kChain;
   int max_iterations = 30;  ///< of the solver, each scan
   /// [sigma] farther from what the IMU predicts, offset uncertainty included, a scan is rejected; 0 = no
   /// gate.

@@ -1,4 +1,4 @@
-#include "rio_t/odometry/offset_step_detector.h"
+#include "rio_t/sensors/offset_step_detector.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -6,16 +6,16 @@
 
 namespace rio_t {
 
-bool OffsetStepDetector::stepped(Time stamp, const Eigen::Vector3d& innovation, const Eigen::Matrix3d& S,
-                            const Eigen::Vector3d& J) {
+bool OffsetStepDetector::stepped(const Innovation& innovation) {
   if (!options_.enabled) return false;
-  const double fade = std::exp(-std::clamp(stamp - last_, 0.0, 10.0 * options_.memory) / options_.memory);
-  last_ = stamp;
-  const auto weight = S.ldlt();
-  const Eigen::Vector3d weighted_J = weight.solve(J);
-  information_ = fade * information_ + J.dot(weighted_J);
-  projection_ = fade * projection_ + innovation.dot(weighted_J);
-  squares_ = fade * squares_ + innovation.dot(weight.solve(innovation));
+  const double fade =
+      std::exp(-std::clamp(innovation.stamp - last_, 0.0, 10.0 * options_.memory) / options_.memory);
+  last_ = innovation.stamp;
+  const Eigen::LDLT<Eigen::Matrix3d> weight = innovation.S_at_offset.ldlt();
+  const Eigen::Vector3d weighted_J = weight.solve(innovation.J_O);
+  information_ = fade * information_ + innovation.J_O.dot(weighted_J);
+  projection_ = fade * projection_ + innovation.d.dot(weighted_J);
+  squares_ = fade * squares_ + innovation.d.dot(weight.solve(innovation.d));
   count_ = fade * count_ + 3.0;
   if (count_ < 30.0 || information_ <= 0.0) return false;
 

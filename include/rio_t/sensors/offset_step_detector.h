@@ -1,8 +1,7 @@
 #pragma once
 
-#include <Eigen/Core>
-
 #include "rio_t/core/time.h"
+#include "rio_t/sensors/innovation.h"
 
 namespace rio_t {
 
@@ -23,10 +22,9 @@ class OffsetStepDetector {
  public:
   explicit OffsetStepDetector(const OffsetStepDetectorOptions& options) : options_(options) {}
 
-  /// `innovation` [m/s], its covariance `S` without the offset's own uncertainty, `J` [m/s^2]; true where the
-  /// offset must have stepped, and then the average starts anew.
-  bool stepped(Time stamp, const Eigen::Vector3d& innovation, const Eigen::Matrix3d& S,
-               const Eigen::Vector3d& J);
+  /// True where the offset must have stepped; then the average starts anew. S is that without the offset's own
+  /// uncertainty.
+  bool stepped(const Innovation& innovation);
 
  private:
   OffsetStepDetectorOptions options_;  // read-only after construction

@@ -1,4 +1,4 @@
-#include "rio_t/odometry/offset_uncertainty.h"
+#include "rio_t/sensors/offset_uncertainty.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -12,11 +12,11 @@ constexpr double kMemory = 40.0;
 
 }  // namespace
 
-void OffsetUncertainty::add(Time stamp, const Eigen::Vector3d& d, const Eigen::Matrix3d& S,
-                            const Eigen::Vector3d& J) {
-  const double fade = std::exp(-std::clamp(stamp - last_, 0.0, 10.0 * kMemory) / kMemory);
-  last_ = stamp;
-  const auto weight = S.ldlt();
+void OffsetUncertainty::add(const Innovation& innovation) {
+  const double fade = std::exp(-std::clamp(innovation.stamp - last_, 0.0, 10.0 * kMemory) / kMemory);
+  last_ = innovation.stamp;
+  const auto& [stamp, d, S, S_at_offset, J] = innovation;
+  const Eigen::LDLT<Eigen::Matrix3d> weight = S.ldlt();
   // Weighed as in the window: else what the estimate does not heed would ask for a change for good.
   const double length = std::sqrt(d.dot(weight.solve(d)));
   const double share = huber_threshold_ > 0.0 && length > huber_threshold_ ? huber_threshold_ / length : 1.0;

@@ -1,8 +1,7 @@
 #pragma once
 
-#include <Eigen/Core>
-
 #include "rio_t/core/time.h"
+#include "rio_t/sensors/innovation.h"
 
 namespace rio_t {
 
@@ -13,9 +12,8 @@ class OffsetUncertainty {
  public:
   /// `huber_threshold` on d' S^-1 d, as on the radar factors; 0: no robust loss.
   explicit OffsetUncertainty(double huber_threshold) : huber_threshold_(huber_threshold) {}
-  /// A scan that was used and tells the offset: its innovation `d` [m/s], the covariance S of that, and
-  /// `J` = d(velocity)/d(t_O) [m/s^2].
-  void add(Time stamp, const Eigen::Vector3d& d, const Eigen::Matrix3d& S, const Eigen::Vector3d& J);
+  /// Of a scan that was used and tells the offset.
+  void add(const Innovation& innovation);
   /// The offset was found to have stepped, and is about to be found anew: it does not lag.
   void offsetStepped();
 

@@ -1,16 +1,20 @@
-#include "rio_t/smoother/initial_prior.h"
+#include "rio_t/smoother/node_prior.h"
 
 #include <cmath>
 
 #include "rio_t/core/so3.h"
-#include "rio_t/smoother/chain.h"
 
 namespace rio_t {
+
+NodePrior nodePrior(const Information& information, const StateBlock& x0, double t_O0) {
+  const SquareRoot root = squareRoot(information);
+  return {x0, t_O0, root.J, root.r0};
+}
 
 NodePrior priorAtRest(const SmootherOptions& options, const ImuNoise& noise, const StateBlock& x,
                       double gravity, double duration) {
   using S = StateBlock;
-  NodeInformation known;
+  Information known{NodeMatrix::Zero(), NodeVector::Zero()};
   const auto add = [&](const Eigen::MatrixXd& rows, int first, double sigma) {
     known.S.block(first, first, rows.cols(), rows.cols()) += rows.transpose() * rows / (sigma * sigma);
   };
@@ -34,7 +38,7 @@ NodePrior priorAtRest(const SmootherOptions& options, const ImuNoise& noise, con
   J.middleCols<3>(S::kTheta) = so3::hat(gravity * R_WI.row(2).transpose());
   J.middleCols<3>(S::kBa).setIdentity();
   add(J, 0, sigma);
-  return priorFromInformation(known, x, options.time_offset_initial);
+  return nodePrior(known, x, options.time_offset_initial);
 }
 
 }  // namespace rio_t

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "rio_t/core/time.h"
+#include "rio_t/factors/state_block.h"
+#include "rio_t/imu/buffer.h"
+
+namespace rio_t {
+
+/// How the model accounts for the time between stamp and measurement.
+enum class TimeOffsetModel {
+  kConstantAcceleration,  ///< the paper's eq. (4)-(5): one acceleration times t_O; states at the stamps
+  kImu,                   ///< the IMU itself over the shift; states at the estimated measurement times
+};
+
+/// Motion of the radar at the time of measurement of a scan, and how it depends on the state and on t_O.
+/// Everything that a radar sees of its motion is a projection of this: a velocity, or the Doppler of a point.
+struct RadarMotion {
+  Eigen::Vector3d v_I = Eigen::Vector3d::Zero();  ///< velocity of the radar's origin, in I at that time [m/s]
+  StateJacobian<3> J_state = StateJacobian<3>::Zero();   ///< of v_I
+  Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();     ///< of v_I [m/s^2]
+  Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();     ///< angular velocity of I, in I [rad/s]
+};
+
+/// Carries the motion from a state to the time of measurement, tau = stamp - t_O (docs/method.md, section 5).
+struct RadarMotionModel {
+  TimeOffsetModel kind = TimeOffsetModel::kImu;
+  double max_time_offset = 0.25;                    ///< [s] beyond it, t_O changes nothing
+  Eigen::Vector3d g_W = Eigen::Vector3d::Zero();    ///< gravity in W [m/s^2]
+  /// Must outlive the model and keep the samples between the state and stamp -+ max_time_offset.
+  const ImuBuffer* imu = nullptr;
+
+  /// kImu, eq. 14-18: dR, dv integrate the IMU from the state to tau, T = tau - state_time, forwards or backwards, at the
+  /// biases of the state. Exact for any shift that the IMU covers:
+  ///   v_I = dR^T (R_IW (v_W + g_W T) + dv) + (omega(tau) - b_g) x l_I
+  /// kConstantAcceleration, eq. 13, paper eq. (4)-(5): one acceleration stands for the whole shift; the state
+  /// is at the stamp:
+  ///   v_I = R_IW v_W + (omega - b_g) x l_I - t_O a_c,   a_c = a - b_a + R_IW g_W,
+  /// with omega at the stamp, and for a the mean over 2 kOffsetHalfWidth around it.
+  /// `state` as StateBlock stores it; `l_I` is the radar in I [m]. Without `derivatives` these stay zero.
+  RadarMotion at(const double* state, Time state_time, Time stamp, double t_O, const Eigen::Vector3d& l_I,
+                 bool derivatives = true) const;
+
+ private:
+  RadarMotion carriedByImu(const StateView& x, Time state_time, Time tau, const Eigen::Vector3d& l_I,
+                           bool derivatives) const;
+  RadarMotion carriedByOneAcceleration(const StateView& x, Time stamp, double t_O, const Eigen::Vector3d& l_I) const;
+};
+
+}  // namespace rio_t

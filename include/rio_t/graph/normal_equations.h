@@ -1,0 +1,75 @@
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "rio_t/graph/window.h"
+
+/// The linearised graph, and block elimination of it (docs/method.md, section 6).
+namespace rio_t {
+
+/// H delta = -b in the tangents of `blocks`, in their order.
+struct NormalEquations {
+  std::vector<const Block*> blocks;
+  std::vector<Eigen::MatrixXd> diagonal;                 ///< H_ii
+  std::vector<std::map<int, Eigen::MatrixXd>> coupling;  ///< H_ij, j > i; none where it is zero
+  std::vector<Eigen::VectorXd> gradient;                 ///< b_i = sum J'r
+  double cost = 0.0;                                     ///< half the sum of squares, after the loss
+
+  /// Without any information.
+  explicit NormalEquations(std::vector<const Block*> blocks = {});
+  int indexOf(const Block& block) const;  ///< -1 where it is not among them
+  /// Takes block i out: its row and column are empty but for the diagonal, and its delta comes out as zero.
+  void hold(int i);
+};
+
+/// Of `terms`, at the blocks as they are. A block that is not in `blocks`, or that is constant, is not solved for. Throws
+/// std::runtime_error where a cost function fails.
+NormalEquations linearize(std::vector<const Block*> blocks, const std::vector<const Term*>& terms);
+NormalEquations linearize(const Window& window);
+
+/// Block Cholesky factor H = L L' in the order of the blocks: L_ii and W_ij = L_ii^-1 H_ij after the blocks before i are
+/// eliminated.
+class Elimination {
+ public:
+  /// None where H is not positive definite. What only rounding made indefinite is lifted by as little as it
+  /// takes.
+  static std::optional<Elimination> of(const NormalEquations& system);
+
+  const std::vector<Eigen::VectorXd>& delta() const { return delta_; }
+  /// delta' H delta: the squared length of the step in sigmas.
+  double squaredLength() const { return squared_length_; }
+  /// Joint covariance of some blocks, by their ascending indices.
+  Eigen::MatrixXd covariance(const std::vector<int>& indices) const;
+  /// Covariance of every block, and of every two that L connects: [i][j], j >= i.
+  std::vector<std::map<int, Eigen::MatrixXd>> covariances() const;
+
+ private:
+  bool factorise(const NormalEquations& system, double lift);
+
+  std::vector<Eigen::MatrixXd> L_;
+  std::vector<std::map<int, Eigen::MatrixXd>> W_;
+  std::vector<Eigen::VectorXd> delta_;
+  double squared_length_ = 0.0;
+};
+
+/// What remains of some blocks after others are eliminated.
+struct Information {
+  Eigen::MatrixXd S;  ///< information
+  Eigen::VectorXd s;  ///< gradient
+};
+/// Eliminates the first `count` blocks; the information of the others, which are left. Throws
+/// std::runtime_error where the first are not determined.
+Information eliminateFirst(const NormalEquations& system, int count);
+
+/// J and r0 with J'J = S and J'r0 = s. S may be singular: what carries no information gives rows of zeros.
+struct SquareRoot {
+  Eigen::MatrixXd J;
+  Eigen::VectorXd r0;
+};
+SquareRoot squareRoot(const Information& information);
+
+}  // namespace rio_t

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <ceres/cost_function.h>
+#include <ceres/loss_function.h>
+#include <ceres/problem.h>
+
+#include <Eigen/Core>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "rio_t/core/time.h"
+#include "rio_t/graph/manifold.h"
+
+namespace rio_t {
+
+class CeresManifold;
+
+/// Parameters that the solver finds.
+struct Block {
+  std::optional<Time> time;            ///< of a node; none for calibration, which holds at all times
+  std::shared_ptr<const Manifold> manifold;
+  Eigen::VectorXd x;                   ///< as stored; its address stays
+  double bound = std::numeric_limits<double>::infinity();  ///< on |x| of a block of one number
+  bool is_constant = false;  ///< not solved for; set by Window::setConstant
+  bool is_retired = false;   ///< calibration that no new term will use
+};
+
+/// A cost on some blocks.
+struct Term {
+  std::unique_ptr<ceres::CostFunction> cost;
+  std::shared_ptr<ceres::LossFunction> loss;  ///< null: none
+  std::vector<Block*> blocks;                 ///< in the order of the cost function
+  ceres::ResidualBlockId in_problem = nullptr;
+};
+
+/// A factor graph: blocks, and terms between them. One ceres::Problem lives as long as the window; terms and
+/// blocks come and go in it. Not thread-safe.
+class Window {
+ public:
+  Window();
+  ~Window();
+  Window(Window&&) noexcept;
+  Window& operator=(Window&&) noexcept;
+
+  Block& addNode(Time time, std::shared_ptr<const Manifold> manifold, Eigen::VectorXd x);
+  /// Who keeps it can ask whether the window still has it.
+  std::shared_ptr<Block> addCalibration(std::shared_ptr<const Manifold> manifold, Eigen::VectorXd x);
+  Term& add(std::unique_ptr<ceres::CostFunction> cost, std::vector<Block*> blocks,
+            std::shared_ptr<ceres::LossFunction> loss = nullptr);
+  void remove(const Term& term);
+  /// The block and the terms on it.
+  void remove(const Block& block);
+  void setConstant(Block& block, bool is_constant);
+  bool has(const Block& block) const;
+
+  /// In the order of elimination: nodes by their times, then calibration by its arrival.
+  const std::vector<std::shared_ptr<Block>>& blocks() const { return blocks_; }
+  const std::vector<std::unique_ptr<Term>>& terms() const { return terms_; }
+  ceres::Problem& problem() { return *problem_; }
+
+ private:
+  std::shared_ptr<Block> insert(std::vector<std::shared_ptr<Block>>::iterator before, Block block);
+
+  // Destroyed last: the problem refers to them.
+  std::map<const Manifold*, std::unique_ptr<CeresManifold>> ceres_manifolds_;
+  std::vector<std::shared_ptr<Block>> blocks_;
+  std::vector<std::unique_ptr<Term>> terms_;
+  std::unique_ptr<ceres::Problem> problem_;
+};
+
+}  // namespace rio_t

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rio_t/imu/buffer.h"
+#include "rio_t/odometry/fault_counters.h"
+#include "rio_t/odometry/health_monitor.h"
+#include "rio_t/odometry/initializer.h"
+#include "rio_t/odometry/model_error_scale.h"
+#include "rio_t/odometry/motion_initializer.h"
+#include "rio_t/odometry/navigation.h"
+#include "rio_t/odometry/options.h"
+#include "rio_t/odometry/pose_doubt.h"
+#include "rio_t/odometry/scan_result.h"
+#include "rio_t/odometry/yaw_doubt.h"
+#include "rio_t/sensors/radar_channel.h"
+#include "rio_t/smoother/fixed_lag_smoother.h"
+
+namespace rio_t {
+
+/// The paper's optimisation thread: from scans and checked IMU samples to the newest optimised state, which
+/// anchors the navigation. Not thread-safe.
+class Estimator {
+ public:
+  /// `navigation` and `faults` must outlive the estimator.
+  Estimator(const OdometryOptions& options, Navigation& navigation, FaultCounters& faults);
+
+  /// Samples that Navigation checked, in time order.
+  void addImu(const std::vector<ImuMeasurement>& samples);
+  /// The IMU's clock jumped: nothing before can be related to what comes.
+  void startAgain(std::uint64_t clock_restarts);
+  /// After samples and scans were taken in: counts times without radar, and moves the window on.
+  void keepUp(bool scan_came, bool scans_wait);
+
+  /// The IMU that covers the scan may still come.
+  bool mustWait(const RadarScan& scan) const;
+  /// `imu_has_ended`: what is not covered never will be.
+  ScanResult useScan(RadarScan scan, bool imu_has_ended);
+  Health updateHealth();
+  /// The optimised poses that no result has told yet; at the end.
+  std::vector<StampedPose> remainingPoses();
+
+  bool initialized() const { return smoother_.started(); }
+  const std::string& waitingFor() const { return waiting_for_; }  ///< while not initialised, for people
+  const std::optional<Initialization>& start() const { return start_; }
+  PointVariances radarNoise() const { return radar_.noise(); }
+
+ private:
+  std::string whyNotNow(Time node_time, bool imu_has_ended) const;
+  void tryInitialize(const ImuMeasurement& sample);
+  void begin(Time time, const NodePrior& prior);
+  bool tryReinitialize(std::vector<StampedPose>& left);
+  PoseAnchor anchorAt(Time time) const;
+  void judge(const RadarAnswer& answer, Time stamp);
+  void updateWindow(ScanResult& result);
+  void publishNewest() { anchor(newestState(), false); }
+  void anchor(const NavigationState& state, bool at_rest);
+  std::vector<StampedPose> marginalize();
+  bool isAtRest(Time time) const;
+  ImuNoise imuNoise() const;  ///< with the model errors as they show
+  NavigationState newestState() const;
+
+  const OdometryOptions options_;
+  const Eigen::Vector3d g_W_;
+  const double max_stamp_ahead_;  ///< [s]
+  Navigation& navigation_;
+  FaultCounters& faults_;
+
+  ImuBuffer imu_;
+  Initializer initializer_;
+  MotionInitializer recovery_;  ///< from divergence
+  FixedLagSmoother smoother_;
+  RadarChannel radar_;
+  ModelErrorScale model_error_scale_;
+  HealthMonitor health_;
+  PoseDoubt pose_doubt_;
+  YawDoubt yaw_doubt_;
+
+  std::optional<Initialization> start_;
+  std::string waiting_for_;
+  Time initialized_at_;
+  std::vector<StampedPose> left_in_silence_;  ///< poses that no scan pushed out of the window; for the next result
+  std::uint64_t clock_restarts_ = 0;
+  std::optional<Time> radar_heard_;  ///< IMU time when a scan came last
+  bool radar_is_silent_ = false;
+};
+
+}  // namespace rio_t

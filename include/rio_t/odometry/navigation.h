@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "rio_t/imu/input_check.h"
+#include "rio_t/odometry/imu_propagator.h"
+#include "rio_t/odometry/options.h"
+
+namespace rio_t {
+
+/// The paper's navigation thread: checks each IMU sample and carries the newest optimised state to it. Never
+/// waits for the solver. Any thread may call it; a call takes microseconds.
+class Navigation {
+ public:
+  Navigation(const OdometryOptions& options, const Eigen::Vector3d& g_W);
+
+  /// What came of a sample.
+  struct Checked {
+    std::vector<ImuMeasurement> samples;   ///< to go on with, bridges over gaps first; none where it was dropped
+    std::vector<const char*> faults;       ///< names for FaultCounters
+    std::uint64_t clock_restarts = 0;      ///< how often the time of the IMU has started again so far
+    std::optional<NavigationState> state;  ///< at the sample; none before the first anchor
+  };
+  Checked add(const ImuMeasurement& imu);
+
+  /// The newest optimised state, and the noise of the IMU from here on. Ignored where the clock restarted since
+  /// `clock_restarts`: the state is of another time.
+  void anchor(const NavigationState& state, bool at_rest, const ImuNoise& noise, std::uint64_t clock_restarts);
+
+  std::optional<NavigationState> state() const;  ///< at the newest sample
+  MeasuredImuNoise imuNoise() const;             ///< over the last second
+
+ private:
+  const ImuNoise imu_noise_;
+  const Eigen::Vector3d g_W_;
+  mutable std::mutex mutex_;  // guards what follows
+  ImuInputCheck input_check_;
+  ImuPropagator propagator_;
+  std::uint64_t clock_restarts_ = 0;
+};
+
+}  // namespace rio_t

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "rio_t/core/pose.h"
+#include "rio_t/graph/solver_termination.h"
+#include "rio_t/odometry/health_monitor.h"
+#include "rio_t/odometry/navigation_state.h"
+#include "rio_t/radar/ego_velocity.h"
+#include "rio_t/radar/scan.h"
+
+namespace rio_t {
+
+/// What became of one scan.
+struct ScanResult {
+  RadarScan scan;  ///< as fed
+  EgoVelocity ego_velocity;
+  bool used = false;               ///< its velocity went into the window
+  double model_error_scale = 1.0;  ///< see ModelErrorScale; in the covariance of ego_velocity
+  std::string rejected_because;    ///< snake case, empty where used; keys of `scans_rejected`
+
+  /// The window was solved again: the scan was used, or the platform is at rest. What follows is set only
+  /// then.
+  bool updated = false;
+  // The newest state of the window.
+  NavigationState state;
+  double time_offset = 0.0;        ///< t_O [s]
+  double time_offset_sigma = 0.0;  ///< [s]
+  int solver_iterations = 0;
+  SolverTermination solver_termination = SolverTermination::kIterationLimit;
+  Health health = Health::kOk;           ///< after this scan; set always
+  bool reinitialized = false;            ///< the estimate was re-initialised before this scan
+  std::vector<StampedPose> left_window;  ///< optimised poses that this scan pushed out, oldest first
+};
+
+}  // namespace rio_t

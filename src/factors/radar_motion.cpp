@@ -1,0 +1,63 @@
+#include "rio_t/factors/radar_motion.h"
+
+#include <algorithm>
+
+#include "rio_t/core/so3.h"
+#include "rio_t/factors/offset_derivative.h"
+#include "rio_t/imu/preintegration.h"
+
+namespace rio_t {
+
+RadarMotion RadarMotionModel::at(const double* state, Time state_time, Time stamp, double t_O,
+                                 const Eigen::Vector3d& l_I,
+                                 bool derivatives) const {
+  const StateView x(state);
+  if (kind == TimeOffsetModel::kConstantAcceleration) return carriedByOneAcceleration(x, stamp, t_O, l_I);
+  return carriedByImu(x, state_time, stamp - std::clamp(t_O, -max_time_offset, max_time_offset), l_I,
+                      derivatives);
+}
+
+RadarMotion RadarMotionModel::carriedByImu(const StateView& x, Time state_time, Time tau,
+                                           const Eigen::Vector3d& l_I, bool derivatives) const {
+  ImuDelta delta;
+  imu->forEachInterval(state_time, tau, [&](double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
+    delta.step(dt, gyro - x.b_g, accel - x.b_a);
+  });
+  const Eigen::Matrix3d R_IW = x.q_WI.toRotationMatrix().transpose();  // at the state
+  const Eigen::Matrix3d dR_T = delta.dR.toRotationMatrix().transpose();
+  const Eigen::Vector3d carried = R_IW * (x.v_W + delta.dt * g_W);
+  const Eigen::Vector3d v_tau = dR_T * (carried + delta.dv);  // of I, in I at tau
+
+  RadarMotion motion;
+  motion.omega_I = imu->at(tau).angular_velocity - x.b_g;
+  motion.v_I = v_tau + motion.omega_I.cross(l_I);
+  if (!derivatives) return motion;
+  motion.J_state.middleCols<3>(StateBlock::kQStored) = dR_T * so3::hat(carried);
+  motion.J_state.middleCols<3>(StateBlock::kVStored) = dR_T * R_IW;
+  motion.J_state.middleCols<3>(StateBlock::kBgStored) =
+      dR_T * delta.dv_dbg + so3::hat(v_tau) * delta.dR_dbg + so3::hat(l_I);
+  motion.J_state.middleCols<3>(StateBlock::kBaStored) = dR_T * delta.dv_dba;
+  motion.dv_dt_O =
+      -velocityRate(imu->mean(tau, kOffsetHalfWidth), x.b_g, x.b_a, v_tau, dR_T * R_IW * g_W, l_I).known();
+  return motion;
+}
+
+RadarMotion RadarMotionModel::carriedByOneAcceleration(const StateView& x, Time stamp, double t_O,
+                                                       const Eigen::Vector3d& l_I) const {
+  const Eigen::Matrix3d R_IW = x.q_WI.toRotationMatrix().transpose();
+  const Eigen::Vector3d v_I = R_IW * x.v_W;
+  const Eigen::Vector3d g_I = R_IW * g_W;
+  const Eigen::Vector3d a_c = imu->mean(stamp, kOffsetHalfWidth).acceleration - x.b_a + g_I;
+
+  RadarMotion motion;
+  motion.omega_I = imu->at(stamp).angular_velocity - x.b_g;
+  motion.v_I = v_I + motion.omega_I.cross(l_I) - t_O * a_c;
+  motion.J_state.middleCols<3>(StateBlock::kQStored) = so3::hat(v_I - t_O * g_I);
+  motion.J_state.middleCols<3>(StateBlock::kVStored) = R_IW;
+  motion.J_state.middleCols<3>(StateBlock::kBgStored) = so3::hat(l_I);
+  motion.J_state.middleCols<3>(StateBlock::kBaStored).diagonal().setConstant(t_O);
+  motion.dv_dt_O = -a_c;
+  return motion;
+}
+
+}  // namespace rio_t

@@ -1,0 +1,271 @@
+#include "rio_t/graph/normal_equations.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <unordered_map>
+#include <utility>
+
+namespace rio_t {
+namespace {
+
+/// Smallest diagonal of a scaled Cholesky factor that still says something, as a square root of 1e-12.
+constexpr double kWellDetermined = 1e-6;
+/// After a long way hardly anything is known of the position: 1/(200 m)^2 beside the 1/(4 um)^2 of an IMU
+/// factor over 5 ms is within the rounding of a double, and an elimination may come out indefinite. Then the
+/// diagonal is lifted by as little as it takes.
+constexpr double kSmallestLift = 1e-15;
+constexpr double kLargestLift = 1e-9;
+
+using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+void add(Eigen::MatrixXd& sum, const Eigen::MatrixXd& part) {
+  if (sum.size() == 0) {
+    sum = part;
+  } else {
+    sum += part;
+  }
+}
+
+/// Residual and derivatives of a term with respect to the tangents of its blocks, after the loss.
+struct Linearized {
+  Eigen::VectorXd r;
+  std::vector<Eigen::MatrixXd> J;
+  double cost = 0.0;
+};
+
+Linearized evaluate(const Term& term) {
+  const auto rows = term.cost->num_residuals();
+  Linearized result;
+  result.r.resize(rows);
+  std::vector<RowMajorMatrix> stored(term.blocks.size());
+  std::vector<const double*> parameters;
+  std::vector<double*> jacobians;
+  for (std::size_t i = 0; i < term.blocks.size(); ++i) {
+    stored[i].resize(rows, term.blocks[i]->manifold->size());
+    parameters.push_back(term.blocks[i]->x.data());
+    jacobians.push_back(stored[i].data());
+  }
+  if (!term.cost->Evaluate(parameters.data(), result.r.data(), jacobians.data()))
+    throw std::runtime_error("graph: a factor cannot be evaluated");
+  double rho[3] = {result.r.squaredNorm(), 1.0, 0.0};
+  if (term.loss) term.loss->Evaluate(rho[0], rho);
+  result.cost = 0.5 * rho[0];
+  const double root = std::sqrt(rho[1]);
+  result.r *= root;
+  for (std::size_t i = 0; i < term.blocks.size(); ++i) {
+    const std::vector<int>& columns = term.blocks[i]->manifold->columns();
+    Eigen::MatrixXd J(rows, static_cast<Eigen::Index>(columns.size()));
+    for (std::size_t k = 0; k < columns.size(); ++k) J.col(static_cast<Eigen::Index>(k)) = root * stored[i].col(columns[k]);
+    result.J.push_back(std::move(J));
+  }
+  return result;
+}
+
+void addTo(NormalEquations& system, const Term& term, const std::unordered_map<const Block*, int>& index) {
+  const Linearized linear = evaluate(term);
+  system.cost += linear.cost;
+  std::vector<int> at;
+  for (const Block* block : term.blocks) {
+    const auto found = index.find(block);
+    at.push_back(found == index.end() || block->is_constant ? -1 : found->second);
+  }
+  for (std::size_t a = 0; a < at.size(); ++a) {
+    if (at[a] < 0) continue;
+    const Eigen::MatrixXd& J = linear.J[a];
+    system.diagonal[at[a]].noalias() += J.transpose() * J;
+    system.gradient[at[a]].noalias() += J.transpose() * linear.r;
+    for (std::size_t b = 0; b < at.size(); ++b)
+      if (at[b] > at[a]) add(system.coupling[at[a]][at[b]], J.transpose() * linear.J[b]);
+  }
+}
+
+}  // namespace
+
+NormalEquations::NormalEquations(std::vector<const Block*> blocks_in) : blocks(std::move(blocks_in)) {
+  for (const Block* block : blocks) {
+    const int tangent = block->manifold->tangent();
+    diagonal.push_back(Eigen::MatrixXd::Zero(tangent, tangent));
+    gradient.push_back(Eigen::VectorXd::Zero(tangent));
+  }
+  coupling.resize(blocks.size());
+}
+
+int NormalEquations::indexOf(const Block& block) const {
+  const auto found = std::find(blocks.rbegin(), blocks.rend(), &block);
+  return static_cast<int>(blocks.rend() - found) - 1;
+}
+
+void NormalEquations::hold(int i) {
+  for (int k = 0; k < i; ++k) coupling[k].erase(i);
+  coupling[i].clear();
+  diagonal[i].setIdentity();
+  gradient[i].setZero();
+}
+
+NormalEquations linearize(std::vector<const Block*> blocks, const std::vector<const Term*>& terms) {
+  NormalEquations system(std::move(blocks));
+  std::unordered_map<const Block*, int> index;
+  for (std::size_t i = 0; i < system.blocks.size(); ++i) index[system.blocks[i]] = static_cast<int>(i);
+  for (const Term* term : terms) addTo(system, *term, index);
+  for (std::size_t i = 0; i < system.blocks.size(); ++i)
+    if (system.blocks[i]->is_constant) system.hold(static_cast<int>(i));
+  return system;
+}
+
+NormalEquations linearize(const Window& window) {
+  std::vector<const Block*> blocks;
+  std::vector<const Term*> terms;
+  for (const auto& block : window.blocks()) blocks.push_back(block.get());
+  for (const auto& term : window.terms()) terms.push_back(term.get());
+  return linearize(std::move(blocks), terms);
+}
+
+bool Elimination::factorise(const NormalEquations& system, double lift) {
+  const std::size_t count = system.blocks.size();
+  std::vector<Eigen::MatrixXd> S = system.diagonal;
+  L_.resize(count);
+  W_ = system.coupling;
+  delta_.resize(count);
+  for (std::size_t i = 0; i < count; ++i) delta_[i] = -system.gradient[i];
+  for (std::size_t i = 0; i < count; ++i) {
+    if (lift > 0.0) S[i].diagonal() *= 1.0 + lift;
+    Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(S[i]);
+    if (factor.info() != Eigen::Success) return false;
+    L_[i] = std::move(S[i]);
+    const auto L = L_[i].triangularView<Eigen::Lower>();
+    L.solveInPlace(delta_[i]);
+    for (auto& [j, W] : W_[i]) {
+      L.solveInPlace(W);
+      delta_[j].noalias() -= W.transpose() * delta_[i];
+    }
+    for (auto a = W_[i].begin(); a != W_[i].end(); ++a) {
+      S[a->first].noalias() -= a->second.transpose() * a->second;
+      for (auto b = std::next(a); b != W_[i].end(); ++b)
+        add(W_[a->first][b->first], -(a->second.transpose() * b->second));
+    }
+  }
+  squared_length_ = 0.0;
+  for (std::size_t i = count; i-- > 0;) {
+    for (const auto& [j, W] : W_[i]) delta_[i].noalias() -= W * delta_[j];
+    L_[i].triangularView<Eigen::Lower>().transpose().solveInPlace(delta_[i]);
+    squared_length_ -= delta_[i].dot(system.gradient[i]);
+  }
+  return true;
+}
+
+std::optional<Elimination> Elimination::of(const NormalEquations& system) {
+  Elimination result;
+  bool done = result.factorise(system, 0.0);
+  for (double lift = kSmallestLift; !done && lift <= kLargestLift; lift *= 10.0)
+    done = result.factorise(system, lift);
+  if (!done) return std::nullopt;
+  return result;
+}
+
+Eigen::MatrixXd Elimination::covariance(const std::vector<int>& indices) const {
+  Eigen::Index columns = 0;
+  for (const int i : indices) columns += L_[i].rows();
+  // Y = L^-1 E, where E selects the blocks: their covariance is Y'Y.
+  std::map<int, Eigen::MatrixXd> Y;
+  Eigen::Index first = 0;
+  for (const int i : indices) {
+    add(Y[i], Eigen::MatrixXd::Zero(L_[i].rows(), columns));
+    Y[i].middleCols(first, L_[i].rows()).setIdentity();
+    first += L_[i].rows();
+  }
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(columns, columns);
+  for (auto at = Y.begin(); at != Y.end(); ++at) {
+    auto& [i, y] = *at;
+    L_[i].triangularView<Eigen::Lower>().solveInPlace(y);
+    for (const auto& [j, W] : W_[i]) add(Y[j], -(W.transpose() * y));
+    result.noalias() += y.transpose() * y;
+  }
+  return result;
+}
+
+std::vector<std::map<int, Eigen::MatrixXd>> Elimination::covariances() const {
+  std::vector<std::map<int, Eigen::MatrixXd>> P(L_.size());
+  const auto at = [&](int a, int b) -> Eigen::MatrixXd {
+    return a <= b ? P[a].at(b) : Eigen::MatrixXd(P[b].at(a).transpose());
+  };
+  for (std::size_t i = L_.size(); i-- > 0;) {
+    const auto L = L_[i].triangularView<Eigen::Lower>();
+    const Eigen::MatrixXd inverse = L.solve(Eigen::MatrixXd::Identity(L_[i].rows(), L_[i].rows()));
+    P[i][static_cast<int>(i)] = inverse.transpose() * inverse;
+    // delta_i = G_i (...) - sum_j G_ij delta_j with G_ij = L_ii^-T W_ij.
+    std::map<int, Eigen::MatrixXd> G;
+    for (const auto& [j, W] : W_[i]) G[j] = L.transpose().solve(W);
+    for (const auto& [j, unused] : G) {
+      Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(L_[i].rows(), L_[j].rows());
+      for (const auto& [k, G_ik] : G) sum.noalias() -= G_ik * at(k, j);
+      P[i][static_cast<int>(i)].noalias() -= sum * G[j].transpose();
+      P[i][j] = std::move(sum);
+    }
+  }
+  return P;
+}
+
+Information eliminateFirst(const NormalEquations& system, int count) {
+  const int blocks = static_cast<int>(system.blocks.size());
+  Eigen::Index rows = 0, first_rows = 0;
+  std::vector<Eigen::Index> first;
+  for (int i = 0; i < blocks; ++i) {
+    first.push_back(rows);
+    rows += system.diagonal[i].rows();
+    if (i < count) first_rows = rows;
+  }
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(rows, rows);
+  Eigen::VectorXd b(rows);
+  for (int i = 0; i < blocks; ++i) {
+    b.segment(first[i], system.gradient[i].size()) = system.gradient[i];
+    H.block(first[i], first[i], system.diagonal[i].rows(), system.diagonal[i].rows()) = system.diagonal[i];
+    for (const auto& [j, part] : system.coupling[i]) {
+      H.block(first[i], first[j], part.rows(), part.cols()) = part;
+      H.block(first[j], first[i], part.cols(), part.rows()) = part.transpose();
+    }
+  }
+  const Eigen::Index kept = rows - first_rows;
+  Eigen::MatrixXd H00 = H.topLeftCorner(first_rows, first_rows);
+  Eigen::LLT<Eigen::MatrixXd> factor(H00);
+  for (double lift = kSmallestLift; factor.info() != Eigen::Success; lift *= 10.0) {
+    if (lift > kLargestLift) throw std::runtime_error("graph: a block that leaves is not determined");
+    H00.diagonal() = (1.0 + lift) * H.diagonal().head(first_rows);
+    factor.compute(H00);
+  }
+  const Eigen::MatrixXd W = factor.matrixL().solve(H.topRightCorner(first_rows, kept));
+  Information result;
+  result.S = H.bottomRightCorner(kept, kept) - W.transpose() * W;
+  result.s = b.tail(kept) - W.transpose() * factor.matrixL().solve(b.head(first_rows));
+  return result;
+}
+
+SquareRoot squareRoot(const Information& information) {
+  const Eigen::Index n = information.S.rows();
+  // The entries differ by many orders of magnitude (metres, biases): scale to a unit diagonal first, so that
+  // "carries no information" does not depend on the units.
+  const Eigen::VectorXd scale = information.S.diagonal().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::VectorXd inverse = (scale.array() > 0.0).select(scale.cwiseInverse(), Eigen::VectorXd::Zero(n));
+  const Eigen::MatrixXd scaled = inverse.asDiagonal() * information.S * inverse.asDiagonal();
+  const Eigen::VectorXd scaled_s = inverse.cwiseProduct(information.s);
+  SquareRoot root{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
+  const Eigen::LLT<Eigen::MatrixXd> cholesky(scaled);
+  if (cholesky.info() == Eigen::Success && cholesky.matrixLLT().diagonal().minCoeff() > kWellDetermined) {
+    root.J = Eigen::MatrixXd(cholesky.matrixU()) * scale.asDiagonal();
+    root.r0 = cholesky.matrixL().solve(scaled_s);
+    return root;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
+  const Eigen::VectorXd& lambda = eigen.eigenvalues();
+  const double floor = 1e-12 * std::max(lambda.maxCoeff(), 0.0);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (lambda(i) <= floor) continue;
+    const Eigen::VectorXd v = eigen.eigenvectors().col(i);
+    root.J.row(i) = std::sqrt(lambda(i)) * v.cwiseProduct(scale).transpose();
+    root.r0(i) = v.dot(scaled_s) / std::sqrt(lambda(i));
+  }
+  return root;
+}
+
+}  // namespace rio_t

@@ -1,0 +1,275 @@
+#include "rio_t/odometry/estimator.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "rio_t/factors/imu_factor.h"
+#include "rio_t/factors/offset_derivative.h"
+
+namespace rio_t {
+namespace {
+
+/// The IMU must be this far past a scan's node [s]: the derivative with respect to t_O looks so far ahead,
+/// and the factor's time may still move a little.
+constexpr double kImuMargin = kOffsetHalfWidth + 0.01;
+/// A scan stamped further ahead of the newest IMU sample is nonsense, not early [s]; unless the IMU may still
+/// come.
+constexpr double kMaxStampAhead = 1.0;
+/// Without a scan the window moves on in such steps [s], or the IMU that it needs would grow without end; and
+/// stays so far behind, for scans that are late.
+constexpr double kSilentStep = 5.0;
+constexpr double kLateScan = 1.0;
+
+RadarChannelOptions channelOptions(const OdometryOptions& options) {
+  return {options.T_IR,     options.ego_velocity, options.feasibility, options.offset_step_detector,
+          options.smoother, options.rest.velocity_sigma};
+}
+
+StampedPose pose(const NodeEstimate& node) { return {node.time, node.x.p_W(), node.x.q_WI()}; }
+
+}  // namespace
+
+Estimator::Estimator(const OdometryOptions& options, Navigation& navigation, FaultCounters& faults)
+    : options_(options),
+      g_W_(0.0, 0.0, -options.gravity),
+      max_stamp_ahead_(std::max(kMaxStampAhead, options.imu_input_check.max_bridged_gap)),
+      navigation_(navigation),
+      faults_(faults),
+      initializer_(options),
+      recovery_(options),
+      smoother_(options.smoother, options.imu_noise, g_W_, imu_),
+      radar_(channelOptions(options), g_W_, imu_),
+      health_(options.health, options.smoother.innovation_gate),
+      waiting_for_(initializer_.waitingFor()) {}
+
+/// The way of a scan: when, how fast, into the window, out.
+ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
+  ScanResult result;
+  result.scan = std::move(scan);
+  result.left_window = std::exchange(left_in_silence_, {});
+  const Time stamp = result.scan.stamp;
+  if (!initialized()) {
+    result.ego_velocity = radar_.velocityOf(result.scan);
+    initializer_.addVelocity(stamp, result.ego_velocity);
+    result.rejected_because = "before_initialization";
+    return result;
+  }
+  // First of all: a new start may move the offset, and with it the time of measurement.
+  if (health_.wantsReinitialization(imu_.newest())) result.reinitialized = tryReinitialize(result.left_window);
+  const Time node_time = radar_.nodeTime(stamp);
+  result.rejected_because = whyNotNow(node_time, imu_has_ended);
+  if (result.rejected_because.empty()) {
+    result.model_error_scale = model_error_scale_.value();
+    smoother_.setImuNoise(imuNoise());
+    const bool at_rest = isAtRest(node_time);
+    const bool has_diverged = health_.health() == Health::kDiverged;
+    const RadarAnswer answer =
+        radar_.use(result.scan, {at_rest, has_diverged, result.model_error_scale}, smoother_);
+    judge(answer, stamp);
+    result.ego_velocity = answer.ego_velocity;
+    result.rejected_because = answer.rejected_because;
+    result.used = result.updated = answer.rejected_because.empty();
+    if (at_rest) {
+      if (Block* node = smoother_.nodeAt(radar_.nodeTime(stamp))) {
+        smoother_.addZeroVelocity(*node, options_.rest.velocity_sigma);
+        result.updated = true;
+      }
+    }
+    if (result.updated) updateWindow(result);
+    updateHealth();
+    if (!result.updated && health_.health() == Health::kDiverged) publishNewest();
+  }
+  result.health = health_.health();
+  return result;
+}
+
+std::string Estimator::whyNotNow(Time node_time, bool imu_has_ended) const {
+  if (node_time < initialized_at_) return "before_initialization";
+  if (node_time - imu_.newest() > max_stamp_ahead_) return "stamp_ahead_of_imu";
+  if (imu_.covers(imu_has_ended ? node_time : node_time + kImuMargin)) return "";
+  return imu_has_ended ? "imu_not_covering" : "older_than_window";
+}
+
+/// Health, recovery and the size of the model errors hear what the scan says of the estimate.
+void Estimator::judge(const RadarAnswer& answer, Time stamp) {
+  if (answer.judged) {
+    health_.addInnovation(*answer.judged);
+  } else if (answer.was_predicted) {
+    health_.addUndecided(stamp);
+  }
+  if (answer.alone) recovery_.add(stamp, *answer.alone);
+  if (answer.offset_stepped) {
+    health_.offsetStepped(stamp);
+    faults_.count("time_offset_step");
+  }
+  if (!answer.used) return;
+  // The state's variance grows about as the root of the accelerometer's, unless that is measured.
+  const ImuMeasurement sample = imu_.at(stamp);
+  const bool accel_is_told = imuNoise().accelVariance(sample) > sample.accel_noise;
+  Eigen::Matrix3d scaled = answer.ego_velocity.told_variance.asDiagonal();
+  if (accel_is_told) scaled += 0.5 * answer.prediction_covariance;
+  const double share = answer.used->S.ldlt().solve(scaled).trace() / 3.0;
+  model_error_scale_.add(stamp, answer.used->squaredSigmas(), share);
+}
+
+void Estimator::updateWindow(ScanResult& result) {
+  const Solution solution = smoother_.optimize();
+  result.solver_iterations = solution.iterations;
+  result.solver_termination = solution.termination;
+  result.state = newestState();
+  result.time_offset = radar_.offset();
+  const Eigen::MatrixXd covariance = smoother_.newestCovariance({&radar_.offsetBlock()});
+  result.time_offset_sigma = radar_.offsetSigma(covariance(StateBlock::kTangent, StateBlock::kTangent));
+  for (const StampedPose& left : marginalize()) result.left_window.push_back(left);
+  health_.updated(result.state.time);
+  anchor(result.state, result.used && result.ego_velocity.status == EgoVelocityStatus::kZeroVelocity);
+}
+
+std::vector<StampedPose> Estimator::marginalize() {
+  std::vector<StampedPose> left;
+  for (const NodeEstimate& node : smoother_.marginalize({radar_.offsetWalk()})) left.push_back(pose(node));
+  return left;
+}
+
+bool Estimator::mustWait(const RadarScan& scan) const {
+  if (!initialized()) return false;
+  const Time node_time = radar_.nodeTime(scan.stamp);
+  return node_time >= initialized_at_ && node_time > imu_.newest() - kImuMargin &&
+         node_time - imu_.newest() <= max_stamp_ahead_;
+}
+
+void Estimator::addImu(const std::vector<ImuMeasurement>& samples) {
+  for (const ImuMeasurement& sample : samples) {
+    if (sample.gyro_doubt > 0.0 && initialized())
+      yaw_doubt_.add(sample.gyro_doubt * (sample.time - imu_.newest()), smoother_.newest().x.p_W());
+    imu_.add(sample);
+    if (!initialized() && !sample.is_bridge) tryInitialize(sample);
+  }
+}
+
+void Estimator::keepUp(bool scan_came, bool scans_wait) {
+  if (imu_.empty()) return;
+  // By the IMU's clock at the arrival of scans: the scans' own stamps may be wrong.
+  if (scan_came || !radar_heard_) {
+    radar_heard_ = imu_.newest();
+    radar_is_silent_ = false;
+  } else if (!radar_is_silent_ && imu_.newest() - *radar_heard_ > options_.max_radar_gap) {
+    faults_.count("radar_gap");
+    radar_is_silent_ = true;
+  }
+  if (!initialized()) return;
+  const Time time = imu_.newest() - (kLateScan + 2.0 * options_.smoother.max_time_offset);
+  if (!scans_wait && time - smoother_.newest().time >= kSilentStep) {
+    smoother_.nodeAt(time);
+    smoother_.optimize();
+    for (const StampedPose& left : marginalize()) left_in_silence_.push_back(left);
+  }
+  const bool keep_for_recovery = options_.health.on_divergence == OnDivergence::kReinitialize;
+  const Time needed = smoother_.imuNeededSince();
+  imu_.dropBefore(keep_for_recovery ? std::min(needed, imu_.newest() - recovery_.imuHistory()) : needed);
+}
+
+void Estimator::startAgain(std::uint64_t clock_restarts) {
+  clock_restarts_ = clock_restarts;
+  imu_.clear();
+  // Nobody stands still because a clock jumped.
+  OdometryOptions at_once = options_;
+  at_once.init_motion_after = 0.0;
+  initializer_ = Initializer(at_once);
+  recovery_.clear();
+  smoother_ = FixedLagSmoother(options_.smoother, options_.imu_noise, g_W_, imu_);
+  model_error_scale_ = ModelErrorScale();
+  health_ = HealthMonitor(options_.health, options_.smoother.innovation_gate);
+  pose_doubt_ = PoseDoubt();
+  left_in_silence_.clear();
+  radar_heard_.reset();
+}
+
+void Estimator::tryInitialize(const ImuMeasurement& sample) {
+  const std::optional<Initialization> found = initializer_.add(sample, imu_);
+  waiting_for_ = initializer_.waitingFor();
+  if (!found) return imu_.dropBefore(sample.time - initializer_.imuHistory());
+  start_ = found;
+  model_error_scale_ = found->model_error_scale;
+  begin(found->time, found->prior);
+}
+
+void Estimator::begin(Time time, const NodePrior& prior) {
+  radar_.start(smoother_, time, prior);
+  yaw_doubt_ = YawDoubt();
+  initialized_at_ = time;
+  health_.startedAt(time);
+  publishNewest();
+}
+
+/// The poses of the window that is given up go to `left`.
+bool Estimator::tryReinitialize(std::vector<StampedPose>& left) {
+  const auto found = recovery_.solve(imu_, [this](Time time) { return anchorAt(time); });
+  if (!found) return false;
+  for (std::size_t k = 0; k < smoother_.size(); ++k)
+    if (smoother_.node(k).time < found->time) left.push_back(pose(smoother_.node(k)));
+  pose_doubt_ = PoseDoubt(newestState());
+  model_error_scale_ = found->model_error_scale;
+  begin(found->time, found->prior);
+  updateHealth();
+  faults_.count("reinitialized");
+  return true;
+}
+
+PoseAnchor Estimator::anchorAt(Time time) const {
+  // From the newest node before, as the navigation goes: what is published goes on from where it is.
+  std::size_t k = smoother_.size() - 1;
+  while (k > 0 && smoother_.node(k).time > time) --k;
+  const NodeEstimate node = smoother_.node(k);
+  StateBlock x = node.x;
+  if (node.time < time)
+    x = predict(x, preintegrate(imu_, node.time, time, x.b_g(), x.b_a(), options_.imu_noise), g_W_);
+  PoseAnchor anchor;  // how well it is known is kept by pose_doubt_
+  anchor.q_WI = x.q_WI();
+  anchor.p_W = x.p_W();
+  anchor.sigma_yaw = options_.smoother.prior_sigma_yaw;
+  anchor.sigma_position = options_.smoother.prior_sigma_position;
+  return anchor;
+}
+
+Health Estimator::updateHealth() {
+  const std::optional<NavigationState> state = navigation_.state();
+  if (!state || imu_.empty()) return health_.health();
+  const bool was_diverged = health_.health() == Health::kDiverged;
+  const Health now = health_.judge(imu_.newest(), *state);
+  if (now == Health::kDiverged && !was_diverged) faults_.count("diverged");
+  return now;
+}
+
+void Estimator::anchor(const NavigationState& state, bool at_rest) {
+  navigation_.anchor(state, at_rest, imuNoise(), clock_restarts_);
+}
+
+std::vector<StampedPose> Estimator::remainingPoses() {
+  std::vector<StampedPose> poses = std::exchange(left_in_silence_, {});
+  for (std::size_t k = 0; k < smoother_.size(); ++k) poses.push_back(pose(smoother_.node(k)));
+  return poses;
+}
+
+bool Estimator::isAtRest(Time time) const {
+  const StateBlock x = smoother_.newest().x;
+  return rio_t::isAtRest(imu_, time, {x.q_WI(), x.v_W(), x.b_g(), x.b_a(), g_W_}, options_.rest);
+}
+
+ImuNoise Estimator::imuNoise() const {
+  ImuNoise noise = options_.imu_noise;
+  noise.accel_density *= std::sqrt(model_error_scale_.value());
+  return noise;
+}
+
+NavigationState Estimator::newestState() const {
+  NavigationState state = navigationState(smoother_.newest(), smoother_.newestCovariance({}), imu_);
+  yaw_doubt_.addTo(state);
+  pose_doubt_.addTo(state);
+  health_.widen(state);
+  return state;
+}
+
+}  // namespace rio_t

@@ -1,0 +1,49 @@
+#include "rio_t/odometry/navigation.h"
+
+#include <utility>
+
+namespace rio_t {
+
+Navigation::Navigation(const OdometryOptions& options, const Eigen::Vector3d& g_W)
+    : imu_noise_(options.imu_noise),
+      g_W_(g_W),
+      input_check_(options.max_imu_gap, options.imu_input_check),
+      propagator_(options.imu_noise, g_W) {}
+
+Navigation::Checked Navigation::add(const ImuMeasurement& imu) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ImuMeasurement sample = imu;
+  ImuInputCheck::Verdict verdict = input_check_.check(sample);
+  Checked checked;
+  checked.faults = std::move(verdict.faults);
+  if (verdict.decision == ImuInputCheck::Decision::kRestart) {
+    propagator_ = ImuPropagator(imu_noise_, g_W_);
+    ++clock_restarts_;
+  }
+  checked.clock_restarts = clock_restarts_;
+  if (verdict.decision == ImuInputCheck::Decision::kDrop) return checked;
+  checked.samples = std::move(verdict.bridge);
+  checked.samples.push_back(sample);
+  for (const ImuMeasurement& each : checked.samples) checked.state = propagator_.add(each);
+  return checked;
+}
+
+void Navigation::anchor(const NavigationState& state, bool at_rest, const ImuNoise& noise,
+                        std::uint64_t clock_restarts) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (clock_restarts != clock_restarts_) return;
+  propagator_.setNoise(noise);
+  propagator_.anchor(state, at_rest);
+}
+
+std::optional<NavigationState> Navigation::state() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return propagator_.state();
+}
+
+MeasuredImuNoise Navigation::imuNoise() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return input_check_.noise();
+}
+
+}  // namespace rio_t

@@ -1,0 +1,31 @@
+#include "rio_t/sensors/innovation_gate.h"
+
+#include <cmath>
+
+namespace rio_t {
+namespace {
+
+constexpr double kUnanimousTime = 0.5;  // [s] of scans that are unanimous: one may be chance
+
+}  // namespace
+
+bool InnovationGate::rejects(const Innovation& innovation, bool is_unanimous, bool tilt_is_known) {
+  const double gate = options_.innovation_gate;
+  const Time stamp = innovation.stamp;
+  if (gate == 0.0 || innovation.widened(options_.innovation_model_error).squaredSigmas() <= gate * gate)
+    return false;
+  if (!tilt_is_known || std::abs(stamp - last_used_) > options_.innovation_gate_timeout) return false;
+  if (!is_unanimous) {
+    unanimous_since_.reset();
+  } else if (!unanimous_since_) {
+    unanimous_since_ = stamp;
+  }
+  return !unanimous_since_ || std::abs(stamp - *unanimous_since_) < kUnanimousTime;
+}
+
+void InnovationGate::used(Time stamp) {
+  last_used_ = stamp;
+  unanimous_since_.reset();
+}
+
+}  // namespace rio_t

@@ -1,0 +1,133 @@
+#include "rio_t/sensors/radar_channel.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace rio_t {
+namespace {
+
+/// Where roll and pitch are known no better [rad], the prediction is not linear in them, and its covariance
+/// too small to reject anything by.
+constexpr double kMaxTiltSigma = 0.1;
+
+/// How many of `some` are not in `others`; both ascend.
+std::size_t countOthers(const std::vector<std::size_t>& some, const std::vector<std::size_t>& others) {
+  return static_cast<std::size_t>(std::count_if(some.begin(), some.end(), [&](std::size_t index) {
+    return !std::binary_search(others.begin(), others.end(), index);
+  }));
+}
+
+VelocityPrior zeroVelocity(double sigma) { return {Eigen::Vector3d::Zero(), sigma * sigma * Eigen::Matrix3d::Identity()}; }
+
+}  // namespace
+
+RadarChannel::RadarChannel(const RadarChannelOptions& options, const Eigen::Vector3d& g_W, const ImuBuffer& imu)
+    : options_(options),
+      estimator_(options.ego_velocity),
+      in_window_(options.smoother, options.T_IR, g_W, imu),
+      feasibility_(options.feasibility),
+      step_detector_(options.offset_step_detector),
+      offset_uncertainty_(options.smoother.huber_threshold),
+      gate_(options.smoother) {}
+
+void RadarChannel::start(FixedLagSmoother& smoother, Time time, const NodePrior& prior) {
+  rio_t::start(smoother, in_window_, time, prior);
+  step_detector_ = OffsetStepDetector(options_.offset_step_detector);
+  offset_uncertainty_ = OffsetUncertainty(options_.smoother.huber_threshold);
+  feasibility_ = FeasibilityCheck(options_.feasibility);
+  gate_.used(time);
+}
+
+RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context, FixedLagSmoother& smoother) {
+  RadarAnswer answer;
+  const auto reject = [&](const std::string& reason) {
+    answer.rejected_because = reason;
+    return answer;
+  };
+  const std::optional<RadarVelocityPrediction> prediction = in_window_.predict(smoother, scan.stamp);
+  std::optional<VelocityPrior> prior;
+  if (prediction) prior = prediction->velocity;
+  if (context.at_rest) prior = zeroVelocity(options_.rest_velocity_sigma);
+
+  EgoVelocity& measured = answer.ego_velocity;
+  measured = measure(scan, context.has_diverged ? std::nullopt : prior, context.model_error_scale);
+  answer.was_predicted = prior.has_value();
+  if (prior) judge(scan, *prior, context.model_error_scale, answer);
+  if (!isValid(measured.status)) return reject(toString(measured.status));
+  if (!feasibility_.accept(scan.stamp, measured.v_R)) return reject("infeasible_velocity");
+
+  const bool tilt_is_known = !prediction || prediction->tilt_sigma < kMaxTiltSigma;
+  const bool moving = prediction && !context.at_rest && measured.status == EgoVelocityStatus::kMoving;
+  const bool informs_offset = moving && prediction->informs_offset;
+  // An offset that is wrong by c shows as (J + noise) c; nothing else tells of the noise's part.
+  if (informs_offset) measured.covariance.diagonal().array() += prediction->rate_variance;
+  RadarVelocityMeasurement z{scan.stamp, measured.v_R, measured.covariance, options_.T_IR};
+  if (!informs_offset) z.held_t_O = offset();
+
+  if (prior) {
+    const Innovation now = innovation(scan.stamp, *prior, measured, prediction);
+    // A minority that sides with the prediction has more noise than its covariance says.
+    const bool can_be_judged = moving && tilt_is_known && hasMajority(measured);
+    if (can_be_judged && informs_offset && options_.smoother.estimate_time_offset && step_detector_.stepped(now)) {
+      in_window_.stepOffset(smoother.window(), scan.stamp);
+      offset_uncertainty_.offsetStepped();
+      answer.offset_stepped = true;
+    }
+    if (gate_.rejects(now, isUnanimous(measured), tilt_is_known)) return reject("innovation");
+    if (can_be_judged) {
+      if (informs_offset) offset_uncertainty_.add(now);
+      answer.used = now;
+      answer.prediction_covariance = prior->covariance;
+    }
+  }
+  const RadarInWindow::AddResult added = in_window_.add(smoother, z);
+  if (added != RadarInWindow::AddResult::kAdded) return reject(toString(added));
+  gate_.used(scan.stamp);
+  if (!context.at_rest) estimator_.learn(scan, measured);
+  return answer;
+}
+
+EgoVelocity RadarChannel::measure(const RadarScan& scan, const std::optional<VelocityPrior>& prior,
+                                  double scale) const {
+  EgoVelocity measured = estimator_.estimate(scan, prior);
+  measured.covariance.diagonal() += (scale - 1.0) * measured.told_variance;
+  measured.told_variance *= scale;
+  return measured;
+}
+
+Innovation RadarChannel::innovation(Time stamp, const VelocityPrior& prior, const EgoVelocity& measured,
+                                    const std::optional<RadarVelocityPrediction>& prediction) const {
+  Innovation result;
+  result.stamp = stamp;
+  result.d = measured.v_R - prior.v_R;
+  result.S = prior.covariance + measured.covariance;
+  if (!prediction) return result;
+  result.S_at_offset = prediction->covariance_at_offset + measured.covariance;
+  result.J_O = prediction->dv_dt_O;
+  return result;
+}
+
+void RadarChannel::judge(const RadarScan& scan, const VelocityPrior& prior, double scale,
+                         RadarAnswer& answer) const {
+  const EgoVelocity& measured = answer.ego_velocity;
+  // Where few points agree, they may be those that side with a wrong prediction. The scan is asked again without it.
+  const EgoVelocity alone = hasMajority(measured) ? measured : measure(scan, std::nullopt, scale);
+  if (!hasMajority(alone)) return;
+  // A crowd may outnumber the static world. What then sides with the prediction alone is its witness: noise
+  // does not give so many of them.
+  const bool is_outvoted = countOthers(measured.inliers, alone.inliers) >= options_.ego_velocity.min_inliers;
+  if (is_outvoted && !isValid(measured.status)) return;
+  if (!is_outvoted) answer.alone = alone;
+  answer.judged = innovation(scan.stamp, prior, is_outvoted ? measured : alone, std::nullopt)
+                      .widened(options_.smoother.innovation_model_error);
+}
+
+double RadarChannel::offsetSigma(double variance) const {
+  return options_.smoother.estimate_time_offset ? offset_uncertainty_.sigma(variance) : 0.0;
+}
+
+FixedLagSmoother::RandomWalk RadarChannel::offsetWalk() const {
+  return {&offsetBlock(), std::hypot(options_.smoother.time_offset_noise, offset_uncertainty_.walk())};
+}
+
+}  // namespace rio_t

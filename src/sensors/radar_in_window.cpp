@@ -1,0 +1,117 @@
+#include "rio_t/sensors/radar_in_window.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "rio_t/factors/constant_offset_factor.h"
+#include "rio_t/factors/offset_derivative.h"
+
+namespace rio_t {
+
+RadarInWindow::RadarInWindow(const SmootherOptions& options, const Extrinsics& T_IR, const Eigen::Vector3d& g_W,
+                             const ImuBuffer& imu)
+    : options_(options),
+      T_IR_(T_IR),
+      model_{options.time_offset_model, options.max_time_offset, g_W, &imu},
+      manifold_(std::make_shared<ScalarManifold>()) {
+  if (options.huber_threshold > 0.0) loss_ = std::make_shared<ceres::HuberLoss>(options.huber_threshold);
+}
+
+Block& RadarInWindow::start(Window& window, double t_O) {
+  stamps_.clear();
+  epochs_ = {{Time(), addOffset(window, t_O)}};
+  return *epochs_.back().block;
+}
+
+std::shared_ptr<Block> RadarInWindow::addOffset(Window& window, double t_O) const {
+  std::shared_ptr<Block> block = window.addCalibration(manifold_, Eigen::VectorXd::Constant(1, t_O));
+  block->bound = options_.max_time_offset;
+  if (!options_.estimate_time_offset) window.setConstant(*block, true);
+  return block;
+}
+
+Time RadarInWindow::nodeTime(Time stamp) const {
+  return options_.time_offset_model == TimeOffsetModel::kImu ? stamp - offset() : stamp;
+}
+
+std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoother& smoother, Time stamp) const {
+  const Time time = nodeTime(stamp);
+  const std::optional<PredictedState> state = smoother.predict(time, {&offsetBlock()});
+  if (!state) return std::nullopt;
+  const Eigen::Matrix3d R_RI = T_IR_.R_RI();
+  const RadarMotion motion = model_.at(state->x.data(), time, stamp, offset(), T_IR_.l_I);
+  Eigen::Matrix<double, 3, kNodeTangent> J;
+  J << motion.J_state.leftCols<3>(), motion.J_state.rightCols<StateBlock::kTangent - 3>(), motion.dv_dt_O;
+  J = (R_RI * J).eval();
+  const NodeMatrix P = state->covariance;
+  constexpr int kOffset = StateBlock::kTangent;
+
+  RadarVelocityPrediction prediction;
+  prediction.t_O = offset();
+  prediction.velocity.v_R = R_RI * motion.v_I;
+  prediction.dv_dt_O = J.col(kOffset);
+  if (!options_.estimate_time_offset) J.col(kOffset).setZero();
+  prediction.velocity.covariance = J * P * J.transpose();
+  const auto J_state = J.leftCols<kOffset>();
+  prediction.covariance_at_offset = J_state * P.topLeftCorner<kOffset, kOffset>() * J_state.transpose();
+  const VelocityRate rate = velocityRate(*model_.imu, time, state->x, model_.g_W, T_IR_.l_I);
+  prediction.informs_offset = rate.informsOffset(options_.time_offset_min_acceleration);
+  if (options_.estimate_time_offset) prediction.rate_variance = rate.variance * P(kOffset, kOffset);
+  const Eigen::Matrix<double, 2, 3> horizontal = state->x.q_WI().toRotationMatrix().topRows<2>();
+  const Eigen::Matrix2d tilt =
+      horizontal * P.block<3, 3>(StateBlock::kTheta, StateBlock::kTheta) * horizontal.transpose();
+  prediction.tilt_sigma = std::sqrt(tilt.diagonal().maxCoeff());
+  return prediction;
+}
+
+RadarInWindow::AddResult RadarInWindow::add(FixedLagSmoother& smoother, const RadarVelocityMeasurement& z) {
+  const Time oldest = smoother.node(0).time - 2.0 * options_.max_time_offset;
+  stamps_.erase(std::remove_if(stamps_.begin(), stamps_.end(), [&](Time stamp) { return stamp < oldest; }),
+                stamps_.end());
+  if (std::find(stamps_.begin(), stamps_.end(), z.stamp) != stamps_.end()) return AddResult::kDuplicateStamp;
+  Block* node = smoother.nodeAt(nodeTime(z.stamp));
+  if (node == nullptr) return AddResult::kOlderThanWindow;
+  stamps_.push_back(z.stamp);
+  smoother.window().add(std::make_unique<RadarVelocityFactor>(z, *node->time, model_),
+                        {node, &offsetOf(smoother.window(), z.stamp)}, loss_);
+  return AddResult::kAdded;
+}
+
+Block& RadarInWindow::offsetOf(Window& window, Time stamp) {
+  const auto is_gone = [&](const Epoch& epoch) { return !window.has(*epoch.block); };
+  epochs_.erase(std::remove_if(epochs_.begin(), epochs_.end() - 1, is_gone), epochs_.end() - 1);
+  auto epoch = epochs_.end() - 1;
+  while (epoch != epochs_.begin() && stamp < epoch->since) --epoch;
+  return *epoch->block;
+}
+
+void RadarInWindow::stepOffset(Window& window, Time stamp) {
+  if (!options_.estimate_time_offset) return;
+  Block& before = *epochs_.back().block;
+  std::shared_ptr<Block> after = addOffset(window, offset());
+  window.add(std::make_unique<ConstantOffsetFactor>(options_.time_offset_sigma), {&before, after.get()});
+  before.is_retired = true;
+  epochs_.push_back({stamp, std::move(after)});
+}
+
+std::string toString(RadarInWindow::AddResult result) {
+  switch (result) {
+    case RadarInWindow::AddResult::kAdded:
+      return "";
+    case RadarInWindow::AddResult::kOlderThanWindow:
+      return "older_than_window";
+    case RadarInWindow::AddResult::kDuplicateStamp:
+      return "duplicate_stamp";
+  }
+  return "";
+}
+
+void start(FixedLagSmoother& smoother, RadarInWindow& radar, Time time, const NodePrior& prior) {
+  Block& state = smoother.start(time, prior.x0);
+  Block& offset = radar.start(smoother.window(), prior.t_O0);
+  addPrior(smoother.window(), {&state, &offset}, {prior.J, prior.r0});
+  smoother.settle();
+}
+
+}  // namespace rio_t
