@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "rio_t/evaluation/trajectory.h"
+#include "rio_t/ros/cloud/point_cloud.h"
 #include "rio_t/ros/messages/conversions.h"
 #include "rio_t/ros/parameters/ros_parameters.h"
 

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "rio_t/TimeOffset.h"
+#include "rio_t/ros/cloud/point_cloud.h"
 #include "rio_t/ros/messages/conversions.h"
 
 namespace rio_t {

@@ -12,7 +12,7 @@
 #include "rio_t/odometry/navigation_state.h"
 #include "rio_t/odometry/options.h"
 #include "rio_t/radar/ego_velocity.h"
-#include "rio_t/ros/cloud/point_cloud.h"
+#include "rio_t/ros/parameters/point_cloud_format.h"
 
 namespace rio_t {
 

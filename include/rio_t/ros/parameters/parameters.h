@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "rio_t/odometry/options.h"
-#include "rio_t/ros/cloud/point_cloud.h"
 #include "rio_t/ros/parameters/parameter_value.h"
+#include "rio_t/ros/parameters/point_cloud_format.h"
 
 namespace rio_t {
 
