@@ -2,6 +2,7 @@
 
 #include <geometry_msgs/PoseStamped.h>
 #include <rosbag/view.h>
+#include <tf2_eigen/tf2_eigen.h>
 
 #include <filesystem>
 
@@ -81,11 +82,13 @@ Trajectory readPoses(const rosbag::Bag& bag, const std::string& topic) {
   rosbag::View view(bag, rosbag::TopicQuery(topic));
   for (const rosbag::MessageInstance& instance : view) {
     const auto message = read<geometry_msgs::PoseStamped>(instance);
-    const auto& p = message->pose.position;
-    const auto& q = message->pose.orientation;
-    const Time time = toTime(message->header.stamp);
-    if (!truth.empty() && time <= truth.back().time) continue;
-    truth.push_back({time, {p.x, p.y, p.z}, Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized()});
+    StampedPose pose;
+    pose.time = toTime(message->header.stamp);
+    if (!truth.empty() && pose.time <= truth.back().time) continue;
+    tf2::fromMsg(message->pose.position, pose.p_W);
+    tf2::fromMsg(message->pose.orientation, pose.q_WI);
+    pose.q_WI.normalize();
+    truth.push_back(pose);
   }
   return truth;
 }

@@ -6,6 +6,7 @@
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <std_msgs/Header.h>
+#include <tf2_eigen/tf2_eigen.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +15,8 @@
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "rio_t/ros/messages/conversions.h"
 
 namespace rio_t {
 namespace {
@@ -77,34 +80,21 @@ Layout layoutOf(BagFormat format) {
       irsValues};
 }
 
-ros::Time toRos(Time time) {
-  ros::Time t;
-  t.fromNSec(static_cast<std::uint64_t>(time.nanoseconds()));
-  return t;
-}
-
-template <typename Vector>
-void assign(const Eigen::Vector3d& from, Vector& to) {
-  to.x = from.x();
-  to.y = from.y();
-  to.z = from.z();
-}
-
 sensor_msgs::Imu imuMessage(const ImuMeasurement& sample, std::uint32_t seq, const Layout& layout) {
   sensor_msgs::Imu message;
   message.header.seq = seq;
-  message.header.stamp = toRos(sample.time);
+  message.header.stamp = toRosTime(sample.time);
   message.header.frame_id = "base_link";
   message.orientation_covariance[0] = layout.orientation_covariance;
-  assign(sample.angular_velocity, message.angular_velocity);
-  assign(sample.acceleration, message.linear_acceleration);
+  tf2::toMsg(sample.angular_velocity, message.angular_velocity);
+  tf2::toMsg(sample.acceleration, message.linear_acceleration);
   return message;
 }
 
 std_msgs::Header triggerMessage(const SimulatedScan& scan, const Layout& layout) {
   std_msgs::Header message;
   message.seq = scan.seq;
-  message.stamp = toRos(scan.stamp);
+  message.stamp = toRosTime(scan.stamp);
   message.frame_id = layout.trigger_frame;
   return message;
 }
@@ -112,7 +102,7 @@ std_msgs::Header triggerMessage(const SimulatedScan& scan, const Layout& layout)
 sensor_msgs::PointCloud2 scanMessage(const SimulatedScan& scan, const Layout& layout) {
   sensor_msgs::PointCloud2 message;
   message.header.seq = scan.seq;
-  if (layout.scan_stamped) message.header.stamp = toRos(scan.stamp);
+  if (layout.scan_stamped) message.header.stamp = toRosTime(scan.stamp);
   message.header.frame_id = layout.scan_frame;
   message.height = 1;
   message.width = static_cast<std::uint32_t>(scan.points.size());
@@ -143,23 +133,20 @@ sensor_msgs::PointCloud2 scanMessage(const SimulatedScan& scan, const Layout& la
 geometry_msgs::PoseStamped poseMessage(const simulation::MotionState& state, Time time, std::uint32_t seq) {
   geometry_msgs::PoseStamped message;
   message.header.seq = seq;
-  message.header.stamp = toRos(time);
+  message.header.stamp = toRosTime(time);
   message.header.frame_id = "world";
-  assign(state.p_W, message.pose.position);
-  message.pose.orientation.w = state.q_WI.w();
-  message.pose.orientation.x = state.q_WI.x();
-  message.pose.orientation.y = state.q_WI.y();
-  message.pose.orientation.z = state.q_WI.z();
+  message.pose.position = tf2::toMsg(state.p_W);
+  message.pose.orientation = tf2::toMsg(state.q_WI);
   return message;
 }
 
 geometry_msgs::TwistStamped twistMessage(const simulation::MotionState& state, Time time, std::uint32_t seq) {
   geometry_msgs::TwistStamped message;
   message.header.seq = seq;
-  message.header.stamp = toRos(time);
+  message.header.stamp = toRosTime(time);
   message.header.frame_id = "world";
-  assign(state.v_W, message.twist.linear);
-  assign(state.q_WI * state.omega_I, message.twist.angular);
+  tf2::toMsg(state.v_W, message.twist.linear);
+  tf2::toMsg(state.q_WI * state.omega_I, message.twist.angular);
   return message;
 }
 
@@ -205,7 +192,7 @@ void writeSimulationBag(const std::string& path, const simulation::Motion& motio
   try {
     rosbag::Bag bag(path, rosbag::bagmode::Write);
     for (const Arrival& arrival : arrivals(data, truth_times, options)) {
-      const ros::Time record = toRos(arrival.time + options.record_offset);
+      const ros::Time record = toRosTime(arrival.time + options.record_offset);
       const auto seq = static_cast<std::uint32_t>(arrival.index);
       switch (arrival.kind) {
         case Kind::kTruth: {

@@ -1,5 +1,7 @@
 #include "rio_t/ros/messages/conversions.h"
 
+#include <tf2_eigen/tf2_eigen.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,20 +14,6 @@ namespace rio_t {
 namespace {
 
 using S = StateBlock;
-
-template <typename Vector>
-void assign(const Eigen::Vector3d& from, Vector* to) {
-  to->x = from.x();
-  to->y = from.y();
-  to->z = from.z();
-}
-
-void assign(const Eigen::Quaterniond& from, geometry_msgs::Quaternion* to) {
-  to->x = from.x();
-  to->y = from.y();
-  to->z = from.z();
-  to->w = from.w();
-}
 
 template <typename Array>
 void assign(const Covariance6& from, Array* to) {
@@ -50,10 +38,8 @@ ImuMeasurement toImuMeasurement(const sensor_msgs::Imu& message, const std::stri
   ImuMeasurement imu;
   imu.time = toTime(message.header.stamp);
   if (imu.time == Time()) throw std::runtime_error("topic " + topic + ": the stamp in the header is zero");
-  const auto& rate = message.angular_velocity;
-  const auto& acceleration = message.linear_acceleration;
-  imu.angular_velocity = {rate.x, rate.y, rate.z};
-  imu.acceleration = {acceleration.x, acceleration.y, acceleration.z};
+  tf2::fromMsg(message.angular_velocity, imu.angular_velocity);
+  tf2::fromMsg(message.linear_acceleration, imu.acceleration);
   return imu;
 }
 
@@ -81,11 +67,11 @@ nav_msgs::Odometry toOdometry(const NavigationState& state, double rate_sigma, c
   message.header.stamp = toRosTime(state.time);
   message.header.frame_id = odom_frame;
   message.child_frame_id = base_link_frame;
-  assign(state.p_W, &message.pose.pose.position);
-  assign(state.q_WI, &message.pose.pose.orientation);
+  message.pose.pose.position = tf2::toMsg(state.p_W);
+  message.pose.pose.orientation = tf2::toMsg(state.q_WI);
   assign(poseCovariance(state), &message.pose.covariance);
-  assign(state.q_WI.conjugate() * state.v_W, &message.twist.twist.linear);
-  assign(state.angular_velocity, &message.twist.twist.angular);
+  tf2::toMsg(state.q_WI.conjugate() * state.v_W, message.twist.twist.linear);
+  tf2::toMsg(state.angular_velocity, message.twist.twist.angular);
   assign(twistCovariance(state, rate_sigma), &message.twist.covariance);
   return message;
 }
@@ -97,8 +83,8 @@ geometry_msgs::TransformStamped toTransform(const NavigationState& state, const 
   transform.header.frame_id = inverted ? base_link_frame : odom_frame;
   transform.child_frame_id = inverted ? odom_frame : base_link_frame;
   const Eigen::Quaterniond q = inverted ? state.q_WI.conjugate() : state.q_WI;
-  assign(inverted ? Eigen::Vector3d(-(q * state.p_W)) : state.p_W, &transform.transform.translation);
-  assign(q, &transform.transform.rotation);
+  tf2::toMsg(inverted ? Eigen::Vector3d(-(q * state.p_W)) : state.p_W, transform.transform.translation);
+  transform.transform.rotation = tf2::toMsg(q);
   return transform;
 }
 
@@ -107,7 +93,7 @@ geometry_msgs::TwistWithCovarianceStamped toTwist(const EgoVelocity& ego_velocit
   geometry_msgs::TwistWithCovarianceStamped message;
   message.header.stamp = toRosTime(stamp);
   message.header.frame_id = radar_frame;
-  assign(ego_velocity.v_R, &message.twist.twist.linear);
+  tf2::toMsg(ego_velocity.v_R, message.twist.twist.linear);
   Covariance6 covariance = -Covariance6::Identity();
   covariance.topLeftCorner<3, 3>() = ego_velocity.covariance;
   assign(covariance, &message.twist.covariance);
@@ -133,11 +119,11 @@ Extrinsics toExtrinsics(const geometry_msgs::Transform& T_base_cloud, PointAxes 
   const Eigen::Quaterniond q_cloud_R = axes == PointAxes::kForwardLeftUp
                                            ? Eigen::Quaterniond(std::sqrt(0.5), 0.0, 0.0, -std::sqrt(0.5))
                                            : Eigen::Quaterniond::Identity();
-  const auto& l = T_base_cloud.translation;
-  const auto& q = T_base_cloud.rotation;
+  Eigen::Quaterniond q_base_cloud;
+  tf2::fromMsg(T_base_cloud.rotation, q_base_cloud);
   Extrinsics T_IR;
-  T_IR.l_I = {l.x, l.y, l.z};
-  T_IR.q_IR = (Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized() * q_cloud_R).normalized();
+  tf2::fromMsg(T_base_cloud.translation, T_IR.l_I);
+  T_IR.q_IR = (q_base_cloud.normalized() * q_cloud_R).normalized();
   return T_IR;
 }
 
@@ -146,8 +132,8 @@ geometry_msgs::TransformStamped toTransform(const Extrinsics& T_IR, const std::s
   geometry_msgs::TransformStamped transform;
   transform.header.frame_id = base_link_frame;
   transform.child_frame_id = radar_frame;
-  assign(T_IR.l_I, &transform.transform.translation);
-  assign(T_IR.q_IR, &transform.transform.rotation);
+  tf2::toMsg(T_IR.l_I, transform.transform.translation);
+  transform.transform.rotation = tf2::toMsg(T_IR.q_IR);
   return transform;
 }
 
