@@ -1,5 +1,7 @@
 #include "rio_t/ros/bag/run_output.h"
 
+#include <yaml-cpp/yaml.h>
+
 #include <cerrno>
 #include <cmath>
 #include <filesystem>
@@ -40,72 +42,65 @@ std::string fixedText(double value, int decimals) {
   return text;
 }
 
-std::string mapText(const std::map<std::string, std::uint64_t>& counts) {
-  std::string text = "{";
-  for (const auto& [name, count] : counts)
-    text += (text.size() > 1 ? ", " : "") + name + ": " + std::to_string(count);
-  return text + "}";
-}
-
-std::string listText(const std::vector<double>& values, int decimals) {
-  std::string text = "[";
-  for (const double value : values) text += (text.size() > 1 ? ", " : "") + fixedText(value, decimals);
-  return text + "]";
-}
-
-/// Standard deviations [m/s, rad, rad].
-std::string noiseText(const PointVariances& noise) {
-  return "{doppler: " + fixedText(std::sqrt(noise.doppler), 4) +
-         ", azimuth: " + fixedText(std::sqrt(noise.azimuth), 4) +
-         ", elevation: " + fixedText(std::sqrt(noise.elevation), 4) + "}";
+std::vector<std::string> fixedTexts(const std::vector<double>& values, int decimals) {
+  std::vector<std::string> texts;
+  texts.reserve(values.size());
+  for (const double value : values) texts.push_back(fixedText(value, decimals));
+  return texts;
 }
 
 std::string summaryText(const RunSummary& summary) {
-  std::string yaml;
-  const auto line = [&](const char* key, const std::string& value) {
-    yaml += std::string(key) + ": " + value + "\n";
+  YAML::Emitter yaml;
+  const auto line = [&](const char* key, const auto& value) {
+    yaml << YAML::Key << key << YAML::Value << YAML::Flow << value;
   };
+  yaml << YAML::BeginMap;
   line("mode", summary.mode);
-  line("imu_count", std::to_string(summary.imu_count));
-  line("scans_total", std::to_string(summary.scans_total));
-  line("scans_used", std::to_string(summary.scans_used));
-  line("scans_rejected", mapText(summary.scans_rejected));
-  line("input_faults", mapText(summary.input_faults));
-  line("solver_terminations", mapText(summary.solver_terminations));
+  line("imu_count", summary.imu_count);
+  line("scans_total", summary.scans_total);
+  line("scans_used", summary.scans_used);
+  line("scans_rejected", summary.scans_rejected);
+  line("input_faults", summary.input_faults);
+  line("solver_terminations", summary.solver_terminations);
   line("initialized_from", summary.initialized_from.empty() ? "none" : summary.initialized_from);
   line("health_at_end", summary.health_at_end);
-  line("divergences", std::to_string(summary.divergences));
-  line("reinitializations", std::to_string(summary.reinitializations));
+  line("divergences", summary.divergences);
+  line("reinitializations", summary.reinitializations);
   line("path_length_m", fixedText(summary.path_length_m, 6));
   line("end_to_start_2d_m", fixedText(summary.end_to_start_2d_m, 6));
   line("end_to_start_3d_m", fixedText(summary.end_to_start_3d_m, 6));
   line("final_offset_s", fixedText(summary.final_offset_s, 9));
   line("final_offset_sigma_s", fixedText(summary.final_offset_sigma_s, 9));
-  line("imu_noise", "{accel: " + fixedText(summary.imu_noise.accel_density, 6) +
-                        ", gyro: " + fixedText(summary.imu_noise.gyro_density, 6) + "}");
-  line("radar_noise", noiseText(summary.radar_noise));
+  line("imu_noise", YAML::BeginMap);
+  line("accel", fixedText(summary.imu_noise.accel_density, 6));
+  line("gyro", fixedText(summary.imu_noise.gyro_density, 6));
+  yaml << YAML::EndMap;
+  line("radar_noise", YAML::BeginMap);  // standard deviations [m/s, rad, rad]
+  line("doppler", fixedText(std::sqrt(summary.radar_noise.doppler), 4));
+  line("azimuth", fixedText(std::sqrt(summary.radar_noise.azimuth), 4));
+  line("elevation", fixedText(std::sqrt(summary.radar_noise.elevation), 4));
+  yaml << YAML::EndMap;
   if (!summary.pass_offsets_s.empty()) {
-    line("pass_offsets_s", listText(summary.pass_offsets_s, 9));
-    line("pass_offset_sigmas_s", listText(summary.pass_offset_sigmas_s, 9));
+    line("pass_offsets_s", fixedTexts(summary.pass_offsets_s, 9));
+    line("pass_offset_sigmas_s", fixedTexts(summary.pass_offset_sigmas_s, 9));
   }
   if (summary.batch) {
-    line("batch_iterations", std::to_string(summary.batch->iterations));
-    line("batch_placements", std::to_string(summary.batch->placements));
-    line("batch_converged", summary.batch->converged ? "true" : "false");
-    line("scans_readmitted", std::to_string(summary.batch->scans_readmitted));
+    line("batch_iterations", summary.batch->iterations);
+    line("batch_placements", summary.batch->placements);
+    line("batch_converged", summary.batch->converged);
+    line("scans_readmitted", summary.batch->scans_readmitted);
   }
   if (summary.truth) {
     line("ate_m", fixedText(summary.truth->ate_m, 9));
     if (summary.truth->t_rel) line("t_rel", fixedText(*summary.truth->t_rel, 9));
     if (summary.truth->r_rel_deg) line("r_rel_deg", fixedText(*summary.truth->r_rel_deg, 9));
   }
-  std::string saved;
-  for (const std::string& name : RunOutput::fileNames()) saved += (saved.empty() ? "[" : ", ") + name;
-  line("saved", saved + "]");
+  line("saved", RunOutput::fileNames());
   // All above is the same in every run; these are not.
   line("estimation_seconds", fixedText(summary.estimation_seconds, 6));
   line("realtime_factor", fixedText(summary.realtime_factor, 3));
-  return yaml;
+  yaml << YAML::EndMap;
+  return std::string(yaml.c_str()) + "\n";
 }
 
 }  // namespace
