@@ -1,8 +1,11 @@
 #include "rio_t/ros/cloud/point_cloud.h"
 
+#include <sensor_msgs/point_cloud2_iterator.h>
+
 #include <algorithm>
 #include <array>
 #include <boost/algorithm/string/join.hpp>
+#include <boost/endian/conversion.hpp>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -158,12 +161,7 @@ class FieldReader {
   std::uint8_t datatype_ = 0;
 };
 
-bool hostIsBigEndian() {
-  const std::uint16_t one = 1;
-  std::uint8_t first = 0;
-  std::memcpy(&first, &one, 1);
-  return first == 0;
-}
+constexpr bool kHostIsBigEndian = boost::endian::order::native == boost::endian::order::big;
 
 /// Where the points lie, in numbers that have been checked against the data.
 struct Layout {
@@ -171,7 +169,7 @@ struct Layout {
 };
 
 Layout checkedLayout(const PointCloud2& message, const PointCloudFormat& format) {
-  if ((message.is_bigendian != 0) != hostIsBigEndian())
+  if ((message.is_bigendian != 0) != kHostIsBigEndian)
     throwLayout(message, "the byte order is not this machine's");
   if (message.point_step == 0) throwLayout(message, "point_step is zero");
   Layout layout;
@@ -296,24 +294,15 @@ RadarScan toRadarScan(const pcl::PointCloud<RadarPointPcl>& cloud, Time stamp) {
 }
 
 PointCloud2 toPointCloud2(const RadarScan& scan, const std::vector<std::size_t>& indices) {
-  constexpr std::size_t kFields = 5;
-  const char* const names[kFields] = {"x", "y", "z", "doppler", "snr_db"};
+  constexpr int kFields = 5;
+  constexpr int kFloat = PointField::FLOAT32;
   PointCloud2 message;
-  message.height = 1;
-  message.width = static_cast<std::uint32_t>(indices.size());
-  message.point_step = kFields * sizeof(float);
-  message.row_step = message.width * message.point_step;
-  message.is_bigendian = hostIsBigEndian() ? 1 : 0;
+  sensor_msgs::PointCloud2Modifier modifier(message);
+  modifier.setPointCloud2Fields(kFields, "x", 1, kFloat, "y", 1, kFloat, "z", 1, kFloat, "doppler", 1, kFloat,
+                                "snr_db", 1, kFloat);
+  modifier.resize(indices.size());
+  message.is_bigendian = kHostIsBigEndian ? 1 : 0;
   message.is_dense = 1;
-  for (std::size_t i = 0; i < kFields; ++i) {
-    PointField field;
-    field.name = names[i];
-    field.offset = static_cast<std::uint32_t>(i * sizeof(float));
-    field.datatype = PointField::FLOAT32;
-    field.count = 1;
-    message.fields.push_back(field);
-  }
-  message.data.resize(indices.size() * message.point_step);
   std::size_t at = 0;
   for (const std::size_t index : indices) {
     const RadarPoint& p = scan.points.at(index);
