@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "count_allocations.h"
-#include "rio_t/ros/bag_runner.h"
+#include "rio_t/ros/bag/bag_runner.h"
 #include "stage_clock.h"
 
 namespace {

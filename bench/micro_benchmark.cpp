@@ -8,7 +8,7 @@
 #include "rio_t/imu/preintegration.h"
 #include "rio_t/odometry/imu_propagator.h"
 #include "rio_t/odometry/options.h"
-#include "rio_t/ros/point_cloud.h"
+#include "rio_t/ros/cloud/point_cloud.h"
 #include "rio_t/simulation/motions.h"
 #include "rio_t/simulation/simulation.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"

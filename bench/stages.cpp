@@ -9,8 +9,8 @@
 
 #include "rio_t/odometry/imu_propagator.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
-#include "rio_t/ros/point_cloud.h"
-#include "rio_t/ros/run_output.h"
+#include "rio_t/ros/bag/run_output.h"
+#include "rio_t/ros/cloud/point_cloud.h"
 #include "rio_t/smoother/chain.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
 #include "stage_clock.h"

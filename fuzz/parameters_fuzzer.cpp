@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "rio_t/odometry/radar_inertial_odometry.h"
-#include "rio_t/ros/parameters.h"
+#include "rio_t/ros/parameters/parameters.h"
 
 namespace {
 

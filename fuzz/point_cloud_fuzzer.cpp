@@ -8,7 +8,7 @@
 #include <numeric>
 
 #include "rio_t/radar/ego_velocity.h"
-#include "rio_t/ros/point_cloud.h"
+#include "rio_t/ros/cloud/point_cloud.h"
 
 namespace {
 

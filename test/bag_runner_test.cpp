@@ -1,4 +1,4 @@
-#include "rio_t/ros/bag_runner.h"
+#include "rio_t/ros/bag/bag_runner.h"
 
 #include <geometry_msgs/PoseStamped.h>
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "rio_t/ros/bag_tool.h"
+#include "rio_t/ros/bag/bag_tool.h"
 
 namespace rio_t {
 namespace {

@@ -1,4 +1,4 @@
-#include "rio_t/ros/conversions.h"
+#include "rio_t/ros/messages/conversions.h"
 
 #include <gtest/gtest.h>
 

@@ -4,12 +4,12 @@
 #include <atomic>
 #include <thread>
 
-#include "rio_t/ros/bounded_trajectory.h"
-#include "rio_t/ros/current_session.h"
-#include "rio_t/ros/live_monitor.h"
-#include "rio_t/ros/live_session.h"
-#include "rio_t/ros/offset_observability.h"
-#include "rio_t/ros/scan_queue.h"
+#include "rio_t/ros/live/bounded_trajectory.h"
+#include "rio_t/ros/live/current_session.h"
+#include "rio_t/ros/live/monitor.h"
+#include "rio_t/ros/live/offset_observability.h"
+#include "rio_t/ros/live/scan_queue.h"
+#include "rio_t/ros/live/session.h"
 
 namespace rio_t {
 namespace {

@@ -1,4 +1,4 @@
-#include "rio_t/ros/parameters.h"
+#include "rio_t/ros/parameters/parameters.h"
 
 #include <gtest/gtest.h>
 
@@ -357,7 +357,8 @@ std::size_t keysChanging(const std::string& group) {
 TEST(Parameters, EveryMemberOfTheOptionsHasAKey) {
   EXPECT_EQ(keysChanging("Smoother") + keysChanging("Time offset"),
             memberCount<SmootherOptions>() + memberCount<OffsetStepDetectorOptions>() + 1)
-      << "with max_queued_scans; a member of SmootherOptions lacks a key in src/ros/parameter_registry.cpp";
+      << "with max_queued_scans; a member of SmootherOptions lacks a key in "
+         "src/ros/parameters/parameter_registry.cpp";
   EXPECT_EQ(keysChanging("Radar: which points"), memberCount<EgoVelocityOptions>());
   EXPECT_EQ(keysChanging("Radar: jumps"), memberCount<FeasibilityOptions>());
   EXPECT_EQ(keysChanging("Initialisation"),
@@ -370,7 +371,7 @@ TEST(Parameters, EveryMemberOfTheOptionsHasAKey) {
       << "with max_imu_gap, max_radar_gap";
   EXPECT_EQ(keysChanging("T_IR"), memberCount<Extrinsics>() + 1) << "with extrinsics_source";
   EXPECT_EQ(memberCount<OdometryOptions>(), 17u)
-      << "a new member needs keys in src/ros/parameter_registry.cpp";
+      << "a new member needs keys in src/ros/parameters/parameter_registry.cpp";
   EXPECT_EQ(memberCount<PointCloudFormat>() - 1, memberCount<PointCloudOverrides>()) << "all but its name";
 }
 

@@ -1,4 +1,4 @@
-#include "rio_t/ros/point_cloud.h"
+#include "rio_t/ros/cloud/point_cloud.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "rio_t/ros/ros_parameters.h"
+#include "rio_t/ros/parameters/ros_parameters.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "rio_t/ros/simulation_bag.h"
+#include "rio_t/ros/bag/simulation_bag.h"
 
 #include <geometry_msgs/PoseStamped.h>
 #include <geometry_msgs/TwistStamped.h>

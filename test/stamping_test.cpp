@@ -1,4 +1,4 @@
-#include "rio_t/ros/stamping.h"
+#include "rio_t/ros/cloud/stamping.h"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 
 #include <exception>
 
-#include "rio_t/ros/live_odometry.h"
+#include "rio_t/ros/live/live_odometry.h"
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "rio_t");

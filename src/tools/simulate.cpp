@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "rio_t/evaluation/trajectory.h"
-#include "rio_t/ros/simulation_bag.h"
+#include "rio_t/ros/bag/simulation_bag.h"
 #include "rio_t/simulation/motions.h"
 #include "rio_t/simulation/simulation.h"
 

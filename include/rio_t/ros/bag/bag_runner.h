@@ -1,0 +1,27 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "rio_t/ros/bag/run_output.h"
+#include "rio_t/ros/parameters/parameters.h"
+
+namespace rio_t {
+
+struct BagRun {
+  std::string bag;            ///< path
+  std::string output_folder;  ///< made if need be
+  Config config;
+  std::function<void(double)> progress;  ///< share of the bag done, 0 to 1; may be empty
+};
+
+/// Plays a bag through the estimator as fast as it goes, in one thread, so that the same bag gives the same
+/// files. Needs no roscore. Throws std::runtime_error with one line that names the bag, topic, key or file
+/// that is wrong: bag missing or unreadable, topic missing or of another type, cloud not as configured, no
+/// data, never initialised, every scan rejected, output not writable.
+RunSummary runBag(const BagRun& run);
+
+/// A short table for people. `files` is the folder that it names.
+std::string describeRun(const RunSummary& summary, const std::string& files);
+
+}  // namespace rio_t

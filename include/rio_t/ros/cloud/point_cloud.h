@@ -1,0 +1,32 @@
+#pragma once
+
+#include <pcl/point_cloud.h>
+#include <sensor_msgs/PointCloud2.h>
+
+#include <cstddef>
+#include <vector>
+
+#include "rio_t/radar/scan.h"
+#include "rio_t/ros/cloud/radar_point.h"
+#include "rio_t/ros/parameters/point_cloud_format.h"
+
+namespace rio_t {
+
+struct DecodedScan {
+  pcl::PointCloud<RadarPointPcl> cloud;  ///< finite points, RIO axes
+  std::size_t dropped_not_finite = 0;    ///< points with a NaN or an infinity
+};
+
+/// Decodes a cloud. No size in the message is trusted: throws std::runtime_error, with the fields received,
+/// the presets known and the one that fits, where a field is missing or the layout does not hold the points
+/// it declares. Points at range zero are kept: they are finite, and the estimator's min_range removes them.
+DecodedScan decode(const sensor_msgs::PointCloud2& message, const PointCloudFormat& format);
+
+/// For the estimator. `stamp` is the scan's time in the IMU clock.
+RadarScan toRadarScan(const pcl::PointCloud<RadarPointPcl>& cloud, Time stamp);
+
+/// The chosen points (indices into scan.points) as a cloud of fields x y z doppler snr_db, RIO axes, for
+/// display. An index past the end throws std::out_of_range. The header is left to the caller.
+sensor_msgs::PointCloud2 toPointCloud2(const RadarScan& scan, const std::vector<std::size_t>& indices);
+
+}  // namespace rio_t

@@ -1,0 +1,115 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "rio_t/radar/scan.h"
+#include "rio_t/ros/parameters/parameters.h"
+
+namespace rio_t {
+
+/// Carries times of the recording (or receiving) clock over into the IMU clock. A message is recorded after
+/// it was stamped, so the smallest difference seen between the two is the clocks' difference and the shortest
+/// delay of the IMU. The minimum is over the last one to two minutes, so that it follows clocks that drift.
+/// Where the differences stay far above it, or the stamps run back, one of the clocks has jumped, and the
+/// minimum starts anew.
+class ClockMap {
+ public:
+  void add(Time stamp, Time record);
+  /// None before the first sample.
+  std::optional<Time> toImuClock(Time record) const;
+
+ private:
+  static constexpr std::int64_t kNothing = std::numeric_limits<std::int64_t>::max();
+  std::int64_t smallest_ns_ = kNothing;         // record minus stamp, of the current minute
+  std::int64_t smallest_before_ns_ = kNothing;  // of the minute before
+  Time minute_begin_;                           // in the IMU clock
+  int far_above_ = 0;                           // samples in a row
+};
+
+struct StampingOptions {
+  StampSource source = StampSource::kHeader;
+  double shift = 0.0;       ///< [s] added to every stamp
+  std::string radar_topic;  ///< for messages to people, as the next
+  std::string trigger_topic;
+  double max_delay = 0.5;      ///< [s] from a trigger to its scan, both as recorded
+  double max_overtake = 0.05;  ///< [s] that a trigger may be recorded after its scan
+  std::size_t max_held = 50;   ///< scans that may wait
+};
+StampingOptions stampingOptions(const Config& config);
+
+/// Gives scans their stamps in the IMU clock. Knows no ROS node: the live node and the bag runner feed it
+/// what they receive, in the order of receipt. "record" is the time of receipt or recording; it may run on
+/// another clock than the stamps.
+///
+/// header: the stamp of the cloud.
+/// arrival: the time of receipt, carried over by ClockMap.
+/// trigger: the stamp of the scan's trigger, found
+///  - by `seq`, where one trigger with the scan's seq was recorded between `max_delay` before the scan and
+///    `max_overtake` after it;
+///  - else, once it is clear that the two do not count alike, by time: the trigger nearest to the header's
+///    stamp, within half a trigger period; where that stamp is zero, the latest recorded before the scan.
+///  A scan that cannot be decided yet is held, and those after it wait with it, so that order is kept.
+///  One whose trigger never comes is given up and counted; no trigger serves two scans.
+class ScanStamper {
+ public:
+  explicit ScanStamper(StampingOptions options);
+
+  void addImu(Time stamp, Time record);
+  void addTrigger(std::uint32_t seq, Time stamp, Time record);
+  /// `scan.stamp` is not read. Throws std::runtime_error, naming the topic and the other sources, for a zero
+  /// `header_stamp` with stamp_source header; that scan is left out, others may follow.
+  void addScan(std::uint32_t seq, Time header_stamp, Time record, RadarScan scan);
+
+  /// Scans that have their stamp now, in the order of receipt.
+  std::vector<RadarScan> take();
+  /// At the end of the data: decides what is held with what there is.
+  std::vector<RadarScan> finish();
+
+  std::size_t held() const { return held_.size(); }
+  /// Scans given up by reason, in snake case: "trigger_missing", "imu_missing", "too_many_held".
+  const std::map<std::string, std::uint64_t>& givenUp() const { return given_up_; }
+
+ private:
+  struct Trigger {
+    std::uint32_t seq = 0;
+    Time stamp, record;
+    bool used = false;
+  };
+  struct Held {
+    std::uint32_t seq = 0;
+    Time header_stamp, record;
+    RadarScan scan;
+  };
+  enum class Decision { kStamped, kWait, kGiveUp };
+  enum class Counting { kUnknown, kAlike, kUnlike };  // whether triggers and scans share their seq
+
+  std::vector<RadarScan> decide();
+  Decision stampFront(Time* stamp);
+  Decision stampFromTrigger(const Held& scan, Time* stamp);
+  Decision stampFromTriggerTime(const Held& scan, Time* stamp);
+  Trigger* triggerOfSeq(const Held& scan);
+  std::optional<double> triggerPeriod() const;
+  void see(Time record);
+  void giveUp(const std::string& reason);
+
+  const StampingOptions options_;
+  ClockMap clocks_;
+  std::deque<Trigger> triggers_;  // the last ones, oldest first
+  std::deque<Held> held_;         // oldest first
+  std::map<std::string, std::uint64_t> given_up_;
+  std::optional<Time> first_record_;
+  Time now_;  // latest record time seen
+  bool finishing_ = false;
+  Counting counting_ = Counting::kUnknown;
+  std::size_t unmatched_ = 0;  // scans in a row that should have found their seq, and did not
+};
+
+}  // namespace rio_t

@@ -1,0 +1,109 @@
+#pragma once
+
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <ros/callback_queue.h>
+#include <ros/message_event.h>
+#include <ros/node_handle.h>
+#include <ros/spinner.h>
+#include <sensor_msgs/Imu.h>
+#include <sensor_msgs/PointCloud2.h>
+#include <std_msgs/Header.h>
+#include <std_srvs/Empty.h>
+#include <std_srvs/Trigger.h>
+#include <tf2_ros/buffer.h>
+#include <tf2_ros/transform_listener.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "rio_t/ros/live/current_session.h"
+#include "rio_t/ros/live/monitor.h"
+#include "rio_t/ros/live/publisher.h"
+#include "rio_t/ros/live/session.h"
+
+namespace rio_t {
+
+/// The live odometry: what both the nodelet and the node own. Threads and topics only; the estimator is the
+/// same as the bag runner's.
+///
+/// Three threads of its own, so it needs none of the caller's: the IMU thread publishes ~odom and never waits
+/// for the solver; the input thread takes scans, triggers, services and diagnostics; the optimisation thread
+/// solves.
+class LiveOdometry {
+ public:
+  /// `name` is for diagnostics. Throws ConfigError or std::runtime_error for wrong parameters.
+  LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& private_node, const std::string& name);
+  /// Returns when all threads have ended; waits for the solver at most for the scan it is at.
+  ~LiveOdometry();
+  LiveOdometry(const LiveOdometry&) = delete;
+  LiveOdometry& operator=(const LiveOdometry&) = delete;
+
+ private:
+  using Session = CurrentSession::Session;
+  using Speaker = CurrentSession::Speaker;
+  template <typename Message>
+  using Event = ros::MessageEvent<const Message>;
+
+  void subscribe();
+  void onImu(const Event<sensor_msgs::Imu>& event);
+  void onScan(const Event<sensor_msgs::PointCloud2>& event);
+  void onTrigger(const Event<std_msgs::Header>& event);
+  bool onReset(std_srvs::Empty::Request& request, std_srvs::Empty::Response& response);
+  bool onSaveTrajectory(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
+
+  /// Takes T_IR from tf, once it is there; the session starts with it. `cloud_frame`: of the cloud's header.
+  void lookUpExtrinsics(const std::string& cloud_frame);
+  void startSession(const Extrinsics& T_IR);
+  /// When it returns, nothing more is published of what was before. Any thread.
+  /// `at_once`: does not wait for rest first.
+  void reset(const std::string& reason, bool at_once = false);
+  void account(const LiveSession::Stamped& stamped);
+  void wakeSolver();
+  void tellFaults();  ///< what is new among the faults of the input; input thread
+  void tellHealth(const ScanResult& result) const;
+  void solve();  ///< body of the optimisation thread
+
+  const std::string name_;
+  const Config config_;
+  const PointCloudFormat format_;
+  ros::NodeHandle node_, private_node_;
+  ros::CallbackQueue imu_queue_, input_queue_;
+  LiveMonitor monitor_;      // thread-safe
+  LivePublisher publisher_;  // see there
+  std::optional<tf2_ros::Buffer> tf_;
+  std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
+  std::optional<diagnostic_updater::Updater> diagnostics_;  // input thread
+
+  CurrentSession session_;  // thread-safe; null until the extrinsics are known
+
+  std::mutex mutex_;  // guards what follows, held for microseconds
+  std::condition_variable work_to_do_;
+  OdometryOptions options_;  // with the extrinsics that hold
+  bool has_work_ = false;
+  bool stopping_ = false;
+  double rate_sigma_ = 0.0;
+
+  struct Told {
+    std::uint64_t count = 0;
+    std::chrono::steady_clock::time_point at;
+  };
+  std::map<std::string, Told> faults_told_;  // input thread only, as the next
+  std::weak_ptr<LiveSession> faults_of_;     // whose faults these are
+
+  ClockJumpDetector imu_stamps_;    // IMU thread only, as the next
+  std::optional<Time> newest_imu_;  // of the good stamps
+
+  ros::Subscriber imu_subscriber_, scan_subscriber_, trigger_subscriber_;
+  ros::ServiceServer reset_server_, save_server_;
+  ros::WallTimer diagnostics_timer_;
+  std::thread solver_;
+  std::optional<ros::AsyncSpinner> imu_spinner_, input_spinner_;
+};
+
+}  // namespace rio_t

@@ -1,0 +1,117 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "rio_t/odometry/options.h"
+#include "rio_t/ros/parameters/parameter_value.h"
+#include "rio_t/ros/parameters/point_cloud_format.h"
+
+namespace rio_t {
+
+/// Where the stamp of a scan comes from (see stamping.h).
+enum class StampSource {
+  kHeader,   ///< "header": the cloud's own header
+  kTrigger,  ///< "trigger": the trigger message that belongs to the scan
+  kArrival,  ///< "arrival": when the scan arrived, carried over into the IMU clock
+};
+std::string toString(StampSource source);
+
+/// How the bag runner goes through a bag.
+enum class RunMode {
+  kOnline,  ///< "online": as a live user has it
+  kBatch,   ///< "batch": the whole bag solved at once, after an online pass
+  kRefine,  ///< "refine": online passes, each with the offset found before taken off the stamps
+};
+
+/// Where the live node takes T_IR from.
+enum class ExtrinsicsSource {
+  kParameters,  ///< "parameters": extrinsics_translation and extrinsics_rotation_xyzw
+  kTf,          ///< "tf": the transform from the cloud's frame_id to base_link_frame
+};
+
+/// What is changed of the preset `radar_format`. Empty text and a sign of zero leave it as it is.
+struct PointCloudOverrides {
+  std::string coordinates;
+  std::string axes;
+  std::string x, y, z, azimuth, elevation, range;
+  std::string doppler;
+  int doppler_sign = 0;
+  std::string power;
+  std::string power_unit;
+  std::string size;  ///< "declared" or "from_data"
+};
+
+/// All that a user can set: the estimator's options and what surrounds them. Each member has one key, listed
+/// with unit, range and meaning in config/estimator.yaml.
+struct Config {
+  std::string imu_topic = "/sensor_platform/imu";
+  std::string radar_topic = "/sensor_platform/radar/scan";
+  std::string trigger_topic = "/sensor_platform/radar/trigger";
+  std::string ground_truth_topic = "/ground_truth/pose";
+
+  StampSource stamp_source = StampSource::kHeader;
+  double radar_stamp_shift = 0.0;  ///< [s]
+
+  std::string odom_frame = "odom";
+  std::string base_link_frame = "base_link";
+  std::string radar_frame = "radar";
+  bool publish_tf = true;
+  bool invert_tf = false;
+  std::size_t path_max_poses = 2000;
+  std::string trajectory_file = "rio_t_trajectory.txt";
+
+  ExtrinsicsSource extrinsics_source = ExtrinsicsSource::kParameters;
+
+  std::string radar_format = "irs";
+  PointCloudOverrides radar_overrides;
+
+  OdometryOptions odometry;
+
+  RunMode mode = RunMode::kOnline;
+  int refine_passes = 3;
+  int batch_max_iterations = 100;
+  double bag_start = 0.0;     ///< [s]
+  double bag_duration = 0.0;  ///< [s] 0: to the end
+  std::string ground_truth;   ///< TUM file; empty: the topic
+};
+
+/// Layout of the cloud: the preset with the overrides.
+PointCloudFormat pointCloudFormat(const Config& config);
+
+/// All that is wrong in a configuration at once.
+class ConfigError : public std::runtime_error {
+ public:
+  explicit ConfigError(std::vector<std::string> faults);
+  const std::vector<std::string>& faults() const { return faults_; }  ///< one line each
+
+ private:
+  std::vector<std::string> faults_;
+};
+
+/// Defaults with the entries on top; where a key comes twice, the later holds. Throws ConfigError naming
+/// every unknown key, wrong type, value out of range and contradiction, each with its origin and what was
+/// expected.
+Config makeConfig(const ParameterEntries& entries);
+
+/// What is known of a key.
+struct ParameterDescription {
+  std::string key;
+  std::string group;        ///< title of its section in estimator.yaml
+  std::string unit;         ///< empty: none
+  std::string expected;     ///< e.g. "a number above 0, at most 10"
+  std::string description;  ///< one line
+};
+/// Every key once, in the order of estimator.yaml.
+std::vector<ParameterDescription> parameterDescriptions();
+
+/// The configuration as YAML with the description of each key as comments: config/estimator.yaml for a
+/// default-constructed one. Reading it back gives the same configuration.
+std::string toYaml(const Config& config);
+
+/// Path of a configuration: `name_or_path` itself if it is a file, else that name, with or without ".yaml",
+/// in the package's config/. Throws std::runtime_error listing the names there are.
+std::string findConfigFile(const std::string& name_or_path);
+
+}  // namespace rio_t

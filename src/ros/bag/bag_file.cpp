@@ -1,0 +1,96 @@
+#include "bag_file.h"
+
+#include <geometry_msgs/PoseStamped.h>
+#include <rosbag/view.h>
+#include <tf2_eigen/tf2_eigen.h>
+
+#include <filesystem>
+
+#include "rio_t/ros/messages/conversions.h"
+
+namespace rio_t {
+
+std::runtime_error bagError(const std::string& bag, const std::string& what) {
+  return std::runtime_error("bag " + bag + ": " + what);
+}
+
+void openBag(const std::string& path, rosbag::Bag* bag) {
+  namespace fs = std::filesystem;
+  if (!fs::exists(path))
+    throw bagError(
+        path, "no such file" + (fs::path(path).is_absolute() ? "" : " in " + fs::current_path().string()));
+  if (fs::is_directory(path)) throw bagError(path, "this is a folder, expected a .bag file");
+  try {
+    bag->open(path, rosbag::bagmode::Read);
+  } catch (const rosbag::BagUnindexedException&) {
+    throw bagError(path, "not indexed, its recording was cut off; run `rosbag reindex " + path + "` first");
+  } catch (const std::exception& error) {
+    throw bagError(path, std::string("cannot be read as a ROS 1 bag (") + error.what() + ")");
+  }
+}
+
+std::map<std::string, std::string> topicTypes(const rosbag::Bag& bag) {
+  rosbag::View all(bag);
+  std::map<std::string, std::string> types;
+  for (const rosbag::ConnectionInfo* connection : all.getConnections())
+    types[connection->topic] = connection->datatype;
+  return types;
+}
+
+void checkTopics(const std::string& bag, const std::map<std::string, std::string>& types,
+                 const std::vector<Wanted>& wanted) {
+  std::string faults;
+  bool missing = false;
+  for (const Wanted& want : wanted) {
+    const auto found = types.find(want.topic);
+    if (found != types.end() && found->second == want.type) continue;
+    if (!faults.empty()) faults += "; ";
+    if (found == types.end()) {
+      missing = true;
+      faults += std::string("no topic ") + want.topic + " (" + want.key + ", " + want.type + ")";
+    } else {
+      faults += "topic " + want.topic + " (" + want.key + ") is " + found->second + ", expected " + want.type;
+    }
+  }
+  if (faults.empty()) return;
+  if (missing) {
+    std::string known;
+    for (const auto& [topic, type] : types) {
+      if (!known.empty()) known += ", ";
+      known.append(topic).append(" (").append(type).append(")");
+    }
+    faults += "; the bag has " + (known.empty() ? "no topics" : known);
+  }
+  throw bagError(bag, faults);
+}
+
+std::pair<ros::Time, ros::Time> playedSpan(const std::string& path, const rosbag::Bag& bag,
+                                           const Config& config) {
+  rosbag::View all(bag);
+  const double length = (all.getEndTime() - all.getBeginTime()).toSec();
+  if (config.bag_start > length) {
+    throw bagError(path, "bag_start (" + std::to_string(config.bag_start) + " s) lies behind its end (" +
+                             std::to_string(length) + " s)");
+  }
+  const ros::Time begin = all.getBeginTime() + ros::Duration(config.bag_start);
+  const bool to_end = config.bag_duration <= 0.0 || config.bag_start + config.bag_duration >= length;
+  return {begin, to_end ? all.getEndTime() : begin + ros::Duration(config.bag_duration)};
+}
+
+Trajectory readPoses(const rosbag::Bag& bag, const std::string& topic) {
+  Trajectory truth;
+  rosbag::View view(bag, rosbag::TopicQuery(topic));
+  for (const rosbag::MessageInstance& instance : view) {
+    const auto message = read<geometry_msgs::PoseStamped>(instance);
+    StampedPose pose;
+    pose.time = toTime(message->header.stamp);
+    if (!truth.empty() && pose.time <= truth.back().time) continue;
+    tf2::fromMsg(message->pose.position, pose.p_W);
+    tf2::fromMsg(message->pose.orientation, pose.q_WI);
+    pose.q_WI.normalize();
+    truth.push_back(pose);
+  }
+  return truth;
+}
+
+}  // namespace rio_t

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <rosbag/message_instance.h>
+#include <sensor_msgs/Imu.h>
+#include <sensor_msgs/PointCloud2.h>
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "rio_t/odometry/batch_odometry.h"
+#include "rio_t/odometry/radar_inertial_odometry.h"
+#include "rio_t/ros/cloud/point_cloud.h"
+#include "rio_t/ros/cloud/stamping.h"
+#include "rio_t/ros/parameters/parameters.h"
+#include "run_log.h"
+
+namespace rio_t {
+
+/// Feeds the estimator message by message.
+class BagPlayer {
+ public:
+  /// `config` and `log` must outlive the player. `recorder`: keeps the run for a batch; may be null.
+  BagPlayer(const Config& config, RunLog* log, BatchOdometry* recorder);
+
+  void play(const rosbag::MessageInstance& instance);
+  /// At the end of the bag.
+  void finish();
+
+  RunSummary summary() const;
+  /// Sets what was read, what of it never became a scan, and the noise that the scans showed.
+  void countInput(RunSummary* summary) const;
+  const RadarInertialOdometry& odometry() const { return odometry_; }
+  /// Of the first initialisation.
+  const std::optional<RadarInertialOdometry::Start>& start() const { return start_; }
+
+ private:
+  struct NotUsable {
+    std::string why;  // the first of them
+    std::uint64_t count = 0;
+  };
+
+  void addImu(const sensor_msgs::Imu& message, Time record);
+  void addCloud(const sensor_msgs::PointCloud2& message, Time record);
+  /// One bad message among good ones is counted; `why` is told at the end, the first one of each kind.
+  void notUsable(const std::string& kind, const std::string& why);
+  void account(ScanResult& result);
+
+  const Config& config_;
+  const PointCloudFormat format_;
+  ScanStamper stamper_;
+  RadarInertialOdometry odometry_;
+  RunLog* log_;
+  BatchOdometry* recorder_;
+  std::optional<RadarInertialOdometry::Start> start_;
+  std::uint64_t imu_count_ = 0, scans_total_ = 0, points_not_finite_ = 0, offset_steps_ = 0;
+  std::map<std::string, NotUsable> not_usable_;  // by kind
+};
+
+}  // namespace rio_t

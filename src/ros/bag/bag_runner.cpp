@@ -1,0 +1,216 @@
+#include "rio_t/ros/bag/bag_runner.h"
+
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+
+#include <chrono>
+#include <stdexcept>
+#include <tuple>
+#include <utility>
+
+#include "bag_file.h"
+#include "bag_player.h"
+#include "rio_t/evaluation/errors.h"
+#include "rio_t/odometry/batch_odometry.h"
+#include "run_log.h"
+
+namespace rio_t {
+namespace {
+
+void checkOutcome(const std::string& bag, const Config& config, const BagPlayer& player) {
+  const RunSummary summary = player.summary();
+  if (summary.imu_count == 0)
+    throw bagError(bag, "no messages on topic " + config.imu_topic + " (imu_topic) in the part played");
+  if (summary.scans_total == 0)
+    throw bagError(bag, "no messages on topic " + config.radar_topic + " (radar_topic) in the part played");
+  // Where none of a topic's messages can be used, what was wrong with the first is what is wrong.
+  const auto countOf = [](const std::map<std::string, std::uint64_t>& counts, const char* name) {
+    const auto found = counts.find(name);
+    return found == counts.end() ? 0 : found->second;
+  };
+  const std::uint64_t bad_scans =
+      countOf(summary.scans_rejected, "cloud_not_usable") + countOf(summary.scans_rejected, "stamp_zero");
+  if (bad_scans == summary.scans_total ||
+      countOf(summary.input_faults, "imu_not_usable") == summary.imu_count)
+    throw bagError(bag, summary.warnings.front());
+  if (!player.odometry().initialized()) {
+    throw bagError(bag, "never initialised, waited for " + player.odometry().waitingFor() + " (" +
+                            std::to_string(summary.imu_count) + " IMU samples, init_duration " +
+                            std::to_string(config.odometry.initialization.duration) + " s)");
+  }
+  if (summary.scans_used > 0) return;
+  std::string reasons;
+  for (const auto& [reason, count] : summary.scans_rejected) {
+    reasons += (reasons.empty() ? "" : ", ") + reason + " " + std::to_string(count);
+  }
+  throw bagError(
+      bag, "every one of the " + std::to_string(summary.scans_total) + " scans was rejected: " + reasons);
+}
+
+TruthErrors errorsAgainst(const Trajectory& truth, const Trajectory& estimate) {
+  TruthErrors errors;
+  errors.ate_m = absoluteError(truth, estimate, Alignment::kOrigin).translation_m.rmse;
+  const RelativeError relative = relativeError(truth, estimate);
+  if (relative.pairs > 0) {
+    errors.t_rel = relative.translation_m.rmse;
+    errors.r_rel_deg = relative.rotation_deg.rmse;
+  }
+  return errors;
+}
+
+/// One bag with its configuration: what all modes share, and the modes.
+class BagJob {
+ public:
+  /// Opens and checks the bag, and makes the output folder.
+  explicit BagJob(const BagRun& run) : run_(run), started_(std::chrono::steady_clock::now()) {
+    const Config& config = run.config;
+    openBag(run.bag, &bag_);
+    std::vector<Wanted> wanted = {{"imu_topic", config.imu_topic, "sensor_msgs/Imu"},
+                                  {"radar_topic", config.radar_topic, "sensor_msgs/PointCloud2"}};
+    if (config.stamp_source == StampSource::kTrigger)
+      wanted.push_back({"trigger_topic", config.trigger_topic, "std_msgs/Header"});
+    for (const Wanted& want : wanted) topics_.push_back(want.topic);
+    const std::map<std::string, std::string> types = topicTypes(bag_);
+    truth_in_bag_ = config.ground_truth.empty() && types.count(config.ground_truth_topic) != 0;
+    if (truth_in_bag_)
+      wanted.push_back({"ground_truth_topic", config.ground_truth_topic, "geometry_msgs/PoseStamped"});
+    checkTopics(run.bag, types, wanted);
+    std::tie(begin_, end_) = playedSpan(run.bag, bag_, config);
+    // Before the work, so that a wrong path costs no time.
+    if (!config.ground_truth.empty()) truth_ = readTum(config.ground_truth);
+    output_.emplace(run.output_folder);
+    started_ = std::chrono::steady_clock::now();
+  }
+
+  RunSummary execute() {
+    switch (run_.config.mode) {
+      case RunMode::kOnline:
+        return online();
+      case RunMode::kBatch:
+        return batch();
+      case RunMode::kRefine:
+        return refine();
+    }
+    throw std::invalid_argument("not a RunMode");
+  }
+
+ private:
+  RunSummary online() {
+    RunLog log(&*output_, 0.0);
+    BagPlayer player(run_.config, &log, nullptr);
+    play(player, run_.config, 0.0, 1.0);
+    return finish(player.summary(), log, *output_);
+  }
+
+  RunSummary batch() {
+    const OdometryOptions& options = run_.config.odometry;
+    BatchOptions batch_options;
+    batch_options.max_iterations = run_.config.batch_max_iterations;
+    BatchOdometry recorder(options, batch_options);
+    RunOutput online_output(run_.output_folder + "/online");
+    RunLog online_log(&online_output, 0.0);
+    BagPlayer player(run_.config, &online_log, &recorder);
+    play(player, run_.config, 0.0, 0.9);
+    finish(player.summary(), online_log, online_output);
+
+    const BatchResult result = recorder.solve(*player.start());
+    RunLog log(&*output_, 0.0);
+    for (const NavigationState& state : result.trajectory) log.addState(state);
+    for (ScanResult scan : result.scans) log.addResult(scan);
+    RunSummary summary;
+    summary.mode = "batch";
+    summary.batch = BatchSummary{result.solution.iterations, result.solution.placements,
+                                 result.solution.converged(), result.readmitted};
+    log.fill(&summary);
+    summary.solver_terminations = {{toString(result.solution.termination), 1}};
+    player.countInput(&summary);
+    return finish(std::move(summary), log, *output_);
+  }
+
+  /// The offset found is taken off the stamps, and the rest is estimated from the prior of the first pass:
+  /// the data are the same in each pass, and a prior from the pass before would count them twice.
+  RunSummary refine() {
+    const int passes = run_.config.refine_passes;
+    std::vector<double> offsets, sigmas;
+    double taken_off = 0.0;  // [s]
+    for (int pass = 1;; ++pass) {
+      Config config = run_.config;
+      config.radar_stamp_shift -= taken_off;
+      if (pass > 1) config.odometry.smoother.time_offset_initial = 0.0;
+      const bool last = pass == passes;
+      std::optional<RunOutput> earlier;
+      if (!last) earlier.emplace(run_.output_folder + "/pass_" + std::to_string(pass));
+      RunOutput& output = last ? *output_ : *earlier;
+      RunLog log(&output, taken_off);
+      BagPlayer player(config, &log, nullptr);
+      play(player, config, (pass - 1.0) / passes, static_cast<double>(pass) / passes);
+      RunSummary summary = player.summary();
+      offsets.push_back(taken_off = summary.final_offset_s);
+      sigmas.push_back(summary.final_offset_sigma_s);
+      if (last) {
+        summary.mode = "refine";
+        summary.pass_offsets_s = offsets;
+        summary.pass_offset_sigmas_s = sigmas;
+      }
+      summary = finish(std::move(summary), log, output);
+      if (last) return summary;
+    }
+  }
+
+  /// The whole bag; progress goes from `from` to `to`.
+  void play(BagPlayer& player, const Config& config, double from, double to) {
+    const double length = (end_ - begin_).toSec();
+    try {
+      rosbag::View view(bag_, rosbag::TopicQuery(topics_), begin_, end_);
+      double told = -1.0;
+      for (const rosbag::MessageInstance& instance : view) {
+        player.play(instance);
+        if (!run_.progress) continue;
+        const double done = length > 0.0 ? (instance.getTime() - begin_).toSec() / length : 1.0;
+        if (done - told > 0.01) run_.progress(from + (to - from) * (told = done));
+      }
+      player.finish();
+    } catch (const std::exception& error) {
+      throw bagError(run_.bag, error.what());
+    }
+    checkOutcome(run_.bag, config, player);
+  }
+
+  /// Adds speed and errors, and saves.
+  RunSummary finish(RunSummary summary, RunLog& log, RunOutput& output) {
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - started_;
+    if (&output == &*output_ && run_.progress) run_.progress(1.0);
+    summary.estimation_seconds = took.count();
+    summary.realtime_factor = (end_ - begin_).toSec() / took.count();
+    const Trajectory trajectory = log.takeTrajectory();
+    std::optional<std::runtime_error> truth_error;
+    if (truth_in_bag_ && truth_.empty()) truth_ = readPoses(bag_, run_.config.ground_truth_topic);
+    if (truth_in_bag_ || !run_.config.ground_truth.empty()) {
+      try {
+        summary.truth = errorsAgainst(truth_, trajectory);
+      } catch (const std::exception& error) {
+        const std::string name =
+            truth_in_bag_ ? "topic " + run_.config.ground_truth_topic : run_.config.ground_truth;
+        truth_error.emplace("ground truth " + name + ": " + error.what());
+      }
+    }
+    output.finish(summary);
+    if (truth_error) throw *truth_error;  // the estimate is saved all the same
+    return summary;
+  }
+
+  const BagRun& run_;
+  rosbag::Bag bag_;
+  std::vector<std::string> topics_;
+  ros::Time begin_, end_;
+  bool truth_in_bag_ = false;
+  Trajectory truth_;
+  std::optional<RunOutput> output_;
+  std::chrono::steady_clock::time_point started_;
+};
+
+}  // namespace
+
+RunSummary runBag(const BagRun& run) { return BagJob(run).execute(); }
+
+}  // namespace rio_t

@@ -1,0 +1,222 @@
+#include "rio_t/ros/bag/simulation_bag.h"
+
+#include <geometry_msgs/PoseStamped.h>
+#include <geometry_msgs/TwistStamped.h>
+#include <rosbag/bag.h>
+#include <sensor_msgs/Imu.h>
+#include <sensor_msgs/PointCloud2.h>
+#include <std_msgs/Header.h>
+#include <tf2_eigen/tf2_eigen.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "rio_t/ros/messages/conversions.h"
+
+namespace rio_t {
+namespace {
+
+using simulation::SimulatedPoint;
+using simulation::SimulatedScan;
+
+// What differs between the formats.
+struct Layout {
+  std::string scan_topic;
+  std::string trigger_topic;
+  std::string scan_frame;
+  std::string trigger_frame;
+  bool scan_stamped;
+  double orientation_covariance;  // first element in the IMU message; -1 says "no orientation"
+  std::vector<std::pair<std::string, std::uint32_t>> fields;  // name and offset [byte], all float32
+  std::uint32_t point_step;                                   // [byte]
+  // Values in the order of `fields`.
+  std::vector<float> (*values)(const SimulatedPoint&);
+};
+
+std::vector<float> irsValues(const SimulatedPoint& p) {
+  const Eigen::Vector3f position_R = p.position_R.cast<float>();
+  return {position_R.x(),
+          position_R.y(),
+          position_R.z(),
+          static_cast<float>(p.snr_db),
+          static_cast<float>(p.doppler),
+          static_cast<float>(p.noise_db),
+          static_cast<float>(p.position_R.norm())};
+}
+
+std::vector<float> tiMmwaveValues(const SimulatedPoint& p) {
+  const Eigen::Vector3f position_R = p.position_R.cast<float>();
+  // x forward, y left, z up
+  return {position_R.y(), -position_R.x(), position_R.z(), static_cast<float>(p.snr_db),
+          static_cast<float>(p.doppler)};
+}
+
+Layout layoutOf(BagFormat format) {
+  if (format == BagFormat::kTiMmwave) {
+    return {"/ti_mmwave/radar_scan_pcl",
+            "/sensor_platform/radar_right/trigger",
+            "",
+            "PB4",
+            false,
+            0.0,
+            {{"x", 0}, {"y", 4}, {"z", 8}, {"intensity", 16}, {"velocity", 20}},
+            32,
+            tiMmwaveValues};
+  }
+  return {
+      "/sensor_platform/radar/scan",
+      "/sensor_platform/radar/trigger",
+      "radar",
+      "radar",
+      true,
+      -1.0,
+      {{"x", 0}, {"y", 4}, {"z", 8}, {"snr_db", 12}, {"v_doppler_mps", 16}, {"noise_db", 20}, {"range", 24}},
+      28,
+      irsValues};
+}
+
+sensor_msgs::Imu imuMessage(const ImuMeasurement& sample, std::uint32_t seq, const Layout& layout) {
+  sensor_msgs::Imu message;
+  message.header.seq = seq;
+  message.header.stamp = toRosTime(sample.time);
+  message.header.frame_id = "base_link";
+  message.orientation_covariance[0] = layout.orientation_covariance;
+  tf2::toMsg(sample.angular_velocity, message.angular_velocity);
+  tf2::toMsg(sample.acceleration, message.linear_acceleration);
+  return message;
+}
+
+std_msgs::Header triggerMessage(const SimulatedScan& scan, const Layout& layout) {
+  std_msgs::Header message;
+  message.seq = scan.seq;
+  message.stamp = toRosTime(scan.stamp);
+  message.frame_id = layout.trigger_frame;
+  return message;
+}
+
+sensor_msgs::PointCloud2 scanMessage(const SimulatedScan& scan, const Layout& layout) {
+  sensor_msgs::PointCloud2 message;
+  message.header.seq = scan.seq;
+  if (layout.scan_stamped) message.header.stamp = toRosTime(scan.stamp);
+  message.header.frame_id = layout.scan_frame;
+  message.height = 1;
+  message.width = static_cast<std::uint32_t>(scan.points.size());
+  for (const auto& [name, offset] : layout.fields) {
+    sensor_msgs::PointField field;
+    field.name = name;
+    field.offset = offset;
+    field.datatype = sensor_msgs::PointField::FLOAT32;
+    field.count = 1;
+    message.fields.push_back(field);
+  }
+  message.is_bigendian = 0;
+  message.point_step = layout.point_step;
+  message.row_step = message.point_step * message.width;
+  message.is_dense = 1;
+  message.data.assign(message.row_step, 0);
+  std::uint8_t* point_data = message.data.data();
+  for (const SimulatedPoint& point : scan.points) {
+    const std::vector<float> values = layout.values(point);
+    for (std::size_t f = 0; f < values.size(); ++f) {
+      std::memcpy(point_data + layout.fields[f].second, &values[f], sizeof(float));
+    }
+    point_data += layout.point_step;
+  }
+  return message;
+}
+
+geometry_msgs::PoseStamped poseMessage(const simulation::MotionState& state, Time time, std::uint32_t seq) {
+  geometry_msgs::PoseStamped message;
+  message.header.seq = seq;
+  message.header.stamp = toRosTime(time);
+  message.header.frame_id = "world";
+  message.pose.position = tf2::toMsg(state.p_W);
+  message.pose.orientation = tf2::toMsg(state.q_WI);
+  return message;
+}
+
+geometry_msgs::TwistStamped twistMessage(const simulation::MotionState& state, Time time, std::uint32_t seq) {
+  geometry_msgs::TwistStamped message;
+  message.header.seq = seq;
+  message.header.stamp = toRosTime(time);
+  message.header.frame_id = "world";
+  tf2::toMsg(state.v_W, message.twist.linear);
+  tf2::toMsg(state.q_WI * state.omega_I, message.twist.angular);
+  return message;
+}
+
+enum class Kind { kTruth, kImu, kTrigger, kScan };
+
+// Something that arrives at the recorder.
+struct Arrival {
+  Time time;
+  Kind kind;
+  std::size_t index;
+};
+
+std::vector<Arrival> arrivals(const simulation::SensorData& data, const std::vector<Time>& truth_times,
+                              const SimulationBagOptions& options) {
+  std::vector<Arrival> all;
+  all.reserve(truth_times.size() + data.imu.samples.size() + 2 * data.scans.size());
+  for (std::size_t i = 0; i < truth_times.size(); ++i) all.push_back({truth_times[i], Kind::kTruth, i});
+  for (std::size_t i = 0; i < data.imu.samples.size(); ++i) {
+    all.push_back({data.imu.samples[i].time + options.imu_latency, Kind::kImu, i});
+  }
+  for (std::size_t i = 0; i < data.scans.size(); ++i) {
+    all.push_back({data.scans[i].stamp + options.imu_latency, Kind::kTrigger, i});
+    if (data.scans[i].delivered) all.push_back({data.scans[i].arrival, Kind::kScan, i});
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Arrival& a, const Arrival& b) { return a.time < b.time; });
+  return all;
+}
+
+}  // namespace
+
+void writeSimulationBag(const std::string& path, const simulation::Motion& motion,
+                        const simulation::SensorData& data, Time start, const SimulationBagOptions& options) {
+  if (!(options.ground_truth_rate > 0.0)) throw std::invalid_argument("ground truth: rate must be positive");
+  const Layout layout = layoutOf(options.format);
+  std::vector<Time> truth_times;
+  const auto truth_count =
+      static_cast<std::size_t>(std::floor(motion.duration() * options.ground_truth_rate)) + 1;
+  for (std::size_t i = 0; i < truth_count; ++i) {
+    truth_times.push_back(start + static_cast<double>(i) / options.ground_truth_rate);
+  }
+
+  try {
+    rosbag::Bag bag(path, rosbag::bagmode::Write);
+    for (const Arrival& arrival : arrivals(data, truth_times, options)) {
+      const ros::Time record = toRosTime(arrival.time + options.record_offset);
+      const auto seq = static_cast<std::uint32_t>(arrival.index);
+      switch (arrival.kind) {
+        case Kind::kTruth: {
+          const Time time = truth_times[arrival.index];
+          const simulation::MotionState state = motion.at(time - start);
+          bag.write("/ground_truth/pose", record, poseMessage(state, time, seq));
+          bag.write("/ground_truth/twist", record, twistMessage(state, time, seq));
+          break;
+        }
+        case Kind::kImu:
+          bag.write("/sensor_platform/imu", record, imuMessage(data.imu.samples[arrival.index], seq, layout));
+          break;
+        case Kind::kTrigger:
+          bag.write(layout.trigger_topic, record, triggerMessage(data.scans[arrival.index], layout));
+          break;
+        case Kind::kScan:
+          bag.write(layout.scan_topic, record, scanMessage(data.scans[arrival.index], layout));
+          break;
+      }
+    }
+    bag.close();
+  } catch (const rosbag::BagException& error) {
+    throw std::runtime_error("bag '" + path + "' cannot be written: " + error.what());
+  }
+}
+
+}  // namespace rio_t

@@ -1,0 +1,210 @@
+#include "rio_t/ros/cloud/stamping.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace rio_t {
+namespace {
+
+constexpr std::size_t kTriggersKept = 64;  // some seconds of them
+// One scan without its seq is a lost trigger; several in a row, and the two count from different starts.
+constexpr std::size_t kUnmatchedMeansUnlike = 5;
+constexpr double kClockMapSpan = 60.0;  // [s]
+// No transport delays the IMU by more for so many samples; and if one did, its scans would be as late.
+constexpr std::int64_t kJump_ns = 500'000'000;
+constexpr int kJumpSamples = 20;
+
+}  // namespace
+
+void ClockMap::add(Time stamp, Time record) {
+  const std::int64_t difference = record.nanoseconds() - stamp.nanoseconds();
+  if (smallest_ns_ != kNothing) {
+    far_above_ = difference - std::min(smallest_ns_, smallest_before_ns_) > kJump_ns ? far_above_ + 1 : 0;
+    if (far_above_ >= kJumpSamples) *this = ClockMap();
+  }
+  if (smallest_ns_ == kNothing) {
+    minute_begin_ = stamp;
+  } else if (std::abs(stamp - minute_begin_) > kClockMapSpan) {
+    smallest_before_ns_ = smallest_ns_;
+    smallest_ns_ = kNothing;
+    minute_begin_ = stamp;
+  }
+  smallest_ns_ = std::min(smallest_ns_, difference);
+}
+
+std::optional<Time> ClockMap::toImuClock(Time record) const {
+  if (smallest_ns_ == kNothing) return std::nullopt;
+  return Time::fromNanoseconds(record.nanoseconds() - std::min(smallest_ns_, smallest_before_ns_));
+}
+
+StampingOptions stampingOptions(const Config& config) {
+  StampingOptions options;
+  options.source = config.stamp_source;
+  options.shift = config.radar_stamp_shift;
+  options.radar_topic = config.radar_topic;
+  options.trigger_topic = config.trigger_topic;
+  return options;
+}
+
+ScanStamper::ScanStamper(StampingOptions options) : options_(std::move(options)) {}
+
+void ScanStamper::see(Time record) {
+  if (!first_record_) first_record_ = now_ = record;
+  now_ = std::max(now_, record);
+}
+
+void ScanStamper::addImu(Time stamp, Time record) {
+  see(record);
+  clocks_.add(stamp, record);
+}
+
+void ScanStamper::addTrigger(std::uint32_t seq, Time stamp, Time record) {
+  see(record);
+  if (!triggers_.empty() && triggers_.back().seq == seq && triggers_.back().stamp == stamp)
+    return;  // sent twice
+  triggers_.push_back({seq, stamp, record, false});
+  if (triggers_.size() > kTriggersKept) triggers_.pop_front();
+}
+
+void ScanStamper::addScan(std::uint32_t seq, Time header_stamp, Time record, RadarScan scan) {
+  see(record);
+  if (options_.source == StampSource::kHeader && header_stamp == Time()) {
+    throw std::runtime_error(
+        "topic " + options_.radar_topic +
+        ": the stamp in the header is zero; stamp_source: header needs one. Set stamp_source to "
+        "trigger (with trigger_topic) or to arrival");
+  }
+  held_.push_back({seq, header_stamp, record, std::move(scan)});
+  if (held_.size() > options_.max_held) giveUp("too_many_held");
+}
+
+void ScanStamper::giveUp(const std::string& reason) {
+  held_.pop_front();
+  ++given_up_[reason];
+}
+
+std::vector<RadarScan> ScanStamper::take() { return decide(); }
+
+std::vector<RadarScan> ScanStamper::finish() {
+  finishing_ = true;
+  std::vector<RadarScan> stamped = decide();
+  finishing_ = false;
+  return stamped;
+}
+
+std::vector<RadarScan> ScanStamper::decide() {
+  std::vector<RadarScan> stamped;
+  while (!held_.empty()) {
+    Time stamp;
+    const Decision decision = stampFront(&stamp);
+    if (decision == Decision::kWait) break;
+    if (decision == Decision::kGiveUp) {
+      giveUp(options_.source == StampSource::kTrigger ? "trigger_missing" : "imu_missing");
+      continue;
+    }
+    stamped.push_back(std::move(held_.front().scan));
+    stamped.back().stamp = stamp + options_.shift;
+    held_.pop_front();
+  }
+  return stamped;
+}
+
+ScanStamper::Decision ScanStamper::stampFront(Time* stamp) {
+  const Held& scan = held_.front();
+  switch (options_.source) {
+    case StampSource::kHeader:
+      *stamp = scan.header_stamp;
+      return Decision::kStamped;
+    case StampSource::kArrival: {
+      const std::optional<Time> arrival = clocks_.toImuClock(scan.record);
+      if (!arrival) return finishing_ ? Decision::kGiveUp : Decision::kWait;
+      *stamp = *arrival;
+      return Decision::kStamped;
+    }
+    case StampSource::kTrigger:
+      return stampFromTrigger(scan, stamp);
+  }
+  throw std::logic_error("stamp source not handled");
+}
+
+ScanStamper::Trigger* ScanStamper::triggerOfSeq(const Held& scan) {
+  Trigger* found = nullptr;
+  for (Trigger& trigger : triggers_) {
+    const double delay = scan.record - trigger.record;
+    if (trigger.seq != scan.seq || delay < -options_.max_overtake || delay > options_.max_delay) continue;
+    if (found != nullptr) {  // a seq that does not count, e.g. always zero
+      counting_ = Counting::kUnlike;
+      return nullptr;
+    }
+    found = &trigger;
+  }
+  return found;
+}
+
+ScanStamper::Decision ScanStamper::stampFromTrigger(const Held& scan, Time* stamp) {
+  if (Trigger* trigger = triggerOfSeq(scan)) {
+    counting_ = Counting::kAlike;
+    unmatched_ = 0;
+    if (trigger->used) return Decision::kGiveUp;
+    trigger->used = true;
+    *stamp = trigger->stamp;
+    return Decision::kStamped;
+  }
+  if (counting_ != Counting::kUnlike) {
+    // A trigger may be a little late.
+    if (!finishing_ && now_ - scan.record <= options_.max_overtake) return Decision::kWait;
+    if (counting_ == Counting::kAlike && ++unmatched_ < kUnmatchedMeansUnlike) return Decision::kGiveUp;
+    if (counting_ == Counting::kUnknown && !finishing_) {
+      // Its trigger may have been sent before the first message: that says nothing about how they count. Then
+      // a later scan tells.
+      const bool later_matches = std::any_of(
+          held_.begin() + 1, held_.end(), [&](const Held& later) { return triggerOfSeq(later) != nullptr; });
+      if (later_matches) return Decision::kGiveUp;
+      if (now_ - *first_record_ <= options_.max_delay + options_.max_overtake) return Decision::kWait;
+    }
+    counting_ = Counting::kUnlike;
+  }
+  return stampFromTriggerTime(scan, stamp);
+}
+
+std::optional<double> ScanStamper::triggerPeriod() const {
+  if (triggers_.size() < 2) return std::nullopt;
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < triggers_.size(); ++i) {
+    steps.push_back(triggers_[i].stamp - triggers_[i - 1].stamp);
+  }
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle;
+}
+
+ScanStamper::Decision ScanStamper::stampFromTriggerTime(const Held& scan, Time* stamp) {
+  Trigger* best = nullptr;
+  if (scan.header_stamp == Time()) {
+    for (Trigger& trigger : triggers_) {
+      const double delay = scan.record - trigger.record;
+      if (delay >= 0.0 && delay <= options_.max_delay) best = &trigger;
+    }
+  } else {
+    const auto distance = [&](const Trigger& trigger) { return std::abs(trigger.stamp - scan.header_stamp); };
+    for (Trigger& trigger : triggers_) {
+      if (best == nullptr || distance(trigger) < distance(*best)) best = &trigger;
+    }
+    const std::optional<double> period = triggerPeriod();
+    const bool waited = finishing_ || now_ - scan.record > options_.max_delay;
+    if (!period && !waited) return Decision::kWait;
+    if (best != nullptr && period && distance(*best) > 0.5 * *period) {
+      const bool later_seen = triggers_.back().stamp > scan.header_stamp;
+      if (!later_seen && !waited) return Decision::kWait;
+      best = nullptr;
+    }
+    if (!period) best = nullptr;
+  }
+  if (best == nullptr || best->used) return Decision::kGiveUp;
+  best->used = true;
+  *stamp = best->stamp;
+  return Decision::kStamped;
+}
+
+}  // namespace rio_t

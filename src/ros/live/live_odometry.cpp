@@ -1,0 +1,354 @@
+#include "rio_t/ros/live/live_odometry.h"
+
+#include <ros/console.h>
+
+#include <boost/function.hpp>
+#include <fstream>
+
+#include "rio_t/evaluation/trajectory.h"
+#include "rio_t/ros/cloud/point_cloud.h"
+#include "rio_t/ros/messages/conversions.h"
+#include "rio_t/ros/parameters/ros_parameters.h"
+
+namespace rio_t {
+namespace {
+
+constexpr double kWarnPeriod = 5.0;        // [s] between warnings of one kind
+constexpr double kDiagnosticPeriod = 1.0;  // [s]
+// Queues deep enough for seconds of input: nothing is lost while a callback is late.
+constexpr std::uint32_t kImuQueue = 5000;
+constexpr std::uint32_t kScanQueue = 200;
+
+double secondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace
+
+LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
+                           const std::string& name)
+    : name_(name),
+      config_(configFromRos(private_node)),
+      format_(pointCloudFormat(config_)),
+      node_(node),
+      private_node_(private_node),
+      monitor_(config_),
+      publisher_(config_, private_node),
+      options_(config_.odometry),
+      imu_stamps_(options_.imu_input_check.max_bridged_gap, options_.imu_input_check.jump_patience) {
+  if (config_.extrinsics_source == ExtrinsicsSource::kTf) {
+    monitor_.waitFor("the first scan, whose frame_id names the radar for tf");
+    tf_.emplace();
+    tf_listener_ = std::make_unique<tf2_ros::TransformListener>(*tf_, node_);
+  } else {
+    startSession(config_.odometry.T_IR);
+  }
+  subscribe();
+  solver_ = std::thread([this] { solve(); });
+  imu_spinner_.emplace(1, &imu_queue_);
+  input_spinner_.emplace(1, &input_queue_);
+  imu_spinner_->start();
+  input_spinner_->start();
+  ROS_INFO_STREAM(name_ << ": IMU " << imu_subscriber_.getTopic() << ", radar " << scan_subscriber_.getTopic()
+                        << " (" << format_.name << "), stamps from " << toString(config_.stamp_source));
+}
+
+LiveOdometry::~LiveOdometry() {
+  // First no more callbacks, then no more solving: the optimisation thread is the last to touch the
+  // publishers.
+  imu_subscriber_.shutdown();
+  scan_subscriber_.shutdown();
+  trigger_subscriber_.shutdown();
+  reset_server_.shutdown();
+  save_server_.shutdown();
+  diagnostics_timer_.stop();
+  imu_spinner_->stop();
+  input_spinner_->stop();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    stopping_ = true;
+  }
+  work_to_do_.notify_all();
+  if (solver_.joinable()) solver_.join();
+}
+
+void LiveOdometry::subscribe() {
+  const ros::TransportHints fast = ros::TransportHints().tcpNoDelay();
+  ros::NodeHandle imu_node(node_);
+  imu_node.setCallbackQueue(&imu_queue_);
+  ros::NodeHandle input_node(node_);
+  input_node.setCallbackQueue(&input_queue_);
+  ros::NodeHandle service_node(private_node_);
+  service_node.setCallbackQueue(&input_queue_);
+
+  const auto subscribeTo = [&](ros::NodeHandle& handle, const std::string& topic, std::uint32_t queue,
+                               auto callback, auto message) {
+    using Message = decltype(message);
+    const boost::function<void(const Event<Message>&)> call = [this, callback](const Event<Message>& event) {
+      (this->*callback)(event);
+    };
+    return handle.subscribe<Message>(topic, queue, call, ros::VoidConstPtr(), fast);
+  };
+  trigger_subscriber_ = config_.stamp_source == StampSource::kTrigger
+                            ? subscribeTo(input_node, config_.trigger_topic, kImuQueue,
+                                          &LiveOdometry::onTrigger, std_msgs::Header())
+                            : ros::Subscriber();
+  scan_subscriber_ = subscribeTo(input_node, config_.radar_topic, kScanQueue, &LiveOdometry::onScan,
+                                 sensor_msgs::PointCloud2());
+  imu_subscriber_ =
+      subscribeTo(imu_node, config_.imu_topic, kImuQueue, &LiveOdometry::onImu, sensor_msgs::Imu());
+  reset_server_ = service_node.advertiseService("reset", &LiveOdometry::onReset, this);
+  save_server_ = service_node.advertiseService("save_trajectory", &LiveOdometry::onSaveTrajectory, this);
+
+  diagnostics_.emplace(node_, private_node_, name_);
+  diagnostics_->setHardwareID("none");
+  using Status = LiveMonitor::Status;
+  diagnostics_->add("odometry", [this](Status& s) { monitor_.describeOdometry(s, session_.get().get()); });
+  diagnostics_->add("input", [this](Status& s) { monitor_.describeInput(s, session_.get().get()); });
+  diagnostics_->add("solver", [this](Status& s) { monitor_.describeSolver(s, session_.get().get()); });
+  diagnostics_->add("time offset", [this](Status& s) { monitor_.describeTimeOffset(s); });
+  // A wall timer, and no update() that looks at ROS time: also a clock that stands still is worth a
+  // diagnosis.
+  const boost::function<void(const ros::WallTimerEvent&)> tell = [this](const ros::WallTimerEvent&) {
+    diagnostics_->force_update();
+    tellFaults();
+  };
+  diagnostics_timer_ = service_node.createWallTimer(ros::WallDuration(kDiagnosticPeriod), tell);
+}
+
+void LiveOdometry::tellFaults() {
+  const Session now = session_.get();
+  if (!now) return;
+  if (faults_of_.lock() != now) {
+    faults_of_ = now;
+    faults_told_.clear();
+  }
+  for (const auto& [fault, count] : now->odometry().faults()) {
+    Told& told = faults_told_[fault];
+    if (count == told.count || secondsSince(told.at) < kWarnPeriod) continue;
+    ROS_WARN_STREAM(name_ << ": input fault " << fault << ", " << count << " so far");
+    told = {count, std::chrono::steady_clock::now()};
+  }
+}
+
+void LiveOdometry::wakeSolver() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    has_work_ = true;
+  }
+  work_to_do_.notify_one();
+}
+
+void LiveOdometry::startSession(const Extrinsics& T_IR) {
+  publisher_.extrinsics(T_IR);
+  OdometryOptions options = config_.odometry;
+  options.T_IR = T_IR;
+  monitor_.waitFor("");
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    options_ = options;
+  }
+  session_.replace(std::make_shared<LiveSession>(config_, options));
+}
+
+void LiveOdometry::reset(const std::string& reason, bool at_once) {
+  ROS_WARN_STREAM(name_ << ": reset: " << reason << "; starts again" << (at_once ? "" : ", stand still"));
+  // Where it still waits for its extrinsics there is nothing to forget.
+  if (session_.get()) {
+    OdometryOptions options;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      options = options_;
+    }
+    if (at_once) options.init_motion_after = 0.0;
+    session_.replace(std::make_shared<LiveSession>(config_, options));
+  }
+  monitor_.reset(reason);
+}
+
+void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
+  const auto start = std::chrono::steady_clock::now();
+  monitor_.imu();
+  try {
+    const ImuMeasurement imu = toImuMeasurement(*event.getConstMessage(), config_.imu_topic);
+    // The same judgement as the session's own, so that the whole session starts again, with what it stamps
+    // by.
+    const ClockJumpDetector::Verdict stamp = imu_stamps_.check(imu.time);
+    if (stamp == ClockJumpDetector::Verdict::kRestart) {
+      const double jump = imu.time - *newest_imu_;
+      reset(std::string("the IMU's stamps jumped ") + (jump < 0.0 ? "back" : "ahead") + " by " +
+                std::to_string(std::abs(jump)) + " s",
+            true);
+    }
+    if (stamp == ClockJumpDetector::Verdict::kGood || stamp == ClockJumpDetector::Verdict::kRestart)
+      newest_imu_ = imu.time;
+    const Session now = session_.get();
+    if (!now) {
+      monitor_.dropped("imu_before_extrinsics");
+      return;
+    }
+    const double rate_sigma = now->rateSigma(imu.time);
+    if (const std::optional<NavigationState> state = now->addImu(imu)) {
+      session_.speak(Speaker::kNavigation, now, [&] {
+        publisher_.odometry(*state, rate_sigma);
+        monitor_.odometry(secondsSince(start));
+      });
+    }
+    if (now->imuPilesUp()) {
+      reset("the optimisation thread took none of the last " + std::to_string(LiveSession::kMaxWaitingImu) +
+            " IMU samples");
+    }
+    account(now->stampWithImu(imu.time, toTime(event.getReceiptTime())));
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      rate_sigma_ = rate_sigma;
+    }
+    wakeSolver();
+  } catch (const std::exception& error) {
+    monitor_.dropped("imu_not_usable");
+    ROS_ERROR_STREAM_THROTTLE(kWarnPeriod, name_ << ": " << error.what());
+  }
+}
+
+void LiveOdometry::onScan(const Event<sensor_msgs::PointCloud2>& event) {
+  const sensor_msgs::PointCloud2& message = *event.getConstMessage();
+  monitor_.scan();
+  try {
+    DecodedScan decoded;
+    try {
+      decoded = decode(message, format_);
+    } catch (const std::exception& error) {
+      throw std::runtime_error("topic " + config_.radar_topic + ": " + error.what());
+    }
+    if (decoded.dropped_not_finite > 0) monitor_.dropped("points_not_finite", decoded.dropped_not_finite);
+    if (!session_.get()) lookUpExtrinsics(message.header.frame_id);
+    const Session now = session_.get();
+    if (!now) {
+      monitor_.dropped("scan_before_extrinsics");
+      return;
+    }
+    account(now->addScan(message.header.seq, toTime(message.header.stamp), toTime(event.getReceiptTime()),
+                         toRadarScan(decoded.cloud, Time())));
+    wakeSolver();
+  } catch (const std::exception& error) {
+    monitor_.dropped("scan_not_usable");
+    ROS_ERROR_STREAM_THROTTLE(kWarnPeriod, name_ << ": " << error.what());
+  }
+}
+
+void LiveOdometry::onTrigger(const Event<std_msgs::Header>& event) {
+  monitor_.trigger();
+  const Session now = session_.get();
+  if (!now) return;
+  const std_msgs::Header& trigger = *event.getConstMessage();
+  account(now->addTrigger(trigger.seq, toTime(trigger.stamp), toTime(event.getReceiptTime())));
+  wakeSolver();
+}
+
+void LiveOdometry::account(const LiveSession::Stamped& stamped) {
+  if (stamped.dropped > 0) {
+    monitor_.dropped("queue_full", stamped.dropped);
+    ROS_WARN_STREAM_THROTTLE(kWarnPeriod, name_ << ": the solver falls behind, the oldest scan was dropped "
+                                                   "(max_queued_scans)");
+  }
+  for (const std::string& reason : stamped.given_up) {
+    monitor_.dropped(reason);
+    ROS_WARN_STREAM_THROTTLE(kWarnPeriod, name_ << ": a scan got no stamp: " << reason
+                                                << " (stamp_source: " << toString(config_.stamp_source)
+                                                << ", trigger_topic: " << config_.trigger_topic << ")");
+  }
+}
+
+void LiveOdometry::lookUpExtrinsics(const std::string& cloud_frame) {
+  const std::string from = cloud_frame.empty() ? config_.radar_frame : cloud_frame;
+  if (from == config_.radar_frame && format_.axes != PointAxes::kRightForwardUp && config_.publish_tf) {
+    throw std::runtime_error("radar_frame: \"" + from +
+                             "\" is also the frame of the clouds, whose axes are not those "
+                             "of radar_frame (x right, y forward, z up); expected another name");
+  }
+  try {
+    const Extrinsics T_IR = toExtrinsics(
+        tf_->lookupTransform(config_.base_link_frame, from, ros::Time(0)).transform, format_.axes);
+    startSession(T_IR);
+    ROS_INFO_STREAM(name_ << ": extrinsics from tf " << from << " -> " << config_.base_link_frame
+                          << ": translation [" << T_IR.l_I.transpose() << "], rotation xyzw ["
+                          << T_IR.q_IR.coeffs().transpose() << "]");
+  } catch (const tf2::TransformException& error) {
+    monitor_.waitFor("tf from " + from + " to " + config_.base_link_frame + " (" + error.what() + ")");
+    ROS_WARN_STREAM_THROTTLE(kWarnPeriod, name_ << ": waiting for tf: " << error.what());
+  }
+}
+
+bool LiveOdometry::onReset(std_srvs::Empty::Request& /*request*/, std_srvs::Empty::Response& /*response*/) {
+  reset("asked for by ~reset");
+  return true;
+}
+
+bool LiveOdometry::onSaveTrajectory(std_srvs::Trigger::Request& /*request*/,
+                                    std_srvs::Trigger::Response& response) {
+  const Session now = session_.get();
+  std::size_t stride = 1;
+  const Trajectory trajectory = now ? now->trajectory(&stride) : Trajectory();
+  try {
+    if (trajectory.empty()) throw std::runtime_error("no optimised pose yet");
+    writeTum(config_.trajectory_file, trajectory);
+    response.success = 1U;
+    response.message = std::to_string(trajectory.size()) + " poses in " + config_.trajectory_file;
+    if (stride > 1)
+      response.message += ", one in " + std::to_string(stride) + ": more than " +
+                          std::to_string(LiveSession::kMaxPoses) + " are not kept";
+  } catch (const std::exception& error) {
+    response.success = 0U;
+    response.message = error.what();
+  }
+  return true;
+}
+
+void LiveOdometry::tellHealth(const ScanResult& result) const {
+  if (result.reinitialized) {
+    ROS_WARN_STREAM(name_ << ": found the state anew in motion; position and heading go on");
+  }
+  if (result.health == Health::kDiverged) {
+    ROS_ERROR_STREAM_THROTTLE(kWarnPeriod,
+                              name_ << ": diverged, radar and IMU contradict each other: do not trust the "
+                                       "estimate (see diagnostics, on_divergence)");
+  }
+}
+
+void LiveOdometry::solve() {
+  Session published;  // whose results ~path holds
+  while (true) {
+    double rate_sigma = 0.0;
+    {
+      std::unique_lock<std::mutex> lock(mutex_);
+      work_to_do_.wait(lock, [this] { return has_work_ || stopping_; });
+      if (stopping_) return;
+      has_work_ = false;
+      rate_sigma = rate_sigma_;
+    }
+    const Session now = session_.get();
+    if (!now) continue;
+    if (published != now) {
+      if (published) publisher_.clearPath();
+      published = now;
+    }
+    try {
+      bool more = false;
+      for (const LiveSession::Result& result : now->process(&more)) {
+        const bool current = session_.speak(Speaker::kOptimisation, now, [&] {
+          publisher_.result(result, rate_sigma);
+          tellHealth(result.result);
+          monitor_.result(result);
+        });
+        if (!current) break;  // reset meanwhile: not of this world any more
+      }
+      if (more) wakeSolver();  // one scan at a time, so that stopping and resets are heeded between them
+    } catch (const std::exception& error) {
+      monitor_.solverFailed(error.what());
+      ROS_ERROR_STREAM(name_ << ": the estimator failed: " << error.what());
+      if (session_.get() == now) reset(std::string("the estimator failed: ") + error.what());
+    }
+  }
+}
+
+}  // namespace rio_t

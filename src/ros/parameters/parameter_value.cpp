@@ -1,0 +1,183 @@
+#include "rio_t/ros/parameters/parameter_value.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <locale>
+#include <map>
+#include <sstream>
+#include <stdexcept>
+
+namespace rio_t {
+namespace {
+
+/// Reads all of `text` as a T, with a decimal point whatever the locale of the machine.
+template <typename T>
+bool parseWhole(const std::string& text, T* value) {
+  std::istringstream stream(text);
+  stream.imbue(std::locale::classic());
+  stream >> *value;
+  return !stream.fail() && stream.peek() == std::istringstream::traits_type::eof();
+}
+
+bool isOneOf(const std::string& text, std::initializer_list<const char*> words) {
+  return std::any_of(words.begin(), words.end(), [&](const char* word) { return text == word; });
+}
+
+ParameterValue fromYamlScalar(const YAML::Node& node) {
+  if (node.Tag() == "!") return {node.Scalar()};  // quoted: text, whatever it looks like
+  return parsePlainScalar(node.Scalar());
+}
+
+ParameterValue fromYaml(const YAML::Node& node) {
+  if (!node.IsDefined() || node.IsNull()) return {};
+  if (node.IsScalar()) return fromYamlScalar(node);
+  if (node.IsMap()) return {ParameterValue::Map{}};
+  ParameterValue::List list;
+  for (const auto& element : node) {
+    // No deeper: no parameter takes lists of lists, and by its anchors a list may hold itself.
+    if (element.IsScalar()) {
+      list.push_back(fromYamlScalar(element));
+    } else if (element.IsNull()) {
+      list.push_back({});
+    } else {
+      list.push_back({ParameterValue::Map{}});
+    }
+  }
+  return {std::move(list)};
+}
+
+// By hand, since std::regex takes one stack frame a letter and a parameter file may have long lines.
+
+std::size_t skipDigits(const std::string& text, std::size_t at) {
+  while (at < text.size() && text[at] >= '0' && text[at] <= '9') ++at;
+  return at;
+}
+
+std::size_t skipSign(const std::string& text, std::size_t at) {
+  return at < text.size() && (text[at] == '+' || text[at] == '-') ? at + 1 : at;
+}
+
+/// [-+]?[0-9]+
+bool looksWhole(const std::string& text) {
+  const std::size_t begin = skipSign(text, 0);
+  return begin < text.size() && skipDigits(text, begin) == text.size();
+}
+
+/// [-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?
+bool looksReal(const std::string& text) {
+  const std::size_t begin = skipSign(text, 0);
+  std::size_t at = skipDigits(text, begin);
+  std::size_t digits = at - begin;
+  if (at < text.size() && text[at] == '.') {
+    const std::size_t end = skipDigits(text, at + 1);
+    digits += end - at - 1;
+    at = end;
+  }
+  if (digits == 0) return false;
+  if (at == text.size()) return true;
+  return (text[at] == 'e' || text[at] == 'E') && looksWhole(text.substr(at + 1));
+}
+
+}  // namespace
+
+std::string ParameterValue::describe() const {
+  struct Describe {
+    std::string operator()(std::monostate) const { return "nothing"; }
+    std::string operator()(bool value) const { return value ? "true" : "false"; }
+    std::string operator()(std::int64_t value) const { return std::to_string(value); }
+    std::string operator()(double value) const {
+      std::ostringstream text;
+      text.imbue(std::locale::classic());
+      text.precision(12);
+      text << value;
+      return text.str();
+    }
+    std::string operator()(const std::string& value) const { return '"' + value + '"'; }
+    std::string operator()(const List& list) const {
+      std::string text = "[";
+      for (const ParameterValue& value : list) text += (text.size() > 1 ? ", " : "") + value.describe();
+      return text + "]";
+    }
+    std::string operator()(Map) const { return "nested keys"; }
+  };
+  return std::visit(Describe{}, data);
+}
+
+ParameterValue parsePlainScalar(const std::string& text) {
+  // The words of YAML 1.1, since that is what the ROS parameter server reads.
+  if (isOneOf(text, {"", "~", "null", "Null", "NULL"})) return {};
+  if (isOneOf(text, {"true", "True", "TRUE", "yes", "Yes", "YES", "on", "On", "ON"})) return {true};
+  if (isOneOf(text, {"false", "False", "FALSE", "no", "No", "NO", "off", "Off", "OFF"})) return {false};
+  if (isOneOf(text, {".nan", ".NaN", ".NAN", "nan", "NaN"}))
+    return {std::numeric_limits<double>::quiet_NaN()};
+  if (isOneOf(text, {".inf", ".Inf", ".INF", "+.inf", "inf"}))
+    return {std::numeric_limits<double>::infinity()};
+  if (isOneOf(text, {"-.inf", "-.Inf", "-.INF", "-inf"})) return {-std::numeric_limits<double>::infinity()};
+
+  std::int64_t whole = 0;
+  if (looksWhole(text) && parseWhole(text, &whole)) return {whole};
+  double real = 0.0;
+  if (looksReal(text)) {
+    if (parseWhole(text, &real)) return {real};
+    return {std::numeric_limits<double>::infinity()};  // 1e999
+  }
+  return {text};
+}
+
+ParameterEntries readParameterFile(const std::string& path) {
+  if (std::filesystem::is_directory(path)) {
+    throw std::runtime_error(path + ": expected a YAML file with one `key: value` a line, this is a folder");
+  }
+  std::ifstream file(path);
+  if (!file)
+    throw std::runtime_error(path + ": cannot be read; expected a YAML file with one `key: value` a line");
+  return readParameters(file, path);
+}
+
+ParameterEntries readParameters(std::istream& yaml, const std::string& name) {
+  YAML::Node root;
+  try {
+    root = YAML::Load(yaml);
+  } catch (const YAML::Exception& error) {
+    throw std::runtime_error(name + ":" + std::to_string(error.mark.line + 1) + ": not YAML (" + error.msg +
+                             "); expected one `key: value` a line");
+  }
+  if (!root.IsDefined() || root.IsNull()) return {};
+  if (!root.IsMap()) throw std::runtime_error(name + ":1: expected one `key: value` a line");
+
+  ParameterEntries entries;
+  std::map<std::string, int> line_of;
+  for (const auto& item : root) {
+    const int line = item.first.Mark().line + 1;
+    const std::string origin = name + ":" + std::to_string(line);
+    if (!item.first.IsScalar())
+      throw std::runtime_error(origin + ": expected `key: value`, the key is no text");
+    const std::string key = item.first.Scalar();
+    const auto [first, is_new] = line_of.emplace(key, line);
+    if (!is_new) {
+      throw std::runtime_error(origin + ": " + key + ": expected each key once, it stands in line " +
+                               std::to_string(first->second) + " too");
+    }
+    entries.push_back({key, fromYaml(item.second), origin});
+  }
+  return entries;
+}
+
+ParameterEntry parseAssignment(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0) {
+    throw std::invalid_argument("--set " + text + ": expected key=value");
+  }
+  try {
+    return {text.substr(0, equals), fromYaml(YAML::Load(text.substr(equals + 1))), "--set"};
+  } catch (const YAML::Exception& error) {
+    throw std::invalid_argument("--set " + text + ": the value is not YAML (" + error.msg + ")");
+  }
+}
+
+}  // namespace rio_t
