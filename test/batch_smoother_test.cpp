@@ -7,58 +7,39 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "radar_smoother.h"
 #include "rio_t/core/so3.h"
-#include "rio_t/smoother/chain_marginals.h"
-#include "rio_t/smoother/initial_prior.h"
-#include "synthetic_motion.h"
 
 namespace rio_t {
 namespace {
 
-double wave(int i) { return std::sin(1.0 + 2.71 * i) + 0.4 * std::cos(0.9 * i * i); }
-
-Eigen::MatrixXd dense(const ChainSystem& chain) {
-  const auto n = static_cast<Eigen::Index>(chain.diagonal.size());
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n * kNodeTangent, n * kNodeTangent);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    H.block<kNodeTangent, kNodeTangent>(k * kNodeTangent, k * kNodeTangent) = chain.diagonal[k];
-    if (k + 1 == n) continue;
-    H.block<kNodeTangent, kNodeTangent>(k * kNodeTangent, (k + 1) * kNodeTangent) = chain.coupling[k];
-    H.block<kNodeTangent, kNodeTangent>((k + 1) * kNodeTangent, k * kNodeTangent) =
-        chain.coupling[k].transpose();
+Eigen::MatrixXd dense(const NormalEquations& system) {
+  const auto count = static_cast<int>(system.blocks.size());
+  const Eigen::Index n = count / 2 * kNodeTangent;
+  const auto first = [](int i) { return Eigen::Index(i / 2 * kNodeTangent + (i % 2) * StateBlock::kTangent); };
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n, n);
+  for (int i = 0; i < count; ++i) {
+    const Eigen::Index rows = system.diagonal[i].rows();
+    H.block(first(i), first(i), rows, rows) = system.diagonal[i];
+    for (const auto& [j, part] : system.coupling[i]) {
+      H.block(first(i), first(j), rows, part.cols()) = part;
+      H.block(first(j), first(i), part.cols(), rows) = part.transpose();
+    }
   }
   return H;
 }
 
-/// Largest difference of corresponding blocks, in standard deviations squared.
-double difference(const std::vector<NodeMatrix>& marginals, const Eigen::MatrixXd& covariance) {
+/// Largest difference to the diagonal blocks of `covariance`, in standard deviations.
+double difference(const std::vector<NodeMatrix>& blocks, const Eigen::MatrixXd& covariance) {
   double largest = 0.0;
-  for (Eigen::Index k = 0; k < static_cast<Eigen::Index>(marginals.size()); ++k) {
-    const NodeMatrix block = covariance.block<kNodeTangent, kNodeTangent>(k * kNodeTangent, k * kNodeTangent);
-    const NodeVector scale = block.diagonal().cwiseSqrt().cwiseInverse();
-    const NodeMatrix scaled = scale.asDiagonal() * (marginals[k] - block) * scale.asDiagonal();
-    largest = std::max(largest, scaled.cwiseAbs().maxCoeff());
+  for (std::size_t k = 0; k < blocks.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(k) * kNodeTangent;
+    const NodeMatrix expected = covariance.block<kNodeTangent, kNodeTangent>(at, at);
+    const NodeVector scale = expected.diagonal().cwiseSqrt().cwiseInverse();
+    const NodeMatrix apart = scale.asDiagonal() * (blocks[k] - expected) * scale.asDiagonal();
+    largest = std::max(largest, apart.cwiseAbs().maxCoeff());
   }
   return largest;
-}
-
-TEST(ChainMarginals, AreTheBlocksOfTheDenseInverse) {
-  constexpr int kNodes = 5;
-  ChainSystem chain(kNodes);
-  for (int k = 0; k < kNodes; ++k) {
-    NodeMatrix A;
-    for (int i = 0; i < A.size(); ++i) A(i) = wave(100 * k + i);
-    chain.diagonal[k] = 4.0 * (A * A.transpose() + NodeMatrix::Identity());
-    if (k + 1 == kNodes) continue;
-    for (int i = 0; i < kNodeTangent * kNodeTangent; ++i) chain.coupling[k](i) = 0.1 * wave(7000 * k + i);
-  }
-  EXPECT_LT(difference(marginalCovariances(chain), dense(chain).inverse()), 1e-9);
-}
-
-TEST(ChainMarginals, AnOpenStateIsRefused) {
-  ChainSystem chain(2);
-  chain.diagonal[0].setIdentity();
-  EXPECT_THROW(marginalCovariances(chain), std::runtime_error);
 }
 
 class Batch : public ::testing::Test {
@@ -69,14 +50,9 @@ class Batch : public ::testing::Test {
 
   /// `error` [m/s] scales a made-up error of each axis.
   RadarVelocityMeasurement measurement(double stamp, double t_O, double error = 0.0) const {
-    RadarVelocityMeasurement z;
-    z.stamp = motion.time(stamp);
-    z.R_RI = so3::exp({0.3, -1.2, 2.0}).toRotationMatrix();
-    z.l_I = {0.03, -0.1, 0.05};
+    RadarVelocityMeasurement z = radarMeasurement(motion, stamp, t_O);
     const int i = static_cast<int>(std::lround(100.0 * stamp));
-    z.v_R = motion.radarVelocity(stamp - t_O, z.R_RI, z.l_I) +
-            error * Eigen::Vector3d(wave(i), wave(i + 1), wave(i + 2));
-    z.covariance = 0.02 * 0.02 * Eigen::Matrix3d::Identity();
+    z.v_R += error * Eigen::Vector3d(wave(i), wave(i + 1), wave(i + 2));
     return z;
   }
 
@@ -103,9 +79,10 @@ TEST_F(Batch, EqualsTheFixedLagSmootherThatKeepsEverything) {
       options.time_offset_model = model;
       options.huber_threshold = huber;
       options.window = 100.0;
+      options.time_offset_noise = 1e-7;  // the paper's t_O of each node, and one for all, are the same where it is constant
       options.time_offset_initial = options.time_offset_sigma = 0.02;
       options.max_iterations = 50;
-      FixedLagSmoother online(options, ImuNoise(), motion.g_W, imu);
+      RadarSmoother online(options, skewMounting(), motion.g_W, imu);
       BatchProblem whole = problem(options);
       online.initialize(whole.start, whole.prior);
       for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
@@ -114,7 +91,7 @@ TEST_F(Batch, EqualsTheFixedLagSmootherThatKeepsEverything) {
         scan.stamp = scan.velocity->stamp;
         if (stamp < 1.0) scan.rest_velocity_sigma = 3.0;
         // Where the window puts its node: elsewhere is the same scan, but another split of the IMU's noise.
-        scan.t_O = model == TimeOffsetModel::kImu ? scan.stamp - online.nodeTime(scan.stamp) : 0.02;
+        scan.t_O = model == TimeOffsetModel::kImu ? scan.stamp - online.radar.nodeTime(scan.stamp) : 0.02;
         whole.scans.push_back(scan);
         online.add(*scan.velocity);
         if (scan.rest_velocity_sigma) online.addRest(scan.stamp, *scan.rest_velocity_sigma);
@@ -132,7 +109,7 @@ TEST_F(Batch, EqualsTheFixedLagSmootherThatKeepsEverything) {
         const NodeEstimate node = online.node(k);
         ASSERT_EQ(batch.nodes[k].time, node.time);
         NodeVector apart;
-        apart << boxminus(batch.nodes[k].x.data(), node.x.data()), batch.nodes[k].t_O - node.t_O;
+        apart << boxminus(batch.nodes[k].x.data(), node.x.data()), batch.nodes[k].t_O - online.t_O();
         const NodeVector sigma = batch.covariances[k].diagonal().cwiseSqrt();
         EXPECT_LT(apart.cwiseQuotient(sigma).norm(), 0.01) << "node " << k;
       }
@@ -179,7 +156,7 @@ TEST_F(Batch, PlacesItsNodesWhereTheOffsetPutsThem) {
     EXPECT_TRUE(batch.converged());
     EXPECT_GT(batch.placements, 1);
     for (std::size_t i = 0; i < whole.scans.size(); ++i) {
-      const NodeEstimate& node = batch.nodes[batch.node_of_scan[i]];
+      const BatchNode& node = batch.nodes[batch.node_of_scan[i]];
       EXPECT_NEAR(node.t_O, t_O, 1e-4);
       EXPECT_NEAR(node.time - (whole.scans[i].stamp - node.t_O), 0.0, 1.1e-4);
       const StateBlock truth = motion.state(node.time - motion.start);
@@ -191,7 +168,7 @@ TEST_F(Batch, PlacesItsNodesWhereTheOffsetPutsThem) {
 
 TEST_F(Batch, KnowsThePastBetterThanTheWindowDid) {
   SmootherOptions options;
-  FixedLagSmoother online(options, ImuNoise(), motion.g_W, imu);
+  RadarSmoother online(options, skewMounting(), motion.g_W, imu);
   BatchProblem whole = problem(options);
   online.initialize(whole.start, whole.prior);
   NodeVector then = NodeVector::Zero();
@@ -254,7 +231,7 @@ TEST_F(Batch, WithoutEstimationTheOffsetStays) {
     scan.t_O = 0.01;
     whole.scans.push_back(scan);
   }
-  for (const NodeEstimate& node : make(options).solve(whole).nodes) EXPECT_DOUBLE_EQ(node.t_O, 0.01);
+  for (const BatchNode& node : make(options).solve(whole).nodes) EXPECT_DOUBLE_EQ(node.t_O, 0.01);
 }
 
 TEST_F(Batch, NothingToBeginFromIsRefused) {

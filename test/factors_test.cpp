@@ -8,10 +8,10 @@
 #include "rio_t/factors/constant_offset_factor.h"
 #include "rio_t/factors/imu_factor.h"
 #include "rio_t/factors/offset_derivative.h"
-#include "rio_t/factors/prior_factor.h"
 #include "rio_t/factors/radar_velocity_factor.h"
 #include "rio_t/factors/zero_velocity_factor.h"
-#include "rio_t/smoother/factor_pool.h"
+#include "rio_t/graph/marginalization.h"
+#include "rio_t/smoother/fixed_lag_smoother.h"
 #include "synthetic_motion.h"
 
 namespace rio_t {
@@ -32,8 +32,7 @@ RadarVelocityMeasurement measurement(Time stamp) {
   z.stamp = stamp;
   z.v_R = {0.3, 1.1, -0.2};
   z.covariance << 0.01, 0.002, 0.0, 0.002, 0.004, 0.001, 0.0, 0.001, 0.02;
-  z.R_RI = so3::exp({0.3, -1.2, 2.0}).toRotationMatrix();
-  z.l_I = {0.03, -0.5, 0.2};
+  z.T_IR = {{0.03, -0.5, 0.2}, Eigen::Quaterniond(so3::exp({0.3, -1.2, 2.0}).conjugate())};
   return z;
 }
 
@@ -111,10 +110,17 @@ TEST(ImuFactor, TransitionSaysTheSameAsTheFactor) {
   EXPECT_LT((T_i + T_j * step.A).norm(), 1e-6 * T_i.norm());
 }
 
+RadarMotionModel imuModel(const ImuBuffer& imu, double max_time_offset = 0.25) {
+  return {TimeOffsetModel::kImu, max_time_offset, SyntheticMotion().g_W, &imu};
+}
+RadarMotionModel constantAcceleration(const ImuBuffer& imu) {
+  return {TimeOffsetModel::kConstantAcceleration, 0.25, SyntheticMotion().g_W, &imu};
+}
+
 TEST(ConstantAccelerationRadarFactor, JacobiansAreCorrect) {
   const SyntheticMotion motion;
   const ImuBuffer imu = motion.imu(0.9, 1.3, 400.0);
-  const ConstantAccelerationRadarFactor factor(measurement(motion.time(1.0)), imu, motion.g_W);
+  const RadarVelocityFactor factor(measurement(motion.time(1.0)), motion.time(1.0), constantAcceleration(imu));
   expectJacobiansCorrect(factor, {values(moved(motion.state(1.0), 0.1)), {0.04}});
 }
 
@@ -129,7 +135,7 @@ TEST(ConstantAccelerationRadarFactor, AtRestTheCorrectedAccelerationIsZero) {
   const double t_O = 0.1;
   const double* blocks[] = {x.data(), &t_O};
   Eigen::Vector3d r;
-  ConstantAccelerationRadarFactor(z, imu, {0.0, 0.0, -9.81}).Evaluate(blocks, r.data(), nullptr);
+  RadarVelocityFactor(z, z.stamp, constantAcceleration(imu)).Evaluate(blocks, r.data(), nullptr);
   EXPECT_LT(r.norm(), 1e-12);
 }
 
@@ -140,7 +146,7 @@ TEST(ImuRadarFactor, JacobiansAreCorrectForwardsAndBackwards) {
     // Held, t_O has no part in it: the derivatives in the state are exact.
     RadarVelocityMeasurement z = measurement(motion.time(1.0));
     z.held_t_O = t_O;
-    expectJacobiansCorrect(ImuRadarFactor(z, motion.time(0.98), imu, 0.25, motion.g_W),
+    expectJacobiansCorrect(RadarVelocityFactor(z, motion.time(0.98), imuModel(imu)),
                            {values(moved(motion.state(0.98), 0.05)), {0.2 - t_O}}, 1e-6, 1e-4);
   }
 }
@@ -150,7 +156,7 @@ TEST(ImuRadarFactor, TheDerivativeInTheOffsetIsThatOverItsWindow) {
   const ImuBuffer imu = motion.imu(0.5, 1.6, 400.0);
   const StateBlock x = moved(motion.state(0.98), 0.05);
   for (const double t_O : {-0.11, -0.0113, 0.0037, 0.0521, 0.1731}) {
-    const ImuRadarFactor factor(measurement(motion.time(1.0)), motion.time(0.98), imu, 0.5, motion.g_W);
+    const RadarVelocityFactor factor(measurement(motion.time(1.0)), motion.time(0.98), imuModel(imu, 0.5));
     const auto residual = [&](double offset, double** jacobians = nullptr) {
       const double* blocks[] = {x.data(), &offset};
       Eigen::Vector3d r;
@@ -181,7 +187,7 @@ TEST(ImuRadarFactor, AHeldOffsetIsAllThatCounts) {
   const auto residual = [&](double t_O) {
     const double* blocks[] = {x.data(), &t_O};
     Eigen::Vector3d r;
-    ImuRadarFactor(z, motion.time(0.98), imu, 0.25, motion.g_W).Evaluate(blocks, r.data(), nullptr);
+    RadarVelocityFactor(z, motion.time(0.98), imuModel(imu)).Evaluate(blocks, r.data(), nullptr);
     return r;
   };
   const Eigen::Vector3d free = residual(0.02);
@@ -214,12 +220,12 @@ TEST(ImuRadarFactor, ResidualIsZeroAtTheTrueOffset) {
   const ImuBuffer imu = motion.imu(0.5, 1.6, 400.0);
   for (const double t_O : {-0.1, 0.0, 0.03, 0.2}) {
     RadarVelocityMeasurement z = measurement(motion.time(1.0));
-    z.v_R = motion.radarVelocity(1.0 - t_O, z.R_RI, z.l_I);
+    z.v_R = motion.radarVelocity(1.0 - t_O, z.T_IR.R_RI(), z.T_IR.l_I);
     z.covariance.setIdentity();
     const StateBlock x = motion.state(1.02);
     const double* blocks[] = {x.data(), &t_O};
     Eigen::Vector3d r;
-    ImuRadarFactor(z, motion.time(1.02), imu, 0.25, motion.g_W).Evaluate(blocks, r.data(), nullptr);
+    RadarVelocityFactor(z, motion.time(1.02), imuModel(imu)).Evaluate(blocks, r.data(), nullptr);
     EXPECT_LT(r.norm(), 1e-4) << "offset " << t_O;
   }
 }
@@ -232,76 +238,16 @@ TEST(ZeroVelocityFactor, JacobiansAreCorrect) {
   expectJacobiansCorrect(ZeroVelocityFactor(0.05), {values(moved(SyntheticMotion().state(1.0), 0.1))});
 }
 
-/// Residual and Jacobians of `cost`, in one row.
-Eigen::VectorXd evaluated(const ceres::CostFunction& cost, const std::vector<const double*>& blocks) {
-  const int rows = cost.num_residuals();
-  Eigen::VectorXd r(rows);
-  std::vector<Eigen::VectorXd> J;
-  J.reserve(cost.parameter_block_sizes().size());
-  for (const int size : cost.parameter_block_sizes()) J.emplace_back(rows * size);
-  std::vector<double*> jacobians;
-  jacobians.reserve(J.size());
-  for (Eigen::VectorXd& j : J) jacobians.push_back(j.data());
-  EXPECT_TRUE(cost.Evaluate(blocks.data(), r.data(), jacobians.data()));
-  for (const Eigen::VectorXd& j : J) {
-    Eigen::VectorXd both(r.size() + j.size());
-    both << r, j;
-    r = both;
+TEST(PriorTerm, JacobiansAreCorrect) {
+  const StateBlock x0 = SyntheticMotion().state(1.0);
+  SquareRoot root{Eigen::MatrixXd(16, 16), Eigen::VectorXd(16)};
+  for (int i = 0; i < 16; ++i) {
+    root.r0(i) = std::sin(0.7 * i);
+    for (int j = 0; j < 16; ++j) root.J(i, j) = std::sin(1.0 + 3.1 * i + 1.7 * j);
   }
-  return r;
-}
-
-TEST(FactorPool, ARecycledFactorIsAsOneMadeAnew) {
-  const SyntheticMotion motion;
-  const ImuBuffer imu = motion.imu(0.5, 1.6, 400.0);
-  const auto preintegrated = [&](double from, double to) {
-    const StateBlock x = motion.state(from);
-    return preintegrate(imu, motion.time(from), motion.time(to), x.b_g(), x.b_a(), ImuNoise());
-  };
-  RadarVelocityMeasurement other = measurement(motion.time(1.2));
-  other.covariance *= 3.0;
-  other.held_t_O = 0.01;
-  const StateBlock x = motion.state(0.98);
-  const StateBlock next = motion.state(1.08);
-  const double t_O = 0.03;
-  const double next_t_O = 0.04;
-  for (const TimeOffsetModel model : {TimeOffsetModel::kImu, TimeOffsetModel::kConstantAcceleration}) {
-    SmootherOptions options;
-    options.time_offset_model = model;
-    // One pool hands out new factors, the other ones that stood for something else.
-    FactorPool fresh(options, ImuNoise(), motion.g_W, imu);
-    FactorPool used(options, ImuNoise(), motion.g_W, imu);
-    WindowNode node = used.node();
-    node.imu_from_previous = used.imuFactor(preintegrated(1.1, 1.3));
-    node.offset_from_previous = used.offsetFactor(1.0);
-    node.rest = used.zeroVelocityFactor(2.0);
-    node.radar.push_back({other.stamp, used.radarFactor(other, motion.time(1.21))});
-    const void* recycled = node.imu_from_previous.get();
-    used.recycle(std::move(node));
-
-    const auto imu_factor = used.imuFactor(preintegrated(0.98, 1.08));
-    EXPECT_EQ(imu_factor.get(), recycled);
-    EXPECT_EQ(evaluated(*imu_factor, {x.data(), next.data()}),
-              evaluated(*fresh.imuFactor(preintegrated(0.98, 1.08)), {x.data(), next.data()}));
-    EXPECT_EQ(evaluated(*used.offsetFactor(1e-3), {&t_O, &next_t_O}),
-              evaluated(*fresh.offsetFactor(1e-3), {&t_O, &next_t_O}));
-    EXPECT_EQ(evaluated(*used.zeroVelocityFactor(0.05), {x.data()}), evaluated(*fresh.zeroVelocityFactor(0.05), {x.data()}));
-    const RadarVelocityMeasurement z = measurement(motion.time(1.0));
-    EXPECT_EQ(evaluated(*used.radarFactor(z, motion.time(0.98)), {x.data(), &t_O}),
-              evaluated(*fresh.radarFactor(z, motion.time(0.98)), {x.data(), &t_O}));
-    EXPECT_TRUE(used.node().radar.empty());
-  }
-}
-
-TEST(PriorFactor, JacobiansAreCorrect) {
-  NodePrior prior;
-  prior.x0 = SyntheticMotion().state(1.0);
-  prior.t_O0 = 0.02;
-  for (int i = 0; i < kNodeTangent; ++i) {
-    prior.r0(i) = std::sin(0.7 * i);
-    for (int j = 0; j < kNodeTangent; ++j) prior.J(i, j) = std::sin(1.0 + 3.1 * i + 1.7 * j);
-  }
-  expectJacobiansCorrect(PriorFactor(prior), {values(moved(prior.x0, 0.4)), {-0.01}});
+  const PriorTerm prior({std::make_shared<StateManifold>(), std::make_shared<ScalarManifold>()},
+                        {stored(x0), Eigen::VectorXd::Constant(1, 0.02)}, root);
+  expectJacobiansCorrect(prior, {values(moved(x0, 0.4)), {-0.01}});
 }
 
 }  // namespace

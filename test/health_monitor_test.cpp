@@ -20,12 +20,21 @@ NavigationState knownState() {
   return state;
 }
 
+/// Off by `speed` [m/s] along x, with that variance.
+Innovation innovation(Time stamp, double speed, double variance) {
+  Innovation result;
+  result.stamp = stamp;
+  result.d = {speed, 0.0, 0.0};
+  result.S = variance * Eigen::Matrix3d::Identity();
+  return result;
+}
+
 /// Scans at 10 Hz with an innovation of `sigmas` along x; the health after the last.
 Health feed(HealthMonitor& monitor, double from, double to, double sigmas) {
   Health health = monitor.health();
   for (int k = 0; from + 0.1 * k < to; ++k) {
     const Time stamp = at(from + 0.1 * k);
-    monitor.addInnovation(stamp, Eigen::Vector3d(0.1 * sigmas, 0.0, 0.0), 0.01 * Eigen::Matrix3d::Identity());
+    monitor.addInnovation(innovation(stamp, 0.1 * sigmas, 0.01));
     monitor.updated(stamp);
     health = monitor.judge(stamp, knownState());
   }
@@ -47,8 +56,7 @@ TEST(HealthMonitor, ScansThatDecideNothingContradictNothing) {
   HealthMonitor monitor(HealthOptions(), 4.0);
   for (int i = 0; i < 40; ++i) {
     if (i % 2 == 0) {
-      monitor.addInnovation(at(5.0 + 0.1 * i), Eigen::Vector3d(2.0, 0.0, 0.0),
-                            0.01 * Eigen::Matrix3d::Identity());
+      monitor.addInnovation(innovation(at(5.0 + 0.1 * i), 2.0, 0.01));
     } else {
       monitor.addUndecided(at(5.0 + 0.1 * i));
     }
@@ -60,7 +68,7 @@ TEST(HealthMonitor, ScansThatDecideNothingContradictNothing) {
 TEST(HealthMonitor, FewScansProveNothing) {
   HealthMonitor monitor(HealthOptions(), 4.0);
   for (int k = 0; k < 5; ++k) {
-    monitor.addInnovation(at(0.4 * k), Eigen::Vector3d(9.0, 0.0, 0.0), Eigen::Matrix3d::Identity());
+    monitor.addInnovation(innovation(at(0.4 * k), 9.0, 1.0));
     monitor.updated(at(0.4 * k));
     EXPECT_EQ(monitor.judge(at(0.4 * k), knownState()), Health::kOk);
   }

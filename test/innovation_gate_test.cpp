@@ -1,5 +1,5 @@
 // The gate rejects what contradicts the IMU, and does not stay shut where the prediction is what is wrong.
-#include "rio_t/odometry/innovation_gate.h"
+#include "rio_t/sensors/innovation_gate.h"
 
 #include <gtest/gtest.h>
 
@@ -9,17 +9,18 @@
 namespace rio_t {
 namespace {
 
-VelocityPrior prior() {
-  VelocityPrior result;
-  result.covariance = 0.01 * Eigen::Matrix3d::Identity();
+/// Off by `speed` along x; 0.1 m/s each of prediction and measurement.
+Innovation innovation(Time stamp, double speed) {
+  Innovation result;
+  result.stamp = stamp;
+  result.d = {speed, 0.0, 0.0};
+  result.S = 0.02 * Eigen::Matrix3d::Identity();
   return result;
 }
 
-/// `speed` along x, which `agreeing` of 20 points support.
-EgoVelocity measured(double speed, std::size_t agreeing) {
+/// `agreeing` of 20 points support the velocity.
+EgoVelocity supportedBy(std::size_t agreeing) {
   EgoVelocity result;
-  result.v_R = {speed, 0.0, 0.0};
-  result.covariance = 0.01 * Eigen::Matrix3d::Identity();
   result.points_used = 20;
   result.inliers.resize(agreeing);
   return result;
@@ -30,7 +31,7 @@ class Gate : public ::testing::Test {
   Gate() : gate(SmootherOptions()) { gate.used(at(0.0)); }
   static Time at(double seconds) { return Time::fromSeconds(100.0 + seconds); }
   bool rejects(double seconds, double speed, std::size_t agreeing, bool tilt_is_known = true) {
-    return gate.rejects(at(seconds), prior(), measured(speed, agreeing), tilt_is_known);
+    return gate.rejects(innovation(at(seconds), speed), isUnanimous(supportedBy(agreeing)), tilt_is_known);
   }
   InnovationGate gate;
 };

@@ -1,4 +1,4 @@
-#include "rio_t/odometry/offset_step_detector.h"
+#include "rio_t/sensors/offset_step_detector.h"
 
 #include <gtest/gtest.h>
 
@@ -10,13 +10,13 @@ namespace {
 /// Scans at 10 Hz whose acceleration turns about, with an offset error and made-up noise of 0.03 m/s.
 /// Seconds until a step is seen; 60 where none is.
 double secondsToStep(double offset_error, double acceleration, double noise = 0.03) {
-  OffsetStepDetector monitor{OffsetStepDetectorOptions()};
+  OffsetStepDetector detector{OffsetStepDetectorOptions()};
   const Eigen::Matrix3d S = 0.05 * 0.05 * Eigen::Matrix3d::Identity();
   for (int i = 0; i < 600; ++i) {
     const Eigen::Vector3d J = acceleration * Eigen::Vector3d(std::sin(0.31 * i), std::cos(0.23 * i), 0.3);
     const Eigen::Vector3d e(std::sin(2.1 * i * i), std::cos(1.3 * i * i), std::sin(0.7 * i * i + 1.0));
-    if (monitor.stepped(Time::fromSeconds(0.1 * i), offset_error * J + std::sqrt(2.0) * noise * e, S, J))
-      return 0.1 * i;
+    const Eigen::Vector3d d = offset_error * J + std::sqrt(2.0) * noise * e;
+    if (detector.stepped({Time::fromSeconds(0.1 * i), d, S, S, J})) return 0.1 * i;
   }
   return 60.0;
 }
@@ -39,10 +39,10 @@ TEST(OffsetStepDetector, DoesNotSpeakWithoutExcitation) { EXPECT_EQ(secondsToSte
 TEST(OffsetStepDetector, CanBeTurnedOff) {
   OffsetStepDetectorOptions options;
   options.enabled = false;
-  OffsetStepDetector monitor(options);
+  OffsetStepDetector detector(options);
   for (int i = 0; i < 200; ++i) {
-    EXPECT_FALSE(monitor.stepped(Time::fromSeconds(0.1 * i), {1, 0, 0}, 1e-4 * Eigen::Matrix3d::Identity(),
-                                 {2, 0, 0}));
+    const Eigen::Matrix3d S = 1e-4 * Eigen::Matrix3d::Identity();
+    EXPECT_FALSE(detector.stepped({Time::fromSeconds(0.1 * i), {1, 0, 0}, S, S, {2, 0, 0}}));
   }
 }
 

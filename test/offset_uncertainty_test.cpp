@@ -1,5 +1,5 @@
 // The published sigma of the offset: widened where the innovations ask for a change all the time.
-#include "rio_t/odometry/offset_uncertainty.h"
+#include "rio_t/sensors/offset_uncertainty.h"
 
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ struct Scans {
   void feed(OffsetUncertainty& u, double seconds, double sigma, double lag) {
     for (double end = time + seconds; time < end; time += 0.1) {
       const Eigen::Vector3d J = kAcceleration * Eigen::Vector3d(std::sin(time), std::cos(time), 0.0);
-      u.add(Time::fromSeconds(time), sigma * noise.vector() + lag * J, kCovariance, J);
+      u.add({Time::fromSeconds(time), sigma * noise.vector() + lag * J, kCovariance, kCovariance, J});
     }
   }
   Noise noise;

@@ -11,7 +11,7 @@ void widen(Information& information, Eigen::Index first, Eigen::Index size, doub
   Eigen::MatrixXd sum = information.S.block(first, first, size, size);
   sum.diagonal().array() += 1.0 / variance;
   const Eigen::MatrixXd column = information.S.middleCols(first, size);
-  const Eigen::MatrixXd gain = column * sum.inverse();
+  const Eigen::MatrixXd gain = sum.ldlt().solve(column.transpose()).transpose();
   information.s -= gain * information.s.segment(first, size).eval();
   information.S -= gain * column.transpose();
 }

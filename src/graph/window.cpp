@@ -29,26 +29,19 @@ Window::~Window() = default;
 Window::Window(Window&&) noexcept = default;
 Window& Window::operator=(Window&&) noexcept = default;
 
-Block& Window::addNode(Time time, std::shared_ptr<const Manifold> manifold, Eigen::VectorXd x) {
+Block& Window::addNode(Time time, std::shared_ptr<const Manifold> manifold, const Eigen::VectorXd& x) {
   const auto later = std::find_if(blocks_.rbegin(), blocks_.rend(), [&](const auto& block) {
                        return block->time && *block->time <= time;
                      }).base();
-  Block block;
-  block.time = time;
-  block.manifold = std::move(manifold);
-  block.x = std::move(x);
-  return *insert(later, std::move(block));
+  return *insert(later, std::make_shared<Block>(time, std::move(manifold), x));
 }
 
-std::shared_ptr<Block> Window::addCalibration(std::shared_ptr<const Manifold> manifold, Eigen::VectorXd x) {
-  Block block;
-  block.manifold = std::move(manifold);
-  block.x = std::move(x);
-  return insert(blocks_.end(), std::move(block));
+std::shared_ptr<Block> Window::addCalibration(std::shared_ptr<const Manifold> manifold, const Eigen::VectorXd& x) {
+  return insert(blocks_.end(), std::make_shared<Block>(std::nullopt, std::move(manifold), x));
 }
 
-std::shared_ptr<Block> Window::insert(std::vector<std::shared_ptr<Block>>::iterator before, Block block) {
-  const auto added = std::make_shared<Block>(std::move(block));
+std::shared_ptr<Block> Window::insert(std::vector<std::shared_ptr<Block>>::iterator before,
+                                      std::shared_ptr<Block> added) {
   blocks_.insert(before, added);
   const Manifold& manifold = *added->manifold;
   if (manifold.size() == manifold.tangent()) {

@@ -12,7 +12,7 @@
 
 namespace rio_t {
 
-StateBlock toStateBlock(const Eigen::VectorXd& stored) {
+StateBlock toStateBlock(const Eigen::Ref<const Eigen::VectorXd>& stored) {
   StateBlock x;
   std::copy(stored.data(), stored.data() + StateBlock::kSize, x.data());
   return x;

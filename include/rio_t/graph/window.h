@@ -9,6 +9,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "rio_t/core/time.h"
@@ -20,9 +21,18 @@ class CeresManifold;
 
 /// Parameters that the solver finds.
 struct Block {
-  std::optional<Time> time;            ///< of a node; none for calibration, which holds at all times
+  Block(std::optional<Time> time_in, std::shared_ptr<const Manifold> manifold_in, const Eigen::VectorXd& x_in)
+      : time(time_in),
+        manifold(std::move(manifold_in)),
+        storage(std::make_unique<double[]>(static_cast<std::size_t>(x_in.size()))),
+        x(storage.get(), x_in.size()) {
+    x = x_in;
+  }
+
+  std::optional<Time> time;  ///< of a node; none for calibration, which holds at all times
   std::shared_ptr<const Manifold> manifold;
-  Eigen::VectorXd x;                   ///< as stored; its address stays
+  const std::unique_ptr<double[]> storage;
+  Eigen::Map<Eigen::VectorXd> x;  ///< as stored; its address stays
   double bound = std::numeric_limits<double>::infinity();  ///< on |x| of a block of one number
   bool is_constant = false;  ///< not solved for; set by Window::setConstant
   bool is_retired = false;   ///< calibration that no new term will use
@@ -45,9 +55,9 @@ class Window {
   Window(Window&&) noexcept;
   Window& operator=(Window&&) noexcept;
 
-  Block& addNode(Time time, std::shared_ptr<const Manifold> manifold, Eigen::VectorXd x);
+  Block& addNode(Time time, std::shared_ptr<const Manifold> manifold, const Eigen::VectorXd& x);
   /// Who keeps it can ask whether the window still has it.
-  std::shared_ptr<Block> addCalibration(std::shared_ptr<const Manifold> manifold, Eigen::VectorXd x);
+  std::shared_ptr<Block> addCalibration(std::shared_ptr<const Manifold> manifold, const Eigen::VectorXd& x);
   Term& add(std::unique_ptr<ceres::CostFunction> cost, std::vector<Block*> blocks,
             std::shared_ptr<ceres::LossFunction> loss = nullptr);
   void remove(const Term& term);
@@ -62,7 +72,7 @@ class Window {
   ceres::Problem& problem() { return *problem_; }
 
  private:
-  std::shared_ptr<Block> insert(std::vector<std::shared_ptr<Block>>::iterator before, Block block);
+  std::shared_ptr<Block> insert(std::vector<std::shared_ptr<Block>>::iterator before, std::shared_ptr<Block> added);
 
   // Destroyed last: the problem refers to them.
   std::map<const Manifold*, std::unique_ptr<CeresManifold>> ceres_manifolds_;

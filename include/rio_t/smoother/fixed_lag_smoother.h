@@ -108,7 +108,7 @@ class FixedLagSmoother {
   mutable LastPreintegration last_preintegration_;  ///< changes no result
 };
 
-StateBlock toStateBlock(const Eigen::VectorXd& stored);
+StateBlock toStateBlock(const Eigen::Ref<const Eigen::VectorXd>& stored);
 Eigen::VectorXd stored(const StateBlock& x);
 
 }  // namespace rio_t

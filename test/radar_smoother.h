@@ -1,0 +1,55 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "rio_t/sensors/radar_in_window.h"
+#include "rio_t/smoother/fixed_lag_smoother.h"
+#include "synthetic_motion.h"
+
+namespace rio_t {
+
+/// A fixed-lag smoother with one radar, without the decisions of a channel.
+struct RadarSmoother {
+  RadarSmoother(const SmootherOptions& options, const Extrinsics& T_IR, const Eigen::Vector3d& g_W,
+                const ImuBuffer& imu)
+      : walk(options.time_offset_noise), states(options, ImuNoise(), g_W, imu), radar(options, T_IR, g_W, imu) {}
+
+  void initialize(Time time, const NodePrior& prior) { start(states, radar, time, prior); }
+  RadarInWindow::AddResult add(const RadarVelocityMeasurement& z) { return radar.add(states, z); }
+  void addRest(Time stamp, double sigma) { states.addZeroVelocity(*states.nodeAt(radar.nodeTime(stamp)), sigma); }
+  Solution optimize(double short_step = SolverLimits().short_step) { return states.optimize(short_step); }
+  std::vector<NodeEstimate> marginalize() { return states.marginalize({{&radar.offsetBlock(), walk}}); }
+  std::optional<RadarVelocityPrediction> predict(Time stamp) const { return radar.predict(states, stamp); }
+  void stepOffset(Time stamp) { radar.stepOffset(states.window(), stamp); }
+
+  std::size_t size() const { return states.size(); }
+  NodeEstimate node(std::size_t k) const { return states.node(k); }
+  NodeEstimate newest() const { return states.newest(); }
+  double t_O() const { return radar.offset(); }
+  NodeMatrix newestCovariance() const { return states.newestCovariance({&radar.offsetBlock()}); }
+
+  double walk;
+  FixedLagSmoother states;
+  RadarInWindow radar;
+};
+
+/// A mounting that hides no sign and no axis.
+inline Extrinsics skewMounting() {
+  return {{0.03, -0.1, 0.05}, Eigen::Quaterniond(so3::exp({0.3, -1.2, 2.0}).conjugate())};
+}
+
+/// What a radar with skewMounting() measures at `stamp` [s], with `t_O` [s].
+inline RadarVelocityMeasurement radarMeasurement(const SyntheticMotion& motion, double stamp, double t_O) {
+  RadarVelocityMeasurement z;
+  z.stamp = motion.time(stamp);
+  z.T_IR = skewMounting();
+  z.v_R = motion.radarVelocity(stamp - t_O, z.T_IR.R_RI(), z.T_IR.l_I);
+  z.covariance = 0.02 * 0.02 * Eigen::Matrix3d::Identity();
+  return z;
+}
+
+/// Made-up numbers around zero.
+inline double wave(int i) { return std::sin(1.0 + 2.71 * i) + 0.4 * std::cos(0.9 * i * i); }
+
+}  // namespace rio_t
