@@ -39,7 +39,6 @@ import rosbag  # noqa: E402
 import rospy  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from rio_t import programs  # noqa: E402
-from rio_t.errors import RioTError  # noqa: E402
 from rio_t.plots import pyplot  # noqa: E402
 from rio_t.ros_processes import program, quiet, start_master, wait_for  # noqa: E402
 
@@ -75,10 +74,8 @@ def make_bag(path, minutes):
     words = (program("rio_t", "simulate"), "--motion", "medium", "--seed", "11", "--time-offset", "0.02", "--duration",
              f"{60.0 * minutes:g}", "--out", path)
     print(f"Simulating {minutes:g} minutes ...", flush=True)
-    try:
-        programs.output_of(*words)
-    except RioTError as error:
-        sys.exit(f"soak.py: the simulation failed: {error}")
+    if programs.run(*words).returncode != 0:
+        sys.exit("soak.py: the simulation failed")
 
 
 def run(bag, minutes, rate):

@@ -74,7 +74,7 @@ def test_place_and_heading_of_the_start_are_no_error():
     result = data.result(data.no_error)
     # What is left is the interpolation of the truth.
     assert numpy.abs(result.ratios * MadeUp.SIGMAS).max() < 3e-5
-    assert result.time[0] >= data.time[0] + 1.0
+    assert len(result.ratios) == len(data.time) - 10, "the first second counts"
 
 
 def test_roll_and_pitch_of_the_start_stay_errors():

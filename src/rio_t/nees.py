@@ -26,9 +26,8 @@ SETTLING = 1.0  # [s] after the first stamp that are left out: there the errors 
 
 @dataclasses.dataclass
 class Consistency:
-    """Of one run. `time` [s] and `ratios` (n, 9): error / sigma of position, rotation vector, velocity, and
-    `offset_ratio` of the offset. `nees`: mean over time and axes for each of PARTS."""
-    time: numpy.ndarray
+    """Of one run. `ratios` (n, 9): error / sigma of position, rotation vector, velocity; `offset_ratio`: of the offset.
+    `nees`: mean over time and axes for each of PARTS."""
     ratios: numpy.ndarray
     offset_ratio: numpy.ndarray
 
@@ -76,8 +75,7 @@ def consistency(navigation, offsets, truth, true_offset):
         raise RioTError("a sigma is 0 or not a number")
     # A sigma of 0: the offset is not estimated.
     estimated = (offsets["stamp"] >= begin) & (offsets["sigma_s"] > 0)
-    return Consistency(navigation.poses.seconds(truth.stamp[0])[used], ratios,
-                       (offsets["offset_s"][estimated] - true_offset) / offsets["sigma_s"][estimated])
+    return Consistency(ratios, (offsets["offset_s"][estimated] - true_offset) / offsets["sigma_s"][estimated])
 
 
 def read_consistency(folder, truth_path, true_offset):

@@ -25,6 +25,8 @@ class Source:
     motion: Optional[str] = None
     offset: Optional[float] = None  # ms, the truth if it is known
     bag: Optional[pathlib.Path] = None
+    users: int = 0                  # work that still wants a simulated bag
+    lock: threading.Lock = dataclasses.field(default_factory=threading.Lock)
 
     @property
     def label(self):
@@ -101,23 +103,19 @@ class Laboratory:
     def map(self, work):
         """Results, in order, of `work`: (source, count of runs, function of lab and bag). Side by side; a simulated
         bag is made for the first that wants it and removed after the last."""
-        users, locks = {}, {}
         for source, _, _ in work:
-            users[id(source)] = users.get(id(source), 0) + 1
-            locks[id(source)] = threading.Lock()
+            source.users += 1
 
         def one(source, function):
-            if source.motion is None:
-                return function(self, source.bag)
-            with locks[id(source)]:
+            with source.lock:
                 if source.bag is None:
                     source.bag = self.simulate(source)
             try:
                 return function(self, source.bag)
             finally:
-                with locks[id(source)]:
-                    users[id(source)] -= 1
-                    if users[id(source)] == 0:
+                with source.lock:
+                    source.users -= 1
+                    if source.users == 0 and source.motion is not None:
                         source.bag.unlink()
                         truth_of(source.bag).unlink()
                         source.bag = None

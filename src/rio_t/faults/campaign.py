@@ -37,16 +37,19 @@ def topics_of(folder, config):
     return tuple((values[f"{kind}_topic"], kind) for kind in ("imu", "radar", "trigger"))
 
 
-def simulated_bag(folder, scratch):
+def bags_for(folder, scratch, given, config):
+    """The given bag; else a simulated one, made with the programs in `folder`, and the real one if it is there."""
+    if given:
+        return [Bag("given", pathlib.Path(given).resolve(), config, topics_of(folder, config))]
     path, truth = scratch / "simulated.bag", scratch / "simulated.truth.txt"
     programs.output_of(folder / "simulate", *SIMULATION, "--out", path, "--ground-truth", truth)
-    return Bag("simulated", path, "irs", topics_of(folder, "irs"), truth)
-
-
-def real_bag(folder):
-    """None, and where it was looked for, if it is not there."""
-    path = pathlib.Path(os.environ.get("RIO_T_DATA_DIR", "../shared/data")) / REAL_BAG
-    return Bag("real", path.resolve(), "ti_mmwave", topics_of(folder, "ti_mmwave")) if path.exists() else None, path
+    bags = [Bag("simulated", path, "irs", topics_of(folder, "irs"), truth)]
+    real = pathlib.Path(os.environ.get("RIO_T_DATA_DIR", "../shared/data")) / REAL_BAG
+    if real.exists():
+        bags.append(Bag("real", real.resolve(), "ti_mmwave", topics_of(folder, "ti_mmwave")))
+    else:
+        print(f"No real bag at {real}: simulated data only (RIO_T_DATA_DIR names the folder).", flush=True)
+    return bags
 
 
 def run_pipeline(folder, bag, config, settings, output):
@@ -63,7 +66,7 @@ def run_pipeline(folder, bag, config, settings, output):
 @functools.lru_cache(maxsize=None)
 def messages_of(bag):
     """Once in each process that runs cases."""
-    return stream.read(bag.path, dict(bag.topics))
+    return stream.read(bag.path, bag.topics)
 
 
 def ensure_usual(folder, bag, settings, output):

@@ -14,7 +14,7 @@ from typing import Callable
 
 import numpy
 
-from . import injection, judge, stream
+from . import campaign, injection, judge, stream
 
 RATE = 4.0                  # times real time of the played bags
 VELOCITY = 0.5              # [m/s] error of the odometry where it has recovered
@@ -38,7 +38,7 @@ class Live:
         self.tester, self.bag, self.folder = tester, bag, folder
         self.happened, self.wrong = [], []
         self.truth = judge.read_truth(bag.truth)
-        self.messages = stream.read(bag.path, bag.topics)
+        self.messages = campaign.messages_of(bag)
         self.begin = 1e-9 * next(m for m in self.messages if m.kind == "imu").stamp
         self.log = folder / "node.log"
         self.logs = open(self.log, "w")

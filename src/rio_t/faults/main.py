@@ -53,24 +53,12 @@ def parse(words):
     return parser, arguments
 
 
-def bags_for(arguments, folder, scratch):
-    from . import campaign
-    if arguments.bag:
-        return [campaign.Bag("given", pathlib.Path(arguments.bag).resolve(), arguments.config,
-                             campaign.topics_of(folder, arguments.config))]
-    bags = [campaign.simulated_bag(folder, scratch)]
-    real, path = campaign.real_bag(folder)
-    if real is None:
-        say(f"No real bag at {path}: simulated data only (RIO_T_DATA_DIR names the folder).")
-    return bags + ([real] if real else [])
-
-
 def run(arguments, bag_cases, live_cases, scratch):
     """Rows of the table: case, bag, what must happen, what happened, [what is wrong]."""
     from .. import programs
     from . import campaign, live
     folder = programs.find(("rio_t_bag", "simulate"), "--programs DIR", arguments.programs)
-    bags, rows = bags_for(arguments, folder, scratch), []
+    bags, rows = campaign.bags_for(folder, scratch, arguments.bag, arguments.config), []
 
     def add(*row):
         rows.append(row)
