@@ -8,22 +8,25 @@ in a sourced workspace, e.g. after `source build/devel/setup.bash`
 Exit status 1 where a check fails. Latencies are judged at rate 1 only: other rates are not what a robot has.
 """
 import argparse
+import contextlib
 import os
-import re
+import pathlib
 import struct
-import subprocess
 import sys
 import tempfile
 import time
 
 import numpy
 import rosbag
+import rosgraph
 import rospy
+import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
+from rio_t import programs, run_folder, tum
+from rio_t.errors import RioTError
 from rio_t.msg import TimeOffset
-
-from live_tools import DEADLINE, is_running, program, start, start_master, stop, wait_for
+from rio_t.ros_processes import DEADLINE, program, quiet, start_master, wait_for
 
 ATE_BOUND = 0.10  # of the bag runner's
 
@@ -58,63 +61,52 @@ class Listener:
         return {message.header.stamp.to_nsec(): message for message in parsed}
 
 
+def is_running(node):
+    try:
+        rosgraph.Master("/benchmark").lookupNode(node)
+        return True
+    except rosgraph.MasterError:
+        return False
+
+
 def play(bag, config, rate, nodelet, clock, topics):
     """Plays the bag to the live node; what was heard meanwhile."""
-    processes = [start_master()]
-    try:
+    with contextlib.ExitStack() as running:
+        running.enter_context(start_master())
         # Before use_sim_time is set: the listener keeps to the clock of the wall.
         rospy.init_node("listener", disable_signals=True)
         listener = Listener(topics)
         launch = ["roslaunch", "rio_t", "rio_t.launch", f"config:={config}", f"nodelet:={str(nodelet).lower()}"]
         if clock:
             launch += [f"bag:={bag}", f"bag_rate:={rate}"]
-        processes.append(start(*launch))
+        running.enter_context(quiet(*launch))
         wait_for("the node's diagnostics", lambda: "input" in listener.diagnostics)
         if not clock:
-            processes.append(start(program("rosbag", "play"), "--quiet", "--delay=3", f"--rate={rate}",
-                                   "__name:=bag_player", bag))
+            running.enter_context(quiet(program("rosbag", "play"), "--quiet", "--delay=3", f"--rate={rate}",
+                                        "__name:=bag_player", bag))
             wait_for("rosbag play", lambda: is_running("/bag_player"))
         with rosbag.Bag(bag) as data:
             length = data.get_end_time() - data.get_start_time()
         wait_for("the end of the bag", lambda: not is_running("/bag_player"), length / rate + DEADLINE)
         time.sleep(2.0)  # the last scans, and diagnostics once more
         return listener
-    finally:
-        for process in reversed(processes):
-            stop(process)
 
 
-def write_tum(path, odometry):
-    with open(path, "w") as file:
-        for stamp in sorted(odometry):
-            p, q = odometry[stamp].pose.pose.position, odometry[stamp].pose.pose.orientation
-            file.write(f"{stamp // 10**9}.{stamp % 10**9:09d} {p.x:.9f} {p.y:.9f} {p.z:.9f} "
-                       f"{q.x:.9f} {q.y:.9f} {q.z:.9f} {q.w:.9f}\n")
-
-
-def read_tum(path):
-    poses = {}
-    with open(path) as lines:
-        for line in lines:
-            stamp, *numbers = line.split()
-            whole, _, part = stamp.partition(".")
-            poses[int(whole) * 10**9 + int(part.ljust(9, "0"))] = numpy.array([float(x) for x in numbers])
-    return poses
+def trajectory_of(poses):
+    """Of poses by stamp [ns]."""
+    stamps = sorted(poses)
+    positions, rotations = [poses[s].position for s in stamps], [poses[s].orientation for s in stamps]
+    return tum.Trajectory(numpy.array(stamps), numpy.array([[p.x, p.y, p.z] for p in positions]),
+                          numpy.array([[q.x, q.y, q.z, q.w] for q in rotations]))
 
 
 def write_truth(bag, topic, path):
-    with rosbag.Bag(bag) as data, open(path, "w") as file:
-        count = 0
-        for _, message, _ in data.read_messages([topic]):
-            stamp, p, q = message.header.stamp.to_nsec(), message.pose.position, message.pose.orientation
-            file.write(f"{stamp // 10**9}.{stamp % 10**9:09d} {p.x!r} {p.y!r} {p.z!r} {q.x!r} {q.y!r} {q.z!r} {q.w!r}\n")
-            count += 1
-    return count > 0
-
-
-def value_of(yaml, key):
-    found = re.search(rf"^{key}: *(.*?) *(#.*)?$", yaml, re.MULTILINE)
-    return found.group(1).strip("\"'") if found else ""
+    """Whether there is one."""
+    with rosbag.Bag(bag) as data:
+        poses = {message.header.stamp.to_nsec(): message.pose for _, message, _ in data.read_messages([topic])}
+    if poses:
+        tum.write(path, trajectory_of(poses))
+    return bool(poses)
 
 
 class Table:
@@ -135,29 +127,33 @@ def main():
     parser.add_argument("--no-clock", action="store_true", help="as sensors do: no /clock, the node lives in wall time")
     parser.add_argument("--set", action="append", default=[], metavar="key=value")
     arguments = parser.parse_args()
+    try:
+        passed = compare(arguments)
+    except (RioTError, OSError) as error:
+        sys.exit(f"live_against_bag.py: {error}")
+    sys.exit(0 if passed else 1)
+
+
+def compare(arguments):
+    """Prints the table; true if all checks hold."""
     bag = os.path.abspath(arguments.bag)
-    folder = tempfile.mkdtemp(prefix="rio_t_live_against_bag_")
+    folder = pathlib.Path(tempfile.mkdtemp(prefix="rio_t_live_against_bag_"))
 
     # One file with every parameter, so that both sides have the same.
-    words = [program("rio_t", "rio_t_bag"), "--config", arguments.config]
-    for assignment in arguments.set:
-        words += ["--set", assignment]
-    yaml = subprocess.run([*words, "--print-config"], stdout=subprocess.PIPE, text=True, check=True).stdout
-    config = os.path.join(folder, "config.yaml")
-    with open(config, "w") as file:
-        file.write(yaml)
-    runner = os.path.join(folder, "bag_runner")
-    subprocess.run([words[0], "--bag", bag, "--config", config, "--output-dir", runner], check=True,
-                   stdout=subprocess.DEVNULL)
+    bag_program, config, runner = program("rio_t", "rio_t_bag"), folder / "config.yaml", folder / "bag_runner"
+    settings = [word for setting in arguments.set for word in ("--set", setting)]
+    config.write_text(programs.output_of(bag_program, "--config", arguments.config, *settings, "--print-config"))
+    programs.output_of(bag_program, "--bag", bag, "--config", config, "--output-dir", runner)
 
-    imu_topic, radar_topic = value_of(yaml, "imu_topic"), value_of(yaml, "radar_topic")
+    values = run_folder.read_yaml(config)
+    imu_topic, radar_topic = values["imu_topic"], values["radar_topic"]
     odom, offset = "/rio_t/odom", "/rio_t/time_offset"
     listener = play(bag, config, arguments.rate, arguments.nodelet, not arguments.no_clock,
                     (imu_topic, radar_topic, odom, offset))
     live, offsets = listener.messages(odom, Odometry), listener.messages(offset, TimeOffset)
     diagnostics = listener.diagnostics
     if not live or not offsets:
-        sys.exit(f"live_against_bag.py: nothing came on {odom} or {offset}; diagnostics: {diagnostics}")
+        raise RioTError(f"nothing came on {odom} or {offset}; diagnostics: {diagnostics}")
 
     table = Table()
     print(f"{os.path.basename(bag)}, {' '.join([arguments.config, *arguments.set])}, rate {arguments.rate:g}"
@@ -166,40 +162,36 @@ def main():
         imu = sorted(message.header.stamp.to_nsec() for _, message, _ in data.read_messages([imu_topic]))
     came = int(diagnostics["input"]["imu_messages"])
     table.row("IMU messages that came", f"{came} of {len(imu)}", came == len(imu))
-    by_runner = read_tum(os.path.join(runner, "trajectory.txt"))
+    by_runner = tum.read(runner / "trajectory.txt").positions()
     expected = [stamp for stamp in imu if stamp >= min(live)]
     missing = [stamp for stamp in expected if stamp not in live]
     table.row("IMU stamps in ~odom", f"{len(expected) - len(missing)} of {len(expected)} from the first on, "
               f"{len(missing)} missing", not missing)
     later = 1e-9 * (min(live) - min(by_runner))
     table.row("first ~odom", f"{1e3 * later:+.1f} ms after the bag runner's", abs(later) < 0.5)
-    with open(os.path.join(runner, "time_offset.csv")) as lines:
-        updates = len(lines.readlines()) - 1
+    updates = len(run_folder.read(runner, "time_offset.csv")["stamp"])
     table.row("optimised states", f"{len(offsets)}, bag runner {updates}", abs(len(offsets) - updates) <= 2)
     drops = {key: int(value) for key, value in diagnostics.get("input", {}).items()
              if key in ("dropped_queue_full", "fault_imu_gap", "fault_imu_out_of_order", "dropped_imu_not_usable")}
     table.row("lost or out of order", ", ".join(f"{v} {k}" for k, v in drops.items()) or "none",
               drops.get("dropped_queue_full", 0) == 0)
 
-    estimate = os.path.join(folder, "live.txt")
-    write_tum(estimate, live)
-    truth = os.path.join(folder, "truth.txt")
-    common = sorted(live.keys() & by_runner.keys())
-    live_poses = read_tum(estimate)
-    apart = [numpy.linalg.norm(live_poses[stamp][:3] - by_runner[stamp][:3]) for stamp in common]
+    estimate, truth = folder / "live.txt", folder / "truth.txt"
+    trajectory = trajectory_of({stamp: message.pose.pose for stamp, message in live.items()})
+    tum.write(estimate, trajectory)
+    live_positions = trajectory.positions()
+    common = sorted(live_positions.keys() & by_runner.keys())
+    apart = [numpy.linalg.norm(live_positions[stamp] - by_runner[stamp]) for stamp in common]
     table.row("live to bag runner", f"{1e3 * numpy.sqrt(numpy.mean(numpy.square(apart))):.1f} mm rms, "
               f"{1e3 * max(apart):.1f} mm worst, of {len(common)} poses")
-    if write_truth(bag, value_of(yaml, "ground_truth_topic"), truth):
-        ates = []
-        for each in (estimate, os.path.join(runner, "trajectory.txt")):
-            report = subprocess.run([program("rio_t", "evaluate"), "--yaml", truth, each], stdout=subprocess.PIPE,
-                                    text=True, check=True).stdout
-            ates.append(float(re.search(r"ape_origin_m: {rmse: ([^,]+)", report).group(1)))
+    if write_truth(bag, values["ground_truth_topic"], truth):
+        told = yaml.safe_load(programs.output_of(program("rio_t", "evaluate"), "--yaml", truth, estimate,
+                                                 runner / "trajectory.txt"))
+        ates = [each["ape_origin_m"]["rmse"] for each in told["estimates"]]
         ratio = ates[0] / ates[1]
         table.row("ATE", f"{ates[0]:.4f} m live, {ates[1]:.4f} m bag runner, {100.0 * (ratio - 1.0):+.1f} %",
                   abs(ratio - 1.0) <= ATE_BOUND)
-    with open(os.path.join(runner, "summary.yaml")) as file:
-        final = float(value_of(file.read(), "final_offset_s"))
+    final = run_folder.read_yaml(runner / "summary.yaml")["final_offset_s"]
     newest = offsets[max(offsets)]
     table.row("time offset at the end", f"{1e3 * newest.offset:.2f} ms live (sigma {1e3 * newest.sigma:.2f}), "
               f"{1e3 * final:.2f} ms bag runner", abs(newest.offset - final) < max(1e-3, newest.sigma))
@@ -217,7 +209,7 @@ def main():
         table.row(name, f"{len(ms)} messages, median {median:.2f} ms, 99 % below {most:.2f} ms, worst {max(ms):.2f} ms",
                   good if arguments.rate == 1.0 else None)
     print(f"  files in                       {folder}")
-    sys.exit(1 if table.failed else 0)
+    return not table.failed
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Plays simulated data to the live node for long, at high speed: called by scripts/soak.sh, which builds first."""
 import argparse
+import contextlib
 import os
 import sys
 import tempfile
@@ -33,16 +34,13 @@ ARGUMENTS = arguments_of(sys.argv[1:])  # before what takes seconds to import
 if ARGUMENTS.check:
     sys.exit()
 
-import matplotlib  # noqa: E402
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as pyplot  # noqa: E402
 import numpy  # noqa: E402
 import rosbag  # noqa: E402
 import rospy  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
-
-from live_tools import is_running, program, start, start_master, stop, wait_for  # noqa: E402
+from rio_t import programs  # noqa: E402
+from rio_t.plots import pyplot  # noqa: E402
+from rio_t.ros_processes import program, quiet, start_master, wait_for  # noqa: E402
 
 
 def memory_mb(process):
@@ -76,27 +74,29 @@ def make_bag(path, minutes):
     words = (program("rio_t", "simulate"), "--motion", "medium", "--seed", "11", "--time-offset", "0.02", "--duration",
              f"{60.0 * minutes:g}", "--out", path)
     print(f"Simulating {minutes:g} minutes ...", flush=True)
-    if start(*words).wait() != 0:
+    if programs.run(*words).returncode != 0:
         sys.exit("soak.py: the simulation failed")
 
 
 def run(bag, minutes, rate):
     with rosbag.Bag(bag) as data:  # takes its time: before the player runs
         first_stamp = data.get_start_time()
-    processes, record = [start_master()], []
-    try:
+    record = []
+    with contextlib.ExitStack() as running:
+        def start(*words):
+            return running.enter_context(quiet(*words)).process
+
+        running.enter_context(start_master())
         rospy.init_node("soak", disable_signals=True)
         diagnostics = Diagnostics()
         rospy.set_param("/use_sim_time", True)
         node = start(program("rio_t", "rio_t_node"), "__name:=rio_t", "_config:=irs")
-        processes.append(node)
         wait_for("diagnostics of the node", lambda: "input" in diagnostics.newest)
         # A robot's subscribers: without any, publishing would cost nothing.
-        processes.append(start("rostopic", "hz", "/rio_t/odom", "/rio_t/path"))
+        start("rostopic", "hz", "/rio_t/odom", "/rio_t/path")
         player = start(program("rosbag", "play"), "--clock", "--hz=1000", "--quiet", "--wait-for-subscribers",
                        f"--rate={rate}", "__name:=bag_player", bag, "--topics", "/sensor_platform/imu",
                        "/sensor_platform/radar/scan")
-        processes.append(player)
         progress = sys.stderr.isatty()
         clock = Clock()
         while player.poll() is None:
@@ -114,9 +114,6 @@ def run(bag, minutes, rate):
         time.sleep(2.0)  # the last diagnostics
         record.append(sample(node, diagnostics, record[-1][0] + 1e-3))
         return numpy.array(record), diagnostics.newest
-    finally:
-        for process in reversed(processes):
-            stop(process)
 
 
 class Clock:

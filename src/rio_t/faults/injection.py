@@ -4,6 +4,7 @@
 take `site.random`, which starts anew for each case, so that a case is the same in every run.
 """
 import dataclasses
+import itertools
 
 import numpy
 
@@ -57,12 +58,17 @@ def edit_points(messages, site, change):
     return edit(messages, "radar", site.covers, lambda m: m.set_points(change(m.points())))
 
 
+def edit_imu(messages, site, accel=None, gyro=None):
+    """`accel` and `gyro` give the vectors of each sample that the fault covers."""
+    def change(message):
+        for of, function in ((message.content.linear_acceleration, accel), (message.content.angular_velocity, gyro)):
+            if function:
+                of.x, of.y, of.z = map(float, function(vector(of)))
+    return edit(messages, "imu", site.covers, change)
+
+
 def vector(of):
     return numpy.array([of.x, of.y, of.z])
-
-
-def set_vector(of, values):
-    of.x, of.y, of.z = (float(v) for v in values)
 
 
 # --- Radar ---
@@ -91,20 +97,12 @@ def scans_of(points):
 def spoiled_points(share):
     """That share of the points is not a number, infinite, or at zero range, position or Doppler."""
     def spoil(points, site):
-        doppler = doppler_field(points)
+        doppler = (doppler_field(points),)
+        kinds = ("x", numpy.nan), ("y", numpy.inf), (doppler, -numpy.inf), (doppler, numpy.nan), ("xyz", 0.0)
         for k in numpy.flatnonzero(site.random.rand(len(points)) < share):
-            kind = site.random.randint(5)
-            if kind == 0:
-                points[k]["x"] = numpy.nan
-            elif kind == 1:
-                points[k]["y"] = numpy.inf
-            elif kind == 2:
-                points[k][doppler] = -numpy.inf
-            elif kind == 3:
-                points[k][doppler] = numpy.nan
-            else:
-                for axis in "xyz":
-                    points[k][axis] = 0.0
+            fields, value = kinds[site.random.randint(5)]
+            for field in fields:
+                points[k][field] = value
         return points
     return lambda messages, site: edit_points(messages, site, lambda p: spoil(p, site))
 
@@ -146,23 +144,23 @@ def all_ghosts(messages, site):
 # --- Stamps of scans and triggers ---
 
 
-def stamps_shifted(kinds, seconds, every=1):
-    """Header stamps of every nth message of these kinds are off."""
+def edit_stamps(kinds, every, stamp):
+    """`stamp(message)` for every nth message of these kinds."""
     def inject(messages, site):
         for kind in kinds:
-            count = iter(range(10**9))
+            count = itertools.count()
             messages = edit(messages, kind, lambda m: site.covers(m) and next(count) % every == 0,
-                            lambda m: setattr(m, "stamp", max(0, m.stamp + nanoseconds(seconds))))
+                            lambda m: setattr(m, "stamp", stamp(m)))
         return messages
     return inject
 
 
+def stamps_shifted(kinds, seconds, every=1):
+    return edit_stamps(kinds, every, lambda m: max(0, m.stamp + nanoseconds(seconds)))
+
+
 def stamp_zero(kind, every=1):
-    def inject(messages, site):
-        count = iter(range(10**9))
-        return edit(messages, kind, lambda m: site.covers(m) and next(count) % every == 0,
-                    lambda m: setattr(m, "stamp", 0))
-    return inject
+    return edit_stamps((kind,), every, lambda m: 0)
 
 
 def scans_before_imu(messages, site):
@@ -238,31 +236,19 @@ def imu_saturated(accel=False, gyro=False, share=0.6):
         up = numpy.abs(rest).argmax()  # where gravity leaves the least of the range
         accel_limit = abs(rest[up]) + share * numpy.percentile(numpy.abs(accels[:, up] - rest[up]), 99)
         gyro_limit = share * numpy.percentile(numpy.abs(gyros).max(axis=1), 99)
-        def clip(m):
-            if accel:
-                a = m.content.linear_acceleration
-                set_vector(a, numpy.clip(vector(a), -accel_limit, accel_limit))
-            if gyro:
-                w = m.content.angular_velocity
-                set_vector(w, numpy.clip(vector(w), -gyro_limit, gyro_limit))
-        return edit(messages, "imu", site.covers, clip)
+        return edit_imu(messages, site, accel and (lambda a: numpy.clip(a, -accel_limit, accel_limit)),
+                        gyro and (lambda w: numpy.clip(w, -gyro_limit, gyro_limit)))
     return inject
 
 
 def imu_scaled(accel=1.0, gyro=1.0):
-    def scale(m):
-        set_vector(m.content.linear_acceleration, accel * vector(m.content.linear_acceleration))
-        set_vector(m.content.angular_velocity, gyro * vector(m.content.angular_velocity))
-    return lambda messages, site: edit(messages, "imu", site.covers, scale)
+    return lambda messages, site: edit_imu(messages, site, lambda a: accel * a, lambda w: gyro * w)
 
 
 def imu_turned(matrix):
     """Another frame than the calibration says: both sensors, v -> matrix v."""
     turn = numpy.array(matrix, dtype=float)
-    def change(m):
-        set_vector(m.content.linear_acceleration, turn @ vector(m.content.linear_acceleration))
-        set_vector(m.content.angular_velocity, turn @ vector(m.content.angular_velocity))
-    return lambda messages, site: edit(messages, "imu", site.covers, change)
+    return lambda messages, site: edit_imu(messages, site, lambda a: turn @ a, lambda w: turn @ w)
 
 
 def imu_gravity_flipped(messages, site):
@@ -274,10 +260,7 @@ def imu_without_gravity(messages, site):
     """The driver removed gravity, as linear acceleration of some fused outputs."""
     rest = [m for m in messages if m.kind == "imu"][:200]
     middle = numpy.mean([vector(m.content.linear_acceleration) for m in rest], axis=0)
-    def change(m):
-        a = m.content.linear_acceleration
-        set_vector(a, vector(a) - middle)
-    return edit(messages, "imu", site.covers, change)
+    return edit_imu(messages, site, lambda a: a - middle)
 
 
 def imu_not_finite(share):
@@ -312,7 +295,6 @@ def clock_jump(seconds, stamps=True, record=True):
 
 def bag_loop(messages, site):
     """Plays on, and then from the start again: stamps jump back, the recording goes on."""
-    length = messages[-1].record - messages[0].record + nanoseconds(0.1)
     until = [m for m in messages if site.seconds(m) < site.begin]
     length = until[-1].record - until[0].record + nanoseconds(0.005)
     return until + [m.recorded_at(m.record + length) for m in messages]

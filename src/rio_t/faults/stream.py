@@ -1,6 +1,8 @@
 """A bag as a list of messages, for faults to transform: read once, changed in memory, written again."""
-import numpy
+import copy
+
 import genpy
+import numpy
 import rosbag
 
 # PointField.datatype of sensor_msgs to numpy.
@@ -19,19 +21,15 @@ class Message:
     def content(self):
         """To look at only; `changed` gives a copy to write to."""
         if self._content is None:
-            self._content = self._raw[4]()
-            self._content.deserialize(self._raw[1])
+            self._content = self._unpacked()
         return self._content
+
+    def _unpacked(self):
+        return self._raw[4]().deserialize(self._raw[1])
 
     def changed(self, record=None):
         """A copy of its own, free to be changed."""
-        content = None
-        if self._raw is not None:
-            content = self._raw[4]()
-            content.deserialize(self._raw[1])
-        else:
-            import copy
-            content = copy.deepcopy(self._content)
+        content = copy.deepcopy(self._content) if self._raw is None else self._unpacked()
         return Message(self.kind, self.topic, self.record if record is None else record, None, content)
 
     def recorded_at(self, record):
@@ -40,10 +38,7 @@ class Message:
 
     def write(self, bag):
         time = genpy.Time(self.record // 10**9, self.record % 10**9)
-        if self._raw is not None:
-            bag.write(self.topic, self._raw, time, raw=True)
-        else:
-            bag.write(self.topic, self._content, time)
+        bag.write(self.topic, self._raw or self._content, time, raw=self._raw is not None)
 
     @property
     def stamp(self):
@@ -73,10 +68,11 @@ class Message:
 
 
 def read(path, topics):
-    """`topics`: kind by topic. Messages in the order of recording."""
+    """`topics`: (topic, kind) of what is read. Messages in the order of recording."""
+    kinds = dict(topics)
     with rosbag.Bag(str(path)) as bag:
-        return [Message(topics[topic], topic, time.to_nsec(), raw=raw)
-                for topic, raw, time in bag.read_messages(list(topics), raw=True)]
+        return [Message(kinds[topic], topic, time.to_nsec(), raw=raw)
+                for topic, raw, time in bag.read_messages(list(kinds), raw=True)]
 
 
 def write(path, messages):

@@ -1,27 +1,14 @@
 """What a run of the bag runner on a faulty bag came to, in figures that expectations are about."""
-import csv
 import dataclasses
-import math
 import pathlib
 import re
 
 import numpy
-import yaml
+from scipy.spatial.transform import Rotation
+
+from .. import geometry, run_folder, tum
 
 NOT_A_NUMBER = re.compile(r"(?<![a-z_])[-+]?\.?(nan|inf)(?![a-z_])", re.IGNORECASE)
-
-
-def columns(path):
-    with open(path, newline="") as file:
-        rows = list(csv.reader(file))
-    return numpy.array([[float(value) for value in row] for row in rows[1:]]).reshape(-1, len(rows[0]))
-
-
-def rotations(xyzw):
-    x, y, z, w = (xyzw / numpy.linalg.norm(xyzw, axis=1, keepdims=True)).T
-    return numpy.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w),
-                        2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
-                        2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], axis=1).reshape(-1, 3, 3)
 
 
 @dataclasses.dataclass
@@ -29,33 +16,33 @@ class States:
     """Position and velocity in a world of its own, attitude, and standard deviations of p (in W) and v (in W)."""
     time: numpy.ndarray
     p: numpy.ndarray
-    R: numpy.ndarray
+    R: Rotation
     v: numpy.ndarray
     sigma_p: numpy.ndarray = None
     sigma_v: numpy.ndarray = None
 
+    def part(self, keep):
+        return States(*(getattr(self, field.name)[keep] for field in dataclasses.fields(self)))
+
+    @property
+    def body_velocity(self):
+        return self.R.apply(self.v, inverse=True)
+
 
 def read_run(folder):
-    """The causal output where it is written with its uncertainty: ten times a second."""
-    poses = numpy.loadtxt(pathlib.Path(folder) / "trajectory.txt", ndmin=2)
-    table = columns(pathlib.Path(folder) / "navigation.csv")
-    if len(table) == 0:
+    """The causal output where it is written with its uncertainty: ten times a second. None if there is none."""
+    navigation = run_folder.read_navigation(pathlib.Path(folder))
+    poses, sigmas = navigation.poses, navigation.sigmas
+    if len(poses) == 0:
         return None
-    # Both are in the order of output, in which a stamp may come twice (a bag that loops).
-    rows, row = [], 0
-    for stamp in table[:, 0]:
-        while abs(poses[row, 0] - stamp) > 1e-7:
-            row += 1
-        rows.append(row)
-    return States(table[:, 0], poses[rows, 1:4], rotations(poses[rows, 4:8]), table[:, 1:4], table[:, 4:7],
-                  table[:, 10:13])
+    return States(poses.seconds(0), poses.position, Rotation.from_quat(poses.quaternion), navigation.velocity,
+                  sigmas[:, :3], sigmas[:, 6:])
 
 
 def read_truth(path):
     """TUM file of a simulated motion."""
-    poses = numpy.loadtxt(path, ndmin=2)
-    return States(poses[:, 0], poses[:, 1:4], rotations(poses[:, 4:8]),
-                  numpy.gradient(poses[:, 1:4], poses[:, 0], axis=0))
+    poses = tum.read(path)
+    return States(poses.seconds(0), poses.position, Rotation.from_quat(poses.quaternion), geometry.velocities(poses))
 
 
 def shifted_back(run, shift):
@@ -69,12 +56,10 @@ def shifted_back(run, shift):
 
 
 def at(reference, times):
-    """The reference at these times; the nearest entry for the attitude, which is close enough."""
-    def interpolate(values):
-        return numpy.stack([numpy.interp(times, reference.time, values[:, k]) for k in range(3)], axis=1)
-    after = numpy.clip(numpy.searchsorted(reference.time, times), 1, len(reference.time) - 1)
-    nearest = after - (times - reference.time[after - 1] < reference.time[after] - times)
-    return States(times, interpolate(reference.p), reference.R[nearest], interpolate(reference.v))
+    """The reference at these times."""
+    return States(times, geometry.interpolate(times, reference.time, reference.p),
+                  geometry.interpolate_rotations(times, reference.time, reference.R.as_quat()),
+                  geometry.interpolate(times, reference.time, reference.v))
 
 
 @dataclasses.dataclass
@@ -97,18 +82,19 @@ def errors_against(reference, run, origin):
     keep = (run.time >= reference.time[0]) & (run.time <= reference.time[-1])
     if not keep.any():
         return None
-    run = States(*(getattr(run, f.name)[keep] for f in dataclasses.fields(run)))
+    run = run.part(keep)
     true = at(reference, run.time)
-    turn = run.R[0] @ true.R[0].T
-    yaw = math.atan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1])
-    Rz = numpy.array([[math.cos(yaw), -math.sin(yaw), 0], [math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
-    e_p = run.p - run.p[0] - (true.p - true.p[0]) @ Rz.T
-    e_v = run.v - true.v @ Rz.T
-    body = numpy.einsum("nji,nj->ni", run.R, run.v) - numpy.einsum("nji,nj->ni", true.R, true.v)
+    turn = geometry.heading_between(true.R[0], run.R[0])
+    e_p = run.p - run.p[0] - turn.apply(true.p - true.p[0])
+    e_v = run.v - turn.apply(true.v)
     sigma_p, sigma_v = numpy.maximum(run.sigma_p, 1e-9), numpy.maximum(run.sigma_v, 1e-9)
     ratio = numpy.maximum((numpy.abs(e_p) / sigma_p).max(axis=1), (numpy.abs(e_v) / sigma_v).max(axis=1))
-    norm = lambda x: numpy.linalg.norm(x, axis=1)
-    return Errors(run.time - origin, norm(body), norm(e_p), norm(run.sigma_v), norm(run.sigma_p), ratio)
+
+    def norm(vectors):
+        return numpy.linalg.norm(vectors, axis=1)
+
+    return Errors(run.time - origin, norm(run.body_velocity - true.body_velocity), norm(e_p), norm(run.sigma_v),
+                  norm(run.sigma_p), ratio)
 
 
 @dataclasses.dataclass
@@ -137,7 +123,7 @@ class Outcome:
 
 def files_with_nan(folder):
     spoiled = []
-    for path in sorted(pathlib.Path(folder).glob("*.*")):
+    for path in sorted(folder.glob("*.*")):
         if path.suffix in (".txt", ".csv", ".yaml") and NOT_A_NUMBER.search(path.read_text()):
             spoiled.append(path.name)
     return spoiled
@@ -145,8 +131,7 @@ def files_with_nan(folder):
 
 def read_outcome(folder, status, messages, reference, origin, shift=0.0):
     folder = pathlib.Path(folder)
-    summary_file = folder / "summary.yaml"
-    summary = yaml.safe_load(summary_file.read_text()) if summary_file.exists() else {}
+    summary = run_folder.read_yaml(folder / "summary.yaml") if (folder / "summary.yaml").exists() else {}
     outcome = Outcome(status, messages, summary, files_with_nan(folder) if folder.exists() else [])
     if summary:
         outcome.run = read_run(folder)

@@ -1,32 +1,24 @@
 """Starts the live node or nodelet, plays bags to it and collects what it says. Waits on conditions, with deadlines."""
 import os
-import signal
 import subprocess
 import threading
-import time
 
-import numpy
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistWithCovarianceStamped
 from nav_msgs.msg import Odometry, Path
-from roslib.packages import find_node
 from sensor_msgs.msg import PointCloud2
 from tf2_msgs.msg import TFMessage
 
-from rio_t.msg import ImuBias, TimeOffset
+from . import programs
+from .msg import ImuBias, TimeOffset
+from .ros_processes import DEADLINE, SLOWNESS, Process, program, wait_for
 
-SLOWNESS = float(os.environ.get("RIO_T_TEST_SLOWNESS", "1"))  # of the programs as built: sanitizers take time
-DEADLINE = 40.0 * SLOWNESS  # [s] for anything; far more than needed, so that only a fault reaches it
 # A library that programs of others need first, before they can load ours: the runtime of a sanitizer.
 PRELOAD = os.environ.get("RIO_T_TEST_PRELOAD", "")
 IMU, RADAR = "/sensor_platform/imu", "/sensor_platform/radar/scan"
 TOPICS = {"odom": Odometry, "odom_optimized": Odometry, "time_offset": TimeOffset, "imu_bias": ImuBias, "path": Path,
           "ego_velocity": TwistWithCovarianceStamped, "inliers": PointCloud2, "points": PointCloud2}
-
-
-def program(package, name):
-    return find_node(package, name)[0]
 
 
 def preloaded():
@@ -35,46 +27,8 @@ def preloaded():
 
 
 def run(*words):
-    return subprocess.run([str(word) for word in words], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                          timeout=DEADLINE, check=False)
-
-
-def read_tum(path):
-    """{stamp in ns: [x y z qx qy qz qw]}, the stamps exact."""
-    poses = {}
-    with open(path) as lines:
-        for line in lines:
-            if line.strip() and not line.startswith("#"):
-                seconds, *numbers = line.split()
-                whole, _, part = seconds.partition(".")
-                poses[int(whole) * 10**9 + int(part.ljust(9, "0")[:9])] = numpy.array([float(x) for x in numbers])
-    return poses
-
-
-class Process:
-    """A process that ends with the `with` block, and is asked to before it is made to."""
-
-    def __init__(self, *words, **options):
-        self.process = subprocess.Popen([str(word) for word in words], start_new_session=True, **options)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.stop()
-
-    def wait(self):
-        return self.process.wait(DEADLINE)
-
-    def stop(self):
-        """Exit status after an interrupt; raises where it does not end."""
-        if self.process.poll() is None:
-            os.killpg(self.process.pid, signal.SIGINT)
-        try:
-            return self.process.wait(DEADLINE)
-        except subprocess.TimeoutExpired:
-            os.killpg(self.process.pid, signal.SIGKILL)
-            raise
+    """The completed process; its stdout holds stderr too."""
+    return programs.run(*words, stderr=subprocess.STDOUT, timeout=DEADLINE)
 
 
 class Listener:
@@ -136,11 +90,8 @@ class Listener:
     def wait_until_heard(self):
         """All publishers of the node are connected to us: nothing will be missed."""
         names = ["/rio_t/" + name for name in TOPICS]
-        deadline = time.monotonic() + DEADLINE
-        while not all(s.get_num_connections() > 0 for s in self._subscribers if s.resolved_name in names):
-            if time.monotonic() > deadline:
-                raise AssertionError("the node did not advertise all of " + " ".join(names))
-            time.sleep(0.01)  # rospy tells no one of new connections
+        wait_for("subscribers of all of " + " ".join(names),  # rospy tells no one of new connections
+                 lambda: all(s.get_num_connections() > 0 for s in self._subscribers if s.resolved_name in names))
 
 
 def node(*parameters):

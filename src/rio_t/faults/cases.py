@@ -28,6 +28,10 @@ class Case:
     bags: tuple = ("simulated", "real")
     shift: float = 0.0         # [s] by which the stamps of the output jump
 
+    @property
+    def must(self):
+        return self.expect.words()
+
 
 def without_radar(seconds, **more):
     return Survives(VELOCITY + 0.1 * seconds, POSITION + 0.05 * seconds**2, **more)

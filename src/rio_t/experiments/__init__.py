@@ -1,0 +1,14 @@
+"""The paper's experiments and more, on simulated or given bags: tables as Markdown and CSV, figures as PNG.
+
+  shifts      stamps shifted by 0, 2.5, ... 15 ms: the estimate must follow, online and in a batch (Fig. 4); arrival
+              against trigger stamps
+  delay       100 ms of delay in passes, each with the estimate of the one before taken off the stamps
+  table1      RIO-T against LC-RIO, which does not estimate the offset (Table I)
+  table2      LC-RIO with the stamps of the bag and with stamps corrected by RIO-T's estimate (Table II)
+  montecarlo  seeds x motions x offsets: mean, spread, and whether the stated uncertainty is honest
+  consistency seeds x motions: errors of position, velocity, tilt, yaw and offset over their stated sigmas, at all
+              times (NEES); 1 is honest, `!` marks what is below 0.5 or above 2
+
+Both models of the offset run side by side: `imu` (ours) and `constant_acceleration` (the paper's). Only `consistency`
+runs one model, that of the configuration or of --set time_offset_model=...
+"""

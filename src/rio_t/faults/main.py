@@ -1,0 +1,119 @@
+"""The program: scripts/faults.py."""
+import argparse
+import concurrent.futures
+import os
+import pathlib
+import shutil
+import sys
+import tempfile
+import time
+
+from . import __doc__ as description
+from ..errors import RioTError
+
+# Everything else is imported once the arguments are known to be good.
+
+
+def say(text):
+    print(text, flush=True)
+
+
+def print_result(case, bag, must, happened, wrong):
+    say(f"{case:24}  {bag:10}  {'FAIL' if wrong else 'pass'}  {happened}".rstrip())
+    if wrong:
+        say(" " * 42 + "must: " + must)
+        say(" " * 42 + "but: " + "; ".join(wrong))
+
+
+def write_table(path, rows):
+    lines = ["| case | bag | what must happen | what happened | |", "| --- | --- | --- | --- | --- |"]
+    for *cells, wrong in rows:
+        cells.append("**FAIL**: " + "; ".join(wrong) if wrong else "pass")
+        lines.append("| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in cells) + " |")
+    path.write_text("\n".join(lines) + "\n")
+
+
+def parse(words):
+    parser = argparse.ArgumentParser(prog="faults.sh", description=description,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--list", action="store_true", help="the cases and what must happen in each")
+    parser.add_argument("--only", action="append", default=[], metavar="NAME", help="this case; may be repeated")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="cases at a time [%(default)s]")
+    parser.add_argument("--bag", help="put the faults into this bag instead")
+    parser.add_argument("--config", default="irs", help="its configuration [%(default)s]")
+    parser.add_argument("--no-live", action="store_true", help="leave out the cases of the live node")
+    parser.add_argument("--output", metavar="DIR", help="keep bags, runs and table.md here")
+    parser.add_argument("--programs", type=pathlib.Path, help=argparse.SUPPRESS)  # set by faults.sh
+    parser.add_argument("--check", action="store_true", help=argparse.SUPPRESS)   # arguments only
+    arguments = parser.parse_args(words)
+    if arguments.jobs < 1:
+        parser.error("--jobs: expected at least 1")
+    if arguments.bag and not os.path.isfile(arguments.bag):
+        parser.error(f"--bag: no such file: {arguments.bag}")
+    return parser, arguments
+
+
+def run(arguments, bag_cases, live_cases, scratch):
+    """Rows of the table: case, bag, what must happen, what happened, [what is wrong]."""
+    from .. import programs
+    from . import campaign, live
+    folder = programs.find(("rio_t_bag", "simulate"), "--programs DIR", arguments.programs)
+    bags, rows = campaign.bags_for(folder, scratch, arguments.bag, arguments.config), []
+
+    def add(*row):
+        rows.append(row)
+        print_result(*row)
+
+    with concurrent.futures.ProcessPoolExecutor(arguments.jobs) as pool:
+        tasks = [(case, bag, pool.submit(campaign.run_case, folder, bag, case.name, scratch / bag.name / case.name,
+                                         bool(arguments.output)))
+                 for bag in bags for case in bag_cases if bag.name == "given" or bag.name in case.bags]
+        for case, bag, task in tasks:
+            add(case.name, bag.name, case.must, *task.result())
+    # One after the other: each has a roscore and real time to itself.
+    if live_cases:
+        with live.session() as tester:
+            for case in live_cases:
+                add(case.name, "live", case.must, *live.run(case, tester, bags[0], scratch / "live"))
+    return rows
+
+
+def run_campaign(arguments, bag_cases, live_cases):
+    started = time.monotonic()
+    scratch = pathlib.Path(arguments.output or tempfile.mkdtemp(prefix="rio_t_faults_")).resolve()
+    scratch.mkdir(parents=True, exist_ok=True)
+    try:
+        rows = run(arguments, bag_cases, live_cases, scratch)
+        write_table(scratch / "table.md", rows)
+    finally:
+        if not arguments.output:
+            shutil.rmtree(scratch, ignore_errors=True)
+    failed = sum(1 for row in rows if row[-1])
+    say(f"{len(rows) - failed} of {len(rows)} cases pass, {time.monotonic() - started:.0f} s"
+        + (f"; table in {scratch / 'table.md'}" if arguments.output else ""))
+    return 1 if failed else 0
+
+
+def main(words):
+    parser, arguments = parse(words)
+    if arguments.check and not (arguments.list or arguments.only):
+        return 0
+    from . import cases, live
+    known = [case.name for case in cases.CASES + live.CASES]
+    for name in arguments.only:
+        if name not in known:
+            parser.error(f"--only: no case {name}; --list names them")
+    if arguments.list:
+        for case in cases.CASES + live.CASES:
+            say(f"{case.name:26}{case.must}")
+        return 0
+    if arguments.check:
+        return 0
+    bag_cases, live_cases = ([case for case in of if not arguments.only or case.name in arguments.only]
+                             for of in (cases.CASES, [] if arguments.no_live or arguments.bag else live.CASES))
+    try:
+        return run_campaign(arguments, bag_cases, live_cases)
+    except (RioTError, OSError) as fault:
+        sys.exit(f"faults.sh: {fault}")
+    except KeyboardInterrupt:
+        sys.exit("faults.sh: interrupted")

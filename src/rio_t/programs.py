@@ -1,0 +1,41 @@
+"""Finds and runs the programs of rio_t."""
+import os
+import pathlib
+import subprocess
+import sys
+
+from .errors import RioTError
+
+
+def find(names, option, given=None):
+    """Folder that holds the programs: the given one, else beside the script, in a sourced workspace or in the build
+    folder. `option` is what the user can give."""
+    source = pathlib.Path(__file__).resolve().parents[2]
+    candidates = [given] if given else [
+        pathlib.Path(sys.argv[0]).resolve().parent,
+        *(pathlib.Path(p) / "lib" / "rio_t" for p in os.environ.get("CMAKE_PREFIX_PATH", "").split(":") if p),
+        source / os.environ.get("RIO_T_BUILD_DIR", "build") / "devel" / "lib" / "rio_t"]
+    for folder in candidates:
+        if all(is_program(folder / name) for name in names):
+            return folder
+    raise RioTError(f"not found: {' and '.join(names)}; run scripts/build.sh, source the setup.bash of a workspace, or "
+                    f"give {option}")
+
+
+def is_program(path):
+    return path.is_file() and os.access(path, os.X_OK)
+
+
+def run(*words, **options):
+    """The completed process, with what it told as text."""
+    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
+    return subprocess.run([str(word) for word in words], text=True, check=False, **options)
+
+
+def output_of(*words):
+    """What a program that succeeds tells on stdout."""
+    done = run(*words)
+    if done.returncode != 0:
+        lines = done.stderr.strip().splitlines()
+        raise RioTError(lines[-1] if lines else f"{words[0]} ended with status {done.returncode}")
+    return done.stdout

@@ -1,0 +1,71 @@
+"""Starts and stops ROS programs, with a master of their own."""
+import os
+import signal
+import socket
+import subprocess
+import time
+
+import rosgraph
+from roslib.packages import find_node
+
+SLOWNESS = float(os.environ.get("RIO_T_TEST_SLOWNESS", "1"))  # of the programs as built: sanitizers take time
+DEADLINE = 60.0 * SLOWNESS  # [s] for anything; far more than needed, so that only a fault reaches it
+
+
+def program(package, name):
+    return find_node(package, name)[0]
+
+
+class Process:
+    """A process that ends with the `with` block, and is asked to before it is made to."""
+
+    def __init__(self, *words, **options):
+        self.process = subprocess.Popen([str(word) for word in words], start_new_session=True, **options)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.stop()
+
+    def wait(self):
+        return self.process.wait(DEADLINE)
+
+    def stop(self):
+        """Exit status after an interrupt; raises if it does not end."""
+        if self.process.poll() is None:
+            os.killpg(self.process.pid, signal.SIGINT)
+        try:
+            return self.process.wait(DEADLINE)
+        except subprocess.TimeoutExpired:
+            os.killpg(self.process.pid, signal.SIGKILL)
+            raise
+
+
+def quiet(*words):
+    """A Process that reads nothing and says nothing but errors."""
+    return Process(*words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+
+
+def wait_for(what, condition, seconds=DEADLINE):
+    deadline = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > deadline:
+            raise TimeoutError(f"in {seconds:.0f} s not seen: {what}")
+        time.sleep(0.01)
+
+
+def start_master():
+    """roscore on a free port, which all programs started from here on use."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    os.environ.setdefault("ROS_IP", "127.0.0.1")
+    os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{port}"
+    core = quiet("roscore", "-p", port)
+    try:
+        wait_for("roscore", rosgraph.is_master_online)
+    except BaseException:
+        core.stop()
+        raise
+    return core

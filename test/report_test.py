@@ -1,0 +1,141 @@
+"""The report from its command to its page, on a short simulated run."""
+import base64
+import re
+import shutil
+import subprocess
+import sys
+
+import pytest
+import yaml
+
+from rio_t import programs
+from rio_t.report.main import main
+
+FIGURES = ["trajectory", "errors", "velocity", "time_offset", "ego_velocity", "biases"]
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+@pytest.fixture
+def report(programs_folder, capsys):
+    """In this process: to import matplotlib takes longer than a report."""
+    def run(*arguments):
+        status = main([str(word) for word in ("--evaluate", programs_folder / "evaluate", *arguments)])
+        told = capsys.readouterr()
+        return subprocess.CompletedProcess(arguments, status, told.out, told.err)
+    return run
+
+
+@pytest.fixture
+def run_folder(simulated_run, tmp_path):
+    """A copy, free to be broken."""
+    return shutil.copytree(simulated_run / "run", tmp_path / "run")
+
+
+def page_of(done):
+    assert done.returncode == 0, done.stderr
+    with open(done.stdout.strip(), encoding="utf-8") as file:
+        return file.read()
+
+
+def cell_after(page, label):
+    """The first cell beside `label` in a table."""
+    return re.search(rf"<td>{re.escape(label)}</td><td[^>]*>([^<]*)</td>", page).group(1)
+
+
+def figures_of(page):
+    return dict(re.findall(r'<img alt="(\w+)" src="data:image/png;base64,([^"]+)">', page))
+
+
+def test_page_holds_its_figures_and_numbers(report, run_folder, simulated_run, programs_folder, tmp_path):
+    truth = simulated_run / "truth.txt"
+    page = page_of(report("--ground-truth", truth, "--true-offset", 0.03, "--output", tmp_path / "out", run_folder))
+    figures = figures_of(page)
+    assert list(figures) == FIGURES
+    for name, data in figures.items():
+        image = base64.b64decode(data)
+        assert image == (tmp_path / "out" / f"{name}.png").read_bytes()
+        assert image.startswith(PNG) and len(image) > 10000, name
+
+    summary = yaml.safe_load((run_folder / "summary.yaml").read_text())
+    assert float(cell_after(page, "final_offset_s")) == pytest.approx(summary["final_offset_s"], rel=1e-5)
+    assert cell_after(page, "scans_used") == str(summary["scans_used"])
+    evaluated = programs.output_of(programs_folder / "evaluate", "--yaml", truth, run_folder / "trajectory_optimized.txt")
+    ate = yaml.safe_load(evaluated)["estimates"][0]["ape_origin_m"]["rmse"]
+    assert cell_after(page, "ATE: position, origin aligned, rmse [m]") == f"{ate:.4f}"
+    error = 1e3 * (summary["final_offset_s"] - 0.03)
+    assert float(cell_after(page, "last estimate minus truth [ms]").split()[0]) == pytest.approx(error, abs=2e-3)
+
+
+def test_without_truth_nothing_is_evaluated(report, run_folder):
+    page = page_of(report(run_folder))
+    assert list(figures_of(page)) == [name for name in FIGURES if name != "errors"]
+    assert "mounting fitted to the data" in page
+    assert "Accuracy" not in page
+
+
+def test_the_mounting_comes_from_the_configuration(report, run_folder, scripts):
+    assert "mounting from the configuration" in page_of(report("--config", scripts.parent / "config/irs.yaml", run_folder))
+
+
+@pytest.mark.parametrize("name, figure", [("time_offset.csv", "time_offset"), ("ego_velocity.csv", "ego_velocity"),
+                                          ("biases.csv", "biases")])
+def test_an_absent_table_is_left_out(report, run_folder, name, figure):
+    (run_folder / name).unlink()
+    assert figure not in figures_of(page_of(report(run_folder)))
+
+
+def test_a_run_that_did_not_finish_says_so(report, run_folder):
+    for name in ("summary.yaml", "trajectory_optimized.txt"):
+        (run_folder / name).unlink()
+    page = page_of(report(run_folder))
+    assert "No summary.yaml: the run did not finish." in page
+    assert "trajectory" in figures_of(page)
+
+
+def test_a_run_that_never_initialised_says_so(report, run_folder):
+    for name in ("trajectory.txt", "trajectory_optimized.txt"):
+        (run_folder / name).write_text("")
+    assert "No poses: the estimator never initialised." in page_of(report(run_folder))
+
+
+@pytest.mark.parametrize("name, content, message", [
+    ("trajectory.txt", None, "trajectory.txt: missing; expected the output folder of rio_t_bag"),
+    ("trajectory.txt", "1 2 3\n", "trajectory.txt:1: expected `stamp x y z qx qy qz qw`"),
+    ("time_offset.csv", "stamp,offset_s\n", "time_offset.csv:1: no column 'sigma_s'"),
+    ("biases.csv", "stamp,bgx,bgy,bgz,bax,bay,baz\n1,2,3,4,5,6,\n", "biases.csv:2: baz is '', expected a number"),
+    ("summary.yaml", "a: [1\n", "summary.yaml: ")])
+def test_a_broken_file_is_told_in_one_line(report, run_folder, name, content, message):
+    if content is None:
+        (run_folder / name).unlink()
+    else:
+        (run_folder / name).write_text(content)
+    refused(report(run_folder), message)
+
+
+@pytest.mark.parametrize("option, content, message", [
+    ("--ground-truth", None, "no such file; expected a trajectory (TUM format)"),
+    ("--ground-truth", "1 2\n", "given:1: expected `stamp x y z qx qy qz qw`"),
+    ("--config", None, "No such file"),
+    ("--config", "extrinsics_translation: [1, 2]\n", "expected extrinsics_translation (3 numbers)"),
+    ("--output", "a file", "cannot be made")])
+def test_a_wrong_option_is_told_in_one_line(report, run_folder, tmp_path, option, content, message):
+    if content is not None:
+        (tmp_path / "given").write_text(content)
+    refused(report(option, tmp_path / "given", run_folder), message)
+
+
+def test_an_absent_run_is_told_in_one_line(scripts, tmp_path):
+    refused(programs.run(sys.executable, scripts / "report.py", tmp_path / "absent"),
+            "no such folder; expected the output folder of rio_t_bag")
+
+
+def test_a_truth_of_another_time_is_told(report, run_folder, tmp_path):
+    (tmp_path / "truth").write_text("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n")
+    assert report("--ground-truth", tmp_path / "truth", run_folder).returncode == 1
+
+
+def refused(done, message):
+    assert done.returncode == 1
+    assert message in done.stderr
+    assert done.stderr.startswith("report.py: ") and done.stderr.count("\n") == 1, done.stderr
+    assert done.stdout == ""
