@@ -217,7 +217,7 @@ TEST(SquareRoot, LeavesTheUnknownFree) {
 }
 
 /// A window with every kind of factor, beside its minimum.
-class Windows : public ::testing::Test {
+class Windows : public ::testing::TestWithParam<WindowSolver> {
  protected:
   static constexpr int kNodes = 9;
 
@@ -303,7 +303,7 @@ class Windows : public ::testing::Test {
   std::shared_ptr<Block> offset;
 };
 
-TEST_F(Windows, TheNormalEquationsAreThoseOfCeres) {
+TEST_P(Windows, TheNormalEquationsAreThoseOfCeres) {
   for (const TimeOffsetModel kind : {TimeOffsetModel::kConstantAcceleration, TimeOffsetModel::kImu}) {
     make(0.01, 0.25, 0.0, false, kind);
     ceres::Problem::EvaluateOptions order;
@@ -328,30 +328,30 @@ TEST_F(Windows, TheNormalEquationsAreThoseOfCeres) {
   }
 }
 
-TEST_F(Windows, FindsTheMinimum) {
+TEST_P(Windows, FindsTheMinimum) {
   make(0.05);
-  EXPECT_EQ(solve(window, kTight).termination, SolverTermination::kConverged);
+  EXPECT_EQ(solve(window, kTight, GetParam()).termination, SolverTermination::kConverged);
   EXPECT_LT(slope(), 1e-3);
   EXPECT_NEAR(offset->x[0], 0.05, 5e-3);
 }
 
-TEST_F(Windows, AWrongJacobianIsNoConvergence) {
+TEST_P(Windows, AWrongJacobianIsNoConvergence) {
   make(0.05, 0.25, 0.0, true);
-  const Solution solution = solve(window, SolverLimits());
+  const Solution solution = solve(window, SolverLimits(), GetParam());
   EXPECT_EQ(solution.termination, SolverTermination::kNoDecrease);
   EXPECT_FALSE(solution.converged());
 }
 
-TEST_F(Windows, TooFewIterationsAreNoConvergence) {
+TEST_P(Windows, TooFewIterationsAreNoConvergence) {
   make(0.05);
-  EXPECT_EQ(solve(window, {1, 1e-2}).termination, SolverTermination::kIterationLimit);
+  EXPECT_EQ(solve(window, {1, 1e-2}, GetParam()).termination, SolverTermination::kIterationLimit);
 }
 
-TEST_F(Windows, AtItsBoundTheOffsetIsHeldAndTheRestIsSolved) {
+TEST_P(Windows, AtItsBoundTheOffsetIsHeldAndTheRestIsSolved) {
   for (const double bound : {0.05, -0.05}) {
     make(1.6 * bound, 0.05);
-    EXPECT_EQ(solve(window, SolverLimits()).termination, SolverTermination::kAtBound);
-    EXPECT_EQ(solve(window, kTight).termination, SolverTermination::kAtBound);
+    EXPECT_EQ(solve(window, SolverLimits(), GetParam()).termination, SolverTermination::kAtBound);
+    EXPECT_EQ(solve(window, kTight, GetParam()).termination, SolverTermination::kAtBound);
     EXPECT_EQ(offset->x[0], bound);
     EXPECT_FALSE(offset->is_constant) << "the next scan may free it";
     EXPECT_LT(slope(), 1e-3);
@@ -359,24 +359,27 @@ TEST_F(Windows, AtItsBoundTheOffsetIsHeldAndTheRestIsSolved) {
     // The others stand where they would were the offset known to be the bound.
     make(1.6 * bound, 0.05, bound);
     window.setConstant(*offset, true);
-    EXPECT_EQ(solve(window, kTight).termination, SolverTermination::kConverged);
+    EXPECT_EQ(solve(window, kTight, GetParam()).termination, SolverTermination::kConverged);
     EXPECT_LT((window.blocks()[kNodes - 1]->x - newest).norm(), 1e-4);
   }
 }
 
-TEST_F(Windows, TheOffsetLeavesABoundThatIsWidened) {
+TEST_P(Windows, TheOffsetLeavesABoundThatIsWidened) {
   make(0.08, 0.05);
-  EXPECT_EQ(solve(window, SolverLimits()).termination, SolverTermination::kAtBound);
+  EXPECT_EQ(solve(window, SolverLimits(), GetParam()).termination, SolverTermination::kAtBound);
   make(0.08, 0.25, 0.05);
-  EXPECT_EQ(solve(window, SolverLimits()).termination, SolverTermination::kConverged);
+  EXPECT_EQ(solve(window, SolverLimits(), GetParam()).termination, SolverTermination::kConverged);
   EXPECT_NEAR(offset->x[0], 0.08, 5e-3);
 }
 
-TEST_F(Windows, AnOffsetThatStartsAtTheBoundLeavesIt) {
+TEST_P(Windows, AnOffsetThatStartsAtTheBoundLeavesIt) {
   make(0.02, 0.05, 0.05);
-  EXPECT_EQ(solve(window, SolverLimits()).termination, SolverTermination::kConverged);
+  EXPECT_EQ(solve(window, SolverLimits(), GetParam()).termination, SolverTermination::kConverged);
   EXPECT_NEAR(offset->x[0], 0.02, 5e-3);
 }
+
+INSTANTIATE_TEST_SUITE_P(Solver, Windows, ::testing::Values(WindowSolver::kChain, WindowSolver::kCeres),
+                         [](const auto& info) { return info.param == WindowSolver::kChain ? "chain" : "ceres"; });
 
 /// A height above the start, off by a bias that is calibrated: z - (p_W,z + bias), whitened. Blocks: state,
 /// bias. All that a new sensor needs: this cost function, and where it is added to the window.

@@ -18,20 +18,34 @@ constexpr double kWellDetermined = 1e-6;
 constexpr double kSmallestLift = 1e-15;
 constexpr double kLargestLift = 1e-9;
 
-using RowMajorMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+/// sum += sign A' B, row by row. Most derivatives are zero, and at these sizes Eigen's blocked product costs
+/// several times as much.
+void addProduct(const RowMatrix& A, const RowMatrix& B, double sign, RowMatrix& sum) {
+  if (sum.size() == 0) sum.setZero(A.cols(), B.cols());
+  const Eigen::Index columns = B.cols();
+  for (Eigen::Index row = 0; row < A.rows(); ++row) {
+    const double* const b = B.data() + row * columns;
+    for (Eigen::Index i = 0; i < A.cols(); ++i) {
+      const double a = sign * A(row, i);
+      if (a == 0.0) continue;
+      double* const to = sum.data() + i * columns;
+      for (Eigen::Index j = 0; j < columns; ++j) to[j] += a * b[j];
+    }
+  }
+}
 
-void add(Eigen::MatrixXd& sum, const Eigen::MatrixXd& part) {
-  if (sum.size() == 0) {
-    sum = part;
-  } else {
-    sum += part;
+/// W <- L^-1 W for the lower triangle of L, by rows.
+void forwardSubstitute(const RowMatrix& L, RowMatrix& W) {
+  for (Eigen::Index i = 0; i < L.rows(); ++i) {
+    for (Eigen::Index j = 0; j < i; ++j) W.row(i) -= L(i, j) * W.row(j);
+    W.row(i) /= L(i, i);
   }
 }
 
 /// Residual and derivatives of a term with respect to the tangents of its blocks, after the loss.
 struct Linearized {
   Eigen::VectorXd r;
-  std::vector<Eigen::MatrixXd> J;
+  std::vector<RowMatrix> J;
   double cost = 0.0;
 };
 
@@ -39,7 +53,7 @@ Linearized evaluate(const Term& term) {
   const auto rows = term.cost->num_residuals();
   Linearized result;
   result.r.resize(rows);
-  std::vector<RowMajorMatrix> stored(term.blocks.size());
+  std::vector<RowMatrix> stored(term.blocks.size());
   std::vector<const double*> parameters;
   std::vector<double*> jacobians;
   for (std::size_t i = 0; i < term.blocks.size(); ++i) {
@@ -56,8 +70,9 @@ Linearized evaluate(const Term& term) {
   result.r *= root;
   for (std::size_t i = 0; i < term.blocks.size(); ++i) {
     const std::vector<int>& columns = term.blocks[i]->manifold->columns();
-    Eigen::MatrixXd J(rows, static_cast<Eigen::Index>(columns.size()));
-    for (std::size_t k = 0; k < columns.size(); ++k) J.col(static_cast<Eigen::Index>(k)) = root * stored[i].col(columns[k]);
+    RowMatrix J(rows, static_cast<Eigen::Index>(columns.size()));
+    for (Eigen::Index row = 0; row < rows; ++row)
+      for (Eigen::Index k = 0; k < J.cols(); ++k) J(row, k) = root * stored[i](row, columns[k]);
     result.J.push_back(std::move(J));
   }
   return result;
@@ -73,11 +88,11 @@ void addTo(NormalEquations& system, const Term& term, const std::unordered_map<c
   }
   for (std::size_t a = 0; a < at.size(); ++a) {
     if (at[a] < 0) continue;
-    const Eigen::MatrixXd& J = linear.J[a];
-    system.diagonal[at[a]].noalias() += J.transpose() * J;
+    const RowMatrix& J = linear.J[a];
+    addProduct(J, J, 1.0, system.diagonal[at[a]]);
     system.gradient[at[a]].noalias() += J.transpose() * linear.r;
     for (std::size_t b = 0; b < at.size(); ++b)
-      if (at[b] > at[a]) add(system.coupling[at[a]][at[b]], J.transpose() * linear.J[b]);
+      if (at[b] > at[a]) addProduct(J, linear.J[b], 1.0, system.coupling[at[a]][at[b]]);
   }
 }
 
@@ -86,7 +101,7 @@ void addTo(NormalEquations& system, const Term& term, const std::unordered_map<c
 NormalEquations::NormalEquations(std::vector<const Block*> blocks_in) : blocks(std::move(blocks_in)) {
   for (const Block* block : blocks) {
     const int tangent = block->manifold->tangent();
-    diagonal.push_back(Eigen::MatrixXd::Zero(tangent, tangent));
+    diagonal.push_back(RowMatrix::Zero(tangent, tangent));
     gradient.push_back(Eigen::VectorXd::Zero(tangent));
   }
   coupling.resize(blocks.size());
@@ -122,28 +137,27 @@ NormalEquations linearize(const Window& window) {
   return linearize(std::move(blocks), terms);
 }
 
-bool Elimination::factorise(const NormalEquations& system, double lift) {
+bool Elimination::factorise(const NormalEquations& system, double raise) {
   const std::size_t count = system.blocks.size();
-  std::vector<Eigen::MatrixXd> S = system.diagonal;
-  L_.resize(count);
+  L_ = system.diagonal;
   W_ = system.coupling;
   delta_.resize(count);
-  for (std::size_t i = 0; i < count; ++i) delta_[i] = -system.gradient[i];
   for (std::size_t i = 0; i < count; ++i) {
-    if (lift > 0.0) S[i].diagonal() *= 1.0 + lift;
-    Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(S[i]);
+    delta_[i] = -system.gradient[i];
+    L_[i].diagonal() *= 1.0 + raise;
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::LLT<Eigen::Ref<RowMatrix>> factor(L_[i]);  // in its place
     if (factor.info() != Eigen::Success) return false;
-    L_[i] = std::move(S[i]);
-    const auto L = L_[i].triangularView<Eigen::Lower>();
-    L.solveInPlace(delta_[i]);
+    L_[i].triangularView<Eigen::Lower>().solveInPlace(delta_[i]);
     for (auto& [j, W] : W_[i]) {
-      L.solveInPlace(W);
+      forwardSubstitute(L_[i], W);
       delta_[j].noalias() -= W.transpose() * delta_[i];
     }
     for (auto a = W_[i].begin(); a != W_[i].end(); ++a) {
-      S[a->first].noalias() -= a->second.transpose() * a->second;
+      addProduct(a->second, a->second, -1.0, L_[a->first]);
       for (auto b = std::next(a); b != W_[i].end(); ++b)
-        add(W_[a->first][b->first], -(a->second.transpose() * b->second));
+        addProduct(a->second, b->second, -1.0, W_[a->first][b->first]);
     }
   }
   squared_length_ = 0.0;
@@ -155,10 +169,10 @@ bool Elimination::factorise(const NormalEquations& system, double lift) {
   return true;
 }
 
-std::optional<Elimination> Elimination::of(const NormalEquations& system) {
+std::optional<Elimination> Elimination::of(const NormalEquations& system, double damping) {
   Elimination result;
-  bool done = result.factorise(system, 0.0);
-  for (double lift = kSmallestLift; !done && lift <= kLargestLift; lift *= 10.0)
+  bool done = result.factorise(system, damping);
+  for (double lift = kSmallestLift; !done && damping == 0.0 && lift <= kLargestLift; lift *= 10.0)
     done = result.factorise(system, lift);
   if (!done) return std::nullopt;
   return result;
@@ -168,19 +182,19 @@ Eigen::MatrixXd Elimination::covariance(const std::vector<int>& indices) const {
   Eigen::Index columns = 0;
   for (const int i : indices) columns += L_[i].rows();
   // Y = L^-1 E, where E selects the blocks: their covariance is Y'Y.
-  std::map<int, Eigen::MatrixXd> Y;
+  std::map<int, RowMatrix> Y;
   Eigen::Index first = 0;
   for (const int i : indices) {
-    add(Y[i], Eigen::MatrixXd::Zero(L_[i].rows(), columns));
+    Y[i].setZero(L_[i].rows(), columns);
     Y[i].middleCols(first, L_[i].rows()).setIdentity();
     first += L_[i].rows();
   }
-  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(columns, columns);
+  RowMatrix result = RowMatrix::Zero(columns, columns);
   for (auto at = Y.begin(); at != Y.end(); ++at) {
     auto& [i, y] = *at;
-    L_[i].triangularView<Eigen::Lower>().solveInPlace(y);
-    for (const auto& [j, W] : W_[i]) add(Y[j], -(W.transpose() * y));
-    result.noalias() += y.transpose() * y;
+    forwardSubstitute(L_[i], y);
+    for (const auto& [j, W] : W_[i]) addProduct(W, y, -1.0, Y[j]);
+    addProduct(y, y, 1.0, result);
   }
   return result;
 }

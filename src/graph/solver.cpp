@@ -78,16 +78,83 @@ ceres::Solver::Options solverOptions() {
   return options;
 }
 
-}  // namespace
+/// Of a step that is tried where the whole one raises the cost. A tilt that is lost makes steps of a radian,
+/// over which the graph is not linear but the direction is right; damping would shorten them to a hundredth.
+constexpr double kShortestShare = 0.06;
+constexpr double kFirstDamping = 1e-4;
 
-Solution linearized(const Window& window) {
+/// Moves all blocks by `share` of the step, no farther than to their bounds. Whether one was stopped there.
+bool take(const std::vector<Eigen::VectorXd>& step, double share, Window& window) {
+  bool stopped = false;
+  for (std::size_t i = 0; i < step.size(); ++i) {
+    Block& block = *window.blocks()[i];
+    const Eigen::VectorXd delta = share * step[i];
+    block.manifold->plus(block.x.data(), delta.data(), block.x.data());
+    if (!isBeyondBound(block)) continue;
+    block.x[0] = std::copysign(block.bound, block.x[0]);
+    stopped = true;
+  }
+  return stopped;
+}
+
+/// Takes the step or a share of it, and linearises there; none where none lowers the cost.
+bool lowerCost(const std::vector<Eigen::VectorXd>& step, Window& window, NormalEquations& system) {
+  std::vector<Eigen::VectorXd> before;
+  for (const auto& block : window.blocks()) before.emplace_back(block->x);
+  for (double share = 1.0; share > kShortestShare; share *= 0.5) {
+    take(step, share, window);
+    NormalEquations candidate = linearize(window);
+    if (candidate.cost < system.cost) {
+      system = std::move(candidate);
+      return true;
+    }
+    for (std::size_t i = 0; i < before.size(); ++i) window.blocks()[i]->x = before[i];
+  }
+  return false;
+}
+
+Solution solveByChain(Window& window, const SolverLimits& limits) {
   Solution solution;
-  solution.normal_equations = linearize(window);
-  solution.elimination = eliminationOf(solution.normal_equations);
+  NormalEquations& system = solution.normal_equations;
+  system = linearize(window);
+  double damping = 0.0;
+  bool tested = false;  // the undamped step from here is long
+  std::optional<Elimination> elimination;
+  std::vector<int> held;
+  for (solution.iterations = 1;; ++solution.iterations) {
+    held = pushedOutwards(window, system);
+    if (held.empty()) {
+      elimination = Elimination::of(system, damping);
+    } else {
+      NormalEquations reduced = system;
+      for (const int i : held) reduced.hold(i);
+      elimination = Elimination::of(reduced, damping);
+    }
+    const bool is_short = elimination && elimination->squaredLength() < limits.short_step;
+    if (is_short && damping == 0.0 && !take(elimination->delta(), 1.0, window)) {
+      solution.termination = held.empty() ? SolverTermination::kConverged : SolverTermination::kAtBound;
+      break;
+    }
+    if (solution.iterations >= limits.max_iterations) break;
+    if (damping == 0.0) tested = true;
+    if (is_short && damping > 0.0 && !tested) {
+      damping = 0.0;  // short by the damping, or because little is left to go
+    } else if (elimination && lowerCost(elimination->delta(), window, system)) {
+      tested = false;
+      damping = damping > kFirstDamping ? 0.1 * damping : 0.0;
+    } else if (is_short && damping > 0.0) {
+      solution.termination = SolverTermination::kNoDecrease;
+      break;
+    } else {
+      damping = std::max(kFirstDamping, 10.0 * damping);
+    }
+  }
+  const bool is_of_system = elimination && damping == 0.0 && held.empty();
+  solution.elimination = is_of_system ? std::move(*elimination) : eliminationOf(system);
   return solution;
 }
 
-Solution solve(Window& window, const SolverLimits& limits) {
+Solution solveByCeres(Window& window, const SolverLimits& limits) {
   ceres::Solver::Options options = solverOptions();
   StopEarly stop_early(window, limits.short_step);
   options.callbacks = {&stop_early};
@@ -123,6 +190,19 @@ Solution solve(Window& window, const SolverLimits& limits) {
     }
     setHeld(outwards);
   }
+}
+
+}  // namespace
+
+Solution linearized(const Window& window) {
+  Solution solution;
+  solution.normal_equations = linearize(window);
+  solution.elimination = eliminationOf(solution.normal_equations);
+  return solution;
+}
+
+Solution solve(Window& window, const SolverLimits& limits, WindowSolver solver) {
+  return solver == WindowSolver::kCeres ? solveByCeres(window, limits) : solveByChain(window, limits);
 }
 
 std::string toString(SolverTermination termination) {

@@ -233,7 +233,7 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
       terms.push_back(&window.add(std::make_unique<RadarVelocityFactor>(z, time, model), {&state, offset.get()}, loss));
     }
     try {
-      solution = rio_t::solve(window, {kMaxIterations, kConverged * kConverged});
+      solution = rio_t::solve(window, {kMaxIterations, kConverged * kConverged}, smoother_.solver);
     } catch (const std::runtime_error&) {
       return 1.0;
     }

@@ -125,7 +125,7 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
   Graph graph = place(problem, t_O, problem.guess);
   solution.placements = 1;
   for (;;) {
-    Solution solved = rio_t::solve(graph.window, {batch_.max_iterations - solution.iterations, kConverged});
+    Solution solved = rio_t::solve(graph.window, {batch_.max_iterations - solution.iterations, kConverged}, options_.solver);
     solution.iterations += solved.iterations;
     solution.nodes.clear();
     for (const Node& node : graph.nodes) solution.nodes.push_back(node.estimate());

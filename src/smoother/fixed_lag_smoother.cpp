@@ -120,7 +120,7 @@ const Preintegration& FixedLagSmoother::preintegrateFrom(const Node& node, Time 
 }
 
 Solution FixedLagSmoother::optimize(double short_step) {
-  solution_ = solve(window_, {options_.max_iterations, short_step});
+  solution_ = solve(window_, {options_.max_iterations, short_step}, options_.solver);
   return solution_;
 }
 

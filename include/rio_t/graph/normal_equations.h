@@ -11,11 +11,14 @@
 /// The linearised graph, and block elimination of it (docs/method.md, section 6).
 namespace rio_t {
 
+/// By rows, as Ceres writes Jacobians.
+using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
 /// H delta = -b in the tangents of `blocks`, in their order.
 struct NormalEquations {
   std::vector<const Block*> blocks;
-  std::vector<Eigen::MatrixXd> diagonal;                 ///< H_ii
-  std::vector<std::map<int, Eigen::MatrixXd>> coupling;  ///< H_ij, j > i; none where it is zero
+  std::vector<RowMatrix> diagonal;                 ///< H_ii
+  std::vector<std::map<int, RowMatrix>> coupling;  ///< H_ij, j > i; none where it is zero
   std::vector<Eigen::VectorXd> gradient;                 ///< b_i = sum J'r
   double cost = 0.0;                                     ///< half the sum of squares, after the loss
 
@@ -37,7 +40,8 @@ class Elimination {
  public:
   /// None where H is not positive definite. What only rounding made indefinite is lifted by as little as it
   /// takes.
-  static std::optional<Elimination> of(const NormalEquations& system);
+  /// `damping` (Levenberg-Marquardt) raises the diagonal by this share.
+  static std::optional<Elimination> of(const NormalEquations& system, double damping = 0.0);
 
   const std::vector<Eigen::VectorXd>& delta() const { return delta_; }
   /// delta' H delta: the squared length of the step in sigmas.
@@ -48,10 +52,10 @@ class Elimination {
   std::vector<std::map<int, Eigen::MatrixXd>> covariances() const;
 
  private:
-  bool factorise(const NormalEquations& system, double lift);
+  bool factorise(const NormalEquations& system, double raise);
 
-  std::vector<Eigen::MatrixXd> L_;
-  std::vector<std::map<int, Eigen::MatrixXd>> W_;
+  std::vector<RowMatrix> L_;
+  std::vector<std::map<int, RowMatrix>> W_;
   std::vector<Eigen::VectorXd> delta_;
   double squared_length_ = 0.0;
 };

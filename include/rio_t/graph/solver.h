@@ -6,6 +6,12 @@
 
 namespace rio_t {
 
+/// Both minimise the same window with the same cost functions.
+enum class WindowSolver {
+  kChain,  ///< Gauss-Newton with the elimination of normal_equations.h
+  kCeres,  ///< ceres::Solve, several times slower
+};
+
 /// When to stop.
 struct SolverLimits {
   int max_iterations = 30;
@@ -21,11 +27,15 @@ struct Solution {
   Elimination elimination;           ///< of them
 };
 
-/// Moves the blocks to where the cost is least, with ceres::Solve. A block that would cross its bound is held there.
+/// Moves the blocks to where the cost is least. A block that would cross its bound is held there. Throws
+/// std::runtime_error where the terms do not determine the blocks.
 ///
-/// Ceres also calls steps convergence that its trust region made short. So the reason why it ended is told by
-/// the undamped step at what it found. Throws std::runtime_error where the terms do not determine the blocks.
-Solution solve(Window& window, const SolverLimits& limits);
+/// kChain: Gauss-Newton from where the blocks are; where a step does not lower the cost, a half of it and
+/// less, then Levenberg-Marquardt damping. Converged where the undamped step is short (that step is still
+/// taken). A damped step that is short says nothing.
+/// kCeres: in the problem that lives as long as the window. Ceres also calls steps convergence that its trust
+/// region made short. So the reason why it ended is told by the undamped step at what it found.
+Solution solve(Window& window, const SolverLimits& limits, WindowSolver solver = WindowSolver::kChain);
 
 /// The same without moving anything: no iterations.
 Solution linearized(const Window& window);

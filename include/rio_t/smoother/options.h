@@ -1,12 +1,14 @@
 #pragma once
 
 #include "rio_t/factors/radar_motion.h"
+#include "rio_t/graph/solver.h"
 
 namespace rio_t {
 
 struct SmootherOptions {
   double window = 1.0;           ///< [s] length of the fixed-lag window
   double huber_threshold = 1.5;  ///< on the whitened radar residual's norm; 0 = no robust loss
+  WindowSolver solver = WindowSolver::kChain;
   int max_iterations = 30;  ///< of the solver, each scan
   /// [sigma] farther from what the IMU predicts, offset uncertainty included, a scan is rejected; 0 = no
   /// gate.
