@@ -74,6 +74,23 @@ TEST(HealthMonitor, FewScansProveNothing) {
   }
 }
 
+TEST(HealthMonitor, AnOffsetThatStepsAllTheTimeIsADivergence) {
+  HealthMonitor monitor(HealthOptions(), 4.0);
+  EXPECT_EQ(feed(monitor, 0.0, 10.0, 1.0), Health::kOk);
+  for (const double step : {10.0, 14.0}) {
+    monitor.offsetStepped(at(step));
+    EXPECT_EQ(feed(monitor, step, step + 4.0, 1.0), Health::kOk) << step;
+  }
+  monitor.offsetStepped(at(18.0));
+  EXPECT_EQ(feed(monitor, 18.0, 18.5, 1.0), Health::kDiverged);
+  EXPECT_EQ(feed(monitor, 18.5, 22.0, 1.0), Health::kOk);
+  // Far apart, each is what it says.
+  for (const double step : {40.0, 70.0, 100.0}) {
+    monitor.offsetStepped(at(step));
+    EXPECT_EQ(feed(monitor, step, step + 5.0, 1.0), Health::kOk) << step;
+  }
+}
+
 TEST(HealthMonitor, CoastsWithoutScansAndDivergesWhereNothingIsKnown) {
   HealthMonitor monitor(HealthOptions(), 4.0);
   feed(monitor, 0.0, 5.0, 1.0);

@@ -1,6 +1,7 @@
 #include "rio_t/factors/radar_motion.h"
 
 #include <algorithm>
+#include <cstdint>
 
 #include "rio_t/core/so3.h"
 #include "rio_t/factors/offset_derivative.h"
@@ -10,15 +11,27 @@ namespace rio_t {
 
 RadarMotion RadarMotionModel::at(const double* state, Time state_time, Time stamp, double t_O,
                                  const Eigen::Vector3d& l_I,
-                                 bool derivatives) const {
+                                 const ImuMean* mean) const {
   const StateView x(state);
-  if (kind == TimeOffsetModel::kConstantAcceleration) return carriedByOneAcceleration(x, stamp, t_O, l_I);
-  return carriedByImu(x, state_time, stamp - std::clamp(t_O, -max_time_offset, max_time_offset), l_I,
-                      derivatives);
+  if (kind == TimeOffsetModel::kConstantAcceleration)
+    return carriedByOneAcceleration(x, stamp, t_O, l_I, mean != nullptr ? *mean : meanAt(stamp));
+  return carriedByImu(x, state_time, tau(stamp, t_O), l_I, mean);
 }
 
+Time RadarMotionModel::tau(Time stamp, double t_O) const {
+  return stamp - std::clamp(t_O, -max_time_offset, max_time_offset);
+}
+
+Time RadarMotionModel::meanTime(Time stamp, double t_O) const {
+  if (kind == TimeOffsetModel::kConstantAcceleration) return stamp;
+  constexpr std::int64_t kMillisecond = 1'000'000;  // [ns]
+  return Time::fromNanoseconds((tau(stamp, t_O).nanoseconds() + kMillisecond / 2) / kMillisecond * kMillisecond);
+}
+
+ImuMean RadarMotionModel::meanAt(Time time) const { return imu->mean(time, kOffsetHalfWidth); }
+
 RadarMotion RadarMotionModel::carriedByImu(const StateView& x, Time state_time, Time tau,
-                                           const Eigen::Vector3d& l_I, bool derivatives) const {
+                                           const Eigen::Vector3d& l_I, const ImuMean* mean) const {
   ImuDelta delta;
   imu->forEachInterval(state_time, tau, [&](double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
     delta.step(dt, gyro - x.b_g, accel - x.b_a);
@@ -31,23 +44,22 @@ RadarMotion RadarMotionModel::carriedByImu(const StateView& x, Time state_time, 
   RadarMotion motion;
   motion.omega_I = imu->at(tau).angular_velocity - x.b_g;
   motion.v_I = v_tau + motion.omega_I.cross(l_I);
-  if (!derivatives) return motion;
+  if (mean == nullptr) return motion;
   motion.J_state.middleCols<3>(StateBlock::kQStored) = dR_T * so3::hat(carried);
   motion.J_state.middleCols<3>(StateBlock::kVStored) = dR_T * R_IW;
   motion.J_state.middleCols<3>(StateBlock::kBgStored) =
       dR_T * delta.dv_dbg + so3::hat(v_tau) * delta.dR_dbg + so3::hat(l_I);
   motion.J_state.middleCols<3>(StateBlock::kBaStored) = dR_T * delta.dv_dba;
-  motion.dv_dt_O =
-      -velocityRate(imu->mean(tau, kOffsetHalfWidth), x.b_g, x.b_a, v_tau, dR_T * R_IW * g_W, l_I).known();
+  motion.dv_dt_O = -velocityRate(*mean, x.b_g, x.b_a, v_tau, dR_T * R_IW * g_W, l_I).known();
   return motion;
 }
 
 RadarMotion RadarMotionModel::carriedByOneAcceleration(const StateView& x, Time stamp, double t_O,
-                                                       const Eigen::Vector3d& l_I) const {
+                                                       const Eigen::Vector3d& l_I, const ImuMean& mean) const {
   const Eigen::Matrix3d R_IW = x.q_WI.toRotationMatrix().transpose();
   const Eigen::Vector3d v_I = R_IW * x.v_W;
   const Eigen::Vector3d g_I = R_IW * g_W;
-  const Eigen::Vector3d a_c = imu->mean(stamp, kOffsetHalfWidth).acceleration - x.b_a + g_I;
+  const Eigen::Vector3d a_c = mean.acceleration - x.b_a + g_I;
 
   RadarMotion motion;
   motion.omega_I = imu->at(stamp).angular_velocity - x.b_g;

@@ -13,7 +13,10 @@ RadarVelocityFactor::RadarVelocityFactor(const RadarVelocityMeasurement& z, Time
 bool RadarVelocityFactor::Evaluate(double const* const* parameters, double* residuals,
                                    double** jacobians) const {
   const double t_O = z_.held_t_O.value_or(parameters[1][0]);
-  const RadarMotion motion = model_.at(parameters[0], state_time_, z_.stamp, t_O, z_.T_IR.l_I, jacobians != nullptr);
+  const Time mean_time = model_.meanTime(z_.stamp, t_O);
+  if (jacobians != nullptr && (!mean_ || mean_->time != mean_time)) mean_ = Mean{mean_time, model_.meanAt(mean_time)};
+  const RadarMotion motion = model_.at(parameters[0], state_time_, z_.stamp, t_O, z_.T_IR.l_I,
+                                       jacobians != nullptr ? &mean_->value : nullptr);
   const Eigen::Matrix3d W_R = whitening_ * z_.T_IR.R_RI();
   Eigen::Map<Eigen::Vector3d>{residuals} = W_R * motion.v_I - whitening_ * z_.v_R;
   if (jacobians == nullptr) return true;

@@ -14,6 +14,7 @@ constexpr std::size_t kMinScans = 8;      // fewer prove nothing
 constexpr double kMinSpan = 0.7;          // of the window, that they must reach over
 constexpr std::size_t kMaxScans = 1000;   // bounds the memory
 constexpr double kStepsApart = 20.0;      // [s] nearer, a step of the offset explains nothing
+constexpr std::size_t kFalseSteps = 3;    // so near each other, no offset steps: a driver restarts once
 constexpr double kMaxSpeed = 200.0;       // [m/s] no platform with such a radar
 constexpr double kMetresPerSecond2 = 10;  // an attitude that is off by x turns x g into velocity each second
 
@@ -78,12 +79,14 @@ std::optional<double> HealthMonitor::contradiction() const {
 
 void HealthMonitor::offsetStepped(Time stamp) {
   // A divergence makes false steps, one after the other: they must not hide it.
-  if (!offset_stepped_ || std::abs(stamp - *offset_stepped_) > kStepsApart) entries_.clear();
-  offset_stepped_ = stamp;
+  if (steps_.empty() || std::abs(stamp - steps_.back()) > kStepsApart) entries_.clear();
+  steps_.push_back(stamp);
+  while (std::abs(stamp - steps_.front()) > kStepsApart) steps_.pop_front();
 }
 
 void HealthMonitor::startedAt(Time time) {
   entries_.clear();
+  steps_.clear();
   last_update_ = time;
   if (diverged_at_) diverged_at_ = time;
 }
@@ -94,6 +97,12 @@ bool HealthMonitor::wantsReinitialization(Time now) const {
 }
 
 Health HealthMonitor::judge(Time now, const NavigationState& state) {
+  if (!diverged_at_ && steps_.size() >= kFalseSteps) {
+    diverged_at_ = now;
+    contradicted_since_ = steps_.front();
+    steps_.clear();
+    entries_.clear();  // a whole window must agree before it is trusted again
+  }
   if (const std::optional<double> share = contradiction()) {
     if (!diverged_at_ && *share > options_.max_contradiction) {
       diverged_at_ = now;

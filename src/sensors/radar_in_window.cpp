@@ -40,7 +40,8 @@ std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoo
   const std::optional<PredictedState> state = smoother.predict(time, {&offsetBlock()});
   if (!state) return std::nullopt;
   const Eigen::Matrix3d R_RI = T_IR_.R_RI();
-  const RadarMotion motion = model_.at(state->x.data(), time, stamp, offset(), T_IR_.l_I);
+  const ImuMean mean = model_.meanAt(time);
+  const RadarMotion motion = model_.at(state->x.data(), time, stamp, offset(), T_IR_.l_I, &mean);
   Eigen::Matrix<double, 3, kNodeTangent> J;
   J << motion.J_state.leftCols<3>(), motion.J_state.rightCols<StateBlock::kTangent - 3>(), motion.dv_dt_O;
   J = (R_RI * J).eval();
@@ -55,7 +56,9 @@ std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoo
   prediction.velocity.covariance = J * P * J.transpose();
   const auto J_state = J.leftCols<kOffset>();
   prediction.covariance_at_offset = J_state * P.topLeftCorner<kOffset, kOffset>() * J_state.transpose();
-  const VelocityRate rate = velocityRate(*model_.imu, time, state->x, model_.g_W, T_IR_.l_I);
+  const Eigen::Quaterniond q_IW = state->x.q_WI().conjugate();
+  const VelocityRate rate = velocityRate(mean, state->x.b_g(), state->x.b_a(), q_IW * state->x.v_W(),
+                                         q_IW * model_.g_W, T_IR_.l_I);
   prediction.informs_offset = rate.informsOffset(options_.time_offset_min_acceleration);
   if (options_.estimate_time_offset) prediction.rate_variance = rate.variance * P(kOffset, kOffset);
   const Eigen::Matrix<double, 2, 3> horizontal = state->x.q_WI().toRotationMatrix().topRows<2>();

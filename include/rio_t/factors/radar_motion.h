@@ -38,14 +38,21 @@ struct RadarMotionModel {
   /// is at the stamp:
   ///   v_I = R_IW v_W + (omega - b_g) x l_I - t_O a_c,   a_c = a - b_a + R_IW g_W,
   /// with omega at the stamp, and for a the mean over 2 kOffsetHalfWidth around it.
-  /// `state` as StateBlock stores it; `l_I` is the radar in I [m]. Without `derivatives` these stay zero.
+  /// `state` as StateBlock stores it; `l_I` is the radar in I [m]. Without `mean`, that at meanTime, the
+  /// derivatives of kImu stay zero.
   RadarMotion at(const double* state, Time state_time, Time stamp, double t_O, const Eigen::Vector3d& l_I,
-                 bool derivatives = true) const;
+                 const ImuMean* mean) const;
+  /// Where the IMU is averaged for the derivative with respect to t_O: tau to a millisecond, or the stamp. An
+  /// evaluation that moved t_O by less than that need not average again.
+  Time meanTime(Time stamp, double t_O) const;
+  ImuMean meanAt(Time time) const;
 
  private:
+  Time tau(Time stamp, double t_O) const;
   RadarMotion carriedByImu(const StateView& x, Time state_time, Time tau, const Eigen::Vector3d& l_I,
-                           bool derivatives) const;
-  RadarMotion carriedByOneAcceleration(const StateView& x, Time stamp, double t_O, const Eigen::Vector3d& l_I) const;
+                           const ImuMean* mean) const;
+  RadarMotion carriedByOneAcceleration(const StateView& x, Time stamp, double t_O, const Eigen::Vector3d& l_I,
+                                       const ImuMean& mean) const;
 };
 
 }  // namespace rio_t

@@ -36,6 +36,11 @@ class RadarVelocityFactor final : public ceres::SizedCostFunction<3, StateBlock:
   Time state_time_;
   RadarMotionModel model_;
   Eigen::Matrix3d whitening_;  ///< W with W'W = covariance^-1
+  struct Mean {
+    Time time;
+    ImuMean value;
+  };
+  mutable std::optional<Mean> mean_;  ///< of the last evaluation; changes no result. Not for two threads.
 };
 
 }  // namespace rio_t

@@ -51,7 +51,8 @@ class HealthMonitor {
   }
   /// The window was updated at `time`.
   void updated(Time time) { last_update_ = time; }
-  /// The time offset was found to have stepped, which explains what contradicted so far; once in a while.
+  /// The time offset was found to have stepped, which explains what contradicted so far; once in a while. Three
+  /// steps in a row are a divergence: it is something else that the offset cannot explain.
   void offsetStepped(Time stamp);
   /// The state at `time` was found anew. Once diverged, the next scans must agree before it is trusted.
   void startedAt(Time time);
@@ -80,7 +81,7 @@ class HealthMonitor {
   double gate_;            // read-only after construction
   SlidingQueue<Entry> entries_;
   Time last_update_;
-  std::optional<Time> offset_stepped_;
+  SlidingQueue<Time> steps_;  ///< of the offset, those near the last
   std::optional<Time> diverged_at_;  ///< since when the scans contradict, or since the last start after that
   Time contradicted_since_;
   Time latest_;  ///< stamp of the newest entry, also after the entries were cleared
