@@ -379,7 +379,7 @@ TEST_P(Windows, AnOffsetThatStartsAtTheBoundLeavesIt) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Solver, Windows, ::testing::Values(WindowSolver::kChain, WindowSolver::kCeres),
-                         [](const auto& info) { return info.param == WindowSolver::kChain ? "chain" : "ceres"; });
+                         [](const auto& solver) { return solver.param == WindowSolver::kChain ? "chain" : "ceres"; });
 
 /// A height above the start, off by a bias that is calibrated: z - (p_W,z + bias), whitened. Blocks: state,
 /// bias. All that a new sensor needs: this cost function, and where it is added to the window.

@@ -18,7 +18,7 @@ struct RadarSmoother {
   void initialize(Time time, const NodePrior& prior) { start(states, radar, time, prior); }
   RadarInWindow::AddResult add(const RadarVelocityMeasurement& z) { return radar.add(states, z); }
   void addRest(Time stamp, double sigma) { states.addZeroVelocity(*states.nodeAt(radar.nodeTime(stamp)), sigma); }
-  Solution optimize(double short_step = SolverLimits().short_step) { return states.optimize(short_step); }
+  const Solution& optimize(double short_step = SolverLimits().short_step) { return states.optimize(short_step); }
   std::vector<NodeEstimate> marginalize() { return states.marginalize({{&radar.offsetBlock(), walk}}); }
   std::optional<RadarVelocityPrediction> predict(Time stamp) const { return radar.predict(states, stamp); }
   void stepOffset(Time stamp) { radar.stepOffset(states.window(), stamp); }

@@ -18,20 +18,45 @@ constexpr double kWellDetermined = 1e-6;
 constexpr double kSmallestLift = 1e-15;
 constexpr double kLargestLift = 1e-9;
 
+/// Some rows of numbers, one after the other.
+struct Rows {
+  const double* data;
+  Eigen::Index rows, columns;
+};
+Rows rowsOf(const RowMatrix& A) { return {A.data(), A.rows(), A.cols()}; }
+
 /// sum += sign A' B, row by row. Most derivatives are zero, and at these sizes Eigen's blocked product costs
 /// several times as much.
-void addProduct(const RowMatrix& A, const RowMatrix& B, double sign, RowMatrix& sum) {
-  if (sum.size() == 0) sum.setZero(A.cols(), B.cols());
-  const Eigen::Index columns = B.cols();
-  for (Eigen::Index row = 0; row < A.rows(); ++row) {
-    const double* const b = B.data() + row * columns;
-    for (Eigen::Index i = 0; i < A.cols(); ++i) {
-      const double a = sign * A(row, i);
+void addProduct(const Rows& A, const Rows& B, double sign, RowMatrix& sum) {
+  if (sum.size() == 0) sum.setZero(A.columns, B.columns);
+  for (Eigen::Index row = 0; row < A.rows; ++row) {
+    const double* const b = B.data + row * B.columns;
+    for (Eigen::Index i = 0; i < A.columns; ++i) {
+      const double a = sign * A.data[row * A.columns + i];
       if (a == 0.0) continue;
-      double* const to = sum.data() + i * columns;
-      for (Eigen::Index j = 0; j < columns; ++j) to[j] += a * b[j];
+      double* const to = sum.data() + i * B.columns;
+      for (Eigen::Index j = 0; j < B.columns; ++j) to[j] += a * b[j];
     }
   }
+}
+
+/// sum += sign A' A, of which only the lower triangle.
+void addSquare(const Rows& A, double sign, RowMatrix& sum) {
+  for (Eigen::Index row = 0; row < A.rows; ++row) {
+    const double* const b = A.data + row * A.columns;
+    for (Eigen::Index i = 0; i < A.columns; ++i) {
+      const double a = sign * b[i];
+      if (a == 0.0) continue;
+      double* const to = sum.data() + i * A.columns;
+      for (Eigen::Index j = 0; j <= i; ++j) to[j] += a * b[j];
+    }
+  }
+}
+
+/// sum += sign A' x.
+void addProduct(const Rows& A, const Eigen::VectorXd& x, double sign, Eigen::VectorXd& sum) {
+  for (Eigen::Index row = 0; row < A.rows; ++row)
+    for (Eigen::Index i = 0; i < A.columns; ++i) sum[i] += sign * x[row] * A.data[row * A.columns + i];
 }
 
 /// W <- L^-1 W for the lower triangle of L, by rows.
@@ -42,57 +67,72 @@ void forwardSubstitute(const RowMatrix& L, RowMatrix& W) {
   }
 }
 
-/// Residual and derivatives of a term with respect to the tangents of its blocks, after the loss.
-struct Linearized {
-  Eigen::VectorXd r;
-  std::vector<RowMatrix> J;
-  double cost = 0.0;
+/// Residual and derivatives of a term with respect to the tangents of its blocks, after the loss. Keeps its
+/// memory from term to term.
+class Linearized {
+ public:
+  void evaluate(const Term& term) {
+    const Eigen::Index rows = term.cost->num_residuals();
+    r_.resize(rows);
+    if (numbers_.size() < term.blocks.size()) numbers_.resize(term.blocks.size());
+    parameters_.clear();
+    jacobians_.clear();
+    for (std::size_t i = 0; i < term.blocks.size(); ++i) {
+      const auto size = static_cast<std::size_t>(rows * term.blocks[i]->manifold->size());
+      if (numbers_[i].size() < size) numbers_[i].resize(size);
+      parameters_.push_back(term.blocks[i]->x.data());
+      jacobians_.push_back(numbers_[i].data());
+    }
+    if (!term.cost->Evaluate(parameters_.data(), r_.data(), jacobians_.data()))
+      throw std::runtime_error("graph: a factor cannot be evaluated");
+    double rho[3] = {r_.squaredNorm(), 1.0, 0.0};
+    if (term.loss) term.loss->Evaluate(rho[0], rho);
+    cost_ = 0.5 * rho[0];
+    const double root = std::sqrt(rho[1]);
+    r_ *= root;
+    J_.clear();
+    for (std::size_t i = 0; i < term.blocks.size(); ++i) J_.push_back(tangents(i, *term.blocks[i]->manifold, root));
+  }
+  const Eigen::VectorXd& r() const { return r_; }
+  const Rows& J(std::size_t i) const { return J_[i]; }
+  double cost() const { return cost_; }
+
+ private:
+  /// Moves the columns that carry the tangent together.
+  Rows tangents(std::size_t i, const Manifold& manifold, double root) {
+    const std::vector<int>& columns = manifold.columns();
+    double* to = numbers_[i].data();
+    const double* from = to;
+    for (Eigen::Index row = 0; row < r_.size(); ++row, from += manifold.size())
+      for (const int column : columns) *to++ = root * from[column];
+    return {numbers_[i].data(), r_.size(), static_cast<Eigen::Index>(columns.size())};
+  }
+
+  Eigen::VectorXd r_;
+  std::vector<std::vector<double>> numbers_;
+  std::vector<const double*> parameters_;
+  std::vector<double*> jacobians_;
+  std::vector<Rows> J_;
+  double cost_ = 0.0;
 };
 
-Linearized evaluate(const Term& term) {
-  const auto rows = term.cost->num_residuals();
-  Linearized result;
-  result.r.resize(rows);
-  std::vector<RowMatrix> stored(term.blocks.size());
-  std::vector<const double*> parameters;
-  std::vector<double*> jacobians;
-  for (std::size_t i = 0; i < term.blocks.size(); ++i) {
-    stored[i].resize(rows, term.blocks[i]->manifold->size());
-    parameters.push_back(term.blocks[i]->x.data());
-    jacobians.push_back(stored[i].data());
-  }
-  if (!term.cost->Evaluate(parameters.data(), result.r.data(), jacobians.data()))
-    throw std::runtime_error("graph: a factor cannot be evaluated");
-  double rho[3] = {result.r.squaredNorm(), 1.0, 0.0};
-  if (term.loss) term.loss->Evaluate(rho[0], rho);
-  result.cost = 0.5 * rho[0];
-  const double root = std::sqrt(rho[1]);
-  result.r *= root;
-  for (std::size_t i = 0; i < term.blocks.size(); ++i) {
-    const std::vector<int>& columns = term.blocks[i]->manifold->columns();
-    RowMatrix J(rows, static_cast<Eigen::Index>(columns.size()));
-    for (Eigen::Index row = 0; row < rows; ++row)
-      for (Eigen::Index k = 0; k < J.cols(); ++k) J(row, k) = root * stored[i](row, columns[k]);
-    result.J.push_back(std::move(J));
-  }
-  return result;
-}
-
-void addTo(NormalEquations& system, const Term& term, const std::unordered_map<const Block*, int>& index) {
-  const Linearized linear = evaluate(term);
-  system.cost += linear.cost;
-  std::vector<int> at;
-  for (const Block* block : term.blocks) {
+void addTo(NormalEquations& system, const Term& term, const std::unordered_map<const Block*, int>& index,
+           Linearized& linear) {
+  linear.evaluate(term);
+  system.cost += linear.cost();
+  const auto indexOf = [&](const Block* block) {
     const auto found = index.find(block);
-    at.push_back(found == index.end() || block->is_constant ? -1 : found->second);
-  }
-  for (std::size_t a = 0; a < at.size(); ++a) {
-    if (at[a] < 0) continue;
-    const RowMatrix& J = linear.J[a];
-    addProduct(J, J, 1.0, system.diagonal[at[a]]);
-    system.gradient[at[a]].noalias() += J.transpose() * linear.r;
-    for (std::size_t b = 0; b < at.size(); ++b)
-      if (at[b] > at[a]) addProduct(J, linear.J[b], 1.0, system.coupling[at[a]][at[b]]);
+    return found == index.end() || block->is_constant ? -1 : found->second;
+  };
+  for (std::size_t a = 0; a < term.blocks.size(); ++a) {
+    const int i = indexOf(term.blocks[a]);
+    if (i < 0) continue;
+    addSquare(linear.J(a), 1.0, system.diagonal[i]);
+    addProduct(linear.J(a), linear.r(), 1.0, system.gradient[i]);
+    for (std::size_t b = 0; b < term.blocks.size(); ++b) {
+      const int j = indexOf(term.blocks[b]);
+      if (j > i) addProduct(linear.J(a), linear.J(b), 1.0, system.coupling[i][j]);
+    }
   }
 }
 
@@ -123,7 +163,10 @@ NormalEquations linearize(std::vector<const Block*> blocks, const std::vector<co
   NormalEquations system(std::move(blocks));
   std::unordered_map<const Block*, int> index;
   for (std::size_t i = 0; i < system.blocks.size(); ++i) index[system.blocks[i]] = static_cast<int>(i);
-  for (const Term* term : terms) addTo(system, *term, index);
+  Linearized linear;
+  for (const Term* term : terms) addTo(system, *term, index, linear);
+  for (RowMatrix& H : system.diagonal)
+    H.triangularView<Eigen::StrictlyUpper>() = H.transpose().triangularView<Eigen::StrictlyUpper>();
   for (std::size_t i = 0; i < system.blocks.size(); ++i)
     if (system.blocks[i]->is_constant) system.hold(static_cast<int>(i));
   return system;
@@ -152,12 +195,12 @@ bool Elimination::factorise(const NormalEquations& system, double raise) {
     L_[i].triangularView<Eigen::Lower>().solveInPlace(delta_[i]);
     for (auto& [j, W] : W_[i]) {
       forwardSubstitute(L_[i], W);
-      delta_[j].noalias() -= W.transpose() * delta_[i];
+      addProduct(rowsOf(W), delta_[i], -1.0, delta_[j]);
     }
     for (auto a = W_[i].begin(); a != W_[i].end(); ++a) {
-      addProduct(a->second, a->second, -1.0, L_[a->first]);
+      addSquare(rowsOf(a->second), -1.0, L_[a->first]);
       for (auto b = std::next(a); b != W_[i].end(); ++b)
-        addProduct(a->second, b->second, -1.0, W_[a->first][b->first]);
+        addProduct(rowsOf(a->second), rowsOf(b->second), -1.0, W_[a->first][b->first]);
     }
   }
   squared_length_ = 0.0;
@@ -193,10 +236,10 @@ Eigen::MatrixXd Elimination::covariance(const std::vector<int>& indices) const {
   for (auto at = Y.begin(); at != Y.end(); ++at) {
     auto& [i, y] = *at;
     forwardSubstitute(L_[i], y);
-    for (const auto& [j, W] : W_[i]) addProduct(W, y, -1.0, Y[j]);
-    addProduct(y, y, 1.0, result);
+    for (const auto& [j, W] : W_[i]) addProduct(rowsOf(W), rowsOf(y), -1.0, Y[j]);
+    addSquare(rowsOf(y), 1.0, result);
   }
-  return result;
+  return result.selfadjointView<Eigen::Lower>();
 }
 
 std::vector<std::map<int, Eigen::MatrixXd>> Elimination::covariances() const {

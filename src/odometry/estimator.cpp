@@ -115,7 +115,7 @@ void Estimator::judge(const RadarAnswer& answer, Time stamp) {
 }
 
 void Estimator::updateWindow(ScanResult& result) {
-  const Solution solution = smoother_.optimize();
+  const Solution& solution = smoother_.optimize();
   result.solver_iterations = solution.iterations;
   result.solver_termination = solution.termination;
   result.state = newestState();

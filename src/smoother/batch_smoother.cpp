@@ -25,7 +25,8 @@ std::vector<NodeMatrix> nodeCovariances(const Elimination& elimination) {
   const std::vector<std::map<int, Eigen::MatrixXd>> P = elimination.covariances();
   std::vector<NodeMatrix> result;
   for (int i = 0; i < static_cast<int>(P.size()); i += 2) {
-    const Eigen::MatrixXd& cross = P[i].at(i + 1);
+    const auto found = P[i].find(i + 1);  // none where the offset is known
+    const Eigen::MatrixXd cross = found == P[i].end() ? Eigen::MatrixXd(NodeVector::Zero().head<15>()) : found->second;
     NodeMatrix covariance;
     covariance << P[i].at(i), cross, cross.transpose(), P[i + 1].at(i + 1);
     result.push_back(covariance);

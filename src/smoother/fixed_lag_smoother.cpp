@@ -119,7 +119,7 @@ const Preintegration& FixedLagSmoother::preintegrateFrom(const Node& node, Time 
   return last.value;
 }
 
-Solution FixedLagSmoother::optimize(double short_step) {
+const Solution& FixedLagSmoother::optimize(double short_step) {
   solution_ = solve(window_, {options_.max_iterations, short_step}, options_.solver);
   return solution_;
 }

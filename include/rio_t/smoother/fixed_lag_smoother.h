@@ -58,7 +58,7 @@ class FixedLagSmoother {
   void addZeroVelocity(Block& node, double velocity_sigma);
 
   /// `short_step`: see SolverLimits.
-  Solution optimize(double short_step = SolverLimits().short_step);
+  const Solution& optimize(double short_step = SolverLimits().short_step);
   /// Random walk of a calibration block.
   struct RandomWalk {
     const Block* block;
