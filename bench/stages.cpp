@@ -11,7 +11,7 @@
 #include "rio_t/odometry/radar_inertial_odometry.h"
 #include "rio_t/ros/bag/run_output.h"
 #include "rio_t/ros/cloud/point_cloud.h"
-#include "rio_t/smoother/chain.h"
+#include "rio_t/sensors/radar_in_window.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
 #include "stage_clock.h"
 
@@ -52,56 +52,46 @@ RadarScan toRadarScan(const pcl::PointCloud<RadarPointPcl>& cloud, Time stamp) {
   return original(cloud, stamp);
 }
 
-void EgoVelocityEstimator::estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior,
-                                    EgoVelocityWorkspace* workspace, EgoVelocity* estimated) const {
-  using Estimate = void (EgoVelocityEstimator::*)(const RadarScan&, const std::optional<VelocityPrior>&,
-                                                  EgoVelocityWorkspace*, EgoVelocity*) const;
-  static const auto original = libraryFunction<Estimate>(&EgoVelocityEstimator::estimate);
+EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior) const {
+  static const auto original = libraryFunction(&EgoVelocityEstimator::estimate);
   const Scope scope(Stage::kEgoVelocity);
-  (this->*original)(scan, prior, workspace, estimated);
+  return (this->*original)(scan, prior);
 }
 
-std::optional<RadarVelocityPrediction> FixedLagSmoother::predictRadarVelocity(
-    Time stamp, const Eigen::Matrix3d& R_RI, const Eigen::Vector3d& l_I) const {
-  static const auto original = libraryFunction(&FixedLagSmoother::predictRadarVelocity);
+std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoother& smoother, Time stamp) const {
+  static const auto original = libraryFunction(&RadarInWindow::predict);
   const Scope scope(Stage::kPrediction);
-  return (this->*original)(stamp, R_RI, l_I);
+  return (this->*original)(smoother, stamp);
 }
 
-FixedLagSmoother::AddResult FixedLagSmoother::add(const RadarVelocityMeasurement& z) {
-  static const auto original = libraryFunction(&FixedLagSmoother::add);
+RadarInWindow::AddResult RadarInWindow::add(FixedLagSmoother& smoother, const RadarVelocityMeasurement& z) {
+  static const auto original = libraryFunction(&RadarInWindow::add);
   const Scope scope(Stage::kFactors);
-  return (this->*original)(z);
+  return (this->*original)(smoother, z);
 }
 
-FixedLagSmoother::AddResult FixedLagSmoother::addRest(Time stamp, double velocity_sigma) {
-  static const auto original = libraryFunction(&FixedLagSmoother::addRest);
-  const Scope scope(Stage::kFactors);
-  return (this->*original)(stamp, velocity_sigma);
-}
-
-SolveReport FixedLagSmoother::optimize(double short_step) {
+const Solution& FixedLagSmoother::optimize(double short_step) {
   static const auto original = libraryFunction(&FixedLagSmoother::optimize);
   const Scope scope(Stage::kSolve);
   return (this->*original)(short_step);
 }
 
-NodeMatrix covarianceOfLast(const ChainSystem& system, ChainSolution* solution) {
-  static const auto original = libraryFunction(&covarianceOfLast);
+Eigen::MatrixXd FixedLagSmoother::newestCovariance(const std::vector<const Block*>& calibration) const {
+  static const auto original = libraryFunction(&FixedLagSmoother::newestCovariance);
   const Scope scope(Stage::kCovariance);
-  return original(system, solution);
+  return (this->*original)(calibration);
 }
 
-const std::vector<NodeEstimate>& FixedLagSmoother::marginalize() {
+std::vector<NodeEstimate> FixedLagSmoother::marginalize(const std::vector<RandomWalk>& walks) {
   static const auto original = libraryFunction(&FixedLagSmoother::marginalize);
   const Scope scope(Stage::kMarginalise);
-  return (this->*original)();
+  return (this->*original)(walks);
 }
 
-void ImuPropagator::anchor(const NavigationState& state) {
+void ImuPropagator::anchor(const NavigationState& state, bool at_rest) {
   static const auto original = libraryFunction(&ImuPropagator::anchor);
   const Scope scope(Stage::kAnchor);
-  (this->*original)(state);
+  (this->*original)(state, at_rest);
 }
 
 std::optional<NavigationState> ImuPropagator::add(const ImuMeasurement& imu) {
@@ -116,11 +106,10 @@ std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasuremen
   return (this->*original)(imu);
 }
 
-void RadarInertialOdometry::process(const ResultHandler& handle) {
-  using Process = void (RadarInertialOdometry::*)(const ResultHandler&);
-  static const auto original = libraryFunction<Process>(&RadarInertialOdometry::process);
+std::vector<ScanResult> RadarInertialOdometry::process() {
+  static const auto original = libraryFunction(&RadarInertialOdometry::process);
   const Scope scope(Stage::kPipeline);
-  (this->*original)(handle);
+  return (this->*original)();
 }
 
 void RunOutput::addState(const NavigationState& state) {

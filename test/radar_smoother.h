@@ -21,7 +21,7 @@ struct RadarSmoother {
   const Solution& optimize(double short_step = SolverLimits().short_step) { return states.optimize(short_step); }
   std::vector<NodeEstimate> marginalize() { return states.marginalize({{&radar.offsetBlock(), walk}}); }
   std::optional<RadarVelocityPrediction> predict(Time stamp) const { return radar.predict(states, stamp); }
-  void stepOffset(Time stamp) { radar.stepOffset(states.window(), stamp); }
+  void stepOffset(Time stamp) { radar.stepOffset(states, stamp); }
 
   std::size_t size() const { return states.size(); }
   NodeEstimate node(std::size_t k) const { return states.node(k); }

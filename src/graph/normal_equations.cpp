@@ -25,32 +25,28 @@ struct Rows {
 };
 Rows rowsOf(const RowMatrix& A) { return {A.data(), A.rows(), A.cols()}; }
 
-/// sum += sign A' B, row by row. Most derivatives are zero, and at these sizes Eigen's blocked product costs
-/// several times as much.
-void addProduct(const Rows& A, const Rows& B, double sign, RowMatrix& sum) {
-  if (sum.size() == 0) sum.setZero(A.columns, B.columns);
+/// The same with the count of B's columns known to the compiler, or N = -1.
+template <int N>
+void addProductOf(const Rows& A, const Rows& B, double sign, double* sum) {
+  const Eigen::Index columns = N > 0 ? N : B.columns;
   for (Eigen::Index row = 0; row < A.rows; ++row) {
-    const double* const b = B.data + row * B.columns;
+    const double* const b = B.data + row * columns;
     for (Eigen::Index i = 0; i < A.columns; ++i) {
       const double a = sign * A.data[row * A.columns + i];
       if (a == 0.0) continue;
-      double* const to = sum.data() + i * B.columns;
-      for (Eigen::Index j = 0; j < B.columns; ++j) to[j] += a * b[j];
+      double* const to = sum + i * columns;
+      for (Eigen::Index j = 0; j < columns; ++j) to[j] += a * b[j];
     }
   }
 }
 
-/// sum += sign A' A, of which only the lower triangle.
-void addSquare(const Rows& A, double sign, RowMatrix& sum) {
-  for (Eigen::Index row = 0; row < A.rows; ++row) {
-    const double* const b = A.data + row * A.columns;
-    for (Eigen::Index i = 0; i < A.columns; ++i) {
-      const double a = sign * b[i];
-      if (a == 0.0) continue;
-      double* const to = sum.data() + i * A.columns;
-      for (Eigen::Index j = 0; j <= i; ++j) to[j] += a * b[j];
-    }
-  }
+/// sum += sign A' B, row by row. Most derivatives are zero, and at these sizes Eigen's blocked product costs
+/// several times as much. States have 15 directions, most calibration has one.
+void addProduct(const Rows& A, const Rows& B, double sign, RowMatrix& sum) {
+  if (sum.size() == 0) sum.setZero(A.columns, B.columns);
+  if (B.columns == 15) return addProductOf<15>(A, B, sign, sum.data());
+  if (B.columns == 1) return addProductOf<1>(A, B, sign, sum.data());
+  addProductOf<-1>(A, B, sign, sum.data());
 }
 
 /// sum += sign A' x.
@@ -60,11 +56,36 @@ void addProduct(const Rows& A, const Eigen::VectorXd& x, double sign, Eigen::Vec
 }
 
 /// W <- L^-1 W for the lower triangle of L, by rows.
-void forwardSubstitute(const RowMatrix& L, RowMatrix& W) {
+template <int N>
+void forwardSubstituteOf(const RowMatrix& L, RowMatrix& W) {
+  const Eigen::Index columns = N > 0 ? N : W.cols();
   for (Eigen::Index i = 0; i < L.rows(); ++i) {
-    for (Eigen::Index j = 0; j < i; ++j) W.row(i) -= L(i, j) * W.row(j);
-    W.row(i) /= L(i, i);
+    double* const to = W.data() + i * columns;
+    for (Eigen::Index j = 0; j < i; ++j) {
+      const double factor = L(i, j);
+      const double* const from = W.data() + j * columns;
+      for (Eigen::Index k = 0; k < columns; ++k) to[k] -= factor * from[k];
+    }
+    const double inverse = 1.0 / L(i, i);
+    for (Eigen::Index k = 0; k < columns; ++k) to[k] *= inverse;
   }
+}
+void forwardSubstitute(const RowMatrix& L, RowMatrix& W) {
+  if (W.cols() == 15) return forwardSubstituteOf<15>(L, W);
+  if (W.cols() == 1) return forwardSubstituteOf<1>(L, W);
+  forwardSubstituteOf<-1>(L, W);
+}
+
+/// S <- its Cholesky factor, in the lower triangle. False where S is not positive definite.
+bool cholesky(RowMatrix& S) {
+  using State = Eigen::Matrix<double, 15, 15, Eigen::RowMajor>;
+  if (S.rows() == State::RowsAtCompileTime) {
+    Eigen::Map<State> state(S.data());
+    const Eigen::LLT<State> factor(state);
+    state = factor.matrixLLT();
+    return factor.info() == Eigen::Success;
+  }
+  return Eigen::LLT<Eigen::Ref<RowMatrix>>(S).info() == Eigen::Success;
 }
 
 /// Residual and derivatives of a term with respect to the tangents of its blocks, after the loss. Keeps its
@@ -127,7 +148,7 @@ void addTo(NormalEquations& system, const Term& term, const std::unordered_map<c
   for (std::size_t a = 0; a < term.blocks.size(); ++a) {
     const int i = indexOf(term.blocks[a]);
     if (i < 0) continue;
-    addSquare(linear.J(a), 1.0, system.diagonal[i]);
+    addProduct(linear.J(a), linear.J(a), 1.0, system.diagonal[i]);
     addProduct(linear.J(a), linear.r(), 1.0, system.gradient[i]);
     for (std::size_t b = 0; b < term.blocks.size(); ++b) {
       const int j = indexOf(term.blocks[b]);
@@ -165,8 +186,6 @@ NormalEquations linearize(std::vector<const Block*> blocks, const std::vector<co
   for (std::size_t i = 0; i < system.blocks.size(); ++i) index[system.blocks[i]] = static_cast<int>(i);
   Linearized linear;
   for (const Term* term : terms) addTo(system, *term, index, linear);
-  for (RowMatrix& H : system.diagonal)
-    H.triangularView<Eigen::StrictlyUpper>() = H.transpose().triangularView<Eigen::StrictlyUpper>();
   for (std::size_t i = 0; i < system.blocks.size(); ++i)
     if (system.blocks[i]->is_constant) system.hold(static_cast<int>(i));
   return system;
@@ -190,15 +209,14 @@ bool Elimination::factorise(const NormalEquations& system, double raise) {
     L_[i].diagonal() *= 1.0 + raise;
   }
   for (std::size_t i = 0; i < count; ++i) {
-    const Eigen::LLT<Eigen::Ref<RowMatrix>> factor(L_[i]);  // in its place
-    if (factor.info() != Eigen::Success) return false;
+    if (!cholesky(L_[i])) return false;
     L_[i].triangularView<Eigen::Lower>().solveInPlace(delta_[i]);
     for (auto& [j, W] : W_[i]) {
       forwardSubstitute(L_[i], W);
       addProduct(rowsOf(W), delta_[i], -1.0, delta_[j]);
     }
     for (auto a = W_[i].begin(); a != W_[i].end(); ++a) {
-      addSquare(rowsOf(a->second), -1.0, L_[a->first]);
+      addProduct(rowsOf(a->second), rowsOf(a->second), -1.0, L_[a->first]);
       for (auto b = std::next(a); b != W_[i].end(); ++b)
         addProduct(rowsOf(a->second), rowsOf(b->second), -1.0, W_[a->first][b->first]);
     }
@@ -237,9 +255,9 @@ Eigen::MatrixXd Elimination::covariance(const std::vector<int>& indices) const {
     auto& [i, y] = *at;
     forwardSubstitute(L_[i], y);
     for (const auto& [j, W] : W_[i]) addProduct(rowsOf(W), rowsOf(y), -1.0, Y[j]);
-    addSquare(rowsOf(y), 1.0, result);
+    addProduct(rowsOf(y), rowsOf(y), 1.0, result);
   }
-  return result.selfadjointView<Eigen::Lower>();
+  return result;
 }
 
 std::vector<std::map<int, Eigen::MatrixXd>> Elimination::covariances() const {

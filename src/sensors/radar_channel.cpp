@@ -69,7 +69,7 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
     // A minority that sides with the prediction has more noise than its covariance says.
     const bool can_be_judged = moving && tilt_is_known && hasMajority(measured);
     if (can_be_judged && informs_offset && options_.smoother.estimate_time_offset && step_detector_.stepped(now)) {
-      in_window_.stepOffset(smoother.window(), scan.stamp);
+      in_window_.stepOffset(smoother, scan.stamp);
       offset_uncertainty_.offsetStepped();
       answer.offset_stepped = true;
     }

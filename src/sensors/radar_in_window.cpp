@@ -89,13 +89,15 @@ Block& RadarInWindow::offsetOf(Window& window, Time stamp) {
   return *epoch->block;
 }
 
-void RadarInWindow::stepOffset(Window& window, Time stamp) {
+void RadarInWindow::stepOffset(FixedLagSmoother& smoother, Time stamp) {
   if (!options_.estimate_time_offset) return;
+  Window& window = smoother.window();
   Block& before = *epochs_.back().block;
   std::shared_ptr<Block> after = addOffset(window, offset());
   window.add(std::make_unique<ConstantOffsetFactor>(options_.time_offset_sigma), {&before, after.get()});
   before.is_retired = true;
   epochs_.push_back({stamp, std::move(after)});
+  smoother.settle();
 }
 
 std::string toString(RadarInWindow::AddResult result) {

@@ -49,7 +49,7 @@ class RadarInWindow {
   std::optional<RadarVelocityPrediction> predict(const FixedLagSmoother& smoother, Time stamp) const;
   AddResult add(FixedLagSmoother& smoother, const RadarVelocityMeasurement& z);
   /// The offset stepped before the scan stamped `stamp`: from that scan on t_O is as uncertain as at the start.
-  void stepOffset(Window& window, Time stamp);
+  void stepOffset(FixedLagSmoother& smoother, Time stamp);
 
   const Extrinsics& extrinsics() const { return T_IR_; }
   const Block& offsetBlock() const { return *epochs_.back().block; }

@@ -45,7 +45,7 @@ class FixedLagSmoother {
   /// Starts (or starts again) with one node of which nothing is known. Sensors add their calibration and the
   /// prior then, and `settle` takes these in.
   Block& start(Time time, const StateBlock& x0);
-  /// After a start: what is known without a solve.
+  /// After a start, and after calibration came: what is known without a solve.
   void settle() { solution_ = linearized(window_); }
   bool started() const { return !nodes_.empty(); }
 
