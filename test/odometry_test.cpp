@@ -287,6 +287,32 @@ TEST(LateScans, PassTheSameGatesAsPunctualOnes) {
 }
 
 /// Wild motion in which a gyro axis reads 17.4 rad/s for 0.3 s.
+// Both solvers and both models of the offset, through everything.
+TEST(Solvers, SayTheSame) {
+  for (const TimeOffsetModel model : {TimeOffsetModel::kImu, TimeOffsetModel::kConstantAcceleration}) {
+    std::vector<ScanResult> last;
+    std::vector<std::size_t> used;
+    for (const WindowSolver solver : {WindowSolver::kChain, WindowSolver::kCeres}) {
+      SimulatedRun run("difficult", 1, 25.0);
+      run.setup.time_offset.constant = 0.03;
+      run.options.smoother.time_offset_model = model;
+      run.options.smoother.solver = solver;
+      run.run();
+      used.push_back(0);
+      for (const ScanResult& result : run.results) {
+        if (!result.used) continue;
+        ++used.back();
+        EXPECT_TRUE(isConverged(result.solver_termination)) << toString(result.solver_termination);
+      }
+      last.push_back(run.results.back());
+    }
+    EXPECT_EQ(used[0], used[1]);
+    EXPECT_LT((last[0].state.p_W - last[1].state.p_W).norm(), 2e-3);
+    EXPECT_NEAR(last[0].time_offset, last[1].time_offset, 0.1 * last[0].time_offset_sigma);
+    EXPECT_NEAR(last[0].time_offset_sigma, last[1].time_offset_sigma, 0.02 * last[0].time_offset_sigma);
+  }
+}
+
 TEST(StuckGyro, CostsLittle) {
   for (const int axis : {0, 1, 2}) {
     SimulatedRun run("difficult", 1, 60.0, 5.0);

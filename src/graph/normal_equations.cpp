@@ -49,6 +49,26 @@ void addProduct(const Rows& A, const Rows& B, double sign, RowMatrix& sum) {
   addProductOf<-1>(A, B, sign, sum.data());
 }
 
+/// sum += sign A' A, of which the lower triangle counts.
+void addSquare(const Rows& A, double sign, RowMatrix& sum) {
+  constexpr Eigen::Index kState = 15, kHalf = 8;
+  if (A.columns != kState) return addProduct(A, A, sign, sum);
+  for (Eigen::Index row = 0; row < A.rows; ++row) {
+    const double* const b = A.data + row * kState;
+    double* to = sum.data();
+    for (Eigen::Index i = 0; i < kState; ++i, to += kState) {
+      const double a = sign * b[i];
+      if (a == 0.0) continue;
+      // Two lengths that the compiler knows are faster than the exact one.
+      if (i < kHalf) {
+        for (Eigen::Index j = 0; j < kHalf; ++j) to[j] += a * b[j];
+      } else {
+        for (Eigen::Index j = 0; j < kState; ++j) to[j] += a * b[j];
+      }
+    }
+  }
+}
+
 /// sum += sign A' x.
 void addProduct(const Rows& A, const Eigen::VectorXd& x, double sign, Eigen::VectorXd& sum) {
   for (Eigen::Index row = 0; row < A.rows; ++row)
@@ -148,7 +168,7 @@ void addTo(NormalEquations& system, const Term& term, const std::unordered_map<c
   for (std::size_t a = 0; a < term.blocks.size(); ++a) {
     const int i = indexOf(term.blocks[a]);
     if (i < 0) continue;
-    addProduct(linear.J(a), linear.J(a), 1.0, system.diagonal[i]);
+    addSquare(linear.J(a), 1.0, system.diagonal[i]);
     addProduct(linear.J(a), linear.r(), 1.0, system.gradient[i]);
     for (std::size_t b = 0; b < term.blocks.size(); ++b) {
       const int j = indexOf(term.blocks[b]);
@@ -186,6 +206,9 @@ NormalEquations linearize(std::vector<const Block*> blocks, const std::vector<co
   for (std::size_t i = 0; i < system.blocks.size(); ++i) index[system.blocks[i]] = static_cast<int>(i);
   Linearized linear;
   for (const Term* term : terms) addTo(system, *term, index, linear);
+  for (RowMatrix& H : system.diagonal)
+    for (Eigen::Index i = 0; i < H.rows(); ++i)
+      for (Eigen::Index j = 0; j < i; ++j) H(j, i) = H(i, j);
   for (std::size_t i = 0; i < system.blocks.size(); ++i)
     if (system.blocks[i]->is_constant) system.hold(static_cast<int>(i));
   return system;
@@ -216,7 +239,7 @@ bool Elimination::factorise(const NormalEquations& system, double raise) {
       addProduct(rowsOf(W), delta_[i], -1.0, delta_[j]);
     }
     for (auto a = W_[i].begin(); a != W_[i].end(); ++a) {
-      addProduct(rowsOf(a->second), rowsOf(a->second), -1.0, L_[a->first]);
+      addSquare(rowsOf(a->second), -1.0, L_[a->first]);
       for (auto b = std::next(a); b != W_[i].end(); ++b)
         addProduct(rowsOf(a->second), rowsOf(b->second), -1.0, W_[a->first][b->first]);
     }

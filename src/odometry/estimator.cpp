@@ -118,10 +118,11 @@ void Estimator::updateWindow(ScanResult& result) {
   const Solution& solution = smoother_.optimize();
   result.solver_iterations = solution.iterations;
   result.solver_termination = solution.termination;
-  result.state = newestState();
-  result.time_offset = radar_.offset();
+  constexpr int kState = StateBlock::kTangent;
   const Eigen::MatrixXd covariance = smoother_.newestCovariance({&radar_.offsetBlock()});
-  result.time_offset_sigma = radar_.offsetSigma(covariance(StateBlock::kTangent, StateBlock::kTangent));
+  result.state = newestState(covariance.topLeftCorner<kState, kState>());
+  result.time_offset = radar_.offset();
+  result.time_offset_sigma = radar_.offsetSigma(covariance(kState, kState));
   for (const StampedPose& left : marginalize()) result.left_window.push_back(left);
   health_.updated(result.state.time);
   anchor(result.state, result.used && result.ego_velocity.status == EgoVelocityStatus::kZeroVelocity);
@@ -210,7 +211,7 @@ bool Estimator::tryReinitialize(std::vector<StampedPose>& left) {
   if (!found) return false;
   for (std::size_t k = 0; k < smoother_.size(); ++k)
     if (smoother_.node(k).time < found->time) left.push_back(pose(smoother_.node(k)));
-  pose_doubt_ = PoseDoubt(newestState());
+  pose_doubt_ = PoseDoubt(newestState(smoother_.newestCovariance({})));
   model_error_scale_ = found->model_error_scale;
   begin(found->time, found->prior);
   updateHealth();
@@ -264,8 +265,8 @@ ImuNoise Estimator::imuNoise() const {
   return noise;
 }
 
-NavigationState Estimator::newestState() const {
-  NavigationState state = navigationState(smoother_.newest(), smoother_.newestCovariance({}), imu_);
+NavigationState Estimator::newestState(const StateCovariance& covariance) const {
+  NavigationState state = navigationState(smoother_.newest(), covariance, imu_);
   yaw_doubt_.addTo(state);
   pose_doubt_.addTo(state);
   health_.widen(state);

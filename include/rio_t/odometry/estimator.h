@@ -56,12 +56,12 @@ class Estimator {
   PoseAnchor anchorAt(Time time) const;
   void judge(const RadarAnswer& answer, Time stamp);
   void updateWindow(ScanResult& result);
-  void publishNewest() { anchor(newestState(), false); }
+  void publishNewest() { anchor(newestState(smoother_.newestCovariance({})), false); }
   void anchor(const NavigationState& state, bool at_rest);
   std::vector<StampedPose> marginalize();
   bool isAtRest(Time time) const;
   ImuNoise imuNoise() const;  ///< with the model errors as they show
-  NavigationState newestState() const;
+  NavigationState newestState(const StateCovariance& covariance) const;
 
   const OdometryOptions options_;
   const Eigen::Vector3d g_W_;
