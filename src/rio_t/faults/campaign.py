@@ -29,6 +29,7 @@ class Bag:
     config: str
     topics: tuple  # (topic, kind)
     truth: Optional[pathlib.Path] = None
+    settings: tuple = ()  # of rio_t_bag in every run, key=value
 
 
 def topics_of(folder, config):
@@ -74,7 +75,7 @@ def ensure_usual(folder, bag, settings, output):
     if (output / "summary.yaml").exists():
         return
     own = pathlib.Path(tempfile.mkdtemp(prefix="usual_", dir=output.parent))
-    status, errors = run_pipeline(folder, bag.path, bag.config, settings, own)
+    status, errors = run_pipeline(folder, bag.path, bag.config, bag.settings + settings, own)
     if status != 0:
         raise RioTError(f"{bag.path} without a fault: {errors.strip()}")
     try:
@@ -90,7 +91,7 @@ def judge_case(folder, bag, case, scratch, keep):
     faulty = case.fault(messages, site)
     faulty_bag = scratch / "faulty.bag"
     stream.write(faulty_bag, faulty)
-    status, errors = run_pipeline(folder, faulty_bag, bag.config, case.settings, scratch / "run")
+    status, errors = run_pipeline(folder, faulty_bag, bag.config, bag.settings + case.settings, scratch / "run")
     (scratch / "stderr.txt").write_text(errors)
     if not keep:
         faulty_bag.unlink()

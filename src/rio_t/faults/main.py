@@ -1,6 +1,7 @@
 """The program: scripts/faults.py."""
 import argparse
 import concurrent.futures
+import dataclasses
 import os
 import pathlib
 import shutil
@@ -41,6 +42,8 @@ def parse(words):
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="cases at a time [%(default)s]")
     parser.add_argument("--bag", help="put the faults into this bag instead")
     parser.add_argument("--config", default="irs", help="its configuration [%(default)s]")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
+                        help="a parameter of every run on a bag, e.g. solver=ceres; may be repeated")
     parser.add_argument("--no-live", action="store_true", help="leave out the cases of the live node")
     parser.add_argument("--output", metavar="DIR", help="keep bags, runs and table.md here")
     parser.add_argument("--programs", type=pathlib.Path, help=argparse.SUPPRESS)  # set by faults.sh
@@ -59,6 +62,7 @@ def run(arguments, bag_cases, live_cases, scratch):
     from . import campaign, live
     folder = programs.find(("rio_t_bag", "simulate"), "--programs DIR", arguments.programs)
     bags, rows = campaign.bags_for(folder, scratch, arguments.bag, arguments.config), []
+    bags = [dataclasses.replace(bag, settings=tuple(arguments.settings)) for bag in bags]
 
     def add(*row):
         rows.append(row)
