@@ -53,7 +53,8 @@ std::vector<ImuMeasurement> GapBridge::until(const ImuMeasurement& next) const {
   const Eigen::Vector3d gravity_at_next = bridge.back().acceleration;
   bridge.pop_back();
 
-  // What it accelerates besides. After a long gap `next` does not tell it: gravity may lie anywhere by then.
+  // Acceleration besides gravity. After a long gap `next` does not show it: the direction of gravity is
+  // unknown by then.
   const Eigen::Vector3d motion_before = newest_->acceleration - gravity_I_;
   const Eigen::Vector3d motion_after =
       std::exp(-gap / kMotionCorrelationTime) * (next.acceleration - gravity_at_next);

@@ -178,7 +178,7 @@ std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solu
   for (std::size_t k = 0; k + 1 < nodes.size(); ++k) {
     const BatchNode& node = nodes[k];
     const BatchNode& next = nodes[k + 1];
-    // What the IMU alone would miss the next node by is spread over the way to it.
+    // The distance by which the IMU alone misses the next node is spread over the way to it.
     const StateBlock missed_by = carried(node.x, node.time, next.time, imu_, g_W_);
     const StateTangent miss = boxminus(next.x.data(), missed_by.data());
     if (k == 0) states.push_back(stateOf(node, solution.covariances[0]));

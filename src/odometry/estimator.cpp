@@ -40,7 +40,7 @@ Estimator::Estimator(const OdometryOptions& options, Navigation& navigation, Fau
       initializer_(options),
       recovery_(options),
       smoother_(options.smoother, options.imu_noise, g_W_, imu_),
-      radar_(channelOptions(options), g_W_, imu_),
+      radars_{RadarChannel(channelOptions(options), g_W_, imu_)},
       health_(options.health, options.smoother.innovation_gate),
       waiting_for_(initializer_.waitingFor()) {}
 
@@ -50,15 +50,16 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
   result.scan = std::move(scan);
   result.left_window = std::exchange(left_in_silence_, {});
   const Time stamp = result.scan.stamp;
+  RadarChannel& radar = radars_.at(result.scan.radar);
   if (!initialized()) {
-    result.ego_velocity = radar_.velocityOf(result.scan);
+    result.ego_velocity = radar.velocityOf(result.scan);
     initializer_.addVelocity(stamp, result.ego_velocity);
     result.rejected_because = "before_initialization";
     return result;
   }
   // First of all: a new start may move the offset, and with it the time of measurement.
   if (health_.wantsReinitialization(imu_.newest())) result.reinitialized = tryReinitialize(result.left_window);
-  const Time node_time = radar_.nodeTime(stamp);
+  const Time node_time = radar.nodeTime(stamp);
   result.rejected_because = whyNotNow(node_time, imu_has_ended);
   if (result.rejected_because.empty()) {
     result.model_error_scale = model_error_scale_.value();
@@ -66,18 +67,18 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
     const bool at_rest = isAtRest(node_time);
     const bool has_diverged = health_.health() == Health::kDiverged;
     const RadarAnswer answer =
-        radar_.use(result.scan, {at_rest, has_diverged, result.model_error_scale}, smoother_);
+        radar.use(result.scan, {at_rest, has_diverged, result.model_error_scale}, smoother_);
     judge(answer, stamp);
     result.ego_velocity = answer.ego_velocity;
     result.rejected_because = answer.rejected_because;
     result.used = result.updated = answer.rejected_because.empty();
     if (at_rest) {
-      if (Block* node = smoother_.nodeAt(radar_.nodeTime(stamp))) {
+      if (Block* node = smoother_.nodeAt(radar.nodeTime(stamp))) {
         smoother_.addZeroVelocity(*node, options_.rest.velocity_sigma);
         result.updated = true;
       }
     }
-    if (result.updated) updateWindow(result);
+    if (result.updated) updateWindow(radar, result);
     updateHealth();
     if (!result.updated && health_.health() == Health::kDiverged) publishNewest();
   }
@@ -114,15 +115,15 @@ void Estimator::judge(const RadarAnswer& answer, Time stamp) {
   model_error_scale_.add(stamp, answer.used->squaredSigmas(), share);
 }
 
-void Estimator::updateWindow(ScanResult& result) {
+void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
   const Solution& solution = smoother_.optimize();
   result.solver_iterations = solution.iterations;
   result.solver_termination = solution.termination;
   constexpr int kState = StateBlock::kTangent;
-  const Eigen::MatrixXd covariance = smoother_.newestCovariance({&radar_.offsetBlock()});
+  const Eigen::MatrixXd covariance = smoother_.newestCovariance({&radar.offsetBlock()});
   result.state = newestState(covariance.topLeftCorner<kState, kState>());
-  result.time_offset = radar_.offset();
-  result.time_offset_sigma = radar_.offsetSigma(covariance(kState, kState));
+  result.time_offset = radar.offset();
+  result.time_offset_sigma = radar.offsetSigma(covariance(kState, kState));
   for (const StampedPose& left : marginalize()) result.left_window.push_back(left);
   health_.updated(result.state.time);
   anchor(result.state, result.used && result.ego_velocity.status == EgoVelocityStatus::kZeroVelocity);
@@ -130,13 +131,15 @@ void Estimator::updateWindow(ScanResult& result) {
 
 std::vector<StampedPose> Estimator::marginalize() {
   std::vector<StampedPose> left;
-  for (const NodeEstimate& node : smoother_.marginalize({radar_.offsetWalk()})) left.push_back(pose(node));
+  std::vector<FixedLagSmoother::RandomWalk> walks;
+  for (const RadarChannel& radar : radars_) walks.push_back(radar.offsetWalk());
+  for (const NodeEstimate& node : smoother_.marginalize(walks)) left.push_back(pose(node));
   return left;
 }
 
 bool Estimator::mustWait(const RadarScan& scan) const {
   if (!initialized()) return false;
-  const Time node_time = radar_.nodeTime(scan.stamp);
+  const Time node_time = radars_.at(scan.radar).nodeTime(scan.stamp);
   return node_time >= initialized_at_ && node_time > imu_.newest() - kImuMargin &&
          node_time - imu_.newest() <= max_stamp_ahead_;
 }
@@ -198,7 +201,7 @@ void Estimator::tryInitialize(const ImuMeasurement& sample) {
 }
 
 void Estimator::begin(Time time, const NodePrior& prior) {
-  radar_.start(smoother_, time, prior);
+  radars_.front().start(smoother_, time, prior);
   yaw_doubt_ = YawDoubt();
   initialized_at_ = time;
   health_.startedAt(time);

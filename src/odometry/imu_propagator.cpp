@@ -49,7 +49,7 @@ void ImuPropagator::anchor(const NavigationState& state, bool at_rest) {
   const auto later = std::upper_bound(history_.begin(), history_.end(), state.time,
                                       [](Time time, const ImuMeasurement& imu) { return time < imu.time; });
   for (const ImuMeasurement* imu = later; imu != history_.end(); ++imu) {
-    // Where no sample at the anchor's time is kept, the first one is held back to it.
+    // If no sample at the anchor's time is kept, the first sample stands for it.
     propagate(imu == history_.begin() ? *imu : *(imu - 1), *imu);
   }
 }
@@ -58,7 +58,7 @@ void ImuPropagator::propagate(const ImuMeasurement& from, const ImuMeasurement& 
   NavigationState& x = *state_;
   const double dt = to.time - x.time;
   if (dt <= 0.0) return;
-  // Where the state lies between two samples, the signal is interpolated at the state.
+  // If the state lies between two samples, the signal is interpolated at its time.
   const double span = to.time - from.time;
   const double share = span > 0.0 ? std::min(1.0, dt / span) : 1.0;
   const Eigen::Vector3d gyro =

@@ -272,7 +272,7 @@ std::vector<bool> MotionInitializer::informOffset(const Velocities& velocities, 
   return informs;
 }
 
-/// What the IMU adds over the way from the state: noise of the accelerometer, and of the tilt.
+/// Covariance that the IMU adds between the state and a scan: noise of the accelerometer, and of the tilt.
 MotionInitializer::CarriedCovariance MotionInitializer::carriedCovariance(const Velocity& z, Time time,
                                                                           const ImuBuffer& imu, double scale) const {
   const double T = std::abs(z.stamp - time);

@@ -28,7 +28,7 @@ struct RadarInertialOdometry::Impl {
     std::vector<RadarScan> scans;
     std::uint64_t clock_restarts = 0;  ///< `imu` is from after that many
   };
-  // What the estimator says of itself; guarded by inbox_mutex, too.
+  // Status of the estimator; guarded by inbox_mutex, too.
   struct Status {
     bool initialized = false;
     std::string waiting_for;

@@ -18,8 +18,8 @@ namespace {
 
 constexpr double kMajority = 0.6;    // of the points
 constexpr double kUnanimous = 0.85;  // of the points
-/// Of a prior that outweighs a majority of the points [m/s]: sharper than a moving object and the world
-/// differ.
+/// A prior with a sigma below this outweighs a majority of the points [m/s]. A moving object and the world
+/// differ by more.
 constexpr double kMaxSharpSigma = 0.1;
 /// Log-likelihood ratio of a point that a velocity explains to one that it does not: a Gaussian of 0.05 m/s
 /// against a uniform density over some m/s.
@@ -173,11 +173,11 @@ double squaredDistance(const VelocitySolution& solution, const VelocityPrior& pr
   return d.dot(covariance.inverse() * d);
 }
 
-/// Replaces `inliers` by the points that support a velocity near the prior, where that is the better choice.
-/// A sharp prior that speaks against the velocity of `inliers` outweighs even a majority of the points. A
-/// vague one is weighed against their number: it must not find a minority that sides with it where it is
-/// wrong. False where a vague prior speaks against neither of two velocities and most points do not decide:
-/// the scan is ambiguous.
+/// Replaces `inliers` by the points that support a velocity near the prior, if that is the better choice. A
+/// sharp prior that contradicts the velocity of `inliers` outweighs even a majority of the points. A vague
+/// prior is weighed against their number: if it is wrong, it must not find a minority that sides with it.
+/// False if the scan is ambiguous: a vague prior contradicts neither of two velocities, and the number of
+/// points does not decide.
 bool selectInliersWithPrior(const std::vector<RadarDirection>& points, const VelocityPrior& prior,
                             const EgoVelocityOptions& o, const PointVariances& noise,
                             std::vector<RadarDirection>& inliers) {

@@ -4,7 +4,7 @@ namespace rio_t {
 
 bool FeasibilityCheck::accept(Time stamp, const Eigen::Vector3d& v_R) {
   if (!v_R.allFinite()) return false;
-  // Time that runs back (a bag that loops) starts a new story.
+  // If the stamps run back (a bag that loops), the average starts again.
   if (!accepted_.empty() && stamp < accepted_.back().stamp) accepted_.clear();
   while (!accepted_.empty() && stamp - accepted_.front().stamp > options_.window) accepted_.pop_front();
 

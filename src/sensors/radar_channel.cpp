@@ -64,24 +64,23 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   RadarVelocityMeasurement z{scan.stamp, measured.v_R, measured.covariance, options_.T_IR};
   if (!informs_offset) z.held_t_O = offset();
 
-  if (prior) {
-    const Innovation now = innovation(scan.stamp, *prior, measured, prediction);
-    // A minority that sides with the prediction has more noise than its covariance says.
-    const bool can_be_judged = moving && tilt_is_known && hasMajority(measured);
-    if (can_be_judged && informs_offset && options_.smoother.estimate_time_offset && step_detector_.stepped(now)) {
-      in_window_.stepOffset(smoother, scan.stamp);
-      offset_uncertainty_.offsetStepped();
-      answer.offset_stepped = true;
-    }
-    if (gate_.rejects(now, isUnanimous(measured), tilt_is_known)) return reject("innovation");
-    if (can_be_judged) {
-      if (informs_offset) offset_uncertainty_.add(now);
-      answer.used = now;
-      answer.prediction_covariance = prior->covariance;
-    }
+  // A minority that sides with the prediction has more noise than its covariance says.
+  const bool can_be_judged = moving && tilt_is_known && hasMajority(measured);
+  std::optional<Innovation> now;
+  if (prior) now = innovation(scan.stamp, *prior, measured, prediction);
+  if (can_be_judged && informs_offset && options_.smoother.estimate_time_offset && step_detector_.stepped(*now)) {
+    in_window_.stepOffset(smoother, scan.stamp);
+    offset_uncertainty_.offsetStepped();
+    answer.offset_stepped = true;
   }
+  if (now && gate_.rejects(*now, isUnanimous(measured), tilt_is_known)) return reject("innovation");
   const RadarInWindow::AddResult added = in_window_.add(smoother, z);
   if (added != RadarInWindow::AddResult::kAdded) return reject(toString(added));
+  if (can_be_judged) {
+    if (informs_offset) offset_uncertainty_.add(*now);
+    answer.used = now;
+    answer.prediction_covariance = prior->covariance;
+  }
   gate_.used(scan.stamp);
   if (!context.at_rest) estimator_.learn(scan, measured);
   return answer;

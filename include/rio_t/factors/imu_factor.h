@@ -30,12 +30,12 @@ class ImuFactor final : public ceres::SizedCostFunction<15, StateBlock::kSize, S
   double accel_walk_weight_ = 0.0;
 };
 
-/// Mean of state j given state i: where the IMU carries it (right side of the factor set to zero).
+/// Mean of state j given state i: the state at which the factor has no residual.
 StateBlock predict(const StateBlock& state_i, const Preintegration& preintegration,
                    const Eigen::Vector3d& g_W);
 
-/// How an error of state i goes into the predicted state j: d_j = A d_i + noise with covariance Q, in
-/// tangents. The same as the whitened factor says, J_i d_i + J_j d_j ~ N(0, 1), solved for d_j.
+/// How an error of state i propagates to the predicted state j: d_j = A d_i + noise with covariance Q, in
+/// tangents. It is the whitened factor, J_i d_i + J_j d_j ~ N(0, 1), solved for d_j.
 struct ImuTransition {
   Eigen::Matrix<double, StateBlock::kTangent, StateBlock::kTangent> A, Q;
 };

@@ -7,22 +7,22 @@
 
 namespace rio_t {
 
-/// Half of the time over which the IMU is averaged for the derivative with respect to t_O [s]: what shakes at
-/// 8 Hz and above hardly moves a radar, and must not count as acceleration. At 2 Hz, as people move, 13 % are
-/// lost (docs/method.md, section 5.3).
+/// Half of the time over which the derivative with respect to t_O averages the IMU [s]. A vibration at 8 Hz
+/// and above hardly moves a radar and must not count as acceleration. Motion at 2 Hz, as of people, loses 13
+/// % (docs/method.md, section 5.3).
 constexpr double kOffsetHalfWidth = 0.1;
 
-/// How the radar's velocity changes with the time of measurement, d/dtau, in I: what a change of t_O shows,
-/// with the opposite sign (docs/method.md, eq. 18).
+/// Derivative of the radar's velocity with respect to the time of measurement, d/dtau, in I. The derivative
+/// with respect to t_O has the opposite sign (docs/method.md, eq. 18).
 struct VelocityRate {
   Eigen::Vector3d a_I = Eigen::Vector3d::Zero();  ///< [m/s^2]
   double variance = 0.0;                          ///< per axis, of the IMU's noise in it [m^2/s^4]
 
-  /// The platform accelerates beyond `min_acceleration` [m/s^2] and beyond what the IMU's noise makes of no
-  /// acceleration, so that a scan says something about the offset.
+  /// Whether a scan tells the offset: the rate exceeds `min_acceleration` [m/s^2] and five sigma of its
+  /// noise.
   bool informsOffset(double min_acceleration) const;
-  /// The part of `a_I` that is surely motion: two sigma less. A rate that just passes informsOffset was lifted there
-  /// by its noise, and would claim more information than it has.
+  /// `a_I` shortened by two sigma of its noise. Noise has often lifted a rate that just passes informsOffset,
+  /// and such a rate would claim too much information.
   Eigen::Vector3d known() const;
 };
 

@@ -31,19 +31,18 @@ struct RadarMotionModel {
   /// Must outlive the model and keep the samples between the state and stamp -+ max_time_offset.
   const ImuBuffer* imu = nullptr;
 
-  /// kImu, eq. 14-18: dR, dv integrate the IMU from the state to tau, T = tau - state_time, forwards or backwards, at the
-  /// biases of the state. Exact for any shift that the IMU covers:
-  ///   v_I = dR^T (R_IW (v_W + g_W T) + dv) + (omega(tau) - b_g) x l_I
+  /// kImu, eq. 14-18: dR and dv integrate the IMU from the state to tau, forwards or backwards, at the biases
+  /// of the state, with T = tau - state_time. Exact for any shift that the IMU covers:
   /// kConstantAcceleration, eq. 13, paper eq. (4)-(5): one acceleration stands for the whole shift; the state
   /// is at the stamp:
   ///   v_I = R_IW v_W + (omega - b_g) x l_I - t_O a_c,   a_c = a - b_a + R_IW g_W,
   /// with omega at the stamp, and for a the mean over 2 kOffsetHalfWidth around it.
-  /// `state` as StateBlock stores it; `l_I` is the radar in I [m]. Without `mean`, that at meanTime, the
-  /// derivatives of kImu stay zero.
+  /// `state` as StateBlock stores it; `l_I` is the radar in I [m]; `mean` is the mean of the IMU at meanTime.
+  /// Without `mean` the derivatives of kImu stay zero.
   RadarMotion at(const double* state, Time state_time, Time stamp, double t_O, const Eigen::Vector3d& l_I,
                  const ImuMean* mean) const;
-  /// Where the IMU is averaged for the derivative with respect to t_O: tau to a millisecond, or the stamp. An
-  /// evaluation that moved t_O by less than that need not average again.
+  /// Centre of the mean of the IMU for the derivative with respect to t_O: tau rounded to a millisecond, or
+  /// the stamp. A smaller change of t_O needs no new mean.
   Time meanTime(Time stamp, double t_O) const;
   ImuMean meanAt(Time time) const;
 

@@ -18,9 +18,9 @@ struct RadarVelocityMeasurement {
   Eigen::Vector3d v_R = Eigen::Vector3d::Zero();             ///< radar velocity, in R [m/s]
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  ///< in R [m^2/s^2]
   Extrinsics T_IR;
-  /// Set: the scan says nothing of the offset (VelocityRate::informsOffset), and the factor takes this value
-  /// for it [s], whatever t_O is. At constant velocity the derivative with respect to t_O is noise of the
-  /// IMU, and a thousand scans of it would pass for knowledge.
+  /// Set if the scan does not tell the offset (VelocityRate::informsOffset). The factor then uses this value
+  /// [s] instead of t_O. At constant velocity the derivative with respect to t_O is noise of the IMU, and a
+  /// thousand such scans would pass for knowledge of the offset.
   std::optional<double> held_t_O = std::nullopt;
 };
 
@@ -40,7 +40,7 @@ class RadarVelocityFactor final : public ceres::SizedCostFunction<3, StateBlock:
     Time time;
     ImuMean value;
   };
-  mutable std::optional<Mean> mean_;  ///< of the last evaluation; changes no result. Not for two threads.
+  mutable std::optional<Mean> mean_;  ///< of the last evaluation: a cache, not for two threads
 };
 
 }  // namespace rio_t

@@ -7,8 +7,8 @@ namespace rio_t {
 
 /// How a block of parameters moves: x [+] delta, with `size()` stored numbers and `tangent()` directions.
 ///
-/// A cost function writes the derivative with respect to direction i into the stored column `columns()[i]`
-/// and zero into the others. So no factor needs the derivatives of a quaternion.
+/// A cost function writes the derivative with respect to direction i into the stored column `columns()[i]`,
+/// and zero into the other columns. So no factor needs the derivatives of a quaternion.
 class Manifold {
  public:
   virtual ~Manifold() = default;

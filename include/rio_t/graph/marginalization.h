@@ -9,8 +9,8 @@
 
 namespace rio_t {
 
-/// What is known of some blocks, linear in their tangents at x0: residual r0 + J (x [-] x0). The prior at the start, and
-/// what marginalisation leaves of all that has left the window.
+/// A prior on some blocks, linear in their tangents at x0: residual r0 + J (x [-] x0). A window starts with
+/// one, and marginalisation adds one that stands for all that has left.
 class PriorTerm final : public ceres::CostFunction {
  public:
   /// `x0` and `manifolds` of each block; the columns of J are their tangents, one after the other.
@@ -24,16 +24,16 @@ class PriorTerm final : public ceres::CostFunction {
   SquareRoot root_;
 };
 
-/// Adds what is known of `blocks` around the values that they have now.
+/// Adds a prior on `blocks` around their current values.
 Term& addPrior(Window& window, const std::vector<Block*>& blocks, const SquareRoot& root);
 
-/// A calibration block that changes as a random walk: what the prior says of it fades.
+/// Random walk of a calibration block. It lowers the information that the prior has about the block.
 struct Walk {
   const Block* block;
-  double variance;  ///< that it gains, per direction of its tangent
+  double variance;  ///< that the block gains, per direction of its tangent
 };
-/// Takes `leaving` out of the window. A prior on the blocks that they touch keeps what they and the terms on
-/// them said.
+/// Removes `leaving` and the terms on them from the window. One prior on the neighbours of `leaving` keeps
+/// what these terms said.
 void marginalize(Window& window, std::vector<const Block*> leaving, const std::vector<Walk>& walks);
 
 }  // namespace rio_t

@@ -18,19 +18,19 @@ using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::R
 struct NormalEquations {
   std::vector<const Block*> blocks;
   std::vector<RowMatrix> diagonal;                 ///< H_ii
-  std::vector<std::map<int, RowMatrix>> coupling;  ///< H_ij, j > i; none where it is zero
+  std::vector<std::map<int, RowMatrix>> coupling;  ///< H_ij, j > i; absent if zero
   std::vector<Eigen::VectorXd> gradient;                 ///< b_i = sum J'r
   double cost = 0.0;                                     ///< half the sum of squares, after the loss
 
   /// Without any information.
   explicit NormalEquations(std::vector<const Block*> blocks = {});
-  int indexOf(const Block& block) const;  ///< -1 where it is not among them
-  /// Takes block i out: its row and column are empty but for the diagonal, and its delta comes out as zero.
+  int indexOf(const Block& block) const;  ///< -1 if it is not among them
+  /// Holds block i: clears its row and column but for the diagonal, so that its delta is zero.
   void hold(int i);
 };
 
-/// Of `terms`, at the blocks as they are. A block that is not in `blocks`, or that is constant, is not solved for. Throws
-/// std::runtime_error where a cost function fails.
+/// Linearises `terms` at the current values of the blocks. A block that is constant or not in `blocks` is not
+/// solved for. Throws std::runtime_error if a cost function fails.
 NormalEquations linearize(std::vector<const Block*> blocks, const std::vector<const Term*>& terms);
 NormalEquations linearize(const Window& window);
 
@@ -38,9 +38,8 @@ NormalEquations linearize(const Window& window);
 /// eliminated.
 class Elimination {
  public:
-  /// None where H is not positive definite. What only rounding made indefinite is lifted by as little as it
-  /// takes.
-  /// `damping` (Levenberg-Marquardt) raises the diagonal by this share.
+  /// None if H is not positive definite. If only rounding made H indefinite, the smallest sufficient share is
+  /// added to its diagonal. `damping` (Levenberg-Marquardt) raises the diagonal by this share.
   static std::optional<Elimination> of(const NormalEquations& system, double damping = 0.0);
 
   const std::vector<Eigen::VectorXd>& delta() const { return delta_; }
@@ -60,16 +59,17 @@ class Elimination {
   double squared_length_ = 0.0;
 };
 
-/// What remains of some blocks after others are eliminated.
+/// Information about some blocks after others are eliminated.
 struct Information {
   Eigen::MatrixXd S;  ///< information
   Eigen::VectorXd s;  ///< gradient
 };
-/// Eliminates the first `count` blocks; the information of the others, which are left. Throws
-/// std::runtime_error where the first are not determined.
+/// Eliminates the first `count` blocks and returns the information about the others. Throws
+/// std::runtime_error if the data do not determine the first ones.
 Information eliminateFirst(const NormalEquations& system, int count);
 
-/// J and r0 with J'J = S and J'r0 = s. S may be singular: what carries no information gives rows of zeros.
+/// J and r0 with J'J = S and J'r0 = s. S may be singular: a direction without information gives a row of
+/// zeros.
 struct SquareRoot {
   Eigen::MatrixXd J;
   Eigen::VectorXd r0;

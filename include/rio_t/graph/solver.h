@@ -15,7 +15,8 @@ enum class WindowSolver {
 /// When to stop.
 struct SolverLimits {
   int max_iterations = 30;
-  /// Squared length of a step in standard deviations, below which it is the last one (docs/method.md, eq. 23a).
+  /// A step is the last one if its squared length in standard deviations is below this (docs/method.md, eq.
+  /// 23a).
   double short_step = 1e-2;
 };
 
@@ -27,17 +28,17 @@ struct Solution {
   Elimination elimination;           ///< of them
 };
 
-/// Moves the blocks to where the cost is least. A block that would cross its bound is held there. Throws
-/// std::runtime_error where the terms do not determine the blocks.
+/// Moves the blocks to the minimum of the cost. Holds a block that would cross its bound at the bound. Throws
+/// std::runtime_error if the terms do not determine the blocks.
 ///
-/// kChain: Gauss-Newton from where the blocks are; where a step does not lower the cost, a half of it and
-/// less, then Levenberg-Marquardt damping. Converged where the undamped step is short (that step is still
-/// taken). A damped step that is short says nothing.
-/// kCeres: in the problem that lives as long as the window. Ceres also calls steps convergence that its trust
-/// region made short. So the reason why it ended is told by the undamped step at what it found.
+/// kChain: Gauss-Newton from the current values. If a step does not lower the cost, the solver tries a half
+/// of it and less, and then Levenberg-Marquardt damping. It has converged when the undamped step is short; it
+/// still takes that step. A damped step may be short because of the damping alone, so it proves nothing.
+/// kCeres: ceres::Solve on the problem that lives as long as the window. Ceres also reports convergence when
+/// its trust region made a step short. So the undamped step at its solution decides why it ended.
 Solution solve(Window& window, const SolverLimits& limits, WindowSolver solver = WindowSolver::kChain);
 
-/// The same without moving anything: no iterations.
+/// The same without moving any block: no iterations.
 Solution linearized(const Window& window);
 
 }  // namespace rio_t

@@ -8,11 +8,11 @@ namespace rio_t {
 enum class SolverTermination {
   kConverged,       ///< the undamped Gauss-Newton step is short (docs/method.md, eq. 23a)
   kAtBound,         ///< the same, with a t_O held at its bound max_time_offset
-  kIterationLimit,  ///< `max_iterations` came before that
-  kNoDecrease,      ///< the step is long, and none, however short or damped, lowers the cost
+  kIterationLimit,  ///< the solver reached `max_iterations` first
+  kNoDecrease,      ///< the step is long, and no shorter or damped step lowers the cost
 };
 
-/// The minimum was found; at the bound, that within the bound.
+/// The solver found the minimum, or the minimum within the bound.
 inline bool isConverged(SolverTermination termination) {
   return termination == SolverTermination::kConverged || termination == SolverTermination::kAtBound;
 }

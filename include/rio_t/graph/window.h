@@ -56,7 +56,7 @@ class Window {
   Window& operator=(Window&&) noexcept;
 
   Block& addNode(Time time, std::shared_ptr<const Manifold> manifold, const Eigen::VectorXd& x);
-  /// Who keeps it can ask whether the window still has it.
+  /// Shared, so that its owner can ask later whether the window still has it.
   std::shared_ptr<Block> addCalibration(std::shared_ptr<const Manifold> manifold, const Eigen::VectorXd& x);
   Term& add(std::unique_ptr<ceres::CostFunction> cost, std::vector<Block*> blocks,
             std::shared_ptr<ceres::LossFunction> loss = nullptr);

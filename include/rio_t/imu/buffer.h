@@ -9,8 +9,8 @@
 
 namespace rio_t {
 
-/// What the IMU read on the mean around a time, with weights that fall linearly to zero to both sides; biases
-/// included, in I.
+/// Mean of the IMU around a time, with weights that fall linearly to zero on both sides; biases included, in
+/// I.
 struct ImuMean {
   double duration = 0.0;       ///< of an even mean with the same noise [s]
   double half_duration = 0.0;  ///< of either side; 0 where there is only one [s]
@@ -24,9 +24,9 @@ struct ImuMean {
 /// The recent IMU samples in time order, read as a piecewise linear signal.
 class ImuBuffer {
  public:
-  /// Throws std::invalid_argument where `imu` is not later than the newest sample.
+  /// Throws std::invalid_argument if `imu` is not later than the newest sample.
   void add(const ImuMeasurement& imu);
-  /// Drops what lies before `time`, but keeps the sample that interpolation at `time` needs.
+  /// Drops samples before `time`, but keeps the one that interpolation at `time` needs.
   void dropBefore(Time time);
   void clear() { samples_.clear(); }
 
@@ -36,18 +36,18 @@ class ImuBuffer {
   Time newest() const { return samples_.back().time; }
   bool covers(Time time) const { return !empty() && oldest() <= time && time <= newest(); }
 
-  /// Linear interpolation; outside of the samples the nearest one, with `time` as its time. Not on an empty
-  /// buffer.
+  /// Linear interpolation; outside of the samples the nearest one, with `time` as its time. The buffer must
+  /// not be empty.
   ImuMeasurement at(Time time) const;
 
-  /// The IMU over [time - half_width, time + half_width], as far as there are samples. Not on an empty
-  /// buffer.
+  /// Mean over [time - half_width, time + half_width], as far as there are samples. The buffer must not be
+  /// empty.
   ImuMean mean(Time time, double half_width) const;
 
   /// Calls step(dt, angular_velocity, acceleration) for each interval between samples from `from` to `to`,
-  /// with the mean of both ends; the ends at `from` and `to` are interpolated. Backwards with dt < 0 where
-  /// `to` < `from`. A step that takes a fourth argument gets the later of the two ends, whose doubts are
-  /// those of the interval.
+  /// with the mean of both ends; the ends at `from` and `to` are interpolated. Goes backwards with dt < 0 if
+  /// `to` < `from`. A step with a fourth argument gets the later of the two ends, whose doubts are those of
+  /// the interval.
   template <typename Step>
   void forEachInterval(Time from, Time to, Step&& step) const;
 

@@ -6,15 +6,15 @@
 
 namespace rio_t {
 
-/// Follows the stamps of a sensor and tells a sample that is out of place from a clock that jumped: the first
-/// stands alone, after the second the stamps go on from where they jumped to. Not thread-safe.
+/// Follows the stamps of a sensor and distinguishes a sample out of place, which stands alone, from a clock
+/// that jumped, after which the stamps go on from the new time. Not thread-safe.
 class ClockJumpDetector {
  public:
   enum class Verdict {
     kGood,     ///< later than the one before, by no more than `max_gap`
-    kBehind,   ///< to be dropped: not later than the newest good one
-    kAhead,    ///< to be dropped: later by more than `max_gap`
-    kRestart,  ///< the clock jumped: this stamp is good, all before belong to another time
+    kBehind,   ///< drop it: not later than the newest good one
+    kAhead,    ///< drop it: later by more than `max_gap`
+    kRestart,  ///< the clock jumped: this stamp is good, earlier ones belong to another time
   };
 
   /// `max_gap` [s] between good stamps; `patience` [s] of stamps elsewhere that make a jump.

@@ -14,57 +14,57 @@
 namespace rio_t {
 
 struct ImuInputCheckOptions {
-  double max_bridged_gap = 3.0;  ///< [s] after a longer one nothing is known: the estimate starts again
-  double jump_patience = 0.5;  ///< [s] of stamps that run elsewhere, after which their clock must have jumped
+  double max_bridged_gap = 3.0;  ///< [s] the estimate starts again after a longer gap
+  double jump_patience = 0.5;  ///< [s] of stamps at another time, after which the clock has jumped
   double accel_range = 0.0;    ///< [m/s^2] largest reading of an axis; 0: found from flat tops
   double gyro_range = 0.0;     ///< [rad/s] likewise
-  /// Motion that the IMU does not see, in gaps and beyond its range, as white noise: what people and drones
-  /// do.
+  /// Motion that the IMU does not see, in gaps and beyond its range, as white noise of the size of human and
+  /// drone motion.
   double unseen_accel_density = 2.0;  ///< [m/s^2/sqrt(Hz)]
   double unseen_gyro_density = 0.5;   ///< [rad/s/sqrt(Hz)]
 };
 
-/// White noise of the IMU as its samples show it, vibration included: densities of the noisiest axis.
+/// White noise of the IMU, measured from its samples, vibration included: densities of the noisiest axis.
 struct MeasuredImuNoise {
   double accel_density = 0.0;  ///< [m/s^2/sqrt(Hz)]
   double gyro_density = 0.0;   ///< [rad/s/sqrt(Hz)]
 
-  /// Three times what the options say, or more: too much for a guess of them.
+  /// Three times the densities of the options, or more: no honest guess is so far off.
   bool isFarAbove(const ImuNoise& told) const {
     return accel_density > 3.0 * told.accel_density || gyro_density > 3.0 * told.gyro_density;
   }
 };
 
-/// The door for IMU samples: drops what cannot be used, and writes into the others how much of the motion
-/// they miss; over a gap it builds a bridge. Not thread-safe.
+/// Checks IMU samples. It drops those that cannot be used, writes into the others how much of the motion they
+/// miss, and bridges gaps. Not thread-safe.
 ///
-/// A signal with a correlation time tau deviates from the straight line over a gap of T << tau by far less
-/// than over a long one; so the density of a gap is the full one times min(1, T / tau), tau that of the
+/// A signal with the correlation time tau deviates from the straight line over a gap of T << tau by far less
+/// than over a long one. So the density of a gap is the full one times min(1, T / tau), with tau of the
 /// motion.
 class ImuInputCheck {
  public:
   enum class Decision {
     kTake,
     kDrop,
-    kRestart,  ///< take it, and forget all before it: the clock jumped, or the IMU was silent for too long
+    kRestart,  ///< take it and forget all before: the clock jumped, or the gap was too long
   };
   struct Verdict {
     Decision decision = Decision::kTake;
     /// Snake case: "imu_not_finite", "imu_out_of_order", "imu_stamp_jump", "imu_clock_restart", "imu_gap",
     /// "imu_saturated", "imu_stuck".
     std::vector<const char*> faults = {};
-    /// To be taken first: stands for what a gap before this sample hid.
+    /// Samples to take first: they stand for a gap before this sample.
     std::vector<ImuMeasurement> bridge = {};
   };
 
-  /// `max_gap` [s] between samples: a longer one is reported, and what it hides is doubted.
+  /// `max_gap` [s] between samples: a longer gap is reported and bridged.
   ImuInputCheck(double max_gap, const ImuInputCheckOptions& options);
-  /// Sets the doubts and the noise of `imu` where it is taken, and replaces what a stuck axis reads.
+  /// Checks `imu`. If it is taken, sets its doubts and its noise, and replaces the reading of a stuck axis.
   Verdict check(ImuMeasurement& imu);
   MeasuredImuNoise noise() const;
 
  private:
-  /// Replaces the readings of axes that are stuck; whether there were any.
+  /// Replaces the readings of stuck axes. Returns whether there were any.
   bool replaceStuck(ImuMeasurement& imu);
   void doubtGyro(ImuMeasurement& imu, double share) const;
   void doubtAccel(ImuMeasurement& imu, double share) const;

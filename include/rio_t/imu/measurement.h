@@ -13,13 +13,13 @@ struct ImuMeasurement {
   /// Specific force [m/s^2], bias included: +g on the upward axis at rest.
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();
 
-  // What the interval that ends with this sample does not show (a gap, saturated axes), as squared densities
-  // of white noise per axis. They add to those of ImuNoise; see ImuInputCheck.
+  // Motion that the interval ending with this sample hides (a gap, saturated axes), as squared densities of
+  // white noise per axis. They add to those of ImuNoise; see ImuInputCheck.
   double gyro_doubt = 0.0;   ///< [rad^2/s]
   double accel_doubt = 0.0;  ///< [m^2/s^3]
 
-  // White noise that the sensor shows by itself (NoiseMeter), as squared densities per axis. Where they are
-  // larger than those of ImuNoise they replace them: a vibrating frame is noisier than a data sheet.
+  // White noise measured by NoiseMeter, as squared densities per axis. If they are larger than those of
+  // ImuNoise they replace them: a vibrating frame is noisier than a data sheet.
   double gyro_noise = 0.0;   ///< [rad^2/s]
   double accel_noise = 0.0;  ///< [m^2/s^3]
 

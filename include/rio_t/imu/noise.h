@@ -8,16 +8,16 @@ namespace rio_t {
 
 /// Continuous-time noise of the IMU.
 struct ImuNoise {
-  /// [m/s^2/sqrt(Hz)] Ten times the white noise of an ADIS16448 at rest: it also stands for vibration, scale
-  /// factor and misalignment, which a walking platform shows as errors of some 0.1 m/s^2 that last for a
+  /// [m/s^2/sqrt(Hz)] Ten times the white noise of an ADIS16448 at rest. It also stands for vibration, scale
+  /// factor and misalignment; on a walking platform these are errors of some 0.1 m/s^2 that last for a
   /// second.
   double accel_density = 2.0e-2;
   double gyro_density = 2.0e-4;       ///< [rad/s/sqrt(Hz)]
   double accel_random_walk = 1.0e-4;  ///< [m/s^3/sqrt(Hz)]
   double gyro_random_walk = 4.0e-6;   ///< [rad/s^2/sqrt(Hz)]
 
-  /// Squared densities for the interval that ends with `imu`: as told or as measured, whichever is larger,
-  /// and what the interval does not show.
+  /// Squared densities for the interval that ends with `imu`: the larger of option and measurement, plus the
+  /// hidden motion of the interval.
   double accelVariance(const ImuMeasurement& imu) const {
     return std::max(accel_density * accel_density, imu.accel_noise) + imu.accel_doubt;
   }

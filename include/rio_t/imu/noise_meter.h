@@ -9,17 +9,17 @@ namespace rio_t {
 
 /// Measures the white noise of a three-axis signal from the signal itself, at rest and in motion.
 ///
-/// A platform moves smoothly from sample to sample, noise and vibration do not. The fourth difference of
+/// A platform moves smoothly from sample to sample; noise and vibration do not. The fourth difference of
 /// equally spaced samples, x0 - 4 x1 + 6 x2 - 4 x3 + x4, removes every cubic and has 70 times the variance of
 /// white noise (docs/method.md, eq. 11b). Not thread-safe.
 class NoiseMeter {
  public:
-  /// One sample [unit] at `time`; times must rise. Samples that are not equally spaced (a gap) start a new
-  /// run of five, and the noise stays as it was.
+  /// Takes one sample [unit] at `time`; times must rise. After an unequal spacing (a gap) a new run of five
+  /// samples begins, and the noise stays as it was.
   void add(Time time, const Eigen::Vector3d& value);
   /// Squared density of the noisiest axis over the last second [unit^2/Hz]; 0 before the first five samples.
   double squaredDensity() const { return weight_ > 0.0 ? squares_.maxCoeff() / weight_ : 0.0; }
-  /// A new run of five, e.g. after a sample that is wrong.
+  /// Begins a new run of five, e.g. after a wrong sample.
   void interrupt() { count_ = 0; }
 
  private:

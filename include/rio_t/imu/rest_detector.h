@@ -8,19 +8,19 @@ namespace rio_t {
 
 struct RestOptions {
   bool enabled = true;
-  double window = 0.5;           ///< [s] that the platform must have been still for
+  double window = 0.5;           ///< [s] for which the platform must have been still
   double max_gyro_std = 0.01;    ///< [rad/s] per axis over the window
   double max_accel_std = 0.1;    ///< [m/s^2] per axis over the window
   double max_rate = 3.0e-3;      ///< [rad/s] mean gyro without bias
   double max_accel_error = 0.1;  ///< [m/s^2] mean accelerometer without bias and gravity
-  double max_speed = 0.1;        ///< [m/s] estimated; faster, stillness is a smooth ride and not rest
-  /// [m/s] per axis, of the velocity zero that rest stands for: a hand that holds still drifts by some cm/s.
-  /// It also turns by some mrad/s, more than the gyro bias is known at the start: so rest says nothing of the
+  double max_speed = 0.1;        ///< [m/s] estimated; above it, stillness is a smooth ride
+  /// [m/s] per axis, of the zero velocity at rest: a hand that holds still drifts by some cm/s. It also turns
+  /// by some mrad/s, more than the gyro bias is known at the start. So rest on the way does not inform the
   /// bias.
   double velocity_sigma = 0.05;
 };
 
-/// What the platform is believed to do, to tell rest from a smooth ride.
+/// The estimated state, which distinguishes rest from a smooth ride.
 struct RestContext {
   Eigen::Quaterniond q_WI = Eigen::Quaterniond::Identity();
   Eigen::Vector3d v_W = Eigen::Vector3d::Zero();  ///< [m/s]
@@ -31,8 +31,8 @@ struct RestContext {
 
 /// Whether the IMU is at rest over the window that ends at `time`.
 ///
-/// The IMU sees rest that a radar cannot: a Doppler bin hides slow motion, and an object that moves can fill
-/// the view. The IMU alone cannot tell rest from uniform motion; hence the context.
+/// The IMU sees rest that a radar cannot see: a Doppler bin hides slow motion, and a moving object can fill
+/// the view. The IMU alone cannot distinguish rest from uniform motion, hence the context.
 bool isAtRest(const ImuBuffer& imu, Time time, const RestContext& context, const RestOptions& options);
 
 }  // namespace rio_t

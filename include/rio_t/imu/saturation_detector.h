@@ -7,11 +7,11 @@
 
 namespace rio_t {
 
-/// Finds samples of an IMU that stand at the end of its range. Not thread-safe.
+/// Finds samples at the end of the range of an IMU. Not thread-safe.
 ///
-/// Where the range is not told, it shows as a flat top: an axis reads its largest value of some seconds,
-/// either sign, five times in a row, far from what it read at first. Once seen, that value is the end of the
-/// range until a sample exceeds it.
+/// If the options do not give the range, a flat top shows it: an axis reads its largest value of some
+/// seconds, of either sign, five times in a row, far from its first reading. That value then is the end of
+/// the range until a sample exceeds it.
 class SaturationDetector {
  public:
   /// Largest readings [m/s^2, rad/s]; 0: not known.

@@ -17,13 +17,13 @@ struct StaticInitializerOptions {
   double max_gravity_error = 0.5;  ///< [m/s^2] | |mean accelerometer| - gravity |
 };
 
-/// What standing still tells (method notes, "Initialisation").
+/// State found at rest (docs/method.md, section 3).
 struct StaticInitialization {
   Time time;                                                 ///< of the last sample used
   Eigen::Quaterniond q_WI = Eigen::Quaterniond::Identity();  ///< levelled, yaw zero
   Eigen::Vector3d b_g = Eigen::Vector3d::Zero();             ///< mean gyro [rad/s]
-  /// What the mean specific force has beyond gravity [m/s^2]: the part of the bias along the vertical. The
-  /// horizontal part cannot be told from a tilt.
+  /// The mean specific force beyond gravity [m/s^2]: the part of the bias along the vertical. The horizontal
+  /// part cannot be distinguished from a tilt.
   Eigen::Vector3d b_a = Eigen::Vector3d::Zero();
   std::size_t samples = 0;
   double duration = 0.0;  ///< [s]
@@ -35,9 +35,10 @@ class StaticInitializer {
   StaticInitializer(const StaticInitializerOptions& options, double gravity);
   /// Feeds one sample; the result once enough rest has been seen. Samples must be in time order.
   std::optional<StaticInitialization> add(const ImuMeasurement& imu);
-  /// What is being waited for, for people: "collecting 1.2 of 3.0 s at rest", "motion: gyro std ...".
+  /// What the start is waiting for, as text for people: "collecting 1.2 of 3.0 s at rest", "motion: gyro std
+  /// ...".
   const std::string& waitingFor() const { return waiting_for_; }
-  /// Whether some duration was seen that was no rest.
+  /// Whether the platform moved for a while.
   bool hasSeenMotion() const { return has_seen_motion_; }
 
  private:

@@ -6,12 +6,12 @@
 
 namespace rio_t {
 
-/// Follows one axis of a gyro and tells a reading that sticks from a fast motion: it jumps away from one
-/// sample to the next, as no mass can, and then repeats itself to the last bit. Not thread-safe.
+/// Follows one axis of a gyro and finds a reading that sticks: it jumps away from one sample to the next, as
+/// no mass can, and then repeats itself to the last bit. Not thread-safe.
 class StuckAxisDetector {
  public:
-  /// Takes a reading [rad/s]. None where it may be used; else what the axis most likely read instead: the
-  /// last good reading, fading with the correlation time of the motion.
+  /// Takes a reading [rad/s]. None if it may be used. Otherwise the most likely reading: the last good one,
+  /// fading with the correlation time of the motion.
   std::optional<double> check(Time time, double reading);
 
  private:

@@ -15,8 +15,8 @@ namespace rio_t {
 struct BatchResult {
   /// State at each IMU sample from the start on, carried between the nodes by the IMU.
   std::vector<NavigationState> trajectory;
-  /// Those of the online run, with the states, offsets and sigmas of the batch; each has the pose of its node
-  /// in `left_window` unless a scan before has it already. Sorted by stamp.
+  /// The results of the online run with the states, offsets and sigmas of the batch, sorted by stamp.
+  /// `left_window` of a result has the pose of its node, unless an earlier scan has it already.
   std::vector<ScanResult> scans;
   BatchSolution solution;
   std::size_t readmitted = 0;  ///< scans that the online gate rejected and the batch took
@@ -24,19 +24,19 @@ struct BatchResult {
 
 /// Remembers an online run, then solves the graph over all of it at once (docs/method.md, section 10).
 ///
-/// Which points and which scans are outliers is decided online; only scans that the innovation gate rejected
-/// are judged again, by the batch's own prediction. The online states are where the batch begins.
+/// The online run decides which points and scans are outliers. The batch judges again only scans that the
+/// innovation gate rejected, by its own prediction. It begins from the online states.
 class BatchOdometry {
  public:
   BatchOdometry(const OdometryOptions& options, const BatchOptions& batch);
 
-  /// Every sample that the online run got; dropped, doubted and bridged as there. Throws std::runtime_error
-  /// where the time of the IMU starts again.
+  /// Takes every sample that the online run got, and checks and bridges it in the same way. Throws
+  /// std::runtime_error if the clock of the IMU jumped.
   void addImu(ImuMeasurement imu);
-  /// `offset_stepped`: the online run found the offset anew at this scan. The points are not kept.
+  /// `offset_stepped`: the online run found a step of the offset at this scan. The points are not kept.
   void addResult(ScanResult result, bool offset_stepped);
 
-  /// `start`: of the online run. Throws std::runtime_error where no scan was used.
+  /// `start`: of the online run. Throws std::runtime_error if no scan was used.
   BatchResult solve(const RadarInertialOdometry::Start& start) const;
 
  private:
@@ -53,11 +53,11 @@ class BatchOdometry {
 
   RadarVelocityMeasurement measurement(const ScanResult& result) const;
   Run makeRun(const RadarInertialOdometry::Start& start, const BatchSmoother& smoother) const;
-  /// Adds what the batch does not reject; how many that are.
+  /// Adds the scans that the batch does not reject, and returns their number.
   std::size_t readmit(const BatchSmoother& smoother, const BatchSolution& solution, Run& run) const;
   bool accepts(const BatchSmoother& smoother, const BatchSolution& solution, const EgoVelocity& measured,
                RadarVelocityMeasurement& z) const;
-  /// Whether the platform accelerates enough for `z` to tell the offset.
+  /// Whether `z` tells the offset.
   bool informsOffset(const BatchSmoother& smoother, const BatchNode& node,
                      const RadarVelocityMeasurement& z, const EgoVelocity& measured) const;
   bool isAtRest(const BatchNode& node) const;

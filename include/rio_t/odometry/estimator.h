@@ -30,37 +30,38 @@ class Estimator {
 
   /// Samples that Navigation checked, in time order.
   void addImu(const std::vector<ImuMeasurement>& samples);
-  /// The IMU's clock jumped: nothing before can be related to what comes.
+  /// The IMU's clock jumped. No earlier data can be related to later data, so all state is dropped.
   void startAgain(std::uint64_t clock_restarts);
-  /// After samples and scans were taken in: counts times without radar, and moves the window on.
+  /// Call it after addImu. Counts times without radar, and moves the window on while the radar is silent.
   void keepUp(bool scan_came, bool scans_wait);
 
-  /// The IMU that covers the scan may still come.
+  /// Whether the IMU that covers the scan may still come.
   bool mustWait(const RadarScan& scan) const;
-  /// `imu_has_ended`: what is not covered never will be.
+  /// `imu_has_ended`: no more IMU will come, so the scan cannot wait for it.
   ScanResult useScan(RadarScan scan, bool imu_has_ended);
   Health updateHealth();
-  /// The optimised poses that no result has told yet; at the end.
+  /// The optimised poses that no result has carried yet; for the end of the data.
   std::vector<StampedPose> remainingPoses();
 
   bool initialized() const { return smoother_.started(); }
   const std::string& waitingFor() const { return waiting_for_; }  ///< while not initialised, for people
   const std::optional<Initialization>& start() const { return start_; }
-  PointVariances radarNoise() const { return radar_.noise(); }
+  PointVariances radarNoise() const { return radars_.front().noise(); }
 
  private:
+  /// Empty, or why the scan of a node at that time cannot be used now.
   std::string whyNotNow(Time node_time, bool imu_has_ended) const;
   void tryInitialize(const ImuMeasurement& sample);
   void begin(Time time, const NodePrior& prior);
   bool tryReinitialize(std::vector<StampedPose>& left);
   PoseAnchor anchorAt(Time time) const;
   void judge(const RadarAnswer& answer, Time stamp);
-  void updateWindow(ScanResult& result);
+  void updateWindow(const RadarChannel& radar, ScanResult& result);
   void publishNewest() { anchor(newestState(smoother_.newestCovariance({})), false); }
   void anchor(const NavigationState& state, bool at_rest);
   std::vector<StampedPose> marginalize();
   bool isAtRest(Time time) const;
-  ImuNoise imuNoise() const;  ///< with the model errors as they show
+  ImuNoise imuNoise() const;  ///< scaled by the model errors found so far
   NavigationState newestState(const StateCovariance& covariance) const;
 
   const OdometryOptions options_;
@@ -71,9 +72,9 @@ class Estimator {
 
   ImuBuffer imu_;
   Initializer initializer_;
-  MotionInitializer recovery_;  ///< from divergence
+  MotionInitializer recovery_;  ///< starts again after a divergence
   FixedLagSmoother smoother_;
-  RadarChannel radar_;
+  std::vector<RadarChannel> radars_;  ///< by RadarScan::radar; one today
   ModelErrorScale model_error_scale_;
   HealthMonitor health_;
   PoseDoubt pose_doubt_;
@@ -82,9 +83,9 @@ class Estimator {
   std::optional<Initialization> start_;
   std::string waiting_for_;
   Time initialized_at_;
-  std::vector<StampedPose> left_in_silence_;  ///< poses that no scan pushed out of the window; for the next result
+  std::vector<StampedPose> left_in_silence_;  ///< left while the radar was silent; for the next result
   std::uint64_t clock_restarts_ = 0;
-  std::optional<Time> radar_heard_;  ///< IMU time when a scan came last
+  std::optional<Time> radar_heard_;  ///< time of the IMU when the last scan came
   bool radar_is_silent_ = false;
 };
 

@@ -18,12 +18,12 @@ class ImuPropagator {
   /// State at this sample; none before the first anchor. Samples must be in time order.
   std::optional<NavigationState> add(const ImuMeasurement& imu);
 
-  /// New optimised state, usually some 100 ms before the newest sample: everything since is integrated again.
-  /// One more than 30 s old is not taken.
-  /// `at_rest`: the radar saw no motion at that time. While the IMU vibrates, what it adds since is noise
-  /// until it is more than that: velocity and position stay where they are.
+  /// Starts again from a new optimised state, usually some 100 ms before the newest sample, and integrates
+  /// all samples since then. Ignores a state older than 30 s.
+  /// `at_rest`: the radar saw no motion at that time. While the IMU vibrates, velocity and position then stay
+  /// where they are until the IMU shows more than its noise.
   void anchor(const NavigationState& state, bool at_rest = false);
-  /// Noise of the IMU from here on.
+  /// Sets the noise of the IMU for the samples to come.
   void setNoise(const ImuNoise& noise) { noise_ = noise; }
   /// At the newest sample; none before the first anchor.
   std::optional<NavigationState> state() const;

@@ -17,21 +17,22 @@ struct Initialization {
   Time time;
   NodePrior prior;
   InitializedFrom from = InitializedFrom::kRest;
-  ModelErrorScale model_error_scale;  ///< of the velocities that it was found from
+  ModelErrorScale model_error_scale;  ///< of the velocities behind it
 };
 
-/// The first state by `init_mode`: from rest where IMU and radar see some, else from motion. Not thread-safe.
+/// Finds the first state by `init_mode`: from rest if IMU and radar see some, else from motion. Not
+/// thread-safe.
 class Initializer {
  public:
   explicit Initializer(const OdometryOptions& options);
 
-  /// `imu` ends with the sample `newest`, which comes once each, in time order, and reaches imuHistory()
+  /// Call it once per sample, in time order. `imu` ends with the sample `newest` and reaches imuHistory()
   /// back.
   std::optional<Initialization> add(const ImuMeasurement& newest, const ImuBuffer& imu);
   /// Velocity of a scan before there is a state.
   void addVelocity(Time stamp, const EgoVelocity& velocity) { motion_.add(stamp, velocity); }
 
-  /// What is being waited for, for people.
+  /// What the start is waiting for, as text for people.
   std::string waitingFor() const;
   double imuHistory() const { return motion_.imuHistory(); }  ///< [s]
 

@@ -4,16 +4,16 @@
 
 namespace rio_t {
 
-/// How large the errors of the models are, against what the options say. Noise is measured (NoiseMeter,
-/// PointNoise); what is left is scale and misalignment of the IMU and what the points of a scan share: the
-/// squares of `imu_accel_noise_density` and `ego_velocity_added_sigma`. Both are multiplied by this factor,
-/// such that the innovations of the radar are as large as their covariances say: the variance factor of
-/// adjustment theory (Mikhail and Ackermann, Observations and Least Squares, 1976) for a part of the noise,
-/// by Fisher scoring, one innovation a step (docs/method.md, eq. 32a). Not thread-safe.
+/// Scale of the model errors against the options. NoiseMeter and PointNoise measure the noise of IMU and
+/// points. The rest is scale and misalignment of the IMU, and what the points of a scan share; the options
+/// `imu_accel_noise_density` and `ego_velocity_added_sigma` stand for it. This factor multiplies both
+/// squares, such that the innovations of the radar are as large as their covariances say: the variance factor
+/// of adjustment theory (Mikhail and Ackermann, Observations and Least Squares, 1976) for a part of the
+/// noise, by Fisher scoring, one innovation a step (docs/method.md, eq. 32a). Not thread-safe.
 class ModelErrorScale {
  public:
-  /// An innovation of 3 axes at `stamp`: its squared length in sigmas, 3 on the mean where the scale is
-  /// right, and the share of its variance that the scale multiplies. Old ones fade.
+  /// Takes an innovation of 3 axes at `stamp`: its squared length in sigmas, 3 on average if the scale is
+  /// right, and the share of its variance that the scale multiplies. Old innovations fade.
   void add(Time stamp, double squared_sigmas, double share);
   double value() const { return value_; }  ///< of the squares; 1 to begin with
 

@@ -20,16 +20,15 @@ struct OdometryOptions;
 
 struct MotionInitializerOptions {
   double window = 2.5;  ///< [s] of radar velocities that are used
-  /// [m/s^2] | |g| - gravity | of the linear solution, which is not told the size of gravity: farther off,
-  /// units, extrinsics or signs are wrong.
+  /// [m/s^2] | |g| - gravity | of the linear solution, which does not know the size of gravity. A larger
+  /// error means wrong units, extrinsics or signs.
   double max_gravity_error = 2.0;
   double max_outlier_fraction = 0.3;  ///< of the velocities, farther than 4 sigma from the solution
   double sigma_gyro_bias = 0.01;      ///< [rad/s] of b_g around zero before the first scan, per axis
   double sigma_accel_bias = 0.1;      ///< [m/s^2] of b_a around zero, likewise
 };
 
-/// What is kept of the pose where the state is found anew. Where it is found for the first time, W is defined
-/// by it.
+/// The pose that a re-initialisation keeps. At the first start it defines W.
 struct PoseAnchor {
   Eigen::Quaterniond q_WI = Eigen::Quaterniond::Identity();  ///< heading is kept, tilt is replaced
   Eigen::Vector3d p_W = Eigen::Vector3d::Zero();             ///< [m]
@@ -44,23 +43,23 @@ struct MotionInitialization {
   ModelErrorScale model_error_scale;  ///< of the velocities around it
 };
 
-/// Finds the first state of a platform that never rests, from some seconds of radar velocities and IMU
-/// (docs/method.md, section 11).
+/// Finds the first state of a moving platform from some seconds of radar velocities and IMU (docs/method.md,
+/// section 11).
 ///
 /// Let dR, dv integrate the IMU from the state's time to a scan T later (T <= 0), and v_k be the velocity of
 /// I, in I, that the scan shows. Then dR v_k - dv = v_I + g_I T: a straight line over T whose slope is the
-/// gravity in I. From there a least squares finds roll, pitch, velocity, biases and t_O together, with the
-/// factor of the smoother; an unknown t_O widens what it tells, and is found where the motion shows it.
-/// None of the scans must go into the smoother again. Not thread-safe.
+/// gravity in I. From there a least squares with the factor of the smoother finds roll, pitch, velocity,
+/// biases and t_O together. It finds t_O if the motion shows it; if not, an unknown t_O widens the rest. The
+/// smoother must not use the same scans again. Not thread-safe.
 class MotionInitializer {
  public:
   explicit MotionInitializer(const OdometryOptions& options);
 
   /// Velocity of one scan, estimated without a prior. Invalid ones are ignored.
   void add(Time stamp, const EgoVelocity& velocity);
-  /// The state, as soon as a window of velocities is there, covered by the IMU, and both agree. Where they do
-  /// not, the older half of the window is dropped, and waitingFor() says why.
-  /// `anchor` gives the pose at the time of the state.
+  /// The state, as soon as the IMU covers a window of velocities and both agree. If they do not agree, drops
+  /// the older half of the window and says why in waitingFor(). `anchor` gives the pose at the time of the
+  /// state.
   std::optional<MotionInitialization> solve(const ImuBuffer& imu,
                                             const std::function<PoseAnchor(Time)>& anchor);
   void clear();
@@ -68,7 +67,7 @@ class MotionInitializer {
   /// [m/s]. False without scans.
   bool isMoving(Time from, Time to, double max_speed) const;
 
-  /// What is being waited for, for people.
+  /// What the start is waiting for, as text for people.
   const std::string& waitingFor() const { return waiting_for_; }
   /// How far back the IMU must reach for solve() [s].
   double imuHistory() const;
@@ -87,9 +86,9 @@ class MotionInitializer {
     Eigen::Vector3d g_I, v_I;
   };
   Line fitLine(const Velocities& velocities, Time time, const ImuBuffer& imu) const;
-  /// Improves `prior.x0` and `prior.t_O0` around which it starts, and adds what the velocities tell, with
-  /// model errors of that `scale`, which is improved by what the velocities scatter around the solution. The
-  /// share of outliers.
+  /// Improves `prior.x0` and `prior.t_O0`, around which it starts, and adds the information of the
+  /// velocities, with model errors of `scale`. Improves `scale` by the scatter of the velocities around the
+  /// solution. Returns the share of outliers.
   double refine(const Velocities& velocities, Time time, const ImuBuffer& imu, ModelErrorScale& scale,
                 NodePrior& prior) const;
   /// Which velocities tell the offset.

@@ -12,22 +12,22 @@
 namespace rio_t {
 
 /// The paper's navigation thread: checks each IMU sample and carries the newest optimised state to it. Never
-/// waits for the solver. Any thread may call it; a call takes microseconds.
+/// waits for the solver. Thread-safe; a call takes microseconds.
 class Navigation {
  public:
   Navigation(const OdometryOptions& options, const Eigen::Vector3d& g_W);
 
-  /// What came of a sample.
+  /// What became of a sample.
   struct Checked {
-    std::vector<ImuMeasurement> samples;   ///< to go on with, bridges over gaps first; none where it was dropped
+    std::vector<ImuMeasurement> samples;   ///< bridge over a gap, then the sample; empty if it was dropped
     std::vector<const char*> faults;       ///< names for FaultCounters
-    std::uint64_t clock_restarts = 0;      ///< how often the time of the IMU has started again so far
+    std::uint64_t clock_restarts = 0;      ///< how often the clock of the IMU has jumped so far
     std::optional<NavigationState> state;  ///< at the sample; none before the first anchor
   };
   Checked add(const ImuMeasurement& imu);
 
-  /// The newest optimised state, and the noise of the IMU from here on. Ignored where the clock restarted since
-  /// `clock_restarts`: the state is of another time.
+  /// Takes the newest optimised state, and the noise of the IMU for the samples to come. Ignores both if the
+  /// clock restarted since `clock_restarts`, because they belong to another time.
   void anchor(const NavigationState& state, bool at_rest, const ImuNoise& noise, std::uint64_t clock_restarts);
 
   std::optional<NavigationState> state() const;  ///< at the newest sample

@@ -12,7 +12,7 @@ namespace rio_t {
 /// b_a.
 using StateCovariance = Eigen::Matrix<double, 15, 15>;
 
-/// Where the platform is: what is published at IMU rate.
+/// State of the platform as published at IMU rate.
 struct NavigationState {
   Time time;
   Eigen::Quaterniond q_WI = Eigen::Quaterniond::Identity();    ///< turns I into W

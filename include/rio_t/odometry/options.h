@@ -18,10 +18,10 @@ namespace rio_t {
 enum class InitMode {
   kStatic,  ///< "static": wait for rest, however long
   kMotion,  ///< "motion": from radar velocities and IMU at once, moving or not
-  kAuto,    ///< "auto": from rest; where there was none for `init_motion_after`, as kMotion
+  kAuto,    ///< "auto": from rest; as kMotion after `init_motion_after` without rest
 };
 
-/// Everything that the estimator is told. Defaults are for an ADIS16448 and a TI IWR6843AOP.
+/// All options of the estimator. The defaults suit an ADIS16448 and a TI IWR6843AOP.
 struct OdometryOptions {
   double gravity = 9.81;  ///< [m/s^2] magnitude
   ImuNoise imu_noise;
@@ -36,10 +36,10 @@ struct OdometryOptions {
   SmootherOptions smoother;
   OffsetStepDetectorOptions offset_step_detector;
   HealthOptions health;
-  /// [s] between samples; over a longer one the uncertainty grows, and it is reported
+  /// [s] between samples; a longer gap is counted and widens the uncertainty
   double max_imu_gap = 0.04;
   ImuInputCheckOptions imu_input_check;
-  double max_radar_gap = 0.5;         ///< [s] without a scan that is not reported
+  double max_radar_gap = 0.5;         ///< [s] without a scan; a longer gap is counted
   std::size_t max_queued_scans = 50;  ///< scans that may wait for the IMU or the solver
 };
 

@@ -6,13 +6,14 @@
 
 namespace rio_t {
 
-/// What is not known of position and heading where the state was found anew. Nothing ever observes them, so
-/// they only add to what is published: inside the window, a position known to hundreds of metres would cost
-/// the digits of all else, and a heading left free would wander.
+/// Uncertainty of position and heading that a re-initialisation keeps. No sensor observes them, so it is
+/// added only to what is published. Inside the window, a position known to hundreds of metres would cost the
+/// digits of all other states, and a free heading would wander.
 class PoseDoubt {
  public:
   PoseDoubt() = default;
-  /// All that `published` says of position and heading; from its position on the heading's doubt spreads.
+  /// Keeps the uncertainty of position and heading of `published`. That of the heading spreads from this
+  /// position on.
   explicit PoseDoubt(const NavigationState& published);
   void addTo(NavigationState& state) const;
 

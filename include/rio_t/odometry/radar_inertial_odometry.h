@@ -27,35 +27,37 @@ class RadarInertialOdometry {
   RadarInertialOdometry(RadarInertialOdometry&&) noexcept;
   RadarInertialOdometry& operator=(RadarInertialOdometry&&) noexcept;
 
-  /// State at this sample, from the newest optimised state: what a live user gets. None before
-  /// initialisation. Samples that are out of place in time, or not finite, are dropped and counted in
-  /// `faults()`, as are gaps and saturated samples, over which the uncertainty grows (see ImuInputCheck). Where the
-  /// IMU's clock jumps, all starts again with an initialisation.
+  /// State at this sample, carried from the newest optimised state: what a live user gets. None before
+  /// initialisation. Drops samples that are out of order or not finite, and counts them in `faults()`. Counts
+  /// gaps and saturated samples, too, and widens the uncertainty over them (see ImuInputCheck). If the IMU's
+  /// clock jumps, everything starts again with an initialisation.
   std::optional<NavigationState> addImu(const ImuMeasurement& imu);
 
   /// Queues a scan. It waits until the IMU covers its time of measurement.
   void addScan(RadarScan scan);
 
-  /// Works off what can be worked off: initialisation, ego-velocity, window. What became of each scan finished.
+  /// Does all the work that is due: initialisation, ego-velocity, window. Returns a result for each scan that
+  /// it finished.
   std::vector<ScanResult> process();
 
-  /// At the end of the data: finishes what still waits (rejected as "imu_not_covering" where the IMU never
-  /// came), and empties the window; the poses still in it are in `left_window` of the last result.
+  /// At the end of the data: finishes the scans that still wait (rejected as "imu_not_covering" if the IMU
+  /// never came) and empties the window. `left_window` of the last result has the poses that were still in
+  /// it.
   std::vector<ScanResult> finish();
 
   bool initialized() const;
-  /// Whether the estimate can be trusted, as of the last `process`. Any thread. Each time that it diverges or
-  /// is found anew is counted in `faults()`, as "diverged" and "reinitialized".
+  /// Whether the estimate can be trusted, as of the last `process`. Any thread. `faults()` counts each
+  /// divergence as "diverged" and each re-initialisation as "reinitialized".
   Health health() const;
-  /// Where the graph begins and what was known there; none before initialisation. Call it from the thread
-  /// that calls `process`.
+  /// Where the graph begins, and its prior; none before initialisation. Call it from the thread that calls
+  /// `process`.
   using Start = Initialization;
   std::optional<Start> start() const;
-  /// Noise of the radar's points, as learned so far. Likewise from that thread.
+  /// Noise of the radar's points, as learned so far. Call it from the thread that calls `process`.
   PointVariances radarNoise() const;
-  /// Noise that the IMU shows by itself, over the last second. Any thread.
+  /// Noise of the IMU, measured over the last second. Any thread.
   MeasuredImuNoise imuNoise() const;
-  /// While not initialised: what is being waited for, for people.
+  /// While not initialised: what the start is waiting for, as text for people.
   std::string waitingFor() const;
   /// Faults of the input so far, by name in snake case, e.g. "imu_out_of_order", "imu_not_finite", "imu_gap".
   std::map<std::string, std::uint64_t> faults() const;

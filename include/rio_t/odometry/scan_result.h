@@ -18,10 +18,10 @@ struct ScanResult {
   EgoVelocity ego_velocity;
   bool used = false;               ///< its velocity went into the window
   double model_error_scale = 1.0;  ///< see ModelErrorScale; in the covariance of ego_velocity
-  std::string rejected_because;    ///< snake case, empty where used; keys of `scans_rejected`
+  std::string rejected_because;    ///< snake case, empty if used; keys of `scans_rejected`
 
-  /// The window was solved again: the scan was used, or the platform is at rest. What follows is set only
-  /// then.
+  /// The window was solved again, because the scan was used or the platform is at rest. If not, the following
+  /// members are not set.
   bool updated = false;
   // The newest state of the window.
   NavigationState state;

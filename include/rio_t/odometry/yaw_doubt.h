@@ -6,8 +6,9 @@
 
 namespace rio_t {
 
-/// What the yaw lost where the IMU was blind (a gap, saturation). Nothing observes the yaw: it stays lost,
-/// whatever a window that was linearised at other yaws makes of it, and so it only adds to what is published.
+/// Uncertainty of the yaw that gaps and saturation of the IMU caused. No sensor observes the yaw, so this
+/// uncertainty stays. A window linearised at different yaws would lose it; therefore it is added to what is
+/// published.
 class YawDoubt {
  public:
   /// `variance` [rad^2] gained at the place `p_W` [m].

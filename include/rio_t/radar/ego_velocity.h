@@ -37,7 +37,7 @@ struct EgoVelocityOptions {
   double ransac_outlier_probability = 0.4;
   double ransac_success_probability = 0.9999;
   double prior_gate =
-      4.0;  ///< [sigma] farther from the prior a velocity contradicts it; only where one is given
+      4.0;  ///< [sigma] a velocity farther than this from the prior contradicts it
   std::uint32_t ransac_seed = 1;  ///< restarted at each scan: same scan, same answer
 
   std::size_t min_inliers = 5;              ///< one velocity has three unknowns; the rest are witnesses
@@ -53,10 +53,10 @@ struct EgoVelocityOptions {
 
   double doppler_quantization = 0.125;  ///< [m/s] step of the radar's Doppler; 0 = none
   /// [m/s] right, forward, up; added in quadrature while moving. The solver's covariance is honest for noise
-  /// that is independent from point to point (its NEES is 3 in simulation). This is for what points share:
-  /// things that move so slowly that they pass as inliers, a velocity that changes within the radar frame (20
-  /// ms at 1 m/s^2), multipath. On a walk with an IWR6843AOP the velocity errors are 0.06 m/s and last for
-  /// several scans.
+  /// that is independent from point to point (its NEES is 3 in simulation). This sigma stands for errors that
+  /// points share: things that move so slowly that they pass as inliers, a velocity that changes within the
+  /// radar frame (20 ms at 1 m/s^2), multipath. On a walk with an IWR6843AOP the velocity errors are 0.06 m/s
+  /// and last for several scans.
   Eigen::Vector3d added_sigma = {0.04, 0.04, 0.04};
   double max_condition_number = 1000.0;  ///< of H'H (unit directions)
   double max_sigma = 0.5;                ///< [m/s] largest axis of the estimate
@@ -79,19 +79,19 @@ struct EgoVelocity {
   EgoVelocityStatus status = EgoVelocityStatus::kTooFewPoints;
   Eigen::Vector3d v_R = Eigen::Vector3d::Zero();         ///< radar velocity, radar frame [m/s]
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< [m^2/s^2], radar frame
-  /// The part of the covariance's diagonal that is told and not measured: `added_sigma` squared, or none at
-  /// rest [m^2/s^2].
+  /// The part of the covariance's diagonal that the options say and no data measure: `added_sigma` squared,
+  /// or zero at rest [m^2/s^2].
   Eigen::Vector3d told_variance = Eigen::Vector3d::Zero();
   std::vector<std::size_t> inliers;  ///< indices into the scan's points
   std::size_t points_used = 0;       ///< points that passed the filter
 };
 
-/// Most points of the scan agree on the velocity, so that it needs no prior.
+/// Most points of the scan agree on the velocity, so it needs no prior.
 bool hasMajority(const EgoVelocity& velocity);
-/// So many points agree that nothing else is left to be the static world: no object fills more of the view.
+/// So many points agree that the velocity must be that of the static world: no object fills more of the view.
 bool isUnanimous(const EgoVelocity& velocity);
 
-/// What is known of the velocity before the scan is looked at, e.g. from the IMU.
+/// Velocity expected before the scan, e.g. from the IMU.
 struct VelocityPrior {
   Eigen::Vector3d v_R = Eigen::Vector3d::Zero();         ///< radar velocity, radar frame [m/s]
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< [m^2/s^2], positive definite
@@ -101,20 +101,20 @@ struct VelocityPrior {
 /// A static target in direction u gives v_d = -u . v_R (Kellner et al., ITSC 2013).
 class EgoVelocityEstimator {
  public:
-  /// Throws std::invalid_argument, naming the option, where one is out of its range.
+  /// Throws std::invalid_argument, naming the option, if one is out of its range.
   explicit EgoVelocityEstimator(const EgoVelocityOptions& options);
 
-  /// A prior helps to tell the static world from an object that moves and fills half of the view, which one
-  /// scan cannot: where the RANSAC velocity contradicts the prior, and `prior_min_inlier_fraction` of the
-  /// points agree with a velocity that does not, those points are the inliers. A prior that is vague (above
-  /// 0.1 m/s) is only one witness more besides the points. The velocity and its covariance come from the
-  /// points alone, so fusing the result with the prior does not count anything twice.
+  /// A prior helps to tell the static world from a moving object that fills half of the view; one scan alone
+  /// cannot. If the RANSAC velocity contradicts the prior, and `prior_min_inlier_fraction` of the points
+  /// agree with a velocity that does not, those points are the inliers. A vague prior (above 0.1 m/s) only
+  /// counts like some points more. The velocity and its covariance come from the points alone, so fusing the
+  /// result with the prior counts nothing twice.
   EgoVelocity estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior = std::nullopt) const;
 
-  /// Learns the noise of the points from what `estimate` made of this scan, for the scans to come. Only the
-  /// errors-in-variables solver uses it. To be called once a scan, in motion, where its velocity is believed.
+  /// Learns the noise of the points from the result of `estimate` for this scan, for the scans to come. Only
+  /// the errors-in-variables solver uses it. Call it once per scan, in motion, if the velocity was used.
   void learn(const RadarScan& scan, const EgoVelocity& estimated);
-  /// As learned so far.
+  /// The noise as learned so far.
   const PointVariances& noise() const { return noise_.variances(); }
 
  private:

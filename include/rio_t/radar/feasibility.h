@@ -17,8 +17,8 @@ struct FeasibilityOptions {
 class FeasibilityCheck {
  public:
   explicit FeasibilityCheck(const FeasibilityOptions& options) : options_(options) {}
-  /// True where `v_R` at `stamp` can follow what came before; a feasible velocity joins the average.
-  /// A rejected one does not, but the average ages, so that the check never locks out for longer than the
+  /// True if `v_R` at `stamp` can follow the velocities before; a feasible velocity joins the average. A
+  /// rejected one does not join, but the average ages, so the check never locks out for longer than the
   /// window.
   bool accept(Time stamp, const Eigen::Vector3d& v_R);
 

@@ -18,20 +18,20 @@ struct PointVariances {
 
 /// Learns the noise of the points from the Doppler residuals of scans in motion.
 ///
-/// The variance of a residual is that of the Doppler, and those of the angles times what the angles change
-/// the Doppler by, which differs from point to point: the squares of residuals, regressed on that, give all
-/// three (method.md, section 9). The start counts as a few points, and is what stays of an angle that the
+/// The variance of a residual is that of the Doppler plus those of the angles times their squared effect on
+/// the Doppler. This effect differs from point to point, so a regression of the squared residuals gives all
+/// three (docs/method.md, section 9). The start counts as a few points. It remains for an angle that the
 /// motion does not show.
 class PointNoise {
  public:
   explicit PointNoise(const PointVariances& start);
 
   /// Learns from a scan. `points`: those that passed the filter; `inliers`: indices of those that `v_R` was
-  /// solved from; both in the order of the scan. The others are learned from as well, as far as they may be
-  /// of the static world: the noise that is known so far must not cut off its own tails.
+  /// solved from; both in the order of the scan. It also learns from the other points, as far as they may
+  /// belong to the static world: otherwise the known noise would cut off its own tails.
   void learn(const std::vector<RadarDirection>& points, const std::vector<std::size_t>& inliers,
              const Eigen::Vector3d& v_R);
-  /// As known so far; the quantisation stays what it was.
+  /// The variances as learned so far; the quantisation does not change.
   const PointVariances& variances() const { return variances_; }
 
  private:

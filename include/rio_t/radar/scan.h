@@ -19,6 +19,7 @@ struct RadarPoint {
 struct RadarScan {
   Time stamp;  ///< as stamped, in the IMU clock; measured at stamp - t_O
   std::vector<RadarPoint> points;
+  std::size_t radar = 0;  ///< which one it is from, see Estimator
 };
 
 /// A detection as the solvers see it.

@@ -5,21 +5,21 @@
 
 namespace rio_t {
 
-/// How far the time offset may be off (docs/method.md, eq. 32b): its marginal variance, and the square of the
-/// lag, where the scans ask for a change all the time. An estimate lags behind an offset that drifts. Not
-/// thread-safe.
+/// Uncertainty of the time offset (docs/method.md, eq. 32b): its marginal variance plus the square of its
+/// lag. The estimate lags behind an offset that drifts, and the scans then keep asking for the same change.
+/// Not thread-safe.
 class OffsetUncertainty {
  public:
-  /// `huber_threshold` on d' S^-1 d, as on the radar factors; 0: no robust loss.
+  /// `huber_threshold` on the root of d' S^-1 d, as on the radar factors; 0: no robust loss.
   explicit OffsetUncertainty(double huber_threshold) : huber_threshold_(huber_threshold) {}
-  /// Of a scan that was used and tells the offset.
+  /// Takes the innovation of a scan that was used and tells the offset.
   void add(const Innovation& innovation);
-  /// The offset was found to have stepped, and is about to be found anew: it does not lag.
+  /// The offset stepped and gets a new block, which does not lag.
   void offsetStepped();
 
-  /// Of the offset [s], given its marginal variance [s^2].
+  /// Standard deviation of the offset [s], given its marginal variance [s^2].
   double sigma(double variance) const;
-  /// Random walk that would follow what the scans ask for [s/sqrt(s)]; 0 where they ask for nothing.
+  /// Random walk that follows the change the scans ask for [s/sqrt(s)]; 0 if they ask for none.
   double walk() const;
 
  private:

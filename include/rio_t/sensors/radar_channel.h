@@ -20,61 +20,63 @@ struct RadarChannelOptions {
   FeasibilityOptions feasibility;
   OffsetStepDetectorOptions offset_step_detector;
   SmootherOptions smoother;
-  double rest_velocity_sigma = 0.05;  ///< [m/s] of the velocity zero, where the IMU is at rest
+  double rest_velocity_sigma = 0.05;  ///< [m/s] of the zero velocity, when the IMU is at rest
 };
 
 /// What the estimator knows when a scan comes.
 struct ScanContext {
   bool at_rest = false;            ///< the IMU is at rest at the time of measurement
-  bool has_diverged = false;       ///< the prediction is not to be trusted
+  bool has_diverged = false;       ///< the prediction cannot be trusted
   double model_error_scale = 1.0;  ///< see ModelErrorScale
 };
 
-/// What the channel made of a scan.
+/// What became of a scan, as the channel answers it. All else that reports a scan reads this value.
 struct RadarAnswer {
   EgoVelocity ego_velocity;
-  std::string rejected_because;  ///< snake case, empty where the scan was used
-  bool offset_stepped = false;   ///< t_O was found to have stepped before this scan
+  std::string rejected_because;  ///< snake case, empty if the scan was used
+  bool offset_stepped = false;   ///< t_O stepped before this scan
 
-  bool was_predicted = false;  ///< else none of what follows
-  /// What health judges: the velocity that the scan shows by itself. None where it does not decide.
+  bool was_predicted = false;  ///< if not, nothing below is set
+  /// For health: the innovation of the velocity that the scan shows without the prediction. None if its
+  /// points do not decide.
   std::optional<Innovation> judged;
-  /// The same velocity, where most points agree on it and no witness speaks for the prediction: what a new start may be
-  /// found from.
+  /// That velocity, if most points agree on it and are not outvoted by witnesses of the prediction. A
+  /// re-initialisation may use it.
   std::optional<EgoVelocity> alone;
-  /// Of a used velocity in motion that most points agree on, against a prediction that is linear.
+  /// For the scale of the model errors: the innovation of a used velocity in motion that most points agree
+  /// on, if the prediction is linear.
   std::optional<Innovation> used;
   Eigen::Matrix3d prediction_covariance = Eigen::Matrix3d::Zero();  ///< its part in used->S [m^2/s^2]
 };
 
 /// One radar, from scan to window: ego-velocity, decisions, time offset. Not thread-safe.
 ///
-/// The decisions in their order (docs/method.md, section 9.3). All judge the innovation of the scan against
-/// what IMU and window predict; at rest, against zero.
+/// The decisions in their order (docs/method.md, section 7.2). All judge the innovation of the scan against
+/// the prediction of IMU and window; at rest, against zero.
 ///
-/// | decision | rejects or does | not where |
+/// | decision | effect | skipped if |
 /// | --- | --- | --- |
-/// | prior in RANSAC | picks the points that agree with the prediction, or `ambiguous` | diverged |
-/// | feasibility | a jump that no platform makes (paper, II-B1) | - |
-/// | step of the offset | gives t_O a new block | no majority; tilt unknown; nothing tells the offset |
-/// | gate | what is farther than `innovation_gate` sigma | tilt unknown; silence; all points agree |
-/// | health | nothing: counts | no majority, or outvoted by witnesses |
+/// | prior in RANSAC | chooses the points that agree with the prediction; rejects `ambiguous` | diverged |
+/// | feasibility | rejects a jump that no platform makes (paper, II-B1) | - |
+/// | step of the offset | gives t_O a new block | no majority; tilt unknown; scan does not tell t_O |
+/// | gate | rejects a velocity beyond `innovation_gate` sigma | tilt unknown; silence; all points agree |
+/// | health | counts, rejects nothing | no majority, or outvoted by witnesses |
 class RadarChannel {
  public:
   /// `imu` must outlive the channel.
   RadarChannel(const RadarChannelOptions& options, const Eigen::Vector3d& g_W, const ImuBuffer& imu);
 
-  /// Velocity of a scan before there is a state.
+  /// Velocity of a scan from its points alone, for the time before there is a state.
   EgoVelocity velocityOf(const RadarScan& scan) const { return estimator_.estimate(scan); }
-  /// A window starts at `time`; then the first offset is in it.
+  /// Starts a window at `time` with the first node and the first offset.
   void start(FixedLagSmoother& smoother, Time time, const NodePrior& prior);
-  /// Decides about a scan and adds it to the window.
+  /// Decides about a scan and, if it is used, adds its term to the window.
   RadarAnswer use(const RadarScan& scan, const ScanContext& context, FixedLagSmoother& smoother);
 
   Time nodeTime(Time stamp) const { return in_window_.nodeTime(stamp); }
   double offset() const { return in_window_.offset(); }  ///< t_O [s]
   const Block& offsetBlock() const { return in_window_.offsetBlock(); }
-  /// [s] given the marginal variance [s^2]; 0 where the offset is not estimated.
+  /// [s] given the marginal variance [s^2]; 0 if the offset is not estimated.
   double offsetSigma(double variance) const;
   FixedLagSmoother::RandomWalk offsetWalk() const;
   const PointVariances& noise() const { return estimator_.noise(); }  ///< of the points, as learned so far
@@ -83,7 +85,7 @@ class RadarChannel {
   EgoVelocity measure(const RadarScan& scan, const std::optional<VelocityPrior>& prior, double scale) const;
   Innovation innovation(Time stamp, const VelocityPrior& prior, const EgoVelocity& measured,
                         const std::optional<RadarVelocityPrediction>& prediction) const;
-  /// What health and a new start get from the scan.
+  /// Sets what health and a re-initialisation get from the scan.
   void judge(const RadarScan& scan, const VelocityPrior& prior, double scale, RadarAnswer& answer) const;
 
   RadarChannelOptions options_;  // read-only after construction

@@ -15,13 +15,14 @@
 
 namespace rio_t {
 
-/// What a scan should show.
+/// Predicted velocity of a scan.
 struct RadarVelocityPrediction {
-  VelocityPrior velocity;  ///< with the uncertainty of everything
-  Eigen::Matrix3d covariance_at_offset = Eigen::Matrix3d::Zero();  ///< the same, were the offset known [m^2/s^2]
+  VelocityPrior velocity;  ///< with all uncertainties
+  Eigen::Matrix3d covariance_at_offset = Eigen::Matrix3d::Zero();  ///< if the offset were known [m^2/s^2]
   Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();               ///< of v_R with respect to t_O [m/s^2]
-  double t_O = 0.0;                                                ///< at which all this holds [s]
-  /// Per axis, of the noise in dv_dt_O times the error of the offset: not in the covariances [m^2/s^2].
+  double t_O = 0.0;                                                ///< of the prediction [s]
+  /// Per axis: the noise in dv_dt_O times the error of the offset. The covariances do not include it
+  /// [m^2/s^2].
   double rate_variance = 0.0;
   bool informs_offset = false;  ///< dv_dt_O is motion, not noise of the IMU
   double tilt_sigma = 0.0;      ///< of roll and pitch, the larger [rad]
@@ -29,9 +30,9 @@ struct RadarVelocityPrediction {
 
 /// One radar in the window of the smoother: its time offset t_O as a calibration block, and its terms.
 ///
-/// The paper has one t_O a node and a factor that keeps it constant (eq. 8-10). One block the prior of which
-/// fades by the random walk says the same with fewer unknowns (docs/method.md, section 6.2). A step of the
-/// offset begins a new block. Not thread-safe.
+/// The paper has one t_O per node and a factor that keeps it constant (eq. 8-10). One block whose prior fades
+/// by the random walk says the same with fewer unknowns (docs/method.md, section 6.2). After a step of the
+/// offset, a new block takes over. Not thread-safe.
 class RadarInWindow {
  public:
   enum class AddResult { kAdded, kOlderThanWindow, kDuplicateStamp };
@@ -40,15 +41,16 @@ class RadarInWindow {
   RadarInWindow(const SmootherOptions& options, const Extrinsics& T_IR, const Eigen::Vector3d& g_W,
                 const ImuBuffer& imu);
 
-  /// In a window that starts.
+  /// Adds the first offset block to a window that starts.
   Block& start(Window& window, double t_O);
-  /// Where a scan stamped `stamp` puts its node: the stamp (constant_acceleration), or the time of measurement as now
+  /// Time of the node of a scan: its stamp (constant_acceleration), or its time of measurement as now
   /// estimated (imu).
   Time nodeTime(Time stamp) const;
-  /// From the newest node before the scan. None for a scan older than the window.
+  /// Predicts from the newest node before the scan. None for a scan older than the window.
   std::optional<RadarVelocityPrediction> predict(const FixedLagSmoother& smoother, Time stamp) const;
   AddResult add(FixedLagSmoother& smoother, const RadarVelocityMeasurement& z);
-  /// The offset stepped before the scan stamped `stamp`: from that scan on t_O is as uncertain as at the start.
+  /// The offset stepped before the scan stamped `stamp`. That scan and later ones use a new block, which
+  /// time_offset_sigma links to the old one.
   void stepOffset(FixedLagSmoother& smoother, Time stamp);
 
   const Extrinsics& extrinsics() const { return T_IR_; }
@@ -69,14 +71,14 @@ class RadarInWindow {
   RadarMotionModel model_;
   std::shared_ptr<ceres::LossFunction> loss_;
   std::shared_ptr<const Manifold> manifold_;
-  std::vector<Epoch> epochs_;  ///< those that the window still has
+  std::vector<Epoch> epochs_;  ///< those still in the window
   std::vector<Time> stamps_;   ///< of the scans in the window
 };
 
-/// Empty for kAdded, else why not, in snake case.
+/// Empty for kAdded, else the reason in snake case.
 std::string toString(RadarInWindow::AddResult result);
 
-/// Starts `smoother` and `radar` with what is known of their first state and offset.
+/// Starts `smoother` and `radar` with the prior on their first state and offset.
 void start(FixedLagSmoother& smoother, RadarInWindow& radar, Time time, const NodePrior& prior);
 
 }  // namespace rio_t

@@ -16,16 +16,17 @@ namespace rio_t {
 
 struct BatchOptions {
   int max_iterations = 100;  ///< of the solver, all together
-  /// [s] A time of measurement that has come farther from its node places all nodes anew (imu model).
+  /// [s] If a time of measurement moves farther than this from its node, all nodes are placed again (imu
+  /// model).
   double placement_tolerance = 1.0e-4;
 };
 
 /// What one scan gives to the graph.
 struct BatchScan {
   Time stamp;
-  double t_O = 0.0;                                  ///< [s] where to begin; places the node (imu model)
-  std::optional<RadarVelocityMeasurement> velocity;  ///< none: not to be used
-  std::optional<double> rest_velocity_sigma;         ///< [m/s] set where the platform is at rest
+  double t_O = 0.0;                                  ///< [s] initial value; also places the node (imu model)
+  std::optional<RadarVelocityMeasurement> velocity;  ///< none: the scan is not used
+  std::optional<double> rest_velocity_sigma;         ///< [m/s] set if the platform is at rest
   bool offset_stepped = false;                       ///< t_O may have stepped since the scan before
 };
 
@@ -40,7 +41,7 @@ struct BatchProblem {
   Time start;       ///< of the first node
   NodePrior prior;  ///< on it
   std::vector<BatchScan> scans;
-  /// States to begin from, in the order of their times, at least one; the IMU carries them to the nodes.
+  /// Initial states in order of time, at least one. The IMU carries them to the nodes.
   std::vector<BatchNode> guess;
 };
 
@@ -55,18 +56,20 @@ struct BatchSolution {
   bool converged() const { return isConverged(termination); }
 };
 
-/// The graph of FixedLagSmoother over all the data at once: same factors, nothing marginalised, and the t_O of each node as
-/// in the paper, so that it may drift over the run (eq. 8-10). Solved until the step that is left is shorter than a thousandth of a standard deviation in every direction.
-/// With the imu model a node stands at the time of measurement of its scan, and the nodes are placed anew
-/// where the offset has moved (docs/method.md, section 10).
+/// The graph of FixedLagSmoother over all the data at once, with the same factors and nothing marginalised.
+/// Each node has its own t_O, as in the paper (eq. 8-10), so that the offset may drift over the run. The
+/// solution stands when the next step is shorter than a thousandth of a standard deviation in every
+/// direction.
+/// With the imu model a node stands at the time of measurement of its scan. If the offset moves, the nodes
+/// are placed again (docs/method.md, section 10).
 class BatchSmoother {
  public:
-  /// `imu` must outlive the smoother and cover all scans with max_time_offset to either side where it can.
-  /// `g_W` is gravity in W [m/s^2].
+  /// `imu` must outlive the smoother. It must cover all scans, with max_time_offset to either side if
+  /// possible. `g_W` is gravity in W [m/s^2].
   BatchSmoother(const SmootherOptions& options, const BatchOptions& batch, const ImuNoise& noise,
                 const Eigen::Vector3d& g_W, const ImuBuffer& imu);
 
-  /// Throws std::invalid_argument without a guess, std::runtime_error where the data leave a state open.
+  /// Throws std::invalid_argument without a guess, std::runtime_error if the data do not determine a state.
   BatchSolution solve(const BatchProblem& problem) const;
 
   /// Residual h - z of a velocity at `node`, whose marginal covariance is `covariance`.

@@ -14,11 +14,11 @@
 
 namespace rio_t {
 
-/// Nodes nearer than this share one [s]: the factor of the radar bridges the rest, and an IMU factor over no
-/// time would weigh infinitely.
+/// A scan nearer than this to a node shares it [s]. The radar factor bridges the rest exactly; an IMU factor
+/// over no time would have infinite weight.
 constexpr double kMinNodeSpacing = 0.005;
 
-/// A state of the window as others see it.
+/// A node of the window: its time and its state.
 struct NodeEstimate {
   Time time;
   StateBlock x;
@@ -40,19 +40,20 @@ class FixedLagSmoother {
   FixedLagSmoother(const SmootherOptions& options, const ImuNoise& noise, const Eigen::Vector3d& g_W,
                    const ImuBuffer& imu);
 
-  /// Noise of the IMU from here on.
+  /// Sets the noise of the IMU for the factors to come.
   void setImuNoise(const ImuNoise& noise);
-  /// Starts (or starts again) with one node of which nothing is known. Sensors add their calibration and the
-  /// prior then, and `settle` takes these in.
+  /// Starts, or starts again, with one node that has no prior yet. The caller adds calibration blocks and
+  /// priors and then calls `settle`.
   Block& start(Time time, const StateBlock& x0);
-  /// After a start, and after calibration came: what is known without a solve.
+  /// Computes the covariances without a solve: after a start, and after a calibration block came.
   void settle() { solution_ = linearized(window_); }
   bool started() const { return !nodes_.empty(); }
 
   Window& window() { return window_; }
-  /// The node at `time`, made if need be; null where `time` lies before the window. The IMU must cover it.
+  /// The node at `time`, created if none is near. Null if `time` is before the window. The IMU must cover
+  /// `time`.
   Block* nodeAt(Time time);
-  /// From the newest node before `time`. None where `time` lies before the window.
+  /// The state at `time`, carried there from the newest node before it. None if `time` is before the window.
   std::optional<PredictedState> predict(Time time, const std::vector<const Block*>& calibration) const;
   /// The platform is at rest at a node; `velocity_sigma` [m/s] per axis.
   void addZeroVelocity(Block& node, double velocity_sigma);
@@ -64,8 +65,8 @@ class FixedLagSmoother {
     const Block* block;
     double density;  ///< [unit/sqrt(s)]
   };
-  /// Marginalises what is older than the window; the nodes that left, oldest first. A calibration block that is retired
-  /// leaves with the last node that a term links it to.
+  /// Marginalises the nodes that are older than the window and returns them, oldest first. A retired
+  /// calibration block leaves with the last node that shares a term with it.
   std::vector<NodeEstimate> marginalize(const std::vector<RandomWalk>& walks);
 
   std::size_t size() const { return nodes_.size(); }
@@ -89,11 +90,11 @@ class FixedLagSmoother {
   void linkToPrevious(std::size_t k);
   Eigen::MatrixXd covarianceOf(const Block& node, const std::vector<const Block*>& calibration) const;
   std::vector<const Block*> leavingWith(const Block& node) const;
-  /// From `node` to `to` with the biases of `node`. A scan asks for the same one twice: for its prediction and
-  /// its node.
+  /// From `node` to `to` with the biases of `node`. A scan needs the same one for its prediction and for its
+  /// node.
   const Preintegration& preintegrateFrom(const Node& node, Time to) const;
 
-  SmootherOptions options_;  // read-only after construction, as the next but one and the two after
+  SmootherOptions options_;  // read-only after construction, as g_W_, imu_ and manifold_
   ImuNoise noise_;
   Eigen::Vector3d g_W_;
   const ImuBuffer* imu_;
@@ -105,7 +106,7 @@ class FixedLagSmoother {
     Time from, to;
     Preintegration value;
   };
-  mutable LastPreintegration last_preintegration_;  ///< changes no result
+  mutable LastPreintegration last_preintegration_;  ///< a cache
 };
 
 StateBlock toStateBlock(const Eigen::Ref<const Eigen::VectorXd>& stored);

@@ -9,12 +9,12 @@
 
 namespace rio_t {
 
-/// Tangent of a state and the time offset of the radar that it was found with: the state's 15, then t_O.
+/// Tangent of a state and the radar's time offset: the 15 of the state, then t_O.
 constexpr int kNodeTangent = StateBlock::kTangent + 1;
 using NodeVector = Eigen::Matrix<double, kNodeTangent, 1>;
 using NodeMatrix = Eigen::Matrix<double, kNodeTangent, kNodeTangent>;
 
-/// What is known of the first node: residual r0 + J ((x, t_O) [-] (x0, t_O0)).
+/// Prior on the first node and on t_O: residual r0 + J ((x, t_O) [-] (x0, t_O0)).
 struct NodePrior {
   StateBlock x0;
   double t_O0 = 0.0;  ///< [s]
@@ -25,8 +25,8 @@ struct NodePrior {
 /// The prior with that information and gradient at (x0, t_O0).
 NodePrior nodePrior(const Information& information, const StateBlock& x0, double t_O0);
 
-/// What is known of the first state after standing still for `duration` seconds. Yaw and position define W.
-/// The mean accelerometer is gravity plus b_a: tilt and b_a are known together far better than each of them
+/// Prior on the first state after `duration` seconds at rest. Yaw and position define W. The mean of the
+/// accelerometer is gravity plus b_a, so tilt and b_a are known far better together than each by itself
 /// (docs/method.md, eq. 7a). `gravity` [m/s^2].
 NodePrior priorAtRest(const SmootherOptions& options, const ImuNoise& noise, const StateBlock& x,
                       double gravity, double duration);

@@ -10,21 +10,21 @@ struct SmootherOptions {
   double huber_threshold = 1.5;  ///< on the whitened radar residual's norm; 0 = no robust loss
   WindowSolver solver = WindowSolver::kChain;
   int max_iterations = 30;  ///< of the solver, each scan
-  /// [sigma] farther from what the IMU predicts, offset uncertainty included, a scan is rejected; 0 = no
-  /// gate.
+  /// [sigma] A scan farther than this from the prediction is rejected. The sigma includes that of the offset.
+  /// 0 = no gate.
   double innovation_gate = 4.0;
-  /// [m/s] per axis, added to that prediction in the gate only: extrinsics and IMU scale that are a little
-  /// wrong.
+  /// [m/s] Added to the sigma of each axis of the innovation, for gate and health only. It stands for small
+  /// errors of the extrinsics and of the IMU's scale.
   double innovation_model_error = 0.1;
-  double innovation_gate_timeout = 3.0;  ///< [s] without a scan after which the next is taken all the same
+  double innovation_gate_timeout = 3.0;  ///< [s] without a used scan; then the gate lets the next one in
 
   bool estimate_time_offset = true;  ///< false: LC-RIO, offset fixed at time_offset_initial
   TimeOffsetModel time_offset_model = TimeOffsetModel::kImu;
   double time_offset_initial = 0.0;   ///< [s]
   double time_offset_sigma = 0.075;   ///< [s] prior
   double time_offset_noise = 2.0e-5;  ///< [s/sqrt(s)] random walk of the offset, while it is constant
-  /// [m/s^2] below, a scan says nothing of the offset: at rest and at constant velocity there is only noise
-  /// to see.
+  /// [m/s^2] A scan with less acceleration does not tell the offset: at rest and at constant velocity it
+  /// shows only noise.
   double time_offset_min_acceleration = 0.2;
   double max_time_offset = 0.25;  ///< [s] bound on |t_O|
 
