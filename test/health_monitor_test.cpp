@@ -74,6 +74,15 @@ TEST(HealthMonitor, FewScansProveNothing) {
   }
 }
 
+TEST(HealthMonitor, ModelsThatDoNotFitAreADivergence) {
+  HealthMonitor monitor(HealthOptions(), 4.0);
+  feed(monitor, 0.0, 5.0, 1.0);
+  EXPECT_EQ(monitor.judge(at(5.0), knownState(), 10.0), Health::kOk);
+  EXPECT_EQ(monitor.judge(at(5.1), knownState(), 30.0), Health::kDiverged);
+  EXPECT_FALSE(monitor.wantsReinitialization(at(60.0))) << "a new start would fit no better";
+  EXPECT_EQ(monitor.judge(at(5.2), knownState(), 10.0), Health::kOk);
+}
+
 TEST(HealthMonitor, AnOffsetThatStepsAllTheTimeIsADivergence) {
   HealthMonitor monitor(HealthOptions(), 4.0);
   EXPECT_EQ(feed(monitor, 0.0, 10.0, 1.0), Health::kOk);

@@ -242,7 +242,7 @@ Health Estimator::updateHealth() {
   const std::optional<NavigationState> state = navigation_.state();
   if (!state || imu_.empty()) return health_.health();
   const bool was_diverged = health_.health() == Health::kDiverged;
-  const Health now = health_.judge(imu_.newest(), *state);
+  const Health now = health_.judge(imu_.newest(), *state, model_error_scale_.value());
   if (now == Health::kDiverged && !was_diverged) faults_.count("diverged");
   return now;
 }

@@ -58,8 +58,9 @@ class HealthMonitor {
   /// before it is trusted.
   void startedAt(Time time);
 
-  /// Judges at `now`; `state` is what is published.
-  Health judge(Time now, const NavigationState& state);
+  /// Judges at `now`; `state` is what is published. `model_error_scale` is that of ModelErrorScale: where the
+  /// models are wrong by five of their sigmas, the input is not what the options say.
+  Health judge(Time now, const NavigationState& state, double model_error_scale = 1.0);
   Health health() const { return health_; }
   /// Whether the divergence has lasted long enough for a re-initialisation.
   bool wantsReinitialization(Time now) const;
