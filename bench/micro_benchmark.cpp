@@ -9,9 +9,9 @@
 #include "rio_t/odometry/imu_propagator.h"
 #include "rio_t/odometry/options.h"
 #include "rio_t/ros/cloud/point_cloud.h"
+#include "rio_t/sensors/radar_in_window.h"
 #include "rio_t/simulation/motions.h"
 #include "rio_t/simulation/simulation.h"
-#include "rio_t/sensors/radar_in_window.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
 #include "rio_t/smoother/node_prior.h"
 
@@ -39,8 +39,7 @@ struct Run {
         scan.points.push_back({point.position_R, point.doppler, point.snr_db});
       const EgoVelocity measured = estimator.estimate(scan);
       if (isValid(measured.status)) {
-        velocities.push_back({scan.stamp, measured.v_R, measured.covariance,
-                              options.T_IR});
+        velocities.push_back({scan.stamp, measured.v_R, measured.covariance, options.T_IR});
       }
       scans.push_back(std::move(scan));
     }
@@ -114,7 +113,9 @@ void smoother(benchmark::State& state, Timed timed, double window) {
   options.window = window;
   FixedLagSmoother smoother(options, ImuNoise(), kGravity, run().imu);
   RadarInWindow radar(options, run().velocities.front().T_IR, kGravity, run().imu);
-  const auto marginalize = [&] { return smoother.marginalize({{&radar.offsetBlock(), options.time_offset_noise}}); };
+  const auto marginalize = [&] {
+    return smoother.marginalize({{&radar.offsetBlock(), options.time_offset_noise}});
+  };
   std::size_t next = run().velocities.size();
   const auto part = [&](Timed which, auto&& call) {
     const auto begin = std::chrono::steady_clock::now();
@@ -124,7 +125,8 @@ void smoother(benchmark::State& state, Timed timed, double window) {
   for (auto _ : state) {
     if (next >= run().velocities.size()) {
       const StateBlock x = run().state(kStart - 0.5);
-      start(smoother, radar, run().options.start + (kStart - 0.5), priorAtRest(options, ImuNoise(), x, 9.81, 3.0));
+      start(smoother, radar, run().options.start + (kStart - 0.5),
+            priorAtRest(options, ImuNoise(), x, 9.81, 3.0));
       // Not timed: the window fills.
       for (next = 0; next < 30; ++next) {
         radar.add(smoother, run().velocities[next]);

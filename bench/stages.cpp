@@ -52,13 +52,15 @@ RadarScan toRadarScan(const pcl::PointCloud<RadarPointPcl>& cloud, Time stamp) {
   return original(cloud, stamp);
 }
 
-EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior) const {
+EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
+                                           const std::optional<VelocityPrior>& prior) const {
   static const auto original = libraryFunction(&EgoVelocityEstimator::estimate);
   const Scope scope(Stage::kEgoVelocity);
   return (this->*original)(scan, prior);
 }
 
-std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoother& smoother, Time stamp) const {
+std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoother& smoother,
+                                                              Time stamp) const {
   static const auto original = libraryFunction(&RadarInWindow::predict);
   const Scope scope(Stage::kPrediction);
   return (this->*original)(smoother, stamp);

@@ -16,7 +16,9 @@ namespace {
 Eigen::MatrixXd dense(const NormalEquations& system) {
   const auto count = static_cast<int>(system.blocks.size());
   const Eigen::Index n = count / 2 * kNodeTangent;
-  const auto first = [](int i) { return Eigen::Index(i / 2 * kNodeTangent + (i % 2) * StateBlock::kTangent); };
+  const auto first = [](int i) {
+    return Eigen::Index(i / 2 * kNodeTangent + (i % 2) * StateBlock::kTangent);
+  };
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n, n);
   for (int i = 0; i < count; ++i) {
     const Eigen::Index rows = system.diagonal[i].rows();
@@ -79,7 +81,8 @@ TEST_F(Batch, EqualsTheFixedLagSmootherThatKeepsEverything) {
       options.time_offset_model = model;
       options.huber_threshold = huber;
       options.window = 100.0;
-      options.time_offset_noise = 1e-7;  // the paper's t_O of each node, and one for all, are the same where it is constant
+      options.time_offset_noise =
+          1e-7;  // the paper's t_O of each node, and one for all, are the same where it is constant
       options.time_offset_initial = options.time_offset_sigma = 0.02;
       options.max_iterations = 50;
       RadarSmoother online(options, skewMounting(), motion.g_W, imu);

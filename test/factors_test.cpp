@@ -120,7 +120,8 @@ RadarMotionModel constantAcceleration(const ImuBuffer& imu) {
 TEST(ConstantAccelerationRadarFactor, JacobiansAreCorrect) {
   const SyntheticMotion motion;
   const ImuBuffer imu = motion.imu(0.9, 1.3, 400.0);
-  const RadarVelocityFactor factor(measurement(motion.time(1.0)), motion.time(1.0), constantAcceleration(imu));
+  const RadarVelocityFactor factor(measurement(motion.time(1.0)), motion.time(1.0),
+                                   constantAcceleration(imu));
   expectJacobiansCorrect(factor, {values(moved(motion.state(1.0), 0.1)), {0.04}});
 }
 

@@ -81,7 +81,8 @@ struct LinearWindow {
       window.add(std::make_unique<LinearCost>(5, std::vector<int>{3, 2}, 100 * k),
                  {nodes.back(), calibration.get()});
       if (k > 0)
-        window.add(std::make_unique<LinearCost>(4, std::vector<int>{3, 3}, 100 * k + 50), {nodes[k - 1], nodes[k]});
+        window.add(std::make_unique<LinearCost>(4, std::vector<int>{3, 3}, 100 * k + 50),
+                   {nodes[k - 1], nodes[k]});
     }
   }
   std::shared_ptr<const Manifold> three = std::make_shared<VectorManifold>(3);
@@ -124,7 +125,8 @@ TEST(Elimination, SolvesLikeTheDenseSystem) {
     const Eigen::VectorXd& delta = elimination->delta()[i];
     EXPECT_LT((delta - expected.segment(dense.first[i], delta.size())).norm(), 1e-9 * expected.norm());
   }
-  EXPECT_NEAR(elimination->squaredLength(), expected.dot(dense.H * expected), 1e-9 * elimination->squaredLength());
+  EXPECT_NEAR(elimination->squaredLength(), expected.dot(dense.H * expected),
+              1e-9 * elimination->squaredLength());
 }
 
 TEST(Elimination, CovariancesAreThoseOfTheDenseInverse) {
@@ -160,7 +162,8 @@ TEST(Marginalization, LeavesTheSolutionOfTheRest) {
   const Eigen::MatrixXd before = linearized(linear.window).elimination.covariance({3, 4, 5});
   solve(linear.window, {});
   const Eigen::VectorXd newest = linear.nodes[4]->x, calibration = linear.calibration->x;
-  for (Block* node : {linear.nodes[4], linear.nodes[3]}) node->x.setConstant(0.7);  // it is linear: the point is free
+  for (Block* node : {linear.nodes[4], linear.nodes[3]})
+    node->x.setConstant(0.7);  // it is linear: the point is free
   marginalize(linear.window, {linear.nodes[0]}, {});
   marginalize(linear.window, {linear.nodes[1], linear.nodes[2]}, {});
   ASSERT_EQ(linear.window.blocks().size(), 3U);
@@ -168,7 +171,8 @@ TEST(Marginalization, LeavesTheSolutionOfTheRest) {
   solve(linear.window, {});
   EXPECT_LT((linear.nodes[4]->x - newest).norm(), 1e-6 * newest.norm());
   EXPECT_LT((linear.calibration->x - calibration).norm(), 1e-6 * calibration.norm());
-  EXPECT_LT((linearized(linear.window).elimination.covariance({0, 1, 2}) - before).norm(), 1e-9 * before.norm());
+  EXPECT_LT((linearized(linear.window).elimination.covariance({0, 1, 2}) - before).norm(),
+            1e-9 * before.norm());
 }
 
 TEST(Marginalization, AWalkWidensWhatThePriorSays) {
@@ -189,7 +193,8 @@ TEST(Marginalization, AWalkWidensWhatThePriorSays) {
   }
   const Eigen::MatrixXd all = H.inverse();
   Eigen::MatrixXd expected(5, 5);
-  expected << all.topLeftCorner(3, 3), all.topRightCorner(3, 2), all.bottomLeftCorner(2, 3), all.bottomRightCorner(2, 2);
+  expected << all.topLeftCorner(3, 3), all.topRightCorner(3, 2), all.bottomLeftCorner(2, 3),
+      all.bottomRightCorner(2, 2);
   const Dense widened(linearize({a.nodes[1], a.calibration.get()}, {a.window.terms().back().get()}));
   EXPECT_LT((widened.H.inverse() - expected).norm(), 1e-6 * expected.norm());
 }
@@ -203,7 +208,8 @@ TEST(SquareRoot, CarriesInformationAndGradient) {
   for (int i = 0; i < 8; ++i) information.s(i) = wave(40 + i);
   const SquareRoot root = squareRoot(information);
   const Eigen::VectorXd scale = information.S.diagonal().cwiseSqrt().cwiseInverse();
-  EXPECT_LT((scale.asDiagonal() * (root.J.transpose() * root.J - information.S) * scale.asDiagonal()).norm(), 1e-10);
+  EXPECT_LT((scale.asDiagonal() * (root.J.transpose() * root.J - information.S) * scale.asDiagonal()).norm(),
+            1e-10);
   EXPECT_LT((root.J.transpose() * root.r0 - information.s).cwiseProduct(scale).norm(), 1e-9);
 }
 
@@ -252,8 +258,8 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
       } else {
         const StateBlock from = motion.state(t - 0.1);
         window.add(std::make_unique<ImuFactor>(
-                       preintegrate(imu, *previous->time, *node.time, from.b_g(), from.b_a(), ImuNoise()), ImuNoise(),
-                       motion.g_W),
+                       preintegrate(imu, *previous->time, *node.time, from.b_g(), from.b_a(), ImuNoise()),
+                       ImuNoise(), motion.g_W),
                    {previous, &node});
       }
       RadarVelocityMeasurement z = radarMeasurement(motion, t + t_O, t_O);
@@ -291,7 +297,8 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
     double largest = 0.0;
     for (std::size_t i = 0; i < system.blocks.size(); ++i) {
       if (system.blocks[i] == offset.get() && std::abs(offset->x[0]) == offset->bound) continue;
-      const Eigen::VectorXd scaled = system.gradient[i].cwiseQuotient(system.diagonal[i].diagonal().cwiseSqrt());
+      const Eigen::VectorXd scaled =
+          system.gradient[i].cwiseQuotient(system.diagonal[i].diagonal().cwiseSqrt());
       largest = std::max(largest, scaled.norm());
     }
     return largest;
@@ -379,7 +386,9 @@ TEST_P(Windows, AnOffsetThatStartsAtTheBoundLeavesIt) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Solver, Windows, ::testing::Values(WindowSolver::kChain, WindowSolver::kCeres),
-                         [](const auto& solver) { return solver.param == WindowSolver::kChain ? "chain" : "ceres"; });
+                         [](const auto& solver) {
+                           return solver.param == WindowSolver::kChain ? "chain" : "ceres";
+                         });
 
 /// A height above the start, off by a bias that is calibrated: z - (p_W,z + bias), whitened. Blocks: state,
 /// bias. All that a new sensor needs: this cost function, and where it is added to the window.

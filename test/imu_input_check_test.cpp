@@ -98,7 +98,8 @@ TEST_F(Gate, DoubtGrowsWithTheGap) {
   EXPECT_GT(small, 0.0);
   EXPECT_EQ(feed(2.0), "imu_gap");
   EXPECT_NEAR(sample.accel_doubt,
-              ImuInputCheckOptions().unseen_accel_density * ImuInputCheckOptions().unseen_accel_density, 1e-12);
+              ImuInputCheckOptions().unseen_accel_density * ImuInputCheckOptions().unseen_accel_density,
+              1e-12);
   EXPECT_LT(small, 0.1 * sample.accel_doubt);
 }
 

@@ -32,7 +32,9 @@ TEST(OffsetStepDetector, SeesAStepOfEitherSign) {
   EXPECT_LT(secondsToStep(0.05, 0.7), 20.0);
 }
 
-TEST(OffsetStepDetector, LeavesSmallChangesToTheRandomWalk) { EXPECT_EQ(secondsToStep(0.003, 5.0, 0.005), 60.0); }
+TEST(OffsetStepDetector, LeavesSmallChangesToTheRandomWalk) {
+  EXPECT_EQ(secondsToStep(0.003, 5.0, 0.005), 60.0);
+}
 
 TEST(OffsetStepDetector, DoesNotSpeakWithoutExcitation) { EXPECT_EQ(secondsToStep(0.05, 0.0), 60.0); }
 

@@ -43,7 +43,8 @@ TEST(PoseDoubt, KeepsWhatWasPublishedAndSpreadsFromThere) {
   doubt.addTo(there);
   EXPECT_LT((block(there, StateBlock::kP) - block(published, StateBlock::kP)).norm(), 1e-12);
   EXPECT_NEAR(headingVariance(there), kHeading * kHeading, 1e-12);
-  EXPECT_NEAR(block(there, StateBlock::kV)(1, 1), std::pow(2.0 * kHeading, 2), 1e-12) << "the velocity turns with it";
+  EXPECT_NEAR(block(there, StateBlock::kV)(1, 1), std::pow(2.0 * kHeading, 2), 1e-12)
+      << "the velocity turns with it";
 
   // 30 m ahead along x: sideways 3 m more, and nothing along the way.
   NavigationState ahead = stateAt(published.p_W + Eigen::Vector3d(30.0, 0.0, 0.0));

@@ -13,12 +13,18 @@ namespace rio_t {
 struct RadarSmoother {
   RadarSmoother(const SmootherOptions& options, const Extrinsics& T_IR, const Eigen::Vector3d& g_W,
                 const ImuBuffer& imu)
-      : walk(options.time_offset_noise), states(options, ImuNoise(), g_W, imu), radar(options, T_IR, g_W, imu) {}
+      : walk(options.time_offset_noise),
+        states(options, ImuNoise(), g_W, imu),
+        radar(options, T_IR, g_W, imu) {}
 
   void initialize(Time time, const NodePrior& prior) { start(states, radar, time, prior); }
   RadarInWindow::AddResult add(const RadarVelocityMeasurement& z) { return radar.add(states, z); }
-  void addRest(Time stamp, double sigma) { states.addZeroVelocity(*states.nodeAt(radar.nodeTime(stamp)), sigma); }
-  const Solution& optimize(double short_step = SolverLimits().short_step) { return states.optimize(short_step); }
+  void addRest(Time stamp, double sigma) {
+    states.addZeroVelocity(*states.nodeAt(radar.nodeTime(stamp)), sigma);
+  }
+  const Solution& optimize(double short_step = SolverLimits().short_step) {
+    return states.optimize(short_step);
+  }
   std::vector<NodeEstimate> marginalize() { return states.marginalize({{&radar.offsetBlock(), walk}}); }
   std::optional<RadarVelocityPrediction> predict(Time stamp) const { return radar.predict(states, stamp); }
   void stepOffset(Time stamp) { radar.stepOffset(states, stamp); }

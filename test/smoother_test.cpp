@@ -1,12 +1,11 @@
 // The fixed-lag smoother with one radar: a known motion is recovered, and the window keeps what it knew.
-#include "rio_t/smoother/fixed_lag_smoother.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "radar_smoother.h"
 #include "rio_t/core/so3.h"
+#include "rio_t/smoother/fixed_lag_smoother.h"
 #include "rio_t/smoother/node_prior.h"
 
 namespace rio_t {
@@ -18,7 +17,9 @@ class Smoother : public ::testing::Test {
 
   explicit Smoother() : imu(motion.imu(0.0, kEnd + 0.5, 400.0)) {}
 
-  RadarVelocityMeasurement measurement(double stamp, double t_O) const { return radarMeasurement(motion, stamp, t_O); }
+  RadarVelocityMeasurement measurement(double stamp, double t_O) const {
+    return radarMeasurement(motion, stamp, t_O);
+  }
 
   RadarSmoother make(const SmootherOptions& options) const {
     RadarSmoother smoother(options, skewMounting(), motion.g_W, imu);

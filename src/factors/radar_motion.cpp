@@ -10,8 +10,7 @@
 namespace rio_t {
 
 RadarMotion RadarMotionModel::at(const double* state, Time state_time, Time stamp, double t_O,
-                                 const Eigen::Vector3d& l_I,
-                                 const ImuMean* mean) const {
+                                 const Eigen::Vector3d& l_I, const ImuMean* mean) const {
   const StateView x(state);
   if (kind == TimeOffsetModel::kConstantAcceleration)
     return carriedByOneAcceleration(x, stamp, t_O, l_I, mean != nullptr ? *mean : meanAt(stamp));
@@ -25,7 +24,8 @@ Time RadarMotionModel::tau(Time stamp, double t_O) const {
 Time RadarMotionModel::meanTime(Time stamp, double t_O) const {
   if (kind == TimeOffsetModel::kConstantAcceleration) return stamp;
   constexpr std::int64_t kMillisecond = 1'000'000;  // [ns]
-  return Time::fromNanoseconds((tau(stamp, t_O).nanoseconds() + kMillisecond / 2) / kMillisecond * kMillisecond);
+  return Time::fromNanoseconds((tau(stamp, t_O).nanoseconds() + kMillisecond / 2) / kMillisecond *
+                               kMillisecond);
 }
 
 ImuMean RadarMotionModel::meanAt(Time time) const { return imu->mean(time, kOffsetHalfWidth); }
@@ -33,9 +33,10 @@ ImuMean RadarMotionModel::meanAt(Time time) const { return imu->mean(time, kOffs
 RadarMotion RadarMotionModel::carriedByImu(const StateView& x, Time state_time, Time tau,
                                            const Eigen::Vector3d& l_I, const ImuMean* mean) const {
   ImuDelta delta;
-  imu->forEachInterval(state_time, tau, [&](double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
-    delta.step(dt, gyro - x.b_g, accel - x.b_a);
-  });
+  imu->forEachInterval(state_time, tau,
+                       [&](double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
+                         delta.step(dt, gyro - x.b_g, accel - x.b_a);
+                       });
   const Eigen::Matrix3d R_IW = x.q_WI.toRotationMatrix().transpose();  // at the state
   const Eigen::Matrix3d dR_T = delta.dR.toRotationMatrix().transpose();
   const Eigen::Vector3d carried = R_IW * (x.v_W + delta.dt * g_W);
@@ -55,7 +56,8 @@ RadarMotion RadarMotionModel::carriedByImu(const StateView& x, Time state_time, 
 }
 
 RadarMotion RadarMotionModel::carriedByOneAcceleration(const StateView& x, Time stamp, double t_O,
-                                                       const Eigen::Vector3d& l_I, const ImuMean& mean) const {
+                                                       const Eigen::Vector3d& l_I,
+                                                       const ImuMean& mean) const {
   const Eigen::Matrix3d R_IW = x.q_WI.toRotationMatrix().transpose();
   const Eigen::Vector3d v_I = R_IW * x.v_W;
   const Eigen::Vector3d g_I = R_IW * g_W;

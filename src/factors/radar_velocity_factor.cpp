@@ -14,7 +14,8 @@ bool RadarVelocityFactor::Evaluate(double const* const* parameters, double* resi
                                    double** jacobians) const {
   const double t_O = z_.held_t_O.value_or(parameters[1][0]);
   const Time mean_time = model_.meanTime(z_.stamp, t_O);
-  if (jacobians != nullptr && (!mean_ || mean_->time != mean_time)) mean_ = Mean{mean_time, model_.meanAt(mean_time)};
+  if (jacobians != nullptr && (!mean_ || mean_->time != mean_time))
+    mean_ = Mean{mean_time, model_.meanAt(mean_time)};
   const RadarMotion motion = model_.at(parameters[0], state_time_, z_.stamp, t_O, z_.T_IR.l_I,
                                        jacobians != nullptr ? &mean_->value : nullptr);
   const Eigen::Matrix3d W_R = whitening_ * z_.T_IR.R_RI();

@@ -2,7 +2,8 @@
 
 namespace rio_t {
 
-bool ZeroVelocityFactor::Evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
+bool ZeroVelocityFactor::Evaluate(double const* const* parameters, double* residuals,
+                                  double** jacobians) const {
   Eigen::Map<Eigen::Vector3d>{residuals} = weight_ * StateView(parameters[0]).v_W;
   if (jacobians == nullptr || jacobians[0] == nullptr) return true;
   Eigen::Map<StateJacobian<3>> J(jacobians[0]);

@@ -44,7 +44,9 @@ class CeresManifold final : public CeresManifoldBase {
 #else
   int GlobalSize() const override { return manifold_.size(); }
   int LocalSize() const override { return manifold_.tangent(); }
-  bool ComputeJacobian(const double* /*x*/, double* jacobian) const override { return select(jacobian, false); }
+  bool ComputeJacobian(const double* /*x*/, double* jacobian) const override {
+    return select(jacobian, false);
+  }
 #endif
 
  private:
@@ -52,7 +54,8 @@ class CeresManifold final : public CeresManifoldBase {
   bool select(double* jacobian, bool transposed) const {
     const int rows = transposed ? manifold_.tangent() : manifold_.size();
     const int columns = transposed ? manifold_.size() : manifold_.tangent();
-    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> J(jacobian, rows, columns);
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> J(jacobian, rows,
+                                                                                         columns);
     J.setZero();
     for (int i = 0; i < manifold_.tangent(); ++i) {
       const int column = manifold_.columns()[i];

@@ -71,7 +71,8 @@ void marginalize(Window& window, std::vector<const Block*> leaving, const std::v
   std::vector<const Block*> order = leaving;
   std::vector<Block*> kept;
   for (const auto& block : window.blocks()) {
-    if (contains(leaving, block.get()) || std::find(touched.begin(), touched.end(), block.get()) == touched.end())
+    if (contains(leaving, block.get()) ||
+        std::find(touched.begin(), touched.end(), block.get()) == touched.end())
       continue;
     kept.push_back(block.get());
     order.push_back(block.get());

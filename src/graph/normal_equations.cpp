@@ -132,7 +132,8 @@ class Linearized {
     const double root = std::sqrt(rho[1]);
     r_ *= root;
     J_.clear();
-    for (std::size_t i = 0; i < term.blocks.size(); ++i) J_.push_back(tangents(i, *term.blocks[i]->manifold, root));
+    for (std::size_t i = 0; i < term.blocks.size(); ++i)
+      J_.push_back(tangents(i, *term.blocks[i]->manifold, root));
   }
   const Eigen::VectorXd& r() const { return r_; }
   const Rows& J(std::size_t i) const { return J_[i]; }
@@ -344,7 +345,8 @@ SquareRoot squareRoot(const Information& information) {
   // The entries differ by many orders of magnitude (metres, biases): scale to a unit diagonal first, so that
   // "carries no information" does not depend on the units.
   const Eigen::VectorXd scale = information.S.diagonal().cwiseMax(0.0).cwiseSqrt();
-  const Eigen::VectorXd inverse = (scale.array() > 0.0).select(scale.cwiseInverse(), Eigen::VectorXd::Zero(n));
+  const Eigen::VectorXd inverse =
+      (scale.array() > 0.0).select(scale.cwiseInverse(), Eigen::VectorXd::Zero(n));
   const Eigen::MatrixXd scaled = inverse.asDiagonal() * information.S * inverse.asDiagonal();
   const Eigen::VectorXd scaled_s = inverse.cwiseProduct(information.s);
   SquareRoot root{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};

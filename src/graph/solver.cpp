@@ -26,10 +26,11 @@ class StopEarly final : public ceres::IterationCallback {
   StopEarly(const Window& window, double short_step) : window_(window), short_step_(short_step) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
     const auto& blocks = window_.blocks();
-    const bool beyond = std::any_of(blocks.begin(), blocks.end(), [](const auto& b) { return isBeyondBound(*b); });
+    const bool beyond =
+        std::any_of(blocks.begin(), blocks.end(), [](const auto& b) { return isBeyondBound(*b); });
     // A step of Gauss-Newton lowers the cost by half of its squared length.
-    const bool is_short = summary.iteration > 0 && summary.step_is_successful &&
-                          2.0 * summary.cost_change < short_step_;
+    const bool is_short =
+        summary.iteration > 0 && summary.step_is_successful && 2.0 * summary.cost_change < short_step_;
     return beyond || is_short ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
   }
 
@@ -83,7 +84,8 @@ ceres::Solver::Options solverOptions() {
 constexpr double kShortestShare = 0.06;
 constexpr double kFirstDamping = 1e-4;
 /// Squared length of a step in standard deviations, below which it is taken without asking the cost: over a
-/// tenth of a sigma the graph is linear, and the cost of a long run is rounded to more than the step lowers it.
+/// tenth of a sigma the graph is linear, and the cost of a long run is rounded to more than the step lowers
+/// it.
 constexpr double kSurelyRight = 1e-2;
 
 /// Moves all blocks by `share` of the step, no farther than to their bounds. Whether one was stopped there.

@@ -36,7 +36,8 @@ Block& Window::addNode(Time time, std::shared_ptr<const Manifold> manifold, cons
   return *insert(later, std::make_shared<Block>(time, std::move(manifold), x));
 }
 
-std::shared_ptr<Block> Window::addCalibration(std::shared_ptr<const Manifold> manifold, const Eigen::VectorXd& x) {
+std::shared_ptr<Block> Window::addCalibration(std::shared_ptr<const Manifold> manifold,
+                                              const Eigen::VectorXd& x) {
   return insert(blocks_.end(), std::make_shared<Block>(std::nullopt, std::move(manifold), x));
 }
 
@@ -68,7 +69,8 @@ Term& Window::add(std::unique_ptr<ceres::CostFunction> cost, std::vector<Block*>
 }
 
 void Window::remove(const Term& term) {
-  const auto at = std::find_if(terms_.begin(), terms_.end(), [&](const auto& other) { return other.get() == &term; });
+  const auto at =
+      std::find_if(terms_.begin(), terms_.end(), [&](const auto& other) { return other.get() == &term; });
   problem_->RemoveResidualBlock(term.in_problem);
   terms_.erase(at);
 }
@@ -79,12 +81,13 @@ void Window::remove(const Block& block) {
   };
   problem_->RemoveParameterBlock(block.x.data());  // and the residual blocks on it
   terms_.erase(std::remove_if(terms_.begin(), terms_.end(), touches), terms_.end());
-  blocks_.erase(std::find_if(blocks_.begin(), blocks_.end(),
-                             [&](const auto& other) { return other.get() == &block; }));
+  blocks_.erase(
+      std::find_if(blocks_.begin(), blocks_.end(), [&](const auto& other) { return other.get() == &block; }));
 }
 
 bool Window::has(const Block& block) const {
-  return std::any_of(blocks_.begin(), blocks_.end(), [&](const auto& other) { return other.get() == &block; });
+  return std::any_of(blocks_.begin(), blocks_.end(),
+                     [&](const auto& other) { return other.get() == &block; });
 }
 
 void Window::setConstant(Block& block, bool is_constant) {

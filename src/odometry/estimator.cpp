@@ -23,7 +23,7 @@ constexpr double kSilentStep = 5.0;
 constexpr double kLateScan = 1.0;
 
 RadarChannelOptions channelOptions(const OdometryOptions& options) {
-  return {options.T_IR,     options.ego_velocity, options.feasibility, options.offset_step_detector,
+  return {options.T_IR,     options.ego_velocity,       options.feasibility, options.offset_step_detector,
           options.smoother, options.rest.velocity_sigma};
 }
 
@@ -58,7 +58,8 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
     return result;
   }
   // First of all: a new start may move the offset, and with it the time of measurement.
-  if (health_.wantsReinitialization(imu_.newest())) result.reinitialized = tryReinitialize(result.left_window);
+  if (health_.wantsReinitialization(imu_.newest()))
+    result.reinitialized = tryReinitialize(result.left_window);
   const Time node_time = radar.nodeTime(stamp);
   result.rejected_because = whyNotNow(node_time, imu_has_ended);
   if (result.rejected_because.empty()) {

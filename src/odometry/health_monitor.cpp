@@ -9,15 +9,15 @@
 namespace rio_t {
 namespace {
 
-constexpr double kDefaultGate = 4.0;      // [sigma]
-constexpr std::size_t kMinScans = 8;      // fewer prove nothing
-constexpr double kMinSpan = 0.7;          // of the window, that they must reach over
-constexpr std::size_t kMaxScans = 1000;   // bounds the memory
-constexpr double kStepsApart = 20.0;      // [s] nearer, a step of the offset explains nothing
-constexpr std::size_t kFalseSteps = 3;    // so near each other, no offset steps: a driver restarts once
-constexpr double kMaxSpeed = 200.0;       // [m/s] no platform with such a radar
-/// Of the squares. Turned axes give 50 and more; the worst platform that was tried, a kart with sparse radars,
-/// 16 for a second and then less than 10.
+constexpr double kDefaultGate = 4.0;     // [sigma]
+constexpr std::size_t kMinScans = 8;     // fewer prove nothing
+constexpr double kMinSpan = 0.7;         // of the window, that they must reach over
+constexpr std::size_t kMaxScans = 1000;  // bounds the memory
+constexpr double kStepsApart = 20.0;     // [s] nearer, a step of the offset explains nothing
+constexpr std::size_t kFalseSteps = 3;   // so near each other, no offset steps: a driver restarts once
+constexpr double kMaxSpeed = 200.0;      // [m/s] no platform with such a radar
+/// Of the squares. Turned axes give 50 and more; the worst platform that was tried, a kart with sparse
+/// radars, 16 for a second and then less than 10.
 constexpr double kMaxModelErrorScale = 25.0;
 constexpr double kMetresPerSecond2 = 10;  // an attitude that is off by x turns x g into velocity each second
 
@@ -53,7 +53,8 @@ HealthMonitor::HealthMonitor(const HealthOptions& options, double gate)
     : options_(options), gate_(gate > 0.0 ? gate : kDefaultGate) {}
 
 void HealthMonitor::addInnovation(const Innovation& innovation) {
-  add({innovation.stamp, std::min(1.0, innovation.squaredSigmas() / (gate_ * gate_)), innovation.d.squaredNorm()});
+  add({innovation.stamp, std::min(1.0, innovation.squaredSigmas() / (gate_ * gate_)),
+       innovation.d.squaredNorm()});
 }
 
 void HealthMonitor::add(const Entry& entry) {

@@ -10,11 +10,11 @@
 #include <utility>
 
 #include "rio_t/factors/offset_derivative.h"
+#include "rio_t/graph/marginalization.h"
+#include "rio_t/graph/solver.h"
 #include "rio_t/imu/preintegration.h"
 #include "rio_t/odometry/options.h"
 #include "rio_t/smoother/carried.h"
-#include "rio_t/graph/marginalization.h"
-#include "rio_t/graph/solver.h"
 
 namespace rio_t {
 namespace {
@@ -65,8 +65,8 @@ void MotionInitializer::add(Time stamp, const EgoVelocity& velocity) {
   const auto after = std::lower_bound(velocities_.begin(), velocities_.end(), stamp,
                                       [](const Velocity& z, Time t) { return z.stamp < t; });
   if (after != velocities_.end() && after->stamp == stamp) return;
-  velocities_.insert(
-      after, Velocity{{stamp, velocity.v_R, velocity.covariance, T_IR_}, velocity.told_variance});
+  velocities_.insert(after,
+                     Velocity{{stamp, velocity.v_R, velocity.covariance, T_IR_}, velocity.told_variance});
   if (velocities_.size() > kMaxVelocities) velocities_.erase(velocities_.begin());
 }
 
@@ -222,7 +222,8 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
   std::vector<bool> informs;
   Solution solution;
   for (int round = 0; round < kMaxRounds; ++round) {
-    const std::vector<bool> informed = std::exchange(informs, informOffset(velocities, time, imu, state, offset->x[0]));
+    const std::vector<bool> informed =
+        std::exchange(informs, informOffset(velocities, time, imu, state, offset->x[0]));
     if (round > 0 && informs == informed) break;
     for (const Term* term : terms) window.remove(*term);
     terms.clear();
@@ -230,7 +231,8 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
       RadarVelocityMeasurement z = velocities[i];
       z.covariance = carriedCovariance(velocities[i], time, imu, scale.value()).whole;
       if (!informs[i]) z.held_t_O = offset->x[0];
-      terms.push_back(&window.add(std::make_unique<RadarVelocityFactor>(z, time, model), {&state, offset.get()}, loss));
+      terms.push_back(
+          &window.add(std::make_unique<RadarVelocityFactor>(z, time, model), {&state, offset.get()}, loss));
     }
     try {
       solution = rio_t::solve(window, {kMaxIterations, kConverged * kConverged}, smoother_.solver);
@@ -260,21 +262,24 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
   return outliers;
 }
 
-std::vector<bool> MotionInitializer::informOffset(const Velocities& velocities, Time time, const ImuBuffer& imu,
-                                                  const Block& state, double t_O) const {
+std::vector<bool> MotionInitializer::informOffset(const Velocities& velocities, Time time,
+                                                  const ImuBuffer& imu, const Block& state,
+                                                  double t_O) const {
   std::vector<bool> informs;
   for (const Velocity& z : velocities) {
     const Time tau = z.stamp - t_O;
     const StateBlock x = carried(toStateBlock(state.x), time, tau, imu, g_W_);
-    informs.push_back(smoother_.estimate_time_offset &&
-                      velocityRate(imu, tau, x, g_W_, T_IR_.l_I).informsOffset(smoother_.time_offset_min_acceleration));
+    informs.push_back(
+        smoother_.estimate_time_offset &&
+        velocityRate(imu, tau, x, g_W_, T_IR_.l_I).informsOffset(smoother_.time_offset_min_acceleration));
   }
   return informs;
 }
 
 /// Covariance that the IMU adds between the state and a scan: noise of the accelerometer, and of the tilt.
 MotionInitializer::CarriedCovariance MotionInitializer::carriedCovariance(const Velocity& z, Time time,
-                                                                          const ImuBuffer& imu, double scale) const {
+                                                                          const ImuBuffer& imu,
+                                                                          double scale) const {
   const double T = std::abs(z.stamp - time);
   const double tilt = noise_.gyro_density * g_W_.norm();
   const double measured = imu.mean(z.stamp, T).accel_variance;
@@ -283,7 +288,8 @@ MotionInitializer::CarriedCovariance MotionInitializer::carriedCovariance(const 
   if (told > measured) scaled.array() += told * T;
   CarriedCovariance covariance{z.covariance, scaled.asDiagonal()};
   covariance.whole.diagonal() += scaled - z.told_variance;
-  covariance.whole.diagonal().array() += tilt * tilt * T * T * T / 3.0 + (told > measured ? 0.0 : measured * T);
+  covariance.whole.diagonal().array() +=
+      tilt * tilt * T * T * T / 3.0 + (told > measured ? 0.0 : measured * T);
   return covariance;
 }
 

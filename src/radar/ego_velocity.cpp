@@ -146,8 +146,9 @@ std::optional<Eigen::Vector3d> ransac(const std::vector<RadarDirection>& points,
 
 /// Points that agree with `v_R`: within the threshold, or within three sigma where the noise of the direction
 /// alone is larger than the threshold, as it is at speed.
-std::vector<RadarDirection> selectInliers(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
-                                          const EgoVelocityOptions& o, const PointVariances& noise) {
+std::vector<RadarDirection> selectInliers(const std::vector<RadarDirection>& points,
+                                          const Eigen::Vector3d& v_R, const EgoVelocityOptions& o,
+                                          const PointVariances& noise) {
   const bool knows_noise = o.solver == EgoVelocitySolver::kErrorsInVariables;
   const double limit = o.ransac_inlier_threshold * o.ransac_inlier_threshold;
   std::vector<RadarDirection> inliers;
@@ -329,12 +330,13 @@ void EgoVelocityEstimator::learn(const RadarScan& scan, const EgoVelocity& estim
 }
 
 bool hasMajority(const EgoVelocity& velocity) {
-  return isValid(velocity.status) &&
-         static_cast<double>(velocity.inliers.size()) >= kMajority * static_cast<double>(velocity.points_used);
+  return isValid(velocity.status) && static_cast<double>(velocity.inliers.size()) >=
+                                         kMajority * static_cast<double>(velocity.points_used);
 }
 
 bool isUnanimous(const EgoVelocity& velocity) {
-  return static_cast<double>(velocity.inliers.size()) > kUnanimous * static_cast<double>(velocity.points_used);
+  return static_cast<double>(velocity.inliers.size()) >
+         kUnanimous * static_cast<double>(velocity.points_used);
 }
 
 bool isValid(EgoVelocityStatus status) {

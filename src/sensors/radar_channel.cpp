@@ -17,11 +17,14 @@ std::size_t countOthers(const std::vector<std::size_t>& some, const std::vector<
   }));
 }
 
-VelocityPrior zeroVelocity(double sigma) { return {Eigen::Vector3d::Zero(), sigma * sigma * Eigen::Matrix3d::Identity()}; }
+VelocityPrior zeroVelocity(double sigma) {
+  return {Eigen::Vector3d::Zero(), sigma * sigma * Eigen::Matrix3d::Identity()};
+}
 
 }  // namespace
 
-RadarChannel::RadarChannel(const RadarChannelOptions& options, const Eigen::Vector3d& g_W, const ImuBuffer& imu)
+RadarChannel::RadarChannel(const RadarChannelOptions& options, const Eigen::Vector3d& g_W,
+                           const ImuBuffer& imu)
     : options_(options),
       estimator_(options.ego_velocity),
       in_window_(options.smoother, options.T_IR, g_W, imu),
@@ -68,7 +71,8 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   const bool can_be_judged = moving && tilt_is_known && hasMajority(measured);
   std::optional<Innovation> now;
   if (prior) now = innovation(scan.stamp, *prior, measured, prediction);
-  if (can_be_judged && informs_offset && options_.smoother.estimate_time_offset && step_detector_.stepped(*now)) {
+  if (can_be_judged && informs_offset && options_.smoother.estimate_time_offset &&
+      step_detector_.stepped(*now)) {
     in_window_.stepOffset(smoother, scan.stamp);
     offset_uncertainty_.offsetStepped();
     answer.offset_stepped = true;
@@ -109,7 +113,8 @@ Innovation RadarChannel::innovation(Time stamp, const VelocityPrior& prior, cons
 void RadarChannel::judge(const RadarScan& scan, const VelocityPrior& prior, double scale,
                          RadarAnswer& answer) const {
   const EgoVelocity& measured = answer.ego_velocity;
-  // Where few points agree, they may be those that side with a wrong prediction. The scan is asked again without it.
+  // Where few points agree, they may be those that side with a wrong prediction. The scan is asked again
+  // without it.
   const EgoVelocity alone = hasMajority(measured) ? measured : measure(scan, std::nullopt, scale);
   if (!hasMajority(alone)) return;
   // A crowd may outnumber the static world. What then sides with the prediction alone is its witness: noise

@@ -9,8 +9,8 @@
 
 namespace rio_t {
 
-RadarInWindow::RadarInWindow(const SmootherOptions& options, const Extrinsics& T_IR, const Eigen::Vector3d& g_W,
-                             const ImuBuffer& imu)
+RadarInWindow::RadarInWindow(const SmootherOptions& options, const Extrinsics& T_IR,
+                             const Eigen::Vector3d& g_W, const ImuBuffer& imu)
     : options_(options),
       T_IR_(T_IR),
       model_{options.time_offset_model, options.max_time_offset, g_W, &imu},
@@ -35,7 +35,8 @@ Time RadarInWindow::nodeTime(Time stamp) const {
   return options_.time_offset_model == TimeOffsetModel::kImu ? stamp - offset() : stamp;
 }
 
-std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoother& smoother, Time stamp) const {
+std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoother& smoother,
+                                                              Time stamp) const {
   const Time time = nodeTime(stamp);
   const std::optional<PredictedState> state = smoother.predict(time, {&offsetBlock()});
   if (!state) return std::nullopt;
@@ -57,8 +58,8 @@ std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoo
   const auto J_state = J.leftCols<kOffset>();
   prediction.covariance_at_offset = J_state * P.topLeftCorner<kOffset, kOffset>() * J_state.transpose();
   const Eigen::Quaterniond q_IW = state->x.q_WI().conjugate();
-  const VelocityRate rate = velocityRate(mean, state->x.b_g(), state->x.b_a(), q_IW * state->x.v_W(),
-                                         q_IW * model_.g_W, T_IR_.l_I);
+  const VelocityRate rate =
+      velocityRate(mean, state->x.b_g(), state->x.b_a(), q_IW * state->x.v_W(), q_IW * model_.g_W, T_IR_.l_I);
   prediction.informs_offset = rate.informsOffset(options_.time_offset_min_acceleration);
   if (options_.estimate_time_offset) prediction.rate_variance = rate.variance * P(kOffset, kOffset);
   const Eigen::Matrix<double, 2, 3> horizontal = state->x.q_WI().toRotationMatrix().topRows<2>();

@@ -26,7 +26,8 @@ std::vector<NodeMatrix> nodeCovariances(const Elimination& elimination) {
   std::vector<NodeMatrix> result;
   for (int i = 0; i < static_cast<int>(P.size()); i += 2) {
     const auto found = P[i].find(i + 1);  // none where the offset is known
-    const Eigen::MatrixXd cross = found == P[i].end() ? Eigen::MatrixXd(NodeVector::Zero().head<15>()) : found->second;
+    const Eigen::MatrixXd cross =
+        found == P[i].end() ? Eigen::MatrixXd(NodeVector::Zero().head<15>()) : found->second;
     NodeMatrix covariance;
     covariance << P[i].at(i), cross, cross.transpose(), P[i + 1].at(i + 1);
     result.push_back(covariance);
@@ -46,7 +47,13 @@ std::size_t nearestNode(const std::vector<BatchNode>& nodes, Time time) {
 
 BatchSmoother::BatchSmoother(const SmootherOptions& options, const BatchOptions& batch, const ImuNoise& noise,
                              const Eigen::Vector3d& g_W, const ImuBuffer& imu)
-    : options_(options), batch_(batch), noise_(noise), g_W_(g_W), imu_(&imu), state_manifold_(std::make_shared<StateManifold>()), offset_manifold_(std::make_shared<ScalarManifold>()) {}
+    : options_(options),
+      batch_(batch),
+      noise_(noise),
+      g_W_(g_W),
+      imu_(&imu),
+      state_manifold_(std::make_shared<StateManifold>()),
+      offset_manifold_(std::make_shared<ScalarManifold>()) {}
 
 BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std::vector<double>& t_O,
                                           const std::vector<BatchNode>& guess) const {
@@ -126,7 +133,8 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
   Graph graph = place(problem, t_O, problem.guess);
   solution.placements = 1;
   for (;;) {
-    Solution solved = rio_t::solve(graph.window, {batch_.max_iterations - solution.iterations, kConverged}, options_.solver);
+    Solution solved = rio_t::solve(graph.window, {batch_.max_iterations - solution.iterations, kConverged},
+                                   options_.solver);
     solution.iterations += solved.iterations;
     solution.nodes.clear();
     for (const Node& node : graph.nodes) solution.nodes.push_back(node.estimate());
@@ -136,7 +144,8 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
     const bool placed = !atMeasurement() || moved <= batch_.placement_tolerance;
     const bool is_last = placed || solution.iterations >= batch_.max_iterations;
     if (is_last) {
-      solution.termination = placed || !solved.converged() ? solved.termination : SolverTermination::kIterationLimit;
+      solution.termination =
+          placed || !solved.converged() ? solved.termination : SolverTermination::kIterationLimit;
       solution.covariances = nodeCovariances(solved.elimination);
       solution.normal_equations = std::move(solved.normal_equations);
       break;
@@ -167,8 +176,9 @@ BatchSmoother::Residual BatchSmoother::residual(const BatchNode& node, const Nod
   if (!options_.estimate_time_offset) J.rightCols<1>().setZero();
   result.prediction_covariance = J * covariance * J.transpose();
   const Time tau = z.stamp - node.t_O;
-  result.informs_offset = velocityRate(*imu_, tau, carried(node.x, node.time, tau, *imu_, g_W_), g_W_, z.T_IR.l_I)
-                              .informsOffset(options_.time_offset_min_acceleration);
+  result.informs_offset =
+      velocityRate(*imu_, tau, carried(node.x, node.time, tau, *imu_, g_W_), g_W_, z.T_IR.l_I)
+          .informsOffset(options_.time_offset_min_acceleration);
   return result;
 }
 

@@ -88,7 +88,8 @@ Block* FixedLagSmoother::nodeAt(Time time) {
   if (time - nodes_[before].time() <= spacing) return nodes_[before].block;
   if (after < nodes_.size() && nodes_[after].time() - time <= spacing) return nodes_[after].block;
 
-  const StateBlock x = rio_t::predict(toStateBlock(nodes_[before].block->x), preintegrateFrom(nodes_[before], time), g_W_);
+  const StateBlock x =
+      rio_t::predict(toStateBlock(nodes_[before].block->x), preintegrateFrom(nodes_[before], time), g_W_);
   Block& block = window_.addNode(time, manifold_, stored(x));
   nodes_.insert(nodes_.begin() + static_cast<std::ptrdiff_t>(after), Node{&block});
   linkToPrevious(after);
@@ -128,11 +129,13 @@ std::vector<const Block*> FixedLagSmoother::leavingWith(const Block& node) const
   std::vector<const Block*> leaving = {&node};
   for (const auto& block : window_.blocks()) {
     if (!block->is_retired) continue;
-    const bool is_linked_to_others = std::any_of(window_.terms().begin(), window_.terms().end(), [&](const auto& term) {
-      const auto& blocks = term->blocks;
-      return std::find(blocks.begin(), blocks.end(), block.get()) != blocks.end() &&
-             std::any_of(blocks.begin(), blocks.end(), [&](const Block* b) { return b->time && b != &node; });
-    });
+    const bool is_linked_to_others =
+        std::any_of(window_.terms().begin(), window_.terms().end(), [&](const auto& term) {
+          const auto& blocks = term->blocks;
+          return std::find(blocks.begin(), blocks.end(), block.get()) != blocks.end() &&
+                 std::any_of(blocks.begin(), blocks.end(),
+                             [&](const Block* b) { return b->time && b != &node; });
+        });
     if (!is_linked_to_others) leaving.push_back(block.get());
   }
   return leaving;

@@ -18,16 +18,16 @@ enum class TimeOffsetModel {
 /// Everything that a radar sees of its motion is a projection of this: a velocity, or the Doppler of a point.
 struct RadarMotion {
   Eigen::Vector3d v_I = Eigen::Vector3d::Zero();  ///< velocity of the radar's origin, in I at that time [m/s]
-  StateJacobian<3> J_state = StateJacobian<3>::Zero();   ///< of v_I
-  Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();     ///< of v_I [m/s^2]
-  Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();     ///< angular velocity of I, in I [rad/s]
+  StateJacobian<3> J_state = StateJacobian<3>::Zero();  ///< of v_I
+  Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();    ///< of v_I [m/s^2]
+  Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();    ///< angular velocity of I, in I [rad/s]
 };
 
 /// Carries the motion from a state to the time of measurement, tau = stamp - t_O (docs/method.md, section 5).
 struct RadarMotionModel {
   TimeOffsetModel kind = TimeOffsetModel::kImu;
-  double max_time_offset = 0.25;                    ///< [s] beyond it, t_O changes nothing
-  Eigen::Vector3d g_W = Eigen::Vector3d::Zero();    ///< gravity in W [m/s^2]
+  double max_time_offset = 0.25;                  ///< [s] beyond it, t_O changes nothing
+  Eigen::Vector3d g_W = Eigen::Vector3d::Zero();  ///< gravity in W [m/s^2]
   /// Must outlive the model and keep the samples between the state and stamp -+ max_time_offset.
   const ImuBuffer* imu = nullptr;
 

@@ -19,8 +19,8 @@ struct NormalEquations {
   std::vector<const Block*> blocks;
   std::vector<RowMatrix> diagonal;                 ///< H_ii
   std::vector<std::map<int, RowMatrix>> coupling;  ///< H_ij, j > i; absent if zero
-  std::vector<Eigen::VectorXd> gradient;                 ///< b_i = sum J'r
-  double cost = 0.0;                                     ///< half the sum of squares, after the loss
+  std::vector<Eigen::VectorXd> gradient;           ///< b_i = sum J'r
+  double cost = 0.0;                               ///< half the sum of squares, after the loss
 
   /// Without any information.
   explicit NormalEquations(std::vector<const Block*> blocks = {});
@@ -34,8 +34,8 @@ struct NormalEquations {
 NormalEquations linearize(std::vector<const Block*> blocks, const std::vector<const Term*>& terms);
 NormalEquations linearize(const Window& window);
 
-/// Block Cholesky factor H = L L' in the order of the blocks: L_ii and W_ij = L_ii^-1 H_ij after the blocks before i are
-/// eliminated.
+/// Block Cholesky factor H = L L' in the order of the blocks: L_ii and W_ij = L_ii^-1 H_ij after the blocks
+/// before i are eliminated.
 class Elimination {
  public:
   /// None if H is not positive definite. If only rounding made H indefinite, the smallest sufficient share is

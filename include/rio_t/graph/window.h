@@ -24,18 +24,18 @@ struct Block {
   Block(std::optional<Time> time_in, std::shared_ptr<const Manifold> manifold_in, const Eigen::VectorXd& x_in)
       : time(time_in),
         manifold(std::move(manifold_in)),
-        storage(std::make_unique<double[]>(static_cast<std::size_t>(x_in.size()))),
-        x(storage.get(), x_in.size()) {
-    x = x_in;
-  }
+        storage(x_in.data(), x_in.data() + x_in.size()),
+        x(storage.data(), x_in.size()) {}
+  Block(const Block&) = delete;
+  Block& operator=(const Block&) = delete;
 
   std::optional<Time> time;  ///< of a node; none for calibration, which holds at all times
   std::shared_ptr<const Manifold> manifold;
-  const std::unique_ptr<double[]> storage;
-  Eigen::Map<Eigen::VectorXd> x;  ///< as stored; its address stays
+  std::vector<double> storage;
+  Eigen::Map<Eigen::VectorXd> x;                           ///< as stored; its address stays
   double bound = std::numeric_limits<double>::infinity();  ///< on |x| of a block of one number
-  bool is_constant = false;  ///< not solved for; set by Window::setConstant
-  bool is_retired = false;   ///< calibration that no new term will use
+  bool is_constant = false;                                ///< not solved for; set by Window::setConstant
+  bool is_retired = false;                                 ///< calibration that no new term will use
 };
 
 /// A cost on some blocks.
@@ -72,7 +72,8 @@ class Window {
   ceres::Problem& problem() { return *problem_; }
 
  private:
-  std::shared_ptr<Block> insert(std::vector<std::shared_ptr<Block>>::iterator before, std::shared_ptr<Block> added);
+  std::shared_ptr<Block> insert(std::vector<std::shared_ptr<Block>>::iterator before,
+                                std::shared_ptr<Block> added);
 
   // Destroyed last: the problem refers to them.
   std::map<const Manifold*, std::unique_ptr<CeresManifold>> ceres_manifolds_;

@@ -3,21 +3,21 @@
 #include <array>
 #include <vector>
 
+#include "rio_t/imu/clock_jump_detector.h"
 #include "rio_t/imu/gap_bridge.h"
 #include "rio_t/imu/measurement.h"
 #include "rio_t/imu/noise.h"
 #include "rio_t/imu/noise_meter.h"
 #include "rio_t/imu/saturation_detector.h"
-#include "rio_t/imu/clock_jump_detector.h"
 #include "rio_t/imu/stuck_axis_detector.h"
 
 namespace rio_t {
 
 struct ImuInputCheckOptions {
   double max_bridged_gap = 3.0;  ///< [s] the estimate starts again after a longer gap
-  double jump_patience = 0.5;  ///< [s] of stamps at another time, after which the clock has jumped
-  double accel_range = 0.0;    ///< [m/s^2] largest reading of an axis; 0: found from flat tops
-  double gyro_range = 0.0;     ///< [rad/s] likewise
+  double jump_patience = 0.5;    ///< [s] of stamps at another time, after which the clock has jumped
+  double accel_range = 0.0;      ///< [m/s^2] largest reading of an axis; 0: found from flat tops
+  double gyro_range = 0.0;       ///< [rad/s] likewise
   /// Motion that the IMU does not see, in gaps and beyond its range, as white noise of the size of human and
   /// drone motion.
   double unseen_accel_density = 2.0;  ///< [m/s^2/sqrt(Hz)]

@@ -58,8 +58,8 @@ class BatchOdometry {
   bool accepts(const BatchSmoother& smoother, const BatchSolution& solution, const EgoVelocity& measured,
                RadarVelocityMeasurement& z) const;
   /// Whether `z` tells the offset.
-  bool informsOffset(const BatchSmoother& smoother, const BatchNode& node,
-                     const RadarVelocityMeasurement& z, const EgoVelocity& measured) const;
+  bool informsOffset(const BatchSmoother& smoother, const BatchNode& node, const RadarVelocityMeasurement& z,
+                     const EgoVelocity& measured) const;
   bool isAtRest(const BatchNode& node) const;
   NavigationState stateOf(const BatchNode& node, const NodeMatrix& covariance) const;
   std::vector<NavigationState> trajectory(const BatchSolution& solution) const;

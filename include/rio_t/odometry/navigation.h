@@ -28,7 +28,8 @@ class Navigation {
 
   /// Takes the newest optimised state, and the noise of the IMU for the samples to come. Ignores both if the
   /// clock restarted since `clock_restarts`, because they belong to another time.
-  void anchor(const NavigationState& state, bool at_rest, const ImuNoise& noise, std::uint64_t clock_restarts);
+  void anchor(const NavigationState& state, bool at_rest, const ImuNoise& noise,
+              std::uint64_t clock_restarts);
 
   std::optional<NavigationState> state() const;  ///< at the newest sample
   MeasuredImuNoise imuNoise() const;             ///< over the last second

@@ -36,8 +36,7 @@ struct EgoVelocityOptions {
   double ransac_inlier_threshold = 0.15;  ///< [m/s] Doppler residual
   double ransac_outlier_probability = 0.4;
   double ransac_success_probability = 0.9999;
-  double prior_gate =
-      4.0;  ///< [sigma] a velocity farther than this from the prior contradicts it
+  double prior_gate = 4.0;        ///< [sigma] a velocity farther than this from the prior contradicts it
   std::uint32_t ransac_seed = 1;  ///< restarted at each scan: same scan, same answer
 
   std::size_t min_inliers = 5;              ///< one velocity has three unknowns; the rest are witnesses

@@ -11,10 +11,10 @@ namespace rio_t {
 /// this one value.
 struct Innovation {
   Time stamp;
-  Eigen::Vector3d d = Eigen::Vector3d::Zero();             ///< measured minus predicted velocity, in R [m/s]
-  Eigen::Matrix3d S = Eigen::Matrix3d::Identity();         ///< covariance of d [m^2/s^2]
+  Eigen::Vector3d d = Eigen::Vector3d::Zero();      ///< measured minus predicted velocity, in R [m/s]
+  Eigen::Matrix3d S = Eigen::Matrix3d::Identity();  ///< covariance of d [m^2/s^2]
   Eigen::Matrix3d S_at_offset = Eigen::Matrix3d::Identity();  ///< the same if the offset were known
-  Eigen::Vector3d J_O = Eigen::Vector3d::Zero();           ///< change of the velocity with t_O [m/s^2]
+  Eigen::Vector3d J_O = Eigen::Vector3d::Zero();              ///< change of the velocity with t_O [m/s^2]
 
   double squaredSigmas() const { return d.dot(S.ldlt().solve(d)); }
   /// The same with `sigma` [m/s] added on each axis of S.

@@ -17,7 +17,7 @@ namespace rio_t {
 
 /// Predicted velocity of a scan.
 struct RadarVelocityPrediction {
-  VelocityPrior velocity;  ///< with all uncertainties
+  VelocityPrior velocity;                                          ///< with all uncertainties
   Eigen::Matrix3d covariance_at_offset = Eigen::Matrix3d::Zero();  ///< if the offset were known [m^2/s^2]
   Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();               ///< of v_R with respect to t_O [m/s^2]
   double t_O = 0.0;                                                ///< of the prediction [s]

@@ -296,9 +296,9 @@ void listSmoother(ParameterList& list, Config& c) {
               "length; what leaves it is marginalised into a prior");
   list.number("huber_threshold", "", atLeast(0), smoother.huber_threshold,
               "on the norm of the whitened radar residual; 0: no robust loss");
-  list.choice<WindowSolver>("solver", {{"chain", WindowSolver::kChain}, {"ceres", WindowSolver::kCeres}},
-                            smoother.solver,
-                            "chain: Gauss-Newton along the chain of states; ceres: ceres::Solve, the same estimate, slower");
+  list.choice<WindowSolver>(
+      "solver", {{"chain", WindowSolver::kChain}, {"ceres", WindowSolver::kCeres}}, smoother.solver,
+      "chain: Gauss-Newton along the chain of states; ceres: ceres::Solve, the same estimate, slower");
   list.integer("max_iterations", between(1, 1000), smoother.max_iterations, "of the solver, each scan");
   list.number("innovation_gate", "", atLeast(0), smoother.innovation_gate,
               "standard deviations from the IMU's prediction; farther, a scan is rejected; 0: no gate");
