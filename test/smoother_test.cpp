@@ -211,6 +211,35 @@ TEST_F(Smoother, AStepOfTheOffsetSurvivesANodeThatIsInsertedBeforeIt) {
   EXPECT_LT(std::sqrt(P(StateBlock::kTangent, StateBlock::kTangent)), 0.5 * options.time_offset_sigma);
 }
 
+TEST_F(Smoother, TwoStepsOfTheOffsetWithinAWindowKeepTheirOwn) {
+  SmootherOptions options;
+  options.window = 2.0;
+  RadarSmoother smoother = make(options);
+  const auto use = [&](double from, double to, double t_O) {
+    for (double stamp = from; stamp < to; stamp += 0.1) {
+      EXPECT_EQ(smoother.add(measurement(stamp, t_O)), RadarInWindow::AddResult::kAdded) << stamp;
+      smoother.optimize();
+      smoother.marginalize();
+    }
+  };
+  use(0.7, 1.65, 0.0);
+  smoother.stepOffset(motion.time(1.7));
+  use(1.7, 2.05, 0.06);
+  smoother.stepOffset(motion.time(2.1));
+  use(2.1, 2.65, -0.03);
+  EXPECT_NEAR(smoother.t_O(), -0.03, 5e-3);
+  // A late scan from between the steps has the offset of its time.
+  use(1.95, 1.96, 0.06);
+  EXPECT_NEAR(smoother.t_O(), -0.03, 5e-3);
+  // The old offsets leave with their last nodes.
+  use(2.7, 4.0, -0.03);
+  use(4.0, 4.05, -0.03);
+  EXPECT_NEAR(smoother.t_O(), -0.03, 1e-3);
+  std::size_t calibration = 0;
+  for (const auto& block : smoother.states.window().blocks()) calibration += block->time ? 0 : 1;
+  EXPECT_EQ(calibration, 1u);
+}
+
 TEST(PriorAtRest, TiltAndBiasAreKnownTogether) {
   const SmootherOptions options;
   StateBlock x;

@@ -30,4 +30,9 @@ bool RadarVelocityFactor::Evaluate(double const* const* parameters, double* resi
   return true;
 }
 
+std::shared_ptr<ceres::LossFunction> huberLoss(double threshold) {
+  if (threshold == 0.0) return nullptr;
+  return std::make_shared<ceres::HuberLoss>(threshold);
+}
+
 }  // namespace rio_t

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -135,17 +136,20 @@ Solution solveByChain(Window& window, const SolverLimits& limits) {
       for (const int i : held) reduced.hold(i);
       elimination = Elimination::of(reduced, damping);
     }
-    const bool is_short = elimination && elimination->squaredLength() < limits.short_step;
-    if (is_short && damping == 0.0 && !take(elimination->delta(), 1.0, window)) {
-      solution.termination = held.empty() ? SolverTermination::kConverged : SolverTermination::kAtBound;
-      break;
-    }
-    if (solution.iterations >= limits.max_iterations) break;
-    if (elimination && damping == 0.0 && elimination->squaredLength() < kSurelyRight) {
-      take(elimination->delta(), 1.0, window);
+    const double squared_length =
+        elimination ? elimination->squaredLength() : std::numeric_limits<double>::infinity();
+    const bool is_short = squared_length < limits.short_step;
+    if (damping == 0.0 && (is_short || squared_length < kSurelyRight)) {
+      const bool stopped_at_bound = take(elimination->delta(), 1.0, window);
+      if (is_short && !stopped_at_bound) {
+        solution.termination = held.empty() ? SolverTermination::kConverged : SolverTermination::kAtBound;
+        break;
+      }
+      if (solution.iterations >= limits.max_iterations) break;
       system = linearize(window);
       continue;
     }
+    if (solution.iterations >= limits.max_iterations) break;
     if (damping == 0.0) tested = true;
     if (is_short && damping > 0.0 && !tested) {
       damping = 0.0;  // short by the damping, or because little is left to go

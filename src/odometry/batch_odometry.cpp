@@ -1,6 +1,5 @@
 #include "rio_t/odometry/batch_odometry.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -9,6 +8,7 @@
 #include "rio_t/imu/preintegration.h"
 #include "rio_t/imu/rest_detector.h"
 #include "rio_t/odometry/imu_propagator.h"
+#include "rio_t/sensors/innovation.h"
 
 namespace rio_t {
 namespace {
@@ -149,12 +149,12 @@ bool BatchOdometry::accepts(const BatchSmoother& smoother, const BatchSolution& 
   const std::size_t k = nearestNode(solution.nodes, at_stamp ? z.stamp : z.stamp - t_O);
   const BatchNode& node = solution.nodes[k];
   const auto residual = smoother.residual(node, solution.covariances[k], z);
-  const double model_error = options_.smoother.innovation_model_error;
   const double gate = options_.smoother.innovation_gate;
-  const Eigen::Matrix3d S =
-      residual.prediction_covariance + z.covariance + model_error * model_error * Eigen::Matrix3d::Identity();
+  Innovation innovation;
+  innovation.d = residual.value;
+  innovation.S = residual.prediction_covariance + z.covariance;
   if (!informsOffset(smoother, node, z, measured)) z.held_t_O = node.t_O;
-  return residual.value.dot(S.ldlt().solve(residual.value)) <= gate * gate;
+  return innovation.widened(options_.smoother.innovation_model_error).squaredSigmas() <= gate * gate;
 }
 
 bool BatchOdometry::informsOffset(const BatchSmoother& smoother, const BatchNode& node,

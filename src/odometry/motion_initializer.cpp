@@ -213,8 +213,7 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
       window.addCalibration(std::make_shared<ScalarManifold>(), Eigen::VectorXd::Constant(1, prior.t_O0));
   offset->bound = smoother_.max_time_offset;
   addPrior(window, {&state, offset.get()}, {prior.J, prior.r0});
-  std::shared_ptr<ceres::LossFunction> loss;
-  if (smoother_.huber_threshold > 0.0) loss = std::make_shared<ceres::HuberLoss>(smoother_.huber_threshold);
+  const std::shared_ptr<ceres::LossFunction> loss = huberLoss(smoother_.huber_threshold);
   const RadarMotionModel model{TimeOffsetModel::kImu, smoother_.max_time_offset, g_W_, &imu};
 
   // Which scans tell the offset depends on the state, and the state on them.

@@ -14,9 +14,8 @@ RadarInWindow::RadarInWindow(const SmootherOptions& options, const Extrinsics& T
     : options_(options),
       T_IR_(T_IR),
       model_{options.time_offset_model, options.max_time_offset, g_W, &imu},
-      manifold_(std::make_shared<ScalarManifold>()) {
-  if (options.huber_threshold > 0.0) loss_ = std::make_shared<ceres::HuberLoss>(options.huber_threshold);
-}
+      loss_(huberLoss(options.huber_threshold)),
+      manifold_(std::make_shared<ScalarManifold>()) {}
 
 Block& RadarInWindow::start(Window& window, double t_O) {
   stamps_.clear();

@@ -72,8 +72,7 @@ BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std
     return carried(near.x, near.time, time, *imu_, g_W_);
   };
 
-  std::shared_ptr<ceres::LossFunction> loss;
-  if (options_.huber_threshold > 0.0) loss = std::make_shared<ceres::HuberLoss>(options_.huber_threshold);
+  const std::shared_ptr<ceres::LossFunction> loss = huberLoss(options_.huber_threshold);
   Graph graph;
   graph.node_of_scan.resize(scans);
   Window& window = graph.window;

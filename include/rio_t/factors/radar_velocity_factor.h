@@ -1,8 +1,10 @@
 #pragma once
 
+#include <ceres/loss_function.h>
 #include <ceres/sized_cost_function.h>
 
 #include <Eigen/Core>
+#include <memory>
 #include <optional>
 
 #include "rio_t/core/time.h"
@@ -42,5 +44,8 @@ class RadarVelocityFactor final : public ceres::SizedCostFunction<3, StateBlock:
   };
   mutable std::optional<Mean> mean_;  ///< of the last evaluation: a cache, not for two threads
 };
+
+/// Huber's loss on the norm of the whitened residual; null, which is no loss, for a threshold of 0.
+std::shared_ptr<ceres::LossFunction> huberLoss(double threshold);
 
 }  // namespace rio_t

@@ -27,6 +27,8 @@ class Estimator {
  public:
   /// `navigation` and `faults` must outlive the estimator.
   Estimator(const OdometryOptions& options, Navigation& navigation, FaultCounters& faults);
+  Estimator(const Estimator&) = delete;  // its parts refer to its IMU buffer
+  Estimator& operator=(const Estimator&) = delete;
 
   /// Samples that Navigation checked, in time order.
   void addImu(const std::vector<ImuMeasurement>& samples);

@@ -32,7 +32,7 @@ class Initializer {
   /// Velocity of a scan before there is a state.
   void addVelocity(Time stamp, const EgoVelocity& velocity) { motion_.add(stamp, velocity); }
 
-  /// What the start is waiting for, as text for people.
+  /// Tells people what the start is waiting for.
   std::string waitingFor() const;
   double imuHistory() const { return motion_.imuHistory(); }  ///< [s]
 

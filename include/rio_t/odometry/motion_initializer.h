@@ -67,7 +67,7 @@ class MotionInitializer {
   /// [m/s]. False without scans.
   bool isMoving(Time from, Time to, double max_speed) const;
 
-  /// What the start is waiting for, as text for people.
+  /// Tells people what the start is waiting for.
   const std::string& waitingFor() const { return waiting_for_; }
   /// How far back the IMU must reach for solve() [s].
   double imuHistory() const;

@@ -17,7 +17,7 @@ class Navigation {
  public:
   Navigation(const OdometryOptions& options, const Eigen::Vector3d& g_W);
 
-  /// What became of a sample.
+  /// The result of one sample.
   struct Checked {
     std::vector<ImuMeasurement> samples;   ///< bridge over a gap, then the sample; empty if it was dropped
     std::vector<const char*> faults;       ///< names for FaultCounters

@@ -49,7 +49,7 @@ class RadarInertialOdometry {
   /// Whether the estimate can be trusted, as of the last `process`. Any thread. `faults()` counts each
   /// divergence as "diverged" and each re-initialisation as "reinitialized".
   Health health() const;
-  /// Where the graph begins, and its prior; none before initialisation. Call it from the thread that calls
+  /// The time and the prior of the first node; none before initialisation. Call it from the thread that calls
   /// `process`.
   using Start = Initialization;
   std::optional<Start> start() const;

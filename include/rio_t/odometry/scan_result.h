@@ -12,7 +12,7 @@
 
 namespace rio_t {
 
-/// What became of one scan.
+/// The result of one scan.
 struct ScanResult {
   RadarScan scan;  ///< as fed
   EgoVelocity ego_velocity;

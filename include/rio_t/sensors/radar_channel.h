@@ -30,7 +30,7 @@ struct ScanContext {
   double model_error_scale = 1.0;  ///< see ModelErrorScale
 };
 
-/// What became of a scan, as the channel answers it. All else that reports a scan reads this value.
+/// The channel's answer to a scan. All else that reports a scan reads this value.
 struct RadarAnswer {
   EgoVelocity ego_velocity;
   std::string rejected_because;  ///< snake case, empty if the scan was used
