@@ -66,7 +66,7 @@ void MotionInitializer::add(Time stamp, const EgoVelocity& velocity) {
                                       [](const Velocity& z, Time t) { return z.stamp < t; });
   if (after != velocities_.end() && after->stamp == stamp) return;
   velocities_.insert(after,
-                     Velocity{{stamp, velocity.v_R, velocity.covariance, T_IR_}, velocity.told_variance});
+                     Velocity{{{stamp, T_IR_}, velocity.v_R, velocity.covariance}, velocity.told_variance});
   if (velocities_.size() > kMaxVelocities) velocities_.erase(velocities_.begin());
 }
 

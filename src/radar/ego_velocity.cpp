@@ -24,6 +24,7 @@ constexpr double kMaxSharpSigma = 0.1;
 /// Log-likelihood ratio of a point that a velocity explains to one that it does not: a Gaussian of 0.05 m/s
 /// against a uniform density over some m/s.
 constexpr double kEvidenceOfAPoint = 4.0;
+constexpr double kAgrees = 3.0;  // [sigma] of a point
 
 void require(bool holds, const char* option, const char* expected) {
   if (!holds) throw std::invalid_argument(std::string("ego velocity: ") + option + " must be " + expected);
@@ -321,6 +322,35 @@ EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
                                                                   : EgoVelocityStatus::kMoving;
   }
   return result;
+}
+
+EgoVelocity EgoVelocityEstimator::around(const RadarScan& scan, const VelocityPrior& prior) const {
+  EgoVelocity result;
+  result.status = EgoVelocityStatus::kTooFewInliers;
+  for (const RadarDirection& p : filter(scan, options_)) {
+    const double variance =
+        residualVariance(Angles(p.u_R), prior.v_R, noise()) + p.u_R.dot(prior.covariance * p.u_R);
+    ++result.points_used;
+    if (square(p.doppler + p.u_R.dot(prior.v_R)) <= square(kAgrees) * variance)
+      result.inliers.push_back(p.index);
+  }
+  const double share = options_.min_inlier_fraction * static_cast<double>(result.points_used);
+  if (!result.inliers.empty() && static_cast<double>(result.inliers.size()) >= share)
+    result.status = EgoVelocityStatus::kMoving;
+  result.v_R = prior.v_R;
+  result.told_variance = options_.added_sigma.cwiseAbs2();
+  return result;
+}
+
+DopplerLikelihood EgoVelocityEstimator::likelihood(const RadarScan& scan,
+                                                   const std::vector<std::size_t>& points,
+                                                   const Eigen::Vector3d& v_R) const {
+  std::vector<RadarDirection> directions;
+  for (const std::size_t i : points) {
+    const RadarPoint& p = scan.points[i];
+    directions.push_back({p.position_R.normalized(), p.doppler, i});
+  }
+  return DopplerLikelihood(directions, v_R, noise());
 }
 
 void EgoVelocityEstimator::learn(const RadarScan& scan, const EgoVelocity& estimated) {

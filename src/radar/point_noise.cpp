@@ -79,7 +79,7 @@ void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vec
     const double residual = p.doppler + p.u_R.dot(v_R);
     const Eigen::Vector3d shares = noiseShares(correctedDirection(p.u_R, residual, v_R, noise), v_R, noise);
     // A squared residual has twice its squared variance.
-    const double probability = inlierProbability(residual, variance(shares), outlier_density_);
+    const double probability = inlierProbability(residual, variance(shares), noise.outlier_density);
     const double weight = 0.5 * probability / square(variance(shares));
     mean_shares += shares / static_cast<double>(points.size());
     if (std::abs(residual) < kOutlierSpan)
@@ -87,8 +87,9 @@ void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vec
     information_ += weight * shares * shares.transpose();
     information_vector_ += weight * (square(residual) + fitted - noise.quantization) * shares;
   }
-  outlier_density_ += forgotten * (outlier_density - outlier_density_);
-  outlier_density_ = std::clamp(outlier_density_, kMinOutlierDensity, kMaxOutlierDensity);
+  double& believed_density = variances_.outlier_density;
+  believed_density += forgotten * (outlier_density - believed_density);
+  believed_density = std::clamp(believed_density, kMinOutlierDensity, kMaxOutlierDensity);
   mean_shares_ += forgotten * (mean_shares - mean_shares_);
   const double believed = variance(mean_shares_);
   solve();

@@ -1,5 +1,6 @@
 #include "rio_t/sensors/radar_channel.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -9,6 +10,8 @@ namespace {
 /// Where roll and pitch are known no better [rad], the prediction is not linear in them, and its covariance
 /// too small to reject anything by.
 constexpr double kMaxTiltSigma = 0.1;
+/// [m/s] Sigma of a velocity that no point of a scan sees.
+constexpr double kUnseen = 100.0;
 
 /// How many of `some` are not in `others`; both ascend.
 std::size_t countOthers(const std::vector<std::size_t>& some, const std::vector<std::size_t>& others) {
@@ -52,20 +55,23 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   if (prediction) prior = prediction->velocity;
   if (context.at_rest) prior = zeroVelocity(options_.rest_velocity_sigma);
 
-  EgoVelocity& measured = answer.ego_velocity;
-  measured = measure(scan, context.has_diverged ? std::nullopt : prior, context.model_error_scale);
+  answer.ego_velocity =
+      measure(scan, context.has_diverged ? std::nullopt : prior, context.model_error_scale);
   answer.was_predicted = prior.has_value();
   if (prior) judge(scan, *prior, context.model_error_scale, answer);
-  if (!isValid(measured.status)) return reject(toString(measured.status));
-  if (!feasibility_.accept(scan.stamp, measured.v_R)) return reject("infeasible_velocity");
+  EgoVelocity measured = answer.ego_velocity;
+  const bool has_own = isValid(measured.status);
+  const bool tightly = options_.smoother.radar_factor == RadarFactor::kDoppler;
+  if (!has_own && tightly && prior && !context.has_diverged)
+    measured = around(*prior, scan, context.model_error_scale);
+  if (!isValid(measured.status)) return reject(toString(answer.ego_velocity.status));
+  if (has_own && !feasibility_.accept(scan.stamp, measured.v_R)) return reject("infeasible_velocity");
 
   const bool tilt_is_known = !prediction || prediction->tilt_sigma < kMaxTiltSigma;
   const bool moving = prediction && !context.at_rest && measured.status == EgoVelocityStatus::kMoving;
   const bool informs_offset = moving && prediction->informs_offset;
   // An offset that is wrong by c shows as (J + noise) c; nothing else tells of the noise's part.
   if (informs_offset) measured.covariance.diagonal().array() += prediction->rate_variance;
-  RadarVelocityMeasurement z{scan.stamp, measured.v_R, measured.covariance, options_.T_IR};
-  if (!informs_offset) z.held_t_O = offset();
 
   // A minority that sides with the prediction has more noise than its covariance says.
   const bool can_be_judged = moving && tilt_is_known && hasMajority(measured);
@@ -78,15 +84,26 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
     answer.offset_stepped = true;
   }
   if (now && gate_.rejects(*now, isUnanimous(measured), tilt_is_known)) return reject("innovation");
-  const RadarInWindow::AddResult added = in_window_.add(smoother, z);
+  RadarScanTime taken{scan.stamp, options_.T_IR};
+  if (!informs_offset) taken.held_t_O = offset();
+  RadarInWindow::AddResult added;
+  if (tightly && measured.status == EgoVelocityStatus::kMoving) {
+    answer.points = std::make_shared<DopplerLikelihood>(
+        estimator_.likelihood(scan, measured.inliers, measured.v_R));
+    DopplerMeasurement z{taken, answer.points, measured.told_variance, options_.smoother.huber_threshold};
+    if (informs_offset) z.shared_variances.array() += prediction->rate_variance;
+    added = in_window_.add(smoother, z);
+  } else {
+    added = in_window_.add(smoother, RadarVelocityMeasurement{taken, measured.v_R, measured.covariance});
+  }
   if (added != RadarInWindow::AddResult::kAdded) return reject(toString(added));
-  if (can_be_judged) {
-    if (informs_offset) offset_uncertainty_.add(*now);
+  if (can_be_judged && informs_offset) offset_uncertainty_.add(*now);
+  if (can_be_judged && has_own) {
     answer.used = now;
     answer.prediction_covariance = prior->covariance;
   }
   gate_.used(scan.stamp);
-  if (!context.at_rest) estimator_.learn(scan, measured);
+  if (!context.at_rest && has_own) estimator_.learn(scan, measured);
   return answer;
 }
 
@@ -96,6 +113,19 @@ EgoVelocity RadarChannel::measure(const RadarScan& scan, const std::optional<Vel
   measured.covariance.diagonal() += (scale - 1.0) * measured.told_variance;
   measured.told_variance *= scale;
   return measured;
+}
+
+EgoVelocity RadarChannel::around(const VelocityPrior& prior, const RadarScan& scan, double scale) const {
+  EgoVelocity result = estimator_.around(scan, prior);
+  if (!isValid(result.status)) return result;
+  result.told_variance *= scale;
+  const VelocityCost cost = withSharedError(
+      estimator_.likelihood(scan, result.inliers, prior.v_R).at(prior.v_R), result.told_variance);
+  Eigen::Matrix3d information = cost.information;
+  information.diagonal().array() += 1.0 / (kUnseen * kUnseen);
+  result.covariance = information.inverse();
+  result.v_R = prior.v_R - result.covariance * cost.gradient;
+  return result;
 }
 
 Innovation RadarChannel::innovation(Time stamp, const VelocityPrior& prior, const EgoVelocity& measured,

@@ -68,7 +68,9 @@ std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoo
   return prediction;
 }
 
-RadarInWindow::AddResult RadarInWindow::add(FixedLagSmoother& smoother, const RadarVelocityMeasurement& z) {
+template <class Factor, class Measurement>
+RadarInWindow::AddResult RadarInWindow::addTerm(FixedLagSmoother& smoother, const Measurement& z,
+                                                const std::shared_ptr<ceres::LossFunction>& loss) {
   const Time oldest = smoother.node(0).time - 2.0 * options_.max_time_offset;
   stamps_.erase(std::remove_if(stamps_.begin(), stamps_.end(), [&](Time stamp) { return stamp < oldest; }),
                 stamps_.end());
@@ -76,9 +78,17 @@ RadarInWindow::AddResult RadarInWindow::add(FixedLagSmoother& smoother, const Ra
   Block* node = smoother.nodeAt(nodeTime(z.stamp));
   if (node == nullptr) return AddResult::kOlderThanWindow;
   stamps_.push_back(z.stamp);
-  smoother.window().add(std::make_unique<RadarVelocityFactor>(z, *node->time, model_),
-                        {node, &offsetOf(smoother.window(), z.stamp)}, loss_);
+  smoother.window().add(std::make_unique<Factor>(z, *node->time, model_),
+                        {node, &offsetOf(smoother.window(), z.stamp)}, loss);
   return AddResult::kAdded;
+}
+
+RadarInWindow::AddResult RadarInWindow::add(FixedLagSmoother& smoother, const RadarVelocityMeasurement& z) {
+  return addTerm<RadarVelocityFactor>(smoother, z, loss_);
+}
+
+RadarInWindow::AddResult RadarInWindow::add(FixedLagSmoother& smoother, const DopplerMeasurement& z) {
+  return addTerm<DopplerFactor>(smoother, z, nullptr);  // its loss is in its rows
 }
 
 Block& RadarInWindow::offsetOf(Window& window, Time stamp) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "rio_t/radar/doppler_likelihood.h"
 #include "rio_t/radar/point_noise.h"
 #include "rio_t/radar/scan.h"
 
@@ -109,6 +110,14 @@ class EgoVelocityEstimator {
   /// counts like some points more. The velocity and its covariance come from the points alone, so fusing the
   /// result with the prior counts nothing twice.
   EgoVelocity estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior = std::nullopt) const;
+
+  /// For scans without a velocity of their own: the inliers are the points within three sigma of the prior.
+  /// Valid if they are `min_inlier_fraction` of the points; one is enough. v_R is that of the prior, and
+  /// there is no covariance.
+  EgoVelocity around(const RadarScan& scan, const VelocityPrior& prior) const;
+  /// What the Dopplers of some points say. They look static at about `v_R` [m/s].
+  DopplerLikelihood likelihood(const RadarScan& scan, const std::vector<std::size_t>& points,
+                               const Eigen::Vector3d& v_R) const;
 
   /// Learns the noise of the points from the result of `estimate` for this scan, for the scans to come. Only
   /// the errors-in-variables solver uses it. Call it once per scan, in motion, if the velocity was used.

@@ -14,6 +14,8 @@ struct PointVariances {
   double azimuth = 0.0;       ///< [rad^2]
   double elevation = 0.0;     ///< [rad^2]
   double quantization = 0.0;  ///< [m^2/s^2] of the Doppler: step^2 / 12
+  /// [s/m] Density of Dopplers that are not of the static world, per point.
+  double outlier_density = 0.01;
 };
 
 /// Learns the noise of the points from the Doppler residuals of scans in motion.
@@ -43,7 +45,6 @@ class PointNoise {
   Eigen::Matrix3d information_ = Eigen::Matrix3d::Zero();         // of the scans
   Eigen::Vector3d information_vector_ = Eigen::Vector3d::Zero();  // that times the variances
   Eigen::Vector3d mean_shares_ = Eigen::Vector3d::Zero();         // of the variances in that of a residual
-  double outlier_density_ = 0.01;  // [s/m] of residuals that are not of the static world, per point
   double scans_ = 0.0;
 };
 

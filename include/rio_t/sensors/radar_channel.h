@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -33,6 +34,7 @@ struct ScanContext {
 /// The channel's answer to a scan. All else that reports a scan reads this value.
 struct RadarAnswer {
   EgoVelocity ego_velocity;
+  std::shared_ptr<const DopplerLikelihood> points;  ///< what went into the window, if not the velocity
   std::string rejected_because;  ///< snake case, empty if the scan was used
   bool offset_stepped = false;   ///< t_O stepped before this scan
 
@@ -83,6 +85,9 @@ class RadarChannel {
 
  private:
   EgoVelocity measure(const RadarScan& scan, const std::optional<VelocityPrior>& prior, double scale) const;
+  /// The velocity that the points show around the prediction, for scans without one of their own. Directions
+  /// that they do not see have a large sigma.
+  EgoVelocity around(const VelocityPrior& prior, const RadarScan& scan, double scale) const;
   Innovation innovation(Time stamp, const VelocityPrior& prior, const EgoVelocity& measured,
                         const std::optional<RadarVelocityPrediction>& prediction) const;
   /// Sets what health and a re-initialisation get from the scan.

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "rio_t/factors/doppler_factor.h"
 #include "rio_t/factors/radar_velocity_factor.h"
 #include "rio_t/radar/ego_velocity.h"
 #include "rio_t/radar/extrinsics.h"
@@ -49,6 +50,7 @@ class RadarInWindow {
   /// Predicts from the newest node before the scan. None for a scan older than the window.
   std::optional<RadarVelocityPrediction> predict(const FixedLagSmoother& smoother, Time stamp) const;
   AddResult add(FixedLagSmoother& smoother, const RadarVelocityMeasurement& z);
+  AddResult add(FixedLagSmoother& smoother, const DopplerMeasurement& z);
   /// The offset stepped before the scan stamped `stamp`. That scan and later ones use a new block, which
   /// time_offset_sigma links to the old one.
   void stepOffset(FixedLagSmoother& smoother, Time stamp);
@@ -64,6 +66,9 @@ class RadarInWindow {
     std::shared_ptr<Block> block;
   };
   Block& offsetOf(Window& window, Time stamp);
+  template <class Factor, class Measurement>
+  AddResult addTerm(FixedLagSmoother& smoother, const Measurement& z,
+                    const std::shared_ptr<ceres::LossFunction>& loss);
   std::shared_ptr<Block> addOffset(Window& window, double t_O) const;
 
   SmootherOptions options_;  // read-only after construction, as the next two

@@ -5,9 +5,16 @@
 
 namespace rio_t {
 
+/// What a scan gives to the window.
+enum class RadarFactor {
+  kVelocity,  ///< the ego-velocity of the scan (the paper)
+  kDoppler,   ///< the Doppler of each point, tightly coupled
+};
+
 struct SmootherOptions {
   double window = 1.0;           ///< [s] length of the fixed-lag window
   double huber_threshold = 1.5;  ///< on the whitened radar residual's norm; 0 = no robust loss
+  RadarFactor radar_factor = RadarFactor::kDoppler;
   WindowSolver solver = WindowSolver::kChain;
   int max_iterations = 30;  ///< of the solver, each scan
   /// [sigma] A scan farther than this from the prediction is rejected. The sigma includes that of the offset.

@@ -296,6 +296,11 @@ void listSmoother(ParameterList& list, Config& c) {
               "length; what leaves it is marginalised into a prior");
   list.number("huber_threshold", "", atLeast(0), smoother.huber_threshold,
               "on the norm of the whitened radar residual; 0: no robust loss");
+  list.choice<RadarFactor>(
+      "radar_factor", {{"velocity", RadarFactor::kVelocity}, {"doppler", RadarFactor::kDoppler}},
+      smoother.radar_factor,
+      "what a scan gives to the window: its ego-velocity, or the Doppler of each point, so that scans of a few "
+      "points count, too");
   list.choice<WindowSolver>(
       "solver", {{"chain", WindowSolver::kChain}, {"ceres", WindowSolver::kCeres}}, smoother.solver,
       "chain: Gauss-Newton along the chain of states; ceres: ceres::Solve, the same estimate, slower");

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <ceres/sized_cost_function.h>
+
+#include <Eigen/Core>
+#include <cmath>
+#include <memory>
+
+#include "rio_t/factors/radar_velocity_model.h"
+#include "rio_t/radar/doppler_likelihood.h"
+
+namespace rio_t {
+
+/// The Dopplers of one scan, as the factor needs them.
+struct DopplerMeasurement : RadarScanTime {
+  std::shared_ptr<const DopplerLikelihood> points;
+  /// Of a velocity error that the points share, per axis of R [m^2/s^2]. See
+  /// EgoVelocityOptions::added_sigma.
+  Eigen::Vector3d shared_variances = Eigen::Vector3d::Zero();
+  double huber_threshold = 0.0;  ///< [sigma] of the shared error; 0: no robust loss
+};
+
+/// The Doppler of each point of a scan, tightly coupled (docs/method.md, section 4.4). Any number of points
+/// counts, in a plane or not. Blocks: state at `state_time`, t_O.
+///
+/// A residual a point, and all depend on the state through one velocity. So QR leaves three rows that depend
+/// on it, and one that is the misfit: the same cost, gradient and J'J as with a row for each point. The loss
+/// is in the rows.
+class DopplerFactor final : public ceres::SizedCostFunction<4, StateBlock::kSize, 1> {
+ public:
+  DopplerFactor(const DopplerMeasurement& z, Time state_time, const RadarMotionModel& model)
+      : points_(z.points), shared_variances_(z.shared_variances), huber_threshold_(z.huber_threshold), model_(z, state_time, model) {}
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
+
+ private:
+  VelocityCost costAt(const Eigen::Vector3d& v_R) const;
+
+  std::shared_ptr<const DopplerLikelihood> points_;
+  Eigen::Vector3d shared_variances_;
+  double huber_threshold_;
+  RadarVelocityModel model_;
+  struct Expansion {
+    Eigen::Vector3d v_R;
+    VelocityCost cost;
+  };
+  /// The last one, which stands for velocities near it: a cache, not for two threads.
+  mutable Expansion expansion_ = {Eigen::Vector3d::Constant(std::nan("")), {}};
+};
+
+}  // namespace rio_t

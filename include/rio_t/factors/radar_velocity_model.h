@@ -1,0 +1,50 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+#include "rio_t/core/time.h"
+#include "rio_t/factors/radar_motion.h"
+#include "rio_t/factors/state_block.h"
+#include "rio_t/radar/extrinsics.h"
+
+namespace rio_t {
+
+/// When and where a scan was taken.
+struct RadarScanTime {
+  Time stamp;  ///< measured at stamp - t_O
+  Extrinsics T_IR;
+  /// Set if the scan does not tell the offset (VelocityRate::informsOffset). The factor then uses this value
+  /// [s] instead of t_O. At constant velocity the derivative with respect to t_O is noise of the IMU, and a
+  /// thousand such scans would pass for knowledge of the offset.
+  std::optional<double> held_t_O = std::nullopt;
+};
+
+/// Velocity of the radar at the time of measurement of a scan, in R, and its derivatives.
+struct PredictedVelocity {
+  Eigen::Vector3d v_R;                            ///< [m/s]
+  StateJacobian<3> J_state;                       ///< as StateBlock stores it
+  Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();  ///< zero if the scan does not tell the offset [m/s^2]
+};
+
+/// RadarMotionModel as the factors of one scan use it. Not for two threads: it keeps the last mean of the IMU.
+class RadarVelocityModel {
+ public:
+  RadarVelocityModel(const RadarScanTime& scan, Time state_time, const RadarMotionModel& model)
+      : scan_(scan), state_time_(state_time), model_(model) {}
+
+  /// `parameters`: state at `state_time`, t_O. Without `derivatives` only v_R is set.
+  PredictedVelocity at(double const* const* parameters, bool derivatives) const;
+
+ private:
+  RadarScanTime scan_;
+  Time state_time_;
+  RadarMotionModel model_;
+  struct Mean {
+    Time time;
+    ImuMean value;
+  };
+  mutable std::optional<Mean> mean_;  ///< of the last evaluation: a cache
+};
+
+}  // namespace rio_t

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "rio_t/radar/point_noise.h"
+#include "rio_t/radar/scan.h"
+
+namespace rio_t {
+
+/// Half a sum of squares and its derivatives with respect to a velocity.
+struct VelocityCost {
+  double value = 0.0;
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< J'J; singular where the points see no motion
+};
+
+/// The same cost if the points share an error of the velocity: minimised over it. `variances` [m^2/s^2] are
+/// those of its axes. `error`, if given, receives the error at the minimum [m/s].
+VelocityCost withSharedError(const VelocityCost& cost, const Eigen::Vector3d& variances,
+                             Eigen::Vector3d* error = nullptr);
+
+/// Factor of a positive semidefinite matrix, A = U'U with U upper triangular. A direction without information
+/// gives a row of zeros.
+Eigen::Matrix3d semidefiniteRoot(const Eigen::Matrix3d& A);
+/// U'^-1 b, where b is in the range of U'. Zero in the rows of zeros.
+Eigen::Vector3d solveTransposed(const Eigen::Matrix3d& U, const Eigen::Vector3d& b);
+
+/// What the Dopplers of a scan say of the radar's velocity: one residual a point (docs/method.md, section
+/// 4.4). Minus its logarithm is half the sum of the squared residuals, so it fits into a least squares.
+///
+/// A Doppler is right within its bin of `step`, plus noise; or, with a small probability, it is anything.
+/// - Bin: a bin wider than the noise bounds the velocity along the ray and does not pull it to the centre.
+/// - Noise of the direction: the sigma grows with the velocity. Its derivative frees the estimate of the bias
+///   that least squares with noisy directions has (total least squares).
+/// - Anything: the residual is bounded, so that an outlier has no weight (a redescending loss).
+class DopplerLikelihood {
+ public:
+  /// `points` look static at about the velocity `v_R` [m/s].
+  DopplerLikelihood(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
+                    const PointVariances& noise);
+
+  VelocityCost at(const Eigen::Vector3d& v_R) const;
+  /// Residual of point i, and its derivative. For tests; `at` adds these up.
+  double residual(std::size_t i, const Eigen::Vector3d& v_R, Eigen::Vector3d& derivative) const;
+  std::size_t size() const { return points_.size(); }
+  double smallestSigma() const { return smallest_sigma_; }  ///< of a point, without the bin [m/s]
+
+ private:
+  struct Point {
+    Eigen::Vector3d u_R;
+    double doppler;
+    Eigen::Matrix3d spread;  ///< v' spread v: variance of the residual by the direction's noise
+    double sigma;            ///< of the noise at the first velocity [m/s]
+    double whole_sigma;      ///< the same with the bin
+    double outlier;          ///< density of outliers over that of the static world, at its largest
+  };
+
+  std::vector<Point> points_;
+  double half_bin_;          ///< [m/s]
+  double doppler_variance_;  ///< [m^2/s^2] without the bin
+  double smallest_sigma_;
+};
+
+}  // namespace rio_t

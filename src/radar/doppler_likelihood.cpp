@@ -1,0 +1,142 @@
+#include "rio_t/radar/doppler_likelihood.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "direction_noise.h"
+
+namespace rio_t {
+namespace {
+
+/// [m^2/s^2] of a residual, or a point without any noise would have infinite weight. A hundredth of the
+/// Doppler noise of any radar known.
+constexpr double kMinVariance = 1e-6;
+/// Below, a residual is as good as zero, and its derivative is taken there.
+constexpr double kNoResidual = 1e-4;  // [sigma]
+/// A pivot below this share of the trace is rounding.
+constexpr double kNoInformation = 1e-12;
+
+double cumulative(double z) { return 0.5 * std::erfc(-z * M_SQRT1_2); }
+double density(double z) { return std::exp(-0.5 * z * z) * (0.5 * M_SQRT1_2 * M_2_SQRTPI); }
+
+/// A residual r and its derivative by the error of the Doppler.
+struct Residual {
+  double value, slope;
+};
+
+/// Noise larger than the bin: r^2 / 2 = -log((exp(-x) + outlier) / (1 + outlier)), x = e^2 / (2 s^2).
+Residual fineResidual(double e, double s, double outlier) {
+  const double z = e / s;
+  const double inlier = std::exp(-0.5 * z * z);
+  const double probability = inlier / (inlier + outlier);
+  const double half_square = -std::log((inlier + outlier) / (1.0 + outlier));
+  const double value = std::sqrt(2.0 * std::max(0.0, half_square));
+  if (value < kNoResidual) return {std::sqrt(probability) * z, std::sqrt(probability) / s};
+  return {std::copysign(value, e), probability * std::abs(z) / (value * s)};
+}
+
+/// The same for a bin of half width h around the Doppler: exp(-x) becomes the probability of the bin.
+Residual coarseResidual(double e, double s, double h, double outlier) {
+  const double a = std::abs(e);  // the bin is even, and erfc is exact in its upper tail only
+  const double below = (a - h) / s;
+  const double above = (a + h) / s;
+  const double edge = h / s;
+  const double centre = 1.0 - 2.0 * cumulative(-edge);
+  const double floor = outlier * centre;
+  const double bin = cumulative(-below) - cumulative(-above);
+  const double half_square = -std::log((bin + floor) / (centre + floor));
+  const double value = std::sqrt(2.0 * std::max(0.0, half_square));
+  if (value < kNoResidual) {  // r = e sqrt(-bin'' / bin) around zero
+    const double root = std::sqrt(2.0 * edge * density(edge) / (centre + floor)) / s;
+    return {root * e, root};
+  }
+  return {std::copysign(value, e), (density(below) - density(above)) / (s * (bin + floor) * value)};
+}
+
+}  // namespace
+
+VelocityCost withSharedError(const VelocityCost& cost, const Eigen::Vector3d& variances,
+                             Eigen::Vector3d* error) {
+  // The minimum over e of cost(v + e) + e' D^-1 e / 2, with cost as a quadratic; D may be zero.
+  const Eigen::Vector3d sigmas = variances.cwiseSqrt();
+  const Eigen::Matrix3d& H = cost.information;
+  const Eigen::Matrix3d inner = Eigen::Matrix3d::Identity() + sigmas.asDiagonal() * H * sigmas.asDiagonal();
+  const Eigen::Matrix3d K = sigmas.asDiagonal() * inner.inverse() * sigmas.asDiagonal();
+  const Eigen::Vector3d e = -K * cost.gradient;
+  if (error != nullptr) *error = e;
+  const Eigen::Matrix3d HK = H * K;
+  return {cost.value + 0.5 * cost.gradient.dot(e), cost.gradient + H * e, H - HK * H};
+}
+
+Eigen::Matrix3d semidefiniteRoot(const Eigen::Matrix3d& A) {
+  const double least = kNoInformation * A.trace();
+  Eigen::Matrix3d U = Eigen::Matrix3d::Zero();
+  for (int i = 0; i < 3; ++i) {
+    const double pivot = A(i, i) - U.col(i).head(i).squaredNorm();
+    if (!(pivot > least)) continue;
+    U(i, i) = std::sqrt(pivot);
+    for (int j = i + 1; j < 3; ++j)
+      U(i, j) = (A(i, j) - U.col(i).head(i).dot(U.col(j).head(i))) / U(i, i);
+  }
+  return U;
+}
+
+Eigen::Vector3d solveTransposed(const Eigen::Matrix3d& U, const Eigen::Vector3d& b) {
+  Eigen::Vector3d x = Eigen::Vector3d::Zero();
+  for (int i = 0; i < 3; ++i)
+    if (U(i, i) > 0.0) x[i] = (b[i] - U.col(i).head(i).dot(x.head(i))) / U(i, i);
+  return x;
+}
+
+DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
+                                     const PointVariances& noise)
+    : half_bin_(std::sqrt(3.0 * noise.quantization)), doppler_variance_(noise.doppler + kMinVariance),
+      smallest_sigma_(std::numeric_limits<double>::max()) {
+  const MomentCorrection correct(noise.azimuth, noise.elevation);
+  const double along_az = 0.75 * noise.azimuth + 0.25 * noise.elevation;
+  const double along_el = 0.75 * noise.elevation + 0.25 * noise.azimuth;
+  points_.reserve(points.size());
+  for (const RadarDirection& p : points) {
+    // At the direction corrected by the residual: at the measured one, the spread correlates with it.
+    const Angles a = correctedDirection(p.u_R, p.doppler + p.u_R.dot(v_R), v_R, noise);
+    const Eigen::Vector3d u = a.direction();
+    const Eigen::Matrix3d spread = noise.azimuth * a.byAzimuth() * a.byAzimuth().transpose() +
+                                   noise.elevation * a.byElevation() * a.byElevation().transpose() +
+                                   (noise.azimuth * along_az + noise.elevation * along_el) * u * u.transpose();
+    const double variance = doppler_variance_ + v_R.dot(spread * v_R);
+    const double sigma = std::sqrt(variance);
+    smallest_sigma_ = std::min(smallest_sigma_, sigma);
+    const double whole = std::sqrt(variance + noise.quantization);
+    points_.push_back({correct.direction(Angles(p.u_R)), p.doppler, spread, sigma, whole,
+                       noise.outlier_density * std::sqrt(2.0 * M_PI) * whole});
+  }
+}
+
+double DopplerLikelihood::residual(std::size_t i, const Eigen::Vector3d& v_R,
+                                   Eigen::Vector3d& derivative) const {
+  const Point& p = points_[i];
+  const double e = p.doppler + p.u_R.dot(v_R);
+  const Eigen::Vector3d spread_v = p.spread * v_R;
+  const double variance = doppler_variance_ + square(half_bin_) / 3.0 + v_R.dot(spread_v);
+  const double scale = p.whole_sigma / std::sqrt(variance);
+  const Residual r = half_bin_ > p.sigma ? coarseResidual(scale * e, p.sigma, half_bin_, p.outlier)
+                                         : fineResidual(scale * e, p.whole_sigma, p.outlier);
+  derivative = r.slope * scale * (p.u_R - (e / variance) * spread_v);
+  return r.value;
+}
+
+VelocityCost DopplerLikelihood::at(const Eigen::Vector3d& v_R) const {
+  VelocityCost cost;
+  Eigen::Vector3d J;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const double r = residual(i, v_R, J);
+    cost.value += 0.5 * r * r;
+    cost.gradient += r * J;
+    cost.information += J * J.transpose();
+  }
+  return cost;
+}
+
+}  // namespace rio_t
