@@ -3,26 +3,6 @@
 #include <cmath>
 
 namespace rio_t {
-namespace {
-
-/// [sigma] Noise alone is farther than this from no acceleration once in 70,000 scans: at 50 Hz once in 20
-/// minutes, so an hour of it says nothing of the offset (chi-squared, 3 degrees of freedom).
-constexpr double kSignificance = 5.0;
-constexpr double kLifted = 2.0;  // [sigma]
-
-}  // namespace
-
-bool VelocityRate::informsOffset(double min_acceleration) const {
-  const double squared = a_I.squaredNorm();
-  return squared > min_acceleration * min_acceleration && squared > kSignificance * kSignificance * variance;
-}
-
-Eigen::Vector3d VelocityRate::known() const {
-  const double size = a_I.norm();
-  const double noise = kLifted * std::sqrt(variance);
-  return size > noise ? Eigen::Vector3d(a_I * (1.0 - noise / size)) : Eigen::Vector3d::Zero();
-}
-
 VelocityRate velocityRate(const ImuMean& imu, const Eigen::Vector3d& b_g, const Eigen::Vector3d& b_a,
                           const Eigen::Vector3d& v_I, const Eigen::Vector3d& g_I,
                           const Eigen::Vector3d& l_I) {

@@ -13,7 +13,7 @@ PredictedVelocity RadarVelocityModel::at(double const* const* parameters, bool d
   predicted.v_R = R_RI * motion.v_I;
   if (!derivatives) return predicted;
   predicted.J_state = R_RI * motion.J_state;
-  if (!scan_.held_t_O) predicted.dv_dt_O = R_RI * motion.dv_dt_O;
+  if (!scan_.held_t_O) predicted.dv_dt_O = scan_.offset_gain * (R_RI * motion.dv_dt_O);
   return predicted;
 }
 

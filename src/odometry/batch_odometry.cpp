@@ -56,7 +56,7 @@ BatchResult BatchOdometry::solve(const RadarInertialOdometry::Start& start) cons
   ImuNoise noise = options_.imu_noise;
   noise.accel_density *= std::sqrt(model_error_scale_);
   const BatchSmoother smoother(options_.smoother, batch_, noise, g_W_, imu_);
-  Run run = makeRun(start, smoother);
+  Run run = makeRun(start);
   if (run.problem.scans.empty()) throw std::runtime_error("batch: the online run used no scan");
   BatchResult batch;
   batch.solution = smoother.solve(run.problem);
@@ -80,11 +80,24 @@ RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) co
   z.covariance.diagonal() +=
       (model_error_scale_ / result.model_error_scale - 1.0) * result.ego_velocity.told_variance;
   z.T_IR = options_.T_IR;
+  z.offset_gain = result.offset_gain;
   return z;
 }
 
-BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& start,
-                                          const BatchSmoother& smoother) const {
+void BatchOdometry::setMeasurement(const ScanResult& result, const BatchNode& node, BatchScan& scan) const {
+  std::optional<double> held_t_O;
+  if (result.offset_gain == 0.0 || isAtRest(node)) held_t_O = node.t_O;
+  if (result.doppler) {
+    scan.doppler = result.doppler;
+    scan.doppler->shared_variances *= model_error_scale_ / result.model_error_scale;
+    scan.doppler->held_t_O = held_t_O;
+  } else {
+    scan.velocity = measurement(result);
+    scan.velocity->held_t_O = held_t_O;
+  }
+}
+
+BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& start) const {
   Run run;
   BatchProblem& problem = run.problem;
   problem.start = start.time;
@@ -103,11 +116,7 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
     scan.offset_stepped = std::exchange(stepped, false);
     const bool at_rest = isAtRest(node);
     if (at_rest) scan.rest_velocity_sigma = options_.rest.velocity_sigma;
-    if (result.used) {
-      scan.velocity = measurement(result);
-      if (!informsOffset(smoother, node, *scan.velocity, result.ego_velocity))
-        scan.velocity->held_t_O = node.t_O;
-    }
+    if (result.used) setMeasurement(result, node, scan);
     problem.scans.push_back(scan);
     run.source.push_back(i);
   }
@@ -124,43 +133,40 @@ std::size_t BatchOdometry::readmit(const BatchSmoother& smoother, const BatchSol
   for (std::size_t i = 0; i < scans_.size(); ++i) {
     const ScanResult& result = scans_[i].result;
     if (result.rejected_because != "innovation") continue;
-    RadarVelocityMeasurement z = measurement(result);
-    if (!accepts(smoother, solution, result.ego_velocity, z)) continue;
+    if (!isValid(result.ego_velocity.status)) continue;
+    const RadarVelocityMeasurement z = measurement(result);
+    const std::optional<BatchNode> node = acceptedBy(smoother, solution, z);
+    if (!node) continue;
     ++count;
     const auto known = std::find(run.source.begin(), run.source.end(), i);  // at rest it is in the graph
     if (known != run.source.end()) {
-      problem.scans[static_cast<std::size_t>(known - run.source.begin())].velocity = z;
+      setMeasurement(result, *node, problem.scans[static_cast<std::size_t>(known - run.source.begin())]);
       continue;
     }
     BatchScan scan;
     scan.stamp = z.stamp;
     scan.t_O = solution.nodes[nearestNode(solution.nodes, z.stamp)].t_O;
-    scan.velocity = z;
+    setMeasurement(result, *node, scan);
     problem.scans.push_back(scan);
     run.source.push_back(i);
   }
   return count;
 }
 
-bool BatchOdometry::accepts(const BatchSmoother& smoother, const BatchSolution& solution,
-                            const EgoVelocity& measured, RadarVelocityMeasurement& z) const {
+std::optional<BatchNode> BatchOdometry::acceptedBy(const BatchSmoother& smoother,
+                                                   const BatchSolution& solution,
+                                                   const RadarVelocityMeasurement& z) const {
   const double t_O = solution.nodes[nearestNode(solution.nodes, z.stamp)].t_O;
   const bool at_stamp = options_.smoother.time_offset_model == TimeOffsetModel::kConstantAcceleration;
   const std::size_t k = nearestNode(solution.nodes, at_stamp ? z.stamp : z.stamp - t_O);
-  const BatchNode& node = solution.nodes[k];
-  const auto residual = smoother.residual(node, solution.covariances[k], z);
+  const auto residual = smoother.residual(solution.nodes[k], solution.covariances[k], z);
   const double gate = options_.smoother.innovation_gate;
   Innovation innovation;
   innovation.d = residual.value;
   innovation.S = residual.prediction_covariance + z.covariance;
-  if (!informsOffset(smoother, node, z, measured)) z.held_t_O = node.t_O;
-  return innovation.widened(options_.smoother.innovation_model_error).squaredSigmas() <= gate * gate;
-}
-
-bool BatchOdometry::informsOffset(const BatchSmoother& smoother, const BatchNode& node,
-                                  const RadarVelocityMeasurement& z, const EgoVelocity& measured) const {
-  return measured.status == EgoVelocityStatus::kMoving && !isAtRest(node) &&
-         smoother.residual(node, NodeMatrix::Zero(), z).informs_offset;
+  if (innovation.widened(options_.smoother.innovation_model_error).squaredSigmas() > gate * gate)
+    return std::nullopt;
+  return solution.nodes[k];
 }
 
 bool BatchOdometry::isAtRest(const BatchNode& node) const {
@@ -220,7 +226,7 @@ std::vector<ScanResult> BatchOdometry::results(const Run& run, const BatchSoluti
     ScanResult& result = results[run.source[j]];
     node_of[run.source[j]] = k;
     result.updated = true;
-    result.used = run.problem.scans[j].velocity.has_value();
+    result.used = run.problem.scans[j].velocity || run.problem.scans[j].doppler;
     if (result.used) result.rejected_because.clear();
     result.state = stateOf(solution.nodes[k], P);
     result.time_offset = solution.nodes[k].t_O;

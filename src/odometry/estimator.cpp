@@ -71,6 +71,8 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
         radar.use(result.scan, {at_rest, has_diverged, result.model_error_scale}, smoother_);
     judge(answer, stamp);
     result.ego_velocity = answer.ego_velocity;
+    result.doppler = answer.doppler;
+    result.offset_gain = answer.offset_gain;
     result.rejected_because = answer.rejected_because;
     result.used = result.updated = answer.rejected_because.empty();
     if (at_rest) {

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "rio_t/factors/offset_derivative.h"
+#include "rio_t/sensors/offset_evidence.h"
 #include "rio_t/graph/marginalization.h"
 #include "rio_t/graph/solver.h"
 #include "rio_t/imu/preintegration.h"
@@ -29,6 +29,11 @@ constexpr double kConverged = 1.0e-4;  // [sigma]
 constexpr double kOutlier = 4.0;       // [sigma]
 constexpr int kScaleRounds = 3;        // of finding the state and the size of the errors around it
 constexpr double kUnknowns = 7.0;      // that the velocities determine: velocity, gravity in I, t_O
+
+/// A gain that changes by less changes nothing.
+bool isNear(const std::vector<double>& a, const std::vector<double>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), [](double x, double y) { return std::abs(x - y) < 0.01; });
+}
 
 std::string format(const char* text, double value, double limit) {
   char line[200];
@@ -218,18 +223,19 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
 
   // Which scans tell the offset depends on the state, and the state on them.
   std::vector<const Term*> terms;
-  std::vector<bool> informs;
+  std::vector<double> gains;
   Solution solution;
   for (int round = 0; round < kMaxRounds; ++round) {
-    const std::vector<bool> informed =
-        std::exchange(informs, informOffset(velocities, time, imu, state, offset->x[0]));
-    if (round > 0 && informs == informed) break;
+    const std::vector<double> last =
+        std::exchange(gains, offsetGains(velocities, time, imu, state, offset->x[0]));
+    if (round > 0 && isNear(gains, last)) break;
     for (const Term* term : terms) window.remove(*term);
     terms.clear();
     for (std::size_t i = 0; i < velocities.size(); ++i) {
       RadarVelocityMeasurement z = velocities[i];
       z.covariance = carriedCovariance(velocities[i], time, imu, scale.value()).whole;
-      if (!informs[i]) z.held_t_O = offset->x[0];
+      z.offset_gain = gains[i];
+      if (gains[i] == 0.0) z.held_t_O = offset->x[0];
       terms.push_back(
           &window.add(std::make_unique<RadarVelocityFactor>(z, time, model), {&state, offset.get()}, loss));
     }
@@ -261,18 +267,22 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
   return outliers;
 }
 
-std::vector<bool> MotionInitializer::informOffset(const Velocities& velocities, Time time,
-                                                  const ImuBuffer& imu, const Block& state,
-                                                  double t_O) const {
-  std::vector<bool> informs;
-  for (const Velocity& z : velocities) {
+std::vector<double> MotionInitializer::offsetGains(const Velocities& velocities, Time time,
+                                                   const ImuBuffer& imu, const Block& state,
+                                                   double t_O) const {
+  OffsetEvidence evidence;
+  std::vector<double> gains(velocities.size(), 0.0);
+  if (!smoother_.estimate_time_offset) return gains;
+  for (std::size_t i = 0; i < velocities.size(); ++i) {
+    const Velocity& z = velocities[i];
     const Time tau = z.stamp - t_O;
     const StateBlock x = carried(toStateBlock(state.x), time, tau, imu, g_W_);
-    informs.push_back(
-        smoother_.estimate_time_offset &&
-        velocityRate(imu, tau, x, g_W_, T_IR_.l_I).informsOffset(smoother_.time_offset_min_acceleration));
+    const OffsetDerivative derivative = offsetDerivative(imu, tau, x, g_W_, T_IR_);
+    evidence.add(z.stamp, derivative, z.covariance.inverse());
+    gains[i] = derivative.mean.norm() > smoother_.time_offset_min_acceleration ? 1.0 : 0.0;
   }
-  return informs;
+  for (double& gain : gains) gain *= evidence.gain();
+  return gains;
 }
 
 /// Covariance that the IMU adds between the state and a scan: noise of the accelerometer, and of the tilt.

@@ -40,6 +40,7 @@ void RadarChannel::start(FixedLagSmoother& smoother, Time time, const NodePrior&
   rio_t::start(smoother, in_window_, time, prior);
   step_detector_ = OffsetStepDetector(options_.offset_step_detector);
   offset_uncertainty_ = OffsetUncertainty(options_.smoother.huber_threshold);
+  offset_evidence_ = OffsetEvidence();
   feasibility_ = FeasibilityCheck(options_.feasibility);
   gate_.used(time);
 }
@@ -69,9 +70,25 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
 
   const bool tilt_is_known = !prediction || prediction->tilt_sigma < kMaxTiltSigma;
   const bool moving = prediction && !context.at_rest && measured.status == EgoVelocityStatus::kMoving;
-  const bool informs_offset = moving && prediction->informs_offset;
+  bool informs_offset = false;
+  if (moving) {
+    offset_evidence_.add(scan.stamp, prediction->dv_dt_O, measured.covariance.inverse());
+    informs_offset = offset_evidence_.gain() > 0.0 &&
+                     prediction->dv_dt_O.mean.norm() > options_.smoother.time_offset_min_acceleration;
+  }
+  answer.offset_gain = informs_offset ? offset_evidence_.gain() : 0.0;
   // An offset that is wrong by c shows as (J + noise) c; nothing else tells of the noise's part.
   if (informs_offset) measured.covariance.diagonal().array() += prediction->rate_variance;
+
+  RadarScanTime taken{scan.stamp, options_.T_IR, answer.offset_gain};
+  if (!informs_offset) taken.held_t_O = offset();
+  if (tightly && measured.status == EgoVelocityStatus::kMoving) {
+    const auto points =
+        std::make_shared<DopplerLikelihood>(estimator_.likelihood(scan, measured.inliers, measured.v_R));
+    answer.doppler =
+        DopplerMeasurement{taken, points, measured.told_variance, options_.smoother.huber_threshold};
+    if (informs_offset) answer.doppler->shared_variances.array() += prediction->rate_variance;
+  }
 
   // A minority that sides with the prediction has more noise than its covariance says.
   const bool can_be_judged = moving && tilt_is_known && hasMajority(measured);
@@ -84,18 +101,10 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
     answer.offset_stepped = true;
   }
   if (now && gate_.rejects(*now, isUnanimous(measured), tilt_is_known)) return reject("innovation");
-  RadarScanTime taken{scan.stamp, options_.T_IR};
-  if (!informs_offset) taken.held_t_O = offset();
-  RadarInWindow::AddResult added;
-  if (tightly && measured.status == EgoVelocityStatus::kMoving) {
-    answer.points = std::make_shared<DopplerLikelihood>(
-        estimator_.likelihood(scan, measured.inliers, measured.v_R));
-    DopplerMeasurement z{taken, answer.points, measured.told_variance, options_.smoother.huber_threshold};
-    if (informs_offset) z.shared_variances.array() += prediction->rate_variance;
-    added = in_window_.add(smoother, z);
-  } else {
-    added = in_window_.add(smoother, RadarVelocityMeasurement{taken, measured.v_R, measured.covariance});
-  }
+  const RadarInWindow::AddResult added =
+      answer.doppler
+          ? in_window_.add(smoother, *answer.doppler)
+          : in_window_.add(smoother, RadarVelocityMeasurement{taken, measured.v_R, measured.covariance});
   if (added != RadarInWindow::AddResult::kAdded) return reject(toString(added));
   if (can_be_judged && informs_offset) offset_uncertainty_.add(*now);
   if (can_be_judged && has_own) {
@@ -136,7 +145,7 @@ Innovation RadarChannel::innovation(Time stamp, const VelocityPrior& prior, cons
   result.S = prior.covariance + measured.covariance;
   if (!prediction) return result;
   result.S_at_offset = prediction->covariance_at_offset + measured.covariance;
-  result.J_O = prediction->dv_dt_O;
+  result.J_O = offset_evidence_.gain() * prediction->dv_dt_O.mean;
   return result;
 }
 

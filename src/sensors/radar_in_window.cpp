@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "rio_t/core/so3.h"
 #include "rio_t/factors/constant_offset_factor.h"
 #include "rio_t/factors/offset_derivative.h"
 
@@ -51,15 +52,19 @@ std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoo
   RadarVelocityPrediction prediction;
   prediction.t_O = offset();
   prediction.velocity.v_R = R_RI * motion.v_I;
-  prediction.dv_dt_O = J.col(kOffset);
   if (!options_.estimate_time_offset) J.col(kOffset).setZero();
   prediction.velocity.covariance = J * P * J.transpose();
   const auto J_state = J.leftCols<kOffset>();
   prediction.covariance_at_offset = J_state * P.topLeftCorner<kOffset, kOffset>() * J_state.transpose();
   const Eigen::Quaterniond q_IW = state->x.q_WI().conjugate();
+  const Eigen::Vector3d g_I = q_IW * model_.g_W;
   const VelocityRate rate =
-      velocityRate(mean, state->x.b_g(), state->x.b_a(), q_IW * state->x.v_W(), q_IW * model_.g_W, T_IR_.l_I);
-  prediction.informs_offset = rate.informsOffset(options_.time_offset_min_acceleration);
+      velocityRate(mean, state->x.b_g(), state->x.b_a(), q_IW * state->x.v_W(), g_I, T_IR_.l_I);
+  prediction.dv_dt_O = offsetDerivative(*model_.imu, time, state->x, model_.g_W, T_IR_);
+  Eigen::Matrix<double, 3, StateBlock::kTangent> J_rate = Eigen::Matrix<double, 3, StateBlock::kTangent>::Zero();
+  J_rate.middleCols<3>(StateBlock::kTheta) = R_RI * so3::hat(g_I);
+  J_rate.middleCols<3>(StateBlock::kBa) = -R_RI;
+  prediction.dv_dt_O.shared = J_rate * P.topLeftCorner<kOffset, kOffset>() * J_rate.transpose();
   if (options_.estimate_time_offset) prediction.rate_variance = rate.variance * P(kOffset, kOffset);
   const Eigen::Matrix<double, 2, 3> horizontal = state->x.q_WI().toRotationMatrix().topRows<2>();
   const Eigen::Matrix2d tilt =

@@ -9,7 +9,6 @@
 
 #include "rio_t/factors/constant_offset_factor.h"
 #include "rio_t/factors/imu_factor.h"
-#include "rio_t/factors/offset_derivative.h"
 #include "rio_t/factors/zero_velocity_factor.h"
 #include "rio_t/graph/marginalization.h"
 #include "rio_t/imu/preintegration.h"
@@ -101,7 +100,10 @@ BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std
     }
     const Node& node = graph.nodes.back();
     graph.node_of_scan[i] = graph.nodes.size() - 1;
-    if (scan.velocity) {
+    if (scan.doppler) {
+      window.add(std::make_unique<DopplerFactor>(*scan.doppler, *node.state->time, model()),
+                 {node.state, node.offset});
+    } else if (scan.velocity) {
       window.add(std::make_unique<RadarVelocityFactor>(*scan.velocity, *node.state->time, model()),
                  {node.state, node.offset}, loss);
     }
@@ -174,10 +176,6 @@ BatchSmoother::Residual BatchSmoother::residual(const BatchNode& node, const Nod
   J << J_x.leftCols<3>(), J_x.rightCols<StateBlock::kTangent - 3>(), J_t;
   if (!options_.estimate_time_offset) J.rightCols<1>().setZero();
   result.prediction_covariance = J * covariance * J.transpose();
-  const Time tau = z.stamp - node.t_O;
-  result.informs_offset =
-      velocityRate(*imu_, tau, carried(node.x, node.time, tau, *imu_, g_W_), g_W_, z.T_IR.l_I)
-          .informsOffset(options_.time_offset_min_acceleration);
   return result;
 }
 

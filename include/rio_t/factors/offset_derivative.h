@@ -18,12 +18,6 @@ struct VelocityRate {
   Eigen::Vector3d a_I = Eigen::Vector3d::Zero();  ///< [m/s^2]
   double variance = 0.0;                          ///< per axis, of the IMU's noise in it [m^2/s^4]
 
-  /// Whether a scan tells the offset: the rate exceeds `min_acceleration` [m/s^2] and five sigma of its
-  /// noise.
-  bool informsOffset(double min_acceleration) const;
-  /// `a_I` shortened by two sigma of its noise. Noise has often lifted a rate that just passes informsOffset,
-  /// and such a rate would claim too much information.
-  Eigen::Vector3d known() const;
 };
 
 /// a_c - omega x v_I + alpha x l, from the mean of the IMU around the time of measurement. `v_I` [m/s] and

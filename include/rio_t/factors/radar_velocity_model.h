@@ -14,9 +14,9 @@ namespace rio_t {
 struct RadarScanTime {
   Time stamp;  ///< measured at stamp - t_O
   Extrinsics T_IR;
-  /// Set if the scan does not tell the offset (VelocityRate::informsOffset). The factor then uses this value
-  /// [s] instead of t_O. At constant velocity the derivative with respect to t_O is noise of the IMU, and a
-  /// thousand such scans would pass for knowledge of the offset.
+  /// Share of the derivative with respect to t_O that is motion and not noise of the IMU, see OffsetEvidence.
+  double offset_gain = 1.0;
+  /// Set if the scan does not tell the offset. The factor then uses this value [s] instead of t_O.
   std::optional<double> held_t_O = std::nullopt;
 };
 

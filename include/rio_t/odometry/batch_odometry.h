@@ -52,14 +52,14 @@ class BatchOdometry {
   };
 
   RadarVelocityMeasurement measurement(const ScanResult& result) const;
-  Run makeRun(const RadarInertialOdometry::Start& start, const BatchSmoother& smoother) const;
+  Run makeRun(const RadarInertialOdometry::Start& start) const;
   /// Adds the scans that the batch does not reject, and returns their number.
   std::size_t readmit(const BatchSmoother& smoother, const BatchSolution& solution, Run& run) const;
-  bool accepts(const BatchSmoother& smoother, const BatchSolution& solution, const EgoVelocity& measured,
-               RadarVelocityMeasurement& z) const;
-  /// Whether `z` tells the offset.
-  bool informsOffset(const BatchSmoother& smoother, const BatchNode& node, const RadarVelocityMeasurement& z,
-                     const EgoVelocity& measured) const;
+  /// The node that a velocity belongs to, if the solution does not reject it.
+  std::optional<BatchNode> acceptedBy(const BatchSmoother& smoother, const BatchSolution& solution,
+                                      const RadarVelocityMeasurement& z) const;
+  /// Sets what the scan gives to the graph, near `node`.
+  void setMeasurement(const ScanResult& result, const BatchNode& node, BatchScan& scan) const;
   bool isAtRest(const BatchNode& node) const;
   NavigationState stateOf(const BatchNode& node, const NodeMatrix& covariance) const;
   std::vector<NavigationState> trajectory(const BatchSolution& solution) const;

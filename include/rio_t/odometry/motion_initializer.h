@@ -91,9 +91,9 @@ class MotionInitializer {
   /// solution. Returns the share of outliers.
   double refine(const Velocities& velocities, Time time, const ImuBuffer& imu, ModelErrorScale& scale,
                 NodePrior& prior) const;
-  /// Which velocities tell the offset.
-  std::vector<bool> informOffset(const Velocities& velocities, Time time, const ImuBuffer& imu,
-                                 const Block& state, double t_O) const;
+  /// What each velocity tells of the offset, see OffsetEvidence; 0: nothing.
+  std::vector<double> offsetGains(const Velocities& velocities, Time time, const ImuBuffer& imu,
+                                  const Block& state, double t_O) const;
   struct CarriedCovariance {
     Eigen::Matrix3d whole;   ///< of a velocity against the state at `time` [m^2/s^2]
     Eigen::Matrix3d scaled;  ///< its part that the model errors scale

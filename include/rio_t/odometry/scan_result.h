@@ -1,9 +1,11 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "rio_t/core/pose.h"
+#include "rio_t/factors/doppler_factor.h"
 #include "rio_t/graph/solver_termination.h"
 #include "rio_t/odometry/health_monitor.h"
 #include "rio_t/odometry/navigation_state.h"
@@ -16,7 +18,9 @@ namespace rio_t {
 struct ScanResult {
   RadarScan scan;  ///< as fed
   EgoVelocity ego_velocity;
-  bool used = false;               ///< its velocity went into the window
+  std::optional<DopplerMeasurement> doppler;  ///< its points, if they and not the velocity count
+  double offset_gain = 0.0;        ///< see OffsetEvidence; 0: the scan does not tell the offset
+  bool used = false;               ///< it went into the window
   double model_error_scale = 1.0;  ///< see ModelErrorScale; in the covariance of ego_velocity
   std::string rejected_because;    ///< snake case, empty if used; keys of `scans_rejected`
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <memory>
 #include <optional>
 #include <string>
 
@@ -34,9 +33,11 @@ struct ScanContext {
 /// The channel's answer to a scan. All else that reports a scan reads this value.
 struct RadarAnswer {
   EgoVelocity ego_velocity;
-  std::shared_ptr<const DopplerLikelihood> points;  ///< what went into the window, if not the velocity
+  /// Its points, if they and not the velocity go into the window.
+  std::optional<DopplerMeasurement> doppler;
   std::string rejected_because;  ///< snake case, empty if the scan was used
   bool offset_stepped = false;   ///< t_O stepped before this scan
+  double offset_gain = 0.0;      ///< see OffsetEvidence; 0: the scan does not tell the offset
 
   bool was_predicted = false;  ///< if not, nothing below is set
   /// For health: the innovation of the velocity that the scan shows without the prediction. None if its
@@ -97,6 +98,7 @@ class RadarChannel {
   EgoVelocityEstimator estimator_;
   RadarInWindow in_window_;
   FeasibilityCheck feasibility_;
+  OffsetEvidence offset_evidence_;
   OffsetStepDetector step_detector_;
   OffsetUncertainty offset_uncertainty_;
   InnovationGate gate_;

@@ -10,6 +10,7 @@
 #include "rio_t/factors/radar_velocity_factor.h"
 #include "rio_t/radar/ego_velocity.h"
 #include "rio_t/radar/extrinsics.h"
+#include "rio_t/sensors/offset_evidence.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
 #include "rio_t/smoother/node_prior.h"
 #include "rio_t/smoother/options.h"
@@ -20,12 +21,11 @@ namespace rio_t {
 struct RadarVelocityPrediction {
   VelocityPrior velocity;                                          ///< with all uncertainties
   Eigen::Matrix3d covariance_at_offset = Eigen::Matrix3d::Zero();  ///< if the offset were known [m^2/s^2]
-  Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();               ///< of v_R with respect to t_O [m/s^2]
+  OffsetDerivative dv_dt_O;                                        ///< of v_R with respect to t_O
   double t_O = 0.0;                                                ///< of the prediction [s]
   /// Per axis: the noise in dv_dt_O times the error of the offset. The covariances do not include it
   /// [m^2/s^2].
   double rate_variance = 0.0;
-  bool informs_offset = false;  ///< dv_dt_O is motion, not noise of the IMU
   double tilt_sigma = 0.0;      ///< of roll and pitch, the larger [rad]
 };
 

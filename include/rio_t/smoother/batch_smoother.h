@@ -3,6 +3,7 @@
 #include <optional>
 #include <vector>
 
+#include "rio_t/factors/doppler_factor.h"
 #include "rio_t/factors/radar_velocity_factor.h"
 #include "rio_t/graph/solver.h"
 #include "rio_t/imu/buffer.h"
@@ -25,7 +26,8 @@ struct BatchOptions {
 struct BatchScan {
   Time stamp;
   double t_O = 0.0;                                  ///< [s] initial value; also places the node (imu model)
-  std::optional<RadarVelocityMeasurement> velocity;  ///< none: the scan is not used
+  std::optional<RadarVelocityMeasurement> velocity;
+  std::optional<DopplerMeasurement> doppler;         ///< instead of the velocity; neither: the scan is not used
   std::optional<double> rest_velocity_sigma;         ///< [m/s] set if the platform is at rest
   bool offset_stepped = false;                       ///< t_O may have stepped since the scan before
 };
@@ -76,7 +78,6 @@ class BatchSmoother {
   struct Residual {
     Eigen::Vector3d value;                  ///< [m/s]
     Eigen::Matrix3d prediction_covariance;  ///< of h alone [m^2/s^2]
-    bool informs_offset = false;            ///< h changes with t_O by motion, not by noise of the IMU
   };
   Residual residual(const BatchNode& node, const NodeMatrix& covariance,
                     const RadarVelocityMeasurement& z) const;

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "rio_t/core/time.h"
+#include "rio_t/factors/state_block.h"
+#include "rio_t/imu/buffer.h"
+#include "rio_t/radar/extrinsics.h"
+
+namespace rio_t {
+
+/// The derivative of the radar's velocity with respect to t_O, as the IMU shows it around a scan.
+struct OffsetDerivative {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();    ///< [m/s^2], as the next two: over both sides
+  Eigen::Vector3d before = Eigen::Vector3d::Zero();  ///< over the time before the scan alone
+  Eigen::Vector3d after = Eigen::Vector3d::Zero();   ///< over the time after it alone
+  /// Covariance of the error that all three share: of tilt and accelerometer bias [m^2/s^4].
+  Eigen::Matrix3d shared = Eigen::Matrix3d::Zero();
+};
+
+/// For a state `x` at the time of measurement `tau`, without `shared`; `g_W` is gravity in W [m/s^2].
+OffsetDerivative offsetDerivative(const ImuBuffer& imu, Time tau, const StateBlock& x,
+                                  const Eigen::Vector3d& g_W, const Extrinsics& T_IR);
+
+/// How much of the derivative with respect to t_O is motion, and how much is noise of the IMU.
+///
+/// Noise in the derivative claims information about t_O that no scan has. Motion is the same before and after
+/// a scan, noise is not. So the mean of before' W after is the square of the motion, whatever the noise, and
+/// its share in mean' W mean is the gain by which the derivative has to be shortened: then J'J claims what
+/// the scans know (docs/method.md, section 5.3). Not thread-safe.
+class OffsetEvidence {
+ public:
+  /// `weight`: inverse covariance of the scan's velocity [s^2/m^2].
+  void add(Time stamp, const OffsetDerivative& derivative, const Eigen::Matrix3d& weight);
+  /// In [0, 1]; 0 while nothing is known.
+  double gain() const;
+
+ private:
+  Time last_;
+  double motion_ = 0.0;          ///< sum of before' W after, less what errors of the state add, fading
+  double motion_variance_ = 0.0; ///< of it
+  double all_ = 0.0;             ///< sum of mean' W mean, fading
+};
+
+}  // namespace rio_t
