@@ -291,12 +291,13 @@ class Circuit {
       t += straight.length;
       Section bend;
       bend.start = t;
-      // Full loops now and then; more to the left than to the right, which closes laps.
-      const double angle = (random.chance(0.25) ? 360.0 : random.uniform(60.0, 150.0)) * kPi / 180.0;
+      // Bends to the left make laps, which stay in a hall; every fourth is a full loop to the right.
+      const bool loop = sections_.size() % 8 == 4;
+      const double angle = (loop ? 360.0 : random.uniform(60.0, 150.0)) * kPi / 180.0;
       const double radius = random.uniform(1.2, 1.8);  // [m] where it is narrowest
       const double peak = kBendSpeed / radius;
       bend.length = 2.0 * angle / peak;
-      bend.peak_rate = random.chance(0.7) ? peak : -peak;
+      bend.peak_rate = loop ? -peak : peak;
       t += bend.length;
       sections_.push_back(straight);
       sections_.push_back(bend);
