@@ -253,7 +253,7 @@ TEST(Parameters, ConfigurationsAreFoundByNameAndByPath) {
     findConfigFile("isr");
     FAIL();
   } catch (const std::runtime_error& error) {
-    EXPECT_TRUE(contains(error.what(), "estimator, irs, ti_mmwave")) << error.what();
+    EXPECT_TRUE(contains(error.what(), "estimator, irs, sparse, ti_mmwave")) << error.what();
   }
   EXPECT_THROW(findConfigFile("./nonexistent.yaml"), std::runtime_error);
 }
