@@ -9,6 +9,8 @@
 #include <set>
 #include <sstream>
 
+#include "rio_t/simulation/presets.h"
+
 namespace rio_t {
 namespace {
 
@@ -251,7 +253,7 @@ TEST(Parameters, ConfigurationsAreFoundByNameAndByPath) {
     findConfigFile("isr");
     FAIL();
   } catch (const std::runtime_error& error) {
-    EXPECT_TRUE(contains(error.what(), "estimator, irs, ti_mmwave")) << error.what();
+    EXPECT_TRUE(contains(error.what(), "estimator, irs, sparse, ti_mmwave")) << error.what();
   }
   EXPECT_THROW(findConfigFile("./nonexistent.yaml"), std::runtime_error);
 }
@@ -298,6 +300,12 @@ TEST(Parameters, SensorConfigurationsLoad) {
   EXPECT_EQ(pointCloudFormat(ti).axes, PointAxes::kForwardLeftUp);
   EXPECT_EQ(ti.stamp_source, StampSource::kTrigger);
   EXPECT_EQ(ti.odometry.T_IR.l_I, Eigen::Vector3d(0.03, 0.03, -0.06));
+  // The mounting is that of the simulated kart, which its first lines promise.
+  const Config sparse = makeConfig(readParameterFile(kConfigFolder + "/sparse.yaml"));
+  const Extrinsics kart = simulation::presetOf("kart").options.T_IR;
+  EXPECT_EQ(pointCloudFormat(sparse).doppler, "v_doppler_mps");
+  EXPECT_EQ(sparse.odometry.T_IR.l_I, kart.l_I);
+  EXPECT_LT(sparse.odometry.T_IR.q_IR.angularDistance(kart.q_IR), 1e-6);
 }
 
 TEST(Parameters, OverridesChangeThePresetInAnyOrder) {

@@ -17,6 +17,7 @@
 #include <map>
 
 #include "rio_t/simulation/motions.h"
+#include "rio_t/simulation/presets.h"
 
 namespace rio_t {
 namespace {
@@ -255,6 +256,51 @@ TEST(SimulationBag, SameRequestSameBytesOtherSeedOtherBytes) {
   EXPECT_GT(content.size(), 1'000'000u);
   EXPECT_TRUE(content == contentOf(second.file.path()));
   EXPECT_FALSE(content == contentOf(other.file.path()));
+}
+
+TEST(SimulationBag, AKartGivesTheSameBytesAndNoEmptyClouds) {
+  const auto write = [](const std::string& path, std::uint64_t seed) {
+    simulation::Preset kart = simulation::presetOf("kart");
+    kart.options.seed = seed;
+    const Motion motion = simulation::makeMotion({kart.motion, seed, 40.0, kart.rest});
+    const SensorData data = simulation::simulate(motion, kart.options);
+    writeSimulationBag(path, motion, data, kart.options.start, SimulationBagOptions{});
+    return data;
+  };
+  const TemporaryFile first, second, other;
+  const SensorData data = write(first.path(), 1);
+  write(second.path(), 1);
+  write(other.path(), 2);
+  EXPECT_TRUE(contentOf(first.path()) == contentOf(second.path()));
+  EXPECT_FALSE(contentOf(first.path()) == contentOf(other.path()));
+
+  const auto scans = read<sensor_msgs::PointCloud2>(first.path(), "/sensor_platform/radar/scan");
+  for (const auto& [cloud, record_time] : scans) ASSERT_GT(cloud.width, 0u);
+  std::size_t empty = 0;
+  for (const simulation::SimulatedScan& scan : data.scans) empty += scan.points.empty() ? 1 : 0;
+  EXPECT_GT(empty, 0u);
+  EXPECT_EQ(scans.size() + empty, data.scans.size());
+}
+
+TEST(SimulationBag, EmptyCloudsAreWrittenWhereTheyArePublished) {
+  const Motion motion = simulation::makeMotion({"easy", 1, 25.0, simulation::MotionRestOptions{}});
+  SimulationOptions options;
+  options.radar.points_mean = 1.0;
+  options.radar.points_sigma = 1.0;
+  options.radar.points_min = 0;
+  const SensorData data = simulation::simulate(motion, options);
+  const TemporaryFile file;
+  writeSimulationBag(file.path(), motion, data, options.start, SimulationBagOptions{});
+  const auto scans = read<sensor_msgs::PointCloud2>(file.path(), "/sensor_platform/radar/scan");
+  EXPECT_EQ(scans.size(), data.scans.size());
+  std::size_t empty = 0;
+  for (const auto& [cloud, record_time] : scans) {
+    if (cloud.width > 0) continue;
+    ++empty;
+    EXPECT_EQ(fieldsOf(cloud).size(), 7u);
+    EXPECT_TRUE(cloud.data.empty());
+  }
+  EXPECT_GT(empty, 20u);
 }
 
 TEST(SimulationBag, NamesTheFileThatCannotBeWritten) {

@@ -8,6 +8,7 @@
 
 #include "rio_t/core/so3.h"
 #include "rio_t/simulation/motions.h"
+#include "rio_t/simulation/presets.h"
 #include "rio_t/simulation/random.h"
 
 namespace rio_t::simulation {
@@ -315,9 +316,49 @@ TEST(Motions, ConstantSpeedKeepsTheSpeedItIsGiven) {
   }
 }
 
+TEST(Motions, AWalkTakesAnotherPace) {
+  const auto mean_speed = [](const Motion& motion) {
+    double length = 0.0;
+    const double from = 14.0, until = motion.duration() - 5.0;  // at full speed
+    for (double t = from; t < until; t += 0.01) length += 0.01 * motion.at(t).v_W.head<2>().norm();
+    return length / (until - from);
+  };
+  const MotionRestOptions rest;
+  // Turns, which are slower, fill more of a faster walk.
+  EXPECT_NEAR(mean_speed(makeMotion({"walk", 1, 150.0, rest, 2.4})), 2.2, 0.1);
+  EXPECT_EQ(makeMotion({"walk", 1, 150.0, rest, 1.3}).at(100.0).p_W, builtIn("walk", 1, 150.0).at(100.0).p_W);
+}
+
+TEST(Motions, AKartBrakesBeforeItsBendsOnAFlatFloor) {
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    const Motion motion = builtIn("kart", seed);
+    double length = 0.0, left = 0.0, right = 0.0, hardest_braking = 0.0, hardest_pull = 0.0;
+    for (double t = 0.0; t < motion.duration(); t += 0.01) {
+      const MotionState state = motion.at(t);
+      const Eigen::Vector3d v_I = state.q_WI.conjugate() * state.v_W;
+      const double forward = (state.q_WI.conjugate() * state.a_W).x();
+      length += 0.01 * state.v_W.norm();
+      ASSERT_LT(std::abs(state.p_W.z()), 1e-6) << t;
+      ASSERT_LT(std::abs(v_I.y()), 0.02) << t;  // no side slip
+      ASSERT_LT(state.v_W.norm(), 3.0) << t;
+      if (t > 14.0 && t < motion.duration() - 5.0) {
+        ASSERT_GT(state.v_W.norm(), 1.0) << t;
+        hardest_braking = std::min(hardest_braking, forward);
+        hardest_pull = std::max(hardest_pull, forward);
+      }
+      (state.omega_I.z() > 0.0 ? left : right) += 0.01 * std::abs(state.omega_I.z());
+    }
+    EXPECT_NEAR(length, 120.0, 10.0) << seed;
+    EXPECT_GT(left, 6.28);   // a lap and more
+    EXPECT_GT(right, 6.28);  // and a loop the other way
+    EXPECT_LT(hardest_braking, -0.8);
+    EXPECT_GT(hardest_pull, 0.8);
+  }
+}
+
 TEST(Motions, SpeedIsRefusedWhereItMeansNothing) {
   for (const MotionDescription& motion : builtInMotions()) {
-    if (motion.name == "constant_speed") continue;
+    if (motion.name == "constant_speed" || motion.name == "walk") continue;
     EXPECT_THROW(makeMotion({motion.name, 1, 0.0, MotionRestOptions{}, 2.0}), std::invalid_argument);
   }
   EXPECT_THROW(makeMotion({"constant_speed", 1, 0.0, MotionRestOptions{}, 0.0}), std::invalid_argument);
@@ -753,6 +794,159 @@ TEST(RadarModel, QuantisesTheDoppler) {
   EXPECT_GT(moving, 1000u);
 }
 
+TEST(RadarModel, WrapsTheDopplerIntoItsSpan) {
+  const Motion motion = builtIn("ground_vehicle", 1, 40.0);  // up to 5 m/s
+  for (const double step : {0.0, 0.125}) {
+    for (const double span : {3.0, 2.875}) {  // an even and an odd number of steps
+      SimulationOptions options;
+      options.radar.doppler_step = step;
+      const SensorData unlimited = simulate(motion, options);
+      options.radar.doppler_span = span;
+      const SensorData limited = simulate(motion, options);
+      ASSERT_EQ(limited.scans.size(), unlimited.scans.size());
+      std::size_t wrapped = 0, first_bin = 0;
+      for (std::size_t k = 0; k < limited.scans.size(); ++k) {
+        // Only the Doppler differs, so that each point is its own truth.
+        ASSERT_EQ(limited.scans[k].points.size(), unlimited.scans[k].points.size());
+        for (std::size_t i = 0; i < limited.scans[k].points.size(); ++i) {
+          const double seen = limited.scans[k].points[i].doppler;
+          const double whole = unlimited.scans[k].points[i].doppler;
+          ASSERT_GE(seen, -0.5 * span);
+          ASSERT_LT(seen, 0.5 * span);
+          ASSERT_NEAR((whole - seen) / span, std::round((whole - seen) / span), 1e-9) << whole;
+          if (step > 0.0) {
+            ASSERT_EQ(seen, step * std::round(seen / step));
+          }
+          wrapped += seen != whole ? 1 : 0;
+          first_bin += step > 0.0 && seen < -0.5 * span + step ? 1 : 0;
+        }
+      }
+      EXPECT_GT(wrapped, 1000u);
+      // Both ends of the span meet there.
+      if (step > 0.0) {
+        EXPECT_GT(first_bin, 20u);
+      }
+    }
+  }
+}
+
+TEST(RadarModel, WithoutNoiseTheSpanIsAllThatIsMissing) {
+  SimulationOptions options = withoutErrors();
+  options.radar.doppler_span = 3.0;
+  options.radar.removeErrors();
+  std::size_t wrapped = 0;
+  for (const SimulatedScan& scan : simulate(builtIn("ground_vehicle", 1, 40.0), options).scans) {
+    for (const SimulatedPoint& point : scan.points) {
+      const double truth = -point.position_R.normalized().dot(scan.v_R);
+      const double spans = (truth - point.doppler) / 3.0;
+      ASSERT_NEAR(spans, std::round(spans), 1e-9);
+      wrapped += std::abs(spans) > 0.5 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(wrapped, 1000u);
+}
+
+TEST(RadarModel, RefusesASpanThatIsNoWholeNumberOfSteps) {
+  const Motion motion = builtIn("easy", 1, 30.0);
+  SimulationOptions options;
+  options.radar.doppler_step = 0.49;
+  for (const double span : {3.0, 0.1, -2.94}) {
+    options.radar.doppler_span = span;
+    try {
+      simulate(motion, options);
+      FAIL() << "no exception for " << span;
+    } catch (const std::invalid_argument& error) {
+      EXPECT_NE(std::string(error.what()).find("doppler-span"), std::string::npos) << error.what();
+    }
+  }
+  options.radar.doppler_span = 2.94;  // 6 steps, but not quite in floating point
+  EXPECT_NO_THROW(simulate(motion, options));
+}
+
+TEST(RadarModel, AFlatRadarReportsAllInItsPlane) {
+  SimulationOptions options;
+  options.radar.ghost_share = 0.2;
+  options.radar.fov_elevation = 5.0;
+  options.radar.measures_elevation = false;
+  const Motion motion = builtIn("ground_vehicle", 1, 40.0);
+  std::size_t count = 0;
+  for (const SimulatedScan& scan : simulate(motion, options).scans) {
+    for (const SimulatedPoint& point : scan.points) {
+      ASSERT_EQ(point.position_R.z(), 0.0);
+      ASSERT_GE(point.position_R.y(), 0.0);
+      ++count;
+    }
+  }
+  EXPECT_GT(count, 5000u);
+
+  // The same reflectors with and without elevation: range and angle to the row of antennas are those of the
+  // things seen, which are not in the plane themselves.
+  options.radar.removeErrors();
+  const SensorData flat = simulate(motion, options);
+  options.radar.measures_elevation = true;
+  const SensorData truth = simulate(motion, options);
+  double highest = 0.0;
+  for (std::size_t k = 0; k < flat.scans.size(); ++k) {
+    ASSERT_EQ(flat.scans[k].points.size(), truth.scans[k].points.size());
+    for (std::size_t i = 0; i < flat.scans[k].points.size(); ++i) {
+      const SimulatedPoint& seen = flat.scans[k].points[i];
+      const Eigen::Vector3d& p_R = truth.scans[k].points[i].position_R;
+      ASSERT_EQ(seen.position_R.z(), 0.0);
+      ASSERT_NEAR(seen.position_R.norm(), p_R.norm(), 1e-9);
+      ASSERT_NEAR(seen.position_R.x(), p_R.x(), 1e-9);
+      ASSERT_EQ(seen.doppler, truth.scans[k].points[i].doppler);
+      highest = std::max(highest, std::abs(std::asin(p_R.z() / p_R.norm())));
+    }
+  }
+  EXPECT_NEAR(highest, 5.0 * 3.141592653589793 / 180.0, 0.005);
+}
+
+// Points of the scans that were delivered, fewest first.
+std::vector<int> sortedCounts(const std::vector<SimulatedScan>& scans) {
+  std::vector<int> counts;
+  for (const SimulatedScan& scan : scans) {
+    if (scan.delivered) counts.push_back(static_cast<int>(scan.points.size()));
+  }
+  std::sort(counts.begin(), counts.end());
+  return counts;
+}
+
+TEST(RadarModel, SparseScansMayBeEmptyAndThenNotPublished) {
+  const Motion motion = builtIn("medium");
+  SimulationOptions options;
+  options.radar.moving_share = 0.0;
+  options.radar.points_mean = 3.0;
+  options.radar.points_sigma = 2.0;
+  EXPECT_EQ(sortedCounts(simulate(motion, options).scans).front(), 1);  // the limit as it has always been
+
+  options.radar.points_min = 0;
+  const SensorData all = simulate(motion, options);
+  const std::vector<int> counts = sortedCounts(all.scans);
+  ASSERT_EQ(counts.size(), all.scans.size());
+  double total = 0.0;
+  for (const int few : {0, 1, 2, 3, 4}) {
+    const auto share = static_cast<double>(std::count(counts.begin(), counts.end(), few)) /
+                       static_cast<double>(counts.size());
+    EXPECT_GT(share, 0.05) << few;
+    total += share;
+  }
+  EXPECT_NEAR(total, 0.77, 0.06);  // a normal distribution below 4.5
+
+  options.radar.publish_empty = false;
+  const SensorData some = simulate(motion, options);
+  ASSERT_EQ(some.scans.size(), all.scans.size());
+  for (std::size_t k = 0; k < all.scans.size(); ++k) {
+    EXPECT_EQ(some.scans[k].delivered, !all.scans[k].points.empty());
+    EXPECT_EQ(some.scans[k].seq, all.scans[k].seq);
+    ASSERT_EQ(some.scans[k].points.size(), all.scans[k].points.size());
+    if (!some.scans[k].points.empty()) {
+      EXPECT_EQ(some.scans[k].points.front().doppler, all.scans[k].points.front().doppler);
+    }
+  }
+  options.radar.points_min = options.radar.points_max + 1;
+  EXPECT_THROW(simulate(motion, options), std::invalid_argument);
+}
+
 TEST(RadarModel, DopplerHasItsNoise) {
   // Same seed with and without errors of the points, so the same reflectors: compare point by point is not
   // possible (noise draws shift), so look at the Doppler residuals at rest instead, where truth is zero.
@@ -984,6 +1178,87 @@ TEST(RadarModel, RefusesOptionsOutOfRange) {
   options = SimulationOptions{};
   options.imu.rate = -1.0;
   EXPECT_THROW(simulate(motion, options), std::invalid_argument);
+}
+
+// --- Presets
+// ---------------------------------------------------------------------------------------------------
+
+double spread(const std::vector<double>& values) {
+  double mean = 0.0, square = 0.0;
+  for (const double v : values) mean += v / static_cast<double>(values.size());
+  for (const double v : values) square += (v - mean) * (v - mean) / static_cast<double>(values.size());
+  return std::sqrt(square);
+}
+
+TEST(Presets, AKartHasASparseCoarseRadarAndAnImuThatShakes) {
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    Preset kart = presetOf("kart");
+    kart.options.seed = seed;
+    const Motion motion = makeMotion({kart.motion, seed, kart.duration, kart.rest});
+    const SensorData data = simulate(motion, kart.options);
+
+    double length = 0.0;
+    for (double t = 0.0; t < motion.duration(); t += 0.01) {
+      const MotionState state = motion.at(t);
+      length += 0.01 * state.v_W.norm();
+      ASSERT_LT(std::abs(state.p_W.z()), 1e-6) << t;
+      if (t < 2.0) {
+        ASSERT_EQ(state.v_W.norm(), 0.0) << t;
+      }
+    }
+    EXPECT_GT(motion.at(3.5).v_W.norm(), 0.5);
+    EXPECT_NEAR(length, 120.0, 10.0);
+
+    const std::vector<int> counts = sortedCounts(data.scans);
+    EXPECT_EQ(counts[counts.size() / 10], 3);
+    EXPECT_EQ(counts[counts.size() / 2], 6);
+    EXPECT_EQ(counts[counts.size() * 9 / 10], 10);
+    EXPECT_EQ(counts.front(), 1);                 // empty ones are not published
+    EXPECT_LT(counts.size(), data.scans.size());  // and there are some
+    EXPECT_NEAR(static_cast<double>(data.scans.size()) / motion.duration(), 30.0, 0.1);
+
+    std::vector<double> ranges, azimuths, elevations;
+    double misfits = 0.0;
+    for (const SimulatedScan& scan : data.scans) {
+      for (const SimulatedPoint& point : scan.points) {
+        const Eigen::Vector3d& p_R = point.position_R;
+        ASSERT_EQ(point.doppler, 0.49 * std::round(point.doppler / 0.49));
+        ranges.push_back(p_R.norm());
+        azimuths.push_back(std::atan2(p_R.x(), p_R.y()) * 180.0 / 3.141592653589793);
+        elevations.push_back(std::asin(p_R.z() / p_R.norm()) * 180.0 / 3.141592653589793);
+        // Two steps are far beyond half a step and what the angles' noise makes of 3 m/s.
+        misfits += std::abs(point.doppler + p_R.normalized().dot(scan.v_R)) > 0.98 ? 1.0 : 0.0;
+      }
+    }
+    std::nth_element(ranges.begin(), ranges.begin() + static_cast<std::ptrdiff_t>(ranges.size() / 2),
+                     ranges.end());
+    EXPECT_NEAR(ranges[ranges.size() / 2], 2.9, 0.15);
+    EXPECT_NEAR(spread(azimuths), 31.0, 1.5);
+    EXPECT_NEAR(spread(elevations), 35.0, 1.5);
+    EXPECT_GT(misfits / static_cast<double>(ranges.size()), 0.01);
+    EXPECT_LT(misfits / static_cast<double>(ranges.size()), 0.05);
+
+    // Looks to the left and upwards, its right side level.
+    const Eigen::Vector3d forward_I = kart.options.T_IR.q_IR * Eigen::Vector3d::UnitY();
+    EXPECT_NEAR(std::atan2(forward_I.y(), forward_I.x()), 0.5236, 1e-4);
+    EXPECT_NEAR(std::asin(forward_I.z()), 0.3840, 1e-4);
+    EXPECT_NEAR((kart.options.T_IR.q_IR * Eigen::Vector3d::UnitX()).z(), 0.0, 1e-9);
+
+    std::vector<double> at_rest;
+    for (std::size_t i = 0; i < 200; ++i) at_rest.push_back(data.imu.samples[i].acceleration.x());
+    EXPECT_NEAR(spread(at_rest), 0.8, 5.0 * 0.8 / std::sqrt(2.0 * 200.0));
+    EXPECT_EQ(data.imu.samples[100].time - kart.options.start, 1.0);
+  }
+}
+
+TEST(Presets, AreKnownByName) {
+  for (const Preset& preset : presets()) EXPECT_EQ(presetOf(preset.name).motion, preset.motion);
+  try {
+    presetOf("tank");
+    FAIL() << "no exception";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("kart"), std::string::npos) << error.what();
+  }
 }
 
 // --- Together

@@ -14,6 +14,8 @@ namespace {
 constexpr double kPi = 3.141592653589793;
 constexpr double kSampleStep = 0.01;  // [s] of the poses that the spline is put through
 constexpr std::uint64_t kMotionStream = 1;
+constexpr double kWalkingPace = 1.3;    // [m/s]
+constexpr double kStraightSpeed = 1.0;  // [m/s]
 
 using VectorFunction = std::function<Eigen::Vector3d(double)>;
 using PoseFunction = std::function<StampedPose(double)>;
@@ -211,10 +213,11 @@ PoseFunction groundVehicle(Random& random, double duration) {
 // Corridors: straight stretches with turns of about a right angle between them.
 class Corridors {
  public:
-  Corridors(Random& random, double duration) {
+  // At walking pace `pace` [m/s].
+  Corridors(Random& random, double duration, double pace) : pace_(pace) {
     for (double t = 0.0; t < duration;) {
       Turn turn;
-      turn.start = t + random.uniform(2.0, 14.0) / kWalkingSpeed;
+      turn.start = t + random.uniform(2.0, 14.0) / pace_;
       const double angle = random.uniform(75.0, 105.0) * kPi / 180.0;
       const double peak = random.uniform(0.7, 0.9);
       turn.length = 2.0 * angle / peak;  // the mean of sin^2 is a half
@@ -231,11 +234,10 @@ class Corridors {
   // Slower in the turns.
   double speed(double t) const {
     const Turn* turn = turnAt(t);
-    return kWalkingSpeed * (turn != nullptr ? 1.0 - 0.3 * shape(*turn, t) : 1.0);
+    return pace_ * (turn != nullptr ? 1.0 - 0.3 * shape(*turn, t) : 1.0);
   }
 
  private:
-  static constexpr double kWalkingSpeed = 1.3;  // [m/s]
   struct Turn {
     double start, length;  // [s]
     double rate;           // peak [rad/s]
@@ -251,13 +253,14 @@ class Corridors {
     return found != turns_.end() ? &*found : nullptr;
   }
 
+  double pace_;
   std::vector<Turn> turns_;
 };
 
 // A sensor held in front of somebody who walks through a building. Steps heave it by 2.5 cm from lowest to
 // highest, and nod, swing and roll it; their rate wanders about 2 Hz.
-PoseFunction walk(Random& random, double duration) {
-  const Corridors corridors(random, duration);
+PoseFunction walk(Random& random, double duration, double pace) {
+  const Corridors corridors(random, duration, pace);
   const Waves hurry(random, 3, 0.02, 0.1, 0.003);
   const PoseFunction body = planar([&](double t) { return corridors.speed(t) + hurry(t); },
                                    [&](double t) { return corridors.yawRate(t); }, duration);
@@ -271,6 +274,69 @@ PoseFunction walk(Random& random, double duration) {
     pose.q_WI = pose.q_WI * attitude(sway(t) + Eigen::Vector3d(0.015 * swing, 0.008 * std::cos(step), 0.0));
     return pose;
   };
+}
+
+// Straights between bends and loops, as one drives a kart round a hall: it speeds up on each straight and
+// brakes before the next bend.
+class Circuit {
+ public:
+  Circuit(Random& random, double duration) {
+    for (double t = 0.0; t < duration;) {
+      Section straight;
+      straight.start = t;
+      straight.top_speed = random.uniform(2.2, 2.9);
+      const double length = random.uniform(4.0, 9.0);  // [m]
+      straight.length =
+          length / (0.5 * (kBendSpeed + straight.top_speed));  // the mean of the shape is a half
+      t += straight.length;
+      Section bend;
+      bend.start = t;
+      // Bends to the left make laps, which stay in a hall; every fourth is a full loop to the right.
+      const bool loop = sections_.size() % 8 == 4;
+      const double angle = (loop ? 360.0 : random.uniform(60.0, 150.0)) * kPi / 180.0;
+      const double radius = random.uniform(1.2, 1.8);  // [m] where it is narrowest
+      const double peak = kBendSpeed / radius;
+      bend.length = 2.0 * angle / peak;
+      bend.peak_rate = loop ? -peak : peak;
+      t += bend.length;
+      sections_.push_back(straight);
+      sections_.push_back(bend);
+    }
+  }
+
+  double speed(double t) const {
+    const Section& section = sectionAt(t);
+    return kBendSpeed + (section.top_speed - kBendSpeed) * shape(section, t);
+  }
+  double yawRate(double t) const {
+    const Section& section = sectionAt(t);
+    return section.peak_rate * shape(section, t);
+  }
+
+ private:
+  static constexpr double kBendSpeed = 1.2;  // [m/s]
+  struct Section {
+    double start = 0.0, length = 0.0;  // [s]
+    double top_speed = kBendSpeed;     // [m/s]
+    double peak_rate = 0.0;            // [rad/s]
+  };
+  static double shape(const Section& section, double t) {
+    const double s = std::sin(kPi * (t - section.start) / section.length);
+    return s * s;
+  }
+  const Section& sectionAt(double t) const {
+    const auto next = std::find_if(sections_.begin() + 1, sections_.end(),
+                                   [t](const Section& section) { return section.start > t; });
+    return *(next - 1);
+  }
+
+  std::vector<Section> sections_;
+};
+
+PoseFunction kart(Random& random, double duration) {
+  const Circuit circuit(random, duration + 1.0);  // the samples run a little past the end
+  return planar([&](double t) { return circuit.speed(t); }, [&](double t) { return circuit.yawRate(t); },
+                duration);
 }
 
 PoseFunction constantSpeed(double speed) {
@@ -291,8 +357,9 @@ PoseFunction poseFunction(const MotionRequest& request, Random& random, double d
   if (name == "gym_loop") return gymLoop(random, duration);
   if (name == "drone") return drone(random, duration);
   if (name == "ground_vehicle") return groundVehicle(random, duration);
-  if (name == "walk") return walk(random, duration);
-  return constantSpeed(request.speed.value_or(1.0));
+  if (name == "kart") return kart(random, duration);
+  if (name == "walk") return walk(random, duration, request.speed.value_or(kWalkingPace));
+  return constantSpeed(request.speed.value_or(kStraightSpeed));
 }
 
 }  // namespace
@@ -307,6 +374,8 @@ const std::vector<MotionDescription>& builtInMotions() {
        300.0},
       {"drone", "multicopter: up to 3 m/s, leans into its acceleration", 90.0},
       {"ground_vehicle", "planar, 1 to 5 m/s, up to 0.45 rad/s about the vertical", 90.0},
+      {"kart", "go-kart in a hall: planar, 1 to 3 m/s, brakes for bends and loops of 1.2 to 1.8 m radius",
+       100.0},
       {"constant_speed", "straight line without rotation, at 1 m/s or --speed", 90.0},
       {"start_in_motion", "medium, but moving from the first sample on", 90.0},
   };
@@ -322,9 +391,9 @@ Motion makeMotion(const MotionRequest& request) {
     for (const MotionDescription& m : known) names += (names.empty() ? "" : ", ") + m.name;
     throw std::invalid_argument("motion '" + request.name + "' is not known; known are: " + names);
   }
-  if (request.speed && request.name != "constant_speed") {
-    throw std::invalid_argument("speed: only the motion constant_speed can be given one, '" + request.name +
-                                "' has its own");
+  if (request.speed && request.name != "constant_speed" && request.name != "walk") {
+    throw std::invalid_argument("speed: only the motions constant_speed and walk can be given one, '" +
+                                request.name + "' has its own");
   }
   if (request.speed && !(*request.speed > 0.0)) throw std::invalid_argument("speed: must be positive");
   MotionRestOptions rest = request.rest;

@@ -33,6 +33,8 @@ void check(const RadarModelOptions& o) {
           "number of points must be positive");
   require(o.points_mean <= o.points_max,
           "mean number of points (points) must not be above its limit (points-max)");
+  require(o.points_min >= 0 && o.points_min <= o.points_max,
+          "fewest points (points-min) must be from 0 to the limit (points-max)");
   require(o.min_range >= 0.0 && o.max_range > o.min_range, "maximum range must be above the minimum");
   require(o.fov_azimuth > 0.0 && o.fov_azimuth <= 90.0, "azimuth limit must be in (0, 90] degrees");
   require(o.fov_elevation > 0.0 && o.fov_elevation <= 90.0, "elevation limit must be in (0, 90] degrees");
@@ -40,6 +42,13 @@ void check(const RadarModelOptions& o) {
       o.range_noise >= 0.0 && o.azimuth_noise >= 0.0 && o.elevation_noise >= 0.0 && o.doppler_noise >= 0.0,
       "noise cannot be negative");
   require(o.doppler_step >= 0.0, "Doppler quantisation cannot be negative");
+  require(o.doppler_span >= 0.0, "Doppler span (doppler-span) cannot be negative");
+  if (o.doppler_span > 0.0 && o.doppler_step > 0.0) {
+    // The bins of a Fourier transform: a value beyond the last of them must be the first one again.
+    const double steps = o.doppler_span / o.doppler_step;
+    require(steps > 0.5 && std::abs(steps - std::round(steps)) < 1e-6 * steps,
+            "Doppler span (doppler-span) must be a whole number of steps (doppler-step)");
+  }
   require(is_share(o.ghost_share) && is_share(o.moving_share) && is_share(o.dropout_share),
           "shares must be in [0, 1]");
   require(o.crowd >= 1, "a crowd must be one person or more");
@@ -130,8 +139,8 @@ class Sensor {
   std::vector<SimulatedPoint> measure(double t, Random& random) const {
     const Frame frame = frameAt(t);
     const int wanted = std::clamp(
-        static_cast<int>(std::lround(options_.points_mean + options_.points_sigma * random.gaussian())), 1,
-        options_.points_max);
+        static_cast<int>(std::lround(options_.points_mean + options_.points_sigma * random.gaussian())),
+        options_.points_min, options_.points_max);
 
     std::vector<Echo> echoes = personEchoes(t, frame, random);
     const std::vector<Echo> room = sceneEchoes(frame, wanted - static_cast<int>(echoes.size()), random);
@@ -224,19 +233,34 @@ class Sensor {
     echoes.resize(kept);
   }
 
-  double quantised(double doppler) const {
-    if (options_.doppler_step <= 0.0) return doppler;
-    return options_.doppler_step * std::round(doppler / options_.doppler_step);
+  // What the sensor makes of a range rate [m/s].
+  double reported(double doppler) const {
+    const double step = options_.doppler_step;
+    const double span = options_.doppler_span;
+    if (step <= 0.0) return span > 0.0 ? wrapped(doppler, span) : doppler;
+    const double bin = std::round(doppler / step);
+    // In whole bins, so that a value next to the end of the span does not round out of it.
+    return step * (span > 0.0 ? wrapped(bin, std::round(span / step)) : bin);
+  }
+
+  // Into [-span / 2, span / 2).
+  static double wrapped(double value, double span) { return value - span * std::floor(value / span + 0.5); }
+
+  // Of a flat radar: a row of antennas measures range and the angle between the row and the point, whatever
+  // its elevation, and takes the point to be in its plane.
+  static Eigen::Vector3d flattened(const Eigen::Vector3d& p_R) {
+    return {p_R.x(), std::hypot(p_R.y(), p_R.z()), 0.0};
   }
 
   SimulatedPoint detect(const Frame& frame, const Echo& echo, Random& random) const {
     const Eigen::Vector3d p_R = frame.middle.q_WR.conjugate() * (echo.p_W - frame.middle.p_W);
+    const Eigen::Vector3d seen_R = options_.measures_elevation ? p_R : flattened(p_R);
     SimulatedPoint point;
     const double range = std::max(options_.min_range, p_R.norm() + options_.range_noise * random.gaussian());
-    const double az = azimuth(p_R) + options_.azimuth_noise * kDegree * random.gaussian();
-    const double el = elevation(p_R) + options_.elevation_noise * kDegree * random.gaussian();
-    point.position_R = fromPolar(range, az, el);
-    point.doppler = quantised(trueDoppler(frame, echo) + options_.doppler_noise * random.gaussian());
+    const double az = azimuth(seen_R) + options_.azimuth_noise * kDegree * random.gaussian();
+    const double el = elevation(seen_R) + options_.elevation_noise * kDegree * random.gaussian();
+    point.position_R = fromPolar(range, az, options_.measures_elevation ? el : 0.0);
+    point.doppler = reported(trueDoppler(frame, echo) + options_.doppler_noise * random.gaussian());
     point.snr_db = std::max(6.0, echo.snr_db);
     point.noise_db = 40.0 + 2.0 * random.gaussian();
     return point;
@@ -248,8 +272,8 @@ class Sensor {
     const double range = random.uniform(options_.min_range, options_.max_range);
     const double az = options_.fov_azimuth * kDegree * random.uniform(-1.0, 1.0);
     const double el = options_.fov_elevation * kDegree * random.uniform(-1.0, 1.0);
-    point.position_R = fromPolar(range, az, el);
-    point.doppler = quantised(random.uniform(-2.5, 2.5));
+    point.position_R = fromPolar(range, az, options_.measures_elevation ? el : 0.0);
+    point.doppler = reported(random.uniform(-2.5, 2.5));
     point.snr_db = random.uniform(6.0, 16.0);
     point.noise_db = 40.0 + 2.0 * random.gaussian();
     return point;
@@ -333,6 +357,7 @@ std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarModelO
     if (scan.delivered) {
       Random random(seed, kScanStream, k);
       scan.points = sensor.measure(measured, random);
+      scan.delivered = options.publish_empty || !scan.points.empty();
     }
     scans.push_back(std::move(scan));
   }

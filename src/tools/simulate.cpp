@@ -15,6 +15,7 @@
 #include "rio_t/evaluation/trajectory.h"
 #include "rio_t/ros/bag/simulation_bag.h"
 #include "rio_t/simulation/motions.h"
+#include "rio_t/simulation/presets.h"
 #include "rio_t/simulation/simulation.h"
 
 namespace {
@@ -29,6 +30,8 @@ struct Request {
   std::string ground_truth;
   double duration = 0.0;
   std::optional<double> speed;
+  std::optional<double> fov_elevation;
+  Preset preset;  // what is moved unless --motion or --trajectory says so
   double ground_truth_file_rate = 400.0;
   double start_time = 1.7e9;
   bool noise_free = false;
@@ -82,6 +85,15 @@ std::string shown(double value) {
   return out.str();
 }
 
+// Half angle of view [deg] of a flat radar: a row of patch antennas has a beam of about 10 degrees.
+constexpr double kFlatFovElevation = 5.0;
+
+void apply(Request& request, const Preset& preset) {
+  request.preset = preset;
+  request.rest = preset.rest;
+  request.simulation = preset.options;
+}
+
 // The options of the program: what each sets, and what --help says about it.
 class Options {
  public:
@@ -91,6 +103,10 @@ class Options {
     TimeOffsetProfile& offset = r.simulation.time_offset;
 
     section("What moves, and where it goes");
+    add("preset", "NAME",
+        "a platform with its motion, sensors and mounting (see below); the other options change it", "none",
+        [&r](const std::string& v) { apply(r, presetOf(v)); });
+    options_.back().first = true;
     text("motion", "NAME", "built-in motion (see below)", r.motion);
     text("trajectory", "FILE",
          "or the poses of a TUM file (t x y z qx qy qz qw), through which a spline is put", r.trajectory);
@@ -110,8 +126,8 @@ class Options {
     number("duration", "S",
            "length of the bag with rest; 0 = the motion's own (with --trajectory: of the file)", r.duration,
            Range::kNotNegative);
-    add("speed", "M/S", "speed of the motion constant_speed; the others have their own", "1",
-        [&r](const std::string& v) { r.speed = parseNumber(v, Range::kPositive); });
+    add("speed", "M/S", "speed of the motions constant_speed and walk; the others have their own",
+        "1; walk 1.3", [&r](const std::string& v) { r.speed = parseNumber(v, Range::kPositive); });
     number("static-start", "S", "rest at the start; 0 = starts in motion", r.rest.static_start,
            Range::kNotNegative);
     number("static-end", "S", "rest at the end; 0 = ends in motion", r.rest.static_end, Range::kNotNegative);
@@ -122,7 +138,8 @@ class Options {
     number("record-offset", "S", "clock of the recorder minus clock of the IMU", r.bag.record_offset);
     number("gravity", "M/S^2", "magnitude", imu.gravity, Range::kPositive);
     flag("noise-free",
-         "no noise, vibration, bias, quantisation, ghosts, moving objects or lost scans (blackouts stay)",
+         "no noise, vibration, bias, quantisation, ghosts, moving objects or lost scans (blackouts, Doppler "
+         "span and flat radars stay)",
          r.noise_free);
 
     section("Time offset t_O: a scan stamped s was measured at s - t_O");
@@ -186,16 +203,27 @@ class Options {
     number("latency-sigma", "S", "scatter of it", radar.latency_sigma, Range::kNotNegative);
     number("points", "N", "mean number of points a scan", radar.points_mean, Range::kPositive);
     number("points-sigma", "N", "scatter of it", radar.points_sigma, Range::kNotNegative);
+    count("points-min", "fewest of it; 0 gives empty scans where mean and scatter do", radar.points_min, 0);
     count("points-max", "limit of it", radar.points_max);
+    add("skip-empty", "", "scans without points are not published", "",
+        [&radar](const std::string&) { radar.publish_empty = false; });
     number("min-range", "M", "nearest point", radar.min_range, Range::kNotNegative);
     number("max-range", "M", "farthest point", radar.max_range, Range::kPositive);
     number("fov-azimuth", "DEG", "half angle of view", radar.fov_azimuth, Range::kPositive);
-    number("fov-elevation", "DEG", "half angle of view", radar.fov_elevation, Range::kPositive);
+    add("fov-elevation", "DEG", "half angle of view",
+        shown(radar.fov_elevation) + "; " + shown(kFlatFovElevation) + " with --no-elevation",
+        [&r](const std::string& v) { r.fov_elevation = parseNumber(v, Range::kPositive); });
+    add("no-elevation", "",
+        "a flat radar: sees what is within --fov-elevation, reports it in its own plane, z = 0", "",
+        [&radar](const std::string&) { radar.measures_elevation = false; });
     number("range-noise", "M", "sigma", radar.range_noise, Range::kNotNegative);
     number("azimuth-noise", "DEG", "sigma", radar.azimuth_noise, Range::kNotNegative);
     number("elevation-noise", "DEG", "sigma", radar.elevation_noise, Range::kNotNegative);
     number("doppler-noise", "M/S", "sigma, before quantisation", radar.doppler_noise, Range::kNotNegative);
     number("doppler-step", "M/S", "quantisation; 0 = none", radar.doppler_step, Range::kNotNegative);
+    number("doppler-span", "M/S",
+           "whole unambiguous span, a whole number of steps: 3 wraps into [-1.5, 1.5); 0 = unlimited",
+           radar.doppler_span, Range::kNotNegative);
     number("ghosts", "SHARE", "of the points: anywhere, any Doppler", radar.ghost_share, Range::kShare);
     number("moving", "SHARE", "of the time: persons walk through the view", radar.moving_share,
            Range::kShare);
@@ -214,25 +242,14 @@ class Options {
 
   // `--name value` or `--name=value`. Throws std::invalid_argument with a message that names the option.
   void parse(const std::vector<std::string>& arguments) const {
-    for (std::size_t i = 0; i < arguments.size(); ++i) {
-      const std::string& argument = arguments[i];
-      const std::size_t equals = argument.find('=');
-      const std::string name = argument.substr(0, equals);
-      const Option* option = find(name);
-      if (option == nullptr) throw std::invalid_argument("unknown option '" + name + "' (see --help)");
-      std::string value;
-      if (equals != std::string::npos) {
-        if (option->argument.empty()) throw std::invalid_argument(name + ": takes no value");
-        value = argument.substr(equals + 1);
-      } else if (!option->argument.empty()) {
-        if (++i == arguments.size())
-          throw std::invalid_argument(name + ": a value is missing (" + option->argument + ")");
-        value = arguments[i];
-      }
+    std::vector<Given> given = read(arguments);
+    // A preset says what the others are to change, wherever it stands.
+    std::stable_partition(given.begin(), given.end(), [](const Given& g) { return g.option->first; });
+    for (const Given& g : given) {
       try {
-        option->set(value);
+        g.option->set(g.value);
       } catch (const std::invalid_argument& error) {
-        throw std::invalid_argument(name + ": " + error.what());
+        throw std::invalid_argument("--" + g.option->name + ": " + error.what());
       }
     }
   }
@@ -257,14 +274,41 @@ class Options {
     std::string argument;  // unit or form of the value; empty for a flag
     std::string help;
     std::string shown_default;
-    Setter set;  // empty for a heading
+    Setter set;          // empty for a heading
+    bool first = false;  // set before the others
+  };
+  struct Given {
+    const Option* option;
+    std::string value;
   };
 
-  void section(const std::string& heading) { options_.push_back({"", "", heading, "", nullptr}); }
+  std::vector<Given> read(const std::vector<std::string>& arguments) const {
+    std::vector<Given> given;
+    for (std::size_t i = 0; i < arguments.size(); ++i) {
+      const std::string& argument = arguments[i];
+      const std::size_t equals = argument.find('=');
+      const std::string name = argument.substr(0, equals);
+      const Option* option = find(name);
+      if (option == nullptr) throw std::invalid_argument("unknown option '" + name + "' (see --help)");
+      std::string value;
+      if (equals != std::string::npos) {
+        if (option->argument.empty()) throw std::invalid_argument(name + ": takes no value");
+        value = argument.substr(equals + 1);
+      } else if (!option->argument.empty()) {
+        if (++i == arguments.size())
+          throw std::invalid_argument(name + ": a value is missing (" + option->argument + ")");
+        value = arguments[i];
+      }
+      given.push_back({option, value});
+    }
+    return given;
+  }
+
+  void section(const std::string& heading) { options_.push_back({"", "", heading, "", nullptr, false}); }
 
   void add(const std::string& name, const std::string& argument, const std::string& help,
            const std::string& shown_default, const Setter& set) {
-    options_.push_back({name, argument, help, shown_default, set});
+    options_.push_back({name, argument, help, shown_default, set, false});
   }
 
   void text(const std::string& name, const std::string& argument, const std::string& help,
@@ -285,11 +329,12 @@ class Options {
         [&target, range](const std::string& v) { target = parseNumber(v, range); });
   }
 
-  void count(const std::string& name, const std::string& help, int& target) {
-    add(name, "N", help, shown(target), [&target](const std::string& v) {
+  void count(const std::string& name, const std::string& help, int& target, int least = 1) {
+    add(name, "N", help, shown(target), [&target, least](const std::string& v) {
       const double n = parseNumber(v);
-      if (n < 1.0 || n > 100000.0 || n != std::floor(n)) {
-        throw std::invalid_argument("'" + v + "' is not a whole number from 1 to 100000");
+      if (n < least || n > 100000.0 || n != std::floor(n)) {
+        throw std::invalid_argument("'" + v + "' is not a whole number from " + std::to_string(least) +
+                                    " to 100000");
       }
       target = static_cast<int>(n);
     });
@@ -306,16 +351,22 @@ class Options {
 };
 
 void printHelp(const Options& options) {
-  std::cout << "Writes a bag of a simulated IMU and radar whose motion and time offset are known.\n\n"
-               "usage: simulate (--motion NAME | --trajectory FILE.txt) --out FILE.bag [options]\n"
-               "example: rosrun rio_t simulate --motion difficult --time-offset 0.03 --seed 1 --out sim.bag\n"
-               "\nDefaults are in brackets. Noise is that of an ADIS16448 and a TI IWR6843AOP, measured on a "
-               "real bag.\n";
+  std::cout
+      << "Writes a bag of a simulated IMU and radar whose motion and time offset are known.\n\n"
+         "usage: simulate (--motion NAME | --trajectory FILE.txt | --preset NAME) --out FILE.bag [options]\n"
+         "example: rosrun rio_t simulate --motion difficult --time-offset 0.03 --seed 1 --out sim.bag\n"
+         "\nDefaults are in brackets. Noise is that of an ADIS16448 and a TI IWR6843AOP, measured on a "
+         "real bag.\n";
   options.print(std::cout);
   std::cout << "\nMotions (duration with rest)\n";
   for (const MotionDescription& motion : builtInMotions()) {
     std::cout << "  " << std::left << std::setw(18) << motion.name << motion.summary << " ("
               << motion.default_duration << " s)\n";
+  }
+  std::cout << "\nPresets (motion)\n";
+  for (const Preset& preset : presets()) {
+    std::cout << "  " << std::left << std::setw(18) << preset.name << preset.summary << " (" << preset.motion
+              << ")\n";
   }
 }
 
@@ -329,14 +380,17 @@ Motion motionFromFile(const Request& request) {
 }
 
 Motion motionOf(const Request& request) {
-  if (request.motion.empty() == request.trajectory.empty()) {
-    throw std::invalid_argument("exactly one of --motion and --trajectory is needed (see --help)");
+  const bool preset = request.motion.empty() && request.trajectory.empty() && !request.preset.motion.empty();
+  const std::string& name = preset ? request.preset.motion : request.motion;
+  if (name.empty() == request.trajectory.empty()) {
+    throw std::invalid_argument(
+        "exactly one of --motion and --trajectory is needed, or a --preset (see --help)");
   }
   if (request.out.empty()) throw std::invalid_argument("--out: the bag to write is not given (see --help)");
   if (!request.trajectory.empty()) {
     if (request.speed) {
       throw std::invalid_argument(
-          "--speed: only --motion constant_speed can be given one, a trajectory has its own");
+          "--speed: only the motions constant_speed and walk can be given one, a trajectory has its own");
     }
     try {
       return motionFromFile(request);
@@ -344,7 +398,8 @@ Motion motionOf(const Request& request) {
       throw std::invalid_argument("--trajectory " + request.trajectory + ": " + error.what());
     }
   }
-  return makeMotion({request.motion, request.simulation.seed, request.duration, request.rest, request.speed});
+  const double duration = preset && request.duration == 0.0 ? request.preset.duration : request.duration;
+  return makeMotion({name, request.simulation.seed, duration, request.rest, request.speed});
 }
 
 std::string triple(const Eigen::Vector3d& v) {
@@ -403,6 +458,12 @@ void run(Request request) {
   if (request.noise_free) {
     request.simulation.imu.removeErrors();
     request.simulation.radar.removeErrors();
+  }
+  RadarModelOptions& radar = request.simulation.radar;
+  if (request.fov_elevation) {
+    radar.fov_elevation = *request.fov_elevation;
+  } else if (!radar.measures_elevation) {
+    radar.fov_elevation = kFlatFovElevation;
   }
   request.simulation.start = Time::fromSeconds(request.start_time);
   const Motion motion = motionOf(request);

@@ -23,7 +23,8 @@ struct MotionRequest {
   std::uint64_t seed = 0;
   double duration = 0.0;   ///< [s] with rest; 0 = the motion's default
   MotionRestOptions rest;  ///< `start_in_motion` ignores `static_start`
-  /// [m/s] of `constant_speed`, 1 if not given. The other motions have speeds of their own.
+  /// [m/s] of `constant_speed`, 1 if not given, and of `walk` between its turns, 1.3 if not given. The other
+  /// motions have speeds of their own.
   std::optional<double> speed = std::nullopt;
 };
 

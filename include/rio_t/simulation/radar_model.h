@@ -19,17 +19,25 @@ struct RadarModelOptions {
 
   double points_mean = 43.0;    ///< points a scan
   double points_sigma = 8.0;    ///< their scatter
+  int points_min = 1;           ///< fewest wanted; a scan has fewer where fewer things are in view
   int points_max = 70;          ///< the sensor's limit
+  bool publish_empty = true;    ///< scans without points; else they are not delivered, as by some drivers
   double min_range = 0.25;      ///< [m]
   double max_range = 12.0;      ///< [m]
   double fov_azimuth = 60.0;    ///< [deg] half angle
   double fov_elevation = 45.0;  ///< [deg] half angle
+  /// A flat radar, false, has one row of antennas: it sees what is within `fov_elevation`, measures range and
+  /// the angle to that row, and reports all points in its plane, z = 0.
+  bool measures_elevation = true;
 
   double range_noise = 0.03;     ///< [m] sigma
   double azimuth_noise = 2.5;    ///< [deg] sigma
   double elevation_noise = 4.5;  ///< [deg] sigma
   double doppler_noise = 0.02;   ///< [m/s] sigma, before quantisation
   double doppler_step = 0.125;   ///< [m/s] quantisation; 0 = none
+  /// [m/s] whole unambiguous span, a whole number of steps: a Doppler appears within [-span / 2, span / 2),
+  /// whole spans away from its true value; 0 = unlimited
+  double doppler_span = 0.0;
 
   double ghost_share = 0.03;   ///< of the points: anywhere, any Doppler
   double moving_share = 0.10;  ///< of the time: walking persons in view
@@ -41,7 +49,8 @@ struct RadarModelOptions {
   };
   std::vector<Interval> blackouts;  ///< no scan with a stamp inside is delivered
 
-  /// Exact points of static reflectors only, every scan delivered but for blackouts.
+  /// Exact points of static reflectors only, every scan delivered but for blackouts. What the sensor cannot
+  /// see or tell apart stays: field of view, elevation, Doppler span.
   void removeErrors();
 };
 
@@ -55,11 +64,11 @@ struct SimulatedPoint {
 
 struct SimulatedScan {
   std::uint32_t seq = 0;
-  Time stamp;                ///< trigger
-  Time measured;             ///< stamp - t_O
-  Time arrival;              ///< when a driver would publish it
-  double time_offset = 0.0;  ///< true t_O of this scan [s]
-  bool delivered = true;
+  Time stamp;                                     ///< trigger
+  Time measured;                                  ///< stamp - t_O
+  Time arrival;                                   ///< when a driver would publish it
+  double time_offset = 0.0;                       ///< true t_O of this scan [s]
+  bool delivered = true;                          ///< false: lost, or empty and not published
   Eigen::Vector3d v_R = Eigen::Vector3d::Zero();  ///< true velocity of the radar at `measured`, in R [m/s]
   std::vector<SimulatedPoint> points;             ///< empty if not delivered
 };
