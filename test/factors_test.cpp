@@ -146,7 +146,7 @@ TEST(ImuRadarFactor, JacobiansAreCorrectForwardsAndBackwards) {
   for (const double t_O : {-0.11, -0.0113, 0.0037, 0.0521, 0.2031}) {
     // Held, t_O has no part in it: the derivatives in the state are exact.
     RadarVelocityMeasurement z = measurement(motion.time(1.0));
-    z.held_t_O = t_O;
+    z.linear_from_t_O = t_O;
     expectJacobiansCorrect(RadarVelocityFactor(z, motion.time(0.98), imuModel(imu)),
                            {values(moved(motion.state(0.98), 0.05)), {0.2 - t_O}}, 1e-6, 1e-4);
   }
@@ -192,7 +192,7 @@ TEST(ImuRadarFactor, AHeldOffsetIsAllThatCounts) {
     return r;
   };
   const Eigen::Vector3d free = residual(0.02);
-  z.held_t_O = 0.02;
+  z.linear_from_t_O = 0.02;
   EXPECT_EQ(residual(0.02), free);
   EXPECT_EQ(residual(-0.1), free);
 }

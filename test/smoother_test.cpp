@@ -128,7 +128,7 @@ TEST_F(Smoother, ScansThatSayNothingOfTheOffsetLeaveIt) {
   RadarSmoother smoother = make(options);
   for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
     RadarVelocityMeasurement z = measurement(stamp, 0.0);
-    z.held_t_O = smoother.t_O();
+    z.linear_from_t_O = smoother.t_O();
     smoother.add(z);
     smoother.optimize();
     smoother.marginalize();

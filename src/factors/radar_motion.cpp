@@ -28,7 +28,7 @@ Time RadarMotionModel::meanTime(Time stamp, double t_O) const {
                                kMillisecond);
 }
 
-ImuMean RadarMotionModel::meanAt(Time time) const { return imu->mean(time, kOffsetHalfWidth); }
+ImuMean RadarMotionModel::meanAt(Time time) const { return imu->mean(time, offsetHalfWidth(*imu, time)); }
 
 RadarMotion RadarMotionModel::carriedByImu(const StateView& x, Time state_time, Time tau,
                                            const Eigen::Vector3d& l_I, const ImuMean* mean) const {

@@ -1,19 +1,30 @@
 #include "rio_t/factors/radar_velocity_model.h"
 
+#include "rio_t/factors/offset_derivative.h"
+
 namespace rio_t {
 
+bool RadarVelocityModel::isCurrent(Time mean_time) const {
+  return mean_ && mean_->time == mean_time &&
+         (mean_->imu_until == model_.imu->newest() || mean_->imu_until - mean_time > kMaxOffsetHalfWidth);
+}
+
 PredictedVelocity RadarVelocityModel::at(double const* const* parameters, bool derivatives) const {
-  const double t_O = scan_.held_t_O.value_or(parameters[1][0]);
+  const double t_O = scan_.linear_from_t_O.value_or(parameters[1][0]);
+  const double away = parameters[1][0] - t_O;
+  // The derivative is needed where the value depends on it.
+  const bool is_linear = away != 0.0 && scan_.offset_gain > 0.0;
   const Time mean_time = model_.meanTime(scan_.stamp, t_O);
-  if (derivatives && (!mean_ || mean_->time != mean_time)) mean_ = Mean{mean_time, model_.meanAt(mean_time)};
+  if ((derivatives || is_linear) && !isCurrent(mean_time))
+    mean_ = Mean{mean_time, model_.imu->newest(), model_.meanAt(mean_time)};
   const RadarMotion motion = model_.at(parameters[0], state_time_, scan_.stamp, t_O, scan_.T_IR.l_I,
-                                       derivatives ? &mean_->value : nullptr);
+                                       derivatives || is_linear ? &mean_->value : nullptr);
   const Eigen::Matrix3d R_RI = scan_.T_IR.R_RI();
   PredictedVelocity predicted;
+  predicted.dv_dt_O = scan_.offset_gain * (R_RI * motion.dv_dt_O);
   predicted.v_R = R_RI * motion.v_I;
-  if (!derivatives) return predicted;
-  predicted.J_state = R_RI * motion.J_state;
-  if (!scan_.held_t_O) predicted.dv_dt_O = scan_.offset_gain * (R_RI * motion.dv_dt_O);
+  if (is_linear) predicted.v_R += away * predicted.dv_dt_O;
+  if (derivatives) predicted.J_state = R_RI * motion.J_state;
   return predicted;
 }
 

@@ -85,15 +85,14 @@ RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) co
 }
 
 void BatchOdometry::setMeasurement(const ScanResult& result, const BatchNode& node, BatchScan& scan) const {
-  std::optional<double> held_t_O;
-  if (result.offset_gain == 0.0 || isAtRest(node)) held_t_O = node.t_O;
+  const double offset_gain = isAtRest(node) ? 0.0 : result.offset_gain;
   if (result.doppler) {
     scan.doppler = result.doppler;
     scan.doppler->shared_variances *= model_error_scale_ / result.model_error_scale;
-    scan.doppler->held_t_O = held_t_O;
+    scan.doppler->offset_gain = offset_gain;
   } else {
     scan.velocity = measurement(result);
-    scan.velocity->held_t_O = held_t_O;
+    scan.velocity->offset_gain = offset_gain;
   }
 }
 

@@ -235,7 +235,7 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
       RadarVelocityMeasurement z = velocities[i];
       z.covariance = carriedCovariance(velocities[i], time, imu, scale.value()).whole;
       z.offset_gain = gains[i];
-      if (gains[i] == 0.0) z.held_t_O = offset->x[0];
+      if (gains[i] == 0.0) z.linear_from_t_O = offset->x[0];
       terms.push_back(
           &window.add(std::make_unique<RadarVelocityFactor>(z, time, model), {&state, offset.get()}, loss));
     }

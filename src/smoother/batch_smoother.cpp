@@ -100,11 +100,16 @@ BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std
     }
     const Node& node = graph.nodes.back();
     graph.node_of_scan[i] = graph.nodes.size() - 1;
+    // Placed anew where the offset moves, so first order is enough.
+    const auto placed = [&](auto z) {
+      if (atMeasurement() || z.offset_gain == 0.0) z.linear_from_t_O = t_O[i];
+      return z;
+    };
     if (scan.doppler) {
-      window.add(std::make_unique<DopplerFactor>(*scan.doppler, *node.state->time, model()),
+      window.add(std::make_unique<DopplerFactor>(placed(*scan.doppler), *node.state->time, model()),
                  {node.state, node.offset});
     } else if (scan.velocity) {
-      window.add(std::make_unique<RadarVelocityFactor>(*scan.velocity, *node.state->time, model()),
+      window.add(std::make_unique<RadarVelocityFactor>(placed(*scan.velocity), *node.state->time, model()),
                  {node.state, node.offset}, loss);
     }
     if (scan.rest_velocity_sigma)
@@ -163,7 +168,8 @@ BatchSmoother::Residual BatchSmoother::residual(const BatchNode& node, const Nod
                                                 const RadarVelocityMeasurement& z) const {
   RadarVelocityMeasurement unit = z;
   unit.covariance.setIdentity();
-  unit.held_t_O.reset();
+  unit.linear_from_t_O.reset();
+  unit.offset_gain = 1.0;
   // The paper's factor stands at the stamp itself.
   const StateBlock x = atMeasurement() ? node.x : carried(node.x, node.time, z.stamp, *imu_, g_W_);
   const double* blocks[] = {x.data(), &node.t_O};

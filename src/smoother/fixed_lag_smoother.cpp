@@ -158,7 +158,7 @@ std::vector<NodeEstimate> FixedLagSmoother::marginalize(const std::vector<Random
 Time FixedLagSmoother::imuNeededSince() const {
   // Offsets move a radar factor's time by at most the bound to either side of its stamp, and the stamp lies
   // within the bound of the node.
-  return nodes_.front().time() - (2.0 * options_.max_time_offset + kOffsetHalfWidth);
+  return nodes_.front().time() - (2.0 * options_.max_time_offset + kMaxOffsetHalfWidth);
 }
 
 }  // namespace rio_t

@@ -11,6 +11,13 @@ namespace rio_t {
 /// and above hardly moves a radar and must not count as acceleration. Motion at 2 Hz, as of people, loses 13
 /// % (docs/method.md, section 5.3).
 constexpr double kOffsetHalfWidth = 0.1;
+/// The same where the IMU vibrates: as long as it takes until the noise of the mean is below kMaxRateNoise
+/// [m/s^2], which is half of the acceleration that tells an offset; but not longer than half a window.
+constexpr double kMaxOffsetHalfWidth = 0.5;
+constexpr double kMaxRateNoise = 0.1;
+
+/// Half of the time over which the derivative averages the IMU at `time` [s].
+double offsetHalfWidth(const ImuBuffer& imu, Time time);
 
 /// Derivative of the radar's velocity with respect to the time of measurement, d/dtau, in I. The derivative
 /// with respect to t_O has the opposite sign (docs/method.md, eq. 18).

@@ -16,8 +16,10 @@ struct RadarScanTime {
   Extrinsics T_IR;
   /// Share of the derivative with respect to t_O that is motion and not noise of the IMU, see OffsetEvidence.
   double offset_gain = 1.0;
-  /// Set if the scan does not tell the offset. The factor then uses this value [s] instead of t_O.
-  std::optional<double> held_t_O = std::nullopt;
+  /// If set, the motion is taken at this t_O [s], and to first order from there. Exactly at each t_O, the noise
+  /// of the IMU over a shift raises the cost whatever the direction of the shift. With a gain of 0, the scan
+  /// does not tell the offset.
+  std::optional<double> linear_from_t_O = std::nullopt;
 };
 
 /// Velocity of the radar at the time of measurement of a scan, in R, and its derivatives.
@@ -37,11 +39,14 @@ class RadarVelocityModel {
   PredictedVelocity at(double const* const* parameters, bool derivatives) const;
 
  private:
+  bool isCurrent(Time mean_time) const;
+
   RadarScanTime scan_;
   Time state_time_;
   RadarMotionModel model_;
   struct Mean {
     Time time;
+    Time imu_until;  ///< what the IMU reached then: later samples may belong to the mean
     ImuMean value;
   };
   mutable std::optional<Mean> mean_;  ///< of the last evaluation: a cache

@@ -14,6 +14,7 @@ struct OffsetDerivative {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();    ///< [m/s^2], as the next two: over both sides
   Eigen::Vector3d before = Eigen::Vector3d::Zero();  ///< over the time before the scan alone
   Eigen::Vector3d after = Eigen::Vector3d::Zero();   ///< over the time after it alone
+  double variance = 0.0;  ///< of the IMU's noise in `mean`, per axis, as far as it is known [m^2/s^4]
   /// Covariance of the error that all three share: of tilt and accelerometer bias [m^2/s^4].
   Eigen::Matrix3d shared = Eigen::Matrix3d::Zero();
 };
@@ -24,9 +25,9 @@ OffsetDerivative offsetDerivative(const ImuBuffer& imu, Time tau, const StateBlo
 
 /// How much of the derivative with respect to t_O is motion, and how much is noise of the IMU.
 ///
-/// Noise in the derivative claims information about t_O that no scan has. Motion is the same before and after
-/// a scan, noise is not. So the mean of before' W after is the square of the motion, whatever the noise, and
-/// its share in mean' W mean is the gain by which the derivative has to be shortened: then J'J claims what
+/// Noise in the derivative claims information about t_O that no scan has. A derivative far beyond the known
+/// noise is motion. Of the others: motion is the same before and after a scan, noise is not. So the mean of
+/// before' W after is the square of the motion, whatever the noise. Its share in mean' W mean is the gain by which the derivative has to be shortened: then J'J claims what
 /// the scans know (docs/method.md, section 5.3). Not thread-safe.
 class OffsetEvidence {
  public:
