@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <cstdio>
 
 #include "rio_t/factors/offset_derivative.h"
 
@@ -51,9 +49,6 @@ void OffsetEvidence::add(Time stamp, const OffsetDerivative& derivative, const E
 double OffsetEvidence::gain() const {
   // One sigma less: noise alone passes it by little and seldom.
   const double sure = motion_ - std::sqrt(motion_variance_);
-  if (getenv("GAIN1") != nullptr) return 1.0;
-  if (getenv("GAINP") != nullptr) fprintf(stderr, "gain %.3f %.3f %.3f\n", last_.seconds(), sure / all_, all_);
-  return sure > 0.0 && all_ > 0.0 ? std::min(1.0, sure / all_) : 0.0;
 }
 
 }  // namespace rio_t

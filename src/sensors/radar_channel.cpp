@@ -81,7 +81,7 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   if (informs_offset) measured.covariance.diagonal().array() += prediction->rate_variance;
 
   RadarScanTime taken{scan.stamp, options_.T_IR, answer.offset_gain};
-  if (!informs_offset || getenv("LIN") != nullptr) taken.linear_from_t_O = offset();
+  taken.linear_from_t_O = offset();
   if (tightly && measured.status == EgoVelocityStatus::kMoving) {
     const auto points =
         std::make_shared<DopplerLikelihood>(estimator_.likelihood(scan, measured.inliers, measured.v_R));
