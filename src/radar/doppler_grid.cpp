@@ -1,0 +1,167 @@
+#include "rio_t/radar/doppler_grid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+
+namespace rio_t {
+namespace {
+
+/// [m/s] Smaller steps are none. Beside a noise of 0.035 m/s their sigma of step / sqrt(12) makes 1.4 %.
+constexpr double kLeastStep = 0.02;
+/// [m/s] Larger ones are none: it would be 1 ms in which the radar measures a Doppler (at 77 GHz).
+constexpr double kLargestStep = 2.0;
+/// [steps] of a value as the driver gives it; it may round to decimals or convert. Values of a radar without
+/// steps come so near to a multiple once in 500 times.
+constexpr double kRounding = 1e-3;
+/// [steps] Where a value is expected no better, being 20 times the one that the step was read off, it counts
+/// as odd. So does a mark like -999 for "no Doppler".
+constexpr double kMaxTolerance = 0.02;
+/// Values of a batch of 32 that may be no multiples. If every twentieth value of a radar is odd, one batch in
+/// 50 has more, and one in 10^5 is the last of three in a row. Of a radar without steps, each value is near a
+/// multiple of a wrong step once in 25 times at most (kMaxTolerance), and 28 of 32 never are.
+constexpr std::size_t kMaxOdd = 4;
+constexpr int kBatchesWithoutStep = 3;
+
+/// The multiple of the step that a value is; 0: it is odd. The step was read off a value of `known_at` steps.
+/// So m steps are expected to within the rounding of the value and that of the step, which has grown by m /
+/// known_at.
+double multipleOf(double step, double known_at, double value) {
+  const double steps = value / step;
+  const double multiple = std::round(steps);
+  const double tolerance = kRounding * (1.0 + multiple / known_at);
+  return tolerance <= kMaxTolerance && std::abs(steps - multiple) <= tolerance ? multiple : 0.0;
+}
+
+/// A step [m/s] and the multiple that it was read off.
+struct Reading {
+  double step = 0.0;
+  double known_at = 1.0;
+};
+
+template <typename Batch>
+std::size_t countOdd(const Batch& values, const Reading& reading) {
+  return static_cast<std::size_t>(std::count_if(values.begin(), values.end(), [&](double value) {
+    return multipleOf(reading.step, reading.known_at, value) == 0.0;
+  }));
+}
+
+/// `start` as the values tell it, if it explains them: if all but kMaxOdd are multiples.
+///
+/// The values ascend, and each larger multiple tells the step better. Only the first value of a multiple
+/// does: a step that followed each would creep through values that lie close together without being the same.
+template <typename Batch>
+std::optional<Reading> explain(const Batch& ascending, const Reading& start) {
+  Reading reading = start;
+  std::size_t odd = 0;
+  for (const double value : ascending) {
+    const double multiple = multipleOf(reading.step, reading.known_at, value);
+    if (multiple == 0.0 && ++odd > kMaxOdd) return std::nullopt;
+    if (multiple > reading.known_at) reading = {value / multiple, multiple};
+  }
+  return reading;
+}
+
+/// More than kMaxOdd values are multiples of the step alone, and not of one that is some times as large. A
+/// smaller step always explains a few more by chance.
+template <typename Batch>
+bool isNeeded(const Batch& values, const Reading& reading) {
+  const std::size_t odd = countOdd(values, reading);
+  for (double times = 2.0; times * reading.step < kLargestStep; times += 1.0) {
+    const Reading larger{times * reading.step, std::max(1.0, reading.known_at / times)};
+    if (countOdd(values, larger) <= odd + kMaxOdd) return false;
+  }
+  return true;
+}
+
+/// The largest step above `least` [m/s] that explains the values and that `base` is a multiple of.
+template <typename Batch>
+std::optional<Reading> largestStep(const Batch& ascending, const Reading& base, double least) {
+  double parts = std::max(1.0, std::ceil(base.step / kLargestStep));
+  for (; base.step / parts > least; parts += 1.0) {
+    const auto found = explain(ascending, {base.step / parts, base.known_at * parts});
+    if (found && isNeeded(ascending, *found)) return found;
+  }
+  return std::nullopt;
+}
+
+/// How often the most frequent value is there.
+template <typename Batch>
+std::size_t mostRepeated(const Batch& ascending) {
+  std::size_t most = 0;
+  for (auto first = ascending.begin(); first != ascending.end();) {
+    const auto next = std::upper_bound(first, ascending.end(), *first * (1.0 + 2.0 * kRounding));
+    most = std::max(most, static_cast<std::size_t>(next - first));
+    first = next;
+  }
+  return most;
+}
+
+}  // namespace
+
+DopplerGrid::DopplerGrid(double given) {
+  if (!(given >= 0.0) || !std::isfinite(given))
+    throw std::invalid_argument("Doppler grid: the step must be finite and at least 0 m/s");
+  step_ = given > 0.0 ? DopplerStep{given < kLeastStep ? 0.0 : given, DopplerStepSource::kGiven}
+                      : DopplerStep{kTypicalStep, DopplerStepSource::kUnknown};
+}
+
+void DopplerGrid::add(const RadarScan& scan) {
+  if (step_.source == DopplerStepSource::kGiven) return;
+  for (const RadarPoint& point : scan.points) {
+    const double size = std::abs(point.doppler);
+    // Zero is a multiple of every step.
+    if (!(size > 0.5 * kLeastStep) || !std::isfinite(size)) continue;
+    batch_[count_] = size;
+    if (++count_ == kBatch) judge();
+  }
+}
+
+/// The batch is full.
+void DopplerGrid::judge() {
+  count_ = 0;
+  std::sort(batch_.begin(), batch_.end());
+  std::optional<Reading> found;
+  if (step_.source == DopplerStepSource::kData && step_.value > 0.0) {
+    // A step that is known is not read anew: an odd value that comes near to a multiple must not move it.
+    if (countOdd(batch_, {step_.value, known_at_}) <= kMaxOdd) {
+      without_step_ = 0;
+      return;
+    }
+    // Perhaps all values so far were multiples of two steps.
+    found = largestStep(batch_, {step_.value, known_at_}, kLeastStep);
+  }
+  const std::size_t repeated = mostRepeated(batch_);
+  if (!found) {
+    // One value alone is a multiple, but nobody knows of how many steps.
+    if (repeated + kMaxOdd >= kBatch) return;
+    // The smallest values are multiples of few steps. As many as may be odd are perhaps odd.
+    for (std::size_t i = 0; i <= kMaxOdd; ++i) {
+      const double least = found ? found->step : kLeastStep;
+      if (const auto larger = largestStep(batch_, {batch_[i], 1.0}, least)) found = larger;
+    }
+  }
+  if (found) {
+    without_step_ = 0;
+    step_ = {found->step, DopplerStepSource::kData};
+    known_at_ = found->known_at;
+  } else if (2 * repeated < kBatch && ++without_step_ >= kBatchesWithoutStep) {
+    // Without steps, no value comes again and again, as it does at rest.
+    step_ = {0.0, DopplerStepSource::kData};
+  }
+}
+
+std::string toString(DopplerStepSource source) {
+  switch (source) {
+    case DopplerStepSource::kUnknown:
+      return "unknown";
+    case DopplerStepSource::kGiven:
+      return "given";
+    case DopplerStepSource::kData:
+      return "data";
+  }
+  throw std::invalid_argument("Doppler grid: not a source");
+}
+
+}  // namespace rio_t
