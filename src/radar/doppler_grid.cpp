@@ -12,11 +12,13 @@ namespace {
 constexpr double kLeastStep = 0.02;
 /// [m/s] Larger ones are none: it would be 1 ms in which the radar measures a Doppler (at 77 GHz).
 constexpr double kLargestStep = 2.0;
+/// [m/s] Larger values are marks of a driver, like -999 for "no Doppler".
+constexpr double kLargestDoppler = 100.0;
 /// [steps] of a value as the driver gives it; it may round to decimals or convert. Values of a radar without
 /// steps come so near to a multiple once in 500 times.
 constexpr double kRounding = 1e-3;
 /// [steps] Where a value is expected no better, being 20 times the one that the step was read off, it counts
-/// as odd. So does a mark like -999 for "no Doppler".
+/// as odd.
 constexpr double kMaxTolerance = 0.02;
 /// Values of a batch of 32 that may be no multiples. If every twentieth value of a radar is odd, one batch in
 /// 50 has more, and one in 10^5 is the last of three in a row. Of a radar without steps, each value is near a
@@ -29,7 +31,8 @@ constexpr int kBatchesWithoutStep = 3;
 /// known_at.
 double multipleOf(double step, double known_at, double value) {
   const double steps = value / step;
-  const double multiple = std::round(steps);
+  const auto multiple =
+      static_cast<double>(static_cast<int>(steps + 0.5));  // std::round takes thrice as long
   const double tolerance = kRounding * (1.0 + multiple / known_at);
   return tolerance <= kMaxTolerance && std::abs(steps - multiple) <= tolerance ? multiple : 0.0;
 }
@@ -112,7 +115,7 @@ void DopplerGrid::add(const RadarScan& scan) {
   for (const RadarPoint& point : scan.points) {
     const double size = std::abs(point.doppler);
     // Zero is a multiple of every step.
-    if (!(size > 0.5 * kLeastStep) || !std::isfinite(size)) continue;
+    if (!(size > 0.5 * kLeastStep && size < kLargestDoppler)) continue;
     batch_[count_] = size;
     if (++count_ == kBatch) judge();
   }
