@@ -157,16 +157,16 @@ TEST(DopplerGrid, AClusterIsNoStep) {
   }
 }
 
-TEST(DopplerGrid, BearsOddValues) {
+TEST(DopplerGrid, BearsMisfits) {
   // What else a driver may put in: values that are not rounded, marks for "none".
-  const std::vector<std::function<double(Random&)>> odd_values = {
+  const std::vector<std::function<double(Random&)>> misfits = {
       [](Random& random) { return random.uniform(-2.0, 2.0); },
       [](Random&) { return -999.9; },
       [](Random&) { return 1e10; },
       [](Random&) { return std::numeric_limits<double>::quiet_NaN(); },
       [](Random&) { return std::numeric_limits<double>::infinity(); },
   };
-  for (const auto& odd_value : odd_values) {
+  for (const auto& misfit : misfits) {
     for (const double step : {0.0634, 0.125, 0.49}) {
       for (std::uint32_t seed = 1; seed <= 20; ++seed) {
         SCOPED_TRACE(testing::Message() << step << " m/s, seed " << seed);
@@ -175,7 +175,7 @@ TEST(DopplerGrid, BearsOddValues) {
         for (int i = 0; i < 1000; ++i) {
           RadarScan scan = scanAt(speedOf(i), 20, step, random);
           for (RadarPoint& p : scan.points) {
-            if (random.uniform(0, 1) < 0.02) p.doppler = odd_value(random);
+            if (random.uniform(0, 1) < 0.02) p.doppler = misfit(random);
           }
           grid.add(scan);
           if (i < 100) continue;

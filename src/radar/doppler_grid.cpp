@@ -17,18 +17,21 @@ constexpr double kLargestDoppler = 100.0;
 /// [steps] of a value as the driver gives it; it may round to decimals or convert. Values of a radar without
 /// steps come so near to a multiple once in 500 times.
 constexpr double kRounding = 1e-3;
-/// [steps] Where a value is expected no better, being 20 times the one that the step was read off, it counts
-/// as odd.
+/// [steps] Where a value is expected no better, being 20 times the one that the step was read off, it is a
+/// misfit.
 constexpr double kMaxTolerance = 0.02;
-/// Values of a batch of 32 that may be no multiples. If every twentieth value of a radar is odd, one batch in
-/// 50 has more, and one in 10^5 is the last of three in a row. Of a radar without steps, each value is near a
-/// multiple of a wrong step once in 25 times at most (kMaxTolerance), and 28 of 32 never are.
-constexpr std::size_t kMaxOdd = 4;
-constexpr int kBatchesWithoutStep = 3;
+/// Share of a value by which the same one may differ, as a float or computed from one.
+constexpr double kSame = 1e-6;
+/// Values of a batch of 16 that may be misfits: no multiples. If every fiftieth value of a radar is one, one
+/// batch in 270 has more, and four in a row never have; if every twentieth is, one in 23, and one in 300 000
+/// is the last of four. Of a radar without steps, each value is near a multiple of a wrong step once in 25
+/// times at most (kMaxTolerance), and 14 of 16 are once in 10^17 times.
+constexpr std::size_t kMaxMisfits = 2;
+constexpr int kBatchesWithoutStep = 4;
 
-/// The multiple of the step that a value is; 0: it is odd. The step was read off a value of `known_at` steps.
-/// So m steps are expected to within the rounding of the value and that of the step, which has grown by m /
-/// known_at.
+/// The multiple of the step that a value is; 0: it is a misfit. The step was read off a value of `known_at`
+/// steps. So m steps are expected to within the rounding of the value and that of the step, which has grown
+/// by m / known_at.
 double multipleOf(double step, double known_at, double value) {
   const double steps = value / step;
   const auto multiple =
@@ -44,36 +47,36 @@ struct Reading {
 };
 
 template <typename Batch>
-std::size_t countOdd(const Batch& values, const Reading& reading) {
+std::size_t countMisfits(const Batch& values, const Reading& reading) {
   return static_cast<std::size_t>(std::count_if(values.begin(), values.end(), [&](double value) {
     return multipleOf(reading.step, reading.known_at, value) == 0.0;
   }));
 }
 
-/// `start` as the values tell it, if it explains them: if all but kMaxOdd are multiples.
+/// `start` as the values tell it, if it explains them: if all but kMaxMisfits are multiples.
 ///
 /// The values ascend, and each larger multiple tells the step better. Only the first value of a multiple
 /// does: a step that followed each would creep through values that lie close together without being the same.
 template <typename Batch>
 std::optional<Reading> explain(const Batch& ascending, const Reading& start) {
   Reading reading = start;
-  std::size_t odd = 0;
+  std::size_t misfits = 0;
   for (const double value : ascending) {
     const double multiple = multipleOf(reading.step, reading.known_at, value);
-    if (multiple == 0.0 && ++odd > kMaxOdd) return std::nullopt;
+    if (multiple == 0.0 && ++misfits > kMaxMisfits) return std::nullopt;
     if (multiple > reading.known_at) reading = {value / multiple, multiple};
   }
   return reading;
 }
 
-/// More than kMaxOdd values are multiples of the step alone, and not of one that is some times as large. A
-/// smaller step always explains a few more by chance.
+/// More than kMaxMisfits values are multiples of the step alone, and not of one that is some times as large.
+/// A smaller step always explains a few more by chance.
 template <typename Batch>
 bool isNeeded(const Batch& values, const Reading& reading) {
-  const std::size_t odd = countOdd(values, reading);
+  const std::size_t misfits = countMisfits(values, reading);
   for (double times = 2.0; times * reading.step < kLargestStep; times += 1.0) {
     const Reading larger{times * reading.step, std::max(1.0, reading.known_at / times)};
-    if (countOdd(values, larger) <= odd + kMaxOdd) return false;
+    if (countMisfits(values, larger) <= misfits + kMaxMisfits) return false;
   }
   return true;
 }
@@ -89,14 +92,13 @@ std::optional<Reading> largestStep(const Batch& ascending, const Reading& base, 
   return std::nullopt;
 }
 
-/// How often the most frequent value is there.
+/// Most values that lie within `width` of each other, as a share of the value.
 template <typename Batch>
-std::size_t mostRepeated(const Batch& ascending) {
+std::size_t mostWithin(const Batch& ascending, double width) {
   std::size_t most = 0;
-  for (auto first = ascending.begin(); first != ascending.end();) {
-    const auto next = std::upper_bound(first, ascending.end(), *first * (1.0 + 2.0 * kRounding));
+  for (auto first = ascending.begin(); first != ascending.end(); ++first) {
+    const auto next = std::upper_bound(first, ascending.end(), *first * (1.0 + width));
     most = std::max(most, static_cast<std::size_t>(next - first));
-    first = next;
   }
   return most;
 }
@@ -127,20 +129,22 @@ void DopplerGrid::judge() {
   std::sort(batch_.begin(), batch_.end());
   std::optional<Reading> found;
   if (step_.source == DopplerStepSource::kData && step_.value > 0.0) {
-    // A step that is known is not read anew: an odd value that comes near to a multiple must not move it.
-    if (countOdd(batch_, {step_.value, known_at_}) <= kMaxOdd) {
+    // A step that is known is not read anew: a misfit that comes near to a multiple must not move it.
+    if (countMisfits(batch_, {step_.value, known_at_}) <= kMaxMisfits) {
       without_step_ = 0;
       return;
     }
     // Perhaps all values so far were multiples of two steps.
     found = largestStep(batch_, {step_.value, known_at_}, kLeastStep);
   }
-  const std::size_t repeated = mostRepeated(batch_);
   if (!found) {
-    // One value alone is a multiple, but nobody knows of how many steps.
-    if (repeated + kMaxOdd >= kBatch) return;
-    // The smallest values are multiples of few steps. As many as may be odd are perhaps odd.
-    for (std::size_t i = 0; i <= kMaxOdd; ++i) {
+    // One value alone is a multiple, but nobody knows of how many steps. Half of them wait for another.
+    if (mostWithin(batch_, 4.0 * kRounding) + kMaxMisfits >= kBatch) {
+      count_ = kBatch / 2;
+      return;
+    }
+    // The smallest values are multiples of few steps. So many may be misfits.
+    for (std::size_t i = 0; i <= kMaxMisfits; ++i) {
       const double least = found ? found->step : kLeastStep;
       if (const auto larger = largestStep(batch_, {batch_[i], 1.0}, least)) found = larger;
     }
@@ -149,8 +153,8 @@ void DopplerGrid::judge() {
     without_step_ = 0;
     step_ = {found->step, DopplerStepSource::kData};
     known_at_ = found->known_at;
-  } else if (2 * repeated < kBatch && ++without_step_ >= kBatchesWithoutStep) {
-    // Without steps, no value comes again and again, as it does at rest.
+  } else if (2 * mostWithin(batch_, kSame) < kBatch && ++without_step_ >= kBatchesWithoutStep) {
+    // Without steps no value comes again and again, as one step does at rest, among misfits.
     step_ = {0.0, DopplerStepSource::kData};
   }
 }

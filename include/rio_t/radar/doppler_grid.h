@@ -23,9 +23,9 @@ struct DopplerStep {
 
 /// Reads the step of a radar's Doppler off the data: all values are multiples of it.
 ///
-/// Values are judged in batches of 32 that are not zero. The step is the largest one of which all but an
+/// Values are judged in batches of 16 that are not zero. The step is the largest one of which all but an
 /// eighth of a batch are multiples. Batches that come later can only make it smaller, by a whole number,
-/// unless the radar is set up anew. Three batches in a row without a step, and there is none
+/// unless the radar is set up anew. Four batches in a row without a step, and there is none
 /// (docs/method.md, section 9.7). The answer depends on the values alone and their order. Not thread-safe.
 class DopplerGrid {
  public:
@@ -42,13 +42,13 @@ class DopplerGrid {
   static constexpr double kTypicalStep = 0.125;
 
  private:
-  static constexpr std::size_t kBatch = 32;
+  static constexpr std::size_t kBatch = 16;
   using Batch = std::array<double, kBatch>;
 
   void judge();
 
   DopplerStep step_;
-  double known_at_ = 1.0;  ///< [steps] the largest value that it was read off
+  double known_at_ = 1.0;  ///< [steps] of the value that it was read off
   Batch batch_ = {};       ///< sizes of Dopplers [m/s]
   std::size_t count_ = 0;  ///< of `batch_` that are in use
   int without_step_ = 0;   ///< batches in a row
