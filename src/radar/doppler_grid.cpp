@@ -134,7 +134,7 @@ void DopplerGrid::judge() {
       without_step_ = 0;
       return;
     }
-    // Perhaps all values so far were multiples of two steps.
+    // Perhaps all values so far were multiples of two steps, or three.
     found = largestStep(batch_, {step_.value, known_at_}, kLeastStep);
   }
   if (!found) {
@@ -143,7 +143,7 @@ void DopplerGrid::judge() {
       count_ = kBatch / 2;
       return;
     }
-    // The smallest values are multiples of few steps. So many may be misfits.
+    // The smallest values are multiples of few steps. One of the first kMaxMisfits + 1 is no misfit.
     for (std::size_t i = 0; i <= kMaxMisfits; ++i) {
       const double least = found ? found->step : kLeastStep;
       if (const auto larger = largestStep(batch_, {batch_[i], 1.0}, least)) found = larger;
