@@ -209,9 +209,9 @@ TEST(DopplerGrid, TheGivenStepHolds) {
   EXPECT_EQ(given.step().value, 0.3);
   EXPECT_EQ(none.step().source, DopplerStepSource::kGiven);
   EXPECT_EQ(none.step().value, 0.0);
-  EXPECT_THROW(DopplerGrid(-0.1), std::invalid_argument);
-  EXPECT_THROW(DopplerGrid(std::numeric_limits<double>::quiet_NaN()), std::invalid_argument);
-  EXPECT_THROW(DopplerGrid(std::numeric_limits<double>::infinity()), std::invalid_argument);
+  EXPECT_THROW(DopplerGrid{-0.1}, std::invalid_argument);
+  EXPECT_THROW(DopplerGrid{std::numeric_limits<double>::quiet_NaN()}, std::invalid_argument);
+  EXPECT_THROW(DopplerGrid{std::numeric_limits<double>::infinity()}, std::invalid_argument);
 }
 
 TEST(DopplerGrid, SameScansSameAnswer) {

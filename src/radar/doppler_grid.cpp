@@ -34,8 +34,7 @@ constexpr int kBatchesWithoutStep = 4;
 /// by m / known_at.
 double multipleOf(double step, double known_at, double value) {
   const double steps = value / step;
-  const auto multiple =
-      static_cast<double>(static_cast<int>(steps + 0.5));  // std::round takes thrice as long
+  const double multiple = std::round(steps);
   const double tolerance = kRounding * (1.0 + multiple / known_at);
   return tolerance <= kMaxTolerance && std::abs(steps - multiple) <= tolerance ? multiple : 0.0;
 }
