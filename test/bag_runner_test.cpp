@@ -185,10 +185,28 @@ TEST_F(BagRunner, EveryScanIsAccountedFor) {
        {"imu_count: 1600\n", "scans_total: 80\n", "scans_used: ", "scans_rejected: {",
         "solver_terminations: {converged: ", "path_length_m: ", "end_to_start_2d_m: ", "end_to_start_3d_m: ",
         "final_offset_s: ", "final_offset_sigma_s: ", "imu_noise: {accel: 0.", "radar_noise: {doppler: 0.",
+        "radar_doppler_step: 0.125", "radar_doppler_step_from: unknown\n", "radar_points_per_scan: {p10: ",
         "saved: [trajectory.txt", "estimation_seconds: ", "realtime_factor: "}) {
     EXPECT_NE(yaml.find(key), std::string::npos) << key;
   }
   EXPECT_EQ(yaml.find("ate_m"), std::string::npos);
+}
+
+TEST_F(BagRunner, TheDopplerStepIsToldWithItsSource) {
+  RunSummary summary;
+  const auto told = [&](double value, DopplerStepSource source, const char* in_summary,
+                        const char* in_table) {
+    summary.radar_doppler_step = {value, source};
+    RunOutput(out_).finish(summary);
+    EXPECT_NE(contents(out_ + "/summary.yaml").find(in_summary), std::string::npos) << in_summary;
+    EXPECT_NE(describeRun(summary, out_).find(in_table), std::string::npos) << in_table;
+  };
+  told(0.125, DopplerStepSource::kUnknown, "radar_doppler_step: 0.125000\nradar_doppler_step_from: unknown\n",
+       "not known");
+  told(0.49, DopplerStepSource::kGiven, "radar_doppler_step: 0.490000\nradar_doppler_step_from: given\n",
+       "0.490 m/s, given");
+  told(0.0, DopplerStepSource::kData, "radar_doppler_step: 0.000000\nradar_doppler_step_from: data\n",
+       "none, from the data");
 }
 
 TEST_F(BagRunner, WhyTheSolverStoppedIsTold) {

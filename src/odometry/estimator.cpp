@@ -51,6 +51,7 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
   result.left_window = std::exchange(left_in_silence_, {});
   const Time stamp = result.scan.stamp;
   RadarChannel& radar = radars_.at(result.scan.radar);
+  radar.observe(result.scan);
   if (!initialized()) {
     result.ego_velocity = radar.velocityOf(result.scan);
     initializer_.addVelocity(stamp, result.ego_velocity);

@@ -144,6 +144,8 @@ std::optional<RadarInertialOdometry::Start> RadarInertialOdometry::start() const
 
 PointVariances RadarInertialOdometry::radarNoise() const { return impl_->estimator.radarNoise(); }
 
+DopplerStep RadarInertialOdometry::radarDopplerStep() const { return impl_->estimator.radarDopplerStep(); }
+
 MeasuredImuNoise RadarInertialOdometry::imuNoise() const { return impl_->navigation.imuNoise(); }
 
 Health RadarInertialOdometry::health() const {

@@ -41,7 +41,7 @@ void validate(const EgoVelocityOptions& o) {
   require(o.zero_velocity_outlier_fraction >= 0.0 && o.zero_velocity_outlier_fraction < 1.0,
           "zero_velocity_outlier_fraction", "in [0, 1)");
   require(o.zero_velocity_sigma > 0.0, "zero_velocity_sigma", "above 0 m/s");
-  require(o.ransac_inlier_threshold > 0.0, "ransac_inlier_threshold", "above 0 m/s");
+  require(o.ransac_inlier_threshold >= 0.0, "ransac_inlier_threshold", "at least 0 m/s");
   require(o.ransac_outlier_probability >= 0.0 && o.ransac_outlier_probability < 1.0,
           "ransac_outlier_probability", "in [0, 1)");
   require(o.ransac_success_probability > 0.0 && o.ransac_success_probability < 1.0,
@@ -51,7 +51,8 @@ void validate(const EgoVelocityOptions& o) {
   require(o.azimuth_sigma >= 0.0 && o.azimuth_sigma < 0.5, "azimuth_sigma", "in [0, 0.5) rad");
   require(o.elevation_sigma >= 0.0 && o.elevation_sigma < 0.5, "elevation_sigma", "in [0, 0.5) rad");
   require(o.doppler_sigma >= 0.0, "doppler_sigma", "at least 0 m/s");
-  require(o.doppler_quantization >= 0.0, "doppler_quantization", "at least 0 m/s");
+  require(o.doppler_quantization >= 0.0 && std::isfinite(o.doppler_quantization), "doppler_quantization",
+          "finite and at least 0 m/s");
   require((o.added_sigma.array() >= 0.0).all(), "added_sigma", "at least 0 m/s");
   require(o.max_condition_number > 1.0, "max_condition_number", "above 1");
   require(o.max_sigma > 0.0, "max_sigma", "above 0 m/s");
@@ -245,11 +246,40 @@ PointVariances startNoise(const EgoVelocityOptions& o) {
           square(o.doppler_quantization) / 12.0};
 }
 
+/// The options with the step that holds, and with the thresholds that were left to it.
+/// - Inlier: the step rounds by up to half of itself; 2.5 sigma keep 99 % of the noise besides.
+/// - Zero: within the zero bin; where the noise is larger than that, 1.5 sigma keep 87 % of the points at
+/// rest,
+///   and zero_velocity_outlier_fraction of them may lie beyond.
+/// A sigma of 0 to start with does not mean that nothing else is possible.
+EgoVelocityOptions withStep(EgoVelocityOptions o, double step) {
+  const double sigma = std::max(o.doppler_sigma, PointNoise::kMinStartDopplerSigma);
+  o.doppler_quantization = step;
+  if (o.ransac_inlier_threshold == 0.0) o.ransac_inlier_threshold = 0.5 * step + 2.5 * sigma;
+  if (o.zero_velocity_threshold == 0.0) o.zero_velocity_threshold = std::max(0.5 * step, 1.5 * sigma);
+  return o;
+}
+
+EgoVelocityOptions validated(const EgoVelocityOptions& o) {
+  validate(o);
+  return o;
+}
+
 }  // namespace
 
 EgoVelocityEstimator::EgoVelocityEstimator(const EgoVelocityOptions& options)
-    : options_(options), ransac_iterations_(ransacIterations(options)), noise_(startNoise(options)) {
-  validate(options);
+    : given_(validated(options)),
+      ransac_iterations_(ransacIterations(given_)),
+      grid_(given_.doppler_quantization),
+      options_(withStep(given_, grid_.step().value)),
+      noise_(startNoise(options_)) {}
+
+void EgoVelocityEstimator::observe(const RadarScan& scan) {
+  grid_.add(scan);
+  const double step = grid_.step().value;
+  if (step == options_.doppler_quantization) return;
+  options_ = withStep(given_, step);
+  noise_.setQuantization(square(step) / 12.0);
 }
 
 EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,

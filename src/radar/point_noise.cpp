@@ -27,8 +27,7 @@ constexpr double kMaxOutlierDensity = 0.1;
 constexpr double kMaxAngleSigma = 0.2;    // [rad]
 constexpr double kMaxDopplerSigma = 0.2;  // [m/s]
 /// A start of zero does not mean that nothing else is possible.
-constexpr double kMinStartAngleSigma = 0.01;    // [rad]
-constexpr double kMinStartDopplerSigma = 0.01;  // [m/s]
+constexpr double kMinStartAngleSigma = 0.01;  // [rad]
 /// [m^2/s^2] of a residual; bounds the weights where there is no noise at all.
 constexpr double kMinVariance = 1e-4;
 

@@ -49,6 +49,7 @@ void OffsetEvidence::add(Time stamp, const OffsetDerivative& derivative, const E
 double OffsetEvidence::gain() const {
   // One sigma less: noise alone passes it by little and seldom.
   const double sure = motion_ - std::sqrt(motion_variance_);
+  return sure > 0.0 && all_ > 0.0 ? std::min(1.0, sure / all_) : 0.0;
 }
 
 }  // namespace rio_t

@@ -49,6 +49,7 @@ class Estimator {
   const std::string& waitingFor() const { return waiting_for_; }  ///< while not initialised, for people
   const std::optional<Initialization>& start() const { return start_; }
   PointVariances radarNoise() const { return radars_.front().noise(); }
+  DopplerStep radarDopplerStep() const { return radars_.front().dopplerStep(); }
 
  private:
   /// Empty, or why the scan of a node at that time cannot be used now.

@@ -55,6 +55,8 @@ class RadarInertialOdometry {
   std::optional<Start> start() const;
   /// Noise of the radar's points, as learned so far. Call it from the thread that calls `process`.
   PointVariances radarNoise() const;
+  /// Step of the radar's Doppler, as known so far. Call it from the thread that calls `process`.
+  DopplerStep radarDopplerStep() const;
   /// Noise of the IMU, measured over the last second. Any thread.
   MeasuredImuNoise imuNoise() const;
   /// While not initialised: what the start is waiting for, as text for people.

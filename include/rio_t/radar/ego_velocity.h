@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "rio_t/radar/doppler_grid.h"
 #include "rio_t/radar/doppler_likelihood.h"
 #include "rio_t/radar/point_noise.h"
 #include "rio_t/radar/scan.h"
@@ -30,11 +31,13 @@ struct EgoVelocityOptions {
       1.570796;  ///< [rad] from the y (forward) axis, either side; the noise model weighs points at the edge
   double max_elevation = 1.570796;  ///< [rad] either side
 
-  double zero_velocity_threshold = 0.05;         ///< [m/s] a Doppler below counts as zero
+  /// [m/s] a Doppler below counts as zero; 0: half the step, or 1.5 doppler_sigma if that is more
+  double zero_velocity_threshold = 0.0;
   double zero_velocity_outlier_fraction = 0.25;  ///< share of Dopplers that may exceed it at rest
   double zero_velocity_sigma = 0.025;            ///< [m/s] per axis at rest, besides the Doppler bin
 
-  double ransac_inlier_threshold = 0.15;  ///< [m/s] Doppler residual
+  /// [m/s] Doppler residual of an inlier; 0: half the step and 2.5 doppler_sigma
+  double ransac_inlier_threshold = 0.0;
   double ransac_outlier_probability = 0.4;
   double ransac_success_probability = 0.9999;
   double prior_gate = 4.0;        ///< [sigma] a velocity farther than this from the prior contradicts it
@@ -51,7 +54,8 @@ struct EgoVelocityOptions {
   double elevation_sigma = 0.05;  ///< [rad]
   double doppler_sigma = 0.035;   ///< [m/s] besides the quantisation
 
-  double doppler_quantization = 0.125;  ///< [m/s] step of the radar's Doppler; 0 = none
+  /// [m/s] step of the radar's Doppler; 0: read off the data, which may show none. See DopplerGrid.
+  double doppler_quantization = 0.0;
   /// [m/s] right, forward, up; added in quadrature while moving. The solver's covariance is honest for noise
   /// that is independent from point to point (its NEES is 3 in simulation). This sigma stands for errors that
   /// points share: things that move so slowly that they pass as inliers, a velocity that changes within the
@@ -111,6 +115,10 @@ class EgoVelocityEstimator {
   /// result with the prior counts nothing twice.
   EgoVelocity estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior = std::nullopt) const;
 
+  /// Learns the step of the Doppler, and the thresholds that follow from it. Call it once per scan, before
+  /// `estimate`, whether the scan is used or not.
+  void observe(const RadarScan& scan);
+
   /// For scans without a velocity of their own: the inliers are the points within three sigma of the prior.
   /// Valid if they are `min_inlier_fraction` of the points; one is enough. v_R is that of the prior, and
   /// there is no covariance.
@@ -124,10 +132,15 @@ class EgoVelocityEstimator {
   void learn(const RadarScan& scan, const EgoVelocity& estimated);
   /// The noise as learned so far.
   const PointVariances& noise() const { return noise_.variances(); }
+  DopplerStep dopplerStep() const { return grid_.step(); }
+  /// The options as they hold now: those that are 0 for "from the step" have their values.
+  const EgoVelocityOptions& options() const { return options_; }
 
  private:
-  EgoVelocityOptions options_;  // read-only after construction
-  int ransac_iterations_;       // read-only after construction
+  EgoVelocityOptions given_;  // read-only after construction
+  int ransac_iterations_;     // read-only after construction
+  DopplerGrid grid_;
+  EgoVelocityOptions options_;  // given_, with what follows from the step
   PointNoise noise_;
 };
 

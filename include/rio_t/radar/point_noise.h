@@ -33,8 +33,13 @@ class PointNoise {
   /// belong to the static world: otherwise the known noise would cut off its own tails.
   void learn(const std::vector<RadarDirection>& points, const std::vector<std::size_t>& inliers,
              const Eigen::Vector3d& v_R);
-  /// The variances as learned so far; the quantisation does not change.
+  /// The quantisation became known [m^2/s^2]. What was learned before with another fades as all that is old.
+  void setQuantization(double variance) { variances_.quantization = variance; }
+  /// The variances as learned so far; the quantisation is as it was given.
   const PointVariances& variances() const { return variances_; }
+
+  /// [m/s] A start of zero does not mean that nothing else is possible.
+  static constexpr double kMinStartDopplerSigma = 0.01;
 
  private:
   void solve();

@@ -69,6 +69,8 @@ class RadarChannel {
   /// `imu` must outlive the channel.
   RadarChannel(const RadarChannelOptions& options, const Eigen::Vector3d& g_W, const ImuBuffer& imu);
 
+  /// Takes what a scan shows of the radar itself. Once per scan, first of all.
+  void observe(const RadarScan& scan) { estimator_.observe(scan); }
   /// Velocity of a scan from its points alone, for the time before there is a state.
   EgoVelocity velocityOf(const RadarScan& scan) const { return estimator_.estimate(scan); }
   /// Starts a window at `time` with the first node and the first offset.
@@ -83,6 +85,7 @@ class RadarChannel {
   double offsetSigma(double variance) const;
   FixedLagSmoother::RandomWalk offsetWalk() const;
   const PointVariances& noise() const { return estimator_.noise(); }  ///< of the points, as learned so far
+  DopplerStep dopplerStep() const { return estimator_.dopplerStep(); }
 
  private:
   EgoVelocity measure(const RadarScan& scan, const std::optional<VelocityPrior>& prior, double scale) const;

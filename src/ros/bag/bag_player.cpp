@@ -2,6 +2,7 @@
 
 #include <std_msgs/Header.h>
 
+#include <array>
 #include <stdexcept>
 #include <utility>
 
@@ -9,6 +10,21 @@
 #include "rio_t/ros/messages/conversions.h"
 
 namespace rio_t {
+namespace {
+
+/// The least number of points that so many of the scans do not exceed.
+std::uint64_t quantile(const std::map<std::size_t, std::uint64_t>& scans_by_size, double share) {
+  std::uint64_t total = 0;
+  for (const auto& [size, scans] : scans_by_size) total += scans;
+  std::uint64_t so_far = 0;
+  for (const auto& [size, scans] : scans_by_size) {
+    so_far += scans;
+    if (static_cast<double>(so_far) >= share * static_cast<double>(total)) return size;
+  }
+  return 0;
+}
+
+}  // namespace
 
 BagPlayer::BagPlayer(const Config& config, RunLog* log, BatchOdometry* recorder)
     : config_(config),
@@ -49,6 +65,11 @@ void BagPlayer::countInput(RunSummary* summary) const {
   summary->imu_count = imu_count_;
   summary->imu_noise = odometry_.imuNoise();
   summary->radar_noise = odometry_.radarNoise();
+  summary->radar_doppler_step = odometry_.radarDopplerStep();
+  for (std::size_t i = 0; i < 3; ++i) {
+    constexpr std::array<double, 3> kShares = {0.1, 0.5, 0.9};
+    summary->radar_points_per_scan[i] = quantile(scans_by_size_, kShares[i]);
+  }
   summary->scans_total = scans_total_;
   for (const auto& [reason, count] : stamper_.givenUp()) summary->scans_rejected[reason] += count;
   summary->input_faults = odometry_.faults();
@@ -92,6 +113,7 @@ void BagPlayer::addCloud(const sensor_msgs::PointCloud2& message, Time record) {
     return;
   }
   points_not_finite_ += decoded.dropped_not_finite;
+  ++scans_by_size_[decoded.cloud.size()];
   try {
     stamper_.addScan(message.header.seq, toTime(message.header.stamp), record,
                      toRadarScan(decoded.cloud, Time()));

@@ -55,7 +55,8 @@ class BagPlayer {
   BatchOdometry* recorder_;
   std::optional<RadarInertialOdometry::Start> start_;
   std::uint64_t imu_count_ = 0, scans_total_ = 0, points_not_finite_ = 0, offset_steps_ = 0;
-  std::map<std::string, NotUsable> not_usable_;  // by kind
+  std::map<std::string, NotUsable> not_usable_;         // by kind
+  std::map<std::size_t, std::uint64_t> scans_by_size_;  // by their number of points
 };
 
 }  // namespace rio_t

@@ -12,6 +12,18 @@ std::string decimal(double value, int decimals) {
   return text;
 }
 
+std::string describeStep(const DopplerStep& step) {
+  switch (step.source) {
+    case DopplerStepSource::kUnknown:
+      return "not known: too few points that move; " + decimal(step.value, 3) + " m/s was taken";
+    case DopplerStepSource::kGiven:
+      return decimal(step.value, 3) + " m/s, given";
+    case DopplerStepSource::kData:
+      break;
+  }
+  return (step.value > 0.0 ? decimal(step.value, 3) + " m/s" : std::string("none")) + ", from the data";
+}
+
 }  // namespace
 
 std::string describeRun(const RunSummary& summary, const std::string& files) {
@@ -48,6 +60,7 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
   row("radar noise", "Doppler " + decimal(std::sqrt(summary.radar_noise.doppler), 3) + " m/s, azimuth " +
                          decimal(std::sqrt(summary.radar_noise.azimuth), 3) + " rad, elevation " +
                          decimal(std::sqrt(summary.radar_noise.elevation), 3) + " rad");
+  row("Doppler step", describeStep(summary.radar_doppler_step));
   if (summary.truth) {
     std::string errors = "ATE " + decimal(summary.truth->ate_m, 3) + " m";
     if (summary.truth->t_rel) {

@@ -80,6 +80,13 @@ std::string summaryText(const RunSummary& summary) {
   line("azimuth", fixedText(std::sqrt(summary.radar_noise.azimuth), 4));
   line("elevation", fixedText(std::sqrt(summary.radar_noise.elevation), 4));
   yaml << YAML::EndMap;
+  line("radar_doppler_step", fixedText(summary.radar_doppler_step.value, 6));  // [m/s]
+  line("radar_doppler_step_from", toString(summary.radar_doppler_step.source));
+  line("radar_points_per_scan", YAML::BeginMap);
+  line("p10", summary.radar_points_per_scan[0]);
+  line("p50", summary.radar_points_per_scan[1]);
+  line("p90", summary.radar_points_per_scan[2]);
+  yaml << YAML::EndMap;
   if (!summary.pass_offsets_s.empty()) {
     line("pass_offsets_s", fixedTexts(summary.pass_offsets_s, 9));
     line("pass_offset_sigmas_s", fixedTexts(summary.pass_offset_sigmas_s, 9));

@@ -315,8 +315,21 @@ void LiveOdometry::tellHealth(const ScanResult& result) const {
   }
 }
 
+void LiveOdometry::tellDopplerStep(const DopplerStep& step, DopplerStep* told) const {
+  if (step.source == DopplerStepSource::kUnknown) return;
+  if (step.source == told->source && step.value == told->value) return;
+  *told = step;
+  const char* from = step.source == DopplerStepSource::kGiven ? "given" : "read off the data";
+  if (step.value > 0.0) {
+    ROS_INFO_STREAM(name_ << ": the radar's Doppler comes in steps of " << step.value << " m/s, " << from);
+  } else {
+    ROS_INFO_STREAM(name_ << ": the radar's Doppler has no steps, " << from);
+  }
+}
+
 void LiveOdometry::solve() {
   Session published;  // whose results ~path holds
+  DopplerStep told;   // of the radar of that session
   while (true) {
     double rate_sigma = 0.0;
     {
@@ -331,6 +344,7 @@ void LiveOdometry::solve() {
     if (published != now) {
       if (published) publisher_.clearPath();
       published = now;
+      told = DopplerStep();
     }
     try {
       bool more = false;
@@ -342,6 +356,7 @@ void LiveOdometry::solve() {
         });
         if (!current) break;  // reset meanwhile: not of this world any more
       }
+      tellDopplerStep(now->odometry().radarDopplerStep(), &told);
       if (more) wakeSolver();  // one scan at a time, so that stopping and resets are heeded between them
     } catch (const std::exception& error) {
       monitor_.solverFailed(error.what());

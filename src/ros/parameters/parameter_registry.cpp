@@ -207,13 +207,14 @@ void listEgoVelocity(ParameterList& list, Config& c) {
   list.number("radar_max_elevation", "rad", above(0, kPi / 2), radar.max_elevation,
               "field of view up and down");
   list.number("zero_velocity_threshold", "m/s", atLeast(0), radar.zero_velocity_threshold,
-              "a Doppler below counts as zero");
+              "a Doppler below counts as zero; 0: half of radar_doppler_step, or 1.5 radar_doppler_sigma if "
+              "that is more");
   list.number("zero_velocity_outlier_fraction", "", between(0, 1), radar.zero_velocity_outlier_fraction,
               "share of Dopplers that may exceed it at rest");
   list.number("zero_velocity_sigma", "m/s", above(0), radar.zero_velocity_sigma,
               "standard deviation per axis, at rest, besides what radar_doppler_step hides");
-  list.number("ransac_inlier_threshold", "m/s", above(0), radar.ransac_inlier_threshold,
-              "Doppler residual of an inlier");
+  list.number("ransac_inlier_threshold", "m/s", atLeast(0), radar.ransac_inlier_threshold,
+              "Doppler residual of an inlier; 0: half of radar_doppler_step and 2.5 radar_doppler_sigma");
   list.number("ransac_outlier_probability", "", Range{0, 1, false, true}, radar.ransac_outlier_probability,
               "share of outliers that is reckoned with");
   list.number("ransac_success_probability", "", inside(0, 1), radar.ransac_success_probability,
@@ -240,7 +241,8 @@ void listEgoVelocity(ParameterList& list, Config& c) {
   list.number("radar_doppler_sigma", "m/s", atLeast(0), radar.doppler_sigma,
               "likewise of its Doppler, besides the steps");
   list.number("radar_doppler_step", "m/s", atLeast(0), radar.doppler_quantization,
-              "step in which the radar gives the Doppler; 0: none");
+              "step in which the radar gives the Doppler; 0: read off the data, which may show none; "
+              "above 0 and below 0.02: none");
   list.vector3("ego_velocity_added_sigma", "m/s", atLeast(0), radar.added_sigma,
                "added in quadrature, to begin with: right, forward, up; the innovations scale it");
   list.number("ego_velocity_max_condition_number", "", atLeast(1), radar.max_condition_number,

@@ -53,6 +53,8 @@ struct RunSummary {
   double final_offset_sigma_s = 0.0;
   MeasuredImuNoise imu_noise;  ///< that the IMU showed at the end
   PointVariances radar_noise;  ///< of the radar's points, as learned; the file has its standard deviations
+  DopplerStep radar_doppler_step;  ///< as known at the end; the file has its source as a key of its own
+  std::array<std::uint64_t, 3> radar_points_per_scan = {};  ///< quantiles of 10, 50 and 90 % of the scans
   std::optional<TruthErrors> truth;
   double estimation_seconds = 0.0;  ///< reading, decoding and estimating, wall clock
   double realtime_factor = 0.0;     ///< seconds of data in a second of that

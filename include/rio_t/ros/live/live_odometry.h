@@ -67,6 +67,7 @@ class LiveOdometry {
   void wakeSolver();
   void tellFaults();  ///< what is new among the faults of the input; input thread
   void tellHealth(const ScanResult& result) const;
+  void tellDopplerStep(const DopplerStep& step, DopplerStep* told) const;  ///< where it is not as told
   void solve();  ///< body of the optimisation thread
 
   const std::string name_;
