@@ -76,7 +76,7 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
     result.offset_gain = answer.offset_gain;
     result.rejected_because = answer.rejected_because;
     result.used = result.updated = answer.rejected_because.empty();
-    if (at_rest) {
+    if (answer.at_rest) {
       if (Block* node = smoother_.nodeAt(radar.nodeTime(stamp))) {
         smoother_.addZeroVelocity(*node, options_.rest.velocity_sigma);
         result.updated = true;

@@ -1,5 +1,6 @@
 #include "rio_t/radar/doppler_likelihood.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -17,6 +18,7 @@ constexpr double kMinVariance = 1e-6;
 constexpr double kNoResidual = 1e-4;  // [sigma]
 /// A pivot below this share of the trace is rounding.
 constexpr double kNoInformation = 1e-12;
+constexpr double kSpreads = 4.0;  // [variances] of the noise of the directions
 
 double cumulative(double z) { return 0.5 * std::erfc(-z * M_SQRT1_2); }
 double density(double z) { return std::exp(-0.5 * z * z) * (0.5 * M_SQRT1_2 * M_2_SQRTPI); }
@@ -53,6 +55,20 @@ Residual coarseResidual(double e, double s, double h, double outlier) {
     return {root * e, root};
   }
   return {std::copysign(value, e), (density(below) - density(above)) / (s * (bin + floor) * value)};
+}
+
+/// Projection on the directions over which the points spread by more than twice their noise.
+Eigen::Matrix3d spreadOver(const std::vector<RadarDirection>& points, double variance) {
+  Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
+  for (const RadarDirection& p : points) mean += p.u_R * p.u_R.transpose() / static_cast<double>(points.size());
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(mean);
+  Eigen::Matrix3d projection = Eigen::Matrix3d::Zero();
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d axis = eigen.eigenvectors().col(i);
+    if (eigen.eigenvalues()[i] > kSpreads * variance) projection += axis * axis.transpose();
+  }
+  return projection;
 }
 
 }  // namespace
@@ -92,7 +108,9 @@ Eigen::Vector3d solveTransposed(const Eigen::Matrix3d& U, const Eigen::Vector3d&
 
 DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
                                      const PointVariances& noise)
-    : half_bin_(std::sqrt(3.0 * noise.quantization)), doppler_variance_(noise.doppler + kMinVariance),
+    : first_v_R_(v_R),
+      spread_over_(spreadOver(points, std::max(noise.azimuth, noise.elevation))),
+      half_bin_(std::sqrt(3.0 * noise.quantization)), doppler_variance_(noise.doppler + kMinVariance),
       smallest_sigma_(std::numeric_limits<double>::max()) {
   const MomentCorrection correct(noise.azimuth, noise.elevation);
   const double along_az = 0.75 * noise.azimuth + 0.25 * noise.elevation;
@@ -118,12 +136,13 @@ double DopplerLikelihood::residual(std::size_t i, const Eigen::Vector3d& v_R,
                                    Eigen::Vector3d& derivative) const {
   const Point& p = points_[i];
   const double e = p.doppler + p.u_R.dot(v_R);
-  const Eigen::Vector3d spread_v = p.spread * v_R;
-  const double variance = doppler_variance_ + square(half_bin_) / 3.0 + v_R.dot(spread_v);
+  const Eigen::Vector3d v = first_v_R_ + spread_over_ * (v_R - first_v_R_);
+  const Eigen::Vector3d spread_v = p.spread * v;
+  const double variance = doppler_variance_ + square(half_bin_) / 3.0 + v.dot(spread_v);
   const double scale = p.whole_sigma / std::sqrt(variance);
   const Residual r = half_bin_ > p.sigma ? coarseResidual(scale * e, p.sigma, half_bin_, p.outlier)
                                          : fineResidual(scale * e, p.whole_sigma, p.outlier);
-  derivative = r.slope * scale * (p.u_R - (e / variance) * spread_v);
+  derivative = r.slope * scale * (p.u_R - (e / variance) * (spread_over_ * spread_v));
   return r.value;
 }
 

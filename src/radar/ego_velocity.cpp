@@ -25,6 +25,10 @@ constexpr double kMaxSharpSigma = 0.1;
 /// against a uniform density over some m/s.
 constexpr double kEvidenceOfAPoint = 4.0;
 constexpr double kAgrees = 3.0;  // [sigma] of a point
+/// Twice the log-likelihood ratio of a slow motion to rest: once in 1000 scans at rest (chi-squared, 3 degrees
+/// of freedom).
+constexpr double kDeniesRest = 16.3;
+constexpr int kSlowIterations = 10;
 
 void require(bool holds, const char* option, const char* expected) {
   if (!holds) throw std::invalid_argument(std::string("ego velocity: ") + option + " must be " + expected);
@@ -241,6 +245,34 @@ bool restCovariance(const std::vector<RadarDirection>& inliers, const EgoVelocit
   return true;
 }
 
+/// A slow motion that hides in the bins around zero: most points read zero, but those along the motion do not.
+/// None if rest explains the points about as well. `points` read at most one bin.
+std::optional<VelocitySolution> slowMotion(const std::vector<RadarDirection>& points,
+                                           const PointVariances& noise, const EgoVelocityOptions& o) {
+  if (points.size() < o.min_inliers) return std::nullopt;
+  VelocitySolution solution = solveLeastSquares(points, o);
+  if (!solution.solved || solution.v_R.isZero()) return std::nullopt;
+  const DopplerLikelihood likelihood(points, Eigen::Vector3d::Zero(), noise);
+  const double at_rest = likelihood.at(Eigen::Vector3d::Zero()).value;
+  if (at_rest < 0.5 * kDeniesRest) return std::nullopt;
+  VelocityCost cost = likelihood.at(solution.v_R);
+  double damping = 1.0 / square(o.doppler_quantization + o.zero_velocity_threshold);
+  for (int i = 0; i < kSlowIterations; ++i) {
+    Eigen::Matrix3d damped = cost.information;
+    damped.diagonal().array() += damping;
+    const Eigen::Vector3d v_R = solution.v_R - damped.inverse() * cost.gradient;
+    const VelocityCost next = likelihood.at(v_R);
+    damping *= next.value < cost.value ? 0.1 : 10.0;
+    if (next.value >= cost.value) continue;
+    solution.v_R = v_R;
+    cost = next;
+  }
+  if (2.0 * (at_rest - cost.value) < kDeniesRest) return std::nullopt;
+  solution.solved = cost.information.determinant() > 0.0;
+  solution.covariance = cost.information.inverse();
+  return solution;
+}
+
 PointVariances startNoise(const EgoVelocityOptions& o) {
   return {square(o.doppler_sigma), square(o.azimuth_sigma), square(o.elevation_sigma),
           square(o.doppler_quantization) / 12.0};
@@ -303,8 +335,20 @@ EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
     return zeros >= (1.0 - o.zero_velocity_outlier_fraction) * static_cast<double>(some.size());
   };
 
-  bool rest = most_read_zero(points);
-  if (rest) {
+  std::vector<RadarDirection> slow;
+  std::copy_if(points.begin(), points.end(), std::back_inserter(slow), [&](const RadarDirection& p) {
+    return std::abs(p.doppler) <= o.zero_velocity_threshold + o.doppler_quantization;
+  });
+  const auto n_slow = static_cast<double>(slow.size());
+  std::optional<VelocitySolution> creeping;
+  if (n_slow >= kMajority * n) creeping = slowMotion(slow, noise(), o);
+  result.denies_rest = creeping.has_value();
+
+  bool rest = !creeping && most_read_zero(points);
+  if (creeping) {
+    inliers = selectInliers(points, creeping->v_R, o, noise());
+    if (const auto refined = slowMotion(inliers, noise(), o)) creeping = refined;
+  } else if (rest) {
     inliers = points;
   } else {
     const std::optional<Eigen::Vector3d> consensus = ransac(points, o, ransac_iterations_);
@@ -325,7 +369,11 @@ EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
   }
 
   VelocitySolution solution;
-  if (rest) {
+  if (creeping) {
+    solution = *creeping;
+    result.told_variance = o.added_sigma.cwiseAbs2();
+    solution.covariance.diagonal() += result.told_variance;
+  } else if (rest) {
     solution.solved = restCovariance(inliers, o, noise(), solution.covariance);
   } else {
     solution = solveLeastSquares(inliers, o);
@@ -364,7 +412,7 @@ EgoVelocity EgoVelocityEstimator::around(const RadarScan& scan, const VelocityPr
     if (square(p.doppler + p.u_R.dot(prior.v_R)) <= square(kAgrees) * variance)
       result.inliers.push_back(p.index);
   }
-  const double share = options_.min_inlier_fraction * static_cast<double>(result.points_used);
+  const double share = kMajority * static_cast<double>(result.points_used);
   if (!result.inliers.empty() && static_cast<double>(result.inliers.size()) >= share)
     result.status = EgoVelocityStatus::kMoving;
   result.v_R = prior.v_R;

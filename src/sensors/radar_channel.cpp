@@ -20,6 +20,10 @@ std::size_t countOthers(const std::vector<std::size_t>& some, const std::vector<
   }));
 }
 
+std::vector<std::size_t> below(std::size_t limit, const std::vector<std::size_t>& ascending) {
+  return {ascending.begin(), std::lower_bound(ascending.begin(), ascending.end(), limit)};
+}
+
 VelocityPrior zeroVelocity(double sigma) {
   return {Eigen::Vector3d::Zero(), sigma * sigma * Eigen::Matrix3d::Identity()};
 }
@@ -42,6 +46,7 @@ void RadarChannel::start(FixedLagSmoother& smoother, Time time, const NodePrior&
   offset_uncertainty_ = OffsetUncertainty(options_.smoother.huber_threshold);
   offset_evidence_ = OffsetEvidence();
   feasibility_ = FeasibilityCheck(options_.feasibility);
+  pool_.clear();
   gate_.used(time);
 }
 
@@ -54,22 +59,29 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   const std::optional<RadarVelocityPrediction> prediction = in_window_.predict(smoother, scan.stamp);
   std::optional<VelocityPrior> prior;
   if (prediction) prior = prediction->velocity;
-  if (context.at_rest) prior = zeroVelocity(options_.rest_velocity_sigma);
+  const bool tightly = options_.smoother.radar_factor == RadarFactor::kDoppler;
+  const auto velocityAt = [&](Time stamp) { return in_window_.velocityAt(smoother, stamp); };
+  const RadarScan pooled = tightly ? pool_.filled(scan, velocityAt) : scan;
+  const bool has_borrowed = pooled.points.size() > scan.points.size();
+  if (context.at_rest) {
+    answer.ego_velocity = measure(pooled, std::nullopt, context.model_error_scale);
+    answer.at_rest = !answer.ego_velocity.denies_rest;
+  }
+  if (answer.at_rest) prior = zeroVelocity(options_.rest_velocity_sigma);
 
   answer.ego_velocity =
-      measure(scan, context.has_diverged ? std::nullopt : prior, context.model_error_scale);
+      measure(pooled, context.has_diverged ? std::nullopt : prior, context.model_error_scale);
   answer.was_predicted = prior.has_value();
-  if (prior) judge(scan, *prior, context.model_error_scale, answer);
+  if (prior) judge(pooled, *prior, context.model_error_scale, answer);
   EgoVelocity measured = answer.ego_velocity;
   const bool has_own = isValid(measured.status);
-  const bool tightly = options_.smoother.radar_factor == RadarFactor::kDoppler;
   if (!has_own && tightly && prior && !context.has_diverged)
-    measured = around(*prior, scan, context.model_error_scale);
+    measured = around(*prior, scan, pooled, context.model_error_scale);
   if (!isValid(measured.status)) return reject(toString(answer.ego_velocity.status));
   if (has_own && !feasibility_.accept(scan.stamp, measured.v_R)) return reject("infeasible_velocity");
 
   const bool tilt_is_known = !prediction || prediction->tilt_sigma < kMaxTiltSigma;
-  const bool moving = prediction && !context.at_rest && measured.status == EgoVelocityStatus::kMoving;
+  const bool moving = prediction && !answer.at_rest && measured.status == EgoVelocityStatus::kMoving;
   bool informs_offset = false;
   if (moving) {
     offset_evidence_.add(scan.stamp, prediction->dv_dt_O, measured.covariance.inverse());
@@ -83,8 +95,9 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   RadarScanTime taken{scan.stamp, options_.T_IR, answer.offset_gain};
   taken.linear_from_t_O = offset();
   if (tightly && measured.status == EgoVelocityStatus::kMoving) {
-    const auto points =
-        std::make_shared<DopplerLikelihood>(estimator_.likelihood(scan, measured.inliers, measured.v_R));
+    const std::vector<std::size_t> own = below(scan.points.size(), measured.inliers);
+    if (own.empty()) return reject("too_few_inliers");
+    const auto points = std::make_shared<DopplerLikelihood>(estimator_.likelihood(scan, own, measured.v_R));
     answer.doppler =
         DopplerMeasurement{taken, points, measured.told_variance, options_.smoother.huber_threshold};
     if (informs_offset) answer.doppler->shared_variances.array() += prediction->rate_variance;
@@ -112,7 +125,12 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
     answer.prediction_covariance = prior->covariance;
   }
   gate_.used(scan.stamp);
-  if (!context.at_rest && has_own) estimator_.learn(scan, measured);
+  // A borrowed point must not teach twice.
+  const bool is_new = !has_borrowed || scan.stamp - learned_at_ > ScanPool::kMaxAge;
+  if (!answer.at_rest && has_own && is_new) {
+    estimator_.learn(pooled, measured);
+    learned_at_ = scan.stamp;
+  }
   return answer;
 }
 
@@ -124,8 +142,11 @@ EgoVelocity RadarChannel::measure(const RadarScan& scan, const std::optional<Vel
   return measured;
 }
 
-EgoVelocity RadarChannel::around(const VelocityPrior& prior, const RadarScan& scan, double scale) const {
-  EgoVelocity result = estimator_.around(scan, prior);
+EgoVelocity RadarChannel::around(const VelocityPrior& prior, const RadarScan& scan, const RadarScan& pooled,
+                                 double scale) const {
+  EgoVelocity result = estimator_.around(pooled, prior);
+  result.inliers = below(scan.points.size(), result.inliers);
+  if (result.inliers.empty()) result.status = EgoVelocityStatus::kTooFewInliers;
   if (!isValid(result.status)) return result;
   result.told_variance *= scale;
   const VelocityCost cost = withSharedError(

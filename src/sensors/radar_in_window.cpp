@@ -41,7 +41,8 @@ std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoo
   const std::optional<PredictedState> state = smoother.predict(time, {&offsetBlock()});
   if (!state) return std::nullopt;
   const Eigen::Matrix3d R_RI = T_IR_.R_RI();
-  const ImuMean mean = model_.meanAt(time);
+  // Over a short time, whatever the noise: what an unknown offset may do must not be smoothed away.
+  const ImuMean mean = model_.imu->mean(time, kOffsetHalfWidth);
   const RadarMotion motion = model_.at(state->x.data(), time, stamp, offset(), T_IR_.l_I, &mean);
   Eigen::Matrix<double, 3, kNodeTangent> J;
   J << motion.J_state.leftCols<3>(), motion.J_state.rightCols<StateBlock::kTangent - 3>(), motion.dv_dt_O;
@@ -69,6 +70,13 @@ std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoo
       horizontal * P.block<3, 3>(StateBlock::kTheta, StateBlock::kTheta) * horizontal.transpose();
   prediction.tilt_sigma = std::sqrt(tilt.diagonal().maxCoeff());
   return prediction;
+}
+
+std::optional<Eigen::Vector3d> RadarInWindow::velocityAt(const FixedLagSmoother& smoother, Time stamp) const {
+  const Time time = nodeTime(stamp);
+  const std::optional<NodeEstimate> node = smoother.nodeBefore(time);
+  if (!node) return std::nullopt;
+  return T_IR_.R_RI() * model_.at(node->x.data(), node->time, stamp, offset(), T_IR_.l_I, nullptr).v_I;
 }
 
 template <class Factor, class Measurement>

@@ -43,10 +43,15 @@ NodeEstimate FixedLagSmoother::node(std::size_t k) const {
   return {nodes_[k].time(), toStateBlock(nodes_[k].block->x)};
 }
 
-std::size_t FixedLagSmoother::nodeBefore(Time time) const {
+std::size_t FixedLagSmoother::indexBefore(Time time) const {
   std::size_t k = nodes_.size() - 1;
   while (k > 0 && nodes_[k].time() > time) --k;
   return k;
+}
+
+std::optional<NodeEstimate> FixedLagSmoother::nodeBefore(Time time) const {
+  if (time < nodes_.front().time()) return std::nullopt;
+  return node(indexBefore(time));
 }
 
 Eigen::MatrixXd FixedLagSmoother::covarianceOf(const Block& node,
@@ -65,7 +70,7 @@ Eigen::MatrixXd FixedLagSmoother::newestCovariance(const std::vector<const Block
 std::optional<PredictedState> FixedLagSmoother::predict(Time time,
                                                         const std::vector<const Block*>& calibration) const {
   if (time < nodes_.front().time()) return std::nullopt;
-  const Node& node = nodes_[nodeBefore(time)];
+  const Node& node = nodes_[indexBefore(time)];
   PredictedState predicted{toStateBlock(node.block->x), covarianceOf(*node.block, calibration)};
   if (time == node.time()) return predicted;
   const Preintegration& pre = preintegrateFrom(node, time);
@@ -83,7 +88,7 @@ Block* FixedLagSmoother::nodeAt(Time time) {
   if (time < nodes_.front().time()) return nullptr;
   // The factor of the imu model reaches its time of measurement from any node, so neighbours can share one.
   const double spacing = options_.time_offset_model == TimeOffsetModel::kImu ? kMinNodeSpacing : 0.0;
-  const std::size_t before = nodeBefore(time);
+  const std::size_t before = indexBefore(time);
   const std::size_t after = before + 1;
   if (time - nodes_[before].time() <= spacing) return nodes_[before].block;
   if (after < nodes_.size() && nodes_[after].time() - time <= spacing) return nodes_[after].block;

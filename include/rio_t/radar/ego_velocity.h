@@ -86,6 +86,8 @@ struct EgoVelocity {
   /// The part of the covariance's diagonal that the options say and no data measure: `added_sigma` squared,
   /// or zero at rest [m^2/s^2].
   Eigen::Vector3d told_variance = Eigen::Vector3d::Zero();
+  /// Points near zero show a slow motion: the platform is not at rest, whatever the IMU shows.
+  bool denies_rest = false;
   std::vector<std::size_t> inliers;  ///< indices into the scan's points
   std::size_t points_used = 0;       ///< points that passed the filter
 };
@@ -120,7 +122,7 @@ class EgoVelocityEstimator {
   void observe(const RadarScan& scan);
 
   /// For scans without a velocity of their own: the inliers are the points within three sigma of the prior.
-  /// Valid if they are `min_inlier_fraction` of the points; one is enough. v_R is that of the prior, and
+  /// Valid if they are the majority of the points; one is enough. v_R is that of the prior, and
   /// there is no covariance.
   EgoVelocity around(const RadarScan& scan, const VelocityPrior& prior) const;
   /// What the Dopplers of some points say. They look static at about `v_R` [m/s].

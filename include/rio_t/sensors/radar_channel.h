@@ -9,6 +9,7 @@
 #include "rio_t/sensors/offset_step_detector.h"
 #include "rio_t/sensors/offset_uncertainty.h"
 #include "rio_t/sensors/radar_in_window.h"
+#include "rio_t/sensors/scan_pool.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
 #include "rio_t/smoother/options.h"
 
@@ -25,7 +26,7 @@ struct RadarChannelOptions {
 
 /// What the estimator knows when a scan comes.
 struct ScanContext {
-  bool at_rest = false;            ///< the IMU is at rest at the time of measurement
+  bool at_rest = false;            ///< the IMU shows no motion at the time of measurement
   bool has_diverged = false;       ///< the prediction cannot be trusted
   double model_error_scale = 1.0;  ///< see ModelErrorScale
 };
@@ -36,6 +37,7 @@ struct RadarAnswer {
   /// Its points, if they and not the velocity go into the window.
   std::optional<DopplerMeasurement> doppler;
   std::string rejected_because;  ///< snake case, empty if the scan was used
+  bool at_rest = false;          ///< as the IMU says, and the points do not deny it
   bool offset_stepped = false;   ///< t_O stepped before this scan
   double offset_gain = 0.0;      ///< see OffsetEvidence; 0: the scan does not tell the offset
 
@@ -91,7 +93,8 @@ class RadarChannel {
   EgoVelocity measure(const RadarScan& scan, const std::optional<VelocityPrior>& prior, double scale) const;
   /// The velocity that the points show around the prediction, for scans without one of their own. Directions
   /// that they do not see have a large sigma.
-  EgoVelocity around(const VelocityPrior& prior, const RadarScan& scan, double scale) const;
+  EgoVelocity around(const VelocityPrior& prior, const RadarScan& scan, const RadarScan& pooled,
+                     double scale) const;
   Innovation innovation(Time stamp, const VelocityPrior& prior, const EgoVelocity& measured,
                         const std::optional<RadarVelocityPrediction>& prediction) const;
   /// Sets what health and a re-initialisation get from the scan.
@@ -101,6 +104,8 @@ class RadarChannel {
   EgoVelocityEstimator estimator_;
   RadarInWindow in_window_;
   FeasibilityCheck feasibility_;
+  ScanPool pool_;
+  Time learned_at_;
   OffsetEvidence offset_evidence_;
   OffsetStepDetector step_detector_;
   OffsetUncertainty offset_uncertainty_;

@@ -49,6 +49,8 @@ class RadarInWindow {
   Time nodeTime(Time stamp) const;
   /// Predicts from the newest node before the scan. None for a scan older than the window.
   std::optional<RadarVelocityPrediction> predict(const FixedLagSmoother& smoother, Time stamp) const;
+  /// The velocity alone, in R [m/s].
+  std::optional<Eigen::Vector3d> velocityAt(const FixedLagSmoother& smoother, Time stamp) const;
   AddResult add(FixedLagSmoother& smoother, const RadarVelocityMeasurement& z);
   AddResult add(FixedLagSmoother& smoother, const DopplerMeasurement& z);
   /// The offset stepped before the scan stamped `stamp`. That scan and later ones use a new block, which

@@ -55,6 +55,8 @@ class FixedLagSmoother {
   Block* nodeAt(Time time);
   /// The state at `time`, carried there from the newest node before it. None if `time` is before the window.
   std::optional<PredictedState> predict(Time time, const std::vector<const Block*>& calibration) const;
+  /// The newest node that is not later than `time`. None if `time` is before the window.
+  std::optional<NodeEstimate> nodeBefore(Time time) const;
   /// The platform is at rest at a node; `velocity_sigma` [m/s] per axis.
   void addZeroVelocity(Block& node, double velocity_sigma);
 
@@ -86,7 +88,7 @@ class FixedLagSmoother {
   };
 
   /// Index of the newest node that is not later than `time`; `time` is not before the window.
-  std::size_t nodeBefore(Time time) const;
+  std::size_t indexBefore(Time time) const;
   void linkToPrevious(std::size_t k);
   Eigen::MatrixXd covarianceOf(const Block& node, const std::vector<const Block*>& calibration) const;
   std::vector<const Block*> leavingWith(const Block& node) const;

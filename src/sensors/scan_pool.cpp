@@ -1,0 +1,32 @@
+#include "rio_t/sensors/scan_pool.h"
+
+#include <cmath>
+
+namespace rio_t {
+namespace {
+
+/// With so many points, three of them outliers in ten, RANSAC finds the static world (docs/method.md, section
+/// 9.1).
+constexpr std::size_t kEnoughPoints = 20;
+
+}  // namespace
+
+RadarScan ScanPool::filled(const RadarScan& scan, const VelocityAt& velocityAt) {
+  if (!scans_.empty() && scan.stamp < scans_.back().stamp) scans_.clear();  // late, or a bag that loops
+  while (!scans_.empty() && scan.stamp - scans_.front().stamp > kMaxAge) scans_.pop_front();
+  RadarScan result = scan;
+  const std::optional<Eigen::Vector3d> v_R = velocityAt(scan.stamp);
+  for (std::size_t i = scans_.size(); v_R && i-- > 0 && result.points.size() < kEnoughPoints;) {
+    const std::optional<Eigen::Vector3d> before_R = velocityAt(scans_[i].stamp);
+    if (!before_R) break;
+    for (RadarPoint point : scans_[i].points) {
+      if (point.position_R.isZero()) continue;
+      point.doppler -= point.position_R.normalized().dot(*v_R - *before_R);
+      result.points.push_back(point);
+    }
+  }
+  scans_.push_back(scan);
+  return result;
+}
+
+}  // namespace rio_t
