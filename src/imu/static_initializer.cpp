@@ -8,6 +8,12 @@ namespace {
 
 constexpr double kWrongUnits = 0.4;  // of gravity that the mean accelerometer is off
 
+/// [s] Rest ends if the mean over so long differs from that before.
+constexpr double kNewest = 0.5;
+constexpr double kCheckEvery = 0.1;
+/// [s] Rest that ends counts from here on: tilt and gyro bias are then known to twice the sigma of 4 s.
+constexpr double kShortest = 1.0;
+
 struct Statistics {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   Eigen::Vector3d std = Eigen::Vector3d::Zero();
@@ -45,14 +51,38 @@ Eigen::Quaterniond levelingRotation(const Eigen::Vector3d& f_I) {
 StaticInitializer::StaticInitializer(const StaticInitializerOptions& options, double gravity)
     : options_(options), gravity_(gravity) {}
 
+bool StaticInitializer::endsNow() {
+  const ImuMeasurement& newest = samples_.back();
+  if (newest.time - samples_.front().time < 2.0 * kNewest || newest.time - checked_at_ < kCheckEvery) return false;
+  checked_at_ = newest.time;
+  Eigen::Vector3d before = Eigen::Vector3d::Zero();
+  Eigen::Vector3d now = Eigen::Vector3d::Zero();
+  double before_count = 0.0;
+  double now_count = 0.0;
+  for (const ImuMeasurement& sample : samples_) {
+    const bool is_new = newest.time - sample.time < kNewest;
+    (is_new ? now : before) += sample.acceleration;
+    (is_new ? now_count : before_count) += 1.0;
+  }
+  // Noise of the mean over the newest samples; that before has less.
+  const double noise = std::sqrt(newest.accel_noise / kNewest);
+  return (now / now_count - before / before_count).norm() > 0.2 * options_.max_accel_std + 4.0 * noise;
+}
+
 std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement& imu) {
   samples_.push_back(imu);
-  const double collected = imu.time - samples_.front().time;
-  if (collected < options_.duration || samples_.size() < 10) {
+  const bool is_ending = endsNow();
+  if (is_ending) {  // What went before is rest all the same.
+    while (imu.time - samples_.back().time < kNewest) samples_.pop_back();
+  }
+  const double collected = samples_.back().time - samples_.front().time;
+  if (collected < (is_ending ? kShortest : options_.duration) || samples_.size() < 10) {
     // A reason that was reported stays until rest has been seen for a whole duration.
     if (waiting_for_.rfind("rest", 0) != 0) {
       waiting_for_ = format("standing still: %.1f of %.1f s seen", collected, options_.duration);
     }
+    has_seen_motion_ |= is_ending;
+    if (is_ending) samples_ = {imu};
     return std::nullopt;
   }
 
@@ -94,7 +124,7 @@ std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement&
   }
 
   StaticInitialization result;
-  result.time = imu.time;
+  result.time = samples_.back().time;
   result.q_WI = levelingRotation(accel.mean);
   result.b_g = gyro.mean;
   result.b_a = accel.mean * (gravity_error / accel.mean.norm());

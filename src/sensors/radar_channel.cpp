@@ -69,14 +69,19 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   }
   if (answer.at_rest) prior = zeroVelocity(options_.rest_velocity_sigma);
 
+  std::optional<VelocityPrior> expected = prior;
+  // Few and coarse points agree with many velocities: they must not all side with a prediction that is a
+  // little wrong.
+  const double doubt = options_.smoother.innovation_model_error;
+  if (expected && has_borrowed) expected->covariance.diagonal().array() += doubt * doubt;
   answer.ego_velocity =
-      measure(pooled, context.has_diverged ? std::nullopt : prior, context.model_error_scale);
+      measure(pooled, context.has_diverged ? std::nullopt : expected, context.model_error_scale);
   answer.was_predicted = prior.has_value();
   if (prior) judge(pooled, *prior, context.model_error_scale, answer);
   EgoVelocity measured = answer.ego_velocity;
   const bool has_own = isValid(measured.status);
   if (!has_own && tightly && prior && !context.has_diverged)
-    measured = around(*prior, scan, pooled, context.model_error_scale);
+    measured = around(*prior, scan, estimator_.around(pooled, *prior), context.model_error_scale);
   if (!isValid(measured.status)) return reject(toString(answer.ego_velocity.status));
   if (has_own && !feasibility_.accept(scan.stamp, measured.v_R)) return reject("infeasible_velocity");
 
@@ -105,28 +110,34 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
 
   // A minority that sides with the prediction has more noise than its covariance says.
   const bool can_be_judged = moving && tilt_is_known && hasMajority(measured);
-  std::optional<Innovation> now;
-  if (prior) now = innovation(scan.stamp, *prior, measured, prediction);
+  std::optional<Innovation> all, now;
+  if (prior) {
+    all = innovation(scan.stamp, *prior, measured, prediction);
+    // Borrowed points made up innovations before.
+    now = has_borrowed && moving
+              ? innovation(scan.stamp, *prior, around(*prior, scan, measured, 1.0), prediction)
+              : all;
+  }
   if (can_be_judged && informs_offset && options_.smoother.estimate_time_offset &&
       step_detector_.stepped(*now)) {
     in_window_.stepOffset(smoother, scan.stamp);
     offset_uncertainty_.offsetStepped();
     answer.offset_stepped = true;
   }
-  if (now && gate_.rejects(*now, isUnanimous(measured), tilt_is_known)) return reject("innovation");
+  if (all && gate_.rejects(*all, isUnanimous(measured), tilt_is_known)) return reject("innovation");
   const RadarInWindow::AddResult added =
       answer.doppler
           ? in_window_.add(smoother, *answer.doppler)
           : in_window_.add(smoother, RadarVelocityMeasurement{taken, measured.v_R, measured.covariance});
   if (added != RadarInWindow::AddResult::kAdded) return reject(toString(added));
   if (can_be_judged && informs_offset) offset_uncertainty_.add(*now);
-  if (can_be_judged && has_own) {
-    answer.used = now;
+  // A borrowed point must not teach twice.
+  const bool is_new = !has_borrowed || scan.stamp - learned_at_ > ScanPool::kMaxAge;
+  if (can_be_judged && has_own && is_new) {
+    answer.used = all;
     answer.prediction_covariance = prior->covariance;
   }
   gate_.used(scan.stamp);
-  // A borrowed point must not teach twice.
-  const bool is_new = !has_borrowed || scan.stamp - learned_at_ > ScanPool::kMaxAge;
   if (!answer.at_rest && has_own && is_new) {
     estimator_.learn(pooled, measured);
     learned_at_ = scan.stamp;
@@ -142,9 +153,8 @@ EgoVelocity RadarChannel::measure(const RadarScan& scan, const std::optional<Vel
   return measured;
 }
 
-EgoVelocity RadarChannel::around(const VelocityPrior& prior, const RadarScan& scan, const RadarScan& pooled,
+EgoVelocity RadarChannel::around(const VelocityPrior& prior, const RadarScan& scan, EgoVelocity result,
                                  double scale) const {
-  EgoVelocity result = estimator_.around(pooled, prior);
   result.inliers = below(scan.points.size(), result.inliers);
   if (result.inliers.empty()) result.status = EgoVelocityStatus::kTooFewInliers;
   if (!isValid(result.status)) return result;

@@ -29,7 +29,8 @@ struct StaticInitialization {
   double duration = 0.0;  ///< [s]
 };
 
-/// Waits for `duration` seconds of rest; any mounting (gravity on any axis).
+/// Waits for `duration` seconds of rest. If the platform sets off earlier, a second of rest before is enough: a
+/// smooth start must not pass for rest. Any mounting (gravity on any axis).
 class StaticInitializer {
  public:
   StaticInitializer(const StaticInitializerOptions& options, double gravity);
@@ -42,11 +43,15 @@ class StaticInitializer {
   bool hasSeenMotion() const { return has_seen_motion_; }
 
  private:
+  /// Whether the newest samples show that the platform sets off: half of max_accel_std, and more than noise.
+  bool endsNow();
+
   StaticInitializerOptions options_;  // read-only after construction
   double gravity_;                    // read-only after construction
   std::vector<ImuMeasurement> samples_;
   std::string waiting_for_ = "the first IMU sample";
   bool has_seen_motion_ = false;
+  Time checked_at_;
 };
 
 /// Shortest rotation that turns the measured specific force at rest, in I, onto the upward axis of W; yaw

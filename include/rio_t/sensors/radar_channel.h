@@ -91,9 +91,9 @@ class RadarChannel {
 
  private:
   EgoVelocity measure(const RadarScan& scan, const std::optional<VelocityPrior>& prior, double scale) const;
-  /// The velocity that the points show around the prediction, for scans without one of their own. Directions
-  /// that they do not see have a large sigma.
-  EgoVelocity around(const VelocityPrior& prior, const RadarScan& scan, const RadarScan& pooled,
+  /// The velocity that the inliers among the scan's own points show around the prediction. Directions that
+  /// they do not see have a large sigma.
+  EgoVelocity around(const VelocityPrior& prior, const RadarScan& scan, EgoVelocity consensus,
                      double scale) const;
   Innovation innovation(Time stamp, const VelocityPrior& prior, const EgoVelocity& measured,
                         const std::optional<RadarVelocityPrediction>& prediction) const;
