@@ -24,7 +24,9 @@ void ModelErrorScale::add(Time stamp, double squared_sigmas, double share) {
   last_ = stamp;
   information_ = fade * information_ + 1.5 * share * share;
   const double excess = std::clamp(squared_sigmas, 0.0, kLargestSquare) - 3.0;
-  value_ *= std::exp(0.5 * share * excess / (kBelief + information_));
+  // Newton's step takes the curvature where it is: by the expected one, a single outlier would count tenfold.
+  const double curvature = information_ + 0.5 * share * share * std::max(0.0, excess);
+  value_ *= std::exp(0.5 * share * excess / (kBelief + curvature));
   value_ = std::clamp(value_, kSmallest, kLargest);
 }
 
