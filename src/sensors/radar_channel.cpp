@@ -188,7 +188,7 @@ Innovation RadarChannel::innovation(Time stamp, const VelocityPrior& prior, cons
   result.S = prior.covariance + measured.covariance;
   if (!prediction) return result;
   result.S_at_offset = prediction->covariance_at_offset + measured.covariance;
-  result.J_O = offset_evidence_.gain() * prediction->dv_dt_O.mean;
+  result.J_O = offset_evidence_.gain() * prediction->dv_dt_O.forInnovation();
   return result;
 }
 
