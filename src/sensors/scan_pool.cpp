@@ -6,7 +6,7 @@ namespace rio_t {
 namespace {
 
 /// With so many points, three of them outliers in ten, RANSAC finds the static world (docs/method.md, section
-/// 9.1).
+/// 9.9).
 constexpr std::size_t kEnoughPoints = 20;
 
 }  // namespace

@@ -20,7 +20,7 @@ struct DopplerMeasurement : RadarScanTime {
   double huber_threshold = 0.0;  ///< [sigma] of the shared error; 0: no robust loss
 };
 
-/// The Doppler of each point of a scan, tightly coupled (docs/method.md, section 4.4). Any number of points
+/// The Doppler of each point of a scan, tightly coupled (docs/method.md, section 5.7). Any number of points
 /// counts, in a plane or not. Blocks: state at `state_time`, t_O.
 ///
 /// A residual a point, and all depend on the state through one velocity. So QR leaves three rows that depend

@@ -27,7 +27,7 @@ Eigen::Matrix3d semidefiniteRoot(const Eigen::Matrix3d& A);
 Eigen::Vector3d solveTransposed(const Eigen::Matrix3d& U, const Eigen::Vector3d& b);
 
 /// What the Dopplers of a scan say of the radar's velocity: one residual a point (docs/method.md, section
-/// 4.4). Minus its logarithm is half the sum of the squared residuals, so it fits into a least squares.
+/// 5.7). Minus its logarithm is half the sum of the squared residuals, so it fits into a least squares.
 ///
 /// A Doppler is right within its bin of `step`, plus noise; or, with a small probability, it is anything.
 /// - Bin: a bin wider than the noise bounds the velocity along the ray and does not pull it to the centre.
