@@ -144,9 +144,10 @@ TEST(ImuRadarFactor, JacobiansAreCorrectForwardsAndBackwards) {
   const SyntheticMotion motion;
   const ImuBuffer imu = motion.imu(0.5, 1.6, 400.0);
   for (const double t_O : {-0.11, -0.0113, 0.0037, 0.0521, 0.2031}) {
-    // Held, t_O has no part in it: the derivatives in the state are exact.
+    // Without a part of t_O in it, the derivatives in the state are exact.
     RadarVelocityMeasurement z = measurement(motion.time(1.0));
     z.linear_from_t_O = t_O;
+    z.offset_gain = 0.0;
     expectJacobiansCorrect(RadarVelocityFactor(z, motion.time(0.98), imuModel(imu)),
                            {values(moved(motion.state(0.98), 0.05)), {0.2 - t_O}}, 1e-6, 1e-4);
   }
@@ -193,27 +194,69 @@ TEST(ImuRadarFactor, AHeldOffsetIsAllThatCounts) {
   };
   const Eigen::Vector3d free = residual(0.02);
   z.linear_from_t_O = 0.02;
+  z.offset_gain = 0.0;
   EXPECT_EQ(residual(0.02), free);
   EXPECT_EQ(residual(-0.1), free);
 }
 
-TEST(VelocityRate, NoiseIsNoAcceleration) {
-  Noise noise;
-  int informs = 0;
-  for (int run = 0; run < 200; ++run) {
-    ImuBuffer imu;
-    for (int i = 0; i <= 30; ++i) {
-      ImuMeasurement sample{Time::fromSeconds(0.01 * i), Eigen::Vector3d::Zero(),
-                            Eigen::Vector3d(0.0, 0.0, 9.81) + 2.0 * noise.vector()};
-      sample.accel_noise = 2.0 * 2.0 * 0.01;
-      imu.add(sample);
+TEST(ImuRadarFactor, AroundWhereAScanWasPlacedTheOffsetCountsToFirstOrder) {
+  const SyntheticMotion motion;
+  const ImuBuffer imu = motion.imu(0.5, 1.6, 400.0);
+  const StateBlock x = moved(motion.state(0.98), 0.05);
+  for (const double gain : {1.0, 0.4}) {
+    RadarVelocityMeasurement z = measurement(motion.time(1.0));
+    z.linear_from_t_O = 0.02;
+    z.offset_gain = gain;
+    const RadarVelocityFactor factor(z, motion.time(0.98), imuModel(imu));
+    z.linear_from_t_O = std::nullopt;
+    const RadarVelocityFactor exact(z, motion.time(0.98), imuModel(imu));
+    const auto residual = [&](const RadarVelocityFactor& f, double t_O, Eigen::Vector3d* J_t = nullptr) {
+      const double* blocks[] = {x.data(), &t_O};
+      double* jacobians[] = {nullptr, J_t != nullptr ? J_t->data() : nullptr};
+      Eigen::Vector3d r;
+      f.Evaluate(blocks, r.data(), J_t != nullptr ? jacobians : nullptr);
+      return r;
+    };
+    Eigen::Vector3d J_t, J_exact, J_away;
+    const Eigen::Vector3d r = residual(factor, 0.02, &J_t);
+    EXPECT_EQ(r, residual(exact, 0.02, &J_exact));
+    EXPECT_EQ(J_t, J_exact);
+    EXPECT_GT(J_t.norm(), 1.0);
+    for (const double t_O : {-0.15, 0.01, 0.021, 0.2}) {
+      // Whether the derivative is asked for or not.
+      EXPECT_LT((residual(factor, t_O) - (r + (t_O - 0.02) * J_t)).norm(), 1e-9) << t_O;
+      EXPECT_LT((residual(factor, t_O, &J_away) - (r + (t_O - 0.02) * J_t)).norm(), 1e-9) << t_O;
+      EXPECT_EQ(J_away, J_t) << t_O;
     }
-    const VelocityRate rate = velocityRate(imu, Time::fromSeconds(0.15), StateBlock(),
-                                           Eigen::Vector3d(0.0, 0.0, -9.81), Eigen::Vector3d::Zero());
-    EXPECT_NEAR(rate.variance, 4.0 * 0.01 / 0.15, 0.02 * rate.variance);
-    informs += rate.informsOffset(0.2) ? 1 : 0;
+    EXPECT_GT((residual(exact, 0.2) - (r + 0.18 * J_t)).norm(), 0.1);  // there is something to leave out
   }
-  EXPECT_EQ(informs, 0);
+}
+
+TEST(VelocityRate, ClaimsTheScatterThatTheNoiseOfTheImuGivesIt) {
+  constexpr double kSpacing = 0.01;  // [s]
+  // The density of the noise, and the half width that it needs [s].
+  for (const auto& [density, half_width] :
+       {std::pair{2.5e-4, kOffsetHalfWidth}, std::pair{4e-3, 0.3}, std::pair{4e-2, kMaxOffsetHalfWidth}}) {
+    Noise noise;
+    double squares = 0.0;
+    constexpr int kRuns = 1000;
+    for (int run = 0; run < kRuns; ++run) {
+      ImuBuffer imu;
+      for (int i = 0; i <= 120; ++i) {
+        ImuMeasurement sample{
+            Time::fromSeconds(kSpacing * i), Eigen::Vector3d::Zero(),
+            Eigen::Vector3d(0.0, 0.0, 9.81) + std::sqrt(density / kSpacing) * noise.vector()};
+        sample.accel_noise = density;
+        imu.add(sample);
+      }
+      const Time middle = Time::fromSeconds(0.6);
+      EXPECT_NEAR(offsetHalfWidth(imu, middle), half_width, 1e-9);
+      const VelocityRate rate =
+          velocityRate(imu, middle, StateBlock(), Eigen::Vector3d(0.0, 0.0, -9.81), Eigen::Vector3d::Zero());
+      squares += rate.a_I.squaredNorm() / rate.variance / (3 * kRuns);
+    }
+    EXPECT_NEAR(squares, 1.0, 0.1) << density;
+  }
 }
 
 TEST(ImuRadarFactor, ResidualIsZeroAtTheTrueOffset) {
