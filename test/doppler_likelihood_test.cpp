@@ -120,7 +120,7 @@ TEST(DopplerResidual, GrowsWithTheErrorAndIsBounded) {
       const double e = 1e-3 * i;
       const double r = residual(e);
       EXPECT_GE(r, before) << e;
-      EXPECT_DOUBLE_EQ(residual(-e), -r) << e;
+      EXPECT_NEAR(residual(-e), -r, 1e-9) << e;
       before = r;
     }
     // A point that is anything has the density of the outliers, and no pull.
@@ -209,7 +209,7 @@ struct MonteCarlo {
 };
 
 MonteCarlo monteCarlo(const Eigen::Vector3d& v_R, double step, std::size_t points, double around) {
-  constexpr int kTrials = 8000;
+  constexpr int kTrials = 4000;
   Scene scene(simulatedRadar(step));
   MonteCarlo result;
   for (int i = 0; i < kTrials; ++i) {
@@ -240,8 +240,6 @@ TEST(DopplerLikelihood, NoisyDirectionsDoNotShortenTheVelocity) {
     for (const Eigen::Vector3d& v_R :
          {Eigen::Vector3d(0.1, 0.5, 0.1), Eigen::Vector3d(0.2, 1.5, 0.6), Eigen::Vector3d(0.1, 3.0, 0.15)}) {
       const MonteCarlo result = monteCarlo(v_R, step, 45, 0.1);
-      RecordProperty("bias", std::to_string(largest(result.bias)));
-      std::printf("step %.3f v %.2f %.2f %.2f: bias %.4f %.4f %.4f rms %.4f %.4f %.4f nees %.2f, ls bias %.4f %.4f %.4f rms %.4f %.4f %.4f\n", step, v_R.x(), v_R.y(), v_R.z(), result.bias.x(), result.bias.y(), result.bias.z(), result.rms.x(), result.rms.y(), result.rms.z(), result.nees, result.least_squares_bias.x(), result.least_squares_bias.y(), result.least_squares_bias.z(), result.least_squares_rms.x(), result.least_squares_rms.y(), result.least_squares_rms.z());
       EXPECT_GT(largest(result.least_squares_bias), 0.004) << "nothing to correct at " << v_R.transpose();
       EXPECT_LT(largest(result.bias), 0.004)
           << result.bias.transpose() << " at " << v_R.transpose() << ", step " << step;
@@ -253,9 +251,9 @@ TEST(DopplerLikelihood, NoisyDirectionsDoNotShortenTheVelocity) {
 TEST(DopplerLikelihood, SpeedsFarBelowABinAreSeenBetterThanByRounding) {
   for (const double speed : {0.08, 0.12}) {
     const MonteCarlo result = monteCarlo({0.0, speed, 0.0}, 0.125, 70, 0.1 * speed);
-      std::printf("speed %.3f: bias %.4f %.4f %.4f rms %.4f %.4f %.4f nees %.2f, ls bias %.4f %.4f %.4f rms %.4f %.4f %.4f\n", speed, result.bias.x(), result.bias.y(), result.bias.z(), result.rms.x(), result.rms.y(), result.rms.z(), result.nees, result.least_squares_bias.x(), result.least_squares_bias.y(), result.least_squares_bias.z(), result.least_squares_rms.x(), result.least_squares_rms.y(), result.least_squares_rms.z());
     EXPECT_LT(std::abs(result.bias.y()), 0.5 * std::abs(result.least_squares_bias.y())) << speed;
     EXPECT_LT(std::abs(result.bias.y()), 0.01) << speed;
+    EXPECT_LT(result.nees, 3.6) << speed;
   }
 }
 

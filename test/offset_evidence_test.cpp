@@ -21,12 +21,13 @@ struct Scans {
   Noise draw{11};
   double time = 1000.0;
   double claimed = 0.0;  ///< information about the offset, with the gain [1/s^2]
-  double known_information = 0.0;  ///< of the motion alone [1/s^2]
+  double raw = 0.0;                ///< without it
+  double known_information = 0.0;  ///< of the motion alone
   double gain_sum = 0.0;
   int count = 0;
 
   void feed(OffsetEvidence& evidence, double seconds) {
-    claimed = known_information = gain_sum = 0.0;
+    claimed = raw = known_information = gain_sum = 0.0;
     count = 0;
     Eigen::Vector3d moving = Eigen::Vector3d::Zero();
     for (const double end = time + seconds; time < end; time += 0.1) {
@@ -42,6 +43,7 @@ struct Scans {
       EXPECT_GE(gain, 0.0);
       EXPECT_LE(gain, 1.0);
       claimed += gain * gain * d.mean.dot(weight * d.mean);
+      raw += d.mean.dot(weight * d.mean);
       known_information += moving.dot(weight * moving);
       gain_sum += gain;
       ++count;
@@ -52,21 +54,27 @@ struct Scans {
 
 TEST(OffsetEvidence, NothingIsKnownAtFirst) { EXPECT_EQ(OffsetEvidence().gain(), 0.0); }
 
-TEST(OffsetEvidence, NoiseAloneClaimsNothing) {
-  for (const double known : {1.0, 0.01}) {
-    for (const double noise : {0.05, 0.5, 3.0}) {
-      OffsetEvidence evidence;
-      Scans scans;
-      scans.noise = noise;
-      scans.known = known;
-      if (known < 1.0 && noise < 0.5) continue;
-      scans.feed(evidence, 3600.0);
-      std::printf("noise %.2f known %.2f gain %.4f sigma %.5f raw %.5f\n", noise, known, scans.meanGain(),
-                  1.0 / std::sqrt(scans.claimed),
-                  1.0 / std::sqrt(36000 * 0.5 * noise * noise * scans.weight.trace()));
-      EXPECT_LT(scans.meanGain(), 0.03) << noise << " m/s^2, known " << known;
-    }
+TEST(OffsetEvidence, NoiseAloneClaimsLittleEvenInAnHour) {
+  // 0.35 m/s^2 in the mean: more than what remains of strong vibration.
+  for (const double noise : {0.05, 0.5}) {
+    OffsetEvidence evidence;
+    Scans scans;
+    scans.noise = noise;
+    scans.feed(evidence, 3600.0);
+    EXPECT_LT(scans.meanGain(), 0.02) << noise << " m/s^2";
+    // Of what the derivatives would claim as they are.
+    EXPECT_LT(scans.claimed, 1e-3 * scans.raw) << noise << " m/s^2";
+    EXPECT_GT(1.0 / std::sqrt(scans.claimed), 0.015) << noise << " m/s^2";
   }
+}
+
+TEST(OffsetEvidence, NoiseALittleBeyondWhatIsKnownIsNoMotion) {
+  OffsetEvidence evidence;
+  Scans scans;
+  scans.noise = 0.5;
+  scans.known = 0.5;
+  scans.feed(evidence, 3600.0);
+  EXPECT_LT(scans.meanGain(), 0.02);
 }
 
 TEST(OffsetEvidence, QuietMotionCountsWhole) {
@@ -77,7 +85,6 @@ TEST(OffsetEvidence, QuietMotionCountsWhole) {
     scans.noise = 0.02;
     scans.feed(evidence, 60.0);
     scans.feed(evidence, 300.0);
-    std::printf("motion %.2f gain %.4f\n", motion, scans.meanGain());
     EXPECT_GT(scans.meanGain(), 0.9) << motion;
   }
 }
@@ -92,8 +99,6 @@ TEST(OffsetEvidence, AMixCountsByItsShareAndClaimsNoMoreThanIsKnown) {
     scans.feed(evidence, 60.0);
     scans.feed(evidence, 3600.0);
     const double share = 1.0 / (1.0 + 0.5 * noise * noise);
-    std::printf("mix noise %.2f gain %.4f share %.4f claimed/known %.3f\n", noise, scans.meanGain(), share,
-                scans.claimed / scans.known_information);
     EXPECT_NEAR(scans.meanGain(), share, 0.2) << noise;
     EXPECT_LT(scans.meanGain(), share) << noise;
     EXPECT_LT(scans.claimed, scans.known_information) << noise;
@@ -106,10 +111,9 @@ TEST(OffsetEvidence, WhatTiltAndBiasAddIsNoMotion) {
   Scans scans;
   Noise draw{5};
   double gains = 0.0;
+  Eigen::Vector3d error = Eigen::Vector3d::Zero();  // lasts for a second
   for (int i = 0; i < 2000; ++i) {
     OffsetDerivative d;
-    // It lasts for a second.
-    static Eigen::Vector3d error = Eigen::Vector3d::Zero();
     if (i % 10 == 0) error = 0.1 * draw.vector();
     d.mean = d.before = d.after = error;
     d.variance = 1e-3;
