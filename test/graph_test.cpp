@@ -372,21 +372,24 @@ TEST_P(Windows, FindsTheMinimum) {
 
 TEST_P(Windows, FindsTheMinimumOfDopplers) {
   make(0.03, 0.25, 0.0, false, TimeOffsetModel::kImu, true);
-  EXPECT_EQ(solve(window, kTight, GetParam()).termination, SolverTermination::kConverged);
-  EXPECT_LT(slope(), 1e-3);
+  // Outliers and bins have no Gauss-Newton that converges quadratically: to a hundredth of a sigma.
+  EXPECT_EQ(solve(window, {200, 1e-4}, GetParam()).termination, SolverTermination::kConverged);
+  EXPECT_LT(slope(), 0.02);
 }
 
-TEST_P(Windows, SayTheSameOfDopplersAsTheOtherSolver) {
-  if (GetParam() == WindowSolver::kCeres) return;  // once is enough
+TEST_P(Windows, SaysTheSameOfDopplersAsTheOtherSolver) {
   std::vector<Eigen::VectorXd> found[2];
-  for (const WindowSolver solver : {WindowSolver::kChain, WindowSolver::kCeres}) {
+  const WindowSolver other =
+      GetParam() == WindowSolver::kChain ? WindowSolver::kCeres : WindowSolver::kChain;
+  for (const WindowSolver solver : {GetParam(), other}) {
     make(0.03, 0.25, 0.0, false, TimeOffsetModel::kImu, true);
-    EXPECT_TRUE(solve(window, SolverLimits(), solver).converged());
-    EXPECT_TRUE(solve(window, kTight, solver).converged());
-    for (const auto& block : window.blocks()) found[solver == WindowSolver::kCeres].push_back(block->x);
+    EXPECT_TRUE(solve(window, {200, 1e-4}, solver).converged());
+    for (const auto& block : window.blocks()) found[solver == other].push_back(block->x);
   }
+  // The velocities have a sigma of 1 cm/s and more.
+  ASSERT_EQ(found[0].size(), found[1].size());
   for (std::size_t i = 0; i < found[0].size(); ++i)
-    EXPECT_LT((found[0][i] - found[1][i]).norm(), 1e-4) << "block " << i;
+    EXPECT_LT((found[0][i] - found[1][i]).norm(), 1e-3) << "block " << i;
 }
 
 TEST_P(Windows, AWrongJacobianIsNoConvergence) {
