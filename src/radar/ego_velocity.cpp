@@ -24,6 +24,8 @@ constexpr double kMaxSharpSigma = 0.1;
 /// Log-likelihood ratio of a point that a velocity explains to one that it does not: a Gaussian of 0.05 m/s
 /// against a uniform density over some m/s.
 constexpr double kEvidenceOfAPoint = 4.0;
+constexpr double kTellsSide = 1.0 / 12.0;             // [spans] a quarter at three sigma
+constexpr int kSides[] = {0, -1, 1};                  // [spans] that a Doppler may have come back from
 constexpr double kAgrees = 3.0;  // [sigma] of a point
 /// Twice the log-likelihood ratio of a slow motion to rest: once in 1000 scans at rest (chi-squared, 3 degrees
 /// of freedom).
@@ -57,6 +59,7 @@ void validate(const EgoVelocityOptions& o) {
   require(o.doppler_sigma >= 0.0, "doppler_sigma", "at least 0 m/s");
   require(o.doppler_quantization >= 0.0 && std::isfinite(o.doppler_quantization), "doppler_quantization",
           "finite and at least 0 m/s");
+  require(o.doppler_span >= 0.0, "doppler_span", "at least 0 m/s");
   require((o.added_sigma.array() >= 0.0).all(), "added_sigma", "at least 0 m/s");
   require(o.max_condition_number > 1.0, "max_condition_number", "above 1");
   require(o.max_sigma > 0.0, "max_sigma", "above 0 m/s");
@@ -89,6 +92,11 @@ std::vector<RadarDirection> filter(const RadarScan& scan, const EgoVelocityOptio
   return directions;
 }
 
+/// Moves each Doppler by whole spans to where a static point is expected at `v_R`.
+void unwrap(std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R, double span) {
+  for (RadarDirection& p : points) p.doppler = unwrapped(p.doppler, -p.u_R.dot(v_R), span);
+}
+
 /// Draws of indices without std::uniform_int_distribution, whose results differ between standard libraries.
 class IndexDraw {
  public:
@@ -115,15 +123,16 @@ bool solveThree(const RadarDirection& a, const RadarDirection& b, const RadarDir
 /// The velocity that most points agree with, among rest and those of three random points each. Each point
 /// costs its squared residual up to the threshold (MSAC), so that among equally many inliers the better fit
 /// wins. `points` has at least three. None where no three drawn span 3D.
+/// With a span, each Doppler counts modulo the span, and the drawn ones may have come back from either side.
 std::optional<Eigen::Vector3d> ransac(const std::vector<RadarDirection>& points, const EgoVelocityOptions& o,
-                                      int iterations) {
+                                      int iterations, double span) {
   const double limit = o.ransac_inlier_threshold * o.ransac_inlier_threshold;
   Eigen::Vector3d best_v_R = Eigen::Vector3d::Zero();
   double best = std::numeric_limits<double>::infinity();
   const auto offer = [&](const Eigen::Vector3d& v_R) {
     double cost = 0.0;
     for (const RadarDirection& p : points) {
-      const double r = p.doppler + p.u_R.dot(v_R);
+      const double r = unwrapped(p.doppler + p.u_R.dot(v_R), 0.0, span);
       cost += std::min(r * r, limit);
       if (cost >= best) return;
     }
@@ -142,10 +151,17 @@ std::optional<Eigen::Vector3d> ransac(const std::vector<RadarDirection>& points,
     std::size_t k = draw.below(n - 2);
     if (k >= std::min(i, j)) ++k;
     if (k >= std::max(i, j)) ++k;
-    Eigen::Vector3d v_R;
-    if (!solveThree(points[i], points[j], points[k], v_R)) continue;
-    spans_space = true;
-    offer(v_R);
+    const int sides = span > 0.0 ? 27 : 1;
+    for (int side = 0; side < sides; ++side) {
+      RadarDirection a = points[i], b = points[j], c = points[k];
+      a.doppler += span * kSides[side % 3];
+      b.doppler += span * kSides[side / 3 % 3];
+      c.doppler += span * kSides[side / 9];
+      Eigen::Vector3d v_R;
+      if (!solveThree(a, b, c, v_R)) break;
+      spans_space = true;
+      offer(v_R);
+    }
   }
   return spans_space ? std::make_optional(best_v_R) : std::nullopt;
 }
@@ -315,6 +331,7 @@ EgoVelocityEstimator::EgoVelocityEstimator(const EgoVelocityOptions& options)
     : given_(validated(options)),
       ransac_iterations_(ransacIterations(given_)),
       grid_(given_.doppler_quantization),
+      span_(given_.doppler_span),
       options_(withStep(given_, grid_.step().value)),
       noise_(startNoise(options_)) {}
 
@@ -329,7 +346,11 @@ void EgoVelocityEstimator::observe(const RadarScan& scan) {
 EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
                                            const std::optional<VelocityPrior>& prior) const {
   const EgoVelocityOptions& o = options_;
-  const std::vector<RadarDirection> points = filter(scan, o);
+  std::vector<RadarDirection> points = filter(scan, o);
+  const double span = span_.value();
+  // A prior that is off by a quarter of the span does not tell on which side a Doppler belongs.
+  const bool tells_side = prior && largestSigma(prior->covariance) < kTellsSide * span;
+  if (tells_side) unwrap(points, prior->v_R, span);
   std::vector<RadarDirection> inliers;
   EgoVelocity result;
   result.points_used = points.size();
@@ -363,11 +384,13 @@ EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
   } else if (rest) {
     inliers = points;
   } else {
-    const std::optional<Eigen::Vector3d> consensus = ransac(points, o, ransac_iterations_);
+    const std::optional<Eigen::Vector3d> consensus =
+        ransac(points, o, ransac_iterations_, tells_side ? 0.0 : span);
     if (!consensus) {
       result.status = EgoVelocityStatus::kIllConditioned;
       return result;
     }
+    if (!tells_side) unwrap(points, *consensus, span);
     inliers = selectInliers(points, *consensus, o, noise());
     if (prior && !selectInliersWithPrior(points, *prior, o, noise(), inliers)) {
       result.status = EgoVelocityStatus::kAmbiguous;
@@ -417,7 +440,9 @@ EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
 EgoVelocity EgoVelocityEstimator::around(const RadarScan& scan, const VelocityPrior& prior) const {
   EgoVelocity result;
   result.status = EgoVelocityStatus::kTooFewInliers;
-  for (const RadarDirection& p : filter(scan, options_)) {
+  std::vector<RadarDirection> points = filter(scan, options_);
+  unwrap(points, prior.v_R, span_.value());
+  for (const RadarDirection& p : points) {
     const double variance =
         residualVariance(Angles(p.u_R), prior.v_R, noise()) + p.u_R.dot(prior.covariance * p.u_R);
     ++result.points_used;
@@ -440,13 +465,17 @@ DopplerLikelihood EgoVelocityEstimator::likelihood(const RadarScan& scan,
     const RadarPoint& p = scan.points[i];
     directions.push_back({p.position_R.normalized(), p.doppler, i});
   }
+  unwrap(directions, v_R, span_.value());
   return DopplerLikelihood(directions, v_R, noise());
 }
 
 void EgoVelocityEstimator::learn(const RadarScan& scan, const EgoVelocity& estimated) {
-  if (options_.solver != EgoVelocitySolver::kErrorsInVariables) return;
   if (estimated.status != EgoVelocityStatus::kMoving) return;
-  noise_.learn(filter(scan, options_), estimated.inliers, estimated.v_R);
+  std::vector<RadarDirection> points = filter(scan, options_);
+  span_.learn(points, estimated.v_R, options_.doppler_quantization);
+  if (options_.solver != EgoVelocitySolver::kErrorsInVariables) return;
+  unwrap(points, estimated.v_R, span_.value());
+  noise_.learn(points, estimated.inliers, estimated.v_R);
 }
 
 bool hasMajority(const EgoVelocity& velocity) {

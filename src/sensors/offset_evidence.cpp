@@ -16,6 +16,8 @@ constexpr double kCertain = 5.0;
 
 }  // namespace
 
+bool OffsetDerivative::isCertain() const { return mean.squaredNorm() > kCertain * kCertain * variance; }
+
 OffsetDerivative offsetDerivative(const ImuBuffer& imu, Time tau, const StateBlock& x,
                                   const Eigen::Vector3d& g_W, const Extrinsics& T_IR) {
   const Eigen::Matrix3d R_RI = T_IR.R_RI();
@@ -38,7 +40,7 @@ void OffsetEvidence::add(Time stamp, const OffsetDerivative& derivative, const E
   const double fade = std::exp(-std::clamp(stamp - last_, 0.0, 10.0 * kMemory) / kMemory);
   last_ = stamp;
   const double all = derivative.mean.dot(weight * derivative.mean);
-  const bool is_certain = derivative.mean.squaredNorm() > kCertain * kCertain * derivative.variance;
+  const bool is_certain = derivative.isCertain();
   const double product = is_certain ? all - derivative.variance * weight.trace()
                                     : derivative.before.dot(weight * derivative.after);
   motion_ = fade * motion_ + product - weight.cwiseProduct(derivative.shared).sum();

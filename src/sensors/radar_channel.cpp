@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace rio_t {
 namespace {
@@ -22,6 +23,15 @@ std::size_t countOthers(const std::vector<std::size_t>& some, const std::vector<
 
 std::vector<std::size_t> below(std::size_t limit, const std::vector<std::size_t>& ascending) {
   return {ascending.begin(), std::lower_bound(ascending.begin(), ascending.end(), limit)};
+}
+
+/// Those of `own` that agree with a prediction, if the majority of the points does.
+std::vector<std::size_t> alsoIn(const EgoVelocity& predicted, const std::vector<std::size_t>& own) {
+  std::vector<std::size_t> both;
+  if (isValid(predicted.status))
+    std::set_intersection(own.begin(), own.end(), predicted.inliers.begin(), predicted.inliers.end(),
+                          std::back_inserter(both));
+  return both.empty() ? own : both;
 }
 
 VelocityPrior zeroVelocity(double sigma) {
@@ -100,7 +110,9 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   RadarScanTime taken{scan.stamp, options_.T_IR, answer.offset_gain};
   taken.linear_from_t_O = offset();
   if (tightly && measured.status == EgoVelocityStatus::kMoving) {
-    const std::vector<std::size_t> own = below(scan.points.size(), measured.inliers);
+    std::vector<std::size_t> own = below(scan.points.size(), measured.inliers);
+    // A thing that moves slowly passes for static in a velocity, but not point by point.
+    if (prior && has_own) own = alsoIn(estimator_.around(scan, *prior), own);
     if (own.empty()) return reject("too_few_inliers");
     const auto points = std::make_shared<DopplerLikelihood>(estimator_.likelihood(scan, own, measured.v_R));
     answer.doppler =
@@ -176,7 +188,7 @@ Innovation RadarChannel::innovation(Time stamp, const VelocityPrior& prior, cons
   result.S = prior.covariance + measured.covariance;
   if (!prediction) return result;
   result.S_at_offset = prediction->covariance_at_offset + measured.covariance;
-  result.J_O = offset_evidence_.gain() * prediction->dv_dt_O.mean;
+  result.J_O = offset_evidence_.gain() * prediction->dv_dt_O.forInnovation();
   return result;
 }
 

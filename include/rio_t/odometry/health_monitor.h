@@ -59,7 +59,7 @@ class HealthMonitor {
   void startedAt(Time time);
 
   /// Judges at `now`; `state` is what is published. `model_error_scale` is that of ModelErrorScale: where the
-  /// models are wrong by five of their sigmas, the input is not what the options say.
+  /// models are wrong by five of their sigmas for a whole window, the input is not what the options say.
   Health judge(Time now, const NavigationState& state, double model_error_scale = 1.0);
   Health health() const { return health_; }
   /// Whether the divergence has lasted long enough for a re-initialisation.
@@ -87,6 +87,7 @@ class HealthMonitor {
   std::optional<Time> diverged_at_;  ///< start of the divergence, or the last start after it
   Time contradicted_since_;
   Time latest_;               ///< stamp of the newest entry, also after the entries were cleared
+  std::optional<Time> misfit_since_;
   double mean_square_ = 0.0;  ///< of d, by the latest scans that had a velocity [m^2/s^2]
   Health health_ = Health::kOk;
 };

@@ -9,6 +9,7 @@
 
 #include "rio_t/radar/doppler_grid.h"
 #include "rio_t/radar/doppler_likelihood.h"
+#include "rio_t/radar/doppler_span.h"
 #include "rio_t/radar/point_noise.h"
 #include "rio_t/radar/scan.h"
 
@@ -56,6 +57,7 @@ struct EgoVelocityOptions {
 
   /// [m/s] step of the radar's Doppler; 0: read off the data, which may show none. See DopplerGrid.
   double doppler_quantization = 0.0;
+  double doppler_span = 0.0;  ///< [m/s] Dopplers beyond come back on the other side; 0 = read it off the data
   /// [m/s] right, forward, up; added in quadrature while moving. The solver's covariance is honest for noise
   /// that is independent from point to point (its NEES is 3 in simulation). This sigma stands for errors that
   /// points share: things that move so slowly that they pass as inliers, a velocity that changes within the
@@ -135,6 +137,7 @@ class EgoVelocityEstimator {
   /// The noise as learned so far.
   const PointVariances& noise() const { return noise_.variances(); }
   DopplerStep dopplerStep() const { return grid_.step(); }
+  double dopplerSpan() const { return span_.value(); }  ///< [m/s] 0: none known
   /// The options as they hold now: those that are 0 for "from the step" have their values.
   const EgoVelocityOptions& options() const { return options_; }
 
@@ -142,6 +145,7 @@ class EgoVelocityEstimator {
   EgoVelocityOptions given_;  // read-only after construction
   int ransac_iterations_;     // read-only after construction
   DopplerGrid grid_;
+  DopplerSpan span_;
   EgoVelocityOptions options_;  // given_, with what follows from the step
   PointNoise noise_;
 };

@@ -17,6 +17,12 @@ struct OffsetDerivative {
   double variance = 0.0;  ///< of the IMU's noise in `mean`, per axis, as far as it is known [m^2/s^4]
   /// Covariance of the error that all three share: of tilt and accelerometer bias [m^2/s^4].
   Eigen::Matrix3d shared = Eigen::Matrix3d::Zero();
+
+  /// The mean is five sigma of its noise: motion.
+  bool isCertain() const;
+  /// For an innovation. The noise before the scan is in its prediction, too, and both together look like a
+  /// wrong offset.
+  const Eigen::Vector3d& forInnovation() const { return isCertain() ? mean : after; }
 };
 
 /// For a state `x` at the time of measurement `tau`, without `shared`; `g_W` is gravity in W [m/s^2].

@@ -240,6 +240,9 @@ void listEgoVelocity(ParameterList& list, Config& c) {
   list.number("radar_elevation_sigma", "rad", atLeast(0), radar.elevation_sigma, "likewise of its elevation");
   list.number("radar_doppler_sigma", "m/s", atLeast(0), radar.doppler_sigma,
               "likewise of its Doppler, besides the steps");
+  list.number("radar_doppler_span", "m/s", atLeast(0), radar.doppler_span,
+              "whole span of the radar's Doppler: what lies beyond comes back on the other side; 0: read it off "
+              "the data");
   list.number("radar_doppler_step", "m/s", atLeast(0), radar.doppler_quantization,
               "step in which the radar gives the Doppler; 0: read off the data, which may show none; "
               "above 0 and below 0.02: none");
