@@ -95,6 +95,8 @@ TEST_F(Batch, EqualsTheFixedLagSmootherThatKeepsEverything) {
         if (stamp < 1.0) scan.rest_velocity_sigma = 3.0;
         // Where the window puts its node: elsewhere is the same scan, but another split of the IMU's noise.
         scan.t_O = model == TimeOffsetModel::kImu ? scan.stamp - online.radar.nodeTime(scan.stamp) : 0.02;
+        // To first order around there, as the batch takes it.
+        if (model == TimeOffsetModel::kImu) scan.velocity->linear_from_t_O = scan.t_O;
         whole.scans.push_back(scan);
         online.add(*scan.velocity);
         if (scan.rest_velocity_sigma) online.addRest(scan.stamp, *scan.rest_velocity_sigma);

@@ -181,6 +181,91 @@ TEST(EgoVelocity, RestWithALargeObjectMoving) {
   EXPECT_EQ(e.inliers.size(), 25u);
 }
 
+EgoVelocityOptions simulatedRadarOptions() {
+  EgoVelocityOptions o;
+  o.azimuth_sigma = 0.0436;
+  o.elevation_sigma = 0.0785;
+  o.doppler_sigma = 0.02;
+  o.doppler_quantization = 0.125;
+  return o;
+}
+
+// Less than a bin, most points read zero, and those along the motion do not.
+TEST(EgoVelocity, ASlowRideIsNoRestAndHasItsVelocity) {
+  for (const double speed : {0.08, 0.12}) {
+    const EgoVelocityEstimator estimator(simulatedRadarOptions());
+    Random random(16);
+    int denied = 0;
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    double squares = 0.0;
+    constexpr int kTrials = 1000;
+    for (int trial = 0; trial < kTrials; ++trial) {
+      const Eigen::Vector3d v(0.0, speed, 0.0);
+      const EgoVelocity e = estimator.estimate(staticScene(v, 70, {0.0436, 0.0785, 0.02, 0.125}, random));
+      if (!e.denies_rest) continue;
+      EXPECT_EQ(e.status, EgoVelocityStatus::kMoving);
+      ++denied;
+      mean += e.v_R;
+      squares += (e.v_R - v).dot(e.covariance.llt().solve(e.v_R - v));
+    }
+    EXPECT_GT(denied, kTrials * 95 / 100) << speed;
+    EXPECT_NEAR(mean.y() / denied, speed, 0.01) << speed;
+    EXPECT_NEAR(mean.x() / denied, 0.0, 0.005) << speed;
+    EXPECT_NEAR(mean.z() / denied, 0.0, 0.01) << speed;
+    EXPECT_LT(squares / denied, 3.0) << speed;
+  }
+}
+
+TEST(EgoVelocity, RestIsNotDeniedByPointsABinOff) {
+  const EgoVelocityEstimator estimator(simulatedRadarOptions());
+  Random random(17);
+  int denied = 0;
+  int rests = 0;
+  constexpr int kTrials = 2000;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    RadarScan scan = staticScene(Eigen::Vector3d::Zero(), 70, {0.0436, 0.0785, 0.02, 0.125}, random);
+    for (RadarPoint& p : scan.points)
+      if (random.uniform(0.0, 1.0) < 0.1) p.doppler += random.uniform(-1.0, 1.0) < 0.0 ? -0.125 : 0.125;
+    const EgoVelocity e = estimator.estimate(scan);
+    denied += e.denies_rest ? 1 : 0;
+    rests += e.status == EgoVelocityStatus::kZeroVelocity ? 1 : 0;
+  }
+  EXPECT_LT(denied, kTrials / 100);
+  EXPECT_GT(rests, kTrials * 99 / 100);
+}
+
+TEST(EgoVelocity, AroundAPredictionMostPointsHaveToAgree) {
+  const EgoVelocityEstimator estimator(simulatedRadarOptions());
+  VelocityPrior prior;
+  prior.v_R = kVelocity;
+  prior.covariance = 0.01 * 0.01 * Eigen::Matrix3d::Identity();
+  Random random(18);
+  // So few that `estimate` does not decide; `wrong` of them move.
+  const auto around = [&](int points, std::size_t wrong) {
+    RadarScan scan = staticScene(kVelocity, points, {}, random);
+    for (std::size_t i = 0; i < wrong; ++i) scan.points[i].doppler += 1.5;
+    return estimator.around(scan, prior);
+  };
+  for (const int points : {1, 2, 3, 10}) {
+    const EgoVelocity e = around(points, 0);
+    EXPECT_EQ(e.status, EgoVelocityStatus::kMoving) << points;
+    EXPECT_EQ(e.inliers.size(), static_cast<std::size_t>(points));
+    EXPECT_EQ(e.v_R, prior.v_R);
+  }
+  EXPECT_FALSE(isValid(around(1, 1).status));
+  EXPECT_FALSE(isValid(around(2, 1).status));
+  EXPECT_TRUE(isValid(around(3, 1).status));
+  EXPECT_TRUE(isValid(around(10, 4).status));
+  EXPECT_FALSE(isValid(around(10, 5).status));
+  const EgoVelocity most = around(10, 4);
+  EXPECT_EQ(most.inliers, (std::vector<std::size_t>{4, 5, 6, 7, 8, 9}));
+  EXPECT_EQ(most.points_used, 10u);
+  EXPECT_FALSE(isValid(around(0, 0).status));
+  // A vaguer prediction agrees with more.
+  prior.covariance = Eigen::Matrix3d::Identity();
+  EXPECT_TRUE(isValid(around(2, 2).status));
+}
+
 // A bin of width q hides every velocity below about q/2; the covariance at rest has to admit that.
 TEST(EgoVelocity, CoarseDopplerDoesNotFakeRest) {
   EgoVelocityOptions o;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 
 #include "noise.h"
 #include "rio_t/core/so3.h"
@@ -253,6 +254,60 @@ TEST(StaticInitializer, AnIdlingEngineIsRest) {
   }
   ASSERT_TRUE(found) << initializer.waitingFor();
   EXPECT_LT((found->b_g - Eigen::Vector3d(0.01, 0.0, -0.02)).norm(), 1e-9);
+}
+
+/// Feeds 200 Hz with noise whose density is known; the result, if it came.
+std::optional<StaticInitialization> feedMotion(StaticInitializer& initializer, double seconds, double noise,
+                                               const std::function<double(double)>& forward) {
+  Noise draw;
+  for (int i = 0; i < static_cast<int>(seconds * 200.0); ++i) {
+    const double t = i / 200.0;
+    ImuMeasurement sample{Time::fromSeconds(100.0 + t), Eigen::Vector3d(0.01, 0.0, -0.02) + 0.002 * draw.vector(),
+                          Eigen::Vector3d(0.0, forward(t), 9.81) + noise * draw.vector()};
+    sample.gyro_noise = 0.002 * 0.002 * 0.005;
+    sample.accel_noise = noise * noise * 0.005;
+    if (const auto result = initializer.add(sample)) return result;
+  }
+  return std::nullopt;
+}
+
+TEST(StaticInitializer, ASmoothStartEndsTheRestAndIsNotAveraged) {
+  // At once, and within a second.
+  for (const double ramp : {0.0, 1.0}) {
+    for (const double noise : {0.02, 0.3}) {
+      StaticInitializer initializer(StaticInitializerOptions(), 9.81);
+      const auto found = feedMotion(initializer, 6.0, noise, [&](double t) {
+        return t < 2.0 ? 0.0 : t < 2.0 + ramp ? 0.5 * (t - 2.0) / ramp : 0.5;
+      });
+      ASSERT_TRUE(found) << initializer.waitingFor();
+      // What it averaged is 0.5 m/s^2 / g = 0.05 rad off where it had moved.
+      const Eigen::Vector3d up_W = found->q_WI * Eigen::Vector3d::UnitZ();
+      EXPECT_LT(std::acos(up_W.z()), 0.01) << "ramp " << ramp << ", noise " << noise;
+      EXPECT_LT((found->b_g - Eigen::Vector3d(0.01, 0.0, -0.02)).norm(), 1e-3);
+      EXPECT_LT(found->duration, 2.5);
+      if (ramp == 0.0) {
+        EXPECT_LE(found->time, Time::fromSeconds(102.0)) << "noise " << noise;
+      }
+    }
+  }
+}
+
+TEST(StaticInitializer, LessThanASecondOfRestDoesNotCount) {
+  StaticInitializer initializer(StaticInitializerOptions(), 9.81);
+  const auto found = feedMotion(initializer, 2.5, 0.02, [](double t) { return t < 0.8 ? 0.0 : 2.0 * (t - 0.8); });
+  EXPECT_FALSE(found);
+  EXPECT_TRUE(initializer.hasSeenMotion());
+}
+
+TEST(StaticInitializer, AnEngineThatIdlesIsAveragedOverTheWholeDuration) {
+  for (const double noise : {0.02, 0.3, 1.5}) {
+    const StaticInitializerOptions options;
+    StaticInitializer initializer(options, 9.81);
+    const auto found = feedMotion(initializer, 6.0, noise, [](double) { return 0.0; });
+    ASSERT_TRUE(found) << initializer.waitingFor();
+    EXPECT_NEAR(found->duration, options.duration, 0.01) << noise;
+    EXPECT_FALSE(initializer.hasSeenMotion());
+  }
 }
 
 TEST(StaticInitializer, SaysWhatItWaitsForAndRecoversFromMotion) {

@@ -69,5 +69,21 @@ TEST(ModelErrorScale, StaysWithinItsBoundsAndIsNotMovedByOneOutlier) {
   EXPECT_GE(scale.value(), 0.01);
 }
 
+TEST(ModelErrorScale, OneOutlierAtTheStartMovesItByItsLikelihood) {
+  for (double share = 0.05; share < 1.01; share += 0.05) {
+    ModelErrorScale scale;
+    scale.add(Time::fromSeconds(1000.0), 1.0e6, share);
+    EXPECT_GT(scale.value(), 1.0) << share;
+    // Largest where the outlier counts as much as the belief: exp(13 / (4 sqrt(8))).
+    EXPECT_LT(scale.value(), 3.16) << share;
+  }
+  // And it is forgotten within some seconds.
+  ModelErrorScale scale;
+  Scans scans(0.0, 1.6e-3, 1.0);
+  scale.add(Time::fromSeconds(scans.time), 1.0e6, 1.0);
+  scans.feed(scale, 20.0);
+  EXPECT_NEAR(scale.value(), 1.0, 0.4);
+}
+
 }  // namespace
 }  // namespace rio_t

@@ -81,8 +81,12 @@ std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement&
     if (waiting_for_.rfind("rest", 0) != 0) {
       waiting_for_ = format("standing still: %.1f of %.1f s seen", collected, options_.duration);
     }
-    has_seen_motion_ |= is_ending;
-    if (is_ending) samples_ = {imu};
+    if (is_ending) {
+      waiting_for_ = format("rest: the mean acceleration changes after %.1f s, at least %.1f expected: moving?",
+                            collected, kShortest);
+      has_seen_motion_ = true;
+      samples_ = {imu};
+    }
     return std::nullopt;
   }
 

@@ -261,6 +261,17 @@ bool restCovariance(const std::vector<RadarDirection>& inliers, const EgoVelocit
   return true;
 }
 
+/// Minus the log-likelihood of rest where some of the points read the bin beside zero for reasons of their own,
+/// on either side. As DopplerLikelihood says it, so many points cannot be wrong by chance.
+double restWithPointsBeside(const std::vector<RadarDirection>& points, const EgoVelocityOptions& o) {
+  const auto n = static_cast<double>(points.size());
+  const auto beside = static_cast<double>(std::count_if(points.begin(), points.end(), [&](const RadarDirection& p) {
+    return std::abs(p.doppler) > o.zero_velocity_threshold;
+  }));
+  const auto logOf = [](double count, double share) { return count > 0.0 ? count * std::log(share) : 0.0; };
+  return -logOf(n - beside, (n - beside) / n) - logOf(beside, 0.5 * beside / n);
+}
+
 /// A slow motion that hides in the bins around zero: most points read zero, but those along the motion do not.
 /// None if rest explains the points about as well. `points` read at most one bin.
 std::optional<VelocitySolution> slowMotion(const std::vector<RadarDirection>& points,
@@ -269,7 +280,8 @@ std::optional<VelocitySolution> slowMotion(const std::vector<RadarDirection>& po
   VelocitySolution solution = solveLeastSquares(points, o);
   if (!solution.solved || solution.v_R.isZero()) return std::nullopt;
   const DopplerLikelihood likelihood(points, Eigen::Vector3d::Zero(), noise);
-  const double at_rest = likelihood.at(Eigen::Vector3d::Zero()).value;
+  double at_rest = likelihood.at(Eigen::Vector3d::Zero()).value;
+  if (o.doppler_quantization > 0.0) at_rest = std::min(at_rest, restWithPointsBeside(points, o));
   if (at_rest < 0.5 * kDeniesRest) return std::nullopt;
   VelocityCost cost = likelihood.at(solution.v_R);
   double damping = 1.0 / square(o.doppler_quantization + o.zero_velocity_threshold);

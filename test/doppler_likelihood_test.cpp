@@ -1,0 +1,407 @@
+// What the Dopplers of a scan say of the velocity: derivatives, outliers, and whether the estimate is unbiased
+// and as certain as it says.
+#include "rio_t/radar/doppler_likelihood.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <cmath>
+#include <vector>
+
+#include "noise.h"
+
+namespace rio_t {
+namespace {
+
+Eigen::Vector3d direction(double azimuth, double elevation) {
+  return {std::cos(elevation) * std::sin(azimuth), std::cos(elevation) * std::cos(azimuth),
+          std::sin(elevation)};
+}
+
+PointVariances variances(double doppler, double azimuth, double elevation, double step) {
+  PointVariances noise;
+  noise.doppler = doppler * doppler;
+  noise.azimuth = azimuth * azimuth;
+  noise.elevation = elevation * elevation;
+  noise.quantization = step * step / 12.0;
+  return noise;
+}
+
+/// 2.5 and 4.5 degrees.
+PointVariances simulatedRadar(double step) { return variances(0.02, 0.0436, 0.0785, step); }
+
+/// Draws scans of static points.
+class Scene {
+ public:
+  explicit Scene(const PointVariances& noise_in, double elevation_spread_in = 0.35)
+      : noise(noise_in), elevation_spread(elevation_spread_in) {}
+  double uniform(double low, double high) {
+    return low + (high - low) * (static_cast<double>(engine_()) + 0.5) / 4294967296.0;
+  }
+  double normal() { return draw_(); }
+  Eigen::Vector3d vector() { return draw_.vector(); }
+  std::vector<RadarDirection> scan(const Eigen::Vector3d& v_R, std::size_t points) {
+    const double step = std::sqrt(12.0 * noise.quantization);
+    std::vector<RadarDirection> result;
+    for (std::size_t i = 0; i < points; ++i) {
+      const double azimuth = uniform(-0.9, 0.9);
+      const double elevation = uniform(-elevation_spread, elevation_spread);
+      double doppler = -direction(azimuth, elevation).dot(v_R) + std::sqrt(noise.doppler) * draw_();
+      if (step > 0.0) doppler = step * std::round(doppler / step);
+      const double measured_azimuth = azimuth + std::sqrt(noise.azimuth) * draw_();
+      const double measured_elevation = elevation + std::sqrt(noise.elevation) * draw_();
+      result.push_back({direction(measured_azimuth, measured_elevation), doppler, i});
+    }
+    return result;
+  }
+
+  PointVariances noise;
+  double elevation_spread;
+
+ private:
+  Noise draw_{20};
+  std::mt19937 engine_{21};
+};
+
+// --- One point
+// ------------------------------------------------------------------------------------------------------
+
+/// Noise finer and coarser than the bin, and no bin.
+const std::vector<PointVariances> kNoises = {
+    simulatedRadar(0.0),        simulatedRadar(0.125), simulatedRadar(0.5),
+    variances(0.02, 0, 0, 0.0), variances(0.02, 0, 0, 0.125), variances(0.05, 0.01, 0.02, 0.125),
+    variances(0.0, 0, 0, 0.0),  variances(0.0, 0, 0, 0.125)};
+
+TEST(DopplerResidual, ItsDerivativeIsThatOfItsDifferences) {
+  const Eigen::Vector3d v_R(0.3, 1.1, -0.2);
+  for (std::size_t k = 0; k < kNoises.size(); ++k) {
+    const PointVariances& noise = kNoises[k];
+    Scene scene(noise);
+    std::vector<RadarDirection> points = scene.scan(v_R, 40);
+    // Errors from zero to far beyond anything, on both sides.
+    for (std::size_t i = 0; i < points.size(); ++i)
+      points[i].doppler = -points[i].u_R.dot(v_R) + (i % 2 == 0 ? 1e-5 : -1e-5) * std::pow(10.0, 0.14 * static_cast<double>(i));
+    const DopplerLikelihood likelihood(points, v_R, noise);
+    for (const Eigen::Vector3d& at : {v_R, Eigen::Vector3d(0.35, 1.0, -0.1)}) {
+      for (std::size_t i = 0; i < likelihood.size(); ++i) {
+        const double h = 1e-4 * likelihood.smallestSigma();
+        Eigen::Vector3d derivative, ignored, numeric;
+        likelihood.residual(i, at, derivative);
+        for (int axis = 0; axis < 3; ++axis) {
+          const Eigen::Vector3d d = h * Eigen::Vector3d::Unit(axis);
+          numeric[axis] =
+              (likelihood.residual(i, at + d, ignored) - likelihood.residual(i, at - d, ignored)) / (2.0 * h);
+        }
+        // In units of a whole sigma.
+        EXPECT_LT((derivative - numeric).norm() * likelihood.smallestSigma(), 1e-4)
+            << "noise " << k << ", error " << points[i].doppler + points[i].u_R.dot(at) << "\n"
+            << derivative.transpose() << "\n"
+            << numeric.transpose();
+      }
+    }
+  }
+}
+
+TEST(DopplerResidual, GrowsWithTheErrorAndIsBounded) {
+  for (const PointVariances& noise : {variances(0.02, 0, 0, 0.0), variances(0.02, 0, 0, 0.125),
+                                      variances(0.05, 0, 0, 0.125), variances(0.02, 0, 0, 0.5)}) {
+    const Eigen::Vector3d u = direction(0.3, 0.1);
+    const DopplerLikelihood likelihood({{u, -1.0, 0}}, u, noise);
+    const auto residual = [&](double error) {
+      Eigen::Vector3d derivative;
+      const double r = likelihood.residual(0, (1.0 + error) * u, derivative);
+      EXPECT_GE(derivative.dot(u), 0.0) << error;
+      return r;
+    };
+    EXPECT_NEAR(residual(0.0), 0.0, 1e-12);
+    double before = 0.0;
+    for (int i = 1; i <= 10000; ++i) {
+      const double e = 1e-3 * i;
+      const double r = residual(e);
+      EXPECT_GE(r, before) << e;
+      EXPECT_NEAR(residual(-e), -r, 1e-9) << e;
+      before = r;
+    }
+    // A point that is anything has the density of the outliers, and no pull.
+    const double whole = std::sqrt(noise.doppler + noise.quantization);
+    const double outlier = noise.outlier_density * std::sqrt(2.0 * M_PI) * whole;
+    EXPECT_NEAR(before, std::sqrt(2.0 * std::log((1.0 + outlier) / outlier)), 0.02);
+    EXPECT_EQ(residual(5.0), residual(10.0));
+    Eigen::Vector3d derivative;
+    likelihood.residual(0, 6.0 * u, derivative);
+    EXPECT_EQ(derivative, Eigen::Vector3d::Zero());
+  }
+}
+
+TEST(DopplerResidual, WithinABinNothingPulls) {
+  const PointVariances noise = variances(0.01, 0, 0, 0.5);
+  const Eigen::Vector3d u = direction(0.3, 0.1);
+  const DopplerLikelihood likelihood({{u, -1.0, 0}}, u, noise);
+  Eigen::Vector3d derivative;
+  for (const double e : {-0.2, -0.1, 0.0, 0.1, 0.2}) {
+    EXPECT_NEAR(likelihood.residual(0, (1.0 + e) * u, derivative), 0.0, 1e-3);
+  }
+  EXPECT_GT(likelihood.residual(0, 1.3 * u, derivative), 2.0);
+  EXPECT_LT(likelihood.residual(0, 0.7 * u, derivative), -2.0);
+}
+
+TEST(DopplerLikelihood, AddsUpItsPoints) {
+  Scene scene(simulatedRadar(0.125));
+  const Eigen::Vector3d v_R(0.2, 1.5, 0.6);
+  const DopplerLikelihood likelihood(scene.scan(v_R, 30), v_R, scene.noise);
+  const Eigen::Vector3d at = v_R + Eigen::Vector3d(0.05, -0.1, 0.1);
+  VelocityCost sum;
+  for (std::size_t i = 0; i < likelihood.size(); ++i) {
+    Eigen::Vector3d J;
+    const double r = likelihood.residual(i, at, J);
+    sum.value += 0.5 * r * r;
+    sum.gradient += r * J;
+    sum.information += J * J.transpose();
+  }
+  const VelocityCost cost = likelihood.at(at);
+  EXPECT_NEAR(cost.value, sum.value, 1e-12 * sum.value);
+  EXPECT_LT((cost.gradient - sum.gradient).norm(), 1e-12 * sum.gradient.norm());
+  EXPECT_LT((cost.information - sum.information).norm(), 1e-12 * sum.information.norm());
+}
+
+// --- The estimate
+// ---------------------------------------------------------------------------------------------------
+
+/// The minimum near `v_R`.
+Eigen::Vector3d minimum(const DopplerLikelihood& likelihood, Eigen::Vector3d v_R) {
+  VelocityCost cost = likelihood.at(v_R);
+  double damping = 1e-6;
+  for (int i = 0; i < 100; ++i) {
+    Eigen::Matrix3d damped = cost.information;
+    damped.diagonal().array() += damping;
+    const Eigen::Vector3d step = -damped.inverse() * cost.gradient;
+    const VelocityCost next = likelihood.at(v_R + step);
+    if (next.value <= cost.value) {
+      v_R += step;
+      cost = next;
+      damping = std::max(1e-6, 0.1 * damping);
+      if (step.norm() < 1e-7) break;
+    } else {
+      damping = std::max(1.0, 10.0 * damping);
+      if (damping > 1e12) break;
+    }
+  }
+  return v_R;
+}
+
+Eigen::Vector3d leastSquares(const std::vector<RadarDirection>& points) {
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  for (const RadarDirection& p : points) {
+    A += p.u_R * p.u_R.transpose();
+    b -= p.doppler * p.u_R;
+  }
+  return A.inverse() * b;
+}
+
+struct MonteCarlo {
+  Eigen::Vector3d bias = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rms = Eigen::Vector3d::Zero();
+  Eigen::Vector3d least_squares_bias = Eigen::Vector3d::Zero();
+  Eigen::Vector3d least_squares_rms = Eigen::Vector3d::Zero();
+  double nees = 0.0;
+};
+
+MonteCarlo monteCarlo(const Eigen::Vector3d& v_R, double step, std::size_t points, double around) {
+  constexpr int kTrials = 4000;
+  Scene scene(simulatedRadar(step));
+  MonteCarlo result;
+  for (int i = 0; i < kTrials; ++i) {
+    // Velocities around v_R, so that the bins are not the same each time.
+    const Eigen::Vector3d truth = v_R + around * scene.vector();
+    const std::vector<RadarDirection> scan = scene.scan(truth, points);
+    // Placed where the estimate would be, not at the truth.
+    const Eigen::Vector3d start = leastSquares(scan);
+    const Eigen::Vector3d first = minimum(DopplerLikelihood(scan, start, scene.noise), start);
+    const DopplerLikelihood likelihood(scan, first, scene.noise);
+    const Eigen::Vector3d found = minimum(likelihood, first);
+    const Eigen::Vector3d error = found - truth;
+    result.bias += error / kTrials;
+    result.rms += error.cwiseAbs2() / kTrials;
+    result.nees += error.dot(likelihood.at(found).information * error) / kTrials;
+    result.least_squares_bias += (start - truth) / kTrials;
+    result.least_squares_rms += (start - truth).cwiseAbs2() / kTrials;
+  }
+  result.rms = result.rms.cwiseSqrt();
+  result.least_squares_rms = result.least_squares_rms.cwiseSqrt();
+  return result;
+}
+
+double largest(const Eigen::Vector3d& v) { return v.cwiseAbs().maxCoeff(); }
+
+TEST(DopplerLikelihood, NoisyDirectionsDoNotShortenTheVelocity) {
+  for (const double step : {0.0, 0.125}) {
+    for (const Eigen::Vector3d& v_R :
+         {Eigen::Vector3d(0.1, 0.5, 0.1), Eigen::Vector3d(0.2, 1.5, 0.6), Eigen::Vector3d(0.1, 3.0, 0.15)}) {
+      const MonteCarlo result = monteCarlo(v_R, step, 45, 0.1);
+      EXPECT_GT(largest(result.least_squares_bias), 0.004) << "nothing to correct at " << v_R.transpose();
+      EXPECT_LT(largest(result.bias), 0.004)
+          << result.bias.transpose() << " at " << v_R.transpose() << ", step " << step;
+      EXPECT_NEAR(result.nees, 3.0, 0.6) << v_R.transpose() << ", step " << step;
+    }
+  }
+}
+
+TEST(DopplerLikelihood, SpeedsFarBelowABinAreSeenBetterThanByRounding) {
+  for (const double speed : {0.08, 0.12}) {
+    const MonteCarlo result = monteCarlo({0.0, speed, 0.0}, 0.125, 70, 0.1 * speed);
+    EXPECT_LT(std::abs(result.bias.y()), 0.5 * std::abs(result.least_squares_bias.y())) << speed;
+    EXPECT_LT(std::abs(result.bias.y()), 0.01) << speed;
+    EXPECT_LT(result.nees, 3.6) << speed;
+  }
+}
+
+TEST(DopplerLikelihood, AnOutlierHasNoWeight) {
+  Scene scene(simulatedRadar(0.125));
+  const Eigen::Vector3d v_R(0.2, 1.5, 0.6);
+  std::vector<RadarDirection> scan = scene.scan(v_R, 40);
+  const Eigen::Vector3d without = minimum(DopplerLikelihood(scan, v_R, scene.noise), v_R);
+  for (int i = 0; i < 10; ++i) scan.push_back({direction(0.2 * i - 0.9, 0.1), 2.0, scan.size()});
+  const Eigen::Vector3d with = minimum(DopplerLikelihood(scan, v_R, scene.noise), v_R);
+  EXPECT_LT((with - without).norm(), 1e-3);
+}
+
+TEST(DopplerLikelihood, WhatAPlanarScanDoesNotSeeStaysWhereItWas) {
+  const Eigen::Vector3d v_R(0.3, 1.5, 0.4);
+  Scene scene(simulatedRadar(0.125), 0.0);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  constexpr int kTrials = 500;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    std::vector<RadarDirection> scan = scene.scan(v_R, 40);
+    // A flat radar reports all points in its plane.
+    for (RadarDirection& p : scan) p.u_R = Eigen::Vector3d(p.u_R.x(), p.u_R.y(), 0.0).normalized();
+    const DopplerLikelihood likelihood(scan, v_R, scene.noise);
+    const VelocityCost cost = likelihood.at(v_R + Eigen::Vector3d(0.05, 0.02, 0.3));
+    EXPECT_LT(std::abs(cost.gradient.z()), 1e-9 * cost.gradient.norm());
+    EXPECT_LT(cost.information.col(2).norm(), 1e-9 * cost.information.norm());
+    const Eigen::Vector3d found = minimum(likelihood, v_R);
+    EXPECT_NEAR(found.z(), v_R.z(), 1e-6);
+    sum += (found - v_R) / kTrials;
+  }
+  EXPECT_LT(sum.head<2>().norm(), 0.01) << sum.transpose();
+}
+
+TEST(DopplerLikelihood, AScanThatIsPlanarButForItsNoiseDoesNotRunAway) {
+  const Eigen::Vector3d v_R(0.3, 1.5, 0.4);
+  Scene scene(simulatedRadar(0.125), 0.0);
+  int ran_away = 0;
+  for (int trial = 0; trial < 500; ++trial) {
+    const DopplerLikelihood likelihood(scene.scan(v_R, 40), v_R, scene.noise);
+    ran_away += std::abs(minimum(likelihood, v_R).z()) > 1.5 ? 1 : 0;
+  }
+  EXPECT_EQ(ran_away, 0);
+}
+
+// --- The algebra
+// ----------------------------------------------------------------------------------------------------
+
+/// Of rank 0 to 3, also where the first axes are those that nothing is known of.
+std::vector<Eigen::Matrix3d> semidefinites() {
+  std::vector<Eigen::Matrix3d> result = {Eigen::Matrix3d::Zero()};
+  const Eigen::Vector3d a(1.3, -0.4, 0.7), b(0.2, 2.0, -0.5), c(-0.9, 0.3, 1.1);
+  for (const double scale : {1e-6, 1.0, 1e6}) {
+    const Eigen::Matrix3d one = scale * a * a.transpose();
+    const Eigen::Matrix3d two = one + scale * b * b.transpose();
+    result.push_back(one);
+    result.push_back(two);
+    result.push_back(two + scale * c * c.transpose());
+    for (int i = 0; i < 3; ++i) {
+      result.push_back(scale * Eigen::Vector3d::Unit(i) * Eigen::Vector3d::Unit(i).transpose());
+      result.push_back(scale * (Eigen::Matrix3d::Identity() -
+                                Eigen::Vector3d::Unit(i) * Eigen::Vector3d::Unit(i).transpose()));
+    }
+  }
+  return result;
+}
+
+TEST(SemidefiniteRoot, IsARootWhateverTheRank) {
+  for (const Eigen::Matrix3d& A : semidefinites()) {
+    const Eigen::Matrix3d U = semidefiniteRoot(A);
+    EXPECT_LE((U.transpose() * U - A).norm(), 1e-12 * A.norm()) << A;
+    EXPECT_EQ(U(1, 0), 0.0);
+    EXPECT_EQ(U(2, 0), 0.0);
+    EXPECT_EQ(U(2, 1), 0.0);
+  }
+}
+
+TEST(SemidefiniteRoot, SolvesWhatIsInItsRange) {
+  for (const Eigen::Matrix3d& A : semidefinites()) {
+    const Eigen::Matrix3d U = semidefiniteRoot(A);
+    const Eigen::Vector3d b = A * Eigen::Vector3d(0.3, -1.2, 0.8);
+    const Eigen::Vector3d x = solveTransposed(U, b);
+    EXPECT_LE((U.transpose() * x - b).norm(), 1e-9 * b.norm()) << A;
+    for (int i = 0; i < 3; ++i) {
+      if (U.row(i).isZero(0.0)) {
+        EXPECT_EQ(x[i], 0.0);
+      }
+    }
+  }
+}
+
+VelocityCost someCost(const Eigen::Matrix3d& information) {
+  VelocityCost cost;
+  cost.value = 30.0;
+  cost.information = information;
+  cost.gradient = information * Eigen::Vector3d(0.04, -0.02, 0.05);
+  return cost;
+}
+
+Eigen::Matrix3d someInformation() {
+  Eigen::Matrix3d A;
+  A << 400.0, 50.0, -20.0, 50.0, 900.0, 30.0, -20.0, 30.0, 80.0;
+  return A;
+}
+
+TEST(SharedError, AddsItsVariancesToThoseOfThePoints) {
+  const Eigen::Vector3d D(1.6e-3, 4.0e-4, 1.0e-2);
+  const VelocityCost alone = someCost(someInformation());
+  Eigen::Vector3d error;
+  const VelocityCost shared = withSharedError(alone, D, &error);
+  const Eigen::Matrix3d D_matrix = D.asDiagonal();
+  const Eigen::Matrix3d expected = (alone.information.inverse() + D_matrix).inverse();
+  EXPECT_LT((shared.information - expected).norm(), 1e-12 * expected.norm());
+  // The same minimum, from where the cost rises by the information that remains.
+  const Eigen::Vector3d to_minimum = -alone.information.inverse() * alone.gradient;
+  EXPECT_LT((shared.gradient + expected * to_minimum).norm(), 1e-10 * shared.gradient.norm());
+  EXPECT_NEAR(shared.value - 0.5 * to_minimum.dot(expected * to_minimum),
+              alone.value - 0.5 * to_minimum.dot(alone.information * to_minimum), 1e-10);
+  // The error that costs least, its own cost included.
+  const auto whole = [&](const Eigen::Vector3d& e) {
+    return alone.value + alone.gradient.dot(e) + 0.5 * e.dot(alone.information * e) +
+           0.5 * (e.array().square() / D.array()).sum();
+  };
+  EXPECT_NEAR(shared.value, whole(error), 1e-10);
+  for (int i = 0; i < 3; ++i)
+    for (const double h : {-1e-3, 1e-3}) EXPECT_GT(whole(error + h * Eigen::Vector3d::Unit(i)), shared.value);
+}
+
+TEST(SharedError, OfNothingChangesNothing) {
+  for (const Eigen::Matrix3d& A : semidefinites()) {
+    const VelocityCost alone = someCost(A);
+    Eigen::Vector3d error = Eigen::Vector3d::Ones();
+    const VelocityCost shared = withSharedError(alone, Eigen::Vector3d::Zero(), &error);
+    EXPECT_EQ(shared.value, alone.value);
+    EXPECT_EQ(shared.gradient, alone.gradient);
+    EXPECT_EQ(shared.information, alone.information);
+    EXPECT_EQ(error, Eigen::Vector3d::Zero());
+  }
+}
+
+TEST(SharedError, LeavesUnseenWhatIsUnseenAndAnAxisWithoutItAlone) {
+  // One point, and an error of one axis alone.
+  const Eigen::Vector3d u = direction(0.4, 0.2);
+  const VelocityCost alone = someCost(900.0 * u * u.transpose());
+  const Eigen::Vector3d D(0.0, 2e-3, 0.0);
+  const Eigen::Matrix3d expected = u * u.transpose() / (1.0 / 900.0 + u.y() * u.y() * D.y());
+  const VelocityCost shared = withSharedError(alone, D);
+  EXPECT_LT((shared.information - expected).norm(), 1e-12 * expected.norm());
+}
+
+}  // namespace
+}  // namespace rio_t

@@ -1,0 +1,179 @@
+// How much of the derivative with respect to the offset is motion: noise must not claim what no scan knows.
+#include "rio_t/sensors/offset_evidence.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "noise.h"
+
+namespace rio_t {
+namespace {
+
+/// Feeds scans at 10 Hz whose derivative is a motion and noise [m/s^2]. The mean of two sides with independent
+/// noise of sigma s has noise of s / sqrt(2).
+struct Scans {
+  double motion = 0.0;  ///< sigma per axis, the same on both sides
+  double noise = 0.0;   ///< sigma per axis and side
+  /// Of the mean's variance, what is known of it: an IMU's noise is measured where it is white.
+  double known = 1.0;
+  Eigen::Matrix3d weight = Eigen::Vector3d(400.0, 900.0, 100.0).asDiagonal();  // [s^2/m^2]
+  Noise draw{11};
+  double time = 1000.0;
+  double claimed = 0.0;  ///< information about the offset, with the gain [1/s^2]
+  double raw = 0.0;                ///< without it
+  double known_information = 0.0;  ///< of the motion alone
+  double gain_sum = 0.0;
+  int count = 0;
+
+  void feed(OffsetEvidence& evidence, double seconds) {
+    claimed = raw = known_information = gain_sum = 0.0;
+    count = 0;
+    Eigen::Vector3d moving = Eigen::Vector3d::Zero();
+    for (const double end = time + seconds; time < end; time += 0.1) {
+      // A motion changes within a second.
+      moving = 0.9 * moving + std::sqrt(1.0 - 0.81) * motion * draw.vector();
+      OffsetDerivative d;
+      d.before = moving + noise * draw.vector();
+      d.after = moving + noise * draw.vector();
+      d.mean = 0.5 * (d.before + d.after);
+      d.variance = known * 0.5 * noise * noise;
+      evidence.add(Time::fromSeconds(time), d, weight);
+      const double gain = evidence.gain();
+      EXPECT_GE(gain, 0.0);
+      EXPECT_LE(gain, 1.0);
+      claimed += gain * gain * d.mean.dot(weight * d.mean);
+      raw += d.mean.dot(weight * d.mean);
+      known_information += moving.dot(weight * moving);
+      gain_sum += gain;
+      ++count;
+    }
+  }
+  double meanGain() const { return gain_sum / count; }
+};
+
+TEST(OffsetEvidence, NothingIsKnownAtFirst) { EXPECT_EQ(OffsetEvidence().gain(), 0.0); }
+
+TEST(OffsetEvidence, NoiseAloneClaimsLittleEvenInAnHour) {
+  // 0.35 m/s^2 in the mean: more than what remains of strong vibration.
+  for (const double noise : {0.05, 0.5}) {
+    OffsetEvidence evidence;
+    Scans scans;
+    scans.noise = noise;
+    scans.feed(evidence, 3600.0);
+    EXPECT_LT(scans.meanGain(), 0.02) << noise << " m/s^2";
+    // Of what the derivatives would claim as they are.
+    EXPECT_LT(scans.claimed, 1e-3 * scans.raw) << noise << " m/s^2";
+    EXPECT_GT(1.0 / std::sqrt(scans.claimed), 0.015) << noise << " m/s^2";
+  }
+}
+
+TEST(OffsetEvidence, NoiseALittleBeyondWhatIsKnownIsNoMotion) {
+  OffsetEvidence evidence;
+  Scans scans;
+  scans.noise = 0.5;
+  scans.known = 0.5;
+  scans.feed(evidence, 3600.0);
+  EXPECT_LT(scans.meanGain(), 0.02);
+}
+
+TEST(OffsetEvidence, QuietMotionCountsWhole) {
+  for (const double motion : {0.3, 1.0, 5.0}) {
+    OffsetEvidence evidence;
+    Scans scans;
+    scans.motion = motion;
+    scans.noise = 0.02;
+    scans.feed(evidence, 60.0);
+    scans.feed(evidence, 300.0);
+    EXPECT_GT(scans.meanGain(), 0.9) << motion;
+  }
+}
+
+TEST(OffsetEvidence, AMixCountsByItsShareAndClaimsNoMoreThanIsKnown) {
+  // Both as likely as each other in the mean, and one more than the other.
+  for (const double noise : {0.5, 1.0, 2.0}) {
+    OffsetEvidence evidence;
+    Scans scans;
+    scans.motion = 1.0;
+    scans.noise = noise;
+    scans.feed(evidence, 60.0);
+    scans.feed(evidence, 3600.0);
+    const double share = 1.0 / (1.0 + 0.5 * noise * noise);
+    EXPECT_NEAR(scans.meanGain(), share, 0.2) << noise;
+    EXPECT_LT(scans.meanGain(), share) << noise;
+    EXPECT_LT(scans.claimed, scans.known_information) << noise;
+  }
+}
+
+TEST(OffsetEvidence, WhatTiltAndBiasAddIsNoMotion) {
+  // A wrong tilt looks like a steady acceleration, on both sides.
+  OffsetEvidence evidence;
+  Scans scans;
+  Noise draw{5};
+  double gains = 0.0;
+  Eigen::Vector3d error = Eigen::Vector3d::Zero();  // lasts for a second
+  for (int i = 0; i < 2000; ++i) {
+    OffsetDerivative d;
+    if (i % 10 == 0) error = 0.1 * draw.vector();
+    d.mean = d.before = d.after = error;
+    d.variance = 1e-3;
+    d.shared = 0.01 * Eigen::Matrix3d::Identity();
+    evidence.add(Time::fromSeconds(0.1 * i), d, scans.weight);
+    gains += evidence.gain() / 2000.0;
+  }
+  EXPECT_LT(gains, 0.1);
+}
+
+TEST(OffsetEvidence, IsForgottenWithinAMinute) {
+  OffsetEvidence evidence;
+  Scans scans;
+  scans.motion = 1.0;
+  scans.noise = 0.1;
+  scans.feed(evidence, 60.0);
+  EXPECT_GT(evidence.gain(), 0.8);
+  scans.motion = 0.0;
+  scans.noise = 1.0;
+  scans.feed(evidence, 120.0);
+  EXPECT_LT(evidence.gain(), 0.1);
+}
+
+TEST(OffsetDerivative, SeesTheSameMotionOnBothSides) {
+  // Speeding up by 2 m/s^2 along the y axis of I, which is level; 0.3 m/s^2 of it a bias.
+  ImuBuffer imu;
+  for (int i = 0; i <= 400; ++i)
+    imu.add({Time::fromSeconds(0.005 * i), Eigen::Vector3d::Zero(), {0.0, 2.3, 9.81}});
+  StateBlock x;
+  x.b_a() = Eigen::Vector3d(0.0, 0.3, 0.0);
+  const OffsetDerivative d =
+      offsetDerivative(imu, Time::fromSeconds(1.0), x, Eigen::Vector3d(0.0, 0.0, -9.81), Extrinsics());
+  // A later stamp, and so a larger t_O, is an earlier velocity.
+  const Eigen::Vector3d expected(0.0, -2.0, 0.0);
+  EXPECT_LT((d.mean - expected).norm(), 1e-9);
+  EXPECT_LT((d.before - expected).norm(), 1e-9);
+  EXPECT_LT((d.after - expected).norm(), 1e-9);
+}
+
+TEST(OffsetDerivative, OfNoiseItsSidesAreIndependentAndItsVarianceIsKnown) {
+  Noise draw;
+  double product = 0.0, squares = 0.0, sides = 0.0;
+  constexpr int kRuns = 2000;
+  for (int run = 0; run < kRuns; ++run) {
+    ImuBuffer imu;
+    for (int i = 0; i <= 160; ++i) {
+      ImuMeasurement sample{Time::fromSeconds(0.005 * i), Eigen::Vector3d::Zero(),
+                            Eigen::Vector3d(0.0, 0.0, 9.81) + 0.5 * draw.vector()};
+      sample.accel_noise = 0.5 * 0.5 * 0.005;
+      imu.add(sample);
+    }
+    const OffsetDerivative d = offsetDerivative(imu, Time::fromSeconds(0.4), StateBlock(),
+                                                Eigen::Vector3d(0.0, 0.0, -9.81), Extrinsics());
+    product += d.before.dot(d.after) / kRuns;
+    sides += 0.5 * (d.before.squaredNorm() + d.after.squaredNorm()) / kRuns;
+    squares += d.mean.squaredNorm() / d.variance / (3 * kRuns);
+  }
+  EXPECT_LT(std::abs(product), 0.05 * sides);
+  EXPECT_NEAR(squares, 1.0, 0.1);
+}
+
+}  // namespace
+}  // namespace rio_t
