@@ -66,95 +66,106 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
     answer.rejected_because = reason;
     return answer;
   };
-  const std::optional<RadarVelocityPrediction> prediction = in_window_.predict(smoother, scan.stamp);
-  std::optional<VelocityPrior> prior;
-  if (prediction) prior = prediction->velocity;
-  const bool tightly = options_.smoother.radar_factor == RadarFactor::kDoppler;
-  const auto velocityAt = [&](Time stamp) { return in_window_.velocityAt(smoother, stamp); };
-  const RadarScan pooled = tightly ? pool_.filled(scan, velocityAt) : scan;
-  const bool has_borrowed = pooled.points.size() > scan.points.size();
-  if (context.at_rest) {
-    answer.ego_velocity = measure(pooled, std::nullopt, context.model_error_scale);
-    answer.at_rest = !answer.ego_velocity.denies_rest;
-  }
-  if (answer.at_rest) prior = zeroVelocity(options_.rest_velocity_sigma);
-
-  std::optional<VelocityPrior> expected = prior;
-  // Few and coarse points agree with many velocities: they must not all side with a prediction that is a
-  // little wrong.
-  const double doubt = options_.smoother.innovation_model_error;
-  if (expected && has_borrowed) expected->covariance.diagonal().array() += doubt * doubt;
-  answer.ego_velocity =
-      measure(pooled, context.has_diverged ? std::nullopt : expected, context.model_error_scale);
-  answer.was_predicted = prior.has_value();
-  if (prior) judge(pooled, *prior, context.model_error_scale, answer);
-  EgoVelocity measured = answer.ego_velocity;
-  const bool has_own = isValid(measured.status);
-  if (!has_own && tightly && prior && !context.has_diverged)
-    measured = around(*prior, scan, estimator_.around(pooled, *prior), context.model_error_scale);
+  Seen seen = see(scan, context, smoother, answer);
+  const EgoVelocity& measured = seen.velocity;
   if (!isValid(measured.status)) return reject(toString(answer.ego_velocity.status));
-  if (has_own && !feasibility_.accept(scan.stamp, measured.v_R)) return reject("infeasible_velocity");
+  if (seen.is_own && !feasibility_.accept(scan.stamp, measured.v_R)) return reject("infeasible_velocity");
 
-  const bool tilt_is_known = !prediction || prediction->tilt_sigma < kMaxTiltSigma;
-  const bool moving = prediction && !answer.at_rest && measured.status == EgoVelocityStatus::kMoving;
-  bool informs_offset = false;
-  if (moving) {
-    offset_evidence_.add(scan.stamp, prediction->dv_dt_O, measured.covariance.inverse());
-    informs_offset = offset_evidence_.gain() > 0.0 &&
-                     prediction->dv_dt_O.mean.norm() > options_.smoother.time_offset_min_acceleration;
-  }
-  answer.offset_gain = informs_offset ? offset_evidence_.gain() : 0.0;
+  answer.offset_gain = offsetGain(scan.stamp, seen);
+  const bool informs_offset = answer.offset_gain > 0.0;
   // An offset that is wrong by c shows as (J + noise) c; nothing else tells of the noise's part.
-  if (informs_offset) measured.covariance.diagonal().array() += prediction->rate_variance;
-
-  RadarScanTime taken{scan.stamp, options_.T_IR, answer.offset_gain};
-  taken.linear_from_t_O = offset();
-  if (tightly && measured.status == EgoVelocityStatus::kMoving) {
-    std::vector<std::size_t> own = below(scan.points.size(), measured.inliers);
-    // A thing that moves slowly passes for static in a velocity, but not point by point.
-    if (prior && has_own) own = alsoIn(estimator_.around(scan, *prior), own);
-    if (own.empty()) return reject("too_few_inliers");
-    const auto points = std::make_shared<DopplerLikelihood>(estimator_.likelihood(scan, own, measured.v_R));
-    answer.doppler =
-        DopplerMeasurement{taken, points, measured.told_variance, options_.smoother.huber_threshold};
-    if (informs_offset) answer.doppler->shared_variances.array() += prediction->rate_variance;
+  const double rate_variance = informs_offset ? seen.prediction->rate_variance : 0.0;
+  seen.velocity.covariance.diagonal().array() += rate_variance;
+  const RadarScanTime taken{scan.stamp, options_.T_IR, answer.offset_gain, offset()};
+  if (isTightlyCoupled() && measured.status == EgoVelocityStatus::kMoving) {
+    const std::vector<std::size_t> points = pointsOf(scan, seen);
+    if (points.empty()) return reject("too_few_inliers");
+    answer.doppler = DopplerMeasurement{
+        taken, std::make_shared<DopplerLikelihood>(estimator_.likelihood(scan, points, measured.v_R)),
+        measured.told_variance.array() + rate_variance, options_.smoother.huber_threshold};
   }
 
   // A minority that sides with the prediction has more noise than its covariance says.
-  const bool can_be_judged = moving && tilt_is_known && hasMajority(measured);
-  std::optional<Innovation> all, now;
-  if (prior) {
-    all = innovation(scan.stamp, *prior, measured, prediction);
-    // Borrowed points made up innovations before.
-    now = has_borrowed && moving
-              ? innovation(scan.stamp, *prior, around(*prior, scan, measured, 1.0), prediction)
-              : all;
-  }
+  const bool can_be_judged = seen.moves && seen.tilt_is_known && hasMajority(measured);
+  std::optional<Innovation> all;  // of the points borrowed, too
+  if (seen.prior) all = innovation(scan.stamp, *seen.prior, measured, seen.prediction);
+  const std::optional<Innovation> own =
+      seen.has_borrowed && seen.moves
+          ? innovation(scan.stamp, *seen.prior, around(*seen.prior, scan, measured), seen.prediction)
+          : all;
   if (can_be_judged && informs_offset && options_.smoother.estimate_time_offset &&
-      step_detector_.stepped(*now)) {
+      step_detector_.stepped(*own)) {
     in_window_.stepOffset(smoother, scan.stamp);
     offset_uncertainty_.offsetStepped();
     answer.offset_stepped = true;
   }
-  if (all && gate_.rejects(*all, isUnanimous(measured), tilt_is_known)) return reject("innovation");
+  if (all && gate_.rejects(*all, isUnanimous(measured), seen.tilt_is_known)) return reject("innovation");
   const RadarInWindow::AddResult added =
       answer.doppler
           ? in_window_.add(smoother, *answer.doppler)
           : in_window_.add(smoother, RadarVelocityMeasurement{taken, measured.v_R, measured.covariance});
   if (added != RadarInWindow::AddResult::kAdded) return reject(toString(added));
-  if (can_be_judged && informs_offset) offset_uncertainty_.add(*now);
-  // A borrowed point must not teach twice.
-  const bool is_new = !has_borrowed || scan.stamp - learned_at_ > ScanPool::kMaxAge;
-  if (can_be_judged && has_own && is_new) {
-    answer.used = all;
-    answer.prediction_covariance = prior->covariance;
-  }
   gate_.used(scan.stamp);
-  if (!answer.at_rest && has_own && is_new) {
-    estimator_.learn(pooled, measured);
+  if (can_be_judged && informs_offset) offset_uncertainty_.add(*own);
+  // A borrowed point must not teach twice.
+  if (!seen.is_own || (seen.has_borrowed && scan.stamp - learned_at_ <= ScanPool::kMaxAge)) return answer;
+  if (can_be_judged) {
+    answer.used = all;
+    answer.prediction_covariance = seen.prior->covariance;
+  }
+  if (!answer.at_rest) {
+    estimator_.learn(seen.pooled, measured);
     learned_at_ = scan.stamp;
   }
   return answer;
+}
+
+RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& context,
+                                     const FixedLagSmoother& smoother, RadarAnswer& answer) {
+  Seen seen;
+  seen.prediction = in_window_.predict(smoother, scan.stamp);
+  if (seen.prediction) seen.prior = seen.prediction->velocity;
+  seen.tilt_is_known = !seen.prediction || seen.prediction->tilt_sigma < kMaxTiltSigma;
+  const auto velocityAt = [&](Time stamp) { return in_window_.velocityAt(smoother, stamp); };
+  seen.pooled = isTightlyCoupled() ? pool_.filled(scan, velocityAt) : scan;
+  seen.has_borrowed = seen.pooled.points.size() > scan.points.size();
+  const double scale = context.model_error_scale;
+  if (context.at_rest) answer.at_rest = !measure(seen.pooled, std::nullopt, scale).denies_rest;
+  if (answer.at_rest) seen.prior = zeroVelocity(options_.rest_velocity_sigma);
+
+  std::optional<VelocityPrior> expected = seen.prior;
+  if (context.has_diverged) expected.reset();
+  // Few and coarse points agree with many velocities: they must not all side with a prediction that is a
+  // little wrong.
+  const double doubt = options_.smoother.innovation_model_error;
+  if (expected && seen.has_borrowed) expected->covariance.diagonal().array() += doubt * doubt;
+  answer.ego_velocity = measure(seen.pooled, expected, scale);
+  answer.was_predicted = seen.prior.has_value();
+  if (seen.prior) judge(seen.pooled, *seen.prior, scale, answer);
+
+  seen.velocity = answer.ego_velocity;
+  seen.is_own = isValid(seen.velocity.status);
+  if (!seen.is_own && isTightlyCoupled() && expected) {
+    EgoVelocity consensus = estimator_.around(seen.pooled, *seen.prior);
+    consensus.told_variance *= scale;
+    seen.velocity = around(*seen.prior, scan, consensus);
+  }
+  seen.moves = seen.prediction && !answer.at_rest && seen.velocity.status == EgoVelocityStatus::kMoving;
+  return seen;
+}
+
+double RadarChannel::offsetGain(Time stamp, const Seen& seen) {
+  if (!seen.moves) return 0.0;
+  const OffsetDerivative& derivative = seen.prediction->dv_dt_O;
+  offset_evidence_.add(stamp, derivative, seen.velocity.covariance.inverse());
+  return derivative.mean.norm() > options_.smoother.time_offset_min_acceleration ? offset_evidence_.gain() : 0.0;
+}
+
+std::vector<std::size_t> RadarChannel::pointsOf(const RadarScan& scan, const Seen& seen) const {
+  const std::vector<std::size_t> own = below(scan.points.size(), seen.velocity.inliers);
+  if (!seen.prior || !seen.is_own) return own;
+  // A thing that moves slowly passes for static in a velocity, but not point by point.
+  return alsoIn(estimator_.around(scan, *seen.prior), own);
 }
 
 EgoVelocity RadarChannel::measure(const RadarScan& scan, const std::optional<VelocityPrior>& prior,
@@ -165,12 +176,10 @@ EgoVelocity RadarChannel::measure(const RadarScan& scan, const std::optional<Vel
   return measured;
 }
 
-EgoVelocity RadarChannel::around(const VelocityPrior& prior, const RadarScan& scan, EgoVelocity result,
-                                 double scale) const {
+EgoVelocity RadarChannel::around(const VelocityPrior& prior, const RadarScan& scan, EgoVelocity result) const {
   result.inliers = below(scan.points.size(), result.inliers);
   if (result.inliers.empty()) result.status = EgoVelocityStatus::kTooFewInliers;
   if (!isValid(result.status)) return result;
-  result.told_variance *= scale;
   const VelocityCost cost = withSharedError(
       estimator_.likelihood(scan, result.inliers, prior.v_R).at(prior.v_R), result.told_variance);
   Eigen::Matrix3d information = cost.information;

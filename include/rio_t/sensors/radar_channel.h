@@ -61,6 +61,7 @@ struct RadarAnswer {
 ///
 /// | decision | effect | skipped if |
 /// | --- | --- | --- |
+/// | rest | the IMU's rest counts if the points do not deny it | - |
 /// | prior in RANSAC | chooses the points that agree with the prediction; rejects `ambiguous` | diverged |
 /// | feasibility | rejects a jump that no platform makes (paper, II-B1) | - |
 /// | step of the offset | gives t_O a new block | no majority; tilt unknown; scan does not tell t_O |
@@ -90,11 +91,29 @@ class RadarChannel {
   DopplerStep dopplerStep() const { return estimator_.dopplerStep(); }
 
  private:
+  /// What a scan shows, before anything is decided.
+  struct Seen {
+    std::optional<RadarVelocityPrediction> prediction;
+    std::optional<VelocityPrior> prior;  ///< the prediction; at rest, zero
+    RadarScan pooled;                    ///< with the points borrowed, see ScanPool
+    bool has_borrowed = false;
+    EgoVelocity velocity;
+    bool is_own = false;  ///< the points agree on it; if not, it is `around` the prediction
+    bool moves = false;
+    bool tilt_is_known = false;
+  };
+  /// Also sets what the answer says of velocity, rest and health.
+  Seen see(const RadarScan& scan, const ScanContext& context, const FixedLagSmoother& smoother,
+           RadarAnswer& answer);
+  /// See OffsetEvidence; 0: the scan does not tell the offset.
+  double offsetGain(Time stamp, const Seen& seen);
+  /// The scan's own points that go into the window.
+  std::vector<std::size_t> pointsOf(const RadarScan& scan, const Seen& seen) const;
+  bool isTightlyCoupled() const { return options_.smoother.radar_factor == RadarFactor::kDoppler; }
   EgoVelocity measure(const RadarScan& scan, const std::optional<VelocityPrior>& prior, double scale) const;
   /// The velocity that the inliers among the scan's own points show around the prediction. Directions that
   /// they do not see have a large sigma.
-  EgoVelocity around(const VelocityPrior& prior, const RadarScan& scan, EgoVelocity consensus,
-                     double scale) const;
+  EgoVelocity around(const VelocityPrior& prior, const RadarScan& scan, EgoVelocity consensus) const;
   Innovation innovation(Time stamp, const VelocityPrior& prior, const EgoVelocity& measured,
                         const std::optional<RadarVelocityPrediction>& prediction) const;
   /// Sets what health and a re-initialisation get from the scan.
