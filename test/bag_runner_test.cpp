@@ -458,7 +458,8 @@ TEST_F(BagRunner, EveryScanRejectedSaysWhy) {
   BagContents what;
   what.points = 2;  // their Dopplers would count, see radar_factor
   writeBag(what);
-  expectError(run({"--set", "radar_factor=velocity"}), {"every one of the 80 scans was rejected", "too_few_points"});
+  expectError(run({"--set", "radar_factor=velocity"}),
+              {"every one of the 80 scans was rejected", "too_few_points"});
   EXPECT_FALSE(fs::exists(out_ + "/summary.yaml"));
   what.points = 0;
   writeBag(what);

@@ -1,5 +1,5 @@
-// What the Dopplers of a scan say of the velocity: derivatives, outliers, and whether the estimate is unbiased
-// and as certain as it says.
+// What the Dopplers of a scan say of the velocity: derivatives, outliers, and whether the estimate is
+// unbiased and as certain as it says.
 #include "rio_t/radar/doppler_likelihood.h"
 
 #include <gtest/gtest.h>
@@ -68,10 +68,10 @@ class Scene {
 // ------------------------------------------------------------------------------------------------------
 
 /// Noise finer and coarser than the bin, and no bin.
-const std::vector<PointVariances> kNoises = {
-    simulatedRadar(0.0),        simulatedRadar(0.125), simulatedRadar(0.5),
-    variances(0.02, 0, 0, 0.0), variances(0.02, 0, 0, 0.125), variances(0.05, 0.01, 0.02, 0.125),
-    variances(0.0, 0, 0, 0.0),  variances(0.0, 0, 0, 0.125)};
+const std::vector<PointVariances> kNoises = {simulatedRadar(0.0),          simulatedRadar(0.125),
+                                             simulatedRadar(0.5),          variances(0.02, 0, 0, 0.0),
+                                             variances(0.02, 0, 0, 0.125), variances(0.05, 0.01, 0.02, 0.125),
+                                             variances(0.0, 0, 0, 0.0),    variances(0.0, 0, 0, 0.125)};
 
 TEST(DopplerResidual, ItsDerivativeIsThatOfItsDifferences) {
   const Eigen::Vector3d v_R(0.3, 1.1, -0.2);
@@ -81,7 +81,8 @@ TEST(DopplerResidual, ItsDerivativeIsThatOfItsDifferences) {
     std::vector<RadarDirection> points = scene.scan(v_R, 40);
     // Errors from zero to far beyond anything, on both sides.
     for (std::size_t i = 0; i < points.size(); ++i)
-      points[i].doppler = -points[i].u_R.dot(v_R) + (i % 2 == 0 ? 1e-5 : -1e-5) * std::pow(10.0, 0.14 * static_cast<double>(i));
+      points[i].doppler = -points[i].u_R.dot(v_R) +
+                          (i % 2 == 0 ? 1e-5 : -1e-5) * std::pow(10.0, 0.14 * static_cast<double>(i));
     const DopplerLikelihood likelihood(points, v_R, noise);
     for (const Eigen::Vector3d& at : {v_R, Eigen::Vector3d(0.35, 1.0, -0.1)}) {
       for (std::size_t i = 0; i < likelihood.size(); ++i) {

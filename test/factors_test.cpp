@@ -331,7 +331,9 @@ struct DopplerScan {
 };
 
 /// 1.7 and 2.9 degrees, without and with a bin.
-PointVariances dopplerNoise(double step) { return {0.03 * 0.03, 0.03 * 0.03, 0.05 * 0.05, step * step / 12.0}; }
+PointVariances dopplerNoise(double step) {
+  return {0.03 * 0.03, 0.03 * 0.03, 0.05 * 0.05, step * step / 12.0};
+}
 /// Dopplers whose residuals are linear.
 PointVariances gaussian() { return {0.03 * 0.03, 0.0, 0.0, 0.0, 0.0}; }
 
@@ -385,8 +387,8 @@ TEST(DopplerFactor, ItsGradientIsThatOfTheCost) {
         EXPECT_NEAR(stored[i < 3 ? i : i + 1], (costs[1] - costs[0]) / (2.0 * h), 1e-5 * stored.norm())
             << count << " points, step " << step << ", tangent " << i;
       }
-      EXPECT_NEAR(stored[StateBlock::kSize], (scan.cost(scan.x, t_O + h) - scan.cost(scan.x, t_O - h)) / (2.0 * h),
-                  1e-5 * stored.norm())
+      EXPECT_NEAR(stored[StateBlock::kSize],
+                  (scan.cost(scan.x, t_O + h) - scan.cost(scan.x, t_O - h)) / (2.0 * h), 1e-5 * stored.norm())
           << count << " points, step " << step;
     }
   }

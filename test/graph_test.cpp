@@ -379,8 +379,7 @@ TEST_P(Windows, FindsTheMinimumOfDopplers) {
 
 TEST_P(Windows, SaysTheSameOfDopplersAsTheOtherSolver) {
   std::vector<Eigen::VectorXd> found[2];
-  const WindowSolver other =
-      GetParam() == WindowSolver::kChain ? WindowSolver::kCeres : WindowSolver::kChain;
+  const WindowSolver other = GetParam() == WindowSolver::kChain ? WindowSolver::kCeres : WindowSolver::kChain;
   for (const WindowSolver solver : {GetParam(), other}) {
     make(0.03, 0.25, 0.0, false, TimeOffsetModel::kImu, true);
     EXPECT_TRUE(solve(window, {200, 1e-4}, solver).converged());

@@ -268,8 +268,8 @@ TEST(Divergence, AnAccelerometerBiasThatJumpsIsToldAndOvercome) {
     EXPECT_EQ(run.odometry->faults().at("reinitialized"), static_cast<std::uint64_t>(diverged.reinitialized));
     EXPECT_EQ(run.odometry->health(), Health::kOk);
     EXPECT_LT(run.rms(45.0, 50.0, [&](const auto& s) { return run.velocityError(s); }), 0.1);
-    // While diverged the covariance covers the error, and where the estimate is re-initialised the position and the
-    // heading go on.
+    // While diverged the covariance covers the error, and where the estimate is re-initialised the position
+    // and the heading go on.
     for (std::size_t k = 1; k < run.states.size(); ++k) {
       const NavigationState& state = run.states[k];
       const double t = run.seconds(state.time);

@@ -262,7 +262,8 @@ std::optional<StaticInitialization> feedMotion(StaticInitializer& initializer, d
   Noise draw;
   for (int i = 0; i < static_cast<int>(seconds * 200.0); ++i) {
     const double t = i / 200.0;
-    ImuMeasurement sample{Time::fromSeconds(100.0 + t), Eigen::Vector3d(0.01, 0.0, -0.02) + 0.002 * draw.vector(),
+    ImuMeasurement sample{Time::fromSeconds(100.0 + t),
+                          Eigen::Vector3d(0.01, 0.0, -0.02) + 0.002 * draw.vector(),
                           Eigen::Vector3d(0.0, forward(t), 9.81) + noise * draw.vector()};
     sample.gyro_noise = 0.002 * 0.002 * 0.005;
     sample.accel_noise = noise * noise * 0.005;
@@ -294,7 +295,8 @@ TEST(StaticInitializer, ASmoothStartEndsTheRestAndIsNotAveraged) {
 
 TEST(StaticInitializer, LessThanASecondOfRestDoesNotCount) {
   StaticInitializer initializer(StaticInitializerOptions(), 9.81);
-  const auto found = feedMotion(initializer, 2.5, 0.02, [](double t) { return t < 0.8 ? 0.0 : 2.0 * (t - 0.8); });
+  const auto found =
+      feedMotion(initializer, 2.5, 0.02, [](double t) { return t < 0.8 ? 0.0 : 2.0 * (t - 0.8); });
   EXPECT_FALSE(found);
   EXPECT_TRUE(initializer.hasSeenMotion());
 }

@@ -349,7 +349,8 @@ TEST(FewPoints, KeepTheVelocity) {
       std::size_t used = 0;
       for (const ScanResult& result : run.results) used += result.used ? 1 : 0;
       EXPECT_GT(used, run.results.size() / 2) << "seed " << seed;
-      EXPECT_LT(run.rms(10.0, 60.0, [&](const NavigationState& state) { return run.velocityError(state); }), 0.1)
+      EXPECT_LT(run.rms(10.0, 60.0, [&](const NavigationState& state) { return run.velocityError(state); }),
+                0.1)
           << "seed " << seed;
       // A person in view may well be all of the points.
       if (!has_persons) {

@@ -10,8 +10,8 @@
 namespace rio_t {
 namespace {
 
-/// Feeds scans at 10 Hz whose derivative is a motion and noise [m/s^2]. The mean of two sides with independent
-/// noise of sigma s has noise of s / sqrt(2).
+/// Feeds scans at 10 Hz whose derivative is a motion and noise [m/s^2]. The mean of two sides with
+/// independent noise of sigma s has noise of s / sqrt(2).
 struct Scans {
   double motion = 0.0;  ///< sigma per axis, the same on both sides
   double noise = 0.0;   ///< sigma per axis and side
@@ -20,7 +20,7 @@ struct Scans {
   Eigen::Matrix3d weight = Eigen::Vector3d(400.0, 900.0, 100.0).asDiagonal();  // [s^2/m^2]
   Noise draw{11};
   double time = 1000.0;
-  double claimed = 0.0;  ///< information about the offset, with the gain [1/s^2]
+  double claimed = 0.0;            ///< information about the offset, with the gain [1/s^2]
   double raw = 0.0;                ///< without it
   double known_information = 0.0;  ///< of the motion alone
   double gain_sum = 0.0;

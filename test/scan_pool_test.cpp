@@ -15,7 +15,8 @@ RadarScan scanAt(double t, std::size_t points) {
   scan.stamp = Time::fromSeconds(t);
   for (std::size_t i = 0; i < points; ++i) {
     const double a = 1.7 * static_cast<double>(i) + 20.0 * t;
-    scan.points.push_back({{3.0 * std::sin(a), 4.0, std::cos(2.0 * a)}, 100.0 * t + static_cast<double>(i), 15.0});
+    scan.points.push_back(
+        {{3.0 * std::sin(a), 4.0, std::cos(2.0 * a)}, 100.0 * t + static_cast<double>(i), 15.0});
   }
   return scan;
 }

@@ -18,8 +18,8 @@ VelocityCost moved(const VelocityCost& cost, const Eigen::Vector3d& by) {
   return {cost.value + cost.gradient.dot(by) + 0.5 * by.dot(H_by), cost.gradient + H_by, cost.information};
 }
 
-/// withSharedError with Huber's loss on the shared error: beyond `threshold` sigma, so that its variances grow
-/// with it.
+/// withSharedError with Huber's loss on the shared error: beyond `threshold` sigma, so that its variances
+/// grow with it.
 VelocityCost withTails(const VelocityCost& cost, const Eigen::Vector3d& variances, double threshold,
                        Eigen::Vector3d& error) {
   double scale = 1.0;
@@ -28,7 +28,8 @@ VelocityCost withTails(const VelocityCost& cost, const Eigen::Vector3d& variance
     const double sigmas = std::sqrt((error.cwiseAbs2().array() / variances.array().max(1e-12)).sum());
     const double next = threshold > 0.0 ? std::max(1.0, sigmas / threshold) : 1.0;
     if (std::abs(next - scale) < 0.01 * scale || i == 20) {
-      if (scale > 1.0) result.value += 0.5 * (2.0 * threshold * sigmas - threshold * threshold - sigmas * sigmas / scale);
+      if (scale > 1.0)
+        result.value += 0.5 * (2.0 * threshold * sigmas - threshold * threshold - sigmas * sigmas / scale);
       return result;
     }
     scale = next;
@@ -61,8 +62,7 @@ bool DopplerFactor::Evaluate(double const* const* parameters, double* residuals,
     J.topRows<3>() = U * predicted.J_state;
     J.row(3).setZero();
   }
-  if (jacobians[1] != nullptr)
-    Eigen::Map<Eigen::Vector4d>{jacobians[1]} << U * predicted.dv_dt_O, 0.0;
+  if (jacobians[1] != nullptr) Eigen::Map<Eigen::Vector4d>{jacobians[1]} << U * predicted.dv_dt_O, 0.0;
   return true;
 }
 

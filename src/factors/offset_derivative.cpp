@@ -27,7 +27,8 @@ VelocityRate velocityRate(const ImuMean& imu, const Eigen::Vector3d& b_g, const 
 VelocityRate velocityRate(const ImuBuffer& imu, Time tau, const StateBlock& x, const Eigen::Vector3d& g_W,
                           const Eigen::Vector3d& l_I) {
   const Eigen::Quaterniond q_IW = x.q_WI().conjugate();
-  return velocityRate(imu.mean(tau, offsetHalfWidth(imu, tau)), x.b_g(), x.b_a(), q_IW * x.v_W(), q_IW * g_W, l_I);
+  return velocityRate(imu.mean(tau, offsetHalfWidth(imu, tau)), x.b_g(), x.b_a(), q_IW * x.v_W(), q_IW * g_W,
+                      l_I);
 }
 
 }  // namespace rio_t

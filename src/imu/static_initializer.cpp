@@ -53,7 +53,8 @@ StaticInitializer::StaticInitializer(const StaticInitializerOptions& options, do
 
 bool StaticInitializer::endsNow() {
   const ImuMeasurement& newest = samples_.back();
-  if (newest.time - samples_.front().time < 2.0 * kNewest || newest.time - checked_at_ < kCheckEvery) return false;
+  if (newest.time - samples_.front().time < 2.0 * kNewest || newest.time - checked_at_ < kCheckEvery)
+    return false;
   checked_at_ = newest.time;
   Eigen::Vector3d before = Eigen::Vector3d::Zero();
   Eigen::Vector3d now = Eigen::Vector3d::Zero();
@@ -82,8 +83,9 @@ std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement&
       waiting_for_ = format("standing still: %.1f of %.1f s seen", collected, options_.duration);
     }
     if (is_ending) {
-      waiting_for_ = format("rest: the mean acceleration changes after %.1f s, at least %.1f expected: moving?",
-                            collected, kShortest);
+      waiting_for_ =
+          format("rest: the mean acceleration changes after %.1f s, at least %.1f expected: moving?",
+                 collected, kShortest);
       has_seen_motion_ = true;
       samples_ = {imu};
     }

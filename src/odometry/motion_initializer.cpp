@@ -9,11 +9,11 @@
 #include <stdexcept>
 #include <utility>
 
-#include "rio_t/sensors/offset_evidence.h"
 #include "rio_t/graph/marginalization.h"
 #include "rio_t/graph/solver.h"
 #include "rio_t/imu/preintegration.h"
 #include "rio_t/odometry/options.h"
+#include "rio_t/sensors/offset_evidence.h"
 #include "rio_t/smoother/carried.h"
 
 namespace rio_t {

@@ -60,7 +60,8 @@ Residual coarseResidual(double e, double s, double h, double outlier) {
 /// Projection on the directions over which the points spread by more than twice their noise.
 Eigen::Matrix3d spreadOver(const std::vector<RadarDirection>& points, double variance) {
   Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
-  for (const RadarDirection& p : points) mean += p.u_R * p.u_R.transpose() / static_cast<double>(points.size());
+  for (const RadarDirection& p : points)
+    mean += p.u_R * p.u_R.transpose() / static_cast<double>(points.size());
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
   eigen.computeDirect(mean);
   Eigen::Matrix3d projection = Eigen::Matrix3d::Zero();
@@ -93,8 +94,7 @@ Eigen::Matrix3d semidefiniteRoot(const Eigen::Matrix3d& A) {
     const double pivot = A(i, i) - U.col(i).head(i).squaredNorm();
     if (!(pivot > least)) continue;
     U(i, i) = std::sqrt(pivot);
-    for (int j = i + 1; j < 3; ++j)
-      U(i, j) = (A(i, j) - U.col(i).head(i).dot(U.col(j).head(i))) / U(i, i);
+    for (int j = i + 1; j < 3; ++j) U(i, j) = (A(i, j) - U.col(i).head(i).dot(U.col(j).head(i))) / U(i, i);
   }
   return U;
 }
@@ -110,7 +110,8 @@ DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, 
                                      const PointVariances& noise)
     : first_v_R_(v_R),
       spread_over_(spreadOver(points, std::max(noise.azimuth, noise.elevation))),
-      half_bin_(std::sqrt(3.0 * noise.quantization)), doppler_variance_(noise.doppler + kMinVariance),
+      half_bin_(std::sqrt(3.0 * noise.quantization)),
+      doppler_variance_(noise.doppler + kMinVariance),
       smallest_sigma_(std::numeric_limits<double>::max()) {
   const MomentCorrection correct(noise.azimuth, noise.elevation);
   const double along_az = 0.75 * noise.azimuth + 0.25 * noise.elevation;
@@ -120,9 +121,10 @@ DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, 
     // At the direction corrected by the residual: at the measured one, the spread correlates with it.
     const Angles a = correctedDirection(p.u_R, p.doppler + p.u_R.dot(v_R), v_R, noise);
     const Eigen::Vector3d u = a.direction();
-    const Eigen::Matrix3d spread = noise.azimuth * a.byAzimuth() * a.byAzimuth().transpose() +
-                                   noise.elevation * a.byElevation() * a.byElevation().transpose() +
-                                   (noise.azimuth * along_az + noise.elevation * along_el) * u * u.transpose();
+    const Eigen::Matrix3d spread =
+        noise.azimuth * a.byAzimuth() * a.byAzimuth().transpose() +
+        noise.elevation * a.byElevation() * a.byElevation().transpose() +
+        (noise.azimuth * along_az + noise.elevation * along_el) * u * u.transpose();
     const double variance = doppler_variance_ + v_R.dot(spread * v_R);
     const double sigma = std::sqrt(variance);
     smallest_sigma_ = std::min(smallest_sigma_, sigma);

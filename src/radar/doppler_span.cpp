@@ -8,8 +8,8 @@ namespace {
 /// [steps] A point lies beyond the Dopplers seen, or a span off, by more or less than this: rounding, and the
 /// noise of its direction.
 constexpr double kClearly = 1.5;
-/// So many points make a span. Moving things are off by anything: that most of ten are off by the same amount,
-/// which is also where the Dopplers end, is no chance.
+/// So many points make a span. Moving things are off by anything: that most of ten are off by the same
+/// amount, which is also where the Dopplers end, is no chance.
 constexpr std::size_t kEnough = 10;
 
 }  // namespace

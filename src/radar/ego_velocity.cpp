@@ -24,11 +24,11 @@ constexpr double kMaxSharpSigma = 0.1;
 /// Log-likelihood ratio of a point that a velocity explains to one that it does not: a Gaussian of 0.05 m/s
 /// against a uniform density over some m/s.
 constexpr double kEvidenceOfAPoint = 4.0;
-constexpr double kTellsSide = 1.0 / 12.0;             // [spans] a quarter at three sigma
-constexpr int kSides[] = {0, -1, 1};                  // [spans] that a Doppler may have come back from
-constexpr double kAgrees = 3.0;  // [sigma] of a point
-/// Twice the log-likelihood ratio of a slow motion to rest: once in 1000 scans at rest (chi-squared, 3 degrees
-/// of freedom).
+constexpr double kTellsSide = 1.0 / 12.0;  // [spans] a quarter at three sigma
+constexpr int kSides[] = {0, -1, 1};       // [spans] that a Doppler may have come back from
+constexpr double kAgrees = 3.0;            // [sigma] of a point
+/// Twice the log-likelihood ratio of a slow motion to rest: once in 1000 scans at rest (chi-squared, 3
+/// degrees of freedom).
 constexpr double kDeniesRest = 16.3;
 constexpr int kSlowIterations = 10;
 
@@ -261,19 +261,20 @@ bool restCovariance(const std::vector<RadarDirection>& inliers, const EgoVelocit
   return true;
 }
 
-/// Minus the log-likelihood of rest where some of the points read the bin beside zero for reasons of their own,
-/// on either side. As DopplerLikelihood says it, so many points cannot be wrong by chance.
+/// Minus the log-likelihood of rest where some of the points read the bin beside zero for reasons of their
+/// own, on either side. As DopplerLikelihood says it, so many points cannot be wrong by chance.
 double restWithPointsBeside(const std::vector<RadarDirection>& points, const EgoVelocityOptions& o) {
   const auto n = static_cast<double>(points.size());
-  const auto beside = static_cast<double>(std::count_if(points.begin(), points.end(), [&](const RadarDirection& p) {
-    return std::abs(p.doppler) > o.zero_velocity_threshold;
-  }));
+  const auto beside =
+      static_cast<double>(std::count_if(points.begin(), points.end(), [&](const RadarDirection& p) {
+        return std::abs(p.doppler) > o.zero_velocity_threshold;
+      }));
   const auto logOf = [](double count, double share) { return count > 0.0 ? count * std::log(share) : 0.0; };
   return -logOf(n - beside, (n - beside) / n) - logOf(beside, 0.5 * beside / n);
 }
 
-/// A slow motion that hides in the bins around zero: most points read zero, but those along the motion do not.
-/// None if rest explains the points about as well. `points` read at most one bin.
+/// A slow motion that hides in the bins around zero: most points read zero, but those along the motion do
+/// not. None if rest explains the points about as well. `points` read at most one bin.
 std::optional<VelocitySolution> slowMotion(const std::vector<RadarDirection>& points,
                                            const PointVariances& noise, const EgoVelocityOptions& o) {
   if (points.size() < o.min_inliers) return std::nullopt;

@@ -10,8 +10,8 @@ namespace {
 
 /// [s] How strong motion and vibration are changes with the kind of motion.
 constexpr double kMemory = 20.0;
-/// [sigma] Noise of the IMU alone is farther than this from no acceleration once in 70,000 scans (chi-squared,
-/// 3 degrees of freedom).
+/// [sigma] Noise of the IMU alone is farther than this from no acceleration once in 70,000 scans
+/// (chi-squared, 3 degrees of freedom).
 constexpr double kCertain = 5.0;
 
 }  // namespace

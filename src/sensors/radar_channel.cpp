@@ -158,7 +158,8 @@ double RadarChannel::offsetGain(Time stamp, const Seen& seen) {
   if (!seen.moves) return 0.0;
   const OffsetDerivative& derivative = seen.prediction->dv_dt_O;
   offset_evidence_.add(stamp, derivative, seen.velocity.covariance.inverse());
-  return derivative.mean.norm() > options_.smoother.time_offset_min_acceleration ? offset_evidence_.gain() : 0.0;
+  return derivative.mean.norm() > options_.smoother.time_offset_min_acceleration ? offset_evidence_.gain()
+                                                                                 : 0.0;
 }
 
 std::vector<std::size_t> RadarChannel::pointsOf(const RadarScan& scan, const Seen& seen) const {
@@ -176,7 +177,8 @@ EgoVelocity RadarChannel::measure(const RadarScan& scan, const std::optional<Vel
   return measured;
 }
 
-EgoVelocity RadarChannel::around(const VelocityPrior& prior, const RadarScan& scan, EgoVelocity result) const {
+EgoVelocity RadarChannel::around(const VelocityPrior& prior, const RadarScan& scan,
+                                 EgoVelocity result) const {
   result.inliers = below(scan.points.size(), result.inliers);
   if (result.inliers.empty()) result.status = EgoVelocityStatus::kTooFewInliers;
   if (!isValid(result.status)) return result;

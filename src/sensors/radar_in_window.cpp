@@ -60,11 +60,13 @@ std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoo
   const Eigen::Quaterniond q_IW = state->x.q_WI().conjugate();
   const Eigen::Vector3d g_I = q_IW * model_.g_W;
   prediction.dv_dt_O = offsetDerivative(*model_.imu, time, state->x, model_.g_W, T_IR_);
-  Eigen::Matrix<double, 3, StateBlock::kTangent> J_rate = Eigen::Matrix<double, 3, StateBlock::kTangent>::Zero();
+  Eigen::Matrix<double, 3, StateBlock::kTangent> J_rate =
+      Eigen::Matrix<double, 3, StateBlock::kTangent>::Zero();
   J_rate.middleCols<3>(StateBlock::kTheta) = R_RI * so3::hat(g_I);
   J_rate.middleCols<3>(StateBlock::kBa) = -R_RI;
   prediction.dv_dt_O.shared = J_rate * P.topLeftCorner<kOffset, kOffset>() * J_rate.transpose();
-  if (options_.estimate_time_offset) prediction.rate_variance = prediction.dv_dt_O.variance * P(kOffset, kOffset);
+  if (options_.estimate_time_offset)
+    prediction.rate_variance = prediction.dv_dt_O.variance * P(kOffset, kOffset);
   const Eigen::Matrix<double, 2, 3> horizontal = state->x.q_WI().toRotationMatrix().topRows<2>();
   const Eigen::Matrix2d tilt =
       horizontal * P.block<3, 3>(StateBlock::kTheta, StateBlock::kTheta) * horizontal.transpose();

@@ -29,7 +29,10 @@ struct DopplerMeasurement : RadarScanTime {
 class DopplerFactor final : public ceres::SizedCostFunction<4, StateBlock::kSize, 1> {
  public:
   DopplerFactor(const DopplerMeasurement& z, Time state_time, const RadarMotionModel& model)
-      : points_(z.points), shared_variances_(z.shared_variances), huber_threshold_(z.huber_threshold), model_(z, state_time, model) {}
+      : points_(z.points),
+        shared_variances_(z.shared_variances),
+        huber_threshold_(z.huber_threshold),
+        model_(z, state_time, model) {}
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
 
  private:

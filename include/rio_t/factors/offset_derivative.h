@@ -24,7 +24,6 @@ double offsetHalfWidth(const ImuBuffer& imu, Time time);
 struct VelocityRate {
   Eigen::Vector3d a_I = Eigen::Vector3d::Zero();  ///< [m/s^2]
   double variance = 0.0;                          ///< per axis, of the IMU's noise in it [m^2/s^4]
-
 };
 
 /// a_c - omega x v_I + alpha x l, from the mean of the IMU around the time of measurement. `v_I` [m/s] and

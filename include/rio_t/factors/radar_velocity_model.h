@@ -16,20 +16,21 @@ struct RadarScanTime {
   Extrinsics T_IR;
   /// Share of the derivative with respect to t_O that is motion and not noise of the IMU, see OffsetEvidence.
   double offset_gain = 1.0;
-  /// If set, the motion is taken at this t_O [s], and to first order from there. Exactly at each t_O, the noise
-  /// of the IMU over a shift raises the cost whatever the direction of the shift. With a gain of 0, the scan
-  /// does not tell the offset.
+  /// If set, the motion is taken at this t_O [s], and to first order from there. Exactly at each t_O, the
+  /// noise of the IMU over a shift raises the cost whatever the direction of the shift. With a gain of 0, the
+  /// scan does not tell the offset.
   std::optional<double> linear_from_t_O = std::nullopt;
 };
 
 /// Velocity of the radar at the time of measurement of a scan, in R, and its derivatives.
 struct PredictedVelocity {
-  Eigen::Vector3d v_R;                            ///< [m/s]
-  StateJacobian<3> J_state;                       ///< as StateBlock stores it
+  Eigen::Vector3d v_R;                                ///< [m/s]
+  StateJacobian<3> J_state;                           ///< as StateBlock stores it
   Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();  ///< zero if the scan does not tell the offset [m/s^2]
 };
 
-/// RadarMotionModel as the factors of one scan use it. Not for two threads: it keeps the last mean of the IMU.
+/// RadarMotionModel as the factors of one scan use it. Not for two threads: it keeps the last mean of the
+/// IMU.
 class RadarVelocityModel {
  public:
   RadarVelocityModel(const RadarScanTime& scan, Time state_time, const RadarMotionModel& model)

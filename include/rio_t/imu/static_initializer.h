@@ -29,8 +29,8 @@ struct StaticInitialization {
   double duration = 0.0;  ///< [s]
 };
 
-/// Waits for `duration` seconds of rest. If the platform sets off earlier, a second of rest before is enough: a
-/// smooth start must not pass for rest. Any mounting (gravity on any axis).
+/// Waits for `duration` seconds of rest. If the platform sets off earlier, a second of rest before is enough:
+/// a smooth start must not pass for rest. Any mounting (gravity on any axis).
 class StaticInitializer {
  public:
   StaticInitializer(const StaticInitializerOptions& options, double gravity);

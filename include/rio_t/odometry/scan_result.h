@@ -19,10 +19,10 @@ struct ScanResult {
   RadarScan scan;  ///< as fed
   EgoVelocity ego_velocity;
   std::optional<DopplerMeasurement> doppler;  ///< its points, if they and not the velocity count
-  double offset_gain = 0.0;        ///< see OffsetEvidence; 0: the scan does not tell the offset
-  bool used = false;               ///< it went into the window
-  double model_error_scale = 1.0;  ///< see ModelErrorScale; in the covariance of ego_velocity
-  std::string rejected_because;    ///< snake case, empty if used; keys of `scans_rejected`
+  double offset_gain = 0.0;                   ///< see OffsetEvidence; 0: the scan does not tell the offset
+  bool used = false;                          ///< it went into the window
+  double model_error_scale = 1.0;             ///< see ModelErrorScale; in the covariance of ego_velocity
+  std::string rejected_because;               ///< snake case, empty if used; keys of `scans_rejected`
 
   /// The window was solved again, because the scan was used or the platform is at rest. If not, the following
   /// members are not set.

@@ -32,8 +32,8 @@ Eigen::Vector3d solveTransposed(const Eigen::Matrix3d& U, const Eigen::Vector3d&
 /// A Doppler is right within its bin of `step`, plus noise; or, with a small probability, it is anything.
 /// - Bin: a bin wider than the noise bounds the velocity along the ray and does not pull it to the centre.
 /// - Noise of the direction: the sigma grows with the velocity. Its derivative frees the estimate of the bias
-///   that least squares with noisy directions has (total least squares). It counts where the directions spread
-///   more than their noise; elsewhere, a larger velocity would explain any residual.
+///   that least squares with noisy directions has (total least squares). It counts where the directions
+///   spread more than their noise; elsewhere, a larger velocity would explain any residual.
 /// - Anything: the residual is bounded, so that an outlier has no weight (a redescending loss).
 class DopplerLikelihood {
  public:
@@ -60,8 +60,8 @@ class DopplerLikelihood {
   std::vector<Point> points_;
   Eigen::Vector3d first_v_R_;
   Eigen::Matrix3d spread_over_;  ///< projects on what the directions spread over
-  double half_bin_;          ///< [m/s]
-  double doppler_variance_;  ///< [m^2/s^2] without the bin
+  double half_bin_;              ///< [m/s]
+  double doppler_variance_;      ///< [m^2/s^2] without the bin
   double smallest_sigma_;
 };
 

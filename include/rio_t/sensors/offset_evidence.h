@@ -33,8 +33,9 @@ OffsetDerivative offsetDerivative(const ImuBuffer& imu, Time tau, const StateBlo
 ///
 /// Noise in the derivative claims information about t_O that no scan has. A derivative far beyond the known
 /// noise is motion. Of the others: motion is the same before and after a scan, noise is not. So the mean of
-/// before' W after is the square of the motion, whatever the noise. Its share in mean' W mean is the gain by which the derivative has to be shortened: then J'J claims what
-/// the scans know (docs/method.md, section 5.3). Not thread-safe.
+/// before' W after is the square of the motion, whatever the noise. Its share in mean' W mean is the gain by
+/// which the derivative has to be shortened: then J'J claims what the scans know (docs/method.md,
+/// section 5.3). Not thread-safe.
 class OffsetEvidence {
  public:
   /// `weight`: inverse covariance of the scan's velocity [s^2/m^2].
@@ -44,9 +45,9 @@ class OffsetEvidence {
 
  private:
   Time last_;
-  double motion_ = 0.0;          ///< sum of before' W after, less what errors of the state add, fading
-  double motion_variance_ = 0.0; ///< of it
-  double all_ = 0.0;             ///< sum of mean' W mean, fading
+  double motion_ = 0.0;           ///< sum of before' W after, less what errors of the state add, fading
+  double motion_variance_ = 0.0;  ///< of it
+  double all_ = 0.0;              ///< sum of mean' W mean, fading
 };
 
 }  // namespace rio_t

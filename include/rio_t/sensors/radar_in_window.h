@@ -26,7 +26,7 @@ struct RadarVelocityPrediction {
   /// Per axis: the noise in dv_dt_O times the error of the offset. The covariances do not include it
   /// [m^2/s^2].
   double rate_variance = 0.0;
-  double tilt_sigma = 0.0;      ///< of roll and pitch, the larger [rad]
+  double tilt_sigma = 0.0;  ///< of roll and pitch, the larger [rad]
 };
 
 /// One radar in the window of the smoother: its time offset t_O as a calibration block, and its terms.

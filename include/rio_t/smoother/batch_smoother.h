@@ -25,11 +25,11 @@ struct BatchOptions {
 /// What one scan gives to the graph.
 struct BatchScan {
   Time stamp;
-  double t_O = 0.0;                                  ///< [s] initial value; also places the node (imu model)
+  double t_O = 0.0;  ///< [s] initial value; also places the node (imu model)
   std::optional<RadarVelocityMeasurement> velocity;
-  std::optional<DopplerMeasurement> doppler;         ///< instead of the velocity; neither: the scan is not used
-  std::optional<double> rest_velocity_sigma;         ///< [m/s] set if the platform is at rest
-  bool offset_stepped = false;                       ///< t_O may have stepped since the scan before
+  std::optional<DopplerMeasurement> doppler;  ///< instead of the velocity; neither: the scan is not used
+  std::optional<double> rest_velocity_sigma;  ///< [m/s] set if the platform is at rest
+  bool offset_stepped = false;                ///< t_O may have stepped since the scan before
 };
 
 /// A state with the offset at its time.

@@ -240,9 +240,10 @@ void listEgoVelocity(ParameterList& list, Config& c) {
   list.number("radar_elevation_sigma", "rad", atLeast(0), radar.elevation_sigma, "likewise of its elevation");
   list.number("radar_doppler_sigma", "m/s", atLeast(0), radar.doppler_sigma,
               "likewise of its Doppler, besides the steps");
-  list.number("radar_doppler_span", "m/s", atLeast(0), radar.doppler_span,
-              "whole span of the radar's Doppler: what lies beyond comes back on the other side; 0: read it off "
-              "the data");
+  list.number(
+      "radar_doppler_span", "m/s", atLeast(0), radar.doppler_span,
+      "whole span of the radar's Doppler: what lies beyond comes back on the other side; 0: read it off "
+      "the data");
   list.number("radar_doppler_step", "m/s", atLeast(0), radar.doppler_quantization,
               "step in which the radar gives the Doppler; 0: read off the data, which may show none; "
               "above 0 and below 0.02: none");
@@ -301,11 +302,12 @@ void listSmoother(ParameterList& list, Config& c) {
               "length; what leaves it is marginalised into a prior");
   list.number("huber_threshold", "", atLeast(0), smoother.huber_threshold,
               "on the norm of the whitened radar residual; 0: no robust loss");
-  list.choice<RadarFactor>(
-      "radar_factor", {{"velocity", RadarFactor::kVelocity}, {"doppler", RadarFactor::kDoppler}},
-      smoother.radar_factor,
-      "what a scan gives to the window: its ego-velocity, or the Doppler of each point, so that scans of a few "
-      "points count, too");
+  list.choice<RadarFactor>("radar_factor",
+                           {{"velocity", RadarFactor::kVelocity}, {"doppler", RadarFactor::kDoppler}},
+                           smoother.radar_factor,
+                           "what a scan gives to the window: its ego-velocity, or the Doppler of each point, "
+                           "so that scans of a few "
+                           "points count, too");
   list.choice<WindowSolver>(
       "solver", {{"chain", WindowSolver::kChain}, {"ceres", WindowSolver::kCeres}}, smoother.solver,
       "chain: Gauss-Newton along the chain of states; ceres: ceres::Solve, the same estimate, slower");
