@@ -86,7 +86,9 @@ TEST(TemporalCalibration, ATruthBeyondTheBoundIsTold) {
   for (const ScanResult& result : run.results) {
     if (!result.updated || run.seconds(result.scan.stamp) < kFarAlong) continue;
     ++windows;
-    if (result.solver_termination == SolverTermination::kAtBound) ++at_bound;
+    if (result.solver_termination != SolverTermination::kAtBound) continue;
+    ++at_bound;
+    EXPECT_LT(std::abs(result.time_offset - 0.08), result.time_offset_sigma);
   }
   EXPECT_GT(windows, 100);
   EXPECT_GT(at_bound, 0.9 * windows);

@@ -220,7 +220,11 @@ void RadarChannel::judge(const RadarScan& scan, const VelocityPrior& prior, doub
 }
 
 double RadarChannel::offsetSigma(double variance) const {
-  return options_.smoother.estimate_time_offset ? offset_uncertainty_.sigma(variance) : 0.0;
+  const SmootherOptions& o = options_.smoother;
+  if (!o.estimate_time_offset) return 0.0;
+  // At the bound the truth may lie anywhere beyond, whatever the curvature of the cost there.
+  const double least = std::abs(offset()) >= o.max_time_offset ? o.max_time_offset : 0.0;
+  return std::max(least, offset_uncertainty_.sigma(variance));
 }
 
 FixedLagSmoother::RandomWalk RadarChannel::offsetWalk() const {
