@@ -80,7 +80,7 @@ TEST(EgoVelocity, ExactWithoutNoise) {
     EXPECT_EQ(e.status, EgoVelocityStatus::kMoving);
     EXPECT_LT((e.v_R - kVelocity).norm(), 1e-9) << toString(solver);
     EXPECT_EQ(e.inliers.size(), 30u);
-    EXPECT_EQ(e.points_used, 30u);
+    EXPECT_EQ(e.points.size(), 30u);
   }
 }
 
@@ -151,12 +151,12 @@ TEST(EgoVelocity, FilterLeavesOutWhatItShould) {
   o.max_azimuth = 1.0;
   o.max_elevation = 1.0;
   const EgoVelocity e = EgoVelocityEstimator(o).estimate(scan);
-  EXPECT_EQ(e.points_used, good);
+  EXPECT_EQ(e.points.size(), good);
   for (const std::size_t i : e.inliers) EXPECT_LT(i, good);
 
   EgoVelocityOptions no_min_range = o;  // a point without direction must not pass even then
   no_min_range.min_range = 0.0;
-  EXPECT_EQ(EgoVelocityEstimator(no_min_range).estimate(scan).points_used, good + 1);
+  EXPECT_EQ(EgoVelocityEstimator(no_min_range).estimate(scan).points.size(), good + 1);
 }
 
 TEST(EgoVelocity, RestWithSomethingMoving) {
@@ -259,7 +259,7 @@ TEST(EgoVelocity, AroundAPredictionMostPointsHaveToAgree) {
   EXPECT_FALSE(isValid(around(10, 5).status));
   const EgoVelocity most = around(10, 4);
   EXPECT_EQ(most.inliers, (std::vector<std::size_t>{4, 5, 6, 7, 8, 9}));
-  EXPECT_EQ(most.points_used, 10u);
+  EXPECT_EQ(most.points.size(), 10u);
   EXPECT_FALSE(isValid(around(0, 0).status));
   // A vaguer prediction agrees with more.
   prior.covariance = Eigen::Matrix3d::Identity();

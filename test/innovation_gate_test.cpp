@@ -21,7 +21,7 @@ Innovation innovation(Time stamp, double speed) {
 /// `agreeing` of 20 points support the velocity.
 EgoVelocity supportedBy(std::size_t agreeing) {
   EgoVelocity result;
-  result.points_used = 20;
+  result.points.resize(20);
   result.inliers.resize(agreeing);
   return result;
 }

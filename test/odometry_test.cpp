@@ -335,6 +335,24 @@ TEST(StuckGyro, CostsLittle) {
 }
 
 /// Three points agree on some velocity whatever they are; only what the IMU predicts tells them.
+/// All but the first scans borrow points, which nobody outside of the estimator has.
+TEST(FewPoints, AreReportedWithoutThoseBorrowed) {
+  SimulatedRun run("medium", 1, 20.0, 5.0);
+  run.setup.radar.points_mean = 6.0;
+  run.setup.radar.points_sigma = 1.0;
+  run.setup.radar.points_max = 8;
+  run.run();
+  std::size_t with_velocity = 0;
+  for (const ScanResult& result : run.results) {
+    const std::size_t all = result.scan.points.size();
+    ASSERT_LE(result.ego_velocity.points.size(), all);
+    ASSERT_LE(result.ego_velocity.inliers.size(), result.ego_velocity.points.size());
+    for (const std::size_t i : result.ego_velocity.inliers) ASSERT_LT(i, all);
+    with_velocity += isValid(result.ego_velocity.status) ? 1 : 0;
+  }
+  EXPECT_GT(with_velocity, run.results.size() / 2);
+}
+
 TEST(FewPoints, KeepTheVelocity) {
   for (const std::uint64_t seed : {1, 2, 3}) {
     for (const bool has_persons : {false, true}) {

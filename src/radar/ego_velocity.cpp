@@ -354,7 +354,7 @@ EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
   if (tells_side) unwrap(points, prior->v_R, span);
   std::vector<RadarDirection> inliers;
   EgoVelocity result;
-  result.points_used = points.size();
+  for (const RadarDirection& p : points) result.points.push_back(p.index);
   const auto n = static_cast<double>(points.size());
   if (points.size() < 3) {
     result.status = EgoVelocityStatus::kTooFewPoints;
@@ -446,11 +446,11 @@ EgoVelocity EgoVelocityEstimator::around(const RadarScan& scan, const VelocityPr
   for (const RadarDirection& p : points) {
     const double variance =
         residualVariance(Angles(p.u_R), prior.v_R, noise()) + p.u_R.dot(prior.covariance * p.u_R);
-    ++result.points_used;
+    result.points.push_back(p.index);
     if (square(p.doppler + p.u_R.dot(prior.v_R)) <= square(kAgrees) * variance)
       result.inliers.push_back(p.index);
   }
-  const double share = kMajority * static_cast<double>(result.points_used);
+  const double share = kMajority * static_cast<double>(result.points.size());
   if (!result.inliers.empty() && static_cast<double>(result.inliers.size()) >= share)
     result.status = EgoVelocityStatus::kMoving;
   result.v_R = prior.v_R;
@@ -481,12 +481,12 @@ void EgoVelocityEstimator::learn(const RadarScan& scan, const EgoVelocity& estim
 
 bool hasMajority(const EgoVelocity& velocity) {
   return isValid(velocity.status) && static_cast<double>(velocity.inliers.size()) >=
-                                         kMajority * static_cast<double>(velocity.points_used);
+                                         kMajority * static_cast<double>(velocity.points.size());
 }
 
 bool isUnanimous(const EgoVelocity& velocity) {
   return static_cast<double>(velocity.inliers.size()) >
-         kUnanimous * static_cast<double>(velocity.points_used);
+         kUnanimous * static_cast<double>(velocity.points.size());
 }
 
 bool isValid(EgoVelocityStatus status) {

@@ -99,7 +99,7 @@ def node(*parameters):
     return Process(program("rio_t", "rio_t_node"), "__name:=rio_t", *("_" + each for each in parameters))
 
 
-def play(bag, topics=(IMU, RADAR), rate=1.0, *more):
+def play(bag, topics=(IMU, RADAR), rate=2.0, *more):
     """rosbag play, which starts when each of the topics has its subscriber."""
     return Process(program("rosbag", "play"), "--clock", "--hz=1000", "--quiet", "--wait-for-subscribers",
                    f"--rate={rate / SLOWNESS}", *more, bag, "--topics", *topics, stdin=subprocess.DEVNULL,

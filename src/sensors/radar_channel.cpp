@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <utility>
 
 namespace rio_t {
 namespace {
@@ -23,6 +24,13 @@ std::size_t countOthers(const std::vector<std::size_t>& some, const std::vector<
 
 std::vector<std::size_t> below(std::size_t limit, const std::vector<std::size_t>& ascending) {
   return {ascending.begin(), std::lower_bound(ascending.begin(), ascending.end(), limit)};
+}
+
+/// Without the points that the scan borrowed: they follow its own (see ScanPool).
+EgoVelocity withOwnPoints(EgoVelocity velocity, const RadarScan& scan) {
+  velocity.points = below(scan.points.size(), velocity.points);
+  velocity.inliers = below(scan.points.size(), velocity.inliers);
+  return velocity;
 }
 
 /// Those of `own` that agree with a prediction, if the majority of the points does.
@@ -144,6 +152,7 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
   if (seen.prior) judge(seen.pooled, *seen.prior, scale, answer);
 
   seen.velocity = answer.ego_velocity;
+  answer.ego_velocity = withOwnPoints(std::move(answer.ego_velocity), scan);
   seen.is_own = isValid(seen.velocity.status);
   if (!seen.is_own && isTightlyCoupled() && expected) {
     EgoVelocity consensus = estimator_.around(seen.pooled, *seen.prior);
@@ -179,7 +188,7 @@ EgoVelocity RadarChannel::measure(const RadarScan& scan, const std::optional<Vel
 
 EgoVelocity RadarChannel::around(const VelocityPrior& prior, const RadarScan& scan,
                                  EgoVelocity result) const {
-  result.inliers = below(scan.points.size(), result.inliers);
+  result = withOwnPoints(std::move(result), scan);
   if (result.inliers.empty()) result.status = EgoVelocityStatus::kTooFewInliers;
   if (!isValid(result.status)) return result;
   const VelocityCost cost = withSharedError(

@@ -90,8 +90,8 @@ struct EgoVelocity {
   Eigen::Vector3d told_variance = Eigen::Vector3d::Zero();
   /// Points near zero show a slow motion: the platform is not at rest, whatever the IMU shows.
   bool denies_rest = false;
-  std::vector<std::size_t> inliers;  ///< indices into the scan's points
-  std::size_t points_used = 0;       ///< points that passed the filter
+  std::vector<std::size_t> points;   ///< those that passed the filter; indices into the scan's points, ascending
+  std::vector<std::size_t> inliers;  ///< those that agree on the velocity; the same
 };
 
 /// Most points of the scan agree on the velocity, so it needs no prior.

@@ -232,7 +232,7 @@ void RunOutput::addResult(const ScanResult& result) {
   appendVector(line, result.ego_velocity.v_R, 6);
   appendVector(line, result.ego_velocity.covariance.diagonal().cwiseMax(0.0).cwiseSqrt(), 6);
   *line += ',' + std::to_string(result.ego_velocity.inliers.size()) + ',' +
-           std::to_string(result.ego_velocity.points_used) + ',' +
+           std::to_string(result.ego_velocity.points.size()) + ',' +
            (result.used ? toString(result.ego_velocity.status) : result.rejected_because);
   ego_velocity_.endLine();
   if (!result.updated) return;
