@@ -32,13 +32,13 @@ Eigen::MatrixXd dense(const NormalEquations& system) {
 }
 
 /// Largest difference to the diagonal blocks of `covariance`, in standard deviations.
-double difference(const std::vector<NodeMatrix>& blocks, const Eigen::MatrixXd& covariance) {
+double difference(const std::vector<Eigen::MatrixXd>& blocks, const Eigen::MatrixXd& covariance) {
   double largest = 0.0;
   for (std::size_t k = 0; k < blocks.size(); ++k) {
     const auto at = static_cast<Eigen::Index>(k) * kNodeTangent;
-    const NodeMatrix expected = covariance.block<kNodeTangent, kNodeTangent>(at, at);
-    const NodeVector scale = expected.diagonal().cwiseSqrt().cwiseInverse();
-    const NodeMatrix apart = scale.asDiagonal() * (blocks[k] - expected) * scale.asDiagonal();
+    const Eigen::MatrixXd expected = covariance.block<kNodeTangent, kNodeTangent>(at, at);
+    const Eigen::VectorXd scale = expected.diagonal().cwiseSqrt().cwiseInverse();
+    const Eigen::MatrixXd apart = scale.asDiagonal() * (blocks[k] - expected) * scale.asDiagonal();
     largest = std::max(largest, apart.cwiseAbs().maxCoeff());
   }
   return largest;
@@ -61,7 +61,7 @@ class Batch : public ::testing::Test {
   BatchProblem problem(const SmootherOptions& options) const {
     BatchProblem problem;
     problem.start = motion.time(0.5);
-    problem.prior = priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0);
+    problem.prior = priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0, skewMounting());
     problem.guess = {{problem.start, motion.state(0.5), options.time_offset_initial}};
     return problem;
   }
@@ -113,12 +113,12 @@ TEST_F(Batch, EqualsTheFixedLagSmootherThatKeepsEverything) {
       for (std::size_t k = 0; k < online.size(); ++k) {
         const NodeEstimate node = online.node(k);
         ASSERT_EQ(batch.nodes[k].time, node.time);
-        NodeVector apart;
+        Eigen::VectorXd apart;
         apart << boxminus(batch.nodes[k].x.data(), node.x.data()), batch.nodes[k].t_O - online.t_O();
-        const NodeVector sigma = batch.covariances[k].diagonal().cwiseSqrt();
+        const Eigen::VectorXd sigma = batch.covariances[k].diagonal().cwiseSqrt();
         EXPECT_LT(apart.cwiseQuotient(sigma).norm(), 0.01) << "node " << k;
       }
-      const NodeVector last = batch.covariances.back().diagonal();
+      const Eigen::VectorXd last = batch.covariances.back().diagonal();
       EXPECT_LT((online.newestCovariance().diagonal().cwiseQuotient(last).array() - 1.0).abs().maxCoeff(),
                 1e-3);
     }
@@ -141,8 +141,8 @@ TEST_F(Batch, CovarianceIsThatOfTheDenseInverse) {
   const Eigen::MatrixXd scaled = scale.asDiagonal() * H * scale.asDiagonal();
   const Eigen::MatrixXd covariance = scale.asDiagonal() * scaled.inverse() * scale.asDiagonal();
   EXPECT_LT(difference(batch.covariances, covariance), 1e-6);
-  for (const NodeMatrix& P : batch.covariances)
-    EXPECT_GT(Eigen::SelfAdjointEigenSolver<NodeMatrix>(P).eigenvalues().minCoeff(), 0.0);
+  for (const Eigen::MatrixXd P : batch.covariances)
+    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(P).eigenvalues().minCoeff(), 0.0);
 }
 
 TEST_F(Batch, PlacesItsNodesWhereTheOffsetPutsThem) {
@@ -176,7 +176,7 @@ TEST_F(Batch, KnowsThePastBetterThanTheWindowDid) {
   RadarSmoother online(options, skewMounting(), motion.g_W, imu);
   BatchProblem whole = problem(options);
   online.initialize(whole.start, whole.prior);
-  NodeVector then = NodeVector::Zero();
+  Eigen::VectorXd then = Eigen::VectorXd::Zero();
   for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
     BatchScan scan;
     scan.velocity = measurement(stamp, 0.01);
@@ -188,7 +188,7 @@ TEST_F(Batch, KnowsThePastBetterThanTheWindowDid) {
     if (whole.scans.size() == 5) then = online.newestCovariance().diagonal();
   }
   const BatchSolution batch = make(options).solve(whole);
-  const NodeVector now = batch.covariances[batch.node_of_scan[4]].diagonal();
+  const Eigen::VectorXd now = batch.covariances[batch.node_of_scan[4]].diagonal();
   for (const int i : {0, 1, 6, 7, 8, 12, 13, 14, 15}) EXPECT_LT(now(i), 0.95 * then(i)) << i;
 }
 

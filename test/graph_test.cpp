@@ -250,7 +250,7 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
       boxplus(truth.data(), beside.data(), x.data());
       Block& node = window.addNode(motion.time(t), manifold, stored(x));
       if (previous == nullptr) {
-        const NodePrior prior = priorAtRest(SmootherOptions(), ImuNoise(), truth, 9.81, 3.0);
+        const NodePrior prior = priorAtRest(SmootherOptions(), ImuNoise(), truth, 9.81, 3.0, skewMounting());
         node.x = stored(truth);
         offset->x[0] = 0.0;
         addPrior(window, {&node, offset.get()}, {prior.J, prior.r0});
@@ -467,7 +467,7 @@ TEST(AddASensor, AnAltimeterNeedsAFactorAndABlock) {
   double sigma_without = 0.0;
   for (const bool with_altimeter : {false, true}) {
     RadarSmoother smoother(options, skewMounting(), motion.g_W, imu);
-    smoother.initialize(motion.time(0.5), priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0));
+    smoother.initialize(motion.time(0.5), priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0, skewMounting()));
     Window& window = smoother.states.window();
     const auto bias = window.addCalibration(std::make_shared<ScalarManifold>(), Eigen::VectorXd::Zero(1));
     // 1 m is known of it beforehand.

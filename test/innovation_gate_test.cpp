@@ -28,10 +28,11 @@ EgoVelocity supportedBy(std::size_t agreeing) {
 
 class Gate : public ::testing::Test {
  protected:
-  Gate() : gate(SmootherOptions()) { gate.used(at(0.0)); }
+  Gate() : gate(SmootherOptions()), last_used(at(0.0)) {}
   static Time at(double seconds) { return Time::fromSeconds(100.0 + seconds); }
   bool rejects(double seconds, double speed, std::size_t agreeing, bool tilt_is_known = true) {
-    return gate.rejects(innovation(at(seconds), speed), isUnanimous(supportedBy(agreeing)), tilt_is_known);
+    return gate.rejects(innovation(at(seconds), speed), isUnanimous(supportedBy(agreeing)), tilt_is_known,
+                        last_used);
   }
   InnovationGate gate;
 };
@@ -57,7 +58,8 @@ TEST_F(Gate, OneScanThatIsDividedStartsTheCountAgain) {
   for (double t = 0.1; t < 0.45; t += 0.1) EXPECT_TRUE(rejects(t, 2.0, 19));
   EXPECT_TRUE(rejects(0.5, 2.0, 16));
   for (double t = 0.6; t < 1.05; t += 0.1) EXPECT_TRUE(rejects(t, 2.0, 19)) << t;
-  gate.used(at(1.05));
+  gate.used();
+  last_used = at(1.05);
   EXPECT_TRUE(rejects(1.15, 2.0, 19)) << "as does one that is used";
 }
 

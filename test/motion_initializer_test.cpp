@@ -93,7 +93,7 @@ struct Rig {
   ImuBuffer imu;
 };
 
-NodeMatrix covarianceOf(const NodePrior& prior) { return (prior.J.transpose() * prior.J).inverse(); }
+Eigen::MatrixXd covarianceOf(const NodePrior& prior) { return (prior.J.transpose() * prior.J).inverse(); }
 
 TEST(MotionInitializer, FindsTiltVelocityAndOffsetAndKnowsHowWell) {
   double tilt_squares = 0.0;
@@ -109,7 +109,7 @@ TEST(MotionInitializer, FindsTiltVelocityAndOffsetAndKnowsHowWell) {
         const auto found = rig.run(initializer, 1.7);
         ASSERT_TRUE(found) << initializer.waitingFor();
         EXPECT_EQ(initializer.waitingFor(), "");
-        const NodeMatrix P = covarianceOf(found->prior);
+        const Eigen::MatrixXd P = covarianceOf(found->prior);
         const double tilt = rig.tiltError(*found);
         const double tilt_variance = P(0, 0) + P(1, 1) + P(2, 2);  // all of it tilt, but 1e-6
         const double offset_error = found->prior.t_O0 - offset;
@@ -163,7 +163,7 @@ TEST(MotionInitializer, KeepsHeadingAndPositionOfTheAnchor) {
   const Eigen::Vector3d turn_W = so3::log(x.q_WI() * anchor.q_WI.conjugate());
   EXPECT_GT(turn_W.norm(), 0.2);
   EXPECT_NEAR(turn_W.z(), 0.0, 0.01);
-  const NodeMatrix P = covarianceOf(found->prior);
+  const Eigen::MatrixXd P = covarianceOf(found->prior);
   EXPECT_NEAR(std::sqrt(P(StateBlock::kP, StateBlock::kP)), 0.7, 1e-6);
   const Eigen::Vector3d up_I = x.q_WI().conjugate() * Eigen::Vector3d::UnitZ();
   EXPECT_NEAR(std::sqrt(up_I.dot(P.topLeftCorner<3, 3>() * up_I)), 0.2, 1e-3);

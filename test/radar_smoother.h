@@ -15,9 +15,10 @@ struct RadarSmoother {
                 const ImuBuffer& imu)
       : walk(options.time_offset_noise),
         states(options, ImuNoise(), g_W, imu),
-        radar(options, T_IR, g_W, imu) {}
+        offset(std::make_shared<OffsetBlocks>(options)),
+        radar(options, T_IR, g_W, imu, offset) {}
 
-  void initialize(Time time, const NodePrior& prior) { start(states, radar, time, prior); }
+  void initialize(Time time, const NodePrior& prior) { radar.start(states, time, prior); }
   RadarInWindow::AddResult add(const RadarVelocityMeasurement& z) { return radar.add(states, z); }
   void addRest(Time stamp, double sigma) {
     states.addZeroVelocity(*states.nodeAt(radar.nodeTime(stamp)), sigma);
@@ -25,7 +26,9 @@ struct RadarSmoother {
   const Solution& optimize(double short_step = SolverLimits().short_step) {
     return states.optimize(short_step);
   }
-  std::vector<NodeEstimate> marginalize() { return states.marginalize({{&radar.offsetBlock(), walk}}); }
+  std::vector<NodeEstimate> marginalize() { return 
+    return states.marginalize({{&offset->newest(), Eigen::VectorXd::Constant(1, walk)}});
+  }
   std::optional<RadarVelocityPrediction> predict(Time stamp) const { return radar.predict(states, stamp); }
   void stepOffset(Time stamp) { radar.stepOffset(states, stamp); }
 
@@ -33,10 +36,12 @@ struct RadarSmoother {
   NodeEstimate node(std::size_t k) const { return states.node(k); }
   NodeEstimate newest() const { return states.newest(); }
   double t_O() const { return radar.offset(); }
-  NodeMatrix newestCovariance() const { return states.newestCovariance({&radar.offsetBlock()}); }
+  /// Of state and t_O.
+  Eigen::MatrixXd newestCovariance() const { return states.newestCovariance({&offset->newest()}); }
 
   double walk;
   FixedLagSmoother states;
+  std::shared_ptr<OffsetBlocks> offset;
   RadarInWindow radar;
 };
 
@@ -49,8 +54,7 @@ inline Extrinsics skewMounting() {
 inline RadarVelocityMeasurement radarMeasurement(const SyntheticMotion& motion, double stamp, double t_O) {
   RadarVelocityMeasurement z;
   z.stamp = motion.time(stamp);
-  z.T_IR = skewMounting();
-  z.v_R = motion.radarVelocity(stamp - t_O, z.T_IR.R_RI(), z.T_IR.l_I);
+  z.v_R = motion.radarVelocity(stamp - t_O, skewMounting().R_RI(), skewMounting().l_I);
   z.covariance = 0.02 * 0.02 * Eigen::Matrix3d::Identity();
   return z;
 }

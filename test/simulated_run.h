@@ -53,10 +53,7 @@ struct SimulatedRun {
       for (; next != data.scans.end() && next->arrival <= sample.time; ++next) {
         if (next->delivered) odometry->addScan(scan(*next));
       }
-      for (ScanResult& result : odometry->process()) {
-        result.scan.points.clear();
-        results.push_back(std::move(result));
-      }
+      for (ScanResult& result : odometry->process()) results.push_back(std::move(result));
     }
   }
 
@@ -93,7 +90,7 @@ struct SimulatedRun {
   OdometryOptions options;
   std::optional<RadarInertialOdometry> odometry;
   std::vector<NavigationState> states;  ///< causal, one for each sample
-  std::vector<ScanResult> results;      ///< without the points
+  std::vector<ScanResult> results;
 };
 
 }  // namespace rio_t

@@ -23,7 +23,7 @@ class Smoother : public ::testing::Test {
 
   RadarSmoother make(const SmootherOptions& options) const {
     RadarSmoother smoother(options, skewMounting(), motion.g_W, imu);
-    smoother.initialize(motion.time(0.5), priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0));
+    smoother.initialize(motion.time(0.5), priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0, skewMounting()));
     return smoother;
   }
 
@@ -63,7 +63,7 @@ TEST_F(Smoother, TheWindowIsBoundedAndKeepsItsCertainty) {
   EXPECT_GT(left.size(), 20u);
   for (std::size_t k = 1; k < left.size(); ++k) EXPECT_LT(left[k - 1].time, left[k].time);
   // Had states been dropped instead of marginalised, the position would be as unknown as a window leaves it.
-  const NodeMatrix& P = smoother.newestCovariance();
+  const Eigen::MatrixXd P = smoother.newestCovariance();
   EXPECT_GT(P(0, 0), 0.0);
   EXPECT_LT(std::sqrt(P(StateBlock::kP, StateBlock::kP)), 0.1);
 }
@@ -98,7 +98,7 @@ TEST_F(Smoother, APositionThatIsHardlyKnownStopsNothing) {
     smoother.marginalize();
   }
   EXPECT_NEAR(smoother.t_O(), 0.03, 2e-4);
-  const NodeMatrix& P = smoother.newestCovariance();
+  const Eigen::MatrixXd P = smoother.newestCovariance();
   EXPECT_GT(std::sqrt(P(StateBlock::kP, StateBlock::kP)), 10.0);
   EXPECT_LT(std::sqrt(P(StateBlock::kV, StateBlock::kV)), 0.1);
 }
@@ -135,7 +135,7 @@ TEST_F(Smoother, ScansThatSayNothingOfTheOffsetLeaveIt) {
     smoother.marginalize();
   }
   EXPECT_NEAR(smoother.t_O(), 0.0, 1e-9);
-  const NodeMatrix& P = smoother.newestCovariance();
+  const Eigen::MatrixXd P = smoother.newestCovariance();
   EXPECT_GE(std::sqrt(P(StateBlock::kTangent, StateBlock::kTangent)),
             options.time_offset_sigma * (1.0 - 1e-9));
 }
@@ -205,10 +205,10 @@ TEST_F(Smoother, AStepOfTheOffsetSurvivesANodeThatIsInsertedBeforeIt) {
   EXPECT_NEAR(smoother.t_O(), 0.06, 5e-3);
   // A new start knows of no step.
   smoother.stepOffset(motion.time(2.3));
-  smoother.initialize(motion.time(2.5), priorAtRest(options, ImuNoise(), motion.state(2.5), 9.81, 3.0));
+  smoother.initialize(motion.time(2.5), priorAtRest(options, ImuNoise(), motion.state(2.5), 9.81, 3.0, skewMounting()));
   use(2.6, 0.0);
   use(2.7, 0.0);
-  const NodeMatrix& P = smoother.newestCovariance();
+  const Eigen::MatrixXd P = smoother.newestCovariance();
   EXPECT_LT(std::sqrt(P(StateBlock::kTangent, StateBlock::kTangent)), 0.5 * options.time_offset_sigma);
 }
 
@@ -245,15 +245,15 @@ TEST(PriorAtRest, TiltAndBiasAreKnownTogether) {
   const SmootherOptions options;
   StateBlock x;
   x.q_WI() = so3::exp({0.4, -0.3, 0.9});
-  const NodePrior prior = priorAtRest(options, ImuNoise(), x, 9.81, 3.0);
-  const NodeMatrix P = (prior.J.transpose() * prior.J).inverse();
+  const NodePrior prior = priorAtRest(options, ImuNoise(), x, 9.81, 3.0, skewMounting());
+  const Eigen::MatrixXd P = (prior.J.transpose() * prior.J).inverse();
   const Eigen::Matrix3d R_WI = x.q_WI().toRotationMatrix();
   const Eigen::Matrix3d tilt = R_WI * P.topLeftCorner<3, 3>() * R_WI.transpose();
   // A tilt error is b_a / g.
   for (int i = 0; i < 2; ++i) EXPECT_NEAR(std::sqrt(tilt(i, i)), options.prior_sigma_accel_bias / 9.81, 3e-4);
   EXPECT_NEAR(std::sqrt(tilt(2, 2)), options.prior_sigma_yaw, 1e-6);
   // What the accelerometer reads is known by its noise, though neither of the two is.
-  Eigen::Matrix<double, 3, kNodeTangent> J = Eigen::Matrix<double, 3, kNodeTangent>::Zero();
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(3, StateBlock::kTangent + 1);
   J.leftCols<3>() = so3::hat(9.81 * R_WI.row(2).transpose());
   J.middleCols<3>(StateBlock::kBa).setIdentity();
   EXPECT_LT(std::sqrt((J * P * J.transpose()).trace() / 3.0), 0.02);

@@ -52,6 +52,7 @@ RadarMotion RadarMotionModel::carriedByImu(const StateView& x, Time state_time, 
       dR_T * delta.dv_dbg + so3::hat(v_tau) * delta.dR_dbg + so3::hat(l_I);
   motion.J_state.middleCols<3>(StateBlock::kBaStored) = dR_T * delta.dv_dba;
   motion.dv_dt_O = -velocityRate(*mean, x.b_g, x.b_a, v_tau, dR_T * R_IW * g_W, l_I).a_I;
+  motion.alpha_I = mean->angular_acceleration;
   return motion;
 }
 

@@ -17,6 +17,8 @@ bool RadarVelocityFactor::Evaluate(double const* const* parameters, double* resi
   if (jacobians == nullptr) return true;
   if (jacobians[0] != nullptr) Eigen::Map<StateJacobian<3>>{jacobians[0]} = whitening_ * predicted.J_state;
   if (jacobians[1] != nullptr) Eigen::Map<Eigen::Vector3d>{jacobians[1]} = whitening_ * predicted.dv_dt_O;
+  if (jacobians[2] != nullptr)
+    Eigen::Map<ExtrinsicsJacobian<3>>{jacobians[2]} = whitening_ * predicted.J_extrinsics;
   return true;
 }
 

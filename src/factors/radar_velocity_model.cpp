@@ -1,5 +1,6 @@
 #include "rio_t/factors/radar_velocity_model.h"
 
+#include "rio_t/core/so3.h"
 #include "rio_t/factors/offset_derivative.h"
 
 namespace rio_t {
@@ -10,6 +11,7 @@ bool RadarVelocityModel::isCurrent(Time mean_time) const {
 }
 
 PredictedVelocity RadarVelocityModel::at(double const* const* parameters, bool derivatives) const {
+  const Extrinsics T_IR = toExtrinsics(parameters[2]);
   const double t_O = scan_.linear_from_t_O.value_or(parameters[1][0]);
   const double away = parameters[1][0] - t_O;
   // The derivative is needed where the value depends on it.
@@ -17,14 +19,19 @@ PredictedVelocity RadarVelocityModel::at(double const* const* parameters, bool d
   const Time mean_time = model_.meanTime(scan_.stamp, t_O);
   if ((derivatives || is_linear) && !isCurrent(mean_time))
     mean_ = Mean{mean_time, model_.imu->newest(), model_.meanAt(mean_time)};
-  const RadarMotion motion = model_.at(parameters[0], state_time_, scan_.stamp, t_O, scan_.T_IR.l_I,
+  const RadarMotion motion = model_.at(parameters[0], state_time_, scan_.stamp, t_O, T_IR.l_I,
                                        derivatives || is_linear ? &mean_->value : nullptr);
-  const Eigen::Matrix3d R_RI = scan_.T_IR.R_RI();
+  const Eigen::Matrix3d R_RI = T_IR.R_RI();
   PredictedVelocity predicted;
   predicted.dv_dt_O = scan_.offset_gain * (R_RI * motion.dv_dt_O);
   predicted.v_R = R_RI * motion.v_I;
   if (is_linear) predicted.v_R += away * predicted.dv_dt_O;
-  if (derivatives) predicted.J_state = R_RI * motion.J_state;
+  if (!derivatives) return predicted;
+  predicted.J_state = R_RI * motion.J_state;
+  predicted.J_extrinsics.setZero();
+  predicted.J_extrinsics.leftCols<3>() = so3::hat(predicted.v_R) * R_RI;
+  predicted.J_extrinsics.rightCols<3>() =
+      R_RI * so3::hat(motion.omega_I - away * scan_.offset_gain * motion.alpha_I);
   return predicted;
 }
 

@@ -7,9 +7,10 @@ namespace rio_t {
 namespace {
 
 /// A walk w of block o, o' = o + w: what is known of o' is S - S_o (S_oo + W^-1)^-1 S_o'.
-void widen(Information& information, Eigen::Index first, Eigen::Index size, double variance) {
+void widen(Information& information, Eigen::Index first, const Eigen::VectorXd& variance) {
+  const Eigen::Index size = variance.size();
   Eigen::MatrixXd sum = information.S.block(first, first, size, size);
-  sum.diagonal().array() += 1.0 / variance;
+  sum.diagonal() += variance.cwiseInverse();
   const Eigen::MatrixXd column = information.S.middleCols(first, size);
   const Eigen::MatrixXd gain = sum.ldlt().solve(column.transpose()).transpose();
   information.s -= gain * information.s.segment(first, size).eval();
@@ -71,7 +72,7 @@ void marginalize(Window& window, std::vector<const Block*> leaving, const std::v
   std::vector<const Block*> order = leaving;
   std::vector<Block*> kept;
   for (const auto& block : window.blocks()) {
-    if (contains(leaving, block.get()) ||
+    if (block->is_constant || contains(leaving, block.get()) ||
         std::find(touched.begin(), touched.end(), block.get()) == touched.end())
       continue;
     kept.push_back(block.get());
@@ -80,10 +81,9 @@ void marginalize(Window& window, std::vector<const Block*> leaving, const std::v
   Information information = eliminateFirst(linearize(order, terms), static_cast<int>(leaving.size()));
   Eigen::Index first = 0;
   for (const Block* block : kept) {
-    const Eigen::Index size = block->manifold->tangent();
     for (const Walk& walk : walks)
-      if (walk.block == block && walk.variance > 0.0) widen(information, first, size, walk.variance);
-    first += size;
+      if (walk.block == block && walk.variance.minCoeff() > 0.0) widen(information, first, walk.variance);
+    first += block->manifold->tangent();
   }
   for (const Block* block : leaving) window.remove(*block);
   if (!kept.empty()) addPrior(window, kept, squareRoot(information));

@@ -79,12 +79,11 @@ RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) co
   z.covariance = result.ego_velocity.covariance;
   z.covariance.diagonal() +=
       (model_error_scale_ / result.model_error_scale - 1.0) * result.ego_velocity.told_variance;
-  z.T_IR = options_.T_IR;
   z.offset_gain = result.offset_gain;
   return z;
 }
 
-void BatchOdometry::setMeasurement(const ScanResult& result, const BatchNode& node, BatchScan& scan) const {
+void BatchOdometry::setMeasurement(const ScanResult& result, const NodeEstimate& node, BatchScan& scan) const {
   const double offset_gain = isAtRest(node) ? 0.0 : result.offset_gain;
   if (result.doppler) {
     scan.doppler = result.doppler;
@@ -101,18 +100,28 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
   BatchProblem& problem = run.problem;
   problem.start = start.time;
   problem.prior = start.prior;
-  problem.guess.push_back({start.time, start.prior.x0, start.prior.t_O0});
-  bool stepped = false;  // a step found at a scan that is not in the graph counts for the next
+  problem.radar = start.radar;
+  for (std::size_t k = 0; k < options_.radarCount(); ++k) {
+    const OdometryOptions own = optionsOfRadar(options_, k);
+    problem.mounting.push_back(own.T_IR);
+    problem.time_offsets.push_back(own.smoother.time_offset_initial);
+  }
+  problem.guess.push_back({start.time, start.prior.x0});
+  std::vector<bool> stepped(problem.mounting.size(), false);
+  // A step found at a scan that is not in the graph counts for the next.
   for (std::size_t i = 0; i < scans_.size(); ++i) {
     const ScanResult& result = scans_[i].result;
-    stepped |= scans_[i].offset_stepped;
+    const std::size_t radar = result.scan.radar;
+    stepped[radar] = stepped[radar] || scans_[i].offset_stepped;
     if (!result.updated) continue;
-    const BatchNode node{result.state.time, stateBlock(result.state), result.time_offset};
+    const NodeEstimate node{result.state.time, stateBlock(result.state)};
     if (node.time > problem.guess.back().time) problem.guess.push_back(node);
     BatchScan scan;
     scan.stamp = result.scan.stamp;
     scan.t_O = result.time_offset;
-    scan.offset_stepped = std::exchange(stepped, false);
+    scan.radar = radar;
+    scan.offset_stepped = stepped[radar];
+    stepped[radar] = false;
     const bool at_rest = isAtRest(node);
     if (at_rest) scan.rest_velocity_sigma = options_.rest.velocity_sigma;
     if (result.used) setMeasurement(result, node, scan);
@@ -126,7 +135,7 @@ std::size_t BatchOdometry::readmit(const BatchSmoother& smoother, const BatchSol
                                    Run& run) const {
   BatchProblem& problem = run.problem;
   for (std::size_t j = 0; j < problem.scans.size(); ++j)
-    problem.scans[j].t_O = solution.nodes[solution.node_of_scan[j]].t_O;
+    problem.scans[j].t_O = solution.scans[j].t_O;
 
   std::size_t count = 0;
   for (std::size_t i = 0; i < scans_.size(); ++i) {
@@ -134,60 +143,69 @@ std::size_t BatchOdometry::readmit(const BatchSmoother& smoother, const BatchSol
     if (result.rejected_because != "innovation") continue;
     if (!isValid(result.ego_velocity.status)) continue;
     const RadarVelocityMeasurement z = measurement(result);
-    const std::optional<BatchNode> node = acceptedBy(smoother, solution, z);
-    if (!node) continue;
+    const BatchSolution::Scan* near = acceptedBy(smoother, run, solution, result.scan.radar, z);
+    if (near == nullptr) continue;
+    const NodeEstimate& node = solution.nodes[near->node];
     ++count;
     const auto known = std::find(run.source.begin(), run.source.end(), i);  // at rest it is in the graph
     if (known != run.source.end()) {
-      setMeasurement(result, *node, problem.scans[static_cast<std::size_t>(known - run.source.begin())]);
+      setMeasurement(result, node, problem.scans[static_cast<std::size_t>(known - run.source.begin())]);
       continue;
     }
     BatchScan scan;
     scan.stamp = z.stamp;
-    scan.t_O = solution.nodes[nearestNode(solution.nodes, z.stamp)].t_O;
-    setMeasurement(result, *node, scan);
+    scan.radar = result.scan.radar;
+    scan.t_O = near->t_O;
+    setMeasurement(result, node, scan);
     problem.scans.push_back(scan);
     run.source.push_back(i);
   }
   return count;
 }
 
-std::optional<BatchNode> BatchOdometry::acceptedBy(const BatchSmoother& smoother,
-                                                   const BatchSolution& solution,
-                                                   const RadarVelocityMeasurement& z) const {
-  const double t_O = solution.nodes[nearestNode(solution.nodes, z.stamp)].t_O;
-  const bool at_stamp = options_.smoother.time_offset_model == TimeOffsetModel::kConstantAcceleration;
-  const std::size_t k = nearestNode(solution.nodes, at_stamp ? z.stamp : z.stamp - t_O);
-  const auto residual = smoother.residual(solution.nodes[k], solution.covariances[k], z);
+const BatchSolution::Scan* BatchOdometry::acceptedBy(const BatchSmoother& smoother, const Run& run,
+                                                     const BatchSolution& solution, std::size_t radar,
+                                                     const RadarVelocityMeasurement& z) const {
+  const BatchSolution::Scan* nearest = nullptr;
+  double least = 0.0;
+  for (std::size_t j = 0; j < solution.scans.size(); ++j) {
+    const BatchScan& scan = run.problem.scans[j];
+    if (scan.radar != radar) continue;
+    const double apart = std::abs(scan.stamp - z.stamp);
+    if (nearest != nullptr && apart >= least) continue;
+    nearest = &solution.scans[j];
+    least = apart;
+  }
+  if (nearest == nullptr) return nullptr;
+  const auto residual = smoother.residual(solution, *nearest, radar, z);
   const double gate = options_.smoother.innovation_gate;
   Innovation innovation;
   innovation.d = residual.value;
   innovation.S = residual.prediction_covariance + z.covariance;
-  if (innovation.widened(options_.smoother.innovation_model_error).squaredSigmas() > gate * gate)
-    return std::nullopt;
-  return solution.nodes[k];
+  const double squared = innovation.widened(options_.smoother.innovation_model_error).squaredSigmas();
+  return squared > gate * gate ? nullptr : nearest;
 }
 
-bool BatchOdometry::isAtRest(const BatchNode& node) const {
+bool BatchOdometry::isAtRest(const NodeEstimate& node) const {
   return rio_t::isAtRest(imu_, node.time, {node.x.q_WI(), node.x.v_W(), node.x.b_g(), node.x.b_a(), g_W_},
                          options_.rest);
 }
 
-NavigationState BatchOdometry::stateOf(const BatchNode& node, const NodeMatrix& covariance) const {
-  return navigationState({node.time, node.x}, covariance.topLeftCorner<kState, kState>(), imu_);
+NavigationState BatchOdometry::stateOf(const NodeEstimate& node, const StateCovariance& covariance) const {
+  return navigationState(node, covariance, imu_);
 }
 
 std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solution) const {
-  const std::vector<BatchNode>& nodes = solution.nodes;
+  const std::vector<NodeEstimate>& nodes = solution.nodes;
   std::vector<NavigationState> states;
   for (std::size_t k = 0; k + 1 < nodes.size(); ++k) {
-    const BatchNode& node = nodes[k];
-    const BatchNode& next = nodes[k + 1];
+    const NodeEstimate& node = nodes[k];
+    const NodeEstimate& next = nodes[k + 1];
     // The distance by which the IMU alone misses the next node is spread over the way to it.
     const StateBlock missed_by = carried(node.x, node.time, next.time, imu_, g_W_);
     const StateTangent miss = boxminus(next.x.data(), missed_by.data());
     if (k == 0) states.push_back(stateOf(node, solution.covariances[0]));
-    BatchNode at = node;
+    NodeEstimate at = node;
     Time carried_to = node.time;
     StateBlock x = node.x;
     imu_.forEachSample(node.time, next.time, [&](const ImuMeasurement& sample) {
@@ -197,7 +215,7 @@ std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solu
       const StateTangent part = share * miss;
       at.time = sample.time;
       boxplus(x.data(), part.data(), at.x.data());
-      const NodeMatrix covariance =
+      const StateCovariance covariance =
           (1.0 - share) * solution.covariances[k] + share * solution.covariances[k + 1];
       if (!sample.is_bridge) states.push_back(stateOf(at, covariance));
     });
@@ -220,17 +238,19 @@ std::vector<ScanResult> BatchOdometry::results(const Run& run, const BatchSoluti
   }
   std::vector<std::size_t> node_of(results.size());
   for (std::size_t j = 0; j < run.source.size(); ++j) {
-    const std::size_t k = solution.node_of_scan[j];
-    const NodeMatrix& P = solution.covariances[k];
+    const BatchSolution::Scan& solved = solution.scans[j];
+    const std::size_t k = solved.node;
     ScanResult& result = results[run.source[j]];
     node_of[run.source[j]] = k;
     result.updated = true;
     result.used = run.problem.scans[j].velocity || run.problem.scans[j].doppler;
     if (result.used) result.rejected_because.clear();
-    result.state = stateOf(solution.nodes[k], P);
-    result.time_offset = solution.nodes[k].t_O;
+    result.state = stateOf(solution.nodes[k], solution.covariances[k]);
+    result.time_offset = solved.t_O;
+    result.T_IR = solution.extrinsics[result.scan.radar];
+    result.T_IR_covariance = extrinsicsCovariance(solution.extrinsics_covariances[result.scan.radar]);
     result.solver_termination = solution.termination;
-    result.time_offset_sigma = options_.smoother.estimate_time_offset ? std::sqrt(P(kState, kState)) : 0.0;
+    result.time_offset_sigma = options_.smoother.estimate_time_offset ? std::sqrt(solved.covariance(kState, kState)) : 0.0;
   }
   std::vector<std::size_t> order(results.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
@@ -243,7 +263,7 @@ std::vector<ScanResult> BatchOdometry::results(const Run& run, const BatchSoluti
     const bool last = i == order.back();
     const std::size_t until = last ? solution.nodes.size() : results[i].updated ? node_of[i] + 1 : next;
     for (; next < until; ++next) {
-      const BatchNode& node = solution.nodes[next];
+      const NodeEstimate& node = solution.nodes[next];
       results[i].left_window.push_back({node.time, node.x.p_W(), node.x.q_WI()});
     }
     sorted.push_back(std::move(results[i]));

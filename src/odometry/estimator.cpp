@@ -22,9 +22,28 @@ constexpr double kMaxStampAhead = 1.0;
 constexpr double kSilentStep = 5.0;
 constexpr double kLateScan = 1.0;
 
-RadarChannelOptions channelOptions(const OdometryOptions& options) {
-  return {options.T_IR,     options.ego_velocity,       options.feasibility, options.offset_step_detector,
-          options.smoother, options.rest.velocity_sigma};
+std::vector<RadarChannel> radarChannels(const OdometryOptions& options, const Eigen::Vector3d& g_W,
+                                        const ImuBuffer& imu) {
+  const auto shared = options.smoother.time_offset_shared ? std::make_shared<OffsetBlocks>(options.smoother)
+                                                          : nullptr;
+  std::vector<RadarChannel> channels;
+  for (std::size_t k = 0; k < options.radarCount(); ++k) {
+    const OdometryOptions own = optionsOfRadar(options, k);
+    const RadarChannelOptions channel{own.T_IR,     own.ego_velocity,       own.feasibility, own.offset_step_detector,
+                                      own.smoother, own.rest.velocity_sigma};
+    channels.emplace_back(channel, g_W, imu, shared);
+  }
+  return channels;
+}
+
+/// Radars that share a block walk once, as far as the one that walks farthest.
+void addWalk(std::vector<FixedLagSmoother::RandomWalk>& walks, const FixedLagSmoother::RandomWalk& walk) {
+  for (FixedLagSmoother::RandomWalk& other : walks) {
+    if (other.block != walk.block) continue;
+    other.density = other.density.cwiseMax(walk.density);
+    return;
+  }
+  walks.push_back(walk);
 }
 
 StampedPose pose(const NodeEstimate& node) { return {node.time, node.x.p_W(), node.x.q_WI()}; }
@@ -38,10 +57,10 @@ Estimator::Estimator(const OdometryOptions& options, Navigation& navigation, Fau
       navigation_(navigation),
       faults_(faults),
       initializer_(options),
-      recovery_(options),
+      recovery_(motionInitializers(options)),
       smoother_(options.smoother, options.imu_noise, g_W_, imu_),
-      radars_{RadarChannel(channelOptions(options), g_W_, imu_)},
-      health_(options.health, options.smoother.innovation_gate),
+      radars_(radarChannels(options, g_W_, imu_)),
+      health_(options.health, options.smoother.innovation_gate, options.radarCount()),
       waiting_for_(initializer_.waitingFor()) {}
 
 /// The way of a scan: when, how fast, into the window, out.
@@ -54,7 +73,7 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
   radar.observe(result.scan);
   if (!initialized()) {
     result.ego_velocity = radar.velocityOf(result.scan);
-    initializer_.addVelocity(stamp, result.ego_velocity);
+    initializer_.addVelocity(result.scan.radar, stamp, result.ego_velocity);
     result.rejected_because = "before_initialization";
     return result;
   }
@@ -69,13 +88,14 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
     const bool at_rest = isAtRest(node_time);
     const bool has_diverged = health_.health() == Health::kDiverged;
     const RadarAnswer answer =
-        radar.use(result.scan, {at_rest, has_diverged, result.model_error_scale}, smoother_);
-    judge(answer, stamp);
+        radar.use(result.scan, {at_rest, has_diverged, result.model_error_scale, last_used_}, smoother_);
+    judge(answer, result.scan);
     result.ego_velocity = answer.ego_velocity;
     result.doppler = answer.doppler;
     result.offset_gain = answer.offset_gain;
     result.rejected_because = answer.rejected_because;
     result.used = result.updated = answer.rejected_because.empty();
+    if (result.used) last_used_ = stamp;
     if (answer.at_rest) {
       if (Block* node = smoother_.nodeAt(radar.nodeTime(stamp))) {
         smoother_.addZeroVelocity(*node, options_.rest.velocity_sigma);
@@ -98,25 +118,26 @@ std::string Estimator::whyNotNow(Time node_time, bool imu_has_ended) const {
 }
 
 /// Health, recovery and the size of the model errors hear what the scan says of the estimate.
-void Estimator::judge(const RadarAnswer& answer, Time stamp) {
+void Estimator::judge(const RadarAnswer& answer, const RadarScan& scan) {
+  HealthMonitor& health = health_.of(scan.radar);
   if (answer.judged) {
-    health_.addInnovation(*answer.judged);
+    health.addInnovation(*answer.judged);
   } else if (answer.was_predicted) {
-    health_.addUndecided(stamp);
+    health.addUndecided(scan.stamp);
   }
-  if (answer.alone) recovery_.add(stamp, *answer.alone);
+  if (answer.alone) recovery_.at(scan.radar).add(scan.stamp, *answer.alone);
   if (answer.offset_stepped) {
-    health_.offsetStepped(stamp);
+    health.offsetStepped(scan.stamp);
     faults_.count("time_offset_step");
   }
   if (!answer.used) return;
   // The state's variance grows about as the root of the accelerometer's, unless that is measured.
-  const ImuMeasurement sample = imu_.at(stamp);
+  const ImuMeasurement sample = imu_.at(scan.stamp);
   const bool accel_is_told = imuNoise().accelVariance(sample) > sample.accel_noise;
   Eigen::Matrix3d scaled = answer.ego_velocity.told_variance.asDiagonal();
   if (accel_is_told) scaled += 0.5 * answer.prediction_covariance;
   const double share = answer.used->S.ldlt().solve(scaled).trace() / 3.0;
-  model_error_scale_.add(stamp, answer.used->squaredSigmas(), share);
+  model_error_scale_.add(scan.stamp, answer.used->squaredSigmas(), share);
 }
 
 void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
@@ -124,10 +145,13 @@ void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
   result.solver_iterations = solution.iterations;
   result.solver_termination = solution.termination;
   constexpr int kState = StateBlock::kTangent;
-  const Eigen::MatrixXd covariance = smoother_.newestCovariance({&radar.offsetBlock()});
+  const Eigen::MatrixXd covariance = smoother_.newestCovariance(radar.calibration());
   result.state = newestState(covariance.topLeftCorner<kState, kState>());
   result.time_offset = radar.offset();
   result.time_offset_sigma = radar.offsetSigma(covariance(kState, kState));
+  result.T_IR = radar.extrinsics();
+  const Eigen::Index estimated = covariance.rows() - (kState + 1);
+  result.T_IR_covariance = extrinsicsCovariance(covariance.bottomRightCorner(estimated, estimated));
   for (const StampedPose& left : marginalize()) result.left_window.push_back(left);
   health_.updated(result.state.time);
   anchor(result.state, result.used && result.ego_velocity.status == EgoVelocityStatus::kZeroVelocity);
@@ -136,7 +160,8 @@ void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
 std::vector<StampedPose> Estimator::marginalize() {
   std::vector<StampedPose> left;
   std::vector<FixedLagSmoother::RandomWalk> walks;
-  for (const RadarChannel& radar : radars_) walks.push_back(radar.offsetWalk());
+  for (const RadarChannel& radar : radars_)
+    for (const FixedLagSmoother::RandomWalk& walk : radar.randomWalks()) addWalk(walks, walk);
   for (const NodeEstimate& node : smoother_.marginalize(walks)) left.push_back(pose(node));
   return left;
 }
@@ -176,7 +201,8 @@ void Estimator::keepUp(bool scan_came, bool scans_wait) {
   }
   const bool keep_for_recovery = options_.health.on_divergence == OnDivergence::kReinitialize;
   const Time needed = smoother_.imuNeededSince();
-  imu_.dropBefore(keep_for_recovery ? std::min(needed, imu_.newest() - recovery_.imuHistory()) : needed);
+  const double history = recovery_.front().imuHistory();
+  imu_.dropBefore(keep_for_recovery ? std::min(needed, imu_.newest() - history) : needed);
 }
 
 void Estimator::startAgain(std::uint64_t clock_restarts) {
@@ -186,10 +212,10 @@ void Estimator::startAgain(std::uint64_t clock_restarts) {
   OdometryOptions at_once = options_;
   at_once.init_motion_after = 0.0;
   initializer_ = Initializer(at_once);
-  recovery_.clear();
+  recovery_ = motionInitializers(options_);
   smoother_ = FixedLagSmoother(options_.smoother, options_.imu_noise, g_W_, imu_);
   model_error_scale_ = ModelErrorScale();
-  health_ = HealthMonitor(options_.health, options_.smoother.innovation_gate);
+  health_ = RadarsHealth(options_.health, options_.smoother.innovation_gate, radars_.size());
   pose_doubt_ = PoseDoubt();
   left_in_silence_.clear();
   radar_heard_.reset();
@@ -201,11 +227,14 @@ void Estimator::tryInitialize(const ImuMeasurement& sample) {
   if (!found) return imu_.dropBefore(sample.time - initializer_.imuHistory());
   start_ = found;
   model_error_scale_ = found->model_error_scale;
-  begin(found->time, found->prior);
+  begin(found->time, found->prior, found->radar);
 }
 
-void Estimator::begin(Time time, const NodePrior& prior) {
-  radars_.front().start(smoother_, time, prior);
+void Estimator::begin(Time time, const NodePrior& prior, std::size_t radar) {
+  radars_[radar].start(smoother_, time, prior);
+  for (std::size_t k = 0; k < radars_.size(); ++k)
+    if (k != radar) radars_[k].join(smoother_);
+  last_used_ = time;
   yaw_doubt_ = YawDoubt();
   initialized_at_ = time;
   health_.startedAt(time);
@@ -214,13 +243,16 @@ void Estimator::begin(Time time, const NodePrior& prior) {
 
 /// The poses of the window that is given up go to `left`.
 bool Estimator::tryReinitialize(std::vector<StampedPose>& left) {
-  const auto found = recovery_.solve(imu_, [this](Time time) { return anchorAt(time); });
+  std::optional<MotionInitialization> found;
+  std::size_t radar = 0;
+  for (; radar < recovery_.size() && !found; ++radar)
+    found = recovery_[radar].solve(imu_, [this](Time time) { return anchorAt(time); });
   if (!found) return false;
   for (std::size_t k = 0; k < smoother_.size(); ++k)
     if (smoother_.node(k).time < found->time) left.push_back(pose(smoother_.node(k)));
   pose_doubt_ = PoseDoubt(newestState(smoother_.newestCovariance({})));
   model_error_scale_ = found->model_error_scale;
-  begin(found->time, found->prior);
+  begin(found->time, found->prior, radar - 1);
   updateHealth();
   faults_.count("reinitialized");
   return true;

@@ -95,6 +95,10 @@ void HealthMonitor::startedAt(Time time) {
   if (diverged_at_) diverged_at_ = time;
 }
 
+bool HealthMonitor::hears(Time now) const {
+  return !entries_.empty() && std::abs(now - latest_) <= options_.window;
+}
+
 bool HealthMonitor::wantsReinitialization(Time now) const {
   return options_.on_divergence == OnDivergence::kReinitialize && diverged_at_ &&
          now - *diverged_at_ > options_.reinitialize_after;

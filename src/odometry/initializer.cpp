@@ -1,5 +1,6 @@
 #include "rio_t/odometry/initializer.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "rio_t/smoother/node_prior.h"
@@ -9,14 +10,25 @@ namespace rio_t {
 std::string toString(InitializedFrom from) { return from == InitializedFrom::kRest ? "rest" : "motion"; }
 
 Initializer::Initializer(const OdometryOptions& options)
-    : options_(options), rest_(options.initialization, options.gravity), motion_(options) {}
+    : options_(options),
+      rest_(options.initialization, options.gravity),
+      motion_(motionInitializers(options)) {}
+
+bool Initializer::isMoving(Time from, Time to) const {
+  const auto says = [&](bool moving) {
+    return std::any_of(motion_.begin(), motion_.end(), [&](const MotionInitializer& radar) {
+      return radar.isMoving(from, to, options_.rest.max_speed) == moving;
+    });
+  };
+  return says(true) && !says(false);
+}
 
 bool Initializer::mayStartInMotion() const {
   if (options_.init_mode != InitMode::kAuto) return options_.init_mode == InitMode::kMotion;
   // Not while a long init_duration is still under way at rest.
   return first_ && *newest_ - *first_ >= options_.init_motion_after &&
          (rest_.hasSeenMotion() || radar_contradicts_rest_ ||
-          motion_.isMoving(*newest_ - options_.init_motion_after, *newest_, options_.rest.max_speed));
+          isMoving(*newest_ - options_.init_motion_after, *newest_));
 }
 
 std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, const ImuBuffer& imu) {
@@ -26,9 +38,10 @@ std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, con
     const std::optional<StaticInitialization> rest = rest_.add(newest);
     // A smooth ride looks like rest to the IMU, and like motion to the radar.
     radar_contradicts_rest_ =
-        rest ? motion_.isMoving(rest->time - rest->duration, rest->time, options_.rest.max_speed)
+        rest ? isMoving(rest->time - rest->duration, rest->time)
              : radar_contradicts_rest_;
     if (rest && !radar_contradicts_rest_) {
+      const OdometryOptions of_first = optionsOfRadar(options_, 0);
       StateBlock x;
       x.q_WI() = rest->q_WI;
       x.b_g() = rest->b_g;
@@ -37,7 +50,8 @@ std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, con
       noise.accel_density = std::sqrt(noise.accelVariance(newest));
       noise.gyro_density = std::sqrt(noise.gyroVariance(newest));
       return Initialization{rest->time,
-                            priorAtRest(options_.smoother, noise, x, options_.gravity, rest->duration),
+                            priorAtRest(of_first.smoother, noise, x, options_.gravity, rest->duration, of_first.T_IR),
+                            0,
                             InitializedFrom::kRest,
                             {}};
     }
@@ -46,16 +60,19 @@ std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, con
   PoseAnchor origin;  // W begins here
   origin.sigma_yaw = options_.smoother.prior_sigma_yaw;
   origin.sigma_position = options_.smoother.prior_sigma_position;
-  const std::optional<MotionInitialization> motion = motion_.solve(imu, [&](Time) { return origin; });
-  if (!motion) return std::nullopt;
-  return Initialization{motion->time, motion->prior, InitializedFrom::kMotion, motion->model_error_scale};
+  for (std::size_t k = 0; k < motion_.size(); ++k) {
+    const auto found = motion_[k].solve(imu, [&](Time) { return origin; });
+    if (found)
+      return Initialization{found->time, found->prior, k, InitializedFrom::kMotion, found->model_error_scale};
+  }
+  return std::nullopt;
 }
 
 std::string Initializer::waitingFor() const {
-  if (options_.init_mode == InitMode::kMotion) return motion_.waitingFor();
+  if (options_.init_mode == InitMode::kMotion) return motion_.front().waitingFor();
   const std::string rest =
       rest_.waitingFor() + (radar_contradicts_rest_ ? " (what looked like it, moved by the radar)" : "");
-  return mayStartInMotion() ? rest + "; or " + motion_.waitingFor() : rest;
+  return mayStartInMotion() ? rest + "; or " + motion_.front().waitingFor() : rest;
 }
 
 }  // namespace rio_t

@@ -71,17 +71,17 @@ void MotionInitializer::add(Time stamp, const EgoVelocity& velocity) {
                                       [](const Velocity& z, Time t) { return z.stamp < t; });
   if (after != velocities_.end() && after->stamp == stamp) return;
   velocities_.insert(after,
-                     Velocity{{{stamp, T_IR_}, velocity.v_R, velocity.covariance}, velocity.told_variance});
+                     Velocity{{{stamp}, velocity.v_R, velocity.covariance}, velocity.told_variance});
   if (velocities_.size() > kMaxVelocities) velocities_.erase(velocities_.begin());
 }
 
-bool MotionInitializer::isMoving(Time from, Time to, double max_speed) const {
+std::optional<bool> MotionInitializer::isMoving(Time from, Time to, double max_speed) const {
   std::vector<double> axes[3];
   for (const Velocity& z : velocities_) {
     if (z.stamp < from || to < z.stamp) continue;
     for (int i = 0; i < 3; ++i) axes[i].push_back(z.v_R[i]);
   }
-  if (axes[0].empty()) return false;
+  if (axes[0].empty()) return std::nullopt;
   Eigen::Vector3d median;
   for (int i = 0; i < 3; ++i) {
     const auto middle = axes[i].begin() + static_cast<std::ptrdiff_t>(axes[i].size() / 2);
@@ -126,6 +126,11 @@ std::optional<MotionInitialization> MotionInitializer::solve(
     x.p_W() = anchor.p_W;
     x.v_W() = x.q_WI() * line.v_I;
     result.prior.t_O0 = smoother_.time_offset_initial;
+    result.prior.T_IR0 = T_IR_;
+    const Eigen::VectorXd calibration = calibrationSigmas(smoother_);
+    const Eigen::Index size = StateBlock::kTangent + calibration.size();
+    result.prior.J = Eigen::MatrixXd::Zero(size, size);
+    result.prior.r0 = Eigen::VectorXd::Zero(size);
     const auto set = [&](int first, double sigma) {
       result.prior.J.diagonal().segment<3>(first).setConstant(1.0 / sigma);
     };
@@ -135,7 +140,7 @@ std::optional<MotionInitialization> MotionInitializer::solve(
     set(StateBlock::kP, anchor.sigma_position);
     set(StateBlock::kBg, options_.sigma_gyro_bias);
     set(StateBlock::kBa, options_.sigma_accel_bias);
-    result.prior.J(StateBlock::kTangent, StateBlock::kTangent) = 1.0 / smoother_.time_offset_sigma;
+    result.prior.J.diagonal().tail(calibration.size()) = calibration.cwiseInverse();
     const NodePrior known = result.prior;
     for (int round = 0; round < kScaleRounds && (round == 0 || outliers <= options_.max_outlier_fraction);
          ++round) {
@@ -217,7 +222,16 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
   const std::shared_ptr<Block> offset =
       window.addCalibration(std::make_shared<ScalarManifold>(), Eigen::VectorXd::Constant(1, prior.t_O0));
   offset->bound = smoother_.max_time_offset;
-  addPrior(window, {&state, offset.get()}, {prior.J, prior.r0});
+  const EstimateExtrinsics estimate = smoother_.estimate_extrinsics;
+  const std::shared_ptr<Block> extrinsics =
+      window.addCalibration(std::make_shared<ExtrinsicsManifold>(estimate), stored(prior.T_IR0));
+  std::vector<Block*> blocks = {&state, offset.get()};
+  if (estimate == EstimateExtrinsics::kNone) {
+    window.setConstant(*extrinsics, true);
+  } else {
+    blocks.push_back(extrinsics.get());
+  }
+  addPrior(window, blocks, {prior.J, prior.r0});
   const std::shared_ptr<ceres::LossFunction> loss = huberLoss(smoother_.huber_threshold);
   const RadarMotionModel model{TimeOffsetModel::kImu, smoother_.max_time_offset, g_W_, &imu};
 
@@ -237,7 +251,7 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
       z.offset_gain = gains[i];
       if (gains[i] == 0.0) z.linear_from_t_O = offset->x[0];
       terms.push_back(
-          &window.add(std::make_unique<RadarVelocityFactor>(z, time, model), {&state, offset.get()}, loss));
+          &window.add(std::make_unique<RadarVelocityFactor>(z, time, model), {&state, offset.get(), extrinsics.get()}, loss));
     }
     try {
       solution = rio_t::solve(window, {kMaxIterations, kConverged * kConverged}, smoother_.solver);
@@ -251,16 +265,19 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
   double mean_square = 0.0;
   double mean_share = 0.0;
   for (std::size_t i = 0; i < velocities.size(); ++i) {
-    const double* blocks[] = {state.x.data(), offset->x.data()};
+    const double* values[] = {state.x.data(), offset->x.data(), extrinsics->x.data()};
     Eigen::Vector3d e;
-    terms[i]->cost->Evaluate(blocks, e.data(), nullptr);
+    terms[i]->cost->Evaluate(values, e.data(), nullptr);
     const CarriedCovariance covariance = carriedCovariance(velocities[i], time, imu, scale.value());
     const double square = std::min(e.squaredNorm(), kOutlier * kOutlier);
     if (e.norm() > kOutlier) outliers += 1.0 / n;
     mean_square += square / n;
     mean_share += covariance.whole.ldlt().solve(covariance.scaled).trace() / (3.0 * n);
   }
-  prior = nodePrior(eliminateFirst(solution.normal_equations, 0), toStateBlock(state.x), offset->x[0]);
+  const Information all = eliminateFirst(solution.normal_equations, 0);
+  const Eigen::Index size = prior.J.cols();  // without extrinsics that are constant
+  const SquareRoot root = squareRoot({all.S.topLeftCorner(size, size), all.s.head(size)});
+  prior = {toStateBlock(state.x), offset->x[0], toExtrinsics(extrinsics->x.data()), root.J, root.r0};
   // The solution is drawn towards the velocities: what is left scatters less.
   const double left = 3.0 * n / (3.0 * n - kUnknowns);
   for (std::size_t i = 0; i < velocities.size(); ++i) scale.add(time, left * mean_square, mean_share);
@@ -300,6 +317,12 @@ MotionInitializer::CarriedCovariance MotionInitializer::carriedCovariance(const 
   covariance.whole.diagonal().array() +=
       tilt * tilt * T * T * T / 3.0 + (told > measured ? 0.0 : measured * T);
   return covariance;
+}
+
+std::vector<MotionInitializer> motionInitializers(const OdometryOptions& options) {
+  std::vector<MotionInitializer> result;
+  for (std::size_t k = 0; k < options.radarCount(); ++k) result.emplace_back(optionsOfRadar(options, k));
+  return result;
 }
 
 }  // namespace rio_t

@@ -142,9 +142,13 @@ std::optional<RadarInertialOdometry::Start> RadarInertialOdometry::start() const
   return impl_->estimator.start();
 }
 
-PointVariances RadarInertialOdometry::radarNoise() const { return impl_->estimator.radarNoise(); }
+PointVariances RadarInertialOdometry::radarNoise(std::size_t radar) const {
+  return impl_->estimator.radar(radar).noise();
+}
 
-DopplerStep RadarInertialOdometry::radarDopplerStep() const { return impl_->estimator.radarDopplerStep(); }
+DopplerStep RadarInertialOdometry::radarDopplerStep(std::size_t radar) const {
+  return impl_->estimator.radar(radar).dopplerStep();
+}
 
 MeasuredImuNoise RadarInertialOdometry::imuNoise() const { return impl_->navigation.imuNoise(); }
 

@@ -9,23 +9,19 @@ constexpr double kUnanimousTime = 0.5;  // [s] of scans that are unanimous: one 
 
 }  // namespace
 
-bool InnovationGate::rejects(const Innovation& innovation, bool is_unanimous, bool tilt_is_known) {
+bool InnovationGate::rejects(const Innovation& innovation, bool is_unanimous, bool tilt_is_known,
+                             Time last_used) {
   const double gate = options_.innovation_gate;
   const Time stamp = innovation.stamp;
   if (gate == 0.0 || innovation.widened(options_.innovation_model_error).squaredSigmas() <= gate * gate)
     return false;
-  if (!tilt_is_known || std::abs(stamp - last_used_) > options_.innovation_gate_timeout) return false;
+  if (!tilt_is_known || std::abs(stamp - last_used) > options_.innovation_gate_timeout) return false;
   if (!is_unanimous) {
     unanimous_since_.reset();
   } else if (!unanimous_since_) {
     unanimous_since_ = stamp;
   }
   return !unanimous_since_ || std::abs(stamp - *unanimous_since_) < kUnanimousTime;
-}
-
-void InnovationGate::used(Time stamp) {
-  last_used_ = stamp;
-  unanimous_since_.reset();
 }
 
 }  // namespace rio_t

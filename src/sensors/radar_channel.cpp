@@ -49,23 +49,33 @@ VelocityPrior zeroVelocity(double sigma) {
 }  // namespace
 
 RadarChannel::RadarChannel(const RadarChannelOptions& options, const Eigen::Vector3d& g_W,
-                           const ImuBuffer& imu)
+                           const ImuBuffer& imu, std::shared_ptr<OffsetBlocks> offset)
     : options_(options),
       estimator_(options.ego_velocity),
-      in_window_(options.smoother, options.T_IR, g_W, imu),
+      in_window_(options.smoother, options.T_IR, g_W, imu,
+                 offset ? std::move(offset) : std::make_shared<OffsetBlocks>(options.smoother)),
       feasibility_(options.feasibility),
       step_detector_(options.offset_step_detector),
       offset_uncertainty_(options.smoother.huber_threshold),
       gate_(options.smoother) {}
 
 void RadarChannel::start(FixedLagSmoother& smoother, Time time, const NodePrior& prior) {
-  rio_t::start(smoother, in_window_, time, prior);
+  in_window_.start(smoother, time, prior);
+  forget();
+}
+
+void RadarChannel::join(FixedLagSmoother& smoother) {
+  in_window_.join(smoother);
+  forget();
+}
+
+void RadarChannel::forget() {
   step_detector_ = OffsetStepDetector(options_.offset_step_detector);
   offset_uncertainty_ = OffsetUncertainty(options_.smoother.huber_threshold);
   offset_evidence_ = OffsetEvidence();
   feasibility_ = FeasibilityCheck(options_.feasibility);
   pool_.clear();
-  gate_.used(time);
+  gate_.used();
 }
 
 RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context, FixedLagSmoother& smoother) {
@@ -84,7 +94,7 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   // An offset that is wrong by c shows as (J + noise) c; nothing else tells of the noise's part.
   const double rate_variance = informs_offset ? seen.prediction->rate_variance : 0.0;
   seen.velocity.covariance.diagonal().array() += rate_variance;
-  const RadarScanTime taken{scan.stamp, options_.T_IR, answer.offset_gain, offset()};
+  const RadarScanTime taken{scan.stamp, answer.offset_gain, offset()};
   if (isTightlyCoupled() && measured.status == EgoVelocityStatus::kMoving) {
     const std::vector<std::size_t> points = pointsOf(scan, seen);
     if (points.empty()) return reject("too_few_inliers");
@@ -107,13 +117,13 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
     offset_uncertainty_.offsetStepped();
     answer.offset_stepped = true;
   }
-  if (all && gate_.rejects(*all, isUnanimous(measured), seen.tilt_is_known)) return reject("innovation");
+  if (all && gate_.rejects(*all, isUnanimous(measured), seen.tilt_is_known, context.last_used)) return reject("innovation");
   const RadarInWindow::AddResult added =
       answer.doppler
           ? in_window_.add(smoother, *answer.doppler)
           : in_window_.add(smoother, RadarVelocityMeasurement{taken, measured.v_R, measured.covariance});
   if (added != RadarInWindow::AddResult::kAdded) return reject(toString(added));
-  gate_.used(scan.stamp);
+  gate_.used();
   if (can_be_judged && informs_offset) offset_uncertainty_.add(*own);
   // A borrowed point must not teach twice.
   if (!seen.is_own || (seen.has_borrowed && scan.stamp - learned_at_ <= ScanPool::kMaxAge)) return answer;
@@ -236,8 +246,17 @@ double RadarChannel::offsetSigma(double variance) const {
   return std::max(least, offset_uncertainty_.sigma(variance));
 }
 
-FixedLagSmoother::RandomWalk RadarChannel::offsetWalk() const {
-  return {&offsetBlock(), std::hypot(options_.smoother.time_offset_noise, offset_uncertainty_.walk())};
+std::vector<FixedLagSmoother::RandomWalk> RadarChannel::randomWalks() const {
+  const SmootherOptions& o = options_.smoother;
+  const std::vector<const Block*> blocks = calibration();
+  std::vector<FixedLagSmoother::RandomWalk> walks = {
+      {blocks[0], Eigen::VectorXd::Constant(1, std::hypot(o.time_offset_noise, offset_uncertainty_.walk()))}};
+  if (blocks.size() == 1) return walks;
+  Eigen::VectorXd densities(6);
+  densities << Eigen::Vector3d::Constant(o.extrinsics_rotation_noise),
+      Eigen::Vector3d::Constant(o.extrinsics_translation_noise);
+  walks.push_back({blocks[1], densities.head(blocks[1]->manifold->tangent())});
+  return walks;
 }
 
 }  // namespace rio_t

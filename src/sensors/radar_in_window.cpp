@@ -5,30 +5,52 @@
 #include <utility>
 
 #include "rio_t/core/so3.h"
-#include "rio_t/factors/constant_offset_factor.h"
 #include "rio_t/factors/offset_derivative.h"
 
 namespace rio_t {
 
 RadarInWindow::RadarInWindow(const SmootherOptions& options, const Extrinsics& T_IR,
-                             const Eigen::Vector3d& g_W, const ImuBuffer& imu)
+                             const Eigen::Vector3d& g_W, const ImuBuffer& imu,
+                             std::shared_ptr<OffsetBlocks> offset)
     : options_(options),
       T_IR_(T_IR),
       model_{options.time_offset_model, options.max_time_offset, g_W, &imu},
       loss_(huberLoss(options.huber_threshold)),
-      manifold_(std::make_shared<ScalarManifold>()) {}
+      extrinsics_manifold_(std::make_shared<ExtrinsicsManifold>(options.estimate_extrinsics)),
+      offset_(std::move(offset)) {}
 
-Block& RadarInWindow::start(Window& window, double t_O) {
+std::vector<Block*> RadarInWindow::addExtrinsics(Window& window, const Extrinsics& T_IR) {
   stamps_.clear();
-  epochs_ = {{Time(), addOffset(window, t_O)}};
-  return *epochs_.back().block;
+  extrinsics_ = window.addCalibration(extrinsics_manifold_, stored(T_IR));
+  if (options_.estimate_extrinsics != EstimateExtrinsics::kNone) return {extrinsics_.get()};
+  window.setConstant(*extrinsics_, true);
+  return {};
 }
 
-std::shared_ptr<Block> RadarInWindow::addOffset(Window& window, double t_O) const {
-  std::shared_ptr<Block> block = window.addCalibration(manifold_, Eigen::VectorXd::Constant(1, t_O));
-  block->bound = options_.max_time_offset;
-  if (!options_.estimate_time_offset) window.setConstant(*block, true);
-  return block;
+void RadarInWindow::start(FixedLagSmoother& smoother, Time time, const NodePrior& prior) {
+  Block& state = smoother.start(time, prior.x0);
+  std::vector<Block*> blocks = {&state, &offset_->start(smoother.window(), prior.t_O0)};
+  for (Block* block : addExtrinsics(smoother.window(), prior.T_IR0)) blocks.push_back(block);
+  addPrior(smoother.window(), blocks, {prior.J, prior.r0});
+  smoother.settle();
+}
+
+void RadarInWindow::join(FixedLagSmoother& smoother) {
+  Window& window = smoother.window();
+  std::vector<Block*> blocks;
+  if (!options_.time_offset_shared) blocks.push_back(&offset_->start(window, options_.time_offset_initial));
+  for (Block* block : addExtrinsics(window, T_IR_)) blocks.push_back(block);
+  Eigen::VectorXd sigmas = calibrationSigmas(options_);
+  if (options_.time_offset_shared) sigmas = sigmas.tail(sigmas.size() - 1).eval();
+  if (!blocks.empty())
+    addPrior(window, blocks, {sigmas.cwiseInverse().asDiagonal(), Eigen::VectorXd::Zero(sigmas.size())});
+  smoother.settle();
+}
+
+std::vector<const Block*> RadarInWindow::calibration() const {
+  std::vector<const Block*> blocks = {&offset_->newest()};
+  if (!extrinsics_->is_constant) blocks.push_back(extrinsics_.get());
+  return blocks;
 }
 
 Time RadarInWindow::nodeTime(Time stamp) const {
@@ -38,28 +60,34 @@ Time RadarInWindow::nodeTime(Time stamp) const {
 std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoother& smoother,
                                                               Time stamp) const {
   const Time time = nodeTime(stamp);
-  const std::optional<PredictedState> state = smoother.predict(time, {&offsetBlock()});
+  const std::optional<PredictedState> state = smoother.predict(time, calibration());
   if (!state) return std::nullopt;
-  const Eigen::Matrix3d R_RI = T_IR_.R_RI();
+  const Extrinsics T_IR = extrinsics();
+  const Eigen::Matrix3d R_RI = T_IR.R_RI();
   // Over a short time, whatever the noise: what an unknown offset may do must not be smoothed away.
   const ImuMean mean = model_.imu->mean(time, kOffsetHalfWidth);
-  const RadarMotion motion = model_.at(state->x.data(), time, stamp, offset(), T_IR_.l_I, &mean);
-  Eigen::Matrix<double, 3, kNodeTangent> J;
-  J << motion.J_state.leftCols<3>(), motion.J_state.rightCols<StateBlock::kTangent - 3>(), motion.dv_dt_O;
-  J = (R_RI * J).eval();
-  const NodeMatrix P = state->covariance;
+  const RadarMotion motion = model_.at(state->x.data(), time, stamp, offset(), T_IR.l_I, &mean);
   constexpr int kOffset = StateBlock::kTangent;
+  const Eigen::MatrixXd& P = state->covariance;
+  Eigen::Matrix<double, 3, Eigen::Dynamic> J(3, P.cols());
+  J.leftCols<kOffset>() << motion.J_state.leftCols<3>(), motion.J_state.rightCols<kOffset - 3>();
+  J.col(kOffset) = motion.dv_dt_O;
+  const Eigen::Index calibrated = P.cols() - (kOffset + 1);  // directions of the extrinsics
+  if (calibrated > 0) J.middleCols<3>(kOffset + 1) = so3::hat(motion.v_I);
+  if (calibrated > 3) J.rightCols<3>() = so3::hat(motion.omega_I);
+  J = (R_RI * J).eval();
 
   RadarVelocityPrediction prediction;
   prediction.t_O = offset();
   prediction.velocity.v_R = R_RI * motion.v_I;
   if (!options_.estimate_time_offset) J.col(kOffset).setZero();
   prediction.velocity.covariance = J * P * J.transpose();
-  const auto J_state = J.leftCols<kOffset>();
-  prediction.covariance_at_offset = J_state * P.topLeftCorner<kOffset, kOffset>() * J_state.transpose();
+  Eigen::Matrix<double, 3, Eigen::Dynamic> J_at_offset = J;
+  J_at_offset.col(kOffset).setZero();
+  prediction.covariance_at_offset = J_at_offset * P * J_at_offset.transpose();
   const Eigen::Quaterniond q_IW = state->x.q_WI().conjugate();
   const Eigen::Vector3d g_I = q_IW * model_.g_W;
-  prediction.dv_dt_O = offsetDerivative(*model_.imu, time, state->x, model_.g_W, T_IR_);
+  prediction.dv_dt_O = offsetDerivative(*model_.imu, time, state->x, model_.g_W, T_IR);
   Eigen::Matrix<double, 3, StateBlock::kTangent> J_rate =
       Eigen::Matrix<double, 3, StateBlock::kTangent>::Zero();
   J_rate.middleCols<3>(StateBlock::kTheta) = R_RI * so3::hat(g_I);
@@ -78,7 +106,8 @@ std::optional<Eigen::Vector3d> RadarInWindow::velocityAt(const FixedLagSmoother&
   const Time time = nodeTime(stamp);
   const std::optional<NodeEstimate> node = smoother.nodeBefore(time);
   if (!node) return std::nullopt;
-  return T_IR_.R_RI() * model_.at(node->x.data(), node->time, stamp, offset(), T_IR_.l_I, nullptr).v_I;
+  const Extrinsics T_IR = extrinsics();
+  return T_IR.R_RI() * model_.at(node->x.data(), node->time, stamp, offset(), T_IR.l_I, nullptr).v_I;
 }
 
 template <class Factor, class Measurement>
@@ -92,7 +121,7 @@ RadarInWindow::AddResult RadarInWindow::addTerm(FixedLagSmoother& smoother, cons
   if (node == nullptr) return AddResult::kOlderThanWindow;
   stamps_.push_back(z.stamp);
   smoother.window().add(std::make_unique<Factor>(z, *node->time, model_),
-                        {node, &offsetOf(smoother.window(), z.stamp)}, loss);
+                        {node, &offset_->of(smoother.window(), z.stamp), extrinsics_.get()}, loss);
   return AddResult::kAdded;
 }
 
@@ -102,25 +131,6 @@ RadarInWindow::AddResult RadarInWindow::add(FixedLagSmoother& smoother, const Ra
 
 RadarInWindow::AddResult RadarInWindow::add(FixedLagSmoother& smoother, const DopplerMeasurement& z) {
   return addTerm<DopplerFactor>(smoother, z, nullptr);  // its loss is in its rows
-}
-
-Block& RadarInWindow::offsetOf(Window& window, Time stamp) {
-  const auto is_gone = [&](const Epoch& epoch) { return !window.has(*epoch.block); };
-  epochs_.erase(std::remove_if(epochs_.begin(), epochs_.end() - 1, is_gone), epochs_.end() - 1);
-  auto epoch = epochs_.end() - 1;
-  while (epoch != epochs_.begin() && stamp < epoch->since) --epoch;
-  return *epoch->block;
-}
-
-void RadarInWindow::stepOffset(FixedLagSmoother& smoother, Time stamp) {
-  if (!options_.estimate_time_offset) return;
-  Window& window = smoother.window();
-  Block& before = *epochs_.back().block;
-  std::shared_ptr<Block> after = addOffset(window, offset());
-  window.add(std::make_unique<ConstantOffsetFactor>(options_.time_offset_sigma), {&before, after.get()});
-  before.is_retired = true;
-  epochs_.push_back({stamp, std::move(after)});
-  smoother.settle();
 }
 
 std::string toString(RadarInWindow::AddResult result) {
@@ -133,13 +143,6 @@ std::string toString(RadarInWindow::AddResult result) {
       return "duplicate_stamp";
   }
   return "";
-}
-
-void start(FixedLagSmoother& smoother, RadarInWindow& radar, Time time, const NodePrior& prior) {
-  Block& state = smoother.start(time, prior.x0);
-  Block& offset = radar.start(smoother.window(), prior.t_O0);
-  addPrior(smoother.window(), {&state, &offset}, {prior.J, prior.r0});
-  smoother.settle();
 }
 
 }  // namespace rio_t

@@ -5,6 +5,7 @@
 #include <memory>
 #include <numeric>
 #include <stdexcept>
+#include <unordered_map>
 #include <utility>
 
 #include "rio_t/factors/constant_offset_factor.h"
@@ -19,26 +20,36 @@ namespace {
 /// Squared length of the step that is left, in standard deviations, below which the solution stands.
 constexpr double kConverged = 1e-6;
 
-/// Of each node's state and t_O, which follow each other in the elimination.
-std::vector<NodeMatrix> nodeCovariances(const Elimination& elimination) {
-  const std::vector<std::map<int, Eigen::MatrixXd>> P = elimination.covariances();
-  std::vector<NodeMatrix> result;
-  for (int i = 0; i < static_cast<int>(P.size()); i += 2) {
-    const auto found = P[i].find(i + 1);  // none where the offset is known
-    const Eigen::MatrixXd cross =
-        found == P[i].end() ? Eigen::MatrixXd(NodeVector::Zero().head<15>()) : found->second;
-    NodeMatrix covariance;
-    covariance << P[i].at(i), cross, cross.transpose(), P[i + 1].at(i + 1);
-    result.push_back(covariance);
+/// Joint covariance of some blocks that the elimination connects.
+Eigen::MatrixXd jointCovariance(const std::vector<std::map<int, Eigen::MatrixXd>>& P,
+                                const std::vector<int>& blocks) {
+  Eigen::Index size = 0;
+  for (const int i : blocks) size += P[i].at(i).rows();
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(size, size);
+  Eigen::Index row = 0;
+  for (const int i : blocks) {
+    const Eigen::Index rows = P[i].at(i).rows();
+    Eigen::Index column = 0;
+    for (const int j : blocks) {
+      const Eigen::Index columns = P[j].at(j).rows();
+      const auto& from = P[std::min(i, j)];
+      const auto found = from.find(std::max(i, j));  // none where a block is known
+      if (found != from.end() && i <= j) {
+        result.block(row, column, rows, columns) = found->second;
+        result.block(column, row, columns, rows) = found->second.transpose();
+      }
+      column += columns;
+    }
+    row += rows;
   }
   return result;
 }
 
 }  // namespace
 
-std::size_t nearestNode(const std::vector<BatchNode>& nodes, Time time) {
+std::size_t nearestNode(const std::vector<NodeEstimate>& nodes, Time time) {
   const auto after = std::lower_bound(nodes.begin(), nodes.end(), time,
-                                      [](const BatchNode& node, Time t) { return node.time < t; });
+                                      [](const NodeEstimate& node, Time t) { return node.time < t; });
   const auto k = static_cast<std::size_t>(after - nodes.begin());
   if (k == 0) return k;
   return after == nodes.end() || time - nodes[k - 1].time < after->time - time ? k - 1 : k;
@@ -52,10 +63,52 @@ BatchSmoother::BatchSmoother(const SmootherOptions& options, const BatchOptions&
       g_W_(g_W),
       imu_(&imu),
       state_manifold_(std::make_shared<StateManifold>()),
-      offset_manifold_(std::make_shared<ScalarManifold>()) {}
+      offset_manifold_(std::make_shared<ScalarManifold>()),
+      extrinsics_manifold_(std::make_shared<ExtrinsicsManifold>(options.estimate_extrinsics)) {}
+
+std::vector<Block*> BatchSmoother::start(const BatchProblem& problem, const StateBlock& x,
+                                         const std::vector<Extrinsics>& mounting, Graph& graph) const {
+  Window& window = graph.window;
+  Block& state = window.addNode(problem.start, state_manifold_, stored(problem.prior.x0));
+  graph.nodes.push_back(&state);
+  const bool is_estimated = options_.estimate_extrinsics != EstimateExtrinsics::kNone;
+  const Eigen::VectorXd sigmas = calibrationSigmas(options_);
+  std::vector<Block*> offsets;
+  for (std::size_t k = 0; k < mounting.size(); ++k) {
+    const bool is_first = k == 0 || !options_.time_offset_shared;
+    const bool has_prior = k == problem.radar;
+    const double t_O = problem.time_offsets.empty() ? 0.0 : problem.time_offsets[k];
+    offsets.push_back(is_first ? &addOffset(window, problem.start, has_prior ? problem.prior.t_O0 : t_O)
+                               : offsets.front());
+  }
+  std::vector<Block*> known = {&state, offsets.at(problem.radar)};
+  for (std::size_t k = 0; k < mounting.size(); ++k) {
+    const bool has_prior = k == problem.radar;
+    // A prior holds around where it is made.
+    const Extrinsics& told = has_prior ? problem.prior.T_IR0 : problem.mounting[k];
+    Block& extrinsics = *window.addCalibration(extrinsics_manifold_, stored(told));
+    graph.extrinsics.push_back(&extrinsics);
+    if (!is_estimated) window.setConstant(extrinsics, true);
+    if (has_prior) {
+      if (is_estimated) known.push_back(&extrinsics);
+      continue;
+    }
+    const auto add = [&](Block& block, const Eigen::VectorXd& sigma) {
+      addPrior(window, {&block}, {sigma.cwiseInverse().asDiagonal(), Eigen::VectorXd::Zero(sigma.size())});
+    };
+    if (!options_.time_offset_shared) add(*offsets[k], sigmas.head<1>());
+    if (is_estimated) add(extrinsics, sigmas.tail(sigmas.size() - 1));
+  }
+  addPrior(window, known, {problem.prior.J, problem.prior.r0});
+  state.x = stored(x);
+  for (std::size_t k = 0; k < mounting.size(); ++k)
+    if (is_estimated) graph.extrinsics[k]->x = stored(mounting[k]);
+  return offsets;
+}
 
 BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std::vector<double>& t_O,
-                                          const std::vector<BatchNode>& guess) const {
+                                          const std::vector<NodeEstimate>& guess,
+                                          const std::vector<Extrinsics>& mounting) const {
   const std::size_t scans = problem.scans.size();
   std::vector<Time> times(scans);
   for (std::size_t i = 0; i < scans; ++i) {
@@ -67,63 +120,65 @@ BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return times[a] < times[b]; });
   const auto stateAt = [&](Time time) {
-    const BatchNode& near = guess[nearestNode(guess, time)];
+    const NodeEstimate& near = guess[nearestNode(guess, time)];
     return carried(near.x, near.time, time, *imu_, g_W_);
   };
 
   const std::shared_ptr<ceres::LossFunction> loss = huberLoss(options_.huber_threshold);
+  const double spacing = atMeasurement() ? kMinNodeSpacing : 0.0;
   Graph graph;
-  graph.node_of_scan.resize(scans);
+  graph.scans.resize(scans);
   Window& window = graph.window;
-  const double first_t_O =
-      !options_.estimate_time_offset || scans == 0 ? problem.prior.t_O0 : t_O[order.front()];
-  graph.nodes.push_back(addNode(window, {problem.start, problem.prior.x0, problem.prior.t_O0}));
-  addPrior(window, {graph.nodes[0].state, graph.nodes[0].offset}, {problem.prior.J, problem.prior.r0});
-  graph.nodes[0].state->x = stored(stateAt(problem.start));
-  graph.nodes[0].offset->x[0] = first_t_O;
+  // The newest of each radar.
+  std::vector<Block*> offsets = start(problem, stateAt(problem.start), mounting, graph);
   for (const std::size_t i : order) {
     const BatchScan& scan = problem.scans[i];
-    const Node previous = graph.nodes.back();
-    const Time previous_time = *previous.state->time;
-    const double dt = times[i] - previous_time;
-    if (dt > (atMeasurement() ? kMinNodeSpacing : 0.0)) {
-      const Node node = addNode(window, {times[i], stateAt(times[i]), t_O[i]});
-      const StateView x(previous.state->x.data());
+    Block* node = graph.nodes.back();
+    if (times[i] - *node->time > spacing) {
+      Block& previous = *node;
+      node = &window.addNode(times[i], state_manifold_, stored(stateAt(times[i])));
+      const StateView x(previous.x.data());
       window.add(std::make_unique<ImuFactor>(
-                     preintegrate(*imu_, previous_time, times[i], x.b_g, x.b_a, noise_), noise_, g_W_),
-                 {previous.state, node.state});
+                     preintegrate(*imu_, *previous.time, times[i], x.b_g, x.b_a, noise_), noise_, g_W_),
+                 {&previous, node});
+      graph.nodes.push_back(node);
+    }
+    Block*& offset = offsets[options_.time_offset_shared ? 0 : scan.radar];
+    if (options_.estimate_time_offset && *offset->time == problem.start) offset->x[0] = t_O[i];
+    const double dt = *node->time - *offset->time;
+    if (dt > 0.0) {
+      Block& previous = *offset;
+      offset = &addOffset(window, *node->time, t_O[i]);
       window.add(std::make_unique<ConstantOffsetFactor>(scan.offset_stepped
                                                             ? options_.time_offset_sigma
                                                             : options_.time_offset_noise * std::sqrt(dt)),
-                 {previous.offset, node.offset});
-      graph.nodes.push_back(node);
+                 {&previous, offset});
     }
-    const Node& node = graph.nodes.back();
-    graph.node_of_scan[i] = graph.nodes.size() - 1;
+    Block* extrinsics = graph.extrinsics[scan.radar];
+    graph.scans[i] = {graph.nodes.size() - 1, offset, extrinsics};
     // Placed anew where the offset moves, so first order is enough.
     const auto placed = [&](auto z) {
       if (atMeasurement() || z.offset_gain == 0.0) z.linear_from_t_O = t_O[i];
       return z;
     };
     if (scan.doppler) {
-      window.add(std::make_unique<DopplerFactor>(placed(*scan.doppler), *node.state->time, model()),
-                 {node.state, node.offset});
+      window.add(std::make_unique<DopplerFactor>(placed(*scan.doppler), *node->time, model()),
+                 {node, offset, extrinsics});
     } else if (scan.velocity) {
-      window.add(std::make_unique<RadarVelocityFactor>(placed(*scan.velocity), *node.state->time, model()),
-                 {node.state, node.offset}, loss);
+      window.add(std::make_unique<RadarVelocityFactor>(placed(*scan.velocity), *node->time, model()),
+                 {node, offset, extrinsics}, loss);
     }
     if (scan.rest_velocity_sigma)
-      window.add(std::make_unique<ZeroVelocityFactor>(*scan.rest_velocity_sigma), {node.state});
+      window.add(std::make_unique<ZeroVelocityFactor>(*scan.rest_velocity_sigma), {node});
   }
   return graph;
 }
 
-BatchSmoother::Node BatchSmoother::addNode(Window& window, const BatchNode& node) const {
-  Block& state = window.addNode(node.time, state_manifold_, stored(node.x));
-  Block& offset = window.addNode(node.time, offset_manifold_, Eigen::VectorXd::Constant(1, node.t_O));
+Block& BatchSmoother::addOffset(Window& window, Time time, double t_O) const {
+  Block& offset = window.addNode(time, offset_manifold_, Eigen::VectorXd::Constant(1, t_O));
   offset.bound = options_.max_time_offset;
   if (!options_.estimate_time_offset) window.setConstant(offset, true);
-  return {&state, &offset};
+  return offset;
 }
 
 RadarMotionModel BatchSmoother::model() const {
@@ -136,52 +191,75 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
   for (const BatchScan& scan : problem.scans) t_O.push_back(scan.t_O);
 
   BatchSolution solution;
-  Graph graph = place(problem, t_O, problem.guess);
+  Graph graph = place(problem, t_O, problem.guess, problem.mounting);
   solution.placements = 1;
   for (;;) {
     Solution solved = rio_t::solve(graph.window, {batch_.max_iterations - solution.iterations, kConverged},
                                    options_.solver);
     solution.iterations += solved.iterations;
     solution.nodes.clear();
-    for (const Node& node : graph.nodes) solution.nodes.push_back(node.estimate());
+    for (const Block* node : graph.nodes) solution.nodes.push_back({*node->time, toStateBlock(node->x)});
+    solution.extrinsics.clear();
+    for (const Block* block : graph.extrinsics)
+      solution.extrinsics.push_back(toExtrinsics(block->x.data()));
     double moved = 0.0;  // [s]
     for (std::size_t i = 0; i < t_O.size(); ++i)
-      moved = std::max(moved, std::abs(solution.nodes[graph.node_of_scan[i]].t_O - t_O[i]));
+      moved = std::max(moved, std::abs(graph.scans[i].offset->x[0] - t_O[i]));
     const bool placed = !atMeasurement() || moved <= batch_.placement_tolerance;
     const bool is_last = placed || solution.iterations >= batch_.max_iterations;
     if (is_last) {
       solution.termination =
           placed || !solved.converged() ? solved.termination : SolverTermination::kIterationLimit;
-      solution.covariances = nodeCovariances(solved.elimination);
+      read(graph, solved, solution);
       solution.normal_equations = std::move(solved.normal_equations);
-      break;
+      return solution;
     }
-    for (std::size_t i = 0; i < t_O.size(); ++i) t_O[i] = solution.nodes[graph.node_of_scan[i]].t_O;
-    graph = place(problem, t_O, solution.nodes);
+    for (std::size_t i = 0; i < t_O.size(); ++i) t_O[i] = graph.scans[i].offset->x[0];
+    graph = place(problem, t_O, solution.nodes, solution.extrinsics);
     ++solution.placements;
   }
-  solution.node_of_scan = std::move(graph.node_of_scan);
-  return solution;
 }
 
-BatchSmoother::Residual BatchSmoother::residual(const BatchNode& node, const NodeMatrix& covariance,
+void BatchSmoother::read(const Graph& graph, const Solution& solved, BatchSolution& solution) const {
+  const std::vector<std::map<int, Eigen::MatrixXd>> P = solved.elimination.covariances();
+  std::unordered_map<const Block*, int> index;
+  for (const Block* block : solved.normal_equations.blocks) index.emplace(block, static_cast<int>(index.size()));
+  for (const Block* node : graph.nodes) solution.covariances.emplace_back(P[index.at(node)].at(index.at(node)));
+  for (const Graph::Scan& scan : graph.scans) {
+    std::vector<int> blocks = {index.at(graph.nodes[scan.node]), index.at(scan.offset)};
+    if (!scan.extrinsics->is_constant) blocks.push_back(index.at(scan.extrinsics));
+    solution.scans.push_back({scan.node, scan.offset->x[0], jointCovariance(P, blocks)});
+  }
+  for (const Block* block : graph.extrinsics)
+    solution.extrinsics_covariances.push_back(block->is_constant ? Eigen::MatrixXd()
+                                                                 : P[index.at(block)].at(index.at(block)));
+}
+
+BatchSmoother::Residual BatchSmoother::residual(const BatchSolution& solution,
+                                                const BatchSolution::Scan& scan, std::size_t radar,
                                                 const RadarVelocityMeasurement& z) const {
   RadarVelocityMeasurement unit = z;
   unit.covariance.setIdentity();
   unit.linear_from_t_O.reset();
   unit.offset_gain = 1.0;
+  const NodeEstimate& node = solution.nodes[scan.node];
   // The paper's factor stands at the stamp itself.
   const StateBlock x = atMeasurement() ? node.x : carried(node.x, node.time, z.stamp, *imu_, g_W_);
-  const double* blocks[] = {x.data(), &node.t_O};
+  const Eigen::VectorXd extrinsics = stored(solution.extrinsics[radar]);
+  const double* blocks[] = {x.data(), &scan.t_O, extrinsics.data()};
   StateJacobian<3> J_x;
-  Residual result;
+  ExtrinsicsJacobian<3> J_e;
   Eigen::Vector3d J_t;
-  double* jacobians[] = {J_x.data(), J_t.data()};
+  Residual result;
+  double* jacobians[] = {J_x.data(), J_t.data(), J_e.data()};
   RadarVelocityFactor(unit, node.time, model()).Evaluate(blocks, result.value.data(), jacobians);
-  Eigen::Matrix<double, 3, kNodeTangent> J;
-  J << J_x.leftCols<3>(), J_x.rightCols<StateBlock::kTangent - 3>(), J_t;
-  if (!options_.estimate_time_offset) J.rightCols<1>().setZero();
-  result.prediction_covariance = J * covariance * J.transpose();
+  if (!options_.estimate_time_offset) J_t.setZero();
+  constexpr int kState = StateBlock::kTangent;
+  Eigen::Matrix<double, 3, Eigen::Dynamic> J(3, scan.covariance.cols());
+  J.leftCols<kState + 1>() << J_x.leftCols<3>(), J_x.rightCols<kState - 3>(), J_t;
+  for (Eigen::Index i = kState + 1; i < J.cols(); ++i)
+    J.col(i) = J_e.col(extrinsics_manifold_->columns()[static_cast<std::size_t>(i - kState - 1)]);
+  result.prediction_covariance = J * scan.covariance * J.transpose();
   return result;
 }
 

@@ -6,15 +6,21 @@
 
 namespace rio_t {
 
-NodePrior nodePrior(const Information& information, const StateBlock& x0, double t_O0) {
-  const SquareRoot root = squareRoot(information);
-  return {x0, t_O0, root.J, root.r0};
+Eigen::VectorXd calibrationSigmas(const SmootherOptions& options) {
+  Eigen::VectorXd sigmas(7);
+  sigmas << options.time_offset_sigma, Eigen::Vector3d::Constant(options.extrinsics_rotation_sigma),
+      Eigen::Vector3d::Constant(options.extrinsics_translation_sigma);
+  if (options.estimate_extrinsics == EstimateExtrinsics::kNone) return sigmas.head<1>();
+  if (options.estimate_extrinsics == EstimateExtrinsics::kRotation) return sigmas.head<4>();
+  return sigmas;
 }
 
 NodePrior priorAtRest(const SmootherOptions& options, const ImuNoise& noise, const StateBlock& x,
-                      double gravity, double duration) {
+                      double gravity, double duration, const Extrinsics& T_IR) {
   using S = StateBlock;
-  Information known{NodeMatrix::Zero(), NodeVector::Zero()};
+  const Eigen::VectorXd calibration = calibrationSigmas(options);
+  const Eigen::Index size = S::kTangent + calibration.size();
+  Information known{Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size)};
   const auto add = [&](const Eigen::MatrixXd& rows, int first, double sigma) {
     known.S.block(first, first, rows.cols(), rows.cols()) += rows.transpose() * rows / (sigma * sigma);
   };
@@ -29,7 +35,7 @@ NodePrior priorAtRest(const SmootherOptions& options, const ImuNoise& noise, con
   const double root_T = std::sqrt(duration);
   addVector(S::kBg, std::hypot(options.prior_sigma_gyro_bias, noise.gyro_density / root_T));
   addVector(S::kBa, options.prior_sigma_accel_bias);
-  known.S(S::kTangent, S::kTangent) = 1.0 / (options.time_offset_sigma * options.time_offset_sigma);
+  known.S.diagonal().tail(calibration.size()) = calibration.cwiseAbs2().cwiseInverse();
 
   // The mean accelerometer, R_IW (0, 0, g) + b_a: also the platform may have gained velocity meanwhile.
   const double gained = std::sqrt(2.0) * options.prior_sigma_velocity / duration;
@@ -38,7 +44,8 @@ NodePrior priorAtRest(const SmootherOptions& options, const ImuNoise& noise, con
   J.middleCols<3>(S::kTheta) = so3::hat(gravity * R_WI.row(2).transpose());
   J.middleCols<3>(S::kBa).setIdentity();
   add(J, 0, sigma);
-  return nodePrior(known, x, options.time_offset_initial);
+  const SquareRoot root = squareRoot(known);
+  return {x, options.time_offset_initial, T_IR, root.J, root.r0};
 }
 
 }  // namespace rio_t

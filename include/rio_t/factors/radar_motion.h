@@ -21,6 +21,7 @@ struct RadarMotion {
   StateJacobian<3> J_state = StateJacobian<3>::Zero();  ///< of v_I
   Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();    ///< of v_I [m/s^2]
   Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();    ///< angular velocity of I, in I [rad/s]
+  Eigen::Vector3d alpha_I = Eigen::Vector3d::Zero();    ///< angular acceleration in dv_dt_O, in I [rad/s^2]
 };
 
 /// Carries the motion from a state to the time of measurement, tau = stamp - t_O (docs/method.md, section 5).

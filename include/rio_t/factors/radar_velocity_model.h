@@ -4,16 +4,15 @@
 #include <optional>
 
 #include "rio_t/core/time.h"
+#include "rio_t/factors/extrinsics_manifold.h"
 #include "rio_t/factors/radar_motion.h"
 #include "rio_t/factors/state_block.h"
-#include "rio_t/radar/extrinsics.h"
 
 namespace rio_t {
 
-/// When and where a scan was taken.
+/// When a scan was taken.
 struct RadarScanTime {
   Time stamp;  ///< measured at stamp - t_O
-  Extrinsics T_IR;
   /// Share of the derivative with respect to t_O that is motion and not noise of the IMU, see OffsetEvidence.
   double offset_gain = 1.0;
   /// If set, the motion is taken at this t_O [s], and to first order from there. Exactly at each t_O, the
@@ -27,6 +26,7 @@ struct PredictedVelocity {
   Eigen::Vector3d v_R;                                ///< [m/s]
   StateJacobian<3> J_state;                           ///< as StateBlock stores it
   Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();  ///< zero if the scan does not tell the offset [m/s^2]
+  ExtrinsicsJacobian<3> J_extrinsics;                 ///< as ExtrinsicsBlock stores it
 };
 
 /// RadarMotionModel as the factors of one scan use it. Not for two threads: it keeps the last mean of the
@@ -36,7 +36,7 @@ class RadarVelocityModel {
   RadarVelocityModel(const RadarScanTime& scan, Time state_time, const RadarMotionModel& model)
       : scan_(scan), state_time_(state_time), model_(model) {}
 
-  /// `parameters`: state at `state_time`, t_O. Without `derivatives` only v_R is set.
+  /// `parameters`: state at `state_time`, t_O, extrinsics. Without `derivatives` only v_R is set.
   PredictedVelocity at(double const* const* parameters, bool derivatives) const;
 
  private:

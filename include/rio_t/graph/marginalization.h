@@ -30,7 +30,7 @@ Term& addPrior(Window& window, const std::vector<Block*>& blocks, const SquareRo
 /// Random walk of a calibration block. It lowers the information that the prior has about the block.
 struct Walk {
   const Block* block;
-  double variance;  ///< that the block gains, per direction of its tangent
+  Eigen::VectorXd variance;  ///< that the block gains, per direction of its tangent
 };
 /// Removes `leaving` and the terms on them from the window. One prior on the neighbours of `leaving` keeps
 /// what these terms said.

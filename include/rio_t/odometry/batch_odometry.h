@@ -55,13 +55,15 @@ class BatchOdometry {
   Run makeRun(const RadarInertialOdometry::Start& start) const;
   /// Adds the scans that the batch does not reject, and returns their number.
   std::size_t readmit(const BatchSmoother& smoother, const BatchSolution& solution, Run& run) const;
-  /// The node that a velocity belongs to, if the solution does not reject it.
-  std::optional<BatchNode> acceptedBy(const BatchSmoother& smoother, const BatchSolution& solution,
-                                      const RadarVelocityMeasurement& z) const;
+  /// The scan of the same radar that is the nearest to a velocity, if the solution does not reject the velocity;
+  /// else null.
+  const BatchSolution::Scan* acceptedBy(const BatchSmoother& smoother, const Run& run,
+                                        const BatchSolution& solution, std::size_t radar,
+                                        const RadarVelocityMeasurement& z) const;
   /// Sets what the scan gives to the graph, near `node`.
-  void setMeasurement(const ScanResult& result, const BatchNode& node, BatchScan& scan) const;
-  bool isAtRest(const BatchNode& node) const;
-  NavigationState stateOf(const BatchNode& node, const NodeMatrix& covariance) const;
+  void setMeasurement(const ScanResult& result, const NodeEstimate& node, BatchScan& scan) const;
+  bool isAtRest(const NodeEstimate& node) const;
+  NavigationState stateOf(const NodeEstimate& node, const StateCovariance& covariance) const;
   std::vector<NavigationState> trajectory(const BatchSolution& solution) const;
   std::vector<ScanResult> results(const Run& run, const BatchSolution& solution) const;
 

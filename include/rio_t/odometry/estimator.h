@@ -7,13 +7,13 @@
 
 #include "rio_t/imu/buffer.h"
 #include "rio_t/odometry/fault_counters.h"
-#include "rio_t/odometry/health_monitor.h"
 #include "rio_t/odometry/initializer.h"
 #include "rio_t/odometry/model_error_scale.h"
 #include "rio_t/odometry/motion_initializer.h"
 #include "rio_t/odometry/navigation.h"
 #include "rio_t/odometry/options.h"
 #include "rio_t/odometry/pose_doubt.h"
+#include "rio_t/odometry/radars_health.h"
 #include "rio_t/odometry/scan_result.h"
 #include "rio_t/odometry/yaw_doubt.h"
 #include "rio_t/sensors/radar_channel.h"
@@ -48,17 +48,17 @@ class Estimator {
   bool initialized() const { return smoother_.started(); }
   const std::string& waitingFor() const { return waiting_for_; }  ///< while not initialised, for people
   const std::optional<Initialization>& start() const { return start_; }
-  PointVariances radarNoise() const { return radars_.front().noise(); }
-  DopplerStep radarDopplerStep() const { return radars_.front().dopplerStep(); }
+  const RadarChannel& radar(std::size_t radar) const { return radars_.at(radar); }
 
  private:
   /// Empty, or why the scan of a node at that time cannot be used now.
   std::string whyNotNow(Time node_time, bool imu_has_ended) const;
   void tryInitialize(const ImuMeasurement& sample);
-  void begin(Time time, const NodePrior& prior);
+  /// Starts a window with the prior, which knows the calibration of `radar`.
+  void begin(Time time, const NodePrior& prior, std::size_t radar);
   bool tryReinitialize(std::vector<StampedPose>& left);
   PoseAnchor anchorAt(Time time) const;
-  void judge(const RadarAnswer& answer, Time stamp);
+  void judge(const RadarAnswer& answer, const RadarScan& scan);
   void updateWindow(const RadarChannel& radar, ScanResult& result);
   void publishNewest() { anchor(newestState(smoother_.newestCovariance({})), false); }
   void anchor(const NavigationState& state, bool at_rest);
@@ -75,17 +75,18 @@ class Estimator {
 
   ImuBuffer imu_;
   Initializer initializer_;
-  MotionInitializer recovery_;  ///< starts again after a divergence
+  std::vector<MotionInitializer> recovery_;  ///< by radar; start again after a divergence
   FixedLagSmoother smoother_;
-  std::vector<RadarChannel> radars_;  ///< by RadarScan::radar; one today
+  std::vector<RadarChannel> radars_;  ///< by RadarScan::radar
   ModelErrorScale model_error_scale_;
-  HealthMonitor health_;
+  RadarsHealth health_;
   PoseDoubt pose_doubt_;
   YawDoubt yaw_doubt_;
 
   std::optional<Initialization> start_;
   std::string waiting_for_;
   Time initialized_at_;
+  Time last_used_;  ///< stamp of the last scan that went into the window
   std::vector<StampedPose> left_in_silence_;  ///< left while the radar was silent; for the next result
   std::uint64_t clock_restarts_ = 0;
   std::optional<Time> radar_heard_;  ///< time of the IMU when the last scan came

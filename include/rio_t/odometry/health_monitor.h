@@ -36,7 +36,7 @@ struct HealthOptions {
   double coasting_after = 1.0;      ///< [s]
 };
 
-/// Judges the estimate by its innovations (docs/method.md, section 12). Not thread-safe.
+/// Judges the estimate by the innovations of one radar (docs/method.md, section 12). Not thread-safe.
 class HealthMonitor {
  public:
   /// `gate` [sigma]: a scan as far as this from the prediction contradicts it fully; 0: 4.
@@ -62,6 +62,8 @@ class HealthMonitor {
   /// models are wrong by five of their sigmas for a whole window, the input is not what the options say.
   Health judge(Time now, const NavigationState& state, double model_error_scale = 1.0);
   Health health() const { return health_; }
+  /// Whether a scan came within the window before `now`.
+  bool hears(Time now) const;
   /// Whether the divergence has lasted long enough for a re-initialisation.
   bool wantsReinitialization(Time now) const;
 

@@ -53,6 +53,7 @@ struct MotionInitialization {
 /// smoother must not use the same scans again. Not thread-safe.
 class MotionInitializer {
  public:
+  /// `options`: as this radar has them, see optionsOfRadar.
   explicit MotionInitializer(const OdometryOptions& options);
 
   /// Velocity of one scan, estimated without a prior. Invalid ones are ignored.
@@ -64,8 +65,8 @@ class MotionInitializer {
                                             const std::function<PoseAnchor(Time)>& anchor);
   void clear();
   /// Whether the scans stamped within [from, to], by the median of each axis, show a speed above `max_speed`
-  /// [m/s]. False without scans.
-  bool isMoving(Time from, Time to, double max_speed) const;
+  /// [m/s]. None without scans.
+  std::optional<bool> isMoving(Time from, Time to, double max_speed) const;
 
   /// Tells people what the start is waiting for.
   const std::string& waitingFor() const { return waiting_for_; }
@@ -111,5 +112,8 @@ class MotionInitializer {
   std::optional<Time> tried_at_;
   std::string waiting_for_ = "the first radar velocity";
 };
+
+/// One for each radar.
+std::vector<MotionInitializer> motionInitializers(const OdometryOptions& options);
 
 }  // namespace rio_t

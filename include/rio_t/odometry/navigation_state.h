@@ -8,10 +8,6 @@
 
 namespace rio_t {
 
-/// Covariance of the error state, in the order theta (right perturbation of R_WI, so in I), p_W, v_W, b_g,
-/// b_a.
-using StateCovariance = Eigen::Matrix<double, 15, 15>;
-
 /// State of the platform as published at IMU rate.
 struct NavigationState {
   Time time;

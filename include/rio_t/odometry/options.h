@@ -1,5 +1,8 @@
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "rio_t/imu/input_check.h"
 #include "rio_t/imu/noise.h"
 #include "rio_t/imu/rest_detector.h"
@@ -19,6 +22,15 @@ enum class InitMode {
   kStatic,  ///< "static": wait for rest, however long
   kMotion,  ///< "motion": from radar velocities and IMU at once, moving or not
   kAuto,    ///< "auto": from rest; as kMotion after `init_motion_after` without rest
+};
+
+/// What is particular to one of several radars.
+struct RadarOptions {
+  std::string name;  ///< in messages and outputs
+  Extrinsics T_IR;
+  EgoVelocityOptions ego_velocity;
+  double time_offset_initial = 0.0;  ///< [s]
+  double time_offset_sigma = 0.075;  ///< [s] prior
 };
 
 /// All options of the estimator. The defaults suit an ADIS16448 and a TI IWR6843AOP.
@@ -41,6 +53,13 @@ struct OdometryOptions {
   ImuInputCheckOptions imu_input_check;
   double max_radar_gap = 0.5;         ///< [s] without a scan; a longer gap is counted
   std::size_t max_queued_scans = 50;  ///< scans that may wait for the IMU or the solver
+
+  /// Several radars, by RadarScan::radar. Empty: one, with the members above.
+  std::vector<RadarOptions> radars;
+  std::size_t radarCount() const { return radars.empty() ? 1 : radars.size(); }
 };
+
+/// The options as one radar has them: without `radars`, and with what is particular to that radar.
+OdometryOptions optionsOfRadar(const OdometryOptions& options, std::size_t radar);
 
 }  // namespace rio_t

@@ -53,10 +53,10 @@ class RadarInertialOdometry {
   /// `process`.
   using Start = Initialization;
   std::optional<Start> start() const;
-  /// Noise of the radar's points, as learned so far. Call it from the thread that calls `process`.
-  PointVariances radarNoise() const;
-  /// Step of the radar's Doppler, as known so far. Call it from the thread that calls `process`.
-  DopplerStep radarDopplerStep() const;
+  /// Noise of a radar's points, as learned so far. Call it from the thread that calls `process`.
+  PointVariances radarNoise(std::size_t radar = 0) const;
+  /// Step of a radar's Doppler, as known so far. Call it from the thread that calls `process`.
+  DopplerStep radarDopplerStep(std::size_t radar = 0) const;
   /// Noise of the IMU, measured over the last second. Any thread.
   MeasuredImuNoise imuNoise() const;
   /// While not initialised: what the start is waiting for, as text for people.

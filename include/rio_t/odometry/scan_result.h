@@ -31,6 +31,10 @@ struct ScanResult {
   NavigationState state;
   double time_offset = 0.0;        ///< t_O [s]
   double time_offset_sigma = 0.0;  ///< [s]
+  Extrinsics T_IR;                 ///< of this radar
+  /// Covariance of T_IR, if it is estimated; zero if not. Translation of the radar in I [m], then turn about
+  /// the axes of I [rad]: the order of ROS.
+  Eigen::Matrix<double, 6, 6> T_IR_covariance = Eigen::Matrix<double, 6, 6>::Zero();
   int solver_iterations = 0;
   SolverTermination solver_termination = SolverTermination::kIterationLimit;
   Health health = Health::kOk;           ///< after this scan; set always

@@ -16,15 +16,14 @@ class InnovationGate {
   explicit InnovationGate(const SmootherOptions& options) : options_(options) {}
 
   /// Whether to reject a scan. The gate is open if `tilt_is_known` is false (the prediction is not linear in
-  /// roll and pitch), after `innovation_gate_timeout` without a used scan, and after half a second of
-  /// unanimous scans (nearly all points of each agree).
-  bool rejects(const Innovation& innovation, bool is_unanimous, bool tilt_is_known);
-  /// The scan with this stamp was used.
-  void used(Time stamp);
+  /// roll and pitch), `innovation_gate_timeout` after the scan stamped `last_used` was used, whatever radar
+  /// it is from, and after half a second of unanimous scans (nearly all points of each agree).
+  bool rejects(const Innovation& innovation, bool is_unanimous, bool tilt_is_known, Time last_used);
+  /// The scan was used.
+  void used() { unanimous_since_.reset(); }
 
  private:
   SmootherOptions options_;  // read-only after construction
-  Time last_used_;
   std::optional<Time> unanimous_since_;  ///< first stamp of the run of unanimous rejected scans
 };
 

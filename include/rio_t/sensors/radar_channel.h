@@ -29,6 +29,7 @@ struct ScanContext {
   bool at_rest = false;            ///< the IMU shows no motion at the time of measurement
   bool has_diverged = false;       ///< the prediction cannot be trusted
   double model_error_scale = 1.0;  ///< see ModelErrorScale
+  Time last_used;                  ///< stamp of the last scan that any radar gave to the window
 };
 
 /// The channel's answer to a scan. All else that reports a scan reads this value.
@@ -70,27 +71,36 @@ struct RadarAnswer {
 class RadarChannel {
  public:
   /// `imu` must outlive the channel.
-  RadarChannel(const RadarChannelOptions& options, const Eigen::Vector3d& g_W, const ImuBuffer& imu);
+  /// `offset`: null, or what the radars that share t_O have in common.
+  RadarChannel(const RadarChannelOptions& options, const Eigen::Vector3d& g_W, const ImuBuffer& imu,
+               std::shared_ptr<OffsetBlocks> offset);
 
   /// Takes what a scan shows of the radar itself. Once per scan, first of all.
   void observe(const RadarScan& scan) { estimator_.observe(scan); }
   /// Velocity of a scan from its points alone, for the time before there is a state.
   EgoVelocity velocityOf(const RadarScan& scan) const { return estimator_.estimate(scan); }
-  /// Starts a window at `time` with the first node and the first offset.
+  /// Starts a window at `time` with the first node and the calibration of this radar.
   void start(FixedLagSmoother& smoother, Time time, const NodePrior& prior);
+  /// Joins a window that another radar has started.
+  void join(FixedLagSmoother& smoother);
   /// Decides about a scan and, if it is used, adds its term to the window.
   RadarAnswer use(const RadarScan& scan, const ScanContext& context, FixedLagSmoother& smoother);
 
   Time nodeTime(Time stamp) const { return in_window_.nodeTime(stamp); }
   double offset() const { return in_window_.offset(); }  ///< t_O [s]
-  const Block& offsetBlock() const { return in_window_.offsetBlock(); }
+  Extrinsics extrinsics() const { return in_window_.extrinsics(); }
+  /// The blocks that are estimated: t_O, which is always there, and the extrinsics.
+  std::vector<const Block*> calibration() const { return in_window_.calibration(); }
   /// [s] given the marginal variance [s^2]; 0 if the offset is not estimated.
   double offsetSigma(double variance) const;
-  FixedLagSmoother::RandomWalk offsetWalk() const;
+  /// Of the blocks that calibration() gives.
+  std::vector<FixedLagSmoother::RandomWalk> randomWalks() const;
   const PointVariances& noise() const { return estimator_.noise(); }  ///< of the points, as learned so far
   DopplerStep dopplerStep() const { return estimator_.dopplerStep(); }
 
  private:
+  /// Forgets what an earlier window has shown.
+  void forget();
   /// What a scan shows, before anything is decided.
   struct Seen {
     std::optional<RadarVelocityPrediction> prediction;

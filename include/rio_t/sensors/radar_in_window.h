@@ -10,6 +10,7 @@
 #include "rio_t/factors/radar_velocity_factor.h"
 #include "rio_t/radar/ego_velocity.h"
 #include "rio_t/radar/extrinsics.h"
+#include "rio_t/sensors/offset_blocks.h"
 #include "rio_t/sensors/offset_evidence.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
 #include "rio_t/smoother/node_prior.h"
@@ -29,21 +30,20 @@ struct RadarVelocityPrediction {
   double tilt_sigma = 0.0;  ///< of roll and pitch, the larger [rad]
 };
 
-/// One radar in the window of the smoother: its time offset t_O as a calibration block, and its terms.
-///
-/// The paper has one t_O per node and a factor that keeps it constant (eq. 8-10). One block whose prior fades
-/// by the random walk says the same with fewer unknowns (docs/method.md, section 6.2). After a step of the
-/// offset, a new block takes over. Not thread-safe.
+/// One radar in the window of the smoother: its calibration blocks, t_O and extrinsics, and its terms. Not
+/// thread-safe.
 class RadarInWindow {
  public:
   enum class AddResult { kAdded, kOlderThanWindow, kDuplicateStamp };
 
-  /// `imu` must outlive it.
+  /// `T_IR` is the mounting as told. `offset` is shared by the radars that share t_O. `imu` must outlive it.
   RadarInWindow(const SmootherOptions& options, const Extrinsics& T_IR, const Eigen::Vector3d& g_W,
-                const ImuBuffer& imu);
+                const ImuBuffer& imu, std::shared_ptr<OffsetBlocks> offset);
 
-  /// Adds the first offset block to a window that starts.
-  Block& start(Window& window, double t_O);
+  /// Starts `smoother` with the prior on its first state and on the calibration of this radar.
+  void start(FixedLagSmoother& smoother, Time time, const NodePrior& prior);
+  /// Joins a window that another radar has started, with its calibration as told.
+  void join(FixedLagSmoother& smoother);
   /// Time of the node of a scan: its stamp (constant_acceleration), or its time of measurement as now
   /// estimated (imu).
   Time nodeTime(Time stamp) const;
@@ -53,39 +53,32 @@ class RadarInWindow {
   std::optional<Eigen::Vector3d> velocityAt(const FixedLagSmoother& smoother, Time stamp) const;
   AddResult add(FixedLagSmoother& smoother, const RadarVelocityMeasurement& z);
   AddResult add(FixedLagSmoother& smoother, const DopplerMeasurement& z);
-  /// The offset stepped before the scan stamped `stamp`. That scan and later ones use a new block, which
-  /// time_offset_sigma links to the old one.
-  void stepOffset(FixedLagSmoother& smoother, Time stamp);
+  /// See OffsetBlocks::step.
+  void stepOffset(FixedLagSmoother& smoother, Time stamp) { offset_->step(smoother, stamp); }
 
-  const Extrinsics& extrinsics() const { return T_IR_; }
-  const Block& offsetBlock() const { return *epochs_.back().block; }
-  double offset() const { return offsetBlock().x[0]; }  ///< t_O [s]
+  double offset() const { return offset_->value(); }  ///< t_O [s]
+  Extrinsics extrinsics() const { return toExtrinsics(extrinsics_->x.data()); }
+  /// The blocks that are estimated, for a covariance: t_O, which is always there, and the extrinsics.
+  std::vector<const Block*> calibration() const;
 
  private:
-  /// Scans from `since` on share one offset.
-  struct Epoch {
-    Time since;
-    std::shared_ptr<Block> block;
-  };
-  Block& offsetOf(Window& window, Time stamp);
+  /// Adds the block to a window that starts. Returns it if it is estimated.
+  std::vector<Block*> addExtrinsics(Window& window, const Extrinsics& T_IR);
   template <class Factor, class Measurement>
   AddResult addTerm(FixedLagSmoother& smoother, const Measurement& z,
                     const std::shared_ptr<ceres::LossFunction>& loss);
-  std::shared_ptr<Block> addOffset(Window& window, double t_O) const;
 
-  SmootherOptions options_;  // read-only after construction, as the next two
+  SmootherOptions options_;  // read-only after construction, as the next four
   Extrinsics T_IR_;
   RadarMotionModel model_;
   std::shared_ptr<ceres::LossFunction> loss_;
-  std::shared_ptr<const Manifold> manifold_;
-  std::vector<Epoch> epochs_;  ///< those still in the window
-  std::vector<Time> stamps_;   ///< of the scans in the window
+  std::shared_ptr<const Manifold> extrinsics_manifold_;
+  std::shared_ptr<OffsetBlocks> offset_;
+  std::shared_ptr<Block> extrinsics_;
+  std::vector<Time> stamps_;  ///< of the scans in the window
 };
 
 /// Empty for kAdded, else the reason in snake case.
 std::string toString(RadarInWindow::AddResult result);
-
-/// Starts `smoother` and `radar` with the prior on their first state and offset.
-void start(FixedLagSmoother& smoother, RadarInWindow& radar, Time time, const NodePrior& prior);
 
 }  // namespace rio_t

@@ -25,6 +25,7 @@ struct BatchOptions {
 /// What one scan gives to the graph.
 struct BatchScan {
   Time stamp;
+  std::size_t radar = 0;
   double t_O = 0.0;  ///< [s] initial value; also places the node (imu model)
   std::optional<RadarVelocityMeasurement> velocity;
   std::optional<DopplerMeasurement> doppler;  ///< instead of the velocity; neither: the scan is not used
@@ -32,34 +33,41 @@ struct BatchScan {
   bool offset_stepped = false;                ///< t_O may have stepped since the scan before
 };
 
-/// A state with the offset at its time.
-struct BatchNode {
-  Time time;
-  StateBlock x;
-  double t_O = 0.0;  ///< [s]
-};
-
 struct BatchProblem {
-  Time start;       ///< of the first node
-  NodePrior prior;  ///< on it
+  Time start;                        ///< of the first node
+  NodePrior prior;                   ///< on it, and on the calibration of `radar`
+  std::size_t radar = 0;             ///< which one the prior knows
+  std::vector<Extrinsics> mounting;  ///< of each radar: as told, and where the solver starts
+  /// Priors on t_O of the radars [s], with time_offset_sigma; not used for `radar`. Empty: zero.
+  std::vector<double> time_offsets;
   std::vector<BatchScan> scans;
   /// Initial states in order of time, at least one. The IMU carries them to the nodes.
-  std::vector<BatchNode> guess;
+  std::vector<NodeEstimate> guess;
 };
 
 struct BatchSolution {
-  std::vector<BatchNode> nodes;
-  std::vector<std::size_t> node_of_scan;  ///< for each scan of the problem
-  std::vector<NodeMatrix> covariances;    ///< marginal, for each node
-  NormalEquations normal_equations;       ///< at the solution: state and t_O of each node, by time
-  int iterations = 0;                     ///< of the solver, all placements together
-  int placements = 0;                     ///< how often the nodes were placed
+  /// Of one scan of the problem.
+  struct Scan {
+    std::size_t node = 0;
+    double t_O = 0.0;  ///< [s]
+    /// Joint, of the node's state, t_O and the estimated extrinsics of the radar.
+    Eigen::MatrixXd covariance;
+  };
+  std::vector<NodeEstimate> nodes;
+  std::vector<StateCovariance> covariances;  ///< marginal, of each node
+  std::vector<Scan> scans;
+  std::vector<Extrinsics> extrinsics;  ///< of each radar
+  /// Of each radar, in the tangent of ExtrinsicsManifold; empty where the extrinsics are not estimated.
+  std::vector<Eigen::MatrixXd> extrinsics_covariances;
+  NormalEquations normal_equations;  ///< at the solution
+  int iterations = 0;                ///< of the solver, all placements together
+  int placements = 0;                ///< how often the nodes were placed
   SolverTermination termination = SolverTermination::kIterationLimit;
   bool converged() const { return isConverged(termination); }
 };
 
 /// The graph of FixedLagSmoother over all the data at once, with the same factors and nothing marginalised.
-/// Each node has its own t_O, as in the paper (eq. 8-10), so that the offset may drift over the run. The
+/// Each scan has its own t_O, as in the paper (eq. 8-10), so that the offset may drift over the run. The
 /// solution stands when the next step is shorter than a thousandth of a standard deviation in every
 /// direction.
 /// With the imu model a node stands at the time of measurement of its scan. If the offset moves, the nodes
@@ -74,30 +82,36 @@ class BatchSmoother {
   /// Throws std::invalid_argument without a guess, std::runtime_error if the data do not determine a state.
   BatchSolution solve(const BatchProblem& problem) const;
 
-  /// Residual h - z of a velocity at `node`, whose marginal covariance is `covariance`.
+  /// Residual h - z of a velocity at the node of `scan`, which is of the same radar.
   struct Residual {
     Eigen::Vector3d value;                  ///< [m/s]
     Eigen::Matrix3d prediction_covariance;  ///< of h alone [m^2/s^2]
   };
-  Residual residual(const BatchNode& node, const NodeMatrix& covariance,
+  Residual residual(const BatchSolution& solution, const BatchSolution::Scan& scan, std::size_t radar,
                     const RadarVelocityMeasurement& z) const;
 
  private:
   bool atMeasurement() const { return options_.time_offset_model == TimeOffsetModel::kImu; }
-  struct Node {
-    Block* state;
-    Block* offset;
-    BatchNode estimate() const { return {*state->time, toStateBlock(state->x), offset->x[0]}; }
-  };
-  /// The whole run as one window, and the node of each scan.
+  /// The whole run as one window.
   struct Graph {
     Window window;
-    std::vector<Node> nodes;
-    std::vector<std::size_t> node_of_scan;
+    std::vector<Block*> nodes;
+    struct Scan {
+      std::size_t node;
+      Block* offset;
+      Block* extrinsics;
+    };
+    std::vector<Scan> scans;
+    std::vector<Block*> extrinsics;  ///< by radar
   };
   Graph place(const BatchProblem& problem, const std::vector<double>& t_O,
-              const std::vector<BatchNode>& guess) const;
-  Node addNode(Window& window, const BatchNode& node) const;
+              const std::vector<NodeEstimate>& guess, const std::vector<Extrinsics>& mounting) const;
+  /// Adds the first node, the calibration of each radar and their priors. Returns the first offsets, by radar.
+  std::vector<Block*> start(const BatchProblem& problem, const StateBlock& x,
+                            const std::vector<Extrinsics>& mounting, Graph& graph) const;
+  Block& addOffset(Window& window, Time time, double t_O) const;
+  /// Sets what the solution says of nodes, scans and extrinsics, with covariances.
+  void read(const Graph& graph, const Solution& solved, BatchSolution& solution) const;
   RadarMotionModel model() const;
 
   SmootherOptions options_;  // all read-only after construction
@@ -105,10 +119,10 @@ class BatchSmoother {
   ImuNoise noise_;
   Eigen::Vector3d g_W_;
   const ImuBuffer* imu_;
-  std::shared_ptr<const Manifold> state_manifold_, offset_manifold_;
+  std::shared_ptr<const Manifold> state_manifold_, offset_manifold_, extrinsics_manifold_;
 };
 
 /// Index of the node nearest to `time`; `nodes` in the order of their times, not empty.
-std::size_t nearestNode(const std::vector<BatchNode>& nodes, Time time);
+std::size_t nearestNode(const std::vector<NodeEstimate>& nodes, Time time);
 
 }  // namespace rio_t

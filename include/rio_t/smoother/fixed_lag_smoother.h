@@ -65,7 +65,7 @@ class FixedLagSmoother {
   /// Random walk of a calibration block.
   struct RandomWalk {
     const Block* block;
-    double density;  ///< [unit/sqrt(s)]
+    Eigen::VectorXd density;  ///< of each direction of its tangent [unit/sqrt(s)]
   };
   /// Marginalises the nodes that are older than the window and returns them, oldest first. A retired
   /// calibration block leaves with the last node that shares a term with it.

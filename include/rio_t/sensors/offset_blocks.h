@@ -1,0 +1,44 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "rio_t/smoother/fixed_lag_smoother.h"
+#include "rio_t/smoother/options.h"
+
+namespace rio_t {
+
+/// The time offset t_O of a radar, or of all radars if they share it, in the window of the smoother.
+///
+/// The paper has one t_O per node and a factor that keeps it constant (eq. 8-10). One block whose prior fades
+/// by the random walk says the same with fewer unknowns (docs/method.md, section 6.2). After a step of the
+/// offset, a new block takes over. Not thread-safe.
+class OffsetBlocks {
+ public:
+  explicit OffsetBlocks(const SmootherOptions& options);
+
+  /// Adds the first block to a window that starts.
+  Block& start(Window& window, double t_O);
+  /// The offset stepped before the scan stamped `stamp`. That scan and later ones use a new block, which
+  /// time_offset_sigma links to the old one.
+  void step(FixedLagSmoother& smoother, Time stamp);
+  /// The block of a scan.
+  Block& of(Window& window, Time stamp);
+
+  const Block& newest() const { return *epochs_.back().block; }
+  double value() const { return newest().x[0]; }  ///< t_O [s]
+
+ private:
+  /// Scans from `since` on share one offset.
+  struct Epoch {
+    Time since;
+    std::shared_ptr<Block> block;
+  };
+  std::shared_ptr<Block> add(Window& window, double t_O) const;
+
+  SmootherOptions options_;  // read-only after construction, as the next
+  std::shared_ptr<const Manifold> manifold_;
+  std::vector<Epoch> epochs_;  ///< those still in the window
+};
+
+}  // namespace rio_t

@@ -1,0 +1,44 @@
+#include "rio_t/sensors/offset_blocks.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "rio_t/factors/constant_offset_factor.h"
+
+namespace rio_t {
+
+OffsetBlocks::OffsetBlocks(const SmootherOptions& options)
+    : options_(options), manifold_(std::make_shared<ScalarManifold>()) {}
+
+Block& OffsetBlocks::start(Window& window, double t_O) {
+  epochs_ = {{Time(), add(window, t_O)}};
+  return *epochs_.back().block;
+}
+
+std::shared_ptr<Block> OffsetBlocks::add(Window& window, double t_O) const {
+  std::shared_ptr<Block> block = window.addCalibration(manifold_, Eigen::VectorXd::Constant(1, t_O));
+  block->bound = options_.max_time_offset;
+  if (!options_.estimate_time_offset) window.setConstant(*block, true);
+  return block;
+}
+
+Block& OffsetBlocks::of(Window& window, Time stamp) {
+  const auto is_gone = [&](const Epoch& epoch) { return !window.has(*epoch.block); };
+  epochs_.erase(std::remove_if(epochs_.begin(), epochs_.end() - 1, is_gone), epochs_.end() - 1);
+  auto epoch = epochs_.end() - 1;
+  while (epoch != epochs_.begin() && stamp < epoch->since) --epoch;
+  return *epoch->block;
+}
+
+void OffsetBlocks::step(FixedLagSmoother& smoother, Time stamp) {
+  if (!options_.estimate_time_offset) return;
+  Window& window = smoother.window();
+  Block& before = *epochs_.back().block;
+  std::shared_ptr<Block> after = add(window, value());
+  window.add(std::make_unique<ConstantOffsetFactor>(options_.time_offset_sigma), {&before, after.get()});
+  before.is_retired = true;
+  epochs_.push_back({stamp, std::move(after)});
+  smoother.settle();
+}
+
+}  // namespace rio_t
