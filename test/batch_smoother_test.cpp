@@ -15,10 +15,10 @@ namespace {
 
 Eigen::MatrixXd dense(const NormalEquations& system) {
   const auto count = static_cast<int>(system.blocks.size());
-  const Eigen::Index n = count / 2 * kNodeTangent;
-  const auto first = [](int i) {
-    return Eigen::Index(i / 2 * kNodeTangent + (i % 2) * StateBlock::kTangent);
-  };
+  std::vector<Eigen::Index> firsts = {0};
+  for (const RowMatrix& H : system.diagonal) firsts.push_back(firsts.back() + H.rows());
+  const Eigen::Index n = firsts.back();
+  const auto first = [&](int i) { return firsts[static_cast<std::size_t>(i)]; };
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n, n);
   for (int i = 0; i < count; ++i) {
     const Eigen::Index rows = system.diagonal[i].rows();
@@ -31,17 +31,11 @@ Eigen::MatrixXd dense(const NormalEquations& system) {
   return H;
 }
 
-/// Largest difference to the diagonal blocks of `covariance`, in standard deviations.
-double difference(const std::vector<Eigen::MatrixXd>& blocks, const Eigen::MatrixXd& covariance) {
-  double largest = 0.0;
-  for (std::size_t k = 0; k < blocks.size(); ++k) {
-    const auto at = static_cast<Eigen::Index>(k) * kNodeTangent;
-    const Eigen::MatrixXd expected = covariance.block<kNodeTangent, kNodeTangent>(at, at);
-    const Eigen::VectorXd scale = expected.diagonal().cwiseSqrt().cwiseInverse();
-    const Eigen::MatrixXd apart = scale.asDiagonal() * (blocks[k] - expected) * scale.asDiagonal();
-    largest = std::max(largest, apart.cwiseAbs().maxCoeff());
-  }
-  return largest;
+/// Largest difference between two covariances, in standard deviations.
+double difference(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& expected) {
+  const Eigen::VectorXd scale = expected.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd apart = scale.asDiagonal() * (covariance - expected) * scale.asDiagonal();
+  return apart.cwiseAbs().maxCoeff();
 }
 
 class Batch : public ::testing::Test {
@@ -62,7 +56,8 @@ class Batch : public ::testing::Test {
     BatchProblem problem;
     problem.start = motion.time(0.5);
     problem.prior = priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0, skewMounting());
-    problem.guess = {{problem.start, motion.state(0.5), options.time_offset_initial}};
+    problem.mounting = {skewMounting()};
+    problem.guess = {{problem.start, motion.state(0.5)}};
     return problem;
   }
 
@@ -113,12 +108,13 @@ TEST_F(Batch, EqualsTheFixedLagSmootherThatKeepsEverything) {
       for (std::size_t k = 0; k < online.size(); ++k) {
         const NodeEstimate node = online.node(k);
         ASSERT_EQ(batch.nodes[k].time, node.time);
-        Eigen::VectorXd apart;
-        apart << boxminus(batch.nodes[k].x.data(), node.x.data()), batch.nodes[k].t_O - online.t_O();
-        const Eigen::VectorXd sigma = batch.covariances[k].diagonal().cwiseSqrt();
+        const StateTangent apart = boxminus(batch.nodes[k].x.data(), node.x.data());
+        const StateTangent sigma = batch.covariances[k].diagonal().cwiseSqrt();
         EXPECT_LT(apart.cwiseQuotient(sigma).norm(), 0.01) << "node " << k;
       }
-      const Eigen::VectorXd last = batch.covariances.back().diagonal();
+      for (const BatchSolution::Scan& scan : batch.scans)
+        EXPECT_LT(std::abs(scan.t_O - online.t_O()), 0.01 * std::sqrt(scan.covariance(15, 15)));
+      const Eigen::VectorXd last = batch.scans.back().covariance.diagonal();
       EXPECT_LT((online.newestCovariance().diagonal().cwiseQuotient(last).array() - 1.0).abs().maxCoeff(),
                 1e-3);
     }
@@ -140,9 +136,13 @@ TEST_F(Batch, CovarianceIsThatOfTheDenseInverse) {
   const Eigen::VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * H * scale.asDiagonal();
   const Eigen::MatrixXd covariance = scale.asDiagonal() * scaled.inverse() * scale.asDiagonal();
-  EXPECT_LT(difference(batch.covariances, covariance), 1e-6);
-  for (const Eigen::MatrixXd P : batch.covariances)
-    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(P).eigenvalues().minCoeff(), 0.0);
+  // A node and its offset follow each other; the first pair is that of the start.
+  constexpr Eigen::Index kPair = StateBlock::kTangent + 1;
+  for (const BatchSolution::Scan& scan : batch.scans) {
+    const auto at = static_cast<Eigen::Index>(scan.node) * kPair;
+    EXPECT_LT(difference(scan.covariance, covariance.block(at, at, kPair, kPair)), 1e-6);
+    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(scan.covariance).eigenvalues().minCoeff(), 0.0);
+  }
 }
 
 TEST_F(Batch, PlacesItsNodesWhereTheOffsetPutsThem) {
@@ -161,9 +161,10 @@ TEST_F(Batch, PlacesItsNodesWhereTheOffsetPutsThem) {
     EXPECT_TRUE(batch.converged());
     EXPECT_GT(batch.placements, 1);
     for (std::size_t i = 0; i < whole.scans.size(); ++i) {
-      const BatchNode& node = batch.nodes[batch.node_of_scan[i]];
-      EXPECT_NEAR(node.t_O, t_O, 1e-4);
-      EXPECT_NEAR(node.time - (whole.scans[i].stamp - node.t_O), 0.0, 1.1e-4);
+      const BatchSolution::Scan& scan = batch.scans[i];
+      const NodeEstimate& node = batch.nodes[scan.node];
+      EXPECT_NEAR(scan.t_O, t_O, 1e-4);
+      EXPECT_NEAR(node.time - (whole.scans[i].stamp - scan.t_O), 0.0, 1.1e-4);
       const StateBlock truth = motion.state(node.time - motion.start);
       EXPECT_LT((node.x.p_W() - truth.p_W()).norm(), 3e-3);
       EXPECT_LT(so3::log(node.x.q_WI().conjugate() * truth.q_WI()).norm(), 3e-3);
@@ -176,7 +177,7 @@ TEST_F(Batch, KnowsThePastBetterThanTheWindowDid) {
   RadarSmoother online(options, skewMounting(), motion.g_W, imu);
   BatchProblem whole = problem(options);
   online.initialize(whole.start, whole.prior);
-  Eigen::VectorXd then = Eigen::VectorXd::Zero();
+  Eigen::VectorXd then;
   for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
     BatchScan scan;
     scan.velocity = measurement(stamp, 0.01);
@@ -188,7 +189,7 @@ TEST_F(Batch, KnowsThePastBetterThanTheWindowDid) {
     if (whole.scans.size() == 5) then = online.newestCovariance().diagonal();
   }
   const BatchSolution batch = make(options).solve(whole);
-  const Eigen::VectorXd now = batch.covariances[batch.node_of_scan[4]].diagonal();
+  const Eigen::VectorXd now = batch.scans[4].covariance.diagonal();
   for (const int i : {0, 1, 6, 7, 8, 12, 13, 14, 15}) EXPECT_LT(now(i), 0.95 * then(i)) << i;
 }
 
@@ -204,8 +205,8 @@ TEST_F(Batch, AStepOfTheOffsetIsFollowedWhereItIsTold) {
     whole.scans.push_back(scan);
   }
   const BatchSolution batch = make(options).solve(whole);
-  EXPECT_NEAR(batch.nodes[1].t_O, 0.01, 3e-4);
-  EXPECT_NEAR(batch.nodes.back().t_O, 0.06, 3e-4);
+  EXPECT_NEAR(batch.scans.front().t_O, 0.01, 3e-4);
+  EXPECT_NEAR(batch.scans.back().t_O, 0.06, 3e-4);
 }
 
 TEST_F(Batch, ATruthBeyondTheBoundIsTold) {
@@ -221,7 +222,7 @@ TEST_F(Batch, ATruthBeyondTheBoundIsTold) {
   const BatchSolution batch = make(options).solve(whole);
   EXPECT_EQ(batch.termination, SolverTermination::kAtBound);
   EXPECT_LT(batch.iterations, 50);
-  EXPECT_NEAR(batch.nodes.back().t_O, 0.05, 1e-9);
+  EXPECT_NEAR(batch.scans.back().t_O, 0.05, 1e-9);
 }
 
 TEST_F(Batch, WithoutEstimationTheOffsetStays) {
@@ -236,7 +237,7 @@ TEST_F(Batch, WithoutEstimationTheOffsetStays) {
     scan.t_O = 0.01;
     whole.scans.push_back(scan);
   }
-  for (const BatchNode& node : make(options).solve(whole).nodes) EXPECT_DOUBLE_EQ(node.t_O, 0.01);
+  for (const BatchSolution::Scan& scan : make(options).solve(whole).scans) EXPECT_DOUBLE_EQ(scan.t_O, 0.01);
 }
 
 TEST_F(Batch, NothingToBeginFromIsRefused) {

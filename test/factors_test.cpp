@@ -35,8 +35,16 @@ RadarVelocityMeasurement measurement(Time stamp) {
   z.stamp = stamp;
   z.v_R = {0.3, 1.1, -0.2};
   z.covariance << 0.01, 0.002, 0.0, 0.002, 0.004, 0.001, 0.0, 0.001, 0.02;
-  z.T_IR = {{0.03, -0.5, 0.2}, Eigen::Quaterniond(so3::exp({0.3, -1.2, 2.0}).conjugate())};
   return z;
+}
+
+Extrinsics mounting() {
+  return {{0.03, -0.5, 0.2}, Eigen::Quaterniond(so3::exp({0.3, -1.2, 2.0}).conjugate())};
+}
+const std::vector<double>& storedMounting() {
+  static const Eigen::VectorXd x = stored(mounting());
+  static const std::vector<double> values(x.data(), x.data() + x.size());
+  return values;
 }
 
 TEST(StateBlock, BoxminusInvertsBoxplus) {
@@ -46,6 +54,33 @@ TEST(StateBlock, BoxminusInvertsBoxplus) {
   StateBlock y;
   boxplus(x.data(), delta.data(), y.data());
   EXPECT_LT((boxminus(y.data(), x.data()) - delta).norm(), 1e-12);
+}
+
+TEST(ExtrinsicsManifold, MinusInvertsPlusAndItsJacobianIsCorrect) {
+  for (const EstimateExtrinsics estimate : {EstimateExtrinsics::kRotation, EstimateExtrinsics::kPose}) {
+    const ExtrinsicsManifold manifold(estimate);
+    Eigen::VectorXd delta(manifold.tangent());
+    for (int i = 0; i < manifold.tangent(); ++i) delta(i) = 0.4 * std::cos(1.7 * i);
+    const std::vector<double> x = storedMounting();
+    std::vector<double> y = x;
+    manifold.plus(x.data(), delta.data(), y.data());
+    EXPECT_LT((manifold.minus(y.data(), x.data()) - delta).norm(), 1e-12);
+    // A turn about the axes of I.
+    const Eigen::Quaterniond turned = so3::exp(delta.head<3>()) * mounting().q_IR;
+    EXPECT_LT(toExtrinsics(y.data()).q_IR.angularDistance(turned), 1e-12);
+    Eigen::MatrixXd numeric(manifold.tangent(), manifold.tangent());
+    constexpr double h = 1e-6;
+    for (int i = 0; i < manifold.tangent(); ++i) {
+      std::vector<double> ends[2] = {y, y};
+      for (const int side : {0, 1}) {
+        const Eigen::VectorXd step = (side == 0 ? -h : h) * Eigen::VectorXd::Unit(manifold.tangent(), i);
+        manifold.plus(y.data(), step.data(), ends[side].data());
+      }
+      numeric.col(i) =
+          (manifold.minus(ends[1].data(), x.data()) - manifold.minus(ends[0].data(), x.data())) / (2.0 * h);
+    }
+    EXPECT_LT((manifold.minusJacobian(y.data(), x.data()) - numeric).cwiseAbs().maxCoeff(), 1e-8);
+  }
 }
 
 TEST(ImuFactor, JacobiansAreCorrect) {
@@ -125,7 +160,7 @@ TEST(ConstantAccelerationRadarFactor, JacobiansAreCorrect) {
   const ImuBuffer imu = motion.imu(0.9, 1.3, 400.0);
   const RadarVelocityFactor factor(measurement(motion.time(1.0)), motion.time(1.0),
                                    constantAcceleration(imu));
-  expectJacobiansCorrect(factor, {values(moved(motion.state(1.0), 0.1)), {0.04}});
+  expectJacobiansCorrect(factor, {values(moved(motion.state(1.0), 0.1)), {0.04}, storedMounting()});
 }
 
 TEST(ConstantAccelerationRadarFactor, AtRestTheCorrectedAccelerationIsZero) {
@@ -137,7 +172,7 @@ TEST(ConstantAccelerationRadarFactor, AtRestTheCorrectedAccelerationIsZero) {
     imu.add({Time::fromSeconds(t), Eigen::Vector3d::Zero(), Eigen::Vector3d(0.0, 0.0, 9.81)});
   const StateBlock x;
   const double t_O = 0.1;
-  const double* blocks[] = {x.data(), &t_O};
+  const double* blocks[] = {x.data(), &t_O, storedMounting().data()};
   Eigen::Vector3d r;
   RadarVelocityFactor(z, z.stamp, constantAcceleration(imu)).Evaluate(blocks, r.data(), nullptr);
   EXPECT_LT(r.norm(), 1e-12);
@@ -152,7 +187,38 @@ TEST(ImuRadarFactor, JacobiansAreCorrectForwardsAndBackwards) {
     z.linear_from_t_O = t_O;
     z.offset_gain = 0.0;
     expectJacobiansCorrect(RadarVelocityFactor(z, motion.time(0.98), imuModel(imu)),
-                           {values(moved(motion.state(0.98), 0.05)), {0.2 - t_O}}, 1e-6, 1e-4);
+                           {values(moved(motion.state(0.98), 0.05)), {0.2 - t_O}, storedMounting()}, 1e-6, 1e-4);
+  }
+}
+
+TEST(ImuRadarFactor, TheDerivativeInTheExtrinsicsIsExactAwayFromWhereTheScanWasPlaced) {
+  const SyntheticMotion motion;
+  const ImuBuffer imu = motion.imu(0.5, 1.6, 400.0);
+  const StateBlock x = moved(motion.state(0.98), 0.05);
+  RadarVelocityMeasurement z = measurement(motion.time(1.0));
+  z.linear_from_t_O = 0.02;
+  z.offset_gain = 0.6;
+  const RadarVelocityFactor factor(z, motion.time(0.98), imuModel(imu));
+  const ExtrinsicsManifold manifold(EstimateExtrinsics::kPose);
+  const double t_O = 0.1;
+  const auto residual = [&](const std::vector<double>& T_IR, double** jacobians = nullptr) {
+    const double* blocks[] = {x.data(), &t_O, T_IR.data()};
+    Eigen::Vector3d r;
+    factor.Evaluate(blocks, r.data(), jacobians);
+    return r;
+  };
+  ExtrinsicsJacobian<3> J;
+  double* jacobians[] = {nullptr, nullptr, J.data()};
+  residual(storedMounting(), jacobians);
+  constexpr double h = 1e-6;
+  for (int i = 0; i < manifold.tangent(); ++i) {
+    std::vector<double> ends[2] = {storedMounting(), storedMounting()};
+    for (const int side : {0, 1}) {
+      const Eigen::VectorXd delta = (side == 0 ? -h : h) * Eigen::VectorXd::Unit(manifold.tangent(), i);
+      manifold.plus(ends[side].data(), delta.data(), ends[side].data());
+    }
+    const Eigen::Vector3d numeric = (residual(ends[1]) - residual(ends[0])) / (2.0 * h);
+    EXPECT_LT((J.col(manifold.columns()[static_cast<std::size_t>(i)]) - numeric).norm(), 1e-6 * J.norm()) << i;
   }
 }
 
@@ -163,13 +229,13 @@ TEST(ImuRadarFactor, TheDerivativeInTheOffsetIsThatOverItsWindow) {
   for (const double t_O : {-0.11, -0.0113, 0.0037, 0.0521, 0.1731}) {
     const RadarVelocityFactor factor(measurement(motion.time(1.0)), motion.time(0.98), imuModel(imu, 0.5));
     const auto residual = [&](double offset, double** jacobians = nullptr) {
-      const double* blocks[] = {x.data(), &offset};
+      const double* blocks[] = {x.data(), &offset, storedMounting().data()};
       Eigen::Vector3d r;
       factor.Evaluate(blocks, r.data(), jacobians);
       return r;
     };
     Eigen::Vector3d J_t;
-    double* jacobians[] = {nullptr, J_t.data()};
+    double* jacobians[] = {nullptr, J_t.data(), nullptr};
     residual(t_O, jacobians);
     // The derivative of the mean with weights that fall linearly: from the mean of one side to that of the
     // other.
@@ -190,7 +256,7 @@ TEST(ImuRadarFactor, AHeldOffsetIsAllThatCounts) {
   RadarVelocityMeasurement z = measurement(motion.time(1.0));
   const StateBlock x = motion.state(0.98);
   const auto residual = [&](double t_O) {
-    const double* blocks[] = {x.data(), &t_O};
+    const double* blocks[] = {x.data(), &t_O, storedMounting().data()};
     Eigen::Vector3d r;
     RadarVelocityFactor(z, motion.time(0.98), imuModel(imu)).Evaluate(blocks, r.data(), nullptr);
     return r;
@@ -214,8 +280,8 @@ TEST(ImuRadarFactor, AroundWhereAScanWasPlacedTheOffsetCountsToFirstOrder) {
     z.linear_from_t_O = std::nullopt;
     const RadarVelocityFactor exact(z, motion.time(0.98), imuModel(imu));
     const auto residual = [&](const RadarVelocityFactor& f, double t_O, Eigen::Vector3d* J_t = nullptr) {
-      const double* blocks[] = {x.data(), &t_O};
-      double* jacobians[] = {nullptr, J_t != nullptr ? J_t->data() : nullptr};
+      const double* blocks[] = {x.data(), &t_O, storedMounting().data()};
+      double* jacobians[] = {nullptr, J_t != nullptr ? J_t->data() : nullptr, nullptr};
       Eigen::Vector3d r;
       f.Evaluate(blocks, r.data(), J_t != nullptr ? jacobians : nullptr);
       return r;
@@ -267,10 +333,10 @@ TEST(ImuRadarFactor, ResidualIsZeroAtTheTrueOffset) {
   const ImuBuffer imu = motion.imu(0.5, 1.6, 400.0);
   for (const double t_O : {-0.1, 0.0, 0.03, 0.2}) {
     RadarVelocityMeasurement z = measurement(motion.time(1.0));
-    z.v_R = motion.radarVelocity(1.0 - t_O, z.T_IR.R_RI(), z.T_IR.l_I);
+    z.v_R = motion.radarVelocity(1.0 - t_O, mounting().R_RI(), mounting().l_I);
     z.covariance.setIdentity();
     const StateBlock x = motion.state(1.02);
-    const double* blocks[] = {x.data(), &t_O};
+    const double* blocks[] = {x.data(), &t_O, storedMounting().data()};
     Eigen::Vector3d r;
     RadarVelocityFactor(z, motion.time(1.02), imuModel(imu)).Evaluate(blocks, r.data(), nullptr);
     EXPECT_LT(r.norm(), 1e-4) << "offset " << t_O;
@@ -285,10 +351,9 @@ struct DopplerScan {
     x = moved(motion.state(0.98), 0.02);
     const RadarVelocityMeasurement mounted = measurement(motion.time(1.0));
     z.stamp = mounted.stamp;
-    z.T_IR = mounted.T_IR;
     z.offset_gain = 1.0;
     z.linear_from_t_O = kPlacedAt;
-    const Eigen::Vector3d v_R = motion.radarVelocity(1.0 - kPlacedAt, z.T_IR.R_RI(), z.T_IR.l_I);
+    const Eigen::Vector3d v_R = motion.radarVelocity(1.0 - kPlacedAt, mounting().R_RI(), mounting().l_I);
     Noise draw;
     for (std::size_t i = 0; i < count; ++i) {
       const Eigen::Vector3d u = (Eigen::Vector3d(0.0, 1.0, 0.0) + 0.5 * draw.vector()).normalized();
@@ -300,26 +365,32 @@ struct DopplerScan {
 
   DopplerFactor factor() const { return {z, motion.time(0.98), imuModel(imu)}; }
   PredictedVelocity predicted(const StateBlock& at, double t_O) const {
-    const double* blocks[] = {at.data(), &t_O};
+    const double* blocks[] = {at.data(), &t_O, storedMounting().data()};
     return RadarVelocityModel(z, motion.time(0.98), imuModel(imu)).at(blocks, true);
   }
   /// Half the sum of the squares of a factor that remembers nothing.
-  double cost(const StateBlock& at, double t_O) const { return cost(factor(), at, t_O); }
-  static double cost(const DopplerFactor& factor, const StateBlock& at, double t_O) {
-    const double* blocks[] = {at.data(), &t_O};
+  double cost(const StateBlock& at, double t_O, const std::vector<double>& T_IR = storedMounting()) const {
+    return cost(factor(), at, t_O, T_IR);
+  }
+  static double cost(const DopplerFactor& factor, const StateBlock& at, double t_O,
+                     const std::vector<double>& T_IR = storedMounting()) {
+    const double* blocks[] = {at.data(), &t_O, T_IR.data()};
     Eigen::Vector4d r;
     EXPECT_TRUE(factor.Evaluate(blocks, r.data(), nullptr));
     return 0.5 * r.squaredNorm();
   }
-  /// Residuals and Jacobian by state and t_O, as stored.
-  using Jacobian = Eigen::Matrix<double, 4, StateBlock::kSize + 1>;
+  /// Residuals and Jacobian by state, t_O and extrinsics, as stored.
+  static constexpr int kExtrinsics = StateBlock::kSize + 1;
+  static constexpr int kStored = kExtrinsics + ExtrinsicsBlock::kSize;
+  using Jacobian = Eigen::Matrix<double, 4, kStored>;
   Eigen::Vector4d linearized(const StateBlock& at, double t_O, Jacobian& J) const {
-    const double* blocks[] = {at.data(), &t_O};
+    const double* blocks[] = {at.data(), &t_O, storedMounting().data()};
     StateJacobian<4> J_state;
+    ExtrinsicsJacobian<4> J_extrinsics;
     Eigen::Vector4d J_t, r;
-    double* jacobians[] = {J_state.data(), J_t.data()};
+    double* jacobians[] = {J_state.data(), J_t.data(), J_extrinsics.data()};
     EXPECT_TRUE(factor().Evaluate(blocks, r.data(), jacobians));
-    J << J_state, J_t;
+    J << J_state, J_t, J_extrinsics;
     return r;
   }
 
@@ -337,7 +408,7 @@ PointVariances dopplerNoise(double step) {
 /// Dopplers whose residuals are linear.
 PointVariances gaussian() { return {0.03 * 0.03, 0.0, 0.0, 0.0, 0.0}; }
 
-using RowJacobian = Eigen::Matrix<double, 1, StateBlock::kSize + 1>;
+using RowJacobian = Eigen::Matrix<double, 1, DopplerScan::kStored>;
 
 TEST(DopplerFactor, SaysTheSameAsARowForEachPoint) {
   for (const double step : {0.0, 0.25}) {
@@ -346,13 +417,14 @@ TEST(DopplerFactor, SaysTheSameAsARowForEachPoint) {
       const PredictedVelocity predicted = scan.predicted(scan.x, DopplerScan::kPlacedAt);
       double cost = 0.0;
       DopplerScan::Jacobian J;
-      Eigen::Matrix<double, StateBlock::kSize + 1, 1> b = decltype(b)::Zero();
-      Eigen::Matrix<double, StateBlock::kSize + 1, StateBlock::kSize + 1> H = decltype(H)::Zero();
+      Eigen::VectorXd b = Eigen::VectorXd::Zero(DopplerScan::kStored);
+      Eigen::MatrixXd H = Eigen::MatrixXd::Zero(DopplerScan::kStored, DopplerScan::kStored);
       for (std::size_t i = 0; i < count; ++i) {
         Eigen::Vector3d derivative;
         const double r = scan.z.points->residual(i, predicted.v_R, derivative);
         RowJacobian row;
-        row << derivative.transpose() * predicted.J_state, derivative.dot(predicted.dv_dt_O);
+        row << derivative.transpose() * predicted.J_state, derivative.dot(predicted.dv_dt_O),
+            derivative.transpose() * predicted.J_extrinsics;
         cost += 0.5 * r * r;
         b += r * row.transpose();
         H += row.transpose() * row;
@@ -373,7 +445,7 @@ TEST(DopplerFactor, ItsGradientIsThatOfTheCost) {
       constexpr double t_O = DopplerScan::kPlacedAt;
       DopplerScan::Jacobian J;
       const Eigen::Vector4d r = scan.linearized(scan.x, t_O, J);
-      const Eigen::Matrix<double, StateBlock::kSize + 1, 1> stored = J.transpose() * r;
+      const Eigen::VectorXd stored = J.transpose() * r;
       constexpr double h = 1e-6;
       for (int i = 0; i < StateBlock::kTangent; ++i) {
         double costs[2];
@@ -390,6 +462,19 @@ TEST(DopplerFactor, ItsGradientIsThatOfTheCost) {
       EXPECT_NEAR(stored[StateBlock::kSize],
                   (scan.cost(scan.x, t_O + h) - scan.cost(scan.x, t_O - h)) / (2.0 * h), 1e-5 * stored.norm())
           << count << " points, step " << step;
+      const ExtrinsicsManifold manifold(EstimateExtrinsics::kPose);
+      for (int i = 0; i < manifold.tangent(); ++i) {
+        double costs[2];
+        for (const int side : {0, 1}) {
+          const Eigen::VectorXd delta = (side == 0 ? -h : h) * Eigen::VectorXd::Unit(6, i);
+          std::vector<double> T_IR = storedMounting();
+          manifold.plus(T_IR.data(), delta.data(), T_IR.data());
+          costs[side] = scan.cost(scan.x, t_O, T_IR);
+        }
+        EXPECT_NEAR(stored[DopplerScan::kExtrinsics + manifold.columns()[static_cast<std::size_t>(i)]],
+                    (costs[1] - costs[0]) / (2.0 * h), 1e-5 * stored.norm())
+            << count << " points, step " << step << ", extrinsics " << i;
+      }
     }
   }
 }
@@ -420,8 +505,8 @@ TEST(DopplerFactor, AnErrorThatThePointsShareLowersTheInformation) {
     // (A^-1 + D)^-1, where A may be singular.
     const Eigen::Matrix3d expected =
         A * (Eigen::Matrix3d::Identity() + Eigen::Matrix3d(D.asDiagonal()) * A).inverse();
-    Eigen::Matrix<double, 3, StateBlock::kSize + 1> J_v;
-    J_v << predicted.J_state, predicted.dv_dt_O;
+    Eigen::Matrix<double, 3, DopplerScan::kStored> J_v;
+    J_v << predicted.J_state, predicted.dv_dt_O, predicted.J_extrinsics;
     DopplerScan::Jacobian J;
     scan.linearized(scan.x, DopplerScan::kPlacedAt, J);
     const auto H = (J_v.transpose() * expected * J_v).eval();

@@ -180,7 +180,7 @@ TEST(Marginalization, AWalkWidensWhatThePriorSays) {
   // Two equal windows; in the second the walk is a block of its own.
   LinearWindow a(3), b(3);
   constexpr double kVariance = 0.3;
-  marginalize(a.window, {a.nodes[0]}, {{a.calibration.get(), kVariance}});
+  marginalize(a.window, {a.nodes[0]}, {{a.calibration.get(), Eigen::VectorXd::Constant(2, kVariance)}});
   marginalize(b.window, {b.nodes[0]}, {});
   const Term* prior = b.window.terms().back().get();
   // The prior of b moves to a calibration before the walk.
@@ -239,6 +239,11 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
     const RadarMotionModel model{kind, bound, motion.g_W, &imu};
     offset = window.addCalibration(std::make_shared<ScalarManifold>(), Eigen::VectorXd::Constant(1, start));
     offset->bound = bound;
+    SmootherOptions known;
+    known.estimate_extrinsics = EstimateExtrinsics::kPose;
+    known.extrinsics_rotation_sigma = known.extrinsics_translation_sigma = 0.01;
+    extrinsics = window.addCalibration(std::make_shared<ExtrinsicsManifold>(known.estimate_extrinsics),
+                                       stored(skewMounting()));
     Block* previous = nullptr;
     for (int k = 0; k < kNodes; ++k) {
       const double t = 0.5 + 0.1 * k;
@@ -250,10 +255,10 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
       boxplus(truth.data(), beside.data(), x.data());
       Block& node = window.addNode(motion.time(t), manifold, stored(x));
       if (previous == nullptr) {
-        const NodePrior prior = priorAtRest(SmootherOptions(), ImuNoise(), truth, 9.81, 3.0, skewMounting());
+        const NodePrior prior = priorAtRest(known, ImuNoise(), truth, 9.81, 3.0, skewMounting());
         node.x = stored(truth);
         offset->x[0] = 0.0;
-        addPrior(window, {&node, offset.get()}, {prior.J, prior.r0});
+        addPrior(window, {&node, offset.get(), extrinsics.get()}, {prior.J, prior.r0});
         node.x = stored(x);
         offset->x[0] = start;
       } else {
@@ -267,13 +272,14 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
       for (int i = 0; i < 3; ++i) z.v_R(i) += 0.01 * wave(5 * k + i);
       if (k % 4 == 2) z.v_R.x() += 0.5;  // for the loss
       if (tightly) {
-        window.add(std::make_unique<DopplerFactor>(dopplers(z, k), *node.time, model), {&node, offset.get()});
+        window.add(std::make_unique<DopplerFactor>(dopplers(z, k), *node.time, model),
+                   {&node, offset.get(), extrinsics.get()});
         previous = &node;
         continue;
       }
       std::unique_ptr<ceres::CostFunction> cost = std::make_unique<RadarVelocityFactor>(z, *node.time, model);
       if (wrong_sign) cost = std::make_unique<WrongSigned>(std::move(cost));
-      window.add(std::move(cost), {&node, offset.get()}, loss);
+      window.add(std::move(cost), {&node, offset.get(), extrinsics.get()}, loss);
       if (k % 3 == 1) window.add(std::make_unique<ZeroVelocityFactor>(3.0), {&node});
       previous = &node;
     }
@@ -302,7 +308,7 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
   }
 
   /// With the Jacobians of the wrong sign.
-  class WrongSigned final : public ceres::SizedCostFunction<3, StateBlock::kSize, 1> {
+  class WrongSigned final : public ceres::SizedCostFunction<3, StateBlock::kSize, 1, ExtrinsicsBlock::kSize> {
    public:
     explicit WrongSigned(std::unique_ptr<ceres::CostFunction> right) : right_(std::move(right)) {}
     bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
@@ -335,7 +341,7 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
   SyntheticMotion motion;
   ImuBuffer imu;
   Window window;
-  std::shared_ptr<Block> offset;
+  std::shared_ptr<Block> offset, extrinsics;
 };
 
 TEST_P(Windows, TheNormalEquationsAreThoseOfCeres) {

@@ -35,6 +35,7 @@ class Gate : public ::testing::Test {
                         last_used);
   }
   InnovationGate gate;
+  Time last_used;
 };
 
 // 0.1 m/s each of prior, measurement and model, four sigmas: 0.69 m/s.

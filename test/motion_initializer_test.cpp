@@ -240,7 +240,7 @@ std::optional<std::pair<InitializedFrom, double>> startBy(InitMode mode, Rig& ri
   for (const ImuMeasurement& sample : rig.data.imu.samples) {
     rig.imu.add(sample);
     for (; next != rig.data.scans.end() && next->stamp < sample.time; ++next)
-      initializer.addVelocity(next->stamp, estimator.estimate(rig.scan(*next)));
+      initializer.addVelocity(0, next->stamp, estimator.estimate(rig.scan(*next)));
     if (const auto found = initializer.add(sample, rig.imu))
       return std::make_pair(found->from, sample.time - rig.setup.start);
     *waiting_for = initializer.waitingFor();

@@ -4,14 +4,22 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
+#include <memory>
 #include <vector>
 
-#include "rio_t/factors/state_block.h"
+#include "rio_t/factors/extrinsics_manifold.h"
+#include "rio_t/factors/state_manifold.h"
 
 namespace rio_t {
 
+inline std::shared_ptr<const Manifold> manifoldOf(std::size_t size) {
+  if (size == StateBlock::kSize) return std::make_shared<StateManifold>();
+  if (size == ExtrinsicsBlock::kSize) return std::make_shared<ExtrinsicsManifold>(EstimateExtrinsics::kPose);
+  return std::make_shared<ScalarManifold>();
+}
+
 /// Compares the Jacobians of a factor with central differences on the manifold: blocks of 16 are states,
-/// moved with boxplus; blocks of 1 are offsets. `tolerance` is relative to the largest entry of the block's
+/// blocks of 7 are extrinsics, both moved on their manifolds; blocks of 1 are offsets. `tolerance` is relative to the largest entry of the block's
 /// Jacobian.
 inline void expectJacobiansCorrect(const ceres::CostFunction& cost, std::vector<std::vector<double>> blocks,
                                    double tolerance = 1e-6, double step = 1e-5) {
@@ -29,8 +37,8 @@ inline void expectJacobiansCorrect(const ceres::CostFunction& cost, std::vector<
   ASSERT_TRUE(cost.Evaluate(parameters.data(), r.data(), jacobians.data()));
 
   for (std::size_t b = 0; b < blocks.size(); ++b) {
-    const bool is_state = blocks[b].size() == StateBlock::kSize;
-    const int tangent = is_state ? StateBlock::kTangent : 1;
+    const std::shared_ptr<const Manifold> manifold = manifoldOf(blocks[b].size());
+    const int tangent = manifold->tangent();
     Eigen::MatrixXd expected(rows, tangent);
     Eigen::MatrixXd actual(rows, tangent);
     const std::vector<double> at = blocks[b];
@@ -38,19 +46,14 @@ inline void expectJacobiansCorrect(const ceres::CostFunction& cost, std::vector<
       Eigen::VectorXd moved[2] = {Eigen::VectorXd(rows), Eigen::VectorXd(rows)};
       for (int side = 0; side < 2; ++side) {
         const double h = side == 0 ? -step : step;
-        if (is_state) {
-          StateTangent delta = StateTangent::Zero();
-          delta(i) = h;
-          boxplus(at.data(), delta.data(), blocks[b].data());
-        } else {
-          blocks[b][0] = at[0] + h;
-        }
+        const Eigen::VectorXd delta = h * Eigen::VectorXd::Unit(tangent, i);
+        manifold->plus(at.data(), delta.data(), blocks[b].data());
         ASSERT_TRUE(cost.Evaluate(parameters.data(), moved[side].data(), nullptr));
       }
       blocks[b] = at;
       parameters[b] = blocks[b].data();
       expected.col(i) = (moved[1] - moved[0]) / (2.0 * step);
-      actual.col(i) = analytic[b].col(is_state && i >= 3 ? i + 1 : i);
+      actual.col(i) = analytic[b].col(manifold->columns()[static_cast<std::size_t>(i)]);
     }
     const double scale = std::max(1.0, expected.cwiseAbs().maxCoeff());
     EXPECT_LT((actual - expected).cwiseAbs().maxCoeff() / scale, tolerance) << "block " << b << "\nanalytic\n"

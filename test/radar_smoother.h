@@ -26,7 +26,7 @@ struct RadarSmoother {
   const Solution& optimize(double short_step = SolverLimits().short_step) {
     return states.optimize(short_step);
   }
-  std::vector<NodeEstimate> marginalize() { return 
+  std::vector<NodeEstimate> marginalize() {
     return states.marginalize({{&offset->newest(), Eigen::VectorXd::Constant(1, walk)}});
   }
   std::optional<RadarVelocityPrediction> predict(Time stamp) const { return radar.predict(states, stamp); }
