@@ -343,6 +343,58 @@ TEST(RadarModel, GhostsComeInTheirShare) {
   EXPECT_NEAR(shareOfMisfits("gym_loop", options), 0.1, 0.007);
 }
 
+TEST(RadarModel, ABurstOfGhostsIsAllGhostsAndLeavesTheOtherScansAlone) {
+  SimulationOptions options;
+  const Motion motion = builtIn("medium", 1, 40.0);
+  const SensorData calm = simulate(motion, options);
+  options.radar.ghost_bursts = {{20.0, 2.0}, {30.0, 0.5}};
+  const SensorData disturbed = simulate(motion, options);
+  ASSERT_EQ(disturbed.scans.size(), calm.scans.size());
+  std::size_t ghosts = 0, hits = 0;
+  for (std::size_t k = 0; k < calm.scans.size(); ++k) {
+    const SimulatedScan& scan = disturbed.scans[k];
+    const double t = scan.stamp - options.start;
+    ASSERT_EQ(scan.points.size(), calm.scans[k].points.size()) << t;
+    const bool burst = (t >= 20.0 && t < 22.0) || (t >= 30.0 && t < 30.5);
+    for (std::size_t i = 0; i < scan.points.size(); ++i) {
+      const SimulatedPoint& point = scan.points[i];
+      if (!burst) {
+        ASSERT_EQ(point.position_R, calm.scans[k].points[i].position_R) << t;
+        continue;
+      }
+      ++ghosts;
+      hits += std::abs(point.doppler + point.position_R.normalized().dot(scan.v_R)) < 0.125 ? 1 : 0;
+    }
+  }
+  // Dopplers of ghosts are even over 5 m/s: a band of 0.25 m/s holds 5 % of them, of some thousand points.
+  ASSERT_GT(ghosts, 800u);
+  EXPECT_NEAR(static_cast<double>(hits) / static_cast<double>(ghosts), 0.05, 0.04);
+}
+
+TEST(RadarModel, WithoutErrorsBlackoutsAndBurstsOfGhostsStay) {
+  SimulationOptions options;
+  options.radar.blackouts = {{20.0, 1.0}};
+  options.radar.ghost_bursts = {{25.0, 1.0}};
+  options.radar.removeErrors();
+  for (const SimulatedScan& scan : simulate(builtIn("medium", 1, 40.0), options).scans) {
+    const double t = scan.stamp - options.start;
+    ASSERT_EQ(scan.delivered, t < 20.0 || t >= 21.0) << t;
+    const bool fits = std::all_of(scan.points.begin(), scan.points.end(), [&](const SimulatedPoint& p) {
+      return std::abs(p.doppler + p.position_R.normalized().dot(scan.v_R)) < 1e-6;
+    });
+    EXPECT_EQ(fits, t < 25.0 || t >= 26.0) << t;
+  }
+}
+
+TEST(RadarModel, TheFirstTriggerSetsThePhase) {
+  SimulationOptions options;
+  options.radar.rate = 20.0;
+  options.radar.first_trigger = 0.07;
+  const std::vector<SimulatedScan> scans = simulate(builtIn("easy", 1, 30.0), options).scans;
+  EXPECT_NEAR(scans[0].stamp - options.start, 0.07, 1e-9);
+  EXPECT_NEAR(scans[100].stamp - options.start, 5.07, 1e-9);
+}
+
 TEST(RadarModel, APersonWalksThroughTheViewForItsShareOfTheTime) {
   SimulationOptions options = withoutErrors();
   options.radar.moving_share = 0.3;
@@ -483,6 +535,9 @@ TEST(RadarModel, RefusesOptionsOutOfRange) {
   EXPECT_THROW(simulate(motion, options), std::invalid_argument);
   options = SimulationOptions{};
   options.radar.rate = 0.0;
+  EXPECT_THROW(simulate(motion, options), std::invalid_argument);
+  options = SimulationOptions{};
+  options.radar.first_trigger = -0.01;
   EXPECT_THROW(simulate(motion, options), std::invalid_argument);
   options = SimulationOptions{};
   options.imu.rate = -1.0;

@@ -79,6 +79,14 @@ std::vector<double> parseNumbers(const std::string& text, std::size_t count) {
   return values;
 }
 
+RadarModelOptions::Interval parseInterval(const std::string& text) {
+  const std::vector<double> n = parseNumbers(text, 2);
+  if (n[0] < 0.0 || n[1] <= 0.0) {
+    throw std::invalid_argument("'" + text + "' must be a start from 0 and a positive duration");
+  }
+  return {n[0], n[1]};
+}
+
 std::string shown(double value) {
   std::ostringstream out;
   out << std::setprecision(10) << value;
@@ -138,8 +146,8 @@ class Options {
     number("record-offset", "S", "clock of the recorder minus clock of the IMU", r.bag.record_offset);
     number("gravity", "M/S^2", "magnitude", imu.gravity, Range::kPositive);
     flag("noise-free",
-         "no noise, vibration, bias, quantisation, ghosts, moving objects or lost scans (blackouts, Doppler "
-         "span and flat radars stay)",
+         "no noise, vibration, bias, quantisation, ghosts, moving objects or lost scans (blackouts, "
+         "ghost bursts, Doppler span and flat radars stay)",
          r.noise_free);
 
     section("Time offset t_O: a scan stamped s was measured at s - t_O");
@@ -196,6 +204,8 @@ class Options {
           r.simulation.T_IR.q_IR = q.normalized();
         });
     number("radar-rate", "HZ", "scans a second", radar.rate, Range::kPositive);
+    number("first-trigger", "S", "of the first scan, from the start of the bag", radar.first_trigger,
+           Range::kNotNegative);
     number("frame-length", "S", "Doppler is the mean over it, centred at the measurement; 0 = an instant",
            radar.frame_length, Range::kNotNegative);
     number("latency", "S", "from stamp to arrival (record time) of a scan", radar.latency,
@@ -231,13 +241,9 @@ class Options {
     number("dropouts", "SHARE", "of the scans: triggered, never delivered", radar.dropout_share,
            Range::kShare);
     add("blackout", "S,S", "START,DURATION without scans; may be repeated", "none",
-        [&radar](const std::string& v) {
-          const std::vector<double> n = parseNumbers(v, 2);
-          if (n[0] < 0.0 || n[1] <= 0.0) {
-            throw std::invalid_argument("'" + v + "' must be a start from 0 and a positive duration");
-          }
-          radar.blackouts.push_back({n[0], n[1]});
-        });
+        [&radar](const std::string& v) { radar.blackouts.push_back(parseInterval(v)); });
+    add("ghost-burst", "S,S", "START,DURATION in which all points are ghosts; may be repeated", "none",
+        [&radar](const std::string& v) { radar.ghost_bursts.push_back(parseInterval(v)); });
   }
 
   // `--name value` or `--name=value`. Throws std::invalid_argument with a message that names the option.
