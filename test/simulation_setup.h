@@ -1,5 +1,7 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cstdint>
@@ -42,6 +44,20 @@ inline Eigen::Vector3d expectedVelocity(const MotionState& s, const Extrinsics& 
   const Eigen::Matrix3d R_IW = s.q_WI.toRotationMatrix().transpose();
   const Eigen::Matrix3d R_RI = T_IR.q_IR.toRotationMatrix().transpose();
   return R_RI * (R_IW * s.v_W + so3::hat(s.omega_I) * T_IR.l_I);
+}
+
+/// That scans without errors show the offset and the mounting of `setup`.
+inline void expectExactEgoVelocity(const Motion& motion, const std::vector<SimulatedScan>& scans,
+                                   const RadarSetup& setup, Time start) {
+  ASSERT_GT(scans.size(), 100u);
+  for (const SimulatedScan& scan : scans) {
+    const double stamp = scan.stamp - start;
+    const double offset = setup.time_offset.at(stamp);
+    EXPECT_NEAR(scan.time_offset, offset, 1e-9);
+    const Eigen::Vector3d truth = expectedVelocity(motion.at(stamp - offset), setup.T_IR);
+    ASSERT_LT((leastSquaresVelocity(scan) - truth).norm(), 1e-6) << "stamp " << stamp;
+    ASSERT_LT((scan.v_R - truth).norm(), 1e-6) << "stamp " << stamp;
+  }
 }
 
 /// Points of the scans that were delivered, fewest first.

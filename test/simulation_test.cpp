@@ -79,6 +79,41 @@ TEST(Presets, AKartHasASparseCoarseRadarAndAnImuThatShakes) {
   }
 }
 
+TEST(Presets, AKartPairIsTheKartWithARadarToEitherSide) {
+  const Preset kart = presetOf("kart");
+  const Preset pair = presetOf("kart_pair");
+  EXPECT_EQ(pair.motion, kart.motion);
+  EXPECT_EQ(pair.options.imu.accel_vibration, kart.options.imu.accel_vibration);
+  ASSERT_EQ(pair.options.radars.size(), 2u);
+  const RadarSetup& left = pair.options.radars.at("left");
+  const RadarSetup& right = pair.options.radars.at("right");
+  EXPECT_EQ(left.T_IR.l_I, Eigen::Vector3d(1.0, 0.3, 0.0));
+  EXPECT_EQ(right.T_IR.l_I, Eigen::Vector3d(1.0, -0.3, 0.0));
+  for (const auto& [radar, side] : {std::pair(left, 1.0), std::pair(right, -1.0)}) {
+    const Eigen::Vector3d forward_I = radar.T_IR.q_IR * Eigen::Vector3d::UnitY();
+    EXPECT_NEAR(std::atan2(forward_I.y(), forward_I.x()), side * 0.5236, 1e-4);
+    EXPECT_NEAR(std::asin(forward_I.z()), 0.3840, 1e-4);
+    EXPECT_NEAR((radar.T_IR.q_IR * Eigen::Vector3d::UnitX()).z(), 0.0, 1e-9);
+  }
+  const Motion motion = makeMotion({pair.motion, 1, 40.0, pair.rest});
+  const SensorData data = simulate(motion, pair.options);
+  EXPECT_TRUE(data.scans.empty());
+  for (const auto& [name, scans] : data.radars) {
+    const std::vector<int> counts = sortedCounts(scans);
+    EXPECT_EQ(counts[counts.size() / 2], 6) << name;
+    EXPECT_NEAR(static_cast<double>(scans.size()) / motion.duration(), 30.0, 0.1) << name;
+    for (const SimulatedScan& scan : scans) {
+      for (const SimulatedPoint& point : scan.points)
+        ASSERT_EQ(point.doppler, 0.49 * std::round(point.doppler / 0.49));
+    }
+  }
+  // Same rate, and always a good part of the period apart.
+  const auto& a = data.radars.at("left");
+  const auto& b = data.radars.at("right");
+  for (std::size_t k = 0; k < std::min(a.size(), b.size()); ++k)
+    ASSERT_NEAR(b[k].stamp - a[k].stamp, 0.012, 1e-6);
+}
+
 TEST(Presets, AreKnownByName) {
   for (const Preset& preset : presets()) EXPECT_EQ(presetOf(preset.name).motion, preset.motion);
   try {
@@ -124,6 +159,101 @@ TEST(Simulation, TheOffsetLeavesTheImuAlone) {
   options.time_offset.constant = 0.1;
   const SensorData with = simulate(motion, options);
   EXPECT_EQ(without.imu.samples.back().acceleration, with.imu.samples.back().acceleration);
+}
+
+// --- Several radars
+
+bool same(const std::vector<SimulatedScan>& a, const std::vector<SimulatedScan>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const SimulatedScan& x, const SimulatedScan& y) {
+                      return x.stamp == y.stamp && x.arrival == y.arrival && x.delivered == y.delivered &&
+                             std::equal(x.points.begin(), x.points.end(), y.points.begin(), y.points.end(),
+                                        [](const SimulatedPoint& p, const SimulatedPoint& q) {
+                                          return p.position_R == q.position_R && p.doppler == q.doppler &&
+                                                 p.snr_db == q.snr_db && p.noise_db == q.noise_db;
+                                        });
+                    });
+}
+
+TEST(SeveralRadars, EachShowsItsOwnOffsetAndMounting) {
+  const Motion motion = builtIn("difficult");
+  SimulationOptions options = withoutErrors();
+  const RadarSetup& exact = options;
+  RadarSetup left = exact, right = exact;
+  left.time_offset.constant = -0.009;
+  left.T_IR.l_I = {0.1, 0.2, 0.0};
+  left.radar.rate = 12.0;
+  right.time_offset.constant = 0.04;
+  right.time_offset.steps = {{40.0, 0.03}};
+  right.T_IR.q_IR = Eigen::Quaterniond(0.8, -0.3, 0.4, 0.1).normalized();
+  options.radars = {{"left", left}, {"right", right}};
+  const SensorData data = simulate(motion, options);
+  EXPECT_TRUE(data.scans.empty());
+  ASSERT_EQ(data.radars.size(), 2u);
+  expectExactEgoVelocity(motion, data.radars.at("left"), left, options.start);
+  expectExactEgoVelocity(motion, data.radars.at("right"), right, options.start);
+  EXPECT_EQ(data.radars.at("left").size(), 1080u);
+  EXPECT_NEAR(static_cast<double>(data.radars.at("right").size()), 900.0, 1.0);
+}
+
+TEST(SeveralRadars, WhatOneMeasuresDoesNotDependOnTheOthers) {
+  const Motion motion = builtIn("medium", 1, 30.0);
+  SimulationOptions options;
+  options.seed = 3;
+  RadarSetup lossy;
+  lossy.radar.dropout_share = 0.3;
+  lossy.radar.latency_sigma = 0.01;
+  options.radars = {{"left", lossy}};
+  const std::vector<SimulatedScan> alone = simulate(motion, options).radars.at("left");
+  RadarSetup crowded;
+  crowded.radar.crowd = 4;
+  options.radars["front"] = crowded;
+  options.radars["right"] = lossy;
+  const SensorData all = simulate(motion, options);
+  EXPECT_TRUE(same(all.radars.at("left"), alone));
+  // The same setup under another name draws other numbers, and so does another seed.
+  EXPECT_FALSE(same(all.radars.at("left"), all.radars.at("right")));
+  std::size_t lost_apart = 0;
+  for (std::size_t k = 0; k < alone.size(); ++k)
+    lost_apart += all.radars.at("right")[k].delivered != alone[k].delivered ? 1 : 0;
+  EXPECT_GT(lost_apart, 60u);  // 0.42 of 300 where the losses are independent
+  options.seed = 4;
+  EXPECT_FALSE(same(simulate(motion, options).radars.at("left"), alone));
+}
+
+TEST(SeveralRadars, LeaveTheImuAlone) {
+  const Motion motion = builtIn("medium", 1, 30.0);
+  SimulationOptions options;
+  options.seed = 5;
+  const ImuData without = simulate(motion, options).imu;
+  options.radars = {{"left", RadarSetup{}}, {"right", RadarSetup{}}};
+  const ImuData with = simulate(motion, options).imu;
+  ASSERT_EQ(with.samples.size(), without.samples.size());
+  for (std::size_t i = 0; i < with.samples.size(); ++i) {
+    ASSERT_EQ(with.samples[i].acceleration, without.samples[i].acceleration) << i;
+    ASSERT_EQ(with.samples[i].angular_velocity, without.samples[i].angular_velocity) << i;
+    ASSERT_EQ(with.b_a[i], without.b_a[i]) << i;
+    ASSERT_EQ(with.b_g[i], without.b_g[i]) << i;
+  }
+}
+
+TEST(SeveralRadars, ABadOneIsNamed) {
+  const Motion motion = builtIn("easy", 1, 30.0);
+  for (const std::string name : {"", "Left", "left-1", "left/a", "lëft"}) {
+    SimulationOptions options;
+    options.radars = {{name, RadarSetup{}}};
+    EXPECT_THROW(simulate(motion, options), std::invalid_argument) << name;
+  }
+  SimulationOptions options;
+  options.radars = {{"left", RadarSetup{}}, {"right_2", RadarSetup{}}};
+  EXPECT_NO_THROW(simulate(motion, options));
+  options.radars["right_2"].radar.rate = 0.0;
+  try {
+    simulate(motion, options);
+    FAIL() << "no exception";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("'right_2'"), std::string::npos) << error.what();
+  }
 }
 
 TEST(Simulation, GroundTruthIsTheMotion) {
