@@ -269,17 +269,15 @@ std::pair<std::string, std::vector<OptionList::Given>> parseRadar(const std::str
 
 void addNamedRadars(OptionList& options, Request& r) {
   options.section(
-      "Several radars. KEY is an option of the two sections below, without dashes; a flag stands alone. What a\n"
-      "comes from the options outside. Each has reflectors, persons and ghosts of its own. --preset "
-      "kart_pair\n"
-      "--preset kart_pair has left and right: --radar changes one of them, or adds one of another name.\n"
+      "Several radars. KEY is an option of the two sections below, without dashes; a flag stands alone.\n"
+      "What a radar leaves out comes from the options outside. Each has its own reflectors, persons and\n"
+      "ghosts. --preset kart_pair has left and right: --radar changes one of them, or adds another.\n"
       "Topics, irs:       /sensor_platform/radar_NAME/scan, /sensor_platform/radar_NAME/trigger\n"
       "Topics, ti_mmwave: /ti_mmwave/radar_scan_pcl_NAME, /sensor_platform/radar_NAME/trigger");
   options
       .add("radar", "TEXT",
-           "\"NAME KEY=VALUE KEY=VALUE ...\": a radar, in the place of the one without a name; may be "
-           "repeated. "
-           "NAME: a-z, 0-9, _",
+           "\"NAME KEY=VALUE ...\", NAME of a-z, 0-9, _: a radar, in the place of the nameless; may be "
+           "repeated",
            "none",
            [&r](const std::string& v) {
              const auto [name, given] = parseRadar(v);
