@@ -40,6 +40,51 @@ def test_a_flat_radar_has_a_narrow_view_unless_one_is_given(simulate):
     assert narrow != ten
 
 
+RADARS = ("--motion", "easy", "--duration", "25", "--radar")
+
+
+def test_a_radar_takes_from_outside_what_it_leaves_out(simulate):
+    outside = ("--time-offset", 0.03, "--blackout", "16,1", "--no-elevation", "--time-offset-step", "20,0.1")
+    _, bag = simulate(*outside, *RADARS, "left", "--radar", "right time-offset=0.1 blackout=18,2 fov-elevation=20")
+    common = "time-offset-step=20,0.1 no-elevation"
+    _, spelled = simulate(*RADARS, f"right time-offset=0.1 blackout=18,2 fov-elevation=20 {common}",
+                          "--radar", f"left time-offset=0.03 blackout=16,1 {common}")
+    assert bag == spelled
+    _, otherwise = simulate(*RADARS, f"right time-offset=0.1 blackout=18,2 fov-elevation=20 {common}",
+                            "--radar", f"left time-offset=0.03 blackout=16,2 {common}")
+    assert bag != otherwise
+
+
+def test_options_may_be_repeated_within_a_radar(simulate):
+    done, twice = simulate(*RADARS, "left blackout=16,1 blackout=18,1 ghost-burst=20,1 ghost-burst=22,1")
+    assert "radar left: 230 scans of 250 triggers" in done.stdout
+    _, once = simulate(*RADARS, "left blackout=16,1 blackout=18,1 ghost-burst=20,1")
+    assert twice != once
+
+
+def test_each_radar_has_its_offset_in_the_summary(simulate):
+    done, _ = simulate("--noise-free", *RADARS, "left time-offset=-0.009 radar-rate=12", "--radar",
+                       "right time-offset=0.04 time-offset-step=20,0.1")
+    assert "radar left: 300 scans of 300 triggers" in done.stdout
+    assert "true time offset: -0.009000 s" in done.stdout
+    assert "true time offset: 0.040000 s at the start, 0.140000 s at the end" in done.stdout
+
+
+def test_a_pair_of_a_preset_may_be_changed(simulate):
+    pair = ("--preset", "kart_pair", "--duration", 20)
+    done, plain = simulate(*pair)
+    assert "radar left: " in done.stdout and "radar right: " in done.stdout
+    _, again = simulate(*pair)
+    assert plain == again
+    _, outside = simulate("--time-offset", 0.03, *pair)
+    _, both = simulate(*pair, "--radar", "left time-offset=0.03", "--radar", "right time-offset=0.03")
+    assert outside == both != plain
+    done, one = simulate(*pair, "--radar", "left ghost-burst=5,3", "--radar", "rear time-offset=0.07")
+    assert one != plain
+    assert [line.split(":")[0] for line in done.stdout.splitlines() if line.startswith("radar ")] == [
+        "radar left", "radar rear", "radar right"]
+
+
 @pytest.mark.parametrize("options, named", [
     (("--preset", "tank"), ("--preset", "kart")),
     (("--motion", "easy", "--doppler-span", "-1"), ("--doppler-span", "below 0")),
@@ -49,7 +94,19 @@ def test_a_flat_radar_has_a_narrow_view_unless_one_is_given(simulate):
     (("--motion", "easy", "--no-elevation=1"), ("--no-elevation", "takes no value")),
     (("--motion", "easy", "--skip-empty=yes"), ("--skip-empty", "takes no value")),
     (("--motion", "easy", "--no-elevation", "--fov-elevation", "0"), ("--fov-elevation", "above 0")),
+    (("--motion", "easy", "--ghost-burst", "5,0"), ("--ghost-burst", "positive duration")),
     (("--seed", "1"), ("--motion", "--trajectory", "--preset")),
+    (RADARS + ("left time-ofset=0.1",), ("--radar", "left", "'time-ofset'", "time-offset, time-offset-drift")),
+    (RADARS + ("left seed=3",), ("--radar", "left", "'seed'", "known are")),
+    (RADARS + ("left radar-rate=0",), ("--radar", "left", "radar-rate", "above 0")),
+    (RADARS + ("left radar-rate",), ("--radar", "left", "radar-rate=HZ", "missing")),
+    (RADARS + ("left no-elevation=1",), ("--radar", "left", "no-elevation", "takes no value")),
+    (RADARS + ("left points=3 points=4",), ("--radar", "left", "points", "twice")),
+    (RADARS + ("left doppler-span=3 doppler-step=0.49",), ("'left'", "doppler-span", "doppler-step")),
+    (RADARS + ("left", "--radar", "left time-offset=0.1"), ("--radar", "two radars", "'left'")),
+    (RADARS + ("Left",), ("'Left'", "lower case")),
+    (RADARS + ("time-offset=0.1",), ("'time-offset=0.1'", "lower case")),
+    (RADARS + ("",), ("radar ''", "lower case")),
 ])
 def test_a_bad_option_is_named(simulate, options, named):
     done, bag = simulate(*options)
@@ -61,5 +118,6 @@ def test_a_bad_option_is_named(simulate, options, named):
 
 def test_help_tells_of_presets_and_options(simulate):
     done, _ = simulate("--help")
-    for word in ("--preset NAME", "--points-min N", "--skip-empty", "--doppler-span M/S", "--no-elevation", "kart"):
+    for word in ("--preset NAME", "--points-min N", "--skip-empty", "--doppler-span M/S", "--no-elevation", "kart", "--radar TEXT",
+                 "--ghost-burst S,S", "--first-trigger S", "kart_pair", "its own reflectors, persons and"):
         assert word in done.stdout

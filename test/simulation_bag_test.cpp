@@ -10,6 +10,7 @@
 #include <std_msgs/Header.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
@@ -246,6 +247,112 @@ TEST(SimulationBag, TiMmwaveTopicsFieldsAndAxes) {
        read<std_msgs::Header>(bag.file.path(), "/sensor_platform/radar_right/trigger")) {
     EXPECT_EQ(nanoseconds(trigger.stamp), bag.data.scans.at(trigger.seq).stamp.nanoseconds());
   }
+}
+
+// The same motion with two radars: they differ in rate, offset and losses.
+struct WrittenPair {
+  explicit WrittenPair(const SimulationBagOptions& options)
+      : motion(simulation::makeMotion({"medium", 1, 25.0, simulation::MotionRestOptions{}})) {
+    simulated.seed = 1;
+    simulation::RadarSetup left, right;
+    left.time_offset.constant = 0.03;
+    right.radar.rate = 20.0;
+    right.radar.first_trigger = 0.06;
+    right.radar.blackouts = {{15.0, 1.0}};
+    simulated.radars = {{"left", left}, {"right", right}};
+    data = simulation::simulate(motion, simulated);
+    writeSimulationBag(file.path(), motion, data, simulated.start, options);
+  }
+
+  Motion motion;
+  SimulationOptions simulated;
+  SensorData data;
+  TemporaryFile file;
+};
+
+TEST(SimulationBag, SeveralRadarsHaveTopicsAndFramesOfTheirOwn) {
+  const WrittenPair bag{SimulationBagOptions{}};
+  const auto topics = topicsOf(bag.file.path());
+  ASSERT_EQ(topics.size(), 7u);
+  EXPECT_EQ(topics.at("/sensor_platform/radar_left/trigger").second, 250u);
+  EXPECT_EQ(topics.at("/sensor_platform/radar_left/scan").second, 250u);
+  EXPECT_EQ(topics.at("/sensor_platform/radar_right/trigger").second, 499u);
+  EXPECT_EQ(topics.at("/sensor_platform/radar_right/scan").second, 479u);
+  for (const std::string name : {"left", "right"}) {
+    const std::vector<simulation::SimulatedScan>& truth = bag.data.radars.at(name);
+    const std::string prefix = "/sensor_platform/radar_" + name;
+    for (const auto& [cloud, record_time] :
+         read<sensor_msgs::PointCloud2>(bag.file.path(), prefix + "/scan")) {
+      const simulation::SimulatedScan& scan = truth.at(cloud.header.seq);
+      EXPECT_EQ(cloud.header.frame_id, "radar_" + name);
+      ASSERT_EQ(nanoseconds(cloud.header.stamp), scan.stamp.nanoseconds());
+      ASSERT_EQ(fieldsOf(cloud).size(), 7u);
+      ASSERT_EQ(cloud.width, scan.points.size());
+      for (std::size_t i = 0; i < scan.points.size(); ++i) {
+        ASSERT_EQ(floatAt(cloud, i, 0), static_cast<float>(scan.points[i].position_R.x()));
+        ASSERT_EQ(floatAt(cloud, i, 16), static_cast<float>(scan.points[i].doppler));
+      }
+    }
+    for (const auto& [trigger, record_time] : read<std_msgs::Header>(bag.file.path(), prefix + "/trigger")) {
+      ASSERT_EQ(nanoseconds(trigger.stamp), truth.at(trigger.seq).stamp.nanoseconds());
+      EXPECT_EQ(trigger.frame_id, "radar_" + name);
+    }
+  }
+}
+
+TEST(SimulationBag, SeveralRadarsInTheFormatOfTiMmwave) {
+  SimulationBagOptions options;
+  options.format = BagFormat::kTiMmwave;
+  const WrittenPair bag{options};
+  ASSERT_EQ(topicsOf(bag.file.path()).size(), 7u);
+  for (const std::string name : {"left", "right"}) {
+    const auto scans = read<sensor_msgs::PointCloud2>(bag.file.path(), "/ti_mmwave/radar_scan_pcl_" + name);
+    ASSERT_GT(scans.size(), 200u);
+    for (const auto& [cloud, record_time] : scans) {
+      ASSERT_EQ(cloud.width, bag.data.radars.at(name).at(cloud.header.seq).points.size());
+      EXPECT_TRUE(cloud.header.stamp.isZero());
+      EXPECT_EQ(cloud.header.frame_id, "");
+      ASSERT_EQ(fieldsOf(cloud).size(), 5u);
+    }
+    const auto triggers =
+        read<std_msgs::Header>(bag.file.path(), "/sensor_platform/radar_" + name + "/trigger");
+    ASSERT_GT(triggers.size(), 200u);
+    for (const auto& [trigger, record_time] : triggers) EXPECT_EQ(trigger.frame_id, "radar_" + name);
+  }
+}
+
+// Every message of the topic, with its record time.
+template <typename Message>
+bool sameMessages(const std::string& a, const std::string& b, const std::string& topic) {
+  const auto first = read<Message>(a, topic), second = read<Message>(b, topic);
+  EXPECT_FALSE(first.empty());
+  return std::equal(
+      first.begin(), first.end(), second.begin(), second.end(),
+      [](const auto& x, const auto& y) { return x.record_time == y.record_time && x.message == y.message; });
+}
+
+TEST(SimulationBag, SeveralRadarsLeaveImuAndTruthAsTheyAre) {
+  const Written one{SimulationBagOptions{}};
+  const WrittenPair two{SimulationBagOptions{}};
+  const std::string &a = one.file.path(), &b = two.file.path();
+  EXPECT_TRUE(sameMessages<sensor_msgs::Imu>(a, b, "/sensor_platform/imu"));
+  EXPECT_TRUE(sameMessages<geometry_msgs::PoseStamped>(a, b, "/ground_truth/pose"));
+  EXPECT_TRUE(sameMessages<geometry_msgs::TwistStamped>(a, b, "/ground_truth/twist"));
+}
+
+TEST(SimulationBag, SeveralRadarsGiveTheSameBytesAndArriveInOrder) {
+  const WrittenPair first{SimulationBagOptions{}}, second{SimulationBagOptions{}};
+  EXPECT_TRUE(contentOf(first.file.path()) == contentOf(second.file.path()));
+  rosbag::Bag file(first.file.path(), rosbag::bagmode::Read);
+  ros::Time before;
+  std::string sequence;  // L and R, in the order of their triggers
+  for (const rosbag::MessageInstance& message : rosbag::View(file)) {
+    EXPECT_GE(message.getTime(), before);
+    before = message.getTime();
+    if (message.getTopic() == "/sensor_platform/radar_left/trigger") sequence += 'L';
+    if (message.getTopic() == "/sensor_platform/radar_right/trigger") sequence += 'R';
+  }
+  EXPECT_EQ(sequence.substr(0, 9), "LRRLRRLRR");
 }
 
 TEST(SimulationBag, SameRequestSameBytesOtherSeedOtherBytes) {

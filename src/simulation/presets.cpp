@@ -57,9 +57,23 @@ Preset kart() {
   return p;
 }
 
+// The kart with a second radar that looks to the other side. Nothing triggers both: they are out of phase.
+Preset kartPair() {
+  Preset p = kart();
+  p.name = "kart_pair";
+  p.summary = "the kart with two such radars, left and right, that look 30 degrees to either side";
+  const RadarSetup& left = p.options;
+  RadarSetup right = left;
+  right.T_IR.l_I.y() = -left.T_IR.l_I.y();
+  right.T_IR.q_IR = lookingTo(-30.0 * kDegree, 22.0 * kDegree);
+  right.radar.first_trigger = left.radar.first_trigger + 0.012;  // of 0.033 s
+  p.options.radars = {{"left", left}, {"right", right}};
+  return p;
+}
+
 }  // namespace
 
-std::vector<Preset> presets() { return {kart()}; }
+std::vector<Preset> presets() { return {kart(), kartPair()}; }
 
 Preset presetOf(const std::string& name) {
   const std::vector<Preset> known = presets();

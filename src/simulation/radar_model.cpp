@@ -27,6 +27,7 @@ void check(const RadarModelOptions& o) {
   };
   const auto is_share = [](double share) { return share >= 0.0 && share <= 1.0; };
   require(o.rate > 0.0, "rate must be positive");
+  require(o.first_trigger >= 0.0, "first trigger cannot be before the start");
   require(o.frame_length >= 0.0, "frame length cannot be negative");
   require(o.latency >= 0.0 && o.latency_sigma >= 0.0, "latency cannot be negative");
   require(o.points_mean > 0.0 && o.points_sigma >= 0.0 && o.points_max > 0,
@@ -136,7 +137,8 @@ class Sensor {
         scene_W_(makeScene(motion, seed, options.points_mean)),
         persons_(makePersons(motion, options, T_IR, seed)) {}
 
-  std::vector<SimulatedPoint> measure(double t, Random& random) const {
+  // Each point is a ghost with the chance of `ghost_share`.
+  std::vector<SimulatedPoint> measure(double t, double ghost_share, Random& random) const {
     const Frame frame = frameAt(t);
     const int wanted = std::clamp(
         static_cast<int>(std::lround(options_.points_mean + options_.points_sigma * random.gaussian())),
@@ -149,7 +151,7 @@ class Sensor {
     std::vector<SimulatedPoint> points;
     points.reserve(echoes.size());
     for (const Echo& echo : echoes) {
-      points.push_back(random.chance(options_.ghost_share) ? ghost(random) : detect(frame, echo, random));
+      points.push_back(random.chance(ghost_share) ? ghost(random) : detect(frame, echo, random));
     }
     return points;
   }
@@ -287,10 +289,10 @@ class Sensor {
   std::vector<Person> persons_;
 };
 
-bool inBlackout(double stamp, const RadarModelOptions& options) {
-  return std::any_of(
-      options.blackouts.begin(), options.blackouts.end(),
-      [&](const RadarModelOptions::Interval& b) { return stamp >= b.start && stamp < b.start + b.duration; });
+bool inAnyOf(const std::vector<RadarModelOptions::Interval>& intervals, double stamp) {
+  return std::any_of(intervals.begin(), intervals.end(), [&](const RadarModelOptions::Interval& i) {
+    return stamp >= i.start && stamp < i.start + i.duration;
+  });
 }
 
 }  // namespace
@@ -334,12 +336,11 @@ std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarModelO
                                          const TimeOffsetProfile& time_offset, const Extrinsics& T_IR,
                                          std::uint64_t seed, Time start) {
   check(options);
-  constexpr double kFirstTrigger = 0.05;  // [s]
   const Sensor sensor(motion, options, T_IR, seed);
   std::vector<SimulatedScan> scans;
   std::uint32_t seq = 0;
   for (std::uint32_t k = 0;; ++k) {
-    const double stamp = kFirstTrigger + k / options.rate;
+    const double stamp = options.first_trigger + k / options.rate;
     if (stamp > motion.duration()) break;
     SimulatedScan scan;
     scan.stamp = start + stamp;
@@ -353,10 +354,11 @@ std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarModelO
         scan.stamp + std::max(0.0, options.latency + options.latency_sigma * latency_random.gaussian());
     scan.v_R = radarVelocity(motion.at(measured), T_IR);
     Random dropout_random(seed, kDropoutStream, k);
-    scan.delivered = !inBlackout(stamp, options) && !dropout_random.chance(options.dropout_share);
+    scan.delivered = !inAnyOf(options.blackouts, stamp) && !dropout_random.chance(options.dropout_share);
     if (scan.delivered) {
       Random random(seed, kScanStream, k);
-      scan.points = sensor.measure(measured, random);
+      const double ghost_share = inAnyOf(options.ghost_bursts, stamp) ? 1.0 : options.ghost_share;
+      scan.points = sensor.measure(measured, ghost_share, random);
       scan.delivered = options.publish_empty || !scan.points.empty();
     }
     scans.push_back(std::move(scan));

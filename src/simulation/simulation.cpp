@@ -3,12 +3,48 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "rio_t/simulation/random.h"
+
 namespace rio_t::simulation {
+namespace {
+
+constexpr std::uint64_t kNamedRadarStream = 30;
+
+// A name becomes part of topics.
+void checkName(const std::string& name) {
+  if (name.empty() || name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") != std::string::npos) {
+    throw std::invalid_argument("the name must be of lower case letters, digits and underscores");
+  }
+}
+
+// By the name alone, so that a radar measures the same whichever others there are. FNV-1a, since std::hash
+// differs from library to library.
+std::uint64_t seedOf(const std::string& name, std::uint64_t seed) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
+  return Random(seed, kNamedRadarStream, hash).bits();
+}
+
+std::vector<SimulatedScan> scansOf(const Motion& motion, const RadarSetup& setup, std::uint64_t seed,
+                                   Time start) {
+  return simulateRadar(motion, setup.radar, setup.time_offset, setup.T_IR, seed, start);
+}
+
+}  // namespace
 
 SensorData simulate(const Motion& motion, const SimulationOptions& options) {
-  return {
-      simulateImu(motion, options.imu, options.seed, options.start),
-      simulateRadar(motion, options.radar, options.time_offset, options.T_IR, options.seed, options.start)};
+  SensorData data;
+  data.imu = simulateImu(motion, options.imu, options.seed, options.start);
+  if (options.radars.empty()) data.scans = scansOf(motion, options, options.seed, options.start);
+  for (const auto& [name, setup] : options.radars) {
+    try {
+      checkName(name);
+      data.radars[name] = scansOf(motion, setup, seedOf(name, options.seed), options.start);
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument("radar '" + name + "': " + error.what());
+    }
+  }
+  return data;
 }
 
 Trajectory groundTruth(const Motion& motion, double rate, Time start) {

@@ -14,7 +14,7 @@ struct Preset {
   std::string motion;         ///< a built-in one
   double duration = 0.0;      ///< [s] with rest; 0 = the motion's own
   MotionRestOptions rest;     ///< at both ends of the motion
-  SimulationOptions options;  ///< IMU, radar and mounting; seed, start and time offset are the defaults
+  SimulationOptions options;  ///< IMU, radars and mountings; seed, start and time offset are the defaults
 };
 
 /// The known presets.

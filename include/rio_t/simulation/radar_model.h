@@ -11,7 +11,8 @@
 namespace rio_t::simulation {
 
 struct RadarModelOptions {
-  double rate = 10.0;  ///< [Hz] of triggers
+  double rate = 10.0;           ///< [Hz] of triggers
+  double first_trigger = 0.05;  ///< [s] from the start of the bag: radars of one rate need not be in phase
   double frame_length =
       0.0;                ///< [s] the Doppler is the mean over it, centred at the measurement; 0 = an instant
   double latency = 0.06;  ///< [s] from stamp to arrival (record time)
@@ -47,10 +48,12 @@ struct RadarModelOptions {
     double start;     ///< [s] from the start of the bag
     double duration;  ///< [s]
   };
-  std::vector<Interval> blackouts;  ///< no scan with a stamp inside is delivered
+  std::vector<Interval> blackouts;     ///< no scan with a stamp inside is delivered
+  std::vector<Interval> ghost_bursts;  ///< all points of a scan with a stamp inside are ghosts
 
-  /// Exact points of static reflectors only, every scan delivered but for blackouts. What the sensor cannot
-  /// see or tell apart stays: field of view, elevation, Doppler span.
+  /// Exact points of static reflectors only, every scan delivered. What was asked for by its time stays:
+  /// blackouts and bursts of ghosts. So does what the sensor cannot see or tell apart: field of view,
+  /// elevation, Doppler span.
   void removeErrors();
 };
 

@@ -1,27 +1,42 @@
 #pragma once
 
+#include <map>
+#include <string>
+#include <vector>
+
 #include "rio_t/simulation/imu_model.h"
 #include "rio_t/simulation/radar_model.h"
 
 namespace rio_t::simulation {
 
-struct SimulationOptions {
-  std::uint64_t seed = 0;
-  Time start = Time::fromNanoseconds(1'700'000'000'000'000'000);  ///< stamp of the first IMU sample
-  ImuModelOptions imu;
+/// A radar on the rig: what it is, how late its stamps are, where it sits.
+struct RadarSetup {
   RadarModelOptions radar;
   TimeOffsetProfile time_offset;
   Extrinsics T_IR{Eigen::Vector3d(0.03, 0.03, -0.06),
                   Eigen::Quaterniond(0.00524, 0.69946, 0.71461, 0.00723).normalized()};  ///< of the IRS rig
 };
 
+/// A rig with one radar, the RadarSetup it is itself, unless `radars` names several.
+struct SimulationOptions : RadarSetup {
+  std::uint64_t seed = 0;
+  Time start = Time::fromNanoseconds(1'700'000'000'000'000'000);  ///< stamp of the first IMU sample
+  ImuModelOptions imu;
+  /// By name: lower case letters, digits and underscores. If there are any, they are all radars of the rig.
+  std::map<std::string, RadarSetup> radars;
+};
+
 /// What the sensors of one rig measure on one motion.
 struct SensorData {
   ImuData imu;
-  std::vector<SimulatedScan> scans;
+  std::vector<SimulatedScan> scans;                          ///< of the one radar; empty if radars have names
+  std::map<std::string, std::vector<SimulatedScan>> radars;  ///< of those with names
 };
 
-/// The same motion and options give the same data, bit for bit.
+/// The same motion and options give the same data, bit for bit. Radars with names draw from sequences of
+/// their own, picked by seed and name: what one of them measures does not depend on the others, nor does
+/// the IMU on any. Each has reflectors, persons and ghosts of its own.
+/// Throws std::invalid_argument for options out of range; the message names the radar.
 SensorData simulate(const Motion& motion, const SimulationOptions& options);
 
 /// True poses at `rate` [Hz] from the start to the end.

@@ -56,6 +56,7 @@ std::vector<float> tiMmwaveValues(const SimulatedPoint& p) {
           static_cast<float>(p.doppler)};
 }
 
+// Of the one radar of a rig.
 Layout layoutOf(BagFormat format) {
   if (format == BagFormat::kTiMmwave) {
     return {"/ti_mmwave/radar_scan_pcl",
@@ -80,12 +81,40 @@ Layout layoutOf(BagFormat format) {
       irsValues};
 }
 
-sensor_msgs::Imu imuMessage(const ImuMeasurement& sample, std::uint32_t seq, const Layout& layout) {
+// Of a radar with a name.
+Layout layoutOf(BagFormat format, const std::string& name) {
+  Layout layout = layoutOf(format);
+  const std::string radar = "radar_" + name;
+  layout.trigger_topic = "/sensor_platform/" + radar + "/trigger";
+  layout.trigger_frame = radar;
+  if (format == BagFormat::kTiMmwave) {
+    layout.scan_topic += "_" + name;
+  } else {
+    layout.scan_topic = "/sensor_platform/" + radar + "/scan";
+    layout.scan_frame = radar;
+  }
+  return layout;
+}
+
+// What one radar writes.
+struct RadarTrack {
+  const std::vector<SimulatedScan>* scans;
+  Layout layout;
+};
+
+std::vector<RadarTrack> tracksOf(const simulation::SensorData& data, BagFormat format) {
+  if (data.radars.empty()) return {{&data.scans, layoutOf(format)}};
+  std::vector<RadarTrack> tracks;
+  for (const auto& [name, scans] : data.radars) tracks.push_back({&scans, layoutOf(format, name)});
+  return tracks;
+}
+
+sensor_msgs::Imu imuMessage(const ImuMeasurement& sample, std::uint32_t seq, double orientation_covariance) {
   sensor_msgs::Imu message;
   message.header.seq = seq;
   message.header.stamp = toRosTime(sample.time);
   message.header.frame_id = "base_link";
-  message.orientation_covariance[0] = layout.orientation_covariance;
+  message.orientation_covariance[0] = orientation_covariance;
   tf2::toMsg(sample.angular_velocity, message.angular_velocity);
   tf2::toMsg(sample.acceleration, message.linear_acceleration);
   return message;
@@ -157,19 +186,22 @@ struct Arrival {
   Time time;
   Kind kind;
   std::size_t index;
+  const RadarTrack* radar = nullptr;  // of a trigger or a scan
 };
 
-std::vector<Arrival> arrivals(const simulation::SensorData& data, const std::vector<Time>& truth_times,
-                              const SimulationBagOptions& options) {
+std::vector<Arrival> arrivals(const simulation::SensorData& data, const std::vector<RadarTrack>& radars,
+                              const std::vector<Time>& truth_times, const SimulationBagOptions& options) {
   std::vector<Arrival> all;
-  all.reserve(truth_times.size() + data.imu.samples.size() + 2 * data.scans.size());
   for (std::size_t i = 0; i < truth_times.size(); ++i) all.push_back({truth_times[i], Kind::kTruth, i});
   for (std::size_t i = 0; i < data.imu.samples.size(); ++i) {
     all.push_back({data.imu.samples[i].time + options.imu_latency, Kind::kImu, i});
   }
-  for (std::size_t i = 0; i < data.scans.size(); ++i) {
-    all.push_back({data.scans[i].stamp + options.imu_latency, Kind::kTrigger, i});
-    if (data.scans[i].delivered) all.push_back({data.scans[i].arrival, Kind::kScan, i});
+  for (const RadarTrack& radar : radars) {
+    for (std::size_t i = 0; i < radar.scans->size(); ++i) {
+      const SimulatedScan& scan = (*radar.scans)[i];
+      all.push_back({scan.stamp + options.imu_latency, Kind::kTrigger, i, &radar});
+      if (scan.delivered) all.push_back({scan.arrival, Kind::kScan, i, &radar});
+    }
   }
   std::stable_sort(all.begin(), all.end(),
                    [](const Arrival& a, const Arrival& b) { return a.time < b.time; });
@@ -181,7 +213,8 @@ std::vector<Arrival> arrivals(const simulation::SensorData& data, const std::vec
 void writeSimulationBag(const std::string& path, const simulation::Motion& motion,
                         const simulation::SensorData& data, Time start, const SimulationBagOptions& options) {
   if (!(options.ground_truth_rate > 0.0)) throw std::invalid_argument("ground truth: rate must be positive");
-  const Layout layout = layoutOf(options.format);
+  const std::vector<RadarTrack> radars = tracksOf(data, options.format);
+  const double orientation_covariance = layoutOf(options.format).orientation_covariance;
   std::vector<Time> truth_times;
   const auto truth_count =
       static_cast<std::size_t>(std::floor(motion.duration() * options.ground_truth_rate)) + 1;
@@ -191,7 +224,7 @@ void writeSimulationBag(const std::string& path, const simulation::Motion& motio
 
   try {
     rosbag::Bag bag(path, rosbag::bagmode::Write);
-    for (const Arrival& arrival : arrivals(data, truth_times, options)) {
+    for (const Arrival& arrival : arrivals(data, radars, truth_times, options)) {
       const ros::Time record = toRosTime(arrival.time + options.record_offset);
       const auto seq = static_cast<std::uint32_t>(arrival.index);
       switch (arrival.kind) {
@@ -203,13 +236,16 @@ void writeSimulationBag(const std::string& path, const simulation::Motion& motio
           break;
         }
         case Kind::kImu:
-          bag.write("/sensor_platform/imu", record, imuMessage(data.imu.samples[arrival.index], seq, layout));
+          bag.write("/sensor_platform/imu", record,
+                    imuMessage(data.imu.samples[arrival.index], seq, orientation_covariance));
           break;
         case Kind::kTrigger:
-          bag.write(layout.trigger_topic, record, triggerMessage(data.scans[arrival.index], layout));
+          bag.write(arrival.radar->layout.trigger_topic, record,
+                    triggerMessage((*arrival.radar->scans)[arrival.index], arrival.radar->layout));
           break;
         case Kind::kScan:
-          bag.write(layout.scan_topic, record, scanMessage(data.scans[arrival.index], layout));
+          bag.write(arrival.radar->layout.scan_topic, record,
+                    scanMessage((*arrival.radar->scans)[arrival.index], arrival.radar->layout));
           break;
       }
     }

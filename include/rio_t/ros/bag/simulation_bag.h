@@ -26,8 +26,13 @@ struct SimulationBagOptions {
 /// Both formats: /sensor_platform/imu, /ground_truth/pose (PoseStamped of I in W), /ground_truth/twist
 /// (TwistStamped, linear and angular velocity both in W). IRS: /sensor_platform/radar/scan and
 /// /sensor_platform/radar/trigger. ti_mmwave: /ti_mmwave/radar_scan_pcl and
-/// /sensor_platform/radar_right/trigger. Lost scans keep their trigger. Throws std::runtime_error naming the
-/// file if it cannot be written.
+/// /sensor_platform/radar_right/trigger. Lost scans keep their trigger.
+///
+/// Radars with names, IRS: /sensor_platform/radar_NAME/scan and /sensor_platform/radar_NAME/trigger, both in
+/// the frame radar_NAME. ti_mmwave: /ti_mmwave/radar_scan_pcl_NAME, without frame as that driver leaves it,
+/// and /sensor_platform/radar_NAME/trigger in the frame radar_NAME.
+///
+/// Throws std::runtime_error naming the file if it cannot be written.
 void writeSimulationBag(const std::string& path, const simulation::Motion& motion,
                         const simulation::SensorData& data, Time start, const SimulationBagOptions& options);
 
