@@ -45,5 +45,43 @@ TEST(RosParameters, FaultsNameTheParameterWithItsNamespace) {
   }
 }
 
+TEST(RosParameters, NamespacesAreTheSectionsOfRadars) {
+  XmlRpc::XmlRpcValue map = serverMap();
+  map["radars"][0] = std::string("left");
+  map["radars"][1] = std::string("right");
+  map["left"]["radar_topic"] = std::string("/left");
+  map["right"]["radar_topic"] = std::string("/right");
+  map["right"]["radar_min_range"] = 1;
+  for (int k = 0; k < 3; ++k) map["right"]["extrinsics_translation"][k] = 1.0 + k;
+  const std::vector<Config> radars = configsOfRadars(makeConfig(toParameterEntries(map, "/rio_t")));
+  ASSERT_EQ(radars.size(), 2U);
+  EXPECT_EQ(radars[0].radar_topic, "/left");
+  EXPECT_EQ(radars[0].odometry.T_IR.l_I, Eigen::Vector3d(0.0, 0.5, 1.0));
+  EXPECT_EQ(radars[1].radar_topic, "/right");
+  EXPECT_EQ(radars[1].odometry.ego_velocity.min_range, 1.0);
+  EXPECT_EQ(radars[1].odometry.T_IR.l_I, Eigen::Vector3d(1.0, 2.0, 3.0));
+}
+
+TEST(RosParameters, FaultsInASectionNameItsNamespace) {
+  XmlRpc::XmlRpcValue map;
+  map["radars"][0] = std::string("left");
+  map["left"]["radar_min_range"] = std::string("near");
+  map["left"]["window"] = 1.0;
+  map["left"]["radar_topic"]["deeper"] = 1.0;
+  try {
+    makeConfig(toParameterEntries(map, "/rio_t"));
+    FAIL();
+  } catch (const ConfigError& error) {
+    ASSERT_EQ(error.faults().size(), 3U) << error.what();
+    const std::string text = error.what();
+    EXPECT_NE(text.find("parameter /rio_t/left/radar_min_range: left/radar_min_range: expected"),
+              std::string::npos)
+        << text;
+    EXPECT_NE(text.find("parameter /rio_t/left/window: left/window: window holds for all"), std::string::npos)
+        << text;
+    EXPECT_NE(text.find("parameter /rio_t/left/radar_topic"), std::string::npos) << text;
+  }
+}
+
 }  // namespace
 }  // namespace rio_t

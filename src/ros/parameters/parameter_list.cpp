@@ -47,6 +47,13 @@ bool isOneLine(const std::string& text) {
   return std::none_of(text.begin(), text.end(), [](char c) { return (c >= 0 && c < ' ') || c == '\x7f'; });
 }
 
+/// What a radar may be called: its name becomes part of keys, topics and file names.
+bool isRadarName(const std::string& text) {
+  return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
+  });
+}
+
 std::string listText(std::initializer_list<double> numbers) {
   std::string text = "[";
   for (const double x : numbers) text += (text.size() > 1 ? ", " : "") + numberText(x);
@@ -103,7 +110,7 @@ std::string Range::text() const {
 void ParameterList::add(const std::string& key, const std::string& unit, const std::string& expected,
                         const std::string& meaning, std::function<bool(const ParameterValue&)> set,
                         std::function<std::string()> print) {
-  all_.push_back({{key, group_, unit, expected, meaning}, std::move(set), std::move(print)});
+  all_.push_back({{key, group_, unit, expected, meaning, of_radar_}, std::move(set), std::move(print)});
 }
 
 void ParameterList::number(const std::string& key, const std::string& unit, Range range, double& member,
@@ -195,6 +202,33 @@ void ParameterList::word(const std::string& key, const std::vector<std::string>&
   choices.reserve(words.size());
   for (const std::string& each : words) choices.emplace_back(each, each);
   choice<std::string>(key, choices, member, meaning);
+}
+
+void ParameterList::radarNames(const std::string& key, std::vector<Config>& member,
+                               const std::string& meaning) {
+  add(
+      key, "", "a list of different names of lower case letters, digits and _", meaning,
+      [&member](const ParameterValue& value) {
+        const ParameterValue::List* list = std::get_if<ParameterValue::List>(&value.data);
+        if (list == nullptr) return false;
+        std::vector<Config> radars;
+        for (const ParameterValue& element : *list) {
+          const std::string* name = std::get_if<std::string>(&element.data);
+          if (name == nullptr || !isRadarName(*name)) return false;
+          for (const Config& other : radars) {
+            if (other.radar_name == *name) return false;
+          }
+          radars.emplace_back().radar_name = *name;
+        }
+        member = std::move(radars);
+        return true;
+      },
+      [&member] {
+        std::string text = "[";
+        for (const Config& radar : member)
+          text += (text.size() > 1 ? ", " : "") + quotedText(radar.radar_name);
+        return text + "]";
+      });
 }
 
 }  // namespace rio_t

@@ -33,8 +33,13 @@ struct Range {
 /// Collects parameters; one method for each kind of value. The members must outlive the list.
 class ParameterList {
  public:
-  /// Title of the section that the next parameters stand in.
-  void group(const std::string& title) { group_ = title; }
+  /// Title of the section that the next parameters stand in. They hold for all radars.
+  void group(const std::string& title) {
+    group_ = title;
+    of_radar_ = false;
+  }
+  /// Whether each radar may have its own of the next parameters.
+  void ofRadar(bool of_radar) { of_radar_ = of_radar; }
 
   void number(const std::string& key, const std::string& unit, Range range, double& member,
               const std::string& meaning);
@@ -55,6 +60,8 @@ class ParameterList {
   /// One of several words, kept as text.
   void word(const std::string& key, const std::vector<std::string>& words, std::string& member,
             const std::string& meaning);
+  /// The names of radars; sets nothing but their names.
+  void radarNames(const std::string& key, std::vector<Config>& member, const std::string& meaning);
 
   const std::vector<Parameter>& all() const { return all_; }
 
@@ -64,6 +71,7 @@ class ParameterList {
            std::function<std::string()> print);
 
   std::string group_;
+  bool of_radar_ = false;
   std::vector<Parameter> all_;
 };
 

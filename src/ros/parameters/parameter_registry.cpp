@@ -17,16 +17,26 @@ Range inside(double min, double max) { return {min, max, true, true}; }
 void listTopics(ParameterList& list, Config& c) {
   list.group("Topics");
   list.text("imu_topic", c.imu_topic, "sensor_msgs/Imu");
+  list.ofRadar(true);
   list.text("radar_topic", c.radar_topic, "sensor_msgs/PointCloud2");
   list.textOrEmpty(
       "trigger_topic", c.trigger_topic,
       "std_msgs/Header, stamped in the IMU clock when a scan starts; only read with stamp_source: trigger");
+  list.ofRadar(false);
   list.textOrEmpty("ground_truth_topic", c.ground_truth_topic,
                    "geometry_msgs/PoseStamped of the IMU, for the errors in summary.yaml; bag runner only");
 }
 
+void listRadars(ParameterList& list, Config& c) {
+  list.group("Several radars");
+  list.radarNames("radars", c.radars,
+                  "each name has a section (left: {radar_topic: ...}) with what this radar has of its own of "
+                  "the keys marked \"per radar\"; []: one radar, without section");
+}
+
 void listStamps(ParameterList& list, Config& c) {
   list.group("Stamps of the scans");
+  list.ofRadar(true);
   list.choice<StampSource>(
       "stamp_source",
       {{"header", StampSource::kHeader},
@@ -43,7 +53,10 @@ void listFrames(ParameterList& list, Config& c) {
   list.group("Frames");
   list.text("odom_frame", c.odom_frame, "world frame, z up, starts at the IMU");
   list.text("base_link_frame", c.base_link_frame, "frame of the IMU");
-  list.text("radar_frame", c.radar_frame, "frame of the radar: x right, y forward, z up");
+  list.ofRadar(true);
+  list.text("radar_frame", c.radar_frame,
+            "frame of the radar: x right, y forward, z up; radar_NAME where `radars` has names");
+  list.ofRadar(false);
   list.boolean("publish_tf", c.publish_tf, "publish odom_frame -> base_link_frame; live node only");
   list.boolean("invert_tf", c.invert_tf,
                "publish base_link_frame -> odom_frame instead, where base_link_frame has another parent");
@@ -58,6 +71,7 @@ void listLiveNode(ParameterList& list, Config& c) {
 
 void listPointCloud(ParameterList& list, Config& c) {
   list.group("Point cloud: a preset, and what differs from it (\"\" and 0: as in the preset)");
+  list.ofRadar(true);
   list.word("radar_format", pointCloudPresets(), c.radar_format,
             "layout of the cloud: names, axes, sign and power");
   list.word("radar_coordinates", {"", "cartesian", "spherical"}, c.radar_overrides.coordinates,
@@ -84,6 +98,7 @@ void listPointCloud(ParameterList& list, Config& c) {
 
 void listExtrinsics(ParameterList& list, Config& c) {
   list.group("T_IR: pose of the radar (x right, y forward, z up) in the IMU frame");
+  list.ofRadar(true);
   list.choice<ExtrinsicsSource>(
       "extrinsics_source", {{"parameters", ExtrinsicsSource::kParameters}, {"tf", ExtrinsicsSource::kTf}},
       c.extrinsics_source,
@@ -92,6 +107,25 @@ void listExtrinsics(ParameterList& list, Config& c) {
   list.vector3("extrinsics_translation", "m", between(-100, 100), c.odometry.T_IR.l_I,
                "origin of the radar in the IMU frame, x, y, z");
   list.rotation("extrinsics_rotation_xyzw", c.odometry.T_IR.q_IR, "turns radar vectors into the IMU frame");
+}
+
+void listEstimateExtrinsics(ParameterList& list, Config& c) {
+  SmootherOptions& smoother = c.odometry.smoother;
+  list.group("Estimate of T_IR: what is told is where it starts");
+  list.choice<EstimateExtrinsics>("estimate_extrinsics",
+                                  {{"none", EstimateExtrinsics::kNone},
+                                   {"rotation", EstimateExtrinsics::kRotation},
+                                   {"pose", EstimateExtrinsics::kPose}},
+                                  smoother.estimate_extrinsics,
+                                  "take T_IR as told; or estimate its rotation; or translation, too");
+  list.number("extrinsics_rotation_sigma", "rad", above(0, kPi), smoother.extrinsics_rotation_sigma,
+              "standard deviation of the rotation told, about each axis");
+  list.number("extrinsics_translation_sigma", "m", above(0, 100), smoother.extrinsics_translation_sigma,
+              "standard deviation of the translation told, per axis");
+  list.number("extrinsics_rotation_noise", "rad/sqrt(s)", above(0), smoother.extrinsics_rotation_noise,
+              "random walk of the rotation, about each axis");
+  list.number("extrinsics_translation_noise", "m/sqrt(s)", above(0), smoother.extrinsics_translation_noise,
+              "random walk of the translation, per axis");
 }
 
 void listImu(ParameterList& list, Config& c) {
@@ -199,6 +233,7 @@ void listRest(ParameterList& list, Config& c) {
 void listEgoVelocity(ParameterList& list, Config& c) {
   EgoVelocityOptions& radar = c.odometry.ego_velocity;
   list.group("Radar: which points count, and the velocity from them");
+  list.ofRadar(true);
   list.number("radar_min_range", "m", atLeast(0), radar.min_range, "nearer points are left out");
   list.number("radar_max_range", "m", above(0), radar.max_range, "farther points are left out");
   list.number("radar_min_snr_db", "dB", anyNumber(), radar.min_snr_db, "weaker points are left out");
@@ -273,10 +308,14 @@ void listTimeOffset(ParameterList& list, Config& c) {
       {{"constant_acceleration", TimeOffsetModel::kConstantAcceleration}, {"imu", TimeOffsetModel::kImu}},
       smoother.time_offset_model,
       "the paper's, one acceleration times the offset; or the IMU itself over the offset");
+  list.boolean("time_offset_shared", smoother.time_offset_shared,
+               "all radars have one clock, and so one offset; false: each has its own");
+  list.ofRadar(true);
   list.number("time_offset_initial", "s", anyNumber(), smoother.time_offset_initial,
               "where the estimate starts");
   list.number("time_offset_sigma", "s", above(0), smoother.time_offset_sigma,
               "standard deviation of that start");
+  list.ofRadar(false);
   list.number("time_offset_noise", "s/sqrt(s)", above(0), smoother.time_offset_noise,
               "random walk of the offset; it grows by itself while the scans ask for a change all the time, "
               "as they do where clocks drift");
@@ -354,10 +393,12 @@ void listBag(ParameterList& list, Config& c) {
 ParameterList parametersOf(Config& config) {
   ParameterList list;
   listTopics(list, config);
+  listRadars(list, config);
   listStamps(list, config);
   listFrames(list, config);
   listPointCloud(list, config);
   listExtrinsics(list, config);
+  listEstimateExtrinsics(list, config);
   listImu(list, config);
   listGaps(list, config);
   listInitialization(list, config);

@@ -6,6 +6,7 @@
 #include <array>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <locale>
 #include <map>
@@ -36,7 +37,7 @@ ParameterValue fromYamlScalar(const YAML::Node& node) {
 ParameterValue fromYaml(const YAML::Node& node) {
   if (!node.IsDefined() || node.IsNull()) return {};
   if (node.IsScalar()) return fromYamlScalar(node);
-  if (node.IsMap()) return {ParameterValue::Map{}};
+  if (node.IsMap()) return {ParameterValue::Map{}};  // no deeper than a section
   ParameterValue::List list;
   for (const auto& element : node) {
     // No deeper: no parameter takes lists of lists, and by its anchors a list may hold itself.
@@ -49,6 +50,32 @@ ParameterValue fromYaml(const YAML::Node& node) {
     }
   }
   return {std::move(list)};
+}
+
+/// Where a line of the YAML text stands, for messages.
+using OriginOfLine = std::function<std::string(int line)>;
+
+/// The entries of a map, and of the maps in it if `sections`.
+ParameterEntries fromYamlMap(const YAML::Node& map, bool sections, const OriginOfLine& originOf) {
+  ParameterEntries entries;
+  std::map<std::string, int> line_of;
+  for (const auto& item : map) {
+    const int line = item.first.Mark().line + 1;
+    const std::string origin = originOf(line);
+    if (!item.first.IsScalar())
+      throw std::runtime_error(origin + ": expected `key: value`, the key is no text");
+    const std::string key = item.first.Scalar();
+    const auto [first, is_new] = line_of.emplace(key, line);
+    if (!is_new) {
+      throw std::runtime_error(origin + ": " + key + ": expected each key once, it stands in line " +
+                               std::to_string(first->second) + " too");
+    }
+    ParameterValue value = sections && item.second.IsMap()
+                               ? ParameterValue{fromYamlMap(item.second, false, originOf)}
+                               : fromYaml(item.second);
+    entries.push_back({key, std::move(value), origin});
+  }
+  return entries;
 }
 
 // By hand, since std::regex takes one stack frame a letter and a parameter file may have long lines.
@@ -103,7 +130,7 @@ std::string ParameterValue::describe() const {
       for (const ParameterValue& value : list) text += (text.size() > 1 ? ", " : "") + value.describe();
       return text + "]";
     }
-    std::string operator()(Map) const { return "nested keys"; }
+    std::string operator()(const Map&) const { return "nested keys"; }
   };
   return std::visit(Describe{}, data);
 }
@@ -149,23 +176,7 @@ ParameterEntries readParameters(std::istream& yaml, const std::string& name) {
   }
   if (!root.IsDefined() || root.IsNull()) return {};
   if (!root.IsMap()) throw std::runtime_error(name + ":1: expected one `key: value` a line");
-
-  ParameterEntries entries;
-  std::map<std::string, int> line_of;
-  for (const auto& item : root) {
-    const int line = item.first.Mark().line + 1;
-    const std::string origin = name + ":" + std::to_string(line);
-    if (!item.first.IsScalar())
-      throw std::runtime_error(origin + ": expected `key: value`, the key is no text");
-    const std::string key = item.first.Scalar();
-    const auto [first, is_new] = line_of.emplace(key, line);
-    if (!is_new) {
-      throw std::runtime_error(origin + ": " + key + ": expected each key once, it stands in line " +
-                               std::to_string(first->second) + " too");
-    }
-    entries.push_back({key, fromYaml(item.second), origin});
-  }
-  return entries;
+  return fromYamlMap(root, true, [&](int line) { return name + ":" + std::to_string(line); });
 }
 
 ParameterEntry parseAssignment(const std::string& text) {
@@ -174,9 +185,14 @@ ParameterEntry parseAssignment(const std::string& text) {
     throw std::invalid_argument("--set " + text + ": expected key=value");
   }
   try {
-    return {text.substr(0, equals), fromYaml(YAML::Load(text.substr(equals + 1))), "--set"};
+    const YAML::Node value = YAML::Load(text.substr(equals + 1));
+    const std::string key = text.substr(0, equals);
+    if (!value.IsMap()) return {key, fromYaml(value), "--set"};
+    return {key, {fromYamlMap(value, false, [](int) { return "--set"; })}, "--set"};
   } catch (const YAML::Exception& error) {
     throw std::invalid_argument("--set " + text + ": the value is not YAML (" + error.msg + ")");
+  } catch (const std::runtime_error& error) {
+    throw std::invalid_argument(error.what());
   }
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <utility>
 
 #include "parameter_list.h"
@@ -28,38 +29,208 @@ std::size_t editDistance(const std::string& a, const std::string& b) {
   return row.back();
 }
 
-std::string unknownKey(const ParameterEntry& entry, const std::vector<Parameter>& all) {
+const Parameter* find(const ParameterList& list, const std::string& key) {
+  const auto found = std::find_if(list.all().begin(), list.all().end(),
+                                  [&](const Parameter& each) { return each.description.key == key; });
+  return found == list.all().end() ? nullptr : &*found;
+}
+
+/// `section`: empty, or that of a radar as "left/".
+std::string unknownKey(const ParameterEntry& entry, const std::string& section, const ParameterList& list) {
   const std::string looked_for = entry.key.substr(0, 100);  // the time grows with the length
   const Parameter* nearest = nullptr;
   std::size_t least = 0;
-  for (const Parameter& each : all) {
+  for (const Parameter& each : list.all()) {
+    if (!section.empty() && !each.description.of_radar) continue;
     const std::size_t distance = editDistance(each.description.key, looked_for);
     if (nearest != nullptr && distance >= least) continue;
     nearest = &each;
     least = distance;
   }
-  return entry.origin + ": unknown parameter \"" + entry.key + "\"; did you mean \"" +
+  return entry.origin + ": unknown parameter \"" + section + entry.key + "\"; did you mean \"" + section +
          nearest->description.key + "\"? (config/estimator.yaml lists all)";
 }
 
-/// What single values cannot show.
-std::vector<std::string> contradictions(const Config& config) {
-  std::vector<std::string> faults;
+/// Sets the parameter of that key; what is wrong goes into `faults`.
+void setParameter(const ParameterEntry& entry, const std::string& section, const ParameterList& list,
+                  std::vector<std::string>* faults) {
+  const Parameter* parameter = find(list, entry.key);
+  if (parameter == nullptr) {
+    faults->push_back(unknownKey(entry, section, list));
+    return;
+  }
+  const ParameterDescription& about = parameter->description;
+  if (!section.empty() && !about.of_radar) {
+    faults->push_back(entry.origin + ": " + section + entry.key + ": " + entry.key +
+                      " holds for all radars; expected it at the top level, not in the section of a radar");
+  } else if (!parameter->set(entry.value)) {
+    faults->push_back(entry.origin + ": " + section + entry.key + ": expected " + about.expected +
+                      (about.unit.empty() ? "" : " [" + about.unit + "]") + ", got " +
+                      entry.value.describe());
+  }
+}
+
+/// The radar's configuration before its section is read: two radars share all but the frame.
+Config withoutSection(const Config& top_level, const std::string& name) {
+  Config config = top_level;
+  config.radars.clear();
+  config.radar_name = name;
+  config.radar_frame = "radar_" + name;
+  return config;
+}
+
+RadarOptions radarOptions(const Config& config) {
+  const OdometryOptions& odometry = config.odometry;
+  return {config.radar_name, odometry.T_IR, odometry.ego_velocity, odometry.smoother.time_offset_initial,
+          odometry.smoother.time_offset_sigma};
+}
+
+/// "left, right"
+std::string namesOf(const std::vector<Config>& radars) {
+  std::string names;
+  for (const Config& radar : radars) names += (names.empty() ? "" : ", ") + radar.radar_name;
+  return names;
+}
+
+bool isRadar(const std::string& name, const std::vector<Config>& radars) {
+  return std::any_of(radars.begin(), radars.end(),
+                     [&](const Config& each) { return each.radar_name == name; });
+}
+
+struct Section {
+  std::string origin;  // of what stands first in it
+  ParameterEntries entries;
+};
+
+/// Entries of the top level, and those of each section: nested keys, or `name/key`.
+struct SortedEntries {
+  ParameterEntries top_level;
+  std::map<std::string, Section> sections;  // by name
+};
+
+SortedEntries sortedEntries(const ParameterEntries& entries, const ParameterList& list) {
+  SortedEntries result;
+  for (const ParameterEntry& entry : entries) {
+    const std::size_t slash = entry.key.find('/');
+    const auto* nested = std::get_if<ParameterValue::Map>(&entry.value.data);
+    if (slash != std::string::npos) {
+      Section& section =
+          result.sections.try_emplace(entry.key.substr(0, slash), Section{entry.origin, {}}).first->second;
+      section.entries.push_back({entry.key.substr(slash + 1), entry.value, entry.origin});
+    } else if (nested != nullptr && find(list, entry.key) == nullptr) {
+      Section& section = result.sections.try_emplace(entry.key, Section{entry.origin, {}}).first->second;
+      section.entries.insert(section.entries.end(), nested->begin(), nested->end());
+    } else {
+      result.top_level.push_back(entry);
+    }
+  }
+  return result;
+}
+
+/// The values of the top level, `radars` with no more than their names; what is wrong goes into `faults`.
+void setTopLevel(const ParameterEntries& entries, const ParameterList& list,
+                 const std::vector<Config>& radars, std::vector<std::string>* faults) {
+  // First, since it says which other keys there are.
+  for (const ParameterEntry& entry : entries) {
+    if (entry.key == "radars") setParameter(entry, "", list, faults);
+  }
+  for (const ParameterEntry& entry : entries) {
+    if (entry.key == "radars") continue;
+    if (find(list, entry.key) != nullptr || !isRadar(entry.key, radars)) {
+      setParameter(entry, "", list, faults);
+    } else if (!std::holds_alternative<std::monostate>(entry.value.data)) {  // `left:` and no more
+      faults->push_back(entry.origin + ": " + entry.key + ": expected nested keys, as " + entry.key +
+                        " is the name of a radar, got " + entry.value.describe());
+    }
+  }
+  for (const Config& radar : radars) {
+    if (find(list, radar.radar_name) == nullptr) continue;
+    faults->push_back("radars: expected names that are no parameters, got \"" + radar.radar_name + "\"");
+  }
+}
+
+/// Completes `radars`, whose names are known, from the top level and the sections.
+void setRadars(const std::map<std::string, Section>& sections, const Config& top_level,
+               std::vector<Config>* radars, std::vector<std::string>* faults) {
+  for (const auto& [name, section] : sections) {
+    if (isRadar(name, *radars)) continue;
+    faults->push_back(section.origin + ": unknown parameter \"" + name +
+                      "\" with keys of its own; expected the name of a radar, and `radars` has " +
+                      (radars->empty() ? "none" : namesOf(*radars)));
+  }
+  for (Config& radar : *radars) {
+    radar = withoutSection(top_level, radar.radar_name);
+    const auto section = sections.find(radar.radar_name);
+    if (section == sections.end()) continue;
+    const ParameterList list = parametersOf(radar);
+    for (const ParameterEntry& entry : section->second.entries)
+      setParameter(entry, radar.radar_name + "/", list, faults);
+  }
+}
+
+/// What single values of one radar cannot show.
+void addContradictions(const Config& config, std::vector<std::string>* faults) {
+  const std::string section = config.radar_name.empty() ? "" : config.radar_name + "/";
   const EgoVelocityOptions& radar = config.odometry.ego_velocity;
   const SmootherOptions& smoother = config.odometry.smoother;
   if (radar.min_range >= radar.max_range) {
-    faults.push_back("radar_min_range: expected less than radar_max_range (" + numberText(radar.max_range) +
-                     " m), got " + numberText(radar.min_range));
+    faults->push_back(section + "radar_min_range: expected less than radar_max_range (" +
+                      numberText(radar.max_range) + " m), got " + numberText(radar.min_range));
   }
   if (std::abs(smoother.time_offset_initial) > smoother.max_time_offset) {
-    faults.push_back("time_offset_initial: expected at most max_time_offset (" +
-                     numberText(smoother.max_time_offset) + " s) in size, got " +
-                     numberText(smoother.time_offset_initial));
+    faults->push_back(section + "time_offset_initial: expected at most max_time_offset (" +
+                      numberText(smoother.max_time_offset) + " s) in size, got " +
+                      numberText(smoother.time_offset_initial));
   }
-  if (config.stamp_source == StampSource::kTrigger && config.trigger_topic.empty()) {
-    faults.emplace_back("trigger_topic: expected a topic, since stamp_source is trigger, got \"\"");
+  if (config.stamp_source == StampSource::kTrigger && config.trigger_topic.empty())
+    faults->push_back(section + "trigger_topic: expected a topic, since stamp_source is trigger, got \"\"");
+}
+
+/// What one radar cannot show.
+void addContradictionsAmong(const std::vector<Config>& radars, std::vector<std::string>* faults) {
+  for (std::size_t k = 0; k < radars.size(); ++k) {
+    const Config& radar = radars[k];
+    for (std::size_t other = 0; other < k; ++other) {
+      const auto same = [&](const char* key, const std::string& value) {
+        faults->push_back(radar.radar_name + "/" + key + ": expected another than that of " +
+                          radars[other].radar_name + ", got \"" + value + "\" for both");
+      };
+      if (radar.radar_topic == radars[other].radar_topic) same("radar_topic", radar.radar_topic);
+      if (radar.radar_frame == radars[other].radar_frame) same("radar_frame", radar.radar_frame);
+    }
+    const SmootherOptions& first = radars.front().odometry.smoother;
+    const SmootherOptions& smoother = radar.odometry.smoother;
+    if (!smoother.time_offset_shared) continue;
+    if (smoother.time_offset_initial != first.time_offset_initial ||
+        smoother.time_offset_sigma != first.time_offset_sigma) {
+      faults->push_back(radar.radar_name +
+                        "/: expected time_offset_initial and time_offset_sigma as those of " +
+                        radars.front().radar_name + ", since time_offset_shared is true");
+    }
   }
+}
+
+std::vector<std::string> contradictions(const Config& config) {
+  std::vector<std::string> faults;
+  for (const Config& radar : configsOfRadars(config)) addContradictions(radar, &faults);
+  addContradictionsAmong(config.radars, &faults);
   return faults;
+}
+
+/// The section of a radar, as YAML.
+std::string sectionYaml(const Config& top_level, const Config& radar) {
+  Config own = radar;
+  Config base = withoutSection(top_level, radar.radar_name);
+  const ParameterList own_list = parametersOf(own);
+  const ParameterList base_list = parametersOf(base);
+  std::string lines;
+  for (std::size_t i = 0; i < own_list.all().size(); ++i) {
+    const Parameter& parameter = own_list.all()[i];
+    if (!parameter.description.of_radar || parameter.print() == base_list.all()[i].print()) continue;
+    lines += "  " + parameter.description.key + ": " + parameter.print() + "\n";
+  }
+  return "# --- Radar " + radar.radar_name + ": what differs from the above\n\n" + radar.radar_name + ":" +
+         (lines.empty() ? " {}\n" : "\n" + lines);
 }
 
 std::string joinFaults(const std::vector<std::string>& faults) {
@@ -128,23 +299,19 @@ PointCloudFormat pointCloudFormat(const Config& config) {
   return format;
 }
 
+std::vector<Config> configsOfRadars(const Config& config) {
+  return config.radars.empty() ? std::vector<Config>{config} : config.radars;
+}
+
 Config makeConfig(const ParameterEntries& entries) {
   Config config;
   std::vector<std::string> faults;
   const ParameterList list = parametersOf(config);
-  for (const ParameterEntry& entry : entries) {
-    const auto parameter = std::find_if(list.all().begin(), list.all().end(), [&](const Parameter& each) {
-      return each.description.key == entry.key;
-    });
-    if (parameter == list.all().end()) {
-      faults.push_back(unknownKey(entry, list.all()));
-    } else if (!parameter->set(entry.value)) {
-      const ParameterDescription& about = parameter->description;
-      faults.push_back(entry.origin + ": " + entry.key + ": expected " + about.expected +
-                       (about.unit.empty() ? "" : " [" + about.unit + "]") + ", got " +
-                       entry.value.describe());
-    }
-  }
+  const SortedEntries sorted = sortedEntries(entries, list);
+  setTopLevel(sorted.top_level, list, config.radars, &faults);
+  const Config top_level = config;
+  setRadars(sorted.sections, top_level, &config.radars, &faults);
+  for (const Config& radar : config.radars) config.odometry.radars.push_back(radarOptions(radar));
   // Judged only where each value is right by itself: otherwise a default might be blamed.
   if (faults.empty()) faults = contradictions(config);
   if (!faults.empty()) throw ConfigError(std::move(faults));
@@ -172,8 +339,10 @@ std::string toYaml(const Config& config) {
     if (about.group != group) yaml += "\n# --- " + about.group + "\n";
     group = about.group;
     yaml += "\n# " + about.description + "\n# " + (about.unit.empty() ? "" : "[" + about.unit + "] ") +
-            about.expected + "\n" + about.key + ": " + parameter.print() + "\n";
+            about.expected + (about.of_radar ? "; per radar" : "") + "\n" + about.key + ": " +
+            parameter.print() + "\n";
   }
+  for (const Config& radar : config.radars) yaml += "\n" + sectionYaml(config, radar);
   return yaml;
 }
 

@@ -31,7 +31,7 @@ ParameterValue toParameterValue(XmlRpc::XmlRpcValue& value) {
       break;
     }
     case XmlRpc::XmlRpcValue::TypeStruct:
-      result.data = ParameterValue::Map{};
+      result.data = ParameterValue::Map{};  // toParameterEntries reads the section of a radar
       break;
     default:
       break;  // nothing, dates and binary data: refused by whatever key has them
@@ -45,7 +45,14 @@ ParameterEntries toParameterEntries(XmlRpc::XmlRpcValue& map, const std::string&
   if (map.getType() != XmlRpc::XmlRpcValue::TypeStruct) return entries;
   for (auto& [key, value] : map) {
     if (of_others.count(key) != 0) continue;
-    entries.push_back({key, toParameterValue(value), "parameter " + name_space + "/" + key});
+    const std::string path = name_space + "/" + key;
+    ParameterValue::Map section;
+    if (value.getType() == XmlRpc::XmlRpcValue::TypeStruct) {
+      for (auto& [inner, inner_value] : value)
+        section.push_back({inner, toParameterValue(inner_value), "parameter " + path + "/" + inner});
+    }
+    entries.push_back(
+        {key, section.empty() ? toParameterValue(value) : ParameterValue{section}, "parameter " + path});
   }
   return entries;
 }

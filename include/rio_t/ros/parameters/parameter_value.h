@@ -8,11 +8,14 @@
 
 namespace rio_t {
 
+struct ParameterEntry;
+
 /// The value of a parameter wherever it came from: a YAML file, the command line, the ROS parameter server.
 struct ParameterValue {
-  struct Map {
-  };  ///< nested keys, or a list in a list: no parameter takes any, but the fault must be nameable
   using List = std::vector<ParameterValue>;
+  /// Nested keys: the section of a radar. It stands, empty, for what lies deeper and for a list in a list:
+  /// no parameter takes any, but the fault must be nameable.
+  using Map = std::vector<ParameterEntry>;
   std::variant<std::monostate, bool, std::int64_t, double, std::string, List, Map> data;
 
   /// For messages: `0.25`, `"text"`, `[1, 2]`, `nothing`.
@@ -30,7 +33,8 @@ struct ParameterEntry {
 };
 using ParameterEntries = std::vector<ParameterEntry>;
 
-/// Reads a flat YAML file; throws std::runtime_error with one line naming file, line and what was expected.
+/// Reads a YAML file, flat but for the sections of radars; throws std::runtime_error with one line naming
+/// file, line and what was expected.
 ParameterEntries readParameterFile(const std::string& path);
 /// The same of an open stream; `name` stands for the file in messages.
 ParameterEntries readParameters(std::istream& yaml, const std::string& name);

@@ -46,6 +46,10 @@ struct PointCloudOverrides {
 /// All that a user can set: the estimator's options and what surrounds them. Each member has one key, listed
 /// with unit, range and meaning in config/estimator.yaml.
 struct Config {
+  /// Several radars: the whole configuration as each of them has it. Empty: one radar, and this is its own.
+  std::vector<Config> radars;
+  std::string radar_name;  ///< empty, but for an element of `radars`
+
   std::string imu_topic = "/sensor_platform/imu";
   std::string radar_topic = "/sensor_platform/radar/scan";
   std::string trigger_topic = "/sensor_platform/radar/trigger";
@@ -77,6 +81,10 @@ struct Config {
   std::string ground_truth;   ///< TUM file; empty: the topic
 };
 
+/// The configuration as each radar has it: `config.radars`, or `config` alone for one radar. The index is
+/// that of RadarScan::radar.
+std::vector<Config> configsOfRadars(const Config& config);
+
 /// Layout of the cloud: the preset with the overrides.
 PointCloudFormat pointCloudFormat(const Config& config);
 
@@ -90,9 +98,10 @@ class ConfigError : public std::runtime_error {
   std::vector<std::string> faults_;
 };
 
-/// Defaults with the entries on top; where a key comes twice, the later holds. Throws ConfigError naming
-/// every unknown key, wrong type, value out of range and contradiction, each with its origin and what was
-/// expected.
+/// Defaults with the entries on top; where a key comes twice, the later holds. A radar of `radars` has what
+/// its section (nested keys, or `name/key`) sets, and what the top level sets for the rest. Throws
+/// ConfigError naming every unknown key, wrong type, value out of range and contradiction, each with its
+/// origin and what was expected.
 Config makeConfig(const ParameterEntries& entries);
 
 /// What is known of a key.
@@ -102,6 +111,7 @@ struct ParameterDescription {
   std::string unit;         ///< empty: none
   std::string expected;     ///< e.g. "a number above 0, at most 10"
   std::string description;  ///< one line
+  bool of_radar = false;    ///< each radar may have its own, in its section
 };
 /// Every key once, in the order of estimator.yaml.
 std::vector<ParameterDescription> parameterDescriptions();
