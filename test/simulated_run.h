@@ -40,6 +40,25 @@ struct SimulatedRun {
     return result;
   }
 
+  /// A scan, and the index of its radar: several ones are in the order of their names.
+  struct Arrival {
+    const simulation::SimulatedScan* scan;
+    std::size_t radar;
+  };
+  static std::vector<Arrival> inOrderOfArrival(const simulation::SensorData& data) {
+    std::vector<Arrival> result;
+    for (const simulation::SimulatedScan& each : data.scans) result.push_back({&each, 0});
+    std::size_t radar = 0;
+    for (const auto& [name, scans] : data.radars) {
+      for (const simulation::SimulatedScan& each : scans) result.push_back({&each, radar});
+      ++radar;
+    }
+    std::stable_sort(result.begin(), result.end(), [](const Arrival& a, const Arrival& b) {
+      return a.scan->arrival < b.scan->arrival;
+    });
+    return result;
+  }
+
   double seconds(Time time) const { return time - setup.start; }
 
   /// Simulates, lets `spoil` change the data, and runs. Call once.
@@ -47,11 +66,15 @@ struct SimulatedRun {
     simulation::SensorData data = simulation::simulate(motion, setup);
     if (spoil) spoil(data);
     odometry.emplace(options);
-    auto next = data.scans.begin();
+    const std::vector<Arrival> arrivals = inOrderOfArrival(data);
+    auto next = arrivals.begin();
     for (const ImuMeasurement& sample : data.imu.samples) {
       if (const auto state = odometry->addImu(sample)) states.push_back(*state);
-      for (; next != data.scans.end() && next->arrival <= sample.time; ++next) {
-        if (next->delivered) odometry->addScan(scan(*next));
+      for (; next != arrivals.end() && next->scan->arrival <= sample.time; ++next) {
+        if (!next->scan->delivered) continue;
+        RadarScan arrived = scan(*next->scan);
+        arrived.radar = next->radar;
+        odometry->addScan(std::move(arrived));
       }
       for (ScanResult& result : odometry->process()) results.push_back(std::move(result));
     }
@@ -70,6 +93,14 @@ struct SimulatedRun {
     const Eigen::Vector3d a = truth(state).q_WI.conjugate() * Eigen::Vector3d::UnitZ();
     const Eigen::Vector3d b = state.q_WI.conjugate() * Eigen::Vector3d::UnitZ();
     return std::atan2(a.cross(b).norm(), a.dot(b));
+  }
+  /// Of p_W [m].
+  double positionError(const NavigationState& state) const { return (truth(state).p_W - state.p_W).norm(); }
+  /// The last result of a radar that updated the window.
+  const ScanResult& last(std::size_t radar) const {
+    return *std::find_if(results.rbegin(), results.rend(), [&](const ScanResult& result) {
+      return result.updated && result.scan.radar == radar;
+    });
   }
   /// Root mean square of `error` over the states from `from` to `to` seconds.
   template <typename Error>
