@@ -14,6 +14,12 @@ double degreesOfFreedom(std::size_t points) { return points > 3 ? static_cast<do
 
 }  // namespace
 
+double largestSigma(const Eigen::Matrix3d& covariance) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(covariance, Eigen::EigenvaluesOnly);
+  return std::sqrt(eigen.eigenvalues()[2]);
+}
+
 VelocitySolution solveLeastSquares(const std::vector<RadarDirection>& points,
                                    const EgoVelocityOptions& options) {
   VelocitySolution solution;

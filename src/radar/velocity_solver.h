@@ -14,6 +14,9 @@ struct VelocitySolution {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< without added_sigma
 };
 
+/// [m/s] Sigma along the largest axis of a covariance.
+double largestSigma(const Eigen::Matrix3d& covariance);
+
 /// v = -(H'H)^-1 H'd, covariance s^2 (H'H)^-1; s^2 is the residual variance, at least the quantisation's
 /// q^2/12.
 VelocitySolution solveLeastSquares(const std::vector<RadarDirection>& points,
