@@ -18,7 +18,7 @@ namespace {
 /// A prior with a sigma below this outweighs a majority of the points [m/s]. A moving object and the world
 /// differ by more.
 constexpr double kMaxSharpSigma = 0.1;
-/// Log-likelihood ratio of a point that a velocity explains to one that it does not: a Gaussian of 0.05 m/s
+/// Log-likelihood ratio of a point that the velocity explains to one that it does not: a Gaussian of 0.05 m/s
 /// against a uniform density over some m/s.
 constexpr double kEvidenceOfAPoint = 4.0;
 constexpr int kSides[] = {0, -1, 1};  // [spans] that a Doppler may have come back from
@@ -36,7 +36,7 @@ class IndexDraw {
   std::mt19937 engine_;
 };
 
-/// Velocity on which three directions agree; none where they lie (nearly) in a plane.
+/// Velocity on which three directions agree. False if they lie (nearly) in a plane.
 bool solveThree(const RadarDirection& a, const RadarDirection& b, const RadarDirection& c,
                 Eigen::Vector3d& v_R) {
   const Eigen::Vector3d bc = b.u_R.cross(c.u_R);

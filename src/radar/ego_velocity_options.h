@@ -11,7 +11,7 @@ EgoVelocityOptions validated(const EgoVelocityOptions& options);
 /// - Inlier: the step rounds by up to half of itself; 2.5 sigma keep 99 % of the noise besides.
 /// - Zero: within the zero bin. If the noise is larger than that, 1.5 sigma keep 87 % of the points at rest,
 ///   and zero_velocity_outlier_fraction of them may lie beyond.
-/// A sigma of 0 to start with does not mean that nothing else is possible.
+/// A sigma of 0 counts as PointNoise::kMinStartDopplerSigma.
 EgoVelocityOptions withStep(EgoVelocityOptions options, double step);
 
 }  // namespace rio_t

@@ -14,7 +14,7 @@ namespace rio_t {
 /// The Dopplers of one scan, as the factor needs them.
 struct DopplerMeasurement : RadarScanTime {
   std::shared_ptr<const DopplerLikelihood> points;
-  /// Of a velocity error that the points share, per axis of R [m^2/s^2]. See
+  /// The points share an error of the velocity. These are its variances along the axes of R [m^2/s^2], see
   /// EgoVelocityOptions::added_sigma.
   Eigen::Vector3d shared_variances = Eigen::Vector3d::Zero();
   double huber_threshold = 0.0;  ///< [sigma] of the shared error; 0: no robust loss
@@ -23,9 +23,9 @@ struct DopplerMeasurement : RadarScanTime {
 /// The Doppler of each point of a scan, tightly coupled (docs/method.md, section 5.7). Any number of points
 /// counts, in a plane or not. Blocks: state at `state_time`, t_O.
 ///
-/// A residual a point, and all depend on the state through one velocity. So QR leaves three rows that depend
-/// on it, and one that is the misfit: the same cost, gradient and J'J as with a row for each point. The loss
-/// is in the rows.
+/// Each point gives one residual, and all residuals depend on the state through one velocity. So QR leaves
+/// three rows that depend on the velocity, and one that holds the misfit. They have the same cost, gradient
+/// and J'J as one row for each point. The loss is in the rows.
 class DopplerFactor final : public ceres::SizedCostFunction<4, StateBlock::kSize, 1> {
  public:
   DopplerFactor(const DopplerMeasurement& z, Time state_time, const RadarMotionModel& model)

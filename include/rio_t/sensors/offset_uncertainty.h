@@ -6,7 +6,7 @@
 namespace rio_t {
 
 /// Uncertainty of the time offset (docs/method.md, eq. 32b): its marginal variance plus the square of its
-/// lag. The estimate lags behind an offset that drifts, and the scans then keep asking for the same change.
+/// lag. If the offset drifts, its estimate lags behind, and the scans keep asking for the same change.
 /// Not thread-safe.
 class OffsetUncertainty {
  public:
@@ -19,7 +19,8 @@ class OffsetUncertainty {
 
   /// Standard deviation of the offset [s], given its marginal variance [s^2].
   double sigma(double variance) const;
-  /// Random walk that follows the change the scans ask for [s/sqrt(s)]; 0 if they ask for none.
+  /// Random walk with which the estimate follows the change that the scans ask for [s/sqrt(s)]; 0 if they ask
+  /// for none.
   double walk() const;
 
  private:
