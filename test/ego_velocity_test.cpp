@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <set>
@@ -24,7 +23,7 @@ TEST(EgoVelocity, ExactWithoutNoise) {
     Random random(1);
     const EgoVelocity e = EgoVelocityEstimator(o).estimate(staticScene(kVelocity, 30, {}, random));
     EXPECT_EQ(e.status, EgoVelocityStatus::kMoving);
-    EXPECT_LT((e.v_R - kVelocity).norm(), 1e-9) << toString(solver);
+    EXPECT_LT((e.v_R - kVelocity).norm(), 1e-9) << "solver " << static_cast<int>(solver);
     EXPECT_EQ(e.inliers.size(), 30u);
     EXPECT_EQ(e.points.size(), 30u);
   }
@@ -203,7 +202,7 @@ TEST(EgoVelocity, SigmaTooLarge) {
   EXPECT_EQ(e.status, EgoVelocityStatus::kSigmaTooLarge);
 }
 
-TEST(EgoVelocity, StatusAndSolverNames) {
+TEST(EgoVelocity, EachStatusHasItsName) {
   std::set<std::string> names;
   for (const EgoVelocityStatus status :
        {EgoVelocityStatus::kMoving, EgoVelocityStatus::kZeroVelocity, EgoVelocityStatus::kTooFewPoints,
@@ -212,11 +211,6 @@ TEST(EgoVelocity, StatusAndSolverNames) {
     names.insert(toString(status));
   }
   EXPECT_EQ(names.size(), 7u);
-  for (const EgoVelocitySolver solver :
-       {EgoVelocitySolver::kLeastSquares, EgoVelocitySolver::kErrorsInVariables}) {
-    EXPECT_EQ(egoVelocitySolverFromString(toString(solver)), solver);
-  }
-  EXPECT_THROW(egoVelocitySolverFromString("odr"), std::invalid_argument);
 }
 
 TEST(EgoVelocity, RefusesSenselessOptions) {

@@ -52,20 +52,4 @@ EgoVelocityOptions withStep(EgoVelocityOptions o, double step) {
   return o;
 }
 
-std::string toString(EgoVelocitySolver solver) {
-  switch (solver) {
-    case EgoVelocitySolver::kLeastSquares:
-      return "ls";
-    case EgoVelocitySolver::kErrorsInVariables:
-      return "eiv";
-  }
-  throw std::invalid_argument("ego velocity: not a solver");
-}
-
-EgoVelocitySolver egoVelocitySolverFromString(const std::string& name) {
-  if (name == "ls") return EgoVelocitySolver::kLeastSquares;
-  if (name == "eiv") return EgoVelocitySolver::kErrorsInVariables;
-  throw std::invalid_argument("ego velocity: solver must be ls or eiv, not '" + name + "'");
-}
-
 }  // namespace rio_t

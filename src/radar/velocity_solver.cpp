@@ -1,9 +1,9 @@
 #include "velocity_solver.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 #include "direction_noise.h"
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstddef>
 #include <vector>
 
 #include "rio_t/radar/ego_velocity.h"
@@ -22,8 +21,8 @@ double largestSigma(const Eigen::Matrix3d& covariance);
 VelocitySolution solveLeastSquares(const std::vector<RadarDirection>& points,
                                    const EgoVelocityOptions& options);
 
-/// Least squares that knows that directions are noisy, see the source. `v_R` is where the weights are first
-/// taken: a RANSAC or least-squares velocity.
+/// Least squares that knows that directions are noisy, see the source. The first weights are those at `v_R`,
+/// a RANSAC or least-squares velocity.
 VelocitySolution solveErrorsInVariables(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
                                         const PointVariances& noise, const EgoVelocityOptions& options);
 

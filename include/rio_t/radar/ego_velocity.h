@@ -20,9 +20,6 @@ enum class EgoVelocitySolver {
   kLeastSquares,       ///< plain least squares: all weight on the Doppler, directions taken as exact
   kErrorsInVariables,  ///< weighted by direction noise, and compensated for the attenuation it causes
 };
-std::string toString(EgoVelocitySolver solver);  ///< "ls" or "eiv"
-/// Inverse of toString. Throws std::invalid_argument, naming the choices, for anything else.
-EgoVelocitySolver egoVelocitySolverFromString(const std::string& name);
 
 struct EgoVelocityOptions {
   double min_range = 0.25;   ///< [m]
@@ -138,7 +135,6 @@ class EgoVelocityEstimator {
   /// The noise as learned so far.
   const PointVariances& noise() const { return noise_.variances(); }
   DopplerStep dopplerStep() const { return grid_.step(); }
-  double dopplerSpan() const { return span_.value(); }  ///< [m/s] 0: none known
   /// The options in use. Those that are 0, "from the step", have the values that follow from it.
   const EgoVelocityOptions& options() const { return options_; }
 
