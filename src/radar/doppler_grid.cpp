@@ -30,8 +30,8 @@ constexpr std::size_t kMaxMisfits = 2;
 constexpr int kBatchesWithoutStep = 4;
 
 /// The multiple of the step that a value is; 0 if it is a misfit. The step was read off a value of `known_at`
-/// steps. So a value of m steps may be off by its own rounding and by that of the step, which has grown by
-/// m / known_at.
+/// steps. So a value of m steps may be off by its own rounding and by that of the step, which has grown
+/// by the factor m / known_at.
 double multipleOf(double step, double known_at, double value) {
   const double steps = value / step;
   const double multiple = std::round(steps);

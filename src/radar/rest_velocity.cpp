@@ -87,10 +87,9 @@ std::vector<RadarDirection> selectZeros(const std::vector<RadarDirection>& point
 }
 
 // Every inlier reads the zero bin, of width q. Two things bound the velocity:
-// - The bin. A point reads zero only while |u . v| < q/2, and so v lies in the ellipsoid v' M v < q^2/4,
-// where
-//   M is the mean of u u'. A uniform density over an ellipsoid in 3D has the covariance M^-1 (q^2/4) / 5.
-//   More points do not help.
+// - The bin. A point reads zero only while |u . v| < q/2. So v lies in the ellipsoid v' M v < q^2/4, and M is
+//   the mean of u u'. A uniform density over an ellipsoid in 3D has the covariance M^-1 (q^2/4) / 5. More
+//   points do not help.
 // - The noise. Noise of sigma s carries readings over the edge of the bin, the sooner the faster the platform
 //   creeps. The likelihood P(v) that a point reads zero has the curvature
 //     -(log P)'' = 2 z phi(z) / (s^2 P(0)) at rest, z = q / (2 s),

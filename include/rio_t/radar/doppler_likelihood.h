@@ -12,7 +12,8 @@ namespace rio_t {
 struct VelocityCost {
   double value = 0.0;
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< J'J; singular where the points see no motion
+  Eigen::Matrix3d information =
+      Eigen::Matrix3d::Zero();  ///< J'J; singular if the points do not show all axes
 };
 
 /// The same cost if the points share an error of the velocity; the cost is minimised over this error.

@@ -12,7 +12,7 @@ class OffsetUncertainty {
  public:
   /// `huber_threshold` on the root of d' S^-1 d, as on the radar factors; 0: no robust loss.
   explicit OffsetUncertainty(double huber_threshold) : huber_threshold_(huber_threshold) {}
-  /// Takes the innovation of a scan that was used and tells the offset.
+  /// Takes the innovation of a scan that was used and that shows the offset.
   void add(const Innovation& innovation);
   /// The offset stepped and gets a new block, which does not lag.
   void offsetStepped();
