@@ -8,15 +8,10 @@
 #include <cmath>
 #include <vector>
 
-#include "noise.h"
+#include "static_scene.h"
 
 namespace rio_t {
 namespace {
-
-Eigen::Vector3d direction(double azimuth, double elevation) {
-  return {std::cos(elevation) * std::sin(azimuth), std::cos(elevation) * std::cos(azimuth),
-          std::sin(elevation)};
-}
 
 PointVariances variances(double doppler, double azimuth, double elevation, double step) {
   PointVariances noise;
