@@ -29,8 +29,8 @@ struct DopplerStep {
 /// 9.7). The answer depends only on the values and their order. Not thread-safe.
 class DopplerGrid {
  public:
-  /// `given` is the step [m/s]. A value below 0.02 says that the radar has none; 0 says that the data show
-  /// it. Throws std::invalid_argument if it is negative or not finite.
+  /// `given` is the step [m/s]. 0: DopplerGrid reads the step off the data; any other value below 0.02: the
+  /// radar has none. Throws std::invalid_argument if it is negative or not finite.
   explicit DopplerGrid(double given);
 
   /// Takes all points of a scan, wherever they lie. 45 points take 1 us. If the radar has no steps, `add`

@@ -12,8 +12,7 @@ namespace rio_t {
 struct VelocityCost {
   double value = 0.0;
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d information =
-      Eigen::Matrix3d::Zero();  ///< J'J; singular if the points do not show all axes
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< J'J; may be singular
 };
 
 /// The same cost if the points share an error of the velocity; the cost is minimised over this error.

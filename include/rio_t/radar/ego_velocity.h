@@ -87,9 +87,9 @@ struct EgoVelocity {
   Eigen::Vector3d told_variance = Eigen::Vector3d::Zero();
   /// Points near zero show a slow motion: the platform is not at rest, whatever the IMU shows.
   bool denies_rest = false;
-  std::vector<std::size_t>
-      points;  ///< those that passed the filter; indices into the scan's points, ascending
-  std::vector<std::size_t> inliers;  ///< those that agree on the velocity; the same
+  /// The points that passed the filter: indices into the scan's points, ascending.
+  std::vector<std::size_t> points;
+  std::vector<std::size_t> inliers;  ///< those of them that agree on the velocity
 };
 
 /// Most points of the scan agree on the velocity, so it needs no prior.

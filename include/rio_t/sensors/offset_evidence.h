@@ -20,8 +20,9 @@ struct OffsetDerivative {
 
   /// The mean exceeds five sigma of its noise, so it is motion.
   bool isCertain() const;
-  /// The derivative that goes with an innovation. The prediction holds the noise before the scan, too; if the
-  /// derivative held it as well, both together would look like a wrong offset.
+  /// The derivative that goes with an innovation: if it is uncertain, that after the scan alone. The
+  /// prediction holds the noise before the scan; if the derivative held it too, both would look like a wrong
+  /// offset.
   const Eigen::Vector3d& forInnovation() const { return isCertain() ? mean : after; }
 };
 
