@@ -95,7 +95,7 @@ std::optional<Eigen::Vector3d> ransac(const std::vector<RadarDirection>& points,
       RadarDirection a = points[i], b = points[j], c = points[k];
       a.doppler += span * kSides[side % 3];
       b.doppler += span * kSides[side / 3 % 3];
-      c.doppler += span * kSides[side / 9];
+      c.doppler += span * kSides[side / 9 % 3];
       Eigen::Vector3d v_R;
       if (!solveThree(a, b, c, v_R)) break;
       spans_space = true;

@@ -50,7 +50,7 @@ std::vector<std::size_t> indicesOf(const std::vector<RadarDirection>& points) {
 /// These become the inliers.
 VelocitySolution solveMotion(const std::vector<RadarDirection>& points, const PointVariances& noise,
                              const EgoVelocityOptions& o, std::vector<RadarDirection>& inliers) {
-  const VelocitySolution first = solveLeastSquares(inliers, o);
+  VelocitySolution first = solveLeastSquares(inliers, o);
   if (!first.solved) return first;
   inliers = selectInliers(points, first.v_R, noise, o);
   return o.solver == EgoVelocitySolver::kLeastSquares ? solveLeastSquares(inliers, o)

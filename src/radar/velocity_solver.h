@@ -22,8 +22,8 @@ VelocitySolution solveLeastSquares(const std::vector<RadarDirection>& points,
                                    const EgoVelocityOptions& options);
 
 /// Least squares that knows that directions are noisy, see the source. The first weights are those at `v_R`,
-/// a RANSAC or least-squares velocity.
+/// a RANSAC or least-squares velocity; `given` is the noise of the points.
 VelocitySolution solveErrorsInVariables(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
-                                        const PointVariances& noise, const EgoVelocityOptions& options);
+                                        const PointVariances& given, const EgoVelocityOptions& options);
 
 }  // namespace rio_t
