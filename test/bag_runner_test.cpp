@@ -1,152 +1,20 @@
+// What a run of a bag writes and says.
 #include "rio_t/ros/bag/bag_runner.h"
 
-#include <geometry_msgs/PoseStamped.h>
 #include <gtest/gtest.h>
-#include <rosbag/bag.h>
-#include <sensor_msgs/Imu.h>
-#include <sensor_msgs/PointCloud2.h>
-#include <sensor_msgs/point_cloud2_iterator.h>
-#include <std_msgs/Header.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
 #include <fstream>
-#include <sstream>
+#include <string>
+#include <vector>
 
-#include "rio_t/ros/bag/bag_tool.h"
+#include "rest_bag.h"
 
 namespace rio_t {
 namespace {
 
-namespace fs = std::filesystem;
-
-std::string contents(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::stringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
-/// The summary without the keys that time the run, which stand at its end.
-std::string untimed(const std::string& summary) {
-  return summary.substr(0, summary.find("estimation_seconds"));
-}
-
-struct Outcome {
-  int status = 0;
-  std::string out, err;
-};
-
-Outcome runTool(const std::vector<std::string>& words) {
-  std::ostringstream out, err;
-  const int status = runBagTool(words, out, err);
-  return {status, out.str(), err.str()};
-}
-
-/// What a test bag holds.
-struct BagContents {
-  double duration = 8.0;  ///< [s]
-  bool imu = true;
-  bool radar = true;
-  int points = 30;       ///< of each scan
-  double doppler = 0.0;  ///< of each point [m/s], alternating sign
-  bool stamped = true;
-  bool imu_stamped = true;
-  double shaking = 0.0;  ///< amplitude of the gyro [rad/s]
-  std::string doppler_field = "v_doppler_mps";
-  bool ground_truth = false;
-};
-
-/// A platform at rest with the IRS topics, recorded by a clock 100 s ahead.
-class BagRunner : public testing::Test {
- protected:
-  void SetUp() override {
-    folder_ =
-        (fs::temp_directory_path() /
-         ("rio_t_bag_runner_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name())))
-            .string();
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-    bag_ = folder_ + "/test.bag";
-    out_ = folder_ + "/out";
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  void writeBag(const BagContents& what) const {
-    rosbag::Bag bag(bag_, rosbag::bagmode::Write);
-    const int steps = static_cast<int>(what.duration * 200.0);
-    for (int k = 0; k < steps; ++k) {
-      const double t = 0.005 * k;
-      const ros::Time stamp = ros::Time(1000.0) + ros::Duration(t);
-      const ros::Time record = stamp + ros::Duration(100.001);
-      if (what.imu) {
-        sensor_msgs::Imu imu;
-        if (what.imu_stamped) imu.header.stamp = stamp;
-        imu.linear_acceleration.z = 9.81;
-        imu.angular_velocity.x = what.shaking * std::sin(20.0 * t);
-        bag.write("/sensor_platform/imu", record, imu);
-      }
-      if (what.radar && k % 20 == 0) writeCloud(what, stamp, record, k / 20, &bag);
-      if (what.ground_truth && k % 4 == 0) {
-        geometry_msgs::PoseStamped pose;
-        pose.header.stamp = stamp;
-        pose.pose.position.x = 5.0;
-        pose.pose.orientation.w = 1.0;
-        bag.write("/ground_truth/pose", record, pose);
-      }
-    }
-    std_msgs::Header other;
-    other.stamp = ros::Time(1000.0);
-    bag.write("/other", ros::Time(1100.0), other);
-  }
-
-  void writeCloud(const BagContents& what, const ros::Time& stamp, const ros::Time& record, int seq,
-                  rosbag::Bag* bag) const {
-    sensor_msgs::PointCloud2 cloud;
-    if (what.stamped) cloud.header.stamp = stamp;
-    cloud.header.seq = static_cast<std::uint32_t>(seq);
-    sensor_msgs::PointCloud2Modifier modifier(cloud);
-    modifier.setPointCloud2Fields(5, "x", 1, sensor_msgs::PointField::FLOAT32, "y", 1,
-                                  sensor_msgs::PointField::FLOAT32, "z", 1, sensor_msgs::PointField::FLOAT32,
-                                  "snr_db", 1, sensor_msgs::PointField::FLOAT32, what.doppler_field.c_str(),
-                                  1, sensor_msgs::PointField::FLOAT32);
-    modifier.resize(static_cast<std::size_t>(what.points));
-    // An iterator refers to the first byte at once, which an empty cloud does not have.
-    if (what.points > 0) writePoints(what, &cloud);
-    bag->write("/sensor_platform/radar/scan", record + ros::Duration(0.0005), cloud);
-  }
-
-  static void writePoints(const BagContents& what, sensor_msgs::PointCloud2* cloud) {
-    sensor_msgs::PointCloud2Iterator<float> x(*cloud, "x");
-    for (int i = 0; i < what.points; ++i, ++x) {
-      const double azimuth = 0.9 * std::sin(1.0 + 2.4 * i);
-      x[0] = static_cast<float>(4.0 * std::sin(azimuth));
-      x[1] = static_cast<float>(4.0 * std::cos(azimuth));
-      x[2] = static_cast<float>(1.5 * std::sin(0.7 * i));
-      x[3] = 20.0F;
-      x[4] = static_cast<float>((i % 2 == 0 ? 1.0 : -1.0) * what.doppler);
-    }
-  }
-
-  Outcome run(const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> words = {"--bag", bag_, "--config", "irs", "--output-dir", out_};
-    words.insert(words.end(), more.begin(), more.end());
-    return runTool(words);
-  }
-
-  /// One line on stderr that holds every part, and exit status 1.
-  void expectError(const Outcome& outcome, const std::vector<std::string>& parts) const {
-    EXPECT_EQ(outcome.status, 1);
-    EXPECT_EQ(outcome.out, "");
-    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
-    for (const std::string& part : parts)
-      EXPECT_NE(outcome.err.find(part), std::string::npos) << part << " not in: " << outcome.err;
-  }
-
-  std::string folder_, bag_, out_;
-};
+using BagRunner = RestBag;
 
 TEST_F(BagRunner, AtRestItStaysAndWritesEveryFile) {
   writeBag({});
@@ -323,126 +191,6 @@ TEST_F(BagRunner, APartOfTheBagCanBePlayed) {
   expectError(run({"--set", "bag_start=100"}), {"bag_start", "behind its end"});
 }
 
-TEST_F(BagRunner, MissingBagFolderAndUnreadableBagAreNamed) {
-  expectError(run(), {bag_, "no such file"});
-  EXPECT_FALSE(fs::exists(out_));
-  bag_ = folder_;
-  expectError(run(), {folder_, "folder"});
-  bag_ = folder_ + "/text.bag";
-  std::ofstream(bag_) << "not a bag at all, but long enough to be looked at\n";
-  expectError(run(), {bag_, "cannot be read as a ROS 1 bag"});
-  std::ofstream(bag_, std::ios::trunc).close();
-  expectError(run(), {bag_});
-}
-
-TEST_F(BagRunner, AnUnindexedBagIsToldToBeReindexed) {
-  writeBag({});
-  // A recording that was cut off has no index: its header says that the index starts at 0.
-  std::string bytes = contents(bag_);
-  const std::size_t at = bytes.find("index_pos=");
-  ASSERT_NE(at, std::string::npos);
-  for (std::size_t i = 0; i < 8; ++i) bytes[at + 10 + i] = 0;
-  std::ofstream(bag_, std::ios::binary) << bytes;
-  expectError(run(), {bag_, "rosbag reindex"});
-}
-
-TEST_F(BagRunner, ATruncatedOrDamagedBagIsNamed) {
-  writeBag({});
-  const std::string bytes = contents(bag_);
-  std::ofstream(bag_, std::ios::binary) << bytes.substr(0, bytes.size() / 2);
-  expectError(run(), {bag_});
-  // Damage in the middle of the data.
-  std::string damaged = bytes;
-  for (std::size_t i = 0; i < 2000; ++i) damaged[bytes.size() / 2 + i] = static_cast<char>(i * 37);
-  std::ofstream(bag_, std::ios::binary | std::ios::trunc) << damaged;
-  const Outcome outcome = run();
-  if (outcome.status != 0) expectError(outcome, {bag_});
-}
-
-TEST_F(BagRunner, MissingTopicsListThoseOfTheBag) {
-  BagContents what;
-  what.radar = false;
-  writeBag(what);
-  expectError(run(), {"no topic /sensor_platform/radar/scan", "radar_topic",
-                      "/sensor_platform/imu (sensor_msgs/Imu)", "/other (std_msgs/Header)"});
-  expectError(run({"--set", "radar_topic=/r", "--set", "imu_topic=/i"}), {"no topic /i", "no topic /r"});
-  writeBag({});
-  expectError(run({"--set", "stamp_source=trigger"}),
-              {"no topic /sensor_platform/radar/trigger", "trigger_topic"});
-}
-
-TEST_F(BagRunner, WrongTypesAreNamed) {
-  writeBag({});
-  expectError(run({"--set", "radar_topic=/sensor_platform/imu"}),
-              {"/sensor_platform/imu (radar_topic) is sensor_msgs/Imu", "expected sensor_msgs/PointCloud2"});
-  expectError(run({"--set", "ground_truth_topic=/other"}),
-              {"/other (ground_truth_topic) is std_msgs/Header"});
-}
-
-TEST_F(BagRunner, AWrongCloudFormatIsNamed) {
-  BagContents what;
-  what.doppler_field = "speed";
-  writeBag(what);
-  expectError(run(), {"/sensor_platform/radar/scan", "v_doppler_mps", "speed"});
-  EXPECT_EQ(run({"--set", "radar_field_doppler=speed"}).status, 0);
-}
-
-TEST_F(BagRunner, ZeroStampsAreNamedWithTheOtherSources) {
-  BagContents what;
-  what.stamped = false;
-  writeBag(what);
-  expectError(run(), {"/sensor_platform/radar/scan", "zero", "trigger", "arrival"});
-  EXPECT_EQ(run({"--set", "stamp_source=arrival"}).status, 0);
-  what.stamped = true;
-  what.imu_stamped = false;
-  writeBag(what);
-  expectError(run(), {"/sensor_platform/imu", "zero"});
-}
-
-TEST_F(BagRunner, ABadMessageAmongGoodOnesIsCountedAndSaid) {
-  writeBag({});
-  {
-    rosbag::Bag bag(bag_, rosbag::bagmode::Append);
-    sensor_msgs::PointCloud2 empty;  // without a stamp
-    bag.write("/sensor_platform/radar/scan", ros::Time(1005.0), empty);
-    sensor_msgs::Imu unstamped;
-    bag.write("/sensor_platform/imu", ros::Time(1005.0), unstamped);
-  }
-  const Outcome outcome = run();
-  EXPECT_EQ(outcome.status, 0) << outcome.err;
-  EXPECT_NE(outcome.err.find("/sensor_platform/radar/scan"), std::string::npos) << outcome.err;
-  EXPECT_NE(outcome.err.find("/sensor_platform/imu: the stamp in the header is zero"), std::string::npos);
-  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 2) << outcome.err;
-  const std::string yaml = contents(out_ + "/summary.yaml");
-  EXPECT_NE(yaml.find("stamp_zero: 1"), std::string::npos) << yaml;
-  EXPECT_NE(yaml.find("imu_not_usable: 1"), std::string::npos) << yaml;
-  EXPECT_NE(yaml.find("scans_total: 81"), std::string::npos) << yaml;
-}
-
-TEST_F(BagRunner, NoDataInThePartPlayedIsNamed) {
-  BagContents what;
-  what.duration = 1.0;
-  writeBag(what);
-  {
-    rosbag::Bag bag(bag_, rosbag::bagmode::Append);
-    std_msgs::Header late;
-    late.stamp = ros::Time(1200.0);
-    bag.write("/other", ros::Time(1200.0), late);
-  }
-  expectError(run({"--set", "bag_start=50"}), {"no messages on topic /sensor_platform/imu"});
-}
-
-TEST_F(BagRunner, NeverInitialisedSaysWhatItWaitedFor) {
-  BagContents what;
-  what.duration = 2.0;
-  writeBag(what);
-  expectError(run(), {"never initialised, waited for", "init_duration"});
-  what.duration = 8.0;
-  what.shaking = 1.0;
-  writeBag(what);
-  expectError(run({"--set", "init_mode=static"}), {"never initialised, waited for", "gyro"});
-}
-
 TEST_F(BagRunner, StartsInMotionWhereThereIsNoRest) {
   BagContents what;
   what.shaking = 1.0;
@@ -452,50 +200,6 @@ TEST_F(BagRunner, StartsInMotionWhereThereIsNoRest) {
   EXPECT_NE(summary.find("initialized_from: motion\n"), std::string::npos) << summary;
   EXPECT_NE(summary.find("health_at_end: ok\ndivergences: 0\nreinitializations: 0\n"), std::string::npos)
       << summary;
-}
-
-TEST_F(BagRunner, EveryScanRejectedSaysWhy) {
-  BagContents what;
-  what.points = 2;  // their Dopplers would count, see radar_factor
-  writeBag(what);
-  expectError(run({"--set", "radar_factor=velocity"}),
-              {"every one of the 80 scans was rejected", "too_few_points"});
-  EXPECT_FALSE(fs::exists(out_ + "/summary.yaml"));
-  what.points = 0;
-  writeBag(what);
-  expectError(run(), {"every one of the 80 scans was rejected", "too_few_points"});
-}
-
-TEST_F(BagRunner, ASummaryOfAnEarlierRunDoesNotOutliveAFailure) {
-  writeBag({});
-  ASSERT_EQ(run().status, 0);
-  ASSERT_TRUE(fs::exists(out_ + "/summary.yaml"));
-  BagContents what;
-  what.points = 0;
-  writeBag(what);
-  EXPECT_EQ(run().status, 1);
-  EXPECT_FALSE(fs::exists(out_ + "/summary.yaml"));
-}
-
-TEST_F(BagRunner, WrongParametersAndArgumentsAreNamed) {
-  writeBag({});
-  expectError(run({"--set", "widnow=1"}), {"widnow", "window"});
-  expectError(run({"--set", "window=fast"}), {"window", "finite number"});
-  expectError(run({"--config", "isr"}), {"isr", "irs"});
-  expectError(run({"--fast"}), {"unknown argument --fast"});
-  expectError(run({"--set"}), {"--set", "expected a value"});
-  expectError(run({"--bag="}), {"--bag", "expected a value"});
-  expectError(runTool({"--config", "irs"}), {"missing argument --bag --output-dir"});
-  expectError(runTool({}), {"missing argument --bag --config --output-dir"});
-}
-
-TEST_F(BagRunner, AnOutputFolderThatCannotBeIsNamed) {
-  writeBag({});
-  std::ofstream(folder_ + "/file") << "in the way";
-  out_ = folder_ + "/file";
-  expectError(run(), {"output folder", folder_ + "/file"});
-  out_ = folder_ + "/file/below";
-  expectError(run(), {"output folder", folder_ + "/file/below"});
 }
 
 TEST_F(BagRunner, HelpAndConfigurationNeedNoBag) {
@@ -525,82 +229,6 @@ TEST(RunOutput, NumbersAreFixedAndStampsExact) {
   std::string stamp;
   appendStamp(&stamp, Time::fromNanoseconds(1700000000000000007));
   EXPECT_EQ(stamp, "1700000000.000000007");
-}
-
-// --- The real sensors ---
-
-class RealBag : public testing::Test {
- protected:
-  void SetUp() override {
-    const char* folder = std::getenv("RIO_T_DATA_DIR");  // NOLINT(concurrency-mt-unsafe): nobody sets it
-    bag_ = (folder != nullptr ? std::string(folder) : std::string(RIO_T_SOURCE_DIR) + "/../shared/data") +
-           "/real/ti_mmwave_rospkg_demo.bag";
-    if (!fs::exists(bag_)) GTEST_SKIP() << "the real bag is not here: " << bag_;
-    out_ = (fs::temp_directory_path() / "rio_t_real_bag").string();
-    fs::remove_all(out_);
-  }
-  void TearDown() override { fs::remove_all(out_); }
-
-  RunSummary play(const std::string& folder) const {
-    const Config config = makeConfig(readParameterFile(findConfigFile("ti_mmwave")));
-    return runBag({bag_, folder, config, nullptr});
-  }
-
-  std::string bag_, out_;
-};
-
-TEST_F(RealBag, TriggerStampsEndWhereTheyStarted) {
-  const RunSummary summary = play(out_);
-  EXPECT_EQ(summary.imu_count, 8270u);
-  EXPECT_EQ(summary.scans_total, 412u);
-  EXPECT_LE(summary.end_to_start_2d_m, 0.10);
-  EXPECT_LE(summary.end_to_start_3d_m, 1.65);  // the published rotation is tilted
-  EXPECT_GT(summary.final_offset_s, -0.020);
-  EXPECT_LT(summary.final_offset_s, 0.0);
-  EXPECT_GT(summary.final_offset_sigma_s, 0.0);
-  EXPECT_LT(summary.final_offset_sigma_s, 0.020);
-}
-
-TEST_F(RealBag, NearlyEveryScanOfTheWalkIsUsed) {
-  play(out_);
-  // Walking from 13.5 s to 33.5 s.
-  std::ifstream csv(out_ + "/ego_velocity.csv");
-  std::string line;
-  std::getline(csv, line);
-  int walking = 0, used = 0;
-  double first = 0.0;
-  while (std::getline(csv, line)) {
-    const double stamp = std::stod(line);
-    if (first == 0.0) first = stamp;
-    if (stamp - first < 13.5 || stamp - first > 33.5) continue;
-    const std::string status = line.substr(line.rfind(',') + 1);
-    ++walking;
-    if (status == "moving" || status == "zero_velocity") ++used;
-  }
-  EXPECT_GE(walking, 190);
-  EXPECT_GE(used, 0.95 * walking);
-}
-
-TEST_F(RealBag, OnlineEndsNearTheBatch) {
-  Config config = makeConfig(readParameterFile(findConfigFile("ti_mmwave")));
-  config.mode = RunMode::kBatch;
-  const RunSummary batch = runBag({bag_, out_, config, nullptr});
-  const RunSummary online = play(out_ + "/again");
-  ASSERT_TRUE(batch.batch.has_value());
-  EXPECT_TRUE(batch.batch->converged);
-  EXPECT_NEAR(online.final_offset_s, batch.final_offset_s, 0.3 * online.final_offset_sigma_s);
-  EXPECT_NEAR(online.end_to_start_2d_m, batch.end_to_start_2d_m, 0.05);
-  EXPECT_NEAR(online.end_to_start_3d_m, batch.end_to_start_3d_m, 0.05);
-}
-
-TEST_F(RealBag, SameBytesTwice) {
-  play(out_ + "/a");
-  play(out_ + "/b");
-  for (const std::string& name : RunOutput::fileNames()) {
-    const std::string a = contents(out_ + "/a/" + name), b = contents(out_ + "/b/" + name);
-    EXPECT_FALSE(a.empty()) << name;
-    EXPECT_EQ(untimed(a), untimed(b)) << name;
-  }
 }
 
 }  // namespace

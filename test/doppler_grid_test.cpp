@@ -5,27 +5,13 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <random>
 #include <stdexcept>
 #include <vector>
 
+#include "noise.h"
+
 namespace rio_t {
 namespace {
-
-/// Random numbers that are the same with every standard library.
-class Random {
- public:
-  explicit Random(std::uint32_t seed) : engine_(seed) {}
-  double uniform(double low, double high) {
-    return low + (high - low) * (static_cast<double>(engine_()) + 0.5) / 4294967296.0;
-  }
-  double normal() {  // Box-Muller
-    return std::sqrt(-2.0 * std::log(uniform(0, 1))) * std::cos(2.0 * M_PI * uniform(0, 1));
-  }
-
- private:
-  std::mt19937 engine_;
-};
 
 constexpr double kNoise = 0.035;  // [m/s] of a Doppler before it is rounded
 

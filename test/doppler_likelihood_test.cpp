@@ -4,20 +4,14 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
 #include <vector>
 
-#include "noise.h"
+#include "static_scene.h"
 
 namespace rio_t {
 namespace {
-
-Eigen::Vector3d direction(double azimuth, double elevation) {
-  return {std::cos(elevation) * std::sin(azimuth), std::cos(elevation) * std::cos(azimuth),
-          std::sin(elevation)};
-}
 
 PointVariances variances(double doppler, double azimuth, double elevation, double step) {
   PointVariances noise;
@@ -36,17 +30,14 @@ class Scene {
  public:
   explicit Scene(const PointVariances& noise_in, double elevation_spread_in = 0.35)
       : noise(noise_in), elevation_spread(elevation_spread_in) {}
-  double uniform(double low, double high) {
-    return low + (high - low) * (static_cast<double>(engine_()) + 0.5) / 4294967296.0;
-  }
   double normal() { return draw_(); }
   Eigen::Vector3d vector() { return draw_.vector(); }
   std::vector<RadarDirection> scan(const Eigen::Vector3d& v_R, std::size_t points) {
     const double step = std::sqrt(12.0 * noise.quantization);
     std::vector<RadarDirection> result;
     for (std::size_t i = 0; i < points; ++i) {
-      const double azimuth = uniform(-0.9, 0.9);
-      const double elevation = uniform(-elevation_spread, elevation_spread);
+      const double azimuth = angle_.uniform(-0.9, 0.9);
+      const double elevation = angle_.uniform(-elevation_spread, elevation_spread);
       double doppler = -direction(azimuth, elevation).dot(v_R) + std::sqrt(noise.doppler) * draw_();
       if (step > 0.0) doppler = step * std::round(doppler / step);
       const double measured_azimuth = azimuth + std::sqrt(noise.azimuth) * draw_();
@@ -61,7 +52,7 @@ class Scene {
 
  private:
   Noise draw_{20};
-  std::mt19937 engine_{21};
+  Random angle_{21};
 };
 
 // --- One point

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstdint>
 #include <random>
 
@@ -18,6 +19,21 @@ class Noise {
   Eigen::Vector3d vector() {
     const double x = (*this)(), y = (*this)(), z = (*this)();
     return {x, y, z};
+  }
+
+ private:
+  std::mt19937 engine_;
+};
+
+/// Random numbers that are the same with every standard library.
+class Random {
+ public:
+  explicit Random(std::uint32_t seed) : engine_(seed) {}
+  double uniform(double low, double high) {
+    return low + (high - low) * (static_cast<double>(engine_()) + 0.5) / 4294967296.0;
+  }
+  double normal() {  // Box-Muller
+    return std::sqrt(-2.0 * std::log(uniform(0, 1))) * std::cos(2.0 * M_PI * uniform(0, 1));
   }
 
  private:

@@ -13,9 +13,11 @@ namespace {
 /// Feeds scans at 10 Hz whose derivative is a motion and noise [m/s^2]. The mean of two sides with
 /// independent noise of sigma s has noise of s / sqrt(2).
 struct Scans {
-  double motion = 0.0;  ///< sigma per axis, the same on both sides
-  double noise = 0.0;   ///< sigma per axis and side
-  /// Of the mean's variance, what is known of it: an IMU's noise is measured where it is white.
+  Scans(double motion_in, double noise_in) : motion(motion_in), noise(noise_in) {}
+
+  double motion;  ///< sigma per axis, the same on both sides
+  double noise;   ///< sigma per axis and side
+  /// The share of the mean's variance that is known: the noise of an IMU is measured where it is white.
   double known = 1.0;
   Eigen::Matrix3d weight = Eigen::Vector3d(400.0, 900.0, 100.0).asDiagonal();  // [s^2/m^2]
   Noise draw{11};
@@ -58,8 +60,7 @@ TEST(OffsetEvidence, NoiseAloneClaimsLittleEvenInAnHour) {
   // 0.35 m/s^2 in the mean: more than what remains of strong vibration.
   for (const double noise : {0.05, 0.5}) {
     OffsetEvidence evidence;
-    Scans scans;
-    scans.noise = noise;
+    Scans scans(0.0, noise);
     scans.feed(evidence, 3600.0);
     EXPECT_LT(scans.meanGain(), 0.02) << noise << " m/s^2";
     // Of what the derivatives would claim as they are.
@@ -70,8 +71,7 @@ TEST(OffsetEvidence, NoiseAloneClaimsLittleEvenInAnHour) {
 
 TEST(OffsetEvidence, NoiseALittleBeyondWhatIsKnownIsNoMotion) {
   OffsetEvidence evidence;
-  Scans scans;
-  scans.noise = 0.5;
+  Scans scans(0.0, 0.5);
   scans.known = 0.5;
   scans.feed(evidence, 3600.0);
   EXPECT_LT(scans.meanGain(), 0.02);
@@ -80,9 +80,7 @@ TEST(OffsetEvidence, NoiseALittleBeyondWhatIsKnownIsNoMotion) {
 TEST(OffsetEvidence, QuietMotionCountsWhole) {
   for (const double motion : {0.3, 1.0, 5.0}) {
     OffsetEvidence evidence;
-    Scans scans;
-    scans.motion = motion;
-    scans.noise = 0.02;
+    Scans scans(motion, 0.02);
     scans.feed(evidence, 60.0);
     scans.feed(evidence, 300.0);
     EXPECT_GT(scans.meanGain(), 0.9) << motion;
@@ -93,9 +91,7 @@ TEST(OffsetEvidence, AMixCountsByItsShareAndClaimsNoMoreThanIsKnown) {
   // Both as likely as each other in the mean, and one more than the other.
   for (const double noise : {0.5, 1.0, 2.0}) {
     OffsetEvidence evidence;
-    Scans scans;
-    scans.motion = 1.0;
-    scans.noise = noise;
+    Scans scans(1.0, noise);
     scans.feed(evidence, 60.0);
     scans.feed(evidence, 3600.0);
     const double share = 1.0 / (1.0 + 0.5 * noise * noise);
@@ -108,7 +104,7 @@ TEST(OffsetEvidence, AMixCountsByItsShareAndClaimsNoMoreThanIsKnown) {
 TEST(OffsetEvidence, WhatTiltAndBiasAddIsNoMotion) {
   // A wrong tilt looks like a steady acceleration, on both sides.
   OffsetEvidence evidence;
-  Scans scans;
+  const Eigen::Matrix3d weight = Scans(0.0, 0.0).weight;
   Noise draw{5};
   double gains = 0.0;
   Eigen::Vector3d error = Eigen::Vector3d::Zero();  // lasts for a second
@@ -118,7 +114,7 @@ TEST(OffsetEvidence, WhatTiltAndBiasAddIsNoMotion) {
     d.mean = d.before = d.after = error;
     d.variance = 1e-3;
     d.shared = 0.01 * Eigen::Matrix3d::Identity();
-    evidence.add(Time::fromSeconds(0.1 * i), d, scans.weight);
+    evidence.add(Time::fromSeconds(0.1 * i), d, weight);
     gains += evidence.gain() / 2000.0;
   }
   EXPECT_LT(gains, 0.1);
@@ -126,9 +122,7 @@ TEST(OffsetEvidence, WhatTiltAndBiasAddIsNoMotion) {
 
 TEST(OffsetEvidence, IsForgottenWithinAMinute) {
   OffsetEvidence evidence;
-  Scans scans;
-  scans.motion = 1.0;
-  scans.noise = 0.1;
+  Scans scans(1.0, 0.1);
   scans.feed(evidence, 60.0);
   EXPECT_GT(evidence.gain(), 0.8);
   scans.motion = 0.0;

@@ -2,26 +2,17 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <limits>
 #include <set>
-#include <sstream>
 
 #include "rio_t/simulation/presets.h"
+#include "run_files.h"
 
 namespace rio_t {
 namespace {
 
 const std::string kConfigFolder = std::string(RIO_T_SOURCE_DIR) + "/config";
-
-std::string contents(const std::string& path) {
-  std::ifstream file(path);
-  std::stringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 /// A file in the test's own folder, gone at the end.
 class TemporaryFile {

@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <cstdint>
-#include <optional>
 
 #include "rio_t/odometry/batch_odometry.h"
 #include "simulated_run.h"

@@ -9,6 +9,7 @@ double offsetHalfWidth(const ImuBuffer& imu, Time time) {
   const double needed = 0.75 * imu.at(time).accel_noise / (kMaxRateNoise * kMaxRateNoise);
   return std::clamp(needed, kOffsetHalfWidth, kMaxOffsetHalfWidth);
 }
+
 VelocityRate velocityRate(const ImuMean& imu, const Eigen::Vector3d& b_g, const Eigen::Vector3d& b_a,
                           const Eigen::Vector3d& v_I, const Eigen::Vector3d& g_I,
                           const Eigen::Vector3d& l_I) {

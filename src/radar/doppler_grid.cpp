@@ -8,30 +8,30 @@
 namespace rio_t {
 namespace {
 
-/// [m/s] Smaller steps are none. Beside a noise of 0.035 m/s their sigma of step / sqrt(12) makes 1.4 %.
+/// [m/s] A smaller step counts as none. Its sigma, step / sqrt(12), adds 1.4 % to a noise of 0.035 m/s.
 constexpr double kLeastStep = 0.02;
-/// [m/s] Larger ones are none: it would be 1 ms in which the radar measures a Doppler (at 77 GHz).
+/// [m/s] A larger step counts as none: the radar would measure a Doppler in 1 ms (at 77 GHz).
 constexpr double kLargestStep = 2.0;
-/// [m/s] Larger values are marks of a driver, like -999 for "no Doppler".
+/// [m/s] A larger value is a mark of the driver, like -999 for "no Doppler".
 constexpr double kLargestDoppler = 100.0;
-/// [steps] of a value as the driver gives it; it may round to decimals or convert. Values of a radar without
-/// steps come so near to a multiple once in 500 times.
+/// [steps] The driver may round or convert a value; it changes the value by up to this much. A value of a
+/// radar without steps is so near to a multiple once in 500 times.
 constexpr double kRounding = 1e-3;
-/// [steps] Where a value is expected no better, being 20 times the one that the step was read off, it is a
-/// misfit.
+/// [steps] The tolerance of a value grows with the value. A value that needs a larger tolerance than this, 20
+/// times the value that the step was read off, is a misfit.
 constexpr double kMaxTolerance = 0.02;
-/// Share of a value by which the same one may differ, as a float or computed from one.
+/// Two values that differ by this share are the same: floats, or computed from floats.
 constexpr double kSame = 1e-6;
-/// Values of a batch of 16 that may be misfits: no multiples. If every fiftieth value of a radar is one, one
-/// batch in 270 has more, and four in a row never have; if every twentieth is, one in 23, and one in 300 000
-/// is the last of four. Of a radar without steps, each value is near a multiple of a wrong step once in 25
-/// times at most (kMaxTolerance), and 14 of 16 are once in 10^17 times.
+/// So many values of a batch of 16 may be misfits, that is, no multiples. If every fiftieth value of a radar
+/// is a misfit, one batch in 270 has more, and four in a row never have. If every twentieth is, one batch in
+/// 23 has more, and one in 300 000 is the last of four. If a radar has no steps, a value is near a multiple
+/// of a wrong step once in 25 times at most (kMaxTolerance), and 14 of 16 values are once in 10^17 times.
 constexpr std::size_t kMaxMisfits = 2;
 constexpr int kBatchesWithoutStep = 4;
 
-/// The multiple of the step that a value is; 0: it is a misfit. The step was read off a value of `known_at`
-/// steps. So m steps are expected to within the rounding of the value and that of the step, which has grown
-/// by m / known_at.
+/// The multiple of the step that a value is; 0 if it is a misfit. The step was read off a value of `known_at`
+/// steps. So a value of m steps may be off by its own rounding and by that of the step, which has grown
+/// by the factor m / known_at.
 double multipleOf(double step, double known_at, double value) {
   const double steps = value / step;
   const double multiple = std::round(steps);
@@ -52,10 +52,11 @@ std::size_t countMisfits(const Batch& values, const Reading& reading) {
   }));
 }
 
-/// `start` as the values tell it, if it explains them: if all but kMaxMisfits are multiples.
+/// The reading `start`, refined by the values; none if more than kMaxMisfits values are no multiples.
 ///
-/// The values ascend, and each larger multiple tells the step better. Only the first value of a multiple
-/// does: a step that followed each would creep through values that lie close together without being the same.
+/// The values ascend, and each larger multiple gives a better step. Only the first value of a multiple
+/// counts: a step that followed each would creep through values that lie close together without being the
+/// same.
 template <typename Batch>
 std::optional<Reading> explain(const Batch& ascending, const Reading& start) {
   Reading reading = start;
@@ -68,8 +69,8 @@ std::optional<Reading> explain(const Batch& ascending, const Reading& start) {
   return reading;
 }
 
-/// More than kMaxMisfits values are multiples of the step alone, and not of one that is some times as large.
-/// A smaller step always explains a few more by chance.
+/// Whether more than kMaxMisfits values are multiples of this step and not of a step 2, 3, ... times as
+/// large. A smaller step always explains a few more values by chance.
 template <typename Batch>
 bool isNeeded(const Batch& values, const Reading& reading) {
   const std::size_t misfits = countMisfits(values, reading);
@@ -91,7 +92,7 @@ std::optional<Reading> largestStep(const Batch& ascending, const Reading& base, 
   return std::nullopt;
 }
 
-/// Most values that lie within `width` of each other, as a share of the value.
+/// The largest number of values that lie within `width` of each other, a share of the value.
 template <typename Batch>
 std::size_t mostWithin(const Batch& ascending, double width) {
   std::size_t most = 0;
@@ -122,13 +123,13 @@ void DopplerGrid::add(const RadarScan& scan) {
   }
 }
 
-/// The batch is full.
+/// Judges the batch, which is full.
 void DopplerGrid::judge() {
   count_ = 0;
   std::sort(batch_.begin(), batch_.end());
   std::optional<Reading> found;
   if (step_.source == DopplerStepSource::kData && step_.value > 0.0) {
-    // A step that is known is not read anew: a misfit that comes near to a multiple must not move it.
+    // The known step stays as it is: a misfit that comes near to a multiple must not move it.
     if (countMisfits(batch_, {step_.value, known_at_}) <= kMaxMisfits) {
       without_step_ = 0;
       return;
@@ -137,12 +138,13 @@ void DopplerGrid::judge() {
     found = largestStep(batch_, {step_.value, known_at_}, kLeastStep);
   }
   if (!found) {
-    // One value alone is a multiple, but nobody knows of how many steps. Half of them wait for another.
+    // If all values are the same, nobody knows how many steps that value is. Half of the batch waits for
+    // another value.
     if (mostWithin(batch_, 4.0 * kRounding) + kMaxMisfits >= kBatch) {
       count_ = kBatch / 2;
       return;
     }
-    // The smallest values are multiples of few steps. One of the first kMaxMisfits + 1 is no misfit.
+    // The smallest values are multiples of few steps. At least one of the first kMaxMisfits + 1 is no misfit.
     for (std::size_t i = 0; i <= kMaxMisfits; ++i) {
       const double least = found ? found->step : kLeastStep;
       if (const auto larger = largestStep(batch_, {batch_[i], 1.0}, least)) found = larger;
@@ -153,7 +155,7 @@ void DopplerGrid::judge() {
     step_ = {found->step, DopplerStepSource::kData};
     known_at_ = found->known_at;
   } else if (2 * mostWithin(batch_, kSame) < kBatch && ++without_step_ >= kBatchesWithoutStep) {
-    // Without steps no value comes again and again, as one step does at rest, among misfits.
+    // Without steps no value repeats. At rest, among misfits, one step does.
     step_ = {0.0, DopplerStepSource::kData};
   }
 }

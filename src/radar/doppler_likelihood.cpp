@@ -11,11 +11,11 @@
 namespace rio_t {
 namespace {
 
-/// [m^2/s^2] of a residual, or a point without any noise would have infinite weight. A hundredth of the
-/// Doppler noise of any radar known.
+/// [m^2/s^2] Least variance of a residual: a point without any noise would have infinite weight. It is a
+/// hundredth of the Doppler noise of any radar known.
 constexpr double kMinVariance = 1e-6;
-/// Below, a residual is as good as zero, and its derivative is taken there.
-constexpr double kNoResidual = 1e-4;  // [sigma]
+/// [sigma] A smaller residual is as good as zero; its derivative is that at zero.
+constexpr double kNoResidual = 1e-4;
 /// A pivot below this share of the trace is rounding.
 constexpr double kNoInformation = 1e-12;
 constexpr double kSpreads = 4.0;  // [variances] of the noise of the directions
@@ -118,7 +118,8 @@ DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, 
   const double along_el = 0.75 * noise.elevation + 0.25 * noise.azimuth;
   points_.reserve(points.size());
   for (const RadarDirection& p : points) {
-    // At the direction corrected by the residual: at the measured one, the spread correlates with it.
+    // The spread is that at the direction corrected by the residual. At the measured direction it would
+    // correlate with the residual.
     const Angles a = correctedDirection(p.u_R, p.doppler + p.u_R.dot(v_R), v_R, noise);
     const Eigen::Vector3d u = a.direction();
     const Eigen::Matrix3d spread =

@@ -5,11 +5,11 @@
 namespace rio_t {
 namespace {
 
-/// [steps] A point lies beyond the Dopplers seen, or a span off, by more or less than this: rounding, and the
-/// noise of its direction.
+/// [steps] Rounding and the noise of a direction may move a point by this much. A point must lie beyond the
+/// Dopplers seen by more, and be a span off to within less.
 constexpr double kClearly = 1.5;
-/// So many points make a span. Moving things are off by anything: that most of ten are off by the same
-/// amount, which is also where the Dopplers end, is no chance.
+/// So many points show a span. Moving objects are off by any amount. It is no chance if most of ten points
+/// are off by one amount and the Dopplers span that same amount.
 constexpr std::size_t kEnough = 10;
 
 }  // namespace

@@ -9,29 +9,29 @@
 namespace rio_t {
 namespace {
 
-/// What the noise at the start counts as: so many points whose residuals show nothing but that noise.
+/// The noise at the start counts as so many points, whose residuals show nothing but that noise.
 constexpr double kStartPoints = 10.0;
-/// [scans] that are remembered, 100 s at 10 Hz: at a walk they tell the elevation noise, which shows least,
-/// to 3 %.
+/// [scans] that PointNoise remembers, 100 s at 10 Hz. At a walk they show the elevation noise, which shows
+/// least, to 3 %.
 constexpr double kMemory = 1000.0;
-/// [steps] of the Doppler. At lower speeds most points lie in a few bins, and the error of the step is
+/// [steps of the Doppler] At a lower speed most points lie in a few bins, and the error of the step is
 /// neither even nor independent of the direction.
 constexpr double kMinSpeed = 4.0;
-/// [m/s] Residuals up to here tell how many outliers there are.
+/// [m/s] Residuals up to this size show how many outliers there are.
 constexpr double kOutlierSpan = 1.0;
-/// [s/m] Bounds of the density of the outliers, per point: 1 in 200 and every other one over 5 m/s. Above,
-/// noise that has become much larger would be taken for outliers for long.
+/// [s/m] Bounds of the density of the outliers, per point: 1 in 200 and every other one over 5 m/s. With a
+/// larger density, points would pass for outliers for long after their noise has grown.
 constexpr double kMinOutlierDensity = 0.001;
 constexpr double kMaxOutlierDensity = 0.1;
-/// Where an angle is known no better, it is none.
+/// An angle or a Doppler with more noise is no measurement.
 constexpr double kMaxAngleSigma = 0.2;    // [rad]
 constexpr double kMaxDopplerSigma = 0.2;  // [m/s]
-/// A start of zero does not mean that nothing else is possible.
+/// As kMinStartDopplerSigma.
 constexpr double kMinStartAngleSigma = 0.01;  // [rad]
-/// [m^2/s^2] of a residual; bounds the weights where there is no noise at all.
+/// [m^2/s^2] Variance of a residual; it bounds the weights if there is no noise at all.
 constexpr double kMinVariance = 1e-4;
 
-/// That a residual is of the static world, a Gaussian, and not of the outliers, which are spread evenly.
+/// Probability that a residual is of the static world, a Gaussian, and not of an outlier, spread evenly.
 double inlierProbability(double residual, double variance, double outlier_density) {
   const double density = std::exp(-0.5 * square(residual) / variance) / std::sqrt(2.0 * M_PI * variance);
   return density / (density + outlier_density);
@@ -53,7 +53,7 @@ void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vec
     return std::max(kMinVariance, noise.quantization + shares.dot(vectorOf(noise)));
   };
   auto inlier = inliers.begin();
-  const auto is_inlier = [&](const RadarDirection& p) {  // to be asked for one point after the other
+  const auto is_inlier = [&](const RadarDirection& p) {  // call it for one point after the other
     if (inlier == inliers.end() || *inlier != p.index) return false;
     ++inlier;
     return true;
@@ -73,11 +73,11 @@ void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vec
   double outlier_density = 0.0;
   inlier = inliers.begin();
   for (const RadarDirection& p : points) {
-    // The velocity has taken this off the squared residuals that it was fitted to.
+    // The fit of the velocity has made the squared residuals of its inliers smaller by this.
     const double fitted = is_inlier(p) ? p.u_R.dot(velocity_covariance * p.u_R) : 0.0;
     const double residual = p.doppler + p.u_R.dot(v_R);
     const Eigen::Vector3d shares = noiseShares(correctedDirection(p.u_R, residual, v_R, noise), v_R, noise);
-    // A squared residual has twice its squared variance.
+    // The variance of r^2 is twice the squared variance of r.
     const double probability = inlierProbability(residual, variance(shares), noise.outlier_density);
     const double weight = 0.5 * probability / square(variance(shares));
     mean_shares += shares / static_cast<double>(points.size());
@@ -92,8 +92,8 @@ void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vec
   mean_shares_ += forgotten * (mean_shares - mean_shares_);
   const double believed = variance(mean_shares_);
   solve();
-  // The scans so far were weighted by what was believed then. Had it been much too small, they would outweigh
-  // all that come.
+  // The scans so far were weighted with the noise believed then. If it was much too small, they would
+  // outweigh all scans to come.
   const double reweighting = square(believed / variance(mean_shares_));
   information_ *= reweighting;
   information_vector_ *= reweighting;

@@ -1,9 +1,9 @@
 #include "velocity_solver.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 #include "direction_noise.h"
 
@@ -13,6 +13,12 @@ namespace {
 double degreesOfFreedom(std::size_t points) { return points > 3 ? static_cast<double>(points - 3) : 1.0; }
 
 }  // namespace
+
+double largestSigma(const Eigen::Matrix3d& covariance) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(covariance, Eigen::EigenvaluesOnly);
+  return std::sqrt(eigen.eigenvalues()[2]);
+}
 
 VelocitySolution solveLeastSquares(const std::vector<RadarDirection>& points,
                                    const EgoVelocityOptions& options) {
@@ -40,16 +46,15 @@ VelocitySolution solveLeastSquares(const std::vector<RadarDirection>& points,
 }
 
 // A measured direction u_m = u + e turns the residual d + u_m . v into Doppler noise plus e . v, and adds the
-// covariance of e to u u' in H'H. The first is met by weights, the second by MomentCorrection. Estimating
+// covariance of e to u u' in H'H. Weights meet the first, MomentCorrection undoes the second. Estimating
 // equation:
 //   sum w_i ( U_i d_i + Q_i v ) = 0,   E[U_i] = u_i,  E[Q_i] = u_i u_i',  w_i = 1 / var_i,
 // an unbiased score, so the estimate is consistent (Carroll et al., Measurement Error in Nonlinear Models,
 // ch. 7; Fuller, Measurement Error Models, section 2.2). Two details matter:
-// - Weights are taken at the direction corrected by its own residual. The measured direction correlates with
-//   its residual, and weights that inherit this bias the estimate (by 0.3 % of the speed at 2.5 m/s); the
-//   corrected one does not, to first order.
-// - Fuller's modification: the compensation is reduced by the share 1/n, without which the estimate has no
-//   moments.
+// - The weights are those of the direction corrected by its own residual. The measured direction correlates
+//   with its residual, and weights taken there bias the estimate (by 0.3 % of the speed at 2.5 m/s). The
+//   corrected direction does not correlate, to first order.
+// - Fuller's modification reduces the compensation by the share 1/n. Without it the estimate has no moments.
 VelocitySolution solveErrorsInVariables(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
                                         const PointVariances& given, const EgoVelocityOptions& options) {
   constexpr int kIterations = 3;

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstddef>
 #include <vector>
 
 #include "rio_t/radar/ego_velocity.h"
@@ -14,14 +13,17 @@ struct VelocitySolution {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< without added_sigma
 };
 
+/// [m/s] Sigma along the largest axis of a covariance.
+double largestSigma(const Eigen::Matrix3d& covariance);
+
 /// v = -(H'H)^-1 H'd, covariance s^2 (H'H)^-1; s^2 is the residual variance, at least the quantisation's
 /// q^2/12.
 VelocitySolution solveLeastSquares(const std::vector<RadarDirection>& points,
                                    const EgoVelocityOptions& options);
 
-/// Least squares that knows that directions are noisy, see the source. `v_R` is where the weights are first
-/// taken: a RANSAC or least-squares velocity.
+/// Least squares that knows that directions are noisy, see the source. The first weights are those at `v_R`,
+/// a RANSAC or least-squares velocity; `given` is the noise of the points.
 VelocitySolution solveErrorsInVariables(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
-                                        const PointVariances& noise, const EgoVelocityOptions& options);
+                                        const PointVariances& given, const EgoVelocityOptions& options);
 
 }  // namespace rio_t

@@ -8,10 +8,9 @@
 namespace rio_t {
 namespace {
 
-/// [s] How strong motion and vibration are changes with the kind of motion.
+/// [s] The sums forget after this time: another kind of motion has other accelerations and vibrations.
 constexpr double kMemory = 20.0;
-/// [sigma] Noise of the IMU alone is farther than this from no acceleration once in 70,000 scans
-/// (chi-squared, 3 degrees of freedom).
+/// [sigma] Noise of the IMU alone exceeds this once in 70,000 scans (chi-squared, 3 degrees of freedom).
 constexpr double kCertain = 5.0;
 
 }  // namespace
@@ -49,7 +48,7 @@ void OffsetEvidence::add(Time stamp, const OffsetDerivative& derivative, const E
 }
 
 double OffsetEvidence::gain() const {
-  // One sigma less: noise alone passes it by little and seldom.
+  // The motion less one sigma. Noise alone seldom exceeds zero then, and hardly.
   const double sure = motion_ - std::sqrt(motion_variance_);
   return sure > 0.0 && all_ > 0.0 ? std::min(1.0, sure / all_) : 0.0;
 }

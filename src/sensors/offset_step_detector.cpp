@@ -20,8 +20,7 @@ bool OffsetStepDetector::stepped(const Innovation& innovation) {
   if (count_ < 30.0 || information_ <= 0.0) return false;
 
   const double change = projection_ / information_;
-  // The scatter that the change itself does not explain; S is a bound on the safe side, so it may well be
-  // below 1.
+  // The scatter that the change does not explain. S is an upper bound, so the scatter may well be below 1.
   const double scatter = std::max(0.2, (squares_ - change * projection_) / count_);
   const double sigma = std::sqrt(scatter / information_);
   if (std::abs(change) < options_.significance * sigma || std::abs(change) < options_.min_change)

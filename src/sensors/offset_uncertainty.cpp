@@ -7,7 +7,7 @@
 namespace rio_t {
 namespace {
 
-/// [s] A drift of 2 ms a minute asks for 1.3 ms over it: more than the scatter of 400 scans.
+/// [s] Over this time a drift of 2 ms a minute asks for 1.3 ms, more than the scatter of 400 scans.
 constexpr double kMemory = 40.0;
 
 }  // namespace
@@ -17,7 +17,8 @@ void OffsetUncertainty::add(const Innovation& innovation) {
   last_ = innovation.stamp;
   const auto& [stamp, d, S, S_at_offset, J] = innovation;
   const Eigen::LDLT<Eigen::Matrix3d> weight = S.ldlt();
-  // Weighed as in the window: else what the estimate does not heed would ask for a change for good.
+  // The weights are those of the window. Otherwise a scan that the window ignores would ask for a change for
+  // good.
   const double length = std::sqrt(d.dot(weight.solve(d)));
   const double share = huber_threshold_ > 0.0 && length > huber_threshold_ ? huber_threshold_ / length : 1.0;
   const Eigen::Vector3d weighted_J = weight.solve(J);
@@ -37,8 +38,8 @@ double OffsetUncertainty::squaredLag() const {
   if (information_ <= 0.0) return 0.0;
   const double change = projection_ / information_;
   const double change_variance = spread_ / (information_ * information_);
-  // Akaike's criterion: a change is worth its while where its square exceeds twice its variance. The square
-  // then is larger than that of the lag by its variance.
+  // Akaike's criterion accepts a change if its square exceeds twice its variance. On average, that square
+  // exceeds the squared lag by the variance.
   const double excess = change * change - change_variance;
   return excess > change_variance ? excess : 0.0;
 }

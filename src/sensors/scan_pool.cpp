@@ -1,7 +1,5 @@
 #include "rio_t/sensors/scan_pool.h"
 
-#include <cmath>
-
 namespace rio_t {
 namespace {
 

@@ -14,7 +14,7 @@ namespace rio_t {
 /// The Dopplers of one scan, as the factor needs them.
 struct DopplerMeasurement : RadarScanTime {
   std::shared_ptr<const DopplerLikelihood> points;
-  /// Of a velocity error that the points share, per axis of R [m^2/s^2]. See
+  /// The points share an error of the velocity. These are its variances along the axes of R [m^2/s^2], see
   /// EgoVelocityOptions::added_sigma.
   Eigen::Vector3d shared_variances = Eigen::Vector3d::Zero();
   double huber_threshold = 0.0;  ///< [sigma] of the shared error; 0: no robust loss

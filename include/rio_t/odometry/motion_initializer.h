@@ -92,7 +92,7 @@ class MotionInitializer {
   /// solution. Returns the share of outliers.
   double refine(const Velocities& velocities, Time time, const ImuBuffer& imu, ModelErrorScale& scale,
                 NodePrior& prior) const;
-  /// What each velocity tells of the offset, see OffsetEvidence; 0: nothing.
+  /// For each velocity the gain of OffsetEvidence: 0 if the velocity says nothing about the offset.
   std::vector<double> offsetGains(const Velocities& velocities, Time time, const ImuBuffer& imu,
                                   const Block& state, double t_O) const;
   struct CarriedCovariance {

@@ -8,11 +8,11 @@
 
 namespace rio_t {
 
-/// Where the Doppler step is from.
+/// The source of the Doppler step.
 enum class DopplerStepSource {
   kUnknown,  ///< not known yet: a typical value
-  kGiven,    ///< by the user
-  kData,     ///< read off the data; a step of 0 says that they show none
+  kGiven,    ///< the user gave it
+  kData,     ///< read off the data; 0 if the data show no step
 };
 std::string toString(DopplerStepSource source);  ///< "unknown", "given" or "data"
 
@@ -23,23 +23,23 @@ struct DopplerStep {
 
 /// Reads the step of a radar's Doppler off the data: all values are multiples of it.
 ///
-/// Values are judged in batches of 16 that are not zero. The step is the largest one of which all but an
-/// eighth of a batch are multiples. Batches that come later can only make it smaller, by a whole number,
-/// unless the radar is set up anew. Four batches in a row without a step, and there is none
-/// (docs/method.md, section 9.7). The answer depends on the values alone and their order. Not thread-safe.
+/// DopplerGrid judges batches of 16 values that are not zero. It takes the largest step of which at least 14
+/// of the 16 values are multiples. Later batches can only divide the step by a whole number, unless the radar
+/// is set up anew. After four batches in a row without a step the radar has none (docs/method.md, section
+/// 9.7). The answer depends only on the values and their order. Not thread-safe.
 class DopplerGrid {
  public:
-  /// `given` [m/s]: the step, below 0.02 there is none; 0: it is read off the data. Throws
-  /// std::invalid_argument if it is negative or not finite.
+  /// `given` is the step [m/s]. 0: DopplerGrid reads the step off the data; any other value below 0.02: the
+  /// radar has none. Throws std::invalid_argument if it is negative or not finite.
   explicit DopplerGrid(double given);
 
-  /// Takes all points of a scan, wherever they lie. Of 45 points it takes 1 us; without steps, where all
-  /// candidates are tried again and again, 9 us at 1 m/s and 70 us at 10 m/s.
+  /// Takes all points of a scan, wherever they lie. 45 points take 1 us. If the radar has no steps, `add`
+  /// tries all candidates again and again: that takes 9 us at 1 m/s and 70 us at 10 m/s.
   void add(const RadarScan& scan);
   DopplerStep step() const { return step_; }
 
-  /// [m/s] before the data tell: that of the IWR6843AOP data sets, and in the middle of what is usual (0.03
-  /// to 0.5) by ratio.
+  /// [m/s] The step until the data show it. The IWR6843AOP data sets have this one. By ratio, it lies in the
+  /// middle of the usual steps, 0.03 to 0.5.
   static constexpr double kTypicalStep = 0.125;
 
  private:

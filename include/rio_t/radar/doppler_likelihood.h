@@ -8,15 +8,16 @@
 
 namespace rio_t {
 
-/// Half a sum of squares and its derivatives with respect to a velocity.
+/// Half a sum of squares, and its derivatives with respect to a velocity.
 struct VelocityCost {
   double value = 0.0;
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< J'J; singular where the points see no motion
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< J'J; may be singular
 };
 
-/// The same cost if the points share an error of the velocity: minimised over it. `variances` [m^2/s^2] are
-/// those of its axes. `error`, if given, receives the error at the minimum [m/s].
+/// The same cost if the points share an error of the velocity; the cost is minimised over this error.
+/// `variances` [m^2/s^2] are those of the error's axes. `error`, if given, receives the error at the minimum
+/// [m/s].
 VelocityCost withSharedError(const VelocityCost& cost, const Eigen::Vector3d& variances,
                              Eigen::Vector3d* error = nullptr);
 
@@ -26,15 +27,18 @@ Eigen::Matrix3d semidefiniteRoot(const Eigen::Matrix3d& A);
 /// U'^-1 b, where b is in the range of U'. Zero in the rows of zeros.
 Eigen::Vector3d solveTransposed(const Eigen::Matrix3d& U, const Eigen::Vector3d& b);
 
-/// What the Dopplers of a scan say of the radar's velocity: one residual a point (docs/method.md, section
-/// 5.7). Minus its logarithm is half the sum of the squared residuals, so it fits into a least squares.
+/// Likelihood of the Dopplers of a scan, given the radar's velocity (docs/method.md, section 5.7).
 ///
-/// A Doppler is right within its bin of `step`, plus noise; or, with a small probability, it is anything.
+/// Each point gives one residual. The residual compares the Doppler that the radar measured with the one that
+/// a static point would show. Half the sum of the squared residuals is minus the logarithm of the likelihood,
+/// so least squares can use it. The model: a Doppler is right within its bin and its noise; or, with a small
+/// probability, the point is an outlier, and its Doppler can be anything.
 /// - Bin: a bin wider than the noise bounds the velocity along the ray and does not pull it to the centre.
-/// - Noise of the direction: the sigma grows with the velocity. Its derivative frees the estimate of the bias
-///   that least squares with noisy directions has (total least squares). It counts where the directions
-///   spread more than their noise; elsewhere, a larger velocity would explain any residual.
-/// - Anything: the residual is bounded, so that an outlier has no weight (a redescending loss).
+/// - Noise of the direction: the sigma of a residual grows with the velocity. The derivative of the sigma
+///   removes the bias that least squares with noisy directions has (total least squares). It only counts over
+///   the directions in which the points spread more than their noise; over the others, a larger velocity
+///   would explain any residual.
+/// - Outliers: the residual is bounded, so that an outlier has no weight (a redescending loss).
 class DopplerLikelihood {
  public:
   /// `points` look static at about the velocity `v_R` [m/s].

@@ -15,18 +15,18 @@ inline double unwrapped(double doppler, double expected, double span) {
   return span > 0.0 ? doppler + span * std::round((expected - doppler) / span) : doppler;
 }
 
-/// The span of a radar's Doppler: what lies beyond comes back on the other side (aliasing).
+/// The span of a radar's Doppler. A Doppler beyond the span comes back on the other side (aliasing).
 ///
-/// If it is not given, it is read off the data. A span shows itself: the Dopplers that were seen end where it
-/// ends, and points whose Doppler must lie beyond by the platform's velocity are a whole span off. Not
+/// If the span is not given, DopplerSpan reads it off the data. A span shows in two ways: no Doppler lies
+/// beyond it, and points whose Doppler must lie beyond, by the platform's velocity, are a whole span off. Not
 /// thread-safe.
 class DopplerSpan {
  public:
   explicit DopplerSpan(double given) : given_(given) {}  ///< [m/s] 0: read it off the data
 
-  /// Takes the points of a scan with a velocity that is known [m/s]; `step` is that of the Doppler [m/s].
+  /// Takes the points of a scan whose velocity is known [m/s]. `step` is that of the Doppler [m/s].
   void learn(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R, double step);
-  /// [m/s]; 0: as far as is known, there is none.
+  /// [m/s] 0: no span is known.
   double value() const { return given_ > 0.0 ? given_ : found_; }
 
  private:

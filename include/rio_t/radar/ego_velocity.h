@@ -20,9 +20,6 @@ enum class EgoVelocitySolver {
   kLeastSquares,       ///< plain least squares: all weight on the Doppler, directions taken as exact
   kErrorsInVariables,  ///< weighted by direction noise, and compensated for the attenuation it causes
 };
-std::string toString(EgoVelocitySolver solver);  ///< "ls" or "eiv"
-/// Inverse of toString. Throws std::invalid_argument, naming the choices, for anything else.
-EgoVelocitySolver egoVelocitySolverFromString(const std::string& name);
 
 struct EgoVelocityOptions {
   double min_range = 0.25;   ///< [m]
@@ -68,10 +65,10 @@ struct EgoVelocityOptions {
   double max_sigma = 0.5;                ///< [m/s] largest axis of the estimate
 };
 
-/// Why a scan gave a velocity, or none.
+/// Whether a scan gave a velocity and, if not, why.
 enum class EgoVelocityStatus {
   kMoving,          ///< solved for from the inliers
-  kZeroVelocity,    ///< at rest: zero, with what the Doppler bin hides as covariance
+  kZeroVelocity,    ///< at rest; the covariance covers the motion that the Doppler bin hides
   kTooFewPoints,    ///< fewer than 3 points after the filter
   kTooFewInliers,   ///< no velocity that enough points agree on
   kIllConditioned,  ///< the directions do not span 3D
@@ -85,13 +82,14 @@ struct EgoVelocity {
   EgoVelocityStatus status = EgoVelocityStatus::kTooFewPoints;
   Eigen::Vector3d v_R = Eigen::Vector3d::Zero();         ///< radar velocity, radar frame [m/s]
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< [m^2/s^2], radar frame
-  /// The part of the covariance's diagonal that the options say and no data measure: `added_sigma` squared,
-  /// or zero at rest [m^2/s^2].
+  /// The part of the covariance's diagonal that comes from the options, not from the data: `added_sigma`
+  /// squared, or zero at rest [m^2/s^2].
   Eigen::Vector3d told_variance = Eigen::Vector3d::Zero();
   /// Points near zero show a slow motion: the platform is not at rest, whatever the IMU shows.
   bool denies_rest = false;
-  std::vector<std::size_t> points;   ///< those that passed the filter; indices into the scan's points, ascending
-  std::vector<std::size_t> inliers;  ///< those that agree on the velocity; the same
+  /// The points that passed the filter: indices into the scan's points, ascending.
+  std::vector<std::size_t> points;
+  std::vector<std::size_t> inliers;  ///< those of them that agree on the velocity
 };
 
 /// Most points of the scan agree on the velocity, so it needs no prior.
@@ -123,11 +121,11 @@ class EgoVelocityEstimator {
   /// `estimate`, whether the scan is used or not.
   void observe(const RadarScan& scan);
 
-  /// For scans without a velocity of their own: the inliers are the points within three sigma of the prior.
-  /// Valid if they are the majority of the points; one is enough. v_R is that of the prior, and
-  /// there is no covariance.
+  /// Compares a scan that has no velocity of its own with a prior. The inliers are the points within three
+  /// sigma of the prior. The result is valid if the inliers are the majority of the points; one point is
+  /// enough. v_R is that of the prior, and there is no covariance.
   EgoVelocity around(const RadarScan& scan, const VelocityPrior& prior) const;
-  /// What the Dopplers of some points say. They look static at about `v_R` [m/s].
+  /// Likelihood of the Dopplers of some points. These look static at about `v_R` [m/s].
   DopplerLikelihood likelihood(const RadarScan& scan, const std::vector<std::size_t>& points,
                                const Eigen::Vector3d& v_R) const;
 
@@ -137,8 +135,7 @@ class EgoVelocityEstimator {
   /// The noise as learned so far.
   const PointVariances& noise() const { return noise_.variances(); }
   DopplerStep dopplerStep() const { return grid_.step(); }
-  double dopplerSpan() const { return span_.value(); }  ///< [m/s] 0: none known
-  /// The options as they hold now: those that are 0 for "from the step" have their values.
+  /// The options in use. Those that are 0, "from the step", have the values that follow from it.
   const EgoVelocityOptions& options() const { return options_; }
 
  private:

@@ -22,23 +22,24 @@ struct PointVariances {
 ///
 /// The variance of a residual is that of the Doppler plus those of the angles times their squared effect on
 /// the Doppler. This effect differs from point to point, so a regression of the squared residuals gives all
-/// three (docs/method.md, section 9). The start counts as a few points. It remains for an angle that the
-/// motion does not show.
+/// three (docs/method.md, section 9). The start counts as a few points. If the motion does not show an angle,
+/// its noise remains that of the start.
 class PointNoise {
  public:
   explicit PointNoise(const PointVariances& start);
 
-  /// Learns from a scan. `points`: those that passed the filter; `inliers`: indices of those that `v_R` was
-  /// solved from; both in the order of the scan. It also learns from the other points, as far as they may
-  /// belong to the static world: otherwise the known noise would cut off its own tails.
+  /// Learns from a scan. `points` passed the filter; `inliers` are the indices of those that `v_R` was solved
+  /// from. Both are in the order of the scan. `learn` also takes the other points, as far as they may belong
+  /// to the static world: otherwise the known noise would cut off its own tails.
   void learn(const std::vector<RadarDirection>& points, const std::vector<std::size_t>& inliers,
              const Eigen::Vector3d& v_R);
-  /// The quantisation became known [m^2/s^2]. What was learned before with another fades as all that is old.
+  /// Sets the quantisation once it is known [m^2/s^2]. Earlier scans were learned with another one; they fade
+  /// as all old scans do.
   void setQuantization(double variance) { variances_.quantization = variance; }
   /// The variances as learned so far; the quantisation is as it was given.
   const PointVariances& variances() const { return variances_; }
 
-  /// [m/s] A start of zero does not mean that nothing else is possible.
+  /// [m/s] A smaller start counts as this one: the noise may turn out larger than a start of zero.
   static constexpr double kMinStartDopplerSigma = 0.01;
 
  private:

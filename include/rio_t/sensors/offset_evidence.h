@@ -18,29 +18,32 @@ struct OffsetDerivative {
   /// Covariance of the error that all three share: of tilt and accelerometer bias [m^2/s^4].
   Eigen::Matrix3d shared = Eigen::Matrix3d::Zero();
 
-  /// The mean is five sigma of its noise: motion.
+  /// The mean exceeds five sigma of its noise, so it is motion.
   bool isCertain() const;
-  /// For an innovation. The noise before the scan is in its prediction, too, and both together look like a
-  /// wrong offset.
+  /// The derivative that goes with an innovation: if it is uncertain, that after the scan alone. The
+  /// prediction holds the noise before the scan; if the derivative held it too, both would look like a wrong
+  /// offset.
   const Eigen::Vector3d& forInnovation() const { return isCertain() ? mean : after; }
 };
 
-/// For a state `x` at the time of measurement `tau`, without `shared`; `g_W` is gravity in W [m/s^2].
+/// The derivative for a state `x` at the time of measurement `tau`, without `shared`. `g_W` is gravity in W
+/// [m/s^2].
 OffsetDerivative offsetDerivative(const ImuBuffer& imu, Time tau, const StateBlock& x,
                                   const Eigen::Vector3d& g_W, const Extrinsics& T_IR);
 
-/// How much of the derivative with respect to t_O is motion, and how much is noise of the IMU.
+/// Tells how much of the derivative with respect to t_O is motion, and how much is noise of the IMU.
 ///
-/// Noise in the derivative claims information about t_O that no scan has. A derivative far beyond the known
-/// noise is motion. Of the others: motion is the same before and after a scan, noise is not. So the mean of
-/// before' W after is the square of the motion, whatever the noise. Its share in mean' W mean is the gain by
-/// which the derivative has to be shortened: then J'J claims what the scans know (docs/method.md,
-/// section 5.3). Not thread-safe.
+/// The factor takes noise in the derivative for information about t_O, which no scan has. A derivative far
+/// beyond the known noise is motion. For smaller ones, OffsetEvidence compares the time before a scan with
+/// the time after it: motion is the same in both, noise is not. So the mean of before' W after is the square
+/// of the motion, whatever the noise. The gain is the share of this square in mean' W mean. If the factor
+/// shortens the derivative J by the gain, J'J is what the scans know (docs/method.md, section 5.3). Not
+/// thread-safe.
 class OffsetEvidence {
  public:
   /// `weight`: inverse covariance of the scan's velocity [s^2/m^2].
   void add(Time stamp, const OffsetDerivative& derivative, const Eigen::Matrix3d& weight);
-  /// In [0, 1]; 0 while nothing is known.
+  /// Factor on the derivative, in [0, 1]; 0 while nothing is known.
   double gain() const;
 
  private:

@@ -16,9 +16,9 @@ struct OffsetStepDetectorOptions {
 /// smoother that is sure of the old value would take minutes to follow.
 ///
 /// An offset that is wrong by c shows as innovations d = J c + noise, J = d(velocity)/d(t_O). The weighted
-/// average over the last scans, sum(J' S^-1 d) / sum(J' S^-1 J), is the change that they ask for. Its
-/// variance is 1 / sum(J' S^-1 J), scaled by the scatter of the innovations against S (docs/method.md, eq.
-/// 32).
+/// average over the last scans, sum(J' S^-1 d) / sum(J' S^-1 J), is the change that they ask for. The
+/// variance of this change is 1 / sum(J' S^-1 J), scaled by the scatter of the innovations against S
+/// (docs/method.md, eq. 32).
 class OffsetStepDetector {
  public:
   explicit OffsetStepDetector(const OffsetStepDetectorOptions& options) : options_(options) {}

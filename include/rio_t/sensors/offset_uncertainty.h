@@ -6,20 +6,21 @@
 namespace rio_t {
 
 /// Uncertainty of the time offset (docs/method.md, eq. 32b): its marginal variance plus the square of its
-/// lag. The estimate lags behind an offset that drifts, and the scans then keep asking for the same change.
+/// lag. If the offset drifts, its estimate lags behind, and the scans keep asking for the same change.
 /// Not thread-safe.
 class OffsetUncertainty {
  public:
   /// `huber_threshold` on the root of d' S^-1 d, as on the radar factors; 0: no robust loss.
   explicit OffsetUncertainty(double huber_threshold) : huber_threshold_(huber_threshold) {}
-  /// Takes the innovation of a scan that was used and tells the offset.
+  /// Takes the innovation of a scan that was used and that shows the offset.
   void add(const Innovation& innovation);
   /// The offset stepped and gets a new block, which does not lag.
   void offsetStepped();
 
   /// Standard deviation of the offset [s], given its marginal variance [s^2].
   double sigma(double variance) const;
-  /// Random walk that follows the change the scans ask for [s/sqrt(s)]; 0 if they ask for none.
+  /// Random walk with which the estimate follows the change that the scans ask for [s/sqrt(s)]; 0 if they ask
+  /// for none.
   double walk() const;
 
  private:

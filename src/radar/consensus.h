@@ -1,0 +1,40 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "rio_t/radar/ego_velocity.h"
+
+namespace rio_t {
+
+constexpr double kMajority = 0.6;    ///< of the points
+constexpr double kUnanimous = 0.85;  ///< of the points
+
+/// Draws needed so that one of them is free of outliers with the wanted probability (Fischler and Bolles,
+/// 1981).
+int ransacIterations(const EgoVelocityOptions& options);
+
+/// The velocity that most points agree with, among rest and those of three random points each. Each point
+/// costs its squared residual up to the threshold (MSAC), so that among equally many inliers the better fit
+/// wins. `points` has at least three. None if no three drawn span 3D.
+/// With a span, each Doppler counts modulo the span, and the drawn ones may have come back from either side.
+std::optional<Eigen::Vector3d> ransac(const std::vector<RadarDirection>& points,
+                                      const EgoVelocityOptions& options, int iterations, double span);
+
+/// Points that agree with `v_R`: within the threshold, or within three sigma if the noise of the direction
+/// alone is larger than the threshold, as it is at speed.
+std::vector<RadarDirection> selectInliers(const std::vector<RadarDirection>& points,
+                                          const Eigen::Vector3d& v_R, const PointVariances& noise,
+                                          const EgoVelocityOptions& options);
+
+/// Replaces `inliers` by the points that support a velocity near the prior, if that is the better choice. A
+/// sharp prior that contradicts the velocity of `inliers` outweighs even a majority of the points. A vague
+/// prior is weighed against their number: if it is wrong, it must not find a minority that sides with it.
+/// False if the scan is ambiguous: a vague prior contradicts neither of two velocities, and the number of
+/// points does not decide.
+bool selectInliersWithPrior(const std::vector<RadarDirection>& points, const VelocityPrior& prior,
+                            const PointVariances& noise, const EgoVelocityOptions& options,
+                            std::vector<RadarDirection>& inliers);
+
+}  // namespace rio_t

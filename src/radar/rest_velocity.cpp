@@ -1,0 +1,135 @@
+#include "rest_velocity.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "consensus.h"
+#include "direction_noise.h"
+
+namespace rio_t {
+namespace {
+
+/// Twice the log-likelihood ratio of a slow motion to rest: once in 1000 scans at rest (chi-squared, 3
+/// degrees of freedom).
+constexpr double kDeniesRest = 16.3;
+constexpr int kSlowIterations = 10;
+
+bool readsZero(const RadarDirection& p, const EgoVelocityOptions& o) {
+  return std::abs(p.doppler) <= o.zero_velocity_threshold;
+}
+
+/// The points that read zero or the bin beside it.
+std::vector<RadarDirection> selectSlow(const std::vector<RadarDirection>& points,
+                                       const EgoVelocityOptions& o) {
+  std::vector<RadarDirection> slow;
+  std::copy_if(points.begin(), points.end(), std::back_inserter(slow), [&](const RadarDirection& p) {
+    return std::abs(p.doppler) <= o.zero_velocity_threshold + o.doppler_quantization;
+  });
+  return slow;
+}
+
+/// Minus the log-likelihood of rest if some of the points read the bin beside zero for reasons of their own,
+/// on either side. DopplerLikelihood takes the points as independent, so it holds that so many of them cannot
+/// be wrong by chance.
+double restWithPointsBeside(const std::vector<RadarDirection>& points, const EgoVelocityOptions& o) {
+  const auto n = static_cast<double>(points.size());
+  const auto beside = static_cast<double>(
+      std::count_if(points.begin(), points.end(), [&](const RadarDirection& p) { return !readsZero(p, o); }));
+  const auto logOf = [](double count, double share) { return count > 0.0 ? count * std::log(share) : 0.0; };
+  return -logOf(n - beside, (n - beside) / n) - logOf(beside, 0.5 * beside / n);
+}
+
+/// The likeliest velocity of `points`, which read at most one bin. None if rest is about as likely.
+std::optional<VelocitySolution> fitSlowMotion(const std::vector<RadarDirection>& points,
+                                              const PointVariances& noise, const EgoVelocityOptions& o) {
+  if (points.size() < o.min_inliers) return std::nullopt;
+  VelocitySolution solution = solveLeastSquares(points, o);
+  if (!solution.solved || solution.v_R.isZero()) return std::nullopt;
+  const DopplerLikelihood likelihood(points, Eigen::Vector3d::Zero(), noise);
+  double at_rest = likelihood.at(Eigen::Vector3d::Zero()).value;
+  if (o.doppler_quantization > 0.0) at_rest = std::min(at_rest, restWithPointsBeside(points, o));
+  if (at_rest < 0.5 * kDeniesRest) return std::nullopt;
+  VelocityCost cost = likelihood.at(solution.v_R);
+  double damping = 1.0 / square(o.doppler_quantization + o.zero_velocity_threshold);
+  for (int i = 0; i < kSlowIterations; ++i) {
+    Eigen::Matrix3d damped = cost.information;
+    damped.diagonal().array() += damping;
+    const Eigen::Vector3d v_R = solution.v_R - damped.inverse() * cost.gradient;
+    const VelocityCost next = likelihood.at(v_R);
+    damping *= next.value < cost.value ? 0.1 : 10.0;
+    if (next.value >= cost.value) continue;
+    solution.v_R = v_R;
+    cost = next;
+  }
+  if (2.0 * (at_rest - cost.value) < kDeniesRest) return std::nullopt;
+  solution.solved = cost.information.determinant() > 0.0;
+  solution.covariance = cost.information.inverse();
+  return solution;
+}
+
+}  // namespace
+
+bool mostReadZero(const std::vector<RadarDirection>& points, const EgoVelocityOptions& o) {
+  const auto zeros = static_cast<double>(
+      std::count_if(points.begin(), points.end(), [&](const RadarDirection& p) { return readsZero(p, o); }));
+  return zeros >= (1.0 - o.zero_velocity_outlier_fraction) * static_cast<double>(points.size());
+}
+
+std::vector<RadarDirection> selectZeros(const std::vector<RadarDirection>& points,
+                                        const EgoVelocityOptions& o) {
+  std::vector<RadarDirection> zeros;
+  std::copy_if(points.begin(), points.end(), std::back_inserter(zeros),
+               [&](const RadarDirection& p) { return readsZero(p, o); });
+  return zeros;
+}
+
+// Every inlier reads the zero bin, of width q. Two things bound the velocity:
+// - The bin. A point reads zero only while |u . v| < q/2. So v lies in the ellipsoid v' M v < q^2/4, and M is
+//   the mean of u u'. A uniform density over an ellipsoid in 3D has the covariance M^-1 (q^2/4) / 5. More
+//   points do not help.
+// - The noise. Noise of sigma s carries readings over the edge of the bin, the sooner the faster the platform
+//   creeps. The likelihood P(v) that a point reads zero has the curvature
+//     -(log P)'' = 2 z phi(z) / (s^2 P(0)) at rest, z = q / (2 s),
+//   for each of the n points (1/s^2 as q goes to 0, nothing if q is much above s).
+// Unsolved if the directions leave some velocity unseen.
+VelocitySolution solveRest(const std::vector<RadarDirection>& inliers, const PointVariances& noise,
+                           const EgoVelocityOptions& o) {
+  VelocitySolution solution;
+  Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
+  for (const RadarDirection& p : inliers) mean += p.u_R * p.u_R.transpose();
+  mean /= static_cast<double>(inliers.size());
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(mean);
+  if (!(eigen.eigenvalues()[0] * o.max_condition_number > eigen.eigenvalues()[2])) return solution;
+  const double q = o.doppler_quantization;
+  const double s = std::sqrt(noise.doppler);
+  const auto n = static_cast<double>(inliers.size());
+  const double z = s > 0.0 ? q / (2.0 * s) : 0.0;
+  double scale = s * s / n;  // of M^-1; this is without a bin
+  if (q > 0.0) {
+    const double phi = std::exp(-0.5 * z * z) / std::sqrt(2.0 * M_PI);
+    const double curvature = s > 0.0 ? 2.0 * z * phi / (s * s * std::erf(z / std::sqrt(2.0))) : 0.0;
+    scale = 1.0 / (20.0 / (q * q) + n * curvature);
+  }
+  solution.covariance = o.zero_velocity_sigma * o.zero_velocity_sigma * Eigen::Matrix3d::Identity() +
+                        scale * eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
+                            eigen.eigenvectors().transpose();
+  solution.solved = true;
+  return solution;
+}
+
+std::optional<SlowMotion> findSlowMotion(const std::vector<RadarDirection>& points,
+                                         const PointVariances& noise, const EgoVelocityOptions& o) {
+  const std::vector<RadarDirection> slow = selectSlow(points, o);
+  if (static_cast<double>(slow.size()) < kMajority * static_cast<double>(points.size())) return std::nullopt;
+  const std::optional<VelocitySolution> first = fitSlowMotion(slow, noise, o);
+  if (!first) return std::nullopt;
+  SlowMotion found{*first, selectInliers(points, first->v_R, noise, o)};
+  if (const auto refined = fitSlowMotion(found.inliers, noise, o)) found.solution = *refined;
+  return found;
+}
+
+}  // namespace rio_t

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "rio_t/radar/ego_velocity.h"
+#include "velocity_solver.h"
+
+namespace rio_t {
+
+/// Enough points read zero for a platform at rest: `zero_velocity_outlier_fraction` of them may read more.
+bool mostReadZero(const std::vector<RadarDirection>& points, const EgoVelocityOptions& options);
+
+/// The points that read zero.
+std::vector<RadarDirection> selectZeros(const std::vector<RadarDirection>& points,
+                                        const EgoVelocityOptions& options);
+
+/// Zero velocity and its covariance. All `inliers` read the zero bin.
+VelocitySolution solveRest(const std::vector<RadarDirection>& inliers, const PointVariances& noise,
+                           const EgoVelocityOptions& options);
+
+struct SlowMotion {
+  VelocitySolution solution;
+  std::vector<RadarDirection> inliers;  ///< the points that agree with the solution
+};
+
+/// A slow motion that hides in the bins around zero: most points read zero, but those along the motion do
+/// not. None if rest explains the points about as well, or if most points read more than one bin.
+std::optional<SlowMotion> findSlowMotion(const std::vector<RadarDirection>& points,
+                                         const PointVariances& noise, const EgoVelocityOptions& options);
+
+}  // namespace rio_t

@@ -1,0 +1,180 @@
+// Bags, parameters and arguments with which no run is possible: one line says why.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <string>
+
+#include "rest_bag.h"
+
+namespace rio_t {
+namespace {
+
+using BagRunnerErrors = RestBag;
+
+TEST_F(BagRunnerErrors, MissingBagFolderAndUnreadableBagAreNamed) {
+  expectError(run(), {bag_, "no such file"});
+  EXPECT_FALSE(fs::exists(out_));
+  bag_ = folder_;
+  expectError(run(), {folder_, "folder"});
+  bag_ = folder_ + "/text.bag";
+  std::ofstream(bag_) << "not a bag at all, but long enough to be looked at\n";
+  expectError(run(), {bag_, "cannot be read as a ROS 1 bag"});
+  std::ofstream(bag_, std::ios::trunc).close();
+  expectError(run(), {bag_});
+}
+
+TEST_F(BagRunnerErrors, AnUnindexedBagIsToldToBeReindexed) {
+  writeBag({});
+  // A recording that was cut off has no index: its header says that the index starts at 0.
+  std::string bytes = contents(bag_);
+  const std::size_t at = bytes.find("index_pos=");
+  ASSERT_NE(at, std::string::npos);
+  for (std::size_t i = 0; i < 8; ++i) bytes[at + 10 + i] = 0;
+  std::ofstream(bag_, std::ios::binary) << bytes;
+  expectError(run(), {bag_, "rosbag reindex"});
+}
+
+TEST_F(BagRunnerErrors, ATruncatedOrDamagedBagIsNamed) {
+  writeBag({});
+  const std::string bytes = contents(bag_);
+  std::ofstream(bag_, std::ios::binary) << bytes.substr(0, bytes.size() / 2);
+  expectError(run(), {bag_});
+  // Damage in the middle of the data.
+  std::string damaged = bytes;
+  for (std::size_t i = 0; i < 2000; ++i) damaged[bytes.size() / 2 + i] = static_cast<char>(i * 37);
+  std::ofstream(bag_, std::ios::binary | std::ios::trunc) << damaged;
+  const Outcome outcome = run();
+  if (outcome.status != 0) expectError(outcome, {bag_});
+}
+
+TEST_F(BagRunnerErrors, MissingTopicsListThoseOfTheBag) {
+  BagContents what;
+  what.radar = false;
+  writeBag(what);
+  expectError(run(), {"no topic /sensor_platform/radar/scan", "radar_topic",
+                      "/sensor_platform/imu (sensor_msgs/Imu)", "/other (std_msgs/Header)"});
+  expectError(run({"--set", "radar_topic=/r", "--set", "imu_topic=/i"}), {"no topic /i", "no topic /r"});
+  writeBag({});
+  expectError(run({"--set", "stamp_source=trigger"}),
+              {"no topic /sensor_platform/radar/trigger", "trigger_topic"});
+}
+
+TEST_F(BagRunnerErrors, WrongTypesAreNamed) {
+  writeBag({});
+  expectError(run({"--set", "radar_topic=/sensor_platform/imu"}),
+              {"/sensor_platform/imu (radar_topic) is sensor_msgs/Imu", "expected sensor_msgs/PointCloud2"});
+  expectError(run({"--set", "ground_truth_topic=/other"}),
+              {"/other (ground_truth_topic) is std_msgs/Header"});
+}
+
+TEST_F(BagRunnerErrors, AWrongCloudFormatIsNamed) {
+  BagContents what;
+  what.doppler_field = "speed";
+  writeBag(what);
+  expectError(run(), {"/sensor_platform/radar/scan", "v_doppler_mps", "speed"});
+  EXPECT_EQ(run({"--set", "radar_field_doppler=speed"}).status, 0);
+}
+
+TEST_F(BagRunnerErrors, ZeroStampsAreNamedWithTheOtherSources) {
+  BagContents what;
+  what.stamped = false;
+  writeBag(what);
+  expectError(run(), {"/sensor_platform/radar/scan", "zero", "trigger", "arrival"});
+  EXPECT_EQ(run({"--set", "stamp_source=arrival"}).status, 0);
+  what.stamped = true;
+  what.imu_stamped = false;
+  writeBag(what);
+  expectError(run(), {"/sensor_platform/imu", "zero"});
+}
+
+TEST_F(BagRunnerErrors, ABadMessageAmongGoodOnesIsCountedAndSaid) {
+  writeBag({});
+  {
+    rosbag::Bag bag(bag_, rosbag::bagmode::Append);
+    sensor_msgs::PointCloud2 empty;  // without a stamp
+    bag.write("/sensor_platform/radar/scan", ros::Time(1005.0), empty);
+    sensor_msgs::Imu unstamped;
+    bag.write("/sensor_platform/imu", ros::Time(1005.0), unstamped);
+  }
+  const Outcome outcome = run();
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("/sensor_platform/radar/scan"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("/sensor_platform/imu: the stamp in the header is zero"), std::string::npos);
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 2) << outcome.err;
+  const std::string yaml = contents(out_ + "/summary.yaml");
+  EXPECT_NE(yaml.find("stamp_zero: 1"), std::string::npos) << yaml;
+  EXPECT_NE(yaml.find("imu_not_usable: 1"), std::string::npos) << yaml;
+  EXPECT_NE(yaml.find("scans_total: 81"), std::string::npos) << yaml;
+}
+
+TEST_F(BagRunnerErrors, NoDataInThePartPlayedIsNamed) {
+  BagContents what;
+  what.duration = 1.0;
+  writeBag(what);
+  {
+    rosbag::Bag bag(bag_, rosbag::bagmode::Append);
+    std_msgs::Header late;
+    late.stamp = ros::Time(1200.0);
+    bag.write("/other", ros::Time(1200.0), late);
+  }
+  expectError(run({"--set", "bag_start=50"}), {"no messages on topic /sensor_platform/imu"});
+}
+
+TEST_F(BagRunnerErrors, NeverInitialisedSaysWhatItWaitedFor) {
+  BagContents what;
+  what.duration = 2.0;
+  writeBag(what);
+  expectError(run(), {"never initialised, waited for", "init_duration"});
+  what.duration = 8.0;
+  what.shaking = 1.0;
+  writeBag(what);
+  expectError(run({"--set", "init_mode=static"}), {"never initialised, waited for", "gyro"});
+}
+
+TEST_F(BagRunnerErrors, EveryScanRejectedSaysWhy) {
+  BagContents what;
+  what.points = 2;  // their Dopplers would count, see radar_factor
+  writeBag(what);
+  expectError(run({"--set", "radar_factor=velocity"}),
+              {"every one of the 80 scans was rejected", "too_few_points"});
+  EXPECT_FALSE(fs::exists(out_ + "/summary.yaml"));
+  what.points = 0;
+  writeBag(what);
+  expectError(run(), {"every one of the 80 scans was rejected", "too_few_points"});
+}
+
+TEST_F(BagRunnerErrors, ASummaryOfAnEarlierRunDoesNotOutliveAFailure) {
+  writeBag({});
+  ASSERT_EQ(run().status, 0);
+  ASSERT_TRUE(fs::exists(out_ + "/summary.yaml"));
+  BagContents what;
+  what.points = 0;
+  writeBag(what);
+  EXPECT_EQ(run().status, 1);
+  EXPECT_FALSE(fs::exists(out_ + "/summary.yaml"));
+}
+
+TEST_F(BagRunnerErrors, WrongParametersAndArgumentsAreNamed) {
+  writeBag({});
+  expectError(run({"--set", "widnow=1"}), {"widnow", "window"});
+  expectError(run({"--set", "window=fast"}), {"window", "finite number"});
+  expectError(run({"--config", "isr"}), {"isr", "irs"});
+  expectError(run({"--fast"}), {"unknown argument --fast"});
+  expectError(run({"--set"}), {"--set", "expected a value"});
+  expectError(run({"--bag="}), {"--bag", "expected a value"});
+  expectError(runTool({"--config", "irs"}), {"missing argument --bag --output-dir"});
+  expectError(runTool({}), {"missing argument --bag --config --output-dir"});
+}
+
+TEST_F(BagRunnerErrors, AnOutputFolderThatCannotBeIsNamed) {
+  writeBag({});
+  std::ofstream(folder_ + "/file") << "in the way";
+  out_ = folder_ + "/file";
+  expectError(run(), {"output folder", folder_ + "/file"});
+  out_ = folder_ + "/file/below";
+  expectError(run(), {"output folder", folder_ + "/file/below"});
+}
+
+}  // namespace
+}  // namespace rio_t

@@ -1,0 +1,210 @@
+// Noise of the points: bias and honesty of the velocity, and noise that is learned.
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <vector>
+
+#include "rio_t/radar/ego_velocity.h"
+#include "static_scene.h"
+
+namespace rio_t {
+namespace {
+
+struct MonteCarlo {
+  Eigen::Vector3d bias = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rms = Eigen::Vector3d::Zero();
+  double nees = 0.0;
+};
+
+MonteCarlo monteCarlo(const EgoVelocityEstimator& estimator, const Eigen::Vector3d& v, const ScanNoise& noise,
+                      double elevation_spread, int trials = 4000) {
+  Random random(20);
+  MonteCarlo result;
+  for (int trial = 0; trial < trials; ++trial) {
+    // Velocities around v, so that the quantisation is not the same each time.
+    const Eigen::Vector3d truth =
+        v + 0.1 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+    const EgoVelocity e = estimator.estimate(staticScene(truth, 45, noise, random, elevation_spread));
+    EXPECT_EQ(e.status, EgoVelocityStatus::kMoving);
+    const Eigen::Vector3d error = e.v_R - truth;
+    result.bias += error / trials;
+    result.rms += error.cwiseAbs2() / trials;
+    result.nees += error.dot(e.covariance.llt().solve(error)) / trials;
+  }
+  result.rms = result.rms.cwiseSqrt();
+  return result;
+}
+
+MonteCarlo monteCarlo(const EgoVelocityOptions& options, const Eigen::Vector3d& v, const ScanNoise& noise,
+                      double elevation_spread) {
+  return monteCarlo(EgoVelocityEstimator(options), v, noise, elevation_spread);
+}
+
+// Little spread in elevation and noisy elevations: where least squares falls short of the vertical velocity
+// most.
+const ScanNoise kDirectionNoise{0.03, 0.05, 0.03, 0.125};
+const Eigen::Vector3d kClimb(0.2, 1.5, 0.6);
+
+TEST(EgoVelocityBias, LeastSquaresFallsShort) {
+  const MonteCarlo ls =
+      monteCarlo(bareOptions(EgoVelocitySolver::kLeastSquares), kClimb, kDirectionNoise, 0.25);
+  EXPECT_LT(ls.bias.z(), -0.04);  // of 0.6 m/s: the reason for the other solver
+  EXPECT_GT(ls.nees, 4.0);
+}
+
+TEST(EgoVelocityBias, ErrorsInVariablesDoesNot) {
+  const EgoVelocityOptions o = bareOptions(EgoVelocitySolver::kErrorsInVariables);
+  const MonteCarlo ls =
+      monteCarlo(bareOptions(EgoVelocitySolver::kLeastSquares), kClimb, kDirectionNoise, 0.25);
+  const MonteCarlo eiv = monteCarlo(o, kClimb, kDirectionNoise, 0.25);
+  EXPECT_LT(eiv.bias.cwiseAbs().maxCoeff(), 0.01);
+  EXPECT_LT(eiv.rms.z(), 0.9 * ls.rms.z());
+  EXPECT_NEAR(eiv.nees, 3.0, 0.5);
+}
+
+TEST(EgoVelocityBias, FastPlatform) {
+  const Eigen::Vector3d fast(0.5, 5.0, 1.0);
+  const MonteCarlo ls =
+      monteCarlo(bareOptions(EgoVelocitySolver::kLeastSquares), fast, kDirectionNoise, 0.35);
+  const MonteCarlo eiv =
+      monteCarlo(bareOptions(EgoVelocitySolver::kErrorsInVariables), fast, kDirectionNoise, 0.35);
+  EXPECT_LT(eiv.rms.z(), ls.rms.z());
+  EXPECT_LT(eiv.rms.y(), ls.rms.y());
+  EXPECT_LT(eiv.bias.cwiseAbs().maxCoeff(), 0.02);
+  EXPECT_NEAR(eiv.nees, 3.0, 0.6);
+}
+
+TEST(EgoVelocityBias, DefaultCovarianceIsNotTooSmall) {
+  const MonteCarlo result = monteCarlo(EgoVelocityOptions(), kClimb, kDirectionNoise, 0.25);
+  EXPECT_LT(result.nees, 3.0);
+  EXPECT_GT(result.nees, 0.8);  // nor so large that it says nothing
+}
+
+/// Scans as a run brings them: at `v` and up to a quarter slower or faster; `ghosts` of the points anywhere.
+void learnFrom(EgoVelocityEstimator& estimator, const Eigen::Vector3d& v, const ScanNoise& noise, int scans,
+               double ghosts = 0.0, double elevation_spread = 0.35) {
+  Random random(40);
+  for (int i = 0; i < scans; ++i) {
+    RadarScan scan = staticScene(random.uniform(0.75, 1.25) * v, 45, noise, random, elevation_spread);
+    for (RadarPoint& p : scan.points) {
+      if (random.uniform(0.0, 1.0) < ghosts) p.doppler = random.uniform(-2.5, 2.5);
+    }
+    estimator.learn(scan, estimator.estimate(scan));
+  }
+}
+
+EgoVelocityOptions startingAt(double azimuth, double elevation, double doppler) {
+  EgoVelocityOptions o = bareOptions(EgoVelocitySolver::kErrorsInVariables);
+  o.azimuth_sigma = azimuth;
+  o.elevation_sigma = elevation;
+  o.doppler_sigma = doppler;
+  return o;
+}
+
+void expectLearned(const EgoVelocityEstimator& estimator, const ScanNoise& truth, double share) {
+  const PointVariances& noise = estimator.noise();
+  EXPECT_NEAR(std::sqrt(noise.azimuth), truth.azimuth, share * truth.azimuth);
+  EXPECT_NEAR(std::sqrt(noise.elevation), truth.elevation, share * truth.elevation);
+  // Half of the step hides it.
+  EXPECT_NEAR(std::sqrt(noise.doppler), truth.doppler, 0.01);
+}
+
+const ScanNoise kSimulatedRadar{0.0436, 0.0785, 0.02, 0.125};  // 2.5 deg, 4.5 deg
+const Eigen::Vector3d kDrive(0.1, 3.0, 0.15);
+
+const std::vector<EgoVelocityOptions> kWrongStarts = {
+    startingAt(0.01, 0.02, 0.01), startingAt(0.1, 0.15, 0.1), startingAt(0.03, 0.05, 0.035)};
+
+TEST(EgoVelocityNoise, IsLearnedFromWrongStarts) {
+  for (const EgoVelocityOptions& o : kWrongStarts) {
+    for (const Eigen::Vector3d& v : {kDrive, Eigen::Vector3d(0.3, 1.0, 0.2)}) {
+      EgoVelocityEstimator estimator(o);
+      learnFrom(estimator, v, kSimulatedRadar, 1000);
+      expectLearned(estimator, kSimulatedRadar, 0.1);
+    }
+  }
+}
+
+TEST(EgoVelocityNoise, GhostsDoNotBlowItUp) {
+  for (const EgoVelocityOptions& o : kWrongStarts) {
+    EgoVelocityEstimator estimator(o);
+    learnFrom(estimator, kDrive, kSimulatedRadar, 1000, 0.2);
+    expectLearned(estimator, kSimulatedRadar, 0.15);
+  }
+}
+
+TEST(EgoVelocityNoise, LeavesNoBiasOnceLearned) {
+  for (const EgoVelocityOptions& o : kWrongStarts) {
+    EgoVelocityEstimator estimator(o);
+    learnFrom(estimator, kDrive, kSimulatedRadar, 1000);
+    const MonteCarlo result = monteCarlo(estimator, kDrive, kSimulatedRadar, 0.35, 12000);
+    EXPECT_LT(result.bias.cwiseAbs().maxCoeff(), 0.003) << result.bias.transpose();
+    EXPECT_NEAR(result.nees, 3.0, 0.4);
+  }
+  // What they come to unlearned: the reason for all this.
+  const MonteCarlo unlearned = monteCarlo(kWrongStarts.back(), kDrive, kSimulatedRadar, 0.35);
+  EXPECT_GT(unlearned.bias.cwiseAbs().maxCoeff(), 0.008);
+}
+
+TEST(EgoVelocityNoise, GoodDirectionsAreNotOvercompensated) {
+  const ScanNoise good{0.005, 0.008, 0.01, 0.125};
+  EgoVelocityEstimator estimator(bareOptions(EgoVelocitySolver::kErrorsInVariables));
+  learnFrom(estimator, kVelocity, good, 1000);
+  const MonteCarlo ls = monteCarlo(bareOptions(EgoVelocitySolver::kLeastSquares), kVelocity, good, 0.35);
+  const MonteCarlo eiv = monteCarlo(estimator, kVelocity, good, 0.35);
+  EXPECT_LT(eiv.bias.cwiseAbs().maxCoeff(), 0.003);
+  EXPECT_LT(eiv.rms.z(), 1.05 * ls.rms.z());
+  EXPECT_NEAR(eiv.nees, 3.0, 0.4);
+}
+
+TEST(EgoVelocityNoise, AnAngleThatTheMotionDoesNotShowStaysAsItWas) {
+  // Upwards, the azimuth does not change the Doppler.
+  EgoVelocityEstimator estimator(startingAt(0.03, 0.05, 0.035));
+  learnFrom(estimator, {0.0, 0.0, 1.5}, kSimulatedRadar, 1000);
+  EXPECT_NEAR(std::sqrt(estimator.noise().azimuth), 0.03, 0.003);
+  EXPECT_NEAR(std::sqrt(estimator.noise().elevation), 0.0785, 0.008);
+}
+
+TEST(EgoVelocityNoise, NoneIsLearnedSafely) {
+  for (const double step : {0.0, 0.125}) {
+    for (const double start : {0.0, 0.05}) {
+      EgoVelocityOptions o = startingAt(start, start, start);
+      o.doppler_quantization = step > 0.0 ? step : kNoStep;
+      o.ransac_inlier_threshold = 0.15;  // by default, a start of zero would leave a narrow one
+      EgoVelocityEstimator estimator(o);
+      learnFrom(estimator, kDrive, {0.0, 0.0, 0.0, step}, 1000);
+      const PointVariances& noise = estimator.noise();
+      for (const double variance : {noise.doppler, noise.azimuth, noise.elevation}) {
+        EXPECT_GE(variance, 0.0);
+        EXPECT_LT(variance, 1e-4);
+      }
+      Random random(41);
+      const EgoVelocity e = estimator.estimate(staticScene(kDrive, 45, {0, 0, 0, step}, random));
+      EXPECT_EQ(e.status, EgoVelocityStatus::kMoving);
+      EXPECT_LT((e.v_R - kDrive).norm(), 0.002 + 0.5 * step);
+      EXPECT_TRUE(e.covariance.allFinite());
+      // And what comes after is learned again; slowly where even the step did not prepare for it.
+      learnFrom(estimator, kDrive, {0.0436, 0.0785, 0.02, step}, 3000);
+      expectLearned(estimator, kSimulatedRadar, step > 0.0 ? 0.15 : 0.35);
+    }
+  }
+}
+
+TEST(EgoVelocityNoise, IsNotLearnedWithoutNeed) {
+  const EgoVelocityOptions o = startingAt(0.03, 0.05, 0.035);
+  Random random(42);
+  const auto learns = [&](EgoVelocityEstimator estimator, const Eigen::Vector3d& v) {
+    const double before = estimator.noise().elevation;
+    const RadarScan scan = staticScene(v, 45, kSimulatedRadar, random);
+    estimator.learn(scan, estimator.estimate(scan));
+    return estimator.noise().elevation != before;
+  };
+  EXPECT_TRUE(learns(EgoVelocityEstimator(o), kDrive));
+  EXPECT_FALSE(learns(EgoVelocityEstimator(o), Eigen::Vector3d::Zero()));
+  EXPECT_FALSE(learns(EgoVelocityEstimator(o), {0.0, 0.4, 0.0}));  // the step hides too much
+  EXPECT_FALSE(learns(EgoVelocityEstimator(bareOptions(EgoVelocitySolver::kLeastSquares)), kDrive));
+}
+
+}  // namespace
+}  // namespace rio_t
