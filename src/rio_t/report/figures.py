@@ -118,27 +118,26 @@ def draw_offset(table, true_offset):
 
 
 def draw_extrinsics(table, told):
-    """Turn from the mounting told, and its lever arm if it was estimated. `told`: lever arm and R_IR."""
+    """Turn and, if it was estimated, lever arm, both from those told. `told`: lever arm and R_IR."""
     lever, R_IR = told
-    turn = np.degrees((Rotation.from_quat(np.stack([table["q" + k] for k in "xyzw"], -1)) * R_IR.inv()).as_rotvec())
-    rows = [("turn from the one told [deg]", turn, "sigma_r", np.zeros(3), 180.0 / np.pi)]
+    turn = (Rotation.from_quat(np.stack([table["q" + k] for k in "xyzw"], -1)) * R_IR.inv()).as_rotvec()
+    moved = np.stack([table[k] for k in "xyz"], -1) - lever
+    rows = [("turn [deg]", turn, "sigma_r", 180.0 / np.pi)]
     if np.any(table["sigma_x"] > 0):
-        rows.append(("lever arm [m]", np.stack([table[k] for k in "xyz"], -1), "sigma_", lever, 1.0))
+        rows.append(("lever arm, moved by [mm]", moved, "sigma_", 1e3))
     figure, all_axes = new_figure(len(rows), 1.2 + 3.2 * len(rows), sharex=True)
     t = table["time"]
-    for axes, (label, values, sigma_name, line, unit) in zip(all_axes, rows):
+    for axes, (label, values, sigma_name, unit) in zip(all_axes, rows):
         settled = 0.0
-        for i, (axis, colour) in enumerate(zip("xyz", AXES)):
+        for value, axis, colour in zip(unit * values.T, "xyz", AXES):
             sigma = unit * table[sigma_name + axis]
-            axes.fill_between(t, values[:, i] - sigma, values[:, i] + sigma, color=colour, alpha=0.15, linewidth=0)
-            axes.plot(t, values[:, i], color=colour, linewidth=1.2, label=axis)
-            axes.axhline(line[i], color=colour if np.any(line) else TRUTH, linewidth=1.0, linestyle="--",
-                         label="told" if i == 2 else None)
+            axes.fill_between(t, value - sigma, value + sigma, color=colour, alpha=0.15, linewidth=0)
+            axes.plot(t, value, color=colour, linewidth=1.2, label=axis)
             settled = max(settled, 2 * float(np.median(sigma[len(sigma) // 2:])))
+        axes.axhline(0.0, color=TRUTH, linewidth=1.2, linestyle="--", label="told")
         # The first sigma is that of the prior: scaled to the estimates, the value told and the settled band.
-        low, high = min(values.min(), line.min()) - settled, max(values.max(), line.max()) + settled
-        margin = 0.08 * max(high - low, 1e-3)
-        axes.set_ylim(low - margin, high + margin)
+        reach = 1.08 * max(unit * float(np.abs(values).max()) + settled, 1e-3)
+        axes.set_ylim(-reach, reach)
         finish_axes(axes, label)
     all_axes[-1].set_xlabel("time [s]")
     return figure

@@ -151,20 +151,20 @@ def add_extrinsics(page, radar, folder):
     path = folder / "summary.yaml"
     if path.is_file():
         told = extrinsics_in(run_folder.read_yaml(path), path, "told_", radar.name)
-        note = "Dashed: as the configuration tells it."
+        note = ""
     else:  # the run did not finish: only its first estimate is left of what was told
         told = last_extrinsics({name: column[:1] for name, column in radar.extrinsics.items()})
-        note = "Dashed: the first estimate, since there is no summary.yaml to tell the configured one."
-    page.heading(radar.title("Extrinsics"), "Pose of the radar in the IMU frame, about and along the axes of the IMU, "
-                                            "with a band of 1 sigma. " + note)
+        note = "Without summary.yaml: from its first estimate."
+    page.heading(radar.title("Extrinsics"), "How far the radar is from where the configuration puts it, about and along "
+                                            "the axes of the IMU, with a band of 1 sigma. " + note)
     lever, rotation = last_extrinsics(radar.extrinsics)
     turn = np.degrees((rotation * told[1].inv()).as_rotvec())
     sigma = {name: radar.extrinsics["sigma_" + name][-1] for name in ("x", "y", "z", "rx", "ry", "rz")}
     rows = [[f"turn about {axis} [deg]", f"{turn[i]:.3f}", f"{np.degrees(sigma['r' + axis]):.3f}"]
             for i, axis in enumerate("xyz")]
-    rows += [[f"lever arm along {axis}, minus that told [m]", f"{lever[i] - told[0][i]:.4f}", f"{sigma[axis]:.4f}"]
+    rows += [[f"lever arm along {axis} [mm]", f"{1e3 * (lever[i] - told[0][i]):.1f}", f"{1e3 * sigma[axis]:.1f}"]
              for i, axis in enumerate("xyz") if sigma[axis] > 0]
-    page.table(rows, ["last estimate, from what was told", "", "sigma"])
+    page.table(rows, ["last estimate minus what was told", "", "sigma"])
     page.figure(run_folder.of_radar("extrinsics", radar.name), figures.draw_extrinsics(radar.extrinsics, told))
 
 
@@ -204,8 +204,7 @@ def report(arguments):
     """Writes the page; its path."""
     run = read_run(arguments.run, arguments.ground_truth)
     true_offsets = true_offsets_of(run.radars, arguments.true_offset)
-    if arguments.config:
-        read_extrinsics(arguments.config, run.radars[0].name)  # before the work, so that a fault costs no time
+    mountings = {radar.name: mounting(radar, arguments.config) for radar in run.radars}
     judge_poses = run.truth and run.estimates
     judge_offset = any(radar.name in true_offsets and radar.offset is not None for radar in run.radars)
     program = arguments.evaluate
@@ -243,7 +242,7 @@ def report(arguments):
         if radar.extrinsics is not None:
             add_extrinsics(page, radar, arguments.run)
         if radar.scans is not None:
-            add_ego_velocity(page, radar, motions, *mounting(radar, arguments.config))
+            add_ego_velocity(page, radar, motions, *mountings[radar.name])
     if run.biases is not None:
         page.heading("Biases of the IMU")
         page.figure("biases", figures.draw_biases(run.biases))
