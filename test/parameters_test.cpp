@@ -430,11 +430,13 @@ TEST(SeveralRadars, LaterEntriesHoldInASectionToo) {
 TEST(SeveralRadars, NamesAreChecked) {
   for (const char* names :
        {"[Left]", "[left, left]", "[\"\"]", "left", "[a-b]", "[1]", "[[left]]", "[l/r]"}) {
-    EXPECT_TRUE(contains(faultOf(std::string("radars=") + names),
-                         "radars: expected a list of different names of lower case letters, digits and _"))
+    EXPECT_TRUE(
+        contains(faultOf(std::string("radars=") + names),
+                 "radars: expected a list of at most 16 different names of lower case letters, digits and _"))
         << names;
   }
   EXPECT_EQ(faultOf("radars=[window]"), "radars: expected names that are no parameters, got \"window\"");
+  EXPECT_TRUE(contains(faultOf("radars=[a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q]"), "at most 16"));
   EXPECT_TRUE(fromAssignments({"radars=[]"}).radars.empty());
 }
 
