@@ -21,7 +21,7 @@ TEST_F(BagRunner, AtRestItStaysAndWritesEveryFile) {
   const Outcome outcome = run({"__name:=rio_t_bag", "__log:=/dev/null"});
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_EQ(outcome.err, "");
-  for (const std::string& name : RunOutput::fileNames())
+  for (const std::string& name : RunFiles{}.names())
     EXPECT_GT(fs::file_size(out_ + "/" + name), 0u) << name;
   for (const char* row : {"path", "end to start", "time offset", "scans", "speed", "files in"}) {
     EXPECT_NE(outcome.out.find(row), std::string::npos) << row;
@@ -43,11 +43,11 @@ TEST_F(BagRunner, EveryScanIsAccountedFor) {
   BagRun bag_run{bag_, out_, Config{}, nullptr};
   const RunSummary summary = runBag(bag_run);
   EXPECT_EQ(summary.imu_count, 1600u);
-  EXPECT_EQ(summary.scans_total, 80u);
+  EXPECT_EQ(summary.scansTotal(), 80u);
   std::uint64_t rejected = 0;
-  for (const auto& [reason, count] : summary.scans_rejected) rejected += count;
-  EXPECT_EQ(summary.scans_used + rejected, summary.scans_total);
-  EXPECT_GT(summary.scans_used, 40u);
+  for (const auto& [reason, count] : summary.radars.front().scans_rejected) rejected += count;
+  EXPECT_EQ(summary.scansUsed() + rejected, summary.scansTotal());
+  EXPECT_GT(summary.scansUsed(), 40u);
   const std::string yaml = contents(out_ + "/summary.yaml");
   for (const char* key :
        {"imu_count: 1600\n", "scans_total: 80\n", "scans_used: ", "scans_rejected: {",
@@ -64,7 +64,7 @@ TEST_F(BagRunner, TheDopplerStepIsToldWithItsSource) {
   RunSummary summary;
   const auto told = [&](double value, DopplerStepSource source, const char* in_summary,
                         const char* in_table) {
-    summary.radar_doppler_step = {value, source};
+    summary.radars.front().doppler_step = {value, source};
     RunOutput(out_).finish(summary);
     EXPECT_NE(contents(out_ + "/summary.yaml").find(in_summary), std::string::npos) << in_summary;
     EXPECT_NE(describeRun(summary, out_).find(in_table), std::string::npos) << in_table;
@@ -94,7 +94,7 @@ TEST_F(BagRunner, SameBagSameBytes) {
   const std::string first = out_;
   out_ = folder_ + "/again";
   ASSERT_EQ(run().status, 0);
-  for (const std::string& name : RunOutput::fileNames()) {
+  for (const std::string& name : RunFiles{}.names()) {
     if (name == "summary.yaml") continue;
     EXPECT_EQ(contents(first + "/" + name), contents(out_ + "/" + name)) << name;
   }
@@ -116,7 +116,7 @@ TEST_F(BagRunner, TheWholeBagAtOnceKeepsTheOnlineRunBesideIt) {
   const std::string online = contents(out_ + "/online/summary.yaml");
   EXPECT_NE(online.find("mode: online\n"), std::string::npos);
   EXPECT_EQ(online.find("batch"), std::string::npos);
-  for (const std::string& name : RunOutput::fileNames()) {
+  for (const std::string& name : RunFiles{}.names()) {
     EXPECT_GT(fs::file_size(out_ + "/" + name), 0u) << name;
     EXPECT_GT(fs::file_size(out_ + "/online/" + name), 0u) << name;
   }
@@ -187,7 +187,7 @@ TEST_F(BagRunner, APartOfTheBagCanBePlayed) {
   bag_run.config.bag_duration = 5.0;
   const RunSummary summary = runBag(bag_run);
   EXPECT_NEAR(static_cast<double>(summary.imu_count), 1000.0, 2.0);
-  EXPECT_NEAR(static_cast<double>(summary.scans_total), 50.0, 1.0);
+  EXPECT_NEAR(static_cast<double>(summary.scansTotal()), 50.0, 1.0);
   expectError(run({"--set", "bag_start=100"}), {"bag_start", "behind its end"});
 }
 
@@ -211,6 +211,35 @@ TEST_F(BagRunner, HelpAndConfigurationNeedNoBag) {
   EXPECT_EQ(printed.out, toYaml(Config{}));
   EXPECT_NE(runTool({"--print-config", "--set", "window=2.0"}).out.find("\nwindow: 2.0\n"),
             std::string::npos);
+}
+
+TEST_F(BagRunner, EstimatedExtrinsicsAreWritten) {
+  writeBag({});
+  const Outcome outcome = run({"--set", "estimate_extrinsics=pose", "--set", "extrinsics_rotation_sigma=0.1",
+                               "--set", "extrinsics_translation_sigma=0.02"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("turned by"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("moved by"), std::string::npos) << outcome.out;
+  const std::string csv = contents(out_ + "/extrinsics.csv");
+  EXPECT_EQ(csv.rfind("stamp,x,y,z,qx,qy,qz,qw,sigma_x,sigma_y,sigma_z,sigma_rx,sigma_ry,sigma_rz\n100", 0),
+            0u);
+  const std::string offsets = contents(out_ + "/time_offset.csv");
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), std::count(offsets.begin(), offsets.end(), '\n'));
+  const std::string yaml = contents(out_ + "/summary.yaml");
+  // At rest nothing shows where the radar is: it stays as told, and as unsure as told.
+  for (const char* line : {"told_extrinsics_translation: [0.030000000, 0.030000000, -0.060000000]\n",
+                           "final_extrinsics_translation: [0.0", "final_extrinsics_translation_sigma: [0.0",
+                           "final_extrinsics_rotation_xyzw: [0.69", "final_extrinsics_rotation_sigma: [0."}) {
+    EXPECT_NE(yaml.find(line), std::string::npos) << line << yaml;
+  }
+
+  ASSERT_EQ(run({"--set", "estimate_extrinsics=rotation"}).status, 0);
+  EXPECT_NE(contents(out_ + "/summary.yaml")
+                .find("final_extrinsics_translation_sigma: [0.000000000, 0.000000000, 0.000000000]"),
+            std::string::npos);
+  ASSERT_EQ(run().status, 0);
+  EXPECT_FALSE(fs::exists(out_ + "/extrinsics.csv"));
+  EXPECT_EQ(contents(out_ + "/summary.yaml").find("extrinsics"), std::string::npos);
 }
 
 TEST(RunOutput, NumbersAreFixedAndStampsExact) {

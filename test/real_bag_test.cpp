@@ -34,13 +34,13 @@ class RealBag : public testing::Test {
 TEST_F(RealBag, TriggerStampsEndWhereTheyStarted) {
   const RunSummary summary = play(out_);
   EXPECT_EQ(summary.imu_count, 8270u);
-  EXPECT_EQ(summary.scans_total, 412u);
+  EXPECT_EQ(summary.scansTotal(), 412u);
   EXPECT_LE(summary.end_to_start_2d_m, 0.10);
   EXPECT_LE(summary.end_to_start_3d_m, 1.65);  // the published rotation is tilted
-  EXPECT_GT(summary.final_offset_s, -0.020);
-  EXPECT_LT(summary.final_offset_s, 0.0);
-  EXPECT_GT(summary.final_offset_sigma_s, 0.0);
-  EXPECT_LT(summary.final_offset_sigma_s, 0.020);
+  EXPECT_GT(summary.radars.front().final_offset_s, -0.020);
+  EXPECT_LT(summary.radars.front().final_offset_s, 0.0);
+  EXPECT_GT(summary.radars.front().final_offset_sigma_s, 0.0);
+  EXPECT_LT(summary.radars.front().final_offset_sigma_s, 0.020);
 }
 
 TEST_F(RealBag, NearlyEveryScanOfTheWalkIsUsed) {
@@ -70,7 +70,7 @@ TEST_F(RealBag, OnlineEndsNearTheBatch) {
   const RunSummary online = play(out_ + "/again");
   ASSERT_TRUE(batch.batch.has_value());
   EXPECT_TRUE(batch.batch->converged);
-  EXPECT_NEAR(online.final_offset_s, batch.final_offset_s, 0.3 * online.final_offset_sigma_s);
+  EXPECT_NEAR(online.radars.front().final_offset_s, batch.radars.front().final_offset_s, 0.3 * online.radars.front().final_offset_sigma_s);
   EXPECT_NEAR(online.end_to_start_2d_m, batch.end_to_start_2d_m, 0.05);
   EXPECT_NEAR(online.end_to_start_3d_m, batch.end_to_start_3d_m, 0.05);
 }
@@ -78,7 +78,7 @@ TEST_F(RealBag, OnlineEndsNearTheBatch) {
 TEST_F(RealBag, SameBytesTwice) {
   play(out_ + "/a");
   play(out_ + "/b");
-  for (const std::string& name : RunOutput::fileNames()) {
+  for (const std::string& name : RunFiles{}.names()) {
     const std::string a = contents(out_ + "/a/" + name), b = contents(out_ + "/b/" + name);
     EXPECT_FALSE(a.empty()) << name;
     EXPECT_EQ(untimed(a), untimed(b)) << name;

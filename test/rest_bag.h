@@ -42,6 +42,7 @@ struct BagContents {
   double shaking = 0.0;  ///< amplitude of the gyro [rad/s]
   std::string doppler_field = "v_doppler_mps";
   bool ground_truth = false;
+  std::vector<std::string> radar_topics = {"/sensor_platform/radar/scan"};
 };
 
 /// A platform at rest with the IRS topics, recorded by a clock 100 s ahead.
@@ -100,7 +101,8 @@ class RestBag : public testing::Test {
     modifier.resize(static_cast<std::size_t>(what.points));
     // An iterator refers to the first byte at once, which an empty cloud does not have.
     if (what.points > 0) writePoints(what, &cloud);
-    bag->write("/sensor_platform/radar/scan", record + ros::Duration(0.0005), cloud);
+    for (const std::string& topic : what.radar_topics)
+      bag->write(topic, record + ros::Duration(0.0005), cloud);
   }
 
   static void writePoints(const BagContents& what, sensor_msgs::PointCloud2* cloud) {
