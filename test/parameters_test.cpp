@@ -459,6 +459,22 @@ TEST(SeveralRadars, UnknownKeysAndSectionsAreNamed) {
   EXPECT_THROW(parseAssignment("left={a: 1, a: 2}"), std::invalid_argument);
 }
 
+TEST(SeveralRadars, OneCanBeTakenOutAndItsSectionStays) {
+  const std::vector<std::string> file = {"radars=[left, right]", "left/radar_topic=/l", "right/radar_topic=/r"};
+  const auto entriesWith = [&](const std::vector<std::string>& more) {
+    ParameterEntries entries;
+    for (const std::string& text : file) entries.push_back(parseAssignment(text));
+    for (const std::string& text : more) entries.push_back(parseAssignment(text));
+    return entries;
+  };
+  const Config left = makeConfig(entriesWith({"radars=[left]"}));
+  ASSERT_EQ(configsOfRadars(left).size(), 1U);
+  EXPECT_EQ(configsOfRadars(left).front().radar_topic, "/l");
+  // What stands there is checked all the same.
+  EXPECT_THROW(makeConfig(entriesWith({"radars=[left]", "right/radar_tpic=/x"})), ConfigError);
+  EXPECT_THROW(makeConfig(entriesWith({"radars=[left]", "middle/radar_topic=/x"})), ConfigError);
+}
+
 TEST(SeveralRadars, ContradictionsNameTheRadar) {
   EXPECT_TRUE(contains(faultOf("radars=[left, right]"),
                        "right/radar_topic: expected another than that of left, got \"/sensor_platform"));

@@ -232,7 +232,7 @@ TEST(TemporalCalibration, TheBatchSaysTheSameOfTheOffset) {
   BatchOdometry batch(run.options, BatchOptions());
   for (const ImuMeasurement& sample : simulation::simulate(run.motion, run.setup).imu.samples)
     batch.addImu(sample);
-  for (const ScanResult& result : run.results) batch.addResult(result, false);
+  for (const ScanResult& result : run.results) batch.addResult(result);
   const BatchResult whole = batch.solve(*run.odometry->start());
   EXPECT_TRUE(whole.solution.converged());
   ASSERT_EQ(whole.scans.size(), run.results.size());

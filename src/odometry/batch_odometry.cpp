@@ -44,12 +44,12 @@ void BatchOdometry::addImu(ImuMeasurement imu) {
   imu_.add(imu);
 }
 
-void BatchOdometry::addResult(ScanResult result, bool offset_stepped) {
+void BatchOdometry::addResult(ScanResult result) {
   if (!result.used && result.rejected_because.empty()) return;  // only carries the last poses
   result.scan.points = {};
   result.left_window.clear();
   if (result.updated) model_error_scale_ = result.model_error_scale;
-  scans_.push_back({std::move(result), offset_stepped});
+  scans_.push_back(std::move(result));
 }
 
 BatchResult BatchOdometry::solve(const RadarInertialOdometry::Start& start) const {
@@ -110,9 +110,9 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
   std::vector<bool> stepped(problem.mounting.size(), false);
   // A step found at a scan that is not in the graph counts for the next.
   for (std::size_t i = 0; i < scans_.size(); ++i) {
-    const ScanResult& result = scans_[i].result;
+    const ScanResult& result = scans_[i];
     const std::size_t radar = result.scan.radar;
-    stepped[radar] = stepped[radar] || scans_[i].offset_stepped;
+    stepped[radar] = stepped[radar] || result.offset_stepped;
     if (!result.updated) continue;
     const NodeEstimate node{result.state.time, stateBlock(result.state)};
     if (node.time > problem.guess.back().time) problem.guess.push_back(node);
@@ -139,7 +139,7 @@ std::size_t BatchOdometry::readmit(const BatchSmoother& smoother, const BatchSol
 
   std::size_t count = 0;
   for (std::size_t i = 0; i < scans_.size(); ++i) {
-    const ScanResult& result = scans_[i].result;
+    const ScanResult& result = scans_[i];
     if (result.rejected_because != "innovation") continue;
     if (!isValid(result.ego_velocity.status)) continue;
     const RadarVelocityMeasurement z = measurement(result);
@@ -232,8 +232,8 @@ std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solu
 
 std::vector<ScanResult> BatchOdometry::results(const Run& run, const BatchSolution& solution) const {
   std::vector<ScanResult> results;
-  for (const Scan& scan : scans_) {
-    results.push_back(scan.result);
+  for (const ScanResult& scan : scans_) {
+    results.push_back(scan);
     results.back().updated = false;
   }
   std::vector<std::size_t> node_of(results.size());

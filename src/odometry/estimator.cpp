@@ -93,6 +93,7 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
     result.ego_velocity = answer.ego_velocity;
     result.doppler = answer.doppler;
     result.offset_gain = answer.offset_gain;
+    result.offset_stepped = answer.offset_stepped;
     result.rejected_because = answer.rejected_because;
     result.used = result.updated = answer.rejected_because.empty();
     if (result.used) last_used_ = stamp;

@@ -33,18 +33,13 @@ class BatchOdometry {
   /// Takes every sample that the online run got, and checks and bridges it in the same way. Throws
   /// std::runtime_error if the clock of the IMU jumped.
   void addImu(ImuMeasurement imu);
-  /// `offset_stepped`: the online run found a step of the offset at this scan. The points are not kept.
-  void addResult(ScanResult result, bool offset_stepped);
+  /// The points are not kept.
+  void addResult(ScanResult result);
 
   /// `start`: of the online run. Throws std::runtime_error if no scan was used.
   BatchResult solve(const RadarInertialOdometry::Start& start) const;
 
  private:
-  struct Scan {
-    ScanResult result;
-    bool offset_stepped = false;
-  };
-
   /// The graph, and for each of its scans the index in scans_.
   struct Run {
     BatchProblem problem;
@@ -73,7 +68,7 @@ class BatchOdometry {
   double model_error_scale_ = 1.0;  ///< of the online run at its end
   ImuInputCheck imu_input_check_;
   ImuBuffer imu_;
-  std::vector<Scan> scans_;
+  std::vector<ScanResult> scans_;
 };
 
 }  // namespace rio_t

@@ -38,6 +38,7 @@ struct ScanResult {
   int solver_iterations = 0;
   SolverTermination solver_termination = SolverTermination::kIterationLimit;
   Health health = Health::kOk;           ///< after this scan; set always
+  bool offset_stepped = false;           ///< t_O stepped before this scan
   bool reinitialized = false;            ///< the estimate was re-initialised before this scan
   std::vector<StampedPose> left_window;  ///< optimised poses that this scan pushed out, oldest first
 };

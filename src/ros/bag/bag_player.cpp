@@ -145,12 +145,7 @@ void BagPlayer::notUsable(const std::string& kind, const std::string& why, NotUs
 
 void BagPlayer::account(ScanResult& result) {
   if (!start_) start_ = odometry_.start();
-  if (recorder_ != nullptr) {
-    const auto faults = odometry_.faults();
-    const auto steps = faults.find("time_offset_step");
-    const std::uint64_t count = steps == faults.end() ? 0 : steps->second;
-    recorder_->addResult(result, std::exchange(offset_steps_, count) != count);
-  }
+  if (recorder_ != nullptr) recorder_->addResult(result);
   log_->addResult(result);
 }
 

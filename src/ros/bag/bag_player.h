@@ -68,7 +68,7 @@ class BagPlayer {
   RunLog* log_;
   BatchOdometry* recorder_;
   std::optional<RadarInertialOdometry::Start> start_;
-  std::uint64_t imu_count_ = 0, points_not_finite_ = 0, offset_steps_ = 0;
+  std::uint64_t imu_count_ = 0, points_not_finite_ = 0;
   NotUsableByKind imu_not_usable_;
 };
 

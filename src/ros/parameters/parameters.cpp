@@ -149,11 +149,36 @@ void setTopLevel(const ParameterEntries& entries, const ParameterList& list,
   }
 }
 
+/// Sets what stands in the section of a radar.
+void setSection(const Section& section, Config* radar, std::vector<std::string>* faults) {
+  const ParameterList list = parametersOf(*radar);
+  for (const ParameterEntry& entry : section.entries)
+    setParameter(entry, radar->radar_name + "/", list, faults);
+}
+
+/// Whether `radars` had the name before a later entry took it out, as `--set radars=[left]` does.
+bool wasRadar(const std::string& name, const ParameterEntries& top_level) {
+  return std::any_of(top_level.begin(), top_level.end(), [&](const ParameterEntry& entry) {
+    const auto* names = std::get_if<ParameterValue::List>(&entry.value.data);
+    return entry.key == "radars" && names != nullptr &&
+           std::any_of(names->begin(), names->end(), [&](const ParameterValue& each) {
+             const auto* text = std::get_if<std::string>(&each.data);
+             return text != nullptr && *text == name;
+           });
+  });
+}
+
 /// Completes `radars`, whose names are known, from the top level and the sections.
-void setRadars(const std::map<std::string, Section>& sections, const Config& top_level,
-               std::vector<Config>* radars, std::vector<std::string>* faults) {
+void setRadars(const SortedEntries& sorted, const Config& top_level, std::vector<Config>* radars,
+               std::vector<std::string>* faults) {
+  const std::map<std::string, Section>& sections = sorted.sections;
   for (const auto& [name, section] : sections) {
     if (isRadar(name, *radars)) continue;
+    if (wasRadar(name, sorted.top_level)) {
+      Config unused = withoutSection(top_level, name);
+      setSection(section, &unused, faults);
+      continue;
+    }
     faults->push_back(section.origin + ": unknown parameter \"" + name +
                       "\" with keys of its own; expected the name of a radar, and `radars` has " +
                       (radars->empty() ? "none" : namesOf(*radars)));
@@ -161,10 +186,7 @@ void setRadars(const std::map<std::string, Section>& sections, const Config& top
   for (Config& radar : *radars) {
     radar = withoutSection(top_level, radar.radar_name);
     const auto section = sections.find(radar.radar_name);
-    if (section == sections.end()) continue;
-    const ParameterList list = parametersOf(radar);
-    for (const ParameterEntry& entry : section->second.entries)
-      setParameter(entry, radar.radar_name + "/", list, faults);
+    if (section != sections.end()) setSection(section->second, &radar, faults);
   }
 }
 
@@ -310,7 +332,7 @@ Config makeConfig(const ParameterEntries& entries) {
   const SortedEntries sorted = sortedEntries(entries, list);
   setTopLevel(sorted.top_level, list, config.radars, &faults);
   const Config top_level = config;
-  setRadars(sorted.sections, top_level, &config.radars, &faults);
+  setRadars(sorted, top_level, &config.radars, &faults);
   for (const Config& radar : config.radars) config.odometry.radars.push_back(radarOptions(radar));
   // Judged only where each value is right by itself: otherwise a default might be blamed.
   if (faults.empty()) faults = contradictions(config);
