@@ -55,9 +55,9 @@ void run(const std::string& bag, const std::string& config, const std::string& o
 
   std::vector<double> solves = StageClock::instance().solves();
   std::sort(solves.begin(), solves.end());
-  const double scans = static_cast<double>(std::max<std::uint64_t>(1, summary.scans_total));
+  const double scans = static_cast<double>(std::max<std::uint64_t>(1, summary.scansTotal()));
   std::printf("{\n  \"scans\": %llu,\n  \"imu_samples\": %llu,\n  \"data_seconds\": %.6f,\n",
-              static_cast<unsigned long long>(summary.scans_total),
+              static_cast<unsigned long long>(summary.scansTotal()),
               static_cast<unsigned long long>(summary.imu_count),
               summary.realtime_factor * summary.estimation_seconds);
   std::printf("  \"estimation_seconds\": %.6f,\n  \"stages\": {\n%s\n  },\n", summary.estimation_seconds,

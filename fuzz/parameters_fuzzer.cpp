@@ -40,7 +40,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   // From here on nothing may throw.
   const std::string printed = rio_t::toYaml(config);
   require(rio_t::toYaml(rio_t::makeConfig(read(printed))) == printed, "what is printed reads back the same");
-  rio_t::pointCloudFormat(config);
+  for (const rio_t::Config& radar : rio_t::configsOfRadars(config)) rio_t::pointCloudFormat(radar);
   const rio_t::RadarInertialOdometry odometry(config.odometry);
   return 0;
 }

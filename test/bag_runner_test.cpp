@@ -3,6 +3,7 @@
 #include <geometry_msgs/PoseStamped.h>
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
+#include <rosbag/view.h>
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <sensor_msgs/point_cloud2_iterator.h>
@@ -16,6 +17,8 @@
 #include <sstream>
 
 #include "rio_t/ros/bag/bag_tool.h"
+#include "rio_t/ros/bag/simulation_bag.h"
+#include "rio_t/simulation/motions.h"
 
 namespace rio_t {
 namespace {
@@ -57,6 +60,7 @@ struct BagContents {
   double shaking = 0.0;  ///< amplitude of the gyro [rad/s]
   std::string doppler_field = "v_doppler_mps";
   bool ground_truth = false;
+  std::vector<std::string> radar_topics = {"/sensor_platform/radar/scan"};
 };
 
 /// A platform at rest with the IRS topics, recorded by a clock 100 s ahead.
@@ -115,7 +119,8 @@ class BagRunner : public testing::Test {
     modifier.resize(static_cast<std::size_t>(what.points));
     // An iterator refers to the first byte at once, which an empty cloud does not have.
     if (what.points > 0) writePoints(what, &cloud);
-    bag->write("/sensor_platform/radar/scan", record + ros::Duration(0.0005), cloud);
+    for (const std::string& topic : what.radar_topics)
+      bag->write(topic, record + ros::Duration(0.0005), cloud);
   }
 
   static void writePoints(const BagContents& what, sensor_msgs::PointCloud2* cloud) {
@@ -153,8 +158,7 @@ TEST_F(BagRunner, AtRestItStaysAndWritesEveryFile) {
   const Outcome outcome = run({"__name:=rio_t_bag", "__log:=/dev/null"});
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_EQ(outcome.err, "");
-  for (const std::string& name : RunOutput::fileNames())
-    EXPECT_GT(fs::file_size(out_ + "/" + name), 0u) << name;
+  for (const std::string& name : RunFiles{}.names()) EXPECT_GT(fs::file_size(out_ + "/" + name), 0u) << name;
   for (const char* row : {"path", "end to start", "time offset", "scans", "speed", "files in"}) {
     EXPECT_NE(outcome.out.find(row), std::string::npos) << row;
   }
@@ -175,11 +179,11 @@ TEST_F(BagRunner, EveryScanIsAccountedFor) {
   BagRun bag_run{bag_, out_, Config{}, nullptr};
   const RunSummary summary = runBag(bag_run);
   EXPECT_EQ(summary.imu_count, 1600u);
-  EXPECT_EQ(summary.scans_total, 80u);
+  EXPECT_EQ(summary.scansTotal(), 80u);
   std::uint64_t rejected = 0;
-  for (const auto& [reason, count] : summary.scans_rejected) rejected += count;
-  EXPECT_EQ(summary.scans_used + rejected, summary.scans_total);
-  EXPECT_GT(summary.scans_used, 40u);
+  for (const auto& [reason, count] : summary.radars.front().scans_rejected) rejected += count;
+  EXPECT_EQ(summary.scansUsed() + rejected, summary.scansTotal());
+  EXPECT_GT(summary.scansUsed(), 40u);
   const std::string yaml = contents(out_ + "/summary.yaml");
   for (const char* key :
        {"imu_count: 1600\n", "scans_total: 80\n", "scans_used: ", "scans_rejected: {",
@@ -196,7 +200,7 @@ TEST_F(BagRunner, TheDopplerStepIsToldWithItsSource) {
   RunSummary summary;
   const auto told = [&](double value, DopplerStepSource source, const char* in_summary,
                         const char* in_table) {
-    summary.radar_doppler_step = {value, source};
+    summary.radars.front().doppler_step = {value, source};
     RunOutput(out_).finish(summary);
     EXPECT_NE(contents(out_ + "/summary.yaml").find(in_summary), std::string::npos) << in_summary;
     EXPECT_NE(describeRun(summary, out_).find(in_table), std::string::npos) << in_table;
@@ -226,7 +230,7 @@ TEST_F(BagRunner, SameBagSameBytes) {
   const std::string first = out_;
   out_ = folder_ + "/again";
   ASSERT_EQ(run().status, 0);
-  for (const std::string& name : RunOutput::fileNames()) {
+  for (const std::string& name : RunFiles{}.names()) {
     if (name == "summary.yaml") continue;
     EXPECT_EQ(contents(first + "/" + name), contents(out_ + "/" + name)) << name;
   }
@@ -248,7 +252,7 @@ TEST_F(BagRunner, TheWholeBagAtOnceKeepsTheOnlineRunBesideIt) {
   const std::string online = contents(out_ + "/online/summary.yaml");
   EXPECT_NE(online.find("mode: online\n"), std::string::npos);
   EXPECT_EQ(online.find("batch"), std::string::npos);
-  for (const std::string& name : RunOutput::fileNames()) {
+  for (const std::string& name : RunFiles{}.names()) {
     EXPECT_GT(fs::file_size(out_ + "/" + name), 0u) << name;
     EXPECT_GT(fs::file_size(out_ + "/online/" + name), 0u) << name;
   }
@@ -319,7 +323,7 @@ TEST_F(BagRunner, APartOfTheBagCanBePlayed) {
   bag_run.config.bag_duration = 5.0;
   const RunSummary summary = runBag(bag_run);
   EXPECT_NEAR(static_cast<double>(summary.imu_count), 1000.0, 2.0);
-  EXPECT_NEAR(static_cast<double>(summary.scans_total), 50.0, 1.0);
+  EXPECT_NEAR(static_cast<double>(summary.scansTotal()), 50.0, 1.0);
   expectError(run({"--set", "bag_start=100"}), {"bag_start", "behind its end"});
 }
 
@@ -509,6 +513,264 @@ TEST_F(BagRunner, HelpAndConfigurationNeedNoBag) {
             std::string::npos);
 }
 
+// --- Several radars ---
+
+const std::vector<std::string> kTwoTopics = {"/left", "/right"};
+
+class TwoRadars : public BagRunner {
+ protected:
+  Outcome runTwo(std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {"--set", "radars=[left, right]", "--set", "left/radar_topic=/left", "--set",
+                               "right/radar_topic=/right"});
+    return run(more);
+  }
+  void expectInSummary(const std::vector<std::string>& lines, const std::string& folder = "") const {
+    const std::string yaml = contents(out_ + folder + "/summary.yaml");
+    for (const std::string& line : lines) EXPECT_NE(yaml.find(line), std::string::npos) << line << yaml;
+  }
+  bool has(const std::string& file) const { return fs::exists(out_ + "/" + file); }
+};
+
+TEST_F(TwoRadars, EachHasItsFilesAndKeys) {
+  BagContents what;
+  what.radar_topics = kTwoTopics;
+  writeBag(what);
+  const Outcome outcome = runTwo();
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  for (const char* part : {"radar left\n", "radar right\n", "of 160 used", "of 80 used"})
+    EXPECT_NE(outcome.out.find(part), std::string::npos) << part << outcome.out;
+  const RunFiles files{{"left", "right"}, false};
+  for (const std::string& name : files.names()) EXPECT_GT(fs::file_size(out_ + "/" + name), 0u) << name;
+  EXPECT_FALSE(has("time_offset.csv"));
+  EXPECT_FALSE(has("ego_velocity.csv"));
+  expectInSummary({"scans_total: 160\n", "scans_total_left: 80\n", "scans_total_right: 80\n",
+                   "\nscans_used_left: ", "\nscans_rejected_right: {", "\nfinal_offset_s_left: 0.",
+                   "\nfinal_offset_sigma_s_right: 0.0", "\nradar_noise_left: {doppler: ",
+                   "\nradar_doppler_step_right: ", "\nradar_points_per_scan_left: {p10: 30",
+                   "saved: [trajectory.txt, trajectory_optimized.txt, navigation.csv, time_offset_left.csv"});
+  const std::string yaml = contents(out_ + "/summary.yaml");
+  EXPECT_EQ(yaml.find("\nfinal_offset_s:"), std::string::npos);
+  EXPECT_EQ(yaml.find("extrinsics"), std::string::npos);
+  // One line a scan, and each scan with its radar.
+  for (const char* name : {"left", "right"}) {
+    const std::string csv = contents(out_ + "/ego_velocity_" + name + ".csv");
+    EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 81) << name;
+  }
+}
+
+TEST_F(TwoRadars, OneNameIsOneRadarAndCarriesNone) {
+  writeBag({});
+  ASSERT_EQ(run().status, 0);
+  const std::string plain = out_;
+  out_ = folder_ + "/named";
+  const Outcome outcome = run({"--set", "radars=[only]"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  for (const std::string& name : RunFiles{}.names())
+    EXPECT_EQ(untimed(contents(out_ + "/" + name)), untimed(contents(plain + "/" + name))) << name;
+}
+
+TEST_F(TwoRadars, MissingTopicsAndWrongTypesNameTheirRadar) {
+  BagContents what;
+  what.radar_topics = {"/left"};
+  writeBag(what);
+  expectError(runTwo(), {"no topic /right (right/radar_topic, sensor_msgs/PointCloud2)"});
+  expectError(
+      runTwo({"--set", "right/radar_topic=/other", "--set", "left/stamp_source=trigger", "--set",
+              "left/trigger_topic=/absent"}),
+      {"topic /other (right/radar_topic) is std_msgs/Header", "no topic /absent (left/trigger_topic"});
+}
+
+TEST_F(TwoRadars, EachHasItsFormatAndItsStamps) {
+  BagContents what;
+  what.radar_topics = {"/left"};
+  what.doppler_field = "speed";
+  what.stamped = false;
+  writeBag(what);
+  {
+    rosbag::Bag bag(bag_, rosbag::bagmode::Append);
+    BagContents other;
+    other.radar_topics = {"/right"};
+    for (int k = 0; k < 80; ++k) {
+      const ros::Time stamp = ros::Time(1000.0) + ros::Duration(0.1 * k);
+      writeCloud(other, stamp, stamp + ros::Duration(100.001), k, &bag);
+    }
+  }
+  const Outcome outcome = runTwo({"--set", "left/radar_field_doppler=speed", "--set",
+                                  "left/stamp_source=arrival", "--set", "left/radar_stamp_shift=0.01"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  // Recorded 0.5 ms later than the IMU sample of that time; and shifted.
+  EXPECT_NE(contents(out_ + "/ego_velocity_left.csv").find("\n1000.110500000,"), std::string::npos);
+  EXPECT_NE(contents(out_ + "/ego_velocity_right.csv").find("\n1000.100000000,"), std::string::npos);
+}
+
+TEST_F(TwoRadars, OneThatGivesNothingIsSaidAndTheOtherGoesOn) {
+  BagContents what;
+  what.radar_topics = kTwoTopics;
+  writeBag(what);
+  Outcome outcome = runTwo({"--set", "right/radar_field_doppler=speed"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("topic /right: point cloud"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("every one of the 80 scans of radar right was rejected: cloud_not_usable 80"),
+            std::string::npos)
+      << outcome.err;
+  // It stays at what was told.
+  expectInSummary({"scans_used_right: 0\n", "final_offset_s_right: 0.000000000\n",
+                   "final_offset_sigma_s_right: 0.075000000\n", "scans_rejected_left: {before_init"});
+
+  expectError(runTwo({"--set", "radar_field_doppler=speed"}), {"topic /left: point cloud"});
+}
+
+TEST_F(TwoRadars, FilesOfAnEarlierRunAreNotTakenForItsOwn) {
+  BagContents what;
+  what.radar_topics = {"/left", "/right", "/sensor_platform/radar/scan"};
+  writeBag(what);
+  ASSERT_EQ(runTwo({"--set", "estimate_extrinsics=rotation"}).status, 0);
+  EXPECT_TRUE(has("extrinsics_right.csv"));
+  std::ofstream(out_ + "/time_offset_truth.csv") << "stamp,offset\n";  // somebody's own
+  std::ofstream(out_ + "/notes.txt") << "somebody's own\n";
+  ASSERT_EQ(run().status, 0);
+  for (const char* name : {"time_offset_left.csv", "ego_velocity_right.csv", "extrinsics_left.csv"})
+    EXPECT_FALSE(has(name)) << name;
+  for (const char* name : {"time_offset.csv", "ego_velocity.csv", "time_offset_truth.csv", "notes.txt"})
+    EXPECT_TRUE(has(name)) << name;
+  ASSERT_EQ(runTwo().status, 0);
+  EXPECT_FALSE(has("time_offset.csv"));
+  EXPECT_FALSE(has("ego_velocity.csv"));
+}
+
+TEST_F(BagRunner, EstimatedExtrinsicsAreWritten) {
+  writeBag({});
+  const Outcome outcome = run({"--set", "estimate_extrinsics=pose", "--set", "extrinsics_rotation_sigma=0.1",
+                               "--set", "extrinsics_translation_sigma=0.02"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("turned by"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("moved by"), std::string::npos) << outcome.out;
+  const std::string csv = contents(out_ + "/extrinsics.csv");
+  EXPECT_EQ(csv.rfind("stamp,x,y,z,qx,qy,qz,qw,sigma_x,sigma_y,sigma_z,sigma_rx,sigma_ry,sigma_rz\n100", 0),
+            0u);
+  const std::string offsets = contents(out_ + "/time_offset.csv");
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), std::count(offsets.begin(), offsets.end(), '\n'));
+  const std::string yaml = contents(out_ + "/summary.yaml");
+  // At rest nothing shows where the radar is: it stays as told, and as unsure as told.
+  for (const char* line : {"told_extrinsics_translation: [0.030000000, 0.030000000, -0.060000000]\n",
+                           "final_extrinsics_translation: [0.0", "final_extrinsics_translation_sigma: [0.0",
+                           "final_extrinsics_rotation_xyzw: [0.69", "final_extrinsics_rotation_sigma: [0."}) {
+    EXPECT_NE(yaml.find(line), std::string::npos) << line << yaml;
+  }
+
+  ASSERT_EQ(run({"--set", "estimate_extrinsics=rotation"}).status, 0);
+  EXPECT_NE(contents(out_ + "/summary.yaml")
+                .find("final_extrinsics_translation_sigma: [0.000000000, 0.000000000, 0.000000000]"),
+            std::string::npos);
+  ASSERT_EQ(run().status, 0);
+  EXPECT_FALSE(fs::exists(out_ + "/extrinsics.csv"));
+  EXPECT_EQ(contents(out_ + "/summary.yaml").find("extrinsics"), std::string::npos);
+}
+
+/// A simulated rig that moves wildly, with two radars of different offsets and mountings.
+class TwoSimulatedRadars : public TwoRadars {
+ protected:
+  static constexpr double kLeft = -0.009, kRight = 0.04;  // [s]
+
+  void SetUp() override {
+    TwoRadars::SetUp();
+    simulation::MotionRequest request;
+    request.name = "difficult";
+    request.seed = 3;
+    request.duration = 25.0;
+    request.rest = {4.0, 0.0, 1.0};
+    const simulation::Motion motion = simulation::makeMotion(request);
+    simulation::SimulationOptions rig;
+    rig.seed = 5;  // of both, so that they share the IMU
+    const auto write = [&](const std::string& path, double offset, const Extrinsics& T_IR) {
+      rig.time_offset = simulation::TimeOffsetProfile{};
+      rig.time_offset.constant = offset;
+      rig.T_IR = T_IR;
+      writeSimulationBag(path, motion, simulation::simulate(motion, rig), rig.start, {});
+    };
+    write(bag_, kLeft, left_);
+    write(folder_ + "/right.bag", kRight, right_);
+    rosbag::Bag both(bag_, rosbag::bagmode::Append), other(folder_ + "/right.bag", rosbag::bagmode::Read);
+    for (const rosbag::MessageInstance& message : rosbag::View(other, rosbag::TopicQuery(kTopic)))
+      both.write("/right", message.getTime(), message);
+  }
+
+  Config config() const {
+    Config config =
+        makeConfig({parseAssignment("radars=[left, right]"), parseAssignment("right/radar_topic=/right"),
+                    parseAssignment("left/radar_topic=" + kTopic)});
+    config.odometry.radars[0].T_IR = left_;
+    config.odometry.radars[1].T_IR = right_;
+    return config;
+  }
+
+  void expectOffsets(const RunSummary& summary) const {
+    ASSERT_EQ(summary.radars.size(), 2u);
+    EXPECT_EQ(summary.radars[0].name, "left");
+    EXPECT_NEAR(summary.radars[0].final_offset_s, kLeft, 1.5e-3);
+    EXPECT_NEAR(summary.radars[1].final_offset_s, kRight, 1.5e-3);
+    for (const RadarSummary& radar : summary.radars) {
+      EXPECT_GT(radar.scans_used, 190u) << radar.name;
+      EXPECT_GT(radar.final_offset_sigma_s, 0.0) << radar.name;
+    }
+    ASSERT_TRUE(summary.truth.has_value());
+    EXPECT_LT(summary.truth->ate_m, 0.15);
+  }
+
+  const std::string kTopic = "/sensor_platform/radar/scan";
+  const Extrinsics left_ = simulation::SimulationOptions{}.T_IR;
+  const Extrinsics right_{Eigen::Vector3d(-0.1, -0.2, 0.05),
+                          Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitZ())) * left_.q_IR};
+};
+
+TEST_F(TwoSimulatedRadars, EachOffsetIsFoundInEveryMode) {
+  for (const RunMode mode : {RunMode::kOnline, RunMode::kBatch, RunMode::kRefine}) {
+    SCOPED_TRACE(static_cast<int>(mode));
+    Config config = this->config();
+    config.mode = mode;
+    config.refine_passes = 2;
+    const RunSummary summary = runBag({bag_, out_, config, nullptr});
+    expectOffsets(summary);
+    if (mode != RunMode::kRefine) continue;
+    // What the first pass found is off the stamps of the second, each radar's its own, and on its outputs
+    // again.
+    expectInSummary({"pass_offsets_s_left: [-0.0", "pass_offsets_s_right: [0.0"});
+    EXPECT_NEAR(summary.radars[0].pass_offsets_s.at(0), kLeft, 1.5e-3);
+    EXPECT_NEAR(summary.radars[1].pass_offsets_s.at(0), kRight, 1.5e-3);
+    const auto stamps = [&](const std::string& folder) {
+      const std::string csv = contents(out_ + folder + "/ego_velocity_right.csv");
+      return csv.substr(csv.find('\n') + 1, 16);
+    };
+    EXPECT_EQ(stamps(""), stamps("/pass_1"));
+  }
+}
+
+TEST_F(TwoSimulatedRadars, MountingsAreFoundEachItsOwn) {
+  Config config = this->config();
+  config.odometry.smoother.estimate_extrinsics = EstimateExtrinsics::kRotation;
+  const Eigen::AngleAxisd wrong(0.08, Eigen::Vector3d(1.0, -2.0, 2.0).normalized());
+  config.odometry.radars[1].T_IR.q_IR = wrong * right_.q_IR;
+  const RunSummary summary = runBag({bag_, out_, config, nullptr});
+  const auto error = [&](std::size_t k, const Extrinsics& truth) {
+    return summary.radars.at(k).extrinsics->T_IR.q_IR.angularDistance(truth.q_IR);
+  };
+  EXPECT_LT(error(0, left_), 0.02);
+  EXPECT_LT(error(1, right_), 0.02);
+  EXPECT_NEAR(summary.radars[1].extrinsics->told.q_IR.angularDistance(right_.q_IR), 0.08, 1e-9);
+  EXPECT_TRUE(summary.radars[1].extrinsics->translation_sigma.isZero());
+  expectInSummary({"final_extrinsics_rotation_xyzw_left: [", "final_extrinsics_rotation_sigma_right: [0.0"});
+}
+
+TEST_F(TwoSimulatedRadars, SameBagSameBytes) {
+  const Config config = this->config();
+  runBag({bag_, out_ + "/a", config, nullptr});
+  runBag({bag_, out_ + "/b", config, nullptr});
+  for (const std::string& name : runFiles(config).names())
+    EXPECT_EQ(untimed(contents(out_ + "/a/" + name)), untimed(contents(out_ + "/b/" + name))) << name;
+}
+
 TEST(RunOutput, NumbersAreFixedAndStampsExact) {
   const auto fixed = [](double value, int decimals) {
     std::string text;
@@ -552,13 +814,13 @@ class RealBag : public testing::Test {
 TEST_F(RealBag, TriggerStampsEndWhereTheyStarted) {
   const RunSummary summary = play(out_);
   EXPECT_EQ(summary.imu_count, 8270u);
-  EXPECT_EQ(summary.scans_total, 412u);
+  EXPECT_EQ(summary.scansTotal(), 412u);
   EXPECT_LE(summary.end_to_start_2d_m, 0.10);
   EXPECT_LE(summary.end_to_start_3d_m, 1.65);  // the published rotation is tilted
-  EXPECT_GT(summary.final_offset_s, -0.020);
-  EXPECT_LT(summary.final_offset_s, 0.0);
-  EXPECT_GT(summary.final_offset_sigma_s, 0.0);
-  EXPECT_LT(summary.final_offset_sigma_s, 0.020);
+  EXPECT_GT(summary.radars.front().final_offset_s, -0.020);
+  EXPECT_LT(summary.radars.front().final_offset_s, 0.0);
+  EXPECT_GT(summary.radars.front().final_offset_sigma_s, 0.0);
+  EXPECT_LT(summary.radars.front().final_offset_sigma_s, 0.020);
 }
 
 TEST_F(RealBag, NearlyEveryScanOfTheWalkIsUsed) {
@@ -588,7 +850,8 @@ TEST_F(RealBag, OnlineEndsNearTheBatch) {
   const RunSummary online = play(out_ + "/again");
   ASSERT_TRUE(batch.batch.has_value());
   EXPECT_TRUE(batch.batch->converged);
-  EXPECT_NEAR(online.final_offset_s, batch.final_offset_s, 0.3 * online.final_offset_sigma_s);
+  EXPECT_NEAR(online.radars.front().final_offset_s, batch.radars.front().final_offset_s,
+              0.3 * online.radars.front().final_offset_sigma_s);
   EXPECT_NEAR(online.end_to_start_2d_m, batch.end_to_start_2d_m, 0.05);
   EXPECT_NEAR(online.end_to_start_3d_m, batch.end_to_start_3d_m, 0.05);
 }
@@ -596,7 +859,7 @@ TEST_F(RealBag, OnlineEndsNearTheBatch) {
 TEST_F(RealBag, SameBytesTwice) {
   play(out_ + "/a");
   play(out_ + "/b");
-  for (const std::string& name : RunOutput::fileNames()) {
+  for (const std::string& name : RunFiles{}.names()) {
     const std::string a = contents(out_ + "/a/" + name), b = contents(out_ + "/b/" + name);
     EXPECT_FALSE(a.empty()) << name;
     EXPECT_EQ(untimed(a), untimed(b)) << name;

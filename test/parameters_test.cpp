@@ -253,7 +253,7 @@ TEST(Parameters, ConfigurationsAreFoundByNameAndByPath) {
     findConfigFile("isr");
     FAIL();
   } catch (const std::runtime_error& error) {
-    EXPECT_TRUE(contains(error.what(), "estimator, irs, sparse, ti_mmwave")) << error.what();
+    EXPECT_TRUE(contains(error.what(), "estimator, irs, sparse, ti_mmwave, two_radars")) << error.what();
   }
   EXPECT_THROW(findConfigFile("./nonexistent.yaml"), std::runtime_error);
 }
@@ -306,6 +306,27 @@ TEST(Parameters, SensorConfigurationsLoad) {
   EXPECT_EQ(pointCloudFormat(sparse).doppler, "v_doppler_mps");
   EXPECT_EQ(sparse.odometry.T_IR.l_I, kart.l_I);
   EXPECT_LT(sparse.odometry.T_IR.q_IR.angularDistance(kart.q_IR), 1e-6);
+}
+
+TEST(Parameters, TheTwoRadarsOfTheExampleAreMirrorImages) {
+  const std::vector<Config> radars =
+      configsOfRadars(makeConfig(readParameterFile(kConfigFolder + "/two_radars.yaml")));
+  ASSERT_EQ(radars.size(), 2u);
+  const Extrinsics left = radars[0].odometry.T_IR, right = radars[1].odometry.T_IR;
+  const Extrinsics kart = simulation::presetOf("kart").options.T_IR;
+  EXPECT_EQ(left.l_I, kart.l_I);
+  EXPECT_LT(left.q_IR.angularDistance(kart.q_IR), 1e-6);
+  const Eigen::Vector3d mirror(1.0, -1.0, 1.0);
+  EXPECT_EQ(right.l_I, left.l_I.cwiseProduct(mirror));
+  const auto looks = [](const Extrinsics& T_IR) {
+    return Eigen::Vector3d(T_IR.q_IR * Eigen::Vector3d::UnitY());
+  };
+  EXPECT_LT((looks(right) - looks(left).cwiseProduct(mirror)).norm(), 1e-6);
+  // Its right stays level, as that of the left radar.
+  EXPECT_NEAR((right.q_IR * Eigen::Vector3d::UnitX()).z(), 0.0, 1e-6);
+  EXPECT_EQ(radars[0].radar_topic, "/sensor_platform/radar_left/scan");
+  EXPECT_EQ(radars[1].radar_topic, "/sensor_platform/radar_right/scan");
+  EXPECT_EQ(radars[1].odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kRotation);
 }
 
 TEST(Parameters, OverridesChangeThePresetInAnyOrder) {
@@ -409,11 +430,13 @@ TEST(SeveralRadars, LaterEntriesHoldInASectionToo) {
 TEST(SeveralRadars, NamesAreChecked) {
   for (const char* names :
        {"[Left]", "[left, left]", "[\"\"]", "left", "[a-b]", "[1]", "[[left]]", "[l/r]"}) {
-    EXPECT_TRUE(contains(faultOf(std::string("radars=") + names),
-                         "radars: expected a list of different names of lower case letters, digits and _"))
+    EXPECT_TRUE(
+        contains(faultOf(std::string("radars=") + names),
+                 "radars: expected a list of at most 16 different names of lower case letters, digits and _"))
         << names;
   }
   EXPECT_EQ(faultOf("radars=[window]"), "radars: expected names that are no parameters, got \"window\"");
+  EXPECT_TRUE(contains(faultOf("radars=[a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q]"), "at most 16"));
   EXPECT_TRUE(fromAssignments({"radars=[]"}).radars.empty());
 }
 

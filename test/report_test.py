@@ -7,9 +7,11 @@ import sys
 
 import pytest
 import yaml
+from scipy.spatial.transform import Rotation
 
 from rio_t import programs
 from rio_t.report.main import main
+from rio_t.report.motion import read_extrinsics
 
 FIGURES = ["trajectory", "errors", "velocity", "time_offset", "ego_velocity", "biases"]
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -64,6 +66,68 @@ def test_page_holds_its_figures_and_numbers(report, run_folder, simulated_run, p
     assert cell_after(page, "ATE: position, origin aligned, rmse [m]") == f"{ate:.4f}"
     error = 1e3 * (summary["final_offset_s"] - 0.03)
     assert float(cell_after(page, "last estimate minus truth [ms]").split()[0]) == pytest.approx(error, abs=2e-3)
+
+
+def test_each_of_two_radars_has_its_sections(report, two_radar_run, simulated_run, tmp_path):
+    page = page_of(report("--ground-truth", simulated_run / "truth.txt", "--true-offset", "left=0.03", "--true-offset",
+                          "right=0.05", "--output", tmp_path / "out", two_radar_run / "run"))
+    assert list(figures_of(page)) == ["trajectory", "errors", "velocity", "time_offset_left", "extrinsics_left",
+                                      "ego_velocity_left", "time_offset_right", "extrinsics_right",
+                                      "ego_velocity_right", "biases"]
+    summary = yaml.safe_load((two_radar_run / "run" / "summary.yaml").read_text())
+    after = page.split("Time offset against the truth: right")[1]
+    error = 1e3 * (summary["final_offset_s_right"] - 0.05)
+    assert float(cell_after(after, "last estimate minus truth [ms]").split()[0]) == pytest.approx(error, abs=2e-3)
+    assert "mounting as estimated at the end" in page
+
+    def rotation(key):
+        return Rotation.from_quat(summary[f"{key}_extrinsics_rotation_xyzw_right"])
+    turn = (rotation("final") * rotation("told").inv()).as_rotvec(degrees=True)
+    section = page.split("<h2>Extrinsics: right")[1]
+    for axis, expected in zip("xyz", turn):
+        assert float(cell_after(section, f"turn about {axis} [deg]")) == pytest.approx(expected, abs=2e-3)
+    assert "lever arm along" not in page  # only the rotation is estimated
+
+
+def test_a_lever_arm_that_is_estimated_is_shown(report, two_radar_run, tmp_path):
+    folder = shutil.copytree(two_radar_run / "run", tmp_path / "run")
+    header, *lines = (folder / "extrinsics_left.csv").read_text().splitlines()
+    rows = [line.split(",") for line in lines]
+    for row in rows:
+        row[1:4], row[8:11] = ["0.05", "0.03", "-0.06"], ["0.01"] * 3  # told x is 0.03
+    (folder / "extrinsics_left.csv").write_text("\n".join([header] + [",".join(row) for row in rows]) + "\n")
+    section = page_of(report(folder)).split("<h2>Extrinsics: left")[1]
+    assert cell_after(section, "lever arm along x [mm]") == "20.0"
+    assert cell_after(section, "lever arm along y [mm]") == "0.0"
+
+
+def test_extrinsics_of_a_run_that_did_not_finish_count_from_their_first(report, two_radar_run, tmp_path):
+    folder = shutil.copytree(two_radar_run / "run", tmp_path / "run")
+    (folder / "summary.yaml").unlink()
+    page = page_of(report(folder))
+    assert "from its first estimate" in page
+    assert "extrinsics_right" in figures_of(page)
+
+
+@pytest.mark.parametrize("words, message", [
+    (["0.03"], "expected NAME=S with a name of left, right, got no name"),
+    (["rear=0.03"], "expected NAME=S with a name of left, right, got the name rear")])
+def test_a_true_offset_names_its_radar(report, two_radar_run, words, message):
+    refused(report("--true-offset", *words, two_radar_run / "run"), message)
+
+
+def test_one_radar_has_no_name(report, run_folder):
+    refused(report("--true-offset", "left=0.03", run_folder), "expected S, since there is one radar")
+
+
+def test_the_mounting_of_each_radar_comes_from_its_section(tmp_path):
+    (tmp_path / "config.yaml").write_text(
+        "extrinsics_translation: [1, 2, 3]\nextrinsics_rotation_xyzw: [0, 0, 0, 1]\n"
+        "radars: [left, right]\nleft: {extrinsics_translation: [4, 5, 6]}\n")
+    for radar, expected in (("left", [4, 5, 6]), ("right", [1, 2, 3]), ("", [1, 2, 3])):
+        lever, rotation = read_extrinsics(tmp_path / "config.yaml", radar)
+        assert lever.tolist() == expected, radar
+        assert rotation.magnitude() == 0
 
 
 def test_without_truth_nothing_is_evaluated(report, run_folder):

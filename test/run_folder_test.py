@@ -26,6 +26,38 @@ def test_a_real_run_is_read(simulated_run):
     assert (navigation.sigmas > 0).all()
 
 
+def test_a_run_of_two_radars_is_read(two_radar_run, tmp_path):
+    folder = shutil.copytree(two_radar_run / "run", tmp_path / "run")
+    assert run_folder.radars(folder) == ["left", "right"]
+    summary = run_folder.read_yaml(folder / "summary.yaml")
+    for radar in ("left", "right"):
+        offsets = run_folder.read(folder, "time_offset.csv", radar)
+        assert offsets["offset_s"][-1] == pytest.approx(summary[f"final_offset_s_{radar}"], abs=1e-8)
+        scans = run_folder.read(folder, "ego_velocity.csv", radar)
+        assert len(scans["stamp"]) == summary[f"scans_total_{radar}"]
+        extrinsics = run_folder.read(folder, "extrinsics.csv", radar)
+        assert [extrinsics["q" + k][-1] for k in "xyzw"] == summary[f"final_extrinsics_rotation_xyzw_{radar}"]
+        assert [extrinsics["sigma_r" + k][-1] for k in "xyz"] == summary[f"final_extrinsics_rotation_sigma_{radar}"]
+        assert (extrinsics["sigma_x"] == 0).all()
+    assert summary["final_offset_s_right"] - summary["final_offset_s_left"] == pytest.approx(0.02, abs=2e-3)
+    (folder / "summary.yaml").unlink()  # the run did not finish
+    assert run_folder.radars(folder) == ["left", "right"]
+
+
+def test_one_radar_has_no_name(simulated_run, tmp_path):
+    assert run_folder.radars(simulated_run / "run") == [""]
+    assert run_folder.radars(tmp_path) == [""]
+    assert run_folder.of_radar("time_offset.csv", "") == "time_offset.csv"
+    assert run_folder.of_radar("time_offset.csv", "left") == "time_offset_left.csv"
+    assert run_folder.of_radar("final_offset_s", "left") == "final_offset_s_left"
+
+
+def test_files_of_another_run_are_not_radars_of_this(two_radar_run, tmp_path):
+    folder = shutil.copytree(two_radar_run / "run", tmp_path / "run")
+    (folder / "ego_velocity_old.csv").write_text("")
+    assert run_folder.radars(folder) == ["left", "right"]
+
+
 def test_each_line_of_navigation_gets_its_pose(tmp_path):
     # The stamp 2 comes twice: the bag looped.
     poses = [(1, 10), (2, 20), (3, 30), (2, 40), (3, 50)]

@@ -1,6 +1,7 @@
 """Reads what rio_t_bag writes into its output folder."""
 import csv
 import dataclasses
+import re
 
 import numpy
 import yaml
@@ -12,6 +13,7 @@ COLUMNS = {
     "navigation.csv": "stamp,vx,vy,vz,sigma_px,sigma_py,sigma_pz,sigma_rx,sigma_ry,sigma_rz,sigma_vx,sigma_vy,sigma_vz",
     "time_offset.csv": "stamp,offset_s,sigma_s",
     "ego_velocity.csv": "stamp,vx,vy,vz,sigma_x,sigma_y,sigma_z,inliers,points,status",
+    "extrinsics.csv": "stamp,x,y,z,qx,qy,qz,qw,sigma_x,sigma_y,sigma_z,sigma_rx,sigma_ry,sigma_rz",
     "biases.csv": "stamp,bgx,bgy,bgz,bax,bay,baz"}
 KINDS = {"stamp": tum.nanoseconds, "status": str}  # all other columns are numbers
 
@@ -43,9 +45,15 @@ def read_table(path, header):
             for name, values in table.items()}
 
 
-def read(folder, name):
-    """A table of the run, by the name of its file."""
-    return read_table(folder / name, COLUMNS[name])
+def of_radar(name, radar):
+    """What a file, or a key of summary.yaml, is called for that radar: `radar` is empty if there is but one."""
+    stem, dot, extension = name.partition(".")
+    return f"{stem}_{radar}{dot}{extension}" if radar else name
+
+
+def read(folder, name, radar=""):
+    """A table of the run, by the name of its file without that of the radar."""
+    return read_table(folder / of_radar(name, radar), COLUMNS[name])
 
 
 def read_yaml(path):
@@ -56,6 +64,16 @@ def read_yaml(path):
     if not isinstance(content, dict):
         raise RioTError(f"{path}: expected `key: value` lines")
     return content
+
+
+def radars(folder):
+    """Names of the radars, in the order of the configuration; [""] for one radar, whose files carry no name."""
+    if (folder / "summary.yaml").is_file():
+        files = read_yaml(folder / "summary.yaml").get("saved") or []
+    else:  # the run did not finish
+        files = sorted(path.name for path in folder.glob("ego_velocity*.csv"))
+    matches = [re.fullmatch(r"ego_velocity_([a-z0-9_]+)\.csv", str(file)) for file in files]
+    return [match.group(1) for match in matches if match] or [""]
 
 
 def read_navigation(folder):

@@ -1,6 +1,7 @@
 """The figures of the report. All times in seconds of the run."""
 import numpy as np
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from scipy.spatial.transform import Rotation
 
 from ..plots import legend_above, pyplot, tidy
 from .motion import USED
@@ -113,6 +114,32 @@ def draw_offset(table, true_offset):
     axes[1].yaxis.set_minor_formatter(NullFormatter())
     finish_axes(axes[1], "[ms]")
     axes[1].set_xlabel("time [s]")
+    return figure
+
+
+def draw_extrinsics(table, told):
+    """Turn and, if it was estimated, lever arm, both from those told. `told`: lever arm and R_IR."""
+    lever, R_IR = told
+    turn = (Rotation.from_quat(np.stack([table["q" + k] for k in "xyzw"], -1)) * R_IR.inv()).as_rotvec()
+    moved = np.stack([table[k] for k in "xyz"], -1) - lever
+    rows = [("turn [deg]", turn, "sigma_r", 180.0 / np.pi)]
+    if np.any(table["sigma_x"] > 0):
+        rows.append(("lever arm, moved by [mm]", moved, "sigma_", 1e3))
+    figure, all_axes = new_figure(len(rows), 1.2 + 3.2 * len(rows), sharex=True)
+    t = table["time"]
+    for axes, (label, values, sigma_name, unit) in zip(all_axes, rows):
+        settled = 0.0
+        for value, axis, colour in zip(unit * values.T, "xyz", AXES):
+            sigma = unit * table[sigma_name + axis]
+            axes.fill_between(t, value - sigma, value + sigma, color=colour, alpha=0.15, linewidth=0)
+            axes.plot(t, value, color=colour, linewidth=1.2, label=axis)
+            settled = max(settled, 2 * float(np.median(sigma[len(sigma) // 2:])))
+        axes.axhline(0.0, color=TRUTH, linewidth=1.2, linestyle="--", label="told")
+        # The first sigma is that of the prior: scaled to the estimates, the value told and the settled band.
+        reach = 1.08 * max(unit * float(np.abs(values).max()) + settled, 1e-3)
+        axes.set_ylim(-reach, reach)
+        finish_axes(axes, label)
+    all_axes[-1].set_xlabel("time [s]")
     return figure
 
 

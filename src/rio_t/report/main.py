@@ -8,13 +8,14 @@ import tempfile
 from typing import Optional
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from . import __doc__ as description
 from . import figures
 from .. import programs, run_folder, tum
 from ..errors import RioTError
 from .accuracy import ERRORS, accuracy_rows, offset_rows, run_evaluate
-from .motion import motion, predicted_ego_velocity, read_extrinsics
+from .motion import extrinsics_in, motion, predicted_ego_velocity, read_extrinsics
 from .page import Page
 
 ESTIMATES = (("optimised", figures.OPTIMIZED, "trajectory_optimized.txt"), ("online", figures.ESTIMATE, "trajectory.txt"))
@@ -31,13 +32,24 @@ class Track:
 
 
 @dataclasses.dataclass
+class Radar:
+    """What is drawn of a radar. Tables are None if their file is absent or has no row; they have a column `time` [s]."""
+    name: str  # empty if there is but one
+    offset: Optional[dict]
+    scans: Optional[dict]
+    extrinsics: Optional[dict]
+
+    def title(self, text):
+        return f"{text}: {self.name}" if self.name else text
+
+
+@dataclasses.dataclass
 class Run:
-    """What is drawn. Tables are None if their file is absent or has no row; they have a column `time` [s]."""
+    """What is drawn. Tables as those of Radar."""
     origin: int     # [ns] where the seconds of the run begin
     estimates: list  # Tracks, the online one last
     truth: Optional[Track]
-    offset: Optional[dict]
-    scans: Optional[dict]
+    radars: list
     biases: Optional[dict]
 
 
@@ -60,13 +72,15 @@ def read_run(folder, truth_file):
     for track in estimates + ([truth] if truth else []):
         track.time = track.poses.seconds(origin)
 
-    def table(name):
-        if not (folder / name).is_file():
+    def table(name, radar=""):
+        if not (folder / run_folder.of_radar(name, radar)).is_file():
             return None
-        content = timed(run_folder.read(folder, name), origin)
+        content = timed(run_folder.read(folder, name, radar), origin)
         return content if len(content["time"]) else None
 
-    return Run(origin, estimates, truth, table("time_offset.csv"), table("ego_velocity.csv"), table("biases.csv"))
+    radars = [Radar(name, table("time_offset.csv", name), table("ego_velocity.csv", name), table("extrinsics.csv", name))
+              for name in run_folder.radars(folder)]
+    return Run(origin, estimates, truth, radars, table("biases.csv"))
 
 
 def add_summary(page, folder):
@@ -125,26 +139,74 @@ def motions_of(run):
     return [each for each in motions if each[2] is not None]
 
 
-def add_ego_velocity(page, run, motions, extrinsics):
+def last_extrinsics(table):
+    """Position of the radar in the IMU frame and R_IR, at the end of the run."""
+    def last(*names):
+        return np.array([table[name][-1] for name in names])
+    return last("x", "y", "z"), Rotation.from_quat(last("qx", "qy", "qz", "qw"))
+
+
+def add_extrinsics(page, radar, folder):
+    """The estimate over time, and how far it went from the mounting told."""
+    path = folder / "summary.yaml"
+    if path.is_file():
+        told = extrinsics_in(run_folder.read_yaml(path), path, "told_", radar.name)
+        note = ""
+    else:  # the run did not finish: only its first estimate is left of what was told
+        told = last_extrinsics({name: column[:1] for name, column in radar.extrinsics.items()})
+        note = "Without summary.yaml: from its first estimate."
+    page.heading(radar.title("Extrinsics"), "How far the radar is from where the configuration puts it, about and along "
+                                            "the axes of the IMU, with a band of 1 sigma. " + note)
+    lever, rotation = last_extrinsics(radar.extrinsics)
+    turn = np.degrees((rotation * told[1].inv()).as_rotvec())
+    sigma = {name: radar.extrinsics["sigma_" + name][-1] for name in ("x", "y", "z", "rx", "ry", "rz")}
+    rows = [[f"turn about {axis} [deg]", f"{turn[i]:.3f}", f"{np.degrees(sigma['r' + axis]):.3f}"]
+            for i, axis in enumerate("xyz")]
+    rows += [[f"lever arm along {axis} [mm]", f"{1e3 * (lever[i] - told[0][i]):.1f}", f"{1e3 * sigma[axis]:.1f}"]
+             for i, axis in enumerate("xyz") if sigma[axis] > 0]
+    page.table(rows, ["last estimate minus what was told", "", "sigma"])
+    page.figure(run_folder.of_radar("extrinsics", radar.name), figures.draw_extrinsics(radar.extrinsics, told))
+
+
+def mounting(radar, config):
+    """Position of the radar in the IMU frame and R_IR, None if not known, and where that is from."""
+    if radar.extrinsics is not None:
+        return last_extrinsics(radar.extrinsics), "as estimated at the end"
+    return (read_extrinsics(config, radar.name) if config else None), "from the configuration"
+
+
+def add_ego_velocity(page, radar, motions, extrinsics, source):
     predicted, how = None, ""
     if motions:
-        at = run.scans["time"]
-        if run.offset is not None:
-            at = at - np.interp(at, run.offset["time"], run.offset["offset_s"])  # measured at stamp - t_O
-        predicted, how = predicted_ego_velocity(run.scans, at, motions[0][2], extrinsics)
+        at = radar.scans["time"]
+        if radar.offset is not None:
+            at = at - np.interp(at, radar.offset["time"], radar.offset["offset_s"])  # measured at stamp - t_O
+        predicted, how = predicted_ego_velocity(radar.scans, at, motions[0][2], extrinsics, source)
     if predicted is not None:
-        page.heading("Ego-velocity residuals",
+        page.heading(radar.title("Ego-velocity residuals"),
                      f"Radar minus what the {motions[0][0]} trajectory predicts, in the radar frame; {how}.")
     else:
-        page.heading("Ego-velocity", "As measured, in the radar frame.")
-    page.figure("ego_velocity", figures.draw_ego_velocity(run.scans, predicted))
+        page.heading(radar.title("Ego-velocity"), "As measured, in the radar frame.")
+    page.figure(run_folder.of_radar("ego_velocity", radar.name), figures.draw_ego_velocity(radar.scans, predicted))
+
+
+def true_offsets_of(radars, given):
+    """By the name of the radar, from the pairs (name, seconds) of --true-offset."""
+    names = [radar.name for radar in radars]
+    for name, _ in given:
+        if name not in names:
+            expected = f"NAME=S with a name of {', '.join(names)}" if names != [""] else "S, since there is one radar"
+            raise RioTError(f"--true-offset: expected {expected}, got {f'the name {name}' if name else 'no name'}")
+    return dict(given)
 
 
 def report(arguments):
     """Writes the page; its path."""
-    run, true_offset = read_run(arguments.run, arguments.ground_truth), arguments.true_offset
-    extrinsics = read_extrinsics(arguments.config) if arguments.config else None
-    judge_poses, judge_offset = run.truth and run.estimates, true_offset is not None and run.offset is not None
+    run = read_run(arguments.run, arguments.ground_truth)
+    true_offsets = true_offsets_of(run.radars, arguments.true_offset)
+    mountings = {radar.name: mounting(radar, arguments.config) for radar in run.radars}
+    judge_poses = run.truth and run.estimates
+    judge_offset = any(radar.name in true_offsets and radar.offset is not None for radar in run.radars)
     program = arguments.evaluate
     if (judge_poses or judge_offset) and not program:
         program = programs.find(["evaluate"], "--evaluate FILE") / "evaluate"
@@ -157,10 +219,12 @@ def report(arguments):
     page = Page(folder, f"rio_t: {arguments.run.resolve().name}")
     add_summary(page, arguments.run)
     errors = add_accuracy(page, run, program, arguments.max_difference) if judge_poses else []
-    if judge_offset:
-        page.heading("Time offset against the truth")
-        result = run_evaluate(program, "--time-offset", arguments.run / "time_offset.csv", "--true-offset",
-                              repr(true_offset))
+    for radar in run.radars:
+        if radar.name not in true_offsets or radar.offset is None:
+            continue
+        page.heading(radar.title("Time offset against the truth"))
+        table = arguments.run / run_folder.of_radar("time_offset.csv", radar.name)
+        result = run_evaluate(program, "--time-offset", table, "--true-offset", repr(true_offsets[radar.name]))
         page.table(offset_rows(result["time_offset"]))
     if run.estimates:
         add_trajectory(page, run, errors)
@@ -170,11 +234,15 @@ def report(arguments):
     if motions:
         page.heading("Velocity", "In the IMU frame, from differences of the poses.")
         page.figure("velocity", figures.draw_velocity(motions))
-    if run.offset is not None:
-        page.heading("Time offset of the radar", "A scan stamped s was measured at s minus the offset.")
-        page.figure("time_offset", figures.draw_offset(run.offset, true_offset))
-    if run.scans is not None:
-        add_ego_velocity(page, run, motions, extrinsics)
+    for radar in run.radars:
+        if radar.offset is not None:
+            page.heading(radar.title("Time offset of the radar"), "A scan stamped s was measured at s minus the offset.")
+            page.figure(run_folder.of_radar("time_offset", radar.name),
+                        figures.draw_offset(radar.offset, true_offsets.get(radar.name)))
+        if radar.extrinsics is not None:
+            add_extrinsics(page, radar, arguments.run)
+        if radar.scans is not None:
+            add_ego_velocity(page, radar, motions, *mountings[radar.name])
     if run.biases is not None:
         page.heading("Biases of the IMU")
         page.figure("biases", figures.draw_biases(run.biases))
@@ -188,12 +256,21 @@ def finite(text):
     return value
 
 
+def named_offset(text):
+    """`S` or `NAME=S`: the name, empty if none, and the seconds."""
+    name, equals, value = text.rpartition("=")
+    if equals and not name:
+        raise argparse.ArgumentTypeError("expected S or NAME=S")
+    return name, finite(value)
+
+
 def main(words):
     parser = argparse.ArgumentParser(prog="report.py", description=description,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("run", metavar="RUN_DIR", type=pathlib.Path, help="output folder of rio_t_bag")
     parser.add_argument("--ground-truth", metavar="FILE", type=pathlib.Path, help="true trajectory, TUM format")
-    parser.add_argument("--true-offset", metavar="S", type=finite, help="true time offset of the radar [s]")
+    parser.add_argument("--true-offset", metavar="[NAME=]S", type=named_offset, action="append", default=[],
+                        help="true time offset of the radar [s]; with several radars once for each, with its name")
     parser.add_argument("--max-difference", metavar="S", type=finite, default=0.01,
                         help="largest difference of the stamps of two poses that are compared [s] (0.01)")
     parser.add_argument("--config", metavar="FILE", type=pathlib.Path,

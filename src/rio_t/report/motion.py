@@ -4,7 +4,7 @@ from scipy.spatial.transform import Rotation
 
 from ..errors import RioTError
 from ..geometry import interpolate, interpolate_rotations
-from ..run_folder import read_yaml
+from ..run_folder import of_radar, read_yaml
 
 USED = ("moving", "zero_velocity")  # status of a scan that entered the estimate
 
@@ -21,26 +21,32 @@ def motion(t, trajectory):
     return at, interpolate_rotations(at, t, q).apply(v_W, inverse=True), turn.as_rotvec() / (2 * step)
 
 
-def read_extrinsics(path):
-    """Position of the radar in the IMU frame and R_IR."""
-    config = read_yaml(path)
+def extrinsics_in(content, path, prefix="", radar=""):
+    """Position of the radar in the IMU frame and R_IR, of the keys that begin with `prefix`."""
+    keys = [of_radar(f"{prefix}extrinsics_{what}", radar) for what in ("translation", "rotation_xyzw")]
     try:
-        lever = np.array(config["extrinsics_translation"], dtype=float).reshape(3)
-        return lever, Rotation.from_quat(np.array(config["extrinsics_rotation_xyzw"], dtype=float).reshape(4))
+        lever, rotation = (np.array(content[key], dtype=float) for key in keys)
+        return lever.reshape(3), Rotation.from_quat(rotation.reshape(4))
     except (KeyError, TypeError, ValueError):
-        raise RioTError(f"{path}: expected extrinsics_translation (3 numbers) and extrinsics_rotation_xyzw "
-                        "(4 numbers)") from None
+        raise RioTError(f"{path}: expected {keys[0]} (3 numbers) and {keys[1]} (4 numbers)") from None
 
 
-def predicted_ego_velocity(scans, at, reference, extrinsics):
+def read_extrinsics(path, radar=""):
+    """Those of a configuration; `radar`: of which of several."""
+    config = read_yaml(path)
+    section = config.get(radar)
+    return extrinsics_in({**config, **section} if radar and isinstance(section, dict) else config, path)
+
+
+def predicted_ego_velocity(scans, at, reference, extrinsics, source):
     """Velocity of the radar in its frame that `reference` predicts at the times `at` of the scans, n x 3, NaN outside;
-    and how. None if there are too few scans for it."""
+    and how. None if there are too few scans for it. `source`: where the extrinsics are from."""
     t, v_I, omega_I = reference
     inside = (at >= t[0]) & (at <= t[-1])
     v, w = interpolate(at, t, v_I), interpolate(at, t, omega_I)
     if extrinsics is not None:
         lever, R_IR = extrinsics
-        predicted, how = R_IR.apply(v + np.cross(w, lever), inverse=True), "mounting from the configuration"
+        predicted, how = R_IR.apply(v + np.cross(w, lever), inverse=True), f"mounting {source}"
     else:
         # Any mounting is linear in velocity and turn rate. Fitted to the data, largest misfits left out.
         regressors = np.concatenate([v, w], axis=1)

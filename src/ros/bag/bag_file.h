@@ -27,7 +27,7 @@ std::map<std::string, std::string> topicTypes(const rosbag::Bag& bag);
 
 /// The topic of a configuration key and the type it must have.
 struct Wanted {
-  const char* key;
+  std::string key;
   std::string topic;
   std::string type;
 };

@@ -27,31 +27,40 @@ std::uint64_t quantile(const std::map<std::size_t, std::uint64_t>& scans_by_size
 }  // namespace
 
 BagPlayer::BagPlayer(const Config& config, RunLog* log, BatchOdometry* recorder)
-    : config_(config),
-      format_(pointCloudFormat(config)),
-      stamper_(stampingOptions(config)),
-      odometry_(config.odometry),
-      log_(log),
-      recorder_(recorder) {}
+    : config_(config), odometry_(config.odometry), log_(log), recorder_(recorder) {
+  for (const Config& radar : configsOfRadars(config)) radars_.emplace_back(radar);
+}
+
+BagPlayer::Radar::Radar(const Config& config)
+    : topic(config.radar_topic),
+      trigger_topic(config.stamp_source == StampSource::kTrigger ? config.trigger_topic : ""),
+      format(pointCloudFormat(config)),
+      stamper(stampingOptions(config)) {}
 
 void BagPlayer::play(const rosbag::MessageInstance& instance) {
   const std::string& topic = instance.getTopic();
   const Time record = toTime(instance.getTime());
-  if (topic == config_.imu_topic) {
-    addImu(*read<sensor_msgs::Imu>(instance), record);
-  } else if (topic == config_.radar_topic) {
-    addCloud(*read<sensor_msgs::PointCloud2>(instance), record);
-  } else {
-    const auto trigger = read<std_msgs::Header>(instance);
-    stamper_.addTrigger(trigger->seq, toTime(trigger->stamp), record);
+  if (topic == config_.imu_topic) addImu(*read<sensor_msgs::Imu>(instance), record);
+  for (Radar& radar : radars_) {
+    if (topic == radar.topic) addCloud(*read<sensor_msgs::PointCloud2>(instance), record, radar);
+    if (topic != radar.trigger_topic) continue;
+    const auto trigger = read<std_msgs::Header>(instance);  // one line may trigger several radars
+    radar.stamper.addTrigger(trigger->seq, toTime(trigger->stamp), record);
   }
-  for (RadarScan& scan : stamper_.take()) odometry_.addScan(std::move(scan));
+  for (std::size_t k = 0; k < radars_.size(); ++k) feed(radars_[k].stamper.take(), k);
   for (ScanResult& result : odometry_.process()) account(result);
 }
 
 void BagPlayer::finish() {
-  for (RadarScan& scan : stamper_.finish()) odometry_.addScan(std::move(scan));
+  for (std::size_t k = 0; k < radars_.size(); ++k) feed(radars_[k].stamper.finish(), k);
   for (ScanResult& result : odometry_.finish()) account(result);
+}
+
+void BagPlayer::feed(std::vector<RadarScan> scans, std::size_t radar) {
+  for (RadarScan& scan : scans) {
+    scan.radar = radar;
+    odometry_.addScan(std::move(scan));
+  }
 }
 
 RunSummary BagPlayer::summary() const {
@@ -64,14 +73,19 @@ RunSummary BagPlayer::summary() const {
 void BagPlayer::countInput(RunSummary* summary) const {
   summary->imu_count = imu_count_;
   summary->imu_noise = odometry_.imuNoise();
-  summary->radar_noise = odometry_.radarNoise();
-  summary->radar_doppler_step = odometry_.radarDopplerStep();
-  for (std::size_t i = 0; i < 3; ++i) {
-    constexpr std::array<double, 3> kShares = {0.1, 0.5, 0.9};
-    summary->radar_points_per_scan[i] = quantile(scans_by_size_, kShares[i]);
+  for (std::size_t k = 0; k < radars_.size(); ++k) {
+    const Radar& radar = radars_[k];
+    RadarSummary& told = summary->radars[k];
+    told.noise = odometry_.radarNoise(k);
+    told.doppler_step = odometry_.radarDopplerStep(k);
+    for (std::size_t i = 0; i < 3; ++i) {
+      constexpr std::array<double, 3> kShares = {0.1, 0.5, 0.9};
+      told.points_per_scan[i] = quantile(radar.scans_by_size, kShares[i]);
+    }
+    told.scans_total = radar.scans_total;
+    for (const auto& [reason, count] : radar.stamper.givenUp()) told.scans_rejected[reason] += count;
+    for (const auto& [kind, what] : radar.not_usable) told.scans_rejected[kind] += what.count;
   }
-  summary->scans_total = scans_total_;
-  for (const auto& [reason, count] : stamper_.givenUp()) summary->scans_rejected[reason] += count;
   summary->input_faults = odometry_.faults();
   // These two are judgements of the estimate, with keys of their own.
   const auto take = [&](const char* name) {
@@ -83,10 +97,13 @@ void BagPlayer::countInput(RunSummary* summary) const {
   summary->health_at_end = toString(odometry_.health());
   if (const auto start = odometry_.start()) summary->initialized_from = toString(start->from);
   if (points_not_finite_ > 0) summary->input_faults["points_not_finite"] = points_not_finite_;
-  for (const auto& [kind, what] : not_usable_) {
-    (kind == "imu_not_usable" ? summary->input_faults : summary->scans_rejected)[kind] += what.count;
-    summary->warnings.push_back(what.why + " (messages: " + std::to_string(what.count) + ")");
-  }
+  for (const auto& [kind, what] : imu_not_usable_) summary->input_faults[kind] += what.count;
+  const auto warn = [&](const NotUsableByKind& kinds) {
+    for (const auto& [kind, what] : kinds)
+      summary->warnings.push_back(what.why + " (messages: " + std::to_string(what.count) + ")");
+  };
+  for (const Radar& radar : radars_) warn(radar.not_usable);
+  warn(imu_not_usable_);
 }
 
 void BagPlayer::addImu(const sensor_msgs::Imu& message, Time record) {
@@ -95,35 +112,35 @@ void BagPlayer::addImu(const sensor_msgs::Imu& message, Time record) {
   try {
     imu = toImuMeasurement(message, config_.imu_topic);
   } catch (const std::exception& error) {
-    notUsable("imu_not_usable", error.what());
+    notUsable("imu_not_usable", error.what(), &imu_not_usable_);
     return;
   }
-  stamper_.addImu(imu.time, record);
+  for (Radar& radar : radars_) radar.stamper.addImu(imu.time, record);
   if (recorder_ != nullptr) recorder_->addImu(imu);
   if (const std::optional<NavigationState> state = odometry_.addImu(imu)) log_->addState(*state);
 }
 
-void BagPlayer::addCloud(const sensor_msgs::PointCloud2& message, Time record) {
-  ++scans_total_;
+void BagPlayer::addCloud(const sensor_msgs::PointCloud2& message, Time record, Radar& radar) {
+  ++radar.scans_total;
   DecodedScan decoded;
   try {
-    decoded = decode(message, format_);
+    decoded = decode(message, radar.format);
   } catch (const std::exception& error) {
-    notUsable("cloud_not_usable", "topic " + config_.radar_topic + ": " + error.what());
+    notUsable("cloud_not_usable", "topic " + radar.topic + ": " + error.what(), &radar.not_usable);
     return;
   }
   points_not_finite_ += decoded.dropped_not_finite;
-  ++scans_by_size_[decoded.cloud.size()];
+  ++radar.scans_by_size[decoded.cloud.size()];
   try {
-    stamper_.addScan(message.header.seq, toTime(message.header.stamp), record,
-                     toRadarScan(decoded.cloud, Time()));
+    radar.stamper.addScan(message.header.seq, toTime(message.header.stamp), record,
+                          toRadarScan(decoded.cloud, Time()));
   } catch (const std::exception& error) {
-    notUsable("stamp_zero", error.what());
+    notUsable("stamp_zero", error.what(), &radar.not_usable);
   }
 }
 
-void BagPlayer::notUsable(const std::string& kind, const std::string& why) {
-  ++not_usable_.try_emplace(kind, NotUsable{why, 0}).first->second.count;
+void BagPlayer::notUsable(const std::string& kind, const std::string& why, NotUsableByKind* kinds) {
+  ++kinds->try_emplace(kind, NotUsable{why, 0}).first->second.count;
 }
 
 void BagPlayer::account(ScanResult& result) {

@@ -8,6 +8,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "rio_t/odometry/batch_odometry.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
@@ -40,23 +41,35 @@ class BagPlayer {
     std::string why;  // the first of them
     std::uint64_t count = 0;
   };
+  using NotUsableByKind = std::map<std::string, NotUsable>;
+
+  /// What comes in from one radar.
+  struct Radar {
+    explicit Radar(const Config& config);
+
+    std::string topic, trigger_topic;  // the latter is empty if triggers are not read
+    PointCloudFormat format;
+    ScanStamper stamper;
+    std::uint64_t scans_total = 0;
+    std::map<std::size_t, std::uint64_t> scans_by_size;  // by their number of points
+    NotUsableByKind not_usable;
+  };
 
   void addImu(const sensor_msgs::Imu& message, Time record);
-  void addCloud(const sensor_msgs::PointCloud2& message, Time record);
+  void addCloud(const sensor_msgs::PointCloud2& message, Time record, Radar& radar);
+  void feed(std::vector<RadarScan> scans, std::size_t radar);
   /// One bad message among good ones is counted; `why` is told at the end, the first one of each kind.
-  void notUsable(const std::string& kind, const std::string& why);
+  static void notUsable(const std::string& kind, const std::string& why, NotUsableByKind* kinds);
   void account(ScanResult& result);
 
   const Config& config_;
-  const PointCloudFormat format_;
-  ScanStamper stamper_;
+  std::vector<Radar> radars_;  // by RadarScan::radar
   RadarInertialOdometry odometry_;
   RunLog* log_;
   BatchOdometry* recorder_;
   std::optional<RadarInertialOdometry::Start> start_;
-  std::uint64_t imu_count_ = 0, scans_total_ = 0, points_not_finite_ = 0, offset_steps_ = 0;
-  std::map<std::string, NotUsable> not_usable_;         // by kind
-  std::map<std::size_t, std::uint64_t> scans_by_size_;  // by their number of points
+  std::uint64_t imu_count_ = 0, points_not_finite_ = 0, offset_steps_ = 0;
+  NotUsableByKind imu_not_usable_;
 };
 
 }  // namespace rio_t

@@ -17,34 +17,90 @@
 namespace rio_t {
 namespace {
 
+/// "left/radar_topic", or without the name for one radar.
+std::string keyOf(const Config& radar, const std::string& key) {
+  return radar.radar_name.empty() ? key : radar.radar_name + "/" + key;
+}
+
+std::uint64_t countOf(const std::map<std::string, std::uint64_t>& counts, const char* name) {
+  const auto found = counts.find(name);
+  return found == counts.end() ? 0 : found->second;
+}
+
+std::string noMessages(const Config& radar) {
+  return "no messages on topic " + radar.radar_topic + " (" + keyOf(radar, "radar_topic") +
+         ") in the part played";
+}
+
+std::string allRejected(const RadarSummary& radar) {
+  std::string reasons;
+  for (const auto& [reason, count] : radar.scans_rejected)
+    reasons += (reasons.empty() ? "" : ", ") + reason + " " + std::to_string(count);
+  return "every one of the " + std::to_string(radar.scans_total) + " scans " +
+         (radar.name.empty() ? "" : "of radar " + radar.name + " ") + "was rejected: " + reasons;
+}
+
+/// A radar among several that gave nothing: the others carry the run, but it must be said.
+void warnOfSilentRadars(const Config& config, RunSummary* summary) {
+  if (summary->radars.size() < 2) return;
+  for (std::size_t k = 0; k < summary->radars.size(); ++k) {
+    const RadarSummary& radar = summary->radars[k];
+    if (radar.scans_used > 0) continue;
+    summary->warnings.push_back(radar.scans_total == 0 ? noMessages(config.radars[k]) : allRejected(radar));
+  }
+}
+
 void checkOutcome(const std::string& bag, const Config& config, const BagPlayer& player) {
   const RunSummary summary = player.summary();
   if (summary.imu_count == 0)
     throw bagError(bag, "no messages on topic " + config.imu_topic + " (imu_topic) in the part played");
-  if (summary.scans_total == 0)
-    throw bagError(bag, "no messages on topic " + config.radar_topic + " (radar_topic) in the part played");
+  if (summary.scansTotal() == 0) {
+    std::string topics;
+    for (const Config& radar : configsOfRadars(config))
+      topics += (topics.empty() ? "" : "; ") + noMessages(radar);
+    throw bagError(bag, topics);
+  }
   // Where none of a topic's messages can be used, what was wrong with the first is what is wrong.
-  const auto countOf = [](const std::map<std::string, std::uint64_t>& counts, const char* name) {
-    const auto found = counts.find(name);
-    return found == counts.end() ? 0 : found->second;
-  };
-  const std::uint64_t bad_scans =
-      countOf(summary.scans_rejected, "cloud_not_usable") + countOf(summary.scans_rejected, "stamp_zero");
-  if (bad_scans == summary.scans_total ||
-      countOf(summary.input_faults, "imu_not_usable") == summary.imu_count)
+  const std::map<std::string, std::uint64_t> rejected = summary.scansRejected();
+  if (countOf(rejected, "cloud_not_usable") + countOf(rejected, "stamp_zero") == summary.scansTotal())
     throw bagError(bag, summary.warnings.front());
+  if (countOf(summary.input_faults, "imu_not_usable") == summary.imu_count)
+    throw bagError(bag, summary.warnings.back());
   if (!player.odometry().initialized()) {
     throw bagError(bag, "never initialised, waited for " + player.odometry().waitingFor() + " (" +
                             std::to_string(summary.imu_count) + " IMU samples, init_duration " +
                             std::to_string(config.odometry.initialization.duration) + " s)");
   }
-  if (summary.scans_used > 0) return;
+  if (summary.scansUsed() > 0) return;
   std::string reasons;
-  for (const auto& [reason, count] : summary.scans_rejected) {
-    reasons += (reasons.empty() ? "" : ", ") + reason + " " + std::to_string(count);
+  for (const RadarSummary& radar : summary.radars)
+    reasons += (reasons.empty() ? "" : "; ") + allRejected(radar);
+  throw bagError(bag, reasons);
+}
+
+/// The topics to read, with the keys that name them.
+std::vector<Wanted> wantedTopics(const Config& config) {
+  std::vector<Wanted> wanted = {{"imu_topic", config.imu_topic, "sensor_msgs/Imu"}};
+  for (const Config& radar : configsOfRadars(config)) {
+    wanted.push_back({keyOf(radar, "radar_topic"), radar.radar_topic, "sensor_msgs/PointCloud2"});
+    if (radar.stamp_source == StampSource::kTrigger)
+      wanted.push_back({keyOf(radar, "trigger_topic"), radar.trigger_topic, "std_msgs/Header"});
   }
-  throw bagError(
-      bag, "every one of the " + std::to_string(summary.scans_total) + " scans was rejected: " + reasons);
+  return wanted;
+}
+
+/// Takes the offsets [s], by radar, off the stamps, so that those that are left start at zero.
+void takeOff(const std::vector<double>& offsets, Config* config) {
+  const auto of = [](double offset, Config* radar) {
+    radar->radar_stamp_shift -= offset;
+    radar->odometry.smoother.time_offset_initial = 0.0;
+  };
+  if (config->radars.empty()) return of(offsets.front(), config);
+  config->odometry.smoother.time_offset_initial = 0.0;
+  for (std::size_t k = 0; k < config->radars.size(); ++k) {
+    of(offsets[k], &config->radars[k]);
+    config->odometry.radars[k].time_offset_initial = 0.0;
+  }
 }
 
 TruthErrors errorsAgainst(const Trajectory& truth, const Trajectory& estimate) {
@@ -62,13 +118,11 @@ TruthErrors errorsAgainst(const Trajectory& truth, const Trajectory& estimate) {
 class BagJob {
  public:
   /// Opens and checks the bag, and makes the output folder.
-  explicit BagJob(const BagRun& run) : run_(run), started_(std::chrono::steady_clock::now()) {
+  explicit BagJob(const BagRun& run)
+      : run_(run), files_(runFiles(run.config)), started_(std::chrono::steady_clock::now()) {
     const Config& config = run.config;
     openBag(run.bag, &bag_);
-    std::vector<Wanted> wanted = {{"imu_topic", config.imu_topic, "sensor_msgs/Imu"},
-                                  {"radar_topic", config.radar_topic, "sensor_msgs/PointCloud2"}};
-    if (config.stamp_source == StampSource::kTrigger)
-      wanted.push_back({"trigger_topic", config.trigger_topic, "std_msgs/Header"});
+    std::vector<Wanted> wanted = wantedTopics(config);
     for (const Wanted& want : wanted) topics_.push_back(want.topic);
     const std::map<std::string, std::string> types = topicTypes(bag_);
     truth_in_bag_ = config.ground_truth.empty() && types.count(config.ground_truth_topic) != 0;
@@ -78,7 +132,7 @@ class BagJob {
     std::tie(begin_, end_) = playedSpan(run.bag, bag_, config);
     // Before the work, so that a wrong path costs no time.
     if (!config.ground_truth.empty()) truth_ = readTum(config.ground_truth);
-    output_.emplace(run.output_folder);
+    output_.emplace(run.output_folder, files_);
     started_ = std::chrono::steady_clock::now();
   }
 
@@ -96,7 +150,7 @@ class BagJob {
 
  private:
   RunSummary online() {
-    RunLog log(&*output_, 0.0);
+    RunLog log(run_.config, &*output_, nothingTakenOff());
     BagPlayer player(run_.config, &log, nullptr);
     play(player, run_.config, 0.0, 1.0);
     return finish(player.summary(), log, *output_);
@@ -107,14 +161,14 @@ class BagJob {
     BatchOptions batch_options;
     batch_options.max_iterations = run_.config.batch_max_iterations;
     BatchOdometry recorder(options, batch_options);
-    RunOutput online_output(run_.output_folder + "/online");
-    RunLog online_log(&online_output, 0.0);
+    RunOutput online_output(run_.output_folder + "/online", files_);
+    RunLog online_log(run_.config, &online_output, nothingTakenOff());
     BagPlayer player(run_.config, &online_log, &recorder);
     play(player, run_.config, 0.0, 0.9);
     finish(player.summary(), online_log, online_output);
 
     const BatchResult result = recorder.solve(*player.start());
-    RunLog log(&*output_, 0.0);
+    RunLog log(run_.config, &*output_, nothingTakenOff());
     for (const NavigationState& state : result.trajectory) log.addState(state);
     for (ScanResult scan : result.scans) log.addResult(scan);
     RunSummary summary;
@@ -131,31 +185,34 @@ class BagJob {
   /// the data are the same in each pass, and a prior from the pass before would count them twice.
   RunSummary refine() {
     const int passes = run_.config.refine_passes;
-    std::vector<double> offsets, sigmas;
-    double taken_off = 0.0;  // [s]
+    std::vector<double> taken_off = nothingTakenOff();  // [s] by radar
+    std::vector<std::vector<double>> offsets(taken_off.size()), sigmas(taken_off.size());
     for (int pass = 1;; ++pass) {
       Config config = run_.config;
-      config.radar_stamp_shift -= taken_off;
-      if (pass > 1) config.odometry.smoother.time_offset_initial = 0.0;
+      if (pass > 1) takeOff(taken_off, &config);
       const bool last = pass == passes;
       std::optional<RunOutput> earlier;
-      if (!last) earlier.emplace(run_.output_folder + "/pass_" + std::to_string(pass));
+      if (!last) earlier.emplace(run_.output_folder + "/pass_" + std::to_string(pass), files_);
       RunOutput& output = last ? *output_ : *earlier;
-      RunLog log(&output, taken_off);
+      RunLog log(config, &output, taken_off);
       BagPlayer player(config, &log, nullptr);
       play(player, config, (pass - 1.0) / passes, static_cast<double>(pass) / passes);
       RunSummary summary = player.summary();
-      offsets.push_back(taken_off = summary.final_offset_s);
-      sigmas.push_back(summary.final_offset_sigma_s);
-      if (last) {
-        summary.mode = "refine";
-        summary.pass_offsets_s = offsets;
-        summary.pass_offset_sigmas_s = sigmas;
+      for (std::size_t k = 0; k < taken_off.size(); ++k) {
+        RadarSummary& radar = summary.radars[k];
+        offsets[k].push_back(taken_off[k] = radar.final_offset_s);
+        sigmas[k].push_back(radar.final_offset_sigma_s);
+        if (!last) continue;
+        radar.pass_offsets_s = offsets[k];
+        radar.pass_offset_sigmas_s = sigmas[k];
       }
+      if (last) summary.mode = "refine";
       summary = finish(std::move(summary), log, output);
       if (last) return summary;
     }
   }
+
+  std::vector<double> nothingTakenOff() const { return std::vector<double>(files_.radars.size(), 0.0); }
 
   /// The whole bag; progress goes from `from` to `to`.
   void play(BagPlayer& player, const Config& config, double from, double to) {
@@ -180,6 +237,7 @@ class BagJob {
   RunSummary finish(RunSummary summary, RunLog& log, RunOutput& output) {
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - started_;
     if (&output == &*output_ && run_.progress) run_.progress(1.0);
+    warnOfSilentRadars(run_.config, &summary);
     summary.estimation_seconds = took.count();
     summary.realtime_factor = (end_ - begin_).toSec() / took.count();
     const Trajectory trajectory = log.takeTrajectory();
@@ -200,6 +258,7 @@ class BagJob {
   }
 
   const BagRun& run_;
+  const RunFiles files_;
   rosbag::Bag bag_;
   std::vector<std::string> topics_;
   ros::Time begin_, end_;

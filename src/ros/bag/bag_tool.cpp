@@ -20,9 +20,12 @@ const char* const kHelp =
     "  --bag BAG               bag with IMU and radar\n"
     "  --config NAME_OR_PATH   irs, ti_mmwave, ... of the package's config/, or a YAML file\n"
     "  --output-dir FOLDER     gets trajectory.txt, trajectory_optimized.txt (TUM), navigation.csv,\n"
-    "                          time_offset.csv, ego_velocity.csv, biases.csv, summary.yaml\n"
+    "                          time_offset.csv, ego_velocity.csv, biases.csv, summary.yaml;\n"
+    "                          extrinsics.csv if they are estimated; with several radars one each of\n"
+    "                          these and of the tables of time offset and ego-velocity, with their names\n"
     "  --set key=value         sets a parameter on top of the configuration, e.g. --set "
     "stamp_source=arrival\n"
+    "                          left/radar_topic=/scan sets it for the radar named left\n"
     "                          mode=batch solves the whole bag at once, mode=refine plays it in passes\n"
     "  --print-config          prints every parameter with unit, range and meaning\n"
     "  --help                  prints this\n";

@@ -1,4 +1,6 @@
+#include <Eigen/Geometry>
 #include <cmath>
+#include <functional>
 #include <string>
 
 #include "rio_t/ros/bag/bag_runner.h"
@@ -24,43 +26,74 @@ std::string describeStep(const DopplerStep& step) {
   return (step.value > 0.0 ? decimal(step.value, 3) + " m/s" : std::string("none")) + ", from the data";
 }
 
+std::string describeScans(std::uint64_t used, std::uint64_t total,
+                          const std::map<std::string, std::uint64_t>& rejected) {
+  std::string scans = std::to_string(used) + " of " + std::to_string(total) + " used";
+  for (const auto& [reason, count] : rejected) scans += ", " + std::to_string(count) + " " + reason;
+  return scans;
+}
+
+/// "1.20 -0.30 0.05", in the unit of which there are `per` in one of `v`.
+std::string decimals(const Eigen::Vector3d& v, double per, int count) {
+  return decimal(per * v.x(), count) + " " + decimal(per * v.y(), count) + " " + decimal(per * v.z(), count);
+}
+
+using Row = std::function<void(const std::string& name, const std::string& value)>;
+
+void describePasses(const RadarSummary& radar, const Row& row) {
+  if (radar.pass_offsets_s.empty()) return;
+  std::string offsets;
+  for (const double offset : radar.pass_offsets_s)
+    offsets += (offsets.empty() ? "" : ", ") + decimal(1e3 * offset, 2);
+  row("after passes", offsets + " ms");
+}
+
+/// The mounting as people can compare it: how far it went from the one told, by the axes of the IMU.
+void describeExtrinsics(const ExtrinsicsSummary& extrinsics, const Row& row) {
+  constexpr double kDegreesPerRadian = 180.0 / 3.14159265358979323846;
+  const Eigen::AngleAxisd turn(extrinsics.T_IR.q_IR * extrinsics.told.q_IR.conjugate());
+  row("turned by", decimals(turn.angle() * turn.axis(), kDegreesPerRadian, 2) +
+                       " deg about x y z of the IMU, sigma " +
+                       decimals(extrinsics.rotation_sigma, kDegreesPerRadian, 2) + " deg");
+  if (extrinsics.translation_sigma.isZero()) return;
+  row("moved by", decimals(extrinsics.T_IR.l_I - extrinsics.told.l_I, 1e3, 1) + " mm, sigma " +
+                      decimals(extrinsics.translation_sigma, 1e3, 1) + " mm");
+}
+
+void describeRadar(const RadarSummary& radar, const Row& row) {
+  row("time offset", decimal(1e3 * radar.final_offset_s, 2) + " ms, sigma " +
+                         decimal(1e3 * radar.final_offset_sigma_s, 2) + " ms");
+  if (radar.extrinsics) describeExtrinsics(*radar.extrinsics, row);
+  row("radar noise", "Doppler " + decimal(std::sqrt(radar.noise.doppler), 3) + " m/s, azimuth " +
+                         decimal(std::sqrt(radar.noise.azimuth), 3) + " rad, elevation " +
+                         decimal(std::sqrt(radar.noise.elevation), 3) + " rad");
+  row("Doppler step", describeStep(radar.doppler_step));
+}
+
 }  // namespace
 
 std::string describeRun(const RunSummary& summary, const std::string& files) {
   std::string table;
-  const auto row = [&](const char* name, const std::string& value) {
-    table += "  " + std::string(name) + std::string(16 - std::string(name).size(), ' ') + value + "\n";
+  const auto row = [&](const std::string& name, const std::string& value) {
+    table += "  " + name + std::string(name.size() < 15 ? 16 - name.size() : 1, ' ') + value + "\n";
   };
   const auto percent = [&](double metres) {
     return summary.path_length_m > 0.1 ? " (" + decimal(100.0 * metres / summary.path_length_m, 2) + " %)"
                                        : std::string();
   };
-  std::string scans =
-      std::to_string(summary.scans_used) + " of " + std::to_string(summary.scans_total) + " used";
-  for (const auto& [reason, count] : summary.scans_rejected)
-    scans += ", " + std::to_string(count) + " " + reason;
   if (summary.batch) {
     row("batch", (summary.batch->converged ? "converged after " : "NOT converged after ") +
                      std::to_string(summary.batch->iterations) + " iterations, nodes placed " +
                      std::to_string(summary.batch->placements) + " times, " +
                      std::to_string(summary.batch->scans_readmitted) + " scans taken back");
   }
-  if (!summary.pass_offsets_s.empty()) {
-    std::string offsets;
-    for (const double offset : summary.pass_offsets_s)
-      offsets += (offsets.empty() ? "" : ", ") + decimal(1e3 * offset, 2);
-    row("after passes", offsets + " ms");
-  }
+  const bool one_radar = summary.radars.size() == 1;
+  if (one_radar) describePasses(summary.radars.front(), row);
   row("path", decimal(summary.path_length_m, 2) + " m");
   row("end to start", decimal(summary.end_to_start_2d_m, 3) + " m" + percent(summary.end_to_start_2d_m) +
                           " horizontal, " + decimal(summary.end_to_start_3d_m, 3) + " m" +
                           percent(summary.end_to_start_3d_m) + " in 3D");
-  row("time offset", decimal(1e3 * summary.final_offset_s, 2) + " ms, sigma " +
-                         decimal(1e3 * summary.final_offset_sigma_s, 2) + " ms");
-  row("radar noise", "Doppler " + decimal(std::sqrt(summary.radar_noise.doppler), 3) + " m/s, azimuth " +
-                         decimal(std::sqrt(summary.radar_noise.azimuth), 3) + " rad, elevation " +
-                         decimal(std::sqrt(summary.radar_noise.elevation), 3) + " rad");
-  row("Doppler step", describeStep(summary.radar_doppler_step));
+  if (one_radar) describeRadar(summary.radars.front(), row);
   if (summary.truth) {
     std::string errors = "ATE " + decimal(summary.truth->ate_m, 3) + " m";
     if (summary.truth->t_rel) {
@@ -69,7 +102,7 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
     }
     row("against truth", errors);
   }
-  row("scans", scans);
+  row("scans", describeScans(summary.scansUsed(), summary.scansTotal(), summary.scansRejected()));
   std::uint64_t windows = 0;
   for (const auto& [reason, count] : summary.solver_terminations) windows += count;
   std::string unsolved;
@@ -90,6 +123,14 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
     row("DO NOT TRUST", "diverged " + std::to_string(summary.divergences) + " times, re-initialised " +
                             std::to_string(summary.reinitializations) + " times, at the end " +
                             summary.health_at_end);
+  }
+  for (const RadarSummary& radar : summary.radars) {
+    if (one_radar) break;
+    table += "  radar " + radar.name + "\n";
+    const auto indented = [&](const std::string& name, const std::string& value) { row("  " + name, value); };
+    describePasses(radar, indented);
+    describeRadar(radar, indented);
+    indented("scans", describeScans(radar.scans_used, radar.scans_total, radar.scans_rejected));
   }
   row("speed", decimal(summary.estimation_seconds, 2) + " s, " + decimal(summary.realtime_factor, 0) +
                    " times real time");

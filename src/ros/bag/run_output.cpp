@@ -2,10 +2,13 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <filesystem>
+#include <initializer_list>
 #include <locale>
+#include <regex>
 #include <sstream>
 #include <stdexcept>
 #include <system_error>
@@ -49,17 +52,80 @@ std::vector<std::string> fixedTexts(const std::vector<double>& values, int decim
   return texts;
 }
 
-std::string summaryText(const RunSummary& summary) {
-  YAML::Emitter yaml;
-  const auto line = [&](const char* key, const auto& value) {
-    yaml << YAML::Key << key << YAML::Value << YAML::Flow << value;
-  };
-  yaml << YAML::BeginMap;
+std::vector<std::string> fixedTexts(const Eigen::Vector3d& v, int decimals) {
+  return fixedTexts(std::vector<double>{v.x(), v.y(), v.z()}, decimals);
+}
+
+std::vector<std::string> fixedTexts(const Eigen::Quaterniond& q, int decimals) {
+  return fixedTexts(std::vector<double>{q.x(), q.y(), q.z(), q.w()}, decimals);
+}
+
+/// "_left"; empty if there is but one radar.
+std::string suffixOf(const std::string& radar) { return radar.empty() ? "" : "_" + radar; }
+
+/// The lines of summary.yaml, in order.
+class SummaryLines {
+ public:
+  SummaryLines() { yaml_ << YAML::BeginMap; }
+  template <typename T>
+  void add(const std::string& key, const T& value) {
+    yaml_ << YAML::Key << key << YAML::Value << YAML::Flow << value;
+  }
+  void beginMap(const std::string& key) { add(key, YAML::BeginMap); }
+  void endMap() { yaml_ << YAML::EndMap; }
+  std::string text() {
+    yaml_ << YAML::EndMap;
+    return std::string(yaml_.c_str()) + "\n";
+  }
+
+ private:
+  YAML::Emitter yaml_;
+};
+
+void addEstimates(SummaryLines& lines, const RadarSummary& radar) {
+  const std::string suffix = suffixOf(radar.name);
+  lines.add("final_offset_s" + suffix, fixedText(radar.final_offset_s, 9));
+  lines.add("final_offset_sigma_s" + suffix, fixedText(radar.final_offset_sigma_s, 9));
+  if (!radar.extrinsics) return;
+  const ExtrinsicsSummary& extrinsics = *radar.extrinsics;
+  lines.add("told_extrinsics_translation" + suffix, fixedTexts(extrinsics.told.l_I, 9));
+  lines.add("told_extrinsics_rotation_xyzw" + suffix, fixedTexts(extrinsics.told.q_IR, 9));
+  lines.add("final_extrinsics_translation" + suffix, fixedTexts(extrinsics.T_IR.l_I, 9));
+  lines.add("final_extrinsics_translation_sigma" + suffix, fixedTexts(extrinsics.translation_sigma, 9));
+  lines.add("final_extrinsics_rotation_xyzw" + suffix, fixedTexts(extrinsics.T_IR.q_IR, 9));
+  lines.add("final_extrinsics_rotation_sigma" + suffix, fixedTexts(extrinsics.rotation_sigma, 9));
+}
+
+void addMeasured(SummaryLines& lines, const RadarSummary& radar) {
+  const std::string suffix = suffixOf(radar.name);
+  lines.beginMap("radar_noise" + suffix);  // standard deviations [m/s, rad, rad]
+  lines.add("doppler", fixedText(std::sqrt(radar.noise.doppler), 4));
+  lines.add("azimuth", fixedText(std::sqrt(radar.noise.azimuth), 4));
+  lines.add("elevation", fixedText(std::sqrt(radar.noise.elevation), 4));
+  lines.endMap();
+  lines.add("radar_doppler_step" + suffix, fixedText(radar.doppler_step.value, 6));  // [m/s]
+  lines.add("radar_doppler_step_from" + suffix, toString(radar.doppler_step.source));
+  lines.beginMap("radar_points_per_scan" + suffix);
+  lines.add("p10", radar.points_per_scan[0]);
+  lines.add("p50", radar.points_per_scan[1]);
+  lines.add("p90", radar.points_per_scan[2]);
+  lines.endMap();
+}
+
+std::string summaryText(const RunSummary& summary, const std::vector<std::string>& saved) {
+  SummaryLines lines;
+  const auto line = [&](const char* key, const auto& value) { lines.add(key, value); };
   line("mode", summary.mode);
   line("imu_count", summary.imu_count);
-  line("scans_total", summary.scans_total);
-  line("scans_used", summary.scans_used);
-  line("scans_rejected", summary.scans_rejected);
+  line("scans_total", summary.scansTotal());
+  line("scans_used", summary.scansUsed());
+  line("scans_rejected", summary.scansRejected());
+  for (const RadarSummary& radar : summary.radars) {
+    if (radar.name.empty()) continue;  // the only one
+    lines.add("scans_total_" + radar.name, radar.scans_total);
+    lines.add("scans_used_" + radar.name, radar.scans_used);
+    lines.add("scans_rejected_" + radar.name, radar.scans_rejected);
+  }
   line("input_faults", summary.input_faults);
   line("solver_terminations", summary.solver_terminations);
   line("initialized_from", summary.initialized_from.empty() ? "none" : summary.initialized_from);
@@ -69,27 +135,16 @@ std::string summaryText(const RunSummary& summary) {
   line("path_length_m", fixedText(summary.path_length_m, 6));
   line("end_to_start_2d_m", fixedText(summary.end_to_start_2d_m, 6));
   line("end_to_start_3d_m", fixedText(summary.end_to_start_3d_m, 6));
-  line("final_offset_s", fixedText(summary.final_offset_s, 9));
-  line("final_offset_sigma_s", fixedText(summary.final_offset_sigma_s, 9));
-  line("imu_noise", YAML::BeginMap);
+  for (const RadarSummary& radar : summary.radars) addEstimates(lines, radar);
+  lines.beginMap("imu_noise");
   line("accel", fixedText(summary.imu_noise.accel_density, 6));
   line("gyro", fixedText(summary.imu_noise.gyro_density, 6));
-  yaml << YAML::EndMap;
-  line("radar_noise", YAML::BeginMap);  // standard deviations [m/s, rad, rad]
-  line("doppler", fixedText(std::sqrt(summary.radar_noise.doppler), 4));
-  line("azimuth", fixedText(std::sqrt(summary.radar_noise.azimuth), 4));
-  line("elevation", fixedText(std::sqrt(summary.radar_noise.elevation), 4));
-  yaml << YAML::EndMap;
-  line("radar_doppler_step", fixedText(summary.radar_doppler_step.value, 6));  // [m/s]
-  line("radar_doppler_step_from", toString(summary.radar_doppler_step.source));
-  line("radar_points_per_scan", YAML::BeginMap);
-  line("p10", summary.radar_points_per_scan[0]);
-  line("p50", summary.radar_points_per_scan[1]);
-  line("p90", summary.radar_points_per_scan[2]);
-  yaml << YAML::EndMap;
-  if (!summary.pass_offsets_s.empty()) {
-    line("pass_offsets_s", fixedTexts(summary.pass_offsets_s, 9));
-    line("pass_offset_sigmas_s", fixedTexts(summary.pass_offset_sigmas_s, 9));
+  lines.endMap();
+  for (const RadarSummary& radar : summary.radars) addMeasured(lines, radar);
+  for (const RadarSummary& radar : summary.radars) {
+    if (radar.pass_offsets_s.empty()) continue;
+    lines.add("pass_offsets_s" + suffixOf(radar.name), fixedTexts(radar.pass_offsets_s, 9));
+    lines.add("pass_offset_sigmas_s" + suffixOf(radar.name), fixedTexts(radar.pass_offset_sigmas_s, 9));
   }
   if (summary.batch) {
     line("batch_iterations", summary.batch->iterations);
@@ -102,15 +157,68 @@ std::string summaryText(const RunSummary& summary) {
     if (summary.truth->t_rel) line("t_rel", fixedText(*summary.truth->t_rel, 9));
     if (summary.truth->r_rel_deg) line("r_rel_deg", fixedText(*summary.truth->r_rel_deg, 9));
   }
-  line("saved", RunOutput::fileNames());
+  line("saved", saved);
   // All above is the same in every run; these are not.
   line("estimation_seconds", fixedText(summary.estimation_seconds, 6));
   line("realtime_factor", fixedText(summary.realtime_factor, 3));
-  yaml << YAML::EndMap;
-  return std::string(yaml.c_str()) + "\n";
+  return lines.text();
+}
+
+const char* const kTimeOffsetHeader = "stamp,offset_s,sigma_s\n";
+const char* const kEgoVelocityHeader = "stamp,vx,vy,vz,sigma_x,sigma_y,sigma_z,inliers,points,status\n";
+const char* const kExtrinsicsHeader =
+    "stamp,x,y,z,qx,qy,qz,qw,sigma_x,sigma_y,sigma_z,sigma_rx,sigma_ry,sigma_rz\n";
+
+/// Whether a run wrote it, or began to.
+bool isEmptyOrBeginsWith(const std::filesystem::path& path, const std::string& header) {
+  std::string start(header.size(), '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(start.data(), static_cast<std::streamsize>(start.size()));
+  return file.gcount() == 0 || start == header;
 }
 
 }  // namespace
+
+std::uint64_t RunSummary::scansTotal() const {
+  std::uint64_t total = 0;
+  for (const RadarSummary& radar : radars) total += radar.scans_total;
+  return total;
+}
+
+std::uint64_t RunSummary::scansUsed() const {
+  std::uint64_t used = 0;
+  for (const RadarSummary& radar : radars) used += radar.scans_used;
+  return used;
+}
+
+std::map<std::string, std::uint64_t> RunSummary::scansRejected() const {
+  std::map<std::string, std::uint64_t> rejected;
+  for (const RadarSummary& radar : radars) {
+    for (const auto& [reason, count] : radar.scans_rejected) rejected[reason] += count;
+  }
+  return rejected;
+}
+
+std::vector<std::string> RunFiles::names() const {
+  std::vector<std::string> names = {"trajectory.txt", "trajectory_optimized.txt", "navigation.csv"};
+  for (const std::string& radar : radars) {
+    names.push_back("time_offset" + suffixOf(radar) + ".csv");
+    names.push_back("ego_velocity" + suffixOf(radar) + ".csv");
+    if (extrinsics) names.push_back("extrinsics" + suffixOf(radar) + ".csv");
+  }
+  names.emplace_back("biases.csv");
+  names.emplace_back("summary.yaml");
+  return names;
+}
+
+RunFiles runFiles(const Config& config) {
+  RunFiles files;
+  files.extrinsics = config.odometry.smoother.estimate_extrinsics != EstimateExtrinsics::kNone;
+  if (config.radars.size() < 2) return files;
+  files.radars.clear();
+  for (const Config& radar : config.radars) files.radars.push_back(radar.radar_name);
+  return files;
+}
 
 void appendFixed(std::string* text, double value, int decimals) {
   if (!std::isfinite(value)) {
@@ -168,31 +276,53 @@ void RunOutput::File::endLine() {
   if (buffer.size() > kBufferSize) flush();
 }
 
-std::vector<std::string> RunOutput::fileNames() {
-  return {"trajectory.txt",  "trajectory_optimized.txt", "navigation.csv",
-          "time_offset.csv", "ego_velocity.csv",         "biases.csv",
-          "summary.yaml"};
-}
-
-RunOutput::RunOutput(const std::string& folder) : folder_(folder) {
+RunOutput::RunOutput(const std::string& folder, const RunFiles& files) : folder_(folder), files_(files) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (!std::filesystem::is_directory(folder)) {
     throw std::runtime_error("output folder " + folder + ": cannot be made (" +
                              (error ? error.message() : "a file of that name exists") + ")");
   }
-  std::filesystem::remove(folder + "/summary.yaml", error);
+  removeOfEarlierRuns();
   trajectory_.open(folder + "/trajectory.txt");
   optimized_.open(folder + "/trajectory_optimized.txt");
   navigation_.open(folder + "/navigation.csv");
-  time_offset_.open(folder + "/time_offset.csv");
-  ego_velocity_.open(folder + "/ego_velocity.csv");
   biases_.open(folder + "/biases.csv");
   navigation_.buffer =
       "stamp,vx,vy,vz,sigma_px,sigma_py,sigma_pz,sigma_rx,sigma_ry,sigma_rz,sigma_vx,sigma_vy,sigma_vz\n";
-  time_offset_.buffer = "stamp,offset_s,sigma_s\n";
-  ego_velocity_.buffer = "stamp,vx,vy,vz,sigma_x,sigma_y,sigma_z,inliers,points,status\n";
   biases_.buffer = "stamp,bgx,bgy,bgz,bax,bay,baz\n";
+  for (const std::string& name : files.radars) {
+    RadarOutput& radar = radars_.emplace_back();
+    radar.time_offset.open(folder + "/time_offset" + suffixOf(name) + ".csv");
+    radar.ego_velocity.open(folder + "/ego_velocity" + suffixOf(name) + ".csv");
+    radar.time_offset.buffer = kTimeOffsetHeader;
+    radar.ego_velocity.buffer = kEgoVelocityHeader;
+    if (!files.extrinsics) continue;
+    radar.extrinsics.emplace().open(folder + "/extrinsics" + suffixOf(name) + ".csv");
+    radar.extrinsics->buffer = kExtrinsicsHeader;
+  }
+}
+
+void RunOutput::removeOfEarlierRuns() const {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  fs::remove(folder_ + "/summary.yaml", error);
+  static const std::regex of_radar("(time_offset|ego_velocity|extrinsics)(_[a-z0-9_]+)?\\.csv");
+  const std::vector<std::string> own = files_.names();
+  std::vector<fs::path> earlier;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) {
+    const std::string name = entry.path().filename().string();
+    std::smatch kind;
+    if (name.size() > 255 || !std::regex_match(name, kind, of_radar) || !entry.is_regular_file(error))
+      continue;
+    if (std::find(own.begin(), own.end(), name) != own.end()) continue;
+    const char* const header = kind[1] == "time_offset"    ? kTimeOffsetHeader
+                               : kind[1] == "ego_velocity" ? kEgoVelocityHeader
+                                                           : kExtrinsicsHeader;
+    // A user's own time_offset_truth.csv stays.
+    if (isEmptyOrBeginsWith(entry.path(), header)) earlier.push_back(entry.path());
+  }
+  for (const fs::path& path : earlier) fs::remove(path, error);
 }
 
 void RunOutput::addPose(File& file, Time time, const Eigen::Vector3d& p_W, const Eigen::Quaterniond& q_WI) {
@@ -227,23 +357,25 @@ void RunOutput::addResult(const ScanResult& result) {
   for (const StampedPose& pose : result.left_window) addPose(optimized_, pose.time, pose.p_W, pose.q_WI);
   if (!result.used && result.rejected_because.empty()) return;  // only carries the last poses
 
-  std::string* line = &ego_velocity_.buffer;
+  RadarOutput& radar = radars_.at(result.scan.radar);
+  std::string* line = &radar.ego_velocity.buffer;
   appendStamp(line, result.scan.stamp);
   appendVector(line, result.ego_velocity.v_R, 6);
   appendVector(line, result.ego_velocity.covariance.diagonal().cwiseMax(0.0).cwiseSqrt(), 6);
   *line += ',' + std::to_string(result.ego_velocity.inliers.size()) + ',' +
            std::to_string(result.ego_velocity.points.size()) + ',' +
            (result.used ? toString(result.ego_velocity.status) : result.rejected_because);
-  ego_velocity_.endLine();
+  radar.ego_velocity.endLine();
   if (!result.updated) return;
 
-  line = &time_offset_.buffer;
+  line = &radar.time_offset.buffer;
   appendStamp(line, result.scan.stamp);
   line->push_back(',');
   appendFixed(line, result.time_offset, 9);
   line->push_back(',');
   appendFixed(line, result.time_offset_sigma, 9);
-  time_offset_.endLine();
+  radar.time_offset.endLine();
+  if (radar.extrinsics) addExtrinsics(*radar.extrinsics, result);
 
   line = &biases_.buffer;
   appendStamp(line, result.scan.stamp);
@@ -252,12 +384,30 @@ void RunOutput::addResult(const ScanResult& result) {
   biases_.endLine();
 }
 
+void RunOutput::addExtrinsics(File& file, const ScanResult& result) {
+  const Eigen::Quaterniond& q_IR = result.T_IR.q_IR;
+  const Eigen::Matrix<double, 6, 1> sigmas = result.T_IR_covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  std::string* line = &file.buffer;
+  appendStamp(line, result.scan.stamp);
+  appendVector(line, result.T_IR.l_I, 9);
+  appendVector(line, q_IR.vec(), 9);
+  line->push_back(',');
+  appendFixed(line, q_IR.w(), 9);
+  appendVector(line, sigmas.head<3>(), 9);
+  appendVector(line, sigmas.tail<3>(), 9);
+  file.endLine();
+}
+
 void RunOutput::finish(const RunSummary& summary) {
-  for (File* file : {&trajectory_, &optimized_, &navigation_, &time_offset_, &ego_velocity_, &biases_})
-    file->flush();
+  for (File* file : {&trajectory_, &optimized_, &navigation_, &biases_}) file->flush();
+  for (RadarOutput& radar : radars_) {
+    radar.time_offset.flush();
+    radar.ego_velocity.flush();
+    if (radar.extrinsics) radar.extrinsics->flush();
+  }
   File yaml;
   yaml.open(folder_ + "/summary.yaml");
-  yaml.buffer = summaryText(summary);
+  yaml.buffer = summaryText(summary, files_.names());
   yaml.flush();
 }
 

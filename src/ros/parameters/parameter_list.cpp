@@ -207,10 +207,10 @@ void ParameterList::word(const std::string& key, const std::vector<std::string>&
 void ParameterList::radarNames(const std::string& key, std::vector<Config>& member,
                                const std::string& meaning) {
   add(
-      key, "", "a list of different names of lower case letters, digits and _", meaning,
+      key, "", "a list of at most 16 different names of lower case letters, digits and _", meaning,
       [&member](const ParameterValue& value) {
         const ParameterValue::List* list = std::get_if<ParameterValue::List>(&value.data);
-        if (list == nullptr) return false;
+        if (list == nullptr || list->size() > 16) return false;
         std::vector<Config> radars;
         for (const ParameterValue& element : *list) {
           const std::string* name = std::get_if<std::string>(&element.data);

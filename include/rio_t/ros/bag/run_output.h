@@ -10,6 +10,7 @@
 
 #include "rio_t/evaluation/trajectory.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
+#include "rio_t/ros/parameters/parameters.h"
 
 namespace rio_t {
 
@@ -28,17 +29,36 @@ struct BatchSummary {
   std::uint64_t scans_readmitted = 0;  ///< rejected by the online gate, taken by the batch
 };
 
-/// What a run comes to; `summary.yaml` has one key for each member.
-struct RunSummary {
-  std::string mode = "online";
-  std::vector<double> pass_offsets_s;        ///< after each pass; only with mode refine
-  std::vector<double> pass_offset_sigmas_s;  ///< likewise
-  std::optional<BatchSummary> batch;         ///< only with mode batch
-  std::uint64_t imu_count = 0;
+/// Where the estimate of a mounting started, and where it ended.
+struct ExtrinsicsSummary {
+  Extrinsics told, T_IR;
+  Eigen::Vector3d translation_sigma = Eigen::Vector3d::Zero();  ///< [m]; zero where not estimated
+  Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Zero();     ///< [rad] about the axes of I
+};
+
+/// What a run comes to for one radar. With several radars its keys in `summary.yaml` end in its name.
+struct RadarSummary {
+  std::string name;               ///< empty if there is but one
   std::uint64_t scans_total = 0;  ///< used and rejected
   std::uint64_t scans_used = 0;
   std::map<std::string, std::uint64_t> scans_rejected;  ///< by reason
-  std::map<std::string, std::uint64_t> input_faults;    ///< by name
+  double final_offset_s = 0.0;
+  double final_offset_sigma_s = 0.0;
+  std::optional<ExtrinsicsSummary> extrinsics;  ///< only where they are estimated
+  PointVariances noise;      ///< of its points, as learned; the file has its standard deviations
+  DopplerStep doppler_step;  ///< as known at the end; the file has its source as a key of its own
+  std::array<std::uint64_t, 3> points_per_scan = {};  ///< quantiles of 10, 50 and 90 % of the scans
+  std::vector<double> pass_offsets_s;                 ///< after each pass; only with mode refine
+  std::vector<double> pass_offset_sigmas_s;           ///< likewise
+};
+
+/// What a run comes to; `summary.yaml` has one key for each member.
+struct RunSummary {
+  std::string mode = "online";
+  std::optional<BatchSummary> batch;                                ///< only with mode batch
+  std::vector<RadarSummary> radars = std::vector<RadarSummary>(1);  ///< in the order of the configuration
+  std::uint64_t imu_count = 0;
+  std::map<std::string, std::uint64_t> input_faults;  ///< by name
   /// Why the solver stopped: windows by reason; with mode batch the one solve of the whole run.
   std::map<std::string, std::uint64_t> solver_terminations;
   std::vector<std::string> warnings;  ///< for people; not in the file
@@ -49,39 +69,52 @@ struct RunSummary {
   double path_length_m = 0.0;      ///< of the optimised poses
   double end_to_start_2d_m = 0.0;  ///< of the causal trajectory, horizontal
   double end_to_start_3d_m = 0.0;
-  double final_offset_s = 0.0;
-  double final_offset_sigma_s = 0.0;
   MeasuredImuNoise imu_noise;  ///< that the IMU showed at the end
-  PointVariances radar_noise;  ///< of the radar's points, as learned; the file has its standard deviations
-  DopplerStep radar_doppler_step;  ///< as known at the end; the file has its source as a key of its own
-  std::array<std::uint64_t, 3> radar_points_per_scan = {};  ///< quantiles of 10, 50 and 90 % of the scans
   std::optional<TruthErrors> truth;
   double estimation_seconds = 0.0;  ///< reading, decoding and estimating, wall clock
   double realtime_factor = 0.0;     ///< seconds of data in a second of that
+
+  // Over all radars.
+  std::uint64_t scansTotal() const;
+  std::uint64_t scansUsed() const;
+  std::map<std::string, std::uint64_t> scansRejected() const;
 };
+
+/// Which files a run writes: those of a radar carry its name, unless there is but one.
+struct RunFiles {
+  std::vector<std::string> radars = {""};  ///< names, as in RadarSummary
+  bool extrinsics = false;                 ///< they are estimated
+
+  std::vector<std::string> names() const;
+};
+/// The files of a run with this configuration.
+RunFiles runFiles(const Config& config);
 
 /// Appends `value` with that many decimals (at most 12), with a point whatever the locale; "nan", "inf".
 void appendFixed(std::string* text, double value, int decimals);
 /// Appends seconds with nine decimals, exactly.
 void appendStamp(std::string* text, Time time);
 
-/// The files of a run: trajectory.txt and trajectory_optimized.txt (TUM), navigation.csv, time_offset.csv,
-/// ego_velocity.csv, biases.csv, summary.yaml. The same calls write the same bytes.
+/// The files of a run: trajectory.txt and trajectory_optimized.txt (TUM), navigation.csv, biases.csv,
+/// summary.yaml; of each radar time_offset.csv, ego_velocity.csv and, if they are estimated, extrinsics.csv.
+/// With several radars these carry their names: time_offset_left.csv. The same calls write the same bytes.
 ///
 /// navigation.csv has the velocity that goes with trajectory.txt, and how sure the estimate is of itself, ten
 /// times a second: v_W [m/s], and standard deviations of p_W [m], of a rotation about the axes of W [rad],
 /// and of v_W [m/s].
+///
+/// extrinsics.csv has T_IR, and standard deviations of its translation [m] and of a turn about the axes of
+/// the IMU [rad]; zero where it is not estimated.
 class RunOutput {
  public:
-  /// Makes the folder and opens the files; throws std::runtime_error naming what cannot be written. A summary
-  /// of an earlier run is removed, so that one of a run that failed is never taken for its own.
-  explicit RunOutput(const std::string& folder);
+  /// Makes the folder and opens the files; throws std::runtime_error naming what cannot be written. The
+  /// summary of an earlier run and files of radars that this run has not are removed, so that they are never
+  /// taken for its own.
+  explicit RunOutput(const std::string& folder, const RunFiles& files = {});
 
   void addState(const NavigationState& state);
   void addResult(const ScanResult& result);
   void finish(const RunSummary& summary);  ///< throws std::runtime_error where the disk is full
-
-  static std::vector<std::string> fileNames();
 
  private:
   /// A file with a large buffer of its own.
@@ -95,10 +128,19 @@ class RunOutput {
     void endLine();
   };
 
+  struct RadarOutput {
+    File time_offset, ego_velocity;
+    std::optional<File> extrinsics;
+  };
+
+  void removeOfEarlierRuns() const;
+  static void addExtrinsics(File& file, const ScanResult& result);
   void addPose(File& file, Time time, const Eigen::Vector3d& p_W, const Eigen::Quaterniond& q_WI);
 
   std::string folder_;
-  File trajectory_, optimized_, navigation_, time_offset_, ego_velocity_, biases_;
+  RunFiles files_;
+  File trajectory_, optimized_, navigation_, biases_;
+  std::vector<RadarOutput> radars_;      // by RadarScan::radar
   std::optional<Time> last_navigation_;  // of the last line in navigation.csv
 };
 
