@@ -488,7 +488,7 @@ TEST(SeveralRadars, ContradictionsNameTheRadar) {
 
 TEST(SeveralRadars, PrintedConfigurationReadsBack) {
   const Config config = fromAssignments(withTwoRadars(
-      {"radars=[left, right, rear]", "rear/radar_topic=/rear", "left/radar_field_x=\"a \\\"b\"",
+      {"radars=[left, right, rear]", "rear/radar_topic=/rear", R"(left/radar_field_x="a \"b")",
        "left/extrinsics_rotation_xyzw=[0.5, -0.5, 0.5, -0.5]", "left/time_offset_initial=0.1234567890123456",
        "right/radar_doppler_step=0.125", "radar_min_range=0.9", "right/radar_min_range=0.3",
        "rear/radar_frame=radar", "estimate_extrinsics=pose", "extrinsics_rotation_sigma=0.2"}));
