@@ -318,6 +318,7 @@ TEST_F(TwoRadarDiagnostics, IsAnErrorWhereNoRadarHasComeYet) {
 TEST_F(TwoRadarDiagnostics, NameTheRadarThatIsMostlyRejected) {
   for (int k = 0; k < 5; ++k) EXPECT_EQ(second(20, 20, 10).level, DiagnosticStatus::OK) << "half are enough";
   Status status;
+  monitor.dropped(1, "points_not_finite", 1000);  // these are no scans
   for (int k = 0; k < 4; ++k) status = second(20, 20, 5);
   EXPECT_EQ(status.level, DiagnosticStatus::WARN);
   EXPECT_EQ(status.message, "radar right: 20 of the last 80 scans were used, rejected mostly as innovation");

@@ -20,6 +20,8 @@ from rio_t import tum
 OK, WARN = 0, 1
 NAMES = ("left", "right")
 SCANS = {name: f"/sensor_platform/radar_{name}/scan" for name in NAMES}
+TRIGGER = "/sensor_platform/radar_right/trigger"
+TRIGGERED = ("right/stamp_source:=trigger", "right/trigger_topic:=" + TRIGGER)  # each radar has its own source
 OF_RADAR = {"extrinsics": PoseWithCovarianceStamped,
             **{topic: tester.TOPICS[topic] for topic in ("time_offset", "ego_velocity", "points", "inliers")}}
 TOPICS = {**{topic: kind for topic, kind in tester.TOPICS.items() if topic not in OF_RADAR},
@@ -89,17 +91,18 @@ class TwoRadarsTest(unittest.TestCase):
         if rospy.has_param("/rio_t"):
             rospy.delete_param("/rio_t")
 
-    def play(self, bag, rate=2.0, topics=(tester.IMU, *SCANS.values())):
-        return tester.play(bag, topics, rate)
+    def play(self, bag, rate=2.0):
+        return tester.play(bag, (tester.IMU, *SCANS.values()), rate)
 
     def test_node_equals_bag_runner_and_keeps_the_topic_contract(self):
         saved, run = os.path.join(self.folder, "saved.txt"), os.path.join(self.folder, "run")
         self.check(tester.run(tester.program("rio_t", "rio_t_bag"), "--bag", self.bag, "--config", "two_radars",
-                              "--output-dir", run))
+                              "--output-dir", run, *(word for each in TRIGGERED for word in ("--set", each.replace(":=", "=")))))
         optimized = tum.read(os.path.join(run, "trajectory_optimized.txt")).positions()
-        with tester.Listener(TOPICS) as listener, tester.node("config:=two_radars", "trajectory_file:=" + saved):
+        parameters = ("config:=two_radars", "trajectory_file:=" + saved, *TRIGGERED)
+        with tester.Listener(TOPICS) as listener, tester.node(*parameters):
             listener.wait_until_heard()
-            with self.play(self.bag) as player:
+            with tester.play(self.bag, (tester.IMU, *SCANS.values(), TRIGGER), 2.0) as player:
                 listener.wait_for_diagnosis("input", "IMU and radars are coming", OK)
                 self.assertEqual(player.wait(), 0)
             listener.wait_for_stamp("odom", self.last_imu)

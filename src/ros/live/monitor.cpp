@@ -31,6 +31,11 @@ double velocitySigma(const NavigationState& state) {
   return std::sqrt(std::max(0.0, variances.maxCoeff()));
 }
 
+/// Whether a scan could not be used because it came too early, which is no fault of its radar.
+bool isEarly(const std::string& reason) {
+  return reason == "scan_before_extrinsics" || reason == "before_initialization";
+}
+
 std::string listOf(const Eigen::VectorXd& numbers) {
   std::ostringstream text;
   text << numbers.transpose().format({6, Eigen::DontAlignCols, ", ", ", ", "", "", "[", "]"});
@@ -127,7 +132,7 @@ void LiveMonitor::dropped(std::size_t radar, const std::string& reason, std::uin
   const std::lock_guard<std::mutex> lock(mutex_);
   Radar& of = radars_.at(radar);
   of.dropped[reason] += count;
-  if (reason == "scan_before_extrinsics") of.early += count;
+  if (isEarly(reason)) of.early += count;
 }
 
 void LiveMonitor::result(const LiveSession::Result& result) {
@@ -139,7 +144,7 @@ void LiveMonitor::result(const LiveSession::Result& result) {
     last_used_ = last_scan_;
   } else if (!result.result.rejected_because.empty()) {
     ++radar.dropped[result.result.rejected_because];
-    if (result.result.rejected_because == "before_initialization") ++radar.early;
+    if (isEarly(result.result.rejected_because)) ++radar.early;
   }
   if (!result.result.updated) return;
   ++updates_;
@@ -277,6 +282,7 @@ std::optional<std::string> LiveMonitor::judgeUse(Radar& radar, bool initialized)
   if (now.usable < then.usable + kInputsJudged || 2 * used >= now.usable - then.usable) return std::nullopt;
   std::pair<std::string, std::uint64_t> most;
   for (const auto& [reason, count] : now.dropped) {
+    if (isEarly(reason) || reason == "points_not_finite") continue;  // the latter counts points
     const auto before = then.dropped.find(reason);
     const std::uint64_t fresh = count - (before == then.dropped.end() ? 0 : before->second);
     if (fresh > most.second) most = {reason, fresh};
