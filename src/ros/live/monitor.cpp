@@ -332,9 +332,7 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
 
   if (imu_.count == 0) {
     status.summary(DiagnosticStatus::ERROR, "no IMU message yet on " + config_.imu_topic);
-  } else if (radars.level == DiagnosticStatus::ERROR) {
-    status.summary(radars.level, radars.text);
-  } else if (imu_rate == 0.0) {
+  } else if (imu_rate == 0.0 && radars.level < DiagnosticStatus::ERROR) {
     status.summary(DiagnosticStatus::WARN, "the IMU is silent");
   } else if (!findings.empty()) {
     status.summary(radars.level, radars.text);

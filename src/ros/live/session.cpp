@@ -48,7 +48,8 @@ LiveSession::Stamped LiveSession::addTrigger(std::size_t radar, std::uint32_t se
 
 LiveSession::Stamped LiveSession::addScan(std::uint32_t seq, Time header_stamp, Time record, RadarScan scan) {
   const std::lock_guard<std::mutex> lock(stamper_mutex_);
-  stampers_.at(scan.radar).stamper.addScan(seq, header_stamp, record, std::move(scan));
+  ScanStamper& stamper = stampers_.at(scan.radar).stamper;
+  stamper.addScan(seq, header_stamp, record, std::move(scan));
   return takeStamped();
 }
 
