@@ -172,6 +172,21 @@ class TwoRadarsTest(unittest.TestCase):
             yaml.safe_load(listener.value("extrinsics " + name, "turn_from_told_deg")),
             numpy.degrees(turn_between(listed(pose.pose.orientation), self.told[name])), atol=0.01))
 
+    def test_mounting_of_a_single_radar_is_told_without_a_name(self):
+        rospy.set_param("/rio_t/extrinsics_rotation_xyzw", self.told["left"].tolist())
+        rospy.set_param("/rio_t/extrinsics_translation", self.levers["left"])
+        parameters = ("config:=irs", "radar_topic:=" + SCANS["left"], "estimate_extrinsics:=rotation")
+        topics = {**tester.TOPICS, "extrinsics": PoseWithCovarianceStamped}
+        with tester.Listener(topics) as listener, tester.node(*parameters):
+            listener.wait_until_heard()
+            with tester.play(self.bag, (tester.IMU, SCANS["left"]), 4.0):
+                for topic in topics:
+                    listener.wait_for(topic, lambda topic=topic: len(listener.messages[topic]) > 20)
+                listener.wait_for("tf of the radar", lambda: ("base_link", "radar") in {
+                    (t.header.frame_id, t.child_frame_id) for t in listener.tf})
+                listener.wait_for_diagnosis("extrinsics", "")
+                listener.wait_for_diagnosis("time offset", "")
+
     def test_radar_that_falls_silent_is_named(self):
         bag = self.simulate("silent", "blackout=8,60")
         with tester.Listener(TOPICS) as listener, tester.node("config:=two_radars"):
