@@ -158,6 +158,20 @@ TEST(Conversions, BiasesCarryTheirSigmas) {
   EXPECT_EQ(message.accelerometer_sigma[0], std::sqrt(state.covariance(S::kBa, S::kBa)));
 }
 
+TEST(Conversions, ExtrinsicsAreAPoseWithACovarianceOfTheOrderOfRos) {
+  const Extrinsics T_IR{{0.1, 0.2, 0.3}, so3::exp({0.0, 0.0, 0.5})};
+  Covariance6 covariance = Covariance6::Zero();
+  covariance.diagonal() << 1.0, 2.0, 3.0, 4.0, 5.0, 6.0;
+  covariance(0, 5) = covariance(5, 0) = 0.5;
+  const auto message = toPose(T_IR, covariance, Time::fromSeconds(7.5), "base_link");
+  EXPECT_EQ(message.header.stamp, ros::Time(7, 500000000));
+  EXPECT_EQ(message.header.frame_id, "base_link");
+  EXPECT_EQ(message.pose.pose.position.y, 0.2);
+  EXPECT_EQ(message.pose.pose.orientation.z, T_IR.q_IR.z());
+  EXPECT_EQ(message.pose.pose.orientation.w, T_IR.q_IR.w());
+  EXPECT_EQ(matrix(message.pose.covariance), covariance);
+}
+
 TEST(Conversions, ExtrinsicsFromTfTurnTheCloudsAxes) {
   geometry_msgs::Transform T;
   T.translation.x = 0.1;

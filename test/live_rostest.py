@@ -9,7 +9,7 @@ import numpy
 import rosbag
 import rospy
 from geometry_msgs.msg import TransformStamped
-from std_srvs.srv import Empty, Trigger
+from std_srvs.srv import Empty
 from tf2_msgs.msg import TFMessage
 
 from rio_t import live_tester as tester
@@ -48,10 +48,6 @@ class LiveTest(unittest.TestCase):
         if outcome.returncode != 0:
             raise AssertionError(f"{outcome.args}: {outcome.stdout}")
 
-    def call(self, service, kind):
-        rospy.wait_for_service(service, tester.DEADLINE)
-        return rospy.ServiceProxy(service, kind)()
-
     def whole_bag(self, listener, *play_arguments):
         """Plays the bag and waits for the last odometry."""
         with tester.play(self.bag, *play_arguments) as player:
@@ -72,7 +68,7 @@ class LiveTest(unittest.TestCase):
 
     def compare_with_bag_runner(self, listener):
         self.compare_live(listener)
-        response = self.call("/rio_t/save_trajectory", Trigger)
+        response = tester.call("/rio_t/save_trajectory")
         self.assertTrue(response.success, response.message)
         saved = tum.read(self.saved).positions()
         newest = max(saved)  # still in the window: will yet change
@@ -152,7 +148,7 @@ class LiveTest(unittest.TestCase):
             with tester.play(self.bag, (tester.IMU, tester.RADAR), 1.0):
                 listener.wait_for("odometry", lambda: len(listener.messages["odom"]) > 0)
                 before = len(listener.messages["odom"])
-                self.call("/rio_t/reset", Empty)
+                tester.call("/rio_t/reset", Empty)
                 listener.wait_for("the reset", lambda: listener.value("odometry", "resets") == "1")
                 self.assertEqual(listener.diagnostics["odometry"].level, WARN)
                 self.assertIn("standing still", listener.diagnostics["odometry"].message)
@@ -212,7 +208,7 @@ class LiveTest(unittest.TestCase):
             with tester.play(self.bag, (tester.IMU, tester.RADAR), 8.0) as player:
                 listener.wait_for_diagnosis("odometry", "standing still")
                 player.stop()
-            self.call("/rio_t/reset", Empty)
+            tester.call("/rio_t/reset", Empty)
             listener.messages["odom"].clear()
             self.whole_bag(listener)
             # The IMU samples before the first scan (0.1 of 11 s) are missed, and the initialisation is not quite the same.

@@ -8,6 +8,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistWithCovarianceStamped
 from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import PointCloud2
+from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
 from . import programs
@@ -32,14 +33,15 @@ def run(*words):
 
 
 class Listener:
-    """Keeps every message of the node called rio_t."""
+    """Keeps every message of the node called rio_t. `topics`: names and kinds, TOPICS are those of one radar."""
 
-    def __init__(self):
+    def __init__(self, topics=None):
         self._changed = threading.Condition()
-        self.messages = {name: [] for name in TOPICS}
+        topics = topics or TOPICS
+        self.messages = {name: [] for name in topics}
         self.tf, self.diagnostics = [], {}
         self._subscribers = [rospy.Subscriber("/rio_t/" + name, kind, self._keep, name, buff_size=2**24,
-                                              tcp_nodelay=True) for name, kind in TOPICS.items()]
+                                              tcp_nodelay=True) for name, kind in topics.items()]
         self._subscribers.append(rospy.Subscriber("/tf", TFMessage, self._keep_tf, buff_size=2**24))
         self._subscribers.append(rospy.Subscriber("/diagnostics", DiagnosticArray, self._keep_diagnostics))
 
@@ -89,9 +91,15 @@ class Listener:
 
     def wait_until_heard(self):
         """All publishers of the node are connected to us: nothing will be missed."""
-        names = ["/rio_t/" + name for name in TOPICS]
+        names = ["/rio_t/" + name for name in self.messages]
         wait_for("subscribers of all of " + " ".join(names),  # rospy tells no one of new connections
                  lambda: all(s.get_num_connections() > 0 for s in self._subscribers if s.resolved_name in names))
+
+
+def call(service, kind=Trigger):
+    """The answer of a service, once it is there."""
+    rospy.wait_for_service(service, DEADLINE)
+    return rospy.ServiceProxy(service, kind)()
 
 
 def node(*parameters):

@@ -23,25 +23,37 @@ double secondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+/// Where a message to people begins with what it is about, e.g. "/rio_t: radar left: ".
+std::string beginning(const std::string& node, const Config& radar) {
+  return node + ": " + (radar.radar_name.empty() ? "" : "radar " + radar.radar_name + ": ");
+}
+
+/// E.g. "time offset left".
+std::string withName(const std::string& what, const Config& radar, const std::string& between = " ") {
+  return radar.radar_name.empty() ? what : what + between + radar.radar_name;
+}
+
 }  // namespace
+
+LiveOdometry::Radar::Radar(const Config& its_config) : config(its_config), format(pointCloudFormat(config)) {
+  if (config.extrinsics_source == ExtrinsicsSource::kParameters) T_IR = config.odometry.T_IR;
+}
 
 LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
                            const std::string& name)
     : name_(name),
       config_(configFromRos(private_node)),
-      format_(pointCloudFormat(config_)),
       node_(node),
       private_node_(private_node),
       monitor_(config_),
       publisher_(config_, private_node),
       options_(config_.odometry),
       imu_stamps_(options_.imu_input_check.max_bridged_gap, options_.imu_input_check.jump_patience) {
-  if (config_.extrinsics_source == ExtrinsicsSource::kTf) {
-    monitor_.waitFor("the first scan, whose frame_id names the radar for tf");
+  for (const Config& radar : configsOfRadars(config_)) radars_.emplace_back(radar);
+  startSessionWhenReady();
+  if (!session_.get()) {
     tf_.emplace();
     tf_listener_ = std::make_unique<tf2_ros::TransformListener>(*tf_, node_);
-  } else {
-    startSession(config_.odometry.T_IR);
   }
   subscribe();
   solver_ = std::thread([this] { solve(); });
@@ -49,16 +61,21 @@ LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& p
   input_spinner_.emplace(1, &input_queue_);
   imu_spinner_->start();
   input_spinner_->start();
-  ROS_INFO_STREAM(name_ << ": IMU " << imu_subscriber_.getTopic() << ", radar " << scan_subscriber_.getTopic()
-                        << " (" << format_.name << "), stamps from " << toString(config_.stamp_source));
+  ROS_INFO_STREAM(name_ << ": IMU " << imu_subscriber_.getTopic());
+  for (const Radar& radar : radars_) {
+    ROS_INFO_STREAM(name_ << ": " << withName("radar", radar.config) << " " << radar.scans.getTopic() << " ("
+                          << radar.format.name << "), stamps from " << toString(radar.config.stamp_source));
+  }
 }
 
 LiveOdometry::~LiveOdometry() {
   // First no more callbacks, then no more solving: the optimisation thread is the last to touch the
   // publishers.
   imu_subscriber_.shutdown();
-  scan_subscriber_.shutdown();
-  trigger_subscriber_.shutdown();
+  for (Radar& radar : radars_) {
+    radar.scans.shutdown();
+    radar.triggers.shutdown();
+  }
   reset_server_.shutdown();
   save_server_.shutdown();
   diagnostics_timer_.stop();
@@ -84,19 +101,24 @@ void LiveOdometry::subscribe() {
   const auto subscribeTo = [&](ros::NodeHandle& handle, const std::string& topic, std::uint32_t queue,
                                auto callback, auto message) {
     using Message = decltype(message);
-    const boost::function<void(const Event<Message>&)> call = [this, callback](const Event<Message>& event) {
-      (this->*callback)(event);
-    };
+    const boost::function<void(const Event<Message>&)> call = callback;
     return handle.subscribe<Message>(topic, queue, call, ros::VoidConstPtr(), fast);
   };
-  trigger_subscriber_ = config_.stamp_source == StampSource::kTrigger
-                            ? subscribeTo(input_node, config_.trigger_topic, kImuQueue,
-                                          &LiveOdometry::onTrigger, std_msgs::Header())
-                            : ros::Subscriber();
-  scan_subscriber_ = subscribeTo(input_node, config_.radar_topic, kScanQueue, &LiveOdometry::onScan,
-                                 sensor_msgs::PointCloud2());
-  imu_subscriber_ =
-      subscribeTo(imu_node, config_.imu_topic, kImuQueue, &LiveOdometry::onImu, sensor_msgs::Imu());
+  for (std::size_t k = 0; k < radars_.size(); ++k) {
+    Radar& radar = radars_[k];
+    if (radar.config.stamp_source == StampSource::kTrigger) {
+      radar.triggers = subscribeTo(
+          input_node, radar.config.trigger_topic, kImuQueue,
+          [this, k](const Event<std_msgs::Header>& event) { onTrigger(k, event); }, std_msgs::Header());
+    }
+    radar.scans = subscribeTo(
+        input_node, radar.config.radar_topic, kScanQueue,
+        [this, k](const Event<sensor_msgs::PointCloud2>& event) { onScan(k, event); },
+        sensor_msgs::PointCloud2());
+  }
+  imu_subscriber_ = subscribeTo(
+      imu_node, config_.imu_topic, kImuQueue, [this](const Event<sensor_msgs::Imu>& event) { onImu(event); },
+      sensor_msgs::Imu());
   reset_server_ = service_node.advertiseService("reset", &LiveOdometry::onReset, this);
   save_server_ = service_node.advertiseService("save_trajectory", &LiveOdometry::onSaveTrajectory, this);
 
@@ -106,7 +128,14 @@ void LiveOdometry::subscribe() {
   diagnostics_->add("odometry", [this](Status& s) { monitor_.describeOdometry(s, session_.get().get()); });
   diagnostics_->add("input", [this](Status& s) { monitor_.describeInput(s, session_.get().get()); });
   diagnostics_->add("solver", [this](Status& s) { monitor_.describeSolver(s, session_.get().get()); });
-  diagnostics_->add("time offset", [this](Status& s) { monitor_.describeTimeOffset(s); });
+  for (std::size_t k = 0; k < radars_.size(); ++k) {
+    const Config& radar = radars_[k].config;
+    diagnostics_->add(withName("time offset", radar),
+                      [this, k](Status& s) { monitor_.describeTimeOffset(s, k); });
+    if (radar.odometry.smoother.estimate_extrinsics != EstimateExtrinsics::kNone)
+      diagnostics_->add(withName("extrinsics", radar),
+                        [this, k](Status& s) { monitor_.describeExtrinsics(s, k); });
+  }
   // A wall timer, and no update() that looks at ROS time: also a clock that stands still is worth a
   // diagnosis.
   const boost::function<void(const ros::WallTimerEvent&)> tell = [this](const ros::WallTimerEvent&) {
@@ -139,10 +168,21 @@ void LiveOdometry::wakeSolver() {
   work_to_do_.notify_one();
 }
 
-void LiveOdometry::startSession(const Extrinsics& T_IR) {
+void LiveOdometry::startSessionWhenReady() {
+  std::vector<Extrinsics> T_IR;
+  for (const Radar& radar : radars_) {
+    if (!radar.T_IR) {
+      monitor_.waitFor("the first scan" + withName("", radar.config, " of radar ") +
+                       ", whose frame_id names the radar for tf");
+      return;
+    }
+    T_IR.push_back(*radar.T_IR);
+  }
   publisher_.extrinsics(T_IR);
   OdometryOptions options = config_.odometry;
-  options.T_IR = T_IR;
+  options.T_IR = T_IR.front();
+  for (std::size_t k = 0; k < options.radars.size(); ++k) options.radars[k].T_IR = T_IR.at(k);
+  monitor_.startWith(T_IR);
   monitor_.waitFor("");
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -184,7 +224,7 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
       newest_imu_ = imu.time;
     const Session now = session_.get();
     if (!now) {
-      monitor_.dropped("imu_before_extrinsics");
+      monitor_.imuDropped("imu_before_extrinsics");
       return;
     }
     const double rate_sigma = now->rateSigma(imu.time);
@@ -205,77 +245,105 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
     }
     wakeSolver();
   } catch (const std::exception& error) {
-    monitor_.dropped("imu_not_usable");
+    monitor_.imuDropped("imu_not_usable");
     ROS_ERROR_STREAM_THROTTLE(kWarnPeriod, name_ << ": " << error.what());
   }
 }
 
-void LiveOdometry::onScan(const Event<sensor_msgs::PointCloud2>& event) {
+void LiveOdometry::onScan(std::size_t radar, const Event<sensor_msgs::PointCloud2>& event) {
   const sensor_msgs::PointCloud2& message = *event.getConstMessage();
-  monitor_.scan();
+  Radar& from = radars_[radar];
+  monitor_.scan(radar);
   try {
     DecodedScan decoded;
     try {
-      decoded = decode(message, format_);
+      decoded = decode(message, from.format);
     } catch (const std::exception& error) {
-      throw std::runtime_error("topic " + config_.radar_topic + ": " + error.what());
+      throw std::runtime_error("topic " + from.config.radar_topic + ": " + error.what());
     }
-    if (decoded.dropped_not_finite > 0) monitor_.dropped("points_not_finite", decoded.dropped_not_finite);
-    if (!session_.get()) lookUpExtrinsics(message.header.frame_id);
+    if (decoded.dropped_not_finite > 0)
+      monitor_.dropped(radar, "points_not_finite", decoded.dropped_not_finite);
+    if (!from.T_IR) lookUpExtrinsics(from, message.header.frame_id);
     const Session now = session_.get();
     if (!now) {
-      monitor_.dropped("scan_before_extrinsics");
+      monitor_.dropped(radar, "scan_before_extrinsics");
       return;
     }
+    RadarScan scan = toRadarScan(decoded.cloud, Time());
+    scan.radar = radar;
     account(now->addScan(message.header.seq, toTime(message.header.stamp), toTime(event.getReceiptTime()),
-                         toRadarScan(decoded.cloud, Time())));
+                         std::move(scan)));
     wakeSolver();
   } catch (const std::exception& error) {
-    monitor_.dropped("scan_not_usable");
-    ROS_ERROR_STREAM_THROTTLE(kWarnPeriod, name_ << ": " << error.what());
+    monitor_.dropped(radar, "scan_not_usable");
+    if (isTimeToTell("scan of " + from.config.radar_topic))
+      ROS_ERROR_STREAM(beginning(name_, from.config) << error.what());
   }
 }
 
-void LiveOdometry::onTrigger(const Event<std_msgs::Header>& event) {
-  monitor_.trigger();
+void LiveOdometry::onTrigger(std::size_t radar, const Event<std_msgs::Header>& event) {
+  monitor_.trigger(radar);
   const Session now = session_.get();
   if (!now) return;
   const std_msgs::Header& trigger = *event.getConstMessage();
-  account(now->addTrigger(trigger.seq, toTime(trigger.stamp), toTime(event.getReceiptTime())));
+  account(now->addTrigger(radar, trigger.seq, toTime(trigger.stamp), toTime(event.getReceiptTime())));
   wakeSolver();
 }
 
 void LiveOdometry::account(const LiveSession::Stamped& stamped) {
-  if (stamped.dropped > 0) {
-    monitor_.dropped("queue_full", stamped.dropped);
-    ROS_WARN_STREAM_THROTTLE(kWarnPeriod, name_ << ": the solver falls behind, the oldest scan was dropped "
-                                                   "(max_queued_scans)");
+  for (const std::size_t radar : stamped.dropped) {
+    monitor_.dropped(radar, "queue_full");
+    if (isTimeToTell("queue_full"))
+      ROS_WARN_STREAM(name_ << ": the solver falls behind, the oldest scan was dropped (max_queued_scans)");
   }
-  for (const std::string& reason : stamped.given_up) {
-    monitor_.dropped(reason);
-    ROS_WARN_STREAM_THROTTLE(kWarnPeriod, name_ << ": a scan got no stamp: " << reason
-                                                << " (stamp_source: " << toString(config_.stamp_source)
-                                                << ", trigger_topic: " << config_.trigger_topic << ")");
+  for (const auto& [radar, reason] : stamped.given_up) {
+    monitor_.dropped(radar, reason);
+    const Config& config = radars_[radar].config;
+    if (isTimeToTell("no stamp for " + config.radar_topic)) {
+      ROS_WARN_STREAM(beginning(name_, config) << "a scan got no stamp: " << reason
+                                               << " (stamp_source: " << toString(config.stamp_source)
+                                               << ", trigger_topic: " << config.trigger_topic << ")");
+    }
   }
 }
 
-void LiveOdometry::lookUpExtrinsics(const std::string& cloud_frame) {
-  const std::string from = cloud_frame.empty() ? config_.radar_frame : cloud_frame;
-  if (from == config_.radar_frame && format_.axes != PointAxes::kRightForwardUp && config_.publish_tf) {
-    throw std::runtime_error("radar_frame: \"" + from +
-                             "\" is also the frame of the clouds, whose axes are not those "
-                             "of radar_frame (x right, y forward, z up); expected another name");
+bool LiveOdometry::isTimeToTell(const std::string& what) {
+  const auto now = std::chrono::steady_clock::now();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto [told, is_first] = told_at_.try_emplace(what, now);
+  if (!is_first && now - told->second < std::chrono::duration<double>(kWarnPeriod)) return false;
+  told->second = now;
+  return true;
+}
+
+void LiveOdometry::lookUpExtrinsics(Radar& radar, const std::string& cloud_frame) {
+  const Config& config = radar.config;
+  const std::string from = cloud_frame.empty() ? config.radar_frame : cloud_frame;
+  if (from == config.radar_frame && config.publish_tf) {
+    std::string why;
+    if (radar.format.axes != PointAxes::kRightForwardUp)
+      why = "whose axes are not those of radar_frame (x right, y forward, z up)";
+    if (config.odometry.smoother.estimate_extrinsics != EstimateExtrinsics::kNone)
+      why = "which has its tf from others, and estimate_extrinsics publishes that of radar_frame";
+    if (!why.empty()) {
+      monitor_.waitFor("another " + (config.radar_name.empty() ? "" : config.radar_name + "/") +
+                       "radar_frame");
+      throw std::runtime_error("radar_frame: \"" + from + "\" is also the frame of the clouds, " + why +
+                               "; expected another name");
+    }
   }
   try {
     const Extrinsics T_IR = toExtrinsics(
-        tf_->lookupTransform(config_.base_link_frame, from, ros::Time(0)).transform, format_.axes);
-    startSession(T_IR);
-    ROS_INFO_STREAM(name_ << ": extrinsics from tf " << from << " -> " << config_.base_link_frame
-                          << ": translation [" << T_IR.l_I.transpose() << "], rotation xyzw ["
-                          << T_IR.q_IR.coeffs().transpose() << "]");
+        tf_->lookupTransform(config.base_link_frame, from, ros::Time(0)).transform, radar.format.axes);
+    radar.T_IR = T_IR;
+    ROS_INFO_STREAM(name_ << ": " << withName("extrinsics", config) << " from tf " << from << " -> "
+                          << config.base_link_frame << ": translation [" << T_IR.l_I.transpose()
+                          << "], rotation xyzw [" << T_IR.q_IR.coeffs().transpose() << "]");
+    startSessionWhenReady();
   } catch (const tf2::TransformException& error) {
-    monitor_.waitFor("tf from " + from + " to " + config_.base_link_frame + " (" + error.what() + ")");
-    ROS_WARN_STREAM_THROTTLE(kWarnPeriod, name_ << ": waiting for tf: " << error.what());
+    monitor_.waitFor("tf from " + from + " to " + config.base_link_frame + " (" + error.what() + ")");
+    if (isTimeToTell("tf from " + from))
+      ROS_WARN_STREAM(beginning(name_, config) << "waiting for tf: " << error.what());
   }
 }
 
@@ -315,21 +383,22 @@ void LiveOdometry::tellHealth(const ScanResult& result) const {
   }
 }
 
-void LiveOdometry::tellDopplerStep(const DopplerStep& step, DopplerStep* told) const {
+void LiveOdometry::tellDopplerStep(const Radar& radar, const DopplerStep& step, DopplerStep* told) const {
   if (step.source == DopplerStepSource::kUnknown) return;
   if (step.source == told->source && step.value == told->value) return;
   *told = step;
   const char* from = step.source == DopplerStepSource::kGiven ? "given" : "read off the data";
+  const std::string whose = withName(name_ + ": Doppler of radar", radar.config);
   if (step.value > 0.0) {
-    ROS_INFO_STREAM(name_ << ": the radar's Doppler comes in steps of " << step.value << " m/s, " << from);
+    ROS_INFO_STREAM(whose << " comes in steps of " << step.value << " m/s, " << from);
   } else {
-    ROS_INFO_STREAM(name_ << ": the radar's Doppler has no steps, " << from);
+    ROS_INFO_STREAM(whose << " has no steps, " << from);
   }
 }
 
 void LiveOdometry::solve() {
-  Session published;  // whose results ~path holds
-  DopplerStep told;   // of the radar of that session
+  Session published;              // whose results ~path holds
+  std::vector<DopplerStep> told;  // of the radars of that session
   while (true) {
     double rate_sigma = 0.0;
     {
@@ -344,7 +413,7 @@ void LiveOdometry::solve() {
     if (published != now) {
       if (published) publisher_.clearPath();
       published = now;
-      told = DopplerStep();
+      told.assign(radars_.size(), DopplerStep());
     }
     try {
       bool more = false;
@@ -356,7 +425,8 @@ void LiveOdometry::solve() {
         });
         if (!current) break;  // reset meanwhile: not of this world any more
       }
-      tellDopplerStep(now->odometry().radarDopplerStep(), &told);
+      for (std::size_t k = 0; k < radars_.size(); ++k)
+        tellDopplerStep(radars_[k], now->odometry().radarDopplerStep(k), &told[k]);
       if (more) wakeSolver();  // one scan at a time, so that stopping and resets are heeded between them
     } catch (const std::exception& error) {
       monitor_.solverFailed(error.what());

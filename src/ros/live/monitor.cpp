@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <string>
+#include <utility>
 
+#include "rio_t/core/so3.h"
 #include "rio_t/factors/state_block.h"
 
 namespace rio_t {
@@ -15,10 +18,38 @@ using diagnostic_msgs::DiagnosticStatus;
 
 /// Windows by which the solver is judged: 2 s at ten scans a second.
 constexpr std::size_t kWindowsJudged = 20;
+/// Calls of describeInput, seconds that is, over which the use of a radar's scans is judged.
+constexpr std::size_t kInputsJudged = 4;
+/// [s] A radar that gave no estimate for so long shows nothing now.
+constexpr double kRecent = 1.0;
+/// The motion has shown what it told better than this share of the sigma that it was told with.
+constexpr double kObserved = 0.5;
+constexpr double kDegree = 3.141592653589793 / 180.0;
 
 double velocitySigma(const NavigationState& state) {
   const Eigen::Vector3d variances = state.covariance.diagonal().segment<3>(StateBlock::kV);
   return std::sqrt(std::max(0.0, variances.maxCoeff()));
+}
+
+/// Whether a scan could not be used because it came too early, which is no fault of its radar.
+bool isEarly(const std::string& reason) {
+  return reason == "scan_before_extrinsics" || reason == "before_initialization";
+}
+
+std::string listOf(const Eigen::VectorXd& numbers) {
+  std::ostringstream text;
+  text << numbers.transpose().format({6, Eigen::DontAlignCols, ", ", ", ", "", "", "[", "]"});
+  return text.str();
+}
+
+/// "turn about x, y", or nothing if no number is above the bound.
+std::string axesAbove(const Eigen::Vector3d& numbers, double bound, const std::string& what) {
+  std::string axes;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (numbers[axis] <= bound) continue;
+    axes += (axes.empty() ? what : ", ") + std::string(1, "xyz"[axis]);
+  }
+  return axes;
 }
 
 /// What to do about windows that keep ending so.
@@ -38,6 +69,33 @@ std::string advice(SolverTermination termination) {
 
 }  // namespace
 
+LiveMonitor::LiveMonitor(const Config& config) : config_(config) {
+  for (Config& radar : configsOfRadars(config)) radars_.emplace_back(std::move(radar));
+}
+
+std::string LiveMonitor::prefix(const Radar& radar) {
+  return radar.config.radar_name.empty() ? "" : radar.config.radar_name + "/";
+}
+
+std::string LiveMonitor::called(const Radar& radar) {
+  return radar.config.radar_name.empty() ? "the radar" : "radar " + radar.config.radar_name;
+}
+
+bool LiveMonitor::isRecent(const Radar& radar) const {
+  return radar.last_update &&
+         last_update_->result.scan.stamp - radar.last_update->result.scan.stamp < kRecent;
+}
+
+LiveMonitor::Finding LiveMonitor::join(const std::vector<Finding>& findings, bool another_works) {
+  Finding all;
+  for (const Finding& finding : findings) {
+    all.text += (all.text.empty() ? "" : "; ") + finding.text;
+    all.level = std::max(all.level, finding.level);
+  }
+  if (another_works) all.level = std::min(all.level, std::uint8_t{DiagnosticStatus::WARN});
+  return all;
+}
+
 void LiveMonitor::Latency::add(double seconds) {
   worst = std::max(worst, seconds);
   sum += seconds;
@@ -49,14 +107,14 @@ void LiveMonitor::imu() {
   ++imu_.count;
 }
 
-void LiveMonitor::scan() {
+void LiveMonitor::scan(std::size_t radar) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  ++scans_.count;
+  ++radars_.at(radar).scans.count;
 }
 
-void LiveMonitor::trigger() {
+void LiveMonitor::trigger(std::size_t radar) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  ++triggers_.count;
+  ++radars_.at(radar).triggers.count;
 }
 
 void LiveMonitor::odometry(double latency) {
@@ -65,19 +123,28 @@ void LiveMonitor::odometry(double latency) {
   odometry_latency_.add(latency);
 }
 
-void LiveMonitor::dropped(const std::string& reason, std::uint64_t count) {
+void LiveMonitor::imuDropped(const std::string& reason) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  dropped_[reason] += count;
+  ++imu_dropped_[reason];
+}
+
+void LiveMonitor::dropped(std::size_t radar, const std::string& reason, std::uint64_t count) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Radar& of = radars_.at(radar);
+  of.dropped[reason] += count;
+  if (isEarly(reason)) of.early += count;
 }
 
 void LiveMonitor::result(const LiveSession::Result& result) {
   const std::lock_guard<std::mutex> lock(mutex_);
+  Radar& radar = radars_.at(result.result.scan.radar);
   last_scan_ = result.result.scan.stamp;
   if (result.result.used) {
-    ++used_;
+    ++radar.used;
     last_used_ = last_scan_;
   } else if (!result.result.rejected_because.empty()) {
-    ++dropped_[result.result.rejected_because];
+    ++radar.dropped[result.result.rejected_because];
+    if (isEarly(result.result.rejected_because)) ++radar.early;
   }
   if (!result.result.updated) return;
   ++updates_;
@@ -89,6 +156,12 @@ void LiveMonitor::result(const LiveSession::Result& result) {
   solver_failure_.clear();
   last_update_ = result;
   last_update_->result.scan.points.clear();  // not needed here
+  radar.last_update = last_update_;
+}
+
+void LiveMonitor::startWith(const std::vector<Extrinsics>& T_IR) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (std::size_t k = 0; k < radars_.size(); ++k) radars_[k].told = T_IR.at(k);
 }
 
 void LiveMonitor::solverFailed(const std::string& what) {
@@ -103,6 +176,10 @@ void LiveMonitor::reset(const std::string& reason) {
   last_terminations_.clear();
   last_update_.reset();
   last_used_.reset();
+  for (Radar& radar : radars_) {
+    radar.last_update.reset();
+    radar.accounts.clear();
+  }
 }
 
 void LiveMonitor::waitFor(const std::string& what) {
@@ -162,6 +239,58 @@ std::string noisyImu(const MeasuredImuNoise& noise, const ImuNoise& told) {
   return text.str();
 }
 
+std::optional<LiveMonitor::Finding> LiveMonitor::describeRadar(Status& status, Radar& radar, double scan_rate,
+                                                               double trigger_rate, bool initialized) const {
+  const Config& config = radar.config;
+  const std::string key = prefix(radar);
+  status.add(key + "scan_rate_hz", scan_rate);
+  status.add(key + "scans", radar.scans.count);
+  status.add(key + "scans_used", radar.used);
+  for (const auto& [reason, count] : radar.dropped) status.add(key + "dropped_" + reason, count);
+  const bool wants_trigger = config.stamp_source == StampSource::kTrigger;
+  if (wants_trigger) status.add(key + "trigger_rate_hz", trigger_rate);
+
+  const std::optional<std::string> mostly_rejected = judgeUse(radar, initialized);
+  const std::string of = radars_.size() == 1 ? "" : called(radar) + ": ";
+  if (radar.scans.count == 0)
+    return Finding{DiagnosticStatus::ERROR, of + "no scan yet on " + config.radar_topic};
+  if (wants_trigger && radar.triggers.count == 0) {
+    return Finding{DiagnosticStatus::ERROR,
+                   of + "no trigger yet on " + config.trigger_topic +
+                       ", and stamp_source is trigger; header and arrival need none"};
+  }
+  if (scan_rate == 0.0) {
+    return Finding{DiagnosticStatus::WARN,
+                   called(radar) + " is silent" + (of.empty() ? "" : ", topic " + config.radar_topic)};
+  }
+  // One radar alone is judged with the odometry.
+  if (mostly_rejected && radars_.size() > 1) return Finding{DiagnosticStatus::WARN, of + *mostly_rejected};
+  return std::nullopt;
+}
+
+std::optional<std::string> LiveMonitor::judgeUse(Radar& radar, bool initialized) {
+  if (!initialized) {
+    radar.accounts.clear();
+    return std::nullopt;
+  }
+  radar.accounts.push_back({radar.scans.count - radar.early, radar.used, radar.dropped});
+  if (radar.accounts.size() <= kInputsJudged) return std::nullopt;
+  const Account then = std::move(radar.accounts.front());
+  radar.accounts.pop_front();
+  const Account& now = radar.accounts.back();
+  const std::uint64_t used = now.used - then.used;
+  if (now.usable < then.usable + kInputsJudged || 2 * used >= now.usable - then.usable) return std::nullopt;
+  std::pair<std::string, std::uint64_t> most;
+  for (const auto& [reason, count] : now.dropped) {
+    if (isEarly(reason) || reason == "points_not_finite") continue;  // the latter counts points
+    const auto before = then.dropped.find(reason);
+    const std::uint64_t fresh = count - (before == then.dropped.end() ? 0 : before->second);
+    if (fresh > most.second) most = {reason, fresh};
+  }
+  return std::to_string(used) + " of the last " + std::to_string(now.usable - then.usable) +
+         " scans were used" + (most.first.empty() ? "" : ", rejected mostly as " + most.first);
+}
+
 void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const Clock::time_point now = Clock::now();
@@ -173,15 +302,10 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
     return value;
   };
   const double imu_rate = hertz(imu_);
-  const double scan_rate = hertz(scans_);
-  const double trigger_rate = hertz(triggers_);
   status.add("imu_rate_hz", imu_rate);
-  status.add("scan_rate_hz", scan_rate);
   status.add("odometry_rate_hz", hertz(odometry_));
   status.add("imu_messages", imu_.count);
-  status.add("scans", scans_.count);
-  status.add("scans_used", used_);
-  for (const auto& [reason, count] : dropped_) status.add("dropped_" + reason, count);
+  for (const auto& [reason, count] : imu_dropped_) status.add("dropped_" + reason, count);
   if (session != nullptr) {
     for (const auto& [name, count] : session->odometry().faults()) {
       // Told with the odometry.
@@ -192,27 +316,33 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   const MeasuredImuNoise noise = session != nullptr ? session->odometry().imuNoise() : MeasuredImuNoise();
   status.add("imu_accel_noise_measured", noise.accel_density);
   status.add("imu_gyro_noise_measured", noise.gyro_density);
-  const bool wants_trigger = config_.stamp_source == StampSource::kTrigger;
-  if (wants_trigger) status.add("trigger_rate_hz", trigger_rate);
 
-  const auto full = dropped_.find("queue_full");
-  const std::uint64_t queue_full = full == dropped_.end() ? 0 : full->second;
+  const bool initialized = session != nullptr && session->odometry().initialized();
+  std::vector<Finding> findings;
+  std::uint64_t queue_full = 0;
+  for (Radar& radar : radars_) {
+    const std::optional<Finding> finding =
+        describeRadar(status, radar, hertz(radar.scans), hertz(radar.triggers), initialized);
+    if (finding) findings.push_back(*finding);
+    const auto full = radar.dropped.find("queue_full");
+    if (full != radar.dropped.end()) queue_full += full->second;
+  }
+  // What one radar lacks is no error while another works.
+  const Finding radars = join(findings, findings.size() < radars_.size());
+
   if (imu_.count == 0) {
     status.summary(DiagnosticStatus::ERROR, "no IMU message yet on " + config_.imu_topic);
-  } else if (scans_.count == 0) {
-    status.summary(DiagnosticStatus::ERROR, "no scan yet on " + config_.radar_topic);
-  } else if (wants_trigger && triggers_.count == 0) {
-    status.summary(DiagnosticStatus::ERROR,
-                   "no trigger yet on " + config_.trigger_topic +
-                       ", and stamp_source is trigger; header and arrival need none");
-  } else if (imu_rate == 0.0 || scan_rate == 0.0) {
-    status.summary(DiagnosticStatus::WARN, imu_rate == 0.0 ? "the IMU is silent" : "the radar is silent");
+  } else if (imu_rate == 0.0 && radars.level < DiagnosticStatus::ERROR) {
+    status.summary(DiagnosticStatus::WARN, "the IMU is silent");
+  } else if (!findings.empty()) {
+    status.summary(radars.level, radars.text);
   } else if (queue_full > queue_full_told_) {
     status.summary(DiagnosticStatus::WARN, "the solver falls behind, scans were dropped");
   } else if (noise.isFarAbove(told)) {
     status.summary(DiagnosticStatus::WARN, noisyImu(noise, told));
   } else {
-    status.summary(DiagnosticStatus::OK, "IMU and radar are coming");
+    status.summary(DiagnosticStatus::OK,
+                   radars_.size() == 1 ? "IMU and radar are coming" : "IMU and radars are coming");
   }
   queue_full_told_ = queue_full;
 }
@@ -256,23 +386,64 @@ void LiveMonitor::describeSolver(Status& status, const LiveSession* session) con
                                              std::to_string(full) + " windows ended " + advice(worst));
 }
 
-void LiveMonitor::describeTimeOffset(Status& status) const {
+void LiveMonitor::describeTimeOffset(Status& status, std::size_t radar) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!last_update_) {
+  const Radar& of = radars_.at(radar);
+  if (!of.last_update) {
     status.summary(DiagnosticStatus::OK, "not estimated yet");
     return;
   }
-  const ScanResult& result = last_update_->result;
+  const ScanResult& result = of.last_update->result;
+  const bool observable = of.last_update->offset_observable && isRecent(of);
   status.add("offset_ms", 1e3 * result.time_offset);
   status.add("sigma_ms", 1e3 * result.time_offset_sigma);
-  status.add("observable", last_update_->offset_observable ? "true" : "false");
+  status.add("observable", observable ? "true" : "false");
   const double bound = config_.odometry.smoother.max_time_offset;
   if (std::abs(result.time_offset) > 0.99 * bound) {
     status.summary(DiagnosticStatus::WARN, "the offset is at its bound max_time_offset");
+  } else if (!isRecent(of)) {
+    status.summary(DiagnosticStatus::OK, "kept: no scan of " + called(of) + " is used now");
   } else {
-    status.summary(DiagnosticStatus::OK, last_update_->offset_observable
-                                             ? "observed by the motion now"
-                                             : "kept: the motion says nothing now");
+    status.summary(DiagnosticStatus::OK,
+                   observable ? "observed by the motion now" : "kept: the motion says nothing now");
+  }
+}
+
+void LiveMonitor::describeExtrinsics(Status& status, std::size_t radar) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const Radar& of = radars_.at(radar);
+  if (!of.last_update) {
+    status.summary(DiagnosticStatus::OK, "not estimated yet");
+    return;
+  }
+  const ScanResult& result = of.last_update->result;
+  const SmootherOptions& options = of.config.odometry.smoother;
+  const Eigen::Matrix<double, 6, 1> sigma = result.T_IR_covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::Vector3d turn = so3::log(result.T_IR.q_IR * of.told.q_IR.conjugate());
+  const Eigen::Vector3d turn_sigma = sigma.tail<3>();
+  // As the parameters want them.
+  status.add("extrinsics_rotation_xyzw", listOf(result.T_IR.q_IR.coeffs()));
+  status.add("extrinsics_translation", listOf(result.T_IR.l_I));
+  status.add("turn_from_told_deg", listOf(turn / kDegree));
+  status.add("turn_sigma_deg", listOf(turn_sigma / kDegree));
+  std::string kept = axesAbove(turn_sigma, kObserved * options.extrinsics_rotation_sigma, "turn about ");
+  if (options.estimate_extrinsics == EstimateExtrinsics::kPose) {
+    const Eigen::Vector3d lever_sigma = sigma.head<3>();
+    status.add("lever_arm_from_told_m", listOf(result.T_IR.l_I - of.told.l_I));
+    status.add("lever_arm_sigma_m", listOf(lever_sigma));
+    const std::string lever =
+        axesAbove(lever_sigma, kObserved * options.extrinsics_translation_sigma, "lever arm along ");
+    kept += (kept.empty() || lever.empty() ? "" : ", ") + lever;
+  }
+  const std::string far = axesAbove(turn.cwiseAbs(), 3.0 * options.extrinsics_rotation_sigma, "about ");
+  if (!far.empty()) {
+    status.summary(
+        DiagnosticStatus::WARN,
+        called(of) + " is turned " + far + " by more than 3 extrinsics_rotation_sigma from what was told");
+  } else if (!kept.empty()) {
+    status.summary(DiagnosticStatus::OK, "kept: the motion has not shown the " + kept);
+  } else {
+    status.summary(DiagnosticStatus::OK, "observed by the motion");
   }
 }
 

@@ -1,5 +1,6 @@
 #include "rio_t/ros/live/publisher.h"
 
+#include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <sensor_msgs/PointCloud2.h>
 
 #include <numeric>
@@ -10,21 +11,46 @@
 
 namespace rio_t {
 
+namespace {
+
+ros::NodeHandle namespaceOf(const Config& radar, const ros::NodeHandle& private_node) {
+  return radar.radar_name.empty() ? private_node : ros::NodeHandle(private_node, radar.radar_name);
+}
+
+void publishCloud(const ros::Publisher& publisher, const RadarScan& scan,
+                  const std::vector<std::size_t>& indices, const std::string& frame) {
+  sensor_msgs::PointCloud2 cloud = toPointCloud2(scan, indices);
+  cloud.header.stamp = toRosTime(scan.stamp);
+  cloud.header.frame_id = frame;
+  publisher.publish(cloud);
+}
+
+}  // namespace
+
 // Queues are deep where a message stands for itself (seconds of odometry survive a busy subscriber), shallow
 // where the newest tells all.
-LivePublisher::LivePublisher(const Config& config, ros::NodeHandle private_node)
-    : config_(config),
-      odom_(private_node.advertise<nav_msgs::Odometry>("odom", 2000)),
-      odom_optimized_(private_node.advertise<nav_msgs::Odometry>("odom_optimized", 200)),
-      time_offset_(private_node.advertise<TimeOffset>("time_offset", 200)),
-      ego_velocity_(private_node.advertise<geometry_msgs::TwistWithCovarianceStamped>("ego_velocity", 200)),
-      points_(private_node.advertise<sensor_msgs::PointCloud2>("points", 20)),
-      inliers_(private_node.advertise<sensor_msgs::PointCloud2>("inliers", 20)),
-      path_(private_node.advertise<nav_msgs::Path>("path", 1, true)),
-      imu_bias_(private_node.advertise<ImuBias>("imu_bias", 200)) {
+LivePublisher::Radar::Radar(const Config& config, const ros::NodeHandle& private_node)
+    : frame(config.radar_frame) {
+  ros::NodeHandle node = namespaceOf(config, private_node);
+  time_offset = node.advertise<TimeOffset>("time_offset", 200);
+  ego_velocity = node.advertise<geometry_msgs::TwistWithCovarianceStamped>("ego_velocity", 200);
+  points = node.advertise<sensor_msgs::PointCloud2>("points", 20);
+  inliers = node.advertise<sensor_msgs::PointCloud2>("inliers", 20);
+  if (config.odometry.smoother.estimate_extrinsics != EstimateExtrinsics::kNone)
+    extrinsics = node.advertise<geometry_msgs::PoseWithCovarianceStamped>("extrinsics", 200);
+}
+
+LivePublisher::LivePublisher(const Config& config, const ros::NodeHandle& private_node) : config_(config) {
+  for (const Config& radar : configsOfRadars(config)) radars_.emplace_back(radar, private_node);
+  ros::NodeHandle node = private_node;
+  odom_ = node.advertise<nav_msgs::Odometry>("odom", 2000);
+  odom_optimized_ = node.advertise<nav_msgs::Odometry>("odom_optimized", 200);
+  path_ = node.advertise<nav_msgs::Path>("path", 1, true);
+  imu_bias_ = node.advertise<ImuBias>("imu_bias", 200);
   path_message_.header.frame_id = config_.odom_frame;
   if (config_.publish_tf) {
     tf_.emplace();
+    radar_tf_.emplace();
     static_tf_.emplace();
   }
 }
@@ -37,34 +63,44 @@ void LivePublisher::odometry(const NavigationState& state, double rate_sigma) {
 
 void LivePublisher::result(const LiveSession::Result& live, double rate_sigma) {
   const ScanResult& result = live.result;
+  const Radar& radar = radars_.at(result.scan.radar);
+  if (radar.extrinsics) extrinsicsOf(radar, live);  // first: who shows a cloud needs its tf
   if (isValid(result.ego_velocity.status))
-    ego_velocity_.publish(toTwist(result.ego_velocity, result.scan.stamp, config_.radar_frame));
-  if (points_.getNumSubscribers() > 0) {
+    radar.ego_velocity.publish(toTwist(result.ego_velocity, result.scan.stamp, radar.frame));
+  if (radar.points.getNumSubscribers() > 0) {
     std::vector<std::size_t> all(result.scan.points.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
-    publishCloud(points_, result.scan, all);
+    publishCloud(radar.points, result.scan, all, radar.frame);
   }
-  if (inliers_.getNumSubscribers() > 0 && isValid(result.ego_velocity.status))
-    publishCloud(inliers_, result.scan, result.ego_velocity.inliers);
+  if (radar.inliers.getNumSubscribers() > 0 && isValid(result.ego_velocity.status))
+    publishCloud(radar.inliers, result.scan, result.ego_velocity.inliers, radar.frame);
   if (!result.updated) return;
   odom_optimized_.publish(toOdometry(result.state, rate_sigma, config_.odom_frame, config_.base_link_frame));
   imu_bias_.publish(toImuBias(result.state, config_.base_link_frame));
   TimeOffset offset;
   offset.header.stamp = toRosTime(result.scan.stamp);
-  offset.header.frame_id = config_.radar_frame;
+  offset.header.frame_id = radar.frame;
   offset.offset = result.time_offset;
   offset.sigma = result.time_offset_sigma;
   offset.observable = static_cast<std::uint8_t>(live.offset_observable);
-  time_offset_.publish(offset);
+  radar.time_offset.publish(offset);
   extendPath(result.state);
 }
 
-void LivePublisher::publishCloud(const ros::Publisher& publisher, const RadarScan& scan,
-                                 const std::vector<std::size_t>& indices) const {
-  sensor_msgs::PointCloud2 cloud = toPointCloud2(scan, indices);
-  cloud.header.stamp = toRosTime(scan.stamp);
-  cloud.header.frame_id = config_.radar_frame;
-  publisher.publish(cloud);
+void LivePublisher::extrinsicsOf(const Radar& radar, const LiveSession::Result& live) {
+  const ScanResult& result = live.result;
+  if (result.updated) {
+    radar.extrinsics->publish(
+        toPose(result.T_IR, result.T_IR_covariance, result.scan.stamp, config_.base_link_frame));
+  }
+  // A stamp ahead of the IMU would make tf forget all that is older than it. Before the state is there, no
+  // stamp has been judged.
+  const std::string& why_not = result.rejected_because;
+  if (!radar_tf_ || why_not == "stamp_ahead_of_imu" || why_not == "before_initialization") return;
+  // Also with a scan that is rejected: its cloud is shown.
+  geometry_msgs::TransformStamped transform = toTransform(live.T_IR, config_.base_link_frame, radar.frame);
+  transform.header.stamp = toRosTime(result.scan.stamp);
+  radar_tf_->sendTransform(transform);
 }
 
 void LivePublisher::extendPath(const NavigationState& state) {
@@ -74,6 +110,8 @@ void LivePublisher::extendPath(const NavigationState& state) {
   pose.pose = odom.pose.pose;
   path_message_.header.stamp = odom.header.stamp;
   std::vector<geometry_msgs::PoseStamped>& poses = path_message_.poses;
+  // A scan that comes late updates the same newest state once more.
+  if (!poses.empty() && poses.back().header.stamp == pose.header.stamp) poses.pop_back();
   poses.push_back(pose);
   if (poses.size() > config_.path_max_poses) poses.erase(poses.begin());
   if (path_.getNumSubscribers() > 0) path_.publish(path_message_);
@@ -84,11 +122,15 @@ void LivePublisher::clearPath() {
   path_.publish(path_message_);
 }
 
-void LivePublisher::extrinsics(const Extrinsics& T_IR) {
+void LivePublisher::extrinsics(const std::vector<Extrinsics>& T_IR) {
   if (!static_tf_) return;
-  geometry_msgs::TransformStamped transform = toTransform(T_IR, config_.base_link_frame, config_.radar_frame);
-  transform.header.stamp = ros::Time::now();
-  static_tf_->sendTransform(transform);
+  for (std::size_t k = 0; k < radars_.size(); ++k) {
+    if (radars_[k].extrinsics) continue;
+    geometry_msgs::TransformStamped transform =
+        toTransform(T_IR.at(k), config_.base_link_frame, radars_[k].frame);
+    transform.header.stamp = ros::Time::now();
+    static_tf_->sendTransform(transform);
+  }
 }
 
 }  // namespace rio_t

@@ -13,11 +13,13 @@ constexpr std::size_t kMaxScansInFlight = 1000;  // bounds the memory of arrival
 }  // namespace
 
 LiveSession::LiveSession(const Config& config, const OdometryOptions& options)
-    : gyro_density_(options.imu_noise.gyro_density),
-      odometry_(options),
-      stamper_(stampingOptions(config)),
-      queue_(options.max_queued_scans),
-      observability_(kObservabilityWindow, kObservableSigma) {}
+    : gyro_density_(options.imu_noise.gyro_density), odometry_(options), queue_(options.max_queued_scans) {
+  for (const Config& radar : configsOfRadars(config)) {
+    const Extrinsics T_IR = optionsOfRadar(options, radars_.size()).T_IR;
+    stampers_.push_back({ScanStamper(stampingOptions(radar)), {}});
+    radars_.push_back({OffsetObservability(kObservabilityWindow, kObservableSigma), T_IR});
+  }
+}
 
 std::optional<NavigationState> LiveSession::addImu(const ImuMeasurement& imu) {
   ++waiting_imu_;
@@ -34,33 +36,41 @@ double LiveSession::rateSigma(Time sample) {
 
 LiveSession::Stamped LiveSession::stampWithImu(Time stamp, Time record) {
   const std::lock_guard<std::mutex> lock(stamper_mutex_);
-  stamper_.addImu(stamp, record);
+  for (Stamper& radar : stampers_) radar.stamper.addImu(stamp, record);
   return takeStamped();
 }
 
-LiveSession::Stamped LiveSession::addTrigger(std::uint32_t seq, Time stamp, Time record) {
+LiveSession::Stamped LiveSession::addTrigger(std::size_t radar, std::uint32_t seq, Time stamp, Time record) {
   const std::lock_guard<std::mutex> lock(stamper_mutex_);
-  stamper_.addTrigger(seq, stamp, record);
+  stampers_.at(radar).stamper.addTrigger(seq, stamp, record);
   return takeStamped();
 }
 
 LiveSession::Stamped LiveSession::addScan(std::uint32_t seq, Time header_stamp, Time record, RadarScan scan) {
   const std::lock_guard<std::mutex> lock(stamper_mutex_);
-  stamper_.addScan(seq, header_stamp, record, std::move(scan));
+  ScanStamper& stamper = stampers_.at(scan.radar).stamper;
+  stamper.addScan(seq, header_stamp, record, std::move(scan));
   return takeStamped();
 }
 
 LiveSession::Stamped LiveSession::takeStamped() {
   Stamped stamped;
-  for (RadarScan& scan : stamper_.take()) {
-    ++stamped.queued;
-    if (queue_.push({std::move(scan), Clock::now()})) ++stamped.dropped;
-  }
-  if (stamper_.givenUp() == given_up_) return stamped;
-  for (const auto& [reason, count] : stamper_.givenUp()) {
-    for (std::uint64_t& told = given_up_[reason]; told < count; ++told) stamped.given_up.push_back(reason);
-  }
+  for (std::size_t radar = 0; radar < stampers_.size(); ++radar) takeStamped(radar, &stamped);
   return stamped;
+}
+
+void LiveSession::takeStamped(std::size_t radar, Stamped* stamped) {
+  Stamper& from = stampers_[radar];
+  for (RadarScan& scan : from.stamper.take()) {
+    ++stamped->queued;
+    const std::optional<RadarScan> dropped = queue_.push({std::move(scan), Clock::now()});
+    if (dropped) stamped->dropped.push_back(dropped->radar);
+  }
+  if (from.stamper.givenUp() == from.given_up) return;
+  for (const auto& [reason, count] : from.stamper.givenUp()) {
+    for (std::uint64_t& told = from.given_up[reason]; told < count; ++told)
+      stamped->given_up.push_back({radar, reason});
+  }
 }
 
 std::vector<LiveSession::Result> LiveSession::process(bool* more) {
@@ -68,16 +78,20 @@ std::vector<LiveSession::Result> LiveSession::process(bool* more) {
   *more = item.has_value();
   if (item) {
     if (arrivals_.size() >= kMaxScansInFlight) arrivals_.clear();
-    arrivals_[item->scan.stamp.nanoseconds()] = item->arrival;
+    arrivals_[{item->scan.radar, item->scan.stamp.nanoseconds()}] = item->arrival;
     odometry_.addScan(std::move(item->scan));
   }
   std::vector<Result> results;
   waiting_imu_ = 0;
   for (ScanResult& scan_result : odometry_.process()) {
     Result result;
-    observability_.add(scan_result);
-    result.offset_observable = observability_.observable();
-    const auto arrival = arrivals_.find(scan_result.scan.stamp.nanoseconds());
+    const RadarScan& scan = scan_result.scan;
+    Radar& radar = radars_.at(scan.radar);
+    radar.observability.add(scan_result);
+    result.offset_observable = radar.observability.observable();
+    if (scan_result.updated) radar.T_IR = scan_result.T_IR;
+    result.T_IR = radar.T_IR;
+    const auto arrival = arrivals_.find({scan.radar, scan.stamp.nanoseconds()});
     if (arrival != arrivals_.end()) {
       result.latency = std::chrono::duration<double>(Clock::now() - arrival->second).count();
       arrivals_.erase(arrival);

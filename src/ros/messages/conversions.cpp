@@ -127,6 +127,17 @@ Extrinsics toExtrinsics(const geometry_msgs::Transform& T_base_cloud, PointAxes 
   return T_IR;
 }
 
+geometry_msgs::PoseWithCovarianceStamped toPose(const Extrinsics& T_IR, const Covariance6& covariance,
+                                                Time stamp, const std::string& base_link_frame) {
+  geometry_msgs::PoseWithCovarianceStamped message;
+  message.header.stamp = toRosTime(stamp);
+  message.header.frame_id = base_link_frame;
+  message.pose.pose.position = tf2::toMsg(T_IR.l_I);
+  message.pose.pose.orientation = tf2::toMsg(T_IR.q_IR);
+  assign(covariance, &message.pose.covariance);
+  return message;
+}
+
 geometry_msgs::TransformStamped toTransform(const Extrinsics& T_IR, const std::string& base_link_frame,
                                             const std::string& radar_frame) {
   geometry_msgs::TransformStamped transform;

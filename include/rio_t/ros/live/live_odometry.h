@@ -21,6 +21,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "rio_t/ros/live/current_session.h"
 #include "rio_t/ros/live/monitor.h"
@@ -50,29 +51,41 @@ class LiveOdometry {
   template <typename Message>
   using Event = ros::MessageEvent<const Message>;
 
+  struct Radar {
+    explicit Radar(const Config& its_config);
+
+    Config config;
+    PointCloudFormat format;
+    std::optional<Extrinsics> T_IR;  ///< told; none until tf has it. Input thread only
+    ros::Subscriber scans, triggers;
+  };
+
   void subscribe();
   void onImu(const Event<sensor_msgs::Imu>& event);
-  void onScan(const Event<sensor_msgs::PointCloud2>& event);
-  void onTrigger(const Event<std_msgs::Header>& event);
+  void onScan(std::size_t radar, const Event<sensor_msgs::PointCloud2>& event);
+  void onTrigger(std::size_t radar, const Event<std_msgs::Header>& event);
   bool onReset(std_srvs::Empty::Request& request, std_srvs::Empty::Response& response);
   bool onSaveTrajectory(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
 
-  /// Takes T_IR from tf, once it is there; the session starts with it. `cloud_frame`: of the cloud's header.
-  void lookUpExtrinsics(const std::string& cloud_frame);
-  void startSession(const Extrinsics& T_IR);
+  /// Takes T_IR from tf, once it is there. `cloud_frame`: of the cloud's header.
+  void lookUpExtrinsics(Radar& radar, const std::string& cloud_frame);
+  /// Starts the session if T_IR of all radars is known; else says what is waited for.
+  void startSessionWhenReady();
   /// When it returns, nothing more is published of what was before. Any thread.
   /// `at_once`: does not wait for rest first.
   void reset(const std::string& reason, bool at_once = false);
   void account(const LiveSession::Stamped& stamped);
+  /// Whether this was not told for some seconds. Each radar has its own turn, unlike with ROS's throttles.
+  bool isTimeToTell(const std::string& what);
   void wakeSolver();
   void tellFaults();  ///< what is new among the faults of the input; input thread
   void tellHealth(const ScanResult& result) const;
-  void tellDopplerStep(const DopplerStep& step, DopplerStep* told) const;  ///< where it is not as told
-  void solve();  ///< body of the optimisation thread
+  void tellDopplerStep(const Radar& radar, const DopplerStep& step,
+                       DopplerStep* told) const;  ///< where it is not as told
+  void solve();                                   ///< body of the optimisation thread
 
   const std::string name_;
   const Config config_;
-  const PointCloudFormat format_;
   ros::NodeHandle node_, private_node_;
   ros::CallbackQueue imu_queue_, input_queue_;
   LiveMonitor monitor_;      // thread-safe
@@ -81,7 +94,8 @@ class LiveOdometry {
   std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
   std::optional<diagnostic_updater::Updater> diagnostics_;  // input thread
 
-  CurrentSession session_;  // thread-safe; null until the extrinsics are known
+  std::vector<Radar> radars_;  // read-only after construction, but for T_IR
+  CurrentSession session_;     // thread-safe; null until the extrinsics are known
 
   std::mutex mutex_;  // guards what follows, held for microseconds
   std::condition_variable work_to_do_;
@@ -89,6 +103,7 @@ class LiveOdometry {
   bool has_work_ = false;
   bool stopping_ = false;
   double rate_sigma_ = 0.0;
+  std::map<std::string, std::chrono::steady_clock::time_point> told_at_;
 
   struct Told {
     std::uint64_t count = 0;
@@ -100,7 +115,7 @@ class LiveOdometry {
   ClockJumpDetector imu_stamps_;    // IMU thread only, as the next
   std::optional<Time> newest_imu_;  // of the good stamps
 
-  ros::Subscriber imu_subscriber_, scan_subscriber_, trigger_subscriber_;
+  ros::Subscriber imu_subscriber_;
   ros::ServiceServer reset_server_, save_server_;
   ros::WallTimer diagnostics_timer_;
   std::thread solver_;

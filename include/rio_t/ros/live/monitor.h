@@ -9,25 +9,32 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "rio_t/ros/live/session.h"
 
 namespace rio_t {
 
-/// Keeps the accounts of the live node and judges them, for `diagnostics`. Thread-safe.
+/// Keeps the accounts of the live node and judges them, for `diagnostics`. Radars are counted as in
+/// configsOfRadars; keys of one radar begin with its name, as "left/scans", where the radars have names.
+/// Thread-safe.
 class LiveMonitor {
  public:
   using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
-  explicit LiveMonitor(const Config& config) : config_(config) {}
+  explicit LiveMonitor(const Config& config);
 
   void imu();  ///< a message came, as the next
-  void scan();
-  void trigger();
+  void scan(std::size_t radar = 0);
+  void trigger(std::size_t radar = 0);
   void odometry(double latency);  ///< ~odom was published that many seconds after the IMU message came
-  void dropped(const std::string& reason,
-               std::uint64_t count = 1);  ///< a scan or sample that goes no further
+  void imuDropped(const std::string& reason);  ///< a sample that goes no further
+  /// Scans, or points of them, that go no further.
+  void dropped(std::size_t radar, const std::string& reason, std::uint64_t count = 1);
   void result(const LiveSession::Result& result);
+  /// The mountings that the session starts with.
+  void startWith(const std::vector<Extrinsics>& T_IR);
   void solverFailed(const std::string& what);
   /// The session starts again; counters of the node go on.
   void reset(const std::string& reason);
@@ -38,7 +45,8 @@ class LiveMonitor {
   void describeOdometry(Status& status, const LiveSession* session) const;
   void describeInput(Status& status, const LiveSession* session);
   void describeSolver(Status& status, const LiveSession* session) const;
-  void describeTimeOffset(Status& status) const;
+  void describeTimeOffset(Status& status, std::size_t radar = 0) const;
+  void describeExtrinsics(Status& status, std::size_t radar = 0) const;
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -52,13 +60,50 @@ class LiveMonitor {
     std::uint64_t told = 0;  // count when the rate was last told
   };
 
+  /// What has become of the scans of a radar.
+  struct Account {
+    std::uint64_t usable = 0, used = 0;
+    std::map<std::string, std::uint64_t> dropped;
+  };
+  struct Radar {
+    explicit Radar(Config its_config) : config(std::move(its_config)), told(config.odometry.T_IR) {}
+
+    Config config;
+    Extrinsics told;  ///< the mounting that the session started with
+    Rate scans, triggers;
+    std::map<std::string, std::uint64_t> dropped;
+    std::uint64_t used = 0;
+    std::uint64_t early = 0;  ///< scans that came before they could be used
+    std::optional<LiveSession::Result> last_update;
+    std::deque<Account> accounts;  ///< as of the last calls of describeInput, newest last
+  };
+  /// What is wrong; `level` is that of diagnostic_msgs/DiagnosticStatus.
+  struct Finding {
+    std::uint8_t level = 0;
+    std::string text;
+  };
+
+  /// "" or "left/", for keys.
+  static std::string prefix(const Radar& radar);
+  /// "the radar" or "radar left", for texts.
+  static std::string called(const Radar& radar);
+  /// Adds what the input has of this radar, and returns what is wrong with it. Rates [Hz].
+  std::optional<Finding> describeRadar(Status& status, Radar& radar, double scan_rate, double trigger_rate,
+                                       bool initialized) const;
+  /// How few of its last scans were used, and why, if it is less than half.
+  static std::optional<std::string> judgeUse(Radar& radar, bool initialized);
+  static Finding join(const std::vector<Finding>& findings, bool another_works);
+  /// Whether the newest estimate is of a scan of this radar, or nearly so.
+  bool isRecent(const Radar& radar) const;
+
   const Config config_;
   mutable std::mutex mutex_;  // guards all that follows
-  Rate imu_, scans_, triggers_, odometry_;
+  std::vector<Radar> radars_;
+  Rate imu_, odometry_;
   Clock::time_point told_ = Clock::now();
   Latency odometry_latency_, scan_latency_;
-  std::map<std::string, std::uint64_t> dropped_;
-  std::uint64_t used_ = 0, updates_ = 0, resets_ = 0, queue_full_told_ = 0;
+  std::map<std::string, std::uint64_t> imu_dropped_;
+  std::uint64_t updates_ = 0, resets_ = 0, queue_full_told_ = 0;
   std::map<SolverTermination, std::uint64_t> terminations_;
   std::deque<SolverTermination> last_terminations_;  // of the last windows, newest last
   std::string last_reset_, waiting_for_, solver_failure_;

@@ -7,6 +7,7 @@
 #include <tf2_ros/transform_broadcaster.h>
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "rio_t/ros/live/session.h"
@@ -15,26 +16,37 @@
 namespace rio_t {
 
 /// Everything that the live node says, as messages. `odometry` belongs to the IMU thread, `result` to the
-/// optimisation thread; they share nothing.
+/// optimisation thread; they share nothing. Topics of one radar are in its name's namespace, where the radars
+/// have names.
 class LivePublisher {
  public:
-  LivePublisher(const Config& config, ros::NodeHandle private_node);
+  LivePublisher(const Config& config, const ros::NodeHandle& private_node);
 
   void odometry(const NavigationState& state, double rate_sigma);  ///< ~odom and tf
-  /// ~odom_optimized, ~time_offset, ~imu_bias, ~path, ~ego_velocity, ~points, ~inliers.
+  /// ~odom_optimized, ~imu_bias, ~path; of the radar: ~time_offset, ~ego_velocity, ~points, ~inliers and,
+  /// where they are estimated, ~extrinsics and tf.
   void result(const LiveSession::Result& live, double rate_sigma);
-  /// base_link_frame -> radar_frame, for display.
-  void extrinsics(const Extrinsics& T_IR);
+  /// base_link_frame -> radar_frame of each radar as static tf, unless it is estimated.
+  void extrinsics(const std::vector<Extrinsics>& T_IR);
   void clearPath();  ///< optimisation thread
 
  private:
-  void publishCloud(const ros::Publisher& publisher, const RadarScan& scan,
-                    const std::vector<std::size_t>& indices) const;
+  struct Radar {
+    Radar(const Config& config, const ros::NodeHandle& private_node);
+
+    std::string frame;
+    ros::Publisher time_offset, ego_velocity, points, inliers;
+    std::optional<ros::Publisher> extrinsics;  ///< none if they are not estimated
+  };
+
+  void extrinsicsOf(const Radar& radar, const LiveSession::Result& live);
   void extendPath(const NavigationState& state);
 
   const Config config_;
-  ros::Publisher odom_, odom_optimized_, time_offset_, ego_velocity_, points_, inliers_, path_, imu_bias_;
-  std::optional<tf2_ros::TransformBroadcaster> tf_;  // none where publish_tf is false, as the next
+  std::vector<Radar> radars_;
+  ros::Publisher odom_, odom_optimized_, path_, imu_bias_;
+  // None where publish_tf is false. One for each thread: they share nothing.
+  std::optional<tf2_ros::TransformBroadcaster> tf_, radar_tf_;
   std::optional<tf2_ros::StaticTransformBroadcaster> static_tf_;
   nav_msgs::Path path_message_;  // optimisation thread only
 };

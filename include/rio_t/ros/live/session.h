@@ -6,6 +6,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "rio_t/evaluation/trajectory.h"
@@ -27,12 +28,16 @@ class LiveSession {
 
   /// What stamping did besides giving stamps.
   struct Stamped {
-    std::size_t queued = 0;             ///< scans handed to the optimisation thread
-    std::size_t dropped = 0;            ///< scans that had to go because the queue was full
-    std::vector<std::string> given_up;  ///< reasons, one for each scan that gets no stamp
+    struct GivenUp {
+      std::size_t radar = 0;
+      std::string reason;
+    };
+    std::size_t queued = 0;            ///< scans handed to the optimisation thread
+    std::vector<std::size_t> dropped;  ///< radars of the scans that had to go because the queue was full
+    std::vector<GivenUp> given_up;     ///< one for each scan that gets no stamp
   };
 
-  /// `options` is config.odometry with the extrinsics that hold.
+  /// `options` is config.odometry with the extrinsics that hold. Radars are counted as in configsOfRadars.
   LiveSession(const Config& config, const OdometryOptions& options);
 
   /// IMU thread. Empty before the first optimised state.
@@ -46,14 +51,15 @@ class LiveSession {
 
   // Stamping; any thread, `record` is the time of receipt.
   Stamped stampWithImu(Time stamp, Time record);
-  Stamped addTrigger(std::uint32_t seq, Time stamp, Time record);
-  Stamped addScan(std::uint32_t seq, Time header_stamp, Time record,
-                  RadarScan scan);  ///< throws as ScanStamper
+  Stamped addTrigger(std::size_t radar, std::uint32_t seq, Time stamp, Time record);
+  /// Throws as ScanStamper. The stamp of `scan` is not read.
+  Stamped addScan(std::uint32_t seq, Time header_stamp, Time record, RadarScan scan);
 
   /// A result with what goes with it.
   struct Result {
     ScanResult result;
     bool offset_observable = false;
+    Extrinsics T_IR;       ///< of this radar, as they hold now; also where the window was not updated
     double latency = 0.0;  ///< [s] from the arrival of the scan to now; 0 where that is not known
   };
   /// Optimisation thread: takes one scan from the queue, if there is one, and works off what can be. `more`
@@ -68,7 +74,20 @@ class LiveSession {
   std::size_t queuedScans() const { return queue_.size(); }
 
  private:
+  /// A radar's way from messages to stamped scans.
+  struct Stamper {
+    ScanStamper stamper;
+    std::map<std::string, std::uint64_t> given_up;  ///< what was told so far
+  };
+  /// What the results of one radar leave behind.
+  struct Radar {
+    OffsetObservability observability;
+    Extrinsics T_IR;
+  };
+  using ScanKey = std::pair<std::size_t, std::int64_t>;  // radar, stamp [ns]
+
   Stamped takeStamped();  // call with stamper_mutex_ held
+  void takeStamped(std::size_t radar, Stamped* stamped);
 
   const double gyro_density_;
   RadarInertialOdometry odometry_;
@@ -78,14 +97,12 @@ class LiveSession {
   std::uint64_t imu_count_ = 0;
 
   std::mutex stamper_mutex_;
-  ScanStamper stamper_;                            // guarded by stamper_mutex_, as the next
-  std::map<std::string, std::uint64_t> given_up_;  // what was told so far
+  std::vector<Stamper> stampers_;  // by radar; guarded by stamper_mutex_
 
   ScanQueue queue_;  // thread-safe
 
-  std::map<std::int64_t, Clock::time_point>
-      arrivals_;  // by stamp [ns]; optimisation thread only, as the next
-  OffsetObservability observability_;
+  std::map<ScanKey, Clock::time_point> arrivals_;  // optimisation thread only, as the next
+  std::vector<Radar> radars_;
 
   mutable std::mutex trajectory_mutex_;
   BoundedTrajectory left_window_{kMaxPoses};  // guarded by trajectory_mutex_, as the next

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <geometry_msgs/TransformStamped.h>
 #include <geometry_msgs/TwistWithCovarianceStamped.h>
 #include <nav_msgs/Odometry.h>
@@ -51,6 +52,10 @@ ImuBias toImuBias(const NavigationState& state, const std::string& base_link_fra
 /// The T_IR that a tf transform from the cloud's frame to base_link stands for. The cloud's frame has the
 /// axes of the cloud (`axes`), T_IR those of RIO (x right, y forward, z up).
 Extrinsics toExtrinsics(const geometry_msgs::Transform& T_base_cloud, PointAxes axes);
+/// T_IR as a pose in `base_link_frame`. `covariance` as ScanResult::T_IR_covariance, which has the order of
+/// ROS.
+geometry_msgs::PoseWithCovarianceStamped toPose(const Extrinsics& T_IR, const Covariance6& covariance,
+                                                Time stamp, const std::string& base_link_frame);
 /// T_IR for display: base_link -> radar_frame with RIO axes.
 geometry_msgs::TransformStamped toTransform(const Extrinsics& T_IR, const std::string& base_link_frame,
                                             const std::string& radar_frame);
