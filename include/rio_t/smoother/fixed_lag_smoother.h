@@ -81,7 +81,7 @@ class FixedLagSmoother {
 
  private:
   struct Node {
-    Block* block;
+    Block* block = nullptr;
     const Term* imu_from_previous = nullptr;  ///< none at the first node
     const Term* zero_velocity = nullptr;
     Time time() const { return *block->time; }
