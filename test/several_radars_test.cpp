@@ -99,6 +99,8 @@ TEST(TwoRadars, OneThatFailsDoesNotPullDownTheOther) {
 }
 
 TEST(Extrinsics, AreFoundWithTheirSigma) {
+  double squares = 0.0;
+  int count = 0;
   for (const std::uint64_t seed : {1, 2, 3}) {
     SimulatedRun run = pair("difficult", seed, 60.0);
     run.options.smoother.estimate_extrinsics = EstimateExtrinsics::kPose;
@@ -114,8 +116,12 @@ TEST(Extrinsics, AreFoundWithTheirSigma) {
       EXPECT_LT(turnDegrees(last.T_IR, truth), 0.5) << name << ", seed " << seed;
       EXPECT_LT(e.head<3>().norm(), 5e-3) << name << ", seed " << seed;
       EXPECT_LT(e.cwiseQuotient(sigmas).cwiseAbs().maxCoeff(), 3.5) << name << ", seed " << seed;
+      squares += e.cwiseQuotient(sigmas).squaredNorm();
+      count += 6;
     }
   }
+  EXPECT_GT(squares / count, 0.5);
+  EXPECT_LT(squares / count, 2.0);
 }
 
 /// A kart on a flat floor, with a tilt that is told 7 degrees too small or too large.
