@@ -21,8 +21,7 @@ TEST_F(BagRunner, AtRestItStaysAndWritesEveryFile) {
   const Outcome outcome = run({"__name:=rio_t_bag", "__log:=/dev/null"});
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_EQ(outcome.err, "");
-  for (const std::string& name : RunFiles{}.names())
-    EXPECT_GT(fs::file_size(out_ + "/" + name), 0u) << name;
+  for (const std::string& name : RunFiles{}.names()) EXPECT_GT(fs::file_size(out_ + "/" + name), 0u) << name;
   for (const char* row : {"path", "end to start", "time offset", "scans", "speed", "files in"}) {
     EXPECT_NE(outcome.out.find(row), std::string::npos) << row;
   }

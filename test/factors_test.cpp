@@ -187,7 +187,8 @@ TEST(ImuRadarFactor, JacobiansAreCorrectForwardsAndBackwards) {
     z.linear_from_t_O = t_O;
     z.offset_gain = 0.0;
     expectJacobiansCorrect(RadarVelocityFactor(z, motion.time(0.98), imuModel(imu)),
-                           {values(moved(motion.state(0.98), 0.05)), {0.2 - t_O}, storedMounting()}, 1e-6, 1e-4);
+                           {values(moved(motion.state(0.98), 0.05)), {0.2 - t_O}, storedMounting()}, 1e-6,
+                           1e-4);
   }
 }
 
@@ -218,7 +219,8 @@ TEST(ImuRadarFactor, TheDerivativeInTheExtrinsicsIsExactAwayFromWhereTheScanWasP
       manifold.plus(ends[side].data(), delta.data(), ends[side].data());
     }
     const Eigen::Vector3d numeric = (residual(ends[1]) - residual(ends[0])) / (2.0 * h);
-    EXPECT_LT((J.col(manifold.columns()[static_cast<std::size_t>(i)]) - numeric).norm(), 1e-6 * J.norm()) << i;
+    EXPECT_LT((J.col(manifold.columns()[static_cast<std::size_t>(i)]) - numeric).norm(), 1e-6 * J.norm())
+        << i;
   }
 }
 

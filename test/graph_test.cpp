@@ -473,7 +473,8 @@ TEST(AddASensor, AnAltimeterNeedsAFactorAndABlock) {
   double sigma_without = 0.0;
   for (const bool with_altimeter : {false, true}) {
     RadarSmoother smoother(options, skewMounting(), motion.g_W, imu);
-    smoother.initialize(motion.time(0.5), priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0, skewMounting()));
+    smoother.initialize(motion.time(0.5),
+                        priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0, skewMounting()));
     Window& window = smoother.states.window();
     const auto bias = window.addCalibration(std::make_shared<ScalarManifold>(), Eigen::VectorXd::Zero(1));
     // 1 m is known of it beforehand.

@@ -19,8 +19,8 @@ inline std::shared_ptr<const Manifold> manifoldOf(std::size_t size) {
 }
 
 /// Compares the Jacobians of a factor with central differences on the manifold: blocks of 16 are states,
-/// blocks of 7 are extrinsics, both moved on their manifolds; blocks of 1 are offsets. `tolerance` is relative to the largest entry of the block's
-/// Jacobian.
+/// blocks of 7 are extrinsics, both moved on their manifolds; blocks of 1 are offsets. `tolerance` is
+/// relative to the largest entry of the block's Jacobian.
 inline void expectJacobiansCorrect(const ceres::CostFunction& cost, std::vector<std::vector<double>> blocks,
                                    double tolerance = 1e-6, double step = 1e-5) {
   const int rows = cost.num_residuals();

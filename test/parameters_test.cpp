@@ -460,7 +460,8 @@ TEST(SeveralRadars, UnknownKeysAndSectionsAreNamed) {
 }
 
 TEST(SeveralRadars, OneCanBeTakenOutAndItsSectionStays) {
-  const std::vector<std::string> file = {"radars=[left, right]", "left/radar_topic=/l", "right/radar_topic=/r"};
+  const std::vector<std::string> file = {"radars=[left, right]", "left/radar_topic=/l",
+                                         "right/radar_topic=/r"};
   const auto entriesWith = [&](const std::vector<std::string>& more) {
     ParameterEntries entries;
     for (const std::string& text : file) entries.push_back(parseAssignment(text));

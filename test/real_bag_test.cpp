@@ -70,7 +70,8 @@ TEST_F(RealBag, OnlineEndsNearTheBatch) {
   const RunSummary online = play(out_ + "/again");
   ASSERT_TRUE(batch.batch.has_value());
   EXPECT_TRUE(batch.batch->converged);
-  EXPECT_NEAR(online.radars.front().final_offset_s, batch.radars.front().final_offset_s, 0.3 * online.radars.front().final_offset_sigma_s);
+  EXPECT_NEAR(online.radars.front().final_offset_s, batch.radars.front().final_offset_s,
+              0.3 * online.radars.front().final_offset_sigma_s);
   EXPECT_NEAR(online.end_to_start_2d_m, batch.end_to_start_2d_m, 0.05);
   EXPECT_NEAR(online.end_to_start_3d_m, batch.end_to_start_3d_m, 0.05);
 }

@@ -53,9 +53,8 @@ struct SimulatedRun {
       for (const simulation::SimulatedScan& each : scans) result.push_back({&each, radar});
       ++radar;
     }
-    std::stable_sort(result.begin(), result.end(), [](const Arrival& a, const Arrival& b) {
-      return a.scan->arrival < b.scan->arrival;
-    });
+    std::stable_sort(result.begin(), result.end(),
+                     [](const Arrival& a, const Arrival& b) { return a.scan->arrival < b.scan->arrival; });
     return result;
   }
 

@@ -23,7 +23,8 @@ class Smoother : public ::testing::Test {
 
   RadarSmoother make(const SmootherOptions& options) const {
     RadarSmoother smoother(options, skewMounting(), motion.g_W, imu);
-    smoother.initialize(motion.time(0.5), priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0, skewMounting()));
+    smoother.initialize(motion.time(0.5),
+                        priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0, skewMounting()));
     return smoother;
   }
 
@@ -205,7 +206,8 @@ TEST_F(Smoother, AStepOfTheOffsetSurvivesANodeThatIsInsertedBeforeIt) {
   EXPECT_NEAR(smoother.t_O(), 0.06, 5e-3);
   // A new start knows of no step.
   smoother.stepOffset(motion.time(2.3));
-  smoother.initialize(motion.time(2.5), priorAtRest(options, ImuNoise(), motion.state(2.5), 9.81, 3.0, skewMounting()));
+  smoother.initialize(motion.time(2.5),
+                      priorAtRest(options, ImuNoise(), motion.state(2.5), 9.81, 3.0, skewMounting()));
   use(2.6, 0.0);
   use(2.7, 0.0);
   const Eigen::MatrixXd P = smoother.newestCovariance();

@@ -122,7 +122,7 @@ class Linearized {
       const auto size = static_cast<std::size_t>(rows * term.blocks[i]->manifold->size());
       if (numbers_[i].size() < size) numbers_[i].resize(size);
       parameters_.push_back(term.blocks[i]->x.data());
-      jacobians_.push_back(numbers_[i].data());
+      jacobians_.push_back(term.blocks[i]->is_constant ? nullptr : numbers_[i].data());
     }
     if (!term.cost->Evaluate(parameters_.data(), r_.data(), jacobians_.data()))
       throw std::runtime_error("graph: a factor cannot be evaluated");
@@ -132,8 +132,10 @@ class Linearized {
     const double root = std::sqrt(rho[1]);
     r_ *= root;
     J_.clear();
-    for (std::size_t i = 0; i < term.blocks.size(); ++i)
-      J_.push_back(tangents(i, *term.blocks[i]->manifold, root));
+    for (std::size_t i = 0; i < term.blocks.size(); ++i) {
+      const bool is_constant = jacobians_[i] == nullptr;
+      J_.push_back(is_constant ? Rows{nullptr, rows, 0} : tangents(i, *term.blocks[i]->manifold, root));
+    }
   }
   const Eigen::VectorXd& r() const { return r_; }
   const Rows& J(std::size_t i) const { return J_[i]; }

@@ -24,13 +24,14 @@ constexpr double kLateScan = 1.0;
 
 std::vector<RadarChannel> radarChannels(const OdometryOptions& options, const Eigen::Vector3d& g_W,
                                         const ImuBuffer& imu) {
-  const auto shared = options.smoother.time_offset_shared ? std::make_shared<OffsetBlocks>(options.smoother)
-                                                          : nullptr;
+  const auto shared =
+      options.smoother.time_offset_shared ? std::make_shared<OffsetBlocks>(options.smoother) : nullptr;
   std::vector<RadarChannel> channels;
   for (std::size_t k = 0; k < options.radarCount(); ++k) {
     const OdometryOptions own = optionsOfRadar(options, k);
-    const RadarChannelOptions channel{own.T_IR,     own.ego_velocity,       own.feasibility, own.offset_step_detector,
-                                      own.smoother, own.rest.velocity_sigma};
+    const RadarChannelOptions channel{own.T_IR,        own.ego_velocity,
+                                      own.feasibility, own.offset_step_detector,
+                                      own.smoother,    own.rest.velocity_sigma};
     channels.emplace_back(channel, g_W, imu, shared);
   }
   return channels;

@@ -38,8 +38,7 @@ std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, con
     const std::optional<StaticInitialization> rest = rest_.add(newest);
     // A smooth ride looks like rest to the IMU, and like motion to the radar.
     radar_contradicts_rest_ =
-        rest ? isMoving(rest->time - rest->duration, rest->time)
-             : radar_contradicts_rest_;
+        rest ? isMoving(rest->time - rest->duration, rest->time) : radar_contradicts_rest_;
     if (rest && !radar_contradicts_rest_) {
       const OdometryOptions of_first = optionsOfRadar(options_, 0);
       StateBlock x;
@@ -49,11 +48,12 @@ std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, con
       ImuNoise noise = options_.imu_noise;
       noise.accel_density = std::sqrt(noise.accelVariance(newest));
       noise.gyro_density = std::sqrt(noise.gyroVariance(newest));
-      return Initialization{rest->time,
-                            priorAtRest(of_first.smoother, noise, x, options_.gravity, rest->duration, of_first.T_IR),
-                            0,
-                            InitializedFrom::kRest,
-                            {}};
+      return Initialization{
+          rest->time,
+          priorAtRest(of_first.smoother, noise, x, options_.gravity, rest->duration, of_first.T_IR),
+          0,
+          InitializedFrom::kRest,
+          {}};
     }
   }
   if (!mayStartInMotion()) return std::nullopt;

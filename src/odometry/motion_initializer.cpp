@@ -70,8 +70,7 @@ void MotionInitializer::add(Time stamp, const EgoVelocity& velocity) {
   const auto after = std::lower_bound(velocities_.begin(), velocities_.end(), stamp,
                                       [](const Velocity& z, Time t) { return z.stamp < t; });
   if (after != velocities_.end() && after->stamp == stamp) return;
-  velocities_.insert(after,
-                     Velocity{{{stamp}, velocity.v_R, velocity.covariance}, velocity.told_variance});
+  velocities_.insert(after, Velocity{{{stamp}, velocity.v_R, velocity.covariance}, velocity.told_variance});
   if (velocities_.size() > kMaxVelocities) velocities_.erase(velocities_.begin());
 }
 
@@ -250,8 +249,8 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
       z.covariance = carriedCovariance(velocities[i], time, imu, scale.value()).whole;
       z.offset_gain = gains[i];
       if (gains[i] == 0.0) z.linear_from_t_O = offset->x[0];
-      terms.push_back(
-          &window.add(std::make_unique<RadarVelocityFactor>(z, time, model), {&state, offset.get(), extrinsics.get()}, loss));
+      terms.push_back(&window.add(std::make_unique<RadarVelocityFactor>(z, time, model),
+                                  {&state, offset.get(), extrinsics.get()}, loss));
     }
     try {
       solution = rio_t::solve(window, {kMaxIterations, kConverged * kConverged}, smoother_.solver);

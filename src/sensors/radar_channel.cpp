@@ -117,7 +117,8 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
     offset_uncertainty_.offsetStepped();
     answer.offset_stepped = true;
   }
-  if (all && gate_.rejects(*all, isUnanimous(measured), seen.tilt_is_known, context.last_used)) return reject("innovation");
+  if (all && gate_.rejects(*all, isUnanimous(measured), seen.tilt_is_known, context.last_used))
+    return reject("innovation");
   const RadarInWindow::AddResult added =
       answer.doppler
           ? in_window_.add(smoother, *answer.doppler)

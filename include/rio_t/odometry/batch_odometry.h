@@ -50,8 +50,8 @@ class BatchOdometry {
   Run makeRun(const RadarInertialOdometry::Start& start) const;
   /// Adds the scans that the batch does not reject, and returns their number.
   std::size_t readmit(const BatchSmoother& smoother, const BatchSolution& solution, Run& run) const;
-  /// The scan of the same radar that is the nearest to a velocity, if the solution does not reject the velocity;
-  /// else null.
+  /// The scan of the same radar that is the nearest to a velocity, if the solution does not reject the
+  /// velocity; else null.
   const BatchSolution::Scan* acceptedBy(const BatchSmoother& smoother, const Run& run,
                                         const BatchSolution& solution, std::size_t radar,
                                         const RadarVelocityMeasurement& z) const;

@@ -86,7 +86,7 @@ class Estimator {
   std::optional<Initialization> start_;
   std::string waiting_for_;
   Time initialized_at_;
-  Time last_used_;  ///< stamp of the last scan that went into the window
+  Time last_used_;                            ///< stamp of the last scan that went into the window
   std::vector<StampedPose> left_in_silence_;  ///< left while the radar was silent; for the next result
   std::uint64_t clock_restarts_ = 0;
   std::optional<Time> radar_heard_;  ///< time of the IMU when the last scan came

@@ -7,8 +7,8 @@
 
 namespace rio_t {
 
-/// Judges the estimate by the innovations of all radars. Where one radar agrees with the estimate, the estimate
-/// is right, and a radar that contradicts it fails. Not thread-safe.
+/// Judges the estimate by the innovations of all radars. Where one radar agrees with the estimate, the
+/// estimate is right, and a radar that contradicts it fails. Not thread-safe.
 class RadarsHealth {
  public:
   /// `gate`: see HealthMonitor.

@@ -23,7 +23,7 @@ class InnovationGate {
   void used() { unanimous_since_.reset(); }
 
  private:
-  SmootherOptions options_;  // read-only after construction
+  SmootherOptions options_;              // read-only after construction
   std::optional<Time> unanimous_since_;  ///< first stamp of the run of unanimous rejected scans
 };
 

@@ -106,7 +106,8 @@ class BatchSmoother {
   };
   Graph place(const BatchProblem& problem, const std::vector<double>& t_O,
               const std::vector<NodeEstimate>& guess, const std::vector<Extrinsics>& mounting) const;
-  /// Adds the first node, the calibration of each radar and their priors. Returns the first offsets, by radar.
+  /// Adds the first node, the calibration of each radar and their priors. Returns the first offsets, by
+  /// radar.
   std::vector<Block*> start(const BatchProblem& problem, const StateBlock& x,
                             const std::vector<Extrinsics>& mounting, Graph& graph) const;
   Block& addOffset(Window& window, Time time, double t_O) const;

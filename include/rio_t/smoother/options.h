@@ -34,13 +34,13 @@ struct SmootherOptions {
   /// [m/s^2] A scan with less acceleration does not tell the offset: at rest and at constant velocity it
   /// shows only noise.
   double time_offset_min_acceleration = 0.2;
-  double max_time_offset = 0.25;  ///< [s] bound on |t_O|
+  double max_time_offset = 0.25;    ///< [s] bound on |t_O|
   bool time_offset_shared = false;  ///< all radars have one clock and so one t_O
 
   EstimateExtrinsics estimate_extrinsics = EstimateExtrinsics::kNone;
-  double extrinsics_rotation_sigma = 0.17;     ///< [rad] prior, per axis: 10 degrees
-  double extrinsics_translation_sigma = 0.05;  ///< [m] prior, per axis
-  double extrinsics_rotation_noise = 1.0e-5;   ///< [rad/sqrt(s)] random walk, per axis
+  double extrinsics_rotation_sigma = 0.17;       ///< [rad] prior, per axis: 10 degrees
+  double extrinsics_translation_sigma = 0.05;    ///< [m] prior, per axis
+  double extrinsics_rotation_noise = 1.0e-5;     ///< [rad/sqrt(s)] random walk, per axis
   double extrinsics_translation_noise = 1.0e-5;  ///< [m/sqrt(s)] likewise
 
   double prior_sigma_yaw = 1.0e-3;       ///< [rad] yaw defines the world frame
