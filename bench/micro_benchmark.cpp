@@ -39,7 +39,7 @@ struct Run {
         scan.points.push_back({point.position_R, point.doppler, point.snr_db});
       const EgoVelocity measured = estimator.estimate(scan);
       if (isValid(measured.status)) {
-        velocities.push_back({scan.stamp, measured.v_R, measured.covariance, options.T_IR});
+        velocities.push_back({{scan.stamp}, measured.v_R, measured.covariance});
       }
       scans.push_back(std::move(scan));
     }
@@ -112,9 +112,12 @@ void smoother(benchmark::State& state, Timed timed, double window) {
   SmootherOptions options;
   options.window = window;
   FixedLagSmoother smoother(options, ImuNoise(), kGravity, run().imu);
-  RadarInWindow radar(options, run().velocities.front().T_IR, kGravity, run().imu);
+  const Extrinsics& T_IR = run().options.T_IR;
+  const auto offset = std::make_shared<OffsetBlocks>(options);
+  RadarInWindow radar(options, T_IR, kGravity, run().imu, offset);
   const auto marginalize = [&] {
-    return smoother.marginalize({{&radar.offsetBlock(), options.time_offset_noise}});
+    return smoother.marginalize(
+        {{&offset->newest(), Eigen::VectorXd::Constant(1, options.time_offset_noise)}});
   };
   std::size_t next = run().velocities.size();
   const auto part = [&](Timed which, auto&& call) {
@@ -125,8 +128,8 @@ void smoother(benchmark::State& state, Timed timed, double window) {
   for (auto _ : state) {
     if (next >= run().velocities.size()) {
       const StateBlock x = run().state(kStart - 0.5);
-      start(smoother, radar, run().options.start + (kStart - 0.5),
-            priorAtRest(options, ImuNoise(), x, 9.81, 3.0));
+      radar.start(smoother, run().options.start + (kStart - 0.5),
+                  priorAtRest(options, ImuNoise(), x, 9.81, 3.0, T_IR));
       // Not timed: the window fills.
       for (next = 0; next < 30; ++next) {
         radar.add(smoother, run().velocities[next]);

@@ -67,7 +67,15 @@ std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoo
 }
 
 RadarInWindow::AddResult RadarInWindow::add(FixedLagSmoother& smoother, const RadarVelocityMeasurement& z) {
-  static const auto original = libraryFunction(&RadarInWindow::add);
+  using Add = AddResult (RadarInWindow::*)(FixedLagSmoother&, const RadarVelocityMeasurement&);
+  static const auto original = libraryFunction<Add>(&RadarInWindow::add);
+  const Scope scope(Stage::kFactors);
+  return (this->*original)(smoother, z);
+}
+
+RadarInWindow::AddResult RadarInWindow::add(FixedLagSmoother& smoother, const DopplerMeasurement& z) {
+  using Add = AddResult (RadarInWindow::*)(FixedLagSmoother&, const DopplerMeasurement&);
+  static const auto original = libraryFunction<Add>(&RadarInWindow::add);
   const Scope scope(Stage::kFactors);
   return (this->*original)(smoother, z);
 }
