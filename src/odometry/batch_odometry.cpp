@@ -83,7 +83,8 @@ RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) co
   return z;
 }
 
-void BatchOdometry::setMeasurement(const ScanResult& result, const NodeEstimate& node, BatchScan& scan) const {
+void BatchOdometry::setMeasurement(const ScanResult& result, const NodeEstimate& node,
+                                   BatchScan& scan) const {
   const double offset_gain = isAtRest(node) ? 0.0 : result.offset_gain;
   if (result.doppler) {
     scan.doppler = result.doppler;
@@ -105,6 +106,7 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
     const OdometryOptions own = optionsOfRadar(options_, k);
     problem.mounting.push_back(own.T_IR);
     problem.time_offsets.push_back(own.smoother.time_offset_initial);
+    problem.time_offset_sigmas.push_back(own.smoother.time_offset_sigma);
   }
   problem.guess.push_back({start.time, start.prior.x0});
   std::vector<bool> stepped(problem.mounting.size(), false);
@@ -134,8 +136,7 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
 std::size_t BatchOdometry::readmit(const BatchSmoother& smoother, const BatchSolution& solution,
                                    Run& run) const {
   BatchProblem& problem = run.problem;
-  for (std::size_t j = 0; j < problem.scans.size(); ++j)
-    problem.scans[j].t_O = solution.scans[j].t_O;
+  for (std::size_t j = 0; j < problem.scans.size(); ++j) problem.scans[j].t_O = solution.scans[j].t_O;
 
   std::size_t count = 0;
   for (std::size_t i = 0; i < scans_.size(); ++i) {
@@ -250,7 +251,8 @@ std::vector<ScanResult> BatchOdometry::results(const Run& run, const BatchSoluti
     result.T_IR = solution.extrinsics[result.scan.radar];
     result.T_IR_covariance = extrinsicsCovariance(solution.extrinsics_covariances[result.scan.radar]);
     result.solver_termination = solution.termination;
-    result.time_offset_sigma = options_.smoother.estimate_time_offset ? std::sqrt(solved.covariance(kState, kState)) : 0.0;
+    result.time_offset_sigma =
+        options_.smoother.estimate_time_offset ? std::sqrt(solved.covariance(kState, kState)) : 0.0;
   }
   std::vector<std::size_t> order(results.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;

@@ -96,7 +96,8 @@ std::vector<Block*> BatchSmoother::start(const BatchProblem& problem, const Stat
     const auto add = [&](Block& block, const Eigen::VectorXd& sigma) {
       addPrior(window, {&block}, {sigma.cwiseInverse().asDiagonal(), Eigen::VectorXd::Zero(sigma.size())});
     };
-    if (!options_.time_offset_shared) add(*offsets[k], sigmas.head<1>());
+    const double sigma = problem.time_offset_sigmas.empty() ? sigmas[0] : problem.time_offset_sigmas[k];
+    if (!options_.time_offset_shared) add(*offsets[k], Eigen::VectorXd::Constant(1, sigma));
     if (is_estimated) add(extrinsics, sigmas.tail(sigmas.size() - 1));
   }
   addPrior(window, known, {problem.prior.J, problem.prior.r0});
@@ -200,8 +201,7 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
     solution.nodes.clear();
     for (const Block* node : graph.nodes) solution.nodes.push_back({*node->time, toStateBlock(node->x)});
     solution.extrinsics.clear();
-    for (const Block* block : graph.extrinsics)
-      solution.extrinsics.push_back(toExtrinsics(block->x.data()));
+    for (const Block* block : graph.extrinsics) solution.extrinsics.push_back(toExtrinsics(block->x.data()));
     double moved = 0.0;  // [s]
     for (std::size_t i = 0; i < t_O.size(); ++i)
       moved = std::max(moved, std::abs(graph.scans[i].offset->x[0] - t_O[i]));
@@ -223,8 +223,10 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
 void BatchSmoother::read(const Graph& graph, const Solution& solved, BatchSolution& solution) const {
   const std::vector<std::map<int, Eigen::MatrixXd>> P = solved.elimination.covariances();
   std::unordered_map<const Block*, int> index;
-  for (const Block* block : solved.normal_equations.blocks) index.emplace(block, static_cast<int>(index.size()));
-  for (const Block* node : graph.nodes) solution.covariances.emplace_back(P[index.at(node)].at(index.at(node)));
+  for (const Block* block : solved.normal_equations.blocks)
+    index.emplace(block, static_cast<int>(index.size()));
+  for (const Block* node : graph.nodes)
+    solution.covariances.emplace_back(P[index.at(node)].at(index.at(node)));
   for (const Graph::Scan& scan : graph.scans) {
     std::vector<int> blocks = {index.at(graph.nodes[scan.node]), index.at(scan.offset)};
     if (!scan.extrinsics->is_constant) blocks.push_back(index.at(scan.extrinsics));
