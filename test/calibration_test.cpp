@@ -124,11 +124,12 @@ TEST_F(CombineExtrinsics, ARunGivesWhatItObserved) {
   Eigen::VectorXd only_x = sigmas(0.17, 0.05), only_y = only_x;
   only_x[0] = 0.001;
   only_y[1] = 0.001;
-  const CombinedExtrinsics combined = combine(
-      prior_, {estimate({0.06, 0.0, 0.0}, {0, 0, 0}, only_x), estimate({0.0, 0.03, 0.0}, {0, 0, 0}, only_y)});
-  EXPECT_TRUE(turnOf(combined.estimate).isApprox(Eigen::Vector3d(0.06, 0.03, 0.0), 0.03));
-  EXPECT_NEAR(std::sqrt(combined.estimate.covariance(0, 0)), 0.001, 1e-5);
-  EXPECT_NEAR(std::sqrt(combined.estimate.covariance(1, 1)), 0.001, 1e-5);
+  const CombinedExtrinsics combined = combine(prior_, {estimate({0.006, 0.0, 0.0}, {0, 0, 0}, only_x),
+                                                       estimate({0.0, 0.003, 0.0}, {0, 0, 0}, only_y)});
+  EXPECT_TRUE(turnOf(combined.estimate).isApprox(Eigen::Vector3d(0.006, 0.003, 0.0), 0.01));
+  // The tangents at the two runs differ by half of their turn, which mixes in 3 mrad of what is not known.
+  EXPECT_NEAR(std::sqrt(combined.estimate.covariance(0, 0)), 0.001, 2e-4);
+  EXPECT_NEAR(std::sqrt(combined.estimate.covariance(1, 1)), 0.001, 2e-4);
   EXPECT_NEAR(std::sqrt(combined.estimate.covariance(2, 2)), 0.17, 0.002);
   EXPECT_EQ(combined.agreement.degrees_of_freedom, 0);
 }

@@ -62,10 +62,10 @@ Given sorted(const ParameterEntries& entries, const std::vector<Config>& radars)
   return given;
 }
 
-double rounded(double value, double to) { return std::round(value / to) * to; }
+double rounded(double value, double per) { return std::round(value * per) / per; }
 
 /// As told to the last digit, else without digits that say nothing.
-double written(double value, double told, double to) { return value == told ? told : rounded(value, to); }
+double written(double value, double told, double per) { return value == told ? told : rounded(value, per); }
 
 std::string numberYaml(double value) {
   ParameterValue number;
@@ -74,16 +74,16 @@ std::string numberYaml(double value) {
 }
 
 template <typename Vector>
-std::string listYaml(const Vector& values, const Vector& told, double to) {
+std::string listYaml(const Vector& values, const Vector& told, double per) {
   std::string list = "[";
   for (Eigen::Index i = 0; i < values.size(); ++i)
-    list += (i == 0 ? "" : ", ") + numberYaml(written(values[i], told[i], to));
+    list += (i == 0 ? "" : ", ") + numberYaml(written(values[i], told[i], per));
   return list + "]";
 }
 
 /// The keys of a radar that are calibrated.
 Keys calibratedKeys(const RadarCalibration& calibration, const Config& told) {
-  constexpr double kMicro = 1e-6, kNano = 1e-9;
+  constexpr double kMicro = 1e6, kNano = 1e9;  // in one
   const SmootherOptions& smoother = told.odometry.smoother;
   const Extrinsics& mounting = told.odometry.T_IR;
   const bool offset_found =
@@ -95,7 +95,7 @@ Keys calibratedKeys(const RadarCalibration& calibration, const Config& told) {
   // A sigma below a microsecond would be written as zero.
   const OffsetEstimate offset =
       offset_found ? OffsetEstimate{rounded(calibration.offset.t_O, kMicro),
-                                    std::max(rounded(calibration.offset.sigma, kMicro), kMicro)}
+                                    std::max(rounded(calibration.offset.sigma, kMicro), 1.0 / kMicro)}
                    : OffsetEstimate{smoother.time_offset_initial, smoother.time_offset_sigma};
   keys.set("time_offset_initial", numberYaml(offset.t_O));
   keys.set("time_offset_sigma", numberYaml(offset.sigma));
