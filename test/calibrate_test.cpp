@@ -283,7 +283,26 @@ TEST_F(Calibrate, ABatchThatDoesNotConvergeDoesNotCount) {
   simulateBag(bag_, "difficult", 1, kOffset, truth_, 20.0);
   const Outcome outcome = calibrateBags({bag_}, {"--set", "batch_max_iterations=1"});
   EXPECT_EQ(outcome.status, 1);
-  expectSays(outcome.err, {bag_ + " does not count: the batch did not converge in", "batch_max_iterations"});
+  expectSays(outcome.err, {bag_ + " does not count: the batch did not converge", "batch_max_iterations"});
+}
+
+TEST(CalibrateFailure, MostScansDivergedDoesNotCount) {
+  RunSummary summary;
+  summary.radars[0].scans_total = 100;
+  summary.batch.emplace().converged = true;
+  summary.scans_diverged = 50;
+  EXPECT_EQ(failureOf(summary), "");
+  summary.scans_diverged = 51;
+  EXPECT_EQ(failureOf(summary), "the odometry diverged for 51 of 100 scans");
+}
+
+TEST_F(Calibrate, WhatIsFarFromWhatWasToldIsSaid) {
+  simulateBag(bag_, "difficult", 1, kOffset, truth_);
+  told_ = truth_;
+  const Outcome outcome = calibrateBags({bag_}, {"--set", "radar_axes=flu"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  expectSays(outcome.out, {"The turn about z is 9.", "are topic, axes, signs and units right?"});
+  EXPECT_EQ(countOf("away from it", outcome.out), 1u) << outcome.out;
 }
 
 TEST_F(Calibrate, WhatIsWrongIsNamedBeforeTheWork) {

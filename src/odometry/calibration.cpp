@@ -128,6 +128,7 @@ void calibrateOffset(const OffsetEstimate& told, const std::vector<RadarCalibrat
   calibration->offsets_agree = combined.agree;
   axis.found = combined.estimate.t_O;
   axis.sigma = combined.estimate.sigma;
+  axis.told_sigma = told.sigma;
   // Runs that disagree have each observed it.
   axis.verdict = combined.agree ? verdictOf(axis.sigma, told.sigma) : Verdict::kObserved;
   if (axis.verdict == Verdict::kObserved) calibration->offset = combined.estimate;
@@ -157,7 +158,8 @@ void calibrateExtrinsics(const ExtrinsicsEstimate& told, const std::vector<Radar
     AxisCalibration& axis = calibration->axes[first + static_cast<std::size_t>(k)];
     axis.found = i < 3 ? found[k] : combined.estimate.T_IR.l_I[k];
     axis.sigma = std::sqrt(combined.estimate.covariance(i, i));
-    axis.verdict = verdictOf(axis.sigma, std::sqrt(told.covariance(i, i)));
+    axis.told_sigma = std::sqrt(told.covariance(i, i));
+    axis.verdict = verdictOf(axis.sigma, axis.told_sigma);
     if (axis.verdict != Verdict::kObserved) continue;
     (i < 3 ? turn : calibration->T_IR.l_I)[k] = axis.found;
   }
@@ -263,6 +265,10 @@ bool RadarCalibration::allTurnsObserved() const {
        {CalibrationAxis::kTurnX, CalibrationAxis::kTurnY, CalibrationAxis::kTurnZ})
     if (axes[static_cast<std::size_t>(axis)].verdict != Verdict::kObserved) return false;
   return true;
+}
+
+double AxisCalibration::farFromTold() const {
+  return verdict == Verdict::kNotEstimated ? 0.0 : std::abs(found - told) / told_sigma;
 }
 
 RadarCalibration calibrate(const RadarCalibrationEstimate& told,

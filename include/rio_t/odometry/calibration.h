@@ -93,7 +93,11 @@ struct AxisCalibration {
   double told = 0.0;   ///< [s], [rad] zero, [m]
   double found = 0.0;  ///< a turn: about the axis of I, from what was told
   double sigma = 0.0;
+  double told_sigma = 0.0;  ///< zero: not estimated
   Verdict verdict = Verdict::kNotEstimated;
+
+  /// In sigmas of what was told; 0 if it is not estimated.
+  double farFromTold() const;
 };
 
 /// What is told of a radar, or what a run found. Sigma zero: not estimated.

@@ -37,7 +37,8 @@ struct Arguments {
 
 Arguments parse(const std::vector<std::string>& words) {
   Arguments arguments;
-  for (const GivenOption& option : readOptions(words, {"bag", "config", "output-dir", "set"}, {"print-config"})) {
+  for (const GivenOption& option :
+       readOptions(words, {"bag", "config", "output-dir", "set"}, {"print-config"})) {
     if (option.name == "help") arguments.help = true;
     if (option.name == "print-config") arguments.print_config = true;
     if (option.name == "bag") arguments.bag = option.value;

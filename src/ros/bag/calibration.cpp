@@ -35,19 +35,6 @@ RadarCalibrationEstimate foundOf(const RadarSummary& radar) {
           {radar.extrinsics->T_IR, radar.extrinsics->covariance}};
 }
 
-/// Why a run that ended does not count; empty if it does.
-std::string failureOf(const RunSummary& summary) {
-  if (!summary.batch->converged) {
-    return "the batch did not converge in " + std::to_string(summary.batch->iterations) +
-           " iterations (batch_max_iterations)";
-  }
-  if (2 * summary.scans_diverged > summary.scansTotal()) {
-    return "the odometry diverged for " + std::to_string(summary.scans_diverged) + " of " +
-           std::to_string(summary.scansTotal()) + " scans";
-  }
-  return "";
-}
-
 /// A folder for each bag, named after it: FOLDER/run, FOLDER/run_2.
 std::vector<std::string> foldersOf(const CalibrationRun& run) {
   std::vector<std::string> folders;
@@ -66,6 +53,15 @@ std::vector<std::string> foldersOf(const CalibrationRun& run) {
 EstimateExtrinsics estimatedExtrinsics(const Config& config) {
   const EstimateExtrinsics told = config.odometry.smoother.estimate_extrinsics;
   return told == EstimateExtrinsics::kNone ? EstimateExtrinsics::kPose : told;
+}
+
+std::string failureOf(const RunSummary& summary) {
+  if (2 * summary.scans_diverged > summary.scansTotal()) {
+    return "the odometry diverged for " + std::to_string(summary.scans_diverged) + " of " +
+           std::to_string(summary.scansTotal()) + " scans";
+  }
+  if (!summary.batch || !summary.batch->converged) return "the batch did not converge (batch_max_iterations)";
+  return "";
 }
 
 BagCalibration calibrateFromBags(const CalibrationRun& run) {

@@ -50,8 +50,16 @@ std::string axisRow(std::size_t axis, const AxisCalibration& values) {
   return row + "\n";
 }
 
-std::string differences(const CalibratedRadar& radar) {
+/// What a reader must not overlook.
+std::string remarks(const CalibratedRadar& radar) {
   std::string text;
+  for (std::size_t axis = 0; axis < kCalibrationAxes; ++axis) {
+    constexpr double kFar = 3.0;
+    const double far = radar.calibration.axes[axis].farFromTold();
+    if (far < kFar) continue;
+    text += std::string("  The ") + kAxes[axis].name + " is " + decimal(far, 1) +
+            " sigma of what was told away from it: are topic, axes, signs and units right?\n";
+  }
   if (!radar.calibration.offsets_agree) {
     std::string offsets;
     for (const OffsetEstimate& offset : radar.offsets)
@@ -77,7 +85,7 @@ std::string describeCalibration(const CalibratedRadar& radar) {
                       padded("told", 10, true) + padded("found", 10, true) + padded("sigma", 10, true) + "\n";
   for (std::size_t axis = 0; axis < kCalibrationAxes; ++axis)
     table += axisRow(axis, radar.calibration.axes[axis]);
-  return table + differences(radar);
+  return table + remarks(radar);
 }
 
 std::string describeCalibration(const BagCalibration& calibration) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "rio_t/odometry/calibration.h"
+#include "rio_t/ros/bag/run_output.h"
 #include "rio_t/ros/parameters/parameters.h"
 
 namespace rio_t {
@@ -39,6 +40,9 @@ struct BagCalibration {
 /// Solves each bag as a batch with offset and extrinsics of every radar, and combines the bags. A bag that
 /// fails, does not converge or diverged for most of its scans does not count.
 BagCalibration calibrateFromBags(const CalibrationRun& run);
+
+/// Why a run that ended does not count; empty if it does.
+std::string failureOf(const RunSummary& summary);
 
 /// What is estimated: `rotation` if the configuration says so, else `pose`. `none` is the default and means
 /// pose here.
