@@ -131,8 +131,8 @@ std::string summaryText(const RunSummary& summary, const std::vector<std::string
   line("initialized_from", summary.initialized_from.empty() ? "none" : summary.initialized_from);
   line("health_at_end", summary.health_at_end);
   line("divergences", summary.divergences);
-  line("scans_diverged", summary.scans_diverged);
   line("reinitializations", summary.reinitializations);
+  line("scans_diverged", summary.scans_diverged);
   line("path_length_m", fixedText(summary.path_length_m, 6));
   line("end_to_start_2d_m", fixedText(summary.end_to_start_2d_m, 6));
   line("end_to_start_3d_m", fixedText(summary.end_to_start_3d_m, 6));
