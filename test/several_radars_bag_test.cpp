@@ -123,6 +123,17 @@ TEST_F(TwoRadars, OneThatGivesNothingIsSaidAndTheOtherGoesOn) {
   expectError(runTwo({"--set", "radar_field_doppler=speed"}), {"topic /left: point cloud"});
 }
 
+TEST_F(TwoRadars, ABatchTakesTheSigmaOfEachSection) {
+  BagContents what;
+  what.radar_topics = kTwoTopics;
+  writeBag(what);
+  const Outcome outcome = runTwo({"--set", "mode=batch", "--set", "left/time_offset_sigma=0.01", "--set",
+                                  "right/time_offset_sigma=0.02"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  // At rest nothing is learned.
+  expectInSummary({"final_offset_sigma_s_left: 0.0100", "final_offset_sigma_s_right: 0.0200"});
+}
+
 TEST_F(TwoRadars, FilesOfAnEarlierRunAreNotTakenForItsOwn) {
   BagContents what;
   what.radar_topics = {"/left", "/right", "/sensor_platform/radar/scan"};

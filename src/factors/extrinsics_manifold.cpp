@@ -62,4 +62,10 @@ Eigen::Matrix<double, 6, 6> extrinsicsCovariance(const Eigen::MatrixXd& tangent)
   return result;
 }
 
+Eigen::MatrixXd tangentCovariance(const Eigen::Matrix<double, 6, 6>& ros, EstimateExtrinsics estimate) {
+  if (estimate == EstimateExtrinsics::kNone) return {};
+  if (estimate == EstimateExtrinsics::kRotation) return ros.bottomRightCorner<3, 3>();
+  return extrinsicsCovariance(ros);  // swaps the halves
+}
+
 }  // namespace rio_t

@@ -106,6 +106,7 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
     const OdometryOptions own = optionsOfRadar(options_, k);
     problem.mounting.push_back(own.T_IR);
     problem.time_offsets.push_back(own.smoother.time_offset_initial);
+    problem.time_offset_sigmas.push_back(own.smoother.time_offset_sigma);
   }
   problem.guess.push_back({start.time, start.prior.x0});
   std::vector<bool> stepped(problem.mounting.size(), false);

@@ -96,7 +96,8 @@ std::vector<Block*> BatchSmoother::start(const BatchProblem& problem, const Stat
     const auto add = [&](Block& block, const Eigen::VectorXd& sigma) {
       addPrior(window, {&block}, {sigma.cwiseInverse().asDiagonal(), Eigen::VectorXd::Zero(sigma.size())});
     };
-    if (!options_.time_offset_shared) add(*offsets[k], sigmas.head<1>());
+    const double sigma = problem.time_offset_sigmas.empty() ? sigmas[0] : problem.time_offset_sigmas[k];
+    if (!options_.time_offset_shared) add(*offsets[k], Eigen::VectorXd::Constant(1, sigma));
     if (is_estimated) add(extrinsics, sigmas.tail(sigmas.size() - 1));
   }
   addPrior(window, known, {problem.prior.J, problem.prior.r0});

@@ -40,5 +40,7 @@ class ExtrinsicsManifold final : public Manifold {
 /// Covariance in the order of ROS, translation [m^2] then turn [rad^2], of that of the tangent; zero where
 /// nothing is estimated and `tangent` is empty.
 Eigen::Matrix<double, 6, 6> extrinsicsCovariance(const Eigen::MatrixXd& tangent);
+/// The way back: empty for kNone.
+Eigen::MatrixXd tangentCovariance(const Eigen::Matrix<double, 6, 6>& ros, EstimateExtrinsics estimate);
 
 }  // namespace rio_t

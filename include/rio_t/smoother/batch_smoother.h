@@ -38,8 +38,9 @@ struct BatchProblem {
   NodePrior prior;                   ///< on it, and on the calibration of `radar`
   std::size_t radar = 0;             ///< which one the prior knows
   std::vector<Extrinsics> mounting;  ///< of each radar: as told, and where the solver starts
-  /// Priors on t_O of the radars [s], with time_offset_sigma; not used for `radar`. Empty: zero.
-  std::vector<double> time_offsets;
+  /// Priors on t_O of the radars [s]; not used for `radar`. Empty: zero, and time_offset_sigma of the
+  /// options.
+  std::vector<double> time_offsets, time_offset_sigmas;
   std::vector<BatchScan> scans;
   /// Initial states in order of time, at least one. The IMU carries them to the nodes.
   std::vector<NodeEstimate> guess;

@@ -4,6 +4,7 @@
 #include <rosbag/view.h>
 
 #include <chrono>
+#include <memory>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -132,11 +133,18 @@ class BagJob {
     std::tie(begin_, end_) = playedSpan(run.bag, bag_, config);
     // Before the work, so that a wrong path costs no time.
     if (!config.ground_truth.empty()) truth_ = readTum(config.ground_truth);
-    output_.emplace(run.output_folder, files_);
+    output_ = openOutput("");
     started_ = std::chrono::steady_clock::now();
   }
 
   RunSummary execute() {
+    RunSummary summary = inMode();
+    if (run_.progress) run_.progress(1.0);
+    return summary;
+  }
+
+ private:
+  RunSummary inMode() {
     switch (run_.config.mode) {
       case RunMode::kOnline:
         return online();
@@ -148,12 +156,11 @@ class BagJob {
     throw std::invalid_argument("not a RunMode");
   }
 
- private:
   RunSummary online() {
-    RunLog log(run_.config, &*output_, nothingTakenOff());
+    RunLog log(run_.config, output_.get(), nothingTakenOff());
     BagPlayer player(run_.config, &log, nullptr);
     play(player, run_.config, 0.0, 1.0);
-    return finish(player.summary(), log, *output_);
+    return finish(player.summary(), log, output_.get());
   }
 
   RunSummary batch() {
@@ -161,14 +168,14 @@ class BagJob {
     BatchOptions batch_options;
     batch_options.max_iterations = run_.config.batch_max_iterations;
     BatchOdometry recorder(options, batch_options);
-    RunOutput online_output(run_.output_folder + "/online", files_);
-    RunLog online_log(run_.config, &online_output, nothingTakenOff());
+    const std::unique_ptr<RunOutput> online_output = openOutput("/online");
+    RunLog online_log(run_.config, online_output.get(), nothingTakenOff());
     BagPlayer player(run_.config, &online_log, &recorder);
     play(player, run_.config, 0.0, 0.9);
-    finish(player.summary(), online_log, online_output);
+    finish(player.summary(), online_log, online_output.get());
 
     const BatchResult result = recorder.solve(*player.start());
-    RunLog log(run_.config, &*output_, nothingTakenOff());
+    RunLog log(run_.config, output_.get(), nothingTakenOff());
     for (const NavigationState& state : result.trajectory) log.addState(state);
     for (ScanResult scan : result.scans) log.addResult(scan);
     RunSummary summary;
@@ -178,7 +185,7 @@ class BagJob {
     log.fill(&summary);
     summary.solver_terminations = {{toString(result.solution.termination), 1}};
     player.countInput(&summary);
-    return finish(std::move(summary), log, *output_);
+    return finish(std::move(summary), log, output_.get());
   }
 
   /// The offset found is taken off the stamps, and the rest is estimated from the prior of the first pass:
@@ -191,10 +198,9 @@ class BagJob {
       Config config = run_.config;
       if (pass > 1) takeOff(taken_off, &config);
       const bool last = pass == passes;
-      std::optional<RunOutput> earlier;
-      if (!last) earlier.emplace(run_.output_folder + "/pass_" + std::to_string(pass), files_);
-      RunOutput& output = last ? *output_ : *earlier;
-      RunLog log(config, &output, taken_off);
+      const std::unique_ptr<RunOutput> earlier = last ? nullptr : openOutput("/pass_" + std::to_string(pass));
+      RunOutput* output = last ? output_.get() : earlier.get();
+      RunLog log(config, output, taken_off);
       BagPlayer player(config, &log, nullptr);
       play(player, config, (pass - 1.0) / passes, static_cast<double>(pass) / passes);
       RunSummary summary = player.summary();
@@ -210,6 +216,12 @@ class BagJob {
       summary = finish(std::move(summary), log, output);
       if (last) return summary;
     }
+  }
+
+  /// Null if no files are wanted.
+  std::unique_ptr<RunOutput> openOutput(const std::string& subfolder) const {
+    if (run_.output_folder.empty()) return nullptr;
+    return std::make_unique<RunOutput>(run_.output_folder + subfolder, files_);
   }
 
   std::vector<double> nothingTakenOff() const { return std::vector<double>(files_.radars.size(), 0.0); }
@@ -234,9 +246,8 @@ class BagJob {
   }
 
   /// Adds speed and errors, and saves.
-  RunSummary finish(RunSummary summary, RunLog& log, RunOutput& output) {
+  RunSummary finish(RunSummary summary, RunLog& log, RunOutput* output) {
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - started_;
-    if (&output == &*output_ && run_.progress) run_.progress(1.0);
     warnOfSilentRadars(run_.config, &summary);
     summary.estimation_seconds = took.count();
     summary.realtime_factor = (end_ - begin_).toSec() / took.count();
@@ -252,7 +263,7 @@ class BagJob {
         truth_error.emplace("ground truth " + name + ": " + error.what());
       }
     }
-    output.finish(summary);
+    if (output != nullptr) output->finish(summary);
     if (truth_error) throw *truth_error;  // the estimate is saved all the same
     return summary;
   }
@@ -264,7 +275,7 @@ class BagJob {
   ros::Time begin_, end_;
   bool truth_in_bag_ = false;
   Trajectory truth_;
-  std::optional<RunOutput> output_;
+  std::unique_ptr<RunOutput> output_;  // null: no files
   std::chrono::steady_clock::time_point started_;
 };
 

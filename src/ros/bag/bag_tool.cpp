@@ -1,12 +1,10 @@
 #include "rio_t/ros/bag/bag_tool.h"
 
-#include <unistd.h>
-
-#include <cstdio>
 #include <exception>
 #include <ostream>
 #include <stdexcept>
 
+#include "command_line.h"
 #include "rio_t/ros/bag/bag_runner.h"
 
 namespace rio_t {
@@ -39,37 +37,16 @@ struct Arguments {
 
 Arguments parse(const std::vector<std::string>& words) {
   Arguments arguments;
-  for (std::size_t i = 0; i < words.size(); ++i) {
-    std::string name = words[i];
-    if (name.rfind("__", 0) == 0 && name.find(":=") != std::string::npos) continue;  // roslaunch's remappings
-    if (name == "--help" || name == "-h") {
-      arguments.help = true;
-      return arguments;
-    }
-    if (name == "--print-config") {
-      arguments.print_config = true;
-      continue;
-    }
-    std::string value;
-    const std::size_t equals = name.find('=');
-    const bool joined = name.rfind("--", 0) == 0 && equals != std::string::npos;
-    if (joined) {
-      value = name.substr(equals + 1);
-      name.resize(equals);
-    }
-    const bool known = name == "--bag" || name == "--config" || name == "--output-dir" || name == "--set";
-    if (!known) throw std::invalid_argument("unknown argument " + words[i] + " (see --help)");
-    if (!joined) {
-      if (i + 1 == words.size())
-        throw std::invalid_argument(name + ": expected a value after it (see --help)");
-      value = words[++i];
-    }
-    if (value.empty()) throw std::invalid_argument(name + ": expected a value, got nothing (see --help)");
-    if (name == "--bag") arguments.bag = value;
-    if (name == "--config") arguments.config = value;
-    if (name == "--output-dir") arguments.output_folder = value;
-    if (name == "--set") arguments.set.push_back(parseAssignment(value));
+  for (const GivenOption& option :
+       readOptions(words, {"bag", "config", "output-dir", "set"}, {"print-config"})) {
+    if (option.name == "help") arguments.help = true;
+    if (option.name == "print-config") arguments.print_config = true;
+    if (option.name == "bag") arguments.bag = option.value;
+    if (option.name == "config") arguments.config = option.value;
+    if (option.name == "output-dir") arguments.output_folder = option.value;
+    if (option.name == "set") arguments.set.push_back(parseAssignment(option.value));
   }
+  if (arguments.help) return arguments;
   if (arguments.print_config) return arguments;
   std::string missing;
   if (arguments.bag.empty()) missing += " --bag";
@@ -77,15 +54,6 @@ Arguments parse(const std::vector<std::string>& words) {
   if (arguments.output_folder.empty()) missing += " --output-dir";
   if (!missing.empty()) throw std::invalid_argument("missing argument" + missing + " (see --help)");
   return arguments;
-}
-
-void showProgress(double done) {
-  const int width = 40;
-  const int filled = static_cast<int>(done * width);
-  const std::string bar = std::string(static_cast<std::size_t>(filled), '#') +
-                          std::string(static_cast<std::size_t>(width - filled), ' ');
-  std::fprintf(stderr, "\r[%s] %3d %%", bar.c_str(), static_cast<int>(100.0 * done));
-  if (done >= 1.0) std::fprintf(stderr, "\n");
 }
 
 int run(const Arguments& arguments, std::ostream& out, std::ostream& err) {
@@ -102,7 +70,7 @@ int run(const Arguments& arguments, std::ostream& out, std::ostream& err) {
     return 0;
   }
   BagRun bag_run{arguments.bag, arguments.output_folder, config, nullptr};
-  if (isatty(STDERR_FILENO) != 0) bag_run.progress = showProgress;
+  bag_run.progress = progressBar();
   const RunSummary summary = runBag(bag_run);
   for (const std::string& warning : summary.warnings) err << "rio_t_bag: warning: " << warning << "\n";
   out << arguments.bag << "\n" << describeRun(summary, arguments.output_folder);

@@ -1,5 +1,7 @@
 #include "run_log.h"
 
+#include "rio_t/smoother/node_prior.h"
+
 namespace rio_t {
 namespace {
 
@@ -16,13 +18,17 @@ RadarSummary before(const std::string& name, const OdometryOptions& options) {
   radar.extrinsics->rotation_sigma.setConstant(smoother.extrinsics_rotation_sigma);
   if (smoother.estimate_extrinsics == EstimateExtrinsics::kPose)
     radar.extrinsics->translation_sigma.setConstant(smoother.extrinsics_translation_sigma);
+  const Eigen::VectorXd sigmas = calibrationSigmas(smoother);
+  radar.extrinsics->covariance = sigmas.tail(sigmas.size() - 1).cwiseAbs2().asDiagonal();
   return radar;
 }
 
 }  // namespace
 
 RunLog::RunLog(const Config& config, RunOutput* output, const std::vector<double>& taken_off)
-    : output_(output), offset_shared_(config.odometry.smoother.time_offset_shared) {
+    : output_(output),
+      offset_shared_(config.odometry.smoother.time_offset_shared),
+      estimate_extrinsics_(config.odometry.smoother.estimate_extrinsics) {
   const std::vector<std::string> names = runFiles(config).radars;
   for (std::size_t k = 0; k < names.size(); ++k) {
     Radar& radar = radars_.emplace_back();
@@ -53,6 +59,7 @@ void RunLog::addResult(ScanResult& result) {
   } else if (!result.rejected_because.empty()) {
     ++radar.summary.scans_rejected[result.rejected_because];
   }
+  if (result.health == Health::kDiverged) ++scans_diverged_;
   if (!result.updated) return;
   ++terminations_[result.solver_termination];
   for (Radar& each : radars_) {
@@ -65,6 +72,7 @@ void RunLog::addResult(ScanResult& result) {
   radar.summary.extrinsics->T_IR = result.T_IR;
   radar.summary.extrinsics->translation_sigma = sigmas.head<3>();
   radar.summary.extrinsics->rotation_sigma = sigmas.tail<3>();
+  radar.summary.extrinsics->covariance = tangentCovariance(result.T_IR_covariance, estimate_extrinsics_);
 }
 
 void RunLog::fill(RunSummary* summary) const {
@@ -72,6 +80,7 @@ void RunLog::fill(RunSummary* summary) const {
   for (const Radar& radar : radars_) summary->radars.push_back(radar.summary);
   for (const auto& [termination, count] : terminations_)
     summary->solver_terminations[toString(termination)] = count;
+  summary->scans_diverged = scans_diverged_;
   summary->path_length_m = path_length_m_;
   if (trajectory_.empty()) return;
   const Eigen::Vector3d moved = trajectory_.back().p_W - trajectory_.front().p_W;

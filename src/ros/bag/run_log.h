@@ -33,9 +33,11 @@ class RunLog {
 
   RunOutput* output_;
   bool offset_shared_;
+  EstimateExtrinsics estimate_extrinsics_;
   std::vector<Radar> radars_;
   Trajectory trajectory_;
   std::map<SolverTermination, std::uint64_t> terminations_;
+  std::uint64_t scans_diverged_ = 0;
   std::optional<StampedPose> newest_optimized_;
   double path_length_m_ = 0.0;
 };

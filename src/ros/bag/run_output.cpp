@@ -132,6 +132,7 @@ std::string summaryText(const RunSummary& summary, const std::vector<std::string
   line("health_at_end", summary.health_at_end);
   line("divergences", summary.divergences);
   line("reinitializations", summary.reinitializations);
+  line("scans_diverged", summary.scans_diverged);
   line("path_length_m", fixedText(summary.path_length_m, 6));
   line("end_to_start_2d_m", fixedText(summary.end_to_start_2d_m, 6));
   line("end_to_start_3d_m", fixedText(summary.end_to_start_3d_m, 6));

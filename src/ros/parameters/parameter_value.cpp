@@ -13,6 +13,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "parameter_list.h"
+
 namespace rio_t {
 namespace {
 
@@ -154,6 +156,28 @@ ParameterValue parsePlainScalar(const std::string& text) {
     return {std::numeric_limits<double>::infinity()};  // 1e999
   }
   return {text};
+}
+
+std::string ParameterValue::yaml() const {
+  struct Write {
+    std::string operator()(std::monostate) const { return ""; }
+    std::string operator()(bool value) const { return value ? "true" : "false"; }
+    std::string operator()(std::int64_t value) const { return std::to_string(value); }
+    std::string operator()(double value) const { return numberText(value); }
+    std::string operator()(const std::string& value) const { return quotedText(value); }
+    std::string operator()(const List& list) const {
+      std::string text = "[";
+      for (const ParameterValue& value : list) text += (text.size() > 1 ? ", " : "") + value.yaml();
+      return text + "]";
+    }
+    std::string operator()(const Map& map) const {
+      std::string text = "{";
+      for (const ParameterEntry& entry : map)
+        text += (text.size() > 1 ? ", " : "") + entry.key + ": " + entry.value.yaml();
+      return text + "}";
+    }
+  };
+  return std::visit(Write{}, data);
 }
 
 ParameterEntries readParameterFile(const std::string& path) {

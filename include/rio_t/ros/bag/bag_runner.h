@@ -10,7 +10,7 @@ namespace rio_t {
 
 struct BagRun {
   std::string bag;            ///< path
-  std::string output_folder;  ///< made if need be
+  std::string output_folder;  ///< made if need be; empty: no files
   Config config;
   std::function<void(double)> progress;  ///< share of the bag done, 0 to 1; may be empty
 };

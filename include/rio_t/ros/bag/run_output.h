@@ -34,6 +34,8 @@ struct ExtrinsicsSummary {
   Extrinsics told, T_IR;
   Eigen::Vector3d translation_sigma = Eigen::Vector3d::Zero();  ///< [m]; zero where not estimated
   Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Zero();     ///< [rad] about the axes of I
+  /// In the tangent of ExtrinsicsManifold: 3x3 of the turn, or 6x6 of turn and lever arm. Not in the file.
+  Eigen::MatrixXd covariance;
 };
 
 /// What a run comes to for one radar. With several radars its keys in `summary.yaml` end in its name.
@@ -66,6 +68,7 @@ struct RunSummary {
   std::string health_at_end = "ok";   ///< "ok", "coasting", "diverged"
   std::uint64_t divergences = 0;
   std::uint64_t reinitializations = 0;
+  std::uint64_t scans_diverged = 0;  ///< after which the health was "diverged"
   double path_length_m = 0.0;      ///< of the optimised poses
   double end_to_start_2d_m = 0.0;  ///< of the causal trajectory, horizontal
   double end_to_start_3d_m = 0.0;

@@ -20,6 +20,8 @@ struct ParameterValue {
 
   /// For messages: `0.25`, `"text"`, `[1, 2]`, `nothing`.
   std::string describe() const;
+  /// As it stands in a parameter file: it reads back as the same value.
+  std::string yaml() const;
 };
 
 /// What plain (unquoted) YAML text stands for: truth value, integer, number, nothing, else text.

@@ -1,0 +1,123 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "rio_t/factors/extrinsics_manifold.h"
+#include "rio_t/radar/extrinsics.h"
+
+/// The calibration of a radar from several runs (docs/method.md, section 14).
+namespace rio_t {
+
+/// Mean and covariance in a vector space.
+struct Gaussian {
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+};
+
+/// Whether several runs say the same. A direction counts for a run that observed it.
+struct Agreement {
+  double chi_squared = 0.0;    ///< of the runs about their common mean
+  int degrees_of_freedom = 0;  ///< 0: no direction was observed by two runs, and nothing can disagree
+
+  /// chi_squared is as likely as 2.6 sigma or less of one number: beyond it lies one case in a hundred.
+  bool agree() const;
+  /// Factor on the sigmas of the runs with which chi_squared would be what is expected; 1 if they agree.
+  double widening() const;
+};
+
+struct Combined {
+  Gaussian estimate;
+  Agreement agreement;
+};
+
+/// What runs with the same prior say together. Their posteriors share that prior, so it must count once:
+/// L = L0 + sum (L_i - L0). If the runs disagree, what they add to the prior counts as little as `widening`
+/// asks.
+Combined combine(const Gaussian& prior, const std::vector<Gaussian>& posteriors);
+
+/// Extrinsics with their covariance in the tangent of ExtrinsicsManifold: 3x3 of a turn, or 6x6 of turn and
+/// lever arm.
+struct ExtrinsicsEstimate {
+  Extrinsics T_IR;
+  Eigen::MatrixXd covariance;
+};
+
+struct CombinedExtrinsics {
+  ExtrinsicsEstimate estimate;
+  Agreement agreement;
+};
+
+/// The same for extrinsics, in the tangent at the first posterior.
+CombinedExtrinsics combine(const ExtrinsicsEstimate& prior,
+                           const std::vector<ExtrinsicsEstimate>& posteriors);
+
+/// Time offset of a radar.
+struct OffsetEstimate {
+  double t_O = 0.0;    ///< [s]
+  double sigma = 0.0;  ///< [s]
+};
+
+struct CombinedOffset {
+  OffsetEstimate estimate;
+  /// False: each run may have its own offset. The estimate is then their mean, with a sigma that covers their
+  /// scatter.
+  bool agree = true;
+};
+
+CombinedOffset combine(const OffsetEstimate& prior, const std::vector<OffsetEstimate>& posteriors);
+
+/// A number is observed if its sigma is at most this share of what it was when it was told. The runs then say
+/// three times as much of it as what was told: 1 / 0.5^2 = 1 + 3. Above that, much of the number found is the
+/// number told.
+inline constexpr double kObservedSigmaShare = 0.5;
+
+enum class Verdict {
+  kObserved,
+  kNotObserved,
+  kNotEstimated,  ///< it is as told
+};
+std::string toString(Verdict verdict);  ///< "observed", "not observed", "not estimated"
+
+/// What is calibrated of a radar, in the order of RadarCalibration::axes.
+enum class CalibrationAxis { kOffset, kTurnX, kTurnY, kTurnZ, kLeverX, kLeverY, kLeverZ };
+inline constexpr std::size_t kCalibrationAxes = 7;
+
+/// How the platform has to move to make it observed: "change speed or turn quickly".
+std::string whatToMove(CalibrationAxis axis);
+
+struct AxisCalibration {
+  double told = 0.0;   ///< [s], [rad] zero, [m]
+  double found = 0.0;  ///< a turn: about the axis of I, from what was told
+  double sigma = 0.0;
+  double told_sigma = 0.0;  ///< zero: not estimated
+  Verdict verdict = Verdict::kNotEstimated;
+
+  /// In sigmas of what was told; 0 if it is not estimated.
+  double farFromTold() const;
+};
+
+/// What is told of a radar, or what a run found. Sigma zero: not estimated.
+struct RadarCalibrationEstimate {
+  OffsetEstimate offset;
+  ExtrinsicsEstimate extrinsics;
+};
+
+struct RadarCalibration {
+  std::array<AxisCalibration, kCalibrationAxes> axes;  ///< by CalibrationAxis
+  OffsetEstimate offset;                               ///< as told if it is not observed
+  Extrinsics T_IR;                                     ///< likewise, each axis by itself
+  bool offsets_agree = true;
+  Agreement extrinsics_agreement;
+
+  bool allTurnsObserved() const;
+};
+
+/// `runs`: at least one.
+RadarCalibration calibrate(const RadarCalibrationEstimate& told,
+                           const std::vector<RadarCalibrationEstimate>& runs);
+
+}  // namespace rio_t

@@ -1,0 +1,175 @@
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "rio_t/ros/bag/calibration.h"
+
+namespace rio_t {
+namespace {
+
+/// Keys in the order in which they came, each once.
+class Keys {
+ public:
+  /// The later value holds.
+  void set(const std::string& key, const std::string& value) {
+    for (auto& [known, old] : keys_) {
+      if (known == key) {
+        old = value;
+        return;
+      }
+    }
+    keys_.emplace_back(key, value);
+  }
+  void remove(const std::string& key) {
+    keys_.erase(
+        std::remove_if(keys_.begin(), keys_.end(), [&](const auto& each) { return each.first == key; }),
+        keys_.end());
+  }
+  std::string yaml(const std::string& indent) const {
+    std::string text;
+    for (const auto& [key, value] : keys_) text += indent + key + ": " + value + "\n";
+    return text;
+  }
+
+ private:
+  std::vector<std::pair<std::string, std::string>> keys_;  // values as YAML
+};
+
+/// What the user gave: the top level, and the section of each radar.
+struct Given {
+  Keys top_level;
+  std::map<std::string, Keys> sections;
+};
+
+Given sorted(const ParameterEntries& entries, const std::vector<Config>& radars) {
+  Given given;
+  for (const ParameterEntry& entry : entries) {
+    const std::size_t slash = entry.key.find('/');
+    const bool is_radar = std::any_of(radars.begin(), radars.end(),
+                                      [&](const Config& radar) { return radar.radar_name == entry.key; });
+    if (slash != std::string::npos) {
+      given.sections[entry.key.substr(0, slash)].set(entry.key.substr(slash + 1), entry.value.yaml());
+    } else if (!is_radar) {
+      given.top_level.set(entry.key, entry.value.yaml());
+    } else if (const auto* nested = std::get_if<ParameterValue::Map>(&entry.value.data)) {
+      for (const ParameterEntry& own : *nested) given.sections[entry.key].set(own.key, own.value.yaml());
+    }
+  }
+  return given;
+}
+
+double rounded(double value, double per) { return std::round(value * per) / per; }
+
+/// As told to the last digit, else without digits that say nothing.
+double written(double value, double told, double per) { return value == told ? told : rounded(value, per); }
+
+std::string numberYaml(double value) {
+  ParameterValue number;
+  number.data = value;
+  return number.yaml();
+}
+
+template <typename Vector>
+std::string listYaml(const Vector& values, const Vector& told, double per) {
+  std::string list = "[";
+  for (Eigen::Index i = 0; i < values.size(); ++i)
+    list += (i == 0 ? "" : ", ") + numberYaml(written(values[i], told[i], per));
+  return list + "]";
+}
+
+/// The keys of a radar that are calibrated.
+Keys calibratedKeys(const RadarCalibration& calibration, const Config& told) {
+  constexpr double kMicro = 1e6, kNano = 1e9;  // in one
+  const SmootherOptions& smoother = told.odometry.smoother;
+  const Extrinsics& mounting = told.odometry.T_IR;
+  const bool offset_found =
+      calibration.axes[static_cast<std::size_t>(CalibrationAxis::kOffset)].verdict == Verdict::kObserved;
+  Keys keys;
+  keys.set("extrinsics_translation", listYaml(calibration.T_IR.l_I, mounting.l_I, kMicro));
+  keys.set("extrinsics_rotation_xyzw",
+           listYaml(calibration.T_IR.q_IR.coeffs(), mounting.q_IR.coeffs(), kNano));
+  // A sigma below a microsecond would be written as zero.
+  const OffsetEstimate offset =
+      offset_found ? OffsetEstimate{rounded(calibration.offset.t_O, kMicro),
+                                    std::max(rounded(calibration.offset.sigma, kMicro), 1.0 / kMicro)}
+                   : OffsetEstimate{smoother.time_offset_initial, smoother.time_offset_sigma};
+  keys.set("time_offset_initial", numberYaml(offset.t_O));
+  keys.set("time_offset_sigma", numberYaml(offset.sigma));
+  return keys;
+}
+
+/// Each line of `text` as a comment; a file name may hold what would end one.
+std::string commented(const std::string& text, const std::string& indent) {
+  std::string result;
+  bool starts = true;
+  for (const char c : text) {
+    if (starts) result += indent + "# ";
+    starts = c == '\n';
+    const bool is_control = (c >= 0 && c < ' ') || c == '\x7f';
+    result += is_control && c != '\n' ? '?' : c;
+  }
+  return result;
+}
+
+std::string oneLine(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', '?');
+  return text;
+}
+
+std::string header(const BagCalibration& calibration, const std::string& name) {
+  std::string text =
+      "Written by rio_t calibrate. It is ready for --config of rio_t_bag, and for the live node.\n";
+  text += "It holds the keys of " + oneLine(name) +
+          " and of --set. The comments of that file are not repeated here.\nBags that count:\n";
+  for (const CalibrationBag& bag : calibration.bags)
+    if (bag.failure.empty()) text += "  " + oneLine(bag.path) + "\n";
+  for (const CalibrationBag& bag : calibration.bags)
+    if (!bag.failure.empty()) text += "This one failed and does not count: " + oneLine(bag.path) + "\n";
+  text +=
+      "Turns are about the axes of the IMU, from the mounting that was told. What is not observed stays as "
+      "told.\n";
+  return commented(text, "");
+}
+
+std::string estimateNext(bool all_turns_observed) {
+  if (all_turns_observed) {
+    return "# The bags show every turn of the mounting, so the next run need not estimate it.\n"
+           "estimate_extrinsics: none\n";
+  }
+  return "# The bags do not show every turn of the mounting, so the next run goes on with the estimate.\n"
+         "estimate_extrinsics: rotation\n";
+}
+
+}  // namespace
+
+std::string calibratedYaml(const BagCalibration& calibration, const Config& config,
+                           const ParameterEntries& given, const std::string& name) {
+  const std::vector<Config> told = configsOfRadars(config);
+  Given entries = sorted(given, config.radars);
+  entries.top_level.remove("estimate_extrinsics");
+  const bool all_turns_observed =
+      std::all_of(calibration.radars.begin(), calibration.radars.end(),
+                  [](const CalibratedRadar& radar) { return radar.calibration.allTurnsObserved(); });
+  const bool has_sections = !config.radars.empty();
+  std::string sections;
+  for (std::size_t k = 0; k < told.size(); ++k) {
+    const CalibratedRadar& radar = calibration.radars[k];
+    const std::string indent = has_sections ? "  " : "";
+    Keys& own = has_sections ? entries.sections[radar.name] : entries.top_level;
+    for (const char* key :
+         {"extrinsics_translation", "extrinsics_rotation_xyzw", "time_offset_initial", "time_offset_sigma"})
+      own.remove(key);
+    if (has_sections) sections += "\n" + radar.name + ":\n" + own.yaml(indent);
+    sections += (has_sections ? "" : "\n") + commented(describeCalibration(radar), indent) + indent +
+                "# If the driver's restart changes the offset, raise time_offset_sigma.\n" +
+                calibratedKeys(radar.calibration, told[k]).yaml(indent);
+  }
+  return header(calibration, name) + "\n" + entries.top_level.yaml("") + "\n" +
+         estimateNext(all_turns_observed) + sections;
+}
+
+}  // namespace rio_t

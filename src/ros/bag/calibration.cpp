@@ -1,0 +1,99 @@
+#include "rio_t/ros/bag/calibration.h"
+
+#include <exception>
+#include <filesystem>
+#include <set>
+#include <utility>
+
+#include "rio_t/ros/bag/bag_runner.h"
+#include "rio_t/smoother/node_prior.h"
+
+namespace rio_t {
+namespace {
+
+Config batchConfig(const Config& config) {
+  Config batch = config;
+  batch.mode = RunMode::kBatch;
+  batch.odometry.smoother.estimate_extrinsics = estimatedExtrinsics(config);
+  for (Config& radar : batch.radars)
+    radar.odometry.smoother.estimate_extrinsics = batch.odometry.smoother.estimate_extrinsics;
+  return batch;
+}
+
+RadarCalibrationEstimate toldOf(const Config& radar) {
+  const SmootherOptions& smoother = radar.odometry.smoother;
+  const Eigen::VectorXd sigmas = calibrationSigmas(smoother);
+  RadarCalibrationEstimate told;
+  told.offset = {smoother.time_offset_initial,
+                 smoother.estimate_time_offset ? smoother.time_offset_sigma : 0.0};
+  told.extrinsics = {radar.odometry.T_IR, sigmas.tail(sigmas.size() - 1).cwiseAbs2().asDiagonal()};
+  return told;
+}
+
+RadarCalibrationEstimate foundOf(const RadarSummary& radar) {
+  return {{radar.final_offset_s, radar.final_offset_sigma_s},
+          {radar.extrinsics->T_IR, radar.extrinsics->covariance}};
+}
+
+/// A folder for each bag, named after it: FOLDER/run, FOLDER/run_2.
+std::vector<std::string> foldersOf(const CalibrationRun& run) {
+  std::vector<std::string> folders;
+  std::set<std::string> taken;
+  for (const std::string& bag : run.bags) {
+    const std::string stem = std::filesystem::path(bag).stem().string();
+    std::string name = stem;
+    for (int k = 2; !taken.insert(name).second; ++k) name = stem + "_" + std::to_string(k);
+    folders.push_back(run.output_folder.empty() ? "" : run.output_folder + "/" + name);
+  }
+  return folders;
+}
+
+}  // namespace
+
+EstimateExtrinsics estimatedExtrinsics(const Config& config) {
+  const EstimateExtrinsics told = config.odometry.smoother.estimate_extrinsics;
+  return told == EstimateExtrinsics::kNone ? EstimateExtrinsics::kPose : told;
+}
+
+std::string failureOf(const RunSummary& summary) {
+  if (2 * summary.scans_diverged > summary.scansTotal()) {
+    return "the odometry diverged for " + std::to_string(summary.scans_diverged) + " of " +
+           std::to_string(summary.scansTotal()) + " scans";
+  }
+  if (!summary.batch || !summary.batch->converged) return "the batch did not converge (batch_max_iterations)";
+  return "";
+}
+
+BagCalibration calibrateFromBags(const CalibrationRun& run) {
+  const Config config = batchConfig(run.config);
+  const std::vector<std::string> folders = foldersOf(run);
+  BagCalibration result;
+  std::vector<RunSummary> summaries;  // of the bags that count
+  for (std::size_t i = 0; i < run.bags.size(); ++i) {
+    CalibrationBag& bag = result.bags.emplace_back();
+    bag.path = run.bags[i];
+    try {
+      RunSummary summary = runBag({bag.path, folders[i], config, run.progress});
+      bag.warnings = summary.warnings;
+      bag.failure = failureOf(summary);
+      if (bag.failure.empty()) summaries.push_back(std::move(summary));
+    } catch (const std::exception& error) {
+      bag.failure = error.what();
+    }
+  }
+  if (summaries.empty()) return result;
+  const std::vector<Config> radars = configsOfRadars(config);
+  for (std::size_t k = 0; k < radars.size(); ++k) {
+    CalibratedRadar& radar = result.radars.emplace_back();
+    radar.name = radars[k].radar_name;
+    std::vector<RadarCalibrationEstimate> found;
+    for (const RunSummary& summary : summaries) {
+      found.push_back(foundOf(summary.radars[k]));
+      radar.offsets.push_back(found.back().offset);
+    }
+    radar.calibration = calibrate(toldOf(radars[k]), found);
+  }
+  return result;
+}
+
+}  // namespace rio_t

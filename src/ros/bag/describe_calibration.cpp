@@ -1,0 +1,104 @@
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "rio_t/ros/bag/calibration.h"
+#include "rio_t/ros/bag/run_output.h"
+
+namespace rio_t {
+namespace {
+
+constexpr double kDegreesPerRadian = 180.0 / 3.14159265358979323846;
+
+struct AxisText {
+  const char* name;
+  const char* unit;
+  double per;  ///< so many units in one of AxisCalibration
+  int decimals;
+};
+/// By CalibrationAxis.
+constexpr std::array<AxisText, kCalibrationAxes> kAxes = {{
+    {"time offset", "ms", 1e3, 2},
+    {"turn about x", "deg", kDegreesPerRadian, 2},
+    {"turn about y", "deg", kDegreesPerRadian, 2},
+    {"turn about z", "deg", kDegreesPerRadian, 2},
+    {"lever arm x", "mm", 1e3, 1},
+    {"lever arm y", "mm", 1e3, 1},
+    {"lever arm z", "mm", 1e3, 1},
+}};
+
+std::string decimal(double value, int decimals) {
+  std::string text;
+  appendFixed(&text, value, decimals);
+  return text;
+}
+
+std::string padded(const std::string& text, std::size_t width, bool to_the_right) {
+  const std::string blanks(text.size() < width ? width - text.size() : 0, ' ');
+  return to_the_right ? blanks + text : text + blanks;
+}
+
+std::string axisRow(std::size_t axis, const AxisCalibration& values) {
+  const AxisText& text = kAxes[axis];
+  const auto column = [&](double value) {
+    return padded(decimal(text.per * value, text.decimals), 10, true);
+  };
+  std::string row = "  " + padded(text.name, 14, false) + padded(text.unit, 4, false) + column(values.told) +
+                    column(values.found) + column(values.sigma) + "   " + toString(values.verdict);
+  if (values.verdict == Verdict::kNotObserved)
+    row += ": " + whatToMove(static_cast<CalibrationAxis>(axis)) + " to make it so";
+  return row + "\n";
+}
+
+/// What a reader must not overlook.
+std::string remarks(const CalibratedRadar& radar) {
+  std::string text;
+  for (std::size_t axis = 0; axis < kCalibrationAxes; ++axis) {
+    constexpr double kFar = 3.0;
+    const double far = radar.calibration.axes[axis].farFromTold();
+    if (far < kFar) continue;
+    text += std::string("  The ") + kAxes[axis].name + " is " + decimal(far, 1) +
+            " sigma of what was told away from it: are topic, axes, signs and units right?\n";
+  }
+  if (!radar.calibration.offsets_agree) {
+    std::string offsets;
+    for (const OffsetEstimate& offset : radar.offsets)
+      offsets += (offsets.empty() ? "" : ", ") + decimal(1e3 * offset.t_O, 2) + " ms";
+    text += "  The offset differs between the bags: " + offsets +
+            "; a driver's restart may change it.\n"
+            "  Found is their mean, and its sigma covers the differences.\n";
+  }
+  const Agreement& extrinsics = radar.calibration.extrinsics_agreement;
+  if (!extrinsics.agree()) {
+    text += "  The mounting differs between the bags by more than the sigmas say: chi-squared " +
+            decimal(extrinsics.chi_squared, 1) + " with " + std::to_string(extrinsics.degrees_of_freedom) +
+            " degrees of freedom.\n  The sigmas are " + decimal(extrinsics.widening(), 1) +
+            " times as wide for that.\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string describeCalibration(const CalibratedRadar& radar) {
+  std::string table = "  " + padded(radar.name.empty() ? "radar" : "radar " + radar.name, 18, false) +
+                      padded("told", 10, true) + padded("found", 10, true) + padded("sigma", 10, true) + "\n";
+  for (std::size_t axis = 0; axis < kCalibrationAxes; ++axis)
+    table += axisRow(axis, radar.calibration.axes[axis]);
+  return table + remarks(radar);
+}
+
+std::string describeCalibration(const BagCalibration& calibration) {
+  std::size_t count = 0;
+  std::string paths;
+  for (const CalibrationBag& bag : calibration.bags) {
+    if (!bag.failure.empty()) continue;
+    paths += (count++ == 0 ? "" : ", ") + bag.path;
+  }
+  std::string text = std::to_string(count) + " of " + std::to_string(calibration.bags.size()) +
+                     (calibration.bags.size() == 1 ? " bag counts: " : " bags count: ") + paths + "\n";
+  for (const CalibratedRadar& radar : calibration.radars) text += describeCalibration(radar);
+  return text + "Turns are about the axes of the IMU, from the mounting that was told.\n";
+}
+
+}  // namespace rio_t
