@@ -93,6 +93,12 @@ TEST_F(AtRest, EveryScanIsAccountedFor) {
 }
 
 // The IMU may fall silent for as long as its gaps are bridged; the radar goes on meanwhile.
+TEST_F(AtRest, AScanOfAnUnknownRadarIsRefused) {
+  RadarScan scan = restScan(100.0);
+  scan.radar = 1;
+  EXPECT_THROW(odometry.addScan(scan), std::invalid_argument);
+}
+
 TEST_F(AtRest, ScansOfAnImuGapWaitForItsEnd) {
   run(104.0);
   odometry.addScan(restScan(106.0));

@@ -42,7 +42,7 @@ VelocityCost DopplerFactor::costAt(const Eigen::Vector3d& v_R) const {
   Eigen::Vector3d error = Eigen::Vector3d::Zero();
   if (!expansion_.v_R.allFinite()) expansion_ = {v_R, points_->at(v_R)};
   for (int i = 0;; ++i) {
-    const VelocityCost cost =
+    VelocityCost cost =
         withTails(moved(expansion_.cost, v_R - expansion_.v_R), shared_variances_, huber_threshold_, error);
     const Eigen::Vector3d away = v_R + error - expansion_.v_R;
     if (away.norm() < kNear * points_->smallestSigma() || i == kMaxExpansions) return cost;

@@ -54,7 +54,7 @@ Term& addPrior(Window& window, const std::vector<Block*>& blocks, const SquareRo
   std::vector<Eigen::VectorXd> x0;
   for (const Block* block : blocks) {
     manifolds.push_back(block->manifold);
-    x0.push_back(block->x);
+    x0.emplace_back(block->x);
   }
   return window.add(std::make_unique<PriorTerm>(std::move(manifolds), std::move(x0), root), blocks);
 }

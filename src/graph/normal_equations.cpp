@@ -185,8 +185,8 @@ void addTo(NormalEquations& system, const Term& term, const std::unordered_map<c
 NormalEquations::NormalEquations(std::vector<const Block*> blocks_in) : blocks(std::move(blocks_in)) {
   for (const Block* block : blocks) {
     const int tangent = block->manifold->tangent();
-    diagonal.push_back(RowMatrix::Zero(tangent, tangent));
-    gradient.push_back(Eigen::VectorXd::Zero(tangent));
+    diagonal.emplace_back(RowMatrix::Zero(tangent, tangent));
+    gradient.emplace_back(Eigen::VectorXd::Zero(tangent));
   }
   coupling.resize(blocks.size());
 }

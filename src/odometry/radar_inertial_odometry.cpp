@@ -1,6 +1,8 @@
 #include "rio_t/odometry/radar_inertial_odometry.h"
 
 #include <mutex>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "rio_t/odometry/estimator.h"
@@ -68,6 +70,10 @@ std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasuremen
 }
 
 void RadarInertialOdometry::addScan(RadarScan scan) {
+  const std::size_t radars = impl_->options.radarCount();
+  if (scan.radar >= radars)
+    throw std::invalid_argument("scan of radar " + std::to_string(scan.radar) + ": expected one of the " +
+                                std::to_string(radars) + " that the options have, counted from 0");
   const std::lock_guard<std::mutex> lock(impl_->inbox_mutex);
   impl_->inbox.scans.push_back(std::move(scan));
 }

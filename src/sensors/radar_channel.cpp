@@ -183,7 +183,7 @@ double RadarChannel::offsetGain(Time stamp, const Seen& seen) {
 }
 
 std::vector<std::size_t> RadarChannel::pointsOf(const RadarScan& scan, const Seen& seen) const {
-  const std::vector<std::size_t> own = below(scan.points.size(), seen.velocity.inliers);
+  std::vector<std::size_t> own = below(scan.points.size(), seen.velocity.inliers);
   if (!seen.prior || !seen.is_own) return own;
   // A thing that moves slowly passes for static in a velocity, but not point by point.
   return alsoIn(estimator_.around(scan, *seen.prior), own);

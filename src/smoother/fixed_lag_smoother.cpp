@@ -151,6 +151,7 @@ std::vector<NodeEstimate> FixedLagSmoother::marginalize(const std::vector<Random
   while (nodes_.size() > 2 && nodes_.back().time() - nodes_.front().time() > options_.window) {
     const double dt = nodes_[1].time() - nodes_[0].time();
     std::vector<Walk> gained;
+    gained.reserve(walks.size());
     for (const RandomWalk& walk : walks) gained.push_back({walk.block, walk.density.cwiseAbs2() * dt});
     left.push_back(node(0));
     rio_t::marginalize(window_, leavingWith(*nodes_.front().block), gained);

@@ -33,7 +33,8 @@ class RadarInertialOdometry {
   /// clock jumps, everything starts again with an initialisation.
   std::optional<NavigationState> addImu(const ImuMeasurement& imu);
 
-  /// Queues a scan. It waits until the IMU covers its time of measurement.
+  /// Queues a scan. It waits until the IMU covers its time of measurement. Throws std::invalid_argument for a
+  /// radar that the options do not have.
   void addScan(RadarScan scan);
 
   /// Does all the work that is due: initialisation, ego-velocity, window. Returns a result for each scan that

@@ -70,8 +70,7 @@ struct RadarAnswer {
 /// | health | counts, rejects nothing | no majority, or outvoted by witnesses |
 class RadarChannel {
  public:
-  /// `imu` must outlive the channel.
-  /// `offset`: null, or what the radars that share t_O have in common.
+  /// `imu` must outlive the channel. `offset` is what the radars that share t_O have in common, or null.
   RadarChannel(const RadarChannelOptions& options, const Eigen::Vector3d& g_W, const ImuBuffer& imu,
                std::shared_ptr<OffsetBlocks> offset);
 
@@ -123,7 +122,7 @@ class RadarChannel {
   EgoVelocity measure(const RadarScan& scan, const std::optional<VelocityPrior>& prior, double scale) const;
   /// The velocity that the inliers among the scan's own points show around the prediction. Directions that
   /// they do not see have a large sigma.
-  EgoVelocity around(const VelocityPrior& prior, const RadarScan& scan, EgoVelocity consensus) const;
+  EgoVelocity around(const VelocityPrior& prior, const RadarScan& scan, EgoVelocity result) const;
   Innovation innovation(Time stamp, const VelocityPrior& prior, const EgoVelocity& measured,
                         const std::optional<RadarVelocityPrediction>& prediction) const;
   /// Sets what health and a re-initialisation get from the scan.
