@@ -227,7 +227,7 @@ class LiveTest(unittest.TestCase):
         self.assertIn("no_such", outcome.stdout)
 
     def test_launch_file_plays_a_bag_to_the_nodelet(self):
-        words = ("--wait", "rio_t", "irs.launch", "bag:=" + self.bag, f"bag_rate:={4.0 / tester.SLOWNESS}",
+        words = ("--wait", "rio_t", "irs.launch", "bag:=" + self.bag, f"bag_rate:={2.0 / tester.SLOWNESS}",
                  "nodelet:=true", "launch_prefix:=" + " ".join(tester.preloaded()))
         with tester.Listener() as listener, tester.Process(shutil.which("roslaunch"), *words) as launch:
             listener.wait_for_stamp("odom", self.imu_stamps[-1])
