@@ -74,18 +74,13 @@ class TwoRadarsTest(unittest.TestCase):
         path = os.path.join(cls.folder, bag + ".bag")
         left = f"left {cls.mounting['left']} time-offset={OFFSETS['left']}"
         right = f"right {cls.mounting['right']} time-offset={OFFSETS['right']} first-trigger=0.08 {right}"
-        cls.check(tester.run(tester.program("rio_t", "simulate"), "--motion", "medium", "--seed", 3, "--duration", 14,
-                             "--static-start", 5, "--static-end", 1, "--radar", left, "--radar", right, "--out", path))
+        tester.check(tester.run(tester.program("rio_t", "simulate"), "--motion", "medium", "--seed", 3, "--duration", 14,
+                                "--static-start", 5, "--static-end", 1, "--radar", left, "--radar", right, "--out", path))
         return path
 
     @classmethod
     def tearDownClass(cls):
         shutil.rmtree(cls.folder)
-
-    @classmethod
-    def check(cls, outcome):
-        if outcome.returncode != 0:
-            raise AssertionError(f"{outcome.args}: {outcome.stdout}")
 
     def setUp(self):
         if rospy.has_param("/rio_t"):
@@ -96,8 +91,8 @@ class TwoRadarsTest(unittest.TestCase):
 
     def test_node_equals_bag_runner_and_keeps_the_topic_contract(self):
         saved, run = os.path.join(self.folder, "saved.txt"), os.path.join(self.folder, "run")
-        self.check(tester.run(tester.program("rio_t", "rio_t_bag"), "--bag", self.bag, "--config", "two_radars",
-                              "--output-dir", run, *(word for each in TRIGGERED for word in ("--set", each.replace(":=", "=")))))
+        tester.check(tester.run(tester.program("rio_t", "rio_t_bag"), "--bag", self.bag, "--config", "two_radars",
+                                "--output-dir", run, *(word for each in TRIGGERED for word in ("--set", each.replace(":=", "=")))))
         optimized = tum.read(os.path.join(run, "trajectory_optimized.txt")).positions()
         parameters = ("config:=two_radars", "trajectory_file:=" + saved, *TRIGGERED)
         with tester.Listener(TOPICS) as listener, tester.node(*parameters):
@@ -239,7 +234,7 @@ class TwoRadarsTest(unittest.TestCase):
 
     def test_launch_file_shows_two_radars(self):
         bag = os.path.join(self.folder, "pair.bag")
-        self.check(tester.run(tester.program("rio_t", "simulate"), "--preset", "kart_pair", "--duration", 12, "--out", bag))
+        tester.check(tester.run(tester.program("rio_t", "simulate"), "--preset", "kart_pair", "--duration", 12, "--out", bag))
         words = ("--wait", "rio_t", "two_radars.launch", "bag:=" + bag, f"bag_rate:={4.0 / tester.SLOWNESS}")
         with tester.Listener(TOPICS) as listener, tester.Process(shutil.which("roslaunch"), *words) as launch:
             for topic in ("odom", "left/time_offset", "right/time_offset", "left/extrinsics", "right/extrinsics"):

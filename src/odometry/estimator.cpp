@@ -246,15 +246,17 @@ void Estimator::begin(Time time, const NodePrior& prior, std::size_t radar) {
 /// The poses of the window that is given up go to `left`.
 bool Estimator::tryReinitialize(std::vector<StampedPose>& left) {
   std::optional<MotionInitialization> found;
-  std::size_t radar = 0;
-  for (; radar < recovery_.size() && !found; ++radar)
-    found = recovery_[radar].solve(imu_, [this](Time time) { return anchorAt(time); });
+  std::size_t found_by = 0;
+  for (std::size_t k = 0; k < recovery_.size() && !found; ++k) {
+    found = recovery_[k].solve(imu_, [this](Time time) { return anchorAt(time); });
+    found_by = k;
+  }
   if (!found) return false;
   for (std::size_t k = 0; k < smoother_.size(); ++k)
     if (smoother_.node(k).time < found->time) left.push_back(pose(smoother_.node(k)));
   pose_doubt_ = PoseDoubt(newestState(smoother_.newestCovariance({})));
   model_error_scale_ = found->model_error_scale;
-  begin(found->time, found->prior, radar - 1);
+  begin(found->time, found->prior, found_by);
   updateHealth();
   faults_.count("reinitialized");
   return true;

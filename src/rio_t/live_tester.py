@@ -98,6 +98,12 @@ class Listener:
                  lambda: all(s.get_num_connections() > 0 for s in self._subscribers if s.resolved_name in names))
 
 
+def check(outcome):
+    """Raises what a program said if it failed."""
+    if outcome.returncode != 0:
+        raise AssertionError(f"{outcome.args}: {outcome.stdout}")
+
+
 def call(service, kind=Trigger):
     """The answer of a service, once it is there."""
     rospy.wait_for_service(service, DEADLINE)

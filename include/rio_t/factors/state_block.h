@@ -59,7 +59,7 @@ struct StateView {
 };
 
 using StateTangent = Eigen::Matrix<double, StateBlock::kTangent, 1>;
-/// Of the tangent: theta (right perturbation of R_WI, so in I), p_W, v_W, b_g, b_a.
+/// Covariance of a tangent. Its order: theta (right perturbation of R_WI, in I), p_W, v_W, b_g, b_a.
 using StateCovariance = Eigen::Matrix<double, StateBlock::kTangent, StateBlock::kTangent>;
 
 /// x_plus_delta = x [+] delta; all of them in storage and tangent order. May alias.

@@ -34,9 +34,9 @@ struct Combined {
   Agreement agreement;
 };
 
-/// What runs with the same prior say together. Their posteriors share that prior, so it must count once:
-/// L = L0 + sum (L_i - L0). If the runs disagree, what they add to the prior counts as little as `widening`
-/// asks.
+/// Combines the posteriors of runs that started from the same prior. Each posterior contains the prior, which
+/// must count only once: L = L0 + sum (L_i - L0). If the runs disagree, `widening` lowers what they add to
+/// the prior.
 Combined combine(const Gaussian& prior, const std::vector<Gaussian>& posteriors);
 
 /// Extrinsics with their covariance in the tangent of ExtrinsicsManifold: 3x3 of a turn, or 6x6 of turn and
@@ -82,7 +82,7 @@ enum class Verdict {
 };
 std::string toString(Verdict verdict);  ///< "observed", "not observed", "not estimated"
 
-/// What is calibrated of a radar, in the order of RadarCalibration::axes.
+/// The numbers that the calibration of a radar finds. RadarCalibration::axes has them in this order.
 enum class CalibrationAxis { kOffset, kTurnX, kTurnY, kTurnZ, kLeverX, kLeverY, kLeverZ };
 inline constexpr std::size_t kCalibrationAxes = 7;
 
@@ -100,7 +100,8 @@ struct AxisCalibration {
   double farFromTold() const;
 };
 
-/// What is told of a radar, or what a run found. Sigma zero: not estimated.
+/// Calibration of a radar: as the user told it, or as one run found it. A sigma of zero says that the run did
+/// not estimate the number.
 struct RadarCalibrationEstimate {
   OffsetEstimate offset;
   ExtrinsicsEstimate extrinsics;

@@ -24,7 +24,7 @@ enum class InitMode {
   kAuto,    ///< "auto": from rest; as kMotion after `init_motion_after` without rest
 };
 
-/// What is particular to one of several radars.
+/// The options that each of several radars has for itself.
 struct RadarOptions {
   std::string name;  ///< in messages and outputs
   Extrinsics T_IR;
@@ -59,7 +59,7 @@ struct OdometryOptions {
   std::size_t radarCount() const { return radars.empty() ? 1 : radars.size(); }
 };
 
-/// The options as one radar has them: without `radars`, and with what is particular to that radar.
+/// The options as one radar has them: without `radars`, and with those that this radar has for itself.
 OdometryOptions optionsOfRadar(const OdometryOptions& options, std::size_t radar);
 
 }  // namespace rio_t

@@ -18,7 +18,7 @@ struct CalibrationRun {
   std::function<void(double)> progress;  ///< share of one bag, as in BagRun; may be empty
 };
 
-/// What one bag came to.
+/// The outcome of one bag.
 struct CalibrationBag {
   std::string path;
   std::string failure;  ///< why it does not count; empty: it counts

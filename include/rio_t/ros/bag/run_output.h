@@ -69,8 +69,8 @@ struct RunSummary {
   std::uint64_t divergences = 0;
   std::uint64_t reinitializations = 0;
   std::uint64_t scans_diverged = 0;  ///< after which the health was "diverged"
-  double path_length_m = 0.0;      ///< of the optimised poses
-  double end_to_start_2d_m = 0.0;  ///< of the causal trajectory, horizontal
+  double path_length_m = 0.0;        ///< of the optimised poses
+  double end_to_start_2d_m = 0.0;    ///< of the causal trajectory, horizontal
   double end_to_start_3d_m = 0.0;
   MeasuredImuNoise imu_noise;  ///< that the IMU showed at the end
   std::optional<TruthErrors> truth;
