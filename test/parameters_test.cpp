@@ -91,7 +91,7 @@ TEST(Parameters, TheKeysThatUsersRelyOnExist) {
   std::set<std::string> keys;
   for (const ParameterDescription& about : parameterDescriptions()) {
     EXPECT_TRUE(keys.insert(about.key).second) << about.key << " twice";
-    EXPECT_FALSE(about.text.empty()) << about.key;
+    EXPECT_FALSE(about.description.empty()) << about.key;
     EXPECT_FALSE(about.expected.empty()) << about.key;
   }
   for (const char* key : {"estimate_time_offset", "stamp_source", "radar_stamp_shift", "bag_start",
@@ -280,9 +280,9 @@ TEST(Parameters, TextsAreFullSentences) {
   std::size_t first = 0;
   for (const ParameterDescription& about : parameterDescriptions()) {
     first += about.first ? 1 : 0;
-    EXPECT_GE(about.text.size(), 40u) << about.key;
-    EXPECT_EQ(about.text.back(), '.') << about.key;
-    EXPECT_EQ(about.text.find('\n'), std::string::npos) << about.key;
+    EXPECT_GE(about.description.size(), 40u) << about.key;
+    EXPECT_EQ(about.description.back(), '.') << about.key;
+    EXPECT_EQ(about.description.find('\n'), std::string::npos) << about.key;
   }
   EXPECT_GE(first, 12u) << "a new user reads these";
   EXPECT_LE(first, 20u) << "a new user reads all of these";
@@ -301,7 +301,7 @@ TEST(Parameters, ProgramsReadAllThatIsKnown) {
   EXPECT_EQ(window["max"].as<double>(), 60.0);
   EXPECT_EQ(window["unit"].as<std::string>(), "s");
   EXPECT_FALSE(window["first"].as<bool>());
-  EXPECT_TRUE(contains(window["text"].as<std::string>(), "The smoother optimises"));
+  EXPECT_TRUE(contains(window["description"].as<std::string>(), "The smoother optimises"));
   const YAML::Node axes = by_key.at("radar_axes");
   EXPECT_EQ(axes["choices"].as<std::vector<std::string>>(), (std::vector<std::string>{"", "rfu", "flu"}));
   EXPECT_EQ(axes["default"].as<std::string>(), "");

@@ -50,7 +50,7 @@ def figures_of(page):
 
 def test_page_holds_its_figures_and_numbers(report, run_folder, simulated_run, programs_folder, tmp_path):
     truth = simulated_run / "truth.txt"
-    page = page_of(report("--ground-truth", truth, "--true-offset", 0.03, "--output", tmp_path / "out", run_folder))
+    page = page_of(report("--ground-truth", truth, "--true-offset", 0.03, "--output-dir", tmp_path / "out", run_folder))
     figures = figures_of(page)
     assert list(figures) == FIGURES
     for name, data in figures.items():
@@ -70,7 +70,7 @@ def test_page_holds_its_figures_and_numbers(report, run_folder, simulated_run, p
 
 def test_each_of_two_radars_has_its_sections(report, two_radar_run, simulated_run, tmp_path):
     page = page_of(report("--ground-truth", simulated_run / "truth.txt", "--true-offset", "left=0.03", "--true-offset",
-                          "right=0.05", "--output", tmp_path / "out", two_radar_run / "run"))
+                          "right=0.05", "--output-dir", tmp_path / "out", two_radar_run / "run"))
     assert list(figures_of(page)) == ["trajectory", "errors", "velocity", "time_offset_left", "extrinsics_left",
                                       "ego_velocity_left", "time_offset_right", "extrinsics_right",
                                       "ego_velocity_right", "biases"]
@@ -181,7 +181,7 @@ def test_a_broken_file_is_told_in_one_line(report, run_folder, name, content, me
     ("--ground-truth", "1 2\n", "given:1: expected `stamp x y z qx qy qz qw`"),
     ("--config", None, "No such file"),
     ("--config", "extrinsics_translation: [1, 2]\n", "expected extrinsics_translation (3 numbers)"),
-    ("--output", "a file", "cannot be made")])
+    ("--output-dir", "a file", "cannot be made")])
 def test_a_wrong_option_is_told_in_one_line(report, run_folder, tmp_path, option, content, message):
     if content is not None:
         (tmp_path / "given").write_text(content)

@@ -210,7 +210,7 @@ def report(arguments):
     program = arguments.evaluate
     if (judge_poses or judge_offset) and not program:
         program = programs.find(["evaluate"], "--evaluate FILE") / "evaluate"
-    folder = arguments.output or arguments.run / "report"
+    folder = arguments.output_dir or arguments.run / "report"
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -275,7 +275,7 @@ def main(words):
                         help="largest difference of the stamps of two poses that are compared [s] (0.01)")
     parser.add_argument("--config", metavar="FILE", type=pathlib.Path,
                         help="configuration of the run, for the radar's mounting")
-    parser.add_argument("--output", metavar="DIR", type=pathlib.Path, help="where to write (RUN_DIR/report)")
+    parser.add_argument("--output-dir", metavar="DIR", type=pathlib.Path, help="where to write (RUN_DIR/report)")
     parser.add_argument("--evaluate", metavar="FILE", type=pathlib.Path, help="the program, if it is not found")
     try:
         print(report(parser.parse_args(words)))

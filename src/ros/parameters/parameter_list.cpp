@@ -56,7 +56,7 @@ bool isRadarName(const std::string& text) {
 
 ParameterValue listOf(std::initializer_list<double> numbers) {
   ParameterValue::List list;
-  for (const double x : numbers) list.push_back({x});
+  for (const double x : numbers) list.emplace_back().data = x;
   return {std::move(list)};
 }
 
@@ -211,7 +211,7 @@ void ParameterList::radarNames(const std::string& key, std::vector<Config>& memb
       },
       [&member] {
         ParameterValue::List names;
-        for (const Config& radar : member) names.push_back({radar.radar_name});
+        for (const Config& radar : member) names.emplace_back().data = radar.radar_name;
         return ParameterValue{std::move(names)};
       });
 }

@@ -85,7 +85,7 @@ std::string toYaml(const Config& config) {
       parametersOf(copy), [&](const std::string& title) { yaml += "\n# --- " + title + "\n"; },
       [&](const Parameter& parameter) {
         const ParameterDescription& about = parameter.description;
-        yaml += "\n" + wrapped(about.text, "# ") + "# " + expectedText(about) + "\n" + about.key + ": " +
+        yaml += "\n" + wrapped(about.description, "# ") + "# " + expectedText(about) + "\n" + about.key + ": " +
                 parameter.get().yaml() + "\n";
       });
   for (const Config& radar : config.radars) yaml += "\n" + sectionYaml(config, radar);
@@ -118,7 +118,7 @@ std::string parametersYaml() {
     add("expected", about.expected);
     add("per_radar", about.of_radar);
     out << YAML::Key << "default" << YAML::Value << YAML::Load(parameter.get().yaml());
-    out << YAML::Key << "text" << YAML::Value << YAML::DoubleQuoted << about.text;
+    out << YAML::Key << "description" << YAML::Value << YAML::DoubleQuoted << about.description;
     out << YAML::EndMap;
   }
   out << YAML::EndSeq;
@@ -140,7 +140,7 @@ std::string parametersMarkdown() {
       parametersOf(config), [&](const std::string& title) { text += "\n## " + title + "\n"; },
       [&](const Parameter& parameter) {
         const ParameterDescription& about = parameter.description;
-        text += "\n### `" + about.key + "`\n\n" + wrapped(about.text, "") + "\nDefault: `" +
+        text += "\n### `" + about.key + "`\n\n" + wrapped(about.description, "") + "\nDefault: `" +
                 parameter.get().yaml() + "`" + (about.unit.empty() ? "" : " " + about.unit) + ". Expected: " +
                 about.expected + (about.of_radar ? ". Per radar" : "") + ".\n";
       });

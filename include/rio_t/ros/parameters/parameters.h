@@ -111,7 +111,7 @@ struct ParameterDescription {
   std::string type;      ///< "number", "integer", "boolean", "choice", "text" or "list"
   std::string unit;      ///< empty: none
   std::string expected;  ///< e.g. "a finite number above 0 and at most 10"
-  std::string text;      ///< full sentences: what it is, typical values, when to change it
+  std::string description;  ///< full sentences: what it is, typical values, when to change it
   double min = -std::numeric_limits<double>::infinity();  ///< of a number, or of each one of a list
   double max = std::numeric_limits<double>::infinity();   ///< likewise
   std::vector<std::string> choices = {};                  ///< of a choice
@@ -127,7 +127,7 @@ std::vector<ParameterDescription> parameterDescriptions();
 std::string toYaml(const Config& config);
 
 /// All that is known of every parameter, with its default, for programs: a YAML list of maps with the keys key,
-/// section, first, type, unit, min, max, choices, expected, per_radar, default and text. A key without a value
+/// section, first, type, unit, min, max, choices, expected, per_radar, default and description. A key without a value
 /// (no unit, no bound) is left out.
 std::string parametersYaml();
 
