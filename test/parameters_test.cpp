@@ -637,7 +637,7 @@ TEST(Parameters, EveryMemberOfTheOptionsHasAKey) {
   EXPECT_EQ(keysChanging("Smoother") + keysChanging("Time offset") + keysChanging("Estimate of T_IR"),
             memberCount<SmootherOptions>() + memberCount<OffsetStepDetectorOptions>() + 1)
       << "with max_queued_scans; a member of SmootherOptions lacks a key in "
-         "src/ros/parameters/parameter_registry.cpp";
+         "src/ros/parameters/";
   EXPECT_EQ(keysChanging("Radar: which points"), memberCount<EgoVelocityOptions>());
   EXPECT_EQ(keysChanging("Radar: jumps"), memberCount<FeasibilityOptions>());
   EXPECT_EQ(keysChanging("Initialisation"),
@@ -652,7 +652,7 @@ TEST(Parameters, EveryMemberOfTheOptionsHasAKey) {
   EXPECT_EQ(memberCount<RadarOptions>(), 5u)
       << "a new member needs its place in radarOptions in src/ros/parameters/parameters.cpp";
   EXPECT_EQ(memberCount<OdometryOptions>(), 18u)
-      << "a new member needs keys in src/ros/parameters/parameter_registry.cpp";
+      << "a new member needs keys in src/ros/parameters/";
   EXPECT_EQ(memberCount<PointCloudFormat>() - 1, memberCount<PointCloudOverrides>()) << "all but its name";
 }
 

@@ -62,6 +62,8 @@ def test_page_holds_its_figures_and_numbers(report, run_folder, simulated_run, p
     summary = yaml.safe_load((run_folder / "summary.yaml").read_text())
     assert float(cell_after(page, "final_offset_s")) == pytest.approx(summary["final_offset_s"], rel=1e-5)
     assert cell_after(page, "scans_used") == str(summary["scans_used"])
+    assert "<h2>Is this run good?</h2>" in page and '<p class="good">This run is good' in page
+    assert cell_after(page, "the estimate started") == "1"
     evaluated = programs.output_of(programs_folder / "evaluate", "--yaml", truth, run_folder / "trajectory_optimized.txt")
     ate = yaml.safe_load(evaluated)["estimates"][0]["ape_origin_m"]["rmse"]
     assert cell_after(page, "ATE: position, origin aligned, rmse [m]") == f"{ate:.4f}"
@@ -219,3 +221,18 @@ def refused(done, message):
     assert message in done.stderr
     assert done.stderr.startswith("report.py: ") and done.stderr.count("\n") == 1, done.stderr
     assert done.stdout == ""
+
+
+def test_a_bad_run_says_why(report, run_folder):
+    summary = run_folder / "summary.yaml"
+    content = yaml.safe_load(summary.read_text())
+    content["verdict"] = "bad"
+    content["checks"][1].update(value=0.1, good=False)
+    content["causes"] = [{"name": "contradicts_imu", "share": 0.9, "text": "90 of 100 scans contradict.", "remedy": "Turn it."}]
+    summary.write_text(yaml.safe_dump(content))
+    page = page_of(report(run_folder))
+    assert '<p class="bad">This run is bad' in page
+    assert '<td class="number bad">0.1</td><td>at least 0.5</td>' in page
+    assert "90 of 100 scans contradict. Turn it." in page
+    summary.unlink()
+    assert '<p class="bad">The run did not finish.' in page_of(report(run_folder))

@@ -137,8 +137,8 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
   row("files in", files);
   const RunVerdict verdict = summary.diagnosis.verdict;
   row("verdict", verdict == RunVerdict::kGood       ? "good"
-                 : verdict == RunVerdict::kDoubtful ? "DOUBTFUL, most likely because:"
-                                                    : "BAD, do not trust it, most likely because:");
+                 : verdict == RunVerdict::kDoubtful ? "DOUBTFUL, because:"
+                                                    : "BAD, do not trust it, because:");
   table += describeCauses(summary.diagnosis);
   return table;
 }

@@ -73,6 +73,16 @@ class SummaryLines {
   }
   void beginMap(const std::string& key) { add(key, YAML::BeginMap); }
   void endMap() { yaml_ << YAML::EndMap; }
+  void addChecks(const std::vector<Check>& checks) {
+    yaml_ << YAML::Key << "checks" << YAML::Value << YAML::BeginSeq;
+    for (const Check& check : checks) {
+      yaml_ << YAML::Flow << YAML::BeginMap << YAML::Key << "name" << YAML::Value << check.name;
+      yaml_ << YAML::Key << "value" << YAML::Value << fixedText(check.value, 4);
+      yaml_ << YAML::Key << (check.at_least ? "at_least" : "at_most") << YAML::Value << fixedText(check.limit, 4);
+      yaml_ << YAML::Key << "good" << YAML::Value << check.good() << YAML::EndMap;
+    }
+    yaml_ << YAML::EndSeq;
+  }
   void addCauses(const std::vector<Cause>& causes) {
     yaml_ << YAML::Key << "causes" << YAML::Value << YAML::BeginSeq;
     for (const Cause& cause : causes) {
@@ -127,6 +137,7 @@ std::string summaryText(const RunSummary& summary, const std::vector<std::string
   const auto line = [&](const char* key, const auto& value) { lines.add(key, value); };
   line("mode", summary.mode);
   line("verdict", toString(summary.diagnosis.verdict));
+  lines.addChecks(summary.diagnosis.checks);
   lines.addCauses(summary.diagnosis.causes);
   line("imu_count", summary.imu_count);
   line("scans_total", summary.scansTotal());

@@ -14,6 +14,10 @@ constexpr double kManyScans = 0.3;
 constexpr double kManyPoints = 0.6;
 constexpr double kManyWindows = 0.3;
 constexpr double kManyDiverged = 0.1;
+constexpr double kManySamples = 0.05;
+constexpr double kFewScansUsed = 0.5;
+constexpr const char* kImuFaults[] = {"imu_not_usable", "imu_saturated", "imu_gap", "imu_out_of_order",
+                                      "imu_not_finite", "imu_stamp_jump", "imu_stuck"};
 /// Scans before anything is said: two seconds at ten a second.
 constexpr std::uint64_t kEnoughScans = 20;
 constexpr std::size_t kMostCauses = 3;
@@ -215,7 +219,7 @@ void addImu(const RunEvidence& evidence, const Config& config, std::vector<Cause
                          const std::string& remedy) {
     const std::uint64_t count = countOf(evidence.faults, name);
     const double share = shareOf(count * samples_of_one, evidence.imu_count);
-    if (share >= 0.05) causes->push_back({name, std::to_string(count) + " " + text, remedy, std::min(1.0, share)});
+    if (share > kManySamples) causes->push_back({name, std::to_string(count) + " " + text, remedy, std::min(1.0, share)});
   };
   fault("imu_not_usable", 1, "IMU messages cannot be used.", "Check the stamps and the values of imu_topic.");
   fault("imu_saturated", 1, "IMU samples are at the end of the range.",
@@ -247,15 +251,36 @@ void addDivergence(const RunEvidence& evidence, std::vector<Cause>* causes) {
        std::max(0.05, share)});
 }
 
-RunVerdict verdictOf(const RunEvidence& evidence, bool has_causes) {
-  std::uint64_t used = 0;
-  for (const RadarEvidence& radar : evidence.radars) used += radar.scans_used;
+std::vector<Check> checksOf(const RunEvidence& evidence) {
+  std::uint64_t used = 0, after_start = 0;
+  double kept = 1.0;
+  for (const RadarEvidence& radar : evidence.radars) {
+    used += radar.scans_used;
+    after_start += radar.scans_total - radar.scans_before_start;
+    const std::uint64_t passed = radar.points_by_verdict[static_cast<std::size_t>(PointVerdict::kKept)];
+    if (radar.points > 0) kept = std::min(kept, shareOf(passed, radar.points));
+  }
+  std::uint64_t imu_faults = 0;
+  for (const char* fault : kImuFaults) imu_faults += countOf(evidence.faults, fault);
+  return {{"started", evidence.initialized ? 1.0 : 0.0, 1.0, true},
+          {"scans_used_share", shareOf(used, after_start), kFewScansUsed, true},
+          {"points_kept_share", kept, 1.0 - kManyPoints, true},
+          {"scans_diverged_share", shareOf(evidence.scans_diverged, evidence.scans_judged), kManyDiverged, false},
+          {"windows_at_offset_bound_share", shareOf(evidence.windows_at_bound, evidence.windows), kManyWindows,
+           false},
+          {"imu_faults_share", std::min(1.0, shareOf(imu_faults, evidence.imu_count)), kManySamples, false},
+          {"healthy_at_end", evidence.health == Health::kOk ? 1.0 : 0.0, 1.0, true}};
+}
+
+RunVerdict verdictOf(const RunEvidence& evidence, const Diagnosis& diagnosis) {
+  const auto used = [](const RadarEvidence& radar) { return radar.scans_used > 0; };
+  const bool any_used = std::any_of(evidence.radars.begin(), evidence.radars.end(), used);
   const bool diverged = evidence.health == Health::kDiverged ||
                         shareOf(evidence.scans_diverged, evidence.scans_judged) > 0.5;
-  if (!evidence.initialized || used == 0 || diverged) return RunVerdict::kBad;
-  const bool doubtful = has_causes || evidence.health == Health::kCoasting ||
-                        shareOf(evidence.scans_diverged, evidence.scans_judged) > kManyDiverged;
-  return doubtful ? RunVerdict::kDoubtful : RunVerdict::kGood;
+  if (!evidence.initialized || !any_used || diverged) return RunVerdict::kBad;
+  const bool all_green = std::all_of(diagnosis.checks.begin(), diagnosis.checks.end(),
+                                     [](const Check& check) { return check.good(); });
+  return all_green && diagnosis.causes.empty() ? RunVerdict::kGood : RunVerdict::kDoubtful;
 }
 
 }  // namespace
@@ -285,7 +310,8 @@ Diagnosis diagnose(const RunEvidence& evidence, const Config& config) {
   std::stable_sort(result.causes.begin(), result.causes.end(),
                    [](const Cause& a, const Cause& b) { return a.share > b.share; });
   if (result.causes.size() > kMostCauses) result.causes.resize(kMostCauses);
-  result.verdict = verdictOf(evidence, !result.causes.empty());
+  result.checks = checksOf(evidence);
+  result.verdict = verdictOf(evidence, result);
   return result;
 }
 
@@ -294,6 +320,11 @@ std::string describeCauses(const Diagnosis& diagnosis) {
   for (std::size_t i = 0; i < diagnosis.causes.size(); ++i) {
     const Cause& cause = diagnosis.causes[i];
     text += "  " + std::to_string(i + 1) + ". " + cause.text + " " + cause.remedy + "\n";
+  }
+  for (const Check& check : diagnosis.checks) {
+    if (check.good()) continue;
+    text += "  " + check.name + " is " + number(check.value) + ", expected at " + (check.at_least ? "least " : "most ") +
+            number(check.limit) + "\n";
   }
   return text;
 }
