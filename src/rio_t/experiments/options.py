@@ -83,7 +83,7 @@ def simulation_words(text):
 
 
 def join_simulate(words):
-    """So that the value of --simulate may begin with a dash."""
+    """Joins --simulate with its value, which may begin with a dash."""
     joined = []
     for word in words:
         if joined and joined[-1] == "--simulate":

@@ -111,8 +111,8 @@ class Refuses:
 
 @dataclasses.dataclass
 class RefusesOrReports:
-    """Where rest alone cannot tell that the input is wrong: refused, or the divergence that follows is reported and
-    the output says how unsure it is."""
+    """Rest alone cannot tell that the input is wrong: the run is refused, or it reports the divergence that follows and
+    says how uncertain it is."""
     message: str
     counted: str = "diverged"
 
