@@ -84,7 +84,9 @@ class SummaryLines {
     yaml_ << YAML::EndSeq;
   }
   void addCauses(const std::vector<Cause>& causes) {
-    yaml_ << YAML::Key << "causes" << YAML::Value << YAML::BeginSeq;
+    yaml_ << YAML::Key << "causes" << YAML::Value;
+    if (causes.empty()) yaml_ << YAML::Flow;
+    yaml_ << YAML::BeginSeq;
     for (const Cause& cause : causes) {
       yaml_ << YAML::BeginMap << YAML::Key << "name" << YAML::Value << cause.name;
       yaml_ << YAML::Key << "share" << YAML::Value << fixedText(cause.share, 3);
