@@ -134,7 +134,7 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
   }
   row("speed", decimal(summary.estimation_seconds, 2) + " s, " + decimal(summary.realtime_factor, 0) +
                    " times real time");
-  row("files in", files);
+  row("files in", files.empty() ? "none; --output-dir FOLDER writes them" : files);
   const RunVerdict verdict = summary.diagnosis.verdict;
   row("verdict", verdict == RunVerdict::kGood       ? "good"
                  : verdict == RunVerdict::kDoubtful ? "DOUBTFUL, because:"
