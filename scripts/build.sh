@@ -27,7 +27,7 @@ step() {
 scripts/install_dependencies.sh
 # The generated message headers depend on the whole configuration: configure only when it is new or told to.
 if [ ! -f "$build/Makefile" ] || [ $# -gt 0 ]; then
-  step cmake -S . -B "$build" -DCMAKE_BUILD_TYPE=Release -DPYTHON_EXECUTABLE=/usr/bin/python3 \
+  step cmake -S . -B "$build" -DCMAKE_BUILD_TYPE=Release -DCMAKE_INSTALL_PREFIX="$(realpath -m "$build")/install" -DPYTHON_EXECUTABLE=/usr/bin/python3 \
     -DPython3_EXECUTABLE=/usr/bin/python3 -DRIO_T_WERROR="${RIO_T_WERROR:-OFF}" "$@"
 fi
 make=(cmake --build "$build" --parallel "$(nproc)")

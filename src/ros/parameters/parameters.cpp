@@ -317,6 +317,15 @@ std::vector<Config> configsOfRadars(const Config& config) {
   return config.radars.empty() ? std::vector<Config>{config} : config.radars;
 }
 
+Config withAbsoluteTopics(Config config) {
+  for (std::string* topic :
+       {&config.imu_topic, &config.radar_topic, &config.trigger_topic, &config.ground_truth_topic}) {
+    if (!topic->empty() && topic->front() != '/') topic->insert(0, "/");
+  }
+  for (Config& radar : config.radars) radar = withAbsoluteTopics(radar);
+  return config;
+}
+
 Config makeConfig(const ParameterEntries& entries) {
   Config config;
   std::vector<std::string> faults;
