@@ -7,6 +7,7 @@ import sys
 
 import pytest
 import yaml
+from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from rio_t import programs
@@ -66,6 +67,21 @@ def test_page_holds_its_figures_and_numbers(report, run_folder, simulated_run, p
     assert cell_after(page, "ATE: position, origin aligned, rmse [m]") == f"{ate:.4f}"
     error = 1e3 * (summary["final_offset_s"] - 0.03)
     assert float(cell_after(page, "last estimate minus truth [ms]").split()[0]) == pytest.approx(error, abs=2e-3)
+
+
+def test_animation_covers_the_run(report, run_folder, tmp_path):
+    page_of(report("--true-offset", 0.03, "--output", tmp_path / "out", "--animation", tmp_path / "run.gif", run_folder))
+    with Image.open(tmp_path / "run.gif") as image:
+        assert image.format == "GIF" and image.n_frames > 60
+        first = image.convert("RGB").tobytes()
+        image.seek(image.n_frames - 1)
+        assert image.convert("RGB").tobytes() != first
+    assert (tmp_path / "run.gif").stat().st_size < 2e6
+
+
+def test_animation_of_another_kind_is_refused(report, run_folder, tmp_path):
+    done = report("--output", tmp_path / "out", "--animation", tmp_path / "run.mp4", run_folder)
+    assert done.returncode == 1 and "run.mp4: expected a name that ends in .gif" in done.stderr
 
 
 def test_each_of_two_radars_has_its_sections(report, two_radar_run, simulated_run, tmp_path):

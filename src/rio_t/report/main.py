@@ -15,6 +15,7 @@ from . import figures
 from .. import programs, run_folder, tum
 from ..errors import RioTError
 from .accuracy import ERRORS, accuracy_rows, offset_rows, run_evaluate
+from .animation import write_animation
 from .motion import extrinsics_in, motion, predicted_ego_velocity, read_extrinsics
 from .page import Page
 
@@ -246,6 +247,10 @@ def report(arguments):
     if run.biases is not None:
         page.heading("Biases of the IMU")
         page.figure("biases", figures.draw_biases(run.biases))
+    if arguments.animation:
+        radar = run.radars[0]
+        write_animation(arguments.animation, run.estimates[-1] if run.estimates else None, radar.offset,
+                        true_offsets.get(radar.name))
     return page.write()
 
 
@@ -276,6 +281,8 @@ def main(words):
     parser.add_argument("--config", metavar="FILE", type=pathlib.Path,
                         help="configuration of the run, for the radar's mounting")
     parser.add_argument("--output", metavar="DIR", type=pathlib.Path, help="where to write (RUN_DIR/report)")
+    parser.add_argument("--animation", metavar="FILE.gif", type=pathlib.Path,
+                        help="also draw path and time offset of the first radar as a moving picture")
     parser.add_argument("--evaluate", metavar="FILE", type=pathlib.Path, help="the program, if it is not found")
     try:
         print(report(parser.parse_args(words)))
