@@ -72,16 +72,16 @@ def test_bag_launch_writes_a_run_and_report_draws_it(ros, bag, tmp_path):
     assert (bag.parent / "out/report/report.html").is_file()
 
 
-@pytest.mark.parametrize("nodelet", ["false", "true"])
-def test_launch_file_plays_a_bag(ros, bag, nodelet):
-    words = [*ros, "rio_t", "irs.launch", f"bag:={bag}", f"nodelet:={nodelet}", "bag_rate:=3"]
+@pytest.mark.parametrize("arguments, name", [(["nodelet:=false"], "/rio_t"), (["nodelet:=true", "ns:=robot"], "/robot/rio_t")])
+def test_launch_file_plays_a_bag(ros, bag, arguments, name):
+    words = [*ros, "rio_t", "irs.launch", f"bag:={bag}", "bag_rate:=3", *arguments]
     with subprocess.Popen(words, stdout=subprocess.DEVNULL) as launch:
         try:
             end = time.monotonic() + DEADLINE
-            while "/rio_t/odom" not in subprocess.run(["rostopic", "list"], text=True, capture_output=True, check=False).stdout:
-                assert launch.poll() is None and time.monotonic() < end, "no topic /rio_t/odom"
-            assert "child_frame_id" in run("rostopic", "echo", "-n", 1, "/rio_t/odom")
-            assert "radar_format: irs" in run("rosparam", "get", "/rio_t/effective")
+            while f"{name}/odom" not in subprocess.run(["rostopic", "list"], text=True, capture_output=True, check=False).stdout:
+                assert launch.poll() is None and time.monotonic() < end, f"no topic {name}/odom"
+            assert "child_frame_id" in run("rostopic", "echo", "-n", 1, f"{name}/odom")
+            assert "radar_format: irs" in run("rosparam", "get", f"{name}/effective")
         finally:
             launch.terminate()
 
