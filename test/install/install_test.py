@@ -47,11 +47,12 @@ def test_neither_sources_nor_build_are_in_reach():
 
 
 def test_no_installed_file_names_the_sources_or_the_build():
-    of_build = re.escape(bytes(BUILD.relative_to(SOURCE))) + b"/install" if SOURCE in BUILD.parents else b"$^"
-    paths = re.compile(re.escape(bytes(SOURCE)) + b"/(?!" + of_build + b")|" + re.escape(bytes(BUILD)) + b"/(?!install)")
-    naming = {str(file.relative_to(PREFIX)): paths.search(file.read_bytes())[0] for file in PREFIX.rglob("*")
-              if file.is_file() and paths.search(file.read_bytes())}
-    assert naming == {}
+    folders = b"|".join(re.escape(bytes(folder)) for folder in
+                        [*(SOURCE / name for name in ("src", "include", "config", "launch", "scripts", "cmake", "msg")),
+                         BUILD / "devel"])
+    paths = re.compile(rb"(?<![\w.+-])(?:" + folders + rb")\b")
+    found = {file.relative_to(PREFIX): paths.search(file.read_bytes()) for file in PREFIX.rglob("*") if file.is_file()}
+    assert {str(file): match[0] for file, match in found.items() if match} == {}
 
 
 @pytest.mark.parametrize("program", ["rio_t_bag", "calibrate", "evaluate", "simulate", "report.py", "experiment.py"])
