@@ -550,10 +550,14 @@ struct Anything {
   operator T() const;  // never defined: only asked for
 };
 
+// gcc 10 warns of missing members also where nothing is initialised.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
 template <typename T, typename Enable, typename... Values>
 struct TakesImpl : std::false_type {};
 template <typename T, typename... Values>
 struct TakesImpl<T, std::void_t<decltype(T{std::declval<Values>()...})>, Values...> : std::true_type {};
+#pragma GCC diagnostic pop
 
 /// Number of members of an aggregate: the longest braced list that it takes.
 template <typename T, typename... Values>
