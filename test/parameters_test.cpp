@@ -12,26 +12,22 @@
 
 #include "rio_t/simulation/presets.h"
 #include "run_files.h"
+#include "temporary_folder.h"
 
 namespace rio_t {
 namespace {
 
 const std::string kConfigFolder = std::string(RIO_T_SOURCE_DIR) + "/config";
 
-/// A file in the test's own folder, gone at the end.
 class TemporaryFile {
  public:
-  explicit TemporaryFile(const std::string& text)
-      : path_((std::filesystem::temp_directory_path() /
-               ("rio_t_parameters_" +
-                std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) + ".yaml"))
-                  .string()) {
+  explicit TemporaryFile(const std::string& text) : path_(folder_.path() + "/parameters.yaml") {
     std::ofstream(path_) << text;
   }
-  ~TemporaryFile() { std::filesystem::remove(path_); }
   const std::string& path() const { return path_; }
 
  private:
+  TemporaryFolder folder_;
   std::string path_;
 };
 
@@ -375,8 +371,8 @@ TEST(Parameters, TheTwoRadarsOfTheExampleAreMirrorImages) {
   EXPECT_LT((looks(right) - looks(left).cwiseProduct(mirror)).norm(), 1e-6);
   // Its right stays level, as that of the left radar.
   EXPECT_NEAR((right.q_IR * Eigen::Vector3d::UnitX()).z(), 0.0, 1e-6);
-  EXPECT_EQ(radars[0].radar_topic, "/sensor_platform/radar_left/scan");
-  EXPECT_EQ(radars[1].radar_topic, "/sensor_platform/radar_right/scan");
+  EXPECT_EQ(radars[0].radar_topic, "sensor_platform/radar_left/scan");
+  EXPECT_EQ(radars[1].radar_topic, "sensor_platform/radar_right/scan");
   EXPECT_EQ(radars[1].odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kRotation);
 }
 
@@ -536,9 +532,19 @@ TEST(SeveralRadars, OneCanBeTakenOutAndItsSectionStays) {
   EXPECT_THROW(makeConfig(entriesWith({"radars=[left]", "middle/radar_topic=/x"})), ConfigError);
 }
 
+TEST(SeveralRadars, TopicsOfABagAreThoseOfANodeWithoutNamespace) {
+  const Config config = withAbsoluteTopics(
+      fromAssignments({"radars=[left, right]", "imu_topic=imu", "left/radar_topic=left/scan",
+                       "right/radar_topic=/right/scan", "ground_truth_topic="}));
+  EXPECT_EQ(config.imu_topic, "/imu");
+  EXPECT_EQ(config.ground_truth_topic, "");
+  EXPECT_EQ(config.radars[0].radar_topic, "/left/scan");
+  EXPECT_EQ(config.radars[1].radar_topic, "/right/scan");
+}
+
 TEST(SeveralRadars, ContradictionsNameTheRadar) {
   EXPECT_TRUE(contains(faultOf("radars=[left, right]"),
-                       "right/radar_topic: expected another than that of left, got \"/sensor_platform"));
+                       "right/radar_topic: expected another than that of left, got \"sensor_platform"));
   EXPECT_TRUE(contains(faultWithTwoRadars({"left/radar_frame=f", "right/radar_frame=f"}),
                        "right/radar_frame: expected another than that of left, got \"f\" for both"));
   EXPECT_TRUE(contains(faultWithTwoRadars({"right/time_offset_initial=0.3"}), "right/time_offset_initial:"));
@@ -604,10 +610,14 @@ struct Anything {
   operator T() const;  // never defined: only asked for
 };
 
+// gcc 10 warns of missing members also where nothing is initialised.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
 template <typename T, typename Enable, typename... Values>
 struct TakesImpl : std::false_type {};
 template <typename T, typename... Values>
 struct TakesImpl<T, std::void_t<decltype(T{std::declval<Values>()...})>, Values...> : std::true_type {};
+#pragma GCC diagnostic pop
 
 /// Number of members of an aggregate: the longest braced list that it takes.
 template <typename T, typename... Values>

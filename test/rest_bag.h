@@ -16,6 +16,7 @@
 
 #include "rio_t/ros/bag/bag_tool.h"
 #include "run_files.h"
+#include "temporary_folder.h"
 
 namespace rio_t {
 
@@ -49,16 +50,9 @@ struct BagContents {
 class RestBag : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ =
-        (fs::temp_directory_path() /
-         ("rio_t_bag_runner_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name())))
-            .string();
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
     bag_ = folder_ + "/test.bag";
     out_ = folder_ + "/out";
   }
-  void TearDown() override { fs::remove_all(folder_); }
 
   void writeBag(const BagContents& what) const {
     rosbag::Bag bag(bag_, rosbag::bagmode::Write);
@@ -133,7 +127,9 @@ class RestBag : public testing::Test {
       EXPECT_NE(outcome.err.find(part), std::string::npos) << part << " not in: " << outcome.err;
   }
 
-  std::string folder_, bag_, out_;
+  const TemporaryFolder temporary_;
+  const std::string folder_ = temporary_.path();
+  std::string bag_, out_;
 };
 
 }  // namespace rio_t

@@ -283,6 +283,10 @@ class BagJob {
 
 }  // namespace
 
-RunSummary runBag(const BagRun& run) { return BagJob(run).execute(); }
+RunSummary runBag(const BagRun& run) {
+  BagRun with_topics_of_bag = run;
+  with_topics_of_bag.config = withAbsoluteTopics(run.config);
+  return BagJob(with_topics_of_bag).execute();
+}
 
 }  // namespace rio_t

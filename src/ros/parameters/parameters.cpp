@@ -1,6 +1,6 @@
 #include "rio_t/ros/parameters/parameters.h"
 
-#include <rospack/rospack.h>
+#include <dlfcn.h>
 
 #include <algorithm>
 #include <cmath>
@@ -237,22 +237,14 @@ std::string joinFaults(const std::vector<std::string>& faults) {
   return text;
 }
 
-/// Folder of the package in the workspace that is sourced; empty if there is none. Asks rospack itself, since
-/// ros::package complains on stderr where it finds nothing.
-std::string packageFolder() {
-  rospack::Rospack packages;
-  packages.setQuiet(true);
-  std::vector<std::string> search_path;
-  std::string folder;
-  if (!packages.getSearchPathFromEnv(search_path)) return "";
-  packages.crawl(search_path, false);
-  return packages.find("rio_t", folder) ? folder : "";
-}
-
+/// The folder of the configurations that came with this library: PREFIX/lib/librio_t_ros.so and
+/// PREFIX/share/rio_t/config, in the install space as in the devel space. No workspace needs to be sourced.
 std::string configFolder() {
-  const std::string package = packageFolder();
-  if (!package.empty() && std::filesystem::is_directory(package + "/config")) return package + "/config";
-  return RIO_T_SOURCE_DIR "/config";  // run from the build folder, no workspace sourced
+  static const char in_this_library = 0;
+  Dl_info library;
+  if (dladdr(&in_this_library, &library) == 0) return "";
+  const auto path = std::filesystem::canonical(library.dli_fname);
+  return (path.parent_path().parent_path() / "share/rio_t/config").string();
 }
 
 }  // namespace
@@ -306,6 +298,15 @@ PointCloudFormat pointCloudFormat(const Config& config) {
 
 std::vector<Config> configsOfRadars(const Config& config) {
   return config.radars.empty() ? std::vector<Config>{config} : config.radars;
+}
+
+Config withAbsoluteTopics(Config config) {
+  for (std::string* topic :
+       {&config.imu_topic, &config.radar_topic, &config.trigger_topic, &config.ground_truth_topic}) {
+    if (!topic->empty() && topic->front() != '/') topic->insert(0, "/");
+  }
+  for (Config& radar : config.radars) radar = withAbsoluteTopics(radar);
+  return config;
 }
 
 Config makeConfig(const ParameterEntries& entries) {

@@ -51,10 +51,10 @@ struct Config {
   std::vector<Config> radars;
   std::string radar_name;  ///< empty, but for an element of `radars`
 
-  std::string imu_topic = "/sensor_platform/imu";
-  std::string radar_topic = "/sensor_platform/radar/scan";
-  std::string trigger_topic = "/sensor_platform/radar/trigger";
-  std::string ground_truth_topic = "/ground_truth/pose";
+  std::string imu_topic = "sensor_platform/imu";
+  std::string radar_topic = "sensor_platform/radar/scan";
+  std::string trigger_topic = "sensor_platform/radar/trigger";
+  std::string ground_truth_topic = "ground_truth/pose";
 
   StampSource stamp_source = StampSource::kHeader;
   double radar_stamp_shift = 0.0;  ///< [s]
@@ -85,6 +85,10 @@ struct Config {
 /// The configuration as each radar has it: `config.radars`, or `config` alone for one radar. The index is
 /// that of RadarScan::radar.
 std::vector<Config> configsOfRadars(const Config& config);
+
+/// The configuration with the topics as a node without a namespace has them, and as a bag holds them: a relative
+/// topic begins with `/`. An empty one stays empty.
+Config withAbsoluteTopics(Config config);
 
 /// Layout of the cloud: the preset with the overrides.
 PointCloudFormat pointCloudFormat(const Config& config);
