@@ -39,6 +39,7 @@ RunEvidence goodRun() {
 RunEvidence withRejected(const std::string& reason) {
   RunEvidence evidence = goodRun();
   evidence.radars.front().scans_used = 0;
+  evidence.radars.front().velocity_status = {{"moving", 10}};
   evidence.radars.front().scans_rejected = {{reason, 190}};
   return evidence;
 }
