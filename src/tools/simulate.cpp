@@ -1,6 +1,7 @@
 // Writes a bag with known truth. See `simulate --help`.
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <iomanip>
 #include <iostream>
 #include <map>
@@ -45,6 +46,14 @@ struct RadarRequest {
   RadarSetup setup;
   std::optional<double> fov_elevation = std::nullopt;
 };
+
+std::uint64_t parseSeed(const std::string& text) {
+  std::uint64_t seed = 0;
+  std::istringstream in(text);
+  const bool digits = text.find_first_not_of("0123456789") == std::string::npos;
+  if (!digits || !(in >> seed)) throw UsageError("'" + text + "' is not a whole number from 0");
+  return seed;
+}
 
 RadarModelOptions::Interval parseInterval(const std::string& text) {
   const std::vector<double> n = parseNumbers(text, 2);
