@@ -75,7 +75,7 @@ def test_bag_launch_writes_a_run_and_report_draws_it(ros, bag, tmp_path):
 
 @pytest.mark.parametrize("arguments, name", [(["nodelet:=false"], "/rio_t"), (["nodelet:=true", "ns:=robot"], "/robot/rio_t")])
 def test_launch_file_plays_a_bag(ros, bag, arguments, name):
-    words = [*ros, "rio_t", "irs.launch", f"bag:={bag}", "bag_rate:=3", *arguments]
+    words = [*ros, "rio_t", "irs.launch", f"bag:={bag}", "bag_rate:=3", "bag_args:=--loop", *arguments]
     with subprocess.Popen(words, stdout=subprocess.DEVNULL) as launch:
         try:
             end = time.monotonic() + DEADLINE
