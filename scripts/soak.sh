@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds, then plays simulated data to the live node for long, at high speed: memory must stay flat after the first
 # minute and latency must not drift. Prints the numbers, draws them; exit status 1 if one of them grows.
-#   scripts/soak.sh [MINUTES_OF_DATA] [--rate R] [--output DIR]      defaults: 60, 10, results/soak
+#   scripts/soak.sh [MINUTES_OF_DATA] [--rate R] [--output-dir DIR]      defaults: 60, 10, results/soak
 set -euo pipefail
 case "${1:-}" in -h | --help) sed -n '2,4s/^# \?//p' "$0"; exit 0 ;; esac
 folder=$(pwd)

@@ -23,7 +23,7 @@ class RealBag : public testing::Test {
 
   RunSummary play(const std::string& folder) const {
     const Config config = makeConfig(readParameterFile(findConfigFile("ti_mmwave")));
-    return runBag({bag_, folder, config, nullptr});
+    return runBag({{bag_}, folder, config, nullptr});
   }
 
   const TemporaryFolder temporary_;
@@ -66,7 +66,7 @@ TEST_F(RealBag, NearlyEveryScanOfTheWalkIsUsed) {
 TEST_F(RealBag, OnlineEndsNearTheBatch) {
   Config config = makeConfig(readParameterFile(findConfigFile("ti_mmwave")));
   config.mode = RunMode::kBatch;
-  const RunSummary batch = runBag({bag_, out_, config, nullptr});
+  const RunSummary batch = runBag({{bag_}, out_, config, nullptr});
   const RunSummary online = play(out_ + "/again");
   ASSERT_TRUE(batch.batch.has_value());
   EXPECT_TRUE(batch.batch->converged);

@@ -64,7 +64,7 @@ std::vector<std::string> neededFields(const PointCloudFormat& f) {
   std::vector<std::string> fitting;
   for (const std::string& name : pointCloudPresets()) {
     const PointCloudFormat preset = pointCloudPreset(name);
-    // Where the power is not read it still tells drivers apart.
+    // The name of the power field tells drivers apart, even if the field is not read.
     std::vector<std::string> names = neededFields(preset);
     names.push_back(preset.power);
     if (std::all_of(names.begin(), names.end(), [&](const std::string& n) { return hasField(message, n); })) {

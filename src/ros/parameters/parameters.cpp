@@ -70,15 +70,6 @@ void setParameter(const ParameterEntry& entry, const std::string& section, const
   }
 }
 
-/// The radar's configuration before its section is read: two radars share all but the frame.
-Config withoutSection(const Config& top_level, const std::string& name) {
-  Config config = top_level;
-  config.radars.clear();
-  config.radar_name = name;
-  config.radar_frame = "radar_" + name;
-  return config;
-}
-
 RadarOptions radarOptions(const Config& config) {
   const OdometryOptions& odometry = config.odometry;
   return {config.radar_name, odometry.T_IR, odometry.ego_velocity, odometry.smoother.time_offset_initial,
@@ -239,22 +230,6 @@ std::vector<std::string> contradictions(const Config& config) {
   return faults;
 }
 
-/// The section of a radar, as YAML.
-std::string sectionYaml(const Config& top_level, const Config& radar) {
-  Config own = radar;
-  Config base = withoutSection(top_level, radar.radar_name);
-  const ParameterList own_list = parametersOf(own);
-  const ParameterList base_list = parametersOf(base);
-  std::string lines;
-  for (std::size_t i = 0; i < own_list.all().size(); ++i) {
-    const Parameter& parameter = own_list.all()[i];
-    if (!parameter.description.of_radar || parameter.print() == base_list.all()[i].print()) continue;
-    lines += "  " + parameter.description.key + ": " + parameter.print() + "\n";
-  }
-  return "# --- Radar " + radar.radar_name + ": what differs from the above\n\n" + radar.radar_name + ":" +
-         (lines.empty() ? " {}\n" : "\n" + lines);
-}
-
 std::string joinFaults(const std::vector<std::string>& faults) {
   if (faults.size() == 1) return faults.front();
   std::string text = std::to_string(faults.size()) + " faults in the configuration:";
@@ -273,6 +248,14 @@ std::string configFolder() {
 }
 
 }  // namespace
+
+Config withoutSection(const Config& top_level, const std::string& name) {
+  Config config = top_level;
+  config.radars.clear();
+  config.radar_name = name;
+  config.radar_frame = "radar_" + name;
+  return config;
+}
 
 std::string toString(StampSource source) {
   switch (source) {
@@ -341,37 +324,10 @@ Config makeConfig(const ParameterEntries& entries) {
   return config;
 }
 
-std::vector<ParameterDescription> parameterDescriptions() {
-  std::vector<ParameterDescription> descriptions;
-  Config config;
-  const ParameterList list = parametersOf(config);
-  for (const Parameter& parameter : list.all()) descriptions.push_back(parameter.description);
-  return descriptions;
-}
-
-std::string toYaml(const Config& config) {
-  std::string yaml =
-      "# Every parameter of rio_t with its default. Written by `rio_t_bag --print-config`; do not edit by "
-      "hand.\n"
-      "# A configuration of your own names only what differs. Unknown keys are refused.\n";
-  std::string group;
-  Config copy = config;  // the list wants members that it could set
-  const ParameterList list = parametersOf(copy);
-  for (const Parameter& parameter : list.all()) {
-    const ParameterDescription& about = parameter.description;
-    if (about.group != group) yaml += "\n# --- " + about.group + "\n";
-    group = about.group;
-    yaml += "\n# " + about.description + "\n# " + (about.unit.empty() ? "" : "[" + about.unit + "] ") +
-            about.expected + (about.of_radar ? "; per radar" : "") + "\n" + about.key + ": " +
-            parameter.print() + "\n";
-  }
-  for (const Config& radar : config.radars) yaml += "\n" + sectionYaml(config, radar);
-  return yaml;
-}
-
 std::string findConfigFile(const std::string& name_or_path) {
   namespace fs = std::filesystem;
-  if (name_or_path.find('/') != std::string::npos || fs::exists(name_or_path)) {
+  // A folder of that name says nothing: `--config irs` works beside a folder with the results for irs.
+  if (name_or_path.find('/') != std::string::npos || fs::is_regular_file(name_or_path)) {
     if (!fs::exists(name_or_path))
       throw std::runtime_error("configuration " + name_or_path + ": no such file");
     return name_or_path;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -111,18 +112,31 @@ Config makeConfig(const ParameterEntries& entries);
 /// What is known of a key.
 struct ParameterDescription {
   std::string key;
-  std::string group;        ///< title of its section in estimator.yaml
-  std::string unit;         ///< empty: none
-  std::string expected;     ///< e.g. "a number above 0, at most 10"
-  std::string description;  ///< one line
-  bool of_radar = false;    ///< each radar may have its own, in its section
+  std::string type;      ///< "number", "integer", "boolean", "choice", "text" or "list"
+  std::string unit;      ///< empty: none
+  std::string expected;  ///< e.g. "a finite number above 0 and at most 10"
+  std::string description;  ///< full sentences: what it is, typical values, when to change it
+  double min = -std::numeric_limits<double>::infinity();  ///< of a number, or of each one of a list
+  double max = std::numeric_limits<double>::infinity();   ///< likewise
+  std::vector<std::string> choices = {};                  ///< of a choice
+  std::string group = {};  ///< title of its section
+  bool of_radar = false;  ///< each radar may have its own value, in its section
+  bool first = false;     ///< one of the parameters that a new user reads first
 };
-/// Every key once, in the order of estimator.yaml.
+/// Every key once, section by section.
 std::vector<ParameterDescription> parameterDescriptions();
 
-/// The configuration as YAML with the description of each key as comments: config/estimator.yaml for a
+/// The configuration as YAML with the text of each key as a comment: config/estimator.yaml for a
 /// default-constructed one. Reading it back gives the same configuration.
 std::string toYaml(const Config& config);
+
+/// All that is known of every parameter, with its default, for programs: a YAML list of maps with the keys key,
+/// section, first, type, unit, min, max, choices, expected, per_radar, default and description. A key without a value
+/// (no unit, no bound) is left out.
+std::string parametersYaml();
+
+/// The same for people: docs/parameters.md.
+std::string parametersMarkdown();
 
 /// Path of a configuration: `name_or_path` itself if it is a file, else that name, with or without ".yaml",
 /// in the package's config/. Throws std::runtime_error listing the names there are.
