@@ -171,6 +171,28 @@ void ParameterList::rotation(const std::string& key, Eigen::Quaterniond& member,
       });
 }
 
+void ParameterList::mounting(const std::string& key, std::optional<MountingAngles>& member,
+                             const std::string& meaning) {
+  constexpr double kDegree = 3.14159265358979323846 / 180.0;
+  add(
+      key, "deg", "[], or a list of 3 finite numbers, each of at least -360 and at most 360", meaning,
+      [&member](const ParameterValue& value) {
+        const auto* list = std::get_if<ParameterValue::List>(&value.data);
+        if (list != nullptr && list->empty()) {
+          member.reset();
+          return true;
+        }
+        const auto x = asNumbers(value, 3, Range{-360.0, 360.0});
+        if (!x) return false;
+        member = MountingAngles{kDegree * (*x)[0], kDegree * (*x)[1], kDegree * (*x)[2]};
+        return true;
+      },
+      [&member] {
+        return member ? listText({member->yaw / kDegree, member->pitch / kDegree, member->roll / kDegree})
+                      : std::string("[]");
+      });
+}
+
 void ParameterList::text(const std::string& key, std::string& member, const std::string& meaning) {
   add(
       key, "", "one line of text, not empty", meaning,

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -51,6 +52,8 @@ class ParameterList {
                const std::string& meaning);
   /// Unit quaternion x, y, z, w; normalised.
   void rotation(const std::string& key, Eigen::Quaterniond& member, const std::string& meaning);
+  /// Yaw, pitch and roll in degrees, or [] for none.
+  void mounting(const std::string& key, std::optional<MountingAngles>& member, const std::string& meaning);
   void text(const std::string& key, std::string& member, const std::string& meaning);
   void textOrEmpty(const std::string& key, std::string& member, const std::string& meaning);
   /// One of several words, each standing for a value.

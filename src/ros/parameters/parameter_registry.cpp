@@ -107,6 +107,15 @@ void listExtrinsics(ParameterList& list, Config& c) {
   list.vector3("extrinsics_translation", "m", between(-100, 100), c.odometry.T_IR.l_I,
                "origin of the radar in the IMU frame, x, y, z");
   list.rotation("extrinsics_rotation_xyzw", c.odometry.T_IR.q_IR, "turns radar vectors into the IMU frame");
+  list.choice<ExtrinsicsAxes>(
+      "extrinsics_axes", {{"rfu", ExtrinsicsAxes::kRightForwardUp}, {"cloud", ExtrinsicsAxes::kCloud}},
+      c.extrinsics_axes,
+      "the radar axes that extrinsics_rotation_xyzw turns: x right, y forward, z up (rfu), or those of the "
+      "cloud (cloud), as radar_axes names them");
+  list.mounting("mounting_yaw_pitch_roll_deg", c.mounting,
+                "the rotation in words, instead of extrinsics_rotation_xyzw: yaw to the left, pitch up, roll "
+                "right side down, seen from an IMU with x forward, y left, z up; [0, 0, 0] looks forward; []: "
+                "the rotation is given as extrinsics_rotation_xyzw");
 }
 
 void listEstimateExtrinsics(ParameterList& list, Config& c) {
@@ -130,6 +139,15 @@ void listEstimateExtrinsics(ParameterList& list, Config& c) {
 
 void listImu(ParameterList& list, Config& c) {
   list.group("IMU");
+  list.choice<AccelerationUnit>(
+      "imu_acceleration_unit",
+      {{"m/s2", AccelerationUnit::kMetresPerSecondSquared}, {"g", AccelerationUnit::kStandardGravity}},
+      c.imu_units.acceleration,
+      "unit of linear_acceleration in the messages; sensor_msgs/Imu asks for m/s2, some drivers write g");
+  list.choice<RateUnit>(
+      "imu_rate_unit", {{"rad/s", RateUnit::kRadiansPerSecond}, {"deg/s", RateUnit::kDegreesPerSecond}},
+      c.imu_units.rate,
+      "unit of angular_velocity in the messages; sensor_msgs/Imu asks for rad/s, some drivers write deg/s");
   list.number("gravity", "m/s^2", between(9.5, 10.0), c.odometry.gravity,
               "magnitude of gravity at the place");
   list.number("imu_accel_noise_density", "m/s^2/sqrt(Hz)", above(0), c.odometry.imu_noise.accel_density,
