@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "rio_t/core/so3.h"
+#include "rio_t/imu/input_check.h"
 #include "rio_t/imu/noise_meter.h"
 #include "rio_t/imu/saturation_detector.h"
 #include "rio_t/imu/static_initializer.h"
@@ -125,8 +126,10 @@ void findRest(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
   options.max_gravity_error = 2.0;  // what is off by more is told as such
   StaticInitializer rest(options, kGravity);
   const Time begin = imu.front().time;
-  for (const ImuMeasurement& sample : imu) {
+  ImuInputCheck check(0.04, {});  // measures the noise, which a vibrating frame has at rest, too
+  for (ImuMeasurement sample : imu) {
     if (sample.time - begin > kStart) return;
+    if (check.check(sample).decision == ImuInputCheck::Decision::kDrop) continue;
     const auto found = rest.add(sample);
     if (!found) continue;
     report->rests_at_start = true;

@@ -22,11 +22,15 @@ constexpr std::size_t kMinVelocities = 6;   // of a window: two lines take four
 constexpr double kMinMotion = 0.25;         // [m/s] that a window must exceed to count as motion
 constexpr double kMinDuration = 3.0;        // [s] of motion, below which nothing is said
 constexpr double kGravitySigma = 0.5;       // [m/s^2] of the mean specific force: 3 degrees
+constexpr double kRestGravitySigma = 0.1;   // [m/s^2] of the gravity from a rest: bias of the accelerometer
+constexpr double kGyroDrift = 3.0e-4;       // [rad/s] with which the gyro loses it: what is left of its bias
 constexpr double kOffsetStep = 0.01;        // [s]
 constexpr double kLevelSigma = 0.17;        // [rad] of the roll, if nothing else is known
+constexpr double kAheadSigma = 0.5;         // [rad] of the pitch, likewise
 constexpr double kUprightWeight = 9.0;      // [sigma^2] half of what upside down costs
 constexpr double kOutlier = 3.0;            // [sigma] from which on a velocity counts less
 constexpr double kClear = 25.0;             // [sigma^2] from which on a sign is taken for known
+constexpr double kAlike = 2.0;              // errors of a window are alike: they count as half as many
 constexpr double kOffsetFactor = 3.0;       // velocities of noisy points draw the bottom of the curve to the side
 constexpr int kM = 9, kL = 3, kShared = kM + kL, kAll = kShared + 6;
 
@@ -62,13 +66,12 @@ Rows rowsOf(const RadarVelocity& velocity, double offset, Time begin, const Iner
   return rows;
 }
 
-/// Information of a velocity in G. The covariance is known in R; before M is, its mean stands for all axes.
-Matrix3d information(const RadarVelocity& velocity, const Matrix3d& R_GI, const Matrix3d* M, double sigma) {
+/// Covariance of a velocity in G. It is known in R; before M is, its mean stands for all axes.
+Matrix3d covariance(const RadarVelocity& velocity, const Matrix3d& R_GI, const Matrix3d* M, double sigma) {
   const Matrix3d model = sigma * sigma * Matrix3d::Identity();
-  if (M == nullptr)
-    return (model + velocity.covariance.trace() / 3.0 * Matrix3d::Identity()).inverse();
+  if (M == nullptr) return model + velocity.covariance.trace() / 3.0 * Matrix3d::Identity();
   const Matrix3d T = R_GI * *M;
-  return (model + T * velocity.covariance * T.transpose()).inverse();
+  return model + T * velocity.covariance * T.transpose();
 }
 
 struct Problem {
@@ -83,21 +86,55 @@ struct WindowSystem {
   double c = 0.0;
 };
 
-WindowSystem systemOf(const VelocityWindow& window, double offset, const Matrix3d* M, const Problem& problem) {
-  WindowSystem system;
+/// All rows of a window, and their covariance: that of each velocity, and the random walk of the IMU's noise
+/// since the beginning, which all later ones share.
+struct WindowRows {
+  MatrixXd A;
+  VectorXd y;
+  MatrixXd covariance;
+};
+
+WindowRows rowsOf(const VelocityWindow& window, double offset, const Matrix3d* M, const Problem& problem) {
+  const Eigen::Index count = static_cast<Eigen::Index>(window.size());
   const Time begin = window.front().velocity->stamp - offset;
-  for (const Weighted& each : window) {
+  const double density = problem.options.accel_density * problem.options.accel_density;
+  WindowRows all{MatrixXd(3 * count, kAll), VectorXd(3 * count), MatrixXd::Zero(3 * count, 3 * count)};
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Weighted& each = window[static_cast<std::size_t>(i)];
     const Rows rows = rowsOf(*each.velocity, offset, begin, problem.track);
+    all.A.middleRows(3 * i, 3) = rows.A;
+    all.y.segment(3 * i, 3) = rows.y;
     const Matrix3d R_GI = problem.track.rotation(each.velocity->stamp - offset).toRotationMatrix();
-    const Matrix3d W =
-        each.weight * information(*each.velocity, R_GI, M, problem.options.velocity_sigma);
-    const MatrixXd weighted = W * rows.A;
-    system.H.noalias() += rows.A.transpose() * weighted;
-    system.b.noalias() += weighted.transpose() * rows.y;
-    system.c += rows.y.dot(W * rows.y);
+    all.covariance.block(3 * i, 3 * i, 3, 3) =
+        covariance(*each.velocity, R_GI, M, problem.options.velocity_sigma) / each.weight;
+    const double walked = density * (each.velocity->stamp - window.front().velocity->stamp);
+    for (Eigen::Index k = i; k < count; ++k) {
+      all.covariance.block(3 * i, 3 * k, 3, 3).diagonal().array() += walked;
+      if (k != i) all.covariance.block(3 * k, 3 * i, 3, 3).diagonal().array() += walked;
+    }
   }
-  const Vector3d g_G = problem.track.gravity(begin, problem.options.gravity);
-  const double known = 1.0 / (kGravitySigma * kGravitySigma);
+  return all;
+}
+
+double gravitySigma(Time time, const MountingSearchOptions& options) {
+  if (!options.gravity_G) return kGravitySigma;
+  const double tilt = kGyroDrift * std::abs(time - options.rest_end);
+  return std::min(kGravitySigma, std::hypot(kRestGravitySigma, options.gravity * tilt));
+}
+
+WindowSystem systemOf(const VelocityWindow& window, double offset, const Matrix3d* M, const Problem& problem) {
+  WindowRows rows = rowsOf(window, offset, M, problem);
+  const Eigen::LLT<MatrixXd> root(rows.covariance);
+  root.matrixL().solveInPlace(rows.A);
+  root.matrixL().solveInPlace(rows.y);
+  WindowSystem system;
+  system.H.noalias() = rows.A.transpose() * rows.A;
+  system.b.noalias() = rows.A.transpose() * rows.y;
+  system.c = rows.y.squaredNorm();
+  const Time begin = window.front().velocity->stamp - offset;
+  const Vector3d g_G = problem.options.gravity_G.value_or(problem.track.gravity(begin, problem.options.gravity));
+  const double sigma = gravitySigma(begin, problem.options);
+  const double known = 1.0 / (sigma * sigma);
   system.H.bottomRightCorner<3, 3>() += known * Matrix3d::Identity();
   system.b.tail<3>() += known * g_G;
   system.c += known * g_G.squaredNorm();
@@ -148,13 +185,15 @@ RotationCost withoutLeverArm(const Quadratic& q) {
   return cost;
 }
 
-/// Without a motion that shows it, a radar stands upright and does not roll: its right axis is level. In M =
-/// sign R the level axis costs the same for both signs.
+/// Without a motion that shows it, a radar stands upright, does not roll and looks ahead: its right axis is level,
+/// its forward axis nearly so. In M = sign R a level axis costs the same for both signs.
 RotationCost withUpright(RotationCost cost, const Vector3d& up_I, int sign) {
-  VectorXd level = VectorXd::Zero(kM), upright = VectorXd::Zero(kM);
+  VectorXd level = VectorXd::Zero(kM), ahead = VectorXd::Zero(kM), upright = VectorXd::Zero(kM);
   level.head<3>() = up_I;
+  ahead.segment<3>(3) = up_I;
   upright.tail<3>() = sign * up_I;
   cost.H += level * level.transpose() / (kLevelSigma * kLevelSigma);
+  cost.H += ahead * ahead.transpose() / (kAheadSigma * kAheadSigma);
   cost.b += kUprightWeight * upright;
   return cost;
 }
@@ -257,16 +296,16 @@ double reweigh(double offset, const Matrix3d& M, const Vector3d& l, Problem* pro
     const MatrixXd nuisance = s.H.bottomRightCorner(6, 6);
     const VectorXd left = s.b.tail(6) - s.H.bottomLeftCorner(6, kShared) * all.head(kShared);
     all.tail(6) = nuisance.ldlt().solve(left);
-    const Time begin = window.front().velocity->stamp - offset;
-    for (Weighted& each : window) {
-      const Rows rows = rowsOf(*each.velocity, offset, begin, problem->track);
-      const Vector3d e = rows.A * all - rows.y;
-      const Matrix3d R_GI = problem->track.rotation(each.velocity->stamp - offset).toRotationMatrix();
-      const double square =
-          e.dot(information(*each.velocity, R_GI, &M, problem->options.velocity_sigma) * e) / 3.0;
-      each.weight = 1.0 / (1.0 + square / (kOutlier * kOutlier));
+    const WindowRows rows = rowsOf(window, offset, &M, *problem);
+    const VectorXd errors = rows.A * all - rows.y;
+    for (std::size_t i = 0; i < window.size(); ++i) {
+      const auto at = static_cast<Eigen::Index>(3 * i);
+      const Vector3d e = errors.segment(at, 3);
+      const Matrix3d own = rows.covariance.block(at, at, 3, 3);
+      const double square = e.dot(own.ldlt().solve(e)) / 3.0;
       squares.push_back(square);
       residuals.push_back(e.squaredNorm() / 3.0);
+      window[i].weight = 1.0 / (1.0 + square / (kOutlier * kOutlier));
     }
   }
   const auto median = [](std::vector<double> values) {
@@ -341,12 +380,16 @@ MountingSearch searchMounting(const std::vector<RadarVelocity>& velocities, cons
   double scale = 1.0;
   std::array<Found, 2> by_sign;  // receding, approaching
   const int steps = static_cast<int>(std::lround(options.max_offset / kOffsetStep));
-  constexpr int kRounds = 3;
+  constexpr int kRounds = 3, kNear = 5;
+  int bottom_before = 0;
   for (int round = 0; round < kRounds; ++round) {
     std::array<double, 2> least = {std::numeric_limits<double>::infinity(),
                                    std::numeric_limits<double>::infinity()};
     std::array<std::vector<double>, 2> curves;
-    for (int k = -steps; k <= steps; ++k) {
+    // The first round looks at all offsets, the later ones around the bottom.
+    const int first = round == 0 ? -steps : std::max(-steps, bottom_before - kNear);
+    const int last = round == 0 ? steps : std::min(steps, bottom_before + kNear);
+    for (int k = first; k <= last; ++k) {
       const RotationCost cost = withoutLeverArm(quadraticOf(k * kOffsetStep, M, problem));
       for (std::size_t s = 0; s < 2; ++s) {
         const int sign = s == 0 ? 1 : -1;
@@ -362,10 +405,13 @@ MountingSearch searchMounting(const std::vector<RadarVelocity>& velocities, cons
         }
       }
     }
-    const double difference = (least[1] - least[0]) / scale;  // positive: receding fits better
+    const double difference = (least[1] - least[0]) / (kAlike * scale);  // positive: receding fits better
     result.sign_significance = std::abs(difference);
-    const int by_imu = difference < -kClear ? -1 : (difference > kClear ? 1 : 0);
-    int class_sign = by_imu != 0 ? by_imu : (options.sign_from_ranges != 0 ? options.sign_from_ranges : 1);
+    // Against the ranges the IMU must be twice as sure.
+    const int likelier = difference < 0.0 ? -1 : 1;
+    const bool contradicts = options.sign_from_ranges != 0 && options.sign_from_ranges != likelier;
+    const int by_imu = std::abs(difference) > (contradicts ? 4.0 * kClear : kClear) ? likelier : 0;
+    const int class_sign = by_imu != 0 ? by_imu : (options.sign_from_ranges != 0 ? options.sign_from_ranges : 1);
     result.sign = class_sign;
     result.mirrored = by_imu != 0 && options.sign_from_ranges != 0 && by_imu != options.sign_from_ranges;
     const std::size_t s = class_sign == 1 ? 0 : 1;
@@ -373,14 +419,15 @@ MountingSearch searchMounting(const std::vector<RadarVelocity>& velocities, cons
     // The offset at the bottom of the curve, and its sigma from the curvature there.
     const std::vector<double>& curve = curves[s];
     const auto bottom = static_cast<int>(std::min_element(curve.begin(), curve.end()) - curve.begin());
-    const int inner = std::clamp(bottom, 1, 2 * steps - 1);
+    bottom_before = first + bottom;
+    const int inner = std::clamp(bottom, 1, static_cast<int>(curve.size()) - 2);
     const auto at = [&](int i) { return curve[static_cast<std::size_t>(i)]; };
     const double curvature = (at(inner - 1) - 2.0 * at(inner) + at(inner + 1)) / (kOffsetStep * kOffsetStep);
     const double slope = (at(inner + 1) - at(inner - 1)) / (2.0 * kOffsetStep);
     const double step =
         curvature > 0.0 ? std::clamp(-slope / curvature, -kOffsetStep, kOffsetStep) : 0.0;
-    result.offset = (inner - steps) * kOffsetStep + step;
-    const bool at_the_end = bottom == 0 || bottom == 2 * steps;
+    result.offset = (first + inner) * kOffsetStep + step;
+    const bool at_the_end = std::abs(bottom_before) == steps;
     result.offset_sigma =
         curvature > 0.0 && !at_the_end ? std::sqrt(2.0 * scale / curvature) : options.max_offset;
 
@@ -398,7 +445,6 @@ MountingSearch searchMounting(const std::vector<RadarVelocity>& velocities, cons
     result.q_IR = Eigen::Quaterniond(R);
 
     // About the axes of I, from the data alone. Errors of a window are alike: they count as half as many.
-    constexpr double kAlike = 2.0;
     const MatrixXd J = tangent(M_found);
     const Matrix3d in_R = J.transpose() * bare.H * J / (kAlike * scale);
     const Matrix3d in_I = R * in_R * R.transpose();

@@ -14,7 +14,12 @@ struct MountingSearchOptions {
   double gravity = 9.81;            ///< [m/s^2] magnitude
   double max_offset = 0.3;          ///< [s] offsets to either side that are tried
   double lever_arm_sigma = 0.5;     ///< [m] per axis, around zero
+  double accel_density = 0.02;      ///< [m/s^2/sqrt(Hz)] white noise of the accelerometer, vibration included
   double velocity_sigma = 0.08;     ///< [m/s] of what a velocity and the IMU over a window do not model
+  /// Gravity in G from a rest [m/s^2], and the end of this rest: the gyro carries it on. Without a rest the mean of
+  /// the specific force stands for it.
+  std::optional<Eigen::Vector3d> gravity_G;
+  Time rest_end;
   /// What the ranges say of the sign (DopplerSign); 0: nothing.
   int sign_from_ranges = 0;
   /// Up in I at rest, or on average; without one, no mounting is more likely than another.

@@ -9,6 +9,7 @@
 namespace rio_t {
 namespace {
 
+constexpr double kStraight = 3.14159265358979323846;  // [rad]
 constexpr double kDegree = 3.14159265358979323846 / 180.0;
 
 std::string degrees(double radians) { return decimalText(radians / kDegree, 0); }
@@ -32,9 +33,14 @@ std::string sureness(const Eigen::Vector3d& sigma) {
   return text;
 }
 
-MountingSearchOptions searchOptions(const ImuInspection& imu, int sign_from_ranges) {
+MountingSearchOptions searchOptions(const ImuInspection& imu, const InertialTrack& track, int sign_from_ranges) {
   MountingSearchOptions options;
   options.sign_from_ranges = sign_from_ranges;
+  options.accel_density = std::max(options.accel_density, imu.report.accel_density_median);
+  if (imu.report.rests_at_start) {
+    options.rest_end = track.begin() + (imu.report.rest_begin + imu.report.rest);
+    options.gravity_G = -(track.rotation(options.rest_end) * imu.report.rest_acceleration);
+  }
   constexpr double kMostlyUp = 7.5;  // [m/s^2] length of the mean: shorter, and the IMU turns over
   const ImuReport& report = imu.report;
   const Eigen::Vector3d up = report.rests_at_start ? report.rest_acceleration : report.mean_acceleration;
@@ -58,7 +64,7 @@ Looked look(const Recording& recording, const ImuInspection& imu, const CloudTop
   looked.velocities = radarVelocities(looked.scans);
   looked.sign = dopplerSignFromRanges(looked.scans, track);
   looked.search =
-      searchMounting(looked.velocities.velocities, track, searchOptions(imu, looked.sign.sign));
+      searchMounting(looked.velocities.velocities, track, searchOptions(imu, track, looked.sign.sign));
   return looked;
 }
 
@@ -163,7 +169,10 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
   const MountingAngles angles = mountingOf(search.q_IR);
   const std::vector<std::string> words = {decimalYaml(angles.yaw / kDegree, 1), decimalYaml(angles.pitch / kDegree, 1),
                                           decimalYaml(angles.roll / kDegree, 1)};
-  const std::string sure = sureness(search.rotation_sigma);
+  Eigen::Vector3d sigma = search.rotation_sigma;
+  constexpr double kSparseSigma = 0.2;  // [rad]
+  if (radar->isSparse()) sigma = (sigma.array().square() + kSparseSigma * kSparseSigma).sqrt().min(kStraight);
+  const std::string sure = sureness(sigma);
   const bool observed = search.rotation_sigma.maxCoeff() < 0.3;
   tell(observed ? FindingLevel::kOk : FindingLevel::kOdd, "mounting",
        "yaw " + words[0] + ", pitch " + words[1] + ", roll " + words[2] + " deg (radar's " +
@@ -175,8 +184,8 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
   std::vector<std::string> lever;
   std::string text;
   for (int k = 0; k < 3; ++k) {
-    // Three sigma away from zero, and known to a decimetre: better than zero.
-    const bool found = std::abs(l[k]) > 3.0 * l_sigma[k] && l_sigma[k] < 0.1;
+    // Three sigma away from zero: better than zero.
+    const bool found = std::abs(l[k]) > 3.0 * l_sigma[k] && l_sigma[k] < 0.3;
     lever.push_back(decimalYaml(found ? l[k] : 0.0, 2));
     text += (k == 0 ? "" : ", ") + decimalText(l[k], 2) + " +- " + decimalText(l_sigma[k], 2);
   }
@@ -191,7 +200,7 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
        decimalText(1e3 * search.offset, 0) + " +- " + decimalText(1e3 * search.offset_sigma, 0) +
            " ms, roughly; the odometry estimates it");
   constexpr double kFar = 0.06, kKnown = 0.03;  // [s] the estimate starts at 0 +- 0.075
-  if (std::abs(search.offset) > kFar && search.offset_sigma < kKnown)
+  if (std::abs(search.offset) > kFar && search.offset_sigma < kKnown && !radar->isSparse())
     radar->keys.set("time_offset_initial",
                     decimalYaml(std::clamp(search.offset, -0.2, 0.2), 3), "Found roughly, in seconds.");
 }
