@@ -147,7 +147,7 @@ TEST_F(CheckBag, APlainBagIsReadyAndItsMountingIsFound) {
             0)
       << describeCheck(plain);
   expectLine(plain, FindingLevel::kOk, {"radar", "/sensor_platform/radar/scan", "format irs"});
-  expectLine(plain, FindingLevel::kOk, {"rest", "9.8", "up is +z"});
+  expectLine(plain, FindingLevel::kOk, {"rest", "gravity 9.", "up is +z"});
   expectLine(plain, FindingLevel::kOk, {"Doppler", "positive for receding", "the IMU"});
   // Only what differs from the defaults.
   for (const char* key : {"imu_topic", "radar_topic", "radar_format", "stamp_source", "radar_doppler_sign"})

@@ -64,14 +64,17 @@ double misfit(const Steps& steps, double scale) {
   return sum;
 }
 
-void findAccelerationUnit(ImuReport* report) {
+void findAccelerationUnit(double least_norm, ImuReport* report) {
   const double norm = report->written_norm;
+  // The least accelerated tenth shows gravity, in m/s^2 or in g.
+  if (least_norm < 0.5 && norm < 8.0) {
+    report->acceleration_fault =
+        "gravity is missing: the acceleration at rest is near zero, and rio_t needs the raw specific force";
+    return;
+  }
   if (norm > 8.0 && norm < 12.0) return;
   if (norm > 0.8 && norm < 1.2) {
     report->units.acceleration = AccelerationUnit::kStandardGravity;
-  } else if (norm < 0.5) {
-    report->acceleration_fault =
-        "gravity is missing: the acceleration has a median size near zero, and rio_t needs the raw specific force";
   } else {
     report->acceleration_fault = "the acceleration is neither in m/s^2 (9.81) nor in g (1)";
   }
@@ -167,7 +170,7 @@ ImuReport inspectImu(const std::vector<ImuMeasurement>& written) {
   if (imu.empty()) return report;
   report.written_norm = quantile(norms, 0.5);
   report.written_rate = quantile(rates, 0.9);
-  findAccelerationUnit(&report);
+  findAccelerationUnit(quantile(norms, 0.1), &report);
   const double scale = inMetresPerSecondSquared(report.units.acceleration);
   for (ImuMeasurement& sample : imu) sample.acceleration *= scale;
   if (report.written_rate == 0.0) {

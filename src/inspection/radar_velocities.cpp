@@ -89,10 +89,10 @@ RadarVelocities radarVelocities(const std::vector<RadarScan>& scans) {
 DopplerSign dopplerSignFromRanges(const std::vector<RadarScan>& scans, const InertialTrack& track) {
   constexpr double kMinApart = 0.15, kMaxApart = 0.6;  // [s]
   const double kSameDirection = std::cos(0.14);        // 8 degrees: the noise of an elevation
-  constexpr double kMaxTurn = 0.07;                    // [rad]
+  constexpr double kMaxTurn = 0.12;                    // [rad]
   constexpr double kMinShift = 0.15;                   // [m] by which a range must change
   constexpr double kFar = 0.3;                         // [m] a match that is farther off is none
-  constexpr double kClear = 5.0;                       // [sigma]
+  constexpr double kClear = 3.0;                       // [sigma]
   DopplerSign result;
   double sum = 0.0, squares = 0.0;
   for (std::size_t i = 0; i < scans.size(); ++i) {

@@ -38,7 +38,7 @@ struct DopplerSign {
 
 /// Compares the points of scans that lie 0.15 to 0.6 s apart: a range changes as its Doppler says, with the
 /// right sign. It needs neither the axes nor the mounting. Pairs between which the platform turns by more than
-/// 4 degrees do not count.
+/// 7 degrees do not count.
 DopplerSign dopplerSignFromRanges(const std::vector<RadarScan>& scans, const InertialTrack& track);
 
 }  // namespace rio_t

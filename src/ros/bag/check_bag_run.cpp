@@ -43,11 +43,8 @@ void writeFile(const std::string& path, const std::string& text) {
 std::string drawRigScript() {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  for (const fs::path& candidate :
-       {program.parent_path() / "draw_rig.py", fs::path(RIO_T_SOURCE_DIR) / "scripts" / "draw_rig.py"}) {
-    if (fs::is_regular_file(candidate)) return candidate.string();
-  }
-  return "";
+  const fs::path script = program.parent_path() / "draw_rig.py";
+  return !error && fs::is_regular_file(script) ? script.string() : "";
 }
 
 void drawRig(const std::string& yaml, const std::string& png) {

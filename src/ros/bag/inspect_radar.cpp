@@ -224,7 +224,10 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
                               cloud.topic + ": the field " + format.format.doppler + " is zero in every point"});
     return radar;
   }
-  if (correctAxes(looked.cloud, looked.search.mirrored, &format))
+  // If the ranges say nothing, a radar that looks along another axis and a contrary sign are one fault, not two:
+  // two fields are swapped.
+  const bool mirrored = looked.search.mirrored || (looked.sign.sign == 0 && looked.search.sign == -1);
+  if (correctAxes(looked.cloud, mirrored, &format))
     looked = look(recording, imu, cloud, stamps, format.format, track);
   radar.usable = true;
   radar.search = looked.search;
