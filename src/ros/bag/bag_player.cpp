@@ -125,7 +125,7 @@ void BagPlayer::addImu(const sensor_msgs::Imu& message, Time record) {
   ++imu_count_;
   ImuMeasurement imu;
   try {
-    imu = toImuMeasurement(message, config_.imu_topic);
+    imu = toImuMeasurement(message, config_.imu_topic, config_.imu_units);
   } catch (const std::exception& error) {
     notUsable("imu_not_usable", error.what(), &imu_not_usable_);
     return;

@@ -211,7 +211,7 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
   const auto start = std::chrono::steady_clock::now();
   monitor_.imu();
   try {
-    const ImuMeasurement imu = toImuMeasurement(*event.getConstMessage(), config_.imu_topic);
+    const ImuMeasurement imu = toImuMeasurement(*event.getConstMessage(), config_.imu_topic, config_.imu_units);
     // The same judgement as the session's own, so that the whole session starts again, with what it stamps
     // by.
     const ClockJumpDetector::Verdict stamp = imu_stamps_.check(imu.time);

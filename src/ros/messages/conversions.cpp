@@ -34,13 +34,14 @@ ros::Time toRosTime(Time time) {
   return {static_cast<std::uint32_t>(ns / kSecond), static_cast<std::uint32_t>(ns % kSecond)};
 }
 
-ImuMeasurement toImuMeasurement(const sensor_msgs::Imu& message, const std::string& topic) {
+ImuMeasurement toImuMeasurement(const sensor_msgs::Imu& message, const std::string& topic,
+                                const ImuUnits& units) {
   ImuMeasurement imu;
   imu.time = toTime(message.header.stamp);
   if (imu.time == Time()) throw std::runtime_error("topic " + topic + ": the stamp in the header is zero");
   tf2::fromMsg(message.angular_velocity, imu.angular_velocity);
   tf2::fromMsg(message.linear_acceleration, imu.acceleration);
-  return imu;
+  return converted(imu, units);
 }
 
 Covariance6 poseCovariance(const NavigationState& state) {
@@ -115,10 +116,7 @@ ImuBias toImuBias(const NavigationState& state, const std::string& base_link_fra
 }
 
 Extrinsics toExtrinsics(const geometry_msgs::Transform& T_base_cloud, PointAxes axes) {
-  // RIO's right is minus the cloud's left, RIO's forward is the cloud's forward: a quarter turn about z.
-  const Eigen::Quaterniond q_cloud_R = axes == PointAxes::kForwardLeftUp
-                                           ? Eigen::Quaterniond(std::sqrt(0.5), 0.0, 0.0, -std::sqrt(0.5))
-                                           : Eigen::Quaterniond::Identity();
+  const Eigen::Quaterniond q_cloud_R = cloudFromRfu(axes);
   Eigen::Quaterniond q_base_cloud;
   tf2::fromMsg(T_base_cloud.rotation, q_base_cloud);
   Extrinsics T_IR;

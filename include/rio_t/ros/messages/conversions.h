@@ -10,6 +10,7 @@
 
 #include "rio_t/ImuBias.h"
 #include "rio_t/imu/measurement.h"
+#include "rio_t/imu/units.h"
 #include "rio_t/odometry/navigation_state.h"
 #include "rio_t/odometry/options.h"
 #include "rio_t/radar/ego_velocity.h"
@@ -22,8 +23,10 @@ using Covariance6 = Eigen::Matrix<double, 6, 6>;
 Time toTime(const ros::Time& time);
 /// Throws std::runtime_error for a time that ROS cannot hold (negative, or after 2106).
 ros::Time toRosTime(Time time);
-/// Throws std::runtime_error, naming `topic`, where the stamp in the header is zero.
-ImuMeasurement toImuMeasurement(const sensor_msgs::Imu& message, const std::string& topic);
+/// In m/s^2 and rad/s; `units` are those of the driver. Throws std::runtime_error, naming `topic`, if the stamp
+/// in the header is zero.
+ImuMeasurement toImuMeasurement(const sensor_msgs::Imu& message, const std::string& topic,
+                                const ImuUnits& units = {});
 
 /// Covariance of position and orientation as nav_msgs/Odometry has it: position, then rotation about the
 /// fixed axes of W. The state's theta is a rotation about the axes of I, so theta_W = R_WI theta_I.

@@ -1,11 +1,14 @@
 #pragma once
 
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "rio_t/imu/units.h"
 #include "rio_t/odometry/options.h"
+#include "rio_t/radar/mounting.h"
 #include "rio_t/ros/parameters/parameter_value.h"
 #include "rio_t/ros/parameters/point_cloud_format.h"
 
@@ -30,6 +33,12 @@ enum class RunMode {
 enum class ExtrinsicsSource {
   kParameters,  ///< "parameters": extrinsics_translation and extrinsics_rotation_xyzw
   kTf,          ///< "tf": the transform from the cloud's frame_id to base_link_frame
+};
+
+/// The axes of the radar that extrinsics_rotation_xyzw turns into those of the IMU.
+enum class ExtrinsicsAxes {
+  kRightForwardUp,  ///< "rfu": x right, y forward, z up, whatever the axes of the cloud
+  kCloud,           ///< "cloud": the cloud's own, see `radar_axes`
 };
 
 /// What is changed of the preset `radar_format`. Empty text and a sign of zero leave it as it is.
@@ -68,6 +77,12 @@ struct Config {
   std::string trajectory_file = "rio_t_trajectory.txt";
 
   ExtrinsicsSource extrinsics_source = ExtrinsicsSource::kParameters;
+  // Two other ways to tell the rotation of T_IR. makeConfig turns them into odometry.T_IR, which always has
+  // the axes of RIO, and sets them back to their defaults.
+  std::optional<MountingAngles> mounting;
+  ExtrinsicsAxes extrinsics_axes = ExtrinsicsAxes::kRightForwardUp;
+
+  ImuUnits imu_units;
 
   std::string radar_format = "irs";
   PointCloudOverrides radar_overrides;
