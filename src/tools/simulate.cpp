@@ -149,6 +149,27 @@ void addImuOptions(OptionList& options, ImuModelOptions& imu) {
                  Range::kPositive);
 }
 
+void addBarometerOptions(OptionList& options, BarometerModelOptions& barometer) {
+  options.section("Barometer");
+  options.flag("barometer", "the platform carries one; topic /sensor_platform/baro", barometer.enabled);
+  options.number("barometer-rate", "HZ", "rate", barometer.rate, Range::kPositive);
+  options.number("barometer-noise", "PA", "sigma of a sample; 12 Pa are a metre", barometer.noise,
+                 Range::kNotNegative);
+  options.number("barometer-drift", "PA/RTS", "random walk: weather, and warmth of the sensor",
+                 barometer.drift, Range::kNotNegative);
+  options
+      .add("pressure-shock", "S,S,PA",
+           "START,DURATION,CHANGE: a door or a rotor changes the pressure; may be repeated", "none",
+           [&barometer](const std::string& v) {
+             const std::vector<double> n = parseNumbers(v, 3);
+             if (n[0] < 0.0 || n[1] <= 0.0)
+               throw std::invalid_argument("'" + v +
+                                           "' must be a start from 0, a positive duration and a change");
+             barometer.shocks.push_back({n[0], n[1], n[2]});
+           })
+      .repeatable = true;
+}
+
 // What --radar takes, too.
 void addRadarOptions(OptionList& options, RadarRequest& r) {
   RadarModelOptions& radar = r.setup.radar;
@@ -324,6 +345,7 @@ void setAll(const OptionList& options, std::vector<OptionList::Given> given, Req
   for (auto& [name, setup] : simulation.radars) setup = setupOf(setup, given, request.radars[name]);
   if (request.noise_free) {
     simulation.imu.removeErrors();
+    simulation.barometer.removeErrors();
     simulation.radar.removeErrors();
     for (auto& [name, setup] : simulation.radars) setup.radar.removeErrors();
   }
@@ -431,6 +453,9 @@ void printSummary(const Request& request, const Motion& motion, const SensorData
             << triple(data.imu.b_a.back()) << " at the end\n"
             << "true gyro bias [rad/s]: " << triple(data.imu.b_g.front()) << " at the start, "
             << triple(data.imu.b_g.back()) << " at the end\n";
+  if (!data.pressures.empty())
+    std::cout << "barometer: " << data.pressures.size() << " samples, true drift at the end "
+              << data.pressures.back().drift << " Pa\n";
   if (data.radars.empty()) printRadar("radar", request.simulation, data.scans);
   for (const auto& [name, scans] : data.radars) {
     printRadar("radar " + name, request.simulation.radars.at(name), scans);
@@ -441,6 +466,8 @@ void printSummary(const Request& request, const Motion& motion, const SensorData
 }
 
 void run(Request request) {
+  if (!request.simulation.barometer.shocks.empty() && !request.simulation.barometer.enabled)
+    throw std::invalid_argument("--pressure-shock needs --barometer");
   request.simulation.start = Time::fromSeconds(request.start_time);
   const Motion motion = motionOf(request);
   const SensorData data = simulate(motion, request.simulation);
@@ -461,6 +488,7 @@ int main(int argc, char** argv) {
     OptionList options;
     addGeneralOptions(options, request);
     addImuOptions(options, request.simulation.imu);
+    addBarometerOptions(options, request.simulation.barometer);
     addNamedRadars(options, request);
     addRadarOptions(options, radar);
     const std::vector<std::string> arguments(argv + 1, argv + argc);

@@ -23,6 +23,8 @@ void listTopics(ParameterList& list, Config& c) {
       "trigger_topic", c.trigger_topic,
       "std_msgs/Header, stamped in the IMU clock when a scan starts; only read with stamp_source: trigger");
   list.ofRadar(false);
+  list.textOrEmpty("barometer_topic", c.barometer_topic,
+                   "sensor_msgs/FluidPressure, stamped in the IMU clock; empty: no barometer");
   list.textOrEmpty("ground_truth_topic", c.ground_truth_topic,
                    "geometry_msgs/PoseStamped of the IMU, for the errors in summary.yaml; bag runner only");
 }
@@ -230,6 +232,46 @@ void listRest(ParameterList& list, Config& c) {
   list.number("rest_velocity_sigma", "m/s", above(0), rest.velocity_sigma, "of the zero velocity, per axis");
 }
 
+void listPlatform(ParameterList& list, Config& c) {
+  GroundVehicleOptions& vehicle = c.odometry.ground_vehicle;
+  list.group("Platform: what it cannot do");
+  list.choice<Platform>("platform", {{"free", Platform::kFree}, {"ground_vehicle", Platform::kGroundVehicle}},
+                        c.odometry.platform,
+                        "free: anything; ground_vehicle: a point of it moves neither sideways nor up, as on "
+                        "wheels. The next keys are of the ground vehicle");
+  list.rotation(
+      "vehicle_frame_rotation_xyzw", vehicle.T_IV.q_IR,
+      "turns vehicle vectors (x forward, y left, z up) into the IMU frame; the estimate starts there");
+  list.vector3("vehicle_frame_translation", "m", between(-100, 100), vehicle.T_IV.l_I,
+               "the point that only moves forward, in the IMU frame: the centre of the rear axle");
+  list.number("vehicle_frame_rotation_sigma", "rad", above(0, kPi), vehicle.rotation_sigma,
+              "standard deviation of the rotation told, about each axis");
+  list.number("vehicle_frame_rotation_noise", "rad/sqrt(s)", above(0), vehicle.rotation_noise,
+              "random walk of the rotation, about each axis");
+  list.number("vehicle_sideways_sigma", "m/s", above(0), vehicle.sideways_sigma,
+              "of the velocity of the point to the side: slip");
+  list.number("vehicle_vertical_sigma", "m/s", above(0), vehicle.vertical_sigma,
+              "of its velocity upwards: bumps, and springs");
+  list.number("vehicle_gate", "", above(0), vehicle.gate,
+              "standard deviations; a velocity that contradicts the constraint more is left out");
+}
+
+void listBarometer(ParameterList& list, Config& c) {
+  BarometerOptions& barometer = c.odometry.barometer;
+  list.group("Barometer: on if it has a barometer_topic");
+  list.number("barometer_noise_density", "m/sqrt(Hz)", above(0), barometer.noise_density,
+              "white noise of the height; more counts if the samples show more");
+  list.number("barometer_drift", "m/sqrt(s)", above(0), barometer.drift,
+              "random walk of the bias of the height: weather, and warmth of the sensor");
+  list.number("barometer_temperature", "deg C", between(-60, 60), barometer.temperature,
+              "of the air at the start; 3 deg off make a height wrong by 1 %");
+  list.number("barometer_gate", "", atLeast(0), barometer.gate,
+              "standard deviations from the estimate; a height farther off is a shock of the pressure; 0: no "
+              "gate");
+  list.number("barometer_gate_timeout", "s", above(0), barometer.gate_timeout,
+              "of such heights, after which the pressure has stepped and the bias is found anew");
+}
+
 void listEgoVelocity(ParameterList& list, Config& c) {
   EgoVelocityOptions& radar = c.odometry.ego_velocity;
   list.group("Radar: which points count, and the velocity from them");
@@ -403,6 +445,8 @@ ParameterList parametersOf(Config& config) {
   listGaps(list, config);
   listInitialization(list, config);
   listRest(list, config);
+  listPlatform(list, config);
+  listBarometer(list, config);
   listEgoVelocity(list, config);
   listFeasibility(list, config);
   listTimeOffset(list, config);

@@ -333,6 +333,7 @@ Config makeConfig(const ParameterEntries& entries) {
   setTopLevel(sorted.top_level, list, config.radars, &faults);
   const Config top_level = config;
   setRadars(sorted, top_level, &config.radars, &faults);
+  config.odometry.use_barometer = !config.barometer_topic.empty();
   for (const Config& radar : config.radars) config.odometry.radars.push_back(radarOptions(radar));
   // Judged only where each value is right by itself: otherwise a default might be blamed.
   if (faults.empty()) faults = contradictions(config);
