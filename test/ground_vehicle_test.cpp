@@ -45,8 +45,8 @@ TEST(GroundVehicleFactor, ATurnAboutTheRearAxleHasNoResidual) {
 }
 
 struct VehicleRun : SimulatedRun {
-  VehicleRun(const std::string& motion, std::uint64_t seed, double duration, bool constrained)
-      : SimulatedRun(motion, seed, duration, 3.0) {
+  VehicleRun(const std::string& name, std::uint64_t seed, double duration, bool constrained)
+      : SimulatedRun(name, seed, duration, 3.0) {
     if (constrained) options.platform = Platform::kGroundVehicle;
   }
   void takeKart() {

@@ -15,7 +15,7 @@ namespace rio_t {
 struct BarometerOptions {
   /// [m/sqrt(Hz)] white noise of the height; more counts if the samples show more
   double noise_density = 0.05;
-  double drift = 0.02;        ///< [m/sqrt(s)] random walk of the bias: weather, and warmth of the sensor
+  double drift = 0.005;        ///< [m/sqrt(s)] random walk of the bias: weather, and warmth of the sensor
   double gate = 4.0;          ///< [sigma] a mean farther from the estimate is rejected; 0: no gate
   double gate_timeout = 1.0;  ///< [s] of rejected means, after which the pressure has stepped for good
   double temperature = 15.0;  ///< [deg C] of the air at the start
