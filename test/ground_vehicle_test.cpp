@@ -22,6 +22,7 @@ TEST(GroundVehicleFactor, JacobiansAreCorrect) {
   const std::vector<double> state(x.data(), x.data() + StateBlock::kSize);
   const Extrinsics T_IV{{-0.8, 0.1, -0.3}, Eigen::Quaterniond(so3::exp({0.1, -0.3, 0.7}))};
   expectJacobiansCorrect(GroundVehicleFactor({0.1, -0.2, 0.9}, {0.05, 0.08}), {state, values(stored(T_IV))});
+  expectJacobiansCorrect(LevelGroundFactor(0.01), {state, values(stored(T_IV))});
 }
 
 TEST(GroundVehicleFactor, ATurnAboutTheRearAxleHasNoResidual) {
@@ -54,6 +55,8 @@ struct VehicleRun : SimulatedRun {
     setup = simulation::presetOf("kart").options;
     setup.seed = seed;
     options.T_IR = setup.T_IR;
+    // The vehicle tells how the radar is tilted, and not the other way round.
+    options.smoother.estimate_extrinsics = EstimateExtrinsics::kRotation;
   }
   double heightRms() const {
     return rms(4.0, 1e3, [this](const NavigationState& state) { return state.p_W.z(); });
@@ -102,7 +105,6 @@ void mountTurned(const Eigen::Quaterniond& q_VI, simulation::SensorData& data, E
 }
 
 TEST(GroundVehicle, ItsFrameIsFoundAsWellAsItSays) {
-  // About the driving direction nothing tells the rotation, and the prior says so.
   Eigen::Vector3d nees = Eigen::Vector3d::Zero();
   constexpr int kRuns = 6;
   for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
@@ -126,13 +128,9 @@ TEST(GroundVehicle, ItsFrameIsFoundAsWellAsItSays) {
     nees += error.cwiseQuotient(last->q_IV_sigma).cwiseAbs2() / kRuns;
     EXPECT_LT(std::abs(error.z()), 0.01);
     EXPECT_LT(std::abs(error.y()), 0.015);
-    EXPECT_GT(last->q_IV_sigma.x(), 0.03);
   }
   std::printf("vehicle frame: roll %.2f, pitch %.2f, yaw %.2f\n", nees.x(), nees.y(), nees.z());
-  for (const double axis : {nees.y(), nees.z()}) {
-    EXPECT_LT(axis, 2.5);
-    EXPECT_GT(axis, 0.05);
-  }
+  for (const double axis : {nees.x(), nees.y(), nees.z()}) EXPECT_LT(axis, 2.5);
 }
 
 TEST(GroundVehicle, BumpsAndSlipAreLeftOut) {

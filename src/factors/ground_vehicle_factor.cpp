@@ -38,4 +38,24 @@ bool GroundVehicleFactor::Evaluate(double const* const* parameters, double* resi
   return true;
 }
 
+bool LevelGroundFactor::Evaluate(double const* const* parameters, double* residuals,
+                                 double** jacobians) const {
+  const Eigen::Vector3d up_I = StateView(parameters[0]).q_WI.conjugate() * Eigen::Vector3d::UnitZ();
+  const Eigen::Matrix3d R_VI = toExtrinsics(parameters[1]).R_RI();
+  Eigen::Map<Eigen::Vector2d>{residuals} = weight_ * (R_VI * up_I).head<2>();
+  if (jacobians == nullptr) return true;
+  const Eigen::Matrix<double, 2, 3> turned = weight_ * (R_VI * so3::hat(up_I)).topRows<2>();
+  if (jacobians[0] != nullptr) {
+    Eigen::Map<StateJacobian<2>> J(jacobians[0]);
+    J.setZero();
+    J.leftCols<3>() = turned;
+  }
+  if (jacobians[1] != nullptr) {
+    Eigen::Map<ExtrinsicsJacobian<2>> J(jacobians[1]);
+    J.setZero();
+    J.leftCols<3>() = turned;
+  }
+  return true;
+}
+
 }  // namespace rio_t

@@ -267,7 +267,7 @@ void Estimator::begin(Time time, const NodePrior& prior, std::size_t radar, bool
   radars_[radar].start(smoother_, time, prior);
   for (std::size_t k = 0; k < radars_.size(); ++k)
     if (k != radar) radars_[k].join(smoother_);
-  if (ground_vehicle_) ground_vehicle_->join(smoother_);
+  if (ground_vehicle_) ground_vehicle_->join(smoother_, at_rest);
   if (barometer_) barometer_->join(smoother_, time, at_rest);
   last_used_ = time;
   yaw_doubt_ = YawDoubt();

@@ -18,7 +18,7 @@ constexpr double kMaxSpan = 0.5;
 /// [s] to either side of a node, of the mean of the gyro: a vibration must not turn the lever of the point.
 constexpr double kGyroHalfWidth = 0.05;
 /// [s] of motion that is judged, and the mean of min(1, squared sigmas / gate^2) above which it is not that
-/// of the vehicle (docs/method.md, section 5.8).
+/// of the vehicle (docs/method.md, section 5.9).
 constexpr double kJudgedMotion = 5.0;
 constexpr double kMaxContradiction = 0.5;
 
@@ -31,12 +31,15 @@ GroundVehicleChannel::GroundVehicleChannel(const GroundVehicleOptions& options, 
       imu_(&imu),
       manifold_(std::make_shared<ExtrinsicsManifold>(EstimateExtrinsics::kRotation)) {}
 
-void GroundVehicleChannel::join(FixedLagSmoother& smoother) {
+void GroundVehicleChannel::join(FixedLagSmoother& smoother, bool at_rest) {
   Window& window = smoother.window();
   frame_ = window.addCalibration(manifold_, stored(options_.T_IV));
   addPrior(window, {frame_.get()},
            {Eigen::MatrixXd::Identity(3, 3) / options_.rotation_sigma, Eigen::VectorXd::Zero(3)});
   judged_at_.reset();
+  if (at_rest && options_.start_slope_sigma > 0.0)
+    window.add(std::make_unique<LevelGroundFactor>(options_.start_slope_sigma),
+               {smoother.nodeAt(smoother.newest().time), frame_.get()});
   smoother.settle();
 }
 

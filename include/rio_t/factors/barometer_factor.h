@@ -7,7 +7,7 @@
 namespace rio_t {
 
 /// A mean of heights by the pressure, above the place of the first pressure, off by a bias (docs/method.md,
-/// section 5.9): residual (p_W,z + delay v_W,z + bias - height) / sigma. Blocks: state, bias [m].
+/// section 5.10): residual (p_W,z + delay v_W,z + bias - height) / sigma. Blocks: state, bias [m].
 class BarometerFactor final : public ceres::SizedCostFunction<1, StateBlock::kSize, 1> {
  public:
   /// `height` [m] is the mean over samples whose mean time is `delay` [s] after the state. `sigma` [m].

@@ -20,7 +20,7 @@ struct VehicleVelocity {
 /// `omega_I` is what the gyro reads [rad/s], bias included.
 VehicleVelocity vehicleVelocity(const double* state, const double* frame, const Eigen::Vector3d& omega_I);
 
-/// A wheeled vehicle moves neither sideways nor up (docs/method.md, section 5.8): residual (v_V,y, v_V,z),
+/// A wheeled vehicle moves neither sideways nor up (docs/method.md, section 5.9): residual (v_V,y, v_V,z),
 /// each over its sigma. Blocks: state, vehicle frame (ExtrinsicsBlock with the manifold of its rotation).
 class GroundVehicleFactor final
     : public ceres::SizedCostFunction<2, StateBlock::kSize, ExtrinsicsBlock::kSize> {
@@ -33,6 +33,19 @@ class GroundVehicleFactor final
  private:
   Eigen::Vector3d omega_I_;
   Eigen::Vector2d weights_;
+};
+
+/// The vehicle stands on level ground: residual (u_x, u_y) / sigma of the upward axis of W in V,
+/// u = R_VI R_IW e_z. Blocks: state, vehicle frame.
+class LevelGroundFactor final
+    : public ceres::SizedCostFunction<2, StateBlock::kSize, ExtrinsicsBlock::kSize> {
+ public:
+  /// `slope_sigma` [rad] of the ground, along and across.
+  explicit LevelGroundFactor(double slope_sigma) : weight_(1.0 / slope_sigma) {}
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
+
+ private:
+  double weight_;
 };
 
 }  // namespace rio_t

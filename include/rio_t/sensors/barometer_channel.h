@@ -15,7 +15,7 @@ namespace rio_t {
 struct BarometerOptions {
   /// [m/sqrt(Hz)] white noise of the height; more counts if the samples show more
   double noise_density = 0.05;
-  double drift = 0.005;        ///< [m/sqrt(s)] random walk of the bias: weather, and warmth of the sensor
+  double drift = 0.005;       ///< [m/sqrt(s)] random walk of the bias: weather, and warmth of the sensor
   double gate = 4.0;          ///< [sigma] a mean farther from the estimate is rejected; 0: no gate
   double gate_timeout = 1.0;  ///< [s] of rejected means, after which the pressure has stepped for good
   double temperature = 15.0;  ///< [deg C] of the air at the start
@@ -48,7 +48,7 @@ struct BarometerAnswer {
   std::string rejected_because;   ///< snake case, empty if it was used
 };
 
-/// A barometer, from pressures to the window (docs/method.md, section 5.9). Not thread-safe.
+/// A barometer, from pressures to the window (docs/method.md, section 5.10). Not thread-safe.
 ///
 /// Means over a tenth of a second join the nearest node, as heights off by a bias that walks. A mean that
 /// contradicts the estimate is rejected: doors and rotors shock the pressure. If the means contradict it for

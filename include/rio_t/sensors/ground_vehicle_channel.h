@@ -23,10 +23,13 @@ struct GroundVehicleOptions {
   /// The vehicle frame V (x forward, y left, z up) in the IMU frame: `q_IR` turns V into I, and `l_I` is the
   /// point that moves only forward, e.g. the centre of the rear axle.
   Extrinsics T_IV;
-  double rotation_sigma = 0.05;    ///< [rad] prior on the rotation, about each axis: three degrees
+  double rotation_sigma = 0.1;  ///< [rad] prior on the rotation, about each axis: six degrees
+  /// [rad] of the ground where the vehicle starts at rest, along and across: a floor. 0: nothing is known of
+  /// it
+  double start_slope_sigma = 0.002;
   double rotation_noise = 1.0e-5;  ///< [rad/sqrt(s)] its random walk, about each axis
   double sideways_sigma = 0.05;    ///< [m/s] of the velocity of the point
-  double vertical_sigma = 0.05;    ///< [m/s] likewise
+  double vertical_sigma = 0.03;    ///< [m/s] likewise
   double gate = 4.0;               ///< [sigma] a velocity that contradicts the constraint more is left out
 };
 
@@ -45,14 +48,15 @@ struct GroundVehicleAnswer {
 };
 
 /// A vehicle on wheels, as a sensor that always reads "no velocity sideways, none upwards"
-/// (docs/method.md, section 5.8). Not thread-safe.
+/// (docs/method.md, section 5.9). Not thread-safe.
 class GroundVehicleChannel {
  public:
   /// `imu` must outlive the channel.
   GroundVehicleChannel(const GroundVehicleOptions& options, double huber_threshold, const ImuBuffer& imu);
 
-  /// Joins a window: adds the vehicle frame as told, with its prior.
-  void join(FixedLagSmoother& smoother);
+  /// Joins a window that begins with one node: adds the vehicle frame as told, with its prior; `at_rest`: the
+  /// vehicle stands on the ground there.
+  void join(FixedLagSmoother& smoother, bool at_rest);
   /// What the estimate says at `time`, and whether that contradicts the constraint. None if the constraint is
   /// off, or was judged less than a tenth of a second ago. Before the terms of that time are added.
   std::optional<GroundVehicleAnswer> judge(const FixedLagSmoother& smoother, Time time);

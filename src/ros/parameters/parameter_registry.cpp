@@ -246,6 +246,10 @@ void listPlatform(ParameterList& list, Config& c) {
                "the point that only moves forward, in the IMU frame: the centre of the rear axle");
   list.number("vehicle_frame_rotation_sigma", "rad", above(0, kPi), vehicle.rotation_sigma,
               "standard deviation of the rotation told, about each axis");
+  list.number(
+      "vehicle_start_slope_sigma", "rad", atLeast(0), vehicle.start_slope_sigma,
+      "standard deviation of the slope of the ground at a start at rest: levels the vehicle frame; 0: not "
+      "known");
   list.number("vehicle_frame_rotation_noise", "rad/sqrt(s)", above(0), vehicle.rotation_noise,
               "random walk of the rotation, about each axis");
   list.number("vehicle_sideways_sigma", "m/s", above(0), vehicle.sideways_sigma,
