@@ -8,6 +8,7 @@
 #include "numeric_jacobian.h"
 #include "rio_t/core/so3.h"
 #include "rio_t/factors/ground_vehicle_factor.h"
+#include "rio_t/imu/rest_detector.h"
 #include "rio_t/simulation/presets.h"
 #include "simulated_run.h"
 #include "synthetic_motion.h"
@@ -160,6 +161,55 @@ TEST(GroundVehicle, BumpsAndSlipAreLeftOut) {
   EXPECT_GE(left_out, 6);
   EXPECT_GT(used_before, 60);
   EXPECT_FALSE(run.contradictedAt());
+}
+
+TEST(GroundVehicle, AnEngineThatIdlesDoesNotHideRest) {
+  VehicleRun run("ground_vehicle", 3, 40.0, true);
+  simulation::MotionRequest request;
+  request.name = "ground_vehicle";
+  request.seed = 3;
+  request.duration = 40.0;
+  request.rest = {3.0, 8.0, 2.0};
+  run.motion = simulation::makeMotion(request);
+  run.setup.imu.accel_vibration = 0.8;
+  run.setup.imu.gyro_vibration = 0.02;
+  run.run();
+  int used_moving = 0, used_at_rest = 0, judged_at_rest = 0;
+  for (const ScanResult& result : run.results) {
+    if (!result.ground_vehicle) continue;
+    const double t = run.seconds(result.scan.stamp);
+    used_moving += t > 10.0 && t < 28.0 && result.ground_vehicle->used ? 1 : 0;
+    judged_at_rest += t > 34.0 ? 1 : 0;
+    used_at_rest += t > 34.0 && result.ground_vehicle->used ? 1 : 0;
+  }
+  EXPECT_GT(used_moving, 120);
+  EXPECT_GT(judged_at_rest, 30);  // to the IMU alone it is no rest
+  EXPECT_EQ(used_at_rest, 0);     // with the radar it is, and rest takes the place of the constraint
+  EXPECT_LT(run.rms(35.0, 40.0, [](const NavigationState& state) { return state.v_W.norm(); }), 0.02);
+}
+
+TEST(Rest, AnImuThatShakesMayRestUnlessItsMeansSayOtherwise) {
+  const auto buffer = [](double acceleration, double rate) {
+    ImuBuffer imu;
+    for (int i = 0; i <= 100; ++i) {
+      ImuMeasurement sample;
+      sample.time = Time::fromSeconds(0.01 * i);
+      const double shake = i % 2 == 0 ? 1.0 : -1.0;
+      sample.acceleration = {acceleration + 0.8 * shake, 0.8 * shake, 9.81 - 0.8 * shake};
+      sample.angular_velocity = {0.0, 0.02 * shake, rate};
+      imu.add(sample);
+    }
+    return imu;
+  };
+  RestContext context;
+  context.g_W = {0.0, 0.0, -9.81};
+  const Time now = Time::fromSeconds(1.0);
+  EXPECT_FALSE(isAtRest(buffer(0.0, 0.0), now, context, RestOptions()));
+  EXPECT_TRUE(mayRestShaking(buffer(0.0, 0.0), now, context, RestOptions()));
+  EXPECT_FALSE(mayRestShaking(buffer(1.5, 0.0), now, context, RestOptions()));
+  EXPECT_FALSE(mayRestShaking(buffer(0.0, 0.1), now, context, RestOptions()));
+  context.v_W = {0.3, 0.0, 0.0};
+  EXPECT_FALSE(mayRestShaking(buffer(0.0, 0.0), now, context, RestOptions()));
 }
 
 }  // namespace

@@ -196,6 +196,11 @@ class BagJob {
                                  result.solution.converged(), result.readmitted};
     log.fill(&summary);
     summary.solver_terminations = {{toString(result.solution.termination), 1}};
+    if (summary.barometer || summary.ground_vehicle)
+      summary.warnings.emplace_back(
+          "mode: batch uses neither the barometer nor platform: ground_vehicle; the run in online/ does");
+    summary.barometer.reset();
+    summary.ground_vehicle.reset();
     player.countInput(&summary);
     return finish(std::move(summary), log, output_.get());
   }
