@@ -15,6 +15,7 @@
 #include "rio_t/odometry/radar_inertial_odometry.h"
 #include "rio_t/ros/cloud/point_cloud.h"
 #include "rio_t/ros/cloud/stamping.h"
+#include "rio_t/ros/diagnosis/diagnosis.h"
 #include "rio_t/ros/parameters/parameters.h"
 #include "run_log.h"
 
@@ -31,7 +32,7 @@ class BagPlayer {
   void finish();
 
   RunSummary summary() const;
-  /// Sets what was read, what of it never became a scan, and the noise that the scans showed.
+  /// Sets what was read, what of it never became a scan, the noise that the scans showed, and the diagnosis.
   void countInput(RunSummary* summary) const;
   const RadarInertialOdometry& odometry() const { return odometry_; }
   /// Of the first initialisation.
@@ -56,6 +57,7 @@ class BagPlayer {
     NotUsableByKind not_usable;
   };
 
+  Diagnosis diagnosis(const RunSummary& summary) const;
   void addImu(const sensor_msgs::Imu& message, Time record);
   void addPressure(const sensor_msgs::FluidPressure& message);
   void addCloud(const sensor_msgs::PointCloud2& message, Time record, Radar& radar);
@@ -70,6 +72,7 @@ class BagPlayer {
   RunLog* log_;
   BatchOdometry* recorder_;
   std::optional<RadarInertialOdometry::Start> start_;
+  EvidenceCollector evidence_;
   std::uint64_t imu_count_ = 0, pressure_count_ = 0, points_not_finite_ = 0;
   NotUsableByKind imu_not_usable_, pressure_not_usable_;
 };

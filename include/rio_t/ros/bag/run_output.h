@@ -10,6 +10,7 @@
 
 #include "rio_t/evaluation/trajectory.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
+#include "rio_t/ros/diagnosis/diagnosis.h"
 #include "rio_t/ros/parameters/parameters.h"
 
 namespace rio_t {
@@ -97,6 +98,7 @@ struct RunSummary {
   MeasuredImuNoise imu_noise;                          ///< that the IMU showed at the end
   std::optional<BarometerSummary> barometer;           ///< only with a barometer_topic
   std::optional<GroundVehicleSummary> ground_vehicle;  ///< only with platform: ground_vehicle
+  Diagnosis diagnosis;                                 ///< whether the run is good, and if not, why
   std::optional<TruthErrors> truth;
   double estimation_seconds = 0.0;  ///< reading, decoding and estimating, wall clock
   double realtime_factor = 0.0;     ///< seconds of data in a second of that
