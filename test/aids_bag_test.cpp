@@ -8,6 +8,7 @@
 #include "rio_t/ros/messages/conversions.h"
 #include "rio_t/simulation/motions.h"
 #include "run_files.h"
+#include "temporary_folder.h"
 
 namespace rio_t {
 namespace {
@@ -15,8 +16,6 @@ namespace {
 class AidsBag : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = (fs::temp_directory_path() / ("rio_t_aids_" + std::to_string(::getpid()))).string();
-    fs::create_directories(folder_);
     simulation::MotionRequest request;
     request.name = "drone";
     request.seed = 2;
@@ -31,16 +30,16 @@ class AidsBag : public testing::Test {
     for (simulation::SimulatedPressure& pressure : data.pressures) pressure.pascal *= 0.01;
     writeSimulationBag(folder_ + "/hectopascal.bag", motion, data, rig.start, {});
   }
-  void TearDown() override { fs::remove_all(folder_); }
 
-  RunSummary run(const std::string& bag, ParameterEntries entries) const {
+  RunSummary run(const std::string& bag, const ParameterEntries& entries) const {
     ParameterEntries all = readParameterFile(findConfigFile("irs"));
-    for (auto& entry : entries) all.push_back(entry);
-    return runBag({folder_ + "/" + bag + ".bag", folder_ + "/out", makeConfig(all), nullptr});
+    all.insert(all.end(), entries.begin(), entries.end());
+    return runBag({{folder_ + "/" + bag + ".bag"}, folder_ + "/out", makeConfig(all), nullptr});
   }
   std::string out(const std::string& name) const { return contents(folder_ + "/out/" + name); }
 
-  std::string folder_;
+  TemporaryFolder temporary_;
+  const std::string folder_ = temporary_.path();
 };
 
 ParameterEntries parse(const std::string& key, const std::string& value) {
