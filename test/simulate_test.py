@@ -121,3 +121,17 @@ def test_help_tells_of_presets_and_options(simulate):
     for word in ("--preset NAME", "--points-min N", "--skip-empty", "--doppler-span M/S", "--no-elevation", "kart", "--radar TEXT",
                  "--ghost-burst S,S", "--first-trigger S", "kart_pair", "its own reflectors, persons and"):
         assert word in done.stdout
+
+
+def test_a_barometer_and_its_shocks(simulate):
+    motion = ("--motion", "drone", "--duration", "25")
+    _, without = simulate(*motion)
+    done, calm = simulate(*motion, "--barometer")
+    assert "barometer: 1250 samples, true drift at the end" in done.stdout
+    assert b"sensor_msgs/FluidPressure" in calm and b"sensor_msgs/FluidPressure" not in without
+    _, shocked = simulate(*motion, "--barometer", "--pressure-shock", "15,1,100", "--pressure-shock", "20,1,-100")
+    assert shocked != calm
+    failed, bag = simulate(*motion, "--pressure-shock", "15,1,100")
+    assert failed.returncode == 1 and "--pressure-shock needs --barometer" in failed.stderr and bag is None
+    failed, _ = simulate(*motion, "--barometer", "--pressure-shock", "15,0,100")
+    assert failed.returncode == 1 and "a positive duration" in failed.stderr

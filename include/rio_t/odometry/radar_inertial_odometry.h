@@ -37,6 +37,11 @@ class RadarInertialOdometry {
   /// radar that the options do not have.
   void addScan(RadarScan scan);
 
+  /// Queues a pressure, if the options use the barometer. What cannot be used is counted in `faults()`:
+  /// "pressure_not_usable" (see faultOf), "pressure_out_of_order", "pressure_ahead_of_imu",
+  /// "pressure_without_node".
+  void addPressure(const Pressure& pressure);
+
   /// Does all the work that is due: initialisation, ego-velocity, window. Returns a result for each scan that
   /// it finished.
   std::vector<ScanResult> process();

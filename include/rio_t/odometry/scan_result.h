@@ -11,6 +11,8 @@
 #include "rio_t/odometry/navigation_state.h"
 #include "rio_t/radar/ego_velocity.h"
 #include "rio_t/radar/scan.h"
+#include "rio_t/sensors/barometer_channel.h"
+#include "rio_t/sensors/ground_vehicle_channel.h"
 
 namespace rio_t {
 
@@ -37,10 +39,12 @@ struct ScanResult {
   Eigen::Matrix<double, 6, 6> T_IR_covariance = Eigen::Matrix<double, 6, 6>::Zero();
   int solver_iterations = 0;
   SolverTermination solver_termination = SolverTermination::kIterationLimit;
-  Health health = Health::kOk;           ///< after this scan; set always
-  bool offset_stepped = false;           ///< t_O stepped before this scan
-  bool reinitialized = false;            ///< the estimate was re-initialised before this scan
-  std::vector<StampedPose> left_window;  ///< optimised poses that this scan pushed out, oldest first
+  Health health = Health::kOk;                        ///< after this scan; set always
+  bool offset_stepped = false;                        ///< t_O stepped before this scan
+  bool reinitialized = false;                         ///< the estimate was re-initialised before this scan
+  std::optional<GroundVehicleAnswer> ground_vehicle;  ///< if the constraint was judged at this scan
+  std::vector<BarometerAnswer> barometer;  ///< means of pressures that were judged before this scan
+  std::vector<StampedPose> left_window;    ///< optimised poses that this scan pushed out, oldest first
 };
 
 }  // namespace rio_t

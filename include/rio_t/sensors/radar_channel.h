@@ -27,6 +27,7 @@ struct RadarChannelOptions {
 /// What the estimator knows when a scan comes.
 struct ScanContext {
   bool at_rest = false;            ///< the IMU shows no motion at the time of measurement
+  bool may_rest = false;           ///< likewise but for a vibration: rest if the points show no motion
   bool has_diverged = false;       ///< the prediction cannot be trusted
   double model_error_scale = 1.0;  ///< see ModelErrorScale
   Time last_used;                  ///< stamp of the last scan that any radar gave to the window

@@ -73,6 +73,7 @@ LiveOdometry::~LiveOdometry() {
   // First no more callbacks, then no more solving: the optimisation thread is the last to touch the
   // publishers.
   imu_subscriber_.shutdown();
+  barometer_subscriber_.shutdown();
   for (Radar& radar : radars_) {
     radar.scans.shutdown();
     radar.triggers.shutdown();
@@ -117,6 +118,11 @@ void LiveOdometry::subscribe() {
         [this, k](const Event<sensor_msgs::PointCloud2>& event) { onScan(k, event); },
         sensor_msgs::PointCloud2());
   }
+  if (!config_.barometer_topic.empty())
+    barometer_subscriber_ = subscribeTo(
+        input_node, config_.barometer_topic, kImuQueue,
+        [this](const Event<sensor_msgs::FluidPressure>& event) { onPressure(event); },
+        sensor_msgs::FluidPressure());
   imu_subscriber_ = subscribeTo(
       imu_node, config_.imu_topic, kImuQueue, [this](const Event<sensor_msgs::Imu>& event) { onImu(event); },
       sensor_msgs::Imu());
@@ -128,6 +134,10 @@ void LiveOdometry::subscribe() {
   using Status = LiveMonitor::Status;
   diagnostics_->add("odometry", [this](Status& s) { monitor_.describeOdometry(s, session_.get().get()); });
   diagnostics_->add("input", [this](Status& s) { monitor_.describeInput(s, session_.get().get()); });
+  if (!config_.barometer_topic.empty())
+    diagnostics_->add("barometer", [this](Status& s) { monitor_.describeBarometer(s); });
+  if (config_.odometry.platform == Platform::kGroundVehicle)
+    diagnostics_->add("ground vehicle", [this](Status& s) { monitor_.describeGroundVehicle(s); });
   diagnostics_->add("solver", [this](Status& s) { monitor_.describeSolver(s, session_.get().get()); });
   for (std::size_t k = 0; k < radars_.size(); ++k) {
     const Config& radar = radars_[k].config;
@@ -282,6 +292,17 @@ void LiveOdometry::onScan(std::size_t radar, const Event<sensor_msgs::PointCloud
   }
 }
 
+void LiveOdometry::onPressure(const Event<sensor_msgs::FluidPressure>& event) {
+  monitor_.pressure();
+  try {
+    const Pressure pressure = toPressure(*event.getConstMessage(), config_.barometer_topic);
+    if (const Session now = session_.get()) now->addPressure(pressure);
+  } catch (const std::exception& error) {
+    monitor_.pressureDropped(error.what());
+    if (isTimeToTell("pressure")) ROS_ERROR_STREAM(name_ << ": " << error.what());
+  }
+}
+
 void LiveOdometry::onTrigger(std::size_t radar, const Event<std_msgs::Header>& event) {
   monitor_.trigger(radar);
   const Session now = session_.get();
@@ -377,6 +398,8 @@ void LiveOdometry::tellHealth(const ScanResult& result) const {
   if (result.reinitialized) {
     ROS_WARN_STREAM(name_ << ": found the state anew in motion; position and heading go on");
   }
+  if (result.ground_vehicle && result.ground_vehicle->is_contradicted)
+    ROS_WARN_STREAM(name_ << ": " << kGroundVehicleContradicted);
   if (result.health == Health::kDiverged) {
     ROS_ERROR_STREAM_THROTTLE(kWarnPeriod,
                               name_ << ": diverged, radar and IMU contradict each other: do not trust the "

@@ -44,6 +44,15 @@ ImuMeasurement toImuMeasurement(const sensor_msgs::Imu& message, const std::stri
   return converted(imu, units);
 }
 
+Pressure toPressure(const sensor_msgs::FluidPressure& message, const std::string& topic) {
+  const Pressure pressure{toTime(message.header.stamp), message.fluid_pressure};
+  if (pressure.time == Time())
+    throw std::runtime_error("topic " + topic + ": the stamp in the header is zero");
+  const std::string fault = faultOf(pressure.pascal);
+  if (!fault.empty()) throw std::runtime_error("topic " + topic + ": fluid_pressure: " + fault);
+  return pressure;
+}
+
 Covariance6 poseCovariance(const NavigationState& state) {
   Eigen::Matrix<double, 6, 15> J = Eigen::Matrix<double, 6, 15>::Zero();
   J.block<3, 3>(0, S::kP).setIdentity();

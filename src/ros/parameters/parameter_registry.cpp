@@ -47,6 +47,8 @@ ParameterList parametersOf(Config& config) {
   listGaps(list, config);
   listInitialization(list, config);
   listRest(list, config);
+  listPlatform(list, config);
+  listBarometer(list, config);
   listEgoVelocity(list, config);
   listFeasibility(list, config);
   listTimeOffset(list, config);

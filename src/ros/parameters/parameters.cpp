@@ -304,7 +304,8 @@ std::vector<Config> configsOfRadars(const Config& config) {
 
 Config withAbsoluteTopics(Config config) {
   for (std::string* topic :
-       {&config.imu_topic, &config.radar_topic, &config.trigger_topic, &config.ground_truth_topic}) {
+       {&config.imu_topic, &config.radar_topic, &config.trigger_topic, &config.ground_truth_topic,
+        &config.barometer_topic}) {
     if (!topic->empty() && topic->front() != '/') topic->insert(0, "/");
   }
   for (Config& radar : config.radars) radar = withAbsoluteTopics(radar);
@@ -320,6 +321,7 @@ Config makeConfig(const ParameterEntries& entries) {
   setTopLevel(sorted.top_level, list, config.radars, &faults);
   const Config top_level = config;
   setRadars(sorted, top_level, &config.radars, &faults);
+  config.odometry.use_barometer = !config.barometer_topic.empty();
   resolveMounting(&config);
   for (Config& radar : config.radars) {
     resolveMounting(&radar);

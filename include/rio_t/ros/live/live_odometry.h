@@ -5,6 +5,7 @@
 #include <ros/message_event.h>
 #include <ros/node_handle.h>
 #include <ros/spinner.h>
+#include <sensor_msgs/FluidPressure.h>
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <std_msgs/Header.h>
@@ -63,6 +64,7 @@ class LiveOdometry {
   void subscribe();
   void onImu(const Event<sensor_msgs::Imu>& event);
   void onScan(std::size_t radar, const Event<sensor_msgs::PointCloud2>& event);
+  void onPressure(const Event<sensor_msgs::FluidPressure>& event);
   void onTrigger(std::size_t radar, const Event<std_msgs::Header>& event);
   bool onReset(std_srvs::Empty::Request& request, std_srvs::Empty::Response& response);
   bool onSaveTrajectory(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
@@ -115,7 +117,7 @@ class LiveOdometry {
   ClockJumpDetector imu_stamps_;    // IMU thread only, as the next
   std::optional<Time> newest_imu_;  // of the good stamps
 
-  ros::Subscriber imu_subscriber_;
+  ros::Subscriber imu_subscriber_, barometer_subscriber_;
   ros::ServiceServer reset_server_, save_server_;
   ros::WallTimer diagnostics_timer_;
   std::thread solver_;

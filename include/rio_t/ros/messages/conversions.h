@@ -4,6 +4,7 @@
 #include <geometry_msgs/TransformStamped.h>
 #include <geometry_msgs/TwistWithCovarianceStamped.h>
 #include <nav_msgs/Odometry.h>
+#include <sensor_msgs/FluidPressure.h>
 #include <sensor_msgs/Imu.h>
 
 #include <string>
@@ -15,6 +16,7 @@
 #include "rio_t/odometry/options.h"
 #include "rio_t/radar/ego_velocity.h"
 #include "rio_t/ros/parameters/point_cloud_format.h"
+#include "rio_t/sensors/barometer_channel.h"
 
 namespace rio_t {
 
@@ -27,6 +29,10 @@ ros::Time toRosTime(Time time);
 /// in the header is zero.
 ImuMeasurement toImuMeasurement(const sensor_msgs::Imu& message, const std::string& topic,
                                 const ImuUnits& units = {});
+
+/// Throws std::runtime_error, naming `topic`, where the stamp is zero or the pressure is none (see faultOf).
+/// The variance in the message is not read: most drivers leave it at zero.
+Pressure toPressure(const sensor_msgs::FluidPressure& message, const std::string& topic);
 
 /// Covariance of position and orientation as nav_msgs/Odometry has it: position, then rotation about the
 /// fixed axes of W. The state's theta is a rotation about the axes of I, so theta_W = R_WI theta_I.

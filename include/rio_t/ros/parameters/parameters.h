@@ -64,6 +64,7 @@ struct Config {
   std::string radar_topic = "sensor_platform/radar/scan";
   std::string trigger_topic = "sensor_platform/radar/trigger";
   std::string ground_truth_topic = "ground_truth/pose";
+  std::string barometer_topic;  ///< empty: no barometer
 
   StampSource stamp_source = StampSource::kHeader;
   double radar_stamp_shift = 0.0;  ///< [s]
