@@ -3,6 +3,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <utility>
 
 #include "rio_t/factors/imu_factor.h"
@@ -62,7 +64,13 @@ Estimator::Estimator(const OdometryOptions& options, Navigation& navigation, Fau
       smoother_(options.smoother, options.imu_noise, g_W_, imu_),
       radars_(radarChannels(options, g_W_, imu_)),
       health_(options.health, options.smoother.innovation_gate, options.radarCount()),
-      waiting_for_(initializer_.waitingFor()) {}
+      waiting_for_(initializer_.waitingFor()) {
+  if (std::getenv("LM")) {
+    LandmarkOptions o;
+    o.max_landmarks = static_cast<std::size_t>(std::atoi(std::getenv("LM")));
+    landmarks_.emplace(o, g_W_, imu_);
+  }
+}
 
 /// The way of a scan: when, how fast, into the window, out.
 ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
@@ -88,6 +96,8 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
     smoother_.setImuNoise(imuNoise());
     const bool at_rest = isAtRest(node_time);
     const bool has_diverged = health_.health() == Health::kDiverged;
+    std::optional<LandmarkMap::Prediction> expected;
+    if (landmarks_) expected = landmarks_->predict(smoother_, stamp - radar.offset(), radar.extrinsicsBlock());
     const RadarAnswer answer =
         radar.use(result.scan, {at_rest, has_diverged, result.model_error_scale, last_used_}, smoother_);
     judge(answer, result.scan);
@@ -98,6 +108,7 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
     result.rejected_because = answer.rejected_because;
     result.used = result.updated = answer.rejected_because.empty();
     if (result.used) last_used_ = stamp;
+    if (expected && result.used) seeLandmarks(answer, *expected, radar, result);
     if (answer.at_rest) {
       if (Block* node = smoother_.nodeAt(radar.nodeTime(stamp))) {
         smoother_.addZeroVelocity(*node, options_.rest.velocity_sigma);
@@ -140,6 +151,26 @@ void Estimator::judge(const RadarAnswer& answer, const RadarScan& scan) {
   if (accel_is_told) scaled += 0.5 * answer.prediction_covariance;
   const double share = answer.used->S.ldlt().solve(scaled).trace() / 3.0;
   model_error_scale_.add(scan.stamp, answer.used->squaredSigmas(), share);
+}
+
+/// Repeated scans at rest are the same scan: they say nothing new of where things are.
+void Estimator::seeLandmarks(const RadarAnswer& answer, const LandmarkMap::Prediction& expected,
+                             const RadarChannel& radar, ScanResult& result) {
+  Block* node = smoother_.nodeAt(radar.nodeTime(result.scan.stamp));
+  if (node == nullptr || answer.at_rest || answer.ego_velocity.status != EgoVelocityStatus::kMoving) return;
+  const PointVariances& noise = radar.noise();
+  std::vector<Detection> detections;
+  for (const std::size_t i : answer.ego_velocity.inliers) {
+    const RadarPoint& point = result.scan.points[i];
+    const double level = point.position_R.head<2>().norm();
+    if (level < 0.5 * point.position_R.norm()) continue;  // the azimuth of a point overhead says nothing
+    detections.push_back({{point.position_R, std::getenv("LM_R")?std::atof(std::getenv("LM_R")):0.04, std::sqrt(noise.azimuth), std::sqrt(noise.elevation)},
+                          point.snr_db});
+  }
+  const LandmarkAnswer seen = landmarks_->use(expected, detections, *node, radar.extrinsicsBlock(), smoother_);
+  if (std::getenv("LM_LOG"))
+    std::fprintf(stderr, "lm %.2f det %zu match %zu cand %zu map %zu nis %.2f drop %d\n", result.scan.stamp - initialized_at_, detections.size(), seen.matched,
+                 seen.candidates, seen.map.size(), seen.squared_sigmas / 3 / std::max<std::size_t>(1, seen.matched), seen.dropped_map);
 }
 
 void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
@@ -219,6 +250,7 @@ void Estimator::startAgain(std::uint64_t clock_restarts) {
   model_error_scale_ = ModelErrorScale();
   health_ = RadarsHealth(options_.health, options_.smoother.innovation_gate, radars_.size());
   pose_doubt_ = PoseDoubt();
+  if (landmarks_) landmarks_->forget();
   left_in_silence_.clear();
   radar_heard_.reset();
 }
@@ -238,6 +270,7 @@ void Estimator::begin(Time time, const NodePrior& prior, std::size_t radar) {
     if (k != radar) radars_[k].join(smoother_);
   last_used_ = time;
   yaw_doubt_ = YawDoubt();
+  if (landmarks_) landmarks_->forget();
   initialized_at_ = time;
   health_.startedAt(time);
   publishNewest();
