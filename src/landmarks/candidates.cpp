@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cstdlib>
 
 namespace rio_t {
 namespace {
@@ -85,7 +86,7 @@ std::vector<Candidate> Candidates::takeProven(double duration, const std::vector
   std::vector<std::size_t> proven;
   for (std::size_t k = 0; k < candidates_.size() && proven.size() < count; ++k) {
     const std::vector<Sighting>& sightings = candidates_[k].sightings;
-    if (sightings.size() < kMinSightings) continue;
+    if (sightings.size() < (std::getenv("LM_MIN") ? std::atoi(std::getenv("LM_MIN")) : kMinSightings)) continue;
     if (sightings.back().node_time - sightings.front().node_time < duration) continue;
     if (isAlone(k, landmarks_W)) proven.push_back(k);
   }

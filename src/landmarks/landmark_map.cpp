@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <cstdlib>
 #include <cmath>
 #include <limits>
 
@@ -135,7 +136,7 @@ LandmarkMap::Association LandmarkMap::associate(const Prediction& prediction, co
     if (pair.squared_sigmas > kGate) continue;
     const bool is_clear = std::none_of(pairs.begin(), pairs.end(), [&](const Pair& other) {
       const bool competes = (other.detection == pair.detection) != (other.landmark == pair.landmark);
-      return competes && other.score < pair.score + kClearly;
+      return competes && other.score < pair.score + (std::getenv("LM_CLEAR") ? std::atof(std::getenv("LM_CLEAR")) : kClearly);
     });
     if (is_clear) result.matches.push_back({pair.detection, pair.landmark, pair.squared_sigmas});
   }

@@ -30,7 +30,7 @@ struct PlacedDetection {
 /// thread-safe.
 class Candidates {
  public:
-  static constexpr std::size_t kMax = 200;
+  static constexpr std::size_t kMax = 300;
   /// A static point shows itself so often within the window. Ghosts do not come back.
   static constexpr std::size_t kMinSightings = 4;
 
