@@ -20,9 +20,6 @@ constexpr double kClearly = 6.0;
 constexpr double kLoss = 4.0;
 /// [s] unseen; then a landmark makes room for a new one, if there is none else.
 constexpr double kLongUnseen = 30.0;
-/// A new landmark must have shown itself over so much of the window.
-constexpr double kProofShare = 0.5;
-
 /// Pairs that match by chance are even over the gate, so the mean of their squared sigmas is 3/5 of it; that of true
 /// ones is 3. Half way between, the map contradicts the estimate. 100 matches tell it to 0.08.
 constexpr double kMaxMeanSquare = 0.5 * (1.0 + kGate / 5.0);
@@ -180,10 +177,11 @@ LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<
   for (const std::size_t i : association.free) {
     const Detection& detection = detections[i];
     placed.push_back({radar_W + R_WR * detection.z.position_R,
-                      R_WR * PolarNoise(detection.z).covariance() * R_WR.transpose(), detection.snr_db,
+                      R_WR * PolarNoise(detection.z).covariance() * R_WR.transpose(), radar_W, detection.snr_db,
+                      prediction.measured,
                       Sighting{*node.time, delta, &extrinsics, detection.z}});
   }
-  candidates_.dropBefore(smoother.node(0).time);
+  candidates_.forgetOld(prediction.measured, smoother.node(0).time);
   candidates_.add(placed);
   dropOutOfReach(x.p_W());
   promote(smoother, prediction.measured);
@@ -229,15 +227,14 @@ void LandmarkMap::promote(FixedLagSmoother& smoother, Time now) {
   for (const Landmark& landmark : landmarks_) landmarks_W.push_back(landmark.p_W());
   makeRoom(now, 1);
   if (landmarks_.size() >= options_.max_landmarks) return;
-  const double window = smoother.newest().time - smoother.node(0).time;
-  const std::vector<Candidate> proven = candidates_.takeProven(
-      kProofShare * window, landmarks_W, options_.max_landmarks - landmarks_.size());
+  const std::vector<Candidate> proven =
+      candidates_.takeProven(landmarks_W, options_.max_landmarks - landmarks_.size());
   for (const Candidate& candidate : proven) {
     Landmark landmark;
     landmark.block = smoother.window().addCalibration(manifold_, candidate.position());
     landmark.last_seen = now;
     landmark.point.id = next_id_++;
-    landmark.point.sightings = candidate.sightings.size();
+    landmark.point.sightings = candidate.count;
     landmark.point.snr_db = candidate.snr_db();
     for (const Sighting& sighting : candidate.sightings) {
       Block* node = smoother.nodeAt(sighting.node_time);

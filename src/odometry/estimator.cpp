@@ -164,7 +164,7 @@ void Estimator::seeLandmarks(const RadarAnswer& answer, const LandmarkMap::Predi
     const RadarPoint& point = result.scan.points[i];
     const double level = point.position_R.head<2>().norm();
     if (level < 0.5 * point.position_R.norm()) continue;  // the azimuth of a point overhead says nothing
-    detections.push_back({{point.position_R, std::getenv("LM_R")?std::atof(std::getenv("LM_R")):0.04, std::sqrt(noise.azimuth), std::sqrt(noise.elevation)},
+    detections.push_back({{point.position_R, std::getenv("LM_R")?std::atof(std::getenv("LM_R")):0.04, std::max(options_.ego_velocity.azimuth_sigma, std::sqrt(noise.azimuth)), std::max(options_.ego_velocity.elevation_sigma, std::sqrt(noise.elevation))},
                           point.snr_db});
   }
   const LandmarkAnswer seen = landmarks_->use(expected, detections, *node, radar.extrinsicsBlock(), smoother_);
