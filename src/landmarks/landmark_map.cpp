@@ -23,7 +23,15 @@ constexpr double kLongUnseen = 30.0;
 /// Pairs that match by chance are even over the gate, so the mean of their squared sigmas is 3/5 of it; that of true
 /// ones is 3. Half way between, the map contradicts the estimate. 100 matches tell it to 0.08.
 constexpr double kMaxMeanSquare = 0.5 * (1.0 + kGate / 5.0);
-constexpr double kJudgedMatches = 100.0;
+/// So many matches tell that mean to 0.15. The map is not trusted before.
+constexpr double kProof = 30.0;
+/// A reflector in view shows itself at least so often. In a scene full of highlights that come and go, hardly any
+/// landmark is seen again.
+constexpr double kMinShare = 0.1;
+/// Scans, over which the account fades.
+constexpr double kMemory = 100.0;
+/// In view: within this of the middle of the field of view, as the cosine.
+constexpr double kCosView = 0.707;
 
 }  // namespace
 
@@ -37,7 +45,8 @@ LandmarkMap::LandmarkMap(const LandmarkOptions& options, const Eigen::Vector3d& 
 void LandmarkMap::forget() {
   landmarks_.clear();
   candidates_.clear();
-  judged_ = judged_sigmas_ = 0.0;
+  in_view_ = matched_ = sigmas_ = 0.0;
+  is_trusted_ = false;
 }
 
 std::vector<LandmarkPoint> LandmarkMap::points() const {
@@ -148,7 +157,8 @@ LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<
   const Extrinsics T_IR = toExtrinsics(extrinsics.x.data());
   const Association association = associate(prediction, T_IR, detections);
   for (const Match& match : association.matches) answer.squared_sigmas += match.squared_sigmas;
-  if (contradicts(association)) {
+  judge(prediction, T_IR, association);
+  if (contradicts()) {
     while (!landmarks_.empty()) retire(landmarks_.size() - 1);
     forget();
     answer.dropped_map = true;
@@ -157,8 +167,9 @@ LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<
   const ImuDelta delta = deltaTo(prediction.measured, node);
   for (const Match& match : association.matches) {
     Landmark& landmark = landmarks_[match.landmark];
-    smoother.window().add(std::make_unique<LandmarkFactor>(detections[match.detection].z, delta, g_W_),
-                          {&node, &extrinsics, landmark.block.get()}, loss_);
+    if (is_trusted_)
+      smoother.window().add(std::make_unique<LandmarkFactor>(detections[match.detection].z, delta, g_W_),
+                            {&node, &extrinsics, landmark.block.get()}, loss_);
     landmark.last_seen = prediction.measured;
     LandmarkPoint& point = landmark.point;
     ++point.sightings;
@@ -183,20 +194,39 @@ LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<
   }
   candidates_.forgetOld(prediction.measured, smoother.node(0).time);
   candidates_.add(placed);
-  dropOutOfReach(x.p_W());
+  dropUseless(x.p_W());
   promote(smoother, prediction.measured);
   answer.candidates = candidates_.size();
+  answer.is_trusted = is_trusted_;
   answer.map = points();
   return answer;
 }
 
-bool LandmarkMap::contradicts(const Association& association) {
-  for (const Match& match : association.matches) {
-    const double keep = 1.0 - 1.0 / kJudgedMatches;
-    judged_ = keep * judged_ + 1.0;
-    judged_sigmas_ = keep * judged_sigmas_ + match.squared_sigmas / 3.0;
+void LandmarkMap::judge(const Prediction& prediction, const Extrinsics& T_IR, const Association& association) {
+  const double keep = 1.0 - 1.0 / kMemory;
+  in_view_ *= keep;
+  matched_ *= keep;
+  sigmas_ *= keep;
+  const StateBlock& x = prediction.state.x;
+  const Eigen::Vector3d radar_W = x.p_W() + x.q_WI() * T_IR.l_I;
+  const Eigen::Vector3d forward_W = x.q_WI() * T_IR.q_IR * Eigen::Vector3d::UnitY();
+  for (const std::size_t k : prediction.landmarks) {
+    if (forward_W.dot((landmarks_[k].p_W() - radar_W).normalized()) < kCosView) continue;
+    landmarks_[k].in_view += 1.0;
+    in_view_ += 1.0;
   }
-  return judged_ > 0.5 * kJudgedMatches && judged_sigmas_ > kMaxMeanSquare * judged_;
+  for (const Match& match : association.matches) {
+    landmarks_[match.landmark].seen_again += 1.0;
+    matched_ += 1.0;
+    sigmas_ += match.squared_sigmas / 3.0;
+  }
+  if (matched_ >= kProof && matched_ >= kMinShare * in_view_ && !contradicts()) is_trusted_ = true;
+}
+
+/// With less than the proof, or with hardly any landmark seen again, nothing is known and nothing counts.
+bool LandmarkMap::contradicts() const {
+  if (matched_ >= kProof && sigmas_ > kMaxMeanSquare * matched_) return true;
+  return is_trusted_ && in_view_ > kProof / kMinShare && matched_ < 0.5 * kMinShare * in_view_;
 }
 
 void LandmarkMap::retire(std::size_t k) {
@@ -204,11 +234,13 @@ void LandmarkMap::retire(std::size_t k) {
   landmarks_.erase(landmarks_.begin() + static_cast<std::ptrdiff_t>(k));
 }
 
-void LandmarkMap::dropOutOfReach(const Eigen::Vector3d& p_W) {
+void LandmarkMap::dropUseless(const Eigen::Vector3d& p_W) {
   constexpr double kMaxConflicts = 3.0;
   for (std::size_t k = landmarks_.size(); k-- > 0;) {
     const bool is_far = (landmarks_[k].p_W() - p_W).norm() > 1.2 * reach_;
-    if (is_far || landmarks_[k].conflicts > kMaxConflicts) retire(k);
+    const Landmark& landmark = landmarks_[k];
+    const bool is_gone = landmark.in_view > kMemory && landmark.seen_again < 0.5 * kMinShare * landmark.in_view;
+    if (is_far || is_gone || landmark.conflicts > kMaxConflicts) retire(k);
   }
 }
 
@@ -236,10 +268,12 @@ void LandmarkMap::promote(FixedLagSmoother& smoother, Time now) {
     landmark.point.id = next_id_++;
     landmark.point.sightings = candidate.count;
     landmark.point.snr_db = candidate.snr_db();
-    for (const Sighting& sighting : candidate.sightings) {
-      Block* node = smoother.nodeAt(sighting.node_time);
-      smoother.window().add(std::make_unique<LandmarkFactor>(sighting.z, sighting.delta, g_W_),
-                            {node, sighting.extrinsics, landmark.block.get()}, loss_);
+    // One places it and says nothing else. Several also say how the platform moved.
+    for (auto sighting = candidate.sightings.rbegin(); sighting != candidate.sightings.rend(); ++sighting) {
+      Block* node = smoother.nodeAt(sighting->node_time);
+      smoother.window().add(std::make_unique<LandmarkFactor>(sighting->z, sighting->delta, g_W_),
+                            {node, sighting->extrinsics, landmark.block.get()}, loss_);
+      if (!is_trusted_) break;
     }
     landmarks_.push_back(std::move(landmark));
   }

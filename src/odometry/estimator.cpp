@@ -169,8 +169,8 @@ void Estimator::seeLandmarks(const RadarAnswer& answer, const LandmarkMap::Predi
   }
   const LandmarkAnswer seen = landmarks_->use(expected, detections, *node, radar.extrinsicsBlock(), smoother_);
   if (std::getenv("LM_LOG"))
-    std::fprintf(stderr, "lm %.2f det %zu match %zu cand %zu map %zu nis %.2f drop %d\n", result.scan.stamp - initialized_at_, detections.size(), seen.matched,
-                 seen.candidates, seen.map.size(), seen.squared_sigmas / 3 / std::max<std::size_t>(1, seen.matched), seen.dropped_map);
+    std::fprintf(stderr, "lm %.2f det %zu match %zu cand %zu map %zu nis %.2f drop %d trust %d\n", result.scan.stamp - initialized_at_, detections.size(), seen.matched,
+                 seen.candidates, seen.map.size(), seen.squared_sigmas / 3 / std::max<std::size_t>(1, seen.matched), seen.dropped_map, seen.is_trusted);
 }
 
 void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {

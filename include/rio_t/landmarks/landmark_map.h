@@ -26,6 +26,7 @@ struct LandmarkAnswer {
   std::size_t matched = 0;    ///< landmarks that the scan saw
   std::size_t candidates = 0;
   double squared_sigmas = 0.0;  ///< sum over the matches, each of 3 degrees of freedom
+  bool is_trusted = false;    ///< the map has proved itself: its matches count
   bool dropped_map = false;   ///< map and estimate contradicted each other
   std::vector<LandmarkPoint> map;
 };
@@ -61,6 +62,7 @@ class LandmarkMap {
     LandmarkPoint point;
     Time last_seen;
     double conflicts = 0.0;
+    double in_view = 0.0, seen_again = 0.0;  ///< scans since it is a landmark
     Eigen::Vector3d p_W() const { return block->x; }
   };
   struct Match {
@@ -75,10 +77,12 @@ class LandmarkMap {
   Association associate(const Prediction& prediction, const Extrinsics& T_IR,
                         const std::vector<Detection>& detections) const;
   void retire(std::size_t k);
-  void dropOutOfReach(const Eigen::Vector3d& p_W);
+  void dropUseless(const Eigen::Vector3d& p_W);
   void makeRoom(Time now, std::size_t wanted);
   void promote(FixedLagSmoother& smoother, Time now);
-  bool contradicts(const Association& association);
+  /// Judges the map by the matches lately.
+  void judge(const Prediction& prediction, const Extrinsics& T_IR, const Association& association);
+  bool contradicts() const;
   ImuDelta deltaTo(Time measured, const Block& node) const;
 
   LandmarkOptions options_;  // read-only after construction, as the next three
@@ -90,7 +94,9 @@ class LandmarkMap {
   Candidates candidates_;
   std::uint64_t next_id_ = 0;
   double reach_ = 0.0;  ///< [m] of the farthest static detection so far
-  double judged_ = 0.0, judged_sigmas_ = 0.0;  ///< matches lately, and their squared sigmas over 3
+  double in_view_ = 0.0, matched_ = 0.0;  ///< lately: landmarks in view, those of them that were seen
+  double sigmas_ = 0.0;                   ///< squared sigmas of these over 3
+  bool is_trusted_ = false;
 };
 
 }  // namespace rio_t
