@@ -3,7 +3,6 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
-#include <cstdlib>
 #include <cmath>
 #include <limits>
 
@@ -91,7 +90,7 @@ LandmarkMap::Association LandmarkMap::associate(const Prediction& prediction, co
     double squared_sigmas, score;
   };
   const Eigen::MatrixXd& P = prediction.state.covariance;
-  const Eigen::Index shared = static_cast<Eigen::Index>(prediction.first_landmark);
+  const auto shared = static_cast<Eigen::Index>(prediction.first_landmark);
   std::vector<Pair> pairs;
   std::vector<bool> is_free(detections.size(), true);
   std::vector<PolarNoise> noises;
@@ -142,7 +141,7 @@ LandmarkMap::Association LandmarkMap::associate(const Prediction& prediction, co
     if (pair.squared_sigmas > kGate) continue;
     const bool is_clear = std::none_of(pairs.begin(), pairs.end(), [&](const Pair& other) {
       const bool competes = (other.detection == pair.detection) != (other.landmark == pair.landmark);
-      return competes && other.score < pair.score + (std::getenv("LM_CLEAR") ? std::atof(std::getenv("LM_CLEAR")) : kClearly);
+      return competes && other.score < pair.score + kClearly;
     });
     if (is_clear) result.matches.push_back({pair.detection, pair.landmark, pair.squared_sigmas});
   }
@@ -175,6 +174,11 @@ LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<
     ++point.sightings;
     point.snr_db += (detections[match.detection].snr_db - point.snr_db) / static_cast<double>(point.sightings);
     landmark.conflicts = std::max(0.0, landmark.conflicts - 1.0);
+  }
+  for (std::size_t column = 0; column < prediction.landmarks.size(); ++column) {
+    const auto at = static_cast<Eigen::Index>(prediction.first_landmark + 3 * column);
+    landmarks_[prediction.landmarks[column]].point.sigma =
+        std::sqrt(prediction.state.covariance.diagonal().segment<3>(at).sum());
   }
   answer.matched = association.matches.size();
   for (const std::size_t k : association.conflicts) landmarks_[k].conflicts += 1.0;

@@ -3,8 +3,6 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <utility>
 
 #include "rio_t/factors/imu_factor.h"
@@ -65,11 +63,7 @@ Estimator::Estimator(const OdometryOptions& options, Navigation& navigation, Fau
       radars_(radarChannels(options, g_W_, imu_)),
       health_(options.health, options.smoother.innovation_gate, options.radarCount()),
       waiting_for_(initializer_.waitingFor()) {
-  if (std::getenv("LM")) {
-    LandmarkOptions o;
-    o.max_landmarks = static_cast<std::size_t>(std::atoi(std::getenv("LM")));
-    landmarks_.emplace(o, g_W_, imu_);
-  }
+  if (options.landmarks.enabled) landmarks_.emplace(options.landmarks, g_W_, imu_);
 }
 
 /// The way of a scan: when, how fast, into the window, out.
@@ -108,7 +102,7 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
     result.rejected_because = answer.rejected_because;
     result.used = result.updated = answer.rejected_because.empty();
     if (result.used) last_used_ = stamp;
-    if (expected && result.used) seeLandmarks(answer, *expected, radar, result);
+    if (expected && result.used) seeLandmarks(*expected, answer, radar, result);
     if (answer.at_rest) {
       if (Block* node = smoother_.nodeAt(radar.nodeTime(stamp))) {
         smoother_.addZeroVelocity(*node, options_.rest.velocity_sigma);
@@ -153,24 +147,26 @@ void Estimator::judge(const RadarAnswer& answer, const RadarScan& scan) {
   model_error_scale_.add(scan.stamp, answer.used->squaredSigmas(), share);
 }
 
-/// Repeated scans at rest are the same scan: they say nothing new of where things are.
-void Estimator::seeLandmarks(const RadarAnswer& answer, const LandmarkMap::Prediction& expected,
+/// Scans at rest repeat one scan, with its errors: they say nothing new of where things are.
+void Estimator::seeLandmarks(const LandmarkMap::Prediction& expected, const RadarAnswer& answer,
                              const RadarChannel& radar, ScanResult& result) {
   Block* node = smoother_.nodeAt(radar.nodeTime(result.scan.stamp));
   if (node == nullptr || answer.at_rest || answer.ego_velocity.status != EgoVelocityStatus::kMoving) return;
+  const OdometryOptions own = optionsOfRadar(options_, result.scan.radar);
   const PointVariances& noise = radar.noise();
+  // The Doppler tells the noise of a direction, but not how far an echo wanders over a thing.
+  const double azimuth_sigma = std::max(own.ego_velocity.azimuth_sigma, std::sqrt(noise.azimuth));
+  const double elevation_sigma = std::max(own.ego_velocity.elevation_sigma, std::sqrt(noise.elevation));
+  constexpr double kMinLevel = 0.5;  // steeper than 60 degrees, an azimuth says little
   std::vector<Detection> detections;
   for (const std::size_t i : answer.ego_velocity.inliers) {
     const RadarPoint& point = result.scan.points[i];
-    const double level = point.position_R.head<2>().norm();
-    if (level < 0.5 * point.position_R.norm()) continue;  // the azimuth of a point overhead says nothing
-    detections.push_back({{point.position_R, std::getenv("LM_R")?std::atof(std::getenv("LM_R")):0.04, std::max(options_.ego_velocity.azimuth_sigma, std::sqrt(noise.azimuth)), std::max(options_.ego_velocity.elevation_sigma, std::sqrt(noise.elevation))},
-                          point.snr_db});
+    if (point.position_R.head<2>().norm() < kMinLevel * point.position_R.norm()) continue;
+    detections.push_back(
+        {{point.position_R, options_.landmarks.range_sigma, azimuth_sigma, elevation_sigma}, point.snr_db});
   }
-  const LandmarkAnswer seen = landmarks_->use(expected, detections, *node, radar.extrinsicsBlock(), smoother_);
-  if (std::getenv("LM_LOG"))
-    std::fprintf(stderr, "lm %.2f det %zu match %zu cand %zu map %zu nis %.2f drop %d trust %d\n", result.scan.stamp - initialized_at_, detections.size(), seen.matched,
-                 seen.candidates, seen.map.size(), seen.squared_sigmas / 3 / std::max<std::size_t>(1, seen.matched), seen.dropped_map, seen.is_trusted);
+  result.landmarks = landmarks_->use(expected, detections, *node, radar.extrinsicsBlock(), smoother_);
+  if (result.landmarks->dropped_map) faults_.count("landmarks_dropped");
 }
 
 void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {

@@ -7,29 +7,11 @@
 #include <vector>
 
 #include "rio_t/landmarks/candidates.h"
+#include "rio_t/landmarks/landmark_answer.h"
 #include "rio_t/landmarks/options.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
 
 namespace rio_t {
-
-/// A landmark as results show it.
-struct LandmarkPoint {
-  Eigen::Vector3d p_W = Eigen::Vector3d::Zero();  ///< [m]
-  double sigma = 0.0;                             ///< [m] root of the trace of its covariance
-  double snr_db = 0.0;                            ///< mean
-  std::uint64_t id = 0;                           ///< counts up; never used again
-  std::uint64_t sightings = 0;
-};
-
-/// What a scan and the map say of each other.
-struct LandmarkAnswer {
-  std::size_t matched = 0;    ///< landmarks that the scan saw
-  std::size_t candidates = 0;
-  double squared_sigmas = 0.0;  ///< sum over the matches, each of 3 degrees of freedom
-  bool is_trusted = false;    ///< the map has proved itself: its matches count
-  bool dropped_map = false;   ///< map and estimate contradicted each other
-  std::vector<LandmarkPoint> map;
-};
 
 /// Static detections as landmarks: points of the world in the window of the smoother, correlated with all
 /// that is estimated (docs/method.md, section 14). One map for all radars. Not thread-safe.

@@ -61,8 +61,8 @@ class Estimator {
   PoseAnchor anchorAt(Time time) const;
   void judge(const RadarAnswer& answer, const RadarScan& scan);
   void updateWindow(const RadarChannel& radar, ScanResult& result);
-  void seeLandmarks(const RadarAnswer& answer, const LandmarkMap::Prediction& expected, const RadarChannel& radar,
-                    ScanResult& result);
+  void seeLandmarks(const LandmarkMap::Prediction& expected, const RadarAnswer& answer,
+                    const RadarChannel& radar, ScanResult& result);
   void publishNewest() { anchor(newestState(smoother_.newestCovariance({})), false); }
   void anchor(const NavigationState& state, bool at_rest);
   std::vector<StampedPose> marginalize();

@@ -167,6 +167,7 @@ std::string summaryText(const RunSummary& summary, const std::vector<std::string
 
 const char* const kTimeOffsetHeader = "stamp,offset_s,sigma_s\n";
 const char* const kEgoVelocityHeader = "stamp,vx,vy,vz,sigma_x,sigma_y,sigma_z,inliers,points,status\n";
+const char* const kMapHeader = "id,x,y,z,sigma,snr_db,sightings\n";
 const char* const kExtrinsicsHeader =
     "stamp,x,y,z,qx,qy,qz,qw,sigma_x,sigma_y,sigma_z,sigma_rx,sigma_ry,sigma_rz\n";
 
@@ -207,6 +208,7 @@ std::vector<std::string> RunFiles::names() const {
     names.push_back("ego_velocity" + suffixOf(radar) + ".csv");
     if (extrinsics) names.push_back("extrinsics" + suffixOf(radar) + ".csv");
   }
+  if (map) names.emplace_back("map.csv");
   names.emplace_back("biases.csv");
   names.emplace_back("summary.yaml");
   return names;
@@ -215,6 +217,7 @@ std::vector<std::string> RunFiles::names() const {
 RunFiles runFiles(const Config& config) {
   RunFiles files;
   files.extrinsics = config.odometry.smoother.estimate_extrinsics != EstimateExtrinsics::kNone;
+  files.map = config.odometry.landmarks.enabled && config.mode != RunMode::kBatch;
   if (config.radars.size() < 2) return files;
   files.radars.clear();
   for (const Config& radar : config.radars) files.radars.push_back(radar.radar_name);
@@ -289,6 +292,7 @@ RunOutput::RunOutput(const std::string& folder, const RunFiles& files) : folder_
   optimized_.open(folder + "/trajectory_optimized.txt");
   navigation_.open(folder + "/navigation.csv");
   biases_.open(folder + "/biases.csv");
+  if (files.map) map_.emplace().open(folder + "/map.csv");
   navigation_.buffer =
       "stamp,vx,vy,vz,sigma_px,sigma_py,sigma_pz,sigma_rx,sigma_ry,sigma_rz,sigma_vx,sigma_vy,sigma_vz\n";
   biases_.buffer = "stamp,bgx,bgy,bgz,bax,bay,baz\n";
@@ -309,6 +313,7 @@ void RunOutput::removeOfEarlierRuns() const {
   std::error_code error;
   fs::remove(folder_ + "/summary.yaml", error);
   static const std::regex of_radar("(time_offset|ego_velocity|extrinsics)(_[a-z0-9_]+)?\\.csv");
+  if (!files_.map && isEmptyOrBeginsWith(folder_ + "/map.csv", kMapHeader)) fs::remove(folder_ + "/map.csv", error);
   const std::vector<std::string> own = files_.names();
   std::vector<fs::path> earlier;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) {
@@ -378,11 +383,30 @@ void RunOutput::addResult(const ScanResult& result) {
   radar.time_offset.endLine();
   if (radar.extrinsics) addExtrinsics(*radar.extrinsics, result);
 
+  if (result.landmarks)
+    for (const LandmarkPoint& point : result.landmarks->map) landmarks_[point.id] = point;
+
   line = &biases_.buffer;
   appendStamp(line, result.scan.stamp);
   appendVector(line, result.state.b_g, 9);
   appendVector(line, result.state.b_a, 9);
   biases_.endLine();
+}
+
+void RunOutput::writeMap() {
+  map_->buffer = kMapHeader;
+  for (const auto& [id, point] : landmarks_) {
+    std::string* line = &map_->buffer;
+    *line += std::to_string(id);
+    appendVector(line, point.p_W, 6);
+    line->push_back(',');
+    appendFixed(line, point.sigma, 6);
+    line->push_back(',');
+    appendFixed(line, point.snr_db, 3);
+    *line += ',' + std::to_string(point.sightings);
+    map_->endLine();
+  }
+  map_->flush();
 }
 
 void RunOutput::addExtrinsics(File& file, const ScanResult& result) {
@@ -406,6 +430,7 @@ void RunOutput::finish(const RunSummary& summary) {
     radar.ego_velocity.flush();
     if (radar.extrinsics) radar.extrinsics->flush();
   }
+  if (map_) writeMap();
   File yaml;
   yaml.open(folder_ + "/summary.yaml");
   yaml.buffer = summaryText(summary, files_.names());

@@ -86,7 +86,8 @@ struct RunSummary {
 /// Which files a run writes: those of a radar carry its name, unless there is but one.
 struct RunFiles {
   std::vector<std::string> radars = {""};  ///< names, as in RadarSummary
-  bool extrinsics = false;                 ///< they are estimated
+  bool extrinsics = false;
+  bool map = false;  ///< landmarks are on                 ///< they are estimated
 
   std::vector<std::string> names() const;
 };
@@ -137,6 +138,7 @@ class RunOutput {
   };
 
   void removeOfEarlierRuns() const;
+  void writeMap();
   static void addExtrinsics(File& file, const ScanResult& result);
   void addPose(File& file, Time time, const Eigen::Vector3d& p_W, const Eigen::Quaterniond& q_WI);
 
@@ -144,6 +146,8 @@ class RunOutput {
   RunFiles files_;
   File trajectory_, optimized_, navigation_, biases_;
   std::vector<RadarOutput> radars_;      // by RadarScan::radar
+  std::optional<File> map_;              // of the landmarks, if they are on
+  std::map<std::uint64_t, LandmarkPoint> landmarks_;  // all that there were, by id, as they were last
   std::optional<Time> last_navigation_;  // of the last line in navigation.csv
 };
 
