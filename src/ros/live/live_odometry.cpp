@@ -50,6 +50,7 @@ LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& p
       options_(config_.odometry),
       imu_stamps_(options_.imu_input_check.max_bridged_gap, options_.imu_input_check.jump_patience) {
   for (const Config& radar : configsOfRadars(config_)) radars_.emplace_back(radar);
+  showEffectiveParameters(private_node_, config_);
   startSessionWhenReady();
   if (!session_.get()) {
     tf_.emplace();

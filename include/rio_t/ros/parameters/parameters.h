@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -50,10 +51,10 @@ struct Config {
   std::vector<Config> radars;
   std::string radar_name;  ///< empty, but for an element of `radars`
 
-  std::string imu_topic = "/sensor_platform/imu";
-  std::string radar_topic = "/sensor_platform/radar/scan";
-  std::string trigger_topic = "/sensor_platform/radar/trigger";
-  std::string ground_truth_topic = "/ground_truth/pose";
+  std::string imu_topic = "sensor_platform/imu";
+  std::string radar_topic = "sensor_platform/radar/scan";
+  std::string trigger_topic = "sensor_platform/radar/trigger";
+  std::string ground_truth_topic = "ground_truth/pose";
 
   StampSource stamp_source = StampSource::kHeader;
   double radar_stamp_shift = 0.0;  ///< [s]
@@ -85,6 +86,10 @@ struct Config {
 /// that of RadarScan::radar.
 std::vector<Config> configsOfRadars(const Config& config);
 
+/// The configuration with the topics as a node without a namespace has them, and as a bag holds them: a relative
+/// topic begins with `/`. An empty one stays empty.
+Config withAbsoluteTopics(Config config);
+
 /// Layout of the cloud: the preset with the overrides.
 PointCloudFormat pointCloudFormat(const Config& config);
 
@@ -107,18 +112,31 @@ Config makeConfig(const ParameterEntries& entries);
 /// What is known of a key.
 struct ParameterDescription {
   std::string key;
-  std::string group;        ///< title of its section in estimator.yaml
-  std::string unit;         ///< empty: none
-  std::string expected;     ///< e.g. "a number above 0, at most 10"
-  std::string description;  ///< one line
-  bool of_radar = false;    ///< each radar may have its own, in its section
+  std::string type;      ///< "number", "integer", "boolean", "choice", "text" or "list"
+  std::string unit;      ///< empty: none
+  std::string expected;  ///< e.g. "a finite number above 0 and at most 10"
+  std::string description;  ///< full sentences: what it is, typical values, when to change it
+  double min = -std::numeric_limits<double>::infinity();  ///< of a number, or of each one of a list
+  double max = std::numeric_limits<double>::infinity();   ///< likewise
+  std::vector<std::string> choices = {};                  ///< of a choice
+  std::string group = {};  ///< title of its section
+  bool of_radar = false;  ///< each radar may have its own value, in its section
+  bool first = false;     ///< one of the parameters that a new user reads first
 };
-/// Every key once, in the order of estimator.yaml.
+/// Every key once, section by section.
 std::vector<ParameterDescription> parameterDescriptions();
 
-/// The configuration as YAML with the description of each key as comments: config/estimator.yaml for a
+/// The configuration as YAML with the text of each key as a comment: config/estimator.yaml for a
 /// default-constructed one. Reading it back gives the same configuration.
 std::string toYaml(const Config& config);
+
+/// All that is known of every parameter, with its default, for programs: a YAML list of maps with the keys key,
+/// section, first, type, unit, min, max, choices, expected, per_radar, default and description. A key without a value
+/// (no unit, no bound) is left out.
+std::string parametersYaml();
+
+/// The same for people: docs/parameters.md.
+std::string parametersMarkdown();
 
 /// Path of a configuration: `name_or_path` itself if it is a file, else that name, with or without ".yaml",
 /// in the package's config/. Throws std::runtime_error listing the names there are.
