@@ -13,17 +13,6 @@ void listLiveNode(ParameterList& list, Config& c) {
             "the node, which is ~/.ros under roslaunch.");
 }
 
-void listLandmarks(ParameterList& list, Config& c) {
-  LandmarkOptions& landmarks = c.odometry.landmarks;
-  list.group("Landmarks: static points that come back hold position and heading");
-  list.boolean("landmarks", landmarks.enabled,
-               "keep static detections as points of the window; the batch ignores it");
-  list.integer("landmarks_max", between(1, 100), landmarks.max_landmarks,
-               "at once; 24 take several times the time of a run without");
-  list.number("radar_range_sigma", "m", above(0), landmarks.range_sigma,
-              "noise of a point's range; only landmarks use it");
-}
-
 void listBag(ParameterList& list, Config& c) {
   list.group("Bag runner");
   list.choice<RunMode>(
