@@ -66,6 +66,7 @@ Estimator::Estimator(const OdometryOptions& options, Navigation& navigation, Fau
   if (options.platform == Platform::kGroundVehicle)
     ground_vehicle_.emplace(options.ground_vehicle, options.smoother.huber_threshold, imu_);
   if (options.use_barometer) barometer_.emplace(options.barometer);
+  if (options.landmarks.enabled) landmarks_.emplace(options.landmarks, g_W_, imu_);
 }
 
 /// The way of a scan: when, how fast, into the window, out.
@@ -98,6 +99,8 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
     // Before the scan's node comes, of which nothing is known yet.
     if (barometer_) result.barometer = barometer_->use(smoother_);
     if (ground_vehicle_ && !at_rest) result.ground_vehicle = ground_vehicle_->judge(smoother_, node_time);
+    std::optional<LandmarkMap::Prediction> expected;
+    if (landmarks_) expected = landmarks_->predict(smoother_, stamp - radar.offset(), radar.extrinsicsBlock());
     const RadarAnswer answer = radar.use(
         result.scan, {at_rest, may_rest, has_diverged, result.model_error_scale, last_used_}, smoother_);
     judge(answer, result.scan);
@@ -108,6 +111,7 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
     result.rejected_because = answer.rejected_because;
     result.used = result.updated = answer.rejected_because.empty();
     if (result.used) last_used_ = stamp;
+    if (expected && result.used) seeLandmarks(*expected, answer, radar, result);
     if (answer.at_rest) {
       if (Block* node = smoother_.nodeAt(radar.nodeTime(stamp))) {
         smoother_.addZeroVelocity(*node, options_.rest.velocity_sigma);
@@ -162,6 +166,28 @@ void Estimator::judge(const RadarAnswer& answer, const RadarScan& scan) {
   if (accel_is_told) scaled += 0.5 * answer.prediction_covariance;
   const double share = answer.used->S.ldlt().solve(scaled).trace() / 3.0;
   model_error_scale_.add(scan.stamp, answer.used->squaredSigmas(), share);
+}
+
+/// Scans at rest repeat one scan, with its errors: they say nothing new of where things are.
+void Estimator::seeLandmarks(const LandmarkMap::Prediction& expected, const RadarAnswer& answer,
+                             const RadarChannel& radar, ScanResult& result) {
+  Block* node = smoother_.nodeAt(radar.nodeTime(result.scan.stamp));
+  if (node == nullptr || answer.at_rest || answer.ego_velocity.status != EgoVelocityStatus::kMoving) return;
+  const OdometryOptions own = optionsOfRadar(options_, result.scan.radar);
+  const PointVariances& noise = radar.noise();
+  // The Doppler tells the noise of a direction, but not how far an echo wanders over a thing.
+  const double azimuth_sigma = std::max(own.ego_velocity.azimuth_sigma, std::sqrt(noise.azimuth));
+  const double elevation_sigma = std::max(own.ego_velocity.elevation_sigma, std::sqrt(noise.elevation));
+  constexpr double kMinLevel = 0.5;  // steeper than 60 degrees, an azimuth says little
+  std::vector<Detection> detections;
+  for (const std::size_t i : answer.ego_velocity.inliers) {
+    const RadarPoint& point = result.scan.points[i];
+    if (point.position_R.head<2>().norm() < kMinLevel * point.position_R.norm()) continue;
+    detections.push_back(
+        {{point.position_R, options_.landmarks.range_sigma, azimuth_sigma, elevation_sigma}, point.snr_db});
+  }
+  result.landmarks = landmarks_->use(expected, detections, *node, radar.extrinsicsBlock(), smoother_);
+  if (result.landmarks->dropped_map) faults_.count("landmarks_dropped");
 }
 
 void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
@@ -250,6 +276,7 @@ void Estimator::startAgain(std::uint64_t clock_restarts) {
   model_error_scale_ = ModelErrorScale();
   health_ = RadarsHealth(options_.health, options_.smoother.innovation_gate, radars_.size());
   pose_doubt_ = PoseDoubt();
+  if (landmarks_) landmarks_->forget();
   left_in_silence_.clear();
   radar_heard_.reset();
 }
@@ -271,6 +298,7 @@ void Estimator::begin(Time time, const NodePrior& prior, std::size_t radar, bool
   if (barometer_) barometer_->join(smoother_, time, at_rest);
   last_used_ = time;
   yaw_doubt_ = YawDoubt();
+  if (landmarks_) landmarks_->forget();
   initialized_at_ = time;
   health_.startedAt(time);
   publishNewest();

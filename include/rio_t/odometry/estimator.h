@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "rio_t/imu/buffer.h"
+#include "rio_t/landmarks/landmark_map.h"
 #include "rio_t/odometry/fault_counters.h"
 #include "rio_t/odometry/initializer.h"
 #include "rio_t/odometry/model_error_scale.h"
@@ -64,6 +65,8 @@ class Estimator {
   PoseAnchor anchorAt(Time time) const;
   void judge(const RadarAnswer& answer, const RadarScan& scan);
   void updateWindow(const RadarChannel& radar, ScanResult& result);
+  void seeLandmarks(const LandmarkMap::Prediction& expected, const RadarAnswer& answer,
+                    const RadarChannel& radar, ScanResult& result);
   void publishNewest() { anchor(newestState(smoother_.newestCovariance({})), false); }
   void anchor(const NavigationState& state, bool at_rest);
   std::vector<StampedPose> marginalize();
@@ -90,6 +93,7 @@ class Estimator {
   RadarsHealth health_;
   PoseDoubt pose_doubt_;
   YawDoubt yaw_doubt_;
+  std::optional<LandmarkMap> landmarks_;  ///< none if they are off
 
   std::optional<Initialization> start_;
   std::string waiting_for_;

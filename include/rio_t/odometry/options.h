@@ -7,6 +7,7 @@
 #include "rio_t/imu/noise.h"
 #include "rio_t/imu/rest_detector.h"
 #include "rio_t/imu/static_initializer.h"
+#include "rio_t/landmarks/options.h"
 #include "rio_t/odometry/health_monitor.h"
 #include "rio_t/odometry/motion_initializer.h"
 #include "rio_t/radar/ego_velocity.h"
@@ -48,6 +49,7 @@ struct OdometryOptions {
   FeasibilityOptions feasibility;
   RestOptions rest;
   SmootherOptions smoother;
+  LandmarkOptions landmarks;
   OffsetStepDetectorOptions offset_step_detector;
   HealthOptions health;
   Platform platform = Platform::kFree;

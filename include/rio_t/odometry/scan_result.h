@@ -7,6 +7,7 @@
 #include "rio_t/core/pose.h"
 #include "rio_t/factors/doppler_factor.h"
 #include "rio_t/graph/solver_termination.h"
+#include "rio_t/landmarks/landmark_answer.h"
 #include "rio_t/odometry/health_monitor.h"
 #include "rio_t/odometry/navigation_state.h"
 #include "rio_t/radar/ego_velocity.h"
@@ -23,6 +24,7 @@ struct ScanResult {
   std::optional<DopplerMeasurement> doppler;  ///< its points, if they and not the velocity count
   double offset_gain = 0.0;                   ///< see OffsetEvidence; 0: the scan does not tell the offset
   bool used = false;                          ///< it went into the window
+  std::optional<LandmarkAnswer> landmarks;    ///< if they are on, of a used scan in motion
   double model_error_scale = 1.0;             ///< see ModelErrorScale; in the covariance of ego_velocity
   std::string rejected_because;               ///< snake case, empty if used; keys of `scans_rejected`
 

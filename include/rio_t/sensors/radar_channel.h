@@ -91,6 +91,7 @@ class RadarChannel {
   Extrinsics extrinsics() const { return in_window_.extrinsics(); }
   /// The blocks that are estimated: t_O, which is always there, and the extrinsics.
   std::vector<const Block*> calibration() const { return in_window_.calibration(); }
+  Block& extrinsicsBlock() const { return in_window_.extrinsicsBlock(); }  ///< for terms on it
   /// [s] given the marginal variance [s^2]; 0 if the offset is not estimated.
   double offsetSigma(double variance) const;
   /// Of the blocks that calibration() gives.

@@ -223,6 +223,7 @@ const char* const kBarometerHeader =
     "stamp,height,innovation,innovation_sigma,bias,bias_sigma,samples,status\n";
 const char* const kGroundVehicleHeader =
     "stamp,vx,vy,vz,sigmas,qx,qy,qz,qw,sigma_rx,sigma_ry,sigma_rz,status\n";
+const char* const kMapHeader = "id,x,y,z,sigma,snr_db,sightings\n";
 const char* const kExtrinsicsHeader =
     "stamp,x,y,z,qx,qy,qz,qw,sigma_x,sigma_y,sigma_z,sigma_rx,sigma_ry,sigma_rz\n";
 
@@ -271,6 +272,7 @@ std::vector<std::string> RunFiles::names() const {
   }
   if (barometer) names.emplace_back("barometer.csv");
   if (ground_vehicle) names.emplace_back("ground_vehicle.csv");
+  if (map) names.emplace_back("map.csv");
   names.emplace_back("biases.csv");
   names.emplace_back("summary.yaml");
   return names;
@@ -281,6 +283,7 @@ RunFiles runFiles(const Config& config) {
   files.barometer = config.odometry.use_barometer;
   files.ground_vehicle = config.odometry.platform == Platform::kGroundVehicle;
   files.extrinsics = config.odometry.smoother.estimate_extrinsics != EstimateExtrinsics::kNone;
+  files.map = config.odometry.landmarks.enabled && config.mode != RunMode::kBatch;
   if (config.radars.size() < 2) return files;
   files.radars.clear();
   for (const Config& radar : config.radars) files.radars.push_back(radar.radar_name);
@@ -355,6 +358,7 @@ RunOutput::RunOutput(const std::string& folder, const RunFiles& files) : folder_
   optimized_.open(folder + "/trajectory_optimized.txt");
   navigation_.open(folder + "/navigation.csv");
   biases_.open(folder + "/biases.csv");
+  if (files.map) map_.emplace().open(folder + "/map.csv");
   navigation_.buffer =
       "stamp,vx,vy,vz,sigma_px,sigma_py,sigma_pz,sigma_rx,sigma_ry,sigma_rz,sigma_vx,sigma_vy,sigma_vz\n";
   biases_.buffer = "stamp,bgx,bgy,bgz,bax,bay,baz\n";
@@ -383,7 +387,7 @@ void RunOutput::removeOfEarlierRuns() const {
   std::error_code error;
   fs::remove(folder_ + "/summary.yaml", error);
   static const std::regex of_radar(
-      "(time_offset|ego_velocity|extrinsics)(_[a-z0-9_]+)?\\.csv|barometer\\.csv|ground_vehicle\\.csv");
+      "(time_offset|ego_velocity|extrinsics)(_[a-z0-9_]+)?\\.csv|(barometer|ground_vehicle|map)\\.csv");
   const std::vector<std::string> own = files_.names();
   std::vector<fs::path> earlier;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) {
@@ -395,6 +399,7 @@ void RunOutput::removeOfEarlierRuns() const {
     const char* const header = kind[1] == "time_offset"       ? kTimeOffsetHeader
                                : kind[1] == "ego_velocity"    ? kEgoVelocityHeader
                                : name == "barometer.csv"      ? kBarometerHeader
+                               : name == "map.csv"            ? kMapHeader
                                : name == "ground_vehicle.csv" ? kGroundVehicleHeader
                                                               : kExtrinsicsHeader;
     // A user's own time_offset_truth.csv stays.
@@ -456,6 +461,9 @@ void RunOutput::addResult(const ScanResult& result) {
   radar.time_offset.endLine();
   if (radar.extrinsics) addExtrinsics(*radar.extrinsics, result);
 
+  if (result.landmarks)
+    for (const LandmarkPoint& point : result.landmarks->map) landmarks_[point.id] = point;
+
   line = &biases_.buffer;
   appendStamp(line, result.scan.stamp);
   appendVector(line, result.state.b_g, 9);
@@ -492,6 +500,22 @@ void RunOutput::addAids(const ScanResult& result) {
   ground_vehicle_->endLine();
 }
 
+void RunOutput::writeMap() {
+  map_->buffer = kMapHeader;
+  for (const auto& [id, point] : landmarks_) {
+    std::string* line = &map_->buffer;
+    *line += std::to_string(id);
+    appendVector(line, point.p_W, 6);
+    line->push_back(',');
+    appendFixed(line, point.sigma, 6);
+    line->push_back(',');
+    appendFixed(line, point.snr_db, 3);
+    *line += ',' + std::to_string(point.sightings);
+    map_->endLine();
+  }
+  map_->flush();
+}
+
 void RunOutput::addExtrinsics(File& file, const ScanResult& result) {
   const Eigen::Quaterniond& q_IR = result.T_IR.q_IR;
   const Eigen::Matrix<double, 6, 1> sigmas = result.T_IR_covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
@@ -515,6 +539,7 @@ void RunOutput::finish(const RunSummary& summary) {
     radar.ego_velocity.flush();
     if (radar.extrinsics) radar.extrinsics->flush();
   }
+  if (map_) writeMap();
   File yaml;
   yaml.open(folder_ + "/summary.yaml");
   yaml.buffer = summaryText(summary, files_.names());

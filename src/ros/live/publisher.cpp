@@ -47,6 +47,7 @@ LivePublisher::LivePublisher(const Config& config, const ros::NodeHandle& privat
   odom_optimized_ = node.advertise<nav_msgs::Odometry>("odom_optimized", 200);
   path_ = node.advertise<nav_msgs::Path>("path", 1, true);
   imu_bias_ = node.advertise<ImuBias>("imu_bias", 200);
+  if (config_.odometry.landmarks.enabled) map_ = node.advertise<sensor_msgs::PointCloud2>("map", 1, true);
   path_message_.header.frame_id = config_.odom_frame;
   if (config_.publish_tf) {
     tf_.emplace();
@@ -75,6 +76,7 @@ void LivePublisher::result(const LiveSession::Result& live, double rate_sigma) {
   if (radar.inliers.getNumSubscribers() > 0 && isValid(result.ego_velocity.status))
     publishCloud(radar.inliers, result.scan, result.ego_velocity.inliers, radar.frame);
   if (!result.updated) return;
+  if (map_ && result.landmarks) map(result);
   odom_optimized_.publish(toOdometry(result.state, rate_sigma, config_.odom_frame, config_.base_link_frame));
   imu_bias_.publish(toImuBias(result.state, config_.base_link_frame));
   TimeOffset offset;
@@ -101,6 +103,13 @@ void LivePublisher::extrinsicsOf(const Radar& radar, const LiveSession::Result& 
   geometry_msgs::TransformStamped transform = toTransform(live.T_IR, config_.base_link_frame, radar.frame);
   transform.header.stamp = toRosTime(result.scan.stamp);
   radar_tf_->sendTransform(transform);
+}
+
+void LivePublisher::map(const ScanResult& result) {
+  sensor_msgs::PointCloud2 cloud = toPointCloud2(result.landmarks->map);
+  cloud.header.stamp = toRosTime(result.state.time);
+  cloud.header.frame_id = config_.odom_frame;
+  map_->publish(cloud);
 }
 
 void LivePublisher::extendPath(const NavigationState& state) {

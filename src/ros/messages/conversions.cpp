@@ -1,5 +1,7 @@
 #include "rio_t/ros/messages/conversions.h"
 
+#include <sensor_msgs/point_cloud2_iterator.h>
+
 #include <tf2_eigen/tf2_eigen.h>
 
 #include <algorithm>
@@ -153,6 +155,25 @@ geometry_msgs::TransformStamped toTransform(const Extrinsics& T_IR, const std::s
   tf2::toMsg(T_IR.l_I, transform.transform.translation);
   transform.transform.rotation = tf2::toMsg(T_IR.q_IR);
   return transform;
+}
+
+sensor_msgs::PointCloud2 toPointCloud2(const std::vector<LandmarkPoint>& map) {
+  sensor_msgs::PointCloud2 cloud;
+  cloud.height = 1;
+  sensor_msgs::PointCloud2Modifier modifier(cloud);
+  constexpr auto kFloat = sensor_msgs::PointField::FLOAT32;
+  modifier.setPointCloud2Fields(6, "x", 1, kFloat, "y", 1, kFloat, "z", 1, kFloat, "sigma", 1, kFloat,
+                                "intensity", 1, kFloat, "sightings", 1, kFloat);
+  modifier.resize(map.size());
+  sensor_msgs::PointCloud2Iterator<float> field(cloud, "x");
+  for (const LandmarkPoint& point : map) {
+    for (int i = 0; i < 3; ++i) field[i] = static_cast<float>(point.p_W[i]);
+    field[3] = static_cast<float>(point.sigma);
+    field[4] = static_cast<float>(point.snr_db);
+    field[5] = static_cast<float>(point.sightings);
+    ++field;
+  }
+  return cloud;
 }
 
 }  // namespace rio_t

@@ -54,6 +54,7 @@ ParameterList parametersOf(Config& config) {
   listTimeOffset(list, config);
   listSmoother(list, config);
   listHealth(list, config);
+  listLandmarks(list, config);
   listLiveNode(list, config);
   listBag(list, config);
   return list;

@@ -115,6 +115,7 @@ struct RunFiles {
   bool extrinsics = false;                 ///< they are estimated
   bool barometer = false;                  ///< there is one
   bool ground_vehicle = false;             ///< the platform is one
+  bool map = false;                        ///< landmarks are on
 
   std::vector<std::string> names() const;
 };
@@ -171,6 +172,7 @@ class RunOutput {
   };
 
   void removeOfEarlierRuns() const;
+  void writeMap();
   static void addExtrinsics(File& file, const ScanResult& result);
   void addAids(const ScanResult& result);
   void addPose(File& file, Time time, const Eigen::Vector3d& p_W, const Eigen::Quaterniond& q_WI);
@@ -180,6 +182,8 @@ class RunOutput {
   File trajectory_, optimized_, navigation_, biases_;
   std::optional<File> barometer_, ground_vehicle_;
   std::vector<RadarOutput> radars_;      // by RadarScan::radar
+  std::optional<File> map_;              // of the landmarks, if they are on
+  std::map<std::uint64_t, LandmarkPoint> landmarks_;  // all that there were, by id, as they were last
   std::optional<Time> last_navigation_;  // of the last line in navigation.csv
 };
 

@@ -24,7 +24,7 @@ class LivePublisher {
 
   void odometry(const NavigationState& state, double rate_sigma);  ///< ~odom and tf
   /// ~odom_optimized, ~imu_bias, ~path; of the radar: ~time_offset, ~ego_velocity, ~points, ~inliers and,
-  /// where they are estimated, ~extrinsics and tf.
+  /// where they are estimated, ~extrinsics and tf. ~map, where landmarks are on.
   void result(const LiveSession::Result& live, double rate_sigma);
   /// base_link_frame -> radar_frame of each radar as static tf, unless it is estimated.
   void extrinsics(const std::vector<Extrinsics>& T_IR);
@@ -40,11 +40,13 @@ class LivePublisher {
   };
 
   void extrinsicsOf(const Radar& radar, const LiveSession::Result& live);
+  void map(const ScanResult& result);
   void extendPath(const NavigationState& state);
 
   const Config config_;
   std::vector<Radar> radars_;
   ros::Publisher odom_, odom_optimized_, path_, imu_bias_;
+  std::optional<ros::Publisher> map_;  ///< none without landmarks
   // None where publish_tf is false. One for each thread: they share nothing.
   std::optional<tf2_ros::TransformBroadcaster> tf_, radar_tf_;
   std::optional<tf2_ros::StaticTransformBroadcaster> static_tf_;

@@ -6,12 +6,15 @@
 #include <nav_msgs/Odometry.h>
 #include <sensor_msgs/FluidPressure.h>
 #include <sensor_msgs/Imu.h>
+#include <sensor_msgs/PointCloud2.h>
 
 #include <string>
+#include <vector>
 
 #include "rio_t/ImuBias.h"
 #include "rio_t/imu/measurement.h"
 #include "rio_t/imu/units.h"
+#include "rio_t/landmarks/landmark_answer.h"
 #include "rio_t/odometry/navigation_state.h"
 #include "rio_t/odometry/options.h"
 #include "rio_t/radar/ego_velocity.h"
@@ -19,6 +22,9 @@
 #include "rio_t/sensors/barometer_channel.h"
 
 namespace rio_t {
+
+/// The landmarks, in W: x, y, z, sigma [m], intensity (mean SNR) and sightings. The header is the caller's.
+sensor_msgs::PointCloud2 toPointCloud2(const std::vector<LandmarkPoint>& map);
 
 using Covariance6 = Eigen::Matrix<double, 6, 6>;
 
