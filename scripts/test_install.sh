@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs what scripts/build.sh built into its folder install/, puts the sources and the rest of the build out of reach,
+# Installs what scripts/build.sh built, for the duration of the test, into its folder install/, puts the sources and the rest of the build out of reach,
 # and runs test/install/install_test.py: programs, launch files, nodelet, Python, and a package that uses the libraries.
 # RIO_T_BUILD_DIR: the build folder, else build/.
 set -euo pipefail
@@ -11,7 +11,9 @@ build=$(realpath -m -- "${RIO_T_BUILD_DIR:-build}")
 temporary=$(mktemp -d)
 trap 'rm -rf "$temporary"' EXIT
 
-cmake --build "$build" --target install >"$temporary/install.log" 2>&1 || { tail -n 30 "$temporary/install.log" >&2; exit 1; }
+# Never inside of the sources: roslaunch would find each launch file twice. In the namespace the folder comes to its prefix.
+installed=$temporary/destination$build/install
+DESTDIR=$temporary/destination cmake --build "$build" --target install >"$temporary/install.log" 2>&1 || { tail -n 30 "$temporary/install.log" >&2; exit 1; }
 cp -r test/install "$temporary/tests"
 results=$build/test_results/rio_t
 mkdir -p "$results"
@@ -22,17 +24,19 @@ namespace=(unshare --mount)
 if ! "${namespace[@]}" true 2>/dev/null; then
   echo "test_install.sh: this system lets nobody hide folders (unshare --mount): the sources stay in reach" >&2
   namespace=()
+  [ ! -e "$build/install" ] || { echo "test_install.sh: $build/install is in the way" >&2; exit 1; }
+  trap 'rm -rf "$temporary" "$build/install"' EXIT
+  cp -r "$installed" "$build/install"
 fi
 RIO_T_HIDDEN=${namespace:+yes} "${namespace[@]}" bash -euc '
-  source=$1 build=$2 temporary=$3
+  source=$1 build=$2 temporary=$3 installed=$4
   if [ -n "$RIO_T_HIDDEN" ]; then
-    mkdir "$temporary/install" "$temporary/results"
-    mount --bind "$build/install" "$temporary/install"
+    mkdir "$temporary/results"
     mount --bind "$build/test_results/rio_t" "$temporary/results"
     mount -t tmpfs none "$build"
     mount -t tmpfs none "$source"
     mkdir -p "$build/install" "$build/test_results/rio_t"
-    mount --bind "$temporary/install" "$build/install"
+    mount --bind "$installed" "$build/install"
     mount --bind "$temporary/results" "$build/test_results/rio_t"
   fi
   cd "$temporary"
@@ -40,4 +44,4 @@ RIO_T_HIDDEN=${namespace:+yes} "${namespace[@]}" bash -euc '
   source "$build/install/setup.bash"
   export RIO_T_TEST_SOURCE=$source RIO_T_TEST_BUILD=$build
   python3 -m pytest -p no:cacheprovider -q --junit-xml="$build/test_results/rio_t/install.xml" tests/install_test.py
-' test_install "$source" "$build" "$temporary"
+' test_install "$source" "$build" "$temporary" "$installed"
