@@ -92,7 +92,7 @@ class CheckBag : public testing::Test {
   /// Runs the odometry with what was written, as a user would.
   static RunSummary run(const BagCheck& check) {
     BagRun bag_run;
-    bag_run.bag = check.bag;
+    bag_run.bags = {check.bag};
     bag_run.config = configOf(check);
     return runBag(bag_run);
   }
@@ -367,7 +367,7 @@ TEST_F(CheckBag, ExitStatusAndFiles) {
   request.out = folder_ + "/my.yaml";
   EXPECT_EQ(runCheck(request, out, err), 0) << err.str();
   BagRun bag_run;
-  bag_run.bag = bag_;
+  bag_run.bags = {bag_};
   bag_run.config = makeConfig(readParameterFile(request.out));
   EXPECT_EQ(runBag(bag_run).divergences, 0u);
 }

@@ -124,7 +124,7 @@ Trial tryOut(const std::string& bag, const std::string& yaml, double duration) {
   Trial trial;
   try {
     BagRun run;
-    run.bag = bag;
+    run.bags = {bag};
     run.config = readBack(yaml);
     run.config.bag_duration = duration;
     trial.summary = runBag(run);
