@@ -184,6 +184,12 @@ void Estimator::addImu(const std::vector<ImuMeasurement>& samples) {
   }
 }
 
+void Estimator::tune(const Tuning& tuning) {
+  apply(tuning, options_);
+  for (RadarChannel& radar : radars_) radar.tune(options_.smoother);
+  health_.setGate(options_.smoother.innovation_gate);
+}
+
 void Estimator::keepUp(bool scan_came, bool scans_wait) {
   if (imu_.empty()) return;
   // By the IMU's clock at the arrival of scans: the scans' own stamps may be wrong.

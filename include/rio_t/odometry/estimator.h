@@ -32,6 +32,8 @@ class Estimator {
 
   /// Samples that Navigation checked, in time order.
   void addImu(const std::vector<ImuMeasurement>& samples);
+  /// In effect for the next scan.
+  void tune(const Tuning& tuning);
   /// The IMU's clock jumped. No earlier data can be related to later data, so all state is dropped.
   void startAgain(std::uint64_t clock_restarts);
   /// Call it after addImu. Counts times without radar, and moves the window on while the radar is silent.
@@ -67,7 +69,7 @@ class Estimator {
   ImuNoise imuNoise() const;  ///< scaled by the model errors found so far
   NavigationState newestState(const StateCovariance& covariance) const;
 
-  const OdometryOptions options_;
+  OdometryOptions options_;  ///< changed by tune() alone
   const Eigen::Vector3d g_W_;
   const double max_stamp_ahead_;  ///< [s]
   Navigation& navigation_;

@@ -306,7 +306,9 @@ PointCloud2 toPointCloud2(const RadarScan& scan, const std::vector<std::size_t>&
   std::size_t at = 0;
   for (const std::size_t index : indices) {
     const RadarPoint& p = scan.points.at(index);
-    const float values[kFields] = {static_cast<float>(p.position_R.x()), static_cast<float>(p.position_R.y()),
+    // From right, forward, up to forward, left, up.
+    const float values[kFields] = {static_cast<float>(p.position_R.y()),
+                                   static_cast<float>(-p.position_R.x()),
                                    static_cast<float>(p.position_R.z()), static_cast<float>(p.doppler),
                                    static_cast<float>(p.snr_db)};
     std::memcpy(&message.data[at], values, sizeof values);

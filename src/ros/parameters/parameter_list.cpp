@@ -124,6 +124,7 @@ void ParameterList::number(const std::string& key, const std::string& unit, Rang
         return true;
       },
       [&member] { return numberText(member); });
+  setRange(range);
 }
 
 void ParameterList::boolean(const std::string& key, bool& member, const std::string& meaning) {

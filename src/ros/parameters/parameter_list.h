@@ -70,6 +70,12 @@ class ParameterList {
            const std::string& meaning, std::function<bool(const ParameterValue&)> set,
            std::function<std::string()> print);
 
+  /// Of the parameter added last.
+  void setRange(const Range& range) {
+    all_.back().description.min = range.min;
+    all_.back().description.max = range.max;
+  }
+
   std::string group_;
   bool of_radar_ = false;
   std::vector<Parameter> all_;
@@ -93,6 +99,7 @@ void ParameterList::integer(const std::string& key, Range range, Integer& member
         return true;
       },
       [&member] { return std::to_string(member); });
+  setRange(range);
 }
 
 template <typename T>

@@ -51,15 +51,43 @@ void listStamps(ParameterList& list, Config& c) {
 
 void listFrames(ParameterList& list, Config& c) {
   list.group("Frames");
-  list.text("odom_frame", c.odom_frame, "world frame, z up, starts at the IMU");
-  list.text("base_link_frame", c.base_link_frame, "frame of the IMU");
+  list.text("odom_frame", c.odom_frame, "The world frame of the odometry: z is up, and it starts at base_link_frame.");
+  list.text("base_link_frame", c.base_link_frame, "The body whose odometry the live node publishes.");
+  list.textOrEmpty("imu_frame", c.imu_frame,
+                   "The frame of the IMU. If it is empty, the frame_id of the IMU's messages names it.");
+  list.choice<BaseExtrinsicsSource>(
+      "base_extrinsics_source",
+      {{"auto", BaseExtrinsicsSource::kAuto},
+       {"parameters", BaseExtrinsicsSource::kParameters},
+       {"tf", BaseExtrinsicsSource::kTf}},
+      c.base_extrinsics_source,
+      "Where the live node takes the pose of the IMU in base_link_frame from: the next two, or tf, which it then "
+      "waits for. auto takes tf if it is there when the odometry starts, else the next two.");
+  list.vector3("base_extrinsics_translation", "m", between(-100, 100), c.T_BI.p_B,
+               "The origin of the IMU in base_link_frame, x, y, z.");
+  list.rotation("base_extrinsics_rotation_xyzw", c.T_BI.q_BI,
+                "The rotation that turns vectors of the IMU into base_link_frame.");
   list.ofRadar(true);
   list.text("radar_frame", c.radar_frame,
-            "frame of the radar: x right, y forward, z up; radar_NAME where `radars` has names");
+            "The frame in which the live node shows what a radar sees: x forward, y left, z up. Nobody else may "
+            "publish a tf of it. With several radars it is rio_t_radar_NAME.");
   list.ofRadar(false);
-  list.boolean("publish_tf", c.publish_tf, "publish odom_frame -> base_link_frame; live node only");
+  list.boolean("publish_tf", c.publish_tf, "Whether the live node publishes the tf odom_frame -> base_link_frame.");
+  list.boolean("publish_radar_tf", c.publish_radar_tf,
+               "Whether the live node publishes the tf base_link_frame -> radar_frame.");
   list.boolean("invert_tf", c.invert_tf,
-               "publish base_link_frame -> odom_frame instead, where base_link_frame has another parent");
+               "Publishes the tf base_link_frame -> odom_frame instead, for a tree in which base_link_frame has "
+               "another parent.");
+  list.number("tf_rate", "Hz", atLeast(0), c.tf_rate,
+              "How often the tf of odom_frame is published. 0: with each IMU sample.");
+  list.number("odom_rate", "Hz", atLeast(0), c.odom_rate,
+              "How often ~odom is published. 0: with each IMU sample.");
+  list.boolean("correct_stamps", c.correct_stamps,
+               "Whether what the live node publishes of a scan has the time of measurement as its stamp (the scan's "
+               "stamp minus the time offset, once there is an estimate), or the scan's stamp.");
+  list.choice<ResetPose>("reset_pose", {{"keep", ResetPose::kKeep}, {"zero", ResetPose::kZero}}, c.reset_pose,
+                         "Where the odometry of the live node goes on after a reset: at the last pose, or at the "
+                         "origin of odom_frame.");
 }
 
 void listLiveNode(ParameterList& list, Config& c) {
@@ -102,8 +130,8 @@ void listExtrinsics(ParameterList& list, Config& c) {
   list.choice<ExtrinsicsSource>(
       "extrinsics_source", {{"parameters", ExtrinsicsSource::kParameters}, {"tf", ExtrinsicsSource::kTf}},
       c.extrinsics_source,
-      "the two below, or tf (live node only): from the cloud's frame_id, with the cloud's axes, to "
-      "base_link_frame");
+      "The two below, or tf, live or of the bag: from the cloud's frame_id, with the cloud's axes, to the frame "
+      "of the IMU.");
   list.vector3("extrinsics_translation", "m", between(-100, 100), c.odometry.T_IR.l_I,
                "origin of the radar in the IMU frame, x, y, z");
   list.rotation("extrinsics_rotation_xyzw", c.odometry.T_IR.q_IR, "turns radar vectors into the IMU frame");
