@@ -98,10 +98,8 @@ TEST(Conversions, InvertedTransformIsTheInverse) {
 }
 
 TEST(Conversions, EgoVelocityKnowsNoRotation) {
-  EgoVelocity ego;
-  ego.v_R = {0.1, 1.2, -0.1};
-  ego.covariance = Eigen::Vector3d(0.01, 0.02, 0.03).asDiagonal();
-  const auto message = toTwist(ego, Time::fromSeconds(7.0), "radar");
+  const Eigen::Matrix3d covariance = Eigen::Vector3d(0.01, 0.02, 0.03).asDiagonal();
+  const auto message = toTwist({0.1, 1.2, -0.1}, covariance, Time::fromSeconds(7.0), "radar");
   EXPECT_EQ(message.header.frame_id, "radar");
   EXPECT_EQ(message.header.stamp, ros::Time(7.0));
   // Forward is x of the frame (REP-103), and right is minus y.
@@ -116,10 +114,10 @@ TEST(Conversions, BiasesCarryTheirSigmas) {
   const NavigationState state = someState();
   const ImuBias message = toImuBias(state, "base_link");
   EXPECT_EQ(message.header.frame_id, "base_link");
-  EXPECT_EQ(message.gyroscope.y, -0.02);
-  EXPECT_EQ(message.accelerometer.z, -0.3);
-  EXPECT_EQ(message.gyroscope_sigma.z, std::sqrt(state.covariance(S::kBg + 2, S::kBg + 2)));
-  EXPECT_EQ(message.accelerometer_sigma.x, std::sqrt(state.covariance(S::kBa, S::kBa)));
+  EXPECT_EQ(message.gyroscope[1], -0.02);
+  EXPECT_EQ(message.accelerometer[2], -0.3);
+  EXPECT_EQ(message.gyroscope_sigma[2], std::sqrt(state.covariance(S::kBg + 2, S::kBg + 2)));
+  EXPECT_EQ(message.accelerometer_sigma[0], std::sqrt(state.covariance(S::kBa, S::kBa)));
 }
 
 TEST(Conversions, ExtrinsicsAreAPoseWithACovarianceOfTheOrderOfRos) {

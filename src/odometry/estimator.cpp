@@ -92,6 +92,7 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
         radar.use(result.scan, {at_rest, has_diverged, result.model_error_scale, last_used_}, smoother_);
     judge(answer, result.scan);
     result.ego_velocity = answer.ego_velocity;
+    result.innovation = answer.judged;
     result.doppler = answer.doppler;
     result.offset_gain = answer.offset_gain;
     result.offset_stepped = answer.offset_stepped;

@@ -11,6 +11,7 @@
 #include "rio_t/odometry/navigation_state.h"
 #include "rio_t/radar/ego_velocity.h"
 #include "rio_t/radar/scan.h"
+#include "rio_t/sensors/innovation.h"
 
 namespace rio_t {
 
@@ -18,6 +19,8 @@ namespace rio_t {
 struct ScanResult {
   RadarScan scan;  ///< as fed
   EgoVelocity ego_velocity;
+  /// The innovation of the velocity that its points show without the prediction; none if they do not decide.
+  std::optional<Innovation> innovation;
   std::optional<DopplerMeasurement> doppler;  ///< its points, if they and not the velocity count
   double offset_gain = 0.0;                   ///< see OffsetEvidence; 0: the scan does not tell the offset
   bool used = false;                          ///< it went into the window

@@ -302,17 +302,24 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
       reset(std::string("the IMU's stamps jumped ") + (jump < 0.0 ? "back" : "ahead") + " by " +
                 std::to_string(std::abs(jump)) + " s",
             true);
+      early_imu_.clear();
     }
     if (stamp == ClockJumpDetector::Verdict::kGood || stamp == ClockJumpDetector::Verdict::kRestart)
       newest_imu_ = imu.time;
     frames_.hear(event.getConstMessage()->header.frame_id);
+    const Received received{imu, toTime(event.getReceiptTime())};
     const Session now = session_.get();
     if (!now) {
+      // The first scan, by which tf names the radar, comes later than the samples that belong to it.
+      early_imu_.push_back(received);
+      if (early_imu_.size() <= kImuQueue) return;
+      early_imu_.pop_front();
       monitor_.imuDropped("imu_before_extrinsics");
       return;
     }
-    const double rate_sigma = now->rateSigma(imu.time);
-    if (const std::optional<NavigationState> state = now->addImu(imu)) {
+    double rate_sigma = 0.0;
+    for (; !early_imu_.empty(); early_imu_.pop_front()) feed(*now, early_imu_.front(), &rate_sigma);
+    if (const std::optional<NavigationState> state = feed(*now, received, &rate_sigma)) {
       if (const std::optional<BodyOdometry> body = frames_.place(*now, *state, rate_sigma)) {
         session_.speak(Speaker::kNavigation, now, [&] {
           if (publisher_.odometry(*body)) ++odom_published_;
@@ -327,7 +334,6 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
       reset("the optimisation thread took none of the last " + std::to_string(LiveSession::kMaxWaitingImu) +
             " IMU samples");
     }
-    account(now->stampWithImu(imu.time, toTime(event.getReceiptTime())));
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       rate_sigma_ = rate_sigma;
@@ -337,6 +343,14 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
     monitor_.imuDropped("imu_not_usable");
     if (isTimeToTell("imu_not_usable")) ROS_ERROR_STREAM(name_ << ": " << error.what());
   }
+}
+
+std::optional<NavigationState> LiveOdometry::feed(LiveSession& session, const Received& received,
+                                                  double* rate_sigma) {
+  *rate_sigma = session.rateSigma(received.imu.time);
+  const std::optional<NavigationState> state = session.addImu(received.imu);
+  account(session.stampWithImu(received.imu.time, received.record));
+  return state;
 }
 
 void LiveOdometry::onScan(std::size_t radar, const Event<sensor_msgs::PointCloud2>& event) {

@@ -41,6 +41,7 @@ LivePublisher::Radar::Radar(const Config& config, const ros::NodeHandle& private
   ros::NodeHandle node = namespaceOf(config, private_node);
   time_offset = node.advertise<TimeOffset>("time_offset", 200);
   ego_velocity = node.advertise<geometry_msgs::TwistWithCovarianceStamped>("ego_velocity", 200);
+  innovation = node.advertise<geometry_msgs::TwistWithCovarianceStamped>("innovation", 200);
   points = node.advertise<sensor_msgs::PointCloud2>("points", 20);
   inliers = node.advertise<sensor_msgs::PointCloud2>("inliers", 20);
   if (config.odometry.smoother.estimate_extrinsics != EstimateExtrinsics::kNone)
@@ -90,7 +91,9 @@ void LivePublisher::result(const LiveSession::Result& live, const Frames& frames
   const Time stamp = correct_stamps_ ? live.measured_at : result.scan.stamp;
   radarFrame(radar, live, frames, stamp);  // first: who shows a cloud needs its tf
   if (isValid(result.ego_velocity.status))
-    publish(radar.ego_velocity, toTwist(result.ego_velocity, stamp, radar.frame));
+    publish(radar.ego_velocity, toTwist(result.ego_velocity.v_R, result.ego_velocity.covariance, stamp, radar.frame));
+  if (result.innovation)
+    publish(radar.innovation, toTwist(result.innovation->d, result.innovation->S, stamp, radar.frame));
   if (radar.points.getNumSubscribers() > 0) {
     std::vector<std::size_t> all(result.scan.points.size());
     std::iota(all.begin(), all.end(), std::size_t{0});

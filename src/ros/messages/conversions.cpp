@@ -74,16 +74,16 @@ Eigen::Quaterniond radarFrameAxes() {
   return {std::sqrt(0.5), 0.0, 0.0, -std::sqrt(0.5)};
 }
 
-geometry_msgs::TwistWithCovarianceStamped toTwist(const EgoVelocity& ego_velocity, Time stamp,
-                                                  const std::string& radar_frame) {
+geometry_msgs::TwistWithCovarianceStamped toTwist(const Eigen::Vector3d& v_R, const Eigen::Matrix3d& covariance,
+                                                  Time stamp, const std::string& radar_frame) {
   geometry_msgs::TwistWithCovarianceStamped message;
   message.header.stamp = toRosTime(stamp);
   message.header.frame_id = radar_frame;
   const Eigen::Matrix3d axes = radarFrameAxes().toRotationMatrix();
-  tf2::toMsg(Eigen::Vector3d(axes * ego_velocity.v_R), message.twist.twist.linear);
-  Covariance6 covariance = kUnknownVariance * Covariance6::Identity();
-  covariance.topLeftCorner<3, 3>() = axes * ego_velocity.covariance * axes.transpose();
-  assign(covariance, &message.twist.covariance);
+  tf2::toMsg(Eigen::Vector3d(axes * v_R), message.twist.twist.linear);
+  Covariance6 both = kUnknownVariance * Covariance6::Identity();
+  both.topLeftCorner<3, 3>() = axes * covariance * axes.transpose();
+  assign(both, &message.twist.covariance);
   return message;
 }
 
@@ -91,13 +91,13 @@ ImuBias toImuBias(const NavigationState& state, const std::string& imu_frame) {
   ImuBias message;
   message.header.stamp = toRosTime(state.time);
   message.header.frame_id = imu_frame;
-  const auto sigmas = [&](int first) {
-    return Eigen::Vector3d(state.covariance.diagonal().segment<3>(first).cwiseMax(0.0).cwiseSqrt());
-  };
-  tf2::toMsg(state.b_g, message.gyroscope);
-  tf2::toMsg(state.b_a, message.accelerometer);
-  tf2::toMsg(sigmas(S::kBg), message.gyroscope_sigma);
-  tf2::toMsg(sigmas(S::kBa), message.accelerometer_sigma);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto k = static_cast<std::size_t>(axis);
+    message.gyroscope[k] = state.b_g[axis];
+    message.accelerometer[k] = state.b_a[axis];
+    message.gyroscope_sigma[k] = std::sqrt(std::max(0.0, state.covariance(S::kBg + axis, S::kBg + axis)));
+    message.accelerometer_sigma[k] = std::sqrt(std::max(0.0, state.covariance(S::kBa + axis, S::kBa + axis)));
+  }
   return message;
 }
 

@@ -16,6 +16,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <deque>
 #include <limits>
 #include <map>
 #include <memory>
@@ -54,6 +55,11 @@ class LiveOdometry {
   using Speaker = CurrentSession::Speaker;
   template <typename Message>
   using Event = ros::MessageEvent<const Message>;
+
+  struct Received {
+    ImuMeasurement imu;
+    Time record;  ///< of receipt
+  };
 
   /// How often a topic comes, for `diagnostics`. Silence is an error, any rate is right.
   struct TopicRate {
@@ -97,6 +103,8 @@ class LiveOdometry {
   /// When it returns, nothing more is published of what was before. Any thread.
   /// `at_once`: does not wait for rest first.
   void reset(const std::string& reason, bool at_once = false);
+  /// What a session does with a sample. The state that is to be published, if there is one.
+  std::optional<NavigationState> feed(LiveSession& session, const Received& received, double* rate_sigma);
   void account(const LiveSession::Stamped& stamped);
   /// Whether this was not told for some seconds. Each radar has its own turn, unlike with ROS's throttles.
   bool isTimeToTell(const std::string& what);
@@ -144,6 +152,7 @@ class LiveOdometry {
 
   ClockJumpDetector imu_stamps_;    // IMU thread only, as the next
   std::optional<Time> newest_imu_;  // of the good stamps
+  std::deque<Received> early_imu_;  // from before there was a session; it gets them first
 
   ros::Subscriber imu_subscriber_;
   ros::ServiceServer reset_server_, save_server_;

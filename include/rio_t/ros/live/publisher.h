@@ -37,8 +37,8 @@ class LivePublisher {
     std::optional<ImuInBody> T_BI;     ///< none while it is not known: then there is no tf of radars
     std::optional<BodyOdometry> body;  ///< of the result's state; none if it was not updated
   };
-  /// ~odom_optimized, ~imu_bias, ~path; of the radar: ~time_offset, ~ego_velocity, ~points, ~inliers, tf and, if
-  /// they are estimated, ~extrinsics.
+  /// ~odom_optimized, ~imu_bias, ~path; of the radar: ~time_offset, ~ego_velocity, ~innovation, ~points,
+  /// ~inliers, tf and, if they are estimated, ~extrinsics.
   void result(const LiveSession::Result& live, const Frames& frames);
   void clearPath();
 
@@ -50,7 +50,7 @@ class LivePublisher {
     Radar(const Config& config, const ros::NodeHandle& private_node);
 
     std::string frame;
-    ros::Publisher time_offset, ego_velocity, points, inliers;
+    ros::Publisher time_offset, ego_velocity, innovation, points, inliers;
     std::optional<ros::Publisher> extrinsics;  ///< none if they are not estimated
     bool has_static_tf = false;
   };

@@ -13,7 +13,7 @@
 #include "rio_t/odometry/body_odometry.h"
 #include "rio_t/odometry/navigation_state.h"
 #include "rio_t/odometry/options.h"
-#include "rio_t/radar/ego_velocity.h"
+#include "rio_t/radar/extrinsics.h"
 #include "rio_t/ros/parameters/point_cloud_format.h"
 
 namespace rio_t {
@@ -42,10 +42,10 @@ constexpr double kUnknownVariance = 1e6;
 /// (REP-103: x forward, y left, z up).
 Eigen::Quaterniond radarFrameAxes();
 
-/// Velocity of the radar in `radar_frame`. The radar says nothing of the angular velocity: it is zero with
+/// A velocity `v_R` in the radar's axes with its covariance, in `radar_frame`. The radar says nothing of the angular velocity: it is zero with
 /// kUnknownVariance.
-geometry_msgs::TwistWithCovarianceStamped toTwist(const EgoVelocity& ego_velocity, Time stamp,
-                                                  const std::string& radar_frame);
+geometry_msgs::TwistWithCovarianceStamped toTwist(const Eigen::Vector3d& v_R, const Eigen::Matrix3d& covariance,
+                                                  Time stamp, const std::string& radar_frame);
 
 ImuBias toImuBias(const NavigationState& state, const std::string& imu_frame);
 
