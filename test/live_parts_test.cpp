@@ -450,7 +450,7 @@ class SolverDiagnostics : public testing::Test {
   }
   LiveMonitor::Status status() const {
     LiveMonitor::Status status;
-    monitor.describeSolver(status, nullptr);
+    monitor.describeSolver(status);
     return status;
   }
   void expectWarning(const std::string& part) const {

@@ -10,6 +10,7 @@ import dynamic_reconfigure.client
 import numpy
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import Odometry
 
 from rio_t import live_tester as tester
 from rio_t import tum
@@ -177,6 +178,28 @@ class SetupTest(unittest.TestCase):
             self.assertGreater(len(periods), 10)
             self.assertEqual(len(periods), len(set(periods)))
             self.assertIsNone(listener.value("odometry", "last_reset_because") or None, "it needed no restart")
+
+    def test_mavros_gets_odometry_by_its_contract(self):
+        """mavros is not in Debian: its topic, rate, frames and covariances are what we can check."""
+        heard = []
+        subscriber = rospy.Subscriber("/mavros/odometry/out", Odometry, heard.append, queue_size=None)
+        topics = {name: kind for name, kind in tester.TOPICS.items() if name != "odom"}
+        with tester.Listener(topics) as listener, tester.Process(
+                shutil.which("roslaunch"), "--wait", "rio_t", "mavros.launch") as launch:
+            listener.wait_until_heard()
+            tester.wait_for("the publisher", lambda: subscriber.get_num_connections() > 0)
+            with tester.play(self.bag) as player:
+                self.assertEqual(player.wait(), 0)
+            last = self.imu_stamps[-1] - 10**9 // 30
+            tester.wait_for("the last odometry", lambda: heard and heard[-1].header.stamp.to_nsec() >= last)
+            launch.stop()
+        subscriber.unregister()
+        self.assertEqual({(m.header.frame_id, m.child_frame_id) for m in heard}, {("odom", "base_link")})
+        stamps = numpy.array([m.header.stamp.to_sec() for m in heard])
+        self.assertAlmostEqual((len(stamps) - 1) / (stamps[-1] - stamps[0]), 30.0, delta=0.5)
+        for message in heard:
+            for covariance in (message.pose.covariance, message.twist.covariance):
+                self.assertGreater(numpy.linalg.eigvalsh(numpy.array(covariance).reshape(6, 6))[0], 0.0)
 
     def test_diagnostics_aggregator(self):
         statuses = {}

@@ -6,6 +6,9 @@ import re
 import xml.etree.ElementTree
 
 import pytest
+import yaml
+from geometry_msgs.msg import TwistWithCovarianceStamped
+from nav_msgs.msg import Odometry
 
 from rio_t import live_tester
 
@@ -43,3 +46,16 @@ def test_rqt_perspective():
 def test_a_field_that_does_not_exist_is_found():
     with pytest.raises((AttributeError, KeyError)):
         field("/rio_t/time_offset/offsett")
+
+
+@pytest.mark.parametrize("source, key, kind", [("odometry", "odom0", Odometry), ("velocity", "twist0", TwistWithCovarianceStamped)])
+def test_robot_localization_is_fed_with_topics_of_its_kinds(source, key, kind):
+    """Robot_localization is not in Debian: the contract of its parameters and messages is what we can check."""
+    values = yaml.safe_load((SOURCE / "launch" / "examples" / f"ekf_{source}.yaml").read_text())
+    node, topic = values[key].split("/")
+    assert node == "rio_t" and live_tester.TOPICS[topic] is kind
+    assert {values["odom_frame"], values["base_link_frame"]} == {"odom", "base_link"}
+    rows = values[key + "_config"]
+    assert len(rows) == 15 and any(rows[6:9]), "the velocity is what a radar gives"
+    if kind is TwistWithCovarianceStamped:
+        assert not any(rows[9:12]), "the radar does not know the angular velocity"

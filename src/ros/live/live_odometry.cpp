@@ -171,7 +171,7 @@ void LiveOdometry::addDiagnostics() {
   using Status = LiveMonitor::Status;
   diagnostics_->add("odometry", [this](Status& s) { monitor_.describeOdometry(s, session_.get().get()); });
   diagnostics_->add("input", [this](Status& s) { monitor_.describeInput(s, session_.get().get()); });
-  diagnostics_->add("solver", [this](Status& s) { monitor_.describeSolver(s, session_.get().get()); });
+  diagnostics_->add("solver", [this](Status& s) { monitor_.describeSolver(s); });
   for (std::size_t k = 0; k < radars_.size(); ++k) {
     const Config& radar = radars_[k].config;
     diagnostics_->add(withName("time offset", radar),

@@ -16,10 +16,16 @@ Parameter parameterOf(const std::string& name, const Value& value) {
   return parameter;
 }
 
+LiveValue plain(const ParameterValue& value) {
+  if (const bool* truth = std::get_if<bool>(&value.data)) return *truth;
+  if (const std::int64_t* whole = std::get_if<std::int64_t>(&value.data)) return *whole;
+  return std::get<double>(value.data);
+}
+
 /// The name of the kind, as dynamic_reconfigure has it.
-std::string typeOf(const ParameterValue& value) {
-  if (std::holds_alternative<bool>(value.data)) return "bool";
-  return std::holds_alternative<std::int64_t>(value.data) ? "int" : "double";
+std::string typeOf(const LiveValue& value) {
+  if (std::holds_alternative<bool>(value)) return "bool";
+  return std::holds_alternative<std::int64_t>(value) ? "int" : "double";
 }
 
 /// The parameter message has whole numbers of 32 bits.
@@ -36,15 +42,15 @@ ParameterDescription descriptionOf(const std::string& key) {
 
 /// Each value replaced by one end of its range.
 template <typename End>
-std::map<std::string, ParameterValue> endsOf(std::map<std::string, ParameterValue> values, bool upper,
+std::map<std::string, LiveValue> endsOf(std::map<std::string, LiveValue> values, bool upper,
                                              const End& end) {
   for (auto& [key, value] : values) {
-    if (bool* truth = std::get_if<bool>(&value.data)) {
+    if (bool* truth = std::get_if<bool>(&value)) {
       *truth = upper;
-    } else if (std::int64_t* whole = std::get_if<std::int64_t>(&value.data)) {
+    } else if (std::int64_t* whole = std::get_if<std::int64_t>(&value)) {
       *whole = clamped(end(descriptionOf(key)));
     } else {
-      value.data = end(descriptionOf(key));
+      value = end(descriptionOf(key));
     }
   }
   return values;
@@ -53,14 +59,15 @@ std::map<std::string, ParameterValue> endsOf(std::map<std::string, ParameterValu
 }  // namespace
 
 LiveParameters::LiveParameters(const Config& config) {
-  for (const std::string& key : liveKeys()) values_[key] = parsePlainScalar(parameterYaml(config, key));
+  for (const std::string& key : liveKeys()) values_[key] = plain(parsePlainScalar(parameterYaml(config, key)));
 }
 
 ParameterEntries LiveParameters::changesFrom(const Config& config) const {
   const LiveParameters before(config);
   ParameterEntries changes;
   for (const auto& [key, value] : values_)
-    if (value.data != before.values_.at(key).data) changes.push_back({key, value, "dynamic_reconfigure"});
+    if (value != before.values_.at(key))
+      std::visit([&](auto each) { changes.push_back({key, {each}, "dynamic_reconfigure"}); }, value);
   return changes;
 }
 
@@ -109,15 +116,15 @@ void LiveParameters::__fromServer__(const ros::NodeHandle& node) {
             if (node.getParam(key, read)) data = read;
           }
         },
-        value.data);
+        value);
   }
 }
 
 void LiveParameters::__toServer__(const ros::NodeHandle& node) const {
   for (const auto& [key, value] : values_) {
-    if (const bool* truth = std::get_if<bool>(&value.data)) node.setParam(key, *truth);
-    if (const auto* whole = std::get_if<std::int64_t>(&value.data)) node.setParam(key, static_cast<int>(*whole));
-    if (const double* number = std::get_if<double>(&value.data)) node.setParam(key, *number);
+    if (const bool* truth = std::get_if<bool>(&value)) node.setParam(key, *truth);
+    if (const auto* whole = std::get_if<std::int64_t>(&value)) node.setParam(key, static_cast<int>(*whole));
+    if (const double* number = std::get_if<double>(&value)) node.setParam(key, *number);
   }
 }
 
@@ -125,7 +132,7 @@ bool LiveParameters::__fromMessage__(dynamic_reconfigure::Config& message) {
   const auto take = [&](const auto& parameters, auto convert) {
     for (const auto& parameter : parameters) {
       const auto found = values_.find(parameter.name);
-      if (found != values_.end()) found->second.data = convert(parameter.value);
+      if (found != values_.end()) found->second = convert(parameter.value);
     }
   };
   take(message.bools, [](auto value) { return value != 0; });
@@ -137,12 +144,12 @@ bool LiveParameters::__fromMessage__(dynamic_reconfigure::Config& message) {
 void LiveParameters::__toMessage__(dynamic_reconfigure::Config& message) const {
   message = {};
   for (const auto& [key, value] : values_) {
-    if (const bool* truth = std::get_if<bool>(&value.data))
-      message.bools.push_back(parameterOf<dynamic_reconfigure::BoolParameter>(key, *truth ? 1 : 0));
-    if (const auto* whole = std::get_if<std::int64_t>(&value.data))
+    if (const bool* truth = std::get_if<bool>(&value))
+      message.bools.push_back(parameterOf<dynamic_reconfigure::BoolParameter>(key, static_cast<std::uint8_t>(*truth)));
+    if (const auto* whole = std::get_if<std::int64_t>(&value))
       message.ints.push_back(
           parameterOf<dynamic_reconfigure::IntParameter>(key, clamped(static_cast<double>(*whole))));
-    if (const double* number = std::get_if<double>(&value.data))
+    if (const double* number = std::get_if<double>(&value))
       message.doubles.push_back(parameterOf<dynamic_reconfigure::DoubleParameter>(key, *number));
   }
   dynamic_reconfigure::GroupState group;  // rqt_reconfigure shows a group with its state

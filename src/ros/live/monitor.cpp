@@ -360,7 +360,7 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   queue_full_told_ = queue_full;
 }
 
-void LiveMonitor::describeSolver(Status& status, const LiveSession* session) const {
+void LiveMonitor::describeSolver(Status& status) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   const auto latency = [&](const std::string& name, const Latency& of) {
     status.add(name + "_mean_ms", of.count > 0 ? 1e3 * of.sum / static_cast<double>(of.count) : 0.0);

@@ -7,11 +7,14 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "rio_t/ros/parameters/parameters.h"
 
 namespace rio_t {
+
+using LiveValue = std::variant<bool, std::int64_t, double>;
 
 /// The parameters that may change while the live node runs (liveKeys()), as dynamic_reconfigure::Server wants
 /// its ConfigType. Its generated headers have the same members with the same names; here texts, units and
@@ -46,7 +49,7 @@ class LiveParameters {
   // NOLINTEND(bugprone-reserved-identifier)
 
  private:
-  std::map<std::string, ParameterValue> values_;  // bool, std::int64_t or double, by key
+  std::map<std::string, LiveValue> values_;  // by key
 };
 
 }  // namespace rio_t

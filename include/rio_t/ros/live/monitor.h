@@ -50,7 +50,7 @@ class LiveMonitor {
   // The tasks. `session` is the running one, null before there is one.
   void describeOdometry(Status& status, const LiveSession* session) const;
   void describeInput(Status& status, const LiveSession* session);
-  void describeSolver(Status& status, const LiveSession* session) const;
+  void describeSolver(Status& status) const;
   void describeTimeOffset(Status& status, std::size_t radar = 0) const;
   void describeExtrinsics(Status& status, std::size_t radar = 0) const;
 
