@@ -26,7 +26,7 @@ class SetupTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.folder = tempfile.mkdtemp(prefix="rio_t_setup_")
-        cls.bag = tester.simulate(cls.path("run.bag"), duration=8)
+        cls.bag = tester.simulate(cls.path("run.bag"))
         cls.imu_stamps = tester.stamps(cls.bag, tester.IMU)
         cls.scan_stamps = tester.stamps(cls.bag, tester.RADAR)
 
@@ -97,7 +97,7 @@ class SetupTest(unittest.TestCase):
 
     def test_ti_mmwave(self):
         bag = tester.simulate(self.path("ti.bag"), "--format", "ti_mmwave", "--q-ir",
-                              "-0.0746967504749,0.923218461092,0.375992995522,-0.0267831268675", duration=8)
+                              "-0.0746967504749,0.923218461092,0.375992995522,-0.0267831268675")
         optimized = tum.read(os.path.join(tester.run_bag(bag, "ti_mmwave", self.path("ti")),
                                           "trajectory_optimized.txt")).positions()
         saved = self.path("ti.txt")

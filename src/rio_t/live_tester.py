@@ -120,7 +120,7 @@ def node(*parameters, remap=()):
     return Process(program("rio_t", "rio_t_node"), "__name:=rio_t", *("_" + each for each in parameters), *remap)
 
 
-def simulate(out, *words, static_start=4, duration=10):
+def simulate(out, *words, static_start=4, duration=12):
     """A short wild run at `out`, which is returned; at rest at both ends, so that it starts and ends sharply."""
     check(run(program("rio_t", "simulate"), "--motion", "medium", "--seed", 3, "--duration", duration, "--static-start",
               static_start, "--static-end", 1, "--time-offset", 0.03, *words, "--out", out))

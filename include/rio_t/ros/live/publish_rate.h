@@ -2,8 +2,7 @@
 
 #include <atomic>
 #include <cmath>
-#include <cstdint>
-#include <optional>
+#include <limits>
 
 #include "rio_t/core/time.h"
 
@@ -28,7 +27,7 @@ class PublishRate {
 
  private:
   std::atomic<double> hz_;
-  std::optional<double> last_;
+  double last_ = std::numeric_limits<double>::quiet_NaN();  // the period of the last one; equals none at first
 };
 
 }  // namespace rio_t
