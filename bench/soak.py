@@ -20,7 +20,7 @@ def arguments_of(words):
     parser = argparse.ArgumentParser(prog="soak.sh", description="memory and latency of the live node over a long time")
     parser.add_argument("minutes", nargs="?", type=float, default=60.0, help="of data [60]")
     parser.add_argument("--rate", type=float, default=10.0, help="times real time [10]")
-    parser.add_argument("--output", default="results/soak", metavar="DIR")
+    parser.add_argument("--output-dir", default="results/soak", metavar="DIR")
     parser.add_argument("--check", action="store_true", help=argparse.SUPPRESS)
     arguments = parser.parse_args(words)
     if not 3.0 <= arguments.minutes <= 600.0:
@@ -186,13 +186,13 @@ def judge(record, newest):
 
 
 def main():
-    os.makedirs(ARGUMENTS.output, exist_ok=True)
+    os.makedirs(ARGUMENTS.output_dir, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="rio_t_soak_") as folder:
         bag = os.path.join(folder, "soak.bag")
         make_bag(bag, ARGUMENTS.minutes)
         print(f"Playing it at rate {ARGUMENTS.rate:g} ...", flush=True)
         record, newest = run(bag, ARGUMENTS.minutes, ARGUMENTS.rate)
-    table, figure = (os.path.join(ARGUMENTS.output, name) for name in ("soak.csv", "soak.png"))
+    table, figure = (os.path.join(ARGUMENTS.output_dir, name) for name in ("soak.csv", "soak.png"))
     numpy.savetxt(table, record, fmt="%.4f", delimiter=",",
                   header="data_seconds,memory_mb,imu,imu_latency_sum_ms,updates,scan_latency_sum_ms")
     draw(record, figure)

@@ -12,7 +12,8 @@ export PATH=/usr/bin:$PATH
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 build=$(realpath -m -- "${RIO_T_BUILD_DIR:-build}")
-if ! { scripts/build.sh && cmake --build "$build" --parallel "$(nproc)" --target rio_t_benchmarks; } >"$log" 2>&1; then
+scripts/build.sh --quiet
+if ! cmake --build "$build" --parallel "$(nproc)" --target rio_t_benchmarks >"$log" 2>&1; then
   tail -n 30 "$log" >&2
   echo "bench.sh: the build failed, see above" >&2
   exit 1

@@ -1,16 +1,34 @@
 #!/usr/bin/env bash
 # Installs what is missing and builds rio_t into build/ (Release). Arguments go to cmake.
+#   scripts/build.sh --quiet [ARGUMENT...]   shows what it installs, and of the build only errors
 # Afterwards: source build/devel/setup.bash
+# RIO_T_BUILD_DIR: the build folder, else build/. RIO_T_WERROR=ON: warnings are errors.
 set -euo pipefail
+case "${1:-}" in -h | --help) sed -n '2,5s/^# \?//p' "$0"; exit 0 ;; esac
 cd "$(dirname "$0")/.."
 export PATH=/usr/bin:$PATH  # catkin belongs to the system's python
+quiet=false
+if [ "${1:-}" = --quiet ]; then
+  quiet=true
+  shift
+fi
+build=${RIO_T_BUILD_DIR:-build}
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+
+# Runs a command, and shows the end of what it says only if it fails.
+step() {
+  if "$@" >"$log" 2>&1; then return; fi
+  tail -n 30 "$log" >&2
+  echo "build.sh: the build failed, see above" >&2
+  exit 1
+}
 
 scripts/install_dependencies.sh
-build=${RIO_T_BUILD_DIR:-build}
 # The generated message headers depend on the whole configuration: configure only when it is new or told to.
 if [ ! -f "$build/Makefile" ] || [ $# -gt 0 ]; then
-  cmake -S . -B "$build" -DCMAKE_BUILD_TYPE=Release -DPYTHON_EXECUTABLE=/usr/bin/python3 \
-    -DPython3_EXECUTABLE=/usr/bin/python3 "$@" >"${TMPDIR:-/tmp}/rio_t_cmake.log" 2>&1 || {
-    cat "${TMPDIR:-/tmp}/rio_t_cmake.log" >&2; exit 1; }
+  step cmake -S . -B "$build" -DCMAKE_BUILD_TYPE=Release -DCMAKE_INSTALL_PREFIX="$(realpath -m "$build")/install" -DPYTHON_EXECUTABLE=/usr/bin/python3 \
+    -DPython3_EXECUTABLE=/usr/bin/python3 -DRIO_T_WERROR="${RIO_T_WERROR:-OFF}" "$@"
 fi
-cmake --build "$build" --parallel "$(nproc)"
+make=(cmake --build "$build" --parallel "$(nproc)")
+if $quiet; then step "${make[@]}"; else "${make[@]}"; fi

@@ -23,11 +23,7 @@ data=${RIO_T_DATA_DIR:-../shared/data}
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 echo "Building (a few minutes the first time) ..."
-if ! scripts/build.sh >"$log" 2>&1; then
-  tail -n 30 "$log" >&2
-  echo "demo.sh: the build failed, see above" >&2
-  exit 1
-fi
+scripts/build.sh --quiet
 programs=$build/devel/lib/rio_t
 
 # show NAME BAG CONFIG [TRUE_OFFSET]: one run, its table, its report.

@@ -8,12 +8,6 @@ python3 "$scripts/experiment.py" --check "$@"
 for word in "$@"; do
   case "$word" in -h | --help) exit 0 ;; esac
 done
-log=$(mktemp)
-trap 'rm -f "$log"' EXIT
-if ! "$scripts/build.sh" >"$log" 2>&1; then
-  tail -n 30 "$log" >&2
-  echo "experiment.sh: the build failed, see above" >&2
-  exit 1
-fi
+"$scripts/build.sh" --quiet
 build=$(cd "$scripts/.." && realpath -m -- "${RIO_T_BUILD_DIR:-build}")
 python3 "$scripts/experiment.py" "$@" --programs "$build/devel/lib/rio_t"

@@ -25,7 +25,7 @@ if [ ! -f "$build/Makefile" ]; then
     -DCMAKE_CXX_FLAGS_RELWITHDEBINFO="-O1 -g" -DPYTHON_EXECUTABLE=/usr/bin/python3 \
     -DPython3_EXECUTABLE=/usr/bin/python3 >"$scratch/cmake.log" 2>&1 || { cat "$scratch/cmake.log" >&2; exit 1; }
 fi
-cmake --build "$build" --parallel "$(nproc)" --target point_cloud_fuzzer parameters_fuzzer >"$scratch/make.log" 2>&1 ||
+cmake --build "$build" --parallel "$(nproc)" --target rio_t_point_cloud_fuzzer rio_t_parameters_fuzzer >"$scratch/make.log" 2>&1 ||
   { tail -n 40 "$scratch/make.log" >&2; exit 1; }
 programs=$build/devel/lib/rio_t
 findings=$build/findings

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# clang-format, clang-tidy and cppcheck over our sources; exit status 1 at any finding.
+# catkin_lint over the package, clang-format, clang-tidy and cppcheck over our sources; exit status 1 at any finding.
 #   scripts/lint.sh            all
 #   scripts/lint.sh FILE...    these sources only
 # RIO_T_BUILD_DIR: where the compile commands are made, else build-lint/.
@@ -8,7 +8,7 @@ case "${1:-}" in -h | --help) sed -n '2,5s/^# \?//p' "$0"; exit 0 ;; esac
 cd "$(dirname "$0")/.."
 export PATH=/usr/bin:$PATH
 build=${RIO_T_BUILD_DIR:-build-lint}
-scripts/install_dependencies.sh clang-format-14 clang-tidy-14 clang-14 cppcheck
+scripts/install_dependencies.sh clang-format-14 clang-tidy-14 clang-14 cppcheck catkin-lint
 
 # The messages' headers are all that must be made.
 cmake -S . -B "$build" -DCMAKE_EXPORT_COMPILE_COMMANDS=ON -DRIO_T_FUZZ=ON \
@@ -27,6 +27,7 @@ mapfile -t sources < <(printf '%s\n' "${files[@]}" | grep '\.cpp$' | while read 
 done)
 
 clean=true
+catkin_lint --offline --strict --quiet . 2> >(grep -v 'rosdep\|unknown dependencies' >&2) || clean=false
 clang-format-14 --dry-run --Werror "${files[@]}" || clean=false
 # Our own headers, and not those that are made from the messages.
 printf '%s\0' "${sources[@]}" |

@@ -13,4 +13,7 @@ set -u
 rm -rf "$build/test_results"
 export RIO_T_DATA_DIR=${RIO_T_DATA_DIR:-$(realpath -m ../shared/data)}
 (cd "$build" && ctest --output-on-failure)
-python3 scripts/count_tests.py "$build/test_results"
+# Programs of others, which use what is installed, cannot load libraries with a sanitizer.
+installed=true
+[ -n "${RIO_T_TEST_PRELOAD:-}" ] || scripts/test_install.sh || installed=false
+python3 scripts/count_tests.py "$build/test_results" && $installed

@@ -159,12 +159,16 @@ TEST_F(BagRunnerErrors, WrongParametersAndArgumentsAreNamed) {
   writeBag({});
   expectError(run({"--set", "widnow=1"}), {"widnow", "window"});
   expectError(run({"--set", "window=fast"}), {"window", "finite number"});
-  expectError(run({"--config", "isr"}), {"isr", "irs"});
-  expectError(run({"--fast"}), {"unknown argument --fast"});
-  expectError(run({"--set"}), {"--set", "expected a value"});
-  expectError(run({"--bag="}), {"--bag", "expected a value"});
-  expectError(runTool({"--config", "irs"}), {"missing argument --bag --output-dir"});
-  expectError(runTool({}), {"missing argument --bag --config --output-dir"});
+  expectError(runTool({bag_, "--config", "isr", "--output-dir", out_}), {"isr", "irs"});
+  // Nothing was tried: another exit status.
+  expectError(run({"--fast"}), {"unrecognised option '--fast'", "--help"}, 2);
+  expectError(run({"--set"}), {"--set", "missing"}, 2);
+  expectError(run({"--set", "window"}), {"--set window", "expected key=value"}, 2);
+  expectError(run({"--config", "irs"}), {"--config", "more than once"}, 2);
+  expectError(run({"--bag="}), {"--bag"}, 2);
+  expectError(run({bag_}), {"expected each bag once"}, 2);
+  expectError(runTool({"--config", "irs"}), {"missing argument BAG --output-dir"}, 2);
+  expectError(runTool({}), {"missing argument BAG --config --output-dir"}, 2);
 }
 
 TEST_F(BagRunnerErrors, AnOutputFolderThatCannotBeIsNamed) {

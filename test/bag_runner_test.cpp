@@ -39,7 +39,7 @@ TEST_F(BagRunner, AtRestItStaysAndWritesEveryFile) {
 
 TEST_F(BagRunner, EveryScanIsAccountedFor) {
   writeBag({});
-  BagRun bag_run{bag_, out_, Config{}, nullptr};
+  BagRun bag_run{{bag_}, out_, Config{}, nullptr};
   const RunSummary summary = runBag(bag_run);
   EXPECT_EQ(summary.imu_count, 1600u);
   EXPECT_EQ(summary.scansTotal(), 80u);
@@ -181,13 +181,13 @@ TEST_F(BagRunner, GroundTruthComesFromTheTopicOrAFile) {
 
 TEST_F(BagRunner, APartOfTheBagCanBePlayed) {
   writeBag({});
-  BagRun bag_run{bag_, out_, Config{}, nullptr};
+  BagRun bag_run{{bag_}, out_, Config{}, nullptr};
   bag_run.config.bag_start = 1.0;
   bag_run.config.bag_duration = 5.0;
   const RunSummary summary = runBag(bag_run);
   EXPECT_NEAR(static_cast<double>(summary.imu_count), 1000.0, 2.0);
   EXPECT_NEAR(static_cast<double>(summary.scansTotal()), 50.0, 1.0);
-  expectError(run({"--set", "bag_start=100"}), {"bag_start", "behind its end"});
+  expectError(run({"--set", "bag_start=100"}), {"bag_start", "after its end"});
 }
 
 TEST_F(BagRunner, StartsInMotionWhereThereIsNoRest) {
@@ -204,7 +204,12 @@ TEST_F(BagRunner, StartsInMotionWhereThereIsNoRest) {
 TEST_F(BagRunner, HelpAndConfigurationNeedNoBag) {
   const Outcome help = runTool({"--help"});
   EXPECT_EQ(help.status, 0);
-  EXPECT_NE(help.out.find("--output-dir"), std::string::npos);
+  for (const char* part : {"--output-dir", "Examples:", "rosrun rio_t rio_t_bag", "Exit status", "--version"})
+    EXPECT_NE(help.out.find(part), std::string::npos) << part;
+  EXPECT_EQ(runTool({"--fast", "-h"}).status, 0);
+  EXPECT_EQ(runTool({"--version"}).out.rfind("rio_t_bag of rio_t ", 0), 0U);
+  EXPECT_EQ(runTool({"--print-parameters"}).out, parametersYaml());
+  EXPECT_EQ(runTool({"--print-parameters=markdown"}).out, parametersMarkdown());
   const Outcome printed = runTool({"--print-config"});
   EXPECT_EQ(printed.status, 0);
   EXPECT_EQ(printed.out, toYaml(Config{}));

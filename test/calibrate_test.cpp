@@ -309,14 +309,13 @@ TEST_F(Calibrate, WhatIsWrongIsNamedBeforeTheWork) {
   writeBag({});
   const std::string own = folder_ + "/own.yaml";
   std::ofstream(own) << "radar_format: irs\n";
-  const auto refused = [&](const std::vector<std::string>& words, const std::vector<std::string>& parts) {
-    expectError(runCalibrate(words), parts);
-  };
-  refused({}, {"missing argument --bag --config --out"});
-  refused({"--bag", bag_, "--config", "irs", "--aut", "x"}, {"--aut", "--help"});
-  refused({"--bag"}, {"--bag", "expected a value"});
+  const auto refused = [&](const std::vector<std::string>& words, const std::vector<std::string>& parts,
+                           int status = 1) { expectError(runCalibrate(words), parts, status); };
+  refused({}, {"missing argument BAG --config --out"}, 2);
+  refused({"--bag", bag_, "--config", "irs", "--aut", "x"}, {"--aut", "--help"}, 2);
+  refused({"--bag"}, {"--bag", "missing"}, 2);
   refused({"--bag", folder_ + "/none.bag", "--config", "irs", "--out", yaml_}, {"/none.bag", "no such file"});
-  refused({"--bag", bag_, "--bag", bag_, "--config", "irs", "--out", yaml_}, {bag_, "each bag once"});
+  refused({"--bag", bag_, "--bag", bag_, "--config", "irs", "--out", yaml_}, {bag_, "each bag once"}, 2);
   refused({"--bag", bag_, "--config", "none", "--out", yaml_}, {"none"});
   refused({"--bag", bag_, "--config", own, "--out", own}, {own, "never overwritten"});
   refused({"--bag", bag_, "--config", own, "--out", folder_ + "/./own.yaml"}, {"never overwritten"});
@@ -334,7 +333,7 @@ TEST_F(Calibrate, HelpSaysWhatItDoes) {
   const Outcome outcome = runCalibrate({"--help"});
   EXPECT_EQ(outcome.status, 0);
   expectSays(outcome.out,
-             {"--bag BAG", "--config", "--set", "--out", "--output-dir", "estimate_extrinsics=rotation"});
+             {"--bag BAG", "--config", "--set", "--out", "--output-dir", "estimate_extrinsics=rotation", "Examples:"});
 }
 
 }  // namespace

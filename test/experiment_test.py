@@ -19,7 +19,7 @@ SHORT = ["--seeds", "1", "--duration", "30"]
 def experiment(scripts, programs_folder, tmp_path):
     def run(*arguments):
         return programs.run(sys.executable, scripts / "experiment.py", *arguments, "--programs", programs_folder,
-                            "--output", tmp_path)
+                            "--output-dir", tmp_path)
     return run
 
 

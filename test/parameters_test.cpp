@@ -1,33 +1,33 @@
 #include "rio_t/ros/parameters/parameters.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
+#include <yaml-cpp/yaml.h>
 
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <set>
+#include <sstream>
 
 #include "rio_t/simulation/presets.h"
 #include "run_files.h"
+#include "temporary_folder.h"
 
 namespace rio_t {
 namespace {
 
 const std::string kConfigFolder = std::string(RIO_T_SOURCE_DIR) + "/config";
 
-/// A file in the test's own folder, gone at the end.
 class TemporaryFile {
  public:
-  explicit TemporaryFile(const std::string& text)
-      : path_((std::filesystem::temp_directory_path() /
-               ("rio_t_parameters_" +
-                std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) + ".yaml"))
-                  .string()) {
+  explicit TemporaryFile(const std::string& text) : path_(folder_.path() + "/parameters.yaml") {
     std::ofstream(path_) << text;
   }
-  ~TemporaryFile() { std::filesystem::remove(path_); }
   const std::string& path() const { return path_; }
 
  private:
+  TemporaryFolder folder_;
   std::string path_;
 };
 
@@ -267,6 +267,62 @@ TEST(Parameters, CommittedFileIsWhatTheProgramPrints) {
       << "run `rio_t_bag --print-config > config/estimator.yaml`";
 }
 
+TEST(Parameters, CommittedPageIsWhatTheProgramPrints) {
+  EXPECT_EQ(contents(std::string(RIO_T_SOURCE_DIR) + "/docs/parameters.md"), parametersMarkdown())
+      << "run `rio_t_bag --print-parameters=markdown > docs/parameters.md`";
+}
+
+TEST(Parameters, TextsAreFullSentences) {
+  std::size_t first = 0;
+  for (const ParameterDescription& about : parameterDescriptions()) {
+    first += about.first ? 1 : 0;
+    EXPECT_GE(about.description.size(), 40u) << about.key;
+    EXPECT_EQ(about.description.back(), '.') << about.key;
+    EXPECT_EQ(about.description.find('\n'), std::string::npos) << about.key;
+  }
+  EXPECT_GE(first, 12u) << "a new user reads these";
+  EXPECT_LE(first, 20u) << "a new user reads all of these";
+}
+
+TEST(Parameters, ProgramsReadAllThatIsKnown) {
+  std::istringstream text(parametersYaml());
+  const YAML::Node all = YAML::Load(text);
+  ASSERT_EQ(all.size(), parameterDescriptions().size());
+  std::map<std::string, YAML::Node> by_key;
+  for (const YAML::Node& each : all) by_key.emplace(each["key"].as<std::string>(), each);
+  const YAML::Node window = by_key.at("window");
+  EXPECT_EQ(window["type"].as<std::string>(), "number");
+  EXPECT_EQ(window["default"].as<double>(), Config{}.odometry.smoother.window);
+  EXPECT_EQ(window["min"].as<double>(), 0.0);
+  EXPECT_EQ(window["max"].as<double>(), 60.0);
+  EXPECT_EQ(window["unit"].as<std::string>(), "s");
+  EXPECT_FALSE(window["first"].as<bool>());
+  EXPECT_TRUE(contains(window["description"].as<std::string>(), "The smoother optimises"));
+  const YAML::Node axes = by_key.at("radar_axes");
+  EXPECT_EQ(axes["choices"].as<std::vector<std::string>>(), (std::vector<std::string>{"", "rfu", "flu"}));
+  EXPECT_EQ(axes["default"].as<std::string>(), "");
+  EXPECT_TRUE(axes["per_radar"].as<bool>());
+  EXPECT_TRUE(axes["first"].as<bool>());
+  EXPECT_FALSE(axes["min"].IsDefined());
+  // The default of every parameter reads back as one of its values.
+  for (const auto& [key, about] : by_key) {
+    std::ostringstream assignment;
+    assignment << key << "=" << about["default"];
+    EXPECT_NO_THROW(fromAssignments({assignment.str()})) << assignment.str();
+  }
+}
+
+TEST(Parameters, AFolderOfThatNameDoesNotHideAConfiguration) {
+  namespace fs = std::filesystem;
+  const fs::path before = fs::current_path();
+  const fs::path folder = fs::temp_directory_path() / ("rio_t_" + std::to_string(getpid()));
+  fs::create_directories(folder / "irs");
+  fs::current_path(folder);
+  EXPECT_TRUE(fs::equivalent(findConfigFile("irs"), kConfigFolder + "/irs.yaml"));
+  fs::current_path(before);
+  fs::remove_all(folder);
+}
+
 TEST(Parameters, PrintedConfigurationReadsBack) {
   const Config config =
       fromAssignments({"window=0.3333333333333333", "stamp_source=arrival", R"(ground_truth="a \"b\".txt")",
@@ -315,8 +371,8 @@ TEST(Parameters, TheTwoRadarsOfTheExampleAreMirrorImages) {
   EXPECT_LT((looks(right) - looks(left).cwiseProduct(mirror)).norm(), 1e-6);
   // Its right stays level, as that of the left radar.
   EXPECT_NEAR((right.q_IR * Eigen::Vector3d::UnitX()).z(), 0.0, 1e-6);
-  EXPECT_EQ(radars[0].radar_topic, "/sensor_platform/radar_left/scan");
-  EXPECT_EQ(radars[1].radar_topic, "/sensor_platform/radar_right/scan");
+  EXPECT_EQ(radars[0].radar_topic, "sensor_platform/radar_left/scan");
+  EXPECT_EQ(radars[1].radar_topic, "sensor_platform/radar_right/scan");
   EXPECT_EQ(radars[1].odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kRotation);
 }
 
@@ -476,9 +532,19 @@ TEST(SeveralRadars, OneCanBeTakenOutAndItsSectionStays) {
   EXPECT_THROW(makeConfig(entriesWith({"radars=[left]", "middle/radar_topic=/x"})), ConfigError);
 }
 
+TEST(SeveralRadars, TopicsOfABagAreThoseOfANodeWithoutNamespace) {
+  const Config config = withAbsoluteTopics(
+      fromAssignments({"radars=[left, right]", "imu_topic=imu", "left/radar_topic=left/scan",
+                       "right/radar_topic=/right/scan", "ground_truth_topic="}));
+  EXPECT_EQ(config.imu_topic, "/imu");
+  EXPECT_EQ(config.ground_truth_topic, "");
+  EXPECT_EQ(config.radars[0].radar_topic, "/left/scan");
+  EXPECT_EQ(config.radars[1].radar_topic, "/right/scan");
+}
+
 TEST(SeveralRadars, ContradictionsNameTheRadar) {
   EXPECT_TRUE(contains(faultOf("radars=[left, right]"),
-                       "right/radar_topic: expected another than that of left, got \"/sensor_platform"));
+                       "right/radar_topic: expected another than that of left, got \"sensor_platform"));
   EXPECT_TRUE(contains(faultWithTwoRadars({"left/radar_frame=f", "right/radar_frame=f"}),
                        "right/radar_frame: expected another than that of left, got \"f\" for both"));
   EXPECT_TRUE(contains(faultWithTwoRadars({"right/time_offset_initial=0.3"}), "right/time_offset_initial:"));
@@ -501,9 +567,9 @@ TEST(SeveralRadars, PrintedConfigurationReadsBack) {
        "right/radar_doppler_step=0.125", "radar_min_range=0.9", "right/radar_min_range=0.3",
        "rear/radar_frame=radar", "estimate_extrinsics=pose", "extrinsics_rotation_sigma=0.2"}));
   const std::string yaml = toYaml(config);
-  EXPECT_TRUE(contains(yaml, "\nradars: [\"left\", \"right\", \"rear\"]\n")) << yaml;
+  EXPECT_TRUE(contains(yaml, "\nradars: [left, right, rear]\n")) << yaml;
   EXPECT_TRUE(contains(yaml,
-                       "\nright:\n  radar_topic: \"/right\"\n  radar_min_range: 0.3\n  "
+                       "\nright:\n  radar_topic: /right\n  radar_min_range: 0.3\n  "
                        "radar_doppler_step: 0.125\n"))
       << "only what differs: " << yaml;
   const TemporaryFile file(yaml);
@@ -544,10 +610,14 @@ struct Anything {
   operator T() const;  // never defined: only asked for
 };
 
+// gcc 10 warns of missing members also where nothing is initialised.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
 template <typename T, typename Enable, typename... Values>
 struct TakesImpl : std::false_type {};
 template <typename T, typename... Values>
 struct TakesImpl<T, std::void_t<decltype(T{std::declval<Values>()...})>, Values...> : std::true_type {};
+#pragma GCC diagnostic pop
 
 /// Number of members of an aggregate: the longest braced list that it takes.
 template <typename T, typename... Values>
@@ -577,7 +647,7 @@ TEST(Parameters, EveryMemberOfTheOptionsHasAKey) {
   EXPECT_EQ(keysChanging("Smoother") + keysChanging("Time offset") + keysChanging("Estimate of T_IR"),
             memberCount<SmootherOptions>() + memberCount<OffsetStepDetectorOptions>() + 1)
       << "with max_queued_scans; a member of SmootherOptions lacks a key in "
-         "src/ros/parameters/parameter_registry.cpp";
+         "src/ros/parameters/";
   EXPECT_EQ(keysChanging("Radar: which points"), memberCount<EgoVelocityOptions>());
   EXPECT_EQ(keysChanging("Radar: jumps"), memberCount<FeasibilityOptions>());
   EXPECT_EQ(keysChanging("Initialisation"),
@@ -592,7 +662,7 @@ TEST(Parameters, EveryMemberOfTheOptionsHasAKey) {
   EXPECT_EQ(memberCount<RadarOptions>(), 5u)
       << "a new member needs its place in radarOptions in src/ros/parameters/parameters.cpp";
   EXPECT_EQ(memberCount<OdometryOptions>(), 18u)
-      << "a new member needs keys in src/ros/parameters/parameter_registry.cpp";
+      << "a new member needs keys in src/ros/parameters/";
   EXPECT_EQ(memberCount<PointCloudFormat>() - 1, memberCount<PointCloudOverrides>()) << "all but its name";
 }
 

@@ -7,6 +7,7 @@
 
 #include "rio_t/ros/bag/bag_runner.h"
 #include "run_files.h"
+#include "temporary_folder.h"
 
 namespace rio_t {
 namespace {
@@ -18,17 +19,16 @@ class RealBag : public testing::Test {
     bag_ = (folder != nullptr ? std::string(folder) : std::string(RIO_T_SOURCE_DIR) + "/../shared/data") +
            "/real/ti_mmwave_rospkg_demo.bag";
     if (!fs::exists(bag_)) GTEST_SKIP() << "the real bag is not here: " << bag_;
-    out_ = (fs::temp_directory_path() / "rio_t_real_bag").string();
-    fs::remove_all(out_);
   }
-  void TearDown() override { fs::remove_all(out_); }
 
   RunSummary play(const std::string& folder) const {
     const Config config = makeConfig(readParameterFile(findConfigFile("ti_mmwave")));
-    return runBag({bag_, folder, config, nullptr});
+    return runBag({{bag_}, folder, config, nullptr});
   }
 
-  std::string bag_, out_;
+  const TemporaryFolder temporary_;
+  const std::string out_ = temporary_.path();
+  std::string bag_;
 };
 
 TEST_F(RealBag, TriggerStampsEndWhereTheyStarted) {
@@ -66,7 +66,7 @@ TEST_F(RealBag, NearlyEveryScanOfTheWalkIsUsed) {
 TEST_F(RealBag, OnlineEndsNearTheBatch) {
   Config config = makeConfig(readParameterFile(findConfigFile("ti_mmwave")));
   config.mode = RunMode::kBatch;
-  const RunSummary batch = runBag({bag_, out_, config, nullptr});
+  const RunSummary batch = runBag({{bag_}, out_, config, nullptr});
   const RunSummary online = play(out_ + "/again");
   ASSERT_TRUE(batch.batch.has_value());
   EXPECT_TRUE(batch.batch->converged);

@@ -7,6 +7,7 @@ import sys
 
 import pytest
 import yaml
+from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from rio_t import programs
@@ -50,7 +51,7 @@ def figures_of(page):
 
 def test_page_holds_its_figures_and_numbers(report, run_folder, simulated_run, programs_folder, tmp_path):
     truth = simulated_run / "truth.txt"
-    page = page_of(report("--ground-truth", truth, "--true-offset", 0.03, "--output", tmp_path / "out", run_folder))
+    page = page_of(report("--ground-truth", truth, "--true-offset", 0.03, "--output-dir", tmp_path / "out", run_folder))
     figures = figures_of(page)
     assert list(figures) == FIGURES
     for name, data in figures.items():
@@ -61,6 +62,8 @@ def test_page_holds_its_figures_and_numbers(report, run_folder, simulated_run, p
     summary = yaml.safe_load((run_folder / "summary.yaml").read_text())
     assert float(cell_after(page, "final_offset_s")) == pytest.approx(summary["final_offset_s"], rel=1e-5)
     assert cell_after(page, "scans_used") == str(summary["scans_used"])
+    assert "<h2>Is this run good?</h2>" in page and '<p class="good">This run is good' in page
+    assert cell_after(page, "the estimate started") == "1"
     evaluated = programs.output_of(programs_folder / "evaluate", "--yaml", truth, run_folder / "trajectory_optimized.txt")
     ate = yaml.safe_load(evaluated)["estimates"][0]["ape_origin_m"]["rmse"]
     assert cell_after(page, "ATE: position, origin aligned, rmse [m]") == f"{ate:.4f}"
@@ -68,9 +71,24 @@ def test_page_holds_its_figures_and_numbers(report, run_folder, simulated_run, p
     assert float(cell_after(page, "last estimate minus truth [ms]").split()[0]) == pytest.approx(error, abs=2e-3)
 
 
+def test_animation_covers_the_run(report, run_folder, tmp_path):
+    page_of(report("--true-offset", 0.03, "--output", tmp_path / "out", "--animation", tmp_path / "run.gif", run_folder))
+    with Image.open(tmp_path / "run.gif") as image:
+        assert image.format == "GIF" and image.n_frames > 60
+        first = image.convert("RGB").tobytes()
+        image.seek(image.n_frames - 1)
+        assert image.convert("RGB").tobytes() != first
+    assert (tmp_path / "run.gif").stat().st_size < 2e6
+
+
+def test_animation_of_another_kind_is_refused(report, run_folder, tmp_path):
+    done = report("--output", tmp_path / "out", "--animation", tmp_path / "run.mp4", run_folder)
+    assert done.returncode == 1 and "run.mp4: expected a name that ends in .gif" in done.stderr
+
+
 def test_each_of_two_radars_has_its_sections(report, two_radar_run, simulated_run, tmp_path):
     page = page_of(report("--ground-truth", simulated_run / "truth.txt", "--true-offset", "left=0.03", "--true-offset",
-                          "right=0.05", "--output", tmp_path / "out", two_radar_run / "run"))
+                          "right=0.05", "--output-dir", tmp_path / "out", two_radar_run / "run"))
     assert list(figures_of(page)) == ["trajectory", "errors", "velocity", "time_offset_left", "extrinsics_left",
                                       "ego_velocity_left", "time_offset_right", "extrinsics_right",
                                       "ego_velocity_right", "biases"]
@@ -181,7 +199,7 @@ def test_a_broken_file_is_told_in_one_line(report, run_folder, name, content, me
     ("--ground-truth", "1 2\n", "given:1: expected `stamp x y z qx qy qz qw`"),
     ("--config", None, "No such file"),
     ("--config", "extrinsics_translation: [1, 2]\n", "expected extrinsics_translation (3 numbers)"),
-    ("--output", "a file", "cannot be made")])
+    ("--output-dir", "a file", "cannot be made")])
 def test_a_wrong_option_is_told_in_one_line(report, run_folder, tmp_path, option, content, message):
     if content is not None:
         (tmp_path / "given").write_text(content)
@@ -203,3 +221,18 @@ def refused(done, message):
     assert message in done.stderr
     assert done.stderr.startswith("report.py: ") and done.stderr.count("\n") == 1, done.stderr
     assert done.stdout == ""
+
+
+def test_a_bad_run_says_why(report, run_folder):
+    summary = run_folder / "summary.yaml"
+    content = yaml.safe_load(summary.read_text())
+    content["verdict"] = "bad"
+    content["checks"][1].update(value=0.1, good=False)
+    content["causes"] = [{"name": "contradicts_imu", "share": 0.9, "text": "90 of 100 scans contradict.", "remedy": "Turn it."}]
+    summary.write_text(yaml.safe_dump(content))
+    page = page_of(report(run_folder))
+    assert '<p class="bad">This run is bad' in page
+    assert '<td class="number bad">0.1</td><td>at least 0.5</td>' in page
+    assert "90 of 100 scans contradict. Turn it." in page
+    summary.unlink()
+    assert '<p class="bad">The run did not finish.' in page_of(report(run_folder))

@@ -16,6 +16,7 @@
 
 #include "rio_t/ros/bag/bag_tool.h"
 #include "run_files.h"
+#include "temporary_folder.h"
 
 namespace rio_t {
 
@@ -49,16 +50,9 @@ struct BagContents {
 class RestBag : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ =
-        (fs::temp_directory_path() /
-         ("rio_t_bag_runner_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name())))
-            .string();
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
     bag_ = folder_ + "/test.bag";
     out_ = folder_ + "/out";
   }
-  void TearDown() override { fs::remove_all(folder_); }
 
   void writeBag(const BagContents& what) const {
     rosbag::Bag bag(bag_, rosbag::bagmode::Write);
@@ -123,16 +117,19 @@ class RestBag : public testing::Test {
     return runTool(words);
   }
 
-  /// One line on stderr that holds every part, and exit status 1.
-  void expectError(const Outcome& outcome, const std::vector<std::string>& parts) const {
-    EXPECT_EQ(outcome.status, 1);
+  /// One line on stderr that holds every part, then perhaps the likely causes; and that exit status.
+  void expectError(const Outcome& outcome, const std::vector<std::string>& parts, int status = 1) const {
+    EXPECT_EQ(outcome.status, status);
     EXPECT_EQ(outcome.out, "");
-    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    const std::string line = outcome.err.substr(0, outcome.err.find("The most likely causes:\n"));
+    EXPECT_EQ(std::count(line.begin(), line.end(), '\n'), 1) << outcome.err;
     for (const std::string& part : parts)
       EXPECT_NE(outcome.err.find(part), std::string::npos) << part << " not in: " << outcome.err;
   }
 
-  std::string folder_, bag_, out_;
+  const TemporaryFolder temporary_;
+  const std::string folder_ = temporary_.path();
+  std::string bag_, out_;
 };
 
 }  // namespace rio_t

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <sstream>
+
 namespace rio_t {
 namespace {
 
@@ -43,6 +45,27 @@ TEST(RosParameters, FaultsNameTheParameterWithItsNamespace) {
     EXPECT_NE(text.find("parameter /rio_t/gravity"), std::string::npos) << text;
     EXPECT_NE(text.find("parameter /rio_t/radar"), std::string::npos) << text;
   }
+}
+
+TEST(RosParameters, WhatANodeShowsIsTheConfigurationItRan) {
+  XmlRpc::XmlRpcValue map = serverMap();
+  map["radars"][0] = std::string("left");
+  map["radars"][1] = std::string("right");
+  map["right"]["radar_min_range"] = 1.5;
+  map["left"]["radar_topic"] = std::string("/left");
+  map["right"]["radar_topic"] = std::string("/right");
+  const Config config = makeConfig(toParameterEntries(map, "/rio_t"));
+  std::istringstream yaml(toYaml(config));
+  XmlRpc::XmlRpcValue shown = toXmlRpc(readParameters(yaml, "shown"));
+  EXPECT_EQ(toYaml(makeConfig(toParameterEntries(shown, "/rio_t/effective"))), toYaml(config));
+  EXPECT_EQ(static_cast<double&>(shown["right"]["radar_min_range"]), 1.5);
+}
+
+TEST(RosParameters, WhatAnEarlierRunShowedIsNotRead) {
+  XmlRpc::XmlRpcValue map = serverMap();
+  map["effective"]["gravity"] = 9.7;
+  map["effective"]["left_over"] = true;
+  EXPECT_EQ(makeConfig(toParameterEntries(map, "/rio_t")).odometry.gravity, 9.805);
 }
 
 TEST(RosParameters, NamespacesAreTheSectionsOfRadars) {

@@ -214,7 +214,7 @@ TEST_F(TwoSimulatedRadars, EachOffsetIsFoundInEveryMode) {
     Config config = this->config();
     config.mode = mode;
     config.refine_passes = 2;
-    const RunSummary summary = runBag({bag_, out_, config, nullptr});
+    const RunSummary summary = runBag({{bag_}, out_, config, nullptr});
     expectOffsets(summary);
     if (mode != RunMode::kRefine) continue;
     // What the first pass found is off the stamps of the second, each radar's its own, and on its outputs
@@ -235,7 +235,7 @@ TEST_F(TwoSimulatedRadars, MountingsAreFoundEachItsOwn) {
   config.odometry.smoother.estimate_extrinsics = EstimateExtrinsics::kRotation;
   const Eigen::AngleAxisd wrong(0.08, Eigen::Vector3d(1.0, -2.0, 2.0).normalized());
   config.odometry.radars[1].T_IR.q_IR = wrong * right_.q_IR;
-  const RunSummary summary = runBag({bag_, out_, config, nullptr});
+  const RunSummary summary = runBag({{bag_}, out_, config, nullptr});
   const auto error = [&](std::size_t k, const Extrinsics& truth) {
     return summary.radars.at(k).extrinsics->T_IR.q_IR.angularDistance(truth.q_IR);
   };
@@ -248,8 +248,8 @@ TEST_F(TwoSimulatedRadars, MountingsAreFoundEachItsOwn) {
 
 TEST_F(TwoSimulatedRadars, SameBagSameBytes) {
   const Config config = this->config();
-  runBag({bag_, out_ + "/a", config, nullptr});
-  runBag({bag_, out_ + "/b", config, nullptr});
+  runBag({{bag_}, out_ + "/a", config, nullptr});
+  runBag({{bag_}, out_ + "/b", config, nullptr});
   for (const std::string& name : runFiles(config).names())
     EXPECT_EQ(untimed(contents(out_ + "/a/" + name)), untimed(contents(out_ + "/b/" + name))) << name;
 }

@@ -34,8 +34,8 @@ def test_a_preset_brings_its_motion_and_another_may_be_given(simulate):
 def test_a_flat_radar_has_a_narrow_view_unless_one_is_given(simulate):
     flat = ("--motion", "ground_vehicle", "--duration", 25, "--no-elevation")
     _, narrow = simulate(*flat)
-    _, five = simulate("--fov-elevation", 5, *flat)
-    _, ten = simulate("--fov-elevation", 10, *flat)
+    _, five = simulate("--fov-elevation-deg", 5, *flat)
+    _, ten = simulate("--fov-elevation-deg", 10, *flat)
     assert narrow == five
     assert narrow != ten
 
@@ -45,12 +45,12 @@ RADARS = ("--motion", "easy", "--duration", "25", "--radar")
 
 def test_a_radar_takes_from_outside_what_it_leaves_out(simulate):
     outside = ("--time-offset", 0.03, "--blackout", "16,1", "--no-elevation", "--time-offset-step", "20,0.1")
-    _, bag = simulate(*outside, *RADARS, "left", "--radar", "right time-offset=0.1 blackout=18,2 fov-elevation=20")
+    _, bag = simulate(*outside, *RADARS, "left", "--radar", "right time-offset=0.1 blackout=18,2 fov-elevation-deg=20")
     common = "time-offset-step=20,0.1 no-elevation"
-    _, spelled = simulate(*RADARS, f"right time-offset=0.1 blackout=18,2 fov-elevation=20 {common}",
+    _, spelled = simulate(*RADARS, f"right time-offset=0.1 blackout=18,2 fov-elevation-deg=20 {common}",
                           "--radar", f"left time-offset=0.03 blackout=16,1 {common}")
     assert bag == spelled
-    _, otherwise = simulate(*RADARS, f"right time-offset=0.1 blackout=18,2 fov-elevation=20 {common}",
+    _, otherwise = simulate(*RADARS, f"right time-offset=0.1 blackout=18,2 fov-elevation-deg=20 {common}",
                             "--radar", f"left time-offset=0.03 blackout=16,2 {common}")
     assert bag != otherwise
 
@@ -91,26 +91,26 @@ def test_a_pair_of_a_preset_may_be_changed(simulate):
     (("--motion", "easy", "--doppler-span", "3", "--doppler-step", "0.49"), ("doppler-span", "doppler-step")),
     (("--motion", "easy", "--points-min", "-1"), ("--points-min", "from 0")),
     (("--motion", "easy", "--points-min", "71"), ("points-min", "points-max")),
-    (("--motion", "easy", "--no-elevation=1"), ("--no-elevation", "takes no value")),
-    (("--motion", "easy", "--skip-empty=yes"), ("--skip-empty", "takes no value")),
-    (("--motion", "easy", "--no-elevation", "--fov-elevation", "0"), ("--fov-elevation", "above 0")),
+    (("--motion", "easy", "--no-elevation=1"), ("--no-elevation", "does not take")),
+    (("--motion", "easy", "--skip-empty=yes"), ("--skip-empty", "does not take")),
+    (("--motion", "easy", "--no-elevation", "--fov-elevation-deg", "0"), ("--fov-elevation-deg", "above 0")),
     (("--motion", "easy", "--ghost-burst", "5,0"), ("--ghost-burst", "positive duration")),
     (("--seed", "1"), ("--motion", "--trajectory", "--preset")),
-    (RADARS + ("left time-ofset=0.1",), ("--radar", "left", "'time-ofset'", "time-offset, time-offset-drift")),
-    (RADARS + ("left seed=3",), ("--radar", "left", "'seed'", "known are")),
+    (RADARS + ("left time-ofset=0.1",), ("--radar", "left", "unrecognised option '--time-ofset'")),
+    (RADARS + ("left seed=3",), ("--radar", "left", "unrecognised option '--seed'")),
     (RADARS + ("left radar-rate=0",), ("--radar", "left", "radar-rate", "above 0")),
-    (RADARS + ("left radar-rate",), ("--radar", "left", "radar-rate=HZ", "missing")),
-    (RADARS + ("left no-elevation=1",), ("--radar", "left", "no-elevation", "takes no value")),
-    (RADARS + ("left points=3 points=4",), ("--radar", "left", "points", "twice")),
+    (RADARS + ("left radar-rate",), ("--radar", "left", "'--radar-rate'", "missing")),
+    (RADARS + ("left no-elevation=1",), ("--radar", "left", "no-elevation", "does not take")),
+    (RADARS + ("left points=3 points=4",), ("--radar", "left", "points", "more than once")),
     (RADARS + ("left doppler-span=3 doppler-step=0.49",), ("'left'", "doppler-span", "doppler-step")),
     (RADARS + ("left", "--radar", "left time-offset=0.1"), ("--radar", "two radars", "'left'")),
     (RADARS + ("Left",), ("'Left'", "lower case")),
     (RADARS + ("time-offset=0.1",), ("'time-offset=0.1'", "lower case")),
-    (RADARS + ("",), ("radar ''", "lower case")),
+    (RADARS + ("",), ("--radar", "expected a value")),
 ])
 def test_a_bad_option_is_named(simulate, options, named):
     done, bag = simulate(*options)
-    assert done.returncode == 1
+    assert done.returncode in (1, 2)  # data, or the command line
     assert bag is None
     for word in named:
         assert word in done.stderr

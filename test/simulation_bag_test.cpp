@@ -8,7 +8,6 @@
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <std_msgs/Header.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -19,6 +18,7 @@
 
 #include "rio_t/simulation/motions.h"
 #include "rio_t/simulation/presets.h"
+#include "temporary_folder.h"
 
 namespace rio_t {
 namespace {
@@ -27,23 +27,13 @@ using simulation::Motion;
 using simulation::SensorData;
 using simulation::SimulationOptions;
 
-// A file that is gone when the test is over, whatever happened.
 class TemporaryFile {
  public:
-  TemporaryFile() {
-    char name[] = "/tmp/rio_t_simulation_bag_XXXXXX";
-    const int descriptor = mkstemp(name);
-    if (descriptor < 0) throw std::runtime_error("no temporary file");
-    close(descriptor);
-    path_ = name;
-  }
-  ~TemporaryFile() { std::remove(path_.c_str()); }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
   const std::string& path() const { return path_; }
 
  private:
-  std::string path_;
+  TemporaryFolder folder_;
+  std::string path_ = folder_.path() + "/simulated.bag";
 };
 
 std::string contentOf(const std::string& path) {

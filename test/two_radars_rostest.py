@@ -60,8 +60,8 @@ class TwoRadarsTest(unittest.TestCase):
         cls.mounting = {}
         for name in NAMES:
             x, y, z, w = product(turn, cls.told[name])
-            cls.mounting[name] = (f"lever-arm={','.join(map(str, cls.levers[name]))} "
-                                  f"q-ir={w:.9f},{x:.9f},{y:.9f},{z:.9f}")
+            cls.mounting[name] = (f"extrinsics-translation={','.join(map(str, cls.levers[name]))} "
+                                  f"extrinsics-rotation-xyzw={x:.9f},{y:.9f},{z:.9f},{w:.9f}")
         cls.bag = cls.simulate("run")
         with rosbag.Bag(cls.bag) as bag:
             cls.scans = {name: [m.header.stamp.to_nsec() for _, m, _ in bag.read_messages([SCANS[name]])]

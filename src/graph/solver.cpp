@@ -80,13 +80,13 @@ ceres::Solver::Options solverOptions() {
   return options;
 }
 
-/// Of a step that is tried where the whole one raises the cost. A tilt that is lost makes steps of a radian,
-/// over which the graph is not linear but the direction is right; damping would shorten them to a hundredth.
+/// The smallest share of a step that is tried if the whole step raises the cost. A lost tilt makes steps of a
+/// radian: the graph is not linear over them, but their direction is right. Damping would make them too short.
 constexpr double kShortestShare = 0.06;
 constexpr double kFirstDamping = 1e-4;
-/// Squared length of a step in standard deviations, below which it is taken without asking the cost: over a
-/// tenth of a sigma the graph is linear, and the cost of a long run is rounded to more than the step lowers
-/// it.
+/// Squared length of a step in standard deviations. A shorter step is taken without a look at the cost: the
+/// graph is linear over a tenth of a sigma, and rounding changes the cost of a long run by more than the step
+/// does.
 constexpr double kSurelyRight = 1e-2;
 
 /// Moves all blocks by `share` of the step, no farther than to their bounds. Whether one was stopped there.

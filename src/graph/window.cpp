@@ -79,10 +79,11 @@ void Window::remove(const Block& block) {
   const auto touches = [&](const std::unique_ptr<Term>& term) {
     return std::find(term->blocks.begin(), term->blocks.end(), &block) != term->blocks.end();
   };
-  problem_->RemoveParameterBlock(block.x.data());  // and the residual blocks on it
+  const auto at =
+      std::find_if(blocks_.begin(), blocks_.end(), [&](const auto& other) { return other.get() == &block; });
+  problem_->RemoveParameterBlock((*at)->x.data());  // and the residual blocks on it
   terms_.erase(std::remove_if(terms_.begin(), terms_.end(), touches), terms_.end());
-  blocks_.erase(
-      std::find_if(blocks_.begin(), blocks_.end(), [&](const auto& other) { return other.get() == &block; }));
+  blocks_.erase(at);
 }
 
 bool Window::has(const Block& block) const {

@@ -16,13 +16,13 @@ constexpr std::size_t kMaxScans = 1000;  // bounds the memory
 constexpr double kStepsApart = 20.0;     // [s] nearer, a step of the offset explains nothing
 constexpr std::size_t kFalseSteps = 3;   // so near each other, no offset steps: a driver restarts once
 constexpr double kMaxSpeed = 200.0;      // [m/s] no platform with such a radar
-/// Of the squares. Turned axes give 50 and more; the worst platform that was tried, a kart with sparse
-/// radars, 16 for a second and then less than 10.
+/// The bound on the scale of the squares. Turned axes give 50 and more. The worst good platform, a kart with
+/// sparse radars, gives 16 for a second and then less than 10.
 constexpr double kMaxModelErrorScale = 25.0;
 constexpr double kMetresPerSecond2 = 10;  // an attitude that is off by x turns x g into velocity each second
 
-/// Of the velocity in I [m^2/s^2]: a heading that an IMU gap lost makes v_W vague for good, and is no
-/// divergence. With the error delta of the state, that of the velocity is R_IW (delta_v + A delta_theta).
+/// Variance of the velocity in I [m^2/s^2]. A heading that was lost in an IMU gap makes v_W vague for good and
+/// is no divergence. An error delta of the state is an error R_IW (delta_v + A delta_theta) of the velocity.
 Eigen::Vector3d bodyVelocityVariance(const NavigationState& state) {
   using S = StateBlock;
   const Eigen::Matrix3d R_WI = state.q_WI.toRotationMatrix();

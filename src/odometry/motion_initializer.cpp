@@ -133,7 +133,7 @@ std::optional<MotionInitialization> MotionInitializer::solve(
     const auto set = [&](int first, double sigma) {
       result.prior.J.diagonal().segment<3>(first).setConstant(1.0 / sigma);
     };
-    // Of the attitude only the heading; theta lives in I. Of the velocity nothing.
+    // The prior holds the heading, and neither tilt nor velocity; theta lives in I.
     result.prior.J.block<1, 3>(StateBlock::kTheta, StateBlock::kTheta) =
         x.q_WI().toRotationMatrix().row(2) / anchor.sigma_yaw;
     set(StateBlock::kP, anchor.sigma_position);

@@ -9,6 +9,7 @@
 #include "direction_noise.h"
 #include "ego_velocity_options.h"
 #include "rest_velocity.h"
+#include "rio_t/radar/point_filter.h"
 #include "velocity_solver.h"
 
 namespace rio_t {
@@ -22,14 +23,8 @@ std::vector<RadarDirection> filter(const RadarScan& scan, const EgoVelocityOptio
   directions.reserve(scan.points.size());
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const RadarPoint& p = scan.points[i];
-    const double range = p.position_R.norm();
-    // At range zero there is no direction, whatever min_range says. NaN fails every comparison.
-    if (!(range > 0.0 && range >= o.min_range && range <= o.max_range)) continue;
-    if (!(p.snr_db >= o.min_snr_db) || !std::isfinite(p.doppler)) continue;
-    const Eigen::Vector3d u = p.position_R / range;
-    if (std::abs(std::atan2(u.x(), u.y())) > o.max_azimuth) continue;
-    if (std::abs(std::asin(std::clamp(u.z(), -1.0, 1.0))) > o.max_elevation) continue;
-    directions.push_back({u, p.doppler, i});
+    if (judgePoint(p, o) != PointVerdict::kKept) continue;
+    directions.push_back({p.position_R / p.position_R.norm(), p.doppler, i});
   }
   return directions;
 }

@@ -19,7 +19,7 @@ from .ros_processes import DEADLINE, SLOWNESS, Process, program, wait_for
 # A library that programs of others need first, before they can load ours: the runtime of a sanitizer.
 PRELOAD = os.environ.get("RIO_T_TEST_PRELOAD", "")
 IMU, RADAR = "/sensor_platform/imu", "/sensor_platform/radar/scan"
-# Of messages that rosbag play keeps for a subscriber that is late. By default it is 100, an eighth of a second of IMU.
+# The messages that rosbag play keeps for a late subscriber. The default is 100, which is an eighth of a second of IMU.
 QUEUE = "--queue=20000"
 TOPICS = {"odom": Odometry, "odom_optimized": Odometry, "time_offset": TimeOffset, "imu_bias": ImuBias, "path": Path,
           "ego_velocity": TwistWithCovarianceStamped, "innovation": TwistWithCovarianceStamped,

@@ -26,7 +26,7 @@ SETTLING = 1.0  # [s] after the first stamp that are left out: there the errors 
 
 @dataclasses.dataclass
 class Consistency:
-    """Of one run. `ratios` (n, 9): error / sigma of position, rotation vector, velocity; `offset_ratio`: of the offset.
+    """One run. `ratios` (n, 9): error / sigma of position, rotation vector, velocity; `offset_ratio`: of the offset.
     `nees`: mean over time and axes for each of PARTS."""
     ratios: numpy.ndarray
     offset_ratio: numpy.ndarray
@@ -79,6 +79,6 @@ def consistency(navigation, offsets, truth, true_offset):
 
 
 def read_consistency(folder, truth_path, true_offset):
-    """Of what rio_t_bag left in the folder. `true_offset` in s."""
+    """The consistency of the run in the folder. `true_offset` in s."""
     return consistency(run_folder.read_navigation(folder), run_folder.read(folder, "time_offset.csv"),
                        tum.read(truth_path), true_offset)

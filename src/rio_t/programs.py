@@ -7,6 +7,10 @@ import sys
 from .errors import RioTError
 
 
+# Exit status of a program that has a result. The result of the latter is not to be trusted, which summary.yaml says.
+OK, NOT_TRUSTED = HAS_RESULT = (0, 3)
+
+
 def find(names, option, given=None):
     """Folder that holds the programs: the given one, else beside the script, in a sourced workspace or in the build
     folder. `option` is what the user can give."""
@@ -33,9 +37,8 @@ def run(*words, **options):
 
 
 def output_of(*words):
-    """What a program that succeeds tells on stdout."""
+    """What a program that has a result tells on stdout."""
     done = run(*words)
-    if done.returncode != 0:
-        lines = done.stderr.strip().splitlines()
-        raise RioTError(lines[-1] if lines else f"{words[0]} ended with status {done.returncode}")
+    if done.returncode not in HAS_RESULT:
+        raise RioTError(done.stderr.strip() or f"{words[0]} ended with status {done.returncode}")
     return done.stdout

@@ -9,8 +9,8 @@
 namespace rio_t {
 namespace {
 
-/// Where roll and pitch are known no better [rad], the prediction is not linear in them, and its covariance
-/// too small to reject anything by.
+/// [rad] If roll and pitch are less certain than this, the prediction is not linear in them, and its
+/// covariance is too small to reject anything.
 constexpr double kMaxTiltSigma = 0.1;
 /// [m/s] Sigma of a velocity that no point of a scan sees.
 constexpr double kUnseen = 100.0;
@@ -231,7 +231,7 @@ Innovation RadarChannel::innovation(Time stamp, const VelocityPrior& prior, cons
 void RadarChannel::judge(const RadarScan& scan, const VelocityPrior& prior, double scale,
                          RadarAnswer& answer) const {
   const EgoVelocity& measured = answer.ego_velocity;
-  // Where few points agree, they may be those that side with a wrong prediction. The scan is asked again
+  // If few points agree, they may be those that side with a wrong prediction. The velocity is measured again
   // without it.
   const EgoVelocity alone = hasMajority(measured) ? measured : measure(scan, std::nullopt, scale);
   if (!hasMajority(alone)) return;

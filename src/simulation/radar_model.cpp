@@ -248,8 +248,8 @@ class Sensor {
   // Into [-span / 2, span / 2).
   static double wrapped(double value, double span) { return value - span * std::floor(value / span + 0.5); }
 
-  // Of a flat radar: a row of antennas measures range and the angle between the row and the point, whatever
-  // its elevation, and takes the point to be in its plane.
+  // The point as a flat radar reports it. A row of antennas measures range and the angle between the row and
+  // the point. It does not see the elevation and takes the point to be in its plane.
   static Eigen::Vector3d flattened(const Eigen::Vector3d& p_R) {
     return {p_R.x(), std::hypot(p_R.y(), p_R.z()), 0.0};
   }

@@ -1,9 +1,5 @@
 /// Errors of trajectories, and of a time offset, against the truth. Figures agree with evo's.
-#include <algorithm>
-#include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <exception>
 #include <fstream>
 #include <iomanip>
 #include <iostream>
@@ -12,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "../ros/bag/command_line.h"
 #include "rio_t/evaluation/errors.h"
 #include "rio_t/evaluation/offset_error.h"
 
@@ -19,26 +16,17 @@ namespace {
 
 using namespace rio_t;
 
-constexpr const char* kUsage =
-    R"(usage: rosrun rio_t evaluate GROUND_TRUTH.txt ESTIMATE.txt... [options]
-       rosrun rio_t evaluate --time-offset FILE.csv --true-offset SECONDS [options]
-
-Errors of estimated trajectories (TUM format: stamp x y z qx qy qz qw) with the definitions of evo:
-  APE   distance and angle to the truth, aligned at the first pose (origin), or by least squares over yaw and
-        position, or over rotation and position (SE3, no scale)
-  RPE   error of the motion over 1 m of the estimate's path and over 1 s; the rmse over 1 m are t_rel and r_rel
-  drift error of the last pose, aligned at the first, per metre of the truth's path
-
-  --max-difference S   largest difference of the stamps of two poses that are compared [s]; default 0.01, as evo
-  --time-offset FILE   estimates of the radar's time offset, a table with columns stamp,offset_s,sigma_s
-  --true-offset S      their constant truth [s]
-  --skip S             leave out the first S seconds of the offsets (convergence); default 0
-  --errors FILE        write the error of every matched pose (origin aligned) of the one estimate as a table
-  --yaml               for machines
-  --help               this text
-
-Exit status: 0, or 1 with one line on stderr.
-)";
+const ProgramText kText = {
+    "evaluate",
+    "GROUND_TRUTH.txt ESTIMATE.txt... [options]\n"
+    "--time-offset FILE.csv --true-offset SECONDS [options]\n",
+    "Shows the errors of estimated trajectories (TUM format: stamp x y z qx qy qz qw) with the definitions of evo.",
+    "rosrun rio_t evaluate truth.txt out/trajectory.txt\n"
+    "rosrun rio_t evaluate --time-offset out/time_offset.csv --true-offset 0.03 --skip 20\n",
+    "APE   distance and angle to the truth. The first poses are aligned (origin), or all poses by least squares\n"
+    "      over yaw and position, or over rotation and position (SE3, no scale).\n"
+    "RPE   error of the motion over 1 m of the estimate's path and over 1 s. The rmse over 1 m is t_rel, r_rel.\n"
+    "drift error of the last pose, with the first poses aligned, per metre of the truth's path.\n"};
 
 struct Arguments {
   std::vector<std::string> trajectories;  ///< truth first
@@ -48,8 +36,36 @@ struct Arguments {
   double skip = 0.0;
   double max_difference = kDefaultMaxDifference;
   bool yaml = false;
-  bool help = false;
 };
+
+void addOptions(OptionSet& options, Arguments& a) {
+  options.values("trajectory", "FILE", "the true trajectory, then the estimates; `--trajectory` may be left out",
+                 [&a](const std::string& file) { a.trajectories.push_back(file); });
+  options.positional("trajectory");
+  options.number("max-difference", "S",
+                 "largest difference of the stamps of two poses that are compared [s]; the default is that of evo",
+                 a.max_difference, NumberRange::kNotNegative);
+  options.text("errors", "FILE", "the error of every matched pose of the one estimate goes there (first poses aligned)",
+               a.errors_file);
+  options.text("time-offset", "FILE", "estimates of the radar's time offset: columns stamp,offset_s,sigma_s",
+               a.time_offset);
+  options.value("true-offset", "S", "their constant truth [s]", "",
+                [&a](const std::string& text) { a.true_offset = parseNumber(text); });
+  options.number("skip", "S", "leaves out the first S seconds of the offsets (convergence)", a.skip,
+                 NumberRange::kNotNegative);
+  options.flag("yaml", "prints YAML for programs", a.yaml);
+}
+
+void check(const Arguments& arguments) {
+  if (arguments.time_offset.empty() == arguments.true_offset.has_value())
+    throw UsageError("--time-offset and --true-offset go together");
+  if (!arguments.errors_file.empty() && arguments.trajectories.size() != 2)
+    throw UsageError("--errors goes with exactly one estimate");
+  if (arguments.trajectories.size() == 1)
+    throw UsageError("only one trajectory given, expected GROUND_TRUTH ESTIMATE...");
+  if (arguments.trajectories.empty() && arguments.time_offset.empty())
+    throw UsageError("nothing to evaluate, expected GROUND_TRUTH ESTIMATE...");
+}
 
 /// What one estimate is reported with; alignments that its shape does not allow are left out.
 struct Evaluation {
@@ -62,61 +78,6 @@ struct Evaluation {
   RelativeError second;
   Drift drift;
 };
-
-Arguments parse(int argc, char** argv) {
-  Arguments arguments;
-  const std::vector<std::string> words(argv + 1, argv + argc);
-  for (std::size_t i = 0; i < words.size(); ++i) {
-    const std::string& word = words[i];
-    const auto value = [&words, &i, &word]() -> std::string {
-      if (i + 1 >= words.size()) throw std::invalid_argument(word + " needs a value; see --help");
-      return words[++i];
-    };
-    const auto seconds = [&value, &word](double least) {
-      const std::string text = value();
-      char* end = nullptr;
-      const double number = std::strtod(text.c_str(), &end);
-      if (end == text.c_str() || *end != '\0' || !std::isfinite(number) || number < least) {
-        throw std::invalid_argument(word + " is '" + text + "', expected seconds" +
-                                    (least == 0.0 ? ", zero or more" : ""));
-      }
-      return number;
-    };
-    if (word == "--help" || word == "-h") {
-      arguments.help = true;
-    } else if (word == "--yaml") {
-      arguments.yaml = true;
-    } else if (word == "--max-difference") {
-      arguments.max_difference = seconds(0.0);
-    } else if (word == "--skip") {
-      arguments.skip = seconds(0.0);
-    } else if (word == "--errors") {
-      arguments.errors_file = value();
-    } else if (word == "--time-offset") {
-      arguments.time_offset = value();
-    } else if (word == "--true-offset") {
-      arguments.true_offset = seconds(-1e9);
-    } else if (word.size() > 1 && word[0] == '-') {
-      throw std::invalid_argument("unknown option " + word + "; see --help");
-    } else {
-      arguments.trajectories.push_back(word);
-    }
-  }
-  if (arguments.help) return arguments;
-  if (arguments.time_offset.empty() == arguments.true_offset.has_value()) {
-    throw std::invalid_argument("--time-offset and --true-offset go together; see --help");
-  }
-  if (!arguments.errors_file.empty() && arguments.trajectories.size() != 2) {
-    throw std::invalid_argument("--errors goes with exactly one estimate; see --help");
-  }
-  if (arguments.trajectories.size() == 1) {
-    throw std::invalid_argument("only one trajectory given, expected GROUND_TRUTH ESTIMATE...; see --help");
-  }
-  if (arguments.trajectories.empty() && arguments.time_offset.empty()) {
-    throw std::invalid_argument("nothing to evaluate, expected GROUND_TRUTH ESTIMATE...; see --help");
-  }
-  return arguments;
-}
 
 Evaluation evaluate(const Trajectory& truth, const std::string& truth_file, const Trajectory& estimate,
                     const std::string& file, double max_difference) {
@@ -298,16 +259,12 @@ void run(const Arguments& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  try {
-    const Arguments arguments = parse(argc, argv);
-    if (arguments.help) {
-      std::cout << kUsage;
-    } else {
-      run(arguments);
-    }
-    return EXIT_SUCCESS;
-  } catch (const std::exception& error) {
-    std::cerr << "evaluate: " << error.what() << '\n';
-    return EXIT_FAILURE;
-  }
+  Arguments arguments;
+  OptionSet options("Options");
+  addOptions(options, arguments);
+  return runProgram(kText, options, {argv + 1, argv + argc}, std::cout, std::cerr, [&] {
+    check(arguments);
+    run(arguments);
+    return kExitOk;
+  });
 }

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "option_list.h"
+#include "../ros/bag/command_line.h"
 #include "rio_t/evaluation/trajectory.h"
 #include "rio_t/ros/bag/simulation_bag.h"
 #include "rio_t/simulation/motions.h"
@@ -38,7 +38,7 @@ struct Request {
   SplineFitOptions fit;
   SimulationOptions simulation;
   SimulationBagOptions bag;
-  std::map<std::string, std::vector<OptionList::Given>> radars;  // what --radar gives, by name
+  std::map<std::string, OptionSet::Given> radars;  // what --radar gives, by name
 };
 
 struct RadarRequest {
@@ -46,14 +46,10 @@ struct RadarRequest {
   std::optional<double> fov_elevation = std::nullopt;
 };
 
-bool isGiven(const std::vector<OptionList::Given>& given, const std::string& name) {
-  return std::any_of(given.begin(), given.end(), [&](const OptionList::Given& g) { return g.name == name; });
-}
-
 RadarModelOptions::Interval parseInterval(const std::string& text) {
   const std::vector<double> n = parseNumbers(text, 2);
   if (n[0] < 0.0 || n[1] <= 0.0) {
-    throw std::invalid_argument("'" + text + "' must be a start from 0 and a positive duration");
+    throw UsageError("'" + text + "' must be a start from 0 and a positive duration");
   }
   return {n[0], n[1]};
 }
@@ -67,11 +63,10 @@ void apply(Request& request, const Preset& preset) {
   request.simulation = preset.options;
 }
 
-void addGeneralOptions(OptionList& options, Request& r) {
-  options.section("What moves, and where it goes");
-  options.add("preset", "NAME",
+void addGeneralOptions(OptionSet& options, Request& r) {
+  options.value("preset", "NAME",
               "a platform with its motion, sensors and mounting (see below); the other options change it",
-              "none", [&r](const std::string& v) { apply(r, presetOf(v)); });
+              "none", [](const std::string& /*name*/) {});  // setAll() applies it
   options.text("motion", "NAME", "built-in motion (see below)", r.motion);
   options.text("trajectory", "FILE",
                "or the poses of a TUM file (t x y z qx qy qz qw), through which a spline is put",
@@ -79,225 +74,186 @@ void addGeneralOptions(OptionList& options, Request& r) {
   options.text("out", "BAG", "bag to write", r.out);
   options.text("ground-truth", "FILE", "also write the truth as a TUM file", r.ground_truth);
   options.number("ground-truth-file-rate", "HZ", "rate of that file", r.ground_truth_file_rate,
-                 Range::kPositive);
+                 NumberRange::kPositive);
   options.number("ground-truth-rate", "HZ", "rate of the truth in the bag", r.bag.ground_truth_rate,
-                 Range::kPositive);
-  options.add("seed", "N", "seed of everything random: same options and seed, same bytes", "0",
+                 NumberRange::kPositive);
+  options.value("seed", "N", "seed of everything random: same options and seed, same bytes", "0",
               [&r](const std::string& v) { r.simulation.seed = parseSeed(v); });
-  options.add("format", "FORMAT", "irs | ti_mmwave: topics, fields, axes and stamps of the bag", "irs",
+  options.value("format", "FORMAT", "irs | ti_mmwave: topics, fields, axes and stamps of the bag", "irs",
               [&r](const std::string& v) {
                 if (v != "irs" && v != "ti_mmwave")
-                  throw std::invalid_argument("'" + v + "' is not one of irs, ti_mmwave");
+                  throw UsageError("'" + v + "' is not one of irs, ti_mmwave");
                 r.bag.format = v == "irs" ? BagFormat::kIrs : BagFormat::kTiMmwave;
               });
   options.number("duration", "S",
                  "length of the bag with rest; 0 = the motion's own (with --trajectory: of the file)",
-                 r.duration, Range::kNotNegative);
-  options.add("speed", "M/S", "speed of the motions constant_speed and walk; the others have their own",
-              "1; walk 1.3", [&r](const std::string& v) { r.speed = parseNumber(v, Range::kPositive); });
+                 r.duration, NumberRange::kNotNegative);
+  options.value("speed", "M/S", "speed of the motions constant_speed and walk; the others have their own",
+              "1; walk 1.3", [&r](const std::string& v) { r.speed = parseNumber(v, NumberRange::kPositive); });
   options.number("static-start", "S", "rest at the start; 0 = starts in motion", r.rest.static_start,
-                 Range::kNotNegative);
+                 NumberRange::kNotNegative);
   options.number("static-end", "S", "rest at the end; 0 = ends in motion", r.rest.static_end,
-                 Range::kNotNegative);
-  options.number("ramp", "S", "from rest to full speed and back", r.rest.ramp, Range::kPositive);
+                 NumberRange::kNotNegative);
+  options.number("ramp", "S", "from rest to full speed and back", r.rest.ramp, NumberRange::kPositive);
   options.number("smoothing", "HZ",
                  "with --trajectory: faster motion than this is taken for noise of the poses", r.fit.cutoff,
-                 Range::kPositive);
-  options.number("start-time", "S", "stamp of the first IMU sample", r.start_time, Range::kPositive);
+                 NumberRange::kPositive);
+  options.number("start-time", "S", "stamp of the first IMU sample", r.start_time, NumberRange::kPositive);
   options.number("record-offset", "S", "clock of the recorder minus clock of the IMU", r.bag.record_offset);
-  options.number("gravity", "M/S^2", "magnitude", r.simulation.imu.gravity, Range::kPositive);
+  options.number("gravity", "M/S^2", "magnitude", r.simulation.imu.gravity, NumberRange::kPositive);
   options.flag("noise-free",
                "no noise, vibration, bias, quantisation, ghosts, moving objects or lost scans (blackouts, "
                "ghost bursts, Doppler span and flat radars stay)",
                r.noise_free);
 }
 
-void addImuOptions(OptionList& options, ImuModelOptions& imu) {
+void addImuOptions(OptionSet& options, ImuModelOptions& imu) {
   options.section("IMU");
-  options.number("imu-rate", "HZ", "rate", imu.rate, Range::kPositive);
+  options.number("imu-rate", "HZ", "rate", imu.rate, NumberRange::kPositive);
   options.number("accel-noise", "M/S^2/RTHZ", "density of the noise", imu.noise.accel_density,
-                 Range::kNotNegative);
+                 NumberRange::kNotNegative);
   options.number("gyro-noise", "RAD/S/RTHZ", "density of the noise", imu.noise.gyro_density,
-                 Range::kNotNegative);
+                 NumberRange::kNotNegative);
   options.number("accel-random-walk", "M/S^3/RTHZ", "of the bias", imu.noise.accel_random_walk,
-                 Range::kNotNegative);
+                 NumberRange::kNotNegative);
   options.number("gyro-random-walk", "RAD/S^2/RTHZ", "of the bias", imu.noise.gyro_random_walk,
-                 Range::kNotNegative);
-  options.add("accel-bias", "X,Y,Z", "bias at the start [m/s^2]", "random", [&imu](const std::string& v) {
+                 NumberRange::kNotNegative);
+  options.value("accel-bias", "X,Y,Z", "bias at the start [m/s^2]", "random", [&imu](const std::string& v) {
     const std::vector<double> n = parseNumbers(v, 3);
     imu.accel_bias = Eigen::Vector3d(n[0], n[1], n[2]);
   });
-  options.add("gyro-bias", "X,Y,Z", "bias at the start [rad/s]", "random", [&imu](const std::string& v) {
+  options.value("gyro-bias", "X,Y,Z", "bias at the start [rad/s]", "random", [&imu](const std::string& v) {
     const std::vector<double> n = parseNumbers(v, 3);
     imu.gyro_bias = Eigen::Vector3d(n[0], n[1], n[2]);
   });
   options.number("accel-bias-sigma", "M/S^2", "of the random bias", imu.accel_bias_sigma,
-                 Range::kNotNegative);
-  options.number("gyro-bias-sigma", "RAD/S", "of the random bias", imu.gyro_bias_sigma, Range::kNotNegative);
+                 NumberRange::kNotNegative);
+  options.number("gyro-bias-sigma", "RAD/S", "of the random bias", imu.gyro_bias_sigma, NumberRange::kNotNegative);
   options.number(
       "vibration", "M/S^2",
       "sigma of what a vibrating frame adds to each axis and sample of the accelerometer, at rest too",
-      imu.accel_vibration, Range::kNotNegative);
+      imu.accel_vibration, NumberRange::kNotNegative);
   options.number("vibration-gyro", "RAD/S", "sigma of what it adds to the gyro", imu.gyro_vibration,
-                 Range::kNotNegative);
+                 NumberRange::kNotNegative);
   options.number("vibration-frequency", "HZ",
                  "the vibration is a narrow band there and aliases above half the IMU rate; 0 = it is white",
-                 imu.vibration_frequency, Range::kNotNegative);
+                 imu.vibration_frequency, NumberRange::kNotNegative);
   options.number("accel-saturation", "M/S^2", "largest reading of an axis", imu.accel_saturation,
-                 Range::kPositive);
+                 NumberRange::kPositive);
   options.number("gyro-saturation", "RAD/S", "largest reading of an axis", imu.gyro_saturation,
-                 Range::kPositive);
+                 NumberRange::kPositive);
 }
 
 // What --radar takes, too.
-void addRadarOptions(OptionList& options, RadarRequest& r) {
+void addRadarOptions(OptionSet& options, RadarRequest& r) {
   RadarModelOptions& radar = r.setup.radar;
   TimeOffsetProfile& offset = r.setup.time_offset;
 
   options.section("Time offset t_O: a scan stamped s was measured at s - t_O");
   options.number("time-offset", "S", "constant part", offset.constant);
   options.number("time-offset-drift", "S/S", "growth, from the start of the bag", offset.drift);
-  options
-      .add("time-offset-step", "S,S",
-           "TIME,CHANGE: from TIME after the start on the offset is CHANGE more; may be repeated", "none",
-           [&offset](const std::string& v) {
-             const std::vector<double> n = parseNumbers(v, 2);
-             offset.steps.push_back({n[0], n[1]});
-           })
-      .repeatable = true;
+  options.values("time-offset-step", "S,S",
+                 "TIME,CHANGE: from TIME after the start on the offset is CHANGE more; may be repeated",
+                 [&offset](const std::string& v) {
+                   const std::vector<double> n = parseNumbers(v, 2);
+                   offset.steps.push_back({n[0], n[1]});
+                 });
 
   options.section("Radar");
-  options.add("lever-arm", "X,Y,Z", "radar origin in the IMU frame [m] (T_IR)", "0.03,0.03,-0.06",
-              [&r](const std::string& v) {
-                const std::vector<double> n = parseNumbers(v, 3);
-                r.setup.T_IR.l_I = {n[0], n[1], n[2]};
-              });
-  options.add("q-ir", "W,X,Y,Z", "rotation that turns radar axes (right, forward, up) into the IMU's (T_IR)",
-              "0.00524,0.69946,0.71461,0.00723", [&r](const std::string& v) {
-                const std::vector<double> n = parseNumbers(v, 4);
-                const Eigen::Quaterniond q(n[0], n[1], n[2], n[3]);
-                if (std::abs(q.norm() - 1.0) > 0.01)
-                  throw std::invalid_argument("'" + v + "' is not a unit quaternion");
-                r.setup.T_IR.q_IR = q.normalized();
-              });
-  options.number("radar-rate", "HZ", "scans a second", radar.rate, Range::kPositive);
+  options.value("extrinsics-translation", "X,Y,Z", "radar origin in the IMU frame [m] (T_IR)", "0.03,0.03,-0.06",
+                [&r](const std::string& v) {
+                  const std::vector<double> n = parseNumbers(v, 3);
+                  r.setup.T_IR.l_I = {n[0], n[1], n[2]};
+                });
+  options.value("extrinsics-rotation-xyzw", "X,Y,Z,W",
+                "rotation that turns radar axes (right, forward, up) into the IMU's (T_IR)",
+                "0.69946,0.71461,0.00723,0.00524", [&r](const std::string& v) {
+                  const std::vector<double> n = parseNumbers(v, 4);
+                  const Eigen::Quaterniond q(n[3], n[0], n[1], n[2]);
+                  if (std::abs(q.norm() - 1.0) > 0.01) throw UsageError("'" + v + "' is not a unit quaternion");
+                  r.setup.T_IR.q_IR = q.normalized();
+                });
+  options.number("radar-rate", "HZ", "scans a second", radar.rate, NumberRange::kPositive);
   options.number("first-trigger", "S", "of the first scan, from the start of the bag", radar.first_trigger,
-                 Range::kNotNegative);
+                 NumberRange::kNotNegative);
   options.number("frame-length", "S",
                  "Doppler is the mean over it, centred at the measurement; 0 = an instant",
-                 radar.frame_length, Range::kNotNegative);
+                 radar.frame_length, NumberRange::kNotNegative);
   options.number("latency", "S", "from stamp to arrival (record time) of a scan", radar.latency,
-                 Range::kNotNegative);
-  options.number("latency-sigma", "S", "scatter of it", radar.latency_sigma, Range::kNotNegative);
-  options.number("points", "N", "mean number of points a scan", radar.points_mean, Range::kPositive);
-  options.number("points-sigma", "N", "scatter of it", radar.points_sigma, Range::kNotNegative);
+                 NumberRange::kNotNegative);
+  options.number("latency-sigma", "S", "scatter of it", radar.latency_sigma, NumberRange::kNotNegative);
+  options.number("points", "N", "mean number of points a scan", radar.points_mean, NumberRange::kPositive);
+  options.number("points-sigma", "N", "scatter of it", radar.points_sigma, NumberRange::kNotNegative);
   options.count("points-min", "fewest of it; 0 gives empty scans where mean and scatter do", radar.points_min,
                 0);
   options.count("points-max", "limit of it", radar.points_max);
   options.flag("skip-empty", "scans without points are not published", radar.publish_empty, false);
-  options.number("min-range", "M", "nearest point", radar.min_range, Range::kNotNegative);
-  options.number("max-range", "M", "farthest point", radar.max_range, Range::kPositive);
-  options.number("fov-azimuth", "DEG", "half angle of view", radar.fov_azimuth, Range::kPositive);
-  options.add("fov-elevation", "DEG", "half angle of view",
-              shown(radar.fov_elevation) + "; " + shown(kFlatFovElevation) + " with --no-elevation",
-              [&r](const std::string& v) { r.fov_elevation = parseNumber(v, Range::kPositive); });
+  options.number("min-range", "M", "nearest point", radar.min_range, NumberRange::kNotNegative);
+  options.number("max-range", "M", "farthest point", radar.max_range, NumberRange::kPositive);
+  options.number("fov-azimuth-deg", "DEG", "half angle of view", radar.fov_azimuth, NumberRange::kPositive);
+  options.value("fov-elevation-deg", "DEG", "half angle of view",
+                shownNumber(radar.fov_elevation) + "; " + shownNumber(kFlatFovElevation) + " with --no-elevation",
+                [&r](const std::string& v) { r.fov_elevation = parseNumber(v, NumberRange::kPositive); });
   options.flag("no-elevation",
-               "a flat radar: sees what is within --fov-elevation, reports it in its own plane, z = 0",
+               "a flat radar: sees what is within --fov-elevation-deg, reports it in its own plane, z = 0",
                radar.measures_elevation, false);
-  options.number("range-noise", "M", "sigma", radar.range_noise, Range::kNotNegative);
-  options.number("azimuth-noise", "DEG", "sigma", radar.azimuth_noise, Range::kNotNegative);
-  options.number("elevation-noise", "DEG", "sigma", radar.elevation_noise, Range::kNotNegative);
+  options.number("range-noise", "M", "sigma", radar.range_noise, NumberRange::kNotNegative);
+  options.number("azimuth-noise-deg", "DEG", "sigma", radar.azimuth_noise, NumberRange::kNotNegative);
+  options.number("elevation-noise-deg", "DEG", "sigma", radar.elevation_noise, NumberRange::kNotNegative);
   options.number("doppler-noise", "M/S", "sigma, before quantisation", radar.doppler_noise,
-                 Range::kNotNegative);
-  options.number("doppler-step", "M/S", "quantisation; 0 = none", radar.doppler_step, Range::kNotNegative);
+                 NumberRange::kNotNegative);
+  options.number("doppler-step", "M/S", "quantisation; 0 = none", radar.doppler_step, NumberRange::kNotNegative);
   options.number("doppler-span", "M/S",
                  "whole unambiguous span, a whole number of steps: 3 wraps into [-1.5, 1.5); 0 = unlimited",
-                 radar.doppler_span, Range::kNotNegative);
-  options.number("ghosts", "SHARE", "of the points: anywhere, any Doppler", radar.ghost_share, Range::kShare);
+                 radar.doppler_span, NumberRange::kNotNegative);
+  options.number("ghosts", "SHARE", "of the points: anywhere, any Doppler", radar.ghost_share, NumberRange::kShare);
   options.number("moving", "SHARE", "of the time: persons walk through the view", radar.moving_share,
-                 Range::kShare);
+                 NumberRange::kShare);
   options.count("crowd", "so many persons at once; their points take the place of the room's", radar.crowd);
   options.number("dropouts", "SHARE", "of the scans: triggered, never delivered", radar.dropout_share,
-                 Range::kShare);
-  options
-      .add("blackout", "S,S", "START,DURATION without scans; may be repeated", "none",
-           [&radar](const std::string& v) { radar.blackouts.push_back(parseInterval(v)); })
-      .repeatable = true;
-  options
-      .add("ghost-burst", "S,S", "START,DURATION in which all points are ghosts; may be repeated", "none",
-           [&radar](const std::string& v) { radar.ghost_bursts.push_back(parseInterval(v)); })
-      .repeatable = true;
+                 NumberRange::kShare);
+  options.values("blackout", "S,S", "START,DURATION without scans; may be repeated",
+                 [&radar](const std::string& v) { radar.blackouts.push_back(parseInterval(v)); });
+  options.values("ghost-burst", "S,S", "START,DURATION in which all points are ghosts; may be repeated",
+                 [&radar](const std::string& v) { radar.ghost_bursts.push_back(parseInterval(v)); });
 }
 
-// Of a radar with a name: what its text gives.
-std::pair<std::string, std::vector<OptionList::Given>> parseRadar(const std::string& text) {
-  std::istringstream words(text);
+/// The name of a radar, and the options that its text gives.
+std::pair<std::string, OptionSet::Given> parseRadar(const std::string& text) {
+  std::istringstream in(text);
   std::string name;
-  words >> name;
+  in >> name;
+  std::vector<std::string> words;
+  for (std::string word; in >> word;) words.push_back("--" + word);
   RadarRequest checked;
-  OptionList options;
+  OptionSet options("");
   addRadarOptions(options, checked);
-  std::vector<OptionList::Given> given;
-  for (std::string word; words >> word;) {
-    const std::size_t equals = word.find('=');
-    const std::string key = word.substr(0, equals);
-    const OptionList::Option* option = options.find(key);
-    if (option == nullptr) {
-      std::string known;
-      for (const std::string& other : options.names()) known += (known.empty() ? "" : ", ") + other;
-      throw std::invalid_argument(name + ": unknown key '" + key + "'; known are " + known);
-    }
-    const bool has_value = equals != std::string::npos;
-    if (has_value && option->argument.empty()) {
-      throw std::invalid_argument(name + ": " + key + " takes no value");
-    }
-    if (!has_value && !option->argument.empty()) {
-      throw std::invalid_argument(name + ": a value is missing (" + key + "=" + option->argument + ")");
-    }
-    if (!option->repeatable && isGiven(given, key)) {
-      throw std::invalid_argument(name + ": " + key + " is given twice");
-    }
-    given.push_back({key, has_value ? word.substr(equals + 1) : ""});
-    try {
-      options.set(given.back());
-    } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(name + ": " + error.what());
-    }
+  try {
+    const OptionSet::Given given = options.parse(words);
+    options.set({given});
+    return {name, given};
+  } catch (const UsageError& error) {
+    throw UsageError(name + ": " + error.what());
   }
-  return {name, given};
 }
 
-void addNamedRadars(OptionList& options, Request& r) {
-  options.section(
-      "Several radars. KEY is an option of the two sections below, without dashes; a flag stands alone.\n"
-      "What a radar leaves out comes from the options outside. Each has its own reflectors, persons and\n"
-      "ghosts. --preset kart_pair has left and right: --radar changes one of them, or adds another.\n"
-      "Topics, irs:       /sensor_platform/radar_NAME/scan, /sensor_platform/radar_NAME/trigger\n"
-      "Topics, ti_mmwave: /ti_mmwave/radar_scan_pcl_NAME, /sensor_platform/radar_NAME/trigger");
-  options
-      .add("radar", "TEXT",
-           "\"NAME KEY=VALUE ...\", NAME of a-z, 0-9, _: a radar, in the place of the nameless; may be "
-           "repeated",
-           "none",
-           [&r](const std::string& v) {
-             const auto [name, given] = parseRadar(v);
-             if (!r.radars.emplace(name, given).second) {
-               throw std::invalid_argument("there are two radars of the name '" + name + "'");
-             }
-           })
-      .repeatable = true;
+void addNamedRadars(OptionSet& options, Request& r) {
+  options.section("Several radars");
+  options.values("radar", "TEXT",
+                 "\"NAME KEY=VALUE ...\", NAME of a-z, 0-9, _: a radar, in the place of the nameless; may be repeated",
+                 [&r](const std::string& v) {
+                   const auto [name, given] = parseRadar(v);
+                   if (!r.radars.emplace(name, given).second)
+                     throw UsageError("there are two radars of the name '" + name + "'");
+                 });
 }
 
-// `outside` without what the radar gives itself, then that.
-RadarSetup setupOf(const RadarSetup& preset, const std::vector<OptionList::Given>& outside,
-                   const std::vector<OptionList::Given>& own) {
+/// `preset` with what is given; the first source that gives an option counts.
+RadarSetup setupOf(const RadarSetup& preset, const std::vector<OptionSet::Given>& sources) {
   RadarRequest radar{preset};
-  OptionList options;
+  OptionSet options("");
   addRadarOptions(options, radar);
-  for (const OptionList::Given& given : outside) {
-    if (options.find(given.name) != nullptr && !isGiven(own, given.name)) options.set(given);
-  }
-  for (const OptionList::Given& given : own) options.set(given);
+  options.set(sources);
   if (radar.fov_elevation) {
     radar.setup.radar.fov_elevation = *radar.fov_elevation;
   } else if (!radar.setup.radar.measures_elevation) {
@@ -306,22 +262,26 @@ RadarSetup setupOf(const RadarSetup& preset, const std::vector<OptionList::Given
   return radar.setup;
 }
 
-// Sets all that the command line gives.
-void setAll(const OptionList& options, std::vector<OptionList::Given> given, Request& request) {
-  // A preset says what the others are to change, wherever it stands.
-  std::stable_partition(given.begin(), given.end(),
-                        [](const OptionList::Given& g) { return g.name == "preset"; });
-  try {
-    for (const OptionList::Given& g : given) options.set(g);
-  } catch (const std::invalid_argument& error) {
-    throw std::invalid_argument(std::string("--") + error.what());
+/// Sets all that the command line gives.
+void setAll(const OptionSet& options, const OptionSet::Given& given, Request& request) {
+  // A preset says what the others are to change, so it comes first.
+  if (const std::optional<std::string> preset = valueOf(given, "preset")) {
+    try {
+      apply(request, presetOf(*preset));
+    } catch (const std::invalid_argument& error) {
+      throw UsageError(std::string("--preset: ") + error.what());
+    }
   }
+  options.set({given});
   SimulationOptions& simulation = request.simulation;
   RadarSetup& one = simulation;
   const RadarSetup common = one;
-  one = setupOf(common, given, {});
+  one = setupOf(common, {given});
   for (const auto& [name, own] : request.radars) simulation.radars.emplace(name, common);
-  for (auto& [name, setup] : simulation.radars) setup = setupOf(setup, given, request.radars[name]);
+  for (auto& [name, setup] : simulation.radars) {
+    const auto own = request.radars.find(name);
+    setup = own == request.radars.end() ? setupOf(setup, {given}) : setupOf(setup, {own->second, given});
+  }
   if (request.noise_free) {
     simulation.imu.removeErrors();
     simulation.radar.removeErrors();
@@ -329,24 +289,30 @@ void setAll(const OptionList& options, std::vector<OptionList::Given> given, Req
   }
 }
 
-void printHelp(const OptionList& options) {
-  std::cout
-      << "Writes a bag of a simulated IMU and radar whose motion and time offset are known.\n\n"
-         "usage: simulate (--motion NAME | --trajectory FILE.txt | --preset NAME) --out FILE.bag [options]\n"
-         "example: rosrun rio_t simulate --motion difficult --time-offset 0.03 --seed 1 --out sim.bag\n"
-         "\nDefaults are in brackets. Noise is that of an ADIS16448 and a TI IWR6843AOP, measured on a "
-         "real bag.\n";
-  options.print(std::cout);
-  std::cout << "\nMotions (duration with rest)\n";
+ProgramText programText() {
+  std::ostringstream notes;
+  notes << "Defaults are in brackets. Noise is that of an ADIS16448 and a TI IWR6843AOP, measured on a real bag. "
+           "Angles are\nin radians, unless the name of the option says deg.\n"
+           "\n--radar: KEY is an option of the two sections on time offset and radar, without dashes; a flag stands "
+           "alone.\nWhat a radar leaves out comes from the options outside. Each has its own reflectors, persons and "
+           "ghosts.\n--preset kart_pair has left and right: --radar changes one of them, or adds another.\n"
+           "Topics, irs:       /sensor_platform/radar_NAME/scan, /sensor_platform/radar_NAME/trigger\n"
+           "Topics, ti_mmwave: /ti_mmwave/radar_scan_pcl_NAME, /sensor_platform/radar_NAME/trigger\n"
+           "\nMotions (duration with rest)\n";
   for (const MotionDescription& motion : builtInMotions()) {
-    std::cout << "  " << std::left << std::setw(18) << motion.name << motion.summary << " ("
-              << motion.default_duration << " s)\n";
+    notes << "  " << std::left << std::setw(18) << motion.name << motion.summary << " (" << motion.default_duration
+          << " s)\n";
   }
-  std::cout << "\nPresets (motion)\n";
+  notes << "\nPresets (motion)\n";
   for (const Preset& preset : presets()) {
-    std::cout << "  " << std::left << std::setw(18) << preset.name << preset.summary << " (" << preset.motion
-              << ")\n";
+    notes << "  " << std::left << std::setw(18) << preset.name << preset.summary << " (" << preset.motion << ")\n";
   }
+  return {"simulate", "(--motion NAME | --trajectory FILE.txt | --preset NAME) --out FILE.bag [options]\n",
+          "Writes a bag of a simulated IMU and radar whose motion and time offset are known.",
+          "rosrun rio_t simulate --motion difficult --time-offset 0.03 --seed 1 --out sim.bag\n"
+          "rosrun rio_t simulate --preset kart --out kart.bag --ground-truth truth.txt\n"
+          "rosrun rio_t simulate --preset kart_pair --radar \"left time-offset=0.03\" --out pair.bag\n",
+          notes.str()};
 }
 
 Motion motionFromFile(const Request& request) {
@@ -362,19 +328,18 @@ Motion motionOf(const Request& request) {
   const bool preset = request.motion.empty() && request.trajectory.empty() && !request.preset.motion.empty();
   const std::string& name = preset ? request.preset.motion : request.motion;
   if (name.empty() == request.trajectory.empty()) {
-    throw std::invalid_argument(
-        "exactly one of --motion and --trajectory is needed, or a --preset (see --help)");
+    throw UsageError("exactly one of --motion and --trajectory is needed, or a --preset");
   }
-  if (request.out.empty()) throw std::invalid_argument("--out: the bag to write is not given (see --help)");
+  if (request.out.empty()) throw UsageError("--out: the bag to write is not given");
   if (!request.trajectory.empty()) {
     if (request.speed) {
-      throw std::invalid_argument(
+      throw UsageError(
           "--speed: only the motions constant_speed and walk can be given one, a trajectory has its own");
     }
     try {
       return motionFromFile(request);
     } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument("--trajectory " + request.trajectory + ": " + error.what());
+      throw UsageError("--trajectory " + request.trajectory + ": " + error.what());
     }
   }
   const double duration = preset && request.duration == 0.0 ? request.preset.duration : request.duration;
@@ -455,26 +420,17 @@ void run(Request request) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  try {
-    Request request;
-    RadarRequest radar;  // for the defaults that --help shows; setAll() sets the radars themselves
-    OptionList options;
-    addGeneralOptions(options, request);
-    addImuOptions(options, request.simulation.imu);
-    addNamedRadars(options, request);
-    addRadarOptions(options, radar);
-    const std::vector<std::string> arguments(argv + 1, argv + argc);
-    for (const std::string& argument : arguments) {
-      if (argument == "--help" || argument == "-h") {
-        printHelp(options);
-        return 0;
-      }
-    }
-    setAll(options, options.read(arguments), request);
-    run(request);
-    return 0;
-  } catch (const std::exception& error) {
-    std::cerr << "simulate: " << error.what() << "\n";
-    return 1;
-  }
+  Request request;
+  RadarRequest radar;  // for the defaults that --help shows; setAll() sets the radars themselves
+  OptionSet options("What moves, and where it goes");
+  addGeneralOptions(options, request);
+  addImuOptions(options, request.simulation.imu);
+  addNamedRadars(options, request);
+  addRadarOptions(options, radar);
+  return runProgramWith(programText(), options, {argv + 1, argv + argc}, std::cout, std::cerr,
+                        [&](const OptionSet::Given& given) {
+                          setAll(options, given, request);
+                          run(request);
+                          return kExitOk;
+                        });
 }

@@ -83,7 +83,7 @@ def simulation_words(text):
 
 
 def join_simulate(words):
-    """So that the value of --simulate may begin with a dash."""
+    """Joins --simulate with its value, which may begin with a dash."""
     joined = []
     for word in words:
         if joined and joined[-1] == "--simulate":
@@ -97,7 +97,7 @@ def make_parser():
     parser = Parser(prog="experiment.sh", description=description,
                     formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("experiment", choices=PLANS, metavar="|".join(PLANS))
-    parser.add_argument("--output", metavar="DIR", type=pathlib.Path, help="where to write (results/EXPERIMENT)")
+    parser.add_argument("--output-dir", metavar="DIR", type=pathlib.Path, help="where to write (results/EXPERIMENT)")
     parser.add_argument("--bag", metavar="BAG", type=pathlib.Path, action="append", default=[],
                         help="run on this bag instead of simulated ones; may be repeated; not for montecarlo "
                              "and consistency")
@@ -150,7 +150,7 @@ def parse(words):
         if key in plan.own_keys:
             raise RioTError(f"--set {setting}: the experiment sets {key} itself")
         options.set_keys.add(key)
-    options.output = options.output or pathlib.Path("results") / options.experiment
+    options.output_dir = options.output_dir or pathlib.Path("results") / options.experiment
     options.seeds = options.seeds or plan.seeds
     options.motion = list(dict.fromkeys(options.motion or plan.motions))
     options.offsets = list(dict.fromkeys(1e3 * s for s in options.time_offset) if options.time_offset else plan.offsets)

@@ -52,9 +52,9 @@ def own_words(words):
 def run(options, words):
     folder = programs.find(("rio_t_bag", "simulate"), "--programs DIR", options.programs)
     sources = sources_of(options)
-    options.output.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".runs_", dir=options.output) as scratch:
+    options.output_dir.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".runs_", dir=options.output_dir) as scratch:
         lab = Laboratory(folder, pathlib.Path(scratch), options)
         page = EXPERIMENTS[options.experiment](lab, sources, options)
     page.notes = describe(options) + page.notes
-    page.write(options.output, options.experiment, own_words(words))
+    page.write(options.output_dir, options.experiment, own_words(words))

@@ -76,7 +76,7 @@ def ensure_usual(folder, bag, settings, output):
         return
     own = pathlib.Path(tempfile.mkdtemp(prefix="usual_", dir=output.parent))
     status, errors = run_pipeline(folder, bag.path, bag.config, bag.settings + settings, own)
-    if status != 0:
+    if status not in programs.HAS_RESULT:
         raise RioTError(f"{bag.path} without a fault: {errors.strip()}")
     try:
         own.rename(output)

@@ -4,6 +4,8 @@ import re
 
 import numpy
 
+from .. import programs
+
 RECOVERY = 5.0             # [s] after the end of a fault everything must be as without it
 # Times the velocity error of the fault-free run, plus [m/s]; against the fault-free run itself, from which an estimate
 # with another history differs by the noise of both.
@@ -44,8 +46,8 @@ class Survives:
 
     def judge(self, outcome, begin, end):
         """(what happened, [what of it is wrong])"""
-        if outcome.status != 0:
-            return "exit status %d: %s" % (outcome.status, last_line(outcome.messages)), ["does not run"]
+        if outcome.status not in programs.HAS_RESULT:
+            return "exit status %d: %s" % (outcome.status, first_line(outcome.messages)), ["does not run"]
         wrong, happened = list(common(outcome)), []
         errors = outcome.errors
         if errors is None:
@@ -98,7 +100,7 @@ class Refuses:
         return f"exit status 1, says \"{self.message}\""
 
     def judge(self, outcome, begin, end):
-        line = last_line(outcome.messages)
+        line = first_line(outcome.messages)
         wrong = []
         if outcome.status != 1:
             wrong.append(f"exit status {outcome.status}")
@@ -109,8 +111,8 @@ class Refuses:
 
 @dataclasses.dataclass
 class RefusesOrReports:
-    """Where rest alone cannot tell that the input is wrong: refused, or the divergence that follows is reported and
-    the output says how unsure it is."""
+    """Rest alone cannot tell that the input is wrong: the run is refused, or it reports the divergence that follows and
+    says how uncertain it is."""
     message: str
     counted: str = "diverged"
 
@@ -118,7 +120,7 @@ class RefusesOrReports:
         return f"exit status 1 with \"{self.message}\", or counts {self.counted}"
 
     def judge(self, outcome, begin, end):
-        if outcome.status != 0:
+        if outcome.status not in programs.HAS_RESULT:
             return Refuses(self.message).judge(outcome, begin, end)
         wrong = list(common(outcome))
         count = outcome.counted().get(self.counted, 0)
@@ -127,9 +129,9 @@ class RefusesOrReports:
         return f"{self.counted} {count}", wrong
 
 
-def last_line(text):
-    lines = text.strip().splitlines()
-    return lines[-1] if lines else ""
+def first_line(text):
+    """What went wrong; the likely causes stand below it."""
+    return text.strip().partition("\n")[0]
 
 
 def common(outcome):

@@ -30,7 +30,7 @@ class States:
 
 
 def read_run(folder):
-    """The causal output where it is written with its uncertainty: ten times a second. None if there is none."""
+    """The causal output with its uncertainty, ten times a second. None if there is none."""
     navigation = run_folder.read_navigation(pathlib.Path(folder))
     poses, sigmas = navigation.poses, navigation.sigmas
     if len(poses) == 0:

@@ -45,7 +45,7 @@ def parse(words):
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
                         help="a parameter of every run on a bag, e.g. solver=ceres; may be repeated")
     parser.add_argument("--no-live", action="store_true", help="leave out the cases of the live node")
-    parser.add_argument("--output", metavar="DIR", help="keep bags, runs and table.md here")
+    parser.add_argument("--output-dir", metavar="DIR", help="keep bags, runs and table.md here")
     parser.add_argument("--programs", type=pathlib.Path, help=argparse.SUPPRESS)  # set by faults.sh
     parser.add_argument("--check", action="store_true", help=argparse.SUPPRESS)   # arguments only
     arguments = parser.parse_args(words)
@@ -70,7 +70,7 @@ def run(arguments, bag_cases, live_cases, scratch):
 
     with concurrent.futures.ProcessPoolExecutor(arguments.jobs) as pool:
         tasks = [(case, bag, pool.submit(campaign.run_case, folder, bag, case.name, scratch / bag.name / case.name,
-                                         bool(arguments.output)))
+                                         bool(arguments.output_dir)))
                  for bag in bags for case in bag_cases if bag.name == "given" or bag.name in case.bags]
         for case, bag, task in tasks:
             add(case.name, bag.name, case.must, *task.result())
@@ -84,17 +84,17 @@ def run(arguments, bag_cases, live_cases, scratch):
 
 def run_campaign(arguments, bag_cases, live_cases):
     started = time.monotonic()
-    scratch = pathlib.Path(arguments.output or tempfile.mkdtemp(prefix="rio_t_faults_")).resolve()
+    scratch = pathlib.Path(arguments.output_dir or tempfile.mkdtemp(prefix="rio_t_faults_")).resolve()
     scratch.mkdir(parents=True, exist_ok=True)
     try:
         rows = run(arguments, bag_cases, live_cases, scratch)
         write_table(scratch / "table.md", rows)
     finally:
-        if not arguments.output:
+        if not arguments.output_dir:
             shutil.rmtree(scratch, ignore_errors=True)
     failed = sum(1 for row in rows if row[-1])
     say(f"{len(rows) - failed} of {len(rows)} cases pass, {time.monotonic() - started:.0f} s"
-        + (f"; table in {scratch / 'table.md'}" if arguments.output else ""))
+        + (f"; table in {scratch / 'table.md'}" if arguments.output_dir else ""))
     return 1 if failed else 0
 
 

@@ -42,7 +42,7 @@ class Message:
 
     @property
     def stamp(self):
-        """Of its header [ns]."""
+        """The stamp in its header [ns]."""
         header = self.content if self.kind == "trigger" else self.content.header
         return header.stamp.to_nsec()
 

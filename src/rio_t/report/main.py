@@ -15,6 +15,7 @@ from . import figures
 from .. import programs, run_folder, tum
 from ..errors import RioTError
 from .accuracy import ERRORS, accuracy_rows, offset_rows, run_evaluate
+from .animation import write_animation
 from .motion import extrinsics_in, motion, predicted_ego_velocity, read_extrinsics
 from .page import Page
 
@@ -83,11 +84,46 @@ def read_run(folder, truth_file):
     return Run(origin, estimates, truth, radars, table("biases.csv"))
 
 
+CHECKS = {  # name in summary.yaml: for people
+    "started": "the estimate started",
+    "scans_used_share": "share of the scans after the start that were used",
+    "points_kept_share": "share of the points that the filter kept",
+    "scans_diverged_share": "share of the scans with a diverged estimate",
+    "windows_at_offset_bound_share": "share of the windows with the offset at max_time_offset",
+    "imu_faults_share": "share of the IMU samples with a fault",
+    "healthy_at_end": "the estimate is healthy at the end"}
+VERDICTS = {
+    "good": "This run is good: nothing speaks against it.",
+    "doubtful": "This run is doubtful. Look at what is red, and at the likely causes.",
+    "bad": "This run is bad: do not trust the estimate."}
+
+
+def add_verdict(page, folder):
+    """Whether the run is good: the verdict of rio_t_bag with its numbers, and what to change."""
+    path = folder / "summary.yaml"
+    page.heading("Is this run good?")
+    if not path.is_file():
+        return page.verdict("bad", "The run did not finish.")
+    summary = run_folder.read_yaml(path)
+    verdict = summary.get("verdict")
+    if verdict not in VERDICTS:
+        return page.note("This run is of an older version, which gave no verdict.")
+    page.verdict(verdict, VERDICTS[verdict])
+    page.checks([(CHECKS.get(check["name"], check["name"]), float(check["value"]),
+                  " ".join(f"{bound.replace('_', ' ')} {check[bound]:g}" for bound in ("at_least", "at_most")
+                           if bound in check), check["good"]) for check in summary.get("checks", [])])
+    causes = summary.get("causes") or []
+    if causes:
+        page.note("The most likely causes, and what to change:")
+        page.table([[f"{k}.", cause["text"] + " " + cause["remedy"]] for k, cause in enumerate(causes, 1)])
+    return None
+
+
 def add_summary(page, folder):
     page.heading("Summary")
     if (folder / "summary.yaml").is_file():
         summary = run_folder.read_yaml(folder / "summary.yaml")
-        page.table([[key, value] for key, value in summary.items() if key != "saved"])
+        page.table([[key, value] for key, value in summary.items() if key not in ("saved", "checks", "causes")])
     else:
         page.note("No summary.yaml: the run did not finish.")
 
@@ -210,13 +246,14 @@ def report(arguments):
     program = arguments.evaluate
     if (judge_poses or judge_offset) and not program:
         program = programs.find(["evaluate"], "--evaluate FILE") / "evaluate"
-    folder = arguments.output or arguments.run / "report"
+    folder = arguments.output_dir or arguments.run / "report"
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RioTError(f"{folder}: cannot be made ({error.strerror})") from None
 
     page = Page(folder, f"rio_t: {arguments.run.resolve().name}")
+    add_verdict(page, arguments.run)
     add_summary(page, arguments.run)
     errors = add_accuracy(page, run, program, arguments.max_difference) if judge_poses else []
     for radar in run.radars:
@@ -246,6 +283,10 @@ def report(arguments):
     if run.biases is not None:
         page.heading("Biases of the IMU")
         page.figure("biases", figures.draw_biases(run.biases))
+    if arguments.animation:
+        radar = run.radars[0]
+        write_animation(arguments.animation, run.estimates[-1] if run.estimates else None, radar.offset,
+                        true_offsets.get(radar.name))
     return page.write()
 
 
@@ -275,7 +316,9 @@ def main(words):
                         help="largest difference of the stamps of two poses that are compared [s] (0.01)")
     parser.add_argument("--config", metavar="FILE", type=pathlib.Path,
                         help="configuration of the run, for the radar's mounting")
-    parser.add_argument("--output", metavar="DIR", type=pathlib.Path, help="where to write (RUN_DIR/report)")
+    parser.add_argument("--output-dir", metavar="DIR", type=pathlib.Path, help="where to write (RUN_DIR/report)")
+    parser.add_argument("--animation", metavar="FILE.gif", type=pathlib.Path,
+                        help="also draw path and time offset of the first radar as a moving picture")
     parser.add_argument("--evaluate", metavar="FILE", type=pathlib.Path, help="the program, if it is not found")
     try:
         print(report(parser.parse_args(words)))

@@ -11,6 +11,8 @@ p.note { color: #666; margin: .2rem 0 1rem; } img { width: 100%; height: auto; }
 table { border-collapse: collapse; margin: .5rem 0; font-variant-numeric: tabular-nums; }
 th, td { padding: .25rem .9rem .25rem 0; border-bottom: 1px solid #ddd; text-align: left; vertical-align: top; }
 td.number, th.number { text-align: right; }
+.good { color: #17702f; font-weight: 600; } .doubtful { color: #8a5a00; font-weight: 600; }
+.bad { color: #b01818; font-weight: 600; }
 """
 
 
@@ -47,6 +49,17 @@ class Page:
     def table(self, rows, header=None):
         head = row_html("th", header) if header else ""
         self.parts.append("<table>" + head + "".join(row_html("td", row) for row in rows) + "</table>")
+
+    def verdict(self, kind, text):
+        """A line in the colour of its kind: good, doubtful or bad."""
+        self.parts.append(f'<p class="{kind}">{html.escape(text)}</p>')
+
+    def checks(self, rows):
+        """Rows of what, value, bound, and whether the value is good, which colours it."""
+        cells = "".join(f"<tr><td>{html.escape(what)}</td>"
+                        f'<td class="number {"good" if good else "bad"}">{html.escape(shown(value))}</td>'
+                        f"<td>{html.escape(bound)}</td></tr>" for what, value, bound, good in rows)
+        self.parts.append(f"<table>{row_html('th', ['', 'value', 'expected'])}{cells}</table>")
 
     def figure(self, name, figure):
         path = self.folder / f"{name}.png"

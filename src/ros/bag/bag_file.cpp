@@ -1,7 +1,6 @@
 #include "bag_file.h"
 
 #include <geometry_msgs/PoseStamped.h>
-#include <rosbag/view.h>
 #include <tf2_eigen/tf2_eigen.h>
 
 #include <filesystem>
@@ -9,6 +8,11 @@
 #include "rio_t/ros/messages/conversions.h"
 
 namespace rio_t {
+namespace {
+
+bool everyTopic(const rosbag::ConnectionInfo* /*connection*/) { return true; }
+
+}  // namespace
 
 std::runtime_error bagError(const std::string& bag, const std::string& what) {
   return std::runtime_error("bag " + bag + ": " + what);
@@ -29,8 +33,21 @@ void openBag(const std::string& path, rosbag::Bag* bag) {
   }
 }
 
-std::map<std::string, std::string> topicTypes(const rosbag::Bag& bag) {
-  rosbag::View all(bag);
+Bags::Bags(const std::vector<std::string>& paths) {
+  for (const std::string& path : paths) {
+    name_ += (name_.empty() ? "" : ", ") + path;
+    openBag(path, bags_.emplace_back(std::make_unique<rosbag::Bag>()).get());
+  }
+}
+
+void Bags::addTo(rosbag::View* view, const std::function<bool(const rosbag::ConnectionInfo*)>& query,
+                 const ros::Time& begin, const ros::Time& end) const {
+  for (const auto& bag : bags_) view->addQuery(*bag, query, begin, end);
+}
+
+std::map<std::string, std::string> Bags::typesByTopic() const {
+  rosbag::View all;
+  addTo(&all, everyTopic);
   std::map<std::string, std::string> types;
   for (const rosbag::ConnectionInfo* connection : all.getConnections())
     types[connection->topic] = connection->datatype;
@@ -64,12 +81,12 @@ void checkTopics(const std::string& bag, const std::map<std::string, std::string
   throw bagError(bag, faults);
 }
 
-std::pair<ros::Time, ros::Time> playedSpan(const std::string& path, const rosbag::Bag& bag,
-                                           const Config& config) {
-  rosbag::View all(bag);
+std::pair<ros::Time, ros::Time> playedSpan(const Bags& bags, const Config& config) {
+  rosbag::View all;
+  bags.addTo(&all, everyTopic);
   const double length = (all.getEndTime() - all.getBeginTime()).toSec();
   if (config.bag_start > length) {
-    throw bagError(path, "bag_start (" + std::to_string(config.bag_start) + " s) lies behind its end (" +
+    throw bagError(bags.name(), "bag_start (" + std::to_string(config.bag_start) + " s) is after its end (" +
                              std::to_string(length) + " s)");
   }
   const ros::Time begin = all.getBeginTime() + ros::Duration(config.bag_start);
@@ -77,9 +94,10 @@ std::pair<ros::Time, ros::Time> playedSpan(const std::string& path, const rosbag
   return {begin, to_end ? all.getEndTime() : begin + ros::Duration(config.bag_duration)};
 }
 
-Trajectory readPoses(const rosbag::Bag& bag, const std::string& topic) {
+Trajectory readPoses(const Bags& bags, const std::string& topic) {
   Trajectory truth;
-  rosbag::View view(bag, rosbag::TopicQuery(topic));
+  rosbag::View view;
+  bags.addTo(&view, rosbag::TopicQuery(topic));
   for (const rosbag::MessageInstance& instance : view) {
     const auto message = read<geometry_msgs::PoseStamped>(instance);
     StampedPose pose;

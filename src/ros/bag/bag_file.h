@@ -3,9 +3,12 @@
 #include <ros/time.h>
 #include <rosbag/bag.h>
 #include <rosbag/message_instance.h>
+#include <rosbag/view.h>
 
 #include <boost/shared_ptr.hpp>
+#include <functional>
 #include <map>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -22,8 +25,23 @@ std::runtime_error bagError(const std::string& bag, const std::string& what);
 /// For reading. Throws bagError where that cannot be.
 void openBag(const std::string& path, rosbag::Bag* bag);
 
-/// By topic.
-std::map<std::string, std::string> topicTypes(const rosbag::Bag& bag);
+/// Bags that are played as one, in the order of their record times.
+class Bags {
+ public:
+  /// Opens them. Throws bagError for one that cannot be read.
+  explicit Bags(const std::vector<std::string>& paths);
+
+  /// For messages: "a.bag, b.bag".
+  const std::string& name() const { return name_; }
+  /// Adds what `query` finds to the view.
+  void addTo(rosbag::View* view, const std::function<bool(const rosbag::ConnectionInfo*)>& query,
+             const ros::Time& begin = ros::TIME_MIN, const ros::Time& end = ros::TIME_MAX) const;
+  std::map<std::string, std::string> typesByTopic() const;
+
+ private:
+  std::string name_;
+  std::vector<std::unique_ptr<rosbag::Bag>> bags_;
+};
 
 /// The topic of a configuration key and the type it must have.
 struct Wanted {
@@ -37,11 +55,10 @@ void checkTopics(const std::string& bag, const std::map<std::string, std::string
                  const std::vector<Wanted>& wanted);
 
 /// Begin and end of what is played, by the keys bag_start and bag_duration.
-std::pair<ros::Time, ros::Time> playedSpan(const std::string& path, const rosbag::Bag& bag,
-                                           const Config& config);
+std::pair<ros::Time, ros::Time> playedSpan(const Bags& bags, const Config& config);
 
 /// Poses of a topic of geometry_msgs/PoseStamped, in the order of their stamps.
-Trajectory readPoses(const rosbag::Bag& bag, const std::string& topic);
+Trajectory readPoses(const Bags& bags, const std::string& topic);
 
 template <typename Message>
 boost::shared_ptr<Message> read(const rosbag::MessageInstance& instance) {

@@ -9,7 +9,6 @@
 
 #include <vector>
 
-#include "bag_file.h"
 #include "rio_t/ros/frames/frames.h"
 
 namespace rio_t {
@@ -24,8 +23,9 @@ std::string topicOfBag(const std::string& told, const std::map<std::string, std:
 
 /// The frame_id of the topic's first message; empty if there is none.
 template <typename Message>
-std::string firstFrame(const rosbag::Bag& bag, const std::string& topic) {
-  rosbag::View view(bag, rosbag::TopicQuery(topic));
+std::string firstFrame(const Bags& bags, const std::string& topic) {
+  rosbag::View view;
+  bags.addTo(&view, rosbag::TopicQuery(topic));
   return view.begin() == view.end() ? "" : read<Message>(*view.begin())->header.frame_id;
 }
 
@@ -59,7 +59,7 @@ Config withTopicsOfBag(Config config, const std::map<std::string, std::string>& 
   return config;
 }
 
-Config withExtrinsicsOfBag(Config config, const std::string& path, const rosbag::Bag& bag) {
+Config withExtrinsicsOfBag(Config config, const Bags& bags) {
   std::vector<Config> radars = configsOfRadars(config);
   std::vector<std::string> cloud_frames;
   bool is_wanted = false;
@@ -68,16 +68,17 @@ Config withExtrinsicsOfBag(Config config, const std::string& path, const rosbag:
     is_wanted = is_wanted || wants;
     radar.publish_radar_tf = false;  // nobody publishes here
     cloud_frames.push_back(
-        wants ? cloudFrame(radar, firstFrame<sensor_msgs::PointCloud2>(bag, radar.radar_topic)) : "");
+        wants ? cloudFrame(radar, firstFrame<sensor_msgs::PointCloud2>(bags, radar.radar_topic)) : "");
   }
   if (!is_wanted) return config;
-  const std::string imu_frame = imuFrame(config, firstFrame<sensor_msgs::Imu>(bag, config.imu_topic));
+  const std::string imu_frame = imuFrame(config, firstFrame<sensor_msgs::Imu>(bags, config.imu_topic));
   // The mountings stand still, wherever they are published: all of tf is taken as static, the first of each.
   tf2::BufferCore tf;
   std::string missing;
   std::vector<Extrinsics> T_IR = lookUp(tf, radars, imu_frame, cloud_frames, &missing);
   for (const char* topic : {"/tf_static", "/tf"}) {
-    rosbag::View view(bag, rosbag::TopicQuery(std::vector<std::string>{topic, topic + 1}));
+    rosbag::View view;
+    bags.addTo(&view, rosbag::TopicQuery(std::vector<std::string>{topic, topic + 1}));
     for (const rosbag::MessageInstance& instance : view) {
       if (missing.empty()) break;
       bool is_new = false;
@@ -85,12 +86,12 @@ Config withExtrinsicsOfBag(Config config, const std::string& path, const rosbag:
         if (tf._frameExists(transform.child_frame_id) && tf.canTransform(transform.header.frame_id,
                                                                          transform.child_frame_id, ros::Time(0)))
           continue;
-        is_new = tf.setTransform(transform, path, true) || is_new;
+        is_new = tf.setTransform(transform, bags.name(), true) || is_new;
       }
       if (is_new) T_IR = lookUp(tf, radars, imu_frame, cloud_frames, &missing);
     }
   }
-  if (!missing.empty()) throw bagError(path, missing + "; the bag's tf has: " + tf.allFramesAsString());
+  if (!missing.empty()) throw bagError(bags.name(), missing + "; the bag's tf has: " + tf.allFramesAsString());
   config.odometry.T_IR = T_IR.front();
   for (std::size_t k = 0; k < config.radars.size(); ++k)
     config.radars[k].odometry.T_IR = config.odometry.radars[k].T_IR = T_IR[k];

@@ -1,10 +1,9 @@
 #pragma once
 
-#include <rosbag/bag.h>
-
 #include <map>
 #include <string>
 
+#include "bag_file.h"
 #include "rio_t/ros/parameters/parameters.h"
 
 /// Names that a bag resolves: topics, and frames by its tf.
@@ -15,8 +14,8 @@ namespace rio_t {
 /// too. What the bag does not have stays, as an absolute name.
 Config withTopicsOfBag(Config config, const std::map<std::string, std::string>& types);
 
-/// With T_IR of the radars whose extrinsics_source is tf, from the bag's /tf_static and /tf. Throws bagError
+/// With T_IR of the radars whose extrinsics_source is tf, from the /tf_static and /tf of the bags. Throws bagError
 /// that names the frames and what is missing.
-Config withExtrinsicsOfBag(Config config, const std::string& path, const rosbag::Bag& bag);
+Config withExtrinsicsOfBag(Config config, const Bags& bags);
 
 }  // namespace rio_t

@@ -27,7 +27,7 @@ std::uint64_t quantile(const std::map<std::size_t, std::uint64_t>& scans_by_size
 }  // namespace
 
 BagPlayer::BagPlayer(const Config& config, RunLog* log, BatchOdometry* recorder)
-    : config_(config), odometry_(config.odometry), log_(log), recorder_(recorder) {
+    : config_(config), odometry_(config.odometry), log_(log), recorder_(recorder), evidence_(config) {
   for (const Config& radar : configsOfRadars(config)) radars_.emplace_back(radar);
 }
 
@@ -104,6 +104,21 @@ void BagPlayer::countInput(RunSummary* summary) const {
   };
   for (const Radar& radar : radars_) warn(radar.not_usable);
   warn(imu_not_usable_);
+  summary->diagnosis = diagnosis(*summary);
+}
+
+Diagnosis BagPlayer::diagnosis(const RunSummary& summary) const {
+  RunEvidence evidence = evidence_.evidence(odometry_);
+  evidence.imu_count = imu_count_;
+  for (const auto& [kind, what] : imu_not_usable_) evidence.faults[kind] += what.count;
+  for (std::size_t k = 0; k < radars_.size(); ++k) {
+    RadarEvidence& radar = evidence.radars[k];
+    radar.scans_total = radars_[k].scans_total;
+    // The stamper and the decoder reject before the odometry sees a scan.
+    for (const auto& [reason, count] : summary.radars[k].scans_rejected)
+      if (reason != "before_initialization") radar.scans_rejected[reason] = count;
+  }
+  return diagnose(evidence, config_);
 }
 
 void BagPlayer::addImu(const sensor_msgs::Imu& message, Time record) {
@@ -145,6 +160,7 @@ void BagPlayer::notUsable(const std::string& kind, const std::string& why, NotUs
 
 void BagPlayer::account(ScanResult& result) {
   if (!start_) start_ = odometry_.start();
+  evidence_.add(result);
   if (recorder_ != nullptr) recorder_->addResult(result);
   log_->addResult(result);
 }

@@ -14,6 +14,7 @@
 #include "rio_t/odometry/radar_inertial_odometry.h"
 #include "rio_t/ros/cloud/point_cloud.h"
 #include "rio_t/ros/cloud/stamping.h"
+#include "rio_t/ros/diagnosis/diagnosis.h"
 #include "rio_t/ros/parameters/parameters.h"
 #include "run_log.h"
 
@@ -30,7 +31,7 @@ class BagPlayer {
   void finish();
 
   RunSummary summary() const;
-  /// Sets what was read, what of it never became a scan, and the noise that the scans showed.
+  /// Sets what was read, what of it never became a scan, the noise that the scans showed, and the diagnosis.
   void countInput(RunSummary* summary) const;
   const RadarInertialOdometry& odometry() const { return odometry_; }
   /// Of the first initialisation.
@@ -55,6 +56,7 @@ class BagPlayer {
     NotUsableByKind not_usable;
   };
 
+  Diagnosis diagnosis(const RunSummary& summary) const;
   void addImu(const sensor_msgs::Imu& message, Time record);
   void addCloud(const sensor_msgs::PointCloud2& message, Time record, Radar& radar);
   void feed(std::vector<RadarScan> scans, std::size_t radar);
@@ -68,6 +70,7 @@ class BagPlayer {
   RunLog* log_;
   BatchOdometry* recorder_;
   std::optional<RadarInertialOdometry::Start> start_;
+  EvidenceCollector evidence_;
   std::uint64_t imu_count_ = 0, points_not_finite_ = 0;
   NotUsableByKind imu_not_usable_;
 };

@@ -1,6 +1,5 @@
 #include "rio_t/ros/bag/bag_runner.h"
 
-#include <rosbag/bag.h>
 #include <rosbag/view.h>
 
 #include <chrono>
@@ -62,22 +61,25 @@ void checkOutcome(const std::string& bag, const Config& config, const BagPlayer&
       topics += (topics.empty() ? "" : "; ") + noMessages(radar);
     throw bagError(bag, topics);
   }
-  // Where none of a topic's messages can be used, what was wrong with the first is what is wrong.
+  // If none of a topic's messages can be used, the fault of the first one says it.
   const std::map<std::string, std::uint64_t> rejected = summary.scansRejected();
   if (countOf(rejected, "cloud_not_usable") + countOf(rejected, "stamp_zero") == summary.scansTotal())
     throw bagError(bag, summary.warnings.front());
   if (countOf(summary.input_faults, "imu_not_usable") == summary.imu_count)
     throw bagError(bag, summary.warnings.back());
+  const auto failed = [&](const std::string& what) {
+    return RunFailed(bagError(bag, what).what(), summary.diagnosis);
+  };
   if (!player.odometry().initialized()) {
-    throw bagError(bag, "never initialised, waited for " + player.odometry().waitingFor() + " (" +
-                            std::to_string(summary.imu_count) + " IMU samples, init_duration " +
-                            std::to_string(config.odometry.initialization.duration) + " s)");
+    throw failed("never initialised, waited for " + player.odometry().waitingFor() + " (" +
+                 std::to_string(summary.imu_count) + " IMU samples, init_duration " +
+                 std::to_string(config.odometry.initialization.duration) + " s)");
   }
   if (summary.scansUsed() > 0) return;
   std::string reasons;
   for (const RadarSummary& radar : summary.radars)
     reasons += (reasons.empty() ? "" : "; ") + allRejected(radar);
-  throw bagError(bag, reasons);
+  throw failed(reasons);
 }
 
 /// The topics to read, with the keys that name them.
@@ -116,14 +118,13 @@ TruthErrors errorsAgainst(const Trajectory& truth, const Trajectory& estimate) {
   return errors;
 }
 
-/// One bag with its configuration: what all modes share, and the modes.
+/// The bags with their configuration: what all modes share, and the modes.
 class BagJob {
  public:
-  /// Opens and checks the bag, and makes the output folder.
+  /// Opens and checks the bags, and makes the output folder.
   explicit BagJob(const BagRun& run)
-      : run_(run), files_(runFiles(run.config)), started_(std::chrono::steady_clock::now()) {
-    openBag(run.bag, &bag_);
-    const std::map<std::string, std::string> types = topicTypes(bag_);
+      : run_(run), files_(runFiles(run.config)), bags_(run.bags), started_(std::chrono::steady_clock::now()) {
+    const std::map<std::string, std::string> types = bags_.typesByTopic();
     run_.config = withTopicsOfBag(run.config, types);
     const Config& config = run_.config;
     std::vector<Wanted> wanted = wantedTopics(config);
@@ -131,9 +132,9 @@ class BagJob {
     truth_in_bag_ = config.ground_truth.empty() && types.count(config.ground_truth_topic) != 0;
     if (truth_in_bag_)
       wanted.push_back({"ground_truth_topic", config.ground_truth_topic, "geometry_msgs/PoseStamped"});
-    checkTopics(run.bag, types, wanted);
-    run_.config = withExtrinsicsOfBag(config, run.bag, bag_);
-    std::tie(begin_, end_) = playedSpan(run.bag, bag_, config);
+    checkTopics(bags_.name(), types, wanted);
+    run_.config = withExtrinsicsOfBag(config, bags_);
+    std::tie(begin_, end_) = playedSpan(bags_, config);
     // Before the work, so that a wrong path costs no time.
     if (!config.ground_truth.empty()) truth_ = readTum(config.ground_truth);
     output_ = openOutput("");
@@ -233,7 +234,8 @@ class BagJob {
   void play(BagPlayer& player, const Config& config, double from, double to) {
     const double length = (end_ - begin_).toSec();
     try {
-      rosbag::View view(bag_, rosbag::TopicQuery(topics_), begin_, end_);
+      rosbag::View view;
+      bags_.addTo(&view, rosbag::TopicQuery(topics_), begin_, end_);
       double told = -1.0;
       for (const rosbag::MessageInstance& instance : view) {
         player.play(instance);
@@ -243,9 +245,9 @@ class BagJob {
       }
       player.finish();
     } catch (const std::exception& error) {
-      throw bagError(run_.bag, error.what());
+      throw bagError(bags_.name(), error.what());
     }
-    checkOutcome(run_.bag, config, player);
+    checkOutcome(bags_.name(), config, player);
   }
 
   /// Adds speed and errors, and saves.
@@ -256,7 +258,7 @@ class BagJob {
     summary.realtime_factor = (end_ - begin_).toSec() / took.count();
     const Trajectory trajectory = log.takeTrajectory();
     std::optional<std::runtime_error> truth_error;
-    if (truth_in_bag_ && truth_.empty()) truth_ = readPoses(bag_, run_.config.ground_truth_topic);
+    if (truth_in_bag_ && truth_.empty()) truth_ = readPoses(bags_, run_.config.ground_truth_topic);
     if (truth_in_bag_ || !run_.config.ground_truth.empty()) {
       try {
         summary.truth = errorsAgainst(truth_, trajectory);
@@ -273,7 +275,7 @@ class BagJob {
 
   BagRun run_;  // with the names that the bag resolves
   const RunFiles files_;
-  rosbag::Bag bag_;
+  const Bags bags_;
   std::vector<std::string> topics_;
   ros::Time begin_, end_;
   bool truth_in_bag_ = false;
@@ -284,6 +286,10 @@ class BagJob {
 
 }  // namespace
 
-RunSummary runBag(const BagRun& run) { return BagJob(run).execute(); }
+RunSummary runBag(const BagRun& run) {
+  BagRun with_topics_of_bag = run;
+  with_topics_of_bag.config = withAbsoluteTopics(run.config);
+  return BagJob(with_topics_of_bag).execute();
+}
 
 }  // namespace rio_t

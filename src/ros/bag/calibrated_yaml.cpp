@@ -130,8 +130,8 @@ std::string header(const BagCalibration& calibration, const std::string& name) {
   for (const CalibrationBag& bag : calibration.bags)
     if (!bag.failure.empty()) text += "This one failed and does not count: " + oneLine(bag.path) + "\n";
   text +=
-      "Turns are about the axes of the IMU, from the mounting that was told. What is not observed stays as "
-      "told.\n";
+      "Turns are about the axes of the IMU, from the mounting that was given. What is not observed stays "
+      "as given.\n";
   return commented(text, "");
 }
 

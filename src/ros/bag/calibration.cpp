@@ -73,7 +73,8 @@ BagCalibration calibrateFromBags(const CalibrationRun& run) {
     CalibrationBag& bag = result.bags.emplace_back();
     bag.path = run.bags[i];
     try {
-      RunSummary summary = runBag({bag.path, folders[i], config, run.progress});
+      const auto progress = run.progress ? run.progress(bag.path) : nullptr;
+      RunSummary summary = runBag({{bag.path}, folders[i], config, progress});
       bag.warnings = summary.warnings;
       bag.failure = failureOf(summary);
       if (bag.failure.empty()) summaries.push_back(std::move(summary));

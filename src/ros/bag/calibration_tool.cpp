@@ -1,7 +1,5 @@
 #include <unistd.h>
 
-#include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <fstream>
 #include <ostream>
@@ -16,58 +14,33 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const char* const kHelp =
-    "usage: calibrate --bag BAG [--bag BAG]... --config NAME_OR_PATH --out FILE.yaml\n"
-    "                 [--set key=value]... [--output-dir FOLDER]\n"
-    "\n"
-    "Finds time offset and mounting of every radar from one or more ROS 1 bags; needs no roscore. It solves "
-    "each\n"
-    "bag as a batch, combines the bags, prints a table, and writes a configuration to use next time.\n"
-    "  --bag BAG               bag with IMU and radar; several bags of one rig count together\n"
-    "  --config NAME_OR_PATH   irs, ti_mmwave, ... of the package's config/, or a YAML file. Its offset and\n"
-    "                          mounting are what is told: where the estimate starts, with the sigmas\n"
-    "                          time_offset_sigma, extrinsics_rotation_sigma and "
-    "extrinsics_translation_sigma\n"
-    "  --set key=value         sets a parameter on top of the configuration, e.g. --set "
-    "stamp_source=arrival\n"
-    "                          left/radar_topic=/scan sets it for the radar named left\n"
-    "                          estimate_extrinsics=rotation leaves the lever arm as told; pose, and none, "
-    "which is\n"
-    "                          the default, estimate it, too\n"
-    "                          mode is always batch here\n"
-    "  --out FILE.yaml         gets the configuration: the keys of --config and --set, with what was found\n"
-    "  --output-dir FOLDER     gets a folder for each bag with the files that rio_t_bag writes\n"
-    "  --help                  prints this\n"
-    "\n"
-    "A number is observed if its sigma is at most half of the sigma of what was told. What is not observed "
-    "stays as\n"
-    "told, and the table says what to move. A bag that fails does not count; the others do.\n"
-    "Exit status: 0; 1 if no bag is left or something given is wrong.\n";
+const ProgramText kText = {
+    "calibrate",
+    "BAG... --config NAME_OR_PATH --out FILE.yaml [--set key=value]... [--output-dir FOLDER]\n",
+    "Finds time offset and mounting of every radar from one or more ROS 1 bags of one rig. It solves each bag as\n"
+    "a batch, combines the bags, prints a table, and writes a configuration to use next time. It needs no "
+    "roscore.",
+    "rosrun rio_t calibrate walk.bag --config my.yaml --out calibrated.yaml\n"
+    "rosrun rio_t calibrate walk.bag turns.bag --config my.yaml --out calibrated.yaml --output-dir runs\n"
+    "rosrun rio_t calibrate walk.bag --config my.yaml --out calibrated.yaml --set estimate_extrinsics=rotation\n",
+    "The estimate starts from offset and mounting of the configuration, with the sigmas time_offset_sigma,\n"
+    "extrinsics_rotation_sigma and extrinsics_translation_sigma. estimate_extrinsics: rotation leaves the lever\n"
+    "arm as it is; pose and none, which is the default, estimate it, too. mode is always batch here.\n"
+    "A number is observed if its sigma is at most half of the sigma at the start. A number that is not observed\n"
+    "stays as it was, and the table says what to move. A bag that fails does not count; the others do.\n"};
 
 struct Arguments {
   std::vector<std::string> bags;
   std::string config, out, output_folder;
   ParameterEntries set;
-  bool help = false;
 };
 
-Arguments parse(const std::vector<std::string>& words) {
-  Arguments arguments;
-  for (const GivenOption& option : readOptions(words, {"bag", "config", "out", "output-dir", "set"}, {})) {
-    if (option.name == "help") arguments.help = true;
-    if (option.name == "bag") arguments.bags.push_back(option.value);
-    if (option.name == "config") arguments.config = option.value;
-    if (option.name == "out") arguments.out = option.value;
-    if (option.name == "output-dir") arguments.output_folder = option.value;
-    if (option.name == "set") arguments.set.push_back(parseAssignment(option.value));
-  }
-  if (arguments.help) return arguments;
-  std::string missing;
-  if (arguments.bags.empty()) missing += " --bag";
-  if (arguments.config.empty()) missing += " --config";
-  if (arguments.out.empty()) missing += " --out";
-  if (!missing.empty()) throw std::invalid_argument("missing argument" + missing + " (see --help)");
-  return arguments;
+void addOptions(OptionSet& options, Arguments& a) {
+  addBagOptions(options, a.bags, a.config, a.set);
+  options.text("out", "FILE.yaml", "the configuration goes there: the keys of --config and --set, with what was found",
+               a.out);
+  options.text("output-dir", "FOLDER", "gets a folder for each bag with the files that rio_t_bag writes",
+               a.output_folder);
 }
 
 bool isSameFile(const std::string& a, const std::string& b) {
@@ -132,10 +105,9 @@ void writeFile(const std::string& path, const std::string& text) {
 }
 
 int run(const Arguments& arguments, std::ostream& out, std::ostream& err) {
-  if (arguments.help) {
-    out << kHelp;
-    return 0;
-  }
+  require({{"BAG", !arguments.bags.empty()},
+           {"--config", !arguments.config.empty()},
+           {"--out", !arguments.out.empty()}});
   const std::string config_file = findConfigFile(arguments.config);
   checkFiles(arguments, config_file);
   ParameterEntries entries = readParameterFile(config_file);
@@ -144,7 +116,10 @@ int run(const Arguments& arguments, std::ostream& out, std::ostream& err) {
   checkConfig(config);
 
   const BagCalibration calibration =
-      calibrateFromBags({arguments.bags, arguments.output_folder, config, progressBar()});
+      calibrateFromBags(
+          {arguments.bags, arguments.output_folder, config, [](const std::string& bag) {
+             return progressBar(bag + " ");
+           }});
   for (const CalibrationBag& bag : calibration.bags) {
     for (const std::string& warning : bag.warnings)
       err << "calibrate: warning: bag " << bag.path << ": " << warning << "\n";
@@ -162,12 +137,10 @@ int run(const Arguments& arguments, std::ostream& out, std::ostream& err) {
 }  // namespace
 
 int runCalibrationTool(const std::vector<std::string>& words, std::ostream& out, std::ostream& err) {
-  try {
-    return run(parse(words), out, err);
-  } catch (const std::exception& error) {
-    err << "calibrate: " << error.what() << "\n";
-    return 1;
-  }
+  Arguments arguments;
+  OptionSet options("Options");
+  addOptions(options, arguments);
+  return runProgram(kText, options, words, out, err, [&] { return run(arguments, out, err); });
 }
 
 }  // namespace rio_t

@@ -3,60 +3,277 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstddef>
+#include <chrono>
+#include <cmath>
 #include <cstdio>
-#include <stdexcept>
+#include <locale>
+#include <iterator>
+#include <ostream>
+#include <sstream>
 
 namespace rio_t {
 namespace {
 
-bool contains(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
+namespace po = boost::program_options;
+
+constexpr unsigned kLineLength = 110;
+
+std::string withDefault(const std::string& help, const std::string& shown_default) {
+  return shown_default.empty() ? help : help + " [" + shown_default + "]";
 }
 
-void showProgress(double done) {
-  const int width = 40;
-  const int filled = static_cast<int>(done * width);
-  const std::string bar = std::string(static_cast<std::size_t>(filled), '#') +
-                          std::string(static_cast<std::size_t>(width - filled), ' ');
-  std::fprintf(stderr, "\r[%s] %3d %%", bar.c_str(), static_cast<int>(100.0 * done));
-  if (done >= 1.0) std::fprintf(stderr, "\n");
+/// `set`, with the name of the option in what it throws.
+OptionSet::Setter named(const std::string& name, const OptionSet::Setter& set) {
+  return [name, set](const std::string& value) {
+    try {
+      if (value.empty()) throw UsageError("expected a value, got nothing");
+      set(value);
+    } catch (const std::invalid_argument& error) {
+      const std::string what = error.what();
+      const std::string prefix = "--" + name;
+      throw UsageError(what.rfind(prefix, 0) == 0 ? what : prefix + ": " + what);
+    }
+  };
+}
+
+bool isRemapping(const std::string& word) {
+  return word.rfind("__", 0) == 0 && word.find(":=") != std::string::npos;
+}
+
+void printHelp(const ProgramText& text, const OptionSet& options, std::ostream& out) {
+  out << text.about << "\n\n";
+  std::istringstream usage(text.usage);
+  const char* lead = "usage: ";
+  for (std::string line; std::getline(usage, line); lead = "       ")
+    out << lead << "rosrun rio_t " << text.name << " " << line << "\n";
+  out << "\n";
+  options.print(out);
+  if (!text.notes.empty()) out << "\n" << text.notes;
+  out << "\nExamples:\n";
+  std::istringstream examples(text.examples);
+  for (std::string line; std::getline(examples, line);) out << "  " << line << "\n";
+  out << "\nExit status: 0 if it worked, 1 if data, a file or a parameter was wrong, 2 if the command line was "
+         "wrong,\n3 if there is a result that is not to be trusted.\n";
+}
+
+/// A line of the progress bar: "[####    ]  40 %, 12 s left".
+std::string progressLine(const std::string& label, double done, double elapsed) {
+  constexpr int kWidth = 40;
+  const auto filled = static_cast<std::size_t>(std::clamp(done, 0.0, 1.0) * kWidth);
+  std::ostringstream line;
+  line << label << "[" << std::string(filled, '#') << std::string(kWidth - filled, ' ') << "] "
+       << static_cast<int>(100.0 * done) << " %";
+  if (done >= 1.0) {
+    line << ", took " << std::lround(elapsed) << " s";
+  } else if (done > 0.02) {
+    line << ", " << std::lround(elapsed / done * (1.0 - done)) << " s left";
+  }
+  return line.str();
 }
 
 }  // namespace
 
-std::vector<GivenOption> readOptions(const std::vector<std::string>& words,
-                                     const std::vector<std::string>& with_value,
-                                     const std::vector<std::string>& flags) {
-  std::vector<GivenOption> given;
-  for (std::size_t i = 0; i < words.size(); ++i) {
-    const std::string& word = words[i];
-    if (word.rfind("__", 0) == 0 && word.find(":=") != std::string::npos) continue;  // roslaunch's remappings
-    if (word == "--help" || word == "-h") {
-      given.push_back({"help", ""});
-      return given;
-    }
-    const bool dashed = word.rfind("--", 0) == 0;
-    if (dashed && contains(flags, word.substr(2))) {
-      given.push_back({word.substr(2), ""});
-      continue;
-    }
-    const std::size_t equals = dashed ? word.find('=') : std::string::npos;
-    const std::string name = word.substr(0, equals);
-    if (!dashed || !contains(with_value, name.substr(2)))
-      throw std::invalid_argument("unknown argument " + word + " (see --help)");
-    if (equals == std::string::npos && i + 1 == words.size())
-      throw std::invalid_argument(name + ": expected a value after it (see --help)");
-    const std::string value = equals == std::string::npos ? words[++i] : word.substr(equals + 1);
-    if (value.empty()) throw std::invalid_argument(name + ": expected a value, got nothing (see --help)");
-    given.push_back({name.substr(2), value});
-  }
-  return given;
+std::string shownNumber(double value) {
+  std::ostringstream out;
+  out.precision(10);
+  out << value;
+  return out.str();
 }
 
-std::function<void(double)> progressBar() {
+std::optional<std::string> valueOf(const OptionSet::Given& given, const std::string& name) {
+  for (const po::option& option : given.options)
+    if (option.string_key == name && !option.value.empty()) return option.value.front();
+  return std::nullopt;
+}
+
+double parseNumber(const std::string& text, NumberRange range) {
+  std::istringstream stream(text);
+  stream.imbue(std::locale::classic());
+  double value = 0.0;
+  stream >> value;
+  const bool whole = !stream.fail() && stream.peek() == std::istringstream::traits_type::eof();
+  if (!whole || !std::isfinite(value)) throw UsageError("'" + text + "' is not a number");
+  if (range == NumberRange::kNotNegative && value < 0.0) throw UsageError("'" + text + "' is below 0");
+  if (range == NumberRange::kPositive && value <= 0.0) throw UsageError("'" + text + "' is not above 0");
+  if (range == NumberRange::kShare && (value < 0.0 || value > 1.0))
+    throw UsageError("'" + text + "' is not within 0 and 1");
+  return value;
+}
+
+std::vector<double> parseNumbers(const std::string& text, std::size_t count) {
+  std::vector<double> values;
+  std::istringstream in(text);
+  for (std::string part; std::getline(in, part, ',');) values.push_back(parseNumber(part));
+  if (values.size() != count) {
+    throw UsageError("'" + text + "' is not " + std::to_string(count) + " numbers with commas between them");
+  }
+  return values;
+}
+
+OptionSet::OptionSet(const std::string& title) { section(title); }
+
+void OptionSet::section(const std::string& title) { sections_.emplace_back(title, kLineLength); }
+
+void OptionSet::add(const std::string& name, const po::value_semantic* semantic, const std::string& help) {
+  const boost::shared_ptr<po::option_description> option(
+      new po::option_description(name.c_str(), semantic, help.c_str()));
+  sections_.back().add(option);
+  all_.add(option);
+}
+
+void OptionSet::flag(const std::string& name, const std::string& help, bool& target, bool value) {
+  add(name, po::bool_switch()->notifier([&target, value](bool given) {
+    if (given) target = value;
+  }),
+      help);
+}
+
+void OptionSet::text(const std::string& name, const std::string& argument, const std::string& help,
+                     std::string& target) {
+  value(name, argument, help, "", [&target](const std::string& text) { target = text; });
+}
+
+void OptionSet::number(const std::string& name, const std::string& argument, const std::string& help,
+                       double& target, NumberRange range) {
+  value(name, argument, help, shownNumber(target),
+        [&target, range](const std::string& text) { target = parseNumber(text, range); });
+}
+
+void OptionSet::count(const std::string& name, const std::string& help, int& target, int least) {
+  value(name, "N", help, std::to_string(target), [&target, least](const std::string& text) {
+    const double n = parseNumber(text);
+    if (n < least || n > 100000.0 || n != std::floor(n)) {
+      throw UsageError("'" + text + "' is not a whole number from " + std::to_string(least) + " to 100000");
+    }
+    target = static_cast<int>(n);
+  });
+}
+
+void OptionSet::value(const std::string& name, const std::string& argument, const std::string& help,
+                      const std::string& shown_default, const Setter& set) {
+  add(name, po::value<std::string>()->value_name(argument)->notifier(named(name, set)),
+      withDefault(help, shown_default));
+}
+
+void OptionSet::valueOrNothing(const std::string& name, const std::string& argument, const std::string& help,
+                               const std::string& nothing_means, const Setter& set) {
+  add(name,
+      po::value<std::string>()
+          ->value_name(argument)
+          ->implicit_value(nothing_means)
+          ->notifier(named(name, set)),
+      help);
+}
+
+void OptionSet::values(const std::string& name, const std::string& argument, const std::string& help,
+                       const Setter& set) {
+  using Words = std::vector<std::string>;
+  add(name,
+      po::value<Words>()->value_name(argument)->notifier([set = named(name, set)](const Words& words) {
+        for (const std::string& word : words) set(word);
+      }),
+      help);
+}
+
+OptionSet::Given OptionSet::parse(const std::vector<std::string>& words) const {
+  std::vector<std::string> own;  // without what roslaunch adds
+  std::remove_copy_if(words.begin(), words.end(), std::back_inserter(own), isRemapping);
+  // No guessing: `--out` must not become `--output-dir`.
+  const int style = po::command_line_style::default_style & ~po::command_line_style::allow_guessing;
+  try {
+    return po::command_line_parser(own).options(all_).positional(positional_).style(style).run();
+  } catch (const po::error& error) {
+    throw UsageError(error.what());
+  }
+}
+
+void OptionSet::set(const std::vector<Given>& sources) const {
+  try {
+    po::variables_map values;
+    for (const Given& source : sources) {
+      Given mine(&all_);
+      for (const po::option& option : source.options)
+        if (all_.find_nothrow(option.string_key, false) != nullptr) mine.options.push_back(option);
+      po::store(mine, values);
+    }
+    po::notify(values);
+  } catch (const po::error& error) {
+    throw UsageError(error.what());
+  }
+}
+
+void OptionSet::print(std::ostream& out) const {
+  for (const po::options_description& section : sections_) out << section << "\n";
+}
+
+int runProgramWith(const ProgramText& text, OptionSet& options, const std::vector<std::string>& words,
+                   std::ostream& out, std::ostream& err,
+                   const std::function<int(const OptionSet::Given&)>& body) {
+  bool help = false, version = false;
+  options.section("Help");
+  options.flag("help,h", "prints this text", help);
+  options.flag("version", "prints the version", version);
+  try {
+    // Before anything else is read, so that it helps with a wrong command line, too.
+    for (const std::string& word : words) help = help || word == "--help" || word == "-h";
+    version = words == std::vector<std::string>{"--version"};
+    if (help) {
+      printHelp(text, options, out);
+      return kExitOk;
+    }
+    if (version) {
+      out << text.name << " of rio_t " RIO_T_VERSION "\n";
+      return kExitOk;
+    }
+    return body(options.parse(words));
+  } catch (const UsageError& error) {
+    err << text.name << ": " << error.what() << " (see --help)\n";
+    return kExitUsage;
+  } catch (const std::exception& error) {
+    err << text.name << ": " << error.what() << "\n";
+    return kExitFailed;
+  }
+}
+
+int runProgram(const ProgramText& text, OptionSet& options, const std::vector<std::string>& words,
+               std::ostream& out, std::ostream& err, const std::function<int()>& body) {
+  return runProgramWith(text, options, words, out, err, [&](const OptionSet::Given& given) {
+    options.set({given});
+    return body();
+  });
+}
+
+void addBagOptions(OptionSet& options, std::vector<std::string>& bags, std::string& config,
+                   ParameterEntries& set) {
+  options.values("bag", "BAG", "a bag with IMU and radar; `--bag` itself may be left out",
+                 [&bags](const std::string& bag) {
+                   if (std::find(bags.begin(), bags.end(), bag) != bags.end())
+                     throw UsageError(bag + ": expected each bag once");
+                   bags.push_back(bag);
+                 });
+  options.positional("bag");
+  options.text("config", "NAME_OR_PATH", "irs, ti_mmwave, ... of the package's config/, or a YAML file", config);
+  options.values("set", "key=value",
+                 "sets a parameter on top of the configuration; left/key=value sets it for the radar left; may be "
+                 "repeated",
+                 [&set](const std::string& text) { set.push_back(parseAssignment(text)); });
+}
+
+void require(const std::vector<std::pair<std::string, bool>>& given_by_name) {
+  std::string missing;
+  for (const auto& [name, given] : given_by_name)
+    if (!given) missing += " " + name;
+  if (!missing.empty()) throw UsageError("missing argument" + missing);
+}
+
+std::function<void(double)> progressBar(const std::string& label) {
   if (isatty(STDERR_FILENO) == 0) return nullptr;
-  return showProgress;
+  return [label, started = std::chrono::steady_clock::now()](double done) {
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - started;
+    // \033[K removes what is left of a longer line.
+    std::fprintf(stderr, "\r%s\033[K", progressLine(label, done, elapsed.count()).c_str());
+    if (done >= 1.0) std::fprintf(stderr, "\n");
+  };
 }
 
 }  // namespace rio_t

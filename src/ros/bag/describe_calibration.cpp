@@ -58,7 +58,7 @@ std::string remarks(const CalibratedRadar& radar) {
     const double far = radar.calibration.axes[axis].farFromTold();
     if (far < kFar) continue;
     text += std::string("  The ") + kAxes[axis].name + " is " + decimal(far, 1) +
-            " sigma of what was told away from it: are topic, axes, signs and units right?\n";
+            " sigma away from it, by the given sigma: are topic, axes, signs and units right?\n";
   }
   if (!radar.calibration.offsets_agree) {
     std::string offsets;
@@ -82,7 +82,7 @@ std::string remarks(const CalibratedRadar& radar) {
 
 std::string describeCalibration(const CalibratedRadar& radar) {
   std::string table = "  " + padded(radar.name.empty() ? "radar" : "radar " + radar.name, 18, false) +
-                      padded("told", 10, true) + padded("found", 10, true) + padded("sigma", 10, true) + "\n";
+                      padded("given", 10, true) + padded("found", 10, true) + padded("sigma", 10, true) + "\n";
   for (std::size_t axis = 0; axis < kCalibrationAxes; ++axis)
     table += axisRow(axis, radar.calibration.axes[axis]);
   return table + remarks(radar);
@@ -98,7 +98,7 @@ std::string describeCalibration(const BagCalibration& calibration) {
   std::string text = std::to_string(count) + " of " + std::to_string(calibration.bags.size()) +
                      (calibration.bags.size() == 1 ? " bag counts: " : " bags count: ") + paths + "\n";
   for (const CalibratedRadar& radar : calibration.radars) text += describeCalibration(radar);
-  return text + "Turns are about the axes of the IMU, from the mounting that was told.\n";
+  return text + "Turns are about the axes of the IMU, from the mounting that was given.\n";
 }
 
 }  // namespace rio_t

@@ -120,7 +120,7 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
   }
   row("started from", summary.initialized_from);
   if (summary.divergences > 0 || summary.health_at_end != "ok") {
-    row("DO NOT TRUST", "diverged " + std::to_string(summary.divergences) + " times, re-initialised " +
+    row("diverged", std::to_string(summary.divergences) + " times, re-initialised " +
                             std::to_string(summary.reinitializations) + " times, at the end " +
                             summary.health_at_end);
   }
@@ -135,6 +135,11 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
   row("speed", decimal(summary.estimation_seconds, 2) + " s, " + decimal(summary.realtime_factor, 0) +
                    " times real time");
   row("files in", files);
+  const RunVerdict verdict = summary.diagnosis.verdict;
+  row("verdict", verdict == RunVerdict::kGood       ? "good"
+                 : verdict == RunVerdict::kDoubtful ? "DOUBTFUL, because:"
+                                                    : "BAD, do not trust it, because:");
+  table += describeCauses(summary.diagnosis);
   return table;
 }
 

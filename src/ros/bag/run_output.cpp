@@ -73,6 +73,26 @@ class SummaryLines {
   }
   void beginMap(const std::string& key) { add(key, YAML::BeginMap); }
   void endMap() { yaml_ << YAML::EndMap; }
+  void addChecks(const std::vector<Check>& checks) {
+    yaml_ << YAML::Key << "checks" << YAML::Value << YAML::BeginSeq;
+    for (const Check& check : checks) {
+      yaml_ << YAML::Flow << YAML::BeginMap << YAML::Key << "name" << YAML::Value << check.name;
+      yaml_ << YAML::Key << "value" << YAML::Value << fixedText(check.value, 4);
+      yaml_ << YAML::Key << (check.at_least ? "at_least" : "at_most") << YAML::Value << fixedText(check.limit, 4);
+      yaml_ << YAML::Key << "good" << YAML::Value << check.good() << YAML::EndMap;
+    }
+    yaml_ << YAML::EndSeq;
+  }
+  void addCauses(const std::vector<Cause>& causes) {
+    yaml_ << YAML::Key << "causes" << YAML::Value << YAML::BeginSeq;
+    for (const Cause& cause : causes) {
+      yaml_ << YAML::BeginMap << YAML::Key << "name" << YAML::Value << cause.name;
+      yaml_ << YAML::Key << "share" << YAML::Value << fixedText(cause.share, 3);
+      yaml_ << YAML::Key << "text" << YAML::Value << YAML::DoubleQuoted << cause.text;
+      yaml_ << YAML::Key << "remedy" << YAML::Value << YAML::DoubleQuoted << cause.remedy << YAML::EndMap;
+    }
+    yaml_ << YAML::EndSeq;
+  }
   std::string text() {
     yaml_ << YAML::EndMap;
     return std::string(yaml_.c_str()) + "\n";
@@ -116,6 +136,9 @@ std::string summaryText(const RunSummary& summary, const std::vector<std::string
   SummaryLines lines;
   const auto line = [&](const char* key, const auto& value) { lines.add(key, value); };
   line("mode", summary.mode);
+  line("verdict", toString(summary.diagnosis.verdict));
+  lines.addChecks(summary.diagnosis.checks);
+  lines.addCauses(summary.diagnosis.causes);
   line("imu_count", summary.imu_count);
   line("scans_total", summary.scansTotal());
   line("scans_used", summary.scansUsed());

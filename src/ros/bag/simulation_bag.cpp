@@ -56,7 +56,7 @@ std::vector<float> tiMmwaveValues(const SimulatedPoint& p) {
           static_cast<float>(p.doppler)};
 }
 
-// Of the one radar of a rig.
+// Topics and frame of the only radar.
 Layout layoutOf(BagFormat format) {
   if (format == BagFormat::kTiMmwave) {
     return {"/ti_mmwave/radar_scan_pcl",
@@ -81,7 +81,7 @@ Layout layoutOf(BagFormat format) {
       irsValues};
 }
 
-// Of a radar with a name.
+// Topics and frame of a radar with a name.
 Layout layoutOf(BagFormat format, const std::string& name) {
   Layout layout = layoutOf(format);
   const std::string radar = "radar_" + name;

@@ -1,6 +1,6 @@
 #include "rio_t/ros/cloud/point_cloud.h"
 
-#include <sensor_msgs/point_cloud2_iterator.h>
+#include <pcl_conversions/pcl_conversions.h>
 
 #include <algorithm>
 #include <array>
@@ -64,7 +64,7 @@ std::vector<std::string> neededFields(const PointCloudFormat& f) {
   std::vector<std::string> fitting;
   for (const std::string& name : pointCloudPresets()) {
     const PointCloudFormat preset = pointCloudPreset(name);
-    // Where the power is not read it still tells drivers apart.
+    // The name of the power field tells drivers apart, even if the field is not read.
     std::vector<std::string> names = neededFields(preset);
     names.push_back(preset.power);
     if (std::all_of(names.begin(), names.end(), [&](const std::string& n) { return hasField(message, n); })) {
@@ -294,26 +294,21 @@ RadarScan toRadarScan(const pcl::PointCloud<RadarPointPcl>& cloud, Time stamp) {
 }
 
 PointCloud2 toPointCloud2(const RadarScan& scan, const std::vector<std::size_t>& indices) {
-  constexpr int kFields = 5;
-  constexpr int kFloat = PointField::FLOAT32;
-  PointCloud2 message;
-  sensor_msgs::PointCloud2Modifier modifier(message);
-  modifier.setPointCloud2Fields(kFields, "x", 1, kFloat, "y", 1, kFloat, "z", 1, kFloat, "doppler", 1, kFloat,
-                                "snr_db", 1, kFloat);
-  modifier.resize(indices.size());
-  message.is_bigendian = kHostIsBigEndian ? 1 : 0;
-  message.is_dense = 1;
-  std::size_t at = 0;
+  pcl::PointCloud<RadarPointPcl> cloud;
+  cloud.reserve(indices.size());
   for (const std::size_t index : indices) {
     const RadarPoint& p = scan.points.at(index);
+    RadarPointPcl point;
     // From right, forward, up to forward, left, up.
-    const float values[kFields] = {static_cast<float>(p.position_R.y()),
-                                   static_cast<float>(-p.position_R.x()),
-                                   static_cast<float>(p.position_R.z()), static_cast<float>(p.doppler),
-                                   static_cast<float>(p.snr_db)};
-    std::memcpy(&message.data[at], values, sizeof values);
-    at += sizeof values;
+    point.x = static_cast<float>(p.position_R.y());
+    point.y = static_cast<float>(-p.position_R.x());
+    point.z = static_cast<float>(p.position_R.z());
+    point.doppler = static_cast<float>(p.doppler);
+    point.snr_db = static_cast<float>(p.snr_db);
+    cloud.push_back(point);
   }
+  PointCloud2 message;
+  pcl::toROSMsg(cloud, message);
   return message;
 }
 

@@ -68,6 +68,7 @@ LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& p
       live_config_(config_),
       imu_stamps_(options_.imu_input_check.max_bridged_gap, options_.imu_input_check.jump_patience) {
   for (const Config& radar : configsOfRadars(config_)) radars_.emplace_back(radar);
+  showEffectiveParameters(private_node_, config_);
   startSessionWhenReady();
   addDiagnostics();
   subscribe(told_);

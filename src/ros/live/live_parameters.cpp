@@ -59,7 +59,7 @@ std::map<std::string, LiveValue> endsOf(std::map<std::string, LiveValue> values,
 }  // namespace
 
 LiveParameters::LiveParameters(const Config& config) {
-  for (const std::string& key : liveKeys()) values_[key] = plain(parsePlainScalar(parameterYaml(config, key)));
+  for (const std::string& key : liveKeys()) values_[key] = plain(parameterValue(config, key));
 }
 
 ParameterEntries LiveParameters::changesFrom(const Config& config) const {

@@ -69,7 +69,8 @@ std::string advice(SolverTermination termination) {
 
 }  // namespace
 
-LiveMonitor::LiveMonitor(const Config& config) : config_(config), imu_noise_(config.odometry.imu_noise) {
+LiveMonitor::LiveMonitor(const Config& config)
+    : config_(config), collector_(config), imu_noise_(config.odometry.imu_noise) {
   for (Config& radar : configsOfRadars(config)) radars_.emplace_back(std::move(radar));
 }
 
@@ -132,11 +133,13 @@ void LiveMonitor::dropped(std::size_t radar, const std::string& reason, std::uin
   Radar& of = radars_.at(radar);
   of.dropped[reason] += count;
   if (isEarly(reason)) of.early += count;
+  if (reason != "points_not_finite") collector_.addDropped(radar, reason, count);
 }
 
 void LiveMonitor::result(const LiveSession::Result& result) {
   const std::lock_guard<std::mutex> lock(mutex_);
   Radar& radar = radars_.at(result.result.scan.radar);
+  collector_.add(result.result);
   last_scan_ = result.result.scan.stamp;
   if (result.result.used) {
     ++radar.used;
@@ -171,6 +174,7 @@ void LiveMonitor::solverFailed(const std::string& what) {
 void LiveMonitor::reset(const std::string& reason) {
   const std::lock_guard<std::mutex> lock(mutex_);
   ++resets_;
+  collector_ = EvidenceCollector(config_);
   last_reset_ = reason;
   last_terminations_.clear();
   last_update_.reset();
@@ -202,6 +206,17 @@ void LiveMonitor::reconfigured(const std::string& refused_because) {
   refused_because_ = refused_because;
 }
 
+void LiveMonitor::addDiagnosis(Status& status, const LiveSession& session) const {
+  RunEvidence evidence = collector_.evidence(session.odometry());
+  evidence.imu_count = imu_.count;
+  const Diagnosis diagnosis = diagnose(evidence, config_);
+  if (evidence.initialized) status.add("verdict", toString(diagnosis.verdict));
+  for (std::size_t i = 0; i < diagnosis.causes.size(); ++i) {
+    const Cause& cause = diagnosis.causes[i];
+    status.add("likely_cause_" + std::to_string(i + 1), cause.text + " " + cause.remedy);
+  }
+}
+
 void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   const bool initialized = session != nullptr && session->odometry().initialized();
@@ -216,6 +231,7 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) c
     status.add("reconfigurations", reconfigurations_);
     status.add("last_reconfiguration", refused_because_.empty() ? "done" : "refused: " + refused_because_);
   }
+  if (session != nullptr) addDiagnosis(status, *session);
   if (!initialized || !waiting_for_.empty()) {
     const std::string what = waiting_for_.empty() ? session->odometry().waitingFor() : waiting_for_;
     status.add("waiting_for", what);

@@ -54,10 +54,10 @@ bool isRadarName(const std::string& text) {
   });
 }
 
-std::string listText(std::initializer_list<double> numbers) {
-  std::string text = "[";
-  for (const double x : numbers) text += (text.size() > 1 ? ", " : "") + numberText(x);
-  return text + "]";
+ParameterValue listOf(std::initializer_list<double> numbers) {
+  ParameterValue::List list;
+  for (const double x : numbers) list.emplace_back().data = x;
+  return {std::move(list)};
 }
 
 }  // namespace
@@ -85,15 +85,6 @@ std::string numberText(double value) {
   return text;
 }
 
-std::string quotedText(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') result += '\\';
-    result += c;
-  }
-  return result + '"';
-}
-
 bool Range::contains(double x) const {
   return (min_open ? x > min : x >= min) && (max_open ? x < max : x <= max) && std::isfinite(x);
 }
@@ -107,43 +98,42 @@ std::string Range::text() const {
   return text;
 }
 
-void ParameterList::add(const std::string& key, const std::string& unit, const std::string& expected,
-                        const std::string& meaning, std::function<bool(const ParameterValue&)> set,
-                        std::function<std::string()> print) {
-  all_.push_back({{key, group_, unit, expected, meaning, of_radar_}, std::move(set), std::move(print)});
+void ParameterList::add(ParameterDescription about, std::function<bool(const ParameterValue&)> set,
+                        std::function<ParameterValue()> get) {
+  about.group = group_;
+  about.of_radar = of_radar_;
+  about.first = std::exchange(is_first_, false);
+  all_.push_back({std::move(about), std::move(set), std::move(get)});
 }
 
 void ParameterList::number(const std::string& key, const std::string& unit, Range range, double& member,
-                           const std::string& meaning) {
-  add(
-      key, unit, "a finite number" + range.text(), meaning,
+                           const std::string& text) {
+  add({key, "number", unit, "a finite number" + range.text(), text, range.min, range.max},
       [range, &member](const ParameterValue& value) {
         const std::optional<double> x = asNumber(value);
         if (!x || !range.contains(*x)) return false;
         member = *x;
         return true;
       },
-      [&member] { return numberText(member); });
-  setRange(range);
+      [&member] { return ParameterValue{member}; });
 }
 
-void ParameterList::boolean(const std::string& key, bool& member, const std::string& meaning) {
-  add(
-      key, "", "true or false", meaning,
+void ParameterList::boolean(const std::string& key, bool& member, const std::string& text) {
+  add({key, "boolean", "", "true or false", text},
       [&member](const ParameterValue& value) {
         const bool* x = std::get_if<bool>(&value.data);
         if (x == nullptr) return false;
         member = *x;
         return true;
       },
-      [&member] { return std::string(member ? "true" : "false"); });
+      [&member] { return ParameterValue{member}; });
 }
 
 void ParameterList::vector3(const std::string& key, const std::string& unit, Range range,
-                            Eigen::Vector3d& member, const std::string& meaning) {
+                            Eigen::Vector3d& member, const std::string& text) {
   const std::string each = range.text();
-  add(
-      key, unit, "a list of 3 finite numbers" + (each.empty() ? "" : ", each" + each), meaning,
+  add({key, "list", unit, "a list of 3 finite numbers" + (each.empty() ? "" : ", each" + each), text, range.min,
+       range.max},
       [range, &member](const ParameterValue& value) {
         const auto x = asNumbers(value, 3, range);
         if (!x) return false;
@@ -151,42 +141,39 @@ void ParameterList::vector3(const std::string& key, const std::string& unit, Ran
         return true;
       },
       [&member] {
-        return listText({member.x(), member.y(), member.z()});
+        return listOf({member.x(), member.y(), member.z()});
       });
 }
 
-void ParameterList::rotation(const std::string& key, Eigen::Quaterniond& member, const std::string& meaning) {
-  add(
-      key, "", "a list of 4 finite numbers x, y, z, w of norm 1 (to 0.001)", meaning,
+void ParameterList::rotation(const std::string& key, Eigen::Quaterniond& member, const std::string& text) {
+  add({key, "list", "", "a list of 4 finite numbers x, y, z, w of norm 1 (to 0.001)", text},
       [&member](const ParameterValue& value) {
         const auto x = asNumbers(value, 4, Range{});
         if (!x) return false;
         const Eigen::Quaterniond q((*x)[3], (*x)[0], (*x)[1], (*x)[2]);
         if (std::abs(q.norm() - 1.0) > 1e-3) return false;
-        // Typed with fewer digits than a double has; one that is exact stays as it is.
+        // People type fewer digits than a double has; an exact quaternion stays as it is.
         member = std::abs(q.norm() - 1.0) < 1e-15 ? q : q.normalized();
         return true;
       },
       [&member] {
-        return listText({member.x(), member.y(), member.z(), member.w()});
+        return listOf({member.x(), member.y(), member.z(), member.w()});
       });
 }
 
-void ParameterList::text(const std::string& key, std::string& member, const std::string& meaning) {
-  add(
-      key, "", "one line of text, not empty", meaning,
+void ParameterList::text(const std::string& key, std::string& member, const std::string& text) {
+  add({key, "text", "", "one line of text, not empty", text},
       [&member](const ParameterValue& value) {
         const std::string* x = std::get_if<std::string>(&value.data);
         if (x == nullptr || x->empty() || !isOneLine(*x)) return false;
         member = *x;
         return true;
       },
-      [&member] { return quotedText(member); });
+      [&member] { return ParameterValue{member}; });
 }
 
-void ParameterList::textOrEmpty(const std::string& key, std::string& member, const std::string& meaning) {
-  add(
-      key, "", "one line of text, may be empty", meaning,
+void ParameterList::textOrEmpty(const std::string& key, std::string& member, const std::string& text) {
+  add({key, "text", "", "one line of text, may be empty", text},
       [&member](const ParameterValue& value) {
         const std::string* x = std::get_if<std::string>(&value.data);
         const bool nothing = std::holds_alternative<std::monostate>(value.data);  // `key:` and no more
@@ -194,21 +181,19 @@ void ParameterList::textOrEmpty(const std::string& key, std::string& member, con
         member = nothing ? std::string() : *x;
         return true;
       },
-      [&member] { return quotedText(member); });
+      [&member] { return ParameterValue{member}; });
 }
 
 void ParameterList::word(const std::string& key, const std::vector<std::string>& words, std::string& member,
-                         const std::string& meaning) {
+                         const std::string& text) {
   std::vector<std::pair<std::string, std::string>> choices;
   choices.reserve(words.size());
   for (const std::string& each : words) choices.emplace_back(each, each);
-  choice<std::string>(key, choices, member, meaning);
+  choice<std::string>(key, choices, member, text);
 }
 
-void ParameterList::radarNames(const std::string& key, std::vector<Config>& member,
-                               const std::string& meaning) {
-  add(
-      key, "", "a list of at most 16 different names of lower case letters, digits and _", meaning,
+void ParameterList::radarNames(const std::string& key, std::vector<Config>& member, const std::string& text) {
+  add({key, "list", "", "a list of at most 16 different names of lower case letters, digits and _", text},
       [&member](const ParameterValue& value) {
         const ParameterValue::List* list = std::get_if<ParameterValue::List>(&value.data);
         if (list == nullptr || list->size() > 16) return false;
@@ -225,10 +210,9 @@ void ParameterList::radarNames(const std::string& key, std::vector<Config>& memb
         return true;
       },
       [&member] {
-        std::string text = "[";
-        for (const Config& radar : member)
-          text += (text.size() > 1 ? ", " : "") + quotedText(radar.radar_name);
-        return text + "]";
+        ParameterValue::List names;
+        for (const Config& radar : member) names.emplace_back().data = radar.radar_name;
+        return ParameterValue{std::move(names)};
       });
 }
 

@@ -14,12 +14,12 @@ namespace rio_t {
 /// One key, bound to a member of one Config.
 struct Parameter {
   ParameterDescription description;
-  std::function<bool(const ParameterValue&)>
-      set;                             ///< false, and nothing changed, where it is not as expected
-  std::function<std::string()> print;  ///< as YAML
+  /// Sets the member. Returns false and changes nothing if the value is not as expected.
+  std::function<bool(const ParameterValue&)> set;
+  std::function<ParameterValue()> get;
 };
 
-/// An interval; what lies on its ends belongs to it unless the end is open.
+/// An interval. Its ends belong to it unless they are open.
 struct Range {
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
@@ -31,44 +31,52 @@ struct Range {
 };
 
 /// Collects parameters; one method for each kind of value. The members must outlive the list.
+///
+/// `text` is for people, in full sentences: what the parameter is, which values are typical, and when to
+/// change it. config/estimator.yaml, docs/parameters.md and dynamic_reconfigure show it.
 class ParameterList {
  public:
-  /// Title of the section that the next parameters stand in. They hold for all radars.
+  /// Starts a section. Its parameters hold for all radars until `ofRadar` is called.
   void group(const std::string& title) {
     group_ = title;
     of_radar_ = false;
   }
-  /// Whether each radar may have its own of the next parameters.
+  /// Whether each radar may have its own value of the next parameters.
   void ofRadar(bool of_radar) { of_radar_ = of_radar; }
+  /// Makes the next parameter one of those that a new user reads first.
+  ParameterList& first() {
+    is_first_ = true;
+    return *this;
+  }
 
   void number(const std::string& key, const std::string& unit, Range range, double& member,
-              const std::string& meaning);
+              const std::string& text);
   template <typename Integer>
-  void integer(const std::string& key, Range range, Integer& member, const std::string& meaning);
-  void boolean(const std::string& key, bool& member, const std::string& meaning);
+  void integer(const std::string& key, Range range, Integer& member, const std::string& text);
+  void boolean(const std::string& key, bool& member, const std::string& text);
   /// Three numbers, each in the range.
   void vector3(const std::string& key, const std::string& unit, Range range, Eigen::Vector3d& member,
-               const std::string& meaning);
+               const std::string& text);
   /// Unit quaternion x, y, z, w; normalised.
-  void rotation(const std::string& key, Eigen::Quaterniond& member, const std::string& meaning);
-  void text(const std::string& key, std::string& member, const std::string& meaning);
-  void textOrEmpty(const std::string& key, std::string& member, const std::string& meaning);
+  void rotation(const std::string& key, Eigen::Quaterniond& member, const std::string& text);
+  void text(const std::string& key, std::string& member, const std::string& text);
+  void textOrEmpty(const std::string& key, std::string& member, const std::string& text);
   /// One of several words, each standing for a value.
   template <typename T>
   void choice(const std::string& key, const std::vector<std::pair<std::string, T>>& choices, T& member,
-              const std::string& meaning);
+              const std::string& text);
   /// One of several words, kept as text.
   void word(const std::string& key, const std::vector<std::string>& words, std::string& member,
-            const std::string& meaning);
+            const std::string& text);
   /// The names of radars; sets nothing but their names.
-  void radarNames(const std::string& key, std::vector<Config>& member, const std::string& meaning);
+  void radarNames(const std::string& key, std::vector<Config>& member, const std::string& text);
 
   const std::vector<Parameter>& all() const { return all_; }
 
  private:
-  void add(const std::string& key, const std::string& unit, const std::string& expected,
-           const std::string& meaning, std::function<bool(const ParameterValue&)> set,
-           std::function<std::string()> print);
+  /// `about` has no group, `of_radar` and `first` yet.
+  void add(ParameterDescription about, std::function<bool(const ParameterValue&)> set,
+           std::function<ParameterValue()> get);
 
   /// Of the parameter added last.
   void setRange(const Range& range) {
@@ -78,44 +86,40 @@ class ParameterList {
 
   std::string group_;
   bool of_radar_ = false;
+  bool is_first_ = false;
   std::vector<Parameter> all_;
 };
 
 /// Shortest text that reads back as the same number; with a point, so that every YAML reader sees a number.
 std::string numberText(double value);
-std::string quotedText(const std::string& text);
 
 template <typename Integer>
-void ParameterList::integer(const std::string& key, Range range, Integer& member,
-                            const std::string& meaning) {
-  add(
-      key, "", "a whole number" + range.text(), meaning,
+void ParameterList::integer(const std::string& key, Range range, Integer& member, const std::string& text) {
+  add({key, "integer", "", "a whole number" + range.text(), text, range.min, range.max},
       [range, &member](const ParameterValue& value) {
         const std::int64_t* x = std::get_if<std::int64_t>(&value.data);
         if (x == nullptr || !range.contains(static_cast<double>(*x))) return false;
-        if (*x > std::numeric_limits<int>::max())
-          return false;  // beyond any sense, and the member may be 32 bit
+        if (*x > std::numeric_limits<int>::max()) return false;  // the member may have 32 bits
         member = static_cast<Integer>(*x);
         return true;
       },
-      [&member] { return std::to_string(member); });
-  setRange(range);
+      [&member] { return ParameterValue{static_cast<std::int64_t>(member)}; });
 }
 
 template <typename T>
 void ParameterList::choice(const std::string& key, const std::vector<std::pair<std::string, T>>& choices,
-                           T& member, const std::string& meaning) {
-  std::string expected = "one of ";
-  for (const auto& each : choices) {
-    if (&each != &choices.front()) expected += ", ";
-    expected += each.first.empty() ? "\"\"" : each.first;
+                           T& member, const std::string& text) {
+  ParameterDescription about = {key, "choice", "", "one of ", text};
+  for (const auto& [word, meant] : choices) {
+    about.expected += (about.choices.empty() ? "" : ", ") + (word.empty() ? "\"\"" : word);
+    about.choices.push_back(word);
   }
   add(
-      key, "", expected, meaning,
+      std::move(about),
       [choices, &member](const ParameterValue& value) {
-        const std::string* text = std::get_if<std::string>(&value.data);
+        const std::string* given = std::get_if<std::string>(&value.data);
         for (const auto& [word, meant] : choices) {
-          if (text == nullptr || word != *text) continue;
+          if (given == nullptr || word != *given) continue;
           member = meant;
           return true;
         }
@@ -123,13 +127,16 @@ void ParameterList::choice(const std::string& key, const std::vector<std::pair<s
       },
       [choices, &member] {
         for (const auto& [word, meant] : choices) {
-          if (meant == member) return word.empty() ? std::string("\"\"") : word;
+          if (meant == member) return ParameterValue{word};
         }
-        return std::string("\"\"");
+        return ParameterValue{std::string()};
       });
 }
 
 /// The registry: every key of `config`, once.
 ParameterList parametersOf(Config& config);
+
+/// The radar's configuration before its section is read: two radars share all but the frame.
+Config withoutSection(const Config& top_level, const std::string& name);
 
 }  // namespace rio_t

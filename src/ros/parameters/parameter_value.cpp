@@ -112,6 +112,44 @@ bool looksReal(const std::string& text) {
   return (text[at] == 'e' || text[at] == 'E') && looksWhole(text.substr(at + 1));
 }
 
+/// Whether text without quotes reads back as text in every YAML reader.
+bool isPlainText(const std::string& text) {
+  const auto isPlain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '/' ||
+           c == '.';
+  };
+  return !text.empty() && std::all_of(text.begin(), text.end(), isPlain) &&
+         std::holds_alternative<std::string>(parsePlainScalar(text).data);
+}
+
+void emit(YAML::Emitter& out, const ParameterValue& value) {
+  struct Emit {
+    void operator()(std::monostate) const { out << YAML::Null; }
+    void operator()(bool value) const { out << value; }
+    void operator()(std::int64_t value) const { out << value; }
+    void operator()(double value) const { out << numberText(value); }
+    void operator()(const std::string& value) const {
+      if (!isPlainText(value)) out << YAML::DoubleQuoted;
+      out << value;
+    }
+    void operator()(const ParameterValue::List& list) const {
+      out << YAML::Flow << YAML::BeginSeq;
+      for (const ParameterValue& element : list) emit(out, element);
+      out << YAML::EndSeq;
+    }
+    void operator()(const ParameterValue::Map& map) const {
+      out << YAML::Flow << YAML::BeginMap;
+      for (const ParameterEntry& entry : map) {
+        out << YAML::Key << entry.key << YAML::Value;
+        emit(out, entry.value);
+      }
+      out << YAML::EndMap;
+    }
+    YAML::Emitter& out;
+  };
+  std::visit(Emit{out}, value.data);
+}
+
 }  // namespace
 
 std::string ParameterValue::describe() const {
@@ -159,25 +197,10 @@ ParameterValue parsePlainScalar(const std::string& text) {
 }
 
 std::string ParameterValue::yaml() const {
-  struct Write {
-    std::string operator()(std::monostate) const { return ""; }
-    std::string operator()(bool value) const { return value ? "true" : "false"; }
-    std::string operator()(std::int64_t value) const { return std::to_string(value); }
-    std::string operator()(double value) const { return numberText(value); }
-    std::string operator()(const std::string& value) const { return quotedText(value); }
-    std::string operator()(const List& list) const {
-      std::string text = "[";
-      for (const ParameterValue& value : list) text += (text.size() > 1 ? ", " : "") + value.yaml();
-      return text + "]";
-    }
-    std::string operator()(const Map& map) const {
-      std::string text = "{";
-      for (const ParameterEntry& entry : map)
-        text += (text.size() > 1 ? ", " : "") + entry.key + ": " + entry.value.yaml();
-      return text + "}";
-    }
-  };
-  return std::visit(Write{}, data);
+  YAML::Emitter out;
+  out << YAML::Flow;
+  emit(out, *this);
+  return out.c_str();
 }
 
 ParameterEntries readParameterFile(const std::string& path) {

@@ -1,6 +1,6 @@
 #include "rio_t/ros/parameters/parameters.h"
 
-#include <rospack/rospack.h>
+#include <dlfcn.h>
 
 #include <algorithm>
 #include <cmath>
@@ -68,15 +68,6 @@ void setParameter(const ParameterEntry& entry, const std::string& section, const
                       (about.unit.empty() ? "" : " [" + about.unit + "]") + ", got " +
                       entry.value.describe());
   }
-}
-
-/// The radar's configuration before its section is read: two radars share all but the frame.
-Config withoutSection(const Config& top_level, const std::string& name) {
-  Config config = top_level;
-  config.radars.clear();
-  config.radar_name = name;
-  config.radar_frame = "rio_t_radar_" + name;
-  return config;
 }
 
 RadarOptions radarOptions(const Config& config) {
@@ -245,22 +236,6 @@ std::vector<std::string> contradictions(const Config& config) {
   return faults;
 }
 
-/// The section of a radar, as YAML.
-std::string sectionYaml(const Config& top_level, const Config& radar) {
-  Config own = radar;
-  Config base = withoutSection(top_level, radar.radar_name);
-  const ParameterList own_list = parametersOf(own);
-  const ParameterList base_list = parametersOf(base);
-  std::string lines;
-  for (std::size_t i = 0; i < own_list.all().size(); ++i) {
-    const Parameter& parameter = own_list.all()[i];
-    if (!parameter.description.of_radar || parameter.print() == base_list.all()[i].print()) continue;
-    lines += "  " + parameter.description.key + ": " + parameter.print() + "\n";
-  }
-  return "# --- Radar " + radar.radar_name + ": what differs from the above\n\n" + radar.radar_name + ":" +
-         (lines.empty() ? " {}\n" : "\n" + lines);
-}
-
 std::string joinFaults(const std::vector<std::string>& faults) {
   if (faults.size() == 1) return faults.front();
   std::string text = std::to_string(faults.size()) + " faults in the configuration:";
@@ -268,25 +243,25 @@ std::string joinFaults(const std::vector<std::string>& faults) {
   return text;
 }
 
-/// Folder of the package in the workspace that is sourced; empty if there is none. Asks rospack itself, since
-/// ros::package complains on stderr where it finds nothing.
-std::string packageFolder() {
-  rospack::Rospack packages;
-  packages.setQuiet(true);
-  std::vector<std::string> search_path;
-  std::string folder;
-  if (!packages.getSearchPathFromEnv(search_path)) return "";
-  packages.crawl(search_path, false);
-  return packages.find("rio_t", folder) ? folder : "";
-}
-
+/// The folder of the configurations that came with this library: PREFIX/lib/librio_t_ros.so and
+/// PREFIX/share/rio_t/config, in the install space as in the devel space. No workspace needs to be sourced.
 std::string configFolder() {
-  const std::string package = packageFolder();
-  if (!package.empty() && std::filesystem::is_directory(package + "/config")) return package + "/config";
-  return RIO_T_SOURCE_DIR "/config";  // run from the build folder, no workspace sourced
+  static const char in_this_library = 0;
+  Dl_info library;
+  if (dladdr(&in_this_library, &library) == 0) return "";
+  const auto path = std::filesystem::canonical(library.dli_fname);
+  return (path.parent_path().parent_path() / "share/rio_t/config").string();
 }
 
 }  // namespace
+
+Config withoutSection(const Config& top_level, const std::string& name) {
+  Config config = top_level;
+  config.radars.clear();
+  config.radar_name = name;
+  config.radar_frame = "rio_t_radar_" + name;
+  return config;
+}
 
 std::string toString(StampSource source) {
   switch (source) {
@@ -331,6 +306,15 @@ std::vector<Config> configsOfRadars(const Config& config) {
   return config.radars.empty() ? std::vector<Config>{config} : config.radars;
 }
 
+Config withAbsoluteTopics(Config config) {
+  for (std::string* topic :
+       {&config.imu_topic, &config.radar_topic, &config.trigger_topic, &config.ground_truth_topic}) {
+    if (!topic->empty() && topic->front() != '/') topic->insert(0, "/");
+  }
+  for (Config& radar : config.radars) radar = withAbsoluteTopics(radar);
+  return config;
+}
+
 Config makeConfig(const ParameterEntries& entries) {
   Config config;
   std::vector<std::string> faults;
@@ -362,12 +346,12 @@ Config withParameters(const Config& config, const ParameterEntries& entries) {
   return changed;
 }
 
-std::string parameterYaml(const Config& config, const std::string& key) {
+ParameterValue parameterValue(const Config& config, const std::string& key) {
   Config copy = config;  // the list wants members that it could set
   const ParameterList list = parametersOf(copy);
   const Parameter* parameter = find(list, key);
   if (parameter == nullptr) throw std::invalid_argument("no parameter \"" + key + "\"");
-  return parameter->print();
+  return parameter->get();
 }
 
 const std::vector<std::string>& liveKeys() {
@@ -378,37 +362,10 @@ const std::vector<std::string>& liveKeys() {
   return keys;
 }
 
-std::vector<ParameterDescription> parameterDescriptions() {
-  std::vector<ParameterDescription> descriptions;
-  Config config;
-  const ParameterList list = parametersOf(config);
-  for (const Parameter& parameter : list.all()) descriptions.push_back(parameter.description);
-  return descriptions;
-}
-
-std::string toYaml(const Config& config) {
-  std::string yaml =
-      "# Every parameter of rio_t with its default. Written by `rio_t_bag --print-config`; do not edit by "
-      "hand.\n"
-      "# A configuration of your own names only what differs. Unknown keys are refused.\n";
-  std::string group;
-  Config copy = config;  // the list wants members that it could set
-  const ParameterList list = parametersOf(copy);
-  for (const Parameter& parameter : list.all()) {
-    const ParameterDescription& about = parameter.description;
-    if (about.group != group) yaml += "\n# --- " + about.group + "\n";
-    group = about.group;
-    yaml += "\n# " + about.description + "\n# " + (about.unit.empty() ? "" : "[" + about.unit + "] ") +
-            about.expected + (about.of_radar ? "; per radar" : "") + "\n" + about.key + ": " +
-            parameter.print() + "\n";
-  }
-  for (const Config& radar : config.radars) yaml += "\n" + sectionYaml(config, radar);
-  return yaml;
-}
-
 std::string findConfigFile(const std::string& name_or_path) {
   namespace fs = std::filesystem;
-  if (name_or_path.find('/') != std::string::npos || fs::exists(name_or_path)) {
+  // A folder of that name says nothing: `--config irs` works beside a folder with the results for irs.
+  if (name_or_path.find('/') != std::string::npos || fs::is_regular_file(name_or_path)) {
     if (!fs::exists(name_or_path))
       throw std::runtime_error("configuration " + name_or_path + ": no such file");
     return name_or_path;

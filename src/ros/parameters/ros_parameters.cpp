@@ -1,8 +1,36 @@
 #include "rio_t/ros/parameters/ros_parameters.h"
 
+#include <ros/param.h>
+
+#include <limits>
 #include <set>
+#include <sstream>
 
 namespace rio_t {
+namespace {
+
+constexpr const char* kEffective = "effective";
+
+struct ToXmlRpc {
+  XmlRpc::XmlRpcValue operator()(std::monostate) const { return {}; }
+  XmlRpc::XmlRpcValue operator()(bool value) const { return {value}; }
+  XmlRpc::XmlRpcValue operator()(double value) const { return {value}; }
+  XmlRpc::XmlRpcValue operator()(const std::string& value) const { return {value}; }
+  XmlRpc::XmlRpcValue operator()(std::int64_t value) const {
+    using Limits = std::numeric_limits<int>;
+    if (value < Limits::min() || value > Limits::max()) return {static_cast<double>(value)};
+    return {static_cast<int>(value)};
+  }
+  XmlRpc::XmlRpcValue operator()(const ParameterValue::List& list) const {
+    XmlRpc::XmlRpcValue result;
+    result.setSize(static_cast<int>(list.size()));
+    for (std::size_t k = 0; k < list.size(); ++k) result[static_cast<int>(k)] = std::visit(*this, list[k].data);
+    return result;
+  }
+  XmlRpc::XmlRpcValue operator()(const ParameterValue::Map& entries) const { return toXmlRpc(entries); }
+};
+
+}  // namespace
 
 ParameterValue toParameterValue(XmlRpc::XmlRpcValue& value) {
   ParameterValue result;
@@ -39,8 +67,14 @@ ParameterValue toParameterValue(XmlRpc::XmlRpcValue& value) {
   return result;
 }
 
+XmlRpc::XmlRpcValue toXmlRpc(const ParameterEntries& entries) {
+  XmlRpc::XmlRpcValue map;
+  for (const ParameterEntry& entry : entries) map[entry.key] = std::visit(ToXmlRpc(), entry.value.data);
+  return map;
+}
+
 ParameterEntries toParameterEntries(XmlRpc::XmlRpcValue& map, const std::string& name_space) {
-  static const std::set<std::string> of_others = {"config", "diagnostic_period", "diagnostic_updater"};
+  static const std::set<std::string> of_others = {"config", "diagnostic_period", "diagnostic_updater", kEffective};
   ParameterEntries entries;
   if (map.getType() != XmlRpc::XmlRpcValue::TypeStruct) return entries;
   for (auto& [key, value] : map) {
@@ -73,6 +107,12 @@ Config configFromRos(const ros::NodeHandle& private_node) {
     for (ParameterEntry& entry : toParameterEntries(map, name_space)) entries.push_back(std::move(entry));
   }
   return makeConfig(entries);
+}
+
+void showEffectiveParameters(const ros::NodeHandle& private_node, const Config& config) {
+  std::istringstream yaml(toYaml(config));
+  private_node.deleteParam(kEffective);
+  private_node.setParam(kEffective, toXmlRpc(readParameters(yaml, "the effective parameters")));
 }
 
 }  // namespace rio_t

@@ -1,7 +1,10 @@
 #pragma once
 
 #include <functional>
+#include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "rio_t/ros/bag/run_output.h"
 #include "rio_t/ros/parameters/parameters.h"
@@ -9,16 +12,27 @@
 namespace rio_t {
 
 struct BagRun {
-  std::string bag;            ///< path
-  std::string output_folder;  ///< made if need be; empty: no files
+  std::vector<std::string> bags;  ///< paths; several bags are played as one, in the order of their records
+  std::string output_folder;      ///< made if need be; empty: no files
   Config config;
   std::function<void(double)> progress;  ///< share of the bag done, 0 to 1; may be empty
 };
 
-/// Plays a bag through the estimator as fast as it goes, in one thread, so that the same bag gives the same
+/// A run that gave no result, with what its data show of the causes.
+class RunFailed : public std::runtime_error {
+ public:
+  RunFailed(const std::string& what, Diagnosis diagnosis)
+      : std::runtime_error(what), diagnosis_(std::move(diagnosis)) {}
+  const Diagnosis& diagnosis() const { return diagnosis_; }
+
+ private:
+  Diagnosis diagnosis_;
+};
+
+/// Plays the bags through the estimator as fast as it goes, in one thread, so that the same bag gives the same
 /// files. Needs no roscore. Throws std::runtime_error with one line that names the bag, topic, key or file
 /// that is wrong: bag missing or unreadable, topic missing or of another type, cloud not as configured, no
-/// data, never initialised, every scan rejected, output not writable.
+/// data, output not writable; RunFailed: never initialised, every scan rejected.
 RunSummary runBag(const BagRun& run);
 
 /// A short table for people. `files` is the folder that it names.

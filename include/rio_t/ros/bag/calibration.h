@@ -15,7 +15,8 @@ struct CalibrationRun {
   std::vector<std::string> bags;         ///< paths
   std::string output_folder;             ///< gets a folder with the files of each bag's run; empty: no files
   Config config;                         ///< what is told
-  std::function<void(double)> progress;  ///< share of one bag, as in BagRun; may be empty
+  /// Makes BagRun::progress for a bag; may be empty.
+  std::function<std::function<void(double)>(const std::string& bag)> progress;
 };
 
 /// The outcome of one bag.

@@ -10,6 +10,7 @@
 
 #include "rio_t/evaluation/trajectory.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
+#include "rio_t/ros/diagnosis/diagnosis.h"
 #include "rio_t/ros/parameters/parameters.h"
 
 namespace rio_t {
@@ -73,6 +74,7 @@ struct RunSummary {
   double end_to_start_2d_m = 0.0;    ///< of the causal trajectory, horizontal
   double end_to_start_3d_m = 0.0;
   MeasuredImuNoise imu_noise;  ///< that the IMU showed at the end
+  Diagnosis diagnosis;         ///< whether the run is good, and if not, why
   std::optional<TruthErrors> truth;
   double estimation_seconds = 0.0;  ///< reading, decoding and estimating, wall clock
   double realtime_factor = 0.0;     ///< seconds of data in a second of that

@@ -3,19 +3,24 @@
 #include <pcl/point_types.h>
 #include <pcl/register_point_struct.h>
 
-namespace rio_t {
+#include <Eigen/Core>
 
-/// One detection as a PCL point, in RIO axes: x right, y forward, z up.
-struct RadarPointPcl {
-  float x = 0.0F;        ///< [m]
-  float y = 0.0F;        ///< [m]
-  float z = 0.0F;        ///< [m]
-  float doppler = 0.0F;  ///< range rate [m/s], positive = receding
-  float snr_db = 0.0F;   ///< [dB]; kUnknownSnrDb where the driver gives no signal-to-noise ratio
-};
+namespace rio_t {
 
 /// Stands for "not known": above every sensible minimum, so that the SNR filter lets such points through.
 constexpr float kUnknownSnrDb = 1000.0F;
+
+/// One detection as a PCL point, in RIO axes: x right, y forward, z up, in metres. PCL's own templates take it
+/// (`pcl::transformPointCloud`, filters, `pcl::fromROSMsg` of `~points` and `~inliers`); those that PCL ships
+/// compiled need `#define PCL_NO_PRECOMPILE` before the first include of PCL.
+struct EIGEN_ALIGN16 RadarPointPcl {
+  PCL_ADD_POINT4D  // x, y, z; data[3] is 1
+  float doppler = 0.0F;  ///< range rate [m/s], positive = receding
+  float snr_db = 0.0F;   ///< [dB]; kUnknownSnrDb if the driver gives no signal-to-noise ratio
+
+  RadarPointPcl() : data{0.0F, 0.0F, 0.0F, 1.0F} {}
+  PCL_MAKE_ALIGNED_OPERATOR_NEW
+};
 
 }  // namespace rio_t
 

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "rio_t/ros/diagnosis/diagnosis.h"
 #include "rio_t/ros/live/session.h"
 
 namespace rio_t {
@@ -99,6 +100,8 @@ class LiveMonitor {
   std::optional<Finding> describeRadar(Status& status, Radar& radar, bool initialized) const;
   /// How few of its last scans were used, and why, if it is less than half.
   static std::optional<std::string> judgeUse(Radar& radar, bool initialized);
+  /// Whether the run is good so far and, if not, why.
+  void addDiagnosis(Status& status, const LiveSession& session) const;
   static Finding join(const std::vector<Finding>& findings, bool another_works);
   /// Whether the newest estimate is of a scan of this radar, or nearly so.
   bool isRecent(const Radar& radar) const;
@@ -106,6 +109,7 @@ class LiveMonitor {
   const Config config_;
   mutable std::mutex mutex_;  // guards all that follows
   std::vector<Radar> radars_;
+  EvidenceCollector collector_;  // since the session started
   Counter imu_;
   ImuNoise imu_noise_;
   Latency odometry_latency_, scan_latency_;

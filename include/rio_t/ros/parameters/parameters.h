@@ -65,10 +65,10 @@ struct Config {
   std::vector<Config> radars;
   std::string radar_name;  ///< empty, but for an element of `radars`
 
-  std::string imu_topic = "/sensor_platform/imu";
-  std::string radar_topic = "/sensor_platform/radar/scan";
-  std::string trigger_topic = "/sensor_platform/radar/trigger";
-  std::string ground_truth_topic = "/ground_truth/pose";
+  std::string imu_topic = "sensor_platform/imu";
+  std::string radar_topic = "sensor_platform/radar/scan";
+  std::string trigger_topic = "sensor_platform/radar/trigger";
+  std::string ground_truth_topic = "ground_truth/pose";
 
   StampSource stamp_source = StampSource::kHeader;
   double radar_stamp_shift = 0.0;  ///< [s]
@@ -108,6 +108,10 @@ struct Config {
 /// that of RadarScan::radar.
 std::vector<Config> configsOfRadars(const Config& config);
 
+/// The configuration with the topics as a node without a namespace has them, and as a bag holds them: a relative
+/// topic begins with `/`. An empty one stays empty.
+Config withAbsoluteTopics(Config config);
+
 /// Layout of the cloud: the preset with the overrides.
 PointCloudFormat pointCloudFormat(const Config& config);
 
@@ -130,8 +134,8 @@ Config makeConfig(const ParameterEntries& entries);
 /// `config` with other values for keys that hold for all radars. Throws ConfigError, as makeConfig, and then
 /// nothing has changed.
 Config withParameters(const Config& config, const ParameterEntries& entries);
-/// The value of a key as YAML. Throws std::invalid_argument for a key that does not exist.
-std::string parameterYaml(const Config& config, const std::string& key);
+/// The value of a key. Throws std::invalid_argument for a key that does not exist.
+ParameterValue parameterValue(const Config& config, const std::string& key);
 
 /// The keys that may change while the live node runs: noises, gates and what is published how often. All hold
 /// for all radars, and each has one truth value, whole number or number.
@@ -140,20 +144,31 @@ const std::vector<std::string>& liveKeys();
 /// What is known of a key.
 struct ParameterDescription {
   std::string key;
-  std::string group;        ///< title of its section in estimator.yaml
-  std::string unit;         ///< empty: none
-  std::string expected;     ///< e.g. "a number above 0, at most 10"
-  std::string description;  ///< one line
-  bool of_radar = false;    ///< each radar may have its own, in its section
-  double min = -std::numeric_limits<double>::infinity();  ///< of a number, as the next
-  double max = std::numeric_limits<double>::infinity();
+  std::string type;      ///< "number", "integer", "boolean", "choice", "text" or "list"
+  std::string unit;      ///< empty: none
+  std::string expected;  ///< e.g. "a finite number above 0 and at most 10"
+  std::string description;  ///< full sentences: what it is, typical values, when to change it
+  double min = -std::numeric_limits<double>::infinity();  ///< of a number, or of each one of a list
+  double max = std::numeric_limits<double>::infinity();   ///< likewise
+  std::vector<std::string> choices = {};                  ///< of a choice
+  std::string group = {};  ///< title of its section
+  bool of_radar = false;  ///< each radar may have its own value, in its section
+  bool first = false;     ///< one of the parameters that a new user reads first
 };
-/// Every key once, in the order of estimator.yaml.
+/// Every key once, section by section.
 std::vector<ParameterDescription> parameterDescriptions();
 
-/// The configuration as YAML with the description of each key as comments: config/estimator.yaml for a
+/// The configuration as YAML with the text of each key as a comment: config/estimator.yaml for a
 /// default-constructed one. Reading it back gives the same configuration.
 std::string toYaml(const Config& config);
+
+/// All that is known of every parameter, with its default, for programs: a YAML list of maps with the keys key,
+/// section, first, type, unit, min, max, choices, expected, per_radar, default and description. A key without a value
+/// (no unit, no bound) is left out.
+std::string parametersYaml();
+
+/// The same for people: docs/parameters.md.
+std::string parametersMarkdown();
 
 /// Path of a configuration: `name_or_path` itself if it is a file, else that name, with or without ".yaml",
 /// in the package's config/. Throws std::runtime_error listing the names there are.

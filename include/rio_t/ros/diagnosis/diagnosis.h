@@ -1,0 +1,47 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "rio_t/ros/diagnosis/run_evidence.h"
+
+namespace rio_t {
+
+/// Whether a run is good.
+enum class RunVerdict {
+  kGood,      ///< nothing speaks against it
+  kDoubtful,  ///< look at the causes
+  kBad,       ///< it never started, used no scan, or diverged: do not trust it
+};
+std::string toString(RunVerdict verdict);  ///< "good", "doubtful", "bad"
+
+/// A likely cause of trouble.
+struct Cause {
+  std::string name;    ///< in snake case: "points_too_weak"
+  std::string text;    ///< a sentence with the numbers that point there
+  std::string remedy;  ///< a sentence with the key to change
+  double share = 0.0;  ///< 0 to 1: how much of the evidence it explains
+};
+
+/// A number that is red or green.
+struct Check {
+  std::string name;  ///< in snake case: "scans_used_share"
+  double value = 0.0;
+  double limit = 0.0;
+  bool at_least = true;  ///< the value must be at least the limit; false: at most
+  bool good() const { return at_least ? value >= limit : value <= limit; }
+};
+
+struct Diagnosis {
+  RunVerdict verdict = RunVerdict::kGood;
+  std::vector<Check> checks;  ///< all of a good run are good
+  std::vector<Cause> causes;  ///< at most three, the likeliest first; none of a good run
+};
+
+/// Why a run disappoints, or that it does not. It works on a run that ended and on one that goes on.
+Diagnosis diagnose(const RunEvidence& evidence, const Config& config);
+
+/// A line for each cause, and for each check that is not good.
+std::string describeCauses(const Diagnosis& diagnosis);
+
+}  // namespace rio_t

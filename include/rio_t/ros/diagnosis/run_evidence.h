@@ -1,0 +1,62 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "rio_t/odometry/radar_inertial_odometry.h"
+#include "rio_t/radar/point_filter.h"
+#include "rio_t/ros/parameters/parameters.h"
+
+namespace rio_t {
+
+using Counts = std::map<std::string, std::uint64_t>;
+
+/// What a run shows of one radar, in counters.
+struct RadarEvidence {
+  std::string name;               ///< empty if there is but one
+  std::uint64_t scans_total = 0;  ///< received
+  std::uint64_t scans_used = 0;
+  std::uint64_t scans_before_start = 0;  ///< before the estimate was initialised
+  Counts scans_rejected;                 ///< by reason, without those before the start
+  Counts velocity_status;                ///< of the scans before the start, by EgoVelocityStatus
+  std::uint64_t points = 0;              ///< of all scans
+  std::array<std::uint64_t, kPointVerdicts> points_by_verdict = {};
+  double snr_sum_db = 0.0;      ///< over `points`
+  double final_offset_s = 0.0;  ///< newest estimate of t_O
+};
+
+/// What a run shows, in counters: enough to say why it disappoints.
+struct RunEvidence {
+  bool initialized = false;
+  std::string waiting_for;  ///< while not initialised
+  std::uint64_t imu_count = 0;
+  Counts faults;  ///< RadarInertialOdometry::faults(), with those of the messages
+  Health health = Health::kOk;
+  std::uint64_t scans_judged = 0;    ///< after the start
+  std::uint64_t scans_diverged = 0;  ///< of them, after which the health was "diverged"
+  std::uint64_t windows = 0, windows_at_bound = 0;
+  MeasuredImuNoise imu_noise;
+  std::vector<RadarEvidence> radars;
+};
+
+/// Collects the evidence from the results of the scans. Not thread-safe.
+class EvidenceCollector {
+ public:
+  explicit EvidenceCollector(const Config& config);
+
+  void add(const ScanResult& result);
+  /// Scans that were dropped before the odometry saw them.
+  void addDropped(std::size_t radar, const std::string& reason, std::uint64_t count);
+  /// The evidence so far, with what `odometry` knows. `scans_total` counts the results and the scans
+  /// that were dropped.
+  RunEvidence evidence(const RadarInertialOdometry& odometry) const;
+
+ private:
+  std::vector<EgoVelocityOptions> options_;  // by RadarScan::radar
+  RunEvidence evidence_;
+};
+
+}  // namespace rio_t

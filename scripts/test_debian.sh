@@ -1,0 +1,60 @@
+#!/usr/bin/env bash
+# Builds this tree and runs every test in another Debian, in a folder that debootstrap makes.
+#   scripts/test_debian.sh bullseye|bookworm|trixie             scripts/test.sh in Debian 11, 12 or 13
+#   scripts/test_debian.sh bullseye|bookworm|trixie COMMAND...  that command instead, in the tree, e.g. a shell
+# It needs root, debootstrap and 6 GB. The first run takes about an hour on two cores. The folder keeps its packages and its
+# build, and later runs build only what changed. The tree is visible read-only inside, and every mount ends with the script.
+# RIO_T_DEBIAN_DIR: where the folders are, else /var/tmp/rio_t_debian. RIO_T_DEBIAN_MIRROR: else deb.debian.org.
+set -euo pipefail
+suite=${1:-}
+case "$suite" in
+  -h | --help) sed -n '2,8s/^# \?//p' "$0"; exit 0 ;;
+  bullseye | bookworm | trixie) shift ;;
+  *) echo "test_debian.sh: expected bullseye, bookworm or trixie, not '$suite'" >&2; exit 1 ;;
+esac
+[ "$(id -u)" -eq 0 ] || { echo "test_debian.sh: must run as root, to mount and to change the root folder" >&2; exit 1; }
+command -v debootstrap >/dev/null || { echo "test_debian.sh: debootstrap is missing: apt-get install debootstrap" >&2; exit 1; }
+
+source=$(cd "$(dirname "$0")/.." && pwd)
+root=${RIO_T_DEBIAN_DIR:-/var/tmp/rio_t_debian}/$suite
+data=${RIO_T_DATA_DIR:-$(realpath -m "$source/../shared/data")}
+
+# The last step that makes the folder writes the mark: a folder that was interrupted starts again.
+if [ ! -f "$root/.rio_t_complete" ]; then
+  echo "test_debian.sh: making $root"
+  mkdir -p "$root"
+  log=$root.log
+  debootstrap --variant=minbase --include=ca-certificates "$suite" "$root" \
+    "${RIO_T_DEBIAN_MIRROR:-http://deb.debian.org/debian}" >"$log" 2>&1 || { tail -n 20 "$log" >&2; exit 1; }
+  mkdir -p "$root"/{rio_t,data,build,ccache}
+  touch "$root/.rio_t_complete"
+fi
+# roscore asks for the address of the machine's own name.
+cp /etc/hosts /etc/resolv.conf "$root/etc/"
+echo "127.0.0.1 localhost $(hostname)" >>"$root/etc/hosts"
+
+# In namespaces of its own: all mounts and processes end with it, whatever happens.
+inside=(unshare --mount --pid --fork --kill-child -- bash -euc '
+  root=$1 source=$2 data=$3
+  shift 3
+  mount --make-rprivate /
+  mount -t proc proc "$root/proc"
+  mkdir -p "$root/dev/shm" "$root/dev/pts"
+  mount -t tmpfs tmpfs "$root/dev/shm"
+  mount --bind /dev/pts "$root/dev/pts"
+  mount -t tmpfs tmpfs "$root/tmp"
+  mount --bind "$source" "$root/rio_t"
+  mount -o remount,ro,bind "$root/rio_t"
+  if [ -d "$data" ]; then
+    mount --bind "$data" "$root/data"
+    mount -o remount,ro,bind "$root/data"
+  fi
+  exec chroot "$root" env -i HOME=/root LANG=C.UTF-8 PATH=/usr/sbin:/usr/bin:/sbin:/bin TERM="${TERM:-dumb}" \
+    RIO_T_WERROR=ON RIO_T_BUILD_DIR=/build RIO_T_DATA_DIR=/data PYTHONDONTWRITEBYTECODE=1 CCACHE_DIR=/ccache \
+    CMAKE_CXX_COMPILER_LAUNCHER=ccache bash -euc '\''cd /rio_t && "$@"'\'' inside "$@"
+' inside "$root" "$source" "$data")
+if [ $# -eq 0 ]; then
+  "${inside[@]}" scripts/install_dependencies.sh ccache
+  set -- scripts/test.sh
+fi
+"${inside[@]}" "$@"

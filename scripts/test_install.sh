@@ -1,0 +1,43 @@
+#!/usr/bin/env bash
+# Installs what scripts/build.sh built into its folder install/, puts the sources and the rest of the build out of reach,
+# and runs test/install/install_test.py: programs, launch files, nodelet, Python, and a package that uses the libraries.
+# RIO_T_BUILD_DIR: the build folder, else build/.
+set -euo pipefail
+case "${1:-}" in -h | --help) sed -n '2,4s/^# \?//p' "$0"; exit 0 ;; esac
+cd "$(dirname "$0")/.."
+export PATH=/usr/bin:$PATH
+source=$(pwd)
+build=$(realpath -m -- "${RIO_T_BUILD_DIR:-build}")
+temporary=$(mktemp -d)
+trap 'rm -rf "$temporary"' EXIT
+
+cmake --build "$build" --target install >"$temporary/install.log" 2>&1 || { tail -n 30 "$temporary/install.log" >&2; exit 1; }
+cp -r test/install "$temporary/tests"
+results=$build/test_results/rio_t
+mkdir -p "$results"
+
+# In a mount namespace of its own, where empty folders cover the sources and the build; all ends with it.
+namespace=(unshare --mount)
+[ "$(id -u)" -eq 0 ] || namespace+=(--map-root-user)
+if ! "${namespace[@]}" true 2>/dev/null; then
+  echo "test_install.sh: this system lets nobody hide folders (unshare --mount): the sources stay in reach" >&2
+  namespace=()
+fi
+RIO_T_HIDDEN=${namespace:+yes} "${namespace[@]}" bash -euc '
+  source=$1 build=$2 temporary=$3
+  if [ -n "$RIO_T_HIDDEN" ]; then
+    mkdir "$temporary/install" "$temporary/results"
+    mount --bind "$build/install" "$temporary/install"
+    mount --bind "$build/test_results/rio_t" "$temporary/results"
+    mount -t tmpfs none "$build"
+    mount -t tmpfs none "$source"
+    mkdir -p "$build/install" "$build/test_results/rio_t"
+    mount --bind "$temporary/install" "$build/install"
+    mount --bind "$temporary/results" "$build/test_results/rio_t"
+  fi
+  cd "$temporary"
+  set +u  # hooks of catkin read variables that a shell without ROS does not have
+  source "$build/install/setup.bash"
+  export RIO_T_TEST_SOURCE=$source RIO_T_TEST_BUILD=$build
+  python3 -m pytest -p no:cacheprovider -q --junit-xml="$build/test_results/rio_t/install.xml" tests/install_test.py
+' test_install "$source" "$build" "$temporary"

@@ -1,0 +1,62 @@
+"""The configuration of a launch file, for <param command="...">, which roslaunch runs while it reads the file.
+
+Prints the configuration that the argument `config` names, and refuses arguments that the launch file does not have:
+roslaunch itself takes every NAME:=VALUE on its command line, and a misspelt one would change nothing without a word."""
+import argparse
+import difflib
+import os
+import pathlib
+import sys
+import xml.etree.ElementTree as ElementTree
+
+from .errors import RioTError
+
+
+def config_path(name, folder):
+    """What the node shall read: an absolute path for a file, counted from `folder`; a name of the package's as it is."""
+    path = pathlib.Path(folder, os.path.expanduser(name))
+    if path.is_file():
+        return str(path.resolve())
+    if "/" in name:
+        raise RioTError(f"config:={name}: there is no file {path}")
+    return name
+
+
+def check_arguments(words, launch_folder):
+    """Raises RioTError if `words`, the command line of roslaunch, starts a launch file of this package with an argument
+    that the file does not have."""
+    files = [launch_folder / pathlib.Path(word).name for word in words if word.endswith(".launch")]
+    files = [file for file in files if file.is_file()]
+    if not files:
+        return  # somebody else's launch file, which roslaunch checks where it includes ours
+    known = [arg.get("name") for arg in ElementTree.parse(files[0]).getroot().findall("arg") if arg.get("value") is None]
+    for word in words:
+        name, assigned, _ = word.partition(":=")
+        if not assigned or name.startswith("_") or name in known:
+            continue
+        close = difflib.get_close_matches(name, known, 1)
+        hint = f"did you mean {close[0]}:= ? " if close else ""
+        raise RioTError(f"{files[0].name} has no argument {name}:= ; {hint}It has {', '.join(known)}; roslaunch --ros-args "
+                        f"rio_t {files[0].name} describes them.")
+
+
+def words_of(process):
+    """The command line of a process; empty if it has ended or belongs to somebody else."""
+    try:
+        return pathlib.Path(f"/proc/{process}/cmdline").read_bytes().decode(errors="replace").rstrip("\0").split("\0")
+    except OSError:
+        return []
+
+
+def main(arguments):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("config", help="a path, absolute or from where roslaunch was called, or a name of the package's config/")
+    parser.add_argument("launch_folder", type=pathlib.Path, help="where the launch files of the package are")
+    options = parser.parse_args(arguments)
+    try:
+        check_arguments(words_of(os.getppid()), options.launch_folder)
+        print(config_path(options.config, os.getcwd()), end="")
+    except RioTError as error:
+        print(f"rio_t: {error}", file=sys.stderr)
+        return 1
+    return 0

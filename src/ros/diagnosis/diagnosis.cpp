@@ -1,0 +1,332 @@
+#include "rio_t/ros/diagnosis/diagnosis.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+
+namespace rio_t {
+namespace {
+
+// A cause shows if it explains at least this share of the evidence. Good runs stay far below: on the bags of
+// docs/results.md, at most a tenth of the scans is rejected, and at most a third of the points filtered.
+constexpr double kManyScans = 0.3;
+constexpr double kManyPoints = 0.6;
+constexpr double kManyWindows = 0.3;
+constexpr double kManyDiverged = 0.1;
+constexpr double kManySamples = 0.05;
+constexpr double kFewScansUsed = 0.5;
+constexpr const char* kImuFaults[] = {"imu_not_usable", "imu_saturated", "imu_gap", "imu_out_of_order",
+                                      "imu_not_finite", "imu_stamp_jump", "imu_stuck"};
+/// Scans before anything is said: two seconds at ten a second.
+constexpr std::uint64_t kEnoughScans = 20;
+constexpr std::size_t kMostCauses = 3;
+
+double shareOf(std::uint64_t part, std::uint64_t whole) {
+  return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+std::uint64_t countOf(const Counts& counts, const std::string& name) {
+  const auto found = counts.find(name);
+  return found == counts.end() ? 0 : found->second;
+}
+
+std::uint64_t sumOf(const Counts& counts, const std::vector<std::string>& names) {
+  std::uint64_t sum = 0;
+  for (const std::string& name : names) sum += countOf(counts, name);
+  return sum;
+}
+
+std::string number(double value) {
+  std::ostringstream text;
+  text.precision(3);
+  text << value;
+  return text.str();
+}
+
+std::string outOf(std::uint64_t part, std::uint64_t whole, const std::string& what) {
+  return std::to_string(part) + " of " + std::to_string(whole) + " " + what;
+}
+
+/// Everything that speaks of one radar.
+class RadarCauses {
+ public:
+  RadarCauses(const RadarEvidence& radar, const Config& config, std::vector<Cause>* causes)
+      : radar_(radar),
+        config_(config),
+        key_(radar.name.empty() ? "" : radar.name + "/"),
+        of_(radar.name.empty() ? "" : " of radar " + radar.name),
+        causes_(causes) {}
+
+  void add() {
+    if (radar_.scans_total < kEnoughScans) return;
+    addPointFilter();
+    addStamps();
+    addVelocities();
+    addContradictions();
+  }
+
+ private:
+  void cause(const std::string& name, double share, const std::string& text, const std::string& remedy) {
+    causes_->push_back({name, text, remedy, share});
+  }
+
+  void addPointFilter() {
+    const EgoVelocityOptions& o = config_.odometry.ego_velocity;
+    const auto filter = [&](PointVerdict verdict, const std::string& name, const std::string& are,
+                            const std::string& remedy) {
+      const std::uint64_t taken = radar_.points_by_verdict[static_cast<std::size_t>(verdict)];
+      const double share = shareOf(taken, radar_.points);
+      if (share < kManyPoints) return;
+      cause(name, share, outOf(taken, radar_.points, "points") + of_ + " are " + are, remedy);
+    };
+    filter(PointVerdict::kTooWeak, "points_too_weak",
+           "below " + key_ + "radar_min_snr_db " + number(o.min_snr_db) + " dB: their mean is " +
+               number(radar_.snr_sum_db / static_cast<double>(std::max<std::uint64_t>(1, radar_.points))) +
+               " dB, and the preset " + config_.radar_format + " reads the power as " +
+               toString(pointCloudFormat(config_).power_unit) + ".",
+           "Set " + key_ + "radar_power_unit to the unit of your driver (not_snr if it is no SNR), or lower " + key_ +
+               "radar_min_snr_db.");
+    filter(PointVerdict::kTooNear, "points_too_near",
+           "nearer than " + key_ + "radar_min_range " + number(o.min_range) + " m.",
+           "Lower " + key_ + "radar_min_range, and check the unit of the positions.");
+    filter(PointVerdict::kTooFar, "points_too_far",
+           "farther than " + key_ + "radar_max_range " + number(o.max_range) + " m.",
+           "Raise " + key_ + "radar_max_range, and check the unit of the positions.");
+    filter(PointVerdict::kBesideView, "points_beside_view",
+           "farther than " + key_ + "radar_max_azimuth " + number(o.max_azimuth) + " rad to either side of forward.",
+           "The axes of the cloud are probably others: set " + key_ + "radar_axes to rfu or flu.");
+    filter(PointVerdict::kAboveView, "points_above_view",
+           "higher or lower than " + key_ + "radar_max_elevation " + number(o.max_elevation) + " rad.",
+           "The axes of the cloud are probably others: set " + key_ + "radar_axes to rfu or flu.");
+    filter(PointVerdict::kNoDirection, "points_without_direction", "at range zero.",
+           "Check the names of the position fields: " + key_ + "radar_field_x and the next ones.");
+  }
+
+  void addStamps() {
+    const auto stamps = [&](const std::string& reason, const std::string& text, const std::string& remedy) {
+      const std::uint64_t count = countOf(radar_.scans_rejected, reason);
+      const double share = shareOf(count, radar_.scans_total);
+      if (share < kManyScans) return;
+      cause(reason, share, outOf(count, radar_.scans_total, "scans") + of_ + " " + text, remedy);
+    };
+    const std::string other = "Set " + key_ + "stamp_source: arrival, or correct the clock with " + key_ +
+                              "radar_stamp_shift.";
+    stamps("stamp_zero", "have a stamp of zero.", "Set " + key_ + "stamp_source to trigger or arrival.");
+    stamps("stamp_ahead_of_imu", "are stamped ahead of the newest IMU sample.", other);
+    stamps("older_than_window", "are stamped before the IMU samples that are kept.", other);
+    stamps("imu_not_covering", "are stamped at a time without IMU samples.", other);
+    stamps("trigger_missing", "have no trigger message.",
+           "Check " + key_ + "trigger_topic, or set " + key_ + "stamp_source to header or arrival.");
+    stamps("duplicate_stamp", "have the stamp of another scan.",
+           "The driver repeats its stamps: set " + key_ + "stamp_source: arrival.");
+    stamps("queue_full", "waited too long for the IMU or the solver.",
+           "Set " + key_ + "stamp_source: arrival if the stamps are ahead of the IMU; lower window if the computer "
+           "is too slow.");
+    stamps("cloud_not_usable", "cannot be read.",
+           "Set " + key_ + "radar_format and the radar_field_ keys to the fields of your cloud.");
+  }
+
+  /// Scans whose points give no velocity, before the start and after it.
+  void addVelocities() {
+    const auto status = [&](const std::string& name, const std::string& text, const std::string& remedy) {
+      const std::uint64_t count =
+          countOf(radar_.scans_rejected, name) + countOf(radar_.velocity_status, name);
+      const double share = shareOf(count, radar_.scans_total);
+      if (share < kManyScans) return;
+      cause(name, share, outOf(count, radar_.scans_total, "scans") + of_ + " " + text, remedy);
+    };
+    const double kept = static_cast<double>(
+        radar_.points_by_verdict[static_cast<std::size_t>(PointVerdict::kKept)]);
+    const double kept_per_scan = kept / static_cast<double>(radar_.scans_total);
+    // What the filter took is a cause of its own.
+    if (shareOf(static_cast<std::uint64_t>(kept), radar_.points) > 1.0 - kManyPoints || radar_.points == 0) {
+      status("too_few_points",
+             "have too few points for a velocity: " + number(kept_per_scan) + " on average after the filter.",
+             "Let the radar report more points: a lower detection threshold in its driver. Set radar_factor: doppler "
+             "if it is not.");
+    }
+    status("too_few_inliers", "have no velocity that enough of their points agree on.",
+           "Check " + key_ + "radar_field_doppler, " + key_ + "radar_axes and the positions. Moving things in view "
+           "do the same.");
+    status("ill_conditioned", "have all their points in one direction.",
+           "Widen the view of the radar: " + key_ + "radar_max_azimuth and " + key_ + "radar_max_elevation.");
+    status("sigma_too_large", "have a velocity that is too uncertain.",
+           "Raise " + key_ + "ego_velocity_max_sigma, or let the radar report more points.");
+    status("ambiguous", "show two velocities, and nothing tells which is that of the static world.",
+           "Something that moves fills the view: turn the radar away from it.");
+  }
+
+  /// Scans that give a velocity that the IMU contradicts.
+  void addContradictions() {
+    const std::uint64_t judged = radar_.scans_total - radar_.scans_before_start;
+    const std::uint64_t contradicted =
+        sumOf(radar_.scans_rejected, {"innovation", "infeasible_velocity"});
+    const double share = shareOf(contradicted, judged);
+    if (share < kManyScans) return;
+    cause("contradicts_imu", share,
+          outOf(contradicted, judged, "scans") + of_ + " show a velocity that contradicts the IMU.",
+          "Check the mounting (" + key_ + "extrinsics_rotation_xyzw), " + key_ + "radar_doppler_sign and " + key_ +
+              "radar_axes; estimate_extrinsics: rotation finds up to 10 degrees by itself.");
+  }
+
+  const RadarEvidence& radar_;
+  const Config& config_;
+  const std::string key_, of_;
+  std::vector<Cause>* causes_;
+};
+
+bool has(const std::string& text, const char* part) { return text.find(part) != std::string::npos; }
+
+void addStart(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
+  const std::string& waiting = evidence.waiting_for;
+  const std::string text = "The start waits for " + waiting + ".";
+  if (evidence.initialized) return;
+  // The start in motion names gravity and mounting, the start at rest what moves.
+  if (has(waiting, "radar and IMU that agree")) {
+    causes->push_back({"start_contradicts", text,
+                       "Check radar_doppler_sign, radar_axes and extrinsics_rotation_xyzw, and that the IMU "
+                       "is in m/s^2 and rad/s.",
+                       0.9});
+  } else if (has(waiting, "not in m/s^2?")) {
+    causes->push_back({"imu_units", text,
+                       "The driver of the IMU must publish m/s^2 with gravity, and rad/s: it may publish g.", 0.95});
+  } else if (config.odometry.init_mode == InitMode::kStatic) {
+    causes->push_back({"never_at_rest", text, "Let the platform rest at the start, or set init_mode: auto.", 0.8});
+  } else {
+    causes->push_back({"too_short", text,
+                       "Give it more data: init_duration of rest, or init_motion_after plus init_motion_window of "
+                       "motion.",
+                       0.2});
+  }
+}
+
+void addOffset(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
+  const double share = shareOf(evidence.windows_at_bound, evidence.windows);
+  if (share < kManyWindows || evidence.windows < kEnoughScans) return;
+  const double bound = config.odometry.smoother.max_time_offset;
+  causes->push_back(
+      {"offset_at_bound",
+       outOf(evidence.windows_at_bound, evidence.windows, "windows") +
+           " end with the time offset at its bound, max_time_offset " + number(bound) + " s.",
+       "Raise max_time_offset, take the known delay off with radar_stamp_shift, or set stamp_source: arrival. A wrong "
+       "mounting can do the same.",
+       share});
+}
+
+void addImu(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
+  const auto fault = [&](const std::string& name, std::uint64_t samples_of_one, const std::string& text,
+                         const std::string& remedy) {
+    const std::uint64_t count = countOf(evidence.faults, name);
+    const double share = shareOf(count * samples_of_one, evidence.imu_count);
+    if (share > kManySamples) causes->push_back({name, std::to_string(count) + " " + text, remedy, std::min(1.0, share)});
+  };
+  fault("imu_not_usable", 1, "IMU messages cannot be used.", "Check the stamps and the values of imu_topic.");
+  fault("imu_saturated", 1, "IMU samples are at the end of the range.",
+        "Take an IMU with a larger range, or give it with imu_accel_range and imu_gyro_range if they are not.");
+  fault("imu_gap", 10, "gaps between IMU samples are longer than max_imu_gap.",
+        "Raise max_imu_gap for a slow IMU, or look for what loses its messages.");
+  fault("imu_out_of_order", 1, "IMU samples are out of order.", "Look for a second publisher on imu_topic.");
+  const ImuNoise& told = config.odometry.imu_noise;
+  const MeasuredImuNoise& noise = evidence.imu_noise;
+  if (!noise.isFarAbove(told)) return;
+  causes->push_back({"imu_noisy",
+                     "The IMU vibrates or is noisier than configured: accelerometer " + number(noise.accel_density) +
+                         " against imu_accel_noise_density " + number(told.accel_density) + ", gyro " +
+                         number(noise.gyro_density) + " against imu_gyro_noise_density " +
+                         number(told.gyro_density) + ".",
+                     "Mount the IMU softer, or raise these two keys.", 0.1});
+}
+
+void addDivergence(const RunEvidence& evidence, std::vector<Cause>* causes) {
+  const double share = shareOf(evidence.scans_diverged, evidence.scans_judged);
+  const std::uint64_t divergences = countOf(evidence.faults, "diverged");
+  if (divergences == 0 && evidence.health != Health::kDiverged) return;
+  causes->push_back(
+      {"diverged",
+       "The estimate diverged " + std::to_string(divergences) + " times, for " +
+           outOf(evidence.scans_diverged, evidence.scans_judged, "scans") + ": radar and IMU contradict each other.",
+       "Check the mounting, radar_doppler_sign and radar_axes; if it diverged only near large moving things, the "
+       "estimate after it is good again.",
+       std::max(0.05, share)});
+}
+
+std::vector<Check> checksOf(const RunEvidence& evidence) {
+  std::uint64_t used = 0, after_start = 0;
+  double kept = 1.0;
+  for (const RadarEvidence& radar : evidence.radars) {
+    used += radar.scans_used;
+    after_start += radar.scans_total - radar.scans_before_start;
+    const std::uint64_t passed = radar.points_by_verdict[static_cast<std::size_t>(PointVerdict::kKept)];
+    if (radar.points > 0) kept = std::min(kept, shareOf(passed, radar.points));
+  }
+  std::uint64_t imu_faults = 0;
+  for (const char* fault : kImuFaults) imu_faults += countOf(evidence.faults, fault);
+  return {{"started", evidence.initialized ? 1.0 : 0.0, 1.0, true},
+          {"scans_used_share", shareOf(used, after_start), kFewScansUsed, true},
+          {"points_kept_share", kept, 1.0 - kManyPoints, true},
+          {"scans_diverged_share", shareOf(evidence.scans_diverged, evidence.scans_judged), kManyDiverged, false},
+          {"windows_at_offset_bound_share", shareOf(evidence.windows_at_bound, evidence.windows), kManyWindows,
+           false},
+          {"imu_faults_share", std::min(1.0, shareOf(imu_faults, evidence.imu_count)), kManySamples, false},
+          {"healthy_at_end", evidence.health == Health::kOk ? 1.0 : 0.0, 1.0, true}};
+}
+
+RunVerdict verdictOf(const RunEvidence& evidence, const Diagnosis& diagnosis) {
+  const auto used = [](const RadarEvidence& radar) { return radar.scans_used > 0; };
+  const bool any_used = std::any_of(evidence.radars.begin(), evidence.radars.end(), used);
+  const bool diverged = evidence.health == Health::kDiverged ||
+                        shareOf(evidence.scans_diverged, evidence.scans_judged) > 0.5;
+  if (!evidence.initialized || !any_used || diverged) return RunVerdict::kBad;
+  const bool all_green = std::all_of(diagnosis.checks.begin(), diagnosis.checks.end(),
+                                     [](const Check& check) { return check.good(); });
+  return all_green && diagnosis.causes.empty() ? RunVerdict::kGood : RunVerdict::kDoubtful;
+}
+
+}  // namespace
+
+std::string toString(RunVerdict verdict) {
+  switch (verdict) {
+    case RunVerdict::kGood:
+      return "good";
+    case RunVerdict::kDoubtful:
+      return "doubtful";
+    case RunVerdict::kBad:
+      return "bad";
+  }
+  throw std::invalid_argument("not a RunVerdict");
+}
+
+Diagnosis diagnose(const RunEvidence& evidence, const Config& config) {
+  Diagnosis result;
+  const std::vector<Config> radars = configsOfRadars(config);
+  for (std::size_t k = 0; k < evidence.radars.size(); ++k)
+    RadarCauses(evidence.radars[k], radars.at(k), &result.causes).add();
+  addStart(evidence, config, &result.causes);
+  addOffset(evidence, config, &result.causes);
+  addImu(evidence, config, &result.causes);
+  addDivergence(evidence, &result.causes);
+  // Stable: of causes that explain the same, the one nearer to the sensor comes first.
+  std::stable_sort(result.causes.begin(), result.causes.end(),
+                   [](const Cause& a, const Cause& b) { return a.share > b.share; });
+  if (result.causes.size() > kMostCauses) result.causes.resize(kMostCauses);
+  result.checks = checksOf(evidence);
+  result.verdict = verdictOf(evidence, result);
+  return result;
+}
+
+std::string describeCauses(const Diagnosis& diagnosis) {
+  std::string text;
+  for (std::size_t i = 0; i < diagnosis.causes.size(); ++i) {
+    const Cause& cause = diagnosis.causes[i];
+    text += "  " + std::to_string(i + 1) + ". " + cause.text + " " + cause.remedy + "\n";
+  }
+  for (const Check& check : diagnosis.checks) {
+    if (check.good()) continue;
+    text += "  " + check.name + " is " + number(check.value) + ", expected at " + (check.at_least ? "least " : "most ") +
+            number(check.limit) + "\n";
+  }
+  return text;
+}
+
+}  // namespace rio_t

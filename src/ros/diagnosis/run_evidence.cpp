@@ -1,0 +1,56 @@
+#include "rio_t/ros/diagnosis/run_evidence.h"
+
+namespace rio_t {
+
+EvidenceCollector::EvidenceCollector(const Config& config) {
+  for (const Config& radar : configsOfRadars(config)) {
+    options_.push_back(radar.odometry.ego_velocity);
+    RadarEvidence& seen = evidence_.radars.emplace_back();
+    seen.name = radar.radar_name;
+    seen.final_offset_s = radar.odometry.smoother.time_offset_initial;
+  }
+}
+
+void EvidenceCollector::add(const ScanResult& result) {
+  if (!result.used && result.rejected_because.empty()) return;  // only carries the last poses
+  RadarEvidence& radar = evidence_.radars.at(result.scan.radar);
+  ++radar.scans_total;
+  for (const RadarPoint& point : result.scan.points) {
+    ++radar.points;
+    radar.snr_sum_db += point.snr_db;
+    ++radar.points_by_verdict[static_cast<std::size_t>(judgePoint(point, options_[result.scan.radar]))];
+  }
+  if (result.rejected_because == "before_initialization") {
+    ++radar.scans_before_start;
+    ++radar.velocity_status[toString(result.ego_velocity.status)];
+    return;
+  }
+  ++evidence_.scans_judged;
+  if (result.health == Health::kDiverged) ++evidence_.scans_diverged;
+  if (result.used) {
+    ++radar.scans_used;
+  } else {
+    ++radar.scans_rejected[result.rejected_because];
+  }
+  if (!result.updated) return;
+  radar.final_offset_s = result.time_offset;
+  ++evidence_.windows;
+  if (result.solver_termination == SolverTermination::kAtBound) ++evidence_.windows_at_bound;
+}
+
+void EvidenceCollector::addDropped(std::size_t radar, const std::string& reason, std::uint64_t count) {
+  evidence_.radars.at(radar).scans_total += count;
+  evidence_.radars.at(radar).scans_rejected[reason] += count;
+}
+
+RunEvidence EvidenceCollector::evidence(const RadarInertialOdometry& odometry) const {
+  RunEvidence all = evidence_;
+  all.initialized = odometry.initialized();
+  if (!all.initialized) all.waiting_for = odometry.waitingFor();
+  all.faults = odometry.faults();
+  all.health = odometry.health();
+  all.imu_noise = odometry.imuNoise();
+  return all;
+}
+
+}  // namespace rio_t

@@ -1,0 +1,123 @@
+#include "../src/ros/bag/command_line.h"
+
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+namespace rio_t {
+namespace {
+
+const ProgramText kText = {"tool", "FILE...\n", "Tests.", "rosrun rio_t tool a.txt\n", ""};
+
+/// A program with an option of each kind.
+class CommandLine : public testing::Test {
+ protected:
+  /// Runs it; what it set is in the members.
+  int run(const std::vector<std::string>& words, const std::function<int()>& body = [] { return 0; }) {
+    OptionSet options("Options");
+    options.values("file", "FILE", "files", [this](const std::string& file) { files_.push_back(file); });
+    options.positional("file");
+    options.number("speed", "M/S", "how fast", speed_, NumberRange::kPositive);
+    options.number("shift", "S", "may be negative", shift_);
+    options.count("count", "how many", count_);
+    options.flag("quiet", "says less", quiet_);
+    options.text("out", "FILE", "goes there", out_file_);
+    options.text("output-dir", "FOLDER", "goes there", folder_);
+    std::ostringstream out, err;
+    const int status = runProgram(kText, options, words, out, err, body);
+    out_ = out.str();
+    err_ = err.str();
+    return status;
+  }
+
+  std::vector<std::string> files_;
+  double speed_ = 1.5, shift_ = 0.0;
+  int count_ = 2;
+  bool quiet_ = false;
+  std::string out_file_, folder_, out_, err_;
+};
+
+TEST_F(CommandLine, BothFormsOfAValueAreRead) {
+  EXPECT_EQ(run({"a.txt", "--speed", "2.5", "--shift=-0.1", "--count=3", "b.txt", "--quiet"}), kExitOk);
+  EXPECT_EQ(files_, (std::vector<std::string>{"a.txt", "b.txt"}));
+  EXPECT_EQ(speed_, 2.5);
+  EXPECT_EQ(shift_, -0.1);
+  EXPECT_EQ(count_, 3);
+  EXPECT_TRUE(quiet_);
+  EXPECT_EQ(err_, "");
+}
+
+TEST_F(CommandLine, ANegativeNumberIsAValue) {
+  EXPECT_EQ(run({"--shift", "-0.25"}), kExitOk);
+  EXPECT_EQ(shift_, -0.25);
+}
+
+TEST_F(CommandLine, WhatIsNotGivenKeepsItsDefault) {
+  EXPECT_EQ(run({}), kExitOk);
+  EXPECT_EQ(speed_, 1.5);
+  EXPECT_FALSE(quiet_);
+}
+
+TEST_F(CommandLine, NothingIsGuessed) {
+  EXPECT_EQ(run({"--output", "x"}), kExitUsage);
+  EXPECT_NE(err_.find("unrecognised option '--output'"), std::string::npos) << err_;
+  EXPECT_EQ(run({"--out", "x"}), kExitOk);
+  EXPECT_EQ(out_file_, "x");
+  EXPECT_EQ(folder_, "");
+}
+
+TEST_F(CommandLine, WrongValuesAreNamed) {
+  const std::pair<std::vector<std::string>, std::string> wrong[] = {
+      {{"--speed", "fast"}, "tool: --speed: 'fast' is not a number (see --help)\n"},
+      {{"--speed", "0"}, "tool: --speed: '0' is not above 0 (see --help)\n"},
+      {{"--speed", "nan"}, "tool: --speed: 'nan' is not a number (see --help)\n"},
+      {{"--speed", "1,5"}, "tool: --speed: '1,5' is not a number (see --help)\n"},
+      {{"--count", "2.5"}, "tool: --count: '2.5' is not a whole number from 1 to 100000 (see --help)\n"},
+  };
+  for (const auto& [words, message] : wrong) {
+    EXPECT_EQ(run(words), kExitUsage);
+    EXPECT_EQ(err_, message);
+  }
+  EXPECT_EQ(run({"--speed"}), kExitUsage);
+  EXPECT_EQ(run({"--quiet=1"}), kExitUsage);
+  EXPECT_EQ(run({"--speed=1", "--speed=2"}), kExitUsage);
+}
+
+TEST_F(CommandLine, TheExitStatusSaysWhatHappened) {
+  EXPECT_EQ(run({}, [] { return static_cast<int>(kExitNotTrusted); }), 3);
+  EXPECT_EQ(run({}, []() -> int { throw std::runtime_error("disk full"); }), kExitFailed);
+  EXPECT_EQ(err_, "tool: disk full\n");
+  EXPECT_EQ(run({}, []() -> int { throw UsageError("a file is missing"); }), kExitUsage);
+}
+
+TEST_F(CommandLine, HelpAndVersionComeBeforeAllElse) {
+  EXPECT_EQ(run({"--wrong", "--help"}), kExitOk);
+  for (const char* part : {"usage: rosrun rio_t tool FILE...", "--speed M/S", "how fast [1.5]", "--quiet",
+                           "Examples:\n  rosrun rio_t tool a.txt\n", "Exit status"})
+    EXPECT_NE(out_.find(part), std::string::npos) << part << " not in " << out_;
+  EXPECT_EQ(run({"--version"}), kExitOk);
+  EXPECT_EQ(out_.rfind("tool of rio_t ", 0), 0U) << out_;
+}
+
+TEST_F(CommandLine, WhatRoslaunchAddsIsSkipped) {
+  EXPECT_EQ(run({"a.txt", "__name:=node", "__log:=/tmp/x.log"}), kExitOk);
+  EXPECT_EQ(files_, std::vector<std::string>{"a.txt"});
+}
+
+TEST(OptionSet, TheFirstSourceCounts) {
+  double x = 0.0, y = 0.0;
+  std::vector<std::string> steps;
+  OptionSet options("");
+  options.number("x", "S", "", x);
+  options.number("y", "S", "", y);
+  options.values("step", "S", "", [&](const std::string& step) { steps.push_back(step); });
+  const OptionSet::Given own = options.parse({"--x=1", "--step=a", "--step=b"});
+  const OptionSet::Given outside = options.parse({"--x=2", "--y=3", "--step=c"});
+  options.set({own, outside});
+  EXPECT_EQ(x, 1.0);
+  EXPECT_EQ(y, 3.0);
+  EXPECT_EQ(steps, (std::vector<std::string>{"a", "b"}));
+}
+
+}  // namespace
+}  // namespace rio_t

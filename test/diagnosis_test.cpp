@@ -1,0 +1,249 @@
+// Each cause from the counters that show it. test/diagnosis_test.py has the runs that show them.
+#include "rio_t/ros/diagnosis/diagnosis.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace rio_t {
+namespace {
+
+std::uint64_t& pointsOf(RunEvidence& evidence, PointVerdict verdict) {
+  return evidence.radars.front().points_by_verdict[static_cast<std::size_t>(verdict)];
+}
+
+/// A good run of 200 scans: some points filtered, some scans rejected.
+RunEvidence goodRun() {
+  RunEvidence evidence;
+  evidence.initialized = true;
+  evidence.imu_count = 4000;
+  evidence.faults = {{"imu_gap", 2}, {"imu_saturated", 20}};
+  evidence.scans_judged = 190;
+  evidence.windows = 180;
+  evidence.windows_at_bound = 3;
+  RadarEvidence& radar = evidence.radars.emplace_back();
+  radar.scans_total = 200;
+  radar.scans_used = 175;
+  radar.scans_before_start = 10;
+  radar.velocity_status = {{"moving", 8}, {"too_few_points", 2}};
+  radar.scans_rejected = {{"innovation", 8}, {"too_few_points", 7}};
+  radar.points = 10000;
+  radar.snr_sum_db = 150000.0;
+  pointsOf(evidence, PointVerdict::kKept) = 7000;
+  pointsOf(evidence, PointVerdict::kTooWeak) = 2500;
+  pointsOf(evidence, PointVerdict::kTooNear) = 500;
+  return evidence;
+}
+
+/// Nothing was used after the start.
+RunEvidence withRejected(const std::string& reason) {
+  RunEvidence evidence = goodRun();
+  evidence.radars.front().scans_used = 0;
+  evidence.radars.front().scans_rejected = {{reason, 190}};
+  return evidence;
+}
+
+RunEvidence neverStarted(const std::string& waiting_for) {
+  RunEvidence evidence = goodRun();
+  evidence.initialized = false;
+  evidence.waiting_for = waiting_for;
+  evidence.scans_judged = evidence.windows = evidence.windows_at_bound = 0;
+  RadarEvidence& radar = evidence.radars.front();
+  radar.scans_used = 0;
+  radar.scans_before_start = radar.scans_total;
+  radar.scans_rejected.clear();
+  radar.velocity_status = {{"moving", 200}};
+  return evidence;
+}
+
+/// The likeliest cause, as "name: text remedy".
+std::string first(const RunEvidence& evidence, const Config& config = Config{}) {
+  const Diagnosis diagnosis = diagnose(evidence, config);
+  if (diagnosis.causes.empty()) return "none";
+  const Cause& cause = diagnosis.causes.front();
+  return cause.name + ": " + cause.text + " " + cause.remedy;
+}
+
+void expectSays(const std::string& text, const std::vector<std::string>& parts) {
+  for (const std::string& part : parts)
+    EXPECT_NE(text.find(part), std::string::npos) << part << " not in: " << text;
+}
+
+TEST(Diagnosis, AGoodRunHasNoCauses) {
+  const Diagnosis diagnosis = diagnose(goodRun(), Config{});
+  EXPECT_EQ(toString(diagnosis.verdict), "good");
+  EXPECT_EQ(describeCauses(diagnosis), "");
+  EXPECT_EQ(diagnosis.checks.size(), 7u);
+  for (const Check& check : diagnosis.checks) EXPECT_TRUE(check.good()) << check.name;
+}
+
+TEST(Diagnosis, FilteredPointsNameTheFilterAndTheUnit) {
+  RunEvidence evidence = withRejected("too_few_points");
+  pointsOf(evidence, PointVerdict::kKept) = 0;
+  pointsOf(evidence, PointVerdict::kTooNear) = 0;
+  pointsOf(evidence, PointVerdict::kTooWeak) = 10000;
+  evidence.radars.front().snr_sum_db = 15000.0;
+  Config config;
+  config.radar_overrides.power_unit = "snr_decidb";
+  expectSays(first(evidence, config),
+             {"points_too_weak: 10000 of 10000 points are below radar_min_snr_db 3 dB", "their mean is 1.5 dB",
+              "the preset irs reads the power as snr_decidb", "Set radar_power_unit"});
+  // One cause: that there are too few points follows from it.
+  EXPECT_EQ(diagnose(evidence, config).causes.size(), 1u);
+  EXPECT_EQ(diagnose(evidence, config).verdict, RunVerdict::kBad);
+}
+
+TEST(Diagnosis, EachFilterHasItsKey) {
+  const std::pair<PointVerdict, std::string> filters[] = {
+      {PointVerdict::kTooNear, "radar_min_range"},   {PointVerdict::kTooFar, "radar_max_range"},
+      {PointVerdict::kBesideView, "radar_axes"},     {PointVerdict::kAboveView, "radar_axes"},
+      {PointVerdict::kNoDirection, "radar_field_x"},
+  };
+  for (const auto& [verdict, key] : filters) {
+    RunEvidence evidence = goodRun();
+    evidence.radars.front().points_by_verdict = {};
+    pointsOf(evidence, verdict) = 9000;
+    pointsOf(evidence, PointVerdict::kKept) = 1000;
+    expectSays(first(evidence), {"9000 of 10000 points", key});
+    EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful) << "it runs, with few points";
+  }
+}
+
+TEST(Diagnosis, RejectedScansNameReasonAndKey) {
+  const std::pair<std::string, std::string> reasons[] = {
+      {"stamp_zero", "stamp_source"},
+      {"stamp_ahead_of_imu", "stamp_source: arrival"},
+      {"older_than_window", "radar_stamp_shift"},
+      {"imu_not_covering", "radar_stamp_shift"},
+      {"trigger_missing", "trigger_topic"},
+      {"duplicate_stamp", "stamp_source: arrival"},
+      {"queue_full", "window"},
+      {"cloud_not_usable", "radar_format"},
+      {"too_few_points", "detection threshold"},
+      {"too_few_inliers", "radar_field_doppler"},
+      {"ill_conditioned", "radar_max_azimuth"},
+      {"sigma_too_large", "ego_velocity_max_sigma"},
+      {"ambiguous", "moves"},
+      {"innovation", "extrinsics_rotation_xyzw"},
+      {"infeasible_velocity", "radar_doppler_sign"},
+  };
+  for (const auto& [reason, key] : reasons) {
+    const RunEvidence evidence = withRejected(reason);
+    expectSays(first(evidence), {"190 of ", key});
+    EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kBad) << reason;
+  }
+}
+
+TEST(Diagnosis, AStartThatNeverCameSaysWhatItWaitsFor) {
+  expectSays(first(neverStarted("rest: x; or radar and IMU that agree: together they show 3 m/s^2 as gravity")),
+             {"start_contradicts", "together they show 3 m/s^2", "radar_doppler_sign"});
+  expectSays(first(neverStarted("rest: mean accelerometer 1.00 m/s^2 instead of gravity 9.81: accelerating, or "
+                                "not in m/s^2?")),
+             {"imu_units", "may publish g"});
+  expectSays(first(neverStarted("standing still: 1.2 of 3.0 s seen")), {"too_short", "init_duration"});
+  Config config;
+  config.odometry.init_mode = InitMode::kStatic;
+  expectSays(first(neverStarted("rest: the gyro moves by 1 rad/s"), config), {"never_at_rest", "init_mode: auto"});
+  EXPECT_EQ(diagnose(neverStarted("rest"), Config{}).verdict, RunVerdict::kBad);
+}
+
+TEST(Diagnosis, AStartWithoutVelocitiesNamesTheirReason) {
+  RunEvidence evidence = neverStarted("rest: the gyro moves; or radar velocities in motion: 0.0 of 2.5 s seen");
+  evidence.radars.front().velocity_status = {{"too_few_inliers", 180}, {"moving", 20}};
+  expectSays(first(evidence), {"too_few_inliers: 180 of 200 scans"});
+}
+
+TEST(Diagnosis, TheOffsetAtItsBoundIsNamed) {
+  RunEvidence evidence = goodRun();
+  evidence.windows_at_bound = 150;
+  expectSays(first(evidence), {"offset_at_bound: 150 of 180 windows", "max_time_offset 0.25 s", "radar_stamp_shift"});
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
+}
+
+TEST(Diagnosis, ADivergenceIsBadIfItLastsAndDoubtfulIfNot) {
+  RunEvidence evidence = goodRun();
+  evidence.faults["diverged"] = 1;
+  evidence.scans_diverged = 30;
+  expectSays(first(evidence), {"diverged 1 times, for 30 of 190 scans", "radar_doppler_sign"});
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
+  evidence.scans_diverged = 100;
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kBad);
+  evidence.scans_diverged = 1;
+  evidence.health = Health::kDiverged;
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kBad);
+}
+
+TEST(Diagnosis, TheImuIsNamed) {
+  RunEvidence evidence = goodRun();
+  evidence.imu_noise.accel_density = 0.2;
+  expectSays(first(evidence), {"imu_noisy", "accelerometer 0.2 against imu_accel_noise_density 0.02"});
+  evidence = goodRun();
+  evidence.faults["imu_saturated"] = 400;
+  expectSays(first(evidence), {"imu_saturated: 400 IMU samples", "imu_accel_range"});
+  evidence = goodRun();
+  evidence.faults["imu_gap"] = 100;
+  expectSays(first(evidence), {"imu_gap: 100 gaps", "max_imu_gap"});
+}
+
+TEST(Diagnosis, TheLikeliestThreeComeFirst) {
+  RunEvidence evidence = withRejected("innovation");
+  evidence.faults = {{"diverged", 2}, {"imu_saturated", 400}, {"imu_gap", 100}};
+  evidence.scans_diverged = 150;
+  const Diagnosis diagnosis = diagnose(evidence, Config{});
+  ASSERT_EQ(diagnosis.causes.size(), 3u);
+  EXPECT_EQ(diagnosis.causes[0].name, "contradicts_imu");
+  EXPECT_EQ(diagnosis.causes[1].name, "diverged");
+  EXPECT_TRUE(std::is_sorted(diagnosis.causes.begin(), diagnosis.causes.end(),
+                             [](const Cause& a, const Cause& b) { return a.share > b.share; }));
+  expectSays(describeCauses(diagnosis), {"  1. 190 of 190 scans", "\n  2. ", "\n  3. ", "\n  scans_used_share is 0"});
+}
+
+TEST(Diagnosis, OneOfSeveralRadarsIsNamed) {
+  Config config;
+  config.radars.resize(2);
+  config.radars[0].radar_name = "left";
+  config.radars[1].radar_name = "right";
+  RunEvidence evidence = goodRun();
+  evidence.radars.push_back(evidence.radars.front());
+  evidence.radars[0].name = "left";
+  evidence.radars[1].name = "right";
+  evidence.radars[1].scans_rejected = {{"innovation", 100}};
+  expectSays(first(evidence, config), {"of radar right", "right/extrinsics_rotation_xyzw"});
+  EXPECT_EQ(diagnose(evidence, config).verdict, RunVerdict::kDoubtful);
+}
+
+TEST(Diagnosis, ManyReasonsForRejectionAreDoubtfulTogether) {
+  RunEvidence evidence = goodRun();
+  evidence.radars.front().scans_used = 80;
+  evidence.radars.front().scans_rejected = {
+      {"innovation", 28}, {"too_few_points", 28}, {"too_few_inliers", 28}, {"ambiguous", 26}};
+  const Diagnosis diagnosis = diagnose(evidence, Config{});
+  EXPECT_EQ(diagnosis.verdict, RunVerdict::kDoubtful);
+  EXPECT_TRUE(diagnosis.causes.empty());
+  EXPECT_EQ(describeCauses(diagnosis), "  scans_used_share is 0.421, expected at least 0.5\n");
+}
+
+TEST(Diagnosis, FewScansSayNothing) {
+  RunEvidence evidence = withRejected("innovation");
+  evidence.radars.front().scans_total = 15;
+  EXPECT_EQ(first(evidence), "none");
+}
+
+TEST(PointFilter, TheFirstFailedTestIsNamed) {
+  const EgoVelocityOptions o;
+  const auto judge = [&](const Eigen::Vector3d& p, double snr) {
+    return judgePoint({p, 0.0, snr}, o);
+  };
+  EXPECT_EQ(judge({0.0, 5.0, 0.0}, 10.0), PointVerdict::kKept);
+  EXPECT_EQ(judge({0.0, 0.0, 0.0}, 10.0), PointVerdict::kNoDirection);
+  EXPECT_EQ(judge({0.0, 0.1, 0.0}, 10.0), PointVerdict::kTooNear);
+  EXPECT_EQ(judge({0.0, 500.0, 0.0}, 0.0), PointVerdict::kTooFar);
+  EXPECT_EQ(judge({0.0, 5.0, 0.0}, 0.0), PointVerdict::kTooWeak);
+  EXPECT_EQ(judge({0.1, -5.0, 0.0}, 10.0), PointVerdict::kBesideView);
+  EgoVelocityOptions flat;
+  flat.max_elevation = 0.1;
+  EXPECT_EQ(judgePoint({{0.0, 5.0, -3.0}, 0.0, 10.0}, flat), PointVerdict::kAboveView);
+}
+
+}  // namespace
+}  // namespace rio_t

@@ -1,0 +1,93 @@
+"""Runs that disappoint say why, and good runs do not."""
+import pytest
+import rosbag
+import yaml
+
+from rio_t import programs
+
+
+@pytest.fixture(name="run_with")
+def run_with_fixture(programs_folder, simulated_run, tmp_path):
+    """Runs rio_t_bag on the simulated bag with these settings: the process and the summary, None without one."""
+    def run(*settings, bag=simulated_run / "run.bag"):
+        words = [word for setting in settings for word in ("--set", setting)]
+        done = programs.run(programs_folder / "rio_t_bag", bag, "--config", "irs", "--output-dir", tmp_path / "out", *words)
+        summary = tmp_path / "out" / "summary.yaml"
+        return done, yaml.safe_load(summary.read_text()) if summary.exists() else None
+    return run
+
+
+def causes_of(summary):
+    return [cause["name"] for cause in summary["causes"]]
+
+
+def test_a_good_run_is_good(run_with):
+    done, summary = run_with()
+    assert done.returncode == 0
+    assert (summary["verdict"], summary["causes"]) == ("good", [])
+    assert all(check["good"] for check in summary["checks"])
+    assert "verdict         good" in done.stdout
+
+
+@pytest.mark.parametrize("motion", ["difficult", "ground_vehicle", "constant_speed"])
+def test_other_good_runs_are_good(run_with, programs_folder, tmp_path, motion):
+    bag = tmp_path / "other.bag"
+    programs.output_of(programs_folder / "simulate", "--motion", motion, "--duration", 30, "--time-offset", 0.03, "--out",
+                       bag)
+    done, summary = run_with(bag=bag)
+    assert (done.returncode, summary["verdict"], summary["causes"]) == (0, "good", [])
+
+
+def test_filtered_points_name_the_unit_of_the_power(run_with):
+    done, summary = run_with("radar_power_unit=snr_decidb")
+    assert (done.returncode, summary) == (1, None)
+    assert "every one of the" in done.stderr
+    assert "points are below radar_min_snr_db 3 dB" in done.stderr
+    assert "reads the power as snr_decidb" in done.stderr
+
+
+def test_a_wrong_sign_is_not_trusted(run_with):
+    done, summary = run_with("radar_doppler_sign=-1")
+    if summary is None:  # it may also refuse to start
+        assert done.returncode == 1
+        assert "radar_doppler_sign" in done.stderr
+        return
+    assert done.returncode == 3
+    assert summary["verdict"] == "bad"
+    assert set(causes_of(summary)) & {"contradicts_imu", "diverged"}
+    assert "radar_doppler_sign" in done.stdout
+
+
+def test_a_start_without_rest_says_so(run_with):
+    done, summary = run_with("init_mode=static", "init_duration=60")
+    assert (done.returncode, summary) == (1, None)
+    assert "never initialised" in done.stderr
+    assert "init_mode: auto" in done.stderr
+
+
+def test_stamps_of_another_clock_are_named(run_with):
+    done, summary = run_with("radar_stamp_shift=1000")
+    assert (done.returncode, summary) == (1, None)
+    assert "radar_stamp_shift" in done.stderr or "stamp_source: arrival" in done.stderr
+
+
+def test_an_offset_beyond_its_bound_is_named(run_with):
+    done, summary = run_with("max_time_offset=0.01", "radar_stamp_shift=0.1")
+    assert "offset_at_bound" in causes_of(summary)
+    assert summary["verdict"] != "good"
+    assert "max_time_offset 0.01" in done.stdout
+
+
+def test_several_bags_are_played_as_one(run_with, programs_folder, simulated_run, tmp_path):
+    parts = [tmp_path / "part_0.bag", tmp_path / "part_1.bag"]
+    with rosbag.Bag(str(simulated_run / "run.bag")) as whole:
+        middle = (whole.get_start_time() + whole.get_end_time()) / 2
+        with rosbag.Bag(str(parts[0]), "w") as first, rosbag.Bag(str(parts[1]), "w") as second:
+            for topic, message, stamp in whole.read_messages():
+                (first if stamp.to_sec() < middle else second).write(topic, message, stamp)
+    _, whole_summary = run_with()
+    trajectory = (tmp_path / "out" / "trajectory.txt").read_bytes()
+    done = programs.run(programs_folder / "rio_t_bag", *parts, "--config", "irs", "--output-dir", tmp_path / "both")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "both" / "trajectory.txt").read_bytes() == trajectory
+    assert yaml.safe_load((tmp_path / "both" / "summary.yaml").read_text())["scans_used"] == whole_summary["scans_used"]

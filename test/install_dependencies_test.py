@@ -1,0 +1,136 @@
+"""scripts/install_dependencies.sh on machines of many kinds: nothing is installed where it could harm."""
+import os
+import pty
+import subprocess
+
+import pytest
+
+DEBIAN = {"11": "bullseye", "12": "bookworm", "13": "trixie"}
+
+
+class Machine:
+    """A machine with stand-ins for the programs that the script calls; what they were asked is in `calls`."""
+
+    def __init__(self, folder, script):
+        self.script, self.root, self.log = script, folder / "root", folder / "calls"
+        self.programs = folder / "bin"
+        self.programs.mkdir()
+        (self.root / "etc").mkdir(parents=True)
+        self.environment = {**os.environ, "PATH": f"{self.programs}:/usr/bin:/bin", "RIO_T_SYSTEM_ROOT": str(self.root)}
+        self.environment.pop("ROS_DISTRO", None)
+        self.program("dpkg-query", "exit 1")  # nothing is installed
+        self.program("id", "echo 0")
+        for name in ("apt-get", "rosdep"):
+            self.program(name, f'echo {name} "$@" >>{self.log}')
+        self.program("sudo", f'echo sudo >>{self.log}; exec "$@"')
+
+    def program(self, name, text):
+        path = self.programs / name
+        path.write_text(f"#!/bin/sh\n{text}\n")
+        path.chmod(0o755)
+
+    def system(self, name, version):
+        (self.root / "etc/os-release").write_text(f'PRETTY_NAME="A {name} {version}"\nID={name}\nVERSION_ID="{version}"\n')
+
+    def ros(self, distribution, sourced):
+        (self.root / "opt/ros" / distribution).mkdir(parents=True)
+        if sourced:
+            self.environment["ROS_DISTRO"] = distribution
+
+    def run(self, *words, answer=None):
+        """The completed process. `answer`: what is typed on a terminal; without it there is none."""
+        if answer is None:
+            return subprocess.run([self.script, *words], env=self.environment, text=True, stdin=subprocess.DEVNULL,
+                                  capture_output=True, check=False)
+        ours, theirs = pty.openpty()
+        os.write(ours, answer.encode())
+        try:
+            return subprocess.run([self.script, *words], env=self.environment, text=True, stdin=theirs,
+                                  capture_output=True, check=False)
+        finally:
+            os.close(ours)
+            os.close(theirs)
+
+    @property
+    def calls(self):
+        return self.log.read_text() if self.log.exists() else ""
+
+
+@pytest.fixture
+def machine(tmp_path, scripts):
+    return Machine(tmp_path, scripts / "install_dependencies.sh")
+
+
+@pytest.mark.parametrize("version", DEBIAN)
+def test_debian_as_root_says_what_it_installs_and_goes_on(machine, version):
+    machine.system("debian", version)
+    done = machine.run("clang-14")
+    assert done.returncode == 0, done.stderr
+    assert "librostest-dev" in done.stdout and "clang-14" in done.stdout and f"A debian {version}" in done.stdout
+    assert "sudo" not in machine.calls
+    assert ("python3-ament-package" in machine.calls) == (version != "11")  # Debian 11 has no such package
+    assert "apt-get update" in machine.calls and "clang-14" in machine.calls
+
+
+def test_nothing_is_done_if_all_is_there(machine):
+    machine.system("debian", "12")
+    machine.program("dpkg-query", "echo installed")
+    done = machine.run()
+    assert (done.returncode, done.stdout, machine.calls) == (0, "", "")
+
+
+def test_without_a_terminal_sudo_is_used_without_a_question(machine):
+    machine.system("debian", "12")
+    machine.program("id", "echo 1000")
+    assert machine.run().returncode == 0
+    assert machine.calls.count("sudo") == 2
+
+
+@pytest.mark.parametrize("answer", ["n\n", "\n", "\x04"])
+def test_on_a_terminal_it_asks_before_sudo(machine, answer):
+    machine.system("debian", "12")
+    machine.program("id", "echo 1000")
+    done = machine.run(answer=answer)
+    assert done.returncode == 1
+    assert machine.calls == ""
+    assert "librostest-dev" in done.stdout
+
+
+def test_on_a_terminal_it_installs_after_a_yes(machine):
+    machine.system("debian", "12")
+    machine.program("id", "echo 1000")
+    assert machine.run(answer="y\n").returncode == 0
+    assert machine.calls.count("sudo") == 2
+
+
+@pytest.mark.parametrize("system, version, distribution", [("ubuntu", "20.04", "noetic"), ("ubuntu", "22.04", "one"),
+                                                           ("debian", "12", "noetic"), ("fedora", "41", None)])
+def test_elsewhere_nothing_changes_and_the_right_lines_are_told(machine, system, version, distribution):
+    machine.system(system, version)
+    if distribution:
+        machine.ros(distribution, sourced=False)
+    done = machine.run("clang-14")
+    assert done.returncode == 3
+    assert machine.calls == ""
+    distribution = distribution or "noetic"
+    for line in (f"source /opt/ros/{distribution}/setup.bash", f"--ignore-src --rosdistro {distribution}", "catkin_make",
+                 "also needs: clang-14"):
+        assert line in done.stderr
+    assert "/opt/ros, and Debian's packages" in done.stderr or f"A {system} {version}" in done.stderr
+
+
+def test_a_sourced_ros_that_has_everything_lets_the_build_go_on(machine):
+    machine.system("ubuntu", "20.04")
+    machine.ros("noetic", sourced=True)
+    assert machine.run().returncode == 0
+    assert "rosdep check --rosdistro noetic" in machine.calls and "apt-get" not in machine.calls
+
+
+def test_a_sourced_ros_that_lacks_something_stops(machine):
+    machine.system("ubuntu", "20.04")
+    machine.ros("noetic", sourced=True)
+    machine.program("rosdep", "exit 1")
+    assert machine.run().returncode == 3
+    machine.program("rosdep", "exit 0")
+    done = machine.run("clang-14")
+    assert done.returncode == 3 and "missing: clang-14" in done.stderr

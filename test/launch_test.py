@@ -1,0 +1,95 @@
+"""The launch files: their arguments, what they refuse, and what they put on the parameter server."""
+import os
+import subprocess
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+import yaml
+from conftest import SOURCE
+
+from rio_t import launch_config
+from rio_t.errors import RioTError
+
+LAUNCH = SOURCE / "launch"
+SENSORS = ("irs", "ti_mmwave", "two_radars")
+
+
+def roslaunch(*words, folder=None):
+    environment = {**os.environ, "PWD": str(folder or os.getcwd())}
+    return subprocess.run(["roslaunch", *map(str, words)], cwd=folder, env=environment, text=True, capture_output=True,
+                          check=False)
+
+
+def parameters(*words, **options):
+    done = roslaunch("--dump-params", *words, **options)
+    assert done.returncode == 0, done.stderr
+    return yaml.safe_load(done.stdout) or {}
+
+
+def arguments(name):
+    root = ElementTree.parse(LAUNCH / f"{name}.launch").getroot()
+    return {arg.get("name"): arg.attrib for arg in root.findall("arg") if arg.get("value") is None}
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_launch_files_of_sensors_have_all_arguments_of_the_general_one(name):
+    general, ours = arguments("rio_t"), arguments(name)
+    assert ours.pop("config")["default"] == name
+    general.pop("config")
+    if name == "two_radars":
+        assert ours.pop("rviz_config")["default"].endswith("two_radars.rviz")
+        general.pop("rviz_config")
+    assert ours == general
+
+
+@pytest.mark.parametrize("name", (*SENSORS, "rio_t", "bag"))
+def test_every_argument_says_what_it_is_for(name):
+    assert all(attributes.get("doc") for attributes in arguments(name).values())
+
+
+def test_a_misspelt_argument_is_refused_with_the_right_one():
+    done = roslaunch("--nodes", "rio_t", "irs.launch", "bga:=run.bag")
+    assert "irs.launch has no argument bga:= ; did you mean bag:= ?" in done.stderr
+    assert "/rio_t" not in done.stdout
+    done = roslaunch("--nodes", LAUNCH / "bag.launch", "bag:=x", "output_dir:=y", "setings:=1")
+    assert "bag.launch has no argument setings:=" in done.stderr
+
+
+def test_special_names_and_launch_files_of_others_pass():
+    launch_config.check_arguments(["roslaunch", "rio_t", "irs.launch", "bag:=x", "__ns:=robot", "_private:=1"], LAUNCH)
+    launch_config.check_arguments(["roslaunch", "my_robot", "bringup.launch", "anything:=1"], LAUNCH)
+    launch_config.check_arguments(["rostest", "live.test"], LAUNCH)
+
+
+def test_somebody_elses_launch_file_may_not_misspell_an_argument(tmp_path):
+    mine = tmp_path / "mine.launch"
+    mine.write_text('<launch><include file="$(find rio_t)/launch/irs.launch"><arg name="bga" value="x"/></include></launch>')
+    assert "bga" in roslaunch("--nodes", mine).stderr
+    mine.write_text('<launch><include file="$(find rio_t)/launch/irs.launch"><arg name="imu_topic" value="/i"/></include></launch>')
+    assert parameters(mine, "mine:=1") == {"/rio_t/config": "irs", "/rio_t/imu_topic": "/i"}
+
+
+def test_config_is_a_name_or_a_path_from_where_the_user_stands(tmp_path):
+    (tmp_path / "sub").mkdir()
+    own = tmp_path / "sub" / "own.yaml"
+    own.write_text("gravity: 9.8\n")
+    assert launch_config.config_path("irs", tmp_path) == "irs"
+    assert launch_config.config_path("sub/own.yaml", tmp_path) == str(own)
+    assert launch_config.config_path("own.yaml", tmp_path / "sub") == str(own)
+    assert launch_config.config_path(str(own), "/") == str(own)
+    assert launch_config.config_path("sub", tmp_path) == "sub"  # a folder is no configuration
+    with pytest.raises(RioTError, match="none.yaml"):
+        launch_config.config_path("sub/none.yaml", tmp_path)
+    assert parameters("rio_t", "irs.launch", "config:=sub/own.yaml", folder=tmp_path) == {"/rio_t/config": str(own)}
+    assert parameters("rio_t", "bag.launch", "bag:=b", "output_dir:=o", "config:=sub/own.yaml",
+                      folder=tmp_path) == {"/rio_t_bag/config": str(own)}
+
+
+def test_namespace_and_topics_reach_the_node_and_the_bag(tmp_path):
+    words = ("rio_t", "irs.launch", "ns:=robot", "bag:=run.bag", "radar_topic:=scan", "clock_hz:=200", "bag_args:=--loop")
+    assert parameters(*words) == {"/use_sim_time": True, "/robot/rio_t/config": "irs",
+                                  "/robot/rio_t/radar_topic": "scan"}
+    assert roslaunch("--nodes", *words, "nodelet:=true", "rviz:=true").stdout.split() == [
+        "/bag_player", "/robot/rio_t_manager", "/robot/rio_t", "/robot/rviz"]
+    play = roslaunch("--args", "bag_player", *words, folder=tmp_path).stdout
+    assert "--prefix=robot" in play and "--hz=200" in play and "--loop" in play and str(tmp_path / "run.bag") in play
