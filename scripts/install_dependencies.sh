@@ -17,7 +17,7 @@ packages=(
   libnodelet-dev libnodeletlib-dev pluginlib-dev
   libstd-msgs-dev libstd-srvs-dev libsensor-msgs-dev libgeometry-msgs-dev libnav-msgs-dev libdiagnostic-msgs-dev
   libdiagnostic-updater-dev libdynamic-reconfigure-config-init-mutex-dev libtf2-dev libtf2-eigen-dev libtf2-ros-dev
-  libtf2-msgs-dev libpcl-dev libpcl-conversions-dev libboost-dev libboost-program-options-dev
+  libtf2-msgs-dev libpcl-dev libpcl-conversions-dev libboost-dev libboost-program-options-dev libtopic-tools-dev
   ros-message-generation ros-message-runtime ros-std-msgs libeigen3-dev libceres-dev libyaml-cpp-dev
   librostest-dev libgtest-dev libbenchmark-dev
   # rosrun, rosbag play, the nodelet manager, rviz, and messages for Python: rostopic echo and the rostests

@@ -201,6 +201,15 @@ TEST_F(BagRunner, StartsInMotionWhereThereIsNoRest) {
       << summary;
 }
 
+TEST_F(BagRunner, WithoutAFolderItPrintsTheSummary) {
+  writeBag({});
+  const Outcome outcome = runTool({bag_, "--config", "irs"});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("verdict         good"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("--output-dir FOLDER writes them"), std::string::npos) << outcome.out;
+  EXPECT_FALSE(fs::exists(out_));
+}
+
 TEST_F(BagRunner, HelpAndConfigurationNeedNoBag) {
   const Outcome help = runTool({"--help"});
   EXPECT_EQ(help.status, 0);

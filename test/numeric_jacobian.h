@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "rio_t/factors/extrinsics_manifold.h"
+#include "rio_t/factors/landmark_factor.h"
 #include "rio_t/factors/state_manifold.h"
 
 namespace rio_t {
@@ -15,6 +16,7 @@ namespace rio_t {
 inline std::shared_ptr<const Manifold> manifoldOf(std::size_t size) {
   if (size == StateBlock::kSize) return std::make_shared<StateManifold>();
   if (size == ExtrinsicsBlock::kSize) return std::make_shared<ExtrinsicsManifold>(EstimateExtrinsics::kPose);
+  if (size == 3) return std::make_shared<PointManifold>();
   return std::make_shared<ScalarManifold>();
 }
 

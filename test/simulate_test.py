@@ -96,8 +96,8 @@ def test_a_pair_of_a_preset_may_be_changed(simulate):
     (("--motion", "easy", "--no-elevation", "--fov-elevation-deg", "0"), ("--fov-elevation-deg", "above 0")),
     (("--motion", "easy", "--ghost-burst", "5,0"), ("--ghost-burst", "positive duration")),
     (("--seed", "1"), ("--motion", "--trajectory", "--preset")),
-    (RADARS + ("left time-ofset=0.1",), ("--radar", "left", "unrecognised option '--time-ofset'")),
-    (RADARS + ("left seed=3",), ("--radar", "left", "unrecognised option '--seed'")),
+    (RADARS + ("left time-ofset=0.1",), ("--radar", "left", "unrecognised option '--time-ofset")),
+    (RADARS + ("left seed=3",), ("--radar", "left", "unrecognised option '--seed")),
     (RADARS + ("left radar-rate=0",), ("--radar", "left", "radar-rate", "above 0")),
     (RADARS + ("left radar-rate",), ("--radar", "left", "'--radar-rate'", "missing")),
     (RADARS + ("left no-elevation=1",), ("--radar", "left", "no-elevation", "does not take")),
@@ -121,3 +121,17 @@ def test_help_tells_of_presets_and_options(simulate):
     for word in ("--preset NAME", "--points-min N", "--skip-empty", "--doppler-span M/S", "--no-elevation", "kart", "--radar TEXT",
                  "--ghost-burst S,S", "--first-trigger S", "kart_pair", "its own reflectors, persons and"):
         assert word in done.stdout
+
+
+def test_a_barometer_and_its_shocks(simulate):
+    motion = ("--motion", "drone", "--duration", "25")
+    _, without = simulate(*motion)
+    done, calm = simulate(*motion, "--barometer")
+    assert "barometer: 1250 samples, true drift at the end" in done.stdout
+    assert b"sensor_msgs/FluidPressure" in calm and b"sensor_msgs/FluidPressure" not in without
+    _, shocked = simulate(*motion, "--barometer", "--pressure-shock", "15,1,100", "--pressure-shock", "20,1,-100")
+    assert shocked != calm
+    failed, bag = simulate(*motion, "--pressure-shock", "15,1,100")
+    assert failed.returncode == 1 and "--pressure-shock needs --barometer" in failed.stderr and bag is None
+    failed, _ = simulate(*motion, "--barometer", "--pressure-shock", "15,0,100")
+    assert failed.returncode == 1 and "a positive duration" in failed.stderr

@@ -67,8 +67,11 @@ struct SimulatedRun {
     odometry.emplace(options);
     const std::vector<Arrival> arrivals = inOrderOfArrival(data);
     auto next = arrivals.begin();
+    auto pressure = data.pressures.begin();
     for (const ImuMeasurement& sample : data.imu.samples) {
       if (const auto state = odometry->addImu(sample)) states.push_back(*state);
+      for (; pressure != data.pressures.end() && pressure->stamp <= sample.time; ++pressure)
+        odometry->addPressure({pressure->stamp, pressure->pascal});
       for (; next != arrivals.end() && next->scan->arrival <= sample.time; ++next) {
         if (!next->scan->delivered) continue;
         RadarScan arrived = scan(*next->scan);

@@ -1,15 +1,29 @@
 #include "rio_t/imu/rest_detector.h"
 
+#include <cmath>
+#include <optional>
+
 namespace rio_t {
 
-bool isAtRest(const ImuBuffer& imu, Time time, const RestContext& context, const RestOptions& options) {
-  if (!options.enabled || context.v_W.norm() > options.max_speed || !imu.covers(time - options.window)) {
-    return false;
-  }
+namespace {
+
+/// Deviations of the IMU from what rest would read.
+struct Deviation {
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();           ///< mean [rad/s]
+  Eigen::Vector3d accel = Eigen::Vector3d::Zero();          ///< mean [m/s^2]
+  Eigen::Vector3d gyro_variance = Eigen::Vector3d::Zero();  ///< about the mean
+  Eigen::Vector3d accel_variance = Eigen::Vector3d::Zero();
   double count = 0.0;
+};
+
+/// Over the window that ends at `time`; none if the estimate moves, or too little was measured.
+std::optional<Deviation> deviationFromRest(const ImuBuffer& imu, Time time, const RestContext& context,
+                                           const RestOptions& options) {
+  if (!options.enabled || context.v_W.norm() > options.max_speed || !imu.covers(time - options.window)) {
+    return std::nullopt;
+  }
   bool is_measured = true;
-  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();
-  Eigen::Vector3d accel = Eigen::Vector3d::Zero();
+  Deviation d;
   Eigen::Vector3d gyro_square = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_square = Eigen::Vector3d::Zero();
   // Deviations from what rest would read: small numbers, so that their squares do not cancel.
@@ -17,21 +31,39 @@ bool isAtRest(const ImuBuffer& imu, Time time, const RestContext& context, const
   imu.forEachSample(time - options.window, time, [&](const ImuMeasurement& sample) {
     const Eigen::Vector3d rate = sample.angular_velocity - context.b_g;
     const Eigen::Vector3d acceleration = sample.acceleration - accel_at_rest;
-    gyro += rate;
-    accel += acceleration;
+    d.gyro += rate;
+    d.accel += acceleration;
     gyro_square += rate.cwiseAbs2();
     accel_square += acceleration.cwiseAbs2();
-    count += 1.0;
+    d.count += 1.0;
     is_measured &= !sample.is_bridge;
   });
-  if (!is_measured || count < 10.0) return false;  // too few to speak of a spread
-  gyro /= count;
-  accel /= count;
-  const Eigen::Vector3d gyro_variance = gyro_square / count - gyro.cwiseAbs2();
-  const Eigen::Vector3d accel_variance = accel_square / count - accel.cwiseAbs2();
-  return gyro_variance.maxCoeff() < options.max_gyro_std * options.max_gyro_std &&
-         accel_variance.maxCoeff() < options.max_accel_std * options.max_accel_std &&
-         gyro.norm() < options.max_rate && accel.norm() < options.max_accel_error;
+  if (!is_measured || d.count < 10.0) return std::nullopt;  // too few to speak of a spread
+  d.gyro /= d.count;
+  d.accel /= d.count;
+  d.gyro_variance = gyro_square / d.count - d.gyro.cwiseAbs2();
+  d.accel_variance = accel_square / d.count - d.accel.cwiseAbs2();
+  return d;
+}
+
+}  // namespace
+
+bool isAtRest(const ImuBuffer& imu, Time time, const RestContext& context, const RestOptions& options) {
+  const std::optional<Deviation> d = deviationFromRest(imu, time, context, options);
+  return d && d->gyro_variance.maxCoeff() < options.max_gyro_std * options.max_gyro_std &&
+         d->accel_variance.maxCoeff() < options.max_accel_std * options.max_accel_std &&
+         d->gyro.norm() < options.max_rate && d->accel.norm() < options.max_accel_error;
+}
+
+bool mayRestShaking(const ImuBuffer& imu, Time time, const RestContext& context, const RestOptions& options) {
+  const std::optional<Deviation> d = deviationFromRest(imu, time, context, options);
+  if (!d) return false;
+  // Sigma of a mean over independent samples; a line of vibration averages out faster.
+  const auto left = [&](const Eigen::Vector3d& variance) {
+    return 3.0 * std::sqrt(variance.sum() / d->count);
+  };
+  return d->gyro.norm() < options.max_rate + left(d->gyro_variance) &&
+         d->accel.norm() < options.max_accel_error + left(d->accel_variance);
 }
 
 }  // namespace rio_t

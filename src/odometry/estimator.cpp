@@ -62,7 +62,12 @@ Estimator::Estimator(const OdometryOptions& options, Navigation& navigation, Fau
       smoother_(options.smoother, options.imu_noise, g_W_, imu_),
       radars_(radarChannels(options, g_W_, imu_)),
       health_(options.health, options.smoother.innovation_gate, options.radarCount()),
-      waiting_for_(initializer_.waitingFor()) {}
+      waiting_for_(initializer_.waitingFor()) {
+  if (options.platform == Platform::kGroundVehicle)
+    ground_vehicle_.emplace(options.ground_vehicle, options.smoother.huber_threshold, imu_);
+  if (options.use_barometer) barometer_.emplace(options.barometer);
+  if (options.landmarks.enabled) landmarks_.emplace(options.landmarks, g_W_, imu_);
+}
 
 /// The way of a scan: when, how fast, into the window, out.
 ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
@@ -86,10 +91,18 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
   if (result.rejected_because.empty()) {
     result.model_error_scale = model_error_scale_.value();
     smoother_.setImuNoise(imuNoise());
-    const bool at_rest = isAtRest(node_time);
+    const bool at_rest = isAtRest(imu_, node_time, restContext(), options_.rest);
+    // The engine of a vehicle may idle.
+    const bool may_rest =
+        ground_vehicle_ && !at_rest && mayRestShaking(imu_, node_time, restContext(), options_.rest);
     const bool has_diverged = health_.health() == Health::kDiverged;
-    const RadarAnswer answer =
-        radar.use(result.scan, {at_rest, has_diverged, result.model_error_scale, last_used_}, smoother_);
+    // Before the scan's node comes, of which nothing is known yet.
+    if (barometer_) result.barometer = barometer_->use(smoother_);
+    if (ground_vehicle_ && !at_rest) result.ground_vehicle = ground_vehicle_->judge(smoother_, node_time);
+    std::optional<LandmarkMap::Prediction> expected;
+    if (landmarks_) expected = landmarks_->predict(smoother_, stamp - radar.offset(), radar.extrinsicsBlock());
+    const RadarAnswer answer = radar.use(
+        result.scan, {at_rest, may_rest, has_diverged, result.model_error_scale, last_used_}, smoother_);
     judge(answer, result.scan);
     result.ego_velocity = answer.ego_velocity;
     result.innovation = answer.judged;
@@ -99,18 +112,31 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
     result.rejected_because = answer.rejected_because;
     result.used = result.updated = answer.rejected_because.empty();
     if (result.used) last_used_ = stamp;
+    if (expected && result.used) seeLandmarks(*expected, answer, radar, result);
     if (answer.at_rest) {
       if (Block* node = smoother_.nodeAt(radar.nodeTime(stamp))) {
         smoother_.addZeroVelocity(*node, options_.rest.velocity_sigma);
         result.updated = true;
       }
     }
+    // The constraint of a vehicle holds whether or not a scan is used, but it is no sign that the radar
+    // works.
+    const bool by_radar = result.updated;
+    if (result.ground_vehicle) constrainToGround(answer.at_rest, result);
     if (result.updated) updateWindow(radar, result);
+    if (by_radar) health_.updated(result.state.time);
     updateHealth();
     if (!result.updated && health_.health() == Health::kDiverged) publishNewest();
   }
   result.health = health_.health();
   return result;
+}
+
+void Estimator::constrainToGround(bool at_rest, ScanResult& result) {
+  GroundVehicleAnswer& vehicle = *result.ground_vehicle;
+  if (vehicle.is_contradicted) faults_.count("ground_vehicle_contradicted");
+  vehicle.used = !at_rest && ground_vehicle_->add(vehicle, smoother_);
+  if (vehicle.used) result.updated = true;
 }
 
 std::string Estimator::whyNotNow(Time node_time, bool imu_has_ended) const {
@@ -143,6 +169,28 @@ void Estimator::judge(const RadarAnswer& answer, const RadarScan& scan) {
   model_error_scale_.add(scan.stamp, answer.used->squaredSigmas(), share);
 }
 
+/// Scans at rest repeat one scan, with its errors: they say nothing new of where things are.
+void Estimator::seeLandmarks(const LandmarkMap::Prediction& expected, const RadarAnswer& answer,
+                             const RadarChannel& radar, ScanResult& result) {
+  Block* node = smoother_.nodeAt(radar.nodeTime(result.scan.stamp));
+  if (node == nullptr || answer.at_rest || answer.ego_velocity.status != EgoVelocityStatus::kMoving) return;
+  const OdometryOptions own = optionsOfRadar(options_, result.scan.radar);
+  const PointVariances& noise = radar.noise();
+  // The Doppler tells the noise of a direction, but not how far an echo wanders over a thing.
+  const double azimuth_sigma = std::max(own.ego_velocity.azimuth_sigma, std::sqrt(noise.azimuth));
+  const double elevation_sigma = std::max(own.ego_velocity.elevation_sigma, std::sqrt(noise.elevation));
+  constexpr double kMinLevel = 0.5;  // steeper than 60 degrees, an azimuth says little
+  std::vector<Detection> detections;
+  for (const std::size_t i : answer.ego_velocity.inliers) {
+    const RadarPoint& point = result.scan.points[i];
+    if (point.position_R.head<2>().norm() < kMinLevel * point.position_R.norm()) continue;
+    detections.push_back(
+        {{point.position_R, options_.landmarks.range_sigma, azimuth_sigma, elevation_sigma}, point.snr_db});
+  }
+  result.landmarks = landmarks_->use(expected, detections, *node, radar.extrinsicsBlock(), smoother_);
+  if (result.landmarks->dropped_map) faults_.count("landmarks_dropped");
+}
+
 void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
   const Solution& solution = smoother_.optimize();
   result.solver_iterations = solution.iterations;
@@ -156,7 +204,6 @@ void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
   const Eigen::Index estimated = covariance.rows() - (kState + 1);
   result.T_IR_covariance = extrinsicsCovariance(covariance.bottomRightCorner(estimated, estimated));
   for (const StampedPose& left : marginalize()) result.left_window.push_back(left);
-  health_.updated(result.state.time);
   anchor(result.state, result.used && result.ego_velocity.status == EgoVelocityStatus::kZeroVelocity);
 }
 
@@ -165,6 +212,10 @@ std::vector<StampedPose> Estimator::marginalize() {
   std::vector<FixedLagSmoother::RandomWalk> walks;
   for (const RadarChannel& radar : radars_)
     for (const FixedLagSmoother::RandomWalk& walk : radar.randomWalks()) addWalk(walks, walk);
+  if (ground_vehicle_)
+    for (const FixedLagSmoother::RandomWalk& walk : ground_vehicle_->randomWalks()) walks.push_back(walk);
+  if (barometer_)
+    for (const FixedLagSmoother::RandomWalk& walk : barometer_->randomWalks()) walks.push_back(walk);
   for (const NodeEstimate& node : smoother_.marginalize(walks)) left.push_back(pose(node));
   return left;
 }
@@ -189,6 +240,11 @@ void Estimator::tune(const Tuning& tuning) {
   apply(tuning, options_);
   for (RadarChannel& radar : radars_) radar.tune(options_.smoother);
   health_.setGate(options_.smoother.innovation_gate);
+}
+
+void Estimator::addPressure(const Pressure& pressure) {
+  if (!barometer_ || imu_.empty()) return;
+  if (const char* fault = barometer_->add(pressure, imu_.newest())) faults_.count(fault);
 }
 
 void Estimator::keepUp(bool scan_came, bool scans_wait) {
@@ -217,6 +273,7 @@ void Estimator::keepUp(bool scan_came, bool scans_wait) {
 void Estimator::startAgain(std::uint64_t clock_restarts) {
   clock_restarts_ = clock_restarts;
   imu_.clear();
+  if (barometer_) barometer_->startAgain();
   // Nobody stands still because a clock jumped.
   OdometryOptions at_once = options_;
   at_once.init_motion_after = 0.0;
@@ -226,6 +283,7 @@ void Estimator::startAgain(std::uint64_t clock_restarts) {
   model_error_scale_ = ModelErrorScale();
   health_ = RadarsHealth(options_.health, options_.smoother.innovation_gate, radars_.size());
   pose_doubt_ = PoseDoubt();
+  if (landmarks_) landmarks_->forget();
   left_in_silence_.clear();
   radar_heard_.reset();
 }
@@ -236,15 +294,18 @@ void Estimator::tryInitialize(const ImuMeasurement& sample) {
   if (!found) return imu_.dropBefore(sample.time - initializer_.imuHistory());
   start_ = found;
   model_error_scale_ = found->model_error_scale;
-  begin(found->time, found->prior, found->radar);
+  begin(found->time, found->prior, found->radar, found->from == InitializedFrom::kRest);
 }
 
-void Estimator::begin(Time time, const NodePrior& prior, std::size_t radar) {
+void Estimator::begin(Time time, const NodePrior& prior, std::size_t radar, bool at_rest) {
   radars_[radar].start(smoother_, time, prior);
   for (std::size_t k = 0; k < radars_.size(); ++k)
     if (k != radar) radars_[k].join(smoother_);
+  if (ground_vehicle_) ground_vehicle_->join(smoother_, at_rest);
+  if (barometer_) barometer_->join(smoother_, time, at_rest);
   last_used_ = time;
   yaw_doubt_ = YawDoubt();
+  if (landmarks_) landmarks_->forget();
   initialized_at_ = time;
   health_.startedAt(time);
   publishNewest();
@@ -263,7 +324,7 @@ bool Estimator::tryReinitialize(std::vector<StampedPose>& left) {
     if (smoother_.node(k).time < found->time) left.push_back(pose(smoother_.node(k)));
   pose_doubt_ = PoseDoubt(newestState(smoother_.newestCovariance({})));
   model_error_scale_ = found->model_error_scale;
-  begin(found->time, found->prior, found_by);
+  begin(found->time, found->prior, found_by, false);
   updateHealth();
   faults_.count("reinitialized");
   return true;
@@ -304,9 +365,9 @@ std::vector<StampedPose> Estimator::remainingPoses() {
   return poses;
 }
 
-bool Estimator::isAtRest(Time time) const {
+RestContext Estimator::restContext() const {
   const StateBlock x = smoother_.newest().x;
-  return rio_t::isAtRest(imu_, time, {x.q_WI(), x.v_W(), x.b_g(), x.b_a(), g_W_}, options_.rest);
+  return {x.q_WI(), x.v_W(), x.b_g(), x.b_a(), g_W_};
 }
 
 ImuNoise Estimator::imuNoise() const {

@@ -28,6 +28,7 @@ struct RadarInertialOdometry::Impl {
   struct Inbox {
     std::vector<ImuMeasurement> imu;
     std::vector<RadarScan> scans;
+    std::vector<Pressure> pressures;
     std::uint64_t clock_restarts = 0;  ///< `imu` is from after that many
     std::optional<Tuning> tuning;
   };
@@ -64,6 +65,7 @@ std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasuremen
   if (m.inbox.clock_restarts != checked.clock_restarts) {
     m.inbox.clock_restarts = checked.clock_restarts;
     m.inbox.imu.clear();
+    m.inbox.pressures.clear();
     m.status.initialized = false;
   }
   m.inbox.imu.insert(m.inbox.imu.end(), checked.samples.begin(), checked.samples.end());
@@ -77,6 +79,12 @@ void RadarInertialOdometry::addScan(RadarScan scan) {
                                 std::to_string(radars) + " that the options have, counted from 0");
   const std::lock_guard<std::mutex> lock(impl_->inbox_mutex);
   impl_->inbox.scans.push_back(std::move(scan));
+}
+
+void RadarInertialOdometry::addPressure(const Pressure& pressure) {
+  if (!impl_->options.use_barometer) return;
+  const std::lock_guard<std::mutex> lock(impl_->inbox_mutex);
+  impl_->inbox.pressures.push_back(pressure);
 }
 
 void RadarInertialOdometry::tune(const Tuning& tuning) {
@@ -128,6 +136,7 @@ void RadarInertialOdometry::Impl::takeInbox() {
     std::swap(taken.imu, inbox.imu);
     std::swap(taken.scans, inbox.scans);
     std::swap(taken.tuning, inbox.tuning);
+    std::swap(taken.pressures, inbox.pressures);
   }
   if (taken.tuning) estimator.tune(*taken.tuning);
   const bool scan_came = !taken.scans.empty();
@@ -135,6 +144,7 @@ void RadarInertialOdometry::Impl::takeInbox() {
   if (std::exchange(clock_restarts, taken.clock_restarts) != taken.clock_restarts)
     estimator.startAgain(clock_restarts);
   estimator.addImu(taken.imu);
+  for (const Pressure& pressure : taken.pressures) estimator.addPressure(pressure);
   estimator.keepUp(scan_came, !waiting_scans.empty());
 }
 

@@ -3,6 +3,7 @@ import os
 import pathlib
 import subprocess
 import sys
+import tempfile
 
 from .errors import RioTError
 
@@ -34,6 +35,19 @@ def run(*words, **options):
     """The completed process, with what it told as text."""
     options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
     return subprocess.run([str(word) for word in words], text=True, check=False, **options)
+
+
+def cpu_seconds_of(*words):
+    """CPU [s], user and system, of a program that succeeds: what it takes with others beside it, too."""
+    with tempfile.TemporaryFile("w+") as errors, subprocess.Popen(
+            [str(word) for word in words], stdout=subprocess.DEVNULL, stderr=errors) as process:
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        if process.returncode != 0:
+            errors.seek(0)
+            lines = errors.read().strip().splitlines()
+            raise RioTError(lines[-1] if lines else f"{words[0]} ended with status {process.returncode}")
+    return usage.ru_utime + usage.ru_stime
 
 
 def output_of(*words):

@@ -14,6 +14,9 @@ COLUMNS = {
     "time_offset.csv": "stamp,offset_s,sigma_s",
     "ego_velocity.csv": "stamp,vx,vy,vz,sigma_x,sigma_y,sigma_z,inliers,points,status",
     "extrinsics.csv": "stamp,x,y,z,qx,qy,qz,qw,sigma_x,sigma_y,sigma_z,sigma_rx,sigma_ry,sigma_rz",
+    "barometer.csv": "stamp,height,innovation,innovation_sigma,bias,bias_sigma,samples,status",
+    "ground_vehicle.csv": "stamp,vx,vy,vz,sigmas,qx,qy,qz,qw,sigma_rx,sigma_ry,sigma_rz,status",
+    "map.csv": "id,x,y,z,sigma,snr_db,sightings",
     "biases.csv": "stamp,bgx,bgy,bgz,bax,bay,baz"}
 KINDS = {"stamp": tum.nanoseconds, "status": str}  # all other columns are numbers
 

@@ -155,6 +155,8 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
   seen.has_borrowed = seen.pooled.points.size() > scan.points.size();
   const double scale = context.model_error_scale;
   if (context.at_rest) answer.at_rest = !measure(seen.pooled, std::nullopt, scale).denies_rest;
+  if (context.may_rest)
+    answer.at_rest = measure(seen.pooled, std::nullopt, scale).status == EgoVelocityStatus::kZeroVelocity;
   if (answer.at_rest) seen.prior = zeroVelocity(options_.rest_velocity_sigma);
 
   std::optional<VelocityPrior> expected = seen.prior;

@@ -35,6 +35,7 @@ std::vector<SimulatedScan> scansOf(const Motion& motion, const RadarSetup& setup
 SensorData simulate(const Motion& motion, const SimulationOptions& options) {
   SensorData data;
   data.imu = simulateImu(motion, options.imu, options.seed, options.start);
+  data.pressures = simulateBarometer(motion, options.barometer, options.seed, options.start);
   if (options.radars.empty()) data.scans = scansOf(motion, options, options.seed, options.start);
   for (const auto& [name, setup] : options.radars) {
     try {

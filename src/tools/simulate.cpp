@@ -1,6 +1,7 @@
 // Writes a bag with known truth. See `simulate --help`.
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <iomanip>
 #include <iostream>
 #include <map>
@@ -46,6 +47,14 @@ struct RadarRequest {
   std::optional<double> fov_elevation = std::nullopt;
 };
 
+std::uint64_t parseSeed(const std::string& text) {
+  std::uint64_t seed = 0;
+  std::istringstream in(text);
+  const bool digits = text.find_first_not_of("0123456789") == std::string::npos;
+  if (!digits || !(in >> seed)) throw UsageError("'" + text + "' is not a whole number from 0");
+  return seed;
+}
+
 RadarModelOptions::Interval parseInterval(const std::string& text) {
   const std::vector<double> n = parseNumbers(text, 2);
   if (n[0] < 0.0 || n[1] <= 0.0) {
@@ -65,8 +74,8 @@ void apply(Request& request, const Preset& preset) {
 
 void addGeneralOptions(OptionSet& options, Request& r) {
   options.value("preset", "NAME",
-              "a platform with its motion, sensors and mounting (see below); the other options change it",
-              "none", [](const std::string& /*name*/) {});  // setAll() applies it
+                "a platform with its motion, sensors and mounting (see below); the other options change it",
+                "none", [](const std::string& /*name*/) {});  // setAll() applies it
   options.text("motion", "NAME", "built-in motion (see below)", r.motion);
   options.text("trajectory", "FILE",
                "or the poses of a TUM file (t x y z qx qy qz qw), through which a spline is put",
@@ -78,18 +87,19 @@ void addGeneralOptions(OptionSet& options, Request& r) {
   options.number("ground-truth-rate", "HZ", "rate of the truth in the bag", r.bag.ground_truth_rate,
                  NumberRange::kPositive);
   options.value("seed", "N", "seed of everything random: same options and seed, same bytes", "0",
-              [&r](const std::string& v) { r.simulation.seed = parseSeed(v); });
+                [&r](const std::string& v) { r.simulation.seed = parseSeed(v); });
   options.value("format", "FORMAT", "irs | ti_mmwave: topics, fields, axes and stamps of the bag", "irs",
-              [&r](const std::string& v) {
-                if (v != "irs" && v != "ti_mmwave")
-                  throw UsageError("'" + v + "' is not one of irs, ti_mmwave");
-                r.bag.format = v == "irs" ? BagFormat::kIrs : BagFormat::kTiMmwave;
-              });
+                [&r](const std::string& v) {
+                  if (v != "irs" && v != "ti_mmwave")
+                    throw UsageError("'" + v + "' is not one of irs, ti_mmwave");
+                  r.bag.format = v == "irs" ? BagFormat::kIrs : BagFormat::kTiMmwave;
+                });
   options.number("duration", "S",
                  "length of the bag with rest; 0 = the motion's own (with --trajectory: of the file)",
                  r.duration, NumberRange::kNotNegative);
   options.value("speed", "M/S", "speed of the motions constant_speed and walk; the others have their own",
-              "1; walk 1.3", [&r](const std::string& v) { r.speed = parseNumber(v, NumberRange::kPositive); });
+                "1; walk 1.3",
+                [&r](const std::string& v) { r.speed = parseNumber(v, NumberRange::kPositive); });
   options.number("static-start", "S", "rest at the start; 0 = starts in motion", r.rest.static_start,
                  NumberRange::kNotNegative);
   options.number("static-end", "S", "rest at the end; 0 = ends in motion", r.rest.static_end,
@@ -128,7 +138,8 @@ void addImuOptions(OptionSet& options, ImuModelOptions& imu) {
   });
   options.number("accel-bias-sigma", "M/S^2", "of the random bias", imu.accel_bias_sigma,
                  NumberRange::kNotNegative);
-  options.number("gyro-bias-sigma", "RAD/S", "of the random bias", imu.gyro_bias_sigma, NumberRange::kNotNegative);
+  options.number("gyro-bias-sigma", "RAD/S", "of the random bias", imu.gyro_bias_sigma,
+                 NumberRange::kNotNegative);
   options.number(
       "vibration", "M/S^2",
       "sigma of what a vibrating frame adds to each axis and sample of the accelerometer, at rest too",
@@ -142,6 +153,24 @@ void addImuOptions(OptionSet& options, ImuModelOptions& imu) {
                  NumberRange::kPositive);
   options.number("gyro-saturation", "RAD/S", "largest reading of an axis", imu.gyro_saturation,
                  NumberRange::kPositive);
+}
+
+void addBarometerOptions(OptionSet& options, BarometerModelOptions& barometer) {
+  options.section("Barometer");
+  options.flag("barometer", "the platform carries one; topic /sensor_platform/baro", barometer.enabled);
+  options.number("barometer-rate", "HZ", "rate", barometer.rate, NumberRange::kPositive);
+  options.number("barometer-noise", "PA", "sigma of a sample; 12 Pa are a metre", barometer.noise,
+                 NumberRange::kNotNegative);
+  options.number("barometer-drift", "PA/RTS", "random walk: weather, and warmth of the sensor",
+                 barometer.drift, NumberRange::kNotNegative);
+  options.values("pressure-shock", "S,S,PA",
+                 "START,DURATION,CHANGE: a door or a rotor changes the pressure; may be repeated",
+                 [&barometer](const std::string& v) {
+                   const std::vector<double> n = parseNumbers(v, 3);
+                   if (n[0] < 0.0 || n[1] <= 0.0)
+                     throw UsageError("'" + v + "' must be a start from 0, a positive duration and a change");
+                   barometer.shocks.push_back({n[0], n[1], n[2]});
+                 });
 }
 
 // What --radar takes, too.
@@ -160,8 +189,8 @@ void addRadarOptions(OptionSet& options, RadarRequest& r) {
                  });
 
   options.section("Radar");
-  options.value("extrinsics-translation", "X,Y,Z", "radar origin in the IMU frame [m] (T_IR)", "0.03,0.03,-0.06",
-                [&r](const std::string& v) {
+  options.value("extrinsics-translation", "X,Y,Z", "radar origin in the IMU frame [m] (T_IR)",
+                "0.03,0.03,-0.06", [&r](const std::string& v) {
                   const std::vector<double> n = parseNumbers(v, 3);
                   r.setup.T_IR.l_I = {n[0], n[1], n[2]};
                 });
@@ -170,7 +199,8 @@ void addRadarOptions(OptionSet& options, RadarRequest& r) {
                 "0.69946,0.71461,0.00723,0.00524", [&r](const std::string& v) {
                   const std::vector<double> n = parseNumbers(v, 4);
                   const Eigen::Quaterniond q(n[3], n[0], n[1], n[2]);
-                  if (std::abs(q.norm() - 1.0) > 0.01) throw UsageError("'" + v + "' is not a unit quaternion");
+                  if (std::abs(q.norm() - 1.0) > 0.01)
+                    throw UsageError("'" + v + "' is not a unit quaternion");
                   r.setup.T_IR.q_IR = q.normalized();
                 });
   options.number("radar-rate", "HZ", "scans a second", radar.rate, NumberRange::kPositive);
@@ -191,9 +221,10 @@ void addRadarOptions(OptionSet& options, RadarRequest& r) {
   options.number("min-range", "M", "nearest point", radar.min_range, NumberRange::kNotNegative);
   options.number("max-range", "M", "farthest point", radar.max_range, NumberRange::kPositive);
   options.number("fov-azimuth-deg", "DEG", "half angle of view", radar.fov_azimuth, NumberRange::kPositive);
-  options.value("fov-elevation-deg", "DEG", "half angle of view",
-                shownNumber(radar.fov_elevation) + "; " + shownNumber(kFlatFovElevation) + " with --no-elevation",
-                [&r](const std::string& v) { r.fov_elevation = parseNumber(v, NumberRange::kPositive); });
+  options.value(
+      "fov-elevation-deg", "DEG", "half angle of view",
+      shownNumber(radar.fov_elevation) + "; " + shownNumber(kFlatFovElevation) + " with --no-elevation",
+      [&r](const std::string& v) { r.fov_elevation = parseNumber(v, NumberRange::kPositive); });
   options.flag("no-elevation",
                "a flat radar: sees what is within --fov-elevation-deg, reports it in its own plane, z = 0",
                radar.measures_elevation, false);
@@ -202,11 +233,13 @@ void addRadarOptions(OptionSet& options, RadarRequest& r) {
   options.number("elevation-noise-deg", "DEG", "sigma", radar.elevation_noise, NumberRange::kNotNegative);
   options.number("doppler-noise", "M/S", "sigma, before quantisation", radar.doppler_noise,
                  NumberRange::kNotNegative);
-  options.number("doppler-step", "M/S", "quantisation; 0 = none", radar.doppler_step, NumberRange::kNotNegative);
+  options.number("doppler-step", "M/S", "quantisation; 0 = none", radar.doppler_step,
+                 NumberRange::kNotNegative);
   options.number("doppler-span", "M/S",
                  "whole unambiguous span, a whole number of steps: 3 wraps into [-1.5, 1.5); 0 = unlimited",
                  radar.doppler_span, NumberRange::kNotNegative);
-  options.number("ghosts", "SHARE", "of the points: anywhere, any Doppler", radar.ghost_share, NumberRange::kShare);
+  options.number("ghosts", "SHARE", "of the points: anywhere, any Doppler", radar.ghost_share,
+                 NumberRange::kShare);
   options.number("moving", "SHARE", "of the time: persons walk through the view", radar.moving_share,
                  NumberRange::kShare);
   options.count("crowd", "so many persons at once; their points take the place of the room's", radar.crowd);
@@ -239,13 +272,14 @@ std::pair<std::string, OptionSet::Given> parseRadar(const std::string& text) {
 
 void addNamedRadars(OptionSet& options, Request& r) {
   options.section("Several radars");
-  options.values("radar", "TEXT",
-                 "\"NAME KEY=VALUE ...\", NAME of a-z, 0-9, _: a radar, in the place of the nameless; may be repeated",
-                 [&r](const std::string& v) {
-                   const auto [name, given] = parseRadar(v);
-                   if (!r.radars.emplace(name, given).second)
-                     throw UsageError("there are two radars of the name '" + name + "'");
-                 });
+  options.values(
+      "radar", "TEXT",
+      "\"NAME KEY=VALUE ...\", NAME of a-z, 0-9, _: a radar, in the place of the nameless; may be repeated",
+      [&r](const std::string& v) {
+        const auto [name, given] = parseRadar(v);
+        if (!r.radars.emplace(name, given).second)
+          throw UsageError("there are two radars of the name '" + name + "'");
+      });
 }
 
 /// `preset` with what is given; the first source that gives an option counts.
@@ -284,6 +318,7 @@ void setAll(const OptionSet& options, const OptionSet::Given& given, Request& re
   }
   if (request.noise_free) {
     simulation.imu.removeErrors();
+    simulation.barometer.removeErrors();
     simulation.radar.removeErrors();
     for (auto& [name, setup] : simulation.radars) setup.radar.removeErrors();
   }
@@ -291,21 +326,25 @@ void setAll(const OptionSet& options, const OptionSet::Given& given, Request& re
 
 ProgramText programText() {
   std::ostringstream notes;
-  notes << "Defaults are in brackets. Noise is that of an ADIS16448 and a TI IWR6843AOP, measured on a real bag. "
+  notes << "Defaults are in brackets. Noise is that of an ADIS16448 and a TI IWR6843AOP, measured on a real "
+           "bag. "
            "Angles are\nin radians, unless the name of the option says deg.\n"
-           "\n--radar: KEY is an option of the two sections on time offset and radar, without dashes; a flag stands "
-           "alone.\nWhat a radar leaves out comes from the options outside. Each has its own reflectors, persons and "
+           "\n--radar: KEY is an option of the two sections on time offset and radar, without dashes; a flag "
+           "stands "
+           "alone.\nWhat a radar leaves out comes from the options outside. Each has its own reflectors, "
+           "persons and "
            "ghosts.\n--preset kart_pair has left and right: --radar changes one of them, or adds another.\n"
            "Topics, irs:       /sensor_platform/radar_NAME/scan, /sensor_platform/radar_NAME/trigger\n"
            "Topics, ti_mmwave: /ti_mmwave/radar_scan_pcl_NAME, /sensor_platform/radar_NAME/trigger\n"
            "\nMotions (duration with rest)\n";
   for (const MotionDescription& motion : builtInMotions()) {
-    notes << "  " << std::left << std::setw(18) << motion.name << motion.summary << " (" << motion.default_duration
-          << " s)\n";
+    notes << "  " << std::left << std::setw(18) << motion.name << motion.summary << " ("
+          << motion.default_duration << " s)\n";
   }
   notes << "\nPresets (motion)\n";
   for (const Preset& preset : presets()) {
-    notes << "  " << std::left << std::setw(18) << preset.name << preset.summary << " (" << preset.motion << ")\n";
+    notes << "  " << std::left << std::setw(18) << preset.name << preset.summary << " (" << preset.motion
+          << ")\n";
   }
   return {"simulate", "(--motion NAME | --trajectory FILE.txt | --preset NAME) --out FILE.bag [options]\n",
           "Writes a bag of a simulated IMU and radar whose motion and time offset are known.",
@@ -396,6 +435,9 @@ void printSummary(const Request& request, const Motion& motion, const SensorData
             << triple(data.imu.b_a.back()) << " at the end\n"
             << "true gyro bias [rad/s]: " << triple(data.imu.b_g.front()) << " at the start, "
             << triple(data.imu.b_g.back()) << " at the end\n";
+  if (!data.pressures.empty())
+    std::cout << "barometer: " << data.pressures.size() << " samples, true drift at the end "
+              << data.pressures.back().drift << " Pa\n";
   if (data.radars.empty()) printRadar("radar", request.simulation, data.scans);
   for (const auto& [name, scans] : data.radars) {
     printRadar("radar " + name, request.simulation.radars.at(name), scans);
@@ -406,6 +448,8 @@ void printSummary(const Request& request, const Motion& motion, const SensorData
 }
 
 void run(Request request) {
+  if (!request.simulation.barometer.shocks.empty() && !request.simulation.barometer.enabled)
+    throw UsageError("--pressure-shock needs --barometer");
   request.simulation.start = Time::fromSeconds(request.start_time);
   const Motion motion = motionOf(request);
   const SensorData data = simulate(motion, request.simulation);
@@ -425,6 +469,7 @@ int main(int argc, char** argv) {
   OptionSet options("What moves, and where it goes");
   addGeneralOptions(options, request);
   addImuOptions(options, request.simulation.imu);
+  addBarometerOptions(options, request.simulation.barometer);
   addNamedRadars(options, request);
   addRadarOptions(options, radar);
   return runProgramWith(programText(), options, {argv + 1, argv + argc}, std::cout, std::cerr,

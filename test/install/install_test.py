@@ -25,7 +25,7 @@ def run(*words, **options):
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory):
     path = tmp_path_factory.mktemp("bag") / "run.bag"
-    run("rosrun", "rio_t", "simulate", "--motion", "easy", "--duration", 15, "--out", path)
+    run("rosrun", "rio_t", "simulate", "--motion", "medium", "--duration", 14, "--static-start", 5, "--static-end", 1, "--out", path)
     return path
 
 
@@ -51,7 +51,9 @@ def test_no_installed_file_names_the_sources_or_the_build():
                         [*(SOURCE / name for name in ("src", "include", "config", "launch", "scripts", "cmake", "msg")),
                          BUILD / "devel"])
     paths = re.compile(rb"(?<![\w.+-])(?:" + folders + rb")\b")
-    found = {file.relative_to(PREFIX): paths.search(file.read_bytes()) for file in PREFIX.rglob("*") if file.is_file()}
+    # genpy installs the byte code of the devel space's __init__.py, too. Python sees that it is not that of the file beside it.
+    found = {file.relative_to(PREFIX): paths.search(file.read_bytes()) for file in PREFIX.rglob("*")
+             if file.is_file() and file.suffix != ".pyc"}
     assert {str(file): match[0] for file, match in found.items() if match} == {}
 
 
@@ -63,7 +65,7 @@ def test_programs_help(program):
 def test_configurations_are_found_without_a_sourced_workspace():
     environment = {"PATH": "/usr/bin:/bin", "LD_LIBRARY_PATH": os.environ["LD_LIBRARY_PATH"]}
     program = PREFIX / "lib/rio_t/rio_t_bag"
-    assert 'radar_format: "ti_mmwave"' in run(program, "--config", "ti_mmwave", "--print-config", env=environment)
+    assert "radar_format: ti_mmwave" in run(program, "--config", "ti_mmwave", "--print-config", env=environment)
 
 
 def test_bag_launch_writes_a_run_and_report_draws_it(ros, bag, tmp_path):
@@ -75,7 +77,7 @@ def test_bag_launch_writes_a_run_and_report_draws_it(ros, bag, tmp_path):
 
 @pytest.mark.parametrize("arguments, name", [(["nodelet:=false"], "/rio_t"), (["nodelet:=true", "ns:=robot"], "/robot/rio_t")])
 def test_launch_file_plays_a_bag(ros, bag, arguments, name):
-    words = [*ros, "rio_t", "irs.launch", f"bag:={bag}", "bag_rate:=3", *arguments]
+    words = [*ros, "rio_t", "irs.launch", f"bag:={bag}", "bag_rate:=3", "bag_args:=--loop", *arguments]
     with subprocess.Popen(words, stdout=subprocess.DEVNULL) as launch:
         try:
             end = time.monotonic() + DEADLINE

@@ -35,4 +35,9 @@ struct RestContext {
 /// the view. The IMU alone cannot distinguish rest from uniform motion, hence the context.
 bool isAtRest(const ImuBuffer& imu, Time time, const RestContext& context, const RestOptions& options);
 
+/// Whether the IMU may be at rest on a platform that shakes, as one whose engine idles: its means over the
+/// window are those of rest, within three sigmas of what the shaking leaves in them. How much it shakes does
+/// not count. It takes a radar that sees no motion to call it rest.
+bool mayRestShaking(const ImuBuffer& imu, Time time, const RestContext& context, const RestOptions& options);
+
 }  // namespace rio_t

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "rio_t/imu/buffer.h"
+#include "rio_t/landmarks/landmark_map.h"
 #include "rio_t/odometry/fault_counters.h"
 #include "rio_t/odometry/initializer.h"
 #include "rio_t/odometry/model_error_scale.h"
@@ -16,6 +17,8 @@
 #include "rio_t/odometry/radars_health.h"
 #include "rio_t/odometry/scan_result.h"
 #include "rio_t/odometry/yaw_doubt.h"
+#include "rio_t/sensors/barometer_channel.h"
+#include "rio_t/sensors/ground_vehicle_channel.h"
 #include "rio_t/sensors/radar_channel.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
 
@@ -34,6 +37,8 @@ class Estimator {
   void addImu(const std::vector<ImuMeasurement>& samples);
   /// In effect for the next scan.
   void tune(const Tuning& tuning);
+  /// In the order of arrival; counts what cannot be used in the faults.
+  void addPressure(const Pressure& pressure);
   /// The IMU's clock jumped. No earlier data can be related to later data, so all state is dropped.
   void startAgain(std::uint64_t clock_restarts);
   /// Call it after addImu. Counts times without radar, and moves the window on while the radar is silent.
@@ -57,15 +62,19 @@ class Estimator {
   std::string whyNotNow(Time node_time, bool imu_has_ended) const;
   void tryInitialize(const ImuMeasurement& sample);
   /// Starts a window with the prior, which knows the calibration of `radar`.
-  void begin(Time time, const NodePrior& prior, std::size_t radar);
+  void begin(Time time, const NodePrior& prior, std::size_t radar, bool at_rest);
   bool tryReinitialize(std::vector<StampedPose>& left);
   PoseAnchor anchorAt(Time time) const;
   void judge(const RadarAnswer& answer, const RadarScan& scan);
   void updateWindow(const RadarChannel& radar, ScanResult& result);
+  void seeLandmarks(const LandmarkMap::Prediction& expected, const RadarAnswer& answer,
+                    const RadarChannel& radar, ScanResult& result);
   void publishNewest() { anchor(newestState(smoother_.newestCovariance({})), false); }
   void anchor(const NavigationState& state, bool at_rest);
   std::vector<StampedPose> marginalize();
-  bool isAtRest(Time time) const;
+  /// Adds the term that was judged, unless the platform is at rest.
+  void constrainToGround(bool at_rest, ScanResult& result);
+  RestContext restContext() const;
   ImuNoise imuNoise() const;  ///< scaled by the model errors found so far
   NavigationState newestState(const StateCovariance& covariance) const;
 
@@ -79,11 +88,14 @@ class Estimator {
   Initializer initializer_;
   std::vector<MotionInitializer> recovery_;  ///< by radar; start again after a divergence
   FixedLagSmoother smoother_;
-  std::vector<RadarChannel> radars_;  ///< by RadarScan::radar
+  std::vector<RadarChannel> radars_;                    ///< by RadarScan::radar
+  std::optional<GroundVehicleChannel> ground_vehicle_;  ///< if the platform is one
+  std::optional<BarometerChannel> barometer_;           ///< if it is used
   ModelErrorScale model_error_scale_;
   RadarsHealth health_;
   PoseDoubt pose_doubt_;
   YawDoubt yaw_doubt_;
+  std::optional<LandmarkMap> landmarks_;  ///< none if they are off
 
   std::optional<Initialization> start_;
   std::string waiting_for_;

@@ -7,11 +7,14 @@
 #include "rio_t/imu/noise.h"
 #include "rio_t/imu/rest_detector.h"
 #include "rio_t/imu/static_initializer.h"
+#include "rio_t/landmarks/options.h"
 #include "rio_t/odometry/health_monitor.h"
 #include "rio_t/odometry/motion_initializer.h"
 #include "rio_t/radar/ego_velocity.h"
 #include "rio_t/radar/extrinsics.h"
 #include "rio_t/radar/feasibility.h"
+#include "rio_t/sensors/barometer_channel.h"
+#include "rio_t/sensors/ground_vehicle_channel.h"
 #include "rio_t/sensors/offset_step_detector.h"
 #include "rio_t/smoother/options.h"
 
@@ -46,8 +49,13 @@ struct OdometryOptions {
   FeasibilityOptions feasibility;
   RestOptions rest;
   SmootherOptions smoother;
+  LandmarkOptions landmarks;
   OffsetStepDetectorOptions offset_step_detector;
   HealthOptions health;
+  Platform platform = Platform::kFree;
+  GroundVehicleOptions ground_vehicle;  ///< if the platform is one
+  bool use_barometer = false;           ///< false: pressures are not taken
+  BarometerOptions barometer;
   /// [s] between samples; a longer gap is counted and widens the uncertainty
   double max_imu_gap = 0.04;
   ImuInputCheckOptions imu_input_check;

@@ -38,6 +38,11 @@ class RadarInertialOdometry {
   /// radar that the options do not have.
   void addScan(RadarScan scan);
 
+  /// Queues a pressure, if the options use the barometer. What cannot be used is counted in `faults()`:
+  /// "pressure_not_usable" (see faultOf), "pressure_out_of_order", "pressure_ahead_of_imu",
+  /// "pressure_without_node".
+  void addPressure(const Pressure& pressure);
+
   /// Does the work that is due: initialisation, ego-velocity, window. Returns a result for each scan that it
   /// finished. It takes up to `max_scans` scans, the others wait for the next call; of those that wait, it drops
   /// the oldest beyond `max_queued_scans` (rejected as "queue_full").

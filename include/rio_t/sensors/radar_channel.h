@@ -27,6 +27,7 @@ struct RadarChannelOptions {
 /// What the estimator knows when a scan comes.
 struct ScanContext {
   bool at_rest = false;            ///< the IMU shows no motion at the time of measurement
+  bool may_rest = false;           ///< likewise but for a vibration: rest if the points show no motion
   bool has_diverged = false;       ///< the prediction cannot be trusted
   double model_error_scale = 1.0;  ///< see ModelErrorScale
   Time last_used;                  ///< stamp of the last scan that any radar gave to the window
@@ -93,6 +94,7 @@ class RadarChannel {
   Extrinsics extrinsics() const { return in_window_.extrinsics(); }
   /// The blocks that are estimated: t_O, which is always there, and the extrinsics.
   std::vector<const Block*> calibration() const { return in_window_.calibration(); }
+  Block& extrinsicsBlock() const { return in_window_.extrinsicsBlock(); }  ///< for terms on it
   /// [s] given the marginal variance [s^2]; 0 if the offset is not estimated.
   double offsetSigma(double variance) const;
   /// Of the blocks that calibration() gives.

@@ -60,6 +60,8 @@ class RadarInWindow {
   Extrinsics extrinsics() const { return toExtrinsics(extrinsics_->x.data()); }
   /// The blocks that are estimated, for a covariance: t_O, which is always there, and the extrinsics.
   std::vector<const Block*> calibration() const;
+  /// For terms on it; constant if it is not estimated.
+  Block& extrinsicsBlock() const { return *extrinsics_; }
 
  private:
   /// Adds the block to a window that starts. Returns it if it is estimated.

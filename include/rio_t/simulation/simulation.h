@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "rio_t/simulation/barometer_model.h"
 #include "rio_t/simulation/imu_model.h"
 #include "rio_t/simulation/radar_model.h"
 
@@ -22,6 +23,7 @@ struct SimulationOptions : RadarSetup {
   std::uint64_t seed = 0;
   Time start = Time::fromNanoseconds(1'700'000'000'000'000'000);  ///< stamp of the first IMU sample
   ImuModelOptions imu;
+  BarometerModelOptions barometer;
   /// By name: lower case letters, digits and underscores. If there are any, they are all radars of the rig.
   std::map<std::string, RadarSetup> radars;
 };
@@ -29,6 +31,7 @@ struct SimulationOptions : RadarSetup {
 /// What the sensors of one rig measure on one motion.
 struct SensorData {
   ImuData imu;
+  std::vector<SimulatedPressure> pressures;                  ///< empty without a barometer
   std::vector<SimulatedScan> scans;                          ///< of the one radar; empty if radars have names
   std::map<std::string, std::vector<SimulatedScan>> radars;  ///< of those with names
 };

@@ -9,6 +9,9 @@
   consistency seeds x motions: errors of position, velocity, tilt, yaw and offset over their stated sigmas, at all
               times (NEES); 1 is honest, `!` marks what is below 0.5 or above 2
 
-Both models of the offset run side by side: `imu` (ours) and `constant_acceleration` (the paper's). Only `consistency`
-runs one model, that of the configuration or of --set time_offset_model=...
+  aids        seeds x motions: without and with the constraint of a ground vehicle and the barometer, each alone and
+              both; the error of the height, and what it costs
+
+Both models of the offset run side by side: `imu` (ours) and `constant_acceleration` (the paper's). `consistency` and
+`aids` run one model, that of the configuration or of --set time_offset_model=...
 """

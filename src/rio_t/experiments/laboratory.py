@@ -45,6 +45,7 @@ class Run:
     summary: dict
     curve: dict     # the table time_offset.csv
     scans: dict     # the table ego_velocity.csv
+    cpu: float = math.nan  # [s] of rio_t_bag, user and system
     before: list = dataclasses.field(default_factory=list)  # Runs: the online pass of a batch, the earlier passes
 
     def figure(self, key):
@@ -74,9 +75,10 @@ class Laboratory:
         self.progress, self.lock = None, threading.Lock()
 
     def execute(self, program, *arguments):
+        """CPU [s] that the program took."""
         if self.stopped.is_set():
             raise RioTError("stopped")
-        programs.output_of(self.folder / program, *arguments)
+        return programs.cpu_seconds_of(self.folder / program, *arguments)
 
     def simulate(self, source):
         handle, name = tempfile.mkstemp(prefix=f"{source.name}_", suffix=".bag", dir=self.scratch)
@@ -93,8 +95,10 @@ class Laboratory:
         for setting in self.options.set + [f"{key}={value}" for key, value in settings.items()]:
             arguments += ["--set", setting]
         try:
-            self.execute("rio_t_bag", *arguments)
-            return read(folder)
+            cpu = self.execute("rio_t_bag", *arguments)
+            result = read(folder)
+            (result[0] if isinstance(result, tuple) else result).cpu = cpu
+            return result
         finally:
             shutil.rmtree(folder, ignore_errors=True)
             with self.lock:

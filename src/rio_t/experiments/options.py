@@ -33,7 +33,9 @@ PLANS = {
     # 30 and 100 ms: two delays of systems without a trigger.
     "montecarlo": Plan(HANDHELD, (FRAME_OFFSET, 30.0, 100.0), 10, True),
     "consistency": Plan(("difficult", "medium", "drone", "ground_vehicle", "gym_loop", "start_in_motion"), (30.0,), 5,
-                        True, ("mode", "radar_stamp_shift", "refine_passes"))}
+                        True, ("mode", "radar_stamp_shift", "refine_passes")),
+    "aids": Plan(("ground_vehicle", "kart", "drone", "difficult"), (30.0,), 3, True,
+                 ("mode", "radar_stamp_shift", "refine_passes", "platform", "barometer_topic"))}
 
 
 class Parser(argparse.ArgumentParser):
@@ -100,19 +102,20 @@ def make_parser():
     parser.add_argument("--output-dir", metavar="DIR", type=pathlib.Path, help="where to write (results/EXPERIMENT)")
     parser.add_argument("--bag", metavar="BAG", type=pathlib.Path, action="append", default=[],
                         help="run on this bag instead of simulated ones; may be repeated; not for montecarlo "
-                             "and consistency")
+                             "consistency and aids")
     parser.add_argument("--config", metavar="CONFIG", default="irs", help="configuration of rio_t_bag (irs)")
     parser.add_argument("--set", metavar="key=value", action="append", default=[],
                         help="parameter of rio_t_bag; may be repeated")
     parser.add_argument("--seeds", metavar="N", type=count,
-                        help="simulated runs of each motion, seeds 1 to N (3; montecarlo 10; consistency 5)")
+                        help="simulated runs of each motion, seeds 1 to N (3; montecarlo 10; consistency 5; aids 3)")
     parser.add_argument("--motion", metavar="NAME", action="append",
                         help="simulated motion; may be repeated (shifts, delay: difficult; tables: easy, medium, "
                              "difficult, gym_loop; montecarlo: easy, medium, difficult; consistency: difficult, "
-                             "medium, drone, ground_vehicle, gym_loop, start_in_motion)")
+                             "medium, drone, ground_vehicle, gym_loop, start_in_motion; aids: ground_vehicle, kart, "
+                             "drone, difficult)")
     parser.add_argument("--time-offset", metavar="S", type=number, action="append",
                         help="true offset of the simulated bags [s] (-0.00925; montecarlo also 0.03 and 0.1; "
-                             "consistency 0.03; may be repeated for these two)")
+                             "consistency and aids 0.03; may be repeated for these three)")
     parser.add_argument("--duration", metavar="S", type=positive,
                         help="length of the simulated bags [s] (the motion's own)")
     parser.add_argument("--simulate", metavar="OPTIONS", default="",
@@ -136,12 +139,14 @@ def parse(words):
     if options.bag and plan.simulated_only:
         raise RioTError(f"--bag: {options.experiment} draws its bags itself")
     options.simulate = simulation_words(options.simulate)
+    if options.experiment == "aids" and "--barometer" not in options.simulate:
+        options.simulate.append("--barometer")
     if options.bag:
         for name in ("seeds", "motion", "time_offset", "duration", "simulate"):
             if getattr(options, name) not in (None, []):
                 raise RioTError(f"--{name.replace('_', '-')}: for simulated bags only, not with --bag")
     if options.time_offset and len(options.time_offset) > 1 and not plan.simulated_only:
-        raise RioTError("--time-offset: more than one is for montecarlo and consistency only")
+        raise RioTError("--time-offset: more than one is for montecarlo, consistency and aids only")
     options.set_keys = set()
     for setting in options.set:
         key, equals, _ = setting.partition("=")

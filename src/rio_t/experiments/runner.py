@@ -5,7 +5,7 @@ import tempfile
 
 from .. import programs
 from ..errors import RioTError
-from . import consistency, delay, montecarlo, shifts, tables
+from . import aids, consistency, delay, montecarlo, shifts, tables
 from .laboratory import Laboratory, Source
 
 EXPERIMENTS = {  # (laboratory, sources, options) -> Page
@@ -14,7 +14,8 @@ EXPERIMENTS = {  # (laboratory, sources, options) -> Page
     "table1": tables.table1,
     "table2": tables.table2,
     "montecarlo": montecarlo.run,
-    "consistency": consistency.run}
+    "consistency": consistency.run,
+    "aids": aids.run}
 
 
 def sources_of(options):

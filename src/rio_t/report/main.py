@@ -52,6 +52,7 @@ class Run:
     truth: Optional[Track]
     radars: list
     biases: Optional[dict]
+    landmarks: Optional[dict] = None  # map.csv
 
 
 def timed(table, origin):
@@ -81,7 +82,8 @@ def read_run(folder, truth_file):
 
     radars = [Radar(name, table("time_offset.csv", name), table("ego_velocity.csv", name), table("extrinsics.csv", name))
               for name in run_folder.radars(folder)]
-    return Run(origin, estimates, truth, radars, table("biases.csv"))
+    landmarks = run_folder.read(folder, "map.csv") if (folder / "map.csv").is_file() else None
+    return Run(origin, estimates, truth, radars, table("biases.csv"), landmarks)
 
 
 CHECKS = {  # name in summary.yaml: for people
@@ -159,7 +161,7 @@ def add_trajectory(page, run, errors):
         tracks += [(name, colour, positions(table)) for name, colour, table in errors]
     else:
         tracks = [(track.name, track.colour, track.poses.position) for track in run.estimates]
-    page.figure("trajectory", figures.draw_trajectory(tracks))
+    page.figure("trajectory", figures.draw_trajectory(tracks, run.landmarks))
     if errors:
         page.heading("Error over time", "Aligned at the first pose.")
         page.figure("errors", figures.draw_errors(errors))

@@ -41,6 +41,7 @@ void BagPlayer::play(const rosbag::MessageInstance& instance) {
   const std::string& topic = instance.getTopic();
   const Time record = toTime(instance.getTime());
   if (topic == config_.imu_topic) addImu(*read<sensor_msgs::Imu>(instance), record);
+  if (topic == config_.barometer_topic) addPressure(*read<sensor_msgs::FluidPressure>(instance));
   for (Radar& radar : radars_) {
     if (topic == radar.topic) addCloud(*read<sensor_msgs::PointCloud2>(instance), record, radar);
     if (topic != radar.trigger_topic) continue;
@@ -73,6 +74,7 @@ RunSummary BagPlayer::summary() const {
 void BagPlayer::countInput(RunSummary* summary) const {
   summary->imu_count = imu_count_;
   summary->imu_noise = odometry_.imuNoise();
+  if (summary->barometer) summary->barometer->pressures = pressure_count_;
   for (std::size_t k = 0; k < radars_.size(); ++k) {
     const Radar& radar = radars_[k];
     RadarSummary& told = summary->radars[k];
@@ -98,11 +100,13 @@ void BagPlayer::countInput(RunSummary* summary) const {
   if (const auto start = odometry_.start()) summary->initialized_from = toString(start->from);
   if (points_not_finite_ > 0) summary->input_faults["points_not_finite"] = points_not_finite_;
   for (const auto& [kind, what] : imu_not_usable_) summary->input_faults[kind] += what.count;
+  for (const auto& [kind, what] : pressure_not_usable_) summary->input_faults[kind] += what.count;
   const auto warn = [&](const NotUsableByKind& kinds) {
     for (const auto& [kind, what] : kinds)
       summary->warnings.push_back(what.why + " (messages: " + std::to_string(what.count) + ")");
   };
   for (const Radar& radar : radars_) warn(radar.not_usable);
+  warn(pressure_not_usable_);
   warn(imu_not_usable_);
   summary->diagnosis = diagnosis(*summary);
 }
@@ -125,7 +129,7 @@ void BagPlayer::addImu(const sensor_msgs::Imu& message, Time record) {
   ++imu_count_;
   ImuMeasurement imu;
   try {
-    imu = toImuMeasurement(message, config_.imu_topic);
+    imu = toImuMeasurement(message, config_.imu_topic, config_.imu_units);
   } catch (const std::exception& error) {
     notUsable("imu_not_usable", error.what(), &imu_not_usable_);
     return;
@@ -133,6 +137,15 @@ void BagPlayer::addImu(const sensor_msgs::Imu& message, Time record) {
   for (Radar& radar : radars_) radar.stamper.addImu(imu.time, record);
   if (recorder_ != nullptr) recorder_->addImu(imu);
   if (const std::optional<NavigationState> state = odometry_.addImu(imu)) log_->addState(*state);
+}
+
+void BagPlayer::addPressure(const sensor_msgs::FluidPressure& message) {
+  ++pressure_count_;
+  try {
+    odometry_.addPressure(toPressure(message, config_.barometer_topic));
+  } catch (const std::exception& error) {
+    notUsable("pressure_not_usable", error.what(), &pressure_not_usable_);
+  }
 }
 
 void BagPlayer::addCloud(const sensor_msgs::PointCloud2& message, Time record, Radar& radar) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <rosbag/message_instance.h>
+#include <sensor_msgs/FluidPressure.h>
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/PointCloud2.h>
 
@@ -58,6 +59,7 @@ class BagPlayer {
 
   Diagnosis diagnosis(const RunSummary& summary) const;
   void addImu(const sensor_msgs::Imu& message, Time record);
+  void addPressure(const sensor_msgs::FluidPressure& message);
   void addCloud(const sensor_msgs::PointCloud2& message, Time record, Radar& radar);
   void feed(std::vector<RadarScan> scans, std::size_t radar);
   /// One bad message among good ones is counted; `why` is told at the end, the first one of each kind.
@@ -71,8 +73,8 @@ class BagPlayer {
   BatchOdometry* recorder_;
   std::optional<RadarInertialOdometry::Start> start_;
   EvidenceCollector evidence_;
-  std::uint64_t imu_count_ = 0, points_not_finite_ = 0;
-  NotUsableByKind imu_not_usable_;
+  std::uint64_t imu_count_ = 0, pressure_count_ = 0, points_not_finite_ = 0;
+  NotUsableByKind imu_not_usable_, pressure_not_usable_;
 };
 
 }  // namespace rio_t

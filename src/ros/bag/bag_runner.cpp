@@ -41,6 +41,16 @@ std::string allRejected(const RadarSummary& radar) {
          (radar.name.empty() ? "" : "of radar " + radar.name + " ") + "was rejected: " + reasons;
 }
 
+/// What the aids must tell people.
+void warnOfAids(const Config& config, RunSummary* summary) {
+  if (summary->barometer && summary->barometer->used == 0)
+    summary->warnings.push_back("no pressure of topic " + config.barometer_topic +
+                                " (barometer_topic) was used, of " +
+                                std::to_string(summary->barometer->pressures) + " messages");
+  if (summary->ground_vehicle && summary->ground_vehicle->contradicted_at)
+    summary->warnings.push_back(contradictionText(*summary->ground_vehicle));
+}
+
 /// A radar among several that gave nothing: the others carry the run, but it must be said.
 void warnOfSilentRadars(const Config& config, RunSummary* summary) {
   if (summary->radars.size() < 2) return;
@@ -85,6 +95,8 @@ void checkOutcome(const std::string& bag, const Config& config, const BagPlayer&
 /// The topics to read, with the keys that name them.
 std::vector<Wanted> wantedTopics(const Config& config) {
   std::vector<Wanted> wanted = {{"imu_topic", config.imu_topic, "sensor_msgs/Imu"}};
+  if (!config.barometer_topic.empty())
+    wanted.push_back({"barometer_topic", config.barometer_topic, "sensor_msgs/FluidPressure"});
   for (const Config& radar : configsOfRadars(config)) {
     wanted.push_back({keyOf(radar, "radar_topic"), radar.radar_topic, "sensor_msgs/PointCloud2"});
     if (radar.stamp_source == StampSource::kTrigger)
@@ -188,6 +200,11 @@ class BagJob {
                                  result.solution.converged(), result.readmitted};
     log.fill(&summary);
     summary.solver_terminations = {{toString(result.solution.termination), 1}};
+    if (summary.barometer || summary.ground_vehicle)
+      summary.warnings.emplace_back(
+          "mode: batch uses neither the barometer nor platform: ground_vehicle; the run in online/ does");
+    summary.barometer.reset();
+    summary.ground_vehicle.reset();
     player.countInput(&summary);
     return finish(std::move(summary), log, output_.get());
   }
@@ -254,6 +271,7 @@ class BagJob {
   RunSummary finish(RunSummary summary, RunLog& log, RunOutput* output) {
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - started_;
     warnOfSilentRadars(run_.config, &summary);
+    warnOfAids(run_.config, &summary);
     summary.estimation_seconds = took.count();
     summary.realtime_factor = (end_ - begin_).toSec() / took.count();
     const Trajectory trajectory = log.takeTrajectory();

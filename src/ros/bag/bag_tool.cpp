@@ -10,7 +10,7 @@ namespace {
 
 const ProgramText kText = {
     "rio_t_bag",
-    "BAG... --config NAME_OR_PATH --output-dir FOLDER [--set key=value]...\n"
+    "BAG... --config NAME_OR_PATH [--output-dir FOLDER] [--set key=value]...\n"
     "--print-config [--config NAME_OR_PATH] [--set key=value]...\n"
     "--print-parameters[=markdown]\n",
     "Plays ROS 1 bags through the radar-inertial odometry, as fast as the computer can. It needs no roscore.",
@@ -32,7 +32,7 @@ struct Arguments {
 
 void addOptions(OptionSet& options, Arguments& a) {
   addBagOptions(options, a.bags, a.config, a.set);
-  options.text("output-dir", "FOLDER", "the files go there", a.output_folder);
+  options.text("output-dir", "FOLDER", "the files go there; without it, only the summary is printed", a.output_folder);
   options.section("Instead of playing");
   options.flag("print-config", "prints the configuration with every parameter", a.print_config);
   options.valueOrNothing("print-parameters", "FORMAT", "prints the reference of all parameters: yaml, or markdown",
@@ -64,9 +64,7 @@ int run(const Arguments& arguments, std::ostream& out, std::ostream& err) {
     return kExitOk;
   }
   if (!arguments.print_config) {
-    require({{"BAG", !arguments.bags.empty()},
-             {"--config", !arguments.config.empty()},
-             {"--output-dir", !arguments.output_folder.empty()}});
+    require({{"BAG", !arguments.bags.empty()}, {"--config", !arguments.config.empty()}});
   }
   ParameterEntries entries;
   if (!arguments.config.empty()) entries = readParameterFile(findConfigFile(arguments.config));

@@ -150,7 +150,9 @@ std::string calibratedYaml(const BagCalibration& calibration, const Config& conf
                            const ParameterEntries& given, const std::string& name) {
   const std::vector<Config> told = configsOfRadars(config);
   Given entries = sorted(given, config.radars);
-  entries.top_level.remove("estimate_extrinsics");
+  // The mounting found is written as a quaternion of RIO's axes. Told in another way, it would count twice.
+  for (const char* key : {"estimate_extrinsics", "mounting_yaw_pitch_roll_deg", "extrinsics_axes"})
+    entries.top_level.remove(key);
   const bool all_turns_observed =
       std::all_of(calibration.radars.begin(), calibration.radars.end(),
                   [](const CalibratedRadar& radar) { return radar.calibration.allTurnsObserved(); });
@@ -161,7 +163,8 @@ std::string calibratedYaml(const BagCalibration& calibration, const Config& conf
     const std::string indent = has_sections ? "  " : "";
     Keys& own = has_sections ? entries.sections[radar.name] : entries.top_level;
     for (const char* key :
-         {"extrinsics_translation", "extrinsics_rotation_xyzw", "time_offset_initial", "time_offset_sigma"})
+         {"extrinsics_translation", "extrinsics_rotation_xyzw", "mounting_yaw_pitch_roll_deg", "extrinsics_axes",
+          "time_offset_initial", "time_offset_sigma"})
       own.remove(key);
     if (has_sections) sections += "\n" + radar.name + ":\n" + own.yaml(indent);
     sections += (has_sections ? "" : "\n") + commented(describeCalibration(radar), indent) + indent +

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <string>
 
+#include "rio_t/radar/mounting.h"
 #include "rio_t/ros/bag/calibration.h"
 #include "rio_t/ros/bag/run_output.h"
 
@@ -78,6 +79,14 @@ std::string remarks(const CalibratedRadar& radar) {
   return text;
 }
 
+/// The mounting found, as mounting_yaw_pitch_roll_deg has it.
+std::string mountingWords(const CalibratedRadar& radar) {
+  const MountingAngles found = mountingOf(radar.calibration.T_IR.q_IR);
+  const auto degrees = [](double angle) { return decimal(kDegreesPerRadian * angle, 1); };
+  return "  mounting: yaw " + degrees(found.yaw) + " (left), pitch " + degrees(found.pitch) + " (up), roll " +
+         degrees(found.roll) + " (right side down) deg, seen from x forward, y left, z up of the IMU\n";
+}
+
 }  // namespace
 
 std::string describeCalibration(const CalibratedRadar& radar) {
@@ -85,7 +94,7 @@ std::string describeCalibration(const CalibratedRadar& radar) {
                       padded("given", 10, true) + padded("found", 10, true) + padded("sigma", 10, true) + "\n";
   for (std::size_t axis = 0; axis < kCalibrationAxes; ++axis)
     table += axisRow(axis, radar.calibration.axes[axis]);
-  return table + remarks(radar);
+  return table + mountingWords(radar) + remarks(radar);
 }
 
 std::string describeCalibration(const BagCalibration& calibration) {

@@ -103,6 +103,18 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
     row("against truth", errors);
   }
   row("scans", describeScans(summary.scansUsed(), summary.scansTotal(), summary.scansRejected()));
+  if (summary.barometer) {
+    row("barometer", std::to_string(summary.barometer->used) + " means of " +
+                         std::to_string(summary.barometer->pressures) + " pressures, " +
+                         std::to_string(summary.barometer->steps) + " steps, bias " +
+                         decimal(summary.barometer->bias, 2) + " m");
+  }
+  if (summary.ground_vehicle) {
+    row("ground vehicle", summary.ground_vehicle->contradicted_at
+                              ? "CONTRADICTED by the motion, switched off"
+                              : std::to_string(summary.ground_vehicle->used) + " terms, " +
+                                    std::to_string(summary.ground_vehicle->left_out) + " left out");
+  }
   std::uint64_t windows = 0;
   for (const auto& [reason, count] : summary.solver_terminations) windows += count;
   std::string unsolved;
@@ -134,7 +146,7 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
   }
   row("speed", decimal(summary.estimation_seconds, 2) + " s, " + decimal(summary.realtime_factor, 0) +
                    " times real time");
-  row("files in", files);
+  row("files in", files.empty() ? "none; --output-dir FOLDER writes them" : files);
   const RunVerdict verdict = summary.diagnosis.verdict;
   row("verdict", verdict == RunVerdict::kGood       ? "good"
                  : verdict == RunVerdict::kDoubtful ? "DOUBTFUL, because:"

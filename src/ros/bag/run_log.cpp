@@ -29,6 +29,12 @@ RunLog::RunLog(const Config& config, RunOutput* output, const std::vector<double
     : output_(output),
       offset_shared_(config.odometry.smoother.time_offset_shared),
       estimate_extrinsics_(config.odometry.smoother.estimate_extrinsics) {
+  if (config.odometry.use_barometer) barometer_.emplace();
+  if (config.odometry.platform == Platform::kGroundVehicle) {
+    ground_vehicle_.emplace();
+    ground_vehicle_->rotation = config.odometry.ground_vehicle.T_IV.q_IR;
+    ground_vehicle_->rotation_sigma.setConstant(config.odometry.ground_vehicle.rotation_sigma);
+  }
   const std::vector<std::string> names = runFiles(config).radars;
   for (std::size_t k = 0; k < names.size(); ++k) {
     Radar& radar = radars_.emplace_back();
@@ -60,6 +66,7 @@ void RunLog::addResult(ScanResult& result) {
     ++radar.summary.scans_rejected[result.rejected_because];
   }
   if (result.health == Health::kDiverged) ++scans_diverged_;
+  accountAids(result);
   if (!result.updated) return;
   ++terminations_[result.solver_termination];
   for (Radar& each : radars_) {
@@ -75,12 +82,36 @@ void RunLog::addResult(ScanResult& result) {
   radar.summary.extrinsics->covariance = tangentCovariance(result.T_IR_covariance, estimate_extrinsics_);
 }
 
+void RunLog::accountAids(const ScanResult& result) {
+  for (const BarometerAnswer& mean : result.barometer) {
+    barometer_->steps += mean.stepped ? 1 : 0;
+    if (!mean.rejected_because.empty()) {
+      ++barometer_->rejected[mean.rejected_because];
+      continue;
+    }
+    ++barometer_->used;
+    barometer_->bias = mean.bias;
+    barometer_->bias_sigma = mean.bias_sigma;
+    if (!mean.stepped) barometer_->innovation_square += mean.innovation * mean.innovation;
+  }
+  if (!result.ground_vehicle) return;
+  const GroundVehicleAnswer& vehicle = *result.ground_vehicle;
+  if (!ground_vehicle_->first_judged) ground_vehicle_->first_judged = vehicle.time;
+  ++(vehicle.used ? ground_vehicle_->used : ground_vehicle_->left_out);
+  ground_vehicle_->rotation = vehicle.q_IV;
+  ground_vehicle_->rotation_sigma = vehicle.q_IV_sigma;
+  if (vehicle.is_contradicted)
+    ground_vehicle_->contradicted_at = vehicle.time - *ground_vehicle_->first_judged;
+}
+
 void RunLog::fill(RunSummary* summary) const {
   summary->radars.clear();
   for (const Radar& radar : radars_) summary->radars.push_back(radar.summary);
   for (const auto& [termination, count] : terminations_)
     summary->solver_terminations[toString(termination)] = count;
   summary->scans_diverged = scans_diverged_;
+  summary->barometer = barometer_;
+  summary->ground_vehicle = ground_vehicle_;
   summary->path_length_m = path_length_m_;
   if (trajectory_.empty()) return;
   const Eigen::Vector3d moved = trajectory_.back().p_W - trajectory_.front().p_W;

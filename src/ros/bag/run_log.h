@@ -26,6 +26,8 @@ class RunLog {
   Trajectory takeTrajectory() { return std::move(trajectory_); }
 
  private:
+  void accountAids(const ScanResult& result);
+
   struct Radar {
     RadarSummary summary;
     double taken_off = 0.0;
@@ -38,6 +40,8 @@ class RunLog {
   Trajectory trajectory_;
   std::map<SolverTermination, std::uint64_t> terminations_;
   std::uint64_t scans_diverged_ = 0;
+  std::optional<BarometerSummary> barometer_;           // if there is one
+  std::optional<GroundVehicleSummary> ground_vehicle_;  // if the platform is one
   std::optional<StampedPose> newest_optimized_;
   double path_length_m_ = 0.0;
 };

@@ -84,7 +84,9 @@ class SummaryLines {
     yaml_ << YAML::EndSeq;
   }
   void addCauses(const std::vector<Cause>& causes) {
-    yaml_ << YAML::Key << "causes" << YAML::Value << YAML::BeginSeq;
+    yaml_ << YAML::Key << "causes" << YAML::Value;
+    if (causes.empty()) yaml_ << YAML::Flow;
+    yaml_ << YAML::BeginSeq;
     for (const Cause& cause : causes) {
       yaml_ << YAML::BeginMap << YAML::Key << "name" << YAML::Value << cause.name;
       yaml_ << YAML::Key << "share" << YAML::Value << fixedText(cause.share, 3);
@@ -132,6 +134,31 @@ void addMeasured(SummaryLines& lines, const RadarSummary& radar) {
   lines.endMap();
 }
 
+void addBarometer(SummaryLines& lines, const BarometerSummary& barometer) {
+  const auto used = static_cast<double>(barometer.used);
+  lines.beginMap("barometer");
+  lines.add("pressures", barometer.pressures);
+  lines.add("means_used", barometer.used);
+  lines.add("means_rejected", barometer.rejected);
+  lines.add("steps", barometer.steps);
+  lines.add("innovation_rms_m",
+            fixedText(used > 0.0 ? std::sqrt(barometer.innovation_square / used) : 0.0, 6));
+  lines.add("final_bias_m", fixedText(barometer.bias, 6));
+  lines.add("final_bias_sigma_m", fixedText(barometer.bias_sigma, 6));
+  lines.endMap();
+}
+
+void addGroundVehicle(SummaryLines& lines, const GroundVehicleSummary& vehicle) {
+  lines.beginMap("ground_vehicle");
+  lines.add("terms_used", vehicle.used);
+  lines.add("terms_left_out", vehicle.left_out);
+  lines.add("final_rotation_xyzw", fixedTexts(vehicle.rotation, 9));
+  lines.add("final_rotation_sigma", fixedTexts(vehicle.rotation_sigma, 9));
+  lines.add("contradicted", vehicle.contradicted_at.has_value());
+  if (vehicle.contradicted_at) lines.add("contradicted_after_s", fixedText(*vehicle.contradicted_at, 3));
+  lines.endMap();
+}
+
 std::string summaryText(const RunSummary& summary, const std::vector<std::string>& saved) {
   SummaryLines lines;
   const auto line = [&](const char* key, const auto& value) { lines.add(key, value); };
@@ -176,6 +203,8 @@ std::string summaryText(const RunSummary& summary, const std::vector<std::string
     line("batch_converged", summary.batch->converged);
     line("scans_readmitted", summary.batch->scans_readmitted);
   }
+  if (summary.barometer) addBarometer(lines, *summary.barometer);
+  if (summary.ground_vehicle) addGroundVehicle(lines, *summary.ground_vehicle);
   if (summary.truth) {
     line("ate_m", fixedText(summary.truth->ate_m, 9));
     if (summary.truth->t_rel) line("t_rel", fixedText(*summary.truth->t_rel, 9));
@@ -190,6 +219,11 @@ std::string summaryText(const RunSummary& summary, const std::vector<std::string
 
 const char* const kTimeOffsetHeader = "stamp,offset_s,sigma_s\n";
 const char* const kEgoVelocityHeader = "stamp,vx,vy,vz,sigma_x,sigma_y,sigma_z,inliers,points,status\n";
+const char* const kBarometerHeader =
+    "stamp,height,innovation,innovation_sigma,bias,bias_sigma,samples,status\n";
+const char* const kGroundVehicleHeader =
+    "stamp,vx,vy,vz,sigmas,qx,qy,qz,qw,sigma_rx,sigma_ry,sigma_rz,status\n";
+const char* const kMapHeader = "id,x,y,z,sigma,snr_db,sightings\n";
 const char* const kExtrinsicsHeader =
     "stamp,x,y,z,qx,qy,qz,qw,sigma_x,sigma_y,sigma_z,sigma_rx,sigma_ry,sigma_rz\n";
 
@@ -223,6 +257,12 @@ std::map<std::string, std::uint64_t> RunSummary::scansRejected() const {
   return rejected;
 }
 
+std::string contradictionText(const GroundVehicleSummary& vehicle) {
+  return "platform: ground_vehicle: after " + fixedText(vehicle.contradicted_at.value_or(0.0), 1) +
+         " s the motion contradicted it, and the constraint was switched off: the platform moves sideways or "
+         "upwards. Is it a ground vehicle, and does vehicle_frame_rotation_xyzw say which way it drives?";
+}
+
 std::vector<std::string> RunFiles::names() const {
   std::vector<std::string> names = {"trajectory.txt", "trajectory_optimized.txt", "navigation.csv"};
   for (const std::string& radar : radars) {
@@ -230,6 +270,9 @@ std::vector<std::string> RunFiles::names() const {
     names.push_back("ego_velocity" + suffixOf(radar) + ".csv");
     if (extrinsics) names.push_back("extrinsics" + suffixOf(radar) + ".csv");
   }
+  if (barometer) names.emplace_back("barometer.csv");
+  if (ground_vehicle) names.emplace_back("ground_vehicle.csv");
+  if (map) names.emplace_back("map.csv");
   names.emplace_back("biases.csv");
   names.emplace_back("summary.yaml");
   return names;
@@ -237,7 +280,10 @@ std::vector<std::string> RunFiles::names() const {
 
 RunFiles runFiles(const Config& config) {
   RunFiles files;
+  files.barometer = config.odometry.use_barometer;
+  files.ground_vehicle = config.odometry.platform == Platform::kGroundVehicle;
   files.extrinsics = config.odometry.smoother.estimate_extrinsics != EstimateExtrinsics::kNone;
+  files.map = config.odometry.landmarks.enabled && config.mode != RunMode::kBatch;
   if (config.radars.size() < 2) return files;
   files.radars.clear();
   for (const Config& radar : config.radars) files.radars.push_back(radar.radar_name);
@@ -312,9 +358,18 @@ RunOutput::RunOutput(const std::string& folder, const RunFiles& files) : folder_
   optimized_.open(folder + "/trajectory_optimized.txt");
   navigation_.open(folder + "/navigation.csv");
   biases_.open(folder + "/biases.csv");
+  if (files.map) map_.emplace().open(folder + "/map.csv");
   navigation_.buffer =
       "stamp,vx,vy,vz,sigma_px,sigma_py,sigma_pz,sigma_rx,sigma_ry,sigma_rz,sigma_vx,sigma_vy,sigma_vz\n";
   biases_.buffer = "stamp,bgx,bgy,bgz,bax,bay,baz\n";
+  if (files.barometer) {
+    barometer_.emplace().open(folder + "/barometer.csv");
+    barometer_->buffer = kBarometerHeader;
+  }
+  if (files.ground_vehicle) {
+    ground_vehicle_.emplace().open(folder + "/ground_vehicle.csv");
+    ground_vehicle_->buffer = kGroundVehicleHeader;
+  }
   for (const std::string& name : files.radars) {
     RadarOutput& radar = radars_.emplace_back();
     radar.time_offset.open(folder + "/time_offset" + suffixOf(name) + ".csv");
@@ -331,7 +386,8 @@ void RunOutput::removeOfEarlierRuns() const {
   namespace fs = std::filesystem;
   std::error_code error;
   fs::remove(folder_ + "/summary.yaml", error);
-  static const std::regex of_radar("(time_offset|ego_velocity|extrinsics)(_[a-z0-9_]+)?\\.csv");
+  static const std::regex of_radar(
+      "(time_offset|ego_velocity|extrinsics)(_[a-z0-9_]+)?\\.csv|(barometer|ground_vehicle|map)\\.csv");
   const std::vector<std::string> own = files_.names();
   std::vector<fs::path> earlier;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) {
@@ -340,9 +396,12 @@ void RunOutput::removeOfEarlierRuns() const {
     if (name.size() > 255 || !std::regex_match(name, kind, of_radar) || !entry.is_regular_file(error))
       continue;
     if (std::find(own.begin(), own.end(), name) != own.end()) continue;
-    const char* const header = kind[1] == "time_offset"    ? kTimeOffsetHeader
-                               : kind[1] == "ego_velocity" ? kEgoVelocityHeader
-                                                           : kExtrinsicsHeader;
+    const char* const header = kind[1] == "time_offset"       ? kTimeOffsetHeader
+                               : kind[1] == "ego_velocity"    ? kEgoVelocityHeader
+                               : name == "barometer.csv"      ? kBarometerHeader
+                               : name == "map.csv"            ? kMapHeader
+                               : name == "ground_vehicle.csv" ? kGroundVehicleHeader
+                                                              : kExtrinsicsHeader;
     // A user's own time_offset_truth.csv stays.
     if (isEmptyOrBeginsWith(entry.path(), header)) earlier.push_back(entry.path());
   }
@@ -379,6 +438,7 @@ void RunOutput::addState(const NavigationState& state) {
 
 void RunOutput::addResult(const ScanResult& result) {
   for (const StampedPose& pose : result.left_window) addPose(optimized_, pose.time, pose.p_W, pose.q_WI);
+  addAids(result);
   if (!result.used && result.rejected_because.empty()) return;  // only carries the last poses
 
   RadarOutput& radar = radars_.at(result.scan.radar);
@@ -401,11 +461,59 @@ void RunOutput::addResult(const ScanResult& result) {
   radar.time_offset.endLine();
   if (radar.extrinsics) addExtrinsics(*radar.extrinsics, result);
 
+  if (result.landmarks)
+    for (const LandmarkPoint& point : result.landmarks->map) landmarks_[point.id] = point;
+
   line = &biases_.buffer;
   appendStamp(line, result.scan.stamp);
   appendVector(line, result.state.b_g, 9);
   appendVector(line, result.state.b_a, 9);
   biases_.endLine();
+}
+
+void RunOutput::addAids(const ScanResult& result) {
+  for (const BarometerAnswer& mean : result.barometer) {
+    std::string* line = &barometer_->buffer;
+    appendStamp(line, mean.time);
+    for (const double x : {mean.height, mean.innovation, mean.innovation_sigma, mean.bias, mean.bias_sigma}) {
+      line->push_back(',');
+      appendFixed(line, x, 6);
+    }
+    *line += ',' + std::to_string(mean.samples) + ',' +
+             (!mean.rejected_because.empty() ? mean.rejected_because
+              : mean.stepped                 ? "stepped"
+                                             : "used");
+    barometer_->endLine();
+  }
+  if (!result.ground_vehicle) return;
+  const GroundVehicleAnswer& vehicle = *result.ground_vehicle;
+  std::string* line = &ground_vehicle_->buffer;
+  appendStamp(line, vehicle.time);
+  appendVector(line, vehicle.v_V, 6);
+  line->push_back(',');
+  appendFixed(line, std::sqrt(vehicle.squared_sigmas), 3);
+  appendVector(line, vehicle.q_IV.vec(), 9);
+  line->push_back(',');
+  appendFixed(line, vehicle.q_IV.w(), 9);
+  appendVector(line, vehicle.q_IV_sigma, 9);
+  *line += vehicle.is_contradicted ? ",contradicted" : vehicle.used ? ",used" : ",left_out";
+  ground_vehicle_->endLine();
+}
+
+void RunOutput::writeMap() {
+  map_->buffer = kMapHeader;
+  for (const auto& [id, point] : landmarks_) {
+    std::string* line = &map_->buffer;
+    *line += std::to_string(id);
+    appendVector(line, point.p_W, 6);
+    line->push_back(',');
+    appendFixed(line, point.sigma, 6);
+    line->push_back(',');
+    appendFixed(line, point.snr_db, 3);
+    *line += ',' + std::to_string(point.sightings);
+    map_->endLine();
+  }
+  map_->flush();
 }
 
 void RunOutput::addExtrinsics(File& file, const ScanResult& result) {
@@ -424,11 +532,14 @@ void RunOutput::addExtrinsics(File& file, const ScanResult& result) {
 
 void RunOutput::finish(const RunSummary& summary) {
   for (File* file : {&trajectory_, &optimized_, &navigation_, &biases_}) file->flush();
+  if (barometer_) barometer_->flush();
+  if (ground_vehicle_) ground_vehicle_->flush();
   for (RadarOutput& radar : radars_) {
     radar.time_offset.flush();
     radar.ego_velocity.flush();
     if (radar.extrinsics) radar.extrinsics->flush();
   }
+  if (map_) writeMap();
   File yaml;
   yaml.open(folder_ + "/summary.yaml");
   yaml.buffer = summaryText(summary, files_.names());

@@ -3,6 +3,7 @@
 #include <geometry_msgs/PoseStamped.h>
 #include <geometry_msgs/TwistStamped.h>
 #include <rosbag/bag.h>
+#include <sensor_msgs/FluidPressure.h>
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <std_msgs/Header.h>
@@ -120,6 +121,15 @@ sensor_msgs::Imu imuMessage(const ImuMeasurement& sample, std::uint32_t seq, dou
   return message;
 }
 
+sensor_msgs::FluidPressure pressureMessage(const simulation::SimulatedPressure& sample, std::uint32_t seq) {
+  sensor_msgs::FluidPressure message;
+  message.header.seq = seq;
+  message.header.stamp = toRosTime(sample.stamp);
+  message.header.frame_id = "base_link";
+  message.fluid_pressure = sample.pascal;
+  return message;
+}
+
 std_msgs::Header triggerMessage(const SimulatedScan& scan, const Layout& layout) {
   std_msgs::Header message;
   message.seq = scan.seq;
@@ -179,7 +189,7 @@ geometry_msgs::TwistStamped twistMessage(const simulation::MotionState& state, T
   return message;
 }
 
-enum class Kind { kTruth, kImu, kTrigger, kScan };
+enum class Kind { kTruth, kImu, kPressure, kTrigger, kScan };
 
 // Something that arrives at the recorder.
 struct Arrival {
@@ -196,6 +206,8 @@ std::vector<Arrival> arrivals(const simulation::SensorData& data, const std::vec
   for (std::size_t i = 0; i < data.imu.samples.size(); ++i) {
     all.push_back({data.imu.samples[i].time + options.imu_latency, Kind::kImu, i});
   }
+  for (std::size_t i = 0; i < data.pressures.size(); ++i)
+    all.push_back({data.pressures[i].stamp + options.barometer_latency, Kind::kPressure, i});
   for (const RadarTrack& radar : radars) {
     for (std::size_t i = 0; i < radar.scans->size(); ++i) {
       const SimulatedScan& scan = (*radar.scans)[i];
@@ -238,6 +250,9 @@ void writeSimulationBag(const std::string& path, const simulation::Motion& motio
         case Kind::kImu:
           bag.write("/sensor_platform/imu", record,
                     imuMessage(data.imu.samples[arrival.index], seq, orientation_covariance));
+          break;
+        case Kind::kPressure:
+          bag.write("/sensor_platform/baro", record, pressureMessage(data.pressures[arrival.index], seq));
           break;
         case Kind::kTrigger:
           bag.write(arrival.radar->layout.trigger_topic, record,

@@ -37,6 +37,7 @@ std::string withName(const std::string& what, const Config& radar, const std::st
 Config withResolvedTopics(Config config, const ros::NodeHandle& node) {
   config.imu_topic = node.resolveName(config.imu_topic);
   config.radar_topic = node.resolveName(config.radar_topic);
+  if (!config.barometer_topic.empty()) config.barometer_topic = node.resolveName(config.barometer_topic);
   if (!config.trigger_topic.empty()) config.trigger_topic = node.resolveName(config.trigger_topic);
   for (Config& radar : config.radars) radar = withResolvedTopics(radar, node);
   return config;
@@ -88,6 +89,7 @@ LiveOdometry::~LiveOdometry() {
   // First no more callbacks, then no more solving: the optimisation thread is the last to touch the
   // publishers.
   imu_subscriber_.shutdown();
+  barometer_subscriber_.shutdown();
   for (Radar& radar : radars_) {
     radar.scans.shutdown();
     radar.triggers.shutdown();
@@ -144,6 +146,11 @@ void LiveOdometry::subscribe(const Config& told) {
         },
         sensor_msgs::PointCloud2());
   }
+  if (!told.barometer_topic.empty())
+    barometer_subscriber_ = subscribeTo(
+        input_node, told.barometer_topic, kImuQueue,
+        [this](const Event<sensor_msgs::FluidPressure>& event) { guarded("pressure", [&] { onPressure(event); }); },
+        sensor_msgs::FluidPressure());
   imu_subscriber_ = subscribeTo(
       imu_node, told.imu_topic, kImuQueue,
       [this](const Event<sensor_msgs::Imu>& event) { guarded("IMU", [&] { onImu(event); }); },
@@ -172,6 +179,10 @@ void LiveOdometry::addDiagnostics() {
   using Status = LiveMonitor::Status;
   diagnostics_->add("odometry", [this](Status& s) { monitor_.describeOdometry(s, session_.get().get()); });
   diagnostics_->add("input", [this](Status& s) { monitor_.describeInput(s, session_.get().get()); });
+  if (!config_.barometer_topic.empty())
+    diagnostics_->add("barometer", [this](Status& s) { monitor_.describeBarometer(s); });
+  if (config_.odometry.platform == Platform::kGroundVehicle)
+    diagnostics_->add("ground vehicle", [this](Status& s) { monitor_.describeGroundVehicle(s); });
   diagnostics_->add("solver", [this](Status& s) { monitor_.describeSolver(s); });
   for (std::size_t k = 0; k < radars_.size(); ++k) {
     const Config& radar = radars_[k].config;
@@ -294,7 +305,7 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
   monitor_.imu();
   imu_rate_->task.tick();
   try {
-    const ImuMeasurement imu = toImuMeasurement(*event.getConstMessage(), config_.imu_topic);
+    const ImuMeasurement imu = toImuMeasurement(*event.getConstMessage(), config_.imu_topic, config_.imu_units);
     // The same judgement as the session's own, so that the whole session starts again, with what it stamps
     // by.
     const ClockJumpDetector::Verdict stamp = imu_stamps_.check(imu.time);
@@ -389,6 +400,17 @@ void LiveOdometry::onScan(std::size_t radar, const Event<sensor_msgs::PointCloud
   }
 }
 
+void LiveOdometry::onPressure(const Event<sensor_msgs::FluidPressure>& event) {
+  monitor_.pressure();
+  try {
+    const Pressure pressure = toPressure(*event.getConstMessage(), config_.barometer_topic);
+    if (const Session now = session_.get()) now->addPressure(pressure);
+  } catch (const std::exception& error) {
+    monitor_.pressureDropped(error.what());
+    if (isTimeToTell("pressure")) ROS_ERROR_STREAM(name_ << ": " << error.what());
+  }
+}
+
 void LiveOdometry::onTrigger(std::size_t radar, const Event<std_msgs::Header>& event) {
   monitor_.trigger(radar);
   radars_[radar].trigger_rate->task.tick();
@@ -472,6 +494,8 @@ void LiveOdometry::tellHealth(const ScanResult& result) {
   if (result.reinitialized) {
     ROS_WARN_STREAM(name_ << ": found the state anew in motion; position and heading go on");
   }
+  if (result.ground_vehicle && result.ground_vehicle->is_contradicted)
+    ROS_WARN_STREAM(name_ << ": " << kGroundVehicleContradicted);
   if (result.health == Health::kDiverged && isTimeToTell("diverged")) {
     ROS_ERROR_STREAM(name_ << ": diverged, radar and IMU contradict each other: do not trust the estimate (see "
                               "diagnostics, on_divergence)");
@@ -513,8 +537,9 @@ void LiveOdometry::solve() {
     try {
       bool more = false;
       for (const LiveSession::Result& result : now->process(&more)) {
-        LivePublisher::Frames frames{frames_.imuFrame().value_or(config_.base_link_frame), frames_.imuInBody(), {}};
+        LivePublisher::Frames frames{frames_.imuFrame().value_or(config_.base_link_frame), frames_.imuInBody(), {}, {}};
         if (result.result.updated) frames.body = frames_.place(*now, result.result.state, rate_sigma);
+        frames.world = now->world();
         const bool current = session_.speak(Speaker::kOptimisation, now, [&] {
           publisher_.result(result, frames);
           tellHealth(result.result);

@@ -141,6 +141,7 @@ void LiveMonitor::result(const LiveSession::Result& result) {
   Radar& radar = radars_.at(result.result.scan.radar);
   collector_.add(result.result);
   last_scan_ = result.result.scan.stamp;
+  accountAids(result.result);
   if (result.result.used) {
     ++radar.used;
     last_used_ = last_scan_;
@@ -179,6 +180,8 @@ void LiveMonitor::reset(const std::string& reason) {
   last_terminations_.clear();
   last_update_.reset();
   last_used_.reset();
+  vehicle_ = GroundVehicle();
+  barometer_.last.reset();
   for (Radar& radar : radars_) {
     radar.last_update.reset();
     radar.accounts.clear();

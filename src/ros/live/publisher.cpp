@@ -62,6 +62,7 @@ LivePublisher::LivePublisher(const Config& config, const ros::NodeHandle& privat
   path_ = node.advertise<nav_msgs::Path>(
       "path", 1, [this](const ros::SingleSubscriberPublisher& subscriber) { publishPathTo(subscriber); });
   imu_bias_ = node.advertise<ImuBias>("imu_bias", 200);
+  if (config_.odometry.landmarks.enabled) map_ = node.advertise<sensor_msgs::PointCloud2>("map", 1, true);
   path_message_.header.frame_id = config_.odom_frame;
   if (config_.publish_tf) tf_.emplace();
   if (config_.publish_radar_tf) {
@@ -102,6 +103,7 @@ void LivePublisher::result(const LiveSession::Result& live, const Frames& frames
   if (radar.inliers.getNumSubscribers() > 0 && isValid(result.ego_velocity.status))
     publishCloud(radar.inliers, result.scan, result.ego_velocity.inliers, radar.frame, stamp);
   if (!result.updated) return;
+  if (map_ && result.landmarks && frames.world) map(result, *frames.world);
   publish(imu_bias_, toImuBias(result.state, frames.imu));
   TimeOffset offset;
   offset.header.stamp = toRosTime(result.scan.stamp);
@@ -136,6 +138,13 @@ void LivePublisher::radarFrame(Radar& radar, const LiveSession::Result& live, co
   // Also with a scan that is rejected: its cloud is shown.
   transform.header.stamp = toRosTime(stamp);
   radar_tf_->sendTransform(transform);
+}
+
+void LivePublisher::map(const ScanResult& result, const WorldInOdom& T_OW) {
+  sensor_msgs::PointCloud2 cloud = toPointCloud2(result.landmarks->map, T_OW);
+  cloud.header.stamp = toRosTime(result.state.time);
+  cloud.header.frame_id = config_.odom_frame;
+  publish(*map_, std::move(cloud));
 }
 
 void LivePublisher::extendPath(const BodyOdometry& body) {

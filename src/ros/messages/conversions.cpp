@@ -1,5 +1,7 @@
 #include "rio_t/ros/messages/conversions.h"
 
+#include <sensor_msgs/point_cloud2_iterator.h>
+
 #include <tf2_eigen/tf2_eigen.h>
 
 #include <algorithm>
@@ -33,13 +35,23 @@ ros::Time toRosTime(Time time) {
   return {static_cast<std::uint32_t>(ns / kSecond), static_cast<std::uint32_t>(ns % kSecond)};
 }
 
-ImuMeasurement toImuMeasurement(const sensor_msgs::Imu& message, const std::string& topic) {
+ImuMeasurement toImuMeasurement(const sensor_msgs::Imu& message, const std::string& topic,
+                                const ImuUnits& units) {
   ImuMeasurement imu;
   imu.time = toTime(message.header.stamp);
   if (imu.time == Time()) throw std::runtime_error("topic " + topic + ": the stamp in the header is zero");
   tf2::fromMsg(message.angular_velocity, imu.angular_velocity);
   tf2::fromMsg(message.linear_acceleration, imu.acceleration);
-  return imu;
+  return converted(imu, units);
+}
+
+Pressure toPressure(const sensor_msgs::FluidPressure& message, const std::string& topic) {
+  const Pressure pressure{toTime(message.header.stamp), message.fluid_pressure};
+  if (pressure.time == Time())
+    throw std::runtime_error("topic " + topic + ": the stamp in the header is zero");
+  const std::string fault = faultOf(pressure.pascal);
+  if (!fault.empty()) throw std::runtime_error("topic " + topic + ": fluid_pressure: " + fault);
+  return pressure;
 }
 
 nav_msgs::Odometry toOdometry(const BodyOdometry& body, const std::string& odom_frame,
@@ -69,10 +81,7 @@ geometry_msgs::TransformStamped toTransform(const BodyOdometry& body, const std:
   return transform;
 }
 
-Eigen::Quaterniond radarFrameAxes() {
-  // Forward is y of the radar and x of its frame: a quarter turn about z.
-  return {std::sqrt(0.5), 0.0, 0.0, -std::sqrt(0.5)};
-}
+Eigen::Quaterniond radarFrameAxes() { return cloudFromRfu(PointAxes::kForwardLeftUp); }
 
 geometry_msgs::TwistWithCovarianceStamped toTwist(const Eigen::Vector3d& v_R, const Eigen::Matrix3d& covariance,
                                                   Time stamp, const std::string& radar_frame) {
@@ -102,8 +111,7 @@ ImuBias toImuBias(const NavigationState& state, const std::string& imu_frame) {
 }
 
 Extrinsics toExtrinsics(const geometry_msgs::Transform& T_imu_cloud, PointAxes axes) {
-  const Eigen::Quaterniond q_cloud_R =
-      axes == PointAxes::kForwardLeftUp ? radarFrameAxes() : Eigen::Quaterniond::Identity();
+  const Eigen::Quaterniond q_cloud_R = cloudFromRfu(axes);
   Eigen::Quaterniond q_imu_cloud;
   tf2::fromMsg(T_imu_cloud.rotation, q_imu_cloud);
   Extrinsics T_IR;
@@ -141,6 +149,26 @@ geometry_msgs::TransformStamped toTransform(const Extrinsics& T_IR, const ImuInB
   transform.transform.rotation =
       tf2::toMsg((T_BI.q_BI * T_IR.q_IR * radarFrameAxes().conjugate()).normalized());
   return transform;
+}
+
+sensor_msgs::PointCloud2 toPointCloud2(const std::vector<LandmarkPoint>& map, const WorldInOdom& T_OW) {
+  sensor_msgs::PointCloud2 cloud;
+  cloud.height = 1;
+  sensor_msgs::PointCloud2Modifier modifier(cloud);
+  constexpr auto kFloat = sensor_msgs::PointField::FLOAT32;
+  modifier.setPointCloud2Fields(6, "x", 1, kFloat, "y", 1, kFloat, "z", 1, kFloat, "sigma", 1, kFloat,
+                                "intensity", 1, kFloat, "sightings", 1, kFloat);
+  modifier.resize(map.size());
+  sensor_msgs::PointCloud2Iterator<float> field(cloud, "x");
+  for (const LandmarkPoint& point : map) {
+    const Eigen::Vector3d p_O = T_OW.p_O + T_OW.q_OW * point.p_W;
+    for (int i = 0; i < 3; ++i) field[i] = static_cast<float>(p_O[i]);
+    field[3] = static_cast<float>(point.sigma);
+    field[4] = static_cast<float>(point.snr_db);
+    field[5] = static_cast<float>(point.sightings);
+    ++field;
+  }
+  return cloud;
 }
 
 }  // namespace rio_t

@@ -206,4 +206,18 @@ void listHealth(ParameterList& list, Config& c) {
               "The health is coasting after this time without a used scan: the IMU alone carries the estimate.");
 }
 
+void listLandmarks(ParameterList& list, Config& c) {
+  LandmarkOptions& landmarks = c.odometry.landmarks;
+  list.group("Landmarks: static points that come back hold position and heading");
+  list.boolean("landmarks", landmarks.enabled,
+               "true keeps static detections as points of the world, and position and heading drift less where they "
+               "come back. The map must prove itself first; until then nothing changes. It costs several times the "
+               "computing time. mode: batch solves without them.");
+  list.integer("landmarks_max", between(1, 100), landmarks.max_landmarks,
+               "The window holds so many landmarks at once. The cost grows faster than their number.");
+  list.number("radar_range_sigma", "m", above(0), landmarks.range_sigma,
+              "The range of a point has this noise. Only landmarks use it. Too small a value makes the map "
+              "contradict itself, and it is dropped (landmarks_dropped).");
+}
+
 }  // namespace rio_t

@@ -163,6 +163,15 @@ void listExtrinsics(ParameterList& list, Config& c) {
                         "This quaternion turns radar vectors (x right, y forward, z up) into the IMU frame. An error "
                         "of a degree bends the path by about 2 % of its length. Set estimate_extrinsics: rotation if "
                         "you know it to 10 degrees only, or find it with `calibrate`.");
+  list.choice<ExtrinsicsAxes>(
+      "extrinsics_axes", {{"rfu", ExtrinsicsAxes::kRightForwardUp}, {"cloud", ExtrinsicsAxes::kCloud}},
+      c.extrinsics_axes,
+      "This says which radar axes extrinsics_rotation_xyzw turns. rfu: x right, y forward, z up, whatever the axes "
+      "of the cloud. cloud: the axes of the cloud itself, as a tf or a calibration tool gives them.");
+  list.first().mounting("mounting_yaw_pitch_roll_deg", c.mounting,
+                        "This is the rotation in words, instead of extrinsics_rotation_xyzw: yaw to the left, pitch "
+                        "up, roll right side down. The IMU has x forward, y left, z up. [0, 0, 0] is an upright radar "
+                        "that looks forward. [] means that extrinsics_rotation_xyzw holds. Give only one of the two.");
 }
 
 void listEstimateExtrinsics(ParameterList& list, Config& c) {

@@ -161,6 +161,27 @@ void ParameterList::rotation(const std::string& key, Eigen::Quaterniond& member,
       });
 }
 
+void ParameterList::mounting(const std::string& key, std::optional<MountingAngles>& member,
+                             const std::string& text) {
+  constexpr double kDegree = 3.14159265358979323846 / 180.0;
+  add({key, "list", "deg", "[], or a list of 3 finite numbers, each of at least -360 and at most 360", text},
+      [&member](const ParameterValue& value) {
+        const auto* list = std::get_if<ParameterValue::List>(&value.data);
+        if (list != nullptr && list->empty()) {
+          member.reset();
+          return true;
+        }
+        const auto x = asNumbers(value, 3, Range{-360.0, 360.0});
+        if (!x) return false;
+        member = MountingAngles{kDegree * (*x)[0], kDegree * (*x)[1], kDegree * (*x)[2]};
+        return true;
+      },
+      [&member] {
+        if (!member) return ParameterValue{ParameterValue::List{}};
+        return listOf({member->yaw / kDegree, member->pitch / kDegree, member->roll / kDegree});
+      });
+}
+
 void ParameterList::text(const std::string& key, std::string& member, const std::string& text) {
   add({key, "text", "", "one line of text, not empty", text},
       [&member](const ParameterValue& value) {

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -59,6 +60,8 @@ class ParameterList {
                const std::string& text);
   /// Unit quaternion x, y, z, w; normalised.
   void rotation(const std::string& key, Eigen::Quaterniond& member, const std::string& text);
+  /// Yaw, pitch and roll in degrees, or [] for none.
+  void mounting(const std::string& key, std::optional<MountingAngles>& member, const std::string& text);
   void text(const std::string& key, std::string& member, const std::string& text);
   void textOrEmpty(const std::string& key, std::string& member, const std::string& text);
   /// One of several words, each standing for a value.

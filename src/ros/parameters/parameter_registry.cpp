@@ -47,11 +47,14 @@ ParameterList parametersOf(Config& config) {
   listGaps(list, config);
   listInitialization(list, config);
   listRest(list, config);
+  listPlatform(list, config);
+  listBarometer(list, config);
   listEgoVelocity(list, config);
   listFeasibility(list, config);
   listTimeOffset(list, config);
   listSmoother(list, config);
   listHealth(list, config);
+  listLandmarks(list, config);
   listLiveNode(list, config);
   listBag(list, config);
   return list;

@@ -33,6 +33,11 @@ void listRest(ParameterList& list, Config& config);
 void listTimeOffset(ParameterList& list, Config& config);
 void listSmoother(ParameterList& list, Config& config);
 void listHealth(ParameterList& list, Config& config);
+void listLandmarks(ParameterList& list, Config& config);
+
+// What the platform cannot do, and how high it is.
+void listPlatform(ParameterList& list, Config& config);
+void listBarometer(ParameterList& list, Config& config);
 
 // The programs.
 void listLiveNode(ParameterList& list, Config& config);

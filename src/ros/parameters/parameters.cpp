@@ -8,6 +8,7 @@
 #include <map>
 #include <utility>
 
+#include "mounting_parameters.h"
 #include "parameter_list.h"
 
 namespace rio_t {
@@ -142,6 +143,7 @@ void setTopLevel(const ParameterEntries& entries, const ParameterList& list,
 
 /// Sets what stands in the section of a radar.
 void setSection(const Section& section, Config* radar, std::vector<std::string>* faults) {
+  beginMounting(section.entries, radar->radar_name + "/", radar, faults);
   const ParameterList list = parametersOf(*radar);
   for (const ParameterEntry& entry : section.entries)
     setParameter(entry, radar->radar_name + "/", list, faults);
@@ -308,7 +310,8 @@ std::vector<Config> configsOfRadars(const Config& config) {
 
 Config withAbsoluteTopics(Config config) {
   for (std::string* topic :
-       {&config.imu_topic, &config.radar_topic, &config.trigger_topic, &config.ground_truth_topic}) {
+       {&config.imu_topic, &config.radar_topic, &config.trigger_topic, &config.ground_truth_topic,
+        &config.barometer_topic}) {
     if (!topic->empty() && topic->front() != '/') topic->insert(0, "/");
   }
   for (Config& radar : config.radars) radar = withAbsoluteTopics(radar);
@@ -320,10 +323,16 @@ Config makeConfig(const ParameterEntries& entries) {
   std::vector<std::string> faults;
   const ParameterList list = parametersOf(config);
   const SortedEntries sorted = sortedEntries(entries, list);
+  beginMounting(sorted.top_level, "", &config, &faults);
   setTopLevel(sorted.top_level, list, config.radars, &faults);
   const Config top_level = config;
   setRadars(sorted, top_level, &config.radars, &faults);
-  for (const Config& radar : config.radars) config.odometry.radars.push_back(radarOptions(radar));
+  config.odometry.use_barometer = !config.barometer_topic.empty();
+  resolveMounting(&config);
+  for (Config& radar : config.radars) {
+    resolveMounting(&radar);
+    config.odometry.radars.push_back(radarOptions(radar));
+  }
   // Judged only where each value is right by itself: otherwise a default might be blamed.
   if (faults.empty()) faults = contradictions(config);
   if (!faults.empty()) throw ConfigError(std::move(faults));

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "rio_t/radar/mounting.h"
+
 namespace rio_t {
 namespace {
 
@@ -92,6 +94,10 @@ PointCoordinates pointCoordinatesFromString(const std::string& name) {
   return choiceOf(name, "coordinates", kCoordinates);
 }
 PowerUnit powerUnitFromString(const std::string& name) { return choiceOf(name, "power_unit", kPowerUnits); }
+
+Eigen::Quaterniond cloudFromRfu(PointAxes axes) {
+  return axes == PointAxes::kForwardLeftUp ? fluFromRfu() : Eigen::Quaterniond::Identity();
+}
 
 std::vector<std::string> pointCloudPresets() {
   std::vector<std::string> names;

@@ -97,6 +97,17 @@ void listPointNoise(ParameterList& list, EgoVelocityOptions& radar) {
 
 void listImu(ParameterList& list, Config& c) {
   list.group("IMU");
+  list.choice<AccelerationUnit>(
+      "imu_acceleration_unit",
+      {{"m/s2", AccelerationUnit::kMetresPerSecondSquared}, {"g", AccelerationUnit::kStandardGravity}},
+      c.imu_units.acceleration,
+      "This is the unit of linear_acceleration in the messages. sensor_msgs/Imu asks for m/s2. Some drivers write g: "
+      "then the acceleration at rest has a size of 1.");
+  list.choice<RateUnit>("imu_rate_unit",
+                        {{"rad/s", RateUnit::kRadiansPerSecond}, {"deg/s", RateUnit::kDegreesPerSecond}},
+                        c.imu_units.rate,
+                        "This is the unit of angular_velocity in the messages. sensor_msgs/Imu asks for rad/s. Some "
+                        "drivers write deg/s.");
   list.number("gravity", "m/s^2", between(9.5, 10.0), c.odometry.gravity,
               "This is the size of gravity at your place: 9.78 at the equator, 9.83 at the poles.");
   list.first().number("imu_accel_noise_density", "m/s^2/sqrt(Hz)", above(0), c.odometry.imu_noise.accel_density,

@@ -55,6 +55,28 @@ struct RadarSummary {
   std::vector<double> pass_offset_sigmas_s;           ///< likewise
 };
 
+/// What became of the barometer.
+struct BarometerSummary {
+  std::uint64_t pressures = 0;                    ///< messages
+  std::uint64_t used = 0;                         ///< means of them that went into the window
+  std::map<std::string, std::uint64_t> rejected;  ///< means by reason
+  std::uint64_t steps = 0;                        ///< after which the bias was found anew
+  double bias = 0.0, bias_sigma = 0.0;            ///< [m] at the end
+  double innovation_square = 0.0;  ///< [m^2] sum over the used ones; the file has the root of the mean
+};
+
+/// What became of the constraint of a ground vehicle.
+struct GroundVehicleSummary {
+  std::uint64_t used = 0;                                        ///< terms
+  std::uint64_t left_out = 0;                                    ///< that contradicted the estimate
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  ///< of the vehicle frame, at the end
+  Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Zero();      ///< [rad] about the axes of I
+  std::optional<double> contradicted_at;                         ///< [s] after the first scan judged
+  std::optional<Time> first_judged;                              ///< not in the file
+};
+/// For people: that the motion contradicts the platform, and what to look at.
+std::string contradictionText(const GroundVehicleSummary& vehicle);
+
 /// What a run comes to; `summary.yaml` has one key for each member.
 struct RunSummary {
   std::string mode = "online";
@@ -73,8 +95,10 @@ struct RunSummary {
   double path_length_m = 0.0;        ///< of the optimised poses
   double end_to_start_2d_m = 0.0;    ///< of the causal trajectory, horizontal
   double end_to_start_3d_m = 0.0;
-  MeasuredImuNoise imu_noise;  ///< that the IMU showed at the end
-  Diagnosis diagnosis;         ///< whether the run is good, and if not, why
+  MeasuredImuNoise imu_noise;                          ///< that the IMU showed at the end
+  std::optional<BarometerSummary> barometer;           ///< only with a barometer_topic
+  std::optional<GroundVehicleSummary> ground_vehicle;  ///< only with platform: ground_vehicle
+  Diagnosis diagnosis;                                 ///< whether the run is good, and if not, why
   std::optional<TruthErrors> truth;
   double estimation_seconds = 0.0;  ///< reading, decoding and estimating, wall clock
   double realtime_factor = 0.0;     ///< seconds of data in a second of that
@@ -89,6 +113,9 @@ struct RunSummary {
 struct RunFiles {
   std::vector<std::string> radars = {""};  ///< names, as in RadarSummary
   bool extrinsics = false;                 ///< they are estimated
+  bool barometer = false;                  ///< there is one
+  bool ground_vehicle = false;             ///< the platform is one
+  bool map = false;                        ///< landmarks are on
 
   std::vector<std::string> names() const;
 };
@@ -107,6 +134,12 @@ void appendStamp(std::string* text, Time time);
 /// navigation.csv has the velocity that goes with trajectory.txt, and how sure the estimate is of itself, ten
 /// times a second: v_W [m/s], and standard deviations of p_W [m], of a rotation about the axes of W [rad],
 /// and of v_W [m/s].
+///
+/// barometer.csv has the means of the pressures: height above the start by the bias before, innovation and
+/// its sigma, bias and its sigma [m], samples in the mean, and what became of it. ground_vehicle.csv has the
+/// predicted velocity of the point in the vehicle frame [m/s], how many sigmas it contradicts the constraint,
+/// and the rotation of the vehicle frame with its sigmas about the axes of I [rad]. Both only where they are
+/// on.
 ///
 /// extrinsics.csv has T_IR, and standard deviations of its translation [m] and of a turn about the axes of
 /// the IMU [rad]; zero where it is not estimated.
@@ -139,13 +172,18 @@ class RunOutput {
   };
 
   void removeOfEarlierRuns() const;
+  void writeMap();
   static void addExtrinsics(File& file, const ScanResult& result);
+  void addAids(const ScanResult& result);
   void addPose(File& file, Time time, const Eigen::Vector3d& p_W, const Eigen::Quaterniond& q_WI);
 
   std::string folder_;
   RunFiles files_;
   File trajectory_, optimized_, navigation_, biases_;
+  std::optional<File> barometer_, ground_vehicle_;
   std::vector<RadarOutput> radars_;      // by RadarScan::radar
+  std::optional<File> map_;              // of the landmarks, if they are on
+  std::map<std::uint64_t, LandmarkPoint> landmarks_;  // all that there were, by id, as they were last
   std::optional<Time> last_navigation_;  // of the last line in navigation.csv
 };
 

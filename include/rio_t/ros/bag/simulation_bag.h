@@ -15,9 +15,10 @@ enum class BagFormat {
 
 struct SimulationBagOptions {
   BagFormat format = BagFormat::kIrs;
-  double ground_truth_rate = 50.0;  ///< [Hz]
-  double imu_latency = 0.001;       ///< [s] from stamp to arrival, also of the triggers
-  double record_offset = 0.0;       ///< [s] clock of the recorder minus clock of the IMU
+  double ground_truth_rate = 50.0;   ///< [Hz]
+  double barometer_latency = 0.002;  ///< [s] from stamp to arrival
+  double imu_latency = 0.001;        ///< [s] from stamp to arrival, also of the triggers
+  double record_offset = 0.0;        ///< [s] clock of the recorder minus clock of the IMU
 };
 
 /// Writes what the sensors measured on `motion` to the bag `path`, in the order of arrival; record times are
@@ -27,6 +28,8 @@ struct SimulationBagOptions {
 /// (TwistStamped, linear and angular velocity both in W). IRS: /sensor_platform/radar/scan and
 /// /sensor_platform/radar/trigger. ti_mmwave: /ti_mmwave/radar_scan_pcl and
 /// /sensor_platform/radar_right/trigger. Lost scans keep their trigger.
+///
+/// With a barometer, both: /sensor_platform/baro (FluidPressure in Pa, variance unknown).
 ///
 /// Radars with names, IRS: /sensor_platform/radar_NAME/scan and /sensor_platform/radar_NAME/trigger, both in
 /// the frame radar_NAME. ti_mmwave: /ti_mmwave/radar_scan_pcl_NAME, without frame as that driver leaves it,

@@ -7,6 +7,7 @@
 #include <ros/message_event.h>
 #include <ros/node_handle.h>
 #include <ros/spinner.h>
+#include <sensor_msgs/FluidPressure.h>
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <std_msgs/Header.h>
@@ -92,6 +93,7 @@ class LiveOdometry {
   void onReconfigure(LiveParameters& values);
   void onImu(const Event<sensor_msgs::Imu>& event);
   void onScan(std::size_t radar, const Event<sensor_msgs::PointCloud2>& event);
+  void onPressure(const Event<sensor_msgs::FluidPressure>& event);
   void onTrigger(std::size_t radar, const Event<std_msgs::Header>& event);
   bool onReset(std_srvs::Empty::Request& request, std_srvs::Empty::Response& response);
   bool onSaveTrajectory(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
@@ -154,7 +156,7 @@ class LiveOdometry {
   std::optional<Time> newest_imu_;  // of the good stamps
   std::deque<Received> early_imu_;  // from before there was a session; it gets them first
 
-  ros::Subscriber imu_subscriber_;
+  ros::Subscriber imu_subscriber_, barometer_subscriber_;
   ros::ServiceServer reset_server_, save_server_;
   ros::WallTimer diagnostics_timer_;
   std::thread solver_;

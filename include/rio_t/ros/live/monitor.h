@@ -2,6 +2,7 @@
 
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
 
+#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -34,6 +35,8 @@ class LiveMonitor {
   void imuDropped(const std::string& reason);  ///< a sample that goes no further
   /// Scans, or points of them, that go no further.
   void dropped(std::size_t radar, const std::string& reason, std::uint64_t count = 1);
+  void pressure();                               ///< a message came
+  void pressureDropped(const std::string& why);  ///< one that cannot be used
   void result(const LiveSession::Result& result);
   /// The mountings that the session starts with.
   void startWith(const std::vector<Extrinsics>& T_IR);
@@ -54,8 +57,11 @@ class LiveMonitor {
   void describeSolver(Status& status) const;
   void describeTimeOffset(Status& status, std::size_t radar = 0) const;
   void describeExtrinsics(Status& status, std::size_t radar = 0) const;
+  void describeBarometer(Status& status);
+  void describeGroundVehicle(Status& status) const;
 
  private:
+  using Clock = std::chrono::steady_clock;
   struct Latency {
     double worst = 0.0, sum = 0.0;  // [s]
     std::uint64_t count = 0;
@@ -68,6 +74,20 @@ class LiveMonitor {
     /// Whether nothing came since the last call.
     bool isSilent() { return std::exchange(told, count) == count; }
   };
+
+  struct Barometer {
+    Counter messages;
+    Clock::time_point told = Clock::now();
+    std::uint64_t not_usable = 0, used = 0, used_told = 0, steps = 0;
+    std::string why_not_usable;                          ///< of the last one
+    std::map<std::string, std::uint64_t> rejected = {};  ///< means
+    std::optional<BarometerAnswer> last = {};
+  };
+  struct GroundVehicle {
+    std::uint64_t used = 0, left_out = 0;
+    std::optional<GroundVehicleAnswer> last = {};
+  };
+  void accountAids(const ScanResult& result);  ///< call with mutex_ held
 
   /// What has become of the scans of a radar.
   struct Account {
@@ -112,6 +132,8 @@ class LiveMonitor {
   EvidenceCollector collector_;  // since the session started
   Counter imu_;
   ImuNoise imu_noise_;
+  Barometer barometer_;
+  GroundVehicle vehicle_;
   Latency odometry_latency_, scan_latency_;
   std::map<std::string, std::uint64_t> imu_dropped_;
   std::uint64_t updates_ = 0, resets_ = 0, queue_full_told_ = 0;
@@ -124,6 +146,13 @@ class LiveMonitor {
   std::optional<Time> last_used_;  // stamp of the last scan used
   Time last_scan_;                 // stamp of the last scan finished
 };
+
+/// The warning for a person whose platform is no ground vehicle.
+constexpr const char* kGroundVehicleContradicted =
+    "the motion contradicts platform: ground_vehicle, which was switched off until ~reset: the platform "
+    "moves "
+    "sideways or upwards. Is it a ground vehicle, and does vehicle_frame_rotation_xyzw say which way it "
+    "drives?";
 
 /// The warning for a person whose IMU is far noisier than the options say.
 std::string noisyImu(const MeasuredImuNoise& noise, const ImuNoise& told);

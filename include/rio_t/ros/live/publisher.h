@@ -35,10 +35,11 @@ class LivePublisher {
   struct Frames {
     std::string imu;
     std::optional<ImuInBody> T_BI;     ///< none while it is not known: then there is no tf of radars
+    std::optional<WorldInOdom> world;  ///< for the map; none before it is known
     std::optional<BodyOdometry> body;  ///< of the result's state; none if it was not updated
   };
   /// ~odom_optimized, ~imu_bias, ~path; of the radar: ~time_offset, ~ego_velocity, ~innovation, ~points,
-  /// ~inliers, tf and, if they are estimated, ~extrinsics.
+  /// ~inliers, tf and, if they are estimated, ~extrinsics. ~map, if landmarks are on.
   void result(const LiveSession::Result& live, const Frames& frames);
   void clearPath();
 
@@ -59,10 +60,12 @@ class LivePublisher {
   void extendPath(const BodyOdometry& body);
   nav_msgs::Path path();
   void publishPathTo(const ros::SingleSubscriberPublisher& subscriber);
+  void map(const ScanResult& result, const WorldInOdom& T_OW);
 
   const Config config_;
   std::vector<Radar> radars_;  // optimisation thread only, after construction
   ros::Publisher odom_, odom_optimized_, path_, imu_bias_;
+  std::optional<ros::Publisher> map_;  ///< none without landmarks
   PublishRate odom_rate_, tf_rate_;
   std::atomic<bool> correct_stamps_;
   std::atomic<std::size_t> path_max_poses_;

@@ -41,6 +41,8 @@ class LiveSession {
 
   /// IMU thread. Empty before the first optimised state.
   std::optional<NavigationState> addImu(const ImuMeasurement& imu);
+  /// Any thread.
+  void addPressure(const Pressure& pressure) { odometry_.addPressure(pressure); }
   /// The optimisation thread has taken none of the last `kMaxWaitingImu` samples: it must be stuck, and what
   /// waits for it would grow without end. Any thread.
   bool imuPilesUp() const { return waiting_imu_ >= kMaxWaitingImu; }

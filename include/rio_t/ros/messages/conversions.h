@@ -4,25 +4,41 @@
 #include <geometry_msgs/TransformStamped.h>
 #include <geometry_msgs/TwistWithCovarianceStamped.h>
 #include <nav_msgs/Odometry.h>
+#include <sensor_msgs/FluidPressure.h>
 #include <sensor_msgs/Imu.h>
+#include <sensor_msgs/PointCloud2.h>
 
 #include <string>
+#include <vector>
 
 #include "rio_t/ImuBias.h"
 #include "rio_t/imu/measurement.h"
+#include "rio_t/imu/units.h"
+#include "rio_t/landmarks/landmark_answer.h"
 #include "rio_t/odometry/body_odometry.h"
 #include "rio_t/odometry/navigation_state.h"
 #include "rio_t/odometry/options.h"
 #include "rio_t/radar/extrinsics.h"
 #include "rio_t/ros/parameters/point_cloud_format.h"
+#include "rio_t/sensors/barometer_channel.h"
 
 namespace rio_t {
+
+/// The landmarks in the odometry frame: x, y, z, sigma [m], intensity (mean SNR) and sightings. The header is the
+/// caller's.
+sensor_msgs::PointCloud2 toPointCloud2(const std::vector<LandmarkPoint>& map, const WorldInOdom& T_OW = {});
 
 Time toTime(const ros::Time& time);
 /// Throws std::runtime_error for a time that ROS cannot hold (negative, or after 2106).
 ros::Time toRosTime(Time time);
-/// Throws std::runtime_error, naming `topic`, where the stamp in the header is zero.
-ImuMeasurement toImuMeasurement(const sensor_msgs::Imu& message, const std::string& topic);
+/// In m/s^2 and rad/s; `units` are those of the driver. Throws std::runtime_error, naming `topic`, if the stamp
+/// in the header is zero.
+ImuMeasurement toImuMeasurement(const sensor_msgs::Imu& message, const std::string& topic,
+                                const ImuUnits& units = {});
+
+/// Throws std::runtime_error, naming `topic`, where the stamp is zero or the pressure is none (see faultOf).
+/// The variance in the message is not read: most drivers leave it at zero.
+Pressure toPressure(const sensor_msgs::FluidPressure& message, const std::string& topic);
 
 /// Pose in `odom_frame`, twist in `base_link_frame` (REP-105 names).
 nav_msgs::Odometry toOdometry(const BodyOdometry& body, const std::string& odom_frame,

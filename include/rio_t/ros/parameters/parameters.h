@@ -1,12 +1,15 @@
 #pragma once
 
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "rio_t/imu/units.h"
 #include "rio_t/odometry/body_odometry.h"
 #include "rio_t/odometry/options.h"
+#include "rio_t/radar/mounting.h"
 #include "rio_t/ros/parameters/parameter_value.h"
 #include "rio_t/ros/parameters/point_cloud_format.h"
 
@@ -46,6 +49,12 @@ enum class ResetPose {
   kZero,  ///< "zero": at the origin
 };
 
+/// The axes of the radar that extrinsics_rotation_xyzw turns into those of the IMU.
+enum class ExtrinsicsAxes {
+  kRightForwardUp,  ///< "rfu": x right, y forward, z up, whatever the axes of the cloud
+  kCloud,           ///< "cloud": the cloud's own, see `radar_axes`
+};
+
 /// What is changed of the preset `radar_format`. Empty text and a sign of zero leave it as it is.
 struct PointCloudOverrides {
   std::string coordinates;
@@ -69,6 +78,7 @@ struct Config {
   std::string radar_topic = "sensor_platform/radar/scan";
   std::string trigger_topic = "sensor_platform/radar/trigger";
   std::string ground_truth_topic = "ground_truth/pose";
+  std::string barometer_topic;  ///< empty: no barometer
 
   StampSource stamp_source = StampSource::kHeader;
   double radar_stamp_shift = 0.0;  ///< [s]
@@ -90,6 +100,12 @@ struct Config {
   std::string trajectory_file = "rio_t_trajectory.txt";
 
   ExtrinsicsSource extrinsics_source = ExtrinsicsSource::kParameters;
+  // Two other ways to tell the rotation of T_IR. makeConfig turns them into odometry.T_IR, which always has
+  // the axes of RIO, and sets them back to their defaults.
+  std::optional<MountingAngles> mounting;
+  ExtrinsicsAxes extrinsics_axes = ExtrinsicsAxes::kRightForwardUp;
+
+  ImuUnits imu_units;
 
   std::string radar_format = "irs";
   PointCloudOverrides radar_overrides;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,9 @@ std::string toString(PowerUnit unit);
 PointAxes pointAxesFromString(const std::string& name);
 PointCoordinates pointCoordinatesFromString(const std::string& name);
 PowerUnit powerUnitFromString(const std::string& name);
+
+/// Turns vectors with x right, y forward, z up into the axes of the cloud.
+Eigen::Quaterniond cloudFromRfu(PointAxes axes);
 
 /// How a driver lays out its cloud. The defaults are the preset "irs".
 struct PointCloudFormat {

@@ -1,6 +1,7 @@
 // Uses the estimator, the point type with PCL, the decoding of clouds and a message.
 #include <ceres/problem.h>
 #include <pcl/common/transforms.h>
+#include <pcl_conversions/pcl_conversions.h>
 #include <rio_t/TimeOffset.h>
 #include <rio_t/odometry/radar_inertial_odometry.h>
 #include <rio_t/ros/cloud/point_cloud.h>

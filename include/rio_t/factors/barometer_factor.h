@@ -1,0 +1,22 @@
+#pragma once
+
+#include <ceres/sized_cost_function.h>
+
+#include "rio_t/factors/state_block.h"
+
+namespace rio_t {
+
+/// A mean of heights by the pressure, above the place of the first pressure, off by a bias (docs/method.md,
+/// section 5.10): residual (p_W,z + delay v_W,z + bias - height) / sigma. Blocks: state, bias [m].
+class BarometerFactor final : public ceres::SizedCostFunction<1, StateBlock::kSize, 1> {
+ public:
+  /// `height` [m] is the mean over samples whose mean time is `delay` [s] after the state. `sigma` [m].
+  BarometerFactor(double height, double delay, double sigma)
+      : height_(height), delay_(delay), weight_(1.0 / sigma) {}
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
+
+ private:
+  double height_, delay_, weight_;
+};
+
+}  // namespace rio_t

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <ceres/sized_cost_function.h>
+
+#include <Eigen/Core>
+
+#include "rio_t/factors/extrinsics_manifold.h"
+#include "rio_t/factors/state_block.h"
+#include "rio_t/graph/manifold.h"
+#include "rio_t/imu/preintegration.h"
+
+namespace rio_t {
+
+/// A point of the world, p_W [m]: the block of a landmark.
+class PointManifold final : public Manifold {
+ public:
+  PointManifold() : Manifold(3, {0, 1, 2}) {}
+  void plus(const double* x, const double* delta, double* x_plus_delta) const override {
+    for (int i = 0; i < 3; ++i) x_plus_delta[i] = x[i] + delta[i];
+  }
+  Eigen::VectorXd minus(const double* y, const double* x) const override {
+    return Eigen::Map<const Eigen::Vector3d>(y) - Eigen::Map<const Eigen::Vector3d>(x);
+  }
+  Eigen::MatrixXd minusJacobian(const double*, const double*) const override {
+    return Eigen::MatrixXd::Identity(3, 3);
+  }
+};
+
+/// Position of a detection with its noise in polar form: along the ray, and across it in the direction of
+/// growing azimuth and of growing elevation.
+struct PolarMeasurement {
+  Eigen::Vector3d position_R = Eigen::Vector3d::Zero();  ///< [m]
+  double range_sigma = 0.0;                              ///< [m]
+  double azimuth_sigma = 0.0;                            ///< [rad] of the azimuth
+  double elevation_sigma = 0.0;                          ///< [rad]
+};
+
+/// Whitened residual of a point that is predicted at `predicted_R` [m], and its derivative by that point:
+/// range, and the two angles on the plane across the measured ray, each over its sigma.
+struct PolarResidual {
+  Eigen::Vector3d value;
+  Eigen::Matrix3d J;
+};
+class PolarNoise {
+ public:
+  explicit PolarNoise(const PolarMeasurement& z);
+  PolarResidual at(const Eigen::Vector3d& predicted_R) const;
+  /// Covariance of the measured point, in R [m^2].
+  Eigen::Matrix3d covariance() const;
+
+ private:
+  double range_;
+  Eigen::Matrix3d axes_;    ///< rows: the ray and the two directions across it
+  Eigen::Vector3d sigmas_;  ///< [m], [rad], [rad]
+};
+
+/// Where the radar sees a point of the world, and how that depends on state, mounting and point.
+struct SeenPoint {
+  Eigen::Vector3d p_R;                       ///< [m]
+  StateJacobian<3> J_state;                  ///< as StateBlock stores it; not by the biases
+  ExtrinsicsJacobian<3> J_extrinsics;        ///< as ExtrinsicsBlock stores it
+  Eigen::Matrix3d J_point;                   ///< by p_W
+};
+/// `delta` carries the state to the time of measurement.
+SeenPoint seenFrom(const StateView& x, const ImuDelta& delta, const Eigen::Vector3d& g_W,
+                   const Extrinsics& T_IR, const Eigen::Vector3d& p_W);
+
+/// A landmark seen in a scan (docs/method.md, section 15). Blocks: state, extrinsics, landmark.
+///
+/// The time of measurement is that of the moment when the scan came: the offset hardly moves within a window,
+/// and a position tells less of it than a velocity. The way from the state to that time, mostly below 5 ms,
+/// is integrated once.
+class LandmarkFactor final
+    : public ceres::SizedCostFunction<3, StateBlock::kSize, ExtrinsicsBlock::kSize, 3> {
+ public:
+  LandmarkFactor(const PolarMeasurement& z, const ImuDelta& delta, const Eigen::Vector3d& g_W)
+      : noise_(z), delta_(delta), g_W_(g_W) {}
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
+
+ private:
+  PolarNoise noise_;
+  ImuDelta delta_;
+  Eigen::Vector3d g_W_;
+};
+
+}  // namespace rio_t

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "rio_t/imu/units.h"
+
+namespace rio_t {
+
+/// What a recording shows of an IMU. All values are in m/s^2 and rad/s, but for those marked "as written".
+struct ImuReport {
+  std::size_t samples = 0;
+  std::size_t not_finite = 0;
+  double written_norm = 0.0;  ///< median of |acceleration|, as written
+  double written_rate = 0.0;  ///< |angular velocity| that nine in ten samples do not exceed, as written
+  ImuUnits units;             ///< found
+  /// Empty if acceleration and rates can be used; else why not, in one sentence.
+  std::string acceleration_fault, rate_fault;
+
+  bool rests_at_start = false;
+  double rest = 0.0;                                         ///< [s] of rest that was averaged
+  double rest_begin = 0.0;                                   ///< [s] after the first sample
+  Eigen::Vector3d rest_acceleration = Eigen::Vector3d::Zero();  ///< mean specific force
+  Eigen::Vector3d rest_rate = Eigen::Vector3d::Zero();          ///< mean: the gyro's bias
+  Eigen::Vector3d mean_acceleration = Eigen::Vector3d::Zero();  ///< of the whole recording
+
+  double accel_density_quiet = 0.0;   ///< [m/s^2/sqrt(Hz)] white noise, in the quietest tenth of the seconds
+  double accel_density_median = 0.0;  ///< in the median second: more than at rest if the frame vibrates
+  double gyro_density_quiet = 0.0;    ///< [rad/s/sqrt(Hz)]
+  double gyro_density_median = 0.0;
+  double largest_acceleration = 0.0, largest_rate = 0.0;  ///< of an axis
+  std::size_t saturated = 0;                              ///< samples at the end of the range
+
+  /// How well the gyro explains the turns of gravity that the accelerometer sees: 1 if it does, 0 if it says
+  /// nothing, negative if it contradicts. The platform must tilt to show it.
+  double tilt_agreement = 0.0;
+  bool tilts = false;
+};
+
+/// `written`: as the driver writes them, in the order of time; times must rise.
+ImuReport inspectImu(const std::vector<ImuMeasurement>& written);
+
+}  // namespace rio_t

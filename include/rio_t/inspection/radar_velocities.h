@@ -1,0 +1,44 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "rio_t/inspection/inertial_track.h"
+#include "rio_t/radar/doppler_grid.h"
+#include "rio_t/radar/scan.h"
+
+namespace rio_t {
+
+/// Velocity that a scan, or some neighbouring ones together, show by themselves.
+struct RadarVelocity {
+  Time stamp;
+  Eigen::Vector3d v_R = Eigen::Vector3d::Zero();         ///< of the radar, in its own axes [m/s]
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< [m^2/s^2]
+};
+
+struct RadarVelocities {
+  std::vector<RadarVelocity> velocities;  ///< in the order of the scans
+  DopplerStep doppler_step;
+  std::size_t groups = 0;  ///< of scans that were tried; `velocities` has those that gave a velocity
+  bool has_elevation = true;
+};
+
+/// Velocities for an inspection: no filter by range, power or field of view, and no prior. Scans of few points
+/// are put together, up to 20 points and 0.12 s. The velocity of a radar without elevation has no vertical part,
+/// with a sigma of 1 m/s. `scans` in the order of their stamps.
+RadarVelocities radarVelocities(const std::vector<RadarScan>& scans);
+
+/// Which sign the ranges give the Doppler.
+struct DopplerSign {
+  /// +1: positive for receding targets; -1: for approaching ones; 0: the ranges do not show it.
+  int sign = 0;
+  double significance = 0.0;  ///< mean vote over its standard deviation; positive for receding
+  std::size_t pairs = 0;      ///< of scans that voted
+};
+
+/// Compares the points of scans that lie 0.15 to 0.6 s apart: a range changes as its Doppler says, with the
+/// right sign. It needs neither the axes nor the mounting. Pairs between which the platform turns by more than
+/// 7 degrees do not count.
+DopplerSign dopplerSignFromRanges(const std::vector<RadarScan>& scans, const InertialTrack& track);
+
+}  // namespace rio_t

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "rio_t/core/time.h"
+
+namespace rio_t {
+
+/// When a message was stamped, and when it was recorded. The two clocks may differ.
+struct MessageTimes {
+  Time stamp, record;
+};
+
+/// How the messages of one topic come.
+struct StreamTiming {
+  std::size_t messages = 0;
+  double duration = 0.0;     ///< [s] from the first to the last, as recorded
+  double rate = 0.0;         ///< [Hz] of the median interval of the stamps; of the records if they tell nothing
+  std::size_t zero = 0;      ///< stamps of zero
+  bool constant = false;     ///< all stamps are the same, and not zero
+  std::size_t duplicates = 0;  ///< stamps as the one before
+  std::size_t backwards = 0;   ///< stamps before the one before
+  std::size_t gaps = 0;        ///< intervals above 3.5 times the median, and above 20 ms
+  double longest_gap = 0.0;    ///< [s]
+  double jitter = 0.0;         ///< [s] half of the inner two thirds of the intervals' scatter
+
+  bool stampsAreUsable() const { return zero == 0 && !constant && 10 * backwards < messages; }
+};
+
+/// `times` in the order of the records.
+StreamTiming inspectTiming(const std::vector<MessageTimes>& times);
+
+/// Arrival against the stamp, both in the IMU clock [s].
+struct StreamDelay {
+  double least = 0.0, median = 0.0, most = 0.0;  ///< most: of nine in ten
+};
+
+/// The delays of a topic beyond those of the IMU: the smallest difference between record and stamp of the IMU
+/// carries the record times over into its clock, as ClockMap does. Both must not be empty.
+StreamDelay delayAgainstImu(const std::vector<MessageTimes>& times, const std::vector<MessageTimes>& imu);
+
+/// The value that a share of the values does not exceed; 0 for none.
+double quantile(std::vector<double> values, double share);
+
+}  // namespace rio_t

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "rio_t/landmarks/detection.h"
+
+namespace rio_t {
+
+/// A thing that may become a landmark: detections that lie on one point.
+///
+/// A highlight on a wall slides along with the radar, and what hangs on the platform moves with it. So the
+/// detections are fitted by p = m + s d, with d the way of the radar since the first of them, across the ray:
+/// s is 0 for a point of the world, and up to 1 for one that slides.
+struct Candidate {
+  std::vector<Sighting> sightings;  ///< those of the window, in the order of time
+  Time first_seen, last_seen;
+  Eigen::Vector3d first_radar_W = Eigen::Vector3d::Zero();  ///< where the radar was at first [m]
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();    ///< of the position alone [1/m^2]
+  Eigen::Vector3d vector = Eigen::Vector3d::Zero();         ///< information times position
+  Eigen::Matrix4d fit_information = Eigen::Matrix4d::Zero();  ///< of (m, s)
+  Eigen::Vector4d fit_vector = Eigen::Vector4d::Zero();
+  double snr_sum = 0.0;
+  std::size_t count = 0;  ///< of all detections
+
+  Eigen::Vector3d position() const { return information.llt().solve(vector); }  ///< p_W [m]
+  double snr_db() const { return snr_sum / static_cast<double>(count); }
+  /// Whether the detections tell that it does not slide.
+  bool isProven() const;
+};
+
+/// A detection in W, with the pose as predicted.
+struct PlacedDetection {
+  Eigen::Vector3d p_W;
+  Eigen::Matrix3d covariance;  ///< of the measurement alone, in W [m^2]
+  Eigen::Vector3d radar_W;  ///< where the radar was [m]
+  double snr_db;
+  Time time;
+  Sighting sighting;
+};
+
+/// The candidates. Bounded: there are no more than kMax, and one that is not seen for kMaxUnseen goes. Not
+/// thread-safe.
+class Candidates {
+ public:
+  static constexpr std::size_t kMax = 300;
+  static constexpr double kMaxUnseen = 2.0;  ///< [s]
+
+  /// Adds the detections of a scan, each to the one candidate that it fits, or as a new one. A detection that
+  /// fits several is left out.
+  void add(const std::vector<PlacedDetection>& detections);
+  /// Forgets candidates that are not seen any more, and sightings from before `oldest_node`: their poses are gone.
+  void forgetOld(Time now, Time oldest_node);
+  void clear() { candidates_.clear(); }
+  std::size_t size() const { return candidates_.size(); }
+  /// Those that have proved static and that nothing else can be taken for, at most `count`; they leave.
+  std::vector<Candidate> takeProven(const std::vector<Eigen::Vector3d>& landmarks_W, std::size_t count);
+
+ private:
+  bool isAlone(std::size_t k, const std::vector<Eigen::Vector3d>& landmarks_W) const;
+
+  std::vector<Candidate> candidates_;
+};
+
+}  // namespace rio_t

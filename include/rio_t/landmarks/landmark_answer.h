@@ -1,0 +1,29 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace rio_t {
+
+/// A landmark as results show it.
+struct LandmarkPoint {
+  Eigen::Vector3d p_W = Eigen::Vector3d::Zero();  ///< [m]
+  double sigma = 0.0;                             ///< [m] root of the trace of its covariance
+  double snr_db = 0.0;                            ///< mean
+  std::uint64_t id = 0;                           ///< counts up; never used again
+  std::uint64_t sightings = 0;
+};
+
+/// What a scan and the map say of each other.
+struct LandmarkAnswer {
+  std::size_t matched = 0;    ///< landmarks that the scan saw
+  std::size_t candidates = 0;
+  double squared_sigmas = 0.0;  ///< sum over the matches, each of 3 degrees of freedom
+  bool is_trusted = false;    ///< the map has proved itself: its matches count
+  bool dropped_map = false;   ///< map and estimate contradicted each other
+  std::vector<LandmarkPoint> map;
+};
+
+}  // namespace rio_t

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "rio_t/landmarks/candidates.h"
+#include "rio_t/landmarks/landmark_answer.h"
+#include "rio_t/landmarks/options.h"
+#include "rio_t/smoother/fixed_lag_smoother.h"
+
+namespace rio_t {
+
+/// Static detections as landmarks: points of the world in the window of the smoother, correlated with all
+/// that is estimated (docs/method.md, section 15). One map for all radars. Not thread-safe.
+class LandmarkMap {
+ public:
+  /// `imu` must outlive the map.
+  LandmarkMap(const LandmarkOptions& options, const Eigen::Vector3d& g_W, const ImuBuffer& imu);
+
+  /// State and landmarks jointly, when a scan was taken.
+  struct Prediction {
+    Time measured;
+    PredictedState state;  ///< joint with the extrinsics, if they are estimated, and with the landmarks
+    std::size_t first_landmark = 0;  ///< column of the first landmark in the covariance
+    std::vector<std::size_t> landmarks;  ///< which of them, by the order of columns
+  };
+  /// Call it before the terms of the scan go into the window. None if the time is before the window.
+  std::optional<Prediction> predict(const FixedLagSmoother& smoother, Time measured,
+                                    const Block& extrinsics) const;
+  /// Associates the detections, adds the terms of those that match, and lets landmarks come and go. The
+  /// window must be optimised afterwards. `node` is the one of the scan.
+  LandmarkAnswer use(const Prediction& prediction, const std::vector<Detection>& detections, Block& node,
+                     Block& extrinsics, FixedLagSmoother& smoother);
+  /// The window has started again, without landmarks.
+  void forget();
+  std::vector<LandmarkPoint> points() const;
+
+ private:
+  struct Landmark {
+    std::shared_ptr<Block> block;
+    LandmarkPoint point;
+    Time last_seen;
+    double conflicts = 0.0;
+    double in_view = 0.0, seen_again = 0.0;  ///< scans since it is a landmark
+    Eigen::Vector3d p_W() const { return block->x; }
+  };
+  struct Match {
+    std::size_t detection, landmark;
+    double squared_sigmas;
+  };
+  struct Association {
+    std::vector<Match> matches;
+    std::vector<std::size_t> free;  ///< detections far from every landmark
+    std::vector<std::size_t> conflicts;  ///< landmarks with a detection just beyond the gate, and no match
+  };
+  Association associate(const Prediction& prediction, const Extrinsics& T_IR,
+                        const std::vector<Detection>& detections) const;
+  void retire(std::size_t k);
+  void dropUseless(const Eigen::Vector3d& p_W);
+  void makeRoom(Time now, std::size_t wanted);
+  void promote(FixedLagSmoother& smoother, Time now);
+  /// Judges the map by the matches lately.
+  void judge(const Prediction& prediction, const Extrinsics& T_IR, const Association& association);
+  bool contradicts() const;
+  ImuDelta deltaTo(Time measured, const Block& node) const;
+
+  LandmarkOptions options_;  // read-only after construction, as the next three
+  Eigen::Vector3d g_W_;
+  const ImuBuffer* imu_;
+  std::shared_ptr<const Manifold> manifold_;
+  std::shared_ptr<ceres::LossFunction> loss_;
+  std::vector<Landmark> landmarks_;
+  Candidates candidates_;
+  std::uint64_t next_id_ = 0;
+  double reach_ = 0.0;  ///< [m] of the farthest static detection so far
+  double in_view_ = 0.0, matched_ = 0.0;  ///< lately: landmarks in view, those of them that were seen
+  double sigmas_ = 0.0;                   ///< squared sigmas of these over 3
+  bool is_trusted_ = false;
+};
+
+}  // namespace rio_t

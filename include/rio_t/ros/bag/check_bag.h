@@ -1,0 +1,54 @@
+#pragma once
+
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+namespace rio_t {
+
+/// What to look at, and where to write.
+struct CheckRequest {
+  std::vector<std::string> bags;  ///< paths
+  std::string out;                ///< gets the configuration; empty: none
+  std::string rig;                ///< PNG with the rig drawn; empty: none
+  std::string imu_topic;          ///< empty: the best one
+  std::vector<std::string> radar_topics;  ///< empty: all that fit
+  double duration = 120.0;        ///< [s] of each bag that are read; 0: all
+  bool try_out = true;            ///< whether the odometry runs on the bag with what is proposed
+};
+
+enum class FindingLevel {
+  kOk,       ///< "OK"
+  kOdd,      ///< "odd": the configuration deals with it, or it is worth knowing
+  kMissing,  ///< "missing": the odometry cannot run
+};
+
+/// One line of the report.
+struct Finding {
+  FindingLevel level = FindingLevel::kOk;
+  std::string subject;  ///< "IMU", "radar /scan", ...
+  std::string text;     ///< one sentence, or phrases
+};
+
+/// What one bag shows, and the configuration for it.
+struct BagCheck {
+  std::string bag;
+  std::vector<Finding> findings;
+  std::string to_do;    ///< one sentence if something is missing
+  std::string yaml;     ///< the configuration; empty if the odometry cannot run
+  double quality = 0.0; ///< larger: the bag shows more of the mounting
+
+  bool ready() const { return !yaml.empty(); }
+};
+
+/// Looks at one bag of `request`. Throws std::runtime_error for a bag that cannot be read.
+BagCheck checkBag(const std::string& bag, const CheckRequest& request);
+
+/// The report for people.
+std::string describeCheck(const BagCheck& check);
+
+/// Checks all bags, prints the reports and writes the files. Returns the exit status: 0 ready, 1 something is
+/// missing, 2 what was asked for is wrong.
+int runCheck(const CheckRequest& request, std::ostream& out, std::ostream& err);
+
+}  // namespace rio_t

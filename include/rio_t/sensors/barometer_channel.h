@@ -1,0 +1,106 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rio_t/core/sliding_queue.h"
+#include "rio_t/core/time.h"
+#include "rio_t/imu/noise_meter.h"
+#include "rio_t/smoother/fixed_lag_smoother.h"
+
+namespace rio_t {
+
+struct BarometerOptions {
+  /// [m/sqrt(Hz)] white noise of the height; more counts if the samples show more
+  double noise_density = 0.05;
+  double drift = 0.005;       ///< [m/sqrt(s)] random walk of the bias: weather, and warmth of the sensor
+  double gate = 4.0;          ///< [sigma] a mean farther from the estimate is rejected; 0: no gate
+  double gate_timeout = 1.0;  ///< [s] of rejected means, after which the pressure has stepped for good
+  double temperature = 15.0;  ///< [deg C] of the air at the start
+};
+
+/// A pressure as a barometer gives it.
+struct Pressure {
+  Time time;            ///< of the measurement, clock of the IMU
+  double pascal = 0.0;  ///< [Pa]
+};
+
+/// Height [m] of the pressure `pascal` above the place where it is `reference_pascal` and the air has
+/// `temperature` [deg C]: the barometric formula of the International Standard Atmosphere (ISO 2533), 6.5 K
+/// colder each kilometre up.
+double heightOfPressure(double pascal, double reference_pascal, double temperature);
+
+/// Empty, or what is wrong with a pressure, for people: not finite, zero, in hPa, or that of no place.
+std::string faultOf(double pascal);
+
+/// What became of a mean of pressures.
+struct BarometerAnswer {
+  Time time;                      ///< mean of the samples
+  int samples = 0;                ///< in the mean
+  double height = 0.0;            ///< [m] above the start, by the bias before this mean
+  double innovation = 0.0;        ///< [m] measured minus predicted
+  double innovation_sigma = 0.0;  ///< [m]
+  double bias = 0.0;              ///< [m]
+  double bias_sigma = 0.0;        ///< [m]
+  bool stepped = false;           ///< the bias is found anew from here on
+  std::string rejected_because;   ///< snake case, empty if it was used
+};
+
+/// A barometer, from pressures to the window (docs/method.md, section 5.10). Not thread-safe.
+///
+/// Means over a tenth of a second join the nearest node, as heights off by a bias that walks. A mean that
+/// contradicts the estimate is rejected: doors and rotors shock the pressure. If the means contradict it for
+/// `gate_timeout`, the pressure has stepped, and the bias is found anew: the height goes on as it is.
+class BarometerChannel {
+ public:
+  explicit BarometerChannel(const BarometerOptions& options) : options_(options) {}
+
+  /// Why a pressure cannot be used, as a fault in snake case; null if it was taken. `newest_imu` is the time
+  /// of the newest sample of the IMU.
+  const char* add(const Pressure& pressure, Time newest_imu);
+  /// Joins a window that begins at `time`. The pressures of the last second at rest say where the start is.
+  void join(FixedLagSmoother& smoother, Time time, bool at_rest);
+  /// Adds the terms of the means that a solved node is near to.
+  std::vector<BarometerAnswer> use(FixedLagSmoother& smoother);
+  /// Of the bias; none before the window has one.
+  std::vector<FixedLagSmoother::RandomWalk> randomWalks() const;
+  /// The clock of the IMU jumped: forgets all but the options.
+  void startAgain() { *this = BarometerChannel(options_); }
+
+ private:
+  struct Sample {
+    Time time;
+    double height;  ///< [m] above the first
+    double span;    ///< [s] that it stands for
+  };
+  /// Mean of consecutive samples.
+  struct Mean {
+    Time first;
+    double time_sum = 0.0;    ///< [s] after `first`
+    double height_sum = 0.0;  ///< [m]
+    double span = 0.0;        ///< [s]
+    int count = 0;
+    Time time() const { return first + time_sum / count; }
+    double height() const { return height_sum / count; }
+  };
+  static void add(const Sample& sample, Mean& mean);
+  const char* collect(const Sample& sample);
+  double variance(const Mean& mean) const;  ///< [m^2]
+  void addBias(FixedLagSmoother& smoother, double bias);
+  BarometerAnswer use(const Mean& mean, const NodeEstimate& node, FixedLagSmoother& smoother);
+
+  BarometerOptions options_;
+  std::optional<double> reference_;  ///< the first pressure [Pa]
+  std::optional<Time> newest_;
+  double spacing_ = 0.0;  ///< [s] of the newest two samples; 0: not known
+  NoiseMeter noise_;
+  SlidingQueue<Sample> recent_;
+  Mean open_;                   ///< the mean that is being filled
+  SlidingQueue<Mean> waiting_;  ///< for a node
+  std::shared_ptr<Block> bias_;
+  std::optional<Time> rejected_since_;
+};
+
+}  // namespace rio_t

@@ -1,0 +1,10 @@
+#!/usr/bin/env python3
+"""Draws the rig of a configuration: src/rio_t/rig.py."""
+import pathlib
+import sys
+
+# In a clone; elsewhere the package is where Python looks for it.
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "src"))
+from rio_t.rig import main  # noqa: E402
+
+sys.exit(main(sys.argv[1:]))

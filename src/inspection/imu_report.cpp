@@ -1,0 +1,190 @@
+#include "rio_t/inspection/imu_report.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "rio_t/core/so3.h"
+#include "rio_t/imu/input_check.h"
+#include "rio_t/imu/noise_meter.h"
+#include "rio_t/imu/saturation_detector.h"
+#include "rio_t/imu/static_initializer.h"
+#include "rio_t/inspection/stream_timing.h"
+
+namespace rio_t {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kGravity = 9.81;        // [m/s^2]
+constexpr double kInStep = 0.5;          // [s] between the two directions of gravity that are compared
+constexpr double kMeanWidth = 0.2;       // [s] over which each is averaged
+constexpr double kFastest = 9.0;         // [rad/s] 500 deg/s: no platform turns so fast one tenth of its time
+constexpr double kLeastTilt = 0.03;      // [rad] rms of the turns of gravity in 0.5 s that show the unit
+
+/// Means of the specific force, in steps of `kMeanWidth`, and the turn from one to the next, by the gyro.
+struct Steps {
+  std::vector<Vector3d> force;
+  std::vector<Vector3d> turn;  // integral of the rates, as written, from the middle of a step to that of the next
+};
+
+Steps stepsOf(const std::vector<ImuMeasurement>& imu) {
+  Steps steps;
+  Vector3d force = Vector3d::Zero(), rate = Vector3d::Zero();
+  std::vector<Vector3d> rates;
+  double count = 0.0;
+  Time begin = imu.front().time;
+  for (const ImuMeasurement& sample : imu) {
+    if (sample.time - begin > kMeanWidth && count > 0.0) {
+      steps.force.push_back(force / count);
+      rates.push_back(rate / count);
+      force.setZero();
+      rate.setZero();
+      count = 0.0;
+      begin = sample.time;
+    }
+    force += sample.acceleration;
+    rate += sample.angular_velocity;
+    count += 1.0;
+  }
+  for (std::size_t i = 0; i + 1 < rates.size(); ++i)
+    steps.turn.push_back(0.5 * kMeanWidth * (rates[i] + rates[i + 1]));
+  return steps;
+}
+
+/// Sum of squares of what a scale on the rates leaves of the changes of the specific force.
+double misfit(const Steps& steps, double scale) {
+  const auto apart = static_cast<std::size_t>(std::lround(kInStep / kMeanWidth));
+  double sum = 0.0;
+  for (std::size_t i = 0; i + apart < steps.force.size(); ++i) {
+    Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
+    for (std::size_t k = i; k < i + apart; ++k) turn = turn * so3::exp(scale * steps.turn[k]);
+    // A force that stands still in the world turns against the IMU.
+    sum += std::min((steps.force[i + apart] - turn.conjugate() * steps.force[i]).squaredNorm(), 25.0);
+  }
+  return sum;
+}
+
+void findAccelerationUnit(double least_norm, ImuReport* report) {
+  const double norm = report->written_norm;
+  // The least accelerated tenth shows gravity, in m/s^2 or in g.
+  if (least_norm < 0.5 && norm < 8.0) {
+    report->acceleration_fault =
+        "gravity is missing: the acceleration at rest is near zero, and rio_t needs the raw specific force";
+    return;
+  }
+  if (norm > 8.0 && norm < 12.0) return;
+  if (norm > 0.8 && norm < 1.2) {
+    report->units.acceleration = AccelerationUnit::kStandardGravity;
+  } else {
+    report->acceleration_fault = "the acceleration is neither in m/s^2 (9.81) nor in g (1)";
+  }
+}
+
+void findRateUnit(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
+  const Steps steps = stepsOf(imu);
+  if (steps.force.size() < 10) return;
+  const double degrees = inRadiansPerSecond(RateUnit::kDegreesPerSecond);
+  const double still = misfit(steps, 0.0);
+  const double as_radians = misfit(steps, 1.0), as_degrees = misfit(steps, degrees);
+  const double least = std::min(as_radians, as_degrees);
+  const double pairs = static_cast<double>(steps.force.size());
+  report->tilts = still / pairs > std::pow(kGravity * kLeastTilt, 2) && least < 0.7 * still;
+  const bool are_degrees = report->tilts ? as_degrees < as_radians : report->written_rate > kFastest;
+  if (are_degrees) report->units.rate = RateUnit::kDegreesPerSecond;
+  const double scale = are_degrees ? degrees : 1.0;
+  const double right = misfit(steps, scale), inverted = misfit(steps, -scale);
+  report->tilt_agreement = still > 0.0 ? 1.0 - right / still : 0.0;
+  if (still / pairs > std::pow(kGravity * kLeastTilt, 2) && inverted < 0.5 * right && inverted < 0.7 * still)
+    report->rate_fault =
+        "gyro and accelerometer contradict each other: gravity turns the other way. Their axes differ, or are left-handed";
+}
+
+void findNoise(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
+  NoiseMeter accel, gyro;
+  SaturationDetector saturation(0.0, 0.0);
+  std::vector<double> accel_densities, gyro_densities;
+  Time next = imu.front().time + 1.0;
+  for (const ImuMeasurement& sample : imu) {
+    accel.add(sample.time, sample.acceleration);
+    gyro.add(sample.time, sample.angular_velocity);
+    const SaturationDetector::Saturated saturated = saturation.check(sample);
+    if (saturated.accel || saturated.gyro) ++report->saturated;
+    report->largest_acceleration =
+        std::max(report->largest_acceleration, sample.acceleration.cwiseAbs().maxCoeff());
+    report->largest_rate = std::max(report->largest_rate, sample.angular_velocity.cwiseAbs().maxCoeff());
+    if (sample.time < next) continue;
+    accel_densities.push_back(std::sqrt(accel.squaredDensity()));
+    gyro_densities.push_back(std::sqrt(gyro.squaredDensity()));
+    next = sample.time + 1.0;
+  }
+  report->accel_density_quiet = quantile(accel_densities, 0.1);
+  report->accel_density_median = quantile(accel_densities, 0.5);
+  report->gyro_density_quiet = quantile(gyro_densities, 0.1);
+  report->gyro_density_median = quantile(gyro_densities, 0.5);
+}
+
+void findRest(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
+  constexpr double kStart = 10.0;  // [s] in which rest must begin
+  StaticInitializerOptions options;
+  options.max_gravity_error = 2.0;  // what is off by more is told as such
+  StaticInitializer rest(options, kGravity);
+  const Time begin = imu.front().time;
+  ImuInputCheck check(0.04, {});  // measures the noise, which a vibrating frame has at rest, too
+  for (ImuMeasurement sample : imu) {
+    if (sample.time - begin > kStart) return;
+    if (check.check(sample).decision == ImuInputCheck::Decision::kDrop) continue;
+    const auto found = rest.add(sample);
+    if (!found) continue;
+    report->rests_at_start = true;
+    report->rest = found->duration;
+    report->rest_begin = std::max(0.0, found->time - begin - found->duration);
+    report->rest_rate = found->b_g;
+    Vector3d sum = Vector3d::Zero();
+    double count = 0.0;
+    for (const ImuMeasurement& each : imu) {
+      if (each.time < found->time - found->duration || found->time < each.time) continue;
+      sum += each.acceleration;
+      count += 1.0;
+    }
+    if (count > 0.0) report->rest_acceleration = sum / count;
+    return;
+  }
+}
+
+}  // namespace
+
+ImuReport inspectImu(const std::vector<ImuMeasurement>& written) {
+  ImuReport report;
+  report.samples = written.size();
+  std::vector<ImuMeasurement> imu;
+  std::vector<double> norms, rates;
+  for (const ImuMeasurement& sample : written) {
+    if (!sample.acceleration.allFinite() || !sample.angular_velocity.allFinite()) {
+      ++report.not_finite;
+      continue;
+    }
+    imu.push_back(sample);
+    norms.push_back(sample.acceleration.norm());
+    rates.push_back(sample.angular_velocity.norm());
+  }
+  if (imu.empty()) return report;
+  report.written_norm = quantile(norms, 0.5);
+  report.written_rate = quantile(rates, 0.9);
+  findAccelerationUnit(quantile(norms, 0.1), &report);
+  const double scale = inMetresPerSecondSquared(report.units.acceleration);
+  for (ImuMeasurement& sample : imu) sample.acceleration *= scale;
+  if (report.written_rate == 0.0) {
+    report.rate_fault = "the angular velocity is zero throughout";
+  } else {
+    findRateUnit(imu, &report);
+  }
+  for (ImuMeasurement& sample : imu) {
+    sample.angular_velocity *= inRadiansPerSecond(report.units.rate);
+    report.mean_acceleration += sample.acceleration / static_cast<double>(imu.size());
+  }
+  findNoise(imu, &report);
+  findRest(imu, &report);
+  return report;
+}
+
+}  // namespace rio_t

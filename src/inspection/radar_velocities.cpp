@@ -1,0 +1,133 @@
+#include "rio_t/inspection/radar_velocities.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "rio_t/radar/ego_velocity.h"
+
+namespace rio_t {
+namespace {
+
+constexpr std::size_t kEnoughPoints = 20;
+constexpr double kGroupSpan = 0.12;      // [s]
+constexpr double kFlatElevation = 0.02;  // [rad] of nine points in ten: below, the radar has no elevation
+constexpr double kVerticalSigma = 1.0;   // [m/s] of a radar without elevation
+
+double elevationOf(const RadarPoint& point) {
+  return std::atan2(point.position_R.z(), point.position_R.head<2>().norm());
+}
+
+bool hasElevation(const std::vector<RadarScan>& scans) {
+  std::size_t all = 0, flat = 0;
+  for (const RadarScan& scan : scans) {
+    for (const RadarPoint& point : scan.points) {
+      ++all;
+      if (std::abs(elevationOf(point)) < kFlatElevation) ++flat;
+    }
+  }
+  return 10 * flat < 9 * all;
+}
+
+/// The next scans, from `*next` on, as one.
+RadarScan nextGroup(const std::vector<RadarScan>& scans, std::size_t* next) {
+  RadarScan group = scans[*next];
+  double stamps = 0.0;  // mean, from the first on, weighted with the points
+  const Time first = group.stamp;
+  for (++*next; *next < scans.size() && group.points.size() < kEnoughPoints; ++*next) {
+    const RadarScan& scan = scans[*next];
+    const double after = scan.stamp - first;
+    if (after < 0.0 || after > kGroupSpan) break;
+    stamps += after * static_cast<double>(scan.points.size());
+    group.points.insert(group.points.end(), scan.points.begin(), scan.points.end());
+  }
+  if (!group.points.empty()) group.stamp = first + stamps / static_cast<double>(group.points.size());
+  return group;
+}
+
+/// Without elevation the vertical velocity is not seen: points straight up and down say that it is zero.
+void addVertical(RadarScan* scan) {
+  const std::size_t count = 1 + scan->points.size() / 8;
+  for (std::size_t i = 0; i < count; ++i) {
+    for (const double side : {-1.0, 1.0})
+      scan->points.push_back({{0.0, 0.0, 5.0 * side}, 0.0, scan->points.front().snr_db});
+  }
+}
+
+EgoVelocityOptions inspectionOptions() {
+  EgoVelocityOptions options;
+  options.min_range = 0.1;
+  options.max_range = 1e4;
+  options.min_snr_db = -1e9;
+  options.max_azimuth = 3.14159265358979323846;
+  options.max_sigma = 2.0;
+  return options;
+}
+
+}  // namespace
+
+RadarVelocities radarVelocities(const std::vector<RadarScan>& scans) {
+  RadarVelocities result;
+  EgoVelocityEstimator estimator(inspectionOptions());
+  for (const RadarScan& scan : scans) estimator.observe(scan);  // the step, before the first velocity
+  result.doppler_step = estimator.dopplerStep();
+  result.has_elevation = hasElevation(scans);
+  for (std::size_t next = 0; next < scans.size();) {
+    RadarScan group = nextGroup(scans, &next);
+    if (group.points.empty()) continue;
+    ++result.groups;
+    if (!result.has_elevation) addVertical(&group);
+    const EgoVelocity velocity = estimator.estimate(group);
+    if (!isValid(velocity.status)) continue;
+    if (velocity.status == EgoVelocityStatus::kMoving && result.has_elevation) estimator.learn(group, velocity);
+    RadarVelocity found{group.stamp, velocity.v_R, velocity.covariance};
+    if (!result.has_elevation) found.covariance(2, 2) = kVerticalSigma * kVerticalSigma;
+    result.velocities.push_back(found);
+  }
+  return result;
+}
+
+DopplerSign dopplerSignFromRanges(const std::vector<RadarScan>& scans, const InertialTrack& track) {
+  constexpr double kMinApart = 0.15, kMaxApart = 0.6;  // [s]
+  const double kSameDirection = std::cos(0.14);        // 8 degrees: the noise of an elevation
+  constexpr double kMaxTurn = 0.12;                    // [rad]
+  constexpr double kMinShift = 0.15;                   // [m] by which a range must change
+  constexpr double kFar = 0.3;                         // [m] a match that is farther off is none
+  constexpr double kClear = 3.0;                       // [sigma]
+  DopplerSign result;
+  double sum = 0.0, squares = 0.0;
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    for (std::size_t k = i + 1; k < scans.size(); ++k) {
+      const double apart = scans[k].stamp - scans[i].stamp;
+      if (apart < kMinApart) continue;
+      if (apart > kMaxApart) break;
+      if (!track.covers(scans[i].stamp) || !track.covers(scans[k].stamp)) break;
+      if (track.rotation(scans[i].stamp).angularDistance(track.rotation(scans[k].stamp)) > kMaxTurn) continue;
+      double vote = 0.0;
+      for (const RadarPoint& point : scans[i].points) {
+        const double shift = point.doppler * apart;
+        if (std::abs(shift) < kMinShift) continue;
+        const double range = point.position_R.norm();
+        double receding = kFar, approaching = kFar;  // nearest match under either sign
+        for (const RadarPoint& other : scans[k].points) {
+          const double other_range = other.position_R.norm();
+          if (point.position_R.dot(other.position_R) < kSameDirection * range * other_range) continue;
+          receding = std::min(receding, std::abs(other_range - range - shift));
+          approaching = std::min(approaching, std::abs(other_range - range + shift));
+        }
+        vote += approaching - receding;
+      }
+      if (vote == 0.0) continue;
+      ++result.pairs;
+      sum += vote;
+      squares += vote * vote;
+    }
+  }
+  // Neighbouring pairs share their points, up to all pairs that one scan is in.
+  if (result.pairs < 20) return result;
+  constexpr double kShared = 4.0;
+  result.significance = sum / std::sqrt(squares) / std::sqrt(kShared);
+  if (std::abs(result.significance) > kClear) result.sign = result.significance > 0.0 ? 1 : -1;
+  return result;
+}
+
+}  // namespace rio_t

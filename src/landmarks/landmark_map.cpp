@@ -1,0 +1,296 @@
+#include "rio_t/landmarks/landmark_map.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace rio_t {
+namespace {
+
+/// chi-squared of 3 degrees of freedom: 1 % of the true pairs lie beyond.
+constexpr double kGate = 11.34;
+/// Beyond this, squared and in sigmas, a detection is of something else: 1 in 100 000 of the true pairs.
+constexpr double kElsewhere = 25.9;
+/// A second explanation must be this much less likely, as twice the logarithm of the ratio: 20 times.
+constexpr double kClearly = 6.0;
+/// [sigma] of Cauchy's loss: a match at the gate counts 0.6 of its weight.
+constexpr double kLoss = 4.0;
+/// [s] unseen; then a landmark makes room for a new one, if there is none else.
+constexpr double kLongUnseen = 30.0;
+/// Pairs that match by chance are even over the gate, so the mean of their squared sigmas is 3/5 of it; that of true
+/// ones is 3. Half way between, the map contradicts the estimate. 100 matches tell it to 0.08.
+constexpr double kMaxMeanSquare = 0.5 * (1.0 + kGate / 5.0);
+/// So many matches tell that mean to 0.15. The map is not trusted before.
+constexpr double kProof = 30.0;
+/// A reflector in view shows itself at least so often. In a scene full of highlights that come and go, hardly any
+/// landmark is seen again.
+constexpr double kMinShare = 0.1;
+/// Scans, over which the account fades.
+constexpr double kMemory = 100.0;
+/// In view: within this of the middle of the field of view, as the cosine.
+constexpr double kCosView = 0.707;
+
+}  // namespace
+
+LandmarkMap::LandmarkMap(const LandmarkOptions& options, const Eigen::Vector3d& g_W, const ImuBuffer& imu)
+    : options_(options),
+      g_W_(g_W),
+      imu_(&imu),
+      manifold_(std::make_shared<PointManifold>()),
+      loss_(std::make_shared<ceres::CauchyLoss>(kLoss)) {}
+
+void LandmarkMap::forget() {
+  landmarks_.clear();
+  candidates_.clear();
+  in_view_ = matched_ = sigmas_ = 0.0;
+  is_trusted_ = false;
+}
+
+std::vector<LandmarkPoint> LandmarkMap::points() const {
+  std::vector<LandmarkPoint> points;
+  for (const Landmark& landmark : landmarks_) {
+    points.push_back(landmark.point);
+    points.back().p_W = landmark.p_W();
+  }
+  return points;
+}
+
+std::optional<LandmarkMap::Prediction> LandmarkMap::predict(const FixedLagSmoother& smoother, Time measured,
+                                                            const Block& extrinsics) const {
+  std::vector<const Block*> blocks;
+  Prediction prediction;
+  prediction.measured = measured;
+  prediction.first_landmark = StateBlock::kTangent;
+  if (!extrinsics.is_constant) {
+    blocks.push_back(&extrinsics);
+    prediction.first_landmark += static_cast<std::size_t>(extrinsics.manifold->tangent());
+  }
+  const std::optional<NodeEstimate> node = smoother.nodeBefore(measured);
+  if (!node) return std::nullopt;
+  const Extrinsics T_IR = toExtrinsics(extrinsics.x.data());
+  const Eigen::Matrix3d R_RW = (node->x.q_WI() * T_IR.q_IR).conjugate().toRotationMatrix();
+  const Eigen::Vector3d radar_W = node->x.p_W() + node->x.q_WI() * T_IR.l_I;
+  for (std::size_t k = 0; k < landmarks_.size(); ++k) {
+    if ((R_RW * (landmarks_[k].p_W() - radar_W)).y() <= 0.0) continue;  // behind the radar
+    prediction.landmarks.push_back(k);
+    blocks.push_back(landmarks_[k].block.get());
+  }
+  std::optional<PredictedState> state = smoother.predict(measured, blocks);
+  if (!state) return std::nullopt;
+  prediction.state = std::move(*state);
+  return prediction;
+}
+
+LandmarkMap::Association LandmarkMap::associate(const Prediction& prediction, const Extrinsics& T_IR,
+                                                const std::vector<Detection>& detections) const {
+  struct Pair {
+    std::size_t detection, landmark;
+    double squared_sigmas, score;
+  };
+  const Eigen::MatrixXd& P = prediction.state.covariance;
+  const auto shared = static_cast<Eigen::Index>(prediction.first_landmark);
+  std::vector<Pair> pairs;
+  std::vector<bool> is_free(detections.size(), true);
+  std::vector<PolarNoise> noises;
+  for (const Detection& detection : detections) noises.emplace_back(detection.z);
+  std::vector<double> nearest(landmarks_.size(), std::numeric_limits<double>::infinity());
+  for (std::size_t column = 0; column < prediction.landmarks.size(); ++column) {
+    const Landmark& landmark = landmarks_[prediction.landmarks[column]];
+    const SeenPoint seen =
+        seenFrom(StateView(prediction.state.x.data()), ImuDelta(), g_W_, T_IR, landmark.p_W());
+    // Of state, extrinsics and landmark, in their tangents.
+    Eigen::Matrix<double, 3, Eigen::Dynamic> J(3, shared + 3);
+    J.setZero();
+    J.leftCols<3>() = seen.J_state.leftCols<3>();
+    J.middleCols<3>(StateBlock::kP) = seen.J_state.middleCols<3>(StateBlock::kPStored);
+    const Eigen::Index calibrated = shared - StateBlock::kTangent;
+    if (calibrated > 0) J.middleCols<3>(StateBlock::kTangent) = seen.J_extrinsics.leftCols<3>();
+    if (calibrated > 3) J.middleCols<3>(StateBlock::kTangent + 3) = seen.J_extrinsics.rightCols<3>();
+    J.rightCols<3>() = seen.J_point;
+    Eigen::MatrixXd own(shared + 3, shared + 3);
+    const Eigen::Index at = shared + 3 * static_cast<Eigen::Index>(column);
+    own.topLeftCorner(shared, shared) = P.topLeftCorner(shared, shared);
+    own.topRightCorner(shared, 3) = P.block(0, at, shared, 3);
+    own.bottomLeftCorner(3, shared) = P.block(at, 0, 3, shared);
+    own.bottomRightCorner<3, 3>() = P.block<3, 3>(at, at);
+    const Eigen::Matrix3d predicted = J * own * J.transpose();  // of the point in R [m^2]
+    for (std::size_t i = 0; i < detections.size(); ++i) {
+      const Detection& detection = detections[i];
+      const double away = (detection.z.position_R - seen.p_R).squaredNorm();
+      const Eigen::Matrix3d noise = noises[i].covariance();
+      if (away > kElsewhere * (predicted.trace() + noise.trace())) continue;
+      const PolarResidual residual = noises[i].at(seen.p_R);
+      Eigen::Matrix3d S = residual.J * predicted * residual.J.transpose();
+      S.diagonal().array() += 1.0;
+      const double squared = residual.value.dot(S.llt().solve(residual.value));
+      if (squared > kElsewhere) continue;
+      is_free[i] = false;
+      nearest[prediction.landmarks[column]] = std::min(nearest[prediction.landmarks[column]], squared);
+      const double strength = (detection.snr_db - landmark.point.snr_db) / kEchoScatter;
+      const double n = static_cast<double>(landmark.point.sightings);
+      const double score = squared + std::log(S.determinant()) + strength * strength / (1.0 + 1.0 / n);
+      pairs.push_back({i, prediction.landmarks[column], squared, score});
+    }
+  }
+  Association result;
+  for (std::size_t i = 0; i < detections.size(); ++i)
+    if (is_free[i]) result.free.push_back(i);
+  for (const Pair& pair : pairs) {
+    if (pair.squared_sigmas > kGate) continue;
+    const bool is_clear = std::none_of(pairs.begin(), pairs.end(), [&](const Pair& other) {
+      const bool competes = (other.detection == pair.detection) != (other.landmark == pair.landmark);
+      return competes && other.score < pair.score + kClearly;
+    });
+    if (is_clear) result.matches.push_back({pair.detection, pair.landmark, pair.squared_sigmas});
+  }
+  for (std::size_t k = 0; k < landmarks_.size(); ++k)
+    if (nearest[k] > kGate && nearest[k] <= kElsewhere) result.conflicts.push_back(k);
+  return result;
+}
+
+LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<Detection>& detections,
+                                Block& node, Block& extrinsics, FixedLagSmoother& smoother) {
+  LandmarkAnswer answer;
+  const Extrinsics T_IR = toExtrinsics(extrinsics.x.data());
+  const Association association = associate(prediction, T_IR, detections);
+  for (const Match& match : association.matches) answer.squared_sigmas += match.squared_sigmas;
+  judge(prediction, T_IR, association);
+  if (contradicts()) {
+    while (!landmarks_.empty()) retire(landmarks_.size() - 1);
+    forget();
+    answer.dropped_map = true;
+    return answer;
+  }
+  const ImuDelta delta = deltaTo(prediction.measured, node);
+  for (const Match& match : association.matches) {
+    Landmark& landmark = landmarks_[match.landmark];
+    if (is_trusted_)
+      smoother.window().add(std::make_unique<LandmarkFactor>(detections[match.detection].z, delta, g_W_),
+                            {&node, &extrinsics, landmark.block.get()}, loss_);
+    landmark.last_seen = prediction.measured;
+    LandmarkPoint& point = landmark.point;
+    ++point.sightings;
+    point.snr_db += (detections[match.detection].snr_db - point.snr_db) / static_cast<double>(point.sightings);
+    landmark.conflicts = std::max(0.0, landmark.conflicts - 1.0);
+  }
+  for (std::size_t column = 0; column < prediction.landmarks.size(); ++column) {
+    const auto at = static_cast<Eigen::Index>(prediction.first_landmark + 3 * column);
+    landmarks_[prediction.landmarks[column]].point.sigma =
+        std::sqrt(prediction.state.covariance.diagonal().segment<3>(at).sum());
+  }
+  answer.matched = association.matches.size();
+  for (const std::size_t k : association.conflicts) landmarks_[k].conflicts += 1.0;
+
+  const StateBlock& x = prediction.state.x;
+  const Eigen::Quaterniond q_WR = x.q_WI() * T_IR.q_IR;
+  const Eigen::Matrix3d R_WR = q_WR.toRotationMatrix();
+  const Eigen::Vector3d radar_W = x.p_W() + x.q_WI() * T_IR.l_I;
+  for (const Detection& detection : detections) reach_ = std::max(reach_, detection.z.position_R.norm());
+  std::vector<PlacedDetection> placed;
+  for (const std::size_t i : association.free) {
+    const Detection& detection = detections[i];
+    placed.push_back({radar_W + R_WR * detection.z.position_R,
+                      R_WR * PolarNoise(detection.z).covariance() * R_WR.transpose(), radar_W, detection.snr_db,
+                      prediction.measured,
+                      Sighting{*node.time, delta, &extrinsics, detection.z}});
+  }
+  candidates_.forgetOld(prediction.measured, smoother.node(0).time);
+  candidates_.add(placed);
+  dropUseless(x.p_W());
+  promote(smoother, prediction.measured);
+  answer.candidates = candidates_.size();
+  answer.is_trusted = is_trusted_;
+  answer.map = points();
+  return answer;
+}
+
+void LandmarkMap::judge(const Prediction& prediction, const Extrinsics& T_IR, const Association& association) {
+  const double keep = 1.0 - 1.0 / kMemory;
+  in_view_ *= keep;
+  matched_ *= keep;
+  sigmas_ *= keep;
+  const StateBlock& x = prediction.state.x;
+  const Eigen::Vector3d radar_W = x.p_W() + x.q_WI() * T_IR.l_I;
+  const Eigen::Vector3d forward_W = x.q_WI() * T_IR.q_IR * Eigen::Vector3d::UnitY();
+  for (const std::size_t k : prediction.landmarks) {
+    if (forward_W.dot((landmarks_[k].p_W() - radar_W).normalized()) < kCosView) continue;
+    landmarks_[k].in_view += 1.0;
+    in_view_ += 1.0;
+  }
+  for (const Match& match : association.matches) {
+    landmarks_[match.landmark].seen_again += 1.0;
+    matched_ += 1.0;
+    sigmas_ += match.squared_sigmas / 3.0;
+  }
+  if (matched_ >= kProof && matched_ >= kMinShare * in_view_ && !contradicts()) is_trusted_ = true;
+}
+
+/// With less than the proof, or with hardly any landmark seen again, nothing is known and nothing counts.
+bool LandmarkMap::contradicts() const {
+  if (matched_ >= kProof && sigmas_ > kMaxMeanSquare * matched_) return true;
+  return is_trusted_ && in_view_ > kProof / kMinShare && matched_ < 0.5 * kMinShare * in_view_;
+}
+
+void LandmarkMap::retire(std::size_t k) {
+  landmarks_[k].block->is_retired = true;
+  landmarks_.erase(landmarks_.begin() + static_cast<std::ptrdiff_t>(k));
+}
+
+void LandmarkMap::dropUseless(const Eigen::Vector3d& p_W) {
+  constexpr double kMaxConflicts = 3.0;
+  for (std::size_t k = landmarks_.size(); k-- > 0;) {
+    const bool is_far = (landmarks_[k].p_W() - p_W).norm() > 1.2 * reach_;
+    const Landmark& landmark = landmarks_[k];
+    const bool is_gone = landmark.in_view > kMemory && landmark.seen_again < 0.5 * kMinShare * landmark.in_view;
+    if (is_far || is_gone || landmark.conflicts > kMaxConflicts) retire(k);
+  }
+}
+
+void LandmarkMap::makeRoom(Time now, std::size_t wanted) {
+  while (landmarks_.size() + wanted > options_.max_landmarks && !landmarks_.empty()) {
+    const auto oldest = std::min_element(landmarks_.begin(), landmarks_.end(), [](const auto& a, const auto& b) {
+      return a.last_seen < b.last_seen;
+    });
+    if (now - oldest->last_seen < kLongUnseen) return;
+    retire(static_cast<std::size_t>(oldest - landmarks_.begin()));
+  }
+}
+
+void LandmarkMap::promote(FixedLagSmoother& smoother, Time now) {
+  std::vector<Eigen::Vector3d> landmarks_W;
+  for (const Landmark& landmark : landmarks_) landmarks_W.push_back(landmark.p_W());
+  makeRoom(now, 1);
+  if (landmarks_.size() >= options_.max_landmarks) return;
+  const std::vector<Candidate> proven =
+      candidates_.takeProven(landmarks_W, options_.max_landmarks - landmarks_.size());
+  for (const Candidate& candidate : proven) {
+    Landmark landmark;
+    landmark.block = smoother.window().addCalibration(manifold_, candidate.position());
+    landmark.last_seen = now;
+    landmark.point.id = next_id_++;
+    landmark.point.sightings = candidate.count;
+    landmark.point.snr_db = candidate.snr_db();
+    // One places it and says nothing else. Several also say how the platform moved.
+    for (auto sighting = candidate.sightings.rbegin(); sighting != candidate.sightings.rend(); ++sighting) {
+      Block* node = smoother.nodeAt(sighting->node_time);
+      smoother.window().add(std::make_unique<LandmarkFactor>(sighting->z, sighting->delta, g_W_),
+                            {node, sighting->extrinsics, landmark.block.get()}, loss_);
+      if (!is_trusted_) break;
+    }
+    landmarks_.push_back(std::move(landmark));
+  }
+}
+
+ImuDelta LandmarkMap::deltaTo(Time measured, const Block& node) const {
+  const StateView x(node.x.data());
+  ImuDelta delta;
+  imu_->forEachInterval(*node.time, measured,
+                        [&](double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
+                          delta.step(dt, gyro - x.b_g, accel - x.b_a);
+                        });
+  return delta;
+}
+
+}  // namespace rio_t

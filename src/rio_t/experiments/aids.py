@@ -1,0 +1,88 @@
+"""What the platform cannot do and how high it is: each aid alone and together, over motions and seeds, with cost."""
+import numpy
+
+from .. import tum
+from ..errors import RioTError
+from .laboratory import need_truth, read_run, truth_of
+from .page import Page, Table, fixed, mean
+
+GROUND, PRESSURE = {"platform": "ground_vehicle"}, {"barometer_topic": "/sensor_platform/baro"}
+# Name, parameters. A new aid is one more line, and one for it together with the others.
+AIDS = {
+    "none": {},
+    "ground vehicle": GROUND,
+    "barometer": PRESSURE,
+    "both": {**GROUND, **PRESSURE}}
+ON_WHEELS = ("ground_vehicle", "kart")
+
+
+def height_errors(folder, bag):
+    """Of the causal trajectory against the truth, both from their starts [m]."""
+    estimate, truth = tum.read(folder / "trajectory.txt"), tum.read(truth_of(bag))
+    at = estimate.seconds(truth.stamp[0])
+    true = numpy.interp(at, truth.seconds(truth.stamp[0]), truth.position[:, 2])
+    height = estimate.position[:, 2]
+    return (height - height[0]) - (true - true[0])
+
+
+def work(settings):
+    """(Run, errors of the height) of a bag, or one line why there is none."""
+    def function(lab, bag):
+        def read(folder):
+            return read_run(folder), height_errors(folder, bag)
+        try:
+            return lab.run(bag, settings, read)
+        except RioTError as error:
+            return str(error)
+    return function
+
+
+def rms(values):
+    return float(numpy.sqrt(numpy.mean(numpy.square(values))))
+
+
+def is_contradicted(run):
+    return run.summary.get("ground_vehicle", {}).get("contradicted", False)
+
+
+def row_of_run(source, aid, result):
+    key = [source.name, source.seed, aid]
+    if isinstance(result, str):
+        return key + [""] * 5 + [result]
+    run, errors = result
+    return key + [fixed(run.figure("ate_m"), 4), fixed(rms(errors), 4), fixed(abs(errors[-1]), 4),
+                  fixed(run.cpu, 2), "contradicted" if is_contradicted(run) else "", ""]
+
+
+def row_of_group(motion, aid, results, plain_cpu):
+    good = [result for result in results if not isinstance(result, str)]
+    runs = [run for run, _ in good]
+    cpu = sum(run.cpu for run in runs)
+    return [motion, aid, len(good), len(results) - len(good), fixed(mean([run.figure("ate_m") for run in runs]), 3),
+            fixed(mean([rms(errors) for _, errors in good]), 3),
+            fixed(mean([abs(errors[-1]) for _, errors in good]), 3),
+            fixed(cpu / plain_cpu, 2) if plain_cpu else "", sum(map(is_contradicted, runs))]
+
+
+def run(lab, sources, _):
+    keys = [(source, aid) for source in sources for aid in AIDS]
+    results = lab.map([(source, 1, work(AIDS[aid])) for source, aid in keys])
+    groups = {}
+    for (source, aid), result in zip(keys, results):
+        if not isinstance(result, str):
+            need_truth(source, result[0])
+        groups.setdefault((source.name, aid), []).append(result)
+    plain = {motion: sum(result[0].cpu for result in of if not isinstance(result, str))
+             for (motion, aid), of in groups.items() if aid == "none"}
+    page = Page("Aids: what the platform cannot do, how high it is")
+    page.notes.append("height: of the causal trajectory, from the start; cost: CPU of rio_t_bag over that without aids "
+                      "on the same bags")
+    page.notes.append(f"only {' and '.join(ON_WHEELS)} are ground vehicles: the others must say that the motion "
+                      "contradicts it")
+    page.tables.append(Table("aids", "Mean of the runs", [
+        "motion", "aid", "runs", "failed", "ATE [m]", "height rms [m]", "height at the end [m]", "cost",
+        "contradicted"], [row_of_group(*key, of, plain[key[0]]) for key, of in groups.items()]))
+    page.tables.append(Table("aids_runs", "Each run", [
+        "motion", "seed", "aid", "ATE [m]", "height rms [m]", "height at the end [m]", "CPU [s]", "platform",
+        "why there is no result"], [row_of_run(*key, result) for key, result in zip(keys, results)]))
+    return page

@@ -1,0 +1,101 @@
+#include <algorithm>
+#include <boost/process.hpp>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <ostream>
+#include <stdexcept>
+
+#include "rio_t/ros/bag/check_bag.h"
+
+namespace rio_t {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kReady = 0, kNotReady = 1, kUsage = 2;
+
+/// Why the request cannot be met; empty: it can.
+std::string faultOf(const CheckRequest& request) {
+  if (request.bags.empty()) return "expected a bag (see --help)";
+  for (const std::string& file : {request.out, request.rig}) {
+    if (file.empty()) continue;
+    if (fs::is_directory(file)) return file + ": expected a file, this is a folder";
+    const fs::path folder = fs::absolute(file).parent_path();
+    if (!fs::is_directory(folder)) return file + ": there is no folder " + folder.string();
+    for (const std::string& bag : request.bags) {
+      std::error_code none;
+      if (fs::equivalent(file, bag, none)) return file + ": expected another file than the bag";
+    }
+  }
+  return "";
+}
+
+void writeFile(const std::string& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  file << text;
+  file.flush();
+  if (!file) throw std::runtime_error(path + ": cannot be written");
+}
+
+/// The script beside the program, as in an installed package and in a build folder.
+std::string drawRigScript() {
+  std::error_code error;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  const fs::path script = program.parent_path() / "draw_rig.py";
+  return !error && fs::is_regular_file(script) ? script.string() : "";
+}
+
+void drawRig(const std::string& yaml, const std::string& png) {
+  const std::string script = drawRigScript();
+  if (script.empty()) throw std::runtime_error("--rig: the script draw_rig.py is not installed");
+  namespace process = boost::process;
+  if (process::system("/usr/bin/env", "python3", script, "--config", yaml, "--out", png) != 0)
+    throw std::runtime_error("--rig " + png + ": draw_rig.py failed");
+}
+
+}  // namespace
+
+int runCheck(const CheckRequest& request, std::ostream& out, std::ostream& err) {
+  const std::string fault = faultOf(request);
+  if (!fault.empty()) {
+    err << "check_bag: " << fault << "\n";
+    return kUsage;
+  }
+  std::optional<BagCheck> best;
+  bool all_ready = true;
+  try {
+    for (const std::string& bag : request.bags) {
+      const BagCheck check = checkBag(bag, request);
+      out << describeCheck(check) << std::flush;
+      all_ready = all_ready && check.ready() && check.to_do.empty();
+      if (check.ready() && (!best || check.quality > best->quality)) best = check;
+    }
+    if (!best) {
+      out << "Not ready: no configuration is written.\n";
+      return kNotReady;
+    }
+    if (request.bags.size() > 1) out << "The configuration is that of " << best->bag << ", which shows most.\n";
+    if (request.out.empty()) {
+      out << "\n" << best->yaml;
+    } else {
+      writeFile(request.out, best->yaml);
+      out << "Written to " << request.out << ". Next: rosrun rio_t rio_t_bag --bag " << best->bag << " --config "
+          << request.out << " --output-dir results\n";
+    }
+    if (!request.rig.empty()) {
+      const std::string yaml = request.out.empty() ? request.rig + ".yaml" : request.out;
+      if (request.out.empty()) writeFile(yaml, best->yaml);
+      drawRig(yaml, request.rig);
+      if (request.out.empty()) fs::remove(yaml);
+      out << "The rig is drawn in " << request.rig << "\n";
+    }
+  } catch (const std::exception& error) {
+    err << "check_bag: " << error.what() << "\n";
+    return kNotReady;
+  }
+  return all_ready ? kReady : kNotReady;
+}
+
+}  // namespace rio_t

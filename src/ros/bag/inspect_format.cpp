@@ -1,0 +1,275 @@
+#include "inspect_format.h"
+
+#include <algorithm>
+#include <array>
+#include <boost/algorithm/string.hpp>
+#include <cmath>
+#include <exception>
+#include <optional>
+#include <utility>
+
+#include "rio_t/inspection/stream_timing.h"
+#include "rio_t/ros/bag/run_output.h"
+#include "rio_t/ros/cloud/point_cloud.h"
+
+namespace rio_t {
+namespace {
+
+using sensor_msgs::PointCloud2;
+
+/// The first message that has points.
+const PointCloud2* example(const CloudTopic& topic) {
+  for (const auto& message : topic.messages) {
+    if (!message->data.empty() && !message->fields.empty()) return message.get();
+  }
+  return nullptr;
+}
+
+std::vector<std::string> fieldsOf(const PointCloud2& message) {
+  std::vector<std::string> names;
+  for (const sensor_msgs::PointField& field : message.fields) names.push_back(field.name);
+  return names;
+}
+
+bool has(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+std::vector<std::string> needed(const PointCloudFormat& f) {
+  const bool cartesian = f.coordinates == PointCoordinates::kCartesian;
+  return {cartesian ? f.x : f.azimuth, cartesian ? f.y : f.elevation, cartesian ? f.z : f.range, f.doppler,
+          f.power};
+}
+
+std::vector<std::string> fittingPresets(const std::vector<std::string>& fields) {
+  std::vector<std::string> fitting;
+  for (const std::string& name : pointCloudPresets()) {
+    const std::vector<std::string> names = needed(pointCloudPreset(name));
+    if (std::all_of(names.begin(), names.end(), [&](const std::string& each) { return has(fields, each); }))
+      fitting.push_back(name);
+  }
+  return fitting;
+}
+
+/// The first field whose name looks like one of the words; it must not be a standard deviation and the like.
+std::string fieldLike(const std::vector<std::string>& fields, const std::vector<std::string>& words) {
+  for (const std::string& word : words) {
+    for (const std::string& field : fields) {
+      const std::string lower = boost::algorithm::to_lower_copy(field);
+      const bool derived = boost::algorithm::contains(lower, "std") || boost::algorithm::contains(lower, "var") ||
+                           boost::algorithm::contains(lower, "noise") ||
+                           boost::algorithm::contains(lower, "bin") || boost::algorithm::contains(lower, "idx");
+      if (!derived && boost::algorithm::contains(lower, word)) return field;
+    }
+  }
+  return "";
+}
+
+/// Values of one field in the whole recording: a format reads any field as the Doppler.
+std::vector<double> valuesOf(const CloudTopic& topic, PointCloudFormat format, const std::string& field) {
+  format.doppler = field;
+  format.doppler_sign = 1;
+  format.power_unit = PowerUnit::kNotSnr;
+  std::vector<double> values;
+  for (const RadarScan& scan : decodeAll(topic, format)) {
+    for (const RadarPoint& point : scan.points) values.push_back(point.doppler);
+  }
+  return values;
+}
+
+std::string decimal(double value, int decimals) {
+  std::string text;
+  appendFixed(&text, value, decimals);
+  return text;
+}
+
+/// Nobody's preset: names, one by one.
+void guessFormat(const std::vector<std::string>& fields, FormatProposal* proposal) {
+  const std::string doppler = fieldLike(
+      fields, {"doppler", "radial_speed", "range_rate", "rangerate", "velocity", "vel", "speed", "v_r", "vr"});
+  if (doppler.empty()) {
+    proposal->fault = "it has no field with the Doppler (fields: " + proposal->fields +
+                      "), so no velocity can be had from it; use a driver that publishes the Doppler";
+    return;
+  }
+  const std::string azimuth = fieldLike(fields, {"azimuth"}), elevation = fieldLike(fields, {"elevation"});
+  const std::string range = fieldLike(fields, {"range", "distance"});
+  const bool cartesian = has(fields, "x") && has(fields, "y") && has(fields, "z");
+  if (!cartesian && (azimuth.empty() || elevation.empty() || range.empty())) {
+    proposal->fault = "it has no position: neither x, y, z nor azimuth, elevation, range (fields: " +
+                      proposal->fields + "); set radar_field_x and the like by hand";
+    return;
+  }
+  const std::string preset = cartesian ? "coloradar" : "ars548_hkust";
+  proposal->keys.set("radar_format", preset, "No preset has these fields; this one is near: " + proposal->fields);
+  if (pointCloudPreset(preset).doppler != doppler) proposal->keys.set("radar_field_doppler", doppler, "");
+  if (!cartesian) {
+    if (azimuth != "azimuth") proposal->keys.set("radar_field_azimuth", azimuth, "");
+    if (elevation != "elevation") proposal->keys.set("radar_field_elevation", elevation, "");
+    if (range != "range") proposal->keys.set("radar_field_range", range, "");
+  }
+  const std::string power = fieldLike(fields, {"snr"});
+  if (!power.empty()) {
+    proposal->keys.set("radar_field_power", power, "");
+    proposal->keys.set("radar_power_unit", "snr_db", "");
+  }
+  proposal->odd.push_back("no preset has the fields " + proposal->fields + "; " + doppler +
+                          " is taken for the Doppler");
+}
+
+void resolve(FormatProposal* proposal) {
+  ParameterEntries entries;
+  for (const ProposedKey& key : proposal->keys.all())
+    entries.push_back(parseAssignment(key.key + "=" + key.values.front()));
+  proposal->format = pointCloudFormat(makeConfig(entries));
+}
+
+/// The unit in which the median is a usual signal to noise ratio, 5 to 60 dB.
+PowerUnit unitOf(double median, PowerUnit of_preset) {
+  constexpr double kLeast = 5.0, kMost = 60.0;
+  const auto usual = [&](double db) { return db >= kLeast && db <= kMost; };
+  const double linear = median > 0.0 ? 10.0 * std::log10(median) : 0.0;
+  if (of_preset == PowerUnit::kSnrDb && usual(median)) return of_preset;
+  if (of_preset == PowerUnit::kSnrDeciDb && usual(0.1 * median)) return of_preset;
+  if (of_preset == PowerUnit::kSnrLinear && usual(linear)) return of_preset;
+  if (usual(median)) return PowerUnit::kSnrDb;
+  if (usual(0.1 * median)) return PowerUnit::kSnrDeciDb;
+  if (usual(linear)) return PowerUnit::kSnrLinear;
+  return PowerUnit::kNotSnr;
+}
+
+void findPower(const CloudTopic& topic, FormatProposal* proposal) {
+  const PointCloudFormat& format = proposal->format;
+  if (format.power_unit == PowerUnit::kNotSnr) {
+    proposal->power = "no SNR is read";
+    return;
+  }
+  const std::vector<double> values = valuesOf(topic, format, format.power);
+  const double median = quantile(values, 0.5);
+  const bool constant = quantile(values, 0.0) == quantile(values, 1.0);
+  const PowerUnit unit = constant ? PowerUnit::kNotSnr : unitOf(median, format.power_unit);
+  const std::string said = "the values of " + format.power + " have the median " + decimal(median, 1);
+  if (unit != format.power_unit) {
+    proposal->keys.set("radar_power_unit", toString(unit),
+                       "As " + toString(format.power_unit) + " they make no sense: " + said);
+    proposal->odd.push_back(said + ", so they are read as " + toString(unit) + ", not as " +
+                            toString(format.power_unit));
+    resolve(proposal);
+  }
+  if (unit == PowerUnit::kNotSnr) {
+    proposal->power = "no SNR is read";
+    return;
+  }
+  std::vector<double> decibels;
+  for (const RadarScan& scan : decodeAll(topic, proposal->format)) {
+    for (const RadarPoint& point : scan.points) decibels.push_back(point.snr_db);
+  }
+  proposal->power = "SNR " + decimal(quantile(decibels, 0.1), 0) + " to " + decimal(quantile(decibels, 0.9), 0) +
+                    " dB in " + format.power;
+  constexpr double kDefaultMinimum = 3.0, kFew = 0.2;  // [dB]
+  if (quantile(decibels, kFew) < kDefaultMinimum) {
+    proposal->keys.set("radar_min_snr_db", decimalYaml(std::floor(quantile(decibels, 0.02)), 1),
+                       "More than a fifth of the points are below the default, 3 dB.");
+    proposal->odd.push_back("a fifth of the points have less than 3 dB, so radar_min_snr_db is lowered");
+  }
+}
+
+}  // namespace
+
+std::vector<RadarScan> decodeAll(const CloudTopic& topic, const PointCloudFormat& format) {
+  std::vector<RadarScan> scans;
+  for (const auto& message : topic.messages) {
+    try {
+      scans.push_back(toRadarScan(decode(*message, format).cloud, Time()));
+    } catch (const std::exception&) {
+      scans.emplace_back();
+    }
+  }
+  return scans;
+}
+
+FormatProposal proposeFormat(const CloudTopic& topic) {
+  FormatProposal proposal;
+  const PointCloud2* message = example(topic);
+  if (message == nullptr) {
+    proposal.fault = "all of its clouds are empty";
+    return proposal;
+  }
+  const std::vector<std::string> fields = fieldsOf(*message);
+  proposal.fields = boost::algorithm::join(fields, ", ");
+  proposal.fitting = fittingPresets(fields);
+  if (proposal.fitting.empty()) {
+    guessFormat(fields, &proposal);
+    if (!proposal.fault.empty()) return proposal;
+  } else {
+    std::string why = "Fields: " + proposal.fields;
+    if (proposal.fitting.size() > 1)
+      why += ". These presets have them, too: " + boost::algorithm::join(proposal.fitting, ", ");
+    proposal.keys.set("radar_format", proposal.fitting.front(), why);
+  }
+  resolve(&proposal);
+  if ((message->width == 0 || message->height == 0) && !proposal.format.size_from_data) {
+    proposal.keys.set("radar_cloud_size", "from_data", "The driver leaves width or height at zero.");
+    resolve(&proposal);
+  }
+  try {
+    decode(*message, proposal.format);
+  } catch (const std::exception& error) {
+    proposal.fault = error.what();
+    return proposal;
+  }
+  findPower(topic, &proposal);
+  return proposal;
+}
+
+bool correctAxes(const CloudReport& cloud, bool mirrored, FormatProposal* proposal) {
+  constexpr double kLooks = 0.4;   // length of the mean direction from which on a radar looks somewhere
+  constexpr double kWider = 1.5;   // by which a field of view is wider in azimuth than in elevation
+  PointCloudFormat& format = proposal->format;
+  if (format.coordinates != PointCoordinates::kCartesian) return false;
+  const std::array<std::string, 3> fields = {format.x, format.y, format.z};
+  const Eigen::Vector3d mean = cloudFromRfu(format.axes) * cloud.mean_direction;  // along the fields
+  const int forward = format.axes == PointAxes::kForwardLeftUp ? 0 : 1;
+  const auto rename = [&](int field, int from) {
+    const std::array<const char*, 3> keys = {"radar_field_x", "radar_field_y", "radar_field_z"};
+    proposal->keys.set(keys[static_cast<std::size_t>(field)], fields[static_cast<std::size_t>(from)],
+                       mirrored ? "Two fields of the cloud are swapped." : "The radar looks along another field.");
+  };
+  int looks = 0;
+  const double most = mean.maxCoeff(&looks);
+  if (most > kLooks && looks != forward) {
+    if (mirrored) {
+      rename(forward, looks);
+      rename(looks, forward);
+      proposal->odd.push_back("the fields " + fields[static_cast<std::size_t>(forward)] + " and " +
+                              fields[static_cast<std::size_t>(looks)] + " are swapped: the radar looks along " +
+                              fields[static_cast<std::size_t>(looks)] + ", and the axes are left-handed");
+    } else if (looks != 2) {
+      const char* axes = looks == 0 ? "flu" : "rfu";
+      proposal->keys.set("radar_axes", axes, "The radar looks along this forward axis.");
+      proposal->odd.push_back("the radar looks along " + fields[static_cast<std::size_t>(looks)] +
+                              ", so its axes are " + axes + ", not those of the preset");
+    } else {  // a camera's axes, turned on: forward is z
+      proposal->keys.set("radar_axes", "flu", "The radar looks along z.");
+      rename(0, 2);
+      rename(1, 0);
+      rename(2, 1);
+      proposal->odd.push_back("the radar looks along " + fields[2]);
+    }
+    resolve(proposal);
+    return true;
+  }
+  // Forward is right. If the lateral axis is much narrower than the vertical one, those two are swapped.
+  if (mirrored && cloud.mean_direction.norm() > kLooks && cloud.spread.z() > kWider * cloud.spread.x()) {
+    const int lateral = forward == 0 ? 1 : 0;
+    rename(lateral, 2);
+    rename(2, lateral);
+    proposal->odd.push_back("the fields " + fields[static_cast<std::size_t>(lateral)] + " and " + fields[2] +
+                            " are swapped: the axes are left-handed");
+    resolve(proposal);
+    return true;
+  }
+  return false;
+}
+
+}  // namespace rio_t

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "inspect_keys.h"
+#include "inspect_recording.h"
+#include "rio_t/inspection/cloud_report.h"
+#include "rio_t/radar/scan.h"
+
+namespace rio_t {
+
+/// How a cloud is to be read.
+struct FormatProposal {
+  std::string fault;                 ///< why it cannot be used, as one sentence; empty: it can
+  std::string fields;                ///< "x, y, z, doppler"
+  std::vector<std::string> fitting;  ///< presets whose fields are all there
+  PointCloudFormat format;
+  ProposedKeys keys;
+  std::vector<std::string> odd;      ///< sentences
+  std::string power;                 ///< what the power field says, as one phrase
+};
+
+/// Chooses preset, names of fields and unit of the power from fields and values.
+FormatProposal proposeFormat(const CloudTopic& topic);
+
+/// Turns the format so that the radar looks along the forward axis, as `cloud` shows it. `mirrored`: the axes
+/// are left-handed (see MountingSearch). Returns whether anything changed.
+bool correctAxes(const CloudReport& cloud, bool mirrored, FormatProposal* proposal);
+
+/// The scans as the format reads them, without stamps. What cannot be decoded is empty.
+std::vector<RadarScan> decodeAll(const CloudTopic& topic, const PointCloudFormat& format);
+
+}  // namespace rio_t

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "rio_t/ros/parameters/parameters.h"
+
+namespace rio_t {
+
+/// A key of a configuration that an inspection proposes, and why.
+struct ProposedKey {
+  std::string key;
+  std::vector<std::string> values;  ///< one, or the elements of a list; as plain YAML
+  bool is_list = false;
+  std::string why;
+};
+
+/// Keys of one level, each once, in the order in which they came.
+class ProposedKeys {
+ public:
+  /// The later value holds.
+  void set(const std::string& key, const std::string& value, const std::string& why);
+  void setList(const std::string& key, const std::vector<std::string>& values, const std::string& why);
+  void remove(const std::string& key);
+  const ProposedKey* find(const std::string& key) const;
+  const std::vector<ProposedKey>& all() const { return keys_; }
+
+ private:
+  void put(ProposedKey key);
+  std::vector<ProposedKey> keys_;
+};
+
+/// A configuration: the top level, and the section of each of several radars.
+struct ProposedConfig {
+  ProposedKeys top_level;
+  std::vector<std::pair<std::string, ProposedKeys>> radars;  ///< by name; empty: one radar, at the top level
+};
+
+/// As a file: the keys that differ from the defaults, each with a comment. `header`: lines for its beginning.
+std::string toYaml(const ProposedConfig& proposed, const std::string& header);
+
+/// The file as the programs read it; throws ConfigError.
+Config readBack(const std::string& yaml);
+
+/// A decimal number as YAML.
+std::string decimalYaml(double value, int decimals);
+
+}  // namespace rio_t

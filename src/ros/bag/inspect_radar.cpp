@@ -1,0 +1,247 @@
+#include "inspect_radar.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "rio_t/radar/mounting.h"
+
+namespace rio_t {
+namespace {
+
+constexpr double kStraight = 3.14159265358979323846;  // [rad]
+constexpr double kDegree = 3.14159265358979323846 / 180.0;
+
+std::string degrees(double radians) { return decimalText(radians / kDegree, 0); }
+
+/// "x 1.2, y 0.9 deg; not observed about z"
+std::string sureness(const Eigen::Vector3d& sigma) {
+  constexpr double kNotObserved = 0.3;  // [rad]
+  std::string known, unknown;
+  for (int k = 0; k < 3; ++k) {
+    const std::string axis(1, "xyz"[k]);
+    if (sigma[k] < kNotObserved) {
+      known += (known.empty() ? "" : ", ") + axis + " " + decimalText(sigma[k] / kDegree, 1);
+    } else {
+      unknown += (unknown.empty() ? "" : " and ") + axis;
+    }
+  }
+  std::string text = known.empty() ? "" : "sigma " + known + " deg about the axes of the IMU";
+  if (!unknown.empty())
+    text += (text.empty() ? "" : "; ") + std::string("not observed about ") + unknown +
+            ": the motion does not show it, and an upright radar is assumed";
+  return text;
+}
+
+MountingSearchOptions searchOptions(const ImuInspection& imu, const InertialTrack& track, int sign_from_ranges) {
+  MountingSearchOptions options;
+  options.sign_from_ranges = sign_from_ranges;
+  options.accel_density = std::max(options.accel_density, imu.report.accel_density_median);
+  if (imu.report.rests_at_start) {
+    options.rest_end = track.begin() + (imu.report.rest_begin + imu.report.rest);
+    options.gravity_G = -(track.rotation(options.rest_end) * imu.report.rest_acceleration);
+  }
+  constexpr double kMostlyUp = 7.5;  // [m/s^2] length of the mean: shorter, and the IMU turns over
+  const ImuReport& report = imu.report;
+  const Eigen::Vector3d up = report.rests_at_start ? report.rest_acceleration : report.mean_acceleration;
+  if (report.mean_acceleration.norm() > kMostlyUp && up.norm() > kMostlyUp) options.up_I = up.normalized();
+  return options;
+}
+
+struct Looked {
+  std::vector<RadarScan> scans;
+  CloudReport cloud;
+  RadarVelocities velocities;
+  DopplerSign sign;
+  MountingSearch search;
+};
+
+Looked look(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud,
+            const StampProposal& stamps, const PointCloudFormat& format, const InertialTrack& track) {
+  Looked looked;
+  looked.scans = stampScans(recording, *imu.topic, cloud, stamps, decodeAll(cloud, format));
+  looked.cloud = inspectCloud(looked.scans);
+  looked.velocities = radarVelocities(looked.scans);
+  looked.sign = dopplerSignFromRanges(looked.scans, track);
+  looked.search =
+      searchMounting(looked.velocities.velocities, track, searchOptions(imu, track, looked.sign.sign));
+  return looked;
+}
+
+void describeCloud(const Looked& looked, const FormatProposal& format, const StreamTiming& timing,
+                   RadarInspection* radar) {
+  const auto tell = [&](FindingLevel level, const std::string& subject, const std::string& text) {
+    radar->findings.push_back({level, subject, text});
+  };
+  const CloudReport& c = looked.cloud;
+  std::string rate = radar->topic + ": " + decimalText(timing.rate, 1) + " Hz";
+  if (timing.gaps > 0)
+    rate += ", gaps: " + std::to_string(timing.gaps) + " (longest " + decimalText(timing.longest_gap, 2) + " s)";
+  if (timing.duplicates > 0 && timing.zero == 0 && !timing.constant)
+    rate += ", duplicate stamps: " + std::to_string(timing.duplicates);
+  std::string presets;
+  for (const std::string& preset : format.fitting) presets += (presets.empty() ? "" : ", ") + preset;
+  tell(timing.gaps > timing.messages / 50 ? FindingLevel::kOdd : FindingLevel::kOk, "radar",
+       rate + "; format " + format.format.name + (format.fitting.size() > 1 ? " (fitting: " + presets + ")" : "") +
+           ", " + format.power);
+  for (const std::string& odd : format.odd) tell(FindingLevel::kOdd, "format", odd);
+  const DopplerStep& step = looked.velocities.doppler_step;
+  const bool sparse = c.points_50 < 15.0;
+  tell(sparse ? FindingLevel::kOdd : FindingLevel::kOk, "points",
+       decimalText(c.points_10, 0) + " / " + decimalText(c.points_50, 0) + " / " + decimalText(c.points_90, 0) +
+           " a scan (10, 50, 90 %), to " + decimalText(c.range_99, 1) + " m, field of view +-" +
+           degrees(c.azimuth_95) + " by +-" + degrees(c.elevation_95) + " deg, Doppler step " +
+           (step.value > 0.0 ? decimalText(step.value, 3) + " m/s" : std::string("none")) +
+           (sparse ? ": few points, so start at rest" : ""));
+  if (!looked.velocities.has_elevation)
+    tell(FindingLevel::kOdd, "points", "the radar measures no elevation: z will drift");
+}
+
+void limitsOfCloud(const CloudReport& cloud, ProposedKeys* keys) {
+  if (cloud.behind > 0.02)
+    keys->set("radar_max_azimuth", "3.141592", "So many points lie behind the radar's forward axis: " +
+                                                   decimalText(100.0 * cloud.behind, 0) + " %.");
+  if (cloud.range_99 > 95.0)
+    keys->set("radar_max_range", decimalYaml(std::ceil(1.2 * cloud.range_99), 1), "The radar sees farther than 100 m.");
+}
+
+void describeSign(const Looked& looked, const FormatProposal& format, RadarInspection* radar) {
+  const MountingSearch& search = looked.search;
+  const std::string field = format.format.doppler;
+  const std::string by_ranges =
+      looked.sign.sign == 0 ? "" : "ranges (" + decimalText(std::abs(looked.sign.significance), 0) + " sigma)";
+  const bool imu_knows = search.enough && search.sign_significance > 25.0;
+  const std::string by_imu =
+      imu_knows ? "the IMU (" + decimalText(std::sqrt(search.sign_significance), 0) + " sigma)" : "";
+  const std::string evidence = by_ranges + (by_ranges.empty() || by_imu.empty() ? "" : " and ") + by_imu;
+  if (search.mirrored) {
+    radar->findings.push_back(
+        {FindingLevel::kOdd, "axes",
+         "the axes of the cloud are left-handed (one axis is inverted): the ranges say that " + field + " is " +
+             (looked.sign.sign > 0 ? "positive for receding" : "negative for receding") +
+             " targets, the IMU the contrary; radar_doppler_sign and the mounting stand for it"});
+    radar->keys.set("radar_doppler_sign", std::to_string(search.sign),
+                    "One axis of the cloud is inverted. This sign and the mounting below stand for it.");
+  } else if (search.sign == -1) {
+    radar->findings.push_back({FindingLevel::kOdd, "Doppler",
+                               field + " is positive for approaching targets, as " + evidence + " show"});
+    radar->keys.set("radar_doppler_sign", "-1", field + " is positive for approaching targets.");
+  } else {
+    radar->findings.push_back({FindingLevel::kOk, "Doppler",
+                               field + " is positive for receding targets" +
+                                   (evidence.empty() ? " (assumed: the motion does not show it)"
+                                                     : ", as " + evidence + " show")});
+  }
+}
+
+/// The 24 turns in words: where the axes of the radar point.
+std::string turnText(const Eigen::Matrix3d& turn) {
+  std::string text;
+  const std::array<const char*, 3> names = {"right", "forward", "up"};
+  for (int k = 0; k < 3; ++k) {
+    int axis = 0;
+    turn.col(k).cwiseAbs().maxCoeff(&axis);
+    text += (k == 0 ? "" : ", ") + std::string(names[static_cast<std::size_t>(k)]) + " = " +
+            (turn(axis, k) < 0.0 ? "-" : "+") + "xyz"[axis];
+  }
+  return text;
+}
+
+Eigen::Matrix3d nearestTurn(const Eigen::Matrix3d& R) {
+  const auto& turns = axisTurns();
+  return *std::max_element(turns.begin(), turns.end(), [&](const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
+    return (a.transpose() * R).trace() < (b.transpose() * R).trace();
+  });
+}
+
+void describeMounting(const MountingSearch& search, RadarInspection* radar) {
+  const auto tell = [&](FindingLevel level, const std::string& subject, const std::string& text) {
+    radar->findings.push_back({level, subject, text});
+  };
+  if (!search.enough) {
+    tell(FindingLevel::kOdd, "mounting",
+         "not found: less than 3 s with motion; the radar is taken to look forward. Record with motion, or set "
+         "mounting_yaw_pitch_roll_deg by hand");
+    radar->keys.setList("mounting_yaw_pitch_roll_deg", {"0.0", "0.0", "0.0"},
+                        "Assumed: the bag does not show it. Yaw left, pitch up, roll right side down.");
+    return;
+  }
+  const MountingAngles angles = mountingOf(search.q_IR);
+  const std::vector<std::string> words = {decimalYaml(angles.yaw / kDegree, 1), decimalYaml(angles.pitch / kDegree, 1),
+                                          decimalYaml(angles.roll / kDegree, 1)};
+  Eigen::Vector3d sigma = search.rotation_sigma;
+  constexpr double kSparseSigma = 0.2;  // [rad]
+  if (radar->isSparse()) sigma = (sigma.array().square() + kSparseSigma * kSparseSigma).sqrt().min(kStraight);
+  const std::string sure = sureness(sigma);
+  const bool observed = search.rotation_sigma.maxCoeff() < 0.3;
+  tell(observed ? FindingLevel::kOk : FindingLevel::kOdd, "mounting",
+       "yaw " + words[0] + ", pitch " + words[1] + ", roll " + words[2] + " deg (radar's " +
+           turnText(nearestTurn(search.q_IR.toRotationMatrix())) + " of the IMU); " + sure);
+  radar->keys.setList("mounting_yaw_pitch_roll_deg", words,
+                      "Yaw left, pitch up, roll right side down, seen from x forward, y left, z up of the IMU. " + sure + ".");
+  const Eigen::Vector3d& l = search.lever_arm_I;
+  const Eigen::Vector3d& l_sigma = search.lever_arm_sigma;
+  std::vector<std::string> lever;
+  std::string text;
+  for (int k = 0; k < 3; ++k) {
+    // Three sigma away from zero: better than zero.
+    const bool found = std::abs(l[k]) > 3.0 * l_sigma[k] && l_sigma[k] < 0.3;
+    lever.push_back(decimalYaml(found ? l[k] : 0.0, 2));
+    text += (k == 0 ? "" : ", ") + decimalText(l[k], 2) + " +- " + decimalText(l_sigma[k], 2);
+  }
+  const bool any = lever[0] != "0.00" || lever[1] != "0.00" || lever[2] != "0.00";
+  tell(FindingLevel::kOk, "lever arm",
+       "about [" + text + "] m: " + (any ? "what is clear of zero is taken over" : "zero is proposed") +
+           "; measure it with a tape");
+  if (any)
+    radar->keys.setList("extrinsics_translation", lever,
+                        "Origin of the radar in the IMU frame, roughly [m]. Measure it with a tape.");
+  tell(FindingLevel::kOk, "offset",
+       decimalText(1e3 * search.offset, 0) + " +- " + decimalText(1e3 * search.offset_sigma, 0) +
+           " ms, roughly; the odometry estimates it");
+  constexpr double kFar = 0.06, kKnown = 0.03;  // [s] the estimate starts at 0 +- 0.075
+  if (std::abs(search.offset) > kFar && search.offset_sigma < kKnown && !radar->isSparse())
+    radar->keys.set("time_offset_initial",
+                    decimalYaml(std::clamp(search.offset, -0.2, 0.2), 3), "Found roughly, in seconds.");
+}
+
+}  // namespace
+
+RadarInspection inspectRadar(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud) {
+  RadarInspection radar;
+  radar.topic = cloud.topic;
+  const StreamTiming timing = inspectTiming(cloud.times);
+  FormatProposal format = proposeFormat(cloud);
+  if (!format.fault.empty()) {
+    radar.findings.push_back({FindingLevel::kMissing, "radar", cloud.topic + ": " + format.fault});
+    return radar;
+  }
+  const StampProposal stamps = proposeStamps(recording, *imu.topic, cloud);
+  const InertialTrack track(imu.samples, imu.report.rest_rate);
+  Looked looked = look(recording, imu, cloud, stamps, format.format, track);
+  if (looked.cloud.points == 0 || !looked.cloud.has_doppler) {
+    radar.findings.push_back({FindingLevel::kMissing, "radar",
+                              cloud.topic + ": the field " + format.format.doppler + " is zero in every point"});
+    return radar;
+  }
+  // If the ranges say nothing, a radar that looks along another axis and a contrary sign are one fault, not two:
+  // two fields are swapped.
+  const bool mirrored = looked.search.mirrored || (looked.sign.sign == 0 && looked.search.sign == -1);
+  if (correctAxes(looked.cloud, mirrored, &format))
+    looked = look(recording, imu, cloud, stamps, format.format, track);
+  radar.usable = true;
+  radar.search = looked.search;
+  radar.points = looked.cloud.points_50;
+  radar.keys.set("radar_topic", cloud.topic, "");
+  for (const ProposedKey& key : format.keys.all()) radar.keys.set(key.key, key.values.front(), key.why);
+  for (const ProposedKey& key : stamps.keys.all()) radar.keys.set(key.key, key.values.front(), key.why);
+  limitsOfCloud(looked.cloud, &radar.keys);
+  describeCloud(looked, format, timing, &radar);
+  for (const std::string& odd : stamps.odd) radar.findings.push_back({FindingLevel::kOdd, "stamps", odd});
+  if (stamps.odd.empty()) radar.findings.push_back({FindingLevel::kOk, "stamps", stamps.text});
+  describeSign(looked, format, &radar);
+  describeMounting(looked.search, &radar);
+  return radar;
+}
+
+}  // namespace rio_t

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "inspect_format.h"
+#include "inspect_recording.h"
+#include "inspect_stamps.h"
+#include "rio_t/inspection/imu_report.h"
+#include "rio_t/inspection/mounting_search.h"
+#include "rio_t/ros/bag/check_bag.h"
+
+namespace rio_t {
+
+/// The IMU of a recording, ready to be compared with radars.
+struct ImuInspection {
+  const ImuTopic* topic = nullptr;
+  ImuReport report;
+  std::vector<ImuMeasurement> samples;  ///< in m/s^2 and rad/s, stamps rising
+  std::vector<Finding> findings;
+  ProposedKeys keys;
+  std::string to_do;  ///< what to do if it cannot be used; empty: it can
+};
+ImuInspection inspectImuTopic(const ImuTopic& topic);
+
+/// A radar of a recording.
+struct RadarInspection {
+  std::string topic;
+  std::vector<Finding> findings;
+  ProposedKeys keys;
+  bool usable = false;
+  MountingSearch search;
+  double points = 0.0;  ///< of the median scan
+
+  /// Velocities of so few points are biased: the coarse mounting may be off by 20 degrees, whatever its sigma.
+  bool isSparse() const { return points < 15.0; }
+};
+RadarInspection inspectRadar(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud);
+
+/// "12.3", and "+-" as "±" is not on every terminal.
+std::string decimalText(double value, int decimals);
+
+}  // namespace rio_t

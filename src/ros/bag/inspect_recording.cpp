@@ -1,0 +1,69 @@
+#include "inspect_recording.h"
+
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+#include <sensor_msgs/Imu.h>
+#include <tf2_eigen/tf2_eigen.h>
+
+#include <algorithm>
+
+#include "bag_file.h"
+#include "rio_t/ros/messages/conversions.h"
+
+namespace rio_t {
+namespace {
+
+template <typename Topic>
+Topic& topicOf(const std::string& name, std::vector<Topic>* topics) {
+  const auto found =
+      std::find_if(topics->begin(), topics->end(), [&](const Topic& each) { return each.topic == name; });
+  if (found != topics->end()) return *found;
+  topics->emplace_back().topic = name;
+  return topics->back();
+}
+
+void addImu(const sensor_msgs::Imu& message, Time record, ImuTopic* topic) {
+  ImuMeasurement imu;
+  imu.time = toTime(message.header.stamp);
+  tf2::fromMsg(message.angular_velocity, imu.angular_velocity);
+  tf2::fromMsg(message.linear_acceleration, imu.acceleration);
+  topic->written.push_back(imu);
+  topic->times.push_back({imu.time, record});
+}
+
+}  // namespace
+
+Recording readRecording(const std::string& path, double duration) {
+  Recording recording;
+  recording.bag = path;
+  rosbag::Bag bag;
+  openBag(path, &bag);
+  recording.types = topicTypes(bag);
+  rosbag::View all(bag);
+  if (all.size() == 0) throw bagError(path, "it holds no messages");
+  recording.length = (all.getEndTime() - all.getBeginTime()).toSec();
+  recording.read = duration > 0.0 ? std::min(duration, recording.length) : recording.length;
+  const ros::Time end =
+      recording.read < recording.length ? all.getBeginTime() + ros::Duration(recording.read) : all.getEndTime();
+  const std::vector<std::string> types = {"sensor_msgs/Imu", "sensor_msgs/PointCloud2", "std_msgs/Header"};
+  rosbag::View view(bag, rosbag::TypeQuery(types), all.getBeginTime(), end);
+  for (const rosbag::MessageInstance& instance : view) {
+    const Time record = toTime(instance.getTime());
+    const std::string& type = instance.getDataType();
+    const std::string& name = instance.getTopic();
+    if (type == types[0]) {
+      addImu(*rio_t::read<sensor_msgs::Imu>(instance), record, &topicOf(name, &recording.imus));
+    } else if (type == types[1]) {
+      CloudTopic& topic = topicOf(name, &recording.clouds);
+      topic.messages.push_back(rio_t::read<sensor_msgs::PointCloud2>(instance));
+      topic.times.push_back({toTime(topic.messages.back()->header.stamp), record});
+    } else {
+      HeaderTopic& topic = topicOf(name, &recording.headers);
+      topic.messages.push_back(*rio_t::read<std_msgs::Header>(instance));
+      topic.times.push_back({toTime(topic.messages.back().stamp), record});
+    }
+  }
+  return recording;
+}
+
+}  // namespace rio_t

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <sensor_msgs/PointCloud2.h>
+#include <std_msgs/Header.h>
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "rio_t/imu/measurement.h"
+#include "rio_t/inspection/stream_timing.h"
+
+/// What an inspection reads from a bag: every topic that may serve.
+namespace rio_t {
+
+struct ImuTopic {
+  std::string topic;
+  std::vector<ImuMeasurement> written;  ///< in the units of the driver; those with a stamp of zero, too
+  std::vector<MessageTimes> times;
+};
+
+struct CloudTopic {
+  std::string topic;
+  std::vector<sensor_msgs::PointCloud2::ConstPtr> messages;
+  std::vector<MessageTimes> times;
+};
+
+struct HeaderTopic {
+  std::string topic;
+  std::vector<std_msgs::Header> messages;
+  std::vector<MessageTimes> times;
+};
+
+struct Recording {
+  std::string bag;
+  std::map<std::string, std::string> types;  ///< of all topics
+  double length = 0.0;                       ///< [s] of the bag
+  double read = 0.0;                         ///< [s] of it that was read
+  std::vector<ImuTopic> imus;
+  std::vector<CloudTopic> clouds;
+  std::vector<HeaderTopic> headers;
+};
+
+/// Reads at most `duration` [s] of a bag; 0: all. Throws std::runtime_error that names the bag.
+Recording readRecording(const std::string& bag, double duration);
+
+}  // namespace rio_t

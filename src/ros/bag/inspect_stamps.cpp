@@ -1,0 +1,143 @@
+#include "inspect_stamps.h"
+
+#include <algorithm>
+#include <boost/algorithm/string.hpp>
+#include <cmath>
+#include <exception>
+#include <set>
+
+#include "rio_t/ros/bag/run_output.h"
+
+namespace rio_t {
+namespace {
+
+constexpr double kLargestDelay = 1.0;  // [s] of a scan, in the IMU's clock: more, and the clocks differ
+constexpr double kAhead = 0.02;        // [s] before its stamp that a scan may arrive: clocks that agree differ less
+
+std::string milliseconds(double seconds) {
+  std::string text;
+  appendFixed(&text, 1e3 * seconds, 0);
+  return text + " ms";
+}
+
+std::string secondsText(double seconds) {
+  std::string text;
+  appendFixed(&text, seconds, 1);
+  return text + " s";
+}
+
+std::size_t sharedWords(const std::string& a, const std::string& b) {
+  const auto words = [](const std::string& topic) {
+    std::vector<std::string> parts;
+    boost::algorithm::split(parts, topic, boost::algorithm::is_any_of("/_"));
+    return std::set<std::string>(parts.begin(), parts.end());
+  };
+  const std::set<std::string> of_a = words(a), of_b = words(b);
+  return static_cast<std::size_t>(
+      std::count_if(of_a.begin(), of_a.end(), [&](const std::string& word) { return of_b.count(word) != 0; }));
+}
+
+/// The header topic that stamps most of the scans, if it stamps eight in ten.
+const HeaderTopic* triggerOf(const Recording& recording, const ImuTopic& imu, const CloudTopic& cloud) {
+  const HeaderTopic* best = nullptr;
+  std::size_t most = 0, shared = 0;
+  const std::vector<RadarScan> empty(cloud.messages.size());
+  for (const HeaderTopic& topic : recording.headers) {
+    if (10 * topic.messages.size() < 8 * cloud.messages.size()) continue;
+    const StreamTiming timing = inspectTiming(topic.times);
+    if (!timing.stampsAreUsable()) continue;
+    const StreamDelay delay = delayAgainstImu(topic.times, imu.times);
+    if (std::abs(delay.median) > kLargestDelay) continue;
+    StampProposal stamps;
+    stamps.source = StampSource::kTrigger;
+    stamps.trigger_topic = topic.topic;
+    const std::size_t stamped = stampScans(recording, imu, cloud, stamps, empty).size();
+    const std::size_t words = sharedWords(topic.topic, cloud.topic);
+    if (10 * stamped < 8 * cloud.messages.size()) continue;
+    if (best != nullptr && (words < shared || (words == shared && stamped <= most))) continue;
+    best = &topic;
+    most = stamped;
+    shared = words;
+  }
+  return best;
+}
+
+}  // namespace
+
+StampProposal proposeStamps(const Recording& recording, const ImuTopic& imu, const CloudTopic& cloud) {
+  StampProposal proposal;
+  const StreamTiming timing = inspectTiming(cloud.times);
+  const StreamDelay delay = delayAgainstImu(cloud.times, imu.times);
+  std::string fault;
+  if (timing.zero == timing.messages) {
+    fault = "the stamps in its headers are zero";
+  } else if (timing.zero > 0) {
+    fault = std::to_string(timing.zero) + " of its " + std::to_string(timing.messages) + " stamps are zero";
+  } else if (timing.constant) {
+    fault = "the stamps in its headers are all the same";
+  } else if (!timing.stampsAreUsable()) {
+    fault = std::to_string(timing.backwards) + " of its stamps run back";
+  } else if (std::abs(delay.median) > kLargestDelay) {
+    fault = "its stamps are on another clock than those of the IMU: " + secondsText(std::abs(delay.median)) +
+            (delay.median > 0.0 ? " behind" : " ahead");
+  }
+  if (fault.empty()) {
+    proposal.text = "stamps in the header; scans arrive " + milliseconds(delay.median) + " after them (90 %: " +
+                    milliseconds(delay.most) + "), jitter " + milliseconds(timing.jitter);
+    if (delay.median < -kAhead)
+      proposal.odd.push_back("the scans are stamped " + milliseconds(-delay.median) +
+                             " ahead of their arrival; the offset estimate covers up to 250 ms");
+    return proposal;
+  }
+  if (const HeaderTopic* trigger = triggerOf(recording, imu, cloud)) {
+    proposal.source = StampSource::kTrigger;
+    proposal.trigger_topic = trigger->topic;
+    proposal.keys.set("stamp_source", "trigger", "By itself " + fault + ".");
+    proposal.keys.set("trigger_topic", trigger->topic, "");
+    proposal.text = "stamps of the trigger " + trigger->topic;
+    proposal.odd.push_back(fault + "; stamp_source: trigger takes those of " + trigger->topic);
+  } else {
+    proposal.source = StampSource::kArrival;
+    proposal.keys.set("stamp_source", "arrival",
+                      "By itself " + fault + ". The delay is part of the time offset, which is estimated.");
+    proposal.text = "stamps from the arrival";
+    proposal.odd.push_back(fault + "; stamp_source: arrival is used, and the delay is estimated as the time offset");
+  }
+  return proposal;
+}
+
+std::vector<RadarScan> stampScans(const Recording& recording, const ImuTopic& imu, const CloudTopic& cloud,
+                                  const StampProposal& stamps, const std::vector<RadarScan>& scans) {
+  StampingOptions options;
+  options.source = stamps.source;
+  options.radar_topic = cloud.topic;
+  options.trigger_topic = stamps.trigger_topic;
+  ScanStamper stamper(options);
+  const HeaderTopic* trigger = nullptr;
+  for (const HeaderTopic& topic : recording.headers) {
+    if (stamps.source == StampSource::kTrigger && topic.topic == stamps.trigger_topic) trigger = &topic;
+  }
+  std::vector<RadarScan> stamped;
+  std::size_t next_imu = 0, next_trigger = 0;
+  for (std::size_t k = 0; k < scans.size(); ++k) {
+    const Time record = cloud.times[k].record;
+    for (; next_imu < imu.times.size() && imu.times[next_imu].record <= record; ++next_imu)
+      stamper.addImu(imu.times[next_imu].stamp, imu.times[next_imu].record);
+    for (; trigger != nullptr && next_trigger < trigger->messages.size() &&
+           trigger->times[next_trigger].record <= record;
+         ++next_trigger) {
+      const MessageTimes& times = trigger->times[next_trigger];
+      stamper.addTrigger(trigger->messages[next_trigger].seq, times.stamp, times.record);
+    }
+    try {
+      stamper.addScan(cloud.messages[k]->header.seq, cloud.times[k].stamp, record, scans[k]);
+    } catch (const std::exception&) {
+      continue;  // a stamp of zero among good ones
+    }
+    for (RadarScan& scan : stamper.take()) stamped.push_back(std::move(scan));
+  }
+  for (RadarScan& scan : stamper.finish()) stamped.push_back(std::move(scan));
+  return stamped;
+}
+
+}  // namespace rio_t

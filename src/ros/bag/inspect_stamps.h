@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "inspect_keys.h"
+#include "inspect_recording.h"
+#include "rio_t/radar/scan.h"
+#include "rio_t/ros/cloud/stamping.h"
+
+namespace rio_t {
+
+/// Where the stamps of a radar come from, and the scans with them.
+struct StampProposal {
+  ProposedKeys keys;
+  StampSource source = StampSource::kHeader;
+  std::string trigger_topic;
+  std::string text;               ///< what the stamps are like, as one phrase
+  std::vector<std::string> odd;   ///< sentences
+};
+
+/// Chooses stamp_source for a cloud. The stamps of the IMU must be usable.
+StampProposal proposeStamps(const Recording& recording, const ImuTopic& imu, const CloudTopic& cloud);
+
+/// Stamps scans as the programs would. `scans`: one for each message of the topic.
+std::vector<RadarScan> stampScans(const Recording& recording, const ImuTopic& imu, const CloudTopic& cloud,
+                                  const StampProposal& stamps, const std::vector<RadarScan>& scans);
+
+}  // namespace rio_t

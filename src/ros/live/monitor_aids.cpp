@@ -1,0 +1,97 @@
+// What LiveMonitor says of barometer and ground vehicle.
+#include <diagnostic_msgs/DiagnosticStatus.h>
+
+#include <cmath>
+#include <string>
+
+#include "rio_t/ros/live/monitor.h"
+
+namespace rio_t {
+
+using diagnostic_msgs::DiagnosticStatus;
+
+void LiveMonitor::pressure() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ++barometer_.messages.count;
+}
+
+void LiveMonitor::pressureDropped(const std::string& why) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ++barometer_.not_usable;
+  barometer_.why_not_usable = why;
+}
+
+void LiveMonitor::accountAids(const ScanResult& result) {
+  for (const BarometerAnswer& mean : result.barometer) {
+    barometer_.last = mean;
+    if (!mean.rejected_because.empty()) {
+      ++barometer_.rejected[mean.rejected_because];
+    } else {
+      ++barometer_.used;
+      barometer_.steps += mean.stepped ? 1 : 0;
+    }
+  }
+  if (!result.ground_vehicle) return;
+  vehicle_.last = *result.ground_vehicle;
+  ++(vehicle_.last->used ? vehicle_.used : vehicle_.left_out);
+}
+
+void LiveMonitor::describeBarometer(Status& status) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const Clock::time_point now = Clock::now();
+  const double seconds = std::max(1e-3, std::chrono::duration<double>(now - barometer_.told).count());
+  const std::uint64_t fresh = barometer_.messages.count - barometer_.messages.told;
+  const std::uint64_t fresh_used = barometer_.used - barometer_.used_told;
+  barometer_.told = now;
+  barometer_.messages.told = barometer_.messages.count;
+  barometer_.used_told = barometer_.used;
+  status.add("pressure_rate_hz", static_cast<double>(fresh) / seconds);
+  status.add("pressures", barometer_.messages.count);
+  status.add("pressures_not_usable", barometer_.not_usable);
+  status.add("means_used", barometer_.used);
+  for (const auto& [reason, count] : barometer_.rejected) status.add("means_rejected_" + reason, count);
+  status.add("steps", barometer_.steps);
+  if (barometer_.last) {
+    status.add("height_m", barometer_.last->height);
+    status.add("innovation_m", barometer_.last->innovation);
+    status.add("innovation_sigma_m", barometer_.last->innovation_sigma);
+    status.add("bias_m", barometer_.last->bias);
+    status.add("bias_sigma_m", barometer_.last->bias_sigma);
+  }
+  if (barometer_.messages.count == 0) {
+    status.summary(DiagnosticStatus::WARN, "no pressure yet on " + config_.barometer_topic);
+  } else if (fresh == 0) {
+    status.summary(DiagnosticStatus::WARN, "the barometer is silent, topic " + config_.barometer_topic);
+  } else if (barometer_.not_usable == barometer_.messages.count) {
+    status.summary(DiagnosticStatus::WARN, "no pressure can be used: " + barometer_.why_not_usable);
+  } else if (fresh_used == 0 && barometer_.last && !barometer_.last->rejected_because.empty()) {
+    status.summary(DiagnosticStatus::WARN,
+                   "no pressure is used now, rejected as " + barometer_.last->rejected_because);
+  } else {
+    status.summary(DiagnosticStatus::OK, barometer_.used > 0 ? "in use" : "pressures are coming");
+  }
+}
+
+void LiveMonitor::describeGroundVehicle(Status& status) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  status.add("terms_used", vehicle_.used);
+  status.add("terms_left_out", vehicle_.left_out);
+  if (!vehicle_.last) {
+    status.summary(DiagnosticStatus::OK, "no motion judged yet");
+    return;
+  }
+  const GroundVehicleAnswer& last = *vehicle_.last;
+  status.add("velocity_sideways_m_s", last.v_V.y());
+  status.add("velocity_upwards_m_s", last.v_V.z());
+  if (last.contradiction) status.add("contradiction", *last.contradiction);
+  const Eigen::Vector4d q = last.q_IV.coeffs();
+  status.add("vehicle_frame_rotation_xyzw", "[" + std::to_string(q[0]) + ", " + std::to_string(q[1]) + ", " +
+                                                std::to_string(q[2]) + ", " + std::to_string(q[3]) + "]");
+  if (last.is_contradicted) {
+    status.summary(DiagnosticStatus::WARN, kGroundVehicleContradicted);
+  } else {
+    status.summary(DiagnosticStatus::OK, "the motion agrees");
+  }
+}
+
+}  // namespace rio_t

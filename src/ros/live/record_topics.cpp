@@ -1,0 +1,59 @@
+#include "record_topics.h"
+
+#include <ros/callback_queue.h>
+#include <ros/master.h>
+#include <ros/ros.h>
+#include <rosbag/bag.h>
+#include <topic_tools/shape_shifter.h>
+
+#include <cstdint>
+#include <map>
+#include <set>
+#include <stdexcept>
+
+namespace rio_t {
+namespace {
+
+using Event = ros::MessageEvent<topic_tools::ShapeShifter const>;
+
+bool isWanted(const std::string& type) {
+  static const std::set<std::string> wanted = {"sensor_msgs/Imu", "sensor_msgs/PointCloud2", "std_msgs/Header"};
+  return wanted.count(type) != 0;
+}
+
+}  // namespace
+
+std::size_t recordTopics(const std::string& path, double duration) {
+  if (!ros::master::check())
+    throw std::runtime_error("--live: there is no ROS master at " + ros::master::getURI());
+  ros::NodeHandle node;
+  rosbag::Bag bag(path, rosbag::bagmode::Write);
+  std::map<std::string, ros::Subscriber> subscribers;
+  std::size_t messages = 0;
+  const auto subscribe = [&](const std::string& topic) {
+    const boost::function<void(const Event&)> record = [&, topic](const Event& event) {
+      bag.write(topic, event.getReceiptTime(), event.getConstMessage());
+      ++messages;
+    };
+    constexpr std::uint32_t kQueue = 5000;
+    subscribers[topic] = node.subscribe<topic_tools::ShapeShifter>(topic, kQueue, record);
+  };
+  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(duration);
+  ros::WallTime look_again;
+  while (ros::ok() && ros::WallTime::now() < end) {
+    if (ros::WallTime::now() > look_again) {  // a driver may start later
+      ros::master::V_TopicInfo topics;
+      ros::master::getTopics(topics);
+      for (const ros::master::TopicInfo& topic : topics) {
+        if (isWanted(topic.datatype) && subscribers.count(topic.name) == 0) subscribe(topic.name);
+      }
+      look_again = ros::WallTime::now() + ros::WallDuration(1.0);
+    }
+    ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.1));
+  }
+  subscribers.clear();
+  bag.close();
+  return messages;
+}
+
+}  // namespace rio_t

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "rio_t/ros/parameters/parameters.h"
+
+/// The rotation of T_IR can be told in three ways: as a quaternion of RIO's axes, as one of the cloud's axes, or
+/// in words. One way counts.
+namespace rio_t {
+
+/// Call it before the entries of a level are set: the top level, or the section of a radar (`section`: "left/").
+/// What a section tells replaces what the top level told in another way. Two ways in one level are a fault.
+void beginMounting(const ParameterEntries& entries, const std::string& section, Config* config,
+                   std::vector<std::string>* faults);
+
+/// Call it once all entries are set: what was told becomes odometry.T_IR.
+void resolveMounting(Config* config);
+
+}  // namespace rio_t

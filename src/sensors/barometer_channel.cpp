@@ -1,0 +1,185 @@
+#include "rio_t/sensors/barometer_channel.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include "rio_t/factors/barometer_factor.h"
+#include "rio_t/graph/marginalization.h"
+
+namespace rio_t {
+namespace {
+
+constexpr double kLapseRate = 6.5e-3;         // [K/m] ISO 2533
+constexpr double kGasConstant = 287.05287;    // [J/(kg K)] of dry air, ISO 2533
+constexpr double kStandardGravity = 9.80665;  // [m/s^2]
+constexpr double kFreezing = 273.15;          // [K]
+/// [Pa] No place where people are has less or more: 9 km up, and 1 km below the sea.
+constexpr double kLeastPressure = 30e3;
+constexpr double kMostPressure = 115e3;
+/// [s] of samples in a mean. Shorter ones cost terms and tell no more: the noise is white.
+constexpr double kMeanSpan = 0.1;
+/// [s] A node as near as this stands for a mean: at 1 m/s^2 the height then deviates by 5 mm.
+constexpr double kNear = 0.1;
+/// [s] of rest before the start: the shortest rest that a start makes do with.
+constexpr double kBeforeStart = 1.0;
+/// [s] of samples that are kept for a start, which may lie a window of motion back.
+constexpr double kRecent = 12.0;
+/// [s] A sample stamped further ahead of the IMU is nonsense, not early.
+constexpr double kMaxAhead = 1.0;
+/// [m] of a bias that nothing is known of.
+constexpr double kUnknownBias = 100.0;
+/// Means that wait for a node: a minute of silence of the radars.
+constexpr std::size_t kMaxWaiting = 600;
+
+}  // namespace
+
+double heightOfPressure(double pascal, double reference_pascal, double temperature) {
+  constexpr double kExponent = kGasConstant * kLapseRate / kStandardGravity;
+  return (temperature + kFreezing) / kLapseRate * (1.0 - std::pow(pascal / reference_pascal, kExponent));
+}
+
+std::string faultOf(double pascal) {
+  if (pascal >= kLeastPressure && pascal <= kMostPressure) return "";
+  char text[200];
+  const bool is_hectopascal = pascal >= 0.01 * kLeastPressure && pascal <= 0.01 * kMostPressure;
+  std::snprintf(text, sizeof text, "the pressure is %g, expected %g to %g Pa%s", pascal, kLeastPressure,
+                kMostPressure, is_hectopascal ? ": is it in hPa? 1 hPa is 100 Pa" : "");
+  return text;
+}
+
+const char* BarometerChannel::add(const Pressure& pressure, Time newest_imu) {
+  if (!faultOf(pressure.pascal).empty()) return "pressure_not_usable";
+  if (pressure.time - newest_imu > kMaxAhead) return "pressure_ahead_of_imu";
+  if (newest_ && pressure.time <= *newest_) return "pressure_out_of_order";
+  if (!reference_) reference_ = pressure.pascal;
+  const double height = heightOfPressure(pressure.pascal, *reference_, options_.temperature);
+  const double since = newest_ ? pressure.time - *newest_ : 0.0;
+  // After a sample that is missing the gap does not make the next one better.
+  const double span = spacing_ > 0.0 ? std::min(since, spacing_) : since;
+  newest_ = pressure.time;
+  spacing_ = since;
+  noise_.add(pressure.time, Eigen::Vector3d(height, 0.0, 0.0));
+  if (span == 0.0) return nullptr;  // the first one tells no rate
+  recent_.push_back({pressure.time, height, span});
+  while (pressure.time - recent_.front().time > kRecent) recent_.pop_front();
+  return bias_ ? collect(recent_.back()) : nullptr;
+}
+
+const char* BarometerChannel::collect(const Sample& sample) {
+  add(sample, open_);
+  if (open_.span < kMeanSpan) return nullptr;
+  waiting_.push_back(std::exchange(open_, Mean()));
+  if (waiting_.size() <= kMaxWaiting) return nullptr;
+  waiting_.pop_front();
+  return "pressure_without_node";
+}
+
+void BarometerChannel::add(const Sample& sample, Mean& mean) {
+  if (mean.count == 0) mean.first = sample.time;
+  mean.time_sum += sample.time - mean.first;
+  mean.height_sum += sample.height;
+  mean.span += sample.span;
+  ++mean.count;
+}
+
+double BarometerChannel::variance(const Mean& mean) const {
+  const double told = options_.noise_density * options_.noise_density;
+  return std::max(told, noise_.squaredDensity()) / mean.span;
+}
+
+void BarometerChannel::addBias(FixedLagSmoother& smoother, double bias) {
+  Window& window = smoother.window();
+  if (bias_ && window.has(*bias_)) bias_->is_retired = true;
+  bias_ = window.addCalibration(std::make_shared<ScalarManifold>(), Eigen::VectorXd::Constant(1, bias));
+  addPrior(window, {bias_.get()},
+           {Eigen::MatrixXd::Constant(1, 1, 1.0 / kUnknownBias), Eigen::VectorXd::Zero(1)});
+  smoother.settle();
+  rejected_since_.reset();
+}
+
+void BarometerChannel::join(FixedLagSmoother& smoother, Time time, bool at_rest) {
+  open_ = Mean();
+  waiting_.clear();
+  Mean at_start;
+  for (const Sample& sample : recent_)
+    if (sample.time <= time && time - sample.time <= kBeforeStart) add(sample, at_start);
+  const double height = at_start.count > 0 ? at_start.height() : 0.0;
+  addBias(smoother, height - smoother.newest().x.p_W().z());
+  if (at_start.count > 0 && at_rest) {
+    smoother.window().add(std::make_unique<BarometerFactor>(height, 0.0, std::sqrt(variance(at_start))),
+                          {smoother.nodeAt(time), bias_.get()});
+    smoother.settle();
+  }
+  for (const Sample& sample : recent_)
+    if (sample.time > time) collect(sample);
+}
+
+std::vector<BarometerAnswer> BarometerChannel::use(FixedLagSmoother& smoother) {
+  std::vector<BarometerAnswer> answers;
+  if (!bias_) return answers;
+  while (!waiting_.empty()) {
+    const Mean mean = waiting_.front();
+    if (mean.time() > smoother.newest().time) break;  // a node may still come nearer
+    std::size_t nearest = smoother.size() - 1;
+    const auto distance = [&](std::size_t k) { return std::abs(smoother.node(k).time - mean.time()); };
+    while (nearest > 0 && distance(nearest - 1) < distance(nearest)) --nearest;
+    waiting_.pop_front();
+    if (distance(nearest) <= kNear) {
+      answers.push_back(use(mean, smoother.node(nearest), smoother));
+      continue;
+    }
+    BarometerAnswer late;
+    late.time = mean.time();
+    late.samples = mean.count;
+    late.rejected_because = mean.time() < smoother.node(0).time ? "older_than_window" : "no_node_near";
+    answers.push_back(late);
+  }
+  return answers;
+}
+
+BarometerAnswer BarometerChannel::use(const Mean& mean, const NodeEstimate& node,
+                                      FixedLagSmoother& smoother) {
+  const double delay = mean.time() - node.time;
+  const auto predicted = smoother.predict(node.time, {bias_.get()});
+  const Eigen::MatrixXd& P = predicted->covariance;
+  Eigen::RowVectorXd J = Eigen::RowVectorXd::Zero(P.cols());
+  J[StateBlock::kP + 2] = 1.0;
+  J[StateBlock::kV + 2] = delay;
+  J[StateBlock::kTangent] = 1.0;
+  const double noise = variance(mean);
+  BarometerAnswer answer;
+  answer.time = mean.time();
+  answer.samples = mean.count;
+  answer.bias = bias_->x[0];
+  answer.bias_sigma = std::sqrt(std::max(0.0, P(StateBlock::kTangent, StateBlock::kTangent)));
+  answer.height = mean.height() - answer.bias;
+  answer.innovation = answer.height - (predicted->x.p_W().z() + delay * predicted->x.v_W().z());
+  answer.innovation_sigma = std::sqrt(std::max(0.0, (J * P * J.transpose())(0, 0)) + noise);
+  const bool contradicts =
+      options_.gate > 0.0 && std::abs(answer.innovation) > options_.gate * answer.innovation_sigma;
+  if (!contradicts) {
+    rejected_since_.reset();
+  } else if (!rejected_since_) {
+    rejected_since_ = answer.time;
+  }
+  if (contradicts && answer.time - *rejected_since_ < options_.gate_timeout) {
+    answer.rejected_because = "innovation";
+    return answer;
+  }
+  if (contradicts) {
+    addBias(smoother, answer.bias + answer.innovation);
+    answer.stepped = true;
+  }
+  smoother.window().add(std::make_unique<BarometerFactor>(mean.height(), delay, std::sqrt(noise)),
+                        {smoother.nodeAt(node.time), bias_.get()});
+  return answer;
+}
+
+std::vector<FixedLagSmoother::RandomWalk> BarometerChannel::randomWalks() const {
+  if (!bias_) return {};
+  return {{bias_.get(), Eigen::VectorXd::Constant(1, options_.drift)}};
+}
+
+}  // namespace rio_t

@@ -1,0 +1,104 @@
+// Runs of bags with a barometer, and with the platform told.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "rio_t/ros/bag/bag_runner.h"
+#include "rio_t/ros/bag/simulation_bag.h"
+#include "rio_t/ros/messages/conversions.h"
+#include "rio_t/simulation/motions.h"
+#include "run_files.h"
+#include "temporary_folder.h"
+
+namespace rio_t {
+namespace {
+
+class AidsBag : public testing::Test {
+ protected:
+  void SetUp() override {
+    simulation::MotionRequest request;
+    request.name = "drone";
+    request.seed = 2;
+    request.duration = 25.0;
+    request.rest = {5.0, 0.0, 2.0};
+    const simulation::Motion motion = simulation::makeMotion(request);
+    simulation::SimulationOptions rig;
+    rig.seed = 2;
+    rig.barometer.enabled = true;
+    simulation::SensorData data = simulation::simulate(motion, rig);
+    writeSimulationBag(folder_ + "/pascal.bag", motion, data, rig.start, {});
+    for (simulation::SimulatedPressure& pressure : data.pressures) pressure.pascal *= 0.01;
+    writeSimulationBag(folder_ + "/hectopascal.bag", motion, data, rig.start, {});
+  }
+
+  RunSummary run(const std::string& bag, const ParameterEntries& entries) const {
+    ParameterEntries all = readParameterFile(findConfigFile("irs"));
+    all.insert(all.end(), entries.begin(), entries.end());
+    return runBag({{folder_ + "/" + bag + ".bag"}, folder_ + "/out", makeConfig(all), nullptr});
+  }
+  std::string out(const std::string& name) const { return contents(folder_ + "/out/" + name); }
+
+  TemporaryFolder temporary_;
+  const std::string folder_ = temporary_.path();
+};
+
+ParameterEntries parse(const std::string& key, const std::string& value) {
+  return {parseAssignment(key + "=" + value)};
+}
+
+TEST_F(AidsBag, ABarometerIsReadAndAccountedFor) {
+  const RunSummary summary = run("pascal", parse("barometer_topic", "/sensor_platform/baro"));
+  ASSERT_TRUE(summary.barometer.has_value());
+  EXPECT_EQ(summary.barometer->pressures, 1250u);
+  EXPECT_GT(summary.barometer->used, 180u);  // ten a second after the start
+  EXPECT_TRUE(summary.barometer->rejected.empty());
+  EXPECT_TRUE(summary.warnings.empty());
+  EXPECT_EQ(out("barometer.csv").rfind("stamp,height,innovation,innovation_sigma,bias,", 0), 0u);
+  EXPECT_NE(out("summary.yaml").find("barometer: {pressures: 1250, means_used: "), std::string::npos);
+  EXPECT_NE(out("summary.yaml").find("barometer.csv"), std::string::npos);
+}
+
+TEST_F(AidsBag, WithoutThemNoFileAndNoKeyIsThere) {
+  run("pascal", parse("barometer_topic", "/sensor_platform/baro"));
+  run("pascal", {});
+  EXPECT_FALSE(fs::exists(folder_ + "/out/barometer.csv"));  // that of the run before is gone
+  EXPECT_EQ(out("summary.yaml").find("barometer"), std::string::npos);
+  EXPECT_EQ(out("summary.yaml").find("ground_vehicle"), std::string::npos);
+}
+
+TEST_F(AidsBag, PressuresInHectopascalAreTold) {
+  const RunSummary summary = run("hectopascal", parse("barometer_topic", "/sensor_platform/baro"));
+  EXPECT_EQ(summary.input_faults.at("pressure_not_usable"), 1250u);
+  ASSERT_FALSE(summary.warnings.empty());
+  EXPECT_NE(summary.warnings.front().find("/sensor_platform/baro: fluid_pressure: the pressure is 10"),
+            std::string::npos)
+      << summary.warnings.front();
+  EXPECT_NE(summary.warnings.front().find("is it in hPa?"), std::string::npos);
+  EXPECT_NE(summary.warnings.back().find("barometer_topic"), std::string::npos);
+}
+
+TEST_F(AidsBag, ATopicThatIsNotThereIsAnError) {
+  try {
+    run("pascal", parse("barometer_topic", "/baro"));
+    FAIL() << "expected an error";
+  } catch (const std::exception& error) {
+    EXPECT_NE(std::string(error.what()).find("no topic /baro (barometer_topic, sensor_msgs/FluidPressure)"),
+              std::string::npos)
+        << error.what();
+  }
+}
+
+TEST_F(AidsBag, ADroneThatIsToldToBeAVehicleIsToldSo) {
+  const RunSummary summary = run("pascal", parse("platform", "ground_vehicle"));
+  ASSERT_TRUE(summary.ground_vehicle.has_value());
+  ASSERT_TRUE(summary.ground_vehicle->contradicted_at.has_value());
+  EXPECT_LT(*summary.ground_vehicle->contradicted_at, 10.0);
+  ASSERT_EQ(summary.warnings.size(), 1u);
+  EXPECT_NE(summary.warnings.front().find("the motion contradicted it"), std::string::npos);
+  EXPECT_EQ(summary.input_faults.at("ground_vehicle_contradicted"), 1u);
+  EXPECT_NE(out("summary.yaml").find("contradicted: true"), std::string::npos);
+  EXPECT_NE(out("ground_vehicle.csv").find(",contradicted\n"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace rio_t

@@ -1,0 +1,154 @@
+// The barometer: its factor, its channel, and what it does for the height in the whole pipeline.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "numeric_jacobian.h"
+#include "rio_t/factors/barometer_factor.h"
+#include "rio_t/sensors/barometer_channel.h"
+#include "simulated_run.h"
+#include "synthetic_motion.h"
+
+namespace rio_t {
+namespace {
+
+Time at(double seconds) { return Time::fromSeconds(1000.0 + seconds); }
+
+TEST(BarometerFactor, JacobiansAreCorrectAndTheTruthHasNoResidual) {
+  const StateBlock x = SyntheticMotion().state(1.3);
+  const std::vector<double> state(x.data(), x.data() + StateBlock::kSize);
+  const double height = x.p_W().z() + 0.05 * x.v_W().z() + 2.0;
+  expectJacobiansCorrect(BarometerFactor(height, 0.05, 0.3), {state, {1.5}});
+  const double bias = 2.0;
+  const double* const blocks[2] = {state.data(), &bias};
+  double residual = 1.0;
+  ASSERT_TRUE(BarometerFactor(height, 0.05, 0.3).Evaluate(blocks, &residual, nullptr));
+  EXPECT_NEAR(residual, 0.0, 1e-12);
+}
+
+TEST(Barometer, HeightsAreThoseOfTheStandardAtmosphere) {
+  // ISO 2533, table 5.
+  EXPECT_NEAR(heightOfPressure(89874.6, 101325.0, 15.0), 1000.0, 0.1);
+  EXPECT_NEAR(heightOfPressure(79495.2, 101325.0, 15.0), 2000.0, 0.1);
+  EXPECT_NEAR(heightOfPressure(101325.0, 89874.6, 15.0 - 6.5), -1000.0, 0.1);
+  EXPECT_EQ(heightOfPressure(95000.0, 95000.0, 20.0), 0.0);
+}
+
+TEST(Barometer, WhatIsNoPressureInPascalIsToldAndNotTaken) {
+  EXPECT_EQ(faultOf(101325.0), "");
+  EXPECT_NE(faultOf(1013.25).find("hPa"), std::string::npos);
+  for (const double none : {0.0, -5.0, 1e6, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    EXPECT_NE(faultOf(none), "") << none;
+    BarometerChannel channel{BarometerOptions()};
+    EXPECT_STREQ(channel.add({at(0.0), none}, at(0.0)), "pressure_not_usable");
+  }
+}
+
+TEST(Barometer, SamplesOutOfOrderOrAheadOfTheImuAreNotTaken) {
+  BarometerChannel channel{BarometerOptions()};
+  EXPECT_EQ(channel.add({at(1.0), 101325.0}, at(1.0)), nullptr);
+  EXPECT_STREQ(channel.add({at(1.0), 101325.0}, at(1.1)), "pressure_out_of_order");
+  EXPECT_STREQ(channel.add({at(0.5), 101325.0}, at(1.1)), "pressure_out_of_order");
+  EXPECT_STREQ(channel.add({at(100.0), 101325.0}, at(1.1)), "pressure_ahead_of_imu");
+  EXPECT_EQ(channel.add({at(1.2), 101325.0}, at(1.2)), nullptr);  // that one did not count
+}
+
+struct DroneRun : SimulatedRun {
+  DroneRun(std::uint64_t seed, double duration, bool barometer) : SimulatedRun("drone", seed, duration, 5.0) {
+    setup.barometer.enabled = true;
+    setup.barometer.drift = 0.0;
+    options.use_barometer = barometer;
+  }
+  /// Heights count from the start.
+  double heightError(const NavigationState& state) const {
+    return state.p_W.z() - (truth(state).p_W.z() - motion.at(0.0).p_W.z());
+  }
+  double heightRms(double from, double to) const {
+    return rms(from, to, [this](const NavigationState& state) { return heightError(state); });
+  }
+  /// What came of the means of pressures from `from` to `to` seconds.
+  template <typename Predicate>
+  int count(double from, double to, Predicate&& predicate) const {
+    int count = 0;
+    for (const ScanResult& result : results)
+      for (const BarometerAnswer& mean : result.barometer)
+        count += seconds(mean.time) >= from && seconds(mean.time) <= to && predicate(mean) ? 1 : 0;
+    return count;
+  }
+};
+
+bool isUsed(const BarometerAnswer& mean) { return mean.rejected_because.empty(); }
+bool isShock(const BarometerAnswer& mean) { return mean.rejected_because == "innovation"; }
+bool isStep(const BarometerAnswer& mean) { return mean.stepped; }
+
+TEST(Barometer, HoldsTheHeightOfADrone) {
+  DroneRun without(3, 120.0, false), with(3, 120.0, true);
+  without.run();
+  with.run();
+  EXPECT_GT(with.count(6.0, 119.0, isUsed), 1000);  // ten means a second
+  EXPECT_EQ(with.count(0.0, 120.0, isShock), 0);
+  EXPECT_LT(with.heightRms(60.0, 120.0), 0.15);
+  EXPECT_LT(with.heightRms(60.0, 120.0), without.heightRms(60.0, 120.0));
+}
+
+TEST(Barometer, ShocksOfThePressureDoNoHarm) {
+  DroneRun calm(4, 90.0, true), shocked(4, 90.0, true);
+  // A door, a gust, and a pressure that stays.
+  shocked.setup.barometer.shocks = {{25.0, 0.4, 100.0}, {45.0, 5.0, -100.0}, {65.0, 1e3, 100.0}};
+  calm.run();
+  shocked.run();
+  EXPECT_GE(shocked.count(25.0, 26.0, isShock), 3);
+  EXPECT_EQ(shocked.count(24.0, 27.0, isStep), 0);
+  EXPECT_EQ(shocked.count(44.0, 52.0, isStep), 2);  // it came, and it went
+  EXPECT_EQ(shocked.count(64.0, 90.0, isStep), 1);
+  EXPECT_LT(shocked.heightRms(20.0, 90.0), calm.heightRms(20.0, 90.0) + 0.2);
+  EXPECT_LT(std::abs(shocked.heightError(shocked.states.back())),
+            std::abs(calm.heightError(calm.states.back())) + 0.2);
+}
+
+TEST(Barometer, TheSigmaOfTheHeightIsWhatItsErrorsAre) {
+  double nees = 0.0, count = 0.0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    DroneRun run(seed, 60.0, true);
+    run.setup.barometer.drift = 0.06;  // Pa, 5 mm: that of the options
+    run.run();
+    for (const ScanResult& result : run.results) {
+      if (!result.updated || run.seconds(result.state.time) < 10.0) continue;
+      const double error = run.heightError(result.state);
+      nees += error * error / result.state.covariance(StateBlock::kP + 2, StateBlock::kP + 2);
+      count += 1.0;
+    }
+  }
+  std::printf("height with a barometer: %.2f\n", nees / count);
+  // A walk of the bias is about one sample a run: six of them scatter by 0.6.
+  EXPECT_GT(nees / count, 0.4);
+  EXPECT_LT(nees / count, 2.2);
+}
+
+TEST(Barometer, OneThatFallsSilentOrComesLateChangesNothingElse) {
+  DroneRun run(5, 40.0, true);
+  run.run([&](simulation::SensorData& data) {
+    for (simulation::SimulatedPressure& pressure : data.pressures)
+      if (run.seconds(pressure.stamp) > 20.0 && run.seconds(pressure.stamp) < 30.0) pressure.pascal = 0.0;
+  });
+  EXPECT_EQ(run.odometry->faults().at("pressure_not_usable"), 500u);
+  EXPECT_EQ(run.odometry->health(), Health::kOk);
+  EXPECT_GT(run.count(31.0, 40.0, isUsed), 70);
+  EXPECT_LT(run.heightRms(30.0, 40.0), 0.3);
+}
+
+TEST(Barometer, OffItTakesNothing) {
+  DroneRun without(1, 30.0, false);
+  without.run();
+  SimulatedRun never("drone", 1, 30.0, 5.0);
+  never.run();
+  ASSERT_EQ(without.states.size(), never.states.size());
+  EXPECT_EQ(without.states.back().p_W, never.states.back().p_W);
+  EXPECT_EQ(without.count(0.0, 30.0, [](const BarometerAnswer&) { return true; }), 0);
+}
+
+}  // namespace
+}  // namespace rio_t

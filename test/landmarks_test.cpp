@@ -1,0 +1,223 @@
+// Landmarks: the factor, what may become one, and the whole pipeline with them.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <random>
+
+#include "numeric_jacobian.h"
+#include "rio_t/core/so3.h"
+#include "rio_t/landmarks/candidates.h"
+#include "simulated_run.h"
+
+namespace rio_t {
+namespace {
+
+const Eigen::Vector3d g_W(0.0, 0.0, -9.81);
+
+StateBlock someState() {
+  StateBlock x;
+  x.q_WI() = so3::exp({0.3, -0.2, 1.1});
+  x.p_W() = Eigen::Vector3d(1.0, -2.0, 0.5);
+  x.v_W() = Eigen::Vector3d(0.7, 0.4, -0.1);
+  return x;
+}
+Extrinsics someMounting() { return {{0.05, -0.1, 0.2}, so3::exp({-0.4, 0.2, 0.9})}; }
+
+ImuDelta someDelta(double dt) {
+  ImuDelta delta;
+  delta.step(dt, {0.5, -1.0, 0.8}, {1.0, 2.0, 9.0});
+  return delta;
+}
+
+PolarMeasurement polar(const Eigen::Vector3d& p_R) { return {p_R, 0.05, 0.04, 0.08}; }
+
+std::vector<double> numbers(const Eigen::Vector3d& p) { return {p.x(), p.y(), p.z()}; }
+std::vector<double> numbers(const StateBlock& x) { return {x.data(), x.data() + StateBlock::kSize}; }
+std::vector<double> numbers(const Extrinsics& T_IR) {
+  const Eigen::VectorXd x = stored(T_IR);
+  return {x.data(), x.data() + x.size()};
+}
+
+TEST(LandmarkFactor, JacobiansAreExact) {
+  for (const double dt : {0.0, 0.004, -0.05}) {
+    const LandmarkFactor factor(polar({1.0, 5.0, -0.7}), someDelta(dt), g_W);
+    expectJacobiansCorrect(factor, {numbers(someState()), numbers(someMounting()), numbers({4.0, 2.0, 1.5})});
+  }
+}
+
+TEST(LandmarkFactor, IsZeroWhereThePointIs) {
+  const StateBlock x = someState();
+  const Extrinsics T_IR = someMounting();
+  const Eigen::Vector3d p_R(1.0, 5.0, -0.7);
+  const Eigen::Vector3d p_W = x.p_W() + x.q_WI() * (T_IR.l_I + T_IR.q_IR * p_R);
+  const LandmarkFactor factor(polar(p_R), ImuDelta(), g_W);
+  const std::vector<double> state = numbers(x), mounting = numbers(T_IR), point = numbers(p_W);
+  const double* const parameters[] = {state.data(), mounting.data(), point.data()};
+  Eigen::Vector3d r;
+  ASSERT_TRUE(factor.Evaluate(parameters, r.data(), nullptr));
+  EXPECT_LT(r.norm(), 1e-9);
+}
+
+/// One sigma of range, azimuth and elevation is a residual of one.
+TEST(LandmarkFactor, TheNoiseIsInPolarForm) {
+  const double range = 6.0, az = 0.4, el = -0.5;
+  const auto at = [](double r, double a, double e) {
+    return Eigen::Vector3d(r * std::cos(e) * std::sin(a), r * std::cos(e) * std::cos(a), r * std::sin(e));
+  };
+  const PolarNoise noise(polar(at(range, az, el)));
+  EXPECT_NEAR((noise.at(at(range + 0.05, az, el)).value - Eigen::Vector3d::UnitX()).norm(), 0.0, 1e-9);
+  EXPECT_NEAR((noise.at(at(range, az + 0.04, el)).value - Eigen::Vector3d::UnitY()).norm(), 0.0, 0.02);
+  EXPECT_NEAR((noise.at(at(range, az, el + 0.08)).value - Eigen::Vector3d::UnitZ()).norm(), 0.0, 0.02);
+  const Eigen::Matrix3d J = noise.at(at(range, az, el)).J;
+  EXPECT_NEAR((J * noise.covariance() * J.transpose() - Eigen::Matrix3d::Identity()).norm(), 0.0, 1e-9);
+}
+
+/// Detections from a radar that goes sideways, `way` [m] in 30 scans.
+class CandidatesTest : public ::testing::Test {
+ protected:
+  PlacedDetection seen(double share, double way, const Eigen::Vector3d& p_W) {
+    PlacedDetection detection;
+    const Time time = Time::fromNanoseconds(1'000'000'000) + 3.0 * share;
+    detection.radar_W = Eigen::Vector3d(share * way, 0.0, 0.0);
+    detection.covariance = Eigen::Vector3d(0.2 * 0.2, 0.05 * 0.05, 0.3 * 0.3).asDiagonal();
+    detection.p_W = p_W + Eigen::Vector3d(0.2 * gauss_(random_), 0.05 * gauss_(random_), 0.3 * gauss_(random_));
+    detection.snr_db = 20.0;
+    detection.time = time;
+    detection.sighting.node_time = time;
+    return detection;
+  }
+  static constexpr int kScans = 30;
+  std::mt19937 random_{7};
+  std::normal_distribution<double> gauss_;
+  Candidates candidates_;
+};
+
+TEST_F(CandidatesTest, AStaticPointIsProvenOnceTheRadarHasMoved) {
+  for (int i = 0; i < kScans; ++i) candidates_.add({seen(i / 30.0, 0.1, {0.0, 5.0, 0.0})});
+  EXPECT_TRUE(candidates_.takeProven({}, 10).empty()) << "0.1 m do not tell a point from a highlight";
+  for (int i = 0; i < kScans; ++i) candidates_.add({seen(i / 30.0, 2.0, {0.0, 5.0, 0.0})});
+  const std::vector<Candidate> proven = candidates_.takeProven({}, 10);
+  ASSERT_EQ(proven.size(), 1u);
+  EXPECT_LT((proven[0].position() - Eigen::Vector3d(0.0, 5.0, 0.0)).norm(), 0.2);
+  EXPECT_EQ(candidates_.size(), 0u);
+}
+
+TEST_F(CandidatesTest, AHighlightThatSlidesAlongIsNeverProven) {
+  for (int i = 0; i < kScans; ++i) {
+    candidates_.add({seen(i / 30.0, 1.0, {i / 30.0, 5.0, 0.0})});
+    EXPECT_TRUE(candidates_.takeProven({}, 10).empty());
+  }
+}
+
+TEST_F(CandidatesTest, TwoThingsThatCannotBeToldApartAreNotProven) {
+  for (int i = 0; i < kScans; ++i)
+    candidates_.add({seen(i / 30.0, 2.0, {0.0, 5.0, 0.0}), seen(i / 30.0, 2.0, {0.6, 5.05, 0.4})});
+  EXPECT_TRUE(candidates_.takeProven({}, 10).empty());
+}
+
+TEST_F(CandidatesTest, NothingBecomesALandmarkBesideAnother) {
+  for (int i = 0; i < kScans; ++i) candidates_.add({seen(i / 30.0, 2.0, {0.0, 5.0, 0.0})});
+  EXPECT_TRUE(candidates_.takeProven({{0.3, 5.0, 0.0}}, 10).empty());
+  EXPECT_EQ(candidates_.takeProven({{3.0, 5.0, 0.0}}, 10).size(), 1u);
+}
+
+TEST_F(CandidatesTest, GhostsFillABoundedListAndProveNothing) {
+  std::uniform_real_distribution<double> anywhere(-10.0, 10.0);
+  for (int i = 0; i < 300; ++i) {
+    std::vector<PlacedDetection> ghosts;
+    for (int k = 0; k < 40; ++k)
+      ghosts.push_back(seen(i / 30.0, 1.0, {anywhere(random_), anywhere(random_), anywhere(random_)}));
+    candidates_.add(ghosts);
+    candidates_.forgetOld(ghosts.front().time, ghosts.front().time);
+    EXPECT_LE(candidates_.size(), Candidates::kMax);
+    EXPECT_TRUE(candidates_.takeProven({}, 10).empty());
+  }
+}
+
+struct Outcome {
+  double rms = 0.0, nees = 0.0, matched = 0.0;
+  std::size_t dropped = 0, largest_map = 0;
+};
+
+/// Errors of position in the frame of the start, from `from` seconds on.
+Outcome outcomeOf(const SimulatedRun& run, double from) {
+  Outcome outcome;
+  double count = 0.0;
+  const simulation::MotionState origin = run.motion.at(0.0);
+  std::optional<Eigen::Quaterniond> turn;  // of the truth into W: the estimate begins level, with yaw zero
+  for (const ScanResult& result : run.results) {
+    if (result.landmarks) {
+      outcome.matched += static_cast<double>(result.landmarks->matched);
+      outcome.dropped += result.landmarks->dropped_map ? 1 : 0;
+      outcome.largest_map = std::max(outcome.largest_map, result.landmarks->map.size());
+    }
+    if (!result.updated) continue;
+    const NavigationState& x = result.state;
+    if (!turn) {
+      const Eigen::Vector3d ahead = x.q_WI * (origin.q_WI.conjugate() * Eigen::Vector3d::UnitX());
+      turn = so3::exp({0.0, 0.0, std::atan2(ahead.y(), ahead.x())});
+    }
+    if (run.seconds(x.time) < from) continue;
+    const Eigen::Vector3d e = x.p_W - *turn * (run.truth(x).p_W - origin.p_W);
+    outcome.rms += e.squaredNorm();
+    for (int i = 0; i < 3; ++i)
+      outcome.nees += e[i] * e[i] / x.covariance(StateBlock::kP + i, StateBlock::kP + i) / 3.0;
+    count += 1.0;
+  }
+  outcome.rms = std::sqrt(outcome.rms / count);
+  outcome.nees /= count;
+  return outcome;
+}
+
+Outcome outcome(const std::string& motion, std::uint64_t seed, bool landmarks,
+                const std::function<void(simulation::RadarModelOptions&)>& change = nullptr) {
+  SimulatedRun run(motion, seed, 60.0, 5.0);
+  run.options.landmarks.enabled = landmarks;
+  if (change) change(run.setup.radar);
+  run.run();
+  return outcomeOf(run, 10.0);
+}
+
+TEST(Landmarks, HoldThePositionInARoom) {
+  double with = 0.0, without = 0.0, nees = 0.0;
+  constexpr int kSeeds = 3;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    const Outcome off = outcome("difficult", seed, false), on = outcome("difficult", seed, true);
+    std::printf("seed %d: %.4f m without, %.4f m with, NEES %.2f, %.0f matches, map %zu\n",
+                static_cast<int>(seed), off.rms, on.rms, on.nees, on.matched, on.largest_map);
+    with += on.rms / kSeeds;
+    without += off.rms / kSeeds;
+    nees += on.nees / kSeeds;
+    EXPECT_EQ(off.matched, 0.0);
+    EXPECT_EQ(on.dropped, 0u);
+    EXPECT_LE(on.largest_map, LandmarkOptions().max_landmarks);
+  }
+  EXPECT_LT(with, 0.6 * without);
+  EXPECT_LT(nees, 2.0);
+}
+
+TEST(Landmarks, DoNoHarmAmongCrowdsAndGhosts) {
+  for (const bool crowd : {true, false}) {
+    double with = 0.0, without = 0.0;
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      const auto spoil = [&](simulation::RadarModelOptions& radar) {
+        if (crowd) {
+          radar.moving_share = 0.9;
+          radar.crowd = 2;
+        } else {
+          radar.ghost_share = 0.5;
+        }
+      };
+      const Outcome off = outcome("medium", seed, false, spoil), on = outcome("medium", seed, true, spoil);
+      std::printf("%s, seed %d: %.4f m without, %.4f m with\n", crowd ? "crowd" : "ghosts",
+                  static_cast<int>(seed), off.rms, on.rms);
+      with += on.rms;
+      without += off.rms;
+    }
+    EXPECT_LT(with, 1.05 * without);
+  }
+}
+
+}  // namespace
+}  // namespace rio_t

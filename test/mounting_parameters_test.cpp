@@ -1,0 +1,114 @@
+// The three ways to tell the rotation of T_IR, and the units of the IMU.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "rio_t/ros/messages/conversions.h"
+#include "rio_t/ros/parameters/parameters.h"
+
+namespace rio_t {
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+Config from(const std::vector<std::string>& assignments) {
+  ParameterEntries entries;
+  for (const std::string& each : assignments) entries.push_back(parseAssignment(each));
+  return makeConfig(entries);
+}
+
+std::string faultOf(const std::vector<std::string>& assignments) {
+  try {
+    from(assignments);
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+const Quaterniond kAhead(std::sqrt(0.5), 0, 0, -std::sqrt(0.5));  // of x right, y forward, z up
+
+TEST(MountingParameters, WordsAreTheQuaternion) {
+  const Config kart = from({"mounting_yaw_pitch_roll_deg=[30, 22, 0]"});
+  EXPECT_LT(kart.odometry.T_IR.q_IR.angularDistance(Quaterniond(0.8501141, 0.1652454, -0.0954045, -0.4908136)), 1e-6);
+  EXPECT_LT(from({"mounting_yaw_pitch_roll_deg=[0, 0, 0]"}).odometry.T_IR.q_IR.angularDistance(kAhead), 1e-12);
+  EXPECT_EQ(from({"mounting_yaw_pitch_roll_deg=[]"}).odometry.T_IR.q_IR.w(), 1.0);
+}
+
+TEST(MountingParameters, TheWordsDoNotDependOnTheAxesOfTheCloud) {
+  for (const std::string& preset : pointCloudPresets()) {
+    const Config config = from({"radar_format=" + preset, "mounting_yaw_pitch_roll_deg=[0, 0, 0]"});
+    EXPECT_LT(config.odometry.T_IR.q_IR.angularDistance(kAhead), 1e-12) << preset;
+  }
+}
+
+TEST(MountingParameters, ARotationOfTheCloudsOwnAxesIsTurnedForAllPresets) {
+  // The cloud's own axes are those of the IMU, x forward, y left, z up, or x right, y forward, z up.
+  for (const std::string& preset : pointCloudPresets()) {
+    const Config config = from({"radar_format=" + preset, "extrinsics_axes=cloud"});
+    const bool flu = pointCloudPreset(preset).axes == PointAxes::kForwardLeftUp;
+    const Vector3d forward_I = config.odometry.T_IR.q_IR * Vector3d::UnitY();
+    EXPECT_LT((forward_I - (flu ? Vector3d(1, 0, 0) : Vector3d(0, 1, 0))).norm(), 1e-12) << preset;
+    EXPECT_LT((config.odometry.T_IR.q_IR * Vector3d::UnitZ() - Vector3d(0, 0, 1)).norm(), 1e-12) << preset;
+  }
+  // The same as from tf.
+  geometry_msgs::Transform tf;
+  tf.rotation.x = tf.rotation.y = tf.rotation.z = tf.rotation.w = 0.5;
+  const Config config = from({"radar_format=coloradar", "extrinsics_axes=cloud",
+                              "extrinsics_rotation_xyzw=[0.5, 0.5, 0.5, 0.5]"});
+  EXPECT_LT(config.odometry.T_IR.q_IR.angularDistance(toExtrinsics(tf, PointAxes::kForwardLeftUp).q_IR), 1e-12);
+}
+
+TEST(MountingParameters, BothWaysAtOnceAreAFaultThatNamesBoth) {
+  const std::string fault =
+      faultOf({"mounting_yaw_pitch_roll_deg=[0, 0, 0]", "extrinsics_rotation_xyzw=[0, 0, 0, 1]"});
+  EXPECT_NE(fault.find("mounting_yaw_pitch_roll_deg"), std::string::npos) << fault;
+  EXPECT_NE(fault.find("extrinsics_rotation_xyzw"), std::string::npos) << fault;
+  const std::string of_radar =
+      faultOf({"radars=[left]", "left/mounting_yaw_pitch_roll_deg=[0, 0, 0]",
+               "left/extrinsics_rotation_xyzw=[0, 0, 0, 1]", "left/radar_topic=/left"});
+  EXPECT_NE(of_radar.find("left/mounting_yaw_pitch_roll_deg"), std::string::npos) << of_radar;
+  EXPECT_EQ(faultOf({"mounting_yaw_pitch_roll_deg=[]", "extrinsics_rotation_xyzw=[0, 0, 0, 1]"}), "");
+}
+
+TEST(MountingParameters, EachRadarHasItsOwn) {
+  const Config config =
+      from({"radars=[left, right, rear]", "mounting_yaw_pitch_roll_deg=[30, 0, 0]", "left/radar_topic=/left",
+            "right/radar_topic=/right", "right/mounting_yaw_pitch_roll_deg=[-30, 0, 0]", "rear/radar_topic=/rear",
+            "rear/extrinsics_rotation_xyzw=[0, 0, 0, 1]"});
+  const auto yaw = [&](std::size_t k) { return mountingOf(config.odometry.radars[k].T_IR.q_IR).yaw * 57.2957795; };
+  EXPECT_NEAR(yaw(0), 30.0, 1e-6);
+  EXPECT_NEAR(yaw(1), -30.0, 1e-6);
+  EXPECT_EQ(config.odometry.radars[2].T_IR.q_IR.w(), 1.0);
+}
+
+TEST(MountingParameters, WhatIsPrintedReadsBackAsTheSameRotation) {
+  const Config config = from({"radar_format=coloradar", "mounting_yaw_pitch_roll_deg=[12, -34, 56]"});
+  std::istringstream yaml(toYaml(config));
+  const Config back = makeConfig(readParameters(yaml, "printed"));
+  EXPECT_LT(back.odometry.T_IR.q_IR.angularDistance(config.odometry.T_IR.q_IR), 1e-9);
+  EXPECT_EQ(toYaml(back), toYaml(config));
+}
+
+TEST(MountingParameters, WrongAnglesAreNamed) {
+  EXPECT_NE(faultOf({"mounting_yaw_pitch_roll_deg=[0, 0]"}).find("list of 3"), std::string::npos);
+  EXPECT_NE(faultOf({"mounting_yaw_pitch_roll_deg=[0, 0, 400]"}).find("at most 360"), std::string::npos);
+  EXPECT_NE(faultOf({"extrinsics_axes=frd"}).find("one of rfu, cloud"), std::string::npos);
+}
+
+TEST(ImuUnitParameters, AMessageInGAndDegreesIsConverted) {
+  const Config config = from({"imu_acceleration_unit=g", "imu_rate_unit=deg/s"});
+  sensor_msgs::Imu message;
+  message.header.stamp = ros::Time(1.0);
+  message.linear_acceleration.z = 1.0;
+  message.angular_velocity.x = 180.0;
+  const ImuMeasurement imu = toImuMeasurement(message, "/imu", config.imu_units);
+  EXPECT_NEAR(imu.acceleration.z(), 9.80665, 1e-12);
+  EXPECT_NEAR(imu.angular_velocity.x(), 3.14159265358979, 1e-12);
+  EXPECT_NE(faultOf({"imu_acceleration_unit=mg"}).find("one of m/s2, g"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace rio_t

@@ -1,0 +1,110 @@
+// The search for the mounting on simulated motions: errors against its sigmas.
+#include "rio_t/inspection/mounting_search.h"
+
+#include <gtest/gtest.h>
+
+#include "rio_t/core/so3.h"
+#include "rio_t/inspection/cloud_report.h"
+#include "rio_t/inspection/imu_report.h"
+#include "rio_t/radar/mounting.h"
+#include "simulated_run.h"
+
+namespace rio_t {
+namespace {
+
+constexpr double kDegree = 3.14159265358979323846 / 180.0;
+
+struct Searched {
+  MountingSearch search;
+  DopplerSign sign;
+  Eigen::Vector3d error = Eigen::Vector3d::Zero();  // [rad] about the axes of I
+};
+
+Searched searchOn(const std::string& motion, std::uint64_t seed, int doppler_sign, const Extrinsics& T_IR) {
+  SimulatedRun simulated(motion, seed, 60.0, 5.0);
+  simulated.setup.T_IR = T_IR;
+  simulated.setup.time_offset.constant = 0.04;
+  const simulation::SensorData data = simulation::simulate(simulated.motion, simulated.setup);
+  std::vector<RadarScan> scans;
+  for (const simulation::SimulatedScan& from : data.scans) {
+    if (!from.delivered) continue;
+    scans.push_back(SimulatedRun::scan(from));
+    for (RadarPoint& point : scans.back().points) point.doppler *= doppler_sign;
+  }
+  const InertialTrack track(data.imu.samples, Eigen::Vector3d::Zero());
+  Searched result;
+  result.sign = dopplerSignFromRanges(scans, track);
+  MountingSearchOptions options;
+  options.sign_from_ranges = result.sign.sign;
+  options.up_I = Eigen::Vector3d::UnitZ();
+  result.search = searchMounting(radarVelocities(scans).velocities, track, options);
+  result.error = so3::log((result.search.q_IR * T_IR.q_IR.conjugate()).normalized());
+  return result;
+}
+
+Extrinsics tilted(std::uint64_t seed) {
+  const double k = static_cast<double>(seed);
+  return {{0.1, -0.05, 0.08}, so3::exp({1.3 * std::sin(k), 2.0 * std::cos(2.0 * k), 2.5 * std::sin(3.0 * k)})};
+}
+
+TEST(MountingSearch, AnyMountingAndSignIsFoundWithinItsSigma) {
+  double sum = 0.0;
+  int count = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    const int sign = seed % 2 == 0 ? -1 : 1;
+    const Searched found = searchOn(seed % 3 == 0 ? "drone" : "medium", seed, sign, tilted(seed));
+    ASSERT_TRUE(found.search.enough);
+    EXPECT_EQ(found.search.sign, sign) << seed;
+    EXPECT_FALSE(found.search.mirrored) << seed;
+    EXPECT_GT(found.search.sign_significance, 25.0) << seed;
+    EXPECT_LT(found.error.norm(), 6.0 * kDegree) << seed;
+    EXPECT_NEAR(found.search.offset, 0.04, 4.0 * found.search.offset_sigma) << seed;
+    EXPECT_LT(found.search.offset_sigma, 0.05) << seed;
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_LT(found.search.rotation_sigma[k], 0.15) << seed;
+      sum += std::pow(found.error[k] / found.search.rotation_sigma[k], 2);
+      ++count;
+    }
+  }
+  // Coarse: it may be too careful, but not too sure.
+  EXPECT_LT(sum / count, 1.5);
+}
+
+TEST(MountingSearch, AVehicleThatOnlyDrivesAheadSaysThatItsRollIsNotObserved) {
+  const Searched found = searchOn("ground_vehicle", 1, 1, {{0.0, 0.0, 0.0}, rotationOf({0.3, 0.2, 0.0})});
+  EXPECT_GT(found.search.rotation_sigma.maxCoeff(), 0.3);
+  EXPECT_LT(found.search.rotation_sigma.minCoeff(), 0.1);
+  // An upright radar is assumed, and this one is.
+  EXPECT_LT(found.error.norm(), 15.0 * kDegree);
+}
+
+TEST(MountingSearch, RestSaysNothing) {
+  std::vector<RadarVelocity> rest;
+  std::vector<ImuMeasurement> imu;
+  for (int i = 0; i < 4000; ++i) {
+    ImuMeasurement sample;
+    sample.time = Time::fromSeconds(1000.0 + 0.005 * i);
+    sample.acceleration = {0.0, 0.0, 9.81};
+    imu.push_back(sample);
+    if (i % 20 == 0) rest.push_back({sample.time, Eigen::Vector3d::Zero(), 1e-3 * Eigen::Matrix3d::Identity()});
+  }
+  EXPECT_FALSE(searchMounting(rest, InertialTrack(imu, Eigen::Vector3d::Zero()), {}).enough);
+}
+
+TEST(MountingSearch, The24TurnsAreRotations) {
+  for (const Eigen::Matrix3d& turn : axisTurns()) {
+    EXPECT_NEAR(turn.determinant(), 1.0, 1e-12);
+    EXPECT_LT((turn * turn.transpose() - Eigen::Matrix3d::Identity()).norm(), 1e-12);
+    EXPECT_EQ(std::count_if(axisTurns().begin(), axisTurns().end(),
+                            [&](const Eigen::Matrix3d& other) { return (turn - other).norm() < 1e-9; }),
+              1);
+  }
+}
+
+TEST(DopplerSignFromRanges, IsThatOfTheDriver) {
+  EXPECT_EQ(searchOn("drone", 1, 1, {}).sign.sign, 1);
+  EXPECT_EQ(searchOn("drone", 1, -1, {}).sign.sign, -1);
+}
+
+}  // namespace
+}  // namespace rio_t
