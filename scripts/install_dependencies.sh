@@ -16,13 +16,14 @@ packages=(
   libroscpp-dev librosconsole-dev libxmlrpcpp-dev librosbag-dev librosbag-storage-dev
   libnodelet-dev libnodeletlib-dev pluginlib-dev
   libstd-msgs-dev libstd-srvs-dev libsensor-msgs-dev libgeometry-msgs-dev libnav-msgs-dev libdiagnostic-msgs-dev
-  libdiagnostic-updater-dev libtf2-dev libtf2-eigen-dev libtf2-ros-dev libpcl-dev libpcl-conversions-dev
-  libboost-dev libboost-program-options-dev libtopic-tools-dev
+  libdiagnostic-updater-dev libdynamic-reconfigure-config-init-mutex-dev libtf2-dev libtf2-eigen-dev libtf2-ros-dev
+  libtf2-msgs-dev libpcl-dev libpcl-conversions-dev libboost-dev libboost-program-options-dev libtopic-tools-dev
   ros-message-generation ros-message-runtime ros-std-msgs libeigen3-dev libceres-dev libyaml-cpp-dev
   librostest-dev libgtest-dev libbenchmark-dev
   # rosrun, rosbag play, the nodelet manager, rviz, and messages for Python: rostopic echo and the rostests
   rosbash rospack-tools python3-roslaunch python3-rosbag python3-rostest python3-rostopic python3-rosservice rosout libnodeletlib-tools rviz
   python3-nav-msgs python3-diagnostic-msgs python3-std-srvs python3-tf2-msgs python3-sensor-msgs python3-nodelet
+  python3-dynamic-reconfigure libdiagnostic-aggregator-tools ros-robot-state-publisher
   python3-numpy python3-matplotlib python3-scipy python3-tqdm python3-yaml python3-setuptools python3-pytest
 )
 

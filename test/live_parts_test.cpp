@@ -1,8 +1,9 @@
 #include <diagnostic_msgs/DiagnosticStatus.h>
 #include <gtest/gtest.h>
 
-#include <atomic>
+#include <chrono>
 #include <cstdio>
+#include <future>
 #include <string>
 #include <thread>
 #include <vector>
@@ -12,33 +13,11 @@
 #include "rio_t/ros/live/current_session.h"
 #include "rio_t/ros/live/monitor.h"
 #include "rio_t/ros/live/offset_observability.h"
-#include "rio_t/ros/live/scan_queue.h"
+#include "rio_t/ros/live/publish_rate.h"
 #include "rio_t/ros/live/session.h"
 
 namespace rio_t {
 namespace {
-
-ScanQueue::Item scanAt(double seconds) {
-  ScanQueue::Item item;
-  item.scan.stamp = Time::fromSeconds(seconds);
-  return item;
-}
-
-TEST(ScanQueue, GivesScansInOrderAndReportsTheOldestAsItGoes) {
-  ScanQueue queue(2);
-  EXPECT_FALSE(queue.pop());
-  EXPECT_FALSE(queue.push(scanAt(1.0)));
-  EXPECT_FALSE(queue.push(scanAt(2.0)));
-  const std::optional<RadarScan> dropped = queue.push(scanAt(3.0));
-  ASSERT_TRUE(dropped);
-  EXPECT_EQ(dropped->stamp, Time::fromSeconds(1.0));
-  EXPECT_EQ(queue.size(), 2U);
-  EXPECT_EQ(queue.pop()->scan.stamp, Time::fromSeconds(2.0));
-  EXPECT_EQ(queue.pop()->scan.stamp, Time::fromSeconds(3.0));
-  EXPECT_FALSE(queue.pop());
-}
-
-TEST(ScanQueue, RefusesToHoldNothing) { EXPECT_THROW(ScanQueue(0), std::invalid_argument); }
 
 /// Ten scans a second, radar velocities with 0.05 m/s per axis, of a platform that accelerates.
 bool observableAt(double acceleration, double yaw_rate, bool used = true, int rest_scans = 0) {
@@ -97,21 +76,14 @@ TEST(CurrentSession, ReplacingWaitsForWhoIsSpeaking) {
     CurrentSession current;
     const auto old = freshSession();
     current.replace(old);
-    std::atomic<bool> speaking{false}, replaced{false};
-    bool replaced_meanwhile = false;
-    std::thread thread([&] {
-      current.speak(speaker, old, [&] {
-        speaking = true;
-        // Long enough for a replacement that does not wait.
-        for (int k = 0; k < 2000; ++k) std::this_thread::yield();
-        replaced_meanwhile = replaced;
-      });
+    std::future<CurrentSession::Session> replaced;
+    current.speak(speaker, old, [&] {
+      replaced = std::async(std::launch::async, [&] { return current.replace(freshSession()); });
+      // A replacement that does not wait is there within microseconds.
+      EXPECT_EQ(replaced.wait_for(std::chrono::milliseconds(200)), std::future_status::timeout);
+      EXPECT_EQ(current.get(), old);
     });
-    while (!speaking) std::this_thread::yield();
-    current.replace(freshSession());
-    replaced = true;
-    thread.join();
-    EXPECT_FALSE(replaced_meanwhile);
+    EXPECT_EQ(replaced.get(), old) << "it must come once nobody speaks";
   }
 }
 
@@ -181,9 +153,8 @@ TEST(LiveSession, StampsTheScansOfEachRadarInItsOwnWay) {
   EXPECT_EQ(session.addTrigger(1, 7, stamp, record).queued, 1U);
 }
 
-TEST(LiveSession, NamesTheRadarWhoseScanGetsNoStampAndTheOneThatMakesRoom) {
-  Config config = twoRadars();
-  config.odometry.max_queued_scans = 1;
+TEST(LiveSession, NamesTheRadarWhoseScanGetsNoStamp) {
+  const Config config = twoRadars();
   LiveSession session(config, config.odometry);
   const auto at = [](double seconds) { return Time::fromSeconds(seconds); };
   session.addScan(1, at(10.0), at(10.0), scanOf(1));
@@ -194,8 +165,58 @@ TEST(LiveSession, NamesTheRadarWhoseScanGetsNoStampAndTheOneThatMakesRoom) {
   ASSERT_EQ(late.given_up.size(), 1U);
   EXPECT_EQ(late.given_up[0].radar, 1U);
   EXPECT_EQ(late.given_up[0].reason, "trigger_missing");
-  const LiveSession::Stamped more = session.addScan(2, at(20.0), at(20.0), scanOf(0));
-  EXPECT_EQ(more.dropped, std::vector<std::size_t>{0});
+}
+
+TEST(LiveSession, TakesOneScanAtATimeAndDropsTheOldestOfTooMany) {
+  Config config = twoRadars();
+  config.odometry.max_queued_scans = 1;
+  LiveSession session(config, config.odometry);
+  for (int k = 0; k < 4; ++k) {
+    const Time stamp = Time::fromSeconds(10.0 + k);
+    session.addScan(static_cast<std::uint32_t>(k), stamp, stamp, scanOf(0));
+  }
+  bool more = false;
+  const std::vector<LiveSession::Result> results = session.process(&more);
+  // One is used, so that a reset waits for one solution alone; one may wait; the two between them go.
+  ASSERT_EQ(results.size(), 3U);
+  EXPECT_TRUE(more);
+  EXPECT_EQ(results[0].result.rejected_because, "before_initialization");
+  for (const std::size_t k : {1U, 2U}) {
+    EXPECT_EQ(results[k].result.rejected_because, "queue_full");
+    EXPECT_EQ(results[k].result.scan.stamp, Time::fromSeconds(10.0 + static_cast<double>(k)));
+  }
+  EXPECT_EQ(session.process(&more).size(), 1U);
+  EXPECT_TRUE(session.process(&more).empty());
+  EXPECT_FALSE(more);
+}
+
+TEST(LiveSession, KnowsNoTimeOfMeasurementBeforeThereIsAnOffset) {
+  const Config config = twoRadars();
+  LiveSession session(config, config.odometry);
+  const Time stamp = Time::fromSeconds(10.0);
+  session.addScan(1, stamp, stamp, scanOf(0));
+  bool more = false;
+  EXPECT_EQ(session.process(&more).at(0).measured_at, stamp);
+}
+
+TEST(PublishRate, TakesTheFirstOfEachPeriodWhateverTheStart) {
+  PublishRate rate(10.0);
+  int published = 0;
+  for (int k = 0; k < 409; ++k) published += rate.isDue(Time::fromSeconds(1.7e9 + k / 409.0)) ? 1 : 0;
+  EXPECT_EQ(published, 10);
+  PublishRate late(10.0);
+  EXPECT_TRUE(late.isDue(Time::fromSeconds(1.7e9 + 0.05)));
+  EXPECT_FALSE(late.isDue(Time::fromSeconds(1.7e9 + 0.09)));
+  EXPECT_TRUE(late.isDue(Time::fromSeconds(1.7e9 + 0.11)));
+  EXPECT_TRUE(late.isDue(Time::fromSeconds(1.0))) << "the clock jumped back";
+}
+
+TEST(PublishRate, OfZeroTakesAll) {
+  PublishRate rate(0.0);
+  for (int k = 0; k < 3; ++k) EXPECT_TRUE(rate.isDue(Time::fromSeconds(5.0)));
+  rate.set(1.0);
+  EXPECT_TRUE(rate.isDue(Time::fromSeconds(5.0)));
+  EXPECT_FALSE(rate.isDue(Time::fromSeconds(5.5)));
 }
 
 TEST(LiveSession, ResultsHaveTheMountingOfTheirRadarAsTold) {
@@ -295,7 +316,7 @@ TEST_F(TwoRadarDiagnostics, CountForEachRadar) {
   EXPECT_EQ(value(status, "right/scans_used"), "9");
   EXPECT_EQ(value(status, "left/dropped_scan_not_usable"), "1");
   EXPECT_EQ(value(status, "right/dropped_innovation"), "1");
-  EXPECT_EQ(value(status, "left/trigger_rate_hz"), "no left/trigger_rate_hz") << "it needs none";
+  EXPECT_EQ(value(status, "left/triggers"), "no left/triggers") << "it needs none";
 }
 
 TEST_F(TwoRadarDiagnostics, NameTheRadarThatIsSilent) {
@@ -307,6 +328,25 @@ TEST_F(TwoRadarDiagnostics, NameTheRadarThatIsSilent) {
   EXPECT_EQ(silent.level, DiagnosticStatus::WARN);
   EXPECT_EQ(silent.message, "radar right is silent, topic /right");
   EXPECT_EQ(second(20, 20, 20).level, DiagnosticStatus::OK);
+}
+
+TEST_F(TwoRadarDiagnostics, IsAnErrorIfTheImuFallsSilent) {
+  second(20, 20, 20);
+  for (int k = 0; k < 10; ++k) feed(0, true);
+  Status status;
+  monitor.describeInput(status, &session);
+  EXPECT_EQ(status.level, DiagnosticStatus::ERROR);
+  EXPECT_EQ(status.message, "the IMU is silent, topic " + config.imu_topic);
+}
+
+TEST_F(TwoRadarDiagnostics, SayHowTheOdometryGoesOnAfterAReset) {
+  Status before;
+  monitor.describeOdometry(before, &session);
+  EXPECT_EQ(value(before, "after_reset"), "no after_reset");
+  monitor.reset("~reset called");
+  Status after;
+  monitor.describeOdometry(after, &session);
+  EXPECT_EQ(value(after, "after_reset"), "goes on from the last pose (reset_pose: keep)");
 }
 
 TEST_F(TwoRadarDiagnostics, IsAnErrorWhereNoRadarHasComeYet) {
@@ -410,7 +450,7 @@ class SolverDiagnostics : public testing::Test {
   }
   LiveMonitor::Status status() const {
     LiveMonitor::Status status;
-    monitor.describeSolver(status, nullptr);
+    monitor.describeSolver(status);
     return status;
   }
   void expectWarning(const std::string& part) const {

@@ -450,7 +450,7 @@ TEST(SeveralRadars, ASectionOverridesTheTopLevel) {
 TEST(SeveralRadars, EachHasAFrameOfItsOwn) {
   const std::vector<Config> radars =
       configsOfRadars(fromAssignments(withTwoRadars({"radar_frame=front", "right/radar_frame=other"})));
-  EXPECT_EQ(radars[0].radar_frame, "radar_left");
+  EXPECT_EQ(radars[0].radar_frame, "rio_t_radar_left");
   EXPECT_EQ(radars[1].radar_frame, "other");
 }
 
@@ -578,7 +578,7 @@ TEST(SeveralRadars, PrintedConfigurationReadsBack) {
   ASSERT_EQ(back.radars.size(), 3u);
   EXPECT_EQ(back.radars[0].odometry.smoother.time_offset_initial, 0.1234567890123456);
   EXPECT_EQ(back.radars[0].radar_overrides.x, "a \"b");
-  EXPECT_EQ(back.radars[0].radar_frame, "radar_left");
+  EXPECT_EQ(back.radars[0].radar_frame, "rio_t_radar_left");
   EXPECT_EQ(back.radars[2].radar_frame, "radar");
   EXPECT_EQ(back.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kPose);
   EXPECT_EQ(back.odometry.radars[1].ego_velocity.min_range, 0.3);

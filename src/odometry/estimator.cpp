@@ -105,6 +105,7 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
         result.scan, {at_rest, may_rest, has_diverged, result.model_error_scale, last_used_}, smoother_);
     judge(answer, result.scan);
     result.ego_velocity = answer.ego_velocity;
+    result.innovation = answer.judged;
     result.doppler = answer.doppler;
     result.offset_gain = answer.offset_gain;
     result.offset_stepped = answer.offset_stepped;
@@ -233,6 +234,12 @@ void Estimator::addImu(const std::vector<ImuMeasurement>& samples) {
     imu_.add(sample);
     if (!initialized() && !sample.is_bridge) tryInitialize(sample);
   }
+}
+
+void Estimator::tune(const Tuning& tuning) {
+  apply(tuning, options_);
+  for (RadarChannel& radar : radars_) radar.tune(options_.smoother);
+  health_.setGate(options_.smoother.innovation_gate);
 }
 
 void Estimator::addPressure(const Pressure& pressure) {

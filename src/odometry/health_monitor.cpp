@@ -50,7 +50,11 @@ std::string toString(Health health) {
 }
 
 HealthMonitor::HealthMonitor(const HealthOptions& options, double gate)
-    : options_(options), gate_(gate > 0.0 ? gate : kDefaultGate) {}
+    : options_(options) {
+  setGate(gate);
+}
+
+void HealthMonitor::setGate(double gate) { gate_ = gate > 0.0 ? gate : kDefaultGate; }
 
 void HealthMonitor::addInnovation(const Innovation& innovation) {
   add({innovation.stamp, std::min(1.0, innovation.squaredSigmas() / (gate_ * gate_)),

@@ -14,4 +14,17 @@ OdometryOptions optionsOfRadar(const OdometryOptions& options, std::size_t radar
   return result;
 }
 
+Tuning tuningOf(const OdometryOptions& options) {
+  const SmootherOptions& smoother = options.smoother;
+  return {options.imu_noise, smoother.innovation_gate, smoother.innovation_model_error,
+          smoother.innovation_gate_timeout};
+}
+
+void apply(const Tuning& tuning, OdometryOptions& options) {
+  options.imu_noise = tuning.imu_noise;
+  options.smoother.innovation_gate = tuning.innovation_gate;
+  options.smoother.innovation_model_error = tuning.innovation_model_error;
+  options.smoother.innovation_gate_timeout = tuning.innovation_gate_timeout;
+}
+
 }  // namespace rio_t

@@ -30,6 +30,7 @@ struct RadarInertialOdometry::Impl {
     std::vector<RadarScan> scans;
     std::vector<Pressure> pressures;
     std::uint64_t clock_restarts = 0;  ///< `imu` is from after that many
+    std::optional<Tuning> tuning;
   };
   // Status of the estimator; guarded by inbox_mutex, too.
   struct Status {
@@ -86,11 +87,16 @@ void RadarInertialOdometry::addPressure(const Pressure& pressure) {
   impl_->inbox.pressures.push_back(pressure);
 }
 
-std::vector<ScanResult> RadarInertialOdometry::process() {
+void RadarInertialOdometry::tune(const Tuning& tuning) {
+  const std::lock_guard<std::mutex> lock(impl_->inbox_mutex);
+  impl_->inbox.tuning = tuning;
+}
+
+std::vector<ScanResult> RadarInertialOdometry::process(std::size_t max_scans) {
   Impl& m = *impl_;
   m.takeInbox();
   std::vector<ScanResult> results;
-  for (auto scan = m.waiting_scans.begin(); scan != m.waiting_scans.end();) {
+  for (auto scan = m.waiting_scans.begin(); scan != m.waiting_scans.end() && results.size() < max_scans;) {
     if (m.estimator.mustWait(*scan)) {
       ++scan;
       continue;
@@ -129,8 +135,10 @@ void RadarInertialOdometry::Impl::takeInbox() {
     taken.clock_restarts = inbox.clock_restarts;
     std::swap(taken.imu, inbox.imu);
     std::swap(taken.scans, inbox.scans);
+    std::swap(taken.tuning, inbox.tuning);
     std::swap(taken.pressures, inbox.pressures);
   }
+  if (taken.tuning) estimator.tune(*taken.tuning);
   const bool scan_came = !taken.scans.empty();
   for (RadarScan& scan : taken.scans) waiting_scans.push_back(std::move(scan));
   if (std::exchange(clock_restarts, taken.clock_restarts) != taken.clock_restarts)

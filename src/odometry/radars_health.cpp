@@ -9,6 +9,10 @@ void RadarsHealth::updated(Time time) {
   for (HealthMonitor& monitor : monitors_) monitor.updated(time);
 }
 
+void RadarsHealth::setGate(double gate) {
+  for (HealthMonitor& monitor : monitors_) monitor.setGate(gate);
+}
+
 void RadarsHealth::startedAt(Time time) {
   for (HealthMonitor& monitor : monitors_) monitor.startedAt(time);
 }

@@ -3,6 +3,7 @@ import os
 import subprocess
 import threading
 
+import rosbag
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistWithCovarianceStamped
@@ -21,7 +22,8 @@ IMU, RADAR = "/sensor_platform/imu", "/sensor_platform/radar/scan"
 # The messages that rosbag play keeps for a late subscriber. The default is 100, which is an eighth of a second of IMU.
 QUEUE = "--queue=20000"
 TOPICS = {"odom": Odometry, "odom_optimized": Odometry, "time_offset": TimeOffset, "imu_bias": ImuBias, "path": Path,
-          "ego_velocity": TwistWithCovarianceStamped, "inliers": PointCloud2, "points": PointCloud2}
+          "ego_velocity": TwistWithCovarianceStamped, "innovation": TwistWithCovarianceStamped,
+          "inliers": PointCloud2, "points": PointCloud2}
 
 
 def preloaded():
@@ -35,16 +37,18 @@ def run(*words):
 
 
 class Listener:
-    """Keeps every message of the node called rio_t. `topics`: names and kinds, TOPICS are those of one radar."""
+    """Keeps every message of a node. `topics`: names and kinds, TOPICS are those of one radar."""
 
-    def __init__(self, topics=None):
+    def __init__(self, topics=None, node="/rio_t"):
         self._changed = threading.Condition()
         topics = topics or TOPICS
         self.messages = {name: [] for name in topics}
-        self.tf, self.diagnostics = [], {}
-        self._subscribers = [rospy.Subscriber("/rio_t/" + name, kind, self._keep, name, buff_size=2**24,
+        self.tf, self.tf_static, self.diagnostics = [], [], {}
+        self.node = node
+        self._subscribers = [rospy.Subscriber(f"{node}/{name}", kind, self._keep, name, buff_size=2**24,
                                               tcp_nodelay=True) for name, kind in topics.items()]
-        self._subscribers.append(rospy.Subscriber("/tf", TFMessage, self._keep_tf, buff_size=2**24))
+        self._subscribers.append(rospy.Subscriber("/tf", TFMessage, self._keep_tf, self.tf, buff_size=2**24))
+        self._subscribers.append(rospy.Subscriber("/tf_static", TFMessage, self._keep_tf, self.tf_static))
         self._subscribers.append(rospy.Subscriber("/diagnostics", DiagnosticArray, self._keep_diagnostics))
 
     def __enter__(self):
@@ -59,9 +63,10 @@ class Listener:
             self.messages[name].append(message)
             self._changed.notify_all()
 
-    def _keep_tf(self, message):
+    def _keep_tf(self, message, kept):
         with self._changed:
-            self.tf.extend(message.transforms)
+            kept.extend(message.transforms)
+            self._changed.notify_all()
 
     def _keep_diagnostics(self, message):
         with self._changed:
@@ -93,7 +98,7 @@ class Listener:
 
     def wait_until_heard(self):
         """All publishers of the node are connected to us: nothing will be missed."""
-        names = ["/rio_t/" + name for name in self.messages]
+        names = [f"{self.node}/{name}" for name in self.messages]
         wait_for("subscribers of all of " + " ".join(names),  # rospy tells no one of new connections
                  lambda: all(s.get_num_connections() > 0 for s in self._subscribers if s.resolved_name in names))
 
@@ -110,13 +115,46 @@ def call(service, kind=Trigger):
     return rospy.ServiceProxy(service, kind)()
 
 
-def node(*parameters):
-    """rio_t_node with private parameters given as "key:=value"."""
-    return Process(program("rio_t", "rio_t_node"), "__name:=rio_t", *("_" + each for each in parameters))
+def node(*parameters, remap=()):
+    """rio_t_node with private parameters given as "key:=value". `remap`: more words, as "__ns:=/robot"."""
+    return Process(program("rio_t", "rio_t_node"), "__name:=rio_t", *("_" + each for each in parameters), *remap)
+
+
+def simulate(out, *words, static_start=4, duration=12):
+    """A short wild run at `out`, which is returned; at rest at both ends, so that it starts and ends sharply."""
+    check(run(program("rio_t", "simulate"), "--motion", "medium", "--seed", 3, "--duration", duration, "--static-start",
+              static_start, "--static-end", 1, "--time-offset", 0.03, *words, "--out", out))
+    return out
+
+
+def run_bag(bag, config, out, *settings):
+    """The folder with the files of the bag runner; `settings` are "key=value"."""
+    check(run(program("rio_t", "rio_t_bag"), "--bag", bag, "--config", config, "--output-dir", out,
+              *(word for each in settings for word in ("--set", each))))
+    return out
+
+
+def stamps(bag, topic):
+    """Header stamps [ns] of the messages of a topic."""
+    with rosbag.Bag(bag) as messages:
+        return [m.header.stamp.to_nsec() for _, m, _ in messages.read_messages([topic])]
+
+
+def edited(bag, out, edit, first=()):
+    """A copy of a bag at `out`. `edit(topic, message)` changes each message; `first`: (topic, message) before all."""
+    with rosbag.Bag(bag) as source, rosbag.Bag(out, "w") as copy:
+        for topic, message, time in source.read_messages():
+            for each_topic, each in first:
+                copy.write(each_topic, each, time)
+            first = ()
+            edit(topic, message)
+            copy.write(topic, message, time)
+    return out
 
 
 def play(bag, topics=(IMU, RADAR), rate=2.0, *more):
     """rosbag play, which starts when each of the topics has its subscriber."""
-    return Process(program("rosbag", "play"), "--clock", "--hz=1000", "--quiet", QUEUE, "--wait-for-subscribers",
+    clock = ("--clock", "--hz=1000") if rospy.get_param("/use_sim_time", False) else ()
+    return Process(program("rosbag", "play"), *clock, "--quiet", QUEUE, "--wait-for-subscribers",
                    f"--rate={rate / SLOWNESS}", *more, bag, "--topics", *topics, stdin=subprocess.DEVNULL,
                    stdout=subprocess.DEVNULL)

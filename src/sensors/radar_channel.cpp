@@ -69,6 +69,11 @@ void RadarChannel::join(FixedLagSmoother& smoother) {
   forget();
 }
 
+void RadarChannel::tune(const SmootherOptions& options) {
+  options_.smoother.innovation_model_error = options.innovation_model_error;
+  gate_.tune(options);
+}
+
 void RadarChannel::forget() {
   step_detector_ = OffsetStepDetector(options_.offset_step_detector);
   offset_uncertainty_ = OffsetUncertainty(options_.smoother.huber_threshold);

@@ -35,6 +35,8 @@ class Estimator {
 
   /// Samples that Navigation checked, in time order.
   void addImu(const std::vector<ImuMeasurement>& samples);
+  /// In effect for the next scan.
+  void tune(const Tuning& tuning);
   /// In the order of arrival; counts what cannot be used in the faults.
   void addPressure(const Pressure& pressure);
   /// The IMU's clock jumped. No earlier data can be related to later data, so all state is dropped.
@@ -76,7 +78,7 @@ class Estimator {
   ImuNoise imuNoise() const;  ///< scaled by the model errors found so far
   NavigationState newestState(const StateCovariance& covariance) const;
 
-  const OdometryOptions options_;
+  OdometryOptions options_;  ///< changed by tune() alone
   const Eigen::Vector3d g_W_;
   const double max_stamp_ahead_;  ///< [s]
   Navigation& navigation_;

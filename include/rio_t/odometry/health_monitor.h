@@ -41,6 +41,7 @@ class HealthMonitor {
  public:
   /// `gate` [sigma]: a scan as far as this from the prediction contradicts it fully; 0: 4.
   HealthMonitor(const HealthOptions& options, double gate);
+  void setGate(double gate);  ///< for the scans to come
 
   /// Takes a scan whose points agree on a velocity without the prediction.
   void addInnovation(const Innovation& innovation);
@@ -82,7 +83,7 @@ class HealthMonitor {
   std::optional<double> contradiction() const;
 
   HealthOptions options_;  // read-only after construction
-  double gate_;            // read-only after construction
+  double gate_ = 0.0;
   SlidingQueue<Entry> entries_;
   Time last_update_;
   SlidingQueue<Time> steps_;         ///< of the offset, within 20 s of the last

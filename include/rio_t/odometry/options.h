@@ -67,6 +67,16 @@ struct OdometryOptions {
   std::size_t radarCount() const { return radars.empty() ? 1 : radars.size(); }
 };
 
+/// The options that may change while the estimator runs, for all radars.
+struct Tuning {
+  ImuNoise imu_noise;
+  double innovation_gate = 0.0;  ///< as in SmootherOptions, like the next two
+  double innovation_model_error = 0.0;
+  double innovation_gate_timeout = 0.0;
+};
+Tuning tuningOf(const OdometryOptions& options);
+void apply(const Tuning& tuning, OdometryOptions& options);
+
 /// The options as one radar has them: without `radars`, and with those that this radar has for itself.
 OdometryOptions optionsOfRadar(const OdometryOptions& options, std::size_t radar);
 

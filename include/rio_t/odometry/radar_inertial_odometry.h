@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -42,9 +43,13 @@ class RadarInertialOdometry {
   /// "pressure_without_node".
   void addPressure(const Pressure& pressure);
 
-  /// Does all the work that is due: initialisation, ego-velocity, window. Returns a result for each scan that
-  /// it finished.
-  std::vector<ScanResult> process();
+  /// Does the work that is due: initialisation, ego-velocity, window. Returns a result for each scan that it
+  /// finished. It takes up to `max_scans` scans, the others wait for the next call; of those that wait, it drops
+  /// the oldest beyond `max_queued_scans` (rejected as "queue_full").
+  std::vector<ScanResult> process(std::size_t max_scans = std::numeric_limits<std::size_t>::max());
+
+  /// Changes options while the estimator runs: in effect from the next `process` on. Any thread.
+  void tune(const Tuning& tuning);
 
   /// At the end of the data: finishes the scans that still wait (rejected as "imu_not_covering" if the IMU
   /// never came) and empties the window. `left_window` of the last result has the poses that were still in

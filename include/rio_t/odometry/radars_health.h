@@ -18,6 +18,7 @@ class RadarsHealth {
   const HealthMonitor& of(std::size_t radar) const { return monitors_.at(radar); }
 
   // All as in HealthMonitor.
+  void setGate(double gate);
   void updated(Time time);
   void startedAt(Time time);
   Health judge(Time now, const NavigationState& state, double model_error_scale);

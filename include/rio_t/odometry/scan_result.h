@@ -14,6 +14,7 @@
 #include "rio_t/radar/scan.h"
 #include "rio_t/sensors/barometer_channel.h"
 #include "rio_t/sensors/ground_vehicle_channel.h"
+#include "rio_t/sensors/innovation.h"
 
 namespace rio_t {
 
@@ -21,6 +22,8 @@ namespace rio_t {
 struct ScanResult {
   RadarScan scan;  ///< as fed
   EgoVelocity ego_velocity;
+  /// The innovation of the velocity that its points show without the prediction; none if they do not decide.
+  std::optional<Innovation> innovation;
   std::optional<DopplerMeasurement> doppler;  ///< its points, if they and not the velocity count
   double offset_gain = 0.0;                   ///< see OffsetEvidence; 0: the scan does not tell the offset
   bool used = false;                          ///< it went into the window

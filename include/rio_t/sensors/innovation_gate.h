@@ -21,9 +21,11 @@ class InnovationGate {
   bool rejects(const Innovation& innovation, bool is_unanimous, bool tilt_is_known, Time last_used);
   /// The scan was used.
   void used() { unanimous_since_.reset(); }
+  /// Judges by other options from now on.
+  void tune(const SmootherOptions& options) { options_ = options; }
 
  private:
-  SmootherOptions options_;              // read-only after construction
+  SmootherOptions options_;
   std::optional<Time> unanimous_since_;  ///< first stamp of the run of unanimous rejected scans
 };
 

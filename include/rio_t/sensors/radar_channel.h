@@ -86,6 +86,9 @@ class RadarChannel {
   /// Decides about a scan and, if it is used, adds its term to the window.
   RadarAnswer use(const RadarScan& scan, const ScanContext& context, FixedLagSmoother& smoother);
 
+  /// Takes the gate of `options` (the keys innovation_*), and nothing else of them.
+  void tune(const SmootherOptions& options);
+
   Time nodeTime(Time stamp) const { return in_window_.nodeTime(stamp); }
   double offset() const { return in_window_.offset(); }  ///< t_O [s]
   Extrinsics extrinsics() const { return in_window_.extrinsics(); }
@@ -130,7 +133,7 @@ class RadarChannel {
   /// Sets what health and a re-initialisation get from the scan.
   void judge(const RadarScan& scan, const VelocityPrior& prior, double scale, RadarAnswer& answer) const;
 
-  RadarChannelOptions options_;  // read-only after construction
+  RadarChannelOptions options_;  // changed by tune() alone
   EgoVelocityEstimator estimator_;
   RadarInWindow in_window_;
   FeasibilityCheck feasibility_;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "bag_file.h"
+#include "bag_frames.h"
 #include "bag_player.h"
 #include "rio_t/evaluation/errors.h"
 #include "rio_t/odometry/batch_odometry.h"
@@ -135,14 +136,16 @@ class BagJob {
   /// Opens and checks the bags, and makes the output folder.
   explicit BagJob(const BagRun& run)
       : run_(run), files_(runFiles(run.config)), bags_(run.bags), started_(std::chrono::steady_clock::now()) {
-    const Config& config = run.config;
+    const std::map<std::string, std::string> types = bags_.typesByTopic();
+    run_.config = withTopicsOfBag(run.config, types);
+    const Config& config = run_.config;
     std::vector<Wanted> wanted = wantedTopics(config);
     for (const Wanted& want : wanted) topics_.push_back(want.topic);
-    const std::map<std::string, std::string> types = bags_.typesByTopic();
     truth_in_bag_ = config.ground_truth.empty() && types.count(config.ground_truth_topic) != 0;
     if (truth_in_bag_)
       wanted.push_back({"ground_truth_topic", config.ground_truth_topic, "geometry_msgs/PoseStamped"});
     checkTopics(bags_.name(), types, wanted);
+    run_.config = withExtrinsicsOfBag(config, bags_);
     std::tie(begin_, end_) = playedSpan(bags_, config);
     // Before the work, so that a wrong path costs no time.
     if (!config.ground_truth.empty()) truth_ = readTum(config.ground_truth);
@@ -288,7 +291,7 @@ class BagJob {
     return summary;
   }
 
-  const BagRun& run_;
+  BagRun run_;  // with the names that the bag resolves
   const RunFiles files_;
   const Bags bags_;
   std::vector<std::string> topics_;

@@ -426,7 +426,7 @@ void RunOutput::addState(const NavigationState& state) {
   const auto sigmas = [](const auto& variances) {
     return Eigen::Vector3d(variances.cwiseMax(0.0).cwiseSqrt());
   };
-  const Covariance6 pose = poseCovariance(state);
+  const Covariance6 pose = bodyOdometry(state, 0.0).pose_covariance;
   std::string* line = &navigation_.buffer;
   appendStamp(line, state.time);
   appendVector(line, state.v_W, 6);

@@ -299,7 +299,10 @@ PointCloud2 toPointCloud2(const RadarScan& scan, const std::vector<std::size_t>&
   for (const std::size_t index : indices) {
     const RadarPoint& p = scan.points.at(index);
     RadarPointPcl point;
-    point.getVector3fMap() = p.position_R.cast<float>();
+    // From right, forward, up to forward, left, up.
+    point.x = static_cast<float>(p.position_R.y());
+    point.y = static_cast<float>(-p.position_R.x());
+    point.z = static_cast<float>(p.position_R.z());
     point.doppler = static_cast<float>(p.doppler);
     point.snr_db = static_cast<float>(p.snr_db);
     cloud.push_back(point);

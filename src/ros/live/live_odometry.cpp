@@ -33,6 +33,22 @@ std::string withName(const std::string& what, const Config& radar, const std::st
   return radar.radar_name.empty() ? what : what + between + radar.radar_name;
 }
 
+/// The topics with namespace and remappings, for messages to people.
+Config withResolvedTopics(Config config, const ros::NodeHandle& node) {
+  config.imu_topic = node.resolveName(config.imu_topic);
+  config.radar_topic = node.resolveName(config.radar_topic);
+  if (!config.barometer_topic.empty()) config.barometer_topic = node.resolveName(config.barometer_topic);
+  if (!config.trigger_topic.empty()) config.trigger_topic = node.resolveName(config.trigger_topic);
+  for (Config& radar : config.radars) radar = withResolvedTopics(radar, node);
+  return config;
+}
+
+/// The handle with another queue.
+ros::NodeHandle onQueue(ros::NodeHandle node, ros::CallbackQueue* queue) {
+  node.setCallbackQueue(queue);
+  return node;
+}
+
 }  // namespace
 
 LiveOdometry::Radar::Radar(const Config& its_config) : config(its_config), format(pointCloudFormat(config)) {
@@ -42,21 +58,21 @@ LiveOdometry::Radar::Radar(const Config& its_config) : config(its_config), forma
 LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
                            const std::string& name)
     : name_(name),
-      config_(configFromRos(private_node)),
+      told_(configFromRos(private_node)),
+      config_(withResolvedTopics(told_, node)),
       node_(node),
       private_node_(private_node),
       monitor_(config_),
-      publisher_(config_, private_node),
+      publisher_(config_, onQueue(private_node, &input_queue_)),
+      frames_(config_, node, name),
       options_(config_.odometry),
+      live_config_(config_),
       imu_stamps_(options_.imu_input_check.max_bridged_gap, options_.imu_input_check.jump_patience) {
   for (const Config& radar : configsOfRadars(config_)) radars_.emplace_back(radar);
   showEffectiveParameters(private_node_, config_);
   startSessionWhenReady();
-  if (!session_.get()) {
-    tf_.emplace();
-    tf_listener_ = std::make_unique<tf2_ros::TransformListener>(*tf_, node_);
-  }
-  subscribe();
+  addDiagnostics();
+  subscribe(told_);
   solver_ = std::thread([this] { solve(); });
   imu_spinner_.emplace(1, &imu_queue_);
   input_spinner_.emplace(1, &input_queue_);
@@ -91,14 +107,21 @@ LiveOdometry::~LiveOdometry() {
   if (solver_.joinable()) solver_.join();
 }
 
-void LiveOdometry::subscribe() {
+template <typename Callback>
+void LiveOdometry::guarded(const std::string& what, Callback&& callback) {
+  try {
+    callback();
+  } catch (const std::exception& error) {
+    if (isTimeToTell(what)) ROS_ERROR_STREAM(name_ << ": " << what << ": " << error.what());
+  }
+}
+
+void LiveOdometry::subscribe(const Config& told) {
   const ros::TransportHints fast = ros::TransportHints().tcpNoDelay();
-  ros::NodeHandle imu_node(node_);
-  imu_node.setCallbackQueue(&imu_queue_);
-  ros::NodeHandle input_node(node_);
-  input_node.setCallbackQueue(&input_queue_);
-  ros::NodeHandle service_node(private_node_);
-  service_node.setCallbackQueue(&input_queue_);
+  ros::NodeHandle imu_node = onQueue(node_, &imu_queue_);
+  ros::NodeHandle input_node = onQueue(node_, &input_queue_);
+  ros::NodeHandle service_node = onQueue(private_node_, &input_queue_);
+  const std::vector<Config> told_of_radars = configsOfRadars(told);
 
   const auto subscribeTo = [&](ros::NodeHandle& handle, const std::string& topic, std::uint32_t queue,
                                auto callback, auto message) {
@@ -110,25 +133,47 @@ void LiveOdometry::subscribe() {
     Radar& radar = radars_[k];
     if (radar.config.stamp_source == StampSource::kTrigger) {
       radar.triggers = subscribeTo(
-          input_node, radar.config.trigger_topic, kImuQueue,
-          [this, k](const Event<std_msgs::Header>& event) { onTrigger(k, event); }, std_msgs::Header());
+          input_node, told_of_radars[k].trigger_topic, kImuQueue,
+          [this, k](const Event<std_msgs::Header>& event) {
+            guarded("trigger", [&] { onTrigger(k, event); });
+          },
+          std_msgs::Header());
     }
     radar.scans = subscribeTo(
-        input_node, radar.config.radar_topic, kScanQueue,
-        [this, k](const Event<sensor_msgs::PointCloud2>& event) { onScan(k, event); },
+        input_node, told_of_radars[k].radar_topic, kScanQueue,
+        [this, k](const Event<sensor_msgs::PointCloud2>& event) {
+          guarded("scan", [&] { onScan(k, event); });
+        },
         sensor_msgs::PointCloud2());
   }
-  if (!config_.barometer_topic.empty())
+  if (!told.barometer_topic.empty())
     barometer_subscriber_ = subscribeTo(
-        input_node, config_.barometer_topic, kImuQueue,
-        [this](const Event<sensor_msgs::FluidPressure>& event) { onPressure(event); },
+        input_node, told.barometer_topic, kImuQueue,
+        [this](const Event<sensor_msgs::FluidPressure>& event) { guarded("pressure", [&] { onPressure(event); }); },
         sensor_msgs::FluidPressure());
   imu_subscriber_ = subscribeTo(
-      imu_node, config_.imu_topic, kImuQueue, [this](const Event<sensor_msgs::Imu>& event) { onImu(event); },
+      imu_node, told.imu_topic, kImuQueue,
+      [this](const Event<sensor_msgs::Imu>& event) { guarded("IMU", [&] { onImu(event); }); },
       sensor_msgs::Imu());
   reset_server_ = service_node.advertiseService("reset", &LiveOdometry::onReset, this);
   save_server_ = service_node.advertiseService("save_trajectory", &LiveOdometry::onSaveTrajectory, this);
+  reconfigure_ =
+      std::make_unique<dynamic_reconfigure::Server<LiveParameters>>(reconfigure_mutex_, service_node);
+  reconfigure_->setCallback([this](LiveParameters& values, std::uint32_t level) {
+    constexpr std::uint32_t kAtStart = ~0U;
+    if (level == kAtStart) {
+      values = LiveParameters(live_config_);
+    } else {
+      onReconfigure(values);
+    }
+  });
+  const boost::function<void(const ros::WallTimerEvent&)> tell = [this](const ros::WallTimerEvent&) {
+    guarded("diagnostics", [this] { onDiagnosticsTimer(); });
+  };
+  diagnostics_timer_ = service_node.createWallTimer(ros::WallDuration(kDiagnosticPeriod), tell);
+}
 
+void LiveOdometry::addDiagnostics() {
   diagnostics_.emplace(node_, private_node_, name_);
   diagnostics_->setHardwareID("none");
   using Status = LiveMonitor::Status;
@@ -138,7 +183,7 @@ void LiveOdometry::subscribe() {
     diagnostics_->add("barometer", [this](Status& s) { monitor_.describeBarometer(s); });
   if (config_.odometry.platform == Platform::kGroundVehicle)
     diagnostics_->add("ground vehicle", [this](Status& s) { monitor_.describeGroundVehicle(s); });
-  diagnostics_->add("solver", [this](Status& s) { monitor_.describeSolver(s, session_.get().get()); });
+  diagnostics_->add("solver", [this](Status& s) { monitor_.describeSolver(s); });
   for (std::size_t k = 0; k < radars_.size(); ++k) {
     const Config& radar = radars_[k].config;
     diagnostics_->add(withName("time offset", radar),
@@ -147,13 +192,48 @@ void LiveOdometry::subscribe() {
       diagnostics_->add(withName("extrinsics", radar),
                         [this, k](Status& s) { monitor_.describeExtrinsics(s, k); });
   }
-  // A wall timer, and no update() that looks at ROS time: also a clock that stands still is worth a
-  // diagnosis.
-  const boost::function<void(const ros::WallTimerEvent&)> tell = [this](const ros::WallTimerEvent&) {
-    diagnostics_->force_update();
-    tellFaults();
-  };
-  diagnostics_timer_ = service_node.createWallTimer(ros::WallDuration(kDiagnosticPeriod), tell);
+  imu_rate_ = std::make_unique<TopicRate>(config_.imu_topic, *diagnostics_);
+  for (Radar& radar : radars_) {
+    radar.scan_rate = std::make_unique<TopicRate>(radar.config.radar_topic, *diagnostics_);
+    if (radar.config.stamp_source == StampSource::kTrigger)
+      radar.trigger_rate = std::make_unique<TopicRate>(radar.config.trigger_topic, *diagnostics_);
+  }
+}
+
+void LiveOdometry::onDiagnosticsTimer() {
+  const bool runs = session_.get() != nullptr;
+  if (runs) monitor_.waitFor(frames_.waitingFor());
+  const std::string source = frames_.source();
+  monitor_.setFrames({{"imu_frame", frames_.imuFrame().value_or("")}, {"base_extrinsics_from", source}});
+  if (runs && !source.empty()) frames_.stopListening();
+  std::uint64_t published = odom_published_.exchange(0);
+  // Before there is an odometry, its silence is no fault.
+  if (published > 0 && !odom_rate_)
+    odom_rate_ = std::make_unique<TopicRate>(private_node_.resolveName("odom"), *diagnostics_);
+  for (; published > 0; --published) odom_rate_->task.tick();
+  // Not update(), which looks at ROS time: also a clock that stands still is worth a diagnosis.
+  diagnostics_->force_update();
+  tellFaults();
+}
+
+void LiveOdometry::onReconfigure(LiveParameters& values) {
+  std::string refused_because;
+  try {
+    live_config_ = withParameters(live_config_, values.changesFrom(live_config_));
+    publisher_.tune(live_config_);
+    monitor_.tune(live_config_.odometry.imu_noise);
+    const Tuning tuning = tuningOf(live_config_.odometry);
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      apply(tuning, options_);
+    }
+    if (const Session now = session_.get()) now->tune(tuning);
+  } catch (const ConfigError& error) {
+    refused_because = error.what();
+    ROS_ERROR_STREAM(name_ << ": the change of parameters was refused, nothing was changed: " << error.what());
+  }
+  monitor_.reconfigured(refused_because);
+  values = LiveParameters(live_config_);
 }
 
 void LiveOdometry::tellFaults() {
@@ -189,8 +269,7 @@ void LiveOdometry::startSessionWhenReady() {
     }
     T_IR.push_back(*radar.T_IR);
   }
-  publisher_.extrinsics(T_IR);
-  OdometryOptions options = config_.odometry;
+  OdometryOptions options = live_config_.odometry;
   options.T_IR = T_IR.front();
   for (std::size_t k = 0; k < options.radars.size(); ++k) options.radars[k].T_IR = T_IR.at(k);
   monitor_.startWith(T_IR);
@@ -212,7 +291,11 @@ void LiveOdometry::reset(const std::string& reason, bool at_once) {
       options = options_;
     }
     if (at_once) options.init_motion_after = 0.0;
-    session_.replace(std::make_shared<LiveSession>(config_, options));
+    const auto fresh = std::make_shared<LiveSession>(config_, options);
+    session_.replace(fresh);
+    // What was reconfigured meanwhile went to the old session.
+    const std::lock_guard<std::mutex> lock(mutex_);
+    fresh->tune(tuningOf(options_));
   }
   monitor_.reset(reason);
 }
@@ -220,6 +303,7 @@ void LiveOdometry::reset(const std::string& reason, bool at_once) {
 void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
   const auto start = std::chrono::steady_clock::now();
   monitor_.imu();
+  imu_rate_->task.tick();
   try {
     const ImuMeasurement imu = toImuMeasurement(*event.getConstMessage(), config_.imu_topic, config_.imu_units);
     // The same judgement as the session's own, so that the whole session starts again, with what it stamps
@@ -230,26 +314,38 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
       reset(std::string("the IMU's stamps jumped ") + (jump < 0.0 ? "back" : "ahead") + " by " +
                 std::to_string(std::abs(jump)) + " s",
             true);
+      early_imu_.clear();
     }
     if (stamp == ClockJumpDetector::Verdict::kGood || stamp == ClockJumpDetector::Verdict::kRestart)
       newest_imu_ = imu.time;
+    frames_.hear(event.getConstMessage()->header.frame_id);
+    const Received received{imu, toTime(event.getReceiptTime())};
     const Session now = session_.get();
     if (!now) {
+      // The first scan, by which tf names the radar, comes later than the samples that belong to it.
+      early_imu_.push_back(received);
+      if (early_imu_.size() <= kImuQueue) return;
+      early_imu_.pop_front();
       monitor_.imuDropped("imu_before_extrinsics");
       return;
     }
-    const double rate_sigma = now->rateSigma(imu.time);
-    if (const std::optional<NavigationState> state = now->addImu(imu)) {
-      session_.speak(Speaker::kNavigation, now, [&] {
-        publisher_.odometry(*state, rate_sigma);
-        monitor_.odometry(secondsSince(start));
-      });
+    double rate_sigma = 0.0;
+    for (; !early_imu_.empty(); early_imu_.pop_front()) feed(*now, early_imu_.front(), &rate_sigma);
+    if (const std::optional<NavigationState> state = feed(*now, received, &rate_sigma)) {
+      if (const std::optional<BodyOdometry> body = frames_.place(*now, *state, rate_sigma)) {
+        session_.speak(Speaker::kNavigation, now, [&] {
+          if (publisher_.odometry(*body)) ++odom_published_;
+          frames_.published(*body);
+          monitor_.odometry(secondsSince(start));
+        });
+      } else if (!frames_.waitingFor().empty()) {
+        monitor_.imuDropped("odometry_before_base_extrinsics");
+      }
     }
     if (now->imuPilesUp()) {
       reset("the optimisation thread took none of the last " + std::to_string(LiveSession::kMaxWaitingImu) +
             " IMU samples");
     }
-    account(now->stampWithImu(imu.time, toTime(event.getReceiptTime())));
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       rate_sigma_ = rate_sigma;
@@ -257,14 +353,24 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
     wakeSolver();
   } catch (const std::exception& error) {
     monitor_.imuDropped("imu_not_usable");
-    ROS_ERROR_STREAM_THROTTLE(kWarnPeriod, name_ << ": " << error.what());
+    if (isTimeToTell("imu_not_usable")) ROS_ERROR_STREAM(name_ << ": " << error.what());
   }
+}
+
+std::optional<NavigationState> LiveOdometry::feed(LiveSession& session, const Received& received,
+                                                  double* rate_sigma) {
+  *rate_sigma = session.rateSigma(received.imu.time);
+  const std::optional<NavigationState> state = session.addImu(received.imu);
+  account(session.stampWithImu(received.imu.time, received.record));
+  return state;
 }
 
 void LiveOdometry::onScan(std::size_t radar, const Event<sensor_msgs::PointCloud2>& event) {
   const sensor_msgs::PointCloud2& message = *event.getConstMessage();
   Radar& from = radars_[radar];
   monitor_.scan(radar);
+  from.scan_rate->task.tick();
+  std::string what = "cloud_not_usable";  // each has its own turn to be told
   try {
     DecodedScan decoded;
     try {
@@ -274,6 +380,7 @@ void LiveOdometry::onScan(std::size_t radar, const Event<sensor_msgs::PointCloud
     }
     if (decoded.dropped_not_finite > 0)
       monitor_.dropped(radar, "points_not_finite", decoded.dropped_not_finite);
+    what = "frame_not_usable";
     if (!from.T_IR) lookUpExtrinsics(from, message.header.frame_id);
     const Session now = session_.get();
     if (!now) {
@@ -282,12 +389,13 @@ void LiveOdometry::onScan(std::size_t radar, const Event<sensor_msgs::PointCloud
     }
     RadarScan scan = toRadarScan(decoded.cloud, Time());
     scan.radar = radar;
+    what = "stamp_not_usable";
     account(now->addScan(message.header.seq, toTime(message.header.stamp), toTime(event.getReceiptTime()),
                          std::move(scan)));
     wakeSolver();
   } catch (const std::exception& error) {
     monitor_.dropped(radar, "scan_not_usable");
-    if (isTimeToTell("scan of " + from.config.radar_topic))
+    if (isTimeToTell(what + " " + from.config.radar_topic))
       ROS_ERROR_STREAM(beginning(name_, from.config) << error.what());
   }
 }
@@ -305,6 +413,7 @@ void LiveOdometry::onPressure(const Event<sensor_msgs::FluidPressure>& event) {
 
 void LiveOdometry::onTrigger(std::size_t radar, const Event<std_msgs::Header>& event) {
   monitor_.trigger(radar);
+  radars_[radar].trigger_rate->task.tick();
   const Session now = session_.get();
   if (!now) return;
   const std_msgs::Header& trigger = *event.getConstMessage();
@@ -313,15 +422,10 @@ void LiveOdometry::onTrigger(std::size_t radar, const Event<std_msgs::Header>& e
 }
 
 void LiveOdometry::account(const LiveSession::Stamped& stamped) {
-  for (const std::size_t radar : stamped.dropped) {
-    monitor_.dropped(radar, "queue_full");
-    if (isTimeToTell("queue_full"))
-      ROS_WARN_STREAM(name_ << ": the solver falls behind, the oldest scan was dropped (max_queued_scans)");
-  }
   for (const auto& [radar, reason] : stamped.given_up) {
     monitor_.dropped(radar, reason);
     const Config& config = radars_[radar].config;
-    if (isTimeToTell("no stamp for " + config.radar_topic)) {
+    if (isTimeToTell("no stamp for " + config.radar_topic + ": " + reason)) {
       ROS_WARN_STREAM(beginning(name_, config) << "a scan got no stamp: " << reason
                                                << " (stamp_source: " << toString(config.stamp_source)
                                                << ", trigger_topic: " << config.trigger_topic << ")");
@@ -340,33 +444,23 @@ bool LiveOdometry::isTimeToTell(const std::string& what) {
 
 void LiveOdometry::lookUpExtrinsics(Radar& radar, const std::string& cloud_frame) {
   const Config& config = radar.config;
-  const std::string from = cloud_frame.empty() ? config.radar_frame : cloud_frame;
-  if (from == config.radar_frame && config.publish_tf) {
-    std::string why;
-    if (radar.format.axes != PointAxes::kRightForwardUp)
-      why = "whose axes are not those of radar_frame (x right, y forward, z up)";
-    if (config.odometry.smoother.estimate_extrinsics != EstimateExtrinsics::kNone)
-      why = "which has its tf from others, and estimate_extrinsics publishes that of radar_frame";
-    if (!why.empty()) {
-      monitor_.waitFor("another " + (config.radar_name.empty() ? "" : config.radar_name + "/") +
-                       "radar_frame");
-      throw std::runtime_error("radar_frame: \"" + from + "\" is also the frame of the clouds, " + why +
-                               "; expected another name");
-    }
-  }
+  std::string waiting_for;
   try {
-    const Extrinsics T_IR = toExtrinsics(
-        tf_->lookupTransform(config.base_link_frame, from, ros::Time(0)).transform, radar.format.axes);
-    radar.T_IR = T_IR;
-    ROS_INFO_STREAM(name_ << ": " << withName("extrinsics", config) << " from tf " << from << " -> "
-                          << config.base_link_frame << ": translation [" << T_IR.l_I.transpose()
-                          << "], rotation xyzw [" << T_IR.q_IR.coeffs().transpose() << "]");
-    startSessionWhenReady();
-  } catch (const tf2::TransformException& error) {
-    monitor_.waitFor("tf from " + from + " to " + config.base_link_frame + " (" + error.what() + ")");
-    if (isTimeToTell("tf from " + from))
-      ROS_WARN_STREAM(beginning(name_, config) << "waiting for tf: " << error.what());
+    radar.T_IR = frames_.radarExtrinsics(config, cloud_frame, &waiting_for);
+  } catch (const std::exception&) {
+    monitor_.waitFor("a frame of the clouds that tf knows" + withName("", config, " of radar "));
+    throw;
   }
+  if (!radar.T_IR) {
+    monitor_.waitFor(waiting_for);
+    if (isTimeToTell("tf of " + config.radar_topic))
+      ROS_WARN_STREAM(beginning(name_, config) << "waiting for " << waiting_for);
+    return;
+  }
+  ROS_INFO_STREAM(name_ << ": " << withName("extrinsics", config) << " from tf " << cloud_frame << " -> "
+                        << *frames_.imuFrame() << ": translation [" << radar.T_IR->l_I.transpose()
+                        << "], rotation xyzw [" << radar.T_IR->q_IR.coeffs().transpose() << "]");
+  startSessionWhenReady();
 }
 
 bool LiveOdometry::onReset(std_srvs::Empty::Request& /*request*/, std_srvs::Empty::Response& /*response*/) {
@@ -394,16 +488,17 @@ bool LiveOdometry::onSaveTrajectory(std_srvs::Trigger::Request& /*request*/,
   return true;
 }
 
-void LiveOdometry::tellHealth(const ScanResult& result) const {
+void LiveOdometry::tellHealth(const ScanResult& result) {
+  if (result.rejected_because == "queue_full" && isTimeToTell("queue_full"))
+    ROS_WARN_STREAM(name_ << ": the solver falls behind, the oldest scan was dropped (max_queued_scans)");
   if (result.reinitialized) {
     ROS_WARN_STREAM(name_ << ": found the state anew in motion; position and heading go on");
   }
   if (result.ground_vehicle && result.ground_vehicle->is_contradicted)
     ROS_WARN_STREAM(name_ << ": " << kGroundVehicleContradicted);
-  if (result.health == Health::kDiverged) {
-    ROS_ERROR_STREAM_THROTTLE(kWarnPeriod,
-                              name_ << ": diverged, radar and IMU contradict each other: do not trust the "
-                                       "estimate (see diagnostics, on_divergence)");
+  if (result.health == Health::kDiverged && isTimeToTell("diverged")) {
+    ROS_ERROR_STREAM(name_ << ": diverged, radar and IMU contradict each other: do not trust the estimate (see "
+                              "diagnostics, on_divergence)");
   }
 }
 
@@ -442,8 +537,11 @@ void LiveOdometry::solve() {
     try {
       bool more = false;
       for (const LiveSession::Result& result : now->process(&more)) {
+        LivePublisher::Frames frames{frames_.imuFrame().value_or(config_.base_link_frame), frames_.imuInBody(), {}, {}};
+        if (result.result.updated) frames.body = frames_.place(*now, result.result.state, rate_sigma);
+        frames.world = now->world();
         const bool current = session_.speak(Speaker::kOptimisation, now, [&] {
-          publisher_.result(result, rate_sigma);
+          publisher_.result(result, frames);
           tellHealth(result.result);
           monitor_.result(result);
         });

@@ -69,7 +69,8 @@ std::string advice(SolverTermination termination) {
 
 }  // namespace
 
-LiveMonitor::LiveMonitor(const Config& config) : config_(config), collector_(config) {
+LiveMonitor::LiveMonitor(const Config& config)
+    : config_(config), collector_(config), imu_noise_(config.odometry.imu_noise) {
   for (Config& radar : configsOfRadars(config)) radars_.emplace_back(std::move(radar));
 }
 
@@ -119,7 +120,6 @@ void LiveMonitor::trigger(std::size_t radar) {
 
 void LiveMonitor::odometry(double latency) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  ++odometry_.count;
   odometry_latency_.add(latency);
 }
 
@@ -193,6 +193,22 @@ void LiveMonitor::waitFor(const std::string& what) {
   waiting_for_ = what;
 }
 
+void LiveMonitor::setFrames(const std::map<std::string, std::string>& frames) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  frames_ = frames;
+}
+
+void LiveMonitor::tune(const ImuNoise& told) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  imu_noise_ = told;
+}
+
+void LiveMonitor::reconfigured(const std::string& refused_because) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ++reconfigurations_;
+  refused_because_ = refused_because;
+}
+
 void LiveMonitor::addDiagnosis(Status& status, const LiveSession& session) const {
   RunEvidence evidence = collector_.evidence(session.odometry());
   evidence.imu_count = imu_.count;
@@ -210,9 +226,17 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) c
   status.add("initialized", initialized ? "true" : "false");
   status.add("resets", resets_);
   status.add("last_reset_because", last_reset_);
+  if (resets_ > 0)
+    status.add("after_reset", config_.reset_pose == ResetPose::kKeep ? "goes on from the last pose (reset_pose: keep)"
+                                                                     : "starts at the origin (reset_pose: zero)");
+  for (const auto& [key, value] : frames_) status.add(key, value);
+  if (reconfigurations_ > 0) {
+    status.add("reconfigurations", reconfigurations_);
+    status.add("last_reconfiguration", refused_because_.empty() ? "done" : "refused: " + refused_because_);
+  }
   if (session != nullptr) addDiagnosis(status, *session);
-  if (!initialized) {
-    const std::string what = session == nullptr ? waiting_for_ : session->odometry().waitingFor();
+  if (!initialized || !waiting_for_.empty()) {
+    const std::string what = waiting_for_.empty() ? session->odometry().waitingFor() : waiting_for_;
     status.add("waiting_for", what);
     status.summary(DiagnosticStatus::WARN, "initialising, waiting for " + what);
     return;
@@ -229,7 +253,7 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) c
     const auto found = faults.find(name);
     return found == faults.end() ? std::uint64_t{0} : found->second;
   };
-  status.add("initialized_from", toString(odometry.start()->from));
+  if (const auto start = session->start()) status.add("initialized_from", toString(start->from));
   status.add("health", toString(health));
   status.add("divergences", count("diverged"));
   status.add("reinitializations", count("reinitialized"));
@@ -257,16 +281,16 @@ std::string noisyImu(const MeasuredImuNoise& noise, const ImuNoise& told) {
   return text.str();
 }
 
-std::optional<LiveMonitor::Finding> LiveMonitor::describeRadar(Status& status, Radar& radar, double scan_rate,
-                                                               double trigger_rate, bool initialized) const {
+std::optional<LiveMonitor::Finding> LiveMonitor::describeRadar(Status& status, Radar& radar,
+                                                               bool initialized) const {
   const Config& config = radar.config;
   const std::string key = prefix(radar);
-  status.add(key + "scan_rate_hz", scan_rate);
+  const bool is_silent = radar.scans.isSilent();
   status.add(key + "scans", radar.scans.count);
   status.add(key + "scans_used", radar.used);
   for (const auto& [reason, count] : radar.dropped) status.add(key + "dropped_" + reason, count);
   const bool wants_trigger = config.stamp_source == StampSource::kTrigger;
-  if (wants_trigger) status.add(key + "trigger_rate_hz", trigger_rate);
+  if (wants_trigger) status.add(key + "triggers", radar.triggers.count);
 
   const std::optional<std::string> mostly_rejected = judgeUse(radar, initialized);
   const std::string of = radars_.size() == 1 ? "" : called(radar) + ": ";
@@ -277,7 +301,7 @@ std::optional<LiveMonitor::Finding> LiveMonitor::describeRadar(Status& status, R
                    of + "no trigger yet on " + config.trigger_topic +
                        ", and stamp_source is trigger; header and arrival need none"};
   }
-  if (scan_rate == 0.0) {
+  if (is_silent) {
     return Finding{DiagnosticStatus::WARN,
                    called(radar) + " is silent" + (of.empty() ? "" : ", topic " + config.radar_topic)};
   }
@@ -311,17 +335,7 @@ std::optional<std::string> LiveMonitor::judgeUse(Radar& radar, bool initialized)
 
 void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const Clock::time_point now = Clock::now();
-  const double seconds = std::max(1e-3, std::chrono::duration<double>(now - told_).count());
-  told_ = now;
-  const auto hertz = [&](Rate& rate) {
-    const double value = static_cast<double>(rate.count - rate.told) / seconds;
-    rate.told = rate.count;
-    return value;
-  };
-  const double imu_rate = hertz(imu_);
-  status.add("imu_rate_hz", imu_rate);
-  status.add("odometry_rate_hz", hertz(odometry_));
+  const bool imu_is_silent = imu_.isSilent();
   status.add("imu_messages", imu_.count);
   for (const auto& [reason, count] : imu_dropped_) status.add("dropped_" + reason, count);
   if (session != nullptr) {
@@ -330,7 +344,7 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
       if (name != "diverged" && name != "reinitialized") status.add("fault_" + name, count);
     }
   }
-  const ImuNoise& told = config_.odometry.imu_noise;
+  const ImuNoise& told = imu_noise_;
   const MeasuredImuNoise noise = session != nullptr ? session->odometry().imuNoise() : MeasuredImuNoise();
   status.add("imu_accel_noise_measured", noise.accel_density);
   status.add("imu_gyro_noise_measured", noise.gyro_density);
@@ -340,7 +354,7 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   std::uint64_t queue_full = 0;
   for (Radar& radar : radars_) {
     const std::optional<Finding> finding =
-        describeRadar(status, radar, hertz(radar.scans), hertz(radar.triggers), initialized);
+        describeRadar(status, radar, initialized);
     if (finding) findings.push_back(*finding);
     const auto full = radar.dropped.find("queue_full");
     if (full != radar.dropped.end()) queue_full += full->second;
@@ -350,8 +364,8 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
 
   if (imu_.count == 0) {
     status.summary(DiagnosticStatus::ERROR, "no IMU message yet on " + config_.imu_topic);
-  } else if (imu_rate == 0.0 && radars.level < DiagnosticStatus::ERROR) {
-    status.summary(DiagnosticStatus::WARN, "the IMU is silent");
+  } else if (imu_is_silent) {
+    status.summary(DiagnosticStatus::ERROR, "the IMU is silent, topic " + config_.imu_topic);
   } else if (!findings.empty()) {
     status.summary(radars.level, radars.text);
   } else if (queue_full > queue_full_told_) {
@@ -365,7 +379,7 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   queue_full_told_ = queue_full;
 }
 
-void LiveMonitor::describeSolver(Status& status, const LiveSession* session) const {
+void LiveMonitor::describeSolver(Status& status) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   const auto latency = [&](const std::string& name, const Latency& of) {
     status.add(name + "_mean_ms", of.count > 0 ? 1e3 * of.sum / static_cast<double>(of.count) : 0.0);
@@ -375,7 +389,6 @@ void LiveMonitor::describeSolver(Status& status, const LiveSession* session) con
   latency("scan_to_optimised", scan_latency_);
   status.add("updates", updates_);
   for (const auto& [termination, count] : terminations_) status.add(toString(termination), count);
-  if (session != nullptr) status.add("queued_scans", session->queuedScans());
   if (!solver_failure_.empty()) {
     status.summary(DiagnosticStatus::ERROR, solver_failure_);
     return;

@@ -3,6 +3,7 @@
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <sensor_msgs/PointCloud2.h>
 
+#include <boost/make_shared.hpp>
 #include <numeric>
 
 #include "rio_t/TimeOffset.h"
@@ -17,12 +18,18 @@ ros::NodeHandle namespaceOf(const Config& radar, const ros::NodeHandle& private_
   return radar.radar_name.empty() ? private_node : ros::NodeHandle(private_node, radar.radar_name);
 }
 
+/// As a shared pointer.
+template <typename Message>
+void publish(const ros::Publisher& publisher, Message message) {
+  publisher.publish(boost::make_shared<const Message>(std::move(message)));
+}
+
 void publishCloud(const ros::Publisher& publisher, const RadarScan& scan,
-                  const std::vector<std::size_t>& indices, const std::string& frame) {
+                  const std::vector<std::size_t>& indices, const std::string& frame, Time stamp) {
   sensor_msgs::PointCloud2 cloud = toPointCloud2(scan, indices);
-  cloud.header.stamp = toRosTime(scan.stamp);
+  cloud.header.stamp = toRosTime(stamp);
   cloud.header.frame_id = frame;
-  publisher.publish(cloud);
+  publish(publisher, std::move(cloud));
 }
 
 }  // namespace
@@ -34,112 +41,146 @@ LivePublisher::Radar::Radar(const Config& config, const ros::NodeHandle& private
   ros::NodeHandle node = namespaceOf(config, private_node);
   time_offset = node.advertise<TimeOffset>("time_offset", 200);
   ego_velocity = node.advertise<geometry_msgs::TwistWithCovarianceStamped>("ego_velocity", 200);
+  innovation = node.advertise<geometry_msgs::TwistWithCovarianceStamped>("innovation", 200);
   points = node.advertise<sensor_msgs::PointCloud2>("points", 20);
   inliers = node.advertise<sensor_msgs::PointCloud2>("inliers", 20);
   if (config.odometry.smoother.estimate_extrinsics != EstimateExtrinsics::kNone)
     extrinsics = node.advertise<geometry_msgs::PoseWithCovarianceStamped>("extrinsics", 200);
 }
 
-LivePublisher::LivePublisher(const Config& config, const ros::NodeHandle& private_node) : config_(config) {
+LivePublisher::LivePublisher(const Config& config, const ros::NodeHandle& private_node)
+    : config_(config),
+      odom_rate_(config.odom_rate),
+      tf_rate_(config.tf_rate),
+      correct_stamps_(config.correct_stamps),
+      path_max_poses_(config.path_max_poses) {
   for (const Config& radar : configsOfRadars(config)) radars_.emplace_back(radar, private_node);
   ros::NodeHandle node = private_node;
   odom_ = node.advertise<nav_msgs::Odometry>("odom", 2000);
   odom_optimized_ = node.advertise<nav_msgs::Odometry>("odom_optimized", 200);
-  path_ = node.advertise<nav_msgs::Path>("path", 1, true);
+  // Not latched: that would serialise the whole path with each scan. Who comes late gets it at once.
+  path_ = node.advertise<nav_msgs::Path>(
+      "path", 1, [this](const ros::SingleSubscriberPublisher& subscriber) { publishPathTo(subscriber); });
   imu_bias_ = node.advertise<ImuBias>("imu_bias", 200);
   if (config_.odometry.landmarks.enabled) map_ = node.advertise<sensor_msgs::PointCloud2>("map", 1, true);
   path_message_.header.frame_id = config_.odom_frame;
-  if (config_.publish_tf) {
-    tf_.emplace();
+  if (config_.publish_tf) tf_.emplace();
+  if (config_.publish_radar_tf) {
     radar_tf_.emplace();
     static_tf_.emplace();
   }
 }
 
-void LivePublisher::odometry(const NavigationState& state, double rate_sigma) {
-  odom_.publish(toOdometry(state, rate_sigma, config_.odom_frame, config_.base_link_frame));
-  if (tf_)
-    tf_->sendTransform(toTransform(state, config_.odom_frame, config_.base_link_frame, config_.invert_tf));
+void LivePublisher::tune(const Config& config) {
+  odom_rate_.set(config.odom_rate);
+  tf_rate_.set(config.tf_rate);
+  correct_stamps_ = config.correct_stamps;
+  path_max_poses_ = config.path_max_poses;
 }
 
-void LivePublisher::result(const LiveSession::Result& live, double rate_sigma) {
+bool LivePublisher::odometry(const BodyOdometry& body) {
+  if (tf_ && tf_rate_.isDue(body.time))
+    tf_->sendTransform(toTransform(body, config_.odom_frame, config_.base_link_frame, config_.invert_tf));
+  if (!odom_rate_.isDue(body.time)) return false;
+  publish(odom_, toOdometry(body, config_.odom_frame, config_.base_link_frame));
+  return true;
+}
+
+void LivePublisher::result(const LiveSession::Result& live, const Frames& frames) {
   const ScanResult& result = live.result;
-  const Radar& radar = radars_.at(result.scan.radar);
-  if (radar.extrinsics) extrinsicsOf(radar, live);  // first: who shows a cloud needs its tf
+  Radar& radar = radars_.at(result.scan.radar);
+  const Time stamp = correct_stamps_ ? live.measured_at : result.scan.stamp;
+  radarFrame(radar, live, frames, stamp);  // first: who shows a cloud needs its tf
   if (isValid(result.ego_velocity.status))
-    radar.ego_velocity.publish(toTwist(result.ego_velocity, result.scan.stamp, radar.frame));
+    publish(radar.ego_velocity, toTwist(result.ego_velocity.v_R, result.ego_velocity.covariance, stamp, radar.frame));
+  if (result.innovation)
+    publish(radar.innovation, toTwist(result.innovation->d, result.innovation->S, stamp, radar.frame));
   if (radar.points.getNumSubscribers() > 0) {
     std::vector<std::size_t> all(result.scan.points.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
-    publishCloud(radar.points, result.scan, all, radar.frame);
+    publishCloud(radar.points, result.scan, all, radar.frame, stamp);
   }
   if (radar.inliers.getNumSubscribers() > 0 && isValid(result.ego_velocity.status))
-    publishCloud(radar.inliers, result.scan, result.ego_velocity.inliers, radar.frame);
+    publishCloud(radar.inliers, result.scan, result.ego_velocity.inliers, radar.frame, stamp);
   if (!result.updated) return;
-  if (map_ && result.landmarks) map(result);
-  odom_optimized_.publish(toOdometry(result.state, rate_sigma, config_.odom_frame, config_.base_link_frame));
-  imu_bias_.publish(toImuBias(result.state, config_.base_link_frame));
+  if (map_ && result.landmarks && frames.world) map(result, *frames.world);
+  publish(imu_bias_, toImuBias(result.state, frames.imu));
   TimeOffset offset;
   offset.header.stamp = toRosTime(result.scan.stamp);
   offset.header.frame_id = radar.frame;
   offset.offset = result.time_offset;
   offset.sigma = result.time_offset_sigma;
   offset.observable = static_cast<std::uint8_t>(live.offset_observable);
-  radar.time_offset.publish(offset);
-  extendPath(result.state);
+  publish(radar.time_offset, offset);
+  if (radar.extrinsics)
+    publish(*radar.extrinsics, toPose(result.T_IR, result.T_IR_covariance, stamp, frames.imu));
+  if (!frames.body) return;
+  publish(odom_optimized_, toOdometry(*frames.body, config_.odom_frame, config_.base_link_frame));
+  extendPath(*frames.body);
 }
 
-void LivePublisher::extrinsicsOf(const Radar& radar, const LiveSession::Result& live) {
-  const ScanResult& result = live.result;
-  if (result.updated) {
-    radar.extrinsics->publish(
-        toPose(result.T_IR, result.T_IR_covariance, result.scan.stamp, config_.base_link_frame));
+void LivePublisher::radarFrame(Radar& radar, const LiveSession::Result& live, const Frames& frames,
+                               Time stamp) {
+  if (!frames.T_BI || !radar_tf_) return;
+  geometry_msgs::TransformStamped transform =
+      toTransform(live.T_IR, *frames.T_BI, config_.base_link_frame, radar.frame);
+  if (!radar.extrinsics) {
+    if (radar.has_static_tf) return;
+    transform.header.stamp = ros::Time::now();
+    static_tf_->sendTransform(transform);
+    radar.has_static_tf = true;
+    return;
   }
   // A stamp ahead of the IMU would make tf forget all that is older than it. Before the state is there, no
   // stamp has been judged.
-  const std::string& why_not = result.rejected_because;
-  if (!radar_tf_ || why_not == "stamp_ahead_of_imu" || why_not == "before_initialization") return;
+  const std::string& why_not = live.result.rejected_because;
+  if (why_not == "stamp_ahead_of_imu" || why_not == "before_initialization") return;
   // Also with a scan that is rejected: its cloud is shown.
-  geometry_msgs::TransformStamped transform = toTransform(live.T_IR, config_.base_link_frame, radar.frame);
-  transform.header.stamp = toRosTime(result.scan.stamp);
+  transform.header.stamp = toRosTime(stamp);
   radar_tf_->sendTransform(transform);
 }
 
-void LivePublisher::map(const ScanResult& result) {
-  sensor_msgs::PointCloud2 cloud = toPointCloud2(result.landmarks->map);
+void LivePublisher::map(const ScanResult& result, const WorldInOdom& T_OW) {
+  sensor_msgs::PointCloud2 cloud = toPointCloud2(result.landmarks->map, T_OW);
   cloud.header.stamp = toRosTime(result.state.time);
   cloud.header.frame_id = config_.odom_frame;
-  map_->publish(cloud);
+  publish(*map_, std::move(cloud));
 }
 
-void LivePublisher::extendPath(const NavigationState& state) {
-  const nav_msgs::Odometry odom = toOdometry(state, 0.0, config_.odom_frame, config_.base_link_frame);
+void LivePublisher::extendPath(const BodyOdometry& body) {
   geometry_msgs::PoseStamped pose;
+  const nav_msgs::Odometry odom = toOdometry(body, config_.odom_frame, config_.base_link_frame);
   pose.header = odom.header;
   pose.pose = odom.pose.pose;
-  path_message_.header.stamp = odom.header.stamp;
-  std::vector<geometry_msgs::PoseStamped>& poses = path_message_.poses;
-  // A scan that comes late updates the same newest state once more.
-  if (!poses.empty() && poses.back().header.stamp == pose.header.stamp) poses.pop_back();
-  poses.push_back(pose);
-  if (poses.size() > config_.path_max_poses) poses.erase(poses.begin());
-  if (path_.getNumSubscribers() > 0) path_.publish(path_message_);
+  {
+    const std::lock_guard<std::mutex> lock(path_mutex_);
+    path_message_.header.stamp = odom.header.stamp;
+    std::vector<geometry_msgs::PoseStamped>& poses = path_message_.poses;
+    // A scan that comes late updates the same newest state once more.
+    if (!poses.empty() && poses.back().header.stamp == pose.header.stamp) poses.pop_back();
+    poses.push_back(pose);
+    const std::size_t most = path_max_poses_;
+    if (poses.size() > most) poses.erase(poses.begin(), poses.end() - static_cast<std::ptrdiff_t>(most));
+  }
+  if (path_.getNumSubscribers() > 0) publish(path_, path());
+}
+
+nav_msgs::Path LivePublisher::path() {
+  const std::lock_guard<std::mutex> lock(path_mutex_);
+  return path_message_;
+}
+
+void LivePublisher::publishPathTo(const ros::SingleSubscriberPublisher& subscriber) {
+  const nav_msgs::Path so_far = path();
+  if (!so_far.poses.empty()) subscriber.publish(so_far);
 }
 
 void LivePublisher::clearPath() {
-  path_message_.poses.clear();
-  path_.publish(path_message_);
-}
-
-void LivePublisher::extrinsics(const std::vector<Extrinsics>& T_IR) {
-  if (!static_tf_) return;
-  for (std::size_t k = 0; k < radars_.size(); ++k) {
-    if (radars_[k].extrinsics) continue;
-    geometry_msgs::TransformStamped transform =
-        toTransform(T_IR.at(k), config_.base_link_frame, radars_[k].frame);
-    transform.header.stamp = ros::Time::now();
-    static_tf_->sendTransform(transform);
+  {
+    const std::lock_guard<std::mutex> lock(path_mutex_);
+    path_message_.poses.clear();
   }
+  publish(path_, path());
 }
 
 }  // namespace rio_t

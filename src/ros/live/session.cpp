@@ -13,11 +13,11 @@ constexpr std::size_t kMaxScansInFlight = 1000;  // bounds the memory of arrival
 }  // namespace
 
 LiveSession::LiveSession(const Config& config, const OdometryOptions& options)
-    : gyro_density_(options.imu_noise.gyro_density), odometry_(options), queue_(options.max_queued_scans) {
+    : gyro_density_(options.imu_noise.gyro_density), odometry_(options) {
   for (const Config& radar : configsOfRadars(config)) {
     const Extrinsics T_IR = optionsOfRadar(options, radars_.size()).T_IR;
     stampers_.push_back({ScanStamper(stampingOptions(radar)), {}});
-    radars_.push_back({OffsetObservability(kObservabilityWindow, kObservableSigma), T_IR});
+    radars_.push_back({OffsetObservability(kObservabilityWindow, kObservableSigma), T_IR, std::nullopt});
   }
 }
 
@@ -63,8 +63,9 @@ void LiveSession::takeStamped(std::size_t radar, Stamped* stamped) {
   Stamper& from = stampers_[radar];
   for (RadarScan& scan : from.stamper.take()) {
     ++stamped->queued;
-    const std::optional<RadarScan> dropped = queue_.push({std::move(scan), Clock::now()});
-    if (dropped) stamped->dropped.push_back(dropped->radar);
+    if (arrivals_.size() >= kMaxScansInFlight) arrivals_.clear();
+    arrivals_[{scan.radar, scan.stamp.nanoseconds()}] = Clock::now();
+    odometry_.addScan(std::move(scan));
   }
   if (from.stamper.givenUp() == from.given_up) return;
   for (const auto& [reason, count] : from.stamper.givenUp()) {
@@ -74,27 +75,27 @@ void LiveSession::takeStamped(std::size_t radar, Stamped* stamped) {
 }
 
 std::vector<LiveSession::Result> LiveSession::process(bool* more) {
-  std::optional<ScanQueue::Item> item = queue_.pop();
-  *more = item.has_value();
-  if (item) {
-    if (arrivals_.size() >= kMaxScansInFlight) arrivals_.clear();
-    arrivals_[{item->scan.radar, item->scan.stamp.nanoseconds()}] = item->arrival;
-    odometry_.addScan(std::move(item->scan));
-  }
   std::vector<Result> results;
   waiting_imu_ = 0;
-  for (ScanResult& scan_result : odometry_.process()) {
+  for (ScanResult& scan_result : odometry_.process(1)) {
     Result result;
     const RadarScan& scan = scan_result.scan;
     Radar& radar = radars_.at(scan.radar);
     radar.observability.add(scan_result);
     result.offset_observable = radar.observability.observable();
-    if (scan_result.updated) radar.T_IR = scan_result.T_IR;
+    if (scan_result.updated) {
+      radar.T_IR = scan_result.T_IR;
+      radar.time_offset = scan_result.time_offset;
+    }
     result.T_IR = radar.T_IR;
-    const auto arrival = arrivals_.find({scan.radar, scan.stamp.nanoseconds()});
-    if (arrival != arrivals_.end()) {
-      result.latency = std::chrono::duration<double>(Clock::now() - arrival->second).count();
-      arrivals_.erase(arrival);
+    result.measured_at = scan.stamp - radar.time_offset.value_or(0.0);
+    {
+      const std::lock_guard<std::mutex> lock(stamper_mutex_);
+      const auto arrival = arrivals_.find({scan.radar, scan.stamp.nanoseconds()});
+      if (arrival != arrivals_.end()) {
+        result.latency = std::chrono::duration<double>(Clock::now() - arrival->second).count();
+        arrivals_.erase(arrival);
+      }
     }
     if (scan_result.updated) {
       const std::lock_guard<std::mutex> lock(trajectory_mutex_);
@@ -104,7 +105,25 @@ std::vector<LiveSession::Result> LiveSession::process(bool* more) {
     result.result = std::move(scan_result);
     results.push_back(std::move(result));
   }
+  *more = !results.empty();
+  const std::lock_guard<std::mutex> lock(start_mutex_);
+  if (!start_) start_ = odometry_.start();
   return results;
+}
+
+std::optional<RadarInertialOdometry::Start> LiveSession::start() const {
+  const std::lock_guard<std::mutex> lock(start_mutex_);
+  return start_;
+}
+
+std::optional<WorldInOdom> LiveSession::world() const {
+  const std::lock_guard<std::mutex> lock(start_mutex_);
+  return world_;
+}
+
+void LiveSession::setWorld(const WorldInOdom& T_OW) {
+  const std::lock_guard<std::mutex> lock(start_mutex_);
+  world_ = T_OW;
 }
 
 Trajectory LiveSession::trajectory(std::size_t* stride) const {

@@ -9,7 +9,6 @@
 #include <limits>
 #include <stdexcept>
 
-#include "rio_t/core/so3.h"
 #include "rio_t/factors/state_block.h"
 
 namespace rio_t {
@@ -55,67 +54,52 @@ Pressure toPressure(const sensor_msgs::FluidPressure& message, const std::string
   return pressure;
 }
 
-Covariance6 poseCovariance(const NavigationState& state) {
-  Eigen::Matrix<double, 6, 15> J = Eigen::Matrix<double, 6, 15>::Zero();
-  J.block<3, 3>(0, S::kP).setIdentity();
-  J.block<3, 3>(3, S::kTheta) = state.q_WI.toRotationMatrix();
-  return J * state.covariance * J.transpose();
-}
-
-Covariance6 twistCovariance(const NavigationState& state, double rate_sigma) {
-  const Eigen::Matrix3d R_IW = state.q_WI.conjugate().toRotationMatrix();
-  Eigen::Matrix<double, 6, 15> J = Eigen::Matrix<double, 6, 15>::Zero();
-  J.block<3, 3>(0, S::kTheta) = so3::hat(R_IW * state.v_W);
-  J.block<3, 3>(0, S::kV) = R_IW;
-  J.block<3, 3>(3, S::kBg) = -Eigen::Matrix3d::Identity();
-  Covariance6 covariance = J * state.covariance * J.transpose();
-  covariance.diagonal().tail<3>().array() += rate_sigma * rate_sigma;
-  return covariance;
-}
-
-nav_msgs::Odometry toOdometry(const NavigationState& state, double rate_sigma, const std::string& odom_frame,
+nav_msgs::Odometry toOdometry(const BodyOdometry& body, const std::string& odom_frame,
                               const std::string& base_link_frame) {
   nav_msgs::Odometry message;
-  message.header.stamp = toRosTime(state.time);
+  message.header.stamp = toRosTime(body.time);
   message.header.frame_id = odom_frame;
   message.child_frame_id = base_link_frame;
-  message.pose.pose.position = tf2::toMsg(state.p_W);
-  message.pose.pose.orientation = tf2::toMsg(state.q_WI);
-  assign(poseCovariance(state), &message.pose.covariance);
-  tf2::toMsg(state.q_WI.conjugate() * state.v_W, message.twist.twist.linear);
-  tf2::toMsg(state.angular_velocity, message.twist.twist.angular);
-  assign(twistCovariance(state, rate_sigma), &message.twist.covariance);
+  message.pose.pose.position = tf2::toMsg(body.p_O);
+  message.pose.pose.orientation = tf2::toMsg(body.q_OB);
+  assign(body.pose_covariance, &message.pose.covariance);
+  tf2::toMsg(body.v_B, message.twist.twist.linear);
+  tf2::toMsg(body.omega_B, message.twist.twist.angular);
+  assign(body.twist_covariance, &message.twist.covariance);
   return message;
 }
 
-geometry_msgs::TransformStamped toTransform(const NavigationState& state, const std::string& odom_frame,
+geometry_msgs::TransformStamped toTransform(const BodyOdometry& body, const std::string& odom_frame,
                                             const std::string& base_link_frame, bool inverted) {
   geometry_msgs::TransformStamped transform;
-  transform.header.stamp = toRosTime(state.time);
+  transform.header.stamp = toRosTime(body.time);
   transform.header.frame_id = inverted ? base_link_frame : odom_frame;
   transform.child_frame_id = inverted ? odom_frame : base_link_frame;
-  const Eigen::Quaterniond q = inverted ? state.q_WI.conjugate() : state.q_WI;
-  tf2::toMsg(inverted ? Eigen::Vector3d(-(q * state.p_W)) : state.p_W, transform.transform.translation);
+  const Eigen::Quaterniond q = inverted ? body.q_OB.conjugate() : body.q_OB;
+  tf2::toMsg(inverted ? Eigen::Vector3d(-(q * body.p_O)) : body.p_O, transform.transform.translation);
   transform.transform.rotation = tf2::toMsg(q);
   return transform;
 }
 
-geometry_msgs::TwistWithCovarianceStamped toTwist(const EgoVelocity& ego_velocity, Time stamp,
-                                                  const std::string& radar_frame) {
+Eigen::Quaterniond radarFrameAxes() { return cloudFromRfu(PointAxes::kForwardLeftUp); }
+
+geometry_msgs::TwistWithCovarianceStamped toTwist(const Eigen::Vector3d& v_R, const Eigen::Matrix3d& covariance,
+                                                  Time stamp, const std::string& radar_frame) {
   geometry_msgs::TwistWithCovarianceStamped message;
   message.header.stamp = toRosTime(stamp);
   message.header.frame_id = radar_frame;
-  tf2::toMsg(ego_velocity.v_R, message.twist.twist.linear);
-  Covariance6 covariance = -Covariance6::Identity();
-  covariance.topLeftCorner<3, 3>() = ego_velocity.covariance;
-  assign(covariance, &message.twist.covariance);
+  const Eigen::Matrix3d axes = radarFrameAxes().toRotationMatrix();
+  tf2::toMsg(Eigen::Vector3d(axes * v_R), message.twist.twist.linear);
+  Covariance6 both = kUnknownVariance * Covariance6::Identity();
+  both.topLeftCorner<3, 3>() = axes * covariance * axes.transpose();
+  assign(both, &message.twist.covariance);
   return message;
 }
 
-ImuBias toImuBias(const NavigationState& state, const std::string& base_link_frame) {
+ImuBias toImuBias(const NavigationState& state, const std::string& imu_frame) {
   ImuBias message;
   message.header.stamp = toRosTime(state.time);
-  message.header.frame_id = base_link_frame;
+  message.header.frame_id = imu_frame;
   for (int axis = 0; axis < 3; ++axis) {
     const auto k = static_cast<std::size_t>(axis);
     message.gyroscope[k] = state.b_g[axis];
@@ -126,38 +110,48 @@ ImuBias toImuBias(const NavigationState& state, const std::string& base_link_fra
   return message;
 }
 
-Extrinsics toExtrinsics(const geometry_msgs::Transform& T_base_cloud, PointAxes axes) {
+Extrinsics toExtrinsics(const geometry_msgs::Transform& T_imu_cloud, PointAxes axes) {
   const Eigen::Quaterniond q_cloud_R = cloudFromRfu(axes);
-  Eigen::Quaterniond q_base_cloud;
-  tf2::fromMsg(T_base_cloud.rotation, q_base_cloud);
+  Eigen::Quaterniond q_imu_cloud;
+  tf2::fromMsg(T_imu_cloud.rotation, q_imu_cloud);
   Extrinsics T_IR;
-  tf2::fromMsg(T_base_cloud.translation, T_IR.l_I);
-  T_IR.q_IR = (q_base_cloud.normalized() * q_cloud_R).normalized();
+  tf2::fromMsg(T_imu_cloud.translation, T_IR.l_I);
+  T_IR.q_IR = (q_imu_cloud.normalized() * q_cloud_R).normalized();
   return T_IR;
 }
 
+ImuInBody toImuInBody(const geometry_msgs::Transform& T_base_imu) {
+  ImuInBody T_BI;
+  tf2::fromMsg(T_base_imu.translation, T_BI.p_B);
+  tf2::fromMsg(T_base_imu.rotation, T_BI.q_BI);
+  T_BI.q_BI.normalize();
+  return T_BI;
+}
+
 geometry_msgs::PoseWithCovarianceStamped toPose(const Extrinsics& T_IR, const Covariance6& covariance,
-                                                Time stamp, const std::string& base_link_frame) {
+                                                Time stamp, const std::string& imu_frame) {
   geometry_msgs::PoseWithCovarianceStamped message;
   message.header.stamp = toRosTime(stamp);
-  message.header.frame_id = base_link_frame;
+  message.header.frame_id = imu_frame;
   message.pose.pose.position = tf2::toMsg(T_IR.l_I);
   message.pose.pose.orientation = tf2::toMsg(T_IR.q_IR);
   assign(covariance, &message.pose.covariance);
   return message;
 }
 
-geometry_msgs::TransformStamped toTransform(const Extrinsics& T_IR, const std::string& base_link_frame,
+geometry_msgs::TransformStamped toTransform(const Extrinsics& T_IR, const ImuInBody& T_BI,
+                                            const std::string& base_link_frame,
                                             const std::string& radar_frame) {
   geometry_msgs::TransformStamped transform;
   transform.header.frame_id = base_link_frame;
   transform.child_frame_id = radar_frame;
-  tf2::toMsg(T_IR.l_I, transform.transform.translation);
-  transform.transform.rotation = tf2::toMsg(T_IR.q_IR);
+  tf2::toMsg(Eigen::Vector3d(T_BI.p_B + T_BI.q_BI * T_IR.l_I), transform.transform.translation);
+  transform.transform.rotation =
+      tf2::toMsg((T_BI.q_BI * T_IR.q_IR * radarFrameAxes().conjugate()).normalized());
   return transform;
 }
 
-sensor_msgs::PointCloud2 toPointCloud2(const std::vector<LandmarkPoint>& map) {
+sensor_msgs::PointCloud2 toPointCloud2(const std::vector<LandmarkPoint>& map, const WorldInOdom& T_OW) {
   sensor_msgs::PointCloud2 cloud;
   cloud.height = 1;
   sensor_msgs::PointCloud2Modifier modifier(cloud);
@@ -167,7 +161,8 @@ sensor_msgs::PointCloud2 toPointCloud2(const std::vector<LandmarkPoint>& map) {
   modifier.resize(map.size());
   sensor_msgs::PointCloud2Iterator<float> field(cloud, "x");
   for (const LandmarkPoint& point : map) {
-    for (int i = 0; i < 3; ++i) field[i] = static_cast<float>(point.p_W[i]);
+    const Eigen::Vector3d p_O = T_OW.p_O + T_OW.q_OW * point.p_W;
+    for (int i = 0; i < 3; ++i) field[i] = static_cast<float>(p_O[i]);
     field[3] = static_cast<float>(point.sigma);
     field[4] = static_cast<float>(point.snr_db);
     field[5] = static_cast<float>(point.sightings);

@@ -55,21 +55,52 @@ void listStamps(ParameterList& list, Config& c) {
 void listFrames(ParameterList& list, Config& c) {
   list.group("Frames");
   list.text("odom_frame", c.odom_frame,
-            "This is the name of the world frame. Its z axis points up. It starts at the first pose of the IMU.");
+            "This is the name of the world frame. Its z axis points up. It starts at the first pose of "
+            "base_link_frame.");
   list.first().text("base_link_frame", c.base_link_frame,
-                    "This is the name of the frame of the IMU, whose pose is estimated. Set it to the frame of your "
-                    "IMU, such as imu_link.");
+                    "This is the body whose odometry the live node publishes. The IMU may sit elsewhere on it.");
+  list.textOrEmpty("imu_frame", c.imu_frame,
+                   "This is the name of the frame of the IMU. If it is empty, the frame_id of the IMU's messages "
+                   "names it. Set it if your driver writes a frame that tf does not know.");
+  list.choice<BaseExtrinsicsSource>(
+      "base_extrinsics_source",
+      {{"auto", BaseExtrinsicsSource::kAuto},
+       {"parameters", BaseExtrinsicsSource::kParameters},
+       {"tf", BaseExtrinsicsSource::kTf}},
+      c.base_extrinsics_source,
+      "This says where the live node takes the pose of the IMU in base_link_frame from. parameters takes the next "
+      "two keys. tf waits for the transform from the frame of the IMU to base_link_frame. auto takes tf if it is "
+      "there when the odometry starts, and the next two keys if not.");
+  list.vector3("base_extrinsics_translation", "m", between(-100, 100), c.T_BI.p_B,
+               "This is the position of the IMU in base_link_frame, x, y, z.");
+  list.rotation("base_extrinsics_rotation_xyzw", c.T_BI.q_BI,
+                "This quaternion turns vectors of the IMU into base_link_frame.");
   list.ofRadar(true);
   list.text("radar_frame", c.radar_frame,
-            "This is the name of the frame that the node publishes for the radar: x right, y forward, z up. With "
-            "several radars the default is radar_NAME. Change it if your URDF has a frame of that name.");
+            "This is the frame in which the live node shows what the radar sees: x forward, y left, z up. With "
+            "several radars the default is rio_t_radar_NAME. Nobody else may publish a transform of it.");
   list.ofRadar(false);
   list.boolean("publish_tf", c.publish_tf,
                "The live node publishes the transform from odom_frame to base_link_frame. Set it to false if "
                "another node, such as robot_localization, publishes it.");
+  list.boolean("publish_radar_tf", c.publish_radar_tf,
+               "The live node publishes the transform from base_link_frame to radar_frame. Set it to false if "
+               "radar_frame is a frame of your URDF.");
   list.boolean("invert_tf", c.invert_tf,
                "The live node publishes the transform from base_link_frame to odom_frame instead. Set it to true if "
                "base_link_frame already has another parent, since a frame can have only one.");
+  list.number("tf_rate", "Hz", atLeast(0), c.tf_rate,
+              "The live node publishes the transform of odom_frame this often. 0 means with each IMU sample. 50 is "
+              "enough for most consumers of tf.");
+  list.number("odom_rate", "Hz", atLeast(0), c.odom_rate,
+              "The live node publishes ~odom this often. 0 means with each IMU sample. Use 30 to 50 for an "
+              "autopilot.");
+  list.boolean("correct_stamps", c.correct_stamps,
+               "What the live node publishes of a scan has the time of measurement as its stamp: the stamp of the "
+               "scan minus the time offset. Set it to false to keep the stamps of the driver.");
+  list.choice<ResetPose>("reset_pose", {{"keep", ResetPose::kKeep}, {"zero", ResetPose::kZero}}, c.reset_pose,
+                         "This says where the odometry of the live node goes on after a reset. keep goes on at the "
+                         "last pose. zero starts at the origin of odom_frame.");
 }
 
 void listPointCloud(ParameterList& list, Config& c) {
@@ -123,8 +154,8 @@ void listExtrinsics(ParameterList& list, Config& c) {
       "extrinsics_source", {{"parameters", ExtrinsicsSource::kParameters}, {"tf", ExtrinsicsSource::kTf}},
       c.extrinsics_source,
       "This says where the mounting of the radar comes from. parameters takes the keys of this section. tf takes "
-      "the transform from the frame_id of the cloud to base_link_frame, in the axes of the cloud. Only the live "
-      "node can take it from tf.");
+      "the transform from the frame_id of the cloud to the frame of the IMU, in the axes of the cloud. rio_t_bag "
+      "takes it from the tf in the bag.");
   list.first().vector3("extrinsics_translation", "m", between(-100, 100), c.odometry.T_IR.l_I,
                        "This is the position of the radar in the IMU frame, x, y, z. A tape measure is good enough: "
                        "1 cm of error matters only if the platform turns fast.");

@@ -186,6 +186,12 @@ void setRadars(const SortedEntries& sorted, const Config& top_level, std::vector
 /// What single values of one radar cannot show.
 void addContradictions(const Config& config, std::vector<std::string>* faults) {
   const std::string section = config.radar_name.empty() ? "" : config.radar_name + "/";
+  if (config.odom_frame == config.base_link_frame)
+    faults->push_back("odom_frame: expected another frame than base_link_frame, got \"" + config.odom_frame +
+                      "\" for both");
+  if (config.radar_frame == config.base_link_frame || config.radar_frame == config.odom_frame)
+    faults->push_back(section + "radar_frame: expected a frame of its own, got \"" + config.radar_frame +
+                      "\" as base_link_frame or odom_frame");
   const EgoVelocityOptions& radar = config.odometry.ego_velocity;
   const SmootherOptions& smoother = config.odometry.smoother;
   if (radar.min_range >= radar.max_range) {
@@ -255,7 +261,7 @@ Config withoutSection(const Config& top_level, const std::string& name) {
   Config config = top_level;
   config.radars.clear();
   config.radar_name = name;
-  config.radar_frame = "radar_" + name;
+  config.radar_frame = "rio_t_radar_" + name;
   return config;
 }
 
@@ -331,6 +337,38 @@ Config makeConfig(const ParameterEntries& entries) {
   if (faults.empty()) faults = contradictions(config);
   if (!faults.empty()) throw ConfigError(std::move(faults));
   return config;
+}
+
+Config withParameters(const Config& config, const ParameterEntries& entries) {
+  Config changed = config;
+  std::vector<std::string> faults;
+  const auto set = [&](Config& each, std::vector<std::string>* faults_of_each) {
+    const ParameterList list = parametersOf(each);
+    for (const ParameterEntry& entry : entries) setParameter(entry, "", list, faults_of_each);
+  };
+  set(changed, &faults);
+  // The same faults again.
+  std::vector<std::string> again;
+  for (Config& radar : changed.radars) set(radar, &again);
+  if (faults.empty()) faults = contradictions(changed);
+  if (!faults.empty()) throw ConfigError(std::move(faults));
+  return changed;
+}
+
+ParameterValue parameterValue(const Config& config, const std::string& key) {
+  Config copy = config;  // the list wants members that it could set
+  const ParameterList list = parametersOf(copy);
+  const Parameter* parameter = find(list, key);
+  if (parameter == nullptr) throw std::invalid_argument("no parameter \"" + key + "\"");
+  return parameter->get();
+}
+
+const std::vector<std::string>& liveKeys() {
+  static const std::vector<std::string> keys = {
+      "imu_accel_noise_density", "imu_gyro_noise_density",  "imu_accel_random_walk", "imu_gyro_random_walk",
+      "innovation_gate",         "innovation_model_error",  "innovation_gate_timeout",
+      "odom_rate",               "tf_rate",                 "path_max_poses",        "correct_stamps"};
+  return keys;
 }
 
 std::string findConfigFile(const std::string& name_or_path) {

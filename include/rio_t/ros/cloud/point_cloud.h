@@ -25,8 +25,9 @@ DecodedScan decode(const sensor_msgs::PointCloud2& message, const PointCloudForm
 /// For the estimator. `stamp` is the scan's time in the IMU clock.
 RadarScan toRadarScan(const pcl::PointCloud<RadarPointPcl>& cloud, Time stamp);
 
-/// The chosen points (indices into scan.points) as a cloud of fields x y z doppler snr_db, RIO axes, for
-/// display. An index past the end throws std::out_of_range. The header is left to the caller.
+/// The chosen points (indices into scan.points) as a cloud of fields x y z doppler snr_db, in the axes of
+/// `radar_frame` (x forward, y left, z up), for display. An index past the end throws std::out_of_range. The
+/// header is left to the caller.
 sensor_msgs::PointCloud2 toPointCloud2(const RadarScan& scan, const std::vector<std::size_t>& indices);
 
 }  // namespace rio_t

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <diagnostic_updater/diagnostic_updater.h>
+#include <diagnostic_updater/publisher.h>
+#include <dynamic_reconfigure/server.h>
 #include <ros/callback_queue.h>
 #include <ros/message_event.h>
 #include <ros/node_handle.h>
@@ -11,11 +13,12 @@
 #include <std_msgs/Header.h>
 #include <std_srvs/Empty.h>
 #include <std_srvs/Trigger.h>
-#include <tf2_ros/buffer.h>
-#include <tf2_ros/transform_listener.h>
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <deque>
+#include <limits>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -24,7 +27,9 @@
 #include <thread>
 #include <vector>
 
+#include "rio_t/ros/live/body_frame.h"
 #include "rio_t/ros/live/current_session.h"
+#include "rio_t/ros/live/live_parameters.h"
 #include "rio_t/ros/live/monitor.h"
 #include "rio_t/ros/live/publisher.h"
 #include "rio_t/ros/live/session.h"
@@ -52,16 +57,40 @@ class LiveOdometry {
   template <typename Message>
   using Event = ros::MessageEvent<const Message>;
 
+  struct Received {
+    ImuMeasurement imu;
+    Time record;  ///< of receipt
+  };
+
+  /// How often a topic comes, for `diagnostics`. Silence is an error, any rate is right.
+  struct TopicRate {
+    TopicRate(const std::string& topic, diagnostic_updater::Updater& updater)
+        : task(topic, updater, {&least, &most, 0.0}) {}
+
+    double least = 0.0, most = std::numeric_limits<double>::infinity();  // [Hz]
+    diagnostic_updater::HeaderlessTopicDiagnostic task;                  // tick() is thread-safe
+  };
+
   struct Radar {
     explicit Radar(const Config& its_config);
 
-    Config config;
+    Config config;  ///< with its topics as they are resolved
     PointCloudFormat format;
     std::optional<Extrinsics> T_IR;  ///< told; none until tf has it. Input thread only
     ros::Subscriber scans, triggers;
+    std::unique_ptr<TopicRate> scan_rate, trigger_rate;
   };
 
-  void subscribe();
+  /// Subscribes to the topics as they were told.
+  void subscribe(const Config& told);
+  void addDiagnostics();
+  /// Calls `callback`. What it throws is told once in a while and counted, and nothing else: no message may end
+  /// the node.
+  template <typename Callback>
+  void guarded(const std::string& what, Callback&& callback);
+  void onDiagnosticsTimer();
+  /// Changes what may change while the node runs; what is refused stays as it was. Input thread.
+  void onReconfigure(LiveParameters& values);
   void onImu(const Event<sensor_msgs::Imu>& event);
   void onScan(std::size_t radar, const Event<sensor_msgs::PointCloud2>& event);
   void onPressure(const Event<sensor_msgs::FluidPressure>& event);
@@ -76,32 +105,37 @@ class LiveOdometry {
   /// When it returns, nothing more is published of what was before. Any thread.
   /// `at_once`: does not wait for rest first.
   void reset(const std::string& reason, bool at_once = false);
+  /// What a session does with a sample. The state that is to be published, if there is one.
+  std::optional<NavigationState> feed(LiveSession& session, const Received& received, double* rate_sigma);
   void account(const LiveSession::Stamped& stamped);
   /// Whether this was not told for some seconds. Each radar has its own turn, unlike with ROS's throttles.
   bool isTimeToTell(const std::string& what);
   void wakeSolver();
   void tellFaults();  ///< what is new among the faults of the input; input thread
-  void tellHealth(const ScanResult& result) const;
+  void tellHealth(const ScanResult& result);
   void tellDopplerStep(const Radar& radar, const DopplerStep& step,
                        DopplerStep* told) const;  ///< where it is not as told
   void solve();                                   ///< body of the optimisation thread
 
   const std::string name_;
-  const Config config_;
+  const Config told_;    // topics as the user wrote them
+  const Config config_;  // topics as they are resolved
   ros::NodeHandle node_, private_node_;
   ros::CallbackQueue imu_queue_, input_queue_;
   LiveMonitor monitor_;      // thread-safe
   LivePublisher publisher_;  // see there
-  std::optional<tf2_ros::Buffer> tf_;
-  std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
-  std::optional<diagnostic_updater::Updater> diagnostics_;  // input thread
+  BodyFrame frames_;         // thread-safe
+  std::optional<diagnostic_updater::Updater> diagnostics_;  // input thread, but for ticks
+  std::unique_ptr<TopicRate> imu_rate_;
+  std::unique_ptr<TopicRate> odom_rate_;  // none before the first ~odom; input thread
+  std::atomic<std::uint64_t> odom_published_{0};
 
   std::vector<Radar> radars_;  // read-only after construction, but for T_IR
   CurrentSession session_;     // thread-safe; null until the extrinsics are known
 
   std::mutex mutex_;  // guards what follows, held for microseconds
   std::condition_variable work_to_do_;
-  OdometryOptions options_;  // with the extrinsics that hold
+  OdometryOptions options_;  // with the extrinsics that hold, tuned
   bool has_work_ = false;
   bool stopping_ = false;
   double rate_sigma_ = 0.0;
@@ -114,8 +148,13 @@ class LiveOdometry {
   std::map<std::string, Told> faults_told_;  // input thread only, as the next
   std::weak_ptr<LiveSession> faults_of_;     // whose faults these are
 
+  Config live_config_;  // config_ with what was reconfigured; input thread only
+  boost::recursive_mutex reconfigure_mutex_;  // the server's own
+  std::unique_ptr<dynamic_reconfigure::Server<LiveParameters>> reconfigure_;
+
   ClockJumpDetector imu_stamps_;    // IMU thread only, as the next
   std::optional<Time> newest_imu_;  // of the good stamps
+  std::deque<Received> early_imu_;  // from before there was a session; it gets them first
 
   ros::Subscriber imu_subscriber_, barometer_subscriber_;
   ros::ServiceServer reset_server_, save_server_;

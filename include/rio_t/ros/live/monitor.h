@@ -18,18 +18,20 @@
 namespace rio_t {
 
 /// Keeps the accounts of the live node and judges them, for `diagnostics`. Radars are counted as in
-/// configsOfRadars; keys of one radar begin with its name, as "left/scans", where the radars have names.
+/// configsOfRadars; keys of one radar begin with its name, as "left/scans", where the radars have names. The
+/// rates of the topics are told by tasks of diagnostic_updater beside it.
 /// Thread-safe.
 class LiveMonitor {
  public:
   using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
+  /// `config`: with the topics as they are resolved.
   explicit LiveMonitor(const Config& config);
 
   void imu();  ///< a message came, as the next
   void scan(std::size_t radar = 0);
   void trigger(std::size_t radar = 0);
-  void odometry(double latency);  ///< ~odom was published that many seconds after the IMU message came
+  void odometry(double latency);  ///< a state was ready that many seconds after the IMU message came
   void imuDropped(const std::string& reason);  ///< a sample that goes no further
   /// Scans, or points of them, that go no further.
   void dropped(std::size_t radar, const std::string& reason, std::uint64_t count = 1);
@@ -43,11 +45,16 @@ class LiveMonitor {
   void reset(const std::string& reason);
   /// What is missing before there is a session at all; empty: nothing.
   void waitFor(const std::string& what);
+  /// What is told about the frames, by key.
+  void setFrames(const std::map<std::string, std::string>& frames);
+  void tune(const ImuNoise& told);  ///< the noise of the IMU as it is told now
+  /// A change of parameters was refused, for that reason; or was made, if it is empty.
+  void reconfigured(const std::string& refused_because);
 
   // The tasks. `session` is the running one, null before there is one.
   void describeOdometry(Status& status, const LiveSession* session) const;
   void describeInput(Status& status, const LiveSession* session);
-  void describeSolver(Status& status, const LiveSession* session) const;
+  void describeSolver(Status& status) const;
   void describeTimeOffset(Status& status, std::size_t radar = 0) const;
   void describeExtrinsics(Status& status, std::size_t radar = 0) const;
   void describeBarometer(Status& status);
@@ -60,13 +67,16 @@ class LiveMonitor {
     std::uint64_t count = 0;
     void add(double seconds);
   };
-  struct Rate {
+  struct Counter {
     std::uint64_t count = 0;
-    std::uint64_t told = 0;  // count when the rate was last told
+    std::uint64_t told = 0;  // count when it was last told
+
+    /// Whether nothing came since the last call.
+    bool isSilent() { return std::exchange(told, count) == count; }
   };
 
   struct Barometer {
-    Rate messages;
+    Counter messages;
     Clock::time_point told = Clock::now();
     std::uint64_t not_usable = 0, used = 0, used_told = 0, steps = 0;
     std::string why_not_usable;                          ///< of the last one
@@ -89,7 +99,7 @@ class LiveMonitor {
 
     Config config;
     Extrinsics told;  ///< the mounting that the session started with
-    Rate scans, triggers;
+    Counter scans, triggers;
     std::map<std::string, std::uint64_t> dropped;
     std::uint64_t used = 0;
     std::uint64_t early = 0;  ///< scans that came before they could be used
@@ -106,9 +116,8 @@ class LiveMonitor {
   static std::string prefix(const Radar& radar);
   /// "the radar" or "radar left", for texts.
   static std::string called(const Radar& radar);
-  /// Adds what the input has of this radar, and returns what is wrong with it. Rates [Hz].
-  std::optional<Finding> describeRadar(Status& status, Radar& radar, double scan_rate, double trigger_rate,
-                                       bool initialized) const;
+  /// Adds what the input has of this radar, and returns what is wrong with it.
+  std::optional<Finding> describeRadar(Status& status, Radar& radar, bool initialized) const;
   /// How few of its last scans were used, and why, if it is less than half.
   static std::optional<std::string> judgeUse(Radar& radar, bool initialized);
   /// Whether the run is good so far and, if not, why.
@@ -121,16 +130,18 @@ class LiveMonitor {
   mutable std::mutex mutex_;  // guards all that follows
   std::vector<Radar> radars_;
   EvidenceCollector collector_;  // since the session started
-  Rate imu_, odometry_;
+  Counter imu_;
+  ImuNoise imu_noise_;
   Barometer barometer_;
   GroundVehicle vehicle_;
-  Clock::time_point told_ = Clock::now();
   Latency odometry_latency_, scan_latency_;
   std::map<std::string, std::uint64_t> imu_dropped_;
   std::uint64_t updates_ = 0, resets_ = 0, queue_full_told_ = 0;
   std::map<SolverTermination, std::uint64_t> terminations_;
   std::deque<SolverTermination> last_terminations_;  // of the last windows, newest last
-  std::string last_reset_, waiting_for_, solver_failure_;
+  std::string last_reset_, waiting_for_, solver_failure_, refused_because_;
+  std::uint64_t reconfigurations_ = 0;
+  std::map<std::string, std::string> frames_;
   std::optional<LiveSession::Result> last_update_;
   std::optional<Time> last_used_;  // stamp of the last scan used
   Time last_scan_;                 // stamp of the last scan finished

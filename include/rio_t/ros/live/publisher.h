@@ -6,51 +6,74 @@
 #include <tf2_ros/static_transform_broadcaster.h>
 #include <tf2_ros/transform_broadcaster.h>
 
+#include <atomic>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "rio_t/odometry/body_odometry.h"
+#include "rio_t/ros/live/publish_rate.h"
 #include "rio_t/ros/live/session.h"
 #include "rio_t/ros/parameters/parameters.h"
 
 namespace rio_t {
 
-/// Everything that the live node says, as messages. `odometry` belongs to the IMU thread, `result` to the
-/// optimisation thread; they share nothing. Topics of one radar are in its name's namespace, where the radars
-/// have names.
+/// Everything that the live node says, as messages. `odometry` belongs to the IMU thread, `result` and
+/// `clearPath` to the optimisation thread, `tune` to any. Topics of one radar are in its name's namespace, if
+/// the radars have names. Messages go out as shared pointers, so that subscribers in the same nodelet manager
+/// get them without a copy; nobody changes a message after it was published.
 class LivePublisher {
  public:
+  /// `private_node` carries the callback queue that serves new subscribers of ~path.
   LivePublisher(const Config& config, const ros::NodeHandle& private_node);
 
-  void odometry(const NavigationState& state, double rate_sigma);  ///< ~odom and tf
-  /// ~odom_optimized, ~imu_bias, ~path; of the radar: ~time_offset, ~ego_velocity, ~points, ~inliers and,
-  /// where they are estimated, ~extrinsics and tf. ~map, where landmarks are on.
-  void result(const LiveSession::Result& live, double rate_sigma);
-  /// base_link_frame -> radar_frame of each radar as static tf, unless it is estimated.
-  void extrinsics(const std::vector<Extrinsics>& T_IR);
-  void clearPath();  ///< optimisation thread
+  /// ~odom and tf, each at its rate. Whether ~odom was published.
+  bool odometry(const BodyOdometry& body);
+
+  /// The frames that a result is published in.
+  struct Frames {
+    std::string imu;
+    std::optional<ImuInBody> T_BI;     ///< none while it is not known: then there is no tf of radars
+    std::optional<WorldInOdom> world;  ///< for the map; none before it is known
+    std::optional<BodyOdometry> body;  ///< of the result's state; none if it was not updated
+  };
+  /// ~odom_optimized, ~imu_bias, ~path; of the radar: ~time_offset, ~ego_velocity, ~innovation, ~points,
+  /// ~inliers, tf and, if they are estimated, ~extrinsics. ~map, if landmarks are on.
+  void result(const LiveSession::Result& live, const Frames& frames);
+  void clearPath();
+
+  /// Takes odom_rate, tf_rate, path_max_poses and correct_stamps; in effect from the next message on.
+  void tune(const Config& config);
 
  private:
   struct Radar {
     Radar(const Config& config, const ros::NodeHandle& private_node);
 
     std::string frame;
-    ros::Publisher time_offset, ego_velocity, points, inliers;
+    ros::Publisher time_offset, ego_velocity, innovation, points, inliers;
     std::optional<ros::Publisher> extrinsics;  ///< none if they are not estimated
+    bool has_static_tf = false;
   };
 
-  void extrinsicsOf(const Radar& radar, const LiveSession::Result& live);
-  void map(const ScanResult& result);
-  void extendPath(const NavigationState& state);
+  void radarFrame(Radar& radar, const LiveSession::Result& live, const Frames& frames, Time stamp);
+  void extendPath(const BodyOdometry& body);
+  nav_msgs::Path path();
+  void publishPathTo(const ros::SingleSubscriberPublisher& subscriber);
+  void map(const ScanResult& result, const WorldInOdom& T_OW);
 
   const Config config_;
-  std::vector<Radar> radars_;
+  std::vector<Radar> radars_;  // optimisation thread only, after construction
   ros::Publisher odom_, odom_optimized_, path_, imu_bias_;
   std::optional<ros::Publisher> map_;  ///< none without landmarks
-  // None where publish_tf is false. One for each thread: they share nothing.
+  PublishRate odom_rate_, tf_rate_;
+  std::atomic<bool> correct_stamps_;
+  std::atomic<std::size_t> path_max_poses_;
+  // None where they are not wanted. One for each thread: they share nothing.
   std::optional<tf2_ros::TransformBroadcaster> tf_, radar_tf_;
   std::optional<tf2_ros::StaticTransformBroadcaster> static_tf_;
-  nav_msgs::Path path_message_;  // optimisation thread only
+  std::mutex path_mutex_;        // never held while something is published
+  nav_msgs::Path path_message_;  // guarded by path_mutex_
 };
 
 }  // namespace rio_t

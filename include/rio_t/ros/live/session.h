@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "rio_t/evaluation/trajectory.h"
+#include "rio_t/odometry/body_odometry.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
 #include "rio_t/ros/cloud/stamping.h"
 #include "rio_t/ros/live/bounded_trajectory.h"
 #include "rio_t/ros/live/offset_observability.h"
-#include "rio_t/ros/live/scan_queue.h"
 
 namespace rio_t {
 
@@ -32,9 +32,8 @@ class LiveSession {
       std::size_t radar = 0;
       std::string reason;
     };
-    std::size_t queued = 0;            ///< scans handed to the optimisation thread
-    std::vector<std::size_t> dropped;  ///< radars of the scans that had to go because the queue was full
-    std::vector<GivenUp> given_up;     ///< one for each scan that gets no stamp
+    std::size_t queued = 0;         ///< scans handed to the optimisation thread
+    std::vector<GivenUp> given_up;  ///< one for each scan that gets no stamp
   };
 
   /// `options` is config.odometry with the extrinsics that hold. Radars are counted as in configsOfRadars.
@@ -61,11 +60,14 @@ class LiveSession {
   struct Result {
     ScanResult result;
     bool offset_observable = false;
+    /// The time of measurement, stamp - t_O, with the newest estimate of this radar's t_O. Before there is one,
+    /// the stamp.
+    Time measured_at;
     Extrinsics T_IR;       ///< of this radar, as they hold now; also where the window was not updated
     double latency = 0.0;  ///< [s] from the arrival of the scan to now; 0 where that is not known
   };
-  /// Optimisation thread: takes one scan from the queue, if there is one, and works off what can be. `more`
-  /// tells whether there was one.
+  /// Optimisation thread: works off what is due, but at most one scan that needs the solver, so that who waits
+  /// for the end or for a reset waits for one solution. `more` tells whether there may be another.
   std::vector<Result> process(bool* more);
 
   /// Optimised poses so far, those that left the window, and the newest. Of more than `kMaxPoses`, one in so
@@ -73,7 +75,17 @@ class LiveSession {
   Trajectory trajectory(std::size_t* stride = nullptr) const;
   static constexpr std::size_t kMaxPoses = 36000;  ///< an hour at 10 Hz, 3 MB
   const RadarInertialOdometry& odometry() const { return odometry_; }
-  std::size_t queuedScans() const { return queue_.size(); }
+  /// As RadarInertialOdometry::start(), of the last call of process(). Any thread.
+  std::optional<RadarInertialOdometry::Start> start() const;
+  /// Takes effect before the next scan. Any thread.
+  void tune(const Tuning& tuning) {
+    gyro_density_ = tuning.imu_noise.gyro_density;
+    odometry_.tune(tuning);
+  }
+
+  /// Place of this session's world in the odometry frame; none before it is known. Set once. Any thread.
+  std::optional<WorldInOdom> world() const;
+  void setWorld(const WorldInOdom& T_OW);
 
  private:
   /// A radar's way from messages to stamped scans.
@@ -85,13 +97,14 @@ class LiveSession {
   struct Radar {
     OffsetObservability observability;
     Extrinsics T_IR;
+    std::optional<double> time_offset;  ///< [s] newest estimate
   };
   using ScanKey = std::pair<std::size_t, std::int64_t>;  // radar, stamp [ns]
 
   Stamped takeStamped();  // call with stamper_mutex_ held
   void takeStamped(std::size_t radar, Stamped* stamped);
 
-  const double gyro_density_;
+  std::atomic<double> gyro_density_;
   RadarInertialOdometry odometry_;
   std::atomic<std::size_t> waiting_imu_{0};  // samples since the optimisation thread last took them
 
@@ -101,10 +114,13 @@ class LiveSession {
   std::mutex stamper_mutex_;
   std::vector<Stamper> stampers_;  // by radar; guarded by stamper_mutex_
 
-  ScanQueue queue_;  // thread-safe
+  std::map<ScanKey, Clock::time_point> arrivals_;  // guarded by stamper_mutex_
 
-  std::map<ScanKey, Clock::time_point> arrivals_;  // optimisation thread only, as the next
-  std::vector<Radar> radars_;
+  std::vector<Radar> radars_;  // optimisation thread only
+
+  mutable std::mutex start_mutex_;
+  std::optional<RadarInertialOdometry::Start> start_;  // guarded by start_mutex_, as the next
+  std::optional<WorldInOdom> world_;
 
   mutable std::mutex trajectory_mutex_;
   BoundedTrajectory left_window_{kMaxPoses};  // guarded by trajectory_mutex_, as the next

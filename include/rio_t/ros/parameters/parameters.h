@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "rio_t/imu/units.h"
+#include "rio_t/odometry/body_odometry.h"
 #include "rio_t/odometry/options.h"
 #include "rio_t/radar/mounting.h"
 #include "rio_t/ros/parameters/parameter_value.h"
@@ -29,10 +30,23 @@ enum class RunMode {
   kRefine,  ///< "refine": online passes, each with the offset found before taken off the stamps
 };
 
-/// Where the live node takes T_IR from.
+/// Where T_IR comes from.
 enum class ExtrinsicsSource {
   kParameters,  ///< "parameters": extrinsics_translation and extrinsics_rotation_xyzw
-  kTf,          ///< "tf": the transform from the cloud's frame_id to base_link_frame
+  kTf,          ///< "tf": the transform from the cloud's frame_id to the frame of the IMU
+};
+
+/// Where the live node takes T_BI from, the pose of the IMU in base_link.
+enum class BaseExtrinsicsSource {
+  kAuto,        ///< "auto": tf, if it knows both frames when the odometry starts; else the parameters
+  kParameters,  ///< "parameters": base_extrinsics_translation and base_extrinsics_rotation_xyzw
+  kTf,          ///< "tf": the transform from the frame of the IMU to base_link_frame, which is waited for
+};
+
+/// Where the odometry of the live node goes on after a reset.
+enum class ResetPose {
+  kKeep,  ///< "keep": at the last pose
+  kZero,  ///< "zero": at the origin
 };
 
 /// The axes of the radar that extrinsics_rotation_xyzw turns into those of the IMU.
@@ -71,9 +85,17 @@ struct Config {
 
   std::string odom_frame = "odom";
   std::string base_link_frame = "base_link";
-  std::string radar_frame = "radar";
+  std::string imu_frame;  ///< empty: the frame_id of the IMU's messages
+  BaseExtrinsicsSource base_extrinsics_source = BaseExtrinsicsSource::kAuto;
+  ImuInBody T_BI;  ///< of the parameters
+  std::string radar_frame = "rio_t_radar";
   bool publish_tf = true;
+  bool publish_radar_tf = true;
   bool invert_tf = false;
+  double tf_rate = 50.0;  ///< [Hz] 0: with each IMU sample
+  double odom_rate = 0.0;  ///< [Hz] 0: with each IMU sample
+  bool correct_stamps = true;
+  ResetPose reset_pose = ResetPose::kKeep;
   std::size_t path_max_poses = 2000;
   std::string trajectory_file = "rio_t_trajectory.txt";
 
@@ -124,6 +146,16 @@ class ConfigError : public std::runtime_error {
 /// ConfigError naming every unknown key, wrong type, value out of range and contradiction, each with its
 /// origin and what was expected.
 Config makeConfig(const ParameterEntries& entries);
+
+/// `config` with other values for keys that hold for all radars. Throws ConfigError, as makeConfig, and then
+/// nothing has changed.
+Config withParameters(const Config& config, const ParameterEntries& entries);
+/// The value of a key. Throws std::invalid_argument for a key that does not exist.
+ParameterValue parameterValue(const Config& config, const std::string& key);
+
+/// The keys that may change while the live node runs: noises, gates and what is published how often. All hold
+/// for all radars, and each has one truth value, whole number or number.
+const std::vector<std::string>& liveKeys();
 
 /// What is known of a key.
 struct ParameterDescription {

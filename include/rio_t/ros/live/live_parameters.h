@@ -1,0 +1,55 @@
+#pragma once
+
+#include <dynamic_reconfigure/Config.h>
+#include <dynamic_reconfigure/ConfigDescription.h>
+#include <ros/node_handle.h>
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "rio_t/ros/parameters/parameters.h"
+
+namespace rio_t {
+
+using LiveValue = std::variant<bool, std::int64_t, double>;
+
+/// The parameters that may change while the live node runs (liveKeys()), as dynamic_reconfigure::Server wants
+/// its ConfigType. Its generated headers have the same members with the same names; here texts, units and
+/// ranges come from the registry of the parameters, so that they stand in one place.
+class LiveParameters {
+ public:
+  /// The defaults.
+  LiveParameters() : LiveParameters(Config()) {}
+  explicit LiveParameters(const Config& config);
+
+  /// What differs from `config`, as entries with the origin "dynamic_reconfigure".
+  ParameterEntries changesFrom(const Config& config) const;
+
+  // What the server calls, by names that it sets.
+  // NOLINTBEGIN(bugprone-reserved-identifier)
+  static dynamic_reconfigure::ConfigDescription __getDescriptionMessage__();
+  static LiveParameters __getDefault__() { return {}; }
+  static LiveParameters __getMin__();
+  static LiveParameters __getMax__();
+  static int __getParamDescriptions__() { return 0; }  ///< not needed: each value knows its kind
+  static int __getGroupDescriptions__() { return 0; }
+  void __clamp__() {}  ///< a value out of range is refused, with a message, and not bent
+  std::uint32_t __level__(const LiveParameters&) const { return 0; }
+  void __fromServer__(const ros::NodeHandle& node);
+  void __toServer__(const ros::NodeHandle& node) const;
+  /// Takes the values of known keys; the kinds of the message decide.
+  bool __fromMessage__(dynamic_reconfigure::Config& message);
+  void __toMessage__(dynamic_reconfigure::Config& message) const;
+  void __toMessage__(dynamic_reconfigure::Config& message, int /*parameters*/, int /*groups*/) const {
+    __toMessage__(message);
+  }
+  // NOLINTEND(bugprone-reserved-identifier)
+
+ private:
+  std::map<std::string, LiveValue> values_;  // by key
+};
+
+}  // namespace rio_t

@@ -1,0 +1,101 @@
+#include "bag_frames.h"
+
+#include <rosbag/view.h>
+#include <sensor_msgs/Imu.h>
+#include <sensor_msgs/PointCloud2.h>
+#include <tf2/buffer_core.h>
+#include <tf2/exceptions.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include <vector>
+
+#include "rio_t/ros/frames/frames.h"
+
+namespace rio_t {
+namespace {
+
+std::string topicOfBag(const std::string& told, const std::map<std::string, std::string>& types) {
+  if (told.empty() || types.count(told) != 0) return told;
+  const std::string other = told.front() == '/' ? told.substr(1) : "/" + told;
+  if (types.count(other) != 0) return other;
+  return told.front() == '/' ? told : other;
+}
+
+/// The frame_id of the topic's first message; empty if there is none.
+template <typename Message>
+std::string firstFrame(const Bags& bags, const std::string& topic) {
+  rosbag::View view;
+  bags.addTo(&view, rosbag::TopicQuery(topic));
+  return view.begin() == view.end() ? "" : read<Message>(*view.begin())->header.frame_id;
+}
+
+/// T_IR by radar; what is missing goes into `missing`.
+std::vector<Extrinsics> lookUp(const tf2::BufferCore& tf, const std::vector<Config>& radars,
+                               const std::string& imu_frame, const std::vector<std::string>& cloud_frames,
+                               std::string* missing) {
+  missing->clear();
+  std::vector<Extrinsics> T_IR;
+  for (std::size_t k = 0; k < radars.size(); ++k) {
+    T_IR.push_back(radars[k].odometry.T_IR);
+    if (radars[k].extrinsics_source != ExtrinsicsSource::kTf) continue;
+    try {
+      T_IR.back() = radarExtrinsics(tf, radars[k], imu_frame, cloud_frames[k]);
+    } catch (const tf2::TransformException& error) {
+      *missing = "no tf from " + cloud_frames[k] + " to " + imu_frame + " (extrinsics_source: tf; " +
+                 error.what() + ")";
+    }
+  }
+  return T_IR;
+}
+
+}  // namespace
+
+Config withTopicsOfBag(Config config, const std::map<std::string, std::string>& types) {
+  config.imu_topic = topicOfBag(config.imu_topic, types);
+  config.radar_topic = topicOfBag(config.radar_topic, types);
+  config.trigger_topic = topicOfBag(config.trigger_topic, types);
+  config.ground_truth_topic = topicOfBag(config.ground_truth_topic, types);
+  for (Config& radar : config.radars) radar = withTopicsOfBag(radar, types);
+  return config;
+}
+
+Config withExtrinsicsOfBag(Config config, const Bags& bags) {
+  std::vector<Config> radars = configsOfRadars(config);
+  std::vector<std::string> cloud_frames;
+  bool is_wanted = false;
+  for (Config& radar : radars) {
+    const bool wants = radar.extrinsics_source == ExtrinsicsSource::kTf;
+    is_wanted = is_wanted || wants;
+    radar.publish_radar_tf = false;  // nobody publishes here
+    cloud_frames.push_back(
+        wants ? cloudFrame(radar, firstFrame<sensor_msgs::PointCloud2>(bags, radar.radar_topic)) : "");
+  }
+  if (!is_wanted) return config;
+  const std::string imu_frame = imuFrame(config, firstFrame<sensor_msgs::Imu>(bags, config.imu_topic));
+  // The mountings stand still, wherever they are published: all of tf is taken as static, the first of each.
+  tf2::BufferCore tf;
+  std::string missing;
+  std::vector<Extrinsics> T_IR = lookUp(tf, radars, imu_frame, cloud_frames, &missing);
+  for (const char* topic : {"/tf_static", "/tf"}) {
+    rosbag::View view;
+    bags.addTo(&view, rosbag::TopicQuery(std::vector<std::string>{topic, topic + 1}));
+    for (const rosbag::MessageInstance& instance : view) {
+      if (missing.empty()) break;
+      bool is_new = false;
+      for (const auto& transform : read<tf2_msgs::TFMessage>(instance)->transforms) {
+        if (tf._frameExists(transform.child_frame_id) && tf.canTransform(transform.header.frame_id,
+                                                                         transform.child_frame_id, ros::Time(0)))
+          continue;
+        is_new = tf.setTransform(transform, bags.name(), true) || is_new;
+      }
+      if (is_new) T_IR = lookUp(tf, radars, imu_frame, cloud_frames, &missing);
+    }
+  }
+  if (!missing.empty()) throw bagError(bags.name(), missing + "; the bag's tf has: " + tf.allFramesAsString());
+  config.odometry.T_IR = T_IR.front();
+  for (std::size_t k = 0; k < config.radars.size(); ++k)
+    config.radars[k].odometry.T_IR = config.odometry.radars[k].T_IR = T_IR[k];
+  return config;
+}
+
+}  // namespace rio_t

@@ -1,0 +1,227 @@
+#!/usr/bin/env python3
+"""The live node in the set-ups that people have: namespaces, remapping, wall time, other drivers, managers, tools."""
+import os
+import pathlib
+import shutil
+import tempfile
+import unittest
+
+import dynamic_reconfigure.client
+import numpy
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import Odometry
+
+from rio_t import live_tester as tester
+from rio_t import tum
+
+OK, WARN, ERROR = 0, 1, 2
+CONFIG = pathlib.Path(__file__).resolve().parent.parent / "config"
+SAME_M = 1e-3  # live as in the bag runner, as in live_rostest.py
+TI_MMWAVE = "/ti_mmwave/radar_scan_pcl"
+TI_TRIGGER = "/sensor_platform/radar_right/trigger"
+
+
+class SetupTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.mkdtemp(prefix="rio_t_setup_")
+        cls.bag = tester.simulate(cls.path("run.bag"))
+        cls.imu_stamps = tester.stamps(cls.bag, tester.IMU)
+        cls.scan_stamps = tester.stamps(cls.bag, tester.RADAR)
+
+    @classmethod
+    def path(cls, name):
+        return os.path.join(cls.folder, name)
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.folder)
+
+    def setUp(self):
+        rospy.set_param("/use_sim_time", True)
+        for name in ("/rio_t", "/robot", "/diagnostic_aggregator"):
+            if rospy.has_param(name):
+                rospy.delete_param(name)
+
+    def play_whole(self, listener, *words, topics=(tester.IMU, tester.RADAR), bag=None, stamps=None):
+        with tester.play(bag or self.bag, topics, 2.0, *words) as player:
+            self.assertEqual(player.wait(), 0)
+        listener.wait_for_stamp("odom", (stamps or self.imu_stamps)[-1])
+
+    def test_namespace(self):
+        """Relative topics, services and parameters lie in the namespace of the node."""
+        parameters = ("config:=irs", "imu_topic:=imu", "radar_topic:=scan")
+        with tester.Listener(node="/robot/rio_t") as listener, tester.node(*parameters, remap=("__ns:=/robot",)):
+            listener.wait_until_heard()
+            self.play_whole(listener, f"{tester.IMU}:=/robot/imu", f"{tester.RADAR}:=/robot/scan")
+            listener.wait_for_diagnosis("input", "", None)
+            self.assertIn("/robot/imu topic status", listener.diagnostics)
+            self.assertIn("/robot/scan topic status", listener.diagnostics)
+            self.assertFalse(tester.call("/robot/rio_t/save_trajectory").message == "")
+        # The bag runner reads the same relative names.
+        run = tester.run_bag(self.bag, "irs", self.path("relative"), "imu_topic=" + tester.IMU[1:],
+                             "radar_topic=" + tester.RADAR[1:])
+        self.assertTrue(os.path.getsize(os.path.join(run, "trajectory.txt")) > 0)
+
+    def test_remapping_is_told_with_the_resolved_names(self):
+        with tester.Listener() as listener, tester.node("config:=irs", remap=(f"{tester.IMU}:=/other/imu",)):
+            listener.wait_until_heard()
+            listener.wait_for_diagnosis("input", "no IMU message yet on /other/imu", ERROR)
+            self.play_whole(listener, f"{tester.IMU}:=/other/imu")
+            listener.wait_for("rate of the IMU", lambda: "Actual frequency (Hz)" in [
+                v.key for v in listener.diagnostics["/other/imu topic status"].values])
+            # After the bag it is silent.
+            listener.wait_for_diagnosis("input", "the IMU is silent, topic /other/imu", ERROR)
+            listener.wait_for_diagnosis("/other/imu topic status", "No events recorded", ERROR)
+
+    def test_wall_time(self):
+        rospy.set_param("/use_sim_time", False)
+        with tester.Listener() as listener, tester.node("config:=irs"):
+            listener.wait_until_heard()
+            self.play_whole(listener)
+            listener.wait_for_stamp("odom_optimized", self.scan_stamps[-4])
+            # Stamps are those of the sensors, whatever the clock.
+            self.assertLessEqual({m.header.stamp.to_nsec() for m in listener.messages["odom"]}, set(self.imu_stamps))
+
+    def test_arrival_stamps(self):
+        with tester.Listener() as listener, tester.node("config:=irs", "stamp_source:=arrival"):
+            listener.wait_until_heard()
+            self.play_whole(listener)
+            listener.wait_for("offsets", lambda: len(listener.messages["time_offset"]) > 20)
+            stamps = [m.header.stamp.to_nsec() for m in listener.messages["time_offset"]]
+            self.assertFalse(set(stamps) & set(self.scan_stamps), "these are the stamps of the headers")
+            nearest = [min(abs(stamp - other) for other in self.scan_stamps) for stamp in stamps]
+            self.assertLess(numpy.median(nearest), 0.5e9)
+            self.assertIsNone(listener.value("input", "dropped_imu_missing"))
+
+    def test_ti_mmwave(self):
+        bag = tester.simulate(self.path("ti.bag"), "--format", "ti_mmwave", "--q-ir",
+                              "-0.0746967504749,0.923218461092,0.375992995522,-0.0267831268675")
+        optimized = tum.read(os.path.join(tester.run_bag(bag, "ti_mmwave", self.path("ti")),
+                                          "trajectory_optimized.txt")).positions()
+        saved = self.path("ti.txt")
+        with tester.Listener() as listener, tester.node("config:=ti_mmwave", "trajectory_file:=" + saved):
+            listener.wait_until_heard()
+            self.play_whole(listener, topics=(tester.IMU, TI_MMWAVE, TI_TRIGGER), bag=bag,
+                            stamps=tester.stamps(bag, tester.IMU))
+            self.assertTrue(tester.call("/rio_t/save_trajectory").success)
+        kept = tum.read(saved).positions()
+        common = (kept.keys() & optimized.keys()) - {max(kept)}
+        self.assertGreater(len(common), 20)
+        self.assertLess(max(numpy.linalg.norm(kept[t] - optimized[t]) for t in common), SAME_M)
+
+    def test_nodelet_with_bad_parameters_is_refused_and_the_manager_lives_on(self):
+        nodelet = tester.program("nodelet", "nodelet")
+        with open(self.path("manager.txt"), "w") as told:
+            words = (*tester.preloaded(), nodelet, "manager", "__name:=manager")
+            with tester.Process(*words, stdout=told, stderr=told) as manager:
+                outcome = tester.run(nodelet, "load", "rio_t/RioTNodelet", "manager", "__name:=rio_t", "_config:=irs",
+                                     "_windou:=1.0")
+                self.assertNotEqual(outcome.returncode, 0, outcome.stdout)
+                self.assertIsNone(manager.process.poll(), "the manager died")
+                rospy.delete_param("/rio_t/windou")
+                with tester.Listener() as listener, tester.Process(nodelet, "load", "rio_t/RioTNodelet", "manager",
+                                                                   "__name:=rio_t", "_config:=irs"):
+                    listener.wait_until_heard()
+                    listener.wait_for_diagnosis("input", "no IMU message yet", ERROR)
+        text = pathlib.Path(self.path("manager.txt")).read_text()
+        self.assertIn("/rio_t/windou", text)
+        self.assertIn('did you mean "window"', text)
+
+    def test_unloading_during_long_solves(self):
+        """The solver has more to do than time for it; the nodelet goes all the same, and the manager stays."""
+        nodelet = tester.program("nodelet", "nodelet")
+        heavy = ("_solver:=ceres", "_window:=30.0", "_max_iterations:=1000", "_max_queued_scans:=20")
+        with tester.Process(*tester.preloaded(), nodelet, "manager", "__name:=manager") as manager:
+            with tester.Listener() as listener, tester.Process(
+                    nodelet, "load", "rio_t/RioTNodelet", "manager", "__name:=rio_t", "_config:=irs", *heavy) as loader:
+                listener.wait_until_heard()
+                with tester.play(self.bag, (tester.IMU, tester.RADAR), 50.0):
+                    listener.wait_for("optimised odometry", lambda: len(listener.messages["odom_optimized"]) > 10)
+                    loader.stop()
+                    self.assertIsNone(manager.process.poll(), "the manager died")
+            with tester.Listener() as listener, tester.Process(nodelet, "load", "rio_t/RioTNodelet", "manager",
+                                                               "__name:=rio_t", "_config:=irs"):
+                listener.wait_until_heard()
+                listener.wait_for_diagnosis("input", "no IMU message yet", ERROR)
+            self.assertIsNone(manager.process.poll(), "the manager died")
+
+    def test_dynamic_reconfigure(self):
+        with tester.Listener() as listener, tester.node("config:=irs", "innovation_gate:=5.0"):
+            listener.wait_until_heard()
+            client = dynamic_reconfigure.client.Client("/rio_t", timeout=tester.DEADLINE)
+            values = client.get_configuration(timeout=tester.DEADLINE)
+            self.assertEqual(values["innovation_gate"], 5.0)  # what holds, not the default
+            self.assertIn("[Hz]", next(p["description"] for p in client.get_parameter_descriptions()
+                                       if p["name"] == "odom_rate"))
+            with tester.play(self.bag) as player:
+                listener.wait_for("odometry", lambda: len(listener.messages["odom"]) > 100)
+                # Refused: nothing changes, and it is told why.
+                answer = client.update_configuration({"innovation_gate": -1.0, "odom_rate": 20.0})
+                self.assertEqual((answer["innovation_gate"], answer["odom_rate"]), (5.0, 0.0))
+                self.assertEqual(rospy.get_param("/rio_t/innovation_gate"), 5.0)
+                listener.wait_for("the refusal", lambda: "innovation_gate: expected a finite number of at least 0" in (
+                    listener.value("odometry", "last_reconfiguration") or ""))
+                # Done: in step with the parameter server, in effect at once. No scan passes a gate of nothing.
+                answer = client.update_configuration({"innovation_gate": 1e-6, "odom_rate": 20.0})
+                before = len(listener.messages["odom"])
+                self.assertEqual((answer["innovation_gate"], answer["odom_rate"]), (1e-6, 20.0))
+                self.assertEqual(rospy.get_param("/rio_t/odom_rate"), 20.0)
+                listener.wait_for("scans that the gate rejects",
+                                  lambda: int(listener.value("input", "dropped_innovation") or 0) > 3)
+                self.assertEqual(player.wait(), 0)
+            listener.wait_for("end of the bag", lambda: listener.messages["odom"][-1].header.stamp.to_nsec() >
+                              self.imu_stamps[-1] - 10**8)
+            # A few messages were on their way.
+            periods = [m.header.stamp.to_nsec() * 20 // 10**9 for m in listener.messages["odom"][before + 50:]]
+            self.assertGreater(len(periods), 10)
+            self.assertEqual(len(periods), len(set(periods)))
+            self.assertIsNone(listener.value("odometry", "last_reset_because") or None, "it needed no restart")
+
+    def test_mavros_gets_odometry_by_its_contract(self):
+        """mavros is not in Debian: its topic, rate, frames and covariances are what we can check."""
+        heard = []
+        subscriber = rospy.Subscriber("/mavros/odometry/out", Odometry, heard.append, queue_size=None)
+        topics = {name: kind for name, kind in tester.TOPICS.items() if name != "odom"}
+        with tester.Listener(topics) as listener, tester.Process(
+                shutil.which("roslaunch"), "--wait", "rio_t", "mavros.launch") as launch:
+            listener.wait_until_heard()
+            tester.wait_for("the publisher", lambda: subscriber.get_num_connections() > 0)
+            with tester.play(self.bag) as player:
+                self.assertEqual(player.wait(), 0)
+            last = self.imu_stamps[-1] - 10**9 // 30
+            tester.wait_for("the last odometry", lambda: heard and heard[-1].header.stamp.to_nsec() >= last)
+            launch.stop()
+        subscriber.unregister()
+        self.assertEqual({(m.header.frame_id, m.child_frame_id) for m in heard}, {("odom", "base_link")})
+        stamps = numpy.array([m.header.stamp.to_sec() for m in heard])
+        self.assertAlmostEqual((len(stamps) - 1) / (stamps[-1] - stamps[0]), 30.0, delta=0.5)
+        for message in heard:
+            for covariance in (message.pose.covariance, message.twist.covariance):
+                self.assertGreater(numpy.linalg.eigvalsh(numpy.array(covariance).reshape(6, 6))[0], 0.0)
+
+    def test_diagnostics_aggregator(self):
+        statuses = {}
+        def keep(message):
+            statuses.update({status.name: status for status in message.status})
+        subscriber = rospy.Subscriber("/diagnostics_agg", DiagnosticArray, keep)
+        tester.check(tester.run(shutil.which("rosparam"), "load", CONFIG / "diagnostics_aggregator.yaml",
+                                "/diagnostic_aggregator"))
+        aggregator = tester.program("diagnostic_aggregator", "aggregator_node")
+        with tester.Listener() as listener, tester.node("config:=irs"), tester.Process(aggregator):
+            listener.wait_until_heard()
+            wanted = {"/rio_t", "/rio_t/Estimate", "/rio_t/Estimate/odometry", "/rio_t/Estimate/solver",
+                      "/rio_t/Estimate/time offset", "/rio_t/Input", "/rio_t/Input/input",
+                      f"/rio_t/Input/{tester.IMU} topic status", f"/rio_t/Input/{tester.RADAR} topic status"}
+            names = {name.replace("//", "/") for name in wanted}
+            tester.wait_for("statuses " + ", ".join(sorted(names)), lambda: names <= {
+                name.replace("//", "/") for name in list(statuses)})
+            self.assertFalse([name for name in statuses if name.startswith("/Other") and "rio_t" in name])
+        subscriber.unregister()
+
+
+if __name__ == "__main__":
+    import rostest
+    rospy.init_node("setup_rostest")
+    rostest.rosrun("rio_t", "setup_rostest", SetupTest)
