@@ -14,6 +14,8 @@ constexpr double kApart = 16.0;
 
 /// [1] Sigma of s below which 0 and 1 are five sigmas apart.
 constexpr double kMaxSlideSigma = 0.2;
+/// (m, s) has four unknowns; as many detections again are witnesses. Two ghosts far apart would fit any s.
+constexpr std::size_t kMinSightings = 8;
 /// [sigma] of s: a twentieth of the static points lies beyond.
 constexpr double kMaxSlide = 2.0;
 
@@ -38,6 +40,7 @@ void addTo(Candidate& candidate, const PlacedDetection& seen) {
 }  // namespace
 
 bool Candidate::isProven() const {
+  if (count < kMinSightings) return false;
   const Eigen::LDLT<Eigen::Matrix4d> factor(fit_information);
   if (factor.info() != Eigen::Success || factor.vectorD().minCoeff() <= 0.0) return false;
   const double sigma = std::sqrt(factor.solve(Eigen::Vector4d::UnitW())[3]);
