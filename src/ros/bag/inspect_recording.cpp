@@ -38,7 +38,7 @@ Recording readRecording(const std::string& path, double duration) {
   recording.bag = path;
   rosbag::Bag bag;
   openBag(path, &bag);
-  recording.types = topicTypes(bag);
+  recording.types = Bags({path}).typesByTopic();
   rosbag::View all(bag);
   if (all.size() == 0) throw bagError(path, "it holds no messages");
   recording.length = (all.getEndTime() - all.getBeginTime()).toSec();
