@@ -116,6 +116,7 @@ TEST(GroundVehicle, ItsFrameIsFoundAsWellAsItSays) {
     simulation::SensorData none;
     mountTurned(q_VI, none, turned);
     run.options.T_IR = turned;
+    run.options.ground_vehicle.rotation_sigma = 0.1;
     run.run([&](simulation::SensorData& data) {
       Extrinsics unused;
       mountTurned(q_VI, data, unused);

@@ -23,7 +23,7 @@ struct GroundVehicleOptions {
   /// The vehicle frame V (x forward, y left, z up) in the IMU frame: `q_IR` turns V into I, and `l_I` is the
   /// point that moves only forward, e.g. the centre of the rear axle.
   Extrinsics T_IV;
-  double rotation_sigma = 0.1;  ///< [rad] prior on the rotation, about each axis: six degrees
+  double rotation_sigma = 0.02;  ///< [rad] prior on the rotation, about each axis: one degree
   /// [rad] of the ground where the vehicle starts at rest, along and across: a floor. 0: nothing is known of
   /// it
   double start_slope_sigma = 0.002;
