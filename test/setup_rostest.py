@@ -96,8 +96,8 @@ class SetupTest(unittest.TestCase):
             self.assertIsNone(listener.value("input", "dropped_imu_missing"))
 
     def test_ti_mmwave(self):
-        bag = tester.simulate(self.path("ti.bag"), "--format", "ti_mmwave", "--q-ir",
-                              "-0.0746967504749,0.923218461092,0.375992995522,-0.0267831268675")
+        bag = tester.simulate(self.path("ti.bag"), "--format", "ti_mmwave", "--extrinsics-rotation-xyzw",
+                              "0.923218461092,0.375992995522,-0.0267831268675,-0.0746967504749")
         optimized = tum.read(os.path.join(tester.run_bag(bag, "ti_mmwave", self.path("ti")),
                                           "trajectory_optimized.txt")).positions()
         saved = self.path("ti.txt")
@@ -202,6 +202,7 @@ class SetupTest(unittest.TestCase):
                 self.assertGreater(numpy.linalg.eigvalsh(numpy.array(covariance).reshape(6, 6))[0], 0.0)
 
     def test_diagnostics_aggregator(self):
+        rospy.set_param("/use_sim_time", False)  # the aggregator publishes by the clock, and no bag gives one
         statuses = {}
         def keep(message):
             statuses.update({status.name: status for status in message.status})
@@ -211,12 +212,11 @@ class SetupTest(unittest.TestCase):
         aggregator = tester.program("diagnostic_aggregator", "aggregator_node")
         with tester.Listener() as listener, tester.node("config:=irs"), tester.Process(aggregator):
             listener.wait_until_heard()
-            wanted = {"/rio_t", "/rio_t/Estimate", "/rio_t/Estimate/odometry", "/rio_t/Estimate/solver",
-                      "/rio_t/Estimate/time offset", "/rio_t/Input", "/rio_t/Input/input",
-                      f"/rio_t/Input/{tester.IMU} topic status", f"/rio_t/Input/{tester.RADAR} topic status"}
-            names = {name.replace("//", "/") for name in wanted}
-            tester.wait_for("statuses " + ", ".join(sorted(names)), lambda: names <= {
-                name.replace("//", "/") for name in list(statuses)})
+            topics = [topic[1:].replace("/", " ") + " topic status" for topic in (tester.IMU, tester.RADAR)]
+            names = {"/rio_t", "/rio_t/Estimate", "/rio_t/Input", *(
+                f"/rio_t/Estimate/{name}" for name in ("odometry", "solver", "time offset")), *(
+                f"/rio_t/Input/{name}" for name in ("input", *topics))}
+            tester.wait_for("statuses " + ", ".join(sorted(names)), lambda: names <= set(statuses))
             self.assertFalse([name for name in statuses if name.startswith("/Other") and "rio_t" in name])
         subscriber.unregister()
 
