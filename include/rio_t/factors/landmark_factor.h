@@ -65,7 +65,7 @@ struct SeenPoint {
 SeenPoint seenFrom(const StateView& x, const ImuDelta& delta, const Eigen::Vector3d& g_W,
                    const Extrinsics& T_IR, const Eigen::Vector3d& p_W);
 
-/// A landmark seen in a scan (docs/method.md, section 15). Blocks: state, extrinsics, landmark.
+/// A landmark seen in a scan (docs/method.md, section 16). Blocks: state, extrinsics, landmark.
 ///
 /// The time of measurement is that of the moment when the scan came: the offset hardly moves within a window,
 /// and a position tells less of it than a velocity. The way from the state to that time, mostly below 5 ms,

@@ -14,7 +14,7 @@
 namespace rio_t {
 
 /// Static detections as landmarks: points of the world in the window of the smoother, correlated with all
-/// that is estimated (docs/method.md, section 15). One map for all radars. Not thread-safe.
+/// that is estimated (docs/method.md, section 16). One map for all radars. Not thread-safe.
 class LandmarkMap {
  public:
   /// `imu` must outlive the map.

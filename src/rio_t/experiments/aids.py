@@ -7,12 +7,14 @@ from .laboratory import need_truth, read_run, truth_of
 from .page import Page, Table, fixed, mean
 
 GROUND, PRESSURE = {"platform": "ground_vehicle"}, {"barometer_topic": "/sensor_platform/baro"}
+LANDMARKS = {"landmarks": "true"}
 # Name, parameters. A new aid is one more line, and one for it together with the others.
 AIDS = {
     "none": {},
     "ground vehicle": GROUND,
     "barometer": PRESSURE,
-    "both": {**GROUND, **PRESSURE}}
+    "landmarks": LANDMARKS,
+    "all": {**GROUND, **PRESSURE, **LANDMARKS}}
 ON_WHEELS = ("ground_vehicle", "kart")
 
 
