@@ -150,7 +150,7 @@ TEST_F(CheckBag, APlainBagIsReadyAndItsMountingIsFound) {
   expectLine(plain, FindingLevel::kOk, {"rest", "gravity 9.", "up is +z"});
   expectLine(plain, FindingLevel::kOk, {"Doppler", "positive for receding", "the IMU"});
   // Only what differs from the defaults.
-  for (const char* key : {"imu_topic", "radar_topic", "radar_format", "stamp_source", "radar_doppler_sign"})
+  for (const char* key : {"radar_format", "stamp_source", "radar_doppler_sign", "imu_rate_unit", "init_mode"})
     EXPECT_EQ(plain.yaml.find(std::string("\n") + key), std::string::npos) << plain.yaml;
 }
 

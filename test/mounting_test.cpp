@@ -47,9 +47,9 @@ TEST(Mounting, TheKartOfTheSimulatorInWords) {
 }
 
 TEST(Mounting, AnglesComeBack) {
-  for (double yaw = -170; yaw <= 180; yaw += 25) {
+  for (double yaw = -170; yaw < 179; yaw += 25) {
     for (double pitch = -85; pitch <= 85; pitch += 17) {
-      for (double roll = -175; roll <= 180; roll += 35) {
+      for (double roll = -175; roll < 179; roll += 35) {
         const MountingAngles back = mountingOf(rotation(yaw, pitch, roll));
         EXPECT_NEAR(back.yaw, yaw * kDegree, 1e-9);
         EXPECT_NEAR(back.pitch, pitch * kDegree, 1e-9);

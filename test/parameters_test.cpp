@@ -655,10 +655,11 @@ TEST(Parameters, EveryMemberOfTheOptionsHasAKey) {
       << "with init_mode and init_motion_after";
   EXPECT_EQ(keysChanging("Health"), memberCount<HealthOptions>());
   EXPECT_EQ(keysChanging("Rest on the way"), memberCount<RestOptions>());
-  EXPECT_EQ(keysChanging("IMU"), memberCount<ImuNoise>() + 1) << "with gravity";
+  EXPECT_EQ(keysChanging("IMU"), memberCount<ImuNoise>() + memberCount<ImuUnits>() + 1) << "with gravity";
   EXPECT_EQ(keysChanging("What sensors"), memberCount<ImuInputCheckOptions>() + 2)
       << "with max_imu_gap, max_radar_gap";
-  EXPECT_EQ(keysChanging("T_IR"), memberCount<Extrinsics>() + 1) << "with extrinsics_source";
+  EXPECT_EQ(keysChanging("T_IR"), memberCount<Extrinsics>() + 3)
+      << "with extrinsics_source, extrinsics_axes and the mounting in words";
   EXPECT_EQ(memberCount<RadarOptions>(), 5u)
       << "a new member needs its place in radarOptions in src/ros/parameters/parameters.cpp";
   EXPECT_EQ(memberCount<OdometryOptions>(), 18u)

@@ -66,7 +66,7 @@ double misfit(const Steps& steps, double scale) {
 
 void findAccelerationUnit(double least_norm, ImuReport* report) {
   const double norm = report->written_norm;
-  // The least accelerated tenth shows gravity, in m/s^2 or in g.
+  // The least accelerated moments show gravity, in m/s^2 or in g.
   if (least_norm < 0.5 && norm < 8.0) {
     report->acceleration_fault =
         "gravity is missing: the acceleration at rest is near zero, and rio_t needs the raw specific force";
@@ -170,7 +170,7 @@ ImuReport inspectImu(const std::vector<ImuMeasurement>& written) {
   if (imu.empty()) return report;
   report.written_norm = quantile(norms, 0.5);
   report.written_rate = quantile(rates, 0.9);
-  findAccelerationUnit(quantile(norms, 0.1), &report);
+  findAccelerationUnit(quantile(norms, 0.02), &report);
   const double scale = inMetresPerSecondSquared(report.units.acceleration);
   for (ImuMeasurement& sample : imu) sample.acceleration *= scale;
   if (report.written_rate == 0.0) {

@@ -49,6 +49,7 @@ def draw_view(axes, radars, size, across, along):
         tip = on_paper(0.5 * size * np.eye(3)[k])
         if np.linalg.norm(tip) < 1e-9:
             continue
+        axes.plot(*(1.2 * tip), alpha=0)  # an annotation alone does not widen the axes
         axes.annotate("", tip, (0, 0), arrowprops={"arrowstyle": "->", "color": "black"})
         axes.annotate(f"{label} of the IMU", 1.12 * tip, ha="center", va="center", fontsize=8)
     axes.plot(0, 0, "ks", markersize=8)
