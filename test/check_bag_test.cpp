@@ -277,8 +277,14 @@ TEST_F(CheckBag, AnImuWithoutStampsOrGravityIsMissingThem) {
   }}));
   expectLine(stamps, FindingLevel::kMissing, {"IMU stamps", "are zero"});
   EXPECT_FALSE(stamps.ready());
-  const BagCheck gravity = check(rewritten("no_gravity", {[](sensor_msgs::Imu& imu) {
-    imu.linear_acceleration.z -= 9.81;
+  // The IMU is not level: what it shows at rest is its gravity.
+  std::optional<geometry_msgs::Vector3> gravity_I;
+  const BagCheck gravity = check(rewritten("no_gravity", {[&](sensor_msgs::Imu& imu) {
+    geometry_msgs::Vector3& force = imu.linear_acceleration;
+    if (!gravity_I) gravity_I = force;
+    force.x -= gravity_I->x;
+    force.y -= gravity_I->y;
+    force.z -= gravity_I->z;
     return true;
   }}));
   expectLine(gravity, FindingLevel::kMissing, {"gravity is missing"});

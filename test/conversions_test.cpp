@@ -70,7 +70,7 @@ TEST(Conversions, OdometryHasFramesAndBodyTwist) {
   const Eigen::Vector3d v_W = state.q_WI * Eigen::Vector3d(v.x, v.y, v.z);
   EXPECT_LT((v_W - state.v_W).norm(), 1e-12);
   EXPECT_EQ(odom.pose.pose.position.z, 3.0);
-  EXPECT_EQ(odom.pose.pose.orientation.w, state.q_WI.w());
+  EXPECT_NEAR(odom.pose.pose.orientation.w, state.q_WI.w(), 1e-12);
   EXPECT_EQ(odom.twist.twist.angular.x, 0.5);
 }
 

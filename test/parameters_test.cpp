@@ -662,7 +662,7 @@ TEST(Parameters, EveryMemberOfTheOptionsHasAKey) {
       << "with extrinsics_source, extrinsics_axes and the mounting in words";
   EXPECT_EQ(memberCount<RadarOptions>(), 5u)
       << "a new member needs its place in radarOptions in src/ros/parameters/parameters.cpp";
-  EXPECT_EQ(memberCount<OdometryOptions>(), 18u)
+  EXPECT_EQ(memberCount<OdometryOptions>(), 23u)
       << "a new member needs keys in src/ros/parameters/";
   EXPECT_EQ(memberCount<PointCloudFormat>() - 1, memberCount<PointCloudOverrides>()) << "all but its name";
 }

@@ -480,7 +480,7 @@ TEST(PointCloudConversion, ToScanAndBack) {
   ours.doppler = "doppler";
   const DecodedScan back = decode(inliers, ours);
   ASSERT_EQ(back.cloud.size(), 1u);
-  expectPoint(back.cloud[0], -1, 4, 0.5, -0.25, 11);
+  expectPoint(back.cloud[0], 4, 1, 0.5, -0.25, 11);  // as we publish: x forward, y left, z up
 
   EXPECT_EQ(decode(toPointCloud2(scan, {}), ours).cloud.size(), 0u);
   EXPECT_THROW(toPointCloud2(scan, {2}), std::out_of_range);

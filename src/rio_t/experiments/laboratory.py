@@ -45,8 +45,8 @@ class Run:
     summary: dict
     curve: dict     # the table time_offset.csv
     scans: dict     # the table ego_velocity.csv
-    cpu: float = math.nan  # [s] of rio_t_bag, user and system
     before: list = dataclasses.field(default_factory=list)  # Runs: the online pass of a batch, the earlier passes
+    cpu: float = math.nan  # [s] of rio_t_bag, user and system
 
     def figure(self, key):
         return float(self.summary.get(key, math.nan))
