@@ -93,4 +93,4 @@ def test_another_package_builds_on_headers_libraries_and_messages(tmp_path):
     run("cmake", "-S", DOWNSTREAM, "-B", tmp_path, "-DCMAKE_BUILD_TYPE=Debug", "-DPYTHON_EXECUTABLE=/usr/bin/python3")
     run("cmake", "--build", tmp_path)
     program = tmp_path / "devel/lib/rio_t_downstream/rio_t_downstream"
-    assert run(program) == "2 -0.5 0.03 0\n"
+    assert run(program) == "3 -0.5 0.03 0\n"  # forward 2, shifted by 1
