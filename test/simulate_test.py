@@ -134,4 +134,4 @@ def test_a_barometer_and_its_shocks(simulate):
     failed, bag = simulate(*motion, "--pressure-shock", "15,1,100")
     assert failed.returncode == 2 and "--pressure-shock needs --barometer" in failed.stderr and bag is None
     failed, _ = simulate(*motion, "--barometer", "--pressure-shock", "15,0,100")
-    assert failed.returncode == 1 and "a positive duration" in failed.stderr
+    assert failed.returncode == 2 and "a positive duration" in failed.stderr
