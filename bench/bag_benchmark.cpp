@@ -28,7 +28,8 @@ void run(const std::string& bag, const std::string& config, const std::string& o
   rio_t::ParameterEntries entries = rio_t::readParameterFile(rio_t::findConfigFile(config));
   for (const std::string& assignment : assignments) entries.push_back(rio_t::parseAssignment(assignment));
   const std::uint64_t allocations_before = rio_t::bench::allocations();
-  const rio_t::RunSummary summary = rio_t::runBag({{bag}, output_folder, rio_t::makeConfig(entries), nullptr});
+  const rio_t::RunSummary summary =
+      rio_t::runBag({{bag}, output_folder, rio_t::makeConfig(entries), nullptr});
   const std::uint64_t allocations = rio_t::bench::allocations() - allocations_before;
 
   StageCost rest;

@@ -27,7 +27,7 @@ if [ ! -f "$root/.rio_t_complete" ]; then
   debootstrap --variant=minbase --include=ca-certificates "$suite" "$root" \
     "${RIO_T_DEBIAN_MIRROR:-http://deb.debian.org/debian}" >"$log" 2>&1 || { tail -n 20 "$log" >&2; exit 1; }
   mkdir -p "$root"/{rio_t,data,build,ccache}
-  # Nothing in the folder has to survive a power cut, and nobody reads manuals in it.
+  # The folder need not survive a power cut and needs no manuals.
   printf '%s\n' force-unsafe-io 'path-exclude=/usr/share/doc/*' 'path-exclude=/usr/share/man/*' >"$root/etc/dpkg/dpkg.cfg.d/rio_t"
   touch "$root/.rio_t_complete"
 fi

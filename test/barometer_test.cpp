@@ -69,7 +69,7 @@ struct DroneRun : SimulatedRun {
   double heightRms(double from, double to) const {
     return rms(from, to, [this](const NavigationState& state) { return heightError(state); });
   }
-  /// What came of the means of pressures from `from` to `to` seconds.
+  /// The answers to the means of pressures from `from` to `to` seconds.
   template <typename Predicate>
   int count(double from, double to, Predicate&& predicate) const {
     int count = 0;

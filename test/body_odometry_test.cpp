@@ -8,6 +8,7 @@
 
 #include "rio_t/core/so3.h"
 #include "rio_t/factors/state_block.h"
+#include "some_state.h"
 
 namespace rio_t {
 namespace {
@@ -17,24 +18,6 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Vector15 = Eigen::Matrix<double, 15, 1>;
 
 const ImuInBody kMounting{{0.3, -0.2, 0.5}, so3::exp({0.4, 1.1, -0.7})};
-
-NavigationState someState() {
-  NavigationState state;
-  state.time = Time::fromNanoseconds(1700000000123456789);
-  state.q_WI = so3::exp({0.3, -0.8, 1.9});
-  state.p_W = {1.0, -2.0, 3.0};
-  state.v_W = {0.7, 1.1, -0.4};
-  state.b_g = {0.01, -0.02, 0.03};
-  state.angular_velocity = {0.5, -0.6, 0.7};
-  // Positive definite with every block correlated.
-  StateCovariance L = StateCovariance::Zero();
-  for (int row = 0; row < 15; ++row) {
-    for (int column = 0; column <= row; ++column) L(row, column) = 0.1 * std::sin(1.0 + 3.0 * row + column);
-    L(row, row) += 0.2;
-  }
-  state.covariance = L * L.transpose();
-  return state;
-}
 
 WorldInOdom someWorld() {
   WorldInOdom T_OW;
@@ -159,7 +142,8 @@ TEST(BodyOdometry, CovarianceOfTheWorldIsThatOfTheNumericDerivative) {
   L << 0.3, 0, 0, 0, 0.1, 0.2, 0, 0, -0.1, 0.05, 0.4, 0, 0.02, 0.03, -0.01, 0.1;
   T_OW.covariance = L * L.transpose();
   const Covariance6 expected = J * T_OW.covariance * J.transpose();
-  const Covariance6 added = bodyOdometry(state, 0.0, kMounting, T_OW).pose_covariance - certain.pose_covariance;
+  const Covariance6 added =
+      bodyOdometry(state, 0.0, kMounting, T_OW).pose_covariance - certain.pose_covariance;
   EXPECT_LT((added - expected).norm(), 1e-8 * expected.norm());
 }
 

@@ -332,8 +332,8 @@ TEST_F(Calibrate, WhatIsWrongIsNamedBeforeTheWork) {
 TEST_F(Calibrate, HelpSaysWhatItDoes) {
   const Outcome outcome = runCalibrate({"--help"});
   EXPECT_EQ(outcome.status, 0);
-  expectSays(outcome.out,
-             {"--bag BAG", "--config", "--set", "--out", "--output-dir", "estimate_extrinsics=rotation", "Examples:"});
+  expectSays(outcome.out, {"--bag BAG", "--config", "--set", "--out", "--output-dir",
+                           "estimate_extrinsics=rotation", "Examples:"});
 }
 
 }  // namespace

@@ -48,7 +48,8 @@ class CheckBag : public testing::Test {
   }
   static void TearDownTestSuite() { fs::remove_all(folder_); }
 
-  static void write(const std::string& motion_name, double duration, BagFormat format, const std::string& path) {
+  static void write(const std::string& motion_name, double duration, BagFormat format,
+                    const std::string& path) {
     simulation::MotionRequest request;
     request.name = motion_name;
     request.seed = setup_.seed;
@@ -71,7 +72,8 @@ class CheckBag : public testing::Test {
       if (const auto imu = instance.instantiate<sensor_msgs::Imu>()) {
         if (!changes.imu || changes.imu(*imu)) out.write(instance.getTopic(), instance.getTime(), *imu);
       } else if (const auto cloud = instance.instantiate<sensor_msgs::PointCloud2>()) {
-        if (!changes.cloud || changes.cloud(*cloud)) out.write(instance.getTopic(), instance.getTime(), *cloud);
+        if (!changes.cloud || changes.cloud(*cloud))
+          out.write(instance.getTopic(), instance.getTime(), *cloud);
       } else if (changes.keep_triggers) {
         out.write(instance.getTopic(), instance.getTime(), instance);
       }
@@ -157,11 +159,11 @@ TEST_F(CheckBag, APlainBagIsReadyAndItsMountingIsFound) {
 
 TEST_F(CheckBag, AnImuInGIsNamed) {
   const BagCheck odd = check(rewritten("g", {[](sensor_msgs::Imu& imu) {
-    imu.linear_acceleration.x /= 9.80665;
-    imu.linear_acceleration.y /= 9.80665;
-    imu.linear_acceleration.z /= 9.80665;
-    return true;
-  }}));
+                                         imu.linear_acceleration.x /= 9.80665;
+                                         imu.linear_acceleration.y /= 9.80665;
+                                         imu.linear_acceleration.z /= 9.80665;
+                                         return true;
+                                       }}));
   expectLine(odd, FindingLevel::kOdd, {"the acceleration is in g"});
   EXPECT_EQ(configOf(odd).imu_units.acceleration, AccelerationUnit::kStandardGravity);
   expectRuns(odd);
@@ -170,11 +172,11 @@ TEST_F(CheckBag, AnImuInGIsNamed) {
 
 TEST_F(CheckBag, AnImuInDegreesIsNamed) {
   const BagCheck odd = check(rewritten("degrees", {[](sensor_msgs::Imu& imu) {
-    imu.angular_velocity.x /= kDegree;
-    imu.angular_velocity.y /= kDegree;
-    imu.angular_velocity.z /= kDegree;
-    return true;
-  }}));
+                                         imu.angular_velocity.x /= kDegree;
+                                         imu.angular_velocity.y /= kDegree;
+                                         imu.angular_velocity.z /= kDegree;
+                                         return true;
+                                       }}));
   expectLine(odd, FindingLevel::kOdd, {"the angular velocity is in deg/s"});
   EXPECT_EQ(configOf(odd).imu_units.rate, RateUnit::kDegreesPerSecond);
   expectRuns(odd);
@@ -273,21 +275,21 @@ TEST_F(CheckBag, ABagWithoutImuIsMissingOne) {
 
 TEST_F(CheckBag, AnImuWithoutStampsOrGravityIsMissingThem) {
   const BagCheck stamps = check(rewritten("imu_zero", {[](sensor_msgs::Imu& imu) {
-    imu.header.stamp = ros::Time();
-    return true;
-  }}));
+                                            imu.header.stamp = ros::Time();
+                                            return true;
+                                          }}));
   expectLine(stamps, FindingLevel::kMissing, {"IMU stamps", "are zero"});
   EXPECT_FALSE(stamps.ready());
   // The IMU is not level: what it shows at rest is its gravity.
   std::optional<geometry_msgs::Vector3> gravity_I;
   const BagCheck gravity = check(rewritten("no_gravity", {[&](sensor_msgs::Imu& imu) {
-    geometry_msgs::Vector3& force = imu.linear_acceleration;
-    if (!gravity_I) gravity_I = force;
-    force.x -= gravity_I->x;
-    force.y -= gravity_I->y;
-    force.z -= gravity_I->z;
-    return true;
-  }}));
+                                             geometry_msgs::Vector3& force = imu.linear_acceleration;
+                                             if (!gravity_I) gravity_I = force;
+                                             force.x -= gravity_I->x;
+                                             force.y -= gravity_I->y;
+                                             force.z -= gravity_I->z;
+                                             return true;
+                                           }}));
   expectLine(gravity, FindingLevel::kMissing, {"gravity is missing"});
   EXPECT_FALSE(gravity.ready());
 }

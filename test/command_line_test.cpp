@@ -13,7 +13,8 @@ const ProgramText kText = {"tool", "FILE...\n", "Tests.", "rosrun rio_t tool a.t
 class CommandLine : public testing::Test {
  protected:
   /// Runs it; what it set is in the members.
-  int run(const std::vector<std::string>& words, const std::function<int()>& body = [] { return 0; }) {
+  int run(
+      const std::vector<std::string>& words, const std::function<int()>& body = [] { return 0; }) {
     OptionSet options("Options");
     options.values("file", "FILE", "files", [this](const std::string& file) { files_.push_back(file); });
     options.positional("file");

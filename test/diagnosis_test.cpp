@@ -86,9 +86,10 @@ TEST(Diagnosis, FilteredPointsNameTheFilterAndTheUnit) {
   evidence.radars.front().snr_sum_db = 15000.0;
   Config config;
   config.radar_overrides.power_unit = "snr_decidb";
-  expectSays(first(evidence, config),
-             {"points_too_weak: 10000 of 10000 points are below radar_min_snr_db 3 dB", "their mean is 1.5 dB",
-              "and radar_power_unit reads the power as snr_decidb", "Set radar_power_unit"});
+  expectSays(
+      first(evidence, config),
+      {"points_too_weak: 10000 of 10000 points are below radar_min_snr_db 3 dB", "their mean is 1.5 dB",
+       "and radar_power_unit reads the power as snr_decidb", "Set radar_power_unit"});
   // One cause: that there are too few points follows from it.
   EXPECT_EQ(diagnose(evidence, config).causes.size(), 1u);
   EXPECT_EQ(diagnose(evidence, config).verdict, RunVerdict::kBad);
@@ -136,20 +137,24 @@ TEST(Diagnosis, RejectedScansNameReasonAndKey) {
 }
 
 TEST(Diagnosis, AStartThatNeverCameSaysWhatItWaitsFor) {
-  expectSays(first(neverStarted("rest: x; or radar and IMU that agree: together they show 3 m/s^2 as gravity")),
-             {"start_contradicts", "together they show 3 m/s^2", "radar_doppler_sign"});
-  expectSays(first(neverStarted("rest: mean accelerometer 1.00 m/s^2 instead of gravity 9.81: accelerating, or "
-                                "not in m/s^2?")),
-             {"imu_units", "may publish g"});
+  expectSays(
+      first(neverStarted("rest: x; or radar and IMU that agree: together they show 3 m/s^2 as gravity")),
+      {"start_contradicts", "together they show 3 m/s^2", "radar_doppler_sign"});
+  expectSays(
+      first(neverStarted("rest: mean accelerometer 1.00 m/s^2 instead of gravity 9.81: accelerating, or "
+                         "not in m/s^2?")),
+      {"imu_units", "may publish g"});
   expectSays(first(neverStarted("standing still: 1.2 of 3.0 s seen")), {"too_short", "init_duration"});
   Config config;
   config.odometry.init_mode = InitMode::kStatic;
-  expectSays(first(neverStarted("rest: the gyro moves by 1 rad/s"), config), {"never_at_rest", "init_mode: auto"});
+  expectSays(first(neverStarted("rest: the gyro moves by 1 rad/s"), config),
+             {"never_at_rest", "init_mode: auto"});
   EXPECT_EQ(diagnose(neverStarted("rest"), Config{}).verdict, RunVerdict::kBad);
 }
 
 TEST(Diagnosis, AStartWithoutVelocitiesNamesTheirReason) {
-  RunEvidence evidence = neverStarted("rest: the gyro moves; or radar velocities in motion: 0.0 of 2.5 s seen");
+  RunEvidence evidence =
+      neverStarted("rest: the gyro moves; or radar velocities in motion: 0.0 of 2.5 s seen");
   evidence.radars.front().velocity_status = {{"too_few_inliers", 180}, {"moving", 20}};
   expectSays(first(evidence), {"too_few_inliers: 180 of 200 scans"});
 }
@@ -157,7 +162,8 @@ TEST(Diagnosis, AStartWithoutVelocitiesNamesTheirReason) {
 TEST(Diagnosis, TheOffsetAtItsBoundIsNamed) {
   RunEvidence evidence = goodRun();
   evidence.windows_at_bound = 150;
-  expectSays(first(evidence), {"offset_at_bound: 150 of 180 windows", "max_time_offset 0.25 s", "radar_stamp_shift"});
+  expectSays(first(evidence),
+             {"offset_at_bound: 150 of 180 windows", "max_time_offset 0.25 s", "radar_stamp_shift"});
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
 }
 
@@ -206,7 +212,8 @@ TEST(Diagnosis, TheLikeliestThreeComeFirst) {
   EXPECT_TRUE(std::is_sorted(diagnosis.causes.begin(), diagnosis.causes.end(),
                              [](const Cause& a, const Cause& b) { return a.share > b.share; }));
   expectSays(describeCauses(diagnosis), {"  1. 190 of 190 scans", "\n  2. ", "\n  3. "});
-  EXPECT_EQ(describeCauses(diagnosis).find("scans_used_share"), std::string::npos) << "a cause says it better";
+  EXPECT_EQ(describeCauses(diagnosis).find("scans_used_share"), std::string::npos)
+      << "a cause says it better";
 }
 
 TEST(Diagnosis, OneOfSeveralRadarsIsNamed) {
@@ -242,9 +249,7 @@ TEST(Diagnosis, FewScansSayNothing) {
 
 TEST(PointFilter, TheFirstFailedTestIsNamed) {
   const EgoVelocityOptions o;
-  const auto judge = [&](const Eigen::Vector3d& p, double snr) {
-    return judgePoint({p, 0.0, snr}, o);
-  };
+  const auto judge = [&](const Eigen::Vector3d& p, double snr) { return judgePoint({p, 0.0, snr}, o); };
   EXPECT_EQ(judge({0.0, 5.0, 0.0}, 10.0), PointVerdict::kKept);
   EXPECT_EQ(judge({0.0, 0.0, 0.0}, 10.0), PointVerdict::kNoDirection);
   EXPECT_EQ(judge({0.0, 0.1, 0.0}, 10.0), PointVerdict::kTooNear);

@@ -3,8 +3,6 @@
 import os
 import pathlib
 import shutil
-import tempfile
-import unittest
 import xml.etree.ElementTree
 
 import numpy
@@ -60,10 +58,12 @@ def as_links(topic, message):
         message.header.frame_id = links[topic]
 
 
-class FramesTest(unittest.TestCase):
+class FramesTest(tester.LiveTestCase):
+    namespaces = ("/rio_t", "/robot_description")
+
     @classmethod
     def setUpClass(cls):
-        cls.folder = tempfile.mkdtemp(prefix="rio_t_frames_")
+        super().setUpClass()
         simulated = tester.simulate(cls.path("simulated.bag"))
         (cls.p_BI, cls.q_BI), (p_BR, q_BR) = joints()["imu_link"], joints()["radar_link"]
         static = TFMessage([transform("base_link", link, pose) for link, pose in joints().items()])
@@ -76,19 +76,6 @@ class FramesTest(unittest.TestCase):
         cls.imu_stamps = tester.stamps(cls.bag, tester.IMU)
         cls.scan_stamps = tester.stamps(cls.bag, tester.RADAR)
 
-    @classmethod
-    def path(cls, name):
-        return os.path.join(cls.folder, name)
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.folder)
-
-    def setUp(self):
-        for name in ("/rio_t", "/robot_description"):
-            if rospy.has_param(name):
-                rospy.delete_param(name)
-
     def set_by_hand(self):
         """On the parameter server, since the command line of a node takes no lists."""
         for key, value in self.by_hand.items():
@@ -100,8 +87,8 @@ class FramesTest(unittest.TestCase):
         return max(numpy.linalg.norm(one[t] - other[t]) for t in common)
 
     def play_whole(self, listener, bag=None, topics=TOPICS, rate=2.0):
-        with tester.play(bag or self.bag, topics, rate) as player:
-            self.assertEqual(player.wait(), 0)
+        with tester.feed(listener, bag or self.bag, topics, rate) as player:
+            player.wait()
         stamps = tester.stamps(bag, tester.IMU) if bag else self.imu_stamps
         listener.wait_for_stamp("odom", stamps[-1])
         listener.wait_for_stamp("odom_optimized", stamps[-1] - 4 * 10**8)  # the last scans may wait for more IMU
@@ -210,9 +197,9 @@ class FramesTest(unittest.TestCase):
         self.set_by_hand()
         with tester.Listener() as listener, tester.node("config:=irs", "base_extrinsics_source:=tf"):
             listener.wait_until_heard()
-            with tester.play(self.bag, TOPICS) as player:
+            with tester.feed(listener, self.bag) as player:
                 listener.wait_for_diagnosis("odometry", "waiting for tf from imu_link to base_link", WARN)
-                self.assertEqual(player.wait(), 0)
+                player.wait()
             self.assertEqual(listener.messages["odom"], [])
 
     def test_who_publishes_which_tf(self):
@@ -223,6 +210,12 @@ class FramesTest(unittest.TestCase):
                     "config:=irs", "imu_frame:=base_link", "extrinsics_source:=parameters", *parameters):
                 listener.wait_until_heard()
                 self.play_whole(listener, rate=4.0)
+                if moving:
+                    last = listener.messages["odom"][-1].header.stamp
+                    listener.wait_for("tf of the last odometry", lambda: (
+                        listener.tf and listener.tf[-1].header.stamp >= last))
+                if static:
+                    listener.wait_for("static tf", lambda: listener.tf_static)
                 self.assertEqual({(t.header.frame_id, t.child_frame_id) for t in listener.tf}, moving)
                 self.assertEqual({(t.header.frame_id, t.child_frame_id) for t in listener.tf_static}, static)
                 inverse = {t.header.stamp.to_nsec(): t.transform for t in listener.tf}
@@ -270,7 +263,7 @@ class FramesTest(unittest.TestCase):
                 self.assertGreater(numpy.linalg.norm(last[0]), 0.1)
                 passed = len(listener.messages["odom"])
                 tester.call("/rio_t/reset", Empty)  # waits for rest, with which the bag begins
-                with tester.play(again, TOPICS, 2.0):
+                with tester.feed(listener, again):
                     listener.wait_for("odometry after the reset", lambda: len(listener.messages["odom"]) > passed)
                     first = listener.messages["odom"][passed]
                 p, q = pose_of(first)

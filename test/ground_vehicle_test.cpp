@@ -1,4 +1,4 @@
-// What a vehicle on wheels cannot do: the factor, and what it does in the whole pipeline.
+// The constraint of a vehicle on wheels: the factor, and its effect in the whole pipeline.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -81,7 +81,8 @@ class CandidatesTest : public ::testing::Test {
     const Time time = Time::fromNanoseconds(1'000'000'000) + 3.0 * share;
     detection.radar_W = Eigen::Vector3d(share * way, 0.0, 0.0);
     detection.covariance = Eigen::Vector3d(0.2 * 0.2, 0.05 * 0.05, 0.3 * 0.3).asDiagonal();
-    detection.p_W = p_W + Eigen::Vector3d(0.2 * gauss_(random_), 0.05 * gauss_(random_), 0.3 * gauss_(random_));
+    detection.p_W =
+        p_W + Eigen::Vector3d(0.2 * gauss_(random_), 0.05 * gauss_(random_), 0.3 * gauss_(random_));
     detection.snr_db = 20.0;
     detection.time = time;
     detection.sighting.node_time = time;

@@ -50,8 +50,9 @@ TEST(LiveParameters, ComeBackFromTheirMessage) {
 }
 
 TEST(LiveParameters, ChangeAllRadars) {
-  Config config = makeConfig({parseAssignment("radars=[left, right]"), parseAssignment("left/radar_topic=/left"),
-                              parseAssignment("right/radar_topic=/right")});
+  Config config =
+      makeConfig({parseAssignment("radars=[left, right]"), parseAssignment("left/radar_topic=/left"),
+                  parseAssignment("right/radar_topic=/right")});
   dynamic_reconfigure::Config message;
   LiveParameters(config).__toMessage__(message);
   doubleOf(message, "innovation_gate") = 5.5;

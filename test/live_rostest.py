@@ -2,8 +2,6 @@
 """The live node and nodelet against the bag runner, and each of their promises, on a simulated bag."""
 import os
 import shutil
-import tempfile
-import unittest
 
 import numpy
 import rosbag
@@ -22,31 +20,29 @@ OPTIMIZED_BOUND_M = 1e-3
 LIVE_BOUND_M = 0.05
 
 
-class LiveTest(unittest.TestCase):
+class LiveTest(tester.LiveTestCase):
+    namespaces = ("/rio_t", "/rio_t_2")
+
     @classmethod
     def setUpClass(cls):
-        cls.folder = tempfile.mkdtemp(prefix="rio_t_live_")
-        cls.bag = os.path.join(cls.folder, "run.bag")
+        super().setUpClass()
+        cls.bag = cls.path("run.bag")
         tester.check(tester.run(tester.program("rio_t", "simulate"), "--motion", "medium", "--seed", 3, "--duration", 14,
                                 "--static-start", 5, "--static-end", 1, "--time-offset", 0.03, "--out", cls.bag))
-        output = os.path.join(cls.folder, "run")
+        output = cls.path("run")
         tester.check(tester.run(tester.program("rio_t", "rio_t_bag"), "--bag", cls.bag, "--config", "irs", "--output-dir",
                                 output))
         cls.live = tum.read(os.path.join(output, "trajectory.txt")).positions()
         cls.optimized = tum.read(os.path.join(output, "trajectory_optimized.txt")).positions()
-        cls.saved = os.path.join(cls.folder, "saved.txt")
+        cls.saved = cls.path("saved.txt")
         with rosbag.Bag(cls.bag) as bag:
             cls.imu_stamps = [m.header.stamp.to_nsec() for _, m, _ in bag.read_messages([tester.IMU])]
             cls.scan_stamps = [m.header.stamp.to_nsec() for _, m, _ in bag.read_messages([tester.RADAR])]
 
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.folder)
-
-    def whole_bag(self, listener, *play_arguments):
-        """Plays the bag and waits for the last odometry."""
-        with tester.play(self.bag, *play_arguments) as player:
-            self.assertEqual(player.wait(), 0)
+    def whole_bag(self, listener, *topics):
+        """Plays the bag, by default IMU and radar, and waits for the last odometry."""
+        with tester.feed(listener, self.bag, topics or (tester.IMU, tester.RADAR)) as player:
+            player.wait()
         listener.wait_for_stamp("odom", self.imu_stamps[-1])
         # The last scan may wait for IMU samples that the bag does not hold.
         listener.wait_for_stamp("odom_optimized", self.scan_stamps[-3])
@@ -128,7 +124,7 @@ class LiveTest(unittest.TestCase):
         with tester.Process(*tester.preloaded(), nodelet, "manager", "__name:=manager") as manager:
             with tester.Listener() as listener, load() as loader:
                 listener.wait_until_heard()
-                with tester.play(self.bag):
+                with tester.feed(listener, self.bag):
                     listener.wait_for("odometry", lambda: len(listener.messages["odom_optimized"]) > 10)
                     loader.stop()  # unloads, while the bag plays on
                 self.assertIsNone(manager.process.poll(), "the manager died")
@@ -143,8 +139,8 @@ class LiveTest(unittest.TestCase):
             listener.wait_until_heard()
             # No more than the rest at the start: long enough to initialise. After the reset nothing comes that could
             # start it again before we look.
-            with tester.play(self.bag, (tester.IMU, tester.RADAR), 2.0, "--duration=4.5") as player:
-                self.assertEqual(player.wait(), 0)
+            with tester.feed(listener, self.bag, duration=4.5) as player:
+                player.wait()
             listener.wait_for("odometry", lambda: listener.messages["odom"])
             listener.wait_for_diagnosis("odometry", "running", OK)
             tester.call("/rio_t/reset", Empty)
@@ -154,7 +150,7 @@ class LiveTest(unittest.TestCase):
             self.assertEqual(listener.value("odometry", "last_reset_because"), "asked for by ~reset")
             self.assertIn("reset_pose: keep", listener.value("odometry", "after_reset"))
             heard = len(listener.messages["odom"])
-            with tester.play(self.bag, (tester.IMU, tester.RADAR), 2.0, "--start=0.5", "--duration=4.5"):
+            with tester.feed(listener, self.bag, start=0.5, duration=4.5):
                 listener.wait_for("odometry again", lambda: len(listener.messages["odom"]) > heard)
 
     def test_looping_bag_resets_and_runs_again(self):
@@ -175,7 +171,7 @@ class LiveTest(unittest.TestCase):
     def test_absent_trigger_is_told(self):
         with tester.Listener() as listener, tester.node("config:=irs", "stamp_source:=trigger"):
             listener.wait_until_heard()
-            with tester.play(self.bag):
+            with tester.feed(listener, self.bag):
                 listener.wait_for_diagnosis("input", "no trigger yet on", ERROR)
                 listener.wait_for("scans given up",
                                   lambda: int(listener.value("input", "dropped_trigger_missing") or 0) > 10)
@@ -184,7 +180,7 @@ class LiveTest(unittest.TestCase):
         with tester.Listener() as listener, tester.node("config:=irs", "stamp_source:=trigger",
                                                         "trajectory_file:=" + self.saved):
             listener.wait_until_heard()
-            self.whole_bag(listener, (tester.IMU, tester.RADAR, "/sensor_platform/radar/trigger"))
+            self.whole_bag(listener, tester.IMU, tester.RADAR, "/sensor_platform/radar/trigger")
             self.compare_with_bag_runner(listener)  # in this bag headers and triggers have the same stamps
 
     def test_extrinsics_from_tf(self):
@@ -201,16 +197,15 @@ class LiveTest(unittest.TestCase):
         rospy.set_param("/rio_t/extrinsics_translation", [9.0, 9.0, 9.0])  # not to be read
         with tester.Listener() as listener, tester.node(*parameters):
             listener.wait_until_heard()
-            with tester.play(self.bag, (tester.IMU, tester.RADAR), 8.0) as player:
+            with tester.feed(listener, self.bag):
                 listener.wait_for_diagnosis("odometry", "waiting for tf from " + cloud_frame, WARN)
-                player.stop()
             self.assertEqual(listener.messages["odom"], [])
             publisher = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
             publisher.publish(TFMessage([transform]))
-            # The node has it once it waits for something else. Then from the start of the bag.
-            with tester.play(self.bag, (tester.IMU, tester.RADAR), 8.0) as player:
-                listener.wait_for_diagnosis("odometry", "standing still")
-                player.stop()
+            # The node has it once it waits for nothing or for something else. Then from the start of the bag.
+            with tester.feed(listener, self.bag):
+                listener.wait_for("extrinsics from tf", lambda: (
+                    "waiting for tf" not in listener.diagnostics["odometry"].message))
             tester.call("/rio_t/reset", Empty)
             listener.messages["odom"].clear()
             self.whole_bag(listener)
@@ -235,12 +230,6 @@ class LiveTest(unittest.TestCase):
         with tester.Listener() as listener, tester.Process(shutil.which("roslaunch"), *words) as launch:
             listener.wait_for_stamp("odom", self.imu_stamps[-1])
             launch.stop()
-
-    def setUp(self):
-        # Each test starts without what others left on the server.
-        for name in ("/rio_t", "/rio_t_2"):
-            if rospy.has_param(name):
-                rospy.delete_param(name)
 
 
 if __name__ == "__main__":

@@ -32,8 +32,11 @@ const Quaterniond kAhead(std::sqrt(0.5), 0, 0, -std::sqrt(0.5));  // of x right,
 
 TEST(MountingParameters, WordsAreTheQuaternion) {
   const Config kart = from({"mounting_yaw_pitch_roll_deg=[30, 22, 0]"});
-  EXPECT_LT(kart.odometry.T_IR.q_IR.angularDistance(Quaterniond(0.8501141, 0.1652454, -0.0954045, -0.4908136)), 1e-6);
-  EXPECT_LT(from({"mounting_yaw_pitch_roll_deg=[0, 0, 0]"}).odometry.T_IR.q_IR.angularDistance(kAhead), 1e-12);
+  EXPECT_LT(
+      kart.odometry.T_IR.q_IR.angularDistance(Quaterniond(0.8501141, 0.1652454, -0.0954045, -0.4908136)),
+      1e-6);
+  EXPECT_LT(from({"mounting_yaw_pitch_roll_deg=[0, 0, 0]"}).odometry.T_IR.q_IR.angularDistance(kAhead),
+            1e-12);
   EXPECT_EQ(from({"mounting_yaw_pitch_roll_deg=[]"}).odometry.T_IR.q_IR.w(), 1.0);
 }
 
@@ -56,9 +59,10 @@ TEST(MountingParameters, ARotationOfTheCloudsOwnAxesIsTurnedForAllPresets) {
   // The same as from tf.
   geometry_msgs::Transform tf;
   tf.rotation.x = tf.rotation.y = tf.rotation.z = tf.rotation.w = 0.5;
-  const Config config = from({"radar_format=coloradar", "extrinsics_axes=cloud",
-                              "extrinsics_rotation_xyzw=[0.5, 0.5, 0.5, 0.5]"});
-  EXPECT_LT(config.odometry.T_IR.q_IR.angularDistance(toExtrinsics(tf, PointAxes::kForwardLeftUp).q_IR), 1e-12);
+  const Config config = from(
+      {"radar_format=coloradar", "extrinsics_axes=cloud", "extrinsics_rotation_xyzw=[0.5, 0.5, 0.5, 0.5]"});
+  EXPECT_LT(config.odometry.T_IR.q_IR.angularDistance(toExtrinsics(tf, PointAxes::kForwardLeftUp).q_IR),
+            1e-12);
 }
 
 TEST(MountingParameters, BothWaysAtOnceAreAFaultThatNamesBoth) {
@@ -76,9 +80,11 @@ TEST(MountingParameters, BothWaysAtOnceAreAFaultThatNamesBoth) {
 TEST(MountingParameters, EachRadarHasItsOwn) {
   const Config config =
       from({"radars=[left, right, rear]", "mounting_yaw_pitch_roll_deg=[30, 0, 0]", "left/radar_topic=/left",
-            "right/radar_topic=/right", "right/mounting_yaw_pitch_roll_deg=[-30, 0, 0]", "rear/radar_topic=/rear",
-            "rear/extrinsics_rotation_xyzw=[0, 0, 0, 1]"});
-  const auto yaw = [&](std::size_t k) { return mountingOf(config.odometry.radars[k].T_IR.q_IR).yaw * 57.2957795; };
+            "right/radar_topic=/right", "right/mounting_yaw_pitch_roll_deg=[-30, 0, 0]",
+            "rear/radar_topic=/rear", "rear/extrinsics_rotation_xyzw=[0, 0, 0, 1]"});
+  const auto yaw = [&](std::size_t k) {
+    return mountingOf(config.odometry.radars[k].T_IR.q_IR).yaw * 57.2957795;
+  };
   EXPECT_NEAR(yaw(0), 30.0, 1e-6);
   EXPECT_NEAR(yaw(1), -30.0, 1e-6);
   EXPECT_EQ(config.odometry.radars[2].T_IR.q_IR.w(), 1.0);

@@ -44,7 +44,8 @@ Searched searchOn(const std::string& motion, std::uint64_t seed, int doppler_sig
 
 Extrinsics tilted(std::uint64_t seed) {
   const double k = static_cast<double>(seed);
-  return {{0.1, -0.05, 0.08}, so3::exp({1.3 * std::sin(k), 2.0 * std::cos(2.0 * k), 2.5 * std::sin(3.0 * k)})};
+  return {{0.1, -0.05, 0.08},
+          so3::exp({1.3 * std::sin(k), 2.0 * std::cos(2.0 * k), 2.5 * std::sin(3.0 * k)})};
 }
 
 TEST(MountingSearch, AnyMountingAndSignIsFoundWithinItsSigma) {
@@ -86,7 +87,8 @@ TEST(MountingSearch, RestSaysNothing) {
     sample.time = Time::fromSeconds(1000.0 + 0.005 * i);
     sample.acceleration = {0.0, 0.0, 9.81};
     imu.push_back(sample);
-    if (i % 20 == 0) rest.push_back({sample.time, Eigen::Vector3d::Zero(), 1e-3 * Eigen::Matrix3d::Identity()});
+    if (i % 20 == 0)
+      rest.push_back({sample.time, Eigen::Vector3d::Zero(), 1e-3 * Eigen::Matrix3d::Identity()});
   }
   EXPECT_FALSE(searchMounting(rest, InertialTrack(imu, Eigen::Vector3d::Zero()), {}).enough);
 }

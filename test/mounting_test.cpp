@@ -43,7 +43,8 @@ TEST(Mounting, YawIsToTheLeftPitchIsUpRollIsRightSideDown) {
 TEST(Mounting, TheKartOfTheSimulatorInWords) {
   // data.md: yaw +30, up 22 degrees.
   EXPECT_LT(rotation(30, 22, 0).angularDistance(simulation::presetOf("kart").options.T_IR.q_IR), 1e-6);
-  EXPECT_LT(rotation(30, 22, 0).angularDistance(Quaterniond(0.8501141, 0.1652454, -0.0954045, -0.4908136)), 1e-6);
+  EXPECT_LT(rotation(30, 22, 0).angularDistance(Quaterniond(0.8501141, 0.1652454, -0.0954045, -0.4908136)),
+            1e-6);
 }
 
 TEST(Mounting, AnglesComeBack) {

@@ -3,8 +3,6 @@
 import os
 import pathlib
 import shutil
-import tempfile
-import unittest
 
 import dynamic_reconfigure.client
 import numpy
@@ -22,31 +20,23 @@ TI_MMWAVE = "/ti_mmwave/radar_scan_pcl"
 TI_TRIGGER = "/sensor_platform/radar_right/trigger"
 
 
-class SetupTest(unittest.TestCase):
+class SetupTest(tester.LiveTestCase):
+    namespaces = ("/rio_t", "/robot", "/diagnostic_aggregator")
+
     @classmethod
     def setUpClass(cls):
-        cls.folder = tempfile.mkdtemp(prefix="rio_t_setup_")
+        super().setUpClass()
         cls.bag = tester.simulate(cls.path("run.bag"))
         cls.imu_stamps = tester.stamps(cls.bag, tester.IMU)
         cls.scan_stamps = tester.stamps(cls.bag, tester.RADAR)
 
-    @classmethod
-    def path(cls, name):
-        return os.path.join(cls.folder, name)
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.folder)
-
     def setUp(self):
+        super().setUp()
         rospy.set_param("/use_sim_time", True)
-        for name in ("/rio_t", "/robot", "/diagnostic_aggregator"):
-            if rospy.has_param(name):
-                rospy.delete_param(name)
 
-    def play_whole(self, listener, *words, topics=(tester.IMU, tester.RADAR), bag=None, stamps=None):
-        with tester.play(bag or self.bag, topics, 2.0, *words) as player:
-            self.assertEqual(player.wait(), 0)
+    def play_whole(self, listener, topics=(tester.IMU, tester.RADAR), bag=None, stamps=None, **more):
+        with tester.feed(listener, bag or self.bag, topics, **more) as player:
+            player.wait()
         listener.wait_for_stamp("odom", (stamps or self.imu_stamps)[-1])
 
     def test_namespace(self):
@@ -54,7 +44,7 @@ class SetupTest(unittest.TestCase):
         parameters = ("config:=irs", "imu_topic:=imu", "radar_topic:=scan")
         with tester.Listener(node="/robot/rio_t") as listener, tester.node(*parameters, remap=("__ns:=/robot",)):
             listener.wait_until_heard()
-            self.play_whole(listener, f"{tester.IMU}:=/robot/imu", f"{tester.RADAR}:=/robot/scan")
+            self.play_whole(listener, {tester.IMU: "/robot/imu", tester.RADAR: "/robot/scan"})
             listener.wait_for_diagnosis("input", "", None)
             self.assertIn("/robot/imu topic status", listener.diagnostics)
             self.assertIn("/robot/scan topic status", listener.diagnostics)
@@ -68,7 +58,7 @@ class SetupTest(unittest.TestCase):
         with tester.Listener() as listener, tester.node("config:=irs", remap=(f"{tester.IMU}:=/other/imu",)):
             listener.wait_until_heard()
             listener.wait_for_diagnosis("input", "no IMU message yet on /other/imu", ERROR)
-            self.play_whole(listener, f"{tester.IMU}:=/other/imu")
+            self.play_whole(listener, {tester.IMU: "/other/imu", tester.RADAR: tester.RADAR})
             listener.wait_for("rate of the IMU", lambda: "Actual frequency (Hz)" in [
                 v.key for v in listener.diagnostics["/other/imu topic status"].values])
             # After the bag it is silent.
@@ -103,8 +93,8 @@ class SetupTest(unittest.TestCase):
         saved = self.path("ti.txt")
         with tester.Listener() as listener, tester.node("config:=ti_mmwave", "trajectory_file:=" + saved):
             listener.wait_until_heard()
-            self.play_whole(listener, topics=(tester.IMU, TI_MMWAVE, TI_TRIGGER), bag=bag,
-                            stamps=tester.stamps(bag, tester.IMU))
+            self.play_whole(listener, (tester.IMU, TI_MMWAVE, TI_TRIGGER), bag, tester.stamps(bag, tester.IMU),
+                            answers={TI_MMWAVE: "points"})
             self.assertTrue(tester.call("/rio_t/save_trajectory").success)
         kept = tum.read(saved).positions()
         common = (kept.keys() & optimized.keys()) - {max(kept)}
@@ -155,7 +145,7 @@ class SetupTest(unittest.TestCase):
             self.assertEqual(values["innovation_gate"], 5.0)  # what holds, not the default
             self.assertIn("[Hz]", next(p["description"] for p in client.get_parameter_descriptions()
                                        if p["name"] == "odom_rate"))
-            with tester.play(self.bag) as player:
+            with tester.feed(listener, self.bag) as player:
                 listener.wait_for("odometry", lambda: len(listener.messages["odom"]) > 100)
                 # Refused: nothing changes, and it is told why.
                 answer = client.update_configuration({"innovation_gate": -1.0, "odom_rate": 20.0})
@@ -170,7 +160,7 @@ class SetupTest(unittest.TestCase):
                 self.assertEqual(rospy.get_param("/rio_t/odom_rate"), 20.0)
                 listener.wait_for("scans that the gate rejects",
                                   lambda: int(listener.value("input", "dropped_innovation") or 0) > 3)
-                self.assertEqual(player.wait(), 0)
+                player.wait()
             listener.wait_for("end of the bag", lambda: listener.messages["odom"][-1].header.stamp.to_nsec() >
                               self.imu_stamps[-1] - 10**8)
             # A few messages were on their way.
@@ -188,8 +178,8 @@ class SetupTest(unittest.TestCase):
                 shutil.which("roslaunch"), "--wait", "rio_t", "mavros.launch") as launch:
             listener.wait_until_heard()
             tester.wait_for("the publisher", lambda: subscriber.get_num_connections() > 0)
-            with tester.play(self.bag) as player:
-                self.assertEqual(player.wait(), 0)
+            with tester.feed(listener, self.bag) as player:
+                player.wait()
             last = self.imu_stamps[-1] - 10**9 // 30
             tester.wait_for("the last odometry", lambda: heard and heard[-1].header.stamp.to_nsec() >= last)
             launch.stop()

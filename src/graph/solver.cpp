@@ -81,7 +81,8 @@ ceres::Solver::Options solverOptions() {
 }
 
 /// The smallest share of a step that is tried if the whole step raises the cost. A lost tilt makes steps of a
-/// radian: the graph is not linear over them, but their direction is right. Damping would make them too short.
+/// radian: the graph is not linear over them, but their direction is right. Damping would make them too
+/// short.
 constexpr double kShortestShare = 0.06;
 constexpr double kFirstDamping = 1e-4;
 /// Squared length of a step in standard deviations. A shorter step is taken without a look at the cost: the

@@ -15,16 +15,17 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kGravity = 9.81;        // [m/s^2]
-constexpr double kInStep = 0.5;          // [s] between the two directions of gravity that are compared
-constexpr double kMeanWidth = 0.2;       // [s] over which each is averaged
-constexpr double kFastest = 9.0;         // [rad/s] 500 deg/s: no platform turns so fast one tenth of its time
-constexpr double kLeastTilt = 0.03;      // [rad] rms of the turns of gravity in 0.5 s that show the unit
+constexpr double kGravity = 9.81;    // [m/s^2]
+constexpr double kInStep = 0.5;      // [s] between the two directions of gravity that are compared
+constexpr double kMeanWidth = 0.2;   // [s] over which each is averaged
+constexpr double kFastest = 9.0;     // [rad/s] 500 deg/s: no platform turns so fast one tenth of its time
+constexpr double kLeastTilt = 0.03;  // [rad] rms of the turns of gravity in 0.5 s that show the unit
 
 /// Means of the specific force, in steps of `kMeanWidth`, and the turn from one to the next, by the gyro.
 struct Steps {
   std::vector<Vector3d> force;
-  std::vector<Vector3d> turn;  // integral of the rates, as written, from the middle of a step to that of the next
+  std::vector<Vector3d>
+      turn;  // integral of the rates, as written, from the middle of a step to that of the next
 };
 
 Steps stepsOf(const std::vector<ImuMeasurement>& imu) {
@@ -96,7 +97,8 @@ void findRateUnit(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
   report->tilt_agreement = still > 0.0 ? 1.0 - right / still : 0.0;
   if (still / pairs > std::pow(kGravity * kLeastTilt, 2) && inverted < 0.5 * right && inverted < 0.7 * still)
     report->rate_fault =
-        "gyro and accelerometer contradict each other: gravity turns the other way. Their axes differ, or are left-handed";
+        "gyro and accelerometer contradict each other: gravity turns the other way. Their axes differ, or "
+        "are left-handed";
 }
 
 void findNoise(const std::vector<ImuMeasurement>& imu, ImuReport* report) {

@@ -7,8 +7,8 @@
 namespace rio_t {
 namespace {
 
-constexpr double kGap = 0.2;          // [s]
-constexpr double kRateWidth = 0.02;   // [s] to either side
+constexpr double kGap = 0.2;           // [s]
+constexpr double kRateWidth = 0.02;    // [s] to either side
 constexpr double kGravityWidth = 7.5;  // [s] to either side
 
 }  // namespace

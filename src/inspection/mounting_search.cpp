@@ -17,21 +17,21 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kWindow = 3.0;             // [s]
-constexpr std::size_t kMinVelocities = 6;   // of a window: two lines take four
-constexpr double kMinMotion = 0.25;         // [m/s] that a window must exceed to count as motion
-constexpr double kMinDuration = 3.0;        // [s] of motion, below which nothing is said
-constexpr double kGravitySigma = 0.5;       // [m/s^2] of the mean specific force: 3 degrees
-constexpr double kRestGravitySigma = 0.1;   // [m/s^2] of the gravity from a rest: bias of the accelerometer
-constexpr double kGyroDrift = 3.0e-4;       // [rad/s] with which the gyro loses it: what is left of its bias
-constexpr double kOffsetStep = 0.01;        // [s]
-constexpr double kLevelSigma = 0.17;        // [rad] of the roll, if nothing else is known
-constexpr double kAheadSigma = 0.5;         // [rad] of the pitch, likewise
-constexpr double kUprightWeight = 9.0;      // [sigma^2] half of what upside down costs
-constexpr double kOutlier = 3.0;            // [sigma] from which on a velocity counts less
-constexpr double kClear = 25.0;             // [sigma^2] from which on a sign is taken for known
-constexpr double kAlike = 2.0;              // errors of a window are alike: they count as half as many
-constexpr double kOffsetFactor = 3.0;       // velocities of noisy points draw the bottom of the curve to the side
+constexpr double kWindow = 3.0;            // [s]
+constexpr std::size_t kMinVelocities = 6;  // of a window: two lines take four
+constexpr double kMinMotion = 0.25;        // [m/s] that a window must exceed to count as motion
+constexpr double kMinDuration = 3.0;       // [s] of motion, below which nothing is said
+constexpr double kGravitySigma = 0.5;      // [m/s^2] of the mean specific force: 3 degrees
+constexpr double kRestGravitySigma = 0.1;  // [m/s^2] of the gravity from a rest: bias of the accelerometer
+constexpr double kGyroDrift = 3.0e-4;      // [rad/s] with which the gyro loses it: what is left of its bias
+constexpr double kOffsetStep = 0.01;       // [s]
+constexpr double kLevelSigma = 0.17;       // [rad] of the roll, if nothing else is known
+constexpr double kAheadSigma = 0.5;        // [rad] of the pitch, likewise
+constexpr double kUprightWeight = 9.0;     // [sigma^2] half of what upside down costs
+constexpr double kOutlier = 3.0;           // [sigma] from which on a velocity counts less
+constexpr double kClear = 25.0;            // [sigma^2] from which on a sign is taken for known
+constexpr double kAlike = 2.0;             // errors of a window are alike: they count as half as many
+constexpr double kOffsetFactor = 3.0;  // velocities of noisy points draw the bottom of the curve to the side
 constexpr int kM = 9, kL = 3, kShared = kM + kL, kAll = kShared + 6;
 
 /// cost(M, l) = x' H x - 2 b' x + c with x = (columns of M, l).
@@ -122,7 +122,8 @@ double gravitySigma(Time time, const MountingSearchOptions& options) {
   return std::min(kGravitySigma, std::hypot(kRestGravitySigma, options.gravity * tilt));
 }
 
-WindowSystem systemOf(const VelocityWindow& window, double offset, const Matrix3d* M, const Problem& problem) {
+WindowSystem systemOf(const VelocityWindow& window, double offset, const Matrix3d* M,
+                      const Problem& problem) {
   WindowRows rows = rowsOf(window, offset, M, problem);
   const Eigen::LLT<MatrixXd> root(rows.covariance);
   root.matrixL().solveInPlace(rows.A);
@@ -132,7 +133,8 @@ WindowSystem systemOf(const VelocityWindow& window, double offset, const Matrix3
   system.b.noalias() = rows.A.transpose() * rows.y;
   system.c = rows.y.squaredNorm();
   const Time begin = window.front().velocity->stamp - offset;
-  const Vector3d g_G = problem.options.gravity_G.value_or(problem.track.gravity(begin, problem.options.gravity));
+  const Vector3d g_G =
+      problem.options.gravity_G.value_or(problem.track.gravity(begin, problem.options.gravity));
   const double sigma = gravitySigma(begin, problem.options);
   const double known = 1.0 / (sigma * sigma);
   system.H.bottomRightCorner<3, 3>() += known * Matrix3d::Identity();
@@ -185,8 +187,8 @@ RotationCost withoutLeverArm(const Quadratic& q) {
   return cost;
 }
 
-/// Without a motion that shows it, a radar stands upright, does not roll and looks ahead: its right axis is level,
-/// its forward axis nearly so. In M = sign R a level axis costs the same for both signs.
+/// Without a motion that shows it, a radar stands upright, does not roll and looks ahead: its right axis is
+/// level, its forward axis nearly so. In M = sign R a level axis costs the same for both signs.
 RotationCost withUpright(RotationCost cost, const Vector3d& up_I, int sign) {
   VectorXd level = VectorXd::Zero(kM), ahead = VectorXd::Zero(kM), upright = VectorXd::Zero(kM);
   level.head<3>() = up_I;
@@ -254,17 +256,16 @@ Found best(const RotationCost& cost, const std::optional<Vector3d>& up_I, int si
 }
 
 /// Windows with motion, of velocities that the IMU covers with any offset.
-std::vector<VelocityWindow> windowsOf(const std::vector<RadarVelocity>& velocities, const InertialTrack& track,
-                                      double reach) {
+std::vector<VelocityWindow> windowsOf(const std::vector<RadarVelocity>& velocities,
+                                      const InertialTrack& track, double reach) {
   std::vector<VelocityWindow> windows;
   VelocityWindow window;
   const auto finish = [&] {
     const bool moves = std::any_of(window.begin(), window.end(), [](const Weighted& each) {
       return each.velocity->v_R.norm() > kMinMotion;
     });
-    const bool long_enough = window.size() >= kMinVelocities && window.back().velocity->stamp -
-                                                                        window.front().velocity->stamp >
-                                                                    0.5 * kWindow;
+    const bool long_enough = window.size() >= kMinVelocities &&
+                             window.back().velocity->stamp - window.front().velocity->stamp > 0.5 * kWindow;
     if (moves && long_enough &&
         track.isWhole(window.front().velocity->stamp - reach, window.back().velocity->stamp + reach))
       windows.push_back(window);
@@ -318,8 +319,8 @@ double reweigh(double offset, const Matrix3d& M, const Vector3d& l, Problem* pro
   return std::max(1.0, kMeanOverMedian * median(squares));
 }
 
-/// Whether another mounting, far off, fits as well: a vehicle that only drives ahead does not show whether its
-/// radar is upside down.
+/// Whether another mounting, far off, fits as well: a vehicle that only drives ahead does not show whether
+/// its radar is upside down.
 void findOtherMounting(const RotationCost& cost, double square, MountingSearch* result) {
   constexpr double kFar = 1.0;  // [rad]
   const Matrix3d R = result->q_IR.toRotationMatrix();
@@ -411,7 +412,8 @@ MountingSearch searchMounting(const std::vector<RadarVelocity>& velocities, cons
     const int likelier = difference < 0.0 ? -1 : 1;
     const bool contradicts = options.sign_from_ranges != 0 && options.sign_from_ranges != likelier;
     const int by_imu = std::abs(difference) > (contradicts ? 4.0 * kClear : kClear) ? likelier : 0;
-    const int class_sign = by_imu != 0 ? by_imu : (options.sign_from_ranges != 0 ? options.sign_from_ranges : 1);
+    const int class_sign =
+        by_imu != 0 ? by_imu : (options.sign_from_ranges != 0 ? options.sign_from_ranges : 1);
     result.sign = class_sign;
     result.mirrored = by_imu != 0 && options.sign_from_ranges != 0 && by_imu != options.sign_from_ranges;
     const std::size_t s = class_sign == 1 ? 0 : 1;
@@ -424,8 +426,7 @@ MountingSearch searchMounting(const std::vector<RadarVelocity>& velocities, cons
     const auto at = [&](int i) { return curve[static_cast<std::size_t>(i)]; };
     const double curvature = (at(inner - 1) - 2.0 * at(inner) + at(inner + 1)) / (kOffsetStep * kOffsetStep);
     const double slope = (at(inner + 1) - at(inner - 1)) / (2.0 * kOffsetStep);
-    const double step =
-        curvature > 0.0 ? std::clamp(-slope / curvature, -kOffsetStep, kOffsetStep) : 0.0;
+    const double step = curvature > 0.0 ? std::clamp(-slope / curvature, -kOffsetStep, kOffsetStep) : 0.0;
     result.offset = (first + inner) * kOffsetStep + step;
     const bool at_the_end = std::abs(bottom_before) == steps;
     result.offset_sigma =

@@ -78,7 +78,8 @@ RadarVelocities radarVelocities(const std::vector<RadarScan>& scans) {
     if (!result.has_elevation) addVertical(&group);
     const EgoVelocity velocity = estimator.estimate(group);
     if (!isValid(velocity.status)) continue;
-    if (velocity.status == EgoVelocityStatus::kMoving && result.has_elevation) estimator.learn(group, velocity);
+    if (velocity.status == EgoVelocityStatus::kMoving && result.has_elevation)
+      estimator.learn(group, velocity);
     RadarVelocity found{group.stamp, velocity.v_R, velocity.covariance};
     if (!result.has_elevation) found.covariance(2, 2) = kVerticalSigma * kVerticalSigma;
     result.velocities.push_back(found);

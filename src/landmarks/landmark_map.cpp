@@ -19,13 +19,13 @@ constexpr double kClearly = 6.0;
 constexpr double kLoss = 4.0;
 /// [s] unseen; then a landmark makes room for a new one, if there is none else.
 constexpr double kLongUnseen = 30.0;
-/// Pairs that match by chance are even over the gate, so the mean of their squared sigmas is 3/5 of it; that of true
-/// ones is 3. Half way between, the map contradicts the estimate. 100 matches tell it to 0.08.
+/// Pairs that match by chance are even over the gate, so the mean of their squared sigmas is 3/5 of it; that
+/// of true ones is 3. Half way between, the map contradicts the estimate. 100 matches tell it to 0.08.
 constexpr double kMaxMeanSquare = 0.5 * (1.0 + kGate / 5.0);
-/// So many matches tell that mean to 0.15. The map is not trusted before.
+/// The number of matches that the map needs before it is trusted: they tell that mean to 0.15.
 constexpr double kProof = 30.0;
-/// A reflector in view shows itself at least so often. In a scene full of highlights that come and go, hardly any
-/// landmark is seen again.
+/// A reflector in view shows itself at least so often. In a scene full of highlights that come and go, hardly
+/// any landmark is seen again.
 constexpr double kMinShare = 0.1;
 /// Scans, over which the account fades.
 constexpr double kMemory = 100.0;
@@ -100,7 +100,7 @@ LandmarkMap::Association LandmarkMap::associate(const Prediction& prediction, co
     const Landmark& landmark = landmarks_[prediction.landmarks[column]];
     const SeenPoint seen =
         seenFrom(StateView(prediction.state.x.data()), ImuDelta(), g_W_, T_IR, landmark.p_W());
-    // Of state, extrinsics and landmark, in their tangents.
+    // The derivative by state, extrinsics and landmark, in their tangents.
     Eigen::Matrix<double, 3, Eigen::Dynamic> J(3, shared + 3);
     J.setZero();
     J.leftCols<3>() = seen.J_state.leftCols<3>();
@@ -172,7 +172,8 @@ LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<
     landmark.last_seen = prediction.measured;
     LandmarkPoint& point = landmark.point;
     ++point.sightings;
-    point.snr_db += (detections[match.detection].snr_db - point.snr_db) / static_cast<double>(point.sightings);
+    point.snr_db +=
+        (detections[match.detection].snr_db - point.snr_db) / static_cast<double>(point.sightings);
     landmark.conflicts = std::max(0.0, landmark.conflicts - 1.0);
   }
   for (std::size_t column = 0; column < prediction.landmarks.size(); ++column) {
@@ -192,8 +193,8 @@ LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<
   for (const std::size_t i : association.free) {
     const Detection& detection = detections[i];
     placed.push_back({radar_W + R_WR * detection.z.position_R,
-                      R_WR * PolarNoise(detection.z).covariance() * R_WR.transpose(), radar_W, detection.snr_db,
-                      prediction.measured,
+                      R_WR * PolarNoise(detection.z).covariance() * R_WR.transpose(), radar_W,
+                      detection.snr_db, prediction.measured,
                       Sighting{*node.time, delta, &extrinsics, detection.z}});
   }
   candidates_.forgetOld(prediction.measured, smoother.node(0).time);
@@ -206,7 +207,8 @@ LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<
   return answer;
 }
 
-void LandmarkMap::judge(const Prediction& prediction, const Extrinsics& T_IR, const Association& association) {
+void LandmarkMap::judge(const Prediction& prediction, const Extrinsics& T_IR,
+                        const Association& association) {
   const double keep = 1.0 - 1.0 / kMemory;
   in_view_ *= keep;
   matched_ *= keep;
@@ -243,16 +245,17 @@ void LandmarkMap::dropUseless(const Eigen::Vector3d& p_W) {
   for (std::size_t k = landmarks_.size(); k-- > 0;) {
     const bool is_far = (landmarks_[k].p_W() - p_W).norm() > 1.2 * reach_;
     const Landmark& landmark = landmarks_[k];
-    const bool is_gone = landmark.in_view > kMemory && landmark.seen_again < 0.5 * kMinShare * landmark.in_view;
+    const bool is_gone =
+        landmark.in_view > kMemory && landmark.seen_again < 0.5 * kMinShare * landmark.in_view;
     if (is_far || is_gone || landmark.conflicts > kMaxConflicts) retire(k);
   }
 }
 
 void LandmarkMap::makeRoom(Time now, std::size_t wanted) {
   while (landmarks_.size() + wanted > options_.max_landmarks && !landmarks_.empty()) {
-    const auto oldest = std::min_element(landmarks_.begin(), landmarks_.end(), [](const auto& a, const auto& b) {
-      return a.last_seen < b.last_seen;
-    });
+    const auto oldest =
+        std::min_element(landmarks_.begin(), landmarks_.end(),
+                         [](const auto& a, const auto& b) { return a.last_seen < b.last_seen; });
     if (now - oldest->last_seen < kLongUnseen) return;
     retire(static_cast<std::size_t>(oldest - landmarks_.begin()));
   }

@@ -100,7 +100,8 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
     if (barometer_) result.barometer = barometer_->use(smoother_);
     if (ground_vehicle_ && !at_rest) result.ground_vehicle = ground_vehicle_->judge(smoother_, node_time);
     std::optional<LandmarkMap::Prediction> expected;
-    if (landmarks_) expected = landmarks_->predict(smoother_, stamp - radar.offset(), radar.extrinsicsBlock());
+    if (landmarks_)
+      expected = landmarks_->predict(smoother_, stamp - radar.offset(), radar.extrinsicsBlock());
     const RadarAnswer answer = radar.use(
         result.scan, {at_rest, may_rest, has_diverged, result.model_error_scale, last_used_}, smoother_);
     judge(answer, result.scan);

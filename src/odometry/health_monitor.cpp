@@ -21,8 +21,9 @@ constexpr double kMaxSpeed = 200.0;      // [m/s] no platform with such a radar
 constexpr double kMaxModelErrorScale = 25.0;
 constexpr double kMetresPerSecond2 = 10;  // an attitude that is off by x turns x g into velocity each second
 
-/// Variance of the velocity in I [m^2/s^2]. A heading that was lost in an IMU gap makes v_W vague for good and
-/// is no divergence. An error delta of the state is an error R_IW (delta_v + A delta_theta) of the velocity.
+/// Variance of the velocity in I [m^2/s^2]. A heading that was lost in an IMU gap makes v_W vague for good
+/// and is no divergence. An error delta of the state is an error R_IW (delta_v + A delta_theta) of the
+/// velocity.
 Eigen::Vector3d bodyVelocityVariance(const NavigationState& state) {
   using S = StateBlock;
   const Eigen::Matrix3d R_WI = state.q_WI.toRotationMatrix();
@@ -49,10 +50,7 @@ std::string toString(Health health) {
   return "";
 }
 
-HealthMonitor::HealthMonitor(const HealthOptions& options, double gate)
-    : options_(options) {
-  setGate(gate);
-}
+HealthMonitor::HealthMonitor(const HealthOptions& options, double gate) : options_(options) { setGate(gate); }
 
 void HealthMonitor::setGate(double gate) { gate_ = gate > 0.0 ? gate : kDefaultGate; }
 

@@ -22,10 +22,11 @@ constexpr double kRounding = 1e-3;
 constexpr double kMaxTolerance = 0.02;
 /// Two values that differ by this share are the same: floats, or computed from floats.
 constexpr double kSame = 1e-6;
-/// The number of misfits (values that are no multiples) that a batch of 16 may have. If every fiftieth value of a radar
-/// is a misfit, one batch in 270 has more, and four in a row never have. If every twentieth is, one batch in
-/// 23 has more, and one in 300 000 is the last of four. If a radar has no steps, a value is near a multiple
-/// of a wrong step once in 25 times at most (kMaxTolerance), and 14 of 16 values are once in 10^17 times.
+/// The number of misfits (values that are no multiples) that a batch of 16 may have. If every fiftieth value
+/// of a radar is a misfit, one batch in 270 has more, and four in a row never have. If every twentieth is,
+/// one batch in 23 has more, and one in 300 000 is the last of four. If a radar has no steps, a value is near
+/// a multiple of a wrong step once in 25 times at most (kMaxTolerance), and 14 of 16 values are once in 10^17
+/// times.
 constexpr std::size_t kMaxMisfits = 2;
 constexpr int kBatchesWithoutStep = 4;
 

@@ -8,8 +8,8 @@ namespace {
 /// [steps] Rounding and the noise of a direction may move a point by this much. A point must lie beyond the
 /// Dopplers seen by more, and be a span off to within less.
 constexpr double kClearly = 1.5;
-/// The number of points that shows a span. Moving objects are off by any amount. It is no chance if most of ten points
-/// are off by one amount and the Dopplers span that same amount.
+/// The number of points that shows a span. Moving objects are off by any amount. It is no chance if most of
+/// ten points are off by one amount and the Dopplers span that same amount.
 constexpr std::size_t kEnough = 10;
 
 }  // namespace

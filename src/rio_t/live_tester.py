@@ -1,7 +1,10 @@
 """Starts the live node or nodelet, plays bags to it and collects what it says. Waits on conditions, with deadlines."""
 import os
+import shutil
 import subprocess
+import tempfile
 import threading
+import unittest
 
 import rosbag
 import rospy
@@ -14,6 +17,7 @@ from tf2_msgs.msg import TFMessage
 
 from . import programs
 from .msg import ImuBias, TimeOffset
+from .paced_player import PacedPlayer
 from .ros_processes import DEADLINE, SLOWNESS, Process, program, wait_for
 
 # A library that programs of others need first, before they can load ours: the runtime of a sanitizer.
@@ -21,6 +25,7 @@ PRELOAD = os.environ.get("RIO_T_TEST_PRELOAD", "")
 IMU, RADAR = "/sensor_platform/imu", "/sensor_platform/radar/scan"
 # The messages that rosbag play keeps for a late subscriber. The default is 100, which is an eighth of a second of IMU.
 QUEUE = "--queue=20000"
+ANSWERS = {RADAR: "points"}  # the topic that repeats each scan, once the solver has taken or rejected it
 TOPICS = {"odom": Odometry, "odom_optimized": Odometry, "time_offset": TimeOffset, "imu_bias": ImuBias, "path": Path,
           "ego_velocity": TwistWithCovarianceStamped, "innovation": TwistWithCovarianceStamped,
           "inliers": PointCloud2, "points": PointCloud2}
@@ -34,6 +39,28 @@ def preloaded():
 def run(*words):
     """The completed process; its stdout holds stderr too."""
     return programs.run(*words, stderr=subprocess.STDOUT, timeout=DEADLINE)
+
+
+class LiveTestCase(unittest.TestCase):
+    """Has a folder of its own, and each test begins without what others left on the parameter server."""
+    namespaces = ("/rio_t",)  # of the parameters of its nodes
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.mkdtemp(prefix="rio_t_live_")
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.folder)
+
+    @classmethod
+    def path(cls, name):
+        return os.path.join(cls.folder, name)
+
+    def setUp(self):
+        for name in self.namespaces:
+            if rospy.has_param(name):
+                rospy.delete_param(name)
 
 
 class Listener:
@@ -72,6 +99,11 @@ class Listener:
         with self._changed:
             for status in message.status:
                 self.diagnostics[status.name.split(": ")[-1]] = status
+            self._changed.notify_all()
+
+    def wake(self):
+        """All who wait look at their conditions again."""
+        with self._changed:
             self._changed.notify_all()
 
     def wait_for(self, what, condition):
@@ -152,8 +184,14 @@ def edited(bag, out, edit, first=()):
     return out
 
 
+def feed(listener, bag, topics=(IMU, RADAR), rate=2.0, answers=ANSWERS, **part):
+    """A PacedPlayer of `topics`: names, or {name in the bag: name to publish on}. No scan is lost on a slow machine."""
+    names = topics if isinstance(topics, dict) else {topic: topic for topic in topics}
+    return PacedPlayer(listener, bag, names, {k: v for k, v in answers.items() if k in names}, rate, **part)
+
+
 def play(bag, topics=(IMU, RADAR), rate=2.0, *more):
-    """rosbag play, which starts when each of the topics has its subscriber."""
+    """rosbag play, which starts when each of the topics has its subscriber. On a slow machine the node may drop scans."""
     clock = ("--clock", "--hz=1000") if rospy.get_param("/use_sim_time", False) else ()
     return Process(program("rosbag", "play"), *clock, "--quiet", QUEUE, "--wait-for-subscribers",
                    f"--rate={rate / SLOWNESS}", *more, bag, "--topics", *topics, stdin=subprocess.DEVNULL,

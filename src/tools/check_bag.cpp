@@ -1,4 +1,6 @@
 // Looks at a bag, or at running topics, and proposes a configuration. See `check_bag --help`.
+#include "rio_t/ros/bag/check_bag.h"
+
 #include <ros/ros.h>
 #include <stdlib.h>
 
@@ -9,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "rio_t/ros/bag/check_bag.h"
 #include "ros/bag/command_line.h"
 #include "ros/live/record_topics.h"
 
@@ -21,14 +22,18 @@ const rio_t::ProgramText kText = {
     "check_bag",
     "BAG... [--out my.yaml] [--rig rig.png]\n"
     "--live [--duration 30] [--out my.yaml]\n",
-    "Looks at the IMU and the radars of a bag: topics, rates, stamps, units, axes, sign of the Doppler. It finds the\n"
-    "mounting of each radar and its time offset roughly, writes a configuration, and runs the odometry with it.\n"
+    "Looks at the IMU and the radars of a bag: topics, rates, stamps, units, axes, sign of the Doppler. It "
+    "finds the\n"
+    "mounting of each radar and its time offset roughly, writes a configuration, and runs the odometry with "
+    "it.\n"
     "Record 3 s at rest, then a minute of motion with turns about all axes.",
     "rosrun rio_t check_bag run.bag --out my.yaml\n"
     "rosrun rio_t rio_t_bag run.bag --config my.yaml --output-dir results\n"
     "rosrun rio_t check_bag --live --duration 60 --keep live.bag --out my.yaml\n",
-    "Each line of the report begins with OK, odd (the configuration deals with it) or missing (the odometry cannot\n"
-    "run). docs/your_sensors.md explains each. Exit status: 0 ready, 1 something is missing, 2 wrong arguments.\n"};
+    "Each line of the report begins with OK, odd (the configuration deals with it) or missing (the odometry "
+    "cannot\n"
+    "run). docs/your_sensors.md explains each. Exit status: 0 ready, 1 something is missing, 2 wrong "
+    "arguments.\n"};
 
 struct Arguments {
   rio_t::CheckRequest request;
@@ -47,8 +52,8 @@ void addOptions(rio_t::OptionSet& options, Arguments& a) {
   options.text("imu-topic", "TOPIC", "the IMU; by default the one with most samples", r.imu_topic);
   options.values("radar-topic", "TOPIC", "a radar; may be repeated; by default all clouds with a Doppler",
                  [&r](const std::string& topic) { r.radar_topics.push_back(topic); });
-  options.value("duration", "S", "seconds to read of each bag (0: all), or to listen with --live", "120; 30 live",
-                [&a](const std::string& text) {
+  options.value("duration", "S", "seconds to read of each bag (0: all), or to listen with --live",
+                "120; 30 live", [&a](const std::string& text) {
                   a.duration = rio_t::parseNumber(text, rio_t::NumberRange::kNotNegative);
                 });
   options.flag("no-trial", "do not run the odometry with what is proposed", a.no_trial);
@@ -106,6 +111,6 @@ int main(int argc, char** argv) {
   Arguments arguments;
   rio_t::OptionSet options("Options");
   addOptions(options, arguments);
-  return rio_t::runProgram(kText, options, std::vector<std::string>(argv + 1, argv + argc), std::cout, std::cerr,
-                           [&] { return run(arguments); });
+  return rio_t::runProgram(kText, options, std::vector<std::string>(argv + 1, argv + argc), std::cout,
+                           std::cerr, [&] { return run(arguments); });
 }

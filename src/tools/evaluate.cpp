@@ -20,12 +20,15 @@ const ProgramText kText = {
     "evaluate",
     "GROUND_TRUTH.txt ESTIMATE.txt... [options]\n"
     "--time-offset FILE.csv --true-offset SECONDS [options]\n",
-    "Shows the errors of estimated trajectories (TUM format: stamp x y z qx qy qz qw) with the definitions of evo.",
+    "Shows the errors of estimated trajectories (TUM format: stamp x y z qx qy qz qw) with the definitions "
+    "of evo.",
     "rosrun rio_t evaluate truth.txt out/trajectory.txt\n"
     "rosrun rio_t evaluate --time-offset out/time_offset.csv --true-offset 0.03 --skip 20\n",
-    "APE   distance and angle to the truth. The first poses are aligned (origin), or all poses by least squares\n"
+    "APE   distance and angle to the truth. The first poses are aligned (origin), or all poses by least "
+    "squares\n"
     "      over yaw and position, or over rotation and position (SE3, no scale).\n"
-    "RPE   error of the motion over 1 m of the estimate's path and over 1 s. The rmse over 1 m is t_rel, r_rel.\n"
+    "RPE   error of the motion over 1 m of the estimate's path and over 1 s. The rmse over 1 m is t_rel, "
+    "r_rel.\n"
     "drift error of the last pose, with the first poses aligned, per metre of the truth's path.\n"};
 
 struct Arguments {
@@ -39,13 +42,16 @@ struct Arguments {
 };
 
 void addOptions(OptionSet& options, Arguments& a) {
-  options.values("trajectory", "FILE", "the true trajectory, then the estimates; `--trajectory` may be left out",
+  options.values("trajectory", "FILE",
+                 "the true trajectory, then the estimates; `--trajectory` may be left out",
                  [&a](const std::string& file) { a.trajectories.push_back(file); });
   options.positional("trajectory");
-  options.number("max-difference", "S",
-                 "largest difference of the stamps of two poses that are compared [s]; the default is that of evo",
-                 a.max_difference, NumberRange::kNotNegative);
-  options.text("errors", "FILE", "the error of every matched pose of the one estimate goes there (first poses aligned)",
+  options.number(
+      "max-difference", "S",
+      "largest difference of the stamps of two poses that are compared [s]; the default is that of evo",
+      a.max_difference, NumberRange::kNotNegative);
+  options.text("errors", "FILE",
+               "the error of every matched pose of the one estimate goes there (first poses aligned)",
                a.errors_file);
   options.text("time-offset", "FILE", "estimates of the radar's time offset: columns stamp,offset_s,sigma_s",
                a.time_offset);

@@ -9,13 +9,13 @@
 
 namespace {
 
-const rio_t::ProgramText kText = {
-    "rio_t_node", "[_config:=NAME_OR_PATH] [_KEY:=VALUE]...\n",
-    "Runs the radar-inertial odometry live, as a ROS node. It needs a roscore.",
-    "rosrun rio_t rio_t_node _config:=irs\n"
-    "rosrun rio_t rio_t_node _config:=$PWD/my.yaml _stamp_source:=arrival\n"
-    "roslaunch rio_t rio_t.launch config:=irs\n",
-    "Parameters are private; docs/parameters.md describes every key. docs/ros.md lists topics and services.\n"};
+const rio_t::ProgramText kText = {"rio_t_node", "[_config:=NAME_OR_PATH] [_KEY:=VALUE]...\n",
+                                  "Runs the radar-inertial odometry live, as a ROS node. It needs a roscore.",
+                                  "rosrun rio_t rio_t_node _config:=irs\n"
+                                  "rosrun rio_t rio_t_node _config:=$PWD/my.yaml _stamp_source:=arrival\n"
+                                  "roslaunch rio_t rio_t.launch config:=irs\n",
+                                  "Parameters are private; docs/parameters.md describes every key. "
+                                  "docs/ros.md lists topics and services.\n"};
 
 int spin() {
   // Outside of try: the console goes with the last handle, and the message would be lost.

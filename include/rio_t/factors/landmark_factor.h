@@ -56,10 +56,10 @@ class PolarNoise {
 
 /// Where the radar sees a point of the world, and how that depends on state, mounting and point.
 struct SeenPoint {
-  Eigen::Vector3d p_R;                       ///< [m]
-  StateJacobian<3> J_state;                  ///< as StateBlock stores it; not by the biases
-  ExtrinsicsJacobian<3> J_extrinsics;        ///< as ExtrinsicsBlock stores it
-  Eigen::Matrix3d J_point;                   ///< by p_W
+  Eigen::Vector3d p_R;                 ///< [m]
+  StateJacobian<3> J_state;            ///< as StateBlock stores it; not by the biases
+  ExtrinsicsJacobian<3> J_extrinsics;  ///< as ExtrinsicsBlock stores it
+  Eigen::Matrix3d J_point;             ///< by p_W
 };
 /// `delta` carries the state to the time of measurement.
 SeenPoint seenFrom(const StateView& x, const ImuDelta& delta, const Eigen::Vector3d& g_W,

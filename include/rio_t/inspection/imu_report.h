@@ -9,7 +9,7 @@
 
 namespace rio_t {
 
-/// What a recording shows of an IMU. All values are in m/s^2 and rad/s, but for those marked "as written".
+/// An IMU as a recording shows it. All values are in m/s^2 and rad/s, but for those marked "as written".
 struct ImuReport {
   std::size_t samples = 0;
   std::size_t not_finite = 0;
@@ -20,8 +20,8 @@ struct ImuReport {
   std::string acceleration_fault, rate_fault;
 
   bool rests_at_start = false;
-  double rest = 0.0;                                         ///< [s] of rest that was averaged
-  double rest_begin = 0.0;                                   ///< [s] after the first sample
+  double rest = 0.0;                                            ///< [s] of rest that was averaged
+  double rest_begin = 0.0;                                      ///< [s] after the first sample
   Eigen::Vector3d rest_acceleration = Eigen::Vector3d::Zero();  ///< mean specific force
   Eigen::Vector3d rest_rate = Eigen::Vector3d::Zero();          ///< mean: the gyro's bias
   Eigen::Vector3d mean_acceleration = Eigen::Vector3d::Zero();  ///< of the whole recording

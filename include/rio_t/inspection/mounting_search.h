@@ -11,16 +11,16 @@
 namespace rio_t {
 
 struct MountingSearchOptions {
-  double gravity = 9.81;            ///< [m/s^2] magnitude
-  double max_offset = 0.3;          ///< [s] offsets to either side that are tried
-  double lever_arm_sigma = 0.5;     ///< [m] per axis, around zero
-  double accel_density = 0.02;      ///< [m/s^2/sqrt(Hz)] white noise of the accelerometer, vibration included
-  double velocity_sigma = 0.08;     ///< [m/s] of what a velocity and the IMU over a window do not model
-  /// Gravity in G from a rest [m/s^2], and the end of this rest: the gyro carries it on. Without a rest the mean of
-  /// the specific force stands for it.
+  double gravity = 9.81;         ///< [m/s^2] magnitude
+  double max_offset = 0.3;       ///< [s] offsets to either side that are tried
+  double lever_arm_sigma = 0.5;  ///< [m] per axis, around zero
+  double accel_density = 0.02;   ///< [m/s^2/sqrt(Hz)] white noise of the accelerometer, vibration included
+  double velocity_sigma = 0.08;  ///< [m/s] of what a velocity and the IMU over a window do not model
+  /// Gravity in G from a rest [m/s^2], and the end of this rest: the gyro carries it on. Without a rest the
+  /// mean of the specific force stands for it.
   std::optional<Eigen::Vector3d> gravity_G;
   Time rest_end;
-  /// What the ranges say of the sign (DopplerSign); 0: nothing.
+  /// The sign by the ranges (DopplerSign); 0: they do not show it.
   int sign_from_ranges = 0;
   /// Up in I at rest, or on average; without one, no mounting is more likely than another.
   std::optional<Eigen::Vector3d> up_I;
@@ -33,13 +33,13 @@ struct AxesHypothesis {
   double misfit = 0.0;  ///< [sigma^2] above the best one, per independent velocity
 };
 
-/// What a recording shows of the mounting of a radar.
+/// The mounting of a radar as a recording shows it.
 struct MountingSearch {
-  bool enough = false;        ///< whether there was enough motion to look at; if not, the rest is empty
-  std::size_t velocities = 0; ///< that were used
-  double speed = 0.0;         ///< [m/s] that nine in ten of them do not exceed
-  double duration = 0.0;      ///< [s] of the windows with motion
-  double residual = 0.0;      ///< [m/s] root mean square, per axis
+  bool enough = false;         ///< whether there was enough motion to look at; if not, the rest is empty
+  std::size_t velocities = 0;  ///< that were used
+  double speed = 0.0;          ///< [m/s] that nine in ten of them do not exceed
+  double duration = 0.0;       ///< [s] of the windows with motion
+  double residual = 0.0;       ///< [m/s] root mean square, per axis
 
   /// v_I = sign q_IR v_R - omega x l: as found, with q_IR a rotation.
   int sign = 1;
@@ -48,11 +48,11 @@ struct MountingSearch {
   /// The ranges say one sign, the IMU the other: one axis of the cloud is inverted, or two are swapped.
   bool mirrored = false;
   Eigen::Quaterniond q_IR = Eigen::Quaterniond::Identity();
-  Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Zero();  ///< [rad] about the axes of I; pi: not observed
-  Eigen::Vector3d lever_arm_I = Eigen::Vector3d::Zero();        ///< [m]
-  Eigen::Vector3d lever_arm_sigma = Eigen::Vector3d::Zero();    ///< [m]
-  double offset = 0.0;        ///< [s] a scan stamped s was measured at s - offset
-  double offset_sigma = 0.0;  ///< [s]
+  Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Zero();   ///< [rad] about the axes of I; pi: not observed
+  Eigen::Vector3d lever_arm_I = Eigen::Vector3d::Zero();      ///< [m]
+  Eigen::Vector3d lever_arm_sigma = Eigen::Vector3d::Zero();  ///< [m]
+  double offset = 0.0;                     ///< [s] a scan stamped s was measured at s - offset
+  double offset_sigma = 0.0;               ///< [s]
   std::vector<AxesHypothesis> hypotheses;  ///< all 48, the best first
 };
 
@@ -60,10 +60,10 @@ struct MountingSearch {
 /// offsets.
 ///
 /// In the gyro's frame G the velocity of the IMU is a straight line in time, its slope the gravity, plus the
-/// integral of the specific force. The velocities of a window of 3 s therefore are linear in M, lever arm, first
-/// velocity and gravity (about which the mean specific force says what it can). The last two are eliminated in
-/// each window; what is left over all windows is a quadratic in M and lever arm, whose minimum over the
-/// rotations is found from the 24 turns of the axes, for both signs. See docs/method.md, section 15.
+/// integral of the specific force. The velocities of a window of 3 s therefore are linear in M, lever arm,
+/// first velocity and gravity (about which the mean specific force says what it can). The last two are
+/// eliminated in each window; what is left over all windows is a quadratic in M and lever arm, whose minimum
+/// over the rotations is found from the 24 turns of the axes, for both signs. See docs/method.md, section 15.
 MountingSearch searchMounting(const std::vector<RadarVelocity>& velocities, const InertialTrack& track,
                               const MountingSearchOptions& options);
 

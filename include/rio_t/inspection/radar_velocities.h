@@ -23,9 +23,9 @@ struct RadarVelocities {
   bool has_elevation = true;
 };
 
-/// Velocities for an inspection: no filter by range, power or field of view, and no prior. Scans of few points
-/// are put together, up to 20 points and 0.12 s. The velocity of a radar without elevation has no vertical part,
-/// with a sigma of 1 m/s. `scans` in the order of their stamps.
+/// Velocities for an inspection: no filter by range, power or field of view, and no prior. Scans of few
+/// points are put together, up to 20 points and 0.12 s. The velocity of a radar without elevation has no
+/// vertical part, with a sigma of 1 m/s. `scans` in the order of their stamps.
 RadarVelocities radarVelocities(const std::vector<RadarScan>& scans);
 
 /// Which sign the ranges give the Doppler.
@@ -37,8 +37,8 @@ struct DopplerSign {
 };
 
 /// Compares the points of scans that lie 0.15 to 0.6 s apart: a range changes as its Doppler says, with the
-/// right sign. It needs neither the axes nor the mounting. Pairs between which the platform turns by more than
-/// 7 degrees do not count.
+/// right sign. It needs neither the axes nor the mounting. Pairs between which the platform turns by more
+/// than 7 degrees do not count.
 DopplerSign dopplerSignFromRanges(const std::vector<RadarScan>& scans, const InertialTrack& track);
 
 }  // namespace rio_t

@@ -15,10 +15,10 @@ struct MessageTimes {
 /// How the messages of one topic come.
 struct StreamTiming {
   std::size_t messages = 0;
-  double duration = 0.0;     ///< [s] from the first to the last, as recorded
-  double rate = 0.0;         ///< [Hz] of the median interval of the stamps; of the records if they tell nothing
-  std::size_t zero = 0;      ///< stamps of zero
-  bool constant = false;     ///< all stamps are the same, and not zero
+  double duration = 0.0;  ///< [s] from the first to the last, as recorded
+  double rate = 0.0;      ///< [Hz] of the median interval of the stamps; of the records if they tell nothing
+  std::size_t zero = 0;   ///< stamps of zero
+  bool constant = false;  ///< all stamps are the same, and not zero
   std::size_t duplicates = 0;  ///< stamps as the one before
   std::size_t backwards = 0;   ///< stamps before the one before
   std::size_t gaps = 0;        ///< intervals above 3.5 times the median, and above 20 ms

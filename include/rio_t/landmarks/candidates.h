@@ -15,9 +15,9 @@ namespace rio_t {
 struct Candidate {
   std::vector<Sighting> sightings;  ///< those of the window, in the order of time
   Time first_seen, last_seen;
-  Eigen::Vector3d first_radar_W = Eigen::Vector3d::Zero();  ///< where the radar was at first [m]
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();    ///< of the position alone [1/m^2]
-  Eigen::Vector3d vector = Eigen::Vector3d::Zero();         ///< information times position
+  Eigen::Vector3d first_radar_W = Eigen::Vector3d::Zero();    ///< where the radar was at first [m]
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();      ///< of the position alone [1/m^2]
+  Eigen::Vector3d vector = Eigen::Vector3d::Zero();           ///< information times position
   Eigen::Matrix4d fit_information = Eigen::Matrix4d::Zero();  ///< of (m, s)
   Eigen::Vector4d fit_vector = Eigen::Vector4d::Zero();
   double snr_sum = 0.0;
@@ -33,7 +33,7 @@ struct Candidate {
 struct PlacedDetection {
   Eigen::Vector3d p_W;
   Eigen::Matrix3d covariance;  ///< of the measurement alone, in W [m^2]
-  Eigen::Vector3d radar_W;  ///< where the radar was [m]
+  Eigen::Vector3d radar_W;     ///< where the radar was [m]
   double snr_db;
   Time time;
   Sighting sighting;
@@ -49,7 +49,8 @@ class Candidates {
   /// Adds the detections of a scan, each to the one candidate that it fits, or as a new one. A detection that
   /// fits several is left out.
   void add(const std::vector<PlacedDetection>& detections);
-  /// Forgets candidates that are not seen any more, and sightings from before `oldest_node`: their poses are gone.
+  /// Forgets candidates that are not seen any more, and sightings from before `oldest_node`: their poses are
+  /// gone.
   void forgetOld(Time now, Time oldest_node);
   void clear() { candidates_.clear(); }
   std::size_t size() const { return candidates_.size(); }

@@ -18,7 +18,7 @@ struct Detection {
 /// A detection as a term of the window needs it.
 struct Sighting {
   Time node_time;
-  ImuDelta delta;             ///< from the node to the time of measurement
+  ImuDelta delta;               ///< from the node to the time of measurement
   Block* extrinsics = nullptr;  ///< of the radar that saw it
   PolarMeasurement z;
 };

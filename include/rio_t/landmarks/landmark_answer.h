@@ -16,13 +16,13 @@ struct LandmarkPoint {
   std::uint64_t sightings = 0;
 };
 
-/// What a scan and the map say of each other.
+/// The map's answer to a scan.
 struct LandmarkAnswer {
-  std::size_t matched = 0;    ///< landmarks that the scan saw
+  std::size_t matched = 0;  ///< landmarks that the scan saw
   std::size_t candidates = 0;
   double squared_sigmas = 0.0;  ///< sum over the matches, each of 3 degrees of freedom
-  bool is_trusted = false;    ///< the map has proved itself: its matches count
-  bool dropped_map = false;   ///< map and estimate contradicted each other
+  bool is_trusted = false;      ///< the map has proved itself: its matches count
+  bool dropped_map = false;     ///< map and estimate contradicted each other
   std::vector<LandmarkPoint> map;
 };
 

@@ -24,7 +24,7 @@ class LandmarkMap {
   struct Prediction {
     Time measured;
     PredictedState state;  ///< joint with the extrinsics, if they are estimated, and with the landmarks
-    std::size_t first_landmark = 0;  ///< column of the first landmark in the covariance
+    std::size_t first_landmark = 0;      ///< column of the first landmark in the covariance
     std::vector<std::size_t> landmarks;  ///< which of them, by the order of columns
   };
   /// Call it before the terms of the scan go into the window. None if the time is before the window.
@@ -53,7 +53,7 @@ class LandmarkMap {
   };
   struct Association {
     std::vector<Match> matches;
-    std::vector<std::size_t> free;  ///< detections far from every landmark
+    std::vector<std::size_t> free;       ///< detections far from every landmark
     std::vector<std::size_t> conflicts;  ///< landmarks with a detection just beyond the gate, and no match
   };
   Association associate(const Prediction& prediction, const Extrinsics& T_IR,
@@ -75,7 +75,7 @@ class LandmarkMap {
   std::vector<Landmark> landmarks_;
   Candidates candidates_;
   std::uint64_t next_id_ = 0;
-  double reach_ = 0.0;  ///< [m] of the farthest static detection so far
+  double reach_ = 0.0;                    ///< [m] of the farthest static detection so far
   double in_view_ = 0.0, matched_ = 0.0;  ///< lately: landmarks in view, those of them that were seen
   double sigmas_ = 0.0;                   ///< squared sigmas of these over 3
   bool is_trusted_ = false;

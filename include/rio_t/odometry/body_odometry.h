@@ -9,8 +9,8 @@ namespace rio_t {
 
 using Covariance6 = Eigen::Matrix<double, 6, 6>;
 
-/// T_BI, the pose of the IMU in the body whose odometry is wanted: x_B = R_BI x_I + p_B. The default is a body
-/// that is the IMU.
+/// T_BI, the pose of the IMU in the body whose odometry is wanted: x_B = R_BI x_I + p_B. The default is a
+/// body that is the IMU.
 struct ImuInBody {
   Eigen::Vector3d p_B = Eigen::Vector3d::Zero();             ///< origin of I in B [m]
   Eigen::Quaterniond q_BI = Eigen::Quaterniond::Identity();  ///< turns I into B
@@ -26,7 +26,7 @@ struct BodyOdometry {
   Eigen::Quaterniond q_OB = Eigen::Quaterniond::Identity();  ///< turns B into O
   Eigen::Vector3d v_B = Eigen::Vector3d::Zero();             ///< velocity of the origin of B, in B [m/s]
   Eigen::Vector3d omega_B = Eigen::Vector3d::Zero();         ///< angular velocity of B, in B [rad/s]
-  /// Of the position, then of a turn about the fixed axes of O [m^2, rad^2].
+  /// The covariance of the position, then of a turn about the fixed axes of O [m^2, rad^2].
   Covariance6 pose_covariance = Covariance6::Zero();
   Covariance6 twist_covariance = Covariance6::Zero();  ///< of v_B, then of omega_B [m^2/s^2, rad^2/s^2]
 };
@@ -42,9 +42,9 @@ struct WorldInOdom {
 };
 
 /// Places W so that the body, whose IMU starts at `start`, is where `last` says: at the same position, with
-/// the same yaw. Roll and pitch are those of `start`, since gravity shows them. The uncertainty of `last` stays.
-/// A default-constructed `last` lets O begin at the body: at the origin, turned from the axes of O by roll and
-/// pitch alone. If the body hangs upside down, the yaw is not defined, and W keeps its own.
+/// the same yaw. Roll and pitch are those of `start`, since gravity shows them. The uncertainty of `last`
+/// stays. A default-constructed `last` lets O begin at the body: at the origin, turned from the axes of O by
+/// roll and pitch alone. If the body hangs upside down, the yaw is not defined, and W keeps its own.
 WorldInOdom placeWorld(const StampedPose& start, const ImuInBody& T_BI, const BodyOdometry& last = {});
 
 /// The odometry of a body that is fixed to the IMU. `rate_sigma`: white noise of a gyro sample [rad/s].

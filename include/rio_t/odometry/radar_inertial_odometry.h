@@ -44,8 +44,8 @@ class RadarInertialOdometry {
   void addPressure(const Pressure& pressure);
 
   /// Does the work that is due: initialisation, ego-velocity, window. Returns a result for each scan that it
-  /// finished. It takes up to `max_scans` scans, the others wait for the next call; of those that wait, it drops
-  /// the oldest beyond `max_queued_scans` (rejected as "queue_full").
+  /// finished. It takes up to `max_scans` scans, the others wait for the next call; of those that wait, it
+  /// drops the oldest beyond `max_queued_scans` (rejected as "queue_full").
   std::vector<ScanResult> process(std::size_t max_scans = std::numeric_limits<std::size_t>::max());
 
   /// Changes options while the estimator runs: in effect from the next `process` on. Any thread.

@@ -9,7 +9,7 @@
 
 namespace rio_t {
 
-/// What the filter of the ego-velocity says of a point.
+/// The verdict of the filter of the ego-velocity on a point.
 enum class PointVerdict {
   kKept,
   kNoDirection,  ///< at range zero, or not finite

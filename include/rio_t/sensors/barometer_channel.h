@@ -35,7 +35,7 @@ double heightOfPressure(double pascal, double reference_pascal, double temperatu
 /// Empty, or what is wrong with a pressure, for people: not finite, zero, in hPa, or that of no place.
 std::string faultOf(double pascal);
 
-/// What became of a mean of pressures.
+/// The channel's answer to a mean of pressures.
 struct BarometerAnswer {
   Time time;                      ///< mean of the samples
   int samples = 0;                ///< in the mean
@@ -64,7 +64,7 @@ class BarometerChannel {
   void join(FixedLagSmoother& smoother, Time time, bool at_rest);
   /// Adds the terms of the means that a solved node is near to.
   std::vector<BarometerAnswer> use(FixedLagSmoother& smoother);
-  /// Of the bias; none before the window has one.
+  /// The walk of the bias; none before the window has one.
   std::vector<FixedLagSmoother::RandomWalk> randomWalks() const;
   /// The clock of the IMU jumped: forgets all but the options.
   void startAgain() { *this = BarometerChannel(options_); }

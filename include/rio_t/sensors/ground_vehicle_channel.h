@@ -13,7 +13,7 @@
 
 namespace rio_t {
 
-/// What the platform can do.
+/// The motions that the platform is capable of.
 enum class Platform {
   kFree,           ///< "free": anything
   kGroundVehicle,  ///< "ground_vehicle": it moves neither sideways nor up
@@ -33,7 +33,7 @@ struct GroundVehicleOptions {
   double gate = 4.0;               ///< [sigma] a velocity that contradicts the constraint more is left out
 };
 
-/// What became of the constraint at one time.
+/// The channel's answer at one time.
 struct GroundVehicleAnswer {
   Time time;
   /// Velocity of the point in V, as predicted without the constraint at this time [m/s].
@@ -57,7 +57,7 @@ class GroundVehicleChannel {
   /// Joins a window that begins with one node: adds the vehicle frame as told, with its prior; `at_rest`: the
   /// vehicle stands on the ground there.
   void join(FixedLagSmoother& smoother, bool at_rest);
-  /// What the estimate says at `time`, and whether that contradicts the constraint. None if the constraint is
+  /// Compares the estimate at `time` with the constraint. None if the constraint is
   /// off, or was judged less than a tenth of a second ago. Before the terms of that time are added.
   std::optional<GroundVehicleAnswer> judge(const FixedLagSmoother& smoother, Time time);
   /// Adds the term that `judge` found to agree. Whether it did.

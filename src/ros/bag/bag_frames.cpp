@@ -83,15 +83,16 @@ Config withExtrinsicsOfBag(Config config, const Bags& bags) {
       if (missing.empty()) break;
       bool is_new = false;
       for (const auto& transform : read<tf2_msgs::TFMessage>(instance)->transforms) {
-        if (tf._frameExists(transform.child_frame_id) && tf.canTransform(transform.header.frame_id,
-                                                                         transform.child_frame_id, ros::Time(0)))
+        if (tf._frameExists(transform.child_frame_id) &&
+            tf.canTransform(transform.header.frame_id, transform.child_frame_id, ros::Time(0)))
           continue;
         is_new = tf.setTransform(transform, bags.name(), true) || is_new;
       }
       if (is_new) T_IR = lookUp(tf, radars, imu_frame, cloud_frames, &missing);
     }
   }
-  if (!missing.empty()) throw bagError(bags.name(), missing + "; the bag's tf has: " + tf.allFramesAsString());
+  if (!missing.empty())
+    throw bagError(bags.name(), missing + "; the bag's tf has: " + tf.allFramesAsString());
   config.odometry.T_IR = T_IR.front();
   for (std::size_t k = 0; k < config.radars.size(); ++k)
     config.radars[k].odometry.T_IR = config.odometry.radars[k].T_IR = T_IR[k];

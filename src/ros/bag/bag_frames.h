@@ -9,13 +9,13 @@
 /// Names that a bag resolves: topics, and frames by its tf.
 namespace rio_t {
 
-/// Topics as the bag has them (`types`: by topic). A relative topic is resolved as in the root namespace, so it
-/// is the topic that the live node hears without a namespace; a bag that was written with relative topics fits,
-/// too. What the bag does not have stays, as an absolute name.
+/// Topics as the bag has them (`types`: by topic). A relative topic is resolved as in the root namespace, so
+/// it is the topic that the live node hears without a namespace; a bag that was written with relative topics
+/// fits, too. What the bag does not have stays, as an absolute name.
 Config withTopicsOfBag(Config config, const std::map<std::string, std::string>& types);
 
-/// With T_IR of the radars whose extrinsics_source is tf, from the /tf_static and /tf of the bags. Throws bagError
-/// that names the frames and what is missing.
+/// With T_IR of the radars whose extrinsics_source is tf, from the /tf_static and /tf of the bags. Throws
+/// bagError that names the frames and what is missing.
 Config withExtrinsicsOfBag(Config config, const Bags& bags);
 
 }  // namespace rio_t

@@ -45,7 +45,7 @@ class BagPlayer {
   };
   using NotUsableByKind = std::map<std::string, NotUsable>;
 
-  /// What comes in from one radar.
+  /// The input of one radar.
   struct Radar {
     explicit Radar(const Config& config);
 

@@ -41,7 +41,7 @@ std::string allRejected(const RadarSummary& radar) {
          (radar.name.empty() ? "" : "of radar " + radar.name + " ") + "was rejected: " + reasons;
 }
 
-/// What the aids must tell people.
+/// The warnings that concern the aids.
 void warnOfAids(const Config& config, RunSummary* summary) {
   if (summary->barometer && summary->barometer->used == 0)
     summary->warnings.push_back("no pressure of topic " + config.barometer_topic +

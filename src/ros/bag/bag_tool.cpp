@@ -16,10 +16,13 @@ const ProgramText kText = {
     "Plays ROS 1 bags through the radar-inertial odometry, as fast as the computer can. It needs no roscore.",
     "rosrun rio_t rio_t_bag walk.bag --config irs --output-dir out\n"
     "rosrun rio_t rio_t_bag part_0.bag part_1.bag --config my.yaml --output-dir out\n"
-    "rosrun rio_t rio_t_bag walk.bag --config irs --output-dir out --set mode=batch --set stamp_source=arrival\n"
+    "rosrun rio_t rio_t_bag walk.bag --config irs --output-dir out --set mode=batch --set "
+    "stamp_source=arrival\n"
     "rosrun rio_t rio_t_bag --print-config > all_parameters.yaml\n",
-    "The folder gets trajectory.txt, trajectory_optimized.txt (TUM: stamp x y z qx qy qz qw), navigation.csv,\n"
-    "time_offset.csv, ego_velocity.csv, biases.csv and summary.yaml; and extrinsics.csv if they are estimated.\n"
+    "The folder gets trajectory.txt, trajectory_optimized.txt (TUM: stamp x y z qx qy qz qw), "
+    "navigation.csv,\n"
+    "time_offset.csv, ego_velocity.csv, biases.csv and summary.yaml; and extrinsics.csv if they are "
+    "estimated.\n"
     "With several radars the tables of a radar carry its name. docs/parameters.md describes every key.\n"};
 
 struct Arguments {
@@ -32,11 +35,13 @@ struct Arguments {
 
 void addOptions(OptionSet& options, Arguments& a) {
   addBagOptions(options, a.bags, a.config, a.set);
-  options.text("output-dir", "FOLDER", "the files go there; without it, only the summary is printed", a.output_folder);
+  options.text("output-dir", "FOLDER", "the files go there; without it, only the summary is printed",
+               a.output_folder);
   options.section("Instead of playing");
   options.flag("print-config", "prints the configuration with every parameter", a.print_config);
-  options.valueOrNothing("print-parameters", "FORMAT", "prints the reference of all parameters: yaml, or markdown",
-                         "yaml", [&a](const std::string& format) {
+  options.valueOrNothing("print-parameters", "FORMAT",
+                         "prints the reference of all parameters: yaml, or markdown", "yaml",
+                         [&a](const std::string& format) {
                            if (format != "yaml" && format != "markdown")
                              throw UsageError("'" + format + "' is not one of yaml, markdown");
                            a.print_parameters = format;

@@ -163,8 +163,8 @@ std::string calibratedYaml(const BagCalibration& calibration, const Config& conf
     const std::string indent = has_sections ? "  " : "";
     Keys& own = has_sections ? entries.sections[radar.name] : entries.top_level;
     for (const char* key :
-         {"extrinsics_translation", "extrinsics_rotation_xyzw", "mounting_yaw_pitch_roll_deg", "extrinsics_axes",
-          "time_offset_initial", "time_offset_sigma"})
+         {"extrinsics_translation", "extrinsics_rotation_xyzw", "mounting_yaw_pitch_roll_deg",
+          "extrinsics_axes", "time_offset_initial", "time_offset_sigma"})
       own.remove(key);
     if (has_sections) sections += "\n" + radar.name + ":\n" + own.yaml(indent);
     sections += (has_sections ? "" : "\n") + commented(describeCalibration(radar), indent) + indent +

@@ -15,18 +15,21 @@ namespace {
 namespace fs = std::filesystem;
 
 const ProgramText kText = {
-    "calibrate",
-    "BAG... --config NAME_OR_PATH --out FILE.yaml [--set key=value]... [--output-dir FOLDER]\n",
-    "Finds time offset and mounting of every radar from one or more ROS 1 bags of one rig. It solves each bag as\n"
+    "calibrate", "BAG... --config NAME_OR_PATH --out FILE.yaml [--set key=value]... [--output-dir FOLDER]\n",
+    "Finds time offset and mounting of every radar from one or more ROS 1 bags of one rig. It solves each "
+    "bag as\n"
     "a batch, combines the bags, prints a table, and writes a configuration to use next time. It needs no "
     "roscore.",
     "rosrun rio_t calibrate walk.bag --config my.yaml --out calibrated.yaml\n"
     "rosrun rio_t calibrate walk.bag turns.bag --config my.yaml --out calibrated.yaml --output-dir runs\n"
-    "rosrun rio_t calibrate walk.bag --config my.yaml --out calibrated.yaml --set estimate_extrinsics=rotation\n",
+    "rosrun rio_t calibrate walk.bag --config my.yaml --out calibrated.yaml --set "
+    "estimate_extrinsics=rotation\n",
     "The estimate starts from offset and mounting of the configuration, with the sigmas time_offset_sigma,\n"
-    "extrinsics_rotation_sigma and extrinsics_translation_sigma. estimate_extrinsics: rotation leaves the lever\n"
+    "extrinsics_rotation_sigma and extrinsics_translation_sigma. estimate_extrinsics: rotation leaves the "
+    "lever\n"
     "arm as it is; pose and none, which is the default, estimate it, too. mode is always batch here.\n"
-    "A number is observed if its sigma is at most half of the sigma at the start. A number that is not observed\n"
+    "A number is observed if its sigma is at most half of the sigma at the start. A number that is not "
+    "observed\n"
     "stays as it was, and the table says what to move. A bag that fails does not count; the others do.\n"};
 
 struct Arguments {
@@ -37,8 +40,8 @@ struct Arguments {
 
 void addOptions(OptionSet& options, Arguments& a) {
   addBagOptions(options, a.bags, a.config, a.set);
-  options.text("out", "FILE.yaml", "the configuration goes there: the keys of --config and --set, with what was found",
-               a.out);
+  options.text("out", "FILE.yaml",
+               "the configuration goes there: the keys of --config and --set, with what was found", a.out);
   options.text("output-dir", "FOLDER", "gets a folder for each bag with the files that rio_t_bag writes",
                a.output_folder);
 }
@@ -116,10 +119,8 @@ int run(const Arguments& arguments, std::ostream& out, std::ostream& err) {
   checkConfig(config);
 
   const BagCalibration calibration =
-      calibrateFromBags(
-          {arguments.bags, arguments.output_folder, config, [](const std::string& bag) {
-             return progressBar(bag + " ");
-           }});
+      calibrateFromBags({arguments.bags, arguments.output_folder, config,
+                         [](const std::string& bag) { return progressBar(bag + " "); }});
   for (const CalibrationBag& bag : calibration.bags) {
     for (const std::string& warning : bag.warnings)
       err << "calibrate: warning: bag " << bag.path << ": " << warning << "\n";

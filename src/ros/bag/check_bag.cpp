@@ -38,13 +38,14 @@ const ImuTopic* chooseImu(const Recording& recording, const CheckRequest& reques
     if (!request.imu_topic.empty() && topic.topic != request.imu_topic) continue;
     const bool usable = inspectTiming(topic.times).stampsAreUsable();
     const bool best_usable = best != nullptr && inspectTiming(best->times).stampsAreUsable();
-    if (best != nullptr && (best_usable != usable ? best_usable : best->times.size() >= topic.times.size())) continue;
+    if (best != nullptr && (best_usable != usable ? best_usable : best->times.size() >= topic.times.size()))
+      continue;
     best = &topic;
   }
   return best;
 }
 
-/// What sets each topic apart: "/radar_a/scan", "/radar_b/scan" give "a", "b".
+/// The part of each topic that differs: "/radar_a/scan", "/radar_b/scan" give "a", "b".
 std::vector<std::string> radarNames(const std::vector<RadarInspection>& radars) {
   std::vector<std::vector<std::string>> words;
   for (const RadarInspection& radar : radars) {
@@ -70,7 +71,8 @@ std::vector<std::string> radarNames(const std::vector<RadarInspection>& radars) 
     // A name that YAML takes for a number or a truth value is none.
     const bool is_text = !name.empty() && std::isalpha(static_cast<unsigned char>(name.front())) != 0;
     const bool taken = std::find(names.begin(), names.end(), name) != names.end() || keys.count(name) != 0;
-    static const std::set<std::string> words_of_yaml = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"};
+    static const std::set<std::string> words_of_yaml = {"y",   "n",    "yes",   "no",  "on",
+                                                        "off", "true", "false", "null"};
     if (!is_text || taken || words_of_yaml.count(name) != 0) name = "radar" + std::to_string(k + 1);
     names.push_back(name);
   }
@@ -116,7 +118,8 @@ struct Trial {
     if (!failure.empty()) return -1e9;
     const double share = static_cast<double>(summary.scansUsed()) /
                          static_cast<double>(std::max<std::uint64_t>(1, summary.scansTotal()));
-    return share - static_cast<double>(summary.divergences) - (summary.health_at_end == "diverged" ? 1.0 : 0.0);
+    return share - static_cast<double>(summary.divergences) -
+           (summary.health_at_end == "diverged" ? 1.0 : 0.0);
   }
 };
 
@@ -139,7 +142,7 @@ struct Attempt {
   const char* value;
   const char* why;
 };
-/// What is tried one after the other if the odometry does not run well.
+/// The configurations that are tried one after the other if the odometry does not run well.
 constexpr Attempt kAttempts[] = {
     {nullptr, nullptr, nullptr},
     {"estimate_extrinsics", "pose", "With a fixed lever arm the odometry diverged."},
@@ -156,7 +159,8 @@ std::string offsetsText(const RunSummary& summary) {
   std::string text;
   for (const RadarSummary& radar : summary.radars) {
     text += (text.empty() ? "offset " : "; ") + (radar.name.empty() ? "" : radar.name + " ") +
-            decimalText(1e3 * radar.final_offset_s, 1) + " +- " + decimalText(1e3 * radar.final_offset_sigma_s, 1) + " ms";
+            decimalText(1e3 * radar.final_offset_s, 1) + " +- " +
+            decimalText(1e3 * radar.final_offset_sigma_s, 1) + " ms";
   }
   return text;
 }
@@ -174,16 +178,17 @@ void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
                                "no divergence, " + numbers + note});
     return;
   }
-  check->findings.push_back({FindingLevel::kMissing, "trial run",
-                             "divergences: " + std::to_string(s.divergences) + ", at the end " + s.health_at_end +
-                                 "; " + numbers});
+  check->findings.push_back(
+      {FindingLevel::kMissing, "trial run",
+       "divergences: " + std::to_string(s.divergences) + ", at the end " + s.health_at_end + "; " + numbers});
   check->to_do =
       "The odometry does not run well with what the bag shows. Measure the mounting, set "
       "mounting_yaw_pitch_roll_deg and extrinsics_translation, and see docs/your_sensors.md.";
 }
 
 /// The configuration with which the odometry runs best on the bag.
-void chooseByTrial(const Recording& recording, const std::string& header, ProposedConfig config, BagCheck* check) {
+void chooseByTrial(const Recording& recording, const std::string& header, ProposedConfig config,
+                   BagCheck* check) {
   const double duration = recording.read < recording.length ? recording.read : 0.0;
   Trial best;
   best.failure = "not tried";
@@ -196,13 +201,13 @@ void chooseByTrial(const Recording& recording, const std::string& header, Propos
     if (check->yaml.empty() || trial.score() > best.score()) {
       best = trial;
       check->yaml = yaml;
-      note = attempt.key == nullptr
-                 ? ""
-                 : std::string(" (with ") + attempt.key + ": " + attempt.value + "; without it, it does not run as well)";
+      note = attempt.key == nullptr ? ""
+                                    : std::string(" (with ") + attempt.key + ": " + attempt.value +
+                                          "; without it, it does not run as well)";
     }
     if (trial.good()) break;
   }
-  // Of several radars one alone may do.
+  // One radar alone may do.
   for (const auto& [name, keys] : config.radars) {
     if (best.good()) break;
     ProposedConfig alone{config.top_level, {}};
@@ -232,7 +237,8 @@ std::string header(const Recording& recording) {
 
 std::string topicsOf(const Recording& recording) {
   std::string text;
-  for (const auto& [topic, type] : recording.types) text += (text.empty() ? "" : ", ") + topic + " (" + type + ")";
+  for (const auto& [topic, type] : recording.types)
+    text += (text.empty() ? "" : ", ") + topic + " (" + type + ")";
   return text.empty() ? "none" : text;
 }
 
@@ -258,11 +264,13 @@ void leaveOutCopies(std::vector<RadarInspection>* radars, const Recording& recor
       RadarInspection& a = (*radars)[i];
       RadarInspection& b = (*radars)[k];
       const std::set<std::int64_t> of_a = stampsOf(a.topic), of_b = stampsOf(b.topic);
-      const auto both = std::count_if(of_a.begin(), of_a.end(), [&](std::int64_t s) { return of_b.count(s) != 0; });
+      const auto both =
+          std::count_if(of_a.begin(), of_a.end(), [&](std::int64_t s) { return of_b.count(s) != 0; });
       const double turn = a.search.q_IR.angularDistance(b.search.q_IR);
       constexpr double kSame = 0.26;  // [rad]
       const bool same_mounting = !a.search.enough || !b.search.enough || turn < kSame;
-      if (of_a.empty() || 10 * static_cast<std::size_t>(both) < 9 * std::min(of_a.size(), of_b.size()) || !same_mounting)
+      if (of_a.empty() || 10 * static_cast<std::size_t>(both) < 9 * std::min(of_a.size(), of_b.size()) ||
+          !same_mounting)
         continue;
       if (b.points > a.points) std::swap(a, b);
       check->findings.push_back({FindingLevel::kOdd, "radar",

@@ -76,13 +76,14 @@ int runCheck(const CheckRequest& request, std::ostream& out, std::ostream& err) 
       out << "Not ready: no configuration is written.\n";
       return kNotReady;
     }
-    if (request.bags.size() > 1) out << "The configuration is that of " << best->bag << ", which shows most.\n";
+    if (request.bags.size() > 1)
+      out << "The configuration is that of " << best->bag << ", which shows most.\n";
     if (request.out.empty()) {
       out << "\n" << best->yaml;
     } else {
       writeFile(request.out, best->yaml);
-      out << "Written to " << request.out << ". Next: rosrun rio_t rio_t_bag --bag " << best->bag << " --config "
-          << request.out << " --output-dir results\n";
+      out << "Written to " << request.out << ". Next: rosrun rio_t rio_t_bag --bag " << best->bag
+          << " --config " << request.out << " --output-dir results\n";
     }
     if (!request.rig.empty()) {
       const std::string yaml = request.out.empty() ? request.rig + ".yaml" : request.out;

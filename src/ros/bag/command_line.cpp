@@ -6,8 +6,8 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <locale>
 #include <iterator>
+#include <locale>
 #include <ostream>
 #include <sstream>
 
@@ -52,7 +52,8 @@ void printHelp(const ProgramText& text, const OptionSet& options, std::ostream& 
   out << "\nExamples:\n";
   std::istringstream examples(text.examples);
   for (std::string line; std::getline(examples, line);) out << "  " << line << "\n";
-  out << "\nExit status: 0 if it worked, 1 if data, a file or a parameter was wrong, 2 if the command line was "
+  out << "\nExit status: 0 if it worked, 1 if data, a file or a parameter was wrong, 2 if the command line "
+         "was "
          "wrong,\n3 if there is a result that is not to be trusted.\n";
 }
 
@@ -168,10 +169,9 @@ void OptionSet::valueOrNothing(const std::string& name, const std::string& argum
 void OptionSet::values(const std::string& name, const std::string& argument, const std::string& help,
                        const Setter& set) {
   using Words = std::vector<std::string>;
-  add(name,
-      po::value<Words>()->value_name(argument)->notifier([set = named(name, set)](const Words& words) {
-        for (const std::string& word : words) set(word);
-      }),
+  add(name, po::value<Words>()->value_name(argument)->notifier([set = named(name, set)](const Words& words) {
+    for (const std::string& word : words) set(word);
+  }),
       help);
 }
 
@@ -252,11 +252,13 @@ void addBagOptions(OptionSet& options, std::vector<std::string>& bags, std::stri
                    bags.push_back(bag);
                  });
   options.positional("bag");
-  options.text("config", "NAME_OR_PATH", "irs, ti_mmwave, ... of the package's config/, or a YAML file", config);
-  options.values("set", "key=value",
-                 "sets a parameter on top of the configuration; left/key=value sets it for the radar left; may be "
-                 "repeated",
-                 [&set](const std::string& text) { set.push_back(parseAssignment(text)); });
+  options.text("config", "NAME_OR_PATH", "irs, ti_mmwave, ... of the package's config/, or a YAML file",
+               config);
+  options.values(
+      "set", "key=value",
+      "sets a parameter on top of the configuration; left/key=value sets it for the radar left; may be "
+      "repeated",
+      [&set](const std::string& text) { set.push_back(parseAssignment(text)); });
 }
 
 void require(const std::vector<std::pair<std::string, bool>>& given_by_name) {

@@ -12,7 +12,8 @@
 
 #include "rio_t/ros/parameters/parameter_value.h"
 
-/// What the command lines of all programs share: boost::program_options with checked numbers, one form of
+/// The part that the command lines of all programs share: boost::program_options with checked numbers, one
+/// form of
 /// --help, and one meaning of the exit status.
 namespace rio_t {
 
@@ -37,8 +38,8 @@ double parseNumber(const std::string& text, NumberRange range = NumberRange::kAn
 /// Numbers with commas between them: "0.1,0,-2".
 std::vector<double> parseNumbers(const std::string& text, std::size_t count);
 
-/// Options of a program, in sections. Each names the variable that it sets; the variable must outlive the set.
-/// A name has no dashes. The argument is what --help shows for the value, such as M/S or FILE.
+/// Options of a program, in sections. Each names the variable that it sets; the variable must outlive the
+/// set. A name has no dashes. The argument is what --help shows for the value, such as M/S or FILE.
 class OptionSet {
  public:
   using Given = boost::program_options::parsed_options;
@@ -69,8 +70,8 @@ class OptionSet {
 
   /// Reads `--name value`, `--name=value` and flags; sets nothing. Throws UsageError that names the option.
   Given parse(const std::vector<std::string>& words) const;
-  /// Sets what is given. If several sources have an option, the first source counts. Options of other sets are
-  /// ignored. Throws UsageError that names the option.
+  /// Sets what is given. If several sources have an option, the first source counts. Options of other sets
+  /// are ignored. Throws UsageError that names the option.
   void set(const std::vector<Given>& sources) const;
 
   void print(std::ostream& out) const;
@@ -90,7 +91,7 @@ std::optional<std::string> valueOf(const OptionSet::Given& given, const std::str
 /// A number as --help shows it.
 std::string shownNumber(double value);
 
-/// What --help shows besides the options.
+/// The texts of --help besides the options.
 struct ProgramText {
   std::string name;      ///< as in `rosrun rio_t NAME`
   std::string usage;     ///< the arguments, one line for each way to call it
@@ -108,15 +109,15 @@ int runProgramWith(const ProgramText& text, OptionSet& options, const std::vecto
                    std::ostream& out, std::ostream& err,
                    const std::function<int(const OptionSet::Given&)>& body);
 
-/// What all programs that read bags share: BAG... or --bag, --config, --set.
+/// The options of all programs that read bags: BAG... or --bag, --config, --set.
 void addBagOptions(OptionSet& options, std::vector<std::string>& bags, std::string& config,
                    ParameterEntries& set);
 
 /// Throws UsageError that names all options which are needed and not given.
 void require(const std::vector<std::pair<std::string, bool>>& given_by_name);
 
-/// A bar on stderr with the time that is left, for a share of the work done from 0 to 1. Empty if stderr is no
-/// terminal. `label` stands before it.
+/// A bar on stderr with the time that is left, for a share of the work done from 0 to 1. Empty if stderr is
+/// no terminal. `label` stands before it.
 std::function<void(double)> progressBar(const std::string& label = "");
 
 }  // namespace rio_t

@@ -91,7 +91,8 @@ std::string mountingWords(const CalibratedRadar& radar) {
 
 std::string describeCalibration(const CalibratedRadar& radar) {
   std::string table = "  " + padded(radar.name.empty() ? "radar" : "radar " + radar.name, 18, false) +
-                      padded("given", 10, true) + padded("found", 10, true) + padded("sigma", 10, true) + "\n";
+                      padded("given", 10, true) + padded("found", 10, true) + padded("sigma", 10, true) +
+                      "\n";
   for (std::size_t axis = 0; axis < kCalibrationAxes; ++axis)
     table += axisRow(axis, radar.calibration.axes[axis]);
   return table + mountingWords(radar) + remarks(radar);

@@ -133,8 +133,8 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
   row("started from", summary.initialized_from);
   if (summary.divergences > 0 || summary.health_at_end != "ok") {
     row("diverged", std::to_string(summary.divergences) + " times, re-initialised " +
-                            std::to_string(summary.reinitializations) + " times, at the end " +
-                            summary.health_at_end);
+                        std::to_string(summary.reinitializations) + " times, at the end " +
+                        summary.health_at_end);
   }
   for (const RadarSummary& radar : summary.radars) {
     if (one_radar) break;

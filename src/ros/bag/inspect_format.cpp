@@ -56,9 +56,10 @@ std::string fieldLike(const std::vector<std::string>& fields, const std::vector<
   for (const std::string& word : words) {
     for (const std::string& field : fields) {
       const std::string lower = boost::algorithm::to_lower_copy(field);
-      const bool derived = boost::algorithm::contains(lower, "std") || boost::algorithm::contains(lower, "var") ||
-                           boost::algorithm::contains(lower, "noise") ||
-                           boost::algorithm::contains(lower, "bin") || boost::algorithm::contains(lower, "idx");
+      const bool derived =
+          boost::algorithm::contains(lower, "std") || boost::algorithm::contains(lower, "var") ||
+          boost::algorithm::contains(lower, "noise") || boost::algorithm::contains(lower, "bin") ||
+          boost::algorithm::contains(lower, "idx");
       if (!derived && boost::algorithm::contains(lower, word)) return field;
     }
   }
@@ -85,8 +86,8 @@ std::string decimal(double value, int decimals) {
 
 /// Nobody's preset: names, one by one.
 void guessFormat(const std::vector<std::string>& fields, FormatProposal* proposal) {
-  const std::string doppler = fieldLike(
-      fields, {"doppler", "radial_speed", "range_rate", "rangerate", "velocity", "vel", "speed", "v_r", "vr"});
+  const std::string doppler = fieldLike(fields, {"doppler", "radial_speed", "range_rate", "rangerate",
+                                                 "velocity", "vel", "speed", "v_r", "vr"});
   if (doppler.empty()) {
     proposal->fault = "it has no field with the Doppler (fields: " + proposal->fields +
                       "), so no velocity can be had from it; use a driver that publishes the Doppler";
@@ -96,12 +97,14 @@ void guessFormat(const std::vector<std::string>& fields, FormatProposal* proposa
   const std::string range = fieldLike(fields, {"range", "distance"});
   const bool cartesian = has(fields, "x") && has(fields, "y") && has(fields, "z");
   if (!cartesian && (azimuth.empty() || elevation.empty() || range.empty())) {
-    proposal->fault = "it has no position: neither x, y, z nor azimuth, elevation, range (fields: " +
-                      proposal->fields + "); set radar_field_x and the like by hand";
+    proposal->fault =
+        "it has no position: neither x, y, z nor azimuth, elevation, range (fields: " + proposal->fields +
+        "); set radar_field_x and the like by hand";
     return;
   }
   const std::string preset = cartesian ? "coloradar" : "ars548_hkust";
-  proposal->keys.set("radar_format", preset, "No preset has these fields; this one is near: " + proposal->fields);
+  proposal->keys.set("radar_format", preset,
+                     "No preset has these fields; this one is near: " + proposal->fields);
   if (pointCloudPreset(preset).doppler != doppler) proposal->keys.set("radar_field_doppler", doppler, "");
   if (!cartesian) {
     if (azimuth != "azimuth") proposal->keys.set("radar_field_azimuth", azimuth, "");
@@ -164,8 +167,8 @@ void findPower(const CloudTopic& topic, FormatProposal* proposal) {
   for (const RadarScan& scan : decodeAll(topic, proposal->format)) {
     for (const RadarPoint& point : scan.points) decibels.push_back(point.snr_db);
   }
-  proposal->power = "SNR " + decimal(quantile(decibels, 0.1), 0) + " to " + decimal(quantile(decibels, 0.9), 0) +
-                    " dB in " + format.power;
+  proposal->power = "SNR " + decimal(quantile(decibels, 0.1), 0) + " to " +
+                    decimal(quantile(decibels, 0.9), 0) + " dB in " + format.power;
   constexpr double kDefaultMinimum = 3.0, kFew = 0.2;  // [dB]
   if (quantile(decibels, kFew) < kDefaultMinimum) {
     proposal->keys.set("radar_min_snr_db", decimalYaml(std::floor(quantile(decibels, 0.02)), 1),
@@ -223,8 +226,8 @@ FormatProposal proposeFormat(const CloudTopic& topic) {
 }
 
 bool correctAxes(const CloudReport& cloud, bool mirrored, FormatProposal* proposal) {
-  constexpr double kLooks = 0.4;   // length of the mean direction from which on a radar looks somewhere
-  constexpr double kWider = 1.5;   // by which a field of view is wider in azimuth than in elevation
+  constexpr double kLooks = 0.4;  // length of the mean direction from which on a radar looks somewhere
+  constexpr double kWider = 1.5;  // by which a field of view is wider in azimuth than in elevation
   PointCloudFormat& format = proposal->format;
   if (format.coordinates != PointCoordinates::kCartesian) return false;
   const std::array<std::string, 3> fields = {format.x, format.y, format.z};
@@ -232,8 +235,9 @@ bool correctAxes(const CloudReport& cloud, bool mirrored, FormatProposal* propos
   const int forward = format.axes == PointAxes::kForwardLeftUp ? 0 : 1;
   const auto rename = [&](int field, int from) {
     const std::array<const char*, 3> keys = {"radar_field_x", "radar_field_y", "radar_field_z"};
-    proposal->keys.set(keys[static_cast<std::size_t>(field)], fields[static_cast<std::size_t>(from)],
-                       mirrored ? "Two fields of the cloud are swapped." : "The radar looks along another field.");
+    proposal->keys.set(
+        keys[static_cast<std::size_t>(field)], fields[static_cast<std::size_t>(from)],
+        mirrored ? "Two fields of the cloud are swapped." : "The radar looks along another field.");
   };
   int looks = 0;
   const double most = mean.maxCoeff(&looks);
@@ -242,7 +246,8 @@ bool correctAxes(const CloudReport& cloud, bool mirrored, FormatProposal* propos
       rename(forward, looks);
       rename(looks, forward);
       proposal->odd.push_back("the fields " + fields[static_cast<std::size_t>(forward)] + " and " +
-                              fields[static_cast<std::size_t>(looks)] + " are swapped: the radar looks along " +
+                              fields[static_cast<std::size_t>(looks)] +
+                              " are swapped: the radar looks along " +
                               fields[static_cast<std::size_t>(looks)] + ", and the axes are left-handed");
     } else if (looks != 2) {
       const char* axes = looks == 0 ? "flu" : "rfu";

@@ -17,8 +17,8 @@ struct FormatProposal {
   std::vector<std::string> fitting;  ///< presets whose fields are all there
   PointCloudFormat format;
   ProposedKeys keys;
-  std::vector<std::string> odd;      ///< sentences
-  std::string power;                 ///< what the power field says, as one phrase
+  std::vector<std::string> odd;  ///< sentences
+  std::string power;             ///< what the power field says, as one phrase
 };
 
 /// Chooses preset, names of fields and unit of the power from fields and values.

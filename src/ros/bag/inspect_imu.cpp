@@ -16,7 +16,8 @@ std::string axisName(const Eigen::Vector3d& direction) {
 std::string rateText(const StreamTiming& timing) {
   std::string text = decimalText(timing.rate, timing.rate < 20.0 ? 1 : 0) + " Hz";
   if (timing.gaps > 0)
-    text += ", gaps: " + std::to_string(timing.gaps) + " (longest " + decimalText(timing.longest_gap, 2) + " s)";
+    text +=
+        ", gaps: " + std::to_string(timing.gaps) + " (longest " + decimalText(timing.longest_gap, 2) + " s)";
   if (timing.duplicates > 0) text += ", duplicate stamps: " + std::to_string(timing.duplicates);
   if (timing.backwards > 0) text += ", stamps that run back: " + std::to_string(timing.backwards);
   return text;
@@ -32,7 +33,8 @@ void checkStamps(const StreamTiming& timing, ImuInspection* imu) {
     fault = std::to_string(timing.backwards) + " of " + std::to_string(timing.messages) + " stamps run back";
   }
   if (fault.empty()) return;
-  imu->findings.push_back({FindingLevel::kMissing, "IMU stamps", fault + "; rio_t needs the time of each sample"});
+  imu->findings.push_back(
+      {FindingLevel::kMissing, "IMU stamps", fault + "; rio_t needs the time of each sample"});
   imu->to_do = "Let the IMU driver set header.stamp, and record again.";
 }
 
@@ -44,8 +46,8 @@ void describe(ImuInspection* imu) {
   const bool in_g = r.units.acceleration == AccelerationUnit::kStandardGravity;
   const bool in_degrees = r.units.rate == RateUnit::kDegreesPerSecond;
   if (in_g) {
-    imu->keys.set("imu_acceleration_unit", "g", "The median size of the acceleration is " +
-                                                    decimalText(r.written_norm, 2) + ".");
+    imu->keys.set("imu_acceleration_unit", "g",
+                  "The median size of the acceleration is " + decimalText(r.written_norm, 2) + ".");
     tell(FindingLevel::kOdd, "IMU unit",
          "the acceleration is in g (median size " + decimalText(r.written_norm, 2) + "), not in m/s^2");
   }
@@ -55,15 +57,18 @@ void describe(ImuInspection* imu) {
   }
   for (const std::string& fault : {r.acceleration_fault, r.rate_fault}) {
     if (fault.empty()) continue;
-    tell(FindingLevel::kMissing, "IMU", fault + " (median size as written " + decimalText(r.written_norm, 2) + ")");
-    imu->to_do = "Set the IMU driver to raw acceleration in m/s^2 and angular velocity in rad/s, with the axes of "
-                 "one right-handed frame, and record again.";
+    tell(FindingLevel::kMissing, "IMU",
+         fault + " (median size as written " + decimalText(r.written_norm, 2) + ")");
+    imu->to_do =
+        "Set the IMU driver to raw acceleration in m/s^2 and angular velocity in rad/s, with the axes of "
+        "one right-handed frame, and record again.";
   }
   if (r.rests_at_start) {
     const double norm = r.rest_acceleration.norm();
     tell(std::abs(norm - 9.81) < 0.3 ? FindingLevel::kOk : FindingLevel::kOdd, "rest",
-         "at rest from " + decimalText(r.rest_begin, 1) + " s; gravity " + decimalText(norm, 2) + " m/s^2, up is " +
-             axisName(r.rest_acceleration) + "; gyro bias " + decimalText(r.rest_rate.norm(), 4) + " rad/s");
+         "at rest from " + decimalText(r.rest_begin, 1) + " s; gravity " + decimalText(norm, 2) +
+             " m/s^2, up is " + axisName(r.rest_acceleration) + "; gyro bias " +
+             decimalText(r.rest_rate.norm(), 4) + " rad/s");
     if (std::abs(norm - 9.81) > 0.45)
       imu->keys.set("init_max_gravity_error", decimalYaml(std::abs(norm - 9.81) + 0.5, 1),
                     "At rest the accelerometer shows " + decimalText(norm, 2) + " m/s^2.");
@@ -82,9 +87,11 @@ void describe(ImuInspection* imu) {
   if (r.saturated > 0)
     tell(FindingLevel::kOdd, "range",
          std::to_string(r.saturated) + " samples are at the end of the range (largest " +
-             decimalText(r.largest_acceleration, 1) + " m/s^2, " + decimalText(r.largest_rate, 2) + " rad/s)");
+             decimalText(r.largest_acceleration, 1) + " m/s^2, " + decimalText(r.largest_rate, 2) +
+             " rad/s)");
   if (r.not_finite > 0)
-    tell(FindingLevel::kOdd, "IMU", std::to_string(r.not_finite) + " samples are not finite; they are left out");
+    tell(FindingLevel::kOdd, "IMU",
+         std::to_string(r.not_finite) + " samples are not finite; they are left out");
 }
 
 }  // namespace
@@ -99,9 +106,10 @@ ImuInspection inspectImuTopic(const ImuTopic& topic) {
   constexpr double kSlow = 50.0;  // [Hz]
   const bool odd = timing.rate < kSlow || timing.gaps > 0 || timing.backwards > 0 ||
                    20 * timing.duplicates > timing.messages;
-  imu.findings.push_back({odd ? FindingLevel::kOdd : FindingLevel::kOk, "IMU",
-                          topic.topic + ": " + rateText(timing) +
-                              (timing.rate < kSlow ? ", slower than the 50 Hz that a hand-held platform needs" : "")});
+  imu.findings.push_back(
+      {odd ? FindingLevel::kOdd : FindingLevel::kOk, "IMU",
+       topic.topic + ": " + rateText(timing) +
+           (timing.rate < kSlow ? ", slower than the 50 Hz that a hand-held platform needs" : "")});
   checkStamps(timing, &imu);
   if (!imu.to_do.empty()) return imu;
   for (const ImuMeasurement& sample : topic.written) {

@@ -33,7 +33,8 @@ std::string sureness(const Eigen::Vector3d& sigma) {
   return text;
 }
 
-MountingSearchOptions searchOptions(const ImuInspection& imu, const InertialTrack& track, int sign_from_ranges) {
+MountingSearchOptions searchOptions(const ImuInspection& imu, const InertialTrack& track,
+                                    int sign_from_ranges) {
   MountingSearchOptions options;
   options.sign_from_ranges = sign_from_ranges;
   options.accel_density = std::max(options.accel_density, imu.report.accel_density_median);
@@ -76,21 +77,23 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
   const CloudReport& c = looked.cloud;
   std::string rate = radar->topic + ": " + decimalText(timing.rate, 1) + " Hz";
   if (timing.gaps > 0)
-    rate += ", gaps: " + std::to_string(timing.gaps) + " (longest " + decimalText(timing.longest_gap, 2) + " s)";
+    rate +=
+        ", gaps: " + std::to_string(timing.gaps) + " (longest " + decimalText(timing.longest_gap, 2) + " s)";
   if (timing.duplicates > 0 && timing.zero == 0 && !timing.constant)
     rate += ", duplicate stamps: " + std::to_string(timing.duplicates);
   std::string presets;
   for (const std::string& preset : format.fitting) presets += (presets.empty() ? "" : ", ") + preset;
   tell(timing.gaps > timing.messages / 50 ? FindingLevel::kOdd : FindingLevel::kOk, "radar",
-       rate + "; format " + format.format.name + (format.fitting.size() > 1 ? " (fitting: " + presets + ")" : "") +
-           ", " + format.power);
+       rate + "; format " + format.format.name +
+           (format.fitting.size() > 1 ? " (fitting: " + presets + ")" : "") + ", " + format.power);
   for (const std::string& odd : format.odd) tell(FindingLevel::kOdd, "format", odd);
   const DopplerStep& step = looked.velocities.doppler_step;
   const bool sparse = c.points_50 < 15.0;
   tell(sparse ? FindingLevel::kOdd : FindingLevel::kOk, "points",
-       decimalText(c.points_10, 0) + " / " + decimalText(c.points_50, 0) + " / " + decimalText(c.points_90, 0) +
-           " a scan (10, 50, 90 %), to " + decimalText(c.range_99, 1) + " m, field of view +-" +
-           degrees(c.azimuth_95) + " by +-" + degrees(c.elevation_95) + " deg, Doppler step " +
+       decimalText(c.points_10, 0) + " / " + decimalText(c.points_50, 0) + " / " +
+           decimalText(c.points_90, 0) + " a scan (10, 50, 90 %), to " + decimalText(c.range_99, 1) +
+           " m, field of view +-" + degrees(c.azimuth_95) + " by +-" + degrees(c.elevation_95) +
+           " deg, Doppler step " +
            (step.value > 0.0 ? decimalText(step.value, 3) + " m/s" : std::string("none")) +
            (sparse ? ": few points, so start at rest" : ""));
   if (!looked.velocities.has_elevation)
@@ -99,17 +102,20 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
 
 void limitsOfCloud(const CloudReport& cloud, ProposedKeys* keys) {
   if (cloud.behind > 0.02)
-    keys->set("radar_max_azimuth", "3.141592", "So many points lie behind the radar's forward axis: " +
-                                                   decimalText(100.0 * cloud.behind, 0) + " %.");
+    keys->set("radar_max_azimuth", "3.141592",
+              "So many points lie behind the radar's forward axis: " + decimalText(100.0 * cloud.behind, 0) +
+                  " %.");
   if (cloud.range_99 > 95.0)
-    keys->set("radar_max_range", decimalYaml(std::ceil(1.2 * cloud.range_99), 1), "The radar sees farther than 100 m.");
+    keys->set("radar_max_range", decimalYaml(std::ceil(1.2 * cloud.range_99), 1),
+              "The radar sees farther than 100 m.");
 }
 
 void describeSign(const Looked& looked, const FormatProposal& format, RadarInspection* radar) {
   const MountingSearch& search = looked.search;
   const std::string field = format.format.doppler;
   const std::string by_ranges =
-      looked.sign.sign == 0 ? "" : "ranges (" + decimalText(std::abs(looked.sign.significance), 0) + " sigma)";
+      looked.sign.sign == 0 ? ""
+                            : "ranges (" + decimalText(std::abs(looked.sign.significance), 0) + " sigma)";
   const bool imu_knows = search.enough && search.sign_significance > 25.0;
   const std::string by_imu =
       imu_knows ? "the IMU (" + decimalText(std::sqrt(search.sign_significance), 0) + " sigma)" : "";
@@ -117,8 +123,8 @@ void describeSign(const Looked& looked, const FormatProposal& format, RadarInspe
   if (search.mirrored) {
     radar->findings.push_back(
         {FindingLevel::kOdd, "axes",
-         "the axes of the cloud are left-handed (one axis is inverted): the ranges say that " + field + " is " +
-             (looked.sign.sign > 0 ? "positive for receding" : "negative for receding") +
+         "the axes of the cloud are left-handed (one axis is inverted): the ranges say that " + field +
+             " is " + (looked.sign.sign > 0 ? "positive for receding" : "negative for receding") +
              " targets, the IMU the contrary; radar_doppler_sign and the mounting stand for it"});
     radar->keys.set("radar_doppler_sign", std::to_string(search.sign),
                     "One axis of the cloud is inverted. This sign and the mounting below stand for it.");
@@ -127,10 +133,10 @@ void describeSign(const Looked& looked, const FormatProposal& format, RadarInspe
                                field + " is positive for approaching targets, as " + evidence + " show"});
     radar->keys.set("radar_doppler_sign", "-1", field + " is positive for approaching targets.");
   } else {
-    radar->findings.push_back({FindingLevel::kOk, "Doppler",
-                               field + " is positive for receding targets" +
-                                   (evidence.empty() ? " (assumed: the motion does not show it)"
-                                                     : ", as " + evidence + " show")});
+    radar->findings.push_back(
+        {FindingLevel::kOk, "Doppler",
+         field + " is positive for receding targets" +
+             (evidence.empty() ? " (assumed: the motion does not show it)" : ", as " + evidence + " show")});
   }
 }
 
@@ -149,9 +155,10 @@ std::string turnText(const Eigen::Matrix3d& turn) {
 
 Eigen::Matrix3d nearestTurn(const Eigen::Matrix3d& R) {
   const auto& turns = axisTurns();
-  return *std::max_element(turns.begin(), turns.end(), [&](const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
-    return (a.transpose() * R).trace() < (b.transpose() * R).trace();
-  });
+  return *std::max_element(turns.begin(), turns.end(),
+                           [&](const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
+                             return (a.transpose() * R).trace() < (b.transpose() * R).trace();
+                           });
 }
 
 void describeMounting(const MountingSearch& search, RadarInspection* radar) {
@@ -160,14 +167,16 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
   };
   if (!search.enough) {
     tell(FindingLevel::kOdd, "mounting",
-         "not found: less than 3 s with motion; the radar is taken to look forward. Record with motion, or set "
+         "not found: less than 3 s with motion; the radar is taken to look forward. Record with motion, or "
+         "set "
          "mounting_yaw_pitch_roll_deg by hand");
     radar->keys.setList("mounting_yaw_pitch_roll_deg", {"0.0", "0.0", "0.0"},
                         "Assumed: the bag does not show it. Yaw left, pitch up, roll right side down.");
     return;
   }
   const MountingAngles angles = mountingOf(search.q_IR);
-  const std::vector<std::string> words = {decimalYaml(angles.yaw / kDegree, 1), decimalYaml(angles.pitch / kDegree, 1),
+  const std::vector<std::string> words = {decimalYaml(angles.yaw / kDegree, 1),
+                                          decimalYaml(angles.pitch / kDegree, 1),
                                           decimalYaml(angles.roll / kDegree, 1)};
   Eigen::Vector3d sigma = search.rotation_sigma;
   constexpr double kSparseSigma = 0.2;  // [rad]
@@ -177,8 +186,10 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
   tell(observed ? FindingLevel::kOk : FindingLevel::kOdd, "mounting",
        "yaw " + words[0] + ", pitch " + words[1] + ", roll " + words[2] + " deg (radar's " +
            turnText(nearestTurn(search.q_IR.toRotationMatrix())) + " of the IMU); " + sure);
-  radar->keys.setList("mounting_yaw_pitch_roll_deg", words,
-                      "Yaw left, pitch up, roll right side down, seen from x forward, y left, z up of the IMU. " + sure + ".");
+  radar->keys.setList(
+      "mounting_yaw_pitch_roll_deg", words,
+      "Yaw left, pitch up, roll right side down, seen from x forward, y left, z up of the IMU. " + sure +
+          ".");
   const Eigen::Vector3d& l = search.lever_arm_I;
   const Eigen::Vector3d& l_sigma = search.lever_arm_sigma;
   std::vector<std::string> lever;
@@ -201,8 +212,8 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
            " ms, roughly; the odometry estimates it");
   constexpr double kFar = 0.06, kKnown = 0.03;  // [s] the estimate starts at 0 +- 0.075
   if (std::abs(search.offset) > kFar && search.offset_sigma < kKnown && !radar->isSparse())
-    radar->keys.set("time_offset_initial",
-                    decimalYaml(std::clamp(search.offset, -0.2, 0.2), 3), "Found roughly, in seconds.");
+    radar->keys.set("time_offset_initial", decimalYaml(std::clamp(search.offset, -0.2, 0.2), 3),
+                    "Found roughly, in seconds.");
 }
 
 }  // namespace
@@ -220,12 +231,13 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   const InertialTrack track(imu.samples, imu.report.rest_rate);
   Looked looked = look(recording, imu, cloud, stamps, format.format, track);
   if (looked.cloud.points == 0 || !looked.cloud.has_doppler) {
-    radar.findings.push_back({FindingLevel::kMissing, "radar",
-                              cloud.topic + ": the field " + format.format.doppler + " is zero in every point"});
+    radar.findings.push_back(
+        {FindingLevel::kMissing, "radar",
+         cloud.topic + ": the field " + format.format.doppler + " is zero in every point"});
     return radar;
   }
-  // If the ranges say nothing, a radar that looks along another axis and a contrary sign are one fault, not two:
-  // two fields are swapped.
+  // If the ranges say nothing, a radar that looks along another axis and a contrary sign are one fault, not
+  // two: two fields are swapped.
   const bool mirrored = looked.search.mirrored || (looked.sign.sign == 0 && looked.search.sign == -1);
   if (correctAxes(looked.cloud, mirrored, &format))
     looked = look(recording, imu, cloud, stamps, format.format, track);

@@ -32,7 +32,8 @@ struct RadarInspection {
   MountingSearch search;
   double points = 0.0;  ///< of the median scan
 
-  /// Velocities of so few points are biased: the coarse mounting may be off by 20 degrees, whatever its sigma.
+  /// Velocities of so few points are biased: the coarse mounting may be off by 20 degrees, whatever its
+  /// sigma.
   bool isSparse() const { return points < 15.0; }
 };
 RadarInspection inspectRadar(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud);

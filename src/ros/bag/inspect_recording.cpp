@@ -43,8 +43,8 @@ Recording readRecording(const std::string& path, double duration) {
   if (all.size() == 0) throw bagError(path, "it holds no messages");
   recording.length = (all.getEndTime() - all.getBeginTime()).toSec();
   recording.read = duration > 0.0 ? std::min(duration, recording.length) : recording.length;
-  const ros::Time end =
-      recording.read < recording.length ? all.getBeginTime() + ros::Duration(recording.read) : all.getEndTime();
+  const ros::Time end = recording.read < recording.length ? all.getBeginTime() + ros::Duration(recording.read)
+                                                          : all.getEndTime();
   const std::vector<std::string> types = {"sensor_msgs/Imu", "sensor_msgs/PointCloud2", "std_msgs/Header"};
   rosbag::View view(bag, rosbag::TypeQuery(types), all.getBeginTime(), end);
   for (const rosbag::MessageInstance& instance : view) {

@@ -10,7 +10,7 @@
 #include "rio_t/imu/measurement.h"
 #include "rio_t/inspection/stream_timing.h"
 
-/// What an inspection reads from a bag: every topic that may serve.
+/// A bag as an inspection reads it: every topic that may serve.
 namespace rio_t {
 
 struct ImuTopic {

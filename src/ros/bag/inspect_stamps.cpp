@@ -12,7 +12,7 @@ namespace rio_t {
 namespace {
 
 constexpr double kLargestDelay = 1.0;  // [s] of a scan, in the IMU's clock: more, and the clocks differ
-constexpr double kAhead = 0.02;        // [s] before its stamp that a scan may arrive: clocks that agree differ less
+constexpr double kAhead = 0.02;  // [s] before its stamp that a scan may arrive: clocks that agree differ less
 
 std::string milliseconds(double seconds) {
   std::string text;
@@ -33,8 +33,8 @@ std::size_t sharedWords(const std::string& a, const std::string& b) {
     return std::set<std::string>(parts.begin(), parts.end());
   };
   const std::set<std::string> of_a = words(a), of_b = words(b);
-  return static_cast<std::size_t>(
-      std::count_if(of_a.begin(), of_a.end(), [&](const std::string& word) { return of_b.count(word) != 0; }));
+  return static_cast<std::size_t>(std::count_if(
+      of_a.begin(), of_a.end(), [&](const std::string& word) { return of_b.count(word) != 0; }));
 }
 
 /// The header topic that stamps most of the scans, if it stamps eight in ten.
@@ -82,8 +82,9 @@ StampProposal proposeStamps(const Recording& recording, const ImuTopic& imu, con
             (delay.median > 0.0 ? " behind" : " ahead");
   }
   if (fault.empty()) {
-    proposal.text = "stamps in the header; scans arrive " + milliseconds(delay.median) + " after them (90 %: " +
-                    milliseconds(delay.most) + "), jitter " + milliseconds(timing.jitter);
+    proposal.text = "stamps in the header; scans arrive " + milliseconds(delay.median) +
+                    " after them (90 %: " + milliseconds(delay.most) + "), jitter " +
+                    milliseconds(timing.jitter);
     if (delay.median < -kAhead)
       proposal.odd.push_back("the scans are stamped " + milliseconds(-delay.median) +
                              " ahead of their arrival; the offset estimate covers up to 250 ms");
@@ -101,7 +102,8 @@ StampProposal proposeStamps(const Recording& recording, const ImuTopic& imu, con
     proposal.keys.set("stamp_source", "arrival",
                       "By itself " + fault + ". The delay is part of the time offset, which is estimated.");
     proposal.text = "stamps from the arrival";
-    proposal.odd.push_back(fault + "; stamp_source: arrival is used, and the delay is estimated as the time offset");
+    proposal.odd.push_back(fault +
+                           "; stamp_source: arrival is used, and the delay is estimated as the time offset");
   }
   return proposal;
 }

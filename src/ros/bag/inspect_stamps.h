@@ -15,8 +15,8 @@ struct StampProposal {
   ProposedKeys keys;
   StampSource source = StampSource::kHeader;
   std::string trigger_topic;
-  std::string text;               ///< what the stamps are like, as one phrase
-  std::vector<std::string> odd;   ///< sentences
+  std::string text;              ///< what the stamps are like, as one phrase
+  std::vector<std::string> odd;  ///< sentences
 };
 
 /// Chooses stamp_source for a cloud. The stamps of the IMU must be usable.

@@ -16,7 +16,7 @@ constexpr double kManyWindows = 0.3;
 constexpr double kManyDiverged = 0.1;
 constexpr double kManySamples = 0.05;
 constexpr double kFewScansUsed = 0.5;
-constexpr const char* kImuFaults[] = {"imu_not_usable", "imu_saturated", "imu_gap", "imu_out_of_order",
+constexpr const char* kImuFaults[] = {"imu_not_usable", "imu_saturated",  "imu_gap",  "imu_out_of_order",
                                       "imu_not_finite", "imu_stamp_jump", "imu_stuck"};
 /// Scans before anything is said: two seconds at ten a second.
 constexpr std::uint64_t kEnoughScans = 20;
@@ -95,7 +95,8 @@ class RadarCauses {
                number(radar_.snr_sum_db / static_cast<double>(std::max<std::uint64_t>(1, radar_.points))) +
                " dB, and " + powerReader() + " reads the power as " +
                toString(pointCloudFormat(config_).power_unit) + ".",
-           "Set " + key_ + "radar_power_unit to the unit of your driver (not_snr if it is no SNR), or lower " + key_ +
+           "Set " + key_ +
+               "radar_power_unit to the unit of your driver (not_snr if it is no SNR), or lower " + key_ +
                "radar_min_snr_db.");
     filter(PointVerdict::kTooNear, "points_too_near",
            "nearer than " + key_ + "radar_min_range " + number(o.min_range) + " m.",
@@ -104,7 +105,8 @@ class RadarCauses {
            "farther than " + key_ + "radar_max_range " + number(o.max_range) + " m.",
            "Raise " + key_ + "radar_max_range, and check the unit of the positions.");
     filter(PointVerdict::kBesideView, "points_beside_view",
-           "farther than " + key_ + "radar_max_azimuth " + number(o.max_azimuth) + " rad to either side of forward.",
+           "farther than " + key_ + "radar_max_azimuth " + number(o.max_azimuth) +
+               " rad to either side of forward.",
            "The axes of the cloud are probably others: set " + key_ + "radar_axes to rfu or flu.");
     filter(PointVerdict::kAboveView, "points_above_view",
            "higher or lower than " + key_ + "radar_max_elevation " + number(o.max_elevation) + " rad.",
@@ -125,8 +127,8 @@ class RadarCauses {
       if (share < kManyScans) return;
       cause(reason, share, outOf(count, radar_.scans_total, "scans") + of_ + " " + text, remedy);
     };
-    const std::string other = "Set " + key_ + "stamp_source: arrival, or correct the clock with " + key_ +
-                              "radar_stamp_shift.";
+    const std::string other =
+        "Set " + key_ + "stamp_source: arrival, or correct the clock with " + key_ + "radar_stamp_shift.";
     stamps("stamp_zero", "have a stamp of zero.", "Set " + key_ + "stamp_source to trigger or arrival.");
     stamps("stamp_ahead_of_imu", "are stamped ahead of the newest IMU sample.", other);
     stamps("older_than_window", "are stamped before the IMU samples that are kept.", other);
@@ -136,8 +138,9 @@ class RadarCauses {
     stamps("duplicate_stamp", "have the stamp of another scan.",
            "The driver repeats its stamps: set " + key_ + "stamp_source: arrival.");
     stamps("queue_full", "waited too long for the IMU or the solver.",
-           "Set " + key_ + "stamp_source: arrival if the stamps are ahead of the IMU; lower window if the computer "
-           "is too slow.");
+           "Set " + key_ +
+               "stamp_source: arrival if the stamps are ahead of the IMU; lower window if the computer "
+               "is too slow.");
     stamps("cloud_not_usable", "cannot be read.",
            "Set " + key_ + "radar_format and the radar_field_ keys to the fields of your cloud.");
   }
@@ -151,19 +154,21 @@ class RadarCauses {
       if (share < kManyScans) return;
       cause(name, share, outOf(count, radar_.scans_total, "scans") + of_ + " " + text, remedy);
     };
-    const double kept = static_cast<double>(
-        radar_.points_by_verdict[static_cast<std::size_t>(PointVerdict::kKept)]);
+    const double kept =
+        static_cast<double>(radar_.points_by_verdict[static_cast<std::size_t>(PointVerdict::kKept)]);
     const double kept_per_scan = kept / static_cast<double>(radar_.scans_total);
-    // What the filter took is a cause of its own.
+    // The points that the filter took are a cause of their own.
     if (shareOf(static_cast<std::uint64_t>(kept), radar_.points) > 1.0 - kManyPoints || radar_.points == 0) {
       status("too_few_points",
              "have too few points for a velocity: " + number(kept_per_scan) + " on average after the filter.",
-             "Let the radar report more points: a lower detection threshold in its driver. Set radar_factor: doppler "
+             "Let the radar report more points: a lower detection threshold in its driver. Set radar_factor: "
+             "doppler "
              "if it is not.");
     }
     status("too_few_inliers", "have no velocity that enough of their points agree on.",
-           "Check " + key_ + "radar_field_doppler, " + key_ + "radar_axes and the positions. Moving things in view "
-           "do the same.");
+           "Check " + key_ + "radar_field_doppler, " + key_ +
+               "radar_axes and the positions. Moving things in view "
+               "do the same.");
     status("ill_conditioned", "have all their points in one direction.",
            "Widen the view of the radar: " + key_ + "radar_max_azimuth and " + key_ + "radar_max_elevation.");
     status("sigma_too_large", "have a velocity that is too uncertain.",
@@ -175,14 +180,13 @@ class RadarCauses {
   /// Scans that give a velocity that the IMU contradicts.
   void addContradictions() {
     const std::uint64_t judged = radar_.scans_total - radar_.scans_before_start;
-    const std::uint64_t contradicted =
-        sumOf(radar_.scans_rejected, {"innovation", "infeasible_velocity"});
+    const std::uint64_t contradicted = sumOf(radar_.scans_rejected, {"innovation", "infeasible_velocity"});
     const double share = shareOf(contradicted, judged);
     if (share < kManyScans) return;
     cause("contradicts_imu", share,
           outOf(contradicted, judged, "scans") + of_ + " show a velocity that contradicts the IMU.",
-          "Check the mounting (" + key_ + "extrinsics_rotation_xyzw), " + key_ + "radar_doppler_sign and " + key_ +
-              "radar_axes; estimate_extrinsics: rotation finds up to 10 degrees by itself.");
+          "Check the mounting (" + key_ + "extrinsics_rotation_xyzw), " + key_ + "radar_doppler_sign and " +
+              key_ + "radar_axes; estimate_extrinsics: rotation finds up to 10 degrees by itself.");
   }
 
   const RadarEvidence& radar_;
@@ -205,14 +209,17 @@ void addStart(const RunEvidence& evidence, const Config& config, std::vector<Cau
                        0.9});
   } else if (has(waiting, "not in m/s^2?")) {
     causes->push_back({"imu_units", text,
-                       "The driver of the IMU must publish m/s^2 with gravity, and rad/s: it may publish g.", 0.95});
+                       "The driver of the IMU must publish m/s^2 with gravity, and rad/s: it may publish g.",
+                       0.95});
   } else if (config.odometry.init_mode == InitMode::kStatic) {
-    causes->push_back({"never_at_rest", text, "Let the platform rest at the start, or set init_mode: auto.", 0.8});
+    causes->push_back(
+        {"never_at_rest", text, "Let the platform rest at the start, or set init_mode: auto.", 0.8});
   } else {
-    causes->push_back({"too_short", text,
-                       "Give it more data: init_duration of rest, or init_motion_after plus init_motion_window of "
-                       "motion.",
-                       0.2});
+    causes->push_back(
+        {"too_short", text,
+         "Give it more data: init_duration of rest, or init_motion_after plus init_motion_window of "
+         "motion.",
+         0.2});
   }
 }
 
@@ -220,13 +227,13 @@ void addOffset(const RunEvidence& evidence, const Config& config, std::vector<Ca
   const double share = shareOf(evidence.windows_at_bound, evidence.windows);
   if (share < kManyWindows || evidence.windows < kEnoughScans) return;
   const double bound = config.odometry.smoother.max_time_offset;
-  causes->push_back(
-      {"offset_at_bound",
-       outOf(evidence.windows_at_bound, evidence.windows, "windows") +
-           " end with the time offset at its bound, max_time_offset " + number(bound) + " s.",
-       "Raise max_time_offset, take the known delay off with radar_stamp_shift, or set stamp_source: arrival. A wrong "
-       "mounting can do the same.",
-       share});
+  causes->push_back({"offset_at_bound",
+                     outOf(evidence.windows_at_bound, evidence.windows, "windows") +
+                         " end with the time offset at its bound, max_time_offset " + number(bound) + " s.",
+                     "Raise max_time_offset, take the known delay off with radar_stamp_shift, or set "
+                     "stamp_source: arrival. A wrong "
+                     "mounting can do the same.",
+                     share});
 }
 
 void addImu(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
@@ -234,11 +241,13 @@ void addImu(const RunEvidence& evidence, const Config& config, std::vector<Cause
                          const std::string& remedy) {
     const std::uint64_t count = countOf(evidence.faults, name);
     const double share = shareOf(count * samples_of_one, evidence.imu_count);
-    if (share > kManySamples) causes->push_back({name, std::to_string(count) + " " + text, remedy, std::min(1.0, share)});
+    if (share > kManySamples)
+      causes->push_back({name, std::to_string(count) + " " + text, remedy, std::min(1.0, share)});
   };
   fault("imu_not_usable", 1, "IMU messages cannot be used.", "Check the stamps and the values of imu_topic.");
-  fault("imu_saturated", 1, "IMU samples are at the end of the range.",
-        "Take an IMU with a larger range, or give it with imu_accel_range and imu_gyro_range if they are not.");
+  fault(
+      "imu_saturated", 1, "IMU samples are at the end of the range.",
+      "Take an IMU with a larger range, or give it with imu_accel_range and imu_gyro_range if they are not.");
   fault("imu_gap", 10, "gaps between IMU samples are longer than max_imu_gap.",
         "Raise max_imu_gap for a slow IMU, or look for what loses its messages.");
   fault("imu_out_of_order", 1, "IMU samples are out of order.", "Look for a second publisher on imu_topic.");
@@ -246,10 +255,10 @@ void addImu(const RunEvidence& evidence, const Config& config, std::vector<Cause
   const MeasuredImuNoise& noise = evidence.imu_noise;
   if (!noise.isFarAbove(told)) return;
   causes->push_back({"imu_noisy",
-                     "The IMU vibrates or is noisier than configured: accelerometer " + number(noise.accel_density) +
-                         " against imu_accel_noise_density " + number(told.accel_density) + ", gyro " +
-                         number(noise.gyro_density) + " against imu_gyro_noise_density " +
-                         number(told.gyro_density) + ".",
+                     "The IMU vibrates or is noisier than configured: accelerometer " +
+                         number(noise.accel_density) + " against imu_accel_noise_density " +
+                         number(told.accel_density) + ", gyro " + number(noise.gyro_density) +
+                         " against imu_gyro_noise_density " + number(told.gyro_density) + ".",
                      "Mount the IMU softer, or raise these two keys.", 0.1});
 }
 
@@ -260,14 +269,16 @@ void addDivergence(const RunEvidence& evidence, std::vector<Cause>* causes) {
   // Without scans the velocity gets lost, which counts as diverged: then the lack of scans is the cause.
   const auto contradicts = [](const Cause& cause) { return cause.name == "contradicts_imu"; };
   const bool scans_are_used = usedShare(evidence) >= kFewScansUsed;
-  if (!scans_are_used && !causes->empty() && std::none_of(causes->begin(), causes->end(), contradicts)) return;
-  causes->push_back(
-      {"diverged",
-       "The estimate diverged " + std::to_string(divergences) + " times, for " +
-           outOf(evidence.scans_diverged, evidence.scans_judged, "scans") + ": radar and IMU contradict each other.",
-       "Check the mounting, radar_doppler_sign and radar_axes; if it diverged only near large moving things, the "
-       "estimate after it is good again.",
-       std::max(0.05, share)});
+  if (!scans_are_used && !causes->empty() && std::none_of(causes->begin(), causes->end(), contradicts))
+    return;
+  causes->push_back({"diverged",
+                     "The estimate diverged " + std::to_string(divergences) + " times, for " +
+                         outOf(evidence.scans_diverged, evidence.scans_judged, "scans") +
+                         ": radar and IMU contradict each other.",
+                     "Check the mounting, radar_doppler_sign and radar_axes; if it diverged only near large "
+                     "moving things, the "
+                     "estimate after it is good again.",
+                     std::max(0.05, share)});
 }
 
 std::vector<Check> checksOf(const RunEvidence& evidence) {
@@ -278,21 +289,22 @@ std::vector<Check> checksOf(const RunEvidence& evidence) {
   }
   std::uint64_t imu_faults = 0;
   for (const char* fault : kImuFaults) imu_faults += countOf(evidence.faults, fault);
-  return {{"started", evidence.initialized ? 1.0 : 0.0, 1.0, true},
-          {"scans_used_share", usedShare(evidence), kFewScansUsed, true},
-          {"points_kept_share", kept, 1.0 - kManyPoints, true},
-          {"scans_diverged_share", shareOf(evidence.scans_diverged, evidence.scans_judged), kManyDiverged, false},
-          {"windows_at_offset_bound_share", shareOf(evidence.windows_at_bound, evidence.windows), kManyWindows,
-           false},
-          {"imu_faults_share", std::min(1.0, shareOf(imu_faults, evidence.imu_count)), kManySamples, false},
-          {"healthy_at_end", evidence.health == Health::kOk ? 1.0 : 0.0, 1.0, true}};
+  return {
+      {"started", evidence.initialized ? 1.0 : 0.0, 1.0, true},
+      {"scans_used_share", usedShare(evidence), kFewScansUsed, true},
+      {"points_kept_share", kept, 1.0 - kManyPoints, true},
+      {"scans_diverged_share", shareOf(evidence.scans_diverged, evidence.scans_judged), kManyDiverged, false},
+      {"windows_at_offset_bound_share", shareOf(evidence.windows_at_bound, evidence.windows), kManyWindows,
+       false},
+      {"imu_faults_share", std::min(1.0, shareOf(imu_faults, evidence.imu_count)), kManySamples, false},
+      {"healthy_at_end", evidence.health == Health::kOk ? 1.0 : 0.0, 1.0, true}};
 }
 
 RunVerdict verdictOf(const RunEvidence& evidence, const Diagnosis& diagnosis) {
   const auto used = [](const RadarEvidence& radar) { return radar.scans_used > 0; };
   const bool any_used = std::any_of(evidence.radars.begin(), evidence.radars.end(), used);
-  const bool diverged = evidence.health == Health::kDiverged ||
-                        shareOf(evidence.scans_diverged, evidence.scans_judged) > 0.5;
+  const bool diverged =
+      evidence.health == Health::kDiverged || shareOf(evidence.scans_diverged, evidence.scans_judged) > 0.5;
   if (!evidence.initialized || !any_used || diverged) return RunVerdict::kBad;
   const bool all_green = std::all_of(diagnosis.checks.begin(), diagnosis.checks.end(),
                                      [](const Check& check) { return check.good(); });
@@ -339,8 +351,8 @@ std::string describeCauses(const Diagnosis& diagnosis) {
   }
   for (const Check& check : diagnosis.checks) {
     if (check.good() || !diagnosis.causes.empty()) continue;  // a cause says it better
-    text += "  " + check.name + " is " + number(check.value) + ", expected at " + (check.at_least ? "least " : "most ") +
-            number(check.limit) + "\n";
+    text += "  " + check.name + " is " + number(check.value) + ", expected at " +
+            (check.at_least ? "least " : "most ") + number(check.limit) + "\n";
   }
   return text;
 }

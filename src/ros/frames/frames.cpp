@@ -23,14 +23,17 @@ std::string imuFrame(const Config& config, const std::string& frame_id) {
 std::string cloudFrame(const Config& radar, const std::string& frame_id) {
   const std::string key = radar.radar_name.empty() ? "" : radar.radar_name + "/";
   if (frame_id.empty())
-    throw std::runtime_error("topic " + radar.radar_topic +
-                             ": the cloud has no frame_id, and extrinsics_source is tf; expected one that tf knows, "
-                             "or " + key + "extrinsics_source: parameters");
+    throw std::runtime_error(
+        "topic " + radar.radar_topic +
+        ": the cloud has no frame_id, and extrinsics_source is tf; expected one that tf knows, "
+        "or " +
+        key + "extrinsics_source: parameters");
   const std::string frame = withoutSlash(frame_id);
   if (frame == radar.radar_frame && radar.publish_radar_tf)
-    throw std::runtime_error(key + "radar_frame: \"" + frame +
-                             "\" is the frame of the clouds, which has its tf from others; expected another name, "
-                             "or publish_radar_tf: false");
+    throw std::runtime_error(
+        key + "radar_frame: \"" + frame +
+        "\" is the frame of the clouds, which has its tf from others; expected another name, "
+        "or publish_radar_tf: false");
   return frame;
 }
 

@@ -77,8 +77,8 @@ bool BodyFrame::tryTf() {
     waiting_for_ = "tf from " + *imu_frame_ + " to " + config_.base_link_frame + " (" + error.what() + ")";
     return false;
   }
-  ROS_INFO_STREAM(name_ << ": pose of the IMU in " << config_.base_link_frame << " from tf " << *imu_frame_ << " -> "
-                        << config_.base_link_frame << ": translation [" << T_BI_->p_B.transpose()
+  ROS_INFO_STREAM(name_ << ": pose of the IMU in " << config_.base_link_frame << " from tf " << *imu_frame_
+                        << " -> " << config_.base_link_frame << ": translation [" << T_BI_->p_B.transpose()
                         << "], rotation xyzw [" << T_BI_->q_BI.coeffs().transpose() << "]");
   return true;
 }
@@ -95,7 +95,8 @@ std::optional<BodyOdometry> BodyFrame::place(LiveSession& session, const Navigat
   if (!tryTf()) {
     if (config_.base_extrinsics_source == BaseExtrinsicsSource::kTf) return std::nullopt;
     ROS_WARN_STREAM(name_ << ": no tf from the IMU's frame " << imu_frame_.value_or("") << " to "
-                          << config_.base_link_frame << ": the parameters base_extrinsics_* hold, which put the IMU at ["
+                          << config_.base_link_frame
+                          << ": the parameters base_extrinsics_* hold, which put the IMU at ["
                           << config_.T_BI.p_B.transpose() << "] (base_extrinsics_source: tf would wait)");
     decide(config_.T_BI, "parameters base_extrinsics_*, since tf does not have it");
   }

@@ -3,35 +3,20 @@
 #include <ros/console.h>
 
 #include <boost/function.hpp>
-#include <fstream>
 
+#include "radar_texts.h"
 #include "rio_t/evaluation/trajectory.h"
-#include "rio_t/ros/cloud/point_cloud.h"
 #include "rio_t/ros/messages/conversions.h"
 #include "rio_t/ros/parameters/ros_parameters.h"
+#include "seconds_since.h"
 
 namespace rio_t {
 namespace {
 
 constexpr double kWarnPeriod = 5.0;        // [s] between warnings of one kind
 constexpr double kDiagnosticPeriod = 1.0;  // [s]
-// Queues deep enough for seconds of input: nothing is lost while a callback is late.
-constexpr std::uint32_t kImuQueue = 5000;
+// Deep enough for seconds of input: nothing is lost while a callback is late.
 constexpr std::uint32_t kScanQueue = 200;
-
-double secondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-/// Where a message to people begins with what it is about, e.g. "/rio_t: radar left: ".
-std::string beginning(const std::string& node, const Config& radar) {
-  return node + ": " + (radar.radar_name.empty() ? "" : "radar " + radar.radar_name + ": ");
-}
-
-/// E.g. "time offset left".
-std::string withName(const std::string& what, const Config& radar, const std::string& between = " ") {
-  return radar.radar_name.empty() ? what : what + between + radar.radar_name;
-}
 
 /// The topics with namespace and remappings, for messages to people.
 Config withResolvedTopics(Config config, const ros::NodeHandle& node) {
@@ -149,7 +134,9 @@ void LiveOdometry::subscribe(const Config& told) {
   if (!told.barometer_topic.empty())
     barometer_subscriber_ = subscribeTo(
         input_node, told.barometer_topic, kImuQueue,
-        [this](const Event<sensor_msgs::FluidPressure>& event) { guarded("pressure", [&] { onPressure(event); }); },
+        [this](const Event<sensor_msgs::FluidPressure>& event) {
+          guarded("pressure", [&] { onPressure(event); });
+        },
         sensor_msgs::FluidPressure());
   imu_subscriber_ = subscribeTo(
       imu_node, told.imu_topic, kImuQueue,
@@ -228,9 +215,10 @@ void LiveOdometry::onReconfigure(LiveParameters& values) {
       apply(tuning, options_);
     }
     if (const Session now = session_.get()) now->tune(tuning);
-  } catch (const ConfigError& error) {
+  } catch (const std::exception& error) {
     refused_because = error.what();
-    ROS_ERROR_STREAM(name_ << ": the change of parameters was refused, nothing was changed: " << error.what());
+    ROS_ERROR_STREAM(name_ << ": the change of parameters was refused, nothing was changed: "
+                           << error.what());
   }
   monitor_.reconfigured(refused_because);
   values = LiveParameters(live_config_);
@@ -293,144 +281,11 @@ void LiveOdometry::reset(const std::string& reason, bool at_once) {
     if (at_once) options.init_motion_after = 0.0;
     const auto fresh = std::make_shared<LiveSession>(config_, options);
     session_.replace(fresh);
-    // What was reconfigured meanwhile went to the old session.
+    // A change of parameters that came meanwhile went to the old session.
     const std::lock_guard<std::mutex> lock(mutex_);
     fresh->tune(tuningOf(options_));
   }
   monitor_.reset(reason);
-}
-
-void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
-  const auto start = std::chrono::steady_clock::now();
-  monitor_.imu();
-  imu_rate_->task.tick();
-  try {
-    const ImuMeasurement imu = toImuMeasurement(*event.getConstMessage(), config_.imu_topic, config_.imu_units);
-    // The same judgement as the session's own, so that the whole session starts again, with what it stamps
-    // by.
-    const ClockJumpDetector::Verdict stamp = imu_stamps_.check(imu.time);
-    if (stamp == ClockJumpDetector::Verdict::kRestart) {
-      const double jump = imu.time - *newest_imu_;
-      reset(std::string("the IMU's stamps jumped ") + (jump < 0.0 ? "back" : "ahead") + " by " +
-                std::to_string(std::abs(jump)) + " s",
-            true);
-      early_imu_.clear();
-    }
-    if (stamp == ClockJumpDetector::Verdict::kGood || stamp == ClockJumpDetector::Verdict::kRestart)
-      newest_imu_ = imu.time;
-    frames_.hear(event.getConstMessage()->header.frame_id);
-    const Received received{imu, toTime(event.getReceiptTime())};
-    const Session now = session_.get();
-    if (!now) {
-      // The first scan, by which tf names the radar, comes later than the samples that belong to it.
-      early_imu_.push_back(received);
-      if (early_imu_.size() <= kImuQueue) return;
-      early_imu_.pop_front();
-      monitor_.imuDropped("imu_before_extrinsics");
-      return;
-    }
-    double rate_sigma = 0.0;
-    for (; !early_imu_.empty(); early_imu_.pop_front()) feed(*now, early_imu_.front(), &rate_sigma);
-    if (const std::optional<NavigationState> state = feed(*now, received, &rate_sigma)) {
-      if (const std::optional<BodyOdometry> body = frames_.place(*now, *state, rate_sigma)) {
-        session_.speak(Speaker::kNavigation, now, [&] {
-          if (publisher_.odometry(*body)) ++odom_published_;
-          frames_.published(*body);
-          monitor_.odometry(secondsSince(start));
-        });
-      } else if (!frames_.waitingFor().empty()) {
-        monitor_.imuDropped("odometry_before_base_extrinsics");
-      }
-    }
-    if (now->imuPilesUp()) {
-      reset("the optimisation thread took none of the last " + std::to_string(LiveSession::kMaxWaitingImu) +
-            " IMU samples");
-    }
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      rate_sigma_ = rate_sigma;
-    }
-    wakeSolver();
-  } catch (const std::exception& error) {
-    monitor_.imuDropped("imu_not_usable");
-    if (isTimeToTell("imu_not_usable")) ROS_ERROR_STREAM(name_ << ": " << error.what());
-  }
-}
-
-std::optional<NavigationState> LiveOdometry::feed(LiveSession& session, const Received& received,
-                                                  double* rate_sigma) {
-  *rate_sigma = session.rateSigma(received.imu.time);
-  const std::optional<NavigationState> state = session.addImu(received.imu);
-  account(session.stampWithImu(received.imu.time, received.record));
-  return state;
-}
-
-void LiveOdometry::onScan(std::size_t radar, const Event<sensor_msgs::PointCloud2>& event) {
-  const sensor_msgs::PointCloud2& message = *event.getConstMessage();
-  Radar& from = radars_[radar];
-  monitor_.scan(radar);
-  from.scan_rate->task.tick();
-  std::string what = "cloud_not_usable";  // each has its own turn to be told
-  try {
-    DecodedScan decoded;
-    try {
-      decoded = decode(message, from.format);
-    } catch (const std::exception& error) {
-      throw std::runtime_error("topic " + from.config.radar_topic + ": " + error.what());
-    }
-    if (decoded.dropped_not_finite > 0)
-      monitor_.dropped(radar, "points_not_finite", decoded.dropped_not_finite);
-    what = "frame_not_usable";
-    if (!from.T_IR) lookUpExtrinsics(from, message.header.frame_id);
-    const Session now = session_.get();
-    if (!now) {
-      monitor_.dropped(radar, "scan_before_extrinsics");
-      return;
-    }
-    RadarScan scan = toRadarScan(decoded.cloud, Time());
-    scan.radar = radar;
-    what = "stamp_not_usable";
-    account(now->addScan(message.header.seq, toTime(message.header.stamp), toTime(event.getReceiptTime()),
-                         std::move(scan)));
-    wakeSolver();
-  } catch (const std::exception& error) {
-    monitor_.dropped(radar, "scan_not_usable");
-    if (isTimeToTell(what + " " + from.config.radar_topic))
-      ROS_ERROR_STREAM(beginning(name_, from.config) << error.what());
-  }
-}
-
-void LiveOdometry::onPressure(const Event<sensor_msgs::FluidPressure>& event) {
-  monitor_.pressure();
-  try {
-    const Pressure pressure = toPressure(*event.getConstMessage(), config_.barometer_topic);
-    if (const Session now = session_.get()) now->addPressure(pressure);
-  } catch (const std::exception& error) {
-    monitor_.pressureDropped(error.what());
-    if (isTimeToTell("pressure")) ROS_ERROR_STREAM(name_ << ": " << error.what());
-  }
-}
-
-void LiveOdometry::onTrigger(std::size_t radar, const Event<std_msgs::Header>& event) {
-  monitor_.trigger(radar);
-  radars_[radar].trigger_rate->task.tick();
-  const Session now = session_.get();
-  if (!now) return;
-  const std_msgs::Header& trigger = *event.getConstMessage();
-  account(now->addTrigger(radar, trigger.seq, toTime(trigger.stamp), toTime(event.getReceiptTime())));
-  wakeSolver();
-}
-
-void LiveOdometry::account(const LiveSession::Stamped& stamped) {
-  for (const auto& [radar, reason] : stamped.given_up) {
-    monitor_.dropped(radar, reason);
-    const Config& config = radars_[radar].config;
-    if (isTimeToTell("no stamp for " + config.radar_topic + ": " + reason)) {
-      ROS_WARN_STREAM(beginning(name_, config) << "a scan got no stamp: " << reason
-                                               << " (stamp_source: " << toString(config.stamp_source)
-                                               << ", trigger_topic: " << config.trigger_topic << ")");
-    }
-  }
 }
 
 bool LiveOdometry::isTimeToTell(const std::string& what) {
@@ -442,38 +297,22 @@ bool LiveOdometry::isTimeToTell(const std::string& what) {
   return true;
 }
 
-void LiveOdometry::lookUpExtrinsics(Radar& radar, const std::string& cloud_frame) {
-  const Config& config = radar.config;
-  std::string waiting_for;
-  try {
-    radar.T_IR = frames_.radarExtrinsics(config, cloud_frame, &waiting_for);
-  } catch (const std::exception&) {
-    monitor_.waitFor("a frame of the clouds that tf knows" + withName("", config, " of radar "));
-    throw;
-  }
-  if (!radar.T_IR) {
-    monitor_.waitFor(waiting_for);
-    if (isTimeToTell("tf of " + config.radar_topic))
-      ROS_WARN_STREAM(beginning(name_, config) << "waiting for " << waiting_for);
-    return;
-  }
-  ROS_INFO_STREAM(name_ << ": " << withName("extrinsics", config) << " from tf " << cloud_frame << " -> "
-                        << *frames_.imuFrame() << ": translation [" << radar.T_IR->l_I.transpose()
-                        << "], rotation xyzw [" << radar.T_IR->q_IR.coeffs().transpose() << "]");
-  startSessionWhenReady();
-}
-
 bool LiveOdometry::onReset(std_srvs::Empty::Request& /*request*/, std_srvs::Empty::Response& /*response*/) {
-  reset("asked for by ~reset");
+  try {
+    reset("asked for by ~reset");
+  } catch (const std::exception& error) {
+    ROS_ERROR_STREAM(name_ << ": ~reset failed: " << error.what());
+    return false;
+  }
   return true;
 }
 
 bool LiveOdometry::onSaveTrajectory(std_srvs::Trigger::Request& /*request*/,
                                     std_srvs::Trigger::Response& response) {
-  const Session now = session_.get();
-  std::size_t stride = 1;
-  const Trajectory trajectory = now ? now->trajectory(&stride) : Trajectory();
   try {
+    const Session now = session_.get();
+    std::size_t stride = 1;
+    const Trajectory trajectory = now ? now->trajectory(&stride) : Trajectory();
     if (trajectory.empty()) throw std::runtime_error("no optimised pose yet");
     writeTum(config_.trajectory_file, trajectory);
     response.success = 1U;
@@ -492,13 +331,14 @@ void LiveOdometry::tellHealth(const ScanResult& result) {
   if (result.rejected_because == "queue_full" && isTimeToTell("queue_full"))
     ROS_WARN_STREAM(name_ << ": the solver falls behind, the oldest scan was dropped (max_queued_scans)");
   if (result.reinitialized) {
-    ROS_WARN_STREAM(name_ << ": found the state anew in motion; position and heading go on");
+    ROS_WARN_STREAM(name_ << ": re-initialised in motion; position and heading go on");
   }
   if (result.ground_vehicle && result.ground_vehicle->is_contradicted)
     ROS_WARN_STREAM(name_ << ": " << kGroundVehicleContradicted);
   if (result.health == Health::kDiverged && isTimeToTell("diverged")) {
-    ROS_ERROR_STREAM(name_ << ": diverged, radar and IMU contradict each other: do not trust the estimate (see "
-                              "diagnostics, on_divergence)");
+    ROS_ERROR_STREAM(
+        name_ << ": diverged, radar and IMU contradict each other: do not trust the estimate (see "
+                 "diagnostics, on_divergence)");
   }
 }
 
@@ -537,7 +377,8 @@ void LiveOdometry::solve() {
     try {
       bool more = false;
       for (const LiveSession::Result& result : now->process(&more)) {
-        LivePublisher::Frames frames{frames_.imuFrame().value_or(config_.base_link_frame), frames_.imuInBody(), {}, {}};
+        LivePublisher::Frames frames{
+            frames_.imuFrame().value_or(config_.base_link_frame), frames_.imuInBody(), {}, {}};
         if (result.result.updated) frames.body = frames_.place(*now, result.result.state, rate_sigma);
         frames.world = now->world();
         const bool current = session_.speak(Speaker::kOptimisation, now, [&] {

@@ -30,7 +30,8 @@ std::string typeOf(const LiveValue& value) {
 
 /// The parameter message has whole numbers of 32 bits.
 std::int32_t clamped(double x) {
-  constexpr double kMin = std::numeric_limits<std::int32_t>::min(), kMax = std::numeric_limits<std::int32_t>::max();
+  constexpr double kMin = std::numeric_limits<std::int32_t>::min(),
+                   kMax = std::numeric_limits<std::int32_t>::max();
   return static_cast<std::int32_t>(std::clamp(x, kMin, kMax));
 }
 
@@ -42,8 +43,7 @@ ParameterDescription descriptionOf(const std::string& key) {
 
 /// Each value replaced by one end of its range.
 template <typename End>
-std::map<std::string, LiveValue> endsOf(std::map<std::string, LiveValue> values, bool upper,
-                                             const End& end) {
+std::map<std::string, LiveValue> endsOf(std::map<std::string, LiveValue> values, bool upper, const End& end) {
   for (auto& [key, value] : values) {
     if (bool* truth = std::get_if<bool>(&value)) {
       *truth = upper;
@@ -145,7 +145,8 @@ void LiveParameters::__toMessage__(dynamic_reconfigure::Config& message) const {
   message = {};
   for (const auto& [key, value] : values_) {
     if (const bool* truth = std::get_if<bool>(&value))
-      message.bools.push_back(parameterOf<dynamic_reconfigure::BoolParameter>(key, static_cast<std::uint8_t>(*truth)));
+      message.bools.push_back(
+          parameterOf<dynamic_reconfigure::BoolParameter>(key, static_cast<std::uint8_t>(*truth)));
     if (const auto* whole = std::get_if<std::int64_t>(&value))
       message.ints.push_back(
           parameterOf<dynamic_reconfigure::IntParameter>(key, clamped(static_cast<double>(*whole))));

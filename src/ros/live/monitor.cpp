@@ -227,8 +227,9 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) c
   status.add("resets", resets_);
   status.add("last_reset_because", last_reset_);
   if (resets_ > 0)
-    status.add("after_reset", config_.reset_pose == ResetPose::kKeep ? "goes on from the last pose (reset_pose: keep)"
-                                                                     : "starts at the origin (reset_pose: zero)");
+    status.add("after_reset", config_.reset_pose == ResetPose::kKeep
+                                  ? "goes on from the last pose (reset_pose: keep)"
+                                  : "starts at the origin (reset_pose: zero)");
   for (const auto& [key, value] : frames_) status.add(key, value);
   if (reconfigurations_ > 0) {
     status.add("reconfigurations", reconfigurations_);
@@ -353,8 +354,7 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   std::vector<Finding> findings;
   std::uint64_t queue_full = 0;
   for (Radar& radar : radars_) {
-    const std::optional<Finding> finding =
-        describeRadar(status, radar, initialized);
+    const std::optional<Finding> finding = describeRadar(status, radar, initialized);
     if (finding) findings.push_back(*finding);
     const auto full = radar.dropped.find("queue_full");
     if (full != radar.dropped.end()) queue_full += full->second;

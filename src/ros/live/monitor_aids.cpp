@@ -1,4 +1,4 @@
-// What LiveMonitor says of barometer and ground vehicle.
+// LiveMonitor: barometer and ground vehicle.
 #include <diagnostic_msgs/DiagnosticStatus.h>
 
 #include <cmath>

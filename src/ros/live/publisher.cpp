@@ -92,7 +92,8 @@ void LivePublisher::result(const LiveSession::Result& live, const Frames& frames
   const Time stamp = correct_stamps_ ? live.measured_at : result.scan.stamp;
   radarFrame(radar, live, frames, stamp);  // first: who shows a cloud needs its tf
   if (isValid(result.ego_velocity.status))
-    publish(radar.ego_velocity, toTwist(result.ego_velocity.v_R, result.ego_velocity.covariance, stamp, radar.frame));
+    publish(radar.ego_velocity,
+            toTwist(result.ego_velocity.v_R, result.ego_velocity.covariance, stamp, radar.frame));
   if (result.innovation)
     publish(radar.innovation, toTwist(result.innovation->d, result.innovation->S, stamp, radar.frame));
   if (radar.points.getNumSubscribers() > 0) {

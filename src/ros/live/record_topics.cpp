@@ -17,7 +17,8 @@ namespace {
 using Event = ros::MessageEvent<topic_tools::ShapeShifter const>;
 
 bool isWanted(const std::string& type) {
-  static const std::set<std::string> wanted = {"sensor_msgs/Imu", "sensor_msgs/PointCloud2", "std_msgs/Header"};
+  static const std::set<std::string> wanted = {"sensor_msgs/Imu", "sensor_msgs/PointCloud2",
+                                               "std_msgs/Header"};
   return wanted.count(type) != 0;
 }
 

@@ -1,7 +1,6 @@
 #include "rio_t/ros/messages/conversions.h"
 
 #include <sensor_msgs/point_cloud2_iterator.h>
-
 #include <tf2_eigen/tf2_eigen.h>
 
 #include <algorithm>
@@ -83,8 +82,9 @@ geometry_msgs::TransformStamped toTransform(const BodyOdometry& body, const std:
 
 Eigen::Quaterniond radarFrameAxes() { return cloudFromRfu(PointAxes::kForwardLeftUp); }
 
-geometry_msgs::TwistWithCovarianceStamped toTwist(const Eigen::Vector3d& v_R, const Eigen::Matrix3d& covariance,
-                                                  Time stamp, const std::string& radar_frame) {
+geometry_msgs::TwistWithCovarianceStamped toTwist(const Eigen::Vector3d& v_R,
+                                                  const Eigen::Matrix3d& covariance, Time stamp,
+                                                  const std::string& radar_frame) {
   geometry_msgs::TwistWithCovarianceStamped message;
   message.header.stamp = toRosTime(stamp);
   message.header.frame_id = radar_frame;

@@ -1,6 +1,6 @@
 #include "parameter_sections.h"
 
-// What the platform cannot do, and how high it is.
+// Ground vehicle, barometer.
 namespace rio_t {
 
 constexpr double kPi = 3.14159265358979323846;

@@ -5,12 +5,13 @@
 
 #include "rio_t/ros/parameters/parameters.h"
 
-/// The rotation of T_IR can be told in three ways: as a quaternion of RIO's axes, as one of the cloud's axes, or
-/// in words. One way counts.
+/// The rotation of T_IR can be told in three ways: as a quaternion of RIO's axes, as one of the cloud's axes,
+/// or in words. One way counts.
 namespace rio_t {
 
-/// Call it before the entries of a level are set: the top level, or the section of a radar (`section`: "left/").
-/// What a section tells replaces what the top level told in another way. Two ways in one level are a fault.
+/// Call it before the entries of a level are set: the top level, or the section of a radar (`section`:
+/// "left/"). A mounting in a section replaces the mounting of the top level, whichever way each is given. Two
+/// ways in one level are a fault.
 void beginMounting(const ParameterEntries& entries, const std::string& section, Config* config,
                    std::vector<std::string>* faults);
 

@@ -108,7 +108,8 @@ void ParameterList::add(ParameterDescription about, std::function<bool(const Par
 
 void ParameterList::number(const std::string& key, const std::string& unit, Range range, double& member,
                            const std::string& text) {
-  add({key, "number", unit, "a finite number" + range.text(), text, range.min, range.max},
+  add(
+      {key, "number", unit, "a finite number" + range.text(), text, range.min, range.max},
       [range, &member](const ParameterValue& value) {
         const std::optional<double> x = asNumber(value);
         if (!x || !range.contains(*x)) return false;
@@ -119,7 +120,8 @@ void ParameterList::number(const std::string& key, const std::string& unit, Rang
 }
 
 void ParameterList::boolean(const std::string& key, bool& member, const std::string& text) {
-  add({key, "boolean", "", "true or false", text},
+  add(
+      {key, "boolean", "", "true or false", text},
       [&member](const ParameterValue& value) {
         const bool* x = std::get_if<bool>(&value.data);
         if (x == nullptr) return false;
@@ -132,8 +134,9 @@ void ParameterList::boolean(const std::string& key, bool& member, const std::str
 void ParameterList::vector3(const std::string& key, const std::string& unit, Range range,
                             Eigen::Vector3d& member, const std::string& text) {
   const std::string each = range.text();
-  add({key, "list", unit, "a list of 3 finite numbers" + (each.empty() ? "" : ", each" + each), text, range.min,
-       range.max},
+  add(
+      {key, "list", unit, "a list of 3 finite numbers" + (each.empty() ? "" : ", each" + each), text,
+       range.min, range.max},
       [range, &member](const ParameterValue& value) {
         const auto x = asNumbers(value, 3, range);
         if (!x) return false;
@@ -146,7 +149,8 @@ void ParameterList::vector3(const std::string& key, const std::string& unit, Ran
 }
 
 void ParameterList::rotation(const std::string& key, Eigen::Quaterniond& member, const std::string& text) {
-  add({key, "list", "", "a list of 4 finite numbers x, y, z, w of norm 1 (to 0.001)", text},
+  add(
+      {key, "list", "", "a list of 4 finite numbers x, y, z, w of norm 1 (to 0.001)", text},
       [&member](const ParameterValue& value) {
         const auto x = asNumbers(value, 4, Range{});
         if (!x) return false;
@@ -164,7 +168,8 @@ void ParameterList::rotation(const std::string& key, Eigen::Quaterniond& member,
 void ParameterList::mounting(const std::string& key, std::optional<MountingAngles>& member,
                              const std::string& text) {
   constexpr double kDegree = 3.14159265358979323846 / 180.0;
-  add({key, "list", "deg", "[], or a list of 3 finite numbers, each of at least -360 and at most 360", text},
+  add(
+      {key, "list", "deg", "[], or a list of 3 finite numbers, each of at least -360 and at most 360", text},
       [&member](const ParameterValue& value) {
         const auto* list = std::get_if<ParameterValue::List>(&value.data);
         if (list != nullptr && list->empty()) {
@@ -183,7 +188,8 @@ void ParameterList::mounting(const std::string& key, std::optional<MountingAngle
 }
 
 void ParameterList::text(const std::string& key, std::string& member, const std::string& text) {
-  add({key, "text", "", "one line of text, not empty", text},
+  add(
+      {key, "text", "", "one line of text, not empty", text},
       [&member](const ParameterValue& value) {
         const std::string* x = std::get_if<std::string>(&value.data);
         if (x == nullptr || x->empty() || !isOneLine(*x)) return false;
@@ -194,7 +200,8 @@ void ParameterList::text(const std::string& key, std::string& member, const std:
 }
 
 void ParameterList::textOrEmpty(const std::string& key, std::string& member, const std::string& text) {
-  add({key, "text", "", "one line of text, may be empty", text},
+  add(
+      {key, "text", "", "one line of text, may be empty", text},
       [&member](const ParameterValue& value) {
         const std::string* x = std::get_if<std::string>(&value.data);
         const bool nothing = std::holds_alternative<std::monostate>(value.data);  // `key:` and no more
@@ -214,7 +221,8 @@ void ParameterList::word(const std::string& key, const std::vector<std::string>&
 }
 
 void ParameterList::radarNames(const std::string& key, std::vector<Config>& member, const std::string& text) {
-  add({key, "list", "", "a list of at most 16 different names of lower case letters, digits and _", text},
+  add(
+      {key, "list", "", "a list of at most 16 different names of lower case letters, digits and _", text},
       [&member](const ParameterValue& value) {
         const ParameterValue::List* list = std::get_if<ParameterValue::List>(&value.data);
         if (list == nullptr || list->size() > 16) return false;

@@ -81,7 +81,7 @@ class ParameterList {
   void add(ParameterDescription about, std::function<bool(const ParameterValue&)> set,
            std::function<ParameterValue()> get);
 
-  /// Of the parameter added last.
+  /// Concerns the parameter added last.
   void setRange(const Range& range) {
     all_.back().description.min = range.min;
     all_.back().description.max = range.max;
@@ -98,7 +98,8 @@ std::string numberText(double value);
 
 template <typename Integer>
 void ParameterList::integer(const std::string& key, Range range, Integer& member, const std::string& text) {
-  add({key, "integer", "", "a whole number" + range.text(), text, range.min, range.max},
+  add(
+      {key, "integer", "", "a whole number" + range.text(), text, range.min, range.max},
       [range, &member](const ParameterValue& value) {
         const std::int64_t* x = std::get_if<std::int64_t>(&value.data);
         if (x == nullptr || !range.contains(static_cast<double>(*x))) return false;

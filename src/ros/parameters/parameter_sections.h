@@ -12,7 +12,7 @@ inline Range above(double min, double max) { return {min, max, true, false}; }
 inline Range between(double min, double max) { return {min, max, false, false}; }
 inline Range inside(double min, double max) { return {min, max, true, true}; }
 
-// What comes in, and where the sensors are.
+// Input, and where the sensors are.
 void listTopics(ParameterList& list, Config& config);
 void listRadars(ParameterList& list, Config& config);
 void listStamps(ParameterList& list, Config& config);
@@ -35,7 +35,7 @@ void listSmoother(ParameterList& list, Config& config);
 void listHealth(ParameterList& list, Config& config);
 void listLandmarks(ParameterList& list, Config& config);
 
-// What the platform cannot do, and how high it is.
+// Ground vehicle, barometer.
 void listPlatform(ParameterList& list, Config& config);
 void listBarometer(ParameterList& list, Config& config);
 

@@ -115,8 +115,8 @@ bool looksReal(const std::string& text) {
 /// Whether text without quotes reads back as text in every YAML reader.
 bool isPlainText(const std::string& text) {
   const auto isPlain = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '/' ||
-           c == '.';
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+           c == '/' || c == '.';
   };
   return !text.empty() && std::all_of(text.begin(), text.end(), isPlain) &&
          std::holds_alternative<std::string>(parsePlainScalar(text).data);

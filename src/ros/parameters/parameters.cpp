@@ -309,9 +309,8 @@ std::vector<Config> configsOfRadars(const Config& config) {
 }
 
 Config withAbsoluteTopics(Config config) {
-  for (std::string* topic :
-       {&config.imu_topic, &config.radar_topic, &config.trigger_topic, &config.ground_truth_topic,
-        &config.barometer_topic}) {
+  for (std::string* topic : {&config.imu_topic, &config.radar_topic, &config.trigger_topic,
+                             &config.ground_truth_topic, &config.barometer_topic}) {
     if (!topic->empty() && topic->front() != '/') topic->insert(0, "/");
   }
   for (Config& radar : config.radars) radar = withAbsoluteTopics(radar);
@@ -364,10 +363,17 @@ ParameterValue parameterValue(const Config& config, const std::string& key) {
 }
 
 const std::vector<std::string>& liveKeys() {
-  static const std::vector<std::string> keys = {
-      "imu_accel_noise_density", "imu_gyro_noise_density",  "imu_accel_random_walk", "imu_gyro_random_walk",
-      "innovation_gate",         "innovation_model_error",  "innovation_gate_timeout",
-      "odom_rate",               "tf_rate",                 "path_max_poses",        "correct_stamps"};
+  static const std::vector<std::string> keys = {"imu_accel_noise_density",
+                                                "imu_gyro_noise_density",
+                                                "imu_accel_random_walk",
+                                                "imu_gyro_random_walk",
+                                                "innovation_gate",
+                                                "innovation_model_error",
+                                                "innovation_gate_timeout",
+                                                "odom_rate",
+                                                "tf_rate",
+                                                "path_max_poses",
+                                                "correct_stamps"};
   return keys;
 }
 

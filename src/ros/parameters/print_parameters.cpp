@@ -1,4 +1,4 @@
-// What people and programs read about the parameters. All of it comes from the registry.
+// The texts about the parameters, for people and programs. The registry has all of them.
 #include <yaml-cpp/yaml.h>
 
 #include <cmath>
@@ -85,8 +85,8 @@ std::string toYaml(const Config& config) {
       parametersOf(copy), [&](const std::string& title) { yaml += "\n# --- " + title + "\n"; },
       [&](const Parameter& parameter) {
         const ParameterDescription& about = parameter.description;
-        yaml += "\n" + wrapped(about.description, "# ") + "# " + expectedText(about) + "\n" + about.key + ": " +
-                parameter.get().yaml() + "\n";
+        yaml += "\n" + wrapped(about.description, "# ") + "# " + expectedText(about) + "\n" + about.key +
+                ": " + parameter.get().yaml() + "\n";
       });
   for (const Config& radar : config.radars) yaml += "\n" + sectionYaml(config, radar);
   return yaml;
@@ -132,8 +132,10 @@ std::string parametersMarkdown() {
       "A configuration is a YAML file that names only what differs from the defaults below. The bag programs "
       "take it with `--config`, the live node with `config:=`. `--set key=value` changes one parameter. An "
       "unknown key or a value out of range is an error that names the key.\n\n"
-      "Angles are in radians, all else is in SI units, unless the name of the key says otherwise. A rotation is "
-      "a quaternion x, y, z, w. \"Per radar\" means that each of several radars may have its own value in its "
+      "Angles are in radians, all else is in SI units, unless the name of the key says otherwise. A rotation "
+      "is "
+      "a quaternion x, y, z, w. \"Per radar\" means that each of several radars may have its own value in "
+      "its "
       "section.\n";
   Config config;
   visit(
@@ -141,8 +143,8 @@ std::string parametersMarkdown() {
       [&](const Parameter& parameter) {
         const ParameterDescription& about = parameter.description;
         text += "\n### `" + about.key + "`\n\n" + wrapped(about.description, "") + "\nDefault: `" +
-                parameter.get().yaml() + "`" + (about.unit.empty() ? "" : " " + about.unit) + ". Expected: " +
-                about.expected + (about.of_radar ? ". Per radar" : "") + ".\n";
+                parameter.get().yaml() + "`" + (about.unit.empty() ? "" : " " + about.unit) +
+                ". Expected: " + about.expected + (about.of_radar ? ". Per radar" : "") + ".\n";
       });
   return text;
 }

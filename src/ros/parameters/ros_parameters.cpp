@@ -24,7 +24,8 @@ struct ToXmlRpc {
   XmlRpc::XmlRpcValue operator()(const ParameterValue::List& list) const {
     XmlRpc::XmlRpcValue result;
     result.setSize(static_cast<int>(list.size()));
-    for (std::size_t k = 0; k < list.size(); ++k) result[static_cast<int>(k)] = std::visit(*this, list[k].data);
+    for (std::size_t k = 0; k < list.size(); ++k)
+      result[static_cast<int>(k)] = std::visit(*this, list[k].data);
     return result;
   }
   XmlRpc::XmlRpcValue operator()(const ParameterValue::Map& entries) const { return toXmlRpc(entries); }
@@ -74,7 +75,8 @@ XmlRpc::XmlRpcValue toXmlRpc(const ParameterEntries& entries) {
 }
 
 ParameterEntries toParameterEntries(XmlRpc::XmlRpcValue& map, const std::string& name_space) {
-  static const std::set<std::string> of_others = {"config", "diagnostic_period", "diagnostic_updater", kEffective};
+  static const std::set<std::string> of_others = {"config", "diagnostic_period", "diagnostic_updater",
+                                                  kEffective};
   ParameterEntries entries;
   if (map.getType() != XmlRpc::XmlRpcValue::TypeStruct) return entries;
   for (auto& [key, value] : map) {

@@ -10,15 +10,18 @@ void listPointFilter(ParameterList& list, EgoVelocityOptions& radar) {
               "Points nearer than this are left out. Raise it if the radar sees its own platform.");
   list.number("radar_max_range", "m", above(0), radar.max_range,
               "Points farther than this are left out. Lower it if far points are mostly ghosts.");
-  list.first().number("radar_min_snr_db", "dB", anyNumber(), radar.min_snr_db,
-                      "Points with a weaker signal to noise than this are left out. 3 to 10 dB are typical. Lower it "
-                      "if too few points are left, raise it in clutter. If it takes almost all points, the preset "
-                      "reads the power in another unit: see radar_power_unit.");
-  list.number("radar_max_azimuth", "rad", above(0, kPi), radar.max_azimuth,
-              "Points farther than this to either side of forward are left out. Lower it if points at the edge of "
-              "the view are bad. Raise it above 1.57 only for a radar that sees behind itself.");
-  list.number("radar_max_elevation", "rad", above(0, kPi / 2), radar.max_elevation,
-              "Points higher or lower than this are left out. Lower it if points at the edge of the view are bad.");
+  list.first().number(
+      "radar_min_snr_db", "dB", anyNumber(), radar.min_snr_db,
+      "Points with a weaker signal to noise than this are left out. 3 to 10 dB are typical. Lower it "
+      "if too few points are left, raise it in clutter. If it takes almost all points, the preset "
+      "reads the power in another unit: see radar_power_unit.");
+  list.number(
+      "radar_max_azimuth", "rad", above(0, kPi), radar.max_azimuth,
+      "Points farther than this to either side of forward are left out. Lower it if points at the edge of "
+      "the view are bad. Raise it above 1.57 only for a radar that sees behind itself.");
+  list.number(
+      "radar_max_elevation", "rad", above(0, kPi / 2), radar.max_elevation,
+      "Points higher or lower than this are left out. Lower it if points at the edge of the view are bad.");
 }
 
 void listStandstill(ParameterList& list, EgoVelocityOptions& radar) {
@@ -28,36 +31,45 @@ void listStandstill(ParameterList& list, EgoVelocityOptions& radar) {
   list.number("zero_velocity_outlier_fraction", "", between(0, 1), radar.zero_velocity_outlier_fraction,
               "A scan counts as standstill if at most this share of its Dopplers is larger than "
               "zero_velocity_threshold. Raise it if many things move around a platform that stands.");
-  list.number("zero_velocity_sigma", "m/s", above(0), radar.zero_velocity_sigma,
-              "The velocity of a scan at standstill has this standard deviation per axis. The motion that a step of "
-              "the Doppler hides comes on top.");
+  list.number(
+      "zero_velocity_sigma", "m/s", above(0), radar.zero_velocity_sigma,
+      "The velocity of a scan at standstill has this standard deviation per axis. The motion that a step of "
+      "the Doppler hides comes on top.");
 }
 
 void listConsensus(ParameterList& list, EgoVelocityOptions& radar) {
-  list.number("ransac_inlier_threshold", "m/s", atLeast(0), radar.ransac_inlier_threshold,
-              "A point is an inlier if its Doppler differs from that of a static point by less than this. 0 derives "
-              "it: half of radar_doppler_step plus 2.5 radar_doppler_sigma.");
-  list.number("ransac_outlier_probability", "", Range{0, 1, false, true}, radar.ransac_outlier_probability,
-              "RANSAC expects this share of outliers, and draws accordingly often. Raise it in crowds and heavy "
-              "clutter; 0.6 costs five times as many draws.");
-  list.number("ransac_success_probability", "", inside(0, 1), radar.ransac_success_probability,
-              "RANSAC draws until it has hit inliers only, once, with this probability. There is seldom a reason to "
-              "change it.");
-  list.number("ego_velocity_prior_gate", "", above(0), radar.prior_gate,
-              "A velocity contradicts the prediction of the IMU if it is farther from it than so many standard "
-              "deviations. The points that agree with the prediction are then preferred, e.g. beside a bus.");
-  list.integer("ransac_seed", atLeast(0), radar.ransac_seed,
-               "This seeds the random draws anew at each scan, so that the same scan gives the same velocity. "
-               "Change it only to see how much the draws matter.");
-  list.integer("ego_velocity_min_inliers", atLeast(3), radar.min_inliers,
-               "A velocity needs at least so many inliers. It has three unknowns, the other inliers confirm it. "
-               "With radar_factor: doppler, a scan with fewer points still counts point by point.");
-  list.number("ego_velocity_min_inlier_fraction", "", between(0, 1), radar.min_inlier_fraction,
-              "A velocity needs at least this share of the points as inliers, since fewer agree by chance. Lower it "
-              "with care if most points are clutter.");
-  list.number("ego_velocity_prior_min_inlier_fraction", "", between(0, 1), radar.prior_min_inlier_fraction,
-              "If the velocity of the majority contradicts the IMU, this share of the points is enough for one that "
-              "agrees with the IMU.");
+  list.number(
+      "ransac_inlier_threshold", "m/s", atLeast(0), radar.ransac_inlier_threshold,
+      "A point is an inlier if its Doppler differs from that of a static point by less than this. 0 derives "
+      "it: half of radar_doppler_step plus 2.5 radar_doppler_sigma.");
+  list.number(
+      "ransac_outlier_probability", "", Range{0, 1, false, true}, radar.ransac_outlier_probability,
+      "RANSAC expects this share of outliers, and draws accordingly often. Raise it in crowds and heavy "
+      "clutter; 0.6 costs five times as many draws.");
+  list.number(
+      "ransac_success_probability", "", inside(0, 1), radar.ransac_success_probability,
+      "RANSAC draws until it has hit inliers only, once, with this probability. There is seldom a reason to "
+      "change it.");
+  list.number(
+      "ego_velocity_prior_gate", "", above(0), radar.prior_gate,
+      "A velocity contradicts the prediction of the IMU if it is farther from it than so many standard "
+      "deviations. The points that agree with the prediction are then preferred, e.g. beside a bus.");
+  list.integer(
+      "ransac_seed", atLeast(0), radar.ransac_seed,
+      "This seeds the random draws anew at each scan, so that the same scan gives the same velocity. "
+      "Change it only to see how much the draws matter.");
+  list.integer(
+      "ego_velocity_min_inliers", atLeast(3), radar.min_inliers,
+      "A velocity needs at least so many inliers. It has three unknowns, the other inliers confirm it. "
+      "With radar_factor: doppler, a scan with fewer points still counts point by point.");
+  list.number(
+      "ego_velocity_min_inlier_fraction", "", between(0, 1), radar.min_inlier_fraction,
+      "A velocity needs at least this share of the points as inliers, since fewer agree by chance. Lower it "
+      "with care if most points are clutter.");
+  list.number(
+      "ego_velocity_prior_min_inlier_fraction", "", between(0, 1), radar.prior_min_inlier_fraction,
+      "If the velocity of the majority contradicts the IMU, this share of the points is enough for one that "
+      "agrees with the IMU.");
 }
 
 void listPointNoise(ParameterList& list, EgoVelocityOptions& radar) {
@@ -65,32 +77,41 @@ void listPointNoise(ParameterList& list, EgoVelocityOptions& radar) {
       "ego_velocity_solver",
       {{"ls", EgoVelocitySolver::kLeastSquares}, {"eiv", EgoVelocitySolver::kErrorsInVariables}},
       radar.solver,
-      "ls solves for the velocity by plain least squares. eiv (errors in variables) weighs each point by the noise "
+      "ls solves for the velocity by plain least squares. eiv (errors in variables) weighs each point by the "
+      "noise "
       "of its direction and removes the bias that this noise causes. ls is for comparison.");
-  list.number("radar_azimuth_sigma", "rad", atLeast(0), radar.azimuth_sigma,
-              "The azimuth of a point has this noise at the start. eiv learns it on the way. 0.02 to 0.05 rad are "
-              "typical of small radars.");
-  list.number("radar_elevation_sigma", "rad", atLeast(0), radar.elevation_sigma,
-              "The elevation of a point has this noise at the start. eiv learns it on the way. 0.03 to 0.1 rad are "
-              "typical of small radars, which have few antennas above each other.");
-  list.number("radar_doppler_sigma", "m/s", atLeast(0), radar.doppler_sigma,
-              "The Doppler of a point has this noise at the start, besides that of its steps. eiv learns it on the "
-              "way.");
-  list.number("radar_doppler_span", "m/s", atLeast(0), radar.doppler_span,
-              "This is the whole span of the Doppler that the radar can tell apart. A faster point appears on the "
-              "other side. 0 reads it off the data. Give it if you know it and drive faster than half of it.");
-  list.number("radar_doppler_step", "m/s", atLeast(0), radar.doppler_quantization,
-              "The radar gives the Doppler in steps of this size. 0 reads it off the data. A value below 0.02 means "
-              "no steps. Give it if you know it and the bag is short.");
-  list.vector3("ego_velocity_added_sigma", "m/s", atLeast(0), radar.added_sigma,
-               "This standard deviation (right, forward, up) is added to the velocity of a scan in quadrature. It "
-               "stands for errors that the points share, such as multipath and slow objects. It is the start: the "
-               "estimator scales it by what the scans show.");
-  list.number("ego_velocity_max_condition_number", "", atLeast(1), radar.max_condition_number,
-              "A scan is rejected if the directions of its inliers span space worse than this: it bounds the "
-              "condition number of H'H, with H the unit directions. It happens if all points lie in one direction.");
-  list.number("ego_velocity_max_sigma", "m/s", above(0), radar.max_sigma,
-              "A scan is rejected if the standard deviation of its velocity is larger than this along any axis.");
+  list.number(
+      "radar_azimuth_sigma", "rad", atLeast(0), radar.azimuth_sigma,
+      "The azimuth of a point has this noise at the start. eiv learns it on the way. 0.02 to 0.05 rad are "
+      "typical of small radars.");
+  list.number(
+      "radar_elevation_sigma", "rad", atLeast(0), radar.elevation_sigma,
+      "The elevation of a point has this noise at the start. eiv learns it on the way. 0.03 to 0.1 rad are "
+      "typical of small radars, which have few antennas above each other.");
+  list.number(
+      "radar_doppler_sigma", "m/s", atLeast(0), radar.doppler_sigma,
+      "The Doppler of a point has this noise at the start, besides that of its steps. eiv learns it on the "
+      "way.");
+  list.number(
+      "radar_doppler_span", "m/s", atLeast(0), radar.doppler_span,
+      "This is the whole span of the Doppler that the radar can tell apart. A faster point appears on the "
+      "other side. 0 reads it off the data. Give it if you know it and drive faster than half of it.");
+  list.number(
+      "radar_doppler_step", "m/s", atLeast(0), radar.doppler_quantization,
+      "The radar gives the Doppler in steps of this size. 0 reads it off the data. A value below 0.02 means "
+      "no steps. Give it if you know it and the bag is short.");
+  list.vector3(
+      "ego_velocity_added_sigma", "m/s", atLeast(0), radar.added_sigma,
+      "This standard deviation (right, forward, up) is added to the velocity of a scan in quadrature. It "
+      "stands for errors that the points share, such as multipath and slow objects. It is the start: the "
+      "estimator scales it by what the scans show.");
+  list.number(
+      "ego_velocity_max_condition_number", "", atLeast(1), radar.max_condition_number,
+      "A scan is rejected if the directions of its inliers span space worse than this: it bounds the "
+      "condition number of H'H, with H the unit directions. It happens if all points lie in one direction.");
+  list.number(
+      "ego_velocity_max_sigma", "m/s", above(0), radar.max_sigma,
+      "A scan is rejected if the standard deviation of its velocity is larger than this along any axis.");
 }
 
 }  // namespace
@@ -101,56 +122,68 @@ void listImu(ParameterList& list, Config& c) {
       "imu_acceleration_unit",
       {{"m/s2", AccelerationUnit::kMetresPerSecondSquared}, {"g", AccelerationUnit::kStandardGravity}},
       c.imu_units.acceleration,
-      "This is the unit of linear_acceleration in the messages. sensor_msgs/Imu asks for m/s2. Some drivers write g: "
+      "This is the unit of linear_acceleration in the messages. sensor_msgs/Imu asks for m/s2. Some drivers "
+      "write g: "
       "then the acceleration at rest has a size of 1.");
-  list.choice<RateUnit>("imu_rate_unit",
-                        {{"rad/s", RateUnit::kRadiansPerSecond}, {"deg/s", RateUnit::kDegreesPerSecond}},
-                        c.imu_units.rate,
-                        "This is the unit of angular_velocity in the messages. sensor_msgs/Imu asks for rad/s. Some "
-                        "drivers write deg/s.");
+  list.choice<RateUnit>(
+      "imu_rate_unit", {{"rad/s", RateUnit::kRadiansPerSecond}, {"deg/s", RateUnit::kDegreesPerSecond}},
+      c.imu_units.rate,
+      "This is the unit of angular_velocity in the messages. sensor_msgs/Imu asks for rad/s. Some "
+      "drivers write deg/s.");
   list.number("gravity", "m/s^2", between(9.5, 10.0), c.odometry.gravity,
               "This is the size of gravity at your place: 9.78 at the equator, 9.83 at the poles.");
-  list.first().number("imu_accel_noise_density", "m/s^2/sqrt(Hz)", above(0), c.odometry.imu_noise.accel_density,
-                      "This is the white noise of the accelerometer, from its data sheet or an Allan plot. 0.001 to "
-                      "0.02 are typical. It is the start: the estimator takes more if the samples or the radar show "
-                      "more. A value two or three times that of the data sheet is a good choice.");
-  list.first().number("imu_gyro_noise_density", "rad/s/sqrt(Hz)", above(0), c.odometry.imu_noise.gyro_density,
-                      "This is the white noise of the gyro, from its data sheet or an Allan plot. 0.00005 to 0.001 "
-                      "are typical. The estimator takes more if the samples show more.");
-  list.number("imu_accel_random_walk", "m/s^3/sqrt(Hz)", above(0), c.odometry.imu_noise.accel_random_walk,
-              "The bias of the accelerometer wanders by this random walk. Raise it if the biases cannot follow, for "
-              "example while the IMU warms up.");
-  list.number("imu_gyro_random_walk", "rad/s^2/sqrt(Hz)", above(0), c.odometry.imu_noise.gyro_random_walk,
-              "The bias of the gyro wanders by this random walk. Raise it if the biases cannot follow, for example "
-              "while the IMU warms up.");
+  list.first().number(
+      "imu_accel_noise_density", "m/s^2/sqrt(Hz)", above(0), c.odometry.imu_noise.accel_density,
+      "This is the white noise of the accelerometer, from its data sheet or an Allan plot. 0.001 to "
+      "0.02 are typical. It is the start: the estimator takes more if the samples or the radar show "
+      "more. A value two or three times that of the data sheet is a good choice.");
+  list.first().number(
+      "imu_gyro_noise_density", "rad/s/sqrt(Hz)", above(0), c.odometry.imu_noise.gyro_density,
+      "This is the white noise of the gyro, from its data sheet or an Allan plot. 0.00005 to 0.001 "
+      "are typical. The estimator takes more if the samples show more.");
+  list.number(
+      "imu_accel_random_walk", "m/s^3/sqrt(Hz)", above(0), c.odometry.imu_noise.accel_random_walk,
+      "The bias of the accelerometer wanders by this random walk. Raise it if the biases cannot follow, for "
+      "example while the IMU warms up.");
+  list.number(
+      "imu_gyro_random_walk", "rad/s^2/sqrt(Hz)", above(0), c.odometry.imu_noise.gyro_random_walk,
+      "The bias of the gyro wanders by this random walk. Raise it if the biases cannot follow, for example "
+      "while the IMU warms up.");
 }
 
 void listGaps(ParameterList& list, Config& c) {
   ImuInputCheckOptions& gate = c.odometry.imu_input_check;
-  list.group("What sensors may leave out");
-  list.number("max_imu_gap", "s", above(0), c.odometry.max_imu_gap,
-              "A longer gap between IMU samples is counted as imu_gap, and the uncertainty grows over it. Set it to "
-              "three or four sample periods. Raise it for an IMU below 100 Hz.");
+  list.group("Gaps of the sensors");
+  list.number(
+      "max_imu_gap", "s", above(0), c.odometry.max_imu_gap,
+      "A longer gap between IMU samples is counted as imu_gap, and the uncertainty grows over it. Set it to "
+      "three or four sample periods. Raise it for an IMU below 100 Hz.");
   list.number("max_bridged_imu_gap", "s", above(0, 60), gate.max_bridged_gap,
               "The estimate starts again after a longer gap, or if the stamps of the IMU run back.");
-  list.number("imu_jump_patience", "s", above(0), gate.jump_patience,
-              "IMU samples with stamps of quite another time are dropped. After this time the clock counts as "
-              "jumped, and the estimate starts again.");
-  list.number("imu_accel_range", "m/s^2", atLeast(0), gate.accel_range,
-              "This is the largest reading of the accelerometer on one axis. A sample there is clipped and counts "
-              "less. 0 finds it from flat tops in the data. A data sheet says 16 g, for example: 156.9.");
-  list.number("imu_gyro_range", "rad/s", atLeast(0), gate.gyro_range,
-              "This is the largest reading of the gyro on one axis. A sample there is clipped and counts less. 0 "
-              "finds it from flat tops in the data. A data sheet says 2000 deg/s, for example: 34.9.");
-  list.number("imu_unseen_accel_density", "m/s^2/sqrt(Hz)", above(0), gate.unseen_accel_density,
-              "This noise stands for the acceleration that the IMU does not see, in gaps and beyond its range. The "
-              "default suits people and drones. Lower it for a slow vehicle.");
-  list.number("imu_unseen_gyro_density", "rad/s/sqrt(Hz)", above(0), gate.unseen_gyro_density,
-              "This noise stands for the turn that the IMU does not see: in gaps, beyond its range, and while an "
-              "axis sticks. The default suits people and drones. Lower it for a slow vehicle.");
-  list.number("max_radar_gap", "s", above(0), c.odometry.max_radar_gap,
-              "A longer time without a scan is counted as radar_gap. Raise it for a radar that sends fewer than five "
-              "scans a second.");
+  list.number(
+      "imu_jump_patience", "s", above(0), gate.jump_patience,
+      "IMU samples with stamps of quite another time are dropped. After this time the clock counts as "
+      "jumped, and the estimate starts again.");
+  list.number(
+      "imu_accel_range", "m/s^2", atLeast(0), gate.accel_range,
+      "This is the largest reading of the accelerometer on one axis. A sample there is clipped and counts "
+      "less. 0 finds it from flat tops in the data. A data sheet says 16 g, for example: 156.9.");
+  list.number(
+      "imu_gyro_range", "rad/s", atLeast(0), gate.gyro_range,
+      "This is the largest reading of the gyro on one axis. A sample there is clipped and counts less. 0 "
+      "finds it from flat tops in the data. A data sheet says 2000 deg/s, for example: 34.9.");
+  list.number(
+      "imu_unseen_accel_density", "m/s^2/sqrt(Hz)", above(0), gate.unseen_accel_density,
+      "This noise stands for the acceleration that the IMU does not see, in gaps and beyond its range. The "
+      "default suits people and drones. Lower it for a slow vehicle.");
+  list.number(
+      "imu_unseen_gyro_density", "rad/s/sqrt(Hz)", above(0), gate.unseen_gyro_density,
+      "This noise stands for the turn that the IMU does not see: in gaps, beyond its range, and while an "
+      "axis sticks. The default suits people and drones. Lower it for a slow vehicle.");
+  list.number(
+      "max_radar_gap", "s", above(0), c.odometry.max_radar_gap,
+      "A longer time without a scan is counted as radar_gap. Raise it for a radar that sends fewer than five "
+      "scans a second.");
 }
 
 void listEgoVelocity(ParameterList& list, Config& c) {
@@ -167,9 +200,10 @@ void listFeasibility(ParameterList& list, Config& c) {
   list.group("Radar: jumps of the velocity that no platform can make");
   list.number("feasibility_window", "s", above(0), c.odometry.feasibility.window,
               "The velocity of a scan is compared with the mean velocity over this time before it.");
-  list.number("feasibility_max_acceleration", "m/s^2", above(0), c.odometry.feasibility.max_acceleration,
-              "A scan is rejected as infeasible if its velocity leaves that mean faster than this. Three g suit "
-              "people and drones. Lower it for a heavy vehicle.");
+  list.number(
+      "feasibility_max_acceleration", "m/s^2", above(0), c.odometry.feasibility.max_acceleration,
+      "A scan is rejected as infeasible if its velocity leaves that mean faster than this. Three g suit "
+      "people and drones. Lower it for a heavy vehicle.");
   list.number("feasibility_margin", "m/s", atLeast(0), c.odometry.feasibility.margin,
               "A difference up to this is always allowed. It stands for the noise of the radar's velocity.");
 }

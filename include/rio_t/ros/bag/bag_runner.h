@@ -29,10 +29,10 @@ class RunFailed : public std::runtime_error {
   Diagnosis diagnosis_;
 };
 
-/// Plays the bags through the estimator as fast as it goes, in one thread, so that the same bag gives the same
-/// files. Needs no roscore. Throws std::runtime_error with one line that names the bag, topic, key or file
-/// that is wrong: bag missing or unreadable, topic missing or of another type, cloud not as configured, no
-/// data, output not writable; RunFailed: never initialised, every scan rejected.
+/// Plays the bags through the estimator as fast as it goes, in one thread, so that the same bag gives the
+/// same files. Needs no roscore. Throws std::runtime_error with one line that names the bag, topic, key or
+/// file that is wrong: bag missing or unreadable, topic missing or of another type, cloud not as configured,
+/// no data, output not writable; RunFailed: never initialised, every scan rejected.
 RunSummary runBag(const BagRun& run);
 
 /// A short table for people. `files` is the folder that it names.

@@ -12,9 +12,9 @@
 namespace rio_t {
 
 struct CalibrationRun {
-  std::vector<std::string> bags;         ///< paths
-  std::string output_folder;             ///< gets a folder with the files of each bag's run; empty: no files
-  Config config;                         ///< what is told
+  std::vector<std::string> bags;  ///< paths
+  std::string output_folder;      ///< gets a folder with the files of each bag's run; empty: no files
+  Config config;                  ///< what is told
   /// Makes BagRun::progress for a bag; may be empty.
   std::function<std::function<void(double)>(const std::string& bag)> progress;
 };

@@ -6,15 +6,15 @@
 
 namespace rio_t {
 
-/// What to look at, and where to write.
+/// The recording, and where to write.
 struct CheckRequest {
-  std::vector<std::string> bags;  ///< paths
-  std::string out;                ///< gets the configuration; empty: none
-  std::string rig;                ///< PNG with the rig drawn; empty: none
-  std::string imu_topic;          ///< empty: the best one
+  std::vector<std::string> bags;          ///< paths
+  std::string out;                        ///< gets the configuration; empty: none
+  std::string rig;                        ///< PNG with the rig drawn; empty: none
+  std::string imu_topic;                  ///< empty: the best one
   std::vector<std::string> radar_topics;  ///< empty: all that fit
-  double duration = 120.0;        ///< [s] of each bag that are read; 0: all
-  bool try_out = true;            ///< whether the odometry runs on the bag with what is proposed
+  double duration = 120.0;                ///< [s] of each bag that are read; 0: all
+  bool try_out = true;                    ///< whether the odometry runs on the bag with what is proposed
 };
 
 enum class FindingLevel {
@@ -30,13 +30,13 @@ struct Finding {
   std::string text;     ///< one sentence, or phrases
 };
 
-/// What one bag shows, and the configuration for it.
+/// The findings about one bag, and the configuration for it.
 struct BagCheck {
   std::string bag;
   std::vector<Finding> findings;
-  std::string to_do;    ///< one sentence if something is missing
-  std::string yaml;     ///< the configuration; empty if the odometry cannot run
-  double quality = 0.0; ///< larger: the bag shows more of the mounting
+  std::string to_do;     ///< one sentence if something is missing
+  std::string yaml;      ///< the configuration; empty if the odometry cannot run
+  double quality = 0.0;  ///< larger: the bag shows more of the mounting
 
   bool ready() const { return !yaml.empty(); }
 };

@@ -39,7 +39,7 @@ struct ExtrinsicsSummary {
   Eigen::MatrixXd covariance;
 };
 
-/// What a run comes to for one radar. With several radars its keys in `summary.yaml` end in its name.
+/// The result of a run for one radar. With several radars its keys in `summary.yaml` end in its name.
 struct RadarSummary {
   std::string name;               ///< empty if there is but one
   std::uint64_t scans_total = 0;  ///< used and rejected
@@ -55,7 +55,7 @@ struct RadarSummary {
   std::vector<double> pass_offset_sigmas_s;           ///< likewise
 };
 
-/// What became of the barometer.
+/// The result for the barometer.
 struct BarometerSummary {
   std::uint64_t pressures = 0;                    ///< messages
   std::uint64_t used = 0;                         ///< means of them that went into the window
@@ -65,7 +65,7 @@ struct BarometerSummary {
   double innovation_square = 0.0;  ///< [m^2] sum over the used ones; the file has the root of the mean
 };
 
-/// What became of the constraint of a ground vehicle.
+/// The result for the constraint of a ground vehicle.
 struct GroundVehicleSummary {
   std::uint64_t used = 0;                                        ///< terms
   std::uint64_t left_out = 0;                                    ///< that contradicted the estimate
@@ -77,7 +77,7 @@ struct GroundVehicleSummary {
 /// For people: that the motion contradicts the platform, and what to look at.
 std::string contradictionText(const GroundVehicleSummary& vehicle);
 
-/// What a run comes to; `summary.yaml` has one key for each member.
+/// The result of a run; `summary.yaml` has one key for each member.
 struct RunSummary {
   std::string mode = "online";
   std::optional<BatchSummary> batch;                                ///< only with mode batch
@@ -181,10 +181,10 @@ class RunOutput {
   RunFiles files_;
   File trajectory_, optimized_, navigation_, biases_;
   std::optional<File> barometer_, ground_vehicle_;
-  std::vector<RadarOutput> radars_;      // by RadarScan::radar
-  std::optional<File> map_;              // of the landmarks, if they are on
+  std::vector<RadarOutput> radars_;                   // by RadarScan::radar
+  std::optional<File> map_;                           // of the landmarks, if they are on
   std::map<std::uint64_t, LandmarkPoint> landmarks_;  // all that there were, by id, as they were last
-  std::optional<Time> last_navigation_;  // of the last line in navigation.csv
+  std::optional<Time> last_navigation_;               // of the last line in navigation.csv
 };
 
 }  // namespace rio_t

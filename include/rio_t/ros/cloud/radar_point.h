@@ -10,13 +10,14 @@ namespace rio_t {
 /// Stands for "not known": above every sensible minimum, so that the SNR filter lets such points through.
 constexpr float kUnknownSnrDb = 1000.0F;
 
-/// One detection as a PCL point, in RIO axes: x right, y forward, z up, in metres. PCL's own templates take it
+/// One detection as a PCL point, in RIO axes: x right, y forward, z up, in metres. PCL's own templates take
+/// it
 /// (`pcl::transformPointCloud`, filters, `pcl::fromROSMsg` of `~points` and `~inliers`); those that PCL ships
 /// compiled need `#define PCL_NO_PRECOMPILE` before the first include of PCL.
 struct EIGEN_ALIGN16 RadarPointPcl {
-  PCL_ADD_POINT4D  // x, y, z; data[3] is 1
-  float doppler = 0.0F;  ///< range rate [m/s], positive = receding
-  float snr_db = 0.0F;   ///< [dB]; kUnknownSnrDb if the driver gives no signal-to-noise ratio
+  PCL_ADD_POINT4D            // x, y, z; data[3] is 1
+      float doppler = 0.0F;  ///< range rate [m/s], positive = receding
+  float snr_db = 0.0F;       ///< [dB]; kUnknownSnrDb if the driver gives no signal-to-noise ratio
 
   RadarPointPcl() : data{0.0F, 0.0F, 0.0F, 1.0F} {}
   PCL_MAKE_ALIGNED_OPERATOR_NEW

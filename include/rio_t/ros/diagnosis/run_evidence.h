@@ -14,7 +14,7 @@ namespace rio_t {
 
 using Counts = std::map<std::string, std::uint64_t>;
 
-/// What a run shows of one radar, in counters.
+/// Counters of one radar.
 struct RadarEvidence {
   std::string name;               ///< empty if there is but one
   std::uint64_t scans_total = 0;  ///< received
@@ -28,7 +28,7 @@ struct RadarEvidence {
   double final_offset_s = 0.0;  ///< newest estimate of t_O
 };
 
-/// What a run shows, in counters: enough to say why it disappoints.
+/// Counters of a run: enough to say why it disappoints.
 struct RunEvidence {
   bool initialized = false;
   std::string waiting_for;  ///< while not initialised

@@ -8,7 +8,7 @@
 #include "rio_t/radar/extrinsics.h"
 #include "rio_t/ros/parameters/parameters.h"
 
-/// What tf says about the sensors; live node and bag runner ask the same questions (docs/frames.md).
+/// Mountings of the sensors from tf; live node and bag runner ask the same questions (docs/frames.md).
 namespace rio_t {
 
 /// The frame of the IMU: the parameter `imu_frame`, else the frame_id of the IMU's messages, else

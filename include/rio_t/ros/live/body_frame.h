@@ -34,13 +34,13 @@ class BodyFrame {
 
   /// T_BI, if it is known.
   std::optional<ImuInBody> imuInBody();
-  /// The odometry of the body. None while its frames are not known (see waitingFor()). Here `auto` decides for
-  /// the parameters if tf does not connect IMU and body.
+  /// The odometry of the body. None while its frames are not known (see waitingFor()). Here `auto` decides
+  /// for the parameters if tf does not connect IMU and body.
   std::optional<BodyOdometry> place(LiveSession& session, const NavigationState& state, double rate_sigma);
   /// The odometry that was published last: the next session goes on from there.
   void published(const BodyOdometry& body);
 
-  /// What is missing for the odometry; empty: nothing.
+  /// The frame or transform that the odometry waits for; empty: none.
   std::string waitingFor() const;
   std::string source() const;  ///< where T_BI came from, for people; empty while it is not known
 

@@ -57,6 +57,9 @@ class LiveOdometry {
   template <typename Message>
   using Event = ros::MessageEvent<const Message>;
 
+  /// Samples: seconds of input, so that nothing is lost while a callback is late.
+  static constexpr std::uint32_t kImuQueue = 5000;
+
   struct Received {
     ImuMeasurement imu;
     Time record;  ///< of receipt
@@ -84,8 +87,8 @@ class LiveOdometry {
   /// Subscribes to the topics as they were told.
   void subscribe(const Config& told);
   void addDiagnostics();
-  /// Calls `callback`. What it throws is told once in a while and counted, and nothing else: no message may end
-  /// the node.
+  /// Calls `callback`. What it throws is told once in a while and counted, and nothing else: no message may
+  /// end the node.
   template <typename Callback>
   void guarded(const std::string& what, Callback&& callback);
   void onDiagnosticsTimer();
@@ -105,7 +108,7 @@ class LiveOdometry {
   /// When it returns, nothing more is published of what was before. Any thread.
   /// `at_once`: does not wait for rest first.
   void reset(const std::string& reason, bool at_once = false);
-  /// What a session does with a sample. The state that is to be published, if there is one.
+  /// Gives a sample to a session. Returns the state that is to be published, if there is one.
   std::optional<NavigationState> feed(LiveSession& session, const Received& received, double* rate_sigma);
   void account(const LiveSession::Stamped& stamped);
   /// Whether this was not told for some seconds. Each radar has its own turn, unlike with ROS's throttles.
@@ -122,9 +125,9 @@ class LiveOdometry {
   const Config config_;  // topics as they are resolved
   ros::NodeHandle node_, private_node_;
   ros::CallbackQueue imu_queue_, input_queue_;
-  LiveMonitor monitor_;      // thread-safe
-  LivePublisher publisher_;  // see there
-  BodyFrame frames_;         // thread-safe
+  LiveMonitor monitor_;                                     // thread-safe
+  LivePublisher publisher_;                                 // see there
+  BodyFrame frames_;                                        // thread-safe
   std::optional<diagnostic_updater::Updater> diagnostics_;  // input thread, but for ticks
   std::unique_ptr<TopicRate> imu_rate_;
   std::unique_ptr<TopicRate> odom_rate_;  // none before the first ~odom; input thread
@@ -148,7 +151,7 @@ class LiveOdometry {
   std::map<std::string, Told> faults_told_;  // input thread only, as the next
   std::weak_ptr<LiveSession> faults_of_;     // whose faults these are
 
-  Config live_config_;  // config_ with what was reconfigured; input thread only
+  Config live_config_;                        // config_ with what was reconfigured; input thread only
   boost::recursive_mutex reconfigure_mutex_;  // the server's own
   std::unique_ptr<dynamic_reconfigure::Server<LiveParameters>> reconfigure_;
 

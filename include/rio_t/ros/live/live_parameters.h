@@ -25,10 +25,10 @@ class LiveParameters {
   LiveParameters() : LiveParameters(Config()) {}
   explicit LiveParameters(const Config& config);
 
-  /// What differs from `config`, as entries with the origin "dynamic_reconfigure".
+  /// The values that differ from those of `config`, as entries with the origin "dynamic_reconfigure".
   ParameterEntries changesFrom(const Config& config) const;
 
-  // What the server calls, by names that it sets.
+  // The server calls these; it sets their names.
   // NOLINTBEGIN(bugprone-reserved-identifier)
   static dynamic_reconfigure::ConfigDescription __getDescriptionMessage__();
   static LiveParameters __getDefault__() { return {}; }

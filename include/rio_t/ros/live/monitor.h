@@ -45,7 +45,7 @@ class LiveMonitor {
   void reset(const std::string& reason);
   /// What is missing before there is a session at all; empty: nothing.
   void waitFor(const std::string& what);
-  /// What is told about the frames, by key.
+  /// Texts about the frames, by key.
   void setFrames(const std::map<std::string, std::string>& frames);
   void tune(const ImuNoise& told);  ///< the noise of the IMU as it is told now
   /// A change of parameters was refused, for that reason; or was made, if it is empty.

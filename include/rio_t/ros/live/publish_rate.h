@@ -8,9 +8,9 @@
 
 namespace rio_t {
 
-/// Thins out a stream by its stamps: the first message of each period is published. The periods count from the
-/// epoch, so the same stamps give the same choice, whenever one starts. `set` may be called from any thread,
-/// `isDue` from one.
+/// Thins out a stream by its stamps: the first message of each period is published. The periods count from
+/// the epoch, so the same stamps give the same choice, whenever one starts. `set` may be called from any
+/// thread, `isDue` from one.
 class PublishRate {
  public:
   explicit PublishRate(double hz) : hz_(hz) {}
@@ -27,7 +27,8 @@ class PublishRate {
 
  private:
   std::atomic<double> hz_;
-  double last_ = std::numeric_limits<double>::quiet_NaN();  // the period of the last one; equals none at first
+  double last_ =
+      std::numeric_limits<double>::quiet_NaN();  // the period of the last one; equals none at first
 };
 
 }  // namespace rio_t

@@ -24,15 +24,15 @@
 
 namespace rio_t {
 
-/// The landmarks in the odometry frame: x, y, z, sigma [m], intensity (mean SNR) and sightings. The header is the
-/// caller's.
+/// The landmarks in the odometry frame: x, y, z, sigma [m], intensity (mean SNR) and sightings. The header is
+/// the caller's.
 sensor_msgs::PointCloud2 toPointCloud2(const std::vector<LandmarkPoint>& map, const WorldInOdom& T_OW = {});
 
 Time toTime(const ros::Time& time);
 /// Throws std::runtime_error for a time that ROS cannot hold (negative, or after 2106).
 ros::Time toRosTime(Time time);
-/// In m/s^2 and rad/s; `units` are those of the driver. Throws std::runtime_error, naming `topic`, if the stamp
-/// in the header is zero.
+/// In m/s^2 and rad/s; `units` are those of the driver. Throws std::runtime_error, naming `topic`, if the
+/// stamp in the header is zero.
 ImuMeasurement toImuMeasurement(const sensor_msgs::Imu& message, const std::string& topic,
                                 const ImuUnits& units = {});
 
@@ -48,8 +48,8 @@ nav_msgs::Odometry toOdometry(const BodyOdometry& body, const std::string& odom_
 geometry_msgs::TransformStamped toTransform(const BodyOdometry& body, const std::string& odom_frame,
                                             const std::string& base_link_frame, bool inverted);
 
-/// [m^2, rad^2, ...] The variance of what a message has a place for and nobody measured. A large number and not
-/// the -1 of sensor_msgs/Imu: filters (robot_localization) take a covariance as it stands, and one with a
+/// [m^2, rad^2, ...] The variance of what a message has a place for and nobody measured. A large number and
+/// not the -1 of sensor_msgs/Imu: filters (robot_localization) take a covariance as it stands, and one with a
 /// negative variance is none. 1e6 is far above the square of any value that a platform can have, and a filter
 /// can still invert it beside variances of 1e-6.
 constexpr double kUnknownVariance = 1e6;
@@ -58,15 +58,16 @@ constexpr double kUnknownVariance = 1e6;
 /// (REP-103: x forward, y left, z up).
 Eigen::Quaterniond radarFrameAxes();
 
-/// A velocity `v_R` in the radar's axes with its covariance, in `radar_frame`. The radar says nothing of the angular velocity: it is zero with
-/// kUnknownVariance.
-geometry_msgs::TwistWithCovarianceStamped toTwist(const Eigen::Vector3d& v_R, const Eigen::Matrix3d& covariance,
-                                                  Time stamp, const std::string& radar_frame);
+/// A velocity `v_R` in the radar's axes with its covariance, in `radar_frame`. The radar says nothing of the
+/// angular velocity: it is zero with kUnknownVariance.
+geometry_msgs::TwistWithCovarianceStamped toTwist(const Eigen::Vector3d& v_R,
+                                                  const Eigen::Matrix3d& covariance, Time stamp,
+                                                  const std::string& radar_frame);
 
 ImuBias toImuBias(const NavigationState& state, const std::string& imu_frame);
 
-/// The T_IR that a tf transform from the cloud's frame to the IMU stands for. The cloud's frame has the axes of
-/// the cloud (`axes`), T_IR those of RIO (x right, y forward, z up).
+/// The T_IR that a tf transform from the cloud's frame to the IMU stands for. The cloud's frame has the axes
+/// of the cloud (`axes`), T_IR those of RIO (x right, y forward, z up).
 Extrinsics toExtrinsics(const geometry_msgs::Transform& T_imu_cloud, PointAxes axes);
 /// The T_BI that a tf transform from the IMU to base_link stands for.
 ImuInBody toImuInBody(const geometry_msgs::Transform& T_base_imu);

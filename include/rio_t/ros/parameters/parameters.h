@@ -92,7 +92,7 @@ struct Config {
   bool publish_tf = true;
   bool publish_radar_tf = true;
   bool invert_tf = false;
-  double tf_rate = 50.0;  ///< [Hz] 0: with each IMU sample
+  double tf_rate = 50.0;   ///< [Hz] 0: with each IMU sample
   double odom_rate = 0.0;  ///< [Hz] 0: with each IMU sample
   bool correct_stamps = true;
   ResetPose reset_pose = ResetPose::kKeep;
@@ -124,8 +124,8 @@ struct Config {
 /// that of RadarScan::radar.
 std::vector<Config> configsOfRadars(const Config& config);
 
-/// The configuration with the topics as a node without a namespace has them, and as a bag holds them: a relative
-/// topic begins with `/`. An empty one stays empty.
+/// The configuration with the topics as a node without a namespace has them, and as a bag holds them: a
+/// relative topic begins with `/`. An empty one stays empty.
 Config withAbsoluteTopics(Config config);
 
 /// Layout of the cloud: the preset with the overrides.
@@ -160,14 +160,14 @@ const std::vector<std::string>& liveKeys();
 /// What is known of a key.
 struct ParameterDescription {
   std::string key;
-  std::string type;      ///< "number", "integer", "boolean", "choice", "text" or "list"
-  std::string unit;      ///< empty: none
-  std::string expected;  ///< e.g. "a finite number above 0 and at most 10"
+  std::string type;         ///< "number", "integer", "boolean", "choice", "text" or "list"
+  std::string unit;         ///< empty: none
+  std::string expected;     ///< e.g. "a finite number above 0 and at most 10"
   std::string description;  ///< full sentences: what it is, typical values, when to change it
   double min = -std::numeric_limits<double>::infinity();  ///< of a number, or of each one of a list
   double max = std::numeric_limits<double>::infinity();   ///< likewise
   std::vector<std::string> choices = {};                  ///< of a choice
-  std::string group = {};  ///< title of its section
+  std::string group = {};                                 ///< title of its section
   bool of_radar = false;  ///< each radar may have its own value, in its section
   bool first = false;     ///< one of the parameters that a new user reads first
 };
@@ -178,9 +178,9 @@ std::vector<ParameterDescription> parameterDescriptions();
 /// default-constructed one. Reading it back gives the same configuration.
 std::string toYaml(const Config& config);
 
-/// All that is known of every parameter, with its default, for programs: a YAML list of maps with the keys key,
-/// section, first, type, unit, min, max, choices, expected, per_radar, default and description. A key without a value
-/// (no unit, no bound) is left out.
+/// All that is known of every parameter, with its default, for programs: a YAML list of maps with the keys
+/// key, section, first, type, unit, min, max, choices, expected, per_radar, default and description. A key
+/// without a value (no unit, no bound) is left out.
 std::string parametersYaml();
 
 /// The same for people: docs/parameters.md.

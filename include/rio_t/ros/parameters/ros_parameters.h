@@ -12,8 +12,8 @@ namespace rio_t {
 /// A value of the ROS parameter server. `value` is not const because XmlRpc gives no const access.
 ParameterValue toParameterValue(XmlRpc::XmlRpcValue& value);
 
-/// Entries as a map of the parameter server; nested keys become nested maps. Whole numbers beyond 32 bits become
-/// floating-point numbers, since the server has no longer ones.
+/// Entries as a map of the parameter server; nested keys become nested maps. Whole numbers beyond 32 bits
+/// become floating-point numbers, since the server has no longer ones.
 XmlRpc::XmlRpcValue toXmlRpc(const ParameterEntries& entries);
 
 /// The entries of a map of the parameter server, `name_space` being where it was found. Keys that other
@@ -26,9 +26,10 @@ ParameterEntries toParameterEntries(XmlRpc::XmlRpcValue& map, const std::string&
 /// std::runtime_error.
 Config configFromRos(const ros::NodeHandle& private_node);
 
-/// Writes every parameter of the run to the parameter server, as `~effective`, and removes that of an earlier run:
-/// `rosparam get /rio_t/effective` shows it, `rosparam dump run.yaml /rio_t/effective` makes a configuration of it.
-/// The user's own parameters stay as they are, so that the next start reads them and not these.
+/// Writes every parameter of the run to the parameter server, as `~effective`, and removes that of an earlier
+/// run: `rosparam get /rio_t/effective` shows it, `rosparam dump run.yaml /rio_t/effective` makes a
+/// configuration of it. The user's own parameters stay as they are, so that the next start reads them and not
+/// these.
 void showEffectiveParameters(const ros::NodeHandle& private_node, const Config& config);
 
 }  // namespace rio_t

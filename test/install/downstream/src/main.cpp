@@ -22,5 +22,6 @@ int main() {
 
   rio_t::TimeOffset message;
   message.offset = 0.03;
-  std::cout << cloud.at(0).x << " " << cloud.at(0).doppler << " " << message.offset << " " << problem.NumResiduals() << "\n";
+  std::cout << cloud.at(0).x << " " << cloud.at(0).doppler << " " << message.offset << " "
+            << problem.NumResiduals() << "\n";
 }

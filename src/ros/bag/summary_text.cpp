@@ -1,0 +1,214 @@
+#include "summary_text.h"
+
+#include <yaml-cpp/yaml.h>
+
+namespace rio_t {
+namespace {
+
+std::string fixedText(double value, int decimals) {
+  std::string text;
+  appendFixed(&text, value, decimals);
+  return text;
+}
+
+std::vector<std::string> fixedTexts(const std::vector<double>& values, int decimals) {
+  std::vector<std::string> texts;
+  texts.reserve(values.size());
+  for (const double value : values) texts.push_back(fixedText(value, decimals));
+  return texts;
+}
+
+std::vector<std::string> fixedTexts(const Eigen::Vector3d& v, int decimals) {
+  return fixedTexts(std::vector<double>{v.x(), v.y(), v.z()}, decimals);
+}
+
+std::vector<std::string> fixedTexts(const Eigen::Quaterniond& q, int decimals) {
+  return fixedTexts(std::vector<double>{q.x(), q.y(), q.z(), q.w()}, decimals);
+}
+
+/// The lines of summary.yaml, in order.
+class SummaryLines {
+ public:
+  SummaryLines() { yaml_ << YAML::BeginMap; }
+  template <typename T>
+  void add(const std::string& key, const T& value) {
+    yaml_ << YAML::Key << key << YAML::Value << YAML::Flow << value;
+  }
+  void beginMap(const std::string& key) { add(key, YAML::BeginMap); }
+  void endMap() { yaml_ << YAML::EndMap; }
+  void addChecks(const std::vector<Check>& checks) {
+    yaml_ << YAML::Key << "checks" << YAML::Value << YAML::BeginSeq;
+    for (const Check& check : checks) {
+      yaml_ << YAML::Flow << YAML::BeginMap << YAML::Key << "name" << YAML::Value << check.name;
+      yaml_ << YAML::Key << "value" << YAML::Value << fixedText(check.value, 4);
+      yaml_ << YAML::Key << (check.at_least ? "at_least" : "at_most") << YAML::Value
+            << fixedText(check.limit, 4);
+      yaml_ << YAML::Key << "good" << YAML::Value << check.good() << YAML::EndMap;
+    }
+    yaml_ << YAML::EndSeq;
+  }
+  void addCauses(const std::vector<Cause>& causes) {
+    yaml_ << YAML::Key << "causes" << YAML::Value;
+    if (causes.empty()) yaml_ << YAML::Flow;
+    yaml_ << YAML::BeginSeq;
+    for (const Cause& cause : causes) {
+      yaml_ << YAML::BeginMap << YAML::Key << "name" << YAML::Value << cause.name;
+      yaml_ << YAML::Key << "share" << YAML::Value << fixedText(cause.share, 3);
+      yaml_ << YAML::Key << "text" << YAML::Value << YAML::DoubleQuoted << cause.text;
+      yaml_ << YAML::Key << "remedy" << YAML::Value << YAML::DoubleQuoted << cause.remedy << YAML::EndMap;
+    }
+    yaml_ << YAML::EndSeq;
+  }
+  std::string text() {
+    yaml_ << YAML::EndMap;
+    return std::string(yaml_.c_str()) + "\n";
+  }
+
+ private:
+  YAML::Emitter yaml_;
+};
+
+void addEstimates(SummaryLines& lines, const RadarSummary& radar) {
+  const std::string suffix = suffixOf(radar.name);
+  lines.add("final_offset_s" + suffix, fixedText(radar.final_offset_s, 9));
+  lines.add("final_offset_sigma_s" + suffix, fixedText(radar.final_offset_sigma_s, 9));
+  if (!radar.extrinsics) return;
+  const ExtrinsicsSummary& extrinsics = *radar.extrinsics;
+  lines.add("told_extrinsics_translation" + suffix, fixedTexts(extrinsics.told.l_I, 9));
+  lines.add("told_extrinsics_rotation_xyzw" + suffix, fixedTexts(extrinsics.told.q_IR, 9));
+  lines.add("final_extrinsics_translation" + suffix, fixedTexts(extrinsics.T_IR.l_I, 9));
+  lines.add("final_extrinsics_translation_sigma" + suffix, fixedTexts(extrinsics.translation_sigma, 9));
+  lines.add("final_extrinsics_rotation_xyzw" + suffix, fixedTexts(extrinsics.T_IR.q_IR, 9));
+  lines.add("final_extrinsics_rotation_sigma" + suffix, fixedTexts(extrinsics.rotation_sigma, 9));
+}
+
+void addMeasured(SummaryLines& lines, const RadarSummary& radar) {
+  const std::string suffix = suffixOf(radar.name);
+  lines.beginMap("radar_noise" + suffix);  // standard deviations [m/s, rad, rad]
+  lines.add("doppler", fixedText(std::sqrt(radar.noise.doppler), 4));
+  lines.add("azimuth", fixedText(std::sqrt(radar.noise.azimuth), 4));
+  lines.add("elevation", fixedText(std::sqrt(radar.noise.elevation), 4));
+  lines.endMap();
+  lines.add("radar_doppler_step" + suffix, fixedText(radar.doppler_step.value, 6));  // [m/s]
+  lines.add("radar_doppler_step_from" + suffix, toString(radar.doppler_step.source));
+  lines.beginMap("radar_points_per_scan" + suffix);
+  lines.add("p10", radar.points_per_scan[0]);
+  lines.add("p50", radar.points_per_scan[1]);
+  lines.add("p90", radar.points_per_scan[2]);
+  lines.endMap();
+}
+
+void addBarometer(SummaryLines& lines, const BarometerSummary& barometer) {
+  const auto used = static_cast<double>(barometer.used);
+  lines.beginMap("barometer");
+  lines.add("pressures", barometer.pressures);
+  lines.add("means_used", barometer.used);
+  lines.add("means_rejected", barometer.rejected);
+  lines.add("steps", barometer.steps);
+  lines.add("innovation_rms_m",
+            fixedText(used > 0.0 ? std::sqrt(barometer.innovation_square / used) : 0.0, 6));
+  lines.add("final_bias_m", fixedText(barometer.bias, 6));
+  lines.add("final_bias_sigma_m", fixedText(barometer.bias_sigma, 6));
+  lines.endMap();
+}
+
+void addGroundVehicle(SummaryLines& lines, const GroundVehicleSummary& vehicle) {
+  lines.beginMap("ground_vehicle");
+  lines.add("terms_used", vehicle.used);
+  lines.add("terms_left_out", vehicle.left_out);
+  lines.add("final_rotation_xyzw", fixedTexts(vehicle.rotation, 9));
+  lines.add("final_rotation_sigma", fixedTexts(vehicle.rotation_sigma, 9));
+  lines.add("contradicted", vehicle.contradicted_at.has_value());
+  if (vehicle.contradicted_at) lines.add("contradicted_after_s", fixedText(*vehicle.contradicted_at, 3));
+  lines.endMap();
+}
+
+}  // namespace
+
+std::string summaryText(const RunSummary& summary, const std::vector<std::string>& saved) {
+  SummaryLines lines;
+  const auto line = [&](const char* key, const auto& value) { lines.add(key, value); };
+  line("mode", summary.mode);
+  line("verdict", toString(summary.diagnosis.verdict));
+  lines.addChecks(summary.diagnosis.checks);
+  lines.addCauses(summary.diagnosis.causes);
+  line("imu_count", summary.imu_count);
+  line("scans_total", summary.scansTotal());
+  line("scans_used", summary.scansUsed());
+  line("scans_rejected", summary.scansRejected());
+  for (const RadarSummary& radar : summary.radars) {
+    if (radar.name.empty()) continue;  // the only one
+    lines.add("scans_total_" + radar.name, radar.scans_total);
+    lines.add("scans_used_" + radar.name, radar.scans_used);
+    lines.add("scans_rejected_" + radar.name, radar.scans_rejected);
+  }
+  line("input_faults", summary.input_faults);
+  line("solver_terminations", summary.solver_terminations);
+  line("initialized_from", summary.initialized_from.empty() ? "none" : summary.initialized_from);
+  line("health_at_end", summary.health_at_end);
+  line("divergences", summary.divergences);
+  line("reinitializations", summary.reinitializations);
+  line("scans_diverged", summary.scans_diverged);
+  line("path_length_m", fixedText(summary.path_length_m, 6));
+  line("end_to_start_2d_m", fixedText(summary.end_to_start_2d_m, 6));
+  line("end_to_start_3d_m", fixedText(summary.end_to_start_3d_m, 6));
+  for (const RadarSummary& radar : summary.radars) addEstimates(lines, radar);
+  lines.beginMap("imu_noise");
+  line("accel", fixedText(summary.imu_noise.accel_density, 6));
+  line("gyro", fixedText(summary.imu_noise.gyro_density, 6));
+  lines.endMap();
+  for (const RadarSummary& radar : summary.radars) addMeasured(lines, radar);
+  for (const RadarSummary& radar : summary.radars) {
+    if (radar.pass_offsets_s.empty()) continue;
+    lines.add("pass_offsets_s" + suffixOf(radar.name), fixedTexts(radar.pass_offsets_s, 9));
+    lines.add("pass_offset_sigmas_s" + suffixOf(radar.name), fixedTexts(radar.pass_offset_sigmas_s, 9));
+  }
+  if (summary.batch) {
+    line("batch_iterations", summary.batch->iterations);
+    line("batch_placements", summary.batch->placements);
+    line("batch_converged", summary.batch->converged);
+    line("scans_readmitted", summary.batch->scans_readmitted);
+  }
+  if (summary.barometer) addBarometer(lines, *summary.barometer);
+  if (summary.ground_vehicle) addGroundVehicle(lines, *summary.ground_vehicle);
+  if (summary.truth) {
+    line("ate_m", fixedText(summary.truth->ate_m, 9));
+    if (summary.truth->t_rel) line("t_rel", fixedText(*summary.truth->t_rel, 9));
+    if (summary.truth->r_rel_deg) line("r_rel_deg", fixedText(*summary.truth->r_rel_deg, 9));
+  }
+  line("saved", saved);
+  // All above is the same in every run; these are not.
+  line("estimation_seconds", fixedText(summary.estimation_seconds, 6));
+  line("realtime_factor", fixedText(summary.realtime_factor, 3));
+  return lines.text();
+}
+
+std::string suffixOf(const std::string& radar) { return radar.empty() ? "" : "_" + radar; }
+
+std::uint64_t RunSummary::scansTotal() const {
+  std::uint64_t total = 0;
+  for (const RadarSummary& radar : radars) total += radar.scans_total;
+  return total;
+}
+
+std::uint64_t RunSummary::scansUsed() const {
+  std::uint64_t used = 0;
+  for (const RadarSummary& radar : radars) used += radar.scans_used;
+  return used;
+}
+
+std::map<std::string, std::uint64_t> RunSummary::scansRejected() const {
+  std::map<std::string, std::uint64_t> rejected;
+  for (const RadarSummary& radar : radars) {
+    for (const auto& [reason, count] : radar.scans_rejected) rejected[reason] += count;
+  }
+  return rejected;
+}
+
+std::string contradictionText(const GroundVehicleSummary& vehicle) {
+  return "platform: ground_vehicle: after " + fixedText(vehicle.contradicted_at.value_or(0.0), 1) +
+         " s the motion contradicted it, and the constraint was switched off: the platform moves sideways or "
+         "upwards. Is it a ground vehicle, and does vehicle_frame_rotation_xyzw say which way it drives?";
+}
+
+}  // namespace rio_t

@@ -1,0 +1,169 @@
+// LiveOdometry: the callbacks of IMU, scans, triggers and pressures.
+#include <ros/console.h>
+
+#include <cmath>
+
+#include "radar_texts.h"
+#include "rio_t/ros/cloud/point_cloud.h"
+#include "rio_t/ros/live/live_odometry.h"
+#include "rio_t/ros/messages/conversions.h"
+#include "seconds_since.h"
+
+namespace rio_t {
+
+void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
+  const auto start = std::chrono::steady_clock::now();
+  monitor_.imu();
+  imu_rate_->task.tick();
+  try {
+    const ImuMeasurement imu =
+        toImuMeasurement(*event.getConstMessage(), config_.imu_topic, config_.imu_units);
+    // The same judgement as the session's own, so that the whole session starts again, with what it stamps
+    // by.
+    const ClockJumpDetector::Verdict stamp = imu_stamps_.check(imu.time);
+    if (stamp == ClockJumpDetector::Verdict::kRestart) {
+      const double jump = imu.time - *newest_imu_;
+      reset(std::string("the IMU's stamps jumped ") + (jump < 0.0 ? "back" : "ahead") + " by " +
+                std::to_string(std::abs(jump)) + " s",
+            true);
+      early_imu_.clear();
+    }
+    if (stamp == ClockJumpDetector::Verdict::kGood || stamp == ClockJumpDetector::Verdict::kRestart)
+      newest_imu_ = imu.time;
+    frames_.hear(event.getConstMessage()->header.frame_id);
+    const Received received{imu, toTime(event.getReceiptTime())};
+    const Session now = session_.get();
+    if (!now) {
+      // The first scan, by which tf names the radar, comes later than the samples that belong to it.
+      early_imu_.push_back(received);
+      if (early_imu_.size() <= kImuQueue) return;
+      early_imu_.pop_front();
+      monitor_.imuDropped("imu_before_extrinsics");
+      return;
+    }
+    double rate_sigma = 0.0;
+    for (; !early_imu_.empty(); early_imu_.pop_front()) feed(*now, early_imu_.front(), &rate_sigma);
+    if (const std::optional<NavigationState> state = feed(*now, received, &rate_sigma)) {
+      if (const std::optional<BodyOdometry> body = frames_.place(*now, *state, rate_sigma)) {
+        session_.speak(Speaker::kNavigation, now, [&] {
+          if (publisher_.odometry(*body)) ++odom_published_;
+          frames_.published(*body);
+          monitor_.odometry(secondsSince(start));
+        });
+      } else if (!frames_.waitingFor().empty()) {
+        monitor_.imuDropped("odometry_before_base_extrinsics");
+      }
+    }
+    if (now->imuPilesUp()) {
+      reset("the optimisation thread took none of the last " + std::to_string(LiveSession::kMaxWaitingImu) +
+            " IMU samples");
+    }
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      rate_sigma_ = rate_sigma;
+    }
+    wakeSolver();
+  } catch (const std::exception& error) {
+    monitor_.imuDropped("imu_not_usable");
+    if (isTimeToTell("imu_not_usable")) ROS_ERROR_STREAM(name_ << ": " << error.what());
+  }
+}
+
+std::optional<NavigationState> LiveOdometry::feed(LiveSession& session, const Received& received,
+                                                  double* rate_sigma) {
+  *rate_sigma = session.rateSigma(received.imu.time);
+  const std::optional<NavigationState> state = session.addImu(received.imu);
+  account(session.stampWithImu(received.imu.time, received.record));
+  return state;
+}
+
+void LiveOdometry::onScan(std::size_t radar, const Event<sensor_msgs::PointCloud2>& event) {
+  const sensor_msgs::PointCloud2& message = *event.getConstMessage();
+  Radar& from = radars_[radar];
+  monitor_.scan(radar);
+  from.scan_rate->task.tick();
+  std::string what = "cloud_not_usable";  // each has its own turn to be told
+  try {
+    DecodedScan decoded;
+    try {
+      decoded = decode(message, from.format);
+    } catch (const std::exception& error) {
+      throw std::runtime_error("topic " + from.config.radar_topic + ": " + error.what());
+    }
+    if (decoded.dropped_not_finite > 0)
+      monitor_.dropped(radar, "points_not_finite", decoded.dropped_not_finite);
+    what = "frame_not_usable";
+    if (!from.T_IR) lookUpExtrinsics(from, message.header.frame_id);
+    const Session now = session_.get();
+    if (!now) {
+      monitor_.dropped(radar, "scan_before_extrinsics");
+      return;
+    }
+    RadarScan scan = toRadarScan(decoded.cloud, Time());
+    scan.radar = radar;
+    what = "stamp_not_usable";
+    account(now->addScan(message.header.seq, toTime(message.header.stamp), toTime(event.getReceiptTime()),
+                         std::move(scan)));
+    wakeSolver();
+  } catch (const std::exception& error) {
+    monitor_.dropped(radar, "scan_not_usable");
+    if (isTimeToTell(what + " " + from.config.radar_topic))
+      ROS_ERROR_STREAM(beginning(name_, from.config) << error.what());
+  }
+}
+
+void LiveOdometry::onPressure(const Event<sensor_msgs::FluidPressure>& event) {
+  monitor_.pressure();
+  try {
+    const Pressure pressure = toPressure(*event.getConstMessage(), config_.barometer_topic);
+    if (const Session now = session_.get()) now->addPressure(pressure);
+  } catch (const std::exception& error) {
+    monitor_.pressureDropped(error.what());
+    if (isTimeToTell("pressure")) ROS_ERROR_STREAM(name_ << ": " << error.what());
+  }
+}
+
+void LiveOdometry::onTrigger(std::size_t radar, const Event<std_msgs::Header>& event) {
+  monitor_.trigger(radar);
+  radars_[radar].trigger_rate->task.tick();
+  const Session now = session_.get();
+  if (!now) return;
+  const std_msgs::Header& trigger = *event.getConstMessage();
+  account(now->addTrigger(radar, trigger.seq, toTime(trigger.stamp), toTime(event.getReceiptTime())));
+  wakeSolver();
+}
+
+void LiveOdometry::account(const LiveSession::Stamped& stamped) {
+  for (const auto& [radar, reason] : stamped.given_up) {
+    monitor_.dropped(radar, reason);
+    const Config& config = radars_[radar].config;
+    if (isTimeToTell("no stamp for " + config.radar_topic + ": " + reason)) {
+      ROS_WARN_STREAM(beginning(name_, config) << "a scan got no stamp: " << reason
+                                               << " (stamp_source: " << toString(config.stamp_source)
+                                               << ", trigger_topic: " << config.trigger_topic << ")");
+    }
+  }
+}
+
+void LiveOdometry::lookUpExtrinsics(Radar& radar, const std::string& cloud_frame) {
+  const Config& config = radar.config;
+  std::string waiting_for;
+  try {
+    radar.T_IR = frames_.radarExtrinsics(config, cloud_frame, &waiting_for);
+  } catch (const std::exception&) {
+    monitor_.waitFor("a frame of the clouds that tf knows" + withName("", config, " of radar "));
+    throw;
+  }
+  if (!radar.T_IR) {
+    monitor_.waitFor(waiting_for);
+    if (isTimeToTell("tf of " + config.radar_topic))
+      ROS_WARN_STREAM(beginning(name_, config) << "waiting for " << waiting_for);
+    return;
+  }
+  ROS_INFO_STREAM(name_ << ": " << withName("extrinsics", config) << " from tf " << cloud_frame << " -> "
+                        << *frames_.imuFrame() << ": translation [" << radar.T_IR->l_I.transpose()
+                        << "], rotation xyzw [" << radar.T_IR->q_IR.coeffs().transpose() << "]");
+  startSessionWhenReady();
+}
+
+}  // namespace rio_t

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <string>
+
+#include "rio_t/ros/parameters/parameters.h"
+
+/// Texts for people that name a radar if there are several.
+namespace rio_t {
+
+/// Where a message to people begins with what it is about, e.g. "/rio_t: radar left: ".
+inline std::string beginning(const std::string& node, const Config& radar) {
+  return node + ": " + (radar.radar_name.empty() ? "" : "radar " + radar.radar_name + ": ");
+}
+
+/// E.g. "time offset left".
+inline std::string withName(const std::string& what, const Config& radar, const std::string& between = " ") {
+  return radar.radar_name.empty() ? what : what + between + radar.radar_name;
+}
+
+}  // namespace rio_t
