@@ -68,6 +68,7 @@ struct SimulatedRun {
     const std::vector<Arrival> arrivals = inOrderOfArrival(data);
     auto next = arrivals.begin();
     auto pressure = data.pressures.begin();
+    std::size_t count = 0;
     for (const ImuMeasurement& sample : data.imu.samples) {
       if (const auto state = odometry->addImu(sample)) states.push_back(*state);
       for (; pressure != data.pressures.end() && pressure->stamp <= sample.time; ++pressure)
@@ -78,6 +79,7 @@ struct SimulatedRun {
         arrived.radar = next->radar;
         odometry->addScan(std::move(arrived));
       }
+      if (++count % samples_per_process != 0) continue;
       for (ScanResult& result : odometry->process()) results.push_back(std::move(result));
     }
   }
@@ -120,6 +122,7 @@ struct SimulatedRun {
 
   simulation::Motion motion;
   simulation::SimulationOptions setup;
+  std::size_t samples_per_process = 1;  ///< IMU samples between two calls of process()
   OdometryOptions options;
   std::optional<RadarInertialOdometry> odometry;
   std::vector<NavigationState> states;  ///< causal, one for each sample

@@ -221,9 +221,13 @@ std::vector<StampedPose> Estimator::marginalize() {
   return left;
 }
 
+Time Estimator::nodeTime(const RadarScan& scan) const {
+  return radars_.at(scan.radar).nodeTime(scan.stamp);
+}
+
 bool Estimator::mustWait(const RadarScan& scan) const {
   if (!initialized()) return false;
-  const Time node_time = radars_.at(scan.radar).nodeTime(scan.stamp);
+  const Time node_time = nodeTime(scan);
   return node_time >= initialized_at_ && node_time > imu_.newest() - kImuMargin &&
          node_time - imu_.newest() <= max_stamp_ahead_;
 }

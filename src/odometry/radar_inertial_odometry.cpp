@@ -18,6 +18,8 @@ struct RadarInertialOdometry::Impl {
         estimator(options, navigation, faults) {}
 
   void takeInbox();
+  /// The end if all must wait.
+  std::vector<RadarScan>::iterator nextReadyScan();
   void shareStatus();
 
   const OdometryOptions options;
@@ -44,7 +46,7 @@ struct RadarInertialOdometry::Impl {
 
   // Only the thread in process() touches these.
   Estimator estimator;
-  std::vector<RadarScan> waiting_scans;  ///< oldest first
+  std::vector<RadarScan> waiting_scans;  ///< in the order in which they came
   std::uint64_t clock_restarts = 0;
 };
 
@@ -96,13 +98,11 @@ std::vector<ScanResult> RadarInertialOdometry::process(std::size_t max_scans) {
   Impl& m = *impl_;
   m.takeInbox();
   std::vector<ScanResult> results;
-  for (auto scan = m.waiting_scans.begin(); scan != m.waiting_scans.end() && results.size() < max_scans;) {
-    if (m.estimator.mustWait(*scan)) {
-      ++scan;
-      continue;
-    }
+  while (results.size() < max_scans) {
+    const auto scan = m.nextReadyScan();
+    if (scan == m.waiting_scans.end()) break;
     results.push_back(m.estimator.useScan(std::move(*scan), false));
-    scan = m.waiting_scans.erase(scan);
+    m.waiting_scans.erase(scan);
   }
   while (m.waiting_scans.size() > m.options.max_queued_scans) {
     ScanResult lost;
@@ -126,6 +126,18 @@ std::vector<ScanResult> RadarInertialOdometry::finish() {
   if (results.empty()) results.emplace_back();
   for (const StampedPose& pose : m.estimator.remainingPoses()) results.back().left_window.push_back(pose);
   return results;
+}
+
+// The one that was ready first, whether the IMU samples come one by one or many at once: the live node and the
+// bag runner shall use the scans of several radars in the same order.
+std::vector<RadarScan>::iterator RadarInertialOdometry::Impl::nextReadyScan() {
+  if (!estimator.initialized()) return waiting_scans.begin();
+  auto first = waiting_scans.end();
+  for (auto scan = waiting_scans.begin(); scan != waiting_scans.end(); ++scan) {
+    if (estimator.mustWait(*scan)) continue;
+    if (first == waiting_scans.end() || estimator.nodeTime(*scan) < estimator.nodeTime(*first)) first = scan;
+  }
+  return first;
 }
 
 void RadarInertialOdometry::Impl::takeInbox() {

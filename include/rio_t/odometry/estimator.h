@@ -44,6 +44,8 @@ class Estimator {
   /// Call it after addImu. Counts times without radar, and moves the window on while the radar is silent.
   void keepUp(bool scan_came, bool scans_wait);
 
+  /// When the scan was measured, as known so far. Only while initialised.
+  Time nodeTime(const RadarScan& scan) const;
   /// Whether the IMU that covers the scan may still come.
   bool mustWait(const RadarScan& scan) const;
   /// `imu_has_ended`: no more IMU will come, so the scan cannot wait for it.
