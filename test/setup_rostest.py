@@ -75,7 +75,7 @@ class SetupTest(tester.LiveTestCase):
             self.assertLessEqual({m.header.stamp.to_nsec() for m in listener.messages["odom"]}, set(self.imu_stamps))
 
     def test_arrival_stamps(self):
-        with tester.Listener() as listener, tester.node("config:=irs", "stamp_source:=arrival"):
+        with tester.Listener() as listener, tester.node("config:=irs", "stamp_source:=arrival", "correct_stamps:=false"):
             listener.wait_until_heard()
             self.play_whole(listener)
             listener.wait_for("offsets", lambda: len(listener.messages["time_offset"]) > 20)

@@ -176,6 +176,22 @@ TEST(Stamping, ATriggerThatComesAfterItsScanIsWaitedFor) {
   EXPECT_EQ(stamper.held(), 0u);
 }
 
+// As a live node may hand them over: the trigger was received in time, but its thread was late.
+TEST(Stamping, ATriggerIsNotGivenUpWhileTheImuRunsAhead) {
+  ScanStamper stamper(options(StampSource::kTrigger));
+  for (const std::uint32_t k : {0U, 1U}) {
+    const double t = 0.1 * k;
+    if (k == 0) stamper.addTrigger(7, imuTime(t), recordTime(t));
+    stamper.addScan(7 + k, Time(), recordTime(t + 0.09), RadarScan());
+    stamper.addImu(imuTime(t + 0.09), recordTime(t + 0.09));
+    stamper.addImu(imuTime(t + 0.2), recordTime(t + 0.2));
+    EXPECT_EQ(stamper.take().size(), 1U - k);
+  }
+  stamper.addTrigger(8, imuTime(0.1), recordTime(0.1));
+  EXPECT_EQ(seconds(stamper.take()), std::vector<double>{0.1});
+  EXPECT_TRUE(stamper.givenUp().empty());
+}
+
 TEST(Stamping, UnlikeSeqsPairTheLatestTriggerBeforeTheArrival) {
   ScanStamper stamper(options(StampSource::kTrigger));
   const std::vector<double> stamps = seconds(runTriggers(stamper, 0.05, 4000, false));

@@ -152,8 +152,11 @@ ScanStamper::Decision ScanStamper::stampFromTrigger(const Held& scan, Time* stam
     return Decision::kStamped;
   }
   if (counting_ != Counting::kUnlike) {
-    // A trigger may be a little late.
-    if (!finishing_ && now_ - scan.record <= options_.max_overtake) return Decision::kWait;
+    // The threads of a busy node may hand over the IMU, the scan and its trigger in another order than they came.
+    // Triggers keep their own order, so a later one says that the scan's will not come.
+    const bool later_came = !triggers_.empty() && triggers_.back().seq > scan.seq;
+    const double patience = later_came ? options_.max_overtake : options_.max_delay;
+    if (!finishing_ && now_ - scan.record <= patience) return Decision::kWait;
     if (counting_ == Counting::kAlike && ++unmatched_ < kUnmatchedMeansUnlike) return Decision::kGiveUp;
     if (counting_ == Counting::kUnknown && !finishing_) {
       // Its trigger may have been sent before the first message: that says nothing about how they count. Then

@@ -56,6 +56,7 @@ StampingOptions stampingOptions(const Config& config);
 ///    `max_overtake` after it;
 ///  - else, once it is clear that the two do not count alike, by time: the trigger nearest to the header's
 ///    stamp, within half a trigger period; where that stamp is zero, the latest recorded before the scan.
+///  A scan waits `max_delay` for its trigger, and `max_overtake` once a later trigger came.
 ///  A scan that cannot be decided yet is held, and those after it wait with it, so that order is kept.
 ///  One whose trigger never comes is given up and counted; no trigger serves two scans.
 class ScanStamper {
