@@ -14,7 +14,7 @@ namespace rio_t {
 void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
   const auto start = std::chrono::steady_clock::now();
   monitor_.imu();
-  imu_rate_->task.tick();
+  imu_rate_->tick();
   try {
     const ImuMeasurement imu =
         toImuMeasurement(*event.getConstMessage(), config_.imu_topic, config_.imu_units);
@@ -81,7 +81,7 @@ void LiveOdometry::onScan(std::size_t radar, const Event<sensor_msgs::PointCloud
   const sensor_msgs::PointCloud2& message = *event.getConstMessage();
   Radar& from = radars_[radar];
   monitor_.scan(radar);
-  from.scan_rate->task.tick();
+  from.scan_rate->tick();
   std::string what = "cloud_not_usable";  // each has its own turn to be told
   try {
     DecodedScan decoded;
@@ -125,7 +125,7 @@ void LiveOdometry::onPressure(const Event<sensor_msgs::FluidPressure>& event) {
 
 void LiveOdometry::onTrigger(std::size_t radar, const Event<std_msgs::Header>& event) {
   monitor_.trigger(radar);
-  radars_[radar].trigger_rate->task.tick();
+  radars_[radar].trigger_rate->tick();
   const Session now = session_.get();
   if (!now) return;
   const std_msgs::Header& trigger = *event.getConstMessage();

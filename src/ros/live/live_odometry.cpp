@@ -197,7 +197,7 @@ void LiveOdometry::onDiagnosticsTimer() {
   // Before there is an odometry, its silence is no fault.
   if (published > 0 && !odom_rate_)
     odom_rate_ = std::make_unique<TopicRate>(private_node_.resolveName("odom"), *diagnostics_);
-  for (; published > 0; --published) odom_rate_->task.tick();
+  for (; published > 0; --published) odom_rate_->tick();
   // Not update(), which looks at ROS time: also a clock that stands still is worth a diagnosis.
   diagnostics_->force_update();
   tellFaults();

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <diagnostic_updater/diagnostic_updater.h>
-#include <diagnostic_updater/publisher.h>
 #include <dynamic_reconfigure/server.h>
 #include <ros/callback_queue.h>
 #include <ros/message_event.h>
@@ -18,7 +17,6 @@
 #include <chrono>
 #include <condition_variable>
 #include <deque>
-#include <limits>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -33,6 +31,7 @@
 #include "rio_t/ros/live/monitor.h"
 #include "rio_t/ros/live/publisher.h"
 #include "rio_t/ros/live/session.h"
+#include "rio_t/ros/live/topic_rate.h"
 
 namespace rio_t {
 
@@ -63,15 +62,6 @@ class LiveOdometry {
   struct Received {
     ImuMeasurement imu;
     Time record;  ///< of receipt
-  };
-
-  /// How often a topic comes, for `diagnostics`. Silence is an error, any rate is right.
-  struct TopicRate {
-    TopicRate(const std::string& topic, diagnostic_updater::Updater& updater)
-        : task(topic, updater, {&least, &most, 0.0}) {}
-
-    double least = 0.0, most = std::numeric_limits<double>::infinity();  // [Hz]
-    diagnostic_updater::HeaderlessTopicDiagnostic task;                  // tick() is thread-safe
   };
 
   struct Radar {
