@@ -3,7 +3,7 @@
 checks that nothing is lost, that the result is as good, and how long it took.
 
 usage: bench/live_against_bag.py BAG CONFIG [--rate R] [--nodelet] [--no-clock] [--set key=value]...
-in a sourced workspace, e.g. after `source build/devel/setup.bash`
+in a sourced workspace, e.g. after `source devel/setup.bash`
 
 Exit status 1 where a check fails. Latencies are judged at rate 1 only: other rates are not what a robot has.
 """

@@ -3,8 +3,8 @@
 # behaviour sanitizers (clang's libFuzzer).
 #   scripts/fuzz.sh [SECONDS]    for that long, else 600
 # Starts from fuzz/corpus/; what is found on the way stays in a temporary folder. An input that breaks something is kept
-# in build-fuzz/findings/ and named; exit status 1 then.
-# RIO_T_BUILD_DIR: the build folder, else build-fuzz/.
+# in build/fuzz/findings/ and named; exit status 1 then.
+# RIO_T_BUILD_DIR: the build folder, else build/fuzz/.
 set -euo pipefail
 case "${1:-}" in -h | --help) sed -n '2,8s/^# \?//p' "$0"; exit 0 ;; esac
 seconds=${1:-600}
@@ -14,7 +14,7 @@ if ! [[ $seconds =~ ^[1-9][0-9]*$ ]]; then
 fi
 cd "$(dirname "$0")/.."
 export PATH=/usr/bin:$PATH
-build=${RIO_T_BUILD_DIR:-build-fuzz}
+build=${RIO_T_BUILD_DIR:-build/fuzz}
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 

@@ -2,12 +2,12 @@
 # catkin_lint over the package, clang-format, clang-tidy and cppcheck over our sources; exit status 1 at any finding.
 #   scripts/lint.sh            all
 #   scripts/lint.sh FILE...    these sources only
-# RIO_T_BUILD_DIR: where the compile commands are made, else build-lint/.
+# RIO_T_BUILD_DIR: where the compile commands are made, else build/lint/.
 set -euo pipefail
 case "${1:-}" in -h | --help) sed -n '2,5s/^# \?//p' "$0"; exit 0 ;; esac
 cd "$(dirname "$0")/.."
 export PATH=/usr/bin:$PATH
-build=${RIO_T_BUILD_DIR:-build-lint}
+build=${RIO_T_BUILD_DIR:-build/lint}
 scripts/install_dependencies.sh clang-format-14 clang-tidy-14 clang-14 cppcheck catkin-lint
 
 # The messages' headers are all that must be made.

@@ -4,7 +4,7 @@
 #   scripts/sanitize.sh thread    data races, misuse of locks
 #   scripts/sanitize.sh address   memory errors, leaks, undefined behaviour
 # Exit status 1 where a test fails or a report comes. What is not reported, and why: scripts/sanitizers/.
-# RIO_T_BUILD_DIR: the build folder, else build-thread/ or build-address/.
+# RIO_T_BUILD_DIR: the build folder, else build/thread/ or build/address/.
 set -euo pipefail
 kind=${1:-}
 case "$kind" in
@@ -15,7 +15,7 @@ case "$kind" in
 esac
 cd "$(dirname "$0")/.."
 export PATH=/usr/bin:$PATH
-export RIO_T_BUILD_DIR=${RIO_T_BUILD_DIR:-build-$kind}
+export RIO_T_BUILD_DIR=${RIO_T_BUILD_DIR:-build/$kind}
 suppressions=$PWD/scripts/sanitizers
 
 # Without NDEBUG: Eigen checks its sizes and indices.
