@@ -6,6 +6,7 @@
 #include "rio_t/core/so3.h"
 #include "rio_t/factors/radar_velocity_factor.h"
 #include "rio_t/factors/state_block.h"
+#include "synthetic_motion.h"
 
 /// A state, a measurement and a mounting in general position, for tests of factors.
 namespace rio_t {
@@ -34,6 +35,10 @@ inline const std::vector<double>& storedMounting() {
   static const Eigen::VectorXd x = stored(mounting());
   static const std::vector<double> values(x.data(), x.data() + x.size());
   return values;
+}
+
+inline RadarMotionModel imuModel(const ImuBuffer& imu, double max_time_offset = 0.25) {
+  return {TimeOffsetModel::kImu, max_time_offset, SyntheticMotion().g_W, &imu};
 }
 
 }  // namespace rio_t

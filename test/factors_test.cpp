@@ -123,9 +123,6 @@ TEST(ImuFactor, TransitionSaysTheSameAsTheFactor) {
   EXPECT_LT((T_i + T_j * step.A).norm(), 1e-6 * T_i.norm());
 }
 
-RadarMotionModel imuModel(const ImuBuffer& imu, double max_time_offset = 0.25) {
-  return {TimeOffsetModel::kImu, max_time_offset, SyntheticMotion().g_W, &imu};
-}
 RadarMotionModel constantAcceleration(const ImuBuffer& imu) {
   return {TimeOffsetModel::kConstantAcceleration, 0.25, SyntheticMotion().g_W, &imu};
 }
