@@ -47,9 +47,11 @@ class PacedPlayer:
         self._stopping, self._error = threading.Event(), None
         self._unanswered = {topic: collections.deque() for topic in answers}  # (time in the bag, stamp) of scans
         self._answers_before = {topic: len(listener.messages[answer]) for topic, answer in answers.items()}
+        # All without a queue: publishing returns when the sockets have taken the message. A late clock would give a trigger
+        # and its scan times of receipt that do not fit.
         self._clock = None
         if rospy.get_param("/use_sim_time", False):
-            self._clock = rospy.Publisher("/clock", Clock, queue_size=1000)
+            self._clock = rospy.Publisher("/clock", Clock, queue_size=None)
         self._publishers = {}
         self._thread = threading.Thread(target=self._run)
 
@@ -87,7 +89,6 @@ class PacedPlayer:
         for connection in bag._get_connections(list(self._topics)):
             name = self._topics[connection.topic]
             kind = raw_kind(connection.datatype, connection.md5sum, connection.msg_def)
-            # Without a queue: publishing returns when the sockets have taken the message.
             self._publishers[connection.topic] = rospy.Publisher(name, kind, queue_size=None)
         missing = set(self._topics) - set(self._publishers)
         if missing:
