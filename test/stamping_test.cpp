@@ -192,6 +192,20 @@ TEST(Stamping, ATriggerIsNotGivenUpWhileTheImuRunsAhead) {
   EXPECT_TRUE(stamper.givenUp().empty());
 }
 
+TEST(Stamping, ATriggerThatComes100MsAfterItsScanIsItsTriggerOnceTheyCountAlike) {
+  for (const bool known : {true, false}) {
+    ScanStamper stamper(options(StampSource::kTrigger));
+    if (known) {
+      stamper.addTrigger(7, imuTime(0.0), recordTime(0.0));
+      stamper.addScan(7, Time(), recordTime(0.09), RadarScan());
+      EXPECT_EQ(stamper.take().size(), 1u);
+    }
+    stamper.addScan(8, Time(), recordTime(0.19), RadarScan());
+    stamper.addTrigger(8, imuTime(0.1), recordTime(0.29));
+    EXPECT_EQ(seconds(stamper.take()), known ? std::vector<double>{0.1} : std::vector<double>{});
+  }
+}
+
 TEST(Stamping, UnlikeSeqsPairTheLatestTriggerBeforeTheArrival) {
   ScanStamper stamper(options(StampSource::kTrigger));
   const std::vector<double> stamps = seconds(runTriggers(stamper, 0.05, 4000, false));

@@ -130,9 +130,12 @@ ScanStamper::Decision ScanStamper::stampFront(Time* stamp) {
 
 ScanStamper::Trigger* ScanStamper::triggerOfSeq(const Held& scan) {
   Trigger* found = nullptr;
+  // A busy machine delivers connections in any order. Once the two are known to count alike, the seq is
+  // enough.
+  const double overtake = counting_ == Counting::kAlike ? options_.max_delay : options_.max_overtake;
   for (Trigger& trigger : triggers_) {
     const double delay = scan.record - trigger.record;
-    if (trigger.seq != scan.seq || delay < -options_.max_overtake || delay > options_.max_delay) continue;
+    if (trigger.seq != scan.seq || delay < -overtake || delay > options_.max_delay) continue;
     if (found != nullptr) {  // a seq that does not count, e.g. always zero
       counting_ = Counting::kUnlike;
       return nullptr;
@@ -152,8 +155,8 @@ ScanStamper::Decision ScanStamper::stampFromTrigger(const Held& scan, Time* stam
     return Decision::kStamped;
   }
   if (counting_ != Counting::kUnlike) {
-    // The threads of a busy node may hand over the IMU, the scan and its trigger in another order than they came.
-    // Triggers keep their own order, so a later one says that the scan's will not come.
+    // The threads of a busy node may hand over the IMU, the scan and its trigger in another order than they
+    // came. Triggers keep their own order, so a later one says that the scan's will not come.
     const bool later_came = !triggers_.empty() && triggers_.back().seq > scan.seq;
     const double patience = later_came ? options_.max_overtake : options_.max_delay;
     if (!finishing_ && now_ - scan.record <= patience) return Decision::kWait;

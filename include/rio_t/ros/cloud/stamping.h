@@ -53,7 +53,7 @@ StampingOptions stampingOptions(const Config& config);
 /// arrival: the time of receipt, carried over by ClockMap.
 /// trigger: the stamp of the scan's trigger, found
 ///  - by `seq`, where one trigger with the scan's seq was recorded between `max_delay` before the scan and
-///    `max_overtake` after it;
+///    `max_overtake` after it (`max_delay` after it, once triggers and scans are known to count alike);
 ///  - else, once it is clear that the two do not count alike, by time: the trigger nearest to the header's
 ///    stamp, within half a trigger period; where that stamp is zero, the latest recorded before the scan.
 ///  A scan waits `max_delay` for its trigger, and `max_overtake` once a later trigger came.
