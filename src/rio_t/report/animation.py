@@ -1,12 +1,13 @@
 """The run as a moving picture: its path from above, and beside it the time offset with its band of 3 sigma."""
 import numpy as np
-from matplotlib.animation import FuncAnimation, PillowWriter
+from PIL import Image
 
 from ..errors import RioTError
 from ..plots import pyplot, tidy
 from .figures import ESTIMATE, TRUTH
 
 FRAMES, FRAMES_PER_SECOND = 80, 10
+COLOURS = 64  # a palette that all frames share: each then stores what changed, also with an old Pillow
 SIGMAS = 3
 
 
@@ -59,5 +60,12 @@ def write_animation(path, track, offset, true_offset=None):
         if row.any():
             text.set_text(f"{value[row][-1]:.2f} ms, sigma {sigma[row][-1]:.2f} ms")
 
-    FuncAnimation(figure, draw, frames=frame_times(time)).save(path, writer=PillowWriter(fps=FRAMES_PER_SECOND))
+    images = []
+    for now in frame_times(time):
+        draw(now)
+        figure.canvas.draw()
+        images.append(Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB"))
     pyplot.close(figure)
+    palette = images[-1].quantize(COLOURS)  # the last frame shows everything
+    first, *others = [image.quantize(palette=palette, dither=0) for image in images]
+    first.save(path, save_all=True, append_images=others, duration=1000 // FRAMES_PER_SECOND, loop=0)
