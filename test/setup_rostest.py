@@ -3,6 +3,7 @@
 import os
 import pathlib
 import shutil
+import unittest
 
 import dynamic_reconfigure.client
 import numpy
@@ -191,6 +192,8 @@ class SetupTest(tester.LiveTestCase):
             for covariance in (message.pose.covariance, message.twist.covariance):
                 self.assertGreater(numpy.linalg.eigvalsh(numpy.array(covariance).reshape(6, 6))[0], 0.0)
 
+    @unittest.skipIf("bullseye" in pathlib.Path("/etc/os-release").read_text(),
+                     "the aggregator of Debian 11 does not find its own plugins")
     def test_diagnostics_aggregator(self):
         rospy.set_param("/use_sim_time", False)  # the aggregator publishes by the clock, and no bag gives one
         statuses = {}
