@@ -11,6 +11,12 @@ build=$(realpath -m -- "${RIO_T_BUILD_DIR:-build}")
 temporary=$(mktemp -d)
 trap 'rm -rf "$temporary"' EXIT
 
+prefix=$(sed -n 's/^CMAKE_INSTALL_PREFIX:PATH=//p' "$build/CMakeCache.txt")
+if [ "$prefix" != "$build/install" ]; then
+  echo "test_install.sh: $build installs into $prefix, expected $build/install: remove the build folder and build again" >&2
+  exit 1
+fi
+
 # Never inside of the sources: roslaunch would find each launch file twice. In the namespace the folder comes to its prefix.
 installed=$temporary/destination$build/install
 DESTDIR=$temporary/destination cmake --build "$build" --target install >"$temporary/install.log" 2>&1 || { tail -n 30 "$temporary/install.log" >&2; exit 1; }
