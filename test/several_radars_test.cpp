@@ -63,8 +63,8 @@ TEST(TwoRadars, EachHasItsOffset) {
   }
 }
 
-// A live node takes the IMU samples in bunches, as threads happen to run; the bag runner one by one. The two offsets
-// differ, so the scans do not get ready in the order in which they come.
+// A live node takes the IMU samples in bunches, as threads happen to run; the bag runner one by one. The two
+// offsets differ, so the scans do not get ready in the order in which they come.
 TEST(TwoRadars, AreUsedInTheSameOrderHoweverTheImuComes) {
   SimulatedRun one_by_one = pair("difficult", 1, 20.0);
   SimulatedRun bunched = pair("difficult", 1, 20.0);

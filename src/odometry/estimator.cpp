@@ -221,9 +221,7 @@ std::vector<StampedPose> Estimator::marginalize() {
   return left;
 }
 
-Time Estimator::nodeTime(const RadarScan& scan) const {
-  return radars_.at(scan.radar).nodeTime(scan.stamp);
-}
+Time Estimator::nodeTime(const RadarScan& scan) const { return radars_.at(scan.radar).nodeTime(scan.stamp); }
 
 bool Estimator::mustWait(const RadarScan& scan) const {
   if (!initialized()) return false;
