@@ -22,7 +22,7 @@ packages=(
   librostest-dev libgtest-dev libbenchmark-dev
   # rosrun, rosbag play, the nodelet manager, rviz, and messages for Python: rostopic echo and the rostests
   rosbash rospack-tools python3-roslaunch python3-rosbag python3-rostest python3-rostopic python3-rosservice rosout libnodeletlib-tools rviz
-  python3-nav-msgs python3-diagnostic-msgs python3-std-srvs python3-tf2-msgs python3-sensor-msgs python3-nodelet
+  python3-nav-msgs python3-diagnostic-msgs python3-std-srvs python3-tf2-msgs python3-sensor-msgs python3-rosgraph-msgs python3-nodelet
   python3-dynamic-reconfigure libdiagnostic-aggregator-tools libdiagnostic-aggregator-dev ros-robot-state-publisher
   python3-numpy python3-matplotlib python3-pil python3-scipy python3-tqdm python3-yaml python3-setuptools python3-pytest
 )

@@ -142,7 +142,7 @@ TEST(SeveralRadars, OneCanBeTakenOutAndItsSectionStays) {
   const Config left = makeConfig(entriesWith({"radars=[left]"}));
   ASSERT_EQ(configsOfRadars(left).size(), 1U);
   EXPECT_EQ(configsOfRadars(left).front().radar_topic, "/l");
-  // What stands there is checked all the same.
+  // The parser checks the section of a radar that is taken out, too.
   EXPECT_THROW(makeConfig(entriesWith({"radars=[left]", "right/radar_tpic=/x"})), ConfigError);
   EXPECT_THROW(makeConfig(entriesWith({"radars=[left]", "middle/radar_topic=/x"})), ConfigError);
 }

@@ -8,22 +8,16 @@
 namespace rio_t {
 namespace {
 
-std::string decimal(double value, int decimals) {
-  std::string text;
-  appendFixed(&text, value, decimals);
-  return text;
-}
-
 std::string describeStep(const DopplerStep& step) {
   switch (step.source) {
     case DopplerStepSource::kUnknown:
-      return "not known: too few points that move; " + decimal(step.value, 3) + " m/s was taken";
+      return "not known: too few points that move; " + fixedText(step.value, 3) + " m/s was taken";
     case DopplerStepSource::kGiven:
-      return decimal(step.value, 3) + " m/s, given";
+      return fixedText(step.value, 3) + " m/s, given";
     case DopplerStepSource::kData:
       break;
   }
-  return (step.value > 0.0 ? decimal(step.value, 3) + " m/s" : std::string("none")) + ", from the data";
+  return (step.value > 0.0 ? fixedText(step.value, 3) + " m/s" : std::string("none")) + ", from the data";
 }
 
 std::string describeScans(std::uint64_t used, std::uint64_t total,
@@ -35,7 +29,8 @@ std::string describeScans(std::uint64_t used, std::uint64_t total,
 
 /// "1.20 -0.30 0.05", in the unit of which there are `per` in one of `v`.
 std::string decimals(const Eigen::Vector3d& v, double per, int count) {
-  return decimal(per * v.x(), count) + " " + decimal(per * v.y(), count) + " " + decimal(per * v.z(), count);
+  return fixedText(per * v.x(), count) + " " + fixedText(per * v.y(), count) + " " +
+         fixedText(per * v.z(), count);
 }
 
 using Row = std::function<void(const std::string& name, const std::string& value)>;
@@ -44,7 +39,7 @@ void describePasses(const RadarSummary& radar, const Row& row) {
   if (radar.pass_offsets_s.empty()) return;
   std::string offsets;
   for (const double offset : radar.pass_offsets_s)
-    offsets += (offsets.empty() ? "" : ", ") + decimal(1e3 * offset, 2);
+    offsets += (offsets.empty() ? "" : ", ") + fixedText(1e3 * offset, 2);
   row("after passes", offsets + " ms");
 }
 
@@ -61,12 +56,12 @@ void describeExtrinsics(const ExtrinsicsSummary& extrinsics, const Row& row) {
 }
 
 void describeRadar(const RadarSummary& radar, const Row& row) {
-  row("time offset", decimal(1e3 * radar.final_offset_s, 2) + " ms, sigma " +
-                         decimal(1e3 * radar.final_offset_sigma_s, 2) + " ms");
+  row("time offset", fixedText(1e3 * radar.final_offset_s, 2) + " ms, sigma " +
+                         fixedText(1e3 * radar.final_offset_sigma_s, 2) + " ms");
   if (radar.extrinsics) describeExtrinsics(*radar.extrinsics, row);
-  row("radar noise", "Doppler " + decimal(std::sqrt(radar.noise.doppler), 3) + " m/s, azimuth " +
-                         decimal(std::sqrt(radar.noise.azimuth), 3) + " rad, elevation " +
-                         decimal(std::sqrt(radar.noise.elevation), 3) + " rad");
+  row("radar noise", "Doppler " + fixedText(std::sqrt(radar.noise.doppler), 3) + " m/s, azimuth " +
+                         fixedText(std::sqrt(radar.noise.azimuth), 3) + " rad, elevation " +
+                         fixedText(std::sqrt(radar.noise.elevation), 3) + " rad");
   row("Doppler step", describeStep(radar.doppler_step));
 }
 
@@ -78,7 +73,7 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
     table += "  " + name + std::string(name.size() < 15 ? 16 - name.size() : 1, ' ') + value + "\n";
   };
   const auto percent = [&](double metres) {
-    return summary.path_length_m > 0.1 ? " (" + decimal(100.0 * metres / summary.path_length_m, 2) + " %)"
+    return summary.path_length_m > 0.1 ? " (" + fixedText(100.0 * metres / summary.path_length_m, 2) + " %)"
                                        : std::string();
   };
   if (summary.batch) {
@@ -89,16 +84,16 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
   }
   const bool one_radar = summary.radars.size() == 1;
   if (one_radar) describePasses(summary.radars.front(), row);
-  row("path", decimal(summary.path_length_m, 2) + " m");
-  row("end to start", decimal(summary.end_to_start_2d_m, 3) + " m" + percent(summary.end_to_start_2d_m) +
-                          " horizontal, " + decimal(summary.end_to_start_3d_m, 3) + " m" +
+  row("path", fixedText(summary.path_length_m, 2) + " m");
+  row("end to start", fixedText(summary.end_to_start_2d_m, 3) + " m" + percent(summary.end_to_start_2d_m) +
+                          " horizontal, " + fixedText(summary.end_to_start_3d_m, 3) + " m" +
                           percent(summary.end_to_start_3d_m) + " in 3D");
   if (one_radar) describeRadar(summary.radars.front(), row);
   if (summary.truth) {
-    std::string errors = "ATE " + decimal(summary.truth->ate_m, 3) + " m";
+    std::string errors = "ATE " + fixedText(summary.truth->ate_m, 3) + " m";
     if (summary.truth->t_rel) {
-      errors += ", t_rel " + decimal(*summary.truth->t_rel, 4) + " m/m, r_rel " +
-                decimal(*summary.truth->r_rel_deg, 3) + " deg/m";
+      errors += ", t_rel " + fixedText(*summary.truth->t_rel, 4) + " m/m, r_rel " +
+                fixedText(*summary.truth->r_rel_deg, 3) + " deg/m";
     }
     row("against truth", errors);
   }
@@ -107,7 +102,7 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
     row("barometer", std::to_string(summary.barometer->used) + " means of " +
                          std::to_string(summary.barometer->pressures) + " pressures, " +
                          std::to_string(summary.barometer->steps) + " steps, bias " +
-                         decimal(summary.barometer->bias, 2) + " m");
+                         fixedText(summary.barometer->bias, 2) + " m");
   }
   if (summary.ground_vehicle) {
     row("ground vehicle", summary.ground_vehicle->contradicted_at
@@ -144,7 +139,7 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
     describeRadar(radar, indented);
     indented("scans", describeScans(radar.scans_used, radar.scans_total, radar.scans_rejected));
   }
-  row("speed", decimal(summary.estimation_seconds, 2) + " s, " + decimal(summary.realtime_factor, 0) +
+  row("speed", fixedText(summary.estimation_seconds, 2) + " s, " + fixedText(summary.realtime_factor, 0) +
                    " times real time");
   row("files in", files.empty() ? "none; --output-dir FOLDER writes them" : files);
   const RunVerdict verdict = summary.diagnosis.verdict;

@@ -110,6 +110,12 @@ void appendFixed(std::string* text, double value, int decimals) {
   appendDigits(text, whole % divisor, decimals);
 }
 
+std::string fixedText(double value, int decimals) {
+  std::string text;
+  appendFixed(&text, value, decimals);
+  return text;
+}
+
 void appendStamp(std::string* text, Time time) {
   const std::int64_t ns = time.nanoseconds();
   if (ns < 0) text->push_back('-');

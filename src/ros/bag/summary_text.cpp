@@ -5,12 +5,6 @@
 namespace rio_t {
 namespace {
 
-std::string fixedText(double value, int decimals) {
-  std::string text;
-  appendFixed(&text, value, decimals);
-  return text;
-}
-
 std::vector<std::string> fixedTexts(const std::vector<double>& values, int decimals) {
   std::vector<std::string> texts;
   texts.reserve(values.size());

@@ -7,7 +7,7 @@
 /// Texts for people that name a radar if there are several.
 namespace rio_t {
 
-/// Where a message to people begins with what it is about, e.g. "/rio_t: radar left: ".
+/// The beginning of a message to people: it names the node and the radar, e.g. "/rio_t: radar left: ".
 inline std::string beginning(const std::string& node, const Config& radar) {
   return node + ": " + (radar.radar_name.empty() ? "" : "radar " + radar.radar_name + ": ");
 }
