@@ -93,7 +93,7 @@ ProposedConfig proposed(const ImuInspection& imu, const std::vector<RadarInspect
                        "The mounting below is coarse. The estimate starts there and refines it.");
   constexpr double kLeast = 0.05, kDefault = 0.17, kSafety = 3.0;  // [rad]
   if (all_observed && kSafety * worst < kDefault)
-    config.top_level.set("extrinsics_rotation_sigma", decimalYaml(std::max(kLeast, kSafety * worst), 2),
+    config.top_level.set("extrinsics_rotation_sigma", fixedText(std::max(kLeast, kSafety * worst), 2),
                          "Standard deviation of the mounting below [rad], with a margin.");
   if (radars.size() == 1) {
     add(radars.front().keys, &config.top_level);
@@ -149,9 +149,9 @@ constexpr Attempt kAttempts[] = {
 };
 
 std::string shareText(const RunSummary& summary) {
-  return decimalText(100.0 * static_cast<double>(summary.scansUsed()) /
-                         static_cast<double>(std::max<std::uint64_t>(1, summary.scansTotal())),
-                     0) +
+  return fixedText(100.0 * static_cast<double>(summary.scansUsed()) /
+                       static_cast<double>(std::max<std::uint64_t>(1, summary.scansTotal())),
+                   0) +
          " % of the scans used";
 }
 
@@ -159,8 +159,8 @@ std::string offsetsText(const RunSummary& summary) {
   std::string text;
   for (const RadarSummary& radar : summary.radars) {
     text += (text.empty() ? "offset " : "; ") + (radar.name.empty() ? "" : radar.name + " ") +
-            decimalText(1e3 * radar.final_offset_s, 1) + " +- " +
-            decimalText(1e3 * radar.final_offset_sigma_s, 1) + " ms";
+            fixedText(1e3 * radar.final_offset_s, 1) + " +- " +
+            fixedText(1e3 * radar.final_offset_sigma_s, 1) + " ms";
   }
   return text;
 }
@@ -172,7 +172,7 @@ void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
     return;
   }
   const RunSummary& s = trial.summary;
-  const std::string numbers = shareText(s) + ", " + decimalText(s.path_length_m, 1) + " m, " + offsetsText(s);
+  const std::string numbers = shareText(s) + ", " + fixedText(s.path_length_m, 1) + " m, " + offsetsText(s);
   if (trial.good()) {
     check->findings.push_back({note.empty() ? FindingLevel::kOk : FindingLevel::kOdd, "trial run",
                                "no divergence, " + numbers + note});
@@ -321,8 +321,8 @@ BagCheck checkBag(const std::string& bag, const CheckRequest& request) {
   const Recording recording = readRecording(bag, request.duration);
   if (recording.read < recording.length)
     check.findings.push_back({FindingLevel::kOk, "bag",
-                              "the first " + decimalText(recording.read, 0) + " of " +
-                                  decimalText(recording.length, 0) + " s were read (--duration)"});
+                              "the first " + fixedText(recording.read, 0) + " of " +
+                                  fixedText(recording.length, 0) + " s were read (--duration)"});
   const ImuTopic* imu_topic = chooseImu(recording, request);
   if (imu_topic == nullptr) {
     missing("IMU", "the bag has no topic of type sensor_msgs/Imu; it has " + topicsOf(recording),

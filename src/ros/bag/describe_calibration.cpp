@@ -28,12 +28,6 @@ constexpr std::array<AxisText, kCalibrationAxes> kAxes = {{
     {"lever arm z", "mm", 1e3, 1},
 }};
 
-std::string decimal(double value, int decimals) {
-  std::string text;
-  appendFixed(&text, value, decimals);
-  return text;
-}
-
 std::string padded(const std::string& text, std::size_t width, bool to_the_right) {
   const std::string blanks(text.size() < width ? width - text.size() : 0, ' ');
   return to_the_right ? blanks + text : text + blanks;
@@ -42,7 +36,7 @@ std::string padded(const std::string& text, std::size_t width, bool to_the_right
 std::string axisRow(std::size_t axis, const AxisCalibration& values) {
   const AxisText& text = kAxes[axis];
   const auto column = [&](double value) {
-    return padded(decimal(text.per * value, text.decimals), 10, true);
+    return padded(fixedText(text.per * value, text.decimals), 10, true);
   };
   std::string row = "  " + padded(text.name, 14, false) + padded(text.unit, 4, false) + column(values.told) +
                     column(values.found) + column(values.sigma) + "   " + toString(values.verdict);
@@ -58,13 +52,13 @@ std::string remarks(const CalibratedRadar& radar) {
     constexpr double kFar = 3.0;
     const double far = radar.calibration.axes[axis].farFromTold();
     if (far < kFar) continue;
-    text += std::string("  The ") + kAxes[axis].name + " is " + decimal(far, 1) +
+    text += std::string("  The ") + kAxes[axis].name + " is " + fixedText(far, 1) +
             " sigma away from it, by the given sigma: are topic, axes, signs and units right?\n";
   }
   if (!radar.calibration.offsets_agree) {
     std::string offsets;
     for (const OffsetEstimate& offset : radar.offsets)
-      offsets += (offsets.empty() ? "" : ", ") + decimal(1e3 * offset.t_O, 2) + " ms";
+      offsets += (offsets.empty() ? "" : ", ") + fixedText(1e3 * offset.t_O, 2) + " ms";
     text += "  The offset differs between the bags: " + offsets +
             "; a driver's restart may change it.\n"
             "  Found is their mean, and its sigma covers the differences.\n";
@@ -72,8 +66,8 @@ std::string remarks(const CalibratedRadar& radar) {
   const Agreement& extrinsics = radar.calibration.extrinsics_agreement;
   if (!extrinsics.agree()) {
     text += "  The mounting differs between the bags by more than the sigmas say: chi-squared " +
-            decimal(extrinsics.chi_squared, 1) + " with " + std::to_string(extrinsics.degrees_of_freedom) +
-            " degrees of freedom.\n  The sigmas are " + decimal(extrinsics.widening(), 1) +
+            fixedText(extrinsics.chi_squared, 1) + " with " + std::to_string(extrinsics.degrees_of_freedom) +
+            " degrees of freedom.\n  The sigmas are " + fixedText(extrinsics.widening(), 1) +
             " times as wide for that.\n";
   }
   return text;
@@ -82,7 +76,7 @@ std::string remarks(const CalibratedRadar& radar) {
 /// The mounting found, as mounting_yaw_pitch_roll_deg has it.
 std::string mountingWords(const CalibratedRadar& radar) {
   const MountingAngles found = mountingOf(radar.calibration.T_IR.q_IR);
-  const auto degrees = [](double angle) { return decimal(kDegreesPerRadian * angle, 1); };
+  const auto degrees = [](double angle) { return fixedText(kDegreesPerRadian * angle, 1); };
   return "  mounting: yaw " + degrees(found.yaw) + " (left), pitch " + degrees(found.pitch) + " (up), roll " +
          degrees(found.roll) + " (right side down) deg, seen from x forward, y left, z up of the IMU\n";
 }

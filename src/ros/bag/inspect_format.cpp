@@ -78,12 +78,6 @@ std::vector<double> valuesOf(const CloudTopic& topic, PointCloudFormat format, c
   return values;
 }
 
-std::string decimal(double value, int decimals) {
-  std::string text;
-  appendFixed(&text, value, decimals);
-  return text;
-}
-
 /// Nobody's preset: names, one by one.
 void guessFormat(const std::vector<std::string>& fields, FormatProposal* proposal) {
   const std::string doppler = fieldLike(fields, {"doppler", "radial_speed", "range_rate", "rangerate",
@@ -151,7 +145,7 @@ void findPower(const CloudTopic& topic, FormatProposal* proposal) {
   const double median = quantile(values, 0.5);
   const bool constant = quantile(values, 0.0) == quantile(values, 1.0);
   const PowerUnit unit = constant ? PowerUnit::kNotSnr : unitOf(median, format.power_unit);
-  const std::string said = "the values of " + format.power + " have the median " + decimal(median, 1);
+  const std::string said = "the values of " + format.power + " have the median " + fixedText(median, 1);
   if (unit != format.power_unit) {
     proposal->keys.set("radar_power_unit", toString(unit),
                        "As " + toString(format.power_unit) + " they make no sense: " + said);
@@ -167,11 +161,11 @@ void findPower(const CloudTopic& topic, FormatProposal* proposal) {
   for (const RadarScan& scan : decodeAll(topic, proposal->format)) {
     for (const RadarPoint& point : scan.points) decibels.push_back(point.snr_db);
   }
-  proposal->power = "SNR " + decimal(quantile(decibels, 0.1), 0) + " to " +
-                    decimal(quantile(decibels, 0.9), 0) + " dB in " + format.power;
+  proposal->power = "SNR " + fixedText(quantile(decibels, 0.1), 0) + " to " +
+                    fixedText(quantile(decibels, 0.9), 0) + " dB in " + format.power;
   constexpr double kDefaultMinimum = 3.0, kFew = 0.2;  // [dB]
   if (quantile(decibels, kFew) < kDefaultMinimum) {
-    proposal->keys.set("radar_min_snr_db", decimalYaml(std::floor(quantile(decibels, 0.02)), 1),
+    proposal->keys.set("radar_min_snr_db", fixedText(std::floor(quantile(decibels, 0.02)), 1),
                        "More than a fifth of the points are below the default, 3 dB.");
     proposal->odd.push_back("a fifth of the points have less than 3 dB, so radar_min_snr_db is lowered");
   }

@@ -14,10 +14,10 @@ std::string axisName(const Eigen::Vector3d& direction) {
 }
 
 std::string rateText(const StreamTiming& timing) {
-  std::string text = decimalText(timing.rate, timing.rate < 20.0 ? 1 : 0) + " Hz";
+  std::string text = fixedText(timing.rate, timing.rate < 20.0 ? 1 : 0) + " Hz";
   if (timing.gaps > 0)
     text +=
-        ", gaps: " + std::to_string(timing.gaps) + " (longest " + decimalText(timing.longest_gap, 2) + " s)";
+        ", gaps: " + std::to_string(timing.gaps) + " (longest " + fixedText(timing.longest_gap, 2) + " s)";
   if (timing.duplicates > 0) text += ", duplicate stamps: " + std::to_string(timing.duplicates);
   if (timing.backwards > 0) text += ", stamps that run back: " + std::to_string(timing.backwards);
   return text;
@@ -47,9 +47,9 @@ void describe(ImuInspection* imu) {
   const bool in_degrees = r.units.rate == RateUnit::kDegreesPerSecond;
   if (in_g) {
     imu->keys.set("imu_acceleration_unit", "g",
-                  "The median size of the acceleration is " + decimalText(r.written_norm, 2) + ".");
+                  "The median size of the acceleration is " + fixedText(r.written_norm, 2) + ".");
     tell(FindingLevel::kOdd, "IMU unit",
-         "the acceleration is in g (median size " + decimalText(r.written_norm, 2) + "), not in m/s^2");
+         "the acceleration is in g (median size " + fixedText(r.written_norm, 2) + "), not in m/s^2");
   }
   if (in_degrees) {
     imu->keys.set("imu_rate_unit", "deg/s", "The turns of gravity fit these rates only in degrees.");
@@ -58,7 +58,7 @@ void describe(ImuInspection* imu) {
   for (const std::string& fault : {r.acceleration_fault, r.rate_fault}) {
     if (fault.empty()) continue;
     tell(FindingLevel::kMissing, "IMU",
-         fault + " (median size as written " + decimalText(r.written_norm, 2) + ")");
+         fault + " (median size as written " + fixedText(r.written_norm, 2) + ")");
     imu->to_do =
         "Set the IMU driver to raw acceleration in m/s^2 and angular velocity in rad/s, with the axes of "
         "one right-handed frame, and record again.";
@@ -66,12 +66,12 @@ void describe(ImuInspection* imu) {
   if (r.rests_at_start) {
     const double norm = r.rest_acceleration.norm();
     tell(std::abs(norm - 9.81) < 0.3 ? FindingLevel::kOk : FindingLevel::kOdd, "rest",
-         "at rest from " + decimalText(r.rest_begin, 1) + " s; gravity " + decimalText(norm, 2) +
+         "at rest from " + fixedText(r.rest_begin, 1) + " s; gravity " + fixedText(norm, 2) +
              " m/s^2, up is " + axisName(r.rest_acceleration) + "; gyro bias " +
-             decimalText(r.rest_rate.norm(), 4) + " rad/s");
+             fixedText(r.rest_rate.norm(), 4) + " rad/s");
     if (std::abs(norm - 9.81) > 0.45)
-      imu->keys.set("init_max_gravity_error", decimalYaml(std::abs(norm - 9.81) + 0.5, 1),
-                    "At rest the accelerometer shows " + decimalText(norm, 2) + " m/s^2.");
+      imu->keys.set("init_max_gravity_error", fixedText(std::abs(norm - 9.81) + 0.5, 1),
+                    "At rest the accelerometer shows " + fixedText(norm, 2) + " m/s^2.");
   } else {
     tell(FindingLevel::kOdd, "rest",
          "no rest in the first 10 s, so the odometry starts in motion; 3 s at rest give a better start");
@@ -80,23 +80,20 @@ void describe(ImuInspection* imu) {
   const double vibration = r.accel_density_median / std::max(r.accel_density_quiet, 1e-9);
   const bool vibrates = r.accel_density_median > 0.04;
   tell(vibrates ? FindingLevel::kOdd : FindingLevel::kOk, "noise",
-       "accelerometer " + decimalText(r.accel_density_quiet, 4) + " m/s^2/sqrt(Hz)" +
-           (vibration > 2.0 ? ", in motion " + decimalText(r.accel_density_median, 4) : "") + "; gyro " +
-           decimalText(r.gyro_density_quiet, 5) + " rad/s/sqrt(Hz)" +
+       "accelerometer " + fixedText(r.accel_density_quiet, 4) + " m/s^2/sqrt(Hz)" +
+           (vibration > 2.0 ? ", in motion " + fixedText(r.accel_density_median, 4) : "") + "; gyro " +
+           fixedText(r.gyro_density_quiet, 5) + " rad/s/sqrt(Hz)" +
            (vibrates ? ": the frame vibrates; mount the IMU softer if you can" : ""));
   if (r.saturated > 0)
     tell(FindingLevel::kOdd, "range",
          std::to_string(r.saturated) + " samples are at the end of the range (largest " +
-             decimalText(r.largest_acceleration, 1) + " m/s^2, " + decimalText(r.largest_rate, 2) +
-             " rad/s)");
+             fixedText(r.largest_acceleration, 1) + " m/s^2, " + fixedText(r.largest_rate, 2) + " rad/s)");
   if (r.not_finite > 0)
     tell(FindingLevel::kOdd, "IMU",
          std::to_string(r.not_finite) + " samples are not finite; they are left out");
 }
 
 }  // namespace
-
-std::string decimalText(double value, int decimals) { return decimalYaml(value, decimals); }
 
 ImuInspection inspectImuTopic(const ImuTopic& topic) {
   ImuInspection imu;

@@ -90,11 +90,4 @@ Config readBack(const std::string& yaml) {
   return makeConfig(readParameters(stream, "proposed configuration"));
 }
 
-std::string decimalYaml(double value, int decimals) {
-  std::string text;
-  appendFixed(&text, value, decimals);
-  // Minus zero is no number that people write.
-  return text.find_first_of("123456789") == std::string::npos && text.front() == '-' ? text.substr(1) : text;
-}
-
 }  // namespace rio_t

@@ -44,7 +44,4 @@ std::string toYaml(const ProposedConfig& proposed, const std::string& header);
 /// The file as the programs read it; throws ConfigError.
 Config readBack(const std::string& yaml);
 
-/// A decimal number as YAML.
-std::string decimalYaml(double value, int decimals);
-
 }  // namespace rio_t

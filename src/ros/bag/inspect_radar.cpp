@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "rio_t/radar/mounting.h"
+#include "rio_t/ros/bag/run_output.h"
 
 namespace rio_t {
 namespace {
@@ -12,7 +13,7 @@ namespace {
 constexpr double kStraight = 3.14159265358979323846;  // [rad]
 constexpr double kDegree = 3.14159265358979323846 / 180.0;
 
-std::string degrees(double radians) { return decimalText(radians / kDegree, 0); }
+std::string degrees(double radians) { return fixedText(radians / kDegree, 0); }
 
 /// "x 1.2, y 0.9 deg; not observed about z"
 std::string sureness(const Eigen::Vector3d& sigma) {
@@ -21,7 +22,7 @@ std::string sureness(const Eigen::Vector3d& sigma) {
   for (int k = 0; k < 3; ++k) {
     const std::string axis(1, "xyz"[k]);
     if (sigma[k] < kNotObserved) {
-      known += (known.empty() ? "" : ", ") + axis + " " + decimalText(sigma[k] / kDegree, 1);
+      known += (known.empty() ? "" : ", ") + axis + " " + fixedText(sigma[k] / kDegree, 1);
     } else {
       unknown += (unknown.empty() ? "" : " and ") + axis;
     }
@@ -75,10 +76,10 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
     radar->findings.push_back({level, subject, text});
   };
   const CloudReport& c = looked.cloud;
-  std::string rate = radar->topic + ": " + decimalText(timing.rate, 1) + " Hz";
+  std::string rate = radar->topic + ": " + fixedText(timing.rate, 1) + " Hz";
   if (timing.gaps > 0)
     rate +=
-        ", gaps: " + std::to_string(timing.gaps) + " (longest " + decimalText(timing.longest_gap, 2) + " s)";
+        ", gaps: " + std::to_string(timing.gaps) + " (longest " + fixedText(timing.longest_gap, 2) + " s)";
   if (timing.duplicates > 0 && timing.zero == 0 && !timing.constant)
     rate += ", duplicate stamps: " + std::to_string(timing.duplicates);
   std::string presets;
@@ -90,11 +91,10 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
   const DopplerStep& step = looked.velocities.doppler_step;
   const bool sparse = c.points_50 < 15.0;
   tell(sparse ? FindingLevel::kOdd : FindingLevel::kOk, "points",
-       decimalText(c.points_10, 0) + " / " + decimalText(c.points_50, 0) + " / " +
-           decimalText(c.points_90, 0) + " a scan (10, 50, 90 %), to " + decimalText(c.range_99, 1) +
-           " m, field of view +-" + degrees(c.azimuth_95) + " by +-" + degrees(c.elevation_95) +
-           " deg, Doppler step " +
-           (step.value > 0.0 ? decimalText(step.value, 3) + " m/s" : std::string("none")) +
+       fixedText(c.points_10, 0) + " / " + fixedText(c.points_50, 0) + " / " + fixedText(c.points_90, 0) +
+           " a scan (10, 50, 90 %), to " + fixedText(c.range_99, 1) + " m, field of view +-" +
+           degrees(c.azimuth_95) + " by +-" + degrees(c.elevation_95) + " deg, Doppler step " +
+           (step.value > 0.0 ? fixedText(step.value, 3) + " m/s" : std::string("none")) +
            (sparse ? ": few points, so start at rest" : ""));
   if (!looked.velocities.has_elevation)
     tell(FindingLevel::kOdd, "points", "the radar measures no elevation: z will drift");
@@ -102,11 +102,11 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
 
 void limitsOfCloud(const CloudReport& cloud, ProposedKeys* keys) {
   if (cloud.behind > 0.02)
-    keys->set("radar_max_azimuth", "3.141592",
-              "So many points lie behind the radar's forward axis: " + decimalText(100.0 * cloud.behind, 0) +
-                  " %.");
+    keys->set(
+        "radar_max_azimuth", "3.141592",
+        "So many points lie behind the radar's forward axis: " + fixedText(100.0 * cloud.behind, 0) + " %.");
   if (cloud.range_99 > 95.0)
-    keys->set("radar_max_range", decimalYaml(std::ceil(1.2 * cloud.range_99), 1),
+    keys->set("radar_max_range", fixedText(std::ceil(1.2 * cloud.range_99), 1),
               "The radar sees farther than 100 m.");
 }
 
@@ -114,11 +114,10 @@ void describeSign(const Looked& looked, const FormatProposal& format, RadarInspe
   const MountingSearch& search = looked.search;
   const std::string field = format.format.doppler;
   const std::string by_ranges =
-      looked.sign.sign == 0 ? ""
-                            : "ranges (" + decimalText(std::abs(looked.sign.significance), 0) + " sigma)";
+      looked.sign.sign == 0 ? "" : "ranges (" + fixedText(std::abs(looked.sign.significance), 0) + " sigma)";
   const bool imu_knows = search.enough && search.sign_significance > 25.0;
   const std::string by_imu =
-      imu_knows ? "the IMU (" + decimalText(std::sqrt(search.sign_significance), 0) + " sigma)" : "";
+      imu_knows ? "the IMU (" + fixedText(std::sqrt(search.sign_significance), 0) + " sigma)" : "";
   const std::string evidence = by_ranges + (by_ranges.empty() || by_imu.empty() ? "" : " and ") + by_imu;
   if (search.mirrored) {
     radar->findings.push_back(
@@ -175,9 +174,9 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
     return;
   }
   const MountingAngles angles = mountingOf(search.q_IR);
-  const std::vector<std::string> words = {decimalYaml(angles.yaw / kDegree, 1),
-                                          decimalYaml(angles.pitch / kDegree, 1),
-                                          decimalYaml(angles.roll / kDegree, 1)};
+  const std::vector<std::string> words = {fixedText(angles.yaw / kDegree, 1),
+                                          fixedText(angles.pitch / kDegree, 1),
+                                          fixedText(angles.roll / kDegree, 1)};
   Eigen::Vector3d sigma = search.rotation_sigma;
   constexpr double kSparseSigma = 0.2;  // [rad]
   if (radar->isSparse()) sigma = (sigma.array().square() + kSparseSigma * kSparseSigma).sqrt().min(kStraight);
@@ -197,8 +196,8 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
   for (int k = 0; k < 3; ++k) {
     // Three sigma away from zero: better than zero.
     const bool found = std::abs(l[k]) > 3.0 * l_sigma[k] && l_sigma[k] < 0.3;
-    lever.push_back(decimalYaml(found ? l[k] : 0.0, 2));
-    text += (k == 0 ? "" : ", ") + decimalText(l[k], 2) + " +- " + decimalText(l_sigma[k], 2);
+    lever.push_back(fixedText(found ? l[k] : 0.0, 2));
+    text += (k == 0 ? "" : ", ") + fixedText(l[k], 2) + " +- " + fixedText(l_sigma[k], 2);
   }
   const bool any = lever[0] != "0.00" || lever[1] != "0.00" || lever[2] != "0.00";
   tell(FindingLevel::kOk, "lever arm",
@@ -208,11 +207,11 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
     radar->keys.setList("extrinsics_translation", lever,
                         "Origin of the radar in the IMU frame, roughly [m]. Measure it with a tape.");
   tell(FindingLevel::kOk, "offset",
-       decimalText(1e3 * search.offset, 0) + " +- " + decimalText(1e3 * search.offset_sigma, 0) +
+       fixedText(1e3 * search.offset, 0) + " +- " + fixedText(1e3 * search.offset_sigma, 0) +
            " ms, roughly; the odometry estimates it");
   constexpr double kFar = 0.06, kKnown = 0.03;  // [s] the estimate starts at 0 +- 0.075
   if (std::abs(search.offset) > kFar && search.offset_sigma < kKnown && !radar->isSparse())
-    radar->keys.set("time_offset_initial", decimalYaml(std::clamp(search.offset, -0.2, 0.2), 3),
+    radar->keys.set("time_offset_initial", fixedText(std::clamp(search.offset, -0.2, 0.2), 3),
                     "Found roughly, in seconds.");
 }
 

@@ -38,7 +38,4 @@ struct RadarInspection {
 };
 RadarInspection inspectRadar(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud);
 
-/// "12.3", and "+-" as "±" is not on every terminal.
-std::string decimalText(double value, int decimals);
-
 }  // namespace rio_t

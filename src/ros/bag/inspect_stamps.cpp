@@ -14,17 +14,9 @@ namespace {
 constexpr double kLargestDelay = 1.0;  // [s] of a scan, in the IMU's clock: more, and the clocks differ
 constexpr double kAhead = 0.02;  // [s] before its stamp that a scan may arrive: clocks that agree differ less
 
-std::string milliseconds(double seconds) {
-  std::string text;
-  appendFixed(&text, 1e3 * seconds, 0);
-  return text + " ms";
-}
+std::string milliseconds(double seconds) { return fixedText(1e3 * seconds, 0) + " ms"; }
 
-std::string secondsText(double seconds) {
-  std::string text;
-  appendFixed(&text, seconds, 1);
-  return text + " s";
-}
+std::string secondsText(double seconds) { return fixedText(seconds, 1) + " s"; }
 
 std::size_t sharedWords(const std::string& a, const std::string& b) {
   const auto words = [](const std::string& topic) {

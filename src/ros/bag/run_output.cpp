@@ -113,7 +113,8 @@ void appendFixed(std::string* text, double value, int decimals) {
 std::string fixedText(double value, int decimals) {
   std::string text;
   appendFixed(&text, value, decimals);
-  return text;
+  return text.find_first_of("123456789in") == std::string::npos && text.front() == '-' ? text.substr(1)
+                                                                                       : text;
 }
 
 void appendStamp(std::string* text, Time time) {

@@ -124,7 +124,7 @@ RunFiles runFiles(const Config& config);
 
 /// Appends `value` with that many decimals (at most 12), with a point whatever the locale; "nan", "inf".
 void appendFixed(std::string* text, double value, int decimals);
-/// The same as a text of its own.
+/// The same as a text of its own, without the sign of a minus zero.
 std::string fixedText(double value, int decimals);
 /// Appends seconds with nine decimals, exactly.
 void appendStamp(std::string* text, Time time);
