@@ -74,16 +74,22 @@ TEST(DopplerGrid, DriversMayRoundToDecimals) {
   }
 }
 
-TEST(DopplerGrid, IsTypicalUntilTheDataTell) {
+// At rest all values are zero. When a platform with coarse steps sets off, one step is all there is to see.
+TEST(DopplerGrid, IsTheLargestThatItCanBeUntilTheDataTell) {
   DopplerGrid grid(0.0);
-  EXPECT_EQ(grid.step().source, DopplerStepSource::kUnknown);
-  EXPECT_EQ(grid.step().value, DopplerGrid::kTypicalStep);
-  // Any step has zero; and one other value alone is a multiple, but nobody knows of how many steps.
   RadarScan scan;
   scan.points.resize(40);
-  for (std::size_t i = 0; i < 5; ++i) scan.points[i].doppler = i % 2 == 0 ? 0.49 : -0.49;
   for (int i = 0; i < 1000; ++i) grid.add(scan);
   EXPECT_EQ(grid.step().source, DopplerStepSource::kUnknown);
+  EXPECT_EQ(grid.step().value, DopplerGrid::kLargestUsualStep);
+  // One value alone is a multiple, but nobody knows of how many steps.
+  for (const double value : {0.491, 0.125, 0.98}) {
+    DopplerGrid slow(0.0);
+    for (std::size_t i = 0; i < 5; ++i) scan.points[i].doppler = i % 2 == 0 ? value : -value;
+    for (int i = 0; i < 1000; ++i) slow.add(scan);
+    EXPECT_EQ(slow.step().source, DopplerStepSource::kUnknown);
+    EXPECT_EQ(slow.step().value, value);
+  }
 }
 
 TEST(DopplerGrid, BecomesSmallerWhenOddMultiplesCome) {

@@ -76,7 +76,7 @@ TEST(EgoVelocityBias, FastPlatform) {
 }
 
 TEST(EgoVelocityBias, DefaultCovarianceIsNotTooSmall) {
-  const MonteCarlo result = monteCarlo(EgoVelocityOptions(), kClimb, kDirectionNoise, 0.25);
+  const MonteCarlo result = monteCarlo(knownStep(), kClimb, kDirectionNoise, 0.25);
   EXPECT_LT(result.nees, 3.0);
   EXPECT_GT(result.nees, 0.8);  // nor so large that it says nothing
 }
@@ -132,6 +132,23 @@ TEST(EgoVelocityNoise, GhostsDoNotBlowItUp) {
     learnFrom(estimator, kDrive, kSimulatedRadar, 1000, 0.2);
     expectLearned(estimator, kSimulatedRadar, 0.15);
   }
+}
+
+// A slow platform with coarse steps. The noise of the directions hides in the bins there, the outliers do not.
+TEST(EgoVelocityNoise, OutliersAreLearnedAtAnySpeed) {
+  EgoVelocityOptions o = bareOptions(EgoVelocitySolver::kErrorsInVariables);
+  o.doppler_quantization = 0.49;
+  const ScanNoise coarse{0.02, 0.04, 0.02, 0.49};
+  const auto learned = [&](double ghosts) {
+    EgoVelocityEstimator estimator(o);
+    EXPECT_EQ(estimator.noise().outlier_density, kMaxOutlierDensity);  // sure of nothing
+    learnFrom(estimator, {0.1, 1.0, 0.1}, coarse, 300, ghosts);
+    EXPECT_EQ(estimator.noise().azimuth, o.azimuth_sigma * o.azimuth_sigma);
+    return estimator.noise().outlier_density;
+  };
+  EXPECT_LT(learned(0.0), 0.01);
+  const double density = 0.2 / 5.0;  // ghosts over 5 m/s
+  EXPECT_NEAR(learned(0.2), density, 0.25 * density);
 }
 
 TEST(EgoVelocityNoise, LeavesNoBiasOnceLearned) {

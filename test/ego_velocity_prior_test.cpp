@@ -22,7 +22,7 @@ RadarScan sceneWithObject(const Eigen::Vector3d& v_R, const Eigen::Vector3d& obj
 }
 
 TEST(EgoVelocityPrior, TellsTheStaticWorldFromAnObject) {
-  const EgoVelocityEstimator estimator{EgoVelocityOptions()};
+  const EgoVelocityEstimator estimator{knownStep()};
   Random random(30);
   VelocityPrior prior;
   prior.covariance = 0.05 * 0.05 * Eigen::Matrix3d::Identity();
@@ -39,7 +39,7 @@ TEST(EgoVelocityPrior, TellsTheStaticWorldFromAnObject) {
 }
 
 TEST(EgoVelocityPrior, AWrongOneIsOverruled) {
-  const EgoVelocityEstimator estimator{EgoVelocityOptions()};
+  const EgoVelocityEstimator estimator{knownStep()};
   Random random(31);
   const RadarScan scan = staticScene(kVelocity, 40, {0.01, 0.02, 0.01, 0.125}, random);
   VelocityPrior prior;
@@ -54,7 +54,7 @@ TEST(EgoVelocityPrior, AWrongOneIsOverruled) {
 
 // What the IMU leaves vague, where it is blind, must not find a few points that side with it.
 TEST(EgoVelocityPrior, AVagueOneIsOneWitnessMore) {
-  const EgoVelocityEstimator estimator{EgoVelocityOptions()};
+  const EgoVelocityEstimator estimator{knownStep()};
   Random random(33);
   const Eigen::Vector3d object_v_R(0.8, 0.9, 0.0);
   VelocityPrior prior;
@@ -83,7 +83,7 @@ TEST(EgoVelocityPrior, AVagueOneIsOneWitnessMore) {
 }
 
 TEST(EgoVelocityPrior, WhereItCannotDecideTheScanIsAmbiguous) {
-  const EgoVelocityEstimator estimator{EgoVelocityOptions()};
+  const EgoVelocityEstimator estimator{knownStep()};
   Random random(34);
   const Eigen::Vector3d object_v_R(0.8, 0.9, 0.0);
   VelocityPrior prior;
@@ -108,7 +108,7 @@ TEST(EgoVelocityPrior, WhereItCannotDecideTheScanIsAmbiguous) {
 }
 
 TEST(EgoVelocityPrior, AGoodOneAddsNoInformation) {
-  const EgoVelocityEstimator estimator{EgoVelocityOptions()};
+  const EgoVelocityEstimator estimator{knownStep()};
   Random random(32);
   const RadarScan scan = staticScene(kVelocity, 40, {0.01, 0.02, 0.01, 0.125}, random);
   VelocityPrior prior;

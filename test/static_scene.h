@@ -37,8 +37,15 @@ inline RadarScan staticScene(const Eigen::Vector3d& v_R, int points, const ScanN
 }
 
 /// Estimation without anything that widens the covariance, for tests of the solver.
-inline EgoVelocityOptions bareOptions(EgoVelocitySolver solver) {
+/// The defaults, for a radar whose step is known.
+inline EgoVelocityOptions knownStep(double step = 0.125) {
   EgoVelocityOptions o;
+  o.doppler_quantization = step;
+  return o;
+}
+
+inline EgoVelocityOptions bareOptions(EgoVelocitySolver solver) {
+  EgoVelocityOptions o = knownStep();
   o.solver = solver;
   o.added_sigma.setZero();
   return o;
@@ -51,11 +58,10 @@ inline const Eigen::Vector3d kVelocity(0.4, 1.2, -0.3);
 
 /// 2.5 and 4.5 degrees.
 inline EgoVelocityOptions simulatedRadarOptions() {
-  EgoVelocityOptions o;
+  EgoVelocityOptions o = knownStep();
   o.azimuth_sigma = 0.0436;
   o.elevation_sigma = 0.0785;
   o.doppler_sigma = 0.02;
-  o.doppler_quantization = 0.125;
   return o;
 }
 

@@ -110,7 +110,7 @@ DopplerGrid::DopplerGrid(double given) {
   if (!(given >= 0.0) || !std::isfinite(given))
     throw std::invalid_argument("Doppler grid: the step must be finite and at least 0 m/s");
   step_ = given > 0.0 ? DopplerStep{given < kLeastStep ? 0.0 : given, DopplerStepSource::kGiven}
-                      : DopplerStep{kTypicalStep, DopplerStepSource::kUnknown};
+                      : DopplerStep{kLargestUsualStep, DopplerStepSource::kUnknown};
 }
 
 void DopplerGrid::add(const RadarScan& scan) {
@@ -140,8 +140,11 @@ void DopplerGrid::judge() {
   }
   if (!found) {
     // If all values are the same, nobody knows how many steps that value is. Half of the batch waits for
-    // another value.
+    // another value. Until then the step is taken as the largest that it can be.
     if (mostWithin(batch_, 4.0 * kRounding) + kMaxMisfits >= kBatch) {
+      const double value = batch_[kBatch / 2];
+      const bool repeats = mostWithin(batch_, kSame) + kMaxMisfits >= kBatch;
+      if (step_.source == DopplerStepSource::kUnknown && repeats && value < kLargestStep) step_.value = value;
       count_ = kBatch / 2;
       return;
     }

@@ -53,7 +53,7 @@ VelocitySolution solveMotion(const std::vector<RadarDirection>& points, const Po
 }
 
 /// `result`, whose points are given, with the solution; or with why it does not count. `valid` is its status
-/// if it does.
+/// if it does. A rest may be as vague as the bins make it; a motion may not.
 EgoVelocity concluded(EgoVelocity result, const std::vector<RadarDirection>& inliers,
                       const VelocitySolution& solution, EgoVelocityStatus valid,
                       const EgoVelocityOptions& o) {
@@ -67,7 +67,9 @@ EgoVelocity concluded(EgoVelocity result, const std::vector<RadarDirection>& inl
     result.v_R = solution.v_R;
     result.covariance = solution.covariance;
     result.covariance.diagonal() += result.told_variance;
-    result.status = largestSigma(result.covariance) > o.max_sigma ? EgoVelocityStatus::kSigmaTooLarge : valid;
+    const bool is_vague =
+        valid == EgoVelocityStatus::kMoving && largestSigma(result.covariance) > o.max_sigma;
+    result.status = is_vague ? EgoVelocityStatus::kSigmaTooLarge : valid;
   }
   return result;
 }

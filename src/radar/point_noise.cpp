@@ -19,10 +19,6 @@ constexpr double kMemory = 1000.0;
 constexpr double kMinSpeed = 4.0;
 /// [m/s] Residuals up to this size show how many outliers there are.
 constexpr double kOutlierSpan = 1.0;
-/// [s/m] Bounds of the density of the outliers, per point: 1 in 200 and every other one over 5 m/s. With a
-/// larger density, points would pass for outliers for long after their noise has grown.
-constexpr double kMinOutlierDensity = 0.001;
-constexpr double kMaxOutlierDensity = 0.1;
 /// An angle or a Doppler with more noise is no measurement.
 constexpr double kMaxAngleSigma = 0.2;    // [rad]
 constexpr double kMaxDopplerSigma = 0.2;  // [m/s]
@@ -31,11 +27,28 @@ constexpr double kMinStartAngleSigma = 0.01;  // [rad]
 /// [m^2/s^2] Variance of a residual; it bounds the weights if there is no noise at all.
 constexpr double kMinVariance = 1e-4;
 
-/// Probability that a residual is of the static world, a Gaussian, and not of an outlier, spread evenly.
-double inlierProbability(double residual, double variance, double outlier_density) {
-  const double density = std::exp(-0.5 * square(residual) / variance) / std::sqrt(2.0 * M_PI * variance);
-  return density / (density + outlier_density);
+/// Density of the residuals of the static world. `variance` is that of Doppler and direction; the bin is wide,
+/// or it counts as more of a Gaussian (as in DopplerLikelihood).
+double inlierDensity(double residual, double variance, double quantization) {
+  const double half_bin = std::sqrt(3.0 * quantization);
+  const double sigma = std::sqrt(variance);
+  if (half_bin > sigma) {
+    const auto beyond = [&](double edge) { return 0.5 * std::erfc(M_SQRT1_2 * edge / sigma); };
+    const double size = std::abs(residual);  // erfc is exact in its upper tail only
+    return (beyond(size - half_bin) - beyond(size + half_bin)) / (2.0 * half_bin);
+  }
+  const double whole = variance + quantization;
+  return std::exp(-0.5 * square(residual) / whole) / std::sqrt(2.0 * M_PI * whole);
 }
+
+/// Probability that a residual is of the static world and not of an outlier, spread evenly.
+double inlierProbability(double residual, double variance, const PointVariances& noise) {
+  const double density = inlierDensity(residual, std::max(kMinVariance, variance), noise.quantization);
+  return density / (density + noise.outlier_density);
+}
+
+/// Share of a new scan in what is known, after so many scans.
+double forgotten(double scans) { return std::max(1.0 / kMemory, 1.0 / (scans + 1.0)); }
 
 Eigen::Vector3d vectorOf(const PointVariances& noise) {
   return {noise.doppler, noise.azimuth, noise.elevation};
@@ -47,8 +60,30 @@ PointNoise::PointNoise(const PointVariances& start) : start_(vectorOf(start)), v
 
 void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vector<std::size_t>& inliers,
                        const Eigen::Vector3d& v_R) {
+  learnOutliers(points, v_R);
+  if (v_R.squaredNorm() >= square(kMinSpeed) * 12.0 * variances_.quantization)
+    learnVariances(points, inliers, v_R);
+}
+
+void PointNoise::learnOutliers(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R) {
+  double density = 0.0;
+  for (const RadarDirection& p : points) {
+    const double residual = p.doppler + p.u_R.dot(v_R);
+    if (std::abs(residual) >= kOutlierSpan) continue;
+    const Eigen::Vector3d shares =
+        noiseShares(correctedDirection(p.u_R, residual, v_R, variances_), v_R, variances_);
+    const double probability = inlierProbability(residual, shares.dot(vectorOf(variances_)), variances_);
+    density += (1.0 - probability) / (2.0 * kOutlierSpan * static_cast<double>(points.size()));
+  }
+  ++scans_of_outliers_;
+  double& believed = variances_.outlier_density;
+  believed += forgotten(scans_of_outliers_) * (density - believed);
+  believed = std::clamp(believed, kMinOutlierDensity, kMaxOutlierDensity);
+}
+
+void PointNoise::learnVariances(const std::vector<RadarDirection>& points,
+                                const std::vector<std::size_t>& inliers, const Eigen::Vector3d& v_R) {
   const PointVariances& noise = variances_;
-  if (v_R.squaredNorm() < square(kMinSpeed) * 12.0 * noise.quantization) return;
   const auto variance = [&](const Eigen::Vector3d& shares) {
     return std::max(kMinVariance, noise.quantization + shares.dot(vectorOf(noise)));
   };
@@ -66,11 +101,10 @@ void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vec
   const Eigen::Matrix3d velocity_covariance = normal.inverse();
 
   ++scans_;
-  const double forgotten = std::max(1.0 / kMemory, 1.0 / (scans_ + 1.0));
-  information_ *= 1.0 - forgotten;
-  information_vector_ *= 1.0 - forgotten;
+  const double share = forgotten(scans_);
+  information_ *= 1.0 - share;
+  information_vector_ *= 1.0 - share;
   Eigen::Vector3d mean_shares = Eigen::Vector3d::Zero();
-  double outlier_density = 0.0;
   inlier = inliers.begin();
   for (const RadarDirection& p : points) {
     // The fit of the velocity has made the squared residuals of its inliers smaller by this.
@@ -78,18 +112,13 @@ void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vec
     const double residual = p.doppler + p.u_R.dot(v_R);
     const Eigen::Vector3d shares = noiseShares(correctedDirection(p.u_R, residual, v_R, noise), v_R, noise);
     // The variance of r^2 is twice the squared variance of r.
-    const double probability = inlierProbability(residual, variance(shares), noise.outlier_density);
+    const double probability = inlierProbability(residual, shares.dot(vectorOf(noise)), noise);
     const double weight = 0.5 * probability / square(variance(shares));
     mean_shares += shares / static_cast<double>(points.size());
-    if (std::abs(residual) < kOutlierSpan)
-      outlier_density += (1.0 - probability) / (2.0 * kOutlierSpan * static_cast<double>(points.size()));
     information_ += weight * shares * shares.transpose();
     information_vector_ += weight * (square(residual) + fitted - noise.quantization) * shares;
   }
-  double& believed_density = variances_.outlier_density;
-  believed_density += forgotten * (outlier_density - believed_density);
-  believed_density = std::clamp(believed_density, kMinOutlierDensity, kMaxOutlierDensity);
-  mean_shares_ += forgotten * (mean_shares - mean_shares_);
+  mean_shares_ += share * (mean_shares - mean_shares_);
   const double believed = variance(mean_shares_);
   solve();
   // The scans so far were weighted with the noise believed then. If it was much too small, they would

@@ -10,7 +10,7 @@ namespace rio_t {
 
 /// The source of the Doppler step.
 enum class DopplerStepSource {
-  kUnknown,  ///< not known yet: a typical value
+  kUnknown,  ///< not known yet: the largest that it can be
   kGiven,    ///< the user gave it
   kData,     ///< read off the data; 0 if the data show no step
 };
@@ -38,9 +38,9 @@ class DopplerGrid {
   void add(const RadarScan& scan);
   DopplerStep step() const { return step_; }
 
-  /// [m/s] The step until the data show it. The IWR6843AOP data sets have this one. By ratio, it lies in the
-  /// middle of the usual steps, 0.03 to 0.5.
-  static constexpr double kTypicalStep = 0.125;
+  /// [m/s] The step while all values are zero: the largest of the usual steps, 0.03 to 0.5. A smaller one would
+  /// take a slow motion for rest, and be sure of it.
+  static constexpr double kLargestUsualStep = 0.5;
 
  private:
   static constexpr std::size_t kBatch = 16;

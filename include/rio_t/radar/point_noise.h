@@ -8,14 +8,20 @@
 
 namespace rio_t {
 
+/// [s/m] Bounds of the density of the outliers, per point: 1 in 200 and every other one over 5 m/s. With a
+/// larger density, points would pass for outliers for long after their noise has grown.
+constexpr double kMinOutlierDensity = 0.001;
+constexpr double kMaxOutlierDensity = 0.1;
+
 /// Noise of a point, independent from point to point.
 struct PointVariances {
   double doppler = 0.0;       ///< [m^2/s^2] besides the quantisation
   double azimuth = 0.0;       ///< [rad^2]
   double elevation = 0.0;     ///< [rad^2]
   double quantization = 0.0;  ///< [m^2/s^2] of the Doppler: step^2 / 12
-  /// [s/m] Density of Dopplers that are not of the static world, per point.
-  double outlier_density = 0.01;
+  /// [s/m] Density of Dopplers that are not of the static world, per point. It begins with the largest, every
+  /// other point over 5 m/s: until scans have shown better, few points must not be sure of anything.
+  double outlier_density = kMaxOutlierDensity;
 };
 
 /// Learns the noise of the points from the Doppler residuals of scans in motion.
@@ -43,6 +49,9 @@ class PointNoise {
   static constexpr double kMinStartDopplerSigma = 0.01;
 
  private:
+  void learnOutliers(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R);
+  void learnVariances(const std::vector<RadarDirection>& points, const std::vector<std::size_t>& inliers,
+                      const Eigen::Vector3d& v_R);
   void solve();
 
   // Vectors and matrices are of the variances of Doppler, azimuth and elevation.
@@ -51,7 +60,8 @@ class PointNoise {
   Eigen::Matrix3d information_ = Eigen::Matrix3d::Zero();         // of the scans
   Eigen::Vector3d information_vector_ = Eigen::Vector3d::Zero();  // that times the variances
   Eigen::Vector3d mean_shares_ = Eigen::Vector3d::Zero();         // of the variances in that of a residual
-  double scans_ = 0.0;
+  double scans_ = 0.0;              // that taught the variances
+  double scans_of_outliers_ = 0.0;  // that taught the density of outliers
 };
 
 }  // namespace rio_t
