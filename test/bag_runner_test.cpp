@@ -52,7 +52,7 @@ TEST_F(BagRunner, EveryScanIsAccountedFor) {
        {"imu_count: 1600\n", "scans_total: 80\n", "scans_used: ", "scans_rejected: {",
         "solver_terminations: {converged: ", "path_length_m: ", "end_to_start_2d_m: ", "end_to_start_3d_m: ",
         "final_offset_s: ", "final_offset_sigma_s: ", "imu_noise: {accel: 0.", "radar_noise: {doppler: 0.",
-        "radar_doppler_step: 0.125", "radar_doppler_step_from: unknown\n", "radar_points_per_scan: {p10: ",
+        "radar_doppler_step: 0.5", "radar_doppler_step_from: unknown\n", "radar_points_per_scan: {p10: ",
         "saved: [trajectory.txt", "estimation_seconds: ", "realtime_factor: "}) {
     EXPECT_NE(yaml.find(key), std::string::npos) << key;
   }

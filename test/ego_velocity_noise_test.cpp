@@ -134,7 +134,8 @@ TEST(EgoVelocityNoise, GhostsDoNotBlowItUp) {
   }
 }
 
-// A slow platform with coarse steps. The noise of the directions hides in the bins there, the outliers do not.
+// A slow platform with coarse steps. The noise of the directions hides in the bins there, the outliers do
+// not.
 TEST(EgoVelocityNoise, OutliersAreLearnedAtAnySpeed) {
   EgoVelocityOptions o = bareOptions(EgoVelocitySolver::kErrorsInVariables);
   o.doppler_quantization = 0.49;

@@ -18,6 +18,12 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
+/// As RadarChannel does it: first the step, then the velocity.
+EgoVelocity velocityOf(const RadarScan& scan, EgoVelocityEstimator& estimator) {
+  estimator.observe(scan);
+  return estimator.estimate(scan);
+}
+
 /// A rig on a simulated motion that starts at full speed.
 struct Rig {
   Rig(const std::string& name, std::uint64_t seed, double offset,
@@ -57,13 +63,14 @@ struct Rig {
   /// Feeds everything in the order of the stamps from `begin` seconds on, until the state is found.
   std::optional<MotionInitialization> run(MotionInitializer& initializer, double begin = 0.0,
                                           const PoseAnchor& anchor = PoseAnchor()) {
-    const EgoVelocityEstimator estimator(options.ego_velocity);
+    EgoVelocityEstimator estimator(options.ego_velocity);
     auto next = data.scans.begin();
     for (const ImuMeasurement& sample : data.imu.samples) {
       if (sample.time - setup.start < begin) continue;
       imu.add(sample);
       for (; next != data.scans.end() && next->stamp < sample.time; ++next) {
-        if (next->stamp - setup.start > begin) initializer.add(next->stamp, estimator.estimate(scan(*next)));
+        if (next->stamp - setup.start > begin)
+          initializer.add(next->stamp, velocityOf(scan(*next), estimator));
       }
       if (auto found = initializer.solve(imu, [&](Time) { return anchor; })) return found;
     }
@@ -234,12 +241,12 @@ TEST(MotionInitializer, SaysWhatItWaitsForAndBearsNonsense) {
 std::optional<std::pair<InitializedFrom, double>> startBy(InitMode mode, Rig& rig, std::string* waiting_for) {
   rig.options.init_mode = mode;
   Initializer initializer(rig.options);
-  const EgoVelocityEstimator estimator(rig.options.ego_velocity);
+  EgoVelocityEstimator estimator(rig.options.ego_velocity);
   auto next = rig.data.scans.begin();
   for (const ImuMeasurement& sample : rig.data.imu.samples) {
     rig.imu.add(sample);
     for (; next != rig.data.scans.end() && next->stamp < sample.time; ++next)
-      initializer.addVelocity(0, next->stamp, estimator.estimate(rig.scan(*next)));
+      initializer.addVelocity(0, next->stamp, velocityOf(rig.scan(*next), estimator));
     if (const auto found = initializer.add(sample, rig.imu))
       return std::make_pair(found->from, sample.time - rig.setup.start);
     *waiting_for = initializer.waitingFor();

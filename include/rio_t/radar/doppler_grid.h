@@ -38,8 +38,8 @@ class DopplerGrid {
   void add(const RadarScan& scan);
   DopplerStep step() const { return step_; }
 
-  /// [m/s] The step while all values are zero: the largest of the usual steps, 0.03 to 0.5. A smaller one would
-  /// take a slow motion for rest, and be sure of it.
+  /// [m/s] The step while all values are zero: the largest of the usual steps, 0.03 to 0.5. A smaller one
+  /// would take a slow motion for rest, and be sure of it.
   static constexpr double kLargestUsualStep = 0.5;
 
  private:

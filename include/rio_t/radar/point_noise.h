@@ -60,8 +60,8 @@ class PointNoise {
   Eigen::Matrix3d information_ = Eigen::Matrix3d::Zero();         // of the scans
   Eigen::Vector3d information_vector_ = Eigen::Vector3d::Zero();  // that times the variances
   Eigen::Vector3d mean_shares_ = Eigen::Vector3d::Zero();         // of the variances in that of a residual
-  double scans_ = 0.0;              // that taught the variances
-  double scans_of_outliers_ = 0.0;  // that taught the density of outliers
+  double scans_ = 0.0;                                            // that taught the variances
+  double scans_of_outliers_ = 0.0;                                // that taught the density of outliers
 };
 
 }  // namespace rio_t
