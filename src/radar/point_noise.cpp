@@ -27,8 +27,8 @@ constexpr double kMinStartAngleSigma = 0.01;  // [rad]
 /// [m^2/s^2] Variance of a residual; it bounds the weights if there is no noise at all.
 constexpr double kMinVariance = 1e-4;
 
-/// Density of the residuals of the static world. `variance` is that of Doppler and direction; the bin is
-/// wide, or it counts as more of a Gaussian (as in DopplerLikelihood).
+/// Density of the residuals of the static world. `variance` is that of Doppler and direction. A bin that is
+/// narrower than this noise adds to it, as in DopplerLikelihood.
 double inlierDensity(double residual, double variance, double quantization) {
   const double half_bin = std::sqrt(3.0 * quantization);
   const double sigma = std::sqrt(variance);

@@ -25,8 +25,9 @@ struct DopplerStep {
 ///
 /// DopplerGrid judges batches of 16 values that are not zero. It takes the largest step of which at least 14
 /// of the 16 values are multiples. Later batches can only divide the step by a whole number, unless the radar
-/// is set up anew. After four batches in a row without a step the radar has none (docs/method.md, section
-/// 9.7). The answer depends only on the values and their order. Not thread-safe.
+/// is set up anew. After four batches in a row without a step the radar has none. Until the step is known it
+/// is the largest that it can be: kLargestUsualStep, or the only value if all are the same (docs/method.md,
+/// section 9.7). The answer depends only on the values and their order. Not thread-safe.
 class DopplerGrid {
  public:
   /// `given` is the step [m/s]. 0: DopplerGrid reads the step off the data; any other value below 0.02: the

@@ -29,7 +29,8 @@ struct PointVariances {
 /// The variance of a residual is that of the Doppler plus those of the angles times their squared effect on
 /// the Doppler. This effect differs from point to point, so a regression of the squared residuals gives all
 /// three (docs/method.md, section 9). The start counts as a few points. If the motion does not show an angle,
-/// its noise remains that of the start.
+/// its noise remains that of the start. The density of the outliers is learned at any speed, the rest above
+/// four steps of the Doppler.
 class PointNoise {
  public:
   explicit PointNoise(const PointVariances& start);
