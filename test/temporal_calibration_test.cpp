@@ -93,6 +93,21 @@ TEST(TemporalCalibration, ATruthBeyondTheBoundIsTold) {
   EXPECT_GT(at_bound, 0.9 * windows);
 }
 
+// The noise moves the estimate off its bound now and then. The curvature there knows nothing of the truth.
+TEST(TemporalCalibration, JustInsideTheBoundItIsNoSurer) {
+  SimulatedRun run("gym_loop", 3, 40.0, kStart);
+  run.setup.time_offset.constant = 0.055;
+  run.options.smoother.max_time_offset = 0.05;
+  run.run();
+  int inside = 0;
+  for (const ScanResult& result : run.results) {
+    if (!result.updated || run.seconds(result.scan.stamp) < kFarAlong) continue;
+    if (std::abs(result.time_offset) < 0.05) ++inside;
+    EXPECT_LT(std::abs(result.time_offset - 0.055), 2.0 * result.time_offset_sigma);
+  }
+  EXPECT_GT(inside, 20);
+}
+
 TEST(TemporalCalibration, FarOffsetsAreFoundInOnePass) {
   double sum = 0.0;
   int count = 0;

@@ -249,9 +249,9 @@ void RadarChannel::judge(const RadarScan& scan, const VelocityPrior& prior, doub
 double RadarChannel::offsetSigma(double variance) const {
   const SmootherOptions& o = options_.smoother;
   if (!o.estimate_time_offset) return 0.0;
-  // At the bound the truth may lie anywhere beyond, whatever the curvature of the cost there.
-  const double least = std::abs(offset()) >= o.max_time_offset ? o.max_time_offset : 0.0;
-  return std::max(least, offset_uncertainty_.sigma(variance));
+  const double sigma = offset_uncertainty_.sigma(variance);
+  // If the bound is within a sigma, the truth may lie anywhere beyond, whatever the curvature of the cost.
+  return std::abs(offset()) + sigma >= o.max_time_offset ? std::max(sigma, o.max_time_offset) : sigma;
 }
 
 std::vector<FixedLagSmoother::RandomWalk> RadarChannel::randomWalks() const {
