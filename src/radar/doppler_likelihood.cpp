@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "direction_noise.h"
+#include "doppler_bin.h"
 
 namespace rio_t {
 namespace {
@@ -20,7 +21,6 @@ constexpr double kNoResidual = 1e-4;
 constexpr double kNoInformation = 1e-12;
 constexpr double kSpreads = 4.0;  // [variances] of the noise of the directions
 
-double cumulative(double z) { return 0.5 * std::erfc(-z * M_SQRT1_2); }
 double density(double z) { return std::exp(-0.5 * z * z) * (0.5 * M_SQRT1_2 * M_2_SQRTPI); }
 
 /// A residual r and its derivative by the error of the Doppler.
@@ -41,13 +41,13 @@ Residual fineResidual(double e, double s, double outlier) {
 
 /// The same for a bin of half width h around the Doppler: exp(-x) becomes the probability of the bin.
 Residual coarseResidual(double e, double s, double h, double outlier) {
-  const double a = std::abs(e);  // the bin is even, and erfc is exact in its upper tail only
+  const double a = std::abs(e);
   const double below = (a - h) / s;
   const double above = (a + h) / s;
   const double edge = h / s;
-  const double centre = 1.0 - 2.0 * cumulative(-edge);
+  const double centre = binProbability(0.0, s, h);
   const double floor = outlier * centre;
-  const double bin = cumulative(-below) - cumulative(-above);
+  const double bin = binProbability(e, s, h);
   const double half_square = -std::log((bin + floor) / (centre + floor));
   const double value = std::sqrt(2.0 * std::max(0.0, half_square));
   if (value < kNoResidual) {  // r = e sqrt(-bin'' / bin) around zero

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "direction_noise.h"
+#include "doppler_bin.h"
 
 namespace rio_t {
 namespace {
@@ -32,11 +33,7 @@ constexpr double kMinVariance = 1e-4;
 double inlierDensity(double residual, double variance, double quantization) {
   const double half_bin = std::sqrt(3.0 * quantization);
   const double sigma = std::sqrt(variance);
-  if (half_bin > sigma) {
-    const auto beyond = [&](double edge) { return 0.5 * std::erfc(M_SQRT1_2 * edge / sigma); };
-    const double size = std::abs(residual);  // erfc is exact in its upper tail only
-    return (beyond(size - half_bin) - beyond(size + half_bin)) / (2.0 * half_bin);
-  }
+  if (half_bin > sigma) return binProbability(residual, sigma, half_bin) / (2.0 * half_bin);
   const double whole = variance + quantization;
   return std::exp(-0.5 * square(residual) / whole) / std::sqrt(2.0 * M_PI * whole);
 }

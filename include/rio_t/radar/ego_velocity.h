@@ -62,7 +62,7 @@ struct EgoVelocityOptions {
   /// and last for several scans.
   Eigen::Vector3d added_sigma = {0.04, 0.04, 0.04};
   double max_condition_number = 1000.0;  ///< of H'H (unit directions)
-  double max_sigma = 0.5;                ///< [m/s] largest axis of the estimate
+  double max_sigma = 0.5;                ///< [m/s] largest axis of the estimate, in motion
 };
 
 /// Whether a scan gave a velocity and, if not, why.
@@ -72,7 +72,7 @@ enum class EgoVelocityStatus {
   kTooFewPoints,    ///< fewer than 3 points after the filter
   kTooFewInliers,   ///< no velocity that enough points agree on
   kIllConditioned,  ///< the directions do not span 3D
-  kSigmaTooLarge,   ///< uncertainty above max_sigma
+  kSigmaTooLarge,   ///< in motion, uncertainty above max_sigma
   kAmbiguous,       ///< two velocities, and a prior too vague to decide between them
 };
 bool isValid(EgoVelocityStatus status);          ///< kMoving or kZeroVelocity

@@ -111,7 +111,8 @@ void listPointNoise(ParameterList& list, EgoVelocityOptions& radar) {
       "condition number of H'H, with H the unit directions. It happens if all points lie in one direction.");
   list.number(
       "ego_velocity_max_sigma", "m/s", above(0), radar.max_sigma,
-      "A scan is rejected if the standard deviation of its velocity is larger than this along any axis.");
+      "A scan in motion is rejected if the standard deviation of its velocity is larger than this along any "
+      "axis.");
 }
 
 }  // namespace
