@@ -7,10 +7,12 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <optional>
 #include <set>
 #include <sstream>
 
 #include "parameter_faults.h"
+#include "rio_t/radar/ego_velocity.h"
 #include "rio_t/simulation/presets.h"
 #include "run_files.h"
 #include "temporary_folder.h"
@@ -107,6 +109,26 @@ TEST(Parameters, ValuesOutOfRangeAreRefused) {
   EXPECT_TRUE(contains(faultOf("ransac_success_probability=1"), "below 1"));
   EXPECT_TRUE(contains(faultOf("ego_velocity_added_sigma=[0.1, -0.1, 0.1]"), "each of at least 0"));
   EXPECT_NO_THROW(fromAssignments({"window=60", "max_time_offset=1.0", "ransac_outlier_probability=0"}));
+}
+
+TEST(Parameters, TheEstimatorTakesEveryNumberThatTheRangesAllow) {
+  std::istringstream text(parametersYaml());
+  for (const YAML::Node& about : YAML::Load(text)) {
+    const auto key = about["key"].as<std::string>();
+    std::vector<std::string> values = {"0", "0.5", "1", "2"};
+    for (const char* end : {"min", "max"})
+      if (about[end].IsDefined()) values.push_back(about[end].as<std::string>());
+    for (const std::string& value : values) {
+      const std::string assignment = key + "=" + value;
+      std::optional<Config> config;
+      try {
+        config = fromAssignments({assignment});
+      } catch (const ConfigError&) {
+        continue;  // refused with its key, as it should be
+      }
+      EXPECT_NO_THROW(EgoVelocityEstimator(config->odometry.ego_velocity)) << assignment;
+    }
+  }
 }
 
 TEST(Parameters, OnlyFiniteNumbersAreTaken) {

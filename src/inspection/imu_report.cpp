@@ -16,10 +16,10 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kGravity = 9.81;    // [m/s^2]
-constexpr double kInStep = 0.5;      // [s] between the two directions of gravity that are compared
-constexpr double kMeanWidth = 0.2;   // [s] over which each is averaged
+constexpr double kMeanWidth = 0.2;   // [s] over which a direction of gravity is averaged
+constexpr std::size_t kApart = 3;    // [means] between the two directions that are compared: 0.6 s
 constexpr double kFastest = 9.0;     // [rad/s] 500 deg/s: no platform turns so fast one tenth of its time
-constexpr double kLeastTilt = 0.03;  // [rad] rms of the turns of gravity in 0.5 s that show the unit
+constexpr double kLeastTilt = 0.03;  // [rad] rms of the turns of gravity in 0.6 s that show the unit
 
 /// Means of the specific force, in steps of `kMeanWidth`, and the turn from one to the next, by the gyro.
 struct Steps {
@@ -54,13 +54,12 @@ Steps stepsOf(const std::vector<ImuMeasurement>& imu) {
 
 /// Sum of squares of what a scale on the rates leaves of the changes of the specific force.
 double misfit(const Steps& steps, double scale) {
-  const auto apart = static_cast<std::size_t>(std::lround(kInStep / kMeanWidth));
   double sum = 0.0;
-  for (std::size_t i = 0; i + apart < steps.force.size(); ++i) {
+  for (std::size_t i = 0; i + kApart < steps.force.size(); ++i) {
     Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
-    for (std::size_t k = i; k < i + apart; ++k) turn = turn * so3::exp(scale * steps.turn[k]);
+    for (std::size_t k = i; k < i + kApart; ++k) turn = turn * so3::exp(scale * steps.turn[k]);
     // A force that stands still in the world turns against the IMU.
-    sum += std::min((steps.force[i + apart] - turn.conjugate() * steps.force[i]).squaredNorm(), 25.0);
+    sum += std::min((steps.force[i + kApart] - turn.conjugate() * steps.force[i]).squaredNorm(), 25.0);
   }
   return sum;
 }

@@ -11,32 +11,36 @@ void listPlatform(ParameterList& list, Config& c) {
   list.choice<Platform>(
       "platform", {{"free", Platform::kFree}, {"ground_vehicle", Platform::kGroundVehicle}},
       c.odometry.platform,
-      "free can move anywhere. ground_vehicle stands on wheels: one point of it moves neither "
-      "sideways nor upwards, which holds the height. Set estimate_extrinsics: rotation with it. The "
-      "log and the diagnostics say so if the motion contradicts it.");
+      "free allows any motion. ground_vehicle is a vehicle on wheels: one point of it moves neither sideways "
+      "nor upwards. This constraint holds the height. Set estimate_extrinsics: rotation with it. The log and "
+      "the diagnostics say so if the motion contradicts the constraint.");
   list.rotation(
       "vehicle_frame_rotation_xyzw", vehicle.T_IV.q_IR,
-      "This rotation turns vectors of the vehicle (x forward, y left, z up) into the IMU frame. The "
-      "estimate starts there. The default is an IMU whose x axis looks forward.");
+      "This rotation turns vectors of the vehicle (x forward, y left, z up) into the IMU frame. The estimate "
+      "of the rotation starts here. The default is an IMU whose x axis points forward.");
   list.vector3(
       "vehicle_frame_translation", "m", between(-100, 100), vehicle.T_IV.l_I,
       "This point of the vehicle, in the IMU frame, moves only forward. It is the centre of the axle that "
       "does not steer.");
   list.number("vehicle_frame_rotation_sigma", "rad", above(0, kPi), vehicle.rotation_sigma,
-              "This is the standard deviation of the rotation as told, about each axis.");
+              "The rotation that you give has this standard deviation about each axis.");
   list.number(
       "vehicle_start_slope_sigma", "rad", atLeast(0), vehicle.start_slope_sigma,
-      "The ground slopes by this standard deviation where the vehicle starts at rest. It levels the vehicle "
-      "frame. The default is a floor in a building. Raise it outdoors. 0 says that nothing is known.");
+      "The ground slopes by this standard deviation where the vehicle starts at rest. The estimator levels "
+      "the vehicle frame with it. The default is a floor in a building. Raise it outdoors. 0 means that the "
+      "slope is unknown.");
   list.number("vehicle_frame_rotation_noise", "rad/sqrt(s)", above(0), vehicle.rotation_noise,
-              "The rotation may walk by this density, about each axis, as a load or a bracket moves.");
+              "The rotation may wander by this random walk about each axis, for example if a load or a "
+              "bracket moves.");
   list.number("vehicle_sideways_sigma", "m/s", above(0), vehicle.sideways_sigma,
-              "This is the standard deviation of the velocity of the point to the side. Raise it if the "
-              "wheels slip.");
+              "This is the standard deviation of the sideways velocity of the point. Raise it if the wheels "
+              "slip.");
   list.number("vehicle_vertical_sigma", "m/s", above(0), vehicle.vertical_sigma,
-              "This is the standard deviation of its velocity upwards. Raise it for bumps and soft springs.");
+              "This is the standard deviation of the upward velocity of the point. Raise it for bumps and "
+              "soft springs.");
   list.number("vehicle_gate", "", above(0), vehicle.gate,
-              "A velocity that contradicts the constraint by more of these standard deviations is left out.");
+              "A velocity is left out if it contradicts the constraint by more than this many standard "
+              "deviations.");
 }
 
 void listBarometer(ParameterList& list, Config& c) {
@@ -47,20 +51,21 @@ void listBarometer(ParameterList& list, Config& c) {
       "The barometer publishes sensor_msgs/FluidPressure on this topic, in Pa and stamped in the IMU "
       "clock. If it is empty, there is no barometer.");
   list.number("barometer_noise_density", "m/sqrt(Hz)", above(0), barometer.noise_density,
-              "This is the white noise of the height. More counts if the samples show more.");
+              "This is the white noise of the height. The estimator takes more if the samples show more.");
   list.number("barometer_drift", "m/sqrt(s)", above(0), barometer.drift,
-              "The bias of the height walks by this density, as weather and the warmth of the sensor change. "
-              "Raise it "
-              "for flights of an hour.");
+              "The bias of the height wanders by this random walk, since the weather and the temperature of "
+              "the sensor change. Raise it for flights of an hour.");
   list.number("barometer_temperature", "deg C", between(-60, 60), barometer.temperature,
-              "The air has this temperature at the start. Three degrees off make a height wrong by 1 %.");
+              "The air has this temperature at the start. An error of three degrees makes a height wrong by "
+              "1 %.");
   list.number(
       "barometer_gate", "", atLeast(0), barometer.gate,
-      "A height that is more of these standard deviations away from the estimate is rejected as a shock of "
-      "the pressure. 0 takes every height.");
+      "A height is rejected as a shock of the pressure if it is more than this many standard deviations away "
+      "from the estimate. 0 takes every height.");
   list.number(
       "barometer_gate_timeout", "s", above(0), barometer.gate_timeout,
-      "If heights are rejected for so long, the pressure has stepped for good, and the bias is found anew.");
+      "If heights are rejected for this time, the pressure has stepped for good, and the bias is estimated "
+      "again.");
 }
 
 }  // namespace rio_t

@@ -7,9 +7,9 @@ void listWindow(ParameterList& list, Config& c) {
   SmootherOptions& smoother = c.odometry.smoother;
   list.number(
       "window", "s", above(0, 60), smoother.window,
-      "The smoother optimises the states of this last stretch of time. What leaves it becomes a prior. 0.5 "
-      "to 3 s are typical. A longer window costs more time a scan and helps little. Raise it if scans are "
-      "rare.");
+      "The smoother optimises the states of this last stretch of time. States that leave the window become a "
+      "prior. 0.5 to 3 s are typical. A longer window costs more time per scan and helps little. Raise it if "
+      "scans are rare.");
   list.number(
       "huber_threshold", "", atLeast(0), smoother.huber_threshold,
       "A scan with a larger whitened residual counts less (Huber loss). 1 to 2 are typical. 0 switches the "
@@ -17,18 +17,15 @@ void listWindow(ParameterList& list, Config& c) {
   list.choice<RadarFactor>(
       "radar_factor", {{"velocity", RadarFactor::kVelocity}, {"doppler", RadarFactor::kDoppler}},
       smoother.radar_factor,
-      "This is what a scan gives to the window. doppler gives the Doppler of each point, so that scans of a "
-      "few "
-      "points count, too. velocity gives one velocity for the scan, as the paper does, and is faster.");
+      "This says what a scan adds to the window. doppler gives the Doppler of each point, so that scans of a "
+      "few points count, too. velocity gives one velocity for the scan, as the paper does, and is faster.");
   list.choice<WindowSolver>("solver", {{"chain", WindowSolver::kChain}, {"ceres", WindowSolver::kCeres}},
                             smoother.solver,
                             "chain uses Gauss-Newton along the chain of states. ceres uses ceres::Solve, "
-                            "which gives the same estimate and "
-                            "is slower. Use ceres to check the other.");
-  list.integer(
-      "max_iterations", between(1, 1000), smoother.max_iterations,
-      "The solver stops after so many iterations at each scan. Two or three are usual. The diagnostics tell "
-      "if it ends there often.");
+                            "which gives the same estimate and is slower. Use ceres to check chain.");
+  list.integer("max_iterations", between(1, 1000), smoother.max_iterations,
+               "The solver stops after this many iterations at each scan. It usually needs two or three. The "
+               "diagnostics tell if it often reaches this limit.");
   list.integer("max_queued_scans", atLeast(1), c.odometry.max_queued_scans,
                "This is the largest number of scans that wait for the IMU or for the solver. If one more "
                "comes, the node "
@@ -38,15 +35,15 @@ void listWindow(ParameterList& list, Config& c) {
 void listGate(ParameterList& list, SmootherOptions& smoother) {
   list.number(
       "innovation_gate", "", atLeast(0), smoother.innovation_gate,
-      "A scan is rejected as an outlier if its velocity is farther from the prediction than so many standard "
-      "deviations. 3 to 6 are typical. 0 takes every scan.");
+      "A scan is rejected as an outlier if its velocity is farther from the prediction than this many "
+      "standard deviations. 3 to 6 are typical. 0 takes every scan.");
   list.number(
       "innovation_model_error", "m/s", atLeast(0), smoother.innovation_model_error,
       "The gate adds this to the standard deviation of the prediction, along each axis. It stands for small "
       "errors of the mounting and of the IMU's scale. Raise it for a platform that is faster than 10 m/s.");
   list.number("innovation_gate_timeout", "s", above(0), smoother.innovation_gate_timeout,
-              "If no scan was used for this time, the gate takes the next one all the same, so that a wrong "
-              "prediction cannot lock the radar out.");
+              "If no scan was used for this time, the gate takes the next one in any case. A wrong "
+              "prediction then cannot lock the radar out.");
 }
 
 void listPriors(ParameterList& list, SmootherOptions& smoother) {
@@ -64,28 +61,29 @@ void listPriors(ParameterList& list, SmootherOptions& smoother) {
       "platform sways while it rests, as a boat does.");
   list.number(
       "prior_sigma_gyro_bias", "rad/s", above(0), smoother.prior_sigma_gyro_bias,
-      "The gyro bias of the first state has this standard deviation, besides the noise of the mean at rest. "
-      "Take the in-run bias stability of the data sheet: 7e-5 is 14 deg/h.");
+      "The gyro bias of the first state has this standard deviation, in addition to the noise of the mean at "
+      "rest. Take the in-run bias stability of the data sheet: 7e-5 is 14 deg/h.");
   list.number(
       "prior_sigma_accel_bias", "m/s^2", above(0), smoother.prior_sigma_accel_bias,
-      "The accelerometer bias of the first state has this standard deviation. Divided by gravity it is that "
-      "of roll and pitch, too. 0.05 to 0.3 are typical of a MEMS.");
+      "The accelerometer bias of the first state has this standard deviation. Divided by gravity, it is also "
+      "the standard deviation of roll and pitch. 0.05 to 0.3 are typical of a MEMS.");
 }
 
 void listOffsetSteps(ParameterList& list, OffsetStepDetectorOptions& monitor) {
   list.boolean(
       "time_offset_step_detection", monitor.enabled,
-      "The estimator looks for steps of the offset, as after a restart of the driver, and then estimates "
-      "the offset again. Set it to false if the offset cannot step.");
+      "The estimator looks for steps of the offset, as after a restart of the driver. After a step it "
+      "estimates the offset again. Set it to false if the offset cannot step.");
   list.number(
       "time_offset_step_memory", "s", above(0), monitor.memory,
-      "The detector averages the scans of about this time. A longer time finds smaller steps, later.");
+      "The detector averages the scans of about this time. A longer time finds smaller steps, but finds them "
+      "later.");
   list.number(
       "time_offset_step_significance", "", above(0), monitor.significance,
-      "The offset has stepped if the scans ask for a change of so many standard deviations. Raise it if the "
-      "detector fires without a step.");
+      "The offset has stepped if the scans ask for a change of this many standard deviations. Raise it if "
+      "the detector fires without a step.");
   list.number("time_offset_step_min", "s", above(0), monitor.min_change,
-              "The detector ignores smaller steps, which the random walk of the offset follows.");
+              "The detector ignores steps smaller than this. The random walk of the offset follows them.");
 }
 
 }  // namespace
@@ -118,8 +116,8 @@ void listInitialization(ParameterList& list, Config& c) {
       "an engine that vibrates at rest.");
   list.number(
       "init_max_gyro_mean", "rad/s", above(0), init.max_gyro_mean,
-      "The platform counts as turning if the mean of the gyro is larger than this on one axis. Raise it for "
-      "a cheap gyro with a larger bias.");
+      "The platform counts as turning if the mean of the gyro is larger than this in size. Raise it for a "
+      "cheap gyro with a larger bias.");
   list.number(
       "init_max_gravity_error", "m/s^2", above(0), init.max_gravity_error,
       "A start at rest is refused if the size of the mean acceleration differs from gravity by more than "
@@ -132,7 +130,7 @@ void listInitialization(ParameterList& list, Config& c) {
   list.number(
       "init_motion_max_gravity_error", "m/s^2", above(0), motion.max_gravity_error,
       "A start in motion is refused if radar and IMU together show a gravity that is wrong by more than "
-      "this. Then units, mounting or Doppler sign are wrong.");
+      "this. Then the units, the mounting or the Doppler sign are wrong.");
   list.number(
       "init_motion_max_outlier_fraction", "", between(0, 1), motion.max_outlier_fraction,
       "A start in motion is refused if more than this share of the radar velocities does not fit the IMU.");
@@ -151,24 +149,21 @@ void listRest(ParameterList& list, Config& c) {
   list.boolean(
       "rest_enabled", rest.enabled,
       "The estimator holds the velocity at zero while the IMU sees rest. Set it to false on a platform that "
-      "moves smoothly at a creep, such as a crane.");
+      "moves slowly and smoothly, such as a crane.");
   list.number("rest_window", "s", above(0), rest.window,
-              "The IMU must have been still for this time before it counts as rest.");
+              "The platform counts as at rest once the IMU has been still for this time.");
   list.number("rest_max_gyro_std", "rad/s", above(0), rest.max_gyro_std,
               "The IMU is still if the gyro scatters less than this on each axis over rest_window.");
   list.number("rest_max_accel_std", "m/s^2", above(0), rest.max_accel_std,
               "The IMU is still if the accelerometer scatters less than this on each axis over rest_window.");
-  list.number(
-      "rest_max_rate", "rad/s", above(0), rest.max_rate,
-      "The IMU is still if the mean of the gyro, without its bias, is smaller than this on each axis.");
+  list.number("rest_max_rate", "rad/s", above(0), rest.max_rate,
+              "The IMU is still if the mean of the gyro, without its bias, is smaller than this in size.");
   list.number(
       "rest_max_accel_error", "m/s^2", above(0), rest.max_accel_error,
-      "The IMU is still if the mean of the accelerometer, without bias and gravity, is smaller than this on "
-      "each axis.");
-  list.number(
-      "rest_max_speed", "m/s", above(0), rest.max_speed,
-      "An IMU that is still counts as a smooth ride, not as rest, if the estimated speed is larger than "
-      "this.");
+      "The IMU is still if the mean of the accelerometer, without bias and gravity, is smaller than this in "
+      "size.");
+  list.number("rest_max_speed", "m/s", above(0), rest.max_speed,
+              "If the estimated speed is larger than this, a still IMU shows a smooth ride, not rest.");
   list.number(
       "rest_velocity_sigma", "m/s", above(0), rest.velocity_sigma,
       "The zero velocity at rest has this standard deviation on each axis. 0.05 suits a hand that holds "
@@ -190,8 +185,8 @@ void listTimeOffset(ParameterList& list, Config& c) {
       "paper does, and is for comparison.");
   list.boolean(
       "time_offset_shared", smoother.time_offset_shared,
-      "All radars have one clock, and so one offset. Set it to true if one trigger line or one computer "
-      "stamps all of them. false gives each radar its own offset.");
+      "true gives all radars one offset. Use it if one trigger line or one computer stamps all scans. false "
+      "gives each radar its own offset.");
   list.ofRadar(true);
   list.first().number(
       "time_offset_initial", "s", anyNumber(), smoother.time_offset_initial,
@@ -199,21 +194,21 @@ void listTimeOffset(ParameterList& list, Config& c) {
       "it to what an earlier run or `calibrate` found; zero works for offsets of up to 0.2 s.");
   list.number(
       "time_offset_sigma", "s", above(0), smoother.time_offset_sigma,
-      "The estimate of the offset starts with this standard deviation. Lower it after a calibration, raise "
-      "it with max_time_offset.");
+      "The estimate of the offset starts with this standard deviation. Lower it after a calibration. Raise "
+      "it if you raise max_time_offset.");
   list.ofRadar(false);
   list.number(
       "time_offset_noise", "s/sqrt(s)", above(0), smoother.time_offset_noise,
-      "The offset may wander by this random walk. It grows by itself if the scans ask for a change all the "
-      "time, as they do if clocks drift.");
+      "The offset may wander by this random walk. The estimator raises the random walk if the scans keep "
+      "asking for a change, as they do if clocks drift.");
   list.number(
       "time_offset_min_acceleration", "m/s^2", atLeast(0), smoother.time_offset_min_acceleration,
-      "A scan informs the offset only if the radar accelerates more than this, and more than five sigma of "
-      "the IMU's noise. Otherwise the offset holds still.");
+      "A scan informs the offset only if the radar accelerates more than this. It informs the offset less, "
+      "or not at all, if noise of the IMU could explain the accelerations of the last 20 s.");
   list.first().number(
       "max_time_offset", "s", above(0, 1), smoother.max_time_offset,
-      "The size of the offset cannot exceed this, of either sign. Raise it if a run ends with the "
-      "offset at its bound; the buffers grow with it. Use radar_stamp_shift for delays above 1 s.");
+      "The offset cannot exceed this in size. Raise it if a run ends with the offset at this bound; the "
+      "buffers grow with it. Use radar_stamp_shift for delays above 1 s.");
   listOffsetSteps(list, c.odometry.offset_step_detector);
 }
 
@@ -230,20 +225,19 @@ void listHealth(ParameterList& list, Config& c) {
   list.choice<OnDivergence>(
       "on_divergence", {{"report", OnDivergence::kReport}, {"reinitialize", OnDivergence::kReinitialize}},
       health.on_divergence,
-      "report says that the estimate diverged and goes on. reinitialize also finds velocity and tilt again "
-      "in motion "
-      "if the divergence lasts; position and heading go on.");
+      "report says that the estimate diverged and goes on. reinitialize also re-initialises velocity and "
+      "tilt in motion if the divergence lasts; position and heading go on.");
   list.number(
       "reinitialize_after", "s", atLeast(0), health.reinitialize_after,
-      "The estimator re-initialises after this time of divergence. For so long the IMU alone is better than "
-      "a radar that contradicts it, as in front of a bus that passes.");
+      "The estimator re-initialises after this time of divergence. Until then the IMU alone is better than a "
+      "radar that contradicts it, as in front of a bus that passes.");
   list.number("divergence_window", "s", above(0, 60), health.window,
               "The health is judged by the scans of this time.");
   list.number(
       "divergence_max_contradiction", "", inside(0, 1), health.max_contradiction,
-      "The estimate diverged if the scans of divergence_window contradict the prediction more than this in "
-      "the mean. A scan contradicts by the square of its distance in units of innovation_gate, at most 1. A "
-      "scan without a majority of points counts 0.");
+      "The estimate diverged if the mean contradiction of the scans in divergence_window is larger than "
+      "this. The contradiction of a scan is the square of its distance from the prediction, in units of "
+      "innovation_gate, and at most 1. It is 0 if no majority of the points agrees.");
   list.number(
       "divergence_max_velocity_sigma", "m/s", above(0), health.max_velocity_sigma,
       "The estimate diverged if the standard deviation of the velocity is larger than this on one axis.");
@@ -257,14 +251,15 @@ void listLandmarks(ParameterList& list, Config& c) {
   list.group("Landmarks: static points that come back hold position and heading");
   list.boolean(
       "landmarks", landmarks.enabled,
-      "true keeps static detections as points of the world, and position and heading drift less where they "
-      "come back. The map must prove itself first; until then nothing changes. It costs several times the "
-      "computing time. mode: batch solves without them.");
+      "true keeps static detections as points of the world. Position and heading drift less if the points "
+      "come back. The map must prove itself first; until then nothing changes. Landmarks cost several times "
+      "the computing time. mode: batch solves without them.");
   list.integer("landmarks_max", between(1, 100), landmarks.max_landmarks,
-               "The window holds so many landmarks at once. The cost grows faster than their number.");
+               "The window holds at most this many landmarks at once. The cost grows faster than their "
+               "number.");
   list.number("radar_range_sigma", "m", above(0), landmarks.range_sigma,
-              "The range of a point has this noise. Only landmarks use it. Too small a value makes the map "
-              "contradict itself, and it is dropped (landmarks_dropped).");
+              "The range of a point has this noise. Only landmarks use it. If the value is too small, the "
+              "map contradicts itself, and the estimator drops the map (landmarks_dropped).");
 }
 
 }  // namespace rio_t

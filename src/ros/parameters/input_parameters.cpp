@@ -11,8 +11,9 @@ void listTopics(ParameterList& list, Config& c) {
   list.group("Topics");
   list.first().text(
       "imu_topic", c.imu_topic,
-      "The IMU publishes sensor_msgs/Imu on this topic, in m/s^2 and rad/s. 100 to 1000 samples a "
-      "second are typical. The orientation in the message is not used.");
+      "The IMU publishes sensor_msgs/Imu on this topic, in m/s^2 and rad/s unless imu_acceleration_unit or "
+      "imu_rate_unit says otherwise. 100 to 1000 samples a second are typical. The orientation in the "
+      "message is not used.");
   list.ofRadar(true);
   list.first().text(
       "radar_topic", c.radar_topic,
@@ -33,8 +34,8 @@ void listRadars(ParameterList& list, Config& c) {
   list.group("Several radars");
   list.radarNames(
       "radars", c.radars,
-      "Name your radars here if you have more than one. Each name has a section (left: {radar_topic: "
-      "...}) with its own values of the keys that say \"per radar\". It takes the rest from the top "
+      "Name your radars here if you have more than one. Each name has a section (left: {radar_topic: ...}) "
+      "with its own values of the keys that say \"per radar\". The radar takes the other keys from the top "
       "level. An empty list means one radar without a section.");
 }
 
@@ -48,30 +49,27 @@ void listStamps(ParameterList& list, Config& c) {
        {"arrival", StampSource::kArrival}},
       c.stamp_source,
       "This says where the time of a scan comes from. header takes the stamp of the cloud. trigger takes the "
-      "stamp "
-      "of the trigger message that belongs to the scan. arrival takes the time at which the scan arrived, "
-      "carried "
-      "over into the clock of the IMU. Use arrival if the driver leaves the stamp at zero and there is no "
-      "trigger. The estimated time offset covers the delay that remains.");
+      "stamp of the trigger message that belongs to the scan. arrival takes the time at which the scan "
+      "arrived, converted to the clock of the IMU. Use arrival if the driver leaves the stamp at zero and "
+      "there is no trigger. The estimated time offset covers the delay that remains.");
   // The bounds keep sums and differences of stamps within 64 bits of nanoseconds.
-  list.number(
-      "radar_stamp_shift", "s", between(-2e9, 2e9), c.radar_stamp_shift,
-      "This is added to the stamp of every scan. Use it for a delay that you know and that is larger than "
-      "max_time_offset: a delay of 0.5 s is -0.5 here. Most set-ups leave it at zero.");
+  list.number("radar_stamp_shift", "s", between(-2e9, 2e9), c.radar_stamp_shift,
+              "This is added to the stamp of every scan. Use it for a known delay that is larger than "
+              "max_time_offset. For a delay of 0.5 s, set -0.5. Most set-ups leave it at zero.");
 }
 
 void listFrames(ParameterList& list, Config& c) {
   list.group("Frames");
   list.text("odom_frame", c.odom_frame,
-            "This is the name of the world frame. Its z axis points up. It starts at the first pose of "
-            "base_link_frame.");
+            "This is the name of the world frame. Its z axis points up. Its origin and heading are those of "
+            "the first pose of base_link_frame.");
   list.first().text(
       "base_link_frame", c.base_link_frame,
       "This is the body whose odometry the live node publishes. The IMU may sit elsewhere on it.");
   list.textOrEmpty(
       "imu_frame", c.imu_frame,
-      "This is the name of the frame of the IMU. If it is empty, the frame_id of the IMU's messages "
-      "names it. Set it if your driver writes a frame that tf does not know.");
+      "This is the name of the frame of the IMU. If this is empty, the name is the frame_id of the IMU's "
+      "messages. Set it if your driver writes a frame that tf does not know.");
   list.choice<BaseExtrinsicsSource>("base_extrinsics_source",
                                     {{"auto", BaseExtrinsicsSource::kAuto},
                                      {"parameters", BaseExtrinsicsSource::kParameters},
@@ -90,7 +88,8 @@ void listFrames(ParameterList& list, Config& c) {
   list.text(
       "radar_frame", c.radar_frame,
       "This is the frame in which the live node shows what the radar sees: x forward, y left, z up. With "
-      "several radars the default is rio_t_radar_NAME. Nobody else may publish a transform of it.");
+      "several radars the default is rio_t_radar_NAME. No other node may publish a transform of this frame, "
+      "unless publish_radar_tf is false.");
   list.ofRadar(false);
   list.boolean("publish_tf", c.publish_tf,
                "The live node publishes the transform from odom_frame to base_link_frame. Set it to false if "
@@ -105,8 +104,8 @@ void listFrames(ParameterList& list, Config& c) {
       "base_link_frame already has another parent, since a frame can have only one.");
   list.number(
       "tf_rate", "Hz", atLeast(0), c.tf_rate,
-      "The live node publishes the transform of odom_frame this often. 0 means with each IMU sample. 50 is "
-      "enough for most consumers of tf.");
+      "The live node publishes the transform between odom_frame and base_link_frame this often. 0 means with "
+      "each IMU sample. 50 is enough for most consumers of tf.");
   list.number("odom_rate", "Hz", atLeast(0), c.odom_rate,
               "The live node publishes ~odom this often. 0 means with each IMU sample. Use 30 to 50 for an "
               "autopilot.");
@@ -142,8 +141,8 @@ void listPointCloud(ParameterList& list, Config& c) {
                    "This field of the cloud holds the z coordinate of a point [m].");
   list.textOrEmpty(
       "radar_field_azimuth", c.radar_overrides.azimuth,
-      "This field holds the azimuth of a point, from forward towards the lateral axis [rad]. Only "
-      "radar_coordinates: spherical reads it.");
+      "This field holds the azimuth of a point [rad]. Zero is forward. Positive is right for rfu and left "
+      "for flu. Only radar_coordinates: spherical reads it.");
   list.textOrEmpty("radar_field_elevation", c.radar_overrides.elevation,
                    "This field holds the elevation of a point, positive up [rad]. Only radar_coordinates: "
                    "spherical reads it.");
@@ -164,7 +163,7 @@ void listPointCloud(ParameterList& list, Config& c) {
       "radar_power_unit", {"", "snr_db", "snr_decidb", "snr_linear", "not_snr"}, c.radar_overrides.power_unit,
       "This is the unit of the power field. snr_db: signal to noise in dB. snr_decidb: in steps of 0.1 dB. "
       "snr_linear: a plain ratio. not_snr: something else, such as RCS; then the field is not read and "
-      "radar_min_snr_db does not apply. Change it if radar_min_snr_db takes almost all points.");
+      "radar_min_snr_db does not apply. Change it if radar_min_snr_db removes almost all points.");
   list.word(
       "radar_cloud_size", {"", "declared", "from_data"}, c.radar_overrides.size,
       "This says how the number of points is found. declared: width times height. from_data: from the length "
@@ -178,19 +177,17 @@ void listExtrinsics(ParameterList& list, Config& c) {
       "extrinsics_source", {{"parameters", ExtrinsicsSource::kParameters}, {"tf", ExtrinsicsSource::kTf}},
       c.extrinsics_source,
       "This says where the mounting of the radar comes from. parameters takes the keys of this section. tf "
-      "takes "
-      "the transform from the frame_id of the cloud to the frame of the IMU, in the axes of the cloud. "
-      "rio_t_bag "
-      "takes it from the tf in the bag.");
+      "takes the transform from the frame_id of the cloud to the frame of the IMU, in the axes of the cloud. "
+      "rio_t_bag takes the transform from the tf in the bag.");
   list.first().vector3(
       "extrinsics_translation", "m", between(-100, 100), c.odometry.T_IR.l_I,
       "This is the position of the radar in the IMU frame, x, y, z. A tape measure is good enough: "
       "1 cm of error matters only if the platform turns fast.");
   list.first().rotation(
       "extrinsics_rotation_xyzw", c.odometry.T_IR.q_IR,
-      "This quaternion turns radar vectors (x right, y forward, z up) into the IMU frame. An error "
-      "of a degree bends the path by about 2 % of its length. Set estimate_extrinsics: rotation if "
-      "you know it to 10 degrees only, or find it with `calibrate`.");
+      "This quaternion turns radar vectors (x right, y forward, z up) into the IMU frame. An error of a "
+      "degree bends the path by about 2 % of its length. If you know the rotation only to 10 degrees, set "
+      "estimate_extrinsics: rotation, or run `calibrate`.");
   list.choice<ExtrinsicsAxes>(
       "extrinsics_axes", {{"rfu", ExtrinsicsAxes::kRightForwardUp}, {"cloud", ExtrinsicsAxes::kCloud}},
       c.extrinsics_axes,
@@ -199,9 +196,9 @@ void listExtrinsics(ParameterList& list, Config& c) {
       "of the cloud. cloud: the axes of the cloud itself, as a tf or a calibration tool gives them.");
   list.first().mounting(
       "mounting_yaw_pitch_roll_deg", c.mounting,
-      "This is the rotation in words, instead of extrinsics_rotation_xyzw: yaw to the left, pitch "
-      "up, roll right side down. The IMU has x forward, y left, z up. [0, 0, 0] is an upright radar "
-      "that looks forward. [] means that extrinsics_rotation_xyzw holds. Give only one of the two.");
+      "These angles replace extrinsics_rotation_xyzw: yaw to the left, pitch up, roll right side down. They "
+      "assume an IMU with x forward, y left, z up. [0, 0, 0] is an upright radar that looks forward. [] "
+      "means that extrinsics_rotation_xyzw is used. Give only one of the two.");
 }
 
 void listEstimateExtrinsics(ParameterList& list, Config& c) {
@@ -219,8 +216,8 @@ void listEstimateExtrinsics(ParameterList& list, Config& c) {
       "calibration.");
   list.number(
       "extrinsics_rotation_sigma", "rad", above(0, kPi), smoother.extrinsics_rotation_sigma,
-      "The estimate starts with this standard deviation about each axis. 0.17 rad (10 degrees) suits a "
-      "mounting by eye, 0.02 rad a mounting from a drawing.");
+      "The estimate of the rotation starts with this standard deviation about each axis. 0.17 rad (10 "
+      "degrees) suits a mounting by eye, 0.02 rad a mounting from a drawing.");
   list.number("extrinsics_translation_sigma", "m", above(0, 100), smoother.extrinsics_translation_sigma,
               "The estimate of the position starts with this standard deviation along each axis. Only "
               "estimate_extrinsics: pose uses it.");

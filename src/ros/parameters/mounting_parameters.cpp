@@ -29,7 +29,7 @@ void beginMounting(const ParameterEntries& entries, const std::string& section, 
   if (quaternion != nullptr && tells(angles)) {
     faults->push_back(angles->origin + ": " + section + "mounting_yaw_pitch_roll_deg and " + section +
                       "extrinsics_rotation_xyzw (" + quaternion->origin +
-                      "): expected only one of the two, as both tell the same rotation");
+                      "): expected only one of the two, since both set the same rotation");
   }
   if (quaternion != nullptr) config->mounting.reset();
 }

@@ -21,14 +21,12 @@ void listBag(ParameterList& list, Config& c) {
       "mode", {{"online", RunMode::kOnline}, {"batch", RunMode::kBatch}, {"refine", RunMode::kRefine}},
       c.mode,
       "This is how rio_t_bag works through a bag. online gives what a live user gets. batch solves the whole "
-      "bag "
-      "at once after an online pass, which is the most accurate. refine plays the bag several times and "
-      "takes "
-      "the offset found before off the stamps.");
+      "bag at once after an online pass, which is the most accurate. refine plays the bag several times. "
+      "Before each new pass it subtracts the offset found so far from the stamps.");
   list.integer("refine_passes", between(1, 100), c.refine_passes,
-               "mode: refine plays the bag so many times. Three passes are enough for most bags.");
+               "mode: refine plays the bag this many times. Three passes are enough for most bags.");
   list.integer("batch_max_iterations", between(1, 10000), c.batch_max_iterations,
-               "The solver of mode: batch stops after so many iterations. Raise it if summary.yaml says "
+               "The solver of mode: batch stops after this many iterations. Raise it if summary.yaml says "
                "batch_converged: false.");
   list.number("bag_start", "s", atLeast(0), c.bag_start,
               "The bag runner leaves out this much of the bag at its beginning.");

@@ -11,6 +11,7 @@ inline Range above(double min) { return {min, anyNumber().max, true, false}; }
 inline Range above(double min, double max) { return {min, max, true, false}; }
 inline Range between(double min, double max) { return {min, max, false, false}; }
 inline Range inside(double min, double max) { return {min, max, true, true}; }
+inline Range below(double min, double max) { return {min, max, false, true}; }  ///< min itself counts
 
 // Input, and where the sensors are.
 void listTopics(ParameterList& list, Config& config);

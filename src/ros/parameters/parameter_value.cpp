@@ -65,7 +65,7 @@ ParameterEntries fromYamlMap(const YAML::Node& map, bool sections, const OriginO
     const int line = item.first.Mark().line + 1;
     const std::string origin = originOf(line);
     if (!item.first.IsScalar())
-      throw std::runtime_error(origin + ": expected `key: value`, the key is no text");
+      throw std::runtime_error(origin + ": expected `key: value` with text as the key");
     const std::string key = item.first.Scalar();
     const auto [first, is_new] = line_of.emplace(key, line);
     if (!is_new) {

@@ -191,7 +191,7 @@ void addContradictions(const Config& config, std::vector<std::string>* faults) {
                       "\" for both");
   if (config.radar_frame == config.base_link_frame || config.radar_frame == config.odom_frame)
     faults->push_back(section + "radar_frame: expected a frame of its own, got \"" + config.radar_frame +
-                      "\" as base_link_frame or odom_frame");
+                      "\", which is base_link_frame or odom_frame");
   const EgoVelocityOptions& radar = config.odometry.ego_velocity;
   const SmootherOptions& smoother = config.odometry.smoother;
   if (radar.min_range >= radar.max_range) {
@@ -400,7 +400,7 @@ std::string findConfigFile(const std::string& name_or_path) {
   std::string known;
   for (const std::string& name : names) known += (known.empty() ? "" : ", ") + name;
   throw std::runtime_error("configuration " + name_or_path +
-                           ": no such file, and none of the package's: " + known);
+                           ": no such file; configurations of the package: " + known);
 }
 
 }  // namespace rio_t

@@ -12,9 +12,9 @@ void listPointFilter(ParameterList& list, EgoVelocityOptions& radar) {
               "Points farther than this are left out. Lower it if far points are mostly ghosts.");
   list.first().number(
       "radar_min_snr_db", "dB", anyNumber(), radar.min_snr_db,
-      "Points with a weaker signal to noise than this are left out. 3 to 10 dB are typical. Lower it "
-      "if too few points are left, raise it in clutter. If it takes almost all points, the preset "
-      "reads the power in another unit: see radar_power_unit.");
+      "Points with a weaker signal to noise than this are left out. 3 to 10 dB are typical. Lower it if too "
+      "few points are left. Raise it in clutter. If it removes almost all points, the preset reads the power "
+      "in the wrong unit: see radar_power_unit.");
   list.number(
       "radar_max_azimuth", "rad", above(0, kPi), radar.max_azimuth,
       "Points farther than this to either side of forward are left out. Lower it if points at the edge of "
@@ -26,50 +26,50 @@ void listPointFilter(ParameterList& list, EgoVelocityOptions& radar) {
 
 void listStandstill(ParameterList& list, EgoVelocityOptions& radar) {
   list.number("zero_velocity_threshold", "m/s", atLeast(0), radar.zero_velocity_threshold,
-              "A smaller Doppler counts as zero in the test for standstill. 0 derives it: half of "
+              "A Doppler smaller than this counts as zero in the test for standstill. 0 means half of "
               "radar_doppler_step, or 1.5 radar_doppler_sigma if that is more.");
-  list.number("zero_velocity_outlier_fraction", "", between(0, 1), radar.zero_velocity_outlier_fraction,
+  list.number("zero_velocity_outlier_fraction", "", below(0, 1), radar.zero_velocity_outlier_fraction,
               "A scan counts as standstill if at most this share of its Dopplers is larger than "
               "zero_velocity_threshold. Raise it if many things move around a platform that stands.");
   list.number(
       "zero_velocity_sigma", "m/s", above(0), radar.zero_velocity_sigma,
-      "The velocity of a scan at standstill has this standard deviation per axis. The motion that a step of "
-      "the Doppler hides comes on top.");
+      "The velocity of a scan at standstill has this standard deviation per axis. The estimator adds the "
+      "motion that a step of the Doppler can hide.");
 }
 
 void listConsensus(ParameterList& list, EgoVelocityOptions& radar) {
   list.number(
       "ransac_inlier_threshold", "m/s", atLeast(0), radar.ransac_inlier_threshold,
-      "A point is an inlier if its Doppler differs from that of a static point by less than this. 0 derives "
-      "it: half of radar_doppler_step plus 2.5 radar_doppler_sigma.");
+      "A point is an inlier if its Doppler differs from that of a static point by less than this. 0 means "
+      "half of radar_doppler_step plus 2.5 radar_doppler_sigma.");
   list.number(
-      "ransac_outlier_probability", "", Range{0, 1, false, true}, radar.ransac_outlier_probability,
-      "RANSAC expects this share of outliers, and draws accordingly often. Raise it in crowds and heavy "
-      "clutter; 0.6 costs five times as many draws.");
+      "ransac_outlier_probability", "", below(0, 1), radar.ransac_outlier_probability,
+      "RANSAC expects this share of outliers. A larger share takes more draws: 0.6 takes almost four times "
+      "as many as 0.4. Raise it in crowds and heavy clutter.");
   list.number(
       "ransac_success_probability", "", inside(0, 1), radar.ransac_success_probability,
-      "RANSAC draws until it has hit inliers only, once, with this probability. There is seldom a reason to "
+      "With this probability, at least one draw of RANSAC has only inliers. There is seldom a reason to "
       "change it.");
   list.number(
       "ego_velocity_prior_gate", "", above(0), radar.prior_gate,
-      "A velocity contradicts the prediction of the IMU if it is farther from it than so many standard "
-      "deviations. The points that agree with the prediction are then preferred, e.g. beside a bus.");
+      "A velocity contradicts the prediction of the IMU if the two are more than this many standard "
+      "deviations apart. The estimator then prefers the points that agree with the prediction, e.g. beside a "
+      "bus.");
   list.integer(
       "ransac_seed", atLeast(0), radar.ransac_seed,
       "This seeds the random draws anew at each scan, so that the same scan gives the same velocity. "
       "Change it only to see how much the draws matter.");
   list.integer(
       "ego_velocity_min_inliers", atLeast(3), radar.min_inliers,
-      "A velocity needs at least so many inliers. It has three unknowns, the other inliers confirm it. "
-      "With radar_factor: doppler, a scan with fewer points still counts point by point.");
+      "A velocity needs at least this many inliers. Three determine it, and the others confirm it. With "
+      "radar_factor: doppler, a scan with fewer points still counts point by point.");
   list.number(
       "ego_velocity_min_inlier_fraction", "", between(0, 1), radar.min_inlier_fraction,
-      "A velocity needs at least this share of the points as inliers, since fewer agree by chance. Lower it "
-      "with care if most points are clutter.");
-  list.number(
-      "ego_velocity_prior_min_inlier_fraction", "", between(0, 1), radar.prior_min_inlier_fraction,
-      "If the velocity of the majority contradicts the IMU, this share of the points is enough for one that "
-      "agrees with the IMU.");
+      "A velocity needs at least this share of the points as inliers, since fewer can agree by chance. Lower "
+      "it with care if most points are clutter.");
+  list.number("ego_velocity_prior_min_inlier_fraction", "", between(0, 1), radar.prior_min_inlier_fraction,
+              "If the velocity of the majority contradicts the IMU, this share of the points is enough for a "
+              "velocity that agrees with the IMU.");
 }
 
 void listPointNoise(ParameterList& list, EgoVelocityOptions& radar) {
@@ -81,34 +81,34 @@ void listPointNoise(ParameterList& list, EgoVelocityOptions& radar) {
       "noise "
       "of its direction and removes the bias that this noise causes. ls is for comparison.");
   list.number(
-      "radar_azimuth_sigma", "rad", atLeast(0), radar.azimuth_sigma,
+      "radar_azimuth_sigma", "rad", below(0, 0.5), radar.azimuth_sigma,
       "The azimuth of a point has this noise at the start. eiv learns it on the way. 0.02 to 0.05 rad are "
       "typical of small radars.");
   list.number(
-      "radar_elevation_sigma", "rad", atLeast(0), radar.elevation_sigma,
+      "radar_elevation_sigma", "rad", below(0, 0.5), radar.elevation_sigma,
       "The elevation of a point has this noise at the start. eiv learns it on the way. 0.03 to 0.1 rad are "
       "typical of small radars, which have few antennas above each other.");
-  list.number(
-      "radar_doppler_sigma", "m/s", atLeast(0), radar.doppler_sigma,
-      "The Doppler of a point has this noise at the start, besides that of its steps. eiv learns it on the "
-      "way.");
+  list.number("radar_doppler_sigma", "m/s", atLeast(0), radar.doppler_sigma,
+              "The Doppler of a point has this noise at the start, in addition to the rounding to "
+              "radar_doppler_step. eiv learns it on the way.");
   list.number(
       "radar_doppler_span", "m/s", atLeast(0), radar.doppler_span,
-      "This is the whole span of the Doppler that the radar can tell apart. A faster point appears on the "
-      "other side. 0 reads it off the data. Give it if you know it and drive faster than half of it.");
+      "The radar measures Dopplers over this span, from the lowest to the highest. A faster point appears at "
+      "the other end of the span (aliasing). 0 reads the span off the data. Set it if you know it and drive "
+      "faster than half of it.");
   list.number(
       "radar_doppler_step", "m/s", atLeast(0), radar.doppler_quantization,
-      "The radar gives the Doppler in steps of this size. 0 reads it off the data. A value below 0.02 means "
-      "no steps. Give it if you know it and the bag is short.");
+      "The radar gives the Doppler in steps of this size. 0 reads it off the data. Any other value below "
+      "0.02 means no steps. Set it if you know it and the bag is short.");
   list.vector3(
       "ego_velocity_added_sigma", "m/s", atLeast(0), radar.added_sigma,
-      "This standard deviation (right, forward, up) is added to the velocity of a scan in quadrature. It "
-      "stands for errors that the points share, such as multipath and slow objects. It is the start: the "
-      "estimator scales it by what the scans show.");
+      "The estimator adds this standard deviation (right, forward, up) in quadrature to that of the velocity "
+      "of a scan. It stands for errors that the points share, such as multipath and slow objects. This is "
+      "the start value: the estimator scales it by what the scans show.");
   list.number(
-      "ego_velocity_max_condition_number", "", atLeast(1), radar.max_condition_number,
-      "A scan is rejected if the directions of its inliers span space worse than this: it bounds the "
-      "condition number of H'H, with H the unit directions. It happens if all points lie in one direction.");
+      "ego_velocity_max_condition_number", "", above(1), radar.max_condition_number,
+      "This bounds the condition number of H'H, with the unit directions of the inliers as the rows of H. A "
+      "scan above it is rejected, for example if all points lie in one direction.");
   list.number(
       "ego_velocity_max_sigma", "m/s", above(0), radar.max_sigma,
       "A scan in motion is rejected if the standard deviation of its velocity is larger than this along any "
@@ -135,9 +135,9 @@ void listImu(ParameterList& list, Config& c) {
               "This is the size of gravity at your place: 9.78 at the equator, 9.83 at the poles.");
   list.first().number(
       "imu_accel_noise_density", "m/s^2/sqrt(Hz)", above(0), c.odometry.imu_noise.accel_density,
-      "This is the white noise of the accelerometer, from its data sheet or an Allan plot. 0.001 to "
-      "0.02 are typical. It is the start: the estimator takes more if the samples or the radar show "
-      "more. A value two or three times that of the data sheet is a good choice.");
+      "This is the white noise of the accelerometer, from its data sheet or an Allan plot. 0.001 to 0.02 are "
+      "typical. This is the start value: the estimator takes more if the samples or the radar show more. A "
+      "value two or three times that of the data sheet is a good choice.");
   list.first().number(
       "imu_gyro_noise_density", "rad/s/sqrt(Hz)", above(0), c.odometry.imu_noise.gyro_density,
       "This is the white noise of the gyro, from its data sheet or an Allan plot. 0.00005 to 0.001 "
@@ -163,23 +163,23 @@ void listGaps(ParameterList& list, Config& c) {
               "The estimate starts again after a longer gap, or if the stamps of the IMU run back.");
   list.number(
       "imu_jump_patience", "s", above(0), gate.jump_patience,
-      "IMU samples with stamps of quite another time are dropped. After this time the clock counts as "
-      "jumped, and the estimate starts again.");
+      "The estimator drops IMU samples whose stamps jump ahead or run back. If such samples go on for this "
+      "time, the clock has jumped, and the estimate starts again.");
   list.number(
       "imu_accel_range", "m/s^2", atLeast(0), gate.accel_range,
-      "This is the largest reading of the accelerometer on one axis. A sample there is clipped and counts "
-      "less. 0 finds it from flat tops in the data. A data sheet says 16 g, for example: 156.9.");
+      "This is the largest reading of the accelerometer on one axis. A sample at this value is clipped and "
+      "counts less. 0 finds the range from flat tops in the data. If the data sheet says 16 g, set 156.9.");
   list.number(
       "imu_gyro_range", "rad/s", atLeast(0), gate.gyro_range,
-      "This is the largest reading of the gyro on one axis. A sample there is clipped and counts less. 0 "
-      "finds it from flat tops in the data. A data sheet says 2000 deg/s, for example: 34.9.");
+      "This is the largest reading of the gyro on one axis. A sample at this value is clipped and counts "
+      "less. 0 finds the range from flat tops in the data. If the data sheet says 2000 deg/s, set 34.9.");
   list.number(
       "imu_unseen_accel_density", "m/s^2/sqrt(Hz)", above(0), gate.unseen_accel_density,
       "This noise stands for the acceleration that the IMU does not see, in gaps and beyond its range. The "
       "default suits people and drones. Lower it for a slow vehicle.");
   list.number(
       "imu_unseen_gyro_density", "rad/s/sqrt(Hz)", above(0), gate.unseen_gyro_density,
-      "This noise stands for the turn that the IMU does not see: in gaps, beyond its range, and while an "
+      "This noise stands for the rotation that the IMU does not see: in gaps, beyond its range, and while an "
       "axis sticks. The default suits people and drones. Lower it for a slow vehicle.");
   list.number(
       "max_radar_gap", "s", above(0), c.odometry.max_radar_gap,
@@ -203,10 +203,11 @@ void listFeasibility(ParameterList& list, Config& c) {
               "The velocity of a scan is compared with the mean velocity over this time before it.");
   list.number(
       "feasibility_max_acceleration", "m/s^2", above(0), c.odometry.feasibility.max_acceleration,
-      "A scan is rejected as infeasible if its velocity leaves that mean faster than this. Three g suit "
-      "people and drones. Lower it for a heavy vehicle.");
+      "A scan is rejected as infeasible if its velocity departs from the mean over feasibility_window faster "
+      "than this. Three g suit people and drones. Lower it for a heavy vehicle.");
   list.number("feasibility_margin", "m/s", atLeast(0), c.odometry.feasibility.margin,
-              "A difference up to this is always allowed. It stands for the noise of the radar's velocity.");
+              "A difference from the mean of up to this is always allowed. It stands for the noise of the "
+              "radar's velocity.");
 }
 
 }  // namespace rio_t
