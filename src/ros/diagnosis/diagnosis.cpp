@@ -161,14 +161,12 @@ class RadarCauses {
     if (shareOf(static_cast<std::uint64_t>(kept), radar_.points) > 1.0 - kManyPoints || radar_.points == 0) {
       status("too_few_points",
              "have too few points for a velocity: " + number(kept_per_scan) + " on average after the filter.",
-             "Let the radar report more points: a lower detection threshold in its driver. Set radar_factor: "
-             "doppler "
-             "if it is not.");
+             "Set a lower detection threshold in the driver of the radar. Set radar_factor: doppler if it is "
+             "velocity.");
     }
     status("too_few_inliers", "have no velocity that enough of their points agree on.",
            "Check " + key_ + "radar_field_doppler, " + key_ +
-               "radar_axes and the positions. Moving things in view "
-               "do the same.");
+               "radar_axes and the positions. Moving things in view have the same effect.");
     status("ill_conditioned", "have all their points in one direction.",
            "Widen the view of the radar: " + key_ + "radar_max_azimuth and " + key_ + "radar_max_elevation.");
     status("sigma_too_large", "have a velocity that is too uncertain.",
@@ -186,7 +184,7 @@ class RadarCauses {
     cause("contradicts_imu", share,
           outOf(contradicted, judged, "scans") + of_ + " show a velocity that contradicts the IMU.",
           "Check the mounting (" + key_ + "extrinsics_rotation_xyzw), " + key_ + "radar_doppler_sign and " +
-              key_ + "radar_axes; estimate_extrinsics: rotation finds up to 10 degrees by itself.");
+              key_ + "radar_axes; estimate_extrinsics: rotation corrects up to 10 degrees by itself.");
   }
 
   const RadarEvidence& radar_;
@@ -204,12 +202,13 @@ void addStart(const RunEvidence& evidence, const Config& config, std::vector<Cau
   // The start in motion names gravity and mounting, the start at rest what moves.
   if (has(waiting, "radar and IMU that agree")) {
     causes->push_back({"start_contradicts", text,
-                       "Check radar_doppler_sign, radar_axes and extrinsics_rotation_xyzw, and that the IMU "
-                       "is in m/s^2 and rad/s.",
+                       "Check radar_doppler_sign, radar_axes, extrinsics_rotation_xyzw, "
+                       "imu_acceleration_unit and imu_rate_unit.",
                        0.9});
   } else if (has(waiting, "not in m/s^2?")) {
     causes->push_back({"imu_units", text,
-                       "The driver of the IMU must publish m/s^2 with gravity, and rad/s: it may publish g.",
+                       "The driver of the IMU may publish g: then set imu_acceleration_unit: g. The driver "
+                       "must not remove gravity.",
                        0.95});
   } else if (config.odometry.init_mode == InitMode::kStatic) {
     causes->push_back(
@@ -217,7 +216,7 @@ void addStart(const RunEvidence& evidence, const Config& config, std::vector<Cau
   } else {
     causes->push_back(
         {"too_short", text,
-         "Give it more data: init_duration of rest, or init_motion_after plus init_motion_window of "
+         "The start needs more data: init_duration of rest, or init_motion_after plus init_motion_window of "
          "motion.",
          0.2});
   }
@@ -230,9 +229,8 @@ void addOffset(const RunEvidence& evidence, const Config& config, std::vector<Ca
   causes->push_back({"offset_at_bound",
                      outOf(evidence.windows_at_bound, evidence.windows, "windows") +
                          " end with the time offset at its bound, max_time_offset " + number(bound) + " s.",
-                     "Raise max_time_offset, take the known delay off with radar_stamp_shift, or set "
-                     "stamp_source: arrival. A wrong "
-                     "mounting can do the same.",
+                     "Raise max_time_offset, subtract a known delay with radar_stamp_shift, or set "
+                     "stamp_source: arrival. A wrong mounting can have the same effect.",
                      share});
 }
 
@@ -245,9 +243,9 @@ void addImu(const RunEvidence& evidence, const Config& config, std::vector<Cause
       causes->push_back({name, std::to_string(count) + " " + text, remedy, std::min(1.0, share)});
   };
   fault("imu_not_usable", 1, "IMU messages cannot be used.", "Check the stamps and the values of imu_topic.");
-  fault(
-      "imu_saturated", 1, "IMU samples are at the end of the range.",
-      "Take an IMU with a larger range, or give it with imu_accel_range and imu_gyro_range if they are not.");
+  fault("imu_saturated", 1, "IMU samples are at the end of the range.",
+        "Take an IMU with a larger range. If the range found is too small, set imu_accel_range and "
+        "imu_gyro_range.");
   fault("imu_gap", 10, "gaps between IMU samples are longer than max_imu_gap.",
         "Raise max_imu_gap for a slow IMU, or look for what loses its messages.");
   fault("imu_out_of_order", 1, "IMU samples are out of order.", "Look for a second publisher on imu_topic.");
@@ -275,9 +273,8 @@ void addDivergence(const RunEvidence& evidence, std::vector<Cause>* causes) {
                      "The estimate diverged " + std::to_string(divergences) + " times, for " +
                          outOf(evidence.scans_diverged, evidence.scans_judged, "scans") +
                          ": radar and IMU contradict each other.",
-                     "Check the mounting, radar_doppler_sign and radar_axes; if it diverged only near large "
-                     "moving things, the "
-                     "estimate after it is good again.",
+                     "Check the mounting, radar_doppler_sign and radar_axes. If the estimate diverged only "
+                     "near large moving things, it is good again after them.",
                      std::max(0.05, share)});
 }
 
