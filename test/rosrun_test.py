@@ -1,6 +1,7 @@
 """rosrun finds each program, and once."""
 import os
 import pathlib
+from xml.etree import ElementTree
 
 import pytest
 
@@ -17,3 +18,7 @@ def test_program_is_found(program):
     done = programs.run("rosrun", "rio_t", program, "--help", stdin=None)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "usage" in done.stdout.lower()
+    assert "Example" in done.stdout
+    version = ElementTree.parse(SOURCE / "package.xml").findtext("version")
+    done = programs.run("rosrun", "rio_t", program, "--version", stdin=None)
+    assert (done.returncode, done.stdout.strip()) == (0, f"{program} of rio_t {version}")

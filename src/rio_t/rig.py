@@ -1,9 +1,8 @@
 """Draws where the radars of a configuration sit and where they look, from above and from the side.
 
-The IMU has x forward, y left, z up. The drawing takes the configuration as rio_t_bag reads it, so that every way of
-telling a mounting is understood.
+The IMU has x forward, y left, z up. The drawing takes the configuration as rio_t_bag reads it, so it understands
+every way to give a mounting.
 """
-import argparse
 import pathlib
 import sys
 
@@ -12,6 +11,7 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from . import programs
+from .command_line import Parser
 from .errors import RioTError
 from .plots import pyplot, tidy
 
@@ -91,10 +91,15 @@ def draw(radars, file):
     pyplot.close(figure)
 
 
+EXAMPLES = """Example:
+  rosrun rio_t draw_rig.py --config my.yaml --out rig.png
+"""
+
+
 def main(arguments):
-    parser = argparse.ArgumentParser(prog="draw_rig.py", description=__doc__)
+    parser = Parser(prog="draw_rig.py", description=__doc__, epilog=EXAMPLES)
     parser.add_argument("--config", required=True, metavar="NAME_OR_PATH",
-                        help="a configuration, as that of rio_t_bag")
+                        help="a configuration, as for rio_t_bag")
     parser.add_argument("--out", required=True, type=pathlib.Path, metavar="FILE.png", help="gets the drawing")
     parser.add_argument("--programs", metavar="FOLDER", help="folder that holds rio_t_bag")
     given = parser.parse_args(arguments)

@@ -2,12 +2,12 @@
 
   shifts      stamps shifted by 0, 2.5, ... 15 ms: the estimate must follow, online and in a batch (Fig. 4); arrival
               against trigger stamps
-  delay       100 ms of delay in passes, each with the estimate of the one before taken off the stamps
+  delay       100 ms of delay in passes; each takes the estimate of the pass before off the stamps
   table1      RIO-T against LC-RIO, which does not estimate the offset (Table I)
   table2      LC-RIO with the stamps of the bag and with stamps corrected by RIO-T's estimate (Table II)
   montecarlo  seeds x motions x offsets: mean, spread, and whether the stated uncertainty is honest
-  consistency seeds x motions: errors of position, velocity, tilt, yaw and offset over their stated sigmas, at all
-              times (NEES); 1 is honest, `!` marks what is below 0.5 or above 2
+  consistency seeds x motions: errors of position, velocity, tilt, yaw and offset, divided by their stated sigmas, at
+              all times (NEES); 1 is honest, `!` marks what is below 0.5 or above 2
 
   aids        seeds x motions: without and with the constraint of a ground vehicle and the barometer, each alone and
               both; the error of the height, and what it costs

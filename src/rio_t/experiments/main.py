@@ -1,7 +1,7 @@
 """The program: scripts/experiment.py."""
 import sys
 
-from ..errors import RioTError
+from ..errors import RioTError, UsageError
 from .options import parse
 
 
@@ -12,8 +12,8 @@ def main(words):
             from .runner import run  # late: a wrong argument is told before numpy and matplotlib are installed
             run(options, words)
     except (RioTError, OSError, ImportError) as error:
-        print(f"experiment.sh: {error}", file=sys.stderr)
-        return 1
+        print(f"experiment.py: {error}", file=sys.stderr)
+        return 2 if isinstance(error, UsageError) else 1
     except KeyboardInterrupt:
         return 130
     return 0

@@ -7,7 +7,8 @@ import pathlib
 import shlex
 
 from . import __doc__ as description
-from ..errors import RioTError
+from .. import command_line
+from ..errors import RioTError, UsageError
 
 # ms; the middle of the 18.5 ms frame that an IRS stamp begins.
 FRAME_OFFSET = -9.25
@@ -38,9 +39,15 @@ PLANS = {
                  ("mode", "radar_stamp_shift", "refine_passes", "platform", "barometer_topic"))}
 
 
-class Parser(argparse.ArgumentParser):
+EXAMPLES = """Examples:
+  rosrun rio_t experiment.py consistency --motion easy --seeds 2
+  rosrun rio_t experiment.py shifts --bag walk.bag --config my.yaml --output-dir out
+"""
+
+
+class Parser(command_line.Parser):
     def error(self, message):
-        raise RioTError(f"{message} (see --help)")
+        raise UsageError(f"{message} (see --help)")
 
 
 def number(text):
@@ -77,10 +84,10 @@ def simulation_words(text):
     try:
         words = shlex.split(text)
     except ValueError as error:
-        raise RioTError(f"--simulate '{text}': {str(error).lower()}") from error
+        raise UsageError(f"--simulate '{text}': {str(error).lower()}") from error
     for word in words:
         if word.startswith("--") and word[2:].partition("=")[0] in OWN_SIMULATION:
-            raise RioTError(f"--simulate: the experiment sets {word.partition('=')[0]} itself")
+            raise UsageError(f"--simulate: the experiment sets {word.partition('=')[0]} itself")
     return words
 
 
@@ -96,12 +103,11 @@ def join_simulate(words):
 
 
 def make_parser():
-    parser = Parser(prog="experiment.sh", description=description,
-                    formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(prog="experiment.py", description=description, epilog=EXAMPLES)
     parser.add_argument("experiment", choices=PLANS, metavar="|".join(PLANS))
     parser.add_argument("--output-dir", metavar="DIR", type=pathlib.Path, help="where to write (results/EXPERIMENT)")
     parser.add_argument("--bag", metavar="BAG", type=pathlib.Path, action="append", default=[],
-                        help="run on this bag instead of simulated ones; may be repeated; not for montecarlo "
+                        help="run on this bag instead of simulated ones; may be repeated; not for montecarlo, "
                              "consistency and aids")
     parser.add_argument("--config", metavar="CONFIG", default="irs", help="configuration of rio_t_bag (irs)")
     parser.add_argument("--set", metavar="key=value", action="append", default=[],
@@ -122,7 +128,7 @@ def make_parser():
                         help="more options for the simulated bags, as one word: \"--imu-rate 100 --points 30\"; "
                              "simulate --help lists them")
     parser.add_argument("--shifts", metavar="MS,MS,...", type=shift_list, default=[2.5 * i for i in range(7)],
-                        help="of the experiment `shifts` [ms] (0,2.5,...,15)")
+                        help="shifts of the stamps in the experiment `shifts` [ms] (0,2.5,...,15)")
     parser.add_argument("--jobs", metavar="N", type=count, default=os.cpu_count() or 1,
                         help="runs side by side (all cores)")
     parser.add_argument("--programs", metavar="DIR", type=pathlib.Path, help="where rio_t_bag and simulate are")
@@ -137,23 +143,23 @@ def parse(words):
         if not bag.is_file():
             raise RioTError(f"--bag {bag}: no such file")
     if options.bag and plan.simulated_only:
-        raise RioTError(f"--bag: {options.experiment} draws its bags itself")
+        raise UsageError(f"--bag: {options.experiment} draws its bags itself")
     options.simulate = simulation_words(options.simulate)
     if options.experiment == "aids" and "--barometer" not in options.simulate:
         options.simulate.append("--barometer")
     if options.bag:
         for name in ("seeds", "motion", "time_offset", "duration", "simulate"):
             if getattr(options, name) not in (None, []):
-                raise RioTError(f"--{name.replace('_', '-')}: for simulated bags only, not with --bag")
+                raise UsageError(f"--{name.replace('_', '-')}: for simulated bags only, not with --bag")
     if options.time_offset and len(options.time_offset) > 1 and not plan.simulated_only:
-        raise RioTError("--time-offset: more than one is for montecarlo, consistency and aids only")
+        raise UsageError("--time-offset: more than one is for montecarlo, consistency and aids only")
     options.set_keys = set()
     for setting in options.set:
         key, equals, _ = setting.partition("=")
         if not equals or not key:
-            raise RioTError(f"--set {setting}: expected key=value")
+            raise UsageError(f"--set {setting}: expected key=value")
         if key in plan.own_keys:
-            raise RioTError(f"--set {setting}: the experiment sets {key} itself")
+            raise UsageError(f"--set {setting}: the experiment sets {key} itself")
         options.set_keys.add(key)
     options.output_dir = options.output_dir or pathlib.Path("results") / options.experiment
     options.seeds = options.seeds or plan.seeds

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from . import __doc__ as description
 from . import figures
 from .. import programs, run_folder, tum
+from ..command_line import Parser
 from ..errors import RioTError
 from .accuracy import ERRORS, accuracy_rows, offset_rows, run_evaluate
 from .animation import write_animation
@@ -307,13 +308,18 @@ def named_offset(text):
     return name, finite(value)
 
 
+EXAMPLES = """Examples:
+  rosrun rio_t report.py out
+  rosrun rio_t report.py out --ground-truth truth.txt --true-offset 0.1 --animation run.gif
+"""
+
+
 def main(words):
-    parser = argparse.ArgumentParser(prog="report.py", description=description,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(prog="report.py", description=description, epilog=EXAMPLES)
     parser.add_argument("run", metavar="RUN_DIR", type=pathlib.Path, help="output folder of rio_t_bag")
     parser.add_argument("--ground-truth", metavar="FILE", type=pathlib.Path, help="true trajectory, TUM format")
     parser.add_argument("--true-offset", metavar="[NAME=]S", type=named_offset, action="append", default=[],
-                        help="true time offset of the radar [s]; with several radars once for each, with its name")
+                        help="true time offset of the radar [s]; with several radars, give it once for each, with its name")
     parser.add_argument("--max-difference", metavar="S", type=finite, default=0.01,
                         help="largest difference of the stamps of two poses that are compared [s] (0.01)")
     parser.add_argument("--config", metavar="FILE", type=pathlib.Path,
@@ -321,7 +327,7 @@ def main(words):
     parser.add_argument("--output-dir", metavar="DIR", type=pathlib.Path, help="where to write (RUN_DIR/report)")
     parser.add_argument("--animation", metavar="FILE.gif", type=pathlib.Path,
                         help="also draw path and time offset of the first radar as a moving picture")
-    parser.add_argument("--evaluate", metavar="FILE", type=pathlib.Path, help="the program, if it is not found")
+    parser.add_argument("--evaluate", metavar="FILE", type=pathlib.Path, help="the program evaluate, if it is not found")
     try:
         print(report(parser.parse_args(words)))
     except (RioTError, OSError) as error:
