@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Builds, then measures what a bag costs: times real time, CPU seconds, memory, allocations, and each stage's share.
+# Builds, then measures what a bag costs: speed in times real time, CPU seconds, memory, allocations, and each stage's share.
 #   scripts/bench.sh BAG CONFIG [--runs N] [--json FILE] [--compare OTHER] [--set key=value]...
 #   scripts/bench.sh growth [--json FILE]   cost against window, points, IMU rate and length of the bag
 #   scripts/bench.sh micro [OPTION]...      the parts one by one (options of Google benchmark)
-# OTHER is another build folder, or a revision of git (built on the first call): ratios from runs that alternate.
+# OTHER is another build folder, or a revision of git (built on the first call). The runs of both alternate; it prints the ratios.
 set -euo pipefail
 case "${1:-}" in '' | -h | --help) sed -n '2,6s/^# \?//p' "$0"; exit 0 ;; esac
 folder=$(pwd)

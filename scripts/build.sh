@@ -2,7 +2,7 @@
 # Installs what is missing and builds rio_t into build/ (Release). Arguments go to cmake.
 #   scripts/build.sh --quiet [ARGUMENT...]   shows what it installs, and of the build only errors
 # Afterwards: source devel/setup.bash
-# RIO_T_BUILD_DIR: the build folder, else build/. Another one has the devel space inside. RIO_T_WERROR=ON: warnings are errors.
+# RIO_T_BUILD_DIR: the build folder, else build/. Any other build folder has the devel space inside. RIO_T_WERROR=ON: warnings are errors.
 set -euo pipefail
 case "${1:-}" in -h | --help) sed -n '2,5s/^# \?//p' "$0"; exit 0 ;; esac
 cd "$(dirname "$0")/.."

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Shows what rio_t does, from a bare clone: installs, builds, estimates, prints a short table, draws a report.
-#   scripts/demo.sh               a simulated hand-held run, wild, with a time offset that is drawn and told at the
-#                                 end only (the same again: RIO_T_DEMO_OFFSET=SECONDS);
+#   scripts/demo.sh               a simulated hand-held run, wild, with a random time offset that is shown only at
+#                                 the end (RIO_T_DEMO_OFFSET=SECONDS sets the offset);
 #                                 also the real bag, if $RIO_T_DATA_DIR (default ../shared/data) has it
 #   scripts/demo.sh BAG [CONFIG]  your bag; CONFIG is irs (default), ti_mmwave or a YAML file
 # Results go to results/.

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds, then runs one of the paper's experiments. scripts/experiment.sh --help tells which, and their options.
+# Builds, then runs one of the paper's experiments. scripts/experiment.sh --help lists them and their options.
 set -euo pipefail
 scripts=$(cd "$(dirname "$0")" && pwd)
 export PATH=/usr/bin:$PATH

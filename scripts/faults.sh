@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds, then runs the fault campaign. scripts/faults.sh --help tells its options.
+# Builds, then runs the fault campaign. scripts/faults.sh --help lists its options.
 set -euo pipefail
 scripts=$(cd "$(dirname "$0")" && pwd)
 export PATH=/usr/bin:$PATH PYTHONDONTWRITEBYTECODE=1

@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Fuzzes the decoding of point clouds and the reading of parameter files, side by side, with the address and undefined
 # behaviour sanitizers (clang's libFuzzer).
-#   scripts/fuzz.sh [SECONDS]    for that long, else 600
-# Starts from fuzz/corpus/; what is found on the way stays in a temporary folder. An input that breaks something is kept
-# in build/fuzz/findings/ and named; exit status 1 then.
+#   scripts/fuzz.sh [SECONDS]    runs for that long [600]
+# It starts from fuzz/corpus/ and keeps new inputs in a temporary folder. If an input breaks something, the script keeps it
+# in build/fuzz/findings/, names it, and ends with exit status 1.
 # RIO_T_BUILD_DIR: the build folder, else build/fuzz/.
 set -euo pipefail
-case "${1:-}" in -h | --help) sed -n '2,8s/^# \?//p' "$0"; exit 0 ;; esac
+case "${1:-}" in -h | --help) sed -n '2,7s/^# \?//p' "$0"; exit 0 ;; esac
 seconds=${1:-600}
 if ! [[ $seconds =~ ^[1-9][0-9]*$ ]]; then
   echo "fuzz.sh: expected a number of seconds, not '$seconds'" >&2

@@ -2,7 +2,7 @@
 # catkin_lint over the package, clang-format, clang-tidy and cppcheck over our sources; exit status 1 at any finding.
 #   scripts/lint.sh            all
 #   scripts/lint.sh FILE...    these sources only
-# RIO_T_BUILD_DIR: where the compile commands are made, else build/lint/.
+# RIO_T_BUILD_DIR: the folder for the compile commands, else build/lint/.
 set -euo pipefail
 case "${1:-}" in -h | --help) sed -n '2,5s/^# \?//p' "$0"; exit 0 ;; esac
 cd "$(dirname "$0")/.."

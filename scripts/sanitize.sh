@@ -3,7 +3,7 @@
 # nodelet on a bag, the experiments.
 #   scripts/sanitize.sh thread    data races, misuse of locks
 #   scripts/sanitize.sh address   memory errors, leaks, undefined behaviour
-# Exit status 1 where a test fails or a report comes. What is not reported, and why: scripts/sanitizers/.
+# Exit status 1 if a test fails or a sanitizer reports. scripts/sanitizers/ lists what is suppressed, and why.
 # RIO_T_BUILD_DIR: the build folder, else build/thread/ or build/address/.
 set -euo pipefail
 kind=${1:-}

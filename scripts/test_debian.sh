@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # Builds this tree and runs every test in another Debian, in a folder that debootstrap makes.
 #   scripts/test_debian.sh bullseye|bookworm|trixie             scripts/test.sh in Debian 11, 12 or 13
-#   scripts/test_debian.sh bullseye|bookworm|trixie COMMAND...  that command instead, in the tree, e.g. a shell
+#   scripts/test_debian.sh bullseye|bookworm|trixie COMMAND...  runs COMMAND instead, in the tree, e.g. a shell
 # It needs root, debootstrap and 6 GB. The first run takes about an hour on two cores. The folder keeps its packages and its
 # build, and later runs build only what changed. The tree is visible read-only inside, and every mount ends with the script.
 # RIO_T_DEBIAN_DIR: where the folders are, else /var/tmp/rio_t_debian. RIO_T_DEBIAN_MIRROR: else deb.debian.org.
 set -euo pipefail
 suite=${1:-}
 case "$suite" in
-  -h | --help) sed -n '2,8s/^# \?//p' "$0"; exit 0 ;;
+  -h | --help) sed -n '2,7s/^# \?//p' "$0"; exit 0 ;;
   bullseye | bookworm | trixie) shift ;;
   *) echo "test_debian.sh: expected bullseye, bookworm or trixie, not '$suite'" >&2; exit 1 ;;
 esac

@@ -44,7 +44,7 @@ struct Arguments {
 
 void addOptions(rio_t::OptionSet& options, Arguments& a) {
   rio_t::CheckRequest& r = a.request;
-  options.values("bag", "BAG", "a bag; also without --bag; each bag is looked at by itself",
+  options.values("bag", "BAG", "a bag; `--bag` may be left out; each bag is looked at by itself",
                  [&r](const std::string& bag) { r.bags.push_back(bag); });
   options.positional("bag");
   options.text("out", "FILE.yaml", "gets the configuration; without it, it is printed", r.out);
@@ -56,9 +56,9 @@ void addOptions(rio_t::OptionSet& options, Arguments& a) {
                 "120; 30 live", [&a](const std::string& text) {
                   a.duration = rio_t::parseNumber(text, rio_t::NumberRange::kNotNegative);
                 });
-  options.flag("no-trial", "do not run the odometry with what is proposed", a.no_trial);
+  options.flag("no-trial", "do not run the odometry with the configuration", a.no_trial);
   options.flag("live", "listen to the running topics instead of reading a bag", a.live);
-  options.text("keep", "BAG", "with --live: keep what was heard in this bag", a.keep);
+  options.text("keep", "BAG", "with --live: keep the messages in this bag", a.keep);
 }
 
 /// A folder that is gone at the end.

@@ -55,7 +55,7 @@ void addOptions(OptionSet& options, Arguments& a) {
                a.errors_file);
   options.text("time-offset", "FILE", "estimates of the radar's time offset: columns stamp,offset_s,sigma_s",
                a.time_offset);
-  options.value("true-offset", "S", "their constant truth [s]", "",
+  options.value("true-offset", "S", "the constant true offset [s]", "",
                 [&a](const std::string& text) { a.true_offset = parseNumber(text); });
   options.number("skip", "S", "leaves out the first S seconds of the offsets (convergence)", a.skip,
                  NumberRange::kNotNegative);

@@ -95,7 +95,7 @@ void addGeneralOptions(OptionSet& options, Request& r) {
                   r.bag.format = v == "irs" ? BagFormat::kIrs : BagFormat::kTiMmwave;
                 });
   options.number("duration", "S",
-                 "length of the bag with rest; 0 = the motion's own (with --trajectory: of the file)",
+                 "length of the bag with rest; 0 = the motion's own (with --trajectory: that of the file)",
                  r.duration, NumberRange::kNotNegative);
   options.value("speed", "M/S", "speed of the motions constant_speed and walk; the others have their own",
                 "1; walk 1.3",
@@ -104,13 +104,13 @@ void addGeneralOptions(OptionSet& options, Request& r) {
                  NumberRange::kNotNegative);
   options.number("static-end", "S", "rest at the end; 0 = ends in motion", r.rest.static_end,
                  NumberRange::kNotNegative);
-  options.number("ramp", "S", "from rest to full speed and back", r.rest.ramp, NumberRange::kPositive);
+  options.number("ramp", "S", "time from rest to full speed, and back", r.rest.ramp, NumberRange::kPositive);
   options.number("smoothing", "HZ",
                  "with --trajectory: faster motion than this is taken for noise of the poses", r.fit.cutoff,
                  NumberRange::kPositive);
   options.number("start-time", "S", "stamp of the first IMU sample", r.start_time, NumberRange::kPositive);
   options.number("record-offset", "S", "clock of the recorder minus clock of the IMU", r.bag.record_offset);
-  options.number("gravity", "M/S^2", "magnitude", r.simulation.imu.gravity, NumberRange::kPositive);
+  options.number("gravity", "M/S^2", "size of gravity", r.simulation.imu.gravity, NumberRange::kPositive);
   options.flag("noise-free",
                "no noise, vibration, bias, quantisation, ghosts, moving objects or lost scans (blackouts, "
                "ghost bursts, Doppler span and flat radars stay)",
@@ -124,9 +124,9 @@ void addImuOptions(OptionSet& options, ImuModelOptions& imu) {
                  NumberRange::kNotNegative);
   options.number("gyro-noise", "RAD/S/RTHZ", "density of the noise", imu.noise.gyro_density,
                  NumberRange::kNotNegative);
-  options.number("accel-random-walk", "M/S^3/RTHZ", "of the bias", imu.noise.accel_random_walk,
+  options.number("accel-random-walk", "M/S^3/RTHZ", "random walk of the bias", imu.noise.accel_random_walk,
                  NumberRange::kNotNegative);
-  options.number("gyro-random-walk", "RAD/S^2/RTHZ", "of the bias", imu.noise.gyro_random_walk,
+  options.number("gyro-random-walk", "RAD/S^2/RTHZ", "random walk of the bias", imu.noise.gyro_random_walk,
                  NumberRange::kNotNegative);
   options.value("accel-bias", "X,Y,Z", "bias at the start [m/s^2]", "random", [&imu](const std::string& v) {
     const std::vector<double> n = parseNumbers(v, 3);
@@ -136,9 +136,9 @@ void addImuOptions(OptionSet& options, ImuModelOptions& imu) {
     const std::vector<double> n = parseNumbers(v, 3);
     imu.gyro_bias = Eigen::Vector3d(n[0], n[1], n[2]);
   });
-  options.number("accel-bias-sigma", "M/S^2", "of the random bias", imu.accel_bias_sigma,
+  options.number("accel-bias-sigma", "M/S^2", "sigma of the random bias", imu.accel_bias_sigma,
                  NumberRange::kNotNegative);
-  options.number("gyro-bias-sigma", "RAD/S", "of the random bias", imu.gyro_bias_sigma,
+  options.number("gyro-bias-sigma", "RAD/S", "sigma of the random bias", imu.gyro_bias_sigma,
                  NumberRange::kNotNegative);
   options.number(
       "vibration", "M/S^2",
@@ -204,19 +204,19 @@ void addRadarOptions(OptionSet& options, RadarRequest& r) {
                   r.setup.T_IR.q_IR = q.normalized();
                 });
   options.number("radar-rate", "HZ", "scans a second", radar.rate, NumberRange::kPositive);
-  options.number("first-trigger", "S", "of the first scan, from the start of the bag", radar.first_trigger,
-                 NumberRange::kNotNegative);
+  options.number("first-trigger", "S", "time of the first trigger, from the start of the bag",
+                 radar.first_trigger, NumberRange::kNotNegative);
   options.number("frame-length", "S",
-                 "Doppler is the mean over it, centred at the measurement; 0 = an instant",
+                 "the Doppler is the mean over this time around the measurement; 0 = an instant",
                  radar.frame_length, NumberRange::kNotNegative);
-  options.number("latency", "S", "from stamp to arrival (record time) of a scan", radar.latency,
+  options.number("latency", "S", "time from stamp to arrival (record time) of a scan", radar.latency,
                  NumberRange::kNotNegative);
-  options.number("latency-sigma", "S", "scatter of it", radar.latency_sigma, NumberRange::kNotNegative);
+  options.number("latency-sigma", "S", "sigma of the latency", radar.latency_sigma,
+                 NumberRange::kNotNegative);
   options.number("points", "N", "mean number of points a scan", radar.points_mean, NumberRange::kPositive);
-  options.number("points-sigma", "N", "scatter of it", radar.points_sigma, NumberRange::kNotNegative);
-  options.count("points-min", "fewest of it; 0 gives empty scans where mean and scatter do", radar.points_min,
-                0);
-  options.count("points-max", "limit of it", radar.points_max);
+  options.number("points-sigma", "N", "sigma of that number", radar.points_sigma, NumberRange::kNotNegative);
+  options.count("points-min", "fewest points a scan; 0 allows empty scans", radar.points_min, 0);
+  options.count("points-max", "most points a scan", radar.points_max);
   options.flag("skip-empty", "scans without points are not published", radar.publish_empty, false);
   options.number("min-range", "M", "nearest point", radar.min_range, NumberRange::kNotNegative);
   options.number("max-range", "M", "farthest point", radar.max_range, NumberRange::kPositive);
@@ -238,13 +238,13 @@ void addRadarOptions(OptionSet& options, RadarRequest& r) {
   options.number("doppler-span", "M/S",
                  "whole unambiguous span, a whole number of steps: 3 wraps into [-1.5, 1.5); 0 = unlimited",
                  radar.doppler_span, NumberRange::kNotNegative);
-  options.number("ghosts", "SHARE", "of the points: anywhere, any Doppler", radar.ghost_share,
-                 NumberRange::kShare);
-  options.number("moving", "SHARE", "of the time: persons walk through the view", radar.moving_share,
-                 NumberRange::kShare);
-  options.count("crowd", "so many persons at once; their points take the place of the room's", radar.crowd);
-  options.number("dropouts", "SHARE", "of the scans: triggered, never delivered", radar.dropout_share,
-                 NumberRange::kShare);
+  options.number("ghosts", "SHARE", "share of the points that are ghosts: anywhere, any Doppler",
+                 radar.ghost_share, NumberRange::kShare);
+  options.number("moving", "SHARE", "share of the time in which persons walk through the view",
+                 radar.moving_share, NumberRange::kShare);
+  options.count("crowd", "number of persons at once; their points replace those of the room", radar.crowd);
+  options.number("dropouts", "SHARE", "share of the scans that are triggered but never delivered",
+                 radar.dropout_share, NumberRange::kShare);
   options.values("blackout", "S,S", "START,DURATION without scans; may be repeated",
                  [&radar](const std::string& v) { radar.blackouts.push_back(parseInterval(v)); });
   options.values("ghost-burst", "S,S", "START,DURATION in which all points are ghosts; may be repeated",
@@ -331,8 +331,8 @@ ProgramText programText() {
            "Angles are\nin radians, unless the name of the option says deg.\n"
            "\n--radar: KEY is an option of the two sections on time offset and radar, without dashes; a flag "
            "stands "
-           "alone.\nWhat a radar leaves out comes from the options outside. Each has its own reflectors, "
-           "persons and "
+           "alone.\nOptions that a radar leaves out come from outside of --radar. Each has its own "
+           "reflectors, persons and "
            "ghosts.\n--preset kart_pair has left and right: --radar changes one of them, or adds another.\n"
            "Topics, irs:       /sensor_platform/radar_NAME/scan, /sensor_platform/radar_NAME/trigger\n"
            "Topics, ti_mmwave: /ti_mmwave/radar_scan_pcl_NAME, /sensor_platform/radar_NAME/trigger\n"

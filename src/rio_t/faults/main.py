@@ -37,11 +37,11 @@ def write_table(path, rows):
 def parse(words):
     parser = argparse.ArgumentParser(prog="faults.sh", description=description,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--list", action="store_true", help="the cases and what must happen in each")
-    parser.add_argument("--only", action="append", default=[], metavar="NAME", help="this case; may be repeated")
+    parser.add_argument("--list", action="store_true", help="list the cases and what must happen in each")
+    parser.add_argument("--only", action="append", default=[], metavar="NAME", help="run only this case; may be repeated")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="cases at a time [%(default)s]")
     parser.add_argument("--bag", help="put the faults into this bag instead")
-    parser.add_argument("--config", default="irs", help="its configuration [%(default)s]")
+    parser.add_argument("--config", default="irs", help="configuration of that bag [%(default)s]")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
                         help="a parameter of every run on a bag, e.g. solver=ceres; may be repeated")
     parser.add_argument("--no-live", action="store_true", help="leave out the cases of the live node")

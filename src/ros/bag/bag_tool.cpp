@@ -21,8 +21,8 @@ const ProgramText kText = {
     "rosrun rio_t rio_t_bag --print-config > all_parameters.yaml\n",
     "The folder gets trajectory.txt, trajectory_optimized.txt (TUM: stamp x y z qx qy qz qw), "
     "navigation.csv,\n"
-    "time_offset.csv, ego_velocity.csv, biases.csv and summary.yaml; and extrinsics.csv if they are "
-    "estimated.\n"
+    "time_offset.csv, ego_velocity.csv, biases.csv and summary.yaml; and extrinsics.csv if the extrinsics "
+    "are estimated.\n"
     "With several radars the tables of a radar carry its name. docs/parameters.md describes every key.\n"};
 
 struct Arguments {

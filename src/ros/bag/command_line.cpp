@@ -54,7 +54,7 @@ void printHelp(const ProgramText& text, const OptionSet& options, std::ostream& 
   for (std::string line; std::getline(examples, line);) out << "  " << line << "\n";
   out << "\nExit status: 0 if it worked, 1 if data, a file or a parameter was wrong, 2 if the command line "
          "was "
-         "wrong,\n3 if there is a result that is not to be trusted.\n";
+         "wrong,\n3 if rio_t_bag has a result that is not to be trusted.\n";
 }
 
 /// A line of the progress bar: "[####    ]  40 %, 12 s left".
