@@ -92,10 +92,27 @@ TEST_F(Gate, AShortGlitchOfTheStampsIsAGap) {
   EXPECT_GT(sample.gyro_doubt, 0.0);
 }
 
+// Taken for the end of a gap, it would put all samples that follow behind it, until the clock seems to jump.
+TEST_F(Gate, OneStampAheadIsNoGap) {
+  for (const double ahead : {0.6, 1.0, 2.5}) {
+    EXPECT_EQ(feed(t + ahead), "imu_stamp_jump") << ahead;
+    for (const double end = t + 3.0; t < end; t += 0.01) ASSERT_EQ(feed(t), "") << ahead;
+  }
+}
+
+TEST_F(Gate, TheSecondSampleConfirmsALongGap) {
+  EXPECT_EQ(feed(2.0), "imu_stamp_jump");
+  EXPECT_EQ(decision, Decision::kDrop);
+  EXPECT_EQ(feed(2.01), "imu_gap");
+  EXPECT_EQ(decision, Decision::kTake);
+  EXPECT_EQ(feed(2.02), "");
+}
+
 TEST_F(Gate, DoubtGrowsWithTheGap) {
   EXPECT_EQ(feed(1.05), "imu_gap");
   const double small = sample.accel_doubt;
   EXPECT_GT(small, 0.0);
+  EXPECT_EQ(feed(1.99), "imu_stamp_jump");  // it may stand alone
   EXPECT_EQ(feed(2.0), "imu_gap");
   EXPECT_NEAR(sample.accel_doubt,
               ImuInputCheckOptions().unseen_accel_density * ImuInputCheckOptions().unseen_accel_density,

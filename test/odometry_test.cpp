@@ -229,6 +229,7 @@ TEST(ImuPropagator, AnAnchorOlderThanItsHistoryIsNotTaken) {
 TEST_F(AtRest, UncertaintyGrowsOverAnImuGap) {
   run(104.0);
   const StateCovariance before = states.back().covariance;
+  EXPECT_FALSE(odometry.addImu(restSample(time + 0.995))) << "it may be a stamp out of place";
   const auto after = odometry.addImu(restSample(time + 1.0));
   ASSERT_TRUE(after);
   // Half a radian and metres a second may have come together in a second.
@@ -337,115 +338,6 @@ TEST(StuckGyro, CostsLittle) {
     EXPECT_GT(run.odometry->faults()["imu_stuck"], 50u);
     EXPECT_LT(run.rms(32.0, 60.0, [&](const NavigationState& state) { return run.velocityError(state); }),
               0.1);
-  }
-}
-
-/// Three points agree on some velocity whatever they are; only what the IMU predicts tells them.
-/// All but the first scans borrow points, which nobody outside of the estimator has.
-TEST(FewPoints, AreReportedWithoutThoseBorrowed) {
-  SimulatedRun run("medium", 1, 20.0, 5.0);
-  run.setup.radar.points_mean = 6.0;
-  run.setup.radar.points_sigma = 1.0;
-  run.setup.radar.points_max = 8;
-  run.run();
-  std::size_t with_velocity = 0;
-  for (const ScanResult& result : run.results) {
-    const std::size_t all = result.scan.points.size();
-    ASSERT_LE(result.ego_velocity.points.size(), all);
-    ASSERT_LE(result.ego_velocity.inliers.size(), result.ego_velocity.points.size());
-    for (const std::size_t i : result.ego_velocity.inliers) ASSERT_LT(i, all);
-    with_velocity += isValid(result.ego_velocity.status) ? 1 : 0;
-  }
-  EXPECT_GT(with_velocity, run.results.size() / 2);
-}
-
-TEST(FewPoints, KeepTheVelocity) {
-  for (const std::uint64_t seed : {1, 2, 3}) {
-    for (const bool has_persons : {false, true}) {
-      SimulatedRun run("medium", seed, 60.0, 5.0);
-      run.options.smoother.radar_factor = RadarFactor::kDoppler;
-      run.setup.radar.points_mean = 3.0;
-      run.setup.radar.points_sigma = 0.7;
-      run.setup.radar.points_min = 2;
-      run.setup.radar.points_max = 4;
-      if (!has_persons) run.setup.radar.moving_share = 0.0;
-      run.run();
-      std::size_t used = 0;
-      for (const ScanResult& result : run.results) used += result.used ? 1 : 0;
-      EXPECT_GT(used, run.results.size() / 2) << "seed " << seed;
-      EXPECT_LT(run.rms(10.0, 60.0, [&](const NavigationState& state) { return run.velocityError(state); }),
-                0.1)
-          << "seed " << seed;
-      // A person in view may well be all of the points.
-      if (!has_persons) {
-        EXPECT_EQ(run.odometry->faults()["diverged"], 0u) << "seed " << seed;
-      }
-    }
-  }
-}
-
-/// One row of antennas: all points in a plane, and what they see of the vertical is nothing.
-TEST(FlatRadar, KeepsTheVelocity) {
-  for (const std::uint64_t seed : {1, 2, 3}) {
-    SimulatedRun run("medium", seed, 60.0, 5.0);
-    run.options.smoother.radar_factor = RadarFactor::kDoppler;
-    run.setup.radar.measures_elevation = false;
-    run.setup.radar.fov_elevation = 10.0;
-    run.run();
-    std::size_t used = 0;
-    for (const ScanResult& result : run.results) used += result.used ? 1 : 0;
-    EXPECT_GT(used, run.results.size() / 2) << "seed " << seed;
-    EXPECT_EQ(run.odometry->faults()["diverged"], 0u) << "seed " << seed;
-    const auto horizontal = [&](const NavigationState& state) {
-      const simulation::MotionState truth = run.truth(state);
-      const Eigen::Vector3d e = truth.q_WI.conjugate() * truth.v_W - state.q_WI.conjugate() * state.v_W;
-      return (truth.q_WI * e).head<2>().norm();
-    };
-    EXPECT_LT(run.rms(10.0, 60.0, horizontal), 0.1) << "seed " << seed;
-  }
-}
-
-/// Less than a bin of the Doppler, and too steady for the IMU to see.
-TEST(Creeping, IsNoRest) {
-  for (const std::uint64_t seed : {1, 2, 3}) {
-    simulation::MotionRequest request;
-    request.name = "constant_speed";
-    request.seed = seed;
-    request.duration = 45.0;
-    request.speed = 0.1;
-    request.rest.static_start = 5.0;
-    request.rest.static_end = 0.0;
-    SimulatedRun run("constant_speed", seed, 45.0, 5.0);
-    run.motion = simulation::makeMotion(request);
-    run.setup.radar.points_mean = 60.0;
-    run.run();
-    int at_rest = 0;
-    int all = 0;
-    for (const ScanResult& result : run.results) {
-      if (run.seconds(result.scan.stamp) < 8.0 || !result.used) continue;
-      ++all;
-      at_rest += result.ego_velocity.status == EgoVelocityStatus::kZeroVelocity ? 1 : 0;
-    }
-    const auto error = [&](const NavigationState& state) { return run.velocityError(state); };
-    EXPECT_GT(all, 300);
-    EXPECT_LT(at_rest, all / 10) << "seed " << seed;
-    EXPECT_LT(run.rms(10.0, 45.0, error), 0.03) << "seed " << seed;
-  }
-}
-
-/// A walk in which a crowd is in view for 30 % of the time.
-TEST(Crowd, IsNoDivergenceAndNoStepOfTheOffset) {
-  for (const int crowd : {3, 5}) {
-    for (const std::uint64_t seed : {3, 4}) {
-      SimulatedRun run("walk", seed, 100.0, 5.0);
-      run.setup.radar.moving_share = 0.3;
-      run.setup.radar.crowd = crowd;
-      run.run();
-      EXPECT_EQ(run.odometry->faults()["diverged"], 0u) << crowd << " persons, seed " << seed;
-      EXPECT_EQ(run.odometry->faults()["time_offset_step"], 0u) << crowd << " persons, seed " << seed;
-      EXPECT_LT(run.rms(10.0, 100.0, [&](const NavigationState& state) { return run.velocityError(state); }),
-                0.1);
-    }
   }
 }
 

@@ -5,13 +5,15 @@ namespace rio_t {
 ClockJumpDetector::Verdict ClockJumpDetector::check(Time stamp) {
   const double step = newest_ ? stamp - *newest_ : 0.0;
   Verdict verdict = Verdict::kGood;
-  if (newest_ && (step <= 0.0 || step > max_gap_)) {
+  if (newest_ && (step <= 0.0 || step > patience_)) {
     verdict = step > 0.0 ? Verdict::kAhead : Verdict::kBehind;
     const double onward = elsewhere_newest_ ? stamp - *elsewhere_newest_ : 0.0;
-    if (onward <= 0.0 || onward > max_gap_) elsewhere_since_ = stamp;
+    const bool goes_on = 0.0 < onward && onward <= max_gap_;
+    if (!goes_on) elsewhere_since_ = stamp;
     elsewhere_newest_ = stamp;
-    if (stamp - *elsewhere_since_ < patience_) return verdict;
-    verdict = Verdict::kRestart;
+    const bool is_gap = goes_on && step > 0.0 && step <= max_gap_;
+    if (!is_gap && stamp - *elsewhere_since_ < patience_) return verdict;
+    verdict = is_gap ? Verdict::kGood : Verdict::kRestart;
   }
   newest_ = stamp;
   elsewhere_since_.reset();

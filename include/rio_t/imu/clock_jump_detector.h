@@ -7,13 +7,15 @@
 namespace rio_t {
 
 /// Follows the stamps of a sensor and distinguishes a sample out of place, which stands alone, from a clock
-/// that jumped, after which the stamps go on from the new time. Not thread-safe.
+/// that jumped, after which the stamps go on from the new time. After a gap longer than `patience`, the
+/// first stamp is dropped and the second confirms the gap: if the first one alone were wrong, all that follow
+/// would be behind it until the clock seems to have jumped. Not thread-safe.
 class ClockJumpDetector {
  public:
   enum class Verdict {
     kGood,     ///< later than the one before, by no more than `max_gap`
     kBehind,   ///< drop it: not later than the newest good one
-    kAhead,    ///< drop it: later by more than `max_gap`
+    kAhead,    ///< drop it: later by more than `max_gap`, or by more than `patience` and alone so far
     kRestart,  ///< the clock jumped: this stamp is good, earlier ones belong to another time
   };
 
