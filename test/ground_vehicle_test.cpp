@@ -95,6 +95,22 @@ TEST(GroundVehicle, ADroneIsToldWithinTenSecondsAndNotHarmed) {
   }
 }
 
+// The platform is as before, but nobody knows for how long the clock was away.
+TEST(GroundVehicle, IsJudgedAgainAfterAClockThatJumped) {
+  VehicleRun run("drone", 1, 60.0, true);
+  run.run([&](simulation::SensorData& data) {
+    for (ImuMeasurement& sample : data.imu.samples)
+      if (run.seconds(sample.time) > 30.0) sample.time = sample.time + 1000.0;
+    for (simulation::SimulatedScan& scan : data.scans) {
+      if (run.seconds(scan.stamp) < 30.0) continue;
+      scan.stamp = scan.stamp + 1000.0;
+      scan.arrival = scan.arrival + 1000.0;
+    }
+  });
+  EXPECT_EQ(run.odometry->faults()["imu_clock_restart"], 1u);
+  EXPECT_EQ(run.odometry->faults()["ground_vehicle_contradicted"], 2u);
+}
+
 /// Turns the IMU, and with it the radar, against the vehicle: `q_VI` turns new vectors of I into old ones.
 void mountTurned(const Eigen::Quaterniond& q_VI, simulation::SensorData& data, Extrinsics& T_IR) {
   const Eigen::Quaterniond q_IV = q_VI.conjugate();

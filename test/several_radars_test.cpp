@@ -81,6 +81,21 @@ TEST(TwoRadars, AreUsedInTheSameOrderHoweverTheImuComes) {
   }
 }
 
+// At rest nothing tells the offsets: the sigma of each grows by its random walk alone.
+TEST(TwoRadars, TheOffsetsOfBothWander) {
+  SimulatedRun run = pair("medium", 1, 50.0);
+  run.motion = SimulatedRun::makeMotion("medium", 1, 50.0, 40.0);
+  for (RadarOptions& radar : run.options.radars) radar.time_offset_sigma = 0.001;
+  run.options.smoother.time_offset_noise = 0.001;
+  run.run([&](simulation::SensorData& data) {
+    const auto moves = [&](const ImuMeasurement& sample) { return run.seconds(sample.time) > 39.0; };
+    auto& samples = data.imu.samples;
+    samples.erase(std::find_if(samples.begin(), samples.end(), moves), samples.end());
+  });
+  for (const std::size_t radar : {0, 1})
+    EXPECT_NEAR(run.last(radar).time_offset_sigma, 0.001 * std::sqrt(1.0 + 35.0), 5e-4) << "radar " << radar;
+}
+
 TEST(TwoRadars, WithOneClockShareTheOffset) {
   SimulatedRun run = pair("medium", 1, 40.0);
   SimulatedRun apart = pair("medium", 1, 40.0);

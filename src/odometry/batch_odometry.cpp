@@ -83,16 +83,12 @@ RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) co
   return z;
 }
 
-void BatchOdometry::setMeasurement(const ScanResult& result, const NodeEstimate& node,
-                                   BatchScan& scan) const {
-  const double offset_gain = isAtRest(node) ? 0.0 : result.offset_gain;
+void BatchOdometry::setMeasurement(const ScanResult& result, BatchScan& scan) const {
   if (result.doppler) {
     scan.doppler = result.doppler;
     scan.doppler->shared_variances *= model_error_scale_ / result.model_error_scale;
-    scan.doppler->offset_gain = offset_gain;
   } else {
     scan.velocity = measurement(result);
-    scan.velocity->offset_gain = offset_gain;
   }
 }
 
@@ -124,9 +120,8 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
     scan.radar = radar;
     scan.offset_stepped = stepped[radar];
     stepped[radar] = false;
-    const bool at_rest = isAtRest(node);
-    if (at_rest) scan.rest_velocity_sigma = options_.rest.velocity_sigma;
-    if (result.used) setMeasurement(result, node, scan);
+    if (result.at_rest) scan.rest_velocity_sigma = options_.rest.velocity_sigma;
+    if (result.used) setMeasurement(result, scan);
     problem.scans.push_back(scan);
     run.source.push_back(i);
   }
@@ -146,18 +141,17 @@ std::size_t BatchOdometry::readmit(const BatchSmoother& smoother, const BatchSol
     const RadarVelocityMeasurement z = measurement(result);
     const BatchSolution::Scan* near = acceptedBy(smoother, run, solution, result.scan.radar, z);
     if (near == nullptr) continue;
-    const NodeEstimate& node = solution.nodes[near->node];
     ++count;
     const auto known = std::find(run.source.begin(), run.source.end(), i);  // at rest it is in the graph
     if (known != run.source.end()) {
-      setMeasurement(result, node, problem.scans[static_cast<std::size_t>(known - run.source.begin())]);
+      setMeasurement(result, problem.scans[static_cast<std::size_t>(known - run.source.begin())]);
       continue;
     }
     BatchScan scan;
     scan.stamp = z.stamp;
     scan.radar = result.scan.radar;
     scan.t_O = near->t_O;
-    setMeasurement(result, node, scan);
+    setMeasurement(result, scan);
     problem.scans.push_back(scan);
     run.source.push_back(i);
   }
@@ -185,11 +179,6 @@ const BatchSolution::Scan* BatchOdometry::acceptedBy(const BatchSmoother& smooth
   innovation.S = residual.prediction_covariance + z.covariance;
   const double squared = innovation.widened(options_.smoother.innovation_model_error).squaredSigmas();
   return squared > gate * gate ? nullptr : nearest;
-}
-
-bool BatchOdometry::isAtRest(const NodeEstimate& node) const {
-  return rio_t::isAtRest(imu_, node.time, {node.x.q_WI(), node.x.v_W(), node.x.b_g(), node.x.b_a(), g_W_},
-                         options_.rest);
 }
 
 NavigationState BatchOdometry::stateOf(const NodeEstimate& node, const StateCovariance& covariance) const {

@@ -103,9 +103,12 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
     if (landmarks_)
       expected = landmarks_->predict(smoother_, stamp - radar.offset(), radar.extrinsicsBlock());
     const RadarAnswer answer = radar.use(
-        result.scan, {at_rest, may_rest, has_diverged, result.model_error_scale, last_used_}, smoother_);
+        result.scan,
+        {at_rest, may_rest, has_diverged, health_.isContradicted(), result.model_error_scale, last_used_},
+        smoother_);
     judge(answer, result.scan);
     result.ego_velocity = answer.ego_velocity;
+    result.at_rest = answer.at_rest;
     result.innovation = answer.judged;
     result.doppler = answer.doppler;
     result.offset_gain = answer.offset_gain;
@@ -250,7 +253,7 @@ void Estimator::addPressure(const Pressure& pressure) {
   if (const char* fault = barometer_->add(pressure, imu_.newest())) faults_.count(fault);
 }
 
-void Estimator::keepUp(bool scan_came, bool scans_wait) {
+void Estimator::keepUp(bool scan_came, const std::vector<RadarScan>& waiting) {
   if (imu_.empty()) return;
   // By the IMU's clock at the arrival of scans: the scans' own stamps may be wrong.
   if (scan_came || !radar_heard_) {
@@ -262,7 +265,9 @@ void Estimator::keepUp(bool scan_came, bool scans_wait) {
   }
   if (!initialized()) return;
   const Time time = imu_.newest() - (kLateScan + 2.0 * options_.smoother.max_time_offset);
-  if (!scans_wait && time - smoother_.newest().time >= kSilentStep) {
+  const bool is_first = std::none_of(waiting.begin(), waiting.end(),
+                                     [&](const RadarScan& scan) { return nodeTime(scan) <= time; });
+  if (is_first && time - smoother_.newest().time >= kSilentStep) {
     smoother_.nodeAt(time);
     smoother_.optimize();
     for (const StampedPose& left : marginalize()) left_in_silence_.push_back(left);
@@ -277,6 +282,8 @@ void Estimator::startAgain(std::uint64_t clock_restarts) {
   clock_restarts_ = clock_restarts;
   imu_.clear();
   if (barometer_) barometer_->startAgain();
+  if (ground_vehicle_)
+    ground_vehicle_.emplace(options_.ground_vehicle, options_.smoother.huber_threshold, imu_);
   // Nobody stands still because a clock jumped.
   OdometryOptions at_once = options_;
   at_once.init_motion_after = 0.0;

@@ -123,12 +123,15 @@ Health HealthMonitor::judge(Time now, const NavigationState& state, double model
   }
   const double variance = bodyVelocityVariance(state).maxCoeff();
   const double max_sigma = options_.max_velocity_sigma;
-  const bool known = state.p_W.allFinite() && state.v_W.allFinite() && state.v_W.norm() < kMaxSpeed &&
-                     variance < max_sigma * max_sigma;  // false for NaN
+  // Both are false for NaN.
+  const bool possible =
+      state.p_W.allFinite() && state.v_W.allFinite() && state.v_W.norm() < kMaxSpeed && variance >= 0.0;
+  const bool known = variance < max_sigma * max_sigma;
   if (model_error_scale < kMaxModelErrorScale) misfit_since_.reset();
   if (model_error_scale >= kMaxModelErrorScale && !misfit_since_) misfit_since_ = now;
   const bool fits = !misfit_since_ || now - *misfit_since_ < options_.window;
-  health_ = diverged_at_ || !known || !fits                ? Health::kDiverged
+  is_contradicted_ = diverged_at_ || !possible || !fits;
+  health_ = is_contradicted_ || !known                     ? Health::kDiverged
             : now - last_update_ > options_.coasting_after ? Health::kCoasting
                                                            : Health::kOk;
   return health_;

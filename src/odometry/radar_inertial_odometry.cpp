@@ -157,7 +157,7 @@ void RadarInertialOdometry::Impl::takeInbox() {
     estimator.startAgain(clock_restarts);
   estimator.addImu(taken.imu);
   for (const Pressure& pressure : taken.pressures) estimator.addPressure(pressure);
-  estimator.keepUp(scan_came, !waiting_scans.empty());
+  estimator.keepUp(scan_came, waiting_scans);
 }
 
 void RadarInertialOdometry::Impl::shareStatus() {

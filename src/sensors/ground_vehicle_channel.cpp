@@ -34,12 +34,14 @@ GroundVehicleChannel::GroundVehicleChannel(const GroundVehicleOptions& options, 
 void GroundVehicleChannel::join(FixedLagSmoother& smoother, bool at_rest) {
   Window& window = smoother.window();
   frame_ = window.addCalibration(manifold_, stored(options_.T_IV));
-  addPrior(window, {frame_.get()},
-           {Eigen::MatrixXd::Identity(3, 3) / options_.rotation_sigma, Eigen::VectorXd::Zero(3)});
+  Block* node = smoother.nodeAt(smoother.newest().time);
+  // It says nothing of the node, but leaves the window with it: the prior of the window can then walk.
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(3, StateBlock::kTangent + 3);
+  J.rightCols<3>().diagonal().setConstant(1.0 / options_.rotation_sigma);
+  addPrior(window, {node, frame_.get()}, {J, Eigen::VectorXd::Zero(3)});
   judged_at_.reset();
   if (at_rest && options_.start_slope_sigma > 0.0)
-    window.add(std::make_unique<LevelGroundFactor>(options_.start_slope_sigma),
-               {smoother.nodeAt(smoother.newest().time), frame_.get()});
+    window.add(std::make_unique<LevelGroundFactor>(options_.start_slope_sigma), {node, frame_.get()});
   smoother.settle();
 }
 

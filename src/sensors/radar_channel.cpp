@@ -42,6 +42,13 @@ std::vector<std::size_t> alsoIn(const EgoVelocity& predicted, const std::vector<
   return both.empty() ? own : both;
 }
 
+/// With the errors that the options tell multiplied by `factor` in their variance.
+EgoVelocity scaled(EgoVelocity velocity, double factor) {
+  velocity.covariance.diagonal() += (factor - 1.0) * velocity.told_variance;
+  velocity.told_variance *= factor;
+  return velocity;
+}
+
 VelocityPrior zeroVelocity(double sigma) {
   return {Eigen::Vector3d::Zero(), sigma * sigma * Eigen::Matrix3d::Identity()};
 }
@@ -80,6 +87,8 @@ void RadarChannel::forget() {
   offset_evidence_ = OffsetEvidence();
   feasibility_ = FeasibilityCheck(options_.feasibility);
   pool_.clear();
+  learned_at_.reset();
+  alone_at_.reset();
   gate_.used();
 }
 
@@ -132,7 +141,7 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   gate_.used();
   if (can_be_judged && informs_offset) offset_uncertainty_.add(*own);
   // A borrowed point must not teach twice.
-  if (!seen.is_own || (seen.has_borrowed && scan.stamp - learned_at_ <= ScanPool::kMaxAge)) return answer;
+  if (!seen.is_own || sharesPoints(seen, scan.stamp, learned_at_)) return answer;
   if (can_be_judged) {
     answer.used = all;
     answer.prediction_covariance = seen.prior->covariance;
@@ -168,11 +177,13 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
   answer.ego_velocity = measure(seen.pooled, expected, scale);
   answer.was_predicted = seen.prior.has_value();
   if (seen.prior) judge(seen.pooled, *seen.prior, scale, answer);
+  if (answer.alone && sharesPoints(seen, scan.stamp, alone_at_)) answer.alone.reset();
+  if (answer.alone) alone_at_ = scan.stamp;
 
   seen.velocity = answer.ego_velocity;
   answer.ego_velocity = withOwnPoints(std::move(answer.ego_velocity), scan);
   seen.is_own = isValid(seen.velocity.status);
-  if (!seen.is_own && isTightlyCoupled() && expected) {
+  if (!seen.is_own && isTightlyCoupled() && seen.prior && !context.is_contradicted) {
     EgoVelocity consensus = estimator_.around(seen.pooled, *seen.prior);
     consensus.told_variance *= scale;
     seen.velocity = around(*seen.prior, scan, consensus);
@@ -198,10 +209,11 @@ std::vector<std::size_t> RadarChannel::pointsOf(const RadarScan& scan, const See
 
 EgoVelocity RadarChannel::measure(const RadarScan& scan, const std::optional<VelocityPrior>& prior,
                                   double scale) const {
-  EgoVelocity measured = estimator_.estimate(scan, prior);
-  measured.covariance.diagonal() += (scale - 1.0) * measured.told_variance;
-  measured.told_variance *= scale;
-  return measured;
+  return scaled(estimator_.estimate(scan, prior), scale);
+}
+
+bool RadarChannel::sharesPoints(const Seen& seen, Time stamp, const std::optional<Time>& before) {
+  return seen.has_borrowed && before && stamp - *before <= ScanPool::kMaxAge;
 }
 
 EgoVelocity RadarChannel::around(const VelocityPrior& prior, const RadarScan& scan,
@@ -241,7 +253,7 @@ void RadarChannel::judge(const RadarScan& scan, const VelocityPrior& prior, doub
   // does not give so many of them.
   const bool is_outvoted = countOthers(measured.inliers, alone.inliers) >= options_.ego_velocity.min_inliers;
   if (is_outvoted && !isValid(measured.status)) return;
-  if (!is_outvoted) answer.alone = alone;
+  if (!is_outvoted) answer.alone = scaled(alone, 1.0 / scale);
   answer.judged = innovation(scan.stamp, prior, is_outvoted ? measured : alone, std::nullopt)
                       .widened(options_.smoother.innovation_model_error);
 }

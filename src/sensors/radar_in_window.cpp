@@ -37,13 +37,15 @@ void RadarInWindow::start(FixedLagSmoother& smoother, Time time, const NodePrior
 
 void RadarInWindow::join(FixedLagSmoother& smoother) {
   Window& window = smoother.window();
-  std::vector<Block*> blocks;
+  std::vector<Block*> blocks = {smoother.nodeAt(smoother.newest().time)};
   if (!options_.time_offset_shared) blocks.push_back(&offset_->start(window, options_.time_offset_initial));
   for (Block* block : addExtrinsics(window, T_IR_)) blocks.push_back(block);
   Eigen::VectorXd sigmas = calibrationSigmas(options_);
   if (options_.time_offset_shared) sigmas = sigmas.tail(sigmas.size() - 1).eval();
-  if (!blocks.empty())
-    addPrior(window, blocks, {sigmas.cwiseInverse().asDiagonal(), Eigen::VectorXd::Zero(sigmas.size())});
+  // It says nothing of the node, but leaves the window with it: the prior of the window can then walk.
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(sigmas.size(), StateBlock::kTangent + sigmas.size());
+  J.rightCols(sigmas.size()) = sigmas.cwiseInverse().asDiagonal();
+  if (blocks.size() > 1) addPrior(window, blocks, {J, Eigen::VectorXd::Zero(sigmas.size())});
   smoother.settle();
 }
 

@@ -55,9 +55,8 @@ class BatchOdometry {
   const BatchSolution::Scan* acceptedBy(const BatchSmoother& smoother, const Run& run,
                                         const BatchSolution& solution, std::size_t radar,
                                         const RadarVelocityMeasurement& z) const;
-  /// Sets what the scan gives to the graph, near `node`.
-  void setMeasurement(const ScanResult& result, const NodeEstimate& node, BatchScan& scan) const;
-  bool isAtRest(const NodeEstimate& node) const;
+  /// Sets what the scan gives to the graph.
+  void setMeasurement(const ScanResult& result, BatchScan& scan) const;
   NavigationState stateOf(const NodeEstimate& node, const StateCovariance& covariance) const;
   std::vector<NavigationState> trajectory(const BatchSolution& solution) const;
   std::vector<ScanResult> results(const Run& run, const BatchSolution& solution) const;

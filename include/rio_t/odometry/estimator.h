@@ -41,8 +41,9 @@ class Estimator {
   void addPressure(const Pressure& pressure);
   /// The IMU's clock jumped. No earlier data can be related to later data, so all state is dropped.
   void startAgain(std::uint64_t clock_restarts);
-  /// Call it after addImu. Counts times without radar, and moves the window on while the radar is silent.
-  void keepUp(bool scan_came, bool scans_wait);
+  /// Call it after addImu. Counts times without radar, and moves the window on if no scan does; `waiting`
+  /// are the scans that come next.
+  void keepUp(bool scan_came, const std::vector<RadarScan>& waiting);
 
   /// When the scan was measured, as known so far. Only while initialised.
   Time nodeTime(const RadarScan& scan) const;

@@ -63,6 +63,9 @@ class HealthMonitor {
   /// models are wrong by five of their sigmas for a whole window, the input is not what the options say.
   Health judge(Time now, const NavigationState& state, double model_error_scale = 1.0);
   Health health() const { return health_; }
+  /// Whether the scans contradict the estimate, so that it must not predict them. An estimate that only does
+  /// not know its velocity says so by its covariance.
+  bool isContradicted() const { return is_contradicted_; }
   /// Whether a scan came within the window before `now`.
   bool hears(Time now) const;
   /// Whether the divergence has lasted long enough for a re-initialisation.
@@ -93,6 +96,7 @@ class HealthMonitor {
   std::optional<Time> misfit_since_;
   double mean_square_ = 0.0;  ///< of d, by the latest scans that had a velocity [m^2/s^2]
   Health health_ = Health::kOk;
+  bool is_contradicted_ = false;
 };
 
 }  // namespace rio_t

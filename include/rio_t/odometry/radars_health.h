@@ -23,6 +23,7 @@ class RadarsHealth {
   void startedAt(Time time);
   Health judge(Time now, const NavigationState& state, double model_error_scale);
   Health health() const { return best().health(); }
+  bool isContradicted() const { return best().isContradicted(); }
   bool wantsReinitialization(Time now) const { return best().wantsReinitialization(now); }
   void widen(NavigationState& state) const { best().widen(state); }
 

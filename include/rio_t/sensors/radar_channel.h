@@ -26,9 +26,10 @@ struct RadarChannelOptions {
 
 /// What the estimator knows when a scan comes.
 struct ScanContext {
-  bool at_rest = false;            ///< the IMU shows no motion at the time of measurement
-  bool may_rest = false;           ///< likewise but for a vibration: rest if the points show no motion
-  bool has_diverged = false;       ///< the prediction cannot be trusted
+  bool at_rest = false;          ///< the IMU shows no motion at the time of measurement
+  bool may_rest = false;         ///< likewise but for a vibration: rest if the points show no motion
+  bool has_diverged = false;     ///< the points choose their velocity without the prediction
+  bool is_contradicted = false;  ///< see HealthMonitor: points that choose none do not follow the prediction
   double model_error_scale = 1.0;  ///< see ModelErrorScale
   Time last_used;                  ///< stamp of the last scan that any radar gave to the window
 };
@@ -47,8 +48,8 @@ struct RadarAnswer {
   /// For health: the innovation of the velocity that the scan shows without the prediction. None if its
   /// points do not decide.
   std::optional<Innovation> judged;
-  /// That velocity, if most points agree on it and are not outvoted by witnesses of the prediction. A
-  /// re-initialisation may use it.
+  /// That velocity, with the sigmas as told, if most points agree on it and are not outvoted by witnesses of
+  /// the prediction. A re-initialisation may use it. None if it shares points with the last one.
   std::optional<EgoVelocity> alone;
   /// For the scale of the model errors: the innovation of a used velocity in motion that most points agree
   /// on, if the prediction is linear.
@@ -124,6 +125,8 @@ class RadarChannel {
   /// The scan's own points that go into the window.
   std::vector<std::size_t> pointsOf(const RadarScan& scan, const Seen& seen) const;
   bool isTightlyCoupled() const { return options_.smoother.radar_factor == RadarFactor::kDoppler; }
+  /// Whether a scan shares points with the one at `before`.
+  static bool sharesPoints(const Seen& seen, Time stamp, const std::optional<Time>& before);
   EgoVelocity measure(const RadarScan& scan, const std::optional<VelocityPrior>& prior, double scale) const;
   /// The velocity that the inliers among the scan's own points show around the prediction. Directions that
   /// they do not see have a large sigma.
@@ -138,7 +141,7 @@ class RadarChannel {
   RadarInWindow in_window_;
   FeasibilityCheck feasibility_;
   ScanPool pool_;
-  Time learned_at_;
+  std::optional<Time> learned_at_, alone_at_;  ///< of the points: those borrowed count once
   OffsetEvidence offset_evidence_;
   OffsetStepDetector step_detector_;
   OffsetUncertainty offset_uncertainty_;

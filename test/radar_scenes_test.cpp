@@ -1,0 +1,179 @@
+// The whole pipeline on radars that see little, and on scenes that are hard.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "rio_t/odometry/radar_inertial_odometry.h"
+#include "simulated_run.h"
+
+namespace rio_t {
+namespace {
+
+/// Three points agree on some velocity whatever they are; only what the IMU predicts tells them.
+/// All but the first scans borrow points, which nobody outside of the estimator has.
+TEST(FewPoints, AreReportedWithoutThoseBorrowed) {
+  SimulatedRun run("medium", 1, 20.0, 5.0);
+  run.setup.radar.points_mean = 6.0;
+  run.setup.radar.points_sigma = 1.0;
+  run.setup.radar.points_max = 8;
+  run.run();
+  std::size_t with_velocity = 0;
+  for (const ScanResult& result : run.results) {
+    const std::size_t all = result.scan.points.size();
+    ASSERT_LE(result.ego_velocity.points.size(), all);
+    ASSERT_LE(result.ego_velocity.inliers.size(), result.ego_velocity.points.size());
+    for (const std::size_t i : result.ego_velocity.inliers) ASSERT_LT(i, all);
+    with_velocity += isValid(result.ego_velocity.status) ? 1 : 0;
+  }
+  EXPECT_GT(with_velocity, run.results.size() / 2);
+}
+
+TEST(FewPoints, KeepTheVelocity) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    for (const bool has_persons : {false, true}) {
+      SimulatedRun run("medium", seed, 60.0, 5.0);
+      run.options.smoother.radar_factor = RadarFactor::kDoppler;
+      run.setup.radar.points_mean = 3.0;
+      run.setup.radar.points_sigma = 0.7;
+      run.setup.radar.points_min = 2;
+      run.setup.radar.points_max = 4;
+      if (!has_persons) run.setup.radar.moving_share = 0.0;
+      run.run();
+      std::size_t used = 0;
+      for (const ScanResult& result : run.results) used += result.used ? 1 : 0;
+      EXPECT_GT(used, run.results.size() / 2) << "seed " << seed;
+      EXPECT_LT(run.rms(10.0, 60.0, [&](const NavigationState& state) { return run.velocityError(state); }),
+                0.1)
+          << "seed " << seed;
+      // A person in view may well be all of the points.
+      if (!has_persons) {
+        EXPECT_EQ(run.odometry->faults()["diverged"], 0u) << "seed " << seed;
+      }
+    }
+  }
+}
+
+/// One row of antennas: all points in a plane, and what they see of the vertical is nothing.
+SimulatedRun flatRadar(const std::string& motion, std::uint64_t seed) {
+  SimulatedRun run(motion, seed, 60.0, 5.0);
+  run.setup.radar.measures_elevation = false;
+  run.setup.radar.fov_elevation = 10.0;
+  return run;
+}
+
+double shareUsed(const SimulatedRun& run, double from) {
+  double used = 0.0, all = 0.0;
+  for (const ScanResult& result : run.results) {
+    if (run.seconds(result.scan.stamp) < from) continue;
+    all += 1.0;
+    used += result.used ? 1.0 : 0.0;
+  }
+  return used / all;
+}
+
+/// [m/s] In the axes of the true heading.
+double horizontalError(const SimulatedRun& run, const NavigationState& state) {
+  const simulation::MotionState truth = run.truth(state);
+  const Eigen::Vector3d e = truth.q_WI.conjugate() * truth.v_W - state.q_WI.conjugate() * state.v_W;
+  return (truth.q_WI * e).head<2>().norm();
+}
+
+TEST(FlatRadar, KeepsTheVelocity) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    SimulatedRun run = flatRadar("medium", seed);
+    run.run();
+    EXPECT_GT(shareUsed(run, 5.0), 0.5) << "seed " << seed;
+    EXPECT_EQ(run.odometry->faults()["diverged"], 0u) << "seed " << seed;
+    const auto error = [&](const NavigationState& state) { return horizontalError(run, state); };
+    EXPECT_LT(run.rms(10.0, 60.0, error), 0.1) << "seed " << seed;
+  }
+}
+
+/// After a gap of the IMU the vertical velocity is unknown for good. The rest is not.
+TEST(FlatRadar, IsUsedIfOnlyTheVerticalVelocityIsUnknown) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    SimulatedRun run = flatRadar("ground_vehicle", seed);
+    run.run([&](simulation::SensorData& data) {
+      auto& samples = data.imu.samples;
+      samples.erase(std::remove_if(samples.begin(), samples.end(),
+                                   [&](const ImuMeasurement& sample) {
+                                     const double t = run.seconds(sample.time);
+                                     return 20.0 < t && t < 21.0;
+                                   }),
+                    samples.end());
+    });
+    EXPECT_GT(shareUsed(run, 22.0), 0.8) << "seed " << seed;
+    const auto error = [&](const NavigationState& state) { return horizontalError(run, state); };
+    EXPECT_LT(run.rms(23.0, 60.0, error), 0.3) << "seed " << seed;
+  }
+}
+
+/// As of a radar whose driver removes what stands still, or with a lens that is covered. Its next scan always
+/// waits already.
+TEST(EmptyScans, DoNotHoldTheWindow) {
+  SimulatedRun run("medium", 1, 60.0, 5.0);
+  run.setup.radar.rate = 20.0;
+  run.run([&](simulation::SensorData& data) {
+    for (simulation::SimulatedScan& scan : data.scans)
+      if (run.seconds(scan.stamp) > 20.0 && run.seconds(scan.stamp) < 50.0) scan.points.clear();
+  });
+  std::vector<Time> left;
+  for (const ScanResult& result : run.results)
+    for (const StampedPose& pose : result.left_window) left.push_back(pose.time);
+  ASSERT_FALSE(left.empty());
+  EXPECT_GT(run.seconds(left.back()), 55.0);
+  // Else all of the IMU since the last used scan would have to be kept.
+  for (std::size_t i = 1; i < left.size(); ++i) EXPECT_LT(left[i] - left[i - 1], 5.1) << run.seconds(left[i]);
+}
+
+/// Less than a bin of the Doppler, and too steady for the IMU to see.
+SimulatedRun creeping(std::uint64_t seed) {
+  simulation::MotionRequest request;
+  request.name = "constant_speed";
+  request.seed = seed;
+  request.duration = 45.0;
+  request.speed = 0.1;
+  request.rest.static_start = 5.0;
+  request.rest.static_end = 0.0;
+  SimulatedRun run("constant_speed", seed, 45.0, 5.0);
+  run.motion = simulation::makeMotion(request);
+  run.setup.radar.points_mean = 60.0;
+  return run;
+}
+
+TEST(Creeping, IsNoRest) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    SimulatedRun run = creeping(seed);
+    run.run();
+    int at_rest = 0;
+    int all = 0;
+    for (const ScanResult& result : run.results) {
+      if (run.seconds(result.scan.stamp) < 8.0 || !result.used) continue;
+      ++all;
+      at_rest += result.ego_velocity.status == EgoVelocityStatus::kZeroVelocity ? 1 : 0;
+    }
+    const auto error = [&](const NavigationState& state) { return run.velocityError(state); };
+    EXPECT_GT(all, 300);
+    EXPECT_LT(at_rest, all / 10) << "seed " << seed;
+    EXPECT_LT(run.rms(10.0, 45.0, error), 0.03) << "seed " << seed;
+  }
+}
+
+/// A walk in which a crowd is in view for 30 % of the time.
+TEST(Crowd, IsNoDivergenceAndNoStepOfTheOffset) {
+  for (const int crowd : {3, 5}) {
+    for (const std::uint64_t seed : {3, 4}) {
+      SimulatedRun run("walk", seed, 100.0, 5.0);
+      run.setup.radar.moving_share = 0.3;
+      run.setup.radar.crowd = crowd;
+      run.run();
+      EXPECT_EQ(run.odometry->faults()["diverged"], 0u) << crowd << " persons, seed " << seed;
+      EXPECT_EQ(run.odometry->faults()["time_offset_step"], 0u) << crowd << " persons, seed " << seed;
+      EXPECT_LT(run.rms(10.0, 100.0, [&](const NavigationState& state) { return run.velocityError(state); }),
+                0.1);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace rio_t
