@@ -209,6 +209,47 @@ TEST_F(Batch, AStepOfTheOffsetIsFollowedWhereItIsTold) {
   EXPECT_NEAR(batch.scans.back().t_O, 0.06, 3e-4);
 }
 
+/// Two radars with one clock measure at the same time, and the second one tells of the step.
+TEST_F(Batch, AStepIsFollowedThoughAnotherRadarHasTheNode) {
+  SmootherOptions options;
+  options.time_offset_shared = true;
+  BatchProblem whole = problem(options);
+  whole.mounting.push_back(skewMounting());
+  for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
+    const bool after = stamp > 2.25;
+    for (const std::size_t radar : {0, 1}) {
+      BatchScan scan;
+      scan.velocity = measurement(stamp, after ? 0.06 : 0.01);
+      scan.stamp = scan.velocity->stamp;
+      scan.radar = radar;
+      scan.offset_stepped = radar == 1 && after && stamp < 2.35;
+      whole.scans.push_back(scan);
+    }
+  }
+  const BatchSolution batch = make(options).solve(whole);
+  EXPECT_NEAR(batch.scans.back().t_O, 0.06, 1e-3);
+}
+
+TEST_F(Batch, ASharedOffsetBeginsWhereItsPriorIs) {
+  SmootherOptions options;
+  options.time_offset_shared = true;
+  options.time_offset_sigma = 1e-4;
+  BatchProblem whole = problem(options);
+  whole.mounting.push_back(skewMounting());
+  whole.time_offsets = {0.0, 0.0};
+  whole.radar = 1;
+  whole.prior.t_O0 = 0.04;
+  for (double stamp = 0.7; stamp < 1.5; stamp += 0.1) {
+    BatchScan scan;
+    scan.velocity = measurement(stamp, 0.04);
+    scan.stamp = scan.velocity->stamp;
+    scan.t_O = 0.04;
+    scan.radar = 1;
+    whole.scans.push_back(scan);
+  }
+  EXPECT_NEAR(make(options).solve(whole).scans.front().t_O, 0.04, 2e-4);
+}
+
 TEST_F(Batch, ATruthBeyondTheBoundIsTold) {
   SmootherOptions options;
   options.max_time_offset = 0.05;

@@ -124,6 +124,20 @@ TEST_F(Smoother, ALateScanIsInsertedAtItsTime) {
   EXPECT_EQ(late.add(measurement(0.9, 0.0)), RadarInWindow::AddResult::kDuplicateStamp);
 }
 
+/// As of two radars that run at the same time. An IMU factor over almost no time costs the position its
+/// digits.
+TEST_F(Smoother, ScansAtTheSameTimeShareANode) {
+  for (const TimeOffsetModel model : {TimeOffsetModel::kImu, TimeOffsetModel::kConstantAcceleration}) {
+    SmootherOptions options;
+    options.time_offset_model = model;
+    RadarSmoother smoother = make(options);
+    const Block* node = smoother.states.nodeAt(motion.time(1.0));
+    EXPECT_EQ(smoother.states.nodeAt(motion.time(1.0001)), node);
+    EXPECT_EQ(smoother.states.nodeAt(motion.time(0.9999)), node);
+    EXPECT_NE(smoother.states.nodeAt(motion.time(1.01)), node);
+  }
+}
+
 TEST_F(Smoother, ScansThatSayNothingOfTheOffsetLeaveIt) {
   SmootherOptions options;
   RadarSmoother smoother = make(options);

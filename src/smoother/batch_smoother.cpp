@@ -76,7 +76,7 @@ std::vector<Block*> BatchSmoother::start(const BatchProblem& problem, const Stat
   std::vector<Block*> offsets;
   for (std::size_t k = 0; k < mounting.size(); ++k) {
     const bool is_first = k == 0 || !options_.time_offset_shared;
-    const bool has_prior = k == problem.radar;
+    const bool has_prior = k == problem.radar || options_.time_offset_shared;
     const double t_O = problem.time_offsets.empty() ? 0.0 : problem.time_offsets[k];
     offsets.push_back(is_first ? &addOffset(window, problem.start, has_prior ? problem.prior.t_O0 : t_O)
                                : offsets.front());
@@ -126,12 +126,13 @@ BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std
   };
 
   const std::shared_ptr<ceres::LossFunction> loss = huberLoss(options_.huber_threshold);
-  const double spacing = atMeasurement() ? kMinNodeSpacing : 0.0;
+  const double spacing = minNodeSpacing(options_.time_offset_model);
   Graph graph;
   graph.scans.resize(scans);
   Window& window = graph.window;
   // The newest of each radar.
   std::vector<Block*> offsets = start(problem, stateAt(problem.start), mounting, graph);
+  std::vector<bool> stepped(offsets.size(), false);  // since the newest
   for (const std::size_t i : order) {
     const BatchScan& scan = problem.scans[i];
     Block* node = graph.nodes.back();
@@ -144,16 +145,19 @@ BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std
                  {&previous, node});
       graph.nodes.push_back(node);
     }
-    Block*& offset = offsets[options_.time_offset_shared ? 0 : scan.radar];
+    const std::size_t clock = options_.time_offset_shared ? 0 : scan.radar;
+    Block*& offset = offsets[clock];
+    stepped[clock] = stepped[clock] || scan.offset_stepped;
     if (options_.estimate_time_offset && *offset->time == problem.start) offset->x[0] = t_O[i];
     const double dt = *node->time - *offset->time;
     if (dt > 0.0) {
       Block& previous = *offset;
       offset = &addOffset(window, *node->time, t_O[i]);
-      window.add(std::make_unique<ConstantOffsetFactor>(scan.offset_stepped
-                                                            ? options_.time_offset_sigma
-                                                            : options_.time_offset_noise * std::sqrt(dt)),
-                 {&previous, offset});
+      window.add(
+          std::make_unique<ConstantOffsetFactor>(stepped[clock] ? options_.time_offset_sigma
+                                                                : options_.time_offset_noise * std::sqrt(dt)),
+          {&previous, offset});
+      stepped[clock] = false;
     }
     Block* extrinsics = graph.extrinsics[scan.radar];
     graph.scans[i] = {graph.nodes.size() - 1, offset, extrinsics};

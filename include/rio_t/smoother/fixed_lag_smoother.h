@@ -14,9 +14,8 @@
 
 namespace rio_t {
 
-/// A scan nearer than this to a node shares it [s]. The radar factor bridges the rest exactly; an IMU factor
-/// over no time would have infinite weight.
-constexpr double kMinNodeSpacing = 0.005;
+/// [s] A scan as near as this to a node shares it: an IMU factor over no time would have infinite weight.
+double minNodeSpacing(TimeOffsetModel model);
 
 /// A node of the window: its time and its state.
 struct NodeEstimate {
