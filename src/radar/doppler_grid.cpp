@@ -12,8 +12,6 @@ namespace {
 constexpr double kLeastStep = 0.02;
 /// [m/s] A larger step counts as none: the radar would measure a Doppler in 1 ms (at 77 GHz).
 constexpr double kLargestStep = 2.0;
-/// [m/s] A larger value is a mark of the driver, like -999 for "no Doppler".
-constexpr double kLargestDoppler = 100.0;
 /// [steps] The driver may round or convert a value; it changes the value by up to this much. A value of a
 /// radar without steps is so near to a multiple once in 500 times.
 constexpr double kRounding = 1e-3;

@@ -1,6 +1,9 @@
 #include "rio_t/radar/doppler_span.h"
 
 #include <algorithm>
+#include <cmath>
+
+#include "rio_t/radar/doppler_grid.h"
 
 namespace rio_t {
 namespace {
@@ -17,6 +20,7 @@ constexpr std::size_t kEnough = 10;
 void DopplerSpan::learn(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R, double step) {
   if (given_ > 0.0) return;
   for (const RadarDirection& p : points) {
+    if (std::abs(p.doppler) >= DopplerGrid::kLargestDoppler) continue;
     if (lowest_ <= p.doppler && p.doppler <= highest_) continue;
     lowest_ = std::min(lowest_, p.doppler);
     highest_ = std::max(highest_, p.doppler);
