@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "noise.h"
+#include "rio_t/radar/doppler_span.h"
 
 namespace rio_t {
 namespace {
@@ -217,6 +218,26 @@ TEST(DopplerGrid, SameScansSameAnswer) {
       ASSERT_EQ(first.step().source, second.step().source);
     }
   }
+}
+
+// A walk at up to 2.4 m/s before a radar of +-1.5 m/s. The driver marks a point without Doppler.
+TEST(DopplerSpan, IsFoundBesideAMarkOfTheDriver) {
+  constexpr double kStep = 0.125;
+  constexpr double kSpan = 3.0;
+  Random random(1);
+  DopplerSpan span(0.0);
+  for (const double speed : {0.5, 1.0, 1.4, 1.8, 2.1, 2.4, 2.4, 2.4}) {
+    const Eigen::Vector3d v_R(0.0, speed, 0.0);
+    std::vector<RadarDirection> points = {{Eigen::Vector3d::UnitY(), -999.0}};
+    for (int i = 0; i < 40; ++i) {
+      const double azimuth = random.uniform(-1.2, 1.2);
+      const Eigen::Vector3d u_R(std::sin(azimuth), std::cos(azimuth), 0.0);
+      const double doppler = unwrapped(-u_R.dot(v_R), 0.0, kSpan);
+      points.push_back({u_R, kStep * (std::floor(doppler / kStep) + 0.5)});
+    }
+    span.learn(points, v_R, kStep);
+  }
+  EXPECT_NEAR(span.value(), kSpan, 0.5 * kStep);
 }
 
 }  // namespace
