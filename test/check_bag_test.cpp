@@ -14,6 +14,7 @@
 #include <optional>
 #include <sstream>
 
+#include "../src/ros/bag/inspect_recording.h"
 #include "rio_t/ros/bag/bag_runner.h"
 #include "rio_t/ros/bag/simulation_bag.h"
 #include "rio_t/ros/parameters/parameters.h"
@@ -32,6 +33,7 @@ struct Changes {
   std::function<bool(sensor_msgs::Imu&)> imu = nullptr;
   std::function<bool(sensor_msgs::PointCloud2&)> cloud = nullptr;
   bool keep_triggers = false;
+  int copies = 1;  // of each message
 };
 
 class CheckBag : public testing::Test {
@@ -70,10 +72,11 @@ class CheckBag : public testing::Test {
     rosbag::View view(in);
     for (const rosbag::MessageInstance& instance : view) {
       if (const auto imu = instance.instantiate<sensor_msgs::Imu>()) {
-        if (!changes.imu || changes.imu(*imu)) out.write(instance.getTopic(), instance.getTime(), *imu);
+        if (changes.imu && !changes.imu(*imu)) continue;
+        for (int k = 0; k < changes.copies; ++k) out.write(instance.getTopic(), instance.getTime(), *imu);
       } else if (const auto cloud = instance.instantiate<sensor_msgs::PointCloud2>()) {
-        if (!changes.cloud || changes.cloud(*cloud))
-          out.write(instance.getTopic(), instance.getTime(), *cloud);
+        if (changes.cloud && !changes.cloud(*cloud)) continue;
+        for (int k = 0; k < changes.copies; ++k) out.write(instance.getTopic(), instance.getTime(), *cloud);
       } else if (changes.keep_triggers) {
         out.write(instance.getTopic(), instance.getTime(), instance);
       }
@@ -81,9 +84,26 @@ class CheckBag : public testing::Test {
     return path;
   }
 
-  static BagCheck check(const std::string& bag) {
+  /// The plain bag with messages of another sensor, `rate` [Hz] of them.
+  template <typename Message>
+  static std::string withTopic(const std::string& name, const std::string& topic, double rate,
+                               Message message) {
+    std::string path = rewritten(name, {});
+    const rosbag::Bag plain(bag_);
+    rosbag::View view(plain);
+    const ros::Time begin = view.getBeginTime(), end = view.getEndTime();
+    rosbag::Bag bag(path, rosbag::bagmode::Append);
+    for (ros::Time time = begin; time < end; time += ros::Duration(1.0 / rate)) {
+      message.header.stamp = time;
+      bag.write(topic, time, message);
+    }
+    return path;
+  }
+
+  static BagCheck check(const std::string& bag, bool try_out = true) {
     CheckRequest request;
     request.bags = {bag};
+    request.try_out = try_out;
     return checkBag(bag, request);
   }
 
@@ -266,6 +286,90 @@ TEST_F(CheckBag, StampsOfAnotherClockAreNamed) {
   expectRuns(odd);
 }
 
+TEST_F(CheckBag, AnImuSampleWithAWrongStampIsLeftOutAlone) {
+  int count = 0;
+  const BagCheck ahead = check(rewritten("imu_ahead", {[&](sensor_msgs::Imu& imu) {
+                                           if (++count == 8000) imu.header.stamp += ros::Duration(100.0);
+                                           return true;
+                                         }}));
+  expectLine(ahead, FindingLevel::kOdd, {"IMU stamps", "leaves out 1 of", "1 stamped more than 0.5 s ahead"});
+  expectLine(ahead, FindingLevel::kOk, {"stamps in the header"});
+  EXPECT_EQ(configOf(ahead).stamp_source, StampSource::kHeader);
+  EXPECT_EQ(ahead.yaml.find("init_mode"), std::string::npos) << ahead.yaml;
+  expectRuns(ahead);
+  EXPECT_LT(turnFromTruth(ahead), 5.0);
+  count = 0;
+  const BagCheck zero = check(rewritten("imu_zero_once", {[&](sensor_msgs::Imu& imu) {
+                                          if (++count == 8000) imu.header.stamp = ros::Time();
+                                          return true;
+                                        }}),
+                              false);
+  EXPECT_TRUE(zero.ready());
+  expectLine(zero, FindingLevel::kOdd, {"IMU stamps", "leaves out 1 of", "1 with a stamp of zero"});
+}
+
+TEST_F(CheckBag, ImuSamplesOfAnotherClockAreLeftOut) {
+  const ros::Duration uptime(1000.0);
+  int count = 0;
+  const BagCheck synced = check(rewritten("imu_synced", {[&](sensor_msgs::Imu& imu) {
+                                            if (++count <= 200) imu.header.stamp -= uptime;
+                                            return true;
+                                          }}));
+  expectLine(synced, FindingLevel::kOdd, {"IMU stamps", "leaves out", "the clock jumped"});
+  EXPECT_EQ(configOf(synced).stamp_source, StampSource::kHeader);
+  expectRuns(synced);
+  EXPECT_LT(turnFromTruth(synced), 5.0);
+  // A jump near the end costs the end, not all before it.
+  count = 0;
+  const BagCheck late = check(rewritten("imu_late_jump", {[&](sensor_msgs::Imu& imu) {
+                                          if (++count > 18000) imu.header.stamp += uptime;
+                                          return true;
+                                        }}),
+                              false);
+  expectLine(late, FindingLevel::kOdd, {"IMU stamps", "the clock jumped"});
+  expectLine(late, FindingLevel::kOk, {"rest", "at rest from"});
+  EXPECT_LT(turnFromTruth(late), 5.0);
+}
+
+TEST_F(CheckBag, APauseOfTheImuIsNoJumpOfItsClock) {
+  int count = 0;
+  const BagCheck odd = check(rewritten("imu_pause", {[&](sensor_msgs::Imu&) {
+                                         ++count;
+                                         return count < 8000 || 10000 < count;
+                                       }}),
+                             false);
+  expectLine(odd, FindingLevel::kOdd, {"IMU", "gaps: 1"});
+  for (const Finding& finding : odd.findings)
+    EXPECT_EQ(finding.text.find("jumped"), std::string::npos) << describeCheck(odd);
+  EXPECT_LT(turnFromTruth(odd), 5.0);
+}
+
+TEST_F(CheckBag, AGyroBesideTheImuIsNotTakenForIt) {
+  sensor_msgs::Imu gyro;
+  gyro.angular_velocity.z = 0.01;
+  const std::string bag = withTopic("gyro", "/camera/gyro/sample", 833.0, gyro);
+  const BagCheck odd = check(bag);
+  expectLine(odd, FindingLevel::kOdd,
+             {"/sensor_platform/imu is chosen", "/camera/gyro/sample (cannot be used)", "--imu-topic"});
+  EXPECT_EQ(configOf(odd).imu_topic, "/sensor_platform/imu");
+  expectRuns(odd);
+  CheckRequest request;
+  request.imu_topic = "/camera/gyro/sample";
+  const BagCheck asked = checkBag(bag, request);
+  expectLine(asked, FindingLevel::kMissing, {"gravity is missing"});
+}
+
+TEST_F(CheckBag, ABagRecordedTwiceIsReady) {
+  Changes changes;
+  changes.copies = 2;
+  const BagCheck odd = check(rewritten("twice", changes));
+  ASSERT_TRUE(odd.ready()) << describeCheck(odd);
+  EXPECT_EQ(odd.to_do, "") << describeCheck(odd);
+  expectLine(odd, FindingLevel::kOk, {"trial run", "no divergence"});
+  expectLine(odd, FindingLevel::kOdd, {"/sensor_platform/imu", "duplicate stamps"});
+  expectLine(odd, FindingLevel::kOk, {"/sensor_platform/radar/scan", "duplicate stamps"});
+}
+
 TEST_F(CheckBag, ABagWithoutImuIsMissingOne) {
   const BagCheck odd = check(rewritten("no_imu", {[](sensor_msgs::Imu&) { return false; }}));
   expectLine(odd, FindingLevel::kMissing, {"IMU", "no topic of type sensor_msgs/Imu"});
@@ -305,6 +409,45 @@ TEST_F(CheckBag, ACloudWithoutDopplerIsNamedWithItsFields) {
   const BagCheck odd = check(rewritten("no_doppler", changes));
   expectLine(odd, FindingLevel::kMissing, {"no field with the Doppler", "snr_db, label"});
   EXPECT_FALSE(odd.ready());
+}
+
+sensor_msgs::PointCloud2 lidarCloud() {
+  sensor_msgs::PointCloud2 cloud;
+  sensor_msgs::PointCloud2Modifier modifier(cloud);
+  modifier.setPointCloud2FieldsByString(1, "xyz");
+  modifier.resize(100);
+  return cloud;
+}
+
+TEST_F(CheckBag, CloudsOfALidarAreNotKeptButNamed) {
+  const std::string bag = withTopic("lidar", "/lidar/points", 10.0, lidarCloud());
+  const Recording recording = readRecording(bag, {});
+  ASSERT_EQ(recording.clouds.size(), 2u);
+  for (const CloudTopic& topic : recording.clouds) {
+    if (topic.topic == "/lidar/points") {
+      EXPECT_EQ(topic.messages.size(), 1u);
+    } else {
+      EXPECT_GT(topic.messages.size(), 400u) << topic.topic;
+    }
+    EXPECT_EQ(topic.times.size(), topic.messages.size()) << topic.topic;
+  }
+  const BagCheck odd = check(bag, false);
+  EXPECT_TRUE(odd.ready());
+  expectLine(odd, FindingLevel::kOdd, {"/lidar/points", "no field with the Doppler", "x, y, z"});
+}
+
+TEST_F(CheckBag, OnlyTopicsThatAreAskedForAreRead) {
+  CheckRequest request;
+  request.imu_topic = "/sensor_platform/imu";
+  request.radar_topics = {"/sensor_platform/radar/scan"};
+  const Recording lidar =
+      readRecording(withTopic("asked_lidar", "/lidar/points", 10.0, lidarCloud()), request);
+  ASSERT_EQ(lidar.clouds.size(), 1u);
+  EXPECT_EQ(lidar.clouds.front().topic, request.radar_topics.front());
+  const Recording imus =
+      readRecording(withTopic("asked_imu", "/camera/imu", 200.0, sensor_msgs::Imu()), request);
+  ASSERT_EQ(imus.imus.size(), 1u);
+  EXPECT_EQ(imus.imus.front().topic, request.imu_topic);
 }
 
 TEST_F(CheckBag, FieldsThatNoPresetHasAreGuessed) {

@@ -49,7 +49,8 @@ void addOptions(rio_t::OptionSet& options, Arguments& a) {
   options.positional("bag");
   options.text("out", "FILE.yaml", "gets the configuration; without it, it is printed", r.out);
   options.text("rig", "FILE.png", "gets a drawing of the rig: top and side view", r.rig);
-  options.text("imu-topic", "TOPIC", "the IMU; by default the one with most samples", r.imu_topic);
+  options.text("imu-topic", "TOPIC", "the IMU; by default the one that can be used, with most samples",
+               r.imu_topic);
   options.values("radar-topic", "TOPIC", "a radar; may be repeated; by default all clouds with a Doppler",
                  [&r](const std::string& topic) { r.radar_topics.push_back(topic); });
   options.value("duration", "S", "seconds to read of each bag (0: all), or to listen with --live",

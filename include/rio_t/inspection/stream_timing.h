@@ -37,7 +37,8 @@ struct StreamDelay {
 };
 
 /// The delays of a topic beyond those of the IMU: the smallest difference between record and stamp of the IMU
-/// carries the record times over into its clock, as ClockMap does. Both must not be empty.
+/// carries the record times over into its clock, as ClockMap does. Both must not be empty. One stamp of the
+/// IMU that is ahead would decide, so leave out those that are out of place.
 StreamDelay delayAgainstImu(const std::vector<MessageTimes>& times, const std::vector<MessageTimes>& imu);
 
 /// The value that a share of the values does not exceed; 0 for none.

@@ -31,18 +31,26 @@ void add(const ProposedKeys& from, ProposedKeys* to) {
   }
 }
 
-/// The IMU with the most samples that can be used, unless one is asked for.
-const ImuTopic* chooseImu(const Recording& recording, const CheckRequest& request) {
-  const ImuTopic* best = nullptr;
-  for (const ImuTopic& topic : recording.imus) {
-    if (!request.imu_topic.empty() && topic.topic != request.imu_topic) continue;
-    const bool usable = inspectTiming(topic.times).stampsAreUsable();
-    const bool best_usable = best != nullptr && inspectTiming(best->times).stampsAreUsable();
-    if (best != nullptr && (best_usable != usable ? best_usable : best->times.size() >= topic.times.size()))
-      continue;
-    best = &topic;
+/// The IMU that can be used, with the most samples; if none can be used, one that says why. There is at least
+/// one. The report names the others.
+ImuInspection chooseImu(const Recording& recording, BagCheck* check) {
+  std::vector<ImuInspection> imus;
+  for (const ImuTopic& topic : recording.imus) imus.push_back(inspectImuTopic(topic));
+  const auto best =
+      std::max_element(imus.begin(), imus.end(), [](const ImuInspection& a, const ImuInspection& b) {
+        if (a.to_do.empty() != b.to_do.empty()) return b.to_do.empty();
+        return a.kept.times.size() < b.kept.times.size();
+      });
+  std::string others;
+  for (const ImuInspection& imu : imus) {
+    if (&imu == &*best) continue;
+    others += (others.empty() ? "" : ", ") + imu.kept.topic + (imu.to_do.empty() ? "" : " (cannot be used)");
   }
-  return best;
+  if (!others.empty())
+    check->findings.push_back({FindingLevel::kOdd, "IMU",
+                               best->kept.topic + " is chosen; the other topics of type sensor_msgs/Imu: " +
+                                   others + "; --imu-topic chooses another"});
+  return std::move(*best);
 }
 
 /// The part of each topic that differs: "/radar_a/scan", "/radar_b/scan" give "a", "b".
@@ -105,20 +113,30 @@ ProposedConfig proposed(const ImuInspection& imu, const std::vector<RadarInspect
   return config;
 }
 
+/// A message that was recorded twice says nothing about the configuration.
+std::uint64_t scansJudged(const RunSummary& summary) {
+  const std::map<std::string, std::uint64_t> rejected = summary.scansRejected();
+  const auto duplicates = rejected.find("duplicate_stamp");
+  return summary.scansTotal() - (duplicates == rejected.end() ? 0 : duplicates->second);
+}
+
+double shareUsed(const RunSummary& summary) {
+  return static_cast<double>(summary.scansUsed()) /
+         static_cast<double>(std::max<std::uint64_t>(1, scansJudged(summary)));
+}
+
 struct Trial {
   std::string failure;  ///< why it did not run; empty: it ran
   RunSummary summary;
 
   bool good() const {
     return failure.empty() && summary.divergences == 0 && summary.health_at_end != "diverged" &&
-           2 * summary.scansUsed() > summary.scansTotal();
+           2 * summary.scansUsed() > scansJudged(summary);
   }
   /// Larger is better.
   double score() const {
     if (!failure.empty()) return -1e9;
-    const double share = static_cast<double>(summary.scansUsed()) /
-                         static_cast<double>(std::max<std::uint64_t>(1, summary.scansTotal()));
-    return share - static_cast<double>(summary.divergences) -
+    return shareUsed(summary) - static_cast<double>(summary.divergences) -
            (summary.health_at_end == "diverged" ? 1.0 : 0.0);
   }
 };
@@ -149,10 +167,7 @@ constexpr Attempt kAttempts[] = {
 };
 
 std::string shareText(const RunSummary& summary) {
-  return fixedText(100.0 * static_cast<double>(summary.scansUsed()) /
-                       static_cast<double>(std::max<std::uint64_t>(1, summary.scansTotal())),
-                   0) +
-         " % of the scans used";
+  return fixedText(100.0 * shareUsed(summary), 0) + " % of the scans used";
 }
 
 std::string offsetsText(const RunSummary& summary) {
@@ -318,35 +333,30 @@ std::string wrapped(const std::string& text, std::size_t indent, std::size_t wid
 BagCheck checkBag(const std::string& bag, const CheckRequest& request) {
   BagCheck check;
   check.bag = bag;
-  const Recording recording = readRecording(bag, request.duration);
+  const Recording recording = readRecording(bag, request);
   if (recording.read < recording.length)
     check.findings.push_back({FindingLevel::kOk, "bag",
                               "the first " + fixedText(recording.read, 0) + " of " +
                                   fixedText(recording.length, 0) + " s were read (--duration)"});
-  const ImuTopic* imu_topic = chooseImu(recording, request);
-  if (imu_topic == nullptr) {
+  if (recording.imus.empty()) {
     missing("IMU", "the bag has no topic of type sensor_msgs/Imu; it has " + topicsOf(recording),
             "Record the IMU, too: 100 Hz or more, with raw acceleration and angular velocity.", &check);
     return check;
   }
-  const ImuInspection imu = inspectImuTopic(*imu_topic);
+  const ImuInspection imu = chooseImu(recording, &check);
   append(imu.findings, &check.findings);
   if (!imu.to_do.empty()) {
     check.to_do = imu.to_do;
     return check;
   }
   std::vector<RadarInspection> radars;
-  std::size_t clouds = 0;
   for (const CloudTopic& cloud : recording.clouds) {
-    const auto& wanted = request.radar_topics;
-    if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), cloud.topic) == wanted.end()) continue;
-    ++clouds;
     RadarInspection radar = inspectRadar(recording, imu, cloud);
     append(radar.findings, &check.findings);
     if (radar.usable) radars.push_back(std::move(radar));
   }
   if (radars.empty()) {
-    if (clouds == 0) {
+    if (recording.clouds.empty()) {
       missing("radar", "the bag has no topic of type sensor_msgs/PointCloud2; it has " + topicsOf(recording),
               "Record the radar, too: a point cloud with positions and Doppler.", &check);
     } else {

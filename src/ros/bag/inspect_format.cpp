@@ -20,7 +20,7 @@ using sensor_msgs::PointCloud2;
 /// The first message that has points.
 const PointCloud2* example(const CloudTopic& topic) {
   for (const auto& message : topic.messages) {
-    if (!message->data.empty() && !message->fields.empty()) return message.get();
+    if (hasPoints(*message)) return message.get();
   }
   return nullptr;
 }
@@ -172,6 +172,8 @@ void findPower(const CloudTopic& topic, FormatProposal* proposal) {
 }
 
 }  // namespace
+
+bool hasPoints(const PointCloud2& cloud) { return !cloud.data.empty() && !cloud.fields.empty(); }
 
 std::vector<RadarScan> decodeAll(const CloudTopic& topic, const PointCloudFormat& format) {
   std::vector<RadarScan> scans;

@@ -21,7 +21,11 @@ struct FormatProposal {
   std::string power;             ///< what the power field says, as one phrase
 };
 
-/// Chooses preset, names of fields and unit of the power from fields and values.
+/// Whether a cloud shows what its fields hold.
+bool hasPoints(const sensor_msgs::PointCloud2& cloud);
+
+/// Chooses preset, names of fields and unit of the power from fields and values. A fault depends on the first
+/// cloud with points alone.
 FormatProposal proposeFormat(const CloudTopic& topic);
 
 /// Turns the format so that the radar looks along the forward axis, as `cloud` shows it. `mirrored`: the axes

@@ -1,7 +1,10 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "inspect_radar.h"
+#include "rio_t/imu/clock_jump_detector.h"
+#include "rio_t/imu/input_check.h"
 #include "rio_t/ros/bag/run_output.h"
 
 namespace rio_t {
@@ -19,23 +22,96 @@ std::string rateText(const StreamTiming& timing) {
     text +=
         ", gaps: " + std::to_string(timing.gaps) + " (longest " + fixedText(timing.longest_gap, 2) + " s)";
   if (timing.duplicates > 0) text += ", duplicate stamps: " + std::to_string(timing.duplicates);
-  if (timing.backwards > 0) text += ", stamps that run back: " + std::to_string(timing.backwards);
   return text;
 }
 
-void checkStamps(const StreamTiming& timing, ImuInspection* imu) {
-  std::string fault;
-  if (timing.zero > 0) {
-    fault = std::to_string(timing.zero) + " of " + std::to_string(timing.messages) + " stamps are zero";
-  } else if (timing.constant) {
-    fault = "all stamps are the same";
-  } else if (!timing.stampsAreUsable()) {
-    fault = std::to_string(timing.backwards) + " of " + std::to_string(timing.messages) + " stamps run back";
+/// The samples that are not out of place by their stamps, and why the others are.
+struct StampedInOrder {
+  ImuTopic kept;
+  std::size_t zero = 0, duplicates = 0, ahead = 0, behind = 0;
+  bool jumped = false;  ///< the clock
+};
+
+/// A pause of the IMU: the records have it, too. If the clock jumped, they do not.
+bool isPause(const MessageTimes& before, const MessageTimes& after, double tolerance) {
+  const double step = after.stamp - before.stamp;
+  return step > 0.0 && std::abs(after.record - before.record - step) < tolerance;
+}
+
+/// Drops what the odometry drops. If the clock jumps, the longest part without a jump is kept.
+StampedInOrder stampedInOrder(const ImuTopic& topic) {
+  const ImuInputCheckOptions odometry;
+  ClockJumpDetector stamps(odometry.max_bridged_gap, odometry.jump_patience);
+  StampedInOrder result;
+  std::vector<ImuTopic> parts(1);
+  for (std::size_t i = 0; i < topic.times.size(); ++i) {
+    const MessageTimes& times = topic.times[i];
+    if (times.stamp == Time()) {
+      ++result.zero;
+      continue;
+    }
+    switch (stamps.check(times.stamp)) {
+      case ClockJumpDetector::Verdict::kGood:
+        break;
+      case ClockJumpDetector::Verdict::kBehind:
+        ++(times.stamp == parts.back().times.back().stamp ? result.duplicates : result.behind);
+        continue;
+      case ClockJumpDetector::Verdict::kAhead:
+        ++result.ahead;
+        continue;
+      case ClockJumpDetector::Verdict::kRestart:
+        if (isPause(parts.back().times.back(), times, odometry.jump_patience)) break;
+        result.jumped = true;
+        parts.emplace_back();
+        break;
+    }
+    parts.back().written.push_back(topic.written[i]);
+    parts.back().times.push_back(times);
   }
-  if (fault.empty()) return;
+  result.kept =
+      std::move(*std::max_element(parts.begin(), parts.end(), [](const ImuTopic& a, const ImuTopic& b) {
+        return a.times.size() < b.times.size();
+      }));
+  result.kept.topic = topic.topic;
+  return result;
+}
+
+void describeOrder(const StampedInOrder& order, std::size_t messages, ImuInspection* imu) {
+  std::string why;
+  const auto tell = [&](std::size_t count, const std::string& text) {
+    if (count > 0) why += (why.empty() ? "" : ", ") + std::to_string(count) + " " + text;
+  };
+  tell(order.zero, "with a stamp of zero");
+  tell(order.ahead, "stamped more than " + fixedText(ImuInputCheckOptions().jump_patience, 1) +
+                        " s ahead of the last good one");
+  tell(order.behind, "stamped before the last good one");
+  if (order.jumped)
+    why += std::string(why.empty() ? "" : "; ") +
+           "the clock jumped, and only the longest part without a jump is used";
+  if (why.empty()) return;
+  const std::size_t left_out = messages - order.kept.times.size() - order.duplicates;
+  imu->findings.push_back({FindingLevel::kOdd, "IMU stamps",
+                           "check_bag leaves out " + std::to_string(left_out) + " of " +
+                               std::to_string(messages) + " samples: " + why});
+}
+
+/// Why the stamps cannot be used; empty: they can, but for a few.
+std::string faultOf(const StreamTiming& timing) {
+  if (10 * timing.zero >= timing.messages)
+    return std::to_string(timing.zero) + " of " + std::to_string(timing.messages) + " stamps are zero";
+  if (timing.constant) return "all stamps are the same";
+  if (10 * timing.backwards >= timing.messages)
+    return std::to_string(timing.backwards) + " of " + std::to_string(timing.messages) + " stamps run back";
+  return "";
+}
+
+void describeRate(const StreamTiming& timing, ImuInspection* imu) {
+  constexpr double kSlow = 50.0;  // [Hz]
+  const bool odd = timing.rate < kSlow || timing.gaps > 0 || 20 * timing.duplicates > timing.messages;
   imu->findings.push_back(
-      {FindingLevel::kMissing, "IMU stamps", fault + "; rio_t needs the time of each sample"});
-  imu->to_do = "Let the IMU driver set header.stamp, and record again.";
+      {odd ? FindingLevel::kOdd : FindingLevel::kOk, "IMU",
+       imu->kept.topic + ": " + rateText(timing) +
+           (timing.rate < kSlow ? ", slower than the 50 Hz that a hand-held platform needs" : "")});
 }
 
 void describe(ImuInspection* imu) {
@@ -97,21 +173,24 @@ void describe(ImuInspection* imu) {
 
 ImuInspection inspectImuTopic(const ImuTopic& topic) {
   ImuInspection imu;
-  imu.topic = &topic;
-  const StreamTiming timing = inspectTiming(topic.times);
+  imu.kept.topic = topic.topic;
   imu.keys.set("imu_topic", topic.topic, "");
-  constexpr double kSlow = 50.0;  // [Hz]
-  const bool odd = timing.rate < kSlow || timing.gaps > 0 || timing.backwards > 0 ||
-                   20 * timing.duplicates > timing.messages;
-  imu.findings.push_back(
-      {odd ? FindingLevel::kOdd : FindingLevel::kOk, "IMU",
-       topic.topic + ": " + rateText(timing) +
-           (timing.rate < kSlow ? ", slower than the 50 Hz that a hand-held platform needs" : "")});
-  checkStamps(timing, &imu);
-  if (!imu.to_do.empty()) return imu;
-  for (const ImuMeasurement& sample : topic.written) {
-    if (imu.samples.empty() || sample.time > imu.samples.back().time) imu.samples.push_back(sample);
+  const StreamTiming written = inspectTiming(topic.times);
+  const std::string fault = faultOf(written);
+  if (!fault.empty()) {
+    describeRate(written, &imu);
+    imu.findings.push_back(
+        {FindingLevel::kMissing, "IMU stamps", fault + "; rio_t needs the time of each sample"});
+    imu.to_do = "Let the IMU driver set header.stamp, and record again.";
+    return imu;
   }
+  const StampedInOrder order = stampedInOrder(topic);
+  StreamTiming timing = inspectTiming(order.kept.times);
+  timing.duplicates = order.duplicates;
+  imu.kept = order.kept;
+  imu.samples = order.kept.written;
+  describeRate(timing, &imu);
+  describeOrder(order, written.messages, &imu);
   imu.report = inspectImu(imu.samples);
   std::vector<ImuMeasurement> finite;
   for (const ImuMeasurement& sample : imu.samples) {

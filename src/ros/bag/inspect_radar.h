@@ -14,7 +14,7 @@ namespace rio_t {
 
 /// The IMU of a recording, ready to be compared with radars.
 struct ImuInspection {
-  const ImuTopic* topic = nullptr;
+  ImuTopic kept;  ///< without the samples whose stamps are out of place
   ImuReport report;
   std::vector<ImuMeasurement> samples;  ///< in m/s^2 and rad/s, stamps rising
   std::vector<Finding> findings;

@@ -6,8 +6,10 @@
 #include <tf2_eigen/tf2_eigen.h>
 
 #include <algorithm>
+#include <set>
 
 #include "bag_file.h"
+#include "inspect_format.h"
 #include "rio_t/ros/messages/conversions.h"
 
 namespace rio_t {
@@ -22,6 +24,10 @@ Topic& topicOf(const std::string& name, std::vector<Topic>* topics) {
   return topics->back();
 }
 
+bool has(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
 void addImu(const sensor_msgs::Imu& message, Time record, ImuTopic* topic) {
   ImuMeasurement imu;
   imu.time = toTime(message.header.stamp);
@@ -33,7 +39,7 @@ void addImu(const sensor_msgs::Imu& message, Time record, ImuTopic* topic) {
 
 }  // namespace
 
-Recording readRecording(const std::string& path, double duration) {
+Recording readRecording(const std::string& path, const CheckRequest& request) {
   Recording recording;
   recording.bag = path;
   rosbag::Bag bag;
@@ -42,11 +48,18 @@ Recording readRecording(const std::string& path, double duration) {
   rosbag::View all(bag);
   if (all.size() == 0) throw bagError(path, "it holds no messages");
   recording.length = (all.getEndTime() - all.getBeginTime()).toSec();
-  recording.read = duration > 0.0 ? std::min(duration, recording.length) : recording.length;
+  recording.read = request.duration > 0.0 ? std::min(request.duration, recording.length) : recording.length;
   const ros::Time end = recording.read < recording.length ? all.getBeginTime() + ros::Duration(recording.read)
                                                           : all.getEndTime();
   const std::vector<std::string> types = {"sensor_msgs/Imu", "sensor_msgs/PointCloud2", "std_msgs/Header"};
-  rosbag::View view(bag, rosbag::TypeQuery(types), all.getBeginTime(), end);
+  const auto is_wanted = [&](const rosbag::ConnectionInfo* connection) {
+    const std::string& type = connection->datatype;
+    if (type == types[0]) return request.imu_topic.empty() || request.imu_topic == connection->topic;
+    if (type == types[1]) return request.radar_topics.empty() || has(request.radar_topics, connection->topic);
+    return type == types[2];
+  };
+  rosbag::View view(bag, is_wanted, all.getBeginTime(), end);
+  std::set<std::string> judged, refused;  // topics with clouds
   for (const rosbag::MessageInstance& instance : view) {
     const Time record = toTime(instance.getTime());
     const std::string& type = instance.getDataType();
@@ -54,9 +67,12 @@ Recording readRecording(const std::string& path, double duration) {
     if (type == types[0]) {
       addImu(*rio_t::read<sensor_msgs::Imu>(instance), record, &topicOf(name, &recording.imus));
     } else if (type == types[1]) {
+      if (refused.count(name) != 0) continue;
       CloudTopic& topic = topicOf(name, &recording.clouds);
       topic.messages.push_back(rio_t::read<sensor_msgs::PointCloud2>(instance));
       topic.times.push_back({toTime(topic.messages.back()->header.stamp), record});
+      const bool is_first = hasPoints(*topic.messages.back()) && judged.insert(name).second;
+      if (is_first && !proposeFormat(topic).fault.empty()) refused.insert(name);
     } else {
       HeaderTopic& topic = topicOf(name, &recording.headers);
       topic.messages.push_back(*rio_t::read<std_msgs::Header>(instance));

@@ -9,6 +9,7 @@
 
 #include "rio_t/imu/measurement.h"
 #include "rio_t/inspection/stream_timing.h"
+#include "rio_t/ros/bag/check_bag.h"
 
 /// A bag as an inspection reads it: every topic that may serve.
 namespace rio_t {
@@ -19,6 +20,8 @@ struct ImuTopic {
   std::vector<MessageTimes> times;
 };
 
+/// Of a topic that cannot serve, no cloud after the first one with points is kept: a lidar would fill the
+/// memory, and one cloud tells why it cannot serve.
 struct CloudTopic {
   std::string topic;
   std::vector<sensor_msgs::PointCloud2::ConstPtr> messages;
@@ -41,7 +44,8 @@ struct Recording {
   std::vector<HeaderTopic> headers;
 };
 
-/// Reads at most `duration` [s] of a bag; 0: all. Throws std::runtime_error that names the bag.
-Recording readRecording(const std::string& bag, double duration);
+/// Reads the topics and the seconds of a bag that `request` asks for. Throws std::runtime_error that names
+/// the bag.
+Recording readRecording(const std::string& bag, const CheckRequest& request);
 
 }  // namespace rio_t

@@ -19,7 +19,7 @@ struct StampProposal {
   std::vector<std::string> odd;  ///< sentences
 };
 
-/// Chooses stamp_source for a cloud. The stamps of the IMU must be usable.
+/// Chooses stamp_source for a cloud. No stamp of the IMU may be out of place.
 StampProposal proposeStamps(const Recording& recording, const ImuTopic& imu, const CloudTopic& cloud);
 
 /// Stamps scans as the programs would. `scans`: one for each message of the topic.
