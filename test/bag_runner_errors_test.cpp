@@ -88,6 +88,37 @@ TEST_F(BagRunnerErrors, ZeroStampsAreNamedWithTheOtherSources) {
   expectError(run(), {"/sensor_platform/imu", "zero"});
 }
 
+TEST_F(BagRunnerErrors, TriggersWithAStampOfZeroAreNamed) {
+  const auto writeTriggers = [&](int zero) {
+    writeBag({});
+    rosbag::Bag bag(bag_, rosbag::bagmode::Append);
+    for (int k = 0; k < 80; ++k) {
+      const ros::Time stamp = ros::Time(1000.0) + ros::Duration(0.1 * k);
+      std_msgs::Header trigger;
+      trigger.seq = static_cast<std::uint32_t>(k);
+      if (k >= zero) trigger.stamp = stamp;
+      bag.write("/sensor_platform/radar/trigger", stamp + ros::Duration(100.001), trigger);
+    }
+  };
+  writeTriggers(80);
+  expectError(
+      run({"--set", "stamp_source=trigger"}),
+      {"every one of the 80 scans was rejected: trigger_missing 80",
+       "  1. 80 messages on trigger_topic /sensor_platform/radar/trigger have a stamp of zero, for 80 "
+       "scans. Correct the driver"});
+  writeTriggers(2);
+  const Outcome outcome = run({"--set", "stamp_source=trigger"});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("/sensor_platform/radar/trigger (trigger_topic): the stamp in the header is "
+                             "zero"),
+            std::string::npos)
+      << outcome.err;
+  EXPECT_NE(outcome.err.find("(messages: 2)"), std::string::npos) << outcome.err;
+  const std::string yaml = contents(out_ + "/summary.yaml");
+  EXPECT_NE(yaml.find("trigger_stamp_zero: 2"), std::string::npos) << yaml;
+  EXPECT_NE(yaml.find("trigger_missing: 2"), std::string::npos) << yaml;
+}
+
 TEST_F(BagRunnerErrors, ABadMessageAmongGoodOnesIsCountedAndSaid) {
   writeBag({});
   {

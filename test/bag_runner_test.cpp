@@ -2,6 +2,7 @@
 #include "rio_t/ros/bag/bag_runner.h"
 
 #include <gtest/gtest.h>
+#include <sensor_msgs/FluidPressure.h>
 
 #include <algorithm>
 #include <cmath>
@@ -177,6 +178,49 @@ TEST_F(BagRunner, GroundTruthComesFromTheTopicOrAFile) {
   expectError(run({"--set", "ground_truth=" + folder_ + "/none.txt"}), {folder_ + "/none.txt"});
   std::ofstream(folder_ + "/elsewhen.txt") << "5.0 0 0 0 0 0 0 1\n6.0 3 0 0 0 0 0 1\n";
   expectError(run({"--set", "ground_truth=" + folder_ + "/elsewhen.txt"}), {"ground truth", "elsewhen.txt"});
+}
+
+TEST_F(BagRunner, ATrajectoryThatBeginsAnewIsDoubtful) {
+  BagContents what;
+  what.duration = 16.0;
+  for (const double jump : {5.0, -5.0}) {
+    what.jump = jump;
+    writeBag(what);
+    const Outcome outcome = run();
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    const std::string where = jump > 0.0 ? "jump ahead from 1007.995 s to 1013.500 s, more than "
+                                           "max_bridged_imu_gap 3 s. The trajectory begins anew there"
+                                         : "jump back from 1007.995 s to 1003.500 s. The trajectory";
+    EXPECT_NE(outcome.err.find("warning: topic /sensor_platform/imu: The stamps of the IMU " + where),
+              std::string::npos)
+        << outcome.err;
+    EXPECT_NE(outcome.out.find(where), std::string::npos) << outcome.out;
+    const std::string yaml = contents(out_ + "/summary.yaml");
+    for (const char* part : {"verdict: doubtful\n", "imu_clock_restart: 1", "name: imu_clock_restart"})
+      EXPECT_NE(yaml.find(part), std::string::npos) << part << yaml;
+  }
+  // A gap that the odometry bridges is none.
+  what.jump = 5.0;
+  writeBag(what);
+  EXPECT_EQ(run({"--set", "max_bridged_imu_gap=6"}).err, "");
+}
+
+TEST_F(BagRunner, TopicsOfABagWithoutLeadingSlashesAreFound) {
+  writeBag({});
+  {
+    rosbag::Bag bag(bag_, rosbag::bagmode::Append);
+    sensor_msgs::FluidPressure pressure;
+    pressure.fluid_pressure = 101325.0;
+    for (int k = 0; k < 400; ++k) {
+      pressure.header.stamp = ros::Time(1000.0) + ros::Duration(0.02 * k);
+      bag.write("sensor_platform/baro", pressure.header.stamp + ros::Duration(100.001), pressure);
+    }
+  }
+  for (const char* topic : {"sensor_platform/baro", "/sensor_platform/baro"}) {
+    const Outcome outcome = run({"--set", std::string("barometer_topic=") + topic});
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_NE(contents(out_ + "/summary.yaml").find("barometer: {pressures: 400,"), std::string::npos);
+  }
 }
 
 TEST_F(BagRunner, APartOfTheBagCanBePlayed) {

@@ -201,6 +201,35 @@ TEST(Diagnosis, TheImuIsNamed) {
   expectSays(first(evidence), {"imu_gap: 100 gaps", "max_imu_gap"});
 }
 
+TEST(Diagnosis, ATrajectoryThatBeginsAnewIsNeverGood) {
+  RunEvidence evidence = goodRun();
+  evidence.faults["imu_clock_restart"] = 1;
+  evidence.imu_restarts = {{Time::fromSeconds(1700000020.0), Time::fromSeconds(1700000028.505)}};
+  expectSays(
+      first(evidence),
+      {"imu_clock_restart: The stamps of the IMU jump ahead from 1700000020.000 s to 1700000028.505 s, "
+       "more than max_bridged_imu_gap 3 s. The trajectory begins anew there, at the origin. Run",
+       "raise max_bridged_imu_gap"});
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
+  evidence.imu_restarts = {{Time::fromSeconds(40.0), Time::fromSeconds(10.0)},
+                           {Time::fromSeconds(40.0), Time::fromSeconds(10.0)}};
+  expectSays(first(evidence),
+             {"jump back from 40.000 s to 10.000 s. The", "at the origin; more such jumps: 1."});
+}
+
+TEST(Diagnosis, TriggersWithAStampOfZeroAreNamed) {
+  RunEvidence evidence = withRejected("trigger_missing");
+  evidence.radars.front().name = "left";
+  evidence.radars.front().triggers_zero = 210;
+  Config config;
+  config.trigger_topic = "/trigger";
+  expectSays(first(evidence, config),
+             {"trigger_stamp_zero: 210 messages on left/trigger_topic /trigger have a stamp of zero, for 200 "
+              "scans.",
+              "left/stamp_source"});
+  EXPECT_EQ(diagnose(evidence, config).causes.size(), 1u) << "that there is no trigger follows from it";
+}
+
 TEST(Diagnosis, TheLikeliestThreeComeFirst) {
   RunEvidence evidence = withRejected("innovation");
   evidence.faults = {{"diverged", 2}, {"imu_saturated", 400}, {"imu_gap", 100}};

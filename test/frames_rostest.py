@@ -16,7 +16,8 @@ from rio_t import live_tester as tester
 from rio_t import tum
 
 OK, WARN, ERROR = 0, 1, 2
-EXAMPLES = pathlib.Path(__file__).resolve().parent.parent / "launch" / "examples"
+PACKAGE = pathlib.Path(__file__).resolve().parent.parent
+CONFIG, EXAMPLES = PACKAGE / "config", PACKAGE / "launch" / "examples"
 SAME_M = 1e-3       # from tf or by hand: the same trajectory
 LIVE_BOUND_M = 0.05  # as in live_rostest.py
 OFFSET_S = 0.03      # of the simulated radar
@@ -59,7 +60,7 @@ def as_links(topic, message):
 
 
 class FramesTest(tester.LiveTestCase):
-    namespaces = ("/rio_t", "/robot_description")
+    namespaces = ("/rio_t", "/robot", "/robot_description")
 
     @classmethod
     def setUpClass(cls):
@@ -201,6 +202,15 @@ class FramesTest(tester.LiveTestCase):
                 listener.wait_for_diagnosis("odometry", "waiting for tf from imu_link to base_link", WARN)
                 player.wait()
             self.assertEqual(listener.messages["odom"], [])
+
+    def test_a_bag_played_into_a_namespace_brings_its_tf(self):
+        config = pathlib.Path(self.path("tf.yaml"))
+        config.write_text((CONFIG / "irs.yaml").read_text() + "\nextrinsics_source: tf\nbase_extrinsics_source: tf\n")
+        words = ("--wait", "rio_t", "rio_t.launch", f"config:={config}", "ns:=robot", "bag:=" + self.bag,
+                 f"bag_rate:={2.0 / tester.SLOWNESS}")
+        with tester.Listener(node="/robot/rio_t") as listener, tester.Process(shutil.which("roslaunch"), *words) as launch:
+            listener.wait_for("odometry", lambda: listener.messages["odom"])
+            launch.stop()
 
     def test_who_publishes_which_tf(self):
         cases = {("publish_tf:=false",): (set(), {("base_link", "rio_t_radar")}),

@@ -93,3 +93,14 @@ def test_namespace_and_topics_reach_the_node_and_the_bag(tmp_path):
         "/bag_player", "/robot/rio_t_manager", "/robot/rio_t", "/robot/rviz"]
     play = roslaunch("--args", "bag_player", *words, folder=tmp_path).stdout
     assert "--prefix=robot" in play and "--hz=200" in play and "--loop" in play and str(tmp_path / "run.bag") in play
+
+
+def test_a_bag_played_into_a_namespace_keeps_its_tf():
+    """tf2 listens to /tf and /tf_static in every namespace."""
+    def remappings(*words):
+        play = roslaunch("--args", "bag_player", "rio_t", "irs.launch", "bag:=run.bag", *words).stdout
+        assert "/run.bag" in play
+        return {word for word in play.split() if ":=/" in word}
+    for namespace in ("robot", "/robot"):
+        assert remappings("ns:=" + namespace) == {f"{namespace}/tf:=/tf", f"{namespace}/tf_static:=/tf_static"}
+    assert remappings() == set()

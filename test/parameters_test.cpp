@@ -37,6 +37,13 @@ TEST(Parameters, EveryKindOfValueIsRead) {
   EXPECT_EQ(config.odometry.smoother.time_offset_noise, 1e-4);
 }
 
+TEST(Parameters, WholeNumbersMayBeWrittenWithAPoint) {
+  EXPECT_EQ(fromAssignments({"max_iterations=9.0"}).odometry.smoother.max_iterations, 9);
+  EXPECT_EQ(fromAssignments({"path_max_poses=1500.0"}).path_max_poses, 1500u);
+  for (const char* refused : {"max_iterations=9.5", "max_iterations=0.0", "max_iterations=99999999999.0"})
+    EXPECT_TRUE(contains(faultOf(refused), "expected a whole number")) << refused;
+}
+
 TEST(Parameters, TheKeysThatUsersRelyOnExist) {
   std::set<std::string> keys;
   for (const ParameterDescription& about : parameterDescriptions()) {

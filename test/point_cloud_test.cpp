@@ -380,16 +380,11 @@ TEST(PointCloudRefusal, WrongSteps) {
   EXPECT_TRUE(contains(refusal(m, irs), "row_step"));
 }
 
-TEST(PointCloudRefusal, OtherByteOrder) {
-  PointCloud2 m = irsMessage();
-  m.is_bigendian = m.is_bigendian ? 0 : 1;
-  EXPECT_TRUE(contains(refusal(m, PointCloudFormat()), "byte order"));
-}
-
 TEST(PointCloudRefusal, DataWithoutSize) {
   PointCloud2 m = irsMessage();
   m.width = 0;
   EXPECT_TRUE(contains(refusal(m, PointCloudFormat()), "width or height is zero"));
+  EXPECT_TRUE(contains(refusal(m, PointCloudFormat()), "radar_cloud_size: from_data"));
 }
 
 // --- What is accepted
@@ -442,6 +437,33 @@ TEST(PointCloudDecode, NotFiniteIsDroppedAndCounted) {
   PointCloud2 m = irsMessage();
   std::memcpy(&m.data[20], &nan, sizeof nan);
   EXPECT_EQ(decode(m, PointCloudFormat()).cloud.size(), 2u);
+}
+
+TEST(PointCloudDecode, BothByteOrders) {
+  PointCloudFormat f;
+  f.doppler = "d";
+  f.power = "s";
+  PointCloud2 m = Message(2, 21)
+                      .floats("x", 1, {1.5F, -1})
+                      .field<double>("y", 5, PointField::FLOAT64, {2.25, 4})
+                      .field<std::int8_t>("z", 13, PointField::INT8, {-3, 3})
+                      .floats("d", 14, {-0.5F, 1})
+                      .field<std::uint16_t>("s", 18, PointField::UINT16, {300, 11})
+                      .get();
+  const DecodedScan same = decode(m, f);
+  m.is_bigendian = m.is_bigendian ? 0 : 1;
+  for (std::size_t point = 0; point < m.data.size(); point += m.point_step) {
+    for (const auto& [offset, size] :
+         {std::pair(1, 4), std::pair(5, 8), std::pair(14, 4), std::pair(18, 2)}) {
+      const auto bytes = m.data.begin() + static_cast<std::ptrdiff_t>(point) + offset;
+      std::reverse(bytes, bytes + size);
+    }
+  }
+  for (const DecodedScan& scan : {same, decode(m, f)}) {
+    ASSERT_EQ(scan.cloud.size(), 2u);
+    expectPoint(scan.cloud[0], 1.5, 2.25, -3, -0.5, 300);
+    expectPoint(scan.cloud[1], -1, 4, 3, 1, 11);
+  }
 }
 
 TEST(PointCloudDecode, ADoubleTooLargeForAFloatIsNotFinite) {

@@ -40,6 +40,7 @@ struct BagContents {
   double doppler = 0.0;  ///< of each point [m/s], alternating sign
   bool stamped = true;
   bool imu_stamped = true;
+  double jump = 0.0;     ///< [s] by which the stamps jump ahead in the middle
   double shaking = 0.0;  ///< amplitude of the gyro [rad/s]
   std::string doppler_field = "v_doppler_mps";
   bool ground_truth = false;
@@ -59,8 +60,9 @@ class RestBag : public testing::Test {
     const int steps = static_cast<int>(what.duration * 200.0);
     for (int k = 0; k < steps; ++k) {
       const double t = 0.005 * k;
-      const ros::Time stamp = ros::Time(1000.0) + ros::Duration(t);
-      const ros::Time record = stamp + ros::Duration(100.001);
+      const ros::Time on_time = ros::Time(1000.0) + ros::Duration(t);
+      const ros::Time record = on_time + ros::Duration(100.001);
+      const ros::Time stamp = on_time + ros::Duration(2 * k < steps ? 0.0 : what.jump);
       if (what.imu) {
         sensor_msgs::Imu imu;
         if (what.imu_stamped) imu.header.stamp = stamp;

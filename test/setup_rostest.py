@@ -151,14 +151,14 @@ class SetupTest(tester.LiveTestCase):
                 # Refused: nothing changes, and it is told why.
                 answer = client.update_configuration({"innovation_gate": -1.0, "odom_rate": 20.0})
                 self.assertEqual((answer["innovation_gate"], answer["odom_rate"]), (5.0, 0.0))
-                self.assertEqual(rospy.get_param("/rio_t/innovation_gate"), 5.0)
+                self.assertEqual(rospy.get_param("/rio_t/effective/innovation_gate"), 5.0)
                 listener.wait_for("the refusal", lambda: "innovation_gate: expected a finite number of at least 0" in (
                     listener.value("odometry", "last_reconfiguration") or ""))
-                # Done: in step with the parameter server, in effect at once. No scan passes a gate of nothing.
+                # Done: shown on the parameter server, in effect at once. No scan passes a gate of nothing.
                 answer = client.update_configuration({"innovation_gate": 1e-6, "odom_rate": 20.0})
                 before = len(listener.messages["odom"])
                 self.assertEqual((answer["innovation_gate"], answer["odom_rate"]), (1e-6, 20.0))
-                self.assertEqual(rospy.get_param("/rio_t/odom_rate"), 20.0)
+                self.assertEqual(rospy.get_param("/rio_t/effective/odom_rate"), 20.0)
                 listener.wait_for("scans that the gate rejects",
                                   lambda: int(listener.value("input", "dropped_innovation") or 0) > 3)
                 player.wait()
@@ -169,6 +169,36 @@ class SetupTest(tester.LiveTestCase):
             self.assertGreater(len(periods), 10)
             self.assertEqual(len(periods), len(set(periods)))
             self.assertIsNone(listener.value("odometry", "last_reset_because") or None, "it needed no restart")
+
+    def test_the_next_run_reads_its_configuration_and_no_value_of_the_run_before(self):
+        effective = []
+        for name, text in (("a", "imu_accel_noise_density: 0.5\nodom_rate: 5\n"), ("b", "imu_accel_noise_density: 0.01\n")):
+            file = pathlib.Path(self.path(name + ".yaml"))
+            file.write_text(text)
+            with tester.Listener() as listener, tester.node(f"config:={file}"):
+                listener.wait_for_diagnosis("input", "no IMU message yet", ERROR)  # it has started
+                if name == "a":
+                    client = dynamic_reconfigure.client.Client("/rio_t", timeout=tester.DEADLINE)
+                    client.update_configuration({"tf_rate": 7.0})
+                    client.close()
+                effective.append(rospy.get_param("/rio_t/effective"))
+                self.assertEqual(set(rospy.get_param("/rio_t")), {"config", "effective"}, "parameters of the user")
+        values = [tuple(each[key] for key in ("imu_accel_noise_density", "odom_rate", "tf_rate")) for each in effective]
+        self.assertEqual(values, [(0.5, 5.0, 7.0), (0.01, 0.0, 50.0)])
+
+    def test_the_log_says_what_is_missing(self):
+        seen = []
+        subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, lambda message: seen.extend(
+            status for status in message.status if "no IMU message yet on /wrong" in status.message))
+        log = pathlib.Path(self.path("node.txt"))
+        with open(log, "w") as told, tester.Process(tester.program("rio_t", "rio_t_node"), "__name:=rio_t", "_config:=irs",
+                                                    "_imu_topic:=/wrong", stdout=told, stderr=told):
+            tester.wait_for("four diagnoses", lambda: len(seen) >= 4)
+        subscriber.unregister()
+        text = log.read_text()
+        self.assertIn("/rio_t: initialising, waiting for", text)
+        self.assertIn("/rio_t: no IMU message yet on /wrong", text)
+        self.assertLess(text.count("no IMU message yet"), 4, "the log repeats each diagnosis")
 
     def test_mavros_gets_odometry_by_its_contract(self):
         """mavros is not in Debian: its topic, rate, frames and covariances are what we can check."""

@@ -82,6 +82,14 @@ TEST_F(TwoRadars, MissingTopicsAndWrongTypesNameTheirRadar) {
       {"topic /other (right/radar_topic) is std_msgs/Header", "no topic /absent (left/trigger_topic"});
 }
 
+TEST_F(TwoRadars, OneTopicForBothIsRefusedAlsoIfOneHasNoSlash) {
+  BagContents what;
+  what.radar_topics = {"/left"};
+  writeBag(what);
+  expectError(runTwo({"--set", "right/radar_topic=left"}),
+              {"right/radar_topic: expected another than that of left, got \"/left\" for both"});
+}
+
 TEST_F(TwoRadars, EachHasItsFormatAndItsStamps) {
   BagContents what;
   what.radar_topics = {"/left"};

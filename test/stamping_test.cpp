@@ -97,6 +97,22 @@ TEST(Stamping, ZeroHeaderStampIsRefusedWithTheOtherSources) {
   EXPECT_EQ(stamper.take().size(), 1u);
 }
 
+TEST(Stamping, ZeroTriggerStampIsRefusedWithTopicAndKey) {
+  ScanStamper stamper(options(StampSource::kTrigger));
+  try {
+    stamper.addTrigger(7, Time(), recordTime(0));
+    FAIL() << "a zero stamp was taken";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("/trigger (trigger_topic)"), std::string::npos) << error.what();
+  }
+  // The trigger is left out: its scan has none, the next one has.
+  stamper.addScan(7, Time(), recordTime(0.02), RadarScan());
+  stamper.addTrigger(8, imuTime(0.1), recordTime(0.1));
+  stamper.addScan(8, Time(), recordTime(0.12), RadarScan());
+  EXPECT_EQ(seconds(stamper.finish()), std::vector<double>({0.1}));
+  EXPECT_EQ(stamper.givenUp().at("trigger_missing"), 1u);
+}
+
 TEST(Stamping, ArrivalIsCarriedOverByTheFastestImuMessage) {
   ScanStamper stamper(options(StampSource::kArrival));
   stamper.addScan(1, Time(), recordTime(0.2), RadarScan());

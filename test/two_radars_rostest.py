@@ -226,6 +226,13 @@ class TwoRadarsTest(tester.LiveTestCase):
                 listener.wait_for("odometry", lambda: listener.messages["odom"])
         publisher.unregister()
 
+    def test_two_radars_that_a_remapping_puts_on_one_topic_are_refused(self):
+        outcome = tester.run(tester.program("rio_t", "rio_t_node"), "__name:=rio_t", "_config:=two_radars",
+                             f"{SCANS['left']}:={SCANS['right']}")
+        self.assertEqual(outcome.returncode, 1, outcome.stdout)
+        self.assertIn("right/radar_topic: expected another than that of left", outcome.stdout)
+        self.assertIn(f'"{SCANS["right"]}" for both', outcome.stdout)
+
     def test_launch_file_shows_two_radars(self):
         bag = self.path("pair.bag")
         tester.check(tester.run(tester.program("rio_t", "simulate"), "--preset", "kart_pair", "--duration", 12, "--out", bag))

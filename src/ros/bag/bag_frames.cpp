@@ -55,6 +55,7 @@ Config withTopicsOfBag(Config config, const std::map<std::string, std::string>& 
   config.radar_topic = topicOfBag(config.radar_topic, types);
   config.trigger_topic = topicOfBag(config.trigger_topic, types);
   config.ground_truth_topic = topicOfBag(config.ground_truth_topic, types);
+  config.barometer_topic = topicOfBag(config.barometer_topic, types);
   for (Config& radar : config.radars) radar = withTopicsOfBag(radar, types);
   return config;
 }

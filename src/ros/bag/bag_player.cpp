@@ -1,7 +1,5 @@
 #include "bag_player.h"
 
-#include <std_msgs/Header.h>
-
 #include <array>
 #include <stdexcept>
 #include <utility>
@@ -27,7 +25,13 @@ std::uint64_t quantile(const std::map<std::size_t, std::uint64_t>& scans_by_size
 }  // namespace
 
 BagPlayer::BagPlayer(const Config& config, RunLog* log, BatchOdometry* recorder)
-    : config_(config), odometry_(config.odometry), log_(log), recorder_(recorder), evidence_(config) {
+    : config_(config),
+      odometry_(config.odometry),
+      log_(log),
+      recorder_(recorder),
+      evidence_(config),
+      imu_stamps_(config.odometry.imu_input_check.max_bridged_gap,
+                  config.odometry.imu_input_check.jump_patience) {
   for (const Config& radar : configsOfRadars(config)) radars_.emplace_back(radar);
 }
 
@@ -42,11 +46,11 @@ void BagPlayer::play(const rosbag::MessageInstance& instance) {
   const Time record = toTime(instance.getTime());
   if (topic == config_.imu_topic) addImu(*read<sensor_msgs::Imu>(instance), record);
   if (topic == config_.barometer_topic) addPressure(*read<sensor_msgs::FluidPressure>(instance));
-  for (Radar& radar : radars_) {
+  for (std::size_t k = 0; k < radars_.size(); ++k) {
+    Radar& radar = radars_[k];
     if (topic == radar.topic) addCloud(*read<sensor_msgs::PointCloud2>(instance), record, radar);
-    if (topic != radar.trigger_topic) continue;
-    const auto trigger = read<std_msgs::Header>(instance);  // one line may trigger several radars
-    radar.stamper.addTrigger(trigger->seq, toTime(trigger->stamp), record);
+    // One line may trigger several radars.
+    if (topic == radar.trigger_topic) addTrigger(*read<std_msgs::Header>(instance), record, k);
   }
   for (std::size_t k = 0; k < radars_.size(); ++k) feed(radars_[k].stamper.take(), k);
   for (ScanResult& result : odometry_.process()) account(result);
@@ -101,12 +105,18 @@ void BagPlayer::countInput(RunSummary* summary) const {
   if (points_not_finite_ > 0) summary->input_faults["points_not_finite"] = points_not_finite_;
   for (const auto& [kind, what] : imu_not_usable_) summary->input_faults[kind] += what.count;
   for (const auto& [kind, what] : pressure_not_usable_) summary->input_faults[kind] += what.count;
+  for (const Radar& radar : radars_)
+    for (const auto& [kind, what] : radar.triggers_not_usable) summary->input_faults[kind] += what.count;
   const auto warn = [&](const NotUsableByKind& kinds) {
     for (const auto& [kind, what] : kinds)
       summary->warnings.push_back(what.why + " (messages: " + std::to_string(what.count) + ")");
   };
   for (const Radar& radar : radars_) warn(radar.not_usable);
+  for (const Radar& radar : radars_) warn(radar.triggers_not_usable);
   warn(pressure_not_usable_);
+  if (!imu_restarts_.empty())
+    summary->warnings.push_back("topic " + config_.imu_topic + ": " +
+                                describeRestarts(imu_restarts_, config_));
   warn(imu_not_usable_);
   summary->diagnosis = diagnosis(*summary);
 }
@@ -114,6 +124,7 @@ void BagPlayer::countInput(RunSummary* summary) const {
 Diagnosis BagPlayer::diagnosis(const RunSummary& summary) const {
   RunEvidence evidence = evidence_.evidence(odometry_);
   evidence.imu_count = imu_count_;
+  evidence.imu_restarts = imu_restarts_;
   for (const auto& [kind, what] : imu_not_usable_) evidence.faults[kind] += what.count;
   for (std::size_t k = 0; k < radars_.size(); ++k) {
     RadarEvidence& radar = evidence.radars[k];
@@ -134,9 +145,27 @@ void BagPlayer::addImu(const sensor_msgs::Imu& message, Time record) {
     notUsable("imu_not_usable", error.what(), &imu_not_usable_);
     return;
   }
+  followImuStamps(imu);
   for (Radar& radar : radars_) radar.stamper.addImu(imu.time, record);
   if (recorder_ != nullptr) recorder_->addImu(imu);
   if (const std::optional<NavigationState> state = odometry_.addImu(imu)) log_->addState(*state);
+}
+
+void BagPlayer::followImuStamps(const ImuMeasurement& imu) {
+  if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite()) return;  // dropped unseen
+  const ClockJumpDetector::Verdict stamp = imu_stamps_.check(imu.time);
+  if (stamp == ClockJumpDetector::Verdict::kRestart) imu_restarts_.push_back({*newest_imu_, imu.time});
+  if (stamp == ClockJumpDetector::Verdict::kGood || stamp == ClockJumpDetector::Verdict::kRestart)
+    newest_imu_ = imu.time;
+}
+
+void BagPlayer::addTrigger(const std_msgs::Header& message, Time record, std::size_t radar) {
+  try {
+    radars_[radar].stamper.addTrigger(message.seq, toTime(message.stamp), record);
+  } catch (const std::exception& error) {
+    notUsable("trigger_stamp_zero", error.what(), &radars_[radar].triggers_not_usable);
+    evidence_.addZeroTrigger(radar);
+  }
 }
 
 void BagPlayer::addPressure(const sensor_msgs::FluidPressure& message) {

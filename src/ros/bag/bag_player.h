@@ -4,6 +4,7 @@
 #include <sensor_msgs/FluidPressure.h>
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/PointCloud2.h>
+#include <std_msgs/Header.h>
 
 #include <cstdint>
 #include <map>
@@ -11,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "rio_t/imu/clock_jump_detector.h"
 #include "rio_t/odometry/batch_odometry.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
 #include "rio_t/ros/cloud/point_cloud.h"
@@ -54,11 +56,14 @@ class BagPlayer {
     ScanStamper stamper;
     std::uint64_t scans_total = 0;
     std::map<std::size_t, std::uint64_t> scans_by_size;  // by their number of points
-    NotUsableByKind not_usable;
+    NotUsableByKind not_usable, triggers_not_usable;
   };
 
   Diagnosis diagnosis(const RunSummary& summary) const;
   void addImu(const sensor_msgs::Imu& message, Time record);
+  /// Records where the odometry starts again.
+  void followImuStamps(const ImuMeasurement& imu);
+  void addTrigger(const std_msgs::Header& message, Time record, std::size_t radar);
   void addPressure(const sensor_msgs::FluidPressure& message);
   void addCloud(const sensor_msgs::PointCloud2& message, Time record, Radar& radar);
   void feed(std::vector<RadarScan> scans, std::size_t radar);
@@ -73,6 +78,9 @@ class BagPlayer {
   BatchOdometry* recorder_;
   std::optional<RadarInertialOdometry::Start> start_;
   EvidenceCollector evidence_;
+  ClockJumpDetector imu_stamps_;  // the same judgement as the odometry's own
+  std::optional<Time> newest_imu_;
+  std::vector<ImuRestart> imu_restarts_;
   std::uint64_t imu_count_ = 0, pressure_count_ = 0, points_not_finite_ = 0;
   NotUsableByKind imu_not_usable_, pressure_not_usable_;
 };

@@ -306,7 +306,8 @@ class BagJob {
 
 RunSummary runBag(const BagRun& run) {
   BagRun with_topics_of_bag = run;
-  with_topics_of_bag.config = withAbsoluteTopics(run.config);
+  // The check again: with a slash before each topic, two radars may have one topic.
+  with_topics_of_bag.config = withParameters(withAbsoluteTopics(run.config), {});
   return BagJob(with_topics_of_bag).execute();
 }
 

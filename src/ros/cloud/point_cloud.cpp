@@ -99,7 +99,10 @@ std::vector<std::string> neededFields(const PointCloudFormat& f) {
       " bytes; fields received: " + fieldsOf(message) + ")");
 }
 
-/// Reads one field of a point. Checked against point_step when it is made, so that reading needs no checks.
+constexpr bool kHostIsBigEndian = boost::endian::order::native == boost::endian::order::big;
+
+/// Reads one field of a point, in either byte order. Checked against point_step when it is made, so that
+/// reading needs no checks.
 class FieldReader {
  public:
   FieldReader(const PointCloud2& message, const PointCloudFormat& format, const std::string& name) {
@@ -119,6 +122,7 @@ class FieldReader {
       throwLayout(message,
                   "field '" + name + "' holds " + std::to_string(field->count) + " values, expected one");
     }
+    swaps_bytes_ = (message.is_bigendian != 0) != kHostIsBigEndian;
     offset_ = field->offset;
     datatype_ = field->datatype;
     if (static_cast<std::uint64_t>(offset_) + size > message.point_step) {
@@ -151,17 +155,19 @@ class FieldReader {
 
  private:
   template <typename T>
-  static double as(const std::uint8_t* bytes) {
+  double as(const std::uint8_t* bytes) const {
+    std::array<std::uint8_t, sizeof(T)> ordered;
+    std::copy_n(bytes, sizeof(T), ordered.begin());  // fields need not be aligned
+    if (swaps_bytes_) std::reverse(ordered.begin(), ordered.end());
     T value;
-    std::memcpy(&value, bytes, sizeof value);  // fields need not be aligned
+    std::memcpy(&value, ordered.data(), sizeof value);
     return static_cast<double>(value);
   }
 
+  bool swaps_bytes_ = false;
   std::size_t offset_ = 0;
   std::uint8_t datatype_ = 0;
 };
-
-constexpr bool kHostIsBigEndian = boost::endian::order::native == boost::endian::order::big;
 
 /// Where the points lie, in numbers that have been checked against the data.
 struct Layout {
@@ -169,8 +175,6 @@ struct Layout {
 };
 
 Layout checkedLayout(const PointCloud2& message, const PointCloudFormat& format) {
-  if ((message.is_bigendian != 0) != kHostIsBigEndian)
-    throwLayout(message, "the byte order is not this machine's");
   if (message.point_step == 0) throwLayout(message, "point_step is zero");
   Layout layout;
   layout.point_step = message.point_step;
@@ -183,7 +187,11 @@ Layout checkedLayout(const PointCloud2& message, const PointCloudFormat& format)
     return layout;
   }
   if (declares_none) {
-    if (size != 0) throwLayout(message, "there is data, but width or height is zero");
+    if (size != 0)
+      throwLayout(
+          message,
+          "there is data, but width or height is zero; radar_cloud_size: from_data finds the number of "
+          "points by the length of the data");
     return layout;
   }
   // Products of two 32-bit numbers fit into 64 bits; those of three need not, so divide instead.

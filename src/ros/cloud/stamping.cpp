@@ -61,6 +61,11 @@ void ScanStamper::addImu(Time stamp, Time record) {
 
 void ScanStamper::addTrigger(std::uint32_t seq, Time stamp, Time record) {
   see(record);
+  if (stamp == Time()) {
+    throw std::runtime_error("topic " + options_.trigger_topic +
+                             " (trigger_topic): the stamp in the header is zero; stamp_source: trigger needs "
+                             "one. Correct the driver, or set stamp_source to header or to arrival");
+  }
   if (!triggers_.empty() && triggers_.back().seq == seq && triggers_.back().stamp == stamp)
     return;  // sent twice
   triggers_.push_back({seq, stamp, record, false});

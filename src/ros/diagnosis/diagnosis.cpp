@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
 #include <sstream>
 #include <stdexcept>
 
@@ -51,6 +52,13 @@ std::string number(double value) {
   std::ostringstream text;
   text.precision(3);
   text << value;
+  return text.str();
+}
+
+/// A stamp, to the millisecond.
+std::string stampText(Time time) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(3) << time.seconds() << " s";
   return text.str();
 }
 
@@ -133,8 +141,17 @@ class RadarCauses {
     stamps("stamp_ahead_of_imu", "are stamped ahead of the newest IMU sample.", other);
     stamps("older_than_window", "are stamped before the IMU samples that are kept.", other);
     stamps("imu_not_covering", "are stamped at a time without IMU samples.", other);
-    stamps("trigger_missing", "have no trigger message.",
-           "Check " + key_ + "trigger_topic, or set " + key_ + "stamp_source to header or arrival.");
+    const double zero_triggers = shareOf(radar_.triggers_zero, radar_.scans_total);
+    if (zero_triggers < kManyScans) {
+      stamps("trigger_missing", "have no trigger message.",
+             "Check " + key_ + "trigger_topic, or set " + key_ + "stamp_source to header or arrival.");
+    } else {
+      cause("trigger_stamp_zero", std::min(1.0, zero_triggers),
+            std::to_string(radar_.triggers_zero) + " messages on " + key_ + "trigger_topic " +
+                config_.trigger_topic + " have a stamp of zero, for " + std::to_string(radar_.scans_total) +
+                " scans.",
+            "Correct the driver of the trigger, or set " + key_ + "stamp_source to header or arrival.");
+    }
     stamps("duplicate_stamp", "have the stamp of another scan.",
            "The driver repeats its stamps: set " + key_ + "stamp_source: arrival.");
     stamps("queue_full", "waited too long for the IMU or the solver.",
@@ -260,6 +277,15 @@ void addImu(const RunEvidence& evidence, const Config& config, std::vector<Cause
                      "Mount the IMU softer, or raise these two keys.", 0.1});
 }
 
+void addRestarts(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
+  if (evidence.imu_restarts.empty()) return;
+  // It is certain, and it concerns the whole trajectory: the share is 1.
+  causes->push_back({"imu_clock_restart", describeRestarts(evidence.imu_restarts, config),
+                     "Run each part by itself (bag_start, bag_duration). For a short gap, raise "
+                     "max_bridged_imu_gap.",
+                     1.0});
+}
+
 void addDivergence(const RunEvidence& evidence, std::vector<Cause>* causes) {
   const double share = shareOf(evidence.scans_diverged, evidence.scans_judged);
   const std::uint64_t divergences = countOf(evidence.faults, "diverged");
@@ -330,6 +356,7 @@ Diagnosis diagnose(const RunEvidence& evidence, const Config& config) {
   addStart(evidence, config, &result.causes);
   addOffset(evidence, config, &result.causes);
   addImu(evidence, config, &result.causes);
+  addRestarts(evidence, config, &result.causes);
   addDivergence(evidence, &result.causes);
   // Stable: of causes that explain the same, the one nearer to the sensor comes first.
   std::stable_sort(result.causes.begin(), result.causes.end(),
@@ -338,6 +365,19 @@ Diagnosis diagnose(const RunEvidence& evidence, const Config& config) {
   result.checks = checksOf(evidence);
   result.verdict = verdictOf(evidence, result);
   return result;
+}
+
+std::string describeRestarts(const std::vector<ImuRestart>& restarts, const Config& config) {
+  const ImuRestart& first = restarts.front();
+  const bool is_ahead = first.before < first.after;
+  std::string text = std::string("The stamps of the IMU jump ") + (is_ahead ? "ahead" : "back") + " from " +
+                     stampText(first.before) + " to " + stampText(first.after);
+  if (is_ahead)
+    text +=
+        ", more than max_bridged_imu_gap " + number(config.odometry.imu_input_check.max_bridged_gap) + " s";
+  text += ". The trajectory begins anew there, at the origin";
+  if (restarts.size() > 1) text += "; more such jumps: " + std::to_string(restarts.size() - 1);
+  return text + ".";
 }
 
 std::string describeCauses(const Diagnosis& diagnosis) {

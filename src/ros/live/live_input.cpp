@@ -129,8 +129,15 @@ void LiveOdometry::onTrigger(std::size_t radar, const Event<std_msgs::Header>& e
   const Session now = session_.get();
   if (!now) return;
   const std_msgs::Header& trigger = *event.getConstMessage();
-  account(now->addTrigger(radar, trigger.seq, toTime(trigger.stamp), toTime(event.getReceiptTime())));
-  wakeSolver();
+  try {
+    account(now->addTrigger(radar, trigger.seq, toTime(trigger.stamp), toTime(event.getReceiptTime())));
+    wakeSolver();
+  } catch (const std::exception& error) {
+    monitor_.zeroTrigger(radar);
+    const Config& config = radars_[radar].config;
+    if (isTimeToTell("trigger_stamp_zero " + config.radar_topic))
+      ROS_ERROR_STREAM(beginning(name_, config) << error.what());
+  }
 }
 
 void LiveOdometry::account(const LiveSession::Stamped& stamped) {
@@ -155,9 +162,7 @@ void LiveOdometry::lookUpExtrinsics(Radar& radar, const std::string& cloud_frame
     throw;
   }
   if (!radar.T_IR) {
-    monitor_.waitFor(waiting_for);
-    if (isTimeToTell("tf of " + config.radar_topic))
-      ROS_WARN_STREAM(beginning(name_, config) << "waiting for " << waiting_for);
+    monitor_.waitFor(waiting_for);  // the status `odometry` and the log tell it
     return;
   }
   ROS_INFO_STREAM(name_ << ": " << withName("extrinsics", config) << " from tf " << cloud_frame << " -> "

@@ -1,5 +1,6 @@
 #include "rio_t/ros/live/live_odometry.h"
 
+#include <diagnostic_msgs/DiagnosticStatus.h>
 #include <ros/console.h>
 
 #include <boost/function.hpp>
@@ -13,7 +14,6 @@
 namespace rio_t {
 namespace {
 
-constexpr double kWarnPeriod = 5.0;        // [s] between warnings of one kind
 constexpr double kDiagnosticPeriod = 1.0;  // [s]
 // Deep enough for seconds of input: nothing is lost while a callback is late.
 constexpr std::uint32_t kScanQueue = 200;
@@ -44,7 +44,8 @@ LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& p
                            const std::string& name)
     : name_(name),
       told_(configFromRos(private_node)),
-      config_(withResolvedTopics(told_, node)),
+      // Checks again, since remapping and namespace may give two radars one topic.
+      config_(withParameters(withResolvedTopics(told_, node), {})),
       node_(node),
       private_node_(private_node),
       monitor_(config_),
@@ -164,8 +165,15 @@ void LiveOdometry::addDiagnostics() {
   diagnostics_.emplace(node_, private_node_, name_);
   diagnostics_->setHardwareID("none");
   using Status = LiveMonitor::Status;
-  diagnostics_->add("odometry", [this](Status& s) { monitor_.describeOdometry(s, session_.get().get()); });
-  diagnostics_->add("input", [this](Status& s) { monitor_.describeInput(s, session_.get().get()); });
+  diagnostics_->add("odometry", [this](Status& s) {
+    const Session now = session_.get();
+    monitor_.describeOdometry(s, now.get());
+    if (!now || now->odometry().health() != Health::kDiverged) tellStatus(s);  // else tellHealth tells it
+  });
+  diagnostics_->add("input", [this](Status& s) {
+    monitor_.describeInput(s, session_.get().get());
+    if (s.message != kSolverFallsBehind) tellStatus(s);  // else tellHealth tells it
+  });
   if (!config_.barometer_topic.empty())
     diagnostics_->add("barometer", [this](Status& s) { monitor_.describeBarometer(s); });
   if (config_.odometry.platform == Platform::kGroundVehicle)
@@ -215,6 +223,7 @@ void LiveOdometry::onReconfigure(LiveParameters& values) {
       apply(tuning, options_);
     }
     if (const Session now = session_.get()) now->tune(tuning);
+    showEffectiveParameters(private_node_, live_config_);
   } catch (const std::exception& error) {
     refused_because = error.what();
     ROS_ERROR_STREAM(name_ << ": the change of parameters was refused, nothing was changed: "
@@ -288,11 +297,18 @@ void LiveOdometry::reset(const std::string& reason, bool at_once) {
   monitor_.reset(reason);
 }
 
-bool LiveOdometry::isTimeToTell(const std::string& what) {
+void LiveOdometry::tellStatus(const LiveMonitor::Status& status) {
+  constexpr double kStatusPeriod = 2.0 * kWarnPeriod;  // [s] A status may stay for minutes.
+  if (status.level != diagnostic_msgs::DiagnosticStatus::OK &&
+      isTimeToTell("status " + status.name, kStatusPeriod))
+    ROS_WARN_STREAM(name_ << ": " << status.message);
+}
+
+bool LiveOdometry::isTimeToTell(const std::string& what, double period) {
   const auto now = std::chrono::steady_clock::now();
   const std::lock_guard<std::mutex> lock(mutex_);
   const auto [told, is_first] = told_at_.try_emplace(what, now);
-  if (!is_first && now - told->second < std::chrono::duration<double>(kWarnPeriod)) return false;
+  if (!is_first && now - told->second < std::chrono::duration<double>(period)) return false;
   told->second = now;
   return true;
 }
@@ -329,7 +345,7 @@ bool LiveOdometry::onSaveTrajectory(std_srvs::Trigger::Request& /*request*/,
 
 void LiveOdometry::tellHealth(const ScanResult& result) {
   if (result.rejected_because == "queue_full" && isTimeToTell("queue_full"))
-    ROS_WARN_STREAM(name_ << ": the solver falls behind, the oldest scan was dropped (max_queued_scans)");
+    ROS_WARN_STREAM(name_ << ": " << kSolverFallsBehind);
   if (result.reinitialized) {
     ROS_WARN_STREAM(name_ << ": re-initialised in motion; position and heading go on");
   }

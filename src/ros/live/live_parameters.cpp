@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <type_traits>
 #include <variant>
 
 namespace rio_t {
@@ -101,31 +100,6 @@ LiveParameters LiveParameters::__getMax__() {
   LiveParameters ends;
   ends.values_ = endsOf(ends.values_, true, [](const ParameterDescription& about) { return about.max; });
   return ends;
-}
-
-void LiveParameters::__fromServer__(const ros::NodeHandle& node) {
-  for (auto& [key, value] : values_) {
-    std::visit(
-        [&](auto& data) {
-          using Data = std::decay_t<decltype(data)>;
-          if constexpr (std::is_same_v<Data, std::int64_t>) {
-            int whole = 0;
-            if (node.getParam(key, whole)) data = whole;
-          } else if constexpr (std::is_same_v<Data, double> || std::is_same_v<Data, bool>) {
-            Data read = data;
-            if (node.getParam(key, read)) data = read;
-          }
-        },
-        value);
-  }
-}
-
-void LiveParameters::__toServer__(const ros::NodeHandle& node) const {
-  for (const auto& [key, value] : values_) {
-    if (const bool* truth = std::get_if<bool>(&value)) node.setParam(key, *truth);
-    if (const auto* whole = std::get_if<std::int64_t>(&value)) node.setParam(key, static_cast<int>(*whole));
-    if (const double* number = std::get_if<double>(&value)) node.setParam(key, *number);
-  }
 }
 
 bool LiveParameters::__fromMessage__(dynamic_reconfigure::Config& message) {

@@ -118,6 +118,12 @@ void LiveMonitor::trigger(std::size_t radar) {
   ++radars_.at(radar).triggers.count;
 }
 
+void LiveMonitor::zeroTrigger(std::size_t radar) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ++radars_.at(radar).dropped["trigger_stamp_zero"];
+  collector_.addZeroTrigger(radar);
+}
+
 void LiveMonitor::odometry(double latency) {
   const std::lock_guard<std::mutex> lock(mutex_);
   odometry_latency_.add(latency);
@@ -369,7 +375,7 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   } else if (!findings.empty()) {
     status.summary(radars.level, radars.text);
   } else if (queue_full > queue_full_told_) {
-    status.summary(DiagnosticStatus::WARN, "the solver falls behind, scans were dropped");
+    status.summary(DiagnosticStatus::WARN, kSolverFallsBehind);
   } else if (noise.isFarAbove(told)) {
     status.summary(DiagnosticStatus::WARN, noisyImu(noise, told));
   } else {

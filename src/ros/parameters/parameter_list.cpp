@@ -15,18 +15,6 @@ std::string boundText(double bound) {
   return text;
 }
 
-std::optional<double> asNumber(const ParameterValue& value) {
-  if (const double* real = std::get_if<double>(&value.data)) return *real;
-  if (const std::int64_t* whole = std::get_if<std::int64_t>(&value.data)) return static_cast<double>(*whole);
-  // Python's YAML reader, which fills the parameter server, takes 1e-3 for text (it wants 1.0e-3).
-  if (const std::string* text = std::get_if<std::string>(&value.data)) {
-    if (text->find_first_of("eE") == std::string::npos) return std::nullopt;
-    const ParameterValue plain = parsePlainScalar(*text);
-    if (const double* real = std::get_if<double>(&plain.data)) return *real;
-  }
-  return std::nullopt;
-}
-
 /// `count` numbers in `range`, or nothing.
 std::optional<std::vector<double>> asNumbers(const ParameterValue& value, std::size_t count,
                                              const Range& range) {
@@ -61,6 +49,18 @@ ParameterValue listOf(std::initializer_list<double> numbers) {
 }
 
 }  // namespace
+
+std::optional<double> asNumber(const ParameterValue& value) {
+  if (const double* real = std::get_if<double>(&value.data)) return *real;
+  if (const std::int64_t* whole = std::get_if<std::int64_t>(&value.data)) return static_cast<double>(*whole);
+  // Python's YAML reader, which fills the parameter server, takes 1e-3 for text (it wants 1.0e-3).
+  if (const std::string* text = std::get_if<std::string>(&value.data)) {
+    if (text->find_first_of("eE") == std::string::npos) return std::nullopt;
+    const ParameterValue plain = parsePlainScalar(*text);
+    if (const double* real = std::get_if<double>(&plain.data)) return *real;
+  }
+  return std::nullopt;
+}
 
 std::string numberText(double value) {
   std::string text;

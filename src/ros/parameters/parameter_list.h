@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <optional>
@@ -96,14 +97,18 @@ class ParameterList {
 /// Shortest text that reads back as the same number; with a point, so that every YAML reader sees a number.
 std::string numberText(double value);
 
+/// The number that the value stands for, or nothing.
+std::optional<double> asNumber(const ParameterValue& value);
+
 template <typename Integer>
 void ParameterList::integer(const std::string& key, Range range, Integer& member, const std::string& text) {
   add(
       {key, "integer", "", "a whole number" + range.text(), text, range.min, range.max},
       [range, &member](const ParameterValue& value) {
-        const std::int64_t* x = std::get_if<std::int64_t>(&value.data);
-        if (x == nullptr || !range.contains(static_cast<double>(*x))) return false;
-        if (*x > std::numeric_limits<int>::max()) return false;  // the member may have 32 bits
+        // YAML and the parameter server may hold 2000.0 for 2000.
+        const std::optional<double> x = asNumber(value);
+        if (!x || !range.contains(*x) || std::trunc(*x) != *x) return false;
+        if (std::abs(*x) > std::numeric_limits<int>::max()) return false;  // the member may have 32 bits
         member = static_cast<Integer>(*x);
         return true;
       },

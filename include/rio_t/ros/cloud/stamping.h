@@ -64,6 +64,7 @@ class ScanStamper {
   explicit ScanStamper(StampingOptions options);
 
   void addImu(Time stamp, Time record);
+  /// Throws std::runtime_error, naming topic and key, for a zero `stamp`; that trigger is left out.
   void addTrigger(std::uint32_t seq, Time stamp, Time record);
   /// `scan.stamp` is not read. Throws std::runtime_error, naming the topic and the other sources, for a zero
   /// `header_stamp` with stamp_source header; that scan is left out, others may follow.

@@ -19,6 +19,7 @@ struct RadarEvidence {
   std::string name;               ///< empty if there is but one
   std::uint64_t scans_total = 0;  ///< received
   std::uint64_t scans_used = 0;
+  std::uint64_t triggers_zero = 0;       ///< trigger messages with a stamp of zero
   std::uint64_t scans_before_start = 0;  ///< before the estimate was initialised
   Counts scans_rejected;                 ///< by reason, without those before the start
   Counts velocity_status;                ///< of the scans before the start, by EgoVelocityStatus
@@ -26,6 +27,12 @@ struct RadarEvidence {
   std::array<std::uint64_t, kPointVerdicts> points_by_verdict = {};
   double snr_sum_db = 0.0;      ///< over `points`
   double final_offset_s = 0.0;  ///< newest estimate of t_O
+};
+
+/// The stamps of the IMU jumped, or left a gap that is too long to bridge: "imu_clock_restart".
+struct ImuRestart {
+  Time before;  ///< newest stamp used before it
+  Time after;   ///< first stamp used after it
 };
 
 /// Counters of a run: enough to say why it disappoints.
@@ -39,6 +46,7 @@ struct RunEvidence {
   std::uint64_t scans_diverged = 0;  ///< of them, after which the health was "diverged"
   std::uint64_t windows = 0, windows_at_bound = 0;
   MeasuredImuNoise imu_noise;
+  std::vector<ImuRestart> imu_restarts;  ///< none in the live node, whose evidence begins after the last one
   std::vector<RadarEvidence> radars;
 };
 
@@ -50,6 +58,8 @@ class EvidenceCollector {
   void add(const ScanResult& result);
   /// Scans that were dropped before the odometry saw them.
   void addDropped(std::size_t radar, const std::string& reason, std::uint64_t count);
+  /// A trigger that was dropped, as its stamp is zero.
+  void addZeroTrigger(std::size_t radar) { ++evidence_.radars.at(radar).triggers_zero; }
   /// The evidence so far, with what `odometry` knows. `scans_total` counts the results and the scans
   /// that were dropped.
   RunEvidence evidence(const RadarInertialOdometry& odometry) const;

@@ -56,6 +56,7 @@ class LiveOdometry {
   template <typename Message>
   using Event = ros::MessageEvent<const Message>;
 
+  static constexpr double kWarnPeriod = 5.0;  ///< [s] between warnings of one kind
   /// Samples: seconds of input, so that nothing is lost while a callback is late.
   static constexpr std::uint32_t kImuQueue = 5000;
 
@@ -101,10 +102,12 @@ class LiveOdometry {
   /// Gives a sample to a session. Returns the state that is to be published, if there is one.
   std::optional<NavigationState> feed(LiveSession& session, const Received& received, double* rate_sigma);
   void account(const LiveSession::Stamped& stamped);
-  /// Whether this was not told for some seconds. Each radar has its own turn, unlike with ROS's throttles.
-  bool isTimeToTell(const std::string& what);
+  /// Whether this was not told for `period` [s]. Each radar has its own turn, unlike with ROS's throttles.
+  bool isTimeToTell(const std::string& what, double period = kWarnPeriod);
   void wakeSolver();
   void tellFaults();  ///< what is new among the faults of the input; input thread
+  /// Logs what a status of the diagnostics says if it is not OK. Input thread.
+  void tellStatus(const LiveMonitor::Status& status);
   void tellHealth(const ScanResult& result);
   void tellDopplerStep(const Radar& radar, const DopplerStep& step,
                        DopplerStep* told) const;  ///< where it is not as told

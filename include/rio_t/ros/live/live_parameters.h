@@ -38,8 +38,10 @@ class LiveParameters {
   static int __getGroupDescriptions__() { return 0; }
   void __clamp__() {}  ///< a value out of range is refused, with a message, and not bent
   std::uint32_t __level__(const LiveParameters&) const { return 0; }
-  void __fromServer__(const ros::NodeHandle& node);
-  void __toServer__(const ros::NodeHandle& node) const;
+  // The values stay off the parameter server: the next start would take them for parameters of the user.
+  // `~effective` has them.
+  void __fromServer__(const ros::NodeHandle&) {}
+  void __toServer__(const ros::NodeHandle&) const {}
   /// Takes the values of known keys; the kinds of the message decide.
   bool __fromMessage__(dynamic_reconfigure::Config& message);
   void __toMessage__(dynamic_reconfigure::Config& message) const;

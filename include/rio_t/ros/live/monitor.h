@@ -31,7 +31,8 @@ class LiveMonitor {
   void imu();  ///< a message came, as the next
   void scan(std::size_t radar = 0);
   void trigger(std::size_t radar = 0);
-  void odometry(double latency);  ///< a state was ready that many seconds after the IMU message came
+  void zeroTrigger(std::size_t radar);  ///< one with a stamp of zero, which stamps no scan
+  void odometry(double latency);        ///< a state was ready that many seconds after the IMU message came
   void imuDropped(const std::string& reason);  ///< a sample that goes no further
   /// Scans, or points of them, that go no further.
   void dropped(std::size_t radar, const std::string& reason, std::uint64_t count = 1);
@@ -153,6 +154,10 @@ constexpr const char* kGroundVehicleContradicted =
     "moves "
     "sideways or upwards. Is it a ground vehicle, and does vehicle_frame_rotation_xyzw say which way it "
     "drives?";
+
+/// The warning for a person whose computer is too slow.
+constexpr const char* kSolverFallsBehind =
+    "the solver falls behind, the oldest scans were dropped (max_queued_scans)";
 
 /// The warning for a person whose IMU is far noisier than the options say.
 std::string noisyImu(const MeasuredImuNoise& noise, const ImuNoise& told);

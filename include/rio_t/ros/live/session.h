@@ -52,8 +52,9 @@ class LiveSession {
 
   // Stamping; any thread, `record` is the time of receipt.
   Stamped stampWithImu(Time stamp, Time record);
+  /// Throws as ScanStamper, as the next does.
   Stamped addTrigger(std::size_t radar, std::uint32_t seq, Time stamp, Time record);
-  /// Throws as ScanStamper. The stamp of `scan` is not read.
+  /// The stamp of `scan` is not read.
   Stamped addScan(std::uint32_t seq, Time header_stamp, Time record, RadarScan scan);
 
   /// A result with what goes with it.

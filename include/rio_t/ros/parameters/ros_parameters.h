@@ -28,8 +28,8 @@ Config configFromRos(const ros::NodeHandle& private_node);
 
 /// Writes every parameter of the run to the parameter server, as `~effective`, and removes that of an earlier
 /// run: `rosparam get /rio_t/effective` shows it, `rosparam dump run.yaml /rio_t/effective` makes a
-/// configuration of it. The user's own parameters stay as they are, so that the next start reads them and not
-/// these.
+/// configuration of it. Call it again if a parameter changes. The user's own parameters stay as they are, so
+/// that the next start reads them and not these.
 void showEffectiveParameters(const ros::NodeHandle& private_node, const Config& config);
 
 }  // namespace rio_t
