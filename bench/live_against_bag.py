@@ -147,7 +147,8 @@ def compare(arguments):
     programs.output_of(bag_program, "--bag", bag, "--config", config, "--output-dir", runner)
 
     values = run_folder.read_yaml(config)
-    imu_topic, radar_topic = values["imu_topic"], values["radar_topic"]
+    imu_topic, radar_topic, truth_topic = (
+        "/" + values[f"{key}_topic"].lstrip("/") for key in ("imu", "radar", "ground_truth"))
     odom, offset = "/rio_t/odom", "/rio_t/time_offset"
     listener = play(bag, config, arguments.rate, arguments.nodelet, not arguments.no_clock,
                     (imu_topic, radar_topic, odom, offset))
@@ -185,7 +186,7 @@ def compare(arguments):
     apart = [numpy.linalg.norm(live_positions[stamp] - by_runner[stamp]) for stamp in common]
     table.row("live to bag runner", f"{1e3 * numpy.sqrt(numpy.mean(numpy.square(apart))):.1f} mm rms, "
               f"{1e3 * max(apart):.1f} mm worst, of {len(common)} poses")
-    if write_truth(bag, values["ground_truth_topic"], truth):
+    if write_truth(bag, truth_topic, truth):
         told = yaml.safe_load(programs.output_of(program("rio_t", "evaluate"), "--yaml", truth, estimate,
                                                  runner / "trajectory.txt"))
         ates = [each["ape_origin_m"]["rmse"] for each in told["estimates"]]

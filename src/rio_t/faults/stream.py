@@ -68,9 +68,11 @@ class Message:
 
 
 def read(path, topics):
-    """`topics`: (topic, kind) of what is read. Messages in the order of recording."""
-    kinds = dict(topics)
+    """`topics`: (topic, kind) of what is read, with or without a leading slash. Messages in the order of recording."""
+    kind_of = {topic.lstrip("/"): kind for topic, kind in topics}
     with rosbag.Bag(str(path)) as bag:
+        kinds = {topic: kind_of[topic.lstrip("/")] for topic in bag.get_type_and_topic_info().topics
+                 if topic.lstrip("/") in kind_of}
         return [Message(kinds[topic], topic, time.to_nsec(), raw=raw)
                 for topic, raw, time in bag.read_messages(list(kinds), raw=True)]
 
