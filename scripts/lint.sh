@@ -8,6 +8,7 @@ case "${1:-}" in -h | --help) sed -n '2,5s/^# \?//p' "$0"; exit 0 ;; esac
 cd "$(dirname "$0")/.."
 export PATH=/usr/bin:$PATH
 build=${RIO_T_BUILD_DIR:-build/lint}
+mkdir -p "$build"
 scripts/install_dependencies.sh clang-format-14 clang-tidy-14 clang-14 cppcheck catkin-lint
 
 # The messages' headers are all that must be made.

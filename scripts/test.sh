@@ -11,7 +11,8 @@ set +u  # catkin's own hooks read variables that a shell without ROS does not ha
 source "$build/devel/setup.bash"
 set -u
 rm -rf "$build/test_results"
-export RIO_T_DATA_DIR=${RIO_T_DATA_DIR:-$(realpath -m ../shared/data)}
+RIO_T_DATA_DIR=$(realpath -m "${RIO_T_DATA_DIR:-../shared/data}")
+export RIO_T_DATA_DIR
 (cd "$build" && ctest --output-on-failure)
 # Programs of others, which use what is installed, cannot load libraries with a sanitizer.
 installed=true

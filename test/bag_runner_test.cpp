@@ -199,6 +199,13 @@ TEST_F(BagRunner, ATrajectoryThatBeginsAnewIsDoubtful) {
     for (const char* part : {"verdict: doubtful\n", "imu_clock_restart: 1", "name: imu_clock_restart"})
       EXPECT_NE(yaml.find(part), std::string::npos) << part << yaml;
   }
+  // Before there is a trajectory, none begins anew. A driver may set its clock first.
+  what.jump = 5.0;
+  what.jump_at = 0.5;
+  writeBag(what);
+  EXPECT_NE(run().out.find("verdict"), std::string::npos);
+  EXPECT_EQ(contents(out_ + "/summary.yaml").find("name: imu_clock_restart"), std::string::npos);
+  what.jump_at = 8.0;
   // A gap that the odometry bridges is none.
   what.jump = 5.0;
   writeBag(what);

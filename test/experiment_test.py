@@ -176,6 +176,14 @@ def test_small_errors_are_numbers_to_yaml(programs_folder, tmp_path):
     assert result["final_error_s"] == pytest.approx(3e-5, abs=1e-12)
 
 
+def test_a_run_that_is_not_to_be_trusted_has_a_result(programs_folder, simulated_run):
+    """As one of the paper's model with a mounting that is turned."""
+    words = (programs_folder / "rio_t_bag", simulated_run / "run.bag", "--config", "irs", "--set",
+             "extrinsics_rotation_xyzw=[0,0,0,1]")
+    assert programs.run(*words).returncode == 3
+    assert programs.cpu_seconds_of(*words) > 0.0
+
+
 USAGE = [
     (["shifts", "--set", "time_offset_model=imu"], "sets time_offset_model itself"),
     (["shifts", "--shifts", "5,5"], "--shifts"),

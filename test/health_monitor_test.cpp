@@ -7,6 +7,7 @@
 
 #include "rio_t/core/so3.h"
 #include "rio_t/factors/state_block.h"
+#include "rio_t/odometry/radars_health.h"
 #include "simulated_run.h"
 
 namespace rio_t {
@@ -119,6 +120,32 @@ TEST(HealthMonitor, CoastsWithoutScansAndDivergesWhereNothingIsKnown) {
   broken.covariance(6, 6) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(monitor.judge(at(6.5), broken), Health::kDiverged);
   EXPECT_FALSE(monitor.wantsReinitialization(at(100.0)));  // no scan contradicts
+}
+
+TEST(HealthMonitor, AVagueVelocityContradictsNothing) {
+  HealthMonitor monitor(HealthOptions(), 4.0);
+  NavigationState vague = knownState();
+  vague.covariance(7, 7) = 1.1;
+  EXPECT_EQ(monitor.judge(at(0.0), vague), Health::kDiverged);
+  EXPECT_FALSE(monitor.isContradicted());
+  feed(monitor, 1.0, 5.0, 10.0);
+  EXPECT_TRUE(monitor.isContradicted());
+}
+
+// With a vague velocity both radars are as bad, but only one of them contradicts the estimate.
+TEST(RadarsHealth, IsThatOfTheRadarThatAgrees) {
+  for (const std::size_t wrong : {0, 1}) {
+    RadarsHealth health(HealthOptions(), 4.0, 2);
+    NavigationState vague = knownState();
+    vague.covariance(7, 7) = 1.1;
+    for (double t = 0.0; t < 4.0; t += 0.1) {
+      for (const std::size_t radar : {0, 1})
+        health.of(radar).addInnovation(innovation(at(t), radar == wrong ? 1.0 : 0.1, 0.01));
+      health.judge(at(t), vague, 1.0);
+    }
+    EXPECT_EQ(health.health(), Health::kDiverged);
+    EXPECT_FALSE(health.isContradicted()) << "radar " << wrong << " is wrong";
+  }
 }
 
 // An IMU gap loses the heading for good, and with it v_W; the motion is known all the same.

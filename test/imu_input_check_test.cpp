@@ -108,6 +108,24 @@ TEST_F(Gate, TheSecondSampleConfirmsALongGap) {
   EXPECT_EQ(feed(2.02), "");
 }
 
+// Whatever of the two is longer.
+TEST_F(Gate, NoGapIsBridgedThatIsLongerThanTheLongest) {
+  for (const double patience : {0.1, 5.0}) {
+    ImuInputCheckOptions options;
+    options.max_bridged_gap = 0.3;
+    options.jump_patience = patience;
+    gate = ImuInputCheck(0.04, options);
+    EXPECT_EQ(feed(1.0), "");
+    EXPECT_EQ(feed(1.4), "imu_stamp_jump") << patience;
+    std::string faults;
+    for (double ahead = 1.41; faults.empty() && ahead < 8.0; ahead += 0.01) {
+      faults = feed(ahead);
+      if (faults == "imu_stamp_jump") faults.clear();
+    }
+    EXPECT_EQ(faults, "imu_clock_restart") << patience;
+  }
+}
+
 TEST_F(Gate, DoubtGrowsWithTheGap) {
   EXPECT_EQ(feed(1.05), "imu_gap");
   const double small = sample.accel_doubt;

@@ -59,6 +59,11 @@ def test_special_names_and_launch_files_of_others_pass():
     launch_config.check_arguments(["roslaunch", "rio_t", "irs.launch", "bag:=x", "__ns:=robot", "_private:=1"], LAUNCH)
     launch_config.check_arguments(["roslaunch", "my_robot", "bringup.launch", "anything:=1"], LAUNCH)
     launch_config.check_arguments(["rostest", "live.test"], LAUNCH)
+    # Ours have usual names.
+    launch_config.check_arguments(["roslaunch", "my_robot", "irs.launch", "anything:=1"], LAUNCH)
+    launch_config.check_arguments(["roslaunch", "/home/me/irs.launch", "anything:=1"], LAUNCH)
+    with pytest.raises(RioTError):
+        launch_config.check_arguments(["roslaunch", str(LAUNCH / "irs.launch"), "anything:=1"], LAUNCH)
 
 
 def test_somebody_elses_launch_file_may_not_misspell_an_argument(tmp_path):

@@ -12,7 +12,7 @@
 #include <sstream>
 
 #include "parameter_faults.h"
-#include "rio_t/radar/ego_velocity.h"
+#include "rio_t/odometry/radar_inertial_odometry.h"
 #include "rio_t/simulation/presets.h"
 #include "run_files.h"
 #include "temporary_folder.h"
@@ -133,7 +133,7 @@ TEST(Parameters, TheEstimatorTakesEveryNumberThatTheRangesAllow) {
       } catch (const ConfigError&) {
         continue;  // refused with its key, as it should be
       }
-      EXPECT_NO_THROW(EgoVelocityEstimator(config->odometry.ego_velocity)) << assignment;
+      EXPECT_NO_THROW(RadarInertialOdometry(config->odometry)) << assignment;
     }
   }
 }

@@ -181,6 +181,16 @@ def test_a_run_that_never_initialised_says_so(report, run_folder):
     assert "No poses: the estimator never initialised." in page_of(report(run_folder))
 
 
+def test_a_run_that_was_refused_says_so(report, run_folder):
+    (run_folder / "summary.yaml").unlink()
+    for file in run_folder.iterdir():
+        if file.is_file():
+            file.write_text("")
+    page = page_of(report(run_folder))
+    assert "No summary.yaml: the run did not finish." in page
+    assert not figures_of(page)
+
+
 @pytest.mark.parametrize("name, content, message", [
     ("trajectory.txt", None, "trajectory.txt: missing; expected the output folder of rio_t_bag"),
     ("trajectory.txt", "1 2 3\n", "trajectory.txt:1: expected `stamp x y z qx qy qz qw`"),

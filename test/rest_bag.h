@@ -40,7 +40,8 @@ struct BagContents {
   double doppler = 0.0;  ///< of each point [m/s], alternating sign
   bool stamped = true;
   bool imu_stamped = true;
-  double jump = 0.0;     ///< [s] by which the stamps jump ahead in the middle
+  double jump = 0.0;     ///< [s] by which the stamps jump ahead at `jump_at`
+  double jump_at = 8.0;  ///< [s]
   double shaking = 0.0;  ///< amplitude of the gyro [rad/s]
   std::string doppler_field = "v_doppler_mps";
   bool ground_truth = false;
@@ -62,7 +63,7 @@ class RestBag : public testing::Test {
       const double t = 0.005 * k;
       const ros::Time on_time = ros::Time(1000.0) + ros::Duration(t);
       const ros::Time record = on_time + ros::Duration(100.001);
-      const ros::Time stamp = on_time + ros::Duration(2 * k < steps ? 0.0 : what.jump);
+      const ros::Time stamp = on_time + ros::Duration(t < what.jump_at ? 0.0 : what.jump);
       if (what.imu) {
         sensor_msgs::Imu imu;
         if (what.imu_stamped) imu.header.stamp = stamp;

@@ -230,7 +230,7 @@ class SetupTest(tester.LiveTestCase):
         def keep(message):
             statuses.update({status.name: status for status in message.status})
         subscriber = rospy.Subscriber("/diagnostics_agg", DiagnosticArray, keep)
-        tester.check(tester.run(shutil.which("rosparam"), "load", CONFIG / "diagnostics_aggregator.yaml",
+        tester.check(tester.run(shutil.which("rosparam"), "load", CONFIG / "diagnostics" / "aggregator.yaml",
                                 "/diagnostic_aggregator"))
         aggregator = tester.program("diagnostic_aggregator", "aggregator_node")
         with tester.Listener() as listener, tester.node("config:=irs"), tester.Process(aggregator):

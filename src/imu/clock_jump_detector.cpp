@@ -1,11 +1,13 @@
 #include "rio_t/imu/clock_jump_detector.h"
 
+#include <algorithm>
+
 namespace rio_t {
 
 ClockJumpDetector::Verdict ClockJumpDetector::check(Time stamp) {
   const double step = newest_ ? stamp - *newest_ : 0.0;
   Verdict verdict = Verdict::kGood;
-  if (newest_ && (step <= 0.0 || step > patience_)) {
+  if (newest_ && (step <= 0.0 || step > std::min(patience_, max_gap_))) {
     verdict = step > 0.0 ? Verdict::kAhead : Verdict::kBehind;
     const double onward = elsewhere_newest_ ? stamp - *elsewhere_newest_ : 0.0;
     const bool goes_on = 0.0 < onward && onward <= max_gap_;

@@ -265,9 +265,9 @@ void Estimator::keepUp(bool scan_came, const std::vector<RadarScan>& waiting) {
   }
   if (!initialized()) return;
   const Time time = imu_.newest() - (kLateScan + 2.0 * options_.smoother.max_time_offset);
-  const bool is_first = std::none_of(waiting.begin(), waiting.end(),
-                                     [&](const RadarScan& scan) { return nodeTime(scan) <= time; });
-  if (is_first && time - smoother_.newest().time >= kSilentStep) {
+  const bool precedes_all = std::none_of(waiting.begin(), waiting.end(),
+                                         [&](const RadarScan& scan) { return nodeTime(scan) <= time; });
+  if (precedes_all && time - smoother_.newest().time >= kSilentStep) {
     smoother_.nodeAt(time);
     smoother_.optimize();
     for (const StampedPose& left : marginalize()) left_in_silence_.push_back(left);

@@ -141,7 +141,8 @@ void DopplerGrid::judge() {
     // another value. Until then the step is taken as the largest that it can be.
     if (mostWithin(batch_, 4.0 * kRounding) + kMaxMisfits >= kBatch) {
       const double value = batch_[kBatch / 2];
-      if (step_.source == DopplerStepSource::kUnknown && value < kLargestStep) step_.value = value;
+      const bool repeats = mostWithin(batch_, kSame) + kMaxMisfits >= kBatch;
+      if (step_.source == DopplerStepSource::kUnknown && repeats && value < kLargestStep) step_.value = value;
       count_ = kBatch / 2;
       return;
     }

@@ -17,9 +17,14 @@ def interpolate_rotations(times, stamps, quaternions):
     return Rotation.from_quat(interpolate(times, stamps, quaternions * signs[:, None]))
 
 
+def matrix_of(rotation):
+    """As Rotation.as_matrix, which the scipy of ROS Noetic lacks."""
+    return rotation.apply(numpy.eye(3)).T
+
+
 def heading_between(a, b):
     """The turn about z that brings rotation `a` nearest to `b`."""
-    R = (b * a.inv()).as_matrix()
+    R = matrix_of(b * a.inv())
     return Rotation.from_euler("z", math.atan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1]))
 
 

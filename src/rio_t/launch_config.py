@@ -25,7 +25,8 @@ def config_path(name, folder):
 def check_arguments(words, launch_folder):
     """Raises RioTError if `words`, the command line of roslaunch, starts a launch file of this package with an argument
     that the file does not have."""
-    files = [launch_folder / pathlib.Path(word).name for word in words if word.endswith(".launch")]
+    files = [launch_folder / pathlib.Path(word).name for before, word in zip(["", *words], words)
+             if word.endswith(".launch") and (before == "rio_t" or pathlib.Path(word).resolve().parent == launch_folder.resolve())]
     files = [file for file in files if file.is_file()]
     if not files:
         return  # somebody else's launch file, which roslaunch checks where it includes ours

@@ -37,13 +37,18 @@ def run(*words, **options):
     return subprocess.run([str(word) for word in words], text=True, check=False, **options)
 
 
+def exit_code(status):
+    """As os.waitstatus_to_exitcode, which Python 3.8 of ROS Noetic lacks."""
+    return -os.WTERMSIG(status) if os.WIFSIGNALED(status) else os.WEXITSTATUS(status)
+
+
 def cpu_seconds_of(*words):
-    """CPU [s], user and system, of a program that succeeds: what it takes with others beside it, too."""
+    """CPU [s], user and system, of a program that has a result: what it takes with others beside it, too."""
     with tempfile.TemporaryFile("w+") as errors, subprocess.Popen(
             [str(word) for word in words], stdout=subprocess.DEVNULL, stderr=errors) as process:
         _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode != 0:
+        process.returncode = exit_code(status)
+        if process.returncode not in HAS_RESULT:
             errors.seek(0)
             lines = errors.read().strip().splitlines()
             raise RioTError(lines[-1] if lines else f"{words[0]} ended with status {process.returncode}")

@@ -8,11 +8,13 @@ import sys
 
 import numpy as np
 import yaml
+from matplotlib.ticker import FuncFormatter
 from scipy.spatial.transform import Rotation
 
 from . import programs
 from .command_line import Parser
 from .errors import RioTError
+from .geometry import matrix_of
 from .plots import pyplot, tidy
 
 COLOURS = ("tab:orange", "tab:blue", "tab:green", "tab:red", "tab:purple", "tab:brown")
@@ -33,7 +35,7 @@ def radars_of(config):
 def angles(rotation):
     """Yaw to the left, pitch up and roll right side down in degrees, as mounting_yaw_pitch_roll_deg has them."""
     flu = rotation * Rotation.from_euler("z", 90, degrees=True)  # x forward, y left, z up of the radar
-    forward, left, up = flu.as_matrix().T
+    forward, left, up = matrix_of(flu).T
     pitch = np.arctan2(forward[2], np.hypot(forward[0], forward[1]))
     yaw = np.arctan2(forward[1], forward[0])
     roll = np.arctan2(left[2], up[2])
@@ -81,7 +83,7 @@ def draw(radars, file):
     draw_view(top, radars, size, (1, -1.0), (0, 1.0))
     top.set_title("from above, forward is up")
     tidy(top, "x, forward [m]", "y, left is to the left [m]")
-    top.xaxis.set_major_formatter(lambda value, _: f"{-value:g}")
+    top.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{-value:g}"))
     draw_view(side, radars, size, (0, 1.0), (2, 1.0))
     side.set_title("from the right, forward is to the right")
     tidy(side, "z, up [m]", "x, forward [m]")
@@ -101,7 +103,7 @@ def main(arguments):
     parser.add_argument("--config", required=True, metavar="NAME_OR_PATH",
                         help="a configuration, as for rio_t_bag")
     parser.add_argument("--out", required=True, type=pathlib.Path, metavar="FILE.png", help="gets the drawing")
-    parser.add_argument("--programs", metavar="FOLDER", help="folder that holds rio_t_bag")
+    parser.add_argument("--programs", type=pathlib.Path, metavar="FOLDER", help="folder that holds rio_t_bag")
     given = parser.parse_args(arguments)
     try:
         folder = programs.find(["rio_t_bag"], "--programs", given.programs)

@@ -26,10 +26,10 @@ struct RadarChannelOptions {
 
 /// What the estimator knows when a scan comes.
 struct ScanContext {
-  bool at_rest = false;          ///< the IMU shows no motion at the time of measurement
-  bool may_rest = false;         ///< likewise but for a vibration: rest if the points show no motion
-  bool has_diverged = false;     ///< the points choose their velocity without the prediction
-  bool is_contradicted = false;  ///< see HealthMonitor: points that choose none do not follow the prediction
+  bool at_rest = false;            ///< the IMU shows no motion at the time of measurement
+  bool may_rest = false;           ///< likewise but for a vibration: rest if the points show no motion
+  bool has_diverged = false;       ///< RANSAC gets no prior
+  bool is_contradicted = false;    ///< see HealthMonitor: no velocity is found around the prediction
   double model_error_scale = 1.0;  ///< see ModelErrorScale
   Time last_used;                  ///< stamp of the last scan that any radar gave to the window
 };

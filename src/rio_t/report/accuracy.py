@@ -2,6 +2,7 @@
 import yaml
 
 from .. import programs
+from ..errors import RioTError
 
 ACCURACY = (
     ("ATE: position, origin aligned, rmse [m]", "ape_origin_m", "rmse", ".4f"),
@@ -22,7 +23,10 @@ ERRORS = "stamp,x,y,z,truth_x,truth_y,truth_z,angle_deg,yaw_deg"  # header of `e
 
 
 def run_evaluate(program, *arguments):
-    return yaml.safe_load(programs.output_of(program, "--yaml", *arguments))
+    evaluation = yaml.safe_load(programs.output_of(program, "--yaml", *arguments))
+    if not isinstance(evaluation, dict):
+        raise RioTError(f"{program}: expected the program evaluate")
+    return evaluation
 
 
 def accuracy_rows(evaluations):

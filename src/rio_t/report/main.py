@@ -60,6 +60,11 @@ def timed(table, origin):
     return {**table, "time": 1e-9 * (table["stamp"] - origin)}
 
 
+def has_lines(file):
+    """rio_t_bag leaves empty tables if a run is refused."""
+    return file.is_file() and file.stat().st_size > 0
+
+
 def read_run(folder, truth_file):
     if not folder.is_dir():
         raise RioTError(f"{folder}: no such folder; expected the output folder of rio_t_bag")
@@ -76,14 +81,14 @@ def read_run(folder, truth_file):
         track.time = track.poses.seconds(origin)
 
     def table(name, radar=""):
-        if not (folder / run_folder.of_radar(name, radar)).is_file():
+        if not has_lines(folder / run_folder.of_radar(name, radar)):
             return None
         content = timed(run_folder.read(folder, name, radar), origin)
         return content if len(content["time"]) else None
 
     radars = [Radar(name, table("time_offset.csv", name), table("ego_velocity.csv", name), table("extrinsics.csv", name))
               for name in run_folder.radars(folder)]
-    landmarks = run_folder.read(folder, "map.csv") if (folder / "map.csv").is_file() else None
+    landmarks = run_folder.read(folder, "map.csv") if has_lines(folder / "map.csv") else None
     return Run(origin, estimates, truth, radars, table("biases.csv"), landmarks)
 
 

@@ -154,9 +154,9 @@ void BagPlayer::addImu(const sensor_msgs::Imu& message, Time record) {
 void BagPlayer::followImuStamps(const ImuMeasurement& imu) {
   if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite()) return;  // dropped unseen
   const ClockJumpDetector::Verdict stamp = imu_stamps_.check(imu.time);
-  if (stamp == ClockJumpDetector::Verdict::kRestart) imu_restarts_.push_back({*newest_imu_, imu.time});
-  if (stamp == ClockJumpDetector::Verdict::kGood || stamp == ClockJumpDetector::Verdict::kRestart)
-    newest_imu_ = imu.time;
+  const bool restarts = stamp == ClockJumpDetector::Verdict::kRestart;
+  if (restarts && odometry_.initialized()) imu_restarts_.push_back({*newest_imu_, imu.time});
+  if (restarts || stamp == ClockJumpDetector::Verdict::kGood) newest_imu_ = imu.time;
 }
 
 void BagPlayer::addTrigger(const std_msgs::Header& message, Time record, std::size_t radar) {

@@ -113,39 +113,37 @@ ProposedConfig proposed(const ImuInspection& imu, const std::vector<RadarInspect
   return config;
 }
 
-/// A message that was recorded twice says nothing about the configuration.
-std::uint64_t scansJudged(const RunSummary& summary) {
-  const std::map<std::string, std::uint64_t> rejected = summary.scansRejected();
-  const auto duplicates = rejected.find("duplicate_stamp");
-  return summary.scansTotal() - (duplicates == rejected.end() ? 0 : duplicates->second);
-}
-
-double shareUsed(const RunSummary& summary) {
-  return static_cast<double>(summary.scansUsed()) /
-         static_cast<double>(std::max<std::uint64_t>(1, scansJudged(summary)));
-}
-
 struct Trial {
   std::string failure;  ///< why it did not run; empty: it ran
   RunSummary summary;
+  std::uint64_t copies = 0;  ///< clouds that were recorded twice: they say nothing about the configuration
 
+  /// Of the scans that are no copies.
+  double shareUsed() const {
+    const std::map<std::string, std::uint64_t> rejected = summary.scansRejected();
+    const auto found = rejected.find("duplicate_stamp");
+    const std::uint64_t duplicates = found == rejected.end() ? 0 : found->second;
+    const std::uint64_t judged = summary.scansTotal() - std::min(copies, duplicates);
+    return static_cast<double>(summary.scansUsed()) / static_cast<double>(std::max<std::uint64_t>(1, judged));
+  }
   bool good() const {
     return failure.empty() && summary.divergences == 0 && summary.health_at_end != "diverged" &&
-           2 * summary.scansUsed() > scansJudged(summary);
+           shareUsed() > 0.5;
   }
   /// Larger is better.
   double score() const {
     if (!failure.empty()) return -1e9;
-    return shareUsed(summary) - static_cast<double>(summary.divergences) -
+    return shareUsed() - static_cast<double>(summary.divergences) -
            (summary.health_at_end == "diverged" ? 1.0 : 0.0);
   }
 };
 
-Trial tryOut(const std::string& bag, const std::string& yaml, double duration) {
+Trial tryOut(const Recording& recording, const std::string& yaml, double duration) {
   Trial trial;
+  for (const CloudTopic& cloud : recording.clouds) trial.copies += cloud.copies;
   try {
     BagRun run;
-    run.bags = {bag};
+    run.bags = {recording.bag};
     run.config = readBack(yaml);
     run.config.bag_duration = duration;
     trial.summary = runBag(run);
@@ -166,8 +164,8 @@ constexpr Attempt kAttempts[] = {
     {"estimate_extrinsics", "pose", "With a fixed lever arm the odometry diverged."},
 };
 
-std::string shareText(const RunSummary& summary) {
-  return fixedText(100.0 * shareUsed(summary), 0) + " % of the scans used";
+std::string shareText(const Trial& trial) {
+  return fixedText(100.0 * trial.shareUsed(), 0) + " % of the scans used";
 }
 
 std::string offsetsText(const RunSummary& summary) {
@@ -187,7 +185,8 @@ void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
     return;
   }
   const RunSummary& s = trial.summary;
-  const std::string numbers = shareText(s) + ", " + fixedText(s.path_length_m, 1) + " m, " + offsetsText(s);
+  const std::string numbers =
+      shareText(trial) + ", " + fixedText(s.path_length_m, 1) + " m, " + offsetsText(s);
   if (trial.good()) {
     check->findings.push_back({note.empty() ? FindingLevel::kOk : FindingLevel::kOdd, "trial run",
                                "no divergence, " + numbers + note});
@@ -212,7 +211,7 @@ void chooseByTrial(const Recording& recording, const std::string& header, Propos
     ProposedConfig changed = config;
     if (attempt.key != nullptr) changed.top_level.set(attempt.key, attempt.value, attempt.why);
     const std::string yaml = toYaml(changed, header);
-    const Trial trial = tryOut(recording.bag, yaml, duration);
+    const Trial trial = tryOut(recording, yaml, duration);
     if (check->yaml.empty() || trial.score() > best.score()) {
       best = trial;
       check->yaml = yaml;
@@ -229,7 +228,7 @@ void chooseByTrial(const Recording& recording, const std::string& header, Propos
     alone.top_level.remove("radars");
     add(keys, &alone.top_level);
     const std::string yaml = toYaml(alone, header);
-    const Trial trial = tryOut(recording.bag, yaml, duration);
+    const Trial trial = tryOut(recording, yaml, duration);
     if (trial.score() <= best.score()) continue;
     best = trial;
     check->yaml = yaml;
@@ -339,7 +338,9 @@ BagCheck checkBag(const std::string& bag, const CheckRequest& request) {
                               "the first " + fixedText(recording.read, 0) + " of " +
                                   fixedText(recording.length, 0) + " s were read (--duration)"});
   if (recording.imus.empty()) {
-    missing("IMU", "the bag has no topic of type sensor_msgs/Imu; it has " + topicsOf(recording),
+    missing("IMU",
+            "the bag has no topic " + (request.imu_topic.empty() ? "" : request.imu_topic + " ") +
+                "of type sensor_msgs/Imu; it has " + topicsOf(recording),
             "Record the IMU, too: 100 Hz or more, with raw acceleration and angular velocity.", &check);
     return check;
   }
@@ -357,8 +358,12 @@ BagCheck checkBag(const std::string& bag, const CheckRequest& request) {
   }
   if (radars.empty()) {
     if (recording.clouds.empty()) {
-      missing("radar", "the bag has no topic of type sensor_msgs/PointCloud2; it has " + topicsOf(recording),
-              "Record the radar, too: a point cloud with positions and Doppler.", &check);
+      std::string wanted;
+      for (const std::string& topic : request.radar_topics) wanted += topic + " ";
+      missing(
+          "radar",
+          "the bag has no topic " + wanted + "of type sensor_msgs/PointCloud2; it has " + topicsOf(recording),
+          "Record the radar, too: a point cloud with positions and Doppler.", &check);
     } else {
       check.to_do = "Use a radar driver that publishes positions and Doppler as sensor_msgs/PointCloud2.";
     }

@@ -57,6 +57,7 @@ StampedInOrder stampedInOrder(const ImuTopic& topic) {
         ++(times.stamp == parts.back().times.back().stamp ? result.duplicates : result.behind);
         continue;
       case ClockJumpDetector::Verdict::kAhead:
+        if (isPause(parts.back().times.back(), times, odometry.jump_patience)) break;
         ++result.ahead;
         continue;
       case ClockJumpDetector::Verdict::kRestart:
@@ -184,7 +185,7 @@ ImuInspection inspectImuTopic(const ImuTopic& topic) {
     imu.to_do = "Let the IMU driver set header.stamp, and record again.";
     return imu;
   }
-  const StampedInOrder order = stampedInOrder(topic);
+  StampedInOrder order = stampedInOrder(topic);
   StreamTiming timing = inspectTiming(order.kept.times);
   timing.duplicates = order.duplicates;
   imu.kept = order.kept;

@@ -6,6 +6,7 @@
 #include <tf2_eigen/tf2_eigen.h>
 
 #include <algorithm>
+#include <iterator>
 #include <set>
 
 #include "bag_file.h"
@@ -26,6 +27,10 @@ Topic& topicOf(const std::string& name, std::vector<Topic>* topics) {
 
 bool has(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+bool isCopy(const sensor_msgs::PointCloud2& a, const sensor_msgs::PointCloud2& b) {
+  return a.header.stamp == b.header.stamp && a.data == b.data;
 }
 
 void addImu(const sensor_msgs::Imu& message, Time record, ImuTopic* topic) {
@@ -71,6 +76,8 @@ Recording readRecording(const std::string& path, const CheckRequest& request) {
       CloudTopic& topic = topicOf(name, &recording.clouds);
       topic.messages.push_back(rio_t::read<sensor_msgs::PointCloud2>(instance));
       topic.times.push_back({toTime(topic.messages.back()->header.stamp), record});
+      if (topic.messages.size() > 1 && isCopy(*topic.messages.back(), **std::prev(topic.messages.end(), 2)))
+        ++topic.copies;
       const bool is_first = hasPoints(*topic.messages.back()) && judged.insert(name).second;
       if (is_first && !proposeFormat(topic).fault.empty()) refused.insert(name);
     } else {

@@ -26,6 +26,7 @@ struct CloudTopic {
   std::string topic;
   std::vector<sensor_msgs::PointCloud2::ConstPtr> messages;
   std::vector<MessageTimes> times;
+  std::uint64_t copies = 0;  ///< messages that are the same as the one before
 };
 
 struct HeaderTopic {

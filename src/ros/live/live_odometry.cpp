@@ -3,7 +3,10 @@
 #include <diagnostic_msgs/DiagnosticStatus.h>
 #include <ros/console.h>
 
+#include <algorithm>
 #include <boost/function.hpp>
+#include <cctype>
+#include <iterator>
 
 #include "radar_texts.h"
 #include "rio_t/evaluation/trajectory.h"
@@ -223,12 +226,12 @@ void LiveOdometry::onReconfigure(LiveParameters& values) {
       apply(tuning, options_);
     }
     if (const Session now = session_.get()) now->tune(tuning);
-    showEffectiveParameters(private_node_, live_config_);
   } catch (const std::exception& error) {
     refused_because = error.what();
     ROS_ERROR_STREAM(name_ << ": the change of parameters was refused, nothing was changed: "
                            << error.what());
   }
+  if (refused_because.empty()) showEffectiveParameters(private_node_, live_config_);
   monitor_.reconfigured(refused_because);
   values = LiveParameters(live_config_);
 }
@@ -298,10 +301,18 @@ void LiveOdometry::reset(const std::string& reason, bool at_once) {
 }
 
 void LiveOdometry::tellStatus(const LiveMonitor::Status& status) {
-  constexpr double kStatusPeriod = 2.0 * kWarnPeriod;  // [s] A status may stay for minutes.
-  if (status.level != diagnostic_msgs::DiagnosticStatus::OK &&
-      isTimeToTell("status " + status.name, kStatusPeriod))
+  constexpr double kStatusPeriod = 60.0;  // [s] A status may stay for as long as the node runs.
+  std::string problem = status.name + ": ";
+  // The numbers in it change all the time.
+  std::copy_if(status.message.begin(), status.message.end(), std::back_inserter(problem),
+               [](unsigned char c) { return std::isdigit(c) == 0; });
+  using Level = diagnostic_msgs::DiagnosticStatus;
+  if (status.level == Level::OK || !isTimeToTell(problem, kStatusPeriod)) return;
+  if (status.level == Level::WARN) {
     ROS_WARN_STREAM(name_ << ": " << status.message);
+  } else {
+    ROS_ERROR_STREAM(name_ << ": " << status.message);
+  }
 }
 
 bool LiveOdometry::isTimeToTell(const std::string& what, double period) {

@@ -164,7 +164,8 @@ void listGaps(ParameterList& list, Config& c) {
   list.number(
       "imu_jump_patience", "s", above(0), gate.jump_patience,
       "The estimator drops IMU samples whose stamps jump ahead or run back. If such samples go on for this "
-      "time, the clock has jumped, and the estimate starts again.");
+      "time, the clock has jumped, and the estimate starts again. After a gap longer than this, the first "
+      "sample is dropped, too. Keep it above ten sample periods.");
   list.number(
       "imu_accel_range", "m/s^2", atLeast(0), gate.accel_range,
       "This is the largest reading of the accelerometer on one axis. A sample at this value is clipped and "

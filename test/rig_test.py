@@ -1,0 +1,11 @@
+"""The drawing of a rig."""
+import sys
+
+from rio_t import programs
+
+
+def test_it_is_drawn(scripts, programs_folder, tmp_path):
+    done = programs.run(sys.executable, scripts / "draw_rig.py", "--config", "two_radars", "--out", tmp_path / "rig.png",
+                        "--programs", programs_folder)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "rig.png").read_bytes().startswith(b"\x89PNG")
