@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <type_traits>
 #include <variant>
 
 namespace rio_t {
@@ -100,6 +101,24 @@ LiveParameters LiveParameters::__getMax__() {
   LiveParameters ends;
   ends.values_ = endsOf(ends.values_, true, [](const ParameterDescription& about) { return about.max; });
   return ends;
+}
+
+void LiveParameters::__fromServer__(const ros::NodeHandle& node) {
+  for (auto& [key, value] : values_) {
+    const std::string effective = "effective/" + key;
+    std::visit(
+        [&](auto& data) {
+          using Data = std::decay_t<decltype(data)>;
+          if constexpr (std::is_same_v<Data, std::int64_t>) {
+            int whole = 0;
+            if (node.getParam(effective, whole)) data = whole;
+          } else if constexpr (std::is_same_v<Data, double> || std::is_same_v<Data, bool>) {
+            Data read = data;
+            if (node.getParam(effective, read)) data = read;
+          }
+        },
+        value);
+  }
 }
 
 bool LiveParameters::__fromMessage__(dynamic_reconfigure::Config& message) {

@@ -38,9 +38,9 @@ class LiveParameters {
   static int __getGroupDescriptions__() { return 0; }
   void __clamp__() {}  ///< a value out of range is refused, with a message, and not bent
   std::uint32_t __level__(const LiveParameters&) const { return 0; }
-  // The values stay off the parameter server: the next start would take them for parameters of the user.
-  // `~effective` has them.
-  void __fromServer__(const ros::NodeHandle&) {}
+  /// Reads the values that hold from `~effective`, so that the server never shows others.
+  void __fromServer__(const ros::NodeHandle& node);
+  /// Writes none: the next start would take them for parameters of the user.
   void __toServer__(const ros::NodeHandle&) const {}
   /// Takes the values of known keys; the kinds of the message decide.
   bool __fromMessage__(dynamic_reconfigure::Config& message);
