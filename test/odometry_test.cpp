@@ -92,13 +92,29 @@ TEST_F(AtRest, EveryScanIsAccountedFor) {
   EXPECT_EQ(odometry.finish().at(0).rejected_because, "imu_not_covering");
 }
 
-// The IMU may fall silent for as long as its gaps are bridged; the radar goes on meanwhile.
+TEST_F(AtRest, AScanMayOvertakeTheSampleThatStartsTheEstimate) {
+  for (const double overtakes_by : {-0.03, 0.01, 0.3}) {
+    odometry = RadarInertialOdometry(OdometryOptions());
+    time = 100.0;
+    while (!odometry.initialized()) run(time + 0.005);
+    const double start = time;
+    odometry = RadarInertialOdometry(OdometryOptions());
+    time = 100.0;
+    run(start + 0.02 - overtakes_by);
+    odometry.addScan(restScan(start + 0.02));
+    const std::vector<ScanResult> results = run(start + 0.2);
+    ASSERT_EQ(results.size(), 1u) << overtakes_by;
+    EXPECT_TRUE(results[0].used) << overtakes_by << ": " << results[0].rejected_because;
+  }
+}
+
 TEST_F(AtRest, AScanOfAnUnknownRadarIsRefused) {
   RadarScan scan = restScan(100.0);
   scan.radar = 1;
   EXPECT_THROW(odometry.addScan(scan), std::invalid_argument);
 }
 
+// The IMU may fall silent for as long as its gaps are bridged. The radar goes on meanwhile.
 TEST_F(AtRest, ScansOfAnImuGapWaitForItsEnd) {
   run(104.0);
   odometry.addScan(restScan(106.0));
@@ -156,7 +172,7 @@ TEST_F(AtRest, WithoutScansTheWindowMovesOn) {
   };
   while (time < 106.0) scanAndRun(time + 0.1);
   EXPECT_TRUE(run(160.0).empty());
-  // Else all of the IMU since the last scan would have to be kept.
+  // A window that stood still would keep all of the IMU since the last scan.
   scanAndRun(160.1);
   ASSERT_FALSE(left.empty());
   EXPECT_GT(left.back().time - Time::fromSeconds(0.0), 145.0);

@@ -227,10 +227,13 @@ std::vector<StampedPose> Estimator::marginalize() {
 Time Estimator::nodeTime(const RadarScan& scan) const { return radars_.at(scan.radar).nodeTime(scan.stamp); }
 
 bool Estimator::mustWait(const RadarScan& scan) const {
-  if (!initialized()) return false;
+  if (imu_.empty()) return false;
   const Time node_time = nodeTime(scan);
-  return node_time >= initialized_at_ && node_time > imu_.newest() - kImuMargin &&
-         node_time - imu_.newest() <= max_stamp_ahead_;
+  const double ahead = node_time - imu_.newest();
+  if (ahead > max_stamp_ahead_) return false;
+  // The sample that starts the estimate may still be on its way.
+  if (!initialized()) return ahead > 0.0;
+  return node_time >= initialized_at_ && ahead > -kImuMargin;
 }
 
 void Estimator::addImu(const std::vector<ImuMeasurement>& samples) {

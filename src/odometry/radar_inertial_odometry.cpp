@@ -131,7 +131,6 @@ std::vector<ScanResult> RadarInertialOdometry::finish() {
 // The one that was ready first, whether the IMU samples come one by one or many at once: the live node and
 // the bag runner shall use the scans of several radars in the same order.
 std::vector<RadarScan>::iterator RadarInertialOdometry::Impl::nextReadyScan() {
-  if (!estimator.initialized()) return waiting_scans.begin();
   auto first = waiting_scans.end();
   for (auto scan = waiting_scans.begin(); scan != waiting_scans.end(); ++scan) {
     if (estimator.mustWait(*scan)) continue;

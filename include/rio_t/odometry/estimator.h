@@ -45,7 +45,7 @@ class Estimator {
   /// are the scans that come next.
   void keepUp(bool scan_came, const std::vector<RadarScan>& waiting);
 
-  /// When the scan was measured, as known so far. Only while initialised.
+  /// When the scan was measured, as known so far.
   Time nodeTime(const RadarScan& scan) const;
   /// Whether the IMU that covers the scan may still come.
   bool mustWait(const RadarScan& scan) const;

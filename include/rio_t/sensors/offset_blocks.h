@@ -26,7 +26,8 @@ class OffsetBlocks {
   Block& of(Window& window, Time stamp);
 
   const Block& newest() const { return *epochs_.back().block; }
-  double value() const { return newest().x[0]; }  ///< t_O [s]
+  /// t_O [s]; before the start, the value it is configured to begin at.
+  double value() const { return epochs_.empty() ? options_.time_offset_initial : newest().x[0]; }
 
  private:
   /// Scans from `since` on share one offset.
