@@ -39,16 +39,16 @@ ImuInspection chooseImu(const Recording& recording, BagCheck* check) {
   const auto best =
       std::max_element(imus.begin(), imus.end(), [](const ImuInspection& a, const ImuInspection& b) {
         if (a.to_do.empty() != b.to_do.empty()) return b.to_do.empty();
-        return a.kept.times.size() < b.kept.times.size();
+        return a.times.size() < b.times.size();
       });
   std::string others;
   for (const ImuInspection& imu : imus) {
     if (&imu == &*best) continue;
-    others += (others.empty() ? "" : ", ") + imu.kept.topic + (imu.to_do.empty() ? "" : " (cannot be used)");
+    others += (others.empty() ? "" : ", ") + imu.topic + (imu.to_do.empty() ? "" : " (cannot be used)");
   }
   if (!others.empty())
     check->findings.push_back({FindingLevel::kOdd, "IMU",
-                               best->kept.topic + " is chosen; the other topics of type sensor_msgs/Imu: " +
+                               best->topic + " is chosen; the other topics of type sensor_msgs/Imu: " +
                                    others + "; --imu-topic chooses another"});
   return std::move(*best);
 }
@@ -118,7 +118,7 @@ struct Trial {
   RunSummary summary;
   std::uint64_t copies = 0;  ///< clouds that were recorded twice: they say nothing about the configuration
 
-  /// Of the scans that are no copies.
+  /// Copies do not count.
   double shareUsed() const {
     const std::map<std::string, std::uint64_t> rejected = summary.scansRejected();
     const auto found = rejected.find("duplicate_stamp");

@@ -111,7 +111,7 @@ void describeRate(const StreamTiming& timing, ImuInspection* imu) {
   const bool odd = timing.rate < kSlow || timing.gaps > 0 || 20 * timing.duplicates > timing.messages;
   imu->findings.push_back(
       {odd ? FindingLevel::kOdd : FindingLevel::kOk, "IMU",
-       imu->kept.topic + ": " + rateText(timing) +
+       imu->topic + ": " + rateText(timing) +
            (timing.rate < kSlow ? ", slower than the 50 Hz that a hand-held platform needs" : "")});
 }
 
@@ -174,7 +174,7 @@ void describe(ImuInspection* imu) {
 
 ImuInspection inspectImuTopic(const ImuTopic& topic) {
   ImuInspection imu;
-  imu.kept.topic = topic.topic;
+  imu.topic = topic.topic;
   imu.keys.set("imu_topic", topic.topic, "");
   const StreamTiming written = inspectTiming(topic.times);
   const std::string fault = faultOf(written);
@@ -188,10 +188,10 @@ ImuInspection inspectImuTopic(const ImuTopic& topic) {
   StampedInOrder order = stampedInOrder(topic);
   StreamTiming timing = inspectTiming(order.kept.times);
   timing.duplicates = order.duplicates;
-  imu.kept = order.kept;
-  imu.samples = order.kept.written;
   describeRate(timing, &imu);
   describeOrder(order, written.messages, &imu);
+  imu.times = std::move(order.kept.times);
+  imu.samples = std::move(order.kept.written);
   imu.report = inspectImu(imu.samples);
   std::vector<ImuMeasurement> finite;
   for (const ImuMeasurement& sample : imu.samples) {

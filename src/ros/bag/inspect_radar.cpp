@@ -61,7 +61,7 @@ struct Looked {
 Looked look(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud,
             const StampProposal& stamps, const PointCloudFormat& format, const InertialTrack& track) {
   Looked looked;
-  looked.scans = stampScans(recording, imu.kept, cloud, stamps, decodeAll(cloud, format));
+  looked.scans = stampScans(recording, imu.times, cloud, stamps, decodeAll(cloud, format));
   looked.cloud = inspectCloud(looked.scans);
   looked.velocities = radarVelocities(looked.scans);
   looked.sign = dopplerSignFromRanges(looked.scans, track);
@@ -226,7 +226,7 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
     radar.findings.push_back({FindingLevel::kMissing, "radar", cloud.topic + ": " + format.fault});
     return radar;
   }
-  const StampProposal stamps = proposeStamps(recording, imu.kept, cloud);
+  const StampProposal stamps = proposeStamps(recording, imu.times, cloud);
   const InertialTrack track(imu.samples, imu.report.rest_rate);
   Looked looked = look(recording, imu, cloud, stamps, format.format, track);
   if (looked.cloud.points == 0 || !looked.cloud.has_doppler) {

@@ -14,9 +14,10 @@ namespace rio_t {
 
 /// The IMU of a recording, ready to be compared with radars.
 struct ImuInspection {
-  ImuTopic kept;  ///< without the samples whose stamps are out of place
+  std::string topic;
+  std::vector<MessageTimes> times;  ///< of the samples whose stamps are in place
   ImuReport report;
-  std::vector<ImuMeasurement> samples;  ///< in m/s^2 and rad/s, stamps rising
+  std::vector<ImuMeasurement> samples;  ///< those that are finite, in m/s^2 and rad/s, stamps rising
   std::vector<Finding> findings;
   ProposedKeys keys;
   std::string to_do;  ///< what to do if it cannot be used; empty: it can

@@ -20,8 +20,8 @@ struct ImuTopic {
   std::vector<MessageTimes> times;
 };
 
-/// Of a topic that cannot serve, no cloud after the first one with points is kept: a lidar would fill the
-/// memory, and one cloud tells why it cannot serve.
+/// One cloud with points tells why a topic cannot serve. No more of such a topic is kept: a lidar would fill
+/// the memory.
 struct CloudTopic {
   std::string topic;
   std::vector<sensor_msgs::PointCloud2::ConstPtr> messages;

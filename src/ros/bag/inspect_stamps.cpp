@@ -30,7 +30,8 @@ std::size_t sharedWords(const std::string& a, const std::string& b) {
 }
 
 /// The header topic that stamps most of the scans, if it stamps eight in ten.
-const HeaderTopic* triggerOf(const Recording& recording, const ImuTopic& imu, const CloudTopic& cloud) {
+const HeaderTopic* triggerOf(const Recording& recording, const std::vector<MessageTimes>& imu,
+                             const CloudTopic& cloud) {
   const HeaderTopic* best = nullptr;
   std::size_t most = 0, shared = 0;
   const std::vector<RadarScan> empty(cloud.messages.size());
@@ -38,7 +39,7 @@ const HeaderTopic* triggerOf(const Recording& recording, const ImuTopic& imu, co
     if (10 * topic.messages.size() < 8 * cloud.messages.size()) continue;
     const StreamTiming timing = inspectTiming(topic.times);
     if (!timing.stampsAreUsable()) continue;
-    const StreamDelay delay = delayAgainstImu(topic.times, imu.times);
+    const StreamDelay delay = delayAgainstImu(topic.times, imu);
     if (std::abs(delay.median) > kLargestDelay) continue;
     StampProposal stamps;
     stamps.source = StampSource::kTrigger;
@@ -56,10 +57,11 @@ const HeaderTopic* triggerOf(const Recording& recording, const ImuTopic& imu, co
 
 }  // namespace
 
-StampProposal proposeStamps(const Recording& recording, const ImuTopic& imu, const CloudTopic& cloud) {
+StampProposal proposeStamps(const Recording& recording, const std::vector<MessageTimes>& imu,
+                            const CloudTopic& cloud) {
   StampProposal proposal;
   const StreamTiming timing = inspectTiming(cloud.times);
-  const StreamDelay delay = delayAgainstImu(cloud.times, imu.times);
+  const StreamDelay delay = delayAgainstImu(cloud.times, imu);
   std::string fault;
   if (timing.zero == timing.messages) {
     fault = "the stamps in its headers are zero";
@@ -100,8 +102,8 @@ StampProposal proposeStamps(const Recording& recording, const ImuTopic& imu, con
   return proposal;
 }
 
-std::vector<RadarScan> stampScans(const Recording& recording, const ImuTopic& imu, const CloudTopic& cloud,
-                                  const StampProposal& stamps, const std::vector<RadarScan>& scans) {
+std::vector<RadarScan> stampScans(const Recording& recording, const std::vector<MessageTimes>& imu,
+                                  const CloudTopic& cloud, const StampProposal& stamps, const std::vector<RadarScan>& scans) {
   StampingOptions options;
   options.source = stamps.source;
   options.radar_topic = cloud.topic;
@@ -115,8 +117,8 @@ std::vector<RadarScan> stampScans(const Recording& recording, const ImuTopic& im
   std::size_t next_imu = 0, next_trigger = 0;
   for (std::size_t k = 0; k < scans.size(); ++k) {
     const Time record = cloud.times[k].record;
-    for (; next_imu < imu.times.size() && imu.times[next_imu].record <= record; ++next_imu)
-      stamper.addImu(imu.times[next_imu].stamp, imu.times[next_imu].record);
+    for (; next_imu < imu.size() && imu[next_imu].record <= record; ++next_imu)
+      stamper.addImu(imu[next_imu].stamp, imu[next_imu].record);
     for (; trigger != nullptr && next_trigger < trigger->messages.size() &&
            trigger->times[next_trigger].record <= record;
          ++next_trigger) {

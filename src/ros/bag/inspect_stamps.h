@@ -20,10 +20,11 @@ struct StampProposal {
 };
 
 /// Chooses stamp_source for a cloud. No stamp of the IMU may be out of place.
-StampProposal proposeStamps(const Recording& recording, const ImuTopic& imu, const CloudTopic& cloud);
+StampProposal proposeStamps(const Recording& recording, const std::vector<MessageTimes>& imu,
+                            const CloudTopic& cloud);
 
 /// Stamps scans as the programs would. `scans`: one for each message of the topic.
-std::vector<RadarScan> stampScans(const Recording& recording, const ImuTopic& imu, const CloudTopic& cloud,
-                                  const StampProposal& stamps, const std::vector<RadarScan>& scans);
+std::vector<RadarScan> stampScans(const Recording& recording, const std::vector<MessageTimes>& imu,
+                                  const CloudTopic& cloud, const StampProposal& stamps, const std::vector<RadarScan>& scans);
 
 }  // namespace rio_t
