@@ -1,0 +1,133 @@
+// check_bag on bags with stamps that are zero, of another clock, lost or there twice.
+#include <gtest/gtest.h>
+#include <ros/time.h>
+#include <sensor_msgs/Imu.h>
+#include <sensor_msgs/PointCloud2.h>
+
+#include <string>
+
+#include "plain_bag.h"
+#include "rio_t/ros/bag/check_bag.h"
+#include "rio_t/ros/parameters/parameters.h"
+
+namespace rio_t {
+namespace {
+
+using CheckBag = PlainBag;
+
+TEST_F(CheckBag, ZeroStampsAreNamed) {
+  Changes changes;
+  changes.cloud = [](sensor_msgs::PointCloud2& cloud) {
+    cloud.header.stamp = ros::Time();
+    return true;
+  };
+  const BagCheck arrival = check(rewritten("zero", changes));
+  expectLine(arrival, FindingLevel::kOdd, {"stamps", "are zero", "arrival"});
+  EXPECT_EQ(configOf(arrival).stamp_source, StampSource::kArrival);
+  expectRuns(arrival);
+  changes.keep_triggers = true;
+  const BagCheck trigger = check(rewritten("zero_with_triggers", changes));
+  expectLine(trigger, FindingLevel::kOdd, {"stamps", "are zero", "/sensor_platform/radar/trigger"});
+  EXPECT_EQ(configOf(trigger).stamp_source, StampSource::kTrigger);
+  expectRuns(trigger);
+}
+
+TEST_F(CheckBag, StampsOfAnotherClockAreNamed) {
+  Changes changes;
+  changes.cloud = [](sensor_msgs::PointCloud2& cloud) {
+    cloud.header.stamp -= ros::Duration(5000.0);
+    return true;
+  };
+  const BagCheck odd = check(rewritten("clock", changes));
+  expectLine(odd, FindingLevel::kOdd, {"stamps", "another clock", "behind"});
+  expectRuns(odd);
+}
+
+TEST_F(CheckBag, AnImuSampleWithAWrongStampIsLeftOutAlone) {
+  int count = 0;
+  const BagCheck ahead = check(rewritten("imu_ahead", {[&](sensor_msgs::Imu& imu) {
+                                           if (++count == 8000) imu.header.stamp += ros::Duration(100.0);
+                                           return true;
+                                         }}));
+  expectLine(ahead, FindingLevel::kOdd, {"IMU stamps", "leaves out 1 of", "1 stamped more than 0.5 s ahead"});
+  expectLine(ahead, FindingLevel::kOk, {"stamps in the header"});
+  EXPECT_EQ(configOf(ahead).stamp_source, StampSource::kHeader);
+  EXPECT_EQ(ahead.yaml.find("init_mode"), std::string::npos) << ahead.yaml;
+  expectRuns(ahead);
+  EXPECT_LT(turnFromTruth(ahead), 5.0);
+  count = 0;
+  const BagCheck zero = check(rewritten("imu_zero_once", {[&](sensor_msgs::Imu& imu) {
+                                          if (++count == 8000) imu.header.stamp = ros::Time();
+                                          return true;
+                                        }}),
+                              false);
+  EXPECT_TRUE(zero.ready());
+  expectLine(zero, FindingLevel::kOdd, {"IMU stamps", "leaves out 1 of", "1 with a stamp of zero"});
+}
+
+TEST_F(CheckBag, ImuSamplesOfAnotherClockAreLeftOut) {
+  const ros::Duration uptime(1000.0);
+  int count = 0;
+  const BagCheck synced = check(rewritten("imu_synced", {[&](sensor_msgs::Imu& imu) {
+                                            if (++count <= 200) imu.header.stamp -= uptime;
+                                            return true;
+                                          }}));
+  expectLine(synced, FindingLevel::kOdd, {"IMU stamps", "leaves out", "the clock jumped"});
+  EXPECT_EQ(configOf(synced).stamp_source, StampSource::kHeader);
+  expectRuns(synced);
+  EXPECT_LT(turnFromTruth(synced), 5.0);
+  // A jump near the end costs the end, not all before it.
+  count = 0;
+  const BagCheck late = check(rewritten("imu_late_jump", {[&](sensor_msgs::Imu& imu) {
+                                          if (++count > 18000) imu.header.stamp += uptime;
+                                          return true;
+                                        }}),
+                              false);
+  expectLine(late, FindingLevel::kOdd, {"IMU stamps", "the clock jumped"});
+  expectLine(late, FindingLevel::kOk, {"rest", "at rest from"});
+  EXPECT_LT(turnFromTruth(late), 5.0);
+}
+
+TEST_F(CheckBag, APauseOfTheImuIsNoJumpOfItsClock) {
+  int count = 0;
+  const BagCheck odd = check(rewritten("imu_pause", {[&](sensor_msgs::Imu&) {
+                                         ++count;
+                                         return count < 8000 || 10000 < count;
+                                       }}),
+                             false);
+  expectLine(odd, FindingLevel::kOdd, {"IMU", "gaps: 1"});
+  for (const Finding& finding : odd.findings) EXPECT_NE(finding.subject, "IMU stamps") << describeCheck(odd);
+  EXPECT_LT(turnFromTruth(odd), 5.0);
+}
+
+TEST_F(CheckBag, ABagRecordedTwiceIsReady) {
+  Changes changes;
+  changes.copies = 2;
+  const BagCheck odd = check(rewritten("twice", changes));
+  ASSERT_TRUE(odd.ready()) << describeCheck(odd);
+  EXPECT_EQ(odd.to_do, "") << describeCheck(odd);
+  expectLine(odd, FindingLevel::kOk, {"trial run", "no divergence"});
+  expectLine(odd, FindingLevel::kOdd, {"/sensor_platform/imu", "duplicate stamps"});
+  expectLine(odd, FindingLevel::kOk, {"/sensor_platform/radar/scan", "duplicate stamps"});
+}
+
+// A driver that gives two scans one stamp: half of them are lost, and that is no matter of the recorder.
+TEST_F(CheckBag, TwoScansOfOneStampAreNoCopies) {
+  ros::Time last;
+  bool again = false;
+  Changes changes;
+  changes.cloud = [&](sensor_msgs::PointCloud2& cloud) {
+    if (again) cloud.header.stamp = last;
+    last = cloud.header.stamp;
+    again = !again;
+    return true;
+  };
+  const BagCheck odd = check(rewritten("one_stamp", changes));
+  for (const Finding& finding : odd.findings) {
+    if (finding.subject != "trial run") continue;
+    EXPECT_EQ(finding.text.find("100 %"), std::string::npos) << finding.text;
+  }
+}
+
+}  // namespace
+}  // namespace rio_t

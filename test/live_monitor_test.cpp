@@ -1,0 +1,268 @@
+// What the live node says in its diagnostics: of two radars, and of the solver.
+#include <diagnostic_msgs/DiagnosticStatus.h>
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <cstdio>
+#include <string>
+
+#include "rio_t/core/so3.h"
+#include "rio_t/graph/solver_termination.h"
+#include "rio_t/ros/live/monitor.h"
+#include "rio_t/ros/live/session.h"
+#include "two_radars_config.h"
+
+namespace rio_t {
+namespace {
+
+/// What `diagnostics` says of two radars.
+class TwoRadarDiagnostics : public testing::Test {
+ protected:
+  using Status = LiveMonitor::Status;
+
+  TwoRadarDiagnostics() {
+    monitor.startWith(kMountings);
+    // A session that is initialised: four seconds of rest.
+    for (int k = 0; k <= 1600; ++k)
+      session.addImu({Time::fromSeconds(0.0025 * k), Eigen::Vector3d::Zero(), {0.0, 0.0, 9.81}});
+    bool more = false;
+    session.process(&more);
+  }
+
+  static std::string value(const Status& status, const std::string& key) {
+    for (const auto& each : status.values)
+      if (each.key == key) return each.value;
+    return "no " + key;
+  }
+  /// A second in which the IMU and these numbers of scans come; so many of those of right are used.
+  Status second(int left, int right, int right_used) {
+    monitor.imu();
+    for (int k = 0; k < left; ++k) feed(0, true);
+    for (int k = 0; k < right; ++k) feed(1, k < right_used);
+    Status status;
+    monitor.describeInput(status, &session);
+    return status;
+  }
+  void feed(std::size_t radar, bool is_used) {
+    monitor.scan(radar);
+    if (radar == 1) monitor.trigger(1);
+    LiveSession::Result result;
+    result.result.scan.radar = radar;
+    result.result.scan.stamp = Time::fromSeconds(0.01 * ++fed);
+    result.result.used = is_used;
+    if (!is_used) result.result.rejected_because = "innovation";
+    monitor.result(result);
+  }
+  /// An update by a scan of a radar.
+  void update(std::size_t radar, double stamp, double offset, const Extrinsics& T_IR,
+              double turn_sigma = 0.02, double lever_sigma = 0.01) {
+    LiveSession::Result result;
+    result.result.scan.radar = radar;
+    result.result.scan.stamp = Time::fromSeconds(stamp);
+    result.result.used = result.result.updated = true;
+    result.result.time_offset = offset;
+    result.result.T_IR = T_IR;
+    result.result.T_IR_covariance.diagonal().head<3>().setConstant(lever_sigma * lever_sigma);
+    result.result.T_IR_covariance.diagonal().tail<3>().setConstant(turn_sigma * turn_sigma);
+    result.offset_observable = true;
+    monitor.result(result);
+  }
+  Status extrinsics(std::size_t radar) const {
+    Status status;
+    monitor.describeExtrinsics(status, radar);
+    return status;
+  }
+
+  const Config config = twoRadars();
+  LiveMonitor monitor{config};
+  LiveSession session{config, config.odometry};
+  int fed = 0;
+};
+
+using diagnostic_msgs::DiagnosticStatus;
+
+TEST_F(TwoRadarDiagnostics, CountForEachRadar) {
+  ASSERT_TRUE(session.odometry().initialized());
+  monitor.dropped(0, "scan_not_usable");
+  const Status status = second(20, 10, 9);
+  EXPECT_EQ(status.level, DiagnosticStatus::OK) << status.message;
+  EXPECT_EQ(value(status, "left/scans"), "20");
+  EXPECT_EQ(value(status, "right/scans"), "10");
+  EXPECT_EQ(value(status, "right/scans_used"), "9");
+  EXPECT_EQ(value(status, "left/dropped_scan_not_usable"), "1");
+  EXPECT_EQ(value(status, "right/dropped_innovation"), "1");
+  EXPECT_EQ(value(status, "left/triggers"), "no left/triggers") << "it needs none";
+}
+
+TEST_F(TwoRadarDiagnostics, NameTheRadarThatIsSilent) {
+  const Status never = second(20, 0, 0);
+  EXPECT_EQ(never.level, DiagnosticStatus::WARN) << "the other one works";
+  EXPECT_EQ(never.message, "radar right: no scan yet on /right");
+  second(20, 20, 20);
+  const Status silent = second(20, 0, 0);
+  EXPECT_EQ(silent.level, DiagnosticStatus::WARN);
+  EXPECT_EQ(silent.message, "radar right is silent, topic /right");
+  EXPECT_EQ(second(20, 20, 20).level, DiagnosticStatus::OK);
+}
+
+TEST_F(TwoRadarDiagnostics, IsAnErrorIfTheImuFallsSilent) {
+  second(20, 20, 20);
+  for (int k = 0; k < 10; ++k) feed(0, true);
+  Status status;
+  monitor.describeInput(status, &session);
+  EXPECT_EQ(status.level, DiagnosticStatus::ERROR);
+  EXPECT_EQ(status.message, "the IMU is silent, topic " + config.imu_topic);
+}
+
+TEST_F(TwoRadarDiagnostics, SayHowTheOdometryGoesOnAfterAReset) {
+  Status before;
+  monitor.describeOdometry(before, &session);
+  EXPECT_EQ(value(before, "after_reset"), "no after_reset");
+  monitor.reset("~reset called");
+  Status after;
+  monitor.describeOdometry(after, &session);
+  EXPECT_EQ(value(after, "after_reset"), "goes on from the last pose (reset_pose: keep)");
+}
+
+TEST_F(TwoRadarDiagnostics, IsAnErrorWhereNoRadarHasComeYet) {
+  const Status status = second(0, 0, 0);
+  EXPECT_EQ(status.level, DiagnosticStatus::ERROR);
+  EXPECT_EQ(status.message, "radar left: no scan yet on /left; radar right: no scan yet on /right");
+}
+
+TEST_F(TwoRadarDiagnostics, NameTheRadarThatIsMostlyRejected) {
+  for (int k = 0; k < 5; ++k) EXPECT_EQ(second(20, 20, 10).level, DiagnosticStatus::OK) << "half are enough";
+  Status status;
+  monitor.dropped(1, "points_not_finite", 1000);  // these are no scans
+  for (int k = 0; k < 4; ++k) status = second(20, 20, 5);
+  EXPECT_EQ(status.level, DiagnosticStatus::WARN);
+  EXPECT_EQ(status.message, "radar right: 20 of the last 80 scans were used, rejected mostly as innovation");
+  for (int k = 0; k < 4; ++k) status = second(20, 20, 20);
+  EXPECT_EQ(status.level, DiagnosticStatus::OK);
+}
+
+TEST_F(TwoRadarDiagnostics, DoNotJudgeScansThatCameBeforeTheStart) {
+  for (int k = 0; k < 20; ++k) {
+    monitor.imu();
+    for (int i = 0; i < 10; ++i) {
+      for (const std::size_t radar : {0U, 1U}) {
+        monitor.scan(radar);
+        monitor.trigger(radar);
+        LiveSession::Result result;
+        result.result.scan.radar = radar;
+        result.result.rejected_because = "before_initialization";
+        monitor.result(result);
+      }
+    }
+    Status status;
+    monitor.describeInput(status, &session);
+    EXPECT_EQ(status.level, DiagnosticStatus::OK) << status.message;
+  }
+}
+
+TEST_F(TwoRadarDiagnostics, HaveATimeOffsetForEachRadar) {
+  update(0, 9.0, 0.03, kMountings[0]);
+  update(1, 9.5, -0.01, kMountings[1]);
+  Status left, right;
+  monitor.describeTimeOffset(left, 0);
+  monitor.describeTimeOffset(right, 1);
+  EXPECT_EQ(value(left, "offset_ms"), "30");
+  EXPECT_EQ(value(right, "offset_ms"), "-10");
+  EXPECT_EQ(left.message, "observed by the motion now");
+  update(1, 12.0, -0.01, kMountings[1]);
+  Status silent;
+  monitor.describeTimeOffset(silent, 0);
+  EXPECT_EQ(silent.message, "kept: no scan of radar left is used now");
+  EXPECT_EQ(value(silent, "observable"), "false");
+  monitor.reset("~reset called");
+  Status fresh;
+  monitor.describeTimeOffset(fresh, 0);
+  EXPECT_EQ(fresh.message, "not estimated yet");
+}
+
+TEST_F(TwoRadarDiagnostics, TellTheMountingAgainstWhatWasTold) {
+  EXPECT_EQ(extrinsics(1).message, "not estimated yet");
+  const Extrinsics turned{kMountings[1].l_I + Eigen::Vector3d(0.0, 0.02, 0.0),
+                          so3::exp({0.0, 0.05, 0.0}) * kMountings[1].q_IR};
+  update(1, 9.0, 0.0, turned);
+  const Status status = extrinsics(1);
+  EXPECT_EQ(status.level, DiagnosticStatus::OK);
+  EXPECT_EQ(status.message, "observed by the motion");
+  double x = 1.0, y = 0.0, z = 1.0;
+  ASSERT_EQ(std::sscanf(value(status, "turn_from_told_deg").c_str(), "[%lf, %lf, %lf]", &x, &y, &z), 3);
+  EXPECT_NEAR(x, 0.0, 1e-5);
+  EXPECT_NEAR(y, 2.864789, 1e-4);
+  EXPECT_NEAR(z, 0.0, 1e-5);
+  ASSERT_EQ(std::sscanf(value(status, "lever_arm_from_told_m").c_str(), "[%lf, %lf, %lf]", &x, &y, &z), 3);
+  EXPECT_NEAR(y, 0.02, 1e-6);
+  ASSERT_EQ(std::sscanf(value(status, "turn_sigma_deg").c_str(), "[%lf, %lf, %lf]", &x, &y, &z), 3);
+  EXPECT_NEAR(z, 1.145916, 1e-4);
+  EXPECT_EQ(value(status, "lever_arm_sigma_m"), "[0.01, 0.01, 0.01]");
+}
+
+TEST_F(TwoRadarDiagnostics, SayWhichPartOfTheMountingTheMotionHasNotShown) {
+  update(0, 9.0, 0.0, kMountings[0], 0.06, 0.01);
+  EXPECT_EQ(extrinsics(0).message, "kept: the motion has not shown the turn about x, y, z");
+  update(0, 9.1, 0.0, kMountings[0], 0.04, 0.03);
+  EXPECT_EQ(extrinsics(0).message, "kept: the motion has not shown the lever arm along x, y, z");
+}
+
+TEST_F(TwoRadarDiagnostics, WarnOfAMountingFarFromWhatWasTold) {
+  update(0, 9.0, 0.0, {kMountings[0].l_I, so3::exp({0.31, 0.0, 0.0}) * kMountings[0].q_IR});
+  EXPECT_EQ(extrinsics(0).level, DiagnosticStatus::WARN);
+  EXPECT_EQ(extrinsics(0).message,
+            "radar left is turned about x by more than 3 extrinsics_rotation_sigma from what was told");
+}
+
+/// What `diagnostics` says of the solver.
+class SolverDiagnostics : public testing::Test {
+ protected:
+  void windows(SolverTermination termination, int count) {
+    LiveSession::Result result;
+    result.result.updated = true;
+    result.result.solver_termination = termination;
+    for (int k = 0; k < count; ++k) monitor.result(result);
+  }
+  LiveMonitor::Status status() const {
+    LiveMonitor::Status status;
+    monitor.describeSolver(status);
+    return status;
+  }
+  void expectWarning(const std::string& part) const {
+    const LiveMonitor::Status now = status();
+    EXPECT_EQ(now.level, diagnostic_msgs::DiagnosticStatus::WARN) << now.message;
+    EXPECT_NE(now.message.find(part), std::string::npos) << now.message;
+  }
+
+  LiveMonitor monitor{Config()};
+};
+
+TEST_F(SolverDiagnostics, WarnWhileMostWindowsEndAtTheBound) {
+  EXPECT_EQ(status().level, diagnostic_msgs::DiagnosticStatus::OK);
+  windows(SolverTermination::kAtBound, 19);
+  EXPECT_EQ(status().level, diagnostic_msgs::DiagnosticStatus::OK) << "too few to judge";
+  windows(SolverTermination::kAtBound, 1);
+  expectWarning("20 of the last 20 windows ended at the bound of the offset: max_time_offset");
+  windows(SolverTermination::kConverged, 9);
+  expectWarning("11 of the last 20 windows");
+  windows(SolverTermination::kConverged, 1);
+  EXPECT_EQ(status().level, diagnostic_msgs::DiagnosticStatus::OK);
+  std::string at_bound;
+  for (const auto& value : status().values)
+    if (value.key == "at_bound") at_bound = value.value;
+  EXPECT_EQ(at_bound, "20");
+}
+
+TEST_F(SolverDiagnostics, WarnOfWhatIsMostFrequent) {
+  windows(SolverTermination::kIterationLimit, 5);
+  windows(SolverTermination::kNoDecrease, 7);
+  windows(SolverTermination::kConverged, 8);
+  expectWarning("7 of the last 20 windows ended without a step that lowers the cost");
+  windows(SolverTermination::kIterationLimit, 12);
+  expectWarning("12 of the last 20 windows ended at max_iterations");
+  monitor.reset("~reset called");
+  EXPECT_EQ(status().level, diagnostic_msgs::DiagnosticStatus::OK);
+}
+
+}  // namespace
+}  // namespace rio_t

@@ -1,0 +1,166 @@
+// The session of the live node: its scans and stamps, and who may speak for it.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <future>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "rio_t/radar/scan.h"
+#include "rio_t/ros/live/current_session.h"
+#include "rio_t/ros/live/session.h"
+#include "two_radars_config.h"
+
+namespace rio_t {
+namespace {
+
+CurrentSession::Session freshSession() { return std::make_shared<LiveSession>(Config(), Config().odometry); }
+
+TEST(CurrentSession, NothingIsSaidForASessionThatWasReplaced) {
+  CurrentSession current;
+  const auto old = freshSession();
+  EXPECT_FALSE(current.replace(old));
+  int said = 0;
+  const auto speak = [&](const CurrentSession::Session& session) {
+    return current.speak(CurrentSession::Speaker::kOptimisation, session, [&] { ++said; });
+  };
+  EXPECT_TRUE(speak(old));
+  EXPECT_EQ(current.replace(freshSession()), old);
+  EXPECT_FALSE(speak(old));
+  EXPECT_TRUE(speak(current.get()));
+  EXPECT_EQ(said, 2);
+}
+
+TEST(CurrentSession, ReplacingWaitsForWhoIsSpeaking) {
+  for (const auto speaker : {CurrentSession::Speaker::kNavigation, CurrentSession::Speaker::kOptimisation}) {
+    CurrentSession current;
+    const auto old = freshSession();
+    current.replace(old);
+    std::future<CurrentSession::Session> replaced;
+    current.speak(speaker, old, [&] {
+      replaced = std::async(std::launch::async, [&] { return current.replace(freshSession()); });
+      // A replacement that does not wait is there within microseconds.
+      EXPECT_EQ(replaced.wait_for(std::chrono::milliseconds(200)), std::future_status::timeout);
+      EXPECT_EQ(current.get(), old);
+    });
+    EXPECT_EQ(replaced.get(), old) << "it must come once nobody speaks";
+  }
+}
+
+TEST(CurrentSession, SpeakersDoNotWaitForEachOther) {
+  CurrentSession current;
+  const auto session = freshSession();
+  current.replace(session);
+  bool both = false;
+  current.speak(CurrentSession::Speaker::kOptimisation, session, [&] {
+    std::thread([&] { both = current.speak(CurrentSession::Speaker::kNavigation, session, [] {}); }).join();
+  });
+  EXPECT_TRUE(both);
+}
+
+RadarScan scanOf(std::size_t radar) {
+  RadarScan scan;
+  scan.radar = radar;
+  return scan;
+}
+
+TEST(LiveSession, TellsWhenTheImuPilesUpBeforeAStuckOptimisation) {
+  const auto session = freshSession();
+  int k = 0;
+  const auto feed = [&](std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i)
+      session->addImu({Time::fromSeconds(0.0025 * ++k), Eigen::Vector3d::Zero(), {0.0, 0.0, 9.81}});
+  };
+  feed(LiveSession::kMaxWaitingImu - 1);
+  EXPECT_FALSE(session->imuPilesUp());
+  feed(1);
+  EXPECT_TRUE(session->imuPilesUp());
+  bool more = false;
+  session->process(&more);
+  EXPECT_FALSE(session->imuPilesUp());
+  feed(LiveSession::kMaxWaitingImu - 1);
+  EXPECT_FALSE(session->imuPilesUp());
+}
+
+TEST(LiveSession, StampsTheScansOfEachRadarInItsOwnWay) {
+  const Config config = twoRadars();
+  LiveSession session(config, config.odometry);
+  const Time stamp = Time::fromSeconds(10.0), record = Time::fromSeconds(10.05);
+  EXPECT_EQ(session.addScan(7, stamp, record, scanOf(0)).queued, 1U);
+  EXPECT_EQ(session.addScan(7, stamp, record, scanOf(1)).queued, 0U) << "it has no trigger yet";
+  EXPECT_EQ(session.addTrigger(0, 7, stamp, record).queued, 0U) << "not its trigger";
+  EXPECT_EQ(session.addTrigger(1, 7, stamp, record).queued, 1U);
+}
+
+TEST(LiveSession, NamesTheRadarWhoseScanGetsNoStamp) {
+  const Config config = twoRadars();
+  LiveSession session(config, config.odometry);
+  const auto at = [](double seconds) { return Time::fromSeconds(seconds); };
+  session.addScan(1, at(10.0), at(10.0), scanOf(1));
+  const LiveSession::Stamped left = session.addScan(1, at(10.0), at(10.0), scanOf(0));
+  EXPECT_EQ(left.queued, 1U);
+  EXPECT_TRUE(left.given_up.empty());
+  const LiveSession::Stamped late = session.addScan(2, at(20.0), at(20.0), scanOf(1));
+  ASSERT_EQ(late.given_up.size(), 1U);
+  EXPECT_EQ(late.given_up[0].radar, 1U);
+  EXPECT_EQ(late.given_up[0].reason, "trigger_missing");
+}
+
+TEST(LiveSession, TakesOneScanAtATimeAndDropsTheOldestOfTooMany) {
+  Config config = twoRadars();
+  config.odometry.max_queued_scans = 1;
+  LiveSession session(config, config.odometry);
+  for (int k = 0; k < 4; ++k) {
+    const Time stamp = Time::fromSeconds(10.0 + k);
+    session.addScan(static_cast<std::uint32_t>(k), stamp, stamp, scanOf(0));
+  }
+  bool more = false;
+  const std::vector<LiveSession::Result> results = session.process(&more);
+  // One is used, so that a reset waits for one solution alone; one may wait; the two between them go.
+  ASSERT_EQ(results.size(), 3U);
+  EXPECT_TRUE(more);
+  EXPECT_EQ(results[0].result.rejected_because, "before_initialization");
+  for (const std::size_t k : {1U, 2U}) {
+    EXPECT_EQ(results[k].result.rejected_because, "queue_full");
+    EXPECT_EQ(results[k].result.scan.stamp, Time::fromSeconds(10.0 + static_cast<double>(k)));
+  }
+  EXPECT_EQ(session.process(&more).size(), 1U);
+  EXPECT_TRUE(session.process(&more).empty());
+  EXPECT_FALSE(more);
+}
+
+TEST(LiveSession, KnowsNoTimeOfMeasurementBeforeThereIsAnOffset) {
+  const Config config = twoRadars();
+  LiveSession session(config, config.odometry);
+  const Time stamp = Time::fromSeconds(10.0);
+  session.addScan(1, stamp, stamp, scanOf(0));
+  bool more = false;
+  EXPECT_EQ(session.process(&more).at(0).measured_at, stamp);
+}
+
+TEST(LiveSession, ResultsHaveTheMountingOfTheirRadarAsTold) {
+  const Config config = twoRadars();
+  LiveSession session(config, config.odometry);
+  for (const std::size_t radar : {1U, 0U}) {
+    RadarScan scan = scanOf(radar);
+    const Time stamp = Time::fromSeconds(10.0);  // both have the same
+    if (radar == 0) {
+      session.addScan(1, stamp, stamp, scan);
+    } else {
+      session.addTrigger(1, 1, stamp, stamp);
+      session.addScan(1, stamp, stamp, scan);
+    }
+    bool more = false;
+    const std::vector<LiveSession::Result> results = session.process(&more);
+    ASSERT_EQ(results.size(), 1U);
+    EXPECT_EQ(results[0].result.scan.radar, radar);
+    EXPECT_EQ(results[0].T_IR.l_I, kMountings[radar].l_I);
+    EXPECT_GT(results[0].latency, 0.0);
+  }
+}
+
+}  // namespace
+}  // namespace rio_t
