@@ -88,9 +88,9 @@ TEST_F(Batch, EqualsTheFixedLagSmootherThatKeepsEverything) {
         scan.velocity = measurement(stamp, 0.02, 0.03);
         scan.stamp = scan.velocity->stamp;
         if (stamp < 1.0) scan.rest_velocity_sigma = 3.0;
-        // Where the window puts its node: elsewhere is the same scan, but another split of the IMU's noise.
+        // The time of the window's node: another time splits the IMU's noise in another way.
         scan.t_O = model == TimeOffsetModel::kImu ? scan.stamp - online.radar.nodeTime(scan.stamp) : 0.02;
-        // To first order around there, as the batch takes it.
+        // The batch takes the measurement to first order around there.
         if (model == TimeOffsetModel::kImu) scan.velocity->linear_from_t_O = scan.t_O;
         whole.scans.push_back(scan);
         online.add(*scan.velocity);

@@ -69,7 +69,7 @@ class Calibrate : public RestBag {
     writeSimulationBag(path, motion, simulation::simulate(motion, rig), rig.start, {});
   }
 
-  /// With the mounting told wrong.
+  /// The bag with the mounting told wrong.
   Outcome calibrateBags(const std::vector<std::string>& bags,
                         const std::vector<std::string>& more = {}) const {
     std::vector<std::string> words = {"--config", "irs",

@@ -92,7 +92,7 @@ TEST_F(Gate, AShortGlitchOfTheStampsIsAGap) {
   EXPECT_GT(sample.gyro_doubt, 0.0);
 }
 
-// Taken for the end of a gap, it would put all samples that follow behind it, until the clock seems to jump.
+// A sample ahead that ended a gap would put all samples that follow behind it, until the clock seems to jump.
 TEST_F(Gate, OneStampAheadIsNoGap) {
   for (const double ahead : {0.6, 1.0, 2.5}) {
     EXPECT_EQ(feed(t + ahead), "imu_stamp_jump") << ahead;
@@ -108,7 +108,7 @@ TEST_F(Gate, TheSecondSampleConfirmsALongGap) {
   EXPECT_EQ(feed(2.02), "");
 }
 
-// Whatever of the two is longer.
+// The patience may be shorter or longer than the longest bridged gap.
 TEST_F(Gate, NoGapIsBridgedThatIsLongerThanTheLongest) {
   for (const double patience : {0.1, 5.0}) {
     ImuInputCheckOptions options;

@@ -84,7 +84,7 @@ struct Rig {
     const Eigen::Vector3d up = found.prior.x0.q_WI().conjugate() * Eigen::Vector3d::UnitZ();
     return std::atan2(up.cross(up_true).norm(), up.dot(up_true));
   }
-  /// Of the velocity in I [m/s].
+  /// Error of the velocity in I [m/s].
   double velocityError(const MotionInitialization& found) const {
     const simulation::MotionState truth = motion.at(found.time - setup.start);
     const StateBlock& x = found.prior.x0;

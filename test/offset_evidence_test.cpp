@@ -63,7 +63,7 @@ TEST(OffsetEvidence, NoiseAloneClaimsLittleEvenInAnHour) {
     Scans scans(0.0, noise);
     scans.feed(evidence, 3600.0);
     EXPECT_LT(scans.meanGain(), 0.02) << noise << " m/s^2";
-    // Of what the derivatives would claim as they are.
+    // The share of what the derivatives would claim as they are.
     EXPECT_LT(scans.claimed, 1e-3 * scans.raw) << noise << " m/s^2";
     EXPECT_GT(1.0 / std::sqrt(scans.claimed), 0.015) << noise << " m/s^2";
   }

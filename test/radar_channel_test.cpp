@@ -28,7 +28,7 @@ struct OneRadar {
     channel.start(smoother, motion.time(t),
                   priorAtRest(options.smoother, ImuNoise(), motion.state(t), 9.81, 3.0, skewMounting()));
   }
-  /// Of a still world, without noise.
+  /// A scan of a still world, without noise.
   RadarScan scan(double stamp, int points) const {
     RadarScan scan;
     scan.stamp = motion.time(stamp);

@@ -128,7 +128,7 @@ class SetupTest(tester.LiveTestCase):
             with tester.Listener() as listener, tester.Process(
                     nodelet, "load", "rio_t/RioTNodelet", "manager", "__name:=rio_t", "_config:=irs", *heavy) as loader:
                 listener.wait_until_heard()
-                with tester.play(self.bag, (tester.IMU, tester.RADAR), 50.0):
+                with tester.play(self.bag, (tester.IMU, tester.RADAR), 10.0):
                     listener.wait_for("optimised odometry", lambda: len(listener.messages["odom_optimized"]) > 10)
                     loader.stop()
                     self.assertIsNone(manager.process.poll(), "the manager died")

@@ -87,12 +87,12 @@ struct SimulatedRun {
   simulation::MotionState truth(const NavigationState& state) const {
     return motion.at(std::clamp(seconds(state.time), 0.0, motion.duration()));
   }
-  /// Of the velocity in I [m/s]: free of the heading, which nobody observes.
+  /// Error of the velocity in I [m/s]. The heading, which nobody observes, has no part in it.
   double velocityError(const NavigationState& state) const {
     const simulation::MotionState true_state = truth(state);
     return (true_state.q_WI.conjugate() * true_state.v_W - state.q_WI.conjugate() * state.v_W).norm();
   }
-  /// Of roll and pitch together [rad].
+  /// Error of roll and pitch together [rad].
   double tiltError(const NavigationState& state) const {
     const Eigen::Vector3d a = truth(state).q_WI.conjugate() * Eigen::Vector3d::UnitZ();
     const Eigen::Vector3d b = state.q_WI.conjugate() * Eigen::Vector3d::UnitZ();

@@ -124,8 +124,7 @@ TEST_F(Smoother, ALateScanIsInsertedAtItsTime) {
   EXPECT_EQ(late.add(measurement(0.9, 0.0)), RadarInWindow::AddResult::kDuplicateStamp);
 }
 
-/// As of two radars that run at the same time. An IMU factor over almost no time costs the position its
-/// digits.
+/// Two radars may run at the same time. An IMU factor over almost no time costs the position its digits.
 TEST_F(Smoother, ScansAtTheSameTimeShareANode) {
   for (const TimeOffsetModel model : {TimeOffsetModel::kImu, TimeOffsetModel::kConstantAcceleration}) {
     SmootherOptions options;

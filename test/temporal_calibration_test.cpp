@@ -26,7 +26,7 @@ OffsetAt offsetAt(const SimulatedRun& run, const ScanResult& result) {
   return {result.time_offset - truth, result.time_offset_sigma, result.time_offset};
 }
 
-/// Of the last scan before `time` [s].
+/// The answer of the last scan before `time` [s].
 OffsetAt offsetAt(const SimulatedRun& run, double time) {
   OffsetAt offset;
   for (const ScanResult& result : run.results) {
@@ -35,12 +35,12 @@ OffsetAt offsetAt(const SimulatedRun& run, double time) {
   return offset;
 }
 
-/// Of the scans from `from` on.
 struct Consistency {
   double largest_error = 0.0;          ///< [s]
   double mean_square_in_sigmas = 0.0;  ///< of (error / sigma)
   double share_within_interval = 0.0;  ///< of scans whose 95 % interval holds the truth
 };
+/// It counts the scans from `from` on.
 Consistency consistency(const SimulatedRun& run, double from) {
   Consistency c;
   int count = 0;

@@ -33,11 +33,11 @@ struct Preintegration {
   Eigen::Vector3d b_g = Eigen::Vector3d::Zero();  ///< [rad/s] linearisation point
   Eigen::Vector3d b_a = Eigen::Vector3d::Zero();  ///< [m/s^2] linearisation point
   ImuDelta delta;
-  /// Of the errors of dR (right perturbation), dp, dv, in this order; Forster eq. (59)-(63).
+  /// The errors are those of dR (right perturbation), dp, dv, in this order; Forster eq. (59)-(63).
   Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
 };
 
-/// From `from` to `to` (later), both covered by `buffer`.
+/// Integrates the IMU from `from` to `to` (later). `buffer` must cover both.
 Preintegration preintegrate(const ImuBuffer& buffer, Time from, Time to, const Eigen::Vector3d& b_g,
                             const Eigen::Vector3d& b_a, const ImuNoise& noise);
 

@@ -48,8 +48,8 @@ struct RadarAnswer {
   /// For health: the innovation of the velocity that the scan shows without the prediction. None if its
   /// points do not decide.
   std::optional<Innovation> judged;
-  /// That velocity, with the sigmas as told, if most points agree on it and are not outvoted by witnesses of
-  /// the prediction. A re-initialisation may use it. None if it shares points with the last one.
+  /// The same velocity for a re-initialisation, with its sigmas before any scale. None if the points that
+  /// agree are no majority, are outvoted by witnesses of the prediction, or are partly those of the last one.
   std::optional<EgoVelocity> alone;
   /// For the scale of the model errors: the innovation of a used velocity in motion that most points agree
   /// on, if the prediction is linear.
@@ -98,7 +98,7 @@ class RadarChannel {
   Block& extrinsicsBlock() const { return in_window_.extrinsicsBlock(); }  ///< for terms on it
   /// [s] given the marginal variance [s^2]; 0 if the offset is not estimated.
   double offsetSigma(double variance) const;
-  /// Of the blocks that calibration() gives.
+  /// One for each block of calibration().
   std::vector<FixedLagSmoother::RandomWalk> randomWalks() const;
   const PointVariances& noise() const { return estimator_.noise(); }  ///< of the points, as learned so far
   DopplerStep dopplerStep() const { return estimator_.dopplerStep(); }

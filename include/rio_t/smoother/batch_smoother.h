@@ -47,7 +47,7 @@ struct BatchProblem {
 };
 
 struct BatchSolution {
-  /// Of one scan of the problem.
+  /// Result for one scan of the problem.
   struct Scan {
     std::size_t node = 0;
     double t_O = 0.0;  ///< [s]

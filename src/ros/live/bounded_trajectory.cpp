@@ -17,7 +17,8 @@ void BoundedTrajectory::add(const StampedPose& pose) {
     // The first pose stays; after it every second.
     std::size_t count = 0;
     for (std::size_t k = 0; k < kept_.size(); k += 2) kept_[count++] = kept_[k];
-    // Of an even capacity the newest went too, so this pose comes at the new stride; of an odd one too early.
+    // If the capacity is even, the newest went too, and this pose comes at the new stride. If it is odd, this
+    // pose comes too early.
     const bool newest_stayed = kept_.size() % 2 == 1;
     kept_.resize(count);
     since_kept_ = newest_stayed ? stride_ : 0;
