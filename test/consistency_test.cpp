@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "rio_t/core/so3.h"
@@ -77,6 +78,38 @@ void expectConsistent(const std::string& motion, double vibration) {
   // A run is about one sample of it: six of them scatter by 0.6.
   EXPECT_GT(mean.time_offset, 0.2);
   EXPECT_LT(mean.time_offset, 2.8);
+}
+
+double heading(const Eigen::Quaterniond& q_WI) {
+  const Eigen::Vector3d forward = q_WI * Eigen::Vector3d::UnitX();
+  return std::atan2(forward.y(), forward.x());
+}
+
+/// A start in motion knows the gyro bias to 0.01 rad/s, so the heading drifts, and nothing says where it is.
+/// A linear prior must not make up such knowledge as the heading turns.
+TEST(Consistency, HeadingOfAVehicleThatStartsInMotion) {
+  double mean = 0.0;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    SimulatedRun run("ground_vehicle", seed, 60.0, 0.0);
+    run.options.init_mode = InitMode::kMotion;
+    run.run();
+    std::optional<double> drift_at_start;
+    double sum = 0.0, count = 0.0;
+    for (const ScanResult& result : run.results) {
+      if (!result.updated) continue;
+      const NavigationState& x = result.state;
+      const double drift = heading(x.q_WI) - heading(run.truth(x).q_WI);
+      if (!drift_at_start) drift_at_start = drift;
+      const double error = std::remainder(drift - *drift_at_start, 2.0 * M_PI);
+      const Eigen::Vector3d z_I = x.q_WI.conjugate() * Eigen::Vector3d::UnitZ();
+      sum += error * error / z_I.dot(x.covariance.topLeftCorner<3, 3>() * z_I);
+      count += 1.0;
+    }
+    ASSERT_GT(count, 400.0);
+    mean += sum / count / kSeeds;
+  }
+  std::printf("start in motion: heading %.2f\n", mean);
+  EXPECT_LT(mean, 2.0);
 }
 
 TEST(Consistency, Medium) { expectConsistent("medium", 0.0); }

@@ -12,6 +12,7 @@
 #include "rio_t/factors/imu_factor.h"
 #include "rio_t/factors/offset_derivative.h"
 #include "rio_t/factors/radar_velocity_factor.h"
+#include "rio_t/factors/state_manifold.h"
 #include "rio_t/factors/zero_velocity_factor.h"
 #include "rio_t/graph/marginalization.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
@@ -29,6 +30,50 @@ TEST(StateBlock, BoxminusInvertsBoxplus) {
   StateBlock y;
   boxplus(x.data(), delta.data(), y.data());
   EXPECT_LT((boxminus(y.data(), x.data()) - delta).norm(), 1e-12);
+}
+
+TEST(StateBlock, BoxplusIsASumToFirstOrder) {
+  const StateBlock x = SyntheticMotion().state(1.0);
+  for (int i = 0; i < StateBlock::kTangent; ++i) {
+    const StateTangent delta = 1e-6 * StateTangent::Unit(i);
+    StateBlock y;
+    boxplus(x.data(), delta.data(), y.data());
+    EXPECT_LT((y.v_W() - x.v_W() - delta.segment<3>(StateBlock::kV)).norm(), 1e-11);
+    EXPECT_LT((y.p_W() - x.p_W() - delta.segment<3>(StateBlock::kP)).norm(), 1e-11);
+  }
+}
+
+// A linear prior must not take another heading for another speed.
+TEST(StateBlock, ATurnAboutGravityIsLinearInTheTangent) {
+  const StateBlock x = SyntheticMotion().state(1.0);
+  ASSERT_GT(x.v_W().norm(), 0.5);
+  const auto turned = [&](double yaw) {
+    StateBlock y = x;
+    const Eigen::Quaterniond turn = so3::exp(yaw * Eigen::Vector3d::UnitZ());
+    y.q_WI() = turn * x.q_WI();
+    y.v_W() = turn * x.v_W();
+    return boxminus(y.data(), x.data());
+  };
+  EXPECT_GT(turned(1.0).norm(), 1.0);
+  EXPECT_LT((turned(1.0) - 1e3 * turned(1e-3)).norm(), 1e-9);
+}
+
+TEST(StateManifold, MinusJacobianIsCorrect) {
+  const StateBlock x = SyntheticMotion().state(1.0);
+  const StateBlock y = moved(SyntheticMotion().state(1.4), 0.3);
+  const StateManifold manifold;
+  Eigen::MatrixXd numeric(StateBlock::kTangent, StateBlock::kTangent);
+  constexpr double h = 1e-6;
+  for (int i = 0; i < StateBlock::kTangent; ++i) {
+    StateBlock ends[2];
+    for (const int side : {0, 1}) {
+      const StateTangent step = (side == 0 ? -h : h) * StateTangent::Unit(i);
+      boxplus(y.data(), step.data(), ends[side].data());
+    }
+    numeric.col(i) =
+        (manifold.minus(ends[1].data(), x.data()) - manifold.minus(ends[0].data(), x.data())) / (2.0 * h);
+  }
+  EXPECT_LT((manifold.minusJacobian(y.data(), x.data()) - numeric).cwiseAbs().maxCoeff(), 1e-8);
 }
 
 TEST(ExtrinsicsManifold, MinusInvertsPlusAndItsJacobianIsCorrect) {
@@ -94,22 +139,22 @@ TEST(ImuFactor, TransitionSaysTheSameAsTheFactor) {
   const ImuTransition step = transition(x_i, pre, noise);
 
   // A against central differences of the prediction, on the manifold.
+  const StateBlock x_j = predict(x_i, pre, motion.g_W);
   Eigen::Matrix<double, StateBlock::kTangent, StateBlock::kTangent> numeric;
   for (int i = 0; i < StateBlock::kTangent; ++i) {
-    StateBlock end[2];
+    StateTangent end[2];
     for (const double h : {-1e-5, 1e-5}) {
       StateTangent delta = StateTangent::Zero();
       delta(i) = h;
       StateBlock x;
       boxplus(x_i.data(), delta.data(), x.data());
-      end[h > 0] = predict(x, pre, motion.g_W);
+      end[h > 0] = boxminus(predict(x, pre, motion.g_W).data(), x_j.data());
     }
-    numeric.col(i) = boxminus(end[1].data(), end[0].data()) / 2e-5;
+    numeric.col(i) = (end[1] - end[0]) / 2e-5;
   }
   EXPECT_LT((step.A - numeric).cwiseAbs().maxCoeff(), 1e-7);
 
   // The factor: J_i d_i + J_j d_j ~ N(0, 1).
-  const StateBlock x_j = predict(x_i, pre, motion.g_W);
   const double* blocks[] = {x_i.data(), x_j.data()};
   StateJacobian<15> J_i, J_j;
   double* jacobians[] = {J_i.data(), J_j.data()};

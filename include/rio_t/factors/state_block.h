@@ -63,6 +63,10 @@ using StateTangent = Eigen::Matrix<double, StateBlock::kTangent, 1>;
 using StateCovariance = Eigen::Matrix<double, StateBlock::kTangent, StateBlock::kTangent>;
 
 /// x_plus_delta = x [+] delta; all of them in storage and tangent order. May alias.
+///
+/// The velocity turns with the heading. With psi, the turn about the vertical of W that is in theta, v_W
+/// becomes Exp(psi z_W) (v_W + dv - psi z_W x v_W): v_W + dv to first order. So a linear prior that does not
+/// know the heading stays as it is if the heading is estimated anew.
 void boxplus(const double* x, const double* delta, double* x_plus_delta);
 /// y [-] x: the tangent that takes x to y.
 StateTangent boxminus(const double* y, const double* x);
