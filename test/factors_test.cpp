@@ -43,19 +43,26 @@ TEST(StateBlock, BoxplusIsASumToFirstOrder) {
   }
 }
 
-// A linear prior must not take another heading for another speed.
-TEST(StateBlock, ATurnAboutGravityIsLinearInTheTangent) {
+// Nobody observes the heading, so a prior that is linear in the tangent must not see that it turns.
+TEST(StateBlock, ATurnOfTheWorldIsLinearInTheTangentWhateverTheState) {
   const StateBlock x = SyntheticMotion().state(1.0);
   ASSERT_GT(x.v_W().norm(), 0.5);
-  const auto turned = [&](double yaw) {
-    StateBlock y = x;
-    const Eigen::Quaterniond turn = so3::exp(yaw * Eigen::Vector3d::UnitZ());
-    y.q_WI() = turn * x.q_WI();
-    y.v_W() = turn * x.v_W();
-    return boxminus(y.data(), x.data());
+  const auto turned = [](StateBlock y, double psi) {
+    const Eigen::Quaterniond turn = so3::exp(psi * Eigen::Vector3d::UnitZ());
+    y.q_WI() = turn * y.q_WI();
+    y.v_W() = turn * y.v_W();
+    return y;
   };
-  EXPECT_GT(turned(1.0).norm(), 1.0);
-  EXPECT_LT((turned(1.0) - 1e3 * turned(1e-3)).norm(), 1e-9);
+  const StateTangent direction = 1e3 * boxminus(turned(x, 1e-3).data(), x.data());
+  EXPECT_NEAR(direction.norm(), std::hypot(1.0, x.v_W().head<2>().norm()), 1e-9);
+  for (const double size : {0.0, 0.3}) {
+    const StateBlock y = moved(x, size);
+    const StateTangent before = boxminus(y.data(), x.data());
+    for (const double psi : {-1.0, 0.1, 2.0}) {
+      const StateTangent after = boxminus(turned(y, psi).data(), x.data());
+      EXPECT_LT((after - before - psi * direction).norm(), 1e-9) << size << ", " << psi;
+    }
+  }
 }
 
 TEST(StateManifold, MinusJacobianIsCorrect) {

@@ -15,17 +15,20 @@ Eigen::VectorXd StateManifold::minus(const double* y, const double* x) const { r
 
 Eigen::MatrixXd StateManifold::minusJacobian(const double* y, const double* x) const {
   const StateView from(x), to(y);
-  const StateTangent delta = boxminus(y, x);
-  const Eigen::Matrix3d J_theta = so3::rightJacobianInverse(delta.head<3>());
-  const Eigen::Matrix3d R_WI = from.q_WI.toRotationMatrix();
-  const double psi = (R_WI * delta.head<3>()).z();
   const Eigen::Vector3d z_W = Eigen::Vector3d::UnitZ();
-  const Eigen::Matrix3d turn_back = so3::exp(-psi * z_W).toRotationMatrix();
+  const Eigen::Matrix3d R_WI = from.q_WI.toRotationMatrix();
+  Eigen::Vector3d tilt_W = R_WI * boxminus(y, x).head<3>();
+  const Eigen::Matrix3d turn = so3::exp(tilt_W.z() * z_W).toRotationMatrix();
+  tilt_W.z() = 0.0;
+  // R_WI(y) = Exp(turn) Exp(tilt) R_WI(x): how a change of tilt (x, y) and of turn (z) turns R_WI(y), in W.
+  Eigen::Matrix3d turned_W = turn * so3::rightJacobian(-tilt_W);
+  turned_W.col(2) = z_W;
+  const Eigen::Matrix3d J_theta_W = turned_W.inverse() * to.q_WI.toRotationMatrix();
   Eigen::MatrixXd J = Eigen::MatrixXd::Identity(StateBlock::kTangent, StateBlock::kTangent);
-  J.topLeftCorner<3, 3>() = J_theta;
-  J.block<3, 3>(StateBlock::kV, StateBlock::kV) = turn_back;
+  J.topLeftCorner<3, 3>() = R_WI.transpose() * J_theta_W;
+  J.block<3, 3>(StateBlock::kV, StateBlock::kV) = turn.transpose();
   J.block<3, 3>(StateBlock::kV, StateBlock::kTheta) =
-      z_W.cross(from.v_W - turn_back * to.v_W) * (R_WI * J_theta).row(2);
+      z_W.cross(from.v_W - turn.transpose() * to.v_W) * J_theta_W.row(2);
   return J;
 }
 

@@ -8,7 +8,7 @@ namespace rio_t {
 /// State of the platform at one time, as one block of parameters for the solver.
 ///
 /// Storage (16): q_WI (x y z w), p_W, v_W, b_g, b_a. Tangent (15), see `boxplus`: theta, p, v, b_g, b_a,
-/// where theta perturbs on the right: R_WI <- R_WI Exp(theta). The time offset t_O is a block of its own.
+/// where theta perturbs on the right to first order: R_WI <- R_WI Exp(theta). The time offset t_O is a block of its own.
 class StateBlock {
  public:
   static constexpr int kSize = 16;
@@ -64,9 +64,11 @@ using StateCovariance = Eigen::Matrix<double, StateBlock::kTangent, StateBlock::
 
 /// x_plus_delta = x [+] delta; all of them in storage and tangent order. May alias.
 ///
-/// The velocity turns with the heading. With psi, the turn about the vertical of W that is in theta, v_W
-/// becomes Exp(psi z_W) (v_W + dv - psi z_W x v_W): v_W + dv to first order. So a linear prior that does not
-/// know the heading stays as it is if the heading is estimated anew.
+/// theta is split in W into a turn about the vertical, psi z_W, and a tilt about a horizontal axis, beta:
+///   R_WI <- Exp(psi z_W) Exp(beta) R_WI
+///   v_W  <- Exp(psi z_W) (v_W + dv - psi z_W x v_W)
+/// To first order this is R_WI Exp(theta) and v_W + dv. Whatever the state, a turn of the world about the
+/// vertical adds to psi and psi z_W x v_W and changes nothing else (docs/method.md, eq. 5).
 void boxplus(const double* x, const double* delta, double* x_plus_delta);
 /// y [-] x: the tangent that takes x to y.
 StateTangent boxminus(const double* y, const double* x);
