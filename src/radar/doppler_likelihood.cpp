@@ -19,7 +19,7 @@ constexpr double kMinVariance = 1e-6;
 constexpr double kNoResidual = 1e-4;
 /// A pivot below this share of the trace is rounding.
 constexpr double kNoInformation = 1e-12;
-constexpr double kSpreads = 4.0;  // [variances] of the noise of the directions
+constexpr double kConfidence = 1.28;  // [sigma] a normal variable is below it nine times in ten
 
 double density(double z) { return std::exp(-0.5 * z * z) * (0.5 * M_SQRT1_2 * M_2_SQRTPI); }
 
@@ -57,8 +57,10 @@ Residual coarseResidual(double e, double s, double h, double outlier) {
   return {std::copysign(value, e), (density(below) - density(above)) / (s * (bin + floor) * value)};
 }
 
-/// Projection on the directions over which the points spread by more than twice their noise.
+/// Projection on the directions over which the points surely spread by more than their noise. A variance of n
+/// samples has a relative standard deviation of sqrt(2 / n).
 Eigen::Matrix3d spreadOver(const std::vector<RadarDirection>& points, double variance) {
+  const double least = 1.0 - kConfidence * std::sqrt(2.0 / static_cast<double>(points.size()));
   Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
   for (const RadarDirection& p : points)
     mean += p.u_R * p.u_R.transpose() / static_cast<double>(points.size());
@@ -67,7 +69,7 @@ Eigen::Matrix3d spreadOver(const std::vector<RadarDirection>& points, double var
   Eigen::Matrix3d projection = Eigen::Matrix3d::Zero();
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3d axis = eigen.eigenvectors().col(i);
-    if (eigen.eigenvalues()[i] > kSpreads * variance) projection += axis * axis.transpose();
+    if (least * eigen.eigenvalues()[i] > variance) projection += axis * axis.transpose();
   }
   return projection;
 }
