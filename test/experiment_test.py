@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from rio_t import nees, programs
-from rio_t.experiments import consistency, options, runner
+from rio_t.experiments import consistency, options, platforms, runner
 from rio_t.experiments.laboratory import Run, Source
 
 MODELS = {"imu", "constant_acceleration"}
@@ -140,6 +140,35 @@ def test_consistency_means_its_runs(succeed, tmp_path):
     assert done.stdout.splitlines()[-1] == last
     for fact in (last, "simulated with --points 30", "consistency.png"):
         assert fact in page
+
+
+def test_platforms_are_drawn_again_the_same(succeed, tmp_path):
+    done = succeed("platforms", "--motion", "easy", "--motion", "start_in_motion", "--seeds", "2", "--duration", "30")
+    single = rows_of(tmp_path / "platforms_runs.csv")
+    assert [(row["motion"], row["seed"]) for row in single] == [
+        ("easy", "1"), ("easy", "2"), ("start_in_motion", "1"), ("start_in_motion", "2")]
+    for row in single:
+        assert row["simulate"].split() == platforms.draw(row["motion"], int(row["seed"]))
+    assert len({row["simulate"] for row in single}) == 4
+    rows = rows_of(tmp_path / "platforms.csv")
+    good = [row for row in single if row["verdict"]]
+    wrong = [row for row in good if max(numbers(row, *consistency.COLUMNS)) > platforms.LARGEST]
+    assert sum(int(row["runs"]) for row in rows) == len(good) > 0
+    assert sum(int(row["failed"]) for row in rows) == 4 - len(good)
+    assert done.stdout.splitlines()[-1].startswith(f"{len(wrong)} of {len(good)} runs are sure and wrong")
+
+
+def test_a_platform_that_is_sure_and_wrong_is_marked():
+    def result(error, verdict):
+        run = Run(31.0, 0.5, {"ate_m": 0.1, "path_length_m": 10.0, "verdict": verdict}, {}, {})
+        return run, nees.Consistency(numpy.full((3, 9), error), numpy.ones(3))
+    results = [result(1.0, "good"), result(3.0, "good"), result(3.0, "doubtful"), "it never started"]
+    lab = unittest.mock.Mock(map=lambda work: results)
+    page = platforms.run(lab, [Source("easy", seed, "easy", 30.0) for seed in (1, 2, 3, 4)], None)
+    assert page.conclusion == "2 of 3 runs are sure and wrong, 1 of them with the verdict good"
+    assert page.tables[0].rows[0][:3] == ["easy", 3, 1] and page.tables[0].rows[0][-2:] == [2, 1]
+    assert {row for row, _ in page.tables[1].marks} == {1, 2}
+    assert {len(row) for row in page.tables[1].rows} == {len(page.tables[1].columns)}
 
 
 def test_options_reach_the_simulator(succeed, tmp_path):

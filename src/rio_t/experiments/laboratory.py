@@ -25,6 +25,7 @@ class Source:
     motion: Optional[str] = None
     offset: Optional[float] = None  # ms, the truth if it is known
     bag: Optional[pathlib.Path] = None
+    words: list = dataclasses.field(default_factory=list)  # more options for `simulate`
     users: int = 0                  # work that still wants a simulated bag
     lock: threading.Lock = dataclasses.field(default_factory=threading.Lock)
 
@@ -86,7 +87,7 @@ class Laboratory:
         bag, duration = pathlib.Path(name), self.options.duration
         self.execute("simulate", "--motion", source.motion, "--seed", source.seed,
                      "--time-offset", repr(1e-3 * source.offset), "--out", bag, "--ground-truth", truth_of(bag),
-                     *self.options.simulate, *([] if duration is None else ["--duration", repr(duration)]))
+                     *source.words, *self.options.simulate, *([] if duration is None else ["--duration", repr(duration)]))
         return bag
 
     def run(self, bag, settings, read=read_run):

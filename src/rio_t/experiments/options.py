@@ -35,6 +35,8 @@ PLANS = {
     "montecarlo": Plan(HANDHELD, (FRAME_OFFSET, 30.0, 100.0), 10, True),
     "consistency": Plan(("difficult", "medium", "drone", "ground_vehicle", "gym_loop", "start_in_motion"), (30.0,), 5,
                         True, ("mode", "radar_stamp_shift", "refine_passes")),
+    "platforms": Plan((*HANDHELD, "gym_loop", "walk", "drone", "ground_vehicle", "kart", "constant_speed",
+                       "start_in_motion"), (30.0,), 10, True, ("mode", "radar_stamp_shift", "refine_passes")),
     "aids": Plan(("ground_vehicle", "kart", "drone", "difficult"), (30.0,), 3, True,
                  ("mode", "radar_stamp_shift", "refine_passes", "platform", "barometer_topic"))}
 
@@ -108,20 +110,20 @@ def make_parser():
     parser.add_argument("--output-dir", metavar="DIR", type=pathlib.Path, help="where to write (results/EXPERIMENT)")
     parser.add_argument("--bag", metavar="BAG", type=pathlib.Path, action="append", default=[],
                         help="run on this bag instead of simulated ones; may be repeated; not for montecarlo, "
-                             "consistency and aids")
+                             "consistency, platforms and aids")
     parser.add_argument("--config", metavar="CONFIG", default="irs", help="configuration of rio_t_bag (irs)")
     parser.add_argument("--set", metavar="key=value", action="append", default=[],
                         help="parameter of rio_t_bag; may be repeated")
     parser.add_argument("--seeds", metavar="N", type=count,
-                        help="simulated runs of each motion, seeds 1 to N (3; montecarlo 10; consistency 5; aids 3)")
+                        help="simulated runs of each motion, seeds 1 to N (3; montecarlo and platforms 10; consistency 5)")
     parser.add_argument("--motion", metavar="NAME", action="append",
                         help="simulated motion; may be repeated (shifts, delay: difficult; tables: easy, medium, "
                              "difficult, gym_loop; montecarlo: easy, medium, difficult; consistency: difficult, "
-                             "medium, drone, ground_vehicle, gym_loop, start_in_motion; aids: ground_vehicle, kart, "
-                             "drone, difficult)")
+                             "medium, drone, ground_vehicle, gym_loop, start_in_motion; platforms: all; aids: "
+                             "ground_vehicle, kart, drone, difficult)")
     parser.add_argument("--time-offset", metavar="S", type=number, action="append",
                         help="true offset of the simulated bags [s] (-0.00925; montecarlo also 0.03 and 0.1; "
-                             "consistency and aids 0.03; may be repeated for these three)")
+                             "consistency, platforms and aids 0.03; may be repeated for these four)")
     parser.add_argument("--duration", metavar="S", type=positive,
                         help="length of the simulated bags [s] (the motion's own)")
     parser.add_argument("--simulate", metavar="OPTIONS", default="",
@@ -152,7 +154,7 @@ def parse(words):
             if getattr(options, name) not in (None, []):
                 raise UsageError(f"--{name.replace('_', '-')}: for simulated bags only, not with --bag")
     if options.time_offset and len(options.time_offset) > 1 and not plan.simulated_only:
-        raise UsageError("--time-offset: more than one is for montecarlo, consistency and aids only")
+        raise UsageError("--time-offset: more than one is for montecarlo, consistency, platforms and aids only")
     options.set_keys = set()
     for setting in options.set:
         key, equals, _ = setting.partition("=")

@@ -5,7 +5,7 @@ import tempfile
 
 from .. import programs
 from ..errors import RioTError
-from . import aids, consistency, delay, montecarlo, shifts, tables
+from . import aids, consistency, delay, montecarlo, platforms, shifts, tables
 from .laboratory import Laboratory, Source
 
 EXPERIMENTS = {  # (laboratory, sources, options) -> Page
@@ -15,6 +15,7 @@ EXPERIMENTS = {  # (laboratory, sources, options) -> Page
     "table2": tables.table2,
     "montecarlo": montecarlo.run,
     "consistency": consistency.run,
+    "platforms": platforms.run,
     "aids": aids.run}
 
 
