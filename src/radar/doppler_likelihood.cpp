@@ -20,6 +20,7 @@ constexpr double kNoResidual = 1e-4;
 /// A pivot below this share of the trace is rounding.
 constexpr double kNoInformation = 1e-12;
 constexpr double kConfidence = 1.28;  // [sigma] a normal variable is below it nine times in ten
+constexpr double kSpreads = 4.0;      // [variances] of the noise: enough with however few points
 
 double density(double z) { return std::exp(-0.5 * z * z) * (0.5 * M_SQRT1_2 * M_2_SQRTPI); }
 
@@ -58,9 +59,10 @@ Residual coarseResidual(double e, double s, double h, double outlier) {
 }
 
 /// Projection on the directions over which the points surely spread by more than their noise. A variance of n
-/// samples has a relative standard deviation of sqrt(2 / n).
+/// samples has a relative standard deviation of sqrt(2 / n). Few points cannot be sure: four variances do.
 Eigen::Matrix3d spreadOver(const std::vector<RadarDirection>& points, double variance) {
-  const double least = 1.0 - kConfidence * std::sqrt(2.0 / static_cast<double>(points.size()));
+  const double sure = 1.0 - kConfidence * std::sqrt(2.0 / static_cast<double>(points.size()));
+  const double least = std::max(1.0 / kSpreads, sure);
   Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
   for (const RadarDirection& p : points)
     mean += p.u_R * p.u_R.transpose() / static_cast<double>(points.size());
