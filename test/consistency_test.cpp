@@ -85,8 +85,8 @@ double heading(const Eigen::Quaterniond& q_WI) {
   return std::atan2(forward.y(), forward.x());
 }
 
-/// A start in motion knows the gyro bias to 0.01 rad/s, so the heading drifts, and nothing says where it is.
-/// A linear prior must not make up such knowledge as the heading turns.
+/// A start in motion knows the gyro bias to 0.01 rad/s. The heading drifts, and no sensor observes it. The
+/// linear prior must not claim to know it.
 TEST(Consistency, HeadingOfAVehicleThatStartsInMotion) {
   double mean = 0.0;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {

@@ -43,7 +43,7 @@ TEST(StateBlock, BoxplusIsASumToFirstOrder) {
   }
 }
 
-// Nobody observes the heading, so a prior that is linear in the tangent must not see that it turns.
+// A linear prior must not see a turn of the world about the vertical, because no sensor does.
 TEST(StateBlock, ATurnOfTheWorldIsLinearInTheTangentWhateverTheState) {
   const StateBlock x = SyntheticMotion().state(1.0);
   ASSERT_GT(x.v_W().norm(), 0.5);

@@ -1,4 +1,4 @@
-// What the live node says in its diagnostics: of two radars, and of the solver.
+// The diagnostics of the live node tell how its two radars and its solver do.
 #include <diagnostic_msgs/DiagnosticStatus.h>
 #include <gtest/gtest.h>
 

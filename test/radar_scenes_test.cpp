@@ -108,8 +108,8 @@ TEST(FlatRadar, IsUsedIfOnlyTheVerticalVelocityIsUnknown) {
   }
 }
 
-/// A driver that removes what stands still sends empty scans, and so does a radar with a covered lens. The next
-/// scan always waits already.
+/// A driver that removes what stands still sends empty scans, and so does a radar with a covered lens. The
+/// next scan always waits already.
 TEST(EmptyScans, DoNotHoldTheWindow) {
   SimulatedRun run("medium", 1, 60.0, 5.0);
   run.setup.radar.rate = 20.0;

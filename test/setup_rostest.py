@@ -16,7 +16,7 @@ from rio_t import tum
 
 OK, WARN, ERROR = 0, 1, 2
 CONFIG = pathlib.Path(__file__).resolve().parent.parent / "config"
-SAME_M = 1e-3  # live as in the bag runner, as in live_rostest.py
+SAME_M = 1e-8  # live as in the bag runner, as in live_rostest.py
 TI_MMWAVE = "/ti_mmwave/radar_scan_pcl"
 TI_TRIGGER = "/sensor_platform/radar_right/trigger"
 

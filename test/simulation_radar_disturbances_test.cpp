@@ -138,7 +138,7 @@ TEST(RadarModel, ACrowdIsInViewAtOnceAndOnTheSameVisits) {
       const int persons = personsIn(data.scans[k], options.T_IR.q_IR);  // the IMU is level all the way
       const bool visited = personsIn(alone.scans[k], options.T_IR.q_IR) > 0;
       ASSERT_LE(persons, crowd) << k;
-      // Nobody has left the view yet when a visit begins.
+      // All persons are in view when a visit begins.
       if (before == 0 && visited) {
         EXPECT_EQ(persons, crowd) << k;
         ++visits;

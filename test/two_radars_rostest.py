@@ -29,7 +29,7 @@ CONFIG = pathlib.Path(__file__).resolve().parent.parent / "config" / "two_radars
 OFFSETS = {"left": 0.03, "right": -0.01}  # [s] true
 TURN = numpy.radians([2.0, -2.0, 2.0])    # of the true mountings from those of CONFIG, about the axes of I
 HONEST = 2.6                              # [sigma] of the truth, at most
-OPTIMIZED_BOUND_M = 1e-3                  # as in live_rostest.py
+OPTIMIZED_BOUND_M = 1e-8                  # as in live_rostest.py
 
 
 def product(a, b):

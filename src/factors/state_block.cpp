@@ -17,9 +17,9 @@ Eigen::Map<const Linear> linear(const double* x) {
 
 void boxplus(const double* x, const double* delta, double* x_plus_delta) {
   const StateView state(x);
-  Eigen::Vector3d tilt_W = state.q_WI * Eigen::Map<const Eigen::Vector3d>(delta + StateBlock::kTheta);
-  const Eigen::Vector3d turn_W = {0.0, 0.0, tilt_W.z()};
-  tilt_W.z() = 0.0;
+  const Eigen::Vector3d theta_W = state.q_WI * Eigen::Map<const Eigen::Vector3d>(delta + StateBlock::kTheta);
+  const Eigen::Vector3d turn_W = {0.0, 0.0, theta_W.z()};
+  const Eigen::Vector3d tilt_W = {theta_W.x(), theta_W.y(), 0.0};
   const Eigen::Quaterniond turn = so3::exp(turn_W);
   const Eigen::Quaterniond q_WI = (turn * so3::exp(tilt_W) * state.q_WI).normalized();
   Linear moved = linear(x) + Eigen::Map<const Linear>(delta + StateBlock::kP);

@@ -17,10 +17,10 @@ Eigen::MatrixXd StateManifold::minusJacobian(const double* y, const double* x) c
   const StateView from(x), to(y);
   const Eigen::Vector3d z_W = Eigen::Vector3d::UnitZ();
   const Eigen::Matrix3d R_WI = from.q_WI.toRotationMatrix();
-  Eigen::Vector3d tilt_W = R_WI * boxminus(y, x).head<3>();
-  const Eigen::Matrix3d turn = so3::exp(tilt_W.z() * z_W).toRotationMatrix();
-  tilt_W.z() = 0.0;
-  // R_WI(y) = Exp(turn) Exp(tilt) R_WI(x): how a change of tilt (x, y) and of turn (z) turns R_WI(y), in W.
+  const Eigen::Vector3d theta_W = R_WI * boxminus(y, x).head<3>();
+  const Eigen::Vector3d tilt_W = {theta_W.x(), theta_W.y(), 0.0};
+  const Eigen::Matrix3d turn = so3::exp(theta_W.z() * z_W).toRotationMatrix();
+  // The columns say how R_WI(y) = turn Exp(tilt_W) R_WI(x) turns in W with tilt x, tilt y and the turn.
   Eigen::Matrix3d turned_W = turn * so3::rightJacobian(-tilt_W);
   turned_W.col(2) = z_W;
   const Eigen::Matrix3d J_theta_W = turned_W.inverse() * to.q_WI.toRotationMatrix();

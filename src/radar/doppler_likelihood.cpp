@@ -62,7 +62,7 @@ Residual coarseResidual(double e, double s, double h, double outlier) {
 /// samples has a relative standard deviation of sqrt(2 / n). Few points cannot be sure: four variances do.
 Eigen::Matrix3d spreadOver(const std::vector<RadarDirection>& points, double variance) {
   const double sure = 1.0 - kConfidence * std::sqrt(2.0 / static_cast<double>(points.size()));
-  const double least = std::max(1.0 / kSpreads, sure);
+  const double sure_share = std::max(1.0 / kSpreads, sure);
   Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
   for (const RadarDirection& p : points)
     mean += p.u_R * p.u_R.transpose() / static_cast<double>(points.size());
@@ -71,7 +71,7 @@ Eigen::Matrix3d spreadOver(const std::vector<RadarDirection>& points, double var
   Eigen::Matrix3d projection = Eigen::Matrix3d::Zero();
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3d axis = eigen.eigenvectors().col(i);
-    if (least * eigen.eigenvalues()[i] > variance) projection += axis * axis.transpose();
+    if (sure_share * eigen.eigenvalues()[i] > variance) projection += axis * axis.transpose();
   }
   return projection;
 }

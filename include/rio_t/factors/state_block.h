@@ -8,8 +8,8 @@ namespace rio_t {
 /// State of the platform at one time, as one block of parameters for the solver.
 ///
 /// Storage (16): q_WI (x y z w), p_W, v_W, b_g, b_a. Tangent (15), see `boxplus`: theta, p, v, b_g, b_a,
-/// where theta perturbs on the right to first order: R_WI <- R_WI Exp(theta). The time offset t_O is a block of
-/// its own.
+/// where theta perturbs on the right to first order: R_WI <- R_WI Exp(theta). The time offset t_O is a block
+/// of its own.
 class StateBlock {
  public:
   static constexpr int kSize = 16;

@@ -76,10 +76,20 @@ def draw_nees(groups):
     return figure
 
 
-def run(lab, sources, _):
-    results = lab.map([(source, 1, work(source)) for source in sources])
+def grouped(sources, results, key):
+    """{key of the source: its results}, each as `work` gives it."""
     if all(isinstance(result, str) for result in results):
         raise RioTError(f"no run has a result: {results[0]}")
+    groups = {}
+    for source, result in zip(sources, results):
+        if not isinstance(result, str):
+            need_truth(source, result[0])
+        groups.setdefault(key(source), []).append(result)
+    return groups
+
+
+def run(lab, sources, _):
+    results = lab.map([(source, 1, work(source)) for source in sources])
     page = Page("Consistency: errors over their stated sigmas")
     page.notes.append("NEES per degree of freedom: the mean over axes and time of (error / sigma)^2, 1 for an honest "
                       f"estimator; `!` marks what is outside {HONEST[0]:g} to {HONEST[1]:g}")
@@ -88,11 +98,7 @@ def run(lab, sources, _):
     page.notes.append("axes are those of the world: tilt is the rotation error about x and y, yaw about z")
     page.notes.append("errors of one run are alike over time, so a run is little more than one sample of yaw or offset: "
                       "of an honest estimator, the mean of five runs is outside the limits three times in ten")
-    groups = {}
-    for source, result in zip(sources, results):
-        if not isinstance(result, str):
-            need_truth(source, result[0])
-        groups.setdefault((source.name, source.offset), []).append(result)
+    groups = grouped(sources, results, lambda source: (source.name, source.offset))
     outside = []
     for name, title, middle in (("consistency", "Mean of the runs", mean),
                                 ("consistency_median", "Median of the runs", median)):

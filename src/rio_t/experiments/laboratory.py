@@ -87,7 +87,8 @@ class Laboratory:
         bag, duration = pathlib.Path(name), self.options.duration
         self.execute("simulate", "--motion", source.motion, "--seed", source.seed,
                      "--time-offset", repr(1e-3 * source.offset), "--out", bag, "--ground-truth", truth_of(bag),
-                     *source.words, *self.options.simulate, *([] if duration is None else ["--duration", repr(duration)]))
+                     *source.words, *self.options.simulate,
+                     *([] if duration is None else ["--duration", repr(duration)]))
         return bag
 
     def run(self, bag, settings, read=read_run):

@@ -26,6 +26,7 @@ class Plan:
     own_keys: tuple = ("time_offset_model", "estimate_time_offset", "radar_stamp_shift", "mode", "refine_passes")
 
 
+PASSES = ("mode", "radar_stamp_shift", "refine_passes")  # how often a bag is played, and as what
 PLANS = {
     "shifts": Plan(("difficult",)),
     "delay": Plan(("difficult",)),
@@ -34,11 +35,11 @@ PLANS = {
     # 30 and 100 ms: two delays of systems without a trigger.
     "montecarlo": Plan(HANDHELD, (FRAME_OFFSET, 30.0, 100.0), 10, True),
     "consistency": Plan(("difficult", "medium", "drone", "ground_vehicle", "gym_loop", "start_in_motion"), (30.0,), 5,
-                        True, ("mode", "radar_stamp_shift", "refine_passes")),
+                        True, PASSES),
     "platforms": Plan((*HANDHELD, "gym_loop", "walk", "drone", "ground_vehicle", "kart", "constant_speed",
-                       "start_in_motion"), (30.0,), 10, True, ("mode", "radar_stamp_shift", "refine_passes")),
+                       "start_in_motion"), (30.0,), 10, True, PASSES),
     "aids": Plan(("ground_vehicle", "kart", "drone", "difficult"), (30.0,), 3, True,
-                 ("mode", "radar_stamp_shift", "refine_passes", "platform", "barometer_topic"))}
+                 (*PASSES, "platform", "barometer_topic"))}
 
 
 EXAMPLES = """Examples:
@@ -115,7 +116,8 @@ def make_parser():
     parser.add_argument("--set", metavar="key=value", action="append", default=[],
                         help="parameter of rio_t_bag; may be repeated")
     parser.add_argument("--seeds", metavar="N", type=count,
-                        help="simulated runs of each motion, seeds 1 to N (3; montecarlo and platforms 10; consistency 5)")
+                        help="simulated runs of each motion, seeds 1 to N (3; montecarlo and platforms 10; consistency "
+                             "5)")
     parser.add_argument("--motion", metavar="NAME", action="append",
                         help="simulated motion; may be repeated (shifts, delay: difficult; tables: easy, medium, "
                              "difficult, gym_loop; montecarlo: easy, medium, difficult; consistency: difficult, "
@@ -147,6 +149,8 @@ def parse(words):
     if options.bag and plan.simulated_only:
         raise UsageError(f"--bag: {options.experiment} draws its bags itself")
     options.simulate = simulation_words(options.simulate)
+    if options.experiment == "platforms" and options.simulate:
+        raise UsageError("--simulate: platforms draws these options itself")
     if options.experiment == "aids" and "--barometer" not in options.simulate:
         options.simulate.append("--barometer")
     if options.bag:

@@ -2,9 +2,7 @@
 import random
 
 from .. import nees
-from ..errors import RioTError
-from .consistency import COLUMNS, remark_of, work
-from .laboratory import need_truth
+from .consistency import COLUMNS, grouped, remark_of, work
 from .page import Page, Table, fixed, median
 
 LARGEST = 4.0  # NEES per degree of freedom: errors of twice the sigma on average
@@ -69,18 +67,12 @@ def run(lab, sources, _):
     for source in sources:
         source.words = draw(source.motion, source.seed)
     results = lab.map([(source, 1, work(source)) for source in sources])
-    if all(isinstance(result, str) for result in results):
-        raise RioTError(f"no run has a result: {results[0]}")
-    groups = {}
-    for source, result in zip(sources, results):
-        if not isinstance(result, str):
-            need_truth(source, result[0])
-        groups.setdefault(source.name, []).append(result)
+    groups = grouped(sources, results, lambda source: source.name)
     page = Page("Platforms: sensors drawn at random")
     page.notes.append("NEES per degree of freedom, as in the experiment consistency; a run is sure and wrong if one of "
                       f"them is above {LARGEST:g}, which `!` marks")
     page.notes.append("a run fails if the odometry never starts")
-    rows = [row_of_motion(motion, group) for motion, group in groups.items()]
+    rows = [row_of_motion(motion, of) for motion, of in groups.items()]
     page.tables.append(Table("platforms", "Median of the runs", [
         "motion", "runs", "failed", *COLUMNS, "sure and wrong", "of these with verdict good"], rows))
     single = [row_of_run(source, result) for source, result in zip(sources, results)]

@@ -37,7 +37,7 @@ class BagPlayer {
   /// Sets what was read, what of it never became a scan, the noise that the scans showed, and the diagnosis.
   void countInput(RunSummary* summary) const;
   const RadarInertialOdometry& odometry() const { return odometry_; }
-  /// The first initialisation's.
+  /// The first initialisation; none before it.
   const std::optional<RadarInertialOdometry::Start>& start() const { return start_; }
 
  private:

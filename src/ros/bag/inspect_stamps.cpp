@@ -103,7 +103,8 @@ StampProposal proposeStamps(const Recording& recording, const std::vector<Messag
 }
 
 std::vector<RadarScan> stampScans(const Recording& recording, const std::vector<MessageTimes>& imu,
-                                  const CloudTopic& cloud, const StampProposal& stamps, const std::vector<RadarScan>& scans) {
+                                  const CloudTopic& cloud, const StampProposal& stamps,
+                                  const std::vector<RadarScan>& scans) {
   StampingOptions options;
   options.source = stamps.source;
   options.radar_topic = cloud.topic;

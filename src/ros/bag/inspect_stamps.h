@@ -25,6 +25,7 @@ StampProposal proposeStamps(const Recording& recording, const std::vector<Messag
 
 /// Stamps scans as the programs would. `scans`: one for each message of the topic.
 std::vector<RadarScan> stampScans(const Recording& recording, const std::vector<MessageTimes>& imu,
-                                  const CloudTopic& cloud, const StampProposal& stamps, const std::vector<RadarScan>& scans);
+                                  const CloudTopic& cloud, const StampProposal& stamps,
+                                  const std::vector<RadarScan>& scans);
 
 }  // namespace rio_t
