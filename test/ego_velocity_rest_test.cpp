@@ -58,6 +58,29 @@ TEST(EgoVelocityRest, ASlowRideIsNoRestAndHasItsVelocity) {
   }
 }
 
+// Far within its bin, a point without Doppler noise says nothing about small changes of the velocity, and the
+// curvature of the likelihood vanishes.
+TEST(EgoVelocityRest, ASlowRideSeenWithoutNoiseHasACovariance) {
+  EgoVelocityOptions o = simulatedRadarOptions();
+  o.doppler_sigma = 0.0;
+  const EgoVelocityEstimator estimator(o);
+  Random random(18);
+  int denied = 0;
+  double squares = 0.0;
+  for (int trial = 0; trial < 1000; ++trial) {
+    const Eigen::Vector3d v(random.uniform(-0.15, 0.15), random.uniform(-0.15, 0.15),
+                            random.uniform(-0.05, 0.05));
+    const EgoVelocity e = estimator.estimate(staticScene(v, 40, {0.0436, 0.0785, 0.0, 0.125}, random));
+    if (!e.denies_rest || e.status != EgoVelocityStatus::kMoving) continue;
+    ++denied;
+    const Eigen::LLT<Eigen::Matrix3d> root(e.covariance);
+    ASSERT_EQ(root.info(), Eigen::Success) << e.covariance;
+    squares += (e.v_R - v).dot(root.solve(e.v_R - v));
+  }
+  EXPECT_GT(denied, 500);
+  EXPECT_LT(squares / denied, 3.0);
+}
+
 TEST(EgoVelocityRest, RestIsNotDeniedByPointsABinOff) {
   const EgoVelocityEstimator estimator(simulatedRadarOptions());
   Random random(17);

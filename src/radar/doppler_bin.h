@@ -12,4 +12,15 @@ inline double binProbability(double e, double sigma, double half_bin) {
   return beyond(size - half_bin) - beyond(size + half_bin);
 }
 
+/// Density of a Doppler of the static world, with the error `e` (docs/method.md, eq. 19a). `variance` is that
+/// of Doppler and direction, `quantization` that of the bin. A bin that is narrower than the noise adds to
+/// it.
+inline double dopplerDensity(double e, double variance, double quantization) {
+  const double half_bin = std::sqrt(3.0 * quantization);
+  const double sigma = std::sqrt(variance);
+  if (half_bin > sigma) return binProbability(e, sigma, half_bin) / (2.0 * half_bin);
+  const double whole = variance + quantization;
+  return std::exp(-0.5 * e * e / whole) / std::sqrt(2.0 * M_PI * whole);
+}
+
 }  // namespace rio_t

@@ -8,19 +8,16 @@
 
 #include "direction_noise.h"
 #include "doppler_bin.h"
+#include "doppler_scatter.h"
 
 namespace rio_t {
 namespace {
 
-/// [m^2/s^2] Least variance of a residual: a point without any noise would have infinite weight. It is a
-/// hundredth of the Doppler noise of any radar known.
-constexpr double kMinVariance = 1e-6;
 /// [sigma] A smaller residual is as good as zero; its derivative is that at zero.
 constexpr double kNoResidual = 1e-4;
 /// A pivot below this share of the trace is rounding.
 constexpr double kNoInformation = 1e-12;
-constexpr double kConfidence = 1.28;  // [sigma] a normal variable is below it nine times in ten
-constexpr double kSpreads = 4.0;      // [variances] of the noise: enough with however few points
+constexpr double kSpreads = 4.0;  // [variances] of the noise: enough with however few points
 
 double density(double z) { return std::exp(-0.5 * z * z) * (0.5 * M_SQRT1_2 * M_2_SQRTPI); }
 
@@ -58,11 +55,10 @@ Residual coarseResidual(double e, double s, double h, double outlier) {
   return {std::copysign(value, e), (density(below) - density(above)) / (s * (bin + floor) * value)};
 }
 
-/// Projection on the directions over which the points surely spread by more than their noise. A variance of n
-/// samples has a relative standard deviation of sqrt(2 / n). Few points cannot be sure: four variances do.
+/// Projection on the directions over which the points surely spread by more than their noise. Few points
+/// cannot be sure: four variances do.
 Eigen::Matrix3d spreadOver(const std::vector<RadarDirection>& points, double variance) {
-  const double sure = 1.0 - kConfidence * std::sqrt(2.0 / static_cast<double>(points.size()));
-  const double sure_share = std::max(1.0 / kSpreads, sure);
+  const double sure_share = std::max(1.0 / kSpreads, 1.0 - kConfidence * relativeSigma(points.size()));
   Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
   for (const RadarDirection& p : points)
     mean += p.u_R * p.u_R.transpose() / static_cast<double>(points.size());
@@ -115,7 +111,7 @@ DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, 
     : first_v_R_(v_R),
       spread_over_(spreadOver(points, std::max(noise.azimuth, noise.elevation))),
       half_bin_(std::sqrt(3.0 * noise.quantization)),
-      doppler_variance_(noise.doppler + kMinVariance),
+      doppler_variance_(noise.doppler + kMinDopplerVariance),
       smallest_sigma_(std::numeric_limits<double>::max()) {
   const MomentCorrection correct(noise.azimuth, noise.elevation);
   const double along_az = 0.75 * noise.azimuth + 0.25 * noise.elevation;

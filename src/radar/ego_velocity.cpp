@@ -7,6 +7,7 @@
 
 #include "consensus.h"
 #include "direction_noise.h"
+#include "doppler_scatter.h"
 #include "ego_velocity_options.h"
 #include "rest_velocity.h"
 #include "rio_t/radar/point_filter.h"
@@ -174,7 +175,12 @@ DopplerLikelihood EgoVelocityEstimator::likelihood(const RadarScan& scan,
     directions.push_back({p.position_R.normalized(), p.doppler, i});
   }
   unwrap(directions, v_R, span_.value());
-  return DopplerLikelihood(directions, v_R, noise());
+  // At a velocity that is a little off, the errors scatter more. They show the noise where they scatter
+  // least.
+  PointVariances noise = withScatter(noise_.variances(), directions, v_R);
+  if (const VelocitySolution fit = solveLeastSquares(directions, options_); fit.solved)
+    noise.doppler = std::min(noise.doppler, withScatter(noise_.variances(), directions, fit.v_R).doppler);
+  return DopplerLikelihood(directions, v_R, noise);
 }
 
 void EgoVelocityEstimator::learn(const RadarScan& scan, const EgoVelocity& estimated) {

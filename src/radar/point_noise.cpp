@@ -28,19 +28,9 @@ constexpr double kMinStartAngleSigma = 0.01;  // [rad]
 /// [m^2/s^2] Variance of a residual; it bounds the weights if there is no noise at all.
 constexpr double kMinVariance = 1e-4;
 
-/// Density of the residuals of the static world. `variance` is that of Doppler and direction. A bin that is
-/// narrower than this noise adds to it, as in DopplerLikelihood.
-double inlierDensity(double residual, double variance, double quantization) {
-  const double half_bin = std::sqrt(3.0 * quantization);
-  const double sigma = std::sqrt(variance);
-  if (half_bin > sigma) return binProbability(residual, sigma, half_bin) / (2.0 * half_bin);
-  const double whole = variance + quantization;
-  return std::exp(-0.5 * square(residual) / whole) / std::sqrt(2.0 * M_PI * whole);
-}
-
 /// Probability that a residual is of the static world and not of an outlier, spread evenly.
 double inlierProbability(double residual, double variance, const PointVariances& noise) {
-  const double density = inlierDensity(residual, std::max(kMinVariance, variance), noise.quantization);
+  const double density = dopplerDensity(residual, std::max(kMinVariance, variance), noise.quantization);
   return density / (density + noise.outlier_density);
 }
 

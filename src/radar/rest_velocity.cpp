@@ -21,6 +21,21 @@ bool readsZero(const RadarDirection& p, const EgoVelocityOptions& o) {
   return std::abs(p.doppler) <= o.zero_velocity_threshold;
 }
 
+/// Mean of u u' over the points, H'H / n.
+Eigen::Matrix3d meanOuterProduct(const std::vector<RadarDirection>& points) {
+  Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
+  for (const RadarDirection& p : points) mean += p.u_R * p.u_R.transpose();
+  return mean / static_cast<double>(points.size());
+}
+
+/// What the bins of width q say about the velocity, as a factor of M = H'H / n. A point reads its bin only
+/// while |d + u . v| < q/2. So v lies in the ellipsoid (v - v_0)' M (v - v_0) < q^2/4. A uniform density over
+/// an ellipsoid in 3D has the covariance M^-1 (q^2/4) / 5. More points do not help. Noise of the Doppler
+/// blurs the edge of the bin, and adds its variance.
+double binInformation(double q, double doppler_variance) {
+  return 1.0 / (square(q) / 20.0 + doppler_variance);
+}
+
 /// The points that read zero or the bin beside it.
 std::vector<RadarDirection> selectSlow(const std::vector<RadarDirection>& points,
                                        const EgoVelocityOptions& o) {
@@ -65,8 +80,11 @@ std::optional<VelocitySolution> fitSlowMotion(const std::vector<RadarDirection>&
     cost = next;
   }
   if (2.0 * (at_rest - cost.value) < kDeniesRest) return std::nullopt;
-  solution.solved = cost.information.determinant() > 0.0;
-  solution.covariance = cost.information.inverse();
+  // A point far within its bin adds nothing to the curvature: without noise, none may be left.
+  Eigen::Matrix3d information = cost.information;
+  if (o.doppler_quantization > 0.0)
+    information += binInformation(o.doppler_quantization, noise.doppler) * meanOuterProduct(points);
+  solution.covariance = information.inverse();
   return solution;
 }
 
@@ -87,9 +105,7 @@ std::vector<RadarDirection> selectZeros(const std::vector<RadarDirection>& point
 }
 
 // Every inlier reads the zero bin, of width q. Two things bound the velocity:
-// - The bin. A point reads zero only while |u . v| < q/2. So v lies in the ellipsoid v' M v < q^2/4, and M is
-//   the mean of u u'. A uniform density over an ellipsoid in 3D has the covariance M^-1 (q^2/4) / 5. More
-//   points do not help.
+// - The bin; see binInformation.
 // - The noise. Noise of sigma s carries readings over the edge of the bin, the sooner the faster the platform
 //   creeps. The likelihood P(v) that a point reads zero has the curvature
 //     -(log P)'' = 2 z phi(z) / (s^2 P(0)) at rest, z = q / (2 s),
@@ -98,11 +114,8 @@ std::vector<RadarDirection> selectZeros(const std::vector<RadarDirection>& point
 VelocitySolution solveRest(const std::vector<RadarDirection>& inliers, const PointVariances& noise,
                            const EgoVelocityOptions& o) {
   VelocitySolution solution;
-  Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
-  for (const RadarDirection& p : inliers) mean += p.u_R * p.u_R.transpose();
-  mean /= static_cast<double>(inliers.size());
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
-  eigen.computeDirect(mean);
+  eigen.computeDirect(meanOuterProduct(inliers));
   if (!(eigen.eigenvalues()[0] * o.max_condition_number > eigen.eigenvalues()[2])) return solution;
   const double q = o.doppler_quantization;
   const double s = std::sqrt(noise.doppler);
@@ -112,7 +125,7 @@ VelocitySolution solveRest(const std::vector<RadarDirection>& inliers, const Poi
   if (q > 0.0) {
     const double phi = std::exp(-0.5 * z * z) / std::sqrt(2.0 * M_PI);
     const double curvature = s > 0.0 ? 2.0 * z * phi / (s * s * std::erf(z / std::sqrt(2.0))) : 0.0;
-    scale = 1.0 / (20.0 / (q * q) + n * curvature);
+    scale = 1.0 / (binInformation(q, noise.doppler) + n * curvature);
   }
   solution.covariance = o.zero_velocity_sigma * o.zero_velocity_sigma * Eigen::Matrix3d::Identity() +
                         scale * eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
