@@ -26,18 +26,21 @@ PointVariances variances(double doppler, double azimuth, double elevation, doubl
 /// 2.5 and 4.5 degrees.
 PointVariances simulatedRadar(double step) { return variances(0.02, 0.0436, 0.0785, step); }
 
-/// Draws scans of static points.
+/// Draws scans of static points. Earlier scans have shown how far the points spread.
 class Scene {
  public:
   explicit Scene(const PointVariances& noise_in, double elevation_spread_in = 0.35)
-      : noise(noise_in), elevation_spread(elevation_spread_in) {}
+      : noise(noise_in), elevation_spread(elevation_spread_in) {
+    noise.azimuths = {0.0, kAzimuthSpread * kAzimuthSpread / 3.0 + noise.azimuth};
+    noise.elevations = {0.0, elevation_spread * elevation_spread / 3.0 + noise.elevation};
+  }
   double normal() { return draw_(); }
   Eigen::Vector3d vector() { return draw_.vector(); }
   std::vector<RadarDirection> scan(const Eigen::Vector3d& v_R, std::size_t points) {
     const double step = std::sqrt(12.0 * noise.quantization);
     std::vector<RadarDirection> result;
     for (std::size_t i = 0; i < points; ++i) {
-      const double azimuth = angle_.uniform(-0.9, 0.9);
+      const double azimuth = angle_.uniform(-kAzimuthSpread, kAzimuthSpread);
       const double elevation = angle_.uniform(-elevation_spread, elevation_spread);
       double doppler = -direction(azimuth, elevation).dot(v_R) + std::sqrt(noise.doppler) * draw_();
       if (step > 0.0) doppler = step * std::round(doppler / step);
@@ -52,6 +55,7 @@ class Scene {
   double elevation_spread;
 
  private:
+  static constexpr double kAzimuthSpread = 0.9;
   Noise draw_{20};
   Random angle_{21};
 };
@@ -235,7 +239,8 @@ TEST(DopplerLikelihood, NoisyDirectionsDoNotShortenTheVelocity) {
       EXPECT_GT(largest(result.least_squares_bias), 0.004) << "nothing to correct at " << v_R.transpose();
       EXPECT_LT(largest(result.bias), 0.004)
           << result.bias.transpose() << " at " << v_R.transpose() << ", step " << step;
-      EXPECT_NEAR(result.nees, 3.0, 0.6) << v_R.transpose() << ", step " << step;
+      EXPECT_GT(result.nees, 2.2) << v_R.transpose() << ", step " << step;  // bins: they say more than J'J
+      EXPECT_LT(result.nees, 3.3) << v_R.transpose() << ", step " << step;
     }
   }
 }
@@ -264,6 +269,14 @@ TEST(DopplerLikelihood, NoisyElevationsDoNotShortenTheVerticalVelocity) {
   const Eigen::Vector3d v_R(0.1, 1.5, 0.4);
   const MonteCarlo result = monteCarlo(Scene(variances(0.02, 0.03, 0.115, 0.0), 0.2), v_R, 80, 0.1);
   EXPECT_LT(result.least_squares_bias.z(), -0.1);
+  EXPECT_LT(largest(result.bias), 0.25 * largest(result.least_squares_bias)) << result.bias.transpose();
+}
+
+/// Few points do not show how far they spread. Earlier scans have.
+TEST(DopplerLikelihood, FewPointsDoNotShortenTheVelocityEither) {
+  const Eigen::Vector3d v_R(0.2, 1.5, 0.6);
+  const MonteCarlo result = monteCarlo(Scene(simulatedRadar(0.0)), v_R, 6, 0.1);
+  EXPECT_LT(result.least_squares_bias.z(), -0.05);
   EXPECT_LT(largest(result.bias), 0.25 * largest(result.least_squares_bias)) << result.bias.transpose();
 }
 

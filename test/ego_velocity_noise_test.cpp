@@ -90,6 +90,7 @@ void learnFrom(EgoVelocityEstimator& estimator, const Eigen::Vector3d& v, const 
     for (RadarPoint& p : scan.points) {
       if (random.uniform(0.0, 1.0) < ghosts) p.doppler = random.uniform(-2.5, 2.5);
     }
+    estimator.observe(scan);
     estimator.learn(scan, estimator.estimate(scan));
   }
 }
@@ -215,6 +216,7 @@ TEST(EgoVelocityNoise, IsNotLearnedWithoutNeed) {
   const auto learns = [&](EgoVelocityEstimator estimator, const Eigen::Vector3d& v) {
     const double before = estimator.noise().elevation;
     const RadarScan scan = staticScene(v, 45, kSimulatedRadar, random);
+    estimator.observe(scan);
     estimator.learn(scan, estimator.estimate(scan));
     return estimator.noise().elevation != before;
   };

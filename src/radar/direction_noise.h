@@ -9,6 +9,13 @@ namespace rio_t {
 
 inline double square(double a) { return a * a; }
 
+inline double azimuthOf(const Eigen::Vector3d& u) { return std::atan2(u.x(), u.y()); }
+inline double elevationOf(const Eigen::Vector3d& u) { return std::atan2(u.z(), std::hypot(u.x(), u.y())); }
+inline Eigen::Vector3d directionOf(double azimuth, double elevation) {
+  return {std::cos(elevation) * std::sin(azimuth), std::cos(elevation) * std::cos(azimuth),
+          std::sin(elevation)};
+}
+
 /// Azimuth and elevation of a unit vector, by their sines and cosines.
 struct Angles {
   explicit Angles(const Eigen::Vector3d& u) : sin_el(u.z()), cos_el(std::hypot(u.x(), u.y())) {

@@ -1,10 +1,10 @@
 #include "rio_t/radar/doppler_likelihood.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "direction_noise.h"
 #include "doppler_bin.h"
@@ -17,7 +17,8 @@ namespace {
 constexpr double kNoResidual = 1e-4;
 /// A pivot below this share of the trace is rounding.
 constexpr double kNoInformation = 1e-12;
-constexpr double kSpreads = 4.0;  // [variances] of the noise: enough with however few points
+constexpr double kSurely = 2.0;   // [sigma]
+constexpr double kSpreads = 4.0;  // [variances] of the noise
 
 double density(double z) { return std::exp(-0.5 * z * z) * (0.5 * M_SQRT1_2 * M_2_SQRTPI); }
 
@@ -55,21 +56,15 @@ Residual coarseResidual(double e, double s, double h, double outlier) {
   return {std::copysign(value, e), (density(below) - density(above)) / (s * (bin + floor) * value)};
 }
 
-/// Projection on the directions over which the points surely spread by more than their noise. Few points
-/// cannot be sure: four variances do.
-Eigen::Matrix3d spreadOver(const std::vector<RadarDirection>& points, double variance) {
-  const double sure_share = std::max(1.0 / kSpreads, 1.0 - kConfidence * relativeSigma(points.size()));
-  Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
-  for (const RadarDirection& p : points)
-    mean += p.u_R * p.u_R.transpose() / static_cast<double>(points.size());
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
-  eigen.computeDirect(mean);
-  Eigen::Matrix3d projection = Eigen::Matrix3d::Zero();
-  for (int i = 0; i < 3; ++i) {
-    const Eigen::Vector3d axis = eigen.eigenvectors().col(i);
-    if (sure_share * eigen.eigenvalues()[i] > variance) projection += axis * axis.transpose();
-  }
-  return projection;
+/// Whether the points surely show by themselves how far an angle spreads, and that its noise is a small part.
+/// `angles` are the measured ones, `noise` is their variance. The variance of n samples has a relative
+/// standard deviation of sqrt(2 / n).
+bool showsSpread(const std::vector<double>& angles, double noise) {
+  const auto n = static_cast<double>(angles.size());
+  const double mean = std::accumulate(angles.begin(), angles.end(), 0.0) / n;
+  double squares = 0.0;
+  for (const double angle : angles) squares += square(angle - mean);
+  return squares / n * (1.0 - kSurely * std::sqrt(2.0 / n)) > kSpreads * noise;
 }
 
 }  // namespace
@@ -106,32 +101,55 @@ Eigen::Vector3d solveTransposed(const Eigen::Matrix3d& U, const Eigen::Vector3d&
   return x;
 }
 
+// The noise of an angle is in the measured direction and in the residual. Two ways undo what this does:
+// - Many points show by themselves how far they spread. Then the sigma of a residual grows with the velocity,
+//   and its derivative undoes it (`shown`: errors in variables).
+// - Few points do not. Then the true angle is expected nearer to the mean than the measured one, by what
+//   earlier scans have shown (`left`, after a regression). The error of this angle is not in the direction.
 DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
                                      const PointVariances& noise)
-    : first_v_R_(v_R),
-      spread_over_(spreadOver(points, std::max(noise.azimuth, noise.elevation))),
-      half_bin_(std::sqrt(3.0 * noise.quantization)),
-      doppler_variance_(noise.doppler + kMinDopplerVariance),
-      smallest_sigma_(std::numeric_limits<double>::max()) {
-  const MomentCorrection correct(noise.azimuth, noise.elevation);
-  const double along_az = 0.75 * noise.azimuth + 0.25 * noise.elevation;
-  const double along_el = 0.75 * noise.elevation + 0.25 * noise.azimuth;
-  points_.reserve(points.size());
+    : half_bin_(std::sqrt(3.0 * noise.quantization)), smallest_sigma_(std::numeric_limits<double>::max()) {
+  std::vector<double> azimuths, elevations;
   for (const RadarDirection& p : points) {
+    azimuths.push_back(azimuthOf(p.u_R));
+    elevations.push_back(elevationOf(p.u_R));
+  }
+  const bool shows_azimuth = showsSpread(azimuths, noise.azimuth);
+  const bool shows_elevation = showsSpread(elevations, noise.elevation);
+  PointVariances shown = noise;
+  PointVariances left;
+  (shows_azimuth ? left : shown).azimuth = 0.0;
+  (shows_elevation ? left : shown).elevation = 0.0;
+  if (!shows_azimuth) left.azimuth = noise.azimuths.remaining(noise.azimuth);
+  if (!shows_elevation) left.elevation = noise.elevations.remaining(noise.elevation);
+
+  const double shorter = std::exp(-0.5 * (left.azimuth + left.elevation));  // the mean of such directions
+  const MomentCorrection correct(shown.azimuth, shown.elevation);
+  const double along_az = 0.75 * shown.azimuth + 0.25 * shown.elevation;
+  const double along_el = 0.75 * shown.elevation + 0.25 * shown.azimuth;
+  points_.reserve(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double azimuth = shows_azimuth ? azimuths[i] : noise.azimuths.expected(azimuths[i], noise.azimuth);
+    const double elevation =
+        shows_elevation ? elevations[i] : noise.elevations.expected(elevations[i], noise.elevation);
+    const Eigen::Vector3d expected = directionOf(azimuth, elevation);
+    const double fixed_variance =
+        noise.doppler + kMinDopplerVariance + residualVariance(Angles(expected), v_R, left);
+    shown.doppler = fixed_variance;
     // The spread is that at the direction corrected by the residual. At the measured direction it would
     // correlate with the residual.
-    const Angles a = correctedDirection(p.u_R, p.doppler + p.u_R.dot(v_R), v_R, noise);
+    const Angles a = correctedDirection(expected, points[i].doppler + expected.dot(v_R), v_R, shown);
     const Eigen::Vector3d u = a.direction();
     const Eigen::Matrix3d spread =
-        noise.azimuth * a.byAzimuth() * a.byAzimuth().transpose() +
-        noise.elevation * a.byElevation() * a.byElevation().transpose() +
-        (noise.azimuth * along_az + noise.elevation * along_el) * u * u.transpose();
-    const double variance = doppler_variance_ + v_R.dot(spread * v_R);
+        shown.azimuth * a.byAzimuth() * a.byAzimuth().transpose() +
+        shown.elevation * a.byElevation() * a.byElevation().transpose() +
+        (shown.azimuth * along_az + shown.elevation * along_el) * u * u.transpose();
+    const double variance = fixed_variance + v_R.dot(spread * v_R);
     const double sigma = std::sqrt(variance);
     smallest_sigma_ = std::min(smallest_sigma_, sigma);
     const double whole = std::sqrt(variance + noise.quantization);
-    points_.push_back({correct.direction(Angles(p.u_R)), p.doppler, spread, sigma, whole,
-                       noise.outlier_density * std::sqrt(2.0 * M_PI) * whole});
+    points_.push_back({shorter * correct.direction(Angles(expected)), points[i].doppler, spread,
+                       fixed_variance, sigma, whole, noise.outlier_density * std::sqrt(2.0 * M_PI) * whole});
   }
 }
 
@@ -139,13 +157,12 @@ double DopplerLikelihood::residual(std::size_t i, const Eigen::Vector3d& v_R,
                                    Eigen::Vector3d& derivative) const {
   const Point& p = points_[i];
   const double e = p.doppler + p.u_R.dot(v_R);
-  const Eigen::Vector3d v = first_v_R_ + spread_over_ * (v_R - first_v_R_);
-  const Eigen::Vector3d spread_v = p.spread * v;
-  const double variance = doppler_variance_ + square(half_bin_) / 3.0 + v.dot(spread_v);
+  const Eigen::Vector3d spread_v = p.spread * v_R;
+  const double variance = p.fixed_variance + square(half_bin_) / 3.0 + v_R.dot(spread_v);
   const double scale = p.whole_sigma / std::sqrt(variance);
   const Residual r = half_bin_ > p.sigma ? coarseResidual(scale * e, p.sigma, half_bin_, p.outlier)
                                          : fineResidual(scale * e, p.whole_sigma, p.outlier);
-  derivative = r.slope * scale * (p.u_R - (e / variance) * (spread_over_ * spread_v));
+  derivative = r.slope * scale * (p.u_R - (e / variance) * spread_v);
   return r.value;
 }
 

@@ -8,6 +8,8 @@
 namespace rio_t {
 namespace {
 
+/// [sigma] A normal variable is below it nine times in ten.
+constexpr double kConfidence = 1.28;
 constexpr int kDoublings = 10;  // of the variance: 32 times the sigma
 
 /// Logarithm of the likelihood (docs/method.md, eq. 19a) of the points, as a function of the noise.
@@ -24,8 +26,6 @@ double logLikelihood(const PointVariances& noise, const std::vector<RadarDirecti
 }
 
 }  // namespace
-
-double relativeSigma(std::size_t n) { return std::sqrt(2.0 / static_cast<double>(n)); }
 
 PointVariances withScatter(const PointVariances& told, const std::vector<RadarDirection>& points,
                            const Eigen::Vector3d& v_R) {

@@ -87,8 +87,12 @@ EgoVelocity concludedInMotion(EgoVelocity result, const std::vector<RadarDirecti
 }
 
 PointVariances startNoise(const EgoVelocityOptions& o) {
-  return {square(o.doppler_sigma), square(o.azimuth_sigma), square(o.elevation_sigma),
-          square(o.doppler_quantization) / 12.0};
+  PointVariances noise;
+  noise.doppler = square(o.doppler_sigma);
+  noise.azimuth = square(o.azimuth_sigma);
+  noise.elevation = square(o.elevation_sigma);
+  noise.quantization = square(o.doppler_quantization) / 12.0;
+  return noise;
 }
 
 }  // namespace
@@ -103,6 +107,7 @@ EgoVelocityEstimator::EgoVelocityEstimator(const EgoVelocityOptions& options)
 
 void EgoVelocityEstimator::observe(const RadarScan& scan) {
   grid_.add(scan);
+  noise_.learnSpread(filter(scan, options_));
   const double step = grid_.step().value;
   if (step == options_.doppler_quantization) return;
   options_ = withStep(given_, step);

@@ -37,6 +37,13 @@ double inlierProbability(double residual, double variance, const PointVariances&
 /// Share of a new scan in what is known, after so many scans.
 double forgotten(double scans) { return std::max(1.0 / kMemory, 1.0 / (scans + 1.0)); }
 
+void addTo(Eigen::Vector3d& moments, double angle) { moments += Eigen::Vector3d(1.0, angle, angle * angle); }
+
+AngleSpread spreadOf(const Eigen::Vector3d& moments) {
+  const double mean = moments[1] / moments[0];
+  return {mean, moments[2] / moments[0] - mean * mean};
+}
+
 Eigen::Vector3d vectorOf(const PointVariances& noise) {
   return {noise.doppler, noise.azimuth, noise.elevation};
 }
@@ -50,6 +57,19 @@ void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vec
   learnOutliers(points, v_R);
   if (v_R.squaredNorm() >= square(kMinSpeed) * 12.0 * variances_.quantization)
     learnVariances(points, inliers, v_R);
+}
+
+void PointNoise::learnSpread(const std::vector<RadarDirection>& points) {
+  if (points.empty()) return;
+  const double kept = 1.0 - 1.0 / kMemory;
+  azimuth_moments_ *= kept;
+  elevation_moments_ *= kept;
+  for (const RadarDirection& p : points) {
+    addTo(azimuth_moments_, azimuthOf(p.u_R));
+    addTo(elevation_moments_, elevationOf(p.u_R));
+  }
+  variances_.azimuths = spreadOf(azimuth_moments_);
+  variances_.elevations = spreadOf(elevation_moments_);
 }
 
 void PointNoise::learnOutliers(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R) {

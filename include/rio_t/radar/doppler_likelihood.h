@@ -34,10 +34,9 @@ Eigen::Vector3d solveTransposed(const Eigen::Matrix3d& U, const Eigen::Vector3d&
 /// so least squares can use it. The model: a Doppler is right within its bin and its noise; or, with a small
 /// probability, the point is an outlier, and its Doppler can be anything.
 /// - Bin: a bin wider than the noise bounds the velocity along the ray and does not pull it to the centre.
-/// - Noise of the direction: the sigma of a residual grows with the velocity. The derivative of the sigma
-///   removes the bias that least squares with noisy directions has (total least squares). It only counts over
-///   the directions in which the points spread more than their noise; over the others, a larger velocity
-///   would explain any residual.
+/// - Noise of the direction: it widens the sigma of a residual, and it shortens the velocity of plain least
+///   squares. Many points undo the latter by the derivative of that sigma (total least squares); few points
+///   by the direction that earlier scans let expect (regression calibration).
 /// - Outliers: the residual is bounded, so that an outlier has no weight (a redescending loss).
 class DopplerLikelihood {
  public:
@@ -55,17 +54,15 @@ class DopplerLikelihood {
   struct Point {
     Eigen::Vector3d u_R;
     double doppler;
-    Eigen::Matrix3d spread;  ///< v' spread v: variance of the residual by the direction's noise
+    Eigen::Matrix3d spread;  ///< v' spread v: variance of the residual by the direction's noise, if it grows
+    double fixed_variance;   ///< [m^2/s^2] the rest of it, without the bin
     double sigma;            ///< of the noise at the first velocity [m/s]
     double whole_sigma;      ///< the same with the bin
     double outlier;          ///< density of outliers over that of the static world, at its largest
   };
 
   std::vector<Point> points_;
-  Eigen::Vector3d first_v_R_;
-  Eigen::Matrix3d spread_over_;  ///< projects on what the directions spread over
-  double half_bin_;              ///< [m/s]
-  double doppler_variance_;      ///< [m^2/s^2] without the bin
+  double half_bin_;  ///< [m/s]
   double smallest_sigma_;
 };
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "rio_t/radar/scan.h"
@@ -13,7 +14,19 @@ namespace rio_t {
 constexpr double kMinOutlierDensity = 0.001;
 constexpr double kMaxOutlierDensity = 0.1;
 
-/// Noise of a point, independent from point to point.
+/// How an angle of the reported points is distributed, its noise included.
+struct AngleSpread {
+  double mean = 0.0;                                          ///< [rad]
+  double variance = std::numeric_limits<double>::infinity();  ///< [rad^2] infinite: not known
+
+  /// Share of the variance that is not noise. `noise` is the variance of a measured angle [rad^2].
+  double trueShare(double noise) const { return variance > noise ? 1.0 - noise / variance : 0.0; }
+  /// The true angle of a point, by linear regression on the measured one, and the variance of its error.
+  double expected(double measured, double noise) const { return mean + trueShare(noise) * (measured - mean); }
+  double remaining(double noise) const { return trueShare(noise) * noise; }
+};
+
+/// Noise of a point, independent from point to point, and what points to expect.
 struct PointVariances {
   double doppler = 0.0;       ///< [m^2/s^2] besides the quantisation
   double azimuth = 0.0;       ///< [rad^2]
@@ -22,6 +35,7 @@ struct PointVariances {
   /// [s/m] Density of Dopplers that are not of the static world, per point. It begins with the largest, every
   /// other point over 5 m/s: until scans have shown better, few points must not be sure of anything.
   double outlier_density = kMaxOutlierDensity;
+  AngleSpread azimuths, elevations;
 };
 
 /// Learns the noise of the points from the Doppler residuals of scans in motion.
@@ -29,8 +43,8 @@ struct PointVariances {
 /// The variance of a residual is that of the Doppler plus those of the angles times their squared effect on
 /// the Doppler. This effect differs from point to point, so a regression of the squared residuals gives all
 /// three (docs/method.md, section 9). The start counts as a few points. If the motion does not show an angle,
-/// its noise remains that of the start. The density of the outliers is learned at any speed, the rest above
-/// four steps of the Doppler.
+/// its noise remains that of the start. The density of the outliers is learned at any speed, the noise above
+/// four steps of the Doppler. How the angles spread is learned from every scan.
 class PointNoise {
  public:
   explicit PointNoise(const PointVariances& start);
@@ -40,6 +54,8 @@ class PointNoise {
   /// to the static world: otherwise the known noise would cut off its own tails.
   void learn(const std::vector<RadarDirection>& points, const std::vector<std::size_t>& inliers,
              const Eigen::Vector3d& v_R);
+  /// Learns how far the directions of a scan spread, moving or not. `points` passed the filter.
+  void learnSpread(const std::vector<RadarDirection>& points);
   /// Sets the quantisation once it is known [m^2/s^2]. Earlier scans were learned with another one; they fade
   /// as all old scans do.
   void setQuantization(double variance) { variances_.quantization = variance; }
@@ -61,8 +77,10 @@ class PointNoise {
   Eigen::Matrix3d information_ = Eigen::Matrix3d::Zero();         // of the scans
   Eigen::Vector3d information_vector_ = Eigen::Vector3d::Zero();  // that times the variances
   Eigen::Vector3d mean_shares_ = Eigen::Vector3d::Zero();         // of the variances in that of a residual
-  double scans_ = 0.0;                                            // that taught the variances
-  double scans_of_outliers_ = 0.0;                                // that taught the density of outliers
+  Eigen::Vector3d azimuth_moments_ = Eigen::Vector3d::Zero();     // sums of the powers 0, 1 and 2
+  Eigen::Vector3d elevation_moments_ = Eigen::Vector3d::Zero();
+  double scans_ = 0.0;              // that taught the variances
+  double scans_of_outliers_ = 0.0;  // that taught the density of outliers
 };
 
 }  // namespace rio_t
