@@ -185,6 +185,19 @@ TEST(EgoVelocityNoise, AnAngleThatTheMotionDoesNotShowStaysAsItWas) {
   EXPECT_NEAR(std::sqrt(estimator.noise().elevation), 0.0785, 0.008);
 }
 
+TEST(EgoVelocityNoise, HowFarTheAnglesSpreadIsLearnedAtRestToo) {
+  EgoVelocityEstimator estimator((EgoVelocityOptions()));
+  Random random(41);
+  for (int i = 0; i < 300; ++i)
+    estimator.observe(staticScene(Eigen::Vector3d::Zero(), 20, kSimulatedRadar, random, 0.2));
+  const AngleSpread& elevations = estimator.noise().elevations;
+  const double noise = kSimulatedRadar.elevation * kSimulatedRadar.elevation;
+  EXPECT_NEAR(elevations.mean, 0.0, 0.01);
+  EXPECT_NEAR(elevations.variance, 0.2 * 0.2 / 3.0 + noise, 0.001);
+  EXPECT_NEAR(elevations.trueShare(noise), 0.684, 0.03);
+  EXPECT_NEAR(estimator.noise().azimuths.trueShare(0.0), 1.0, 1e-12);
+}
+
 TEST(EgoVelocityNoise, NoneIsLearnedSafely) {
   for (const double step : {0.0, 0.125}) {
     for (const double start : {0.0, 0.05}) {

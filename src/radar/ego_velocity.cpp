@@ -86,6 +86,17 @@ EgoVelocity concludedInMotion(EgoVelocity result, const std::vector<RadarDirecti
   return concluded(std::move(result), inliers, solution, EgoVelocityStatus::kMoving, o);
 }
 
+/// The noise told, or a larger one if the points show it. At a velocity that is a little off they scatter
+/// more; they show the noise where they scatter least.
+PointVariances shownBy(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
+                       const PointVariances& told, const EgoVelocityOptions& o) {
+  PointVariances noise = withScatter(told, points, v_R);
+  if (noise.doppler == told.doppler) return noise;
+  const VelocitySolution fit = solveLeastSquares(points, o);
+  if (fit.solved) noise.doppler = std::min(noise.doppler, withScatter(told, points, fit.v_R).doppler);
+  return noise;
+}
+
 PointVariances startNoise(const EgoVelocityOptions& o) {
   PointVariances noise;
   noise.doppler = square(o.doppler_sigma);
@@ -180,12 +191,7 @@ DopplerLikelihood EgoVelocityEstimator::likelihood(const RadarScan& scan,
     directions.push_back({p.position_R.normalized(), p.doppler, i});
   }
   unwrap(directions, v_R, span_.value());
-  // At a velocity that is a little off, the errors scatter more. They show the noise where they scatter
-  // least.
-  PointVariances noise = withScatter(noise_.variances(), directions, v_R);
-  if (const VelocitySolution fit = solveLeastSquares(directions, options_); fit.solved)
-    noise.doppler = std::min(noise.doppler, withScatter(noise_.variances(), directions, fit.v_R).doppler);
-  return DopplerLikelihood(directions, v_R, noise);
+  return DopplerLikelihood(directions, v_R, shownBy(directions, v_R, noise(), options_));
 }
 
 void EgoVelocityEstimator::learn(const RadarScan& scan, const EgoVelocity& estimated) {
