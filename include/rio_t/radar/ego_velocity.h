@@ -117,8 +117,8 @@ class EgoVelocityEstimator {
   /// result with the prior counts nothing twice.
   EgoVelocity estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior = std::nullopt) const;
 
-  /// Learns the step of the Doppler, and the thresholds that follow from it. Call it once per scan, before
-  /// `estimate`, whether the scan is used or not.
+  /// Learns the step of the Doppler, the thresholds that follow from it, and how far the directions spread.
+  /// Call it once per scan, before `estimate`, whether the scan is used or not.
   void observe(const RadarScan& scan);
 
   /// Compares a scan that has no velocity of its own with a prior. The inliers are the points within three
