@@ -76,10 +76,20 @@ struct DopplerScan {
 
 /// 1.7 and 2.9 degrees, without and with a bin.
 PointVariances dopplerNoise(double step) {
-  return {0.03 * 0.03, 0.03 * 0.03, 0.05 * 0.05, step * step / 12.0};
+  PointVariances noise;
+  noise.doppler = 0.03 * 0.03;
+  noise.azimuth = 0.03 * 0.03;
+  noise.elevation = 0.05 * 0.05;
+  noise.quantization = step * step / 12.0;
+  return noise;
 }
 /// Dopplers whose residuals are linear.
-PointVariances gaussian() { return {0.03 * 0.03, 0.0, 0.0, 0.0, 0.0}; }
+PointVariances gaussian() {
+  PointVariances noise;
+  noise.doppler = 0.03 * 0.03;
+  noise.outlier_density = 0.0;
+  return noise;
+}
 
 using RowJacobian = Eigen::Matrix<double, 1, DopplerScan::kStored>;
 
