@@ -3,7 +3,6 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
-#include <optional>
 #include <vector>
 
 #include "rio_t/radar/ego_velocity.h"
@@ -184,30 +183,6 @@ TEST(EgoVelocityNoise, AnAngleThatTheMotionDoesNotShowStaysAsItWas) {
   learnFrom(estimator, {0.0, 0.0, 1.5}, kSimulatedRadar, 1000);
   EXPECT_NEAR(std::sqrt(estimator.noise().azimuth), 0.03, 0.003);
   EXPECT_NEAR(std::sqrt(estimator.noise().elevation), 0.0785, 0.008);
-}
-
-/// Elevations that are as noisy as they spread: the velocity of the scan is too small, and so are its
-/// residuals.
-TEST(EgoVelocityNoise, APriorShowsNoiseThatIsAsLargeAsTheSpread) {
-  const ScanNoise noise{0.035, 0.1, 0.02, 0.0};
-  const auto learned = [&](bool with_prior) {
-    EgoVelocityOptions o = startingAt(0.03, 0.05, 0.035);
-    o.doppler_quantization = kNoStep;
-    EgoVelocityEstimator estimator(o);
-    Random random(42);
-    for (int i = 0; i < 1000; ++i) {
-      const Eigen::Vector3d v_R = random.uniform(0.75, 1.25) * Eigen::Vector3d(0.4, 1.2, -0.5);
-      const RadarScan scan = staticScene(v_R, 20, noise, random, 0.17);
-      VelocityPrior prior{v_R, 0.03 * 0.03 * Eigen::Matrix3d::Identity()};
-      for (int axis = 0; axis < 3; ++axis) prior.v_R[axis] += 0.03 * random.normal();
-      estimator.observe(scan);
-      estimator.learn(scan, estimator.estimate(scan, prior),
-                      with_prior ? std::optional<VelocityPrior>(prior) : std::nullopt);
-    }
-    return std::sqrt(estimator.noise().elevation);
-  };
-  EXPECT_LT(learned(false), 0.08);
-  EXPECT_NEAR(learned(true), noise.elevation, 0.01);
 }
 
 TEST(EgoVelocityNoise, HowFarTheAnglesSpreadIsLearnedAtRestToo) {

@@ -1,6 +1,5 @@
 #include "rio_t/radar/ego_velocity.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -195,21 +194,13 @@ DopplerLikelihood EgoVelocityEstimator::likelihood(const RadarScan& scan,
   return DopplerLikelihood(directions, v_R, shownBy(directions, v_R, noise(), options_));
 }
 
-void EgoVelocityEstimator::learn(const RadarScan& scan, const EgoVelocity& estimated,
-                                 const std::optional<VelocityPrior>& prior) {
+void EgoVelocityEstimator::learn(const RadarScan& scan, const EgoVelocity& estimated) {
   if (estimated.status != EgoVelocityStatus::kMoving) return;
   std::vector<RadarDirection> points = filter(scan, options_);
   span_.learn(points, estimated.v_R, options_.doppler_quantization);
   if (options_.solver != EgoVelocitySolver::kErrorsInVariables) return;
   unwrap(points, estimated.v_R, span_.value());
-  Eigen::Vector3d v_R = estimated.v_R;
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-  if (prior) {
-    information = prior->covariance.inverse();
-    const Eigen::Matrix3d of_scan = estimated.covariance.inverse();
-    v_R = (information + of_scan).inverse() * (information * prior->v_R + of_scan * estimated.v_R);
-  }
-  noise_.learn(points, estimated.inliers, v_R, information);
+  noise_.learn(points, estimated.inliers, estimated.v_R);
 }
 
 bool hasMajority(const EgoVelocity& velocity) {

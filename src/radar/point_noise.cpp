@@ -53,10 +53,10 @@ Eigen::Vector3d vectorOf(const PointVariances& noise) {
 PointNoise::PointNoise(const PointVariances& start) : start_(vectorOf(start)), variances_(start) {}
 
 void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vector<std::size_t>& inliers,
-                       const Eigen::Vector3d& v_R, const Eigen::Matrix3d& prior) {
+                       const Eigen::Vector3d& v_R) {
   learnOutliers(points, v_R);
   if (v_R.squaredNorm() >= square(kMinSpeed) * 12.0 * variances_.quantization)
-    learnVariances(points, inliers, v_R, prior);
+    learnVariances(points, inliers, v_R);
 }
 
 void PointNoise::learnSpread(const std::vector<RadarDirection>& points) {
@@ -89,8 +89,7 @@ void PointNoise::learnOutliers(const std::vector<RadarDirection>& points, const 
 }
 
 void PointNoise::learnVariances(const std::vector<RadarDirection>& points,
-                                const std::vector<std::size_t>& inliers, const Eigen::Vector3d& v_R,
-                                const Eigen::Matrix3d& prior) {
+                                const std::vector<std::size_t>& inliers, const Eigen::Vector3d& v_R) {
   const PointVariances& noise = variances_;
   const auto variance = [&](const Eigen::Vector3d& shares) {
     return std::max(kMinVariance, noise.quantization + shares.dot(vectorOf(noise)));
@@ -102,7 +101,7 @@ void PointNoise::learnVariances(const std::vector<RadarDirection>& points,
     return true;
   };
 
-  Eigen::Matrix3d normal = prior;
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   for (const RadarDirection& p : points) {
     if (is_inlier(p)) normal += p.u_R * p.u_R.transpose() / variance(noiseShares(Angles(p.u_R), v_R, noise));
   }

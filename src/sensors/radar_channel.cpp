@@ -147,7 +147,7 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
     answer.prediction_covariance = seen.prior->covariance;
   }
   if (!answer.at_rest) {
-    estimator_.learn(seen.pooled, measured, seen.moves && !context.has_diverged ? seen.prior : std::nullopt);
+    estimator_.learn(seen.pooled, measured);
     learned_at_ = scan.stamp;
   }
   return answer;

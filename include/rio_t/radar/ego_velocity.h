@@ -131,9 +131,7 @@ class EgoVelocityEstimator {
 
   /// Learns the noise of the points from the result of `estimate` for this scan, for the scans to come. Only
   /// the errors-in-variables solver uses it. Call it once per scan, in motion, if the velocity was used.
-  /// Noise that is as large as the spread of the points hides in their own velocity; a prior shows it.
-  void learn(const RadarScan& scan, const EgoVelocity& estimated,
-             const std::optional<VelocityPrior>& prior = std::nullopt);
+  void learn(const RadarScan& scan, const EgoVelocity& estimated);
   /// The noise as learned so far.
   const PointVariances& noise() const { return noise_.variances(); }
   DopplerStep dopplerStep() const { return grid_.step(); }

@@ -51,10 +51,9 @@ class PointNoise {
 
   /// Learns from a scan. `points` passed the filter; `inliers` are the indices of those that `v_R` was solved
   /// from. Both are in the order of the scan. `learn` also takes the other points, as far as they may belong
-  /// to the static world: otherwise the known noise would cut off its own tails. `prior` is the information
-  /// on `v_R` that is not of these points [s^2/m^2].
+  /// to the static world: otherwise the known noise would cut off its own tails.
   void learn(const std::vector<RadarDirection>& points, const std::vector<std::size_t>& inliers,
-             const Eigen::Vector3d& v_R, const Eigen::Matrix3d& prior = Eigen::Matrix3d::Zero());
+             const Eigen::Vector3d& v_R);
   /// Learns how far the directions of a scan spread, moving or not. `points` passed the filter.
   void learnSpread(const std::vector<RadarDirection>& points);
   /// Sets the quantisation once it is known [m^2/s^2]. Earlier scans were learned with another one; they fade
@@ -69,7 +68,7 @@ class PointNoise {
  private:
   void learnOutliers(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R);
   void learnVariances(const std::vector<RadarDirection>& points, const std::vector<std::size_t>& inliers,
-                      const Eigen::Vector3d& v_R, const Eigen::Matrix3d& prior);
+                      const Eigen::Vector3d& v_R);
   void solve();
 
   // Vectors and matrices are of the variances of Doppler, azimuth and elevation.
