@@ -181,7 +181,7 @@ Outcome outcome(const std::string& motion, std::uint64_t seed, bool landmarks,
 
 TEST(Landmarks, HoldThePositionInARoom) {
   double with = 0.0, without = 0.0, nees = 0.0;
-  constexpr int kSeeds = 5;
+  constexpr int kSeeds = 5;  // of the first three, one has almost no drift to remove
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     const Outcome off = outcome("difficult", seed, false), on = outcome("difficult", seed, true);
     std::printf("seed %d: %.4f m without, %.4f m with, NEES %.2f, %.0f matches, map %zu\n",

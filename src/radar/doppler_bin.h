@@ -4,6 +4,10 @@
 
 namespace rio_t {
 
+/// [m^2/s^2] Least variance of a Doppler: a point without noise would have infinite weight. It is a hundredth
+/// of that of any radar known.
+constexpr double kMinDopplerVariance = 1e-6;
+
 /// Probability that a value with the error `e` and the noise `sigma` falls into a bin of half width
 /// `half_bin` around it (docs/method.md, eq. 19a, times the width).
 inline double binProbability(double e, double sigma, double half_bin) {

@@ -8,7 +8,6 @@
 
 #include "direction_noise.h"
 #include "doppler_bin.h"
-#include "doppler_scatter.h"
 
 namespace rio_t {
 namespace {

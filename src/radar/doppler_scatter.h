@@ -8,9 +8,6 @@
 
 namespace rio_t {
 
-/// [m^2/s^2] Least variance of the noise of a Doppler: a point without any would have infinite weight. It is
-/// a hundredth of that of any radar known.
-constexpr double kMinDopplerVariance = 1e-6;
 /// The noise told, with more Doppler noise if the errors of the points at `v_R` surely scatter by more than
 /// it says. A radar may be noisier than it was said to be, and what is learned comes late.
 PointVariances withScatter(const PointVariances& told, const std::vector<RadarDirection>& points,

@@ -28,9 +28,9 @@ Eigen::Matrix3d meanOuterProduct(const std::vector<RadarDirection>& points) {
   return mean / static_cast<double>(points.size());
 }
 
-/// What the bins of width q say about the velocity, as a factor of M = H'H / n. A point reads its bin only
-/// while |d + u . v| < q/2. So v lies in the ellipsoid (v - v_0)' M (v - v_0) < q^2/4. A uniform density over
-/// an ellipsoid in 3D has the covariance M^-1 (q^2/4) / 5. More points do not help. Noise of the Doppler
+/// The bins of width q give the velocity the information M = H'H / n times this factor. A point reads its bin
+/// only while |d + u . v| < q/2. So v lies in the ellipsoid (v - v_0)' M (v - v_0) < q^2/4. A uniform density
+/// over an ellipsoid in 3D has the covariance M^-1 (q^2/4) / 5. More points do not help. Noise of the Doppler
 /// blurs the edge of the bin, and adds its variance.
 double binInformation(double q, double doppler_variance) {
   return 1.0 / (square(q) / 20.0 + doppler_variance);
@@ -84,6 +84,7 @@ std::optional<VelocitySolution> fitSlowMotion(const std::vector<RadarDirection>&
   Eigen::Matrix3d information = cost.information;
   if (o.doppler_quantization > 0.0)
     information += binInformation(o.doppler_quantization, noise.doppler) * meanOuterProduct(points);
+  solution.solved = information.determinant() > 0.0;
   solution.covariance = information.inverse();
   return solution;
 }

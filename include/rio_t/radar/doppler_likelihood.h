@@ -36,7 +36,7 @@ Eigen::Vector3d solveTransposed(const Eigen::Matrix3d& U, const Eigen::Vector3d&
 /// - Bin: a bin wider than the noise bounds the velocity along the ray and does not pull it to the centre.
 /// - Noise of the direction: it widens the sigma of a residual, and it shortens the velocity of plain least
 ///   squares. Many points undo the latter by the derivative of that sigma (total least squares); few points
-///   by the direction that earlier scans let expect (regression calibration).
+///   by a direction between the measured one and the mean of earlier scans (regression calibration).
 /// - Outliers: the residual is bounded, so that an outlier has no weight (a redescending loss).
 class DopplerLikelihood {
  public:
