@@ -116,10 +116,10 @@ std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasuremen
   return (this->*original)(imu);
 }
 
-std::vector<ScanResult> RadarInertialOdometry::process() {
+std::vector<ScanResult> RadarInertialOdometry::process(std::size_t max_scans) {
   static const auto original = libraryFunction(&RadarInertialOdometry::process);
   const Scope scope(Stage::kPipeline);
-  return (this->*original)();
+  return (this->*original)(max_scans);
 }
 
 void RunOutput::addState(const NavigationState& state) {
