@@ -29,19 +29,24 @@ PointVariances simulatedRadar(double step) { return variances(0.02, 0.0436, 0.07
 /// Draws scans of static points. Earlier scans have shown how far the points spread.
 class Scene {
  public:
-  explicit Scene(const PointVariances& noise_in, double elevation_spread_in = 0.35)
-      : noise(noise_in), elevation_spread(elevation_spread_in) {
-    noise.azimuths = {0.0, kAzimuthSpread * kAzimuthSpread / 3.0 + noise.azimuth};
-    noise.elevations = {0.0, elevation_spread * elevation_spread / 3.0 + noise.elevation};
+  /// `mean_elevation_sigma` [rad] is how far scans look up and down.
+  explicit Scene(const PointVariances& noise_in, double elevation_spread_in = 0.35,
+                 double mean_elevation_sigma = 0.0)
+      : noise(noise_in), elevation_spread(elevation_spread_in), mean_elevation_sigma_(mean_elevation_sigma) {
+    const double azimuths = kAzimuthSpread * kAzimuthSpread / 3.0 + noise.azimuth;
+    const double elevations = elevation_spread * elevation_spread / 3.0 + noise.elevation;
+    noise.azimuths = {0.0, azimuths, azimuths};
+    noise.elevations = {0.0, elevations + mean_elevation_sigma * mean_elevation_sigma, elevations};
   }
   double normal() { return draw_(); }
   Eigen::Vector3d vector() { return draw_.vector(); }
   std::vector<RadarDirection> scan(const Eigen::Vector3d& v_R, std::size_t points) {
     const double step = std::sqrt(12.0 * noise.quantization);
     std::vector<RadarDirection> result;
+    const double mean_elevation = mean_elevation_sigma_ > 0.0 ? mean_elevation_sigma_ * draw_() : 0.0;
     for (std::size_t i = 0; i < points; ++i) {
       const double azimuth = angle_.uniform(-kAzimuthSpread, kAzimuthSpread);
-      const double elevation = angle_.uniform(-elevation_spread, elevation_spread);
+      const double elevation = mean_elevation + angle_.uniform(-elevation_spread, elevation_spread);
       double doppler = -direction(azimuth, elevation).dot(v_R) + std::sqrt(noise.doppler) * draw_();
       if (step > 0.0) doppler = step * std::round(doppler / step);
       const double measured_azimuth = azimuth + std::sqrt(noise.azimuth) * draw_();
@@ -56,6 +61,7 @@ class Scene {
 
  private:
   static constexpr double kAzimuthSpread = 0.9;
+  double mean_elevation_sigma_;
   Noise draw_{20};
   Random angle_{21};
 };
@@ -278,6 +284,18 @@ TEST(DopplerLikelihood, FewPointsDoNotShortenTheVelocityEither) {
   const MonteCarlo result = monteCarlo(Scene(simulatedRadar(0.0)), v_R, 6, 0.1);
   EXPECT_LT(result.least_squares_bias.z(), -0.05);
   EXPECT_LT(largest(result.bias), 0.25 * largest(result.least_squares_bias)) << result.bias.transpose();
+}
+
+/// A radar that pitches looks at the floor and then at the ceiling. That the scans spread says nothing of the
+/// spread within a scan.
+TEST(DopplerLikelihood, ScansThatLookUpAndDownDoNotShortenTheVelocityEither) {
+  const Eigen::Vector3d v_R(0.1, 1.5, 0.4);
+  Scene scene(variances(0.02, 0.03, 0.115, 0.0), 0.2, 0.3);
+  const MonteCarlo result = monteCarlo(scene, v_R, 20, 0.1);
+  EXPECT_LT(result.least_squares_bias.z(), -0.1);
+  EXPECT_LT(largest(result.bias), 0.25 * largest(result.least_squares_bias)) << result.bias.transpose();
+  scene.noise.elevations.within = scene.noise.elevations.variance;
+  EXPECT_GT(largest(monteCarlo(scene, v_R, 20, 0.1).bias), 2.0 * largest(result.bias));
 }
 
 TEST(DopplerLikelihood, WhatAPlanarScanDoesNotSeeStaysWhereItWas) {

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <cmath>
 #include <vector>
 
@@ -194,8 +195,22 @@ TEST(EgoVelocityNoise, HowFarTheAnglesSpreadIsLearnedAtRestToo) {
   const double noise = kSimulatedRadar.elevation * kSimulatedRadar.elevation;
   EXPECT_NEAR(elevations.mean, 0.0, 0.01);
   EXPECT_NEAR(elevations.variance, 0.2 * 0.2 / 3.0 + noise, 0.001);
-  EXPECT_NEAR(elevations.trueShare(noise), 0.684, 0.03);
-  EXPECT_NEAR(estimator.noise().azimuths.trueShare(0.0), 1.0, 1e-12);
+  EXPECT_NEAR(elevations.within, elevations.variance, 0.0005);  // the scans look the same way
+}
+
+TEST(EgoVelocityNoise, ScansThatLookUpAndDownSpreadNoFartherWithin) {
+  EgoVelocityEstimator estimator((EgoVelocityOptions()));
+  Random random(41);
+  for (int i = 0; i < 300; ++i) {
+    RadarScan scan = staticScene(Eigen::Vector3d::Zero(), 20, {0, 0, 0.02, 0.125}, random, 0.2);
+    const Eigen::AngleAxisd pitch(i % 2 == 0 ? 0.3 : -0.3, Eigen::Vector3d::UnitX());
+    for (RadarPoint& p : scan.points) p.position_R = pitch * p.position_R;
+    estimator.observe(scan);
+  }
+  // A pitch moves points at the side less than points ahead.
+  const AngleSpread& elevations = estimator.noise().elevations;
+  EXPECT_LT(elevations.within, 0.5 * elevations.variance);
+  EXPECT_NEAR(elevations.within, 0.2 * 0.2 / 3.0, 0.005);
 }
 
 TEST(EgoVelocityNoise, NoneIsLearnedSafely) {

@@ -2,8 +2,10 @@
 
 #include <Eigen/Core>
 #include <cmath>
+#include <vector>
 
 #include "rio_t/radar/point_noise.h"
+#include "rio_t/radar/scan.h"
 
 namespace rio_t {
 
@@ -11,6 +13,16 @@ inline double square(double a) { return a * a; }
 
 inline double azimuthOf(const Eigen::Vector3d& u) { return std::atan2(u.x(), u.y()); }
 inline double elevationOf(const Eigen::Vector3d& u) { return std::atan2(u.z(), std::hypot(u.x(), u.y())); }
+inline std::vector<double> azimuthsOf(const std::vector<RadarDirection>& points) {
+  std::vector<double> angles;
+  for (const RadarDirection& p : points) angles.push_back(azimuthOf(p.u_R));
+  return angles;
+}
+inline std::vector<double> elevationsOf(const std::vector<RadarDirection>& points) {
+  std::vector<double> angles;
+  for (const RadarDirection& p : points) angles.push_back(elevationOf(p.u_R));
+  return angles;
+}
 inline Eigen::Vector3d directionOf(double azimuth, double elevation) {
   return {std::cos(elevation) * std::sin(azimuth), std::cos(elevation) * std::cos(azimuth),
           std::sin(elevation)};

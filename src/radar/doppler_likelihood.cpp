@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "angle_regression.h"
 #include "direction_noise.h"
 #include "doppler_bin.h"
 
@@ -104,23 +105,22 @@ Eigen::Vector3d solveTransposed(const Eigen::Matrix3d& U, const Eigen::Vector3d&
 // - Many points show by themselves how far they spread. Then the sigma of a residual grows with the velocity,
 //   and its derivative undoes it (`shown`: errors in variables).
 // - Few points do not. Then the true angle is expected nearer to the mean than the measured one, by what
-//   earlier scans have shown (`left`, after a regression). The error of this angle is not in the direction.
+//   earlier scans have shown (`left`, after the regression). The error of this angle is not in the direction.
 DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
                                      const PointVariances& noise)
     : half_bin_(std::sqrt(3.0 * noise.quantization)), smallest_sigma_(std::numeric_limits<double>::max()) {
-  std::vector<double> azimuths, elevations;
-  for (const RadarDirection& p : points) {
-    azimuths.push_back(azimuthOf(p.u_R));
-    elevations.push_back(elevationOf(p.u_R));
-  }
+  const std::vector<double> azimuths = azimuthsOf(points);
+  const std::vector<double> elevations = elevationsOf(points);
+  const AngleRegression by_azimuth(azimuths, noise.azimuth, noise.azimuths);
+  const AngleRegression by_elevation(elevations, noise.elevation, noise.elevations);
   const bool shows_azimuth = showsSpread(azimuths, noise.azimuth);
   const bool shows_elevation = showsSpread(elevations, noise.elevation);
   PointVariances shown = noise;
   PointVariances left;
   (shows_azimuth ? left : shown).azimuth = 0.0;
   (shows_elevation ? left : shown).elevation = 0.0;
-  if (!shows_azimuth) left.azimuth = noise.azimuths.remaining(noise.azimuth);
-  if (!shows_elevation) left.elevation = noise.elevations.remaining(noise.elevation);
+  if (!shows_azimuth) left.azimuth = by_azimuth.remaining();
+  if (!shows_elevation) left.elevation = by_elevation.remaining();
 
   const double shorter = std::exp(-0.5 * (left.azimuth + left.elevation));  // the mean of such directions
   const MomentCorrection correct(shown.azimuth, shown.elevation);
@@ -128,9 +128,8 @@ DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, 
   const double along_el = 0.75 * shown.elevation + 0.25 * shown.azimuth;
   points_.reserve(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const double azimuth = shows_azimuth ? azimuths[i] : noise.azimuths.expected(azimuths[i], noise.azimuth);
-    const double elevation =
-        shows_elevation ? elevations[i] : noise.elevations.expected(elevations[i], noise.elevation);
+    const double azimuth = shows_azimuth ? azimuths[i] : by_azimuth.expected(azimuths[i]);
+    const double elevation = shows_elevation ? elevations[i] : by_elevation.expected(elevations[i]);
     const Eigen::Vector3d expected = directionOf(azimuth, elevation);
     const double fixed_variance =
         noise.doppler + kMinDopplerVariance + residualVariance(Angles(expected), v_R, left);

@@ -37,13 +37,6 @@ double inlierProbability(double residual, double variance, const PointVariances&
 /// Share of a new scan in what is known, after so many scans.
 double forgotten(double scans) { return std::max(1.0 / kMemory, 1.0 / (scans + 1.0)); }
 
-void addTo(Eigen::Vector3d& moments, double angle) { moments += Eigen::Vector3d(1.0, angle, angle * angle); }
-
-AngleSpread spreadOf(const Eigen::Vector3d& moments) {
-  const double mean = moments[1] / moments[0];
-  return {mean, moments[2] / moments[0] - mean * mean};
-}
-
 Eigen::Vector3d vectorOf(const PointVariances& noise) {
   return {noise.doppler, noise.azimuth, noise.elevation};
 }
@@ -61,15 +54,31 @@ void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vec
 
 void PointNoise::learnSpread(const std::vector<RadarDirection>& points) {
   if (points.empty()) return;
-  const double kept = 1.0 - 1.0 / kMemory;
-  azimuth_moments_ *= kept;
-  elevation_moments_ *= kept;
-  for (const RadarDirection& p : points) {
-    addTo(azimuth_moments_, azimuthOf(p.u_R));
-    addTo(elevation_moments_, elevationOf(p.u_R));
+  constexpr double kKept = 1.0 - 1.0 / kMemory;
+  azimuth_moments_.add(azimuthsOf(points), kKept);
+  elevation_moments_.add(elevationsOf(points), kKept);
+  variances_.azimuths = azimuth_moments_.spread();
+  variances_.elevations = elevation_moments_.spread();
+}
+
+void PointNoise::AngleMoments::add(const std::vector<double>& angles, double kept) {
+  const auto n = static_cast<double>(angles.size());
+  double sum = 0.0, squares = 0.0;
+  for (const double angle : angles) {
+    sum += angle;
+    squares += square(angle);
   }
-  variances_.azimuths = spreadOf(azimuth_moments_);
-  variances_.elevations = spreadOf(elevation_moments_);
+  all = kept * all + Eigen::Vector3d(n, sum, squares);
+  within = kept * within + squares - sum * sum / n;
+  freedom = kept * freedom + n - 1.0;
+}
+
+AngleSpread PointNoise::AngleMoments::spread() const {
+  AngleSpread spread;
+  spread.mean = all[1] / all[0];
+  spread.variance = std::max(0.0, all[2] / all[0] - square(spread.mean));
+  spread.within = freedom > 0.0 ? std::min(within / freedom, spread.variance) : spread.variance;
+  return spread;
 }
 
 void PointNoise::learnOutliers(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R) {

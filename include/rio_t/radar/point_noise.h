@@ -14,16 +14,11 @@ namespace rio_t {
 constexpr double kMinOutlierDensity = 0.001;
 constexpr double kMaxOutlierDensity = 0.1;
 
-/// How an angle of the reported points is distributed, its noise included.
+/// How an angle of the reported points is distributed, its noise included [rad^2]. Infinite: not known.
 struct AngleSpread {
-  double mean = 0.0;                                          ///< [rad]
-  double variance = std::numeric_limits<double>::infinity();  ///< [rad^2] infinite: not known
-
-  /// Share of the variance that is not noise. `noise` is the variance of a measured angle [rad^2].
-  double trueShare(double noise) const { return variance > noise ? 1.0 - noise / variance : 0.0; }
-  /// The true angle of a point, by linear regression on the measured one, and the variance of its error.
-  double expected(double measured, double noise) const { return mean + trueShare(noise) * (measured - mean); }
-  double remaining(double noise) const { return trueShare(noise) * noise; }
+  double mean = 0.0;                                          ///< of all points [rad]
+  double variance = std::numeric_limits<double>::infinity();  ///< about it
+  double within = std::numeric_limits<double>::infinity();    ///< about the mean of their scan
 };
 
 /// Noise of a point, independent from point to point, and what points to expect.
@@ -71,14 +66,22 @@ class PointNoise {
                       const Eigen::Vector3d& v_R);
   void solve();
 
+  /// Sums over the points of earlier scans.
+  struct AngleMoments {
+    Eigen::Vector3d all = Eigen::Vector3d::Zero();  // of the powers 0, 1 and 2
+    double within = 0.0;                            // squares about the mean of the scan
+    double freedom = 0.0;                           // of these squares
+    void add(const std::vector<double>& angles, double kept);
+    AngleSpread spread() const;
+  };
+
   // Vectors and matrices are of the variances of Doppler, azimuth and elevation.
   Eigen::Vector3d start_;  // read-only after construction
   PointVariances variances_;
   Eigen::Matrix3d information_ = Eigen::Matrix3d::Zero();         // of the scans
   Eigen::Vector3d information_vector_ = Eigen::Vector3d::Zero();  // that times the variances
   Eigen::Vector3d mean_shares_ = Eigen::Vector3d::Zero();         // of the variances in that of a residual
-  Eigen::Vector3d azimuth_moments_ = Eigen::Vector3d::Zero();     // sums of the powers 0, 1 and 2
-  Eigen::Vector3d elevation_moments_ = Eigen::Vector3d::Zero();
+  AngleMoments azimuth_moments_, elevation_moments_;
   double scans_ = 0.0;              // that taught the variances
   double scans_of_outliers_ = 0.0;  // that taught the density of outliers
 };

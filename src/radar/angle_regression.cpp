@@ -1,0 +1,28 @@
+#include "angle_regression.h"
+
+#include <cmath>
+#include <numeric>
+
+namespace rio_t {
+namespace {
+
+/// Share of a variance that is not noise.
+double trueShare(double variance, double noise) { return variance > noise ? 1.0 - noise / variance : 0.0; }
+
+}  // namespace
+
+AngleRegression::AngleRegression(const std::vector<double>& measured, double noise,
+                                 const AngleSpread& spread) {
+  const auto n = static_cast<double>(measured.size());
+  scan_mean_ = std::accumulate(measured.begin(), measured.end(), 0.0) / n;
+  mean_ = scan_mean_;
+  remaining_ = noise;
+  if (!std::isfinite(spread.variance)) return;
+  share_ = trueShare(spread.within, noise);
+  const double of_means = spread.variance - spread.within + spread.within / n;
+  const double mean_share = trueShare(of_means, noise / n);
+  mean_ = spread.mean + mean_share * (scan_mean_ - spread.mean);
+  remaining_ = noise * (share_ * (1.0 - 1.0 / n) + mean_share / n);
+}
+
+}  // namespace rio_t

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <vector>
+
+#include "rio_t/radar/point_noise.h"
+
+namespace rio_t {
+
+/// The true angles of the points of a scan, by linear regression on the measured ones: a point is expected
+/// between where it was measured and the mean of its scan, and this mean between where it was measured and
+/// that of earlier scans. The error of an expected angle does not correlate with it (docs/method.md, section
+/// 5.7).
+class AngleRegression {
+ public:
+  /// `measured` are the angles of the scan [rad], at least one. `noise` is the variance of one [rad^2].
+  AngleRegression(const std::vector<double>& measured, double noise, const AngleSpread& spread);
+  double expected(double measured) const { return mean_ + share_ * (measured - scan_mean_); }
+  double remaining() const { return remaining_; }  ///< variance of the error of `expected` [rad^2]
+
+ private:
+  double scan_mean_ = 0.0;
+  double mean_ = 0.0;  // expected
+  double share_ = 1.0;
+  double remaining_ = 0.0;
+};
+
+}  // namespace rio_t

@@ -1,0 +1,69 @@
+// The expected angles of a scan: between the measured ones, the mean of the scan, and that of earlier scans.
+#include "../src/radar/angle_regression.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "noise.h"
+
+namespace rio_t {
+namespace {
+
+TEST(AngleRegression, WithoutEarlierScansTheMeasuredAngleIsExpected) {
+  const AngleRegression regression({0.1, -0.3, 0.4}, 0.02, AngleSpread());
+  EXPECT_DOUBLE_EQ(regression.expected(0.4), 0.4);
+  EXPECT_DOUBLE_EQ(regression.remaining(), 0.02);
+}
+
+TEST(AngleRegression, WithoutNoiseTheMeasuredAngleIsExpected) {
+  const AngleRegression regression({0.1, -0.3, 0.4}, 0.0, {0.2, 0.05, 0.04});
+  EXPECT_NEAR(regression.expected(0.4), 0.4, 1e-12);
+  EXPECT_NEAR(regression.remaining(), 0.0, 1e-12);
+}
+
+/// A radar without elevation may report it as noise.
+TEST(AngleRegression, IfAllIsNoiseTheMeanIsExpected) {
+  const AngleRegression regression({0.1, -0.3, 0.5}, 0.05, {0.2, 0.05, 0.05});
+  EXPECT_NEAR(regression.expected(0.5), 0.2, 1e-12);
+  EXPECT_NEAR(regression.remaining(), 0.0, 1e-12);
+}
+
+/// A scan of one point has no spread: what counts is the spread of all points.
+TEST(AngleRegression, OnePointIsExpectedBetweenItselfAndTheMeanOfAll) {
+  const AngleRegression regression({0.5}, 0.02, {0.1, 0.08, 0.05});
+  EXPECT_NEAR(regression.expected(0.5), 0.1 + 0.75 * 0.4, 1e-12);
+  EXPECT_NEAR(regression.remaining(), 0.75 * 0.02, 1e-12);
+}
+
+/// The error is as large as stated, and does not correlate with the expected angle.
+TEST(AngleRegression, ItsErrorDoesNotCorrelateWithIt) {
+  const double within = 0.1, of_means = 0.2, noise = 0.12;  // sigmas [rad]
+  const AngleSpread spread{0.05, within * within + of_means * of_means + noise * noise,
+                           within * within + noise * noise};
+  Noise draw(7);
+  double variance = 0.0, covariance = 0.0, of_expected = 0.0, remaining = 0.0;
+  constexpr int kScans = 20000, kPoints = 5;
+  for (int k = 0; k < kScans; ++k) {
+    const double mean = spread.mean + of_means * draw();
+    std::vector<double> truth, measured;
+    for (int i = 0; i < kPoints; ++i) {
+      truth.push_back(mean + within * draw());
+      measured.push_back(truth.back() + noise * draw());
+    }
+    const AngleRegression regression(measured, noise * noise, spread);
+    remaining = regression.remaining();
+    for (int i = 0; i < kPoints; ++i) {
+      const double expected = regression.expected(measured[i]);
+      const double error = truth[i] - expected;
+      variance += error * error / (kScans * kPoints);
+      covariance += error * (expected - spread.mean) / (kScans * kPoints);
+      of_expected += (expected - spread.mean) * (expected - spread.mean) / (kScans * kPoints);
+    }
+  }
+  EXPECT_NEAR(variance, remaining, 0.02 * remaining);
+  EXPECT_LT(std::abs(covariance), 0.02 * of_expected);
+}
+
+}  // namespace
+}  // namespace rio_t
