@@ -186,6 +186,16 @@ TEST(EgoVelocityNoise, AnAngleThatTheMotionDoesNotShowStaysAsItWas) {
   EXPECT_NEAR(std::sqrt(estimator.noise().elevation), 0.0785, 0.008);
 }
 
+/// A coarse radar at 1.05 to 1.75 m/s, where three steps are 1.47 m/s.
+TEST(EgoVelocityNoise, IsLearnedAboveThreeStepsOfTheDoppler) {
+  const ScanNoise coarse{0.03, 0.14, 0.03, 0.49};
+  EgoVelocityOptions o = startingAt(0.03, 0.05, 0.035);
+  o.doppler_quantization = coarse.quantization;
+  EgoVelocityEstimator estimator(o);
+  learnFrom(estimator, {0.15, 1.3, 0.5}, coarse, 1500);
+  EXPECT_NEAR(std::sqrt(estimator.noise().elevation), coarse.elevation, 0.25 * coarse.elevation);
+}
+
 TEST(EgoVelocityNoise, HowFarTheAnglesSpreadIsLearnedAtRestToo) {
   EgoVelocityEstimator estimator((EgoVelocityOptions()));
   Random random(41);
@@ -250,7 +260,7 @@ TEST(EgoVelocityNoise, IsNotLearnedWithoutNeed) {
   };
   EXPECT_TRUE(learns(EgoVelocityEstimator(o), kDrive));
   EXPECT_FALSE(learns(EgoVelocityEstimator(o), Eigen::Vector3d::Zero()));
-  EXPECT_FALSE(learns(EgoVelocityEstimator(o), {0.0, 0.4, 0.0}));  // the step hides too much
+  EXPECT_FALSE(learns(EgoVelocityEstimator(o), {0.0, 0.35, 0.0}));  // the step hides too much
   EXPECT_FALSE(learns(EgoVelocityEstimator(bareOptions(EgoVelocitySolver::kLeastSquares)), kDrive));
 }
 

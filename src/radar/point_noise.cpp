@@ -16,8 +16,8 @@ constexpr double kStartPoints = 10.0;
 /// least, to 3 %.
 constexpr double kMemory = 1000.0;
 /// [steps of the Doppler] At a lower speed most points lie in a few bins, and the error of the step is
-/// neither even nor independent of the direction.
-constexpr double kMinSpeed = 4.0;
+/// neither even nor independent of the direction: at two steps it passes for three times the azimuth noise.
+constexpr double kMinSpeed = 3.0;
 /// [m/s] Residuals up to this size show how many outliers there are.
 constexpr double kOutlierSpan = 1.0;
 /// An angle or a Doppler with more noise is no measurement.

@@ -39,7 +39,7 @@ struct PointVariances {
 /// the Doppler. This effect differs from point to point, so a regression of the squared residuals gives all
 /// three (docs/method.md, section 9). The start counts as a few points. If the motion does not show an angle,
 /// its noise remains that of the start. The density of the outliers is learned at any speed, the noise above
-/// four steps of the Doppler. How the angles spread is learned from every scan.
+/// three steps of the Doppler. How the angles spread is learned from every scan.
 class PointNoise {
  public:
   explicit PointNoise(const PointVariances& start);
