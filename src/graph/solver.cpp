@@ -174,10 +174,9 @@ Solution solveByCeres(Window& window, const SolverLimits& limits) {
   StopEarly stop_early(window, limits.short_step);
   options.callbacks = {&stop_early};
   std::vector<int> held;
-  const auto setHeld = [&](const std::vector<int>& indices) {
+  const auto release = [&] {
     for (const int i : held) window.setConstant(*window.blocks()[i], false);
-    held = indices;
-    for (const int i : held) window.setConstant(*window.blocks()[i], true);
+    return std::exchange(held, {});
   };
   int iterations = 0;
   for (;;) {
@@ -187,8 +186,7 @@ Solution solveByCeres(Window& window, const SolverLimits& limits) {
     iterations += std::max(1, static_cast<int>(summary.iterations.size()) - 1);
     for (const auto& block : window.blocks())
       if (isBeyondBound(*block)) block->x[0] = std::copysign(block->bound, block->x[0]);
-    const std::vector<int> held_before = held;
-    setHeld({});
+    const std::vector<int> held_before = release();
     Solution solution = linearized(window);
     solution.iterations = iterations;
     const std::vector<int> outwards = pushedOutwards(window, solution.normal_equations);
@@ -203,7 +201,8 @@ Solution solveByCeres(Window& window, const SolverLimits& limits) {
       solution.termination = SolverTermination::kNoDecrease;
       return solution;
     }
-    setHeld(outwards);
+    held = outwards;
+    for (const int i : held) window.setConstant(*window.blocks()[i], true);
   }
 }
 

@@ -36,8 +36,8 @@ Steps stepsOf(const std::vector<ImuMeasurement>& imu) {
   Time begin = imu.front().time;
   for (const ImuMeasurement& sample : imu) {
     if (sample.time - begin > kMeanWidth && count > 0.0) {
-      steps.force.push_back(force / count);
-      rates.push_back(rate / count);
+      steps.force.emplace_back(force / count);
+      rates.emplace_back(rate / count);
       force.setZero();
       rate.setZero();
       count = 0.0;
@@ -48,7 +48,7 @@ Steps stepsOf(const std::vector<ImuMeasurement>& imu) {
     count += 1.0;
   }
   for (std::size_t i = 0; i + 1 < rates.size(); ++i)
-    steps.turn.push_back(0.5 * kMeanWidth * (rates[i] + rates[i + 1]));
+    steps.turn.emplace_back(0.5 * kMeanWidth * (rates[i] + rates[i + 1]));
   return steps;
 }
 

@@ -18,15 +18,15 @@ InertialTrack::InertialTrack(const std::vector<ImuMeasurement>& imu, const Eigen
   for (const ImuMeasurement& sample : imu) {
     if (last != nullptr && sample.time <= last->time) continue;
     if (last == nullptr) {
-      q_GI_.push_back(Eigen::Quaterniond::Identity());
-      impulse_.push_back(Eigen::Vector3d::Zero());
+      q_GI_.emplace_back(Eigen::Quaterniond::Identity());
+      impulse_.emplace_back(Eigen::Vector3d::Zero());
       gaps_.push_back(0);
     } else {
       const double dt = sample.time - last->time;
       const Eigen::Vector3d half_turn =
           0.25 * dt * (last->angular_velocity + sample.angular_velocity - 2.0 * gyro_bias);
       const Eigen::Quaterniond middle = q_GI_.back() * so3::exp(half_turn);
-      impulse_.push_back(impulse_.back() + 0.5 * dt * (middle * (last->acceleration + sample.acceleration)));
+      impulse_.emplace_back(impulse_.back() + 0.5 * dt * (middle * (last->acceleration + sample.acceleration)));
       q_GI_.push_back((middle * so3::exp(half_turn)).normalized());
       gaps_.push_back(gaps_.back() + (dt > kGap ? 1 : 0));
     }

@@ -58,7 +58,7 @@ Rows rowsOf(const RadarVelocity& velocity, double offset, Time begin, const Iner
   const Time time = velocity.stamp - offset;
   const Matrix3d R = track.rotation(time).toRotationMatrix();
   Rows rows;
-  for (int j = 0; j < 3; ++j) rows.A.block<3, 3>(0, 3 * j) = velocity.v_R[j] * R;
+  for (int j = 0; j < 3; ++j) rows.A.middleCols<3>(3L * j) = velocity.v_R[j] * R;
   rows.A.block<3, 3>(0, kM) = -R * so3::hat(track.rate(time));
   rows.A.block<3, 3>(0, kShared) = -Matrix3d::Identity();
   rows.A.block<3, 3>(0, kShared + 3) = -(time - begin) * Matrix3d::Identity();

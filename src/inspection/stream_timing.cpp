@@ -53,6 +53,7 @@ StreamDelay delayAgainstImu(const std::vector<MessageTimes>& times, const std::v
   for (const MessageTimes& each : imu)
     smallest = std::min(smallest, each.record.nanoseconds() - each.stamp.nanoseconds());
   std::vector<double> delays;
+  delays.reserve(times.size());
   for (const MessageTimes& each : times)
     delays.push_back(Time::fromNanoseconds(each.record.nanoseconds() - smallest) - each.stamp);
   return {quantile(delays, 0.0), quantile(delays, 0.5), quantile(delays, 0.9)};

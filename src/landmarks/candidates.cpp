@@ -117,6 +117,7 @@ std::vector<Candidate> Candidates::takeProven(const std::vector<Eigen::Vector3d>
     if (isAlone(k, landmarks_W)) proven.push_back(k);
   }
   std::vector<Candidate> taken;
+  taken.reserve(proven.size());
   for (const std::size_t k : proven) taken.push_back(candidates_[k]);
   for (auto k = proven.rbegin(); k != proven.rend(); ++k)
     candidates_.erase(candidates_.begin() + static_cast<std::ptrdiff_t>(*k));

@@ -94,6 +94,7 @@ LandmarkMap::Association LandmarkMap::associate(const Prediction& prediction, co
   std::vector<Pair> pairs;
   std::vector<bool> is_free(detections.size(), true);
   std::vector<PolarNoise> noises;
+  noises.reserve(detections.size());
   for (const Detection& detection : detections) noises.emplace_back(detection.z);
   std::vector<double> nearest(landmarks_.size(), std::numeric_limits<double>::infinity());
   for (std::size_t column = 0; column < prediction.landmarks.size(); ++column) {

@@ -15,11 +15,13 @@ inline double azimuthOf(const Eigen::Vector3d& u) { return std::atan2(u.x(), u.y
 inline double elevationOf(const Eigen::Vector3d& u) { return std::atan2(u.z(), std::hypot(u.x(), u.y())); }
 inline std::vector<double> azimuthsOf(const std::vector<RadarDirection>& points) {
   std::vector<double> angles;
+  angles.reserve(points.size());
   for (const RadarDirection& p : points) angles.push_back(azimuthOf(p.u_R));
   return angles;
 }
 inline std::vector<double> elevationsOf(const std::vector<RadarDirection>& points) {
   std::vector<double> angles;
+  angles.reserve(points.size());
   for (const RadarDirection& p : points) angles.push_back(elevationOf(p.u_R));
   return angles;
 }

@@ -72,8 +72,8 @@ class BarometerChannel {
  private:
   struct Sample {
     Time time;
-    double height;  ///< [m] above the first
-    double span;    ///< [s] that it stands for
+    double height = 0.0;  ///< [m] above the first
+    double span = 0.0;    ///< [s] that it stands for
   };
   /// Mean of consecutive samples.
   struct Mean {

@@ -67,8 +67,8 @@ class GroundVehicleChannel {
  private:
   struct Judged {
     Time time;
-    double span;           ///< [s] of motion that it stands for
-    double contradiction;  ///< 0..1
+    double span = 0.0;           ///< [s] of motion that it stands for
+    double contradiction = 0.0;  ///< 0..1
   };
   std::optional<double> contradictionWith(const Judged& judged);
   Eigen::Vector3d omegaAt(Time time) const;

@@ -16,7 +16,7 @@ namespace {
 
 std::string topicOfBag(const std::string& told, const std::map<std::string, std::string>& types) {
   if (told.empty() || types.count(told) != 0) return told;
-  const std::string other = told.front() == '/' ? told.substr(1) : "/" + told;
+  std::string other = told.front() == '/' ? told.substr(1) : "/" + told;
   if (types.count(other) != 0) return other;
   return told.front() == '/' ? told : other;
 }

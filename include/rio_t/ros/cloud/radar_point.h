@@ -19,7 +19,8 @@ struct EIGEN_ALIGN16 RadarPointPcl {
       float doppler = 0.0F;  ///< range rate [m/s], positive = receding
   float snr_db = 0.0F;       ///< [dB]; kUnknownSnrDb if the driver gives no signal-to-noise ratio
 
-  RadarPointPcl() : data{0.0F, 0.0F, 0.0F, 1.0F} {}
+  // `data` shares its memory with x, y, z.
+  RadarPointPcl() : data{0.0F, 0.0F, 0.0F, 1.0F} {}  // NOLINT(cppcoreguidelines-pro-type-member-init)
   PCL_MAKE_ALIGNED_OPERATOR_NEW
 };
 
