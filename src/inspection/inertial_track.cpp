@@ -26,7 +26,8 @@ InertialTrack::InertialTrack(const std::vector<ImuMeasurement>& imu, const Eigen
       const Eigen::Vector3d half_turn =
           0.25 * dt * (last->angular_velocity + sample.angular_velocity - 2.0 * gyro_bias);
       const Eigen::Quaterniond middle = q_GI_.back() * so3::exp(half_turn);
-      impulse_.emplace_back(impulse_.back() + 0.5 * dt * (middle * (last->acceleration + sample.acceleration)));
+      impulse_.emplace_back(impulse_.back() +
+                            0.5 * dt * (middle * (last->acceleration + sample.acceleration)));
       q_GI_.push_back((middle * so3::exp(half_turn)).normalized());
       gaps_.push_back(gaps_.back() + (dt > kGap ? 1 : 0));
     }
