@@ -22,7 +22,7 @@ TEST(AngleRegression, WithoutNoiseTheMeasuredAngleIsExpected) {
   EXPECT_NEAR(regression.remaining(), 0.0, 1e-12);
 }
 
-/// A radar without elevation may report it as noise.
+/// A radar without elevation may report noise.
 TEST(AngleRegression, IfAllIsNoiseTheMeanIsExpected) {
   const AngleRegression regression({0.1, -0.3, 0.5}, 0.05, {0.2, 0.05, 0.05});
   EXPECT_NEAR(regression.expected(0.5), 0.2, 1e-12);
