@@ -28,29 +28,42 @@ TEST(FewPoints, AreReportedWithoutThoseBorrowed) {
   EXPECT_GT(with_velocity, run.results.size() / 2);
 }
 
+SimulatedRun threePoints(std::uint64_t seed) {
+  SimulatedRun run("medium", seed, 60.0, 5.0);
+  run.options.smoother.radar_factor = RadarFactor::kDoppler;
+  run.setup.radar.points_mean = 3.0;
+  run.setup.radar.points_sigma = 0.7;
+  run.setup.radar.points_min = 2;
+  run.setup.radar.points_max = 4;
+  return run;
+}
+
+bool keepsTheVelocity(const SimulatedRun& run) {
+  std::size_t used = 0;
+  for (const ScanResult& result : run.results) used += result.used ? 1 : 0;
+  return used > run.results.size() / 2 &&
+         run.rms(10.0, 60.0, [&](const NavigationState& state) { return run.velocityError(state); }) < 0.1;
+}
+
 TEST(FewPoints, KeepTheVelocity) {
   for (const std::uint64_t seed : {1, 2, 3}) {
-    for (const bool has_persons : {false, true}) {
-      SimulatedRun run("medium", seed, 60.0, 5.0);
-      run.options.smoother.radar_factor = RadarFactor::kDoppler;
-      run.setup.radar.points_mean = 3.0;
-      run.setup.radar.points_sigma = 0.7;
-      run.setup.radar.points_min = 2;
-      run.setup.radar.points_max = 4;
-      if (!has_persons) run.setup.radar.moving_share = 0.0;
-      run.run();
-      std::size_t used = 0;
-      for (const ScanResult& result : run.results) used += result.used ? 1 : 0;
-      EXPECT_GT(used, run.results.size() / 2) << "seed " << seed;
-      EXPECT_LT(run.rms(10.0, 60.0, [&](const NavigationState& state) { return run.velocityError(state); }),
-                0.1)
-          << "seed " << seed;
-      // A person in view may well be all of the points.
-      if (!has_persons) {
-        EXPECT_EQ(run.odometry->faults()["diverged"], 0u) << "seed " << seed;
-      }
-    }
+    SimulatedRun run = threePoints(seed);
+    run.setup.radar.moving_share = 0.0;
+    run.run();
+    EXPECT_TRUE(keepsTheVelocity(run)) << "seed " << seed;
+    EXPECT_EQ(run.odometry->faults()["diverged"], 0u) << "seed " << seed;
   }
+}
+
+/// A person in view may well be all of the points, and then no estimate can be right.
+TEST(FewPoints, MostlyKeepTheVelocityAmongPersons) {
+  int kept = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SimulatedRun run = threePoints(seed);
+    run.run();
+    kept += keepsTheVelocity(run) ? 1 : 0;
+  }
+  EXPECT_GE(kept, 6);
 }
 
 /// One row of antennas: all points in a plane, and what they see of the vertical is nothing.
@@ -155,7 +168,8 @@ TEST(Creeping, IsNoRest) {
     const auto error = [&](const NavigationState& state) { return run.velocityError(state); };
     EXPECT_GT(all, 300);
     EXPECT_LT(at_rest, all / 10) << "seed " << seed;
-    EXPECT_LT(run.rms(10.0, 45.0, error), 0.03) << "seed " << seed;
+    // Where in its bin the speed lies, the noise of the Doppler shows: with twice the noise it is 0.017.
+    EXPECT_LT(run.rms(10.0, 45.0, error), 0.012) << "seed " << seed;
   }
 }
 

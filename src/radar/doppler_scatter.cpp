@@ -19,7 +19,7 @@ double logLikelihood(const PointVariances& noise, const std::vector<RadarDirecti
   for (const RadarDirection& p : points) {
     const double variance =
         kMinDopplerVariance + residualVariance(Angles(p.u_R), v_R, noise) - noise.quantization;
-    sum += std::log(dopplerDensity(p.doppler + p.u_R.dot(v_R), variance, noise.quantization) +
+    sum += std::log(dopplerDensity(p.doppler + p.u_R.dot(v_R), variance, noise.quantization).value +
                     noise.outlier_density);
   }
   return sum;

@@ -194,13 +194,14 @@ DopplerLikelihood EgoVelocityEstimator::likelihood(const RadarScan& scan,
   return DopplerLikelihood(directions, v_R, shownBy(directions, v_R, noise(), options_));
 }
 
-void EgoVelocityEstimator::learn(const RadarScan& scan, const EgoVelocity& estimated) {
+void EgoVelocityEstimator::learn(const RadarScan& scan, const EgoVelocity& estimated,
+                                 const std::optional<VelocityPrior>& prior) {
   if (estimated.status != EgoVelocityStatus::kMoving) return;
   std::vector<RadarDirection> points = filter(scan, options_);
   span_.learn(points, estimated.v_R, options_.doppler_quantization);
   if (options_.solver != EgoVelocitySolver::kErrorsInVariables) return;
   unwrap(points, estimated.v_R, span_.value());
-  noise_.learn(points, estimated.inliers, estimated.v_R);
+  noise_.learn(points, estimated.inliers, estimated.v_R, prior);
 }
 
 bool hasMajority(const EgoVelocity& velocity) {

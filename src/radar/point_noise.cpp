@@ -1,11 +1,12 @@
 #include "rio_t/radar/point_noise.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 #include "direction_noise.h"
 #include "doppler_bin.h"
+#include "doppler_scatter.h"
+#include "velocity_posterior.h"
 
 namespace rio_t {
 namespace {
@@ -15,9 +16,6 @@ constexpr double kStartPoints = 10.0;
 /// [scans] that PointNoise remembers, 100 s at 10 Hz. At a walk they show the elevation noise, which shows
 /// least, to 3 %.
 constexpr double kMemory = 1000.0;
-/// [steps of the Doppler] At a lower speed most points lie in a few bins, and the error of the step is
-/// neither even nor independent of the direction: at two steps it passes for three times the azimuth noise.
-constexpr double kMinSpeed = 3.0;
 /// [m/s] Residuals up to this size show how many outliers there are.
 constexpr double kOutlierSpan = 1.0;
 /// An angle or a Doppler with more noise is no measurement.
@@ -28,12 +26,6 @@ constexpr double kMinStartAngleSigma = 0.01;  // [rad]
 /// [m^2/s^2] Variance of a residual; it bounds the weights if there is no noise at all.
 constexpr double kMinVariance = 1e-4;
 
-/// Probability that a residual is of the static world and not of an outlier, spread evenly.
-double inlierProbability(double residual, double variance, const PointVariances& noise) {
-  const double density = dopplerDensity(residual, std::max(kMinVariance, variance), noise.quantization);
-  return density / (density + noise.outlier_density);
-}
-
 /// Share of a new scan in what is known, after so many scans.
 double forgotten(double scans) { return std::max(1.0 / kMemory, 1.0 / (scans + 1.0)); }
 
@@ -41,16 +33,24 @@ Eigen::Vector3d vectorOf(const PointVariances& noise) {
   return {noise.doppler, noise.azimuth, noise.elevation};
 }
 
+/// The points with these indices; both are in the order of the scan.
+std::vector<RadarDirection> selected(const std::vector<RadarDirection>& points,
+                                     const std::vector<std::size_t>& indices) {
+  std::vector<RadarDirection> found;
+  found.reserve(indices.size());
+  auto next = indices.begin();
+  for (const RadarDirection& p : points) {
+    if (next == indices.end()) break;
+    if (*next != p.index) continue;
+    found.push_back(p);
+    ++next;
+  }
+  return found;
+}
+
 }  // namespace
 
 PointNoise::PointNoise(const PointVariances& start) : start_(vectorOf(start)), variances_(start) {}
-
-void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vector<std::size_t>& inliers,
-                       const Eigen::Vector3d& v_R) {
-  learnOutliers(points, v_R);
-  if (v_R.squaredNorm() >= square(kMinSpeed) * 12.0 * variances_.quantization)
-    learnVariances(points, inliers, v_R);
-}
 
 void PointNoise::learnSpread(const std::vector<RadarDirection>& points) {
   if (points.empty()) return;
@@ -81,67 +81,61 @@ AngleSpread PointNoise::AngleMoments::spread() const {
   return spread;
 }
 
-void PointNoise::learnOutliers(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R) {
-  double density = 0.0;
-  for (const RadarDirection& p : points) {
-    const double residual = p.doppler + p.u_R.dot(v_R);
-    if (std::abs(residual) >= kOutlierSpan) continue;
-    const Eigen::Vector3d shares =
-        noiseShares(correctedDirection(p.u_R, residual, v_R, variances_), v_R, variances_);
-    const double probability = inlierProbability(residual, shares.dot(vectorOf(variances_)), variances_);
-    density += (1.0 - probability) / (2.0 * kOutlierSpan * static_cast<double>(points.size()));
-  }
-  ++scans_of_outliers_;
-  double& believed = variances_.outlier_density;
-  believed += forgotten(scans_of_outliers_) * (density - believed);
-  believed = std::clamp(believed, kMinOutlierDensity, kMaxOutlierDensity);
-}
-
-void PointNoise::learnVariances(const std::vector<RadarDirection>& points,
-                                const std::vector<std::size_t>& inliers, const Eigen::Vector3d& v_R) {
-  const PointVariances& noise = variances_;
-  const auto variance = [&](const Eigen::Vector3d& shares) {
-    return std::max(kMinVariance, noise.quantization + shares.dot(vectorOf(noise)));
-  };
-  auto inlier = inliers.begin();
-  const auto is_inlier = [&](const RadarDirection& p) {  // call it for one point after the other
-    if (inlier == inliers.end() || *inlier != p.index) return false;
-    ++inlier;
-    return true;
-  };
-
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  for (const RadarDirection& p : points) {
-    if (is_inlier(p)) normal += p.u_R * p.u_R.transpose() / variance(noiseShares(Angles(p.u_R), v_R, noise));
-  }
-  const Eigen::Matrix3d velocity_covariance = normal.inverse();
+void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vector<std::size_t>& inliers,
+                       const Eigen::Vector3d& v_R, const std::optional<VelocityPrior>& prior) {
+  // With a noise much too small, a few points would agree by chance, and confirm it.
+  const std::vector<RadarDirection> agreeing = selected(points, inliers);
+  const VelocityPosterior velocity =
+      findPosterior(agreeing, withScatter(variances_, agreeing, v_R), prior, v_R);
 
   ++scans_;
   const double share = forgotten(scans_);
   information_ *= 1.0 - share;
   information_vector_ *= 1.0 - share;
+  const auto count = static_cast<double>(points.size());
   Eigen::Vector3d mean_shares = Eigen::Vector3d::Zero();
-  inlier = inliers.begin();
+  double outlier_density = 0.0;
   for (const RadarDirection& p : points) {
-    // The fit of the velocity has made the squared residuals of its inliers smaller by this.
-    const double fitted = is_inlier(p) ? p.u_R.dot(velocity_covariance * p.u_R) : 0.0;
-    const double residual = p.doppler + p.u_R.dot(v_R);
-    const Eigen::Vector3d shares = noiseShares(correctedDirection(p.u_R, residual, v_R, noise), v_R, noise);
-    // The variance of r^2 is twice the squared variance of r.
-    const double probability = inlierProbability(residual, shares.dot(vectorOf(noise)), noise);
-    const double weight = 0.5 * probability / square(variance(shares));
-    mean_shares += shares / static_cast<double>(points.size());
-    information_ += weight * shares * shares.transpose();
-    information_vector_ += weight * (square(residual) + fitted - noise.quantization) * shares;
+    const double residual = p.doppler + p.u_R.dot(velocity.v_R);
+    const Eigen::Vector3d shares =
+        noiseShares(correctedDirection(p.u_R, residual, velocity.v_R, variances_), velocity.v_R, variances_);
+    const double variance = std::max(kMinVariance, shares.dot(vectorOf(variances_)));
+    const auto densityAt = [&](double e) { return dopplerDensity(e, variance, variances_.quantization); };
+    // Derivative of the log of the likelihood, that of an outlier included, by the variance.
+    const auto slopeOf = [&](const DopplerDensity& d) {
+      return d.by_variance / (d.value + variances_.outlier_density);
+    };
+    const DopplerDensity density = densityAt(residual);
+    const double probability = density.value / (density.value + variances_.outlier_density);
+    // The mean over what the velocity leaves open, by three points: a fit hides some of the noise.
+    const double open = std::sqrt(3.0 * p.u_R.dot(velocity.covariance * p.u_R));
+    const double slope =
+        (slopeOf(densityAt(residual - open)) + 4.0 * slopeOf(density) + slopeOf(densityAt(residual + open))) /
+        6.0;
+    const double information = probability * varianceInformation(variance, variances_.quantization);
+    information_ += information * shares * shares.transpose();
+    information_vector_ += (slope + information * variance) * shares;
+    mean_shares += shares / count;
+    if (std::abs(residual) < kOutlierSpan)
+      outlier_density += (1.0 - probability) / (2.0 * kOutlierSpan * count);
   }
+  double& believed_density = variances_.outlier_density;
+  believed_density += share * (outlier_density - believed_density);
+  believed_density = std::clamp(believed_density, kMinOutlierDensity, kMaxOutlierDensity);
+
   mean_shares_ += share * (mean_shares - mean_shares_);
-  const double believed = variance(mean_shares_);
+  const double believed = informationOfPoint();
   solve();
   // The scans so far were weighted with the noise believed then. If it was much too small, they would
   // outweigh all scans to come.
-  const double reweighting = square(believed / variance(mean_shares_));
+  const double reweighting = informationOfPoint() / believed;
   information_ *= reweighting;
   information_vector_ *= reweighting;
+}
+
+double PointNoise::informationOfPoint() const {
+  const double variance = mean_shares_.dot(vectorOf(variances_));
+  return varianceInformation(std::max(kMinVariance, variance), variances_.quantization);
 }
 
 void PointNoise::solve() {

@@ -8,6 +8,7 @@
 
 #include "consensus.h"
 #include "direction_noise.h"
+#include "velocity_posterior.h"
 
 namespace rio_t {
 namespace {
@@ -15,25 +16,9 @@ namespace {
 /// Twice the log-likelihood ratio of a slow motion to rest: once in 1000 scans at rest (chi-squared, 3
 /// degrees of freedom).
 constexpr double kDeniesRest = 16.3;
-constexpr int kSlowIterations = 10;
 
 bool readsZero(const RadarDirection& p, const EgoVelocityOptions& o) {
   return std::abs(p.doppler) <= o.zero_velocity_threshold;
-}
-
-/// Mean of u u' over the points, H'H / n.
-Eigen::Matrix3d meanOuterProduct(const std::vector<RadarDirection>& points) {
-  Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
-  for (const RadarDirection& p : points) mean += p.u_R * p.u_R.transpose();
-  return mean / static_cast<double>(points.size());
-}
-
-/// The bins of width q give the velocity the information M = H'H / n times this factor. A point reads its bin
-/// only while |d + u . v| < q/2. So v lies in the ellipsoid (v - v_0)' M (v - v_0) < q^2/4. A uniform density
-/// over an ellipsoid in 3D has the covariance M^-1 (q^2/4) / 5. More points do not help. Noise of the Doppler
-/// blurs the edge of the bin, and adds its variance.
-double binInformation(double q, double doppler_variance) {
-  return 1.0 / (square(q) / 20.0 + doppler_variance);
 }
 
 /// The points that read zero or the bin beside it.
@@ -67,21 +52,11 @@ std::optional<VelocitySolution> fitSlowMotion(const std::vector<RadarDirection>&
   double at_rest = likelihood.at(Eigen::Vector3d::Zero()).value;
   if (o.doppler_quantization > 0.0) at_rest = std::min(at_rest, restWithPointsBeside(points, o));
   if (at_rest < 0.5 * kDeniesRest) return std::nullopt;
-  VelocityCost cost = likelihood.at(solution.v_R);
-  double damping = 1.0 / square(o.doppler_quantization + o.zero_velocity_threshold);
-  for (int i = 0; i < kSlowIterations; ++i) {
-    Eigen::Matrix3d damped = cost.information;
-    damped.diagonal().array() += damping;
-    const Eigen::Vector3d v_R = solution.v_R - damped.inverse() * cost.gradient;
-    const VelocityCost next = likelihood.at(v_R);
-    damping *= next.value < cost.value ? 0.1 : 10.0;
-    if (next.value >= cost.value) continue;
-    solution.v_R = v_R;
-    cost = next;
-  }
-  if (2.0 * (at_rest - cost.value) < kDeniesRest) return std::nullopt;
+  const LikeliestVelocity likeliest = findLikeliest(likelihood, std::nullopt, solution.v_R);
+  if (2.0 * (at_rest - likeliest.cost.value) < kDeniesRest) return std::nullopt;
+  solution.v_R = likeliest.v_R;
   // A point far within its bin adds nothing to the curvature: without noise, none may be left.
-  Eigen::Matrix3d information = cost.information;
+  Eigen::Matrix3d information = likeliest.cost.information;
   if (o.doppler_quantization > 0.0)
     information += binInformation(o.doppler_quantization, noise.doppler) * meanOuterProduct(points);
   solution.solved = information.determinant() > 0.0;

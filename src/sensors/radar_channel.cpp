@@ -147,7 +147,7 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
     answer.prediction_covariance = seen.prior->covariance;
   }
   if (!answer.at_rest) {
-    estimator_.learn(seen.pooled, measured);
+    estimator_.learn(seen.pooled, measured, seen.prior);
     learned_at_ = scan.stamp;
   }
   return answer;

@@ -49,6 +49,7 @@ class DopplerLikelihood {
   double residual(std::size_t i, const Eigen::Vector3d& v_R, Eigen::Vector3d& derivative) const;
   std::size_t size() const { return points_.size(); }
   double smallestSigma() const { return smallest_sigma_; }  ///< of a point, without the bin [m/s]
+  double halfBin() const { return half_bin_; }              ///< [m/s]
 
  private:
   struct Point {

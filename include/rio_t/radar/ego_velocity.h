@@ -12,6 +12,7 @@
 #include "rio_t/radar/doppler_span.h"
 #include "rio_t/radar/point_noise.h"
 #include "rio_t/radar/scan.h"
+#include "rio_t/radar/velocity_prior.h"
 
 namespace rio_t {
 
@@ -97,12 +98,6 @@ bool hasMajority(const EgoVelocity& velocity);
 /// So many points agree that the velocity must be that of the static world: no object fills more of the view.
 bool isUnanimous(const EgoVelocity& velocity);
 
-/// Velocity expected before the scan, e.g. from the IMU.
-struct VelocityPrior {
-  Eigen::Vector3d v_R = Eigen::Vector3d::Zero();         ///< radar velocity, radar frame [m/s]
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< [m^2/s^2], positive definite
-};
-
 /// Ego-velocity of one scan: filter, zero-velocity test, 3-point RANSAC, least squares.
 /// A static target in direction u gives v_d = -u . v_R (Kellner et al., ITSC 2013).
 class EgoVelocityEstimator {
@@ -131,7 +126,9 @@ class EgoVelocityEstimator {
 
   /// Learns the noise of the points from the result of `estimate` for this scan, for the scans to come. Only
   /// the errors-in-variables solver uses it. Call it once per scan, in motion, if the velocity was used.
-  void learn(const RadarScan& scan, const EgoVelocity& estimated);
+  /// A `prior` that knows nothing of the scan shows noise that the bins hide.
+  void learn(const RadarScan& scan, const EgoVelocity& estimated,
+             const std::optional<VelocityPrior>& prior = std::nullopt);
   /// The noise as learned so far.
   const PointVariances& noise() const { return noise_.variances(); }
   DopplerStep dopplerStep() const { return grid_.step(); }

@@ -3,9 +3,11 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "rio_t/radar/scan.h"
+#include "rio_t/radar/velocity_prior.h"
 
 namespace rio_t {
 
@@ -36,19 +38,19 @@ struct PointVariances {
 /// Learns the noise of the points from the Doppler residuals of scans in motion.
 ///
 /// The variance of a residual is that of the Doppler plus those of the angles times their squared effect on
-/// the Doppler. This effect differs from point to point, so a regression of the squared residuals gives all
-/// three (docs/method.md, section 9). The start counts as a few points. If the motion does not show an angle,
-/// its noise remains that of the start. The density of the outliers is learned at any speed, the noise above
-/// three steps of the Doppler. How the angles spread is learned from every scan.
+/// the Doppler. This effect differs from point to point, so the likelihood of the Dopplers within their bins
+/// gives all three (docs/method.md, section 9). The start counts as a few points. If the motion does not show
+/// an angle, its noise remains that of the start. How the angles spread is learned from every scan.
 class PointNoise {
  public:
   explicit PointNoise(const PointVariances& start);
 
   /// Learns from a scan. `points` passed the filter; `inliers` are the indices of those that `v_R` was solved
   /// from. Both are in the order of the scan. `learn` also takes the other points, as far as they may belong
-  /// to the static world: otherwise the known noise would cut off its own tails.
+  /// to the static world: otherwise the known noise would cut off its own tails. `prior`, if any, knows
+  /// nothing of this scan.
   void learn(const std::vector<RadarDirection>& points, const std::vector<std::size_t>& inliers,
-             const Eigen::Vector3d& v_R);
+             const Eigen::Vector3d& v_R, const std::optional<VelocityPrior>& prior);
   /// Learns how far the directions of a scan spread, moving or not. `points` passed the filter.
   void learnSpread(const std::vector<RadarDirection>& points);
   /// Sets the quantisation once it is known [m^2/s^2]. Earlier scans were learned with another one; they fade
@@ -61,10 +63,8 @@ class PointNoise {
   static constexpr double kMinStartDopplerSigma = 0.01;
 
  private:
-  void learnOutliers(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R);
-  void learnVariances(const std::vector<RadarDirection>& points, const std::vector<std::size_t>& inliers,
-                      const Eigen::Vector3d& v_R);
   void solve();
+  double informationOfPoint() const;  // about the variance of its residual, a typical one
 
   /// Sums over the points of earlier scans.
   struct AngleMoments {
@@ -82,8 +82,7 @@ class PointNoise {
   Eigen::Vector3d information_vector_ = Eigen::Vector3d::Zero();  // that times the variances
   Eigen::Vector3d mean_shares_ = Eigen::Vector3d::Zero();         // of the variances in that of a residual
   AngleMoments azimuth_moments_, elevation_moments_;
-  double scans_ = 0.0;              // that taught the variances
-  double scans_of_outliers_ = 0.0;  // that taught the density of outliers
+  double scans_ = 0.0;
 };
 
 }  // namespace rio_t
