@@ -108,7 +108,7 @@ void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vec
     const DopplerDensity density = densityAt(residual);
     const double probability = density.value / (density.value + variances_.outlier_density);
     // The mean over what the velocity leaves open, by three points: a fit hides some of the noise.
-    const double open = std::sqrt(3.0 * p.u_R.dot(velocity.covariance * p.u_R));
+    const double open = std::sqrt(std::max(0.0, 3.0 * p.u_R.dot(velocity.covariance * p.u_R)));
     const double slope =
         (slopeOf(densityAt(residual - open)) + 4.0 * slopeOf(density) + slopeOf(densityAt(residual + open))) /
         6.0;
