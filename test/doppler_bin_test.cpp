@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 
 namespace rio_t {
@@ -14,7 +13,7 @@ const double kSigmas[] = {0.02, 0.1, 0.3};
 
 double quantization(double step) { return step * step / 12.0; }
 
-TEST(DopplerDensity, IsOneInAll) {
+TEST(DopplerDensity, IntegratesToOne) {
   for (const double step : kSteps) {
     for (const double sigma : kSigmas) {
       double sum = 0.0;

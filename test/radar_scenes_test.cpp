@@ -168,7 +168,8 @@ TEST(Creeping, IsNoRest) {
     const auto error = [&](const NavigationState& state) { return run.velocityError(state); };
     EXPECT_GT(all, 300);
     EXPECT_LT(at_rest, all / 10) << "seed " << seed;
-    // Where in its bin the speed lies, the noise of the Doppler shows: with twice the noise it is 0.017.
+    // The estimator needs the noise of the Doppler to find the speed within its bin. If it takes the noise
+    // for twice as large, this error is 0.017 m/s.
     EXPECT_LT(run.rms(10.0, 45.0, error), 0.012) << "seed " << seed;
   }
 }

@@ -83,8 +83,9 @@ AngleSpread PointNoise::AngleMoments::spread() const {
 
 void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vector<std::size_t>& inliers,
                        const Eigen::Vector3d& v_R, const std::optional<VelocityPrior>& prior) {
-  // With a noise much too small, a few points would agree by chance, and confirm it.
   const std::vector<RadarDirection> agreeing = selected(points, inliers);
+  // The scan may widen its noise. If the noise known is much too small, a few points agree by chance, and
+  // would confirm it.
   const VelocityPosterior velocity =
       findPosterior(agreeing, withScatter(variances_, agreeing, v_R), prior, v_R);
 
@@ -107,7 +108,8 @@ void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vec
     };
     const DopplerDensity density = densityAt(residual);
     const double probability = density.value / (density.value + variances_.outlier_density);
-    // The mean over what the velocity leaves open, by three points: a fit hides some of the noise.
+    // A fit hides some of the noise. So this is the mean over the velocities that the scan leaves open, by
+    // three points.
     const double open = std::sqrt(std::max(0.0, 3.0 * p.u_R.dot(velocity.covariance * p.u_R)));
     const double slope =
         (slopeOf(densityAt(residual - open)) + 4.0 * slopeOf(density) + slopeOf(densityAt(residual + open))) /

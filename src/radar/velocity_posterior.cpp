@@ -10,7 +10,7 @@ namespace rio_t {
 namespace {
 
 constexpr int kMaxIterations = 10;
-/// A step that promises to lower the cost by less is none: a hundredth of a sigma.
+/// The search ends at a step that promises to lower the cost by less, a hundredth of a sigma.
 constexpr double kNoProgress = 0.5e-4;
 
 VelocityCost costAt(const Eigen::Vector3d& v_R, const DopplerLikelihood& likelihood,

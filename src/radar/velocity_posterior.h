@@ -12,7 +12,8 @@ namespace rio_t {
 /// Mean of u u' over the points.
 Eigen::Matrix3d meanOuterProduct(const std::vector<RadarDirection>& points);
 
-/// What the bins alone tell of the velocity, as a factor of meanOuterProduct(); see the source. [s^2/m^2]
+/// [s^2/m^2] This factor times meanOuterProduct() is the information that the bins give the velocity. The
+/// source derives it.
 double binInformation(double doppler_step, double doppler_variance);
 
 struct LikeliestVelocity {

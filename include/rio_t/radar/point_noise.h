@@ -64,7 +64,7 @@ class PointNoise {
 
  private:
   void solve();
-  double informationOfPoint() const;  // about the variance of its residual, a typical one
+  double informationOfPoint() const;  // of a typical one, about the variance of its residual
 
   /// Sums over the points of earlier scans.
   struct AngleMoments {

@@ -55,7 +55,7 @@ CASES = [
          lasting(20, 14.0)),
     Case("scans_dropped_50", inject.scans_dropped(0.5), Survives(VELOCITY, POSITION), ALWAYS),
     Case("scans_empty", inject.scans_of(0), without_radar(3, counted=("too_few_points",), grows=1.2), lasting(3)),
-    # Such scans count. Their points, one or two at a time, show most of the velocity.
+    # The window uses such scans: one or two points at a time show most of the velocity.
     Case("scans_of_1_or_2_points", inject.scans_of(2), without_radar(5, counted=("too_few_points",), grows=1.5)),
     Case("points_not_finite", inject.spoiled_points(0.5), Survives(VELOCITY, POSITION, counted=("points_not_finite",)),
          ALWAYS),
