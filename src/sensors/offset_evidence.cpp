@@ -25,12 +25,15 @@ OffsetDerivative offsetDerivative(const ImuBuffer& imu, Time tau, const StateBlo
     return velocityRate(imu.mean(time, half_width), x.b_g(), x.b_a(), q_IW * x.v_W(), q_IW * g_W, T_IR.l_I);
   };
   const double half_width = offsetHalfWidth(imu, tau);
-  const double quarter = 0.5 * half_width;
+  // A mean around a time without samples would move to the next sample, and take in some of the other side.
+  const auto quarter = [&](double reach) { return 0.5 * std::clamp(reach, 0.0, half_width); };
+  const double before = quarter(tau - imu.oldest());
+  const double after = quarter(imu.newest() - tau);
   OffsetDerivative result;
   const VelocityRate mean = over(tau, half_width);
   result.mean = -R_RI * mean.a_I;
-  result.before = -R_RI * over(tau - quarter, quarter).a_I;
-  result.after = -R_RI * over(tau + quarter, quarter).a_I;
+  result.before = -R_RI * over(tau - before, before).a_I;
+  result.after = -R_RI * over(tau + after, after).a_I;
   result.variance = mean.variance;
   return result;
 }

@@ -238,7 +238,9 @@ Innovation RadarChannel::innovation(Time stamp, const VelocityPrior& prior, cons
   result.S = prior.covariance + measured.covariance;
   if (!prediction) return result;
   result.S_at_offset = prediction->covariance_at_offset + measured.covariance;
-  result.J_O = offset_evidence_.gain() * prediction->dv_dt_O.forInnovation();
+  // The prediction holds the noise before the scan. A derivative with the same noise would let both look like
+  // a wrong offset.
+  result.J_O = offset_evidence_.gain() * prediction->dv_dt_O.after;
   return result;
 }
 

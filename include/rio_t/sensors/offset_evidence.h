@@ -12,18 +12,15 @@ namespace rio_t {
 /// The derivative of the radar's velocity with respect to t_O, as the IMU shows it around a scan.
 struct OffsetDerivative {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();    ///< [m/s^2], as the next two: over both sides
-  Eigen::Vector3d before = Eigen::Vector3d::Zero();  ///< over the time before the scan alone
-  Eigen::Vector3d after = Eigen::Vector3d::Zero();   ///< over the time after it alone
+  // Over the time before and after the scan. They share no sample, so their noise is independent.
+  Eigen::Vector3d before = Eigen::Vector3d::Zero();
+  Eigen::Vector3d after = Eigen::Vector3d::Zero();
   double variance = 0.0;  ///< of the IMU's noise in `mean`, per axis, as far as it is known [m^2/s^4]
   /// Covariance of the error that all three share: of tilt and accelerometer bias [m^2/s^4].
   Eigen::Matrix3d shared = Eigen::Matrix3d::Zero();
 
   /// The mean exceeds five sigma of its noise, so it is motion.
   bool isCertain() const;
-  /// The derivative that goes with an innovation: if it is uncertain, that after the scan alone. The
-  /// prediction holds the noise before the scan; if the derivative held it too, both would look like a wrong
-  /// offset.
-  const Eigen::Vector3d& forInnovation() const { return isCertain() ? mean : after; }
 };
 
 /// The derivative for a state `x` at the time of measurement `tau`, without `shared`. `g_W` is gravity in W
