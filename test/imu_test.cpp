@@ -162,6 +162,24 @@ TEST(NoiseMeter, MeasuresTheDensityAtRestAndInMotion) {
   }
 }
 
+TEST(NoiseMeter, MeasuresThoughSamplesAreMissingOrComeInBursts) {
+  const SyntheticMotion motion;
+  constexpr double kSigma = 0.5;
+  // Every third sample of an IMU at 100 Hz is missing; a bus hands over four samples at a time.
+  const std::vector<std::vector<double>> patterns = {
+      {0.01, 0.02}, {0.01, 0.02, 0.01, 0.02, 0.02}, {0.002, 0.002, 0.002, 0.024}};
+  for (const std::vector<double>& spacings : patterns) {
+    Noise noise;
+    NoiseMeter meter;
+    double t = 0.0;
+    std::size_t samples = 0;
+    for (; t < 10.0; t += spacings[samples++ % spacings.size()])
+      meter.add(motion.time(t), motion.imuSample(t).acceleration + kSigma * noise.vector());
+    const double rate = static_cast<double>(samples) / t;
+    EXPECT_NEAR(std::sqrt(meter.squaredDensity() * rate) / kSigma, 1.0, 0.25) << spacings.back();
+  }
+}
+
 TEST(NoiseMeter, ASignalThatStoodStillToTheLastBitMayBegin) {
   for (const double still : {9.81, 9.8125}) {
     Noise noise;

@@ -9,13 +9,13 @@ namespace rio_t {
 
 /// Measures the white noise of a three-axis signal from the signal itself, at rest and in motion.
 ///
-/// A platform moves smoothly from sample to sample; noise and vibration do not. The fourth difference of
-/// equally spaced samples, x0 - 4 x1 + 6 x2 - 4 x3 + x4, removes every cubic and has 70 times the variance of
-/// white noise (docs/method.md, eq. 11b). Not thread-safe.
+/// A platform moves smoothly from sample to sample; noise and vibration do not. Of five samples, one linear
+/// combination is free of every cubic in time (the fourth divided difference; docs/method.md, eq. 11b). Noise
+/// alone is left in it, whatever the spacing of the samples. Not thread-safe.
 class NoiseMeter {
  public:
-  /// Takes one sample [unit] at `time`; times must rise. After an unequal spacing (a gap) a new run of five
-  /// samples begins, and the noise stays as it was.
+  /// Takes one sample [unit] at `time`; times must rise. After a gap a new run of five samples begins, and
+  /// the noise stays as it was.
   void add(Time time, const Eigen::Vector3d& value);
   /// Squared density of the noisiest axis over the last second [unit^2/Hz]; 0 before the first five samples.
   double squaredDensity() const { return weight_ > 0.0 ? squares_.maxCoeff() / weight_ : 0.0; }
@@ -23,10 +23,17 @@ class NoiseMeter {
   void interrupt() { count_ = 0; }
 
  private:
-  std::array<Eigen::Vector3d, 5> last_ = {};  ///< oldest first
-  int count_ = 0;                             ///< of `last_` that are in use
-  double spacing_ = 0.0;                      ///< of the newest two [s]
+  struct Sample {
+    Time time;
+    Eigen::Vector3d value = Eigen::Vector3d::Zero();
+  };
+  /// Of the five samples, per axis [unit^2/Hz].
+  Eigen::Vector3d squaredDensities() const;
+
+  std::array<Sample, 5> last_ = {};  ///< oldest first
+  int count_ = 0;                    ///< of `last_` that are in use
   Time newest_;
+  double spacing_ = 0.0;                               ///< mean of the last second [s]; 0 before two samples
   Eigen::Vector3d squares_ = Eigen::Vector3d::Zero();  ///< fading sum, in squared densities
   double weight_ = 0.0;                                ///< the same sum of ones
 };
