@@ -294,6 +294,28 @@ TEST(ImuModel, SaturatesPerAxis) {
   EXPECT_EQ(gyro, 1.0);
 }
 
+TEST(ImuModel, LosesSamplesAndLeavesTheOthersAsTheyAre) {
+  const Motion motion = builtIn("easy", 1, 30.0);
+  ImuModelOptions options;
+  const ImuData whole = simulateImu(motion, options, 1, Time());
+  options.dropout_share = 0.3;
+  const ImuData some = simulateImu(motion, options, 1, Time());
+  EXPECT_NEAR(static_cast<double>(some.samples.size()) / static_cast<double>(whole.samples.size()), 0.7,
+              0.02);
+  EXPECT_EQ(some.b_a.size(), some.samples.size());
+  EXPECT_EQ(some.b_g.size(), some.samples.size());
+  EXPECT_EQ(some.samples.front().time, whole.samples.front().time);
+  auto from = whole.samples.begin();
+  for (const ImuMeasurement& sample : some.samples) {
+    while (from != whole.samples.end() && from->time < sample.time) ++from;
+    ASSERT_NE(from, whole.samples.end());
+    ASSERT_EQ(sample.time, from->time);
+    ASSERT_EQ(sample.acceleration, from->acceleration);
+  }
+  options.dropout_share = 1.0;
+  EXPECT_THROW(simulateImu(motion, options, 1, Time()), std::invalid_argument);
+}
+
 TEST(ImuModel, StampsFollowTheRate) {
   const Motion motion = builtIn("easy", 1, 30.0);
   ImuModelOptions options;

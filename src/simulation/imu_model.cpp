@@ -11,6 +11,7 @@ namespace {
 constexpr std::uint64_t kBiasStream = 10;
 constexpr std::uint64_t kNoiseStream = 11;
 constexpr std::uint64_t kVibrationStream = 12;
+constexpr std::uint64_t kDropoutStream = 13;
 
 Eigen::Vector3d saturated(const Eigen::Vector3d& value, double limit) {
   return value.cwiseMax(-limit).cwiseMin(limit);
@@ -28,6 +29,9 @@ void check(const ImuModelOptions& options) {
   }
   if (options.vibration_frequency < 0.0) {
     throw std::invalid_argument("frequency of the IMU vibration cannot be negative");
+  }
+  if (!(options.dropout_share >= 0.0 && options.dropout_share < 1.0)) {
+    throw std::invalid_argument("share of lost IMU samples must be at least 0 and below 1");
   }
   if (!(options.accel_saturation > 0.0) || !(options.gyro_saturation > 0.0)) {
     throw std::invalid_argument("IMU saturation must be positive");
@@ -78,6 +82,7 @@ void ImuModelOptions::removeErrors() {
   noise.accel_density = noise.gyro_density = 0.0;
   noise.accel_random_walk = noise.gyro_random_walk = 0.0;
   accel_vibration = gyro_vibration = 0.0;
+  dropout_share = 0.0;
   accel_bias = Eigen::Vector3d::Zero();
   gyro_bias = Eigen::Vector3d::Zero();
 }
@@ -86,6 +91,7 @@ ImuData simulateImu(const Motion& motion, const ImuModelOptions& options, std::u
   check(options);
   Random bias_random(seed, kBiasStream);
   Random random(seed, kNoiseStream);
+  Random dropout_random(seed, kDropoutStream);
   Vibration accel_vibration(options.accel_vibration, options.vibration_frequency,
                             Random(seed, kVibrationStream, 0));
   Vibration gyro_vibration(options.gyro_vibration, options.vibration_frequency,
@@ -116,9 +122,12 @@ ImuData simulateImu(const Motion& motion, const ImuModelOptions& options, std::u
                                         options.noise.accel_density * root_rate * random.gaussianVector() +
                                         accel_vibration.at(t),
                                     options.accel_saturation);
-    data.samples.push_back(sample);
-    data.b_a.push_back(b_a);
-    data.b_g.push_back(b_g);
+    const bool is_lost = i > 0 && dropout_random.chance(options.dropout_share);
+    if (!is_lost) {
+      data.samples.push_back(sample);
+      data.b_a.push_back(b_a);
+      data.b_g.push_back(b_g);
+    }
     b_a += options.noise.accel_random_walk / root_rate * random.gaussianVector();
     b_g += options.noise.gyro_random_walk / root_rate * random.gaussianVector();
   }

@@ -111,10 +111,11 @@ void addGeneralOptions(OptionSet& options, Request& r) {
   options.number("start-time", "S", "stamp of the first IMU sample", r.start_time, NumberRange::kPositive);
   options.number("record-offset", "S", "clock of the recorder minus clock of the IMU", r.bag.record_offset);
   options.number("gravity", "M/S^2", "size of gravity", r.simulation.imu.gravity, NumberRange::kPositive);
-  options.flag("noise-free",
-               "no noise, vibration, bias, quantisation, ghosts, moving objects or lost scans (blackouts, "
-               "ghost bursts, Doppler span and flat radars stay)",
-               r.noise_free);
+  options.flag(
+      "noise-free",
+      "no noise, vibration, bias, quantisation, ghosts, moving objects, lost scans or samples (blackouts, "
+      "ghost bursts, Doppler span and flat radars stay)",
+      r.noise_free);
 }
 
 void addImuOptions(OptionSet& options, ImuModelOptions& imu) {
@@ -149,6 +150,8 @@ void addImuOptions(OptionSet& options, ImuModelOptions& imu) {
   options.number("vibration-frequency", "HZ",
                  "the vibration is a narrow band there and aliases above half the IMU rate; 0 = it is white",
                  imu.vibration_frequency, NumberRange::kNotNegative);
+  options.number("imu-dropouts", "SHARE", "share of the samples that are lost", imu.dropout_share,
+                 NumberRange::kShare);
   options.number("accel-saturation", "M/S^2", "largest reading of an axis", imu.accel_saturation,
                  NumberRange::kPositive);
   options.number("gyro-saturation", "RAD/S", "largest reading of an axis", imu.gyro_saturation,

@@ -41,8 +41,9 @@ struct ImuModelOptions {
   /// and phase hold for about half a second. Above half the rate it aliases: no filter stands before a
   /// sample.
   double vibration_frequency = 0.0;
+  double dropout_share = 0.0;  ///< of the samples but the first: taken, never delivered
 
-  /// No noise, no vibration and no bias; rate, saturation and gravity stay.
+  /// No noise, no vibration, no bias and no lost samples; rate, saturation and gravity stay.
   void removeErrors();
 };
 

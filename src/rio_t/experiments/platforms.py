@@ -28,7 +28,8 @@ VALUES = {
     "dropouts": (0, 0, 0.05, 0.3),
     "latency": (0.01, 0.06, 0.2),
     "latency-sigma": (0, 0.005, 0.02),
-    "points": (5, 10, 20, 43, 80, 150)}
+    "points": (5, 10, 20, 43, 80, 150),
+    "imu-dropouts": (0, 0, 0.1, 0.33)}
 
 
 def draw(motion, seed):
