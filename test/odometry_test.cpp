@@ -7,7 +7,9 @@
 #include <set>
 #include <utility>
 
+#include "noise.h"
 #include "rio_t/odometry/imu_propagator.h"
+#include "rio_t/odometry/navigation.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
 #include "simulated_run.h"
 
@@ -355,6 +357,21 @@ TEST(StuckGyro, CostsLittle) {
     EXPECT_LT(run.rms(32.0, 60.0, [&](const NavigationState& state) { return run.velocityError(state); }),
               0.1);
   }
+}
+
+/// An engine that is off at the end must not make the run look quiet.
+TEST(Vibration, NoiseOfTheRunIsNotThatOfItsEnd) {
+  Navigation navigation(OdometryOptions(), Eigen::Vector3d(0.0, 0.0, -9.81));
+  Noise draw;
+  constexpr double kRate = 100.0;
+  for (int i = 0; i < 2000; ++i) {
+    const double sigma = i < 1000 ? 1.0 : 0.01;
+    navigation.add({Time::fromSeconds(10.0 + i / kRate), Eigen::Vector3d::Zero(),
+                    Eigen::Vector3d(0.0, 0.0, 9.81) + sigma * draw.vector()});
+  }
+  const double density = 1.0 / std::sqrt(kRate);
+  EXPECT_LT(navigation.imuNoise().accel_density, 0.1 * density);
+  EXPECT_NEAR(navigation.imuNoiseOfRun().accel_density, std::sqrt(0.5) * density, 0.2 * density);
 }
 
 /// Straight ahead at 3 m/s on a frame that vibrates, then at rest.

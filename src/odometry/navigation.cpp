@@ -1,5 +1,7 @@
 #include "rio_t/odometry/navigation.h"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace rio_t {
@@ -22,6 +24,9 @@ Navigation::Checked Navigation::add(const ImuMeasurement& imu) {
   }
   checked.clock_restarts = clock_restarts_;
   if (verdict.decision == ImuInputCheck::Decision::kDrop) return checked;
+  accel_noises_ += sample.accel_noise;
+  gyro_noises_ += sample.gyro_noise;
+  samples_ += 1.0;
   checked.samples = std::move(verdict.bridge);
   checked.samples.push_back(sample);
   for (const ImuMeasurement& each : checked.samples) checked.state = propagator_.add(each);
@@ -44,6 +49,12 @@ std::optional<NavigationState> Navigation::state() const {
 MeasuredImuNoise Navigation::imuNoise() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return input_check_.noise();
+}
+
+MeasuredImuNoise Navigation::imuNoiseOfRun() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const double count = std::max(1.0, samples_);
+  return {std::sqrt(accel_noises_ / count), std::sqrt(gyro_noises_ / count)};
 }
 
 }  // namespace rio_t

@@ -187,6 +187,8 @@ DopplerStep RadarInertialOdometry::radarDopplerStep(std::size_t radar) const {
 
 MeasuredImuNoise RadarInertialOdometry::imuNoise() const { return impl_->navigation.imuNoise(); }
 
+MeasuredImuNoise RadarInertialOdometry::imuNoiseOfRun() const { return impl_->navigation.imuNoiseOfRun(); }
+
 Health RadarInertialOdometry::health() const {
   const std::lock_guard<std::mutex> lock(impl_->inbox_mutex);
   return impl_->status.health;

@@ -33,6 +33,7 @@ class Navigation {
 
   std::optional<NavigationState> state() const;  ///< at the newest sample
   MeasuredImuNoise imuNoise() const;             ///< over the last second
+  MeasuredImuNoise imuNoiseOfRun() const;        ///< root mean square of it since the first sample
 
  private:
   const ImuNoise imu_noise_;
@@ -41,6 +42,9 @@ class Navigation {
   ImuInputCheck input_check_;
   ImuPropagator propagator_;
   std::uint64_t clock_restarts_ = 0;
+  double accel_noises_ = 0.0;  ///< sum of ImuMeasurement::accel_noise
+  double gyro_noises_ = 0.0;   ///< likewise
+  double samples_ = 0.0;       ///< in both sums
 };
 
 }  // namespace rio_t

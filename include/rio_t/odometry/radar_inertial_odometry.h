@@ -70,6 +70,8 @@ class RadarInertialOdometry {
   DopplerStep radarDopplerStep(std::size_t radar = 0) const;
   /// Noise of the IMU, measured over the last second. Any thread.
   MeasuredImuNoise imuNoise() const;
+  /// Root mean square of it since the first sample. Any thread.
+  MeasuredImuNoise imuNoiseOfRun() const;
   /// While not initialised: what the start is waiting for, as text for people.
   std::string waitingFor() const;
   /// Faults of the input so far, by name in snake case, e.g. "imu_out_of_order", "imu_not_finite", "imu_gap".

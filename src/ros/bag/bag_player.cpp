@@ -77,7 +77,7 @@ RunSummary BagPlayer::summary() const {
 
 void BagPlayer::countInput(RunSummary* summary) const {
   summary->imu_count = imu_count_;
-  summary->imu_noise = odometry_.imuNoise();
+  summary->imu_noise = odometry_.imuNoiseOfRun();
   if (summary->barometer) summary->barometer->pressures = pressure_count_;
   for (std::size_t k = 0; k < radars_.size(); ++k) {
     const Radar& radar = radars_[k];

@@ -49,7 +49,7 @@ RunEvidence EvidenceCollector::evidence(const RadarInertialOdometry& odometry) c
   if (!all.initialized) all.waiting_for = odometry.waitingFor();
   all.faults = odometry.faults();
   all.health = odometry.health();
-  all.imu_noise = odometry.imuNoise();
+  all.imu_noise = odometry.imuNoiseOfRun();
   return all;
 }
 

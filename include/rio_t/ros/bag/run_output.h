@@ -95,7 +95,7 @@ struct RunSummary {
   double path_length_m = 0.0;        ///< of the optimised poses
   double end_to_start_2d_m = 0.0;    ///< of the causal trajectory, horizontal
   double end_to_start_3d_m = 0.0;
-  MeasuredImuNoise imu_noise;                          ///< that the IMU showed at the end
+  MeasuredImuNoise imu_noise;                          ///< of the run, root mean square
   std::optional<BarometerSummary> barometer;           ///< only with a barometer_topic
   std::optional<GroundVehicleSummary> ground_vehicle;  ///< only with platform: ground_vehicle
   Diagnosis diagnosis;                                 ///< whether the run is good, and if not, why

@@ -45,7 +45,7 @@ struct RunEvidence {
   std::uint64_t scans_judged = 0;    ///< after the start
   std::uint64_t scans_diverged = 0;  ///< of them, after which the health was "diverged"
   std::uint64_t windows = 0, windows_at_bound = 0;
-  MeasuredImuNoise imu_noise;
+  MeasuredImuNoise imu_noise;  ///< of the run, root mean square
   std::vector<ImuRestart> imu_restarts;  ///< none in the live node, whose evidence begins after the last one
   std::vector<RadarEvidence> radars;
 };
