@@ -73,7 +73,7 @@ ceres::Solver::Options solverOptions() {
   options.num_threads = 1;
   options.logging_type = ceres::SILENT;
   options.update_state_every_iteration = true;  // for StopEarly
-  // It is StopEarly that ends a solve; these only end what gets nowhere.
+  // StopEarly ends a solve. These limits end only one that makes no progress.
   options.function_tolerance = 1e-12;
   options.gradient_tolerance = 1e-14;
   options.parameter_tolerance = 1e-14;

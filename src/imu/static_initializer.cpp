@@ -98,7 +98,8 @@ std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement&
   removeNoise(samples_, &ImuMeasurement::gyro_noise, collected, gyro);
   removeNoise(samples_, &ImuMeasurement::accel_noise, collected, accel);
   const double gravity_error = accel.mean.norm() - gravity_;
-  // Whatever people and drones do, the accelerometer reads about gravity on the mean.
+  // In any motion of people and drones the accelerometer reads about gravity on average. If not, the units
+  // are wrong.
   double mean_size = 0.0;
   for (const ImuMeasurement& sample : samples_) mean_size += sample.acceleration.norm();
   mean_size /= static_cast<double>(samples_.size());

@@ -112,7 +112,7 @@ std::vector<Candidate> Candidates::takeProven(const std::vector<Eigen::Vector3d>
                                               std::size_t count) {
   std::vector<std::size_t> proven;
   for (std::size_t k = 0; k < candidates_.size() && proven.size() < count; ++k) {
-    // Its first term has to place it.
+    // A landmark needs a sighting that places it.
     if (candidates_[k].sightings.empty() || !candidates_[k].isProven()) continue;
     if (isAlone(k, landmarks_W)) proven.push_back(k);
   }

@@ -27,7 +27,7 @@ constexpr double kProof = 30.0;
 /// A reflector in view shows itself at least so often. In a scene full of highlights that come and go, hardly
 /// any landmark is seen again.
 constexpr double kMinShare = 0.1;
-/// Scans, over which the account fades.
+/// Time constant of the fading sums, in scans.
 constexpr double kMemory = 100.0;
 /// In view: within this of the middle of the field of view, as the cosine.
 constexpr double kCosView = 0.707;
@@ -276,7 +276,7 @@ void LandmarkMap::promote(FixedLagSmoother& smoother, Time now) {
     landmark.point.id = next_id_++;
     landmark.point.sightings = candidate.count;
     landmark.point.snr_db = candidate.snr_db();
-    // One places it and says nothing else. Several also say how the platform moved.
+    // One sighting only places the landmark. Several also tell how the platform moved.
     for (auto sighting = candidate.sightings.rbegin(); sighting != candidate.sightings.rend(); ++sighting) {
       Block* node = smoother.nodeAt(sighting->node_time);
       smoother.window().add(std::make_unique<LandmarkFactor>(sighting->z, sighting->delta, g_W_),

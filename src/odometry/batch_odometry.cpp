@@ -210,7 +210,7 @@ std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solu
       if (!sample.is_bridge) states.push_back(stateOf(at, covariance));
     });
   }
-  // Behind the last scan there is the IMU alone.
+  // After the last scan, the IMU alone carries the state.
   ImuPropagator propagator(options_.imu_noise, g_W_);
   propagator.anchor(stateOf(nodes.back(), solution.covariances.back()));
   imu_.forEachSample(nodes.back().time - 0.1, imu_.newest(), [&](const ImuMeasurement& sample) {

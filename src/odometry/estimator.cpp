@@ -14,11 +14,11 @@ namespace {
 /// The IMU must be this far past a scan's node [s]: the derivative with respect to t_O looks so far ahead,
 /// and the factor's time may still move a little.
 constexpr double kImuMargin = kOffsetHalfWidth + 0.01;
-/// A scan stamped further ahead of the newest IMU sample is nonsense, not early [s]; unless the IMU may still
-/// come.
+/// [s] A scan stamped further ahead of the newest IMU sample has a wrong stamp, unless the IMU is in a gap
+/// that will be bridged.
 constexpr double kMaxStampAhead = 1.0;
-/// Without a scan the window moves on in such steps [s], or the IMU that it needs would grow without end; and
-/// stays so far behind, for scans that are late.
+/// [s] Without scans the window moves on in steps of kSilentStep, because the IMU buffer must not grow
+/// without end. It stays kLateScan behind, for late scans.
 constexpr double kSilentStep = 5.0;
 constexpr double kLateScan = 1.0;
 
@@ -69,7 +69,7 @@ Estimator::Estimator(const OdometryOptions& options, Navigation& navigation, Fau
   if (options.landmarks.enabled) landmarks_.emplace(options.landmarks, g_W_, imu_);
 }
 
-/// The way of a scan: when, how fast, into the window, out.
+/// One scan: finds its time, measures its velocity, adds it to the window, solves, reports.
 ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
   ScanResult result;
   result.scan = std::move(scan);
@@ -83,7 +83,7 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
     result.rejected_because = "before_initialization";
     return result;
   }
-  // First of all: a new start may move the offset, and with it the time of measurement.
+  // This comes first, because a new start may move the offset and with it the time of measurement.
   if (health_.wantsReinitialization(imu_.newest()))
     result.reinitialized = tryReinitialize(result.left_window);
   const Time node_time = radar.nodeTime(stamp);
@@ -96,7 +96,7 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
     const bool may_rest =
         ground_vehicle_ && !at_rest && mayRestShaking(imu_, node_time, restContext(), options_.rest);
     const bool has_diverged = health_.health() == Health::kDiverged;
-    // Before the scan's node comes, of which nothing is known yet.
+    // These come before the radar adds its node, because a new node has no estimate yet.
     if (barometer_) result.barometer = barometer_->use(smoother_);
     if (ground_vehicle_ && !at_rest) result.ground_vehicle = ground_vehicle_->judge(smoother_, node_time);
     std::optional<LandmarkMap::Prediction> expected;
@@ -150,7 +150,7 @@ std::string Estimator::whyNotNow(Time node_time, bool imu_has_ended) const {
   return imu_has_ended ? "imu_not_covering" : "older_than_window";
 }
 
-/// Health, recovery and the size of the model errors hear what the scan says of the estimate.
+/// Passes the innovations of the scan to health, recovery and the scale of the model errors.
 void Estimator::judge(const RadarAnswer& answer, const RadarScan& scan) {
   HealthMonitor& health = health_.of(scan.radar);
   if (answer.judged) {
@@ -173,14 +173,14 @@ void Estimator::judge(const RadarAnswer& answer, const RadarScan& scan) {
   model_error_scale_.add(scan.stamp, answer.used->squaredSigmas(), share);
 }
 
-/// Scans at rest repeat one scan, with its errors: they say nothing new of where things are.
+/// Leaves out scans at rest: they repeat the errors of one scan.
 void Estimator::seeLandmarks(const LandmarkMap::Prediction& expected, const RadarAnswer& answer,
                              const RadarChannel& radar, ScanResult& result) {
   Block* node = smoother_.nodeAt(radar.nodeTime(result.scan.stamp));
   if (node == nullptr || answer.at_rest || answer.ego_velocity.status != EgoVelocityStatus::kMoving) return;
   const OdometryOptions own = optionsOfRadar(options_, result.scan.radar);
   const PointVariances& noise = radar.noise();
-  // The Doppler tells the noise of a direction, but not how far an echo wanders over a thing.
+  // The noise that the Dopplers show does not contain how far an echo wanders over an object.
   const double azimuth_sigma = std::max(own.ego_velocity.azimuth_sigma, std::sqrt(noise.azimuth));
   const double elevation_sigma = std::max(own.ego_velocity.elevation_sigma, std::sqrt(noise.elevation));
   constexpr double kMinLevel = 0.5;  // steeper than 60 degrees, an azimuth says little
@@ -287,7 +287,7 @@ void Estimator::startAgain(std::uint64_t clock_restarts) {
   if (barometer_) barometer_->startAgain();
   if (ground_vehicle_)
     ground_vehicle_.emplace(options_.ground_vehicle, options_.smoother.huber_threshold, imu_);
-  // Nobody stands still because a clock jumped.
+  // The platform may be moving, so a start in motion need not wait.
   OdometryOptions at_once = options_;
   at_once.init_motion_after = 0.0;
   initializer_ = Initializer(at_once);
@@ -344,7 +344,8 @@ bool Estimator::tryReinitialize(std::vector<StampedPose>& left) {
 }
 
 PoseAnchor Estimator::anchorAt(Time time) const {
-  // From the newest node before, as the navigation goes: what is published goes on from where it is.
+  // The IMU carries the newest node before `time`, as in Navigation, so that the published pose does not
+  // jump.
   std::size_t k = smoother_.size() - 1;
   while (k > 0 && smoother_.node(k).time > time) --k;
   const NodeEstimate node = smoother_.node(k);

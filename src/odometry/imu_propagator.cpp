@@ -9,7 +9,7 @@
 namespace rio_t {
 namespace {
 
-/// How far back an anchor may lie [s]; bounds the history. A solver that is later has no say.
+/// [s] How far back the history reaches. An older anchor is ignored.
 constexpr double kHistory = 30.0;
 /// [sigma] A velocity that the IMU gained since rest and that its noise does not explain (chi-squared, 3
 /// degrees of freedom: once in 900 times).

@@ -30,7 +30,7 @@ constexpr double kOutlier = 4.0;       // [sigma]
 constexpr int kScaleRounds = 3;        // of finding the state and the size of the errors around it
 constexpr double kUnknowns = 7.0;      // that the velocities determine: velocity, gravity in I, t_O
 
-/// A gain that changes by less changes nothing.
+/// Whether no gain differs by more than 0.01, which changes nothing.
 bool isNear(const std::vector<double>& a, const std::vector<double>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), [](double x, double y) { return std::abs(x - y) < 0.01; });
 }

@@ -128,8 +128,8 @@ std::vector<ScanResult> RadarInertialOdometry::finish() {
   return results;
 }
 
-// The one that was ready first, whether the IMU samples come one by one or many at once: the live node and
-// the bag runner shall use the scans of several radars in the same order.
+// The scan that the IMU covered first, however many IMU samples come at once. So the live node and the bag
+// runner use the scans of several radars in the same order.
 std::vector<RadarScan>::iterator RadarInertialOdometry::Impl::nextReadyScan() {
   auto first = waiting_scans.end();
   for (auto scan = waiting_scans.begin(); scan != waiting_scans.end(); ++scan) {
@@ -162,7 +162,7 @@ void RadarInertialOdometry::Impl::takeInbox() {
 void RadarInertialOdometry::Impl::shareStatus() {
   const Health health = estimator.updateHealth();
   const std::lock_guard<std::mutex> lock(inbox_mutex);
-  // Not where the clock restarted meanwhile: then it waits for a start again.
+  // If the clock restarted meanwhile, the odometry waits for a new start.
   status.initialized = estimator.initialized() && inbox.clock_restarts == clock_restarts;
   status.waiting_for = estimator.waitingFor();
   status.health = health;

@@ -15,22 +15,22 @@ constexpr double kLapseRate = 6.5e-3;         // [K/m] ISO 2533
 constexpr double kGasConstant = 287.05287;    // [J/(kg K)] of dry air, ISO 2533
 constexpr double kStandardGravity = 9.80665;  // [m/s^2]
 constexpr double kFreezing = 273.15;          // [K]
-/// [Pa] No place where people are has less or more: 9 km up, and 1 km below the sea.
+/// [Pa] The pressures 9 km above and 1 km below the sea. People are nowhere else.
 constexpr double kLeastPressure = 30e3;
 constexpr double kMostPressure = 115e3;
-/// [s] of samples in a mean. Shorter ones cost terms and tell no more: the noise is white.
+/// [s] of samples in a mean. Shorter means cost more terms and tell no more, because the noise is white.
 constexpr double kMeanSpan = 0.1;
 /// [s] A node as near as this stands for a mean: at 1 m/s^2 the height then deviates by 5 mm.
 constexpr double kNear = 0.1;
-/// [s] of rest before the start: the shortest rest that a start makes do with.
+/// [s] of samples before a start at rest: the shortest rest from which the estimate starts.
 constexpr double kBeforeStart = 1.0;
-/// [s] of samples that are kept for a start, which may lie a window of motion back.
+/// [s] of samples that are kept for a start. A start in motion lies up to a window of motion back.
 constexpr double kRecent = 12.0;
-/// [s] A sample stamped further ahead of the IMU is nonsense, not early.
+/// [s] A sample stamped further ahead of the IMU has a wrong stamp.
 constexpr double kMaxAhead = 1.0;
-/// [m] of a bias that nothing is known of.
+/// [m] Sigma of an unknown bias.
 constexpr double kUnknownBias = 100.0;
-/// Means that wait for a node: a minute of silence of the radars.
+/// Means that wait for a node: those of a minute without scans.
 constexpr std::size_t kMaxWaiting = 600;
 
 }  // namespace
@@ -56,7 +56,7 @@ const char* BarometerChannel::add(const Pressure& pressure, Time newest_imu) {
   if (!reference_) reference_ = pressure.pascal;
   const double height = heightOfPressure(pressure.pascal, *reference_, options_.temperature);
   const double since = newest_ ? pressure.time - *newest_ : 0.0;
-  // After a sample that is missing the gap does not make the next one better.
+  // A missing sample does not make the next one more accurate.
   const double span = spacing_ > 0.0 ? std::min(since, spacing_) : since;
   newest_ = pressure.time;
   spacing_ = since;

@@ -11,11 +11,12 @@
 namespace rio_t {
 namespace {
 
-/// [s] A bump or a slip lasts about so long: terms nearer to each other would count it twice.
+/// [s] A bump or a slip lasts about so long. Terms nearer to each other would count it twice.
 constexpr double kSpacing = 0.1;
-/// [s] A pause of the scans is no motion that was judged.
+/// [s] A longer pause of the scans does not count as judged motion.
 constexpr double kMaxSpan = 0.5;
-/// [s] to either side of a node, of the mean of the gyro: a vibration must not turn the lever of the point.
+/// [s] The gyro is averaged over so long to either side of a node, so that vibration does not act on the
+/// lever of the point.
 constexpr double kGyroHalfWidth = 0.05;
 /// [s] of motion that is judged, and the mean of min(1, squared sigmas / gate^2) above which it is not that
 /// of the vehicle (docs/method.md, section 5.9).
@@ -35,7 +36,7 @@ void GroundVehicleChannel::join(FixedLagSmoother& smoother, bool at_rest) {
   Window& window = smoother.window();
   frame_ = window.addCalibration(manifold_, stored(options_.T_IV));
   Block* node = smoother.nodeAt(smoother.newest().time);
-  // It says nothing of the node, but leaves the window with it: the prior of the window can then walk.
+  // This prior does not constrain the node. It leaves the window with it, and from then on the block walks.
   Eigen::MatrixXd J = Eigen::MatrixXd::Zero(3, StateBlock::kTangent + 3);
   J.rightCols<3>().diagonal().setConstant(1.0 / options_.rotation_sigma);
   addPrior(window, {node, frame_.get()}, {J, Eigen::VectorXd::Zero(3)});
@@ -74,7 +75,7 @@ std::optional<GroundVehicleAnswer> GroundVehicleChannel::judge(const FixedLagSmo
   const double gate_square = options_.gate * options_.gate;
   answer.used = answer.squared_sigmas <= gate_square;
 
-  // A motion so slow that no direction of it could contradict the constraint says nothing.
+  // At this speed, could any direction of motion contradict the constraint? If not, the motion is not judged.
   const bool could_contradict = velocity.v_V.squaredNorm() > gate_square * S.diagonal().maxCoeff();
   const double span = judged_at_ ? std::clamp(time - *judged_at_, 0.0, kMaxSpan) : 0.0;
   judged_at_ = time;

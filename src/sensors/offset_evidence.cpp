@@ -51,7 +51,7 @@ void OffsetEvidence::add(Time stamp, const OffsetDerivative& derivative, const E
 }
 
 double OffsetEvidence::gain() const {
-  // The motion less one sigma. Noise alone seldom exceeds zero then, and hardly.
+  // The motion less one sigma: noise alone is seldom above zero then, and only a little.
   const double sure = motion_ - std::sqrt(motion_variance_);
   return sure > 0.0 && all_ > 0.0 ? std::min(1.0, sure / all_) : 0.0;
 }

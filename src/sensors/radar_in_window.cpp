@@ -42,7 +42,7 @@ void RadarInWindow::join(FixedLagSmoother& smoother) {
   for (Block* block : addExtrinsics(window, T_IR_)) blocks.push_back(block);
   Eigen::VectorXd sigmas = calibrationSigmas(options_);
   if (options_.time_offset_shared) sigmas = sigmas.tail(sigmas.size() - 1).eval();
-  // It says nothing of the node, but leaves the window with it: the prior of the window can then walk.
+  // This prior does not constrain the node. It leaves the window with it, and from then on the block walks.
   Eigen::MatrixXd J = Eigen::MatrixXd::Zero(sigmas.size(), StateBlock::kTangent + sigmas.size());
   J.rightCols(sigmas.size()) = sigmas.cwiseInverse().asDiagonal();
   if (blocks.size() > 1) addPrior(window, blocks, {J, Eigen::VectorXd::Zero(sigmas.size())});
@@ -66,7 +66,7 @@ std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoo
   if (!state) return std::nullopt;
   const Extrinsics T_IR = extrinsics();
   const Eigen::Matrix3d R_RI = T_IR.R_RI();
-  // Over a short time, whatever the noise: what an unknown offset may do must not be smoothed away.
+  // A short mean, even if the IMU vibrates: a wide one would smooth away what an unknown offset changes.
   const ImuMean mean = model_.imu->mean(time, kOffsetHalfWidth);
   const RadarMotion motion = model_.at(state->x.data(), time, stamp, offset(), T_IR.l_I, &mean);
   constexpr int kOffset = StateBlock::kTangent;
