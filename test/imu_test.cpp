@@ -166,8 +166,11 @@ TEST(NoiseMeter, MeasuresThoughSamplesAreMissingOrComeInBursts) {
   const SyntheticMotion motion;
   constexpr double kSigma = 0.5;
   // Every third sample of an IMU at 100 Hz is missing; a bus hands over four samples at a time.
-  const std::vector<std::vector<double>> patterns = {
+  std::vector<std::vector<double>> patterns = {
       {0.01, 0.02}, {0.01, 0.02, 0.01, 0.02, 0.02}, {0.002, 0.002, 0.002, 0.024}};
+  // A gap each second.
+  patterns.emplace_back(100, 0.01);
+  patterns.back().back() = 0.3;
   for (const std::vector<double>& spacings : patterns) {
     Noise noise;
     NoiseMeter meter;

@@ -8,8 +8,6 @@ namespace {
 
 /// [s] over which the noise is averaged: long against a footstep, short against a change of speed of a motor.
 constexpr double kMemory = 1.0;
-/// A spacing of more than so many mean ones is a gap. Two missing samples in a row are none.
-constexpr double kGap = 3.5;
 /// A square counts at most this many times the mean: four sigma. A knock is not noise, and a vibration that
 /// begins still multiplies the mean within a few hundredths of a second.
 constexpr double kLargestSquare = 16.0;
@@ -18,8 +16,7 @@ constexpr double kNothing = 1e-10;
 
 }  // namespace
 
-Eigen::Vector3d NoiseMeter::squaredDensities() const {
-  const double spacing = (last_[4].time - last_[0].time) / 4.0;
+Eigen::Vector3d NoiseMeter::squaredDensities(double spacing) const {
   Eigen::Vector3d difference = Eigen::Vector3d::Zero();
   double gain = 0.0;
   for (const Sample& sample : last_) {
@@ -33,15 +30,6 @@ Eigen::Vector3d NoiseMeter::squaredDensities() const {
 }
 
 void NoiseMeter::add(Time time, const Eigen::Vector3d& value) {
-  if (count_ > 0) {
-    const double spacing = time - newest_;
-    const bool is_gap = spacing_ > 0.0 && spacing > kGap * spacing_;
-    if (is_gap) count_ = 0;
-    // A gap counts in part: if the rate has changed, the mean spacing still finds the new one.
-    const double counted = is_gap ? kGap * spacing_ : spacing;
-    spacing_ += (spacing_ > 0.0 ? std::min(1.0, counted / kMemory) : 1.0) * (counted - spacing_);
-  }
-  newest_ = time;
   if (count_ == 5) {
     std::rotate(last_.begin(), last_.begin() + 1, last_.end());
     --count_;
@@ -49,12 +37,12 @@ void NoiseMeter::add(Time time, const Eigen::Vector3d& value) {
   last_[static_cast<std::size_t>(count_++)] = {time, value};
   if (count_ < 5) return;
 
-  Eigen::Vector3d squares = squaredDensities();
+  const double spacing = (last_[4].time - last_[0].time) / 4.0;
+  Eigen::Vector3d squares = squaredDensities(spacing);
   const double mean = squaredDensity();
   // A signal that stood still to the last bit has no mean to compare with.
-  if (mean > kNothing && weight_ * spacing_ > kMemory / 2.0)
-    squares = squares.cwiseMin(kLargestSquare * mean);
-  const double fade = std::exp(-spacing_ / kMemory);
+  if (mean > kNothing && weight_ * spacing > kMemory / 2.0) squares = squares.cwiseMin(kLargestSquare * mean);
+  const double fade = std::exp(-(time - last_[3].time) / kMemory);
   squares_ = fade * squares_ + squares;
   weight_ = fade * weight_ + 1.0;
 }

@@ -84,7 +84,7 @@ std::vector<Block*> BatchSmoother::start(const BatchProblem& problem, const Stat
   std::vector<Block*> known = {&state, offsets.at(problem.radar)};
   for (std::size_t k = 0; k < mounting.size(); ++k) {
     const bool has_prior = k == problem.radar;
-    // The prior is linear around its own mounting.
+    // The prior has its own mounting as its origin, so the block starts there.
     const Extrinsics& told = has_prior ? problem.prior.T_IR0 : problem.mounting[k];
     Block& extrinsics = *window.addCalibration(extrinsics_manifold_, stored(told));
     graph.extrinsics.push_back(&extrinsics);

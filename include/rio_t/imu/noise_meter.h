@@ -14,8 +14,7 @@ namespace rio_t {
 /// alone is left in it, whatever the spacing of the samples. Not thread-safe.
 class NoiseMeter {
  public:
-  /// Takes one sample [unit] at `time`; times must rise. After a gap a new run of five samples begins, and
-  /// the noise stays as it was.
+  /// Takes one sample [unit] at `time`; times must rise.
   void add(Time time, const Eigen::Vector3d& value);
   /// Squared density of the noisiest axis over the last second [unit^2/Hz]; 0 before the first five samples.
   double squaredDensity() const { return weight_ > 0.0 ? squares_.maxCoeff() / weight_ : 0.0; }
@@ -27,13 +26,12 @@ class NoiseMeter {
     Time time;
     Eigen::Vector3d value = Eigen::Vector3d::Zero();
   };
-  /// Of the five samples, per axis [unit^2/Hz].
-  Eigen::Vector3d squaredDensities() const;
+  /// Returns the squared density that the five samples show, per axis [unit^2/Hz]; `spacing` is their mean
+  /// spacing [s].
+  Eigen::Vector3d squaredDensities(double spacing) const;
 
-  std::array<Sample, 5> last_ = {};  ///< oldest first
-  int count_ = 0;                    ///< of `last_` that are in use
-  Time newest_;
-  double spacing_ = 0.0;                               ///< mean of the last second [s]; 0 before two samples
+  std::array<Sample, 5> last_ = {};                    ///< oldest first
+  int count_ = 0;                                      ///< of `last_` that are in use
   Eigen::Vector3d squares_ = Eigen::Vector3d::Zero();  ///< fading sum, in squared densities
   double weight_ = 0.0;                                ///< the same sum of ones
 };
