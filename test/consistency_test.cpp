@@ -122,6 +122,24 @@ TEST(Consistency, HeadingOfAVehicleThatStartsInMotion) {
   EXPECT_LT(mean, 2.0);
 }
 
+/// A precise and fast radar beside an IMU that vibrates: the estimated velocity follows the radar, and the
+/// offset shows only where the acceleration changes.
+TEST(Consistency, OffsetOfAFastRadarBesideAnImuThatVibrates) {
+  double mean = 0.0;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    SimulatedRun run("easy", seed, 45.0, kStart);
+    run.setup.time_offset.constant = 0.03;
+    run.setup.imu.rate = 100.0;
+    run.setup.imu.accel_vibration = 0.3;
+    run.setup.radar.rate = 50.0;
+    run.setup.radar.doppler_step = 0.0;
+    run.run();
+    mean += neesOf(run).time_offset / kSeeds;
+  }
+  std::printf("fast radar, vibration: offset %.2f\n", mean);
+  EXPECT_LT(mean, 2.8);
+}
+
 TEST(Consistency, Medium) { expectConsistent("medium", 0.0); }
 TEST(Consistency, Drone) { expectConsistent("drone", 0.0); }
 TEST(Consistency, GroundVehicle) { expectConsistent("ground_vehicle", 0.0); }

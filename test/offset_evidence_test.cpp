@@ -4,12 +4,16 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
+#include <memory>
 #include <utility>
 
 #include "noise.h"
 
 namespace rio_t {
 namespace {
+
+const Eigen::Vector3d kGravity(0.0, 0.0, -9.81);  // in W
 
 /// Feeds scans at 10 Hz whose derivative is a motion and noise [m/s^2]. The mean of two sides with
 /// independent noise of sigma s has noise of s / sqrt(2).
@@ -41,7 +45,10 @@ struct Scans {
       d.after = moving + noise * draw.vector();
       d.mean = 0.5 * (d.before + d.after);
       d.variance = known * 0.5 * noise * noise;
-      evidence.add(Time::fromSeconds(time), d, weight);
+      OffsetScan scan;
+      scan.tau = Time::fromSeconds(time);
+      scan.measured = weight.inverse();
+      evidence.add(scan, d);
       const double gain = evidence.gain();
       EXPECT_GE(gain, 0.0);
       EXPECT_LE(gain, 1.0);
@@ -114,8 +121,11 @@ TEST(OffsetEvidence, WhatTiltAndBiasAddIsNoMotion) {
     if (i % 10 == 0) error = 0.1 * draw.vector();
     d.mean = d.before = d.after = error;
     d.variance = 1e-3;
-    d.shared = 0.01 * Eigen::Matrix3d::Identity();
-    evidence.add(Time::fromSeconds(0.1 * i), d, weight);
+    OffsetScan scan;
+    scan.tau = Time::fromSeconds(0.1 * i);
+    scan.shared = 0.01 * Eigen::Matrix3d::Identity();
+    scan.measured = weight.inverse();
+    evidence.add(scan, d);
     gains += evidence.gain() / 2000.0;
   }
   EXPECT_LT(gains, 0.1);
@@ -140,7 +150,7 @@ TEST(OffsetDerivative, SeesTheSameMotionOnBothSides) {
   StateBlock x;
   x.b_a() = Eigen::Vector3d(0.0, 0.3, 0.0);
   const OffsetDerivative d =
-      offsetDerivative(imu, Time::fromSeconds(1.0), x, Eigen::Vector3d(0.0, 0.0, -9.81), Extrinsics());
+      offsetDerivative(imu, Time::fromSeconds(1.0), x, kGravity, Extrinsics(), kOffsetHalfWidth);
   // A later stamp, and so a larger t_O, is an earlier velocity.
   const Eigen::Vector3d expected(0.0, -2.0, 0.0);
   EXPECT_LT((d.mean - expected).norm(), 1e-9);
@@ -160,8 +170,8 @@ TEST(OffsetDerivative, OfNoiseItsSidesAreIndependentAndItsVarianceIsKnown) {
       sample.accel_noise = 0.5 * 0.5 * 0.005;
       imu.add(sample);
     }
-    const OffsetDerivative d = offsetDerivative(imu, Time::fromSeconds(0.4), StateBlock(),
-                                                Eigen::Vector3d(0.0, 0.0, -9.81), Extrinsics());
+    const OffsetDerivative d =
+        offsetDerivative(imu, Time::fromSeconds(0.4), StateBlock(), kGravity, Extrinsics(), 0.2);
     product += d.before.dot(d.after) / kRuns;
     sides += 0.5 * (d.before.squaredNorm() + d.after.squaredNorm()) / kRuns;
     squares += d.mean.squaredNorm() / d.variance / (3 * kRuns);
@@ -170,8 +180,8 @@ TEST(OffsetDerivative, OfNoiseItsSidesAreIndependentAndItsVarianceIsKnown) {
   EXPECT_NEAR(squares, 1.0, 0.1);
 }
 
-TEST(OffsetDerivative, ItsSidesShareNoSampleThoughTheImuVibrates) {
-  // The wide mean of a vibrating IMU reaches further than the samples: a scan waits for 0.11 s of them.
+TEST(OffsetDerivative, ItsSidesShareNoSampleThoughTheMeanIsWide) {
+  // A wide mean reaches further than the samples: a scan waits for 0.11 s of them.
   for (const auto& [reach_before, reach_after] : {std::pair{1.0, 0.11}, {0.11, 1.0}}) {
     const Time scan = Time::fromSeconds(reach_before);
     ImuBuffer imu;
@@ -179,16 +189,81 @@ TEST(OffsetDerivative, ItsSidesShareNoSampleThoughTheImuVibrates) {
       const Time time = Time::fromSeconds(0.01 * i);
       ImuMeasurement sample{
           time, Eigen::Vector3d::Zero(), {time < scan ? 1.0 : 0.0, time > scan ? 1.0 : 0.0, 9.81}};
-      sample.accel_noise = 0.01;
       imu.add(sample);
     }
     const OffsetDerivative d =
-        offsetDerivative(imu, scan, StateBlock(), Eigen::Vector3d(0.0, 0.0, -9.81), Extrinsics());
+        offsetDerivative(imu, scan, StateBlock(), kGravity, Extrinsics(), kMaxOffsetHalfWidth);
     EXPECT_NEAR(d.before.x(), -1.0, 0.1) << reach_before;
     EXPECT_NEAR(d.after.y(), -1.0, 0.1) << reach_before;
     EXPECT_NEAR(d.before.y(), 0.0, 1e-9) << reach_before;
     EXPECT_NEAR(d.after.x(), 0.0, 1e-9) << reach_before;
   }
+}
+
+/// A level IMU at 100 Hz with white noise of `sigma` per sample, that moves by `acceleration(t)` along x, for
+/// a minute; its scans come at 50 Hz. The IMU reaches 0.11 s past each scan, as it does online.
+template <class Acceleration>
+void feedScans(const Acceleration& acceleration, double sigma, const Eigen::Matrix3d& predicted,
+               const std::function<void(const OffsetScan&, const ImuBuffer&)>& use) {
+  constexpr double kSpacing = 0.01;
+  Noise draw;
+  ImuBuffer imu;
+  for (int i = 0; i < 6000; ++i) {
+    const double t = kSpacing * i;
+    ImuMeasurement sample{Time::fromSeconds(t), Eigen::Vector3d::Zero(),
+                          Eigen::Vector3d(acceleration(t), 0.0, 9.81) + sigma * draw.vector()};
+    sample.accel_noise = sigma * sigma * kSpacing;
+    imu.add(sample);
+    if (i < 11 || i % 2 == 0) continue;
+    OffsetScan scan;
+    scan.tau = Time::fromSeconds(t - 0.11);
+    scan.predicted = predicted;
+    scan.measured = 1e-4 * Eigen::Matrix3d::Identity();
+    use(scan, imu);
+  }
+}
+
+/// Evidence over the first width alone.
+OffsetEvidence evidenceOf(double sigma, const Eigen::Matrix3d& predicted) {
+  OffsetEvidence evidence;
+  feedScans([](double) { return 1.0; }, sigma, predicted,
+            [&](const OffsetScan& scan, const ImuBuffer& imu) {
+              evidence.add(scan, offsetDerivative(imu, scan.tau, StateBlock(), kGravity, Extrinsics(), 0.1));
+            });
+  return evidence;
+}
+
+TEST(OffsetEvidence, AConstantAccelerationTellsNothingOnceTheVelocityFollowsIt) {
+  // A wrong offset then shifts every velocity by the same, and the estimate goes along. Only the changes of
+  // the derivative tell the offset, and here they are noise, although the acceleration is far above it.
+  const OffsetEvidence alone = evidenceOf(0.3, Eigen::Matrix3d::Zero());
+  EXPECT_GT(alone.gain(), 0.9);
+  const OffsetEvidence followed = evidenceOf(0.3, 1e-4 * Eigen::Matrix3d::Identity());
+  EXPECT_LT(followed.gain(), 0.3);
+  EXPECT_LT(followed.information(), 1e-3 * alone.information());
+}
+
+/// The best width for an acceleration of 1 m/s^2 at `frequency` [Hz], and the gain there.
+std::pair<double, double> bestWidth(double frequency, double sigma) {
+  std::unique_ptr<OffsetWidths> widths;
+  std::pair<double, double> best;
+  feedScans([&](double t) { return std::sin(2.0 * M_PI * frequency * t); }, sigma,
+            1e-4 * Eigen::Matrix3d::Identity(),
+            [&](const OffsetScan& scan, const ImuBuffer& imu) {
+              if (!widths) widths = std::make_unique<OffsetWidths>(imu, kGravity);
+              widths->add(scan);
+              best = {widths->derivative(scan).half_width, widths->gain()};
+            });
+  return best;
+}
+
+TEST(OffsetWidths, FastMotionAndAQuietImuTakeTheNarrowestNoiseAWiderOne) {
+  const auto [of_fast, gain_of_fast] = bestWidth(1.5, 0.005);
+  EXPECT_EQ(of_fast, kOffsetHalfWidth);
+  EXPECT_GT(gain_of_fast, 0.9);
+  const auto [of_noise, gain_of_noise] = bestWidth(0.5, 0.5);
+  EXPECT_GT(of_noise, kOffsetHalfWidth);
+  EXPECT_GT(gain_of_noise, 0.1);
 }
 
 }  // namespace

@@ -13,7 +13,8 @@ RadarMotion RadarMotionModel::at(const double* state, Time state_time, Time stam
                                  const Eigen::Vector3d& l_I, const ImuMean* mean) const {
   const StateView x(state);
   if (kind == TimeOffsetModel::kConstantAcceleration)
-    return carriedByOneAcceleration(x, stamp, t_O, l_I, mean != nullptr ? *mean : meanAt(stamp));
+    return carriedByOneAcceleration(x, stamp, t_O, l_I,
+                                    mean != nullptr ? *mean : imu->mean(stamp, kOffsetHalfWidth));
   return carriedByImu(x, state_time, tau(stamp, t_O), l_I, mean);
 }
 
@@ -27,8 +28,6 @@ Time RadarMotionModel::meanTime(Time stamp, double t_O) const {
   return Time::fromNanoseconds((tau(stamp, t_O).nanoseconds() + kMillisecond / 2) / kMillisecond *
                                kMillisecond);
 }
-
-ImuMean RadarMotionModel::meanAt(Time time) const { return imu->mean(time, offsetHalfWidth(*imu, time)); }
 
 RadarMotion RadarMotionModel::carriedByImu(const StateView& x, Time state_time, Time tau,
                                            const Eigen::Vector3d& l_I, const ImuMean* mean) const {

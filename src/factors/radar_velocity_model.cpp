@@ -1,13 +1,12 @@
 #include "rio_t/factors/radar_velocity_model.h"
 
 #include "rio_t/core/so3.h"
-#include "rio_t/factors/offset_derivative.h"
 
 namespace rio_t {
 
 bool RadarVelocityModel::isCurrent(Time mean_time) const {
   return mean_ && mean_->time == mean_time &&
-         (mean_->imu_until == model_.imu->newest() || mean_->imu_until - mean_time > kMaxOffsetHalfWidth);
+         (mean_->imu_until == model_.imu->newest() || mean_->imu_until - mean_time > scan_.offset_half_width);
 }
 
 PredictedVelocity RadarVelocityModel::at(double const* const* parameters, bool derivatives) const {
@@ -18,7 +17,7 @@ PredictedVelocity RadarVelocityModel::at(double const* const* parameters, bool d
   const bool is_linear = away != 0.0 && scan_.offset_gain > 0.0;
   const Time mean_time = model_.meanTime(scan_.stamp, t_O);
   if ((derivatives || is_linear) && !isCurrent(mean_time))
-    mean_ = Mean{mean_time, model_.imu->newest(), model_.meanAt(mean_time)};
+    mean_ = Mean{mean_time, model_.imu->newest(), model_.imu->mean(mean_time, scan_.offset_half_width)};
   const RadarMotion motion = model_.at(parameters[0], state_time_, scan_.stamp, t_O, T_IR.l_I,
                                        derivatives || is_linear ? &mean_->value : nullptr);
   const Eigen::Matrix3d R_RI = T_IR.R_RI();

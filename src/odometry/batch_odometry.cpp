@@ -80,6 +80,7 @@ RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) co
   z.covariance.diagonal() +=
       (model_error_scale_ / result.model_error_scale - 1.0) * result.ego_velocity.told_variance;
   z.offset_gain = result.offset_gain;
+  z.offset_half_width = result.offset_half_width;
   return z;
 }
 

@@ -112,6 +112,7 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
     result.innovation = answer.judged;
     result.doppler = answer.doppler;
     result.offset_gain = answer.offset_gain;
+    result.offset_half_width = answer.offset_half_width;
     result.offset_stepped = answer.offset_stepped;
     result.rejected_because = answer.rejected_because;
     result.used = result.updated = answer.rejected_because.empty();

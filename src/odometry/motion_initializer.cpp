@@ -236,18 +236,20 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
 
   // Which scans tell the offset depends on the state, and the state on them.
   std::vector<const Term*> terms;
-  std::vector<double> gains;
+  OffsetGains offset_gains;
   Solution solution;
   for (int round = 0; round < kMaxRounds; ++round) {
-    const std::vector<double> last =
-        std::exchange(gains, offsetGains(velocities, time, imu, state, offset->x[0]));
-    if (round > 0 && isNear(gains, last)) break;
+    const OffsetGains last =
+        std::exchange(offset_gains, offsetGains(velocities, time, imu, state, offset->x[0]));
+    const std::vector<double>& gains = offset_gains.gains;
+    if (round > 0 && isNear(gains, last.gains)) break;
     for (const Term* term : terms) window.remove(*term);
     terms.clear();
     for (std::size_t i = 0; i < velocities.size(); ++i) {
       RadarVelocityMeasurement z = velocities[i];
       z.covariance = carriedCovariance(velocities[i], time, imu, scale.value()).whole;
       z.offset_gain = gains[i];
+      z.offset_half_width = offset_gains.half_width;
       if (gains[i] == 0.0) z.linear_from_t_O = offset->x[0];
       terms.push_back(&window.add(std::make_unique<RadarVelocityFactor>(z, time, model),
                                   {&state, offset.get(), extrinsics.get()}, loss));
@@ -283,22 +285,29 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
   return outliers;
 }
 
-std::vector<double> MotionInitializer::offsetGains(const Velocities& velocities, Time time,
-                                                   const ImuBuffer& imu, const Block& state,
-                                                   double t_O) const {
-  OffsetEvidence evidence;
-  std::vector<double> gains(velocities.size(), 0.0);
-  if (!smoother_.estimate_time_offset) return gains;
-  for (std::size_t i = 0; i < velocities.size(); ++i) {
-    const Velocity& z = velocities[i];
-    const Time tau = z.stamp - t_O;
-    const StateBlock x = carried(toStateBlock(state.x), time, tau, imu, g_W_);
-    const OffsetDerivative derivative = offsetDerivative(imu, tau, x, g_W_, T_IR_);
-    evidence.add(z.stamp, derivative, z.covariance.inverse());
-    gains[i] = derivative.mean.norm() > smoother_.time_offset_min_acceleration ? 1.0 : 0.0;
+MotionInitializer::OffsetGains MotionInitializer::offsetGains(const Velocities& velocities, Time time,
+                                                              const ImuBuffer& imu, const Block& state,
+                                                              double t_O) const {
+  OffsetGains result;
+  result.gains.resize(velocities.size(), 0.0);
+  if (!smoother_.estimate_time_offset) return result;
+  OffsetWidths widths(imu, g_W_);
+  std::vector<OffsetScan> scans;
+  for (const Velocity& z : velocities) {
+    OffsetScan scan;
+    scan.tau = z.stamp - t_O;
+    scan.x = carried(toStateBlock(state.x), time, scan.tau, imu, g_W_);
+    scan.T_IR = T_IR_;
+    scan.measured = z.covariance;
+    widths.add(scan);
+    scans.push_back(scan);
   }
-  for (double& gain : gains) gain *= evidence.gain();
-  return gains;
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    const OffsetDerivative derivative = widths.derivative(scans[i]);
+    result.half_width = derivative.half_width;
+    if (derivative.mean.norm() > smoother_.time_offset_min_acceleration) result.gains[i] = widths.gain();
+  }
+  return result;
 }
 
 /// Covariance that the IMU adds between the state and a scan: noise of the accelerometer, and of the tilt.

@@ -62,6 +62,7 @@ RadarChannel::RadarChannel(const RadarChannelOptions& options, const Eigen::Vect
       in_window_(options.smoother, options.T_IR, g_W, imu,
                  offset ? std::move(offset) : std::make_shared<OffsetBlocks>(options.smoother)),
       feasibility_(options.feasibility),
+      offset_widths_(imu, g_W),
       step_detector_(options.offset_step_detector),
       offset_uncertainty_(options.smoother.huber_threshold),
       gate_(options.smoother) {}
@@ -84,7 +85,7 @@ void RadarChannel::tune(const SmootherOptions& options) {
 void RadarChannel::forget() {
   step_detector_ = OffsetStepDetector(options_.offset_step_detector);
   offset_uncertainty_ = OffsetUncertainty(options_.smoother.huber_threshold);
-  offset_evidence_ = OffsetEvidence();
+  offset_widths_.clear();
   feasibility_ = FeasibilityCheck(options_.feasibility);
   pool_.clear();
   learned_at_.reset();
@@ -103,12 +104,16 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   if (!isValid(measured.status)) return reject(toString(answer.ego_velocity.status));
   if (seen.is_own && !feasibility_.accept(scan.stamp, measured.v_R)) return reject("infeasible_velocity");
 
-  answer.offset_gain = offsetGain(scan.stamp, seen);
+  answer.offset_gain = offsetGain(seen);
   const bool informs_offset = answer.offset_gain > 0.0;
   // An offset that is wrong by c shows as (J + noise) c; nothing else tells of the noise's part.
-  const double rate_variance = informs_offset ? seen.prediction->rate_variance : 0.0;
+  double rate_variance = 0.0;
+  if (informs_offset) {
+    answer.offset_half_width = seen.dv_dt_O.half_width;
+    rate_variance = seen.dv_dt_O.variance * seen.prediction->t_O_variance;
+  }
   seen.velocity.covariance.diagonal().array() += rate_variance;
-  const RadarScanTime taken{scan.stamp, answer.offset_gain, offset()};
+  const RadarScanTime taken{scan.stamp, answer.offset_gain, answer.offset_half_width, offset()};
   if (isTightlyCoupled() && measured.status == EgoVelocityStatus::kMoving) {
     const std::vector<std::size_t> points = pointsOf(scan, seen);
     if (points.empty()) return reject("too_few_inliers");
@@ -120,10 +125,10 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   // A minority that sides with the prediction has more noise than its covariance says.
   const bool can_be_judged = seen.moves && seen.tilt_is_known && hasMajority(measured);
   std::optional<Innovation> all;  // of the points borrowed, too
-  if (seen.prior) all = innovation(scan.stamp, *seen.prior, measured, seen.prediction);
+  if (seen.prior) all = innovation(scan.stamp, *seen.prior, measured, &seen);
   const std::optional<Innovation> own =
       seen.has_borrowed && seen.moves
-          ? innovation(scan.stamp, *seen.prior, around(*seen.prior, scan, measured), seen.prediction)
+          ? innovation(scan.stamp, *seen.prior, around(*seen.prior, scan, measured), &seen)
           : all;
   if (can_be_judged && informs_offset && options_.smoother.estimate_time_offset &&
       step_detector_.stepped(*own)) {
@@ -192,12 +197,14 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
   return seen;
 }
 
-double RadarChannel::offsetGain(Time stamp, const Seen& seen) {
+double RadarChannel::offsetGain(Seen& seen) {
   if (!seen.moves) return 0.0;
-  const OffsetDerivative& derivative = seen.prediction->dv_dt_O;
-  offset_evidence_.add(stamp, derivative, seen.velocity.covariance.inverse());
-  return derivative.mean.norm() > options_.smoother.time_offset_min_acceleration ? offset_evidence_.gain()
-                                                                                 : 0.0;
+  OffsetScan scan = seen.prediction->scan;
+  scan.measured = seen.velocity.covariance;
+  offset_widths_.add(scan);
+  seen.dv_dt_O = offset_widths_.derivative(scan);
+  const bool moves_enough = seen.dv_dt_O.mean.norm() > options_.smoother.time_offset_min_acceleration;
+  return moves_enough ? offset_widths_.gain() : 0.0;
 }
 
 std::vector<std::size_t> RadarChannel::pointsOf(const RadarScan& scan, const Seen& seen) const {
@@ -231,16 +238,16 @@ EgoVelocity RadarChannel::around(const VelocityPrior& prior, const RadarScan& sc
 }
 
 Innovation RadarChannel::innovation(Time stamp, const VelocityPrior& prior, const EgoVelocity& measured,
-                                    const std::optional<RadarVelocityPrediction>& prediction) const {
+                                    const Seen* seen) const {
   Innovation result;
   result.stamp = stamp;
   result.d = measured.v_R - prior.v_R;
   result.S = prior.covariance + measured.covariance;
-  if (!prediction) return result;
-  result.S_at_offset = prediction->covariance_at_offset + measured.covariance;
+  if (seen == nullptr || !seen->prediction) return result;
+  result.S_at_offset = seen->prediction->scan.predicted + measured.covariance;
   // The prediction holds the noise before the scan. A derivative with the same noise would let both look like
   // a wrong offset.
-  result.J_O = offset_evidence_.gain() * prediction->dv_dt_O.after;
+  result.J_O = offset_widths_.gain() * seen->dv_dt_O.after;
   return result;
 }
 
@@ -256,7 +263,7 @@ void RadarChannel::judge(const RadarScan& scan, const VelocityPrior& prior, doub
   const bool is_outvoted = countOthers(measured.inliers, alone.inliers) >= options_.ego_velocity.min_inliers;
   if (is_outvoted && !isValid(measured.status)) return;
   if (!is_outvoted) answer.alone = scaled(alone, 1.0 / scale);
-  answer.judged = innovation(scan.stamp, prior, is_outvoted ? measured : alone, std::nullopt)
+  answer.judged = innovation(scan.stamp, prior, is_outvoted ? measured : alone, nullptr)
                       .widened(options_.smoother.innovation_model_error);
 }
 

@@ -82,21 +82,22 @@ std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoo
   RadarVelocityPrediction prediction;
   prediction.t_O = offset();
   prediction.velocity.v_R = R_RI * motion.v_I;
+  prediction.scan.tau = time;
+  prediction.scan.x = state->x;
+  prediction.scan.T_IR = T_IR;
   if (!options_.estimate_time_offset) J.col(kOffset).setZero();
   prediction.velocity.covariance = J * P * J.transpose();
   Eigen::Matrix<double, 3, Eigen::Dynamic> J_at_offset = J;
   J_at_offset.col(kOffset).setZero();
-  prediction.covariance_at_offset = J_at_offset * P * J_at_offset.transpose();
+  prediction.scan.predicted = J_at_offset * P * J_at_offset.transpose();
   const Eigen::Quaterniond q_IW = state->x.q_WI().conjugate();
   const Eigen::Vector3d g_I = q_IW * model_.g_W;
-  prediction.dv_dt_O = offsetDerivative(*model_.imu, time, state->x, model_.g_W, T_IR);
   Eigen::Matrix<double, 3, StateBlock::kTangent> J_rate =
       Eigen::Matrix<double, 3, StateBlock::kTangent>::Zero();
   J_rate.middleCols<3>(StateBlock::kTheta) = R_RI * so3::hat(g_I);
   J_rate.middleCols<3>(StateBlock::kBa) = -R_RI;
-  prediction.dv_dt_O.shared = J_rate * P.topLeftCorner<kOffset, kOffset>() * J_rate.transpose();
-  if (options_.estimate_time_offset)
-    prediction.rate_variance = prediction.dv_dt_O.variance * P(kOffset, kOffset);
+  prediction.scan.shared = J_rate * P.topLeftCorner<kOffset, kOffset>() * J_rate.transpose();
+  if (options_.estimate_time_offset) prediction.t_O_variance = P(kOffset, kOffset);
   const Eigen::Matrix<double, 2, 3> horizontal = state->x.q_WI().toRotationMatrix().topRows<2>();
   const Eigen::Matrix2d tilt =
       horizontal * P.block<3, 3>(StateBlock::kTheta, StateBlock::kTheta) * horizontal.transpose();

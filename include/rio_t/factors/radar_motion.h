@@ -45,7 +45,6 @@ struct RadarMotionModel {
   /// Centre of the mean of the IMU for the derivative with respect to t_O: tau rounded to a millisecond, or
   /// the stamp. A smaller change of t_O needs no new mean.
   Time meanTime(Time stamp, double t_O) const;
-  ImuMean meanAt(Time time) const;
 
  private:
   Time tau(Time stamp, double t_O) const;

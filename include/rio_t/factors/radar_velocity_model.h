@@ -5,6 +5,7 @@
 
 #include "rio_t/core/time.h"
 #include "rio_t/factors/extrinsics_manifold.h"
+#include "rio_t/factors/offset_derivative.h"
 #include "rio_t/factors/radar_motion.h"
 #include "rio_t/factors/state_block.h"
 
@@ -15,6 +16,7 @@ struct RadarScanTime {
   Time stamp;  ///< measured at stamp - t_O
   /// Share of the derivative with respect to t_O that is motion and not noise of the IMU, see OffsetEvidence.
   double offset_gain = 1.0;
+  double offset_half_width = kOffsetHalfWidth;  ///< of the mean in that derivative [s]
   /// If set, the motion is taken at this t_O [s], and to first order from there. Exactly at each t_O, the
   /// noise of the IMU over a shift raises the cost whatever the direction of the shift. With a gain of 0, the
   /// scan does not tell the offset.

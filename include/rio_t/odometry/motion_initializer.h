@@ -92,9 +92,12 @@ class MotionInitializer {
   /// solution. Returns the share of outliers.
   double refine(const Velocities& velocities, Time time, const ImuBuffer& imu, ModelErrorScale& scale,
                 NodePrior& prior) const;
-  /// For each velocity the gain of OffsetEvidence: 0 if the velocity says nothing about the offset.
-  std::vector<double> offsetGains(const Velocities& velocities, Time time, const ImuBuffer& imu,
-                                  const Block& state, double t_O) const;
+  struct OffsetGains {
+    std::vector<double> gains;  ///< of OffsetEvidence; 0: the velocity says nothing about the offset
+    double half_width = kOffsetHalfWidth;  ///< of the mean of the IMU in the derivative [s]
+  };
+  OffsetGains offsetGains(const Velocities& velocities, Time time, const ImuBuffer& imu, const Block& state,
+                          double t_O) const;
   struct CarriedCovariance {
     Eigen::Matrix3d whole;   ///< of a velocity against the state at `time` [m^2/s^2]
     Eigen::Matrix3d scaled;  ///< its part that the model errors scale

@@ -24,13 +24,14 @@ struct ScanResult {
   EgoVelocity ego_velocity;
   /// The innovation of the velocity that its points show without the prediction; none if they do not decide.
   std::optional<Innovation> innovation;
-  std::optional<DopplerMeasurement> doppler;  ///< its points, if they and not the velocity count
-  double offset_gain = 0.0;                   ///< see OffsetEvidence; 0: the scan does not tell the offset
-  bool used = false;                          ///< it went into the window
-  bool at_rest = false;                       ///< the IMU shows rest, and the points do not deny it
-  std::optional<LandmarkAnswer> landmarks;    ///< if they are on, of a used scan in motion
-  double model_error_scale = 1.0;             ///< see ModelErrorScale; in the covariance of ego_velocity
-  std::string rejected_because;               ///< snake case, empty if used; keys of `scans_rejected`
+  std::optional<DopplerMeasurement> doppler;    ///< its points, if they and not the velocity count
+  double offset_gain = 0.0;                     ///< see OffsetEvidence; 0: the scan does not tell the offset
+  double offset_half_width = kOffsetHalfWidth;  ///< of the mean of the IMU in the derivative [s]
+  bool used = false;                            ///< it went into the window
+  bool at_rest = false;                         ///< the IMU shows rest, and the points do not deny it
+  std::optional<LandmarkAnswer> landmarks;      ///< if they are on, of a used scan in motion
+  double model_error_scale = 1.0;               ///< see ModelErrorScale; in the covariance of ego_velocity
+  std::string rejected_because;                 ///< snake case, empty if used; keys of `scans_rejected`
 
   /// The window was solved again, because the scan was used or the platform is at rest. If not, the following
   /// members are not set.

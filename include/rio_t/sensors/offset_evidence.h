@@ -1,8 +1,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <deque>
 
 #include "rio_t/core/time.h"
+#include "rio_t/factors/offset_derivative.h"
 #include "rio_t/factors/state_block.h"
 #include "rio_t/imu/buffer.h"
 #include "rio_t/radar/extrinsics.h"
@@ -11,13 +14,12 @@ namespace rio_t {
 
 /// The derivative of the radar's velocity with respect to t_O, as the IMU shows it around a scan.
 struct OffsetDerivative {
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();    ///< [m/s^2], as the next two: over both sides
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();  ///< [m/s^2], as the next two: over both sides
   // Over the time before and after the scan. They share no sample, so their noise is independent.
   Eigen::Vector3d before = Eigen::Vector3d::Zero();
   Eigen::Vector3d after = Eigen::Vector3d::Zero();
+  double half_width = kOffsetHalfWidth;  ///< of `mean` [s]
   double variance = 0.0;  ///< of the IMU's noise in `mean`, per axis, as far as it is known [m^2/s^4]
-  /// Covariance of the error that all three share: of tilt and accelerometer bias [m^2/s^4].
-  Eigen::Matrix3d shared = Eigen::Matrix3d::Zero();
 
   /// The mean exceeds five sigma of its noise, so it is motion.
   bool isCertain() const;
@@ -26,28 +28,84 @@ struct OffsetDerivative {
 /// The derivative for a state `x` at the time of measurement `tau`, without `shared`. `g_W` is gravity in W
 /// [m/s^2].
 OffsetDerivative offsetDerivative(const ImuBuffer& imu, Time tau, const StateBlock& x,
-                                  const Eigen::Vector3d& g_W, const Extrinsics& T_IR);
+                                  const Eigen::Vector3d& g_W, const Extrinsics& T_IR, double half_width);
+
+/// A scan against its prediction.
+struct OffsetScan {
+  Time tau;      ///< of measurement, as predicted
+  StateBlock x;  ///< predicted at tau
+  Extrinsics T_IR;
+  /// Covariance in R of the error that tilt and accelerometer bias give to every derivative [m^2/s^4].
+  Eigen::Matrix3d shared = Eigen::Matrix3d::Zero();
+  /// Covariance in R of the predicted velocity if t_O were known [m^2/s^2]. Zero: the prediction does not
+  /// follow the scans.
+  Eigen::Matrix3d predicted = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d measured = Eigen::Matrix3d::Zero();  ///< covariance in R of the scan's velocity [m^2/s^2]
+};
 
 /// Tells how much of the derivative with respect to t_O is motion, and how much is noise of the IMU.
 ///
-/// The factor takes noise in the derivative for information about t_O, which no scan has. A derivative far
-/// beyond the known noise is motion. For smaller ones, OffsetEvidence compares the time before a scan with
-/// the time after it: motion is the same in both, noise is not. So the mean of before' W after is the square
-/// of the motion, whatever the noise. The gain is the share of this square in mean' W mean. If the factor
-/// shortens the derivative J by the gain, J'J is what the scans know (docs/method.md, section 5.3). Not
-/// thread-safe.
+/// The factor takes noise in the derivative for information about t_O, which no scan has. If the offset is
+/// wrong, the estimated velocity follows the radar. So a scan tells the offset by what the derivative has
+/// changed since the scans that the estimate followed, and noise changes faster than motion. A derivative far
+/// beyond the known noise is motion, and the noise of its change is known. For smaller ones, OffsetEvidence
+/// compares the time before a scan with the time after it: motion is the same in both, noise is not. So the
+/// mean of before' W after is the square of the motion, whatever the noise. The gain is the share of this
+/// square in mean' W mean. If the factor shortens the derivative J by the gain, J'J is what the scans know
+/// (docs/method.md, section 5.3). Not thread-safe.
 class OffsetEvidence {
  public:
-  /// `weight`: inverse covariance of the scan's velocity [s^2/m^2].
-  void add(Time stamp, const OffsetDerivative& derivative, const Eigen::Matrix3d& weight);
+  void add(const OffsetScan& scan, const OffsetDerivative& derivative);
   /// Factor on the derivative, in [0, 1]; 0 while nothing is known.
   double gain() const;
+  /// What the last scans know about the offset [1/s^2].
+  double information() const { return gain() * gain() * all_; }
 
  private:
+  struct Followed {
+    Time tau;
+    double weight = 0.0;  ///< in the velocity that the estimate has now
+    double sigma = 0.0;   ///< of the derivative's noise [m/s^2]
+  };
+  /// Variance of the noise in the change of the derivative [m^2/s^4]; `share` of the change is followed.
+  double varianceOfChange(Time tau, const OffsetDerivative& derivative, double share);
+
+  // What the estimated velocity has followed of a wrong offset, per second of it, in W [m/s^2].
+  Eigen::Vector3d mean_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d before_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d after_ = Eigen::Vector3d::Zero();
+  double constant_ = 0.0;       ///< share that is followed of an error that stays the same
+  double noise_ = 0.0;          ///< variance of the noise in mean_ [m^2/s^4]
+  std::deque<Followed> scans_;  ///< whose means overlap the newest
   Time last_;
   double motion_ = 0.0;           ///< sum of before' W after, less what errors of the state add, fading
   double motion_variance_ = 0.0;  ///< of it
   double all_ = 0.0;              ///< sum of mean' W mean, fading
+};
+
+/// Evidence for each of kOffsetHalfWidths. The width with the most information is the best: a wide mean has
+/// less noise, and smooths fast motion away. Not thread-safe.
+class OffsetWidths {
+ public:
+  /// `imu` must outlive it. `g_W` is gravity in W [m/s^2].
+  OffsetWidths(const ImuBuffer& imu, const Eigen::Vector3d& g_W) : imu_(&imu), g_W_(g_W) {}
+  /// The scan counts when the IMU covers the mean around it.
+  void add(const OffsetScan& scan);
+  void clear() { widths_ = {}; }
+  /// The derivative over the best width. Its mean takes the samples that exist.
+  OffsetDerivative derivative(const OffsetScan& scan) const;
+  double gain() const { return widths_[best()].evidence.gain(); }
+
+ private:
+  std::size_t best() const;
+
+  const ImuBuffer* imu_;
+  Eigen::Vector3d g_W_;
+  struct Width {
+    OffsetEvidence evidence;
+    std::deque<OffsetScan> waiting;
+  };
+  std::array<Width, kOffsetHalfWidths.size()> widths_;
 };
 
 }  // namespace rio_t

@@ -39,10 +39,11 @@ struct RadarAnswer {
   EgoVelocity ego_velocity;
   /// Its points, if they and not the velocity go into the window.
   std::optional<DopplerMeasurement> doppler;
-  std::string rejected_because;  ///< snake case, empty if the scan was used
-  bool at_rest = false;          ///< as the IMU says, and the points do not deny it
-  bool offset_stepped = false;   ///< t_O stepped before this scan
-  double offset_gain = 0.0;      ///< see OffsetEvidence; 0: the scan does not tell the offset
+  std::string rejected_because;                 ///< snake case, empty if the scan was used
+  bool at_rest = false;                         ///< as the IMU says, and the points do not deny it
+  bool offset_stepped = false;                  ///< t_O stepped before this scan
+  double offset_gain = 0.0;                     ///< see OffsetEvidence; 0: the scan does not tell the offset
+  double offset_half_width = kOffsetHalfWidth;  ///< of the mean of the IMU in the derivative [s]
 
   bool was_predicted = false;  ///< if not, nothing below is set
   /// For health: the innovation of the velocity that the scan shows without the prediction. None if its
@@ -115,13 +116,14 @@ class RadarChannel {
     EgoVelocity velocity;
     bool is_own = false;  ///< the points agree on it; if not, it is `around` the prediction
     bool moves = false;
+    OffsetDerivative dv_dt_O;  ///< if it moves, of the predicted velocity with respect to t_O
     bool tilt_is_known = false;
   };
   /// Also sets what the answer says of velocity, rest and health.
   Seen see(const RadarScan& scan, const ScanContext& context, const FixedLagSmoother& smoother,
            RadarAnswer& answer);
   /// See OffsetEvidence; 0: the scan does not tell the offset.
-  double offsetGain(Time stamp, const Seen& seen);
+  double offsetGain(Seen& seen);
   /// The scan's own points that go into the window.
   std::vector<std::size_t> pointsOf(const RadarScan& scan, const Seen& seen) const;
   bool isTightlyCoupled() const { return options_.smoother.radar_factor == RadarFactor::kDoppler; }
@@ -132,7 +134,7 @@ class RadarChannel {
   /// they do not see have a large sigma.
   EgoVelocity around(const VelocityPrior& prior, const RadarScan& scan, EgoVelocity result) const;
   Innovation innovation(Time stamp, const VelocityPrior& prior, const EgoVelocity& measured,
-                        const std::optional<RadarVelocityPrediction>& prediction) const;
+                        const Seen* seen) const;
   /// Sets what health and a re-initialisation get from the scan.
   void judge(const RadarScan& scan, const VelocityPrior& prior, double scale, RadarAnswer& answer) const;
 
@@ -142,7 +144,7 @@ class RadarChannel {
   FeasibilityCheck feasibility_;
   ScanPool pool_;
   std::optional<Time> learned_at_, alone_at_;  ///< of the points: those borrowed count once
-  OffsetEvidence offset_evidence_;
+  OffsetWidths offset_widths_;
   OffsetStepDetector step_detector_;
   OffsetUncertainty offset_uncertainty_;
   InnovationGate gate_;

@@ -20,14 +20,11 @@ namespace rio_t {
 
 /// Predicted velocity of a scan.
 struct RadarVelocityPrediction {
-  VelocityPrior velocity;                                          ///< with all uncertainties
-  Eigen::Matrix3d covariance_at_offset = Eigen::Matrix3d::Zero();  ///< if the offset were known [m^2/s^2]
-  OffsetDerivative dv_dt_O;                                        ///< of v_R with respect to t_O
-  double t_O = 0.0;                                                ///< of the prediction [s]
-  /// Per axis: the noise in dv_dt_O times the error of the offset. The covariances do not include it
-  /// [m^2/s^2].
-  double rate_variance = 0.0;
-  double tilt_sigma = 0.0;  ///< of roll and pitch, the larger [rad]
+  VelocityPrior velocity;     ///< with all uncertainties
+  OffsetScan scan;            ///< without what is measured
+  double t_O = 0.0;           ///< of the prediction [s]
+  double t_O_variance = 0.0;  ///< 0 if t_O is not estimated [s^2]
+  double tilt_sigma = 0.0;    ///< of roll and pitch, the larger [rad]
 };
 
 /// One radar in the window of the smoother: its calibration blocks, t_O and extrinsics, and its terms. Not
