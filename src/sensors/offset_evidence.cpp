@@ -98,7 +98,10 @@ void OffsetWidths::add(const OffsetScan& scan) {
     std::deque<OffsetScan>& waiting = widths_[i].waiting;
     const double half_width = kOffsetHalfWidths[i];
     waiting.push_back(scan);
-    for (; !waiting.empty() && imu_->newest() - waiting.front().tau >= half_width; waiting.pop_front()) {
+    // The IMU reaches kOffsetHalfWidth past a scan. It may reach further, but then the order of the messages
+    // would change the result.
+    const double left = half_width - kOffsetHalfWidth;
+    for (; !waiting.empty() && scan.tau - waiting.front().tau >= left; waiting.pop_front()) {
       const OffsetScan& next = waiting.front();
       if (next.tau - imu_->oldest() < half_width) continue;
       widths_[i].evidence.add(next, offsetDerivative(*imu_, next.tau, next.x, g_W_, next.T_IR, half_width));

@@ -89,7 +89,7 @@ class OffsetWidths {
  public:
   /// `imu` must outlive it. `g_W` is gravity in W [m/s^2].
   OffsetWidths(const ImuBuffer& imu, const Eigen::Vector3d& g_W) : imu_(&imu), g_W_(g_W) {}
-  /// The scan counts when the IMU covers the mean around it.
+  /// The scan counts when a later one shows that the IMU covers the mean around it.
   void add(const OffsetScan& scan);
   void clear() { widths_ = {}; }
   /// The derivative over the best width. Its mean takes the samples that exist.
