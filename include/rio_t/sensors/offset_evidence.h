@@ -47,12 +47,12 @@ struct OffsetScan {
 ///
 /// The factor takes noise in the derivative for information about t_O, which no scan has. If the offset is
 /// wrong, the estimated velocity follows the radar. So a scan tells the offset by what the derivative has
-/// changed since the scans that the estimate followed, and noise changes faster than motion. A derivative far
-/// beyond the known noise is motion, and the noise of its change is known. For smaller ones, OffsetEvidence
-/// compares the time before a scan with the time after it: motion is the same in both, noise is not. So the
-/// mean of before' W after is the square of the motion, whatever the noise. The gain is the share of this
-/// square in mean' W mean. If the factor shortens the derivative J by the gain, J'J is what the scans know
-/// (docs/method.md, section 5.3). Not thread-safe.
+/// changed since the scans that the estimate followed, and noise changes faster than motion. The rest is
+/// about these changes. If a derivative is far beyond the known noise, the noise of its change is known, too.
+/// For smaller ones, OffsetEvidence compares the time before a scan with the time after it: motion is the
+/// same in both, noise is not. So the mean of before' W after is the square of the motion, whatever the
+/// noise. The gain is the share of this square in mean' W mean. If the factor shortens the derivative J by
+/// the gain, J'J is what the scans know (docs/method.md, section 5.3). Not thread-safe.
 class OffsetEvidence {
  public:
   void add(const OffsetScan& scan, const OffsetDerivative& derivative);

@@ -122,7 +122,7 @@ class RadarChannel {
   /// Also sets what the answer says of velocity, rest and health.
   Seen see(const RadarScan& scan, const ScanContext& context, const FixedLagSmoother& smoother,
            RadarAnswer& answer);
-  /// See OffsetEvidence; 0: the scan does not tell the offset.
+  /// See OffsetEvidence; 0: the scan does not tell the offset. Sets `seen.dv_dt_O`.
   double offsetGain(Seen& seen);
   /// The scan's own points that go into the window.
   std::vector<std::size_t> pointsOf(const RadarScan& scan, const Seen& seen) const;
@@ -133,6 +133,7 @@ class RadarChannel {
   /// The velocity that the inliers among the scan's own points show around the prediction. Directions that
   /// they do not see have a large sigma.
   EgoVelocity around(const VelocityPrior& prior, const RadarScan& scan, EgoVelocity result) const;
+  /// Without `seen`, it does not tell how it depends on the offset.
   Innovation innovation(Time stamp, const VelocityPrior& prior, const EgoVelocity& measured,
                         const Seen* seen) const;
   /// Sets what health and a re-initialisation get from the scan.
