@@ -67,7 +67,7 @@ void OffsetEvidence::add(const OffsetScan& scan, const OffsetDerivative& derivat
   const Eigen::Matrix3d W = (scan.predicted + scan.measured).inverse();
   const Eigen::Matrix3d K = scan.predicted * W;
   const auto change = [&](const Eigen::Vector3d& now, Eigen::Vector3d& followed) {
-    const Eigen::Vector3d changed = now - R_WR.transpose() * followed;
+    Eigen::Vector3d changed = now - R_WR.transpose() * followed;
     followed += R_WR * K * changed;
     return changed;
   };
