@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "noise.h"
 
@@ -201,10 +202,10 @@ TEST(OffsetDerivative, ItsSidesShareNoSampleThoughTheMeanIsWide) {
 }
 
 /// A level IMU at 100 Hz with white noise of `sigma` per sample, that moves by `acceleration(t)` along x, for
-/// a minute; its scans come at 50 Hz. The IMU reaches 0.11 s past each scan, as it does online.
+/// a minute; its scans come at 50 Hz. The IMU reaches `ahead` samples past each scan.
 template <class Acceleration>
-void feedScans(const Acceleration& acceleration, double sigma, const Eigen::Matrix3d& predicted,
-               const std::function<void(const OffsetScan&, const ImuBuffer&)>& use) {
+void feedScans(const Acceleration& acceleration, double sigma, double predicted,
+               const std::function<void(const OffsetScan&, const ImuBuffer&)>& use, int ahead = 11) {
   constexpr double kSpacing = 0.01;
   Noise draw;
   ImuBuffer imu;
@@ -214,41 +215,48 @@ void feedScans(const Acceleration& acceleration, double sigma, const Eigen::Matr
                           Eigen::Vector3d(acceleration(t), 0.0, 9.81) + sigma * draw.vector()};
     sample.accel_noise = sigma * sigma * kSpacing;
     imu.add(sample);
-    if (i < 11 || i % 2 == 0) continue;
+    if (i < ahead || (i - ahead) % 2 != 0) continue;
     OffsetScan scan;
-    scan.tau = Time::fromSeconds(t - 0.11);
-    scan.predicted = predicted;
+    scan.tau = Time::fromSeconds(kSpacing * (i - ahead));
+    scan.predicted = predicted * Eigen::Matrix3d::Identity();
     scan.measured = 1e-4 * Eigen::Matrix3d::Identity();
     use(scan, imu);
   }
 }
 
-/// Evidence over the first width alone.
-OffsetEvidence evidenceOf(double sigma, const Eigen::Matrix3d& predicted) {
+/// Evidence over the first width alone. `shared` is the variance of what tilt and bias may add [m^2/s^4].
+template <class Acceleration>
+OffsetEvidence evidenceOf(const Acceleration& acceleration, double sigma, double predicted, double shared) {
   OffsetEvidence evidence;
-  feedScans([](double) { return 1.0; }, sigma, predicted,
-            [&](const OffsetScan& scan, const ImuBuffer& imu) {
-              evidence.add(scan, offsetDerivative(imu, scan.tau, StateBlock(), kGravity, Extrinsics(), 0.1));
-            });
+  feedScans(acceleration, sigma, predicted, [&](OffsetScan scan, const ImuBuffer& imu) {
+    scan.shared = shared * Eigen::Matrix3d::Identity();
+    evidence.add(scan, offsetDerivative(imu, scan.tau, StateBlock(), kGravity, Extrinsics(), 0.1));
+  });
   return evidence;
 }
 
 TEST(OffsetEvidence, AConstantAccelerationTellsNothingOnceTheVelocityFollowsIt) {
   // A wrong offset then shifts every velocity by the same, and the estimate goes along. Only the changes of
   // the derivative tell the offset, and here they are noise, although the acceleration is far above it.
-  const OffsetEvidence alone = evidenceOf(0.3, Eigen::Matrix3d::Zero());
+  const auto steady = [](double) { return 1.0; };
+  const OffsetEvidence alone = evidenceOf(steady, 0.3, 0.0, 0.0);
   EXPECT_GT(alone.gain(), 0.9);
-  const OffsetEvidence followed = evidenceOf(0.3, 1e-4 * Eigen::Matrix3d::Identity());
+  const OffsetEvidence followed = evidenceOf(steady, 0.3, 1e-4, 0.0);
   EXPECT_LT(followed.gain(), 0.3);
   EXPECT_LT(followed.information(), 1e-3 * alone.information());
+}
+
+TEST(OffsetEvidence, TheVelocityFollowsAWrongTiltToo) {
+  // A tilt that is wrong by 2 degrees adds 0.34 m/s^2 to every derivative, and nothing to its changes.
+  const auto shaking = [](double t) { return std::sin(2.0 * M_PI * t); };
+  EXPECT_GT(evidenceOf(shaking, 0.005, 1e-4, 0.34 * 0.34).gain(), 0.9);
 }
 
 /// The best width for an acceleration of 1 m/s^2 at `frequency` [Hz], and the gain there.
 std::pair<double, double> bestWidth(double frequency, double sigma) {
   std::unique_ptr<OffsetWidths> widths;
   std::pair<double, double> best;
-  feedScans([&](double t) { return std::sin(2.0 * M_PI * frequency * t); }, sigma,
-            1e-4 * Eigen::Matrix3d::Identity(),
+  feedScans([&](double t) { return std::sin(2.0 * M_PI * frequency * t); }, sigma, 1e-4,
             [&](const OffsetScan& scan, const ImuBuffer& imu) {
               if (!widths) widths = std::make_unique<OffsetWidths>(imu, kGravity);
               widths->add(scan);
@@ -264,6 +272,28 @@ TEST(OffsetWidths, FastMotionAndAQuietImuTakeTheNarrowestNoiseAWiderOne) {
   const auto [of_noise, gain_of_noise] = bestWidth(0.5, 0.5);
   EXPECT_GT(of_noise, kOffsetHalfWidth);
   EXPECT_GT(gain_of_noise, 0.1);
+}
+
+/// The gain after each scan of a noisy minute.
+std::vector<double> gains(int ahead) {
+  std::unique_ptr<OffsetWidths> widths;
+  std::vector<double> result;
+  feedScans([](double t) { return std::sin(M_PI * t); }, 0.5, 1e-4,
+            [&](const OffsetScan& scan, const ImuBuffer& imu) {
+              if (!widths) widths = std::make_unique<OffsetWidths>(imu, kGravity);
+              widths->add(scan);
+              result.push_back(widths->gain());
+            },
+            ahead);
+  return result;
+}
+
+TEST(OffsetWidths, KnowTheSameHoweverFarTheImuIsAhead) {
+  // The IMU reaches 0.11 s past each scan in one run, and 0.81 s in the other.
+  const std::vector<double> of_near = gains(11);
+  const std::vector<double> of_far = gains(81);
+  ASSERT_LT(of_far.size(), of_near.size());
+  for (std::size_t i = 0; i < of_far.size(); ++i) ASSERT_EQ(of_near[i], of_far[i]) << "scan " << i;
 }
 
 }  // namespace

@@ -80,7 +80,6 @@ std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoo
   J = (R_RI * J).eval();
 
   RadarVelocityPrediction prediction;
-  prediction.t_O = offset();
   prediction.velocity.v_R = R_RI * motion.v_I;
   prediction.scan.tau = time;
   prediction.scan.x = state->x;

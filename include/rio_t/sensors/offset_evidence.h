@@ -25,8 +25,8 @@ struct OffsetDerivative {
   bool isCertain() const;
 };
 
-/// The derivative for a state `x` at the time of measurement `tau`, without `shared`. `g_W` is gravity in W
-/// [m/s^2].
+/// The derivative for a state `x` at the time of measurement `tau`, with a mean over `half_width` [s] to
+/// either side, as far as the samples reach. `g_W` is gravity in W [m/s^2].
 OffsetDerivative offsetDerivative(const ImuBuffer& imu, Time tau, const StateBlock& x,
                                   const Eigen::Vector3d& g_W, const Extrinsics& T_IR, double half_width);
 
@@ -58,23 +58,25 @@ class OffsetEvidence {
   void add(const OffsetScan& scan, const OffsetDerivative& derivative);
   /// Factor on the derivative, in [0, 1]; 0 while nothing is known.
   double gain() const;
-  /// What the last scans know about the offset [1/s^2].
+  /// Returns the information about the offset that the last scans give [1/s^2].
   double information() const { return gain() * gain() * all_; }
 
  private:
   struct Followed {
     Time tau;
-    double weight = 0.0;  ///< in the velocity that the estimate has now
-    double sigma = 0.0;   ///< of the derivative's noise [m/s^2]
+    double weight = 0.0;  ///< of its mean in mean_
+    double sigma = 0.0;   ///< of the noise in its mean [m/s^2]
   };
-  /// Variance of the noise in the change of the derivative [m^2/s^4]; `share` of the change is followed.
+  /// Returns the variance of the noise in the change of the derivative [m^2/s^4]. The velocity then follows
+  /// `share` of the change.
   double varianceOfChange(Time tau, const OffsetDerivative& derivative, double share);
 
-  // What the estimated velocity has followed of a wrong offset, per second of it, in W [m/s^2].
+  // If the offset is wrong by one second, the scans have moved the estimated velocity by this, in W [m/s^2]:
+  // as the mean says, and as each side says.
   Eigen::Vector3d mean_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d before_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d after_ = Eigen::Vector3d::Zero();
-  double constant_ = 0.0;       ///< share that is followed of an error that stays the same
+  double constant_ = 0.0;       ///< share of a constant error by which they have moved it
   double noise_ = 0.0;          ///< variance of the noise in mean_ [m^2/s^4]
   std::deque<Followed> scans_;  ///< whose means overlap the newest
   Time last_;
