@@ -16,6 +16,7 @@ std::uint64_t& pointsOf(RunEvidence& evidence, PointVerdict verdict) {
 RunEvidence goodRun() {
   RunEvidence evidence;
   evidence.initialized = true;
+  evidence.heading_sigma = 0.05;
   evidence.imu_count = 4000;
   evidence.faults = {{"imu_gap", 2}, {"imu_saturated", 20}};
   evidence.scans_judged = 190;
@@ -199,6 +200,19 @@ TEST(Diagnosis, TheImuIsNamed) {
   evidence = goodRun();
   evidence.faults["imu_gap"] = 100;
   expectSays(first(evidence), {"imu_gap: 100 gaps", "max_imu_gap"});
+}
+
+TEST(Diagnosis, AVagueHeadingIsDoubtfulAndSaysWhy) {
+  RunEvidence evidence = goodRun();
+  evidence.heading_sigma = 0.6;
+  expectSays(first(evidence), {"heading_vague", "0.6 rad", "22 gaps and saturated samples"});
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
+  evidence.faults.clear();
+  EXPECT_EQ(first(evidence), "none");  // a long way
+  evidence.initialized_from = InitializedFrom::kMotion;
+  expectSays(first(evidence), {"0.6 rad", "start in motion", "init_duration", "init_motion_sigma_gyro_bias"});
+  evidence.heading_sigma = 0.05;
+  EXPECT_EQ(first(evidence), "none");
 }
 
 TEST(Diagnosis, ATrajectoryThatBeginsAnewIsNeverGood) {

@@ -122,7 +122,7 @@ void BagPlayer::countInput(RunSummary* summary) const {
 }
 
 Diagnosis BagPlayer::diagnosis(const RunSummary& summary) const {
-  RunEvidence evidence = evidence_.evidence(odometry_);
+  RunEvidence evidence = evidence_.evidence(odometry_, odometry_.start());
   evidence.imu_count = imu_count_;
   evidence.imu_restarts = imu_restarts_;
   for (const auto& [kind, what] : imu_not_usable_) evidence.faults[kind] += what.count;

@@ -17,6 +17,8 @@ constexpr double kManyWindows = 0.3;
 constexpr double kManyDiverged = 0.1;
 constexpr double kManySamples = 0.05;
 constexpr double kFewScansUsed = 0.5;
+/// [rad] A heading that is off by this much leads aside by a tenth of the way.
+constexpr double kVagueHeading = 0.1;
 constexpr const char* kImuFaults[] = {"imu_not_usable", "imu_saturated",  "imu_gap",  "imu_out_of_order",
                                       "imu_not_finite", "imu_stamp_jump", "imu_stuck"};
 /// Scans before anything is said: two seconds at ten a second.
@@ -277,6 +279,29 @@ void addImu(const RunEvidence& evidence, const Config& config, std::vector<Cause
                      "Mount the IMU softer, or raise these two keys.", 0.1});
 }
 
+/// A heading that was never known, or that was lost. On a long way from rest it also drifts, as the noise of
+/// the gyro says; that is no fault.
+void addHeading(const RunEvidence& evidence, std::vector<Cause>* causes) {
+  if (!evidence.initialized || evidence.heading_sigma <= kVagueHeading) return;
+  const std::uint64_t lost = sumOf(evidence.faults, {"imu_gap", "imu_saturated"});
+  const bool began_in_motion = evidence.initialized_from == InitializedFrom::kMotion;
+  if (!began_in_motion && lost == 0) return;
+  const std::string known = "The heading is known to " + number(evidence.heading_sigma) + " rad only: ";
+  const double share = std::min(1.0, evidence.heading_sigma);
+  if (began_in_motion) {
+    causes->push_back({"heading_vague", known + "the start in motion does not show the bias of the gyro.",
+                       "Let the platform rest for init_duration at the start, or lower "
+                       "init_motion_sigma_gyro_bias to what your IMU promises.",
+                       share});
+  } else {
+    causes->push_back({"heading_vague",
+                       known + "it is lost while the IMU is, and " + std::to_string(lost) +
+                           " gaps and saturated samples were seen.",
+                       "Look for what loses the messages of the IMU, or take one with a larger range.",
+                       share});
+  }
+}
+
 void addRestarts(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
   if (evidence.imu_restarts.empty()) return;
   // It is certain, and it concerns the whole trajectory: the share is 1.
@@ -356,6 +381,7 @@ Diagnosis diagnose(const RunEvidence& evidence, const Config& config) {
   addStart(evidence, config, &result.causes);
   addOffset(evidence, config, &result.causes);
   addImu(evidence, config, &result.causes);
+  addHeading(evidence, &result.causes);
   addRestarts(evidence, config, &result.causes);
   addDivergence(evidence, &result.causes);
   // Stable: of causes that explain the same, the one nearer to the sensor comes first.

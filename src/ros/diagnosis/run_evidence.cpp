@@ -1,5 +1,9 @@
 #include "rio_t/ros/diagnosis/run_evidence.h"
 
+#include <cmath>
+
+#include "rio_t/odometry/body_odometry.h"
+
 namespace rio_t {
 
 EvidenceCollector::EvidenceCollector(const Config& config) {
@@ -34,6 +38,7 @@ void EvidenceCollector::add(const ScanResult& result) {
   }
   if (!result.updated) return;
   radar.final_offset_s = result.time_offset;
+  evidence_.heading_sigma = std::sqrt(bodyOdometry(result.state, 0.0).pose_covariance(5, 5));
   ++evidence_.windows;
   if (result.solver_termination == SolverTermination::kAtBound) ++evidence_.windows_at_bound;
 }
@@ -43,9 +48,11 @@ void EvidenceCollector::addDropped(std::size_t radar, const std::string& reason,
   evidence_.radars.at(radar).scans_rejected[reason] += count;
 }
 
-RunEvidence EvidenceCollector::evidence(const RadarInertialOdometry& odometry) const {
+RunEvidence EvidenceCollector::evidence(const RadarInertialOdometry& odometry,
+                                        const std::optional<RadarInertialOdometry::Start>& start) const {
   RunEvidence all = evidence_;
   all.initialized = odometry.initialized();
+  if (start) all.initialized_from = start->from;
   if (!all.initialized) all.waiting_for = odometry.waitingFor();
   all.faults = odometry.faults();
   all.health = odometry.health();

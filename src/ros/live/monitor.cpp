@@ -216,7 +216,7 @@ void LiveMonitor::reconfigured(const std::string& refused_because) {
 }
 
 void LiveMonitor::addDiagnosis(Status& status, const LiveSession& session) const {
-  RunEvidence evidence = collector_.evidence(session.odometry());
+  RunEvidence evidence = collector_.evidence(session.odometry(), session.start());
   evidence.imu_count = imu_.count;
   const Diagnosis diagnosis = diagnose(evidence, config_);
   if (evidence.initialized) status.add("verdict", toString(diagnosis.verdict));

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,14 +39,16 @@ struct ImuRestart {
 /// Counters of a run: enough to say why it disappoints.
 struct RunEvidence {
   bool initialized = false;
-  std::string waiting_for;  ///< while not initialised
+  InitializedFrom initialized_from = InitializedFrom::kRest;
+  std::string waiting_for;     ///< while not initialised
+  double heading_sigma = 0.0;  ///< of the newest state [rad]
   std::uint64_t imu_count = 0;
   Counts faults;  ///< RadarInertialOdometry::faults(), with those of the messages
   Health health = Health::kOk;
   std::uint64_t scans_judged = 0;    ///< after the start
   std::uint64_t scans_diverged = 0;  ///< of them, after which the health was "diverged"
   std::uint64_t windows = 0, windows_at_bound = 0;
-  MeasuredImuNoise imu_noise;  ///< of the run, root mean square
+  MeasuredImuNoise imu_noise;            ///< of the run, root mean square
   std::vector<ImuRestart> imu_restarts;  ///< none in the live node, whose evidence begins after the last one
   std::vector<RadarEvidence> radars;
 };
@@ -60,9 +63,10 @@ class EvidenceCollector {
   void addDropped(std::size_t radar, const std::string& reason, std::uint64_t count);
   /// A trigger that was dropped, as its stamp is zero.
   void addZeroTrigger(std::size_t radar) { ++evidence_.radars.at(radar).triggers_zero; }
-  /// The evidence so far, with what `odometry` knows. `scans_total` counts the results and the scans
-  /// that were dropped.
-  RunEvidence evidence(const RadarInertialOdometry& odometry) const;
+  /// The evidence so far, with what `odometry` knows and its `start`. `scans_total` counts the results and
+  /// the scans that were dropped.
+  RunEvidence evidence(const RadarInertialOdometry& odometry,
+                       const std::optional<RadarInertialOdometry::Start>& start) const;
 
  private:
   std::vector<EgoVelocityOptions> options_;  // by RadarScan::radar
