@@ -48,18 +48,6 @@ def test_a_start_in_motion_says_how_vague_the_heading_is(run_with, programs_fold
     assert (summary["verdict"], summary["causes"]) == ("good", [])
 
 
-def test_a_heading_lost_in_a_gap_of_the_imu_is_named(run_with, simulated_run, tmp_path):
-    bag = tmp_path / "gap.bag"
-    with rosbag.Bag(str(simulated_run / "run.bag")) as whole, rosbag.Bag(str(bag), "w") as cut:
-        begin = whole.get_start_time() + 10.0
-        for topic, message, time in whole.read_messages():
-            if "imu" not in topic or not begin <= time.to_sec() < begin + 1.0:
-                cut.write(topic, message, time)
-    _, summary = run_with(bag=bag)
-    assert summary["verdict"] == "doubtful"
-    assert "heading_vague" in causes_of(summary)
-
-
 def test_filtered_points_name_the_unit_of_the_power(run_with):
     done, summary = run_with("radar_power_unit=snr_decidb", "radar_min_snr_db=20")
     assert (done.returncode, summary) == (1, None)

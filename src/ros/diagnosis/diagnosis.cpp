@@ -279,27 +279,16 @@ void addImu(const RunEvidence& evidence, const Config& config, std::vector<Cause
                      "Mount the IMU softer, or raise these two keys.", 0.1});
 }
 
-/// A heading that was never known, or that was lost. On a long way from rest it also drifts, as the noise of
-/// the gyro says; that is no fault.
+/// After a start at rest the heading drifts, too, but only as the noise of the gyro says.
 void addHeading(const RunEvidence& evidence, std::vector<Cause>* causes) {
-  if (!evidence.initialized || evidence.heading_sigma <= kVagueHeading) return;
-  const std::uint64_t lost = sumOf(evidence.faults, {"imu_gap", "imu_saturated"});
-  const bool began_in_motion = evidence.initialized_from == InitializedFrom::kMotion;
-  if (!began_in_motion && lost == 0) return;
-  const std::string known = "The heading is known to " + number(evidence.heading_sigma) + " rad only: ";
-  const double share = std::min(1.0, evidence.heading_sigma);
-  if (began_in_motion) {
-    causes->push_back({"heading_vague", known + "the start in motion does not show the bias of the gyro.",
-                       "Let the platform rest for init_duration at the start, or lower "
-                       "init_motion_sigma_gyro_bias to what your IMU promises.",
-                       share});
-  } else {
-    causes->push_back({"heading_vague",
-                       known + "it is lost while the IMU is, and " + std::to_string(lost) +
-                           " gaps and saturated samples were seen.",
-                       "Look for what loses the messages of the IMU, or take one with a larger range.",
-                       share});
-  }
+  if (evidence.initialized_from != InitializedFrom::kMotion || evidence.heading_sigma <= kVagueHeading)
+    return;
+  causes->push_back({"heading_vague",
+                     "The heading is known to " + number(evidence.heading_sigma) +
+                         " rad only: a start in motion does not show the bias of the gyro.",
+                     "Let the platform rest for init_duration at the start, or lower "
+                     "init_motion_sigma_gyro_bias to what your IMU promises.",
+                     std::min(1.0, evidence.heading_sigma)});
 }
 
 void addRestarts(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
