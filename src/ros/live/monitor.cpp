@@ -8,7 +8,6 @@
 #include <string>
 #include <utility>
 
-#include "rio_t/core/so3.h"
 #include "rio_t/factors/state_block.h"
 
 namespace rio_t {
@@ -20,11 +19,6 @@ using diagnostic_msgs::DiagnosticStatus;
 constexpr std::size_t kWindowsJudged = 20;
 /// Calls of describeInput, seconds that is, over which the use of a radar's scans is judged.
 constexpr std::size_t kInputsJudged = 4;
-/// [s] A radar that gave no estimate for so long shows nothing now.
-constexpr double kRecent = 1.0;
-/// The motion has shown what it told better than this share of the sigma that it was told with.
-constexpr double kObserved = 0.5;
-constexpr double kDegree = 3.141592653589793 / 180.0;
 
 double velocitySigma(const NavigationState& state) {
   const Eigen::Vector3d variances = state.covariance.diagonal().segment<3>(StateBlock::kV);
@@ -34,22 +28,6 @@ double velocitySigma(const NavigationState& state) {
 /// Whether a scan could not be used because it came too early, which is no fault of its radar.
 bool isEarly(const std::string& reason) {
   return reason == "scan_before_extrinsics" || reason == "before_initialization";
-}
-
-std::string listOf(const Eigen::VectorXd& numbers) {
-  std::ostringstream text;
-  text << numbers.transpose().format({6, Eigen::DontAlignCols, ", ", ", ", "", "", "[", "]"});
-  return text.str();
-}
-
-/// "turn about x, y", or nothing if no number is above the bound.
-std::string axesAbove(const Eigen::Vector3d& numbers, double bound, const std::string& what) {
-  std::string axes;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (numbers[axis] <= bound) continue;
-    axes += (axes.empty() ? what : ", ") + std::string(1, "xyz"[axis]);
-  }
-  return axes;
 }
 
 /// What to do about windows that keep ending so.
@@ -69,6 +47,15 @@ std::string advice(SolverTermination termination) {
 
 }  // namespace
 
+std::string noisyImu(const MeasuredImuNoise& noise, const ImuNoise& told) {
+  std::ostringstream text;
+  text << "the IMU vibrates or is noisier than told: accelerometer " << noise.accel_density
+       << " m/s^2/sqrt(Hz), imu_accel_noise_density " << told.accel_density << "; gyro " << noise.gyro_density
+       << " rad/s/sqrt(Hz), imu_gyro_noise_density " << told.gyro_density
+       << ". The estimate takes the measured noise. A softer mount makes it better.";
+  return text.str();
+}
+
 LiveMonitor::LiveMonitor(const Config& config)
     : config_(config), collector_(config), imu_noise_(config.odometry.imu_noise) {
   for (Config& radar : configsOfRadars(config)) radars_.emplace_back(std::move(radar));
@@ -80,11 +67,6 @@ std::string LiveMonitor::prefix(const Radar& radar) {
 
 std::string LiveMonitor::called(const Radar& radar) {
   return radar.config.radar_name.empty() ? "the radar" : "radar " + radar.config.radar_name;
-}
-
-bool LiveMonitor::isRecent(const Radar& radar) const {
-  return radar.last_update &&
-         last_update_->result.scan.stamp - radar.last_update->result.scan.stamp < kRecent;
 }
 
 LiveMonitor::Finding LiveMonitor::join(const std::vector<Finding>& findings, bool another_works) {
@@ -279,15 +261,6 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) c
   }
 }
 
-std::string noisyImu(const MeasuredImuNoise& noise, const ImuNoise& told) {
-  std::ostringstream text;
-  text << "the IMU vibrates or is noisier than told: accelerometer " << noise.accel_density
-       << " m/s^2/sqrt(Hz), imu_accel_noise_density " << told.accel_density << "; gyro " << noise.gyro_density
-       << " rad/s/sqrt(Hz), imu_gyro_noise_density " << told.gyro_density
-       << ". The estimate takes the measured noise. A softer mount makes it better.";
-  return text.str();
-}
-
 std::optional<LiveMonitor::Finding> LiveMonitor::describeRadar(Status& status, Radar& radar,
                                                                bool initialized) const {
   const Config& config = radar.config;
@@ -421,67 +394,6 @@ void LiveMonitor::describeSolver(Status& status) const {
     if (countOf(other) > countOf(worst)) worst = other;
   status.summary(DiagnosticStatus::WARN, std::to_string(countOf(worst)) + " of the last " +
                                              std::to_string(full) + " windows ended " + advice(worst));
-}
-
-void LiveMonitor::describeTimeOffset(Status& status, std::size_t radar) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  const Radar& of = radars_.at(radar);
-  if (!of.last_update) {
-    status.summary(DiagnosticStatus::OK, "not estimated yet");
-    return;
-  }
-  const ScanResult& result = of.last_update->result;
-  const bool observable = of.last_update->offset_observable && isRecent(of);
-  status.add("offset_ms", 1e3 * result.time_offset);
-  status.add("sigma_ms", 1e3 * result.time_offset_sigma);
-  status.add("observable", observable ? "true" : "false");
-  const double bound = config_.odometry.smoother.max_time_offset;
-  if (std::abs(result.time_offset) > 0.99 * bound) {
-    status.summary(DiagnosticStatus::WARN, "the offset is at its bound max_time_offset");
-  } else if (!isRecent(of)) {
-    status.summary(DiagnosticStatus::OK, "kept: no scan of " + called(of) + " is used now");
-  } else {
-    status.summary(DiagnosticStatus::OK,
-                   observable ? "observed by the motion now" : "kept: the motion says nothing now");
-  }
-}
-
-void LiveMonitor::describeExtrinsics(Status& status, std::size_t radar) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  const Radar& of = radars_.at(radar);
-  if (!of.last_update) {
-    status.summary(DiagnosticStatus::OK, "not estimated yet");
-    return;
-  }
-  const ScanResult& result = of.last_update->result;
-  const SmootherOptions& options = of.config.odometry.smoother;
-  const Eigen::Matrix<double, 6, 1> sigma = result.T_IR_covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-  const Eigen::Vector3d turn = so3::log(result.T_IR.q_IR * of.told.q_IR.conjugate());
-  const Eigen::Vector3d turn_sigma = sigma.tail<3>();
-  // As the parameters want them.
-  status.add("extrinsics_rotation_xyzw", listOf(result.T_IR.q_IR.coeffs()));
-  status.add("extrinsics_translation", listOf(result.T_IR.l_I));
-  status.add("turn_from_told_deg", listOf(turn / kDegree));
-  status.add("turn_sigma_deg", listOf(turn_sigma / kDegree));
-  std::string kept = axesAbove(turn_sigma, kObserved * options.extrinsics_rotation_sigma, "turn about ");
-  if (options.estimate_extrinsics == EstimateExtrinsics::kPose) {
-    const Eigen::Vector3d lever_sigma = sigma.head<3>();
-    status.add("lever_arm_from_told_m", listOf(result.T_IR.l_I - of.told.l_I));
-    status.add("lever_arm_sigma_m", listOf(lever_sigma));
-    const std::string lever =
-        axesAbove(lever_sigma, kObserved * options.extrinsics_translation_sigma, "lever arm along ");
-    kept += (kept.empty() || lever.empty() ? "" : ", ") + lever;
-  }
-  const std::string far = axesAbove(turn.cwiseAbs(), 3.0 * options.extrinsics_rotation_sigma, "about ");
-  if (!far.empty()) {
-    status.summary(
-        DiagnosticStatus::WARN,
-        called(of) + " is turned " + far + " by more than 3 extrinsics_rotation_sigma from what was told");
-  } else if (!kept.empty()) {
-    status.summary(DiagnosticStatus::OK, "kept: the motion has not shown the " + kept);
-  } else {
-    status.summary(DiagnosticStatus::OK, "observed by the motion");
-  }
 }
 
 }  // namespace rio_t

@@ -1,0 +1,106 @@
+// LiveMonitor: time offset and extrinsics of a radar.
+#include <diagnostic_msgs/DiagnosticStatus.h>
+
+#include <cmath>
+#include <sstream>
+#include <string>
+
+#include "rio_t/core/so3.h"
+#include "rio_t/ros/live/monitor.h"
+
+namespace rio_t {
+namespace {
+
+using diagnostic_msgs::DiagnosticStatus;
+
+/// [s] A radar that gave no estimate for so long shows nothing now.
+constexpr double kRecent = 1.0;
+/// The motion has shown what it told better than this share of the sigma that it was told with.
+constexpr double kObserved = 0.5;
+constexpr double kDegree = 3.141592653589793 / 180.0;
+
+std::string listOf(const Eigen::VectorXd& numbers) {
+  std::ostringstream text;
+  text << numbers.transpose().format({6, Eigen::DontAlignCols, ", ", ", ", "", "", "[", "]"});
+  return text.str();
+}
+
+/// "turn about x, y", or nothing if no number is above the bound.
+std::string axesAbove(const Eigen::Vector3d& numbers, double bound, const std::string& what) {
+  std::string axes;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (numbers[axis] <= bound) continue;
+    axes += (axes.empty() ? what : ", ") + std::string(1, "xyz"[axis]);
+  }
+  return axes;
+}
+
+}  // namespace
+
+bool LiveMonitor::isRecent(const Radar& radar) const {
+  return radar.last_update &&
+         last_update_->result.scan.stamp - radar.last_update->result.scan.stamp < kRecent;
+}
+
+void LiveMonitor::describeTimeOffset(Status& status, std::size_t radar) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const Radar& of = radars_.at(radar);
+  if (!of.last_update) {
+    status.summary(DiagnosticStatus::OK, "not estimated yet");
+    return;
+  }
+  const ScanResult& result = of.last_update->result;
+  const bool observable = of.last_update->offset_observable && isRecent(of);
+  status.add("offset_ms", 1e3 * result.time_offset);
+  status.add("sigma_ms", 1e3 * result.time_offset_sigma);
+  status.add("observable", observable ? "true" : "false");
+  const double bound = config_.odometry.smoother.max_time_offset;
+  if (std::abs(result.time_offset) > 0.99 * bound) {
+    status.summary(DiagnosticStatus::WARN, "the offset is at its bound max_time_offset");
+  } else if (!isRecent(of)) {
+    status.summary(DiagnosticStatus::OK, "kept: no scan of " + called(of) + " is used now");
+  } else {
+    status.summary(DiagnosticStatus::OK,
+                   observable ? "observed by the motion now" : "kept: the motion says nothing now");
+  }
+}
+
+void LiveMonitor::describeExtrinsics(Status& status, std::size_t radar) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const Radar& of = radars_.at(radar);
+  if (!of.last_update) {
+    status.summary(DiagnosticStatus::OK, "not estimated yet");
+    return;
+  }
+  const ScanResult& result = of.last_update->result;
+  const SmootherOptions& options = of.config.odometry.smoother;
+  const Eigen::Matrix<double, 6, 1> sigma = result.T_IR_covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::Vector3d turn = so3::log(result.T_IR.q_IR * of.told.q_IR.conjugate());
+  const Eigen::Vector3d turn_sigma = sigma.tail<3>();
+  // As the parameters want them.
+  status.add("extrinsics_rotation_xyzw", listOf(result.T_IR.q_IR.coeffs()));
+  status.add("extrinsics_translation", listOf(result.T_IR.l_I));
+  status.add("turn_from_told_deg", listOf(turn / kDegree));
+  status.add("turn_sigma_deg", listOf(turn_sigma / kDegree));
+  std::string kept = axesAbove(turn_sigma, kObserved * options.extrinsics_rotation_sigma, "turn about ");
+  if (options.estimate_extrinsics == EstimateExtrinsics::kPose) {
+    const Eigen::Vector3d lever_sigma = sigma.head<3>();
+    status.add("lever_arm_from_told_m", listOf(result.T_IR.l_I - of.told.l_I));
+    status.add("lever_arm_sigma_m", listOf(lever_sigma));
+    const std::string lever =
+        axesAbove(lever_sigma, kObserved * options.extrinsics_translation_sigma, "lever arm along ");
+    kept += (kept.empty() || lever.empty() ? "" : ", ") + lever;
+  }
+  const std::string far = axesAbove(turn.cwiseAbs(), 3.0 * options.extrinsics_rotation_sigma, "about ");
+  if (!far.empty()) {
+    status.summary(
+        DiagnosticStatus::WARN,
+        called(of) + " is turned " + far + " by more than 3 extrinsics_rotation_sigma from what was told");
+  } else if (!kept.empty()) {
+    status.summary(DiagnosticStatus::OK, "kept: the motion has not shown the " + kept);
+  } else {
+    status.summary(DiagnosticStatus::OK, "observed by the motion");
+  }
+}
+
+}  // namespace rio_t
