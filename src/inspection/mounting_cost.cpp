@@ -1,0 +1,201 @@
+#include "mounting_cost.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "rio_t/core/so3.h"
+
+namespace rio_t {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+constexpr double kWindow = 3.0;            // [s]
+constexpr std::size_t kMinVelocities = 6;  // of a window: two lines take four
+constexpr double kMinMotion = 0.25;        // [m/s] that a window must exceed to count as motion
+constexpr double kGravitySigma = 0.5;      // [m/s^2] of the mean specific force: 3 degrees
+constexpr double kRestGravitySigma = 0.1;  // [m/s^2] of the gravity from a rest: bias of the accelerometer
+constexpr double kGyroDrift = 3.0e-4;      // [rad/s] with which the gyro loses it: what is left of its bias
+constexpr double kOutlier = 3.0;           // [sigma] from which on a velocity counts less
+
+/// A window adds to the mounting its first velocity in G and the gravity in G.
+constexpr Eigen::Index kMounting = kMountingM + kMountingL, kOwn = 6, kUnknowns = kMounting + kOwn;
+
+/// Rows A x = y of one velocity: x = (M, l, v_w, g_w).
+struct Rows {
+  MatrixXd A = MatrixXd::Zero(3, kUnknowns);
+  Vector3d y;
+};
+
+Rows rowsOf(const RadarVelocity& velocity, double offset, Time begin, const InertialTrack& track) {
+  const Time time = velocity.stamp - offset;
+  const Matrix3d R = track.rotation(time).toRotationMatrix();
+  Rows rows;
+  for (int j = 0; j < 3; ++j) rows.A.middleCols<3>(3L * j) = velocity.v_R[j] * R;
+  rows.A.block<3, 3>(0, kMountingM) = -R * so3::hat(track.rate(time));
+  rows.A.block<3, 3>(0, kMounting) = -Matrix3d::Identity();
+  rows.A.block<3, 3>(0, kMounting + 3) = -(time - begin) * Matrix3d::Identity();
+  rows.y = track.impulse(time) - track.impulse(begin);
+  return rows;
+}
+
+/// Covariance of a velocity in G. It is known in R; before M is, its mean stands for all axes.
+Matrix3d covariance(const RadarVelocity& velocity, const Matrix3d& R_GI, const std::optional<Matrix3d>& M,
+                    double sigma) {
+  const Matrix3d model = sigma * sigma * Matrix3d::Identity();
+  if (!M) return model + velocity.covariance.trace() / 3.0 * Matrix3d::Identity();
+  const Matrix3d T = R_GI * *M;
+  return model + T * velocity.covariance * T.transpose();
+}
+
+/// All rows of a window, and their covariance: that of each velocity, and the random walk of the IMU's noise
+/// since the beginning, which all later ones share.
+struct WindowRows {
+  MatrixXd A;
+  VectorXd y;
+  MatrixXd covariance;
+};
+
+WindowRows rowsOf(const VelocityWindow& window, double offset, const std::optional<Matrix3d>& M,
+                  const MountingProblem& problem) {
+  const Eigen::Index count = static_cast<Eigen::Index>(window.size());
+  const Time begin = window.front().velocity->stamp - offset;
+  const double density = problem.options.accel_density * problem.options.accel_density;
+  WindowRows all{MatrixXd(3 * count, kUnknowns), VectorXd(3 * count), MatrixXd::Zero(3 * count, 3 * count)};
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const WeightedVelocity& each = window[static_cast<std::size_t>(i)];
+    const Rows rows = rowsOf(*each.velocity, offset, begin, problem.track);
+    all.A.middleRows(3 * i, 3) = rows.A;
+    all.y.segment(3 * i, 3) = rows.y;
+    const Matrix3d R_GI = problem.track.rotation(each.velocity->stamp - offset).toRotationMatrix();
+    all.covariance.block(3 * i, 3 * i, 3, 3) =
+        covariance(*each.velocity, R_GI, M, problem.options.velocity_sigma) / each.weight;
+    const double walked = density * (each.velocity->stamp - window.front().velocity->stamp);
+    for (Eigen::Index k = i; k < count; ++k) {
+      all.covariance.block(3 * i, 3 * k, 3, 3).diagonal().array() += walked;
+      if (k != i) all.covariance.block(3 * k, 3 * i, 3, 3).diagonal().array() += walked;
+    }
+  }
+  return all;
+}
+
+double gravitySigma(Time time, const MountingSearchOptions& options) {
+  if (!options.gravity_G) return kGravitySigma;
+  const double tilt = kGyroDrift * std::abs(time - options.rest_end);
+  return std::min(kGravitySigma, std::hypot(kRestGravitySigma, options.gravity * tilt));
+}
+
+/// The cost of all unknowns of a window.
+Quadratic costOf(const VelocityWindow& window, double offset, const std::optional<Matrix3d>& M,
+                 const MountingProblem& problem) {
+  WindowRows rows = rowsOf(window, offset, M, problem);
+  const Eigen::LLT<MatrixXd> root(rows.covariance);
+  root.matrixL().solveInPlace(rows.A);
+  root.matrixL().solveInPlace(rows.y);
+  Quadratic cost(kUnknowns);
+  cost.H.noalias() = rows.A.transpose() * rows.A;
+  cost.b.noalias() = rows.A.transpose() * rows.y;
+  cost.c = rows.y.squaredNorm();
+  const Time begin = window.front().velocity->stamp - offset;
+  const Vector3d g_G =
+      problem.options.gravity_G.value_or(problem.track.gravity(begin, problem.options.gravity));
+  const double sigma = gravitySigma(begin, problem.options);
+  const double known = 1.0 / (sigma * sigma);
+  cost.H.bottomRightCorner<3, 3>() += known * Matrix3d::Identity();
+  cost.b.tail<3>() += known * g_G;
+  cost.c += known * g_G.squaredNorm();
+  return cost;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+Quadratic withoutLast(const Quadratic& cost, Eigen::Index count) {
+  const Eigen::Index kept = cost.b.size() - count;
+  const MatrixXd last = cost.H.bottomRightCorner(count, count);
+  const MatrixXd cross = cost.H.bottomLeftCorner(count, kept);
+  const Eigen::LDLT<MatrixXd> solver(last);
+  const VectorXd best = solver.solve(cost.b.tail(count));
+  Quadratic left(kept);
+  left.H = cost.H.topLeftCorner(kept, kept) - cross.transpose() * solver.solve(cross);
+  left.b = cost.b.head(kept) - cross.transpose() * best;
+  left.c = cost.c - cost.b.tail(count).dot(best);
+  return left;
+}
+
+std::vector<VelocityWindow> windowsOf(const std::vector<RadarVelocity>& velocities,
+                                      const InertialTrack& track, double reach) {
+  std::vector<VelocityWindow> windows;
+  VelocityWindow window;
+  const auto finish = [&] {
+    const bool moves = std::any_of(window.begin(), window.end(), [](const WeightedVelocity& each) {
+      return each.velocity->v_R.norm() > kMinMotion;
+    });
+    const bool long_enough = window.size() >= kMinVelocities &&
+                             window.back().velocity->stamp - window.front().velocity->stamp > 0.5 * kWindow;
+    if (moves && long_enough &&
+        track.isWhole(window.front().velocity->stamp - reach, window.back().velocity->stamp + reach))
+      windows.push_back(window);
+    window.clear();
+  };
+  for (const RadarVelocity& velocity : velocities) {
+    if (!track.covers(velocity.stamp - reach) || !track.covers(velocity.stamp + reach)) continue;
+    if (!window.empty() && std::abs(velocity.stamp - window.front().velocity->stamp) > kWindow) finish();
+    window.push_back({&velocity});
+  }
+  if (!window.empty()) finish();
+  return windows;
+}
+
+VectorXd columnsOf(const Matrix3d& M) { return Eigen::Map<const VectorXd>(M.data(), kMountingM); }
+
+Quadratic mountingCost(double offset, const std::optional<Matrix3d>& M, const MountingProblem& problem) {
+  Quadratic total(kMounting);
+  for (const VelocityWindow& window : problem.windows) {
+    const Quadratic cost = withoutLast(costOf(window, offset, M, problem), kOwn);
+    total.H += cost.H;
+    total.b += cost.b;
+    total.c += cost.c;
+  }
+  const double sigma = problem.options.lever_arm_sigma;
+  total.H.bottomRightCorner(kMountingL, kMountingL) += Matrix3d::Identity() / (sigma * sigma);
+  return total;
+}
+
+MountingMisfit reweigh(double offset, const Matrix3d& M, const Vector3d& l_I, MountingProblem* problem) {
+  std::vector<double> squares, residuals;
+  for (VelocityWindow& window : problem->windows) {
+    const Quadratic cost = costOf(window, offset, M, *problem);
+    VectorXd x(kUnknowns);
+    x << columnsOf(M), l_I, VectorXd::Zero(kOwn);
+    const MatrixXd own = cost.H.bottomRightCorner(kOwn, kOwn);
+    x.tail(kOwn) =
+        own.ldlt().solve(cost.b.tail(kOwn) - cost.H.bottomLeftCorner(kOwn, kMounting) * x.head(kMounting));
+    const WindowRows rows = rowsOf(window, offset, M, *problem);
+    const VectorXd errors = rows.A * x - rows.y;
+    for (std::size_t i = 0; i < window.size(); ++i) {
+      const auto at = static_cast<Eigen::Index>(3 * i);
+      const Vector3d e = errors.segment(at, 3);
+      const Matrix3d covariance = rows.covariance.block(at, at, 3, 3);
+      const double square = e.dot(covariance.ldlt().solve(e)) / 3.0;
+      squares.push_back(square);
+      residuals.push_back(e.squaredNorm() / 3.0);
+      window[i].weight = 1.0 / (1.0 + square / (kOutlier * kOutlier));
+    }
+  }
+  constexpr double kMeanOverMedian = 1.27;  // of a mean of three squares: chi-squared has its median at 2.37
+  return {std::sqrt(kMeanOverMedian * median(std::move(residuals))),
+          std::max(1.0, kMeanOverMedian * median(std::move(squares)))};
+}
+
+}  // namespace rio_t

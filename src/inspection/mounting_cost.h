@@ -1,0 +1,63 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "rio_t/inspection/mounting_search.h"
+
+namespace rio_t {
+
+/// cost(x) = x' H x - 2 b' x + c. Of dynamic size: that compiles in a tenth of the time.
+struct Quadratic {
+  explicit Quadratic(Eigen::Index size)
+      : H(Eigen::MatrixXd::Zero(size, size)), b(Eigen::VectorXd::Zero(size)) {}
+
+  Eigen::MatrixXd H;
+  Eigen::VectorXd b;
+  double c = 0.0;
+};
+
+/// What is left of `cost` if its last `count` unknowns are always at their best.
+Quadratic withoutLast(const Quadratic& cost, Eigen::Index count);
+
+/// A velocity with its weight in a robust loss.
+struct WeightedVelocity {
+  const RadarVelocity* velocity = nullptr;
+  double weight = 1.0;
+};
+using VelocityWindow = std::vector<WeightedVelocity>;
+
+/// What the search for the mounting looks at.
+struct MountingProblem {
+  const InertialTrack& track;
+  const MountingSearchOptions& options;
+  std::vector<VelocityWindow> windows;
+};
+
+/// Windows with motion, of velocities that the IMU covers with any offset up to `reach` [s].
+std::vector<VelocityWindow> windowsOf(const std::vector<RadarVelocity>& velocities,
+                                      const InertialTrack& track, double reach);
+
+/// The unknowns of a mounting: the columns of M (v_I = M v_R, M a rotation times the sign of the Doppler),
+/// then the lever arm l_I.
+constexpr Eigen::Index kMountingM = 9, kMountingL = 3;
+
+Eigen::VectorXd columnsOf(const Eigen::Matrix3d& M);
+
+/// The cost of a mounting at an offset [s], in sigma^2. `M`: about what it is, which turns the covariances of
+/// the velocities; without it their means stand for all axes.
+Quadratic mountingCost(double offset, const std::optional<Eigen::Matrix3d>& M,
+                       const MountingProblem& problem);
+
+/// How well the velocities fit a mounting, from medians.
+struct MountingMisfit {
+  double residual = 0.0;  ///< [m/s] root mean square, per axis
+  double square = 1.0;    ///< [sigma^2] mean, per axis; at least 1
+};
+
+/// Sets the weights of the velocities for a mounting, those of a Cauchy loss.
+MountingMisfit reweigh(double offset, const Eigen::Matrix3d& M, const Eigen::Vector3d& l_I,
+                       MountingProblem* problem);
+
+}  // namespace rio_t
