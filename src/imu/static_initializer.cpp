@@ -36,10 +36,61 @@ void removeNoise(const std::vector<ImuMeasurement>& samples, double ImuMeasureme
   statistics.std = (statistics.std.cwiseAbs2().array() - variance).max(0.0).sqrt();
 }
 
+struct RestStatistics {
+  Statistics gyro, accel;  // without the white noise
+  double mean_size = 0.0;  // [m/s^2] of the specific force
+};
+
+/// `seconds`: what the samples cover.
+RestStatistics statistics(const std::vector<ImuMeasurement>& samples, double seconds) {
+  RestStatistics result;
+  result.gyro = statistics(samples, &ImuMeasurement::angular_velocity);
+  result.accel = statistics(samples, &ImuMeasurement::acceleration);
+  // An engine that idles shakes the IMU, and moves nothing.
+  removeNoise(samples, &ImuMeasurement::gyro_noise, seconds, result.gyro);
+  removeNoise(samples, &ImuMeasurement::accel_noise, seconds, result.accel);
+  for (const ImuMeasurement& sample : samples) result.mean_size += sample.acceleration.norm();
+  result.mean_size /= static_cast<double>(samples.size());
+  return result;
+}
+
 std::string format(const char* text, double value, double limit) {
   char line[200];
   std::snprintf(line, sizeof line, text, value, limit);
   return line;
+}
+
+/// What is wrong with the samples, if they are not those of rest.
+std::string noRestBecause(const RestStatistics& rest, const StaticInitializerOptions& options,
+                          double gravity) {
+  const Statistics& gyro = rest.gyro;
+  const Statistics& accel = rest.accel;
+  // In any motion of people and drones the accelerometer reads about gravity on average. If not, the units
+  // are wrong.
+  if (std::abs(rest.mean_size - gravity) > kWrongUnits * gravity) {
+    return format(
+        "rest: the accelerometer reads %.2f m/s^2 on the mean, expected gravity %.2f m/s^2: gravity removed, "
+        "or not in m/s^2?",
+        rest.mean_size, gravity);
+  }
+  if (gyro.std.maxCoeff() > options.max_gyro_std) {
+    return format("rest: the gyro moves by %.3f rad/s (std), at most %.3f allowed: moving, or not in rad/s?",
+                  gyro.std.maxCoeff(), options.max_gyro_std);
+  }
+  if (accel.std.maxCoeff() > options.max_accel_std) {
+    return format("rest: the accelerometer moves by %.2f m/s^2 (std), at most %.2f allowed",
+                  accel.std.maxCoeff(), options.max_accel_std);
+  }
+  if (gyro.mean.norm() > options.max_gyro_mean) {
+    return format("rest: mean gyro %.3f rad/s, at most %.3f allowed: turning, or not in rad/s?",
+                  gyro.mean.norm(), options.max_gyro_mean);
+  }
+  if (std::abs(accel.mean.norm() - gravity) > options.max_gravity_error) {
+    return format(
+        "rest: mean accelerometer %.2f m/s^2 instead of gravity %.2f: accelerating, or not in m/s^2?",
+        accel.mean.norm(), gravity);
+  }
+  return "";
 }
 
 }  // namespace
@@ -92,37 +143,8 @@ std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement&
     return std::nullopt;
   }
 
-  Statistics gyro = statistics(samples_, &ImuMeasurement::angular_velocity);
-  Statistics accel = statistics(samples_, &ImuMeasurement::acceleration);
-  // An engine that idles shakes the IMU, and moves nothing.
-  removeNoise(samples_, &ImuMeasurement::gyro_noise, collected, gyro);
-  removeNoise(samples_, &ImuMeasurement::accel_noise, collected, accel);
-  const double gravity_error = accel.mean.norm() - gravity_;
-  // In any motion of people and drones the accelerometer reads about gravity on average. If not, the units
-  // are wrong.
-  double mean_size = 0.0;
-  for (const ImuMeasurement& sample : samples_) mean_size += sample.acceleration.norm();
-  mean_size /= static_cast<double>(samples_.size());
-  std::string fault;
-  if (std::abs(mean_size - gravity_) > kWrongUnits * gravity_) {
-    fault = format(
-        "rest: the accelerometer reads %.2f m/s^2 on the mean, expected gravity %.2f m/s^2: gravity removed, "
-        "or not in m/s^2?",
-        mean_size, gravity_);
-  } else if (gyro.std.maxCoeff() > options_.max_gyro_std) {
-    fault = format("rest: the gyro moves by %.3f rad/s (std), at most %.3f allowed: moving, or not in rad/s?",
-                   gyro.std.maxCoeff(), options_.max_gyro_std);
-  } else if (accel.std.maxCoeff() > options_.max_accel_std) {
-    fault = format("rest: the accelerometer moves by %.2f m/s^2 (std), at most %.2f allowed",
-                   accel.std.maxCoeff(), options_.max_accel_std);
-  } else if (gyro.mean.norm() > options_.max_gyro_mean) {
-    fault = format("rest: mean gyro %.3f rad/s, at most %.3f allowed: turning, or not in rad/s?",
-                   gyro.mean.norm(), options_.max_gyro_mean);
-  } else if (std::abs(gravity_error) > options_.max_gravity_error) {
-    fault =
-        format("rest: mean accelerometer %.2f m/s^2 instead of gravity %.2f: accelerating, or not in m/s^2?",
-               accel.mean.norm(), gravity_);
-  }
+  const RestStatistics rest = statistics(samples_, collected);
+  const std::string fault = noRestBecause(rest, options_, gravity_);
   if (!fault.empty()) {
     waiting_for_ = fault;
     has_seen_motion_ = true;
@@ -132,9 +154,9 @@ std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement&
 
   StaticInitialization result;
   result.time = samples_.back().time;
-  result.q_WI = levelingRotation(accel.mean);
-  result.b_g = gyro.mean;
-  result.b_a = accel.mean * (gravity_error / accel.mean.norm());
+  result.q_WI = levelingRotation(rest.accel.mean);
+  result.b_g = rest.gyro.mean;
+  result.b_a = rest.accel.mean * ((rest.accel.mean.norm() - gravity_) / rest.accel.mean.norm());
   result.samples = samples_.size();
   result.duration = collected;
   waiting_for_.clear();

@@ -36,8 +36,8 @@ class StaticInitializer {
   StaticInitializer(const StaticInitializerOptions& options, double gravity);
   /// Feeds one sample; the result once enough rest has been seen. Samples must be in time order.
   std::optional<StaticInitialization> add(const ImuMeasurement& imu);
-  /// Tells people what the start is waiting for: "collecting 1.2 of 3.0 s at rest", "motion: gyro std
-  /// ...".
+  /// Tells people what the start is waiting for: "standing still: 1.2 of 3.0 s seen", or "rest: ..." and why
+  /// this is none.
   const std::string& waitingFor() const { return waiting_for_; }
   /// Whether the platform moved for a while.
   bool hasSeenMotion() const { return has_seen_motion_; }

@@ -20,11 +20,18 @@ std::string describeStep(const DopplerStep& step) {
   return (step.value > 0.0 ? fixedText(step.value, 3) + " m/s" : std::string("none")) + ", from the data";
 }
 
+/// "3 late, 1 empty"
+std::string listOf(const std::map<std::string, std::uint64_t>& counts) {
+  std::string list;
+  for (const auto& [name, count] : counts)
+    list += (list.empty() ? "" : ", ") + std::to_string(count) + " " + name;
+  return list;
+}
+
 std::string describeScans(std::uint64_t used, std::uint64_t total,
                           const std::map<std::string, std::uint64_t>& rejected) {
-  std::string scans = std::to_string(used) + " of " + std::to_string(total) + " used";
-  for (const auto& [reason, count] : rejected) scans += ", " + std::to_string(count) + " " + reason;
-  return scans;
+  return std::to_string(used) + " of " + std::to_string(total) + " used" +
+         (rejected.empty() ? "" : ", " + listOf(rejected));
 }
 
 /// "1.20 -0.30 0.05", in the unit of which there are `per` in one of `v`.
@@ -65,6 +72,34 @@ void describeRadar(const RadarSummary& radar, const Row& row) {
   row("Doppler step", describeStep(radar.doppler_step));
 }
 
+void describeAids(const RunSummary& summary, const Row& row) {
+  if (summary.barometer) {
+    row("barometer", std::to_string(summary.barometer->used) + " means of " +
+                         std::to_string(summary.barometer->pressures) + " pressures, " +
+                         std::to_string(summary.barometer->steps) + " steps, bias " +
+                         fixedText(summary.barometer->bias, 2) + " m");
+  }
+  if (summary.ground_vehicle) {
+    row("ground vehicle", summary.ground_vehicle->contradicted_at
+                              ? "CONTRADICTED by the motion, switched off"
+                              : std::to_string(summary.ground_vehicle->used) + " terms, " +
+                                    std::to_string(summary.ground_vehicle->left_out) + " left out");
+  }
+}
+
+/// Tells of the windows that did not converge.
+void describeSolver(const std::map<std::string, std::uint64_t>& terminations, const Row& row) {
+  std::uint64_t windows = 0;
+  for (const auto& [reason, count] : terminations) windows += count;
+  std::string unsolved;
+  for (const auto& [reason, count] : terminations) {
+    if (reason == toString(SolverTermination::kConverged)) continue;
+    unsolved += (unsolved.empty() ? "" : ", ") + std::to_string(count) + " of " + std::to_string(windows) +
+                " windows " + reason;
+  }
+  if (!unsolved.empty()) row("solver", unsolved);
+}
+
 }  // namespace
 
 std::string describeRun(const RunSummary& summary, const std::string& files) {
@@ -98,33 +133,9 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
     row("against truth", errors);
   }
   row("scans", describeScans(summary.scansUsed(), summary.scansTotal(), summary.scansRejected()));
-  if (summary.barometer) {
-    row("barometer", std::to_string(summary.barometer->used) + " means of " +
-                         std::to_string(summary.barometer->pressures) + " pressures, " +
-                         std::to_string(summary.barometer->steps) + " steps, bias " +
-                         fixedText(summary.barometer->bias, 2) + " m");
-  }
-  if (summary.ground_vehicle) {
-    row("ground vehicle", summary.ground_vehicle->contradicted_at
-                              ? "CONTRADICTED by the motion, switched off"
-                              : std::to_string(summary.ground_vehicle->used) + " terms, " +
-                                    std::to_string(summary.ground_vehicle->left_out) + " left out");
-  }
-  std::uint64_t windows = 0;
-  for (const auto& [reason, count] : summary.solver_terminations) windows += count;
-  std::string unsolved;
-  for (const auto& [reason, count] : summary.solver_terminations) {
-    if (reason == toString(SolverTermination::kConverged)) continue;
-    unsolved += (unsolved.empty() ? "" : ", ") + std::to_string(count) + " of " + std::to_string(windows) +
-                " windows " + reason;
-  }
-  if (!unsolved.empty()) row("solver", unsolved);
-  if (!summary.input_faults.empty()) {
-    std::string faults;
-    for (const auto& [name, count] : summary.input_faults)
-      faults += (faults.empty() ? "" : ", ") + std::to_string(count) + " " + name;
-    row("input faults", faults);
-  }
+  describeAids(summary, row);
+  describeSolver(summary.solver_terminations, row);
+  if (!summary.input_faults.empty()) row("input faults", listOf(summary.input_faults));
   row("started from", summary.initialized_from);
   if (summary.divergences > 0 || summary.health_at_end != "ok") {
     row("diverged", std::to_string(summary.divergences) + " times, re-initialised " +
