@@ -41,12 +41,21 @@ void addProductOf(const Rows& A, const Rows& B, double sign, double* sum) {
 }
 
 /// sum += sign A' B, row by row. Most derivatives are zero, and at these sizes Eigen's blocked product costs
-/// several times as much. States have 15 directions, most calibration has one.
+/// several times as much. States have 15 directions; an offset has one, a mounting three or six.
 void addProduct(const Rows& A, const Rows& B, double sign, RowMatrix& sum) {
   if (sum.size() == 0) sum.setZero(A.columns, B.columns);
-  if (B.columns == 15) return addProductOf<15>(A, B, sign, sum.data());
-  if (B.columns == 1) return addProductOf<1>(A, B, sign, sum.data());
-  addProductOf<-1>(A, B, sign, sum.data());
+  switch (B.columns) {
+    case 15:
+      return addProductOf<15>(A, B, sign, sum.data());
+    case 6:
+      return addProductOf<6>(A, B, sign, sum.data());
+    case 3:
+      return addProductOf<3>(A, B, sign, sum.data());
+    case 1:
+      return addProductOf<1>(A, B, sign, sum.data());
+    default:
+      return addProductOf<-1>(A, B, sign, sum.data());
+  }
 }
 
 /// sum += sign A' A, of which the lower triangle counts.
@@ -91,9 +100,18 @@ void forwardSubstituteOf(const RowMatrix& L, RowMatrix& W) {
   }
 }
 void forwardSubstitute(const RowMatrix& L, RowMatrix& W) {
-  if (W.cols() == 15) return forwardSubstituteOf<15>(L, W);
-  if (W.cols() == 1) return forwardSubstituteOf<1>(L, W);
-  forwardSubstituteOf<-1>(L, W);
+  switch (W.cols()) {
+    case 15:
+      return forwardSubstituteOf<15>(L, W);
+    case 6:
+      return forwardSubstituteOf<6>(L, W);
+    case 3:
+      return forwardSubstituteOf<3>(L, W);
+    case 1:
+      return forwardSubstituteOf<1>(L, W);
+    default:
+      return forwardSubstituteOf<-1>(L, W);
+  }
 }
 
 /// S <- its Cholesky factor, in the lower triangle. False where S is not positive definite.
