@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <unordered_map>
@@ -25,19 +26,24 @@ struct Rows {
 };
 Rows rowsOf(const RowMatrix& A) { return {A.data(), A.rows(), A.cols()}; }
 
-/// The same with the count of B's columns known to the compiler, or N = -1.
+/// Column `i` of A times the first N columns of B, added to `to`. The sums stay in registers.
+template <int N>
+void addColumnProduct(const Rows& A, Eigen::Index i, const Rows& B, double sign, double* to) {
+  std::array<double, N> sums;
+  std::copy_n(to, N, sums.begin());
+  for (Eigen::Index row = 0; row < A.rows; ++row) {
+    const double a = sign * A.data[row * A.columns + i];
+    if (a == 0.0) continue;
+    const double* const b = B.data + row * B.columns;
+    for (std::size_t j = 0; j < N; ++j) sums[j] += a * b[j];
+  }
+  std::copy_n(sums.begin(), N, to);
+}
+
+/// addProduct with the count of B's columns known to the compiler.
 template <int N>
 void addProductOf(const Rows& A, const Rows& B, double sign, double* sum) {
-  const Eigen::Index columns = N > 0 ? N : B.columns;
-  for (Eigen::Index row = 0; row < A.rows; ++row) {
-    const double* const b = B.data + row * columns;
-    for (Eigen::Index i = 0; i < A.columns; ++i) {
-      const double a = sign * A.data[row * A.columns + i];
-      if (a == 0.0) continue;
-      double* const to = sum + i * columns;
-      for (Eigen::Index j = 0; j < columns; ++j) to[j] += a * b[j];
-    }
-  }
+  for (Eigen::Index i = 0; i < A.columns; ++i) addColumnProduct<N>(A, i, B, sign, sum + i * N);
 }
 
 /// sum += sign A' B, row by row. Most derivatives are zero, and at these sizes Eigen's blocked product costs
@@ -54,28 +60,20 @@ void addProduct(const Rows& A, const Rows& B, double sign, RowMatrix& sum) {
     case 1:
       return addProductOf<1>(A, B, sign, sum.data());
     default:
-      return addProductOf<-1>(A, B, sign, sum.data());
+      for (Eigen::Index i = 0; i < A.columns; ++i)
+        for (Eigen::Index j = 0; j < B.columns; ++j)
+          addColumnProduct<1>(A, i, {B.data + j, B.rows, B.columns}, sign, sum.data() + i * B.columns + j);
   }
 }
 
 /// sum += sign A' A, of which the lower triangle counts.
 void addSquare(const Rows& A, double sign, RowMatrix& sum) {
-  constexpr Eigen::Index kState = 15, kHalf = 8;
+  constexpr int kState = 15, kHalf = 8;
   if (A.columns != kState) return addProduct(A, A, sign, sum);
-  for (Eigen::Index row = 0; row < A.rows; ++row) {
-    const double* const b = A.data + row * kState;
-    double* to = sum.data();
-    for (Eigen::Index i = 0; i < kState; ++i, to += kState) {
-      const double a = sign * b[i];
-      if (a == 0.0) continue;
-      // Two lengths that the compiler knows are faster than the exact one.
-      if (i < kHalf) {
-        for (Eigen::Index j = 0; j < kHalf; ++j) to[j] += a * b[j];
-      } else {
-        for (Eigen::Index j = 0; j < kState; ++j) to[j] += a * b[j];
-      }
-    }
-  }
+  // Two lengths that the compiler knows are faster than the exact one.
+  double* to = sum.data();
+  for (Eigen::Index i = 0; i < kHalf; ++i, to += kState) addColumnProduct<kHalf>(A, i, A, sign, to);
+  for (Eigen::Index i = kHalf; i < kState; ++i, to += kState) addColumnProduct<kState>(A, i, A, sign, to);
 }
 
 /// sum += sign A' x.
