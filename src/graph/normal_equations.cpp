@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <stdexcept>
+#include <type_traits>
 #include <unordered_map>
 #include <utility>
 
@@ -26,44 +27,43 @@ struct Rows {
 };
 Rows rowsOf(const RowMatrix& A) { return {A.data(), A.rows(), A.cols()}; }
 
-/// Column `i` of A times the first N columns of B, added to `to`. The sums stay in registers.
+/// Calls part(first, width) for parts of the columns, with widths that the compiler knows: 15 of a state, 6
+/// and 3 of a mounting, 1 of an offset.
+template <typename Part>
+void inParts(Eigen::Index columns, const Part& part) {
+  Eigen::Index first = 0;
+  const auto take = [&](auto width) {
+    for (; columns - first >= width; first += width) part(first, width);
+  };
+  take(std::integral_constant<int, 15>());
+  take(std::integral_constant<int, 6>());
+  take(std::integral_constant<int, 3>());
+  take(std::integral_constant<int, 1>());
+}
+
+/// Column `i` of A times N columns of B, from column `first` on, added to `to`. The sums stay in registers.
 template <int N>
-void addColumnProduct(const Rows& A, Eigen::Index i, const Rows& B, double sign, double* to) {
-  std::array<double, N> sums;
+void addColumnProduct(const Rows& A, Eigen::Index i, const Rows& B, Eigen::Index first, double sign,
+                      double* to) {
+  std::array<double, N> sums{};
   std::copy_n(to, N, sums.begin());
   for (Eigen::Index row = 0; row < A.rows; ++row) {
     const double a = sign * A.data[row * A.columns + i];
     if (a == 0.0) continue;
-    const double* const b = B.data + row * B.columns;
+    const double* const b = B.data + row * B.columns + first;
     for (std::size_t j = 0; j < N; ++j) sums[j] += a * b[j];
   }
   std::copy_n(sums.begin(), N, to);
 }
 
-/// addProduct with the count of B's columns known to the compiler.
-template <int N>
-void addProductOf(const Rows& A, const Rows& B, double sign, double* sum) {
-  for (Eigen::Index i = 0; i < A.columns; ++i) addColumnProduct<N>(A, i, B, sign, sum + i * N);
-}
-
-/// sum += sign A' B, row by row. Most derivatives are zero, and at these sizes Eigen's blocked product costs
-/// several times as much. States have 15 directions; an offset has one, a mounting three or six.
+/// sum += sign A' B. Most derivatives are zero, and at these sizes Eigen's blocked product costs several
+/// times as much.
 void addProduct(const Rows& A, const Rows& B, double sign, RowMatrix& sum) {
   if (sum.size() == 0) sum.setZero(A.columns, B.columns);
-  switch (B.columns) {
-    case 15:
-      return addProductOf<15>(A, B, sign, sum.data());
-    case 6:
-      return addProductOf<6>(A, B, sign, sum.data());
-    case 3:
-      return addProductOf<3>(A, B, sign, sum.data());
-    case 1:
-      return addProductOf<1>(A, B, sign, sum.data());
-    default:
-      for (Eigen::Index i = 0; i < A.columns; ++i)
-        for (Eigen::Index j = 0; j < B.columns; ++j)
-          addColumnProduct<1>(A, i, {B.data + j, B.rows, B.columns}, sign, sum.data() + i * B.columns + j);
-  }
+  inParts(B.columns, [A, B, sign, to = sum.data()](Eigen::Index first, auto width) {
+    for (Eigen::Index i = 0; i < A.columns; ++i)
+      addColumnProduct<width>(A, i, B, first, sign, to + i * B.columns + first);
+  });
 }
 
 /// sum += sign A' A, of which the lower triangle counts.
@@ -72,8 +72,8 @@ void addSquare(const Rows& A, double sign, RowMatrix& sum) {
   if (A.columns != kState) return addProduct(A, A, sign, sum);
   // Two lengths that the compiler knows are faster than the exact one.
   double* to = sum.data();
-  for (Eigen::Index i = 0; i < kHalf; ++i, to += kState) addColumnProduct<kHalf>(A, i, A, sign, to);
-  for (Eigen::Index i = kHalf; i < kState; ++i, to += kState) addColumnProduct<kState>(A, i, A, sign, to);
+  for (Eigen::Index i = 0; i < kHalf; ++i, to += kState) addColumnProduct<kHalf>(A, i, A, 0, sign, to);
+  for (Eigen::Index i = kHalf; i < kState; ++i, to += kState) addColumnProduct<kState>(A, i, A, 0, sign, to);
 }
 
 /// sum += sign A' x.
@@ -82,34 +82,26 @@ void addProduct(const Rows& A, const Eigen::VectorXd& x, double sign, Eigen::Vec
     for (Eigen::Index i = 0; i < A.columns; ++i) sum[i] += sign * x[row] * A.data[row * A.columns + i];
 }
 
-/// W <- L^-1 W for the lower triangle of L, by rows.
+/// N columns of W <- L^-1 W, from column `first` on.
 template <int N>
-void forwardSubstituteOf(const RowMatrix& L, RowMatrix& W) {
-  const Eigen::Index columns = N > 0 ? N : W.cols();
+void forwardSubstitute(const RowMatrix& L, Eigen::Index first, RowMatrix& W) {
   for (Eigen::Index i = 0; i < L.rows(); ++i) {
-    double* const to = W.data() + i * columns;
+    double* const to = W.data() + i * W.cols() + first;
+    std::array<double, N> sums{};
+    std::copy_n(to, N, sums.begin());
     for (Eigen::Index j = 0; j < i; ++j) {
       const double factor = L(i, j);
-      const double* const from = W.data() + j * columns;
-      for (Eigen::Index k = 0; k < columns; ++k) to[k] -= factor * from[k];
+      const double* const from = W.data() + j * W.cols() + first;
+      for (std::size_t k = 0; k < N; ++k) sums[k] -= factor * from[k];
     }
     const double inverse = 1.0 / L(i, i);
-    for (Eigen::Index k = 0; k < columns; ++k) to[k] *= inverse;
+    for (std::size_t k = 0; k < N; ++k) to[k] = sums[k] * inverse;
   }
 }
+
+/// W <- L^-1 W for the lower triangle of L.
 void forwardSubstitute(const RowMatrix& L, RowMatrix& W) {
-  switch (W.cols()) {
-    case 15:
-      return forwardSubstituteOf<15>(L, W);
-    case 6:
-      return forwardSubstituteOf<6>(L, W);
-    case 3:
-      return forwardSubstituteOf<3>(L, W);
-    case 1:
-      return forwardSubstituteOf<1>(L, W);
-    default:
-      return forwardSubstituteOf<-1>(L, W);
-  }
+  inParts(W.cols(), [&](Eigen::Index first, auto width) { forwardSubstitute<width>(L, first, W); });
 }
 
 /// S <- its Cholesky factor, in the lower triangle. False where S is not positive definite.
