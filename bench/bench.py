@@ -38,9 +38,12 @@ def play(programs, bag, config, assignments, folder):
     cpu = usage.ru_utime + usage.ru_stime
     seconds = float(summary["estimation_seconds"])
     data = float(summary["realtime_factor"]) * seconds
+    # With several radars each key ends with "_" and the name of one.
+    offsets = {key: float(value) for key, value in summary.items()
+               if key == "final_offset_s" or key.startswith("final_offset_s_")}
     return {"data_seconds": data, "cpu_seconds": cpu, "user_seconds": usage.ru_utime, "system_seconds": usage.ru_stime,
             "realtime_factor_cpu": data / cpu, "estimation_seconds": seconds, "realtime_factor": data / seconds,
-            "peak_memory_mb": usage.ru_maxrss / 1024.0, "final_offset_s": float(summary["final_offset_s"]),
+            "peak_memory_mb": usage.ru_maxrss / 1024.0, "final_offsets": offsets,
             "ate_m": float(summary["ate_m"]) if "ate_m" in summary else None}
 
 
@@ -125,7 +128,9 @@ def show_ratios(ours, theirs, other):
         print(f"    {name:20s} {before:9.3f} -> {after:9.3f}   ratio {ratios[key]['median']:.2f} "
               f"({min(pairs):.2f} to {max(pairs):.2f})")
     a, b = ours[0], theirs[0]
-    print(f"    {'final offset':20s} {1e3 * b['final_offset_s']:9.3f} -> {1e3 * a['final_offset_s']:9.3f} ms")
+    for key in sorted(a["final_offsets"].keys() & b["final_offsets"].keys()):
+        name = "final offset" + key[len("final_offset_s"):].replace("_", " ", 1)
+        print(f"    {name:20s} {1e3 * b['final_offsets'][key]:9.3f} -> {1e3 * a['final_offsets'][key]:9.3f} ms")
     if a["ate_m"] is not None and b["ate_m"] is not None:
         print(f"    {'ATE':20s} {b['ate_m']:9.4f} -> {a['ate_m']:9.4f} m   ({100.0 * (a['ate_m'] / b['ate_m'] - 1.0):+.2f} %)")
     return ratios
