@@ -37,8 +37,8 @@ void removeNoise(const std::vector<ImuMeasurement>& samples, double ImuMeasureme
 }
 
 struct RestStatistics {
-  Statistics gyro, accel;  // without the white noise
-  double mean_size = 0.0;  // [m/s^2] of the specific force
+  Statistics gyro, accel;  // their std without the white noise
+  double mean_size = 0.0;  // [m/s^2] mean of the specific force's norm
 };
 
 /// `seconds`: what the samples cover.
@@ -60,7 +60,7 @@ std::string format(const char* text, double value, double limit) {
   return line;
 }
 
-/// What is wrong with the samples, if they are not those of rest.
+/// Says why the samples do not show a platform at rest; nothing if they do.
 std::string noRestBecause(const RestStatistics& rest, const StaticInitializerOptions& options,
                           double gravity) {
   const Statistics& gyro = rest.gyro;

@@ -18,7 +18,8 @@ struct Quadratic {
   double c = 0.0;
 };
 
-/// What is left of `cost` if its last `count` unknowns are always at their best.
+/// Eliminates the last `count` unknowns: each value of the others then costs what it costs with the best
+/// values of these.
 Quadratic withoutLast(const Quadratic& cost, Eigen::Index count);
 
 /// A velocity with its weight in a robust loss.
@@ -28,7 +29,7 @@ struct WeightedVelocity {
 };
 using VelocityWindow = std::vector<WeightedVelocity>;
 
-/// What the search for the mounting looks at.
+/// The search finds the mounting that fits these windows of velocities to the track of the IMU.
 struct MountingProblem {
   const InertialTrack& track;
   const MountingSearchOptions& options;
@@ -45,12 +46,12 @@ constexpr Eigen::Index kMountingM = 9, kMountingL = 3;
 
 Eigen::VectorXd columnsOf(const Eigen::Matrix3d& M);
 
-/// The cost of a mounting at an offset [s], in sigma^2. `M`: about what it is, which turns the covariances of
-/// the velocities; without it their means stand for all axes.
+/// The cost of a mounting at an offset [s], in sigma^2. `M`: an estimate of M, which turns the covariances
+/// of the velocities into G; without one, each velocity has its mean variance on all axes.
 Quadratic mountingCost(double offset, const std::optional<Eigen::Matrix3d>& M,
                        const MountingProblem& problem);
 
-/// How well the velocities fit a mounting, from medians.
+/// How badly the velocities fit a mounting, from medians.
 struct MountingMisfit {
   double residual = 0.0;  ///< [m/s] root mean square, per axis
   double square = 1.0;    ///< [sigma^2] mean, per axis; at least 1

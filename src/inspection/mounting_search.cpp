@@ -33,7 +33,7 @@ struct Found {
   double cost = std::numeric_limits<double>::infinity();
 };
 
-/// Of a cost in M alone.
+/// The value of a cost that depends on M alone.
 double costOf(const Quadratic& cost, const Matrix3d& M) {
   const VectorXd m = columnsOf(M);
   return m.dot(cost.H * m) - 2.0 * cost.b.dot(m) + cost.c;
@@ -100,10 +100,10 @@ Found descendFromAllTurns(const Quadratic& cost, int sign) {
   return best;
 }
 
-/// What the offsets cost with the best rotation for each, and the best of all.
+/// The cost over the offset, each with the rotation that fits it best.
 struct Curve {
-  std::vector<double> costs;  // of the offsets from the first on, in steps
-  Found least;
+  std::vector<double> costs;  // a value for each step of the offset
+  Found least;                // the mounting that costs least over all offsets
 };
 using BySign = std::array<Curve, 2>;  // receding, approaching
 
@@ -127,7 +127,8 @@ BySign tryOffsets(int first, int last, const std::optional<Matrix3d>& M,
   return curves;
 }
 
-/// `unit`: what one independent sigma^2 costs.
+/// Chooses the sign that fits better; if neither does clearly, the ranges decide. `unit`: the cost of one
+/// independent sigma^2.
 void chooseSign(const BySign& curves, double unit, int sign_from_ranges, MountingSearch* result) {
   const double difference = (curves[1].least.cost - curves[0].least.cost) / unit;  // > 0: receding is better
   const int likelier = difference < 0.0 ? -1 : 1;
@@ -156,7 +157,8 @@ int findOffset(const std::vector<double>& costs, int first, int steps, double sc
   return first + bottom;
 }
 
-/// From the data alone, without what is known beforehand. `cost`: in M; `H_l`: information of the lever arm.
+/// Sets the sigmas that the data alone give, without prior knowledge. `cost`: depends on M alone; `H_l`: the
+/// information about the lever arm.
 void setSigmas(const Quadratic& cost, const Matrix3d& H_l, double unit, MountingSearch* result) {
   const Matrix3d R = result->q_IR.toRotationMatrix();
   const MatrixXd J = tangent(result->sign * R);
