@@ -38,13 +38,13 @@ Residual fineResidual(double e, double s, double outlier) {
   return {std::copysign(value, e), probability * std::abs(z) / (value * s)};
 }
 
-/// The same for a bin of half width h around the Doppler: exp(-x) becomes the probability of the bin.
-Residual coarseResidual(double e, double s, double h, double outlier) {
+/// The same for a bin of half width h around the Doppler: exp(-x) becomes the probability of the bin. That of
+/// the bin around e = 0 is `centre`.
+Residual coarseResidual(double e, double s, double h, double centre, double outlier) {
   const double a = std::abs(e);
   const double below = (a - h) / s;
   const double above = (a + h) / s;
   const double edge = h / s;
-  const double centre = binProbability(0.0, s, h);
   const double floor = outlier * centre;
   const double bin = binProbability(e, s, h);
   const double half_square = -std::log((bin + floor) / (centre + floor));
@@ -147,7 +147,8 @@ DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, 
     smallest_sigma_ = std::min(smallest_sigma_, sigma);
     const double whole = std::sqrt(variance + noise.quantization);
     points_.push_back({shorter * correct.direction(Angles(expected)), points[i].doppler, spread,
-                       fixed_variance, sigma, whole, noise.outlier_density * std::sqrt(2.0 * M_PI) * whole});
+                       fixed_variance, sigma, whole, noise.outlier_density * std::sqrt(2.0 * M_PI) * whole,
+                       binProbability(0.0, sigma, half_bin_)});
   }
 }
 
@@ -158,7 +159,7 @@ double DopplerLikelihood::residual(std::size_t i, const Eigen::Vector3d& v_R,
   const Eigen::Vector3d spread_v = p.spread * v_R;
   const double variance = p.fixed_variance + square(half_bin_) / 3.0 + v_R.dot(spread_v);
   const double scale = p.whole_sigma / std::sqrt(variance);
-  const Residual r = half_bin_ > p.sigma ? coarseResidual(scale * e, p.sigma, half_bin_, p.outlier)
+  const Residual r = half_bin_ > p.sigma ? coarseResidual(scale * e, p.sigma, half_bin_, p.centre, p.outlier)
                                          : fineResidual(scale * e, p.whole_sigma, p.outlier);
   derivative = r.slope * scale * (p.u_R - (e / variance) * spread_v);
   return r.value;
