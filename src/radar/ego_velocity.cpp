@@ -162,6 +162,10 @@ EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
   return concludedInMotion(result, inliers, solution, o);
 }
 
+bool EgoVelocityEstimator::deniesRest(const RadarScan& scan) const {
+  return findSlowMotion(filter(scan, options_), noise(), options_).has_value();
+}
+
 EgoVelocity EgoVelocityEstimator::around(const RadarScan& scan, const VelocityPrior& prior) const {
   EgoVelocity result;
   result.status = EgoVelocityStatus::kTooFewInliers;

@@ -46,18 +46,20 @@ double restWithPointsBeside(const std::vector<RadarDirection>& points, const Ego
 std::optional<VelocitySolution> fitSlowMotion(const std::vector<RadarDirection>& points,
                                               const PointVariances& noise, const EgoVelocityOptions& o) {
   if (points.size() < o.min_inliers) return std::nullopt;
+  const bool has_bins = o.doppler_quantization > 0.0;
+  if (has_bins && restWithPointsBeside(points, o) < 0.5 * kDeniesRest) return std::nullopt;
   VelocitySolution solution = solveLeastSquares(points, o);
   if (!solution.solved || solution.v_R.isZero()) return std::nullopt;
   const DopplerLikelihood likelihood(points, Eigen::Vector3d::Zero(), noise);
   double at_rest = likelihood.at(Eigen::Vector3d::Zero()).value;
-  if (o.doppler_quantization > 0.0) at_rest = std::min(at_rest, restWithPointsBeside(points, o));
+  if (has_bins) at_rest = std::min(at_rest, restWithPointsBeside(points, o));
   if (at_rest < 0.5 * kDeniesRest) return std::nullopt;
   const LikeliestVelocity likeliest = findLikeliest(likelihood, std::nullopt, solution.v_R);
   if (2.0 * (at_rest - likeliest.cost.value) < kDeniesRest) return std::nullopt;
   solution.v_R = likeliest.v_R;
   // A point far within its bin adds nothing to the curvature: without noise, none may be left.
   Eigen::Matrix3d information = likeliest.cost.information;
-  if (o.doppler_quantization > 0.0)
+  if (has_bins)
     information += binInformation(o.doppler_quantization, noise.doppler) * meanOuterProduct(points);
   solution.solved = information.determinant() > 0.0;
   solution.covariance = information.inverse();

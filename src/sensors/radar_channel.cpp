@@ -88,6 +88,7 @@ void RadarChannel::forget() {
   offset_widths_.clear();
   feasibility_ = FeasibilityCheck(options_.feasibility);
   pool_.clear();
+  rest_pool_.clear();
   learned_at_.reset();
   alone_at_.reset();
   gate_.used();
@@ -166,11 +167,19 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
   seen.tilt_is_known = !seen.prediction || seen.prediction->tilt_sigma < kMaxTiltSigma;
   const auto velocityAt = [&](Time stamp) { return in_window_.velocityAt(smoother, stamp); };
   seen.pooled = isTightlyCoupled() ? pool_.filled(scan, velocityAt) : scan;
-  seen.has_borrowed = seen.pooled.points.size() > scan.points.size();
   const double scale = context.model_error_scale;
   if (context.at_rest) answer.at_rest = !measure(seen.pooled, std::nullopt, scale).denies_rest;
   if (context.may_rest)
     answer.at_rest = measure(seen.pooled, std::nullopt, scale).status == EgoVelocityStatus::kZeroVelocity;
+  if (!context.at_rest && !context.may_rest) {
+    rest_pool_.clear();
+  } else {
+    rest_pool_.add(scan);
+    std::optional<RadarScan> creeping = answer.at_rest ? creep() : std::nullopt;
+    if (creeping) answer.at_rest = false;
+    if (creeping && isTightlyCoupled()) seen.pooled = *std::move(creeping);
+  }
+  seen.has_borrowed = seen.pooled.points.size() > scan.points.size();
   if (answer.at_rest) seen.prior = zeroVelocity(options_.rest_velocity_sigma);
 
   std::optional<VelocityPrior> expected = seen.prior;
@@ -195,6 +204,15 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
   }
   seen.moves = seen.prediction && !answer.at_rest && seen.velocity.status == EgoVelocityStatus::kMoving;
   return seen;
+}
+
+std::optional<RadarScan> RadarChannel::creep() const {
+  // Few points show soon that a platform sets off, many show how slowly it creeps.
+  for (std::size_t enough = RestPool::kMost / 25; enough <= RestPool::kMost; enough *= 5) {
+    RadarScan newest = rest_pool_.newest(enough);
+    if (estimator_.deniesRest(newest)) return newest;
+  }
+  return std::nullopt;
 }
 
 double RadarChannel::offsetGain(Seen& seen) {

@@ -17,7 +17,7 @@ struct RestOptions {
   /// [m/s] per axis, of the zero velocity at rest: a hand that holds still drifts by some cm/s. It also turns
   /// by some mrad/s, more than the gyro bias is known at the start. So rest on the way does not inform the
   /// bias.
-  double velocity_sigma = 0.05;
+  double velocity_sigma = 0.01;
 };
 
 /// The estimated state, which distinguishes rest from a smooth ride.

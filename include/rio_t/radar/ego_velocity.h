@@ -112,6 +112,10 @@ class EgoVelocityEstimator {
   /// result with the prior counts nothing twice.
   EgoVelocity estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior = std::nullopt) const;
 
+  /// Whether the points are those of a slow motion and not of rest (see EgoVelocity::denies_rest). They may be
+  /// of several scans with one velocity.
+  bool deniesRest(const RadarScan& scan) const;
+
   /// Learns the step of the Doppler, the thresholds that follow from it, and how far the directions spread.
   /// Call it once per scan, before `estimate`, whether the scan is used or not.
   void observe(const RadarScan& scan);

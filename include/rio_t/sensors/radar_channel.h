@@ -9,6 +9,7 @@
 #include "rio_t/sensors/offset_step_detector.h"
 #include "rio_t/sensors/offset_uncertainty.h"
 #include "rio_t/sensors/radar_in_window.h"
+#include "rio_t/sensors/rest_pool.h"
 #include "rio_t/sensors/scan_pool.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
 #include "rio_t/smoother/options.h"
@@ -21,7 +22,7 @@ struct RadarChannelOptions {
   FeasibilityOptions feasibility;
   OffsetStepDetectorOptions offset_step_detector;
   SmootherOptions smoother;
-  double rest_velocity_sigma = 0.05;  ///< [m/s] of the zero velocity, when the IMU is at rest
+  double rest_velocity_sigma = 0.01;  ///< [m/s] of the zero velocity, when the IMU is at rest
 };
 
 /// What the estimator knows when a scan comes.
@@ -111,7 +112,7 @@ class RadarChannel {
   struct Seen {
     std::optional<RadarVelocityPrediction> prediction;
     std::optional<VelocityPrior> prior;  ///< the prediction; at rest, zero
-    RadarScan pooled;                    ///< with the points borrowed, see ScanPool
+    RadarScan pooled;                    ///< with the points borrowed, see ScanPool and RestPool
     bool has_borrowed = false;
     EgoVelocity velocity;
     bool is_own = false;  ///< the points agree on it; if not, it is `around` the prediction
@@ -122,6 +123,8 @@ class RadarChannel {
   /// Also sets what the answer says of velocity, rest and health.
   Seen see(const RadarScan& scan, const ScanContext& context, const FixedLagSmoother& smoother,
            RadarAnswer& answer);
+  /// The newest points since the IMU came to rest, if they show that the platform creeps.
+  std::optional<RadarScan> creep() const;
   /// See OffsetEvidence; 0: the scan does not tell the offset. Sets `seen.dv_dt_O`.
   double offsetGain(Seen& seen);
   /// The scan's own points that go into the window.
@@ -144,6 +147,7 @@ class RadarChannel {
   RadarInWindow in_window_;
   FeasibilityCheck feasibility_;
   ScanPool pool_;
+  RestPool rest_pool_;
   std::optional<Time> learned_at_, alone_at_;  ///< of the points: those borrowed count once
   OffsetWidths offset_widths_;
   OffsetStepDetector step_detector_;

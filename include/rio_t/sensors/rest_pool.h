@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstddef>
+
+#include "rio_t/core/sliding_queue.h"
+#include "rio_t/radar/scan.h"
+
+namespace rio_t {
+
+/// The scans since the IMU came to rest.
+///
+/// A platform that creeps leaves most points of a scan in the Doppler bin around zero, and its IMU shows no
+/// motion either. Its velocity is the same in all these scans, so their points tell together what those of
+/// one scan do not. Not thread-safe.
+class RestPool {
+ public:
+  /// [points] They show a platform that creeps at a sixth of a Doppler bin (docs/method.md, section 9.5).
+  static constexpr std::size_t kMost = 1000;
+
+  void add(const RadarScan& scan);
+  /// The points of the newest scan, followed by those of the scans before it, until there are `enough`.
+  RadarScan newest(std::size_t enough) const;
+  void clear() { scans_.clear(); }
+
+ private:
+  SlidingQueue<RadarScan> scans_;
+};
+
+}  // namespace rio_t
