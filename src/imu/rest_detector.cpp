@@ -48,22 +48,22 @@ std::optional<Deviation> deviationFromRest(const ImuBuffer& imu, Time time, cons
 
 }  // namespace
 
-bool isAtRest(const ImuBuffer& imu, Time time, const RestContext& context, const RestOptions& options) {
+std::optional<Rest> findRest(const ImuBuffer& imu, Time time, const RestContext& context,
+                             const RestOptions& options) {
   const std::optional<Deviation> d = deviationFromRest(imu, time, context, options);
-  return d && d->gyro_variance.maxCoeff() < options.max_gyro_std * options.max_gyro_std &&
-         d->accel_variance.maxCoeff() < options.max_accel_std * options.max_accel_std &&
-         d->gyro.norm() < options.max_rate && d->accel.norm() < options.max_accel_error;
-}
-
-bool mayRestShaking(const ImuBuffer& imu, Time time, const RestContext& context, const RestOptions& options) {
-  const std::optional<Deviation> d = deviationFromRest(imu, time, context, options);
-  if (!d) return false;
+  if (!d) return std::nullopt;
+  Rest rest;
+  rest.shakes = d->gyro_variance.maxCoeff() >= options.max_gyro_std * options.max_gyro_std ||
+                d->accel_variance.maxCoeff() >= options.max_accel_std * options.max_accel_std;
   // Sigma of a mean over independent samples; a line of vibration averages out faster.
   const auto left = [&](const Eigen::Vector3d& variance) {
-    return 3.0 * std::sqrt(variance.sum() / d->count);
+    return rest.shakes ? 3.0 * std::sqrt(variance.sum() / d->count) : 0.0;
   };
-  return d->gyro.norm() < options.max_rate + left(d->gyro_variance) &&
-         d->accel.norm() < options.max_accel_error + left(d->accel_variance);
+  if (d->gyro.norm() >= options.max_rate + left(d->gyro_variance) ||
+      d->accel.norm() >= options.max_accel_error + left(d->accel_variance))
+    return std::nullopt;
+  rest.velocity_sigma = std::hypot(options.velocity_sigma, d->accel.norm() * options.window);
+  return rest;
 }
 
 }  // namespace rio_t

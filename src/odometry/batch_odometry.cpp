@@ -121,7 +121,7 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
     scan.radar = radar;
     scan.offset_stepped = stepped[radar];
     stepped[radar] = false;
-    if (result.at_rest) scan.rest_velocity_sigma = options_.rest.velocity_sigma;
+    if (result.at_rest) scan.rest_velocity_sigma = result.rest_velocity_sigma;
     if (result.used) setMeasurement(result, scan);
     problem.scans.push_back(scan);
     run.source.push_back(i);

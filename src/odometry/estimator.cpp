@@ -29,9 +29,8 @@ std::vector<RadarChannel> radarChannels(const OdometryOptions& options, const Ei
   std::vector<RadarChannel> channels;
   for (std::size_t k = 0; k < options.radarCount(); ++k) {
     const OdometryOptions own = optionsOfRadar(options, k);
-    const RadarChannelOptions channel{own.T_IR,        own.ego_velocity,
-                                      own.feasibility, own.offset_step_detector,
-                                      own.smoother,    own.rest.velocity_sigma};
+    const RadarChannelOptions channel{own.T_IR, own.ego_velocity, own.feasibility, own.offset_step_detector,
+                                      own.smoother};
     channels.emplace_back(channel, g_W, imu, shared);
   }
   return channels;
@@ -91,20 +90,18 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
   if (result.rejected_because.empty()) {
     result.model_error_scale = model_error_scale_.value();
     smoother_.setImuNoise(imuNoise());
-    const bool at_rest = isAtRest(imu_, node_time, restContext(), options_.rest);
-    // The engine of a vehicle may idle.
-    const bool may_rest =
-        ground_vehicle_ && !at_rest && mayRestShaking(imu_, node_time, restContext(), options_.rest);
+    const std::optional<Rest> rest = findRest(imu_, node_time, restContext(), options_.rest);
+    const bool is_still = rest && !rest->shakes;
     const bool has_diverged = health_.health() == Health::kDiverged;
     // These come before the radar adds its node, because a new node has no estimate yet.
     if (barometer_) result.barometer = barometer_->use(smoother_);
-    if (ground_vehicle_ && !at_rest) result.ground_vehicle = ground_vehicle_->judge(smoother_, node_time);
+    if (ground_vehicle_ && !is_still) result.ground_vehicle = ground_vehicle_->judge(smoother_, node_time);
     std::optional<LandmarkMap::Prediction> expected;
     if (landmarks_)
       expected = landmarks_->predict(smoother_, stamp - radar.offset(), radar.extrinsicsBlock());
     const RadarAnswer answer = radar.use(
         result.scan,
-        {at_rest, may_rest, has_diverged, health_.isContradicted(), result.model_error_scale, last_used_},
+        {rest, has_diverged, health_.isContradicted(), result.model_error_scale, last_used_},
         smoother_);
     judge(answer, result.scan);
     result.ego_velocity = answer.ego_velocity;
@@ -120,7 +117,8 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
     if (expected && result.used) seeLandmarks(*expected, answer, radar, result);
     if (answer.at_rest) {
       if (Block* node = smoother_.nodeAt(radar.nodeTime(stamp))) {
-        smoother_.addZeroVelocity(*node, options_.rest.velocity_sigma);
+        result.rest_velocity_sigma = rest->velocity_sigma;
+        smoother_.addZeroVelocity(*node, rest->velocity_sigma);
         result.updated = true;
       }
     }

@@ -168,19 +168,18 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
   const auto velocityAt = [&](Time stamp) { return in_window_.velocityAt(smoother, stamp); };
   seen.pooled = isTightlyCoupled() ? pool_.filled(scan, velocityAt) : scan;
   const double scale = context.model_error_scale;
-  if (context.at_rest) answer.at_rest = !measure(seen.pooled, std::nullopt, scale).denies_rest;
-  if (context.may_rest)
-    answer.at_rest = measure(seen.pooled, std::nullopt, scale).status == EgoVelocityStatus::kZeroVelocity;
-  if (!context.at_rest && !context.may_rest) {
-    rest_pool_.clear();
-  } else {
+  if (context.rest) {
+    const EgoVelocity alone = measure(seen.pooled, std::nullopt, scale);
+    answer.at_rest = context.rest->shakes ? alone.status == EgoVelocityStatus::kZeroVelocity : !alone.denies_rest;
     rest_pool_.add(scan);
     std::optional<RadarScan> creeping = answer.at_rest ? creep() : std::nullopt;
     if (creeping) answer.at_rest = false;
     if (creeping && isTightlyCoupled()) seen.pooled = *std::move(creeping);
+  } else {
+    rest_pool_.clear();
   }
   seen.has_borrowed = seen.pooled.points.size() > scan.points.size();
-  if (answer.at_rest) seen.prior = zeroVelocity(options_.rest_velocity_sigma);
+  if (answer.at_rest) seen.prior = zeroVelocity(context.rest->velocity_sigma);
 
   std::optional<VelocityPrior> expected = seen.prior;
   if (context.has_diverged) expected.reset();

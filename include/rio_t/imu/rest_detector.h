@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <optional>
 
 #include "rio_t/imu/buffer.h"
 
@@ -14,9 +15,7 @@ struct RestOptions {
   double max_rate = 3.0e-3;      ///< [rad/s] mean gyro without bias
   double max_accel_error = 0.1;  ///< [m/s^2] mean accelerometer without bias and gravity
   double max_speed = 0.1;        ///< [m/s] estimated; above it, stillness is a smooth ride
-  /// [m/s] per axis, of the zero velocity at rest: a hand that holds still drifts by some cm/s. It also turns
-  /// by some mrad/s, more than the gyro bias is known at the start. So rest on the way does not inform the
-  /// bias.
+  /// [m/s] per axis, of the zero velocity: about as slow as a platform may creep unseen by radar and IMU.
   double velocity_sigma = 0.01;
 };
 
@@ -29,15 +28,24 @@ struct RestContext {
   Eigen::Vector3d g_W = Eigen::Vector3d::Zero();  ///< [m/s^2]
 };
 
-/// Whether the IMU is at rest over the window that ends at `time`.
+/// Rest over a window, as the IMU shows it.
+struct Rest {
+  /// The IMU vibrates, as on a vehicle whose engine idles. It takes a radar that sees no motion to call this
+  /// rest.
+  bool shakes = false;
+  /// [m/s] per axis, of the zero velocity. With the mean acceleration that is not explained, the platform may
+  /// have set off within the window.
+  double velocity_sigma = 0.0;
+};
+
+/// Rest over the window that ends at `time`, if the IMU shows no motion. If it shakes, its means over the
+/// window must be those of rest, within three sigmas of what the shaking leaves in them.
 ///
 /// The IMU sees rest that a radar cannot see: a Doppler bin hides slow motion, and a moving object can fill
-/// the view. The IMU alone cannot distinguish rest from uniform motion, hence the context.
-bool isAtRest(const ImuBuffer& imu, Time time, const RestContext& context, const RestOptions& options);
-
-/// Whether the IMU may be at rest on a platform that shakes, as one whose engine idles: its means over the
-/// window are those of rest, within three sigmas of what the shaking leaves in them. How much it shakes does
-/// not count. It takes a radar that sees no motion to call it rest.
-bool mayRestShaking(const ImuBuffer& imu, Time time, const RestContext& context, const RestOptions& options);
+/// the view. The IMU alone cannot distinguish rest from uniform motion, hence the context. A hand that holds
+/// still turns by some mrad/s, more than the gyro bias is known at the start. So rest on the way does not
+/// inform the bias.
+std::optional<Rest> findRest(const ImuBuffer& imu, Time time, const RestContext& context,
+                             const RestOptions& options);
 
 }  // namespace rio_t

@@ -29,6 +29,7 @@ struct ScanResult {
   double offset_half_width = kOffsetHalfWidth;  ///< of the mean of the IMU in the derivative [s]
   bool used = false;                            ///< it went into the window
   bool at_rest = false;                         ///< the IMU shows rest, and the points do not deny it
+  double rest_velocity_sigma = 0.0;             ///< [m/s] of the zero velocity, if at rest
   std::optional<LandmarkAnswer> landmarks;      ///< if they are on, of a used scan in motion
   double model_error_scale = 1.0;               ///< see ModelErrorScale; in the covariance of ego_velocity
   std::string rejected_because;                 ///< snake case, empty if used; keys of `scans_rejected`

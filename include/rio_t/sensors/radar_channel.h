@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "rio_t/imu/rest_detector.h"
 #include "rio_t/radar/ego_velocity.h"
 #include "rio_t/radar/feasibility.h"
 #include "rio_t/sensors/innovation_gate.h"
@@ -22,13 +23,11 @@ struct RadarChannelOptions {
   FeasibilityOptions feasibility;
   OffsetStepDetectorOptions offset_step_detector;
   SmootherOptions smoother;
-  double rest_velocity_sigma = 0.01;  ///< [m/s] of the zero velocity, when the IMU is at rest
 };
 
 /// What the estimator knows when a scan comes.
 struct ScanContext {
-  bool at_rest = false;            ///< the IMU shows no motion at the time of measurement
-  bool may_rest = false;           ///< likewise but for a vibration: rest if the points show no motion
+  std::optional<Rest> rest;        ///< as the IMU shows it at the time of measurement
   bool has_diverged = false;       ///< RANSAC gets no prior
   bool is_contradicted = false;    ///< see HealthMonitor: no velocity is found around the prediction
   double model_error_scale = 1.0;  ///< see ModelErrorScale
