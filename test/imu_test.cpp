@@ -363,15 +363,31 @@ TEST(Rest, IsSeenAndToldFromMotion) {
   context.g_W = {0, 0, -9.81};
   context.b_g = {0.01, 0, 0};
   const Time end = Time::fromSeconds(1.0);
-  EXPECT_TRUE(isAtRest(still({0.01, 0, 0}, {0, 0, 9.81}), end, context, RestOptions()));
-  EXPECT_FALSE(isAtRest(still({0.01, 0, 0.01}, {0, 0, 9.81}), end, context, RestOptions())) << "turning";
-  EXPECT_FALSE(isAtRest(still({0.01, 0, 0}, {0.3, 0, 9.81}), end, context, RestOptions())) << "speeding up";
+  const auto rest = findRest(still({0.01, 0, 0}, {0, 0, 9.81}), end, context, RestOptions());
+  ASSERT_TRUE(rest);
+  EXPECT_FALSE(rest->shakes);
+  EXPECT_FALSE(findRest(still({0.01, 0, 0.01}, {0, 0, 9.81}), end, context, RestOptions())) << "turning";
+  EXPECT_FALSE(findRest(still({0.01, 0, 0}, {0.3, 0, 9.81}), end, context, RestOptions())) << "speeding up";
   RestContext riding = context;
   riding.v_W = {1.0, 0, 0};
-  EXPECT_FALSE(isAtRest(still({0.01, 0, 0}, {0, 0, 9.81}), end, riding, RestOptions())) << "a smooth ride";
+  EXPECT_FALSE(findRest(still({0.01, 0, 0}, {0, 0, 9.81}), end, riding, RestOptions())) << "a smooth ride";
   RestOptions off;
   off.enabled = false;
-  EXPECT_FALSE(isAtRest(still({0.01, 0, 0}, {0, 0, 9.81}), end, context, off));
+  EXPECT_FALSE(findRest(still({0.01, 0, 0}, {0, 0, 9.81}), end, context, off));
+}
+
+TEST(Rest, ItsSigmaIsWhatThePlatformMayHaveGainedUnseen) {
+  RestContext context;
+  context.g_W = {0, 0, -9.81};
+  const Time end = Time::fromSeconds(1.0);
+  const RestOptions options;
+  const auto quiet = findRest(still({0, 0, 0}, {0, 0, 9.81}), end, context, options);
+  ASSERT_TRUE(quiet);
+  EXPECT_LT(quiet->velocity_sigma, 1.1 * options.velocity_sigma);
+  // It sets off so gently that it still passes for rest. After half a second it has 4 cm/s.
+  const auto setting_off = findRest(still({0, 0, 0}, {0.08, 0, 9.81}), end, context, options);
+  ASSERT_TRUE(setting_off);
+  EXPECT_NEAR(setting_off->velocity_sigma, 0.08 * options.window, 0.005);
 }
 
 }  // namespace

@@ -140,23 +140,23 @@ TEST(EmptyScans, DoNotHoldTheWindow) {
 }
 
 /// Less than a bin of the Doppler, and too steady for the IMU to see.
-SimulatedRun creeping(std::uint64_t seed) {
+SimulatedRun creeping(std::uint64_t seed, double speed, double points) {
   simulation::MotionRequest request;
   request.name = "constant_speed";
   request.seed = seed;
   request.duration = 45.0;
-  request.speed = 0.1;
+  request.speed = speed;
   request.rest.static_start = 5.0;
   request.rest.static_end = 0.0;
   SimulatedRun run("constant_speed", seed, 45.0, 5.0);
   run.motion = simulation::makeMotion(request);
-  run.setup.radar.points_mean = 60.0;
+  run.setup.radar.points_mean = points;
   return run;
 }
 
 TEST(Creeping, IsNoRest) {
   for (const std::uint64_t seed : {1, 2, 3}) {
-    SimulatedRun run = creeping(seed);
+    SimulatedRun run = creeping(seed, 0.1, 60.0);
     run.run();
     int at_rest = 0;
     int all = 0;
@@ -172,6 +172,43 @@ TEST(Creeping, IsNoRest) {
     // for twice as large, this error is 0.017 m/s.
     EXPECT_LT(run.rms(10.0, 45.0, error), 0.012) << "seed " << seed;
   }
+}
+
+// Most scans by themselves look like those of a platform at rest.
+TEST(Creeping, IsNoRestEvenIfOneScanDoesNotTell) {
+  for (const double points : {15.0, 60.0}) {
+    for (const std::uint64_t seed : {1, 2, 3}) {
+      SimulatedRun run = creeping(seed, 0.05, points);
+      run.run();
+      const auto error = [&](const NavigationState& state) { return run.velocityError(state); };
+      EXPECT_LT(run.rms(15.0, 45.0, error), 0.03) << "points " << points << ", seed " << seed;
+    }
+  }
+}
+
+TEST(Rest, APlatformThatStandsStillDoesNotDrift) {
+  SimulatedRun run("medium", 1, 60.0, 45.0);
+  run.run([&](simulation::SensorData& data) {
+    const auto moves = [&](const auto& item) { return run.seconds(item.stamp) > 44.0; };
+    data.scans.erase(std::remove_if(data.scans.begin(), data.scans.end(), moves), data.scans.end());
+  });
+  ASSERT_FALSE(run.results.empty());
+  const NavigationState& state = run.results.back().state;
+  const auto sigma = state.covariance.diagonal().segment<3>(StateBlock::kP).cwiseSqrt();
+  EXPECT_LT(sigma.maxCoeff(), 0.03);  // after 40 s
+  EXPECT_LT((run.truth(state).p_W - state.p_W).norm(), 3.0 * sigma.norm());
+}
+
+/// Before, only a vehicle could rest on a frame that shakes.
+TEST(Rest, AnyPlatformMayRestOnAFrameThatShakes) {
+  SimulatedRun run("medium", 2, 60.0, 45.0);
+  run.setup.imu.accel_vibration = 0.8;
+  run.run();
+  int at_rest = 0;
+  for (const ScanResult& result : run.results)
+    if (run.seconds(result.scan.stamp) > 10.0 && run.seconds(result.scan.stamp) < 45.0)
+      at_rest += result.at_rest ? 1 : 0;
+  EXPECT_GT(at_rest, 300);
 }
 
 /// A walk in which a crowd is in view for 30 % of the time.
