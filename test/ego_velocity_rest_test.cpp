@@ -99,6 +99,45 @@ TEST(EgoVelocityRest, RestIsNotDeniedByPointsABinOff) {
   EXPECT_GT(rests, kTrials * 99 / 100);
 }
 
+/// Share of the trials in which `points` points of a radar with noise of 0.02 m/s and steps of 0.125 m/s deny
+/// rest. `change` changes the points.
+template <typename Change>
+double shareDenied(double speed, int points, const Change& change) {
+  const EgoVelocityEstimator estimator(simulatedRadarOptions());
+  Random random(19);
+  int denied = 0;
+  constexpr int kTrials = 200;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    RadarScan scan = staticScene({0.0, speed, 0.0}, points, {0.0436, 0.0785, 0.02, 0.125}, random);
+    change(scan, random);
+    denied += estimator.deniesRest(scan) ? 1 : 0;
+  }
+  return static_cast<double>(denied) / kTrials;
+}
+
+TEST(EgoVelocityRest, AThousandPointsTellACreepOfAThirdOfABin) {
+  const auto as_drawn = [](RadarScan&, Random&) {};
+  EXPECT_LT(shareDenied(0.04, 40, as_drawn), 0.1);  // one scan does not
+  EXPECT_GT(shareDenied(0.04, 1000, as_drawn), 0.9);
+  EXPECT_LT(shareDenied(0.0, 1000, as_drawn), 0.01);
+}
+
+TEST(EgoVelocityRest, AThousandPointsAtRestMayReadABinOff) {
+  const auto a_tenth_off = [](RadarScan& scan, Random& random) {
+    for (RadarPoint& p : scan.points)
+      if (random.uniform(0.0, 1.0) < 0.1) p.doppler += random.uniform(-1.0, 1.0) < 0.0 ? -0.125 : 0.125;
+  };
+  EXPECT_LT(shareDenied(0.0, 1000, a_tenth_off), 0.01);
+  // A curtain or a fan: one echo of 40 that is always a bin off.
+  const auto one_always_off = [](RadarScan& scan, Random&) {
+    for (std::size_t i = 0; i < scan.points.size(); i += 40) {
+      scan.points[i].position_R = scan.points[0].position_R;
+      scan.points[i].doppler = 0.125;
+    }
+  };
+  EXPECT_LT(shareDenied(0.0, 1000, one_always_off), 0.01);
+}
+
 // A bin of width q hides every velocity below about q/2; the covariance at rest has to admit that.
 TEST(EgoVelocityRest, CoarseDopplerDoesNotFakeRest) {
   EgoVelocityOptions o;

@@ -163,7 +163,8 @@ EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
 }
 
 bool EgoVelocityEstimator::deniesRest(const RadarScan& scan) const {
-  return findSlowMotion(filter(scan, options_), noise(), options_).has_value();
+  const std::vector<RadarDirection> points = filter(scan, options_);
+  return findSlowMotion(points, noise(), options_) && directionsAgreeOnMotion(points, options_);
 }
 
 EgoVelocity EgoVelocityEstimator::around(const RadarScan& scan, const VelocityPrior& prior) const {

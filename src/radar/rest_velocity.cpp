@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
+#include <utility>
 
 #include "consensus.h"
 #include "direction_noise.h"
@@ -16,6 +18,8 @@ namespace {
 /// Twice the log-likelihood ratio of a slow motion to rest: once in 1000 scans at rest (chi-squared, 3
 /// degrees of freedom).
 constexpr double kDeniesRest = 16.3;
+/// [rad] 15 degrees, the beam of a radar with few antennas: the echoes of one object lie within it.
+constexpr double kCellWidth = 0.26;
 
 bool readsZero(const RadarDirection& p, const EgoVelocityOptions& o) {
   return std::abs(p.doppler) <= o.zero_velocity_threshold;
@@ -110,6 +114,32 @@ VelocitySolution solveRest(const std::vector<RadarDirection>& inliers, const Poi
                             eigen.eigenvectors().transpose();
   solution.solved = true;
   return solution;
+}
+
+bool directionsAgreeOnMotion(const std::vector<RadarDirection>& points, const EgoVelocityOptions& o) {
+  struct Cell {
+    double count = 0.0, approaching = 0.0;
+    Eigen::Vector3d sum_R = Eigen::Vector3d::Zero();
+  };
+  std::map<std::pair<long, long>, Cell> cells;
+  for (const RadarDirection& p : points) {
+    Cell& cell = cells[{std::lround(azimuthOf(p.u_R) / kCellWidth), std::lround(elevationOf(p.u_R) / kCellWidth)}];
+    cell.count += 1.0;
+    cell.sum_R += p.u_R;
+    if (!readsZero(p, o)) cell.approaching -= std::copysign(1.0, p.doppler);
+  }
+  // Least squares: the share of a cell's points that approach is u . g, so it grows along the motion.
+  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  double all = 0.0;
+  for (const auto& [index, cell] : cells) {
+    H += cell.sum_R * cell.sum_R.transpose() / cell.count;
+    b += cell.sum_R * cell.approaching / cell.count;
+    all += square(cell.approaching) / cell.count;
+  }
+  const double explained = b.dot(H.ldlt().solve(b));
+  const double freedom = static_cast<double>(cells.size()) - 3.0;
+  return freedom > 0.0 && explained / 3.0 > kDeniesRest / 3.0 * (all - explained) / freedom;
 }
 
 std::optional<SlowMotion> findSlowMotion(const std::vector<RadarDirection>& points,

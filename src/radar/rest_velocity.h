@@ -19,6 +19,11 @@ std::vector<RadarDirection> selectZeros(const std::vector<RadarDirection>& point
 VelocitySolution solveRest(const std::vector<RadarDirection>& inliers, const PointVariances& noise,
                            const EgoVelocityOptions& options);
 
+/// Whether the points that do not read zero show one motion in all directions. `points` are of many scans. An
+/// echo that moves by itself, as a curtain does, reads the same in all of them, so each direction counts once:
+/// F test of the motion against what the directions differ otherwise.
+bool directionsAgreeOnMotion(const std::vector<RadarDirection>& points, const EgoVelocityOptions& options);
+
 struct SlowMotion {
   VelocitySolution solution;
   std::vector<RadarDirection> inliers;  ///< the points that agree with the solution

@@ -112,8 +112,8 @@ class EgoVelocityEstimator {
   /// result with the prior counts nothing twice.
   EgoVelocity estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior = std::nullopt) const;
 
-  /// Whether the points are those of a slow motion and not of rest (see EgoVelocity::denies_rest). They may be
-  /// of several scans with one velocity.
+  /// Whether the points of many scans with one velocity are those of a slow motion and not of rest, as
+  /// EgoVelocity::denies_rest says of one scan.
   bool deniesRest(const RadarScan& scan) const;
 
   /// Learns the step of the Doppler, the thresholds that follow from it, and how far the directions spread.

@@ -14,7 +14,8 @@ namespace rio_t {
 /// one scan do not. Not thread-safe.
 class RestPool {
  public:
-  /// [points] They show a platform that creeps at a sixth of a Doppler bin (docs/method.md, section 9.5).
+  /// [points] They show a platform that creeps at a third of a Doppler bin
+  /// (*AThousandPointsTellACreepOfAThirdOfABin*).
   static constexpr std::size_t kMost = 1000;
 
   void add(const RadarScan& scan);
