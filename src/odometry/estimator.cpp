@@ -100,8 +100,7 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
     if (landmarks_)
       expected = landmarks_->predict(smoother_, stamp - radar.offset(), radar.extrinsicsBlock());
     const RadarAnswer answer = radar.use(
-        result.scan,
-        {rest, has_diverged, health_.isContradicted(), result.model_error_scale, last_used_},
+        result.scan, {rest, has_diverged, health_.isContradicted(), result.model_error_scale, last_used_},
         smoother_);
     judge(answer, result.scan);
     result.ego_velocity = answer.ego_velocity;

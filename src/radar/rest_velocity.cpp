@@ -123,7 +123,8 @@ bool directionsAgreeOnMotion(const std::vector<RadarDirection>& points, const Eg
   };
   std::map<std::pair<long, long>, Cell> cells;
   for (const RadarDirection& p : points) {
-    Cell& cell = cells[{std::lround(azimuthOf(p.u_R) / kCellWidth), std::lround(elevationOf(p.u_R) / kCellWidth)}];
+    Cell& cell =
+        cells[{std::lround(azimuthOf(p.u_R) / kCellWidth), std::lround(elevationOf(p.u_R) / kCellWidth)}];
     cell.count += 1.0;
     cell.sum_R += p.u_R;
     if (!readsZero(p, o)) cell.approaching -= std::copysign(1.0, p.doppler);

@@ -20,8 +20,8 @@ VelocitySolution solveRest(const std::vector<RadarDirection>& inliers, const Poi
                            const EgoVelocityOptions& options);
 
 /// Whether the points that do not read zero show one motion in all directions. `points` are of many scans. An
-/// echo that moves by itself, as a curtain does, reads the same in all of them, so each direction counts once:
-/// F test of the motion against what the directions differ otherwise.
+/// echo that moves by itself, as a curtain does, reads the same in all of them, so each direction counts
+/// once: F test of the motion against what the directions differ otherwise.
 bool directionsAgreeOnMotion(const std::vector<RadarDirection>& points, const EgoVelocityOptions& options);
 
 struct SlowMotion {

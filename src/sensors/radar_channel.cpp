@@ -168,16 +168,8 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
   const auto velocityAt = [&](Time stamp) { return in_window_.velocityAt(smoother, stamp); };
   seen.pooled = isTightlyCoupled() ? pool_.filled(scan, velocityAt) : scan;
   const double scale = context.model_error_scale;
-  if (context.rest) {
-    const EgoVelocity alone = measure(seen.pooled, std::nullopt, scale);
-    answer.at_rest = context.rest->shakes ? alone.status == EgoVelocityStatus::kZeroVelocity : !alone.denies_rest;
-    rest_pool_.add(scan);
-    std::optional<RadarScan> creeping = answer.at_rest ? creep() : std::nullopt;
-    if (creeping) answer.at_rest = false;
-    if (creeping && isTightlyCoupled()) seen.pooled = *std::move(creeping);
-  } else {
-    rest_pool_.clear();
-  }
+  if (!context.rest) rest_pool_.clear();
+  if (context.rest) answer.at_rest = confirmsRest(*context.rest, scan, scale, seen);
   seen.has_borrowed = seen.pooled.points.size() > scan.points.size();
   if (answer.at_rest) seen.prior = zeroVelocity(context.rest->velocity_sigma);
 
@@ -205,13 +197,18 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
   return seen;
 }
 
-std::optional<RadarScan> RadarChannel::creep() const {
+bool RadarChannel::confirmsRest(const Rest& rest, const RadarScan& scan, double scale, Seen& seen) {
+  rest_pool_.add(scan);
+  const EgoVelocity alone = measure(seen.pooled, std::nullopt, scale);
+  if (rest.shakes ? alone.status != EgoVelocityStatus::kZeroVelocity : alone.denies_rest) return false;
   // Few points show soon that a platform sets off, many show how slowly it creeps.
   for (std::size_t enough = RestPool::kMost / 25; enough <= RestPool::kMost; enough *= 5) {
     RadarScan newest = rest_pool_.newest(enough);
-    if (estimator_.deniesRest(newest)) return newest;
+    if (!estimator_.deniesRest(newest)) continue;
+    if (isTightlyCoupled()) seen.pooled = std::move(newest);
+    return false;
   }
-  return std::nullopt;
+  return true;
 }
 
 double RadarChannel::offsetGain(Seen& seen) {

@@ -122,8 +122,9 @@ class RadarChannel {
   /// Also sets what the answer says of velocity, rest and health.
   Seen see(const RadarScan& scan, const ScanContext& context, const FixedLagSmoother& smoother,
            RadarAnswer& answer);
-  /// The newest points since the IMU came to rest, if they show that the platform creeps.
-  std::optional<RadarScan> creep() const;
+  /// Whether the points do not deny a rest that the IMU shows. If many scans together show a creep, `seen`
+  /// borrows their points.
+  bool confirmsRest(const Rest& rest, const RadarScan& scan, double scale, Seen& seen);
   /// See OffsetEvidence; 0: the scan does not tell the offset. Sets `seen.dv_dt_O`.
   double offsetGain(Seen& seen);
   /// The scan's own points that go into the window.

@@ -166,8 +166,9 @@ void listRest(ParameterList& list, Config& c) {
               "If the estimated speed is larger than this, a still IMU shows a smooth ride, not rest.");
   list.number(
       "rest_velocity_sigma", "m/s", above(0), rest.velocity_sigma,
-      "The zero velocity at rest has this standard deviation on each axis. 0.05 suits a hand that holds "
-      "still. Lower it to 0.01 for a wheeled platform.");
+      "The zero velocity at rest has this standard deviation on each axis, plus what the platform may have "
+      "gained within rest_window, by the acceleration that the IMU shows. Raise it for a hand that holds "
+      "still, or a platform that may creep by some cm/s.");
 }
 
 void listTimeOffset(ParameterList& list, Config& c) {
