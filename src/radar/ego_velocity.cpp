@@ -164,7 +164,7 @@ EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
 
 bool EgoVelocityEstimator::deniesRest(const RadarScan& scan) const {
   const std::vector<RadarDirection> points = filter(scan, options_);
-  return findSlowMotion(points, noise(), options_) && directionsAgreeOnMotion(points, options_);
+  return directionsAgreeOnMotion(points, options_) && findSlowMotion(points, noise(), options_);
 }
 
 EgoVelocity EgoVelocityEstimator::around(const RadarScan& scan, const VelocityPrior& prior) const {

@@ -3,10 +3,10 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <map>
-#include <utility>
 
 #include "consensus.h"
 #include "direction_noise.h"
@@ -121,10 +121,10 @@ bool directionsAgreeOnMotion(const std::vector<RadarDirection>& points, const Eg
     double count = 0.0, approaching = 0.0;
     Eigen::Vector3d sum_R = Eigen::Vector3d::Zero();
   };
-  std::map<std::pair<long, long>, Cell> cells;
+  std::map<std::array<long, 3>, Cell> cells;
   for (const RadarDirection& p : points) {
-    Cell& cell =
-        cells[{std::lround(azimuthOf(p.u_R) / kCellWidth), std::lround(elevationOf(p.u_R) / kCellWidth)}];
+    const Eigen::Vector3d corner = p.u_R / kCellWidth;
+    Cell& cell = cells[{std::lround(corner.x()), std::lround(corner.y()), std::lround(corner.z())}];
     cell.count += 1.0;
     cell.sum_R += p.u_R;
     if (!readsZero(p, o)) cell.approaching -= std::copysign(1.0, p.doppler);
@@ -140,7 +140,10 @@ bool directionsAgreeOnMotion(const std::vector<RadarDirection>& points, const Eg
   }
   const double explained = b.dot(H.ldlt().solve(b));
   const double freedom = static_cast<double>(cells.size()) - 3.0;
-  return freedom > 0.0 && explained / 3.0 > kDeniesRest / 3.0 * (all - explained) / freedom;
+  if (!(freedom > 0.0)) return false;
+  // Quantile of the F distribution, within 4 % from 20 degrees of freedom on.
+  const double limit = kDeniesRest / 3.0 * (1.0 + 9.0 / freedom);
+  return explained / 3.0 > limit * (all - explained) / freedom;
 }
 
 std::optional<SlowMotion> findSlowMotion(const std::vector<RadarDirection>& points,

@@ -202,7 +202,7 @@ bool RadarChannel::confirmsRest(const Rest& rest, const RadarScan& scan, double 
   const EgoVelocity alone = measure(seen.pooled, std::nullopt, scale);
   if (rest.shakes ? alone.status != EgoVelocityStatus::kZeroVelocity : alone.denies_rest) return false;
   // Few points show soon that a platform sets off, many show how slowly it creeps.
-  for (std::size_t enough = RestPool::kMost / 25; enough <= RestPool::kMost; enough *= 5) {
+  for (std::size_t enough = RestPool::kMost / 16; enough <= RestPool::kMost; enough *= 4) {
     RadarScan newest = rest_pool_.newest(enough);
     if (!estimator_.deniesRest(newest)) continue;
     if (isTightlyCoupled()) seen.pooled = std::move(newest);

@@ -15,8 +15,8 @@ namespace rio_t {
 class RestPool {
  public:
   /// [points] They show a platform that creeps at a third of a Doppler bin
-  /// (*AThousandPointsTellACreepOfAThirdOfABin*).
-  static constexpr std::size_t kMost = 1000;
+  /// (*ManyPointsTellACreepOfAThirdOfABin*).
+  static constexpr std::size_t kMost = 500;
 
   void add(const RadarScan& scan);
   /// The points of the newest scan, followed by those of the scans before it, until there are `enough`.
