@@ -167,6 +167,14 @@ bool EgoVelocityEstimator::deniesRest(const RadarScan& scan) const {
   return directionsAgreeOnMotion(points, options_) && findSlowMotion(points, noise(), options_);
 }
 
+RadarScan EgoVelocityEstimator::slowPoints(const RadarScan& scan) const {
+  RadarScan slow = scan;
+  slow.points.clear();
+  for (const RadarDirection& p : selectSlow(filter(scan, options_), options_))
+    slow.points.push_back(scan.points[p.index]);
+  return slow;
+}
+
 EgoVelocity EgoVelocityEstimator::around(const RadarScan& scan, const VelocityPrior& prior) const {
   EgoVelocity result;
   result.status = EgoVelocityStatus::kTooFewInliers;

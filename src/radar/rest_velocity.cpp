@@ -25,16 +25,6 @@ bool readsZero(const RadarDirection& p, const EgoVelocityOptions& o) {
   return std::abs(p.doppler) <= o.zero_velocity_threshold;
 }
 
-/// The points that read zero or the bin beside it.
-std::vector<RadarDirection> selectSlow(const std::vector<RadarDirection>& points,
-                                       const EgoVelocityOptions& o) {
-  std::vector<RadarDirection> slow;
-  std::copy_if(points.begin(), points.end(), std::back_inserter(slow), [&](const RadarDirection& p) {
-    return std::abs(p.doppler) <= o.zero_velocity_threshold + o.doppler_quantization;
-  });
-  return slow;
-}
-
 /// Minus the log-likelihood of rest if some of the points read the bin beside zero for reasons of their own,
 /// on either side. DopplerLikelihood takes the points as independent, so it holds that so many of them cannot
 /// be wrong by chance.
@@ -86,6 +76,15 @@ std::vector<RadarDirection> selectZeros(const std::vector<RadarDirection>& point
   return zeros;
 }
 
+std::vector<RadarDirection> selectSlow(const std::vector<RadarDirection>& points,
+                                       const EgoVelocityOptions& o) {
+  std::vector<RadarDirection> slow;
+  std::copy_if(points.begin(), points.end(), std::back_inserter(slow), [&](const RadarDirection& p) {
+    return std::abs(p.doppler) <= o.zero_velocity_threshold + o.doppler_quantization;
+  });
+  return slow;
+}
+
 // Every inlier reads the zero bin, of width q. Two things bound the velocity:
 // - The bin; see binInformation.
 // - The noise. Noise of sigma s carries readings over the edge of the bin, the sooner the faster the platform
@@ -122,7 +121,7 @@ bool directionsAgreeOnMotion(const std::vector<RadarDirection>& points, const Eg
     Eigen::Vector3d sum_R = Eigen::Vector3d::Zero();
   };
   std::map<std::array<long, 3>, Cell> cells;
-  for (const RadarDirection& p : points) {
+  for (const RadarDirection& p : selectSlow(points, o)) {
     const Eigen::Vector3d corner = p.u_R / kCellWidth;
     Cell& cell = cells[{std::lround(corner.x()), std::lround(corner.y()), std::lround(corner.z())}];
     cell.count += 1.0;

@@ -15,6 +15,10 @@ bool mostReadZero(const std::vector<RadarDirection>& points, const EgoVelocityOp
 std::vector<RadarDirection> selectZeros(const std::vector<RadarDirection>& points,
                                         const EgoVelocityOptions& options);
 
+/// The points that read zero or the bin beside it.
+std::vector<RadarDirection> selectSlow(const std::vector<RadarDirection>& points,
+                                       const EgoVelocityOptions& options);
+
 /// Zero velocity and its covariance. All `inliers` read the zero bin.
 VelocitySolution solveRest(const std::vector<RadarDirection>& inliers, const PointVariances& noise,
                            const EgoVelocityOptions& options);

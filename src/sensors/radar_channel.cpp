@@ -198,17 +198,16 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
 }
 
 bool RadarChannel::confirmsRest(const Rest& rest, const RadarScan& scan, double scale, Seen& seen) {
-  rest_pool_.add(scan);
   const EgoVelocity alone = measure(seen.pooled, std::nullopt, scale);
-  if (rest.shakes ? alone.status != EgoVelocityStatus::kZeroVelocity : alone.denies_rest) return false;
+  bool confirms = rest.shakes ? alone.status == EgoVelocityStatus::kZeroVelocity : !alone.denies_rest;
   // Few points show soon that a platform sets off, many show how slowly it creeps.
-  for (std::size_t enough = RestPool::kMost / 16; enough <= RestPool::kMost; enough *= 4) {
-    RadarScan newest = rest_pool_.newest(enough);
-    if (!estimator_.deniesRest(newest)) continue;
-    if (isTightlyCoupled()) seen.pooled = std::move(newest);
-    return false;
+  for (std::size_t enough = RestPool::kMost / 16; confirms && enough <= RestPool::kMost; enough *= 4) {
+    RadarScan filled = rest_pool_.filled(scan, enough);
+    confirms = !estimator_.deniesRest(filled);
+    if (!confirms && isTightlyCoupled()) seen.pooled = std::move(filled);
   }
-  return true;
+  rest_pool_.add(estimator_.slowPoints(scan));
+  return confirms;
 }
 
 double RadarChannel::offsetGain(Seen& seen) {

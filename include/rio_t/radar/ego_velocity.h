@@ -115,6 +115,8 @@ class EgoVelocityEstimator {
   /// Whether the points of many scans with one velocity are those of a slow motion and not of rest, as
   /// EgoVelocity::denies_rest says of one scan.
   bool deniesRest(const RadarScan& scan) const;
+  /// The scan with those points alone that read zero or the bin beside it, and that the filter keeps.
+  RadarScan slowPoints(const RadarScan& scan) const;
 
   /// Learns the step of the Doppler, the thresholds that follow from it, and how far the directions spread.
   /// Call it once per scan, before `estimate`, whether the scan is used or not.

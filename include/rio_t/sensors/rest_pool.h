@@ -18,9 +18,10 @@ class RestPool {
   /// (*ManyPointsTellACreepOfAThirdOfABin*).
   static constexpr std::size_t kMost = 500;
 
-  void add(const RadarScan& scan);
-  /// The points of the newest scan, followed by those of the scans before it, until there are `enough`.
-  RadarScan newest(std::size_t enough) const;
+  /// `slow`: a scan without the points that no platform at rest sees.
+  void add(const RadarScan& slow);
+  /// The points of the scan, followed by those of the newest scans that were added, until there are `enough`.
+  RadarScan filled(const RadarScan& scan, std::size_t enough) const;
   void clear() { scans_.clear(); }
 
  private:
