@@ -199,7 +199,7 @@ TEST(Rest, APlatformThatStandsStillDoesNotDrift) {
   EXPECT_LT((run.truth(state).p_W - state.p_W).norm(), 3.0 * sigma.norm());
 }
 
-/// Before, only a vehicle could rest on a frame that shakes.
+/// A drone whose rotors idle, for one.
 TEST(Rest, AnyPlatformMayRestOnAFrameThatShakes) {
   SimulatedRun run("medium", 2, 60.0, 45.0);
   run.setup.imu.accel_vibration = 0.8;

@@ -4,6 +4,7 @@ namespace rio_t {
 
 void RestPool::add(const RadarScan& slow) {
   if (!scans_.empty() && slow.stamp < scans_.back().stamp) scans_.clear();  // late, or a bag that loops
+  if (slow.points.empty()) return;  // the pool is bounded by its points
   scans_.push_back(slow);
   std::size_t later = 0;  // points after the oldest scan
   for (std::size_t i = 1; i < scans_.size(); ++i) later += scans_[i].points.size();

@@ -65,7 +65,7 @@ struct RadarAnswer {
 ///
 /// | decision | effect | skipped if |
 /// | --- | --- | --- |
-/// | rest | the IMU's rest counts if the points do not deny it | - |
+/// | rest | the IMU's rest counts if neither this scan nor those since it began deny it | - |
 /// | prior in RANSAC | chooses the points that agree with the prediction; rejects `ambiguous` | diverged |
 /// | feasibility | rejects a jump that no platform makes (paper, II-B1) | - |
 /// | step of the offset | gives t_O a new block | no majority; tilt unknown; scan does not tell t_O |
