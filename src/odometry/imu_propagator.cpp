@@ -31,14 +31,13 @@ std::optional<NavigationState> ImuPropagator::state() const {
       !history_.empty() && history_.back().accel_noise > noise_.accel_density * noise_.accel_density;
   if (!state_ || !rest_ || !vibrates) return state_;
   constexpr int kV = StateBlock::kV;
-  const Eigen::Vector3d gained = state_->v_W - rest_->v_W;
   const Eigen::Matrix3d noise =
       state_->covariance.block<3, 3>(kV, kV) - rest_->covariance.block<3, 3>(kV, kV);
   const double variance = noise.trace() / 3.0;
-  if (gained.squaredNorm() > kMoves * kMoves * variance) return state_;
+  if (state_->v_W.squaredNorm() > kMoves * kMoves * variance) return state_;
   NavigationState held = *state_;
-  held.v_W = rest_->v_W;
-  held.p_W = rest_->p_W + (state_->time - rest_->time) * rest_->v_W;
+  held.v_W.setZero();
+  held.p_W = rest_->p_W;
   return held;
 }
 

@@ -20,8 +20,8 @@ class ImuPropagator {
 
   /// Starts again from a new optimised state, usually some 100 ms before the newest sample, and integrates
   /// all samples since then. Ignores a state older than 30 s.
-  /// `at_rest`: the radar saw no motion at that time. While the IMU vibrates, velocity and position then stay
-  /// where they are until the IMU shows more than its noise.
+  /// `at_rest`: the platform stood still then, and `state` has no velocity. While the IMU vibrates, velocity
+  /// and position stay where they are until the IMU shows more than its noise.
   void anchor(const NavigationState& state, bool at_rest = false);
   /// Sets the noise of the IMU for the samples to come.
   void setNoise(const ImuNoise& noise) { noise_ = noise; }
