@@ -139,6 +139,28 @@ TEST(EmptyScans, DoNotHoldTheWindow) {
   for (std::size_t i = 1; i < left.size(); ++i) EXPECT_LT(left[i] - left[i - 1], 5.1) << run.seconds(left[i]);
 }
 
+/// The points that read the next bin tell the speed. A velocity fitted to all points leaves them out, or takes
+/// them for noise.
+TEST(CoarseRadar, TellsTheSpeedByTheEdgesOfItsBins) {
+  for (const double points : {20.0, 80.0}) {
+    SimulatedRun run("kart", 5, 60.0, 8.0);
+    simulation::RadarModelOptions& radar = run.setup.radar;
+    radar.rate = 30.0;
+    radar.points_mean = points;
+    radar.points_max = 200;
+    radar.fov_azimuth = 30.0;
+    radar.fov_elevation = 20.0;
+    radar.azimuth_noise = 0.5;
+    radar.elevation_noise = 1.0;
+    radar.doppler_noise = 0.03;
+    radar.doppler_step = 0.49;
+    run.run();
+    const auto error = [&](const NavigationState& state) { return run.velocityError(state); };
+    EXPECT_LT(run.rms(25.0, 60.0, error), 0.06) << points << " points";
+    EXPECT_EQ(run.odometry->faults()["time_offset_step"], 0u) << points << " points";
+  }
+}
+
 /// Less than a bin of the Doppler, and too steady for the IMU to see.
 SimulatedRun creeping(std::uint64_t seed, double speed, double points) {
   simulation::MotionRequest request;
@@ -213,6 +235,19 @@ TEST(Rest, AnyPlatformMayRestOnAFrameThatShakes) {
   const auto error = [&](const NavigationState& state) { return run.velocityError(state); };
   EXPECT_LT(run.rms(10.0, 45.0, error), 0.01);
   EXPECT_LT(run.rms(45.0, 60.0, error), 0.1);
+}
+
+/// With noisy directions a larger velocity would explain larger residuals.
+TEST(Rest, ANoisierDopplerThanToldDoesNotRunAway) {
+  for (const double step : {0.0, 0.125}) {
+    SimulatedRun run("medium", 1, 60.0, 45.0);
+    run.setup.radar.doppler_noise = 0.15;
+    run.setup.radar.doppler_step = step;
+    run.options.rest.enabled = false;
+    run.run();
+    const auto error = [&](const NavigationState& state) { return run.velocityError(state); };
+    EXPECT_LT(run.rms(2.0, 45.0, error), 0.03) << step;
+  }
 }
 
 /// A walk in which a crowd is in view for 30 % of the time.

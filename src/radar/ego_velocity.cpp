@@ -7,7 +7,6 @@
 
 #include "consensus.h"
 #include "direction_noise.h"
-#include "doppler_scatter.h"
 #include "ego_velocity_options.h"
 #include "rest_velocity.h"
 #include "rio_t/radar/point_filter.h"
@@ -84,17 +83,6 @@ EgoVelocity concludedInMotion(EgoVelocity result, const std::vector<RadarDirecti
                               const VelocitySolution& solution, const EgoVelocityOptions& o) {
   result.told_variance = o.added_sigma.cwiseAbs2();
   return concluded(std::move(result), inliers, solution, EgoVelocityStatus::kMoving, o);
-}
-
-/// The noise told, or a larger one if the points show it. At a velocity that is a little off they scatter
-/// more; they show the noise where they scatter least.
-PointVariances shownBy(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
-                       const PointVariances& told, const EgoVelocityOptions& o) {
-  PointVariances noise = withScatter(told, points, v_R);
-  if (noise.doppler == told.doppler) return noise;
-  const VelocitySolution fit = solveLeastSquares(points, o);
-  if (fit.solved) noise.doppler = std::min(noise.doppler, withScatter(told, points, fit.v_R).doppler);
-  return noise;
 }
 
 PointVariances startNoise(const EgoVelocityOptions& o) {
@@ -195,6 +183,13 @@ EgoVelocity EgoVelocityEstimator::around(const RadarScan& scan, const VelocityPr
   return result;
 }
 
+EgoVelocity EgoVelocityEstimator::staticWorld(const RadarScan& scan, const EgoVelocity& estimated,
+                                              const std::optional<VelocityPrior>& prior) const {
+  if (!prior) return estimated;
+  const EgoVelocity predicted = around(scan, *prior);
+  return isValid(predicted.status) ? predicted : estimated;
+}
+
 DopplerLikelihood EgoVelocityEstimator::likelihood(const RadarScan& scan,
                                                    const std::vector<std::size_t>& points,
                                                    const Eigen::Vector3d& v_R) const {
@@ -204,7 +199,7 @@ DopplerLikelihood EgoVelocityEstimator::likelihood(const RadarScan& scan,
     directions.push_back({p.position_R.normalized(), p.doppler, i});
   }
   unwrap(directions, v_R, span_.value());
-  return DopplerLikelihood(directions, v_R, shownBy(directions, v_R, noise(), options_));
+  return DopplerLikelihood(directions, v_R, noise());
 }
 
 void EgoVelocityEstimator::learn(const RadarScan& scan, const EgoVelocity& estimated,
@@ -213,8 +208,9 @@ void EgoVelocityEstimator::learn(const RadarScan& scan, const EgoVelocity& estim
   std::vector<RadarDirection> points = filter(scan, options_);
   span_.learn(points, estimated.v_R, options_.doppler_quantization);
   if (options_.solver != EgoVelocitySolver::kErrorsInVariables) return;
-  unwrap(points, estimated.v_R, span_.value());
-  noise_.learn(points, estimated.inliers, estimated.v_R, prior);
+  const EgoVelocity world = staticWorld(scan, estimated, prior);
+  unwrap(points, world.v_R, span_.value());
+  noise_.learn(points, world.inliers, world.v_R, prior);
 }
 
 bool hasMajority(const EgoVelocity& velocity) {

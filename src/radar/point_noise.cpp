@@ -5,7 +5,6 @@
 
 #include "direction_noise.h"
 #include "doppler_bin.h"
-#include "doppler_scatter.h"
 #include "velocity_posterior.h"
 
 namespace rio_t {
@@ -84,10 +83,7 @@ AngleSpread PointNoise::AngleMoments::spread() const {
 void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vector<std::size_t>& inliers,
                        const Eigen::Vector3d& v_R, const std::optional<VelocityPrior>& prior) {
   const std::vector<RadarDirection> agreeing = selected(points, inliers);
-  // The scan may widen its noise. If the noise known is much too small, a few points agree by chance, and
-  // would confirm it.
-  const VelocityPosterior velocity =
-      findPosterior(agreeing, withScatter(variances_, agreeing, v_R), prior, v_R);
+  const VelocityPosterior velocity = findPosterior(agreeing, variances_, prior, v_R);
 
   ++scans_;
   const double share = forgotten(scans_);

@@ -33,15 +33,6 @@ EgoVelocity withOwnPoints(EgoVelocity velocity, const RadarScan& scan) {
   return velocity;
 }
 
-/// Those of `own` that agree with a prediction, if the majority of the points does.
-std::vector<std::size_t> alsoIn(const EgoVelocity& predicted, const std::vector<std::size_t>& own) {
-  std::vector<std::size_t> both;
-  if (isValid(predicted.status))
-    std::set_intersection(own.begin(), own.end(), predicted.inliers.begin(), predicted.inliers.end(),
-                          std::back_inserter(both));
-  return both.empty() ? own : both;
-}
-
 /// With the errors that the options tell multiplied by `factor` in their variance.
 EgoVelocity scaled(EgoVelocity velocity, double factor) {
   velocity.covariance.diagonal() += (factor - 1.0) * velocity.told_variance;
@@ -116,10 +107,10 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   seen.velocity.covariance.diagonal().array() += rate_variance;
   const RadarScanTime taken{scan.stamp, answer.offset_gain, answer.offset_half_width, offset()};
   if (isTightlyCoupled() && measured.status == EgoVelocityStatus::kMoving) {
-    const std::vector<std::size_t> points = pointsOf(scan, seen);
-    if (points.empty()) return reject("too_few_inliers");
+    const EgoVelocity world = staticWorld(scan, seen);
+    if (world.inliers.empty()) return reject("too_few_inliers");
     answer.doppler = DopplerMeasurement{
-        taken, std::make_shared<DopplerLikelihood>(estimator_.likelihood(scan, points, measured.v_R)),
+        taken, std::make_shared<DopplerLikelihood>(estimator_.likelihood(scan, world.inliers, world.v_R)),
         measured.told_variance.array() + rate_variance, options_.smoother.huber_threshold};
   }
 
@@ -220,11 +211,11 @@ double RadarChannel::offsetGain(Seen& seen) {
   return moves_enough ? offset_widths_.gain() : 0.0;
 }
 
-std::vector<std::size_t> RadarChannel::pointsOf(const RadarScan& scan, const Seen& seen) const {
-  std::vector<std::size_t> own = below(scan.points.size(), seen.velocity.inliers);
-  if (!seen.prior || !seen.is_own) return own;
-  // A thing that moves slowly passes for static in a velocity, but not point by point.
-  return alsoIn(estimator_.around(scan, *seen.prior), own);
+EgoVelocity RadarChannel::staticWorld(const RadarScan& scan, const Seen& seen) const {
+  EgoVelocity own = withOwnPoints(seen.velocity, scan);
+  if (seen.is_own) return estimator_.staticWorld(scan, own, seen.prior);
+  own.v_R = seen.prior->v_R;
+  return own;
 }
 
 EgoVelocity RadarChannel::measure(const RadarScan& scan, const std::optional<VelocityPrior>& prior,

@@ -127,8 +127,8 @@ class RadarChannel {
   bool confirmsRest(const Rest& rest, const RadarScan& scan, double scale, Seen& seen);
   /// See OffsetEvidence; 0: the scan does not tell the offset. Sets `seen.dv_dt_O`.
   double offsetGain(Seen& seen);
-  /// The scan's own points that go into the window.
-  std::vector<std::size_t> pointsOf(const RadarScan& scan, const Seen& seen) const;
+  /// The scan's own points that go into the window are the inliers.
+  EgoVelocity staticWorld(const RadarScan& scan, const Seen& seen) const;
   bool isTightlyCoupled() const { return options_.smoother.radar_factor == RadarFactor::kDoppler; }
   /// Whether a scan shares points with the one at `before`.
   static bool sharesPoints(const Seen& seen, Time stamp, const std::optional<Time>& before);
