@@ -1,6 +1,5 @@
 #include "rio_t/radar/ego_velocity.h"
 
-#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <utility>

@@ -3,7 +3,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <utility>
 
 namespace rio_t {
