@@ -139,8 +139,8 @@ TEST(EmptyScans, DoNotHoldTheWindow) {
   for (std::size_t i = 1; i < left.size(); ++i) EXPECT_LT(left[i] - left[i - 1], 5.1) << run.seconds(left[i]);
 }
 
-/// The points that read the next bin tell the speed. A velocity fitted to all points leaves them out, or takes
-/// them for noise.
+/// The points that read the next bin tell the speed. A velocity fitted to all points leaves them out, or
+/// takes them for noise.
 TEST(CoarseRadar, TellsTheSpeedByTheEdgesOfItsBins) {
   for (const double points : {20.0, 80.0}) {
     SimulatedRun run("kart", 5, 60.0, 8.0);

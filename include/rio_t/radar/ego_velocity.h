@@ -126,9 +126,9 @@ class EgoVelocityEstimator {
   /// sigma of the prior. The result is valid if the inliers are the majority of the points; one point is
   /// enough. v_R is that of the prior, and there is no covariance.
   EgoVelocity around(const RadarScan& scan, const VelocityPrior& prior) const;
-  /// The prior with the points that agree with it, if they are the majority; else `estimated`. An estimate from
-  /// rounded Dopplers lies near the middle of a bin. Its inliers leave out points that read the next bin, and
-  /// the others are all too slow.
+  /// The prior with the points that agree with it, if they are the majority; else `estimated`. An estimate
+  /// from rounded Dopplers lies near the middle of a bin. Its inliers leave out points that read the next
+  /// bin, and the others are all too slow.
   EgoVelocity staticWorld(const RadarScan& scan, const EgoVelocity& estimated,
                           const std::optional<VelocityPrior>& prior) const;
   /// Likelihood of the Dopplers of some points. These look static at about `v_R` [m/s].
