@@ -338,8 +338,8 @@ std::vector<Eigen::Matrix3d> semidefinites() {
   for (const double scale : {1e-6, 1.0, 1e6}) {
     const Eigen::Matrix3d one = scale * a * a.transpose();
     const Eigen::Matrix3d two = one + scale * b * b.transpose();
-    result.emplace_back(one);
-    result.emplace_back(two);
+    result.push_back(one);
+    result.push_back(two);
     result.emplace_back(two + scale * c * c.transpose());
     for (int i = 0; i < 3; ++i) {
       result.emplace_back(scale * Eigen::Vector3d::Unit(i) * Eigen::Vector3d::Unit(i).transpose());

@@ -231,7 +231,7 @@ TEST(Rest, AnyPlatformMayRestOnAFrameThatShakes) {
     if (run.seconds(result.scan.stamp) > 10.0 && run.seconds(result.scan.stamp) < 45.0)
       at_rest += result.at_rest ? 1 : 0;
   EXPECT_GT(at_rest, 300);
-  // What is published stands still too, and moves once the platform does.
+  // The published velocity is zero at rest, and follows the platform after it.
   const auto error = [&](const NavigationState& state) { return run.velocityError(state); };
   EXPECT_LT(run.rms(10.0, 45.0, error), 0.01);
   EXPECT_LT(run.rms(45.0, 60.0, error), 0.1);

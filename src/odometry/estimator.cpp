@@ -206,8 +206,8 @@ void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
   const Eigen::Index estimated = covariance.rows() - (kState + 1);
   result.T_IR_covariance = extrinsicsCovariance(covariance.bottomRightCorner(estimated, estimated));
   for (const StampedPose& left : marginalize()) result.left_window.push_back(left);
-  // On a frame that shakes the window believes rest little, lest the start of a gentle drive pass for an
-  // offset. What is published stands still.
+  // On a frame that shakes the window believes rest little: the start of a gentle drive must not look like an
+  // offset. The published platform stands still.
   if (result.at_rest) result.state.v_W.setZero();
   anchor(result.state, result.at_rest);
 }

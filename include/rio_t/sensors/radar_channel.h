@@ -127,7 +127,8 @@ class RadarChannel {
   bool confirmsRest(const Rest& rest, const RadarScan& scan, double scale, Seen& seen);
   /// See OffsetEvidence; 0: the scan does not tell the offset. Sets `seen.dv_dt_O`.
   double offsetGain(Seen& seen);
-  /// The scan's own points that go into the window are the inliers.
+  /// What of the scan goes into the window: its own points, which are the inliers, and the velocity at which
+  /// their likelihood is set up.
   EgoVelocity staticWorld(const RadarScan& scan, const Seen& seen) const;
   bool isTightlyCoupled() const { return options_.smoother.radar_factor == RadarFactor::kDoppler; }
   /// Whether a scan shares points with the one at `before`.
