@@ -72,44 +72,4 @@ inline Angles correctedDirection(const Eigen::Vector3d& u_R, double residual, co
           .normalized());
 }
 
-/// Turns moments of a measured direction into unbiased moments of the true one.
-///
-/// With azimuth error N(0, sa^2), E[cos(k az_measured)] = exp(-k^2 sa^2 / 2) cos(k az), the same for sines
-/// and for elevation; and u and u u' are made of such terms with k = 1, 2. So u and u u' can be undone
-/// exactly, which subtracts the noise's share from H'H, and with it the attenuation of the least-squares
-/// velocity.
-class MomentCorrection {
- public:
-  /// Noise variances of azimuth and elevation [rad^2].
-  MomentCorrection(double azimuth_variance, double elevation_variance)
-      : az1_(std::exp(0.5 * azimuth_variance)),
-        az2_(std::exp(2.0 * azimuth_variance)),
-        el1_(std::exp(0.5 * elevation_variance)),
-        el2_(std::exp(2.0 * elevation_variance)) {}
-
-  /// Unbiased for u.
-  Eigen::Vector3d direction(const Angles& a) const {
-    return {el1_ * az1_ * a.cos_el * a.sin_az, el1_ * az1_ * a.cos_el * a.cos_az, el1_ * a.sin_el};
-  }
-
-  /// Unbiased for u u'.
-  Eigen::Matrix3d outerProduct(const Angles& a) const {
-    const double cos_2el = el2_ * (1.0 - 2.0 * square(a.sin_el));
-    const double cos_el_sq = 0.5 * (1.0 + cos_2el);
-    const double sin_cos_el = el2_ * a.sin_el * a.cos_el;
-    const double cos_2az = az2_ * (square(a.cos_az) - square(a.sin_az));
-    const double xx = cos_el_sq * 0.5 * (1.0 - cos_2az);
-    const double yy = cos_el_sq * 0.5 * (1.0 + cos_2az);
-    const double xy = cos_el_sq * az2_ * a.sin_az * a.cos_az;
-    const double xz = sin_cos_el * az1_ * a.sin_az;
-    const double yz = sin_cos_el * az1_ * a.cos_az;
-    Eigen::Matrix3d m;
-    m << xx, xy, xz, xy, yy, yz, xz, yz, 0.5 * (1.0 - cos_2el);
-    return m;
-  }
-
- private:
-  double az1_, az2_, el1_, el2_;
-};
-
 }  // namespace rio_t

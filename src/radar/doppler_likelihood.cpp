@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numeric>
 
 #include "angle_regression.h"
@@ -108,7 +109,8 @@ Eigen::Vector3d solveTransposed(const Eigen::Matrix3d& U, const Eigen::Vector3d&
 //   earlier scans have shown (`left`, after the regression). The error of this angle is not in the direction.
 DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
                                      const PointVariances& noise)
-    : half_bin_(std::sqrt(3.0 * noise.quantization)), smallest_sigma_(std::numeric_limits<double>::max()) {
+    : half_bin_(std::sqrt(3.0 * noise.quantization)),
+      smallest_sigma_(std::numeric_limits<double>::max()) {
   const std::vector<double> azimuths = azimuthsOf(points);
   const std::vector<double> elevations = elevationsOf(points);
   const AngleRegression by_azimuth(azimuths, noise.azimuth, noise.azimuths);
@@ -123,7 +125,10 @@ DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, 
   if (!shows_elevation) left.elevation = by_elevation.remaining();
 
   const double shorter = std::exp(-0.5 * (left.azimuth + left.elevation));  // the mean of such directions
-  const MomentCorrection correct(shown.azimuth, shown.elevation);
+  // The mean direction of a noisy one is shorter than the true one: E[cos(a + e)] = exp(-s^2 / 2) cos(a).
+  const double longer_el = std::exp(0.5 * shown.elevation);
+  const double longer_az = longer_el * std::exp(0.5 * shown.azimuth);
+  const Eigen::Vector3d longer(longer_az, longer_az, longer_el);
   const double along_az = 0.75 * shown.azimuth + 0.25 * shown.elevation;
   const double along_el = 0.75 * shown.elevation + 0.25 * shown.azimuth;
   points_.reserve(points.size());
@@ -146,7 +151,7 @@ DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, 
     const double sigma = std::sqrt(variance);
     smallest_sigma_ = std::min(smallest_sigma_, sigma);
     const double whole = std::sqrt(variance + noise.quantization);
-    points_.push_back({shorter * correct.direction(Angles(expected)), points[i].doppler, spread,
+    points_.push_back({shorter * longer.cwiseProduct(expected), points[i].doppler, spread,
                        fixed_variance, sigma, whole, noise.outlier_density * std::sqrt(2.0 * M_PI) * whole,
                        binProbability(0.0, sigma, half_bin_)});
   }
@@ -163,6 +168,22 @@ double DopplerLikelihood::residual(std::size_t i, const Eigen::Vector3d& v_R,
                                          : fineResidual(scale * e, p.whole_sigma, p.outlier);
   derivative = r.slope * scale * (p.u_R - (e / variance) * spread_v);
   return r.value;
+}
+
+// The points that read one bin, of width q, do so only while |d + u . v| < q/2. So v lies in the ellipsoid
+// (v - v_0)' M (v - v_0) < q^2/4, with M the mean of u u'. A uniform density over an ellipsoid in 3D has the
+// covariance M^-1 (q^2/4) / 5. More points of this bin do not help, since they share the error of rounding.
+// Other bins do. Noise blurs the edge of the bin, and adds its variance.
+Eigen::Matrix3d DopplerLikelihood::binInformation() const {
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  if (!(half_bin_ > smallest_sigma_)) return information;
+  std::map<long, double> counts;
+  const auto bin = [this](const Point& p) { return std::lround(p.doppler / (2.0 * half_bin_)); };
+  for (const Point& p : points_) ++counts[bin(p)];
+  for (const Point& p : points_)
+    if (half_bin_ > p.sigma)
+      information += (1.0 - p.sigma / half_bin_) / (square(half_bin_) / 5.0 + square(p.sigma)) / counts[bin(p)] * p.u_R * p.u_R.transpose();
+  return information;
 }
 
 VelocityCost DopplerLikelihood::at(const Eigen::Vector3d& v_R) const {

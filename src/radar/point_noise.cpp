@@ -1,11 +1,12 @@
 #include "rio_t/radar/point_noise.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 #include "direction_noise.h"
 #include "doppler_bin.h"
-#include "velocity_posterior.h"
+#include "likeliest_velocity.h"
 
 namespace rio_t {
 namespace {
@@ -83,7 +84,8 @@ AngleSpread PointNoise::AngleMoments::spread() const {
 void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vector<std::size_t>& inliers,
                        const Eigen::Vector3d& v_R, const std::optional<VelocityPrior>& prior) {
   const std::vector<RadarDirection> agreeing = selected(points, inliers);
-  const VelocityPosterior velocity = findPosterior(agreeing, variances_, prior, v_R);
+  const LikeliestVelocity velocity = findLikeliest(DopplerLikelihood(agreeing, v_R, variances_), prior, v_R);
+  const Eigen::Matrix3d covariance = velocity.information.inverse();
 
   ++scans_;
   const double share = forgotten(scans_);
@@ -106,7 +108,7 @@ void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vec
     const double probability = density.value / (density.value + variances_.outlier_density);
     // A fit hides some of the noise. So this is the mean over the velocities that the scan leaves open, by
     // three points.
-    const double open = std::sqrt(std::max(0.0, 3.0 * p.u_R.dot(velocity.covariance * p.u_R)));
+    const double open = std::sqrt(std::max(0.0, 3.0 * p.u_R.dot(covariance * p.u_R)));
     const double slope =
         (slopeOf(densityAt(residual - open)) + 4.0 * slopeOf(density) + slopeOf(densityAt(residual + open))) /
         6.0;

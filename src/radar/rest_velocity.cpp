@@ -1,7 +1,6 @@
 #include "rest_velocity.h"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,7 +9,7 @@
 
 #include "consensus.h"
 #include "direction_noise.h"
-#include "velocity_posterior.h"
+#include "likeliest_velocity.h"
 
 namespace rio_t {
 namespace {
@@ -42,22 +41,15 @@ std::optional<VelocitySolution> fitSlowMotion(const std::vector<RadarDirection>&
   if (points.size() < o.min_inliers) return std::nullopt;
   const bool has_bins = o.doppler_quantization > 0.0;
   if (has_bins && restWithPointsBeside(points, o) < 0.5 * kDeniesRest) return std::nullopt;
-  VelocitySolution solution = solveLeastSquares(points, o);
-  if (!solution.solved || solution.v_R.isZero()) return std::nullopt;
+  const VelocitySolution start = solveLeastSquares(points, o);
+  if (!start.solved || start.v_R.isZero()) return std::nullopt;
   const DopplerLikelihood likelihood(points, Eigen::Vector3d::Zero(), noise);
   double at_rest = likelihood.at(Eigen::Vector3d::Zero()).value;
   if (has_bins) at_rest = std::min(at_rest, restWithPointsBeside(points, o));
   if (at_rest < 0.5 * kDeniesRest) return std::nullopt;
-  const LikeliestVelocity likeliest = findLikeliest(likelihood, std::nullopt, solution.v_R);
-  if (2.0 * (at_rest - likeliest.cost.value) < kDeniesRest) return std::nullopt;
-  solution.v_R = likeliest.v_R;
-  // A point far within its bin adds nothing to the curvature: without noise, none may be left.
-  Eigen::Matrix3d information = likeliest.cost.information;
-  if (has_bins)
-    information += binInformation(o.doppler_quantization, noise.doppler) * meanOuterProduct(points);
-  solution.solved = information.determinant() > 0.0;
-  solution.covariance = information.inverse();
-  return solution;
+  const LikeliestVelocity likeliest = findLikeliest(likelihood, std::nullopt, start.v_R);
+  if (2.0 * (at_rest - likeliest.cost) < kDeniesRest) return std::nullopt;
+  return solutionOf(likeliest.v_R, likeliest.information, o);
 }
 
 }  // namespace
@@ -85,34 +77,13 @@ std::vector<RadarDirection> selectSlow(const std::vector<RadarDirection>& points
   return slow;
 }
 
-// Every inlier reads the zero bin, of width q. Two things bound the velocity:
-// - The bin; see binInformation.
-// - The noise. Noise of sigma s carries readings over the edge of the bin, the sooner the faster the platform
-//   creeps. The likelihood P(v) that a point reads zero has the curvature
-//     -(log P)'' = 2 z phi(z) / (s^2 P(0)) at rest, z = q / (2 s),
-//   for each of the n points (1/s^2 as q goes to 0, nothing if q is much above s).
-// Unsolved if the directions leave some velocity unseen.
 VelocitySolution solveRest(const std::vector<RadarDirection>& inliers, const PointVariances& noise,
                            const EgoVelocityOptions& o) {
-  VelocitySolution solution;
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
-  eigen.computeDirect(meanOuterProduct(inliers));
-  if (!(eigen.eigenvalues()[0] * o.max_condition_number > eigen.eigenvalues()[2])) return solution;
-  const double q = o.doppler_quantization;
-  const double s = std::sqrt(noise.doppler);
-  const auto n = static_cast<double>(inliers.size());
-  const double z = s > 0.0 ? q / (2.0 * s) : 0.0;
-  double scale = s * s / n;  // of M^-1; this is without a bin
-  if (q > 0.0) {
-    const double phi = std::exp(-0.5 * z * z) / std::sqrt(2.0 * M_PI);
-    const double curvature = s > 0.0 ? 2.0 * z * phi / (s * s * std::erf(z / std::sqrt(2.0))) : 0.0;
-    scale = 1.0 / (binInformation(q, noise.doppler) + n * curvature);
-  }
-  solution.covariance = o.zero_velocity_sigma * o.zero_velocity_sigma * Eigen::Matrix3d::Identity() +
-                        scale * eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
-                            eigen.eigenvectors().transpose();
-  solution.solved = true;
-  return solution;
+  const Eigen::Vector3d v_R = Eigen::Vector3d::Zero();
+  const DopplerLikelihood likelihood(inliers, v_R, noise);
+  VelocitySolution rest = solutionOf(v_R, likelihood.at(v_R).information + likelihood.binInformation(), o);
+  rest.covariance.diagonal().array() += square(o.zero_velocity_sigma);
+  return rest;
 }
 
 bool directionsAgreeOnMotion(const std::vector<RadarDirection>& points, const EgoVelocityOptions& o) {

@@ -21,9 +21,8 @@ double largestSigma(const Eigen::Matrix3d& covariance);
 VelocitySolution solveLeastSquares(const std::vector<RadarDirection>& points,
                                    const EgoVelocityOptions& options);
 
-/// Least squares that knows that directions are noisy, see the source. The first weights are those at `v_R`,
-/// a RANSAC or least-squares velocity; `given` is the noise of the points.
-VelocitySolution solveErrorsInVariables(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
-                                        const PointVariances& given, const EgoVelocityOptions& options);
+/// A velocity with its covariance. Unsolved if the information [s^2/m^2] leaves some direction unseen.
+VelocitySolution solutionOf(const Eigen::Vector3d& v_R, const Eigen::Matrix3d& information,
+                            const EgoVelocityOptions& options);
 
 }  // namespace rio_t
