@@ -12,7 +12,7 @@ SOURCE = pathlib.Path(os.environ["RIO_T_TEST_SOURCE"])
 BUILD = pathlib.Path(os.environ["RIO_T_TEST_BUILD"])
 PREFIX = BUILD / "install"
 DOWNSTREAM = pathlib.Path(__file__).parent / "downstream"
-DEADLINE = 120.0  # [s] for anything; far more than needed
+DEADLINE = 600.0  # [s] for anything; far more than needed, even beside other work
 
 
 def run(*words, **options):
