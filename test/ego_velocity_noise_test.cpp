@@ -162,7 +162,7 @@ TEST(EgoVelocityNoise, LeavesNoBiasOnceLearned) {
     EXPECT_NEAR(result.nees, 3.0, 0.4);
   }
   // What they come to unlearned: the reason for all this.
-  const MonteCarlo unlearned = monteCarlo(kWrongStarts.back(), kDrive, kSimulatedRadar, 0.35);
+  const MonteCarlo unlearned = monteCarlo(kWrongStarts.front(), kDrive, kSimulatedRadar, 0.35);
   EXPECT_GT(unlearned.bias.cwiseAbs().maxCoeff(), 0.008);
 }
 

@@ -37,7 +37,7 @@ TEST(EgoVelocity, SignAndAxes) {
       scan.points.push_back({4.0 * direction(azimuth, elevation), -direction(azimuth, elevation).y(), 20.0});
     }
   }
-  const EgoVelocity e = EgoVelocityEstimator(EgoVelocityOptions()).estimate(scan);
+  const EgoVelocity e = EgoVelocityEstimator(knownStep(kNoStep)).estimate(scan);
   EXPECT_EQ(e.status, EgoVelocityStatus::kMoving);
   EXPECT_NEAR(e.v_R.y(), 1.0, 0.02);
   EXPECT_NEAR(e.v_R.x(), 0.0, 0.02);
@@ -46,7 +46,7 @@ TEST(EgoVelocity, SignAndAxes) {
 
 TEST(EgoVelocity, FortyPercentOutliers) {
   Random random(2);
-  const EgoVelocityEstimator estimator{EgoVelocityOptions()};
+  const EgoVelocityEstimator estimator{knownStep()};
   for (int trial = 0; trial < 200; ++trial) {
     RadarScan scan = staticScene(kVelocity, 50, {0.01, 0.02, 0.01, 0.125}, random);
     for (std::size_t i = 0; i < scan.points.size(); i += 5) {  // two of five

@@ -36,7 +36,6 @@ inline RadarScan staticScene(const Eigen::Vector3d& v_R, int points, const ScanN
   return scan;
 }
 
-/// Estimation without anything that widens the covariance, for tests of the solver.
 /// The defaults, for a radar whose step is known.
 inline EgoVelocityOptions knownStep(double step = 0.125) {
   EgoVelocityOptions o;
@@ -44,6 +43,7 @@ inline EgoVelocityOptions knownStep(double step = 0.125) {
   return o;
 }
 
+/// Estimation without anything that widens the covariance, for tests of the solver.
 inline EgoVelocityOptions bareOptions(EgoVelocitySolver solver) {
   EgoVelocityOptions o = knownStep();
   o.solver = solver;

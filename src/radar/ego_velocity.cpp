@@ -7,7 +7,6 @@
 #include "consensus.h"
 #include "direction_noise.h"
 #include "ego_velocity_options.h"
-#include "likeliest_velocity.h"
 #include "rest_velocity.h"
 #include "rio_t/radar/point_filter.h"
 #include "velocity_solver.h"
@@ -48,10 +47,8 @@ VelocitySolution solveMotion(const std::vector<RadarDirection>& points, const Po
   VelocitySolution first = solveLeastSquares(inliers, o);
   if (!first.solved) return first;
   inliers = selectInliers(points, first.v_R, noise, o);
-  if (o.solver == EgoVelocitySolver::kLeastSquares) return solveLeastSquares(inliers, o);
-  const LikeliestVelocity likeliest =
-      findLikeliest(DopplerLikelihood(inliers, first.v_R, noise), std::nullopt, first.v_R);
-  return solutionOf(likeliest.v_R, likeliest.information, o);
+  return o.solver == EgoVelocitySolver::kLeastSquares ? solveLeastSquares(inliers, o)
+                                                      : solveLikelihood(inliers, noise, first.v_R, o);
 }
 
 /// `result`, whose points are given, with the solution; or with why it does not count. `valid` is its status

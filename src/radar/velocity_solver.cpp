@@ -6,11 +6,14 @@
 #include <cstddef>
 
 #include "direction_noise.h"
+#include "likeliest_velocity.h"
 
 namespace rio_t {
 namespace {
 
 using SymmetricEigen = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>;
+
+double degreesOfFreedom(std::size_t points) { return points > 3 ? static_cast<double>(points - 3) : 1.0; }
 
 bool isWellConditioned(const SymmetricEigen& eigen, const EgoVelocityOptions& options) {
   return eigen.eigenvalues()[0] * options.max_condition_number > eigen.eigenvalues()[2];
@@ -46,11 +49,19 @@ VelocitySolution solveLeastSquares(const std::vector<RadarDirection>& points,
   solution.v_R = inverse * right;
   double squares = 0.0;
   for (const RadarDirection& p : points) squares += square(p.doppler + p.u_R.dot(solution.v_R));
-  const double freedom = points.size() > 3 ? static_cast<double>(points.size() - 3) : 1.0;
-  const double variance = std::max(squares / freedom, square(options.doppler_quantization) / 12.0);
+  const double variance =
+      std::max(squares / degreesOfFreedom(points.size()), square(options.doppler_quantization) / 12.0);
   solution.covariance = variance * inverse;
   solution.solved = true;
   return solution;
+}
+
+VelocitySolution solveLikelihood(const std::vector<RadarDirection>& points, const PointVariances& noise,
+                                 const Eigen::Vector3d& v_R, const EgoVelocityOptions& options) {
+  const LikeliestVelocity likeliest = findLikeliest(DopplerLikelihood(points, v_R, noise), std::nullopt, v_R);
+  const double squares = 2.0 * likeliest.cost;  // in sigmas
+  const double wider = std::max(1.0, squares / degreesOfFreedom(points.size()));
+  return solutionOf(likeliest.v_R, likeliest.information / wider, options);
 }
 
 VelocitySolution solutionOf(const Eigen::Vector3d& v_R, const Eigen::Matrix3d& information,

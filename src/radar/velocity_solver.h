@@ -21,6 +21,11 @@ double largestSigma(const Eigen::Matrix3d& covariance);
 VelocitySolution solveLeastSquares(const std::vector<RadarDirection>& points,
                                    const EgoVelocityOptions& options);
 
+/// The likeliest velocity; see DopplerLikelihood. The search begins at `v_R`. Residuals larger than `noise`
+/// promises widen the covariance.
+VelocitySolution solveLikelihood(const std::vector<RadarDirection>& points, const PointVariances& noise,
+                                 const Eigen::Vector3d& v_R, const EgoVelocityOptions& options);
+
 /// A velocity with its covariance. Unsolved if the information [s^2/m^2] leaves some direction unseen.
 VelocitySolution solutionOf(const Eigen::Vector3d& v_R, const Eigen::Matrix3d& information,
                             const EgoVelocityOptions& options);

@@ -48,8 +48,8 @@ class DopplerLikelihood {
   /// Information of the bins that are wider than the noise [s^2/m^2]. J'J lacks it: a point far within its bin
   /// has no derivative, and yet it bounds the velocity.
   Eigen::Matrix3d binInformation() const;
-  /// Residual of point i, and its derivative. For tests; `at` adds these up.
-  double residual(std::size_t i, const Eigen::Vector3d& v_R, Eigen::Vector3d& derivative) const;
+  /// That of point i. For tests; `at` adds these up.
+  VelocityCost ofPoint(std::size_t i, const Eigen::Vector3d& v_R) const;
   std::size_t size() const { return points_.size(); }
   double smallestSigma() const { return smallest_sigma_; }  ///< of a point, without the bin [m/s]
   double halfBin() const { return half_bin_; }              ///< [m/s]
