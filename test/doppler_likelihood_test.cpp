@@ -220,6 +220,7 @@ struct MonteCarlo {
   Eigen::Vector3d least_squares_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d least_squares_rms = Eigen::Vector3d::Zero();
   double nees = 0.0;
+  double nees_with_bins = 0.0;
 };
 
 MonteCarlo monteCarlo(Scene scene, const Eigen::Vector3d& v_R, std::size_t points, double around) {
@@ -237,7 +238,9 @@ MonteCarlo monteCarlo(Scene scene, const Eigen::Vector3d& v_R, std::size_t point
     const Eigen::Vector3d error = found - truth;
     result.bias += error / kTrials;
     result.rms += error.cwiseAbs2() / kTrials;
-    result.nees += error.dot(likelihood.at(found).information * error) / kTrials;
+    const Eigen::Matrix3d information = likelihood.at(found).information;
+    result.nees += error.dot(information * error) / kTrials;
+    result.nees_with_bins += error.dot((information + likelihood.binInformation()) * error) / kTrials;
     result.least_squares_bias += (start - truth) / kTrials;
     result.least_squares_rms += (start - truth).cwiseAbs2() / kTrials;
   }
@@ -256,9 +259,27 @@ TEST(DopplerLikelihood, NoisyDirectionsDoNotShortenTheVelocity) {
       EXPECT_GT(largest(result.least_squares_bias), 0.004) << "nothing to correct at " << v_R.transpose();
       EXPECT_LT(largest(result.bias), 0.004)
           << result.bias.transpose() << " at " << v_R.transpose() << ", step " << step;
-      EXPECT_GT(result.nees, 2.2) << v_R.transpose() << ", step " << step;  // bins: they say more than J'J
+      EXPECT_GT(result.nees, 2.2) << v_R.transpose() << ", step " << step;  // bins say more
       EXPECT_LT(result.nees, 3.3) << v_R.transpose() << ", step " << step;
     }
+  }
+}
+
+// Bins that are finer and coarser than the noise, many points and few. Three is honest.
+TEST(DopplerLikelihood, ItsInformationIsHonestForAnyRadar) {
+  struct Radar {
+    PointVariances noise;
+    std::size_t points;
+  };
+  for (const Radar& radar :
+       {Radar{variances(0.035, 0.03, 0.05, 0.0), 8}, Radar{variances(0.03, 0.02, 0.045, 0.06), 10},
+        Radar{variances(0.03, 0.02, 0.045, 0.125), 30}, Radar{variances(0.02, 0, 0, 0.125), 20},
+        Radar{variances(0.03, 0.02, 0.03, 0.25), 10}, Radar{variances(0.03, 0, 0, 0.49), 8},
+        Radar{variances(0.03, 0.02, 0.03, 0.49), 20}, Radar{variances(0.02, 0.035, 0.05, 0.49), 80}}) {
+    const MonteCarlo result = monteCarlo(Scene(radar.noise), {0.1, 3.0, 0.15}, radar.points, 0.1);
+    const double step = std::sqrt(12.0 * radar.noise.quantization);
+    EXPECT_GT(result.nees_with_bins, 1.5) << radar.points << " points, step " << step;
+    EXPECT_LT(result.nees_with_bins, 3.8) << radar.points << " points, step " << step;
   }
 }
 

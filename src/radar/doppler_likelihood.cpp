@@ -105,8 +105,7 @@ Eigen::Vector3d solveTransposed(const Eigen::Matrix3d& U, const Eigen::Vector3d&
 //   earlier scans have shown (`left`, after the regression). The error of this angle is not in the direction.
 DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
                                      const PointVariances& noise)
-    : half_bin_(std::sqrt(3.0 * noise.quantization)),
-      smallest_sigma_(std::numeric_limits<double>::max()) {
+    : half_bin_(std::sqrt(3.0 * noise.quantization)), smallest_sigma_(std::numeric_limits<double>::max()) {
   const std::vector<double> azimuths = azimuthsOf(points);
   const std::vector<double> elevations = elevationsOf(points);
   const AngleRegression by_azimuth(azimuths, noise.azimuth, noise.azimuths);
@@ -147,8 +146,8 @@ DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, 
     const double sigma = std::sqrt(variance);
     smallest_sigma_ = std::min(smallest_sigma_, sigma);
     const double whole = std::sqrt(variance + noise.quantization);
-    points_.push_back({shorter * longer.cwiseProduct(expected), points[i].doppler, spread,
-                       fixed_variance, sigma, whole, noise.outlier_density * std::sqrt(2.0 * M_PI) * whole,
+    points_.push_back({shorter * longer.cwiseProduct(expected), points[i].doppler, spread, fixed_variance,
+                       sigma, whole, noise.outlier_density * std::sqrt(2.0 * M_PI) * whole,
                        binProbability(0.0, sigma, half_bin_)});
   }
 }
@@ -165,19 +164,19 @@ VelocityCost DopplerLikelihood::ofPoint(std::size_t i, const Eigen::Vector3d& v_
   return {cost.value, cost.slope * by_v, cost.curvature * by_v * by_v.transpose()};
 }
 
-// The points that read one bin, of width q, do so only while |d + u . v| < q/2. So v lies in the ellipsoid
-// (v - v_0)' M (v - v_0) < q^2/4, with M the mean of u u'. A uniform density over an ellipsoid in 3D has the
-// covariance M^-1 (q^2/4) / 5. More points of this bin do not help, since they share the error of rounding.
-// Other bins do. Noise blurs the edge of the bin, and adds its variance.
+// The error of rounding has the variance q^2/12, and the points that read one bin share it. Of a bin of half
+// width h, the likelihood is flat but for the share s/h near its edges, where the curvature tells.
 Eigen::Matrix3d DopplerLikelihood::binInformation() const {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   if (!(half_bin_ > smallest_sigma_)) return information;
+  const auto binOf = [this](const Point& p) { return std::lround(p.doppler / (2.0 * half_bin_)); };
   std::map<long, double> counts;
-  const auto bin = [this](const Point& p) { return std::lround(p.doppler / (2.0 * half_bin_)); };
-  for (const Point& p : points_) ++counts[bin(p)];
-  for (const Point& p : points_)
-    if (half_bin_ > p.sigma)
-      information += (1.0 - p.sigma / half_bin_) / (square(half_bin_) / 3.0 + square(p.sigma)) / counts[bin(p)] * p.u_R * p.u_R.transpose();
+  for (const Point& p : points_) ++counts[binOf(p)];
+  for (const Point& p : points_) {
+    const double flat = std::max(0.0, 1.0 - p.sigma / half_bin_);
+    const double variance = square(half_bin_) / 3.0 + square(p.sigma);
+    information += flat / (counts[binOf(p)] * variance) * p.u_R * p.u_R.transpose();
+  }
   return information;
 }
 
