@@ -91,22 +91,26 @@ PointVariances gaussian() {
   return noise;
 }
 
+using RowJacobian = Eigen::Matrix<double, 1, DopplerScan::kStored>;
+
 TEST(DopplerFactor, SaysTheSameAsARowForEachPoint) {
   for (const double step : {0.0, 0.25}) {
     for (const std::size_t count : {1U, 2U, 3U, 40U}) {
       const DopplerScan scan(count, dopplerNoise(step));
       const PredictedVelocity predicted = scan.predicted(scan.x, DopplerScan::kPlacedAt);
-      Eigen::Matrix<double, 3, DopplerScan::kStored> by_state;
-      by_state << predicted.J_state, predicted.dv_dt_O, predicted.J_extrinsics;
       double cost = 0.0;
       DopplerScan::Jacobian J;
       Eigen::VectorXd b = Eigen::VectorXd::Zero(DopplerScan::kStored);
       Eigen::MatrixXd H = Eigen::MatrixXd::Zero(DopplerScan::kStored, DopplerScan::kStored);
       for (std::size_t i = 0; i < count; ++i) {
-        const VelocityCost point = scan.z.points->ofPoint(i, predicted.v_R);
-        cost += point.value;
-        b += by_state.transpose() * point.gradient;
-        H += by_state.transpose() * point.information * by_state;
+        Eigen::Vector3d derivative;
+        const double r = scan.z.points->residual(i, predicted.v_R, derivative);
+        RowJacobian row;
+        row << derivative.transpose() * predicted.J_state, derivative.dot(predicted.dv_dt_O),
+            derivative.transpose() * predicted.J_extrinsics;
+        cost += 0.5 * r * r;
+        b += r * row.transpose();
+        H += row.transpose() * row;
       }
       const Eigen::Vector4d r = scan.linearized(scan.x, DopplerScan::kPlacedAt, J);
       EXPECT_GT(cost, 0.0);

@@ -166,6 +166,28 @@ TEST(EgoVelocityNoise, LeavesNoBiasOnceLearned) {
   EXPECT_GT(unlearned.bias.cwiseAbs().maxCoeff(), 0.008);
 }
 
+/// The points of an object spread by their noise alone. They say nothing of two axes of the velocity.
+TEST(EgoVelocityNoise, AnObjectInACornerOfTheViewIsNotTheWorld) {
+  const ScanNoise noisy{0.09, 0.07, 0.01, 0.0};
+  EgoVelocityOptions o = startingAt(noisy.azimuth, noisy.elevation, noisy.doppler);
+  o.doppler_quantization = kNoStep;
+  EgoVelocityEstimator estimator(o);
+  learnFrom(estimator, kDrive, noisy, 300);
+  Random random(44);
+  int believed = 0;
+  constexpr int kTrials = 1000;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    RadarScan scan;
+    for (int i = 0; i < 8; ++i) {
+      const Eigen::Vector3d u_R =
+          direction(0.3 + noisy.azimuth * random.normal(), noisy.elevation * random.normal());
+      scan.points.push_back({3.0 * u_R, -1.0 + noisy.doppler * random.normal(), 15.0});
+    }
+    believed += isValid(estimator.estimate(scan).status) ? 1 : 0;
+  }
+  EXPECT_LT(believed, kTrials / 20);
+}
+
 TEST(EgoVelocityNoise, GoodDirectionsAreNotOvercompensated) {
   const ScanNoise good{0.005, 0.008, 0.01, 0.125};
   EgoVelocityEstimator estimator(bareOptions(EgoVelocitySolver::kErrorsInVariables));

@@ -14,6 +14,8 @@
 namespace rio_t {
 namespace {
 
+/// [sigma] A smaller residual is as good as zero; its derivative is that at zero.
+constexpr double kNoResidual = 1e-4;
 /// A pivot below this share of the trace is rounding.
 constexpr double kNoInformation = 1e-12;
 constexpr double kSurely = 2.0;   // [sigma]
@@ -21,36 +23,38 @@ constexpr double kSpreads = 4.0;  // [variances] of the noise
 
 double density(double z) { return std::exp(-0.5 * z * z) * (0.5 * M_SQRT1_2 * M_2_SQRTPI); }
 
-/// Minus the log-likelihood of a point, and its derivatives by the error e of the Doppler. The curvature is
-/// that of a static point times the probability that the point is one: that of the mixture would be negative
-/// between the two.
-struct PointCost {
-  double value, slope, curvature;
+/// A residual r and its derivative by the error of the Doppler.
+struct Residual {
+  double value, slope;
 };
 
-/// Noise larger than the bin: -log((exp(-x) + outlier) / (1 + outlier)), x = e^2 / (2 s^2).
-PointCost fineCost(double e, double s, double outlier) {
+/// Noise larger than the bin: r^2 / 2 = -log((exp(-x) + outlier) / (1 + outlier)), x = e^2 / (2 s^2).
+Residual fineResidual(double e, double s, double outlier) {
   const double z = e / s;
   const double inlier = std::exp(-0.5 * z * z);
   const double probability = inlier / (inlier + outlier);
-  return {-std::log((inlier + outlier) / (1.0 + outlier)), probability * z / s, probability / (s * s)};
+  const double half_square = -std::log((inlier + outlier) / (1.0 + outlier));
+  const double value = std::sqrt(2.0 * std::max(0.0, half_square));
+  if (value < kNoResidual) return {std::sqrt(probability) * z, std::sqrt(probability) / s};
+  return {std::copysign(value, e), probability * std::abs(z) / (value * s)};
 }
 
 /// The same for a bin of half width h around the Doppler: exp(-x) becomes the probability of the bin. That of
 /// the bin around e = 0 is `centre`.
-PointCost coarseCost(double e, double s, double h, double centre, double outlier) {
-  const double below = (std::abs(e) - h) / s;
-  const double above = (std::abs(e) + h) / s;
+Residual coarseResidual(double e, double s, double h, double centre, double outlier) {
+  const double a = std::abs(e);
+  const double below = (a - h) / s;
+  const double above = (a + h) / s;
+  const double edge = h / s;
   const double floor = outlier * centre;
   const double bin = binProbability(e, s, h);
-  const double value = -std::log((bin + floor) / (centre + floor));
-  if (!(bin > std::numeric_limits<double>::min())) return {value, 0.0, 0.0};
-  const double probability = bin / (bin + floor);
-  const double near = density(below) / bin;
-  const double far = density(above) / bin;
-  const double slope = (near - far) / s;
-  const double bend = (below * near - above * far) / (s * s);
-  return {value, std::copysign(probability * slope, e), probability * (slope * slope - bend)};
+  const double half_square = -std::log((bin + floor) / (centre + floor));
+  const double value = std::sqrt(2.0 * std::max(0.0, half_square));
+  if (value < kNoResidual) {  // r = e sqrt(-bin'' / bin) around zero
+    const double root = std::sqrt(2.0 * edge * density(edge) / (centre + floor)) / s;
+    return {root * e, root};
+  }
+  return {std::copysign(value, e), (density(below) - density(above)) / (s * (bin + floor) * value)};
 }
 
 /// Whether the points surely show by themselves how far an angle spreads, and that its noise is a small part.
@@ -152,20 +156,21 @@ DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, 
   }
 }
 
-VelocityCost DopplerLikelihood::ofPoint(std::size_t i, const Eigen::Vector3d& v_R) const {
+double DopplerLikelihood::residual(std::size_t i, const Eigen::Vector3d& v_R,
+                                   Eigen::Vector3d& derivative) const {
   const Point& p = points_[i];
   const double e = p.doppler + p.u_R.dot(v_R);
   const Eigen::Vector3d spread_v = p.spread * v_R;
   const double variance = p.fixed_variance + square(half_bin_) / 3.0 + v_R.dot(spread_v);
   const double scale = p.whole_sigma / std::sqrt(variance);
-  const PointCost cost = half_bin_ > p.sigma ? coarseCost(scale * e, p.sigma, half_bin_, p.centre, p.outlier)
-                                             : fineCost(scale * e, p.whole_sigma, p.outlier);
-  const Eigen::Vector3d by_v = scale * (p.u_R - (e / variance) * spread_v);
-  return {cost.value, cost.slope * by_v, cost.curvature * by_v * by_v.transpose()};
+  const Residual r = half_bin_ > p.sigma ? coarseResidual(scale * e, p.sigma, half_bin_, p.centre, p.outlier)
+                                         : fineResidual(scale * e, p.whole_sigma, p.outlier);
+  derivative = r.slope * scale * (p.u_R - (e / variance) * spread_v);
+  return r.value;
 }
 
 // The error of rounding has the variance q^2/12, and the points that read one bin share it. Of a bin of half
-// width h, the likelihood is flat but for the share s/h near its edges, where the curvature tells.
+// width h, the likelihood is flat but for the share s/h near its edges, where J'J tells.
 Eigen::Matrix3d DopplerLikelihood::binInformation() const {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   if (!(half_bin_ > smallest_sigma_)) return information;
@@ -181,14 +186,15 @@ Eigen::Matrix3d DopplerLikelihood::binInformation() const {
 }
 
 VelocityCost DopplerLikelihood::at(const Eigen::Vector3d& v_R) const {
-  VelocityCost sum;
+  VelocityCost cost;
+  Eigen::Vector3d J;
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    const VelocityCost cost = ofPoint(i, v_R);
-    sum.value += cost.value;
-    sum.gradient += cost.gradient;
-    sum.information += cost.information;
+    const double r = residual(i, v_R, J);
+    cost.value += 0.5 * r * r;
+    cost.gradient += r * J;
+    cost.information += J * J.transpose();
   }
-  return sum;
+  return cost;
 }
 
 }  // namespace rio_t

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 
 #include "direction_noise.h"
 #include "likeliest_velocity.h"
@@ -22,6 +23,15 @@ bool isWellConditioned(const SymmetricEigen& eigen, const EgoVelocityOptions& op
 Eigen::Matrix3d inverseOf(const SymmetricEigen& eigen) {
   return eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
          eigen.eigenvectors().transpose();
+}
+
+/// How the angles of these points spread, noise included.
+AngleSpread spreadOf(const std::vector<double>& angles) {
+  const auto n = static_cast<double>(angles.size());
+  AngleSpread spread{std::accumulate(angles.begin(), angles.end(), 0.0) / n, 0.0, 0.0};
+  for (const double angle : angles) spread.variance += square(angle - spread.mean) / (n - 1.0);
+  spread.within = spread.variance;
+  return spread;
 }
 
 }  // namespace
@@ -58,7 +68,12 @@ VelocitySolution solveLeastSquares(const std::vector<RadarDirection>& points,
 
 VelocitySolution solveLikelihood(const std::vector<RadarDirection>& points, const PointVariances& noise,
                                  const Eigen::Vector3d& v_R, const EgoVelocityOptions& options) {
-  const LikeliestVelocity likeliest = findLikeliest(DopplerLikelihood(points, v_R, noise), std::nullopt, v_R);
+  PointVariances known = noise;
+  known.outlier_density = kMinOutlierDensity;  // RANSAC has left them out
+  // The scan alone tells how far it spreads: an object in a corner of the view must not pass for the world.
+  known.azimuths = spreadOf(azimuthsOf(points));
+  known.elevations = spreadOf(elevationsOf(points));
+  const LikeliestVelocity likeliest = findLikeliest(DopplerLikelihood(points, v_R, known), std::nullopt, v_R);
   const double squares = 2.0 * likeliest.cost;  // in sigmas
   const double wider = std::max(1.0, squares / degreesOfFreedom(points.size()));
   return solutionOf(likeliest.v_R, likeliest.information / wider, options);

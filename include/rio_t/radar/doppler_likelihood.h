@@ -8,11 +8,11 @@
 
 namespace rio_t {
 
-/// Minus a log-likelihood, and its derivatives with respect to a velocity.
+/// Half a sum of squares, and its derivatives with respect to a velocity.
 struct VelocityCost {
   double value = 0.0;
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< positive semidefinite; may be singular
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< J'J; may be singular
 };
 
 /// The same cost if the points share an error of the velocity; the cost is minimised over this error.
@@ -29,28 +29,27 @@ Eigen::Vector3d solveTransposed(const Eigen::Matrix3d& U, const Eigen::Vector3d&
 
 /// Likelihood of the Dopplers of a scan, given the radar's velocity (docs/method.md, section 5.7).
 ///
-/// The cost compares the Doppler of each point with the one that a static point would show. The model: a
-/// Doppler is right within its bin and its noise; or, with a small probability, the point is an outlier, and
-/// its Doppler can be anything.
+/// Each point gives one residual. The residual compares the Doppler that the radar measured with the one that
+/// a static point would show. Half the sum of the squared residuals is minus the logarithm of the likelihood,
+/// so least squares can use it. The model: a Doppler is right within its bin and its noise; or, with a small
+/// probability, the point is an outlier, and its Doppler can be anything.
 /// - Bin: a bin wider than the noise bounds the velocity along the ray and does not pull it to the centre.
-/// - Noise of the direction: it widens the sigma of a point, and it shortens the velocity of plain least
+/// - Noise of the direction: it widens the sigma of a residual, and it shortens the velocity of plain least
 ///   squares. Many points undo the latter by the derivative of that sigma (total least squares); few points
 ///   by a direction between the measured one and the mean of earlier scans (regression calibration).
-/// - Outliers: the cost of a point is bounded, so that an outlier has no weight (a redescending loss).
+/// - Outliers: the residual is bounded, so that an outlier has no weight (a redescending loss).
 class DopplerLikelihood {
  public:
   /// `points` look static at about the velocity `v_R` [m/s].
   DopplerLikelihood(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
                     const PointVariances& noise);
 
-  /// The information is the curvature of the static world, each point weighted by the probability that it
-  /// belongs to it.
   VelocityCost at(const Eigen::Vector3d& v_R) const;
-  /// The part of point i. For tests; `at` adds these up.
-  VelocityCost ofPoint(std::size_t i, const Eigen::Vector3d& v_R) const;
-  /// Information of the bins that are wider than the noise [s^2/m^2]. `at` lacks it: a point far within its
-  /// bin has no curvature, and yet the bin bounds the velocity.
+  /// Information of the bins that are wider than the noise [s^2/m^2]. J'J lacks it: a point far within its bin
+  /// has no derivative, and yet the bin bounds the velocity.
   Eigen::Matrix3d binInformation() const;
+  /// Residual of point i, and its derivative. For tests; `at` adds these up.
+  double residual(std::size_t i, const Eigen::Vector3d& v_R, Eigen::Vector3d& derivative) const;
   std::size_t size() const { return points_.size(); }
   double smallestSigma() const { return smallest_sigma_; }  ///< of a point, without the bin [m/s]
   double halfBin() const { return half_bin_; }              ///< [m/s]
