@@ -195,8 +195,10 @@ TEST(EgoVelocityNoise, GoodDirectionsAreNotOvercompensated) {
   const MonteCarlo ls = monteCarlo(bareOptions(EgoVelocitySolver::kLeastSquares), kVelocity, good, 0.35);
   const MonteCarlo eiv = monteCarlo(estimator, kVelocity, good, 0.35);
   EXPECT_LT(eiv.bias.cwiseAbs().maxCoeff(), 0.003);
-  EXPECT_LT(eiv.rms.z(), 1.05 * ls.rms.z());
-  EXPECT_NEAR(eiv.nees, 3.0, 0.4);
+  EXPECT_LT(eiv.rms.z(), 0.95 * ls.rms.z());
+  // Bins much wider than the noise say more than J'J.
+  EXPECT_LT(eiv.nees, 3.0);
+  EXPECT_GT(eiv.nees, 1.5);
 }
 
 TEST(EgoVelocityNoise, AnAngleThatTheMotionDoesNotShowStaysAsItWas) {
