@@ -100,7 +100,7 @@ TEST(Diagnosis, EachFilterHasItsKey) {
   const std::pair<PointVerdict, std::string> filters[] = {
       {PointVerdict::kTooNear, "radar_min_range"},   {PointVerdict::kTooFar, "radar_max_range"},
       {PointVerdict::kBesideView, "radar_axes"},     {PointVerdict::kAboveView, "radar_axes"},
-      {PointVerdict::kNoDirection, "radar_field_x"},
+      {PointVerdict::kNoDirection, "radar_field_x"}, {PointVerdict::kAmbiguous, "multiObjBeamForming"},
   };
   for (const auto& [verdict, key] : filters) {
     RunEvidence evidence = goodRun();
@@ -300,6 +300,30 @@ TEST(PointFilter, TheFirstFailedTestIsNamed) {
   EgoVelocityOptions flat;
   flat.max_elevation = 0.1;
   EXPECT_EQ(judgePoint({{0.0, 5.0, -3.0}, 0.0, 10.0}, flat), PointVerdict::kAboveView);
+  EXPECT_EQ(judgePoint({{0.0, 5.0, 0.0}, 0.0, 10.0, true}, o), PointVerdict::kAmbiguous);
+}
+
+/// Which of these points are ambiguous, as a string of zeros and ones.
+std::string ambiguous(std::vector<RadarPoint> points) {
+  markAmbiguous(points);
+  std::string marks;
+  for (const RadarPoint& p : points) marks += p.is_ambiguous ? '1' : '0';
+  return marks;
+}
+
+TEST(PointFilter, OneEchoAtSeveralDirectionsIsAmbiguous) {
+  const Eigen::Vector3d here(0.0, 3.0, 4.0), there(3.0, 4.0, 0.0);  // both at 5 m
+  const Eigen::Vector3d rounded = there + Eigen::Vector3d(0.0, 0.001, 0.0);
+  const Eigen::Vector3d next_bin = 1.01 * there;
+  EXPECT_EQ(ambiguous({}), "");
+  EXPECT_EQ(ambiguous({{here, 0.5, 20.0}}), "0");
+  EXPECT_EQ(ambiguous({{here, 0.5, 20.0}, {there, 0.5, 20.0}}), "11");
+  EXPECT_EQ(ambiguous({{here, 0.5, 20.0}, {here, 0.1, 9.0}, {rounded, 0.5, 20.0}}), "101");
+  EXPECT_EQ(ambiguous({{here, 0.5, 20.0}, {there, 0.6, 20.0}, {here, 0.1, 9.0}}), "000") << "another Doppler";
+  EXPECT_EQ(ambiguous({{here, 0.5, 20.0}, {there, 0.5, 20.1}, {here, 0.1, 9.0}}), "000") << "another SNR";
+  EXPECT_EQ(ambiguous({{here, 0.5, 20.0}, {next_bin, 0.5, 20.0}, {here, 0.1, 9.0}}), "000")
+      << "another range";
+  EXPECT_EQ(ambiguous({{here, 0.5, 20.0}, {there, 0.5, 20.0}, {here, 0.1, 20.0}}), "000") << "no SNR";
 }
 
 }  // namespace

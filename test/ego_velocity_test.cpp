@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "rio_t/radar/point_filter.h"
 #include "static_scene.h"
 
 namespace rio_t {
@@ -102,6 +103,30 @@ TEST(EgoVelocity, FilterLeavesOutWhatItShould) {
   EgoVelocityOptions no_min_range = o;  // a point without direction must not pass even then
   no_min_range.min_range = 0.0;
   EXPECT_EQ(EgoVelocityEstimator(no_min_range).estimate(scan).points.size(), good + 1);
+}
+
+// As a radar does that finds two peaks in the spectrum of the angles of one echo.
+TEST(EgoVelocity, AnEchoAtTwoDirectionsDoesNotTurnIt) {
+  const EgoVelocityEstimator estimator{knownStep(0.25)};
+  Random random(5);
+  Eigen::Vector3d marked = Eigen::Vector3d::Zero(), unmarked = Eigen::Vector3d::Zero();
+  constexpr int kTrials = 500;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    RadarScan scan = staticScene(kVelocity, 40, {0.02, 0.04, 0.02, 0.25}, random);
+    for (std::size_t i = 0; i < 40; ++i) {
+      RadarPoint& p = scan.points[i];
+      p.snr_db = random.uniform(10.0, 30.0);
+      if (i % 3 != 0) continue;
+      RadarPoint ghost = p;
+      ghost.position_R = p.position_R.norm() * direction(0.9, -0.6);
+      scan.points.push_back(ghost);
+    }
+    unmarked += (estimator.estimate(scan).v_R - kVelocity) / kTrials;
+    markAmbiguous(scan.points);
+    marked += (estimator.estimate(scan).v_R - kVelocity) / kTrials;
+  }
+  EXPECT_LT(marked.norm(), 0.02) << marked.transpose();
+  EXPECT_GT(unmarked.norm(), 0.05) << "nothing to leave out: " << unmarked.transpose();
 }
 
 void observe(EgoVelocityEstimator& estimator, double step, Random& random) {

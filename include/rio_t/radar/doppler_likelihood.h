@@ -45,8 +45,8 @@ class DopplerLikelihood {
                     const PointVariances& noise);
 
   VelocityCost at(const Eigen::Vector3d& v_R) const;
-  /// Information of the bins that are wider than the noise [s^2/m^2]. J'J lacks it: a point far within its bin
-  /// has no derivative, and yet the bin bounds the velocity.
+  /// Information of the bins that are wider than the noise [s^2/m^2]. J'J lacks it: a point far within its
+  /// bin has no derivative, and yet the bin bounds the velocity.
   Eigen::Matrix3d binInformation() const;
   /// Residual of point i, and its derivative. For tests; `at` adds these up.
   double residual(std::size_t i, const Eigen::Vector3d& v_R, Eigen::Vector3d& derivative) const;

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <string>
+#include <vector>
 
 #include "rio_t/radar/ego_velocity.h"
 #include "rio_t/radar/scan.h"
@@ -18,8 +19,14 @@ enum class PointVerdict {
   kTooWeak,      ///< below min_snr_db
   kBesideView,   ///< beyond max_azimuth
   kAboveView,    ///< beyond max_elevation, up or down
+  kAmbiguous,    ///< is_ambiguous
 };
-constexpr std::size_t kPointVerdicts = 7;
+constexpr std::size_t kPointVerdicts = 8;
+
+/// Marks the points that are one echo at several directions: they have the same range, Doppler and SNR. A
+/// radar reports them where the spectrum of the angles has more than one peak, and all but one are at the
+/// wrong place. Marks none if three points or more all have the same SNR: it then tells nothing.
+void markAmbiguous(std::vector<RadarPoint>& points);
 
 /// The first test that the point fails, in the order of PointVerdict.
 PointVerdict judgePoint(const RadarPoint& point, const EgoVelocityOptions& options);

@@ -13,6 +13,7 @@ struct RadarPoint {
   Eigen::Vector3d position_R = Eigen::Vector3d::Zero();  ///< [m]
   double doppler = 0.0;  ///< range rate [m/s]: positive = receding, so v_d = -u . v_R for a static target
   double snr_db = 0.0;   ///< signal to noise [dB]; or the intensity if the driver gives no SNR
+  bool is_ambiguous = false;  ///< the radar could not tell the direction, see markAmbiguous()
 };
 
 /// One scan of the radar. All points are finite (the decoder drops and counts the others).

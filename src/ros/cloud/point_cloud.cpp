@@ -13,6 +13,8 @@
 #include <optional>
 #include <stdexcept>
 
+#include "rio_t/radar/point_filter.h"
+
 namespace rio_t {
 namespace {
 
@@ -298,6 +300,7 @@ RadarScan toRadarScan(const pcl::PointCloud<RadarPointPcl>& cloud, Time stamp) {
   for (const RadarPointPcl& p : cloud) {
     scan.points.push_back({{p.x, p.y, p.z}, static_cast<double>(p.doppler), static_cast<double>(p.snr_db)});
   }
+  markAmbiguous(scan.points);
   return scan;
 }
 

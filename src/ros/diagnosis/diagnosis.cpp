@@ -123,6 +123,10 @@ class RadarCauses {
            "The axes of the cloud are probably others: set " + key_ + "radar_axes to rfu or flu.");
     filter(PointVerdict::kNoDirection, "points_without_direction", "at range zero.",
            "Check the names of the position fields: " + key_ + "radar_field_x and the next ones.");
+    filter(
+        PointVerdict::kAmbiguous, "points_ambiguous",
+        "one echo at several directions: they have the same range, Doppler and SNR.",
+        "Let the driver of the radar report one direction for each echo (multiObjBeamForming of TI radars).");
   }
 
   std::string powerReader() const {
