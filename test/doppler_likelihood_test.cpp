@@ -257,7 +257,7 @@ TEST(DopplerLikelihood, NoisyDirectionsDoNotShortenTheVelocity) {
 TEST(DopplerLikelihood, ItsInformationIsHonestForAnyRadar) {
   struct Radar {
     PointVariances noise;
-    std::size_t points;
+    std::size_t points = 0;
   };
   for (const Radar& radar :
        {Radar{variances(0.035, 0.03, 0.05, 0.0), 8}, Radar{variances(0.03, 0.02, 0.045, 0.06), 10},

@@ -158,7 +158,7 @@ class FieldReader {
  private:
   template <typename T>
   double as(const std::uint8_t* bytes) const {
-    std::array<std::uint8_t, sizeof(T)> ordered;
+    std::array<std::uint8_t, sizeof(T)> ordered = {};
     std::copy_n(bytes, sizeof(T), ordered.begin());  // fields need not be aligned
     if (swaps_bytes_) std::reverse(ordered.begin(), ordered.end());
     T value;
