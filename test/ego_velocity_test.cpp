@@ -47,7 +47,7 @@ TEST(EgoVelocity, SignAndAxes) {
 
 TEST(EgoVelocity, FortyPercentOutliers) {
   Random random(2);
-  const EgoVelocityEstimator estimator{knownStep()};
+  EgoVelocityEstimator estimator{EgoVelocityOptions()};
   for (int trial = 0; trial < 200; ++trial) {
     RadarScan scan = staticScene(kVelocity, 50, {0.01, 0.02, 0.01, 0.125}, random);
     for (std::size_t i = 0; i < scan.points.size(); i += 5) {  // two of five
@@ -56,6 +56,7 @@ TEST(EgoVelocity, FortyPercentOutliers) {
         scan.points[k].doppler += sign * random.uniform(0.6, 3.0);
       }
     }
+    estimator.observe(scan);
     const EgoVelocity e = estimator.estimate(scan);
     ASSERT_EQ(e.status, EgoVelocityStatus::kMoving) << trial;
     for (const std::size_t i : e.inliers) EXPECT_GE(i % 5, 2u) << "outlier taken, trial " << trial;

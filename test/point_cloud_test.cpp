@@ -239,6 +239,20 @@ TEST(PointCloudDecode, TheOriginIsKept) {
 
 // --- To the core and back ---
 
+TEST(PointCloudConversion, MarksWhatIsAmbiguous) {
+  PointCloud2 m = irsMessage();
+  const auto isAmbiguous = [&](const PointCloudFormat& format) {
+    const RadarScan scan = toRadarScan(decode(m, format).cloud, Time());
+    return scan.points[0].is_ambiguous && scan.points[1].is_ambiguous;
+  };
+  EXPECT_FALSE(isAmbiguous(PointCloudFormat()));
+  // The second point is that of the first, on the other side.
+  std::copy_n(m.data.begin(), m.point_step, m.data.begin() + m.point_step);
+  const float x = -1.0F;
+  std::memcpy(&m.data[m.point_step], &x, sizeof(x));
+  EXPECT_TRUE(isAmbiguous(PointCloudFormat()));
+}
+
 TEST(PointCloudConversion, ToScanAndBack) {
   const Time stamp = Time::fromNanoseconds(1700000000123456789);
   const RadarScan scan = toRadarScan(decode(irsMessage(), PointCloudFormat()).cloud, stamp);

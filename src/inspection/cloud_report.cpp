@@ -11,7 +11,7 @@ CloudReport inspectCloud(const std::vector<RadarScan>& scans) {
   report.scans = scans.size();
   std::vector<double> counts, ranges, azimuths, elevations, dopplers;
   Eigen::Vector3d squares = Eigen::Vector3d::Zero();
-  double behind = 0.0;
+  double behind = 0.0, ambiguous = 0.0;
   for (const RadarScan& scan : scans) {
     counts.push_back(static_cast<double>(scan.points.size()));
     if (scan.points.empty()) ++report.empty;
@@ -27,6 +27,7 @@ CloudReport inspectCloud(const std::vector<RadarScan>& scans) {
       report.mean_direction += p / range;
       squares += (p / range).cwiseAbs2();
       if (p.y() < 0.0) behind += 1.0;
+      if (point.is_ambiguous) ambiguous += 1.0;
     }
   }
   report.points = ranges.size();
@@ -35,6 +36,7 @@ CloudReport inspectCloud(const std::vector<RadarScan>& scans) {
   report.mean_direction /= n;
   report.spread = (squares / n - report.mean_direction.cwiseAbs2()).cwiseMax(0.0).cwiseSqrt();
   report.behind = behind / n;
+  report.ambiguous = ambiguous / n;
   report.points_10 = quantile(counts, 0.1);
   report.points_50 = quantile(counts, 0.5);
   report.points_90 = quantile(counts, 0.9);

@@ -17,6 +17,7 @@ struct CloudReport {
   double range_50 = 0.0, range_99 = 0.0;        ///< [m]
   double azimuth_95 = 0.0, elevation_95 = 0.0;  ///< [rad] to either side of forward (y) hold 95 %
   double behind = 0.0;                          ///< share of the points with a negative y
+  double ambiguous = 0.0;                       ///< share of the points, see markAmbiguous()
   Eigen::Vector3d mean_direction = Eigen::Vector3d::Zero();  ///< of unit vectors; short: it looks all around
   Eigen::Vector3d spread = Eigen::Vector3d::Zero();  ///< standard deviation of the unit vectors, per axis
   double largest_doppler = 0.0;                      ///< [m/s] that 99.9 % of the points do not exceed

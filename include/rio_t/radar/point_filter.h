@@ -19,13 +19,13 @@ enum class PointVerdict {
   kTooWeak,      ///< below min_snr_db
   kBesideView,   ///< beyond max_azimuth
   kAboveView,    ///< beyond max_elevation, up or down
-  kAmbiguous,    ///< is_ambiguous
+  kAmbiguous,    ///< has the range, Doppler and SNR of another point
 };
 constexpr std::size_t kPointVerdicts = 8;
 
-/// Marks the points that are one echo at several directions: they have the same range, Doppler and SNR. A
-/// radar reports them where the spectrum of the angles has more than one peak, and all but one are at the
-/// wrong place. Marks none if three points or more all have the same SNR: it then tells nothing.
+/// Marks the points that have the same range, Doppler and SNR as another. A radar reports one echo at several
+/// directions if the spectrum of its angles has more than one peak, and no point tells which one is right.
+/// Marks none if three points or more all have the same SNR: it then tells nothing.
 void markAmbiguous(std::vector<RadarPoint>& points);
 
 /// The first test that the point fails, in the order of PointVerdict.

@@ -96,6 +96,10 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
            degrees(c.azimuth_95) + " by +-" + degrees(c.elevation_95) + " deg, Doppler step " +
            (step.value > 0.0 ? fixedText(step.value, 3) + " m/s" : std::string("none")) +
            (sparse ? ": few points, so start at rest" : ""));
+  if (c.ambiguous > 0.005)  // one per cent
+    tell(FindingLevel::kOk, "points",
+         fixedText(100.0 * c.ambiguous, 0) +
+             " % have the range, Doppler and SNR of another point: one echo at several directions, left out");
   if (!looked.velocities.has_elevation)
     tell(FindingLevel::kOdd, "points", "the radar measures no elevation: z will drift");
 }

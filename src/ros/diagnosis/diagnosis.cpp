@@ -125,7 +125,7 @@ class RadarCauses {
            "Check the names of the position fields: " + key_ + "radar_field_x and the next ones.");
     filter(
         PointVerdict::kAmbiguous, "points_ambiguous",
-        "one echo at several directions: they have the same range, Doppler and SNR.",
+        "ambiguous: the radar reports one echo at several directions, with the same range, Doppler and SNR.",
         "Let the driver of the radar report one direction for each echo (multiObjBeamForming of TI radars).");
   }
 

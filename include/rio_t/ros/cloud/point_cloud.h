@@ -22,7 +22,7 @@ struct DecodedScan {
 /// it declares. Points at range zero are kept: they are finite, and the estimator's min_range removes them.
 DecodedScan decode(const sensor_msgs::PointCloud2& message, const PointCloudFormat& format);
 
-/// For the estimator. `stamp` is the scan's time in the IMU clock.
+/// For the estimator, with the ambiguous points marked. `stamp` is the scan's time in the IMU clock.
 RadarScan toRadarScan(const pcl::PointCloud<RadarPointPcl>& cloud, Time stamp);
 
 /// The chosen points (indices into scan.points) as a cloud of fields x y z doppler snr_db, in the axes of
