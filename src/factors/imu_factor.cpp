@@ -137,4 +137,13 @@ StateBlock predict(const StateBlock& state_i, const Preintegration& preintegrati
   return state_j;
 }
 
+StateBlock carried(const StateBlock& x, Time from, Time to, const ImuBuffer& imu,
+                   const Eigen::Vector3d& g_W) {
+  Preintegration pre;
+  pre.b_g = x.b_g();
+  pre.b_a = x.b_a();
+  pre.delta = integrate(imu, from, to, pre.b_g, pre.b_a);
+  return predict(x, pre, g_W);
+}
+
 }  // namespace rio_t

@@ -31,11 +31,7 @@ Time RadarMotionModel::meanTime(Time stamp, double t_O) const {
 
 RadarMotion RadarMotionModel::carriedByImu(const StateView& x, Time state_time, Time tau,
                                            const Eigen::Vector3d& l_I, const ImuMean* mean) const {
-  ImuDelta delta;
-  imu->forEachInterval(state_time, tau,
-                       [&](double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
-                         delta.step(dt, gyro - x.b_g, accel - x.b_a);
-                       });
+  const ImuDelta delta = integrate(*imu, state_time, tau, x.b_g, x.b_a);
   const Eigen::Matrix3d R_IW = x.q_WI.toRotationMatrix().transpose();  // at the state
   const Eigen::Matrix3d dR_T = delta.dR.toRotationMatrix().transpose();
   const Eigen::Vector3d carried = R_IW * (x.v_W + delta.dt * g_W);

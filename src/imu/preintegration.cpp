@@ -27,6 +27,15 @@ void ImuDelta::step(double step_dt, const Eigen::Vector3d& omega, const Eigen::V
   dt += step_dt;
 }
 
+ImuDelta integrate(const ImuBuffer& imu, Time from, Time to, const Eigen::Vector3d& b_g,
+                   const Eigen::Vector3d& b_a) {
+  ImuDelta delta;
+  imu.forEachInterval(from, to, [&](double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
+    delta.step(dt, gyro - b_g, accel - b_a);
+  });
+  return delta;
+}
+
 Preintegration preintegrate(const ImuBuffer& buffer, Time from, Time to, const Eigen::Vector3d& b_g,
                             const Eigen::Vector3d& b_a, const ImuNoise& noise) {
   Preintegration result;

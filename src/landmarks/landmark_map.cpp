@@ -164,7 +164,8 @@ LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<
     answer.dropped_map = true;
     return answer;
   }
-  const ImuDelta delta = deltaTo(prediction.measured, node);
+  const StateView at_node(node.x.data());
+  const ImuDelta delta = integrate(*imu_, *node.time, prediction.measured, at_node.b_g, at_node.b_a);
   for (const Match& match : association.matches) {
     Landmark& landmark = landmarks_[match.landmark];
     if (is_trusted_)
@@ -285,16 +286,6 @@ void LandmarkMap::promote(FixedLagSmoother& smoother, Time now) {
     }
     landmarks_.push_back(std::move(landmark));
   }
-}
-
-ImuDelta LandmarkMap::deltaTo(Time measured, const Block& node) const {
-  const StateView x(node.x.data());
-  ImuDelta delta;
-  imu_->forEachInterval(*node.time, measured,
-                        [&](double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
-                          delta.step(dt, gyro - x.b_g, accel - x.b_a);
-                        });
-  return delta;
 }
 
 }  // namespace rio_t

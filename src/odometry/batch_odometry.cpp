@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "rio_t/imu/preintegration.h"
+#include "rio_t/factors/imu_factor.h"
 #include "rio_t/imu/rest_detector.h"
 #include "rio_t/odometry/imu_propagator.h"
 #include "rio_t/sensors/innovation.h"

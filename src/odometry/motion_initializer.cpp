@@ -9,12 +9,12 @@
 #include <stdexcept>
 #include <utility>
 
+#include "rio_t/factors/imu_factor.h"
 #include "rio_t/graph/marginalization.h"
 #include "rio_t/graph/solver.h"
 #include "rio_t/imu/preintegration.h"
 #include "rio_t/odometry/options.h"
 #include "rio_t/sensors/offset_evidence.h"
-#include "rio_t/smoother/carried.h"
 
 namespace rio_t {
 namespace {
@@ -192,10 +192,7 @@ MotionInitializer::Line MotionInitializer::fitLine(const Velocities& velocities,
   Eigen::Vector3d mean_Ty = Eigen::Vector3d::Zero();
   for (const Velocity& z : velocities) {
     const Time tau = z.stamp - smoother_.time_offset_initial;
-    ImuDelta delta;
-    imu.forEachInterval(time, tau, [&](double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
-      delta.step(dt, gyro, accel);
-    });
+    const ImuDelta delta = integrate(imu, time, tau, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
     const Eigen::Vector3d v_I = T_IR_.q_IR * z.v_R - imu.at(tau).angular_velocity.cross(T_IR_.l_I);
     const Eigen::Vector3d y = delta.dR * v_I - delta.dv;
     mean_T += delta.dt;

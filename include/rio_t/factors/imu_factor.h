@@ -34,6 +34,9 @@ class ImuFactor final : public ceres::SizedCostFunction<15, StateBlock::kSize, S
 StateBlock predict(const StateBlock& state_i, const Preintegration& preintegration,
                    const Eigen::Vector3d& g_W);
 
+/// `x` at `from`, carried by the IMU to `to`, forwards or backwards, at its own biases.
+StateBlock carried(const StateBlock& x, Time from, Time to, const ImuBuffer& imu, const Eigen::Vector3d& g_W);
+
 /// How an error of state i propagates to the predicted state j: d_j = A d_i + noise with covariance Q, in
 /// tangents. It is the whitened factor, J_i d_i + J_j d_j ~ N(0, 1), solved for d_j.
 struct ImuTransition {

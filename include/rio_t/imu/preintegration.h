@@ -28,6 +28,10 @@ struct ImuDelta {
   void step(double step_dt, const Eigen::Vector3d& omega, const Eigen::Vector3d& a);
 };
 
+/// From `from` to `to`, forwards or backwards, at these biases, without covariance.
+ImuDelta integrate(const ImuBuffer& imu, Time from, Time to, const Eigen::Vector3d& b_g,
+                   const Eigen::Vector3d& b_a);
+
 /// ImuDelta between two times with its covariance, at the biases it was integrated with.
 struct Preintegration {
   Eigen::Vector3d b_g = Eigen::Vector3d::Zero();  ///< [rad/s] linearisation point

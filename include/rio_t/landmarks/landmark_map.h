@@ -65,7 +65,6 @@ class LandmarkMap {
   /// Judges the map by the matches lately.
   void judge(const Prediction& prediction, const Extrinsics& T_IR, const Association& association);
   bool contradicts() const;
-  ImuDelta deltaTo(Time measured, const Block& node) const;
 
   LandmarkOptions options_;  // read-only after construction, as the next three
   Eigen::Vector3d g_W_;

@@ -8,7 +8,6 @@
 #include "rio_t/graph/solver.h"
 #include "rio_t/imu/buffer.h"
 #include "rio_t/imu/noise.h"
-#include "rio_t/smoother/carried.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
 #include "rio_t/smoother/node_prior.h"
 #include "rio_t/smoother/options.h"
