@@ -13,7 +13,19 @@ class BarometerFactor final : public ceres::SizedCostFunction<1, StateBlock::kSi
   /// `height` [m] is the mean over samples whose mean time is `delay` [s] after the state. `sigma` [m].
   BarometerFactor(double height, double delay, double sigma)
       : height_(height), delay_(delay), weight_(1.0 / sigma) {}
-  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const StateView x(parameters[0]);
+    residuals[0] = weight_ * (x.p_W.z() + delay_ * x.v_W.z() + parameters[1][0] - height_);
+    if (jacobians == nullptr) return true;
+    if (jacobians[0] != nullptr) {
+      Eigen::Map<StateJacobian<1>> J(jacobians[0]);
+      J.setZero();
+      J(StateBlock::kPStored + 2) = weight_;
+      J(StateBlock::kVStored + 2) = weight_ * delay_;
+    }
+    if (jacobians[1] != nullptr) jacobians[1][0] = weight_;
+    return true;
+  }
 
  private:
   double height_, delay_, weight_;

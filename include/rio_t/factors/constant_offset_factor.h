@@ -9,7 +9,13 @@ class ConstantOffsetFactor final : public ceres::SizedCostFunction<1, 1, 1> {
  public:
   /// `sigma`: standard deviation of the change between the two states [s].
   explicit ConstantOffsetFactor(double sigma) : weight_(1.0 / sigma) {}
-  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    residuals[0] = weight_ * (parameters[1][0] - parameters[0][0]);
+    if (jacobians == nullptr) return true;
+    if (jacobians[0] != nullptr) jacobians[0][0] = -weight_;
+    if (jacobians[1] != nullptr) jacobians[1][0] = weight_;
+    return true;
+  }
 
  private:
   double weight_ = 0.0;
