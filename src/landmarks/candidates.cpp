@@ -78,7 +78,6 @@ void Candidates::add(const std::vector<PlacedDetection>& detections) {
   for (std::size_t i = 0; i < detections.size() && candidates_.size() < kMax; ++i) {
     if (fits_of_detection[i] > 0) continue;
     Candidate candidate;
-    candidate.first_seen = detections[i].time;
     candidate.first_radar_W = detections[i].radar_W;
     addTo(candidate, detections[i]);
     candidates_.push_back(std::move(candidate));

@@ -156,7 +156,6 @@ LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<
   LandmarkAnswer answer;
   const Extrinsics T_IR = toExtrinsics(extrinsics.x.data());
   const Association association = associate(prediction, T_IR, detections);
-  for (const Match& match : association.matches) answer.squared_sigmas += match.squared_sigmas;
   judge(prediction, T_IR, association);
   if (contradicts()) {
     while (!landmarks_.empty()) retire(landmarks_.size() - 1);
@@ -203,8 +202,6 @@ LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<
   candidates_.add(placed);
   dropUseless(x.p_W());
   promote(smoother, prediction.measured);
-  answer.candidates = candidates_.size();
-  answer.is_trusted = is_trusted_;
   answer.map = points();
   return answer;
 }

@@ -182,10 +182,6 @@ const BatchSolution::Scan* BatchOdometry::acceptedBy(const BatchSmoother& smooth
   return squared > gate * gate ? nullptr : nearest;
 }
 
-NavigationState BatchOdometry::stateOf(const NodeEstimate& node, const StateCovariance& covariance) const {
-  return navigationState(node, covariance, imu_);
-}
-
 std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solution) const {
   const std::vector<NodeEstimate>& nodes = solution.nodes;
   std::vector<NavigationState> states;
@@ -195,7 +191,7 @@ std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solu
     // The distance by which the IMU alone misses the next node is spread over the way to it.
     const StateBlock missed_by = carried(node.x, node.time, next.time, imu_, g_W_);
     const StateTangent miss = boxminus(next.x.data(), missed_by.data());
-    if (k == 0) states.push_back(stateOf(node, solution.covariances[0]));
+    if (k == 0) states.push_back(navigationState(node, solution.covariances[0], imu_));
     NodeEstimate at = node;
     Time carried_to = node.time;
     StateBlock x = node.x;
@@ -208,12 +204,12 @@ std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solu
       boxplus(x.data(), part.data(), at.x.data());
       const StateCovariance covariance =
           (1.0 - share) * solution.covariances[k] + share * solution.covariances[k + 1];
-      if (!sample.is_bridge) states.push_back(stateOf(at, covariance));
+      if (!sample.is_bridge) states.push_back(navigationState(at, covariance, imu_));
     });
   }
   // After the last scan, the IMU alone carries the state.
   ImuPropagator propagator(options_.imu_noise, g_W_);
-  propagator.anchor(stateOf(nodes.back(), solution.covariances.back()));
+  propagator.anchor(navigationState(nodes.back(), solution.covariances.back(), imu_));
   imu_.forEachSample(nodes.back().time - 0.1, imu_.newest(), [&](const ImuMeasurement& sample) {
     const std::optional<NavigationState> state = propagator.add(sample);
     if (state && state->time > nodes.back().time && !sample.is_bridge) states.push_back(*state);
@@ -236,7 +232,7 @@ std::vector<ScanResult> BatchOdometry::results(const Run& run, const BatchSoluti
     result.updated = true;
     result.used = run.problem.scans[j].velocity || run.problem.scans[j].doppler;
     if (result.used) result.rejected_because.clear();
-    result.state = stateOf(solution.nodes[k], solution.covariances[k]);
+    result.state = navigationState(solution.nodes[k], solution.covariances[k], imu_);
     result.time_offset = solved.t_O;
     result.T_IR = solution.extrinsics[result.scan.radar];
     result.T_IR_covariance = extrinsicsCovariance(solution.extrinsics_covariances[result.scan.radar]);

@@ -28,12 +28,6 @@ void OffsetUncertainty::add(const Innovation& innovation) {
   projection_ = fade * projection_ + share * d.dot(weighted_J);
 }
 
-void OffsetUncertainty::offsetStepped() {
-  information_ = 0.0;
-  spread_ = 0.0;
-  projection_ = 0.0;
-}
-
 double OffsetUncertainty::squaredLag() const {
   if (information_ <= 0.0) return 0.0;
   const double change = projection_ / information_;

@@ -124,7 +124,7 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   if (can_be_judged && informs_offset && options_.smoother.estimate_time_offset &&
       step_detector_.stepped(*own)) {
     in_window_.stepOffset(smoother, scan.stamp);
-    offset_uncertainty_.offsetStepped();
+    offset_uncertainty_ = OffsetUncertainty(options_.smoother.huber_threshold);  // the new block does not lag
     answer.offset_stepped = true;
   }
   if (all && gate_.rejects(*all, isUnanimous(measured), seen.tilt_is_known, context.last_used))

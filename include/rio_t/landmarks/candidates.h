@@ -14,7 +14,7 @@ namespace rio_t {
 /// s is 0 for a point of the world, and up to 1 for one that slides.
 struct Candidate {
   std::vector<Sighting> sightings;  ///< those of the window, in the order of time
-  Time first_seen, last_seen;
+  Time last_seen;
   Eigen::Vector3d first_radar_W = Eigen::Vector3d::Zero();    ///< where the radar was at first [m]
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();      ///< of the position alone [1/m^2]
   Eigen::Vector3d vector = Eigen::Vector3d::Zero();           ///< information times position

@@ -18,11 +18,8 @@ struct LandmarkPoint {
 
 /// The map's answer to a scan.
 struct LandmarkAnswer {
-  std::size_t matched = 0;  ///< landmarks that the scan saw
-  std::size_t candidates = 0;
-  double squared_sigmas = 0.0;  ///< sum over the matches, each of 3 degrees of freedom
-  bool is_trusted = false;      ///< the map has proved itself: its matches count
-  bool dropped_map = false;     ///< map and estimate contradicted each other
+  std::size_t matched = 0;   ///< landmarks that the scan saw
+  bool dropped_map = false;  ///< map and estimate contradicted each other
   std::vector<LandmarkPoint> map;
 };
 

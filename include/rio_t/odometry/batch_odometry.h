@@ -57,7 +57,6 @@ class BatchOdometry {
                                         const RadarVelocityMeasurement& z) const;
   /// Sets what the scan gives to the graph.
   void setMeasurement(const ScanResult& result, BatchScan& scan) const;
-  NavigationState stateOf(const NodeEstimate& node, const StateCovariance& covariance) const;
   std::vector<NavigationState> trajectory(const BatchSolution& solution) const;
   std::vector<ScanResult> results(const Run& run, const BatchSolution& solution) const;
 

@@ -14,8 +14,6 @@ class OffsetUncertainty {
   explicit OffsetUncertainty(double huber_threshold) : huber_threshold_(huber_threshold) {}
   /// Takes the innovation of a scan that was used and that shows the offset.
   void add(const Innovation& innovation);
-  /// The offset stepped and gets a new block, which does not lag.
-  void offsetStepped();
 
   /// Standard deviation of the offset [s], given its marginal variance [s^2].
   double sigma(double variance) const;
