@@ -16,7 +16,6 @@
 #include "rio_t/odometry/pose_doubt.h"
 #include "rio_t/odometry/radars_health.h"
 #include "rio_t/odometry/scan_result.h"
-#include "rio_t/odometry/yaw_doubt.h"
 #include "rio_t/sensors/barometer_channel.h"
 #include "rio_t/sensors/ground_vehicle_channel.h"
 #include "rio_t/sensors/radar_channel.h"

@@ -23,4 +23,18 @@ class PoseDoubt {
   Eigen::Vector3d pivot_W_ = Eigen::Vector3d::Zero();   ///< [m]
 };
 
+/// Uncertainty of the yaw that gaps and saturation of the IMU caused. No sensor observes the yaw, so this
+/// uncertainty stays. A window linearised at different yaws would lose it; therefore it is added to what is
+/// published.
+class YawDoubt {
+ public:
+  /// `variance` [rad^2] gained at the place `p_W` [m].
+  void add(double variance, const Eigen::Vector3d& p_W);
+  void addTo(NavigationState& state) const;
+
+ private:
+  double variance_ = 0.0;                                ///< [rad^2] since the start
+  Eigen::Vector3d lost_at_W_ = Eigen::Vector3d::Zero();  ///< [m] where the last of it was gained
+};
+
 }  // namespace rio_t
