@@ -114,7 +114,7 @@ TEST(AbsoluteError, YawAlignmentTurnsAboutTheVerticalOnly) {
 
   const Trajectory tilted = moved(helix(), so3::exp({0.1, 0, 0}), {0, 0, 0});
   EXPECT_GT(absoluteError(helix(), tilted, Alignment::kYaw).translation_m.rmse, 0.05);
-  EXPECT_NEAR(absoluteError(helix(), tilted, Alignment::kYaw).rotation_deg.mean, 0.1 * 180.0 / kPi, 0.2);
+  EXPECT_NEAR(absoluteError(helix(), tilted, Alignment::kYaw).rotation_deg.mean, 0.1 * 180.0 / M_PI, 0.2);
   EXPECT_NEAR(absoluteError(helix(), tilted, Alignment::kSe3).translation_m.max, 0.0, kExact);
 }
 
@@ -138,7 +138,7 @@ TEST(AbsoluteError, StatisticsOfKnownErrors) {
 
 TEST(AbsoluteError, OriginAlignmentSwingsAWrongFirstHeadingRound) {
   Trajectory estimate = helix();
-  estimate[0].q_WI = estimate[0].q_WI * so3::exp({0, 0, 90.0 * kPi / 180.0});
+  estimate[0].q_WI = estimate[0].q_WI * so3::exp({0, 0, 90.0 * M_PI / 180.0});
   const AbsoluteError error = absoluteError(helix(), estimate, Alignment::kOrigin);
   // A point r away from the start is moved by 2 r sin(45 deg) horizontally.
   const double r = helix().back().p_W.head<2>().norm();

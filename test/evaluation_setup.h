@@ -11,13 +11,12 @@
 
 namespace rio_t {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kExact = 1e-9;
 
 inline Time at(double seconds) { return Time::fromNanoseconds(1700000000000000000) + seconds; }
 
 inline StampedPose pose(double seconds, const Eigen::Vector3d& p_W, double yaw_deg = 0.0) {
-  return {at(seconds), p_W, so3::exp({0.0, 0.0, yaw_deg * kPi / 180.0})};
+  return {at(seconds), p_W, so3::exp({0.0, 0.0, yaw_deg * M_PI / 180.0})};
 }
 
 /// 1 m/s along a circle of 5 m radius that climbs a little, heading along the path, 10 Hz.
@@ -27,7 +26,7 @@ inline Trajectory helix(int poses = 101) {
     const double t = 0.1 * i;
     const double angle = t / 5.0;
     trajectory.push_back(
-        pose(t, {5.0 * std::sin(angle), 5.0 * (1.0 - std::cos(angle)), 0.05 * t}, angle * 180.0 / kPi));
+        pose(t, {5.0 * std::sin(angle), 5.0 * (1.0 - std::cos(angle)), 0.05 * t}, angle * 180.0 / M_PI));
   }
   return trajectory;
 }

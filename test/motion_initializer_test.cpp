@@ -16,8 +16,6 @@
 namespace rio_t {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
 /// As RadarChannel does it: first the step, then the velocity.
 EgoVelocity velocityOf(const RadarScan& scan, EgoVelocityEstimator& estimator) {
   estimator.observe(scan);
@@ -140,8 +138,8 @@ TEST(MotionInitializer, FindsTiltVelocityAndOffsetAndKnowsHowWell) {
 }
 
 TEST(MotionInitializer, WorksForAnyMounting) {
-  for (const Eigen::Vector3d& turn : {Eigen::Vector3d(kPi, 0, 0), Eigen::Vector3d(0, 0.5 * kPi, 0),
-                                      Eigen::Vector3d(-0.5 * kPi, 0.3, 2.0)}) {
+  for (const Eigen::Vector3d& turn : {Eigen::Vector3d(M_PI, 0, 0), Eigen::Vector3d(0, 0.5 * M_PI, 0),
+                                      Eigen::Vector3d(-0.5 * M_PI, 0.3, 2.0)}) {
     Rig rig("difficult", 4, 0.03, so3::exp(turn));
     MotionInitializer initializer(rig.options);
     const auto found = rig.run(initializer);
@@ -193,14 +191,14 @@ TEST(MotionInitializer, WrongUnitsAndSignsAreToldAndNotStartedFrom) {
     Rig rig("difficult", 7, 0.0);
     for (ImuMeasurement& sample : rig.data.imu.samples) {
       if (fault == "accelerometer in g") sample.acceleration /= 9.81;
-      if (fault == "gyro in deg/s") sample.angular_velocity *= 180.0 / kPi;
+      if (fault == "gyro in deg/s") sample.angular_velocity *= 180.0 / M_PI;
     }
     for (simulation::SimulatedScan& scan : rig.data.scans) {
       for (simulation::SimulatedPoint& point : scan.points)
         if (fault == "Doppler sign") point.doppler = -point.doppler;
     }
     if (fault == "extrinsics")
-      rig.options.T_IR.q_IR = rig.options.T_IR.q_IR * so3::exp({0.0, 0.0, 0.5 * kPi});
+      rig.options.T_IR.q_IR = rig.options.T_IR.q_IR * so3::exp({0.0, 0.0, 0.5 * M_PI});
     MotionInitializer initializer(rig.options);
     EXPECT_FALSE(rig.run(initializer));
     EXPECT_NE(initializer.waitingFor().find("radar and IMU that agree"), std::string::npos)

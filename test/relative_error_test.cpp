@@ -89,7 +89,7 @@ TEST(RelativeError, RefusesWrongPieces) {
 TEST(Drift, IsTheLastErrorPerMetre) {
   Trajectory estimate = straight(81);
   estimate.back().p_W += Eigen::Vector3d(0.3, 0.4, 1.2);
-  estimate.back().q_WI = so3::exp({0, 0, -4.0 * kPi / 180.0});
+  estimate.back().q_WI = so3::exp({0, 0, -4.0 * M_PI / 180.0});
   estimate = moved(estimate, so3::exp({0, 0, 1.0}), {5, 5, 5});
   const Drift result = drift(straight(81), estimate);
   EXPECT_NEAR(result.path_m, 10.0, kExact);

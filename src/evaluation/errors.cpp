@@ -13,8 +13,7 @@
 namespace rio_t {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kDegrees = 180.0 / kPi;
+constexpr double kDegrees = 180.0 / M_PI;
 
 /// Angle between two orientations [deg].
 double angleDegrees(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
@@ -29,7 +28,7 @@ double yaw(const Eigen::Quaterniond& q) {
 
 /// Heading of `estimate` minus that of `truth`, the short way round [deg].
 double yawDegrees(const Eigen::Quaterniond& truth, const Eigen::Quaterniond& estimate) {
-  return kDegrees * std::remainder(yaw(estimate) - yaw(truth), 2.0 * kPi);
+  return kDegrees * std::remainder(yaw(estimate) - yaw(truth), 2.0 * M_PI);
 }
 
 Statistics statistics(std::vector<double> values) {

@@ -16,7 +16,6 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kMinDuration = 3.0;    // [s] of motion, below which nothing is said
 constexpr double kOffsetStep = 0.01;    // [s]
 constexpr double kLevelSigma = 0.17;    // [rad] of the roll, if nothing else is known
@@ -164,7 +163,7 @@ void setSigmas(const Quadratic& cost, const Matrix3d& H_l, double unit, Mounting
   const MatrixXd J = tangent(result->sign * R);
   const Matrix3d in_R = J.transpose() * cost.H * J / unit;
   const Matrix3d in_I = R * in_R * R.transpose();
-  const Matrix3d covariance = (in_I + Matrix3d::Identity() / (kPi * kPi)).inverse();
+  const Matrix3d covariance = (in_I + Matrix3d::Identity() / (M_PI * M_PI)).inverse();
   result->rotation_sigma = covariance.diagonal().cwiseSqrt();
   result->lever_arm_sigma = std::sqrt(unit) * H_l.inverse().diagonal().cwiseSqrt();
 }
@@ -180,7 +179,7 @@ void findOtherMounting(const Quadratic& cost, double square, MountingSearch* res
     const Vector3d between = so3::log(Eigen::Quaterniond(other.R * R.transpose()).normalized());
     if (between.norm() < kFar || (other.cost - least) / square > kClear) continue;
     for (int k = 0; k < 3; ++k) {
-      if (std::abs(between[k]) > 0.5 * between.norm()) result->rotation_sigma[k] = kPi;
+      if (std::abs(between[k]) > 0.5 * between.norm()) result->rotation_sigma[k] = M_PI;
     }
   }
 }

@@ -60,12 +60,11 @@ class Vibration {
     in_phase_ = kept * in_phase_ + renewed * random_.gaussianVector();
     quadrature_ = kept * quadrature_ + renewed * random_.gaussianVector();
     t_ = t;
-    const double phase = 2.0 * kPi * frequency_ * t;
+    const double phase = 2.0 * M_PI * frequency_ * t;
     return sigma_ * (std::cos(phase) * in_phase_ - std::sin(phase) * quadrature_);
   }
 
  private:
-  static constexpr double kPi = 3.141592653589793;
   static constexpr double kCoherence = 0.5;  // [s]
 
   double sigma_;

@@ -11,7 +11,6 @@
 namespace rio_t::simulation {
 namespace {
 
-constexpr double kPi = 3.141592653589793;
 constexpr double kSampleStep = 0.01;  // [s] of the poses that the spline is put through
 constexpr std::uint64_t kMotionStream = 1;
 constexpr double kWalkingPace = 1.3;    // [m/s]
@@ -29,7 +28,7 @@ class Waves {
     for (int i = 0; i < count; ++i) {
       const double f = low + (high - low) * (i + random.uniform()) / count;
       waves_.push_back(
-          {weight * random.uniform(0.7, 1.3) / f, 2.0 * kPi * f, random.uniform(0.0, 2.0 * kPi)});
+          {weight * random.uniform(0.7, 1.3) / f, 2.0 * M_PI * f, random.uniform(0.0, 2.0 * M_PI)});
     }
   }
   double operator()(double t) const {
@@ -63,7 +62,8 @@ VectorFunction sum(const VectorFunction& f, const VectorFunction& g) {
 // The bounce of walking: twice per stride up and down, once sideways.
 VectorFunction stepBounce(double step_rate, double height) {
   return [=](double t) -> Eigen::Vector3d {
-    return {0.0, 0.5 * height * std::sin(kPi * step_rate * t), height * std::sin(2.0 * kPi * step_rate * t)};
+    return {0.0, 0.5 * height * std::sin(M_PI * step_rate * t),
+            height * std::sin(2.0 * M_PI * step_rate * t)};
   };
 }
 
@@ -132,7 +132,7 @@ PoseFunction handHeld(const HandHeld& how, Random& random, double duration) {
 
 // One lap of an oval hall, back to where it began, with the sensor looking along the path.
 PoseFunction gymLoop(Random& random, double duration) {
-  const double length = 2.1 * duration / (2.0 * kPi);  // half axes for about 1 m/s
+  const double length = 2.1 * duration / (2.0 * M_PI);  // half axes for about 1 m/s
   const double a = 0.63 * length;
   const double b = 0.30 * length;
   const VectorFunction bounce = stepBounce(1.8, 0.012);
@@ -140,11 +140,11 @@ PoseFunction gymLoop(Random& random, double duration) {
   const VectorFunction drift = withPeakSpeed(waves(random, 3, 0.05, 0.2, {1.0, 1.0, 0.5}), 0.15, duration);
   return combine(
       [=](double t) -> Eigen::Vector3d {
-        const double phi = 2.0 * kPi * t / duration;
+        const double phi = 2.0 * M_PI * t / duration;
         return Eigen::Vector3d(a * std::sin(phi), b * (1.0 - std::cos(phi)), 0.0) + bounce(t) + drift(t);
       },
       [=](double t) -> Eigen::Vector3d {
-        const double phi = 2.0 * kPi * t / duration;
+        const double phi = 2.0 * M_PI * t / duration;
         // Heading of the oval, unwrapped: atan2 of the part that circles around phi itself.
         const double heading =
             phi + std::atan2(b * std::sin(phi) * std::cos(phi) - a * std::cos(phi) * std::sin(phi),
@@ -218,7 +218,7 @@ class Corridors {
     for (double t = 0.0; t < duration;) {
       Turn turn;
       turn.start = t + random.uniform(2.0, 14.0) / pace_;
-      const double angle = random.uniform(75.0, 105.0) * kPi / 180.0;
+      const double angle = random.uniform(75.0, 105.0) * M_PI / 180.0;
       const double peak = random.uniform(0.7, 0.9);
       turn.length = 2.0 * angle / peak;  // the mean of sin^2 is a half
       turn.rate = random.chance(0.5) ? peak : -peak;
@@ -243,7 +243,7 @@ class Corridors {
     double rate;           // peak [rad/s]
   };
   static double shape(const Turn& turn, double t) {
-    const double s = std::sin(kPi * (t - turn.start) / turn.length);
+    const double s = std::sin(M_PI * (t - turn.start) / turn.length);
     return s * s;
   }
   const Turn* turnAt(double t) const {
@@ -267,7 +267,7 @@ PoseFunction walk(Random& random, double duration, double pace) {
   const Waves stride(random, 3, 0.02, 0.1, 0.005);
   const VectorFunction sway = withPeakRate(waves(random, 3, 0.2, 0.9, {0.5, 0.5, 1.0}), 0.15, duration);
   return [=](double t) {
-    const double step = 2.0 * kPi * (2.0 * t + stride(t));
+    const double step = 2.0 * M_PI * (2.0 * t + stride(t));
     const double swing = std::sin(0.5 * step);  // left and right foot
     StampedPose pose = body(t);
     pose.p_W += pose.q_WI * Eigen::Vector3d(0.0, 0.012 * swing, 0.0125 * std::sin(step));
@@ -293,7 +293,7 @@ class Circuit {
       bend.start = t;
       // Bends to the left make laps, which stay in a hall; every fourth is a full loop to the right.
       const bool loop = sections_.size() % 8 == 4;
-      const double angle = (loop ? 360.0 : random.uniform(60.0, 150.0)) * kPi / 180.0;
+      const double angle = (loop ? 360.0 : random.uniform(60.0, 150.0)) * M_PI / 180.0;
       const double radius = random.uniform(1.2, 1.8);  // [m] where it is narrowest
       const double peak = kBendSpeed / radius;
       bend.length = 2.0 * angle / peak;
@@ -321,7 +321,7 @@ class Circuit {
     double peak_rate = 0.0;            // [rad/s]
   };
   static double shape(const Section& section, double t) {
-    const double s = std::sin(kPi * (t - section.start) / section.length);
+    const double s = std::sin(M_PI * (t - section.start) / section.length);
     return s * s;
   }
   const Section& sectionAt(double t) const {

@@ -12,7 +12,6 @@ namespace {
 
 constexpr int kDegree = 5;
 constexpr int kOrder = kDegree + 1;  // coefficients that act at one time
-constexpr double kPi = 3.141592653589793;
 
 using Weights = Eigen::Matrix<double, kOrder, 1>;
 using Vector7d = Eigen::Matrix<double, 7, 1>;
@@ -118,7 +117,7 @@ std::vector<Vector7d> poseVectors(const Trajectory& poses) {
     if (i > 0) {
       const double cos_half = v.tail<4>().dot(vectors.back().tail<4>());
       if (cos_half < 0.0) v.tail<4>() *= -1.0;
-      if (std::abs(cos_half) < std::cos(kPi / 4.0)) {
+      if (std::abs(cos_half) < std::cos(M_PI / 4.0)) {
         throw std::invalid_argument("trajectory: poses " + std::to_string(i) + " and " +
                                     std::to_string(i + 1) +
                                     " are more than 90 degrees apart, too far for a spline");
@@ -159,7 +158,7 @@ TrajectorySpline::TrajectorySpline(const Trajectory& poses, const SplineFitOptio
     coefficients_.middleCols<kOrder>(s.index) += vectors[i] * w.transpose();
   }
   const double pose_rate = static_cast<double>(poses.size() - 1) / duration_;
-  const double penalty = pose_rate / std::pow(2.0 * kPi * options.cutoff, 6);
+  const double penalty = pose_rate / std::pow(2.0 * M_PI * options.cutoff, 6);
   const Eigen::Matrix<double, kOrder, kOrder> jerk = penalty * jerkProducts(knot_spacing_);
   for (int s = 0; s < segments; ++s) normal.add(s, jerk);
   normal.solve(coefficients_);

@@ -1,9 +1,9 @@
+#include <cmath>
+
 #include "parameter_sections.h"
 
 // Ground vehicle, barometer.
 namespace rio_t {
-
-constexpr double kPi = 3.14159265358979323846;
 
 void listPlatform(ParameterList& list, Config& c) {
   GroundVehicleOptions& vehicle = c.odometry.ground_vehicle;
@@ -22,7 +22,7 @@ void listPlatform(ParameterList& list, Config& c) {
       "vehicle_frame_translation", "m", between(-100, 100), vehicle.T_IV.l_I,
       "This point of the vehicle, in the IMU frame, moves only forward. It is the centre of the axle that "
       "does not steer.");
-  list.number("vehicle_frame_rotation_sigma", "rad", above(0, kPi), vehicle.rotation_sigma,
+  list.number("vehicle_frame_rotation_sigma", "rad", above(0, M_PI), vehicle.rotation_sigma,
               "The rotation that you give has this standard deviation about each axis.");
   list.number(
       "vehicle_start_slope_sigma", "rad", atLeast(0), vehicle.start_slope_sigma,

@@ -1,12 +1,8 @@
+#include <cmath>
+
 #include "parameter_sections.h"
 
 namespace rio_t {
-namespace {
-
-constexpr double kPi = 3.14159265358979323846;
-
-}  // namespace
-
 void listTopics(ParameterList& list, Config& c) {
   list.group("Topics");
   list.first().text(
@@ -215,7 +211,7 @@ void listEstimateExtrinsics(ParameterList& list, Config& c) {
       "its position as well, which needs fast turns. Use rotation for a mounting by eye, and none after a "
       "calibration.");
   list.number(
-      "extrinsics_rotation_sigma", "rad", above(0, kPi), smoother.extrinsics_rotation_sigma,
+      "extrinsics_rotation_sigma", "rad", above(0, M_PI), smoother.extrinsics_rotation_sigma,
       "The estimate of the rotation starts with this standard deviation about each axis. 0.17 rad (10 "
       "degrees) suits a mounting by eye, 0.02 rad a mounting from a drawing.");
   list.number("extrinsics_translation_sigma", "m", above(0, 100), smoother.extrinsics_translation_sigma,

@@ -1,9 +1,9 @@
+#include <cmath>
+
 #include "parameter_sections.h"
 
 namespace rio_t {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 void listPointFilter(ParameterList& list, EgoVelocityOptions& radar) {
   list.number("radar_min_range", "m", atLeast(0), radar.min_range,
@@ -16,11 +16,11 @@ void listPointFilter(ParameterList& list, EgoVelocityOptions& radar) {
       "few points are left. Raise it in clutter. If it removes almost all points, the preset reads the power "
       "in the wrong unit: see radar_power_unit.");
   list.number(
-      "radar_max_azimuth", "rad", above(0, kPi), radar.max_azimuth,
+      "radar_max_azimuth", "rad", above(0, M_PI), radar.max_azimuth,
       "Points farther than this to either side of forward are left out. Lower it if points at the edge of "
       "the view are bad. Raise it above 1.57 only for a radar that sees behind itself.");
   list.number(
-      "radar_max_elevation", "rad", above(0, kPi / 2), radar.max_elevation,
+      "radar_max_elevation", "rad", above(0, M_PI / 2), radar.max_elevation,
       "Points higher or lower than this are left out. Lower it if points at the edge of the view are bad.");
 }
 
