@@ -383,7 +383,7 @@ TEST(PriorTerm, JacobiansAreCorrect) {
     root.r0(i) = std::sin(0.7 * i);
     for (int j = 0; j < 16; ++j) root.J(i, j) = std::sin(1.0 + 3.1 * i + 1.7 * j);
   }
-  const PriorTerm prior({std::make_shared<StateManifold>(), std::make_shared<ScalarManifold>()},
+  const PriorTerm prior({std::make_shared<StateManifold>(), std::make_shared<VectorManifold>(1)},
                         {stored(x0), Eigen::VectorXd::Constant(1, 0.02)}, root);
   expectJacobiansCorrect(prior, {values(moved(x0, 0.4)), {-0.01}});
 }

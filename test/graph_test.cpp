@@ -237,7 +237,7 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
     const auto manifold = std::make_shared<StateManifold>();
     const auto loss = std::make_shared<ceres::HuberLoss>(1.5);
     const RadarMotionModel model{kind, bound, motion.g_W, &imu};
-    offset = window.addCalibration(std::make_shared<ScalarManifold>(), Eigen::VectorXd::Constant(1, start));
+    offset = window.addCalibration(std::make_shared<VectorManifold>(1), Eigen::VectorXd::Constant(1, start));
     offset->bound = bound;
     SmootherOptions known;
     known.estimate_extrinsics = EstimateExtrinsics::kPose;
@@ -476,7 +476,7 @@ TEST(AddASensor, AnAltimeterNeedsAFactorAndABlock) {
     smoother.initialize(motion.time(0.5),
                         priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0, skewMounting()));
     Window& window = smoother.states.window();
-    const auto bias = window.addCalibration(std::make_shared<ScalarManifold>(), Eigen::VectorXd::Zero(1));
+    const auto bias = window.addCalibration(std::make_shared<VectorManifold>(1), Eigen::VectorXd::Zero(1));
     // 1 m is known of it beforehand.
     addPrior(window, {bias.get()}, {Eigen::MatrixXd::Identity(1, 1), Eigen::VectorXd::Zero(1)});
     smoother.states.settle();

@@ -8,20 +8,19 @@
 #include <vector>
 
 #include "rio_t/factors/extrinsics_manifold.h"
-#include "rio_t/factors/landmark_factor.h"
 #include "rio_t/factors/state_manifold.h"
+#include "rio_t/graph/manifold.h"
 
 namespace rio_t {
 
 inline std::shared_ptr<const Manifold> manifoldOf(std::size_t size) {
   if (size == StateBlock::kSize) return std::make_shared<StateManifold>();
   if (size == ExtrinsicsBlock::kSize) return std::make_shared<ExtrinsicsManifold>(EstimateExtrinsics::kPose);
-  if (size == 3) return std::make_shared<PointManifold>();
-  return std::make_shared<ScalarManifold>();
+  return std::make_shared<VectorManifold>(static_cast<int>(size));
 }
 
 /// Compares the Jacobians of a factor with central differences on the manifold: blocks of 16 are states,
-/// blocks of 7 are extrinsics, both moved on their manifolds; blocks of 1 are offsets. `tolerance` is
+/// blocks of 7 are extrinsics, both moved on their manifolds; other blocks add up. `tolerance` is
 /// relative to the largest entry of the block's Jacobian.
 inline void expectJacobiansCorrect(const ceres::CostFunction& cost, std::vector<std::vector<double>> blocks,
                                    double tolerance = 1e-6, double step = 1e-5) {

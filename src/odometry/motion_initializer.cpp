@@ -216,7 +216,7 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
   Window window;
   Block& state = window.addNode(time, std::make_shared<StateManifold>(), stored(prior.x0));
   const std::shared_ptr<Block> offset =
-      window.addCalibration(std::make_shared<ScalarManifold>(), Eigen::VectorXd::Constant(1, prior.t_O0));
+      window.addCalibration(std::make_shared<VectorManifold>(1), Eigen::VectorXd::Constant(1, prior.t_O0));
   offset->bound = smoother_.max_time_offset;
   const EstimateExtrinsics estimate = smoother_.estimate_extrinsics;
   const std::shared_ptr<Block> extrinsics =

@@ -92,7 +92,7 @@ double BarometerChannel::variance(const Mean& mean) const {
 void BarometerChannel::addBias(FixedLagSmoother& smoother, double bias) {
   Window& window = smoother.window();
   if (bias_ && window.has(*bias_)) bias_->is_retired = true;
-  bias_ = window.addCalibration(std::make_shared<ScalarManifold>(), Eigen::VectorXd::Constant(1, bias));
+  bias_ = window.addCalibration(std::make_shared<VectorManifold>(1), Eigen::VectorXd::Constant(1, bias));
   addPrior(window, {bias_.get()},
            {Eigen::MatrixXd::Constant(1, 1, 1.0 / kUnknownBias), Eigen::VectorXd::Zero(1)});
   smoother.settle();

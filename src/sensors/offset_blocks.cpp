@@ -8,7 +8,7 @@
 namespace rio_t {
 
 OffsetBlocks::OffsetBlocks(const SmootherOptions& options)
-    : options_(options), manifold_(std::make_shared<ScalarManifold>()) {}
+    : options_(options), manifold_(std::make_shared<VectorManifold>(1)) {}
 
 Block& OffsetBlocks::start(Window& window, double t_O) {
   epochs_ = {{Time(), add(window, t_O)}};

@@ -63,7 +63,7 @@ BatchSmoother::BatchSmoother(const SmootherOptions& options, const BatchOptions&
       g_W_(g_W),
       imu_(&imu),
       state_manifold_(std::make_shared<StateManifold>()),
-      offset_manifold_(std::make_shared<ScalarManifold>()),
+      offset_manifold_(std::make_shared<VectorManifold>(1)),
       extrinsics_manifold_(std::make_shared<ExtrinsicsManifold>(options.estimate_extrinsics)) {}
 
 std::vector<Block*> BatchSmoother::start(const BatchProblem& problem, const StateBlock& x,

@@ -6,25 +6,9 @@
 
 #include "rio_t/factors/extrinsics_manifold.h"
 #include "rio_t/factors/state_block.h"
-#include "rio_t/graph/manifold.h"
 #include "rio_t/imu/preintegration.h"
 
 namespace rio_t {
-
-/// A point of the world, p_W [m]: the block of a landmark.
-class PointManifold final : public Manifold {
- public:
-  PointManifold() : Manifold(3, {0, 1, 2}) {}
-  void plus(const double* x, const double* delta, double* x_plus_delta) const override {
-    for (int i = 0; i < 3; ++i) x_plus_delta[i] = x[i] + delta[i];
-  }
-  Eigen::VectorXd minus(const double* y, const double* x) const override {
-    return Eigen::Map<const Eigen::Vector3d>(y) - Eigen::Map<const Eigen::Vector3d>(x);
-  }
-  Eigen::MatrixXd minusJacobian(const double*, const double*) const override {
-    return Eigen::MatrixXd::Identity(3, 3);
-  }
-};
 
 /// Position of a detection with its noise in polar form: along the ray, and across it in the direction of
 /// growing azimuth and of growing elevation.

@@ -1,6 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
+#include <numeric>
+#include <utility>
 #include <vector>
 
 namespace rio_t {
@@ -30,18 +33,26 @@ class Manifold {
   std::vector<int> columns_;  // read-only after construction
 };
 
-/// One number that adds up, such as a time offset.
-class ScalarManifold final : public Manifold {
+/// `size` numbers that add up, such as a time offset or a point.
+class VectorManifold final : public Manifold {
  public:
-  ScalarManifold() : Manifold(1, {0}) {}
+  explicit VectorManifold(int size) : Manifold(size, allColumns(size)) {}
   void plus(const double* x, const double* delta, double* x_plus_delta) const override {
-    *x_plus_delta = *x + *delta;
+    for (int i = 0; i < size(); ++i) x_plus_delta[i] = x[i] + delta[i];
   }
   Eigen::VectorXd minus(const double* y, const double* x) const override {
-    return Eigen::VectorXd::Constant(1, *y - *x);
+    using Values = Eigen::Map<const Eigen::VectorXd>;
+    return Values(y, size()) - Values(x, size());
   }
   Eigen::MatrixXd minusJacobian(const double*, const double*) const override {
-    return Eigen::MatrixXd::Identity(1, 1);
+    return Eigen::MatrixXd::Identity(size(), size());
+  }
+
+ private:
+  static std::vector<int> allColumns(int size) {
+    std::vector<int> columns(static_cast<std::size_t>(size));
+    std::iota(columns.begin(), columns.end(), 0);
+    return columns;
   }
 };
 
