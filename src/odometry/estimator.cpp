@@ -103,14 +103,7 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
         result.scan, {rest, has_diverged, health_.isContradicted(), result.model_error_scale, last_used_},
         smoother_);
     judge(answer, result.scan);
-    result.ego_velocity = answer.ego_velocity;
-    result.at_rest = answer.at_rest;
-    result.innovation = answer.judged;
-    result.doppler = answer.doppler;
-    result.offset_gain = answer.offset_gain;
-    result.offset_half_width = answer.offset_half_width;
-    result.offset_stepped = answer.offset_stepped;
-    result.rejected_because = answer.rejected_because;
+    static_cast<ScanAnswer&>(result) = static_cast<const ScanAnswer&>(answer);
     result.used = result.updated = answer.rejected_because.empty();
     if (result.used) last_used_ = stamp;
     if (expected && result.used) seeLandmarks(*expected, answer, radar, result);
@@ -151,8 +144,8 @@ std::string Estimator::whyNotNow(Time node_time, bool imu_has_ended) const {
 /// Passes the innovations of the scan to health, recovery and the scale of the model errors.
 void Estimator::judge(const RadarAnswer& answer, const RadarScan& scan) {
   HealthMonitor& health = health_.of(scan.radar);
-  if (answer.judged) {
-    health.addInnovation(*answer.judged);
+  if (answer.innovation) {
+    health.addInnovation(*answer.innovation);
   } else if (answer.was_predicted) {
     health.addUndecided(scan.stamp);
   }

@@ -266,8 +266,8 @@ void RadarChannel::judge(const RadarScan& scan, const VelocityPrior& prior, doub
   const bool is_outvoted = countOthers(measured.inliers, alone.inliers) >= options_.ego_velocity.min_inliers;
   if (is_outvoted && !isValid(measured.status)) return;
   if (!is_outvoted) answer.alone = scaled(alone, 1.0 / scale);
-  answer.judged = innovation(scan.stamp, prior, is_outvoted ? measured : alone, nullptr)
-                      .widened(options_.smoother.innovation_model_error);
+  answer.innovation = innovation(scan.stamp, prior, is_outvoted ? measured : alone, nullptr)
+                          .widened(options_.smoother.innovation_model_error);
 }
 
 double RadarChannel::offsetSigma(double variance) const {

@@ -34,23 +34,25 @@ struct ScanContext {
   Time last_used;                  ///< stamp of the last scan that any radar gave to the window
 };
 
-/// The channel's answer to a scan. All else that reports a scan reads this value.
-struct RadarAnswer {
+/// What a channel answers to a scan and the result of the scan repeats.
+struct ScanAnswer {
   EgoVelocity ego_velocity;
-  /// Its points, if they and not the velocity go into the window.
-  std::optional<DopplerMeasurement> doppler;
-  std::string rejected_because;                 ///< snake case, empty if the scan was used
-  bool at_rest = false;                         ///< as the IMU says, and the points do not deny it
+  /// Of the velocity that its points show without the prediction, for health. None if they do not decide.
+  std::optional<Innovation> innovation;
+  std::optional<DopplerMeasurement> doppler;    ///< its points, if they and not the velocity count
+  std::string rejected_because;                 ///< snake case, empty if used; keys of `scans_rejected`
+  bool at_rest = false;                         ///< the IMU shows rest, and the points do not deny it
   bool offset_stepped = false;                  ///< t_O stepped before this scan
   double offset_gain = 0.0;                     ///< see OffsetEvidence; 0: the scan does not tell the offset
   double offset_half_width = kOffsetHalfWidth;  ///< of the mean of the IMU in the derivative [s]
+};
 
-  bool was_predicted = false;  ///< if not, nothing below is set
-  /// For health: the innovation of the velocity that the scan shows without the prediction. None if its
-  /// points do not decide.
-  std::optional<Innovation> judged;
-  /// The same velocity for a re-initialisation, with its sigmas before any scale. None if the points that
-  /// agree are no majority, are outvoted by witnesses of the prediction, or are partly those of the last one.
+/// The channel's answer to a scan. All else that reports a scan reads this value.
+struct RadarAnswer : ScanAnswer {
+  bool was_predicted = false;  ///< if not, neither `innovation` nor what follows is set
+  /// The velocity of `innovation` for a re-initialisation, with its sigmas before any scale. None if the
+  /// points that agree are no majority, are outvoted by witnesses of the prediction, or are partly those of
+  /// the last one.
   std::optional<EgoVelocity> alone;
   /// For the scale of the model errors: the innovation of a used velocity in motion that most points agree
   /// on, if the prediction is linear.
