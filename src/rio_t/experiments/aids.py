@@ -2,8 +2,7 @@
 import numpy
 
 from .. import tum
-from ..errors import RioTError
-from .laboratory import need_truth, read_run, truth_of
+from .laboratory import grouped, one_run_or_fault, truth_of
 from .page import Page, Table, fixed, mean
 
 GROUND, PRESSURE = {"platform": "ground_vehicle"}, {"barometer_topic": "/sensor_platform/baro"}
@@ -25,18 +24,6 @@ def height_errors(folder, bag):
     true = numpy.interp(at, truth.seconds(truth.stamp[0]), truth.position[:, 2])
     height = estimate.position[:, 2]
     return (height - height[0]) - (true - true[0])
-
-
-def work(settings):
-    """(Run, errors of the height) of a bag, or one line why there is none."""
-    def function(lab, bag):
-        def read(folder):
-            return read_run(folder), height_errors(folder, bag)
-        try:
-            return lab.run(bag, settings, read)
-        except RioTError as error:
-            return str(error)
-    return function
 
 
 def rms(values):
@@ -68,12 +55,8 @@ def row_of_group(motion, aid, results, plain_cpu):
 
 def run(lab, sources, _):
     keys = [(source, aid) for source in sources for aid in AIDS]
-    results = lab.map([(source, 1, work(AIDS[aid])) for source, aid in keys])
-    groups = {}
-    for (source, aid), result in zip(keys, results):
-        if not isinstance(result, str):
-            need_truth(source, result[0])
-        groups.setdefault((source.name, aid), []).append(result)
+    results = lab.map([(source, 1, one_run_or_fault(AIDS[aid], height_errors)) for source, aid in keys])
+    groups = grouped([source for source, _ in keys], [(source.name, aid) for source, aid in keys], results)
     plain = {motion: sum(result[0].cpu for result in of if not isinstance(result, str))
              for (motion, aid), of in groups.items() if aid == "none"}
     page = Page("Aids: what the platform cannot do, how high it is")

@@ -3,7 +3,7 @@ from .. import nees
 from ..errors import RioTError
 from ..plots import legend_above, pyplot, tidy
 from .figures import name_cases
-from .laboratory import need_truth, read_run, truth_of
+from .laboratory import grouped, one_run_or_fault, truth_of
 from .page import Page, Table, fixed, mean, median
 
 HONEST = (0.5, 2.0)  # NEES per degree of freedom beyond these is marked
@@ -12,14 +12,8 @@ COLUMNS = [f"{part} NEES" for part in nees.PARTS]
 
 def work(source):
     """(Run, Consistency) of a bag of the source, or one line why there is none."""
-    def function(lab, bag):
-        def read(folder):
-            return read_run(folder), nees.read_consistency(folder, truth_of(bag), 1e-3 * source.offset)
-        try:
-            return lab.run(bag, {}, read)
-        except RioTError as error:
-            return str(error)
-    return function
+    return one_run_or_fault(
+        {}, lambda folder, bag: nees.read_consistency(folder, truth_of(bag), 1e-3 * source.offset))
 
 
 def marks_of(rows, first):
@@ -76,20 +70,15 @@ def draw_nees(groups):
     return figure
 
 
-def grouped(sources, results, key):
-    """{key of the source: its results}, each as `work` gives it."""
+def results_of(lab, sources):
+    results = lab.map([(source, 1, work(source)) for source in sources])
     if all(isinstance(result, str) for result in results):
         raise RioTError(f"no run has a result: {results[0]}")
-    groups = {}
-    for source, result in zip(sources, results):
-        if not isinstance(result, str):
-            need_truth(source, result[0])
-        groups.setdefault(key(source), []).append(result)
-    return groups
+    return results
 
 
 def run(lab, sources, _):
-    results = lab.map([(source, 1, work(source)) for source in sources])
+    results = results_of(lab, sources)
     page = Page("Consistency: errors over their stated sigmas")
     page.notes.append("NEES per degree of freedom: the mean over axes and time of (error / sigma)^2, 1 for an honest "
                       f"estimator; `!` marks what is outside {HONEST[0]:g} to {HONEST[1]:g}")
@@ -98,7 +87,7 @@ def run(lab, sources, _):
     page.notes.append("axes are those of the world: tilt is the rotation error about x and y, yaw about z")
     page.notes.append("errors of one run are alike over time, so a run is little more than one sample of yaw or offset: "
                       "of an honest estimator, the mean of five runs is outside the limits three times in ten")
-    groups = grouped(sources, results, lambda source: (source.name, source.offset))
+    groups = grouped(sources, [(source.name, source.offset) for source in sources], results)
     outside = []
     for name, title, middle in (("consistency", "Mean of the runs", mean),
                                 ("consistency_median", "Median of the runs", median)):

@@ -99,7 +99,7 @@ class Laboratory:
         try:
             cpu = self.execute("rio_t_bag", *arguments)
             result = read(folder)
-            (result[0] if isinstance(result, tuple) else result).cpu = cpu
+            run_of(result).cpu = cpu
             return result
         finally:
             shutil.rmtree(folder, ignore_errors=True)
@@ -156,17 +156,33 @@ def one_run(settings):
     return lambda lab, bag: lab.run(bag, settings)
 
 
-def one_run_or_fault(settings):
-    """The Run, or one line why there is none."""
+def one_run_or_fault(settings, figures=None):
+    """The Run, (Run, figures of its folder and the bag) if there are figures, or one line why there is none."""
     def function(lab, bag):
+        def read(folder):
+            return read_run(folder) if figures is None else (read_run(folder), figures(folder, bag))
         try:
-            return lab.run(bag, settings)
+            return lab.run(bag, settings, read)
         except RioTError as error:
             return str(error)
     return function
+
+
+def run_of(result):
+    return result[0] if isinstance(result, tuple) else result
 
 
 def need_truth(source, run):
     if "ate_m" not in run.summary:
         raise RioTError(f"{source.bag}: no ground truth in the bag; name its topic with "
                         "--set ground_truth_topic=..., or a TUM file with --set ground_truth=FILE")
+
+
+def grouped(sources, keys, results):
+    """{key: its results}, each as one_run_or_fault gives it. All that ran need the truth."""
+    groups = {}
+    for source, key, result in zip(sources, keys, results):
+        if not isinstance(result, str):
+            need_truth(source, run_of(result))
+        groups.setdefault(key, []).append(result)
+    return groups

@@ -3,7 +3,7 @@ import math
 
 from ..plots import legend_above, pyplot, tidy
 from .figures import COLOURS, name_cases
-from .laboratory import MODELS, lc_rio, need_truth, one_run_or_fault, rio_t
+from .laboratory import MODELS, grouped, lc_rio, one_run_or_fault, rio_t
 from .page import Page, Table, fixed, mean, median, spread
 
 NORMAL_95 = 1.959964
@@ -66,11 +66,8 @@ def run(lab, sources, _):
     page = Page("Monte-Carlo over seeds")
     page.notes.append("covered: share of the runs whose 95 % interval (estimate at the end +- 1.96 sigma) holds the "
                       "true offset")
-    groups = {}
-    for (source, method), run in zip(keys, results):
-        if not isinstance(run, str):
-            need_truth(source, run)
-        groups.setdefault((source.name, source.offset, method), []).append(run)
+    groups = grouped([source for source, _ in keys],
+                     [(source.name, source.offset, method) for source, method in keys], results)
     page.tables.append(Table("montecarlo", "Errors by motion and offset", [
         "motion", "true offset [ms]", "method", "runs", "failed", "least scans used [%]", "ATE mean [m]", "ATE sd [m]",
         "ATE median [m]", "ATE max [m]", "offset error mean [ms]", "sd [ms]", "mean size [ms]", "max size [ms]",

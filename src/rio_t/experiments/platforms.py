@@ -2,7 +2,8 @@
 import random
 
 from .. import nees
-from .consistency import COLUMNS, grouped, remark_of, work
+from .consistency import COLUMNS, remark_of, results_of
+from .laboratory import grouped
 from .page import Page, Table, fixed, median
 
 LARGEST = 4.0  # NEES per degree of freedom: errors of twice the sigma on average
@@ -67,8 +68,8 @@ def row_of_motion(motion, results):
 def run(lab, sources, _):
     for source in sources:
         source.words = draw(source.motion, source.seed)
-    results = lab.map([(source, 1, work(source)) for source in sources])
-    groups = grouped(sources, results, lambda source: source.name)
+    results = results_of(lab, sources)
+    groups = grouped(sources, [source.name for source in sources], results)
     page = Page("Platforms: sensors drawn at random")
     page.notes.append("NEES per degree of freedom, as in the experiment consistency; a run is sure and wrong if one of "
                       f"them is above {LARGEST:g}, which `!` marks")
