@@ -340,12 +340,8 @@ bool Estimator::tryReinitialize(std::vector<StampedPose>& left) {
 PoseAnchor Estimator::anchorAt(Time time) const {
   // The IMU carries the newest node before `time`, as in Navigation, so that the published pose does not
   // jump.
-  std::size_t k = smoother_.size() - 1;
-  while (k > 0 && smoother_.node(k).time > time) --k;
-  const NodeEstimate node = smoother_.node(k);
-  StateBlock x = node.x;
-  if (node.time < time)
-    x = predict(x, preintegrate(imu_, node.time, time, x.b_g(), x.b_a(), options_.imu_noise), g_W_);
+  const NodeEstimate node = smoother_.nodeBefore(time).value_or(smoother_.node(0));
+  const StateBlock x = node.time < time ? carried(node.x, node.time, time, imu_, g_W_) : node.x;
   PoseAnchor anchor;  // how well it is known is kept by pose_doubt_
   anchor.q_WI = x.q_WI();
   anchor.p_W = x.p_W();
