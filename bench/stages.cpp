@@ -80,10 +80,10 @@ RadarInWindow::AddResult RadarInWindow::add(FixedLagSmoother& smoother, const Do
   return (this->*original)(smoother, z);
 }
 
-const Solution& FixedLagSmoother::optimize(double short_step) {
+const Solution& FixedLagSmoother::optimize() {
   static const auto original = libraryFunction(&FixedLagSmoother::optimize);
   const Scope scope(Stage::kSolve);
-  return (this->*original)(short_step);
+  return (this->*original)();
 }
 
 Eigen::MatrixXd FixedLagSmoother::newestCovariance(const std::vector<const Block*>& calibration) const {

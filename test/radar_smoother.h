@@ -23,9 +23,7 @@ struct RadarSmoother {
   void addRest(Time stamp, double sigma) {
     states.addZeroVelocity(*states.nodeAt(radar.nodeTime(stamp)), sigma);
   }
-  const Solution& optimize(double short_step = SolverLimits().short_step) {
-    return states.optimize(short_step);
-  }
+  const Solution& optimize() { return states.optimize(); }
   std::vector<NodeEstimate> marginalize() {
     return states.marginalize({{&offset->newest(), Eigen::VectorXd::Constant(1, walk)}});
   }

@@ -130,8 +130,8 @@ const Preintegration& FixedLagSmoother::preintegrateFrom(const Node& node, Time 
   return last.value;
 }
 
-const Solution& FixedLagSmoother::optimize(double short_step) {
-  solution_ = solve(window_, {options_.max_iterations, short_step}, options_.solver);
+const Solution& FixedLagSmoother::optimize() {
+  solution_ = solve(window_, {options_.max_iterations}, options_.solver);
   return solution_;
 }
 

@@ -59,8 +59,7 @@ class FixedLagSmoother {
   /// The platform is at rest at a node; `velocity_sigma` [m/s] per axis.
   void addZeroVelocity(Block& node, double velocity_sigma);
 
-  /// `short_step`: see SolverLimits.
-  const Solution& optimize(double short_step = SolverLimits().short_step);
+  const Solution& optimize();
   /// Random walk of a calibration block.
   struct RandomWalk {
     const Block* block;
