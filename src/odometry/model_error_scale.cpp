@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rio_t/core/fading.h"
+
 namespace rio_t {
 namespace {
 
@@ -20,7 +22,7 @@ constexpr double kLargestSquare = 16.0;
 }  // namespace
 
 void ModelErrorScale::add(Time stamp, double squared_sigmas, double share) {
-  const double fade = std::exp(-std::clamp(stamp - last_, 0.0, 10.0 * kMemory) / kMemory);
+  const double fade = fading(last_, stamp, kMemory);
   last_ = stamp;
   information_ = fade * information_ + 1.5 * share * share;
   const double excess = std::clamp(squared_sigmas, 0.0, kLargestSquare) - 3.0;

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rio_t/core/fading.h"
+
 namespace rio_t {
 namespace {
 
@@ -61,7 +63,7 @@ double OffsetEvidence::varianceOfChange(Time tau, const OffsetDerivative& deriva
 }
 
 void OffsetEvidence::add(const OffsetScan& scan, const OffsetDerivative& derivative) {
-  const double fade = std::exp(-std::clamp(scan.tau - last_, 0.0, 10.0 * kMemory) / kMemory);
+  const double fade = fading(last_, scan.tau, kMemory);
   last_ = scan.tau;
   const Eigen::Matrix3d R_WR = (scan.x.q_WI() * scan.T_IR.q_IR).toRotationMatrix();
   const Eigen::Matrix3d W = (scan.predicted + scan.measured).inverse();

@@ -4,12 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rio_t/core/fading.h"
+
 namespace rio_t {
 
 bool OffsetStepDetector::stepped(const Innovation& innovation) {
   if (!options_.enabled) return false;
-  const double fade =
-      std::exp(-std::clamp(innovation.stamp - last_, 0.0, 10.0 * options_.memory) / options_.memory);
+  const double fade = fading(last_, innovation.stamp, options_.memory);
   last_ = innovation.stamp;
   const Eigen::LDLT<Eigen::Matrix3d> weight = innovation.S_at_offset.ldlt();
   const Eigen::Vector3d weighted_J = weight.solve(innovation.J_O);

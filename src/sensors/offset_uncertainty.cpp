@@ -1,8 +1,9 @@
 #include "rio_t/sensors/offset_uncertainty.h"
 
 #include <Eigen/Cholesky>
-#include <algorithm>
 #include <cmath>
+
+#include "rio_t/core/fading.h"
 
 namespace rio_t {
 namespace {
@@ -13,7 +14,7 @@ constexpr double kMemory = 40.0;
 }  // namespace
 
 void OffsetUncertainty::add(const Innovation& innovation) {
-  const double fade = std::exp(-std::clamp(innovation.stamp - last_, 0.0, 10.0 * kMemory) / kMemory);
+  const double fade = fading(last_, innovation.stamp, kMemory);
   last_ = innovation.stamp;
   const auto& [stamp, d, S, S_at_offset, J] = innovation;
   const Eigen::LDLT<Eigen::Matrix3d> weight = S.ldlt();
