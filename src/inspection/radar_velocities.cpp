@@ -58,7 +58,7 @@ EgoVelocityOptions inspectionOptions() {
   options.min_range = 0.1;
   options.max_range = 1e4;
   options.min_snr_db = -1e9;
-  options.max_azimuth = 3.14159265358979323846;
+  options.max_azimuth = M_PI;
   options.max_sigma = 2.0;
   return options;
 }

@@ -1,12 +1,13 @@
 #include "rio_t/simulation/presets.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 namespace rio_t::simulation {
 namespace {
 
-constexpr double kDegree = 3.141592653589793 / 180.0;
+constexpr double kDegree = M_PI / 180.0;
 
 // Rotation from the axes of a radar (x right, y forward, z up) to those of an IMU (x forward, y left, z up)
 // for a radar that looks `left` to the left and `up` upwards [rad].

@@ -5,8 +5,6 @@
 namespace rio_t::simulation {
 namespace {
 
-constexpr double kTwoPi = 6.283185307179586;
-
 std::uint64_t splitMix(std::uint64_t& state) {
   state += 0x9e3779b97f4a7c15u;
   std::uint64_t z = state;
@@ -44,7 +42,7 @@ double Random::uniform() { return static_cast<double>(bits() >> 11) * 0x1.0p-53;
 double Random::gaussian() {
   // Box and Muller. The second number of the pair is left unused: no hidden state, simpler to reason about.
   const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));
-  return radius * std::cos(kTwoPi * uniform());
+  return radius * std::cos(2.0 * M_PI * uniform());
 }
 
 Eigen::Vector3d Random::gaussianVector() {

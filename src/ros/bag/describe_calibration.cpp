@@ -9,7 +9,7 @@
 namespace rio_t {
 namespace {
 
-constexpr double kDegreesPerRadian = 180.0 / 3.14159265358979323846;
+constexpr double kDegreesPerRadian = 180.0 / M_PI;
 
 struct AxisText {
   const char* name;

@@ -10,8 +10,8 @@
 namespace rio_t {
 namespace {
 
-constexpr double kStraight = 3.14159265358979323846;  // [rad]
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
+constexpr double kStraight = M_PI;  // [rad]
+constexpr double kDegree = M_PI / 180.0;
 
 std::string degrees(double radians) { return fixedText(radians / kDegree, 0); }
 

@@ -17,7 +17,7 @@ using diagnostic_msgs::DiagnosticStatus;
 constexpr double kRecent = 1.0;
 /// The motion has shown what it told better than this share of the sigma that it was told with.
 constexpr double kObserved = 0.5;
-constexpr double kDegree = 3.141592653589793 / 180.0;
+constexpr double kDegree = M_PI / 180.0;
 
 std::string listOf(const Eigen::VectorXd& numbers) {
   std::ostringstream text;

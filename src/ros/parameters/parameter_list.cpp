@@ -167,7 +167,7 @@ void ParameterList::rotation(const std::string& key, Eigen::Quaterniond& member,
 
 void ParameterList::mounting(const std::string& key, std::optional<MountingAngles>& member,
                              const std::string& text) {
-  constexpr double kDegree = 3.14159265358979323846 / 180.0;
+  constexpr double kDegree = M_PI / 180.0;
   add(
       {key, "list", "deg", "[], or a list of 3 finite numbers, each of at least -360 and at most 360", text},
       [&member](const ParameterValue& value) {
