@@ -157,7 +157,6 @@ std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement&
   result.q_WI = levelingRotation(rest.accel.mean);
   result.b_g = rest.gyro.mean;
   result.b_a = rest.accel.mean * ((rest.accel.mean.norm() - gravity_) / rest.accel.mean.norm());
-  result.samples = samples_.size();
   result.duration = collected;
   waiting_for_.clear();
   samples_.clear();

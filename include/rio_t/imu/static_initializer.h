@@ -25,7 +25,6 @@ struct StaticInitialization {
   /// The mean specific force beyond gravity [m/s^2]: the part of the bias along the vertical. The horizontal
   /// part cannot be distinguished from a tilt.
   Eigen::Vector3d b_a = Eigen::Vector3d::Zero();
-  std::size_t samples = 0;
   double duration = 0.0;  ///< [s]
 };
 

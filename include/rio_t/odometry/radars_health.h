@@ -15,7 +15,6 @@ class RadarsHealth {
   RadarsHealth(const HealthOptions& options, double gate, std::size_t radars);
 
   HealthMonitor& of(std::size_t radar) { return monitors_.at(radar); }
-  const HealthMonitor& of(std::size_t radar) const { return monitors_.at(radar); }
 
   // All as in HealthMonitor.
   void setGate(double gate);
