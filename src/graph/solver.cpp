@@ -58,12 +58,15 @@ Elimination eliminationOf(const NormalEquations& system) {
   return std::move(*elimination);
 }
 
+NormalEquations holding(const std::vector<int>& held, NormalEquations system) {
+  for (const int i : held) system.hold(i);
+  return system;
+}
+
 /// Length of the undamped step given that some blocks are held.
 double squaredLength(const Solution& solution, const std::vector<int>& held) {
   if (held.empty()) return solution.elimination.squaredLength();
-  NormalEquations reduced = solution.normal_equations;
-  for (const int i : held) reduced.hold(i);
-  return eliminationOf(reduced).squaredLength();
+  return eliminationOf(holding(held, solution.normal_equations)).squaredLength();
 }
 
 ceres::Solver::Options solverOptions() {
@@ -130,13 +133,8 @@ Solution solveByChain(Window& window, const SolverLimits& limits) {
   std::vector<int> held;
   for (solution.iterations = 1;; ++solution.iterations) {
     held = pushedOutwards(window, system);
-    if (held.empty()) {
-      elimination = Elimination::of(system, damping);
-    } else {
-      NormalEquations reduced = system;
-      for (const int i : held) reduced.hold(i);
-      elimination = Elimination::of(reduced, damping);
-    }
+    elimination =
+        held.empty() ? Elimination::of(system, damping) : Elimination::of(holding(held, system), damping);
     const double squared_length =
         elimination ? elimination->squaredLength() : std::numeric_limits<double>::infinity();
     const bool is_short = squared_length < limits.short_step;
