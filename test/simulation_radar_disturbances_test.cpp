@@ -63,6 +63,35 @@ TEST(RadarModel, ABurstOfGhostsIsAllGhostsAndLeavesTheOtherScansAlone) {
   EXPECT_NEAR(static_cast<double>(hits) / static_cast<double>(ghosts), 0.05, 0.04);
 }
 
+TEST(RadarModel, AmbiguousPointsHaveASecondDirectionAndLeaveTheOthersAlone) {
+  SimulationOptions options;
+  const Motion motion = builtIn("medium", 1, 40.0);
+  const SensorData clean = simulate(motion, options);
+  options.radar.ambiguous_share = 0.15;
+  const SensorData ambiguous = simulate(motion, options);
+  std::size_t all = 0, second = 0;
+  for (std::size_t k = 0; k < clean.scans.size(); ++k) {
+    const std::vector<SimulatedPoint>& points = ambiguous.scans[k].points;
+    const std::size_t echoes = clean.scans[k].points.size();
+    ASSERT_GE(points.size(), echoes);
+    for (std::size_t i = 0; i < echoes; ++i)
+      ASSERT_EQ(points[i].position_R, clean.scans[k].points[i].position_R);
+    for (std::size_t i = echoes; i < points.size(); ++i) {
+      const SimulatedPoint& point = points[i];
+      EXPECT_TRUE(std::any_of(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(echoes),
+                              [&](const SimulatedPoint& echo) {
+                                return echo.doppler == point.doppler && echo.snr_db == point.snr_db &&
+                                       std::abs(echo.position_R.norm() - point.position_R.norm()) < 1e-9 &&
+                                       (echo.position_R - point.position_R).norm() > 1e-3;
+                              }));
+    }
+    all += echoes;
+    second += points.size() - echoes;
+  }
+  // 17000 points: sigma of the share is 0.003.
+  EXPECT_NEAR(static_cast<double>(second) / static_cast<double>(all), 0.15, 0.015);
+}
+
 TEST(RadarModel, WithoutErrorsBlackoutsAndBurstsOfGhostsStay) {
   SimulationOptions options;
   options.radar.blackouts = {{20.0, 1.0}};

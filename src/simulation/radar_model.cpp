@@ -20,6 +20,7 @@ constexpr std::uint64_t kPersonStream = 22;
 constexpr std::uint64_t kDropoutStream = 23;
 constexpr std::uint64_t kLatencyStream = 24;
 constexpr std::uint64_t kCrowdStream = 25;
+constexpr std::uint64_t kAmbiguousStream = 26;
 
 void check(const RadarModelOptions& o) {
   const auto require = [](bool ok, const char* what) {
@@ -50,7 +51,8 @@ void check(const RadarModelOptions& o) {
     require(steps > 0.5 && std::abs(steps - std::round(steps)) < 1e-6 * steps,
             "Doppler span (doppler-span) must be a whole number of steps (doppler-step)");
   }
-  require(is_share(o.ghost_share) && is_share(o.moving_share) && is_share(o.dropout_share),
+  require(is_share(o.ghost_share) && is_share(o.ambiguous_share) && is_share(o.moving_share) &&
+              is_share(o.dropout_share),
           "shares must be in [0, 1]");
   require(o.crowd >= 1, "a crowd must be one person or more");
 }
@@ -72,6 +74,13 @@ double elevation(const Eigen::Vector3d& p_R) { return std::atan2(p_R.z(), std::h
 
 Eigen::Vector3d fromPolar(double range, double az, double el) {
   return range * Eigen::Vector3d(std::cos(el) * std::sin(az), std::cos(el) * std::cos(az), std::sin(el));
+}
+
+/// A point at this range, anywhere in the view.
+Eigen::Vector3d anywhere(double range, const RadarModelOptions& o, Random& random) {
+  const double az = o.fov_azimuth * kDegree * random.uniform(-1.0, 1.0);
+  const double el = o.fov_elevation * kDegree * random.uniform(-1.0, 1.0);
+  return fromPolar(range, az, o.measures_elevation ? el : 0.0);
 }
 
 bool visible(const Eigen::Vector3d& p_R, const RadarModelOptions& o) {
@@ -271,10 +280,7 @@ class Sensor {
   // Multipath and interference: where and how fast says nothing.
   SimulatedPoint ghost(Random& random) const {
     SimulatedPoint point;
-    const double range = random.uniform(options_.min_range, options_.max_range);
-    const double az = options_.fov_azimuth * kDegree * random.uniform(-1.0, 1.0);
-    const double el = options_.fov_elevation * kDegree * random.uniform(-1.0, 1.0);
-    point.position_R = fromPolar(range, az, options_.measures_elevation ? el : 0.0);
+    point.position_R = anywhere(random.uniform(options_.min_range, options_.max_range), options_, random);
     point.doppler = reported(random.uniform(-2.5, 2.5));
     point.snr_db = random.uniform(6.0, 16.0);
     point.noise_db = 40.0 + 2.0 * random.gaussian();
@@ -289,6 +295,17 @@ class Sensor {
   std::vector<Person> persons_;
 };
 
+/// The spectrum of an echo's angles may have a second peak: the radar then reports two points.
+void addSecondDirections(std::vector<SimulatedPoint>& points, const RadarModelOptions& o, Random& random) {
+  const std::size_t echoes = points.size();
+  for (std::size_t i = 0; i < echoes && points.size() < static_cast<std::size_t>(o.points_max); ++i) {
+    if (!random.chance(o.ambiguous_share)) continue;
+    SimulatedPoint second = points[i];
+    second.position_R = anywhere(second.position_R.norm(), o, random);
+    points.push_back(second);
+  }
+}
+
 bool inAnyOf(const std::vector<RadarModelOptions::Interval>& intervals, double stamp) {
   return std::any_of(intervals.begin(), intervals.end(), [&](const RadarModelOptions::Interval& i) {
     return stamp >= i.start && stamp < i.start + i.duration;
@@ -299,7 +316,7 @@ bool inAnyOf(const std::vector<RadarModelOptions::Interval>& intervals, double s
 
 void RadarModelOptions::removeErrors() {
   range_noise = azimuth_noise = elevation_noise = doppler_noise = doppler_step = 0.0;
-  ghost_share = moving_share = dropout_share = latency_sigma = 0.0;
+  ghost_share = ambiguous_share = moving_share = dropout_share = latency_sigma = 0.0;
 }
 
 Eigen::Vector3d radarVelocity(const MotionState& state, const Extrinsics& T_IR) {
@@ -359,6 +376,8 @@ std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarModelO
       Random random(seed, kScanStream, k);
       const double ghost_share = inAnyOf(options.ghost_bursts, stamp) ? 1.0 : options.ghost_share;
       scan.points = sensor.measure(measured, ghost_share, random);
+      Random ambiguous_random(seed, kAmbiguousStream, k);
+      addSecondDirections(scan.points, options, ambiguous_random);
       scan.delivered = options.publish_empty || !scan.points.empty();
     }
     scans.push_back(std::move(scan));

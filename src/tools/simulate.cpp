@@ -113,8 +113,8 @@ void addGeneralOptions(OptionSet& options, Request& r) {
   options.number("gravity", "M/S^2", "size of gravity", r.simulation.imu.gravity, NumberRange::kPositive);
   options.flag(
       "noise-free",
-      "no noise, vibration, bias, quantisation, ghosts, moving objects, lost scans or samples (blackouts, "
-      "ghost bursts, Doppler span and flat radars stay)",
+      "no noise, vibration, bias, quantisation, ghosts, ambiguous points, moving objects, lost scans or "
+      "samples (blackouts, ghost bursts, Doppler span and flat radars stay)",
       r.noise_free);
 }
 
@@ -243,6 +243,10 @@ void addRadarOptions(OptionSet& options, RadarRequest& r) {
                  radar.doppler_span, NumberRange::kNotNegative);
   options.number("ghosts", "SHARE", "share of the points that are ghosts: anywhere, any Doppler",
                  radar.ghost_share, NumberRange::kShare);
+  options.number("ambiguous", "SHARE",
+                 "share of the points that the radar reports at a second direction, too: same range, Doppler "
+                 "and SNR",
+                 radar.ambiguous_share, NumberRange::kShare);
   options.number("moving", "SHARE", "share of the time in which persons walk through the view",
                  radar.moving_share, NumberRange::kShare);
   options.count("crowd", "number of persons at once; their points replace those of the room", radar.crowd);

@@ -40,7 +40,9 @@ struct RadarModelOptions {
   /// whole spans away from its true value; 0 = unlimited
   double doppler_span = 0.0;
 
-  double ghost_share = 0.03;   ///< of the points: anywhere, any Doppler
+  double ghost_share = 0.03;  ///< of the points: anywhere, any Doppler
+  /// Of the points: the radar reports them at a second direction, too, with the same range, Doppler and SNR.
+  double ambiguous_share = 0.0;
   double moving_share = 0.10;  ///< of the time: walking persons in view
   int crowd = 1;               ///< so many at once; their points take the place of the room's
   double dropout_share = 0.0;  ///< of the scans: triggered, never delivered
