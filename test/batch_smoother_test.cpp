@@ -209,6 +209,23 @@ TEST_F(Batch, AStepOfTheOffsetIsFollowedWhereItIsTold) {
   EXPECT_NEAR(batch.scans.back().t_O, 0.06, 3e-4);
 }
 
+TEST_F(Batch, AStepHasTheSigmaOfItsRadar) {
+  SmootherOptions options;
+  options.time_offset_sigma = 1e-4;  // of the radars that have no section of their own
+  BatchProblem whole = problem(options);
+  whole.time_offsets = {0.0};
+  whole.time_offset_sigmas = {0.075};
+  for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
+    const bool after = stamp > 2.25;
+    BatchScan scan;
+    scan.velocity = measurement(stamp, after ? 0.05 : 0.0);
+    scan.stamp = scan.velocity->stamp;
+    scan.offset_stepped = after && stamp < 2.35;
+    whole.scans.push_back(scan);
+  }
+  EXPECT_NEAR(make(options).solve(whole).scans.back().t_O, 0.05, 3e-4);
+}
+
 /// Two radars with one clock measure at the same time, and the second one tells of the step.
 TEST_F(Batch, AStepIsFollowedThoughAnotherRadarHasTheNode) {
   SmootherOptions options;

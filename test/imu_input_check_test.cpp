@@ -317,6 +317,28 @@ TEST_F(Gate, AFastTurnThatGoesOnIsNotStuck) {
   EXPECT_EQ(sample.angular_velocity.x(), 6.1);
 }
 
+TEST_F(Gate, AClockThatJumpsIsNoNoise) {
+  for (const double jump : {-800.0, -100.0, 1000.0}) {
+    gate = ImuInputCheck(0.04, ImuInputCheckOptions());
+    for (t = 0.0; t < 1.0; t += 0.01) feed(t);
+    const double before = sample.accel_noise;
+    const auto later = [&](double seconds) {
+      ImuMeasurement imu = motion.imuSample(seconds);
+      imu.time = imu.time + jump;
+      return imu;
+    };
+    bool restarted = false;
+    for (; t < 4.0; t += 0.01) {
+      feed(later(t));
+      restarted = restarted || decision == Decision::kRestart;
+      if (decision == Decision::kDrop) continue;
+      EXPECT_LT(std::sqrt(sample.accel_noise), 2.0 * std::sqrt(before) + 1e-3) << jump << " at " << t;
+    }
+    EXPECT_TRUE(restarted) << jump;
+    EXPECT_TRUE(std::isfinite(sample.accel_noise)) << jump;
+  }
+}
+
 TEST_F(Gate, NoiseFarAboveWhatWasToldIsSeen) {
   EXPECT_FALSE(gate.noise().isFarAbove(ImuNoise()));
   Noise noise;

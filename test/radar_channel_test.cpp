@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <memory>
 
 #include "radar_smoother.h"
 #include "rio_t/smoother/node_prior.h"
@@ -75,6 +76,40 @@ TEST(RadarChannel, BorrowedPointsCountOnceForARestart) {
     if (radar.use(stamp, 6).alone) alone.push_back(stamp);
   ASSERT_GT(alone.size(), 8u);
   for (std::size_t i = 1; i < alone.size(); ++i) EXPECT_GT(alone[i] - alone[i - 1], 0.2) << alone[i];
+}
+
+/// A duplicate must not lend its points to the scans after it, nor teach.
+TEST(RadarChannel, AScanThatComesTwiceCountsOnce) {
+  OneRadar once, twice;
+  for (double stamp = 0.7; stamp < 3.0; stamp += 0.05) {
+    const RadarAnswer expected = once.use(stamp, 6);
+    const RadarAnswer first = twice.use(stamp, 6);
+    ASSERT_EQ(first.rejected_because, expected.rejected_because) << stamp;
+    EXPECT_EQ(first.ego_velocity.v_R, expected.ego_velocity.v_R) << stamp;
+    if (!first.rejected_because.empty()) continue;
+    const RadarAnswer second = twice.use(stamp, 6);
+    EXPECT_EQ(second.rejected_because, "duplicate_stamp");
+    EXPECT_FALSE(second.was_predicted || second.innovation || second.alone);
+  }
+  EXPECT_EQ(once.channel.noise().doppler, twice.channel.noise().doppler);
+}
+
+/// The change of velocity that a borrowed Doppler gets.
+TEST(RadarInWindow, TellsTheVelocityOfTheLastScansInBothModels) {
+  for (const TimeOffsetModel model : {TimeOffsetModel::kImu, TimeOffsetModel::kConstantAcceleration}) {
+    SmootherOptions options;
+    options.time_offset_model = model;
+    const SyntheticMotion motion;
+    const ImuBuffer imu = motion.imu(0.0, 4.0, 200.0);
+    FixedLagSmoother smoother(options, ImuNoise(), motion.g_W, imu);
+    RadarInWindow radar(options, skewMounting(), motion.g_W, imu, std::make_shared<OffsetBlocks>(options));
+    radar.start(smoother, motion.time(1.0),
+                priorAtRest(options, ImuNoise(), motion.state(1.0), 9.81, 3.0, skewMounting()));
+    for (const double t : {1.05, 1.1, 1.15}) {
+      const Eigen::Vector3d true_R = motion.radarVelocity(t, skewMounting().R_RI(), skewMounting().l_I);
+      EXPECT_LT((radar.velocityAt(smoother, motion.time(t)).value() - true_R).norm(), 0.01) << t;
+    }
+  }
 }
 
 }  // namespace

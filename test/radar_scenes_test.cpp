@@ -139,6 +139,21 @@ TEST(EmptyScans, DoNotHoldTheWindow) {
   for (std::size_t i = 1; i < left.size(); ++i) EXPECT_LT(left[i] - left[i - 1], 5.1) << run.seconds(left[i]);
 }
 
+/// A borrowed Doppler has the change of the velocity in it: it may lie beyond what the radar can report.
+TEST(FewPoints, ShowTheSpanOfTheirOwnDopplersOnly) {
+  SimulatedRun run("drone", 1, 60.0, 5.0);
+  run.setup.radar.rate = 20.0;
+  run.setup.radar.points_mean = 9.0;
+  run.setup.radar.points_sigma = 2.0;
+  run.setup.radar.doppler_step = 0.125;
+  run.setup.radar.doppler_span = 3.0;
+  run.run();
+  std::size_t refused = 0;
+  for (const ScanResult& result : run.results)
+    if (run.seconds(result.scan.stamp) > 20.0 && result.rejected_because == "too_few_inliers") ++refused;
+  EXPECT_LT(refused, 30u);
+}
+
 /// The points that read the next bin tell the speed. A velocity fitted to all points leaves them out, or
 /// takes them for noise.
 TEST(CoarseRadar, TellsTheSpeedByTheEdgesOfItsBins) {

@@ -28,6 +28,8 @@ ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
       newest_.reset();
       bridge_.reset();
       gyro_axes_ = {};
+      accel_noise_.interrupt();
+      gyro_noise_.interrupt();
       break;
   }
   const double gap = newest_ ? imu.time - *newest_ : 0.0;

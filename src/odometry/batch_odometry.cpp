@@ -53,9 +53,7 @@ void BatchOdometry::addResult(ScanResult result) {
 }
 
 BatchResult BatchOdometry::solve(const RadarInertialOdometry::Start& start) const {
-  ImuNoise noise = options_.imu_noise;
-  noise.accel_density *= std::sqrt(model_error_scale_);
-  const BatchSmoother smoother(options_.smoother, batch_, noise, g_W_, imu_);
+  const BatchSmoother smoother(options_.smoother, batch_, imuNoise(), g_W_, imu_);
   Run run = makeRun(start);
   if (run.problem.scans.empty()) throw std::runtime_error("batch: the online run used no scan");
   BatchResult batch;
@@ -72,6 +70,12 @@ BatchResult BatchOdometry::solve(const RadarInertialOdometry::Start& start) cons
   return batch;
 }
 
+ImuNoise BatchOdometry::imuNoise() const {
+  ImuNoise noise = options_.imu_noise;
+  noise.accel_density *= std::sqrt(model_error_scale_);
+  return noise;
+}
+
 RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) const {
   RadarVelocityMeasurement z;
   z.stamp = result.scan.stamp;
@@ -79,6 +83,7 @@ RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) co
   z.covariance = result.ego_velocity.covariance;
   z.covariance.diagonal() +=
       (model_error_scale_ / result.model_error_scale - 1.0) * result.ego_velocity.told_variance;
+  z.covariance.diagonal().array() += result.rate_variance;
   z.offset_gain = result.offset_gain;
   z.offset_half_width = result.offset_half_width;
   return z;
@@ -87,7 +92,9 @@ RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) co
 void BatchOdometry::setMeasurement(const ScanResult& result, BatchScan& scan) const {
   if (result.doppler) {
     scan.doppler = result.doppler;
-    scan.doppler->shared_variances *= model_error_scale_ / result.model_error_scale;
+    auto shared = scan.doppler->shared_variances.array();
+    shared = (shared - result.rate_variance) * (model_error_scale_ / result.model_error_scale) +
+             result.rate_variance;
   } else {
     scan.velocity = measurement(result);
   }
@@ -208,7 +215,7 @@ std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solu
     });
   }
   // After the last scan, the IMU alone carries the state.
-  ImuPropagator propagator(options_.imu_noise, g_W_);
+  ImuPropagator propagator(imuNoise(), g_W_);
   propagator.anchor(navigationState(nodes.back(), solution.covariances.back(), imu_));
   imu_.forEachSample(nodes.back().time - 0.1, imu_.newest(), [&](const ImuMeasurement& sample) {
     const std::optional<NavigationState> state = propagator.add(sample);

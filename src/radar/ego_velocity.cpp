@@ -1,5 +1,6 @@
 #include "rio_t/radar/ego_velocity.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
@@ -202,10 +203,13 @@ DopplerLikelihood EgoVelocityEstimator::likelihood(const RadarScan& scan,
 }
 
 void EgoVelocityEstimator::learn(const RadarScan& scan, const EgoVelocity& estimated,
-                                 const std::optional<VelocityPrior>& prior) {
+                                 const std::optional<VelocityPrior>& prior, std::size_t borrowed) {
   if (estimated.status != EgoVelocityStatus::kMoving) return;
   std::vector<RadarDirection> points = filter(scan, options_);
-  span_.learn(points, estimated.v_R, options_.doppler_quantization);
+  const std::size_t own = scan.points.size() - borrowed;
+  const auto end =
+      std::find_if(points.begin(), points.end(), [own](const auto& p) { return p.index >= own; });
+  span_.learn({points.begin(), end}, estimated.v_R, options_.doppler_quantization);
   if (options_.solver != EgoVelocitySolver::kErrorsInVariables) return;
   const EgoVelocity world = staticWorld(scan, estimated, prior);
   unwrap(points, world.v_R, span_.value());
@@ -242,6 +246,8 @@ std::string toString(EgoVelocityStatus status) {
       return "sigma_too_large";
     case EgoVelocityStatus::kAmbiguous:
       return "ambiguous";
+    case EgoVelocityStatus::kNotEstimated:
+      return "not_estimated";
   }
   throw std::invalid_argument("ego velocity: not a status");
 }

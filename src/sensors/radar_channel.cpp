@@ -90,6 +90,8 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
     answer.rejected_because = reason;
     return answer;
   };
+  // Before its points count a second time, for health or in a pool.
+  if (in_window_.has(scan.stamp)) return reject(toString(RadarInWindow::AddResult::kDuplicateStamp));
   Seen seen = see(scan, context, smoother, answer);
   const EgoVelocity& measured = seen.velocity;
   if (!isValid(measured.status)) return reject(toString(answer.ego_velocity.status));
@@ -98,19 +100,18 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   answer.offset_gain = offsetGain(seen);
   const bool informs_offset = answer.offset_gain > 0.0;
   // An offset that is wrong by c shows as (J + noise) c; nothing else tells of the noise's part.
-  double rate_variance = 0.0;
   if (informs_offset) {
     answer.offset_half_width = seen.dv_dt_O.half_width;
-    rate_variance = seen.dv_dt_O.variance * seen.prediction->t_O_variance;
+    answer.rate_variance = seen.dv_dt_O.variance * seen.prediction->t_O_variance;
   }
-  seen.velocity.covariance.diagonal().array() += rate_variance;
+  seen.velocity.covariance.diagonal().array() += answer.rate_variance;
   const RadarScanTime taken{scan.stamp, answer.offset_gain, answer.offset_half_width, offset()};
   if (isTightlyCoupled() && measured.status == EgoVelocityStatus::kMoving) {
     const EgoVelocity world = staticWorld(scan, seen);
     if (world.inliers.empty()) return reject("too_few_inliers");
     answer.doppler = DopplerMeasurement{
         taken, std::make_shared<DopplerLikelihood>(estimator_.likelihood(scan, world.inliers, world.v_R)),
-        measured.told_variance.array() + rate_variance, options_.smoother.huber_threshold};
+        measured.told_variance.array() + answer.rate_variance, options_.smoother.huber_threshold};
   }
 
   // A minority that sides with the prediction has more noise than its covariance says.
@@ -137,13 +138,13 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   gate_.used();
   if (can_be_judged && informs_offset) offset_uncertainty_.add(*own);
   // A borrowed point must not teach twice.
-  if (!seen.is_own || sharesPoints(seen, scan.stamp, learned_at_)) return answer;
+  if (!seen.is_own || sharesPoints(seen, learned_at_)) return answer;
   if (can_be_judged) {
     answer.used = all;
     answer.prediction_covariance = seen.prior->covariance;
   }
   if (!answer.at_rest) {
-    estimator_.learn(seen.pooled, measured, seen.prior);
+    estimator_.learn(seen.pooled, measured, seen.prior, seen.pooled.points.size() - scan.points.size());
     learned_at_ = scan.stamp;
   }
   return answer;
@@ -157,6 +158,7 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
   seen.tilt_is_known = !seen.prediction || seen.prediction->tilt_sigma < kMaxTiltSigma;
   const auto velocityAt = [&](Time stamp) { return in_window_.velocityAt(smoother, stamp); };
   seen.pooled = isTightlyCoupled() ? pool_.filled(scan, velocityAt) : scan;
+  seen.borrowed_since = scan.stamp - ScanPool::kMaxAge;
   const double scale = context.model_error_scale;
   if (!context.rest) rest_pool_.clear();
   if (context.rest) answer.at_rest = confirmsRest(*context.rest, scan, scale, seen);
@@ -172,7 +174,7 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
   answer.ego_velocity = measure(seen.pooled, expected, scale);
   answer.was_predicted = seen.prior.has_value();
   if (seen.prior) judge(seen.pooled, *seen.prior, scale, answer);
-  if (answer.alone && sharesPoints(seen, scan.stamp, alone_at_)) answer.alone.reset();
+  if (answer.alone && sharesPoints(seen, alone_at_)) answer.alone.reset();
   if (answer.alone) alone_at_ = scan.stamp;
 
   seen.velocity = answer.ego_velocity;
@@ -194,7 +196,9 @@ bool RadarChannel::confirmsRest(const Rest& rest, const RadarScan& scan, double 
   for (std::size_t enough = RestPool::kMost / 16; confirms && enough <= RestPool::kMost; enough *= 4) {
     RadarScan filled = rest_pool_.filled(scan, enough);
     confirms = !estimator_.deniesRest(filled);
-    if (!confirms && isTightlyCoupled()) seen.pooled = std::move(filled);
+    if (confirms || !isTightlyCoupled()) continue;
+    if (filled.points.size() > scan.points.size()) seen.borrowed_since = rest_pool_.oldest();
+    seen.pooled = std::move(filled);
   }
   rest_pool_.add(estimator_.slowPoints(scan));
   return confirms;
@@ -222,8 +226,8 @@ EgoVelocity RadarChannel::measure(const RadarScan& scan, const std::optional<Vel
   return scaled(estimator_.estimate(scan, prior), scale);
 }
 
-bool RadarChannel::sharesPoints(const Seen& seen, Time stamp, const std::optional<Time>& before) {
-  return seen.has_borrowed && before && stamp - *before <= ScanPool::kMaxAge;
+bool RadarChannel::sharesPoints(const Seen& seen, const std::optional<Time>& before) {
+  return seen.has_borrowed && before && *before >= seen.borrowed_since;
 }
 
 EgoVelocity RadarChannel::around(const VelocityPrior& prior, const RadarScan& scan,

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "rio_t/core/so3.h"
+#include "rio_t/factors/imu_factor.h"
 #include "rio_t/factors/offset_derivative.h"
 
 namespace rio_t {
@@ -108,8 +109,10 @@ std::optional<Eigen::Vector3d> RadarInWindow::velocityAt(const FixedLagSmoother&
   const Time time = nodeTime(stamp);
   const std::optional<NodeEstimate> node = smoother.nodeBefore(time);
   if (!node) return std::nullopt;
+  // One acceleration alone does not carry a state from its node to the scan.
+  const StateBlock x = carried(node->x, node->time, time, *model_.imu, model_.g_W);
   const Extrinsics T_IR = extrinsics();
-  return T_IR.R_RI() * model_.at(node->x.data(), node->time, stamp, offset(), T_IR.l_I, nullptr).v_I;
+  return T_IR.R_RI() * model_.at(x.data(), time, stamp, offset(), T_IR.l_I, nullptr).v_I;
 }
 
 template <class Factor, class Measurement>
@@ -118,7 +121,7 @@ RadarInWindow::AddResult RadarInWindow::addTerm(FixedLagSmoother& smoother, cons
   const Time oldest = smoother.node(0).time - 2.0 * options_.max_time_offset;
   stamps_.erase(std::remove_if(stamps_.begin(), stamps_.end(), [&](Time stamp) { return stamp < oldest; }),
                 stamps_.end());
-  if (std::find(stamps_.begin(), stamps_.end(), z.stamp) != stamps_.end()) return AddResult::kDuplicateStamp;
+  if (has(z.stamp)) return AddResult::kDuplicateStamp;
   Block* node = smoother.nodeAt(nodeTime(z.stamp));
   if (node == nullptr) return AddResult::kOlderThanWindow;
   stamps_.push_back(z.stamp);

@@ -3,7 +3,8 @@
 namespace rio_t {
 
 void RestPool::add(const RadarScan& slow) {
-  if (!scans_.empty() && slow.stamp < scans_.back().stamp) scans_.clear();  // late, or a bag that loops
+  if (!scans_.empty() && slow.stamp <= scans_.back().stamp)
+    scans_.clear();                 // late, twice, or a bag that loops
   if (slow.points.empty()) return;  // the pool is bounded by its points
   scans_.push_back(slow);
   std::size_t later = 0;  // points after the oldest scan

@@ -10,7 +10,8 @@ constexpr std::size_t kEnoughPoints = 20;
 }  // namespace
 
 RadarScan ScanPool::filled(const RadarScan& scan, const VelocityAt& velocityAt) {
-  if (!scans_.empty() && scan.stamp < scans_.back().stamp) scans_.clear();  // late, or a bag that loops
+  if (!scans_.empty() && scan.stamp <= scans_.back().stamp)
+    scans_.clear();  // late, twice, or a bag that loops
   while (!scans_.empty() && scan.stamp - scans_.front().stamp > kMaxAge) scans_.pop_front();
   RadarScan result = scan;
   const std::optional<Eigen::Vector3d> v_R = velocityAt(scan.stamp);

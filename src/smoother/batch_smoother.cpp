@@ -153,10 +153,12 @@ BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std
     if (dt > 0.0) {
       Block& previous = *offset;
       offset = &addOffset(window, *node->time, t_O[i]);
-      window.add(
-          std::make_unique<ConstantOffsetFactor>(stepped[clock] ? options_.time_offset_sigma
-                                                                : options_.time_offset_noise * std::sqrt(dt)),
-          {&previous, offset});
+      const double anew = options_.time_offset_shared || problem.time_offset_sigmas.empty()
+                              ? options_.time_offset_sigma
+                              : problem.time_offset_sigmas[scan.radar];
+      window.add(std::make_unique<ConstantOffsetFactor>(
+                     stepped[clock] ? anew : options_.time_offset_noise * std::sqrt(dt)),
+                 {&previous, offset});
       stepped[clock] = false;
     }
     Block* extrinsics = graph.extrinsics[scan.radar];

@@ -46,6 +46,7 @@ class BatchOdometry {
     std::vector<std::size_t> source;
   };
 
+  ImuNoise imuNoise() const;  ///< as the options tell it, times the scale of the model errors
   RadarVelocityMeasurement measurement(const ScanResult& result) const;
   Run makeRun(const RadarInertialOdometry::Start& start) const;
   /// Adds the scans that the batch does not reject, and returns their number.

@@ -75,12 +75,13 @@ enum class EgoVelocityStatus {
   kIllConditioned,  ///< the directions do not span 3D
   kSigmaTooLarge,   ///< in motion, uncertainty above max_sigma
   kAmbiguous,       ///< two velocities, and a prior too vague to decide between them
+  kNotEstimated,    ///< nobody asked
 };
 bool isValid(EgoVelocityStatus status);          ///< kMoving or kZeroVelocity
 std::string toString(EgoVelocityStatus status);  ///< snake case, e.g. "too_few_points"
 
 struct EgoVelocity {
-  EgoVelocityStatus status = EgoVelocityStatus::kTooFewPoints;
+  EgoVelocityStatus status = EgoVelocityStatus::kNotEstimated;
   Eigen::Vector3d v_R = Eigen::Vector3d::Zero();         ///< radar velocity, radar frame [m/s]
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< [m^2/s^2], radar frame
   /// The part of the covariance's diagonal that comes from the options, not from the data: `added_sigma`
@@ -137,9 +138,10 @@ class EgoVelocityEstimator {
 
   /// Learns the noise of the points from the result of `estimate` for this scan, for the scans to come. Only
   /// the errors-in-variables solver uses it. Call it once per scan, in motion, if the velocity was used.
-  /// A `prior` that knows nothing of the scan shows noise that the bins hide.
+  /// A `prior` that knows nothing of the scan shows noise that the bins hide. So many of the last points are
+  /// `borrowed` from other scans: their Dopplers do not show the span.
   void learn(const RadarScan& scan, const EgoVelocity& estimated,
-             const std::optional<VelocityPrior>& prior = std::nullopt);
+             const std::optional<VelocityPrior>& prior = std::nullopt, std::size_t borrowed = 0);
   /// The noise as learned so far.
   const PointVariances& noise() const { return noise_.variances(); }
   DopplerStep dopplerStep() const { return grid_.step(); }

@@ -45,6 +45,8 @@ struct ScanAnswer {
   bool offset_stepped = false;                  ///< t_O stepped before this scan
   double offset_gain = 0.0;                     ///< see OffsetEvidence; 0: the scan does not tell the offset
   double offset_half_width = kOffsetHalfWidth;  ///< of the mean of the IMU in the derivative [s]
+  /// Per axis, what the noise of the derivative adds to what went into the window (18e) [m^2/s^2].
+  double rate_variance = 0.0;
 };
 
 /// The channel's answer to a scan. All else that reports a scan reads this value.
@@ -115,6 +117,7 @@ class RadarChannel {
     std::optional<VelocityPrior> prior;  ///< the prediction; at rest, zero
     RadarScan pooled;                    ///< with the points borrowed, see ScanPool and RestPool
     bool has_borrowed = false;
+    Time borrowed_since;  ///< no borrowed point is older
     EgoVelocity velocity;
     bool is_own = false;  ///< the points agree on it; if not, it is `around` the prediction
     bool moves = false;
@@ -134,7 +137,7 @@ class RadarChannel {
   EgoVelocity staticWorld(const RadarScan& scan, const Seen& seen) const;
   bool isTightlyCoupled() const { return options_.smoother.radar_factor == RadarFactor::kDoppler; }
   /// Whether a scan shares points with the one at `before`.
-  static bool sharesPoints(const Seen& seen, Time stamp, const std::optional<Time>& before);
+  static bool sharesPoints(const Seen& seen, const std::optional<Time>& before);
   EgoVelocity measure(const RadarScan& scan, const std::optional<VelocityPrior>& prior, double scale) const;
   /// The velocity that the inliers among the scan's own points show around the prediction. Directions that
   /// they do not see have a large sigma.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -47,6 +48,8 @@ class RadarInWindow {
   std::optional<RadarVelocityPrediction> predict(const FixedLagSmoother& smoother, Time stamp) const;
   /// The velocity alone, in R [m/s].
   std::optional<Eigen::Vector3d> velocityAt(const FixedLagSmoother& smoother, Time stamp) const;
+  /// Whether the scan with that stamp has a term already.
+  bool has(Time stamp) const { return std::find(stamps_.begin(), stamps_.end(), stamp) != stamps_.end(); }
   AddResult add(FixedLagSmoother& smoother, const RadarVelocityMeasurement& z);
   AddResult add(FixedLagSmoother& smoother, const DopplerMeasurement& z);
   /// See OffsetBlocks::step.

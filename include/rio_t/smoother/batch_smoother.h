@@ -37,8 +37,8 @@ struct BatchProblem {
   NodePrior prior;                   ///< on it, and on the calibration of `radar`
   std::size_t radar = 0;             ///< which one the prior knows
   std::vector<Extrinsics> mounting;  ///< of each radar: as told, and where the solver starts
-  /// Priors on t_O of the radars [s]; not used for `radar`. Empty: zero, and time_offset_sigma of the
-  /// options.
+  /// Priors on t_O of the radars [s], and the sigma of a step. Not used for the start of `radar`. Empty:
+  /// zero, and time_offset_sigma of the options.
   std::vector<double> time_offsets, time_offset_sigmas;
   std::vector<BatchScan> scans;
   /// Initial states in order of time, at least one. The IMU carries them to the nodes.
