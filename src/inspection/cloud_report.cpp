@@ -8,13 +8,11 @@ namespace rio_t {
 
 CloudReport inspectCloud(const std::vector<RadarScan>& scans) {
   CloudReport report;
-  report.scans = scans.size();
-  std::vector<double> counts, ranges, azimuths, elevations, dopplers;
+  std::vector<double> counts, ranges, azimuths, elevations;
   Eigen::Vector3d squares = Eigen::Vector3d::Zero();
   double behind = 0.0, ambiguous = 0.0;
   for (const RadarScan& scan : scans) {
     counts.push_back(static_cast<double>(scan.points.size()));
-    if (scan.points.empty()) ++report.empty;
     for (const RadarPoint& point : scan.points) {
       const Eigen::Vector3d& p = point.position_R;
       const double range = p.norm();
@@ -23,7 +21,6 @@ CloudReport inspectCloud(const std::vector<RadarScan>& scans) {
       ranges.push_back(range);
       azimuths.push_back(std::abs(std::atan2(p.x(), p.y())));
       elevations.push_back(std::abs(std::atan2(p.z(), p.head<2>().norm())));
-      dopplers.push_back(std::abs(point.doppler));
       report.mean_direction += p / range;
       squares += (p / range).cwiseAbs2();
       if (p.y() < 0.0) behind += 1.0;
@@ -40,11 +37,9 @@ CloudReport inspectCloud(const std::vector<RadarScan>& scans) {
   report.points_10 = quantile(counts, 0.1);
   report.points_50 = quantile(counts, 0.5);
   report.points_90 = quantile(counts, 0.9);
-  report.range_50 = quantile(ranges, 0.5);
   report.range_99 = quantile(ranges, 0.99);
   report.azimuth_95 = quantile(azimuths, 0.95);
   report.elevation_95 = quantile(elevations, 0.95);
-  report.largest_doppler = quantile(dopplers, 0.999);
   return report;
 }
 

@@ -88,13 +88,13 @@ void findRateUnit(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
   const double as_radians = misfit(steps, 1.0), as_degrees = misfit(steps, degrees);
   const double least = std::min(as_radians, as_degrees);
   const double pairs = static_cast<double>(steps.force.size());
-  report->tilts = still / pairs > std::pow(kGravity * kLeastTilt, 2) && least < 0.7 * still;
-  const bool are_degrees = report->tilts ? as_degrees < as_radians : report->written_rate > kFastest;
+  const bool turns = still / pairs > std::pow(kGravity * kLeastTilt, 2);  // enough to show the unit
+  const bool are_degrees =
+      turns && least < 0.7 * still ? as_degrees < as_radians : report->written_rate > kFastest;
   if (are_degrees) report->units.rate = RateUnit::kDegreesPerSecond;
   const double scale = are_degrees ? degrees : 1.0;
   const double right = misfit(steps, scale), inverted = misfit(steps, -scale);
-  report->tilt_agreement = still > 0.0 ? 1.0 - right / still : 0.0;
-  if (still / pairs > std::pow(kGravity * kLeastTilt, 2) && inverted < 0.5 * right && inverted < 0.7 * still)
+  if (turns && inverted < 0.5 * right && inverted < 0.7 * still)
     report->rate_fault =
         "gyro and accelerometer contradict each other: gravity turns the other way. Their axes differ, or "
         "are left-handed";
@@ -121,7 +121,6 @@ void findNoise(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
   report->accel_density_quiet = quantile(accel_densities, 0.1);
   report->accel_density_median = quantile(accel_densities, 0.5);
   report->gyro_density_quiet = quantile(gyro_densities, 0.1);
-  report->gyro_density_median = quantile(gyro_densities, 0.5);
 }
 
 void findRest(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
@@ -156,7 +155,6 @@ void findRest(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
 
 ImuReport inspectImu(const std::vector<ImuMeasurement>& written) {
   ImuReport report;
-  report.samples = written.size();
   std::vector<ImuMeasurement> imu;
   std::vector<double> norms, rates;
   for (const ImuMeasurement& sample : written) {

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "rio_t/core/so3.h"
+#include "rio_t/inspection/stream_timing.h"
 
 namespace rio_t {
 namespace {
@@ -112,12 +113,6 @@ Quadratic costOf(const VelocityWindow& window, double offset, const std::optiona
   return cost;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 }  // namespace
 
 Quadratic withoutLast(const Quadratic& cost, Eigen::Index count) {
@@ -172,8 +167,8 @@ Quadratic mountingCost(double offset, const std::optional<Matrix3d>& M, const Mo
   return total;
 }
 
-MountingMisfit reweigh(double offset, const Matrix3d& M, const Vector3d& l_I, MountingProblem* problem) {
-  std::vector<double> squares, residuals;
+double reweigh(double offset, const Matrix3d& M, const Vector3d& l_I, MountingProblem* problem) {
+  std::vector<double> squares;
   for (VelocityWindow& window : problem->windows) {
     const Quadratic cost = costOf(window, offset, M, *problem);
     VectorXd x(kUnknowns);
@@ -189,13 +184,11 @@ MountingMisfit reweigh(double offset, const Matrix3d& M, const Vector3d& l_I, Mo
       const Matrix3d covariance = rows.covariance.block(at, at, 3, 3);
       const double square = e.dot(covariance.ldlt().solve(e)) / 3.0;
       squares.push_back(square);
-      residuals.push_back(e.squaredNorm() / 3.0);
       window[i].weight = 1.0 / (1.0 + square / (kOutlier * kOutlier));
     }
   }
   constexpr double kMeanOverMedian = 1.27;  // of a mean of three squares: chi-squared has its median at 2.37
-  return {std::sqrt(kMeanOverMedian * median(std::move(residuals))),
-          std::max(1.0, kMeanOverMedian * median(std::move(squares)))};
+  return std::max(1.0, kMeanOverMedian * quantile(std::move(squares), 0.5));
 }
 
 }  // namespace rio_t

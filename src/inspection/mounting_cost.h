@@ -51,14 +51,8 @@ Eigen::VectorXd columnsOf(const Eigen::Matrix3d& M);
 Quadratic mountingCost(double offset, const std::optional<Eigen::Matrix3d>& M,
                        const MountingProblem& problem);
 
-/// How badly the velocities fit a mounting, from medians.
-struct MountingMisfit {
-  double residual = 0.0;  ///< [m/s] root mean square, per axis
-  double square = 1.0;    ///< [sigma^2] mean, per axis; at least 1
-};
-
-/// Sets the weights of the velocities for a mounting, those of a Cauchy loss.
-MountingMisfit reweigh(double offset, const Eigen::Matrix3d& M, const Eigen::Vector3d& l_I,
-                       MountingProblem* problem);
+/// Sets the weights of the velocities for a mounting, those of a Cauchy loss. Returns how badly the
+/// velocities fit it: the mean [sigma^2] per axis, from the median; at least 1.
+double reweigh(double offset, const Eigen::Matrix3d& M, const Eigen::Vector3d& l_I, MountingProblem* problem);
 
 }  // namespace rio_t

@@ -184,27 +184,12 @@ void findOtherMounting(const Quadratic& cost, double square, MountingSearch* res
   }
 }
 
-void rankHypotheses(const Quadratic& cost, double unit, MountingSearch* result) {
-  const double floor = costOf(cost, result->sign * result->q_IR.toRotationMatrix());
-  const double velocities = static_cast<double>(result->velocities);
-  for (const int sign : {1, -1})
-    for (const Matrix3d& turn : axisTurns())
-      result->hypotheses.push_back({sign, turn, (costOf(cost, sign * turn) - floor) / (unit * velocities)});
-  std::stable_sort(result->hypotheses.begin(), result->hypotheses.end(),
-                   [](const AxesHypothesis& a, const AxesHypothesis& b) { return a.misfit < b.misfit; });
-}
-
-void describe(const std::vector<VelocityWindow>& windows, MountingSearch* result) {
-  std::vector<double> speeds;
-  for (const VelocityWindow& window : windows) {
-    result->duration += window.back().velocity->stamp - window.front().velocity->stamp;
-    for (const WeightedVelocity& each : window) speeds.push_back(each.velocity->v_R.norm());
-  }
-  result->velocities = speeds.size();
-  result->enough = result->duration >= kMinDuration;
-  if (!result->enough) return;
-  std::sort(speeds.begin(), speeds.end());
-  result->speed = speeds[speeds.size() * 9 / 10];
+/// [s]
+double durationOf(const std::vector<VelocityWindow>& windows) {
+  double duration = 0.0;
+  for (const VelocityWindow& window : windows)
+    duration += window.back().velocity->stamp - window.front().velocity->stamp;
+  return duration;
 }
 
 }  // namespace
@@ -236,7 +221,7 @@ MountingSearch searchMounting(const std::vector<RadarVelocity>& velocities, cons
                               const MountingSearchOptions& options) {
   MountingSearch result;
   MountingProblem problem{track, options, windowsOf(velocities, track, options.max_offset + 0.05)};
-  describe(problem.windows, &result);
+  result.enough = durationOf(problem.windows) >= kMinDuration;
   if (!result.enough) return result;
 
   // The first round looks at all offsets, the later ones around the bottom, with the noise as it was found.
@@ -266,13 +251,10 @@ MountingSearch searchMounting(const std::vector<RadarVelocity>& velocities, cons
     result.lever_arm_I =
         H_l.inverse() * (with_lever_arm.b.tail(kMountingL) -
                          with_lever_arm.H.bottomLeftCorner(kMountingL, kMountingM) * columnsOf(*M));
-    const MountingMisfit misfit = reweigh(result.offset, *M, result.lever_arm_I, &problem);
-    result.residual = misfit.residual;
-    scale = misfit.square;
+    scale = reweigh(result.offset, *M, result.lever_arm_I, &problem);
     setSigmas(cost, H_l, kAlike * scale, &result);
   }
   findOtherMounting(cost, kAlike * scale, &result);
-  rankHypotheses(cost, kAlike * scale, &result);
   return result;
 }
 

@@ -74,7 +74,6 @@ RadarVelocities radarVelocities(const std::vector<RadarScan>& scans) {
   for (std::size_t next = 0; next < scans.size();) {
     RadarScan group = nextGroup(scans, &next);
     if (group.points.empty()) continue;
-    ++result.groups;
     if (!result.has_elevation) addVertical(&group);
     const EgoVelocity velocity = estimator.estimate(group);
     if (!isValid(velocity.status)) continue;
@@ -96,6 +95,7 @@ DopplerSign dopplerSignFromRanges(const std::vector<RadarScan>& scans, const Ine
   constexpr double kClear = 3.0;                       // [sigma]
   DopplerSign result;
   double sum = 0.0, squares = 0.0;
+  int pairs = 0;  // of scans that voted
   for (std::size_t i = 0; i < scans.size(); ++i) {
     for (std::size_t k = i + 1; k < scans.size(); ++k) {
       const double apart = scans[k].stamp - scans[i].stamp;
@@ -118,13 +118,13 @@ DopplerSign dopplerSignFromRanges(const std::vector<RadarScan>& scans, const Ine
         vote += approaching - receding;
       }
       if (vote == 0.0) continue;
-      ++result.pairs;
+      ++pairs;
       sum += vote;
       squares += vote * vote;
     }
   }
   // Neighbouring pairs share their points, up to all pairs that one scan is in.
-  if (result.pairs < 20) return result;
+  if (pairs < 20) return result;
   constexpr double kShared = 4.0;
   result.significance = sum / std::sqrt(squares) / std::sqrt(kShared);
   if (std::abs(result.significance) > kClear) result.sign = result.significance > 0.0 ? 1 : -1;

@@ -21,7 +21,6 @@ StreamTiming inspectTiming(const std::vector<MessageTimes>& times) {
   StreamTiming timing;
   timing.messages = times.size();
   if (times.empty()) return timing;
-  timing.duration = times.back().record - times.front().record;
   std::vector<double> intervals, record_intervals;
   std::size_t same_as_first = 0;
   for (std::size_t i = 0; i < times.size(); ++i) {
@@ -56,7 +55,7 @@ StreamDelay delayAgainstImu(const std::vector<MessageTimes>& times, const std::v
   delays.reserve(times.size());
   for (const MessageTimes& each : times)
     delays.push_back(Time::fromNanoseconds(each.record.nanoseconds() - smallest) - each.stamp);
-  return {quantile(delays, 0.0), quantile(delays, 0.5), quantile(delays, 0.9)};
+  return {quantile(delays, 0.5), quantile(delays, 0.9)};
 }
 
 }  // namespace rio_t

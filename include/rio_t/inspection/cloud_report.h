@@ -10,17 +10,15 @@ namespace rio_t {
 
 /// Statistics of a radar's points.
 struct CloudReport {
-  std::size_t scans = 0, points = 0;
-  std::size_t empty = 0;  ///< scans without a point
+  std::size_t points = 0;
   double points_10 = 0.0, points_50 = 0.0,
          points_90 = 0.0;                       ///< a scan: 10, 50 and 90 % of the scans have fewer
-  double range_50 = 0.0, range_99 = 0.0;        ///< [m]
+  double range_99 = 0.0;                        ///< [m]
   double azimuth_95 = 0.0, elevation_95 = 0.0;  ///< [rad] to either side of forward (y) hold 95 %
   double behind = 0.0;                          ///< share of the points with a negative y
   double ambiguous = 0.0;                       ///< share of the points, see markAmbiguous()
   Eigen::Vector3d mean_direction = Eigen::Vector3d::Zero();  ///< of unit vectors; short: it looks all around
   Eigen::Vector3d spread = Eigen::Vector3d::Zero();  ///< standard deviation of the unit vectors, per axis
-  double largest_doppler = 0.0;                      ///< [m/s] that 99.9 % of the points do not exceed
   bool has_doppler = false;                          ///< some Doppler is not zero
 };
 

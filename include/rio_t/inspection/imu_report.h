@@ -11,7 +11,6 @@ namespace rio_t {
 
 /// An IMU as a recording shows it. All values are in m/s^2 and rad/s, but for those marked "as written".
 struct ImuReport {
-  std::size_t samples = 0;
   std::size_t not_finite = 0;
   double written_norm = 0.0;  ///< median of |acceleration|, as written
   double written_rate = 0.0;  ///< |angular velocity| that nine in ten samples do not exceed, as written
@@ -29,14 +28,8 @@ struct ImuReport {
   double accel_density_quiet = 0.0;   ///< [m/s^2/sqrt(Hz)] white noise, in the quietest tenth of the seconds
   double accel_density_median = 0.0;  ///< in the median second: more than at rest if the frame vibrates
   double gyro_density_quiet = 0.0;    ///< [rad/s/sqrt(Hz)]
-  double gyro_density_median = 0.0;
   double largest_acceleration = 0.0, largest_rate = 0.0;  ///< of an axis
   std::size_t saturated = 0;                              ///< samples at the end of the range
-
-  /// How well the gyro explains the turns of gravity that the accelerometer sees: 1 if it does, 0 if it says
-  /// nothing, negative if it contradicts. The platform must tilt to show it.
-  double tilt_agreement = 0.0;
-  bool tilts = false;
 };
 
 /// `written`: as the driver writes them, in the order of time; times must rise.

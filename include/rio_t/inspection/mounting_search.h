@@ -26,20 +26,9 @@ struct MountingSearchOptions {
   std::optional<Eigen::Vector3d> up_I;
 };
 
-/// How the Dopplers of a radar fit the IMU if v_I = M v_R with M a rotation times `sign`.
-struct AxesHypothesis {
-  int sign = 1;
-  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();  ///< one of the 24 turns of the axes
-  double misfit = 0.0;  ///< [sigma^2] above the best one, per independent velocity
-};
-
 /// The mounting of a radar as a recording shows it.
 struct MountingSearch {
-  bool enough = false;         ///< whether there was enough motion to look at; if not, the rest is empty
-  std::size_t velocities = 0;  ///< that were used
-  double speed = 0.0;          ///< [m/s] that nine in ten of them do not exceed
-  double duration = 0.0;       ///< [s] of the windows with motion
-  double residual = 0.0;       ///< [m/s] root mean square, per axis
+  bool enough = false;  ///< whether there was enough motion to look at; if not, the rest is empty
 
   /// v_I = sign q_IR v_R - omega x l: as found, with q_IR a rotation.
   int sign = 1;
@@ -51,9 +40,8 @@ struct MountingSearch {
   Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Zero();   ///< [rad] about the axes of I; pi: not observed
   Eigen::Vector3d lever_arm_I = Eigen::Vector3d::Zero();      ///< [m]
   Eigen::Vector3d lever_arm_sigma = Eigen::Vector3d::Zero();  ///< [m]
-  double offset = 0.0;                     ///< [s] a scan stamped s was measured at s - offset
-  double offset_sigma = 0.0;               ///< [s]
-  std::vector<AxesHypothesis> hypotheses;  ///< all 48, the best first
+  double offset = 0.0;        ///< [s] a scan stamped s was measured at s - offset
+  double offset_sigma = 0.0;  ///< [s]
 };
 
 /// Searches mounting, sign of the Doppler and time offset, coarsely, over all rotations, both signs and all

@@ -19,7 +19,6 @@ struct RadarVelocity {
 struct RadarVelocities {
   std::vector<RadarVelocity> velocities;  ///< in the order of the scans
   DopplerStep doppler_step;
-  std::size_t groups = 0;  ///< of scans that were tried; `velocities` has those that gave a velocity
   bool has_elevation = true;
 };
 
@@ -33,7 +32,6 @@ struct DopplerSign {
   /// +1: positive for receding targets; -1: for approaching ones; 0: the ranges do not show it.
   int sign = 0;
   double significance = 0.0;  ///< mean vote over its standard deviation; positive for receding
-  std::size_t pairs = 0;      ///< of scans that voted
 };
 
 /// Compares the points of scans that lie 0.15 to 0.6 s apart: a range changes as its Doppler says, with the

@@ -15,7 +15,6 @@ struct MessageTimes {
 /// How the messages of one topic come.
 struct StreamTiming {
   std::size_t messages = 0;
-  double duration = 0.0;  ///< [s] from the first to the last, as recorded
   double rate = 0.0;      ///< [Hz] of the median interval of the stamps; of the records if they tell nothing
   std::size_t zero = 0;   ///< stamps of zero
   bool constant = false;  ///< all stamps are the same, and not zero
@@ -33,7 +32,7 @@ StreamTiming inspectTiming(const std::vector<MessageTimes>& times);
 
 /// Arrival against the stamp, both in the IMU clock [s].
 struct StreamDelay {
-  double least = 0.0, median = 0.0, most = 0.0;  ///< most: of nine in ten
+  double median = 0.0, most = 0.0;  ///< most: of nine in ten
 };
 
 /// The delays of a topic beyond those of the IMU: the smallest difference between record and stamp of the IMU
