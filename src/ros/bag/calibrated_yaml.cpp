@@ -2,47 +2,26 @@
 #include <cmath>
 #include <map>
 #include <string>
-#include <utility>
 #include <variant>
 #include <vector>
 
+#include "inspect_keys.h"
 #include "rio_t/ros/bag/calibration.h"
 
 namespace rio_t {
 namespace {
 
-/// Keys in the order in which they came, each once.
-class Keys {
- public:
-  /// The later value holds.
-  void set(const std::string& key, const std::string& value) {
-    for (auto& [known, old] : keys_) {
-      if (known == key) {
-        old = value;
-        return;
-      }
-    }
-    keys_.emplace_back(key, value);
-  }
-  void remove(const std::string& key) {
-    keys_.erase(
-        std::remove_if(keys_.begin(), keys_.end(), [&](const auto& each) { return each.first == key; }),
-        keys_.end());
-  }
-  std::string yaml(const std::string& indent) const {
-    std::string text;
-    for (const auto& [key, value] : keys_) text += indent + key + ": " + value + "\n";
-    return text;
-  }
-
- private:
-  std::vector<std::pair<std::string, std::string>> keys_;  // values as YAML
-};
+/// Each value is one text in YAML, also a list.
+std::string yamlOf(const ProposedKeys& keys, const std::string& indent) {
+  std::string text;
+  for (const ProposedKey& key : keys.all()) text += indent + key.key + ": " + key.values.front() + "\n";
+  return text;
+}
 
 /// What the user gave: the top level, and the section of each radar.
 struct Given {
-  Keys top_level;
-  std::map<std::string, Keys> sections;
+  ProposedKeys top_level;
+  std::map<std::string, ProposedKeys> sections;
 };
 
 Given sorted(const ParameterEntries& entries, const std::vector<Config>& radars) {
@@ -82,13 +61,13 @@ std::string listYaml(const Vector& values, const Vector& told, double per) {
 }
 
 /// The keys of a radar that are calibrated.
-Keys calibratedKeys(const RadarCalibration& calibration, const Config& told) {
+ProposedKeys calibratedKeys(const RadarCalibration& calibration, const Config& told) {
   constexpr double kMicro = 1e6, kNano = 1e9;  // in one
   const SmootherOptions& smoother = told.odometry.smoother;
   const Extrinsics& mounting = told.odometry.T_IR;
   const bool offset_found =
       calibration.axes[static_cast<std::size_t>(CalibrationAxis::kOffset)].verdict == Verdict::kObserved;
-  Keys keys;
+  ProposedKeys keys;
   keys.set("extrinsics_translation", listYaml(calibration.T_IR.l_I, mounting.l_I, kMicro));
   keys.set("extrinsics_rotation_xyzw",
            listYaml(calibration.T_IR.q_IR.coeffs(), mounting.q_IR.coeffs(), kNano));
@@ -161,17 +140,17 @@ std::string calibratedYaml(const BagCalibration& calibration, const Config& conf
   for (std::size_t k = 0; k < told.size(); ++k) {
     const CalibratedRadar& radar = calibration.radars[k];
     const std::string indent = has_sections ? "  " : "";
-    Keys& own = has_sections ? entries.sections[radar.name] : entries.top_level;
+    ProposedKeys& own = has_sections ? entries.sections[radar.name] : entries.top_level;
     for (const char* key :
          {"extrinsics_translation", "extrinsics_rotation_xyzw", "mounting_yaw_pitch_roll_deg",
           "extrinsics_axes", "time_offset_initial", "time_offset_sigma"})
       own.remove(key);
-    if (has_sections) sections += "\n" + radar.name + ":\n" + own.yaml(indent);
+    if (has_sections) sections += "\n" + radar.name + ":\n" + yamlOf(own, indent);
     sections += (has_sections ? "" : "\n") + commented(describeCalibration(radar), indent) + indent +
                 "# If the driver's restart changes the offset, raise time_offset_sigma.\n" +
-                calibratedKeys(radar.calibration, told[k]).yaml(indent);
+                yamlOf(calibratedKeys(radar.calibration, told[k]), indent);
   }
-  return header(calibration, name) + "\n" + entries.top_level.yaml("") + "\n" +
+  return header(calibration, name) + "\n" + yamlOf(entries.top_level, "") + "\n" +
          estimateNext(all_turns_observed) + sections;
 }
 

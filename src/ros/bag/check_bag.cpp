@@ -21,16 +21,6 @@ void append(const std::vector<Finding>& from, std::vector<Finding>* to) {
   to->insert(to->end(), from.begin(), from.end());
 }
 
-void add(const ProposedKeys& from, ProposedKeys* to) {
-  for (const ProposedKey& key : from.all()) {
-    if (key.is_list) {
-      to->setList(key.key, key.values, key.why);
-    } else {
-      to->set(key.key, key.values.front(), key.why);
-    }
-  }
-}
-
 /// The IMU that can be used, with the most samples; if none can be used, one that says why. There is at least
 /// one. The report names the others.
 ImuInspection chooseImu(const Recording& recording, BagCheck* check) {
@@ -89,7 +79,7 @@ std::vector<std::string> radarNames(const std::vector<RadarInspection>& radars) 
 
 ProposedConfig proposed(const ImuInspection& imu, const std::vector<RadarInspection>& radars) {
   ProposedConfig config;
-  add(imu.keys, &config.top_level);
+  config.top_level.add(imu.keys);
   double worst = 0.0;
   bool all_observed = true;
   for (const RadarInspection& radar : radars) {
@@ -104,11 +94,11 @@ ProposedConfig proposed(const ImuInspection& imu, const std::vector<RadarInspect
     config.top_level.set("extrinsics_rotation_sigma", fixedText(std::max(kLeast, kSafety * worst), 2),
                          "Standard deviation of the mounting below [rad], with a margin.");
   if (radars.size() == 1) {
-    add(radars.front().keys, &config.top_level);
+    config.top_level.add(radars.front().keys);
     return config;
   }
   const std::vector<std::string> names = radarNames(radars);
-  config.top_level.setList("radars", names, "");
+  config.top_level.setList("radars", names);
   for (std::size_t k = 0; k < radars.size(); ++k) config.radars.emplace_back(names[k], radars[k].keys);
   return config;
 }
@@ -226,7 +216,7 @@ void chooseByTrial(const Recording& recording, const std::string& header, Propos
     if (best.good()) break;
     ProposedConfig alone{config.top_level, {}};
     alone.top_level.remove("radars");
-    add(keys, &alone.top_level);
+    alone.top_level.add(keys);
     const std::string yaml = toYaml(alone, header);
     const Trial trial = tryOut(recording, yaml, duration);
     if (trial.score() <= best.score()) continue;

@@ -99,16 +99,16 @@ void guessFormat(const std::vector<std::string>& fields, FormatProposal* proposa
   const std::string preset = cartesian ? "coloradar" : "ars548_hkust";
   proposal->keys.set("radar_format", preset,
                      "No preset has these fields; this one is near: " + proposal->fields);
-  if (pointCloudPreset(preset).doppler != doppler) proposal->keys.set("radar_field_doppler", doppler, "");
+  if (pointCloudPreset(preset).doppler != doppler) proposal->keys.set("radar_field_doppler", doppler);
   if (!cartesian) {
-    if (azimuth != "azimuth") proposal->keys.set("radar_field_azimuth", azimuth, "");
-    if (elevation != "elevation") proposal->keys.set("radar_field_elevation", elevation, "");
-    if (range != "range") proposal->keys.set("radar_field_range", range, "");
+    if (azimuth != "azimuth") proposal->keys.set("radar_field_azimuth", azimuth);
+    if (elevation != "elevation") proposal->keys.set("radar_field_elevation", elevation);
+    if (range != "range") proposal->keys.set("radar_field_range", range);
   }
   const std::string power = fieldLike(fields, {"snr"});
   if (!power.empty()) {
-    proposal->keys.set("radar_field_power", power, "");
-    proposal->keys.set("radar_power_unit", "snr_db", "");
+    proposal->keys.set("radar_field_power", power);
+    proposal->keys.set("radar_power_unit", "snr_db");
   }
   proposal->odd.push_back("no preset has the fields " + proposal->fields + "; " + doppler +
                           " is taken for the Doppler");

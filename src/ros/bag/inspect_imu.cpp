@@ -175,7 +175,7 @@ void describe(ImuInspection* imu) {
 ImuInspection inspectImuTopic(const ImuTopic& topic) {
   ImuInspection imu;
   imu.topic = topic.topic;
-  imu.keys.set("imu_topic", topic.topic, "");
+  imu.keys.set("imu_topic", topic.topic);
   const StreamTiming written = inspectTiming(topic.times);
   const std::string fault = faultOf(written);
   if (!fault.empty()) {

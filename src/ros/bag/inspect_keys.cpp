@@ -60,16 +60,14 @@ void ProposedKeys::setList(const std::string& key, const std::vector<std::string
   put({key, values, true, why});
 }
 
+void ProposedKeys::add(const ProposedKeys& other) {
+  for (const ProposedKey& key : other.all()) put(key);
+}
+
 void ProposedKeys::remove(const std::string& key) {
   keys_.erase(
       std::remove_if(keys_.begin(), keys_.end(), [&](const ProposedKey& each) { return each.key == key; }),
       keys_.end());
-}
-
-const ProposedKey* ProposedKeys::find(const std::string& key) const {
-  const auto found =
-      std::find_if(keys_.begin(), keys_.end(), [&](const ProposedKey& each) { return each.key == key; });
-  return found == keys_.end() ? nullptr : &*found;
 }
 
 std::string toYaml(const ProposedConfig& proposed, const std::string& header) {

@@ -9,7 +9,7 @@
 
 namespace rio_t {
 
-/// A key of a configuration that an inspection proposes, and why.
+/// A key of a configuration that a program proposes, and why.
 struct ProposedKey {
   std::string key;
   std::vector<std::string> values;  ///< one, or the elements of a list; as plain YAML
@@ -21,10 +21,10 @@ struct ProposedKey {
 class ProposedKeys {
  public:
   /// The later value holds.
-  void set(const std::string& key, const std::string& value, const std::string& why);
-  void setList(const std::string& key, const std::vector<std::string>& values, const std::string& why);
+  void set(const std::string& key, const std::string& value, const std::string& why = "");
+  void setList(const std::string& key, const std::vector<std::string>& values, const std::string& why = "");
+  void add(const ProposedKeys& other);
   void remove(const std::string& key);
-  const ProposedKey* find(const std::string& key) const;
   const std::vector<ProposedKey>& all() const { return keys_; }
 
  private:

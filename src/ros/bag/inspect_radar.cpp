@@ -247,9 +247,9 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   radar.usable = true;
   radar.search = looked.search;
   radar.points = looked.cloud.points_50;
-  radar.keys.set("radar_topic", cloud.topic, "");
-  for (const ProposedKey& key : format.keys.all()) radar.keys.set(key.key, key.values.front(), key.why);
-  for (const ProposedKey& key : stamps.keys.all()) radar.keys.set(key.key, key.values.front(), key.why);
+  radar.keys.set("radar_topic", cloud.topic);
+  radar.keys.add(format.keys);
+  radar.keys.add(stamps.keys);
   limitsOfCloud(looked.cloud, &radar.keys);
   describeCloud(looked, format, timing, &radar);
   for (const std::string& odd : stamps.odd) radar.findings.push_back({FindingLevel::kOdd, "stamps", odd});

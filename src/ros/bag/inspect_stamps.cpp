@@ -88,7 +88,7 @@ StampProposal proposeStamps(const Recording& recording, const std::vector<Messag
     proposal.source = StampSource::kTrigger;
     proposal.trigger_topic = trigger->topic;
     proposal.keys.set("stamp_source", "trigger", "By itself " + fault + ".");
-    proposal.keys.set("trigger_topic", trigger->topic, "");
+    proposal.keys.set("trigger_topic", trigger->topic);
     proposal.text = "stamps of the trigger " + trigger->topic;
     proposal.odd.push_back(fault + "; stamp_source: trigger takes those of " + trigger->topic);
   } else {
