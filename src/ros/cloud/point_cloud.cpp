@@ -1,6 +1,7 @@
 #include "rio_t/ros/cloud/point_cloud.h"
 
 #include <pcl_conversions/pcl_conversions.h>
+#include <sensor_msgs/point_field_conversion.h>
 
 #include <algorithm>
 #include <array>
@@ -8,7 +9,6 @@
 #include <boost/endian/conversion.hpp>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -22,24 +22,9 @@ using boost::algorithm::join;
 using sensor_msgs::PointCloud2;
 using sensor_msgs::PointField;
 
-std::size_t sizeOf(std::uint8_t datatype) {
-  switch (datatype) {
-    case PointField::INT8:
-    case PointField::UINT8:
-      return 1;
-    case PointField::INT16:
-    case PointField::UINT16:
-      return 2;
-    case PointField::INT32:
-    case PointField::UINT32:
-    case PointField::FLOAT32:
-      return 4;
-    case PointField::FLOAT64:
-      return 8;
-    default:
-      return 0;
-  }
-}
+/// [bytes] by datatype. PointField counts its datatypes from 1.
+constexpr std::array<std::size_t, 9> kSizes = {0, 1, 1, 2, 2, 4, 4, 4, 8};
+static_assert(PointField::INT8 == 1 && PointField::FLOAT64 == 8);
 
 std::string fieldsOf(const PointCloud2& message) {
   std::vector<std::string> names;
@@ -114,8 +99,8 @@ class FieldReader {
     if (std::count_if(message.fields.begin(), message.fields.end(), same_name) > 1) {
       throwLayout(message, "field '" + name + "' is there twice");
     }
-    const std::size_t size = sizeOf(field->datatype);
-    if (size == 0) {
+    size_ = field->datatype < kSizes.size() ? kSizes[field->datatype] : 0;
+    if (size_ == 0) {
       throwLayout(message,
                   "field '" + name + "' has the unknown datatype " + std::to_string(field->datatype));
     }
@@ -127,47 +112,26 @@ class FieldReader {
     swaps_bytes_ = (message.is_bigendian != 0) != kHostIsBigEndian;
     offset_ = field->offset;
     datatype_ = field->datatype;
-    if (static_cast<std::uint64_t>(offset_) + size > message.point_step) {
+    if (static_cast<std::uint64_t>(offset_) + size_ > message.point_step) {
       throwLayout(message, "field '" + name + "' at offset " + std::to_string(offset_) + " with " +
-                               std::to_string(size) + " bytes does not fit into a point");
+                               std::to_string(size_) + " bytes does not fit into a point");
     }
   }
 
   double read(const std::uint8_t* point) const {
-    const std::uint8_t* bytes = point + offset_;
-    switch (datatype_) {
-      case PointField::INT8:
-        return as<std::int8_t>(bytes);
-      case PointField::UINT8:
-        return as<std::uint8_t>(bytes);
-      case PointField::INT16:
-        return as<std::int16_t>(bytes);
-      case PointField::UINT16:
-        return as<std::uint16_t>(bytes);
-      case PointField::INT32:
-        return as<std::int32_t>(bytes);
-      case PointField::UINT32:
-        return as<std::uint32_t>(bytes);
-      case PointField::FLOAT32:
-        return as<float>(bytes);
-      default:
-        return as<double>(bytes);
+    alignas(double) std::array<std::uint8_t, sizeof(double)> bytes = {};  // fields need not be aligned
+    const std::uint8_t* const field = point + offset_;
+    if (swaps_bytes_) {
+      std::reverse_copy(field, field + size_, bytes.begin());
+    } else {
+      std::copy_n(field, size_, bytes.begin());
     }
+    return sensor_msgs::readPointCloud2BufferValue<double>(bytes.data(), datatype_);
   }
 
  private:
-  template <typename T>
-  double as(const std::uint8_t* bytes) const {
-    std::array<std::uint8_t, sizeof(T)> ordered = {};
-    std::copy_n(bytes, sizeof(T), ordered.begin());  // fields need not be aligned
-    if (swaps_bytes_) std::reverse(ordered.begin(), ordered.end());
-    T value;
-    std::memcpy(&value, ordered.data(), sizeof value);
-    return static_cast<double>(value);
-  }
-
   bool swaps_bytes_ = false;
-  std::size_t offset_ = 0;
+  std::size_t offset_ = 0, size_ = 0;
   std::uint8_t datatype_ = 0;
 };
 
