@@ -128,7 +128,7 @@ TEST_F(CheckBag, AnotherUnitOfThePowerIsNamed) {
   };
   const BagCheck odd = check(rewritten("power", changes));
   expectLine(odd, FindingLevel::kOdd, {"format", "snr_decidb"});
-  EXPECT_EQ(configOf(odd).radar_overrides.power_unit, "snr_decidb");
+  EXPECT_EQ(configOf(odd).radar_overrides.power_unit, PowerUnit::kSnrDeciDb);
   expectRuns(odd);
 }
 

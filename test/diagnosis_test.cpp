@@ -86,7 +86,7 @@ TEST(Diagnosis, FilteredPointsNameTheFilterAndTheUnit) {
   pointsOf(evidence, PointVerdict::kTooWeak) = 10000;
   evidence.radars.front().snr_sum_db = 15000.0;
   Config config;
-  config.radar_overrides.power_unit = "snr_decidb";
+  config.radar_overrides.power_unit = PowerUnit::kSnrDeciDb;
   expectSays(
       first(evidence, config),
       {"points_too_weak: 10000 of 10000 points are below radar_min_snr_db 3 dB", "their mean is 1.5 dB",

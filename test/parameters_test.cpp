@@ -10,6 +10,7 @@
 #include <optional>
 #include <set>
 #include <sstream>
+#include <stdexcept>
 
 #include "parameter_faults.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
@@ -379,12 +380,16 @@ TEST(Parameters, OverridesChangeThePresetInAnyOrder) {
 /// Stands for a value of any type in a braced list.
 struct Anything {
   template <typename T>
-  operator T() const;  // never defined: only asked for
+  operator T() const {  // never called: only asked for
+    throw std::logic_error("a value of any type");
+  }
 };
 
-// gcc 10 warns of missing members also where nothing is initialised.
+// gcc 10 warns of missing members also where nothing is initialised, and gcc of the constructor by which
+// Anything becomes an std::optional.
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wmissing-field-initializers"
+#pragma GCC diagnostic ignored "-Wconversion"
 template <typename T, typename Enable, typename... Values>
 struct TakesImpl : std::false_type {};
 template <typename T, typename... Values>

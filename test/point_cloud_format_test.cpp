@@ -12,6 +12,7 @@
 
 #include "point_cloud_message.h"
 #include "rio_t/ros/cloud/point_cloud.h"
+#include "rio_t/ros/parameters/parameters.h"
 
 namespace rio_t {
 namespace {
@@ -179,20 +180,15 @@ TEST(PointCloudFormat, EveryDatatype) {
   EXPECT_EQ(decoded(b).y, 200.0F);
 }
 
-TEST(PointCloudFormat, NamesOfTheChoices) {
-  for (const PointAxes a : {PointAxes::kRightForwardUp, PointAxes::kForwardLeftUp}) {
-    EXPECT_EQ(pointAxesFromString(toString(a)), a);
-  }
-  for (const PointCoordinates c : {PointCoordinates::kCartesian, PointCoordinates::kSpherical}) {
-    EXPECT_EQ(pointCoordinatesFromString(toString(c)), c);
-  }
+TEST(PointCloudFormat, APowerUnitIsSetByItsName) {
   for (const PowerUnit u :
        {PowerUnit::kSnrDb, PowerUnit::kSnrDeciDb, PowerUnit::kSnrLinear, PowerUnit::kNotSnr}) {
-    EXPECT_EQ(powerUnitFromString(toString(u)), u);
+    const Config config = makeConfig({parseAssignment("radar_power_unit=" + toString(u))});
+    EXPECT_EQ(pointCloudFormat(config).power_unit, u);
   }
-  EXPECT_THROW(pointAxesFromString("ned"), std::invalid_argument);
-  EXPECT_THROW(pointCoordinatesFromString(""), std::invalid_argument);
-  EXPECT_THROW(powerUnitFromString("watt"), std::invalid_argument);
+}
+
+TEST(PointCloudFormat, ASignOfZeroIsRefused) {
   PointCloudFormat f;
   f.doppler_sign = 0;
   EXPECT_THROW(decode(irsMessage(), f), std::invalid_argument);

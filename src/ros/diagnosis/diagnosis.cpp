@@ -130,8 +130,8 @@ class RadarCauses {
   }
 
   std::string powerReader() const {
-    return config_.radar_overrides.power_unit.empty() ? "the preset " + config_.radar_format
-                                                      : key_ + "radar_power_unit";
+    return config_.radar_overrides.power_unit ? key_ + "radar_power_unit"
+                                              : "the preset " + config_.radar_format;
   }
 
   void addStamps() {

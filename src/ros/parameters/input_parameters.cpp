@@ -123,10 +123,17 @@ void listPointCloud(ParameterList& list, Config& c) {
       "This preset says how your driver lays out its cloud: names of the fields, axes, sign of the "
       "Doppler and unit of the power. If no preset fits, take the nearest and change what differs "
       "with the keys radar_field_..., radar_axes, radar_doppler_sign and radar_power_unit.");
-  list.word("radar_coordinates", {"", "cartesian", "spherical"}, c.radar_overrides.coordinates,
-            "The cloud has positions as x, y, z (cartesian) or as azimuth, elevation, range (spherical).");
-  list.first().word(
-      "radar_axes", {"", "rfu", "flu"}, c.radar_overrides.axes,
+  list.choice<std::optional<PointCoordinates>>(
+      "radar_coordinates",
+      {{"", std::nullopt},
+       {"cartesian", PointCoordinates::kCartesian},
+       {"spherical", PointCoordinates::kSpherical}},
+      c.radar_overrides.coordinates,
+      "The cloud has positions as x, y, z (cartesian) or as azimuth, elevation, range (spherical).");
+  list.first().choice<std::optional<PointAxes>>(
+      "radar_axes",
+      {{"", std::nullopt}, {"rfu", PointAxes::kRightForwardUp}, {"flu", PointAxes::kForwardLeftUp}},
+      c.radar_overrides.axes,
       "These are the axes of the cloud. rfu: x right, y forward, z up. flu: x forward, y left, z up, "
       "as REP-103. Empty means the axes of the preset.");
   list.textOrEmpty("radar_field_x", c.radar_overrides.x,
@@ -155,13 +162,18 @@ void listPointCloud(ParameterList& list, Config& c) {
   list.textOrEmpty(
       "radar_field_power", c.radar_overrides.power,
       "This field holds the signal to noise of a point, in the unit that radar_power_unit names.");
-  list.word(
-      "radar_power_unit", {"", "snr_db", "snr_decidb", "snr_linear", "not_snr"}, c.radar_overrides.power_unit,
+  std::vector<std::pair<std::string, std::optional<PowerUnit>>> units = {{"", std::nullopt}};
+  for (const PowerUnit unit :
+       {PowerUnit::kSnrDb, PowerUnit::kSnrDeciDb, PowerUnit::kSnrLinear, PowerUnit::kNotSnr})
+    units.emplace_back(toString(unit), unit);
+  list.choice<std::optional<PowerUnit>>(
+      "radar_power_unit", units, c.radar_overrides.power_unit,
       "This is the unit of the power field. snr_db: signal to noise in dB. snr_decidb: in steps of 0.1 dB. "
       "snr_linear: a plain ratio. not_snr: something else, such as RCS; then the field is not read and "
       "radar_min_snr_db does not apply. Change it if radar_min_snr_db removes almost all points.");
-  list.word(
-      "radar_cloud_size", {"", "declared", "from_data"}, c.radar_overrides.size,
+  list.choice<std::optional<bool>>(
+      "radar_cloud_size", {{"", std::nullopt}, {"declared", false}, {"from_data", true}},
+      c.radar_overrides.size_from_data,
       "This says how the number of points is found. declared: width times height. from_data: from the length "
       "of the data, for drivers that leave width and height at zero.");
 }

@@ -283,10 +283,10 @@ ConfigError::ConfigError(std::vector<std::string> faults)
 PointCloudFormat pointCloudFormat(const Config& config) {
   PointCloudFormat format = pointCloudPreset(config.radar_format);
   const PointCloudOverrides& overrides = config.radar_overrides;
-  if (!overrides.coordinates.empty()) format.coordinates = pointCoordinatesFromString(overrides.coordinates);
-  if (!overrides.axes.empty()) format.axes = pointAxesFromString(overrides.axes);
-  if (!overrides.power_unit.empty()) format.power_unit = powerUnitFromString(overrides.power_unit);
-  if (!overrides.size.empty()) format.size_from_data = overrides.size == "from_data";
+  format.coordinates = overrides.coordinates.value_or(format.coordinates);
+  format.axes = overrides.axes.value_or(format.axes);
+  format.power_unit = overrides.power_unit.value_or(format.power_unit);
+  format.size_from_data = overrides.size_from_data.value_or(format.size_from_data);
   if (overrides.doppler_sign != 0) format.doppler_sign = overrides.doppler_sign;
   const std::pair<const std::string*, std::string*> names[] = {
       {&overrides.x, &format.x},

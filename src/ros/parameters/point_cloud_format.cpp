@@ -1,45 +1,12 @@
 #include "rio_t/ros/parameters/point_cloud_format.h"
 
-#include <array>
 #include <boost/algorithm/string/join.hpp>
 #include <stdexcept>
-#include <utility>
 
 #include "rio_t/radar/mounting.h"
 
 namespace rio_t {
 namespace {
-
-template <typename Choice, std::size_t N>
-using Names = std::array<std::pair<Choice, const char*>, N>;
-
-constexpr Names<PointAxes, 2> kAxes = {
-    {{PointAxes::kRightForwardUp, "rfu"}, {PointAxes::kForwardLeftUp, "flu"}}};
-constexpr Names<PointCoordinates, 2> kCoordinates = {
-    {{PointCoordinates::kCartesian, "cartesian"}, {PointCoordinates::kSpherical, "spherical"}}};
-constexpr Names<PowerUnit, 4> kPowerUnits = {{{PowerUnit::kSnrDb, "snr_db"},
-                                              {PowerUnit::kSnrDeciDb, "snr_decidb"},
-                                              {PowerUnit::kSnrLinear, "snr_linear"},
-                                              {PowerUnit::kNotSnr, "not_snr"}}};
-
-template <typename Choice, std::size_t N>
-std::string nameOf(Choice choice, const Names<Choice, N>& names) {
-  for (const auto& [value, name] : names) {
-    if (value == choice) return name;
-  }
-  throw std::invalid_argument("point cloud: a choice without a name");
-}
-
-template <typename Choice, std::size_t N>
-Choice choiceOf(const std::string& name, const char* what, const Names<Choice, N>& names) {
-  std::string known;
-  for (const auto& [value, value_name] : names) {
-    if (name == value_name) return value;
-    known += known.empty() ? value_name : std::string(", ") + value_name;
-  }
-  throw std::invalid_argument(std::string("point cloud: ") + what + " must be one of " + known + ", not '" +
-                              name + "'");
-}
 
 PointCloudFormat flu(const char* name, const char* doppler, const char* power, PowerUnit unit) {
   PointCloudFormat f;
@@ -86,14 +53,19 @@ const std::vector<PointCloudFormat>& presets() {
 
 }  // namespace
 
-std::string toString(PointAxes axes) { return nameOf(axes, kAxes); }
-std::string toString(PointCoordinates coordinates) { return nameOf(coordinates, kCoordinates); }
-std::string toString(PowerUnit unit) { return nameOf(unit, kPowerUnits); }
-PointAxes pointAxesFromString(const std::string& name) { return choiceOf(name, "axes", kAxes); }
-PointCoordinates pointCoordinatesFromString(const std::string& name) {
-  return choiceOf(name, "coordinates", kCoordinates);
+std::string toString(PowerUnit unit) {
+  switch (unit) {
+    case PowerUnit::kSnrDb:
+      return "snr_db";
+    case PowerUnit::kSnrDeciDb:
+      return "snr_decidb";
+    case PowerUnit::kSnrLinear:
+      return "snr_linear";
+    case PowerUnit::kNotSnr:
+      return "not_snr";
+  }
+  throw std::invalid_argument("not a PowerUnit");
 }
-PowerUnit powerUnitFromString(const std::string& name) { return choiceOf(name, "power_unit", kPowerUnits); }
 
 Eigen::Quaterniond cloudFromRfu(PointAxes axes) {
   return axes == PointAxes::kForwardLeftUp ? fluFromRfu() : Eigen::Quaterniond::Identity();

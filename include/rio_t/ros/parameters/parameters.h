@@ -55,16 +55,16 @@ enum class ExtrinsicsAxes {
   kCloud,           ///< "cloud": the cloud's own, see `radar_axes`
 };
 
-/// What is changed of the preset `radar_format`. Empty text and a sign of zero leave it as it is.
+/// What is changed of the preset `radar_format`. Empty text, no value and a sign of zero leave it as it is.
 struct PointCloudOverrides {
-  std::string coordinates;
-  std::string axes;
+  std::optional<PointCoordinates> coordinates;
+  std::optional<PointAxes> axes;
   std::string x, y, z, azimuth, elevation, range;
   std::string doppler;
   int doppler_sign = 0;
   std::string power;
-  std::string power_unit;
-  std::string size;  ///< "declared" or "from_data"
+  std::optional<PowerUnit> power_unit;
+  std::optional<bool> size_from_data;
 };
 
 /// All that a user can set: the estimator's options and what surrounds them. Each member has one key, listed

@@ -28,13 +28,7 @@ enum class PowerUnit {
   kNotSnr,     ///< "not_snr": RCS, a raw intensity, or nothing: not read, the SNR filter does not apply
 };
 
-std::string toString(PointAxes axes);
-std::string toString(PointCoordinates coordinates);
 std::string toString(PowerUnit unit);
-// The inverses throw std::invalid_argument, naming the choices.
-PointAxes pointAxesFromString(const std::string& name);
-PointCoordinates pointCoordinatesFromString(const std::string& name);
-PowerUnit powerUnitFromString(const std::string& name);
 
 /// Turns vectors with x right, y forward, z up into the axes of the cloud.
 Eigen::Quaterniond cloudFromRfu(PointAxes axes);
