@@ -23,11 +23,6 @@ std::string keyOf(const Config& radar, const std::string& key) {
   return radar.radar_name.empty() ? key : radar.radar_name + "/" + key;
 }
 
-std::uint64_t countOf(const std::map<std::string, std::uint64_t>& counts, const char* name) {
-  const auto found = counts.find(name);
-  return found == counts.end() ? 0 : found->second;
-}
-
 std::string noMessages(const Config& radar) {
   return "no messages on topic " + radar.radar_topic + " (" + keyOf(radar, "radar_topic") +
          ") in the part played";

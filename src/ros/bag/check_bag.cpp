@@ -110,9 +110,7 @@ struct Trial {
 
   /// Copies do not count.
   double shareUsed() const {
-    const std::map<std::string, std::uint64_t> rejected = summary.scansRejected();
-    const auto found = rejected.find("duplicate_stamp");
-    const std::uint64_t duplicates = found == rejected.end() ? 0 : found->second;
+    const std::uint64_t duplicates = countOf(summary.scansRejected(), "duplicate_stamp");
     const std::uint64_t judged = summary.scansTotal() - std::min(copies, duplicates);
     return static_cast<double>(summary.scansUsed()) / static_cast<double>(std::max<std::uint64_t>(1, judged));
   }

@@ -29,11 +29,6 @@ double shareOf(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
-std::uint64_t countOf(const Counts& counts, const std::string& name) {
-  const auto found = counts.find(name);
-  return found == counts.end() ? 0 : found->second;
-}
-
 std::uint64_t sumOf(const Counts& counts, const std::vector<std::string>& names) {
   std::uint64_t sum = 0;
   for (const std::string& name : names) sum += countOf(counts, name);
@@ -91,6 +86,15 @@ class RadarCauses {
     causes_->push_back({name, text, remedy, share});
   }
 
+  /// A reason why scans were rejected, or gave no velocity before the start.
+  void scans(const std::string& reason, const std::string& text, const std::string& remedy) {
+    const std::uint64_t count =
+        countOf(radar_.scans_rejected, reason) + countOf(radar_.velocity_status, reason);
+    const double share = shareOf(count, radar_.scans_total);
+    if (share < kManyScans) return;
+    cause(reason, share, outOf(count, radar_.scans_total, "scans") + of_ + " " + text, remedy);
+  }
+
   void addPointFilter() {
     const EgoVelocityOptions& o = config_.odometry.ego_velocity;
     const auto filter = [&](PointVerdict verdict, const std::string& name, const std::string& are,
@@ -135,22 +139,16 @@ class RadarCauses {
   }
 
   void addStamps() {
-    const auto stamps = [&](const std::string& reason, const std::string& text, const std::string& remedy) {
-      const std::uint64_t count = countOf(radar_.scans_rejected, reason);
-      const double share = shareOf(count, radar_.scans_total);
-      if (share < kManyScans) return;
-      cause(reason, share, outOf(count, radar_.scans_total, "scans") + of_ + " " + text, remedy);
-    };
     const std::string other =
         "Set " + key_ + "stamp_source: arrival, or correct the clock with " + key_ + "radar_stamp_shift.";
-    stamps("stamp_zero", "have a stamp of zero.", "Set " + key_ + "stamp_source to trigger or arrival.");
-    stamps("stamp_ahead_of_imu", "are stamped ahead of the newest IMU sample.", other);
-    stamps("older_than_window", "are stamped before the IMU samples that are kept.", other);
-    stamps("imu_not_covering", "are stamped at a time without IMU samples.", other);
+    scans("stamp_zero", "have a stamp of zero.", "Set " + key_ + "stamp_source to trigger or arrival.");
+    scans("stamp_ahead_of_imu", "are stamped ahead of the newest IMU sample.", other);
+    scans("older_than_window", "are stamped before the IMU samples that are kept.", other);
+    scans("imu_not_covering", "are stamped at a time without IMU samples.", other);
     const double zero_triggers = shareOf(radar_.triggers_zero, radar_.scans_total);
     if (zero_triggers < kManyScans) {
-      stamps("trigger_missing", "have no trigger message.",
-             "Check " + key_ + "trigger_topic, or set " + key_ + "stamp_source to header or arrival.");
+      scans("trigger_missing", "have no trigger message.",
+            "Check " + key_ + "trigger_topic, or set " + key_ + "stamp_source to header or arrival.");
     } else {
       cause("trigger_stamp_zero", std::min(1.0, zero_triggers),
             std::to_string(radar_.triggers_zero) + " messages on " + key_ + "trigger_topic " +
@@ -158,44 +156,37 @@ class RadarCauses {
                 " scans.",
             "Correct the driver of the trigger, or set " + key_ + "stamp_source to header or arrival.");
     }
-    stamps("duplicate_stamp", "have the stamp of another scan.",
-           "The driver repeats its stamps: set " + key_ + "stamp_source: arrival.");
-    stamps("queue_full", "waited too long for the IMU or the solver.",
-           "Set " + key_ +
-               "stamp_source: arrival if the stamps are ahead of the IMU; lower window if the computer "
-               "is too slow.");
-    stamps("cloud_not_usable", "cannot be read.",
-           "Set " + key_ + "radar_format and the radar_field_ keys to the fields of your cloud.");
+    scans("duplicate_stamp", "have the stamp of another scan.",
+          "The driver repeats its stamps: set " + key_ + "stamp_source: arrival.");
+    scans("queue_full", "waited too long for the IMU or the solver.",
+          "Set " + key_ +
+              "stamp_source: arrival if the stamps are ahead of the IMU; lower window if the computer "
+              "is too slow.");
+    scans("cloud_not_usable", "cannot be read.",
+          "Set " + key_ + "radar_format and the radar_field_ keys to the fields of your cloud.");
   }
 
   /// Scans whose points give no velocity, before the start and after it.
   void addVelocities() {
-    const auto status = [&](const std::string& name, const std::string& text, const std::string& remedy) {
-      const std::uint64_t count =
-          countOf(radar_.scans_rejected, name) + countOf(radar_.velocity_status, name);
-      const double share = shareOf(count, radar_.scans_total);
-      if (share < kManyScans) return;
-      cause(name, share, outOf(count, radar_.scans_total, "scans") + of_ + " " + text, remedy);
-    };
     const double kept =
         static_cast<double>(radar_.points_by_verdict[static_cast<std::size_t>(PointVerdict::kKept)]);
     const double kept_per_scan = kept / static_cast<double>(radar_.scans_total);
     // The points that the filter took are a cause of their own.
     if (shareOf(static_cast<std::uint64_t>(kept), radar_.points) > 1.0 - kManyPoints || radar_.points == 0) {
-      status("too_few_points",
-             "have too few points for a velocity: " + number(kept_per_scan) + " on average after the filter.",
-             "Set a lower detection threshold in the driver of the radar. Set radar_factor: doppler if it is "
-             "velocity.");
+      scans("too_few_points",
+            "have too few points for a velocity: " + number(kept_per_scan) + " on average after the filter.",
+            "Set a lower detection threshold in the driver of the radar. Set radar_factor: doppler if it is "
+            "velocity.");
     }
-    status("too_few_inliers", "have no velocity that enough of their points agree on.",
-           "Check " + key_ + "radar_field_doppler, " + key_ +
-               "radar_axes and the positions. Moving things in view have the same effect.");
-    status("ill_conditioned", "have all their points in one direction.",
-           "Widen the view of the radar: " + key_ + "radar_max_azimuth and " + key_ + "radar_max_elevation.");
-    status("sigma_too_large", "have a velocity that is too uncertain.",
-           "Raise " + key_ + "ego_velocity_max_sigma, or let the radar report more points.");
-    status("ambiguous", "show two velocities, and nothing tells which is that of the static world.",
-           "Something that moves fills the view: turn the radar away from it.");
+    scans("too_few_inliers", "have no velocity that enough of their points agree on.",
+          "Check " + key_ + "radar_field_doppler, " + key_ +
+              "radar_axes and the positions. Moving things in view have the same effect.");
+    scans("ill_conditioned", "have all their points in one direction.",
+          "Widen the view of the radar: " + key_ + "radar_max_azimuth and " + key_ + "radar_max_elevation.");
+    scans("sigma_too_large", "have a velocity that is too uncertain.",
+          "Raise " + key_ + "ego_velocity_max_sigma, or let the radar report more points.");
+    scans("ambiguous", "show two velocities, and nothing tells which is that of the static world.",
+          "Something that moves fills the view: turn the radar away from it.");
   }
 
   /// Scans that give a velocity that the IMU contradicts.

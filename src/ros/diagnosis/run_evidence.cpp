@@ -6,6 +6,11 @@
 
 namespace rio_t {
 
+std::uint64_t countOf(const Counts& counts, const std::string& name) {
+  const auto found = counts.find(name);
+  return found == counts.end() ? 0 : found->second;
+}
+
 EvidenceCollector::EvidenceCollector(const Config& config) {
   for (const Config& radar : configsOfRadars(config)) {
     options_.push_back(radar.odometry.ego_velocity);

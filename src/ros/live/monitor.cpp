@@ -238,14 +238,10 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) c
   const RadarInertialOdometry& odometry = session->odometry();
   const Health health = odometry.health();
   const std::map<std::string, std::uint64_t> faults = odometry.faults();
-  const auto count = [&](const char* name) {
-    const auto found = faults.find(name);
-    return found == faults.end() ? std::uint64_t{0} : found->second;
-  };
   if (const auto start = session->start()) status.add("initialized_from", toString(start->from));
   status.add("health", toString(health));
-  status.add("divergences", count("diverged"));
-  status.add("reinitializations", count("reinitialized"));
+  status.add("divergences", countOf(faults, "diverged"));
+  status.add("reinitializations", countOf(faults, "reinitialized"));
   status.add("speed_m_s", state.v_W.norm());
   status.add("velocity_sigma_m_s", velocitySigma(state));
   status.add("seconds_since_a_scan_was_used", last_used_ ? last_scan_ - *last_used_ : 0.0);
@@ -305,8 +301,7 @@ std::optional<std::string> LiveMonitor::judgeUse(Radar& radar, bool initialized)
   std::pair<std::string, std::uint64_t> most;
   for (const auto& [reason, count] : now.dropped) {
     if (isEarly(reason) || reason == "points_not_finite") continue;  // the latter counts points
-    const auto before = then.dropped.find(reason);
-    const std::uint64_t fresh = count - (before == then.dropped.end() ? 0 : before->second);
+    const std::uint64_t fresh = count - countOf(then.dropped, reason);
     if (fresh > most.second) most = {reason, fresh};
   }
   return std::to_string(used) + " of the last " + std::to_string(now.usable - then.usable) +
@@ -335,8 +330,7 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   for (Radar& radar : radars_) {
     const std::optional<Finding> finding = describeRadar(status, radar, initialized);
     if (finding) findings.push_back(*finding);
-    const auto full = radar.dropped.find("queue_full");
-    if (full != radar.dropped.end()) queue_full += full->second;
+    queue_full += countOf(radar.dropped, "queue_full");
   }
   // What one radar lacks is no error while another works.
   const Finding radars = join(findings, findings.size() < radars_.size());
@@ -380,19 +374,19 @@ void LiveMonitor::describeSolver(Status& status) const {
   status.add("termination", toString(last_terminations_.back()));
   // A window gets a few iterations from where the last one ended: one of them that does not converge is no
   // fault.
-  const auto countOf = [&](SolverTermination termination) {
+  const auto ended = [&](SolverTermination termination) {
     return std::count(last_terminations_.begin(), last_terminations_.end(), termination);
   };
   const auto full = static_cast<std::ptrdiff_t>(kWindowsJudged);
-  const std::ptrdiff_t converged = countOf(SolverTermination::kConverged);
+  const std::ptrdiff_t converged = ended(SolverTermination::kConverged);
   if (last_terminations_.size() < kWindowsJudged || 2 * converged >= full) {
     status.summary(DiagnosticStatus::OK, "solving");
     return;
   }
   SolverTermination worst = SolverTermination::kAtBound;
   for (const SolverTermination other : {SolverTermination::kIterationLimit, SolverTermination::kNoDecrease})
-    if (countOf(other) > countOf(worst)) worst = other;
-  status.summary(DiagnosticStatus::WARN, std::to_string(countOf(worst)) + " of the last " +
+    if (ended(other) > ended(worst)) worst = other;
+  status.summary(DiagnosticStatus::WARN, std::to_string(ended(worst)) + " of the last " +
                                              std::to_string(full) + " windows ended " + advice(worst));
 }
 

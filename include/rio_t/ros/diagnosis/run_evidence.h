@@ -14,6 +14,8 @@
 namespace rio_t {
 
 using Counts = std::map<std::string, std::uint64_t>;
+/// Zero for a name that is not there.
+std::uint64_t countOf(const Counts& counts, const std::string& name);
 
 /// Counters of one radar.
 struct RadarEvidence {
