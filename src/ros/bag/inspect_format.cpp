@@ -35,22 +35,6 @@ bool has(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-std::vector<std::string> needed(const PointCloudFormat& f) {
-  const bool cartesian = f.coordinates == PointCoordinates::kCartesian;
-  return {cartesian ? f.x : f.azimuth, cartesian ? f.y : f.elevation, cartesian ? f.z : f.range, f.doppler,
-          f.power};
-}
-
-std::vector<std::string> fittingPresets(const std::vector<std::string>& fields) {
-  std::vector<std::string> fitting;
-  for (const std::string& name : pointCloudPresets()) {
-    const std::vector<std::string> names = needed(pointCloudPreset(name));
-    if (std::all_of(names.begin(), names.end(), [&](const std::string& each) { return has(fields, each); }))
-      fitting.push_back(name);
-  }
-  return fitting;
-}
-
 /// The first field whose name looks like one of the words; it must not be a standard deviation and the like.
 std::string fieldLike(const std::vector<std::string>& fields, const std::vector<std::string>& words) {
   for (const std::string& word : words) {
@@ -196,7 +180,7 @@ FormatProposal proposeFormat(const CloudTopic& topic) {
   }
   const std::vector<std::string> fields = fieldsOf(*message);
   proposal.fields = boost::algorithm::join(fields, ", ");
-  proposal.fitting = fittingPresets(fields);
+  proposal.fitting = fittingPresets(*message);
   if (proposal.fitting.empty()) {
     guessFormat(fields, &proposal);
     if (!proposal.fault.empty()) return proposal;

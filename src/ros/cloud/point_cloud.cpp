@@ -37,27 +37,9 @@ bool hasField(const PointCloud2& message, const std::string& name) {
                      [&](const PointField& field) { return field.name == name; });
 }
 
-std::vector<std::string> neededFields(const PointCloudFormat& f) {
-  std::vector<std::string> names = f.coordinates == PointCoordinates::kCartesian
-                                       ? std::vector<std::string>{f.x, f.y, f.z}
-                                       : std::vector<std::string>{f.azimuth, f.elevation, f.range};
-  names.push_back(f.doppler);
-  if (f.power_unit != PowerUnit::kNotSnr) names.push_back(f.power);
-  return names;
-}
-
 [[noreturn]] void throwMissing(const PointCloud2& message, const PointCloudFormat& format,
                                const std::string& missing) {
-  std::vector<std::string> fitting;
-  for (const std::string& name : pointCloudPresets()) {
-    const PointCloudFormat preset = pointCloudPreset(name);
-    // The name of the power field tells drivers apart, even if the field is not read.
-    std::vector<std::string> names = neededFields(preset);
-    names.push_back(preset.power);
-    if (std::all_of(names.begin(), names.end(), [&](const std::string& n) { return hasField(message, n); })) {
-      fitting.push_back(name);
-    }
-  }
+  const std::vector<std::string> fitting = fittingPresets(message);
   std::string text = "point cloud: format '" + format.name + "' needs the field '" + missing +
                      "'; fields received: " + fieldsOf(message) +
                      "; presets known: " + join(pointCloudPresets(), ", ");
@@ -212,6 +194,19 @@ float narrow(double value) {
 }
 
 }  // namespace
+
+std::vector<std::string> fittingPresets(const PointCloud2& message) {
+  std::vector<std::string> fitting;
+  for (const std::string& name : pointCloudPresets()) {
+    const PointCloudFormat f = pointCloudPreset(name);
+    const bool cartesian = f.coordinates == PointCoordinates::kCartesian;
+    const std::vector<std::string> names = {cartesian ? f.x : f.azimuth, cartesian ? f.y : f.elevation,
+                                            cartesian ? f.z : f.range, f.doppler, f.power};
+    if (std::all_of(names.begin(), names.end(), [&](const std::string& n) { return hasField(message, n); }))
+      fitting.push_back(name);
+  }
+  return fitting;
+}
 
 DecodedScan decode(const PointCloud2& message, const PointCloudFormat& format) {
   if (format.doppler_sign != 1 && format.doppler_sign != -1) {

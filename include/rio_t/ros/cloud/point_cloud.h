@@ -4,6 +4,7 @@
 #include <sensor_msgs/PointCloud2.h>
 
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "rio_t/radar/scan.h"
@@ -21,6 +22,10 @@ struct DecodedScan {
 /// the presets known and the one that fits, where a field is missing or the layout does not hold the points
 /// it declares. Points at range zero are kept: they are finite, and the estimator's min_range removes them.
 DecodedScan decode(const sensor_msgs::PointCloud2& message, const PointCloudFormat& format);
+
+/// The presets whose fields the cloud has. The field of the power counts even where it is not read: its name
+/// tells drivers apart.
+std::vector<std::string> fittingPresets(const sensor_msgs::PointCloud2& message);
 
 /// For the estimator, with the ambiguous points marked. `stamp` is the scan's time in the IMU clock.
 RadarScan toRadarScan(const pcl::PointCloud<RadarPointPcl>& cloud, Time stamp);
