@@ -306,7 +306,7 @@ TEST_F(BagRunner, EstimatedExtrinsicsAreWritten) {
   EXPECT_EQ(contents(out_ + "/summary.yaml").find("extrinsics"), std::string::npos);
 }
 
-TEST(RunOutput, NumbersAreFixedAndStampsExact) {
+TEST(RunOutput, NumbersAreFixed) {
   const auto fixed = [](double value, int decimals) {
     std::string text;
     appendFixed(&text, value, decimals);
@@ -319,9 +319,6 @@ TEST(RunOutput, NumbersAreFixedAndStampsExact) {
   EXPECT_EQ(fixed(12.0, 0), "12");
   EXPECT_EQ(fixed(1e20, 2), "100000000000000000000.00");
   EXPECT_EQ(fixed(std::nan(""), 2), ".nan");
-  std::string stamp;
-  appendStamp(&stamp, Time::fromNanoseconds(1700000000000000007));
-  EXPECT_EQ(stamp, "1700000000.000000007");
 }
 
 }  // namespace

@@ -31,13 +31,18 @@ void appendDigits(std::string* text, std::uint64_t value, int at_least) {
   while (count > 0) text->push_back(digits[--count]);
 }
 
-void appendVector(std::string* line, const Eigen::Vector3d& v, int decimals) {
-  for (int i = 0; i < 3; ++i) {
-    line->push_back(',');
-    appendFixed(line, v[i], decimals);
-  }
+void appendNumber(std::string* line, double x, int decimals) {
+  line->push_back(',');
+  appendFixed(line, x, decimals);
 }
 
+void appendVector(std::string* line, const Eigen::Vector3d& v, int decimals) {
+  for (int i = 0; i < 3; ++i) appendNumber(line, v[i], decimals);
+}
+
+const char* const kNavigationHeader =
+    "stamp,vx,vy,vz,sigma_px,sigma_py,sigma_pz,sigma_rx,sigma_ry,sigma_rz,sigma_vx,sigma_vy,sigma_vz\n";
+const char* const kBiasesHeader = "stamp,bgx,bgy,bgz,bax,bay,baz\n";
 const char* const kTimeOffsetHeader = "stamp,offset_s,sigma_s\n";
 const char* const kEgoVelocityHeader = "stamp,vx,vy,vz,sigma_x,sigma_y,sigma_z,inliers,points,status\n";
 const char* const kBarometerHeader =
@@ -117,16 +122,7 @@ std::string fixedText(double value, int decimals) {
                                                                                        : text;
 }
 
-void appendStamp(std::string* text, Time time) {
-  const std::int64_t ns = time.nanoseconds();
-  if (ns < 0) text->push_back('-');
-  const auto size = static_cast<std::uint64_t>(ns < 0 ? -ns : ns);
-  appendDigits(text, size / 1000000000, 1);
-  text->push_back('.');
-  appendDigits(text, size % 1000000000, 9);
-}
-
-void RunOutput::File::open(const std::string& path_in) {
+void RunOutput::File::open(const std::string& path_in, const std::string& header) {
   path = path_in;
   stream.open(path, std::ios::binary | std::ios::trunc);
   if (!stream) {
@@ -134,6 +130,7 @@ void RunOutput::File::open(const std::string& path_in) {
     throw std::runtime_error("output " + path + ": cannot be written (" + reason + ")");
   }
   buffer.reserve(kBufferSize + 1024);
+  buffer = header;
 }
 
 void RunOutput::File::flush() {
@@ -158,29 +155,18 @@ RunOutput::RunOutput(const std::string& folder, const RunFiles& files) : folder_
   removeOfEarlierRuns();
   trajectory_.open(folder + "/trajectory.txt");
   optimized_.open(folder + "/trajectory_optimized.txt");
-  navigation_.open(folder + "/navigation.csv");
-  biases_.open(folder + "/biases.csv");
-  if (files.map) map_.emplace().open(folder + "/map.csv");
-  navigation_.buffer =
-      "stamp,vx,vy,vz,sigma_px,sigma_py,sigma_pz,sigma_rx,sigma_ry,sigma_rz,sigma_vx,sigma_vy,sigma_vz\n";
-  biases_.buffer = "stamp,bgx,bgy,bgz,bax,bay,baz\n";
-  if (files.barometer) {
-    barometer_.emplace().open(folder + "/barometer.csv");
-    barometer_->buffer = kBarometerHeader;
-  }
-  if (files.ground_vehicle) {
-    ground_vehicle_.emplace().open(folder + "/ground_vehicle.csv");
-    ground_vehicle_->buffer = kGroundVehicleHeader;
-  }
+  navigation_.open(folder + "/navigation.csv", kNavigationHeader);
+  biases_.open(folder + "/biases.csv", kBiasesHeader);
+  if (files.map) map_.emplace().open(folder + "/map.csv", kMapHeader);
+  if (files.barometer) barometer_.emplace().open(folder + "/barometer.csv", kBarometerHeader);
+  if (files.ground_vehicle)
+    ground_vehicle_.emplace().open(folder + "/ground_vehicle.csv", kGroundVehicleHeader);
   for (const std::string& name : files.radars) {
+    const std::string end = suffixOf(name) + ".csv";
     RadarOutput& radar = radars_.emplace_back();
-    radar.time_offset.open(folder + "/time_offset" + suffixOf(name) + ".csv");
-    radar.ego_velocity.open(folder + "/ego_velocity" + suffixOf(name) + ".csv");
-    radar.time_offset.buffer = kTimeOffsetHeader;
-    radar.ego_velocity.buffer = kEgoVelocityHeader;
-    if (!files.extrinsics) continue;
-    radar.extrinsics.emplace().open(folder + "/extrinsics" + suffixOf(name) + ".csv");
-    radar.extrinsics->buffer = kExtrinsicsHeader;
+    radar.time_offset.open(folder + "/time_offset" + end, kTimeOffsetHeader);
+    radar.ego_velocity.open(folder + "/ego_velocity" + end, kEgoVelocityHeader);
+    if (files.extrinsics) radar.extrinsics.emplace().open(folder + "/extrinsics" + end, kExtrinsicsHeader);
   }
 }
 
@@ -212,7 +198,7 @@ void RunOutput::removeOfEarlierRuns() const {
 
 void RunOutput::addPose(File& file, Time time, const Eigen::Vector3d& p_W, const Eigen::Quaterniond& q_WI) {
   std::string* line = &file.buffer;
-  appendStamp(line, time);
+  *line += formatTime(time);
   for (const double x : {p_W.x(), p_W.y(), p_W.z(), q_WI.x(), q_WI.y(), q_WI.z(), q_WI.w()}) {
     line->push_back(' ');
     appendFixed(line, x, 9);
@@ -230,7 +216,7 @@ void RunOutput::addState(const NavigationState& state) {
   };
   const Covariance6 pose = bodyOdometry(state, 0.0).pose_covariance;
   std::string* line = &navigation_.buffer;
-  appendStamp(line, state.time);
+  *line += formatTime(state.time);
   appendVector(line, state.v_W, 6);
   appendVector(line, sigmas(pose.diagonal().head<3>()), 6);
   appendVector(line, sigmas(pose.diagonal().tail<3>()), 6);
@@ -245,7 +231,7 @@ void RunOutput::addResult(const ScanResult& result) {
 
   RadarOutput& radar = radars_.at(result.scan.radar);
   std::string* line = &radar.ego_velocity.buffer;
-  appendStamp(line, result.scan.stamp);
+  *line += formatTime(result.scan.stamp);
   appendVector(line, result.ego_velocity.v_R, 6);
   appendVector(line, result.ego_velocity.covariance.diagonal().cwiseMax(0.0).cwiseSqrt(), 6);
   *line += ',' + std::to_string(result.ego_velocity.inliers.size()) + ',' +
@@ -255,11 +241,9 @@ void RunOutput::addResult(const ScanResult& result) {
   if (!result.updated) return;
 
   line = &radar.time_offset.buffer;
-  appendStamp(line, result.scan.stamp);
-  line->push_back(',');
-  appendFixed(line, result.time_offset, 9);
-  line->push_back(',');
-  appendFixed(line, result.time_offset_sigma, 9);
+  *line += formatTime(result.scan.stamp);
+  appendNumber(line, result.time_offset, 9);
+  appendNumber(line, result.time_offset_sigma, 9);
   radar.time_offset.endLine();
   if (radar.extrinsics) addExtrinsics(*radar.extrinsics, result);
 
@@ -267,7 +251,7 @@ void RunOutput::addResult(const ScanResult& result) {
     for (const LandmarkPoint& point : result.landmarks->map) landmarks_[point.id] = point;
 
   line = &biases_.buffer;
-  appendStamp(line, result.scan.stamp);
+  *line += formatTime(result.scan.stamp);
   appendVector(line, result.state.b_g, 9);
   appendVector(line, result.state.b_a, 9);
   biases_.endLine();
@@ -276,11 +260,9 @@ void RunOutput::addResult(const ScanResult& result) {
 void RunOutput::addAids(const ScanResult& result) {
   for (const BarometerAnswer& mean : result.barometer) {
     std::string* line = &barometer_->buffer;
-    appendStamp(line, mean.time);
-    for (const double x : {mean.height, mean.innovation, mean.innovation_sigma, mean.bias, mean.bias_sigma}) {
-      line->push_back(',');
-      appendFixed(line, x, 6);
-    }
+    *line += formatTime(mean.time);
+    for (const double x : {mean.height, mean.innovation, mean.innovation_sigma, mean.bias, mean.bias_sigma})
+      appendNumber(line, x, 6);
     *line += ',' + std::to_string(mean.samples) + ',' +
              (!mean.rejected_because.empty() ? mean.rejected_because
               : mean.stepped                 ? "stepped"
@@ -290,28 +272,23 @@ void RunOutput::addAids(const ScanResult& result) {
   if (!result.ground_vehicle) return;
   const GroundVehicleAnswer& vehicle = *result.ground_vehicle;
   std::string* line = &ground_vehicle_->buffer;
-  appendStamp(line, vehicle.time);
+  *line += formatTime(vehicle.time);
   appendVector(line, vehicle.v_V, 6);
-  line->push_back(',');
-  appendFixed(line, std::sqrt(vehicle.squared_sigmas), 3);
+  appendNumber(line, std::sqrt(vehicle.squared_sigmas), 3);
   appendVector(line, vehicle.q_IV.vec(), 9);
-  line->push_back(',');
-  appendFixed(line, vehicle.q_IV.w(), 9);
+  appendNumber(line, vehicle.q_IV.w(), 9);
   appendVector(line, vehicle.q_IV_sigma, 9);
   *line += vehicle.is_contradicted ? ",contradicted" : vehicle.used ? ",used" : ",left_out";
   ground_vehicle_->endLine();
 }
 
 void RunOutput::writeMap() {
-  map_->buffer = kMapHeader;
   for (const auto& [id, point] : landmarks_) {
     std::string* line = &map_->buffer;
     *line += std::to_string(id);
     appendVector(line, point.p_W, 6);
-    line->push_back(',');
-    appendFixed(line, point.sigma, 6);
-    line->push_back(',');
-    appendFixed(line, point.snr_db, 3);
+    appendNumber(line, point.sigma, 6);
+    appendNumber(line, point.snr_db, 3);
     *line += ',' + std::to_string(point.sightings);
     map_->endLine();
   }
@@ -322,11 +299,10 @@ void RunOutput::addExtrinsics(File& file, const ScanResult& result) {
   const Eigen::Quaterniond& q_IR = result.T_IR.q_IR;
   const Eigen::Matrix<double, 6, 1> sigmas = result.T_IR_covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
   std::string* line = &file.buffer;
-  appendStamp(line, result.scan.stamp);
+  *line += formatTime(result.scan.stamp);
   appendVector(line, result.T_IR.l_I, 9);
   appendVector(line, q_IR.vec(), 9);
-  line->push_back(',');
-  appendFixed(line, q_IR.w(), 9);
+  appendNumber(line, q_IR.w(), 9);
   appendVector(line, sigmas.head<3>(), 9);
   appendVector(line, sigmas.tail<3>(), 9);
   file.endLine();

@@ -126,8 +126,6 @@ RunFiles runFiles(const Config& config);
 void appendFixed(std::string* text, double value, int decimals);
 /// The same as a text of its own, without the sign of a minus zero.
 std::string fixedText(double value, int decimals);
-/// Appends seconds with nine decimals, exactly.
-void appendStamp(std::string* text, Time time);
 
 /// The files of a run: trajectory.txt and trajectory_optimized.txt (TUM), navigation.csv, biases.csv,
 /// summary.yaml; of each radar time_offset.csv, ego_velocity.csv and, if they are estimated, extrinsics.csv.
@@ -163,7 +161,8 @@ class RunOutput {
     std::ofstream stream;
     std::string buffer;
 
-    void open(const std::string& path_in);
+    /// Empties it, and begins it with `header`.
+    void open(const std::string& path_in, const std::string& header = "");
     void flush();
     void endLine();
   };
