@@ -51,10 +51,8 @@ TEST(SeveralRadars, ASectionOverridesTheTopLevel) {
 
   const std::vector<RadarOptions>& options = config.odometry.radars;
   ASSERT_EQ(options.size(), 2u);
-  EXPECT_EQ(options[0].name, "left");
   EXPECT_EQ(options[0].time_offset_initial, 0.02);
   EXPECT_EQ(options[0].ego_velocity.min_range, 0.7);
-  EXPECT_EQ(options[1].name, "right");
   EXPECT_EQ(options[1].time_offset_initial, 0.01);
   EXPECT_EQ(options[1].time_offset_sigma, 0.03);
   EXPECT_EQ(options[1].ego_velocity.min_range, 0.9);

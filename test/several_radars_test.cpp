@@ -29,7 +29,6 @@ SimulatedRun pair(const std::string& motion, std::uint64_t seed, double duration
     radar.T_IR = {{0.1, 0.1 * side, 0.02}, looking(40.0 * side, 0.0)};
     radar.time_offset.constant = side > 0.0 ? -0.009 : 0.040;
     RadarOptions told;
-    told.name = name;
     told.T_IR = radar.T_IR;
     run.options.radars.push_back(told);
   }

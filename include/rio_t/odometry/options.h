@@ -1,6 +1,5 @@
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "rio_t/imu/input_check.h"
@@ -29,7 +28,6 @@ enum class InitMode {
 
 /// The options that each of several radars has for itself.
 struct RadarOptions {
-  std::string name;  ///< in messages and outputs
   Extrinsics T_IR;
   EgoVelocityOptions ego_velocity;
   double time_offset_initial = 0.0;  ///< [s]

@@ -3,6 +3,7 @@
 #include <geometry_msgs/PoseStamped.h>
 #include <tf2_eigen/tf2_eigen.h>
 
+#include <boost/algorithm/string/join.hpp>
 #include <filesystem>
 
 #include "rio_t/ros/messages/conversions.h"
@@ -10,14 +11,7 @@
 namespace rio_t {
 namespace {
 
-bool everyTopic(const rosbag::ConnectionInfo* /*connection*/) { return true; }
-
-}  // namespace
-
-std::runtime_error bagError(const std::string& bag, const std::string& what) {
-  return std::runtime_error("bag " + bag + ": " + what);
-}
-
+/// For reading. Throws bagError where that cannot be.
 void openBag(const std::string& path, rosbag::Bag* bag) {
   namespace fs = std::filesystem;
   if (!fs::exists(path))
@@ -33,11 +27,17 @@ void openBag(const std::string& path, rosbag::Bag* bag) {
   }
 }
 
-Bags::Bags(const std::vector<std::string>& paths) {
-  for (const std::string& path : paths) {
-    name_ += (name_.empty() ? "" : ", ") + path;
+}  // namespace
+
+std::runtime_error bagError(const std::string& bag, const std::string& what) {
+  return std::runtime_error("bag " + bag + ": " + what);
+}
+
+bool everyTopic(const rosbag::ConnectionInfo* /*connection*/) { return true; }
+
+Bags::Bags(const std::vector<std::string>& paths) : name_(boost::algorithm::join(paths, ", ")) {
+  for (const std::string& path : paths)
     openBag(path, bags_.emplace_back(std::make_unique<rosbag::Bag>()).get());
-  }
 }
 
 void Bags::addTo(rosbag::View* view, const std::function<bool(const rosbag::ConnectionInfo*)>& query,

@@ -22,8 +22,8 @@ namespace rio_t {
 
 std::runtime_error bagError(const std::string& bag, const std::string& what);
 
-/// For reading. Throws bagError where that cannot be.
-void openBag(const std::string& path, rosbag::Bag* bag);
+/// Finds all, as a query of Bags::addTo().
+bool everyTopic(const rosbag::ConnectionInfo* connection);
 
 /// Bags that are played as one, in the order of their record times.
 class Bags {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/algorithm/cxx11/any_of.hpp>
 #include <boost/algorithm/string.hpp>
 #include <cmath>
 #include <exception>
@@ -29,10 +30,6 @@ std::vector<std::string> fieldsOf(const PointCloud2& message) {
   std::vector<std::string> names;
   for (const sensor_msgs::PointField& field : message.fields) names.push_back(field.name);
   return names;
-}
-
-bool has(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
 }
 
 /// The first field whose name looks like one of the words; it must not be a standard deviation and the like.
@@ -73,7 +70,8 @@ void guessFormat(const std::vector<std::string>& fields, FormatProposal* proposa
   }
   const std::string azimuth = fieldLike(fields, {"azimuth"}), elevation = fieldLike(fields, {"elevation"});
   const std::string range = fieldLike(fields, {"range", "distance"});
-  const bool cartesian = has(fields, "x") && has(fields, "y") && has(fields, "z");
+  const auto has = [&](const char* name) { return boost::algorithm::any_of_equal(fields, name); };
+  const bool cartesian = has("x") && has("y") && has("z");
   if (!cartesian && (azimuth.empty() || elevation.empty() || range.empty())) {
     proposal->fault =
         "it has no position: neither x, y, z nor azimuth, elevation, range (fields: " + proposal->fields +

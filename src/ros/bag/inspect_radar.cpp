@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/algorithm/string/join.hpp>
 #include <cmath>
 
 #include "rio_t/radar/mounting.h"
@@ -82,11 +83,11 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
         ", gaps: " + std::to_string(timing.gaps) + " (longest " + fixedText(timing.longest_gap, 2) + " s)";
   if (timing.duplicates > 0 && timing.zero == 0 && !timing.constant)
     rate += ", duplicate stamps: " + std::to_string(timing.duplicates);
-  std::string presets;
-  for (const std::string& preset : format.fitting) presets += (presets.empty() ? "" : ", ") + preset;
   tell(timing.gaps > timing.messages / 50 ? FindingLevel::kOdd : FindingLevel::kOk, "radar",
        rate + "; format " + format.format.name +
-           (format.fitting.size() > 1 ? " (fitting: " + presets + ")" : "") + ", " + format.power);
+           (format.fitting.size() > 1 ? " (fitting: " + boost::algorithm::join(format.fitting, ", ") + ")"
+                                      : "") +
+           ", " + format.power);
   for (const std::string& odd : format.odd) tell(FindingLevel::kOdd, "format", odd);
   const DopplerStep& step = looked.velocities.doppler_step;
   const bool sparse = c.points_50 < 15.0;

@@ -1,11 +1,11 @@
 #include "inspect_recording.h"
 
-#include <rosbag/bag.h>
 #include <rosbag/view.h>
 #include <sensor_msgs/Imu.h>
 #include <tf2_eigen/tf2_eigen.h>
 
 #include <algorithm>
+#include <boost/algorithm/cxx11/any_of.hpp>
 #include <iterator>
 #include <set>
 
@@ -23,10 +23,6 @@ Topic& topicOf(const std::string& name, std::vector<Topic>* topics) {
   if (found != topics->end()) return *found;
   topics->emplace_back().topic = name;
   return topics->back();
-}
-
-bool has(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
 }
 
 bool isCopy(const sensor_msgs::PointCloud2& a, const sensor_msgs::PointCloud2& b) {
@@ -47,10 +43,10 @@ void addImu(const sensor_msgs::Imu& message, Time record, ImuTopic* topic) {
 Recording readRecording(const std::string& path, const CheckRequest& request) {
   Recording recording;
   recording.bag = path;
-  rosbag::Bag bag;
-  openBag(path, &bag);
-  recording.types = Bags({path}).typesByTopic();
-  rosbag::View all(bag);
+  const Bags bags({path});
+  recording.types = bags.typesByTopic();
+  rosbag::View all;
+  bags.addTo(&all, everyTopic);
   if (all.size() == 0) throw bagError(path, "it holds no messages");
   recording.length = (all.getEndTime() - all.getBeginTime()).toSec();
   recording.read = request.duration > 0.0 ? std::min(request.duration, recording.length) : recording.length;
@@ -60,10 +56,13 @@ Recording readRecording(const std::string& path, const CheckRequest& request) {
   const auto is_wanted = [&](const rosbag::ConnectionInfo* connection) {
     const std::string& type = connection->datatype;
     if (type == types[0]) return request.imu_topic.empty() || request.imu_topic == connection->topic;
-    if (type == types[1]) return request.radar_topics.empty() || has(request.radar_topics, connection->topic);
+    if (type == types[1])
+      return request.radar_topics.empty() ||
+             boost::algorithm::any_of_equal(request.radar_topics, connection->topic);
     return type == types[2];
   };
-  rosbag::View view(bag, is_wanted, all.getBeginTime(), end);
+  rosbag::View view;
+  bags.addTo(&view, is_wanted, all.getBeginTime(), end);
   std::set<std::string> judged, refused;  // topics with clouds
   for (const rosbag::MessageInstance& instance : view) {
     const Time record = toTime(instance.getTime());

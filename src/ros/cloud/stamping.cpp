@@ -4,6 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "rio_t/inspection/stream_timing.h"
+
 namespace rio_t {
 namespace {
 
@@ -89,16 +91,7 @@ void ScanStamper::giveUp(const std::string& reason) {
   ++given_up_[reason];
 }
 
-std::vector<RadarScan> ScanStamper::take() { return decide(); }
-
-std::vector<RadarScan> ScanStamper::finish() {
-  finishing_ = true;
-  std::vector<RadarScan> stamped = decide();
-  finishing_ = false;
-  return stamped;
-}
-
-std::vector<RadarScan> ScanStamper::decide() {
+std::vector<RadarScan> ScanStamper::take() {
   std::vector<RadarScan> stamped;
   while (!held_.empty()) {
     Time stamp;
@@ -112,6 +105,13 @@ std::vector<RadarScan> ScanStamper::decide() {
     stamped.back().stamp = stamp + options_.shift;
     held_.pop_front();
   }
+  return stamped;
+}
+
+std::vector<RadarScan> ScanStamper::finish() {
+  finishing_ = true;
+  std::vector<RadarScan> stamped = take();
+  finishing_ = false;
   return stamped;
 }
 
@@ -185,9 +185,7 @@ std::optional<double> ScanStamper::triggerPeriod() const {
   for (std::size_t i = 1; i < triggers_.size(); ++i) {
     steps.push_back(triggers_[i].stamp - triggers_[i - 1].stamp);
   }
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return quantile(std::move(steps), 0.5);
 }
 
 ScanStamper::Decision ScanStamper::stampFromTriggerTime(const Held& scan, Time* stamp) {

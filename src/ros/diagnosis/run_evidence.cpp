@@ -14,9 +14,7 @@ std::uint64_t countOf(const Counts& counts, const std::string& name) {
 EvidenceCollector::EvidenceCollector(const Config& config) {
   for (const Config& radar : configsOfRadars(config)) {
     options_.push_back(radar.odometry.ego_velocity);
-    RadarEvidence& seen = evidence_.radars.emplace_back();
-    seen.name = radar.radar_name;
-    seen.final_offset_s = radar.odometry.smoother.time_offset_initial;
+    evidence_.radars.emplace_back().name = radar.radar_name;
   }
 }
 
@@ -42,7 +40,6 @@ void EvidenceCollector::add(const ScanResult& result) {
     ++radar.scans_rejected[result.rejected_because];
   }
   if (!result.updated) return;
-  radar.final_offset_s = result.time_offset;
   evidence_.heading_sigma = std::sqrt(bodyOdometry(result.state, 0.0).pose_covariance(5, 5));
   ++evidence_.windows;
   if (result.solver_termination == SolverTermination::kAtBound) ++evidence_.windows_at_bound;

@@ -140,8 +140,8 @@ void LiveOdometry::onTrigger(std::size_t radar, const Event<std_msgs::Header>& e
   }
 }
 
-void LiveOdometry::account(const LiveSession::Stamped& stamped) {
-  for (const auto& [radar, reason] : stamped.given_up) {
+void LiveOdometry::account(const std::vector<LiveSession::GivenUp>& given_up) {
+  for (const auto& [radar, reason] : given_up) {
     monitor_.dropped(radar, reason);
     const Config& config = radars_[radar].config;
     if (isTimeToTell("no stamp for " + config.radar_topic + ": " + reason)) {

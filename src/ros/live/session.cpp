@@ -34,35 +34,36 @@ double LiveSession::rateSigma(Time sample) {
   return gyro_density_ * std::sqrt(static_cast<double>(imu_count_ - 1) / seconds);
 }
 
-LiveSession::Stamped LiveSession::stampWithImu(Time stamp, Time record) {
+std::vector<LiveSession::GivenUp> LiveSession::stampWithImu(Time stamp, Time record) {
   const std::lock_guard<std::mutex> lock(stamper_mutex_);
   for (Stamper& radar : stampers_) radar.stamper.addImu(stamp, record);
   return takeStamped();
 }
 
-LiveSession::Stamped LiveSession::addTrigger(std::size_t radar, std::uint32_t seq, Time stamp, Time record) {
+std::vector<LiveSession::GivenUp> LiveSession::addTrigger(std::size_t radar, std::uint32_t seq, Time stamp,
+                                                          Time record) {
   const std::lock_guard<std::mutex> lock(stamper_mutex_);
   stampers_.at(radar).stamper.addTrigger(seq, stamp, record);
   return takeStamped();
 }
 
-LiveSession::Stamped LiveSession::addScan(std::uint32_t seq, Time header_stamp, Time record, RadarScan scan) {
+std::vector<LiveSession::GivenUp> LiveSession::addScan(std::uint32_t seq, Time header_stamp, Time record,
+                                                       RadarScan scan) {
   const std::lock_guard<std::mutex> lock(stamper_mutex_);
   ScanStamper& stamper = stampers_.at(scan.radar).stamper;
   stamper.addScan(seq, header_stamp, record, std::move(scan));
   return takeStamped();
 }
 
-LiveSession::Stamped LiveSession::takeStamped() {
-  Stamped stamped;
-  for (std::size_t radar = 0; radar < stampers_.size(); ++radar) takeStamped(radar, &stamped);
-  return stamped;
+std::vector<LiveSession::GivenUp> LiveSession::takeStamped() {
+  std::vector<GivenUp> given_up;
+  for (std::size_t radar = 0; radar < stampers_.size(); ++radar) takeStamped(radar, &given_up);
+  return given_up;
 }
 
-void LiveSession::takeStamped(std::size_t radar, Stamped* stamped) {
+void LiveSession::takeStamped(std::size_t radar, std::vector<GivenUp>* given_up) {
   Stamper& from = stampers_[radar];
   for (RadarScan& scan : from.stamper.take()) {
-    ++stamped->queued;
     if (arrivals_.size() >= kMaxScansInFlight) arrivals_.clear();
     arrivals_[{scan.radar, scan.stamp.nanoseconds()}] = Clock::now();
     odometry_.addScan(std::move(scan));
@@ -70,7 +71,7 @@ void LiveSession::takeStamped(std::size_t radar, Stamped* stamped) {
   if (from.stamper.givenUp() == from.given_up) return;
   for (const auto& [reason, count] : from.stamper.givenUp()) {
     for (std::uint64_t& told = from.given_up[reason]; told < count; ++told)
-      stamped->given_up.push_back({radar, reason});
+      given_up->push_back({radar, reason});
   }
 }
 

@@ -82,12 +82,6 @@ class ParameterList {
   void add(ParameterDescription about, std::function<bool(const ParameterValue&)> set,
            std::function<ParameterValue()> get);
 
-  /// Concerns the parameter added last.
-  void setRange(const Range& range) {
-    all_.back().description.min = range.min;
-    all_.back().description.max = range.max;
-  }
-
   std::string group_;
   bool of_radar_ = false;
   bool is_first_ = false;

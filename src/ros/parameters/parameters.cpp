@@ -3,6 +3,7 @@
 #include <dlfcn.h>
 
 #include <algorithm>
+#include <boost/algorithm/string/join.hpp>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -73,7 +74,7 @@ void setParameter(const ParameterEntry& entry, const std::string& section, const
 
 RadarOptions radarOptions(const Config& config) {
   const OdometryOptions& odometry = config.odometry;
-  return {config.radar_name, odometry.T_IR, odometry.ego_velocity, odometry.smoother.time_offset_initial,
+  return {odometry.T_IR, odometry.ego_velocity, odometry.smoother.time_offset_initial,
           odometry.smoother.time_offset_sigma};
 }
 
@@ -397,10 +398,9 @@ std::string findConfigFile(const std::string& name_or_path) {
     }
   }
   std::sort(names.begin(), names.end());
-  std::string known;
-  for (const std::string& name : names) known += (known.empty() ? "" : ", ") + name;
-  throw std::runtime_error("configuration " + name_or_path +
-                           ": no such file; configurations of the package: " + known);
+  throw std::runtime_error(
+      "configuration " + name_or_path +
+      ": no such file; configurations of the package: " + boost::algorithm::join(names, ", "));
 }
 
 }  // namespace rio_t

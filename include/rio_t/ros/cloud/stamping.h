@@ -93,7 +93,6 @@ class ScanStamper {
   enum class Decision { kStamped, kWait, kGiveUp };
   enum class Counting { kUnknown, kAlike, kUnlike };  // whether triggers and scans share their seq
 
-  std::vector<RadarScan> decide();
   Decision stampFront(Time* stamp);
   Decision stampFromTrigger(const Held& scan, Time* stamp);
   Decision stampFromTriggerTime(const Held& scan, Time* stamp);

@@ -28,8 +28,7 @@ struct RadarEvidence {
   Counts velocity_status;                ///< of the scans before the start, by EgoVelocityStatus
   std::uint64_t points = 0;              ///< of all scans
   std::array<std::uint64_t, kPointVerdicts> points_by_verdict = {};
-  double snr_sum_db = 0.0;      ///< over `points`
-  double final_offset_s = 0.0;  ///< newest estimate of t_O
+  double snr_sum_db = 0.0;  ///< over `points`
 };
 
 /// The stamps of the IMU jumped, or left a gap that is too long to bridge: "imu_clock_restart".

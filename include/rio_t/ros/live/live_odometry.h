@@ -101,7 +101,7 @@ class LiveOdometry {
   void reset(const std::string& reason, bool at_once = false);
   /// Gives a sample to a session. Returns the state that is to be published, if there is one.
   std::optional<NavigationState> feed(LiveSession& session, const Received& received, double* rate_sigma);
-  void account(const LiveSession::Stamped& stamped);
+  void account(const std::vector<LiveSession::GivenUp>& given_up);
   /// Whether this was not told for `period` [s]. Each radar has its own turn, unlike with ROS's throttles.
   bool isTimeToTell(const std::string& what, double period = kWarnPeriod);
   void wakeSolver();

@@ -26,14 +26,10 @@ class LiveSession {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// What stamping did besides giving stamps.
-  struct Stamped {
-    struct GivenUp {
-      std::size_t radar = 0;
-      std::string reason;
-    };
-    std::size_t queued = 0;         ///< scans handed to the optimisation thread
-    std::vector<GivenUp> given_up;  ///< one for each scan that gets no stamp
+  /// A scan that gets no stamp.
+  struct GivenUp {
+    std::size_t radar = 0;
+    std::string reason;
   };
 
   /// `options` is config.odometry with the extrinsics that hold. Radars are counted as in configsOfRadars.
@@ -50,12 +46,12 @@ class LiveSession {
   /// White noise of one gyro sample [rad/s], from its density and the rate seen so far. IMU thread.
   double rateSigma(Time sample);
 
-  // Stamping; any thread, `record` is the time of receipt.
-  Stamped stampWithImu(Time stamp, Time record);
+  // Stamping; any thread, `record` is the time of receipt. They return the scans that get no stamp.
+  std::vector<GivenUp> stampWithImu(Time stamp, Time record);
   /// Throws as ScanStamper, as the next does.
-  Stamped addTrigger(std::size_t radar, std::uint32_t seq, Time stamp, Time record);
+  std::vector<GivenUp> addTrigger(std::size_t radar, std::uint32_t seq, Time stamp, Time record);
   /// The stamp of `scan` is not read.
-  Stamped addScan(std::uint32_t seq, Time header_stamp, Time record, RadarScan scan);
+  std::vector<GivenUp> addScan(std::uint32_t seq, Time header_stamp, Time record, RadarScan scan);
 
   /// A result with what goes with it.
   struct Result {
@@ -102,8 +98,8 @@ class LiveSession {
   };
   using ScanKey = std::pair<std::size_t, std::int64_t>;  // radar, stamp [ns]
 
-  Stamped takeStamped();  // call with stamper_mutex_ held
-  void takeStamped(std::size_t radar, Stamped* stamped);
+  std::vector<GivenUp> takeStamped();  // call with stamper_mutex_ held
+  void takeStamped(std::size_t radar, std::vector<GivenUp>* given_up);
 
   std::atomic<double> gyro_density_;
   RadarInertialOdometry odometry_;
