@@ -128,11 +128,10 @@ Trajectory readTum(const std::string& path) {
 
 std::string formatTime(Time time) {
   const std::int64_t ns = time.nanoseconds();
-  const std::int64_t second = 1000000000;
-  std::array<char, 40> text{};
-  std::snprintf(text.data(), text.size(), "%s%lld.%09lld", ns < 0 ? "-" : "",
-                static_cast<long long>(std::abs(ns / second)), static_cast<long long>(std::abs(ns % second)));
-  return text.data();
+  std::string text = std::to_string(std::abs(ns));
+  if (text.size() < 10) text.insert(0, 10 - text.size(), '0');
+  text.insert(text.size() - 9, 1, '.');
+  return ns < 0 ? "-" + text : text;
 }
 
 void writeTumLine(std::ostream& out, const StampedPose& pose) {
