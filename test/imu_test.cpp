@@ -3,11 +3,15 @@
 
 #include <cmath>
 #include <functional>
+#include <optional>
+#include <utility>
 
 #include "noise.h"
 #include "rio_t/core/so3.h"
 #include "rio_t/imu/buffer.h"
+#include "rio_t/imu/input_check.h"
 #include "rio_t/imu/noise_meter.h"
+#include "rio_t/imu/noise_spectrum.h"
 #include "rio_t/imu/preintegration.h"
 #include "rio_t/imu/rest_detector.h"
 #include "rio_t/imu/static_initializer.h"
@@ -196,6 +200,30 @@ TEST(NoiseMeter, ASignalThatStoodStillToTheLastBitMayBegin) {
   }
 }
 
+/// White noise has one density. A line of vibration averages out, and motion does not count.
+TEST(NoiseSpectrum, MeansHaveLessOfAVibrationAndAllOfWhiteNoise) {
+  for (const double rate : {100.0, 400.0}) {
+    const auto densities = [&](double white, double line, double frequency) {
+      NoiseSpectrum spectrum;
+      Noise noise;
+      for (int i = 0; i < static_cast<int>(10.0 * rate); ++i) {
+        const double t = i / rate;
+        spectrum.add(
+            Time::fromSeconds(t),
+            white * noise.vector() + Eigen::Vector3d(2.0 * std::sin(2.0 * M_PI * t),
+                                                     line * std::sin(2.0 * M_PI * frequency * t), 0.0));
+      }
+      return std::pair(std::sqrt(spectrum.squaredDensity()), std::sqrt(spectrum.squaredDensityOfMeans()));
+    };
+    const auto [samples, means] = densities(0.5, 0.0, 0.0);
+    EXPECT_NEAR(samples * std::sqrt(rate), 0.5, 0.1) << rate;
+    EXPECT_GT(means, 0.6 * samples) << rate;
+    const auto [shaken, averaged] = densities(0.0, 3.0, 0.35 * rate);
+    EXPECT_GT(shaken * std::sqrt(rate), 2.0) << rate;
+    EXPECT_LT(averaged, 0.3 * shaken) << rate;
+  }
+}
+
 TEST(NoiseMeter, IsNotMovedByAKnockOrAGap) {
   const double rate = 200.0;
   Noise noise;
@@ -263,18 +291,26 @@ TEST(StaticInitializer, SixMountingsWithBias) {
   }
 }
 
+/// Noise, or the line of an engine at this frequency [Hz].
 TEST(StaticInitializer, AnIdlingEngineIsRest) {
-  StaticInitializer initializer(StaticInitializerOptions(), 9.81);
-  Noise noise;
-  std::optional<StaticInitialization> found;
-  for (int i = 0; i < 800 && !found; ++i) {
-    ImuMeasurement sample{Time::fromSeconds(10.0 + 0.005 * i), Eigen::Vector3d(0.01, 0.0, -0.02),
-                          Eigen::Vector3d(0.0, 0.0, 9.81) + 1.5 * noise.vector()};
-    sample.accel_noise = 1.5 * 1.5 * 0.005;
-    found = initializer.add(sample);
+  for (const double frequency : {0.0, 12.0, 17.0, 33.0, 70.0}) {
+    ImuInputCheck check(0.1, ImuInputCheckOptions());
+    StaticInitializer initializer(StaticInitializerOptions(), 9.81);
+    Noise noise;
+    std::optional<StaticInitialization> found;
+    for (int i = 0; i < 800 && !found; ++i) {
+      const double t = 0.005 * i;
+      const Eigen::Vector3d shaking =
+          frequency > 0.0 ? std::sin(2.0 * M_PI * frequency * t) * Eigen::Vector3d(2.0, 1.0, 2.0)
+                          : Eigen::Vector3d(1.5 * noise.vector());
+      ImuMeasurement sample{Time::fromSeconds(10.0 + t), Eigen::Vector3d(0.01, 0.0, -0.02),
+                            Eigen::Vector3d(0.0, 0.0, 9.81) + shaking};
+      check.check(sample);
+      found = initializer.add(sample);
+    }
+    ASSERT_TRUE(found) << frequency << " Hz: " << initializer.waitingFor();
+    EXPECT_LT((found->b_g - Eigen::Vector3d(0.01, 0.0, -0.02)).norm(), 1e-9);
   }
-  ASSERT_TRUE(found) << initializer.waitingFor();
-  EXPECT_LT((found->b_g - Eigen::Vector3d(0.01, 0.0, -0.02)).norm(), 1e-9);
 }
 
 /// Feeds 200 Hz with noise whose density is known; the result, if it came.
@@ -286,8 +322,8 @@ std::optional<StaticInitialization> feedMotion(StaticInitializer& initializer, d
     ImuMeasurement sample{Time::fromSeconds(100.0 + t),
                           Eigen::Vector3d(0.01, 0.0, -0.02) + 0.002 * draw.vector(),
                           Eigen::Vector3d(0.0, forward(t), 9.81) + noise * draw.vector()};
-    sample.gyro_noise = 0.002 * 0.002 * 0.005;
-    sample.accel_noise = noise * noise * 0.005;
+    sample.gyro_mean_noise = 0.002 * 0.002 * 0.005;
+    sample.accel_mean_noise = noise * noise * 0.005;
     if (const auto result = initializer.add(sample)) return result;
   }
   return std::nullopt;

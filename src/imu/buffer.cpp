@@ -36,6 +36,8 @@ ImuMeasurement ImuBuffer::at(Time time) const {
     result.accel_doubt = b.accel_doubt;
     result.gyro_noise = b.gyro_noise;
     result.accel_noise = b.accel_noise;
+    result.gyro_mean_noise = b.gyro_mean_noise;
+    result.accel_mean_noise = b.accel_mean_noise;
     result.is_bridge = a.is_bridge || b.is_bridge;
   }
   result.time = time;

@@ -59,6 +59,8 @@ ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
   }
   imu.accel_noise = accel_noise_.squaredDensity();
   imu.gyro_noise = gyro_noise_.squaredDensity();
+  imu.accel_mean_noise = accel_noise_.squaredDensityOfMeans();
+  imu.gyro_mean_noise = gyro_noise_.squaredDensityOfMeans();
   if (gap > max_gap_) verdict.bridge = bridge_.until(imu);
   bridge_.follow(imu);
   return verdict;

@@ -29,6 +29,8 @@ Eigen::Vector3d NoiseMeter::squaredDensities(double spacing) const {
   return difference.cwiseAbs2() * (spacing / gain);
 }
 
+bool NoiseMeter::isSettled() const { return weight_ * spacing_ > kMemory / 2.0; }
+
 void NoiseMeter::add(Time time, const Eigen::Vector3d& value) {
   if (count_ == 5) {
     std::rotate(last_.begin(), last_.begin() + 1, last_.end());
@@ -37,11 +39,11 @@ void NoiseMeter::add(Time time, const Eigen::Vector3d& value) {
   last_[static_cast<std::size_t>(count_++)] = {time, value};
   if (count_ < 5) return;
 
-  const double spacing = (last_[4].time - last_[0].time) / 4.0;
-  Eigen::Vector3d squares = squaredDensities(spacing);
+  spacing_ = (last_[4].time - last_[0].time) / 4.0;
+  Eigen::Vector3d squares = squaredDensities(spacing_);
   const double mean = squaredDensity();
   // A signal that stood still to the last bit has no mean to compare with.
-  if (mean > kNothing && weight_ * spacing > kMemory / 2.0) squares = squares.cwiseMin(kLargestSquare * mean);
+  if (mean > kNothing && isSettled()) squares = squares.cwiseMin(kLargestSquare * mean);
   const double fade = std::exp(-(time - last_[3].time) / kMemory);
   squares_ = fade * squares_ + squares;
   weight_ = fade * weight_ + 1.0;

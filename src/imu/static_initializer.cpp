@@ -8,6 +8,9 @@ namespace {
 
 constexpr double kWrongUnits = 0.4;  // of gravity that the mean accelerometer is off
 
+/// [s] An engine that idles at 600 turns a minute or more shakes the IMU and does not move the mean over so
+/// long.
+constexpr double kMean = 0.1;
 /// [s] Rest ends if the mean over so long differs from that before.
 constexpr double kNewest = 0.5;
 constexpr double kCheckEvery = 0.1;
@@ -19,36 +22,38 @@ struct Statistics {
   Eigen::Vector3d std = Eigen::Vector3d::Zero();
 };
 
-Statistics statistics(const std::vector<ImuMeasurement>& samples, Eigen::Vector3d ImuMeasurement::*member) {
+/// Spread of the means over kMean, which an engine does not move, without the white noise that is left in
+/// them.
+Statistics statistics(const std::vector<ImuMeasurement>& samples, Eigen::Vector3d ImuMeasurement::*member,
+                      double ImuMeasurement::*squared_density) {
   Statistics result;
   for (const ImuMeasurement& sample : samples) result.mean += sample.*member;
   result.mean /= static_cast<double>(samples.size());
-  for (const ImuMeasurement& sample : samples) result.std += (sample.*member - result.mean).cwiseAbs2();
-  result.std = (result.std / static_cast<double>(samples.size())).cwiseSqrt();
+  Eigen::Vector3d squares = Eigen::Vector3d::Zero();
+  double noise = 0.0;
+  double means = 0.0;
+  for (auto first = samples.begin(); first != samples.end();) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    auto next = first;
+    for (; next != samples.end() && next->time - first->time < kMean; ++next) sum += *next.*member;
+    squares += (sum / static_cast<double>(next - first) - result.mean).cwiseAbs2();
+    noise += *first.*squared_density / kMean;
+    means += 1.0;
+    first = next;
+  }
+  result.std = ((squares.array() - noise) / means).max(0.0).sqrt();
   return result;
 }
 
-/// Takes the white noise that the samples show by themselves off the spread; `seconds` is what they cover.
-void removeNoise(const std::vector<ImuMeasurement>& samples, double ImuMeasurement::*squared_density,
-                 double seconds, Statistics& statistics) {
-  double variance = 0.0;  // of a sample: squared density times rate
-  for (const ImuMeasurement& sample : samples) variance += sample.*squared_density / seconds;
-  statistics.std = (statistics.std.cwiseAbs2().array() - variance).max(0.0).sqrt();
-}
-
 struct RestStatistics {
-  Statistics gyro, accel;  // their std without the white noise
+  Statistics gyro, accel;
   double mean_size = 0.0;  // [m/s^2] mean of the specific force's norm
 };
 
-/// `seconds`: what the samples cover.
-RestStatistics statistics(const std::vector<ImuMeasurement>& samples, double seconds) {
+RestStatistics statistics(const std::vector<ImuMeasurement>& samples) {
   RestStatistics result;
-  result.gyro = statistics(samples, &ImuMeasurement::angular_velocity);
-  result.accel = statistics(samples, &ImuMeasurement::acceleration);
-  // An engine that idles shakes the IMU, and moves nothing.
-  removeNoise(samples, &ImuMeasurement::gyro_noise, seconds, result.gyro);
-  removeNoise(samples, &ImuMeasurement::accel_noise, seconds, result.accel);
+  result.gyro = statistics(samples, &ImuMeasurement::angular_velocity, &ImuMeasurement::gyro_mean_noise);
+  result.accel = statistics(samples, &ImuMeasurement::acceleration, &ImuMeasurement::accel_mean_noise);
   for (const ImuMeasurement& sample : samples) result.mean_size += sample.acceleration.norm();
   result.mean_size /= static_cast<double>(samples.size());
   return result;
@@ -117,7 +122,7 @@ bool StaticInitializer::endsNow() {
     (is_new ? now_count : before_count) += 1.0;
   }
   // Noise of the mean over the newest samples; that before has less.
-  const double noise = std::sqrt(newest.accel_noise / kNewest);
+  const double noise = std::sqrt(newest.accel_mean_noise / kNewest);
   return (now / now_count - before / before_count).norm() > 0.2 * options_.max_accel_std + 4.0 * noise;
 }
 
@@ -143,7 +148,7 @@ std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement&
     return std::nullopt;
   }
 
-  const RestStatistics rest = statistics(samples_, collected);
+  const RestStatistics rest = statistics(samples_);
   const std::string fault = noRestBecause(rest, options_, gravity_);
   if (!fault.empty()) {
     waiting_for_ = fault;

@@ -157,7 +157,7 @@ void Estimator::judge(const RadarAnswer& answer, const RadarScan& scan) {
   if (!answer.used) return;
   // The state's variance grows about as the root of the accelerometer's, unless that is measured.
   const ImuMeasurement sample = imu_.at(scan.stamp);
-  const bool accel_is_told = imuNoise().accelVariance(sample) > sample.accel_noise;
+  const bool accel_is_told = imuNoise().accelVariance(sample) > sample.accel_mean_noise;
   Eigen::Matrix3d scaled = answer.ego_velocity.told_variance.asDiagonal();
   if (accel_is_told) scaled += 0.5 * answer.prediction_covariance;
   const double share = answer.used->S.ldlt().solve(scaled).trace() / 3.0;

@@ -7,7 +7,7 @@
 #include "rio_t/imu/gap_bridge.h"
 #include "rio_t/imu/measurement.h"
 #include "rio_t/imu/noise.h"
-#include "rio_t/imu/noise_meter.h"
+#include "rio_t/imu/noise_spectrum.h"
 #include "rio_t/imu/saturation_detector.h"
 #include "rio_t/imu/stuck_axis_detector.h"
 
@@ -75,7 +75,7 @@ class ImuInputCheck {
   SaturationDetector saturation_;
   std::array<StuckAxisDetector, 3> gyro_axes_;
   GapBridge bridge_;
-  NoiseMeter accel_noise_, gyro_noise_;
+  NoiseSpectrum accel_noise_, gyro_noise_;
   std::optional<Time> newest_;
   SaturationDetector::Saturated was_saturated_;
 };

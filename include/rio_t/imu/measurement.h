@@ -18,10 +18,12 @@ struct ImuMeasurement {
   double gyro_doubt = 0.0;   ///< [rad^2/s]
   double accel_doubt = 0.0;  ///< [m^2/s^3]
 
-  // White noise measured by NoiseMeter, as squared densities per axis. If they are larger than those of
-  // ImuNoise they replace them: a vibrating frame is noisier than a data sheet.
-  double gyro_noise = 0.0;   ///< [rad^2/s]
-  double accel_noise = 0.0;  ///< [m^2/s^3]
+  // White noise measured by NoiseSpectrum, as squared densities per axis: that of the samples, and what is
+  // left of it in their means.
+  double gyro_noise = 0.0;        ///< [rad^2/s]
+  double accel_noise = 0.0;       ///< [m^2/s^3]
+  double gyro_mean_noise = 0.0;   ///< [rad^2/s]
+  double accel_mean_noise = 0.0;  ///< [m^2/s^3]
 
   bool is_bridge = false;  ///< not measured: see GapBridge
 };

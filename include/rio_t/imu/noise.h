@@ -16,13 +16,13 @@ struct ImuNoise {
   double accel_random_walk = 1.0e-4;  ///< [m/s^3/sqrt(Hz)]
   double gyro_random_walk = 4.0e-6;   ///< [rad/s^2/sqrt(Hz)]
 
-  /// Squared densities for the interval that ends with `imu`: the larger of option and measurement, plus the
-  /// hidden motion of the interval.
+  /// Squared densities of integrated samples for the interval that ends with `imu`: the larger of option and
+  /// measurement, plus the hidden motion of the interval. A vibrating frame is noisier than a data sheet.
   double accelVariance(const ImuMeasurement& imu) const {
-    return std::max(accel_density * accel_density, imu.accel_noise) + imu.accel_doubt;
+    return std::max(accel_density * accel_density, imu.accel_mean_noise) + imu.accel_doubt;
   }
   double gyroVariance(const ImuMeasurement& imu) const {
-    return std::max(gyro_density * gyro_density, imu.gyro_noise) + imu.gyro_doubt;
+    return std::max(gyro_density * gyro_density, imu.gyro_mean_noise) + imu.gyro_doubt;
   }
 };
 

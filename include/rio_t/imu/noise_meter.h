@@ -18,6 +18,9 @@ class NoiseMeter {
   void add(Time time, const Eigen::Vector3d& value);
   /// Squared density of the noisiest axis over the last second [unit^2/Hz]; 0 before the first five samples.
   double squaredDensity() const { return weight_ > 0.0 ? squares_.maxCoeff() / weight_ : 0.0; }
+  double spacing() const { return spacing_; }  ///< of the samples [s]
+  /// Whether the density is a mean over at least half a second.
+  bool isSettled() const;
   /// Begins a new run of five, e.g. after a wrong sample.
   void interrupt() { count_ = 0; }
 
@@ -30,7 +33,8 @@ class NoiseMeter {
   /// spacing [s].
   Eigen::Vector3d squaredDensities(double spacing) const;
 
-  std::array<Sample, 5> last_ = {};                    ///< oldest first
+  std::array<Sample, 5> last_ = {};  ///< oldest first
+  double spacing_ = 0.0;
   int count_ = 0;                                      ///< of `last_` that are in use
   Eigen::Vector3d squares_ = Eigen::Vector3d::Zero();  ///< fading sum, in squared densities
   double weight_ = 0.0;                                ///< the same sum of ones

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+
+#include "rio_t/core/time.h"
+#include "rio_t/imu/noise_meter.h"
+
+namespace rio_t {
+
+/// The noise of a three-axis signal at the rate of its samples, and at a half, a quarter, ... of it.
+///
+/// White noise has the same density at all these rates. A vibration has less at the lower ones: it averages
+/// out. Motion has more. What integrates samples cares for the lower rates (docs/method.md, section 4.3). Not
+/// thread-safe.
+class NoiseSpectrum {
+ public:
+  /// As in NoiseMeter.
+  void add(Time time, const Eigen::Vector3d& value);
+  void interrupt();
+  double squaredDensity() const { return rates_.front().meter.squaredDensity(); }  ///< of the samples
+  /// Of means of samples: the smallest density of all rates down to 10 Hz.
+  double squaredDensityOfMeans() const;
+
+ private:
+  struct Rate {
+    NoiseMeter meter;
+    bool has_first = false;  ///< of the two whose mean goes to the next rate
+    Time first_time;
+    Eigen::Vector3d first = Eigen::Vector3d::Zero();
+  };
+  std::array<Rate, 9> rates_ = {};  ///< the last of an IMU of 2560 Hz is 10 Hz
+};
+
+}  // namespace rio_t
