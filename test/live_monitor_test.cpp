@@ -22,13 +22,16 @@ class TwoRadarDiagnostics : public testing::Test {
 
   TwoRadarDiagnostics() {
     monitor.startWith(kMountings);
-    // A session that is initialised: four seconds of rest.
-    for (int k = 0; k <= 1600; ++k)
-      session.addImu({Time::fromSeconds(0.0025 * k), Eigen::Vector3d::Zero(), {0.0, 0.0, 9.81}});
-    bool more = false;
-    session.process(&more);
+    rest(session, 0, 4);  // initialised
   }
 
+  /// The IMU at rest, between these seconds.
+  static void rest(LiveSession& of, int from, int to) {
+    for (int k = 400 * from; k < 400 * to; ++k)
+      of.addImu({Time::fromSeconds(0.0025 * k), Eigen::Vector3d::Zero(), {0.0, 0.0, 9.81}});
+    bool more = false;
+    of.process(&more);
+  }
   static std::string value(const Status& status, const std::string& key) {
     for (const auto& each : status.values)
       if (each.key == key) return each.value;
@@ -66,6 +69,11 @@ class TwoRadarDiagnostics : public testing::Test {
     result.result.T_IR_covariance.diagonal().tail<3>().setConstant(turn_sigma * turn_sigma);
     result.offset_observable = true;
     monitor.result(result);
+  }
+  Status odometry(const LiveSession& of) const {
+    Status status;
+    monitor.describeOdometry(status, &of);
+    return status;
   }
   Status extrinsics(std::size_t radar) const {
     Status status;
@@ -122,6 +130,28 @@ TEST_F(TwoRadarDiagnostics, SayHowTheOdometryGoesOnAfterAReset) {
   Status after;
   monitor.describeOdometry(after, &session);
   EXPECT_EQ(value(after, "after_reset"), "goes on from the last pose (reset_pose: keep)");
+}
+
+TEST_F(TwoRadarDiagnostics, AreAnErrorWithItsCauseWhereNoScanWasEverUsed) {
+  const std::string cause =
+      ". Likely cause: 30 of 30 scans of radar left show a velocity that contradicts the IMU. Check the "
+      "mounting";
+  for (int k = 0; k < 30; ++k) feed(0, false);
+  rest(session, 4, 7);
+  const Status coasts = odometry(session);
+  EXPECT_EQ(coasts.level, DiagnosticStatus::ERROR);
+  EXPECT_EQ(value(coasts, "health"), "coasting");
+  EXPECT_EQ(coasts.message.find("no scan is used: the IMU alone carries the estimate" + cause), 0U)
+      << coasts.message;
+  OdometryOptions never_sure = config.odometry;
+  never_sure.health.max_velocity_sigma = 1e-6;
+  LiveSession diverged(config, never_sure);
+  rest(diverged, 0, 4);
+  const Status diverges = odometry(diverged);
+  EXPECT_EQ(diverges.level, DiagnosticStatus::ERROR);
+  EXPECT_EQ(value(diverges, "health"), "diverged");
+  EXPECT_EQ(diverges.message.find("diverged: do not trust the estimate; finding the state anew" + cause), 0U)
+      << diverges.message;
 }
 
 TEST_F(TwoRadarDiagnostics, IsAnErrorWhereNoRadarHasComeYet) {

@@ -305,7 +305,7 @@ void LiveOdometry::tellStatus(const LiveMonitor::Status& status) {
   std::string problem = status.name + ": ";
   // The numbers in it change all the time.
   std::copy_if(status.message.begin(), status.message.end(), std::back_inserter(problem),
-               [](unsigned char c) { return std::isdigit(c) == 0; });
+               [](unsigned char c) { return std::isdigit(c) == 0 && c != '.'; });
   using Level = diagnostic_msgs::DiagnosticStatus;
   if (status.level == Level::OK || !isTimeToTell(problem, kStatusPeriod)) return;
   if (status.level == Level::WARN) {

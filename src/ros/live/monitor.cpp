@@ -197,7 +197,7 @@ void LiveMonitor::reconfigured(const std::string& refused_because) {
   refused_because_ = refused_because;
 }
 
-void LiveMonitor::addDiagnosis(Status& status, const LiveSession& session) const {
+std::string LiveMonitor::addDiagnosis(Status& status, const LiveSession& session) const {
   RunEvidence evidence = collector_.evidence(session.odometry(), session.start());
   evidence.imu_count = imu_.count;
   const Diagnosis diagnosis = diagnose(evidence, config_);
@@ -206,6 +206,8 @@ void LiveMonitor::addDiagnosis(Status& status, const LiveSession& session) const
     const Cause& cause = diagnosis.causes[i];
     status.add("likely_cause_" + std::to_string(i + 1), cause.text + " " + cause.remedy);
   }
+  if (diagnosis.causes.empty()) return "";
+  return ". Likely cause: " + diagnosis.causes.front().text + " " + diagnosis.causes.front().remedy;
 }
 
 void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) const {
@@ -223,18 +225,14 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) c
     status.add("reconfigurations", reconfigurations_);
     status.add("last_reconfiguration", refused_because_.empty() ? "done" : "refused: " + refused_because_);
   }
-  if (session != nullptr) addDiagnosis(status, *session);
+  std::string likely_cause;
+  if (session != nullptr) likely_cause = addDiagnosis(status, *session);
   if (!initialized || !waiting_for_.empty()) {
     const std::string what = waiting_for_.empty() ? session->odometry().waitingFor() : waiting_for_;
     status.add("waiting_for", what);
     status.summary(DiagnosticStatus::WARN, "initialising, waiting for " + what);
     return;
   }
-  if (!last_update_) {
-    status.summary(DiagnosticStatus::WARN, "initialised, no scan used yet");
-    return;
-  }
-  const NavigationState& state = last_update_->result.state;
   const RadarInertialOdometry& odometry = session->odometry();
   const Health health = odometry.health();
   const std::map<std::string, std::uint64_t> faults = odometry.faults();
@@ -242,16 +240,24 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) c
   status.add("health", toString(health));
   status.add("divergences", countOf(faults, "diverged"));
   status.add("reinitializations", countOf(faults, "reinitialized"));
-  status.add("speed_m_s", state.v_W.norm());
-  status.add("velocity_sigma_m_s", velocitySigma(state));
-  status.add("seconds_since_a_scan_was_used", last_used_ ? last_scan_ - *last_used_ : 0.0);
+  if (last_update_) {
+    const NavigationState& state = last_update_->result.state;
+    status.add("speed_m_s", state.v_W.norm());
+    status.add("velocity_sigma_m_s", velocitySigma(state));
+    status.add("seconds_since_a_scan_was_used", last_used_ ? last_scan_ - *last_used_ : 0.0);
+  }
+  // The health comes first: where no scan was ever used, the IMU alone leads astray, too.
   if (health == Health::kDiverged) {
     status.summary(DiagnosticStatus::ERROR,
-                   config_.odometry.health.on_divergence == OnDivergence::kReinitialize
-                       ? "diverged: do not trust the estimate; finding the state anew"
-                       : "diverged: do not trust the estimate; call ~reset");
+                   (config_.odometry.health.on_divergence == OnDivergence::kReinitialize
+                        ? "diverged: do not trust the estimate; finding the state anew"
+                        : "diverged: do not trust the estimate; call ~reset") +
+                       likely_cause);
   } else if (health == Health::kCoasting) {
-    status.summary(DiagnosticStatus::ERROR, "no scan is used: the IMU alone carries the estimate");
+    status.summary(DiagnosticStatus::ERROR,
+                   "no scan is used: the IMU alone carries the estimate" + likely_cause);
+  } else if (!last_update_) {
+    status.summary(DiagnosticStatus::WARN, "initialised, no scan used yet");
   } else {
     status.summary(DiagnosticStatus::OK, "running");
   }

@@ -121,8 +121,9 @@ class LiveMonitor {
   std::optional<Finding> describeRadar(Status& status, Radar& radar, bool initialized) const;
   /// How few of its last scans were used, and why, if it is less than half.
   static std::optional<std::string> judgeUse(Radar& radar, bool initialized);
-  /// Whether the run is good so far and, if not, why.
-  void addDiagnosis(Status& status, const LiveSession& session) const;
+  /// Adds whether the run is good so far and, if not, why. Returns the likeliest cause for the end of a
+  /// message; empty if there is none.
+  std::string addDiagnosis(Status& status, const LiveSession& session) const;
   static Finding join(const std::vector<Finding>& findings, bool another_works);
   /// Whether the newest estimate is of a scan of this radar, or nearly so.
   bool isRecent(const Radar& radar) const;
