@@ -181,6 +181,14 @@ TEST(Diagnosis, ADivergenceIsBadIfItLastsAndDoubtfulIfNot) {
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kBad);
 }
 
+TEST(Diagnosis, ADivergenceAfterTheLastScanIsNoContradictionOfTheRadar) {
+  RunEvidence evidence = goodRun();
+  evidence.faults["diverged"] = 1;
+  evidence.health = Health::kDiverged;
+  expectSays(first(evidence), {"no_scans: The estimate diverged 1 times while no scan came"});
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kBad);
+}
+
 TEST(Diagnosis, ADivergenceForLackOfScansNamesTheLack) {
   RunEvidence evidence = withRejected("stamp_ahead_of_imu");
   evidence.faults["diverged"] = 1;

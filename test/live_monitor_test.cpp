@@ -7,6 +7,7 @@
 #include <string>
 
 #include "rio_t/core/so3.h"
+#include "rio_t/factors/state_block.h"
 #include "rio_t/graph/solver_termination.h"
 #include "rio_t/ros/live/monitor.h"
 #include "rio_t/ros/live/session.h"
@@ -152,6 +153,21 @@ TEST_F(TwoRadarDiagnostics, AreAnErrorWithItsCauseWhereNoScanWasEverUsed) {
   EXPECT_EQ(value(diverges, "health"), "diverged");
   EXPECT_EQ(diverges.message.find("diverged: do not trust the estimate; finding the state anew" + cause), 0U)
       << diverges.message;
+}
+
+TEST_F(TwoRadarDiagnostics, TellTheStateOfTheNewestImuSampleThoughNoScanComes) {
+  NavigationState state;
+  state.time = Time::fromSeconds(9.5);
+  state.v_W = {3.0, 4.0, 0.0};
+  state.covariance.diagonal().segment<3>(StateBlock::kV).setConstant(4.0);
+  update(0, 3.5, 0.0, kMountings[0]);
+  monitor.odometry(state, 0.001);
+  const Status status = odometry(session);
+  EXPECT_EQ(value(status, "speed_m_s"), "5");
+  EXPECT_EQ(value(status, "velocity_sigma_m_s"), "2");
+  EXPECT_EQ(value(status, "seconds_since_a_scan_was_used"), "6");
+  monitor.reset("~reset called");
+  EXPECT_EQ(value(odometry(session), "speed_m_s"), "no speed_m_s");
 }
 
 TEST_F(TwoRadarDiagnostics, IsAnErrorWhereNoRadarHasComeYet) {

@@ -200,6 +200,17 @@ class SetupTest(tester.LiveTestCase):
         self.assertIn("/rio_t: no IMU message yet on /wrong", text)
         self.assertLess(text.count("no IMU message yet"), 4, "the log repeats each diagnosis")
 
+    def test_the_log_says_that_the_estimate_diverged_also_where_no_scan_comes(self):
+        log = pathlib.Path(self.path("diverged.txt"))
+        # No state is known so well: it diverges as it starts, at rest, by the IMU alone.
+        with open(log, "w") as told, tester.Listener() as listener, tester.Process(
+                tester.program("rio_t", "rio_t_node"), "__name:=rio_t", "_config:=irs",
+                "_divergence_max_velocity_sigma:=1e-6", stdout=told, stderr=told):
+            listener.wait_until_heard()
+            with tester.feed(listener, self.bag, (tester.IMU,)):
+                listener.wait_for_diagnosis("odometry", "diverged", ERROR)
+        self.assertIn("/rio_t: diverged: do not trust the estimate", log.read_text())
+
     def test_mavros_gets_odometry_by_its_contract(self):
         """mavros is not in Debian: its topic, rate, frames and covariances are what we can check."""
         heard = []

@@ -304,6 +304,13 @@ void addDivergence(const RunEvidence& evidence, std::vector<Cause>* causes) {
   const bool scans_are_used = usedShare(evidence) >= kFewScansUsed;
   if (!scans_are_used && !causes->empty() && std::none_of(causes->begin(), causes->end(), contradicts))
     return;
+  if (evidence.scans_diverged == 0) {
+    causes->push_back({"no_scans",
+                       "The estimate diverged " + std::to_string(divergences) +
+                           " times while no scan came that can be used: the IMU alone carried it.",
+                       "Look for what keeps the scans of the radar away.", 0.05});
+    return;
+  }
   causes->push_back({"diverged",
                      "The estimate diverged " + std::to_string(divergences) + " times, for " +
                          outOf(evidence.scans_diverged, evidence.scans_judged, "scans") +

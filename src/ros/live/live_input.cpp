@@ -48,7 +48,7 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
         session_.speak(Speaker::kNavigation, now, [&] {
           if (publisher_.odometry(*body)) ++odom_published_;
           frames_.published(*body);
-          monitor_.odometry(secondsSince(start));
+          monitor_.odometry(*state, secondsSince(start));
         });
       } else if (!frames_.waitingFor().empty()) {
         monitor_.imuDropped("odometry_before_base_extrinsics");

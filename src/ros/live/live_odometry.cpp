@@ -171,7 +171,7 @@ void LiveOdometry::addDiagnostics() {
   diagnostics_->add("odometry", [this](Status& s) {
     const Session now = session_.get();
     monitor_.describeOdometry(s, now.get());
-    if (!now || now->odometry().health() != Health::kDiverged) tellStatus(s);  // else tellHealth tells it
+    tellStatus(s);  // a divergence, too: tellHealth tells it only while scans come
   });
   diagnostics_->add("input", [this](Status& s) {
     monitor_.describeInput(s, session_.get().get());

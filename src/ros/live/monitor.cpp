@@ -106,8 +106,9 @@ void LiveMonitor::zeroTrigger(std::size_t radar) {
   collector_.addZeroTrigger(radar);
 }
 
-void LiveMonitor::odometry(double latency) {
+void LiveMonitor::odometry(const NavigationState& state, double latency) {
   const std::lock_guard<std::mutex> lock(mutex_);
+  newest_state_ = state;
   odometry_latency_.add(latency);
 }
 
@@ -128,11 +129,10 @@ void LiveMonitor::result(const LiveSession::Result& result) {
   const std::lock_guard<std::mutex> lock(mutex_);
   Radar& radar = radars_.at(result.result.scan.radar);
   collector_.add(result.result);
-  last_scan_ = result.result.scan.stamp;
   accountAids(result.result);
   if (result.result.used) {
     ++radar.used;
-    last_used_ = last_scan_;
+    last_used_ = result.result.scan.stamp;
   } else if (!result.result.rejected_because.empty()) {
     ++radar.dropped[result.result.rejected_because];
     if (isEarly(result.result.rejected_because)) ++radar.early;
@@ -168,6 +168,7 @@ void LiveMonitor::reset(const std::string& reason) {
   last_terminations_.clear();
   last_update_.reset();
   last_used_.reset();
+  newest_state_.reset();
   vehicle_ = GroundVehicle();
   barometer_.last.reset();
   for (Radar& radar : radars_) {
@@ -236,15 +237,17 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) c
   const RadarInertialOdometry& odometry = session->odometry();
   const Health health = odometry.health();
   const std::map<std::string, std::uint64_t> faults = odometry.faults();
-  if (const auto start = session->start()) status.add("initialized_from", toString(start->from));
+  const std::optional<RadarInertialOdometry::Start> start = session->start();
+  if (start) status.add("initialized_from", toString(start->from));
   status.add("health", toString(health));
   status.add("divergences", countOf(faults, "diverged"));
   status.add("reinitializations", countOf(faults, "reinitialized"));
-  if (last_update_) {
-    const NavigationState& state = last_update_->result.state;
-    status.add("speed_m_s", state.v_W.norm());
-    status.add("velocity_sigma_m_s", velocitySigma(state));
-    status.add("seconds_since_a_scan_was_used", last_used_ ? last_scan_ - *last_used_ : 0.0);
+  if (newest_state_) {
+    // Not those of the last scan: they would stand still once no more scans come.
+    status.add("speed_m_s", newest_state_->v_W.norm());
+    status.add("velocity_sigma_m_s", velocitySigma(*newest_state_));
+    const Time since = last_used_ ? *last_used_ : start ? start->time : newest_state_->time;
+    status.add("seconds_since_a_scan_was_used", std::max(0.0, newest_state_->time - since));
   }
   // The health comes first: where no scan was ever used, the IMU alone leads astray, too.
   if (health == Health::kDiverged) {

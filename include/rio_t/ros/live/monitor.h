@@ -32,7 +32,8 @@ class LiveMonitor {
   void scan(std::size_t radar = 0);
   void trigger(std::size_t radar = 0);
   void zeroTrigger(std::size_t radar);  ///< one with a stamp of zero, which stamps no scan
-  void odometry(double latency);        ///< a state was ready that many seconds after the IMU message came
+  /// A state was ready `latency` seconds after the IMU message came.
+  void odometry(const NavigationState& state, double latency);
   void imuDropped(const std::string& reason);  ///< a sample that goes no further
   /// Scans, or points of them, that go no further.
   void dropped(std::size_t radar, const std::string& reason, std::uint64_t count = 1);
@@ -145,8 +146,8 @@ class LiveMonitor {
   std::uint64_t reconfigurations_ = 0;
   std::map<std::string, std::string> frames_;
   std::optional<LiveSession::Result> last_update_;
-  std::optional<Time> last_used_;  // stamp of the last scan used
-  Time last_scan_;                 // stamp of the last scan finished
+  std::optional<Time> last_used_;                // stamp of the last scan used
+  std::optional<NavigationState> newest_state_;  // at the newest IMU sample
 };
 
 /// The warning for a person whose platform is no ground vehicle.
