@@ -176,6 +176,22 @@ TEST_F(TwoRadarDiagnostics, IsAnErrorWhereNoRadarHasComeYet) {
   EXPECT_EQ(status.message, "radar left: no scan yet on /left; radar right: no scan yet on /right");
 }
 
+TEST_F(TwoRadarDiagnostics, NameTheTypeOfATopicThatIsPublishedAsAnother) {
+  EXPECT_TRUE(monitor.lacksInput());
+  monitor.setTopicTypes({{config.imu_topic, "std_msgs/Header"},
+                         {"/left", "sensor_msgs/PointCloud2"},
+                         {"/right", "std_msgs/Header"}});
+  Status nothing;
+  monitor.describeInput(nothing, &session);
+  EXPECT_EQ(nothing.message, "no IMU message yet on " + config.imu_topic +
+                                 ", which is published as std_msgs/Header, expected sensor_msgs/Imu");
+  EXPECT_EQ(second(0, 0, 0).message,
+            "radar left: no scan yet on /left; radar right: no scan yet on /right, which is published as "
+            "std_msgs/Header, expected sensor_msgs/PointCloud2");
+  EXPECT_EQ(second(20, 20, 20).level, DiagnosticStatus::OK);
+  EXPECT_FALSE(monitor.lacksInput());
+}
+
 TEST_F(TwoRadarDiagnostics, NameTheRadarThatIsMostlyRejected) {
   for (int k = 0; k < 5; ++k) EXPECT_EQ(second(20, 20, 10).level, DiagnosticStatus::OK) << "half are enough";
   Status status;

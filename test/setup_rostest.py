@@ -10,6 +10,7 @@ import numpy
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
+from std_msgs.msg import Header
 
 from rio_t import live_tester as tester
 from rio_t import tum
@@ -210,6 +211,13 @@ class SetupTest(tester.LiveTestCase):
             with tester.feed(listener, self.bag, (tester.IMU,)):
                 listener.wait_for_diagnosis("odometry", "diverged", ERROR)
         self.assertIn("/rio_t: diverged: do not trust the estimate", log.read_text())
+
+    def test_a_topic_of_a_wrong_type_is_told(self):
+        publisher = rospy.Publisher("/odd/imu", Header, queue_size=1)
+        with tester.Listener() as listener, tester.node("config:=irs", "imu_topic:=/odd/imu"):
+            listener.wait_for_diagnosis("input", "no IMU message yet on /odd/imu, which is published as std_msgs/Header, "
+                                                 "expected sensor_msgs/Imu", ERROR)
+        publisher.unregister()
 
     def test_mavros_gets_odometry_by_its_contract(self):
         """mavros is not in Debian: its topic, rate, frames and covariances are what we can check."""

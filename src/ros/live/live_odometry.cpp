@@ -2,6 +2,7 @@
 
 #include <diagnostic_msgs/DiagnosticStatus.h>
 #include <ros/console.h>
+#include <ros/master.h>
 
 #include <algorithm>
 #include <boost/function.hpp>
@@ -35,6 +36,16 @@ Config withResolvedTopics(Config config, const ros::NodeHandle& node) {
 ros::NodeHandle onQueue(ros::NodeHandle node, ros::CallbackQueue* queue) {
   node.setCallbackQueue(queue);
   return node;
+}
+
+/// The types of what is published, by topic; none without a master.
+std::map<std::string, std::string> publishedTypes() {
+  std::map<std::string, std::string> types;
+  ros::master::V_TopicInfo topics;
+  // getTopics alone would wait for a master that is gone.
+  if (!ros::master::check() || !ros::master::getTopics(topics)) return types;
+  for (const ros::master::TopicInfo& topic : topics) types[topic.name] = topic.datatype;
+  return types;
 }
 
 }  // namespace
@@ -174,6 +185,8 @@ void LiveOdometry::addDiagnostics() {
     tellStatus(s);  // a divergence, too: tellHealth tells it only while scans come
   });
   diagnostics_->add("input", [this](Status& s) {
+    // Before the monitor is locked: the master may take its time.
+    if (monitor_.lacksInput()) monitor_.setTopicTypes(publishedTypes());
     monitor_.describeInput(s, session_.get().get());
     if (s.message != kSolverFallsBehind) tellStatus(s);  // else tellHealth tells it
   });

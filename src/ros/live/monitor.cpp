@@ -187,6 +187,26 @@ void LiveMonitor::setFrames(const std::map<std::string, std::string>& frames) {
   frames_ = frames;
 }
 
+bool LiveMonitor::lacksInput() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return imu_.count == 0 || std::any_of(radars_.begin(), radars_.end(), [](const Radar& radar) {
+           return radar.scans.count == 0 ||
+                  (radar.config.stamp_source == StampSource::kTrigger && radar.triggers.count == 0);
+         });
+}
+
+void LiveMonitor::setTopicTypes(const std::map<std::string, std::string>& types) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  topic_types_ = types;
+}
+
+std::string LiveMonitor::wrongType(const std::string& topic, const std::string& expected) const {
+  const auto found = topic_types_.find(topic);
+  // "*": whatever the publisher has.
+  if (found == topic_types_.end() || found->second == expected || found->second == "*") return "";
+  return ", which is published as " + found->second + ", expected " + expected;
+}
+
 void LiveMonitor::tune(const ImuNoise& told) {
   const std::lock_guard<std::mutex> lock(mutex_);
   imu_noise_ = told;
@@ -280,10 +300,12 @@ std::optional<LiveMonitor::Finding> LiveMonitor::describeRadar(Status& status, R
   const std::optional<std::string> mostly_rejected = judgeUse(radar, initialized);
   const std::string of = radars_.size() == 1 ? "" : called(radar) + ": ";
   if (radar.scans.count == 0)
-    return Finding{DiagnosticStatus::ERROR, of + "no scan yet on " + config.radar_topic};
+    return Finding{DiagnosticStatus::ERROR, of + "no scan yet on " + config.radar_topic +
+                                                wrongType(config.radar_topic, "sensor_msgs/PointCloud2")};
   if (wants_trigger && radar.triggers.count == 0) {
     return Finding{DiagnosticStatus::ERROR,
                    of + "no trigger yet on " + config.trigger_topic +
+                       wrongType(config.trigger_topic, "std_msgs/Header") +
                        ", and stamp_source is trigger; header and arrival need none"};
   }
   if (is_silent) {
@@ -345,7 +367,8 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   const Finding radars = join(findings, findings.size() < radars_.size());
 
   if (imu_.count == 0) {
-    status.summary(DiagnosticStatus::ERROR, "no IMU message yet on " + config_.imu_topic);
+    status.summary(DiagnosticStatus::ERROR, "no IMU message yet on " + config_.imu_topic +
+                                                wrongType(config_.imu_topic, "sensor_msgs/Imu"));
   } else if (imu_is_silent) {
     status.summary(DiagnosticStatus::ERROR, "the IMU is silent, topic " + config_.imu_topic);
   } else if (!findings.empty()) {

@@ -49,6 +49,10 @@ class LiveMonitor {
   void waitFor(const std::string& what);
   /// Texts about the frames, by key.
   void setFrames(const std::map<std::string, std::string>& frames);
+  /// Whether nothing came yet on a topic of the IMU or of a radar.
+  bool lacksInput() const;
+  /// The types of what is published, by topic: a topic of a wrong type brings no message.
+  void setTopicTypes(const std::map<std::string, std::string>& types);
   void tune(const ImuNoise& told);  ///< the noise of the IMU as it is told now
   /// A change of parameters was refused, for that reason; or was made, if it is empty.
   void reconfigured(const std::string& refused_because);
@@ -125,6 +129,8 @@ class LiveMonitor {
   /// Adds whether the run is good so far and, if not, why. Returns the likeliest cause for the end of a
   /// message; empty if there is none.
   std::string addDiagnosis(Status& status, const LiveSession& session) const;
+  /// For the end of a message about a topic on which nothing came; empty if its type is right or unknown.
+  std::string wrongType(const std::string& topic, const std::string& expected) const;
   static Finding join(const std::vector<Finding>& findings, bool another_works);
   /// Whether the newest estimate is of a scan of this radar, or nearly so.
   bool isRecent(const Radar& radar) const;
@@ -144,7 +150,7 @@ class LiveMonitor {
   std::deque<SolverTermination> last_terminations_;  // of the last windows, newest last
   std::string last_reset_, waiting_for_, solver_failure_, refused_because_;
   std::uint64_t reconfigurations_ = 0;
-  std::map<std::string, std::string> frames_;
+  std::map<std::string, std::string> frames_, topic_types_;
   std::optional<LiveSession::Result> last_update_;
   std::optional<Time> last_used_;                // stamp of the last scan used
   std::optional<NavigationState> newest_state_;  // at the newest IMU sample
