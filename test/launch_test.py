@@ -90,20 +90,32 @@ def test_config_is_a_name_or_a_path_from_where_the_user_stands(tmp_path):
                       folder=tmp_path) == {"/rio_t_bag/config": str(own)}
 
 
+def test_a_bag_that_is_not_there_is_refused(tmp_path):
+    for bag, path in (("nope.bag", tmp_path / "nope.bag"), (tmp_path, tmp_path)):
+        done = roslaunch("--nodes", "rio_t", "irs.launch", f"bag:={bag}", folder=tmp_path)
+        assert f"rio_t: bag {path}: no such file" in done.stderr
+        assert "/rio_t" not in done.stdout
+    (tmp_path / "my run.bag").touch()
+    assert "/rio_t" in roslaunch("--nodes", "rio_t", "irs.launch", "bag:=my run.bag", folder=tmp_path).stdout
+
+
 def test_namespace_and_topics_reach_the_node_and_the_bag(tmp_path):
+    (tmp_path / "run.bag").touch()
     words = ("rio_t", "irs.launch", "ns:=robot", "bag:=run.bag", "radar_topic:=scan", "clock_hz:=200", "bag_args:=--loop")
-    assert parameters(*words) == {"/use_sim_time": True, "/robot/rio_t/config": "irs",
-                                  "/robot/rio_t/radar_topic": "scan"}
-    assert roslaunch("--nodes", *words, "nodelet:=true", "rviz:=true").stdout.split() == [
+    assert parameters(*words, folder=tmp_path) == {"/use_sim_time": True, "/robot/rio_t/config": "irs",
+                                                   "/robot/rio_t/radar_topic": "scan"}
+    assert roslaunch("--nodes", *words, "nodelet:=true", "rviz:=true", folder=tmp_path).stdout.split() == [
         "/bag_player", "/robot/rio_t_manager", "/robot/rio_t", "/robot/rviz"]
     play = roslaunch("--args", "bag_player", *words, folder=tmp_path).stdout
     assert "--prefix=robot" in play and "--hz=200" in play and "--loop" in play and str(tmp_path / "run.bag") in play
 
 
-def test_a_bag_played_into_a_namespace_keeps_its_tf():
+def test_a_bag_played_into_a_namespace_keeps_its_tf(tmp_path):
     """tf2 listens to /tf and /tf_static in every namespace."""
+    (tmp_path / "run.bag").touch()
+
     def remappings(*words):
-        play = roslaunch("--args", "bag_player", "rio_t", "irs.launch", "bag:=run.bag", *words).stdout
+        play = roslaunch("--args", "bag_player", "rio_t", "irs.launch", "bag:=run.bag", *words, folder=tmp_path).stdout
         assert "/run.bag" in play
         return {word for word in play.split() if ":=/" in word}
     for namespace in ("robot", "/robot"):

@@ -1,7 +1,8 @@
 """The configuration of a launch file, for <param command="...">, which roslaunch runs while it reads the file.
 
 Prints the configuration that the argument `config` names, and refuses arguments that the launch file does not have:
-roslaunch itself takes every NAME:=VALUE on its command line, and a misspelt one would change nothing without a word."""
+roslaunch itself takes every NAME:=VALUE on its command line, and a misspelt one would change nothing without a word.
+It also refuses a bag that is not there: its player would end, and the node would wait for it for ever."""
 import argparse
 import difflib
 import os
@@ -53,9 +54,12 @@ def main(arguments):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("config", help="a path, absolute or from where roslaunch was called, or a name of the package's config/")
     parser.add_argument("launch_folder", type=pathlib.Path, help="where the launch files of the package are")
+    parser.add_argument("--bag", default="", help="the bag that is to be played; empty: none")
     options = parser.parse_args(arguments)
     try:
         check_arguments(words_of(os.getppid()), options.launch_folder)
+        if options.bag and not pathlib.Path(options.bag).is_file():
+            raise RioTError(f"bag {options.bag}: no such file")
         print(config_path(options.config, os.getcwd()), end="")
     except RioTError as error:
         print(f"rio_t: {error}", file=sys.stderr)
