@@ -219,6 +219,7 @@ class LiveTest(tester.LiveTestCase):
         self.assertIn("/rio_t/windou", outcome.stdout)
         self.assertIn('did you mean "window"', outcome.stdout)
         self.assertIn("/rio_t/gravity", outcome.stdout)
+        self.assertIn("(perhaps left by an earlier run: rosparam delete /rio_t)", outcome.stdout)
         outcome = tester.run(tester.program("rio_t", "rio_t_node"), "__name:=rio_t_2", "_config:=no_such")
         self.assertEqual(outcome.returncode, 1, outcome.stdout)
         self.assertIn("no_such", outcome.stdout)

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <sstream>
+#include <string>
+#include <vector>
 
 namespace rio_t {
 namespace {
@@ -45,6 +47,15 @@ TEST(RosParameters, FaultsNameTheParameterWithItsNamespace) {
     EXPECT_NE(text.find("parameter /rio_t/gravity"), std::string::npos) << text;
     EXPECT_NE(text.find("parameter /rio_t/radar"), std::string::npos) << text;
   }
+}
+
+TEST(RosParameters, FaultsOfTheServerSayHowToRemoveWhatAnEarlierRunLeft) {
+  const ConfigError error = withHintOfServer(
+      ConfigError({"parameter /rio_t/left/windou: unknown", "own.yaml:1: unknown"}), "/rio_t");
+  EXPECT_EQ(error.faults(),
+            (std::vector<std::string>{"parameter /rio_t/left/windou: unknown (perhaps left by an "
+                                      "earlier run: rosparam delete /rio_t)",
+                                      "own.yaml:1: unknown"}));
 }
 
 TEST(RosParameters, WhatANodeShowsIsTheConfigurationItRan) {

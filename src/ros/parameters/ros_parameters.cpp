@@ -93,6 +93,14 @@ ParameterEntries toParameterEntries(XmlRpc::XmlRpcValue& map, const std::string&
   return entries;
 }
 
+ConfigError withHintOfServer(const ConfigError& error, const std::string& name_space) {
+  std::vector<std::string> faults = error.faults();
+  for (std::string& fault : faults)
+    if (fault.rfind("parameter " + name_space + "/", 0) == 0)
+      fault += " (perhaps left by an earlier run: rosparam delete " + name_space + ")";
+  return ConfigError(std::move(faults));
+}
+
 Config configFromRos(const ros::NodeHandle& private_node) {
   const std::string& name_space = private_node.getNamespace();
   ParameterEntries entries;
@@ -108,7 +116,11 @@ Config configFromRos(const ros::NodeHandle& private_node) {
   if (private_node.getParam(name_space, map)) {
     for (ParameterEntry& entry : toParameterEntries(map, name_space)) entries.push_back(std::move(entry));
   }
-  return makeConfig(entries);
+  try {
+    return makeConfig(entries);
+  } catch (const ConfigError& error) {
+    throw withHintOfServer(error, name_space);
+  }
 }
 
 void showEffectiveParameters(const ros::NodeHandle& private_node, const Config& config) {

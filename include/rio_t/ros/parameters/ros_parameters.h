@@ -21,6 +21,10 @@ XmlRpc::XmlRpcValue toXmlRpc(const ParameterEntries& entries);
 /// showEffectiveParameters wrote.
 ParameterEntries toParameterEntries(XmlRpc::XmlRpcValue& map, const std::string& name_space);
 
+/// The same faults. Those of parameters of the server say how to remove what an earlier run left there, since
+/// the server keeps a misspelt one after the command was corrected.
+ConfigError withHintOfServer(const ConfigError& error, const std::string& name_space);
+
 /// Configuration of a node: the file that its private parameter `config` names (a name of the package's
 /// config/, or a path), if any, with the other private parameters on top. Throws ConfigError, or
 /// std::runtime_error.
