@@ -45,6 +45,16 @@ TEST(Parameters, WholeNumbersMayBeWrittenWithAPoint) {
     EXPECT_TRUE(contains(faultOf(refused), "expected a whole number")) << refused;
 }
 
+TEST(Parameters, FramesAreKeptWithoutTheSlashThatTf2Refuses) {
+  const Config config =
+      fromAssignments({"odom_frame=/odom", "base_link_frame=/base", "radar_frame=/my/radar"});
+  EXPECT_EQ(config.odom_frame, "odom");
+  EXPECT_EQ(config.base_link_frame, "base");
+  EXPECT_EQ(config.radar_frame, "my/radar");
+  EXPECT_TRUE(contains(faultOf("odom_frame=/"), "odom_frame: expected one line of text, not empty"));
+  EXPECT_TRUE(contains(faultsOf({"odom_frame=/map", "base_link_frame=map"}).at(0), "got \"map\" for both"));
+}
+
 TEST(Parameters, TheKeysThatUsersRelyOnExist) {
   std::set<std::string> keys;
   for (const ParameterDescription& about : parameterDescriptions()) {

@@ -7,13 +7,6 @@
 #include "rio_t/ros/messages/conversions.h"
 
 namespace rio_t {
-namespace {
-
-std::string withoutSlash(const std::string& frame) {
-  return !frame.empty() && frame.front() == '/' ? frame.substr(1) : frame;
-}
-
-}  // namespace
 
 std::string imuFrame(const Config& config, const std::string& frame_id) {
   const std::string& told = config.imu_frame.empty() ? frame_id : config.imu_frame;

@@ -56,10 +56,10 @@ void listStamps(ParameterList& list, Config& c) {
 
 void listFrames(ParameterList& list, Config& c) {
   list.group("Frames");
-  list.text("odom_frame", c.odom_frame,
-            "This is the name of the world frame. Its z axis points up. Its origin and heading are those of "
-            "the first pose of base_link_frame.");
-  list.first().text(
+  list.frame("odom_frame", c.odom_frame,
+             "This is the name of the world frame. Its z axis points up. Its origin and heading are those of "
+             "the first pose of base_link_frame.");
+  list.first().frame(
       "base_link_frame", c.base_link_frame,
       "This is the body whose odometry the live node publishes. The IMU may sit elsewhere on it.");
   list.textOrEmpty(
@@ -81,7 +81,7 @@ void listFrames(ParameterList& list, Config& c) {
   list.rotation("base_extrinsics_rotation_xyzw", c.T_BI.q_BI,
                 "This quaternion turns vectors of the IMU into base_link_frame.");
   list.ofRadar(true);
-  list.text(
+  list.frame(
       "radar_frame", c.radar_frame,
       "This is the frame in which the live node shows what the radar sees: x forward, y left, z up. With "
       "several radars the default is rio_t_radar_NAME. No other node may publish a transform of this frame, "

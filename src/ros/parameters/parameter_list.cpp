@@ -212,6 +212,18 @@ void ParameterList::textOrEmpty(const std::string& key, std::string& member, con
       [&member] { return ParameterValue{member}; });
 }
 
+void ParameterList::frame(const std::string& key, std::string& member, const std::string& text) {
+  add(
+      {key, "text", "", "one line of text, not empty", text},
+      [&member](const ParameterValue& value) {
+        const std::string* x = std::get_if<std::string>(&value.data);
+        if (x == nullptr || withoutSlash(*x).empty() || !isOneLine(*x)) return false;
+        member = withoutSlash(*x);
+        return true;
+      },
+      [&member] { return ParameterValue{member}; });
+}
+
 void ParameterList::word(const std::string& key, const std::vector<std::string>& words, std::string& member,
                          const std::string& text) {
   std::vector<std::pair<std::string, std::string>> choices;

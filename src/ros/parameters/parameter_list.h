@@ -65,6 +65,8 @@ class ParameterList {
   void mounting(const std::string& key, std::optional<MountingAngles>& member, const std::string& text);
   void text(const std::string& key, std::string& member, const std::string& text);
   void textOrEmpty(const std::string& key, std::string& member, const std::string& text);
+  /// A text that is kept without a leading slash.
+  void frame(const std::string& key, std::string& member, const std::string& text);
   /// One of several words, each standing for a value.
   template <typename T>
   void choice(const std::string& key, const std::vector<std::pair<std::string, T>>& choices, T& member,

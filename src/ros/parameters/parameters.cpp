@@ -318,6 +318,10 @@ Config withAbsoluteTopics(Config config) {
   return config;
 }
 
+std::string withoutSlash(const std::string& frame) {
+  return !frame.empty() && frame.front() == '/' ? frame.substr(1) : frame;
+}
+
 Config makeConfig(const ParameterEntries& entries) {
   Config config;
   std::vector<std::string> faults;

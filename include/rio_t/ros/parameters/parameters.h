@@ -128,6 +128,9 @@ std::vector<Config> configsOfRadars(const Config& config);
 /// relative topic begins with `/`. An empty one stays empty.
 Config withAbsoluteTopics(Config config);
 
+/// The name of a frame for tf2, which refuses the leading slash that tf1 had.
+std::string withoutSlash(const std::string& frame);
+
 /// Layout of the cloud: the preset with the overrides.
 PointCloudFormat pointCloudFormat(const Config& config);
 
