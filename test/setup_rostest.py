@@ -212,6 +212,16 @@ class SetupTest(tester.LiveTestCase):
                 listener.wait_for_diagnosis("odometry", "diverged", ERROR)
         self.assertIn("/rio_t: diverged: do not trust the estimate", log.read_text())
 
+    def test_save_trajectory_answers_with_the_whole_path(self):
+        words = ("__name:=rio_t", "_config:=irs", "_trajectory_file:=poses.txt")
+        with tester.Listener() as listener, tester.Process(tester.program("rio_t", "rio_t_node"), *words, cwd=self.folder):
+            listener.wait_until_heard()
+            with tester.feed(listener, self.bag):
+                listener.wait_for("optimised odometry", lambda: listener.messages["odom_optimized"])
+                response = tester.call("/rio_t/save_trajectory")
+        self.assertIn(" poses in " + os.path.realpath(self.path("poses.txt")), response.message)
+        self.assertTrue(os.path.isfile(self.path("poses.txt")))
+
     def test_a_topic_of_a_wrong_type_is_told(self):
         publisher = rospy.Publisher("/odd/imu", Header, queue_size=1)
         with tester.Listener() as listener, tester.node("config:=irs", "imu_topic:=/odd/imu"):

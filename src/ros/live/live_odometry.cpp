@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <boost/function.hpp>
 #include <cctype>
+#include <filesystem>
 #include <iterator>
 
 #include "radar_texts.h"
@@ -354,9 +355,11 @@ bool LiveOdometry::onSaveTrajectory(std_srvs::Trigger::Request& /*request*/,
     std::size_t stride = 1;
     const Trajectory trajectory = now ? now->trajectory(&stride) : Trajectory();
     if (trajectory.empty()) throw std::runtime_error("no optimised pose yet");
-    writeTum(config_.trajectory_file, trajectory);
+    // With its folder, since who calls may not know where the node runs.
+    const std::string file = std::filesystem::absolute(config_.trajectory_file).string();
+    writeTum(file, trajectory);
     response.success = 1U;
-    response.message = std::to_string(trajectory.size()) + " poses in " + config_.trajectory_file;
+    response.message = std::to_string(trajectory.size()) + " poses in " + file;
     if (stride > 1)
       response.message += ", one in " + std::to_string(stride) + ": more than " +
                           std::to_string(LiveSession::kMaxPoses) + " are not kept";
