@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
 
 namespace rio_t {
 namespace {
@@ -75,7 +77,7 @@ TEST(Diagnosis, AGoodRunHasNoCauses) {
   const Diagnosis diagnosis = diagnose(goodRun(), Config{});
   EXPECT_EQ(toString(diagnosis.verdict), "good");
   EXPECT_EQ(describeCauses(diagnosis), "");
-  EXPECT_EQ(diagnosis.checks.size(), 7u);
+  EXPECT_EQ(diagnosis.checks.size(), 8u);
   for (const Check& check : diagnosis.checks) EXPECT_TRUE(check.good()) << check.name;
 }
 
@@ -187,6 +189,66 @@ TEST(Diagnosis, ADivergenceAfterTheLastScanIsNoContradictionOfTheRadar) {
   evidence.health = Health::kDiverged;
   expectSays(first(evidence), {"no_scans: The estimate diverged 1 times while no scan came"});
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kBad);
+}
+
+TEST(Diagnosis, ARadarThatIsSilentForMostOfTheTimeIsBad) {
+  RunEvidence evidence = goodRun();
+  evidence.run_seconds = 60.0;
+  evidence.silent_seconds = 30.0;
+  evidence.silence_begin = 29.0;
+  evidence.silence_end = 60.0;
+  EXPECT_EQ(first(evidence), "none") << "half of the time is not most of it";
+  evidence.silent_seconds = 40.0;
+  evidence.silence_begin = 19.04;
+  evidence.health = Health::kDiverged;  // for lack of scans: not a cause
+  const Diagnosis diagnosis = diagnose(evidence, Config{});
+  EXPECT_EQ(diagnosis.verdict, RunVerdict::kBad);
+  ASSERT_EQ(diagnosis.causes.size(), 1u);
+  expectSays(first(evidence), {"radar_silent: No scan was used from 19.0 to 60.0 s after the start",
+                               "for 40.0 of 60.0 s", "bag_start"});
+  evidence.health = Health::kOk;  // the radar came back
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kBad);
+  RunEvidence rejected = withRejected("innovation");
+  rejected.run_seconds = 60.0;
+  rejected.silent_seconds = 59.0;
+  ASSERT_EQ(diagnose(rejected, Config{}).causes.size(), 1u) << "the radar was heard";
+  EXPECT_EQ(diagnose(rejected, Config{}).causes[0].name, "contradicts_imu");
+}
+
+/// Seconds of states at 10 Hz from `from` on, with a scan after each of those before `heard_until`.
+void feed(EvidenceCollector& collector, double from, double heard_until, double to) {
+  const int states = static_cast<int>(std::lround(10.0 * (to - from)));
+  for (int k = 0; k <= states; ++k) {
+    const Time time = Time::fromSeconds(from + 0.1 * k);
+    collector.addState(time);
+    ScanResult result;
+    result.scan.stamp = time;
+    result.used = true;
+    if (time < Time::fromSeconds(heard_until)) collector.add(result);
+  }
+}
+
+TEST(Diagnosis, TheTimeWithoutScansIsCounted) {
+  const Config config;
+  const RadarInertialOdometry odometry(config.odometry);
+  EvidenceCollector collector(config);
+  feed(collector, 100.0, 105.05, 120.0);
+  RunEvidence evidence = collector.evidence(odometry, std::nullopt);
+  EXPECT_NEAR(evidence.run_seconds, 20.0, 1e-6);
+  EXPECT_NEAR(evidence.silent_seconds, 14.0, 0.11) << "it coasts from one second after the last scan on";
+  EXPECT_NEAR(evidence.silence_begin, 5.0, 1e-6);
+  EXPECT_NEAR(evidence.silence_end, 20.0, 1e-6);
+  feed(collector, 50.0, 70.0, 60.0);  // the clock jumped back, and no time went by
+  evidence = collector.evidence(odometry, std::nullopt);
+  EXPECT_NEAR(evidence.run_seconds, 30.0, 1e-6);
+  EXPECT_NEAR(evidence.silent_seconds, 14.0, 0.11);
+  ScanResult at_rest;
+  at_rest.scan.stamp = Time::fromSeconds(69.9);
+  at_rest.rejected_because = "too_few_points";
+  at_rest.at_rest = true;
+  collector.add(at_rest);
+  feed(collector, 60.1, 0.0, 70.0);
+  EXPECT_NEAR(collector.evidence(odometry, std::nullopt).silent_seconds, 14.0, 0.11) << "it stands still";
 }
 
 TEST(Diagnosis, ADivergenceForLackOfScansNamesTheLack) {

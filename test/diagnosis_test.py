@@ -68,6 +68,19 @@ def test_a_wrong_sign_is_not_trusted(run_with):
     assert "radar_doppler_sign" in done.stdout
 
 
+def test_a_radar_that_falls_silent_is_bad(run_with, simulated_run, tmp_path):
+    bag = tmp_path / "silent.bag"
+    with rosbag.Bag(str(simulated_run / "run.bag")) as whole, rosbag.Bag(str(bag), "w") as silent:
+        start, end = whole.get_start_time(), whole.get_end_time()
+        for topic, message, stamp in whole.read_messages():
+            if "radar" not in topic or stamp.to_sec() < start + 0.4 * (end - start):
+                silent.write(topic, message, stamp)
+    done, summary = run_with(bag=bag)
+    assert (done.returncode, summary["verdict"]) == (3, "bad")
+    assert causes_of(summary) == ["radar_silent"]
+    assert "No scan was used from" in done.stdout
+
+
 def test_a_start_without_rest_says_so(run_with):
     done, summary = run_with("init_mode=static", "init_duration=10", "bag_duration=2")
     assert (done.returncode, summary) == (1, None)

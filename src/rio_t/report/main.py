@@ -95,6 +95,7 @@ def read_run(folder, truth_file):
 CHECKS = {  # name in summary.yaml: for people
     "started": "the estimate started",
     "scans_used_share": "share of the scans after the start that were used",
+    "silent_time_share": "share of the time after the start without a used scan",
     "points_kept_share": "share of the points that the filter kept",
     "scans_diverged_share": "share of the scans with a diverged estimate",
     "windows_at_offset_bound_share": "share of the windows with the offset at max_time_offset",

@@ -148,7 +148,10 @@ void BagPlayer::addImu(const sensor_msgs::Imu& message, Time record) {
   followImuStamps(imu);
   for (Radar& radar : radars_) radar.stamper.addImu(imu.time, record);
   if (recorder_ != nullptr) recorder_->addImu(imu);
-  if (const std::optional<NavigationState> state = odometry_.addImu(imu)) log_->addState(*state);
+  const std::optional<NavigationState> state = odometry_.addImu(imu);
+  if (!state) return;
+  evidence_.addState(state->time);
+  log_->addState(*state);
 }
 
 void BagPlayer::followImuStamps(const ImuMeasurement& imu) {

@@ -17,6 +17,7 @@ constexpr double kManyWindows = 0.3;
 constexpr double kManyDiverged = 0.1;
 constexpr double kManySamples = 0.05;
 constexpr double kFewScansUsed = 0.5;
+constexpr double kMostlySilent = 0.5;
 /// [rad] A heading that is off by this much leads aside by a tenth of the way.
 constexpr double kVagueHeading = 0.1;
 constexpr const char* kImuFaults[] = {"imu_not_usable", "imu_saturated",  "imu_gap",  "imu_out_of_order",
@@ -45,6 +46,11 @@ double usedShare(const RunEvidence& evidence) {
   return shareOf(used, after_start);
 }
 
+/// Share of the time in which the IMU alone carried the estimate.
+double silentShare(const RunEvidence& evidence) {
+  return evidence.run_seconds > 0.0 ? evidence.silent_seconds / evidence.run_seconds : 0.0;
+}
+
 std::string number(double value) {
   std::ostringstream text;
   text.precision(3);
@@ -52,12 +58,14 @@ std::string number(double value) {
   return text.str();
 }
 
-/// A stamp, to the millisecond.
-std::string stampText(Time time) {
+std::string fixed(double value, int digits) {
   std::ostringstream text;
-  text << std::fixed << std::setprecision(3) << time.seconds() << " s";
+  text << std::fixed << std::setprecision(digits) << value;
   return text.str();
 }
+
+/// A stamp, to the millisecond.
+std::string stampText(Time time) { return fixed(time.seconds(), 3) + " s"; }
 
 std::string outOf(std::uint64_t part, std::uint64_t whole, const std::string& what) {
   return std::to_string(part) + " of " + std::to_string(whole) + " " + what;
@@ -295,13 +303,27 @@ void addRestarts(const RunEvidence& evidence, const Config& config, std::vector<
                      1.0});
 }
 
+/// Scans that came and were rejected have causes of their own.
+void addSilence(const RunEvidence& evidence, std::vector<Cause>* causes) {
+  const double share = silentShare(evidence);
+  if (share <= kMostlySilent || (usedShare(evidence) < kFewScansUsed && !causes->empty())) return;
+  causes->push_back({"radar_silent",
+                     "No scan was used from " + fixed(evidence.silence_begin, 1) + " to " +
+                         fixed(evidence.silence_end, 1) + " s after the start: the IMU alone carried the " +
+                         "estimate for " + fixed(evidence.silent_seconds, 1) + " of " +
+                         fixed(evidence.run_seconds, 1) + " s.",
+                     "Look for what stops the radar or loses its messages, or run the part with scans "
+                     "(bag_start, bag_duration).",
+                     share});
+}
+
 void addDivergence(const RunEvidence& evidence, std::vector<Cause>* causes) {
   const double share = shareOf(evidence.scans_diverged, evidence.scans_judged);
   const std::uint64_t divergences = countOf(evidence.faults, "diverged");
   if (divergences == 0 && evidence.health != Health::kDiverged) return;
   // Without scans the velocity gets lost, which counts as diverged: then the lack of scans is the cause.
   const auto contradicts = [](const Cause& cause) { return cause.name == "contradicts_imu"; };
-  const bool scans_are_used = usedShare(evidence) >= kFewScansUsed;
+  const bool scans_are_used = usedShare(evidence) >= kFewScansUsed && silentShare(evidence) <= kMostlySilent;
   if (!scans_are_used && !causes->empty() && std::none_of(causes->begin(), causes->end(), contradicts))
     return;
   if (evidence.scans_diverged == 0) {
@@ -331,6 +353,7 @@ std::vector<Check> checksOf(const RunEvidence& evidence) {
   return {
       {"started", evidence.initialized ? 1.0 : 0.0, 1.0, true},
       {"scans_used_share", usedShare(evidence), kFewScansUsed, true},
+      {"silent_time_share", silentShare(evidence), kMostlySilent, false},
       {"points_kept_share", kept, 1.0 - kManyPoints, true},
       {"scans_diverged_share", shareOf(evidence.scans_diverged, evidence.scans_judged), kManyDiverged, false},
       {"windows_at_offset_bound_share", shareOf(evidence.windows_at_bound, evidence.windows), kManyWindows,
@@ -344,7 +367,8 @@ RunVerdict verdictOf(const RunEvidence& evidence, const Diagnosis& diagnosis) {
   const bool any_used = std::any_of(evidence.radars.begin(), evidence.radars.end(), used);
   const bool diverged =
       evidence.health == Health::kDiverged || shareOf(evidence.scans_diverged, evidence.scans_judged) > 0.5;
-  if (!evidence.initialized || !any_used || diverged) return RunVerdict::kBad;
+  const bool silent = silentShare(evidence) > kMostlySilent;
+  if (!evidence.initialized || !any_used || diverged || silent) return RunVerdict::kBad;
   const bool all_green = std::all_of(diagnosis.checks.begin(), diagnosis.checks.end(),
                                      [](const Check& check) { return check.good(); });
   return all_green && diagnosis.causes.empty() ? RunVerdict::kGood : RunVerdict::kDoubtful;
@@ -374,6 +398,7 @@ Diagnosis diagnose(const RunEvidence& evidence, const Config& config) {
   addImu(evidence, config, &result.causes);
   addHeading(evidence, &result.causes);
   addRestarts(evidence, config, &result.causes);
+  addSilence(evidence, &result.causes);
   addDivergence(evidence, &result.causes);
   // Stable: of causes that explain the same, the one nearer to the sensor comes first.
   std::stable_sort(result.causes.begin(), result.causes.end(),

@@ -11,7 +11,9 @@ std::uint64_t countOf(const Counts& counts, const std::string& name) {
   return found == counts.end() ? 0 : found->second;
 }
 
-EvidenceCollector::EvidenceCollector(const Config& config) {
+EvidenceCollector::EvidenceCollector(const Config& config)
+    : coasting_after_(config.odometry.health.coasting_after),
+      max_bridged_gap_(config.odometry.imu_input_check.max_bridged_gap) {
   for (const Config& radar : configsOfRadars(config)) {
     options_.push_back(radar.odometry.ego_velocity);
     evidence_.radars.emplace_back().name = radar.radar_name;
@@ -32,6 +34,8 @@ void EvidenceCollector::add(const ScanResult& result) {
     ++radar.velocity_status[toString(result.ego_velocity.status)];
     return;
   }
+  // A radar that filters what stands still has no scan to use at rest, and is not silent.
+  if (result.used || result.at_rest) last_used_ = result.scan.stamp;
   ++evidence_.scans_judged;
   if (result.health == Health::kDiverged) ++evidence_.scans_diverged;
   if (result.used) {
@@ -43,6 +47,22 @@ void EvidenceCollector::add(const ScanResult& result) {
   evidence_.heading_sigma = std::sqrt(bodyOdometry(result.state, 0.0).pose_covariance(5, 5));
   ++evidence_.windows;
   if (result.solver_termination == SolverTermination::kAtBound) ++evidence_.windows_at_bound;
+}
+
+void EvidenceCollector::addState(Time time) {
+  const double step = newest_state_ ? time - *newest_state_ : 0.0;
+  newest_state_ = time;
+  if (step <= 0.0 || step > max_bridged_gap_) {  // the first one, or the clock jumped
+    last_used_ = time;
+    return;
+  }
+  evidence_.run_seconds += step;
+  const double silence = time - last_used_;
+  if (silence <= coasting_after_) return;
+  evidence_.silent_seconds += step;
+  if (silence <= evidence_.silence_end - evidence_.silence_begin) return;
+  evidence_.silence_begin = evidence_.run_seconds - silence;
+  evidence_.silence_end = evidence_.run_seconds;
 }
 
 void EvidenceCollector::addDropped(std::size_t radar, const std::string& reason, std::uint64_t count) {

@@ -11,7 +11,7 @@ namespace rio_t {
 enum class RunVerdict {
   kGood,      ///< nothing speaks against it
   kDoubtful,  ///< look at the causes
-  kBad,       ///< it never started, used no scan, or diverged: do not trust it
+  kBad,       ///< it never started, used no scan, was silent or diverged: do not trust it
 };
 std::string toString(RunVerdict verdict);  ///< "good", "doubtful", "bad"
 

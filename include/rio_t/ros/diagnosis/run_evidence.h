@@ -49,7 +49,12 @@ struct RunEvidence {
   std::uint64_t scans_judged = 0;    ///< after the start
   std::uint64_t scans_diverged = 0;  ///< of them, after which the health was "diverged"
   std::uint64_t windows = 0, windows_at_bound = 0;
-  MeasuredImuNoise imu_noise;            ///< of the run, root mean square
+  MeasuredImuNoise imu_noise;  ///< of the run, root mean square
+  // In IMU time [s] since the start, jumps of its clock left out. Zero in the live node, whose monitor tells
+  // of silence.
+  double run_seconds = 0.0;
+  double silent_seconds = 0.0;  ///< of them, later than `coasting_after` after the last scan that was used
+  double silence_begin = 0.0, silence_end = 0.0;  ///< of the longest silence
   std::vector<ImuRestart> imu_restarts;  ///< none in the live node, whose evidence begins after the last one
   std::vector<RadarEvidence> radars;
 };
@@ -60,6 +65,8 @@ class EvidenceCollector {
   explicit EvidenceCollector(const Config& config);
 
   void add(const ScanResult& result);
+  /// A sample of the IMU after the start.
+  void addState(Time time);
   /// Scans that were dropped before the odometry saw them.
   void addDropped(std::size_t radar, const std::string& reason, std::uint64_t count);
   /// A trigger that was dropped, as its stamp is zero.
@@ -71,6 +78,9 @@ class EvidenceCollector {
 
  private:
   std::vector<EgoVelocityOptions> options_;  // by RadarScan::radar
+  double coasting_after_, max_bridged_gap_;  // [s]
+  std::optional<Time> newest_state_;
+  Time last_used_;  // scan, or the start
   RunEvidence evidence_;
 };
 
