@@ -162,6 +162,36 @@ TEST(Diagnosis, AStartWithoutVelocitiesNamesTheirReason) {
   expectSays(first(evidence), {"too_few_inliers: 180 of 200 scans"});
 }
 
+TEST(Diagnosis, AClockOfTheRadarThatIsBehindIsNamed) {
+  const Config config;
+  EvidenceCollector collector(config);
+  ScanResult result;
+  result.rejected_because = "before_initialization";
+  result.ego_velocity.status = EgoVelocityStatus::kMoving;
+  result.scan.stamp = Time::fromSeconds(10.0);
+  collector.add(result);  // before there is an IMU
+  collector.addImu(Time::fromSeconds(100.0));
+  collector.addImu(Time::fromSeconds(100.1));
+  result.scan.stamp = Time::fromSeconds(100.05);
+  collector.add(result);
+  collector.addState(Time::fromSeconds(103.0));
+  // As the odometry leaves a scan that it does not evaluate.
+  result.ego_velocity = EgoVelocity();
+  for (int k = 0; k < 98; ++k) {
+    result.scan.stamp = Time::fromSeconds(11.5 + 0.1 * k);
+    collector.add(result);
+  }
+  const RadarInertialOdometry odometry(config.odometry);
+  RunEvidence evidence = collector.evidence(odometry, std::nullopt);
+  EXPECT_EQ(evidence.radars[0].velocity_status, (Counts{{"moving", 2}}));
+  evidence.initialized = true;
+  EXPECT_EQ(diagnose(evidence, config).verdict, RunVerdict::kBad);
+  ASSERT_EQ(diagnose(evidence, config).causes.size(), 1u);
+  expectSays(first(evidence), {"stamp_before_imu: 98 of 100 scans are stamped before the first IMU sample, "
+                               "the first of them by 88.5 s",
+                               "stamp_source: arrival", "radar_stamp_shift"});
+}
+
 TEST(Diagnosis, TheOffsetAtItsBoundIsNamed) {
   RunEvidence evidence = goodRun();
   evidence.windows_at_bound = 150;

@@ -94,6 +94,13 @@ def test_stamps_of_another_clock_are_named(run_with):
     assert "radar_stamp_shift" in done.stderr or "stamp_source: arrival" in done.stderr
 
 
+def test_a_clock_of_the_radar_that_is_behind_is_named(run_with):
+    done, summary = run_with("radar_stamp_shift=-1000")
+    assert (done.returncode, summary) == (1, None)
+    assert "are stamped before the first IMU sample, the first of them by " in done.stderr
+    assert "too few points" not in done.stderr
+
+
 def test_an_offset_beyond_its_bound_is_named(run_with):
     done, summary = run_with("max_time_offset=0.01", "radar_stamp_shift=0.1")
     assert "offset_at_bound" in causes_of(summary)

@@ -159,7 +159,9 @@ void BagPlayer::followImuStamps(const ImuMeasurement& imu) {
   const ClockJumpDetector::Verdict stamp = imu_stamps_.check(imu.time);
   const bool restarts = stamp == ClockJumpDetector::Verdict::kRestart;
   if (restarts && odometry_.initialized()) imu_restarts_.push_back({*newest_imu_, imu.time});
-  if (restarts || stamp == ClockJumpDetector::Verdict::kGood) newest_imu_ = imu.time;
+  if (!restarts && stamp != ClockJumpDetector::Verdict::kGood) return;
+  newest_imu_ = imu.time;
+  evidence_.addImu(imu.time);
 }
 
 void BagPlayer::addTrigger(const std_msgs::Header& message, Time record, std::size_t radar) {

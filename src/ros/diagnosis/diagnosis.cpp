@@ -150,6 +150,13 @@ class RadarCauses {
     const std::string other =
         "Set " + key_ + "stamp_source: arrival, or correct the clock with " + key_ + "radar_stamp_shift.";
     scans("stamp_zero", "have a stamp of zero.", "Set " + key_ + "stamp_source to trigger or arrival.");
+    const double before_imu = shareOf(radar_.scans_before_imu, radar_.scans_total);
+    if (before_imu >= kManyScans)
+      cause("stamp_before_imu", before_imu,
+            outOf(radar_.scans_before_imu, radar_.scans_total, "scans") + of_ +
+                " are stamped before the first IMU sample, the first of them by " +
+                fixed(radar_.seconds_before_imu, 1) + " s.",
+            other);
     scans("stamp_ahead_of_imu", "are stamped ahead of the newest IMU sample.", other);
     scans("older_than_window", "are stamped before the IMU samples that are kept.", other);
     scans("imu_not_covering", "are stamped at a time without IMU samples.", other);

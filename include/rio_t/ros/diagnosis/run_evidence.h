@@ -24,8 +24,10 @@ struct RadarEvidence {
   std::uint64_t scans_used = 0;
   std::uint64_t triggers_zero = 0;       ///< trigger messages with a stamp of zero
   std::uint64_t scans_before_start = 0;  ///< before the estimate was initialised
+  std::uint64_t scans_before_imu = 0;    ///< of these, stamped before the first IMU sample
+  double seconds_before_imu = 0.0;       ///< by how much, of the first of them
   Counts scans_rejected;                 ///< by reason, without those before the start
-  Counts velocity_status;                ///< of the scans before the start, by EgoVelocityStatus
+  Counts velocity_status;                ///< of the scans before the start that were evaluated
   std::uint64_t points = 0;              ///< of all scans
   std::array<std::uint64_t, kPointVerdicts> points_by_verdict = {};
   double snr_sum_db = 0.0;  ///< over `points`
@@ -65,6 +67,10 @@ class EvidenceCollector {
   explicit EvidenceCollector(const Config& config);
 
   void add(const ScanResult& result);
+  /// A sample of the IMU. Not called in the live node.
+  void addImu(Time time) {
+    if (!first_imu_) first_imu_ = time;
+  }
   /// A sample of the IMU after the start.
   void addState(Time time);
   /// Scans that were dropped before the odometry saw them.
@@ -79,7 +85,7 @@ class EvidenceCollector {
  private:
   std::vector<EgoVelocityOptions> options_;  // by RadarScan::radar
   double coasting_after_, max_bridged_gap_;  // [s]
-  std::optional<Time> newest_state_;
+  std::optional<Time> first_imu_, newest_state_;
   Time last_used_;  // scan, or the start
   RunEvidence evidence_;
 };
