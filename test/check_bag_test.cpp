@@ -187,6 +187,20 @@ TEST_F(CheckBag, TwoRadarsGetASectionEach) {
   }
 }
 
+TEST_F(CheckBag, ATrialRunThatIsBadSaysWhy) {
+  int clouds = 0;
+  Changes changes;
+  changes.cloud = [&](sensor_msgs::PointCloud2&) { return ++clouds <= 200; };
+  const std::string bag = rewritten("silent", changes);
+  const BagCheck odd = check(bag);
+  expectLine(odd, FindingLevel::kOdd, {"trial run", "the run is bad: No scan was used from"});
+  EXPECT_NE(odd.to_do, "");
+  CheckRequest request;
+  request.bags = {bag};
+  std::ostringstream out, err;
+  EXPECT_EQ(runCheck(request, out, err), 1) << out.str();
+}
+
 TEST_F(CheckBag, ExitStatusAndFiles) {
   CheckRequest request;
   std::ostringstream out, err;

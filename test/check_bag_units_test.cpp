@@ -120,6 +120,17 @@ TEST_F(CheckBag, FieldsThatNoPresetHasAreGuessed) {
   expectRuns(odd);
 }
 
+TEST_F(CheckBag, PositionsInMillimetresAreOdd) {
+  Changes changes;
+  changes.cloud = [](sensor_msgs::PointCloud2& cloud) {
+    for (std::size_t i = 0; i < cloud.width; ++i)
+      for (const char* axis : {"x", "y", "z"}) *fieldOf(cloud, i, axis) *= 1000.0F;
+    return true;
+  };
+  expectLine(check(rewritten("millimetres", changes), false), FindingLevel::kOdd,
+             {"points", "are the positions in m?"});
+}
+
 TEST_F(CheckBag, AnotherUnitOfThePowerIsNamed) {
   Changes changes;
   changes.cloud = [](sensor_msgs::PointCloud2& cloud) {

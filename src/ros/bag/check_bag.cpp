@@ -115,14 +115,13 @@ struct Trial {
     return static_cast<double>(summary.scansUsed()) / static_cast<double>(std::max<std::uint64_t>(1, judged));
   }
   bool good() const {
-    return failure.empty() && summary.divergences == 0 && summary.health_at_end != "diverged" &&
-           shareUsed() > 0.5;
+    return failure.empty() && summary.divergences == 0 && summary.health_at_end == toString(Health::kOk) &&
+           summary.diagnosis.verdict != RunVerdict::kBad && shareUsed() > 0.5;
   }
-  /// Larger is better.
+  /// Larger is better; a good one is better than all others.
   double score() const {
     if (!failure.empty()) return -1e9;
-    return shareUsed() - static_cast<double>(summary.divergences) -
-           (summary.health_at_end == "diverged" ? 1.0 : 0.0);
+    return shareUsed() - static_cast<double>(summary.divergences) - (good() ? 0.0 : 1.0);
   }
 };
 
@@ -183,6 +182,12 @@ void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
   check->findings.push_back(
       {FindingLevel::kMissing, "trial run",
        "divergences: " + std::to_string(s.divergences) + ", at the end " + s.health_at_end + "; " + numbers});
+  std::string why = "the run is " + toString(s.diagnosis.verdict);
+  if (!s.diagnosis.causes.empty()) {
+    const Cause& cause = s.diagnosis.causes.front();
+    why += ": " + cause.text + " " + cause.remedy;
+  }
+  check->findings.push_back({FindingLevel::kOdd, "trial run", why});
   check->to_do =
       "The odometry does not run well with what the bag shows. Measure the mounting, set "
       "mounting_yaw_pitch_roll_deg and extrinsics_translation, and see docs/your_sensors.md.";

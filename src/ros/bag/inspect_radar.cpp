@@ -97,6 +97,10 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
            degrees(c.azimuth_95) + " by +-" + degrees(c.elevation_95) + " deg, Doppler step " +
            (step.value > 0.0 ? fixedText(step.value, 3) + " m/s" : std::string("none")) +
            (sparse ? ": few points, so start at rest" : ""));
+  constexpr double kIncredible = 500.0;  // [m] farther than radars see
+  if (c.range_99 > kIncredible)
+    tell(FindingLevel::kOdd, "points",
+         "the ranges reach " + fixedText(c.range_99, 0) + " m: are the positions in m?");
   if (c.ambiguous > 0.005)  // one per cent
     tell(FindingLevel::kOk, "points",
          fixedText(100.0 * c.ambiguous, 0) +
