@@ -211,12 +211,30 @@ TEST_F(CheckBag, ExitStatusAndFiles) {
   request.bags = {bag_};
   request.out = bag_;
   EXPECT_EQ(runCheck(request, out, err), 2);
+  EXPECT_NE(faultOf(request), "");
   request.out = folder_ + "/my.yaml";
+  EXPECT_EQ(faultOf(request), "");
   EXPECT_EQ(runCheck(request, out, err), 0) << err.str();
   BagRun bag_run;
   bag_run.bags = {bag_};
   bag_run.config = makeConfig(readParameterFile(request.out));
   EXPECT_EQ(runBag(bag_run).divergences, 0u);
+}
+
+TEST_F(CheckBag, TheNextCommandCanBePasted) {
+  CheckRequest request;
+  request.try_out = false;
+  const std::string copy = folder_ + "/a copy.bag";
+  fs::copy_file(bag_, copy);
+  request.bags = {copy};
+  request.out = folder_ + "/my own.yaml";
+  std::ostringstream out, err;
+  EXPECT_EQ(runCheck(request, out, err), 0) << err.str();
+  EXPECT_NE(out.str().find("--bag \"" + copy + "\" --config \"" + request.out + "\""), std::string::npos)
+      << out.str();
+  request.bags_go_away = true;
+  EXPECT_EQ(runCheck(request, out, err), 0) << err.str();
+  EXPECT_NE(out.str().find("--bag BAG --config"), std::string::npos) << out.str();
 }
 
 }  // namespace

@@ -10,6 +10,7 @@ import numpy
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Imu
 from std_msgs.msg import Header
 
 from rio_t import live_tester as tester
@@ -250,6 +251,27 @@ class SetupTest(tester.LiveTestCase):
         for message in heard:
             for covariance in (message.pose.covariance, message.twist.covariance):
                 self.assertGreater(numpy.linalg.eigvalsh(numpy.array(covariance).reshape(6, 6))[0], 0.0)
+
+    def test_check_bag_refuses_a_path_before_it_listens_and_names_a_silent_clock(self):
+        def listen(*options):
+            outcome = tester.run(tester.program("rio_t", "check_bag"), "--live", "--duration", 3, *options)
+            return outcome.returncode, outcome.stdout
+        kept = self.path("kept.bag")
+        status, told = listen("--keep", self.bag)
+        self.assertEqual(status, 2)
+        self.assertIn("expected a new file", told)
+        status, told = listen("--keep", kept, "--out", self.path("nowhere/my.yaml"))
+        self.assertEqual(status, 2)
+        self.assertIn("there is no folder", told)
+        self.assertNotIn("listening", told)
+        # A latched message waits for each who comes, and nobody publishes a clock.
+        publisher = rospy.Publisher("/some_imu", Imu, queue_size=1, latch=True)
+        publisher.publish(Imu())
+        status, told = listen("--keep", kept)
+        publisher.unregister()
+        self.assertEqual(status, 1, told)
+        self.assertIn("use_sim_time is true, but /clock is silent", told)
+        self.assertFalse(os.path.exists(kept))
 
     @unittest.skipIf("bullseye" in pathlib.Path("/etc/os-release").read_text(),
                      "the aggregator of Debian 11 does not find its own plugins")

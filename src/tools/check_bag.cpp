@@ -59,7 +59,7 @@ void addOptions(rio_t::OptionSet& options, Arguments& a) {
                 });
   options.flag("no-trial", "do not run the odometry with the configuration", a.no_trial);
   options.flag("live", "listen to the running topics instead of reading a bag", a.live);
-  options.text("keep", "BAG", "with --live: keep the messages in this bag", a.keep);
+  options.text("keep", "BAG", "with --live: keep the messages in this new bag", a.keep);
 }
 
 /// A folder that is gone at the end.
@@ -83,15 +83,20 @@ class TemporaryFolder {
 };
 
 int runLive(rio_t::CheckRequest request, double duration, const std::string& keep) {
-  int argc = 0;
-  ros::init(argc, nullptr, "rio_t_check_bag", ros::init_options::AnonymousName);
+  // Before the recording, so that a wrong path costs no time.
+  if (fs::exists(keep)) throw rio_t::UsageError("--keep " + keep + ": expected a new file, this one exists");
   const TemporaryFolder folder;
   const std::string bag = keep.empty() ? (folder.path() / "live.bag").string() : keep;
+  request.bags = {bag};
+  request.bags_go_away = keep.empty();
+  request.duration = 0.0;
+  const std::string fault = rio_t::faultOf(request);
+  if (!fault.empty()) throw rio_t::UsageError(fault);
+  int argc = 0;
+  ros::init(argc, nullptr, "rio_t_check_bag", ros::init_options::AnonymousName);
   std::cerr << "check_bag: listening for " << duration << " s; keep still for 3 s, then move\n";
   if (rio_t::recordTopics(bag, duration) == 0)
     throw std::runtime_error("--live: no message of an Imu, PointCloud2 or Header topic came");
-  request.bags = {bag};
-  request.duration = 0.0;
   return rio_t::runCheck(request, std::cout, std::cerr);
 }
 

@@ -3,8 +3,10 @@
 #include <exception>
 #include <filesystem>
 #include <fstream>
+#include <iomanip>
 #include <optional>
 #include <ostream>
+#include <sstream>
 #include <stdexcept>
 
 #include "rio_t/ros/bag/check_bag.h"
@@ -15,22 +17,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kReady = 0, kNotReady = 1, kUsage = 2;
-
-/// Why the request cannot be met; empty: it can.
-std::string faultOf(const CheckRequest& request) {
-  if (request.bags.empty()) return "expected a bag (see --help)";
-  for (const std::string& file : {request.out, request.rig}) {
-    if (file.empty()) continue;
-    if (fs::is_directory(file)) return file + ": expected a file, this is a folder";
-    const fs::path folder = fs::absolute(file).parent_path();
-    if (!fs::is_directory(folder)) return file + ": there is no folder " + folder.string();
-    for (const std::string& bag : request.bags) {
-      std::error_code none;
-      if (fs::equivalent(file, bag, none)) return file + ": expected another file than the bag";
-    }
-  }
-  return "";
-}
 
 void writeFile(const std::string& path, const std::string& text) {
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
@@ -55,7 +41,30 @@ void drawRig(const std::string& yaml, const std::string& png) {
     throw std::runtime_error("--rig " + png + ": draw_rig.py failed");
 }
 
+/// For a shell.
+std::string word(const std::string& path) {
+  if (path.find(' ') == std::string::npos) return path;
+  std::ostringstream text;
+  text << std::quoted(path);
+  return text.str();
+}
+
 }  // namespace
+
+std::string faultOf(const CheckRequest& request) {
+  if (request.bags.empty()) return "expected a bag (see --help)";
+  for (const std::string& file : {request.out, request.rig}) {
+    if (file.empty()) continue;
+    if (fs::is_directory(file)) return file + ": expected a file, this is a folder";
+    const fs::path folder = fs::absolute(file).parent_path();
+    if (!fs::is_directory(folder)) return file + ": there is no folder " + folder.string();
+    for (const std::string& bag : request.bags) {
+      std::error_code none;
+      if (fs::equivalent(file, bag, none)) return file + ": expected another file than the bag";
+    }
+  }
+  return "";
+}
 
 int runCheck(const CheckRequest& request, std::ostream& out, std::ostream& err) {
   const std::string fault = faultOf(request);
@@ -82,8 +91,9 @@ int runCheck(const CheckRequest& request, std::ostream& out, std::ostream& err) 
       out << "\n" << best->yaml;
     } else {
       writeFile(request.out, best->yaml);
-      out << "Written to " << request.out << ". Next: rosrun rio_t rio_t_bag --bag " << best->bag
-          << " --config " << request.out << " --output-dir results\n";
+      out << "Written to " << request.out << ". Next: rosrun rio_t rio_t_bag --bag "
+          << (request.bags_go_away ? "BAG" : word(best->bag)) << " --config " << word(request.out)
+          << " --output-dir results\n";
     }
     if (!request.rig.empty()) {
       const std::string yaml = request.out.empty() ? request.rig + ".yaml" : request.out;

@@ -7,6 +7,7 @@
 #include <topic_tools/shape_shifter.h>
 
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <set>
 #include <stdexcept>
@@ -30,9 +31,14 @@ std::size_t recordTopics(const std::string& path, double duration) {
   ros::NodeHandle node;
   rosbag::Bag bag(path, rosbag::bagmode::Write);
   std::map<std::string, ros::Subscriber> subscribers;
-  std::size_t messages = 0;
+  std::size_t messages = 0, without_time = 0;
   const auto subscribe = [&](const std::string& topic) {
     const boost::function<void(const Event&)> record = [&, topic](const Event& event) {
+      // With use_sim_time there is no time before the first /clock, and a bag takes no message without one.
+      if (event.getReceiptTime().isZero()) {
+        ++without_time;
+        return;
+      }
       bag.write(topic, event.getReceiptTime(), event.getConstMessage());
       ++messages;
     };
@@ -54,6 +60,11 @@ std::size_t recordTopics(const std::string& path, double duration) {
   }
   subscribers.clear();
   bag.close();
+  if (messages == 0) std::filesystem::remove(path);  // it would be in the way of the next try
+  if (messages == 0 && without_time > 0)
+    throw std::runtime_error(
+        "--live: use_sim_time is true, but /clock is silent: play with --clock, or set use_sim_time to "
+        "false");
   return messages;
 }
 

@@ -14,6 +14,7 @@ struct CheckRequest {
   std::string imu_topic;                  ///< empty: the best one
   std::vector<std::string> radar_topics;  ///< empty: all that fit
   double duration = 120.0;                ///< [s] of each bag that are read; 0: all
+  bool bags_go_away = false;              ///< they are temporary: nobody can run on them afterwards
   bool try_out = true;                    ///< whether the odometry runs on the bag with what is proposed
 };
 
@@ -46,6 +47,9 @@ BagCheck checkBag(const std::string& bag, const CheckRequest& request);
 
 /// The report for people.
 std::string describeCheck(const BagCheck& check);
+
+/// Why the files of the request cannot be read or written; empty: they can.
+std::string faultOf(const CheckRequest& request);
 
 /// Checks all bags, prints the reports and writes the files. Returns the exit status: 0 ready, 1 something is
 /// missing, 2 what was asked for is wrong.
