@@ -202,6 +202,14 @@ TEST_F(BagRunnerErrors, WrongParametersAndArgumentsAreNamed) {
   expectError(runTool({}), {"missing argument BAG --config"}, 2);
 }
 
+TEST_F(BagRunnerErrors, AGroundTruthIsNotOverwritten) {
+  writeBag({});
+  ASSERT_EQ(run().status, 0);
+  const std::string truth = out_ + "/trajectory.txt", before = contents(truth);
+  expectError(run({"--set", "ground_truth=" + truth}), {"ground_truth", truth, "expected another file"});
+  EXPECT_EQ(contents(truth), before);
+}
+
 TEST_F(BagRunnerErrors, AnOutputFolderThatCannotBeIsNamed) {
   writeBag({});
   std::ofstream(folder_ + "/file") << "in the way";

@@ -2,7 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
 #include <sstream>
+
+#include "temporary_folder.h"
 
 namespace rio_t {
 namespace {
@@ -118,6 +122,17 @@ TEST(OptionSet, TheFirstSourceCounts) {
   EXPECT_EQ(x, 1.0);
   EXPECT_EQ(y, 3.0);
   EXPECT_EQ(steps, (std::vector<std::string>{"a", "b"}));
+}
+
+TEST(SameFile, IsOneWhereverItIsNamedFrom) {
+  const TemporaryFolder temporary;
+  const std::string file = temporary.path() + "/a.txt";
+  EXPECT_TRUE(isSameFile(file, temporary.path() + "/./a.txt")) << "it does not exist yet";
+  EXPECT_FALSE(isSameFile(file, temporary.path() + "/b.txt"));
+  EXPECT_FALSE(isSameFile("", ""));
+  std::ofstream(file) << "content";
+  std::filesystem::create_hard_link(file, temporary.path() + "/link.txt");
+  EXPECT_TRUE(isSameFile(file, temporary.path() + "/link.txt"));
 }
 
 }  // namespace

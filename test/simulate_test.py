@@ -54,6 +54,19 @@ def test_ambiguous_points_do_no_harm(simulate, programs_folder, tmp_path):
     assert mean_error("--ambiguous", 0.15) < 1.2 * mean_error()
 
 
+def test_no_program_overwrites_what_it_reads(simulate, programs_folder, simulated_run, tmp_path):
+    done, bag = simulate("--motion", "easy", "--duration", 20, "--ground-truth", tmp_path / "." / "simulated.bag")
+    assert (done.returncode, bag) == (2, None)
+    assert "--ground-truth" in done.stderr and "expected another file" in done.stderr
+    trajectory = tmp_path / "trajectory.txt"
+    trajectory.write_bytes((simulated_run / "truth.txt").read_bytes())
+    done, _ = simulate("--trajectory", trajectory, "--ground-truth", trajectory)
+    assert done.returncode == 2 and "--trajectory" in done.stderr
+    done = programs.run(programs_folder / "evaluate", simulated_run / "truth.txt", trajectory, "--errors", trajectory)
+    assert done.returncode == 2 and "--errors" in done.stderr
+    assert trajectory.read_bytes() == (simulated_run / "truth.txt").read_bytes()
+
+
 RADARS = ("--motion", "easy", "--duration", "25", "--radar")
 
 

@@ -67,6 +67,13 @@ void check(const Arguments& arguments) {
     throw UsageError("--time-offset and --true-offset go together");
   if (!arguments.errors_file.empty() && arguments.trajectories.size() != 2)
     throw UsageError("--errors goes with exactly one estimate");
+  std::vector<std::string> inputs = arguments.trajectories;
+  inputs.push_back(arguments.time_offset);
+  for (const std::string& input : inputs) {
+    if (isSameFile(arguments.errors_file, input))
+      throw UsageError("--errors " + arguments.errors_file +
+                       ": expected another file than those that are read");
+  }
   if (arguments.trajectories.size() == 1)
     throw UsageError("only one trajectory given, expected GROUND_TRUTH ESTIMATE...");
   if (arguments.trajectories.empty() && arguments.time_offset.empty())

@@ -457,6 +457,13 @@ void printSummary(const Request& request, const Motion& motion, const SensorData
 void run(Request request) {
   if (!request.simulation.barometer.shocks.empty() && !request.simulation.barometer.enabled)
     throw UsageError("--pressure-shock needs --barometer");
+  if (isSameFile(request.ground_truth, request.out))
+    throw UsageError("--ground-truth " + request.ground_truth + ": expected another file than that of --out");
+  for (const std::string& file : {request.out, request.ground_truth}) {
+    if (isSameFile(file, request.trajectory))
+      throw UsageError("--trajectory " + request.trajectory +
+                       ": expected another file than those that are written");
+  }
   request.simulation.start = Time::fromSeconds(request.start_time);
   const Motion motion = motionOf(request);
   const SensorData data = simulate(motion, request.simulation);

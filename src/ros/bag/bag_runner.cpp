@@ -11,6 +11,7 @@
 #include "bag_file.h"
 #include "bag_frames.h"
 #include "bag_player.h"
+#include "command_line.h"
 #include "rio_t/evaluation/errors.h"
 #include "rio_t/odometry/batch_odometry.h"
 #include "run_log.h"
@@ -237,6 +238,12 @@ class BagJob {
   /// Null if no files are wanted.
   std::unique_ptr<RunOutput> openOutput(const std::string& subfolder) const {
     if (run_.output_folder.empty()) return nullptr;
+    for (const std::string& name : files_.names()) {
+      const std::string file = run_.output_folder + subfolder + "/" + name;
+      if (isSameFile(file, run_.config.ground_truth))
+        throw std::runtime_error("ground_truth " + run_.config.ground_truth +
+                                 ": expected another file than those that the run writes");
+    }
     return std::make_unique<RunOutput>(run_.output_folder + subfolder, files_);
   }
 

@@ -46,11 +46,6 @@ void addOptions(OptionSet& options, Arguments& a) {
                a.output_folder);
 }
 
-bool isSameFile(const std::string& a, const std::string& b) {
-  std::error_code error;
-  return fs::equivalent(a, b, error);
-}
-
 /// Before the work, so that a wrong path costs no time.
 void checkFiles(const Arguments& arguments, const std::string& config_file) {
   for (std::size_t i = 0; i < arguments.bags.size(); ++i) {

@@ -9,6 +9,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "command_line.h"
 #include "rio_t/ros/bag/check_bag.h"
 
 namespace rio_t {
@@ -59,8 +60,7 @@ std::string faultOf(const CheckRequest& request) {
     const fs::path folder = fs::absolute(file).parent_path();
     if (!fs::is_directory(folder)) return file + ": there is no folder " + folder.string();
     for (const std::string& bag : request.bags) {
-      std::error_code none;
-      if (fs::equivalent(file, bag, none)) return file + ": expected another file than the bag";
+      if (isSameFile(file, bag)) return file + ": expected another file than the bag";
     }
   }
   return "";

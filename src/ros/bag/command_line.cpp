@@ -6,10 +6,12 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <iterator>
 #include <locale>
 #include <ostream>
 #include <sstream>
+#include <system_error>
 
 namespace rio_t {
 namespace {
@@ -259,6 +261,14 @@ void addBagOptions(OptionSet& options, std::vector<std::string>& bags, std::stri
       "sets a parameter on top of the configuration; left/key=value sets it for the radar left; may be "
       "repeated",
       [&set](const std::string& text) { set.push_back(parseAssignment(text)); });
+}
+
+bool isSameFile(const std::string& a, const std::string& b) {
+  namespace fs = std::filesystem;
+  if (a.empty() || b.empty()) return false;
+  std::error_code error;  // there is one for files that do not exist
+  if (fs::equivalent(a, b, error)) return true;
+  return fs::weakly_canonical(fs::absolute(a)) == fs::weakly_canonical(fs::absolute(b));
 }
 
 void require(const std::vector<std::pair<std::string, bool>>& given_by_name) {

@@ -116,6 +116,10 @@ void addBagOptions(OptionSet& options, std::vector<std::string>& bags, std::stri
 /// Throws UsageError that names all options which are needed and not given.
 void require(const std::vector<std::pair<std::string, bool>>& given_by_name);
 
+/// Whether both name one file, also if it does not exist yet: a program must not write what it reads, nor two
+/// results to one file.
+bool isSameFile(const std::string& a, const std::string& b);
+
 /// A bar on stderr with the time that is left, for a share of the work done from 0 to 1. Empty if stderr is
 /// no terminal. `label` stands before it.
 std::function<void(double)> progressBar(const std::string& label = "");
