@@ -11,6 +11,7 @@
 #include <sensor_msgs/point_cloud2_iterator.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <sstream>
 #include <string>
@@ -103,6 +104,30 @@ TEST_F(CheckBag, AnImuWithoutStampsOrGravityIsMissingThem) {
                                            }}));
   expectLine(gravity, FindingLevel::kMissing, {"gravity is missing"});
   EXPECT_FALSE(gravity.ready());
+}
+
+TEST_F(CheckBag, AnImuThatIsNotFiniteIsNotUsed) {
+  int count = 0;
+  const BagCheck odd = check(rewritten("imu_nan", {[&](sensor_msgs::Imu& imu) {
+                                         if (++count % 5 == 0) imu.angular_velocity.x = std::nan("");
+                                         return true;
+                                       }}));
+  expectLine(odd, FindingLevel::kMissing, {"IMU", "samples are not finite"});
+  EXPECT_FALSE(odd.ready());
+  EXPECT_NE(odd.to_do.find("NaN"), std::string::npos);
+}
+
+TEST_F(CheckBag, ADopplerThatIsNotFiniteIsNamed) {
+  Changes changes;
+  changes.cloud = [](sensor_msgs::PointCloud2& cloud) {
+    if (cloud.width == 0) return true;
+    sensor_msgs::PointCloud2Iterator<float> doppler(cloud, "v_doppler_mps");
+    for (; doppler != doppler.end(); ++doppler) *doppler = std::nanf("");
+    return true;
+  };
+  const BagCheck odd = check(rewritten("doppler_nan", changes));
+  expectLine(odd, FindingLevel::kMissing, {"radar", "v_doppler_mps is not finite in every point"});
+  EXPECT_FALSE(odd.ready());
 }
 
 TEST_F(CheckBag, ACloudWithoutDopplerIsNamedWithItsFields) {

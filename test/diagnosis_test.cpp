@@ -300,6 +300,13 @@ TEST(Diagnosis, TheImuIsNamed) {
   evidence = goodRun();
   evidence.faults["imu_gap"] = 100;
   expectSays(first(evidence), {"imu_gap: 100 gaps", "max_imu_gap"});
+  const std::pair<std::string, std::string> more[] = {
+      {"imu_not_finite", "NaN"}, {"imu_stamp_jump", "imu_jump_patience"}, {"imu_stuck", "gyro"}};
+  for (const auto& [name, part] : more) {
+    evidence = goodRun();
+    evidence.faults[name] = 400;
+    expectSays(first(evidence), {name + ": 400 IMU samples", part});
+  }
 }
 
 TEST(Diagnosis, AVagueHeadingAfterAStartInMotionIsDoubtful) {

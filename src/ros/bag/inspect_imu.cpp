@@ -120,6 +120,13 @@ void describe(ImuInspection* imu) {
   const auto tell = [&](FindingLevel level, const std::string& subject, const std::string& text) {
     imu->findings.push_back({level, subject, text});
   };
+  const std::size_t samples = imu->samples.size() + r.not_finite;
+  if (10 * r.not_finite > samples) {  // the rest of the report would be of what is left
+    tell(FindingLevel::kMissing, "IMU",
+         std::to_string(r.not_finite) + " of " + std::to_string(samples) + " samples are not finite");
+    imu->to_do = "Correct the IMU driver, which writes NaN or infinity, and record again.";
+    return;
+  }
   const bool in_g = r.units.acceleration == AccelerationUnit::kStandardGravity;
   const bool in_degrees = r.units.rate == RateUnit::kDegreesPerSecond;
   if (in_g) {

@@ -239,9 +239,13 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   const InertialTrack track(imu.samples, imu.report.rest_rate);
   Looked looked = look(recording, imu, cloud, stamps, format.format, track);
   if (looked.cloud.points == 0 || !looked.cloud.has_doppler) {
-    radar.findings.push_back(
-        {FindingLevel::kMissing, "radar",
-         cloud.topic + ": the field " + format.format.doppler + " is zero in every point"});
+    const std::vector<RadarScan> decoded = decodeAll(cloud, format.format);
+    const bool none_finite = std::all_of(decoded.begin(), decoded.end(),
+                                         [](const RadarScan& scan) { return scan.points.empty(); });
+    radar.findings.push_back({FindingLevel::kMissing, "radar",
+                              cloud.topic + ": the " + (none_finite ? "position or the " : "") + "field " +
+                                  format.format.doppler + " is " + (none_finite ? "not finite" : "zero") +
+                                  " in every point"});
     return radar;
   }
   // If the ranges say nothing, a radar that looks along another axis and a contrary sign are one fault, not

@@ -278,6 +278,12 @@ void addImu(const RunEvidence& evidence, const Config& config, std::vector<Cause
   fault("imu_gap", 10, "gaps between IMU samples are longer than max_imu_gap.",
         "Raise max_imu_gap for a slow IMU, or look for what loses its messages.");
   fault("imu_out_of_order", 1, "IMU samples are out of order.", "Look for a second publisher on imu_topic.");
+  fault("imu_not_finite", 1, "IMU samples are not finite.",
+        "Correct the driver of the IMU: it writes NaN or infinity.");
+  fault("imu_stamp_jump", 1, "IMU samples are stamped far ahead of the one before.",
+        "Look at the clock of the driver. For an IMU with pauses, raise imu_jump_patience.");
+  fault("imu_stuck", 1, "IMU samples have a gyro axis that jumps away and stays there.",
+        "Look at the cable and the driver of the IMU: an axis of its gyro fails.");
   const ImuNoise& told = config.odometry.imu_noise;
   const MeasuredImuNoise& noise = evidence.imu_noise;
   if (!noise.isFarAbove(told)) return;
