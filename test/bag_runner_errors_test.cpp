@@ -20,6 +20,7 @@ TEST_F(BagRunnerErrors, MissingBagFolderAndUnreadableBagAreNamed) {
   bag_ = folder_ + "/text.bag";
   std::ofstream(bag_) << "not a bag at all, but long enough to be looked at\n";
   expectError(run(), {bag_, "cannot be read as a ROS 1 bag"});
+  EXPECT_EQ(run().err.find("reindex"), std::string::npos) << "it is no bag";
   std::ofstream(bag_, std::ios::trunc).close();
   expectError(run(), {bag_});
 }
@@ -39,7 +40,7 @@ TEST_F(BagRunnerErrors, ATruncatedOrDamagedBagIsNamed) {
   writeBag({});
   const std::string bytes = contents(bag_);
   std::ofstream(bag_, std::ios::binary) << bytes.substr(0, bytes.size() / 2);
-  expectError(run(), {bag_});
+  expectError(run(), {bag_, "perhaps cut off", "rosbag reindex " + bag_});
   // Damage in the middle of the data.
   std::string damaged = bytes;
   for (std::size_t i = 0; i < 2000; ++i) damaged[bytes.size() / 2 + i] = static_cast<char>(i * 37);

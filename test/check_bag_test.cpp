@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <optional>
 #include <sstream>
 #include <string>
@@ -244,6 +245,21 @@ TEST_F(CheckBag, ExitStatusAndFiles) {
   bag_run.bags = {bag_};
   bag_run.config = makeConfig(readParameterFile(request.out));
   EXPECT_EQ(runBag(bag_run).divergences, 0u);
+}
+
+TEST_F(CheckBag, ADamagedBagIsNamed) {
+  std::string bytes = contents(bag_);
+  const std::size_t at = bytes.rfind("v_doppler_mps");  // in the last cloud
+  ASSERT_NE(at, std::string::npos);
+  // The length of this text comes before it. Now it ends beyond the message.
+  for (std::size_t i = 1; i <= 4; ++i) bytes[at - i] = '\x7f';
+  CheckRequest request;
+  request.bags = {folder_ + "/damaged.bag", bag_};
+  std::ofstream(request.bags.front(), std::ios::binary) << bytes;
+  std::ostringstream out, err;
+  EXPECT_EQ(runCheck(request, out, err), 1);
+  EXPECT_NE(err.str().find("bag " + request.bags.front() + ": perhaps it is damaged ("), std::string::npos)
+      << err.str();
 }
 
 TEST_F(CheckBag, TheNextCommandCanBePasted) {

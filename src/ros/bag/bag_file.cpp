@@ -5,6 +5,7 @@
 
 #include <boost/algorithm/string/join.hpp>
 #include <filesystem>
+#include <fstream>
 
 #include "rio_t/ros/messages/conversions.h"
 
@@ -23,7 +24,11 @@ void openBag(const std::string& path, rosbag::Bag* bag) {
   } catch (const rosbag::BagUnindexedException&) {
     throw bagError(path, "not indexed, its recording was cut off; run `rosbag reindex " + path + "` first");
   } catch (const std::exception& error) {
-    throw bagError(path, std::string("cannot be read as a ROS 1 bag (") + error.what() + ")");
+    const std::string magic = "#ROSBAG V2.0";
+    std::string start(magic.size(), '\0');
+    std::ifstream(path, std::ios::binary).read(start.data(), static_cast<std::streamsize>(start.size()));
+    throw bagError(path, std::string("cannot be read as a ROS 1 bag (") + error.what() + ")" +
+                             (start == magic ? "; perhaps cut off: try `rosbag reindex " + path + "`" : ""));
   }
 }
 

@@ -16,6 +16,8 @@
 namespace rio_t {
 namespace {
 
+constexpr const char* kTypes[] = {"sensor_msgs/Imu", "sensor_msgs/PointCloud2", "std_msgs/Header"};
+
 template <typename Topic>
 Topic& topicOf(const std::string& name, std::vector<Topic>* topics) {
   const auto found =
@@ -38,6 +40,31 @@ void addImu(const sensor_msgs::Imu& message, Time record, ImuTopic* topic) {
   topic->times.push_back({imu.time, record});
 }
 
+void readMessages(rosbag::View& view, Recording* recording) {
+  std::set<std::string> judged, refused;  // topics with clouds
+  for (const rosbag::MessageInstance& instance : view) {
+    const Time record = toTime(instance.getTime());
+    const std::string& type = instance.getDataType();
+    const std::string& name = instance.getTopic();
+    if (type == kTypes[0]) {
+      addImu(*rio_t::read<sensor_msgs::Imu>(instance), record, &topicOf(name, &recording->imus));
+    } else if (type == kTypes[1]) {
+      if (refused.count(name) != 0) continue;
+      CloudTopic& topic = topicOf(name, &recording->clouds);
+      topic.messages.push_back(rio_t::read<sensor_msgs::PointCloud2>(instance));
+      topic.times.push_back({toTime(topic.messages.back()->header.stamp), record});
+      if (topic.messages.size() > 1 && isCopy(*topic.messages.back(), **std::prev(topic.messages.end(), 2)))
+        ++topic.copies;
+      const bool is_first = hasPoints(*topic.messages.back()) && judged.insert(name).second;
+      if (is_first && !proposeFormat(topic).fault.empty()) refused.insert(name);
+    } else {
+      HeaderTopic& topic = topicOf(name, &recording->headers);
+      topic.messages.push_back(*rio_t::read<std_msgs::Header>(instance));
+      topic.times.push_back({toTime(topic.messages.back().stamp), record});
+    }
+  }
+}
+
 }  // namespace
 
 Recording readRecording(const std::string& path, const CheckRequest& request) {
@@ -52,38 +79,20 @@ Recording readRecording(const std::string& path, const CheckRequest& request) {
   recording.read = request.duration > 0.0 ? std::min(request.duration, recording.length) : recording.length;
   const ros::Time end = recording.read < recording.length ? all.getBeginTime() + ros::Duration(recording.read)
                                                           : all.getEndTime();
-  const std::vector<std::string> types = {"sensor_msgs/Imu", "sensor_msgs/PointCloud2", "std_msgs/Header"};
   const auto is_wanted = [&](const rosbag::ConnectionInfo* connection) {
     const std::string& type = connection->datatype;
-    if (type == types[0]) return request.imu_topic.empty() || request.imu_topic == connection->topic;
-    if (type == types[1])
+    if (type == kTypes[0]) return request.imu_topic.empty() || request.imu_topic == connection->topic;
+    if (type == kTypes[1])
       return request.radar_topics.empty() ||
              boost::algorithm::any_of_equal(request.radar_topics, connection->topic);
-    return type == types[2];
+    return type == kTypes[2];
   };
   rosbag::View view;
   bags.addTo(&view, is_wanted, all.getBeginTime(), end);
-  std::set<std::string> judged, refused;  // topics with clouds
-  for (const rosbag::MessageInstance& instance : view) {
-    const Time record = toTime(instance.getTime());
-    const std::string& type = instance.getDataType();
-    const std::string& name = instance.getTopic();
-    if (type == types[0]) {
-      addImu(*rio_t::read<sensor_msgs::Imu>(instance), record, &topicOf(name, &recording.imus));
-    } else if (type == types[1]) {
-      if (refused.count(name) != 0) continue;
-      CloudTopic& topic = topicOf(name, &recording.clouds);
-      topic.messages.push_back(rio_t::read<sensor_msgs::PointCloud2>(instance));
-      topic.times.push_back({toTime(topic.messages.back()->header.stamp), record});
-      if (topic.messages.size() > 1 && isCopy(*topic.messages.back(), **std::prev(topic.messages.end(), 2)))
-        ++topic.copies;
-      const bool is_first = hasPoints(*topic.messages.back()) && judged.insert(name).second;
-      if (is_first && !proposeFormat(topic).fault.empty()) refused.insert(name);
-    } else {
-      HeaderTopic& topic = topicOf(name, &recording.headers);
-      topic.messages.push_back(*rio_t::read<std_msgs::Header>(instance));
-      topic.times.push_back({toTime(topic.messages.back().stamp), record});
-    }
+  try {
+    readMessages(view, &recording);
+  } catch (const std::exception& error) {
+    throw bagError(path, std::string("perhaps it is damaged (") + error.what() + ")");
   }
   return recording;
 }
