@@ -183,6 +183,28 @@ TEST_F(CheckBag, OnlyTopicsThatAreAskedForAreRead) {
   EXPECT_EQ(imus.imus.front().topic, request.imu_topic);
 }
 
+TEST_F(CheckBag, ATopicMayBeRelative) {
+  CheckRequest request;
+  request.imu_topic = "sensor_platform/imu";
+  request.radar_topics = {"sensor_platform/radar/scan"};
+  const Recording recording = readRecording(bag_, request);
+  EXPECT_EQ(recording.imus.size(), 1u);
+  EXPECT_EQ(recording.clouds.size(), 1u);
+}
+
+TEST_F(CheckBag, ATopicThatIsNotThereIsToBeChosenAnew) {
+  CheckRequest request;
+  request.imu_topic = "/imu";
+  const BagCheck imu = checkBag(bag_, request);
+  expectLine(imu, FindingLevel::kMissing, {"no topic /imu", "/sensor_platform/imu (sensor_msgs/Imu)"});
+  EXPECT_NE(imu.to_do.find("with --imu-topic"), std::string::npos) << imu.to_do;
+  request.imu_topic = "";
+  request.radar_topics = {"/scan"};
+  const BagCheck radar = checkBag(bag_, request);
+  expectLine(radar, FindingLevel::kMissing, {"no topic /scan", "/sensor_platform/radar/scan"});
+  EXPECT_NE(radar.to_do.find("with --radar-topic"), std::string::npos) << radar.to_do;
+}
+
 TEST_F(CheckBag, TheOtherFormatOfTheSimulatorIsReady) {
   const std::string path = folder_ + "/ti.bag";
   write("medium", 50.0, BagFormat::kTiMmwave, path);

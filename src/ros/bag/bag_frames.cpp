@@ -14,13 +14,6 @@
 namespace rio_t {
 namespace {
 
-std::string topicOfBag(const std::string& told, const std::map<std::string, std::string>& types) {
-  if (told.empty() || types.count(told) != 0) return told;
-  std::string other = told.front() == '/' ? told.substr(1) : "/" + told;
-  if (types.count(other) != 0) return other;
-  return told.front() == '/' ? told : other;
-}
-
 /// The frame_id of the topic's first message; empty if there is none.
 template <typename Message>
 std::string firstFrame(const Bags& bags, const std::string& topic) {
@@ -49,6 +42,13 @@ std::vector<Extrinsics> lookUp(const tf2::BufferCore& tf, const std::vector<Conf
 }
 
 }  // namespace
+
+std::string topicOfBag(const std::string& told, const std::map<std::string, std::string>& types) {
+  if (told.empty() || types.count(told) != 0) return told;
+  std::string other = told.front() == '/' ? told.substr(1) : "/" + told;
+  if (types.count(other) != 0) return other;
+  return told.front() == '/' ? told : other;
+}
 
 Config withTopicsOfBag(Config config, const std::map<std::string, std::string>& types) {
   config.imu_topic = topicOfBag(config.imu_topic, types);

@@ -249,6 +249,11 @@ std::string topicsOf(const Recording& recording) {
   return text.empty() ? "none" : text;
 }
 
+bool hasType(const Recording& recording, const std::string& type) {
+  return std::any_of(recording.types.begin(), recording.types.end(),
+                     [&](const auto& topic) { return topic.second == type; });
+}
+
 void missing(const std::string& subject, const std::string& text, const std::string& to_do, BagCheck* check) {
   check->findings.push_back({FindingLevel::kMissing, subject, text});
   check->to_do = to_do;
@@ -334,7 +339,10 @@ BagCheck checkBag(const std::string& bag, const CheckRequest& request) {
     missing("IMU",
             "the bag has no topic " + (request.imu_topic.empty() ? "" : request.imu_topic + " ") +
                 "of type sensor_msgs/Imu; it has " + topicsOf(recording),
-            "Record the IMU, too: 100 Hz or more, with raw acceleration and angular velocity.", &check);
+            !request.imu_topic.empty() && hasType(recording, "sensor_msgs/Imu")
+                ? "Choose a topic of that type which the bag has with --imu-topic, or leave the option out."
+                : "Record the IMU, too: 100 Hz or more, with raw acceleration and angular velocity.",
+            &check);
     return check;
   }
   const ImuInspection imu = chooseImu(recording, &check);
@@ -356,7 +364,10 @@ BagCheck checkBag(const std::string& bag, const CheckRequest& request) {
       missing(
           "radar",
           "the bag has no topic " + wanted + "of type sensor_msgs/PointCloud2; it has " + topicsOf(recording),
-          "Record the radar, too: a point cloud with positions and Doppler.", &check);
+          !request.radar_topics.empty() && hasType(recording, "sensor_msgs/PointCloud2")
+              ? "Choose topics of that type which the bag has with --radar-topic, or leave the option out."
+              : "Record the radar, too: a point cloud with positions and Doppler.",
+          &check);
     } else {
       check.to_do = "Use a radar driver that publishes positions and Doppler as sensor_msgs/PointCloud2.";
     }

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "bag_file.h"
+#include "bag_frames.h"
 #include "inspect_format.h"
 #include "rio_t/ros/messages/conversions.h"
 
@@ -79,12 +80,15 @@ Recording readRecording(const std::string& path, const CheckRequest& request) {
   recording.read = request.duration > 0.0 ? std::min(request.duration, recording.length) : recording.length;
   const ros::Time end = recording.read < recording.length ? all.getBeginTime() + ros::Duration(recording.read)
                                                           : all.getEndTime();
+  const std::string imu_topic = topicOfBag(request.imu_topic, recording.types);
+  std::vector<std::string> radar_topics;
+  for (const std::string& topic : request.radar_topics)
+    radar_topics.push_back(topicOfBag(topic, recording.types));
   const auto is_wanted = [&](const rosbag::ConnectionInfo* connection) {
     const std::string& type = connection->datatype;
-    if (type == kTypes[0]) return request.imu_topic.empty() || request.imu_topic == connection->topic;
+    if (type == kTypes[0]) return imu_topic.empty() || imu_topic == connection->topic;
     if (type == kTypes[1])
-      return request.radar_topics.empty() ||
-             boost::algorithm::any_of_equal(request.radar_topics, connection->topic);
+      return radar_topics.empty() || boost::algorithm::any_of_equal(radar_topics, connection->topic);
     return type == kTypes[2];
   };
   rosbag::View view;
