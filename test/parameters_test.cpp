@@ -207,6 +207,9 @@ TEST(Parameters, AWrongFileIsOneLineWithFileLineAndExpectation) {
   EXPECT_TRUE(contains(messageOfFile("just text\n"), "FILE:1: expected one `key: value` a line"));
   EXPECT_TRUE(contains(messageOfFile("window: 1.0\ngravity: 9.8\nwindow: 2.0\n"),
                        "FILE:3: window: expected each key once"));
+  EXPECT_EQ(messageOfFile("window: 1.0\n---\ngravity: 9.8\n"),
+            "FILE:3: expected one YAML document, here begins a second one");
+  EXPECT_EQ(messageOfFile("---\nwindow: 1.0\n---\n"), "nothing wrong") << "the second one is empty";
   EXPECT_TRUE(contains(messageOfFile("radar:\n  topic: /x\n"), "FILE:1: unknown parameter \"radar\""));
   for (const char* text : {"window: fast\n", "a: [\n", "- 1\n"}) {
     EXPECT_FALSE(contains(messageOfFile(text), "\n")) << text;

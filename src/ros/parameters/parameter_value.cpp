@@ -216,12 +216,18 @@ ParameterEntries readParameterFile(const std::string& path) {
 ParameterEntries readParameters(std::istream& yaml, const std::string& name) {
   YAML::Node root;
   try {
-    root = YAML::Load(yaml);
+    for (const YAML::Node& document : YAML::LoadAll(yaml)) {
+      if (document.IsNull()) continue;
+      if (!root.IsNull())
+        throw std::runtime_error(name + ":" + std::to_string(document.Mark().line + 1) +
+                                 ": expected one YAML document, here begins a second one");
+      root.reset(document);
+    }
   } catch (const YAML::Exception& error) {
     throw std::runtime_error(name + ":" + std::to_string(error.mark.line + 1) + ": not YAML (" + error.msg +
                              "); expected one `key: value` a line");
   }
-  if (!root.IsDefined() || root.IsNull()) return {};
+  if (root.IsNull()) return {};
   if (!root.IsMap()) throw std::runtime_error(name + ":1: expected one `key: value` a line");
   return fromYamlMap(root, true, [&](int line) { return name + ":" + std::to_string(line); });
 }
