@@ -8,6 +8,7 @@ import pytest
 import yaml
 
 from rio_t import nees, programs
+from rio_t.errors import RioTError
 from rio_t.experiments import consistency, options, platforms, runner
 from rio_t.experiments.laboratory import Run, Source
 
@@ -211,6 +212,16 @@ def test_a_run_that_is_not_to_be_trusted_has_a_result(programs_folder, simulated
              "extrinsics_rotation_xyzw=[0,0,0,1]")
     assert programs.run(*words).returncode == 3
     assert programs.cpu_seconds_of(*words) > 0.0
+
+
+def test_a_program_that_fails_says_why(tmp_path):
+    program = tmp_path / "rio_t_bag"
+    program.write_text("#!/bin/sh\ncat >&2 <<END\nrio_t_bag: warning: it is late\nrio_t_bag: it never started\n"
+                       "The most likely causes:\n  1. The IMU is upside down.\nEND\nexit 1\n")
+    program.chmod(0o755)
+    with pytest.raises(RioTError) as failed:
+        programs.cpu_seconds_of(program)
+    assert str(failed.value) == "rio_t_bag: it never started The most likely causes: 1. The IMU is upside down."
 
 
 USAGE = [

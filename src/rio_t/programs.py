@@ -50,8 +50,9 @@ def cpu_seconds_of(*words):
         process.returncode = exit_code(status)
         if process.returncode not in HAS_RESULT:
             errors.seek(0)
-            lines = errors.read().strip().splitlines()
-            raise RioTError(lines[-1] if lines else f"{words[0]} ended with status {process.returncode}")
+            # After what went wrong come the likely causes.
+            lines = [line.strip() for line in errors if ": warning: " not in line]
+            raise RioTError(" ".join(lines).strip() or f"{words[0]} ended with status {process.returncode}")
     return usage.ru_utime + usage.ru_stime
 
 
