@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from rio_t import programs
 from rio_t.report.main import main
-from rio_t.report.motion import read_extrinsics
+from rio_t.rig import radars_of, read_config
 
 FIGURES = ["trajectory", "errors", "velocity", "time_offset", "ego_velocity", "biases"]
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -139,14 +139,13 @@ def test_one_radar_has_no_name(report, run_folder):
     refused(report("--true-offset", "left=0.03", run_folder), "expected S, since there is one radar")
 
 
-def test_the_mounting_of_each_radar_comes_from_its_section(tmp_path):
+def test_the_mounting_of_each_radar_comes_from_its_section(programs_folder, tmp_path):
     (tmp_path / "config.yaml").write_text(
-        "extrinsics_translation: [1, 2, 3]\nextrinsics_rotation_xyzw: [0, 0, 0, 1]\n"
-        "radars: [left, right]\nleft: {extrinsics_translation: [4, 5, 6]}\n")
-    for radar, expected in (("left", [4, 5, 6]), ("right", [1, 2, 3]), ("", [1, 2, 3])):
-        lever, rotation = read_extrinsics(tmp_path / "config.yaml", radar)
-        assert lever.tolist() == expected, radar
-        assert rotation.magnitude() == 0
+        "extrinsics_translation: [1, 2, 3]\nextrinsics_rotation_xyzw: [0, 0, 0, 1]\nradars: [left, right]\n"
+        "left: {radar_topic: /left, extrinsics_translation: [4, 5, 6]}\nright: {radar_topic: /right}\n")
+    radars = radars_of(read_config(programs_folder, tmp_path / "config.yaml"))
+    assert [(name, lever.tolist()) for name, lever, _ in radars] == [("left", [4, 5, 6]), ("right", [1, 2, 3])]
+    assert all(rotation.magnitude() == 0 for _, _, rotation in radars)
 
 
 def test_without_truth_nothing_is_evaluated(report, run_folder):
@@ -156,8 +155,10 @@ def test_without_truth_nothing_is_evaluated(report, run_folder):
     assert "Accuracy" not in page
 
 
-def test_the_mounting_comes_from_the_configuration(report, run_folder, scripts):
-    assert "mounting from the configuration" in page_of(report("--config", scripts.parent / "config/irs.yaml", run_folder))
+def test_the_mounting_comes_from_the_configuration(report, run_folder, scripts, tmp_path):
+    (tmp_path / "words.yaml").write_text("mounting_yaw_pitch_roll_deg: [10, 0, 0]\n")
+    for config in ("irs", scripts.parent / "config/irs.yaml", tmp_path / "words.yaml"):
+        assert "mounting from the configuration" in page_of(report("--config", config, run_folder))
 
 
 @pytest.mark.parametrize("name, figure", [("time_offset.csv", "time_offset"), ("ego_velocity.csv", "ego_velocity"),
@@ -208,8 +209,8 @@ def test_a_broken_file_is_told_in_one_line(report, run_folder, name, content, me
 @pytest.mark.parametrize("option, content, message", [
     ("--ground-truth", None, "no such file; expected a trajectory (TUM format)"),
     ("--ground-truth", "1 2\n", "given:1: expected `stamp x y z qx qy qz qw`"),
-    ("--config", None, "No such file"),
-    ("--config", "extrinsics_translation: [1, 2]\n", "expected extrinsics_translation (3 numbers)"),
+    ("--config", None, "no such file"),
+    ("--config", "extrinsics_translation: [1, 2]\n", "extrinsics_translation: expected a list of 3 finite numbers"),
     ("--output-dir", "a file", "cannot be made")])
 def test_a_wrong_option_is_told_in_one_line(report, run_folder, tmp_path, option, content, message):
     if content is not None:

@@ -21,6 +21,11 @@ COLOURS = ("tab:orange", "tab:blue", "tab:green", "tab:red", "tab:purple", "tab:
 VIEW = np.deg2rad(45.0)  # of the cone that stands for the field of view, to either side
 
 
+def read_config(folder, name_or_path):
+    """A configuration as rio_t_bag, which is in `folder`, reads it: names and every way to give a mounting."""
+    return yaml.safe_load(programs.output_of(folder / "rio_t_bag", "--print-config", "--config", name_or_path))
+
+
 def radars_of(config):
     """(name, lever arm, rotation that turns right, forward, up into the axes of the IMU) of each radar."""
     names = config.get("radars") or [""]
@@ -107,8 +112,7 @@ def main(arguments):
     given = parser.parse_args(arguments)
     try:
         folder = programs.find(["rio_t_bag"], "--programs", given.programs)
-        config = yaml.safe_load(programs.output_of(folder / "rio_t_bag", "--print-config", "--config", given.config))
-        draw(radars_of(config), given.out)
+        draw(radars_of(read_config(folder, given.config)), given.out)
     except (RioTError, OSError, ValueError, KeyError) as error:
         print(f"draw_rig.py: {error}", file=sys.stderr)
         return 1

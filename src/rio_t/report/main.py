@@ -15,9 +15,10 @@ from . import figures
 from .. import programs, run_folder, tum
 from ..command_line import Parser
 from ..errors import RioTError
+from ..rig import radars_of, read_config
 from .accuracy import ERRORS, accuracy_rows, offset_rows, run_evaluate
 from .animation import write_animation
-from .motion import extrinsics_in, motion, predicted_ego_velocity, read_extrinsics
+from .motion import extrinsics_in, motion, predicted_ego_velocity
 from .page import Page
 
 ESTIMATES = (("optimised", figures.OPTIMIZED, "trajectory_optimized.txt"), ("online", figures.ESTIMATE, "trajectory.txt"))
@@ -213,11 +214,19 @@ def add_extrinsics(page, radar, folder):
     page.figure(run_folder.of_radar("extrinsics", radar.name), figures.draw_extrinsics(radar.extrinsics, told))
 
 
-def mounting(radar, config):
+def told_mountings(arguments):
+    """Those of --config, by the name of the radar."""
+    if not arguments.config:
+        return {}
+    folder = programs.find(["rio_t_bag"], "--evaluate FILE beside it", arguments.evaluate and arguments.evaluate.parent)
+    return {name: (lever, rotation) for name, lever, rotation in radars_of(read_config(folder, arguments.config))}
+
+
+def mounting(radar, told):
     """Position of the radar in the IMU frame and R_IR, None if not known, and where that is from."""
     if radar.extrinsics is not None:
         return last_extrinsics(radar.extrinsics), "as estimated at the end"
-    return (read_extrinsics(config, radar.name) if config else None), "from the configuration"
+    return told.get(radar.name), "from the configuration"
 
 
 def add_ego_velocity(page, radar, motions, extrinsics, source):
@@ -249,7 +258,8 @@ def report(arguments):
     """Writes the page; its path."""
     run = read_run(arguments.run, arguments.ground_truth)
     true_offsets = true_offsets_of(run.radars, arguments.true_offset)
-    mountings = {radar.name: mounting(radar, arguments.config) for radar in run.radars}
+    told = told_mountings(arguments)
+    mountings = {radar.name: mounting(radar, told) for radar in run.radars}
     judge_poses = run.truth and run.estimates
     judge_offset = any(radar.name in true_offsets and radar.offset is not None for radar in run.radars)
     program = arguments.evaluate
@@ -328,12 +338,13 @@ def main(words):
                         help="true time offset of the radar [s]; with several radars, give it once for each, with its name")
     parser.add_argument("--max-difference", metavar="S", type=finite, default=0.01,
                         help="largest difference of the stamps of two poses that are compared [s] (0.01)")
-    parser.add_argument("--config", metavar="FILE", type=pathlib.Path,
-                        help="configuration of the run, for the radar's mounting")
+    parser.add_argument("--config", metavar="NAME_OR_PATH",
+                        help="configuration of the run, as for rio_t_bag, for the radar's mounting")
     parser.add_argument("--output-dir", metavar="DIR", type=pathlib.Path, help="where to write (RUN_DIR/report)")
     parser.add_argument("--animation", metavar="FILE.gif", type=pathlib.Path,
                         help="also draw path and time offset of the first radar as a moving picture")
-    parser.add_argument("--evaluate", metavar="FILE", type=pathlib.Path, help="the program evaluate, if it is not found")
+    parser.add_argument("--evaluate", metavar="FILE", type=pathlib.Path,
+                        help="the program evaluate, if it is not found; rio_t_bag is beside it")
     try:
         print(report(parser.parse_args(words)))
     except (RioTError, OSError) as error:

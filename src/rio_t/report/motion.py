@@ -4,7 +4,7 @@ from scipy.spatial.transform import Rotation
 
 from ..errors import RioTError
 from ..geometry import interpolate, interpolate_rotations
-from ..run_folder import of_radar, read_yaml
+from ..run_folder import of_radar
 
 USED = ("moving", "zero_velocity")  # status of a scan that entered the estimate
 
@@ -29,13 +29,6 @@ def extrinsics_in(content, path, prefix="", radar=""):
         return lever.reshape(3), Rotation.from_quat(rotation.reshape(4))
     except (KeyError, TypeError, ValueError):
         raise RioTError(f"{path}: expected {keys[0]} (3 numbers) and {keys[1]} (4 numbers)") from None
-
-
-def read_extrinsics(path, radar=""):
-    """Those of a configuration; `radar`: of which of several."""
-    config = read_yaml(path)
-    section = config.get(radar)
-    return extrinsics_in({**config, **section} if radar and isinstance(section, dict) else config, path)
 
 
 def predicted_ego_velocity(scans, at, reference, extrinsics, source):
