@@ -342,7 +342,7 @@ TEST(StaticInitializer, ASmoothStartEndsTheRestAndIsNotAveraged) {
       const Eigen::Vector3d up_W = found->q_WI * Eigen::Vector3d::UnitZ();
       EXPECT_LT(std::acos(up_W.z()), 0.01) << "ramp " << ramp << ", noise " << noise;
       EXPECT_LT((found->b_g - Eigen::Vector3d(0.01, 0.0, -0.02)).norm(), 1e-3);
-      EXPECT_LT(found->duration, 2.5);
+      EXPECT_LT(found->duration, 2.5) << "ramp " << ramp << ", noise " << noise;
       if (ramp == 0.0) {
         EXPECT_LE(found->time, Time::fromSeconds(102.0)) << "noise " << noise;
       }

@@ -42,11 +42,14 @@ struct OneRadar {
     }
     return scan;
   }
-  RadarAnswer use(double stamp, int points, double model_error_scale = 1.0) {
+  RadarAnswer answer(double stamp, int points, double model_error_scale = 1.0) {
     ScanContext context;
     context.model_error_scale = model_error_scale;
     context.last_used = motion.time(stamp - 0.1);
-    const RadarAnswer answer = channel.use(scan(stamp, points), context, smoother);
+    return channel.use(scan(stamp, points), context, smoother);
+  }
+  RadarAnswer use(double stamp, int points, double model_error_scale = 1.0) {
+    const RadarAnswer answer = this->answer(stamp, points, model_error_scale);
     smoother.optimize();
     smoother.marginalize(channel.randomWalks());
     return answer;
@@ -87,7 +90,7 @@ TEST(RadarChannel, AScanThatComesTwiceCountsOnce) {
     ASSERT_EQ(first.rejected_because, expected.rejected_because) << stamp;
     EXPECT_EQ(first.ego_velocity.v_R, expected.ego_velocity.v_R) << stamp;
     if (!first.rejected_because.empty()) continue;
-    const RadarAnswer second = twice.use(stamp, 6);
+    const RadarAnswer second = twice.answer(stamp, 6);
     EXPECT_EQ(second.rejected_because, "duplicate_stamp");
     EXPECT_FALSE(second.was_predicted || second.innovation || second.alone);
   }

@@ -1,5 +1,6 @@
 #include "rio_t/imu/static_initializer.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -22,26 +23,41 @@ struct Statistics {
   Eigen::Vector3d std = Eigen::Vector3d::Zero();
 };
 
-/// Spread of the means over kMean, which an engine does not move, without the white noise that is left in
-/// them.
-Statistics statistics(const std::vector<ImuMeasurement>& samples, Eigen::Vector3d ImuMeasurement::*member,
-                      double ImuMeasurement::*squared_density) {
-  Statistics result;
-  for (const ImuMeasurement& sample : samples) result.mean += sample.*member;
-  result.mean /= static_cast<double>(samples.size());
-  Eigen::Vector3d squares = Eigen::Vector3d::Zero();
-  double noise = 0.0;
-  double means = 0.0;
-  for (auto first = samples.begin(); first != samples.end();) {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    auto next = first;
-    for (; next != samples.end() && next->time - first->time < kMean; ++next) sum += *next.*member;
-    squares += (sum / static_cast<double>(next - first) - result.mean).cwiseAbs2();
-    noise += *first.*squared_density / kMean;
-    means += 1.0;
+using Samples = std::vector<ImuMeasurement>::const_iterator;
+
+Eigen::Vector3d meanOf(Samples first, Samples last, Eigen::Vector3d ImuMeasurement::*member) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (auto sample = first; sample != last; ++sample) sum += *sample.*member;
+  return sum / static_cast<double>(last - first);
+}
+
+/// The means over kMean, one after the other; what is left at the end is not a whole one.
+std::vector<Eigen::Vector3d> meansOf(Samples first, Samples last, Eigen::Vector3d ImuMeasurement::*member) {
+  std::vector<Eigen::Vector3d> means;
+  for (auto next = first; next != last; ++next) {
+    if (next->time - first->time < kMean) continue;
+    means.push_back(meanOf(first, next, member));
     first = next;
   }
-  result.std = ((squares.array() - noise) / means).max(0.0).sqrt();
+  return means;
+}
+
+Eigen::Vector3d variancesOf(const std::vector<Eigen::Vector3d>& values, const Eigen::Vector3d& mean) {
+  Eigen::Vector3d squares = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& value : values) squares += (value - mean).cwiseAbs2();
+  return squares / static_cast<double>(values.size());
+}
+
+/// Mean of the samples, and spread of the means over kMean without the white noise that is left in them.
+Statistics statistics(const std::vector<ImuMeasurement>& samples, Eigen::Vector3d ImuMeasurement::*member,
+                      double ImuMeasurement::*squared_density) {
+  double density = 0.0;
+  for (const ImuMeasurement& sample : samples) density += sample.*squared_density;
+  density /= static_cast<double>(samples.size());
+  Statistics result;
+  result.mean = meanOf(samples.begin(), samples.end(), member);
+  const Eigen::Vector3d variances = variancesOf(meansOf(samples.begin(), samples.end(), member), result.mean);
+  result.std = (variances.array() - density / kMean).max(0.0).sqrt();
   return result;
 }
 
@@ -112,18 +128,16 @@ bool StaticInitializer::endsNow() {
   if (newest.time - samples_.front().time < 2.0 * kNewest || newest.time - checked_at_ < kCheckEvery)
     return false;
   checked_at_ = newest.time;
-  Eigen::Vector3d before = Eigen::Vector3d::Zero();
-  Eigen::Vector3d now = Eigen::Vector3d::Zero();
-  double before_count = 0.0;
-  double now_count = 0.0;
-  for (const ImuMeasurement& sample : samples_) {
-    const bool is_new = newest.time - sample.time < kNewest;
-    (is_new ? now : before) += sample.acceleration;
-    (is_new ? now_count : before_count) += 1.0;
-  }
-  // Noise of the mean over the newest samples; that before has less.
-  const double noise = std::sqrt(newest.accel_mean_noise / kNewest);
-  return (now / now_count - before / before_count).norm() > 0.2 * options_.max_accel_std + 4.0 * noise;
+  const auto new_ones = std::find_if(samples_.begin(), samples_.end(), [&](const ImuMeasurement& sample) {
+    return newest.time - sample.time < kNewest;
+  });
+  const auto acceleration = &ImuMeasurement::acceleration;
+  const Eigen::Vector3d before = meanOf(samples_.begin(), new_ones, acceleration);
+  const Eigen::Vector3d change = meanOf(new_ones, samples_.end(), acceleration) - before;
+  // Noise of the mean over the newest samples: as measured, or as the means before have scattered.
+  const Eigen::Vector3d variances = variancesOf(meansOf(samples_.begin(), new_ones, acceleration), before);
+  const double noise = std::sqrt(std::max(newest.accel_mean_noise, kMean * variances.maxCoeff()) / kNewest);
+  return change.norm() > 0.2 * options_.max_accel_std + 4.0 * noise;
 }
 
 std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement& imu) {
