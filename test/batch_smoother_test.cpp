@@ -61,6 +61,18 @@ class Batch : public ::testing::Test {
     return problem;
   }
 
+  /// Scans of one radar; t_O steps from `before` to `after` in the middle, and the first scan after it tells.
+  void addScansWithStep(double before, double after, BatchProblem& problem) const {
+    for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
+      const bool has_stepped = stamp > 2.25;
+      BatchScan scan;
+      scan.velocity = measurement(stamp, has_stepped ? after : before);
+      scan.stamp = scan.velocity->stamp;
+      scan.offset_stepped = has_stepped && stamp < 2.35;
+      problem.scans.push_back(scan);
+    }
+  }
+
   BatchSmoother make(const SmootherOptions& options) const {
     return {options, BatchOptions(), ImuNoise(), motion.g_W, imu};
   }
@@ -196,14 +208,7 @@ TEST_F(Batch, KnowsThePastBetterThanTheWindowDid) {
 TEST_F(Batch, AStepOfTheOffsetIsFollowedWhereItIsTold) {
   SmootherOptions options;
   BatchProblem whole = problem(options);
-  for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
-    const bool after = stamp > 2.25;
-    BatchScan scan;
-    scan.velocity = measurement(stamp, after ? 0.06 : 0.01);
-    scan.stamp = scan.velocity->stamp;
-    scan.offset_stepped = after && stamp < 2.35;
-    whole.scans.push_back(scan);
-  }
+  addScansWithStep(0.01, 0.06, whole);
   const BatchSolution batch = make(options).solve(whole);
   EXPECT_NEAR(batch.scans.front().t_O, 0.01, 3e-4);
   EXPECT_NEAR(batch.scans.back().t_O, 0.06, 3e-4);
@@ -215,14 +220,7 @@ TEST_F(Batch, AStepHasTheSigmaOfItsRadar) {
   BatchProblem whole = problem(options);
   whole.time_offsets = {0.0};
   whole.time_offset_sigmas = {0.075};
-  for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
-    const bool after = stamp > 2.25;
-    BatchScan scan;
-    scan.velocity = measurement(stamp, after ? 0.05 : 0.0);
-    scan.stamp = scan.velocity->stamp;
-    scan.offset_stepped = after && stamp < 2.35;
-    whole.scans.push_back(scan);
-  }
+  addScansWithStep(0.0, 0.05, whole);
   EXPECT_NEAR(make(options).solve(whole).scans.back().t_O, 0.05, 3e-4);
 }
 

@@ -7,8 +7,8 @@
 
 namespace rio_t {
 
-/// What a sum that forgets within `memory` [s] keeps from `last` to `now`. Late data fade nothing, and no
-/// pause fades all.
+/// A sum that forgets with the time constant `memory` [s] is multiplied by this factor from `last` to `now`.
+/// The factor is 1 for data that come late, and it is never zero.
 inline double fading(Time last, Time now, double memory) {
   return std::exp(-std::clamp(now - last, 0.0, 10.0 * memory) / memory);
 }

@@ -11,7 +11,7 @@ namespace rio_t {
 /// The noise of a three-axis signal at the rate of its samples, and at a half, a quarter, ... of it.
 ///
 /// White noise has the same density at all these rates. A vibration has less at the lower ones: it averages
-/// out. Motion has more. What integrates samples cares for the lower rates (docs/method.md, section 4.3). Not
+/// out. Motion has more. Preintegration uses the smallest density (docs/method.md, section 4.3). Not
 /// thread-safe.
 class NoiseSpectrum {
  public:
@@ -19,7 +19,7 @@ class NoiseSpectrum {
   void add(Time time, const Eigen::Vector3d& value);
   void interrupt();
   double squaredDensity() const { return rates_.front().meter.squaredDensity(); }  ///< of the samples
-  /// Of means of samples: the smallest density of all rates down to 10 Hz.
+  /// The smallest density of all rates down to 10 Hz. It is never above that of the samples.
   double squaredDensityOfMeans() const;
 
  private:

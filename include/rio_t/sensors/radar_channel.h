@@ -34,10 +34,11 @@ struct ScanContext {
   Time last_used;                  ///< stamp of the last scan that any radar gave to the window
 };
 
-/// What a channel answers to a scan and the result of the scan repeats.
+/// The part of a channel's answer to a scan that ScanResult repeats.
 struct ScanAnswer {
   EgoVelocity ego_velocity;
-  /// Of the velocity that its points show without the prediction, for health. None if they do not decide.
+  /// Health uses this innovation. It is that of the velocity that the points show without the prediction.
+  /// None if the points do not decide.
   std::optional<Innovation> innovation;
   std::optional<DopplerMeasurement> doppler;    ///< its points, if they and not the velocity count
   std::string rejected_because;                 ///< snake case, empty if used; keys of `scans_rejected`

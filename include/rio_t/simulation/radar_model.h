@@ -41,7 +41,8 @@ struct RadarModelOptions {
   double doppler_span = 0.0;
 
   double ghost_share = 0.03;  ///< of the points: anywhere, any Doppler
-  /// Of the points: the radar reports them at a second direction, too, with the same range, Doppler and SNR.
+  /// The radar reports this share of the points at a second direction, too. Range, Doppler and SNR are the
+  /// same.
   double ambiguous_share = 0.0;
   double moving_share = 0.10;  ///< of the time: walking persons in view
   int crowd = 1;               ///< so many at once; their points take the place of the room's

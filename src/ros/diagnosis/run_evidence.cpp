@@ -33,8 +33,7 @@ void EvidenceCollector::add(const ScanResult& result) {
     ++radar.scans_before_start;
     if (first_imu_ && result.scan.stamp < *first_imu_ && ++radar.scans_before_imu == 1)
       radar.seconds_before_imu = *first_imu_ - result.scan.stamp;
-    // After the start, nobody asks what a scan from before it shows.
-    if (!newest_state_) ++radar.velocity_status[toString(result.ego_velocity.status)];
+    ++radar.velocity_status[toString(result.ego_velocity.status)];
     return;
   }
   // A radar that filters what stands still has no scan to use at rest, and is not silent.

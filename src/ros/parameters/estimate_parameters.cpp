@@ -108,12 +108,12 @@ void listInitialization(ParameterList& list, Config& c) {
       "A start at rest averages the IMU over this time for attitude and gyro bias. 2 to 5 s are typical.");
   list.number(
       "init_max_gyro_std", "rad/s", above(0), init.max_gyro_std,
-      "The platform counts as moving if the gyro scatters more than this on one axis. Raise it for an engine "
-      "that vibrates at rest.");
+      "The platform counts as moving if the means of the gyro over 0.1 s scatter more than this on one axis. "
+      "An engine that idles hardly moves these means.");
   list.number(
       "init_max_accel_std", "m/s^2", above(0), init.max_accel_std,
-      "The platform counts as moving if the accelerometer scatters more than this on one axis. Raise it for "
-      "an engine that vibrates at rest.");
+      "The platform counts as moving if the means of the accelerometer over 0.1 s scatter more than this on "
+      "one axis. An engine that idles hardly moves these means.");
   list.number(
       "init_max_gyro_mean", "rad/s", above(0), init.max_gyro_mean,
       "The platform counts as turning if the mean of the gyro is larger than this in size. Raise it for a "

@@ -27,7 +27,7 @@ struct RadarEvidence {
   std::uint64_t scans_before_imu = 0;    ///< of these, stamped before the first IMU sample
   double seconds_before_imu = 0.0;       ///< by how much, of the first of them
   Counts scans_rejected;                 ///< by reason, without those before the start
-  Counts velocity_status;                ///< of the scans before the start that were evaluated
+  Counts velocity_status;                ///< of the scans before the start, by EgoVelocityStatus
   std::uint64_t points = 0;              ///< of all scans
   std::array<std::uint64_t, kPointVerdicts> points_by_verdict = {};
   double snr_sum_db = 0.0;  ///< over `points`

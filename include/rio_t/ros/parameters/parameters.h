@@ -55,7 +55,8 @@ enum class ExtrinsicsAxes {
   kCloud,           ///< "cloud": the cloud's own, see `radar_axes`
 };
 
-/// What is changed of the preset `radar_format`. Empty text, no value and a sign of zero leave it as it is.
+/// These members override the preset `radar_format`. Empty text, no value and a sign of zero override
+/// nothing.
 struct PointCloudOverrides {
   std::optional<PointCoordinates> coordinates;
   std::optional<PointAxes> axes;
