@@ -122,22 +122,14 @@ class Linearized {
  public:
   void evaluate(const Term& term) {
     const Eigen::Index rows = term.cost->num_residuals();
-    r_.resize(rows);
     if (numbers_.size() < term.blocks.size()) numbers_.resize(term.blocks.size());
-    parameters_.clear();
     jacobians_.clear();
     for (std::size_t i = 0; i < term.blocks.size(); ++i) {
       const auto size = static_cast<std::size_t>(rows * term.blocks[i]->manifold->size());
       if (numbers_[i].size() < size) numbers_[i].resize(size);
-      parameters_.push_back(term.blocks[i]->x.data());
       jacobians_.push_back(term.blocks[i]->is_constant ? nullptr : numbers_[i].data());
     }
-    if (!term.cost->Evaluate(parameters_.data(), r_.data(), jacobians_.data()))
-      throw std::runtime_error("graph: a factor cannot be evaluated");
-    double rho[3] = {r_.squaredNorm(), 1.0, 0.0};
-    if (term.loss) term.loss->Evaluate(rho[0], rho);
-    cost_ = 0.5 * rho[0];
-    const double root = std::sqrt(rho[1]);
+    const double root = std::sqrt(evaluate(term, jacobians_.data()));
     r_ *= root;
     J_.clear();
     for (std::size_t i = 0; i < term.blocks.size(); ++i) {
@@ -145,11 +137,29 @@ class Linearized {
       J_.push_back(is_constant ? Rows{nullptr, rows, 0} : tangents(i, *term.blocks[i]->manifold, root));
     }
   }
+  /// The residual alone.
+  double costOf(const Term& term) {
+    evaluate(term, nullptr);
+    return cost_;
+  }
   const Eigen::VectorXd& r() const { return r_; }
   const Rows& J(std::size_t i) const { return J_[i]; }
   double cost() const { return cost_; }
 
  private:
+  /// Sets residual and cost; returns the derivative of the loss.
+  double evaluate(const Term& term, double** jacobians) {
+    r_.resize(term.cost->num_residuals());
+    parameters_.clear();
+    for (const Block* block : term.blocks) parameters_.push_back(block->x.data());
+    if (!term.cost->Evaluate(parameters_.data(), r_.data(), jacobians))
+      throw std::runtime_error("graph: a factor cannot be evaluated");
+    double rho[3] = {r_.squaredNorm(), 1.0, 0.0};
+    if (term.loss) term.loss->Evaluate(rho[0], rho);
+    cost_ = 0.5 * rho[0];
+    return rho[1];
+  }
+
   /// Moves the columns that carry the tangent together.
   Rows tangents(std::size_t i, const Manifold& manifold, double root) {
     const std::vector<int>& columns = manifold.columns();
@@ -231,6 +241,13 @@ NormalEquations linearize(const Window& window) {
   for (const auto& block : window.blocks()) blocks.push_back(block.get());
   for (const auto& term : window.terms()) terms.push_back(term.get());
   return linearize(std::move(blocks), terms);
+}
+
+double costOf(const Window& window) {
+  Linearized linear;
+  double cost = 0.0;
+  for (const auto& term : window.terms()) cost += linear.costOf(*term);
+  return cost;
 }
 
 bool Elimination::factorise(const NormalEquations& system, double raise) {

@@ -107,20 +107,23 @@ bool take(const std::vector<Eigen::VectorXd>& step, double share, Window& window
   return stopped;
 }
 
-/// Takes the step or a share of it, and linearises there; none where none lowers the cost.
-bool lowerCost(const std::vector<Eigen::VectorXd>& step, Window& window, NormalEquations& system) {
+struct TakenStep {
+  double cost;   ///< after it
+  bool is_whole; ///< neither a share of the step nor stopped at a bound
+};
+
+/// Takes the step or a share of it; none where none lowers the cost.
+std::optional<TakenStep> lowerCost(const std::vector<Eigen::VectorXd>& step, double cost_before,
+                                   Window& window) {
   std::vector<Eigen::VectorXd> before;
   for (const auto& block : window.blocks()) before.emplace_back(block->x);
   for (double share = 1.0; share > kShortestShare; share *= 0.5) {
-    take(step, share, window);
-    NormalEquations candidate = linearize(window);
-    if (candidate.cost < system.cost) {
-      system = std::move(candidate);
-      return true;
-    }
+    const bool stopped_at_bound = take(step, share, window);
+    const double cost = costOf(window);
+    if (cost < cost_before) return TakenStep{cost, share == 1.0 && !stopped_at_bound};
     for (std::size_t i = 0; i < before.size(); ++i) window.blocks()[i]->x = before[i];
   }
-  return false;
+  return std::nullopt;
 }
 
 Solution solveByChain(Window& window, const SolverLimits& limits) {
@@ -131,6 +134,9 @@ Solution solveByChain(Window& window, const SolverLimits& limits) {
   bool tested = false;  // the undamped step from here is long
   std::optional<Elimination> elimination;
   std::vector<int> held;
+  const auto lower = [&] {
+    return elimination ? lowerCost(elimination->delta(), system.cost, window) : std::nullopt;
+  };
   for (solution.iterations = 1;; ++solution.iterations) {
     held = pushedOutwards(window, system);
     elimination =
@@ -152,7 +158,13 @@ Solution solveByChain(Window& window, const SolverLimits& limits) {
     if (damping == 0.0) tested = true;
     if (is_short && damping > 0.0 && !tested) {
       damping = 0.0;  // short by the damping, or because little is left to go
-    } else if (elimination && lowerCost(elimination->delta(), window, system)) {
+    } else if (const std::optional<TakenStep> taken = lower()) {
+      const double unforeseen = taken->cost - (system.cost - 0.5 * squared_length);
+      if (damping == 0.0 && held.empty() && taken->is_whole && 2.0 * std::abs(unforeseen) < limits.short_step) {
+        solution.termination = SolverTermination::kConverged;
+        break;
+      }
+      system = linearize(window);
       tested = false;
       damping = damping > kFirstDamping ? 0.1 * damping : 0.0;
     } else if (is_short && damping > 0.0) {

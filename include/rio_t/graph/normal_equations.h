@@ -33,6 +33,8 @@ struct NormalEquations {
 /// solved for. Throws std::runtime_error if a cost function fails.
 NormalEquations linearize(std::vector<const Block*> blocks, const std::vector<const Term*>& terms);
 NormalEquations linearize(const Window& window);
+/// NormalEquations::cost of the window, without derivatives.
+double costOf(const Window& window);
 
 /// Block Cholesky factor H = L L' in the order of the blocks: L_ii and W_ij = L_ii^-1 H_ij after the blocks
 /// before i are eliminated.
