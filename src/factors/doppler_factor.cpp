@@ -8,7 +8,7 @@ namespace {
 
 /// [sigma] of a point. As near as this, an expansion to second order is as good as the points themselves: it
 /// leaves out (e / sigma)^3 / 6.
-constexpr double kNear = 0.05;
+constexpr double kNear = 0.1;
 /// Expansions until the shared error stands. With a few less, the cost depended on where the last one was,
 /// and a batch of the real bag did not converge.
 constexpr int kMaxExpansions = 20;

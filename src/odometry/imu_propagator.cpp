@@ -1,6 +1,7 @@
 #include "rio_t/odometry/imu_propagator.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "rio_t/core/so3.h"
 #include "rio_t/factors/state_block.h"
@@ -11,6 +12,9 @@ namespace {
 
 /// [s] How far back the history reaches. An older anchor is ignored.
 constexpr double kHistory = 30.0;
+/// [s] The covariance follows the state in steps of at least this. No platform turns or accelerates so much
+/// within it that the covariance would show it.
+constexpr double kCovarianceStep = 0.01;
 /// [sigma] A velocity that the IMU gained since rest and that its noise does not explain (chi-squared, 3
 /// degrees of freedom: once in 900 times).
 constexpr double kMoves = 4.0;
@@ -44,6 +48,7 @@ std::optional<NavigationState> ImuPropagator::state() const {
 void ImuPropagator::anchor(const NavigationState& state, bool at_rest) {
   if (state_ && history_.back().time - state.time > kHistory) return;
   state_ = state;
+  pending_ = {};
   rest_ = at_rest ? state_ : std::nullopt;
   const auto later = std::upper_bound(history_.begin(), history_.end(), state.time,
                                       [](Time time, const ImuMeasurement& imu) { return time < imu.time; });
@@ -67,29 +72,43 @@ void ImuPropagator::propagate(const ImuMeasurement& from, const ImuMeasurement& 
   const Eigen::Vector3d a = accel - x.b_a;
 
   const Eigen::Quaterniond half = so3::exp(0.5 * dt * omega);
-  const Eigen::Matrix3d R_mid = (x.q_WI * half).toRotationMatrix();
-  const Eigen::Vector3d a_W = R_mid * a + g_W_;
+  const Eigen::Vector3d a_W = (x.q_WI * half) * a + g_W_;
 
-  ErrorStep(dt, half.toRotationMatrix().transpose(), R_mid, a).propagate(x.covariance);
-  using S = StateBlock;
-  const auto addNoise = [&](int first, double variance) {
-    x.covariance.diagonal().segment<3>(first).array() += variance * dt;
-  };
-  const double accel_variance = noise_.accelVariance(to);
-  addNoise(S::kTheta, noise_.gyroVariance(to));
-  addNoise(S::kV, accel_variance);
-  addNoise(S::kBg, noise_.gyro_random_walk * noise_.gyro_random_walk);
-  addNoise(S::kBa, noise_.accel_random_walk * noise_.accel_random_walk);
-  // A gap is one long step: what the velocity gains on the way moves the position too.
-  addNoise(S::kP, accel_variance * dt * dt / 3.0);
-  x.covariance.block<3, 3>(S::kP, S::kV).diagonal().array() += accel_variance * dt * dt / 2.0;
-  x.covariance.block<3, 3>(S::kV, S::kP).diagonal().array() += accel_variance * dt * dt / 2.0;
+  Pending& p = pending_;
+  if (p.dt == 0.0) p.q_WI = x.q_WI;
+  p.dt += dt;
+  p.angle += dt * omega;
+  p.velocity += dt * a;
+  p.gyro_variance += dt * noise_.gyroVariance(to);
+  p.accel_variance += dt * noise_.accelVariance(to);
 
   x.p_W += dt * x.v_W + 0.5 * dt * dt * a_W;
   x.v_W += dt * a_W;
   x.q_WI = (x.q_WI * half * half).normalized();
   x.angular_velocity = to.angular_velocity - x.b_g;
   x.time = to.time;
+  if (p.dt >= kCovarianceStep) propagateCovariance();
+}
+
+void ImuPropagator::propagateCovariance() {
+  const Pending p = std::exchange(pending_, {});
+  if (p.dt == 0.0) return;
+  const Eigen::Quaterniond half = so3::exp(0.5 * p.angle);
+  StateCovariance& P = state_->covariance;
+  ErrorStep(p.dt, half.toRotationMatrix().transpose(), (p.q_WI * half).toRotationMatrix(), p.velocity / p.dt)
+      .propagate(P);
+  using S = StateBlock;
+  const auto addNoise = [&P](int first, double variance) {
+    P.diagonal().segment<3>(first).array() += variance;
+  };
+  addNoise(S::kTheta, p.gyro_variance);
+  addNoise(S::kV, p.accel_variance);
+  addNoise(S::kBg, noise_.gyro_random_walk * noise_.gyro_random_walk * p.dt);
+  addNoise(S::kBa, noise_.accel_random_walk * noise_.accel_random_walk * p.dt);
+  // What the velocity gains on the way moves the position too.
+  addNoise(S::kP, p.accel_variance * p.dt * p.dt / 3.0);
+  P.block<3, 3>(S::kP, S::kV).diagonal().array() += p.accel_variance * p.dt / 2.0;
+  P.block<3, 3>(S::kV, S::kP).diagonal().array() += p.accel_variance * p.dt / 2.0;
 }
 
 }  // namespace rio_t

@@ -134,7 +134,8 @@ DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, 
   for (std::size_t i = 0; i < points.size(); ++i) {
     const double azimuth = shows_azimuth ? azimuths[i] : by_azimuth.expected(azimuths[i]);
     const double elevation = shows_elevation ? elevations[i] : by_elevation.expected(elevations[i]);
-    const Eigen::Vector3d expected = directionOf(azimuth, elevation);
+    const bool is_measured = shows_azimuth && shows_elevation;
+    const Eigen::Vector3d expected = is_measured ? points[i].u_R : directionOf(azimuth, elevation);
     const double fixed_variance =
         noise.doppler + kMinDopplerVariance + residualVariance(Angles(expected), v_R, left);
     shown.doppler = fixed_variance;
@@ -152,7 +153,7 @@ DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, 
     const double whole = std::sqrt(variance + noise.quantization);
     points_.push_back({shorter * longer.cwiseProduct(expected), points[i].doppler, spread, fixed_variance,
                        sigma, whole, noise.outlier_density * std::sqrt(2.0 * M_PI) * whole,
-                       binProbability(0.0, sigma, half_bin_)});
+                       half_bin_ > sigma ? binProbability(0.0, sigma, half_bin_) : 0.0});
   }
 }
 

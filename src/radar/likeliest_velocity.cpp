@@ -8,8 +8,9 @@ namespace rio_t {
 namespace {
 
 constexpr int kMaxIterations = 10;
-/// The search ends at a step that promises to lower the cost by less, a hundredth of a sigma.
-constexpr double kNoProgress = 0.5e-4;
+/// A step that promises to lower the cost by less is the last one: a tenth of a sigma, over which the likelihood
+/// is quadratic.
+constexpr double kLittleProgress = 0.5e-2;
 
 VelocityCost costAt(const Eigen::Vector3d& v_R, const DopplerLikelihood& likelihood,
                     const std::optional<VelocityPrior>& prior) {
@@ -35,7 +36,11 @@ LikeliestVelocity findLikeliest(const DopplerLikelihood& likelihood,
     Eigen::Matrix3d damped = cost.information;
     damped.diagonal().array() += damping;
     const Eigen::Vector3d step = -damped.inverse() * cost.gradient;
-    if (-0.5 * step.dot(cost.gradient) < kNoProgress) break;
+    if (-0.5 * step.dot(cost.gradient) < kLittleProgress) {
+      best_R += step;
+      cost.value += step.dot(cost.gradient + 0.5 * cost.information * step);
+      break;
+    }
     const VelocityCost next = costAt(best_R + step, likelihood, prior);
     const bool is_better = next.value < cost.value;
     damping *= is_better ? 0.1 : 10.0;

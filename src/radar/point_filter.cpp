@@ -44,9 +44,9 @@ PointVerdict judgePoint(const RadarPoint& point, const EgoVelocityOptions& o) {
   if (range < o.min_range) return PointVerdict::kTooNear;
   if (range > o.max_range) return PointVerdict::kTooFar;
   if (!(point.snr_db >= o.min_snr_db)) return PointVerdict::kTooWeak;
-  const Eigen::Vector3d u = point.position_R / range;
-  if (std::abs(std::atan2(u.x(), u.y())) > o.max_azimuth) return PointVerdict::kBesideView;
-  if (std::abs(std::asin(std::clamp(u.z(), -1.0, 1.0))) > o.max_elevation) return PointVerdict::kAboveView;
+  const Eigen::Vector3d& p = point.position_R;
+  if (p.y() < std::cos(o.max_azimuth) * std::hypot(p.x(), p.y())) return PointVerdict::kBesideView;
+  if (std::abs(p.z()) > std::sin(o.max_elevation) * range) return PointVerdict::kAboveView;
   if (point.is_ambiguous) return PointVerdict::kAmbiguous;
   return PointVerdict::kKept;
 }
