@@ -41,25 +41,15 @@ Preintegration preintegrate(const ImuBuffer& buffer, Time from, Time to, const E
   Preintegration result;
   result.b_g = b_g;
   result.b_a = b_a;
+  SamplesInOne samples;
   buffer.forEachInterval(from, to, [&](double dt, const auto& gyro, const auto& accel, const auto& later) {
-    const double gyro_variance = noise.gyroVariance(later);
-    const double accel_variance = noise.accelVariance(later);
     const Eigen::Vector3d omega = gyro - b_g;
     const Eigen::Vector3d a = accel - b_a;
-    const Eigen::Quaterniond half = so3::exp(0.5 * dt * omega);
-    const Eigen::Matrix3d half_T = half.toRotationMatrix().transpose();
-    const Eigen::Matrix3d R_mid = (result.delta.dR * half).toRotationMatrix();
-
-    ErrorStep(dt, half_T, R_mid, a).propagate(result.covariance);
-    result.covariance.diagonal().segment<3>(0).array() += gyro_variance * dt;
-    // White acceleration noise over dt: position and velocity errors are correlated (double integration).
-    result.covariance.diagonal().segment<3>(3).array() += accel_variance * dt * dt * dt / 3.0;
-    result.covariance.block<3, 3>(3, 6).diagonal().array() += accel_variance * dt * dt / 2.0;
-    result.covariance.block<3, 3>(6, 3).diagonal().array() += accel_variance * dt * dt / 2.0;
-    result.covariance.diagonal().segment<3>(6).array() += accel_variance * dt;
-
+    samples.add(result.delta.dR, dt, omega, a, noise.gyroVariance(later), noise.accelVariance(later));
     result.delta.step(dt, omega, a);
+    if (samples.isWhole()) propagateCovariance(samples, result.covariance);
   });
+  propagateCovariance(samples, result.covariance);
   return result;
 }
 

@@ -1,20 +1,15 @@
 #include "rio_t/odometry/imu_propagator.h"
 
 #include <algorithm>
-#include <utility>
 
 #include "rio_t/core/so3.h"
 #include "rio_t/factors/state_block.h"
-#include "rio_t/imu/error_step.h"
 
 namespace rio_t {
 namespace {
 
 /// [s] How far back the history reaches. An older anchor is ignored.
 constexpr double kHistory = 30.0;
-/// [s] The covariance follows the state in steps of at least this. No platform turns or accelerates so much
-/// within it that the covariance would show it.
-constexpr double kCovarianceStep = 0.01;
 /// [sigma] A velocity that the IMU gained since rest and that its noise does not explain (chi-squared, 3
 /// degrees of freedom: once in 900 times).
 constexpr double kMoves = 4.0;
@@ -48,7 +43,7 @@ std::optional<NavigationState> ImuPropagator::state() const {
 void ImuPropagator::anchor(const NavigationState& state, bool at_rest) {
   if (state_ && history_.back().time - state.time > kHistory) return;
   state_ = state;
-  pending_ = {};
+  samples_ = {};
   rest_ = at_rest ? state_ : std::nullopt;
   const auto later = std::upper_bound(history_.begin(), history_.end(), state.time,
                                       [](Time time, const ImuMeasurement& imu) { return time < imu.time; });
@@ -74,41 +69,19 @@ void ImuPropagator::propagate(const ImuMeasurement& from, const ImuMeasurement& 
   const Eigen::Quaterniond half = so3::exp(0.5 * dt * omega);
   const Eigen::Vector3d a_W = (x.q_WI * half) * a + g_W_;
 
-  Pending& p = pending_;
-  if (p.dt == 0.0) p.q_WI = x.q_WI;
-  p.dt += dt;
-  p.angle += dt * omega;
-  p.velocity += dt * a;
-  p.gyro_variance += dt * noise_.gyroVariance(to);
-  p.accel_variance += dt * noise_.accelVariance(to);
-
+  samples_.add(x.q_WI, dt, omega, a, noise_.gyroVariance(to), noise_.accelVariance(to));
   x.p_W += dt * x.v_W + 0.5 * dt * dt * a_W;
   x.v_W += dt * a_W;
   x.q_WI = (x.q_WI * half * half).normalized();
   x.angular_velocity = to.angular_velocity - x.b_g;
   x.time = to.time;
-  if (p.dt >= kCovarianceStep) propagateCovariance();
-}
-
-void ImuPropagator::propagateCovariance() {
-  const Pending p = std::exchange(pending_, {});
-  if (p.dt == 0.0) return;
-  const Eigen::Quaterniond half = so3::exp(0.5 * p.angle);
-  StateCovariance& P = state_->covariance;
-  ErrorStep(p.dt, half.toRotationMatrix().transpose(), (p.q_WI * half).toRotationMatrix(), p.velocity / p.dt)
-      .propagate(P);
-  using S = StateBlock;
-  const auto addNoise = [&P](int first, double variance) {
-    P.diagonal().segment<3>(first).array() += variance;
+  if (!samples_.isWhole()) return;
+  const auto addWalk = [&x, T = samples_.dt](int first, double density) {
+    x.covariance.diagonal().segment<3>(first).array() += density * density * T;
   };
-  addNoise(S::kTheta, p.gyro_variance);
-  addNoise(S::kV, p.accel_variance);
-  addNoise(S::kBg, noise_.gyro_random_walk * noise_.gyro_random_walk * p.dt);
-  addNoise(S::kBa, noise_.accel_random_walk * noise_.accel_random_walk * p.dt);
-  // What the velocity gains on the way moves the position too.
-  addNoise(S::kP, p.accel_variance * p.dt * p.dt / 3.0);
-  P.block<3, 3>(S::kP, S::kV).diagonal().array() += p.accel_variance * p.dt / 2.0;
-  P.block<3, 3>(S::kV, S::kP).diagonal().array() += p.accel_variance * p.dt / 2.0;
+  propagateCovariance(samples_, x.covariance);
+  addWalk(StateBlock::kBg, noise_.gyro_random_walk);
+  addWalk(StateBlock::kBa, noise_.accel_random_walk);
 }
 
 }  // namespace rio_t

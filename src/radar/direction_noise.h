@@ -12,7 +12,7 @@ namespace rio_t {
 inline double square(double a) { return a * a; }
 
 inline double azimuthOf(const Eigen::Vector3d& u) { return std::atan2(u.x(), u.y()); }
-inline double elevationOf(const Eigen::Vector3d& u) { return std::atan2(u.z(), std::hypot(u.x(), u.y())); }
+inline double elevationOf(const Eigen::Vector3d& u) { return std::atan2(u.z(), u.head<2>().norm()); }
 inline std::vector<double> azimuthsOf(const std::vector<RadarDirection>& points) {
   std::vector<double> angles;
   angles.reserve(points.size());
@@ -32,7 +32,7 @@ inline Eigen::Vector3d directionOf(double azimuth, double elevation) {
 
 /// Azimuth and elevation of a unit vector, by their sines and cosines.
 struct Angles {
-  explicit Angles(const Eigen::Vector3d& u) : sin_el(u.z()), cos_el(std::hypot(u.x(), u.y())) {
+  explicit Angles(const Eigen::Vector3d& u) : sin_el(u.z()), cos_el(u.head<2>().norm()) {
     // Straight up or down has no azimuth; any will do, since its derivatives vanish there.
     sin_az = cos_el > 1e-9 ? u.x() / cos_el : 0.0;
     cos_az = cos_el > 1e-9 ? u.y() / cos_el : 1.0;

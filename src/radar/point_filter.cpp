@@ -45,7 +45,7 @@ PointVerdict judgePoint(const RadarPoint& point, const EgoVelocityOptions& o) {
   if (range > o.max_range) return PointVerdict::kTooFar;
   if (!(point.snr_db >= o.min_snr_db)) return PointVerdict::kTooWeak;
   const Eigen::Vector3d& p = point.position_R;
-  if (p.y() < std::cos(o.max_azimuth) * std::hypot(p.x(), p.y())) return PointVerdict::kBesideView;
+  if (p.y() < std::cos(o.max_azimuth) * p.head<2>().norm()) return PointVerdict::kBesideView;
   if (std::abs(p.z()) > std::sin(o.max_elevation) * range) return PointVerdict::kAboveView;
   if (point.is_ambiguous) return PointVerdict::kAmbiguous;
   return PointVerdict::kKept;

@@ -14,7 +14,8 @@ RadarScan ScanPool::filled(const RadarScan& scan, const VelocityAt& velocityAt) 
     scans_.clear();  // late, twice, or a bag that loops
   while (!scans_.empty() && scan.stamp - scans_.front().stamp > kMaxAge) scans_.pop_front();
   RadarScan result = scan;
-  const std::optional<Eigen::Vector3d> v_R = velocityAt(scan.stamp);
+  const bool is_enough = scan.points.size() >= kEnoughPoints;
+  const std::optional<Eigen::Vector3d> v_R = is_enough ? std::nullopt : velocityAt(scan.stamp);
   for (std::size_t i = scans_.size(); v_R && i-- > 0 && result.points.size() < kEnoughPoints;) {
     const std::optional<Eigen::Vector3d> before_R = velocityAt(scans_[i].stamp);
     if (!before_R) break;

@@ -1,10 +1,35 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "rio_t/core/so3.h"
 
 namespace rio_t {
+
+/// Some samples of the IMU in one: the covariance of what is integrated from them follows in steps of
+/// kCovarianceStep. No platform turns or accelerates so much within one that the covariance would show it.
+struct SamplesInOne {
+  static constexpr double kCovarianceStep = 0.01;  // [s]
+
+  double dt = 0.0;                                        ///< [s]
+  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();  ///< attitude of I at their begin
+  Eigen::Vector3d angle = Eigen::Vector3d::Zero();        ///< turned by, in I [rad]
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();     ///< gained, with gravity, in I [m/s]
+  double gyro_variance = 0.0;                             ///< of `angle`, per axis [rad^2]
+  double accel_variance = 0.0;                            ///< of `velocity`, per axis [m^2/s^2]
+
+  /// `now` is the attitude before the sample; rates without biases; squared densities of their noise.
+  void add(const Eigen::Quaterniond& now, double step, const Eigen::Vector3d& omega, const Eigen::Vector3d& a,
+           double gyro_density, double accel_density) {
+    if (dt == 0.0) q = now;
+    dt += step;
+    angle += step * omega;
+    velocity += step * a;
+    gyro_variance += step * gyro_density;
+    accel_variance += step * accel_density;
+  }
+  bool isWhole() const { return dt >= kCovarianceStep; }
+};
 
 /// How the errors of orientation (right perturbation), position and velocity, and of the biases where they
 /// are among the columns, go over one IMU step with midpoint rotation: P <- A P A', A the identity but for
@@ -18,9 +43,13 @@ struct ErrorStep {
   Eigen::Matrix3d A_vt;  ///< -dt R hat(a) Exp(-omega dt / 2)
   Eigen::Matrix3d R;     ///< at the middle of the step
 
-  ErrorStep(double dt_in, const Eigen::Matrix3d& half_T, const Eigen::Matrix3d& R_mid,
-            const Eigen::Vector3d& a)
-      : dt(dt_in), A_tt(half_T * half_T), A_vt(-dt_in * R_mid * so3::hat(a) * half_T), R(R_mid) {}
+  explicit ErrorStep(const SamplesInOne& samples) : dt(samples.dt) {
+    const Eigen::Quaterniond half = so3::exp(0.5 * samples.angle);
+    const Eigen::Matrix3d half_T = half.toRotationMatrix().transpose();
+    A_tt = half_T * half_T;
+    R = (samples.q * half).toRotationMatrix();
+    A_vt = -R * so3::hat(samples.velocity) * half_T;
+  }
 
   template <int Size>
   void propagate(Eigen::Matrix<double, Size, Size>& P) const {
@@ -45,5 +74,24 @@ struct ErrorStep {
     return result;
   }
 };
+
+/// Takes `samples` into the covariance P of the errors of ErrorStep, with the noise of the IMU, and starts
+/// anew. The caller adds that of the biases.
+template <int Size>
+void propagateCovariance(SamplesInOne& samples, Eigen::Matrix<double, Size, Size>& P) {
+  if (samples.dt == 0.0) return;
+  constexpr int kTheta = 0, kP = 3, kV = 6;
+  ErrorStep(samples).propagate(P);
+  const auto add = [&P](int row, int column, double variance) {
+    P.template block<3, 3>(row, column).diagonal().array() += variance;
+  };
+  add(kTheta, kTheta, samples.gyro_variance);
+  // White noise of the acceleration: the errors of position and velocity correlate (double integration).
+  add(kP, kP, samples.accel_variance * samples.dt * samples.dt / 3.0);
+  add(kP, kV, samples.accel_variance * samples.dt / 2.0);
+  add(kV, kP, samples.accel_variance * samples.dt / 2.0);
+  add(kV, kV, samples.accel_variance);
+  samples = {};
+}
 
 }  // namespace rio_t

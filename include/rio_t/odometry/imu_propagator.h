@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "rio_t/core/sliding_queue.h"
+#include "rio_t/imu/error_step.h"
 #include "rio_t/imu/measurement.h"
 #include "rio_t/imu/noise.h"
 #include "rio_t/odometry/navigation_state.h"
@@ -25,26 +26,17 @@ class ImuPropagator {
   void anchor(const NavigationState& state, bool at_rest = false);
   /// Sets the noise of the IMU for the samples to come.
   void setNoise(const ImuNoise& noise) { noise_ = noise; }
-  /// At the newest sample; none before the first anchor. Its covariance may be 10 ms older.
+  /// At the newest sample; none before the first anchor. Its covariance may be kCovarianceStep older.
   std::optional<NavigationState> state() const;
 
  private:
   void propagate(const ImuMeasurement& from, const ImuMeasurement& to);
-  void propagateCovariance();
 
   ImuNoise noise_;
   Eigen::Vector3d g_W_;  // read-only after construction
   SlidingQueue<ImuMeasurement> history_;
   std::optional<NavigationState> state_;
-  /// Motion since the time of the covariance.
-  struct Pending {
-    double dt = 0.0;                                          ///< [s]
-    Eigen::Quaterniond q_WI = Eigen::Quaterniond::Identity();  ///< at its begin
-    Eigen::Vector3d angle = Eigen::Vector3d::Zero();          ///< [rad]
-    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();       ///< gained, with gravity, in I [m/s]
-    double gyro_variance = 0.0;                               ///< [rad^2]
-    double accel_variance = 0.0;                              ///< [m^2/s^2]
-  } pending_;
+  SamplesInOne samples_;                 ///< since the time of the covariance
   std::optional<NavigationState> rest_;  ///< the anchor, if the platform was at rest there
 };
 

@@ -1,7 +1,9 @@
 #include "rio_t/ros/bag/run_output.h"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
+#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <initializer_list>
@@ -22,13 +24,11 @@ constexpr std::size_t kBufferSize = 1 << 18;
 constexpr double kNavigationPeriod = 0.0999;  // [s] between lines of navigation.csv
 
 void appendDigits(std::string* text, std::uint64_t value, int at_least) {
-  char digits[24];
-  int count = 0;
-  do {
-    digits[count++] = static_cast<char>('0' + value % 10);
-    value /= 10;
-  } while (value != 0 || count < at_least);
-  while (count > 0) text->push_back(digits[--count]);
+  std::array<char, 20> digits{};
+  const char* const end = std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
+  const auto count = static_cast<int>(end - digits.data());
+  if (count < at_least) text->append(static_cast<std::size_t>(at_least - count), '0');
+  text->append(digits.data(), static_cast<std::size_t>(count));
 }
 
 void appendNumber(std::string* line, double x, int decimals) {
