@@ -369,6 +369,14 @@ TEST_P(Windows, TheNormalEquationsAreThoseOfCeres) {
   }
 }
 
+TEST(Solve, ALinearWindowIsSolvedAtOnceAndIsNotLookedAtAgain) {
+  LinearWindow linear(6);
+  const Solution solution = solve(linear.window, SolverLimits());
+  EXPECT_EQ(solution.termination, SolverTermination::kConverged);
+  EXPECT_EQ(solution.iterations, 1);
+  EXPECT_LT(linearized(linear.window).elimination.squaredLength(), 1e-18);
+}
+
 TEST_P(Windows, FindsTheMinimum) {
   make(0.05);
   EXPECT_EQ(solve(window, kTight, GetParam()).termination, SolverTermination::kConverged);

@@ -114,12 +114,14 @@ TEST(Preintegration, BiasJacobiansPredictReintegration) {
   }
 }
 
-TEST(Preintegration, CovarianceIsThatOfManyNoisyRuns) {
+class PreintegrationOfARate : public testing::TestWithParam<double> {};
+
+TEST_P(PreintegrationOfARate, CovarianceIsThatOfManyNoisyRuns) {
   const SyntheticMotion motion;
   ImuNoise noise;
   noise.gyro_density = 2e-3;
   noise.accel_density = 2e-2;
-  const double rate = 100.0;
+  const double rate = GetParam();
   const ImuBuffer clean = motion.imu(0.0, 0.5, rate);
   const Preintegration expected =
       preintegrate(clean, motion.time(0.0), motion.time(0.5), motion.b_g, motion.b_a, noise);
@@ -147,6 +149,9 @@ TEST(Preintegration, CovarianceIsThatOfManyNoisyRuns) {
   const Eigen::Matrix<double, 9, 9> whitened = whitening * (sum / runs) * whitening.transpose();
   EXPECT_LT((whitened - Eigen::Matrix<double, 9, 9>::Identity()).cwiseAbs().maxCoeff(), 0.15) << whitened;
 }
+
+// [Hz] One sample a step of the covariance, and several.
+INSTANTIATE_TEST_SUITE_P(Rates, PreintegrationOfARate, testing::Values(100.0, 500.0));
 
 TEST(NoiseMeter, MeasuresTheDensityAtRestAndInMotion) {
   const SyntheticMotion motion;

@@ -108,8 +108,8 @@ bool take(const std::vector<Eigen::VectorXd>& step, double share, Window& window
 }
 
 struct TakenStep {
-  double cost;   ///< after it
-  bool is_whole; ///< neither a share of the step nor stopped at a bound
+  double cost;    ///< after it
+  bool is_whole;  ///< neither a share of the step nor stopped at a bound
 };
 
 /// Takes the step or a share of it; none where none lowers the cost.
@@ -159,8 +159,10 @@ Solution solveByChain(Window& window, const SolverLimits& limits) {
     if (is_short && damping > 0.0 && !tested) {
       damping = 0.0;  // short by the damping, or because little is left to go
     } else if (const std::optional<TakenStep> taken = lower()) {
+      // No step is left if the cost came out as the normal equations promised.
       const double unforeseen = taken->cost - (system.cost - 0.5 * squared_length);
-      if (damping == 0.0 && held.empty() && taken->is_whole && 2.0 * std::abs(unforeseen) < limits.short_step) {
+      if (damping == 0.0 && held.empty() && taken->is_whole &&
+          2.0 * std::abs(unforeseen) < limits.short_step) {
         solution.termination = SolverTermination::kConverged;
         break;
       }

@@ -24,7 +24,7 @@ struct Solution {
   int iterations = 0;
   SolverTermination termination = SolverTermination::kIterationLimit;
   bool converged() const { return isConverged(termination); }
-  NormalEquations normal_equations;  ///< at the solution
+  NormalEquations normal_equations;  ///< at the solution, or one step before it over which they hold
   Elimination elimination;           ///< of them
 };
 
@@ -33,7 +33,9 @@ struct Solution {
 ///
 /// kChain: Gauss-Newton from the current values. If a step does not lower the cost, the solver tries a half
 /// of it and less, and then Levenberg-Marquardt damping. It has converged when the undamped step is short; it
-/// still takes that step. A damped step may be short because of the damping alone, so it proves nothing.
+/// still takes that step. It has also converged when the cost after a whole undamped step is what the normal
+/// equations promised: then no long step is left. A damped step may be short because of the damping alone, so
+/// it proves nothing.
 /// kCeres: ceres::Solve on the problem that lives as long as the window. Ceres also reports convergence when
 /// its trust region made a step short. So the undamped step at its solution decides why it ended.
 Solution solve(Window& window, const SolverLimits& limits, WindowSolver solver = WindowSolver::kChain);
