@@ -126,6 +126,12 @@ std::optional<TakenStep> lowerCost(const std::vector<Eigen::VectorXd>& step, dou
   return std::nullopt;
 }
 
+/// After a whole step whose cost differs by `unforeseen` from what the normal equations promised. A
+/// difference that grows with the cube of the step leaves three times as much slope along it.
+double squaredLengthLeft(double unforeseen, double squared_length) {
+  return 9.0 * unforeseen * unforeseen / squared_length;
+}
+
 Solution solveByChain(Window& window, const SolverLimits& limits) {
   Solution solution;
   NormalEquations& system = solution.normal_equations;
@@ -159,10 +165,9 @@ Solution solveByChain(Window& window, const SolverLimits& limits) {
     if (is_short && damping > 0.0 && !tested) {
       damping = 0.0;  // short by the damping, or because little is left to go
     } else if (const std::optional<TakenStep> taken = lower()) {
-      // No step is left if the cost came out as the normal equations promised.
       const double unforeseen = taken->cost - (system.cost - 0.5 * squared_length);
       if (damping == 0.0 && held.empty() && taken->is_whole &&
-          2.0 * std::abs(unforeseen) < limits.short_step) {
+          squaredLengthLeft(unforeseen, squared_length) < limits.short_step) {
         solution.termination = SolverTermination::kConverged;
         break;
       }

@@ -33,9 +33,9 @@ struct Solution {
 ///
 /// kChain: Gauss-Newton from the current values. If a step does not lower the cost, the solver tries a half
 /// of it and less, and then Levenberg-Marquardt damping. It has converged when the undamped step is short; it
-/// still takes that step. It has also converged when the cost after a whole undamped step is what the normal
-/// equations promised: then no long step is left. A damped step may be short because of the damping alone, so
-/// it proves nothing.
+/// still takes that step. It has also converged when the cost after a whole undamped step is near enough to
+/// what the normal equations promised (docs/method.md, eq. 23c). A damped step may be short because of the
+/// damping alone, so it proves nothing.
 /// kCeres: ceres::Solve on the problem that lives as long as the window. Ceres also reports convergence when
 /// its trust region made a step short. So the undamped step at its solution decides why it ended.
 Solution solve(Window& window, const SolverLimits& limits, WindowSolver solver = WindowSolver::kChain);
