@@ -371,6 +371,11 @@ TEST_P(Windows, TheNormalEquationsAreThoseOfCeres) {
 
 TEST(Solve, ALinearWindowIsSolvedAtOnceAndIsNotLookedAtAgain) {
   LinearWindow linear(6);
+  solve(linear.window, SolverLimits());
+  linear.window.blocks().front()->x[0] += 0.2;  // less than a sigma
+  const double away = linearized(linear.window).elimination.squaredLength();
+  ASSERT_GT(away, 10.0 * SolverLimits().short_step);
+  ASSERT_LT(away, 1.0);
   const Solution solution = solve(linear.window, SolverLimits());
   EXPECT_EQ(solution.termination, SolverTermination::kConverged);
   EXPECT_EQ(solution.iterations, 1);
@@ -403,6 +408,17 @@ TEST_P(Windows, SaysTheSameOfDopplersAsTheOtherSolver) {
   ASSERT_EQ(found[0].size(), found[1].size());
   for (std::size_t i = 0; i < found[0].size(); ++i)
     EXPECT_LT((found[0][i] - found[1][i]).norm(), 1e-3) << "block " << i;
+}
+
+TEST_P(Windows, AfterConvergenceNoLongStepIsLeft) {
+  for (const bool tightly : {false, true}) {
+    for (const double t_O : {0.0, 0.03, 0.1}) {
+      make(t_O, 0.25, 0.0, false, TimeOffsetModel::kImu, tightly);
+      EXPECT_TRUE(solve(window, SolverLimits(), GetParam()).converged());
+      EXPECT_LT(linearized(window).elimination.squaredLength(), SolverLimits().short_step)
+          << "tightly " << tightly << ", " << t_O << " s";
+    }
+  }
 }
 
 TEST_P(Windows, AWrongJacobianIsNoConvergence) {

@@ -92,6 +92,8 @@ constexpr double kFirstDamping = 1e-4;
 /// graph is linear over a tenth of a sigma, and rounding changes the cost of a long run by more than the step
 /// does.
 constexpr double kSurelyRight = 1e-2;
+/// Likewise: a longer step is never the last one.
+constexpr double kLongestLastStep = 1.0;
 
 /// Moves all blocks by `share` of the step, no farther than to their bounds. Whether one was stopped there.
 bool take(const std::vector<Eigen::VectorXd>& step, double share, Window& window) {
@@ -127,8 +129,10 @@ std::optional<TakenStep> lowerCost(const std::vector<Eigen::VectorXd>& step, dou
 }
 
 /// After a whole step whose cost differs by `unforeseen` from what the normal equations promised. A
-/// difference that grows with the cube of the step leaves three times as much slope along it.
+/// difference that grows with the cube of the step leaves three times as much slope along it. A step of more
+/// than a sigma tells nothing: it may leave slope across it, too.
 double squaredLengthLeft(double unforeseen, double squared_length) {
+  if (squared_length > kLongestLastStep) return std::numeric_limits<double>::infinity();
   return 9.0 * unforeseen * unforeseen / squared_length;
 }
 
