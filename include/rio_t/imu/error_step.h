@@ -7,14 +7,14 @@
 namespace rio_t {
 
 /// Some samples of the IMU in one: the covariance of what is integrated from them follows in steps of
-/// kCovarianceStep. No platform turns or accelerates so much within one that the covariance would show it.
+/// kCovarianceStep, in which a platform hardly turns.
 struct SamplesInOne {
   static constexpr double kCovarianceStep = 0.01;  // [s]
 
   double dt = 0.0;                                        ///< [s]
   Eigen::Quaterniond q = Eigen::Quaterniond::Identity();  ///< attitude of I at their begin
   Eigen::Vector3d angle = Eigen::Vector3d::Zero();        ///< turned by, in I [rad]
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();     ///< gained, with gravity, in I [m/s]
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();     ///< integral of the specific force, in I [m/s]
   double gyro_variance = 0.0;                             ///< of `angle`, per axis [rad^2]
   double accel_variance = 0.0;                            ///< of `velocity`, per axis [m^2/s^2]
 
