@@ -243,6 +243,8 @@ TEST(EgoVelocity, RefusesSenselessOptions) {
     spoil(o);
     EXPECT_THROW(EgoVelocityEstimator{o}, std::invalid_argument);
   };
+  refused([](EgoVelocityOptions& o) { o.max_azimuth = 3.2; });
+  refused([](EgoVelocityOptions& o) { o.max_elevation = 1.6; });
   refused([](EgoVelocityOptions& o) { o.max_range = 0.1; });
   refused([](EgoVelocityOptions& o) { o.ransac_success_probability = 1.0; });
   refused([](EgoVelocityOptions& o) { o.ransac_outlier_probability = 1.0; });

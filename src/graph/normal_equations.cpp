@@ -137,7 +137,7 @@ class Linearized {
       J_.push_back(is_constant ? Rows{nullptr, rows, 0} : tangents(i, *term.blocks[i]->manifold, root));
     }
   }
-  /// The residual alone.
+  /// Without derivatives.
   double costOf(const Term& term) {
     evaluate(term, nullptr);
     return cost_;

@@ -92,7 +92,7 @@ constexpr double kFirstDamping = 1e-4;
 /// graph is linear over a tenth of a sigma, and rounding changes the cost of a long run by more than the step
 /// does.
 constexpr double kSurelyRight = 1e-2;
-/// Likewise: a longer step is never the last one.
+/// Likewise, of the longest step that may be the last one.
 constexpr double kLongestLastStep = 1.0;
 
 /// Moves all blocks by `share` of the step, no farther than to their bounds. Whether one was stopped there.

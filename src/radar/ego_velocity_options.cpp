@@ -19,8 +19,9 @@ EgoVelocityOptions validated(const EgoVelocityOptions& o) {
   require(o.min_range >= 0.0, "min_range", "at least 0 m");
   require(o.max_range > o.min_range, "max_range", "above min_range");
   require(std::isfinite(o.min_snr_db), "min_snr_db", "finite");
-  require(o.max_azimuth > 0.0, "max_azimuth", "above 0 rad");
-  require(o.max_elevation > 0.0, "max_elevation", "above 0 rad");
+  require(o.max_azimuth > 0.0 && o.max_azimuth <= M_PI, "max_azimuth", "above 0 and at most pi rad");
+  require(o.max_elevation > 0.0 && o.max_elevation <= M_PI_2, "max_elevation",
+          "above 0 and at most pi/2 rad");
   require(o.zero_velocity_threshold >= 0.0, "zero_velocity_threshold", "at least 0 m/s");
   require(o.zero_velocity_outlier_fraction >= 0.0 && o.zero_velocity_outlier_fraction < 1.0,
           "zero_velocity_outlier_fraction", "in [0, 1)");

@@ -8,8 +8,8 @@ namespace rio_t {
 namespace {
 
 constexpr int kMaxIterations = 10;
-/// A step that promises to lower the cost by less is the last one: a tenth of a sigma, over which the likelihood
-/// is quadratic.
+/// A step that promises to lower the cost by less is the last one: a tenth of a sigma, over which the
+/// likelihood is quadratic.
 constexpr double kLittleProgress = 0.5e-2;
 
 VelocityCost costAt(const Eigen::Vector3d& v_R, const DopplerLikelihood& likelihood,
