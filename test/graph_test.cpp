@@ -9,6 +9,7 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <memory>
+#include <numeric>
 
 #include "radar_smoother.h"
 #include "rio_t/factors/constant_offset_factor.h"
@@ -38,8 +39,8 @@ class VectorManifold final : public Manifold {
 
  private:
   static std::vector<int> upTo(int n) {
-    std::vector<int> columns;
-    for (int i = 0; i < n; ++i) columns.push_back(i);
+    std::vector<int> columns(static_cast<std::size_t>(n));
+    std::iota(columns.begin(), columns.end(), 0);
     return columns;
   }
 };
@@ -299,7 +300,7 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
       points.push_back({u, -u.dot(z.v_R) + error, static_cast<std::size_t>(i)});
     }
     DopplerMeasurement result;
-    static_cast<RadarScanTime&>(result) = z;
+    result.stamp = z.stamp;
     result.linear_from_t_O = 0.0;
     result.points = std::make_shared<DopplerLikelihood>(points, z.v_R, noise);
     result.shared_variances.setConstant(0.04 * 0.04);
@@ -402,7 +403,7 @@ TEST_P(Windows, SaysTheSameOfDopplersAsTheOtherSolver) {
   for (const WindowSolver solver : {GetParam(), other}) {
     make(0.03, 0.25, 0.0, false, TimeOffsetModel::kImu, true);
     EXPECT_TRUE(solve(window, {200, 1e-4}, solver).converged());
-    for (const auto& block : window.blocks()) found[solver == other].push_back(block->x);
+    for (const auto& block : window.blocks()) found[solver == other].emplace_back(block->x);
   }
   // The velocities have a sigma of 1 cm/s and more.
   ASSERT_EQ(found[0].size(), found[1].size());

@@ -329,7 +329,7 @@ std::optional<StaticInitialization> feedMotion(StaticInitializer& initializer, d
                           Eigen::Vector3d(0.0, forward(t), 9.81) + noise * draw.vector()};
     sample.gyro_mean_noise = 0.002 * 0.002 * 0.005;
     sample.accel_mean_noise = noise * noise * 0.005;
-    if (const auto result = initializer.add(sample)) return result;
+    if (auto result = initializer.add(sample)) return result;
   }
   return std::nullopt;
 }

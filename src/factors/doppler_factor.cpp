@@ -62,7 +62,10 @@ bool DopplerFactor::Evaluate(double const* const* parameters, double* residuals,
     J.topRows<3>() = U * predicted.J_state;
     J.row(3).setZero();
   }
-  if (jacobians[1] != nullptr) Eigen::Map<Eigen::Vector4d>{jacobians[1]} << U * predicted.dv_dt_O, 0.0;
+  if (jacobians[1] != nullptr) {
+    Eigen::Map<Eigen::Vector4d> J(jacobians[1]);
+    J << U * predicted.dv_dt_O, 0.0;
+  }
   if (jacobians[2] != nullptr) {
     Eigen::Map<ExtrinsicsJacobian<4>> J(jacobians[2]);
     J.topRows<3>() = U * predicted.J_extrinsics;
