@@ -194,7 +194,7 @@ void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
 }
 
 /// The configuration with which the odometry runs best on the bag.
-void chooseByTrial(const Recording& recording, const std::string& header, ProposedConfig config,
+void chooseByTrial(const Recording& recording, const std::string& header, const ProposedConfig& config,
                    BagCheck* check) {
   const double duration = recording.read < recording.length ? recording.read : 0.0;
   Trial best;

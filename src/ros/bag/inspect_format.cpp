@@ -149,7 +149,7 @@ void findPower(const CloudTopic& topic, FormatProposal* proposal) {
   if (quantile(decibels, kFew) < kDefaultMinimum) {
     proposal->keys.set("radar_min_snr_db", fixedText(std::floor(quantile(decibels, 0.02)), 1),
                        "More than a fifth of the points are below the default, 3 dB.");
-    proposal->odd.push_back("a fifth of the points have less than 3 dB, so radar_min_snr_db is lowered");
+    proposal->odd.emplace_back("a fifth of the points have less than 3 dB, so radar_min_snr_db is lowered");
   }
 }
 

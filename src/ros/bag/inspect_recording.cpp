@@ -52,7 +52,7 @@ void readMessages(rosbag::View& view, Recording* recording) {
     } else if (type == kTypes[1]) {
       if (refused.count(name) != 0) continue;
       CloudTopic& topic = topicOf(name, &recording->clouds);
-      topic.messages.push_back(rio_t::read<sensor_msgs::PointCloud2>(instance));
+      topic.messages.emplace_back(rio_t::read<sensor_msgs::PointCloud2>(instance));
       topic.times.push_back({toTime(topic.messages.back()->header.stamp), record});
       if (topic.messages.size() > 1 && isCopy(*topic.messages.back(), **std::prev(topic.messages.end(), 2)))
         ++topic.copies;

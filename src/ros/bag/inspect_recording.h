@@ -47,6 +47,6 @@ struct Recording {
 
 /// Reads the topics and the seconds of a bag that `request` asks for. Throws std::runtime_error that names
 /// the bag.
-Recording readRecording(const std::string& bag, const CheckRequest& request);
+Recording readRecording(const std::string& path, const CheckRequest& request);
 
 }  // namespace rio_t
