@@ -24,7 +24,7 @@ void listWindow(ParameterList& list, Config& c) {
                             "chain uses Gauss-Newton along the chain of states. ceres uses ceres::Solve, "
                             "which gives the same estimate and is slower. Use ceres to check chain.");
   list.integer("max_iterations", between(1, 1000), smoother.max_iterations,
-               "The solver stops after this many iterations at each scan. It usually needs two or three. The "
+               "The solver stops after this many iterations at each scan. It usually needs one or two. The "
                "diagnostics tell if it often reaches this limit.");
   list.integer("max_queued_scans", atLeast(1), c.odometry.max_queued_scans,
                "This is the largest number of scans that wait for the IMU or for the solver. If one more "
