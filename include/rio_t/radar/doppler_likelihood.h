@@ -63,7 +63,7 @@ class DopplerLikelihood {
     double sigma;            ///< of the noise at the first velocity [m/s]
     double whole_sigma;      ///< the same with the bin
     double outlier;          ///< density of outliers over that of the static world, at its largest
-    double centre;           ///< probability of the bin around no error
+    double centre;           ///< probability of the bin around no error; 0 if the noise is wider
   };
 
   std::vector<Point> points_;
