@@ -66,15 +66,15 @@ std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoo
   return (this->*original)(smoother, stamp);
 }
 
-RadarInWindow::AddResult RadarInWindow::add(FixedLagSmoother& smoother, const RadarVelocityMeasurement& z) {
-  using Add = AddResult (RadarInWindow::*)(FixedLagSmoother&, const RadarVelocityMeasurement&);
+bool RadarInWindow::add(FixedLagSmoother& smoother, const RadarVelocityMeasurement& z) {
+  using Add = bool (RadarInWindow::*)(FixedLagSmoother&, const RadarVelocityMeasurement&);
   static const auto original = libraryFunction<Add>(&RadarInWindow::add);
   const Scope scope(Stage::kFactors);
   return (this->*original)(smoother, z);
 }
 
-RadarInWindow::AddResult RadarInWindow::add(FixedLagSmoother& smoother, const DopplerMeasurement& z) {
-  using Add = AddResult (RadarInWindow::*)(FixedLagSmoother&, const DopplerMeasurement&);
+bool RadarInWindow::add(FixedLagSmoother& smoother, const DopplerMeasurement& z) {
+  using Add = bool (RadarInWindow::*)(FixedLagSmoother&, const DopplerMeasurement&);
   static const auto original = libraryFunction<Add>(&RadarInWindow::add);
   const Scope scope(Stage::kFactors);
   return (this->*original)(smoother, z);

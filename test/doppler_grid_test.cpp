@@ -220,10 +220,11 @@ TEST(DopplerGrid, SameScansSameAnswer) {
   }
 }
 
-// A walk at up to 2.4 m/s before a radar of +-1.5 m/s. The driver marks a point without Doppler.
-TEST(DopplerSpan, IsFoundBesideAMarkOfTheDriver) {
-  constexpr double kStep = 0.125;
-  constexpr double kSpan = 3.0;
+constexpr double kStep = 0.125;
+constexpr double kSpan = 3.0;
+
+/// A walk at up to 2.4 m/s before a radar of +-1.5 m/s. The driver marks a point without Doppler.
+DopplerSpan spanOfWalk() {
   Random random(1);
   DopplerSpan span(0.0);
   for (const double speed : {0.5, 1.0, 1.4, 1.8, 2.1, 2.4, 2.4, 2.4}) {
@@ -237,7 +238,18 @@ TEST(DopplerSpan, IsFoundBesideAMarkOfTheDriver) {
     }
     span.learn(points, v_R, kStep);
   }
+  return span;
+}
+
+TEST(DopplerSpan, IsFoundBesideAMarkOfTheDriver) { EXPECT_NEAR(spanOfWalk().value(), kSpan, 0.5 * kStep); }
+
+TEST(DopplerSpan, OneWildDopplerDoesNotEndIt) {
+  DopplerSpan span = spanOfWalk();
+  span.learn({{Eigen::Vector3d::UnitY(), 60.0}}, Eigen::Vector3d(0.0, 1.0, 0.0), kStep);
   EXPECT_NEAR(span.value(), kSpan, 0.5 * kStep);
+  span.learn(std::vector<RadarDirection>(20, {Eigen::Vector3d::UnitY(), 2.5}),
+             Eigen::Vector3d(0.0, -2.5, 0.0), kStep);
+  EXPECT_EQ(span.value(), 0.0) << "many show that it was wrong";
 }
 
 }  // namespace

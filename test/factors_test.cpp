@@ -187,6 +187,23 @@ TEST(ConstantAccelerationRadarFactor, JacobiansAreCorrect) {
   expectJacobiansCorrect(factor, {values(moved(motion.state(1.0), 0.1)), {0.04}, storedMounting()});
 }
 
+TEST(ConstantAccelerationRadarFactor, SaysTheSameWithAndWithoutJacobians) {
+  const SyntheticMotion motion;
+  const ImuBuffer imu = motion.imu(0.5, 1.6, 400.0);
+  RadarVelocityMeasurement z = measurement(motion.time(1.0));
+  z.offset_half_width = 0.4;
+  const RadarVelocityFactor factor(z, motion.time(1.0), constantAcceleration(imu));
+  const StateBlock x = moved(motion.state(1.0), 0.1);
+  const double t_O = 0.1;
+  const double* blocks[] = {x.data(), &t_O, storedMounting().data()};
+  Eigen::Vector3d alone, r;
+  StateJacobian<3> J;
+  double* jacobians[] = {J.data(), nullptr, nullptr};
+  factor.Evaluate(blocks, alone.data(), nullptr);
+  factor.Evaluate(blocks, r.data(), jacobians);
+  EXPECT_LT((alone - r).norm(), 1e-12);
+}
+
 TEST(ConstantAccelerationRadarFactor, AtRestTheCorrectedAccelerationIsZero) {
   // The sign of gravity: a level accelerometer at rest reads +g, so the offset must not matter.
   RadarVelocityMeasurement z = measurement(Time::fromSeconds(1.0));

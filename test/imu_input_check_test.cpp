@@ -49,8 +49,8 @@ class Gate : public ::testing::Test {
 TEST_F(Gate, GoodSamplesPassUnchanged) {
   EXPECT_EQ(feed(1.0), "");
   EXPECT_EQ(decision, Decision::kTake);
-  EXPECT_EQ(sample.gyro_doubt, 0.0);
-  EXPECT_EQ(sample.accel_doubt, 0.0);
+  EXPECT_EQ(sample.unseen_gyro_variance, 0.0);
+  EXPECT_EQ(sample.unseen_accel_variance, 0.0);
 }
 
 TEST_F(Gate, SamplesOutOfPlaceAreDroppedAndTheOthersGoOn) {
@@ -78,7 +78,7 @@ TEST_F(Gate, StampsThatRunElsewhereMakeAJumpOnlyAfterAWhile) {
     }
     EXPECT_EQ(feed(t), "imu_clock_restart");
     EXPECT_EQ(decision, Decision::kRestart);
-    EXPECT_EQ(sample.gyro_doubt, 0.0);
+    EXPECT_EQ(sample.unseen_gyro_variance, 0.0);
     EXPECT_EQ(feed(t + 0.01), "");
     EXPECT_EQ(decision, Decision::kTake);
     t += 0.02;
@@ -89,7 +89,7 @@ TEST_F(Gate, AShortGlitchOfTheStampsIsAGap) {
   for (double glitch = 0.0; glitch < 0.3; glitch += 0.01) EXPECT_EQ(feed(101.0 + glitch), "imu_stamp_jump");
   EXPECT_EQ(feed(1.3), "imu_gap");
   EXPECT_EQ(decision, Decision::kTake);
-  EXPECT_GT(sample.gyro_doubt, 0.0);
+  EXPECT_GT(sample.unseen_gyro_variance, 0.0);
 }
 
 // A sample ahead that ended a gap would put all samples that follow behind it, until the clock seems to jump.
@@ -126,16 +126,16 @@ TEST_F(Gate, NoGapIsBridgedThatIsLongerThanTheLongest) {
   }
 }
 
-TEST_F(Gate, DoubtGrowsWithTheGap) {
+TEST_F(Gate, UnseenMotionGrowsWithTheGap) {
   EXPECT_EQ(feed(1.05), "imu_gap");
-  const double small = sample.accel_doubt;
+  const double small = sample.unseen_accel_variance;
   EXPECT_GT(small, 0.0);
   EXPECT_EQ(feed(1.99), "imu_stamp_jump");  // it may stand alone
   EXPECT_EQ(feed(2.0), "imu_gap");
-  EXPECT_NEAR(sample.accel_doubt,
+  EXPECT_NEAR(sample.unseen_accel_variance,
               ImuInputCheckOptions().unseen_accel_density * ImuInputCheckOptions().unseen_accel_density,
               1e-12);
-  EXPECT_LT(small, 0.1 * sample.accel_doubt);
+  EXPECT_LT(small, 0.1 * sample.unseen_accel_variance);
 }
 
 TEST_F(Gate, OverAShortGapTheBridgeIsAlmostStraight) {
@@ -148,7 +148,7 @@ TEST_F(Gate, OverAShortGapTheBridgeIsAlmostStraight) {
     const double share = 0.2 * static_cast<double>(i + 1);
     EXPECT_NEAR(bridge[i].time - before.time, 0.1 * share, 1e-9);
     EXPECT_TRUE(bridge[i].is_bridge);
-    EXPECT_EQ(bridge[i].gyro_doubt, sample.gyro_doubt);
+    EXPECT_EQ(bridge[i].unseen_gyro_variance, sample.unseen_gyro_variance);
     const Eigen::Vector3d turn = sample.angular_velocity - before.angular_velocity;
     // 1 - 1 / cosh(T / (2 tau)), in the middle
     EXPECT_LT((bridge[i].angular_velocity - before.angular_velocity - share * turn).norm(),
@@ -271,15 +271,15 @@ TEST(Saturation, AToldRangeHolds) {
   for (int i = 0; i < 8; ++i) EXPECT_FALSE(detector.check(imu).accel) << "flat, but not at the range";
 }
 
-TEST(Preintegration, DoubtOfAnIntervalWidensWhatCrossesIt) {
+TEST(Preintegration, UnseenMotionInAnIntervalWidensWhatCrossesIt) {
   const SyntheticMotion motion;
-  const auto covariance = [&](double gyro_doubt, double accel_doubt) {
+  const auto covariance = [&](double unseen_gyro_variance, double unseen_accel_variance) {
     ImuBuffer buffer;
     for (int i = 0; i <= 20; ++i) {
       ImuMeasurement imu = motion.imuSample(0.01 * i);
       if (i == 10) {
-        imu.gyro_doubt = gyro_doubt;
-        imu.accel_doubt = accel_doubt;
+        imu.unseen_gyro_variance = unseen_gyro_variance;
+        imu.unseen_accel_variance = unseen_accel_variance;
       }
       buffer.add(imu);
     }
@@ -303,7 +303,7 @@ TEST_F(Gate, AStuckGyroAxisIsReplaced) {
     EXPECT_NE(feed(stuck).find("imu_stuck"), std::string::npos) << s;
     EXPECT_LT(sample.angular_velocity.y(), 2.0);
     EXPECT_EQ(sample.angular_velocity.x(), stuck.angular_velocity.x());
-    EXPECT_GT(sample.gyro_doubt, 0.1);
+    EXPECT_GT(sample.unseen_gyro_variance, 0.1);
   }
   feed(1.3);
   EXPECT_EQ(sample.angular_velocity, motion.imuSample(1.3).angular_velocity);

@@ -28,14 +28,13 @@ EgoVelocity supportedBy(std::size_t agreeing) {
 
 class Gate : public ::testing::Test {
  protected:
-  Gate() : gate(SmootherOptions()), last_used(at(0.0)) {}
   static Time at(double seconds) { return Time::fromSeconds(100.0 + seconds); }
   bool rejects(double seconds, double speed, std::size_t agreeing, bool tilt_is_known = true) {
-    return gate.rejects(innovation(at(seconds), speed), isUnanimous(supportedBy(agreeing)), tilt_is_known,
+    return gate.rejects({}, innovation(at(seconds), speed), isUnanimous(supportedBy(agreeing)), tilt_is_known,
                         last_used);
   }
   InnovationGate gate;
-  Time last_used;
+  Time last_used = at(0.0);
 };
 
 // 0.1 m/s each of prior, measurement and model, four sigmas: 0.69 m/s.

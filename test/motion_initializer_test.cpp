@@ -59,8 +59,8 @@ struct Rig {
   }
 
   /// Feeds everything in the order of the stamps from `begin` seconds on, until the state is found.
-  std::optional<MotionInitialization> run(MotionInitializer& initializer, double begin = 0.0,
-                                          const PoseAnchor& anchor = PoseAnchor()) {
+  std::optional<Initialization> run(MotionInitializer& initializer, double begin = 0.0,
+                                    const PoseAnchor& anchor = PoseAnchor()) {
     EgoVelocityEstimator estimator(options.ego_velocity);
     auto next = data.scans.begin();
     for (const ImuMeasurement& sample : data.imu.samples) {
@@ -76,14 +76,14 @@ struct Rig {
   }
 
   /// Angle between the true and the estimated direction of gravity, in I [rad].
-  double tiltError(const MotionInitialization& found) const {
+  double tiltError(const Initialization& found) const {
     const simulation::MotionState truth = motion.at(found.time - setup.start);
     const Eigen::Vector3d up_true = (truth.q_WI * q_BI).conjugate() * Eigen::Vector3d::UnitZ();
     const Eigen::Vector3d up = found.prior.x0.q_WI().conjugate() * Eigen::Vector3d::UnitZ();
     return std::atan2(up.cross(up_true).norm(), up.dot(up_true));
   }
   /// Error of the velocity in I [m/s].
-  double velocityError(const MotionInitialization& found) const {
+  double velocityError(const Initialization& found) const {
     const simulation::MotionState truth = motion.at(found.time - setup.start);
     const StateBlock& x = found.prior.x0;
     return ((truth.q_WI * q_BI).conjugate() * truth.v_W - x.q_WI().conjugate() * x.v_W()).norm();
@@ -155,8 +155,8 @@ TEST(MotionInitializer, KeepsHeadingAndPositionOfTheAnchor) {
   PoseAnchor anchor;
   anchor.q_WI = so3::exp({0.0, 0.0, 1.2}) * rig.motion.at(2.0).q_WI * so3::exp({0.3, -0.2, 0.0});
   anchor.p_W = Eigen::Vector3d(10.0, -3.0, 2.0);
-  anchor.sigma_yaw = 0.2;
-  anchor.sigma_position = 0.7;
+  rig.options.smoother.prior_sigma_yaw = 0.2;
+  rig.options.smoother.prior_sigma_position = 0.7;
   MotionInitializer initializer(rig.options);
   const auto found = rig.run(initializer, 0.0, anchor);
   ASSERT_TRUE(found) << initializer.waitingFor();

@@ -19,7 +19,7 @@ struct RadarSmoother {
         radar(options, T_IR, g_W, imu, offset) {}
 
   void initialize(Time time, const NodePrior& prior) { radar.start(states, time, prior); }
-  RadarInWindow::AddResult add(const RadarVelocityMeasurement& z) { return radar.add(states, z); }
+  bool add(const RadarVelocityMeasurement& z) { return radar.add(states, z); }
   void addRest(Time stamp, double sigma) {
     states.addZeroVelocity(*states.nodeAt(radar.nodeTime(stamp)), sigma);
   }

@@ -109,6 +109,19 @@ TEST(TwoRadars, WithOneClockShareTheOffset) {
   EXPECT_LT(run.last(0).time_offset_sigma, 0.85 * apart.last(0).time_offset_sigma);
 }
 
+TEST(TwoRadars, AStepOfTheirClockIsOneStep) {
+  SimulatedRun run = pair("difficult", 1, 60.0);
+  for (auto& [name, radar] : run.setup.radars) {
+    radar.time_offset.constant = 0.03;
+    radar.time_offset.steps = {{35.0, 0.1}};
+  }
+  run.options.smoother.time_offset_shared = true;
+  run.run();
+  EXPECT_EQ(run.odometry->faults()["time_offset_step"], 1U);
+  for (const std::size_t radar : {0, 1})
+    EXPECT_LT(std::abs(run.last(radar).time_offset - 0.13), 2.6 * run.last(radar).time_offset_sigma) << radar;
+}
+
 /// What one radar does for 10 s must not pull down the other.
 TEST(TwoRadars, OneThatFailsDoesNotPullDownTheOther) {
   for (const std::uint64_t seed : {1, 2, 3}) {

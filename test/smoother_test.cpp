@@ -107,10 +107,8 @@ TEST_F(Smoother, APositionThatIsHardlyKnownStopsNothing) {
 TEST_F(Smoother, ALateScanIsInsertedAtItsTime) {
   SmootherOptions options;
   RadarSmoother in_order = make(options), late = make(options);
-  for (const double stamp : {0.7, 0.8, 0.9, 1.0})
-    EXPECT_EQ(in_order.add(measurement(stamp, 0.0)), RadarInWindow::AddResult::kAdded);
-  for (const double stamp : {0.7, 0.9, 1.0, 0.8})
-    EXPECT_EQ(late.add(measurement(stamp, 0.0)), RadarInWindow::AddResult::kAdded);
+  for (const double stamp : {0.7, 0.8, 0.9, 1.0}) EXPECT_TRUE(in_order.add(measurement(stamp, 0.0)));
+  for (const double stamp : {0.7, 0.9, 1.0, 0.8}) EXPECT_TRUE(late.add(measurement(stamp, 0.0)));
   for (int i = 0; i < 3; ++i) {
     in_order.optimize();
     late.optimize();
@@ -120,8 +118,7 @@ TEST_F(Smoother, ALateScanIsInsertedAtItsTime) {
     EXPECT_EQ(late.node(k).time, in_order.node(k).time);
     EXPECT_LT(boxminus(late.node(k).x.data(), in_order.node(k).x.data()).norm(), 1e-6);
   }
-  EXPECT_EQ(late.add(measurement(0.3, 0.0)), RadarInWindow::AddResult::kOlderThanWindow);
-  EXPECT_EQ(late.add(measurement(0.9, 0.0)), RadarInWindow::AddResult::kDuplicateStamp);
+  EXPECT_FALSE(late.add(measurement(0.3, 0.0)));
 }
 
 /// Two radars may run at the same time. An IMU factor over almost no time costs the position its digits.
@@ -202,7 +199,7 @@ TEST_F(Smoother, AStepOfTheOffsetSurvivesANodeThatIsInsertedBeforeIt) {
   options.window = 2.0;
   RadarSmoother smoother = make(options);
   const auto use = [&](double stamp, double t_O) {
-    EXPECT_EQ(smoother.add(measurement(stamp, t_O)), RadarInWindow::AddResult::kAdded) << stamp;
+    EXPECT_TRUE(smoother.add(measurement(stamp, t_O))) << stamp;
     smoother.optimize();
   };
   for (double stamp = 0.7; stamp < 2.0; stamp += 0.1) use(stamp, 0.0);
@@ -233,7 +230,7 @@ TEST_F(Smoother, TwoStepsOfTheOffsetWithinAWindowKeepTheirOwn) {
   RadarSmoother smoother = make(options);
   const auto use = [&](double from, double to, double t_O) {
     for (double stamp = from; stamp < to; stamp += 0.1) {
-      EXPECT_EQ(smoother.add(measurement(stamp, t_O)), RadarInWindow::AddResult::kAdded) << stamp;
+      EXPECT_TRUE(smoother.add(measurement(stamp, t_O))) << stamp;
       smoother.optimize();
       smoother.marginalize();
     }

@@ -240,6 +240,22 @@ TEST(TemporalCalibration, AStepIsFoundAtAnyRate) {
   }
 }
 
+// The scans from before the step must not hide it, nor may the noise pass for what they contradict.
+TEST(TemporalCalibration, AStepIsFoundUnderVibration) {
+  for (const std::uint64_t seed : {3, 4}) {
+    SimulatedRun run("difficult", seed, 55.0, kStart);
+    run.setup.radar.rate = 25.0;
+    run.setup.imu.rate = 200.0;
+    run.setup.imu.accel_vibration = 0.3;
+    run.setup.time_offset.constant = 0.02;
+    run.setup.time_offset.steps = {{45.0, 0.1}};
+    run.run();
+    EXPECT_LE(run.odometry->faults()["time_offset_step"], 2u) << seed;
+    EXPECT_EQ(run.odometry->faults()["diverged"], 0u) << seed;
+    EXPECT_LT(std::abs(offsetAt(run, 48.0).error), 5.0e-3) << seed;
+  }
+}
+
 TEST(TemporalCalibration, TheBatchSaysTheSameOfTheOffset) {
   SimulatedRun run("difficult", 1, 40.0, kStart);
   run.setup.time_offset.constant = 0.1;

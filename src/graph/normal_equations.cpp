@@ -182,19 +182,18 @@ void addTo(NormalEquations& system, const Term& term, const std::unordered_map<c
            Linearized& linear) {
   linear.evaluate(term);
   system.cost += linear.cost();
-  const auto indexOf = [&](const Block* block) {
+  std::vector<int> indices;  // -1: not solved for
+  for (const Block* block : term.blocks) {
     const auto found = index.find(block);
-    return found == index.end() || block->is_constant ? -1 : found->second;
-  };
-  for (std::size_t a = 0; a < term.blocks.size(); ++a) {
-    const int i = indexOf(term.blocks[a]);
+    indices.push_back(found == index.end() || block->is_constant ? -1 : found->second);
+  }
+  for (std::size_t a = 0; a < indices.size(); ++a) {
+    const int i = indices[a];
     if (i < 0) continue;
     addSquare(linear.J(a), 1.0, system.diagonal[i]);
     addProduct(linear.J(a), linear.r(), 1.0, system.gradient[i]);
-    for (std::size_t b = 0; b < term.blocks.size(); ++b) {
-      const int j = indexOf(term.blocks[b]);
-      if (j > i) addProduct(linear.J(a), linear.J(b), 1.0, system.coupling[i][j]);
-    }
+    for (std::size_t b = 0; b < indices.size(); ++b)
+      if (indices[b] > i) addProduct(linear.J(a), linear.J(b), 1.0, system.coupling[i][indices[b]]);
   }
 }
 
@@ -268,8 +267,13 @@ bool Elimination::factorise(const NormalEquations& system, double raise) {
     }
     for (auto a = W_[i].begin(); a != W_[i].end(); ++a) {
       addSquare(rowsOf(a->second), -1.0, L_[a->first]);
-      for (auto b = std::next(a); b != W_[i].end(); ++b)
-        addProduct(rowsOf(a->second), rowsOf(b->second), -1.0, W_[a->first][b->first]);
+      auto& row = W_[a->first];
+      auto to = row.begin();
+      for (auto b = std::next(a); b != W_[i].end(); ++b, ++to) {
+        while (to != row.end() && to->first < b->first) ++to;
+        to = row.try_emplace(to, b->first);
+        addProduct(rowsOf(a->second), rowsOf(b->second), -1.0, to->second);
+      }
     }
   }
   squared_length_ = 0.0;

@@ -23,21 +23,13 @@ std::size_t ImuBuffer::firstAfter(Time time) const {
 
 ImuMeasurement ImuBuffer::at(Time time) const {
   const std::size_t after = firstAfter(time);
-  ImuMeasurement result;
-  if (after == 0 || after == samples_.size()) {
-    result = after == 0 ? samples_.front() : samples_.back();
-  } else {
+  ImuMeasurement result = after == samples_.size() ? samples_.back() : samples_[after];
+  if (after > 0 && after < samples_.size()) {  // the later sample carries the noise of the interval
     const ImuMeasurement& a = samples_[after - 1];
     const ImuMeasurement& b = samples_[after];
     const double share = (time - a.time) / (b.time - a.time);
     result.angular_velocity = a.angular_velocity + share * (b.angular_velocity - a.angular_velocity);
     result.acceleration = a.acceleration + share * (b.acceleration - a.acceleration);
-    result.gyro_doubt = b.gyro_doubt;
-    result.accel_doubt = b.accel_doubt;
-    result.gyro_noise = b.gyro_noise;
-    result.accel_noise = b.accel_noise;
-    result.gyro_mean_noise = b.gyro_mean_noise;
-    result.accel_mean_noise = b.accel_mean_noise;
     result.is_bridge = a.is_bridge || b.is_bridge;
   }
   result.time = time;
@@ -68,8 +60,9 @@ ImuMean ImuBuffer::mean(Time time, double half_width) const {
       result.acceleration += weight * accel;
       weights += weight;
       squared_weights += weight * weight / dt;
-      result.gyro_variance = std::max(result.gyro_variance, later.gyro_noise + later.gyro_doubt);
-      result.accel_variance = std::max(result.accel_variance, later.accel_noise + later.accel_doubt);
+      result.gyro_variance = std::max(result.gyro_variance, later.gyro_noise + later.unseen_gyro_variance);
+      result.accel_variance =
+          std::max(result.accel_variance, later.accel_noise + later.unseen_accel_variance);
     });
     return sums;
   };

@@ -4,6 +4,11 @@
 #include <cmath>
 
 namespace rio_t {
+namespace {
+
+void raise(double& variance, double density) { variance = std::max(variance, density * density); }
+
+}  // namespace
 
 ImuInputCheck::ImuInputCheck(double max_gap, const ImuInputCheckOptions& options)
     : max_gap_(max_gap),
@@ -36,19 +41,21 @@ ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
   newest_ = imu.time;
   if (gap > max_gap_) {
     verdict.faults.push_back("imu_gap");
-    doubtGyro(imu, std::min(1.0, gap / kMotionCorrelationTime));
-    doubtAccel(imu, std::min(1.0, gap / kMotionCorrelationTime));
+    const double share = std::min(1.0, gap / kMotionCorrelationTime);
+    raise(imu.unseen_gyro_variance, share * options_.unseen_gyro_density);
+    raise(imu.unseen_accel_variance, share * options_.unseen_accel_density);
   }
   // The interval before and the one after a saturated sample both hide something.
   const SaturationDetector::Saturated saturated = saturation_.check(imu);
   if (saturated.accel || saturated.gyro) verdict.faults.push_back("imu_saturated");
-  if (saturated.gyro || was_saturated_.gyro) doubtGyro(imu, 1.0);
-  if (saturated.accel || was_saturated_.accel) doubtAccel(imu, 1.0);
+  if (saturated.gyro || was_saturated_.gyro) raise(imu.unseen_gyro_variance, options_.unseen_gyro_density);
+  if (saturated.accel || was_saturated_.accel)
+    raise(imu.unseen_accel_variance, options_.unseen_accel_density);
   was_saturated_ = saturated;
   const bool is_stuck = replaceStuck(imu);
   if (is_stuck) {
     verdict.faults.push_back("imu_stuck");
-    doubtGyro(imu, 1.0);
+    raise(imu.unseen_gyro_variance, options_.unseen_gyro_density);
   }
   if (saturated.accel || saturated.gyro || is_stuck) {
     accel_noise_.interrupt();
@@ -80,16 +87,6 @@ bool ImuInputCheck::replaceStuck(ImuMeasurement& imu) {
     is_stuck = true;
   }
   return is_stuck;
-}
-
-void ImuInputCheck::doubtGyro(ImuMeasurement& imu, double share) const {
-  const double density = share * options_.unseen_gyro_density;
-  imu.gyro_doubt = std::max(imu.gyro_doubt, density * density);
-}
-
-void ImuInputCheck::doubtAccel(ImuMeasurement& imu, double share) const {
-  const double density = share * options_.unseen_accel_density;
-  imu.accel_doubt = std::max(imu.accel_doubt, density * density);
 }
 
 }  // namespace rio_t

@@ -94,8 +94,11 @@ LandmarkMap::Association LandmarkMap::associate(const Prediction& prediction, co
   std::vector<Pair> pairs;
   std::vector<bool> is_free(detections.size(), true);
   std::vector<PolarNoise> noises;
-  noises.reserve(detections.size());
-  for (const Detection& detection : detections) noises.emplace_back(detection.z);
+  std::vector<double> spreads;  // [m^2] trace of the covariance
+  for (const Detection& detection : detections) {
+    noises.emplace_back(detection.z);
+    spreads.push_back(noises.back().covariance().trace());
+  }
   std::vector<double> nearest(landmarks_.size(), std::numeric_limits<double>::infinity());
   for (std::size_t column = 0; column < prediction.landmarks.size(); ++column) {
     const Landmark& landmark = landmarks_[prediction.landmarks[column]];
@@ -120,8 +123,7 @@ LandmarkMap::Association LandmarkMap::associate(const Prediction& prediction, co
     for (std::size_t i = 0; i < detections.size(); ++i) {
       const Detection& detection = detections[i];
       const double away = (detection.z.position_R - seen.p_R).squaredNorm();
-      const Eigen::Matrix3d noise = noises[i].covariance();
-      if (away > kElsewhere * (predicted.trace() + noise.trace())) continue;
+      if (away > kElsewhere * (predicted.trace() + spreads[i])) continue;
       const PolarResidual residual = noises[i].at(seen.p_R);
       Eigen::Matrix3d S = residual.J * predicted * residual.J.transpose();
       S.diagonal().array() += 1.0;
@@ -250,8 +252,8 @@ void LandmarkMap::dropUseless(const Eigen::Vector3d& p_W) {
   }
 }
 
-void LandmarkMap::makeRoom(Time now, std::size_t wanted) {
-  while (landmarks_.size() + wanted > options_.max_landmarks && !landmarks_.empty()) {
+void LandmarkMap::makeRoom(Time now) {
+  while (landmarks_.size() >= options_.max_landmarks && !landmarks_.empty()) {
     const auto oldest =
         std::min_element(landmarks_.begin(), landmarks_.end(),
                          [](const auto& a, const auto& b) { return a.last_seen < b.last_seen; });
@@ -263,7 +265,7 @@ void LandmarkMap::makeRoom(Time now, std::size_t wanted) {
 void LandmarkMap::promote(FixedLagSmoother& smoother, Time now) {
   std::vector<Eigen::Vector3d> landmarks_W;
   for (const Landmark& landmark : landmarks_) landmarks_W.push_back(landmark.p_W());
-  makeRoom(now, 1);
+  makeRoom(now);
   if (landmarks_.size() >= options_.max_landmarks) return;
   const std::vector<Candidate> proven =
       candidates_.takeProven(landmarks_W, options_.max_landmarks - landmarks_.size());

@@ -8,7 +8,6 @@
 #include "rio_t/factors/imu_factor.h"
 #include "rio_t/imu/rest_detector.h"
 #include "rio_t/odometry/imu_propagator.h"
-#include "rio_t/sensors/innovation.h"
 
 namespace rio_t {
 namespace {
@@ -54,17 +53,10 @@ void BatchOdometry::addResult(ScanResult result) {
 
 BatchResult BatchOdometry::solve(const RadarInertialOdometry::Start& start) const {
   const BatchSmoother smoother(options_.smoother, batch_, imuNoise(), g_W_, imu_);
-  Run run = makeRun(start);
+  const Run run = makeRun(start);
   if (run.problem.scans.empty()) throw std::runtime_error("batch: the online run used no scan");
   BatchResult batch;
   batch.solution = smoother.solve(run.problem);
-  batch.readmitted = readmit(smoother, batch.solution, run);
-  if (batch.readmitted > 0) {
-    const int iterations = batch.solution.iterations;
-    run.problem.guess = batch.solution.nodes;
-    batch.solution = smoother.solve(run.problem);
-    batch.solution.iterations += iterations;
-  }
   batch.trajectory = trajectory(batch.solution);
   batch.scans = results(run, batch.solution);
   return batch;
@@ -134,59 +126,6 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
     run.source.push_back(i);
   }
   return run;
-}
-
-std::size_t BatchOdometry::readmit(const BatchSmoother& smoother, const BatchSolution& solution,
-                                   Run& run) const {
-  BatchProblem& problem = run.problem;
-  for (std::size_t j = 0; j < problem.scans.size(); ++j) problem.scans[j].t_O = solution.scans[j].t_O;
-
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < scans_.size(); ++i) {
-    const ScanResult& result = scans_[i];
-    if (result.rejected_because != "innovation") continue;
-    if (!isValid(result.ego_velocity.status)) continue;
-    const RadarVelocityMeasurement z = measurement(result);
-    const BatchSolution::Scan* near = acceptedBy(smoother, run, solution, result.scan.radar, z);
-    if (near == nullptr) continue;
-    ++count;
-    const auto known = std::find(run.source.begin(), run.source.end(), i);  // at rest it is in the graph
-    if (known != run.source.end()) {
-      setMeasurement(result, problem.scans[static_cast<std::size_t>(known - run.source.begin())]);
-      continue;
-    }
-    BatchScan scan;
-    scan.stamp = z.stamp;
-    scan.radar = result.scan.radar;
-    scan.t_O = near->t_O;
-    setMeasurement(result, scan);
-    problem.scans.push_back(scan);
-    run.source.push_back(i);
-  }
-  return count;
-}
-
-const BatchSolution::Scan* BatchOdometry::acceptedBy(const BatchSmoother& smoother, const Run& run,
-                                                     const BatchSolution& solution, std::size_t radar,
-                                                     const RadarVelocityMeasurement& z) const {
-  const BatchSolution::Scan* nearest = nullptr;
-  double least = 0.0;
-  for (std::size_t j = 0; j < solution.scans.size(); ++j) {
-    const BatchScan& scan = run.problem.scans[j];
-    if (scan.radar != radar) continue;
-    const double apart = std::abs(scan.stamp - z.stamp);
-    if (nearest != nullptr && apart >= least) continue;
-    nearest = &solution.scans[j];
-    least = apart;
-  }
-  if (nearest == nullptr) return nullptr;
-  const auto residual = smoother.residual(solution, *nearest, radar, z);
-  const double gate = options_.smoother.innovation_gate;
-  Innovation innovation;
-  innovation.d = residual.value;
-  innovation.S = residual.prediction_covariance + z.covariance;
-  const double squared = innovation.widened(options_.smoother.innovation_model_error).squaredSigmas();
-  return squared > gate * gate ? nullptr : nearest;
 }
 
 std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solution) const {

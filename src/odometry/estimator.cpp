@@ -28,7 +28,8 @@ std::vector<RadarChannel> radarChannels(const OdometryOptions& options, const Ei
       options.smoother.time_offset_shared ? std::make_shared<OffsetBlocks>(options.smoother) : nullptr;
   std::vector<RadarChannel> channels;
   for (std::size_t k = 0; k < options.radarCount(); ++k) {
-    const OdometryOptions own = optionsOfRadar(options, k);
+    OdometryOptions own = optionsOfRadar(options, k);
+    own.offset_step_detector.max_change = 2.0 * own.smoother.max_time_offset;
     const RadarChannelOptions channel{own.T_IR, own.ego_velocity, own.feasibility, own.offset_step_detector,
                                       own.smoother};
     channels.emplace_back(channel, g_W, imu, shared);
@@ -57,7 +58,6 @@ Estimator::Estimator(const OdometryOptions& options, Navigation& navigation, Fau
       navigation_(navigation),
       faults_(faults),
       initializer_(options),
-      recovery_(motionInitializers(options)),
       smoother_(options.smoother, options.imu_noise, g_W_, imu_),
       radars_(radarChannels(options, g_W_, imu_)),
       health_(options.health, options.smoother.innovation_gate, options.radarCount()),
@@ -149,7 +149,7 @@ void Estimator::judge(const RadarAnswer& answer, const RadarScan& scan) {
   } else if (answer.was_predicted) {
     health.addUndecided(scan.stamp);
   }
-  if (answer.alone) recovery_.at(scan.radar).add(scan.stamp, *answer.alone);
+  if (answer.alone) initializer_.addVelocity(scan.radar, scan.stamp, *answer.alone);
   if (answer.offset_stepped) {
     health.offsetStepped(scan.stamp);
     faults_.count("time_offset_step");
@@ -157,7 +157,8 @@ void Estimator::judge(const RadarAnswer& answer, const RadarScan& scan) {
   if (!answer.used) return;
   // The state's variance grows about as the root of the accelerometer's, unless that is measured.
   const ImuMeasurement sample = imu_.at(scan.stamp);
-  const bool accel_is_told = imuNoise().accelVariance(sample) > sample.accel_mean_noise;
+  const ImuNoise noise = imuNoise();
+  const bool accel_is_told = noise.accel_density * noise.accel_density > sample.accel_mean_noise;
   Eigen::Matrix3d scaled = answer.ego_velocity.told_variance.asDiagonal();
   if (accel_is_told) scaled += 0.5 * answer.prediction_covariance;
   const double share = answer.used->S.ldlt().solve(scaled).trace() / 3.0;
@@ -232,8 +233,9 @@ bool Estimator::mustWait(const RadarScan& scan) const {
 
 void Estimator::addImu(const std::vector<ImuMeasurement>& samples) {
   for (const ImuMeasurement& sample : samples) {
-    if (sample.gyro_doubt > 0.0 && initialized())
-      yaw_doubt_.add(sample.gyro_doubt * (sample.time - imu_.newest()), smoother_.newest().x.p_W());
+    if (sample.unseen_gyro_variance > 0.0 && initialized())
+      yaw_inflation_.add(sample.unseen_gyro_variance * (sample.time - imu_.newest()),
+                         smoother_.newest().x.p_W());
     imu_.add(sample);
     if (!initialized() && !sample.is_bridge) tryInitialize(sample);
   }
@@ -242,6 +244,7 @@ void Estimator::addImu(const std::vector<ImuMeasurement>& samples) {
 void Estimator::tune(const Tuning& tuning) {
   apply(tuning, options_);
   for (RadarChannel& radar : radars_) radar.tune(options_.smoother);
+  initializer_.setImuNoise(options_.imu_noise);
   health_.setGate(options_.smoother.innovation_gate);
 }
 
@@ -271,8 +274,8 @@ void Estimator::keepUp(bool scan_came, const std::vector<RadarScan>& waiting) {
   }
   const bool keep_for_recovery = options_.health.on_divergence == OnDivergence::kReinitialize;
   const Time needed = smoother_.imuNeededSince();
-  const double history = recovery_.front().imuHistory();
-  imu_.dropBefore(keep_for_recovery ? std::min(needed, imu_.newest() - history) : needed);
+  const Time recovery = imu_.newest() - initializer_.imuHistory();
+  imu_.dropBefore(keep_for_recovery ? std::min(needed, recovery) : needed);
 }
 
 void Estimator::startAgain(std::uint64_t clock_restarts) {
@@ -285,11 +288,10 @@ void Estimator::startAgain(std::uint64_t clock_restarts) {
   OdometryOptions at_once = options_;
   at_once.init_motion_after = 0.0;
   initializer_ = Initializer(at_once);
-  recovery_ = motionInitializers(options_);
   smoother_ = FixedLagSmoother(options_.smoother, options_.imu_noise, g_W_, imu_);
   model_error_scale_ = ModelErrorScale();
   health_ = RadarsHealth(options_.health, options_.smoother.innovation_gate, radars_.size());
-  pose_doubt_ = PoseDoubt();
+  pose_inflation_ = PoseInflation();
   if (landmarks_) landmarks_->forget();
   left_in_silence_.clear();
   radar_heard_.reset();
@@ -300,38 +302,35 @@ void Estimator::tryInitialize(const ImuMeasurement& sample) {
   waiting_for_ = initializer_.waitingFor();
   if (!found) return imu_.dropBefore(sample.time - initializer_.imuHistory());
   start_ = found;
-  model_error_scale_ = found->model_error_scale;
-  begin(found->time, found->prior, found->radar, found->from == InitializedFrom::kRest);
+  begin(*found);
 }
 
-void Estimator::begin(Time time, const NodePrior& prior, std::size_t radar, bool at_rest) {
-  radars_[radar].start(smoother_, time, prior);
+void Estimator::begin(const Initialization& found) {
+  const bool at_rest = found.from == InitializedFrom::kRest;
+  radars_[found.radar].start(smoother_, found.time, found.prior);
   for (std::size_t k = 0; k < radars_.size(); ++k)
-    if (k != radar) radars_[k].join(smoother_);
+    if (k != found.radar) radars_[k].join(smoother_);
   if (ground_vehicle_) ground_vehicle_->join(smoother_, at_rest);
-  if (barometer_) barometer_->join(smoother_, time, at_rest);
-  last_used_ = time;
-  yaw_doubt_ = YawDoubt();
+  if (barometer_) barometer_->join(smoother_, found.time, at_rest);
+  initializer_.forgetVelocities();
+  model_error_scale_ = found.model_error_scale;
+  last_used_ = found.time;
+  yaw_inflation_ = YawInflation();
   if (landmarks_) landmarks_->forget();
-  initialized_at_ = time;
-  health_.startedAt(time);
+  initialized_at_ = found.time;
+  health_.startedAt(found.time);
   publishNewest();
 }
 
 /// The poses of the window that is given up go to `left`.
 bool Estimator::tryReinitialize(std::vector<StampedPose>& left) {
-  std::optional<MotionInitialization> found;
-  std::size_t found_by = 0;
-  for (std::size_t k = 0; k < recovery_.size() && !found; ++k) {
-    found = recovery_[k].solve(imu_, [this](Time time) { return anchorAt(time); });
-    found_by = k;
-  }
+  const std::optional<Initialization> found =
+      initializer_.findInMotion(imu_, [this](Time time) { return anchorAt(time); });
   if (!found) return false;
   for (std::size_t k = 0; k < smoother_.size(); ++k)
     if (smoother_.node(k).time < found->time) left.push_back(pose(smoother_.node(k)));
-  pose_doubt_ = PoseDoubt(newestState(smoother_.newestCovariance({})));
-  model_error_scale_ = found->model_error_scale;
-  begin(found->time, found->prior, found_by, false);
+  pose_inflation_ = PoseInflation(newestState(smoother_.newestCovariance({})));
+  begin(*found);
   updateHealth();
   faults_.count("reinitialized");
   return true;
@@ -342,12 +341,7 @@ PoseAnchor Estimator::anchorAt(Time time) const {
   // jump.
   const NodeEstimate node = smoother_.nodeBefore(time).value_or(smoother_.node(0));
   const StateBlock x = node.time < time ? carried(node.x, node.time, time, imu_, g_W_) : node.x;
-  PoseAnchor anchor;  // how well it is known is kept by pose_doubt_
-  anchor.q_WI = x.q_WI();
-  anchor.p_W = x.p_W();
-  anchor.sigma_yaw = options_.smoother.prior_sigma_yaw;
-  anchor.sigma_position = options_.smoother.prior_sigma_position;
-  return anchor;
+  return {x.q_WI(), x.p_W()};  // pose_inflation_ keeps how well they are known
 }
 
 Health Estimator::updateHealth() {
@@ -382,8 +376,8 @@ ImuNoise Estimator::imuNoise() const {
 
 NavigationState Estimator::newestState(const StateCovariance& covariance) const {
   NavigationState state = navigationState(smoother_.newest(), covariance, imu_);
-  yaw_doubt_.addTo(state);
-  pose_doubt_.addTo(state);
+  yaw_inflation_.addTo(state);
+  pose_inflation_.addTo(state);
   health_.widen(state);
   return state;
 }

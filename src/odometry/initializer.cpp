@@ -7,12 +7,10 @@
 
 namespace rio_t {
 
-std::string toString(InitializedFrom from) { return from == InitializedFrom::kRest ? "rest" : "motion"; }
-
 Initializer::Initializer(const OdometryOptions& options)
-    : options_(options),
-      rest_(options.initialization, options.gravity),
-      motion_(motionInitializers(options)) {}
+    : options_(options), rest_(options.initialization, options.gravity) {
+  for (std::size_t k = 0; k < options.radarCount(); ++k) motion_.emplace_back(optionsOfRadar(options, k));
+}
 
 bool Initializer::isMoving(Time from, Time to) const {
   const auto says = [&](bool moving) {
@@ -57,15 +55,26 @@ std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, con
     }
   }
   if (!mayStartInMotion()) return std::nullopt;
-  PoseAnchor origin;  // W begins here
-  origin.sigma_yaw = options_.smoother.prior_sigma_yaw;
-  origin.sigma_position = options_.smoother.prior_sigma_position;
+  return findInMotion(imu, [](Time) { return PoseAnchor(); });  // W begins here
+}
+
+std::optional<Initialization> Initializer::findInMotion(const ImuBuffer& imu,
+                                                        const std::function<PoseAnchor(Time)>& anchorAt) {
   for (std::size_t k = 0; k < motion_.size(); ++k) {
-    const auto found = motion_[k].solve(imu, [&](Time) { return origin; });
-    if (found)
-      return Initialization{found->time, found->prior, k, InitializedFrom::kMotion, found->model_error_scale};
+    std::optional<Initialization> found = motion_[k].solve(imu, anchorAt);
+    if (!found) continue;
+    found->radar = k;
+    return found;
   }
   return std::nullopt;
+}
+
+void Initializer::forgetVelocities() {
+  for (MotionInitializer& radar : motion_) radar.clear();
+}
+
+void Initializer::setImuNoise(const ImuNoise& noise) {
+  for (MotionInitializer& radar : motion_) radar.setImuNoise(noise);
 }
 
 std::string Initializer::waitingFor() const {

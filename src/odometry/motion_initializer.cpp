@@ -52,9 +52,9 @@ Eigen::Quaterniond withGravity(const Eigen::Quaterniond& q_WI, const Eigen::Vect
 MotionInitializer::MotionInitializer(const OdometryOptions& options)
     : options_(options.motion_initialization),
       smoother_(options.smoother),
-      noise_(options.imu_noise),
       g_W_(0.0, 0.0, -options.gravity),
-      T_IR_(options.T_IR) {}
+      T_IR_(options.T_IR),
+      noise_(options.imu_noise) {}
 
 double MotionInitializer::imuHistory() const {
   return options_.window + 2.0 * smoother_.max_time_offset + kMaxLatency;
@@ -90,8 +90,8 @@ std::optional<bool> MotionInitializer::isMoving(Time from, Time to, double max_s
   return median.norm() > max_speed;
 }
 
-std::optional<MotionInitialization> MotionInitializer::solve(
-    const ImuBuffer& imu, const std::function<PoseAnchor(Time)>& anchorAt) {
+std::optional<Initialization> MotionInitializer::solve(const ImuBuffer& imu,
+                                                       const std::function<PoseAnchor(Time)>& anchorAt) {
   if (velocities_.empty() || imu.empty()) return std::nullopt;
   const auto outOfReach = [&](const Velocity& z) { return std::abs(z.stamp - imu.newest()) > imuHistory(); };
   velocities_.erase(std::remove_if(velocities_.begin(), velocities_.end(), outOfReach), velocities_.end());
@@ -116,8 +116,9 @@ std::optional<MotionInitialization> MotionInitializer::solve(
   const Line line = fitLine(window, time, imu);
   const double gravity_error = line.g_I.norm() + g_W_.z();
   double outliers = 1.0;
-  MotionInitialization result;
+  Initialization result;
   result.time = time;
+  result.from = InitializedFrom::kMotion;
   if (std::abs(gravity_error) < options_.max_gravity_error) {
     const PoseAnchor anchor = anchorAt(time);
     StateBlock& x = result.prior.x0;
@@ -135,8 +136,8 @@ std::optional<MotionInitialization> MotionInitializer::solve(
     };
     // The prior holds the heading, and neither tilt nor velocity; theta lives in I.
     result.prior.J.block<1, 3>(StateBlock::kTheta, StateBlock::kTheta) =
-        x.q_WI().toRotationMatrix().row(2) / anchor.sigma_yaw;
-    set(StateBlock::kP, anchor.sigma_position);
+        x.q_WI().toRotationMatrix().row(2) / smoother_.prior_sigma_yaw;
+    set(StateBlock::kP, smoother_.prior_sigma_position);
     set(StateBlock::kBg, options_.sigma_gyro_bias);
     set(StateBlock::kBa, options_.sigma_accel_bias);
     result.prior.J.diagonal().tail(calibration.size()) = calibration.cwiseInverse();
@@ -166,6 +167,8 @@ std::optional<MotionInitialization> MotionInitializer::solve(
                                  [&](const auto& z) { return z.stamp > time - 0.5 * options_.window; }));
   return std::nullopt;
 }
+
+std::string toString(InitializedFrom from) { return from == InitializedFrom::kRest ? "rest" : "motion"; }
 
 MotionInitializer::Velocities MotionInitializer::windowUntil(Time time, const ImuBuffer& imu) const {
   const double reach = smoother_.max_time_offset;
@@ -231,6 +234,8 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
   const std::shared_ptr<ceres::LossFunction> loss = huberLoss(smoother_.huber_threshold);
   const RadarMotionModel model{TimeOffsetModel::kImu, smoother_.max_time_offset, g_W_, &imu};
 
+  std::vector<CarriedCovariance> covariances;
+  for (const Velocity& z : velocities) covariances.push_back(carriedCovariance(z, time, imu, scale.value()));
   // Which scans tell the offset depends on the state, and the state on them.
   std::vector<const Term*> terms;
   OffsetGains offset_gains;
@@ -244,7 +249,7 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
     terms.clear();
     for (std::size_t i = 0; i < velocities.size(); ++i) {
       RadarVelocityMeasurement z = velocities[i];
-      z.covariance = carriedCovariance(velocities[i], time, imu, scale.value()).whole;
+      z.covariance = covariances[i].whole;
       z.offset_gain = gains[i];
       z.offset_half_width = offset_gains.half_width;
       if (gains[i] == 0.0) z.linear_from_t_O = offset->x[0];
@@ -266,11 +271,10 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
     const double* values[] = {state.x.data(), offset->x.data(), extrinsics->x.data()};
     Eigen::Vector3d e;
     terms[i]->cost->Evaluate(values, e.data(), nullptr);
-    const CarriedCovariance covariance = carriedCovariance(velocities[i], time, imu, scale.value());
     const double square = std::min(e.squaredNorm(), kOutlier * kOutlier);
     if (e.norm() > kOutlier) outliers += 1.0 / n;
     mean_square += square / n;
-    mean_share += covariance.whole.ldlt().solve(covariance.scaled).trace() / (3.0 * n);
+    mean_share += covariances[i].whole.ldlt().solve(covariances[i].scaled).trace() / (3.0 * n);
   }
   const Information all = eliminateFirst(solution.normal_equations, 0);
   const Eigen::Index size = prior.J.cols();  // without extrinsics that are constant
@@ -313,7 +317,10 @@ MotionInitializer::CarriedCovariance MotionInitializer::carriedCovariance(const 
                                                                           double scale) const {
   const double T = std::abs(z.stamp - time);
   const double tilt = noise_.gyro_density * g_W_.norm();
-  const double measured = imu.mean(z.stamp, T).accel_variance;
+  double measured = 0.0;
+  imu.forEachSample(std::min(z.stamp, time), std::max(z.stamp, time), [&](const ImuMeasurement& sample) {
+    measured = std::max(measured, sample.accel_noise + sample.unseen_accel_variance);
+  });
   const double told = scale * noise_.accel_density * noise_.accel_density;
   Eigen::Vector3d scaled = scale * z.told_variance;
   if (told > measured) scaled.array() += told * T;
@@ -322,12 +329,6 @@ MotionInitializer::CarriedCovariance MotionInitializer::carriedCovariance(const 
   covariance.whole.diagonal().array() +=
       tilt * tilt * T * T * T / 3.0 + (told > measured ? 0.0 : measured * T);
   return covariance;
-}
-
-std::vector<MotionInitializer> motionInitializers(const OdometryOptions& options) {
-  std::vector<MotionInitializer> result;
-  for (std::size_t k = 0; k < options.radarCount(); ++k) result.emplace_back(optionsOfRadar(options, k));
-  return result;
 }
 
 }  // namespace rio_t

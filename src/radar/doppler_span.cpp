@@ -12,8 +12,11 @@ namespace {
 /// Dopplers seen by more, and be a span off to within less.
 constexpr double kClearly = 1.5;
 /// The number of points that shows a span. Moving objects are off by any amount. It is no chance if most of
-/// ten points are off by one amount and the Dopplers span that same amount.
+/// ten points are off by one amount and the Dopplers span that same amount. As many show that a span is too
+/// small: fewer are errors of the transmission.
 constexpr std::size_t kEnough = 10;
+/// [spans] A step may be finer than the noise; it then counts as this.
+constexpr double kFinestStep = 0.05;
 
 }  // namespace
 
@@ -22,13 +25,14 @@ void DopplerSpan::learn(const std::vector<RadarDirection>& points, const Eigen::
   for (const RadarDirection& p : points) {
     if (std::abs(p.doppler) >= DopplerGrid::kLargestDoppler) continue;
     if (lowest_ <= p.doppler && p.doppler <= highest_) continue;
+    if (found_ > 0.0 && ++outside_ < kEnough) continue;
     lowest_ = std::min(lowest_, p.doppler);
     highest_ = std::max(highest_, p.doppler);
-    beyond_ = back_ = 0;
+    beyond_ = back_ = outside_ = 0;
     found_ = 0.0;
   }
   const double span = highest_ - lowest_ + step;
-  const double clearly = kClearly * std::max(step, 0.05 * span);
+  const double clearly = kClearly * std::max(step, kFinestStep * span);
   for (const RadarDirection& p : points) {
     const double expected = -p.u_R.dot(v_R);
     if (expected > lowest_ - clearly && expected < highest_ + clearly) continue;

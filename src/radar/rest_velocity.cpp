@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <map>
 
 #include "consensus.h"
@@ -40,12 +41,12 @@ std::optional<VelocitySolution> fitSlowMotion(const std::vector<RadarDirection>&
                                               const PointVariances& noise, const EgoVelocityOptions& o) {
   if (points.size() < o.min_inliers) return std::nullopt;
   const bool has_bins = o.doppler_quantization > 0.0;
-  if (has_bins && restWithPointsBeside(points, o) < 0.5 * kDeniesRest) return std::nullopt;
+  const double beside = has_bins ? restWithPointsBeside(points, o) : std::numeric_limits<double>::infinity();
+  if (beside < 0.5 * kDeniesRest) return std::nullopt;
   const VelocitySolution start = solveLeastSquares(points, o);
   if (!start.solved || start.v_R.isZero()) return std::nullopt;
   const DopplerLikelihood likelihood(points, Eigen::Vector3d::Zero(), noise);
-  double at_rest = likelihood.at(Eigen::Vector3d::Zero()).value;
-  if (has_bins) at_rest = std::min(at_rest, restWithPointsBeside(points, o));
+  const double at_rest = std::min(likelihood.at(Eigen::Vector3d::Zero()).value, beside);
   if (at_rest < 0.5 * kDeniesRest) return std::nullopt;
   const LikeliestVelocity likeliest = findLikeliest(likelihood, std::nullopt, start.v_R);
   if (2.0 * (at_rest - likeliest.cost) < kDeniesRest) return std::nullopt;
@@ -91,8 +92,10 @@ bool directionsAgreeOnMotion(const std::vector<RadarDirection>& points, const Eg
     double count = 0.0, approaching = 0.0;
     Eigen::Vector3d sum_R = Eigen::Vector3d::Zero();
   };
+  const std::vector<RadarDirection> slow = selectSlow(points, o);
+  if (std::all_of(slow.begin(), slow.end(), [&](const auto& p) { return readsZero(p, o); })) return false;
   std::map<std::array<long, 3>, Cell> cells;
-  for (const RadarDirection& p : selectSlow(points, o)) {
+  for (const RadarDirection& p : slow) {
     const Eigen::Vector3d corner = p.u_R / kCellWidth;
     Cell& cell = cells[{std::lround(corner.x()), std::lround(corner.y()), std::lround(corner.z())}];
     cell.count += 1.0;

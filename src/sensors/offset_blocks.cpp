@@ -32,6 +32,7 @@ Block& OffsetBlocks::of(Window& window, Time stamp) {
 
 void OffsetBlocks::step(FixedLagSmoother& smoother, Time stamp) {
   if (!options_.estimate_time_offset) return;
+  ++steps_;
   Window& window = smoother.window();
   Block& before = *epochs_.back().block;
   std::shared_ptr<Block> after = add(window, value());

@@ -3,28 +3,45 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "rio_t/core/fading.h"
 
 namespace rio_t {
+namespace {
+
+constexpr double kMinCount = 30.0;   // of components: ten scans, since one may be an outlier
+constexpr double kMinScatter = 0.2;  // of the variance: fewer scans than it seems may agree by chance
+
+}  // namespace
+
+bool OffsetStepDetector::showsStep(const Average& average) const {
+  if (average.count < kMinCount || average.information <= 0.0) return false;
+  const double change = average.projection / average.information;
+  // The scatter that the change does not explain. S is an upper bound, so the scatter may well be below 1.
+  const double scatter =
+      std::max(kMinScatter, (average.squares - change * average.projection) / average.count);
+  const double sigma = std::sqrt(scatter / average.information);
+  return std::abs(change) >= std::max(options_.significance * sigma, options_.min_change) &&
+         std::abs(change) <= options_.max_change;
+}
 
 bool OffsetStepDetector::stepped(const Innovation& innovation) {
   if (!options_.enabled) return false;
-  const double fade = fading(last_, innovation.stamp, options_.memory);
-  last_ = innovation.stamp;
+  const Time before = std::exchange(last_, innovation.stamp);
   const Eigen::LDLT<Eigen::Matrix3d> weight = innovation.S_at_offset.ldlt();
   const Eigen::Vector3d weighted_J = weight.solve(innovation.J_O);
-  information_ = fade * information_ + innovation.J_O.dot(weighted_J);
-  projection_ = fade * projection_ + innovation.d.dot(weighted_J);
-  squares_ = fade * squares_ + innovation.d.dot(weight.solve(innovation.d));
-  count_ = fade * count_ + 3.0;
-  if (count_ < 30.0 || information_ <= 0.0) return false;
-
-  const double change = projection_ / information_;
-  // The scatter that the change does not explain. S is an upper bound, so the scatter may well be below 1.
-  const double scatter = std::max(0.2, (squares_ - change * projection_) / count_);
-  const double sigma = std::sqrt(scatter / information_);
-  if (std::abs(change) < options_.significance * sigma || std::abs(change) < options_.min_change)
+  const double squares = innovation.d.dot(weight.solve(innovation.d));
+  double memory = options_.memory;
+  for (Average& average : averages_) {
+    const double fade = fading(before, innovation.stamp, memory);
+    average.information = fade * average.information + innovation.J_O.dot(weighted_J);
+    average.projection = fade * average.projection + innovation.d.dot(weighted_J);
+    average.squares = fade * average.squares + squares;
+    average.count = fade * average.count + 3.0;
+    memory *= 0.5;
+  }
+  if (std::none_of(averages_.begin(), averages_.end(), [this](const Average& a) { return showsStep(a); }))
     return false;
   *this = OffsetStepDetector(options_);
   return true;

@@ -54,8 +54,7 @@ RadarChannel::RadarChannel(const RadarChannelOptions& options, const Eigen::Vect
       feasibility_(options.feasibility),
       offset_widths_(imu, g_W),
       step_detector_(options.offset_step_detector),
-      offset_uncertainty_(options.smoother.huber_threshold),
-      gate_(options.smoother) {}
+      offset_uncertainty_(options.smoother.huber_threshold) {}
 
 void RadarChannel::start(FixedLagSmoother& smoother, Time time, const NodePrior& prior) {
   in_window_.start(smoother, time, prior);
@@ -68,13 +67,13 @@ void RadarChannel::join(FixedLagSmoother& smoother) {
 }
 
 void RadarChannel::tune(const SmootherOptions& options) {
+  options_.smoother.innovation_gate = options.innovation_gate;
+  options_.smoother.innovation_gate_timeout = options.innovation_gate_timeout;
   options_.smoother.innovation_model_error = options.innovation_model_error;
-  gate_.tune(options);
 }
 
 void RadarChannel::forget() {
-  step_detector_ = OffsetStepDetector(options_.offset_step_detector);
-  offset_uncertainty_ = OffsetUncertainty(options_.smoother.huber_threshold);
+  forgetOffset();
   offset_widths_.clear();
   feasibility_ = FeasibilityCheck(options_.feasibility);
   pool_.clear();
@@ -84,14 +83,25 @@ void RadarChannel::forget() {
   gate_.used();
 }
 
+void RadarChannel::forgetOffset() {
+  offset_steps_ = in_window_.offsetSteps();
+  step_detector_ = OffsetStepDetector(options_.offset_step_detector);
+  offset_uncertainty_ = OffsetUncertainty(options_.smoother.huber_threshold);
+}
+
+void RadarChannel::followOffsetSteps() {
+  if (offset_steps_ != in_window_.offsetSteps()) forgetOffset();
+}
+
 RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context, FixedLagSmoother& smoother) {
   RadarAnswer answer;
   const auto reject = [&](const std::string& reason) {
     answer.rejected_because = reason;
     return answer;
   };
+  followOffsetSteps();
   // Before its points count a second time, for health or in a pool.
-  if (in_window_.has(scan.stamp)) return reject(toString(RadarInWindow::AddResult::kDuplicateStamp));
+  if (in_window_.has(scan.stamp)) return reject("duplicate_stamp");
   Seen seen = see(scan, context, smoother, answer);
   const EgoVelocity& measured = seen.velocity;
   if (!isValid(measured.status)) return reject(toString(answer.ego_velocity.status));
@@ -118,25 +128,30 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   const bool can_be_judged = seen.moves && seen.tilt_is_known && hasMajority(measured);
   std::optional<Innovation> all;  // of the points borrowed, too
   if (seen.prior) all = innovation(scan.stamp, *seen.prior, measured, &seen);
-  const std::optional<Innovation> own =
-      seen.has_borrowed && seen.moves
-          ? innovation(scan.stamp, *seen.prior, around(*seen.prior, scan, measured), &seen)
-          : all;
-  if (can_be_judged && informs_offset && options_.smoother.estimate_time_offset &&
-      step_detector_.stepped(*own)) {
-    in_window_.stepOffset(smoother, scan.stamp);
-    offset_uncertainty_ = OffsetUncertainty(options_.smoother.huber_threshold);  // the new block does not lag
-    answer.offset_stepped = true;
+  std::optional<Innovation> own;  // of its own points, if it tells the offset
+  if (can_be_judged && informs_offset) {
+    EgoVelocity of_own = measured;
+    if (seen.has_borrowed) {
+      of_own = around(*seen.prior, scan, measured);
+      of_own.covariance.diagonal().array() += answer.rate_variance;
+    }
+    own = innovation(scan.stamp, *seen.prior, of_own, &seen);
+    answer.offset_stepped = step_detector_.stepped(*own);
   }
-  if (all && gate_.rejects(*all, isUnanimous(measured), seen.tilt_is_known, context.last_used))
+  if (answer.offset_stepped) {
+    in_window_.stepOffset(smoother, scan.stamp);
+    followOffsetSteps();
+  }
+  if (all &&
+      gate_.rejects(options_.smoother, *all, isUnanimous(measured), seen.tilt_is_known, context.last_used))
     return reject("innovation");
-  const RadarInWindow::AddResult added =
+  const bool added =
       answer.doppler
           ? in_window_.add(smoother, *answer.doppler)
           : in_window_.add(smoother, RadarVelocityMeasurement{taken, measured.v_R, measured.covariance});
-  if (added != RadarInWindow::AddResult::kAdded) return reject(toString(added));
+  if (!added) return reject("older_than_window");
   gate_.used();
-  if (can_be_judged && informs_offset) offset_uncertainty_.add(*own);
+  if (own) offset_uncertainty_.add(*own);
   // A borrowed point must not teach twice.
   if (!seen.is_own || sharesPoints(seen, learned_at_)) return answer;
   if (can_be_judged) {
@@ -169,11 +184,11 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
   if (context.has_diverged) expected.reset();
   // Few and coarse points agree with many velocities: they must not all side with a prediction that is a
   // little wrong.
-  const double doubt = options_.smoother.innovation_model_error;
-  if (expected && seen.has_borrowed) expected->covariance.diagonal().array() += doubt * doubt;
+  const double sigma = options_.smoother.innovation_model_error;
+  if (expected && seen.has_borrowed) expected->covariance.diagonal().array() += sigma * sigma;
   answer.ego_velocity = measure(seen.pooled, expected, scale);
   answer.was_predicted = seen.prior.has_value();
-  if (seen.prior) judge(seen.pooled, *seen.prior, scale, answer);
+  if (seen.prior) judge(seen.pooled, *seen.prior, expected.has_value(), scale, answer);
   if (answer.alone && sharesPoints(seen, alone_at_)) answer.alone.reset();
   if (answer.alone) alone_at_ = scan.stamp;
 
@@ -205,7 +220,7 @@ bool RadarChannel::confirmsRest(const Rest& rest, const RadarScan& scan, double 
 }
 
 double RadarChannel::offsetGain(Seen& seen) {
-  if (!seen.moves) return 0.0;
+  if (!seen.moves || !options_.smoother.estimate_time_offset) return 0.0;
   OffsetScan scan = seen.prediction->scan;
   scan.measured = seen.velocity.covariance;
   offset_widths_.add(scan);
@@ -258,12 +273,13 @@ Innovation RadarChannel::innovation(Time stamp, const VelocityPrior& prior, cons
   return result;
 }
 
-void RadarChannel::judge(const RadarScan& scan, const VelocityPrior& prior, double scale,
+void RadarChannel::judge(const RadarScan& scan, const VelocityPrior& prior, bool had_prior, double scale,
                          RadarAnswer& answer) const {
   const EgoVelocity& measured = answer.ego_velocity;
   // If few points agree, they may be those that side with a wrong prediction. The velocity is measured again
   // without it.
-  const EgoVelocity alone = hasMajority(measured) ? measured : measure(scan, std::nullopt, scale);
+  const EgoVelocity alone =
+      hasMajority(measured) || !had_prior ? measured : measure(scan, std::nullopt, scale);
   if (!hasMajority(alone)) return;
   // A crowd may outnumber the static world. What then sides with the prediction alone is its witness: noise
   // does not give so many of them.

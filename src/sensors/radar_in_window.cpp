@@ -116,38 +116,25 @@ std::optional<Eigen::Vector3d> RadarInWindow::velocityAt(const FixedLagSmoother&
 }
 
 template <class Factor, class Measurement>
-RadarInWindow::AddResult RadarInWindow::addTerm(FixedLagSmoother& smoother, const Measurement& z,
-                                                const std::shared_ptr<ceres::LossFunction>& loss) {
+bool RadarInWindow::addTerm(FixedLagSmoother& smoother, const Measurement& z,
+                            const std::shared_ptr<ceres::LossFunction>& loss) {
   const Time oldest = smoother.node(0).time - 2.0 * options_.max_time_offset;
   stamps_.erase(std::remove_if(stamps_.begin(), stamps_.end(), [&](Time stamp) { return stamp < oldest; }),
                 stamps_.end());
-  if (has(z.stamp)) return AddResult::kDuplicateStamp;
   Block* node = smoother.nodeAt(nodeTime(z.stamp));
-  if (node == nullptr) return AddResult::kOlderThanWindow;
+  if (node == nullptr) return false;
   stamps_.push_back(z.stamp);
   smoother.window().add(std::make_unique<Factor>(z, *node->time, model_),
                         {node, &offset_->of(smoother.window(), z.stamp), extrinsics_.get()}, loss);
-  return AddResult::kAdded;
+  return true;
 }
 
-RadarInWindow::AddResult RadarInWindow::add(FixedLagSmoother& smoother, const RadarVelocityMeasurement& z) {
+bool RadarInWindow::add(FixedLagSmoother& smoother, const RadarVelocityMeasurement& z) {
   return addTerm<RadarVelocityFactor>(smoother, z, loss_);
 }
 
-RadarInWindow::AddResult RadarInWindow::add(FixedLagSmoother& smoother, const DopplerMeasurement& z) {
+bool RadarInWindow::add(FixedLagSmoother& smoother, const DopplerMeasurement& z) {
   return addTerm<DopplerFactor>(smoother, z, nullptr);  // its loss is in its rows
-}
-
-std::string toString(RadarInWindow::AddResult result) {
-  switch (result) {
-    case RadarInWindow::AddResult::kAdded:
-      return "";
-    case RadarInWindow::AddResult::kOlderThanWindow:
-      return "older_than_window";
-    case RadarInWindow::AddResult::kDuplicateStamp:
-      return "duplicate_stamp";
-  }
-  return "";
 }
 
 }  // namespace rio_t

@@ -243,32 +243,4 @@ void BatchSmoother::read(const Graph& graph, const Solution& solved, BatchSoluti
                                                                  : P[index.at(block)].at(index.at(block)));
 }
 
-BatchSmoother::Residual BatchSmoother::residual(const BatchSolution& solution,
-                                                const BatchSolution::Scan& scan, std::size_t radar,
-                                                const RadarVelocityMeasurement& z) const {
-  RadarVelocityMeasurement unit = z;
-  unit.covariance.setIdentity();
-  unit.linear_from_t_O.reset();
-  unit.offset_gain = 1.0;
-  const NodeEstimate& node = solution.nodes[scan.node];
-  // The paper's factor stands at the stamp itself.
-  const StateBlock x = atMeasurement() ? node.x : carried(node.x, node.time, z.stamp, *imu_, g_W_);
-  const Eigen::VectorXd extrinsics = stored(solution.extrinsics[radar]);
-  const double* blocks[] = {x.data(), &scan.t_O, extrinsics.data()};
-  StateJacobian<3> J_x;
-  ExtrinsicsJacobian<3> J_e;
-  Eigen::Vector3d J_t;
-  Residual result;
-  double* jacobians[] = {J_x.data(), J_t.data(), J_e.data()};
-  RadarVelocityFactor(unit, node.time, model()).Evaluate(blocks, result.value.data(), jacobians);
-  if (!options_.estimate_time_offset) J_t.setZero();
-  constexpr int kState = StateBlock::kTangent;
-  Eigen::Matrix<double, 3, Eigen::Dynamic> J(3, scan.covariance.cols());
-  J.leftCols<kState + 1>() << J_x.leftCols<3>(), J_x.rightCols<kState - 3>(), J_t;
-  for (Eigen::Index i = kState + 1; i < J.cols(); ++i)
-    J.col(i) = J_e.col(extrinsics_manifold_->columns()[static_cast<std::size_t>(i - kState - 1)]);
-  result.prediction_covariance = J * scan.covariance * J.transpose();
-  return result;
-}
-
 }  // namespace rio_t

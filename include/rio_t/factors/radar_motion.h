@@ -37,9 +37,10 @@ struct RadarMotionModel {
   /// kConstantAcceleration, eq. 13, paper eq. (4)-(5): one acceleration stands for the whole shift; the state
   /// is at the stamp:
   ///   v_I = R_IW v_W + (omega - b_g) x l_I - t_O a_c,   a_c = a - b_a + R_IW g_W,
-  /// with omega at the stamp, and for a the mean over 2 kOffsetHalfWidth around it.
+  /// with omega at the stamp, and for a the mean around it.
   /// `state` as StateBlock stores it; `l_I` is the radar in I [m]; `mean` is the mean of the IMU at meanTime.
-  /// Without `mean` the derivatives of kImu stay zero.
+  /// Without `mean` the derivatives of kImu stay zero, and kConstantAcceleration takes that over
+  /// kOffsetHalfWidth to either side.
   RadarMotion at(const double* state, Time state_time, Time stamp, double t_O, const Eigen::Vector3d& l_I,
                  const ImuMean* mean) const;
   /// Centre of the mean of the IMU for the derivative with respect to t_O: tau rounded to a millisecond, or

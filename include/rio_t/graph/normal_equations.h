@@ -47,7 +47,7 @@ class Elimination {
   const std::vector<Eigen::VectorXd>& delta() const { return delta_; }
   /// delta' H delta: the squared length of the step in sigmas.
   double squaredLength() const { return squared_length_; }
-  /// Joint covariance of some blocks, by their ascending indices.
+  /// Joint covariance of some blocks, by their indices, in that order.
   Eigen::MatrixXd covariance(const std::vector<int>& indices) const;
   /// Covariance of every block, and of every two that L connects: [i][j], j >= i.
   std::vector<std::map<int, Eigen::MatrixXd>> covariances() const;

@@ -17,7 +17,7 @@ struct ImuMean {
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();      ///< [rad/s]
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();          ///< specific force [m/s^2]
   Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();  ///< of that mean [rad/s^2]
-  double gyro_variance = 0.0;   ///< noise and doubt, the largest squared density [rad^2/s]
+  double gyro_variance = 0.0;   ///< noise and unseen motion, the largest squared density [rad^2/s]
   double accel_variance = 0.0;  ///< likewise [m^2/s^3]
 };
 
@@ -31,7 +31,6 @@ class ImuBuffer {
   void clear() { samples_.clear(); }
 
   bool empty() const { return samples_.empty(); }
-  std::size_t size() const { return samples_.size(); }
   Time oldest() const { return samples_.front().time; }
   Time newest() const { return samples_.back().time; }
   bool covers(Time time) const { return !empty() && oldest() <= time && time <= newest(); }
@@ -46,8 +45,8 @@ class ImuBuffer {
 
   /// Calls step(dt, angular_velocity, acceleration) for each interval between samples from `from` to `to`,
   /// with the mean of both ends; the ends at `from` and `to` are interpolated. Goes backwards with dt < 0 if
-  /// `to` < `from`. A step with a fourth argument gets the later of the two ends, whose doubts are those of
-  /// the interval.
+  /// `to` < `from`. A step with a fourth argument gets the later of the two ends, whose noise is that of the
+  /// interval.
   template <typename Step>
   void forEachInterval(Time from, Time to, Step&& step) const;
 
@@ -78,19 +77,19 @@ void ImuBuffer::forEachInterval(Time from, Time to, Step&& step) const {
       step(dt, gyro, accel);
     }
   };
-  ImuMeasurement previous = at(from);
+  const ImuMeasurement first = at(from);
+  const ImuMeasurement* previous = &first;
+  const auto advance = [&](const ImuMeasurement& next) {
+    interval(*previous, next);
+    previous = &next;
+  };
   if (from < to) {
-    for (std::size_t i = firstAfter(from); i < samples_.size() && samples_[i].time < to; ++i) {
-      interval(previous, samples_[i]);
-      previous = samples_[i];
-    }
+    for (std::size_t i = firstAfter(from); i < samples_.size() && samples_[i].time < to; ++i)
+      advance(samples_[i]);
   } else {
-    for (std::size_t i = firstAfter(from); i-- > 0 && samples_[i].time > to;) {
-      interval(previous, samples_[i]);
-      previous = samples_[i];
-    }
+    for (std::size_t i = firstAfter(from); i-- > 0 && samples_[i].time > to;) advance(samples_[i]);
   }
-  interval(previous, at(to));
+  interval(*previous, at(to));
 }
 
 }  // namespace rio_t

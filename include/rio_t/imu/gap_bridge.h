@@ -25,8 +25,8 @@ class GapBridge {
   void follow(const ImuMeasurement& imu);
   /// Starts again without any sample.
   void reset() { newest_.reset(); }
-  /// Samples between the last one taken and `next`, without those two. `is_bridge` is set, and the doubts are
-  /// those of `next`. None before the first sample.
+  /// Samples between the last one taken and `next`, without those two. `is_bridge` is set, and the noise is
+  /// that of `next`. None before the first sample.
   std::vector<ImuMeasurement> until(const ImuMeasurement& next) const;
 
  private:

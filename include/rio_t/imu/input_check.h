@@ -59,15 +59,14 @@ class ImuInputCheck {
 
   /// `max_gap` [s] between samples: a longer gap is reported and bridged.
   ImuInputCheck(double max_gap, const ImuInputCheckOptions& options);
-  /// Checks `imu`. If it is taken, sets its doubts and its noise, and replaces the reading of a stuck axis.
+  /// Checks `imu`. If it is taken, sets its noise, the unseen motion included, and replaces the reading of a
+  /// stuck axis.
   Verdict check(ImuMeasurement& imu);
   MeasuredImuNoise noise() const;
 
  private:
   /// Replaces the readings of stuck axes. Returns whether there were any.
   bool replaceStuck(ImuMeasurement& imu);
-  void doubtGyro(ImuMeasurement& imu, double share) const;
-  void doubtAccel(ImuMeasurement& imu, double share) const;
 
   double max_gap_;  // read-only after construction, as the next
   ImuInputCheckOptions options_;

@@ -15,8 +15,8 @@ struct ImuMeasurement {
 
   // Motion that the interval ending with this sample hides (a gap, saturated axes), as squared densities of
   // white noise per axis. They add to those of ImuNoise; see ImuInputCheck.
-  double gyro_doubt = 0.0;   ///< [rad^2/s]
-  double accel_doubt = 0.0;  ///< [m^2/s^3]
+  double unseen_gyro_variance = 0.0;   ///< [rad^2/s]
+  double unseen_accel_variance = 0.0;  ///< [m^2/s^3]
 
   // White noise measured by NoiseSpectrum, as squared densities per axis: that of the samples, and what is
   // left of it in their means.

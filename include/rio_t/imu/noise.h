@@ -19,10 +19,10 @@ struct ImuNoise {
   /// Squared densities of integrated samples for the interval that ends with `imu`: the larger of option and
   /// measurement, plus the hidden motion of the interval. A vibrating frame is noisier than a data sheet.
   double accelVariance(const ImuMeasurement& imu) const {
-    return std::max(accel_density * accel_density, imu.accel_mean_noise) + imu.accel_doubt;
+    return std::max(accel_density * accel_density, imu.accel_mean_noise) + imu.unseen_accel_variance;
   }
   double gyroVariance(const ImuMeasurement& imu) const {
-    return std::max(gyro_density * gyro_density, imu.gyro_mean_noise) + imu.gyro_doubt;
+    return std::max(gyro_density * gyro_density, imu.gyro_mean_noise) + imu.unseen_gyro_variance;
   }
 };
 

@@ -42,7 +42,8 @@ class StaticInitializer {
   bool hasSeenMotion() const { return has_seen_motion_; }
 
  private:
-  /// Whether the newest samples show that the platform sets off: half of max_accel_std, and more than noise.
+  /// Whether the newest samples show that the platform sets off: a fifth of max_accel_std, and more than
+  /// noise.
   bool endsNow();
 
   StaticInitializerOptions options_;  // read-only after construction

@@ -60,7 +60,7 @@ class LandmarkMap {
                         const std::vector<Detection>& detections) const;
   void retire(std::size_t k);
   void dropUseless(const Eigen::Vector3d& p_W);
-  void makeRoom(Time now, std::size_t wanted);
+  void makeRoom(Time now);
   void promote(FixedLagSmoother& smoother, Time now);
   /// Judges the map by the matches lately.
   void judge(const Prediction& prediction, const Extrinsics& T_IR, const Association& association);

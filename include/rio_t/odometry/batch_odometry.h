@@ -19,13 +19,11 @@ struct BatchResult {
   /// `left_window` of a result has the pose of its node, unless an earlier scan has it already.
   std::vector<ScanResult> scans;
   BatchSolution solution;
-  std::size_t readmitted = 0;  ///< scans that the online gate rejected and the batch took
 };
 
 /// Remembers an online run, then solves the graph over all of it at once (docs/method.md, section 10).
 ///
-/// The online run decides which points and scans are outliers. The batch judges again only scans that the
-/// innovation gate rejected, by its own prediction. It begins from the online states.
+/// The online run decides which points and scans are outliers. The batch begins from the online states.
 class BatchOdometry {
  public:
   BatchOdometry(const OdometryOptions& options, const BatchOptions& batch);
@@ -49,13 +47,6 @@ class BatchOdometry {
   ImuNoise imuNoise() const;  ///< as the options tell it, times the scale of the model errors
   RadarVelocityMeasurement measurement(const ScanResult& result) const;
   Run makeRun(const RadarInertialOdometry::Start& start) const;
-  /// Adds the scans that the batch does not reject, and returns their number.
-  std::size_t readmit(const BatchSmoother& smoother, const BatchSolution& solution, Run& run) const;
-  /// The scan of the same radar that is the nearest to a velocity, if the solution does not reject the
-  /// velocity; else null.
-  const BatchSolution::Scan* acceptedBy(const BatchSmoother& smoother, const Run& run,
-                                        const BatchSolution& solution, std::size_t radar,
-                                        const RadarVelocityMeasurement& z) const;
   /// Sets what the scan gives to the graph.
   void setMeasurement(const ScanResult& result, BatchScan& scan) const;
   std::vector<NavigationState> trajectory(const BatchSolution& solution) const;

@@ -10,10 +10,9 @@
 #include "rio_t/odometry/fault_counters.h"
 #include "rio_t/odometry/initializer.h"
 #include "rio_t/odometry/model_error_scale.h"
-#include "rio_t/odometry/motion_initializer.h"
 #include "rio_t/odometry/navigation.h"
 #include "rio_t/odometry/options.h"
-#include "rio_t/odometry/pose_doubt.h"
+#include "rio_t/odometry/pose_inflation.h"
 #include "rio_t/odometry/radars_health.h"
 #include "rio_t/odometry/scan_result.h"
 #include "rio_t/sensors/barometer_channel.h"
@@ -63,8 +62,8 @@ class Estimator {
   /// Empty, or why the scan of a node at that time cannot be used now.
   std::string whyNotNow(Time node_time, bool imu_has_ended) const;
   void tryInitialize(const ImuMeasurement& sample);
-  /// Starts a window with the prior, which knows the calibration of `radar`.
-  void begin(Time time, const NodePrior& prior, std::size_t radar, bool at_rest);
+  /// Starts a window.
+  void begin(const Initialization& found);
   bool tryReinitialize(std::vector<StampedPose>& left);
   PoseAnchor anchorAt(Time time) const;
   void judge(const RadarAnswer& answer, const RadarScan& scan);
@@ -88,15 +87,14 @@ class Estimator {
 
   ImuBuffer imu_;
   Initializer initializer_;
-  std::vector<MotionInitializer> recovery_;  ///< by radar; start again after a divergence
   FixedLagSmoother smoother_;
   std::vector<RadarChannel> radars_;                    ///< by RadarScan::radar
   std::optional<GroundVehicleChannel> ground_vehicle_;  ///< if the platform is one
   std::optional<BarometerChannel> barometer_;           ///< if it is used
   ModelErrorScale model_error_scale_;
   RadarsHealth health_;
-  PoseDoubt pose_doubt_;
-  YawDoubt yaw_doubt_;
+  PoseInflation pose_inflation_;
+  YawInflation yaw_inflation_;
   std::optional<LandmarkMap> landmarks_;  ///< none if they are off
 
   std::optional<Initialization> start_;

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "rio_t/imu/static_initializer.h"
 #include "rio_t/odometry/motion_initializer.h"
@@ -9,20 +11,8 @@
 
 namespace rio_t {
 
-/// Where a first state came from.
-enum class InitializedFrom { kRest, kMotion };
-std::string toString(InitializedFrom from);  ///< "rest" or "motion"
-
-struct Initialization {
-  Time time;
-  NodePrior prior;        ///< on the state and on the calibration of `radar`
-  std::size_t radar = 0;  ///< whose velocities it is from; the first, from rest
-  InitializedFrom from = InitializedFrom::kRest;
-  ModelErrorScale model_error_scale;  ///< of the velocities behind it
-};
-
-/// Finds the first state by `init_mode`: from rest if IMU and radar see some, else from motion. Not
-/// thread-safe.
+/// Finds the first state by `init_mode`: from rest if IMU and radar see some, else from motion. After a
+/// divergence it finds a new one in motion. Not thread-safe.
 class Initializer {
  public:
   explicit Initializer(const OdometryOptions& options);
@@ -30,7 +20,13 @@ class Initializer {
   /// Call it once per sample, in time order. `imu` ends with the sample `newest` and reaches imuHistory()
   /// back.
   std::optional<Initialization> add(const ImuMeasurement& newest, const ImuBuffer& imu);
-  /// Velocity of a scan of a radar before there is a state.
+  /// The state of a platform that moves, at a pose that is known; see MotionInitializer.
+  std::optional<Initialization> findInMotion(const ImuBuffer& imu,
+                                             const std::function<PoseAnchor(Time)>& anchorAt);
+  /// Forgets the velocities: no scan counts twice.
+  void forgetVelocities();
+  void setImuNoise(const ImuNoise& noise);
+  /// Velocity of a scan of a radar, measured without a prediction.
   void addVelocity(std::size_t radar, Time stamp, const EgoVelocity& velocity) {
     motion_.at(radar).add(stamp, velocity);
   }

@@ -32,14 +32,18 @@ struct MotionInitializerOptions {
 struct PoseAnchor {
   Eigen::Quaterniond q_WI = Eigen::Quaterniond::Identity();  ///< heading is kept, tilt is replaced
   Eigen::Vector3d p_W = Eigen::Vector3d::Zero();             ///< [m]
-  double sigma_yaw = 1.0e-3;                                 ///< [rad]
-  double sigma_position = 1.0e-3;                            ///< [m]
 };
 
-/// First state of a platform that moves.
-struct MotionInitialization {
-  Time time;                          ///< of the state: the newest velocity's stamp
-  NodePrior prior;                    ///< the state, t_O and what is known of them, correlations included
+/// Where a first state came from.
+enum class InitializedFrom { kRest, kMotion };
+std::string toString(InitializedFrom from);  ///< "rest" or "motion"
+
+/// A first state.
+struct Initialization {
+  Time time;              ///< of the state; in motion, the newest velocity's stamp
+  NodePrior prior;        ///< on the state and on the calibration of `radar`, correlations included
+  std::size_t radar = 0;  ///< whose velocities it is from; the first, from rest
+  InitializedFrom from = InitializedFrom::kRest;
   ModelErrorScale model_error_scale;  ///< of the velocities around it
 };
 
@@ -61,9 +65,10 @@ class MotionInitializer {
   /// The state, as soon as the IMU covers a window of velocities and both agree. If they do not agree, drops
   /// the older half of the window and says why in waitingFor(). `anchor` gives the pose at the time of the
   /// state.
-  std::optional<MotionInitialization> solve(const ImuBuffer& imu,
-                                            const std::function<PoseAnchor(Time)>& anchor);
+  std::optional<Initialization> solve(const ImuBuffer& imu, const std::function<PoseAnchor(Time)>& anchor);
+  /// Forgets the velocities.
   void clear();
+  void setImuNoise(const ImuNoise& noise) { noise_ = noise; }
   /// Whether the scans stamped within [from, to], by the median of each axis, show a speed above `max_speed`
   /// [m/s]. None without scans.
   std::optional<bool> isMoving(Time from, Time to, double max_speed) const;
@@ -104,19 +109,15 @@ class MotionInitializer {
   };
   CarriedCovariance carriedCovariance(const Velocity& z, Time time, const ImuBuffer& imu, double scale) const;
 
-  // Read-only after construction.
-  MotionInitializerOptions options_;
+  MotionInitializerOptions options_;  // read-only after construction, as the next three
   SmootherOptions smoother_;
-  ImuNoise noise_;
   Eigen::Vector3d g_W_;
   Extrinsics T_IR_;
+  ImuNoise noise_;
 
   Velocities velocities_;  // by stamp
   std::optional<Time> tried_at_;
   std::string waiting_for_ = "the first radar velocity";
 };
-
-/// One for each radar.
-std::vector<MotionInitializer> motionInitializers(const OdometryOptions& options);
 
 }  // namespace rio_t

@@ -34,8 +34,9 @@ class DopplerSpan {
   double found_ = 0.0;
   double lowest_ = std::numeric_limits<double>::infinity();
   double highest_ = -std::numeric_limits<double>::infinity();
-  std::size_t beyond_ = 0;  ///< points whose Doppler must lie beyond those seen
-  std::size_t back_ = 0;    ///< of these, the ones that are a span off
+  std::size_t beyond_ = 0;   ///< points whose Doppler must lie beyond those seen
+  std::size_t back_ = 0;     ///< of these, the ones that are a span off
+  std::size_t outside_ = 0;  ///< points that read more than the span that was found
 };
 
 }  // namespace rio_t

@@ -13,19 +13,16 @@ namespace rio_t {
 /// correct one. Not thread-safe.
 class InnovationGate {
  public:
-  explicit InnovationGate(const SmootherOptions& options) : options_(options) {}
-
-  /// Whether to reject a scan. The gate is open if `tilt_is_known` is false (the prediction is not linear in
-  /// roll and pitch), `innovation_gate_timeout` after the scan stamped `last_used` was used, whatever radar
-  /// it is from, and after half a second of unanimous scans (nearly all points of each agree).
-  bool rejects(const Innovation& innovation, bool is_unanimous, bool tilt_is_known, Time last_used);
+  /// Whether to reject a scan, by the options innovation_*. The gate is open if `tilt_is_known` is false (the
+  /// prediction is not linear in roll and pitch), `innovation_gate_timeout` after the scan stamped
+  /// `last_used` was used, whatever radar it is from, and after half a second of unanimous scans (nearly all
+  /// points of each agree).
+  bool rejects(const SmootherOptions& options, const Innovation& innovation, bool is_unanimous,
+               bool tilt_is_known, Time last_used);
   /// The scan was used.
   void used() { unanimous_since_.reset(); }
-  /// Judges by other options from now on.
-  void tune(const SmootherOptions& options) { options_ = options; }
 
  private:
-  SmootherOptions options_;
   std::optional<Time> unanimous_since_;  ///< first stamp of the run of unanimous rejected scans
 };
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <vector>
 
@@ -25,6 +26,7 @@ class OffsetBlocks {
   /// The block of a scan.
   Block& of(Window& window, Time stamp);
 
+  std::size_t steps() const { return steps_; }  ///< so far, of all radars that share t_O
   const Block& newest() const { return *epochs_.back().block; }
   /// t_O [s]; before the start, the value it is configured to begin at.
   double value() const { return epochs_.empty() ? options_.time_offset_initial : newest().x[0]; }
@@ -40,6 +42,7 @@ class OffsetBlocks {
   SmootherOptions options_;  // read-only after construction, as the next
   std::shared_ptr<const Manifold> manifold_;
   std::vector<Epoch> epochs_;  ///< those still in the window
+  std::size_t steps_ = 0;
 };
 
 }  // namespace rio_t

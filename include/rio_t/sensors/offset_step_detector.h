@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+
 #include "rio_t/core/time.h"
 #include "rio_t/sensors/innovation.h"
 
@@ -7,9 +9,10 @@ namespace rio_t {
 
 struct OffsetStepDetectorOptions {
   bool enabled = true;
-  double memory = 4.0;         ///< [s] time constant of the average over scans
+  double memory = 4.0;         ///< [s] longest time constant of the average over scans
   double significance = 6.0;   ///< [sigma] of the change that the innovations ask for
   double min_change = 5.0e-3;  ///< [s] the random walk of the offset follows smaller steps
+  double max_change = 0.5;     ///< [s] from bound to bound: no offset steps farther
 };
 
 /// Detects steps of the time offset. A driver that restarts may change the offset by many sigma, and a
@@ -18,7 +21,8 @@ struct OffsetStepDetectorOptions {
 /// An offset that is wrong by c shows as innovations d = J c + noise, J = d(velocity)/d(t_O). The weighted
 /// average over the last scans, sum(J' S^-1 d) / sum(J' S^-1 J), is the change that they ask for. The
 /// variance of this change is 1 / sum(J' S^-1 J), scaled by the scatter of the innovations against S
-/// (docs/method.md, eq. 32).
+/// (docs/method.md, eq. 32). Several averages run side by side, each over half the time of the one before: a
+/// long one sees small steps, and a short one sees a step before the scans from before it are forgotten.
 class OffsetStepDetector {
  public:
   explicit OffsetStepDetector(const OffsetStepDetectorOptions& options) : options_(options) {}
@@ -28,12 +32,18 @@ class OffsetStepDetector {
   bool stepped(const Innovation& innovation);
 
  private:
+  /// Sums over the scans, fading.
+  struct Average {
+    double information = 0.0;  ///< J' S^-1 J
+    double projection = 0.0;   ///< J' S^-1 d
+    double squares = 0.0;      ///< d' S^-1 d
+    double count = 0.0;        ///< 3
+  };
+  bool showsStep(const Average& average) const;
+
   OffsetStepDetectorOptions options_;  // read-only after construction
   Time last_;
-  double information_ = 0.0;  ///< sum J' S^-1 J, fading
-  double projection_ = 0.0;   ///< sum J' S^-1 d, fading
-  double squares_ = 0.0;      ///< sum d' S^-1 d, fading
-  double count_ = 0.0;        ///< sum 3, fading
+  std::array<Average, 4> averages_;  ///< the first over `memory`
 };
 
 }  // namespace rio_t

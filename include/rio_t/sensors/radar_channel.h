@@ -112,6 +112,10 @@ class RadarChannel {
  private:
   /// Forgets what an earlier window has shown.
   void forget();
+  /// Forgets what scans have shown of the offset: its new block does not lag.
+  void forgetOffset();
+  /// Does so if the offset stepped. Another radar that shares it may have seen the step.
+  void followOffsetSteps();
   /// What a scan shows, before anything is decided.
   struct Seen {
     std::optional<RadarVelocityPrediction> prediction;
@@ -146,8 +150,10 @@ class RadarChannel {
   /// Without `seen`, it does not tell how it depends on the offset.
   Innovation innovation(Time stamp, const VelocityPrior& prior, const EgoVelocity& measured,
                         const Seen* seen) const;
-  /// Sets what health and a re-initialisation get from the scan.
-  void judge(const RadarScan& scan, const VelocityPrior& prior, double scale, RadarAnswer& answer) const;
+  /// Sets what health and a re-initialisation get from the scan. `had_prior`: its velocity was measured with
+  /// one.
+  void judge(const RadarScan& scan, const VelocityPrior& prior, bool had_prior, double scale,
+             RadarAnswer& answer) const;
 
   RadarChannelOptions options_;  // changed by tune() alone
   EgoVelocityEstimator estimator_;
@@ -159,6 +165,7 @@ class RadarChannel {
   OffsetWidths offset_widths_;
   OffsetStepDetector step_detector_;
   OffsetUncertainty offset_uncertainty_;
+  std::size_t offset_steps_ = 0;  ///< those that the last two know of
   InnovationGate gate_;
 };
 

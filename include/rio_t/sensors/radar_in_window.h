@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "rio_t/factors/doppler_factor.h"
@@ -31,8 +30,6 @@ struct RadarVelocityPrediction {
 /// thread-safe.
 class RadarInWindow {
  public:
-  enum class AddResult { kAdded, kOlderThanWindow, kDuplicateStamp };
-
   /// `T_IR` is the mounting as told. `offset` is shared by the radars that share t_O. `imu` must outlive it.
   RadarInWindow(const SmootherOptions& options, const Extrinsics& T_IR, const Eigen::Vector3d& g_W,
                 const ImuBuffer& imu, std::shared_ptr<OffsetBlocks> offset);
@@ -50,10 +47,12 @@ class RadarInWindow {
   std::optional<Eigen::Vector3d> velocityAt(const FixedLagSmoother& smoother, Time stamp) const;
   /// Whether the scan with that stamp has a term already.
   bool has(Time stamp) const { return std::find(stamps_.begin(), stamps_.end(), stamp) != stamps_.end(); }
-  AddResult add(FixedLagSmoother& smoother, const RadarVelocityMeasurement& z);
-  AddResult add(FixedLagSmoother& smoother, const DopplerMeasurement& z);
+  /// Adds the term of a scan that has none; false if the scan is older than the window.
+  bool add(FixedLagSmoother& smoother, const RadarVelocityMeasurement& z);
+  bool add(FixedLagSmoother& smoother, const DopplerMeasurement& z);
   /// See OffsetBlocks::step.
   void stepOffset(FixedLagSmoother& smoother, Time stamp) { offset_->step(smoother, stamp); }
+  std::size_t offsetSteps() const { return offset_->steps(); }
 
   double offset() const { return offset_->value(); }  ///< t_O [s]
   Extrinsics extrinsics() const { return toExtrinsics(extrinsics_->x.data()); }
@@ -66,8 +65,8 @@ class RadarInWindow {
   /// Adds the block to a window that starts. Returns it if it is estimated.
   std::vector<Block*> addExtrinsics(Window& window, const Extrinsics& T_IR);
   template <class Factor, class Measurement>
-  AddResult addTerm(FixedLagSmoother& smoother, const Measurement& z,
-                    const std::shared_ptr<ceres::LossFunction>& loss);
+  bool addTerm(FixedLagSmoother& smoother, const Measurement& z,
+               const std::shared_ptr<ceres::LossFunction>& loss);
 
   SmootherOptions options_;  // read-only after construction, as the next four
   Extrinsics T_IR_;
@@ -78,8 +77,5 @@ class RadarInWindow {
   std::shared_ptr<Block> extrinsics_;
   std::vector<Time> stamps_;  ///< of the scans in the window
 };
-
-/// Empty for kAdded, else the reason in snake case.
-std::string toString(RadarInWindow::AddResult result);
 
 }  // namespace rio_t

@@ -82,14 +82,6 @@ class BatchSmoother {
   /// Throws std::invalid_argument without a guess, std::runtime_error if the data do not determine a state.
   BatchSolution solve(const BatchProblem& problem) const;
 
-  /// Residual h - z of a velocity at the node of `scan`, which is of the same radar.
-  struct Residual {
-    Eigen::Vector3d value;                  ///< [m/s]
-    Eigen::Matrix3d prediction_covariance;  ///< of h alone [m^2/s^2]
-  };
-  Residual residual(const BatchSolution& solution, const BatchSolution::Scan& scan, std::size_t radar,
-                    const RadarVelocityMeasurement& z) const;
-
  private:
   bool atMeasurement() const { return options_.time_offset_model == TimeOffsetModel::kImu; }
   /// The whole run as one window.

@@ -192,8 +192,8 @@ class BagJob {
     for (ScanResult scan : result.scans) log.addResult(scan);
     RunSummary summary;
     summary.mode = "batch";
-    summary.batch = BatchSummary{result.solution.iterations, result.solution.placements,
-                                 result.solution.converged(), result.readmitted};
+    summary.batch =
+        BatchSummary{result.solution.iterations, result.solution.placements, result.solution.converged()};
     log.fill(&summary);
     summary.solver_terminations = {{toString(result.solution.termination), 1}};
     if (summary.barometer || summary.ground_vehicle)

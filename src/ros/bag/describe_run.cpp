@@ -114,8 +114,7 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
   if (summary.batch) {
     row("batch", (summary.batch->converged ? "converged after " : "NOT converged after ") +
                      std::to_string(summary.batch->iterations) + " iterations, nodes placed " +
-                     std::to_string(summary.batch->placements) + " times, " +
-                     std::to_string(summary.batch->scans_readmitted) + " scans taken back");
+                     std::to_string(summary.batch->placements) + " times");
   }
   const bool one_radar = summary.radars.size() == 1;
   if (one_radar) describePasses(summary.radars.front(), row);

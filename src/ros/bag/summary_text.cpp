@@ -161,7 +161,6 @@ std::string summaryText(const RunSummary& summary, const std::vector<std::string
     line("batch_iterations", summary.batch->iterations);
     line("batch_placements", summary.batch->placements);
     line("batch_converged", summary.batch->converged);
-    line("scans_readmitted", summary.batch->scans_readmitted);
   }
   if (summary.barometer) addBarometer(lines, *summary.barometer);
   if (summary.ground_vehicle) addGroundVehicle(lines, *summary.ground_vehicle);

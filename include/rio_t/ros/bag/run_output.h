@@ -27,7 +27,6 @@ struct BatchSummary {
   int iterations = 0;
   int placements = 0;  ///< how often the nodes were placed
   bool converged = false;
-  std::uint64_t scans_readmitted = 0;  ///< rejected by the online gate, taken by the batch
 };
 
 /// Where the estimate of a mounting started, and where it ended.

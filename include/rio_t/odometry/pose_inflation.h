@@ -9,12 +9,12 @@ namespace rio_t {
 /// Uncertainty of position and heading that a re-initialisation keeps. No sensor observes them, so it is
 /// added only to what is published. Inside the window, a position known to hundreds of metres would cost the
 /// digits of all other states, and a free heading would wander.
-class PoseDoubt {
+class PoseInflation {
  public:
-  PoseDoubt() = default;
+  PoseInflation() = default;
   /// Keeps the uncertainty of position and heading of `published`. That of the heading spreads from this
   /// position on.
-  explicit PoseDoubt(const NavigationState& published);
+  explicit PoseInflation(const NavigationState& published);
   void addTo(NavigationState& state) const;
 
  private:
@@ -26,7 +26,7 @@ class PoseDoubt {
 /// Uncertainty of the yaw that gaps and saturation of the IMU caused. No sensor observes the yaw, so this
 /// uncertainty stays. A window linearised at different yaws would lose it; therefore it is added to what is
 /// published.
-class YawDoubt {
+class YawInflation {
  public:
   /// `variance` [rad^2] gained at the place `p_W` [m].
   void add(double variance, const Eigen::Vector3d& p_W);

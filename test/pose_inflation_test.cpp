@@ -1,5 +1,5 @@
 // What a new start or a blind IMU leaves unknown of position and heading, in what is published.
-#include "rio_t/odometry/pose_doubt.h"
+#include "rio_t/odometry/pose_inflation.h"
 
 #include <gtest/gtest.h>
 
@@ -31,12 +31,12 @@ Eigen::Matrix3d block(const NavigationState& state, int first) {
   return state.covariance.block<3, 3>(first, first);
 }
 
-TEST(PoseDoubt, KeepsWhatWasPublishedAndSpreadsFromThere) {
+TEST(PoseInflation, KeepsWhatWasPublishedAndSpreadsFromThere) {
   NavigationState published = stateAt({5.0, 1.0, 0.0});
   published.covariance.block<3, 3>(StateBlock::kP, StateBlock::kP).diagonal() << 0.04, 0.09, 0.01;
   const Eigen::Vector3d up_I = published.q_WI.conjugate() * Eigen::Vector3d::UnitZ();
   published.covariance.topLeftCorner<3, 3>() = kHeading * kHeading * up_I * up_I.transpose();
-  const PoseDoubt doubt(published);
+  const PoseInflation doubt(published);
 
   NavigationState there = stateAt(published.p_W);
   doubt.addTo(there);
@@ -52,15 +52,15 @@ TEST(PoseDoubt, KeepsWhatWasPublishedAndSpreadsFromThere) {
   EXPECT_NEAR(block(ahead, StateBlock::kP)(1, 1), 0.09 + std::pow(30.0 * kHeading, 2), 1e-9);
 }
 
-TEST(PoseDoubt, NoneAddsNothing) {
+TEST(PoseInflation, NoneAddsNothing) {
   NavigationState state = stateAt({5.0, 1.0, 0.0});
-  PoseDoubt().addTo(state);
-  YawDoubt().addTo(state);
+  PoseInflation().addTo(state);
+  YawInflation().addTo(state);
   EXPECT_EQ(state.covariance, StateCovariance::Zero());
 }
 
-TEST(YawDoubt, AddsWhatTheWindowForgot) {
-  YawDoubt doubt;
+TEST(YawInflation, AddsWhatTheWindowForgot) {
+  YawInflation doubt;
   doubt.add(kHeading * kHeading, {5.0, 1.0, 0.0});
   NavigationState ahead = stateAt({35.0, 1.0, 0.0});
   doubt.addTo(ahead);
@@ -70,8 +70,8 @@ TEST(YawDoubt, AddsWhatTheWindowForgot) {
   EXPECT_NEAR(block(ahead, StateBlock::kP)(0, 0), 0.75 * std::pow(kHeading, 4) * 30.0 * 30.0, 1e-9);
 }
 
-TEST(YawDoubt, AddsNoTurnWhereTheWindowStillKnowsOfIt) {
-  YawDoubt doubt;
+TEST(YawInflation, AddsNoTurnWhereTheWindowStillKnowsOfIt) {
+  YawInflation doubt;
   doubt.add(kHeading * kHeading, {5.0, 1.0, 0.0});
   NavigationState state = stateAt({35.0, 1.0, 0.0});
   const Eigen::Vector3d up_I = state.q_WI.conjugate() * Eigen::Vector3d::UnitZ();

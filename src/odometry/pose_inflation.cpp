@@ -1,4 +1,4 @@
-#include "rio_t/odometry/pose_doubt.h"
+#include "rio_t/odometry/pose_inflation.h"
 
 #include <algorithm>
 
@@ -27,23 +27,23 @@ double headingVariance(const NavigationState& state) {
 
 }  // namespace
 
-PoseDoubt::PoseDoubt(const NavigationState& published)
+PoseInflation::PoseInflation(const NavigationState& published)
     : position_(published.covariance.block<3, 3>(S::kP, S::kP)),
       heading_(headingVariance(published)),
       pivot_W_(published.p_W) {}
 
-void PoseDoubt::addTo(NavigationState& state) const {
+void PoseInflation::addTo(NavigationState& state) const {
   state.covariance.block<3, 3>(S::kP, S::kP) += position_;
   const StateTangent turn = turnAbout(pivot_W_, state);
   state.covariance += heading_ * turn * turn.transpose();
 }
 
-void YawDoubt::add(double variance, const Eigen::Vector3d& p_W) {
+void YawInflation::add(double variance, const Eigen::Vector3d& p_W) {
   variance_ += variance;
   lost_at_W_ = p_W;
 }
 
-void YawDoubt::addTo(NavigationState& state) const {
+void YawInflation::addTo(NavigationState& state) const {
   if (variance_ == 0.0) return;
   const double missing = variance_ - headingVariance(state);
   if (missing > 0.0) {
