@@ -65,5 +65,35 @@ TEST(AngleRegression, ItsErrorDoesNotCorrelateWithIt) {
   EXPECT_LT(std::abs(covariance), 0.02 * of_expected);
 }
 
+// A drone climbs: the points come into a narrow band at the edge of the view. The wide scans from before must
+// not make noise pass for spread.
+TEST(AngleRegression, ARadarThatComesToAnotherViewSeesItsSpread) {
+  const double noise = 0.08;
+  Noise draw(3);
+  PointNoise learned{PointVariances()};
+  const auto directions = [&](double within) {
+    std::vector<RadarDirection> points;
+    for (std::size_t i = 0; i < 40; ++i) {
+      const double elevation = within * draw() + noise * draw();
+      points.push_back({{0.0, std::cos(elevation), std::sin(elevation)}, 0.0, i});
+    }
+    return points;
+  };
+  const auto shareOfTruth = [&](double within) {
+    const std::vector<RadarDirection> points = directions(within);
+    learned.learnSpread(points);
+    std::vector<double> elevations;
+    for (const RadarDirection& p : points) elevations.push_back(std::asin(p.u_R.z()));
+    const AngleRegression regression(elevations, noise * noise, learned.variances().elevations);
+    return regression.expected(1.0) - regression.expected(0.0);
+  };
+  for (int k = 0; k < 500; ++k) shareOfTruth(0.3);
+  EXPECT_GT(learned.variances().elevations.within_freedom, 100.0) << "one view";
+  for (int k = 0; k < 20; ++k) shareOfTruth(0.08);
+  double share = 0.0;
+  for (int k = 0; k < 20; ++k) share += shareOfTruth(0.08) / 20.0;
+  EXPECT_NEAR(share, 0.5, 0.1) << "half of what the narrow view shows is noise";
+}
+
 }  // namespace
 }  // namespace rio_t

@@ -3,11 +3,21 @@
 #include <cmath>
 #include <numeric>
 
+#include "direction_noise.h"
+
 namespace rio_t {
 namespace {
 
 /// Share of a variance that is not noise.
 double trueShare(double variance, double noise) { return variance > noise ? 1.0 - noise / variance : 0.0; }
+
+/// The variance about the mean of this scan, as this scan and earlier ones show it together.
+double varianceWithin(const std::vector<double>& angles, double mean, const AngleSpread& spread) {
+  if (!std::isfinite(spread.within_freedom)) return spread.within;
+  double squares = spread.within_freedom * spread.within;
+  for (const double angle : angles) squares += square(angle - mean);
+  return squares / (spread.within_freedom + static_cast<double>(angles.size()) - 1.0);
+}
 
 }  // namespace
 
@@ -18,7 +28,7 @@ AngleRegression::AngleRegression(const std::vector<double>& measured, double noi
   mean_ = scan_mean_;
   remaining_ = noise;
   if (!std::isfinite(spread.variance)) return;
-  share_ = trueShare(spread.within, noise);
+  share_ = trueShare(varianceWithin(measured, scan_mean_, spread), noise);
   const double of_means = spread.variance - spread.within + spread.within / n;
   const double mean_share = trueShare(of_means, noise / n);
   mean_ = spread.mean + mean_share * (scan_mean_ - spread.mean);

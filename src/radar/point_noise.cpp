@@ -16,6 +16,11 @@ constexpr double kStartPoints = 10.0;
 /// [scans] that PointNoise remembers, 100 s at 10 Hz. At a walk they show the elevation noise, which shows
 /// least, to 3 %.
 constexpr double kMemory = 1000.0;
+/// [scans] over which the spread of the directions is watched for changes: a platform turns to another view
+/// in seconds.
+constexpr double kViewMemory = 100.0;
+/// A scan of fewer points hardly shows how far its directions spread.
+constexpr double kFewPoints = 5.0;
 /// [m/s] Residuals up to this size show how many outliers there are.
 constexpr double kOutlierSpan = 1.0;
 /// An angle or a Doppler with more noise is no measurement.
@@ -28,6 +33,13 @@ constexpr double kMinVariance = 1e-4;
 
 /// Share of a new scan in what is known, after so many scans.
 double forgotten(double scans) { return std::max(1.0 / kMemory, 1.0 / (scans + 1.0)); }
+
+/// Of a variance with so many degrees of freedom: the trigamma function of their half.
+double varianceOfLogarithm(double freedom) {
+  const double x = 0.5 * freedom;
+  const double y = x + 1.0;
+  return 1.0 / (x * x) + 1.0 / y + 0.5 / (y * y) + 1.0 / (6.0 * y * y * y);
+}
 
 Eigen::Vector3d vectorOf(const PointVariances& noise) {
   return {noise.doppler, noise.azimuth, noise.elevation};
@@ -69,8 +81,13 @@ void PointNoise::AngleMoments::add(const std::vector<double>& angles, double kep
     squares += square(angle);
   }
   all = kept * all + Eigen::Vector3d(n, sum, squares);
-  within = kept * within + squares - sum * sum / n;
+  const double own = squares - sum * sum / n;
+  within = kept * within + own;
   freedom = kept * freedom + n - 1.0;
+  if (n < kFewPoints || own <= 0.0) return;
+  const double logarithm = std::log(own / (n - 1.0) / (within / freedom));
+  scatter = (1.0 - 1.0 / kViewMemory) * scatter +
+            Eigen::Vector3d(square(logarithm), varianceOfLogarithm(n - 1.0), 1.0);
 }
 
 AngleSpread PointNoise::AngleMoments::spread() const {
@@ -78,6 +95,8 @@ AngleSpread PointNoise::AngleMoments::spread() const {
   spread.mean = all[1] / all[0];
   spread.variance = std::max(0.0, all[2] / all[0] - square(spread.mean));
   spread.within = freedom > 0.0 ? std::min(within / freedom, spread.variance) : spread.variance;
+  const double excess = scatter[2] > 0.0 ? (scatter[0] - scatter[1]) / scatter[2] : 0.0;
+  if (excess > 0.0) spread.within_freedom = (1.0 + std::sqrt(1.0 + 2.0 * excess)) / excess;
   return spread;
 }
 

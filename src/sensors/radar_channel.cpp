@@ -267,6 +267,9 @@ Innovation RadarChannel::innovation(Time stamp, const VelocityPrior& prior, cons
   result.S = prior.covariance + measured.covariance;
   if (seen == nullptr || !seen->prediction) return result;
   result.S_at_offset = seen->prediction->scan.predicted + measured.covariance;
+  // The scale of the model errors takes a step for noise: with its part, the scans after a step would count
+  // for little.
+  result.S_at_offset.diagonal() -= measured.told_variance;
   // The prediction holds the noise before the scan. A derivative with the same noise would let both look like
   // a wrong offset.
   result.J_O = offset_widths_.gain() * seen->dv_dt_O.after;

@@ -21,6 +21,8 @@ struct AngleSpread {
   double mean = 0.0;                                          ///< of all points [rad]
   double variance = std::numeric_limits<double>::infinity();  ///< about it
   double within = std::numeric_limits<double>::infinity();    ///< about the mean of their scan
+  /// For the variance of a scan, earlier scans count as so many squares: few if the scans differ.
+  double within_freedom = std::numeric_limits<double>::infinity();
 };
 
 /// Noise of a point, independent from point to point, and what points to expect.
@@ -71,6 +73,9 @@ class PointNoise {
     Eigen::Vector3d all = Eigen::Vector3d::Zero();  // of the powers 0, 1 and 2
     double within = 0.0;                            // squares about the mean of the scan
     double freedom = 0.0;                           // of these squares
+    // Over the last scans: squares of the logarithms of their variances over `within`, those that chance
+    // gives, and their number.
+    Eigen::Vector3d scatter = Eigen::Vector3d::Zero();
     void add(const std::vector<double>& angles, double kept);
     AngleSpread spread() const;
   };
