@@ -92,15 +92,23 @@ using diagnostic_msgs::DiagnosticStatus;
 
 TEST_F(TwoRadarDiagnostics, CountForEachRadar) {
   ASSERT_TRUE(session.odometry().initialized());
-  monitor.dropped(0, "scan_not_usable");
+  monitor.dropped(0, "cloud_not_usable");
   const Status status = second(20, 10, 9);
   EXPECT_EQ(status.level, DiagnosticStatus::OK) << status.message;
   EXPECT_EQ(value(status, "left/scans"), "20");
   EXPECT_EQ(value(status, "right/scans"), "10");
   EXPECT_EQ(value(status, "right/scans_used"), "9");
-  EXPECT_EQ(value(status, "left/dropped_scan_not_usable"), "1");
+  EXPECT_EQ(value(status, "left/dropped_cloud_not_usable"), "1");
   EXPECT_EQ(value(status, "right/dropped_innovation"), "1");
   EXPECT_EQ(value(status, "left/triggers"), "no left/triggers") << "it needs none";
+}
+
+TEST_F(TwoRadarDiagnostics, NameTheCauseOfScansThatCannotBeUsed) {
+  for (const char* reason : {"cloud_not_usable", "stamp_zero"}) {
+    monitor.reset("~reset called");
+    monitor.dropped(0, reason, 30);
+    EXPECT_EQ(value(odometry(session), "likely_cause_1").find("30 of 30 scans of radar left"), 0U) << reason;
+  }
 }
 
 TEST_F(TwoRadarDiagnostics, NameTheRadarThatIsSilent) {

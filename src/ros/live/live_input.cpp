@@ -82,7 +82,7 @@ void LiveOdometry::onScan(std::size_t radar, const Event<sensor_msgs::PointCloud
   Radar& from = radars_[radar];
   monitor_.scan(radar);
   from.scan_rate->tick();
-  std::string what = "cloud_not_usable";  // each has its own turn to be told
+  std::string what = "cloud_not_usable";  // as the bag runner calls it
   try {
     DecodedScan decoded;
     try {
@@ -101,12 +101,12 @@ void LiveOdometry::onScan(std::size_t radar, const Event<sensor_msgs::PointCloud
     }
     RadarScan scan = toRadarScan(decoded.cloud, Time());
     scan.radar = radar;
-    what = "stamp_not_usable";
+    what = "stamp_zero";
     account(now->addScan(message.header.seq, toTime(message.header.stamp), toTime(event.getReceiptTime()),
                          std::move(scan)));
     wakeSolver();
   } catch (const std::exception& error) {
-    monitor_.dropped(radar, "scan_not_usable");
+    monitor_.dropped(radar, what);
     if (isTimeToTell(what + " " + from.config.radar_topic))
       ROS_ERROR_STREAM(beginning(name_, from.config) << error.what());
   }
