@@ -152,6 +152,23 @@ class LiveTest(tester.LiveTestCase):
             with tester.feed(listener, self.bag, start=0.5, duration=4.5):
                 listener.wait_for("odometry again", lambda: len(listener.messages["odom"]) > heard)
 
+    def test_an_odd_stamp_resets_nothing(self):
+        """One scan is stamped so early that the stamp minus the offset, its time of measurement, is below zero."""
+        odd = self.scan_stamps[80]
+
+        def edit(topic, message):
+            if topic == tester.RADAR and message.header.stamp.to_nsec() == odd:
+                message.header.stamp = rospy.Time(0, 1000)
+        bag = tester.edited(self.bag, self.path("odd.bag"), edit)
+        with tester.Listener() as listener, tester.node("config:=irs"):
+            listener.wait_until_heard()
+            with tester.feed(listener, bag, answers={}) as player:
+                player.wait()
+            listener.wait_for_stamp("odom_optimized", self.scan_stamps[-3])
+            listener.wait_for("a diagnosis after the last sample", lambda: int(
+                listener.value("input", "imu_messages") or 0) == len(self.imu_stamps))
+            self.assertEqual(listener.value("odometry", "resets"), "0")
+
     def test_looping_bag_resets_and_runs_again(self):
         with tester.Listener() as listener, tester.node("config:=irs"):
             listener.wait_until_heard()

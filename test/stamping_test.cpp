@@ -81,6 +81,23 @@ TEST(Stamping, HeaderStampsAreKeptToTheNanosecondAndShifted) {
   EXPECT_TRUE(stamper.take().empty());
 }
 
+TEST(Stamping, AShiftedStampThatNoMessageCanHoldIsGivenUp) {
+  StampingOptions with_shift = options(StampSource::kHeader);
+  with_shift.shift = -1.0;
+  ScanStamper below(with_shift);
+  below.addScan(1, Time::fromSeconds(0.5), recordTime(0), RadarScan());
+  below.addScan(2, Time::fromSeconds(1.5), recordTime(1), RadarScan());
+  const std::vector<RadarScan> scans = below.take();
+  ASSERT_EQ(scans.size(), 1u);
+  EXPECT_EQ(scans[0].stamp, Time::fromSeconds(0.5));
+  EXPECT_EQ(below.givenUp().at("stamp_out_of_range"), 1u);
+  with_shift.shift = 2e9;
+  ScanStamper above(with_shift);
+  above.addScan(1, Time::fromSeconds(3e9), recordTime(0), RadarScan());
+  EXPECT_TRUE(above.take().empty());
+  EXPECT_EQ(above.givenUp().at("stamp_out_of_range"), 1u);
+}
+
 TEST(Stamping, ZeroHeaderStampIsRefusedWithTheOtherSources) {
   ScanStamper stamper(options(StampSource::kHeader));
   try {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <stdexcept>
 
 #include "rio_t/inspection/stream_timing.h"
@@ -16,6 +18,9 @@ constexpr double kClockMapSpan = 60.0;  // [s]
 // No transport delays the IMU by more for so many samples; and if one did, its scans would be as late.
 constexpr std::int64_t kJump_ns = 500'000'000;
 constexpr int kJumpSamples = 20;
+// A message holds no later stamp: its seconds have 32 bits.
+constexpr Time kNewestStamp =
+    Time::fromNanoseconds(std::int64_t{1'000'000'000} * std::numeric_limits<std::uint32_t>::max());
 
 }  // namespace
 
@@ -101,8 +106,13 @@ std::vector<RadarScan> ScanStamper::take() {
       giveUp(options_.source == StampSource::kTrigger ? "trigger_missing" : "imu_missing");
       continue;
     }
+    stamp = stamp + options_.shift;
+    if (stamp < Time() || stamp > kNewestStamp) {
+      giveUp("stamp_out_of_range");
+      continue;
+    }
     stamped.push_back(std::move(held_.front().scan));
-    stamped.back().stamp = stamp + options_.shift;
+    stamped.back().stamp = stamp;
     held_.pop_front();
   }
   return stamped;

@@ -425,7 +425,8 @@ void LiveOdometry::solve() {
         if (result.result.updated) frames.body = frames_.place(*now, result.result.state, rate_sigma);
         frames.world = now->world();
         const bool current = session_.speak(Speaker::kOptimisation, now, [&] {
-          publisher_.result(result, frames);
+          // Not a fault of the estimator: `stamp - t_O` of an odd stamp may be no time that ROS can hold.
+          guarded("a result was not published", [&] { publisher_.result(result, frames); });
           tellHealth(result.result);
           monitor_.result(result);
         });

@@ -59,6 +59,7 @@ StampingOptions stampingOptions(const Config& config);
 ///  A scan waits `max_delay` for its trigger, and `max_overtake` once a later trigger came.
 ///  A scan that cannot be decided yet is held, and those after it wait with it, so that order is kept.
 ///  One whose trigger never comes is given up and counted; no trigger serves two scans.
+/// A scan is given up, too, if its shifted stamp is below zero or later than a message can hold.
 class ScanStamper {
  public:
   explicit ScanStamper(StampingOptions options);
@@ -76,7 +77,8 @@ class ScanStamper {
   std::vector<RadarScan> finish();
 
   std::size_t held() const { return held_.size(); }
-  /// Scans given up by reason, in snake case: "trigger_missing", "imu_missing", "too_many_held".
+  /// Scans given up by reason, in snake case: "trigger_missing", "imu_missing", "too_many_held",
+  /// "stamp_out_of_range".
   const std::map<std::string, std::uint64_t>& givenUp() const { return given_up_; }
 
  private:
