@@ -169,6 +169,23 @@ class LiveTest(tester.LiveTestCase):
                 listener.value("input", "imu_messages") or 0) == len(self.imu_stamps))
             self.assertEqual(listener.value("odometry", "resets"), "0")
 
+    def test_a_gap_of_samples_that_are_not_finite_resets_node_and_estimator_at_once(self):
+        first, last = (self.imu_stamps[0] + int(s * 1e9) for s in (7.0, 9.0))
+
+        def edit(topic, message):
+            if topic == tester.IMU and first <= message.header.stamp.to_nsec() <= last:
+                message.linear_acceleration.x = float("nan")
+        bag = tester.edited(self.bag, self.path("not_finite.bag"), edit)
+        with tester.Listener() as listener, tester.node("config:=irs", "max_bridged_imu_gap:=1.0", "imu_jump_patience:=0.1"):
+            listener.wait_until_heard()
+            with tester.feed(listener, bag, answers={}) as player:
+                player.wait()
+            listener.wait_for("a diagnosis after the last sample", lambda: int(
+                listener.value("input", "imu_messages") or 0) == len(self.imu_stamps))
+            self.assertEqual(listener.value("odometry", "resets"), "1")
+            self.assertIn("jumped ahead by 2.", listener.value("odometry", "last_reset_because"))
+            self.assertIsNone(listener.value("input", "fault_imu_clock_restart"), "the session is a new one")
+
     def test_looping_bag_resets_and_runs_again(self):
         with tester.Listener() as listener, tester.node("config:=irs"):
             listener.wait_until_heard()

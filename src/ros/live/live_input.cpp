@@ -18,18 +18,7 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
   try {
     const ImuMeasurement imu =
         toImuMeasurement(*event.getConstMessage(), config_.imu_topic, config_.imu_units);
-    // The same judgement as the session's own, so that the whole session starts again, with what it stamps
-    // by.
-    const ClockJumpDetector::Verdict stamp = imu_stamps_.check(imu.time);
-    if (stamp == ClockJumpDetector::Verdict::kRestart) {
-      const double jump = imu.time - *newest_imu_;
-      reset(std::string("the IMU's stamps jumped ") + (jump < 0.0 ? "back" : "ahead") + " by " +
-                std::to_string(std::abs(jump)) + " s",
-            true);
-      early_imu_.clear();
-    }
-    if (stamp == ClockJumpDetector::Verdict::kGood || stamp == ClockJumpDetector::Verdict::kRestart)
-      newest_imu_ = imu.time;
+    followImuStamps(imu);
     frames_.hear(event.getConstMessage()->header.frame_id);
     const Received received{imu, toTime(event.getReceiptTime())};
     const Session now = session_.get();
@@ -67,6 +56,21 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
     monitor_.imuDropped("imu_not_usable");
     if (isTimeToTell("imu_not_usable")) ROS_ERROR_STREAM(name_ << ": " << error.what());
   }
+}
+
+void LiveOdometry::followImuStamps(const ImuMeasurement& imu) {
+  // The same judgement as the session's own, so that the whole session starts again, with what it stamps by.
+  if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite()) return;  // the session drops it
+  const ClockJumpDetector::Verdict stamp = imu_stamps_.check(imu.time);
+  const bool restarts = stamp == ClockJumpDetector::Verdict::kRestart;
+  if (restarts) {
+    const double jump = imu.time - *newest_imu_;
+    reset(std::string("the IMU's stamps jumped ") + (jump < 0.0 ? "back" : "ahead") + " by " +
+              std::to_string(std::abs(jump)) + " s",
+          true);
+    early_imu_.clear();
+  }
+  if (restarts || stamp == ClockJumpDetector::Verdict::kGood) newest_imu_ = imu.time;
 }
 
 std::optional<NavigationState> LiveOdometry::feed(LiveSession& session, const Received& received,
