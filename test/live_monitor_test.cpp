@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdio>
+#include <limits>
 #include <string>
 
 #include "rio_t/core/so3.h"
@@ -161,6 +162,19 @@ TEST_F(TwoRadarDiagnostics, AreAnErrorWithItsCauseWhereNoScanWasEverUsed) {
   EXPECT_EQ(value(diverges, "health"), "diverged");
   EXPECT_EQ(diverges.message.find("diverged: do not trust the estimate; finding the state anew" + cause), 0U)
       << diverges.message;
+}
+
+TEST_F(TwoRadarDiagnostics, TakeTheShareOfFaultySamplesSinceTheReset) {
+  for (int k = 0; k < 10000; ++k) monitor.imu();
+  monitor.reset("~reset called");
+  LiveSession fresh(config, config.odometry);
+  rest(fresh, 0, 4);
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  for (int k = 0; k < 200; ++k)
+    fresh.addImu({Time::fromSeconds(4.0 + 0.0025 * k), {kNan, 0.0, 0.0}, {0.0, 0.0, 9.81}});
+  for (int k = 0; k < 1800; ++k) monitor.imu();
+  EXPECT_EQ(value(odometry(fresh), "likely_cause_1").find("200 IMU samples are not finite."), 0U)
+      << value(odometry(fresh), "likely_cause_1");
 }
 
 TEST_F(TwoRadarDiagnostics, TellTheStateOfTheNewestImuSampleThoughNoScanComes) {

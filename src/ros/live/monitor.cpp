@@ -164,6 +164,7 @@ void LiveMonitor::reset(const std::string& reason) {
   const std::lock_guard<std::mutex> lock(mutex_);
   ++resets_;
   collector_ = EvidenceCollector(config_);
+  imu_before_session_ = imu_.count;
   last_reset_ = reason;
   last_terminations_.clear();
   last_update_.reset();
@@ -220,7 +221,7 @@ void LiveMonitor::reconfigured(const std::string& refused_because) {
 
 std::string LiveMonitor::addDiagnosis(Status& status, const LiveSession& session) const {
   RunEvidence evidence = collector_.evidence(session.odometry(), session.start());
-  evidence.imu_count = imu_.count;
+  evidence.imu_count = imu_.count - imu_before_session_;
   const Diagnosis diagnosis = diagnose(evidence, config_);
   if (evidence.initialized) status.add("verdict", toString(diagnosis.verdict));
   for (std::size_t i = 0; i < diagnosis.causes.size(); ++i) {
