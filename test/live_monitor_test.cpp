@@ -244,6 +244,15 @@ TEST_F(TwoRadarDiagnostics, DoNotJudgeScansThatCameBeforeTheStart) {
   }
 }
 
+TEST_F(TwoRadarDiagnostics, DoNotDoubtARunWhoseScansLongWaitedForTf) {
+  for (const char* reason : {"scan_before_extrinsics", "frame_not_usable"}) monitor.dropped(0, reason, 100);
+  for (int k = 0; k < 30; ++k) feed(0, true);
+  for (int k = 0; k < 1600; ++k) monitor.imu();
+  const Status status = odometry(session);
+  EXPECT_EQ(value(status, "verdict"), "good");
+  EXPECT_EQ(value(status, "likely_cause_1"), "no likely_cause_1");
+}
+
 TEST_F(TwoRadarDiagnostics, HaveATimeOffsetForEachRadar) {
   update(0, 9.0, 0.03, kMountings[0]);
   update(1, 9.5, -0.01, kMountings[1]);
