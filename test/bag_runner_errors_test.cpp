@@ -199,6 +199,7 @@ TEST_F(BagRunnerErrors, WrongParametersAndArgumentsAreNamed) {
   expectError(run({"--config", "irs"}), {"config", "more than once"}, 2);
   expectError(run({"--bag="}), {"--bag"}, 2);
   expectError(run({bag_}), {"expected each bag once"}, 2);
+  expectError(run({folder_ + "/./test.bag"}), {"expected each bag once"}, 2);
   expectError(runTool({"--config", "irs"}), {"missing argument BAG"}, 2);
   expectError(runTool({}), {"missing argument BAG --config"}, 2);
 }

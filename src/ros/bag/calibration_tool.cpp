@@ -48,14 +48,9 @@ void addOptions(OptionSet& options, Arguments& a) {
 
 /// Before the work, so that a wrong path costs no time.
 void checkFiles(const Arguments& arguments, const std::string& config_file) {
-  for (std::size_t i = 0; i < arguments.bags.size(); ++i) {
-    const std::string& bag = arguments.bags[i];
+  for (const std::string& bag : arguments.bags) {
     if (!fs::is_regular_file(bag))
       throw std::runtime_error("--bag " + bag + ": no such file; expected a bag");
-    for (std::size_t k = 0; k < i; ++k) {
-      if (isSameFile(bag, arguments.bags[k]))
-        throw std::runtime_error("--bag " + bag + ": expected each bag once, since it would count twice");
-    }
     if (isSameFile(arguments.out, bag))
       throw std::runtime_error("--out " + arguments.out + ": expected another file than that of --bag");
   }

@@ -249,8 +249,8 @@ void addBagOptions(OptionSet& options, std::vector<std::string>& bags, std::stri
                    ParameterEntries& set) {
   options.values("bag", "BAG", "a bag with IMU and radar; `--bag` itself may be left out",
                  [&bags](const std::string& bag) {
-                   if (std::find(bags.begin(), bags.end(), bag) != bags.end())
-                     throw UsageError(bag + ": expected each bag once");
+                   for (const std::string& other : bags)
+                     if (isSameFile(bag, other)) throw UsageError(bag + ": expected each bag once");
                    bags.push_back(bag);
                  });
   options.positional("bag");
