@@ -8,10 +8,8 @@
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <std_msgs/Header.h>
-#include <sys/resource.h>
 
 #include <algorithm>
-#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -19,6 +17,7 @@
 #include <iterator>
 #include <map>
 
+#include "full_disk.h"
 #include "rio_t/simulation/motions.h"
 #include "rio_t/simulation/presets.h"
 #include "temporary_folder.h"
@@ -108,26 +107,6 @@ Fields fieldsOf(const sensor_msgs::PointCloud2& cloud) {
 }
 
 std::int64_t nanoseconds(const ros::Time& time) { return static_cast<std::int64_t>(time.toNSec()); }
-
-/// No file of this process grows beyond so many bytes: as on a full disk, writing fails with an error.
-class FullDisk {
- public:
-  explicit FullDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit small = {bytes, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &small);
-  }
-  ~FullDisk() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-
- private:
-  rlimit before_ = {};
-  void (*handler_)(int);
-};
 
 TEST(SimulationBag, AFullDiskIsAnErrorThatNamesTheBagAndLeavesNone) {
   const Written whole({});

@@ -302,7 +302,7 @@ class BagJob {
   bool truth_in_bag_ = false;
   Trajectory truth_;
   std::optional<std::runtime_error> truth_error_;  // why it does not judge what was last finished
-  std::unique_ptr<RunOutput> output_;  // null: no files
+  std::unique_ptr<RunOutput> output_;              // null: no files
   std::chrono::steady_clock::time_point started_;
 };
 
