@@ -265,6 +265,8 @@ class BagJob {
         if (done - told > 0.01) run_.progress(from + (to - from) * (told = done));
       }
       player.finish();
+    } catch (const OutputError&) {
+      throw;
     } catch (const std::exception& error) {
       throw bagError(bags_.name(), error.what());
     }
