@@ -245,7 +245,8 @@ void LiveOdometry::onReconfigure(LiveParameters& values) {
     ROS_ERROR_STREAM(name_ << ": the change of parameters was refused, nothing was changed: "
                            << error.what());
   }
-  if (refused_because.empty()) showEffectiveParameters(private_node_, live_config_);
+  // Without a master this would wait for one, and the input with it.
+  if (refused_because.empty() && ros::master::check()) showEffectiveParameters(private_node_, live_config_);
   monitor_.reconfigured(refused_because);
   values = LiveParameters(live_config_);
 }
