@@ -239,6 +239,34 @@ TEST(Stamping, ATriggerThatComes100MsAfterItsScanIsItsTriggerOnceTheyCountAlike)
   }
 }
 
+TEST(Stamping, AClockOfReceiptThatIsSetBackCostsNoScan) {
+  ScanStamper stamper(options(StampSource::kTrigger));
+  std::vector<RadarScan> all;
+  for (int ms = 0; ms < 4000; ++ms) {
+    const Time record = recordTime(1e-3 * ms + (ms < 2095 ? 0.0 : -30.0));  // a scan waits for its trigger
+    stamper.addImu(imuTime(1e-3 * ms), record);
+    const auto seq = static_cast<std::uint32_t>(7 + ms / 100);
+    if (ms % 100 == 90) stamper.addScan(seq, Time(), record, RadarScan());
+    if (ms % 100 == 99) stamper.addTrigger(seq, imuTime(1e-3 * (ms - 99)), record);  // overtaken
+    append(stamper.take(), &all);
+  }
+  append(stamper.finish(), &all);
+  const std::vector<double> stamps = seconds(all);
+  ASSERT_EQ(stamps.size(), 40u);
+  for (int k = 0; k < 40; ++k) EXPECT_NEAR(stamps[k], 0.1 * k, 1e-9);
+}
+
+TEST(Stamping, AScanThatIsHandedOverLateDoesNotSetTheClockBack) {
+  ScanStamper stamper(options(StampSource::kTrigger));
+  stamper.addTrigger(7, imuTime(0.0), recordTime(0.0));
+  stamper.addScan(7, Time(), recordTime(0.03), RadarScan());
+  EXPECT_EQ(stamper.take().size(), 1u);
+  stamper.addTrigger(8, imuTime(0.1), recordTime(0.1));
+  stamper.addImu(imuTime(2.0), recordTime(2.0));
+  stamper.addScan(8, Time(), recordTime(0.13), RadarScan());
+  EXPECT_EQ(seconds(stamper.take()), std::vector<double>({0.1}));
+}
+
 TEST(Stamping, UnlikeSeqsPairTheLatestTriggerBeforeTheArrival) {
   ScanStamper stamper(options(StampSource::kTrigger));
   const std::vector<double> stamps = seconds(runTriggers(stamper, 0.05, 4000, false));

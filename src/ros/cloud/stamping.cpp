@@ -61,7 +61,21 @@ void ScanStamper::see(Time record) {
   now_ = std::max(now_, record);
 }
 
+void ScanStamper::followStepBack(Time record) {
+  const double step = record - *newest_imu_record_;
+  const auto carryOver = [&](auto& each) {
+    if (each.record - record > options_.max_delay) each.record = each.record + step;
+  };
+  for (Held& scan : held_) carryOver(scan);
+  for (Trigger& trigger : triggers_) carryOver(trigger);
+  if (first_record_) first_record_ = *first_record_ + step;
+  now_ = record;
+}
+
 void ScanStamper::addImu(Time stamp, Time record) {
+  // Samples come in their own order. Scans and triggers may be handed over late, which is no step.
+  if (newest_imu_record_ && record - *newest_imu_record_ < -options_.max_delay) followStepBack(record);
+  newest_imu_record_ = record;
   see(record);
   clocks_.add(stamp, record);
 }

@@ -101,6 +101,8 @@ class ScanStamper {
   Trigger* triggerOfSeq(const Held& scan);
   std::optional<double> triggerPeriod() const;
   void see(Time record);
+  /// The clock of the records was set back to `record`: carries what waits over to it.
+  void followStepBack(Time record);
   void giveUp(const std::string& reason);
 
   const StampingOptions options_;
@@ -108,7 +110,7 @@ class ScanStamper {
   std::deque<Trigger> triggers_;  // the last ones, oldest first
   std::deque<Held> held_;         // oldest first
   std::map<std::string, std::uint64_t> given_up_;
-  std::optional<Time> first_record_;
+  std::optional<Time> first_record_, newest_imu_record_;
   Time now_;  // latest record time seen
   bool finishing_ = false;
   Counting counting_ = Counting::kUnknown;
