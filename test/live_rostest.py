@@ -254,6 +254,12 @@ class LiveTest(tester.LiveTestCase):
         self.assertIn('did you mean "window"', outcome.stdout)
         self.assertIn("/rio_t/gravity", outcome.stdout)
         self.assertIn("(perhaps left by an earlier run: rosparam delete /rio_t)", outcome.stdout)
+        rospy.delete_param("/rio_t")
+        outcome = tester.run(tester.program("rio_t", "rio_t_node"), "__name:=rio_t", "_config:=irs", "_imu_topic:=a b",
+                             "_radar_topic:=~scan")
+        self.assertEqual(outcome.returncode, 1, outcome.stdout)
+        self.assertIn('imu_topic: expected the name of a topic, got "a b"', outcome.stdout)
+        self.assertIn('radar_topic: expected the name of a topic, got "~scan"', outcome.stdout)
         outcome = tester.run(tester.program("rio_t", "rio_t_node"), "__name:=rio_t_2", "_config:=no_such")
         self.assertEqual(outcome.returncode, 1, outcome.stdout)
         self.assertIn("no_such", outcome.stdout)
