@@ -200,20 +200,20 @@ TEST(LiveSession, KeepsThePosesThatLeftTheWindowDuringASilenceThoughTheNextScanI
     return rejected_because;
   };
   for (int k = 0; k < 30 * 200; ++k) {
-    const double t = 0.005 * k;
+    const double t = 1.0 + 0.005 * k;
     session.addImu({Time::fromSeconds(t), Eigen::Vector3d::Zero(), {0.0, 0.0, 9.81}});
-    if (t <= 6.0 && k % 20 == 0) add(t);
+    if (t <= 7.0 && k % 20 == 0) add(t);
     if (k % 10 == 0) process();
   }
   ASSERT_GT(used, 10U);
-  add(4.005);
+  add(5.005);
   EXPECT_EQ(process(), "older_than_window");
   const Trajectory kept = session.trajectory();
   ASSERT_FALSE(kept.empty());
-  EXPECT_GT(kept.back().time, Time::fromSeconds(20.0));
+  EXPECT_GT(kept.back().time, Time::fromSeconds(10.0)) << "the last scan is of 7 s";
   for (std::size_t k = 1; k < kept.size(); ++k) {
     EXPECT_GT(kept[k].time, kept[k - 1].time);
-    EXPECT_LT(kept[k].time - kept[k - 1].time, 2.0);
+    EXPECT_LE(kept[k].time - kept[k - 1].time, 5.0) << "kSilentStep of the estimator";
   }
 }
 
