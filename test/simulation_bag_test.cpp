@@ -378,7 +378,7 @@ TEST(SimulationBag, AKartGivesTheSameBytesAndNoEmptyClouds) {
     simulation::Preset kart = simulation::presetOf("kart");
     kart.options.seed = seed;
     const Motion motion = simulation::makeMotion({kart.motion, seed, 40.0, kart.rest});
-    const SensorData data = simulation::simulate(motion, kart.options);
+    SensorData data = simulation::simulate(motion, kart.options);
     writeSimulationBag(path, motion, data, kart.options.start, SimulationBagOptions{});
     return data;
   };
