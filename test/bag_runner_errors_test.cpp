@@ -5,6 +5,7 @@
 #include <fstream>
 #include <string>
 
+#include "full_disk.h"
 #include "rest_bag.h"
 
 namespace rio_t {
@@ -199,6 +200,7 @@ TEST_F(BagRunnerErrors, WrongParametersAndArgumentsAreNamed) {
   expectError(run({"--config", "irs"}), {"config", "more than once"}, 2);
   expectError(run({"--bag="}), {"--bag"}, 2);
   expectError(run({bag_}), {"expected each bag once"}, 2);
+  expectError(run({folder_ + "/./test.bag"}), {"expected each bag once"}, 2);
   expectError(runTool({"--config", "irs"}), {"missing argument BAG"}, 2);
   expectError(runTool({}), {"missing argument BAG --config"}, 2);
 }
@@ -218,6 +220,14 @@ TEST_F(BagRunnerErrors, AnOutputFolderThatCannotBeIsNamed) {
   expectError(run(), {"output folder", folder_ + "/file"});
   out_ = folder_ + "/file/below";
   expectError(run(), {"output folder", folder_ + "/file/below"});
+}
+
+TEST_F(BagRunnerErrors, AFullDiskIsNotBlamedOnTheBag) {
+  BagContents what;
+  what.duration = 30.0;  // more than the buffer of the trajectory holds
+  writeBag(what);
+  const FullDisk disk(100'000);
+  expectError(run(), {"rio_t_bag: output " + out_ + "/trajectory.txt: writing failed"});
 }
 
 }  // namespace

@@ -180,6 +180,19 @@ TEST_F(BagRunner, GroundTruthComesFromTheTopicOrAFile) {
   expectError(run({"--set", "ground_truth=" + folder_ + "/elsewhen.txt"}), {"ground truth", "elsewhen.txt"});
 }
 
+TEST_F(BagRunner, EveryModeSavesItsEstimateThoughTheGroundTruthDoesNotMatch) {
+  writeBag({});
+  const std::string truth = folder_ + "/elsewhen.txt";
+  std::ofstream(truth) << "5.0 0 0 0 0 0 0 1\n6.0 3 0 0 0 0 0 1\n";
+  for (const std::string mode : {"online", "batch", "refine"}) {
+    out_ = folder_ + "/" + mode;
+    expectError(run({"--set", "ground_truth=" + truth, "--set", "mode=" + mode, "--set", "refine_passes=2"}),
+                {"ground truth", truth});
+    EXPECT_NE(contents(out_ + "/summary.yaml").find("mode: " + mode + "\n"), std::string::npos) << mode;
+    EXPECT_GT(readTum(out_ + "/trajectory.txt").size(), 100U) << mode;
+  }
+}
+
 TEST_F(BagRunner, ATrajectoryThatBeginsAnewIsDoubtful) {
   BagContents what;
   what.duration = 16.0;

@@ -317,9 +317,9 @@ TEST_F(Calibrate, WhatIsWrongIsNamedBeforeTheWork) {
   refused({"--bag", folder_ + "/none.bag", "--config", "irs", "--out", yaml_}, {"/none.bag", "no such file"});
   refused({"--bag", bag_, "--bag", bag_, "--config", "irs", "--out", yaml_}, {bag_, "each bag once"}, 2);
   refused({"--bag", bag_, "--config", "none", "--out", yaml_}, {"none"});
-  refused({"--bag", bag_, "--config", own, "--out", own}, {own, "never overwritten"});
-  refused({"--bag", bag_, "--config", own, "--out", folder_ + "/./own.yaml"}, {"never overwritten"});
-  refused({"--bag", bag_, "--config", own, "--out", bag_}, {bag_, "--bag"});
+  refused({"--bag", bag_, "--config", own, "--out", own}, {own, "which is read"});
+  refused({"--bag", bag_, "--config", own, "--out", folder_ + "/./own.yaml"}, {"own.yaml, which is read"});
+  refused({"--bag", bag_, "--config", own, "--out", bag_}, {"--out", bag_ + ", which is read"});
   refused({"--bag", bag_, "--config", own, "--out", folder_ + "/no/such.yaml"}, {"--out", "no folder"});
   refused({"--bag", bag_, "--config", own, "--out", folder_}, {"--out", "folder"});
   refused({"--bag", bag_, "--config", own, "--out", yaml_, "--set", "gravitee=9.8"}, {"gravitee", "gravity"});

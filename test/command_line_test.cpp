@@ -1,11 +1,14 @@
 #include "../src/ros/bag/command_line.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 
+#include "full_disk.h"
 #include "temporary_folder.h"
 
 namespace rio_t {
@@ -133,6 +136,52 @@ TEST(SameFile, IsOneWhereverItIsNamedFrom) {
   std::ofstream(file) << "content";
   std::filesystem::create_hard_link(file, temporary.path() + "/link.txt");
   EXPECT_TRUE(isSameFile(file, temporary.path() + "/link.txt"));
+}
+
+std::string contentOf(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+TEST(OutputFile, AFailureLeavesWhatWasThere) {
+  const TemporaryFolder temporary;
+  const std::string file = temporary.path() + "/a.yaml";
+  writeFile(file, "old");
+  {
+    const FullDisk disk(1000);
+    EXPECT_THROW(writeFile(file, std::string(10000, 'x')), std::runtime_error);
+  }
+  EXPECT_EQ(contentOf(file), "old");
+  EXPECT_FALSE(std::filesystem::exists(file + ".part"));
+  writeFile(file, "new");
+  EXPECT_EQ(contentOf(file), "new");
+}
+
+TEST(OutputFile, ALinkStaysALink) {
+  const TemporaryFolder temporary;
+  const std::string file = temporary.path() + "/a.yaml", link = temporary.path() + "/link.yaml";
+  writeFile(file, "old");
+  std::filesystem::create_symlink(file, link);
+  EXPECT_EQ(faultOfOutput(link, {}), "");
+  writeFile(link, "new");
+  EXPECT_EQ(contentOf(file), "new");
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+}
+
+TEST(OutputFile, WhatCannotBeWrittenIsKnownBeforeTheWork) {
+  const TemporaryFolder temporary;
+  const std::string file = temporary.path() + "/a.yaml";
+  const auto expectFault = [](const std::string& fault, const std::string& part) {
+    EXPECT_NE(fault.find(part), std::string::npos) << fault;
+  };
+  EXPECT_EQ(faultOfOutput(file, {temporary.path() + "/b.yaml"}), "");
+  expectFault(faultOfOutput(file, {temporary.path() + "/./a.yaml"}), "expected another file");
+  expectFault(faultOfOutput(temporary.path(), {}), "this is a folder");
+  expectFault(faultOfOutput(temporary.path() + "/none/a.yaml", {}), "there is no folder");
+  std::filesystem::permissions(temporary.path(), std::filesystem::perms::owner_read);
+  const std::string fault = faultOfOutput(file, {});
+  std::filesystem::permissions(temporary.path(), std::filesystem::perms::owner_all);
+  if (geteuid() != 0) expectFault(fault, temporary.path() + " cannot be written");  // root writes anywhere
 }
 
 }  // namespace

@@ -117,6 +117,7 @@ TEST(Diagnosis, EachFilterHasItsKey) {
 TEST(Diagnosis, RejectedScansNameReasonAndKey) {
   const std::pair<std::string, std::string> reasons[] = {
       {"stamp_zero", "stamp_source"},
+      {"stamp_out_of_range", "radar_stamp_shift"},
       {"stamp_ahead_of_imu", "stamp_source: arrival"},
       {"older_than_window", "radar_stamp_shift"},
       {"imu_not_covering", "radar_stamp_shift"},

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdio>
+#include <limits>
 #include <string>
 
 #include "rio_t/core/so3.h"
@@ -92,15 +93,23 @@ using diagnostic_msgs::DiagnosticStatus;
 
 TEST_F(TwoRadarDiagnostics, CountForEachRadar) {
   ASSERT_TRUE(session.odometry().initialized());
-  monitor.dropped(0, "scan_not_usable");
+  monitor.dropped(0, "cloud_not_usable");
   const Status status = second(20, 10, 9);
   EXPECT_EQ(status.level, DiagnosticStatus::OK) << status.message;
   EXPECT_EQ(value(status, "left/scans"), "20");
   EXPECT_EQ(value(status, "right/scans"), "10");
   EXPECT_EQ(value(status, "right/scans_used"), "9");
-  EXPECT_EQ(value(status, "left/dropped_scan_not_usable"), "1");
+  EXPECT_EQ(value(status, "left/dropped_cloud_not_usable"), "1");
   EXPECT_EQ(value(status, "right/dropped_innovation"), "1");
   EXPECT_EQ(value(status, "left/triggers"), "no left/triggers") << "it needs none";
+}
+
+TEST_F(TwoRadarDiagnostics, NameTheCauseOfScansThatCannotBeUsed) {
+  for (const char* reason : {"cloud_not_usable", "stamp_zero"}) {
+    monitor.reset("~reset called");
+    monitor.dropped(0, reason, 30);
+    EXPECT_EQ(value(odometry(session), "likely_cause_1").find("30 of 30 scans of radar left"), 0U) << reason;
+  }
 }
 
 TEST_F(TwoRadarDiagnostics, NameTheRadarThatIsSilent) {
@@ -153,6 +162,19 @@ TEST_F(TwoRadarDiagnostics, AreAnErrorWithItsCauseWhereNoScanWasEverUsed) {
   EXPECT_EQ(value(diverges, "health"), "diverged");
   EXPECT_EQ(diverges.message.find("diverged: do not trust the estimate; finding the state anew" + cause), 0U)
       << diverges.message;
+}
+
+TEST_F(TwoRadarDiagnostics, TakeTheShareOfFaultySamplesSinceTheReset) {
+  for (int k = 0; k < 10000; ++k) monitor.imu();
+  monitor.reset("~reset called");
+  LiveSession fresh(config, config.odometry);
+  rest(fresh, 0, 4);
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  for (int k = 0; k < 200; ++k)
+    fresh.addImu({Time::fromSeconds(4.0 + 0.0025 * k), {kNan, 0.0, 0.0}, {0.0, 0.0, 9.81}});
+  for (int k = 0; k < 1800; ++k) monitor.imu();
+  EXPECT_EQ(value(odometry(fresh), "likely_cause_1").find("200 IMU samples are not finite."), 0U)
+      << value(odometry(fresh), "likely_cause_1");
 }
 
 TEST_F(TwoRadarDiagnostics, TellTheStateOfTheNewestImuSampleThoughNoScanComes) {
@@ -220,6 +242,15 @@ TEST_F(TwoRadarDiagnostics, DoNotJudgeScansThatCameBeforeTheStart) {
     monitor.describeInput(status, &session);
     EXPECT_EQ(status.level, DiagnosticStatus::OK) << status.message;
   }
+}
+
+TEST_F(TwoRadarDiagnostics, DoNotDoubtARunWhoseScansLongWaitedForTf) {
+  for (const char* reason : {"scan_before_extrinsics", "frame_not_usable"}) monitor.dropped(0, reason, 100);
+  for (int k = 0; k < 30; ++k) feed(0, true);
+  for (int k = 0; k < 1600; ++k) monitor.imu();
+  const Status status = odometry(session);
+  EXPECT_EQ(value(status, "verdict"), "good");
+  EXPECT_EQ(value(status, "likely_cause_1"), "no likely_cause_1");
 }
 
 TEST_F(TwoRadarDiagnostics, HaveATimeOffsetForEachRadar) {

@@ -152,6 +152,40 @@ class LiveTest(tester.LiveTestCase):
             with tester.feed(listener, self.bag, start=0.5, duration=4.5):
                 listener.wait_for("odometry again", lambda: len(listener.messages["odom"]) > heard)
 
+    def test_an_odd_stamp_resets_nothing(self):
+        """One scan is stamped so early that the stamp minus the offset, its time of measurement, is below zero."""
+        odd = self.scan_stamps[80]
+
+        def edit(topic, message):
+            if topic == tester.RADAR and message.header.stamp.to_nsec() == odd:
+                message.header.stamp = rospy.Time(0, 1000)
+        bag = tester.edited(self.bag, self.path("odd.bag"), edit)
+        with tester.Listener() as listener, tester.node("config:=irs"):
+            listener.wait_until_heard()
+            with tester.feed(listener, bag, answers={}) as player:
+                player.wait()
+            listener.wait_for_stamp("odom_optimized", self.scan_stamps[-3])
+            listener.wait_for("a diagnosis after the last sample", lambda: int(
+                listener.value("input", "imu_messages") or 0) == len(self.imu_stamps))
+            self.assertEqual(listener.value("odometry", "resets"), "0")
+
+    def test_a_gap_of_samples_that_are_not_finite_resets_node_and_estimator_at_once(self):
+        first, last = (self.imu_stamps[0] + int(s * 1e9) for s in (7.0, 9.0))
+
+        def edit(topic, message):
+            if topic == tester.IMU and first <= message.header.stamp.to_nsec() <= last:
+                message.linear_acceleration.x = float("nan")
+        bag = tester.edited(self.bag, self.path("not_finite.bag"), edit)
+        with tester.Listener() as listener, tester.node("config:=irs", "max_bridged_imu_gap:=1.0", "imu_jump_patience:=0.1"):
+            listener.wait_until_heard()
+            with tester.feed(listener, bag, answers={}) as player:
+                player.wait()
+            listener.wait_for("a diagnosis after the last sample", lambda: int(
+                listener.value("input", "imu_messages") or 0) == len(self.imu_stamps))
+            self.assertEqual(listener.value("odometry", "resets"), "1")
+            self.assertIn("jumped ahead by 2.", listener.value("odometry", "last_reset_because"))
+            self.assertIsNone(listener.value("input", "fault_imu_clock_restart"), "the session is a new one")
+
     def test_looping_bag_resets_and_runs_again(self):
         with tester.Listener() as listener, tester.node("config:=irs"):
             listener.wait_until_heard()
@@ -220,6 +254,12 @@ class LiveTest(tester.LiveTestCase):
         self.assertIn('did you mean "window"', outcome.stdout)
         self.assertIn("/rio_t/gravity", outcome.stdout)
         self.assertIn("(perhaps left by an earlier run: rosparam delete /rio_t)", outcome.stdout)
+        rospy.delete_param("/rio_t")
+        outcome = tester.run(tester.program("rio_t", "rio_t_node"), "__name:=rio_t", "_config:=irs", "_imu_topic:=a b",
+                             "_radar_topic:=~scan")
+        self.assertEqual(outcome.returncode, 1, outcome.stdout)
+        self.assertIn('imu_topic: expected the name of a topic, got "a b"', outcome.stdout)
+        self.assertIn('radar_topic: expected the name of a topic, got "~scan"', outcome.stdout)
         outcome = tester.run(tester.program("rio_t", "rio_t_node"), "__name:=rio_t_2", "_config:=no_such")
         self.assertEqual(outcome.returncode, 1, outcome.stdout)
         self.assertIn("no_such", outcome.stdout)

@@ -2,10 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <future>
 #include <memory>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -168,6 +170,50 @@ TEST(LiveSession, ResultsHaveTheMountingOfTheirRadarAsTold) {
     EXPECT_EQ(results[0].result.scan.radar, radar);
     EXPECT_EQ(results[0].T_IR.l_I, kMountings[radar].l_I);
     EXPECT_GT(results[0].latency, 0.0);
+  }
+}
+
+TEST(LiveSession, KeepsThePosesThatLeftTheWindowDuringASilenceThoughTheNextScanIsRejected) {
+  LiveSession session(Config(), Config().odometry);
+  const auto scanAt = [](double seconds) {
+    RadarScan scan;
+    scan.stamp = Time::fromSeconds(seconds);
+    for (int i = 0; i < 30; ++i) {
+      const double azimuth = 0.9 * std::sin(1.0 + 2.4 * i);
+      scan.points.push_back(
+          {{4.0 * std::sin(azimuth), 4.0 * std::cos(azimuth), 1.5 * std::sin(0.7 * i)}, 0.0, 20.0});
+    }
+    return scan;
+  };
+  const auto add = [&](double stamp) {
+    session.addScan(0, Time::fromSeconds(stamp), Time::fromSeconds(stamp), scanAt(stamp));
+  };
+  std::size_t used = 0;
+  const auto process = [&] {
+    std::string rejected_because;
+    for (bool more = true; more;) {
+      for (const LiveSession::Result& result : session.process(&more)) {
+        used += result.result.used ? 1 : 0;
+        rejected_because = result.result.rejected_because;
+      }
+    }
+    return rejected_because;
+  };
+  for (int k = 0; k < 30 * 200; ++k) {
+    const double t = 1.0 + 0.005 * k;
+    session.addImu({Time::fromSeconds(t), Eigen::Vector3d::Zero(), {0.0, 0.0, 9.81}});
+    if (t <= 7.0 && k % 20 == 0) add(t);
+    if (k % 10 == 0) process();
+  }
+  ASSERT_GT(used, 10U);
+  add(5.005);
+  EXPECT_EQ(process(), "older_than_window");
+  const Trajectory kept = session.trajectory();
+  ASSERT_FALSE(kept.empty());
+  EXPECT_GT(kept.back().time, Time::fromSeconds(10.0)) << "the last scan is of 7 s";
+  for (std::size_t k = 1; k < kept.size(); ++k) {
+    EXPECT_GT(kept[k].time, kept[k - 1].time);
+    EXPECT_LE(kept[k].time - kept[k - 1].time, 5.0) << "kSilentStep of the estimator";
   }
 }
 

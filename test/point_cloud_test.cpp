@@ -168,6 +168,11 @@ TEST(PointCloudDecode, Empty) {
   m.width = m.row_step = 0;
   m.data.clear();
   EXPECT_EQ(decode(m, PointCloudFormat()).cloud.size(), 0u);
+  m.point_step = 0;
+  EXPECT_EQ(decode(m, PointCloudFormat()).cloud.size(), 0u);
+  m.width = 1;
+  m.height = 0;
+  EXPECT_EQ(decode(m, PointCloudFormat()).cloud.size(), 0u);
   EXPECT_EQ(decode(PointCloud2(), PointCloudFormat()).cloud.size(), 0u);
 }
 

@@ -63,13 +63,15 @@ TEST(RosParameters, WhatANodeShowsIsTheConfigurationItRan) {
   map["radars"][0] = std::string("left");
   map["radars"][1] = std::string("right");
   map["right"]["radar_min_range"] = 1.5;
-  map["left"]["radar_topic"] = std::string("/left");
+  map["radar_topic"] = std::string("/left");  // the section of left is empty
   map["right"]["radar_topic"] = std::string("/right");
   const Config config = makeConfig(toParameterEntries(map, "/rio_t"));
   std::istringstream yaml(toYaml(config));
   XmlRpc::XmlRpcValue shown = toXmlRpc(readParameters(yaml, "shown"));
   EXPECT_EQ(toYaml(makeConfig(toParameterEntries(shown, "/rio_t/effective"))), toYaml(config));
   EXPECT_EQ(static_cast<double&>(shown["right"]["radar_min_range"]), 1.5);
+  EXPECT_EQ(shown["left"].getType(), XmlRpc::XmlRpcValue::TypeStruct);
+  EXPECT_EQ(toXmlRpc({}).getType(), XmlRpc::XmlRpcValue::TypeStruct);
 }
 
 TEST(RosParameters, WhatAnEarlierRunShowedIsNotRead) {

@@ -12,10 +12,12 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <map>
 
+#include "full_disk.h"
 #include "rio_t/simulation/motions.h"
 #include "rio_t/simulation/presets.h"
 #include "temporary_folder.h"
@@ -105,6 +107,22 @@ Fields fieldsOf(const sensor_msgs::PointCloud2& cloud) {
 }
 
 std::int64_t nanoseconds(const ros::Time& time) { return static_cast<std::int64_t>(time.toNSec()); }
+
+TEST(SimulationBag, AFullDiskIsAnErrorThatNamesTheBagAndLeavesNone) {
+  const Written whole({});
+  const TemporaryFile file;
+  std::string told;
+  {
+    const FullDisk disk(100'000);
+    try {
+      writeSimulationBag(file.path(), whole.motion, whole.data, whole.simulated.start, {});
+    } catch (const std::runtime_error& error) {
+      told = error.what();
+    }
+  }
+  EXPECT_EQ(told.find("bag '" + file.path() + "' cannot be written: "), 0U) << told;
+  EXPECT_FALSE(std::filesystem::exists(file.path()));
+}
 
 TEST(SimulationBag, IrsTopicsAndTypes) {
   const Written bag{SimulationBagOptions{}};
@@ -360,7 +378,7 @@ TEST(SimulationBag, AKartGivesTheSameBytesAndNoEmptyClouds) {
     simulation::Preset kart = simulation::presetOf("kart");
     kart.options.seed = seed;
     const Motion motion = simulation::makeMotion({kart.motion, seed, 40.0, kart.rest});
-    const SensorData data = simulation::simulate(motion, kart.options);
+    SensorData data = simulation::simulate(motion, kart.options);
     writeSimulationBag(path, motion, data, kart.options.start, SimulationBagOptions{});
     return data;
   };

@@ -81,6 +81,23 @@ TEST(Stamping, HeaderStampsAreKeptToTheNanosecondAndShifted) {
   EXPECT_TRUE(stamper.take().empty());
 }
 
+TEST(Stamping, AShiftedStampThatNoMessageCanHoldIsGivenUp) {
+  StampingOptions with_shift = options(StampSource::kHeader);
+  with_shift.shift = -1.0;
+  ScanStamper below(with_shift);
+  below.addScan(1, Time::fromSeconds(0.5), recordTime(0), RadarScan());
+  below.addScan(2, Time::fromSeconds(1.5), recordTime(1), RadarScan());
+  const std::vector<RadarScan> scans = below.take();
+  ASSERT_EQ(scans.size(), 1u);
+  EXPECT_EQ(scans[0].stamp, Time::fromSeconds(0.5));
+  EXPECT_EQ(below.givenUp().at("stamp_out_of_range"), 1u);
+  with_shift.shift = 2e9;
+  ScanStamper above(with_shift);
+  above.addScan(1, Time::fromSeconds(3e9), recordTime(0), RadarScan());
+  EXPECT_TRUE(above.take().empty());
+  EXPECT_EQ(above.givenUp().at("stamp_out_of_range"), 1u);
+}
+
 TEST(Stamping, ZeroHeaderStampIsRefusedWithTheOtherSources) {
   ScanStamper stamper(options(StampSource::kHeader));
   try {
@@ -220,6 +237,34 @@ TEST(Stamping, ATriggerThatComes100MsAfterItsScanIsItsTriggerOnceTheyCountAlike)
     stamper.addTrigger(8, imuTime(0.1), recordTime(0.29));
     EXPECT_EQ(seconds(stamper.take()), known ? std::vector<double>{0.1} : std::vector<double>{});
   }
+}
+
+TEST(Stamping, AClockOfReceiptThatIsSetBackCostsNoScan) {
+  ScanStamper stamper(options(StampSource::kTrigger));
+  std::vector<RadarScan> all;
+  for (int ms = 0; ms < 4000; ++ms) {
+    const Time record = recordTime(1e-3 * ms + (ms < 2095 ? 0.0 : -30.0));  // a scan waits for its trigger
+    stamper.addImu(imuTime(1e-3 * ms), record);
+    const auto seq = static_cast<std::uint32_t>(7 + ms / 100);
+    if (ms % 100 == 90) stamper.addScan(seq, Time(), record, RadarScan());
+    if (ms % 100 == 99) stamper.addTrigger(seq, imuTime(1e-3 * (ms - 99)), record);  // overtaken
+    append(stamper.take(), &all);
+  }
+  append(stamper.finish(), &all);
+  const std::vector<double> stamps = seconds(all);
+  ASSERT_EQ(stamps.size(), 40u);
+  for (int k = 0; k < 40; ++k) EXPECT_NEAR(stamps[k], 0.1 * k, 1e-9);
+}
+
+TEST(Stamping, AScanThatIsHandedOverLateDoesNotSetTheClockBack) {
+  ScanStamper stamper(options(StampSource::kTrigger));
+  stamper.addTrigger(7, imuTime(0.0), recordTime(0.0));
+  stamper.addScan(7, Time(), recordTime(0.03), RadarScan());
+  EXPECT_EQ(stamper.take().size(), 1u);
+  stamper.addTrigger(8, imuTime(0.1), recordTime(0.1));
+  stamper.addImu(imuTime(2.0), recordTime(2.0));
+  stamper.addScan(8, Time(), recordTime(0.13), RadarScan());
+  EXPECT_EQ(seconds(stamper.take()), std::vector<double>({0.1}));
 }
 
 TEST(Stamping, UnlikeSeqsPairTheLatestTriggerBeforeTheArrival) {

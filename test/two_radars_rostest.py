@@ -200,8 +200,10 @@ class TwoRadarsTest(tester.LiveTestCase):
             listener.wait_until_heard()
             with self.feed(listener, self.bag):
                 listener.wait_for("scans that cannot be read", lambda: int(
-                    listener.value("input", "right/dropped_scan_not_usable") or 0) > 10)
-                self.assertIsNone(listener.value("input", "left/dropped_scan_not_usable"))
+                    listener.value("input", "right/dropped_cloud_not_usable") or 0) > 10)
+                self.assertIsNone(listener.value("input", "left/dropped_cloud_not_usable"))
+                listener.wait_for("the cause", lambda: "scans of radar right cannot be read. Set right/radar_format" in (
+                    listener.value("odometry", "likely_cause_1") or ""))
                 listener.wait_for_diagnosis("odometry", "running", OK)
 
     def test_session_starts_when_tf_has_both_mountings(self):

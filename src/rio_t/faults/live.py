@@ -161,8 +161,8 @@ def scan_stamps_zero(live):
     with live.tester.Listener() as listener, live.node(), live.player(*PLAYED, bag=bag):
         listener.wait_until_heard()
         wait_for_time(live, listener, 39.0)
-        live.wait(listener, "scans counted", lambda: listener.value("input", "dropped_scan_not_usable") not in (None, "0"))
-        live.happened.append(f"counted {listener.value('input', 'dropped_scan_not_usable')}")
+        live.wait(listener, "scans counted", lambda: listener.value("input", "dropped_stamp_zero") not in (None, "0"))
+        live.happened.append(f"counted {listener.value('input', 'dropped_stamp_zero')}")
         live.check_odometry(listener.messages["odom"], 10.0, 38.0)
         live.said("stamp in the header is zero", at_most=4)
 

@@ -6,6 +6,7 @@
 #include <boost/algorithm/string/join.hpp>
 #include <filesystem>
 #include <fstream>
+#include <system_error>
 
 #include "rio_t/ros/messages/conversions.h"
 
@@ -39,6 +40,29 @@ std::runtime_error bagError(const std::string& bag, const std::string& what) {
 }
 
 bool everyTopic(const rosbag::ConnectionInfo* /*connection*/) { return true; }
+
+void writeBag(const std::string& path, const std::function<void(rosbag::Bag&)>& write) {
+  std::unique_ptr<rosbag::Bag> bag;
+  const auto discard = [&] {
+    if (!bag) return;
+    // Its destructor would write again, and end the program if that fails. So it lives on.
+    static auto* const discarded = new std::vector<rosbag::Bag*>();
+    discarded->push_back(bag.release());
+    std::error_code ignored;
+    if (std::filesystem::is_regular_file(path, ignored)) std::filesystem::remove(path, ignored);
+  };
+  try {
+    bag = std::make_unique<rosbag::Bag>(path, rosbag::bagmode::Write);
+    write(*bag);
+    bag->close();
+  } catch (const rosbag::BagException& error) {
+    discard();
+    throw std::runtime_error("bag '" + path + "' cannot be written: " + error.what());
+  } catch (...) {
+    discard();
+    throw;
+  }
+}
 
 Bags::Bags(const std::vector<std::string>& paths) : name_(boost::algorithm::join(paths, ", ")) {
   for (const std::string& path : paths)

@@ -25,6 +25,10 @@ std::runtime_error bagError(const std::string& bag, const std::string& what);
 /// Finds all, as a query of Bags::addTo().
 bool everyTopic(const rosbag::ConnectionInfo* connection);
 
+/// Makes a bag, which `write` fills. If that fails, there is no file, and what it throws names the bag if the
+/// bag is to blame.
+void writeBag(const std::string& path, const std::function<void(rosbag::Bag&)>& write);
+
 /// Bags that are played as one, in the order of their record times.
 class Bags {
  public:

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -152,6 +153,7 @@ class BagJob {
   RunSummary execute() {
     RunSummary summary = inMode();
     if (run_.progress) run_.progress(1.0);
+    if (truth_error_) throw *truth_error_;  // the estimate is saved all the same
     return summary;
   }
 
@@ -263,6 +265,8 @@ class BagJob {
         if (done - told > 0.01) run_.progress(from + (to - from) * (told = done));
       }
       player.finish();
+    } catch (const OutputError&) {
+      throw;
     } catch (const std::exception& error) {
       throw bagError(bags_.name(), error.what());
     }
@@ -277,7 +281,7 @@ class BagJob {
     summary.estimation_seconds = took.count();
     summary.realtime_factor = (end_ - begin_).toSec() / took.count();
     const Trajectory trajectory = log.takeTrajectory();
-    std::optional<std::runtime_error> truth_error;
+    truth_error_.reset();
     if (truth_in_bag_ && truth_.empty()) truth_ = readPoses(bags_, run_.config.ground_truth_topic);
     if (truth_in_bag_ || !run_.config.ground_truth.empty()) {
       try {
@@ -285,11 +289,10 @@ class BagJob {
       } catch (const std::exception& error) {
         const std::string name =
             truth_in_bag_ ? "topic " + run_.config.ground_truth_topic : run_.config.ground_truth;
-        truth_error.emplace("ground truth " + name + ": " + error.what());
+        truth_error_.emplace("ground truth " + name + ": " + error.what());
       }
     }
     if (output != nullptr) output->finish(summary);
-    if (truth_error) throw *truth_error;  // the estimate is saved all the same
     return summary;
   }
 
@@ -300,7 +303,8 @@ class BagJob {
   ros::Time begin_, end_;
   bool truth_in_bag_ = false;
   Trajectory truth_;
-  std::unique_ptr<RunOutput> output_;  // null: no files
+  std::optional<std::runtime_error> truth_error_;  // why it does not judge what was last finished
+  std::unique_ptr<RunOutput> output_;              // null: no files
   std::chrono::steady_clock::time_point started_;
 };
 

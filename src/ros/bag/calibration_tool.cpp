@@ -1,10 +1,6 @@
-#include <unistd.h>
-
 #include <filesystem>
-#include <fstream>
 #include <ostream>
 #include <stdexcept>
-#include <system_error>
 
 #include "command_line.h"
 #include "rio_t/ros/bag/calibration.h"
@@ -48,29 +44,14 @@ void addOptions(OptionSet& options, Arguments& a) {
 
 /// Before the work, so that a wrong path costs no time.
 void checkFiles(const Arguments& arguments, const std::string& config_file) {
-  for (std::size_t i = 0; i < arguments.bags.size(); ++i) {
-    const std::string& bag = arguments.bags[i];
+  for (const std::string& bag : arguments.bags) {
     if (!fs::is_regular_file(bag))
       throw std::runtime_error("--bag " + bag + ": no such file; expected a bag");
-    for (std::size_t k = 0; k < i; ++k) {
-      if (isSameFile(bag, arguments.bags[k]))
-        throw std::runtime_error("--bag " + bag + ": expected each bag once, since it would count twice");
-    }
-    if (isSameFile(arguments.out, bag))
-      throw std::runtime_error("--out " + arguments.out + ": expected another file than that of --bag");
   }
-  if (isSameFile(arguments.out, config_file)) {
-    throw std::runtime_error("--out " + arguments.out +
-                             ": expected another file than that of --config, which is never overwritten");
-  }
-  const fs::path out(arguments.out);
-  const fs::path folder = out.has_parent_path() ? out.parent_path() : fs::path(".");
-  if (fs::is_directory(out))
-    throw std::runtime_error("--out " + arguments.out + ": expected a file, this is a folder");
-  if (!fs::is_directory(folder))
-    throw std::runtime_error("--out " + arguments.out + ": there is no folder " + folder.string());
-  if (access(folder.c_str(), W_OK) != 0)
-    throw std::runtime_error("--out " + arguments.out + ": folder " + folder.string() + " cannot be written");
+  std::vector<std::string> inputs = arguments.bags;
+  inputs.push_back(config_file);
+  const std::string fault = faultOfOutput(arguments.out, inputs);
+  if (!fault.empty()) throw std::runtime_error("--out " + fault);
 }
 
 void checkConfig(const Config& config) {
@@ -81,25 +62,6 @@ void checkConfig(const Config& config) {
         "extrinsics_translation "
         "and extrinsics_rotation_xyzw; set these to what tf says, and --set extrinsics_source=parameters");
   }
-}
-
-/// Beside it first, so that a run that fails leaves no half file.
-void writeFile(const std::string& path, const std::string& text) {
-  const std::string beside = path + ".part";
-  {
-    std::ofstream file(beside, std::ios::binary | std::ios::trunc);
-    file << text;
-    file.flush();
-    if (file) {
-      file.close();
-      std::error_code error;
-      fs::rename(beside, path, error);
-      if (!error) return;
-    }
-  }
-  std::error_code ignored;
-  fs::remove(beside, ignored);
-  throw std::runtime_error("--out " + path + ": writing failed");
 }
 
 int run(const Arguments& arguments, std::ostream& out, std::ostream& err) {

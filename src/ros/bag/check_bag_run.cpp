@@ -2,7 +2,6 @@
 #include <boost/process.hpp>
 #include <exception>
 #include <filesystem>
-#include <fstream>
 #include <iomanip>
 #include <optional>
 #include <ostream>
@@ -16,15 +15,6 @@ namespace rio_t {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr int kReady = 0, kNotReady = 1, kUsage = 2;
-
-void writeFile(const std::string& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  file << text;
-  file.flush();
-  if (!file) throw std::runtime_error(path + ": cannot be written");
-}
 
 /// The script beside the program, as in an installed package and in a build folder.
 std::string drawRigScript() {
@@ -56,12 +46,8 @@ std::string faultOf(const CheckRequest& request) {
   if (request.bags.empty()) return "expected a bag (see --help)";
   for (const std::string& file : {request.out, request.rig}) {
     if (file.empty()) continue;
-    if (fs::is_directory(file)) return file + ": expected a file, this is a folder";
-    const fs::path folder = fs::absolute(file).parent_path();
-    if (!fs::is_directory(folder)) return file + ": there is no folder " + folder.string();
-    for (const std::string& bag : request.bags) {
-      if (isSameFile(file, bag)) return file + ": expected another file than the bag";
-    }
+    const std::string fault = faultOfOutput(file, request.bags);
+    if (!fault.empty()) return fault;
   }
   return "";
 }
@@ -70,7 +56,7 @@ int runCheck(const CheckRequest& request, std::ostream& out, std::ostream& err) 
   const std::string fault = faultOf(request);
   if (!fault.empty()) {
     err << "check_bag: " << fault << "\n";
-    return kUsage;
+    return kExitUsage;
   }
   std::optional<BagCheck> best;
   bool all_ready = true;
@@ -83,7 +69,7 @@ int runCheck(const CheckRequest& request, std::ostream& out, std::ostream& err) 
     }
     if (!best) {
       out << "Not ready: no configuration is written.\n";
-      return kNotReady;
+      return kExitFailed;
     }
     if (request.bags.size() > 1)
       out << "The configuration is that of " << best->bag << ", which shows most.\n";
@@ -104,9 +90,9 @@ int runCheck(const CheckRequest& request, std::ostream& out, std::ostream& err) 
     }
   } catch (const std::exception& error) {
     err << "check_bag: " << error.what() << "\n";
-    return kNotReady;
+    return kExitFailed;
   }
-  return all_ready ? kReady : kNotReady;
+  return all_ready ? kExitOk : kExitFailed;
 }
 
 }  // namespace rio_t

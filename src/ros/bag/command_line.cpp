@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <iterator>
 #include <locale>
 #include <ostream>
@@ -72,6 +73,13 @@ std::string progressLine(const std::string& label, double done, double elapsed) 
     line << ", " << std::lround(elapsed / done * (1.0 - done)) << " s left";
   }
   return line.str();
+}
+
+/// A link or a device stays what it is; all else is replaced.
+bool isWrittenInPlace(const std::string& path) {
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::symlink_status(path, error);
+  return std::filesystem::exists(status) && !std::filesystem::is_regular_file(status);
 }
 
 }  // namespace
@@ -249,8 +257,8 @@ void addBagOptions(OptionSet& options, std::vector<std::string>& bags, std::stri
                    ParameterEntries& set) {
   options.values("bag", "BAG", "a bag with IMU and radar; `--bag` itself may be left out",
                  [&bags](const std::string& bag) {
-                   if (std::find(bags.begin(), bags.end(), bag) != bags.end())
-                     throw UsageError(bag + ": expected each bag once");
+                   for (const std::string& other : bags)
+                     if (isSameFile(bag, other)) throw UsageError(bag + ": expected each bag once");
                    bags.push_back(bag);
                  });
   options.positional("bag");
@@ -269,6 +277,33 @@ bool isSameFile(const std::string& a, const std::string& b) {
   std::error_code error;  // there is one for files that do not exist
   if (fs::equivalent(a, b, error)) return true;
   return fs::weakly_canonical(fs::absolute(a)) == fs::weakly_canonical(fs::absolute(b));
+}
+
+std::string faultOfOutput(const std::string& path, const std::vector<std::string>& inputs) {
+  namespace fs = std::filesystem;
+  for (const std::string& input : inputs)
+    if (isSameFile(path, input)) return path + ": expected another file than " + input + ", which is read";
+  if (fs::is_directory(path)) return path + ": expected a file, this is a folder";
+  if (isWrittenInPlace(path)) return access(path.c_str(), W_OK) == 0 ? "" : path + ": cannot be written";
+  const fs::path folder = fs::absolute(path).parent_path();
+  if (!fs::is_directory(folder)) return path + ": there is no folder " + folder.string();
+  if (access(folder.c_str(), W_OK) != 0) return path + ": folder " + folder.string() + " cannot be written";
+  return "";
+}
+
+void writeFile(const std::string& path, const std::string& text) {
+  const std::string written = isWrittenInPlace(path) ? path : path + ".part";
+  std::ofstream file(written, std::ios::binary | std::ios::trunc);
+  file << text;
+  file.close();
+  std::error_code error;
+  if (file) {
+    if (written == path) return;
+    std::filesystem::rename(written, path, error);
+    if (!error) return;
+  }
+  if (written != path) std::filesystem::remove(written, error);
+  throw std::runtime_error(path + ": cannot be written (disk full?)");
 }
 
 void require(const std::vector<std::pair<std::string, bool>>& given_by_name) {

@@ -120,6 +120,14 @@ void require(const std::vector<std::pair<std::string, bool>>& given_by_name);
 /// results to one file.
 bool isSameFile(const std::string& a, const std::string& b);
 
+/// Why a program that reads `inputs` cannot write `path`; empty if it can. Programs ask before the work, so
+/// that a wrong path costs no time.
+std::string faultOfOutput(const std::string& path, const std::vector<std::string>& inputs);
+
+/// Writes the file beside `path` first, so that a program that fails leaves what was there. Writes to a link
+/// or a device as it is. Throws std::runtime_error that names the path.
+void writeFile(const std::string& path, const std::string& text);
+
 /// A bar on stderr with the time that is left, for a share of the work done from 0 to 1. Empty if stderr is
 /// no terminal. `label` stands before it.
 std::function<void(double)> progressBar(const std::string& label = "");

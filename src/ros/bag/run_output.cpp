@@ -127,7 +127,7 @@ void RunOutput::File::open(const std::string& path_in, const std::string& header
   stream.open(path, std::ios::binary | std::ios::trunc);
   if (!stream) {
     const std::string reason = std::error_code(errno, std::generic_category()).message();
-    throw std::runtime_error("output " + path + ": cannot be written (" + reason + ")");
+    throw OutputError("output " + path + ": cannot be written (" + reason + ")");
   }
   buffer.reserve(kBufferSize + 1024);
   buffer = header;
@@ -137,7 +137,7 @@ void RunOutput::File::flush() {
   stream.write(buffer.data(), static_cast<std::streamsize>(buffer.size()));
   stream.flush();
   buffer.clear();
-  if (!stream) throw std::runtime_error("output " + path + ": writing failed (disk full?)");
+  if (!stream) throw OutputError("output " + path + ": writing failed (disk full?)");
 }
 
 void RunOutput::File::endLine() {
@@ -149,8 +149,8 @@ RunOutput::RunOutput(const std::string& folder, const RunFiles& files) : folder_
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (!std::filesystem::is_directory(folder)) {
-    throw std::runtime_error("output folder " + folder + ": cannot be made (" +
-                             (error ? error.message() : "a file of that name exists") + ")");
+    throw OutputError("output folder " + folder + ": cannot be made (" +
+                      (error ? error.message() : "a file of that name exists") + ")");
   }
   removeOfEarlierRuns();
   trajectory_.open(folder + "/trajectory.txt");

@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "bag_file.h"
 #include "rio_t/ros/messages/conversions.h"
 
 namespace rio_t {
@@ -234,8 +235,7 @@ void writeSimulationBag(const std::string& path, const simulation::Motion& motio
     truth_times.push_back(start + static_cast<double>(i) / options.ground_truth_rate);
   }
 
-  try {
-    rosbag::Bag bag(path, rosbag::bagmode::Write);
+  writeBag(path, [&](rosbag::Bag& bag) {
     for (const Arrival& arrival : arrivals(data, radars, truth_times, options)) {
       const ros::Time record = toRosTime(arrival.time + options.record_offset);
       const auto seq = static_cast<std::uint32_t>(arrival.index);
@@ -264,10 +264,7 @@ void writeSimulationBag(const std::string& path, const simulation::Motion& motio
           break;
       }
     }
-    bag.close();
-  } catch (const rosbag::BagException& error) {
-    throw std::runtime_error("bag '" + path + "' cannot be written: " + error.what());
-  }
+  });
 }
 
 }  // namespace rio_t

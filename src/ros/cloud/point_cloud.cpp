@@ -213,9 +213,9 @@ DecodedScan decode(const PointCloud2& message, const PointCloudFormat& format) {
     throw std::invalid_argument("point cloud: doppler_sign must be 1 or -1, not " +
                                 std::to_string(format.doppler_sign));
   }
-  // Some drivers send an empty message, without fields, where nothing was detected.
+  // If nothing was detected, some drivers leave out the fields, and some the size of a point.
   DecodedScan scan;
-  if (message.fields.empty() && message.data.empty() && message.width == 0) return scan;
+  if (message.data.empty() && (message.width == 0 || message.height == 0)) return scan;
 
   const bool cartesian = format.coordinates == PointCoordinates::kCartesian;
   const FieldReader first(message, format, cartesian ? format.x : format.azimuth);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <stdexcept>
 
 #include "rio_t/inspection/stream_timing.h"
@@ -16,6 +18,9 @@ constexpr double kClockMapSpan = 60.0;  // [s]
 // No transport delays the IMU by more for so many samples; and if one did, its scans would be as late.
 constexpr std::int64_t kJump_ns = 500'000'000;
 constexpr int kJumpSamples = 20;
+// A message holds no later stamp: its seconds have 32 bits.
+constexpr Time kNewestStamp =
+    Time::fromNanoseconds(std::int64_t{1'000'000'000} * std::numeric_limits<std::uint32_t>::max());
 
 }  // namespace
 
@@ -56,7 +61,21 @@ void ScanStamper::see(Time record) {
   now_ = std::max(now_, record);
 }
 
+void ScanStamper::followStepBack(Time record) {
+  const double step = record - *newest_imu_record_;
+  const auto carryOver = [&](auto& each) {
+    if (each.record - record > options_.max_delay) each.record = each.record + step;
+  };
+  for (Held& scan : held_) carryOver(scan);
+  for (Trigger& trigger : triggers_) carryOver(trigger);
+  if (first_record_) first_record_ = *first_record_ + step;
+  now_ = record;
+}
+
 void ScanStamper::addImu(Time stamp, Time record) {
+  // Samples come in their own order. Scans and triggers may be handed over late, which is no step.
+  if (newest_imu_record_ && record - *newest_imu_record_ < -options_.max_delay) followStepBack(record);
+  newest_imu_record_ = record;
   see(record);
   clocks_.add(stamp, record);
 }
@@ -101,8 +120,13 @@ std::vector<RadarScan> ScanStamper::take() {
       giveUp(options_.source == StampSource::kTrigger ? "trigger_missing" : "imu_missing");
       continue;
     }
+    stamp = stamp + options_.shift;
+    if (stamp < Time() || stamp > kNewestStamp) {
+      giveUp("stamp_out_of_range");
+      continue;
+    }
     stamped.push_back(std::move(held_.front().scan));
-    stamped.back().stamp = stamp + options_.shift;
+    stamped.back().stamp = stamp;
     held_.pop_front();
   }
   return stamped;

@@ -150,6 +150,8 @@ class RadarCauses {
     const std::string other =
         "Set " + key_ + "stamp_source: arrival, or correct the clock with " + key_ + "radar_stamp_shift.";
     scans("stamp_zero", "have a stamp of zero.", "Set " + key_ + "stamp_source to trigger or arrival.");
+    scans("stamp_out_of_range", "have a stamp below zero or later than ROS can hold.",
+          "Correct " + key_ + "radar_stamp_shift or the stamps of the driver.");
     const double before_imu = shareOf(radar_.scans_before_imu, radar_.scans_total);
     if (before_imu >= kManyScans)
       cause("stamp_before_imu", before_imu,

@@ -18,18 +18,7 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
   try {
     const ImuMeasurement imu =
         toImuMeasurement(*event.getConstMessage(), config_.imu_topic, config_.imu_units);
-    // The same judgement as the session's own, so that the whole session starts again, with what it stamps
-    // by.
-    const ClockJumpDetector::Verdict stamp = imu_stamps_.check(imu.time);
-    if (stamp == ClockJumpDetector::Verdict::kRestart) {
-      const double jump = imu.time - *newest_imu_;
-      reset(std::string("the IMU's stamps jumped ") + (jump < 0.0 ? "back" : "ahead") + " by " +
-                std::to_string(std::abs(jump)) + " s",
-            true);
-      early_imu_.clear();
-    }
-    if (stamp == ClockJumpDetector::Verdict::kGood || stamp == ClockJumpDetector::Verdict::kRestart)
-      newest_imu_ = imu.time;
+    followImuStamps(imu);
     frames_.hear(event.getConstMessage()->header.frame_id);
     const Received received{imu, toTime(event.getReceiptTime())};
     const Session now = session_.get();
@@ -69,6 +58,21 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
   }
 }
 
+void LiveOdometry::followImuStamps(const ImuMeasurement& imu) {
+  // The same judgement as the session's own, so that the whole session starts again, with what it stamps by.
+  if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite()) return;  // the session drops it
+  const ClockJumpDetector::Verdict stamp = imu_stamps_.check(imu.time);
+  const bool restarts = stamp == ClockJumpDetector::Verdict::kRestart;
+  if (restarts) {
+    const double jump = imu.time - *newest_imu_;
+    reset(std::string("the IMU's stamps jumped ") + (jump < 0.0 ? "back" : "ahead") + " by " +
+              std::to_string(std::abs(jump)) + " s",
+          true);
+    early_imu_.clear();
+  }
+  if (restarts || stamp == ClockJumpDetector::Verdict::kGood) newest_imu_ = imu.time;
+}
+
 std::optional<NavigationState> LiveOdometry::feed(LiveSession& session, const Received& received,
                                                   double* rate_sigma) {
   *rate_sigma = session.rateSigma(received.imu.time);
@@ -82,7 +86,7 @@ void LiveOdometry::onScan(std::size_t radar, const Event<sensor_msgs::PointCloud
   Radar& from = radars_[radar];
   monitor_.scan(radar);
   from.scan_rate->tick();
-  std::string what = "cloud_not_usable";  // each has its own turn to be told
+  std::string what = "cloud_not_usable";  // as the bag runner calls it
   try {
     DecodedScan decoded;
     try {
@@ -101,12 +105,12 @@ void LiveOdometry::onScan(std::size_t radar, const Event<sensor_msgs::PointCloud
     }
     RadarScan scan = toRadarScan(decoded.cloud, Time());
     scan.radar = radar;
-    what = "stamp_not_usable";
+    what = "stamp_zero";
     account(now->addScan(message.header.seq, toTime(message.header.stamp), toTime(event.getReceiptTime()),
                          std::move(scan)));
     wakeSolver();
   } catch (const std::exception& error) {
-    monitor_.dropped(radar, "scan_not_usable");
+    monitor_.dropped(radar, what);
     if (isTimeToTell(what + " " + from.config.radar_topic))
       ROS_ERROR_STREAM(beginning(name_, from.config) << error.what());
   }

@@ -2,6 +2,7 @@
 
 #include <diagnostic_msgs/DiagnosticStatus.h>
 #include <ros/console.h>
+#include <ros/exceptions.h>
 #include <ros/master.h>
 
 #include <algorithm>
@@ -9,6 +10,7 @@
 #include <cctype>
 #include <filesystem>
 #include <iterator>
+#include <utility>
 
 #include "radar_texts.h"
 #include "rio_t/evaluation/trajectory.h"
@@ -23,13 +25,37 @@ constexpr double kDiagnosticPeriod = 1.0;  // [s]
 // Deep enough for seconds of input: nothing is lost while a callback is late.
 constexpr std::uint32_t kScanQueue = 200;
 
-/// The topics with namespace and remappings, for messages to people.
+/// What is wrong goes into `faults`.
+void resolveTopics(const ros::NodeHandle& node, Config* config, std::vector<std::string>* faults) {
+  const auto resolve = [&](const std::string& key, std::string* topic) {
+    if (topic->empty()) return;
+    try {
+      *topic = node.resolveName(*topic);
+    } catch (const ros::InvalidNameException& error) {
+      faults->push_back(key + ": expected the name of a topic, got \"" + *topic + "\" (" + error.what() +
+                        ")");
+    }
+  };
+  const std::string section = config->radar_name.empty() ? "" : config->radar_name + "/";
+  if (section.empty()) {
+    resolve("imu_topic", &config->imu_topic);
+    resolve("barometer_topic", &config->barometer_topic);
+  }
+  resolve(section + "radar_topic", &config->radar_topic);
+  resolve(section + "trigger_topic", &config->trigger_topic);
+  for (Config& radar : config->radars) {
+    resolveTopics(node, &radar, faults);
+    radar.imu_topic = config->imu_topic;
+    radar.barometer_topic = config->barometer_topic;
+  }
+}
+
+/// The topics with namespace and remappings, for messages to people. Throws ConfigError that names the keys
+/// of topics that ROS does not take.
 Config withResolvedTopics(Config config, const ros::NodeHandle& node) {
-  config.imu_topic = node.resolveName(config.imu_topic);
-  config.radar_topic = node.resolveName(config.radar_topic);
-  if (!config.barometer_topic.empty()) config.barometer_topic = node.resolveName(config.barometer_topic);
-  if (!config.trigger_topic.empty()) config.trigger_topic = node.resolveName(config.trigger_topic);
-  for (Config& radar : config.radars) radar = withResolvedTopics(radar, node);
+  std::vector<std::string> faults;
+  resolveTopics(node, &config, &faults);
+  if (!faults.empty()) throw ConfigError(std::move(faults));
   return config;
 }
 
@@ -245,7 +271,8 @@ void LiveOdometry::onReconfigure(LiveParameters& values) {
     ROS_ERROR_STREAM(name_ << ": the change of parameters was refused, nothing was changed: "
                            << error.what());
   }
-  if (refused_because.empty()) showEffectiveParameters(private_node_, live_config_);
+  // Without a master this would wait for one, and the input with it.
+  if (refused_because.empty() && ros::master::check()) showEffectiveParameters(private_node_, live_config_);
   monitor_.reconfigured(refused_because);
   values = LiveParameters(live_config_);
 }
@@ -425,7 +452,8 @@ void LiveOdometry::solve() {
         if (result.result.updated) frames.body = frames_.place(*now, result.result.state, rate_sigma);
         frames.world = now->world();
         const bool current = session_.speak(Speaker::kOptimisation, now, [&] {
-          publisher_.result(result, frames);
+          // Not a fault of the estimator: `stamp - t_O` of an odd stamp may be no time that ROS can hold.
+          guarded("a result was not published", [&] { publisher_.result(result, frames); });
           tellHealth(result.result);
           monitor_.result(result);
         });

@@ -25,9 +25,11 @@ double velocitySigma(const NavigationState& state) {
   return std::sqrt(std::max(0.0, variances.maxCoeff()));
 }
 
-/// Whether a scan could not be used because it came too early, which is no fault of its radar.
+/// Whether a scan could not be used because it came too early: before the start, or before tf had named the
+/// radar.
 bool isEarly(const std::string& reason) {
-  return reason == "scan_before_extrinsics" || reason == "before_initialization";
+  return reason == "scan_before_extrinsics" || reason == "frame_not_usable" ||
+         reason == "before_initialization";
 }
 
 /// What to do about windows that keep ending so.
@@ -121,8 +123,11 @@ void LiveMonitor::dropped(std::size_t radar, const std::string& reason, std::uin
   const std::lock_guard<std::mutex> lock(mutex_);
   Radar& of = radars_.at(radar);
   of.dropped[reason] += count;
-  if (isEarly(reason)) of.early += count;
-  if (reason != "points_not_finite") collector_.addDropped(radar, reason, count);
+  if (isEarly(reason)) {
+    of.early += count;
+  } else if (reason != "points_not_finite") {
+    collector_.addDropped(radar, reason, count);
+  }
 }
 
 void LiveMonitor::result(const LiveSession::Result& result) {
@@ -164,6 +169,7 @@ void LiveMonitor::reset(const std::string& reason) {
   const std::lock_guard<std::mutex> lock(mutex_);
   ++resets_;
   collector_ = EvidenceCollector(config_);
+  imu_before_session_ = imu_.count;
   last_reset_ = reason;
   last_terminations_.clear();
   last_update_.reset();
@@ -220,7 +226,7 @@ void LiveMonitor::reconfigured(const std::string& refused_because) {
 
 std::string LiveMonitor::addDiagnosis(Status& status, const LiveSession& session) const {
   RunEvidence evidence = collector_.evidence(session.odometry(), session.start());
-  evidence.imu_count = imu_.count;
+  evidence.imu_count = imu_.count - imu_before_session_;
   const Diagnosis diagnosis = diagnose(evidence, config_);
   if (evidence.initialized) status.add("verdict", toString(diagnosis.verdict));
   for (std::size_t i = 0; i < diagnosis.causes.size(); ++i) {

@@ -12,6 +12,8 @@
 #include <set>
 #include <stdexcept>
 
+#include "../bag/bag_file.h"
+
 namespace rio_t {
 namespace {
 
@@ -23,27 +25,22 @@ bool isWanted(const std::string& type) {
   return wanted.count(type) != 0;
 }
 
-}  // namespace
-
-std::size_t recordTopics(const std::string& path, double duration) {
-  if (!ros::master::check())
-    throw std::runtime_error("--live: there is no ROS master at " + ros::master::getURI());
-  ros::NodeHandle node;
-  rosbag::Bag bag(path, rosbag::bagmode::Write);
+/// Writes what comes within `duration` [s].
+void record(ros::NodeHandle& node, double duration, rosbag::Bag& bag, std::size_t* messages,
+            std::size_t* without_time) {
   std::map<std::string, ros::Subscriber> subscribers;
-  std::size_t messages = 0, without_time = 0;
   const auto subscribe = [&](const std::string& topic) {
-    const boost::function<void(const Event&)> record = [&, topic](const Event& event) {
+    const boost::function<void(const Event&)> keep = [&, topic](const Event& event) {
       // With use_sim_time there is no time before the first /clock, and a bag takes no message without one.
       if (event.getReceiptTime().isZero()) {
-        ++without_time;
+        ++*without_time;
         return;
       }
       bag.write(topic, event.getReceiptTime(), event.getConstMessage());
-      ++messages;
+      ++*messages;
     };
     constexpr std::uint32_t kQueue = 5000;
-    subscribers[topic] = node.subscribe<topic_tools::ShapeShifter>(topic, kQueue, record);
+    subscribers[topic] = node.subscribe<topic_tools::ShapeShifter>(topic, kQueue, keep);
   };
   const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(duration);
   ros::WallTime look_again;
@@ -58,8 +55,16 @@ std::size_t recordTopics(const std::string& path, double duration) {
     }
     ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.1));
   }
-  subscribers.clear();
-  bag.close();
+}
+
+}  // namespace
+
+std::size_t recordTopics(const std::string& path, double duration) {
+  if (!ros::master::check())
+    throw std::runtime_error("--live: there is no ROS master at " + ros::master::getURI());
+  ros::NodeHandle node;
+  std::size_t messages = 0, without_time = 0;
+  writeBag(path, [&](rosbag::Bag& bag) { record(node, duration, bag, &messages, &without_time); });
   if (messages == 0) std::filesystem::remove(path);  // it would be in the way of the next try
   if (messages == 0 && without_time > 0)
     throw std::runtime_error(

@@ -98,10 +98,11 @@ std::vector<LiveSession::Result> LiveSession::process(bool* more) {
         arrivals_.erase(arrival);
       }
     }
-    if (scan_result.updated) {
+    {
       const std::lock_guard<std::mutex> lock(trajectory_mutex_);
       for (const StampedPose& pose : scan_result.left_window) left_window_.add(pose);
-      newest_ = StampedPose{scan_result.state.time, scan_result.state.p_W, scan_result.state.q_WI};
+      if (scan_result.updated)
+        newest_ = StampedPose{scan_result.state.time, scan_result.state.p_W, scan_result.state.q_WI};
     }
     result.result = std::move(scan_result);
     results.push_back(std::move(result));
@@ -131,7 +132,8 @@ Trajectory LiveSession::trajectory(std::size_t* stride) const {
   const std::lock_guard<std::mutex> lock(trajectory_mutex_);
   if (stride != nullptr) *stride = left_window_.stride();
   Trajectory all = left_window_.poses();
-  if (newest_) all.push_back(*newest_);
+  // While no scan is used, newer poses leave the window.
+  if (newest_ && (all.empty() || all.back().time < newest_->time)) all.push_back(*newest_);
   return all;
 }
 

@@ -69,7 +69,9 @@ ParameterValue toParameterValue(XmlRpc::XmlRpcValue& value) {
 }
 
 XmlRpc::XmlRpcValue toXmlRpc(const ParameterEntries& entries) {
-  XmlRpc::XmlRpcValue map;
+  // A struct also without entries: a value of no type makes the whole map one that no server takes.
+  int offset = 0;
+  XmlRpc::XmlRpcValue map("<value><struct></struct></value>", &offset);
   for (const ParameterEntry& entry : entries) map[entry.key] = std::visit(ToXmlRpc(), entry.value.data);
   return map;
 }

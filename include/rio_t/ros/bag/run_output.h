@@ -5,6 +5,7 @@
 #include <fstream>
 #include <map>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -126,6 +127,12 @@ void appendFixed(std::string* text, double value, int decimals);
 /// The same as a text of its own, without the sign of a minus zero.
 std::string fixedText(double value, int decimals);
 
+/// The files of a run cannot be written: the bag is not to blame.
+class OutputError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 /// The files of a run: trajectory.txt and trajectory_optimized.txt (TUM), navigation.csv, biases.csv,
 /// summary.yaml; of each radar time_offset.csv, ego_velocity.csv and, if they are estimated, extrinsics.csv.
 /// With several radars these carry their names: time_offset_left.csv. The same calls write the same bytes.
@@ -144,14 +151,15 @@ std::string fixedText(double value, int decimals);
 /// the IMU [rad]; zero where it is not estimated.
 class RunOutput {
  public:
-  /// Makes the folder and opens the files; throws std::runtime_error naming what cannot be written. The
+  /// Makes the folder and opens the files; throws OutputError naming what cannot be written. The
   /// summary of an earlier run and files of radars that this run has not are removed, so that they are never
   /// taken for its own.
   explicit RunOutput(const std::string& folder, const RunFiles& files = {});
 
+  // These throw OutputError if the disk is full.
   void addState(const NavigationState& state);
   void addResult(const ScanResult& result);
-  void finish(const RunSummary& summary);  ///< throws std::runtime_error where the disk is full
+  void finish(const RunSummary& summary);
 
  private:
   /// A file with a large buffer of its own.

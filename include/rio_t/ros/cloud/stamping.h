@@ -59,6 +59,7 @@ StampingOptions stampingOptions(const Config& config);
 ///  A scan waits `max_delay` for its trigger, and `max_overtake` once a later trigger came.
 ///  A scan that cannot be decided yet is held, and those after it wait with it, so that order is kept.
 ///  One whose trigger never comes is given up and counted; no trigger serves two scans.
+/// A scan is given up, too, if its shifted stamp is below zero or later than a message can hold.
 class ScanStamper {
  public:
   explicit ScanStamper(StampingOptions options);
@@ -76,7 +77,8 @@ class ScanStamper {
   std::vector<RadarScan> finish();
 
   std::size_t held() const { return held_.size(); }
-  /// Scans given up by reason, in snake case: "trigger_missing", "imu_missing", "too_many_held".
+  /// Scans given up by reason, in snake case: "trigger_missing", "imu_missing", "too_many_held",
+  /// "stamp_out_of_range".
   const std::map<std::string, std::uint64_t>& givenUp() const { return given_up_; }
 
  private:
@@ -99,6 +101,8 @@ class ScanStamper {
   Trigger* triggerOfSeq(const Held& scan);
   std::optional<double> triggerPeriod() const;
   void see(Time record);
+  /// The clock of the records was set back to `record`: carries what waits over to it.
+  void followStepBack(Time record);
   void giveUp(const std::string& reason);
 
   const StampingOptions options_;
@@ -106,7 +110,7 @@ class ScanStamper {
   std::deque<Trigger> triggers_;  // the last ones, oldest first
   std::deque<Held> held_;         // oldest first
   std::map<std::string, std::uint64_t> given_up_;
-  std::optional<Time> first_record_;
+  std::optional<Time> first_record_, newest_imu_record_;
   Time now_;  // latest record time seen
   bool finishing_ = false;
   Counting counting_ = Counting::kUnknown;

@@ -78,8 +78,8 @@ class LiveOdometry {
   /// Subscribes to the topics as they were told.
   void subscribe(const Config& told);
   void addDiagnostics();
-  /// Calls `callback`. What it throws is told once in a while and counted, and nothing else: no message may
-  /// end the node.
+  /// Calls `callback`. What it throws is told once in a while, and nothing else: no message may end the node
+  /// or reset the estimate. Any thread.
   template <typename Callback>
   void guarded(const std::string& what, Callback&& callback);
   void onDiagnosticsTimer();
@@ -99,6 +99,8 @@ class LiveOdometry {
   /// When it returns, nothing more is published of what was before. Any thread.
   /// `at_once`: does not wait for rest first.
   void reset(const std::string& reason, bool at_once = false);
+  /// Resets if the clock of the IMU jumped. IMU thread.
+  void followImuStamps(const ImuMeasurement& imu);
   /// Gives a sample to a session. Returns the state that is to be published, if there is one.
   std::optional<NavigationState> feed(LiveSession& session, const Received& received, double* rate_sigma);
   void account(const std::vector<LiveSession::GivenUp>& given_up);

@@ -140,6 +140,7 @@ class LiveMonitor {
   std::vector<Radar> radars_;
   EvidenceCollector collector_;  // since the session started
   Counter imu_;
+  std::uint64_t imu_before_session_ = 0;
   ImuNoise imu_noise_;
   Barometer barometer_;
   GroundVehicle vehicle_;
