@@ -91,14 +91,17 @@ ProposedConfig proposed(const ImuInspection& imu, const std::vector<RadarInspect
                        "The mounting below is coarse. The estimate starts there and refines it.");
   constexpr double kLeast = 0.05, kDefault = 0.17, kSafety = 3.0;  // [rad]
   if (all_observed && kSafety * worst < kDefault)
-    config.top_level.set("extrinsics_rotation_sigma", fixedText(std::max(kLeast, kSafety * worst), 2),
+    config.top_level.set("extrinsics_rotation_sigma",
+                         ParameterValue{rounded(std::max(kLeast, kSafety * worst), 100.0)},
                          "Standard deviation of the mounting below [rad], with a margin.");
   if (radars.size() == 1) {
     config.top_level.add(radars.front().keys);
     return config;
   }
   const std::vector<std::string> names = radarNames(radars);
-  config.top_level.setList("radars", names);
+  ParameterValue::List list;
+  for (const std::string& name : names) list.push_back({name});
+  config.top_level.set("radars", ParameterValue{list});
   for (std::size_t k = 0; k < radars.size(); ++k) config.radars.emplace_back(names[k], radars[k].keys);
   return config;
 }
@@ -233,11 +236,7 @@ void chooseByTrial(const Recording& recording, const std::string& header, const 
 }
 
 std::string header(const Recording& recording) {
-  std::string name = recording.bag;
-  for (char& c : name) {
-    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = '?';
-  }
-  return "Written by rio_t check_bag from " + name +
+  return "Written by rio_t check_bag from " + oneLine(recording.bag) +
          ".\nIt has the keys that differ from the defaults; config/estimator.yaml lists all."
          "\nRun: rosrun rio_t rio_t_bag --bag BAG --config THIS_FILE --output-dir results";
 }

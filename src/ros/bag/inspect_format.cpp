@@ -99,7 +99,7 @@ void guessFormat(const std::vector<std::string>& fields, FormatProposal* proposa
 void resolve(FormatProposal* proposal) {
   ParameterEntries entries;
   for (const ProposedKey& key : proposal->keys.all())
-    entries.push_back(parseAssignment(key.key + "=" + key.values.front()));
+    entries.push_back({key.key, key.value, "fields of the cloud"});
   proposal->format = pointCloudFormat(makeConfig(entries));
 }
 
@@ -147,7 +147,7 @@ void findPower(const CloudTopic& topic, FormatProposal* proposal) {
                     fixedText(quantile(decibels, 0.9), 0) + " dB in " + format.power;
   constexpr double kDefaultMinimum = 3.0, kFew = 0.2;  // [dB]
   if (quantile(decibels, kFew) < kDefaultMinimum) {
-    proposal->keys.set("radar_min_snr_db", fixedText(std::floor(quantile(decibels, 0.02)), 1),
+    proposal->keys.set("radar_min_snr_db", ParameterValue{std::floor(quantile(decibels, 0.02))},
                        "More than a fifth of the points are below the default, 3 dB.");
     proposal->odd.emplace_back("a fifth of the points have less than 3 dB, so radar_min_snr_db is lowered");
   }

@@ -154,7 +154,7 @@ void describe(ImuInspection* imu) {
              " m/s^2, up is " + axisName(r.rest_acceleration) + "; gyro bias " +
              fixedText(r.rest_rate.norm(), 4) + " rad/s");
     if (std::abs(norm - 9.81) > 0.45)
-      imu->keys.set("init_max_gravity_error", fixedText(std::abs(norm - 9.81) + 0.5, 1),
+      imu->keys.set("init_max_gravity_error", ParameterValue{rounded(std::abs(norm - 9.81) + 0.5, 10.0)},
                     "At rest the accelerometer shows " + fixedText(norm, 2) + " m/s^2.");
   } else {
     tell(FindingLevel::kOdd, "rest",

@@ -112,10 +112,10 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
 void limitsOfCloud(const CloudReport& cloud, ProposedKeys* keys) {
   if (cloud.behind > 0.02)
     keys->set(
-        "radar_max_azimuth", "3.141592",
+        "radar_max_azimuth", ParameterValue{3.141592},
         "So many points lie behind the radar's forward axis: " + fixedText(100.0 * cloud.behind, 0) + " %.");
   if (cloud.range_99 > 95.0)
-    keys->set("radar_max_range", fixedText(std::ceil(1.2 * cloud.range_99), 1),
+    keys->set("radar_max_range", ParameterValue{std::ceil(1.2 * cloud.range_99)},
               "The radar sees farther than 100 m.");
 }
 
@@ -134,12 +134,13 @@ void describeSign(const Looked& looked, const FormatProposal& format, RadarInspe
          "the axes of the cloud are left-handed (one axis is inverted): the ranges say that " + field +
              " is " + (looked.sign.sign > 0 ? "positive for receding" : "negative for receding") +
              " targets, the IMU the contrary; radar_doppler_sign and the mounting stand for it"});
-    radar->keys.set("radar_doppler_sign", std::to_string(search.sign),
+    radar->keys.set("radar_doppler_sign", ParameterValue{std::int64_t{search.sign}},
                     "One axis of the cloud is inverted. This sign and the mounting below stand for it.");
   } else if (search.sign == -1) {
     radar->findings.push_back({FindingLevel::kOdd, "Doppler",
                                field + " is positive for approaching targets, as " + evidence + " show"});
-    radar->keys.set("radar_doppler_sign", "-1", field + " is positive for approaching targets.");
+    radar->keys.set("radar_doppler_sign", ParameterValue{std::int64_t{-1}},
+                    field + " is positive for approaching targets.");
   } else {
     radar->findings.push_back(
         {FindingLevel::kOk, "Doppler",
@@ -178,49 +179,48 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
          "not found: less than 3 s with motion; the radar is taken to look forward. Record with motion, or "
          "set "
          "mounting_yaw_pitch_roll_deg by hand");
-    radar->keys.setList("mounting_yaw_pitch_roll_deg", {"0.0", "0.0", "0.0"},
-                        "Assumed: the bag does not show it. Yaw left, pitch up, roll right side down.");
+    radar->keys.set("mounting_yaw_pitch_roll_deg", listOf({0.0, 0.0, 0.0}),
+                    "Assumed: the bag does not show it. Yaw left, pitch up, roll right side down.");
     return;
   }
   const MountingAngles angles = mountingOf(search.q_IR);
-  const std::vector<std::string> words = {fixedText(angles.yaw / kDegree, 1),
-                                          fixedText(angles.pitch / kDegree, 1),
-                                          fixedText(angles.roll / kDegree, 1)};
+  const double yaw = rounded(angles.yaw / kDegree, 10.0), pitch = rounded(angles.pitch / kDegree, 10.0),
+               roll = rounded(angles.roll / kDegree, 10.0);
   Eigen::Vector3d sigma = search.rotation_sigma;
   constexpr double kSparseSigma = 0.2;  // [rad]
   if (radar->isSparse()) sigma = (sigma.array().square() + kSparseSigma * kSparseSigma).sqrt().min(kStraight);
   const std::string sure = sureness(sigma);
   const bool observed = search.rotation_sigma.maxCoeff() < 0.3;
   tell(observed ? FindingLevel::kOk : FindingLevel::kOdd, "mounting",
-       "yaw " + words[0] + ", pitch " + words[1] + ", roll " + words[2] + " deg (radar's " +
-           turnText(nearestTurn(search.q_IR.toRotationMatrix())) + " of the IMU); " + sure);
-  radar->keys.setList(
-      "mounting_yaw_pitch_roll_deg", words,
-      "Yaw left, pitch up, roll right side down, seen from x forward, y left, z up of the IMU. " + sure +
-          ".");
+       "yaw " + fixedText(yaw, 1) + ", pitch " + fixedText(pitch, 1) + ", roll " + fixedText(roll, 1) +
+           " deg (radar's " + turnText(nearestTurn(search.q_IR.toRotationMatrix())) + " of the IMU); " +
+           sure);
+  radar->keys.set("mounting_yaw_pitch_roll_deg", listOf({yaw, pitch, roll}),
+                  "Yaw left, pitch up, roll right side down, seen from x forward, y left, z up of the IMU. " +
+                      sure + ".");
   const Eigen::Vector3d& l = search.lever_arm_I;
   const Eigen::Vector3d& l_sigma = search.lever_arm_sigma;
-  std::vector<std::string> lever;
+  std::vector<double> lever;
   std::string text;
   for (int k = 0; k < 3; ++k) {
     // Three sigma away from zero: better than zero.
     const bool found = std::abs(l[k]) > 3.0 * l_sigma[k] && l_sigma[k] < 0.3;
-    lever.push_back(fixedText(found ? l[k] : 0.0, 2));
+    lever.push_back(found ? rounded(l[k], 100.0) : 0.0);
     text += (k == 0 ? "" : ", ") + fixedText(l[k], 2) + " +- " + fixedText(l_sigma[k], 2);
   }
-  const bool any = lever[0] != "0.00" || lever[1] != "0.00" || lever[2] != "0.00";
+  const bool any = std::any_of(lever.begin(), lever.end(), [](double x) { return x != 0.0; });
   tell(FindingLevel::kOk, "lever arm",
        "about [" + text + "] m: " + (any ? "what is clear of zero is taken over" : "zero is proposed") +
            "; measure it with a tape");
   if (any)
-    radar->keys.setList("extrinsics_translation", lever,
-                        "Origin of the radar in the IMU frame, roughly [m]. Measure it with a tape.");
+    radar->keys.set("extrinsics_translation", listOf(lever),
+                    "Origin of the radar in the IMU frame, roughly [m]. Measure it with a tape.");
   tell(FindingLevel::kOk, "offset",
        fixedText(1e3 * search.offset, 0) + " +- " + fixedText(1e3 * search.offset_sigma, 0) +
            " ms, roughly; the odometry estimates it");
   constexpr double kFar = 0.06, kKnown = 0.03;  // [s] the estimate starts at 0 +- 0.075
   if (std::abs(search.offset) > kFar && search.offset_sigma < kKnown && !radar->isSparse())
-    radar->keys.set("time_offset_initial", fixedText(std::clamp(search.offset, -0.2, 0.2), 3),
+    radar->keys.set("time_offset_initial", ParameterValue{rounded(std::clamp(search.offset, -0.2, 0.2), 1e3)},
                     "Found roughly, in seconds.");
 }
 

@@ -42,12 +42,6 @@ bool isRadarName(const std::string& text) {
   });
 }
 
-ParameterValue listOf(std::initializer_list<double> numbers) {
-  ParameterValue::List list;
-  for (const double x : numbers) list.emplace_back().data = x;
-  return {std::move(list)};
-}
-
 }  // namespace
 
 std::optional<double> asNumber(const ParameterValue& value) {

@@ -175,6 +175,12 @@ std::string ParameterValue::describe() const {
   return std::visit(Describe{}, data);
 }
 
+ParameterValue listOf(const std::vector<double>& numbers) {
+  ParameterValue::List list;
+  for (const double x : numbers) list.push_back({x});
+  return {std::move(list)};
+}
+
 ParameterValue parsePlainScalar(const std::string& text) {
   // The words of YAML 1.1, since that is what the ROS parameter server reads.
   if (isOneOf(text, {"", "~", "null", "Null", "NULL"})) return {};
