@@ -3,9 +3,11 @@
 #include <array>
 #include <cstdint>
 #include <fstream>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "rio_t/evaluation/trajectory.h"
@@ -109,6 +111,11 @@ struct RunSummary {
   std::map<std::string, std::uint64_t> scansRejected() const;
 };
 
+/// A file of a run, and how it begins.
+struct RunFile {
+  std::string name, header;
+};
+
 /// Which files a run writes: those of a radar carry its name, unless there is but one.
 struct RunFiles {
   std::vector<std::string> radars = {""};  ///< names, as in RadarSummary
@@ -117,6 +124,7 @@ struct RunFiles {
   bool ground_vehicle = false;             ///< the platform is one
   bool map = false;                        ///< landmarks are on
 
+  std::vector<RunFile> all() const;  ///< but for summary.yaml
   std::vector<std::string> names() const;
 };
 /// The files of a run with this configuration.
@@ -161,29 +169,22 @@ class RunOutput {
     std::ofstream stream;
     std::string buffer;
 
-    /// Empties it, and begins it with `header`.
-    void open(const std::string& path_in, const std::string& header = "");
+    /// Empties it, and begins it with `text`.
+    void open(const std::string& path_in, const std::string& text);
     void flush();
     void endLine();
   };
 
-  struct RadarOutput {
-    File time_offset, ego_velocity;
-    std::optional<File> extrinsics;
-  };
-
   void removeOfEarlierRuns() const;
-  void writeMap();
+  void addMap(File& file);
+  File& file(std::string_view name) { return open_.find(name)->second; }  // one of files_
   static void addExtrinsics(File& file, const ScanResult& result);
   void addAids(const ScanResult& result);
   void addPose(File& file, Time time, const Eigen::Vector3d& p_W, const Eigen::Quaterniond& q_WI);
 
   std::string folder_;
   RunFiles files_;
-  File trajectory_, optimized_, navigation_, biases_;
-  std::optional<File> barometer_, ground_vehicle_;
-  std::vector<RadarOutput> radars_;                   // by RadarScan::radar
-  std::optional<File> map_;                           // of the landmarks, if they are on
+  std::map<std::string, File, std::less<>> open_;     // by name
   std::map<std::uint64_t, LandmarkPoint> landmarks_;  // all that there were, by id, as they were last
   std::optional<Time> last_navigation_;               // of the last line in navigation.csv
 };
