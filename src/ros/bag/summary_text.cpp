@@ -200,9 +200,7 @@ std::map<std::string, std::uint64_t> RunSummary::scansRejected() const {
 }
 
 std::string contradictionText(const GroundVehicleSummary& vehicle) {
-  return "platform: ground_vehicle: after " + fixedText(vehicle.contradicted_at.value_or(0.0), 1) +
-         " s the motion contradicted it, and the constraint was switched off: the platform moves sideways or "
-         "upwards. Is it a ground vehicle, and does vehicle_frame_rotation_xyzw say which way it drives?";
+  return "after " + fixedText(vehicle.contradicted_at.value_or(0.0), 1) + " s " + kGroundVehicleContradicted;
 }
 
 }  // namespace rio_t

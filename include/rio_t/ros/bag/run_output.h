@@ -58,23 +58,14 @@ struct RadarSummary {
 };
 
 /// The result for the barometer.
-struct BarometerSummary {
-  std::uint64_t pressures = 0;                    ///< messages
-  std::uint64_t used = 0;                         ///< means of them that went into the window
-  std::map<std::string, std::uint64_t> rejected;  ///< means by reason
-  std::uint64_t steps = 0;                        ///< after which the bias was found anew
-  double bias = 0.0, bias_sigma = 0.0;            ///< [m] at the end
-  double innovation_square = 0.0;  ///< [m^2] sum over the used ones; the file has the root of the mean
+struct BarometerSummary : BarometerCounts {
+  std::uint64_t pressures = 0;  ///< messages
 };
 
 /// The result for the constraint of a ground vehicle.
-struct GroundVehicleSummary {
-  std::uint64_t used = 0;                                        ///< terms
-  std::uint64_t left_out = 0;                                    ///< that contradicted the estimate
+struct GroundVehicleSummary : GroundVehicleCounts {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  ///< of the vehicle frame, at the end
   Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Zero();      ///< [rad] about the axes of I
-  std::optional<double> contradicted_at;                         ///< [s] after the first scan judged
-  std::optional<Time> first_judged;                              ///< not in the file
 };
 /// For people: that the motion contradicts the platform, and what to look at.
 std::string contradictionText(const GroundVehicleSummary& vehicle);
