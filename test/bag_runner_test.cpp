@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "../src/ros/text.h"
 #include "rest_bag.h"
 
 namespace rio_t {

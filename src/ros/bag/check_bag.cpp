@@ -9,6 +9,7 @@
 #include <set>
 #include <utility>
 
+#include "../text.h"
 #include "inspect_radar.h"
 #include "rio_t/ros/bag/bag_runner.h"
 
@@ -34,7 +35,7 @@ ImuInspection chooseImu(const Recording& recording, BagCheck* check) {
   std::string others;
   for (const ImuInspection& imu : imus) {
     if (&imu == &*best) continue;
-    others += (others.empty() ? "" : ", ") + imu.topic + (imu.to_do.empty() ? "" : " (cannot be used)");
+    appendItem(&others, imu.topic + (imu.to_do.empty() ? "" : " (cannot be used)"));
   }
   if (!others.empty())
     check->findings.push_back({FindingLevel::kOdd, "IMU",
@@ -64,7 +65,7 @@ std::vector<std::string> radarNames(const std::vector<RadarInspection>& radars) 
       const bool shared = std::all_of(words.begin(), words.end(), [&](const std::vector<std::string>& other) {
         return std::find(other.begin(), other.end(), word) != other.end();
       });
-      if (!shared && !word.empty()) name += (name.empty() ? "" : "_") + word;
+      if (!shared && !word.empty()) appendItem(&name, word, "_");
     }
     // A name that YAML takes for a number or a truth value is none.
     const bool is_text = !name.empty() && std::isalpha(static_cast<unsigned char>(name.front())) != 0;
@@ -243,8 +244,7 @@ std::string header(const Recording& recording) {
 
 std::string topicsOf(const Recording& recording) {
   std::string text;
-  for (const auto& [topic, type] : recording.types)
-    text += (text.empty() ? "" : ", ") + topic + " (" + type + ")";
+  for (const auto& [topic, type] : recording.types) appendItem(&text, topic + " (" + type + ")");
   return text.empty() ? "none" : text;
 }
 
@@ -302,26 +302,6 @@ std::string levelText(FindingLevel level) {
       break;
   }
   return "missing ";
-}
-
-/// Broken into lines of `width`, the later ones indented.
-std::string wrapped(const std::string& text, std::size_t indent, std::size_t width) {
-  std::string result;
-  std::size_t column = indent;
-  std::vector<std::string> words;
-  boost::algorithm::split(words, text, boost::algorithm::is_any_of(" "));
-  for (std::size_t i = 0; i < words.size(); ++i) {
-    if (i > 0 && column + 1 + words[i].size() > width) {
-      result += "\n" + std::string(indent, ' ');
-      column = indent;
-    } else if (i > 0) {
-      result += " ";
-      ++column;
-    }
-    result += words[i];
-    column += words[i].size();
-  }
-  return result;
 }
 
 }  // namespace
@@ -396,9 +376,9 @@ std::string describeCheck(const BagCheck& check) {
   for (const Finding& finding : check.findings) {
     std::string line = "  " + levelText(finding.level) + finding.subject;
     line += std::string(finding.subject.size() < kSubject ? kSubject - finding.subject.size() : 1, ' ');
-    text += line + wrapped(finding.text, 2 + 8 + kSubject, kWidth) + "\n";
+    text += line + wrapped(finding.text, std::string(2 + 8 + kSubject, ' '), kWidth) + "\n";
   }
-  if (!check.to_do.empty()) text += "  To do: " + wrapped(check.to_do, 9, kWidth) + "\n";
+  if (!check.to_do.empty()) text += "  To do: " + wrapped(check.to_do, std::string(9, ' '), kWidth) + "\n";
   return text;
 }
 

@@ -9,8 +9,8 @@
 #include <optional>
 #include <utility>
 
+#include "../text.h"
 #include "rio_t/inspection/stream_timing.h"
-#include "rio_t/ros/bag/run_output.h"
 #include "rio_t/ros/cloud/point_cloud.h"
 
 namespace rio_t {

@@ -2,10 +2,10 @@
 #include <cmath>
 #include <utility>
 
+#include "../text.h"
 #include "inspect_radar.h"
 #include "rio_t/imu/clock_jump_detector.h"
 #include "rio_t/imu/input_check.h"
-#include "rio_t/ros/bag/run_output.h"
 
 namespace rio_t {
 namespace {
@@ -14,15 +14,6 @@ std::string axisName(const Eigen::Vector3d& direction) {
   int axis = 0;
   direction.cwiseAbs().maxCoeff(&axis);
   return std::string(direction[axis] < 0.0 ? "-" : "+") + "xyz"[axis];
-}
-
-std::string rateText(const StreamTiming& timing) {
-  std::string text = fixedText(timing.rate, timing.rate < 20.0 ? 1 : 0) + " Hz";
-  if (timing.gaps > 0)
-    text +=
-        ", gaps: " + std::to_string(timing.gaps) + " (longest " + fixedText(timing.longest_gap, 2) + " s)";
-  if (timing.duplicates > 0) text += ", duplicate stamps: " + std::to_string(timing.duplicates);
-  return text;
 }
 
 /// The samples that are not out of place by their stamps, and why the others are.
@@ -80,15 +71,14 @@ StampedInOrder stampedInOrder(const ImuTopic& topic) {
 void describeOrder(const StampedInOrder& order, std::size_t messages, ImuInspection* imu) {
   std::string why;
   const auto tell = [&](std::size_t count, const std::string& text) {
-    if (count > 0) why += (why.empty() ? "" : ", ") + std::to_string(count) + " " + text;
+    if (count > 0) appendItem(&why, std::to_string(count) + " " + text);
   };
   tell(order.zero, "with a stamp of zero");
   tell(order.ahead, "stamped more than " + fixedText(ImuInputCheckOptions().jump_patience, 1) +
                         " s ahead of the last good one");
   tell(order.behind, "stamped before the last good one");
   if (order.jumped)
-    why += std::string(why.empty() ? "" : "; ") +
-           "the clock jumped, and only the longest part without a jump is used";
+    appendItem(&why, "the clock jumped, and only the longest part without a jump is used", "; ");
   if (why.empty()) return;
   const std::size_t left_out = messages - order.kept.times.size() - order.duplicates;
   imu->findings.push_back({FindingLevel::kOdd, "IMU stamps",
@@ -111,7 +101,7 @@ void describeRate(const StreamTiming& timing, ImuInspection* imu) {
   const bool odd = timing.rate < kSlow || timing.gaps > 0 || 20 * timing.duplicates > timing.messages;
   imu->findings.push_back(
       {odd ? FindingLevel::kOdd : FindingLevel::kOk, "IMU",
-       imu->topic + ": " + rateText(timing) +
+       imu->topic + ": " + rateText(timing, timing.rate < 20.0 ? 1 : 0, true) +
            (timing.rate < kSlow ? ", slower than the 50 Hz that a hand-held platform needs" : "")});
 }
 
@@ -178,6 +168,16 @@ void describe(ImuInspection* imu) {
 }
 
 }  // namespace
+
+std::string rateText(const StreamTiming& timing, int decimals, bool with_duplicates) {
+  std::string text = fixedText(timing.rate, decimals) + " Hz";
+  if (timing.gaps > 0)
+    text +=
+        ", gaps: " + std::to_string(timing.gaps) + " (longest " + fixedText(timing.longest_gap, 2) + " s)";
+  if (with_duplicates && timing.duplicates > 0)
+    text += ", duplicate stamps: " + std::to_string(timing.duplicates);
+  return text;
+}
 
 ImuInspection inspectImuTopic(const ImuTopic& topic) {
   ImuInspection imu;

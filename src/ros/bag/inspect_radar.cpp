@@ -5,8 +5,8 @@
 #include <boost/algorithm/string/join.hpp>
 #include <cmath>
 
+#include "../text.h"
 #include "rio_t/radar/mounting.h"
-#include "rio_t/ros/bag/run_output.h"
 
 namespace rio_t {
 namespace {
@@ -23,15 +23,17 @@ std::string sureness(const Eigen::Vector3d& sigma) {
   for (int k = 0; k < 3; ++k) {
     const std::string axis(1, "xyz"[k]);
     if (sigma[k] < kNotObserved) {
-      known += (known.empty() ? "" : ", ") + axis + " " + fixedText(sigma[k] / kDegree, 1);
+      appendItem(&known, axis + " " + fixedText(sigma[k] / kDegree, 1));
     } else {
-      unknown += (unknown.empty() ? "" : " and ") + axis;
+      appendItem(&unknown, axis, " and ");
     }
   }
   std::string text = known.empty() ? "" : "sigma " + known + " deg about the axes of the IMU";
   if (!unknown.empty())
-    text += (text.empty() ? "" : "; ") + std::string("not observed about ") + unknown +
-            ": the motion does not show it, and an upright radar is assumed";
+    appendItem(
+        &text,
+        "not observed about " + unknown + ": the motion does not show it, and an upright radar is assumed",
+        "; ");
   return text;
 }
 
@@ -77,14 +79,9 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
     radar->findings.push_back({level, subject, text});
   };
   const CloudReport& c = looked.cloud;
-  std::string rate = radar->topic + ": " + fixedText(timing.rate, 1) + " Hz";
-  if (timing.gaps > 0)
-    rate +=
-        ", gaps: " + std::to_string(timing.gaps) + " (longest " + fixedText(timing.longest_gap, 2) + " s)";
-  if (timing.duplicates > 0 && timing.zero == 0 && !timing.constant)
-    rate += ", duplicate stamps: " + std::to_string(timing.duplicates);
   tell(timing.gaps > timing.messages / 50 ? FindingLevel::kOdd : FindingLevel::kOk, "radar",
-       rate + "; format " + format.format.name +
+       radar->topic + ": " + rateText(timing, 1, timing.zero == 0 && !timing.constant) + "; format " +
+           format.format.name +
            (format.fitting.size() > 1 ? " (fitting: " + boost::algorithm::join(format.fitting, ", ") + ")"
                                       : "") +
            ", " + format.power);

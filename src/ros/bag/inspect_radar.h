@@ -12,6 +12,9 @@
 
 namespace rio_t {
 
+/// "100 Hz, gaps: 2 (longest 0.50 s), duplicate stamps: 3"
+std::string rateText(const StreamTiming& timing, int decimals, bool with_duplicates);
+
 /// The IMU of a recording, ready to be compared with radars.
 struct ImuInspection {
   std::string topic;

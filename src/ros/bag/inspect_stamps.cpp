@@ -6,7 +6,7 @@
 #include <exception>
 #include <set>
 
-#include "rio_t/ros/bag/run_output.h"
+#include "../text.h"
 
 namespace rio_t {
 namespace {

@@ -1,18 +1,14 @@
 #include "rio_t/ros/bag/run_output.h"
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <initializer_list>
-#include <locale>
 #include <regex>
-#include <sstream>
 #include <stdexcept>
 #include <system_error>
 
+#include "../text.h"
 #include "rio_t/factors/state_block.h"
 #include "rio_t/ros/messages/conversions.h"
 #include "summary_text.h"
@@ -22,14 +18,6 @@ namespace {
 
 constexpr std::size_t kBufferSize = 1 << 18;
 constexpr double kNavigationPeriod = 0.0999;  // [s] between lines of navigation.csv
-
-void appendDigits(std::string* text, std::uint64_t value, int at_least) {
-  std::array<char, 20> digits{};
-  const char* const end = std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
-  const auto count = static_cast<int>(end - digits.data());
-  if (count < at_least) text->append(static_cast<std::size_t>(at_least - count), '0');
-  text->append(digits.data(), static_cast<std::size_t>(count));
-}
 
 void appendNumber(std::string* line, double x, int decimals) {
   line->push_back(',');
@@ -96,38 +84,6 @@ RunFiles runFiles(const Config& config) {
   files.radars.clear();
   for (const Config& radar : config.radars) files.radars.push_back(radar.radar_name);
   return files;
-}
-
-void appendFixed(std::string* text, double value, int decimals) {
-  if (!std::isfinite(value)) {
-    *text += std::isnan(value) ? ".nan" : value > 0.0 ? ".inf" : "-.inf";
-    return;
-  }
-  double scale = 1.0;
-  for (int i = 0; i < decimals; ++i) scale *= 10.0;
-  const double scaled = std::round(std::abs(value) * scale);
-  if (scaled > 9e18) {  // beyond 64 bits
-    std::ostringstream stream;
-    stream.imbue(std::locale::classic());
-    stream.precision(decimals);
-    stream << std::fixed << value;
-    *text += stream.str();
-    return;
-  }
-  const auto whole = static_cast<std::uint64_t>(scaled);
-  const auto divisor = static_cast<std::uint64_t>(scale);
-  if (value < 0.0 && whole != 0) text->push_back('-');
-  appendDigits(text, whole / divisor, 1);
-  if (decimals == 0) return;
-  text->push_back('.');
-  appendDigits(text, whole % divisor, decimals);
-}
-
-std::string fixedText(double value, int decimals) {
-  std::string text;
-  appendFixed(&text, value, decimals);
-  return text.find_first_of("123456789in") == std::string::npos && text.front() == '-' ? text.substr(1)
-                                                                                       : text;
 }
 
 void RunOutput::File::open(const std::string& path_in, const std::string& text) {

@@ -2,6 +2,8 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include "../text.h"
+
 namespace rio_t {
 namespace {
 
@@ -176,8 +178,6 @@ std::string summaryText(const RunSummary& summary, const std::vector<std::string
   line("realtime_factor", fixedText(summary.realtime_factor, 3));
   return lines.text();
 }
-
-std::string suffixOf(const std::string& radar) { return radar.empty() ? "" : "_" + radar; }
 
 std::uint64_t RunSummary::scansTotal() const {
   std::uint64_t total = 0;

@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "../text.h"
 #include "rio_t/factors/state_block.h"
 
 namespace rio_t {
@@ -61,10 +62,6 @@ LiveMonitor::LiveMonitor(const Config& config)
   for (Config& radar : configsOfRadars(config)) radars_.emplace_back(std::move(radar));
 }
 
-std::string LiveMonitor::prefix(const Radar& radar) {
-  return radar.config.radar_name.empty() ? "" : radar.config.radar_name + "/";
-}
-
 std::string LiveMonitor::called(const Radar& radar) {
   return radar.config.radar_name.empty() ? "the radar" : "radar " + radar.config.radar_name;
 }
@@ -72,7 +69,7 @@ std::string LiveMonitor::called(const Radar& radar) {
 LiveMonitor::Finding LiveMonitor::join(const std::vector<Finding>& findings, bool another_works) {
   Finding all;
   for (const Finding& finding : findings) {
-    all.text += (all.text.empty() ? "" : "; ") + finding.text;
+    appendItem(&all.text, finding.text, "; ");
     all.level = std::max(all.level, finding.level);
   }
   if (another_works) all.level = std::min(all.level, std::uint8_t{DiagnosticStatus::WARN});
@@ -289,7 +286,7 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) c
 std::optional<LiveMonitor::Finding> LiveMonitor::describeRadar(Status& status, Radar& radar,
                                                                bool initialized) const {
   const Config& config = radar.config;
-  const std::string key = prefix(radar);
+  const std::string key = prefixOf(radar.config.radar_name);
   const bool is_silent = radar.scans.isSilent();
   status.add(key + "scans", radar.scans.count);
   status.add(key + "scans_used", radar.used);

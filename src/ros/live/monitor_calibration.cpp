@@ -5,6 +5,7 @@
 #include <sstream>
 #include <string>
 
+#include "../text.h"
 #include "rio_t/core/so3.h"
 #include "rio_t/ros/live/monitor.h"
 
@@ -89,7 +90,7 @@ void LiveMonitor::describeExtrinsics(Status& status, std::size_t radar) const {
     status.add("lever_arm_sigma_m", listOf(lever_sigma));
     const std::string lever =
         axesAbove(lever_sigma, kObserved * options.extrinsics_translation_sigma, "lever arm along ");
-    kept += (kept.empty() || lever.empty() ? "" : ", ") + lever;
+    if (!lever.empty()) appendItem(&kept, lever);
   }
   const std::string far = axesAbove(turn.cwiseAbs(), 3.0 * options.extrinsics_rotation_sigma, "about ");
   if (!far.empty()) {

@@ -121,11 +121,6 @@ struct RunFiles {
 /// The files of a run with this configuration.
 RunFiles runFiles(const Config& config);
 
-/// Appends `value` with that many decimals (at most 12), with a point whatever the locale; "nan", "inf".
-void appendFixed(std::string* text, double value, int decimals);
-/// The same as a text of its own, without the sign of a minus zero.
-std::string fixedText(double value, int decimals);
-
 /// The files of a run: trajectory.txt and trajectory_optimized.txt (TUM), navigation.csv, biases.csv,
 /// summary.yaml; of each radar time_offset.csv, ego_velocity.csv and, if they are estimated, extrinsics.csv.
 /// With several radars these carry their names: time_offset_left.csv. The same calls write the same bytes.

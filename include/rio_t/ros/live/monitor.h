@@ -116,8 +116,6 @@ class LiveMonitor {
     std::string text;
   };
 
-  /// "" or "left/", for keys.
-  static std::string prefix(const Radar& radar);
   /// "the radar" or "radar left", for texts.
   static std::string called(const Radar& radar);
   /// Adds what the input has of this radar, and returns what is wrong with it.
