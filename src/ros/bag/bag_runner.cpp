@@ -129,7 +129,7 @@ class BagJob {
   explicit BagJob(const BagRun& run)
       : run_(run), files_(runFiles(run.config)), bags_(run.bags), started_(std::chrono::steady_clock::now()) {
     const std::map<std::string, std::string> types = bags_.typesByTopic();
-    run_.config = withTopicsOfBag(run.config, types);
+    run_.config = withTopics(run.config, [&](const std::string& topic) { return topicOfBag(topic, types); });
     const Config& config = run_.config;
     std::vector<Wanted> wanted = wantedTopics(config);
     for (const Wanted& want : wanted) topics_.push_back(want.topic);

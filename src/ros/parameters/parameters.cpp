@@ -310,13 +310,18 @@ std::vector<Config> configsOfRadars(const Config& config) {
   return config.radars.empty() ? std::vector<Config>{config} : config.radars;
 }
 
-Config withAbsoluteTopics(Config config) {
+Config withTopics(Config config, const std::function<std::string(const std::string&)>& resolve) {
   for (std::string* topic : {&config.imu_topic, &config.radar_topic, &config.trigger_topic,
                              &config.ground_truth_topic, &config.barometer_topic}) {
-    if (!topic->empty() && topic->front() != '/') topic->insert(0, "/");
+    if (!topic->empty()) *topic = resolve(*topic);
   }
-  for (Config& radar : config.radars) radar = withAbsoluteTopics(radar);
+  for (Config& radar : config.radars) radar = withTopics(radar, resolve);
   return config;
+}
+
+Config withAbsoluteTopics(const Config& config) {
+  return withTopics(config,
+                    [](const std::string& topic) { return topic.front() == '/' ? topic : "/" + topic; });
 }
 
 std::string withoutSlash(const std::string& frame) {
