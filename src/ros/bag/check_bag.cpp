@@ -16,8 +16,6 @@
 namespace rio_t {
 namespace {
 
-constexpr double kObserved = 0.3;  // [rad] sigma of a turn below which the bag shows it
-
 void append(const std::vector<Finding>& from, std::vector<Finding>* to) {
   to->insert(to->end(), from.begin(), from.end());
 }
@@ -85,13 +83,13 @@ ProposedConfig proposed(const ImuInspection& imu, const std::vector<RadarInspect
   bool all_observed = true;
   for (const RadarInspection& radar : radars) {
     const Eigen::Vector3d& sigma = radar.search.rotation_sigma;
-    if (!radar.search.enough || sigma.maxCoeff() > kObserved || radar.isSparse()) all_observed = false;
+    if (!radar.search.enough || sigma.maxCoeff() > kObservedTurn || radar.isSparse()) all_observed = false;
     worst = std::max(worst, sigma.maxCoeff());
   }
   config.top_level.set("estimate_extrinsics", "rotation",
                        "The mounting below is coarse. The estimate starts there and refines it.");
-  constexpr double kLeast = 0.05, kDefault = 0.17, kSafety = 3.0;  // [rad]
-  if (all_observed && kSafety * worst < kDefault)
+  constexpr double kLeast = 0.05, kSafety = 3.0;  // [rad]
+  if (all_observed && kSafety * worst < SmootherOptions().extrinsics_rotation_sigma)
     config.top_level.set("extrinsics_rotation_sigma",
                          ParameterValue{rounded(std::max(kLeast, kSafety * worst), 100.0)},
                          "Standard deviation of the mounting below [rad], with a margin.");

@@ -145,11 +145,13 @@ void findPower(const CloudTopic& topic, FormatProposal* proposal) {
   }
   proposal->power = "SNR " + fixedText(quantile(decibels, 0.1), 0) + " to " +
                     fixedText(quantile(decibels, 0.9), 0) + " dB in " + format.power;
-  constexpr double kDefaultMinimum = 3.0, kFew = 0.2;  // [dB]
-  if (quantile(decibels, kFew) < kDefaultMinimum) {
-    proposal->keys.set("radar_min_snr_db", ParameterValue{std::floor(quantile(decibels, 0.02))},
-                       "More than a fifth of the points are below the default, 3 dB.");
-    proposal->odd.emplace_back("a fifth of the points have less than 3 dB, so radar_min_snr_db is lowered");
+  const double minimum = EgoVelocityOptions().min_snr_db;
+  if (quantile(decibels, 0.2) < minimum) {
+    proposal->keys.set(
+        "radar_min_snr_db", ParameterValue{std::floor(quantile(decibels, 0.02))},
+        "More than a fifth of the points are below the default, " + fixedText(minimum, 0) + " dB.");
+    proposal->odd.push_back("a fifth of the points have less than " + fixedText(minimum, 0) +
+                            " dB, so radar_min_snr_db is lowered");
   }
 }
 

@@ -138,13 +138,15 @@ void describe(ImuInspection* imu) {
         "one right-handed frame, and record again.";
   }
   if (r.rests_at_start) {
-    const double norm = r.rest_acceleration.norm();
-    tell(std::abs(norm - 9.81) < 0.3 ? FindingLevel::kOk : FindingLevel::kOdd, "rest",
+    const OdometryOptions options;
+    const double norm = r.rest_acceleration.norm(), error = std::abs(norm - options.gravity);
+    const double allowed = options.initialization.max_gravity_error;
+    tell(error < 0.3 ? FindingLevel::kOk : FindingLevel::kOdd, "rest",
          "at rest from " + fixedText(r.rest_begin, 1) + " s; gravity " + fixedText(norm, 2) +
              " m/s^2, up is " + axisName(r.rest_acceleration) + "; gyro bias " +
              fixedText(r.rest_rate.norm(), 4) + " rad/s");
-    if (std::abs(norm - 9.81) > 0.45)
-      imu->keys.set("init_max_gravity_error", ParameterValue{rounded(std::abs(norm - 9.81) + 0.5, 10.0)},
+    if (error > 0.9 * allowed)
+      imu->keys.set("init_max_gravity_error", ParameterValue{rounded(error + allowed, 10.0)},
                     "At rest the accelerometer shows " + fixedText(norm, 2) + " m/s^2.");
   } else {
     tell(FindingLevel::kOdd, "rest",

@@ -18,11 +18,10 @@ std::string degrees(double radians) { return fixedText(radians / kDegree, 0); }
 
 /// "x 1.2, y 0.9 deg; not observed about z"
 std::string sureness(const Eigen::Vector3d& sigma) {
-  constexpr double kNotObserved = 0.3;  // [rad]
   std::string known, unknown;
   for (int k = 0; k < 3; ++k) {
     const std::string axis(1, "xyz"[k]);
-    if (sigma[k] < kNotObserved) {
+    if (sigma[k] < kObservedTurn) {
       appendItem(&known, axis + " " + fixedText(sigma[k] / kDegree, 1));
     } else {
       appendItem(&unknown, axis, " and ");
@@ -87,7 +86,7 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
            ", " + format.power);
   for (const std::string& odd : format.odd) tell(FindingLevel::kOdd, "format", odd);
   const DopplerStep& step = looked.velocities.doppler_step;
-  const bool sparse = c.points_50 < 15.0;
+  const bool sparse = radar->isSparse();
   tell(sparse ? FindingLevel::kOdd : FindingLevel::kOk, "points",
        fixedText(c.points_10, 0) + " / " + fixedText(c.points_50, 0) + " / " + fixedText(c.points_90, 0) +
            " a scan (10, 50, 90 %), to " + fixedText(c.range_99, 1) + " m, field of view +-" +
@@ -111,9 +110,10 @@ void limitsOfCloud(const CloudReport& cloud, ProposedKeys* keys) {
     keys->set(
         "radar_max_azimuth", ParameterValue{3.141592},
         "So many points lie behind the radar's forward axis: " + fixedText(100.0 * cloud.behind, 0) + " %.");
-  if (cloud.range_99 > 95.0)
+  const double max_range = EgoVelocityOptions().max_range;
+  if (cloud.range_99 > 0.95 * max_range)
     keys->set("radar_max_range", ParameterValue{std::ceil(1.2 * cloud.range_99)},
-              "The radar sees farther than 100 m.");
+              "The radar sees farther than " + fixedText(max_range, 0) + " m.");
 }
 
 void describeSign(const Looked& looked, const FormatProposal& format, RadarInspection* radar) {
@@ -187,7 +187,7 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
   constexpr double kSparseSigma = 0.2;  // [rad]
   if (radar->isSparse()) sigma = (sigma.array().square() + kSparseSigma * kSparseSigma).sqrt().min(kStraight);
   const std::string sure = sureness(sigma);
-  const bool observed = search.rotation_sigma.maxCoeff() < 0.3;
+  const bool observed = search.rotation_sigma.maxCoeff() < kObservedTurn;
   tell(observed ? FindingLevel::kOk : FindingLevel::kOdd, "mounting",
        "yaw " + fixedText(yaw, 1) + ", pitch " + fixedText(pitch, 1) + ", roll " + fixedText(roll, 1) +
            " deg (radar's " + turnText(nearestTurn(search.q_IR.toRotationMatrix())) + " of the IMU); " +
@@ -215,9 +215,13 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
   tell(FindingLevel::kOk, "offset",
        fixedText(1e3 * search.offset, 0) + " +- " + fixedText(1e3 * search.offset_sigma, 0) +
            " ms, roughly; the odometry estimates it");
-  constexpr double kFar = 0.06, kKnown = 0.03;  // [s] the estimate starts at 0 +- 0.075
-  if (std::abs(search.offset) > kFar && search.offset_sigma < kKnown && !radar->isSparse())
-    radar->keys.set("time_offset_initial", ParameterValue{rounded(std::clamp(search.offset, -0.2, 0.2), 1e3)},
+  constexpr double kKnown = 0.03;  // [s]
+  const SmootherOptions defaults;
+  const double bound = 0.8 * defaults.max_time_offset;
+  if (std::abs(search.offset) > 0.8 * defaults.time_offset_sigma && search.offset_sigma < kKnown &&
+      !radar->isSparse())
+    radar->keys.set("time_offset_initial",
+                    ParameterValue{rounded(std::clamp(search.offset, -bound, bound), 1e3)},
                     "Found roughly, in seconds.");
 }
 

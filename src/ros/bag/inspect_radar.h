@@ -27,6 +27,9 @@ struct ImuInspection {
 };
 ImuInspection inspectImuTopic(const ImuTopic& topic);
 
+/// [rad] Sigma of a turn below which the bag shows it.
+constexpr double kObservedTurn = 0.3;
+
 /// A radar of a recording.
 struct RadarInspection {
   std::string topic;
