@@ -41,7 +41,7 @@ std::string axisRow(std::size_t axis, const AxisCalibration& values) {
   std::string row = "  " + padded(text.name, 14, false) + padded(text.unit, 4, false) + column(values.told) +
                     column(values.found) + column(values.sigma) + "   " + toString(values.verdict);
   if (values.verdict == Verdict::kNotObserved)
-    row += ": " + whatToMove(static_cast<CalibrationAxis>(axis)) + " to make it so";
+    row += ": to observe it, " + whatToMove(static_cast<CalibrationAxis>(axis));
   return row + "\n";
 }
 

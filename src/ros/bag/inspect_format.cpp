@@ -65,7 +65,7 @@ void guessFormat(const std::vector<std::string>& fields, FormatProposal* proposa
                                                  "velocity", "vel", "speed", "v_r", "vr"});
   if (doppler.empty()) {
     proposal->fault = "it has no field with the Doppler (fields: " + proposal->fields +
-                      "), so no velocity can be had from it; use a driver that publishes the Doppler";
+                      "), so it gives no velocity; use a driver that publishes the Doppler";
     return;
   }
   const std::string azimuth = fieldLike(fields, {"azimuth"}), elevation = fieldLike(fields, {"elevation"});

@@ -426,7 +426,7 @@ std::string describeRestarts(const std::vector<ImuRestart>& restarts, const Conf
   if (is_ahead)
     text +=
         ", more than max_bridged_imu_gap " + number(config.odometry.imu_input_check.max_bridged_gap) + " s";
-  text += ". The trajectory begins anew there, at the origin";
+  text += ". There the trajectory starts again at the origin";
   if (restarts.size() > 1) text += "; more such jumps: " + std::to_string(restarts.size() - 1);
   return text + ".";
 }

@@ -50,7 +50,7 @@ std::string advice(SolverTermination termination) {
 
 std::string noisyImu(const MeasuredImuNoise& noise, const ImuNoise& told) {
   std::ostringstream text;
-  text << "the IMU vibrates or is noisier than told: accelerometer " << noise.accel_density
+  text << "the IMU vibrates or is noisier than configured: accelerometer " << noise.accel_density
        << " m/s^2/sqrt(Hz), imu_accel_noise_density " << told.accel_density << "; gyro " << noise.gyro_density
        << " rad/s/sqrt(Hz), imu_gyro_noise_density " << told.gyro_density
        << ". The estimate takes the measured noise. A softer mount makes it better.";
@@ -270,7 +270,7 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) c
   if (health == Health::kDiverged) {
     status.summary(DiagnosticStatus::ERROR,
                    (config_.odometry.health.on_divergence == OnDivergence::kReinitialize
-                        ? "diverged: do not trust the estimate; finding the state anew"
+                        ? "diverged: do not trust the estimate; re-initialising"
                         : "diverged: do not trust the estimate; call ~reset") +
                        likely_cause);
   } else if (health == Health::kCoasting) {

@@ -62,7 +62,7 @@ void LiveMonitor::describeTimeOffset(Status& status, std::size_t radar) const {
     status.summary(DiagnosticStatus::OK, "kept: no scan of " + called(of) + " is used now");
   } else {
     status.summary(DiagnosticStatus::OK,
-                   observable ? "observed by the motion now" : "kept: the motion says nothing now");
+                   observable ? "observed by the motion now" : "kept: not observable now");
   }
 }
 
@@ -94,9 +94,9 @@ void LiveMonitor::describeExtrinsics(Status& status, std::size_t radar) const {
   }
   const std::string far = axesAbove(turn.cwiseAbs(), 3.0 * options.extrinsics_rotation_sigma, "about ");
   if (!far.empty()) {
-    status.summary(
-        DiagnosticStatus::WARN,
-        called(of) + " is turned " + far + " by more than 3 extrinsics_rotation_sigma from what was told");
+    status.summary(DiagnosticStatus::WARN,
+                   "the estimated rotation of " + called(of) + " " + far +
+                       " differs from the configured one by more than 3 extrinsics_rotation_sigma");
   } else if (!kept.empty()) {
     status.summary(DiagnosticStatus::OK, "kept: the motion has not shown the " + kept);
   } else {
