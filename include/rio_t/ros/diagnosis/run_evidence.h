@@ -117,7 +117,6 @@ struct GroundVehicleCounts {
 constexpr const char* kGroundVehicleContradicted =
     "the motion contradicted platform: ground_vehicle, and the constraint is switched off until a reset: the "
     "platform moves sideways or upwards. Is it a ground vehicle, and does vehicle_frame_rotation_xyzw say "
-    "which "
-    "way it drives?";
+    "which way it drives?";
 
 }  // namespace rio_t
