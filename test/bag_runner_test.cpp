@@ -181,7 +181,7 @@ TEST_F(BagRunner, GroundTruthComesFromTheTopicOrAFile) {
   expectError(run({"--set", "ground_truth=" + folder_ + "/elsewhen.txt"}), {"ground truth", "elsewhen.txt"});
 }
 
-TEST_F(BagRunner, ATrajectoryThatBeginsAnewIsDoubtful) {
+TEST_F(BagRunner, ATrajectoryThatStartsAgainIsDoubtful) {
   BagContents what;
   what.duration = 16.0;
   for (const double jump : {5.0, -5.0}) {
@@ -191,7 +191,7 @@ TEST_F(BagRunner, ATrajectoryThatBeginsAnewIsDoubtful) {
     EXPECT_EQ(outcome.status, 0) << outcome.err;
     const std::string where = jump > 0.0 ? "jump ahead from 1007.995 s to 1013.500 s, more than "
                                            "max_bridged_imu_gap 3 s. There the trajectory starts again"
-                                         : "jump back from 1007.995 s to 1003.500 s. The trajectory";
+                                         : "jump back from 1007.995 s to 1003.500 s. There the trajectory";
     EXPECT_NE(outcome.err.find("warning: topic /sensor_platform/imu: The stamps of the IMU " + where),
               std::string::npos)
         << outcome.err;
