@@ -10,7 +10,8 @@ import sys
 import tempfile
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "src"))
-from rio_t import programs as programs_of_rio_t  # noqa: E402
+from rio_t.errors import RioTError  # noqa: E402
+from rio_t.programs import usage_of  # noqa: E402
 
 
 def fail(text):
@@ -22,13 +23,10 @@ def play(programs, bag, config, assignments, folder):
     words = [os.path.join(programs, "rio_t_bag"), "--bag", bag, "--config", config, "--output-dir", folder]
     for assignment in assignments:
         words += ["--set", assignment]
-    with tempfile.TemporaryFile("w+") as told:
-        process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=told)
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = programs_of_rio_t.exit_code(status)
-        told.seek(0)
-        if process.returncode not in programs_of_rio_t.HAS_RESULT:
-            fail(" ".join(words) + "\n" + told.read())
+    try:
+        usage = usage_of(*words)
+    except RioTError as error:
+        fail(" ".join(words) + f"\n{error}")
     summary = {}
     with open(os.path.join(folder, "summary.yaml")) as lines:
         for line in lines:

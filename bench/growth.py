@@ -4,22 +4,18 @@ Called by scripts/bench.sh growth, which builds first. On simulated bags of its 
 import argparse
 import json
 import os
-import subprocess
 import sys
 import tempfile
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "src"))
+from rio_t.errors import RioTError  # noqa: E402
+from rio_t.programs import output_of  # noqa: E402
 
 RUNS = 5  # of each case; for each stage the fastest counts, the others were disturbed
 COLUMNS = (("reading, output", ("reading and the rest", "output", "pipeline")), ("decode", ("decode",)),
            ("ego-velocity", ("ego-velocity",)), ("factors", ("prediction", "factors")),
            ("solve", ("solve", "covariance")), ("marginalise", ("marginalise",)),
            ("navigation", ("navigation: anchor", "navigation: step")))
-
-
-def run(*words):
-    outcome = subprocess.run(words, capture_output=True, text=True, check=False)
-    if outcome.returncode != 0:
-        sys.exit("growth.py: " + " ".join(words) + "\n" + outcome.stderr.strip())
-    return outcome.stdout
 
 
 class Bench:
@@ -33,8 +29,8 @@ class Bench:
         """A simulated bag with these options of `simulate`; made once."""
         path = os.path.join(self.folder, "_".join(options).replace("-", "") + ".bag")
         if not os.path.exists(path):
-            run(self.program("simulate"), "--motion", "difficult", "--seed", "5", "--time-offset", "0.02", "--out", path,
-                *options)
+            output_of(self.program("simulate"), "--motion", "difficult", "--seed", "5", "--time-offset", "0.02", "--out",
+                      path, *options)
         return path
 
     def bag_of_points(self, points):
@@ -44,7 +40,7 @@ class Bench:
     def cost(self, bag, *assignments):
         """Microseconds a scan, by stage and in sum; the window solve's quantiles."""
         words = (self.program("bag_benchmark"), bag, "irs", os.path.join(self.folder, "out"), *assignments)
-        results = [json.loads(run(*words)) for _ in range(RUNS)]
+        results = [json.loads(output_of(*words)) for _ in range(RUNS)]
         scans = results[0]["scans"]
         cost = {name: min(1e6 * sum(result["stages"][each]["seconds"] for each in of) / scans for result in results)
                 for name, of in COLUMNS}
@@ -86,4 +82,7 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except RioTError as error:
+        sys.exit(f"growth.py: {error}")

@@ -21,12 +21,11 @@ import rosbag
 import rosgraph
 import rospy
 import yaml
-from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from rio_t import programs, run_folder, tum
 from rio_t.errors import RioTError
 from rio_t.msg import TimeOffset
-from rio_t.ros_processes import DEADLINE, program, quiet, start_master, wait_for
+from rio_t.ros_processes import DEADLINE, Diagnostics, program, quiet, start_master, wait_for
 
 WAIT = 110.0  # [ms] of IMU that a scan waits for after its measurement, kImuMargin of odometry/estimator.cpp
 ATE_BOUND = 0.10  # of the bag runner's
@@ -38,18 +37,13 @@ class Listener:
 
     def __init__(self, topics):
         self.raw = {topic: [] for topic in topics}
-        self.diagnostics = {}  # the last: {task: {key: value}}
+        self.diagnostics = Diagnostics().newest
         for topic in topics:
             rospy.Subscriber(topic, rospy.AnyMsg, self._keep, self.raw[topic], buff_size=2**24, tcp_nodelay=True)
-        rospy.Subscriber("/diagnostics", DiagnosticArray, self._keep_diagnostics)
 
     @staticmethod
     def _keep(message, messages):
         messages.append((time.monotonic(), message._buff))
-
-    def _keep_diagnostics(self, message):
-        for status in message.status:
-            self.diagnostics[status.name.split(": ")[-1]] = {value.key: value.value for value in status.values}
 
     def receipts(self, topic):
         """{stamp of the header [ns]: time of receipt [s]}"""

@@ -37,30 +37,14 @@ if ARGUMENTS.check:
 import numpy  # noqa: E402
 import rosbag  # noqa: E402
 import rospy  # noqa: E402
-from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from rio_t import programs  # noqa: E402
 from rio_t.plots import pyplot  # noqa: E402
-from rio_t.ros_processes import program, quiet, start_master, wait_for  # noqa: E402
+from rio_t.ros_processes import Diagnostics, program, quiet, start_master, wait_for  # noqa: E402
 
 
 def memory_mb(process):
     with open(f"/proc/{process.pid}/statm") as file:
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20
-
-
-class Diagnostics:
-    """The newest numbers of the node, {task: {key: value}}."""
-
-    def __init__(self):
-        self.newest = {}
-        rospy.Subscriber("/diagnostics", DiagnosticArray, self._keep)
-
-    def _keep(self, message):
-        for status in message.status:
-            self.newest[status.name.split(": ")[-1]] = {value.key: value.value for value in status.values}
-
-    def number(self, task, key):
-        return float(self.newest.get(task, {}).get(key, 0.0))
 
 
 def sample(node, diagnostics, seconds):

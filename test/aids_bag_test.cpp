@@ -94,7 +94,8 @@ TEST_F(AidsBag, ADroneThatIsToldToBeAVehicleIsToldSo) {
   ASSERT_TRUE(summary.ground_vehicle->contradicted_at.has_value());
   EXPECT_LT(*summary.ground_vehicle->contradicted_at, 10.0);
   ASSERT_EQ(summary.warnings.size(), 1u);
-  EXPECT_NE(summary.warnings.front().find("the motion contradicted it"), std::string::npos);
+  EXPECT_NE(summary.warnings.front().find("s the motion contradicted platform: ground_vehicle"),
+            std::string::npos);
   EXPECT_EQ(summary.input_faults.at("ground_vehicle_contradicted"), 1u);
   EXPECT_NE(out("summary.yaml").find("contradicted: true"), std::string::npos);
   EXPECT_NE(out("ground_vehicle.csv").find(",contradicted\n"), std::string::npos);

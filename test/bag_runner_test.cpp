@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "../src/ros/text.h"
 #include "rest_bag.h"
 
 namespace rio_t {
@@ -193,7 +194,7 @@ TEST_F(BagRunner, EveryModeSavesItsEstimateThoughTheGroundTruthDoesNotMatch) {
   }
 }
 
-TEST_F(BagRunner, ATrajectoryThatBeginsAnewIsDoubtful) {
+TEST_F(BagRunner, ATrajectoryThatStartsAgainIsDoubtful) {
   BagContents what;
   what.duration = 16.0;
   for (const double jump : {5.0, -5.0}) {
@@ -202,8 +203,8 @@ TEST_F(BagRunner, ATrajectoryThatBeginsAnewIsDoubtful) {
     const Outcome outcome = run();
     EXPECT_EQ(outcome.status, 0) << outcome.err;
     const std::string where = jump > 0.0 ? "jump ahead from 1007.995 s to 1013.500 s, more than "
-                                           "max_bridged_imu_gap 3 s. The trajectory begins anew there"
-                                         : "jump back from 1007.995 s to 1003.500 s. The trajectory";
+                                           "max_bridged_imu_gap 3 s. There the trajectory starts again"
+                                         : "jump back from 1007.995 s to 1003.500 s. There the trajectory";
     EXPECT_NE(outcome.err.find("warning: topic /sensor_platform/imu: The stamps of the IMU " + where),
               std::string::npos)
         << outcome.err;
@@ -212,7 +213,7 @@ TEST_F(BagRunner, ATrajectoryThatBeginsAnewIsDoubtful) {
     for (const char* part : {"verdict: doubtful\n", "imu_clock_restart: 1", "name: imu_clock_restart"})
       EXPECT_NE(yaml.find(part), std::string::npos) << part << yaml;
   }
-  // Before there is a trajectory, none begins anew. A driver may set its clock first.
+  // Before there is a trajectory, none starts again. A driver may set its clock first.
   what.jump = 5.0;
   what.jump_at = 0.5;
   writeBag(what);

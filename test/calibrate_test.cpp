@@ -226,8 +226,10 @@ TEST_F(Calibrate, WhatAStraightRideDoesNotShowStaysAsTold) {
   const Outcome outcome = calibrateBags({bag_});
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   // It speeds up and slows down along x of the IMU, and never turns.
-  expectSays(outcome.out, {"not observed: change speed along y or z", "not observed: rotate about y or z",
-                           "not observed: rotate about x or z", "not observed: rotate about x or y"});
+  expectSays(outcome.out, {"not observed: to observe it, change speed along y or z",
+                           "not observed: to observe it, rotate about y or z",
+                           "not observed: to observe it, rotate about x or z",
+                           "not observed: to observe it, rotate about x or y"});
   EXPECT_EQ(countOf("not observed", outcome.out), 4u) << outcome.out;
   const Config config = written();
   EXPECT_EQ(config.odometry.T_IR.l_I, truth_.l_I);

@@ -50,6 +50,19 @@ TEST_F(CheckBag, AnImuInDegreesIsNamed) {
   expectRuns(odd);
 }
 
+TEST_F(CheckBag, AFieldWhoseNameIsYamlIsRead) {
+  Changes changes;
+  changes.cloud = [](sensor_msgs::PointCloud2& cloud) {
+    for (sensor_msgs::PointField& field : cloud.fields) {
+      if (field.name == "v_doppler_mps") field.name = "[velocity]";
+    }
+    return true;
+  };
+  const BagCheck odd = check(rewritten("yaml_field", changes), false);
+  ASSERT_TRUE(odd.ready()) << describeCheck(odd);
+  EXPECT_EQ(configOf(odd).radar_overrides.doppler, "[velocity]") << odd.yaml;
+}
+
 TEST_F(CheckBag, ANegativeDopplerIsNamed) {
   Changes changes;
   changes.cloud = [](sensor_msgs::PointCloud2& cloud) {

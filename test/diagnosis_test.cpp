@@ -328,7 +328,7 @@ TEST(Diagnosis, ATrajectoryThatBeginsAnewIsNeverGood) {
   expectSays(
       first(evidence),
       {"imu_clock_restart: The stamps of the IMU jump ahead from 1700000020.000 s to 1700000028.505 s, "
-       "more than max_bridged_imu_gap 3 s. The trajectory begins anew there, at the origin. Run",
+       "more than max_bridged_imu_gap 3 s. There the trajectory starts again at the origin. Run",
        "raise max_bridged_imu_gap"});
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
   evidence.imu_restarts = {{Time::fromSeconds(40.0), Time::fromSeconds(10.0)},

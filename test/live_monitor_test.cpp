@@ -160,7 +160,7 @@ TEST_F(TwoRadarDiagnostics, AreAnErrorWithItsCauseWhereNoScanWasEverUsed) {
   const Status diverges = odometry(diverged);
   EXPECT_EQ(diverges.level, DiagnosticStatus::ERROR);
   EXPECT_EQ(value(diverges, "health"), "diverged");
-  EXPECT_EQ(diverges.message.find("diverged: do not trust the estimate; finding the state anew" + cause), 0U)
+  EXPECT_EQ(diverges.message.find("diverged: do not trust the estimate; re-initialising" + cause), 0U)
       << diverges.message;
 }
 
@@ -304,7 +304,8 @@ TEST_F(TwoRadarDiagnostics, WarnOfAMountingFarFromWhatWasTold) {
   update(0, 9.0, 0.0, {kMountings[0].l_I, so3::exp({0.31, 0.0, 0.0}) * kMountings[0].q_IR});
   EXPECT_EQ(extrinsics(0).level, DiagnosticStatus::WARN);
   EXPECT_EQ(extrinsics(0).message,
-            "radar left is turned about x by more than 3 extrinsics_rotation_sigma from what was told");
+            "the estimated rotation of radar left about x differs from the configured one by more than 3 "
+            "extrinsics_rotation_sigma");
 }
 
 /// What `diagnostics` says of the solver.

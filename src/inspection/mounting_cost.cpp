@@ -19,6 +19,9 @@ using Eigen::VectorXd;
 constexpr double kWindow = 3.0;            // [s]
 constexpr std::size_t kMinVelocities = 6;  // of a window: two lines take four
 constexpr double kMinMotion = 0.25;        // [m/s] that a window must exceed to count as motion
+constexpr double kGravity = 9.81;          // [m/s^2] anywhere on earth to 0.03
+constexpr double kLeverArmSigma = 0.5;     // [m] per axis, around zero
+constexpr double kVelocitySigma = 0.08;    // [m/s] of what a velocity and the IMU over a window do not model
 constexpr double kGravitySigma = 0.5;      // [m/s^2] of the mean specific force: 3 degrees
 constexpr double kRestGravitySigma = 0.1;  // [m/s^2] of the gravity from a rest: bias of the accelerometer
 constexpr double kGyroDrift = 3.0e-4;      // [rad/s] with which the gyro loses it: what is left of its bias
@@ -46,9 +49,8 @@ Rows rowsOf(const RadarVelocity& velocity, double offset, Time begin, const Iner
 }
 
 /// Covariance of a velocity in G. It is known in R; before M is, its mean stands for all axes.
-Matrix3d covariance(const RadarVelocity& velocity, const Matrix3d& R_GI, const std::optional<Matrix3d>& M,
-                    double sigma) {
-  const Matrix3d model = sigma * sigma * Matrix3d::Identity();
+Matrix3d covariance(const RadarVelocity& velocity, const Matrix3d& R_GI, const std::optional<Matrix3d>& M) {
+  const Matrix3d model = kVelocitySigma * kVelocitySigma * Matrix3d::Identity();
   if (!M) return model + velocity.covariance.trace() / 3.0 * Matrix3d::Identity();
   const Matrix3d T = R_GI * *M;
   return model + T * velocity.covariance * T.transpose();
@@ -74,8 +76,7 @@ WindowRows rowsOf(const VelocityWindow& window, double offset, const std::option
     all.A.middleRows(3 * i, 3) = rows.A;
     all.y.segment(3 * i, 3) = rows.y;
     const Matrix3d R_GI = problem.track.rotation(each.velocity->stamp - offset).toRotationMatrix();
-    all.covariance.block(3 * i, 3 * i, 3, 3) =
-        covariance(*each.velocity, R_GI, M, problem.options.velocity_sigma) / each.weight;
+    all.covariance.block(3 * i, 3 * i, 3, 3) = covariance(*each.velocity, R_GI, M) / each.weight;
     const double walked = density * (each.velocity->stamp - window.front().velocity->stamp);
     for (Eigen::Index k = i; k < count; ++k) {
       all.covariance.block(3 * i, 3 * k, 3, 3).diagonal().array() += walked;
@@ -88,7 +89,7 @@ WindowRows rowsOf(const VelocityWindow& window, double offset, const std::option
 double gravitySigma(Time time, const MountingSearchOptions& options) {
   if (!options.gravity_G) return kGravitySigma;
   const double tilt = kGyroDrift * std::abs(time - options.rest_end);
-  return std::min(kGravitySigma, std::hypot(kRestGravitySigma, options.gravity * tilt));
+  return std::min(kGravitySigma, std::hypot(kRestGravitySigma, kGravity * tilt));
 }
 
 /// The cost of all unknowns of a window.
@@ -103,8 +104,7 @@ Quadratic costOf(const VelocityWindow& window, double offset, const std::optiona
   cost.b.noalias() = rows.A.transpose() * rows.y;
   cost.c = rows.y.squaredNorm();
   const Time begin = window.front().velocity->stamp - offset;
-  const Vector3d g_G =
-      problem.options.gravity_G.value_or(problem.track.gravity(begin, problem.options.gravity));
+  const Vector3d g_G = problem.options.gravity_G.value_or(problem.track.gravity(begin, kGravity));
   const double sigma = gravitySigma(begin, problem.options);
   const double known = 1.0 / (sigma * sigma);
   cost.H.bottomRightCorner<3, 3>() += known * Matrix3d::Identity();
@@ -162,8 +162,8 @@ Quadratic mountingCost(double offset, const std::optional<Matrix3d>& M, const Mo
     total.b += cost.b;
     total.c += cost.c;
   }
-  const double sigma = problem.options.lever_arm_sigma;
-  total.H.bottomRightCorner(kMountingL, kMountingL) += Matrix3d::Identity() / (sigma * sigma);
+  total.H.bottomRightCorner(kMountingL, kMountingL) +=
+      Matrix3d::Identity() / (kLeverArmSigma * kLeverArmSigma);
   return total;
 }
 

@@ -42,8 +42,8 @@ def exit_code(status):
     return -os.WTERMSIG(status) if os.WIFSIGNALED(status) else os.WEXITSTATUS(status)
 
 
-def cpu_seconds_of(*words):
-    """CPU [s], user and system, of a program that has a result: what it takes with others beside it, too."""
+def usage_of(*words):
+    """The resources (os.wait4) that a program with a result took."""
     with tempfile.TemporaryFile("w+") as errors, subprocess.Popen(
             [str(word) for word in words], stdout=subprocess.DEVNULL, stderr=errors) as process:
         _, status, usage = os.wait4(process.pid, 0)
@@ -53,6 +53,12 @@ def cpu_seconds_of(*words):
             # After what went wrong come the likely causes.
             lines = [line.strip() for line in errors if ": warning: " not in line]
             raise RioTError(" ".join(lines).strip() or f"{words[0]} ended with status {process.returncode}")
+    return usage
+
+
+def cpu_seconds_of(*words):
+    """CPU [s], user and system, of a program that has a result: what it takes with others beside it, too."""
+    usage = usage_of(*words)
     return usage.ru_utime + usage.ru_stime
 
 

@@ -6,6 +6,8 @@ import subprocess
 import time
 
 import rosgraph
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
 from roslib.packages import find_node
 
 SLOWNESS = float(os.environ.get("RIO_T_TEST_SLOWNESS", "1"))  # of the programs as built: sanitizers take time
@@ -53,6 +55,21 @@ def wait_for(what, condition, seconds=DEADLINE):
         if time.monotonic() > deadline:
             raise TimeoutError(f"in {seconds:.0f} s not seen: {what}")
         time.sleep(0.01)
+
+
+class Diagnostics:
+    """The newest values of the node, {task: {key: value}}."""
+
+    def __init__(self):
+        self.newest = {}
+        rospy.Subscriber("/diagnostics", DiagnosticArray, self._keep)
+
+    def _keep(self, message):
+        for status in message.status:
+            self.newest[status.name.split(": ")[-1]] = {value.key: value.value for value in status.values}
+
+    def number(self, task, key):
+        return float(self.newest.get(task, {}).get(key, 0.0))
 
 
 def start_master():

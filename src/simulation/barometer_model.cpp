@@ -12,12 +12,12 @@ namespace {
 constexpr std::uint64_t kBarometerStream = 40;
 constexpr double kEdge = 0.05;  // [s] in which a shock rises and falls
 
-// ISO 2533, solved for the pressure.
-double pressureAt(double height, const BarometerModelOptions& options) {
+// ISO 2533, solved for the pressure. The height zero of W is at sea level.
+double pressureAt(double height) {
   constexpr double kLapseRate = 6.5e-3, kGasConstant = 287.05287, kGravity = 9.80665;
-  const double temperature = options.start_temperature + 273.15;
-  return options.start_pressure *
-         std::pow(1.0 - kLapseRate * height / temperature, kGravity / (kGasConstant * kLapseRate));
+  constexpr double kPressure = 101325.0, kTemperature = 15.0 + 273.15;  // [Pa, K]
+  return kPressure *
+         std::pow(1.0 - kLapseRate * height / kTemperature, kGravity / (kGasConstant * kLapseRate));
 }
 
 double shockAt(double t, const std::vector<BarometerModelOptions::Shock>& shocks) {
@@ -34,8 +34,6 @@ void check(const BarometerModelOptions& options) {
   if (!(options.rate > 0.0)) throw std::invalid_argument("barometer: rate must be positive");
   if (options.noise < 0.0 || options.drift < 0.0)
     throw std::invalid_argument("barometer: noise and drift cannot be negative");
-  if (!(options.start_pressure > 0.0))
-    throw std::invalid_argument("barometer: pressure at the start must be positive");
 }
 
 }  // namespace
@@ -56,7 +54,7 @@ std::vector<SimulatedPressure> simulateBarometer(const Motion& motion, const Bar
     SimulatedPressure pressure;
     pressure.stamp = start + t;
     pressure.drift = drift;
-    pressure.pascal = pressureAt(motion.at(t).p_W.z(), options) + drift + shockAt(t, options.shocks) +
+    pressure.pascal = pressureAt(motion.at(t).p_W.z()) + drift + shockAt(t, options.shocks) +
                       options.noise * random.gaussian();
     pressures.push_back(pressure);
   }

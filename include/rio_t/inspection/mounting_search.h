@@ -11,11 +11,7 @@
 namespace rio_t {
 
 struct MountingSearchOptions {
-  double gravity = 9.81;         ///< [m/s^2] magnitude
-  double max_offset = 0.3;       ///< [s] offsets to either side that are tried
-  double lever_arm_sigma = 0.5;  ///< [m] per axis, around zero
-  double accel_density = 0.02;   ///< [m/s^2/sqrt(Hz)] white noise of the accelerometer, vibration included
-  double velocity_sigma = 0.08;  ///< [m/s] of what a velocity and the IMU over a window do not model
+  double accel_density = 0.02;  ///< [m/s^2/sqrt(Hz)] white noise of the accelerometer, vibration included
   /// Gravity in G from a rest [m/s^2], and the end of this rest: the gyro carries it on. Without a rest the
   /// mean of the specific force stands for it.
   std::optional<Eigen::Vector3d> gravity_G;

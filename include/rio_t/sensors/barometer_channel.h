@@ -44,7 +44,7 @@ struct BarometerAnswer {
   double innovation_sigma = 0.0;  ///< [m]
   double bias = 0.0;              ///< [m]
   double bias_sigma = 0.0;        ///< [m]
-  bool stepped = false;           ///< the bias is found anew from here on
+  bool stepped = false;           ///< the bias is estimated again from here on
   std::string rejected_because;   ///< snake case, empty if it was used
 };
 
@@ -52,7 +52,7 @@ struct BarometerAnswer {
 ///
 /// Means over a tenth of a second join the nearest node, as heights off by a bias that walks. A mean that
 /// contradicts the estimate is rejected: doors and rotors shock the pressure. If the means contradict it for
-/// `gate_timeout`, the pressure has stepped, and the bias is found anew: the height goes on as it is.
+/// `gate_timeout`, the pressure has stepped, and the bias is estimated again: the height goes on as it is.
 class BarometerChannel {
  public:
   explicit BarometerChannel(const BarometerOptions& options) : options_(options) {}

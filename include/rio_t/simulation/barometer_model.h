@@ -18,9 +18,7 @@ struct BarometerModelOptions {
     double duration;  ///< [s]
     double change;    ///< [Pa]
   };
-  std::vector<Shock> shocks;        ///< doors, rotor wash; each rises and falls within 50 ms
-  double start_pressure = 101325;   ///< [Pa] at the height zero of W
-  double start_temperature = 15.0;  ///< [deg C] there
+  std::vector<Shock> shocks;  ///< doors, rotor wash; each rises and falls within 50 ms
 
   /// No noise and no drift; what was asked for by its time, the shocks, stays.
   void removeErrors();

@@ -105,27 +105,31 @@ def join_simulate(words):
     return joined
 
 
+def by_plan(text_of):
+    """"shifts, delay: 3; montecarlo: 10": what the plans have unless the user says otherwise."""
+    names = {}
+    for name, plan in PLANS.items():
+        names.setdefault(text_of(plan), []).append(name)
+    return "; ".join(f"{', '.join(of)}: {text}" for text, of in names.items())
+
+
 def make_parser():
     parser = Parser(prog="experiment.py", description=description, epilog=EXAMPLES)
     parser.add_argument("experiment", choices=PLANS, metavar="|".join(PLANS))
     parser.add_argument("--output-dir", metavar="DIR", type=pathlib.Path, help="where to write (results/EXPERIMENT)")
     parser.add_argument("--bag", metavar="BAG", type=pathlib.Path, action="append", default=[],
-                        help="run on this bag instead of simulated ones; may be repeated; not for montecarlo, "
-                             "consistency, platforms and aids")
+                        help="run on this bag instead of simulated ones; may be repeated; not for "
+                             + ", ".join(name for name, plan in PLANS.items() if plan.simulated_only))
     parser.add_argument("--config", metavar="CONFIG", default="irs", help="configuration of rio_t_bag (irs)")
     parser.add_argument("--set", metavar="key=value", action="append", default=[],
                         help="parameter of rio_t_bag; may be repeated")
     parser.add_argument("--seeds", metavar="N", type=count,
-                        help="simulated runs of each motion, seeds 1 to N (3; montecarlo and platforms 10; consistency "
-                             "5)")
+                        help=f"simulated runs of each motion, seeds 1 to N ({by_plan(lambda plan: str(plan.seeds))})")
     parser.add_argument("--motion", metavar="NAME", action="append",
-                        help="simulated motion; may be repeated (shifts, delay: difficult; tables: easy, medium, "
-                             "difficult, gym_loop; montecarlo: easy, medium, difficult; consistency: difficult, "
-                             "medium, drone, ground_vehicle, gym_loop, start_in_motion; platforms: all; aids: "
-                             "ground_vehicle, kart, drone, difficult)")
+                        help=f"simulated motion; may be repeated ({by_plan(lambda plan: ', '.join(plan.motions))})")
     parser.add_argument("--time-offset", metavar="S", type=number, action="append",
-                        help="true offset of the simulated bags [s] (-0.00925; montecarlo also 0.03 and 0.1; "
-                             "consistency, platforms and aids 0.03; may be repeated for these four)")
+                        help="true offset of the simulated bags [s]; may be repeated where no --bag is taken ("
+                             + by_plan(lambda plan: ", ".join(f"{1e-3 * ms:g}" for ms in plan.offsets)) + ")")
     parser.add_argument("--duration", metavar="S", type=positive,
                         help="length of the simulated bags [s] (the motion's own)")
     parser.add_argument("--simulate", metavar="OPTIONS", default="",

@@ -210,7 +210,7 @@ def add_extrinsics(page, radar, folder):
             for i, axis in enumerate("xyz")]
     rows += [[f"lever arm along {axis} [mm]", f"{1e3 * (lever[i] - told[0][i]):.1f}", f"{1e3 * sigma[axis]:.1f}"]
              for i, axis in enumerate("xyz") if sigma[axis] > 0]
-    page.table(rows, ["last estimate minus what was told", "", "sigma"])
+    page.table(rows, ["last estimate minus the configured value", "", "sigma"])
     page.figure(run_folder.of_radar("extrinsics", radar.name), figures.draw_extrinsics(radar.extrinsics, told))
 
 

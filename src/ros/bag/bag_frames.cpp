@@ -50,16 +50,6 @@ std::string topicOfBag(const std::string& told, const std::map<std::string, std:
   return told.front() == '/' ? told : other;
 }
 
-Config withTopicsOfBag(Config config, const std::map<std::string, std::string>& types) {
-  config.imu_topic = topicOfBag(config.imu_topic, types);
-  config.radar_topic = topicOfBag(config.radar_topic, types);
-  config.trigger_topic = topicOfBag(config.trigger_topic, types);
-  config.ground_truth_topic = topicOfBag(config.ground_truth_topic, types);
-  config.barometer_topic = topicOfBag(config.barometer_topic, types);
-  for (Config& radar : config.radars) radar = withTopicsOfBag(radar, types);
-  return config;
-}
-
 Config withExtrinsicsOfBag(Config config, const Bags& bags) {
   std::vector<Config> radars = configsOfRadars(config);
   std::vector<std::string> cloud_frames;

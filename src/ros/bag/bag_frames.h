@@ -14,9 +14,6 @@ namespace rio_t {
 /// fits, too. What the bag does not have stays, as an absolute name; no name stays none.
 std::string topicOfBag(const std::string& told, const std::map<std::string, std::string>& types);
 
-/// With all topics as the bag has them.
-Config withTopicsOfBag(Config config, const std::map<std::string, std::string>& types);
-
 /// With T_IR of the radars whose extrinsics_source is tf, from the /tf_static and /tf of the bags. Throws
 /// bagError that names the frames and what is missing.
 Config withExtrinsicsOfBag(Config config, const Bags& bags);

@@ -5,25 +5,10 @@
 #include <utility>
 
 #include "bag_file.h"
+#include "rio_t/inspection/stream_timing.h"
 #include "rio_t/ros/messages/conversions.h"
 
 namespace rio_t {
-namespace {
-
-/// The least number of points that so many of the scans do not exceed.
-std::uint64_t quantile(const std::map<std::size_t, std::uint64_t>& scans_by_size, double share) {
-  std::uint64_t total = 0;
-  for (const auto& [size, scans] : scans_by_size) total += scans;
-  std::uint64_t so_far = 0;
-  for (const auto& [size, scans] : scans_by_size) {
-    so_far += scans;
-    if (static_cast<double>(so_far) >= share * static_cast<double>(total)) return size;
-  }
-  return 0;
-}
-
-}  // namespace
-
 BagPlayer::BagPlayer(const Config& config, RunLog* log, BatchOdometry* recorder)
     : config_(config),
       odometry_(config.odometry),
@@ -86,7 +71,7 @@ void BagPlayer::countInput(RunSummary* summary) const {
     told.doppler_step = odometry_.radarDopplerStep(k);
     for (std::size_t i = 0; i < 3; ++i) {
       constexpr std::array<double, 3> kShares = {0.1, 0.5, 0.9};
-      told.points_per_scan[i] = quantile(radar.scans_by_size, kShares[i]);
+      told.points_per_scan[i] = static_cast<std::uint64_t>(quantile(radar.scan_sizes, kShares[i]));
     }
     told.scans_total = radar.scans_total;
     for (const auto& [reason, count] : radar.stamper.givenUp()) told.scans_rejected[reason] += count;
@@ -192,7 +177,7 @@ void BagPlayer::addCloud(const sensor_msgs::PointCloud2& message, Time record, R
     return;
   }
   points_not_finite_ += decoded.dropped_not_finite;
-  ++radar.scans_by_size[decoded.cloud.size()];
+  radar.scan_sizes.push_back(static_cast<double>(decoded.cloud.size()));
   try {
     radar.stamper.addScan(message.header.seq, toTime(message.header.stamp), record,
                           toRadarScan(decoded.cloud, Time()));

@@ -55,7 +55,7 @@ class BagPlayer {
     PointCloudFormat format;
     ScanStamper stamper;
     std::uint64_t scans_total = 0;
-    std::map<std::size_t, std::uint64_t> scans_by_size;  // by their number of points
+    std::vector<double> scan_sizes;  // numbers of points
     NotUsableByKind not_usable, triggers_not_usable;
   };
 

@@ -9,6 +9,7 @@
 #include <tuple>
 #include <utility>
 
+#include "../text.h"
 #include "bag_file.h"
 #include "bag_frames.h"
 #include "bag_player.h"
@@ -20,20 +21,15 @@
 namespace rio_t {
 namespace {
 
-/// "left/radar_topic", or without the name for one radar.
-std::string keyOf(const Config& radar, const std::string& key) {
-  return radar.radar_name.empty() ? key : radar.radar_name + "/" + key;
-}
-
 std::string noMessages(const Config& radar) {
-  return "no messages on topic " + radar.radar_topic + " (" + keyOf(radar, "radar_topic") +
+  return "no messages on topic " + radar.radar_topic + " (" + prefixOf(radar.radar_name) + "radar_topic" +
          ") in the part played";
 }
 
 std::string allRejected(const RadarSummary& radar) {
   std::string reasons;
   for (const auto& [reason, count] : radar.scans_rejected)
-    reasons += (reasons.empty() ? "" : ", ") + reason + " " + std::to_string(count);
+    appendItem(&reasons, reason + " " + std::to_string(count));
   return "every one of the " + std::to_string(radar.scans_total) + " scans " +
          (radar.name.empty() ? "" : "of radar " + radar.name + " ") + "was rejected: " + reasons;
 }
@@ -64,8 +60,7 @@ void checkOutcome(const std::string& bag, const Config& config, const BagPlayer&
     throw bagError(bag, "no messages on topic " + config.imu_topic + " (imu_topic) in the part played");
   if (summary.scansTotal() == 0) {
     std::string topics;
-    for (const Config& radar : configsOfRadars(config))
-      topics += (topics.empty() ? "" : "; ") + noMessages(radar);
+    for (const Config& radar : configsOfRadars(config)) appendItem(&topics, noMessages(radar), "; ");
     throw bagError(bag, topics);
   }
   // If none of a topic's messages can be used, the fault of the first one says it.
@@ -84,8 +79,7 @@ void checkOutcome(const std::string& bag, const Config& config, const BagPlayer&
   }
   if (summary.scansUsed() > 0) return;
   std::string reasons;
-  for (const RadarSummary& radar : summary.radars)
-    reasons += (reasons.empty() ? "" : "; ") + allRejected(radar);
+  for (const RadarSummary& radar : summary.radars) appendItem(&reasons, allRejected(radar), "; ");
   throw failed(reasons);
 }
 
@@ -95,9 +89,11 @@ std::vector<Wanted> wantedTopics(const Config& config) {
   if (!config.barometer_topic.empty())
     wanted.push_back({"barometer_topic", config.barometer_topic, "sensor_msgs/FluidPressure"});
   for (const Config& radar : configsOfRadars(config)) {
-    wanted.push_back({keyOf(radar, "radar_topic"), radar.radar_topic, "sensor_msgs/PointCloud2"});
+    wanted.push_back(
+        {prefixOf(radar.radar_name) + "radar_topic", radar.radar_topic, "sensor_msgs/PointCloud2"});
     if (radar.stamp_source == StampSource::kTrigger)
-      wanted.push_back({keyOf(radar, "trigger_topic"), radar.trigger_topic, "std_msgs/Header"});
+      wanted.push_back(
+          {prefixOf(radar.radar_name) + "trigger_topic", radar.trigger_topic, "std_msgs/Header"});
   }
   return wanted;
 }
@@ -134,7 +130,7 @@ class BagJob {
   explicit BagJob(const BagRun& run)
       : run_(run), files_(runFiles(run.config)), bags_(run.bags), started_(std::chrono::steady_clock::now()) {
     const std::map<std::string, std::string> types = bags_.typesByTopic();
-    run_.config = withTopicsOfBag(run.config, types);
+    run_.config = withTopics(run.config, [&](const std::string& topic) { return topicOfBag(topic, types); });
     const Config& config = run_.config;
     std::vector<Wanted> wanted = wantedTopics(config);
     for (const Wanted& want : wanted) topics_.push_back(want.topic);

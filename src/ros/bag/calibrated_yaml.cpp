@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <string>
 #include <variant>
@@ -10,13 +9,6 @@
 
 namespace rio_t {
 namespace {
-
-/// Each value is one text in YAML, also a list.
-std::string yamlOf(const ProposedKeys& keys, const std::string& indent) {
-  std::string text;
-  for (const ProposedKey& key : keys.all()) text += indent + key.key + ": " + key.values.front() + "\n";
-  return text;
-}
 
 /// What the user gave: the top level, and the section of each radar.
 struct Given {
@@ -31,33 +23,24 @@ Given sorted(const ParameterEntries& entries, const std::vector<Config>& radars)
     const bool is_radar = std::any_of(radars.begin(), radars.end(),
                                       [&](const Config& radar) { return radar.radar_name == entry.key; });
     if (slash != std::string::npos) {
-      given.sections[entry.key.substr(0, slash)].set(entry.key.substr(slash + 1), entry.value.yaml());
+      given.sections[entry.key.substr(0, slash)].set(entry.key.substr(slash + 1), entry.value);
     } else if (!is_radar) {
-      given.top_level.set(entry.key, entry.value.yaml());
+      given.top_level.set(entry.key, entry.value);
     } else if (const auto* nested = std::get_if<ParameterValue::Map>(&entry.value.data)) {
-      for (const ParameterEntry& own : *nested) given.sections[entry.key].set(own.key, own.value.yaml());
+      for (const ParameterEntry& own : *nested) given.sections[entry.key].set(own.key, own.value);
     }
   }
   return given;
 }
 
-double rounded(double value, double per) { return std::round(value * per) / per; }
-
 /// As told to the last digit, else without digits that say nothing.
 double written(double value, double told, double per) { return value == told ? told : rounded(value, per); }
 
-std::string numberYaml(double value) {
-  ParameterValue number;
-  number.data = value;
-  return number.yaml();
-}
-
 template <typename Vector>
-std::string listYaml(const Vector& values, const Vector& told, double per) {
-  std::string list = "[";
-  for (Eigen::Index i = 0; i < values.size(); ++i)
-    list += (i == 0 ? "" : ", ") + numberYaml(written(values[i], told[i], per));
-  return list + "]";
+ParameterValue writtenList(const Vector& values, const Vector& told, double per) {
+  std::vector<double> list;
+  for (Eigen::Index i = 0; i < values.size(); ++i) list.push_back(written(values[i], told[i], per));
+  return listOf(list);
 }
 
 /// The keys of a radar that are calibrated.
@@ -68,35 +51,17 @@ ProposedKeys calibratedKeys(const RadarCalibration& calibration, const Config& t
   const bool offset_found =
       calibration.axes[static_cast<std::size_t>(CalibrationAxis::kOffset)].verdict == Verdict::kObserved;
   ProposedKeys keys;
-  keys.set("extrinsics_translation", listYaml(calibration.T_IR.l_I, mounting.l_I, kMicro));
+  keys.set("extrinsics_translation", writtenList(calibration.T_IR.l_I, mounting.l_I, kMicro));
   keys.set("extrinsics_rotation_xyzw",
-           listYaml(calibration.T_IR.q_IR.coeffs(), mounting.q_IR.coeffs(), kNano));
+           writtenList(calibration.T_IR.q_IR.coeffs(), mounting.q_IR.coeffs(), kNano));
   // A sigma below a microsecond would be written as zero.
   const OffsetEstimate offset =
       offset_found ? OffsetEstimate{rounded(calibration.offset.t_O, kMicro),
                                     std::max(rounded(calibration.offset.sigma, kMicro), 1.0 / kMicro)}
                    : OffsetEstimate{smoother.time_offset_initial, smoother.time_offset_sigma};
-  keys.set("time_offset_initial", numberYaml(offset.t_O));
-  keys.set("time_offset_sigma", numberYaml(offset.sigma));
+  keys.set("time_offset_initial", ParameterValue{offset.t_O});
+  keys.set("time_offset_sigma", ParameterValue{offset.sigma});
   return keys;
-}
-
-/// Each line of `text` as a comment; a file name may hold what would end one.
-std::string commented(const std::string& text, const std::string& indent) {
-  std::string result;
-  bool starts = true;
-  for (const char c : text) {
-    if (starts) result += indent + "# ";
-    starts = c == '\n';
-    const bool is_control = (c >= 0 && c < ' ') || c == '\x7f';
-    result += is_control && c != '\n' ? '?' : c;
-  }
-  return result;
-}
-
-std::string oneLine(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', '?');
-  return text;
 }
 
 std::string header(const BagCalibration& calibration, const std::string& name) {
@@ -145,12 +110,12 @@ std::string calibratedYaml(const BagCalibration& calibration, const Config& conf
          {"extrinsics_translation", "extrinsics_rotation_xyzw", "mounting_yaw_pitch_roll_deg",
           "extrinsics_axes", "time_offset_initial", "time_offset_sigma"})
       own.remove(key);
-    if (has_sections) sections += "\n" + radar.name + ":\n" + yamlOf(own, indent);
+    if (has_sections) sections += "\n" + radar.name + ":\n" + toYaml(own, indent);
     sections += (has_sections ? "" : "\n") + commented(describeCalibration(radar), indent) + indent +
                 "# If the driver's restart changes the offset, raise time_offset_sigma.\n" +
-                yamlOf(calibratedKeys(radar.calibration, told[k]), indent);
+                toYaml(calibratedKeys(radar.calibration, told[k]), indent);
   }
-  return header(calibration, name) + "\n" + yamlOf(entries.top_level, "") + "\n" +
+  return header(calibration, name) + "\n" + toYaml(entries.top_level, "") + "\n" +
          estimateNext(all_turns_observed) + sections;
 }
 

@@ -2,9 +2,9 @@
 #include <cmath>
 #include <string>
 
+#include "../text.h"
 #include "rio_t/radar/mounting.h"
 #include "rio_t/ros/bag/calibration.h"
-#include "rio_t/ros/bag/run_output.h"
 
 namespace rio_t {
 namespace {
@@ -41,7 +41,7 @@ std::string axisRow(std::size_t axis, const AxisCalibration& values) {
   std::string row = "  " + padded(text.name, 14, false) + padded(text.unit, 4, false) + column(values.told) +
                     column(values.found) + column(values.sigma) + "   " + toString(values.verdict);
   if (values.verdict == Verdict::kNotObserved)
-    row += ": " + whatToMove(static_cast<CalibrationAxis>(axis)) + " to make it so";
+    row += ": to observe it, " + whatToMove(static_cast<CalibrationAxis>(axis));
   return row + "\n";
 }
 
@@ -58,7 +58,7 @@ std::string remarks(const CalibratedRadar& radar) {
   if (!radar.calibration.offsets_agree) {
     std::string offsets;
     for (const OffsetEstimate& offset : radar.offsets)
-      offsets += (offsets.empty() ? "" : ", ") + fixedText(1e3 * offset.t_O, 2) + " ms";
+      appendItem(&offsets, fixedText(1e3 * offset.t_O, 2) + " ms");
     text += "  The offset differs between the bags: " + offsets +
             "; a driver's restart may change it.\n"
             "  Found is their mean, and its sigma covers the differences.\n";

@@ -3,6 +3,7 @@
 #include <functional>
 #include <string>
 
+#include "../text.h"
 #include "rio_t/ros/bag/bag_runner.h"
 
 namespace rio_t {
@@ -23,8 +24,7 @@ std::string describeStep(const DopplerStep& step) {
 /// "3 late, 1 empty"
 std::string listOf(const std::map<std::string, std::uint64_t>& counts) {
   std::string list;
-  for (const auto& [name, count] : counts)
-    list += (list.empty() ? "" : ", ") + std::to_string(count) + " " + name;
+  for (const auto& [name, count] : counts) appendItem(&list, std::to_string(count) + " " + name);
   return list;
 }
 
@@ -45,8 +45,7 @@ using Row = std::function<void(const std::string& name, const std::string& value
 void describePasses(const RadarSummary& radar, const Row& row) {
   if (radar.pass_offsets_s.empty()) return;
   std::string offsets;
-  for (const double offset : radar.pass_offsets_s)
-    offsets += (offsets.empty() ? "" : ", ") + fixedText(1e3 * offset, 2);
+  for (const double offset : radar.pass_offsets_s) appendItem(&offsets, fixedText(1e3 * offset, 2));
   row("after passes", offsets + " ms");
 }
 
@@ -94,8 +93,7 @@ void describeSolver(const std::map<std::string, std::uint64_t>& terminations, co
   std::string unsolved;
   for (const auto& [reason, count] : terminations) {
     if (reason == toString(SolverTermination::kConverged)) continue;
-    unsolved += (unsolved.empty() ? "" : ", ") + std::to_string(count) + " of " + std::to_string(windows) +
-                " windows " + reason;
+    appendItem(&unsolved, std::to_string(count) + " of " + std::to_string(windows) + " windows " + reason);
   }
   if (!unsolved.empty()) row("solver", unsolved);
 }

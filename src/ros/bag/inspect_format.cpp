@@ -9,8 +9,8 @@
 #include <optional>
 #include <utility>
 
+#include "../text.h"
 #include "rio_t/inspection/stream_timing.h"
-#include "rio_t/ros/bag/run_output.h"
 #include "rio_t/ros/cloud/point_cloud.h"
 
 namespace rio_t {
@@ -65,7 +65,7 @@ void guessFormat(const std::vector<std::string>& fields, FormatProposal* proposa
                                                  "velocity", "vel", "speed", "v_r", "vr"});
   if (doppler.empty()) {
     proposal->fault = "it has no field with the Doppler (fields: " + proposal->fields +
-                      "), so no velocity can be had from it; use a driver that publishes the Doppler";
+                      "), so it gives no velocity; use a driver that publishes the Doppler";
     return;
   }
   const std::string azimuth = fieldLike(fields, {"azimuth"}), elevation = fieldLike(fields, {"elevation"});
@@ -99,7 +99,7 @@ void guessFormat(const std::vector<std::string>& fields, FormatProposal* proposa
 void resolve(FormatProposal* proposal) {
   ParameterEntries entries;
   for (const ProposedKey& key : proposal->keys.all())
-    entries.push_back(parseAssignment(key.key + "=" + key.values.front()));
+    entries.push_back({key.key, key.value, "fields of the cloud"});
   proposal->format = pointCloudFormat(makeConfig(entries));
 }
 
@@ -145,11 +145,13 @@ void findPower(const CloudTopic& topic, FormatProposal* proposal) {
   }
   proposal->power = "SNR " + fixedText(quantile(decibels, 0.1), 0) + " to " +
                     fixedText(quantile(decibels, 0.9), 0) + " dB in " + format.power;
-  constexpr double kDefaultMinimum = 3.0, kFew = 0.2;  // [dB]
-  if (quantile(decibels, kFew) < kDefaultMinimum) {
-    proposal->keys.set("radar_min_snr_db", fixedText(std::floor(quantile(decibels, 0.02)), 1),
-                       "More than a fifth of the points are below the default, 3 dB.");
-    proposal->odd.emplace_back("a fifth of the points have less than 3 dB, so radar_min_snr_db is lowered");
+  const double minimum = EgoVelocityOptions().min_snr_db;
+  if (quantile(decibels, 0.2) < minimum) {
+    proposal->keys.set(
+        "radar_min_snr_db", ParameterValue{std::floor(quantile(decibels, 0.02))},
+        "More than a fifth of the points are below the default, " + fixedText(minimum, 0) + " dB.");
+    proposal->odd.push_back("a fifth of the points have less than " + fixedText(minimum, 0) +
+                            " dB, so radar_min_snr_db is lowered");
   }
 }
 

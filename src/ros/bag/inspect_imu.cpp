@@ -2,10 +2,10 @@
 #include <cmath>
 #include <utility>
 
+#include "../text.h"
 #include "inspect_radar.h"
 #include "rio_t/imu/clock_jump_detector.h"
 #include "rio_t/imu/input_check.h"
-#include "rio_t/ros/bag/run_output.h"
 
 namespace rio_t {
 namespace {
@@ -14,15 +14,6 @@ std::string axisName(const Eigen::Vector3d& direction) {
   int axis = 0;
   direction.cwiseAbs().maxCoeff(&axis);
   return std::string(direction[axis] < 0.0 ? "-" : "+") + "xyz"[axis];
-}
-
-std::string rateText(const StreamTiming& timing) {
-  std::string text = fixedText(timing.rate, timing.rate < 20.0 ? 1 : 0) + " Hz";
-  if (timing.gaps > 0)
-    text +=
-        ", gaps: " + std::to_string(timing.gaps) + " (longest " + fixedText(timing.longest_gap, 2) + " s)";
-  if (timing.duplicates > 0) text += ", duplicate stamps: " + std::to_string(timing.duplicates);
-  return text;
 }
 
 /// The samples that are not out of place by their stamps, and why the others are.
@@ -80,15 +71,14 @@ StampedInOrder stampedInOrder(const ImuTopic& topic) {
 void describeOrder(const StampedInOrder& order, std::size_t messages, ImuInspection* imu) {
   std::string why;
   const auto tell = [&](std::size_t count, const std::string& text) {
-    if (count > 0) why += (why.empty() ? "" : ", ") + std::to_string(count) + " " + text;
+    if (count > 0) appendItem(&why, std::to_string(count) + " " + text);
   };
   tell(order.zero, "with a stamp of zero");
   tell(order.ahead, "stamped more than " + fixedText(ImuInputCheckOptions().jump_patience, 1) +
                         " s ahead of the last good one");
   tell(order.behind, "stamped before the last good one");
   if (order.jumped)
-    why += std::string(why.empty() ? "" : "; ") +
-           "the clock jumped, and only the longest part without a jump is used";
+    appendItem(&why, "the clock jumped, and only the longest part without a jump is used", "; ");
   if (why.empty()) return;
   const std::size_t left_out = messages - order.kept.times.size() - order.duplicates;
   imu->findings.push_back({FindingLevel::kOdd, "IMU stamps",
@@ -111,73 +101,101 @@ void describeRate(const StreamTiming& timing, ImuInspection* imu) {
   const bool odd = timing.rate < kSlow || timing.gaps > 0 || 20 * timing.duplicates > timing.messages;
   imu->findings.push_back(
       {odd ? FindingLevel::kOdd : FindingLevel::kOk, "IMU",
-       imu->topic + ": " + rateText(timing) +
+       imu->topic + ": " + rateText(timing, timing.rate < 20.0 ? 1 : 0, true) +
            (timing.rate < kSlow ? ", slower than the 50 Hz that a hand-held platform needs" : "")});
 }
 
-void describe(ImuInspection* imu) {
+void tell(ImuInspection* imu, FindingLevel level, const std::string& subject, const std::string& text) {
+  imu->findings.push_back({level, subject, text});
+}
+
+void describeUnits(ImuInspection* imu) {
   const ImuReport& r = imu->report;
-  const auto tell = [&](FindingLevel level, const std::string& subject, const std::string& text) {
-    imu->findings.push_back({level, subject, text});
-  };
-  const std::size_t samples = imu->samples.size() + r.not_finite;
-  if (10 * r.not_finite > samples) {  // the rest of the report would be of what is left
-    tell(FindingLevel::kMissing, "IMU",
-         std::to_string(r.not_finite) + " of " + std::to_string(samples) + " samples are not finite");
-    imu->to_do = "Correct the IMU driver, which writes NaN or infinity, and record again.";
-    return;
-  }
   const bool in_g = r.units.acceleration == AccelerationUnit::kStandardGravity;
   const bool in_degrees = r.units.rate == RateUnit::kDegreesPerSecond;
   if (in_g) {
     imu->keys.set("imu_acceleration_unit", "g",
                   "The median size of the acceleration is " + fixedText(r.written_norm, 2) + ".");
-    tell(FindingLevel::kOdd, "IMU unit",
+    tell(imu, FindingLevel::kOdd, "IMU unit",
          "the acceleration is in g (median size " + fixedText(r.written_norm, 2) + "), not in m/s^2");
   }
   if (in_degrees) {
     imu->keys.set("imu_rate_unit", "deg/s", "The turns of gravity fit these rates only in degrees.");
-    tell(FindingLevel::kOdd, "IMU unit", "the angular velocity is in deg/s, not in rad/s");
+    tell(imu, FindingLevel::kOdd, "IMU unit", "the angular velocity is in deg/s, not in rad/s");
   }
   for (const std::string& fault : {r.acceleration_fault, r.rate_fault}) {
     if (fault.empty()) continue;
-    tell(FindingLevel::kMissing, "IMU",
+    tell(imu, FindingLevel::kMissing, "IMU",
          fault + " (median size as written " + fixedText(r.written_norm, 2) + ")");
     imu->to_do =
         "Set the IMU driver to raw acceleration in m/s^2 and angular velocity in rad/s, with the axes of "
         "one right-handed frame, and record again.";
   }
+}
+
+void describeRest(ImuInspection* imu) {
+  const ImuReport& r = imu->report;
   if (r.rests_at_start) {
-    const double norm = r.rest_acceleration.norm();
-    tell(std::abs(norm - 9.81) < 0.3 ? FindingLevel::kOk : FindingLevel::kOdd, "rest",
+    const OdometryOptions options;
+    const double norm = r.rest_acceleration.norm(), error = std::abs(norm - options.gravity);
+    const double allowed = options.initialization.max_gravity_error;
+    tell(imu, error < 0.3 ? FindingLevel::kOk : FindingLevel::kOdd, "rest",
          "at rest from " + fixedText(r.rest_begin, 1) + " s; gravity " + fixedText(norm, 2) +
              " m/s^2, up is " + axisName(r.rest_acceleration) + "; gyro bias " +
              fixedText(r.rest_rate.norm(), 4) + " rad/s");
-    if (std::abs(norm - 9.81) > 0.45)
-      imu->keys.set("init_max_gravity_error", fixedText(std::abs(norm - 9.81) + 0.5, 1),
+    if (error > 0.9 * allowed)
+      imu->keys.set("init_max_gravity_error", ParameterValue{rounded(error + allowed, 10.0)},
                     "At rest the accelerometer shows " + fixedText(norm, 2) + " m/s^2.");
   } else {
-    tell(FindingLevel::kOdd, "rest",
+    tell(imu, FindingLevel::kOdd, "rest",
          "no rest in the first 10 s, so the odometry starts in motion; 3 s at rest give a better start");
     imu->keys.set("init_mode", "motion", "There is no rest at the start.");
   }
+}
+
+void describeNoise(ImuInspection* imu) {
+  const ImuReport& r = imu->report;
   const double vibration = r.accel_density_median / std::max(r.accel_density_quiet, 1e-9);
   const bool vibrates = r.accel_density_median > 0.04;
-  tell(vibrates ? FindingLevel::kOdd : FindingLevel::kOk, "noise",
+  tell(imu, vibrates ? FindingLevel::kOdd : FindingLevel::kOk, "noise",
        "accelerometer " + fixedText(r.accel_density_quiet, 4) + " m/s^2/sqrt(Hz)" +
            (vibration > 2.0 ? ", in motion " + fixedText(r.accel_density_median, 4) : "") + "; gyro " +
            fixedText(r.gyro_density_quiet, 5) + " rad/s/sqrt(Hz)" +
            (vibrates ? ": the frame vibrates; mount the IMU softer if you can" : ""));
   if (r.saturated > 0)
-    tell(FindingLevel::kOdd, "range",
+    tell(imu, FindingLevel::kOdd, "range",
          std::to_string(r.saturated) + " samples are at the end of the range (largest " +
              fixedText(r.largest_acceleration, 1) + " m/s^2, " + fixedText(r.largest_rate, 2) + " rad/s)");
+}
+
+void describe(ImuInspection* imu) {
+  const ImuReport& r = imu->report;
+  const std::size_t samples = imu->samples.size() + r.not_finite;
+  if (10 * r.not_finite > samples) {  // the rest of the report would be of what is left
+    tell(imu, FindingLevel::kMissing, "IMU",
+         std::to_string(r.not_finite) + " of " + std::to_string(samples) + " samples are not finite");
+    imu->to_do = "Correct the IMU driver, which writes NaN or infinity, and record again.";
+    return;
+  }
+  describeUnits(imu);
+  describeRest(imu);
+  describeNoise(imu);
   if (r.not_finite > 0)
-    tell(FindingLevel::kOdd, "IMU",
+    tell(imu, FindingLevel::kOdd, "IMU",
          std::to_string(r.not_finite) + " samples are not finite; they are left out");
 }
 
 }  // namespace
+
+std::string rateText(const StreamTiming& timing, int decimals, bool with_duplicates) {
+  std::string text = fixedText(timing.rate, decimals) + " Hz";
+  if (timing.gaps > 0)
+    text +=
+        ", gaps: " + std::to_string(timing.gaps) + " (longest " + fixedText(timing.longest_gap, 2) + " s)";
+  if (with_duplicates && timing.duplicates > 0)
+    text += ", duplicate stamps: " + std::to_string(timing.duplicates);
+  return text;
+}
 
 ImuInspection inspectImuTopic(const ImuTopic& topic) {
   ImuInspection imu;

@@ -12,8 +12,7 @@ namespace rio_t {
 /// A key of a configuration that a program proposes, and why.
 struct ProposedKey {
   std::string key;
-  std::vector<std::string> values;  ///< one, or the elements of a list; as plain YAML
-  bool is_list = false;
+  ParameterValue value;
   std::string why;
 };
 
@@ -21,14 +20,13 @@ struct ProposedKey {
 class ProposedKeys {
  public:
   /// The later value holds.
-  void set(const std::string& key, const std::string& value, const std::string& why = "");
-  void setList(const std::string& key, const std::vector<std::string>& values, const std::string& why = "");
+  void set(const std::string& key, ParameterValue value, const std::string& why = "");
+  void set(const std::string& key, const std::string& text, const std::string& why = "");
   void add(const ProposedKeys& other);
   void remove(const std::string& key);
   const std::vector<ProposedKey>& all() const { return keys_; }
 
  private:
-  void put(ProposedKey key);
   std::vector<ProposedKey> keys_;
 };
 
@@ -37,6 +35,16 @@ struct ProposedConfig {
   ProposedKeys top_level;
   std::vector<std::pair<std::string, ProposedKeys>> radars;  ///< by name; empty: one radar, at the top level
 };
+
+/// To the nearest of the numbers that lie 1 / `per` apart; never minus zero.
+double rounded(double value, double per);
+
+/// Each line of `text` as a comment; a file name may hold what would end one.
+std::string commented(const std::string& text, const std::string& indent);
+std::string oneLine(std::string text);
+
+/// All keys, one a line, each after its reason as a comment.
+std::string toYaml(const ProposedKeys& keys, const std::string& indent);
 
 /// As a file: the keys that differ from the defaults, each with a comment. `header`: lines for its beginning.
 std::string toYaml(const ProposedConfig& proposed, const std::string& header);

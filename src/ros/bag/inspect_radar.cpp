@@ -5,8 +5,8 @@
 #include <boost/algorithm/string/join.hpp>
 #include <cmath>
 
+#include "../text.h"
 #include "rio_t/radar/mounting.h"
-#include "rio_t/ros/bag/run_output.h"
 
 namespace rio_t {
 namespace {
@@ -18,20 +18,21 @@ std::string degrees(double radians) { return fixedText(radians / kDegree, 0); }
 
 /// "x 1.2, y 0.9 deg; not observed about z"
 std::string sureness(const Eigen::Vector3d& sigma) {
-  constexpr double kNotObserved = 0.3;  // [rad]
   std::string known, unknown;
   for (int k = 0; k < 3; ++k) {
     const std::string axis(1, "xyz"[k]);
-    if (sigma[k] < kNotObserved) {
-      known += (known.empty() ? "" : ", ") + axis + " " + fixedText(sigma[k] / kDegree, 1);
+    if (sigma[k] < kObservedTurn) {
+      appendItem(&known, axis + " " + fixedText(sigma[k] / kDegree, 1));
     } else {
-      unknown += (unknown.empty() ? "" : " and ") + axis;
+      appendItem(&unknown, axis, " and ");
     }
   }
   std::string text = known.empty() ? "" : "sigma " + known + " deg about the axes of the IMU";
   if (!unknown.empty())
-    text += (text.empty() ? "" : "; ") + std::string("not observed about ") + unknown +
-            ": the motion does not show it, and an upright radar is assumed";
+    appendItem(
+        &text,
+        "not observed about " + unknown + ": the motion does not show it, and an upright radar is assumed",
+        "; ");
   return text;
 }
 
@@ -77,20 +78,15 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
     radar->findings.push_back({level, subject, text});
   };
   const CloudReport& c = looked.cloud;
-  std::string rate = radar->topic + ": " + fixedText(timing.rate, 1) + " Hz";
-  if (timing.gaps > 0)
-    rate +=
-        ", gaps: " + std::to_string(timing.gaps) + " (longest " + fixedText(timing.longest_gap, 2) + " s)";
-  if (timing.duplicates > 0 && timing.zero == 0 && !timing.constant)
-    rate += ", duplicate stamps: " + std::to_string(timing.duplicates);
   tell(timing.gaps > timing.messages / 50 ? FindingLevel::kOdd : FindingLevel::kOk, "radar",
-       rate + "; format " + format.format.name +
+       radar->topic + ": " + rateText(timing, 1, timing.zero == 0 && !timing.constant) + "; format " +
+           format.format.name +
            (format.fitting.size() > 1 ? " (fitting: " + boost::algorithm::join(format.fitting, ", ") + ")"
                                       : "") +
            ", " + format.power);
   for (const std::string& odd : format.odd) tell(FindingLevel::kOdd, "format", odd);
   const DopplerStep& step = looked.velocities.doppler_step;
-  const bool sparse = c.points_50 < 15.0;
+  const bool sparse = radar->isSparse();
   tell(sparse ? FindingLevel::kOdd : FindingLevel::kOk, "points",
        fixedText(c.points_10, 0) + " / " + fixedText(c.points_50, 0) + " / " + fixedText(c.points_90, 0) +
            " a scan (10, 50, 90 %), to " + fixedText(c.range_99, 1) + " m, field of view +-" +
@@ -112,11 +108,12 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
 void limitsOfCloud(const CloudReport& cloud, ProposedKeys* keys) {
   if (cloud.behind > 0.02)
     keys->set(
-        "radar_max_azimuth", "3.141592",
+        "radar_max_azimuth", ParameterValue{3.141592},
         "So many points lie behind the radar's forward axis: " + fixedText(100.0 * cloud.behind, 0) + " %.");
-  if (cloud.range_99 > 95.0)
-    keys->set("radar_max_range", fixedText(std::ceil(1.2 * cloud.range_99), 1),
-              "The radar sees farther than 100 m.");
+  const double max_range = EgoVelocityOptions().max_range;
+  if (cloud.range_99 > 0.95 * max_range)
+    keys->set("radar_max_range", ParameterValue{std::ceil(1.2 * cloud.range_99)},
+              "The radar sees farther than " + fixedText(max_range, 0) + " m.");
 }
 
 void describeSign(const Looked& looked, const FormatProposal& format, RadarInspection* radar) {
@@ -134,12 +131,13 @@ void describeSign(const Looked& looked, const FormatProposal& format, RadarInspe
          "the axes of the cloud are left-handed (one axis is inverted): the ranges say that " + field +
              " is " + (looked.sign.sign > 0 ? "positive for receding" : "negative for receding") +
              " targets, the IMU the contrary; radar_doppler_sign and the mounting stand for it"});
-    radar->keys.set("radar_doppler_sign", std::to_string(search.sign),
+    radar->keys.set("radar_doppler_sign", ParameterValue{std::int64_t{search.sign}},
                     "One axis of the cloud is inverted. This sign and the mounting below stand for it.");
   } else if (search.sign == -1) {
     radar->findings.push_back({FindingLevel::kOdd, "Doppler",
                                field + " is positive for approaching targets, as " + evidence + " show"});
-    radar->keys.set("radar_doppler_sign", "-1", field + " is positive for approaching targets.");
+    radar->keys.set("radar_doppler_sign", ParameterValue{std::int64_t{-1}},
+                    field + " is positive for approaching targets.");
   } else {
     radar->findings.push_back(
         {FindingLevel::kOk, "Doppler",
@@ -178,49 +176,52 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
          "not found: less than 3 s with motion; the radar is taken to look forward. Record with motion, or "
          "set "
          "mounting_yaw_pitch_roll_deg by hand");
-    radar->keys.setList("mounting_yaw_pitch_roll_deg", {"0.0", "0.0", "0.0"},
-                        "Assumed: the bag does not show it. Yaw left, pitch up, roll right side down.");
+    radar->keys.set("mounting_yaw_pitch_roll_deg", listOf({0.0, 0.0, 0.0}),
+                    "Assumed: the bag does not show it. Yaw left, pitch up, roll right side down.");
     return;
   }
   const MountingAngles angles = mountingOf(search.q_IR);
-  const std::vector<std::string> words = {fixedText(angles.yaw / kDegree, 1),
-                                          fixedText(angles.pitch / kDegree, 1),
-                                          fixedText(angles.roll / kDegree, 1)};
+  const double yaw = rounded(angles.yaw / kDegree, 10.0), pitch = rounded(angles.pitch / kDegree, 10.0),
+               roll = rounded(angles.roll / kDegree, 10.0);
   Eigen::Vector3d sigma = search.rotation_sigma;
   constexpr double kSparseSigma = 0.2;  // [rad]
   if (radar->isSparse()) sigma = (sigma.array().square() + kSparseSigma * kSparseSigma).sqrt().min(kStraight);
   const std::string sure = sureness(sigma);
-  const bool observed = search.rotation_sigma.maxCoeff() < 0.3;
+  const bool observed = search.rotation_sigma.maxCoeff() < kObservedTurn;
   tell(observed ? FindingLevel::kOk : FindingLevel::kOdd, "mounting",
-       "yaw " + words[0] + ", pitch " + words[1] + ", roll " + words[2] + " deg (radar's " +
-           turnText(nearestTurn(search.q_IR.toRotationMatrix())) + " of the IMU); " + sure);
-  radar->keys.setList(
-      "mounting_yaw_pitch_roll_deg", words,
-      "Yaw left, pitch up, roll right side down, seen from x forward, y left, z up of the IMU. " + sure +
-          ".");
+       "yaw " + fixedText(yaw, 1) + ", pitch " + fixedText(pitch, 1) + ", roll " + fixedText(roll, 1) +
+           " deg (radar's " + turnText(nearestTurn(search.q_IR.toRotationMatrix())) + " of the IMU); " +
+           sure);
+  radar->keys.set("mounting_yaw_pitch_roll_deg", listOf({yaw, pitch, roll}),
+                  "Yaw left, pitch up, roll right side down, seen from x forward, y left, z up of the IMU. " +
+                      sure + ".");
   const Eigen::Vector3d& l = search.lever_arm_I;
   const Eigen::Vector3d& l_sigma = search.lever_arm_sigma;
-  std::vector<std::string> lever;
+  std::vector<double> lever;
   std::string text;
   for (int k = 0; k < 3; ++k) {
     // Three sigma away from zero: better than zero.
     const bool found = std::abs(l[k]) > 3.0 * l_sigma[k] && l_sigma[k] < 0.3;
-    lever.push_back(fixedText(found ? l[k] : 0.0, 2));
+    lever.push_back(found ? rounded(l[k], 100.0) : 0.0);
     text += (k == 0 ? "" : ", ") + fixedText(l[k], 2) + " +- " + fixedText(l_sigma[k], 2);
   }
-  const bool any = lever[0] != "0.00" || lever[1] != "0.00" || lever[2] != "0.00";
+  const bool any = std::any_of(lever.begin(), lever.end(), [](double x) { return x != 0.0; });
   tell(FindingLevel::kOk, "lever arm",
        "about [" + text + "] m: " + (any ? "what is clear of zero is taken over" : "zero is proposed") +
            "; measure it with a tape");
   if (any)
-    radar->keys.setList("extrinsics_translation", lever,
-                        "Origin of the radar in the IMU frame, roughly [m]. Measure it with a tape.");
+    radar->keys.set("extrinsics_translation", listOf(lever),
+                    "Origin of the radar in the IMU frame, roughly [m]. Measure it with a tape.");
   tell(FindingLevel::kOk, "offset",
        fixedText(1e3 * search.offset, 0) + " +- " + fixedText(1e3 * search.offset_sigma, 0) +
            " ms, roughly; the odometry estimates it");
-  constexpr double kFar = 0.06, kKnown = 0.03;  // [s] the estimate starts at 0 +- 0.075
-  if (std::abs(search.offset) > kFar && search.offset_sigma < kKnown && !radar->isSparse())
-    radar->keys.set("time_offset_initial", fixedText(std::clamp(search.offset, -0.2, 0.2), 3),
+  constexpr double kKnown = 0.03;  // [s]
+  const SmootherOptions defaults;
+  const double bound = 0.8 * defaults.max_time_offset;
+  if (std::abs(search.offset) > 0.8 * defaults.time_offset_sigma && search.offset_sigma < kKnown &&
+      !radar->isSparse())
+    radar->keys.set("time_offset_initial",
+                    ParameterValue{rounded(std::clamp(search.offset, -bound, bound), 1e3)},
                     "Found roughly, in seconds.");
 }
 

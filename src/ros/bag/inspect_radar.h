@@ -12,6 +12,9 @@
 
 namespace rio_t {
 
+/// "100 Hz, gaps: 2 (longest 0.50 s), duplicate stamps: 3"
+std::string rateText(const StreamTiming& timing, int decimals, bool with_duplicates);
+
 /// The IMU of a recording, ready to be compared with radars.
 struct ImuInspection {
   std::string topic;
@@ -23,6 +26,9 @@ struct ImuInspection {
   std::string to_do;  ///< what to do if it cannot be used; empty: it can
 };
 ImuInspection inspectImuTopic(const ImuTopic& topic);
+
+/// [rad] Sigma of a turn below which the bag shows it.
+constexpr double kObservedTurn = 0.3;
 
 /// A radar of a recording.
 struct RadarInspection {

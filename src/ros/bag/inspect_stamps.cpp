@@ -6,7 +6,7 @@
 #include <exception>
 #include <set>
 
-#include "rio_t/ros/bag/run_output.h"
+#include "../text.h"
 
 namespace rio_t {
 namespace {
@@ -81,7 +81,8 @@ StampProposal proposeStamps(const Recording& recording, const std::vector<Messag
                     milliseconds(timing.jitter);
     if (delay.median < -kAhead)
       proposal.odd.push_back("the scans are stamped " + milliseconds(-delay.median) +
-                             " ahead of their arrival; the offset estimate covers up to 250 ms");
+                             " ahead of their arrival; the offset estimate covers up to " +
+                             milliseconds(SmootherOptions().max_time_offset));
     return proposal;
   }
   if (const HeaderTopic* trigger = triggerOf(recording, imu, cloud)) {

@@ -66,7 +66,8 @@ void RunLog::addResult(ScanResult& result) {
     ++radar.summary.scans_rejected[result.rejected_because];
   }
   if (result.health == Health::kDiverged) ++scans_diverged_;
-  accountAids(result);
+  if (barometer_) barometer_->add(result);
+  if (ground_vehicle_) ground_vehicle_->add(result);
   if (!result.updated) return;
   ++terminations_[result.solver_termination];
   for (Radar& each : radars_) {
@@ -82,28 +83,6 @@ void RunLog::addResult(ScanResult& result) {
   radar.summary.extrinsics->covariance = tangentCovariance(result.T_IR_covariance, estimate_extrinsics_);
 }
 
-void RunLog::accountAids(const ScanResult& result) {
-  for (const BarometerAnswer& mean : result.barometer) {
-    barometer_->steps += mean.stepped ? 1 : 0;
-    if (!mean.rejected_because.empty()) {
-      ++barometer_->rejected[mean.rejected_because];
-      continue;
-    }
-    ++barometer_->used;
-    barometer_->bias = mean.bias;
-    barometer_->bias_sigma = mean.bias_sigma;
-    if (!mean.stepped) barometer_->innovation_square += mean.innovation * mean.innovation;
-  }
-  if (!result.ground_vehicle) return;
-  const GroundVehicleAnswer& vehicle = *result.ground_vehicle;
-  if (!ground_vehicle_->first_judged) ground_vehicle_->first_judged = vehicle.time;
-  ++(vehicle.used ? ground_vehicle_->used : ground_vehicle_->left_out);
-  ground_vehicle_->rotation = vehicle.q_IV;
-  ground_vehicle_->rotation_sigma = vehicle.q_IV_sigma;
-  if (vehicle.is_contradicted)
-    ground_vehicle_->contradicted_at = vehicle.time - *ground_vehicle_->first_judged;
-}
-
 void RunLog::fill(RunSummary* summary) const {
   summary->radars.clear();
   for (const Radar& radar : radars_) summary->radars.push_back(radar.summary);
@@ -112,6 +91,10 @@ void RunLog::fill(RunSummary* summary) const {
   summary->scans_diverged = scans_diverged_;
   summary->barometer = barometer_;
   summary->ground_vehicle = ground_vehicle_;
+  if (ground_vehicle_ && ground_vehicle_->last) {
+    summary->ground_vehicle->rotation = ground_vehicle_->last->q_IV;
+    summary->ground_vehicle->rotation_sigma = ground_vehicle_->last->q_IV_sigma;
+  }
   summary->path_length_m = path_length_m_;
   if (trajectory_.empty()) return;
   const Eigen::Vector3d moved = trajectory_.back().p_W - trajectory_.front().p_W;

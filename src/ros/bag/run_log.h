@@ -26,8 +26,6 @@ class RunLog {
   Trajectory takeTrajectory() { return std::move(trajectory_); }
 
  private:
-  void accountAids(const ScanResult& result);
-
   struct Radar {
     RadarSummary summary;
     double taken_off = 0.0;

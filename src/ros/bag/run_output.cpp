@@ -1,18 +1,14 @@
 #include "rio_t/ros/bag/run_output.h"
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <initializer_list>
-#include <locale>
 #include <regex>
-#include <sstream>
 #include <stdexcept>
 #include <system_error>
 
+#include "../text.h"
 #include "rio_t/factors/state_block.h"
 #include "rio_t/ros/messages/conversions.h"
 #include "summary_text.h"
@@ -22,14 +18,6 @@ namespace {
 
 constexpr std::size_t kBufferSize = 1 << 18;
 constexpr double kNavigationPeriod = 0.0999;  // [s] between lines of navigation.csv
-
-void appendDigits(std::string* text, std::uint64_t value, int at_least) {
-  std::array<char, 20> digits{};
-  const char* const end = std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
-  const auto count = static_cast<int>(end - digits.data());
-  if (count < at_least) text->append(static_cast<std::size_t>(at_least - count), '0');
-  text->append(digits.data(), static_cast<std::size_t>(count));
-}
 
 void appendNumber(std::string* line, double x, int decimals) {
   line->push_back(',');
@@ -63,17 +51,25 @@ bool isEmptyOrBeginsWith(const std::filesystem::path& path, const std::string& h
 
 }  // namespace
 
-std::vector<std::string> RunFiles::names() const {
-  std::vector<std::string> names = {"trajectory.txt", "trajectory_optimized.txt", "navigation.csv"};
+std::vector<RunFile> RunFiles::all() const {
+  std::vector<RunFile> files = {
+      {"trajectory.txt", ""}, {"trajectory_optimized.txt", ""}, {"navigation.csv", kNavigationHeader}};
   for (const std::string& radar : radars) {
-    names.push_back("time_offset" + suffixOf(radar) + ".csv");
-    names.push_back("ego_velocity" + suffixOf(radar) + ".csv");
-    if (extrinsics) names.push_back("extrinsics" + suffixOf(radar) + ".csv");
+    const std::string end = suffixOf(radar) + ".csv";
+    files.push_back({"time_offset" + end, kTimeOffsetHeader});
+    files.push_back({"ego_velocity" + end, kEgoVelocityHeader});
+    if (extrinsics) files.push_back({"extrinsics" + end, kExtrinsicsHeader});
   }
-  if (barometer) names.emplace_back("barometer.csv");
-  if (ground_vehicle) names.emplace_back("ground_vehicle.csv");
-  if (map) names.emplace_back("map.csv");
-  names.emplace_back("biases.csv");
+  if (barometer) files.push_back({"barometer.csv", kBarometerHeader});
+  if (ground_vehicle) files.push_back({"ground_vehicle.csv", kGroundVehicleHeader});
+  if (map) files.push_back({"map.csv", kMapHeader});
+  files.push_back({"biases.csv", kBiasesHeader});
+  return files;
+}
+
+std::vector<std::string> RunFiles::names() const {
+  std::vector<std::string> names;
+  for (const RunFile& file : all()) names.push_back(file.name);
   names.emplace_back("summary.yaml");
   return names;
 }
@@ -90,39 +86,7 @@ RunFiles runFiles(const Config& config) {
   return files;
 }
 
-void appendFixed(std::string* text, double value, int decimals) {
-  if (!std::isfinite(value)) {
-    *text += std::isnan(value) ? ".nan" : value > 0.0 ? ".inf" : "-.inf";
-    return;
-  }
-  double scale = 1.0;
-  for (int i = 0; i < decimals; ++i) scale *= 10.0;
-  const double scaled = std::round(std::abs(value) * scale);
-  if (scaled > 9e18) {  // beyond 64 bits
-    std::ostringstream stream;
-    stream.imbue(std::locale::classic());
-    stream.precision(decimals);
-    stream << std::fixed << value;
-    *text += stream.str();
-    return;
-  }
-  const auto whole = static_cast<std::uint64_t>(scaled);
-  const auto divisor = static_cast<std::uint64_t>(scale);
-  if (value < 0.0 && whole != 0) text->push_back('-');
-  appendDigits(text, whole / divisor, 1);
-  if (decimals == 0) return;
-  text->push_back('.');
-  appendDigits(text, whole % divisor, decimals);
-}
-
-std::string fixedText(double value, int decimals) {
-  std::string text;
-  appendFixed(&text, value, decimals);
-  return text.find_first_of("123456789in") == std::string::npos && text.front() == '-' ? text.substr(1)
-                                                                                       : text;
-}
-
-void RunOutput::File::open(const std::string& path_in, const std::string& header) {
+void RunOutput::File::open(const std::string& path_in, const std::string& text) {
   path = path_in;
   stream.open(path, std::ios::binary | std::ios::trunc);
   if (!stream) {
@@ -130,7 +94,7 @@ void RunOutput::File::open(const std::string& path_in, const std::string& header
     throw OutputError("output " + path + ": cannot be written (" + reason + ")");
   }
   buffer.reserve(kBufferSize + 1024);
-  buffer = header;
+  buffer = text;
 }
 
 void RunOutput::File::flush() {
@@ -153,45 +117,30 @@ RunOutput::RunOutput(const std::string& folder, const RunFiles& files) : folder_
                       (error ? error.message() : "a file of that name exists") + ")");
   }
   removeOfEarlierRuns();
-  trajectory_.open(folder + "/trajectory.txt");
-  optimized_.open(folder + "/trajectory_optimized.txt");
-  navigation_.open(folder + "/navigation.csv", kNavigationHeader);
-  biases_.open(folder + "/biases.csv", kBiasesHeader);
-  if (files.map) map_.emplace().open(folder + "/map.csv", kMapHeader);
-  if (files.barometer) barometer_.emplace().open(folder + "/barometer.csv", kBarometerHeader);
-  if (files.ground_vehicle)
-    ground_vehicle_.emplace().open(folder + "/ground_vehicle.csv", kGroundVehicleHeader);
-  for (const std::string& name : files.radars) {
-    const std::string end = suffixOf(name) + ".csv";
-    RadarOutput& radar = radars_.emplace_back();
-    radar.time_offset.open(folder + "/time_offset" + end, kTimeOffsetHeader);
-    radar.ego_velocity.open(folder + "/ego_velocity" + end, kEgoVelocityHeader);
-    if (files.extrinsics) radar.extrinsics.emplace().open(folder + "/extrinsics" + end, kExtrinsicsHeader);
-  }
+  for (const RunFile& file : files.all()) open_[file.name].open(folder + "/" + file.name, file.header);
 }
 
 void RunOutput::removeOfEarlierRuns() const {
   namespace fs = std::filesystem;
   std::error_code error;
   fs::remove(folder_ + "/summary.yaml", error);
-  static const std::regex of_radar(
-      "(time_offset|ego_velocity|extrinsics)(_[a-z0-9_]+)?\\.csv|(barometer|ground_vehicle|map)\\.csv");
+  // What not every run writes.
+  static const std::regex optional("(time_offset|ego_velocity|extrinsics)_[a-z0-9_]+\\.csv|(.+)\\.csv");
   const std::vector<std::string> own = files_.names();
+  const std::vector<RunFile> possible = RunFiles{{""}, true, true, true, true}.all();
   std::vector<fs::path> earlier;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) {
     const std::string name = entry.path().filename().string();
     std::smatch kind;
-    if (name.size() > 255 || !std::regex_match(name, kind, of_radar) || !entry.is_regular_file(error))
+    if (name.size() > 255 || !std::regex_match(name, kind, optional) || !entry.is_regular_file(error))
       continue;
     if (std::find(own.begin(), own.end(), name) != own.end()) continue;
-    const char* const header = kind[1] == "time_offset"       ? kTimeOffsetHeader
-                               : kind[1] == "ego_velocity"    ? kEgoVelocityHeader
-                               : name == "barometer.csv"      ? kBarometerHeader
-                               : name == "map.csv"            ? kMapHeader
-                               : name == "ground_vehicle.csv" ? kGroundVehicleHeader
-                                                              : kExtrinsicsHeader;
+    const std::string stem = kind[1].str() + kind[2].str();
+    const auto file = std::find_if(possible.begin(), possible.end(),
+                                   [&](const RunFile& each) { return each.name == stem + ".csv"; });
+    if (file == possible.end()) continue;
     // A user's own time_offset_truth.csv stays.
-    if (isEmptyOrBeginsWith(entry.path(), header)) earlier.push_back(entry.path());
+    if (isEmptyOrBeginsWith(entry.path(), file->header)) earlier.push_back(entry.path());
   }
   for (const fs::path& path : earlier) fs::remove(path, error);
 }
@@ -207,7 +156,7 @@ void RunOutput::addPose(File& file, Time time, const Eigen::Vector3d& p_W, const
 }
 
 void RunOutput::addState(const NavigationState& state) {
-  addPose(trajectory_, state.time, state.p_W, state.q_WI);
+  addPose(file("trajectory.txt"), state.time, state.p_W, state.q_WI);
   // Also where time runs back (a bag that loops): a line, then ten a second again.
   if (last_navigation_ && std::abs(state.time - *last_navigation_) < kNavigationPeriod) return;
   last_navigation_ = state.time;
@@ -215,51 +164,57 @@ void RunOutput::addState(const NavigationState& state) {
     return Eigen::Vector3d(variances.cwiseMax(0.0).cwiseSqrt());
   };
   const Covariance6 pose = bodyOdometry(state, 0.0).pose_covariance;
-  std::string* line = &navigation_.buffer;
+  File& navigation = file("navigation.csv");
+  std::string* line = &navigation.buffer;
   *line += formatTime(state.time);
   appendVector(line, state.v_W, 6);
   appendVector(line, sigmas(pose.diagonal().head<3>()), 6);
   appendVector(line, sigmas(pose.diagonal().tail<3>()), 6);
   appendVector(line, sigmas(state.covariance.diagonal().segment<3>(StateBlock::kV)), 6);
-  navigation_.endLine();
+  navigation.endLine();
 }
 
 void RunOutput::addResult(const ScanResult& result) {
-  for (const StampedPose& pose : result.left_window) addPose(optimized_, pose.time, pose.p_W, pose.q_WI);
+  for (const StampedPose& pose : result.left_window)
+    addPose(file("trajectory_optimized.txt"), pose.time, pose.p_W, pose.q_WI);
   addAids(result);
   if (!result.used && result.rejected_because.empty()) return;  // only carries the last poses
 
-  RadarOutput& radar = radars_.at(result.scan.radar);
-  std::string* line = &radar.ego_velocity.buffer;
+  const std::string end = suffixOf(files_.radars.at(result.scan.radar)) + ".csv";
+  File& ego_velocity = file("ego_velocity" + end);
+  std::string* line = &ego_velocity.buffer;
   *line += formatTime(result.scan.stamp);
   appendVector(line, result.ego_velocity.v_R, 6);
   appendVector(line, result.ego_velocity.covariance.diagonal().cwiseMax(0.0).cwiseSqrt(), 6);
   *line += ',' + std::to_string(result.ego_velocity.inliers.size()) + ',' +
            std::to_string(result.ego_velocity.points.size()) + ',' +
            (result.used ? toString(result.ego_velocity.status) : result.rejected_because);
-  radar.ego_velocity.endLine();
+  ego_velocity.endLine();
   if (!result.updated) return;
 
-  line = &radar.time_offset.buffer;
+  File& time_offset = file("time_offset" + end);
+  line = &time_offset.buffer;
   *line += formatTime(result.scan.stamp);
   appendNumber(line, result.time_offset, 9);
   appendNumber(line, result.time_offset_sigma, 9);
-  radar.time_offset.endLine();
-  if (radar.extrinsics) addExtrinsics(*radar.extrinsics, result);
+  time_offset.endLine();
+  if (files_.extrinsics) addExtrinsics(file("extrinsics" + end), result);
 
   if (result.landmarks)
     for (const LandmarkPoint& point : result.landmarks->map) landmarks_[point.id] = point;
 
-  line = &biases_.buffer;
+  File& biases = file("biases.csv");
+  line = &biases.buffer;
   *line += formatTime(result.scan.stamp);
   appendVector(line, result.state.b_g, 9);
   appendVector(line, result.state.b_a, 9);
-  biases_.endLine();
+  biases.endLine();
 }
 
 void RunOutput::addAids(const ScanResult& result) {
   for (const BarometerAnswer& mean : result.barometer) {
-    std::string* line = &barometer_->buffer;
+    File& barometer = file("barometer.csv");
+    std::string* line = &barometer.buffer;
     *line += formatTime(mean.time);
     for (const double x : {mean.height, mean.innovation, mean.innovation_sigma, mean.bias, mean.bias_sigma})
       appendNumber(line, x, 6);
@@ -267,11 +222,12 @@ void RunOutput::addAids(const ScanResult& result) {
              (!mean.rejected_because.empty() ? mean.rejected_because
               : mean.stepped                 ? "stepped"
                                              : "used");
-    barometer_->endLine();
+    barometer.endLine();
   }
   if (!result.ground_vehicle) return;
   const GroundVehicleAnswer& vehicle = *result.ground_vehicle;
-  std::string* line = &ground_vehicle_->buffer;
+  File& ground_vehicle = file("ground_vehicle.csv");
+  std::string* line = &ground_vehicle.buffer;
   *line += formatTime(vehicle.time);
   appendVector(line, vehicle.v_V, 6);
   appendNumber(line, std::sqrt(vehicle.squared_sigmas), 3);
@@ -279,20 +235,19 @@ void RunOutput::addAids(const ScanResult& result) {
   appendNumber(line, vehicle.q_IV.w(), 9);
   appendVector(line, vehicle.q_IV_sigma, 9);
   *line += vehicle.is_contradicted ? ",contradicted" : vehicle.used ? ",used" : ",left_out";
-  ground_vehicle_->endLine();
+  ground_vehicle.endLine();
 }
 
-void RunOutput::writeMap() {
+void RunOutput::addMap(File& file) {
   for (const auto& [id, point] : landmarks_) {
-    std::string* line = &map_->buffer;
+    std::string* line = &file.buffer;
     *line += std::to_string(id);
     appendVector(line, point.p_W, 6);
     appendNumber(line, point.sigma, 6);
     appendNumber(line, point.snr_db, 3);
     *line += ',' + std::to_string(point.sightings);
-    map_->endLine();
+    file.endLine();
   }
-  map_->flush();
 }
 
 void RunOutput::addExtrinsics(File& file, const ScanResult& result) {
@@ -309,18 +264,10 @@ void RunOutput::addExtrinsics(File& file, const ScanResult& result) {
 }
 
 void RunOutput::finish(const RunSummary& summary) {
-  for (File* file : {&trajectory_, &optimized_, &navigation_, &biases_}) file->flush();
-  if (barometer_) barometer_->flush();
-  if (ground_vehicle_) ground_vehicle_->flush();
-  for (RadarOutput& radar : radars_) {
-    radar.time_offset.flush();
-    radar.ego_velocity.flush();
-    if (radar.extrinsics) radar.extrinsics->flush();
-  }
-  if (map_) writeMap();
+  if (files_.map) addMap(file("map.csv"));
+  for (auto& [name, file] : open_) file.flush();
   File yaml;
-  yaml.open(folder_ + "/summary.yaml");
-  yaml.buffer = summaryText(summary, files_.names());
+  yaml.open(folder_ + "/summary.yaml", summaryText(summary, files_.names()));
   yaml.flush();
 }
 

@@ -2,6 +2,8 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include "../text.h"
+
 namespace rio_t {
 namespace {
 
@@ -176,8 +178,6 @@ std::string summaryText(const RunSummary& summary, const std::vector<std::string
   return lines.text();
 }
 
-std::string suffixOf(const std::string& radar) { return radar.empty() ? "" : "_" + radar; }
-
 std::uint64_t RunSummary::scansTotal() const {
   std::uint64_t total = 0;
   for (const RadarSummary& radar : radars) total += radar.scans_total;
@@ -199,9 +199,7 @@ std::map<std::string, std::uint64_t> RunSummary::scansRejected() const {
 }
 
 std::string contradictionText(const GroundVehicleSummary& vehicle) {
-  return "platform: ground_vehicle: after " + fixedText(vehicle.contradicted_at.value_or(0.0), 1) +
-         " s the motion contradicted it, and the constraint was switched off: the platform moves sideways or "
-         "upwards. Is it a ground vehicle, and does vehicle_frame_rotation_xyzw say which way it drives?";
+  return "after " + fixedText(vehicle.contradicted_at.value_or(0.0), 1) + " s " + kGroundVehicleContradicted;
 }
 
 }  // namespace rio_t

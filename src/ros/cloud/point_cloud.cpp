@@ -51,9 +51,8 @@ bool hasField(const PointCloud2& message, const std::string& name) {
     text += "; more than one preset fits: " + join(fitting, ", ") + " (choose your driver's)";
   } else if (is_old_ti) {
     text +=
-        "; this is the cloud of the older radar-lab ti_mmwave driver, which has no Doppler: no velocity can "
-        "be "
-        "had from it; use ti_mmwave_rospkg 3.3 or later";
+        "; this is the cloud of the older radar-lab ti_mmwave driver, which has no Doppler: it gives no "
+        "velocity; use ti_mmwave_rospkg 3.3 or later";
   } else {
     text += "; none fits: set the names of the fields one by one";
   }

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iomanip>
 #include <sstream>
 #include <stdexcept>
+
+#include "../text.h"
 
 namespace rio_t {
 namespace {
@@ -58,14 +59,8 @@ std::string number(double value) {
   return text.str();
 }
 
-std::string fixed(double value, int digits) {
-  std::ostringstream text;
-  text << std::fixed << std::setprecision(digits) << value;
-  return text.str();
-}
-
 /// A stamp, to the millisecond.
-std::string stampText(Time time) { return fixed(time.seconds(), 3) + " s"; }
+std::string stampText(Time time) { return fixedText(time.seconds(), 3) + " s"; }
 
 std::string outOf(std::uint64_t part, std::uint64_t whole, const std::string& what) {
   return std::to_string(part) + " of " + std::to_string(whole) + " " + what;
@@ -77,7 +72,7 @@ class RadarCauses {
   RadarCauses(const RadarEvidence& radar, const Config& config, std::vector<Cause>* causes)
       : radar_(radar),
         config_(config),
-        key_(radar.name.empty() ? "" : radar.name + "/"),
+        key_(prefixOf(radar.name)),
         of_(radar.name.empty() ? "" : " of radar " + radar.name),
         causes_(causes) {}
 
@@ -157,7 +152,7 @@ class RadarCauses {
       cause("stamp_before_imu", before_imu,
             outOf(radar_.scans_before_imu, radar_.scans_total, "scans") + of_ +
                 " are stamped before the first IMU sample, the first of them by " +
-                fixed(radar_.seconds_before_imu, 1) + " s.",
+                fixedText(radar_.seconds_before_imu, 1) + " s.",
             other);
     scans("stamp_ahead_of_imu", "are stamped ahead of the newest IMU sample.", other);
     scans("older_than_window", "are stamped before the IMU samples that are kept.", other);
@@ -323,10 +318,11 @@ void addSilence(const RunEvidence& evidence, std::vector<Cause>* causes) {
   const double share = silentShare(evidence);
   if (share <= kMostlySilent || (usedShare(evidence) < kFewScansUsed && !causes->empty())) return;
   causes->push_back({"radar_silent",
-                     "No scan was used from " + fixed(evidence.silence_begin, 1) + " to " +
-                         fixed(evidence.silence_end, 1) + " s after the start: the IMU alone carried the " +
-                         "estimate for " + fixed(evidence.silent_seconds, 1) + " of " +
-                         fixed(evidence.run_seconds, 1) + " s.",
+                     "No scan was used from " + fixedText(evidence.silence_begin, 1) + " to " +
+                         fixedText(evidence.silence_end, 1) +
+                         " s after the start: the IMU alone carried the " + "estimate for " +
+                         fixedText(evidence.silent_seconds, 1) + " of " + fixedText(evidence.run_seconds, 1) +
+                         " s.",
                      "Look for what stops the radar or loses its messages, or run the part with scans "
                      "(bag_start, bag_duration).",
                      share});
@@ -432,7 +428,7 @@ std::string describeRestarts(const std::vector<ImuRestart>& restarts, const Conf
   if (is_ahead)
     text +=
         ", more than max_bridged_imu_gap " + number(config.odometry.imu_input_check.max_bridged_gap) + " s";
-  text += ". The trajectory begins anew there, at the origin";
+  text += ". There the trajectory starts again at the origin";
   if (restarts.size() > 1) text += "; more such jumps: " + std::to_string(restarts.size() - 1);
   return text + ".";
 }

@@ -84,4 +84,30 @@ RunEvidence EvidenceCollector::evidence(const RadarInertialOdometry& odometry,
   return all;
 }
 
+void BarometerCounts::add(const ScanResult& result) {
+  for (const BarometerAnswer& mean : result.barometer) {
+    last = mean;
+    if (!mean.rejected_because.empty()) {
+      ++rejected[mean.rejected_because];
+      continue;
+    }
+    ++used;
+    bias = mean.bias;
+    bias_sigma = mean.bias_sigma;
+    if (mean.stepped) {
+      ++steps;
+    } else {
+      innovation_square += mean.innovation * mean.innovation;
+    }
+  }
+}
+
+void GroundVehicleCounts::add(const ScanResult& result) {
+  if (!result.ground_vehicle) return;
+  last = result.ground_vehicle;
+  ++(last->used ? used : left_out);
+  if (!first_judged) first_judged = last->time;
+  if (last->is_contradicted) contradicted_at = last->time - *first_judged;
+}
+
 }  // namespace rio_t

@@ -4,6 +4,7 @@
 
 #include <stdexcept>
 
+#include "../text.h"
 #include "rio_t/ros/messages/conversions.h"
 
 namespace rio_t {
@@ -14,7 +15,7 @@ std::string imuFrame(const Config& config, const std::string& frame_id) {
 }
 
 std::string cloudFrame(const Config& radar, const std::string& frame_id) {
-  const std::string key = radar.radar_name.empty() ? "" : radar.radar_name + "/";
+  const std::string key = prefixOf(radar.radar_name);
   if (frame_id.empty())
     throw std::runtime_error(
         "topic " + radar.radar_topic +

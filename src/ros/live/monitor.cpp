@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "../text.h"
 #include "rio_t/factors/state_block.h"
 
 namespace rio_t {
@@ -51,7 +52,7 @@ std::string advice(SolverTermination termination) {
 
 std::string noisyImu(const MeasuredImuNoise& noise, const ImuNoise& told) {
   std::ostringstream text;
-  text << "the IMU vibrates or is noisier than told: accelerometer " << noise.accel_density
+  text << "the IMU vibrates or is noisier than configured: accelerometer " << noise.accel_density
        << " m/s^2/sqrt(Hz), imu_accel_noise_density " << told.accel_density << "; gyro " << noise.gyro_density
        << " rad/s/sqrt(Hz), imu_gyro_noise_density " << told.gyro_density
        << ". The estimate takes the measured noise. A softer mount makes it better.";
@@ -63,10 +64,6 @@ LiveMonitor::LiveMonitor(const Config& config)
   for (Config& radar : configsOfRadars(config)) radars_.emplace_back(std::move(radar));
 }
 
-std::string LiveMonitor::prefix(const Radar& radar) {
-  return radar.config.radar_name.empty() ? "" : radar.config.radar_name + "/";
-}
-
 std::string LiveMonitor::called(const Radar& radar) {
   return radar.config.radar_name.empty() ? "the radar" : "radar " + radar.config.radar_name;
 }
@@ -74,7 +71,7 @@ std::string LiveMonitor::called(const Radar& radar) {
 LiveMonitor::Finding LiveMonitor::join(const std::vector<Finding>& findings, bool another_works) {
   Finding all;
   for (const Finding& finding : findings) {
-    all.text += (all.text.empty() ? "" : "; ") + finding.text;
+    appendItem(&all.text, finding.text, "; ");
     all.level = std::max(all.level, finding.level);
   }
   if (another_works) all.level = std::min(all.level, std::uint8_t{DiagnosticStatus::WARN});
@@ -279,7 +276,7 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) c
   if (health == Health::kDiverged) {
     status.summary(DiagnosticStatus::ERROR,
                    (config_.odometry.health.on_divergence == OnDivergence::kReinitialize
-                        ? "diverged: do not trust the estimate; finding the state anew"
+                        ? "diverged: do not trust the estimate; re-initialising"
                         : "diverged: do not trust the estimate; call ~reset") +
                        likely_cause);
   } else if (health == Health::kCoasting) {
@@ -295,7 +292,7 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) c
 std::optional<LiveMonitor::Finding> LiveMonitor::describeRadar(Status& status, Radar& radar,
                                                                bool initialized) const {
   const Config& config = radar.config;
-  const std::string key = prefix(radar);
+  const std::string key = prefixOf(radar.config.radar_name);
   const bool is_silent = radar.scans.isSilent();
   status.add(key + "scans", radar.scans.count);
   status.add(key + "scans_used", radar.used);

@@ -21,21 +21,6 @@ void LiveMonitor::pressureDropped(const std::string& why) {
   barometer_.why_not_usable = why;
 }
 
-void LiveMonitor::accountAids(const ScanResult& result) {
-  for (const BarometerAnswer& mean : result.barometer) {
-    barometer_.last = mean;
-    if (!mean.rejected_because.empty()) {
-      ++barometer_.rejected[mean.rejected_because];
-    } else {
-      ++barometer_.used;
-      barometer_.steps += mean.stepped ? 1 : 0;
-    }
-  }
-  if (!result.ground_vehicle) return;
-  vehicle_.last = *result.ground_vehicle;
-  ++(vehicle_.last->used ? vehicle_.used : vehicle_.left_out);
-}
-
 void LiveMonitor::describeBarometer(Status& status) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const Clock::time_point now = Clock::now();

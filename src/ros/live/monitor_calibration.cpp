@@ -5,6 +5,7 @@
 #include <sstream>
 #include <string>
 
+#include "../text.h"
 #include "rio_t/core/so3.h"
 #include "rio_t/ros/live/monitor.h"
 
@@ -61,7 +62,7 @@ void LiveMonitor::describeTimeOffset(Status& status, std::size_t radar) const {
     status.summary(DiagnosticStatus::OK, "kept: no scan of " + called(of) + " is used now");
   } else {
     status.summary(DiagnosticStatus::OK,
-                   observable ? "observed by the motion now" : "kept: the motion says nothing now");
+                   observable ? "observed by the motion now" : "kept: not observable now");
   }
 }
 
@@ -89,13 +90,13 @@ void LiveMonitor::describeExtrinsics(Status& status, std::size_t radar) const {
     status.add("lever_arm_sigma_m", listOf(lever_sigma));
     const std::string lever =
         axesAbove(lever_sigma, kObserved * options.extrinsics_translation_sigma, "lever arm along ");
-    kept += (kept.empty() || lever.empty() ? "" : ", ") + lever;
+    if (!lever.empty()) appendItem(&kept, lever);
   }
   const std::string far = axesAbove(turn.cwiseAbs(), 3.0 * options.extrinsics_rotation_sigma, "about ");
   if (!far.empty()) {
-    status.summary(
-        DiagnosticStatus::WARN,
-        called(of) + " is turned " + far + " by more than 3 extrinsics_rotation_sigma from what was told");
+    status.summary(DiagnosticStatus::WARN,
+                   "the estimated rotation of " + called(of) + " " + far +
+                       " differs from the configured one by more than 3 extrinsics_rotation_sigma");
   } else if (!kept.empty()) {
     status.summary(DiagnosticStatus::OK, "kept: the motion has not shown the " + kept);
   } else {

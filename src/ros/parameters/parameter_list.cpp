@@ -42,12 +42,6 @@ bool isRadarName(const std::string& text) {
   });
 }
 
-ParameterValue listOf(std::initializer_list<double> numbers) {
-  ParameterValue::List list;
-  for (const double x : numbers) list.emplace_back().data = x;
-  return {std::move(list)};
-}
-
 }  // namespace
 
 std::optional<double> asNumber(const ParameterValue& value) {
@@ -188,37 +182,28 @@ void ParameterList::mounting(const std::string& key, std::optional<MountingAngle
 }
 
 void ParameterList::text(const std::string& key, std::string& member, const std::string& text) {
-  add(
-      {key, "text", "", "one line of text, not empty", text},
-      [&member](const ParameterValue& value) {
-        const std::string* x = std::get_if<std::string>(&value.data);
-        if (x == nullptr || x->empty() || !isOneLine(*x)) return false;
-        member = *x;
-        return true;
-      },
-      [&member] { return ParameterValue{member}; });
+  addText(key, member, text, false, [](const std::string& given) { return given; });
 }
 
 void ParameterList::textOrEmpty(const std::string& key, std::string& member, const std::string& text) {
-  add(
-      {key, "text", "", "one line of text, may be empty", text},
-      [&member](const ParameterValue& value) {
-        const std::string* x = std::get_if<std::string>(&value.data);
-        const bool nothing = std::holds_alternative<std::monostate>(value.data);  // `key:` and no more
-        if (x == nullptr ? !nothing : !isOneLine(*x)) return false;
-        member = nothing ? std::string() : *x;
-        return true;
-      },
-      [&member] { return ParameterValue{member}; });
+  addText(key, member, text, true, [](const std::string& given) { return given; });
 }
 
 void ParameterList::frame(const std::string& key, std::string& member, const std::string& text) {
+  addText(key, member, text, false, withoutSlash);
+}
+
+void ParameterList::addText(const std::string& key, std::string& member, const std::string& text,
+                            bool may_be_empty, const std::function<std::string(const std::string&)>& kept) {
   add(
-      {key, "text", "", "one line of text, not empty", text},
-      [&member](const ParameterValue& value) {
-        const std::string* x = std::get_if<std::string>(&value.data);
-        if (x == nullptr || withoutSlash(*x).empty() || !isOneLine(*x)) return false;
-        member = withoutSlash(*x);
+      {key, "text", "", std::string("one line of text, ") + (may_be_empty ? "may be" : "not") + " empty",
+       text},
+      [may_be_empty, kept, &member](const ParameterValue& value) {
+        const bool nothing = std::holds_alternative<std::monostate>(value.data);  // `key:` and no more
+        const std::string* given = std::get_if<std::string>(&value.data);
+        const std::string x = given == nullptr ? "" : kept(*given);
+        if ((given == nullptr && !nothing) || (x.empty() && !may_be_empty) || !isOneLine(x)) return false;
+        member = x;
         return true;
       },
       [&member] { return ParameterValue{member}; });

@@ -80,6 +80,9 @@ class ParameterList {
   const std::vector<Parameter>& all() const { return all_; }
 
  private:
+  /// `kept`: turns a text into that which is kept.
+  void addText(const std::string& key, std::string& member, const std::string& text, bool may_be_empty,
+               const std::function<std::string(const std::string&)>& kept);
   /// `about` has no group, `of_radar` and `first` yet.
   void add(ParameterDescription about, std::function<bool(const ParameterValue&)> set,
            std::function<ParameterValue()> get);

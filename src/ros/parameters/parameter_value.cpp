@@ -18,12 +18,13 @@
 namespace rio_t {
 namespace {
 
-/// Reads all of `text` as a T, with a decimal point whatever the locale of the machine.
+/// Reads all of `text` as a T, with a decimal point whatever the locale of the machine. std::regex would take
+/// one stack frame a letter, and a parameter file may have long lines.
 template <typename T>
 bool parseWhole(const std::string& text, T* value) {
   std::istringstream stream(text);
   stream.imbue(std::locale::classic());
-  stream >> *value;
+  stream >> std::noskipws >> *value;
   return !stream.fail() && stream.peek() == std::istringstream::traits_type::eof();
 }
 
@@ -78,38 +79,6 @@ ParameterEntries fromYamlMap(const YAML::Node& map, bool sections, const OriginO
     entries.push_back({key, std::move(value), origin});
   }
   return entries;
-}
-
-// By hand, since std::regex takes one stack frame a letter and a parameter file may have long lines.
-
-std::size_t skipDigits(const std::string& text, std::size_t at) {
-  while (at < text.size() && text[at] >= '0' && text[at] <= '9') ++at;
-  return at;
-}
-
-std::size_t skipSign(const std::string& text, std::size_t at) {
-  return at < text.size() && (text[at] == '+' || text[at] == '-') ? at + 1 : at;
-}
-
-/// [-+]?[0-9]+
-bool looksWhole(const std::string& text) {
-  const std::size_t begin = skipSign(text, 0);
-  return begin < text.size() && skipDigits(text, begin) == text.size();
-}
-
-/// [-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?
-bool looksReal(const std::string& text) {
-  const std::size_t begin = skipSign(text, 0);
-  std::size_t at = skipDigits(text, begin);
-  std::size_t digits = at - begin;
-  if (at < text.size() && text[at] == '.') {
-    const std::size_t end = skipDigits(text, at + 1);
-    digits += end - at - 1;
-    at = end;
-  }
-  if (digits == 0) return false;
-  if (at == text.size()) return true;
-  return (text[at] == 'e' || text[at] == 'E') && looksWhole(text.substr(at + 1));
 }
 
 /// Whether text without quotes reads back as text in every YAML reader.
@@ -175,6 +144,12 @@ std::string ParameterValue::describe() const {
   return std::visit(Describe{}, data);
 }
 
+ParameterValue listOf(const std::vector<double>& numbers) {
+  ParameterValue::List list;
+  for (const double x : numbers) list.push_back({x});
+  return {std::move(list)};
+}
+
 ParameterValue parsePlainScalar(const std::string& text) {
   // The words of YAML 1.1, since that is what the ROS parameter server reads.
   if (isOneOf(text, {"", "~", "null", "Null", "NULL"})) return {};
@@ -187,12 +162,9 @@ ParameterValue parsePlainScalar(const std::string& text) {
   if (isOneOf(text, {"-.inf", "-.Inf", "-.INF", "-inf"})) return {-std::numeric_limits<double>::infinity()};
 
   std::int64_t whole = 0;
-  if (looksWhole(text) && parseWhole(text, &whole)) return {whole};
+  if (parseWhole(text, &whole)) return {whole};
   double real = 0.0;
-  if (looksReal(text)) {
-    if (parseWhole(text, &real)) return {real};
-    return {std::numeric_limits<double>::infinity()};  // 1e999
-  }
+  if (parseWhole(text, &real)) return {real};
   return {text};
 }
 

@@ -9,6 +9,7 @@
 #include <map>
 #include <utility>
 
+#include "../text.h"
 #include "mounting_parameters.h"
 #include "parameter_list.h"
 
@@ -81,7 +82,7 @@ RadarOptions radarOptions(const Config& config) {
 /// "left, right"
 std::string namesOf(const std::vector<Config>& radars) {
   std::string names;
-  for (const Config& radar : radars) names += (names.empty() ? "" : ", ") + radar.radar_name;
+  for (const Config& radar : radars) appendItem(&names, radar.radar_name);
   return names;
 }
 
@@ -144,10 +145,10 @@ void setTopLevel(const ParameterEntries& entries, const ParameterList& list,
 
 /// Sets what stands in the section of a radar.
 void setSection(const Section& section, Config* radar, std::vector<std::string>* faults) {
-  beginMounting(section.entries, radar->radar_name + "/", radar, faults);
+  beginMounting(section.entries, prefixOf(radar->radar_name), radar, faults);
   const ParameterList list = parametersOf(*radar);
   for (const ParameterEntry& entry : section.entries)
-    setParameter(entry, radar->radar_name + "/", list, faults);
+    setParameter(entry, prefixOf(radar->radar_name), list, faults);
 }
 
 /// Whether `radars` had the name before a later entry took it out, as `--set radars=[left]` does.
@@ -186,7 +187,7 @@ void setRadars(const SortedEntries& sorted, const Config& top_level, std::vector
 
 /// What single values of one radar cannot show.
 void addContradictions(const Config& config, std::vector<std::string>* faults) {
-  const std::string section = config.radar_name.empty() ? "" : config.radar_name + "/";
+  const std::string section = prefixOf(config.radar_name);
   if (config.odom_frame == config.base_link_frame)
     faults->push_back("odom_frame: expected another frame than base_link_frame, got \"" + config.odom_frame +
                       "\" for both");
@@ -309,13 +310,18 @@ std::vector<Config> configsOfRadars(const Config& config) {
   return config.radars.empty() ? std::vector<Config>{config} : config.radars;
 }
 
-Config withAbsoluteTopics(Config config) {
+Config withTopics(Config config, const std::function<std::string(const std::string&)>& resolve) {
   for (std::string* topic : {&config.imu_topic, &config.radar_topic, &config.trigger_topic,
                              &config.ground_truth_topic, &config.barometer_topic}) {
-    if (!topic->empty() && topic->front() != '/') topic->insert(0, "/");
+    if (!topic->empty()) *topic = resolve(*topic);
   }
-  for (Config& radar : config.radars) radar = withAbsoluteTopics(radar);
+  for (Config& radar : config.radars) radar = withTopics(radar, resolve);
   return config;
+}
+
+Config withAbsoluteTopics(const Config& config) {
+  return withTopics(config,
+                    [](const std::string& topic) { return topic.front() == '/' ? topic : "/" + topic; });
 }
 
 std::string withoutSlash(const std::string& frame) {

@@ -2,8 +2,8 @@
 #include <yaml-cpp/yaml.h>
 
 #include <cmath>
-#include <sstream>
 
+#include "../text.h"
 #include "parameter_list.h"
 
 namespace rio_t {
@@ -11,20 +11,6 @@ namespace {
 
 constexpr std::size_t kLineLength = 110;
 const char* const kFirst = "The parameters that matter first";
-
-/// `text` as lines that begin with `indent`.
-std::string wrapped(const std::string& text, const std::string& indent) {
-  std::string lines, line;
-  std::istringstream words(text);
-  for (std::string word; words >> word;) {
-    if (!line.empty() && indent.size() + line.size() + 1 + word.size() > kLineLength) {
-      lines += indent + line + "\n";
-      line.clear();
-    }
-    line += (line.empty() ? "" : " ") + word;
-  }
-  return lines + indent + line + "\n";
-}
 
 std::string expectedText(const ParameterDescription& about) {
   return (about.unit.empty() ? "" : "[" + about.unit + "] ") + about.expected +
@@ -85,8 +71,8 @@ std::string toYaml(const Config& config) {
       parametersOf(copy), [&](const std::string& title) { yaml += "\n# --- " + title + "\n"; },
       [&](const Parameter& parameter) {
         const ParameterDescription& about = parameter.description;
-        yaml += "\n" + wrapped(about.description, "# ") + "# " + expectedText(about) + "\n" + about.key +
-                ": " + parameter.get().yaml() + "\n";
+        yaml += "\n# " + wrapped(about.description, "# ", kLineLength) + "\n# " + expectedText(about) + "\n" +
+                about.key + ": " + parameter.get().yaml() + "\n";
       });
   for (const Config& radar : config.radars) yaml += "\n" + sectionYaml(config, radar);
   return yaml;
@@ -142,9 +128,10 @@ std::string parametersMarkdown() {
       parametersOf(config), [&](const std::string& title) { text += "\n## " + title + "\n"; },
       [&](const Parameter& parameter) {
         const ParameterDescription& about = parameter.description;
-        text += "\n### `" + about.key + "`\n\n" + wrapped(about.description, "") + "\nDefault: `" +
-                parameter.get().yaml() + "`" + (about.unit.empty() ? "" : " " + about.unit) +
-                ". Expected: " + about.expected + (about.of_radar ? ". Per radar" : "") + ".\n";
+        text += "\n### `" + about.key + "`\n\n" + wrapped(about.description, "", kLineLength) +
+                "\n\nDefault: `" + parameter.get().yaml() + "`" +
+                (about.unit.empty() ? "" : " " + about.unit) + ". Expected: " + about.expected +
+                (about.of_radar ? ". Per radar" : "") + ".\n";
       });
   return text;
 }

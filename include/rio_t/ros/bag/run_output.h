@@ -3,10 +3,12 @@
 #include <array>
 #include <cstdint>
 #include <fstream>
+#include <functional>
 #include <map>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "rio_t/evaluation/trajectory.h"
@@ -56,23 +58,14 @@ struct RadarSummary {
 };
 
 /// The result for the barometer.
-struct BarometerSummary {
-  std::uint64_t pressures = 0;                    ///< messages
-  std::uint64_t used = 0;                         ///< means of them that went into the window
-  std::map<std::string, std::uint64_t> rejected;  ///< means by reason
-  std::uint64_t steps = 0;                        ///< after which the bias was found anew
-  double bias = 0.0, bias_sigma = 0.0;            ///< [m] at the end
-  double innovation_square = 0.0;  ///< [m^2] sum over the used ones; the file has the root of the mean
+struct BarometerSummary : BarometerCounts {
+  std::uint64_t pressures = 0;  ///< messages
 };
 
 /// The result for the constraint of a ground vehicle.
-struct GroundVehicleSummary {
-  std::uint64_t used = 0;                                        ///< terms
-  std::uint64_t left_out = 0;                                    ///< that contradicted the estimate
+struct GroundVehicleSummary : GroundVehicleCounts {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  ///< of the vehicle frame, at the end
   Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Zero();      ///< [rad] about the axes of I
-  std::optional<double> contradicted_at;                         ///< [s] after the first scan judged
-  std::optional<Time> first_judged;                              ///< not in the file
 };
 /// For people: that the motion contradicts the platform, and what to look at.
 std::string contradictionText(const GroundVehicleSummary& vehicle);
@@ -109,6 +102,11 @@ struct RunSummary {
   std::map<std::string, std::uint64_t> scansRejected() const;
 };
 
+/// A file of a run, and how it begins.
+struct RunFile {
+  std::string name, header;
+};
+
 /// Which files a run writes: those of a radar carry its name, unless there is but one.
 struct RunFiles {
   std::vector<std::string> radars = {""};  ///< names, as in RadarSummary
@@ -117,15 +115,11 @@ struct RunFiles {
   bool ground_vehicle = false;             ///< the platform is one
   bool map = false;                        ///< landmarks are on
 
+  std::vector<RunFile> all() const;  ///< but for summary.yaml
   std::vector<std::string> names() const;
 };
 /// The files of a run with this configuration.
 RunFiles runFiles(const Config& config);
-
-/// Appends `value` with that many decimals (at most 12), with a point whatever the locale; "nan", "inf".
-void appendFixed(std::string* text, double value, int decimals);
-/// The same as a text of its own, without the sign of a minus zero.
-std::string fixedText(double value, int decimals);
 
 /// The files of a run cannot be written: the bag is not to blame.
 class OutputError : public std::runtime_error {
@@ -168,29 +162,22 @@ class RunOutput {
     std::ofstream stream;
     std::string buffer;
 
-    /// Empties it, and begins it with `header`.
-    void open(const std::string& path_in, const std::string& header = "");
+    /// Empties it, and begins it with `text`.
+    void open(const std::string& path_in, const std::string& text);
     void flush();
     void endLine();
   };
 
-  struct RadarOutput {
-    File time_offset, ego_velocity;
-    std::optional<File> extrinsics;
-  };
-
   void removeOfEarlierRuns() const;
-  void writeMap();
+  void addMap(File& file);
+  File& file(std::string_view name) { return open_.find(name)->second; }  // one of files_
   static void addExtrinsics(File& file, const ScanResult& result);
   void addAids(const ScanResult& result);
   void addPose(File& file, Time time, const Eigen::Vector3d& p_W, const Eigen::Quaterniond& q_WI);
 
   std::string folder_;
   RunFiles files_;
-  File trajectory_, optimized_, navigation_, biases_;
-  std::optional<File> barometer_, ground_vehicle_;
-  std::vector<RadarOutput> radars_;                   // by RadarScan::radar
-  std::optional<File> map_;                           // of the landmarks, if they are on
+  std::map<std::string, File, std::less<>> open_;     // by name
   std::map<std::uint64_t, LandmarkPoint> landmarks_;  // all that there were, by id, as they were last
   std::optional<Time> last_navigation_;               // of the last line in navigation.csv
 };

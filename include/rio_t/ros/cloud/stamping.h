@@ -19,7 +19,7 @@ namespace rio_t {
 /// it was stamped, so the smallest difference seen between the two is the clocks' difference and the shortest
 /// delay of the IMU. The minimum is over the last one to two minutes, so that it follows clocks that drift.
 /// Where the differences stay far above it, or the stamps run back, one of the clocks has jumped, and the
-/// minimum starts anew.
+/// minimum starts again.
 class ClockMap {
  public:
   void add(Time stamp, Time record);

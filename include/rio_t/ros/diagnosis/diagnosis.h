@@ -41,8 +41,8 @@ struct Diagnosis {
 /// Why a run disappoints, or that it does not. It works on a run that ended and on one that goes on.
 Diagnosis diagnose(const RunEvidence& evidence, const Config& config);
 
-/// Says where the trajectory begins anew: the first of the restarts, and how many follow. `restarts` must not
-/// be empty.
+/// Says where the trajectory starts again: the first of the restarts, and how many follow. `restarts` must
+/// not be empty.
 std::string describeRestarts(const std::vector<ImuRestart>& restarts, const Config& config);
 
 /// A line for each cause, and for each check that is not good.

@@ -90,4 +90,33 @@ class EvidenceCollector {
   RunEvidence evidence_;
 };
 
+/// What has become of the means of the pressures.
+struct BarometerCounts {
+  std::uint64_t used = 0;               ///< means that went into the window
+  std::uint64_t steps = 0;              ///< after which the bias was estimated again
+  Counts rejected;                      ///< means by reason
+  std::optional<BarometerAnswer> last;  ///< used or not
+  double bias = 0.0, bias_sigma = 0.0;  ///< [m] of the last one used
+  double innovation_square = 0.0;       ///< [m^2] sum over the used ones without those of a step
+
+  void add(const ScanResult& result);
+};
+
+/// What has become of the terms of a ground vehicle.
+struct GroundVehicleCounts {
+  std::uint64_t used = 0;
+  std::uint64_t left_out = 0;             ///< they contradicted the estimate
+  std::optional<double> contradicted_at;  ///< [s] after the first scan judged
+  std::optional<Time> first_judged;
+  std::optional<GroundVehicleAnswer> last;
+
+  void add(const ScanResult& result);
+};
+
+/// The warning for a person whose platform is no ground vehicle.
+constexpr const char* kGroundVehicleContradicted =
+    "the motion contradicted platform: ground_vehicle, and the constraint is switched off until a reset: the "
+    "platform moves sideways or upwards. Is it a ground vehicle, and does vehicle_frame_rotation_xyzw say "
+    "which way it drives?";
+
 }  // namespace rio_t

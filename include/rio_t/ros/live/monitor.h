@@ -81,19 +81,17 @@ class LiveMonitor {
     bool isSilent() { return std::exchange(told, count) == count; }
   };
 
-  struct Barometer {
+  struct Barometer : BarometerCounts {
     Counter messages;
     Clock::time_point told = Clock::now();
-    std::uint64_t not_usable = 0, used = 0, used_told = 0, steps = 0;
-    std::string why_not_usable;                          ///< of the last one
-    std::map<std::string, std::uint64_t> rejected = {};  ///< means
-    std::optional<BarometerAnswer> last = {};
+    std::uint64_t not_usable = 0, used_told = 0;
+    std::string why_not_usable;  ///< of the last one
   };
-  struct GroundVehicle {
-    std::uint64_t used = 0, left_out = 0;
-    std::optional<GroundVehicleAnswer> last = {};
-  };
-  void accountAids(const ScanResult& result);  ///< call with mutex_ held
+  using GroundVehicle = GroundVehicleCounts;
+  void accountAids(const ScanResult& result) {  ///< call with mutex_ held
+    barometer_.add(result);
+    vehicle_.add(result);
+  }
 
   /// What has become of the scans of a radar.
   struct Account {
@@ -118,8 +116,6 @@ class LiveMonitor {
     std::string text;
   };
 
-  /// "" or "left/", for keys.
-  static std::string prefix(const Radar& radar);
   /// "the radar" or "radar left", for texts.
   static std::string called(const Radar& radar);
   /// Adds what the input has of this radar, and returns what is wrong with it.
@@ -156,13 +152,6 @@ class LiveMonitor {
   std::optional<Time> last_used_;                // stamp of the last scan used
   std::optional<NavigationState> newest_state_;  // at the newest IMU sample
 };
-
-/// The warning for a person whose platform is no ground vehicle.
-constexpr const char* kGroundVehicleContradicted =
-    "the motion contradicts platform: ground_vehicle, which was switched off until ~reset: the platform "
-    "moves "
-    "sideways or upwards. Is it a ground vehicle, and does vehicle_frame_rotation_xyzw say which way it "
-    "drives?";
 
 /// The warning for a person whose computer is too slow.
 constexpr const char* kSolverFallsBehind =

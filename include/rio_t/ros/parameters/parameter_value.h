@@ -24,6 +24,8 @@ struct ParameterValue {
   std::string yaml() const;
 };
 
+ParameterValue listOf(const std::vector<double>& numbers);
+
 /// What plain (unquoted) YAML text stands for: truth value, integer, number, nothing, else text.
 ParameterValue parsePlainScalar(const std::string& text);
 

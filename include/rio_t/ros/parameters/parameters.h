@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -125,9 +126,11 @@ struct Config {
 /// that of RadarScan::radar.
 std::vector<Config> configsOfRadars(const Config& config);
 
+/// The configuration with each topic as `resolve` gives it. An empty one stays empty.
+Config withTopics(Config config, const std::function<std::string(const std::string&)>& resolve);
 /// The configuration with the topics as a node without a namespace has them, and as a bag holds them: a
-/// relative topic begins with `/`. An empty one stays empty.
-Config withAbsoluteTopics(Config config);
+/// relative topic begins with `/`.
+Config withAbsoluteTopics(const Config& config);
 
 /// The name of a frame for tf2, which refuses the leading slash that tf1 had.
 std::string withoutSlash(const std::string& frame);

@@ -1,0 +1,79 @@
+#include "check_proposal.h"
+
+#include <algorithm>
+#include <boost/algorithm/string.hpp>
+#include <cctype>
+#include <set>
+#include <string>
+
+#include "../text.h"
+
+namespace rio_t {
+namespace {
+
+/// The part of each topic that differs: "/radar_a/scan", "/radar_b/scan" give "a", "b".
+std::vector<std::string> radarNames(const std::vector<RadarInspection>& radars) {
+  std::vector<std::vector<std::string>> words;
+  for (const RadarInspection& radar : radars) {
+    std::string topic = boost::algorithm::to_lower_copy(radar.topic);
+    for (char& c : topic) {
+      if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = ' ';
+    }
+    words.emplace_back();
+    boost::algorithm::split(words.back(), topic, boost::algorithm::is_any_of(" "),
+                            boost::algorithm::token_compress_on);
+  }
+  std::set<std::string> keys = {"radars"};
+  for (const ParameterDescription& about : parameterDescriptions()) keys.insert(about.key);
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k < radars.size(); ++k) {
+    std::string name;
+    for (const std::string& word : words[k]) {
+      const bool shared = std::all_of(words.begin(), words.end(), [&](const std::vector<std::string>& other) {
+        return std::find(other.begin(), other.end(), word) != other.end();
+      });
+      if (!shared && !word.empty()) appendItem(&name, word, "_");
+    }
+    // A name that YAML takes for a number or a truth value is none.
+    const bool is_text = !name.empty() && std::isalpha(static_cast<unsigned char>(name.front())) != 0;
+    const bool taken = std::find(names.begin(), names.end(), name) != names.end() || keys.count(name) != 0;
+    static const std::set<std::string> words_of_yaml = {"y",   "n",    "yes",   "no",  "on",
+                                                        "off", "true", "false", "null"};
+    if (!is_text || taken || words_of_yaml.count(name) != 0) name = "radar" + std::to_string(k + 1);
+    names.push_back(name);
+  }
+  return names;
+}
+
+}  // namespace
+
+ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarInspection>& radars) {
+  ProposedConfig config;
+  config.top_level.add(imu.keys);
+  double worst = 0.0;
+  bool all_observed = true;
+  for (const RadarInspection& radar : radars) {
+    const Eigen::Vector3d& sigma = radar.search.rotation_sigma;
+    if (!radar.search.enough || sigma.maxCoeff() > kObservedTurn || radar.isSparse()) all_observed = false;
+    worst = std::max(worst, sigma.maxCoeff());
+  }
+  config.top_level.set("estimate_extrinsics", "rotation",
+                       "The mounting below is coarse. The estimate starts there and refines it.");
+  constexpr double kLeast = 0.05, kSafety = 3.0;  // [rad]
+  if (all_observed && kSafety * worst < SmootherOptions().extrinsics_rotation_sigma)
+    config.top_level.set("extrinsics_rotation_sigma",
+                         ParameterValue{rounded(std::max(kLeast, kSafety * worst), 100.0)},
+                         "Standard deviation of the mounting below [rad], with a margin.");
+  if (radars.size() == 1) {
+    config.top_level.add(radars.front().keys);
+    return config;
+  }
+  const std::vector<std::string> names = radarNames(radars);
+  ParameterValue::List list;
+  for (const std::string& name : names) list.push_back({name});
+  config.top_level.set("radars", ParameterValue{list});
+  for (std::size_t k = 0; k < radars.size(); ++k) config.radars.emplace_back(names[k], radars[k].keys);
+  return config;
+}
+
+}  // namespace rio_t

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <vector>
+
+#include "inspect_keys.h"
+#include "inspect_radar.h"
+
+namespace rio_t {
+
+/// The configuration for an IMU and radars as they were found.
+ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarInspection>& radars);
+
+}  // namespace rio_t

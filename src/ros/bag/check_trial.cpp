@@ -1,0 +1,142 @@
+#include "check_trial.h"
+
+#include <algorithm>
+#include <exception>
+
+#include "../text.h"
+#include "rio_t/ros/bag/bag_runner.h"
+
+namespace rio_t {
+namespace {
+
+struct Trial {
+  std::string failure;  ///< why it did not run; empty: it ran
+  RunSummary summary;
+  std::uint64_t copies = 0;  ///< clouds that were recorded twice: they say nothing about the configuration
+
+  /// Copies do not count.
+  double shareUsed() const {
+    const std::uint64_t duplicates = countOf(summary.scansRejected(), "duplicate_stamp");
+    const std::uint64_t judged = summary.scansTotal() - std::min(copies, duplicates);
+    return static_cast<double>(summary.scansUsed()) / static_cast<double>(std::max<std::uint64_t>(1, judged));
+  }
+  bool good() const {
+    return failure.empty() && summary.divergences == 0 && summary.health_at_end == toString(Health::kOk) &&
+           summary.diagnosis.verdict != RunVerdict::kBad && shareUsed() > 0.5;
+  }
+  /// Larger is better; a good one is better than all others.
+  double score() const {
+    if (!failure.empty()) return -1e9;
+    return shareUsed() - static_cast<double>(summary.divergences) - (good() ? 0.0 : 1.0);
+  }
+};
+
+Trial tryOut(const Recording& recording, const std::string& yaml, double duration) {
+  Trial trial;
+  for (const CloudTopic& cloud : recording.clouds) trial.copies += cloud.copies;
+  try {
+    BagRun run;
+    run.bags = {recording.bag};
+    run.config = readBack(yaml);
+    run.config.bag_duration = duration;
+    trial.summary = runBag(run);
+  } catch (const std::exception& error) {
+    trial.failure = error.what();
+  }
+  return trial;
+}
+
+struct Attempt {
+  const char* key;
+  const char* value;
+  const char* why;
+};
+/// The configurations that are tried one after the other if the odometry does not run well.
+constexpr Attempt kAttempts[] = {
+    {nullptr, nullptr, nullptr},
+    {"estimate_extrinsics", "pose", "With a fixed lever arm the odometry diverged."},
+};
+
+std::string shareText(const Trial& trial) {
+  return fixedText(100.0 * trial.shareUsed(), 0) + " % of the scans used";
+}
+
+std::string offsetsText(const RunSummary& summary) {
+  std::string text;
+  for (const RadarSummary& radar : summary.radars) {
+    text += (text.empty() ? "offset " : "; ") + (radar.name.empty() ? "" : radar.name + " ") +
+            fixedText(1e3 * radar.final_offset_s, 1) + " +- " +
+            fixedText(1e3 * radar.final_offset_sigma_s, 1) + " ms";
+  }
+  return text;
+}
+
+void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
+  if (!trial.failure.empty()) {
+    check->findings.push_back({FindingLevel::kMissing, "trial run", trial.failure});
+    check->to_do = "See the lines marked odd; then record again, at rest for 3 s and then in motion.";
+    return;
+  }
+  const RunSummary& s = trial.summary;
+  const std::string numbers =
+      shareText(trial) + ", " + fixedText(s.path_length_m, 1) + " m, " + offsetsText(s);
+  if (trial.good()) {
+    check->findings.push_back({note.empty() ? FindingLevel::kOk : FindingLevel::kOdd, "trial run",
+                               "no divergence, " + numbers + note});
+    return;
+  }
+  check->findings.push_back(
+      {FindingLevel::kMissing, "trial run",
+       "divergences: " + std::to_string(s.divergences) + ", at the end " + s.health_at_end + "; " + numbers});
+  std::string why = "the run is " + toString(s.diagnosis.verdict);
+  if (!s.diagnosis.causes.empty()) {
+    const Cause& cause = s.diagnosis.causes.front();
+    why += ": " + cause.text + " " + cause.remedy;
+  }
+  check->findings.push_back({FindingLevel::kOdd, "trial run", why});
+  check->to_do =
+      "The odometry does not run well with what the bag shows. Measure the mounting, set "
+      "mounting_yaw_pitch_roll_deg and extrinsics_translation, and see docs/your_sensors.md.";
+}
+
+}  // namespace
+
+void chooseByTrial(const Recording& recording, const std::string& header, const ProposedConfig& config,
+                   BagCheck* check) {
+  const double duration = recording.read < recording.length ? recording.read : 0.0;
+  Trial best;
+  best.failure = "not tried";
+  std::string note;
+  for (const Attempt& attempt : kAttempts) {
+    ProposedConfig changed = config;
+    if (attempt.key != nullptr) changed.top_level.set(attempt.key, attempt.value, attempt.why);
+    const std::string yaml = toYaml(changed, header);
+    const Trial trial = tryOut(recording, yaml, duration);
+    if (check->yaml.empty() || trial.score() > best.score()) {
+      best = trial;
+      check->yaml = yaml;
+      note = attempt.key == nullptr ? ""
+                                    : std::string(" (with ") + attempt.key + ": " + attempt.value +
+                                          "; without it, it does not run as well)";
+    }
+    if (trial.good()) break;
+  }
+  // One radar alone may do.
+  for (const auto& [name, keys] : config.radars) {
+    if (best.good()) break;
+    ProposedConfig alone{config.top_level, {}};
+    alone.top_level.remove("radars");
+    alone.top_level.add(keys);
+    const std::string yaml = toYaml(alone, header);
+    const Trial trial = tryOut(recording, yaml, duration);
+    if (trial.score() <= best.score()) continue;
+    best = trial;
+    check->yaml = yaml;
+    note = " (with the radar " + name + " alone; together the odometry does not run as well)";
+  }
+  tellTrial(best, note, check);
+  if (!best.good()) check->quality -= 1e3;
+  if (!best.failure.empty()) check->yaml.clear();
+}
+
+}  // namespace rio_t

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <string>
+
+#include "inspect_keys.h"
+#include "inspect_recording.h"
+#include "rio_t/ros/bag/check_bag.h"
+
+namespace rio_t {
+
+/// Runs the odometry on the bag and gives `check` the configuration with which it runs best: `config`, or one
+/// near it. `header`: lines for the beginning of the file.
+void chooseByTrial(const Recording& recording, const std::string& header, const ProposedConfig& config,
+                   BagCheck* check);
+
+}  // namespace rio_t

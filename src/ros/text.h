@@ -1,0 +1,24 @@
+#pragma once
+
+#include <string>
+
+/// Texts for people and files.
+namespace rio_t {
+
+/// Appends `value` with that many decimals (at most 12), with a point whatever the locale; "nan", "inf".
+void appendFixed(std::string* text, double value, int decimals);
+/// The same as a text of its own, without the sign of a minus zero.
+std::string fixedText(double value, int decimals);
+
+/// Appends an item to a list in a text: "a, b".
+void appendItem(std::string* list, const std::string& item, const std::string& separator = ", ");
+
+/// Broken into lines of `width`; all but the first begin with `indent`, and the first has room for it.
+std::string wrapped(const std::string& text, const std::string& indent, std::size_t width);
+
+/// What the keys of a radar begin with: "left/"; empty if there is but one radar.
+std::string prefixOf(const std::string& radar);
+/// What the names of its files end in: "_left"; likewise.
+std::string suffixOf(const std::string& radar);
+
+}  // namespace rio_t
