@@ -5,6 +5,7 @@
 #include <cmath>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace rio_t {
@@ -53,6 +54,15 @@ TEST(RosParameters, AListOfTheCommandLineArrivesAsText) {
   } catch (const ConfigError& error) {
     EXPECT_NE(std::string(error.what()).find("got \"[0,0\""), std::string::npos) << error.what();
   }
+}
+
+TEST(RosParameters, TheServerReplacesTheMountingOfTheFileInEitherWay) {
+  std::istringstream yaml("extrinsics_rotation_xyzw: [0, 0, 0, 1]\n");
+  ParameterEntries entries = readParameters(yaml, "my.yaml");
+  XmlRpc::XmlRpcValue map;
+  for (int k = 0; k < 3; ++k) map["mounting_yaw_pitch_roll_deg"][k] = 60 * k;
+  for (ParameterEntry& entry : toParameterEntries(map, "/rio_t")) entries.push_back(std::move(entry));
+  EXPECT_NEAR(mountingOf(makeConfig(entries).odometry.T_IR.q_IR).roll, 2.0 / 3.0 * M_PI, 1e-9);
 }
 
 TEST(RosParameters, FaultsNameTheParameterWithItsNamespace) {

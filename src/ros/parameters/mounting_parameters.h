@@ -5,8 +5,8 @@
 
 #include "rio_t/ros/parameters/parameters.h"
 
-/// The rotation of T_IR can be given in three ways: as a quaternion of RIO's axes, as one of the cloud's axes,
-/// or in words. One way counts.
+/// The rotation of T_IR can be given in three ways: as a quaternion of RIO's axes, as one of the cloud's
+/// axes, or in words. One way counts.
 namespace rio_t {
 
 /// Call it before the entries of a level are set: the top level, or the section of a radar (`section`:

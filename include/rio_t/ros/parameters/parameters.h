@@ -147,7 +147,8 @@ class ConfigError : public std::runtime_error {
   std::vector<std::string> faults_;
 };
 
-/// Defaults with the entries on top; where a key comes twice, the later holds. A radar of `radars` has what
+/// Defaults with the entries on top. If a key comes twice, the later holds. If two sources give the mounting,
+/// one as a quaternion and one in words, the later source holds, too. A radar of `radars` has what
 /// its section (nested keys, or `name/key`) sets, and what the top level sets for the rest. Throws
 /// ConfigError naming every unknown key, wrong type, value out of range and contradiction, each with its
 /// origin and what was expected.
