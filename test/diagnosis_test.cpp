@@ -214,6 +214,15 @@ TEST(Diagnosis, ADivergenceIsBadIfItLastsAndDoubtfulIfNot) {
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kBad);
 }
 
+TEST(Diagnosis, AContradictionNamesCheckBagAndAMountingThatIsNotGiven) {
+  const RunEvidence evidence = withRejected("innovation");
+  expectSays(first(evidence), {"contradicts_imu", "order x, y, z, w", "rosrun rio_t check_bag BAG"});
+  const Config config = makeConfig({});
+  expectSays(first(evidence, config), {"no_mounting", "look along y of the IMU", "check_bag"});
+  EXPECT_EQ(diagnose(evidence, config).causes.at(1).name, "contradicts_imu");
+  EXPECT_TRUE(diagnose(goodRun(), config).causes.empty());
+}
+
 TEST(Diagnosis, ADivergenceAfterTheLastScanIsNoContradictionOfTheRadar) {
   RunEvidence evidence = goodRun();
   evidence.faults["diverged"] = 1;

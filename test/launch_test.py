@@ -78,16 +78,38 @@ def test_config_is_a_name_or_a_path_from_where_the_user_stands(tmp_path):
     (tmp_path / "sub").mkdir()
     own = tmp_path / "sub" / "own.yaml"
     own.write_text("gravity: 9.8\n")
-    assert launch_config.config_path("irs", tmp_path) == "irs"
-    assert launch_config.config_path("sub/own.yaml", tmp_path) == str(own)
-    assert launch_config.config_path("own.yaml", tmp_path / "sub") == str(own)
-    assert launch_config.config_path(str(own), "/") == str(own)
-    assert launch_config.config_path("sub", tmp_path) == "sub"  # a folder is no configuration
+
+    def path_of(name, folder):
+        return launch_config.config_path(name, folder, SOURCE / "config")
+
+    assert path_of("irs", tmp_path) == "irs"
+    assert path_of("irs.yaml", tmp_path) == "irs.yaml"
+    assert path_of("sub/own.yaml", tmp_path) == str(own)
+    assert path_of("own.yaml", tmp_path / "sub") == str(own)
+    assert path_of(str(own), "/") == str(own)
+    (tmp_path / "irs").mkdir()
+    assert path_of("irs", tmp_path) == "irs"  # a folder is no configuration
     with pytest.raises(RioTError, match="none.yaml"):
-        launch_config.config_path("sub/none.yaml", tmp_path)
+        path_of("sub/none.yaml", tmp_path)
+    with pytest.raises(RioTError, match="config:=isr: .*, irs, "):
+        path_of("isr", tmp_path)
     assert parameters("rio_t", "irs.launch", "config:=sub/own.yaml", folder=tmp_path) == {"/rio_t/config": str(own)}
     assert parameters("rio_t", "bag.launch", "bag:=b", "output_dir:=o", "config:=sub/own.yaml",
                       folder=tmp_path) == {"/rio_t_bag/config": str(own)}
+
+
+@pytest.mark.parametrize("words", [("irs.launch",), ("bag.launch", "bag:=b", "output_dir:=o")])
+def test_a_configuration_that_is_not_there_is_refused(words):
+    done = roslaunch("--nodes", "rio_t", *words, "config:=isr")
+    assert "rio_t: config:=isr: there is no file" in done.stderr
+    assert "/rio_t" not in done.stdout
+
+
+@pytest.mark.parametrize("name", (*SENSORS, "rio_t", "bag"))
+def test_an_argument_without_a_default_says_that_it_is_optional(name):
+    """roslaunch --ros-args lists them among those that are required."""
+    for attributes in arguments(name).values():
+        assert (attributes.get("default") == "") == attributes["doc"].startswith("Optional. "), attributes
 
 
 def test_a_bag_that_is_not_there_is_refused(tmp_path):

@@ -77,6 +77,57 @@ TEST(MountingParameters, BothWaysAtOnceAreAFaultThatNamesBoth) {
   EXPECT_EQ(faultOf({"mounting_yaw_pitch_roll_deg=[]", "extrinsics_rotation_xyzw=[0, 0, 0, 1]"}), "");
 }
 
+/// As a file with these lines, and the assignments on top.
+Config fromFile(const std::string& lines, const std::vector<std::string>& assignments) {
+  std::istringstream yaml(lines);
+  ParameterEntries entries = readParameters(yaml, "my.yaml");
+  for (const std::string& each : assignments) entries.push_back(parseAssignment(each));
+  return makeConfig(entries);
+}
+
+double rollOf(const Config& config) {
+  return mountingOf(configsOfRadars(config).front().odometry.T_IR.q_IR).roll * 57.2957795;
+}
+
+TEST(MountingParameters, TheCommandLineReplacesTheMountingOfTheFileInEitherWay) {
+  const std::string quaternion = "imu_topic: imu\nextrinsics_rotation_xyzw: [0.0, 0.0, 0.0, 1.0]\n";
+  EXPECT_NEAR(rollOf(fromFile(quaternion, {"mounting_yaw_pitch_roll_deg=[0, 0, 180]"})), 180.0, 1e-6);
+  EXPECT_EQ(fromFile(quaternion, {"mounting_yaw_pitch_roll_deg=[]"}).odometry.T_IR.q_IR.w(), 1.0);
+  const std::string words = "mounting_yaw_pitch_roll_deg: [0, 0, 180]\n";
+  EXPECT_EQ(fromFile(words, {"extrinsics_rotation_xyzw=[0, 0, 0, 1]"}).odometry.T_IR.q_IR.w(), 1.0);
+  EXPECT_THROW(fromFile(quaternion + words, {}), ConfigError);
+}
+
+TEST(MountingParameters, TheCommandLineReplacesTheMountingOfASectionInEitherWay) {
+  const std::string quaternion =
+      "radars: [left]\nleft:\n  radar_topic: left\n  extrinsics_rotation_xyzw: [0, 0, 0, 1]\n";
+  EXPECT_NEAR(rollOf(fromFile(quaternion, {"left/mounting_yaw_pitch_roll_deg=[0, 0, 180]"})), 180.0, 1e-6);
+  const std::string words =
+      "radars: [left]\nleft:\n  radar_topic: left\n  mounting_yaw_pitch_roll_deg: [0, 0, 180]\n";
+  const Config config = fromFile(words, {"left/extrinsics_rotation_xyzw=[0, 0, 0, 1]"});
+  EXPECT_EQ(config.odometry.radars.front().T_IR.q_IR.w(), 1.0);
+}
+
+TEST(MountingParameters, AMountingThatNoSourceGivesIsAWarning) {
+  const auto warnings = [](const std::vector<std::string>& assignments) {
+    return mountingWarnings(from(assignments));
+  };
+  ASSERT_EQ(warnings({"imu_topic=imu", "extrinsics_translation=[1, 0, 0]"}).size(), 1u);
+  EXPECT_EQ(warnings({}).front(),
+            "The configuration gives no mounting: the radar is taken to look along y of the IMU. Set "
+            "mounting_yaw_pitch_roll_deg or extrinsics_rotation_xyzw.");
+  EXPECT_EQ(warnings({"mounting_yaw_pitch_roll_deg=[]"}).size(), 1u);
+  EXPECT_TRUE(warnings({"extrinsics_rotation_xyzw=[0, 0, 0, 1]"}).empty()) << "the identity is meant";
+  EXPECT_TRUE(warnings({"mounting_yaw_pitch_roll_deg=[90, 0, 0]"}).empty());
+  EXPECT_TRUE(warnings({"extrinsics_axes=cloud"}).empty());
+  EXPECT_TRUE(warnings({"extrinsics_source=tf"}).empty());
+  const std::vector<std::string> of_left =
+      warnings({"radars=[left, right]", "left/radar_topic=left", "right/radar_topic=right",
+                "right/mounting_yaw_pitch_roll_deg=[-30, 0, 0]"});
+  ASSERT_EQ(of_left.size(), 1u);
+  EXPECT_NE(of_left.front().find("left/mounting_yaw_pitch_roll_deg"), std::string::npos) << of_left.front();
+}
+
 TEST(MountingParameters, EachRadarHasItsOwn) {
   const Config config =
       from({"radars=[left, right, rear]", "mounting_yaw_pitch_roll_deg=[30, 0, 0]", "left/radar_topic=/left",

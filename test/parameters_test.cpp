@@ -175,6 +175,8 @@ TEST(Parameters, RotationsMustBeUnitAndAreNormalised) {
 TEST(Parameters, UnknownKeysAreErrorsWithTheNearestKey) {
   EXPECT_TRUE(contains(faultOf("widnow=1.0"), "unknown parameter \"widnow\"; did you mean \"window\"?"));
   EXPECT_TRUE(contains(faultOf("estimate_timeoffset=true"), "did you mean \"estimate_time_offset\"?"));
+  EXPECT_EQ(faultOf("velodyne_ip=1"),
+            "--set: unknown parameter \"velodyne_ip\" (config/estimator.yaml lists all)");
 }
 
 TEST(Parameters, ContradictionsAreRefused) {

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace rio_t {
@@ -30,6 +32,37 @@ TEST(RosParameters, EveryTypeReachesTheConfiguration) {
   EXPECT_EQ(config.odometry.gravity, 9.805);
   EXPECT_EQ(config.imu_topic, "/my/imu");
   EXPECT_EQ(config.odometry.T_IR.l_I, Eigen::Vector3d(0.0, 0.5, 1.0));
+}
+
+TEST(RosParameters, AListOfTheCommandLineArrivesAsText) {
+  XmlRpc::XmlRpcValue map = serverMap();  // rosrun rio_t rio_t_node _key:=[0,0,180]
+  map["mounting_yaw_pitch_roll_deg"] = std::string("[0,0,180]");
+  map["radars"] = std::string("[left]");
+  map["left"]["radar_topic"] = std::string("/left");
+  map["left"]["extrinsics_translation"] = std::string("[1, 2.5, 3e-1]");
+  map["trajectory_file"] = std::string("[1].txt");  // a text stays one
+  const Config config = makeConfig(toParameterEntries(map, "/rio_t"));
+  EXPECT_NEAR(std::abs(mountingOf(config.radars.front().odometry.T_IR.q_IR).roll), M_PI, 1e-9);
+  EXPECT_EQ(config.radars.front().odometry.T_IR.l_I, Eigen::Vector3d(1.0, 2.5, 0.3));
+  EXPECT_EQ(config.trajectory_file, "[1].txt");
+
+  XmlRpc::XmlRpcValue broken;
+  broken["mounting_yaw_pitch_roll_deg"] = std::string("[0,0");
+  try {
+    makeConfig(toParameterEntries(broken, "/rio_t"));
+    FAIL();
+  } catch (const ConfigError& error) {
+    EXPECT_NE(std::string(error.what()).find("got \"[0,0\""), std::string::npos) << error.what();
+  }
+}
+
+TEST(RosParameters, TheServerReplacesTheMountingOfTheFileInEitherWay) {
+  std::istringstream yaml("extrinsics_rotation_xyzw: [0, 0, 0, 1]\n");
+  ParameterEntries entries = readParameters(yaml, "my.yaml");
+  XmlRpc::XmlRpcValue map;
+  for (int k = 0; k < 3; ++k) map["mounting_yaw_pitch_roll_deg"][k] = 60 * k;
+  for (ParameterEntry& entry : toParameterEntries(map, "/rio_t")) entries.push_back(std::move(entry));
+  EXPECT_NEAR(mountingOf(makeConfig(entries).odometry.T_IR.q_IR).roll, 2.0 / 3.0 * M_PI, 1e-9);
 }
 
 TEST(RosParameters, FaultsNameTheParameterWithItsNamespace) {

@@ -2,7 +2,8 @@
 
 Prints the configuration that the argument `config` names, and refuses arguments that the launch file does not have:
 roslaunch itself takes every NAME:=VALUE on its command line, and a misspelt one would change nothing without a word.
-It also refuses a bag that is not there: its player would end, and the node would wait for it for ever."""
+It also refuses a configuration that is not there, since the node would end and roslaunch would go on, and a bag that is
+not there, since its player would end and the node would wait for it for ever."""
 import argparse
 import difflib
 import os
@@ -13,13 +14,16 @@ import xml.etree.ElementTree as ElementTree
 from .errors import RioTError
 
 
-def config_path(name, folder):
+def config_path(name, folder, package_configs):
     """What the node shall read: an absolute path for a file, counted from `folder`; a name of the package's as it is."""
     path = pathlib.Path(folder, os.path.expanduser(name))
     if path.is_file():
         return str(path.resolve())
     if "/" in name:
         raise RioTError(f"config:={name}: there is no file {path}")
+    if not any((package_configs / (name + extension)).is_file() for extension in ("", ".yaml")):
+        names = ", ".join(sorted(file.stem for file in package_configs.glob("*.yaml")))
+        raise RioTError(f"config:={name}: there is no file {path}, and the package has {names}")
     return name
 
 
@@ -60,7 +64,7 @@ def main(arguments):
         check_arguments(words_of(os.getppid()), options.launch_folder)
         if options.bag and not pathlib.Path(options.bag).is_file():
             raise RioTError(f"bag {options.bag}: no such file")
-        print(config_path(options.config, os.getcwd()), end="")
+        print(config_path(options.config, os.getcwd(), options.launch_folder.parent / "config"), end="")
     except RioTError as error:
         print(f"rio_t: {error}", file=sys.stderr)
         return 1

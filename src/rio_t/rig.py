@@ -111,6 +111,8 @@ def main(arguments):
     parser.add_argument("--programs", type=pathlib.Path, metavar="FOLDER", help="folder that holds rio_t_bag")
     given = parser.parse_args(arguments)
     try:
+        if not given.out.parent.is_dir():
+            raise RioTError(f"--out {given.out}: there is no folder {given.out.parent}")
         folder = programs.find(["rio_t_bag"], "--programs", given.programs)
         draw(radars_of(read_config(folder, given.config)), given.out)
     except (RioTError, OSError, ValueError, KeyError) as error:

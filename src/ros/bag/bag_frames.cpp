@@ -82,8 +82,11 @@ Config withExtrinsicsOfBag(Config config, const Bags& bags) {
       if (is_new) T_IR = lookUp(tf, radars, imu_frame, cloud_frames, &missing);
     }
   }
-  if (!missing.empty())
-    throw bagError(bags.name(), missing + "; the bag's tf has: " + tf.allFramesAsString());
+  if (!missing.empty()) {
+    const std::string frames = tf.allFramesAsString();
+    throw bagError(bags.name(),
+                   missing + (frames.empty() ? "; the bag has no tf" : "; the bag's tf has: " + frames));
+  }
   config.odometry.T_IR = T_IR.front();
   for (std::size_t k = 0; k < config.radars.size(); ++k)
     config.radars[k].odometry.T_IR = config.odometry.radars[k].T_IR = T_IR[k];

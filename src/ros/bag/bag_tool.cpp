@@ -49,6 +49,8 @@ void addOptions(OptionSet& options, Arguments& a) {
 }
 
 int play(const Arguments& arguments, const Config& config, std::ostream& out, std::ostream& err) {
+  for (const std::string& warning : mountingWarnings(config))
+    err << "rio_t_bag: warning: " << warning << "\n";
   try {
     const RunSummary summary = runBag({arguments.bags, arguments.output_folder, config, progressBar()});
     for (const std::string& warning : summary.warnings) err << "rio_t_bag: warning: " << warning << "\n";

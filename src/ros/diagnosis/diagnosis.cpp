@@ -26,6 +26,8 @@ constexpr const char* kImuFaults[] = {"imu_not_usable", "imu_saturated",  "imu_g
 /// Scans before anything is said: two seconds at ten a second.
 constexpr std::uint64_t kEnoughScans = 20;
 constexpr std::size_t kMostCauses = 3;
+/// The remedy for a wrong mounting, sign or axes.
+constexpr const char* kCheckBag = " Run `rosrun rio_t check_bag BAG`: it finds all three.";
 
 double shareOf(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
@@ -209,8 +211,9 @@ class RadarCauses {
     if (share < kManyScans) return;
     cause("contradicts_imu", share,
           outOf(contradicted, judged, "scans") + of_ + " show a velocity that contradicts the IMU.",
-          "Check the mounting (" + key_ + "extrinsics_rotation_xyzw), " + key_ + "radar_doppler_sign and " +
-              key_ + "radar_axes; estimate_extrinsics: rotation corrects up to 10 degrees by itself.");
+          "Check the mounting (" + key_ + "extrinsics_rotation_xyzw, order x, y, z, w), " + key_ +
+              "radar_doppler_sign and " + key_ + "radar_axes." + kCheckBag +
+              " estimate_extrinsics: rotation corrects up to 10 degrees by itself.");
   }
 
   const RadarEvidence& radar_;
@@ -228,8 +231,9 @@ void addStart(const RunEvidence& evidence, const Config& config, std::vector<Cau
   // The start in motion names gravity and mounting, the start at rest what moves.
   if (has(waiting, "radar and IMU that agree")) {
     causes->push_back({"start_contradicts", text,
-                       "Check radar_doppler_sign, radar_axes, extrinsics_rotation_xyzw, "
-                       "imu_acceleration_unit and imu_rate_unit.",
+                       "Check radar_doppler_sign, radar_axes, extrinsics_rotation_xyzw (order x, y, z, w), "
+                       "imu_acceleration_unit and imu_rate_unit. Run `rosrun rio_t check_bag BAG`: it finds "
+                       "them all.",
                        0.9});
   } else if (has(waiting, "not in m/s^2?")) {
     causes->push_back({"imu_units", text,
@@ -348,9 +352,25 @@ void addDivergence(const RunEvidence& evidence, std::vector<Cause>* causes) {
                      "The estimate diverged " + std::to_string(divergences) + " times, for " +
                          outOf(evidence.scans_diverged, evidence.scans_judged, "scans") +
                          ": radar and IMU contradict each other.",
-                     "Check the mounting, radar_doppler_sign and radar_axes. If the estimate diverged only "
-                     "near large moving things, it is good again after them.",
+                     "Check the mounting (extrinsics_rotation_xyzw has the order x, y, z, w), "
+                     "radar_doppler_sign and radar_axes." +
+                         std::string(kCheckBag) +
+                         " If the estimate diverged only near large moving things, it is good again after "
+                         "them.",
                      std::max(0.05, share)});
+}
+
+/// A mounting that nobody set is the likeliest cause of a contradiction.
+void addMissingMounting(const Config& config, std::vector<Cause>* causes) {
+  double share = -1.0;
+  for (const Cause& cause : *causes)
+    if (cause.name == "contradicts_imu" || cause.name == "start_contradicts" || cause.name == "diverged")
+      share = std::max(share, cause.share);
+  if (share < 0.0) return;
+  std::vector<Cause> missing;
+  for (const std::string& warning : mountingWarnings(config))
+    missing.push_back({"no_mounting", warning, "`rosrun rio_t check_bag BAG` finds the mounting.", share});
+  causes->insert(causes->begin(), missing.begin(), missing.end());
 }
 
 std::vector<Check> checksOf(const RunEvidence& evidence) {
@@ -411,6 +431,7 @@ Diagnosis diagnose(const RunEvidence& evidence, const Config& config) {
   addRestarts(evidence, config, &result.causes);
   addSilence(evidence, &result.causes);
   addDivergence(evidence, &result.causes);
+  addMissingMounting(config, &result.causes);
   // Stable: of causes that explain the same, the one nearer to the sensor comes first.
   std::stable_sort(result.causes.begin(), result.causes.end(),
                    [](const Cause& a, const Cause& b) { return a.share > b.share; });

@@ -206,7 +206,9 @@ void listExtrinsics(ParameterList& list, Config& c) {
       "mounting_yaw_pitch_roll_deg", c.mounting,
       "These angles replace extrinsics_rotation_xyzw: yaw to the left, pitch up, roll right side down. They "
       "assume an IMU with x forward, y left, z up. [0, 0, 0] is an upright radar that looks forward. [] "
-      "means that extrinsics_rotation_xyzw is used. Give only one of the two.");
+      "means that extrinsics_rotation_xyzw is used. Give only one of the two in a file. --set and the "
+      "parameter "
+      "server replace either one of a file by either one.");
 }
 
 void listEstimateExtrinsics(ParameterList& list, Config& c) {

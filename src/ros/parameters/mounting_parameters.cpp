@@ -1,5 +1,7 @@
 #include "mounting_parameters.h"
 
+#include <algorithm>
+#include <cctype>
 #include <variant>
 
 namespace rio_t {
@@ -13,11 +15,23 @@ const ParameterEntry* lastOf(const ParameterEntries& entries, const std::string&
   return last;
 }
 
-/// `[]` stands for "not told".
-bool tells(const ParameterEntry* entry) {
+/// `[]` stands for "not given".
+bool isGiven(const ParameterEntry* entry) {
   if (entry == nullptr) return false;
   const auto* list = std::get_if<ParameterValue::List>(&entry->value.data);
   return list == nullptr || !list->empty();
+}
+
+/// The file, the command line, or the parameter server: the origin without line and key.
+std::string sourceOf(const ParameterEntry& entry) {
+  const std::string& origin = entry.origin;
+  const std::string of_server = "parameter ";
+  if (origin.rfind(of_server, 0) == 0) return of_server;
+  const std::size_t colon = origin.rfind(':');
+  if (colon == std::string::npos) return origin;
+  const bool is_line = std::all_of(origin.begin() + static_cast<std::ptrdiff_t>(colon) + 1, origin.end(),
+                                   [](unsigned char c) { return std::isdigit(c) != 0; });
+  return is_line ? origin.substr(0, colon) : origin;
 }
 
 }  // namespace
@@ -26,23 +40,46 @@ void beginMounting(const ParameterEntries& entries, const std::string& section, 
                    std::vector<std::string>* faults) {
   const ParameterEntry* quaternion = lastOf(entries, "extrinsics_rotation_xyzw");
   const ParameterEntry* angles = lastOf(entries, "mounting_yaw_pitch_roll_deg");
-  if (quaternion != nullptr && tells(angles)) {
+  const ParameterEntry* axes = lastOf(entries, "extrinsics_axes");
+  const bool is_given = quaternion != nullptr || axes != nullptr || isGiven(angles);
+  config->has_default_mounting = !is_given && (section.empty() || config->has_default_mounting);
+  if (quaternion == nullptr && angles == nullptr) return;
+  config->rotation_replaces_mounting = false;
+  if (quaternion == nullptr) return;
+  config->mounting.reset();  // that of the top level
+  if (!isGiven(angles)) return;
+  if (sourceOf(*quaternion) == sourceOf(*angles)) {
     faults->push_back(angles->origin + ": " + section + "mounting_yaw_pitch_roll_deg and " + section +
                       "extrinsics_rotation_xyzw (" + quaternion->origin +
                       "): expected only one of the two, since both set the same rotation");
   }
-  if (quaternion != nullptr) config->mounting.reset();
+  config->rotation_replaces_mounting = angles < quaternion;  // in the order of the entries
 }
 
 void resolveMounting(Config* config) {
   Eigen::Quaterniond& q_IR = config->odometry.T_IR.q_IR;
-  if (config->mounting) {
+  if (config->mounting && !config->rotation_replaces_mounting) {
     q_IR = rotationOf(*config->mounting);
   } else if (config->extrinsics_axes == ExtrinsicsAxes::kCloud) {
     q_IR = (q_IR * cloudFromRfu(pointCloudFormat(*config).axes)).normalized();
   }
   config->mounting.reset();
+  config->rotation_replaces_mounting = false;
   config->extrinsics_axes = ExtrinsicsAxes::kRightForwardUp;
+}
+
+std::vector<std::string> mountingWarnings(const Config& config) {
+  std::vector<std::string> warnings;
+  for (const Config& radar : configsOfRadars(config)) {
+    if (!radar.has_default_mounting || radar.extrinsics_source != ExtrinsicsSource::kParameters) continue;
+    const bool is_named = !radar.radar_name.empty();
+    const std::string key = is_named ? radar.radar_name + "/" : "";
+    warnings.push_back("The configuration gives no mounting: the radar " +
+                       (is_named ? radar.radar_name + " " : std::string()) +
+                       "is taken to look along y of the IMU. Set " + key + "mounting_yaw_pitch_roll_deg or " +
+                       key + "extrinsics_rotation_xyzw.");
+  }
+  return warnings;
 }
 
 }  // namespace rio_t

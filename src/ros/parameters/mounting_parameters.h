@@ -5,17 +5,18 @@
 
 #include "rio_t/ros/parameters/parameters.h"
 
-/// The rotation of T_IR can be told in three ways: as a quaternion of RIO's axes, as one of the cloud's axes,
-/// or in words. One way counts.
+/// The rotation of T_IR can be given in three ways: as a quaternion of RIO's axes, as one of the cloud's
+/// axes, or in words. One way counts.
 namespace rio_t {
 
 /// Call it before the entries of a level are set: the top level, or the section of a radar (`section`:
-/// "left/"). A mounting in a section replaces the mounting of the top level, whichever way each is given. Two
-/// ways in one level are a fault.
+/// "left/"). A mounting in a section replaces the mounting of the top level, whichever way each is given. In
+/// one level, the later source counts: --set and the parameter server replace what the file says. Two ways in
+/// one source are a fault.
 void beginMounting(const ParameterEntries& entries, const std::string& section, Config* config,
                    std::vector<std::string>* faults);
 
-/// Call it once all entries are set: what was told becomes odometry.T_IR.
+/// Call it once all entries are set: what was given becomes odometry.T_IR.
 void resolveMounting(Config* config);
 
 }  // namespace rio_t

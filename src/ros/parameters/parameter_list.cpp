@@ -144,7 +144,7 @@ void ParameterList::vector3(const std::string& key, const std::string& unit, Ran
 
 void ParameterList::rotation(const std::string& key, Eigen::Quaterniond& member, const std::string& text) {
   add(
-      {key, "list", "", "a list of 4 finite numbers x, y, z, w of norm 1 (to 0.001)", text},
+      {key, "list", "", "a list of 4 finite numbers of norm 1 to 0.001 (order x, y, z, w)", text},
       [&member](const ParameterValue& value) {
         const auto x = asNumbers(value, 4, Range{});
         if (!x) return false;

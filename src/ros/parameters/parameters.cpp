@@ -50,8 +50,10 @@ std::string unknownKey(const ParameterEntry& entry, const std::string& section, 
     nearest = &each;
     least = distance;
   }
-  return entry.origin + ": unknown parameter \"" + section + entry.key + "\"; did you mean \"" + section +
-         nearest->description.key + "\"? (config/estimator.yaml lists all)";
+  const bool is_near = least <= std::max<std::size_t>(2, looked_for.size() / 3);
+  return entry.origin + ": unknown parameter \"" + section + entry.key + "\"" +
+         (is_near ? "; did you mean \"" + section + nearest->description.key + "\"?" : std::string()) +
+         " (config/estimator.yaml lists all)";
 }
 
 /// Sets the parameter of that key; what is wrong goes into `faults`.

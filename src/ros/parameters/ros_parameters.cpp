@@ -1,10 +1,13 @@
 #include "rio_t/ros/parameters/ros_parameters.h"
 
+#include <ros/console.h>
 #include <ros/param.h>
 
+#include <algorithm>
 #include <limits>
 #include <set>
 #include <sstream>
+#include <stdexcept>
 
 namespace rio_t {
 namespace {
@@ -30,6 +33,25 @@ struct ToXmlRpc {
   }
   XmlRpc::XmlRpcValue operator()(const ParameterValue::Map& entries) const { return toXmlRpc(entries); }
 };
+
+bool isList(const std::string& key) {
+  const std::vector<ParameterDescription> all = parameterDescriptions();
+  return std::any_of(all.begin(), all.end(), [&](const ParameterDescription& about) {
+    return about.key == key && about.type == "list";
+  });
+}
+
+/// The value of that key. `rosrun rio_t rio_t_node _key:=[0,0,180]` makes a text of the list.
+ParameterValue toValueOf(const std::string& key, XmlRpc::XmlRpcValue& value) {
+  ParameterValue result = toParameterValue(value);
+  const auto* text = std::get_if<std::string>(&result.data);
+  if (text == nullptr || text->empty() || text->front() != '[' || !isList(key)) return result;
+  try {
+    return parseAssignment(key + "=" + *text).value;
+  } catch (const std::invalid_argument&) {
+    return result;  // not YAML: the fault of the key shows the text
+  }
+}
 
 }  // namespace
 
@@ -87,10 +109,10 @@ ParameterEntries toParameterEntries(XmlRpc::XmlRpcValue& map, const std::string&
     ParameterValue::Map section;
     if (value.getType() == XmlRpc::XmlRpcValue::TypeStruct) {
       for (auto& [inner, inner_value] : value)
-        section.push_back({inner, toParameterValue(inner_value), "parameter " + path + "/" + inner});
+        section.push_back({inner, toValueOf(inner, inner_value), "parameter " + path + "/" + inner});
     }
     entries.push_back(
-        {key, section.empty() ? toParameterValue(value) : ParameterValue{section}, "parameter " + path});
+        {key, section.empty() ? toValueOf(key, value) : ParameterValue{section}, "parameter " + path});
   }
   return entries;
 }
@@ -119,7 +141,10 @@ Config configFromRos(const ros::NodeHandle& private_node) {
     for (ParameterEntry& entry : toParameterEntries(map, name_space)) entries.push_back(std::move(entry));
   }
   try {
-    return makeConfig(entries);
+    Config config = makeConfig(entries);
+    for (const std::string& warning : mountingWarnings(config))
+      ROS_WARN_STREAM(name_space << ": " << warning);
+    return config;
   } catch (const ConfigError& error) {
     throw withHintOfServer(error, name_space);
   }

@@ -57,7 +57,7 @@ void listConsensus(ParameterList& list, EgoVelocityOptions& radar) {
       "bus.");
   list.integer(
       "ransac_seed", atLeast(0), radar.ransac_seed,
-      "This seeds the random draws anew at each scan, so that the same scan gives the same velocity. "
+      "Each scan restarts the random generator with this seed, so that the same scan gives the same velocity. "
       "Change it only to see how much the draws matter.");
   list.integer(
       "ego_velocity_min_inliers", atLeast(3), radar.min_inliers,

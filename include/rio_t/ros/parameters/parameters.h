@@ -102,10 +102,12 @@ struct Config {
   std::string trajectory_file = "rio_t_trajectory.txt";
 
   ExtrinsicsSource extrinsics_source = ExtrinsicsSource::kParameters;
-  // Two other ways to tell the rotation of T_IR. makeConfig turns them into odometry.T_IR, which always has
+  // Two other ways to give the rotation of T_IR. makeConfig turns them into odometry.T_IR, which always has
   // the axes of RIO, and sets them back to their defaults.
   std::optional<MountingAngles> mounting;
   ExtrinsicsAxes extrinsics_axes = ExtrinsicsAxes::kRightForwardUp;
+  bool rotation_replaces_mounting = false;  ///< the quaternion comes from a later source than `mounting`
+  bool has_default_mounting = false;        ///< makeConfig found no key that gives the rotation of T_IR
 
   ImuUnits imu_units;
 
@@ -148,11 +150,15 @@ class ConfigError : public std::runtime_error {
   std::vector<std::string> faults_;
 };
 
-/// Defaults with the entries on top; where a key comes twice, the later holds. A radar of `radars` has what
+/// Defaults with the entries on top. If a key comes twice, the later holds. If two sources give the mounting,
+/// one as a quaternion and one in words, the later source holds, too. A radar of `radars` has what
 /// its section (nested keys, or `name/key`) sets, and what the top level sets for the rest. Throws
 /// ConfigError naming every unknown key, wrong type, value out of range and contradiction, each with its
 /// origin and what was expected.
 Config makeConfig(const ParameterEntries& entries);
+
+/// A sentence for each radar whose mounting no source gives: the run starts, but it is probably not meant.
+std::vector<std::string> mountingWarnings(const Config& config);
 
 /// `config` with other values for keys that hold for all radars. Throws ConfigError, as makeConfig, and then
 /// nothing has changed.

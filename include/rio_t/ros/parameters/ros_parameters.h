@@ -18,7 +18,8 @@ XmlRpc::XmlRpcValue toXmlRpc(const ParameterEntries& entries);
 
 /// The entries of a map of the parameter server, `name_space` being where it was found. Keys that other
 /// libraries read from a node's private parameters (diagnostic_updater) are left out, and what
-/// showEffectiveParameters wrote.
+/// showEffectiveParameters wrote. A text such as "[0,0,180]" becomes a list if the key has one: `rosrun`
+/// passes lists as texts.
 ParameterEntries toParameterEntries(XmlRpc::XmlRpcValue& map, const std::string& name_space);
 
 /// The same faults. Those of parameters of the server say how to remove what an earlier run left there, since
