@@ -179,6 +179,16 @@ TEST(Parameters, UnknownKeysAreErrorsWithTheNearestKey) {
             "--set: unknown parameter \"velodyne_ip\" (config/estimator.yaml lists all)");
 }
 
+TEST(Parameters, ATabThatIndentsIsNamed) {
+  std::istringstream yaml("radars: [left]\nleft:\n\tradar_topic: left\n");
+  try {
+    readParameters(yaml, "my.yaml");
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_TRUE(contains(error.what(), "a tab cannot indent: use spaces")) << error.what();
+  }
+}
+
 TEST(Parameters, ContradictionsAreRefused) {
   EXPECT_TRUE(contains(faultsOf({"radar_min_range=10", "radar_max_range=5"}).at(0), "radar_min_range"));
   EXPECT_TRUE(contains(faultsOf({"time_offset_initial=-0.3"}).at(0), "max_time_offset"));

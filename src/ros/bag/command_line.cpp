@@ -39,6 +39,23 @@ OptionSet::Setter named(const std::string& name, const OptionSet::Setter& set) {
   };
 }
 
+/// `--outputdir`, `--output_dir`, `--out`: what is compared of a name that is not known.
+std::string withoutDashes(std::string name) {
+  const auto is_dash = [](char c) { return c == '-' || c == '_'; };
+  name.erase(std::remove_if(name.begin(), name.end(), is_dash), name.end());
+  return name;
+}
+
+/// "; did you mean --output-dir?", or nothing: an option that begins as the unknown one does.
+std::string guessOf(const std::string& unknown, const po::options_description& options) {
+  const std::string begin = withoutDashes(unknown.substr(0, unknown.find('=')));
+  if (begin.size() < 3) return "";
+  for (const auto& option : options.options())
+    if (withoutDashes(option->long_name()).rfind(begin, 0) == 0)
+      return "; did you mean --" + option->long_name() + "?";
+  return "";
+}
+
 bool isRemapping(const std::string& word) {
   return word.rfind("__", 0) == 0 && word.find(":=") != std::string::npos;
 }
@@ -192,6 +209,8 @@ OptionSet::Given OptionSet::parse(const std::vector<std::string>& words) const {
   const int style = po::command_line_style::default_style & ~po::command_line_style::allow_guessing;
   try {
     return po::command_line_parser(own).options(all_).positional(positional_).style(style).run();
+  } catch (const po::unknown_option& error) {
+    throw UsageError(error.what() + guessOf(error.get_option_name(), all_));
   } catch (const po::error& error) {
     throw UsageError(error.what());
   }

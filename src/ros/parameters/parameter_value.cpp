@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <locale>
 #include <map>
@@ -53,6 +54,15 @@ ParameterValue fromYaml(const YAML::Node& node) {
     }
   }
   return {std::move(list)};
+}
+
+/// What YAML says only as "illegal map value": empty if that line, counted from 0, has no tab.
+std::string hintOfTab(const std::string& yaml, int line) {
+  std::istringstream lines(yaml);
+  std::string text;
+  for (int k = 0; k <= line; ++k)
+    if (!std::getline(lines, text)) return "";
+  return text.find('\t') == std::string::npos ? "" : "; a tab cannot indent: use spaces";
 }
 
 /// Where a line of the YAML text stands, for messages.
@@ -186,9 +196,10 @@ ParameterEntries readParameterFile(const std::string& path) {
 }
 
 ParameterEntries readParameters(std::istream& yaml, const std::string& name) {
+  const std::string text{std::istreambuf_iterator<char>(yaml), std::istreambuf_iterator<char>()};
   YAML::Node root;
   try {
-    for (const YAML::Node& document : YAML::LoadAll(yaml)) {
+    for (const YAML::Node& document : YAML::LoadAll(text)) {
       if (document.IsNull()) continue;
       if (!root.IsNull())
         throw std::runtime_error(name + ":" + std::to_string(document.Mark().line + 1) +
@@ -197,7 +208,7 @@ ParameterEntries readParameters(std::istream& yaml, const std::string& name) {
     }
   } catch (const YAML::Exception& error) {
     throw std::runtime_error(name + ":" + std::to_string(error.mark.line + 1) + ": not YAML (" + error.msg +
-                             "); expected one `key: value` a line");
+                             hintOfTab(text, error.mark.line) + "); expected one `key: value` a line");
   }
   if (root.IsNull()) return {};
   if (!root.IsMap()) throw std::runtime_error(name + ":1: expected one `key: value` a line");
