@@ -313,6 +313,24 @@ TEST(Divergence, AnAccelerometerBiasThatJumpsIsToldAndOvercome) {
   }
 }
 
+// Nothing brings back the metres that a wrong velocity drove before the scans mended it.
+TEST(Divergence, TheSigmaOfThePositionOutlivesIt) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    SimulatedRun run("medium", seed, 70.0);
+    run.options.health.on_divergence = OnDivergence::kReport;
+    run.run([&](simulation::SensorData& data) {
+      for (ImuMeasurement& sample : data.imu.samples)
+        if (run.seconds(sample.time) > 35.0 && run.seconds(sample.time) < 38.0)
+          sample.acceleration.x() += 1.0;
+    });
+    EXPECT_GE(run.odometry->faults()["diverged"], 1U) << seed;
+    const NavigationState& end = run.states.back();
+    EXPECT_EQ(run.odometry->health(), Health::kOk) << seed;
+    const double sigma = std::sqrt(end.covariance.block<3, 3>(StateBlock::kP, StateBlock::kP).trace());
+    EXPECT_LT(run.positionError(end), 2.0 * sigma) << seed;
+  }
+}
+
 TEST(Divergence, ABlackoutIsCoastingAndNotDivergence) {
   SimulatedRun run("difficult", 3, 40.0);
   run.setup.radar.blackouts.push_back({kFault, 5.0});

@@ -188,7 +188,9 @@ void Estimator::seeLandmarks(const LandmarkMap::Prediction& expected, const Rada
 }
 
 void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
+  const Eigen::Vector3d predicted_W = smoother_.newest().x.v_W();
   const Solution& solution = smoother_.optimize();
+  corrected_W_ += smoother_.newest().x.v_W() - predicted_W;
   result.solver_iterations = solution.iterations;
   result.solver_termination = solution.termination;
   constexpr int kState = StateBlock::kTangent;
@@ -315,6 +317,8 @@ void Estimator::begin(const Initialization& found) {
   initializer_.forgetVelocities();
   model_error_scale_ = found.model_error_scale;
   last_used_ = found.time;
+  contradicted_since_ = found.time;
+  corrected_W_.setZero();
   yaw_inflation_ = YawInflation();
   if (landmarks_) landmarks_->forget();
   initialized_at_ = found.time;
@@ -348,9 +352,24 @@ Health Estimator::updateHealth() {
   const std::optional<NavigationState> state = navigation_.state();
   if (!state || imu_.empty()) return health_.health();
   const bool was_diverged = health_.health() == Health::kDiverged;
+  const bool was_contradicted = health_.isContradicted();
   const Health now = health_.judge(imu_.newest(), *state, model_error_scale_.value());
   if (now == Health::kDiverged && !was_diverged) faults_.count("diverged");
+  followContradiction(was_contradicted);
   return now;
+}
+
+/// If the estimate was wrong, the scans have moved its velocity by the error; if it was right, by nothing.
+/// The position has drifted by that error, and no scan moves it back.
+void Estimator::followContradiction(bool was_contradicted) {
+  const bool is_contradicted = health_.isContradicted();
+  if (is_contradicted && !was_contradicted) {
+    contradicted_since_ = imu_.newest() - options_.health.window;
+    corrected_W_.setZero();
+  } else if (was_contradicted && !is_contradicted) {
+    const double seconds = imu_.newest() - contradicted_since_;
+    pose_inflation_.addPosition(corrected_W_.squaredNorm() * seconds * seconds);
+  }
 }
 
 void Estimator::anchor(const NavigationState& state, bool at_rest) {

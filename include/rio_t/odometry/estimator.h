@@ -76,6 +76,8 @@ class Estimator {
   /// Adds the term that was judged, unless the platform is at rest.
   void constrainToGround(bool at_rest, ScanResult& result);
   RestContext restContext() const;
+  /// Sees that the scans begin or cease to contradict the estimate.
+  void followContradiction(bool was_contradicted);
   ImuNoise imuNoise() const;  ///< scaled by the model errors found so far
   NavigationState newestState(const StateCovariance& covariance) const;
 
@@ -94,6 +96,8 @@ class Estimator {
   ModelErrorScale model_error_scale_;
   RadarsHealth health_;
   PoseInflation pose_inflation_;
+  Time contradicted_since_;
+  Eigen::Vector3d corrected_W_ = Eigen::Vector3d::Zero();  ///< what scans added to v_W since then [m/s]
   YawInflation yaw_inflation_;
   std::optional<LandmarkMap> landmarks_;  ///< none if they are off
 

@@ -15,6 +15,8 @@ class PoseInflation {
   /// Keeps the uncertainty of position and heading of `published`. That of the heading spreads from this
   /// position on.
   explicit PoseInflation(const NavigationState& published);
+  /// The position has drifted by this variance per axis [m^2].
+  void addPosition(double variance) { position_.diagonal().array() += variance; }
   void addTo(NavigationState& state) const;
 
  private:
