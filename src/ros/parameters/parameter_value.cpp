@@ -155,8 +155,8 @@ std::string ParameterValue::describe() const {
 }
 
 ParameterValue listOf(const std::vector<double>& numbers) {
-  ParameterValue::List list;
-  for (const double x : numbers) list.push_back({x});
+  ParameterValue::List list(numbers.size());
+  for (std::size_t i = 0; i < numbers.size(); ++i) list[i].data = numbers[i];
   return {std::move(list)};
 }
 
