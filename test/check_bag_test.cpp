@@ -140,7 +140,7 @@ TEST_F(CheckBag, ACloudWithoutDopplerIsNamedWithItsFields) {
     return true;
   };
   const BagCheck odd = check(rewritten("no_doppler", changes));
-  expectLine(odd, FindingLevel::kMissing, {"no field with the Doppler", "snr_db, label"});
+  expectLine(odd, FindingLevel::kMissing, {"no field name looks like a Doppler", "snr_db, label"});
   EXPECT_FALSE(odd.ready());
 }
 
@@ -166,7 +166,7 @@ TEST_F(CheckBag, CloudsOfALidarAreNotKeptButNamed) {
   }
   const BagCheck odd = check(bag, false);
   EXPECT_TRUE(odd.ready());
-  expectLine(odd, FindingLevel::kOdd, {"/lidar/points", "no field with the Doppler", "x, y, z"});
+  expectLine(odd, FindingLevel::kOdd, {"/lidar/points", "no field name looks like a Doppler", "x, y, z"});
 }
 
 TEST_F(CheckBag, OnlyTopicsThatAreAskedForAreRead) {
@@ -227,6 +227,12 @@ TEST_F(CheckBag, TwoRadarsGetASectionEach) {
   writeSimulationBag(path, motion, simulation::simulate(motion, kart.options), kart.options.start, {});
   const BagCheck pair = check(path);
   expectRuns(pair);
+  const auto is_odd_mounting = [](const Finding& finding) {
+    return finding.level == FindingLevel::kOdd &&
+           finding.text.find("compare it with the robot") != std::string::npos;
+  };
+  EXPECT_EQ(std::count_if(pair.findings.begin(), pair.findings.end(), is_odd_mounting), 2)
+      << "six points a scan";
   const Config config = configOf(pair);
   ASSERT_EQ(config.radars.size(), 2u) << pair.yaml;
   for (const Config& radar : config.radars) {

@@ -64,8 +64,9 @@ void guessFormat(const std::vector<std::string>& fields, FormatProposal* proposa
   const std::string doppler = fieldLike(fields, {"doppler", "radial_speed", "range_rate", "rangerate",
                                                  "velocity", "vel", "speed", "v_r", "vr"});
   if (doppler.empty()) {
-    proposal->fault = "it has no field with the Doppler (fields: " + proposal->fields +
-                      "), so it gives no velocity; use a driver that publishes the Doppler";
+    proposal->fault = "no field name looks like a Doppler (fields: " + proposal->fields +
+                      "); if one of them is, name it with radar_field_doppler, else use a driver that "
+                      "publishes the Doppler";
     return;
   }
   const std::string azimuth = fieldLike(fields, {"azimuth"}), elevation = fieldLike(fields, {"elevation"});

@@ -187,11 +187,13 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
   constexpr double kSparseSigma = 0.2;  // [rad]
   if (radar->isSparse()) sigma = (sigma.array().square() + kSparseSigma * kSparseSigma).sqrt().min(kStraight);
   const std::string sure = sureness(sigma);
-  const bool observed = search.rotation_sigma.maxCoeff() < kObservedTurn;
+  // Few points a scan may show another mounting that fits as well: upside down, or a view beside the motion.
+  const bool observed = search.rotation_sigma.maxCoeff() < kObservedTurn && !radar->isSparse();
   tell(observed ? FindingLevel::kOk : FindingLevel::kOdd, "mounting",
        "yaw " + fixedText(yaw, 1) + ", pitch " + fixedText(pitch, 1) + ", roll " + fixedText(roll, 1) +
            " deg (radar's " + turnText(nearestTurn(search.q_IR.toRotationMatrix())) + " of the IMU); " +
-           sure);
+           sure +
+           (radar->isSparse() ? "; so few points may show a wrong one: compare it with the robot" : ""));
   radar->keys.set("mounting_yaw_pitch_roll_deg", listOf({yaw, pitch, roll}),
                   "Yaw left, pitch up, roll right side down, seen from x forward, y left, z up of the IMU. " +
                       sure + ".");
