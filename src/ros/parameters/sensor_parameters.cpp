@@ -55,10 +55,10 @@ void listConsensus(ParameterList& list, EgoVelocityOptions& radar) {
       "A velocity contradicts the prediction of the IMU if the two are more than this many standard "
       "deviations apart. The estimator then prefers the points that agree with the prediction, e.g. beside a "
       "bus.");
-  list.integer(
-      "ransac_seed", atLeast(0), radar.ransac_seed,
-      "Each scan restarts the random generator with this seed, so that the same scan gives the same velocity. "
-      "Change it only to see how much the draws matter.");
+  list.integer("ransac_seed", atLeast(0), radar.ransac_seed,
+               "Each scan restarts the random generator with this seed, so that the same scan gives the same "
+               "velocity. "
+               "Change it only to see how much the draws matter.");
   list.integer(
       "ego_velocity_min_inliers", atLeast(3), radar.min_inliers,
       "A velocity needs at least this many inliers. Three determine it, and the others confirm it. With "
