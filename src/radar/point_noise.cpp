@@ -34,7 +34,7 @@ constexpr double kMinVariance = 1e-4;
 /// Share of a new scan in what is known, after so many scans.
 double forgotten(double scans) { return std::max(1.0 / kMemory, 1.0 / (scans + 1.0)); }
 
-/// Of a variance with so many degrees of freedom: the trigamma function of their half.
+/// Variance of the logarithm of a variance that has so many degrees of freedom: trigamma of half of them.
 double varianceOfLogarithm(double freedom) {
   const double x = 0.5 * freedom;
   const double y = x + 1.0;

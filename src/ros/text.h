@@ -16,9 +16,9 @@ void appendItem(std::string* list, const std::string& item, const std::string& s
 /// Broken into lines of `width`; all but the first begin with `indent`, and the first has room for it.
 std::string wrapped(const std::string& text, const std::string& indent, std::size_t width);
 
-/// What the keys of a radar begin with: "left/"; empty if there is but one radar.
+/// The keys of a radar begin with this: "left/"; empty if there is one radar.
 std::string prefixOf(const std::string& radar);
-/// What the names of its files end in: "_left"; likewise.
+/// The names of its files end with this: "_left"; likewise.
 std::string suffixOf(const std::string& radar);
 
 }  // namespace rio_t

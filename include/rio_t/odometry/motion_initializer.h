@@ -34,7 +34,7 @@ struct PoseAnchor {
   Eigen::Vector3d p_W = Eigen::Vector3d::Zero();             ///< [m]
 };
 
-/// Where a first state came from.
+/// The source of a first state.
 enum class InitializedFrom { kRest, kMotion };
 std::string toString(InitializedFrom from);  ///< "rest" or "motion"
 

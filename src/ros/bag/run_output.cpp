@@ -124,7 +124,7 @@ void RunOutput::removeOfEarlierRuns() const {
   namespace fs = std::filesystem;
   std::error_code error;
   fs::remove(folder_ + "/summary.yaml", error);
-  // What not every run writes.
+  // Not every run writes these.
   static const std::regex optional("(time_offset|ego_velocity|extrinsics)_[a-z0-9_]+\\.csv|(.+)\\.csv");
   const std::vector<std::string> own = files_.names();
   const std::vector<RunFile> possible = RunFiles{{""}, true, true, true, true}.all();

@@ -25,7 +25,7 @@ constexpr double kDiagnosticPeriod = 1.0;  // [s]
 // Deep enough for seconds of input: nothing is lost while a callback is late.
 constexpr std::uint32_t kScanQueue = 200;
 
-/// What is wrong goes into `faults`.
+/// Adds what is wrong to `faults`.
 void resolveTopics(const ros::NodeHandle& node, Config* config, std::vector<std::string>* faults) {
   const auto resolve = [&](const std::string& key, std::string* topic) {
     if (topic->empty()) return;

@@ -90,7 +90,7 @@ class EvidenceCollector {
   RunEvidence evidence_;
 };
 
-/// What has become of the means of the pressures.
+/// Counts of the means of the pressures, by outcome.
 struct BarometerCounts {
   std::uint64_t used = 0;               ///< means that went into the window
   std::uint64_t steps = 0;              ///< after which the bias was estimated again
@@ -102,7 +102,7 @@ struct BarometerCounts {
   void add(const ScanResult& result);
 };
 
-/// What has become of the terms of a ground vehicle.
+/// Counts of the terms of a ground vehicle, by outcome.
 struct GroundVehicleCounts {
   std::uint64_t used = 0;
   std::uint64_t left_out = 0;             ///< they contradicted the estimate
