@@ -428,6 +428,7 @@ void LiveOdometry::tellDopplerStep(const Radar& radar, const DopplerStep& step, 
 void LiveOdometry::solve() {
   Session published;              // whose results ~path holds
   std::vector<DopplerStep> told;  // of the radars of that session
+  bool has_told_start = false;    // of that session
   while (true) {
     double rate_sigma = 0.0;
     {
@@ -443,6 +444,7 @@ void LiveOdometry::solve() {
       if (published) publisher_.clearPath();
       published = now;
       told.assign(radars_.size(), DopplerStep());
+      has_told_start = false;
     }
     try {
       bool more = false;
@@ -458,6 +460,11 @@ void LiveOdometry::solve() {
           monitor_.result(result);
         });
         if (!current) break;  // reset meanwhile: not of this world any more
+      }
+      if (!has_told_start && now->odometry().start()) {
+        has_told_start = true;
+        ROS_INFO_STREAM(name_ << ": started from " << toString(now->odometry().start()->from)
+                              << "; ~odom is published");
       }
       for (std::size_t k = 0; k < radars_.size(); ++k)
         tellDopplerStep(radars_[k], now->odometry().radarDopplerStep(k), &told[k]);
