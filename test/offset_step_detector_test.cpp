@@ -11,7 +11,7 @@ namespace {
 /// Seconds until a step is seen; 60 where none is.
 /// `quiet`: [s] during which the offset was right.
 double secondsToStep(double offset_error, double acceleration, double noise = 0.03, double quiet = 0.0) {
-  OffsetStepDetector detector{OffsetStepDetectorOptions()};
+  OffsetStepDetector detector(OffsetStepDetectorOptions(), 0.25);
   const Eigen::Matrix3d S = 0.05 * 0.05 * Eigen::Matrix3d::Identity();
   for (int i = 0; i < 600; ++i) {
     const Eigen::Vector3d J = acceleration * Eigen::Vector3d(std::sin(0.31 * i), std::cos(0.23 * i), 0.3);
@@ -51,7 +51,7 @@ TEST(OffsetStepDetector, DoesNotSpeakWithoutExcitation) { EXPECT_EQ(secondsToSte
 TEST(OffsetStepDetector, CanBeTurnedOff) {
   OffsetStepDetectorOptions options;
   options.enabled = false;
-  OffsetStepDetector detector(options);
+  OffsetStepDetector detector(options, 0.25);
   for (int i = 0; i < 200; ++i) {
     const Eigen::Matrix3d S = 1e-4 * Eigen::Matrix3d::Identity();
     EXPECT_FALSE(detector.stepped({Time::fromSeconds(0.1 * i), {1, 0, 0}, S, S, {2, 0, 0}}));

@@ -28,8 +28,7 @@ std::vector<RadarChannel> radarChannels(const OdometryOptions& options, const Ei
       options.smoother.time_offset_shared ? std::make_shared<OffsetBlocks>(options.smoother) : nullptr;
   std::vector<RadarChannel> channels;
   for (std::size_t k = 0; k < options.radarCount(); ++k) {
-    OdometryOptions own = optionsOfRadar(options, k);
-    own.offset_step_detector.max_change = 2.0 * own.smoother.max_time_offset;
+    const OdometryOptions own = optionsOfRadar(options, k);
     const RadarChannelOptions channel{own.T_IR, own.ego_velocity, own.feasibility, own.offset_step_detector,
                                       own.smoother};
     channels.emplace_back(channel, g_W, imu, shared);

@@ -23,7 +23,7 @@ bool OffsetStepDetector::showsStep(const Average& average) const {
       std::max(kMinScatter, (average.squares - change * average.projection) / average.count);
   const double sigma = std::sqrt(scatter / average.information);
   return std::abs(change) >= std::max(options_.significance * sigma, options_.min_change) &&
-         std::abs(change) <= options_.max_change;
+         std::abs(change) <= max_change_;
 }
 
 bool OffsetStepDetector::stepped(const Innovation& innovation) {
@@ -43,7 +43,7 @@ bool OffsetStepDetector::stepped(const Innovation& innovation) {
   }
   if (std::none_of(averages_.begin(), averages_.end(), [this](const Average& a) { return showsStep(a); }))
     return false;
-  *this = OffsetStepDetector(options_);
+  averages_ = {};
   return true;
 }
 

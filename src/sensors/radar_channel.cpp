@@ -53,7 +53,7 @@ RadarChannel::RadarChannel(const RadarChannelOptions& options, const Eigen::Vect
                  offset ? std::move(offset) : std::make_shared<OffsetBlocks>(options.smoother)),
       feasibility_(options.feasibility),
       offset_widths_(imu, g_W),
-      step_detector_(options.offset_step_detector),
+      step_detector_(options.offset_step_detector, options.smoother.max_time_offset),
       offset_uncertainty_(options.smoother.huber_threshold) {}
 
 void RadarChannel::start(FixedLagSmoother& smoother, Time time, const NodePrior& prior) {
@@ -85,7 +85,7 @@ void RadarChannel::forget() {
 
 void RadarChannel::forgetOffset() {
   offset_steps_ = in_window_.offsetSteps();
-  step_detector_ = OffsetStepDetector(options_.offset_step_detector);
+  step_detector_ = OffsetStepDetector(options_.offset_step_detector, options_.smoother.max_time_offset);
   offset_uncertainty_ = OffsetUncertainty(options_.smoother.huber_threshold);
 }
 

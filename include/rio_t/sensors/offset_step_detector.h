@@ -12,7 +12,6 @@ struct OffsetStepDetectorOptions {
   double memory = 4.0;         ///< [s] longest time constant of the average over scans
   double significance = 6.0;   ///< [sigma] of the change that the innovations ask for
   double min_change = 5.0e-3;  ///< [s] the random walk of the offset follows smaller steps
-  double max_change = 0.5;     ///< [s] from bound to bound: no offset steps farther
 };
 
 /// Detects steps of the time offset. A driver that restarts may change the offset by many sigma, and a
@@ -25,7 +24,9 @@ struct OffsetStepDetectorOptions {
 /// long one sees small steps, and a short one sees a step before the scans from before it are forgotten.
 class OffsetStepDetector {
  public:
-  explicit OffsetStepDetector(const OffsetStepDetectorOptions& options) : options_(options) {}
+  /// `max_time_offset` [s] is the bound of the offset: no step is longer than from bound to bound.
+  OffsetStepDetector(const OffsetStepDetectorOptions& options, double max_time_offset)
+      : options_(options), max_change_(2.0 * max_time_offset) {}
 
   /// True if the offset has stepped; the average then starts again. S is here S_at_offset, without the
   /// uncertainty of the offset.
@@ -41,7 +42,8 @@ class OffsetStepDetector {
   };
   bool showsStep(const Average& average) const;
 
-  OffsetStepDetectorOptions options_;  // read-only after construction
+  OffsetStepDetectorOptions options_;  // read-only after construction, as the next
+  double max_change_;                  ///< [s]
   Time last_;
   std::array<Average, 4> averages_;  ///< the first over `memory`
 };
