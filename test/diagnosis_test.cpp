@@ -77,8 +77,20 @@ TEST(Diagnosis, AGoodRunHasNoCauses) {
   const Diagnosis diagnosis = diagnose(goodRun(), Config{});
   EXPECT_EQ(toString(diagnosis.verdict), "good");
   EXPECT_EQ(describeCauses(diagnosis), "");
-  EXPECT_EQ(diagnosis.checks.size(), 8u);
+  EXPECT_EQ(diagnosis.checks.size(), 9u);
   for (const Check& check : diagnosis.checks) EXPECT_TRUE(check.good()) << check.name;
+}
+
+TEST(Diagnosis, AMountingFarFromTheToldOneIsNoGoodRun) {
+  RunEvidence evidence = goodRun();
+  evidence.radars.front().turn = Eigen::Vector3d(0.1, 0.5, -0.45);  // the sigma is 0.17
+  EXPECT_EQ(first(evidence), "none");
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
+  evidence.radars.front().turn.y() = -1.5;
+  expectSays(first(evidence),
+             {"mounting_far: The estimated mounting is turned from the told one by 6, -86, -26 degrees",
+              "extrinsics_rotation_sigma 9.74 degrees", "Check radar_doppler_sign"});
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
 }
 
 TEST(Diagnosis, FilteredPointsNameTheFilterAndTheUnit) {

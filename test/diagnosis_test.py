@@ -1,4 +1,6 @@
 """Runs that disappoint say why, and good runs do not."""
+import pathlib
+
 import pytest
 import rosbag
 import yaml
@@ -9,9 +11,9 @@ from rio_t import programs
 @pytest.fixture(name="run_with")
 def run_with_fixture(programs_folder, simulated_run, tmp_path):
     """Runs rio_t_bag on the simulated bag with these settings: the process and the summary, None without one."""
-    def run(*settings, bag=simulated_run / "run.bag"):
+    def run(*settings, bag=simulated_run / "run.bag", config="irs"):
         words = [word for setting in settings for word in ("--set", setting)]
-        done = programs.run(programs_folder / "rio_t_bag", bag, "--config", "irs", "--output-dir", tmp_path / "out", *words)
+        done = programs.run(programs_folder / "rio_t_bag", bag, "--config", config, "--output-dir", tmp_path / "out", *words)
         summary = tmp_path / "out" / "summary.yaml"
         return done, yaml.safe_load(summary.read_text()) if summary.exists() else None
     return run
@@ -66,6 +68,22 @@ def test_a_wrong_sign_is_not_trusted(run_with):
     assert summary["verdict"] == "bad"
     assert set(causes_of(summary)) & {"contradicts_imu", "diverged"}
     assert "radar_doppler_sign" in done.stdout
+
+
+def test_a_mounting_that_follows_a_wrong_sign_is_named(run_with, programs_folder, tmp_path):
+    """Nothing contradicts such a run any more: the radar is turned around, and its scans are used."""
+    config = yaml.safe_load((pathlib.Path(__file__).parent.parent / "config" / "two_radars.yaml").read_text())
+    radars = []
+    for name in config["radars"]:
+        lever, rotation = (",".join(map(str, config[name]["extrinsics_" + key])) for key in ("translation", "rotation_xyzw"))
+        radars += ["--radar", f"{name} extrinsics-translation={lever} extrinsics-rotation-xyzw={rotation}"]
+    bag = tmp_path / "pair.bag"
+    programs.output_of(programs_folder / "simulate", "--motion", "medium", "--seed", 3, "--duration", 60, *radars, "--out", bag)
+    _, summary = run_with(bag=bag, config="two_radars")
+    assert (summary["verdict"], summary["causes"]) == ("good", [])
+    _, summary = run_with("right/radar_doppler_sign=-1", bag=bag, config="two_radars")
+    assert summary["verdict"] != "good"
+    assert "mounting_far" in causes_of(summary)
 
 
 def test_a_radar_that_falls_silent_is_bad(run_with, simulated_run, tmp_path):

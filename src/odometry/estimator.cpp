@@ -198,6 +198,7 @@ void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
   result.time_offset = radar.offset();
   result.time_offset_sigma = radar.offsetSigma(covariance(kState, kState));
   result.T_IR = radar.extrinsics();
+  result.told_T_IR = radar.toldExtrinsics();
   const Eigen::Index estimated = covariance.rows() - (kState + 1);
   result.T_IR_covariance = extrinsicsCovariance(covariance.bottomRightCorner(estimated, estimated));
   for (const StampedPose& left : marginalize()) result.left_window.push_back(left);

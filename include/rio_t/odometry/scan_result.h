@@ -31,6 +31,7 @@ struct ScanResult : ScanAnswer {
   double time_offset = 0.0;        ///< t_O [s]
   double time_offset_sigma = 0.0;  ///< [s]
   Extrinsics T_IR;                 ///< of this radar
+  Extrinsics told_T_IR;            ///< the mounting that the options tell
   /// Covariance of T_IR, if it is estimated; zero if not. Translation of the radar in I [m], then turn about
   /// the axes of I [rad]: the order of ROS.
   Eigen::Matrix<double, 6, 6> T_IR_covariance = Eigen::Matrix<double, 6, 6>::Zero();

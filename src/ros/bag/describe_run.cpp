@@ -52,8 +52,7 @@ void describePasses(const RadarSummary& radar, const Row& row) {
 /// The mounting as people can compare it: how far it went from the one told, by the axes of the IMU.
 void describeExtrinsics(const ExtrinsicsSummary& extrinsics, const Row& row) {
   constexpr double kDegreesPerRadian = 180.0 / M_PI;
-  const Eigen::AngleAxisd turn(extrinsics.T_IR.q_IR * extrinsics.told.q_IR.conjugate());
-  row("turned by", decimals(turn.angle() * turn.axis(), kDegreesPerRadian, 2) +
+  row("turned by", decimals(turnBetween(extrinsics.told, extrinsics.T_IR), kDegreesPerRadian, 2) +
                        " deg about x y z of the IMU, sigma " +
                        decimals(extrinsics.rotation_sigma, kDegreesPerRadian, 2) + " deg");
   if (extrinsics.translation_sigma.isZero()) return;

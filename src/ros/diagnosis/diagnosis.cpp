@@ -68,6 +68,11 @@ std::string outOf(std::uint64_t part, std::uint64_t whole, const std::string& wh
   return std::to_string(part) + " of " + std::to_string(whole) + " " + what;
 }
 
+/// How far the estimated mounting is turned from the told one, about the worst axis.
+double turnSigmas(const RadarEvidence& radar, const Config& config) {
+  return radar.turn.cwiseAbs().maxCoeff() / config.odometry.smoother.extrinsics_rotation_sigma;
+}
+
 /// Everything that speaks of one radar.
 class RadarCauses {
  public:
@@ -84,6 +89,7 @@ class RadarCauses {
     addStamps();
     addVelocities();
     addContradictions();
+    addMounting();
   }
 
  private:
@@ -214,6 +220,21 @@ class RadarCauses {
           "Check the mounting (" + key_ + "extrinsics_rotation_xyzw, order x, y, z, w), " + key_ +
               "radar_doppler_sign and " + key_ + "radar_axes." + kCheckBag +
               " estimate_extrinsics: rotation corrects up to 10 degrees by itself.");
+  }
+
+  /// An estimate that follows a wrong sign turns the mounting around, and then contradicts nothing.
+  void addMounting() {
+    const double sigmas = turnSigmas(radar_, config_);
+    if (sigmas <= kFarMounting) return;
+    constexpr double kDegree = M_PI / 180.0;
+    const Eigen::Vector3d turn = radar_.turn / kDegree;
+    cause("mounting_far", 1.0 - kFarMounting / sigmas,
+          "The estimated mounting" + of_ + " is turned from the told one by " + fixedText(turn.x(), 0) + ", " +
+              fixedText(turn.y(), 0) + ", " + fixedText(turn.z(), 0) +
+              " degrees about x, y, z of the IMU, with " + key_ + "extrinsics_rotation_sigma " +
+              number(config_.odometry.smoother.extrinsics_rotation_sigma / kDegree) + " degrees.",
+          "Check " + key_ + "radar_doppler_sign, " + key_ + "radar_axes and the mounting (" + key_ +
+              "extrinsics_rotation_xyzw, order x, y, z, w)." + kCheckBag);
   }
 
   const RadarEvidence& radar_;
@@ -373,8 +394,10 @@ void addMissingMounting(const Config& config, std::vector<Cause>* causes) {
   causes->insert(causes->begin(), missing.begin(), missing.end());
 }
 
-std::vector<Check> checksOf(const RunEvidence& evidence) {
-  double kept = 1.0;
+std::vector<Check> checksOf(const RunEvidence& evidence, const std::vector<Config>& radars) {
+  double kept = 1.0, turned = 0.0;
+  for (std::size_t k = 0; k < evidence.radars.size(); ++k)
+    turned = std::max(turned, turnSigmas(evidence.radars[k], radars.at(k)));
   for (const RadarEvidence& radar : evidence.radars) {
     const std::uint64_t passed = radar.points_by_verdict[static_cast<std::size_t>(PointVerdict::kKept)];
     if (radar.points > 0) kept = std::min(kept, shareOf(passed, radar.points));
@@ -389,6 +412,7 @@ std::vector<Check> checksOf(const RunEvidence& evidence) {
       {"scans_diverged_share", shareOf(evidence.scans_diverged, evidence.scans_judged), kManyDiverged, false},
       {"windows_at_offset_bound_share", shareOf(evidence.windows_at_bound, evidence.windows), kManyWindows,
        false},
+      {"mounting_turned_sigmas", turned, kFarMounting, false},
       {"imu_faults_share", std::min(1.0, shareOf(imu_faults, evidence.imu_count)), kManySamples, false},
       {"healthy_at_end", evidence.health == Health::kOk ? 1.0 : 0.0, 1.0, true}};
 }
@@ -436,7 +460,7 @@ Diagnosis diagnose(const RunEvidence& evidence, const Config& config) {
   std::stable_sort(result.causes.begin(), result.causes.end(),
                    [](const Cause& a, const Cause& b) { return a.share > b.share; });
   if (result.causes.size() > kMostCauses) result.causes.resize(kMostCauses);
-  result.checks = checksOf(evidence);
+  result.checks = checksOf(evidence, radars);
   result.verdict = verdictOf(evidence, result);
   return result;
 }

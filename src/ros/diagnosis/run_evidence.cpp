@@ -46,6 +46,7 @@ void EvidenceCollector::add(const ScanResult& result) {
     ++radar.scans_rejected[result.rejected_because];
   }
   if (!result.updated) return;
+  radar.turn = turnBetween(result.told_T_IR, result.T_IR);
   evidence_.heading_sigma = std::sqrt(bodyOdometry(result.state, 0.0).pose_covariance(5, 5));
   ++evidence_.windows;
   if (result.solver_termination == SolverTermination::kAtBound) ++evidence_.windows_at_bound;

@@ -313,7 +313,6 @@ void LiveOdometry::startSessionWhenReady() {
   OdometryOptions options = live_config_.odometry;
   options.T_IR = T_IR.front();
   for (std::size_t k = 0; k < options.radars.size(); ++k) options.radars[k].T_IR = T_IR.at(k);
-  monitor_.startWith(T_IR);
   monitor_.waitFor("");
   {
     const std::lock_guard<std::mutex> lock(mutex_);

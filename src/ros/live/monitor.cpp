@@ -152,11 +152,6 @@ void LiveMonitor::result(const LiveSession::Result& result) {
   radar.last_update = last_update_;
 }
 
-void LiveMonitor::startWith(const std::vector<Extrinsics>& T_IR) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  for (std::size_t k = 0; k < radars_.size(); ++k) radars_[k].told = T_IR.at(k);
-}
-
 void LiveMonitor::solverFailed(const std::string& what) {
   const std::lock_guard<std::mutex> lock(mutex_);
   solver_failure_ = what;

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "../text.h"
-#include "rio_t/core/so3.h"
+#include "rio_t/ros/diagnosis/diagnosis.h"
 #include "rio_t/ros/live/monitor.h"
 
 namespace rio_t {
@@ -76,7 +76,7 @@ void LiveMonitor::describeExtrinsics(Status& status, std::size_t radar) const {
   const ScanResult& result = of.last_update->result;
   const SmootherOptions& options = of.config.odometry.smoother;
   const Eigen::Matrix<double, 6, 1> sigma = result.T_IR_covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-  const Eigen::Vector3d turn = so3::log(result.T_IR.q_IR * of.told.q_IR.conjugate());
+  const Eigen::Vector3d turn = turnBetween(result.told_T_IR, result.T_IR);
   const Eigen::Vector3d turn_sigma = sigma.tail<3>();
   // As the parameters want them.
   status.add("extrinsics_rotation_xyzw", listOf(result.T_IR.q_IR.coeffs()));
@@ -86,13 +86,13 @@ void LiveMonitor::describeExtrinsics(Status& status, std::size_t radar) const {
   std::string kept = axesAbove(turn_sigma, kObserved * options.extrinsics_rotation_sigma, "turn about ");
   if (options.estimate_extrinsics == EstimateExtrinsics::kPose) {
     const Eigen::Vector3d lever_sigma = sigma.head<3>();
-    status.add("lever_arm_from_told_m", listOf(result.T_IR.l_I - of.told.l_I));
+    status.add("lever_arm_from_told_m", listOf(result.T_IR.l_I - result.told_T_IR.l_I));
     status.add("lever_arm_sigma_m", listOf(lever_sigma));
     const std::string lever =
         axesAbove(lever_sigma, kObserved * options.extrinsics_translation_sigma, "lever arm along ");
     if (!lever.empty()) appendItem(&kept, lever);
   }
-  const std::string far = axesAbove(turn.cwiseAbs(), 3.0 * options.extrinsics_rotation_sigma, "about ");
+  const std::string far = axesAbove(turn.cwiseAbs(), kFarMounting * options.extrinsics_rotation_sigma, "about ");
   if (!far.empty()) {
     status.summary(DiagnosticStatus::WARN,
                    "the estimated rotation of " + called(of) + " " + far +

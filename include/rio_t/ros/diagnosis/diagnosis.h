@@ -15,6 +15,10 @@ enum class RunVerdict {
 };
 std::string toString(RunVerdict verdict);  ///< "good", "doubtful", "bad"
 
+/// An estimated mounting is far from the told one if it is turned by more than so many
+/// `extrinsics_rotation_sigma` about an axis. If that sigma is right, one radar in 120 is.
+constexpr double kFarMounting = 3.0;
+
 /// A likely cause of trouble.
 struct Cause {
   std::string name;    ///< in snake case: "points_too_weak"

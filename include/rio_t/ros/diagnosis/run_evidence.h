@@ -30,7 +30,8 @@ struct RadarEvidence {
   Counts velocity_status;                ///< of the scans before the start, by EgoVelocityStatus
   std::uint64_t points = 0;              ///< of all scans
   std::array<std::uint64_t, kPointVerdicts> points_by_verdict = {};
-  double snr_sum_db = 0.0;  ///< over `points`
+  double snr_sum_db = 0.0;                         ///< over `points`
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< of the newest mounting from the told one [rad]
 };
 
 /// The stamps of the IMU jumped, or left a gap that is too long to bridge: "imu_clock_restart".

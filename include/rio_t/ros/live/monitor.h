@@ -40,8 +40,6 @@ class LiveMonitor {
   void pressure();                               ///< a message came
   void pressureDropped(const std::string& why);  ///< one that cannot be used
   void result(const LiveSession::Result& result);
-  /// The mountings that the session starts with.
-  void startWith(const std::vector<Extrinsics>& T_IR);
   void solverFailed(const std::string& what);
   /// The session starts again; counters of the node go on.
   void reset(const std::string& reason);
@@ -99,10 +97,9 @@ class LiveMonitor {
     std::map<std::string, std::uint64_t> dropped;
   };
   struct Radar {
-    explicit Radar(Config its_config) : config(std::move(its_config)), told(config.odometry.T_IR) {}
+    explicit Radar(Config its_config) : config(std::move(its_config)) {}
 
     Config config;
-    Extrinsics told;  ///< the mounting that the session started with
     Counter scans, triggers;
     std::map<std::string, std::uint64_t> dropped;
     std::uint64_t used = 0;
