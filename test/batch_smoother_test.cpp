@@ -7,29 +7,12 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "dense_system.h"
 #include "radar_smoother.h"
 #include "rio_t/core/so3.h"
 
 namespace rio_t {
 namespace {
-
-Eigen::MatrixXd dense(const NormalEquations& system) {
-  const auto count = static_cast<int>(system.blocks.size());
-  std::vector<Eigen::Index> firsts = {0};
-  for (const RowMatrix& H : system.diagonal) firsts.push_back(firsts.back() + H.rows());
-  const Eigen::Index n = firsts.back();
-  const auto first = [&](int i) { return firsts[static_cast<std::size_t>(i)]; };
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n, n);
-  for (int i = 0; i < count; ++i) {
-    const Eigen::Index rows = system.diagonal[i].rows();
-    H.block(first(i), first(i), rows, rows) = system.diagonal[i];
-    for (const auto& [j, part] : system.coupling[i]) {
-      H.block(first(i), first(j), rows, part.cols()) = part;
-      H.block(first(j), first(i), part.cols(), rows) = part.transpose();
-    }
-  }
-  return H;
-}
 
 /// Largest difference between two covariances, in standard deviations.
 double difference(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& expected) {
@@ -144,7 +127,7 @@ TEST_F(Batch, CovarianceIsThatOfTheDenseInverse) {
   }
   const BatchSolution batch = make(options).solve(whole);
   // Scaled to a unit diagonal: metres and biases together are beyond what a dense inverse can hold.
-  const Eigen::MatrixXd H = dense(batch.normal_equations);
+  const Eigen::MatrixXd H = Dense(batch.system).H;
   const Eigen::VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * H * scale.asDiagonal();
   const Eigen::MatrixXd covariance = scale.asDiagonal() * scaled.inverse() * scale.asDiagonal();

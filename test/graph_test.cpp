@@ -11,6 +11,7 @@
 #include <memory>
 #include <numeric>
 
+#include "dense_system.h"
 #include "radar_smoother.h"
 #include "rio_t/factors/constant_offset_factor.h"
 #include "rio_t/factors/doppler_factor.h"
@@ -93,32 +94,9 @@ struct LinearWindow {
   std::shared_ptr<Block> calibration;
 };
 
-struct Dense {
-  explicit Dense(const NormalEquations& system) {
-    Eigen::Index rows = 0;
-    for (const Eigen::VectorXd& b_i : system.gradient) {
-      first.push_back(rows);
-      rows += b_i.size();
-    }
-    H = Eigen::MatrixXd::Zero(rows, rows);
-    b = Eigen::VectorXd::Zero(rows);
-    for (std::size_t i = 0; i < first.size(); ++i) {
-      b.segment(first[i], system.gradient[i].size()) = system.gradient[i];
-      H.block(first[i], first[i], system.diagonal[i].rows(), system.diagonal[i].rows()) = system.diagonal[i];
-      for (const auto& [j, part] : system.coupling[i]) {
-        H.block(first[i], first[j], part.rows(), part.cols()) = part;
-        H.block(first[j], first[i], part.cols(), part.rows()) = part.transpose();
-      }
-    }
-  }
-  std::vector<Eigen::Index> first;
-  Eigen::MatrixXd H;
-  Eigen::VectorXd b;
-};
-
 TEST(Elimination, SolvesLikeTheDenseSystem) {
   const LinearWindow linear(5);
-  const NormalEquations system = linearize(linear.window);
+  const LinearSystem system = linearize(linear.window);
   const Dense dense(system);
   const Eigen::VectorXd expected = dense.H.ldlt().solve(-dense.b);
   const auto elimination = Elimination::of(system);
@@ -133,7 +111,7 @@ TEST(Elimination, SolvesLikeTheDenseSystem) {
 
 TEST(Elimination, CovariancesAreThoseOfTheDenseInverse) {
   const LinearWindow linear(5);
-  const NormalEquations system = linearize(linear.window);
+  const LinearSystem system = linearize(linear.window);
   const Dense dense(system);
   const Eigen::MatrixXd inverse = dense.H.inverse();
   const auto elimination = Elimination::of(system);
@@ -201,27 +179,46 @@ TEST(Marginalization, AWalkWidensWhatThePriorSays) {
   EXPECT_LT((widened.H.inverse() - expected).norm(), 1e-6 * expected.norm());
 }
 
-TEST(SquareRoot, CarriesInformationAndGradient) {
-  Eigen::MatrixXd A(8, 8);
-  for (int i = 0; i < A.size(); ++i) A(i) = wave(5 + i);
-  Information information{A * A.transpose() + 0.5 * Eigen::MatrixXd::Identity(8, 8), Eigen::VectorXd(8)};
-  information.S.row(3) *= 1e6;  // as different as metres and biases
-  information.S.col(3) *= 1e6;
-  for (int i = 0; i < 8; ++i) information.s(i) = wave(40 + i);
-  const SquareRoot root = squareRoot(information);
-  const Eigen::VectorXd scale = information.S.diagonal().cwiseSqrt().cwiseInverse();
-  EXPECT_LT((scale.asDiagonal() * (root.J.transpose() * root.J - information.S) * scale.asDiagonal()).norm(),
-            1e-10);
-  EXPECT_LT((root.J.transpose() * root.r0 - information.s).cwiseProduct(scale).norm(), 1e-9);
+TEST(Marginalization, KeepsWhatIsHardlyKnown) {
+  // A chain of numbers. Only the first is observed, a billion times worse than each knows the next.
+  Window window;
+  const auto one = std::make_shared<VectorManifold>(1);
+  constexpr double kSigma = 1e3, kStep = 1e-6;
+  const auto root = [](std::vector<double> row) {
+    return SquareRoot{Eigen::Map<Eigen::RowVectorXd>(row.data(), static_cast<Eigen::Index>(row.size())),
+                      Eigen::VectorXd::Zero(1)};
+  };
+  Block* last = &window.addNode(Time(), one, Eigen::VectorXd::Zero(1));
+  addPrior(window, {last}, root({1.0 / kSigma}));
+  for (int k = 1; k < 3000; ++k) {
+    Block& next = window.addNode(Time::fromSeconds(0.01 * k), one, Eigen::VectorXd::Zero(1));
+    addPrior(window, {last, &next}, root({-1.0 / kStep, 1.0 / kStep}));
+    marginalize(window, {last}, {});
+    last = &next;
+  }
+  EXPECT_NEAR(std::sqrt(linearized(window).elimination.covariance({0})(0, 0)), kSigma, 1e-3 * kSigma);
+}
+
+TEST(SquareRoot, CompressedSaysTheSame) {
+  SquareRoot rows{Eigen::MatrixXd(11, 8), Eigen::VectorXd(11)};
+  for (int i = 0; i < rows.J.size(); ++i) rows.J(i) = wave(5 + i);
+  rows.J.col(3) *= 1e6;  // as different as metres and biases
+  for (int i = 0; i < rows.r0.size(); ++i) rows.r0(i) = wave(40 + i);
+  const SquareRoot root = compressed(rows);
+  ASSERT_EQ(root.J.rows(), 8);
+  const Eigen::VectorXd scale = rows.J.colwise().norm().cwiseInverse();
+  const Eigen::MatrixXd J = rows.J * scale.asDiagonal(), again = root.J * scale.asDiagonal();
+  EXPECT_LT((again.transpose() * again - J.transpose() * J).norm(), 1e-12);
+  EXPECT_LT((again.transpose() * root.r0 - J.transpose() * rows.r0).norm(), 1e-12);
 }
 
 TEST(SquareRoot, LeavesTheUnknownFree) {
-  Information information{Eigen::MatrixXd::Zero(4, 4), Eigen::VectorXd::Zero(4)};
-  information.S(2, 2) = 4.0;
-  information.s(2) = 1.0;
-  const SquareRoot root = squareRoot(information);
-  EXPECT_LT((root.J.transpose() * root.J - information.S).norm(), 1e-12);
-  EXPECT_TRUE(root.r0.allFinite());
+  SquareRoot rows{Eigen::MatrixXd::Zero(6, 4), Eigen::VectorXd::Zero(6)};
+  rows.J(1, 2) = 2.0;
+  rows.r0(1) = 0.5;
+  const SquareRoot root = compressed(rows);
+  EXPECT_LT((root.J.transpose() * root.J - rows.J.transpose() * rows.J).norm(), 1e-12);
+  EXPECT_LT((root.J.transpose() * root.r0 - rows.J.transpose() * rows.r0).norm(), 1e-12);
 }
 
 /// A window with every kind of factor, beside its minimum.
@@ -328,13 +325,14 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
 
   /// Largest slope per standard deviation, but of the offset where it is at its bound.
   double slope() const {
-    const NormalEquations system = linearize(window);
+    const LinearSystem system = linearize(window);
+    const Dense dense(system);
     double largest = 0.0;
     for (std::size_t i = 0; i < system.blocks.size(); ++i) {
       if (system.blocks[i] == offset.get() && std::abs(offset->x[0]) == offset->bound) continue;
-      const Eigen::VectorXd scaled =
-          system.gradient[i].cwiseQuotient(system.diagonal[i].diagonal().cwiseSqrt());
-      largest = std::max(largest, scaled.norm());
+      const Eigen::VectorXd b = system.gradient(static_cast<int>(i));
+      const Eigen::VectorXd squares = dense.H.diagonal().segment(dense.first[i], b.size());
+      largest = std::max(largest, b.cwiseQuotient(squares.cwiseSqrt()).norm());
     }
     return largest;
   }
@@ -345,7 +343,7 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
   std::shared_ptr<Block> offset, extrinsics;
 };
 
-TEST_P(Windows, TheNormalEquationsAreThoseOfCeres) {
+TEST_P(Windows, TheLinearSystemIsThatOfCeres) {
   for (const TimeOffsetModel kind : {TimeOffsetModel::kConstantAcceleration, TimeOffsetModel::kImu}) {
     make(0.01, 0.25, 0.0, false, kind);
     ceres::Problem::EvaluateOptions order;
@@ -360,7 +358,7 @@ TEST_P(Windows, TheNormalEquationsAreThoseOfCeres) {
     const Eigen::MatrixXd H = J.transpose() * J;
     const Eigen::Map<const Eigen::VectorXd> b(gradient.data(), J.cols());
 
-    const NormalEquations system = linearize(window);
+    const LinearSystem system = linearize(window);
     const Dense dense(system);
     EXPECT_NEAR(system.cost, cost, 1e-12 * cost);
     ASSERT_EQ(dense.H.rows(), H.rows());

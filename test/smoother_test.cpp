@@ -89,9 +89,11 @@ TEST_F(Smoother, AShortWindowEqualsALongOneWhereTheProblemIsNearlyLinear) {
   EXPECT_NEAR(std::log(a.newestCovariance()(15, 15) / b.newestCovariance()(15, 15)), 0.0, 0.1);
 }
 
-TEST_F(Smoother, APositionThatIsHardlyKnownStopsNothing) {
+TEST_F(Smoother, APositionAndAHeadingThatAreHardlyKnownStaySo) {
   SmootherOptions options;
-  options.prior_sigma_position = 1e5;  // beside an IMU factor that knows it to a tenth of a millimetre
+  options.prior_sigma_position = 1e5;  // beside an IMU factor that knows its change to micrometres
+  options.prior_sigma_yaw = 1.0;
+  options.prior_sigma_velocity = 1e3;  // a velocity that is known in W would tell the heading
   RadarSmoother smoother = make(options);
   for (double stamp = 0.7; stamp < kEnd; stamp += 0.02) {
     smoother.add(measurement(stamp, 0.03));
@@ -100,8 +102,12 @@ TEST_F(Smoother, APositionThatIsHardlyKnownStopsNothing) {
   }
   EXPECT_NEAR(smoother.t_O(), 0.03, 2e-4);
   const Eigen::MatrixXd P = smoother.newestCovariance();
-  EXPECT_GT(std::sqrt(P(StateBlock::kP, StateBlock::kP)), 10.0);
-  EXPECT_LT(std::sqrt(P(StateBlock::kV, StateBlock::kV)), 0.1);
+  EXPECT_NEAR(std::sqrt(P(StateBlock::kP, StateBlock::kP)), 1e5, 100.0);
+  const Eigen::Vector3d up_I = smoother.newest().x.q_WI().conjugate() * Eigen::Vector3d::UnitZ();
+  EXPECT_NEAR(std::sqrt(up_I.dot(P.topLeftCorner<3, 3>() * up_I)), 1.0, 1e-2);
+  const Eigen::Vector3d v_W = smoother.newest().x.v_W();
+  EXPECT_LT(std::sqrt(P(StateBlock::kV + 2, StateBlock::kV + 2)), 0.1);
+  EXPECT_LT(std::sqrt(P(StateBlock::kV, StateBlock::kV)), 0.1 + v_W.norm());
 }
 
 TEST_F(Smoother, ALateScanIsInsertedAtItsTime) {

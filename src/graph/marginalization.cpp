@@ -6,17 +6,6 @@
 namespace rio_t {
 namespace {
 
-/// A walk w of block o, o' = o + w: what is known of o' is S - S_o (S_oo + W^-1)^-1 S_o'.
-void widen(Information& information, Eigen::Index first, const Eigen::VectorXd& variance) {
-  const Eigen::Index size = variance.size();
-  Eigen::MatrixXd sum = information.S.block(first, first, size, size);
-  sum.diagonal() += variance.cwiseInverse();
-  const Eigen::MatrixXd column = information.S.middleCols(first, size);
-  const Eigen::MatrixXd gain = sum.ldlt().solve(column.transpose()).transpose();
-  information.s -= gain * information.s.segment(first, size).eval();
-  information.S -= gain * column.transpose();
-}
-
 bool contains(const std::vector<const Block*>& blocks, const Block* block) {
   return std::find(blocks.begin(), blocks.end(), block) != blocks.end();
 }
@@ -78,15 +67,15 @@ void marginalize(Window& window, std::vector<const Block*> leaving, const std::v
     kept.push_back(block.get());
     order.push_back(block.get());
   }
-  Information information = eliminateFirst(linearize(order, terms), static_cast<int>(leaving.size()));
+  SquareRoot known = eliminateFirst(linearize(order, terms), static_cast<int>(leaving.size()));
   Eigen::Index first = 0;
   for (const Block* block : kept) {
     for (const Walk& walk : walks)
-      if (walk.block == block && walk.variance.minCoeff() > 0.0) widen(information, first, walk.variance);
+      if (walk.block == block && walk.variance.minCoeff() > 0.0) known = widened(known, first, walk.variance);
     first += block->manifold->tangent();
   }
   for (const Block* block : leaving) window.remove(*block);
-  if (!kept.empty()) addPrior(window, kept, squareRoot(information));
+  if (!kept.empty()) addPrior(window, kept, known);
 }
 
 }  // namespace rio_t

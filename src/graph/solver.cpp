@@ -41,24 +41,24 @@ class StopEarly final : public ceres::IterationCallback {
 };
 
 /// The blocks that stand at their bound, with the cost falling outwards.
-std::vector<int> pushedOutwards(const Window& window, const NormalEquations& system) {
+std::vector<int> pushedOutwards(const Window& window, const LinearSystem& system) {
   std::vector<int> result;
   for (std::size_t i = 0; i < system.blocks.size(); ++i) {
     const Block& block = *window.blocks()[i];
     if (std::isfinite(block.bound) && std::abs(block.x[0]) >= block.bound &&
-        system.gradient[i][0] * block.x[0] < 0.0)
+        system.gradient(static_cast<int>(i))[0] * block.x[0] < 0.0)
       result.push_back(static_cast<int>(i));
   }
   return result;
 }
 
-Elimination eliminationOf(const NormalEquations& system) {
+Elimination eliminationOf(const LinearSystem& system) {
   std::optional<Elimination> elimination = Elimination::of(system);
   if (!elimination) throw std::runtime_error("graph: the data do not determine every state");
   return std::move(*elimination);
 }
 
-NormalEquations holding(const std::vector<int>& held, NormalEquations system) {
+LinearSystem holding(const std::vector<int>& held, LinearSystem system) {
   for (const int i : held) system.hold(i);
   return system;
 }
@@ -66,7 +66,7 @@ NormalEquations holding(const std::vector<int>& held, NormalEquations system) {
 /// Length of the undamped step given that some blocks are held.
 double squaredLength(const Solution& solution, const std::vector<int>& held) {
   if (held.empty()) return solution.elimination.squaredLength();
-  return eliminationOf(holding(held, solution.normal_equations)).squaredLength();
+  return eliminationOf(holding(held, solution.system)).squaredLength();
 }
 
 ceres::Solver::Options solverOptions() {
@@ -128,7 +128,7 @@ std::optional<TakenStep> lowerCost(const std::vector<Eigen::VectorXd>& step, dou
   return std::nullopt;
 }
 
-/// After a whole step whose cost differs by `unforeseen` from what the normal equations promised. A
+/// After a whole step whose cost differs by `unforeseen` from what the linear system promised. A
 /// difference that grows with the cube of the step leaves three times as much slope along it. A step of more
 /// than a sigma tells nothing: it may leave slope across it, too.
 double squaredLengthLeft(double unforeseen, double squared_length) {
@@ -138,7 +138,7 @@ double squaredLengthLeft(double unforeseen, double squared_length) {
 
 Solution solveByChain(Window& window, const SolverLimits& limits) {
   Solution solution;
-  NormalEquations& system = solution.normal_equations;
+  LinearSystem& system = solution.system;
   system = linearize(window);
   double damping = 0.0;
   bool tested = false;  // the undamped step from here is long
@@ -210,7 +210,7 @@ Solution solveByCeres(Window& window, const SolverLimits& limits) {
     const std::vector<int> held_before = release();
     Solution solution = linearized(window);
     solution.iterations = iterations;
-    const std::vector<int> outwards = pushedOutwards(window, solution.normal_equations);
+    const std::vector<int> outwards = pushedOutwards(window, solution.system);
     const bool is_short = squaredLength(solution, outwards) < limits.short_step;
     if (is_short) {
       solution.termination = outwards.empty() ? SolverTermination::kConverged : SolverTermination::kAtBound;
@@ -231,8 +231,8 @@ Solution solveByCeres(Window& window, const SolverLimits& limits) {
 
 Solution linearized(const Window& window) {
   Solution solution;
-  solution.normal_equations = linearize(window);
-  solution.elimination = eliminationOf(solution.normal_equations);
+  solution.system = linearize(window);
+  solution.elimination = eliminationOf(solution.system);
   return solution;
 }
 

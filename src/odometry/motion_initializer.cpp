@@ -276,9 +276,7 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
     mean_square += square / n;
     mean_share += covariances[i].whole.ldlt().solve(covariances[i].scaled).trace() / (3.0 * n);
   }
-  const Information all = eliminateFirst(solution.normal_equations, 0);
-  const Eigen::Index size = prior.J.cols();  // without extrinsics that are constant
-  const SquareRoot root = squareRoot({all.S.topLeftCorner(size, size), all.s.head(size)});
+  const SquareRoot root = eliminateFirst(solution.system, 0);
   prior = {toStateBlock(state.x), offset->x[0], toExtrinsics(extrinsics->x.data()), root.J, root.r0};
   // The solution is drawn towards the velocities: what is left scatters less.
   const double left = 3.0 * n / (3.0 * n - kUnknowns);

@@ -217,7 +217,7 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
       solution.termination =
           placed || !solved.converged() ? solved.termination : SolverTermination::kIterationLimit;
       read(graph, solved, solution);
-      solution.normal_equations = std::move(solved.normal_equations);
+      solution.system = std::move(solved.system);
       return solution;
     }
     for (std::size_t i = 0; i < t_O.size(); ++i) t_O[i] = graph.scans[i].offset->x[0];
@@ -229,7 +229,7 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
 void BatchSmoother::read(const Graph& graph, const Solution& solved, BatchSolution& solution) const {
   const std::vector<std::map<int, Eigen::MatrixXd>> P = solved.elimination.covariances();
   std::unordered_map<const Block*, int> index;
-  for (const Block* block : solved.normal_equations.blocks)
+  for (const Block* block : solved.system.blocks)
     index.emplace(block, static_cast<int>(index.size()));
   for (const Block* node : graph.nodes)
     solution.covariances.emplace_back(P[index.at(node)].at(index.at(node)));

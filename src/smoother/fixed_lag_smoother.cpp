@@ -56,8 +56,8 @@ std::optional<NodeEstimate> FixedLagSmoother::nodeBefore(Time time) const {
 
 Eigen::MatrixXd FixedLagSmoother::covarianceOf(const Block& node,
                                                const std::vector<const Block*>& calibration) const {
-  std::vector<int> indices = {solution_.normal_equations.indexOf(node)};
-  for (const Block* block : calibration) indices.push_back(solution_.normal_equations.indexOf(*block));
+  std::vector<int> indices = {solution_.system.indexOf(node)};
+  for (const Block* block : calibration) indices.push_back(solution_.system.indexOf(*block));
   if (std::any_of(indices.begin(), indices.end(), [](int i) { return i < 0; }))
     throw std::logic_error("smoother: asked for the covariance of what was not solved for");
   return solution_.elimination.covariance(indices);

@@ -20,9 +20,11 @@ NodePrior priorAtRest(const SmootherOptions& options, const ImuNoise& noise, con
   using S = StateBlock;
   const Eigen::VectorXd calibration = calibrationSigmas(options);
   const Eigen::Index size = S::kTangent + calibration.size();
-  Information known{Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size)};
-  const auto add = [&](const Eigen::MatrixXd& rows, int first, double sigma) {
-    known.S.block(first, first, rows.cols(), rows.cols()) += rows.transpose() * rows / (sigma * sigma);
+  SquareRoot known{Eigen::MatrixXd(0, size), {}};
+  const auto add = [&](const Eigen::MatrixXd& rows, Eigen::Index first, double sigma) {
+    known.J.conservativeResize(known.J.rows() + rows.rows(), Eigen::NoChange);
+    known.J.bottomRows(rows.rows()).setZero();
+    known.J.block(known.J.rows() - rows.rows(), first, rows.rows(), rows.cols()) = rows / sigma;
   };
   const auto addVector = [&](int first, double sigma) { add(Eigen::Matrix3d::Identity(), first, sigma); };
 
@@ -35,7 +37,8 @@ NodePrior priorAtRest(const SmootherOptions& options, const ImuNoise& noise, con
   const double root_T = std::sqrt(duration);
   addVector(S::kBg, std::hypot(options.prior_sigma_gyro_bias, noise.gyro_density / root_T));
   addVector(S::kBa, options.prior_sigma_accel_bias);
-  known.S.diagonal().tail(calibration.size()) = calibration.cwiseAbs2().cwiseInverse();
+  for (Eigen::Index k = 0; k < calibration.size(); ++k)
+    add(Eigen::MatrixXd::Identity(1, 1), S::kTangent + k, calibration[k]);
 
   // The mean accelerometer, R_IW (0, 0, g) + b_a: also the platform may have gained velocity meanwhile.
   const double gained = std::sqrt(2.0) * options.prior_sigma_velocity / duration;
@@ -44,7 +47,8 @@ NodePrior priorAtRest(const SmootherOptions& options, const ImuNoise& noise, con
   J.middleCols<3>(S::kTheta) = so3::hat(gravity * R_WI.row(2).transpose());
   J.middleCols<3>(S::kBa).setIdentity();
   add(J, 0, sigma);
-  const SquareRoot root = squareRoot(known);
+  known.r0.setZero(known.J.rows());
+  const SquareRoot root = compressed(known);
   return {x, options.time_offset_initial, T_IR, root.J, root.r0};
 }
 

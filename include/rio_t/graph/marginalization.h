@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "rio_t/graph/normal_equations.h"
+#include "rio_t/graph/elimination.h"
 #include "rio_t/graph/window.h"
 
 namespace rio_t {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "rio_t/graph/normal_equations.h"
+#include "rio_t/graph/elimination.h"
 #include "rio_t/graph/solver_termination.h"
 #include "rio_t/graph/window.h"
 
@@ -8,7 +8,7 @@ namespace rio_t {
 
 /// Both minimise the same window with the same cost functions.
 enum class WindowSolver {
-  kChain,  ///< Gauss-Newton with the elimination of normal_equations.h
+  kChain,  ///< Gauss-Newton with the block elimination of elimination.h
   kCeres,  ///< ceres::Solve, several times slower
 };
 
@@ -24,8 +24,8 @@ struct Solution {
   int iterations = 0;
   SolverTermination termination = SolverTermination::kIterationLimit;
   bool converged() const { return isConverged(termination); }
-  NormalEquations normal_equations;  ///< at the solution, or one step before it over which they hold
-  Elimination elimination;           ///< of them
+  LinearSystem system;      ///< at the solution, or one step before it over which it holds
+  Elimination elimination;  ///< of it
 };
 
 /// Moves the blocks to the minimum of the cost. Holds a block that would cross its bound at the bound. Throws
@@ -34,7 +34,7 @@ struct Solution {
 /// kChain: Gauss-Newton from the current values. If a step does not lower the cost, the solver tries a half
 /// of it and less, and then Levenberg-Marquardt damping. It has converged when the undamped step is short; it
 /// still takes that step. It has also converged when the cost after a whole undamped step is near enough to
-/// what the normal equations promised (docs/method.md, eq. 23c). A damped step may be short because of the
+/// what the linear system promised (docs/method.md, eq. 23c). A damped step may be short because of the
 /// damping alone, so it proves nothing.
 /// kCeres: ceres::Solve on the problem that lives as long as the window. Ceres also reports convergence when
 /// its trust region made a step short. So the undamped step at its solution decides why it ended.

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 
 #include "rio_t/factors/state_block.h"
-#include "rio_t/graph/normal_equations.h"
+#include "rio_t/graph/elimination.h"
 #include "rio_t/imu/noise.h"
 #include "rio_t/radar/extrinsics.h"
 #include "rio_t/smoother/options.h"

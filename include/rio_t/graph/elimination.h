@@ -1,0 +1,48 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "rio_t/graph/linear_system.h"
+
+/// Block elimination of the linearised graph by QR (docs/method.md, section 6.3).
+namespace rio_t {
+
+/// The factor R of J = Q R, block by block in their order: R_ii, and R_ij for the later blocks j that the
+/// rows of block i touch.
+class Elimination {
+ public:
+  /// None if the rows do not determine every block. `damping` (Levenberg-Marquardt) raises the squares of the
+  /// columns by this share.
+  static std::optional<Elimination> of(const LinearSystem& system, double damping = 0.0);
+
+  const std::vector<Eigen::VectorXd>& delta() const { return delta_; }
+  /// |R delta|^2: the squared length of the step in sigmas.
+  double squaredLength() const { return squared_length_; }
+  /// Joint covariance of some blocks, by their indices, in that order.
+  Eigen::MatrixXd covariance(const std::vector<int>& indices) const;
+  /// Covariance of every block, and of every two that R connects: [i][j], j >= i.
+  std::vector<std::map<int, Eigen::MatrixXd>> covariances() const;
+
+ private:
+  std::vector<RowMatrix> L_;                 ///< R_ii transposed
+  std::vector<std::map<int, RowMatrix>> W_;  ///< R_ij
+  std::vector<Eigen::VectorXd> delta_;
+  double squared_length_ = 0.0;
+};
+
+/// What rows say: J delta + r0. J has a row for each of its columns.
+struct SquareRoot {
+  Eigen::MatrixXd J;
+  Eigen::VectorXd r0;
+};
+/// The same J'J, J'r0 with a row for each column.
+SquareRoot compressed(const SquareRoot& rows);
+/// What is known of the other blocks when the first `count` are eliminated. Throws std::runtime_error if the
+/// rows do not determine the first ones.
+SquareRoot eliminateFirst(const LinearSystem& system, int count);
+/// The same about x' = x + w, where w is a random walk of the columns from `first` on, with these variances.
+SquareRoot widened(const SquareRoot& known, Eigen::Index first, const Eigen::VectorXd& variances);
+
+}  // namespace rio_t

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "rio_t/graph/window.h"
+
+namespace rio_t {
+
+/// By rows, as Ceres writes Jacobians.
+using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// Rows J delta + r of the linearised graph, whitened and after the loss.
+struct LinearRows {
+  std::vector<int> blocks;  ///< that they depend on, ascending
+  RowMatrix Jr;             ///< the tangents of `blocks`, one after the other, and r in the last column
+};
+
+/// The linearised graph: the least squares of all rows, in the tangents of `blocks`. It keeps the rows and
+/// not the normal equations J'J. Nothing observes position and heading, so they may be known a billion times
+/// worse than an IMU term knows their changes. The squares of both do not fit into the digits of a double.
+struct LinearSystem {
+  std::vector<const Block*> blocks;
+  std::vector<LinearRows> rows;
+  std::vector<bool> is_held;  ///< blocks that are not solved for: no row has them
+  double cost = 0.0;          ///< half the sum of squares, after the loss
+
+  int indexOf(const Block& block) const;  ///< -1 if it is not among them
+  Eigen::Index tangent(int i) const { return blocks[i]->manifold->tangent(); }
+  Eigen::VectorXd gradient(int i) const;  ///< J'r of block i
+  void hold(int i);                       ///< takes block i out of all rows
+};
+
+/// Linearises `terms` at the current values of the blocks. A block that is constant is held; one that is not
+/// in `blocks` is not solved for. Throws std::runtime_error if a cost function fails.
+LinearSystem linearize(std::vector<const Block*> blocks, const std::vector<const Term*>& terms);
+LinearSystem linearize(const Window& window);
+/// LinearSystem::cost of the window, without derivatives.
+double costOf(const Window& window);
+
+}  // namespace rio_t

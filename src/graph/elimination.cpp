@@ -1,0 +1,390 @@
+#include "rio_t/graph/elimination.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <deque>
+#include <stdexcept>
+#include <type_traits>
+#include <utility>
+
+namespace rio_t {
+namespace {
+
+/// Rounding leaves some 1e-15 of a column that the rows do not determine.
+constexpr double kNothing = 1e-14;
+
+/// Rows of numbers whose length is a multiple of kPart, one after the other. Keeps its memory.
+class Tableau {
+ public:
+  static constexpr Eigen::Index kPart = 8;
+
+  void reset(Eigen::Index rows, Eigen::Index columns) {
+    rows_ = rows;
+    stride_ = (columns + kPart - 1) / kPart * kPart;
+    numbers_.assign(static_cast<std::size_t>(rows * stride_), 0.0);
+  }
+  Eigen::Index rows() const { return rows_; }
+  double* row(Eigen::Index i) { return numbers_.data() + i * stride_; }
+  const double* row(Eigen::Index i) const { return numbers_.data() + i * stride_; }
+
+  /// Householder reflections that clear the columns from `first` to `end` below the diagonal. They pass over
+  /// rows with a zero in the column: most derivatives are zero.
+  void triangularise(Eigen::Index first, Eigen::Index end) {
+    for (Eigen::Index k = first; k < std::min(end, rows_ - 1); ++k) {
+      reflected_ = {k};
+      double square = row(k)[k] * row(k)[k];
+      for (Eigen::Index i = k + 1; i < rows_; ++i) {
+        const double x = row(i)[k];
+        if (x == 0.0) continue;
+        reflected_.push_back(i);
+        square += x * x;
+      }
+      if (reflected_.size() == 1) continue;
+      const double norm = std::sqrt(square);
+      const double pivot = row(k)[k];
+      v_.clear();
+      for (const Eigen::Index i : reflected_) v_.push_back(row(i)[k]);
+      v_.front() += pivot > 0.0 ? norm : -norm;
+      const double scale = 1.0 / (norm * (norm + std::abs(pivot)));
+      // Whole parts: the columns before k are zero in these rows, and stay zero.
+      for (Eigen::Index part = k / kPart * kPart; part < stride_; part += kPart) reflect(part, scale);
+      for (const Eigen::Index i : reflected_) row(i)[k] = 0.0;
+      row(k)[k] = pivot > 0.0 ? -norm : norm;
+    }
+  }
+
+ private:
+  /// The sums stay in registers.
+  void reflect(Eigen::Index part, double scale) {
+    std::array<double, kPart> sums{};
+    for (std::size_t n = 0; n < v_.size(); ++n) {
+      const double* const from = row(reflected_[n]) + part;
+      for (std::size_t j = 0; j < kPart; ++j) sums[j] += v_[n] * from[j];
+    }
+    for (double& sum : sums) sum *= scale;
+    for (std::size_t n = 0; n < v_.size(); ++n) {
+      double* const to = row(reflected_[n]) + part;
+      for (std::size_t j = 0; j < kPart; ++j) to[j] -= v_[n] * sums[j];
+    }
+  }
+
+  Eigen::Index rows_ = 0, stride_ = 0;
+  std::vector<double> numbers_;
+  std::vector<Eigen::Index> reflected_;
+  std::vector<double> v_;
+};
+
+/// The rows of a tableau from `from` on, as many as columns.
+SquareRoot squareRootOf(const Tableau& tableau, Eigen::Index from, Eigen::Index columns) {
+  SquareRoot result{Eigen::MatrixXd::Zero(columns, columns), Eigen::VectorXd::Zero(columns)};
+  for (Eigen::Index i = 0; i < std::min(columns, tableau.rows() - from); ++i) {
+    const Eigen::Map<const Eigen::RowVectorXd> row(tableau.row(from + i) + from, columns + 1);
+    result.J.row(i) = row.head(columns);
+    result.r0[i] = row[columns];
+  }
+  return result;
+}
+
+/// Eliminates the blocks of a system, first to last.
+class BlockElimination {
+ public:
+  struct Eliminated {
+    RowMatrix L;               ///< R_ii transposed
+    std::map<int, RowMatrix> W;  ///< R_ij
+    Eigen::VectorXd z;         ///< their right side: R delta + z
+  };
+
+  BlockElimination(const LinearSystem& system, double damping)
+      : system_(system), damping_(damping), waiting_(system.blocks.size()) {
+    for (std::size_t i = 0; i < system.blocks.size(); ++i)
+      squares_.emplace_back(Eigen::VectorXd::Zero(system.tangent(static_cast<int>(i))));
+    for (const LinearRows& each : system.rows) {
+      if (each.blocks.empty()) continue;
+      waiting_[static_cast<std::size_t>(each.blocks.front())].push_back(&each);
+      Eigen::Index first = 0;
+      for (const int k : each.blocks) {
+        Eigen::VectorXd& squares = squares_[static_cast<std::size_t>(k)];
+        squares += each.Jr.middleCols(first, squares.size()).colwise().squaredNorm().transpose();
+        first += squares.size();
+      }
+    }
+  }
+
+  /// None if the rows do not determine block i. What they say of later blocks waits for these.
+  std::optional<Eliminated> eliminate(int i) {
+    const std::vector<const LinearRows*> stacked =
+        std::exchange(waiting_[static_cast<std::size_t>(i)], {});
+    const Eigen::VectorXd& squares = squares_[static_cast<std::size_t>(i)];
+    const Eigen::Index own = squares.size();
+    columns_.assign(1, i);
+    Eigen::Index rows = damping_ > 0.0 ? own : 0;
+    for (const LinearRows* each : stacked) {
+      columns_.insert(columns_.end(), each->blocks.begin(), each->blocks.end());
+      rows += each->Jr.rows();
+    }
+    std::sort(columns_.begin(), columns_.end());
+    columns_.erase(std::unique(columns_.begin(), columns_.end()), columns_.end());
+    starts_.clear();
+    Eigen::Index others = 0;
+    for (const int k : columns_) {
+      starts_.push_back(others);
+      others += system_.tangent(k);
+    }
+    if (rows < own) return std::nullopt;
+    const Eigen::Index last = others;  // the column of r
+    tableau_.reset(rows, last + 1);
+    Eigen::Index row = 0;
+    for (const LinearRows* each : stacked) row = stack(*each, row, last);
+    if (damping_ > 0.0)
+      for (Eigen::Index k = 0; k < own; ++k) tableau_.row(row + k)[k] = std::sqrt(damping_ * squares[k]);
+    tableau_.triangularise(0, own);
+    for (Eigen::Index k = 0; k < own; ++k)
+      if (!(std::abs(tableau_.row(k)[k]) > kNothing * std::sqrt(squares[k]))) return std::nullopt;
+    keepRest(own, last);
+    return read(own, last);
+  }
+
+  /// What the rows that still wait say of the blocks from `first` on that are not held.
+  SquareRoot rest(int first) {
+    columns_.clear();
+    starts_.clear();
+    Eigen::Index last = 0, rows = 0;
+    for (int k = first; k < static_cast<int>(waiting_.size()); ++k) {
+      if (system_.is_held[static_cast<std::size_t>(k)]) continue;
+      columns_.push_back(k);
+      starts_.push_back(last);
+      last += system_.tangent(k);
+      for (const LinearRows* each : waiting_[static_cast<std::size_t>(k)]) rows += each->Jr.rows();
+    }
+    tableau_.reset(rows, last + 1);
+    Eigen::Index row = 0;
+    for (const int k : columns_)
+      for (const LinearRows* each : waiting_[static_cast<std::size_t>(k)]) row = stack(*each, row, last);
+    tableau_.triangularise(0, last);
+    return squareRootOf(tableau_, 0, last);
+  }
+
+ private:
+  /// Copies rows into the tableau; returns the row after them.
+  Eigen::Index stack(const LinearRows& rows, Eigen::Index row, Eigen::Index last) {
+    for (Eigen::Index i = 0; i < rows.Jr.rows(); ++i, ++row) {
+      const double* from = rows.Jr.data() + i * rows.Jr.cols();
+      double* const to = tableau_.row(row);
+      std::size_t at = 0;
+      for (const int k : rows.blocks) {
+        while (columns_[at] != k) ++at;
+        const Eigen::Index width = system_.tangent(k);
+        std::copy_n(from, width, to + starts_[at]);
+        from += width;
+      }
+      to[last] = *from;
+    }
+    return row;
+  }
+
+  /// The rows below the first `own` wait for the next block, no more of them than they have columns.
+  void keepRest(Eigen::Index own, Eigen::Index last) {
+    if (columns_.size() == 1) return;
+    Eigen::Index rows = tableau_.rows() - own;
+    if (rows > last - own) {
+      tableau_.triangularise(own, last);
+      rows = last - own;
+    }
+    if (rows <= 0) return;
+    LinearRows& rest = rest_.emplace_back();
+    rest.blocks.assign(columns_.begin() + 1, columns_.end());
+    rest.Jr.resize(rows, last + 1 - own);
+    for (Eigen::Index i = 0; i < rows; ++i)
+      std::copy_n(tableau_.row(own + i) + own, rest.Jr.cols(), rest.Jr.data() + i * rest.Jr.cols());
+    // First of all: its rows are triangular, so few of them are reflected.
+    auto& waiting = waiting_[static_cast<std::size_t>(rest.blocks.front())];
+    waiting.insert(waiting.begin(), &rest);
+  }
+
+  Eliminated read(Eigen::Index own, Eigen::Index last) const {
+    Eliminated result;
+    result.L.setZero(own, own);
+    result.z.resize(own);
+    for (Eigen::Index k = 0; k < own; ++k) {
+      for (Eigen::Index j = k; j < own; ++j) result.L(j, k) = tableau_.row(k)[j];
+      result.z[k] = tableau_.row(k)[last];
+    }
+    for (std::size_t at = 1; at < columns_.size(); ++at) {
+      RowMatrix& W = result.W.emplace_hint(result.W.end(), columns_[at], RowMatrix())->second;
+      W.resize(own, system_.tangent(columns_[at]));
+      for (Eigen::Index k = 0; k < own; ++k)
+        std::copy_n(tableau_.row(k) + starts_[at], W.cols(), W.data() + k * W.cols());
+    }
+    return result;
+  }
+
+  const LinearSystem& system_;
+  double damping_;
+  std::vector<Eigen::VectorXd> squares_;  ///< of the columns of each block
+  std::vector<std::vector<const LinearRows*>> waiting_;  ///< by their first block
+  std::deque<LinearRows> rest_;
+  // Of the block that is eliminated: the blocks of its columns, and where they begin.
+  std::vector<int> columns_;
+  std::vector<Eigen::Index> starts_;
+  Tableau tableau_;
+};
+
+/// Calls part(first, width) for parts of the columns, with widths that the compiler knows: 15 of a state, 6
+/// and 3 of a mounting, 1 of an offset.
+template <typename Part>
+void inParts(Eigen::Index columns, const Part& part) {
+  Eigen::Index first = 0;
+  const auto take = [&](auto width) {
+    for (; columns - first >= width; first += width) part(first, width);
+  };
+  take(std::integral_constant<int, 15>());
+  take(std::integral_constant<int, 6>());
+  take(std::integral_constant<int, 3>());
+  take(std::integral_constant<int, 1>());
+}
+
+/// sum += sign A' B. At these sizes Eigen's blocked product costs several times as much.
+void addProduct(const RowMatrix& A, const RowMatrix& B, double sign, RowMatrix& sum) {
+  if (sum.size() == 0) sum.setZero(A.cols(), B.cols());
+  inParts(B.cols(), [&](Eigen::Index first, auto width) {
+    for (Eigen::Index i = 0; i < A.cols(); ++i) {
+      double* const to = sum.data() + i * B.cols() + first;
+      std::array<double, width> sums{};
+      std::copy_n(to, width, sums.begin());
+      for (Eigen::Index row = 0; row < A.rows(); ++row) {
+        const double a = sign * A(row, i);
+        if (a == 0.0) continue;
+        const double* const b = B.data() + row * B.cols() + first;
+        for (std::size_t j = 0; j < width; ++j) sums[j] += a * b[j];
+      }
+      std::copy_n(sums.begin(), width, to);
+    }
+  });
+}
+
+/// W <- L^-1 W for the lower triangle of L.
+void forwardSubstitute(const RowMatrix& L, RowMatrix& W) {
+  inParts(W.cols(), [&](Eigen::Index first, auto width) {
+    for (Eigen::Index i = 0; i < L.rows(); ++i) {
+      double* const to = W.data() + i * W.cols() + first;
+      std::array<double, width> sums{};
+      std::copy_n(to, width, sums.begin());
+      for (Eigen::Index j = 0; j < i; ++j) {
+        const double factor = L(i, j);
+        const double* const from = W.data() + j * W.cols() + first;
+        for (std::size_t k = 0; k < width; ++k) sums[k] -= factor * from[k];
+      }
+      const double inverse = 1.0 / L(i, i);
+      for (std::size_t k = 0; k < width; ++k) to[k] = sums[k] * inverse;
+    }
+  });
+}
+
+}  // namespace
+
+std::optional<Elimination> Elimination::of(const LinearSystem& system, double damping) {
+  Elimination result;
+  const int count = static_cast<int>(system.blocks.size());
+  result.delta_.resize(system.blocks.size());
+  BlockElimination elimination(system, damping);
+  for (int i = 0; i < count; ++i) {
+    BlockElimination::Eliminated of_block;
+    if (system.is_held[static_cast<std::size_t>(i)]) {
+      of_block.L.setIdentity(system.tangent(i), system.tangent(i));
+      of_block.z.setZero(system.tangent(i));
+    } else if (auto eliminated = elimination.eliminate(i)) {
+      of_block = std::move(*eliminated);
+    } else {
+      return std::nullopt;
+    }
+    result.squared_length_ += of_block.z.squaredNorm();
+    result.delta_[static_cast<std::size_t>(i)] = -of_block.z;
+    result.L_.push_back(std::move(of_block.L));
+    result.W_.push_back(std::move(of_block.W));
+  }
+  for (std::size_t i = system.blocks.size(); i-- > 0;) {
+    Eigen::VectorXd& delta = result.delta_[i];
+    for (const auto& [j, W] : result.W_[i]) delta.noalias() -= W * result.delta_[static_cast<std::size_t>(j)];
+    result.L_[i].triangularView<Eigen::Lower>().transpose().solveInPlace(delta);
+  }
+  return result;
+}
+
+Eigen::MatrixXd Elimination::covariance(const std::vector<int>& indices) const {
+  Eigen::Index columns = 0;
+  for (const int i : indices) columns += L_[i].rows();
+  // Y = L^-1 E, where E selects the blocks: their covariance is Y'Y.
+  std::map<int, RowMatrix> Y;
+  Eigen::Index first = 0;
+  for (const int i : indices) {
+    Y[i].setZero(L_[i].rows(), columns);
+    Y[i].middleCols(first, L_[i].rows()).setIdentity();
+    first += L_[i].rows();
+  }
+  RowMatrix result = RowMatrix::Zero(columns, columns);
+  for (auto at = Y.begin(); at != Y.end(); ++at) {
+    auto& [i, y] = *at;
+    forwardSubstitute(L_[i], y);
+    for (const auto& [j, W] : W_[i]) addProduct(W, y, -1.0, Y[j]);
+    addProduct(y, y, 1.0, result);
+  }
+  return result;
+}
+
+std::vector<std::map<int, Eigen::MatrixXd>> Elimination::covariances() const {
+  std::vector<std::map<int, Eigen::MatrixXd>> P(L_.size());
+  const auto at = [&](int a, int b) -> Eigen::MatrixXd {
+    return a <= b ? P[a].at(b) : Eigen::MatrixXd(P[b].at(a).transpose());
+  };
+  for (std::size_t i = L_.size(); i-- > 0;) {
+    const auto L = L_[i].triangularView<Eigen::Lower>();
+    const Eigen::MatrixXd inverse = L.solve(Eigen::MatrixXd::Identity(L_[i].rows(), L_[i].rows()));
+    P[i][static_cast<int>(i)] = inverse.transpose() * inverse;
+    // delta_i = G_i (...) - sum_j G_ij delta_j with G_ij = R_ii^-1 R_ij.
+    std::map<int, Eigen::MatrixXd> G;
+    for (const auto& [j, W] : W_[i]) G[j] = L.transpose().solve(W);
+    for (const auto& [j, unused] : G) {
+      Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(L_[i].rows(), L_[j].rows());
+      for (const auto& [k, G_ik] : G) sum.noalias() -= G_ik * at(k, j);
+      P[i][static_cast<int>(i)].noalias() -= sum * G[j].transpose();
+      P[i][j] = std::move(sum);
+    }
+  }
+  return P;
+}
+
+SquareRoot compressed(const SquareRoot& rows) {
+  const Eigen::Index columns = rows.J.cols();
+  Tableau tableau;
+  tableau.reset(rows.J.rows(), columns + 1);
+  for (Eigen::Index i = 0; i < rows.J.rows(); ++i) {
+    Eigen::Map<Eigen::RowVectorXd>(tableau.row(i), columns + 1) << rows.J.row(i), rows.r0[i];
+  }
+  tableau.triangularise(0, columns);
+  return squareRootOf(tableau, 0, columns);
+}
+
+SquareRoot eliminateFirst(const LinearSystem& system, int count) {
+  BlockElimination elimination(system, 0.0);
+  for (int i = 0; i < count; ++i)
+    if (!system.is_held[static_cast<std::size_t>(i)] && !elimination.eliminate(i))
+      throw std::runtime_error("graph: a block that leaves is not determined");
+  return elimination.rest(count);
+}
+
+SquareRoot widened(const SquareRoot& known, Eigen::Index first, const Eigen::VectorXd& variances) {
+  // Rows in (w, x'): x = x' - w, and w = 0 +- its sigma.
+  const Eigen::Index walk = variances.size(), columns = known.J.cols(), rows = known.J.rows();
+  Tableau tableau;
+  tableau.reset(walk + rows, walk + columns + 1);
+  for (Eigen::Index k = 0; k < walk; ++k) tableau.row(k)[k] = 1.0 / std::sqrt(variances[k]);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    Eigen::Map<Eigen::RowVectorXd>(tableau.row(walk + i), walk + columns + 1)
+        << -known.J.block(i, first, 1, walk), known.J.row(i), known.r0[i];
+  }
+  tableau.triangularise(0, walk + columns);
+  return squareRootOf(tableau, walk, columns);
+}
+
+}  // namespace rio_t
