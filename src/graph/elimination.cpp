@@ -32,47 +32,44 @@ class Tableau {
   /// rows with a zero in the column: most derivatives are zero.
   void triangularise(Eigen::Index first, Eigen::Index end) {
     for (Eigen::Index k = first; k < std::min(end, rows_ - 1); ++k) {
-      reflected_ = {k};
-      double square = row(k)[k] * row(k)[k];
-      for (Eigen::Index i = k + 1; i < rows_; ++i) {
-        const double x = row(i)[k];
-        if (x == 0.0) continue;
-        reflected_.push_back(i);
-        square += x * x;
+      const double pivot = row(k)[k];
+      double square = pivot * pivot;
+      reflected_ = {{row(k), pivot}};
+      double* at = row(k + 1);
+      for (Eigen::Index i = k + 1; i < rows_; ++i, at += stride_) {
+        if (at[k] == 0.0) continue;
+        reflected_.push_back({at, at[k]});
+        square += at[k] * at[k];
       }
       if (reflected_.size() == 1) continue;
       const double norm = std::sqrt(square);
-      const double pivot = row(k)[k];
-      v_.clear();
-      for (const Eigen::Index i : reflected_) v_.push_back(row(i)[k]);
-      v_.front() += pivot > 0.0 ? norm : -norm;
+      reflected_.front().v += pivot > 0.0 ? norm : -norm;
       const double scale = 1.0 / (norm * (norm + std::abs(pivot)));
       // Whole parts: the columns before k are zero in these rows, and stay zero.
       for (Eigen::Index part = k / kPart * kPart; part < stride_; part += kPart) reflect(part, scale);
-      for (const Eigen::Index i : reflected_) row(i)[k] = 0.0;
+      for (const Reflected& each : reflected_) each.row[k] = 0.0;
       row(k)[k] = pivot > 0.0 ? -norm : norm;
     }
   }
 
  private:
+  struct Reflected {
+    double* row;
+    double v;  ///< of the reflection I - scale v v'
+  };
+
   /// The sums stay in registers.
   void reflect(Eigen::Index part, double scale) {
-    std::array<double, kPart> sums{};
-    for (std::size_t n = 0; n < v_.size(); ++n) {
-      const double* const from = row(reflected_[n]) + part;
-      for (std::size_t j = 0; j < kPart; ++j) sums[j] += v_[n] * from[j];
-    }
-    for (double& sum : sums) sum *= scale;
-    for (std::size_t n = 0; n < v_.size(); ++n) {
-      double* const to = row(reflected_[n]) + part;
-      for (std::size_t j = 0; j < kPart; ++j) to[j] -= v_[n] * sums[j];
-    }
+    using Part = Eigen::Array<double, kPart, 1>;
+    Part sums = Part::Zero();
+    for (const Reflected& each : reflected_) sums += each.v * Eigen::Map<const Part>(each.row + part);
+    sums *= scale;
+    for (const Reflected& each : reflected_) Eigen::Map<Part>(each.row + part) -= each.v * sums;
   }
 
   Eigen::Index rows_ = 0, stride_ = 0;
   std::vector<double> numbers_;
-  std::vector<Eigen::Index> reflected_;
-  std::vector<double> v_;
+  std::vector<Reflected> reflected_;
 };
 
 /// The rows of a tableau from `from` on, as many as columns.
