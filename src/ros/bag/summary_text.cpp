@@ -94,7 +94,7 @@ void addMeasured(SummaryLines& lines, const RadarSummary& radar) {
   lines.endMap();
 }
 
-void addBarometer(SummaryLines& lines, const BarometerSummary& barometer) {
+void addBarometer(SummaryLines& lines, const BarometerCounts& barometer) {
   const auto used = static_cast<double>(barometer.used);
   lines.beginMap("barometer");
   lines.add("pressures", barometer.pressures);
@@ -108,7 +108,7 @@ void addBarometer(SummaryLines& lines, const BarometerSummary& barometer) {
   lines.endMap();
 }
 
-void addGroundVehicle(SummaryLines& lines, const GroundVehicleSummary& vehicle) {
+void addGroundVehicle(SummaryLines& lines, const GroundVehicleCounts& vehicle) {
   lines.beginMap("ground_vehicle");
   lines.add("terms_used", vehicle.used);
   lines.add("terms_left_out", vehicle.left_out);
@@ -140,7 +140,7 @@ std::string summaryText(const RunSummary& summary, const std::vector<std::string
   }
   line("input_faults", summary.input_faults);
   line("solver_terminations", summary.solver_terminations);
-  line("initialized_from", summary.initialized_from.empty() ? "none" : summary.initialized_from);
+  line("initialized_from", toString(summary.initialized_from));
   line("health_at_end", summary.health_at_end);
   line("divergences", summary.divergences);
   line("reinitializations", summary.reinitializations);
@@ -190,16 +190,12 @@ std::uint64_t RunSummary::scansUsed() const {
   return used;
 }
 
-std::map<std::string, std::uint64_t> RunSummary::scansRejected() const {
-  std::map<std::string, std::uint64_t> rejected;
+Counts RunSummary::scansRejected() const {
+  Counts rejected;
   for (const RadarSummary& radar : radars) {
     for (const auto& [reason, count] : radar.scans_rejected) rejected[reason] += count;
   }
   return rejected;
-}
-
-std::string contradictionText(const GroundVehicleSummary& vehicle) {
-  return "after " + fixedText(vehicle.contradicted_at.value_or(0.0), 1) + " s " + kGroundVehicleContradicted;
 }
 
 }  // namespace rio_t
