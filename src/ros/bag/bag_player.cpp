@@ -115,12 +115,10 @@ void BagPlayer::addImu(const sensor_msgs::Imu& message, Time record) {
 
 void BagPlayer::followImuStamps(const ImuMeasurement& imu) {
   if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite()) return;  // dropped unseen
-  const ClockJumpDetector::Verdict stamp = imu_stamps_.check(imu.time);
-  const bool restarts = stamp == ClockJumpDetector::Verdict::kRestart;
-  if (restarts && odometry_.initialized()) imu_restarts_.push_back({*newest_imu_, imu.time});
-  if (!restarts && stamp != ClockJumpDetector::Verdict::kGood) return;
-  newest_imu_ = imu.time;
-  evidence_.addImu(imu.time);
+  const std::optional<Time> before = imu_stamps_.newest();
+  const bool restarts = imu_stamps_.check(imu.time) == ClockJumpDetector::Verdict::kRestart;
+  if (restarts && odometry_.initialized()) imu_restarts_.push_back({*before, imu.time});
+  if (imu_stamps_.newest() == imu.time) evidence_.addImu(imu.time);
 }
 
 void BagPlayer::addTrigger(const std_msgs::Header& message, Time record, std::size_t radar) {

@@ -77,7 +77,6 @@ class BagPlayer {
   std::optional<RadarInertialOdometry::Start> start_;
   EvidenceCollector evidence_;
   ClockJumpDetector imu_stamps_;  // the same judgement as the odometry's own
-  std::optional<Time> newest_imu_;
   std::vector<ImuRestart> imu_restarts_;
   std::uint64_t imu_count_ = 0, pressure_count_ = 0, points_not_finite_ = 0;
   NotUsableByKind imu_not_usable_, pressure_not_usable_;

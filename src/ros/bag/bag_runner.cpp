@@ -130,7 +130,9 @@ class BagJob {
   explicit BagJob(const BagRun& run)
       : run_(run), files_(runFiles(run.config)), bags_(run.bags), started_(std::chrono::steady_clock::now()) {
     const std::map<std::string, std::string> types = bags_.typesByTopic();
-    run_.config = withTopics(run.config, [&](const std::string& topic) { return topicOfBag(topic, types); });
+    run_.config = withTopics(run.config, [&](const std::string& /*key*/, const std::string& topic) {
+      return topicOfBag(topic, types);
+    });
     const Config& config = run_.config;
     std::vector<Wanted> wanted = wantedTopics(config);
     for (const Wanted& want : wanted) topics_.push_back(want.topic);
@@ -147,25 +149,14 @@ class BagJob {
   }
 
   RunSummary execute() {
-    RunSummary summary = inMode();
+    const RunMode mode = run_.config.mode;
+    RunSummary summary = mode == RunMode::kBatch ? batch() : mode == RunMode::kRefine ? refine() : online();
     if (run_.progress) run_.progress(1.0);
     if (truth_error_) throw *truth_error_;  // the estimate is saved all the same
     return summary;
   }
 
  private:
-  RunSummary inMode() {
-    switch (run_.config.mode) {
-      case RunMode::kOnline:
-        return online();
-      case RunMode::kBatch:
-        return batch();
-      case RunMode::kRefine:
-        return refine();
-    }
-    throw std::invalid_argument("not a RunMode");
-  }
-
   RunSummary online() {
     RunLog log(run_.config, output_.get(), nothingTakenOff());
     BagPlayer player(run_.config, &log, nullptr);
