@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <fstream>
 #include <functional>
+#include <initializer_list>
 #include <map>
 #include <optional>
 #include <stdexcept>
@@ -54,6 +55,9 @@ struct RunSummary : RunEvidence {
   std::uint64_t scansUsed() const;
   Counts scansRejected() const;
 };
+
+/// The text of summary.yaml. `saved`: the files of the run.
+std::string summaryText(const RunSummary& summary, const std::vector<std::string>& saved);
 
 /// A file of a run, and how it begins.
 struct RunFile {
@@ -109,7 +113,7 @@ class RunOutput {
   void finish(const RunSummary& summary);
 
  private:
-  /// A file with a large buffer of its own.
+  /// A table with a large buffer of its own. A line gets its columns one after the other.
   struct File {
     std::string path;
     std::ofstream stream;
@@ -118,15 +122,18 @@ class RunOutput {
     /// Empties it, and begins it with `text`.
     void open(const std::string& path_in, const std::string& text);
     void flush();
+    File& add(std::initializer_list<double> values, int decimals, char separator = ',');
+    File& add(const Eigen::Vector3d& v, int decimals, char separator = ',');
+    File& add(const Eigen::Quaterniond& q, int decimals, char separator = ',');  ///< x, y, z, w
+    File& add(const std::string& text);
     void endLine();
   };
 
   void removeOfEarlierRuns() const;
-  void addMap(File& file);
   File& file(std::string_view name) { return open_.find(name)->second; }  // one of files_
-  static void addExtrinsics(File& file, const ScanResult& result);
+  File& row(std::string_view name, Time stamp);                           // of that file
   void addAids(const ScanResult& result);
-  void addPose(File& file, Time time, const Eigen::Vector3d& p_W, const Eigen::Quaterniond& q_WI);
+  void addPose(std::string_view name, const StampedPose& pose);
 
   std::string folder_;
   RunFiles files_;
