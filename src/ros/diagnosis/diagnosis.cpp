@@ -33,12 +33,6 @@ double shareOf(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
-std::uint64_t sumOf(const Counts& counts, const std::vector<std::string>& names) {
-  std::uint64_t sum = 0;
-  for (const std::string& name : names) sum += countOf(counts, name);
-  return sum;
-}
-
 /// Windows, and those of them that ended with the offset at its bound.
 std::pair<std::uint64_t, std::uint64_t> windowsAtBound(const RunEvidence& evidence) {
   std::uint64_t windows = 0;
@@ -213,7 +207,8 @@ class RadarCauses {
   /// Scans that give a velocity that the IMU contradicts.
   void addContradictions() {
     const std::uint64_t judged = radar_.scans_total - radar_.scans_before_start;
-    const std::uint64_t contradicted = sumOf(radar_.scans_rejected, {"innovation", "infeasible_velocity"});
+    const std::uint64_t contradicted =
+        countOf(radar_.scans_rejected, "innovation") + countOf(radar_.scans_rejected, "infeasible_velocity");
     const double share = shareOf(contradicted, judged);
     if (share < kManyScans) return;
     cause("contradicts_imu", share,
@@ -416,15 +411,7 @@ RunVerdict verdictOf(const RunEvidence& evidence, const Diagnosis& diagnosis) {
 }  // namespace
 
 std::string toString(RunVerdict verdict) {
-  switch (verdict) {
-    case RunVerdict::kGood:
-      return "good";
-    case RunVerdict::kDoubtful:
-      return "doubtful";
-    case RunVerdict::kBad:
-      return "bad";
-  }
-  throw std::invalid_argument("not a RunVerdict");
+  return verdict == RunVerdict::kGood ? "good" : verdict == RunVerdict::kDoubtful ? "doubtful" : "bad";
 }
 
 Diagnosis diagnose(const RunEvidence& evidence, const Config& config) {
