@@ -92,6 +92,8 @@ RunSummary BagPlayer::summary(const RunLog& log) const {
                                describeRestarts(imu_restarts_, config_));
   warn(imu_not_usable_);
   summary.diagnosis = diagnose(summary, config_);
+  // Keys and files of the only radar carry no name.
+  if (summary.radars.size() == 1) summary.radars.front().name.clear();
   return summary;
 }
 
