@@ -63,6 +63,7 @@ TEST_F(BagRunner, EveryScanIsAccountedFor) {
 
 TEST_F(BagRunner, TheDopplerStepIsToldWithItsSource) {
   RunSummary summary;
+  summary.radars.emplace_back();
   const auto told = [&](double value, DopplerStepSource source, const char* in_summary,
                         const char* in_table) {
     summary.radars.front().doppler_step = {value, source};

@@ -290,7 +290,7 @@ TEST_F(Calibrate, ABatchThatDoesNotConvergeDoesNotCount) {
 
 TEST(CalibrateFailure, MostScansDivergedDoesNotCount) {
   RunSummary summary;
-  summary.radars[0].scans_total = 100;
+  summary.radars.emplace_back().scans_total = 100;
   summary.batch.emplace().converged = true;
   summary.scans_diverged = 50;
   EXPECT_EQ(failureOf(summary), "");

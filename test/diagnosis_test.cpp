@@ -20,11 +20,10 @@ RunEvidence goodRun() {
   evidence.initialized = true;
   evidence.heading_sigma = 0.05;
   evidence.imu_count = 4000;
-  evidence.faults = {{"imu_gap", 2}, {"imu_saturated", 20}};
+  evidence.input_faults = {{"imu_gap", 2}, {"imu_saturated", 20}};
   evidence.scans_judged = 190;
-  evidence.windows = 180;
-  evidence.windows_at_bound = 3;
-  RadarEvidence& radar = evidence.radars.emplace_back();
+  evidence.solver_terminations = {{"at_bound", 3}, {"converged", 177}};
+  RadarSummary& radar = evidence.radars.emplace_back();
   radar.scans_total = 200;
   radar.scans_used = 175;
   radar.scans_before_start = 10;
@@ -51,8 +50,9 @@ RunEvidence neverStarted(const std::string& waiting_for) {
   RunEvidence evidence = goodRun();
   evidence.initialized = false;
   evidence.waiting_for = waiting_for;
-  evidence.scans_judged = evidence.windows = evidence.windows_at_bound = 0;
-  RadarEvidence& radar = evidence.radars.front();
+  evidence.scans_judged = 0;
+  evidence.solver_terminations.clear();
+  RadarSummary& radar = evidence.radars.front();
   radar.scans_used = 0;
   radar.scans_before_start = radar.scans_total;
   radar.scans_rejected.clear();
@@ -207,7 +207,7 @@ TEST(Diagnosis, AClockOfTheRadarThatIsBehindIsNamed) {
 
 TEST(Diagnosis, TheOffsetAtItsBoundIsNamed) {
   RunEvidence evidence = goodRun();
-  evidence.windows_at_bound = 150;
+  evidence.solver_terminations = {{"at_bound", 150}, {"converged", 30}};
   expectSays(first(evidence),
              {"offset_at_bound: 150 of 180 windows", "max_time_offset 0.25 s", "radar_stamp_shift"});
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
@@ -215,7 +215,7 @@ TEST(Diagnosis, TheOffsetAtItsBoundIsNamed) {
 
 TEST(Diagnosis, ADivergenceIsBadIfItLastsAndDoubtfulIfNot) {
   RunEvidence evidence = goodRun();
-  evidence.faults["diverged"] = 1;
+  evidence.divergences = 1;
   evidence.scans_diverged = 30;
   expectSays(first(evidence), {"diverged 1 times, for 30 of 190 scans", "radar_doppler_sign"});
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
@@ -237,7 +237,7 @@ TEST(Diagnosis, AContradictionNamesCheckBagAndAMountingThatIsNotGiven) {
 
 TEST(Diagnosis, ADivergenceAfterTheLastScanIsNoContradictionOfTheRadar) {
   RunEvidence evidence = goodRun();
-  evidence.faults["diverged"] = 1;
+  evidence.divergences = 1;
   evidence.health = Health::kDiverged;
   expectSays(first(evidence), {"no_scans: The estimate diverged 1 times while no scan came"});
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kBad);
@@ -305,7 +305,7 @@ TEST(Diagnosis, TheTimeWithoutScansIsCounted) {
 
 TEST(Diagnosis, ADivergenceForLackOfScansNamesTheLack) {
   RunEvidence evidence = withRejected("stamp_ahead_of_imu");
-  evidence.faults["diverged"] = 1;
+  evidence.divergences = 1;
   evidence.scans_diverged = 100;
   const Diagnosis diagnosis = diagnose(evidence, Config{});
   ASSERT_EQ(diagnosis.causes.size(), 1u);
@@ -317,16 +317,16 @@ TEST(Diagnosis, TheImuIsNamed) {
   evidence.imu_noise.accel_density = 0.2;
   expectSays(first(evidence), {"imu_noisy", "accelerometer 0.2 against imu_accel_noise_density 0.02"});
   evidence = goodRun();
-  evidence.faults["imu_saturated"] = 400;
+  evidence.input_faults["imu_saturated"] = 400;
   expectSays(first(evidence), {"imu_saturated: 400 IMU samples", "imu_accel_range"});
   evidence = goodRun();
-  evidence.faults["imu_gap"] = 100;
+  evidence.input_faults["imu_gap"] = 100;
   expectSays(first(evidence), {"imu_gap: 100 gaps", "max_imu_gap"});
   const std::pair<std::string, std::string> more[] = {
       {"imu_not_finite", "NaN"}, {"imu_stamp_jump", "imu_jump_patience"}, {"imu_stuck", "gyro"}};
   for (const auto& [name, part] : more) {
     evidence = goodRun();
-    evidence.faults[name] = 400;
+    evidence.input_faults[name] = 400;
     expectSays(first(evidence), {name + ": 400 IMU samples", part});
   }
 }
@@ -344,7 +344,7 @@ TEST(Diagnosis, AVagueHeadingAfterAStartInMotionIsDoubtful) {
 
 TEST(Diagnosis, ATrajectoryThatBeginsAnewIsNeverGood) {
   RunEvidence evidence = goodRun();
-  evidence.faults["imu_clock_restart"] = 1;
+  evidence.input_faults["imu_clock_restart"] = 1;
   evidence.imu_restarts = {{Time::fromSeconds(1700000020.0), Time::fromSeconds(1700000028.505)}};
   expectSays(
       first(evidence),
@@ -373,7 +373,8 @@ TEST(Diagnosis, TriggersWithAStampOfZeroAreNamed) {
 
 TEST(Diagnosis, TheLikeliestThreeComeFirst) {
   RunEvidence evidence = withRejected("innovation");
-  evidence.faults = {{"diverged", 2}, {"imu_saturated", 400}, {"imu_gap", 100}};
+  evidence.divergences = 2;
+  evidence.input_faults = {{"imu_saturated", 400}, {"imu_gap", 100}};
   evidence.scans_diverged = 150;
   const Diagnosis diagnosis = diagnose(evidence, Config{});
   ASSERT_EQ(diagnosis.causes.size(), 3u);

@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "rio_t/ros/bag/bag_tool.h"
+#include "rio_t/ros/bag/bag_runner.h"
 #include "run_files.h"
 #include "temporary_folder.h"
 

@@ -80,43 +80,52 @@ void check(const Arguments& arguments) {
     throw UsageError("nothing to evaluate, expected GROUND_TRUTH ESTIMATE...");
 }
 
-/// What one estimate is reported with; alignments that its shape does not allow are left out.
+/// One way to compare an estimate with the truth.
+struct Comparison {
+  const char* name;                  ///< for people
+  const char* key;                   ///< for programs
+  const char* count_name = nullptr;  ///< none: the shape of the path does not allow this alignment
+  std::size_t count = 0;
+  Statistics metres = {}, degrees = {};
+};
+
 struct Evaluation {
   std::string file;
-  AbsoluteError origin;
-  std::optional<AbsoluteError> yaw;
-  std::optional<AbsoluteError> se3;
-  RelativeError metre;
-  RelativeError metre_all;
-  RelativeError second;
+  std::vector<Comparison> comparisons;  ///< the first: over all poses that match
   Drift drift;
 };
 
 Evaluation evaluate(const Trajectory& truth, const std::string& truth_file, const Trajectory& estimate,
                     const std::string& file, double max_difference) {
-  const auto aligned = [&](Alignment kind) -> std::optional<AbsoluteError> {
+  Evaluation result{file, {}, {}};
+  std::vector<Comparison>& all = result.comparisons;
+  const auto absolute = [&](const char* name, const char* key, Alignment kind) {
+    const AbsoluteError e = absoluteError(truth, estimate, kind, max_difference);
+    all.push_back({name, key, "poses", e.matched_poses, e.translation_m, e.rotation_deg});
+  };
+  const auto absoluteIfPossible = [&](const char* name, const char* key, Alignment kind) {
     try {
-      return absoluteError(truth, estimate, kind, max_difference);
+      absolute(name, key, kind);
     } catch (const std::invalid_argument&) {
-      return std::nullopt;  // on a line, or at rest: the origin still aligns
+      all.push_back({name, key});  // on a line, or at rest: the origin still aligns
     }
   };
-  RelativeErrorOptions metre_all;
-  metre_all.all_pairs = true;
-  RelativeErrorOptions second;
-  second.unit = DeltaUnit::kSeconds;
+  const auto relative = [&](const char* name, const char* key, DeltaUnit unit, bool all_pairs) {
+    const RelativeError e = relativeError(truth, estimate, {1.0, unit, all_pairs}, max_difference);
+    all.push_back({name, key, "pairs", e.pairs, e.translation_m, e.rotation_deg});
+  };
   try {
-    return {file,
-            absoluteError(truth, estimate, Alignment::kOrigin, max_difference),
-            aligned(Alignment::kYaw),
-            aligned(Alignment::kSe3),
-            relativeError(truth, estimate, RelativeErrorOptions{}, max_difference),
-            relativeError(truth, estimate, metre_all, max_difference),
-            relativeError(truth, estimate, second, max_difference),
-            drift(truth, estimate, max_difference)};
+    absolute("APE origin (ATE)", "ape_origin", Alignment::kOrigin);
+    absoluteIfPossible("APE yaw", "ape_yaw", Alignment::kYaw);
+    absoluteIfPossible("APE SE3", "ape_se3", Alignment::kSe3);
+    relative("RPE 1 m (t_rel, r_rel)", "rpe_1m", DeltaUnit::kMetres, false);
+    relative("RPE 1 m, all pairs", "rpe_1m_all_pairs", DeltaUnit::kMetres, true);
+    relative("RPE 1 s", "rpe_1s", DeltaUnit::kSeconds, false);
+    result.drift = drift(truth, estimate, max_difference);
   } catch (const std::invalid_argument& error) {
     throw std::runtime_error(file + " against " + truth_file + ": " + error.what());
   }
+  return result;
 }
 
 void printRow(const char* name, const Statistics& s, const char* unit, std::size_t count) {
@@ -124,33 +133,19 @@ void printRow(const char* name, const Statistics& s, const char* unit, std::size
               count);
 }
 
-void printAbsolute(const char* name, const std::optional<AbsoluteError>& error) {
-  if (!error) {
-    std::printf("  %-22s not possible: the path is too straight\n", name);
-    return;
-  }
-  printRow(name, error->translation_m, "m", error->matched_poses);
-  printRow("", error->rotation_deg, "deg", error->matched_poses);
-}
-
-void printRelative(const char* name, const RelativeError& error) {
-  if (error.pairs == 0) {
-    std::printf("  %-22s no pairs: the path is too short\n", name);
-    return;
-  }
-  printRow(name, error.translation_m, "m", error.pairs);
-  printRow("", error.rotation_deg, "deg", error.pairs);
-}
-
 void printTable(const Evaluation& e) {
   std::printf("%s\n  %-22s %10s %10s %10s %10s  %-4s %7s\n", e.file.c_str(), "", "rmse", "mean", "median",
               "max", "", "count");
-  printAbsolute("APE origin (ATE)", e.origin);
-  printAbsolute("APE yaw", e.yaw);
-  printAbsolute("APE SE3", e.se3);
-  printRelative("RPE 1 m (t_rel, r_rel)", e.metre);
-  printRelative("RPE 1 m, all pairs", e.metre_all);
-  printRelative("RPE 1 s", e.second);
+  for (const Comparison& each : e.comparisons) {
+    if (each.count_name == nullptr) {
+      std::printf("  %-22s not possible: the path is too straight\n", each.name);
+    } else if (each.count == 0) {
+      std::printf("  %-22s no pairs: the path is too short\n", each.name);
+    } else {
+      printRow(each.name, each.metres, "m", each.count);
+      printRow("", each.degrees, "deg", each.count);
+    }
+  }
   std::printf("  %-22s %.3f m (%.3f m horizontal), yaw %.2f deg after %.2f m: %.2f %%\n\n",
               "drift at the end", e.drift.final_m, e.drift.final_horizontal_m, e.drift.final_yaw_deg,
               e.drift.path_m, 100.0 * e.drift.per_metre);
@@ -173,34 +168,21 @@ std::string quoted(const std::string& text) {
 }
 
 // Numbers as %#.9g: with a point, without which YAML 1.1 takes 2e-05 for text.
-void yamlRow(const std::string& key, const Statistics& s, const char* count_name, std::size_t count) {
-  std::printf("    %s: {rmse: %#.9g, mean: %#.9g, median: %#.9g, max: %#.9g, %s: %zu}\n", key.c_str(), s.rmse,
-              s.mean, s.median, s.max, count_name, count);
-}
-
-void yamlAbsolute(const std::string& key, const std::optional<AbsoluteError>& error) {
-  if (!error) return;
-  yamlRow(key + "_m", error->translation_m, "poses", error->matched_poses);
-  yamlRow(key + "_deg", error->rotation_deg, "poses", error->matched_poses);
-}
-
-void yamlRelative(const std::string& key, const RelativeError& error) {
-  yamlRow(key + "_m", error.translation_m, "pairs", error.pairs);
-  yamlRow(key + "_deg", error.rotation_deg, "pairs", error.pairs);
+void yamlRow(const Comparison& c, const char* unit, const Statistics& s) {
+  std::printf("    %s_%s: {rmse: %#.9g, mean: %#.9g, median: %#.9g, max: %#.9g, %s: %zu}\n", c.key, unit,
+              s.rmse, s.mean, s.median, s.max, c.count_name, c.count);
 }
 
 void printYaml(const Evaluation& e) {
-  std::printf("  - file: %s\n    matched_poses: %zu\n", quoted(e.file).c_str(), e.origin.matched_poses);
-  yamlAbsolute("ape_origin", e.origin);
-  yamlAbsolute("ape_yaw", e.yaw);
-  yamlAbsolute("ape_se3", e.se3);
-  yamlRelative("rpe_1m", e.metre);
-  yamlRelative("rpe_1m_all_pairs", e.metre_all);
-  yamlRelative("rpe_1s", e.second);
+  std::printf("  - file: %s\n    matched_poses: %zu\n", quoted(e.file).c_str(), e.comparisons.front().count);
+  for (const Comparison& each : e.comparisons) {
+    if (each.count_name == nullptr) continue;
+    yamlRow(each, "m", each.metres);
+    yamlRow(each, "deg", each.degrees);
+  }
   std::printf(
       "    drift: {path_m: %#.9g, final_m: %#.9g, final_horizontal_m: %#.9g, final_yaw_deg: %#.9g, "
-      "per_metre: "
-      "%#.9g}\n",
+      "per_metre: %#.9g}\n",
       e.drift.path_m, e.drift.final_m, e.drift.final_horizontal_m, e.drift.final_yaw_deg, e.drift.per_metre);
 }
 

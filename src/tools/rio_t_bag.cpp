@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "rio_t/ros/bag/bag_tool.h"
+#include "rio_t/ros/bag/bag_runner.h"
 
 int main(int argc, char** argv) {
   return rio_t::runBagTool(std::vector<std::string>(argv + 1, argv + argc), std::cout, std::cerr);

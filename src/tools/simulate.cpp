@@ -55,6 +55,8 @@ std::uint64_t parseSeed(const std::string& text) {
   return seed;
 }
 
+Eigen::Vector3d parseVector(const std::string& text) { return Eigen::Vector3d(parseNumbers(text, 3).data()); }
+
 RadarModelOptions::Interval parseInterval(const std::string& text) {
   const std::vector<double> n = parseNumbers(text, 2);
   if (n[0] < 0.0 || n[1] <= 0.0) {
@@ -65,12 +67,6 @@ RadarModelOptions::Interval parseInterval(const std::string& text) {
 
 // Half angle of view [deg] of a flat radar: a row of patch antennas has a beam of about 10 degrees.
 constexpr double kFlatFovElevation = 5.0;
-
-void apply(Request& request, const Preset& preset) {
-  request.preset = preset;
-  request.rest = preset.rest;
-  request.simulation = preset.options;
-}
 
 void addGeneralOptions(OptionSet& options, Request& r) {
   options.value("preset", "NAME",
@@ -129,14 +125,10 @@ void addImuOptions(OptionSet& options, ImuModelOptions& imu) {
                  NumberRange::kNotNegative);
   options.number("gyro-random-walk", "RAD/S^2/RTHZ", "random walk of the bias", imu.noise.gyro_random_walk,
                  NumberRange::kNotNegative);
-  options.value("accel-bias", "X,Y,Z", "bias at the start [m/s^2]", "random", [&imu](const std::string& v) {
-    const std::vector<double> n = parseNumbers(v, 3);
-    imu.accel_bias = Eigen::Vector3d(n[0], n[1], n[2]);
-  });
-  options.value("gyro-bias", "X,Y,Z", "bias at the start [rad/s]", "random", [&imu](const std::string& v) {
-    const std::vector<double> n = parseNumbers(v, 3);
-    imu.gyro_bias = Eigen::Vector3d(n[0], n[1], n[2]);
-  });
+  options.value("accel-bias", "X,Y,Z", "bias at the start [m/s^2]", "random",
+                [&imu](const std::string& v) { imu.accel_bias = parseVector(v); });
+  options.value("gyro-bias", "X,Y,Z", "bias at the start [rad/s]", "random",
+                [&imu](const std::string& v) { imu.gyro_bias = parseVector(v); });
   options.number("accel-bias-sigma", "M/S^2", "sigma of the random bias", imu.accel_bias_sigma,
                  NumberRange::kNotNegative);
   options.number("gyro-bias-sigma", "RAD/S", "sigma of the random bias", imu.gyro_bias_sigma,
@@ -193,10 +185,7 @@ void addRadarOptions(OptionSet& options, RadarRequest& r) {
 
   options.section("Radar");
   options.value("extrinsics-translation", "X,Y,Z", "radar origin in the IMU frame [m] (T_IR)",
-                "0.03,0.03,-0.06", [&r](const std::string& v) {
-                  const std::vector<double> n = parseNumbers(v, 3);
-                  r.setup.T_IR.l_I = {n[0], n[1], n[2]};
-                });
+                "0.03,0.03,-0.06", [&r](const std::string& v) { r.setup.T_IR.l_I = parseVector(v); });
   options.value("extrinsics-rotation-xyzw", "X,Y,Z,W",
                 "rotation that turns radar axes (right, forward, up) into the IMU's (T_IR)",
                 "0.69946,0.71461,0.00723,0.00524", [&r](const std::string& v) {
@@ -306,13 +295,13 @@ RadarSetup setupOf(const RadarSetup& preset, const std::vector<OptionSet::Given>
 /// Sets all that the command line gives.
 void setAll(const OptionSet& options, const OptionSet::Given& given, Request& request) {
   // A preset says what the others are to change, so it comes first.
-  if (const std::optional<std::string> preset = valueOf(given, "preset")) {
-    try {
-      apply(request, presetOf(*preset));
-    } catch (const std::invalid_argument& error) {
-      throw UsageError(std::string("--preset: ") + error.what());
-    }
-  }
+  OptionSet preset("");
+  preset.value("preset", "NAME", "", "", [&request](const std::string& name) {
+    request.preset = presetOf(name);
+    request.rest = request.preset.rest;
+    request.simulation = request.preset.options;
+  });
+  preset.set({given});
   options.set({given});
   SimulationOptions& simulation = request.simulation;
   RadarSetup& one = simulation;
@@ -334,13 +323,11 @@ void setAll(const OptionSet& options, const OptionSet::Given& given, Request& re
 ProgramText programText() {
   std::ostringstream notes;
   notes << "Defaults are in brackets. Noise is that of an ADIS16448 and a TI IWR6843AOP, measured on a real "
-           "bag. "
-           "Angles are\nin radians, unless the name of the option says deg.\n"
+           "bag. Angles are\nin radians, unless the name of the option says deg.\n"
            "\n--radar: KEY is an option of the two sections on time offset and radar, without dashes; a flag "
-           "stands "
-           "alone.\nOptions that a radar leaves out come from outside of --radar. Each has its own "
-           "reflectors, persons and "
-           "ghosts.\n--preset kart_pair has left and right: --radar changes one of them, or adds another.\n"
+           "stands alone.\nOptions that a radar leaves out come from outside of --radar. Each has its own "
+           "reflectors, persons and ghosts.\n--preset kart_pair has left and right: --radar changes one of "
+           "them, or adds another.\n"
            "Topics, irs:       /sensor_platform/radar_NAME/scan, /sensor_platform/radar_NAME/trigger\n"
            "Topics, ti_mmwave: /ti_mmwave/radar_scan_pcl_NAME, /sensor_platform/radar_NAME/trigger\n"
            "\nMotions (duration with rest)\n";

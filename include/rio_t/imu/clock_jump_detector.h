@@ -22,6 +22,8 @@ class ClockJumpDetector {
   /// `max_gap` [s] between good stamps; `patience` [s] of stamps elsewhere that make a jump.
   ClockJumpDetector(double max_gap, double patience) : max_gap_(max_gap), patience_(patience) {}
   Verdict check(Time stamp);
+  /// The newest good stamp.
+  const std::optional<Time>& newest() const { return newest_; }
 
  private:
   double max_gap_;   // read-only after construction, as the next

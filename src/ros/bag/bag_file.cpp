@@ -8,6 +8,7 @@
 #include <fstream>
 #include <system_error>
 
+#include "../text.h"
 #include "rio_t/ros/messages/conversions.h"
 
 namespace rio_t {
@@ -90,21 +91,17 @@ void checkTopics(const std::string& bag, const std::map<std::string, std::string
   for (const Wanted& want : wanted) {
     const auto found = types.find(want.topic);
     if (found != types.end() && found->second == want.type) continue;
-    if (!faults.empty()) faults += "; ";
-    if (found == types.end()) {
-      missing = true;
-      faults += std::string("no topic ") + want.topic + " (" + want.key + ", " + want.type + ")";
-    } else {
-      faults += "topic " + want.topic + " (" + want.key + ") is " + found->second + ", expected " + want.type;
-    }
+    missing = missing || found == types.end();
+    const std::string fault =
+        found == types.end()
+            ? "no topic " + want.topic + " (" + want.key + ", " + want.type + ")"
+            : "topic " + want.topic + " (" + want.key + ") is " + found->second + ", expected " + want.type;
+    appendItem(&faults, fault, "; ");
   }
   if (faults.empty()) return;
   if (missing) {
     std::string known;
-    for (const auto& [topic, type] : types) {
-      if (!known.empty()) known += ", ";
-      known.append(topic).append(" (").append(type).append(")");
-    }
+    for (const auto& [topic, type] : types) appendItem(&known, topic + " (" + type + ")");
     faults += "; the bag has " + (known.empty() ? "no topics" : known);
   }
   throw bagError(bag, faults);

@@ -53,20 +53,23 @@ void BagPlayer::feed(std::vector<RadarScan> scans, std::size_t radar) {
   }
 }
 
-RunSummary BagPlayer::summary() const {
-  RunSummary summary;
-  log_->fill(&summary);
-  countInput(&summary);
-  return summary;
-}
-
-void BagPlayer::countInput(RunSummary* summary) const {
-  summary->imu_count = imu_count_;
-  summary->imu_noise = odometry_.imuNoiseOfRun();
-  if (summary->barometer) summary->barometer->pressures = pressure_count_;
+RunSummary BagPlayer::summary(const RunLog& log) const {
+  RunSummary summary(evidence_.evidence(odometry_, odometry_.start()));
+  log.fill(&summary);
+  summary.imu_count = imu_count_;
+  summary.imu_restarts = imu_restarts_;
+  summary.health_at_end = toString(summary.health);
+  if (summary.barometer) summary.barometer->pressures = pressure_count_;
+  const auto warn = [&](const NotUsableByKind& kinds) {
+    for (const auto& [kind, what] : kinds)
+      summary.warnings.push_back(what.why + " (messages: " + std::to_string(what.count) + ")");
+  };
+  const auto count = [&](const NotUsableByKind& kinds, Counts* counts) {
+    for (const auto& [kind, what] : kinds) (*counts)[kind] += what.count;
+  };
   for (std::size_t k = 0; k < radars_.size(); ++k) {
     const Radar& radar = radars_[k];
-    RadarSummary& told = summary->radars[k];
+    RadarSummary& told = summary.radars[k];
     told.noise = odometry_.radarNoise(k);
     told.doppler_step = odometry_.radarDopplerStep(k);
     for (std::size_t i = 0; i < 3; ++i) {
@@ -74,51 +77,24 @@ void BagPlayer::countInput(RunSummary* summary) const {
       told.points_per_scan[i] = static_cast<std::uint64_t>(quantile(radar.scan_sizes, kShares[i]));
     }
     told.scans_total = radar.scans_total;
-    for (const auto& [reason, count] : radar.stamper.givenUp()) told.scans_rejected[reason] += count;
-    for (const auto& [kind, what] : radar.not_usable) told.scans_rejected[kind] += what.count;
+    for (const auto& [reason, given_up] : radar.stamper.givenUp()) told.scans_rejected[reason] += given_up;
+    count(radar.not_usable, &told.scans_rejected);
+    count(radar.triggers_not_usable, &summary.input_faults);
+    warn(radar.not_usable);
   }
-  summary->input_faults = odometry_.faults();
-  // These two are judgements of the estimate, with keys of their own.
-  const auto take = [&](const char* name) {
-    const auto node = summary->input_faults.extract(name);
-    return node.empty() ? std::uint64_t{0} : node.mapped();
-  };
-  summary->divergences = take("diverged");
-  summary->reinitializations = take("reinitialized");
-  summary->health_at_end = toString(odometry_.health());
-  if (const auto start = odometry_.start()) summary->initialized_from = toString(start->from);
-  if (points_not_finite_ > 0) summary->input_faults["points_not_finite"] = points_not_finite_;
-  for (const auto& [kind, what] : imu_not_usable_) summary->input_faults[kind] += what.count;
-  for (const auto& [kind, what] : pressure_not_usable_) summary->input_faults[kind] += what.count;
-  for (const Radar& radar : radars_)
-    for (const auto& [kind, what] : radar.triggers_not_usable) summary->input_faults[kind] += what.count;
-  const auto warn = [&](const NotUsableByKind& kinds) {
-    for (const auto& [kind, what] : kinds)
-      summary->warnings.push_back(what.why + " (messages: " + std::to_string(what.count) + ")");
-  };
-  for (const Radar& radar : radars_) warn(radar.not_usable);
+  if (points_not_finite_ > 0) summary.input_faults["points_not_finite"] = points_not_finite_;
+  count(imu_not_usable_, &summary.input_faults);
+  count(pressure_not_usable_, &summary.input_faults);
   for (const Radar& radar : radars_) warn(radar.triggers_not_usable);
   warn(pressure_not_usable_);
   if (!imu_restarts_.empty())
-    summary->warnings.push_back("topic " + config_.imu_topic + ": " +
-                                describeRestarts(imu_restarts_, config_));
+    summary.warnings.push_back("topic " + config_.imu_topic + ": " +
+                               describeRestarts(imu_restarts_, config_));
   warn(imu_not_usable_);
-  summary->diagnosis = diagnosis(*summary);
-}
-
-Diagnosis BagPlayer::diagnosis(const RunSummary& summary) const {
-  RunEvidence evidence = evidence_.evidence(odometry_, odometry_.start());
-  evidence.imu_count = imu_count_;
-  evidence.imu_restarts = imu_restarts_;
-  for (const auto& [kind, what] : imu_not_usable_) evidence.faults[kind] += what.count;
-  for (std::size_t k = 0; k < radars_.size(); ++k) {
-    RadarEvidence& radar = evidence.radars[k];
-    radar.scans_total = radars_[k].scans_total;
-    // The stamper and the decoder reject before the odometry sees a scan.
-    for (const auto& [reason, count] : summary.radars[k].scans_rejected)
-      if (reason != "before_initialization") radar.scans_rejected[reason] = count;
-  }
-  return diagnose(evidence, config_);
+  summary.diagnosis = diagnose(summary, config_);
+  // Keys and files of the only radar carry no name.
+  if (summary.radars.size() == 1) summary.radars.front().name.clear();
+  return summary;
 }
 
 void BagPlayer::addImu(const sensor_msgs::Imu& message, Time record) {
@@ -141,12 +117,10 @@ void BagPlayer::addImu(const sensor_msgs::Imu& message, Time record) {
 
 void BagPlayer::followImuStamps(const ImuMeasurement& imu) {
   if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite()) return;  // dropped unseen
-  const ClockJumpDetector::Verdict stamp = imu_stamps_.check(imu.time);
-  const bool restarts = stamp == ClockJumpDetector::Verdict::kRestart;
-  if (restarts && odometry_.initialized()) imu_restarts_.push_back({*newest_imu_, imu.time});
-  if (!restarts && stamp != ClockJumpDetector::Verdict::kGood) return;
-  newest_imu_ = imu.time;
-  evidence_.addImu(imu.time);
+  const std::optional<Time> before = imu_stamps_.newest();
+  const bool restarts = imu_stamps_.check(imu.time) == ClockJumpDetector::Verdict::kRestart;
+  if (restarts && odometry_.initialized()) imu_restarts_.push_back({*before, imu.time});
+  if (imu_stamps_.newest() == imu.time) evidence_.addImu(imu.time);
 }
 
 void BagPlayer::addTrigger(const std_msgs::Header& message, Time record, std::size_t radar) {

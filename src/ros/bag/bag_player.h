@@ -33,10 +33,9 @@ class BagPlayer {
   /// At the end of the bag.
   void finish();
 
-  RunSummary summary() const;
-  /// Sets what was read, what of it never became a scan, the noise that the scans showed, and the diagnosis.
-  void countInput(RunSummary* summary) const;
-  const RadarInertialOdometry& odometry() const { return odometry_; }
+  /// What was read, what of it never became a scan, the noise that the scans showed, the diagnosis, and the
+  /// estimates of `log`.
+  RunSummary summary(const RunLog& log) const;
   /// The first initialisation; none before it.
   const std::optional<RadarInertialOdometry::Start>& start() const { return start_; }
 
@@ -59,7 +58,6 @@ class BagPlayer {
     NotUsableByKind not_usable, triggers_not_usable;
   };
 
-  Diagnosis diagnosis(const RunSummary& summary) const;
   void addImu(const sensor_msgs::Imu& message, Time record);
   /// Records where the odometry starts again.
   void followImuStamps(const ImuMeasurement& imu);
@@ -79,7 +77,6 @@ class BagPlayer {
   std::optional<RadarInertialOdometry::Start> start_;
   EvidenceCollector evidence_;
   ClockJumpDetector imu_stamps_;  // the same judgement as the odometry's own
-  std::optional<Time> newest_imu_;
   std::vector<ImuRestart> imu_restarts_;
   std::uint64_t imu_count_ = 0, pressure_count_ = 0, points_not_finite_ = 0;
   NotUsableByKind imu_not_usable_, pressure_not_usable_;

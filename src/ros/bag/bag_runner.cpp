@@ -41,7 +41,8 @@ void warnOfAids(const Config& config, RunSummary* summary) {
                                 " (barometer_topic) was used, of " +
                                 std::to_string(summary->barometer->pressures) + " messages");
   if (summary->ground_vehicle && summary->ground_vehicle->contradicted_at)
-    summary->warnings.push_back(contradictionText(*summary->ground_vehicle));
+    summary->warnings.push_back("after " + fixedText(*summary->ground_vehicle->contradicted_at, 1) + " s " +
+                                kGroundVehicleContradicted);
 }
 
 /// A radar among several that gave nothing: the others carry the run, but it must be said.
@@ -54,8 +55,7 @@ void warnOfSilentRadars(const Config& config, RunSummary* summary) {
   }
 }
 
-void checkOutcome(const std::string& bag, const Config& config, const BagPlayer& player) {
-  const RunSummary summary = player.summary();
+void checkOutcome(const std::string& bag, const Config& config, const RunSummary& summary) {
   if (summary.imu_count == 0)
     throw bagError(bag, "no messages on topic " + config.imu_topic + " (imu_topic) in the part played");
   if (summary.scansTotal() == 0) {
@@ -64,7 +64,7 @@ void checkOutcome(const std::string& bag, const Config& config, const BagPlayer&
     throw bagError(bag, topics);
   }
   // If none of a topic's messages can be used, the fault of the first one says it.
-  const std::map<std::string, std::uint64_t> rejected = summary.scansRejected();
+  const Counts rejected = summary.scansRejected();
   if (countOf(rejected, "cloud_not_usable") + countOf(rejected, "stamp_zero") == summary.scansTotal())
     throw bagError(bag, summary.warnings.front());
   if (countOf(summary.input_faults, "imu_not_usable") == summary.imu_count)
@@ -72,8 +72,8 @@ void checkOutcome(const std::string& bag, const Config& config, const BagPlayer&
   const auto failed = [&](const std::string& what) {
     return RunFailed(bagError(bag, what).what(), summary.diagnosis);
   };
-  if (!player.odometry().initialized()) {
-    throw failed("never initialised, waited for " + player.odometry().waitingFor() + " (" +
+  if (!summary.initialized) {
+    throw failed("never initialised, waited for " + summary.waiting_for + " (" +
                  std::to_string(summary.imu_count) + " IMU samples, init_duration " +
                  std::to_string(config.odometry.initialization.duration) + " s)");
   }
@@ -130,7 +130,9 @@ class BagJob {
   explicit BagJob(const BagRun& run)
       : run_(run), files_(runFiles(run.config)), bags_(run.bags), started_(std::chrono::steady_clock::now()) {
     const std::map<std::string, std::string> types = bags_.typesByTopic();
-    run_.config = withTopics(run.config, [&](const std::string& topic) { return topicOfBag(topic, types); });
+    run_.config = withTopics(run.config, [&](const std::string& /*key*/, const std::string& topic) {
+      return topicOfBag(topic, types);
+    });
     const Config& config = run_.config;
     std::vector<Wanted> wanted = wantedTopics(config);
     for (const Wanted& want : wanted) topics_.push_back(want.topic);
@@ -147,30 +149,18 @@ class BagJob {
   }
 
   RunSummary execute() {
-    RunSummary summary = inMode();
+    const RunMode mode = run_.config.mode;
+    RunSummary summary = mode == RunMode::kBatch ? batch() : mode == RunMode::kRefine ? refine() : online();
     if (run_.progress) run_.progress(1.0);
     if (truth_error_) throw *truth_error_;  // the estimate is saved all the same
     return summary;
   }
 
  private:
-  RunSummary inMode() {
-    switch (run_.config.mode) {
-      case RunMode::kOnline:
-        return online();
-      case RunMode::kBatch:
-        return batch();
-      case RunMode::kRefine:
-        return refine();
-    }
-    throw std::invalid_argument("not a RunMode");
-  }
-
   RunSummary online() {
     RunLog log(run_.config, output_.get(), nothingTakenOff());
     BagPlayer player(run_.config, &log, nullptr);
-    play(player, run_.config, 0.0, 1.0);
-    return finish(player.summary(), log, output_.get());
+    return finish(play(player, run_.config, log, 0.0, 1.0), log, output_.get());
   }
 
   RunSummary batch() {
@@ -181,25 +171,23 @@ class BagJob {
     const std::unique_ptr<RunOutput> online_output = openOutput("/online");
     RunLog online_log(run_.config, online_output.get(), nothingTakenOff());
     BagPlayer player(run_.config, &online_log, &recorder);
-    play(player, run_.config, 0.0, 0.9);
-    finish(player.summary(), online_log, online_output.get());
+    finish(play(player, run_.config, online_log, 0.0, 0.9), online_log, online_output.get());
 
     const BatchResult result = recorder.solve(*player.start());
     RunLog log(run_.config, output_.get(), nothingTakenOff());
     for (const NavigationState& state : result.trajectory) log.addState(state);
     for (ScanResult scan : result.scans) log.addResult(scan);
-    RunSummary summary;
+    RunSummary summary = player.summary(log);  // what the batch does not change, and its estimates
     summary.mode = "batch";
     summary.batch =
         BatchSummary{result.solution.iterations, result.solution.placements, result.solution.converged()};
-    log.fill(&summary);
     summary.solver_terminations = {{toString(result.solution.termination), 1}};
     if (summary.barometer || summary.ground_vehicle)
-      summary.warnings.emplace_back(
+      summary.warnings.insert(
+          summary.warnings.begin(),
           "mode: batch uses neither the barometer nor platform: ground_vehicle; the run in online/ does");
     summary.barometer.reset();
     summary.ground_vehicle.reset();
-    player.countInput(&summary);
     return finish(std::move(summary), log, output_.get());
   }
 
@@ -217,8 +205,8 @@ class BagJob {
       RunOutput* output = last ? output_.get() : earlier.get();
       RunLog log(config, output, taken_off);
       BagPlayer player(config, &log, nullptr);
-      play(player, config, (pass - 1.0) / passes, static_cast<double>(pass) / passes);
-      RunSummary summary = player.summary();
+      RunSummary summary =
+          play(player, config, log, (pass - 1.0) / passes, static_cast<double>(pass) / passes);
       for (std::size_t k = 0; k < taken_off.size(); ++k) {
         RadarSummary& radar = summary.radars[k];
         offsets[k].push_back(taken_off[k] = radar.final_offset_s);
@@ -248,7 +236,7 @@ class BagJob {
   std::vector<double> nothingTakenOff() const { return std::vector<double>(files_.radars.size(), 0.0); }
 
   /// The whole bag; progress goes from `from` to `to`.
-  void play(BagPlayer& player, const Config& config, double from, double to) {
+  RunSummary play(BagPlayer& player, const Config& config, const RunLog& log, double from, double to) {
     const double length = (end_ - begin_).toSec();
     try {
       rosbag::View view;
@@ -266,7 +254,9 @@ class BagJob {
     } catch (const std::exception& error) {
       throw bagError(bags_.name(), error.what());
     }
-    checkOutcome(bags_.name(), config, player);
+    RunSummary summary = player.summary(log);
+    checkOutcome(bags_.name(), config, summary);
+    return summary;
   }
 
   /// Adds speed and errors, and saves.

@@ -1,5 +1,3 @@
-#include "rio_t/ros/bag/bag_tool.h"
-
 #include <ostream>
 
 #include "command_line.h"

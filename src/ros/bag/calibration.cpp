@@ -14,9 +14,10 @@ namespace {
 Config batchConfig(const Config& config) {
   Config batch = config;
   batch.mode = RunMode::kBatch;
-  batch.odometry.smoother.estimate_extrinsics = estimatedExtrinsics(config);
-  for (Config& radar : batch.radars)
-    radar.odometry.smoother.estimate_extrinsics = batch.odometry.smoother.estimate_extrinsics;
+  EstimateExtrinsics& estimated = batch.odometry.smoother.estimate_extrinsics;
+  // `none` is the default and means pose here.
+  if (estimated == EstimateExtrinsics::kNone) estimated = EstimateExtrinsics::kPose;
+  for (Config& radar : batch.radars) radar.odometry.smoother.estimate_extrinsics = estimated;
   return batch;
 }
 
@@ -49,11 +50,6 @@ std::vector<std::string> foldersOf(const CalibrationRun& run) {
 }
 
 }  // namespace
-
-EstimateExtrinsics estimatedExtrinsics(const Config& config) {
-  const EstimateExtrinsics told = config.odometry.smoother.estimate_extrinsics;
-  return told == EstimateExtrinsics::kNone ? EstimateExtrinsics::kPose : told;
-}
 
 std::string failureOf(const RunSummary& summary) {
   if (2 * summary.scans_diverged > summary.scansTotal()) {

@@ -59,8 +59,8 @@ void checkConfig(const Config& config) {
     if (radar.extrinsics_source == ExtrinsicsSource::kParameters) continue;
     throw std::runtime_error(
         "extrinsics_source: expected parameters, got tf: the mounting found is written to "
-        "extrinsics_translation "
-        "and extrinsics_rotation_xyzw; set these to what tf says, and --set extrinsics_source=parameters");
+        "extrinsics_translation and extrinsics_rotation_xyzw; set these to what tf says, and --set "
+        "extrinsics_source=parameters");
   }
 }
 

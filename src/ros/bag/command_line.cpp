@@ -73,8 +73,7 @@ void printHelp(const ProgramText& text, const OptionSet& options, std::ostream& 
   std::istringstream examples(text.examples);
   for (std::string line; std::getline(examples, line);) out << "  " << line << "\n";
   out << "\nExit status: 0 if it worked, 1 if data, a file or a parameter was wrong, 2 if the command line "
-         "was "
-         "wrong,\n3 if rio_t_bag has a result that is not to be trusted.\n";
+         "was wrong,\n3 if rio_t_bag has a result that is not to be trusted.\n";
 }
 
 /// A line of the progress bar: "[####    ]  40 %, 12 s left".
@@ -106,12 +105,6 @@ std::string shownNumber(double value) {
   out.precision(10);
   out << value;
   return out.str();
-}
-
-std::optional<std::string> valueOf(const OptionSet::Given& given, const std::string& name) {
-  for (const po::option& option : given.options)
-    if (option.string_key == name && !option.value.empty()) return option.value.front();
-  return std::nullopt;
 }
 
 double parseNumber(const std::string& text, NumberRange range) {

@@ -4,7 +4,6 @@
 #include <functional>
 #include <iosfwd>
 #include <list>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -84,9 +83,6 @@ class OptionSet {
   std::list<boost::program_options::options_description> sections_;
   boost::program_options::positional_options_description positional_;
 };
-
-/// The value of an option, if it is given.
-std::optional<std::string> valueOf(const OptionSet::Given& given, const std::string& name);
 
 /// A number as --help shows it.
 std::string shownNumber(double value);

@@ -22,14 +22,13 @@ std::string describeStep(const DopplerStep& step) {
 }
 
 /// "3 late, 1 empty"
-std::string listOf(const std::map<std::string, std::uint64_t>& counts) {
+std::string listOf(const Counts& counts) {
   std::string list;
   for (const auto& [name, count] : counts) appendItem(&list, std::to_string(count) + " " + name);
   return list;
 }
 
-std::string describeScans(std::uint64_t used, std::uint64_t total,
-                          const std::map<std::string, std::uint64_t>& rejected) {
+std::string describeScans(std::uint64_t used, std::uint64_t total, const Counts& rejected) {
   return std::to_string(used) + " of " + std::to_string(total) + " used" +
          (rejected.empty() ? "" : ", " + listOf(rejected));
 }
@@ -86,7 +85,7 @@ void describeAids(const RunSummary& summary, const Row& row) {
 }
 
 /// Tells of the windows that did not converge.
-void describeSolver(const std::map<std::string, std::uint64_t>& terminations, const Row& row) {
+void describeSolver(const Counts& terminations, const Row& row) {
   std::uint64_t windows = 0;
   for (const auto& [reason, count] : terminations) windows += count;
   std::string unsolved;
@@ -132,7 +131,7 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
   describeAids(summary, row);
   describeSolver(summary.solver_terminations, row);
   if (!summary.input_faults.empty()) row("input faults", listOf(summary.input_faults));
-  row("started from", summary.initialized_from);
+  row("started from", toString(summary.initialized_from));
   if (summary.divergences > 0 || summary.health_at_end != "ok") {
     row("diverged", std::to_string(summary.divergences) + " times, re-initialised " +
                         std::to_string(summary.reinitializations) + " times, at the end " +

@@ -1,9 +1,6 @@
 #pragma once
 
-#include <cstdint>
-#include <map>
 #include <optional>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -12,7 +9,7 @@
 
 namespace rio_t {
 
-/// Writes what a run gives, and keeps the accounts.
+/// Writes the estimates of a run, and keeps the newest of them for its summary.
 class RunLog {
  public:
   /// `taken_off` [s], by radar: the stamps are earlier, and the offset smaller, by so much.
@@ -27,7 +24,7 @@ class RunLog {
 
  private:
   struct Radar {
-    RadarSummary summary;
+    RadarEstimate estimate;
     double taken_off = 0.0;
   };
 
@@ -36,10 +33,8 @@ class RunLog {
   EstimateExtrinsics estimate_extrinsics_;
   std::vector<Radar> radars_;
   Trajectory trajectory_;
-  std::map<SolverTermination, std::uint64_t> terminations_;
-  std::uint64_t scans_diverged_ = 0;
-  std::optional<BarometerSummary> barometer_;           // if there is one
-  std::optional<GroundVehicleSummary> ground_vehicle_;  // if the platform is one
+  std::optional<BarometerCounts> barometer_;           // if there is one
+  std::optional<GroundVehicleCounts> ground_vehicle_;  // if the platform is one
   std::optional<StampedPose> newest_optimized_;
   double path_length_m_ = 0.0;
 };

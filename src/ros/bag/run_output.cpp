@@ -11,7 +11,6 @@
 #include "../text.h"
 #include "rio_t/factors/state_block.h"
 #include "rio_t/ros/messages/conversions.h"
-#include "summary_text.h"
 
 namespace rio_t {
 namespace {
@@ -19,13 +18,10 @@ namespace {
 constexpr std::size_t kBufferSize = 1 << 18;
 constexpr double kNavigationPeriod = 0.0999;  // [s] between lines of navigation.csv
 
-void appendNumber(std::string* line, double x, int decimals) {
-  line->push_back(',');
-  appendFixed(line, x, decimals);
-}
-
-void appendVector(std::string* line, const Eigen::Vector3d& v, int decimals) {
-  for (int i = 0; i < 3; ++i) appendNumber(line, v[i], decimals);
+/// Standard deviations.
+template <typename Variances>
+Eigen::Vector3d sigmasOf(const Variances& variances) {
+  return variances.cwiseMax(0.0).cwiseSqrt();
 }
 
 const char* const kNavigationHeader =
@@ -104,6 +100,27 @@ void RunOutput::File::flush() {
   if (!stream) throw OutputError("output " + path + ": writing failed (disk full?)");
 }
 
+RunOutput::File& RunOutput::File::add(std::initializer_list<double> values, int decimals, char separator) {
+  for (const double x : values) {
+    buffer.push_back(separator);
+    appendFixed(&buffer, x, decimals);
+  }
+  return *this;
+}
+
+RunOutput::File& RunOutput::File::add(const Eigen::Vector3d& v, int decimals, char separator) {
+  return add({v.x(), v.y(), v.z()}, decimals, separator);
+}
+
+RunOutput::File& RunOutput::File::add(const Eigen::Quaterniond& q, int decimals, char separator) {
+  return add({q.x(), q.y(), q.z(), q.w()}, decimals, separator);
+}
+
+RunOutput::File& RunOutput::File::add(const std::string& text) {
+  buffer += ',' + text;
+  return *this;
+}
+
 void RunOutput::File::endLine() {
   buffer.push_back('\n');
   if (buffer.size() > kBufferSize) flush();
@@ -145,126 +162,88 @@ void RunOutput::removeOfEarlierRuns() const {
   for (const fs::path& path : earlier) fs::remove(path, error);
 }
 
-void RunOutput::addPose(File& file, Time time, const Eigen::Vector3d& p_W, const Eigen::Quaterniond& q_WI) {
-  std::string* line = &file.buffer;
-  *line += formatTime(time);
-  for (const double x : {p_W.x(), p_W.y(), p_W.z(), q_WI.x(), q_WI.y(), q_WI.z(), q_WI.w()}) {
-    line->push_back(' ');
-    appendFixed(line, x, 9);
-  }
-  file.endLine();
+RunOutput::File& RunOutput::row(std::string_view name, Time stamp) {
+  File& table = file(name);
+  table.buffer += formatTime(stamp);
+  return table;
+}
+
+void RunOutput::addPose(std::string_view name, const StampedPose& pose) {
+  row(name, pose.time).add(pose.p_W, 9, ' ').add(pose.q_WI, 9, ' ').endLine();
 }
 
 void RunOutput::addState(const NavigationState& state) {
-  addPose(file("trajectory.txt"), state.time, state.p_W, state.q_WI);
+  addPose("trajectory.txt", {state.time, state.p_W, state.q_WI});
   // Also where time runs back (a bag that loops): a line, then ten a second again.
   if (last_navigation_ && std::abs(state.time - *last_navigation_) < kNavigationPeriod) return;
   last_navigation_ = state.time;
-  const auto sigmas = [](const auto& variances) {
-    return Eigen::Vector3d(variances.cwiseMax(0.0).cwiseSqrt());
-  };
   const Covariance6 pose = bodyOdometry(state, 0.0).pose_covariance;
-  File& navigation = file("navigation.csv");
-  std::string* line = &navigation.buffer;
-  *line += formatTime(state.time);
-  appendVector(line, state.v_W, 6);
-  appendVector(line, sigmas(pose.diagonal().head<3>()), 6);
-  appendVector(line, sigmas(pose.diagonal().tail<3>()), 6);
-  appendVector(line, sigmas(state.covariance.diagonal().segment<3>(StateBlock::kV)), 6);
-  navigation.endLine();
+  row("navigation.csv", state.time)
+      .add(state.v_W, 6)
+      .add(sigmasOf(pose.diagonal().head<3>()), 6)
+      .add(sigmasOf(pose.diagonal().tail<3>()), 6)
+      .add(sigmasOf(state.covariance.diagonal().segment<3>(StateBlock::kV)), 6)
+      .endLine();
 }
 
 void RunOutput::addResult(const ScanResult& result) {
-  for (const StampedPose& pose : result.left_window)
-    addPose(file("trajectory_optimized.txt"), pose.time, pose.p_W, pose.q_WI);
+  for (const StampedPose& pose : result.left_window) addPose("trajectory_optimized.txt", pose);
   addAids(result);
   if (!result.used && result.rejected_because.empty()) return;  // only carries the last poses
 
   const std::string end = suffixOf(files_.radars.at(result.scan.radar)) + ".csv";
-  File& ego_velocity = file("ego_velocity" + end);
-  std::string* line = &ego_velocity.buffer;
-  *line += formatTime(result.scan.stamp);
-  appendVector(line, result.ego_velocity.v_R, 6);
-  appendVector(line, result.ego_velocity.covariance.diagonal().cwiseMax(0.0).cwiseSqrt(), 6);
-  *line += ',' + std::to_string(result.ego_velocity.inliers.size()) + ',' +
-           std::to_string(result.ego_velocity.points.size()) + ',' +
-           (result.used ? toString(result.ego_velocity.status) : result.rejected_because);
-  ego_velocity.endLine();
+  const Time stamp = result.scan.stamp;
+  const EgoVelocity& velocity = result.ego_velocity;
+  row("ego_velocity" + end, stamp)
+      .add(velocity.v_R, 6)
+      .add(sigmasOf(velocity.covariance.diagonal()), 6)
+      .add(std::to_string(velocity.inliers.size()))
+      .add(std::to_string(velocity.points.size()))
+      .add(result.used ? toString(velocity.status) : result.rejected_because)
+      .endLine();
   if (!result.updated) return;
-
-  File& time_offset = file("time_offset" + end);
-  line = &time_offset.buffer;
-  *line += formatTime(result.scan.stamp);
-  appendNumber(line, result.time_offset, 9);
-  appendNumber(line, result.time_offset_sigma, 9);
-  time_offset.endLine();
-  if (files_.extrinsics) addExtrinsics(file("extrinsics" + end), result);
-
-  if (result.landmarks)
+  row("time_offset" + end, stamp).add({result.time_offset, result.time_offset_sigma}, 9).endLine();
+  if (files_.extrinsics)
+    row("extrinsics" + end, stamp)
+        .add(result.T_IR.l_I, 9)
+        .add(result.T_IR.q_IR, 9)
+        .add(sigmasOf(result.T_IR_covariance.diagonal().head<3>()), 9)
+        .add(sigmasOf(result.T_IR_covariance.diagonal().tail<3>()), 9)
+        .endLine();
+  if (result.landmarks && files_.map)
     for (const LandmarkPoint& point : result.landmarks->map) landmarks_[point.id] = point;
-
-  File& biases = file("biases.csv");
-  line = &biases.buffer;
-  *line += formatTime(result.scan.stamp);
-  appendVector(line, result.state.b_g, 9);
-  appendVector(line, result.state.b_a, 9);
-  biases.endLine();
+  row("biases.csv", stamp).add(result.state.b_g, 9).add(result.state.b_a, 9).endLine();
 }
 
 void RunOutput::addAids(const ScanResult& result) {
-  for (const BarometerAnswer& mean : result.barometer) {
-    File& barometer = file("barometer.csv");
-    std::string* line = &barometer.buffer;
-    *line += formatTime(mean.time);
-    for (const double x : {mean.height, mean.innovation, mean.innovation_sigma, mean.bias, mean.bias_sigma})
-      appendNumber(line, x, 6);
-    *line += ',' + std::to_string(mean.samples) + ',' +
-             (!mean.rejected_because.empty() ? mean.rejected_because
-              : mean.stepped                 ? "stepped"
-                                             : "used");
-    barometer.endLine();
-  }
+  for (const BarometerAnswer& mean : result.barometer)
+    row("barometer.csv", mean.time)
+        .add({mean.height, mean.innovation, mean.innovation_sigma, mean.bias, mean.bias_sigma}, 6)
+        .add(std::to_string(mean.samples))
+        .add(!mean.rejected_because.empty() ? mean.rejected_because
+             : mean.stepped                 ? "stepped"
+                                            : "used")
+        .endLine();
   if (!result.ground_vehicle) return;
   const GroundVehicleAnswer& vehicle = *result.ground_vehicle;
-  File& ground_vehicle = file("ground_vehicle.csv");
-  std::string* line = &ground_vehicle.buffer;
-  *line += formatTime(vehicle.time);
-  appendVector(line, vehicle.v_V, 6);
-  appendNumber(line, std::sqrt(vehicle.squared_sigmas), 3);
-  appendVector(line, vehicle.q_IV.vec(), 9);
-  appendNumber(line, vehicle.q_IV.w(), 9);
-  appendVector(line, vehicle.q_IV_sigma, 9);
-  *line += vehicle.is_contradicted ? ",contradicted" : vehicle.used ? ",used" : ",left_out";
-  ground_vehicle.endLine();
-}
-
-void RunOutput::addMap(File& file) {
-  for (const auto& [id, point] : landmarks_) {
-    std::string* line = &file.buffer;
-    *line += std::to_string(id);
-    appendVector(line, point.p_W, 6);
-    appendNumber(line, point.sigma, 6);
-    appendNumber(line, point.snr_db, 3);
-    *line += ',' + std::to_string(point.sightings);
-    file.endLine();
-  }
-}
-
-void RunOutput::addExtrinsics(File& file, const ScanResult& result) {
-  const Eigen::Quaterniond& q_IR = result.T_IR.q_IR;
-  const Eigen::Matrix<double, 6, 1> sigmas = result.T_IR_covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-  std::string* line = &file.buffer;
-  *line += formatTime(result.scan.stamp);
-  appendVector(line, result.T_IR.l_I, 9);
-  appendVector(line, q_IR.vec(), 9);
-  appendNumber(line, q_IR.w(), 9);
-  appendVector(line, sigmas.head<3>(), 9);
-  appendVector(line, sigmas.tail<3>(), 9);
-  file.endLine();
+  row("ground_vehicle.csv", vehicle.time)
+      .add(vehicle.v_V, 6)
+      .add({std::sqrt(vehicle.squared_sigmas)}, 3)
+      .add(vehicle.q_IV, 9)
+      .add(vehicle.q_IV_sigma, 9)
+      .add(vehicle.is_contradicted ? "contradicted"
+           : vehicle.used          ? "used"
+                                   : "left_out")
+      .endLine();
 }
 
 void RunOutput::finish(const RunSummary& summary) {
-  if (files_.map) addMap(file("map.csv"));
+  for (const auto& [id, point] : landmarks_) {
+    File& map = file("map.csv");
+    map.buffer += std::to_string(id);
+    map.add(point.p_W, 6).add({point.sigma}, 6).add({point.snr_db}, 3).add(std::to_string(point.sightings));
+    map.endLine();
+  }
   for (auto& [name, file] : open_) file.flush();
   File yaml;
   yaml.open(folder_ + "/summary.yaml", summaryText(summary, files_.names()));

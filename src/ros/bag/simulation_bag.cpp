@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -111,11 +112,17 @@ std::vector<RadarTrack> tracksOf(const simulation::SensorData& data, BagFormat f
   return tracks;
 }
 
+std_msgs::Header headerOf(std::uint32_t seq, Time stamp, const std::string& frame) {
+  std_msgs::Header header;
+  header.seq = seq;
+  header.stamp = toRosTime(stamp);
+  header.frame_id = frame;
+  return header;
+}
+
 sensor_msgs::Imu imuMessage(const ImuMeasurement& sample, std::uint32_t seq, double orientation_covariance) {
   sensor_msgs::Imu message;
-  message.header.seq = seq;
-  message.header.stamp = toRosTime(sample.time);
-  message.header.frame_id = "base_link";
+  message.header = headerOf(seq, sample.time, "base_link");
   message.orientation_covariance[0] = orientation_covariance;
   tf2::toMsg(sample.angular_velocity, message.angular_velocity);
   tf2::toMsg(sample.acceleration, message.linear_acceleration);
@@ -124,18 +131,8 @@ sensor_msgs::Imu imuMessage(const ImuMeasurement& sample, std::uint32_t seq, dou
 
 sensor_msgs::FluidPressure pressureMessage(const simulation::SimulatedPressure& sample, std::uint32_t seq) {
   sensor_msgs::FluidPressure message;
-  message.header.seq = seq;
-  message.header.stamp = toRosTime(sample.stamp);
-  message.header.frame_id = "base_link";
+  message.header = headerOf(seq, sample.stamp, "base_link");
   message.fluid_pressure = sample.pascal;
-  return message;
-}
-
-std_msgs::Header triggerMessage(const SimulatedScan& scan, const Layout& layout) {
-  std_msgs::Header message;
-  message.seq = scan.seq;
-  message.stamp = toRosTime(scan.stamp);
-  message.frame_id = layout.trigger_frame;
   return message;
 }
 
@@ -172,9 +169,7 @@ sensor_msgs::PointCloud2 scanMessage(const SimulatedScan& scan, const Layout& la
 
 geometry_msgs::PoseStamped poseMessage(const simulation::MotionState& state, Time time, std::uint32_t seq) {
   geometry_msgs::PoseStamped message;
-  message.header.seq = seq;
-  message.header.stamp = toRosTime(time);
-  message.header.frame_id = "world";
+  message.header = headerOf(seq, time, "world");
   message.pose.position = tf2::toMsg(state.p_W);
   message.pose.orientation = tf2::toMsg(state.q_WI);
   return message;
@@ -182,38 +177,55 @@ geometry_msgs::PoseStamped poseMessage(const simulation::MotionState& state, Tim
 
 geometry_msgs::TwistStamped twistMessage(const simulation::MotionState& state, Time time, std::uint32_t seq) {
   geometry_msgs::TwistStamped message;
-  message.header.seq = seq;
-  message.header.stamp = toRosTime(time);
-  message.header.frame_id = "world";
+  message.header = headerOf(seq, time, "world");
   tf2::toMsg(state.v_W, message.twist.linear);
   tf2::toMsg(state.q_WI * state.omega_I, message.twist.angular);
   return message;
 }
 
-enum class Kind { kTruth, kImu, kPressure, kTrigger, kScan };
-
-// Something that arrives at the recorder.
+// Something that arrives at the recorder, and how it is written.
 struct Arrival {
   Time time;
-  Kind kind;
-  std::size_t index;
-  const RadarTrack* radar = nullptr;  // of a trigger or a scan
+  std::function<void(rosbag::Bag& bag, const ros::Time& record)> write;
 };
 
-std::vector<Arrival> arrivals(const simulation::SensorData& data, const std::vector<RadarTrack>& radars,
-                              const std::vector<Time>& truth_times, const SimulationBagOptions& options) {
+std::vector<Arrival> arrivals(const simulation::Motion& motion, const simulation::SensorData& data,
+                              const std::vector<RadarTrack>& radars, Time start,
+                              const SimulationBagOptions& options) {
   std::vector<Arrival> all;
-  for (std::size_t i = 0; i < truth_times.size(); ++i) all.push_back({truth_times[i], Kind::kTruth, i});
-  for (std::size_t i = 0; i < data.imu.samples.size(); ++i) {
-    all.push_back({data.imu.samples[i].time + options.imu_latency, Kind::kImu, i});
+  /// `make`: the message.
+  const auto add = [&all](Time time, const std::string& topic, auto make) {
+    all.push_back({time, [topic, make](rosbag::Bag& bag, const ros::Time& record) {
+                     bag.write(topic, record, make());
+                   }});
+  };
+  const auto truths =
+      static_cast<std::uint32_t>(std::floor(motion.duration() * options.ground_truth_rate)) + 1;
+  for (std::uint32_t i = 0; i < truths; ++i) {
+    const Time time = start + i / options.ground_truth_rate;
+    add(time, "/ground_truth/pose",
+        [&motion, time, start, i] { return poseMessage(motion.at(time - start), time, i); });
+    add(time, "/ground_truth/twist",
+        [&motion, time, start, i] { return twistMessage(motion.at(time - start), time, i); });
   }
-  for (std::size_t i = 0; i < data.pressures.size(); ++i)
-    all.push_back({data.pressures[i].stamp + options.barometer_latency, Kind::kPressure, i});
+  const double orientation_covariance = layoutOf(options.format).orientation_covariance;
+  std::uint32_t seq = 0;
+  for (const ImuMeasurement& sample : data.imu.samples)
+    add(sample.time + options.imu_latency, "/sensor_platform/imu",
+        [&sample, seq = seq++, orientation_covariance] {
+          return imuMessage(sample, seq, orientation_covariance);
+        });
+  seq = 0;
+  for (const simulation::SimulatedPressure& sample : data.pressures)
+    add(sample.stamp + options.barometer_latency, "/sensor_platform/baro",
+        [&sample, seq = seq++] { return pressureMessage(sample, seq); });
   for (const RadarTrack& radar : radars) {
-    for (std::size_t i = 0; i < radar.scans->size(); ++i) {
-      const SimulatedScan& scan = (*radar.scans)[i];
-      all.push_back({scan.stamp + options.imu_latency, Kind::kTrigger, i, &radar});
-      if (scan.delivered) all.push_back({scan.arrival, Kind::kScan, i, &radar});
+    const Layout& layout = radar.layout;
+    for (const SimulatedScan& scan : *radar.scans) {
+      add(scan.stamp + options.imu_latency, layout.trigger_topic,
+          [&scan, &layout] { return headerOf(scan.seq, scan.stamp, layout.trigger_frame); });
+      if (scan.delivered)
+        add(scan.arrival, layout.scan_topic, [&scan, &layout] { return scanMessage(scan, layout); });
     }
   }
   std::stable_sort(all.begin(), all.end(),
@@ -227,43 +239,9 @@ void writeSimulationBag(const std::string& path, const simulation::Motion& motio
                         const simulation::SensorData& data, Time start, const SimulationBagOptions& options) {
   if (!(options.ground_truth_rate > 0.0)) throw std::invalid_argument("ground truth: rate must be positive");
   const std::vector<RadarTrack> radars = tracksOf(data, options.format);
-  const double orientation_covariance = layoutOf(options.format).orientation_covariance;
-  std::vector<Time> truth_times;
-  const auto truth_count =
-      static_cast<std::size_t>(std::floor(motion.duration() * options.ground_truth_rate)) + 1;
-  for (std::size_t i = 0; i < truth_count; ++i) {
-    truth_times.push_back(start + static_cast<double>(i) / options.ground_truth_rate);
-  }
-
   writeBag(path, [&](rosbag::Bag& bag) {
-    for (const Arrival& arrival : arrivals(data, radars, truth_times, options)) {
-      const ros::Time record = toRosTime(arrival.time + options.record_offset);
-      const auto seq = static_cast<std::uint32_t>(arrival.index);
-      switch (arrival.kind) {
-        case Kind::kTruth: {
-          const Time time = truth_times[arrival.index];
-          const simulation::MotionState state = motion.at(time - start);
-          bag.write("/ground_truth/pose", record, poseMessage(state, time, seq));
-          bag.write("/ground_truth/twist", record, twistMessage(state, time, seq));
-          break;
-        }
-        case Kind::kImu:
-          bag.write("/sensor_platform/imu", record,
-                    imuMessage(data.imu.samples[arrival.index], seq, orientation_covariance));
-          break;
-        case Kind::kPressure:
-          bag.write("/sensor_platform/baro", record, pressureMessage(data.pressures[arrival.index], seq));
-          break;
-        case Kind::kTrigger:
-          bag.write(arrival.radar->layout.trigger_topic, record,
-                    triggerMessage((*arrival.radar->scans)[arrival.index], arrival.radar->layout));
-          break;
-        case Kind::kScan:
-          bag.write(arrival.radar->layout.scan_topic, record,
-                    scanMessage((*arrival.radar->scans)[arrival.index], arrival.radar->layout));
-          break;
-      }
-    }
+    for (const Arrival& arrival : arrivals(motion, data, radars, start, options))
+      arrival.write(bag, toRosTime(arrival.time + options.record_offset));
   });
 }
 

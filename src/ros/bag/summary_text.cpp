@@ -1,25 +1,18 @@
-#include "summary_text.h"
-
 #include <yaml-cpp/yaml.h>
 
 #include "../text.h"
+#include "rio_t/ros/bag/run_output.h"
 
 namespace rio_t {
 namespace {
 
-std::vector<std::string> fixedTexts(const std::vector<double>& values, int decimals) {
+/// `values`: a vector, of Eigen or of the standard library.
+template <typename Values>
+std::vector<std::string> fixedTexts(const Values& values, int decimals) {
   std::vector<std::string> texts;
-  texts.reserve(values.size());
-  for (const double value : values) texts.push_back(fixedText(value, decimals));
+  for (std::size_t i = 0; i < static_cast<std::size_t>(values.size()); ++i)
+    texts.push_back(fixedText(values[i], decimals));
   return texts;
-}
-
-std::vector<std::string> fixedTexts(const Eigen::Vector3d& v, int decimals) {
-  return fixedTexts(std::vector<double>{v.x(), v.y(), v.z()}, decimals);
-}
-
-std::vector<std::string> fixedTexts(const Eigen::Quaterniond& q, int decimals) {
-  return fixedTexts(std::vector<double>{q.x(), q.y(), q.z(), q.w()}, decimals);
 }
 
 /// The lines of summary.yaml, in order.
@@ -71,10 +64,10 @@ void addEstimates(SummaryLines& lines, const RadarSummary& radar) {
   if (!radar.extrinsics) return;
   const ExtrinsicsSummary& extrinsics = *radar.extrinsics;
   lines.add("told_extrinsics_translation" + suffix, fixedTexts(extrinsics.told.l_I, 9));
-  lines.add("told_extrinsics_rotation_xyzw" + suffix, fixedTexts(extrinsics.told.q_IR, 9));
+  lines.add("told_extrinsics_rotation_xyzw" + suffix, fixedTexts(extrinsics.told.q_IR.coeffs(), 9));
   lines.add("final_extrinsics_translation" + suffix, fixedTexts(extrinsics.T_IR.l_I, 9));
   lines.add("final_extrinsics_translation_sigma" + suffix, fixedTexts(extrinsics.translation_sigma, 9));
-  lines.add("final_extrinsics_rotation_xyzw" + suffix, fixedTexts(extrinsics.T_IR.q_IR, 9));
+  lines.add("final_extrinsics_rotation_xyzw" + suffix, fixedTexts(extrinsics.T_IR.q_IR.coeffs(), 9));
   lines.add("final_extrinsics_rotation_sigma" + suffix, fixedTexts(extrinsics.rotation_sigma, 9));
 }
 
@@ -94,7 +87,7 @@ void addMeasured(SummaryLines& lines, const RadarSummary& radar) {
   lines.endMap();
 }
 
-void addBarometer(SummaryLines& lines, const BarometerSummary& barometer) {
+void addBarometer(SummaryLines& lines, const BarometerCounts& barometer) {
   const auto used = static_cast<double>(barometer.used);
   lines.beginMap("barometer");
   lines.add("pressures", barometer.pressures);
@@ -108,11 +101,11 @@ void addBarometer(SummaryLines& lines, const BarometerSummary& barometer) {
   lines.endMap();
 }
 
-void addGroundVehicle(SummaryLines& lines, const GroundVehicleSummary& vehicle) {
+void addGroundVehicle(SummaryLines& lines, const GroundVehicleCounts& vehicle) {
   lines.beginMap("ground_vehicle");
   lines.add("terms_used", vehicle.used);
   lines.add("terms_left_out", vehicle.left_out);
-  lines.add("final_rotation_xyzw", fixedTexts(vehicle.rotation, 9));
+  lines.add("final_rotation_xyzw", fixedTexts(vehicle.rotation.coeffs(), 9));
   lines.add("final_rotation_sigma", fixedTexts(vehicle.rotation_sigma, 9));
   lines.add("contradicted", vehicle.contradicted_at.has_value());
   if (vehicle.contradicted_at) lines.add("contradicted_after_s", fixedText(*vehicle.contradicted_at, 3));
@@ -123,35 +116,34 @@ void addGroundVehicle(SummaryLines& lines, const GroundVehicleSummary& vehicle) 
 
 std::string summaryText(const RunSummary& summary, const std::vector<std::string>& saved) {
   SummaryLines lines;
-  const auto line = [&](const char* key, const auto& value) { lines.add(key, value); };
-  line("mode", summary.mode);
-  line("verdict", toString(summary.diagnosis.verdict));
+  lines.add("mode", summary.mode);
+  lines.add("verdict", toString(summary.diagnosis.verdict));
   lines.addChecks(summary.diagnosis.checks);
   lines.addCauses(summary.diagnosis.causes);
-  line("imu_count", summary.imu_count);
-  line("scans_total", summary.scansTotal());
-  line("scans_used", summary.scansUsed());
-  line("scans_rejected", summary.scansRejected());
+  lines.add("imu_count", summary.imu_count);
+  lines.add("scans_total", summary.scansTotal());
+  lines.add("scans_used", summary.scansUsed());
+  lines.add("scans_rejected", summary.scansRejected());
   for (const RadarSummary& radar : summary.radars) {
     if (radar.name.empty()) continue;  // the only one
     lines.add("scans_total_" + radar.name, radar.scans_total);
     lines.add("scans_used_" + radar.name, radar.scans_used);
     lines.add("scans_rejected_" + radar.name, radar.scans_rejected);
   }
-  line("input_faults", summary.input_faults);
-  line("solver_terminations", summary.solver_terminations);
-  line("initialized_from", summary.initialized_from.empty() ? "none" : summary.initialized_from);
-  line("health_at_end", summary.health_at_end);
-  line("divergences", summary.divergences);
-  line("reinitializations", summary.reinitializations);
-  line("scans_diverged", summary.scans_diverged);
-  line("path_length_m", fixedText(summary.path_length_m, 6));
-  line("end_to_start_2d_m", fixedText(summary.end_to_start_2d_m, 6));
-  line("end_to_start_3d_m", fixedText(summary.end_to_start_3d_m, 6));
+  lines.add("input_faults", summary.input_faults);
+  lines.add("solver_terminations", summary.solver_terminations);
+  lines.add("initialized_from", toString(summary.initialized_from));
+  lines.add("health_at_end", summary.health_at_end);
+  lines.add("divergences", summary.divergences);
+  lines.add("reinitializations", summary.reinitializations);
+  lines.add("scans_diverged", summary.scans_diverged);
+  lines.add("path_length_m", fixedText(summary.path_length_m, 6));
+  lines.add("end_to_start_2d_m", fixedText(summary.end_to_start_2d_m, 6));
+  lines.add("end_to_start_3d_m", fixedText(summary.end_to_start_3d_m, 6));
   for (const RadarSummary& radar : summary.radars) addEstimates(lines, radar);
   lines.beginMap("imu_noise");
-  line("accel", fixedText(summary.imu_noise.accel_density, 6));
-  line("gyro", fixedText(summary.imu_noise.gyro_density, 6));
+  lines.add("accel", fixedText(summary.imu_noise.accel_density, 6));
+  lines.add("gyro", fixedText(summary.imu_noise.gyro_density, 6));
   lines.endMap();
   for (const RadarSummary& radar : summary.radars) addMeasured(lines, radar);
   for (const RadarSummary& radar : summary.radars) {
@@ -160,21 +152,21 @@ std::string summaryText(const RunSummary& summary, const std::vector<std::string
     lines.add("pass_offset_sigmas_s" + suffixOf(radar.name), fixedTexts(radar.pass_offset_sigmas_s, 9));
   }
   if (summary.batch) {
-    line("batch_iterations", summary.batch->iterations);
-    line("batch_placements", summary.batch->placements);
-    line("batch_converged", summary.batch->converged);
+    lines.add("batch_iterations", summary.batch->iterations);
+    lines.add("batch_placements", summary.batch->placements);
+    lines.add("batch_converged", summary.batch->converged);
   }
   if (summary.barometer) addBarometer(lines, *summary.barometer);
   if (summary.ground_vehicle) addGroundVehicle(lines, *summary.ground_vehicle);
   if (summary.truth) {
-    line("ate_m", fixedText(summary.truth->ate_m, 9));
-    if (summary.truth->t_rel) line("t_rel", fixedText(*summary.truth->t_rel, 9));
-    if (summary.truth->r_rel_deg) line("r_rel_deg", fixedText(*summary.truth->r_rel_deg, 9));
+    lines.add("ate_m", fixedText(summary.truth->ate_m, 9));
+    if (summary.truth->t_rel) lines.add("t_rel", fixedText(*summary.truth->t_rel, 9));
+    if (summary.truth->r_rel_deg) lines.add("r_rel_deg", fixedText(*summary.truth->r_rel_deg, 9));
   }
-  line("saved", saved);
+  lines.add("saved", saved);
   // All above is the same in every run; these are not.
-  line("estimation_seconds", fixedText(summary.estimation_seconds, 6));
-  line("realtime_factor", fixedText(summary.realtime_factor, 3));
+  lines.add("estimation_seconds", fixedText(summary.estimation_seconds, 6));
+  lines.add("realtime_factor", fixedText(summary.realtime_factor, 3));
   return lines.text();
 }
 
@@ -190,16 +182,12 @@ std::uint64_t RunSummary::scansUsed() const {
   return used;
 }
 
-std::map<std::string, std::uint64_t> RunSummary::scansRejected() const {
-  std::map<std::string, std::uint64_t> rejected;
+Counts RunSummary::scansRejected() const {
+  Counts rejected;
   for (const RadarSummary& radar : radars) {
     for (const auto& [reason, count] : radar.scans_rejected) rejected[reason] += count;
   }
   return rejected;
-}
-
-std::string contradictionText(const GroundVehicleSummary& vehicle) {
-  return "after " + fixedText(vehicle.contradicted_at.value_or(0.0), 1) + " s " + kGroundVehicleContradicted;
 }
 
 }  // namespace rio_t

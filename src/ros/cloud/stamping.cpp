@@ -141,20 +141,12 @@ std::vector<RadarScan> ScanStamper::finish() {
 
 ScanStamper::Decision ScanStamper::stampFront(Time* stamp) {
   const Held& scan = held_.front();
-  switch (options_.source) {
-    case StampSource::kHeader:
-      *stamp = scan.header_stamp;
-      return Decision::kStamped;
-    case StampSource::kArrival: {
-      const std::optional<Time> arrival = clocks_.toImuClock(scan.record);
-      if (!arrival) return finishing_ ? Decision::kGiveUp : Decision::kWait;
-      *stamp = *arrival;
-      return Decision::kStamped;
-    }
-    case StampSource::kTrigger:
-      return stampFromTrigger(scan, stamp);
-  }
-  throw std::logic_error("stamp source not handled");
+  if (options_.source == StampSource::kTrigger) return stampFromTrigger(scan, stamp);
+  const std::optional<Time> found =
+      options_.source == StampSource::kHeader ? scan.header_stamp : clocks_.toImuClock(scan.record);
+  if (!found) return finishing_ ? Decision::kGiveUp : Decision::kWait;
+  *stamp = *found;
+  return Decision::kStamped;
 }
 
 ScanStamper::Trigger* ScanStamper::triggerOfSeq(const Held& scan) {

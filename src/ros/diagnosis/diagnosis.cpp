@@ -33,16 +33,17 @@ double shareOf(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
-std::uint64_t sumOf(const Counts& counts, const std::vector<std::string>& names) {
-  std::uint64_t sum = 0;
-  for (const std::string& name : names) sum += countOf(counts, name);
-  return sum;
+/// Windows, and those of them that ended with the offset at its bound.
+std::pair<std::uint64_t, std::uint64_t> windowsAtBound(const RunEvidence& evidence) {
+  std::uint64_t windows = 0;
+  for (const auto& [reason, count] : evidence.solver_terminations) windows += count;
+  return {windows, countOf(evidence.solver_terminations, toString(SolverTermination::kAtBound))};
 }
 
 /// Share of the scans after the start that were used.
 double usedShare(const RunEvidence& evidence) {
   std::uint64_t used = 0, after_start = 0;
-  for (const RadarEvidence& radar : evidence.radars) {
+  for (const RadarSummary& radar : evidence.radars) {
     used += radar.scans_used;
     after_start += radar.scans_total - radar.scans_before_start;
   }
@@ -69,14 +70,14 @@ std::string outOf(std::uint64_t part, std::uint64_t whole, const std::string& wh
 }
 
 /// How far the estimated mounting is turned from the told one, about the worst axis.
-double turnSigmas(const RadarEvidence& radar, const Config& config) {
+double turnSigmas(const RadarSummary& radar, const Config& config) {
   return radar.turn.cwiseAbs().maxCoeff() / config.odometry.smoother.extrinsics_rotation_sigma;
 }
 
 /// Everything that speaks of one radar.
 class RadarCauses {
  public:
-  RadarCauses(const RadarEvidence& radar, const Config& config, std::vector<Cause>* causes)
+  RadarCauses(const RadarSummary& radar, const Config& config, std::vector<Cause>* causes)
       : radar_(radar),
         config_(config),
         key_(prefixOf(radar.name)),
@@ -212,7 +213,8 @@ class RadarCauses {
   /// Scans that give a velocity that the IMU contradicts.
   void addContradictions() {
     const std::uint64_t judged = radar_.scans_total - radar_.scans_before_start;
-    const std::uint64_t contradicted = sumOf(radar_.scans_rejected, {"innovation", "infeasible_velocity"});
+    const std::uint64_t contradicted =
+        countOf(radar_.scans_rejected, "innovation") + countOf(radar_.scans_rejected, "infeasible_velocity");
     const double share = shareOf(contradicted, judged);
     if (share < kManyScans) return;
     cause("contradicts_imu", share,
@@ -237,7 +239,7 @@ class RadarCauses {
               "extrinsics_rotation_xyzw, order x, y, z, w)." + kCheckBag);
   }
 
-  const RadarEvidence& radar_;
+  const RadarSummary& radar_;
   const Config& config_;
   const std::string key_, of_;
   std::vector<Cause>* causes_;
@@ -274,11 +276,12 @@ void addStart(const RunEvidence& evidence, const Config& config, std::vector<Cau
 }
 
 void addOffset(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
-  const double share = shareOf(evidence.windows_at_bound, evidence.windows);
-  if (share < kManyWindows || evidence.windows < kEnoughScans) return;
+  const auto [windows, at_bound] = windowsAtBound(evidence);
+  const double share = shareOf(at_bound, windows);
+  if (share < kManyWindows || windows < kEnoughScans) return;
   const double bound = config.odometry.smoother.max_time_offset;
   causes->push_back({"offset_at_bound",
-                     outOf(evidence.windows_at_bound, evidence.windows, "windows") +
+                     outOf(at_bound, windows, "windows") +
                          " end with the time offset at its bound, max_time_offset " + number(bound) + " s.",
                      "Raise max_time_offset, subtract a known delay with radar_stamp_shift, or set "
                      "stamp_source: arrival. A wrong mounting can have the same effect.",
@@ -288,7 +291,7 @@ void addOffset(const RunEvidence& evidence, const Config& config, std::vector<Ca
 void addImu(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
   const auto fault = [&](const std::string& name, std::uint64_t samples_of_one, const std::string& text,
                          const std::string& remedy) {
-    const std::uint64_t count = countOf(evidence.faults, name);
+    const std::uint64_t count = countOf(evidence.input_faults, name);
     const double share = shareOf(count * samples_of_one, evidence.imu_count);
     if (share > kManySamples)
       causes->push_back({name, std::to_string(count) + " " + text, remedy, std::min(1.0, share)});
@@ -355,7 +358,7 @@ void addSilence(const RunEvidence& evidence, std::vector<Cause>* causes) {
 
 void addDivergence(const RunEvidence& evidence, std::vector<Cause>* causes) {
   const double share = shareOf(evidence.scans_diverged, evidence.scans_judged);
-  const std::uint64_t divergences = countOf(evidence.faults, "diverged");
+  const std::uint64_t divergences = evidence.divergences;
   if (divergences == 0 && evidence.health != Health::kDiverged) return;
   // Without scans the velocity gets lost, which counts as diverged: then the lack of scans is the cause.
   const auto contradicts = [](const Cause& cause) { return cause.name == "contradicts_imu"; };
@@ -395,30 +398,30 @@ void addMissingMounting(const Config& config, std::vector<Cause>* causes) {
 }
 
 std::vector<Check> checksOf(const RunEvidence& evidence, const std::vector<Config>& radars) {
+  const auto [windows, at_bound] = windowsAtBound(evidence);
   double kept = 1.0, turned = 0.0;
   for (std::size_t k = 0; k < evidence.radars.size(); ++k)
     turned = std::max(turned, turnSigmas(evidence.radars[k], radars.at(k)));
-  for (const RadarEvidence& radar : evidence.radars) {
+  for (const RadarSummary& radar : evidence.radars) {
     const std::uint64_t passed = radar.points_by_verdict[static_cast<std::size_t>(PointVerdict::kKept)];
     if (radar.points > 0) kept = std::min(kept, shareOf(passed, radar.points));
   }
   std::uint64_t imu_faults = 0;
-  for (const char* fault : kImuFaults) imu_faults += countOf(evidence.faults, fault);
+  for (const char* fault : kImuFaults) imu_faults += countOf(evidence.input_faults, fault);
   return {
       {"started", evidence.initialized ? 1.0 : 0.0, 1.0, true},
       {"scans_used_share", usedShare(evidence), kFewScansUsed, true},
       {"silent_time_share", silentShare(evidence), kMostlySilent, false},
       {"points_kept_share", kept, 1.0 - kManyPoints, true},
       {"scans_diverged_share", shareOf(evidence.scans_diverged, evidence.scans_judged), kManyDiverged, false},
-      {"windows_at_offset_bound_share", shareOf(evidence.windows_at_bound, evidence.windows), kManyWindows,
-       false},
+      {"windows_at_offset_bound_share", shareOf(at_bound, windows), kManyWindows, false},
       {"mounting_turned_sigmas", turned, kFarMounting, false},
       {"imu_faults_share", std::min(1.0, shareOf(imu_faults, evidence.imu_count)), kManySamples, false},
       {"healthy_at_end", evidence.health == Health::kOk ? 1.0 : 0.0, 1.0, true}};
 }
 
 RunVerdict verdictOf(const RunEvidence& evidence, const Diagnosis& diagnosis) {
-  const auto used = [](const RadarEvidence& radar) { return radar.scans_used > 0; };
+  const auto used = [](const RadarSummary& radar) { return radar.scans_used > 0; };
   const bool any_used = std::any_of(evidence.radars.begin(), evidence.radars.end(), used);
   const bool diverged =
       evidence.health == Health::kDiverged || shareOf(evidence.scans_diverged, evidence.scans_judged) > 0.5;
@@ -432,15 +435,7 @@ RunVerdict verdictOf(const RunEvidence& evidence, const Diagnosis& diagnosis) {
 }  // namespace
 
 std::string toString(RunVerdict verdict) {
-  switch (verdict) {
-    case RunVerdict::kGood:
-      return "good";
-    case RunVerdict::kDoubtful:
-      return "doubtful";
-    case RunVerdict::kBad:
-      return "bad";
-  }
-  throw std::invalid_argument("not a RunVerdict");
+  return verdict == RunVerdict::kGood ? "good" : verdict == RunVerdict::kDoubtful ? "doubtful" : "bad";
 }
 
 Diagnosis diagnose(const RunEvidence& evidence, const Config& config) {

@@ -22,7 +22,7 @@ EvidenceCollector::EvidenceCollector(const Config& config)
 
 void EvidenceCollector::add(const ScanResult& result) {
   if (!result.used && result.rejected_because.empty()) return;  // only carries the last poses
-  RadarEvidence& radar = evidence_.radars.at(result.scan.radar);
+  RadarSummary& radar = evidence_.radars.at(result.scan.radar);
   ++radar.scans_total;
   for (const RadarPoint& point : result.scan.points) {
     ++radar.points;
@@ -33,6 +33,7 @@ void EvidenceCollector::add(const ScanResult& result) {
     ++radar.scans_before_start;
     if (first_imu_ && result.scan.stamp < *first_imu_ && ++radar.scans_before_imu == 1)
       radar.seconds_before_imu = *first_imu_ - result.scan.stamp;
+    ++radar.scans_rejected[result.rejected_because];
     ++radar.velocity_status[toString(result.ego_velocity.status)];
     return;
   }
@@ -48,8 +49,7 @@ void EvidenceCollector::add(const ScanResult& result) {
   if (!result.updated) return;
   radar.turn = turnBetween(result.told_T_IR, result.T_IR);
   evidence_.heading_sigma = std::sqrt(bodyOdometry(result.state, 0.0).pose_covariance(5, 5));
-  ++evidence_.windows;
-  if (result.solver_termination == SolverTermination::kAtBound) ++evidence_.windows_at_bound;
+  ++evidence_.solver_terminations[toString(result.solver_termination)];
 }
 
 void EvidenceCollector::addState(Time time) {
@@ -79,7 +79,12 @@ RunEvidence EvidenceCollector::evidence(const RadarInertialOdometry& odometry,
   all.initialized = odometry.initialized();
   if (start) all.initialized_from = start->from;
   if (!all.initialized) all.waiting_for = odometry.waitingFor();
-  all.faults = odometry.faults();
+  all.input_faults = odometry.faults();
+  // These two are judgements of the estimate.
+  all.divergences = countOf(all.input_faults, "diverged");
+  all.reinitializations = countOf(all.input_faults, "reinitialized");
+  all.input_faults.erase("diverged");
+  all.input_faults.erase("reinitialized");
   all.health = odometry.health();
   all.imu_noise = odometry.imuNoiseOfRun();
   return all;
@@ -109,6 +114,8 @@ void GroundVehicleCounts::add(const ScanResult& result) {
   ++(last->used ? used : left_out);
   if (!first_judged) first_judged = last->time;
   if (last->is_contradicted) contradicted_at = last->time - *first_judged;
+  rotation = last->q_IV;
+  rotation_sigma = last->q_IV_sigma;
 }
 
 }  // namespace rio_t

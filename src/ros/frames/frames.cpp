@@ -37,8 +37,4 @@ Extrinsics radarExtrinsics(const tf2::BufferCore& tf, const Config& radar, const
                       pointCloudFormat(radar).axes);
 }
 
-ImuInBody imuInBody(const tf2::BufferCore& tf, const Config& config, const std::string& imu_frame) {
-  return toImuInBody(tf.lookupTransform(config.base_link_frame, imu_frame, ros::Time(0)).transform);
-}
-
 }  // namespace rio_t

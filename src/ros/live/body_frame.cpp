@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "rio_t/ros/frames/frames.h"
+#include "rio_t/ros/messages/conversions.h"
 
 namespace rio_t {
 namespace {
@@ -72,7 +73,8 @@ bool BodyFrame::tryTf() {
     return true;
   }
   try {
-    decide(rio_t::imuInBody(*tf_, config_, *imu_frame_), "tf from " + *imu_frame_);
+    const auto transform = tf_->lookupTransform(config_.base_link_frame, *imu_frame_, ros::Time(0));
+    decide(toImuInBody(transform.transform), "tf from " + *imu_frame_);
   } catch (const tf2::TransformException& error) {
     waiting_for_ = "tf from " + *imu_frame_ + " to " + config_.base_link_frame + " (" + error.what() + ")";
     return false;

@@ -12,26 +12,19 @@ BoundedTrajectory::BoundedTrajectory(std::size_t capacity) : capacity_(capacity)
 
 void BoundedTrajectory::add(const StampedPose& pose) {
   last_ = pose;
-  if (!kept_.empty() && ++since_kept_ < stride_) return;
+  if (count_++ % stride_ != 0) return;
   if (kept_.size() == capacity_) {
-    // The first pose stays; after it every second.
-    std::size_t count = 0;
-    for (std::size_t k = 0; k < kept_.size(); k += 2) kept_[count++] = kept_[k];
-    // If the capacity is even, the newest went too, and this pose comes at the new stride. If it is odd, this
-    // pose comes too early.
-    const bool newest_stayed = kept_.size() % 2 == 1;
-    kept_.resize(count);
-    since_kept_ = newest_stayed ? stride_ : 0;
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < kept_.size(); k += 2) kept_[kept++] = kept_[k];
+    kept_.resize(kept);
     stride_ *= 2;
-    if (newest_stayed) return;
   }
-  since_kept_ = 0;
-  kept_.push_back(pose);
+  if (lastIsKept()) kept_.push_back(pose);
 }
 
 Trajectory BoundedTrajectory::poses() const {
   Trajectory all = kept_;
-  if (since_kept_ > 0) all.push_back(last_);
+  if (count_ > 0 && !lastIsKept()) all.push_back(last_);
   return all;
 }
 

@@ -7,14 +7,13 @@
 #include "rio_t/ros/cloud/point_cloud.h"
 #include "rio_t/ros/live/live_odometry.h"
 #include "rio_t/ros/messages/conversions.h"
-#include "seconds_since.h"
 
 namespace rio_t {
 
 void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
   const auto start = std::chrono::steady_clock::now();
   monitor_.imu();
-  imu_rate_->tick();
+  tick_imu_();
   try {
     const ImuMeasurement imu =
         toImuMeasurement(*event.getConstMessage(), config_.imu_topic, config_.imu_units);
@@ -37,7 +36,8 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
         session_.speak(Speaker::kNavigation, now, [&] {
           if (publisher_.odometry(*body)) ++odom_published_;
           frames_.published(*body);
-          monitor_.odometry(*state, secondsSince(start));
+          monitor_.odometry(*state,
+                            std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
         });
       } else if (!frames_.waitingFor().empty()) {
         monitor_.imuDropped("odometry_before_base_extrinsics");
@@ -61,16 +61,13 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
 void LiveOdometry::followImuStamps(const ImuMeasurement& imu) {
   // The same judgement as the session's own, so that the whole session starts again, with what it stamps by.
   if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite()) return;  // the session drops it
-  const ClockJumpDetector::Verdict stamp = imu_stamps_.check(imu.time);
-  const bool restarts = stamp == ClockJumpDetector::Verdict::kRestart;
-  if (restarts) {
-    const double jump = imu.time - *newest_imu_;
-    reset(std::string("the IMU's stamps jumped ") + (jump < 0.0 ? "back" : "ahead") + " by " +
-              std::to_string(std::abs(jump)) + " s",
-          true);
-    early_imu_.clear();
-  }
-  if (restarts || stamp == ClockJumpDetector::Verdict::kGood) newest_imu_ = imu.time;
+  const std::optional<Time> before = imu_stamps_.newest();
+  if (imu_stamps_.check(imu.time) != ClockJumpDetector::Verdict::kRestart) return;
+  const double jump = imu.time - *before;
+  reset(std::string("the IMU's stamps jumped ") + (jump < 0.0 ? "back" : "ahead") + " by " +
+            std::to_string(std::abs(jump)) + " s",
+        true);
+  early_imu_.clear();
 }
 
 std::optional<NavigationState> LiveOdometry::feed(LiveSession& session, const Received& received,
@@ -85,7 +82,7 @@ void LiveOdometry::onScan(std::size_t radar, const Event<sensor_msgs::PointCloud
   const sensor_msgs::PointCloud2& message = *event.getConstMessage();
   Radar& from = radars_[radar];
   monitor_.scan(radar);
-  from.scan_rate->tick();
+  from.tick_scan();
   std::string what = "cloud_not_usable";  // as the bag runner calls it
   try {
     DecodedScan decoded;
@@ -129,7 +126,7 @@ void LiveOdometry::onPressure(const Event<sensor_msgs::FluidPressure>& event) {
 
 void LiveOdometry::onTrigger(std::size_t radar, const Event<std_msgs::Header>& event) {
   monitor_.trigger(radar);
-  radars_[radar].trigger_rate->tick();
+  radars_[radar].tick_trigger();
   const Session now = session_.get();
   if (!now) return;
   const std_msgs::Header& trigger = *event.getConstMessage();

@@ -16,7 +16,7 @@
 #include "rio_t/evaluation/trajectory.h"
 #include "rio_t/ros/messages/conversions.h"
 #include "rio_t/ros/parameters/ros_parameters.h"
-#include "seconds_since.h"
+#include "topic_rate.h"
 
 namespace rio_t {
 namespace {
@@ -25,36 +25,21 @@ constexpr double kDiagnosticPeriod = 1.0;  // [s]
 // Deep enough for seconds of input: nothing is lost while a callback is late.
 constexpr std::uint32_t kScanQueue = 200;
 
-/// Adds what is wrong to `faults`.
-void resolveTopics(const ros::NodeHandle& node, Config* config, std::vector<std::string>* faults) {
-  const auto resolve = [&](const std::string& key, std::string* topic) {
-    if (topic->empty()) return;
-    try {
-      *topic = node.resolveName(*topic);
-    } catch (const ros::InvalidNameException& error) {
-      faults->push_back(key + ": expected the name of a topic, got \"" + *topic + "\" (" + error.what() +
-                        ")");
-    }
-  };
-  const std::string section = config->radar_name.empty() ? "" : config->radar_name + "/";
-  if (section.empty()) {
-    resolve("imu_topic", &config->imu_topic);
-    resolve("barometer_topic", &config->barometer_topic);
-  }
-  resolve(section + "radar_topic", &config->radar_topic);
-  resolve(section + "trigger_topic", &config->trigger_topic);
-  for (Config& radar : config->radars) {
-    resolveTopics(node, &radar, faults);
-    radar.imu_topic = config->imu_topic;
-    radar.barometer_topic = config->barometer_topic;
-  }
-}
-
 /// The topics with namespace and remappings, for messages to people. Throws ConfigError that names the keys
 /// of topics that ROS does not take.
-Config withResolvedTopics(Config config, const ros::NodeHandle& node) {
+Config withResolvedTopics(const Config& told, const ros::NodeHandle& node) {
   std::vector<std::string> faults;
-  resolveTopics(node, &config, &faults);
+  Config config = withTopics(told, [&](const std::string& key, const std::string& topic) {
+    try {
+      return key == "ground_truth_topic" ? topic : node.resolveName(topic);
+    } catch (const ros::InvalidNameException& error) {
+      std::string fault =
+          key + ": expected the name of a topic, got \"" + topic + "\" (" + error.what() + ")";
+      // Each radar has the topics of the top level, too.
+      if (std::find(faults.begin(), faults.end(), fault) == faults.end()) faults.push_back(std::move(fault));
+      return topic;
+    }
+  });
   if (!faults.empty()) throw ConfigError(std::move(faults));
   return config;
 }
@@ -150,40 +135,24 @@ void LiveOdometry::subscribe(const Config& told) {
   ros::NodeHandle service_node = onQueue(private_node_, &input_queue_);
   const std::vector<Config> told_of_radars = configsOfRadars(told);
 
-  const auto subscribeTo = [&](ros::NodeHandle& handle, const std::string& topic, std::uint32_t queue,
-                               auto callback, auto message) {
-    using Message = decltype(message);
-    const boost::function<void(const Event<Message>&)> call = callback;
-    return handle.subscribe<Message>(topic, queue, call, ros::VoidConstPtr(), fast);
-  };
   for (std::size_t k = 0; k < radars_.size(); ++k) {
     Radar& radar = radars_[k];
-    if (radar.config.stamp_source == StampSource::kTrigger) {
-      radar.triggers = subscribeTo(
-          input_node, told_of_radars[k].trigger_topic, kImuQueue,
-          [this, k](const Event<std_msgs::Header>& event) {
-            guarded("trigger", [&] { onTrigger(k, event); });
-          },
-          std_msgs::Header());
-    }
-    radar.scans = subscribeTo(
-        input_node, told_of_radars[k].radar_topic, kScanQueue,
-        [this, k](const Event<sensor_msgs::PointCloud2>& event) {
-          guarded("scan", [&] { onScan(k, event); });
-        },
-        sensor_msgs::PointCloud2());
+    const boost::function<void(const Event<std_msgs::Header>&)> trigger = [this, k](const auto& event) {
+      onTrigger(k, event);
+    };
+    const boost::function<void(const Event<sensor_msgs::PointCloud2>&)> scan = [this, k](const auto& event) {
+      onScan(k, event);
+    };
+    if (radar.config.stamp_source == StampSource::kTrigger)
+      radar.triggers = input_node.subscribe<std_msgs::Header>(told_of_radars[k].trigger_topic, kImuQueue,
+                                                              trigger, ros::VoidConstPtr(), fast);
+    radar.scans = input_node.subscribe<sensor_msgs::PointCloud2>(told_of_radars[k].radar_topic, kScanQueue,
+                                                                 scan, ros::VoidConstPtr(), fast);
   }
   if (!told.barometer_topic.empty())
-    barometer_subscriber_ = subscribeTo(
-        input_node, told.barometer_topic, kImuQueue,
-        [this](const Event<sensor_msgs::FluidPressure>& event) {
-          guarded("pressure", [&] { onPressure(event); });
-        },
-        sensor_msgs::FluidPressure());
-  imu_subscriber_ = subscribeTo(
-      imu_node, told.imu_topic, kImuQueue,
-      [this](const Event<sensor_msgs::Imu>& event) { guarded("IMU", [&] { onImu(event); }); },
-      sensor_msgs::Imu());
+    barometer_subscriber_ =
+        input_node.subscribe(told.barometer_topic, kImuQueue, &LiveOdometry::onPressure, this, fast);
+  imu_subscriber_ = imu_node.subscribe(told.imu_topic, kImuQueue, &LiveOdometry::onImu, this, fast);
   reset_server_ = service_node.advertiseService("reset", &LiveOdometry::onReset, this);
   save_server_ = service_node.advertiseService("save_trajectory", &LiveOdometry::onSaveTrajectory, this);
   reconfigure_ =
@@ -230,11 +199,11 @@ void LiveOdometry::addDiagnostics() {
       diagnostics_->add(withName("extrinsics", radar),
                         [this, k](Status& s) { monitor_.describeExtrinsics(s, k); });
   }
-  imu_rate_ = std::make_unique<TopicRate>(config_.imu_topic, *diagnostics_);
+  tick_imu_ = topicRate(config_.imu_topic, *diagnostics_);
   for (Radar& radar : radars_) {
-    radar.scan_rate = std::make_unique<TopicRate>(radar.config.radar_topic, *diagnostics_);
+    radar.tick_scan = topicRate(radar.config.radar_topic, *diagnostics_);
     if (radar.config.stamp_source == StampSource::kTrigger)
-      radar.trigger_rate = std::make_unique<TopicRate>(radar.config.trigger_topic, *diagnostics_);
+      radar.tick_trigger = topicRate(radar.config.trigger_topic, *diagnostics_);
   }
 }
 
@@ -246,9 +215,8 @@ void LiveOdometry::onDiagnosticsTimer() {
   if (runs && !source.empty()) frames_.stopListening();
   std::uint64_t published = odom_published_.exchange(0);
   // Before there is an odometry, its silence is no fault.
-  if (published > 0 && !odom_rate_)
-    odom_rate_ = std::make_unique<TopicRate>(private_node_.resolveName("odom"), *diagnostics_);
-  for (; published > 0; --published) odom_rate_->tick();
+  if (published > 0 && !tick_odom_) tick_odom_ = topicRate(private_node_.resolveName("odom"), *diagnostics_);
+  for (; published > 0; --published) tick_odom_();
   // Not update(), which looks at ROS time: also a clock that stands still is worth a diagnosis.
   diagnostics_->force_update();
   tellFaults();
@@ -285,10 +253,10 @@ void LiveOdometry::tellFaults() {
     faults_told_.clear();
   }
   for (const auto& [fault, count] : now->odometry().faults()) {
-    Told& told = faults_told_[fault];
-    if (count == told.count || secondsSince(told.at) < kWarnPeriod) continue;
+    std::uint64_t& told = faults_told_[fault];
+    if (count == told || !isTimeToTell("input fault " + fault)) continue;
     ROS_WARN_STREAM(name_ << ": input fault " << fault << ", " << count << " so far");
-    told = {count, std::chrono::steady_clock::now()};
+    told = count;
   }
 }
 

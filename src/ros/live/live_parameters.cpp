@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <limits>
-#include <type_traits>
+#include <stdexcept>
 #include <variant>
+
+#include "rio_t/ros/parameters/ros_parameters.h"
 
 namespace rio_t {
 namespace {
@@ -14,18 +16,6 @@ Parameter parameterOf(const std::string& name, const Value& value) {
   parameter.name = name;
   parameter.value = value;
   return parameter;
-}
-
-LiveValue plain(const ParameterValue& value) {
-  if (const bool* truth = std::get_if<bool>(&value.data)) return *truth;
-  if (const std::int64_t* whole = std::get_if<std::int64_t>(&value.data)) return *whole;
-  return std::get<double>(value.data);
-}
-
-/// The name of the kind, as dynamic_reconfigure has it.
-std::string typeOf(const LiveValue& value) {
-  if (std::holds_alternative<bool>(value)) return "bool";
-  return std::holds_alternative<std::int64_t>(value) ? "int" : "double";
 }
 
 /// The parameter message has whole numbers of 32 bits.
@@ -41,33 +31,22 @@ ParameterDescription descriptionOf(const std::string& key) {
   throw std::logic_error("no parameter " + key);
 }
 
-/// Each value replaced by one end of its range.
-template <typename End>
-std::map<std::string, LiveValue> endsOf(std::map<std::string, LiveValue> values, bool upper, const End& end) {
-  for (auto& [key, value] : values) {
-    if (bool* truth = std::get_if<bool>(&value)) {
-      *truth = upper;
-    } else if (std::int64_t* whole = std::get_if<std::int64_t>(&value)) {
-      *whole = clamped(end(descriptionOf(key)));
-    } else {
-      value = end(descriptionOf(key));
-    }
-  }
-  return values;
+/// The name of the kind, as dynamic_reconfigure has it.
+std::string typeOf(const ParameterDescription& about) {
+  return about.type == "boolean" ? "bool" : about.type == "integer" ? "int" : "double";
 }
 
 }  // namespace
 
 LiveParameters::LiveParameters(const Config& config) {
-  for (const std::string& key : liveKeys()) values_[key] = plain(parameterValue(config, key));
+  for (const std::string& key : liveKeys()) values_[key] = parameterValue(config, key);
 }
 
 ParameterEntries LiveParameters::changesFrom(const Config& config) const {
   const LiveParameters before(config);
   ParameterEntries changes;
   for (const auto& [key, value] : values_)
-    if (value != before.values_.at(key))
-      std::visit([&](auto each) { changes.push_back({key, {each}, "dynamic_reconfigure"}); }, value);
+    if (value.yaml() != before.values_.at(key).yaml()) changes.push_back({key, value, "dynamic_reconfigure"});
   return changes;
 }
 
@@ -80,7 +59,7 @@ dynamic_reconfigure::ConfigDescription LiveParameters::__getDescriptionMessage__
     const ParameterDescription about = descriptionOf(key);
     dynamic_reconfigure::ParamDescription parameter;
     parameter.name = key;
-    parameter.type = typeOf(defaults.values_.at(key));
+    parameter.type = typeOf(about);
     parameter.description = (about.unit.empty() ? "" : "[" + about.unit + "] ") + about.description;
     group.parameters.push_back(parameter);
   }
@@ -91,41 +70,33 @@ dynamic_reconfigure::ConfigDescription LiveParameters::__getDescriptionMessage__
   return message;
 }
 
-LiveParameters LiveParameters::__getMin__() {
+LiveParameters LiveParameters::endsOfRanges(bool upper) {
   LiveParameters ends;
-  ends.values_ = endsOf(ends.values_, false, [](const ParameterDescription& about) { return about.min; });
-  return ends;
-}
-
-LiveParameters LiveParameters::__getMax__() {
-  LiveParameters ends;
-  ends.values_ = endsOf(ends.values_, true, [](const ParameterDescription& about) { return about.max; });
+  for (auto& [key, value] : ends.values_) {
+    const ParameterDescription about = descriptionOf(key);
+    const double end = upper ? about.max : about.min;
+    if (about.type == "boolean") {
+      value.data = upper;
+    } else if (about.type == "integer") {
+      value.data = std::int64_t{clamped(end)};
+    } else {
+      value.data = end;
+    }
+  }
   return ends;
 }
 
 void LiveParameters::__fromServer__(const ros::NodeHandle& node) {
-  for (auto& [key, value] : values_) {
-    const std::string effective = "effective/" + key;
-    std::visit(
-        [&](auto& data) {
-          using Data = std::decay_t<decltype(data)>;
-          if constexpr (std::is_same_v<Data, std::int64_t>) {
-            int whole = 0;
-            if (node.getParam(effective, whole)) data = whole;
-          } else if constexpr (std::is_same_v<Data, double> || std::is_same_v<Data, bool>) {
-            Data read = data;
-            if (node.getParam(effective, read)) data = read;
-          }
-        },
-        value);
-  }
+  XmlRpc::XmlRpcValue read;
+  for (auto& [key, value] : values_)
+    if (node.getParam("effective/" + key, read)) value = toParameterValue(read);
 }
 
 bool LiveParameters::__fromMessage__(dynamic_reconfigure::Config& message) {
   const auto take = [&](const auto& parameters, auto convert) {
     for (const auto& parameter : parameters) {
       const auto found = values_.find(parameter.name);
-      if (found != values_.end()) found->second = convert(parameter.value);
+      if (found != values_.end()) found->second.data = convert(parameter.value);
     }
   };
   take(message.bools, [](auto value) { return value != 0; });
@@ -137,14 +108,16 @@ bool LiveParameters::__fromMessage__(dynamic_reconfigure::Config& message) {
 void LiveParameters::__toMessage__(dynamic_reconfigure::Config& message) const {
   message = {};
   for (const auto& [key, value] : values_) {
-    if (const bool* truth = std::get_if<bool>(&value))
+    if (const bool* truth = std::get_if<bool>(&value.data)) {
       message.bools.push_back(
           parameterOf<dynamic_reconfigure::BoolParameter>(key, static_cast<std::uint8_t>(*truth)));
-    if (const auto* whole = std::get_if<std::int64_t>(&value))
+    } else if (const auto* whole = std::get_if<std::int64_t>(&value.data)) {
       message.ints.push_back(
           parameterOf<dynamic_reconfigure::IntParameter>(key, clamped(static_cast<double>(*whole))));
-    if (const double* number = std::get_if<double>(&value))
-      message.doubles.push_back(parameterOf<dynamic_reconfigure::DoubleParameter>(key, *number));
+    } else {
+      message.doubles.push_back(
+          parameterOf<dynamic_reconfigure::DoubleParameter>(key, std::get<double>(value.data)));
+    }
   }
   dynamic_reconfigure::GroupState group;  // rqt_reconfigure shows a group with its state
   group.name = "Default";

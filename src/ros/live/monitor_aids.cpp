@@ -12,7 +12,7 @@ using diagnostic_msgs::DiagnosticStatus;
 
 void LiveMonitor::pressure() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  ++barometer_.messages.count;
+  ++barometer_.pressures;
 }
 
 void LiveMonitor::pressureDropped(const std::string& why) {
@@ -25,13 +25,13 @@ void LiveMonitor::describeBarometer(Status& status) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const Clock::time_point now = Clock::now();
   const double seconds = std::max(1e-3, std::chrono::duration<double>(now - barometer_.told).count());
-  const std::uint64_t fresh = barometer_.messages.count - barometer_.messages.told;
+  const std::uint64_t fresh = barometer_.pressures - barometer_.pressures_told;
   const std::uint64_t fresh_used = barometer_.used - barometer_.used_told;
   barometer_.told = now;
-  barometer_.messages.told = barometer_.messages.count;
+  barometer_.pressures_told = barometer_.pressures;
   barometer_.used_told = barometer_.used;
   status.add("pressure_rate_hz", static_cast<double>(fresh) / seconds);
-  status.add("pressures", barometer_.messages.count);
+  status.add("pressures", barometer_.pressures);
   status.add("pressures_not_usable", barometer_.not_usable);
   status.add("means_used", barometer_.used);
   for (const auto& [reason, count] : barometer_.rejected) status.add("means_rejected_" + reason, count);
@@ -43,11 +43,11 @@ void LiveMonitor::describeBarometer(Status& status) {
     status.add("bias_m", barometer_.last->bias);
     status.add("bias_sigma_m", barometer_.last->bias_sigma);
   }
-  if (barometer_.messages.count == 0) {
+  if (barometer_.pressures == 0) {
     status.summary(DiagnosticStatus::WARN, "no pressure yet on " + config_.barometer_topic);
   } else if (fresh == 0) {
     status.summary(DiagnosticStatus::WARN, "the barometer is silent, topic " + config_.barometer_topic);
-  } else if (barometer_.not_usable == barometer_.messages.count) {
+  } else if (barometer_.not_usable == barometer_.pressures) {
     status.summary(DiagnosticStatus::WARN, "no pressure can be used: " + barometer_.why_not_usable);
   } else if (fresh_used == 0 && barometer_.last && !barometer_.last->rejected_because.empty()) {
     status.summary(DiagnosticStatus::WARN,

@@ -11,12 +11,7 @@
 #include "rio_t/ros/messages/conversions.h"
 
 namespace rio_t {
-
 namespace {
-
-ros::NodeHandle namespaceOf(const Config& radar, const ros::NodeHandle& private_node) {
-  return radar.radar_name.empty() ? private_node : ros::NodeHandle(private_node, radar.radar_name);
-}
 
 /// As a shared pointer.
 template <typename Message>
@@ -38,7 +33,7 @@ void publishCloud(const ros::Publisher& publisher, const RadarScan& scan,
 // where the newest tells all.
 LivePublisher::Radar::Radar(const Config& config, const ros::NodeHandle& private_node)
     : frame(config.radar_frame) {
-  ros::NodeHandle node = namespaceOf(config, private_node);
+  ros::NodeHandle node(private_node, config.radar_name);  // without a name, the same
   time_offset = node.advertise<TimeOffset>("time_offset", 200);
   ego_velocity = node.advertise<geometry_msgs::TwistWithCovarianceStamped>("ego_velocity", 200);
   innovation = node.advertise<geometry_msgs::TwistWithCovarianceStamped>("innovation", 200);
@@ -59,8 +54,10 @@ LivePublisher::LivePublisher(const Config& config, const ros::NodeHandle& privat
   odom_ = node.advertise<nav_msgs::Odometry>("odom", 2000);
   odom_optimized_ = node.advertise<nav_msgs::Odometry>("odom_optimized", 200);
   // Not latched: that would serialise the whole path with each scan. Who comes late gets it at once.
-  path_ = node.advertise<nav_msgs::Path>(
-      "path", 1, [this](const ros::SingleSubscriberPublisher& subscriber) { publishPathTo(subscriber); });
+  path_ = node.advertise<nav_msgs::Path>("path", 1, [this](const ros::SingleSubscriberPublisher& subscriber) {
+    const nav_msgs::Path so_far = path();
+    if (!so_far.poses.empty()) subscriber.publish(so_far);
+  });
   imu_bias_ = node.advertise<ImuBias>("imu_bias", 200);
   if (config_.odometry.landmarks.enabled) map_ = node.advertise<sensor_msgs::PointCloud2>("map", 1, true);
   path_message_.header.frame_id = config_.odom_frame;
@@ -169,11 +166,6 @@ void LivePublisher::extendPath(const BodyOdometry& body) {
 nav_msgs::Path LivePublisher::path() {
   const std::lock_guard<std::mutex> lock(path_mutex_);
   return path_message_;
-}
-
-void LivePublisher::publishPathTo(const ros::SingleSubscriberPublisher& subscriber) {
-  const nav_msgs::Path so_far = path();
-  if (!so_far.poses.empty()) subscriber.publish(so_far);
 }
 
 void LivePublisher::clearPath() {

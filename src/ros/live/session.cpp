@@ -57,22 +57,18 @@ std::vector<LiveSession::GivenUp> LiveSession::addScan(std::uint32_t seq, Time h
 
 std::vector<LiveSession::GivenUp> LiveSession::takeStamped() {
   std::vector<GivenUp> given_up;
-  for (std::size_t radar = 0; radar < stampers_.size(); ++radar) takeStamped(radar, &given_up);
+  for (std::size_t radar = 0; radar < stampers_.size(); ++radar) {
+    Stamper& from = stampers_[radar];
+    for (RadarScan& scan : from.stamper.take()) {
+      if (arrivals_.size() >= kMaxScansInFlight) arrivals_.clear();
+      arrivals_[{scan.radar, scan.stamp.nanoseconds()}] = Clock::now();
+      odometry_.addScan(std::move(scan));
+    }
+    for (const auto& [reason, count] : from.stamper.givenUp())
+      for (std::uint64_t& told = from.given_up[reason]; told < count; ++told)
+        given_up.push_back({radar, reason});
+  }
   return given_up;
-}
-
-void LiveSession::takeStamped(std::size_t radar, std::vector<GivenUp>* given_up) {
-  Stamper& from = stampers_[radar];
-  for (RadarScan& scan : from.stamper.take()) {
-    if (arrivals_.size() >= kMaxScansInFlight) arrivals_.clear();
-    arrivals_[{scan.radar, scan.stamp.nanoseconds()}] = Clock::now();
-    odometry_.addScan(std::move(scan));
-  }
-  if (from.stamper.givenUp() == from.given_up) return;
-  for (const auto& [reason, count] : from.stamper.givenUp()) {
-    for (std::uint64_t& told = from.given_up[reason]; told < count; ++told)
-      given_up->push_back({radar, reason});
-  }
 }
 
 std::vector<LiveSession::Result> LiveSession::process(bool* more) {

@@ -1,12 +1,15 @@
-#include "rio_t/ros/live/topic_rate.h"
+#include "topic_rate.h"
 
 #include <diagnostic_updater/publisher.h>
 
 #include <limits>
+#include <memory>
 
 namespace rio_t {
+namespace {
 
-struct TopicRate::Task {
+// Debian 11's diagnostic_updater/publisher.h defines a function that is not inline: one file may include it.
+struct Task {
   Task(const std::string& topic, diagnostic_updater::Updater& updater)
       : diagnostic(topic, updater, {&least, &most, 0.0}) {}
 
@@ -14,10 +17,10 @@ struct TopicRate::Task {
   diagnostic_updater::HeaderlessTopicDiagnostic diagnostic;
 };
 
-TopicRate::TopicRate(const std::string& topic, diagnostic_updater::Updater& updater)
-    : task_(std::make_unique<Task>(topic, updater)) {}
-TopicRate::~TopicRate() = default;
+}  // namespace
 
-void TopicRate::tick() { task_->diagnostic.tick(); }
+std::function<void()> topicRate(const std::string& topic, diagnostic_updater::Updater& updater) {
+  return [task = std::make_shared<Task>(topic, updater)] { task->diagnostic.tick(); };
+}
 
 }  // namespace rio_t

@@ -5,7 +5,7 @@
 // Ground vehicle, barometer.
 namespace rio_t {
 
-void listPlatform(ParameterList& list, Config& c) {
+void listAids(ParameterList& list, Config& c) {
   GroundVehicleOptions& vehicle = c.odometry.ground_vehicle;
   list.group("Platform");
   list.choice<Platform>(
@@ -41,9 +41,7 @@ void listPlatform(ParameterList& list, Config& c) {
   list.number("vehicle_gate", "", above(0), vehicle.gate,
               "A velocity is left out if it contradicts the constraint by more than this many standard "
               "deviations.");
-}
 
-void listBarometer(ParameterList& list, Config& c) {
   BarometerOptions& barometer = c.odometry.barometer;
   list.group("Barometer");
   list.textOrEmpty(

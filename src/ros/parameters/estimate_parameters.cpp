@@ -26,10 +26,10 @@ void listWindow(ParameterList& list, Config& c) {
   list.integer("max_iterations", between(1, 1000), smoother.max_iterations,
                "The solver stops after this many iterations at each scan. It usually needs one or two. The "
                "diagnostics tell if it often reaches this limit.");
-  list.integer("max_queued_scans", atLeast(1), c.odometry.max_queued_scans,
-               "This is the largest number of scans that wait for the IMU or for the solver. If one more "
-               "comes, the node "
-               "drops the oldest and counts it as queue_full. Raise it if the IMU arrives in bursts.");
+  list.integer(
+      "max_queued_scans", atLeast(1), c.odometry.max_queued_scans,
+      "This is the largest number of scans that wait for the IMU or for the solver. If one more comes, the "
+      "node drops the oldest and counts it as queue_full. Raise it if the IMU arrives in bursts.");
 }
 
 void listGate(ParameterList& list, SmootherOptions& smoother) {
@@ -88,17 +88,15 @@ void listOffsetSteps(ParameterList& list, OffsetStepDetectorOptions& monitor) {
 
 }  // namespace
 
-void listInitialization(ParameterList& list, Config& c) {
+void listStart(ParameterList& list, Config& c) {
   StaticInitializerOptions& init = c.odometry.initialization;
   list.group("Initialisation");
   list.first().choice<InitMode>(
       "init_mode", {{"static", InitMode::kStatic}, {"motion", InitMode::kMotion}, {"auto", InitMode::kAuto}},
       c.odometry.init_mode,
       "This is how the estimate starts. static waits for rest, however long. motion starts from radar and "
-      "IMU at "
-      "once, moving or not. auto waits for rest for init_motion_after, and then starts in motion. A start at "
-      "rest "
-      "is the most accurate: let the platform stand for 3 s if you can.");
+      "IMU at once, moving or not. auto waits for rest for init_motion_after, and then starts in motion. A "
+      "start at rest is the most accurate: let the platform stand for 3 s if you can.");
   list.number(
       "init_motion_after", "s", atLeast(0), c.odometry.init_motion_after,
       "init_mode: auto starts in motion after this time without rest. Lower it for bags that begin in "
@@ -141,9 +139,7 @@ void listInitialization(ParameterList& list, Config& c) {
   list.number(
       "init_motion_sigma_accel_bias", "m/s^2", above(0), motion.sigma_accel_bias,
       "A start in motion takes the accelerometer bias as zero with this standard deviation on each axis.");
-}
 
-void listRest(ParameterList& list, Config& c) {
   RestOptions& rest = c.odometry.rest;
   list.group("Rest on the way, as the IMU sees it");
   list.boolean(
@@ -182,8 +178,7 @@ void listTimeOffset(ParameterList& list, Config& c) {
       {{"constant_acceleration", TimeOffsetModel::kConstantAcceleration}, {"imu", TimeOffsetModel::kImu}},
       smoother.time_offset_model,
       "imu integrates the IMU over the offset. constant_acceleration takes one acceleration times the "
-      "offset, as the "
-      "paper does, and is for comparison.");
+      "offset, as the paper does, and is for comparison.");
   list.boolean(
       "time_offset_shared", smoother.time_offset_shared,
       "true gives all radars one offset. Use it if one trigger line or one computer stamps all scans. false "
@@ -220,7 +215,7 @@ void listSmoother(ParameterList& list, Config& c) {
   listPriors(list, c.odometry.smoother);
 }
 
-void listHealth(ParameterList& list, Config& c) {
+void listHealthAndLandmarks(ParameterList& list, Config& c) {
   HealthOptions& health = c.odometry.health;
   list.group("Health: ok, coasting or diverged");
   list.choice<OnDivergence>(
@@ -245,9 +240,7 @@ void listHealth(ParameterList& list, Config& c) {
   list.number(
       "coasting_after", "s", above(0), health.coasting_after,
       "The health is coasting after this time without a used scan: the IMU alone carries the estimate.");
-}
 
-void listLandmarks(ParameterList& list, Config& c) {
   LandmarkOptions& landmarks = c.odometry.landmarks;
   list.group("Landmarks: static points that come back hold position and heading");
   list.boolean(

@@ -3,7 +3,7 @@
 #include "parameter_sections.h"
 
 namespace rio_t {
-void listTopics(ParameterList& list, Config& c) {
+void listMessages(ParameterList& list, Config& c) {
   list.group("Topics");
   list.first().text(
       "imu_topic", c.imu_topic,
@@ -24,18 +24,14 @@ void listTopics(ParameterList& list, Config& c) {
       "ground_truth_topic", c.ground_truth_topic,
       "The bag may have the true poses of the IMU as geometry_msgs/PoseStamped on this topic. The bag "
       "runner then adds the errors to summary.yaml. The live node does not read it.");
-}
 
-void listRadars(ParameterList& list, Config& c) {
   list.group("Several radars");
   list.radarNames(
       "radars", c.radars,
       "Name your radars here if you have more than one. Each name has a section (left: {radar_topic: ...}) "
       "with its own values of the keys that say \"per radar\". The radar takes the other keys from the top "
       "level. An empty list means one radar without a section.");
-}
 
-void listStamps(ParameterList& list, Config& c) {
   list.group("Stamps of the scans");
   list.ofRadar(true);
   list.first().choice<StampSource>(
@@ -66,16 +62,15 @@ void listFrames(ParameterList& list, Config& c) {
       "imu_frame", c.imu_frame,
       "This is the name of the frame of the IMU. If this is empty, the name is the frame_id of the IMU's "
       "messages. Set it if your driver writes a frame that tf does not know.");
-  list.choice<BaseExtrinsicsSource>("base_extrinsics_source",
-                                    {{"auto", BaseExtrinsicsSource::kAuto},
-                                     {"parameters", BaseExtrinsicsSource::kParameters},
-                                     {"tf", BaseExtrinsicsSource::kTf}},
-                                    c.base_extrinsics_source,
-                                    "This says where the live node takes the pose of the IMU in "
-                                    "base_link_frame from. parameters takes the next "
-                                    "two keys. tf waits for the transform from the frame of the IMU to "
-                                    "base_link_frame. auto takes tf if it is "
-                                    "there when the odometry starts, and the next two keys if not.");
+  list.choice<BaseExtrinsicsSource>(
+      "base_extrinsics_source",
+      {{"auto", BaseExtrinsicsSource::kAuto},
+       {"parameters", BaseExtrinsicsSource::kParameters},
+       {"tf", BaseExtrinsicsSource::kTf}},
+      c.base_extrinsics_source,
+      "This says where the live node takes the pose of the IMU in base_link_frame from. parameters takes the "
+      "next two keys. tf waits for the transform from the frame of the IMU to base_link_frame. auto takes tf "
+      "if it is there when the odometry starts, and the next two keys if not.");
   list.vector3("base_extrinsics_translation", "m", between(-100, 100), c.T_BI.p_B,
                "This is the position of the IMU in base_link_frame, x, y, z.");
   list.rotation("base_extrinsics_rotation_xyzw", c.T_BI.q_BI,
@@ -118,8 +113,10 @@ void listFrames(ParameterList& list, Config& c) {
 void listPointCloud(ParameterList& list, Config& c) {
   list.group("Point cloud: what differs from the preset (\"\" and 0: as in the preset)");
   list.ofRadar(true);
-  list.first().word(
-      "radar_format", pointCloudPresets(), c.radar_format,
+  std::vector<std::pair<std::string, std::string>> presets;
+  for (const std::string& name : pointCloudPresets()) presets.emplace_back(name, name);
+  list.first().choice<std::string>(
+      "radar_format", presets, c.radar_format,
       "This preset says how your driver lays out its cloud: names of the fields, axes, sign of the "
       "Doppler and unit of the power. If no preset fits, take the nearest and change what differs "
       "with the keys radar_field_..., radar_axes, radar_doppler_sign and radar_power_unit.");
@@ -196,22 +193,19 @@ void listExtrinsics(ParameterList& list, Config& c) {
       "This quaternion turns radar vectors (x right, y forward, z up) into the IMU frame. An error of a "
       "degree bends the path by about 2 % of its length. If you know the rotation only to 10 degrees, set "
       "estimate_extrinsics: rotation, or run `calibrate`.");
-  list.choice<ExtrinsicsAxes>(
-      "extrinsics_axes", {{"rfu", ExtrinsicsAxes::kRightForwardUp}, {"cloud", ExtrinsicsAxes::kCloud}},
-      c.extrinsics_axes,
-      "This says which radar axes extrinsics_rotation_xyzw turns. rfu: x right, y forward, z up, whatever "
-      "the axes "
-      "of the cloud. cloud: the axes of the cloud itself, as a tf or a calibration tool gives them.");
+  list.choice<ExtrinsicsAxes>("extrinsics_axes",
+                              {{"rfu", ExtrinsicsAxes::kRightForwardUp}, {"cloud", ExtrinsicsAxes::kCloud}},
+                              c.extrinsics_axes,
+                              "This says which radar axes extrinsics_rotation_xyzw turns. rfu: x right, y "
+                              "forward, z up, whatever the axes of the cloud. cloud: the axes of the cloud "
+                              "itself, as a tf or a calibration tool gives them.");
   list.first().mounting(
       "mounting_yaw_pitch_roll_deg", c.mounting,
       "These angles replace extrinsics_rotation_xyzw: yaw to the left, pitch up, roll right side down. They "
       "assume an IMU with x forward, y left, z up. [0, 0, 0] is an upright radar that looks forward. [] "
       "means that extrinsics_rotation_xyzw is used. Give only one of the two in a file. --set and the "
-      "parameter "
-      "server replace either one of a file by either one.");
-}
+      "parameter server replace either one of a file by either one.");
 
-void listEstimateExtrinsics(ParameterList& list, Config& c) {
   SmootherOptions& smoother = c.odometry.smoother;
   list.group("Estimate of T_IR: the mounting above is where the estimate starts");
   list.first().choice<EstimateExtrinsics>(
@@ -221,9 +215,8 @@ void listEstimateExtrinsics(ParameterList& list, Config& c) {
        {"pose", EstimateExtrinsics::kPose}},
       smoother.estimate_extrinsics,
       "none takes the mounting as it is. rotation estimates the rotation of the radar on the way. pose "
-      "estimates "
-      "its position as well, which needs fast turns. Use rotation for a mounting by eye, and none after a "
-      "calibration.");
+      "estimates its position as well, which needs fast turns. Use rotation for a mounting by eye, and none "
+      "after a calibration.");
   list.number(
       "extrinsics_rotation_sigma", "rad", above(0, M_PI), smoother.extrinsics_rotation_sigma,
       "The estimate of the rotation starts with this standard deviation about each axis. 0.17 rad (10 "

@@ -4,6 +4,8 @@
 #include <cctype>
 #include <variant>
 
+#include "../text.h"
+
 namespace rio_t {
 namespace {
 
@@ -72,10 +74,9 @@ std::vector<std::string> mountingWarnings(const Config& config) {
   std::vector<std::string> warnings;
   for (const Config& radar : configsOfRadars(config)) {
     if (!radar.has_default_mounting || radar.extrinsics_source != ExtrinsicsSource::kParameters) continue;
-    const bool is_named = !radar.radar_name.empty();
-    const std::string key = is_named ? radar.radar_name + "/" : "";
+    const std::string key = prefixOf(radar.radar_name);
     warnings.push_back("The configuration gives no mounting: the radar " +
-                       (is_named ? radar.radar_name + " " : std::string()) +
+                       (key.empty() ? "" : radar.radar_name + " ") +
                        "is taken to look along y of the IMU. Set " + key + "mounting_yaw_pitch_roll_deg or " +
                        key + "extrinsics_rotation_xyzw.");
   }

@@ -92,92 +92,72 @@ std::string Range::text() const {
   return text;
 }
 
-void ParameterList::add(ParameterDescription about, std::function<bool(const ParameterValue&)> set,
-                        std::function<ParameterValue()> get) {
-  about.group = group_;
-  about.of_radar = of_radar_;
-  about.first = std::exchange(is_first_, false);
-  all_.push_back({std::move(about), std::move(set), std::move(get)});
-}
-
 void ParameterList::number(const std::string& key, const std::string& unit, Range range, double& member,
                            const std::string& text) {
-  add(
-      {key, "number", unit, "a finite number" + range.text(), text, range.min, range.max},
-      [range, &member](const ParameterValue& value) {
-        const std::optional<double> x = asNumber(value);
-        if (!x || !range.contains(*x)) return false;
-        member = *x;
-        return true;
-      },
-      [&member] { return ParameterValue{member}; });
+  bind({key, "number", unit, "a finite number" + range.text(), text, range.min, range.max}, member,
+       [range](const ParameterValue& value) {
+         const std::optional<double> x = asNumber(value);
+         return x && range.contains(*x) ? x : std::nullopt;
+       });
 }
 
 void ParameterList::boolean(const std::string& key, bool& member, const std::string& text) {
-  add(
-      {key, "boolean", "", "true or false", text},
-      [&member](const ParameterValue& value) {
-        const bool* x = std::get_if<bool>(&value.data);
-        if (x == nullptr) return false;
-        member = *x;
-        return true;
-      },
-      [&member] { return ParameterValue{member}; });
+  bind({key, "boolean", "", "true or false", text}, member, [](const ParameterValue& value) {
+    const bool* x = std::get_if<bool>(&value.data);
+    return x == nullptr ? std::nullopt : std::optional<bool>(*x);
+  });
 }
 
 void ParameterList::vector3(const std::string& key, const std::string& unit, Range range,
                             Eigen::Vector3d& member, const std::string& text) {
   const std::string each = range.text();
-  add(
+  bind(
       {key, "list", unit, "a list of 3 finite numbers" + (each.empty() ? "" : ", each" + each), text,
        range.min, range.max},
-      [range, &member](const ParameterValue& value) {
+      member,
+      [range](const ParameterValue& value) -> std::optional<Eigen::Vector3d> {
         const auto x = asNumbers(value, 3, range);
-        if (!x) return false;
-        member = Eigen::Vector3d((*x)[0], (*x)[1], (*x)[2]);
-        return true;
+        if (!x) return std::nullopt;
+        return Eigen::Vector3d(x->data());
       },
-      [&member] {
-        return listOf({member.x(), member.y(), member.z()});
+      [](const Eigen::Vector3d& v) {
+        return listOf({v.x(), v.y(), v.z()});
       });
 }
 
 void ParameterList::rotation(const std::string& key, Eigen::Quaterniond& member, const std::string& text) {
-  add(
-      {key, "list", "", "a list of 4 finite numbers of norm 1 to 0.001 (order x, y, z, w)", text},
-      [&member](const ParameterValue& value) {
+  bind(
+      {key, "list", "", "a list of 4 finite numbers of norm 1 to 0.001 (order x, y, z, w)", text}, member,
+      [](const ParameterValue& value) -> std::optional<Eigen::Quaterniond> {
         const auto x = asNumbers(value, 4, Range{});
-        if (!x) return false;
-        const Eigen::Quaterniond q((*x)[3], (*x)[0], (*x)[1], (*x)[2]);
-        if (std::abs(q.norm() - 1.0) > 1e-3) return false;
+        if (!x) return std::nullopt;
+        const Eigen::Quaterniond q(x->data());  // in the order x, y, z, w
+        if (std::abs(q.norm() - 1.0) > 1e-3) return std::nullopt;
         // People type fewer digits than a double has; an exact quaternion stays as it is.
-        member = std::abs(q.norm() - 1.0) < 1e-15 ? q : q.normalized();
-        return true;
+        return std::abs(q.norm() - 1.0) < 1e-15 ? q : q.normalized();
       },
-      [&member] {
-        return listOf({member.x(), member.y(), member.z(), member.w()});
+      [](const Eigen::Quaterniond& q) {
+        return listOf({q.x(), q.y(), q.z(), q.w()});
       });
 }
 
 void ParameterList::mounting(const std::string& key, std::optional<MountingAngles>& member,
                              const std::string& text) {
   constexpr double kDegree = M_PI / 180.0;
-  add(
+  using Angles = std::optional<MountingAngles>;
+  bind(
       {key, "list", "deg", "[], or a list of 3 finite numbers, each of at least -360 and at most 360", text},
-      [&member](const ParameterValue& value) {
+      member,
+      [](const ParameterValue& value) -> std::optional<Angles> {
         const auto* list = std::get_if<ParameterValue::List>(&value.data);
-        if (list != nullptr && list->empty()) {
-          member.reset();
-          return true;
-        }
+        if (list != nullptr && list->empty()) return Angles();
         const auto x = asNumbers(value, 3, Range{-360.0, 360.0});
-        if (!x) return false;
-        member = MountingAngles{kDegree * (*x)[0], kDegree * (*x)[1], kDegree * (*x)[2]};
-        return true;
+        if (!x) return std::nullopt;
+        return Angles(MountingAngles{kDegree * (*x)[0], kDegree * (*x)[1], kDegree * (*x)[2]});
       },
-      [&member] {
-        if (!member) return ParameterValue{ParameterValue::List{}};
-        return listOf({member->yaw / kDegree, member->pitch / kDegree, member->roll / kDegree});
+      [](const Angles& angles) {
+        if (!angles) return ParameterValue{ParameterValue::List{}};
+        return listOf({angles->yaw / kDegree, angles->pitch / kDegree, angles->roll / kDegree});
       });
 }
 
@@ -195,49 +175,38 @@ void ParameterList::frame(const std::string& key, std::string& member, const std
 
 void ParameterList::addText(const std::string& key, std::string& member, const std::string& text,
                             bool may_be_empty, const std::function<std::string(const std::string&)>& kept) {
-  add(
-      {key, "text", "", std::string("one line of text, ") + (may_be_empty ? "may be" : "not") + " empty",
-       text},
-      [may_be_empty, kept, &member](const ParameterValue& value) {
-        const bool nothing = std::holds_alternative<std::monostate>(value.data);  // `key:` and no more
-        const std::string* given = std::get_if<std::string>(&value.data);
-        const std::string x = given == nullptr ? "" : kept(*given);
-        if ((given == nullptr && !nothing) || (x.empty() && !may_be_empty) || !isOneLine(x)) return false;
-        member = x;
-        return true;
-      },
-      [&member] { return ParameterValue{member}; });
-}
-
-void ParameterList::word(const std::string& key, const std::vector<std::string>& words, std::string& member,
-                         const std::string& text) {
-  std::vector<std::pair<std::string, std::string>> choices;
-  choices.reserve(words.size());
-  for (const std::string& each : words) choices.emplace_back(each, each);
-  choice<std::string>(key, choices, member, text);
+  bind({key, "text", "", std::string("one line of text, ") + (may_be_empty ? "may be" : "not") + " empty",
+        text},
+       member, [may_be_empty, kept](const ParameterValue& value) -> std::optional<std::string> {
+         const bool nothing = std::holds_alternative<std::monostate>(value.data);  // `key:` and no more
+         const std::string* given = std::get_if<std::string>(&value.data);
+         const std::string x = given == nullptr ? "" : kept(*given);
+         if ((given == nullptr && !nothing) || (x.empty() && !may_be_empty) || !isOneLine(x))
+           return std::nullopt;
+         return x;
+       });
 }
 
 void ParameterList::radarNames(const std::string& key, std::vector<Config>& member, const std::string& text) {
-  add(
+  bind(
       {key, "list", "", "a list of at most 16 different names of lower case letters, digits and _", text},
-      [&member](const ParameterValue& value) {
+      member,
+      [](const ParameterValue& value) -> std::optional<std::vector<Config>> {
         const ParameterValue::List* list = std::get_if<ParameterValue::List>(&value.data);
-        if (list == nullptr || list->size() > 16) return false;
+        if (list == nullptr || list->size() > 16) return std::nullopt;
         std::vector<Config> radars;
         for (const ParameterValue& element : *list) {
           const std::string* name = std::get_if<std::string>(&element.data);
-          if (name == nullptr || !isRadarName(*name)) return false;
-          for (const Config& other : radars) {
-            if (other.radar_name == *name) return false;
-          }
+          if (name == nullptr || !isRadarName(*name)) return std::nullopt;
+          for (const Config& other : radars)
+            if (other.radar_name == *name) return std::nullopt;
           radars.emplace_back().radar_name = *name;
         }
-        member = std::move(radars);
-        return true;
+        return radars;
       },
-      [&member] {
+      [](const std::vector<Config>& radars) {
         ParameterValue::List names;
-        for (const Config& radar : member) names.emplace_back().data = radar.radar_name;
+        for (const Config& radar : radars) names.emplace_back().data = radar.radar_name;
         return ParameterValue{std::move(names)};
       });
 }

@@ -71,9 +71,6 @@ class ParameterList {
   template <typename T>
   void choice(const std::string& key, const std::vector<std::pair<std::string, T>>& choices, T& member,
               const std::string& text);
-  /// One of several words, kept as text.
-  void word(const std::string& key, const std::vector<std::string>& words, std::string& member,
-            const std::string& text);
   /// The names of radars; sets nothing but their names.
   void radarNames(const std::string& key, std::vector<Config>& member, const std::string& text);
 
@@ -83,9 +80,25 @@ class ParameterList {
   /// `kept`: turns a text into that which is kept.
   void addText(const std::string& key, std::string& member, const std::string& text, bool may_be_empty,
                const std::function<std::string(const std::string&)>& kept);
-  /// `about` has no group, `of_radar` and `first` yet.
-  void add(ParameterDescription about, std::function<bool(const ParameterValue&)> set,
-           std::function<ParameterValue()> get);
+  /// Adds a parameter that sets `member` to what `read` makes of a value, unless that is nothing. `about` has
+  /// no group, `of_radar` and `first` yet.
+  template <typename T, typename Read, typename Show>
+  void bind(ParameterDescription about, T& member, const Read& read, const Show& show) {
+    about.group = group_;
+    about.of_radar = of_radar_;
+    about.first = std::exchange(is_first_, false);
+    const auto set = [&member, read](const ParameterValue& value) {
+      std::optional<T> x = read(value);
+      if (x) member = std::move(*x);
+      return x.has_value();
+    };
+    all_.push_back({std::move(about), set, [&member, show] { return show(member); }});
+  }
+  /// The same of a member that a ParameterValue can hold.
+  template <typename T, typename Read>
+  void bind(ParameterDescription about, T& member, const Read& read) {
+    bind(std::move(about), member, read, [](const T& value) { return ParameterValue{value}; });
+  }
 
   std::string group_;
   bool of_radar_ = false;
@@ -101,17 +114,16 @@ std::optional<double> asNumber(const ParameterValue& value);
 
 template <typename Integer>
 void ParameterList::integer(const std::string& key, Range range, Integer& member, const std::string& text) {
-  add(
-      {key, "integer", "", "a whole number" + range.text(), text, range.min, range.max},
-      [range, &member](const ParameterValue& value) {
+  bind(
+      {key, "integer", "", "a whole number" + range.text(), text, range.min, range.max}, member,
+      [range](const ParameterValue& value) -> std::optional<Integer> {
         // YAML and the parameter server may hold 2000.0 for 2000.
         const std::optional<double> x = asNumber(value);
-        if (!x || !range.contains(*x) || std::trunc(*x) != *x) return false;
-        if (std::abs(*x) > std::numeric_limits<int>::max()) return false;  // the member may have 32 bits
-        member = static_cast<Integer>(*x);
-        return true;
+        if (!x || !range.contains(*x) || std::trunc(*x) != *x) return std::nullopt;
+        if (std::abs(*x) > std::numeric_limits<int>::max()) return std::nullopt;  // it may have 32 bits
+        return static_cast<Integer>(*x);
       },
-      [&member] { return ParameterValue{static_cast<std::int64_t>(member)}; });
+      [](Integer value) { return ParameterValue{static_cast<std::int64_t>(value)}; });
 }
 
 template <typename T>
@@ -122,21 +134,17 @@ void ParameterList::choice(const std::string& key, const std::vector<std::pair<s
     about.expected += (about.choices.empty() ? "" : ", ") + (word.empty() ? "\"\"" : word);
     about.choices.push_back(word);
   }
-  add(
-      std::move(about),
-      [choices, &member](const ParameterValue& value) {
+  bind(
+      std::move(about), member,
+      [choices](const ParameterValue& value) -> std::optional<T> {
         const std::string* given = std::get_if<std::string>(&value.data);
-        for (const auto& [word, meant] : choices) {
-          if (given == nullptr || word != *given) continue;
-          member = meant;
-          return true;
-        }
-        return false;
+        for (const auto& [word, meant] : choices)
+          if (given != nullptr && word == *given) return std::optional<T>(std::in_place, meant);
+        return std::nullopt;
       },
-      [choices, &member] {
-        for (const auto& [word, meant] : choices) {
-          if (meant == member) return ParameterValue{word};
-        }
+      [choices](const T& value) {
+        for (const auto& [word, meant] : choices)
+          if (meant == value) return ParameterValue{word};
         return ParameterValue{std::string()};
       });
 }

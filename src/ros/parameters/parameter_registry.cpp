@@ -3,7 +3,7 @@
 // Loading, checking, the fault messages, config/estimator.yaml and docs/parameters.md all come from here.
 namespace rio_t {
 
-void listLiveNode(ParameterList& list, Config& c) {
+void listPrograms(ParameterList& list, Config& c) {
   list.group("Live node");
   list.integer(
       "path_max_poses", between(1, 1e6), c.path_max_poses,
@@ -13,9 +13,7 @@ void listLiveNode(ParameterList& list, Config& c) {
       "trajectory_file", c.trajectory_file,
       "The service ~save_trajectory writes this TUM file. A relative path counts from the working folder of "
       "the node, which is ~/.ros under roslaunch.");
-}
 
-void listBag(ParameterList& list, Config& c) {
   list.group("Bag runner");
   list.choice<RunMode>(
       "mode", {{"online", RunMode::kOnline}, {"batch", RunMode::kBatch}, {"refine", RunMode::kRefine}},
@@ -40,27 +38,18 @@ void listBag(ParameterList& list, Config& c) {
 
 ParameterList parametersOf(Config& config) {
   ParameterList list;
-  listTopics(list, config);
-  listRadars(list, config);
-  listStamps(list, config);
+  listMessages(list, config);
   listFrames(list, config);
   listPointCloud(list, config);
   listExtrinsics(list, config);
-  listEstimateExtrinsics(list, config);
   listImu(list, config);
-  listGaps(list, config);
-  listInitialization(list, config);
-  listRest(list, config);
-  listPlatform(list, config);
-  listBarometer(list, config);
-  listEgoVelocity(list, config);
-  listFeasibility(list, config);
+  listStart(list, config);
+  listAids(list, config);
+  listRadar(list, config);
   listTimeOffset(list, config);
   listSmoother(list, config);
-  listHealth(list, config);
-  listLandmarks(list, config);
-  listLiveNode(list, config);
-  listBag(list, config);
+  listHealthAndLandmarks(list, config);
+  listPrograms(list, config);
   return list;
 }
 

@@ -270,15 +270,7 @@ Config withoutSection(const Config& top_level, const std::string& name) {
 }
 
 std::string toString(StampSource source) {
-  switch (source) {
-    case StampSource::kHeader:
-      return "header";
-    case StampSource::kTrigger:
-      return "trigger";
-    case StampSource::kArrival:
-      return "arrival";
-  }
-  throw std::invalid_argument("not a StampSource");
+  return source == StampSource::kHeader ? "header" : source == StampSource::kTrigger ? "trigger" : "arrival";
 }
 
 ConfigError::ConfigError(std::vector<std::string> faults)
@@ -312,18 +304,25 @@ std::vector<Config> configsOfRadars(const Config& config) {
   return config.radars.empty() ? std::vector<Config>{config} : config.radars;
 }
 
-Config withTopics(Config config, const std::function<std::string(const std::string&)>& resolve) {
-  for (std::string* topic : {&config.imu_topic, &config.radar_topic, &config.trigger_topic,
-                             &config.ground_truth_topic, &config.barometer_topic}) {
-    if (!topic->empty()) *topic = resolve(*topic);
-  }
+Config withTopics(Config config, const TopicResolver& resolve) {
+  const std::string section = prefixOf(config.radar_name);
+  const std::pair<std::string, std::string*> topics[] = {
+      {"imu_topic", &config.imu_topic},
+      {"barometer_topic", &config.barometer_topic},
+      {section + "radar_topic", &config.radar_topic},
+      {section + "trigger_topic", &config.trigger_topic},
+      {"ground_truth_topic", &config.ground_truth_topic},
+  };
+  for (const auto& [key, topic] : topics)
+    if (!topic->empty()) *topic = resolve(key, *topic);
   for (Config& radar : config.radars) radar = withTopics(radar, resolve);
   return config;
 }
 
 Config withAbsoluteTopics(const Config& config) {
-  return withTopics(config,
-                    [](const std::string& topic) { return topic.front() == '/' ? topic : "/" + topic; });
+  return withTopics(config, [](const std::string& /*key*/, const std::string& topic) {
+    return topic.front() == '/' ? topic : "/" + topic;
+  });
 }
 
 std::string withoutSlash(const std::string& frame) {

@@ -54,17 +54,8 @@ const std::vector<PointCloudFormat>& presets() {
 }  // namespace
 
 std::string toString(PowerUnit unit) {
-  switch (unit) {
-    case PowerUnit::kSnrDb:
-      return "snr_db";
-    case PowerUnit::kSnrDeciDb:
-      return "snr_decidb";
-    case PowerUnit::kSnrLinear:
-      return "snr_linear";
-    case PowerUnit::kNotSnr:
-      return "not_snr";
-  }
-  throw std::invalid_argument("not a PowerUnit");
+  constexpr const char* kNames[] = {"snr_db", "snr_decidb", "snr_linear", "not_snr"};
+  return kNames[static_cast<std::size_t>(unit)];
 }
 
 Eigen::Quaterniond cloudFromRfu(PointAxes axes) {

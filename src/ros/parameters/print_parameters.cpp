@@ -119,10 +119,8 @@ std::string parametersMarkdown() {
       "take it with `--config`, the live node with `config:=`. `--set key=value` changes one parameter. An "
       "unknown key or a value out of range is an error that names the key.\n\n"
       "Angles are in radians, all else is in SI units, unless the name of the key says otherwise. A rotation "
-      "is "
-      "a quaternion x, y, z, w. \"Per radar\" means that each of several radars may have its own value in "
-      "its "
-      "section.\n";
+      "is a quaternion x, y, z, w. \"Per radar\" means that each of several radars may have its own value in "
+      "its section.\n";
   Config config;
   visit(
       parametersOf(config), [&](const std::string& title) { text += "\n## " + title + "\n"; },

@@ -3,7 +3,6 @@
 #include <ros/console.h>
 #include <ros/param.h>
 
-#include <algorithm>
 #include <limits>
 #include <set>
 #include <sstream>
@@ -34,42 +33,31 @@ struct ToXmlRpc {
   XmlRpc::XmlRpcValue operator()(const ParameterValue::Map& entries) const { return toXmlRpc(entries); }
 };
 
-bool isList(const std::string& key) {
-  const std::vector<ParameterDescription> all = parameterDescriptions();
-  return std::any_of(all.begin(), all.end(), [&](const ParameterDescription& about) {
-    return about.key == key && about.type == "list";
-  });
-}
-
 /// The value of that key. `rosrun rio_t rio_t_node _key:=[0,0,180]` makes a text of the list.
 ParameterValue toValueOf(const std::string& key, XmlRpc::XmlRpcValue& value) {
   ParameterValue result = toParameterValue(value);
   const auto* text = std::get_if<std::string>(&result.data);
-  if (text == nullptr || text->empty() || text->front() != '[' || !isList(key)) return result;
+  if (text == nullptr || text->empty() || text->front() != '[') return result;
   try {
-    return parseAssignment(key + "=" + *text).value;
+    const bool takes_list = std::holds_alternative<ParameterValue::List>(parameterValue(Config(), key).data);
+    return takes_list ? parseAssignment(key + "=" + *text).value : result;
   } catch (const std::invalid_argument&) {
-    return result;  // not YAML: the fault of the key shows the text
+    return result;  // no such key, or not YAML: its fault shows the text
   }
 }
 
 }  // namespace
 
 ParameterValue toParameterValue(XmlRpc::XmlRpcValue& value) {
-  ParameterValue result;
   switch (value.getType()) {
     case XmlRpc::XmlRpcValue::TypeBoolean:
-      result.data = static_cast<bool>(static_cast<bool&>(value));
-      break;
+      return {static_cast<bool>(static_cast<bool&>(value))};
     case XmlRpc::XmlRpcValue::TypeInt:
-      result.data = static_cast<std::int64_t>(static_cast<int&>(value));
-      break;
+      return {static_cast<std::int64_t>(static_cast<int&>(value))};
     case XmlRpc::XmlRpcValue::TypeDouble:
-      result.data = static_cast<double>(static_cast<double&>(value));
-      break;
+      return {static_cast<double>(static_cast<double&>(value))};
     case XmlRpc::XmlRpcValue::TypeString:
-      result.data = static_cast<std::string&>(value);
-      break;
+      return {static_cast<std::string&>(value)};
     case XmlRpc::XmlRpcValue::TypeArray: {
       ParameterValue::List list;
       // begin() and end() are those of a struct's members.
@@ -78,16 +66,13 @@ ParameterValue toParameterValue(XmlRpc::XmlRpcValue& value) {
         const bool is_list = value[k].getType() == XmlRpc::XmlRpcValue::TypeArray;
         list.push_back(is_list ? ParameterValue{ParameterValue::Map{}} : toParameterValue(value[k]));
       }
-      result.data = std::move(list);
-      break;
+      return {std::move(list)};
     }
     case XmlRpc::XmlRpcValue::TypeStruct:
-      result.data = ParameterValue::Map{};  // toParameterEntries reads the section of a radar
-      break;
+      return {ParameterValue::Map{}};  // toParameterEntries reads the section of a radar
     default:
-      break;  // nothing, dates and binary data: refused by whatever key has them
+      return {};  // nothing, dates and binary data: refused by whatever key has them
   }
-  return result;
 }
 
 XmlRpc::XmlRpcValue toXmlRpc(const ParameterEntries& entries) {

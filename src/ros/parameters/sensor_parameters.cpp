@@ -57,8 +57,7 @@ void listConsensus(ParameterList& list, EgoVelocityOptions& radar) {
       "bus.");
   list.integer("ransac_seed", atLeast(0), radar.ransac_seed,
                "Each scan restarts the random generator with this seed, so that the same scan gives the same "
-               "velocity. "
-               "Change it only to see how much the draws matter.");
+               "velocity. Change it only to see how much the draws matter.");
   list.integer(
       "ego_velocity_min_inliers", atLeast(3), radar.min_inliers,
       "A velocity needs at least this many inliers. Three determine it, and the others confirm it. With "
@@ -78,8 +77,7 @@ void listPointNoise(ParameterList& list, EgoVelocityOptions& radar) {
       {{"ls", EgoVelocitySolver::kLeastSquares}, {"eiv", EgoVelocitySolver::kErrorsInVariables}},
       radar.solver,
       "ls solves for the velocity by plain least squares. eiv (errors in variables) weighs each point by the "
-      "noise "
-      "of its direction and removes the bias that this noise causes. ls is for comparison.");
+      "noise of its direction and removes the bias that this noise causes. ls is for comparison.");
   list.number(
       "radar_azimuth_sigma", "rad", below(0, 0.5), radar.azimuth_sigma,
       "The azimuth of a point has this noise at the start. eiv learns it on the way. 0.02 to 0.05 rad are "
@@ -124,8 +122,7 @@ void listImu(ParameterList& list, Config& c) {
       {{"m/s2", AccelerationUnit::kMetresPerSecondSquared}, {"g", AccelerationUnit::kStandardGravity}},
       c.imu_units.acceleration,
       "This is the unit of linear_acceleration in the messages. sensor_msgs/Imu asks for m/s2. Some drivers "
-      "write g: "
-      "then the acceleration at rest has a size of 1.");
+      "write g: then the acceleration at rest has a size of 1.");
   list.choice<RateUnit>(
       "imu_rate_unit", {{"rad/s", RateUnit::kRadiansPerSecond}, {"deg/s", RateUnit::kDegreesPerSecond}},
       c.imu_units.rate,
@@ -150,9 +147,7 @@ void listImu(ParameterList& list, Config& c) {
       "imu_gyro_random_walk", "rad/s^2/sqrt(Hz)", above(0), c.odometry.imu_noise.gyro_random_walk,
       "The bias of the gyro wanders by this random walk. Raise it if the biases cannot follow, for example "
       "while the IMU warms up.");
-}
 
-void listGaps(ParameterList& list, Config& c) {
   ImuInputCheckOptions& gate = c.odometry.imu_input_check;
   list.group("Gaps of the sensors");
   list.number(
@@ -188,7 +183,7 @@ void listGaps(ParameterList& list, Config& c) {
       "scans a second.");
 }
 
-void listEgoVelocity(ParameterList& list, Config& c) {
+void listRadar(ParameterList& list, Config& c) {
   EgoVelocityOptions& radar = c.odometry.ego_velocity;
   list.group("Radar: which points count, and the velocity from them");
   list.ofRadar(true);
@@ -196,9 +191,7 @@ void listEgoVelocity(ParameterList& list, Config& c) {
   listStandstill(list, radar);
   listConsensus(list, radar);
   listPointNoise(list, radar);
-}
 
-void listFeasibility(ParameterList& list, Config& c) {
   list.group("Radar: jumps of the velocity that no platform can make");
   list.number("feasibility_window", "s", above(0), c.odometry.feasibility.window,
               "The velocity of a scan is compared with the mean velocity over this time before it.");

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <iosfwd>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -37,5 +38,9 @@ RunSummary runBag(const BagRun& run);
 
 /// A short table for people. `files` is the folder that it names.
 std::string describeRun(const RunSummary& summary, const std::string& files);
+
+/// The program rio_t_bag: `words` are its arguments. Returns the exit status; what went wrong is told in
+/// `err`.
+int runBagTool(const std::vector<std::string>& words, std::ostream& out, std::ostream& err);
 
 }  // namespace rio_t

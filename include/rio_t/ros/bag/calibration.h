@@ -45,10 +45,6 @@ BagCalibration calibrateFromBags(const CalibrationRun& run);
 /// Why a run that ended does not count; empty if it does.
 std::string failureOf(const RunSummary& summary);
 
-/// What is estimated: `rotation` if the configuration says so, else `pose`. `none` is the default and means
-/// pose here.
-EstimateExtrinsics estimatedExtrinsics(const Config& config);
-
 /// A table for people: what was told and found, sigmas, verdicts, and what to move for what was not observed.
 std::string describeCalibration(const BagCalibration& calibration);
 /// The part of one radar.

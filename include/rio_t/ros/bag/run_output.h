@@ -1,18 +1,18 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <fstream>
 #include <functional>
+#include <initializer_list>
 #include <map>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "rio_t/evaluation/trajectory.h"
-#include "rio_t/odometry/radar_inertial_odometry.h"
 #include "rio_t/ros/diagnosis/diagnosis.h"
 #include "rio_t/ros/parameters/parameters.h"
 
@@ -32,66 +32,20 @@ struct BatchSummary {
   bool converged = false;
 };
 
-/// Where the estimate of a mounting started, and where it ended.
-struct ExtrinsicsSummary {
-  Extrinsics told, T_IR;
-  Eigen::Vector3d translation_sigma = Eigen::Vector3d::Zero();  ///< [m]; zero where not estimated
-  Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Zero();     ///< [rad] about the axes of I
-  /// In the tangent of ExtrinsicsManifold: 3x3 of the turn, or 6x6 of turn and lever arm. Not in the file.
-  Eigen::MatrixXd covariance;
-};
+/// The result of a run: what the diagnosis needs, and what the files and the people get besides.
+struct RunSummary : RunEvidence {
+  explicit RunSummary(RunEvidence evidence = {}) : RunEvidence(std::move(evidence)) {}
 
-/// The result of a run for one radar. With several radars its keys in `summary.yaml` end in its name.
-struct RadarSummary {
-  std::string name;               ///< empty if there is but one
-  std::uint64_t scans_total = 0;  ///< used and rejected
-  std::uint64_t scans_used = 0;
-  std::map<std::string, std::uint64_t> scans_rejected;  ///< by reason
-  double final_offset_s = 0.0;
-  double final_offset_sigma_s = 0.0;
-  std::optional<ExtrinsicsSummary> extrinsics;  ///< only where they are estimated
-  PointVariances noise;      ///< of its points, as learned; the file has its standard deviations
-  DopplerStep doppler_step;  ///< as known at the end; the file has its source as a key of its own
-  std::array<std::uint64_t, 3> points_per_scan = {};  ///< quantiles of 10, 50 and 90 % of the scans
-  std::vector<double> pass_offsets_s;                 ///< after each pass; only with mode refine
-  std::vector<double> pass_offset_sigmas_s;           ///< likewise
-};
-
-/// The result for the barometer.
-struct BarometerSummary : BarometerCounts {
-  std::uint64_t pressures = 0;  ///< messages
-};
-
-/// The result for the constraint of a ground vehicle.
-struct GroundVehicleSummary : GroundVehicleCounts {
-  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  ///< of the vehicle frame, at the end
-  Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Zero();      ///< [rad] about the axes of I
-};
-/// For people: that the motion contradicts the platform, and what to look at.
-std::string contradictionText(const GroundVehicleSummary& vehicle);
-
-/// The result of a run; `summary.yaml` has one key for each member.
-struct RunSummary {
   std::string mode = "online";
-  std::optional<BatchSummary> batch;                                ///< only with mode batch
-  std::vector<RadarSummary> radars = std::vector<RadarSummary>(1);  ///< in the order of the configuration
-  std::uint64_t imu_count = 0;
-  std::map<std::string, std::uint64_t> input_faults;  ///< by name
-  /// Why the solver stopped: windows by reason; with mode batch the one solve of the whole run.
-  std::map<std::string, std::uint64_t> solver_terminations;
+  std::optional<BatchSummary> batch;  ///< only with mode batch
   std::vector<std::string> warnings;  ///< for people; not in the file
-  std::string initialized_from;       ///< "rest" or "motion"; empty: never initialised
-  std::string health_at_end = "ok";   ///< "ok", "coasting", "diverged"
-  std::uint64_t divergences = 0;
-  std::uint64_t reinitializations = 0;
-  std::uint64_t scans_diverged = 0;  ///< after which the health was "diverged"
-  double path_length_m = 0.0;        ///< of the optimised poses
-  double end_to_start_2d_m = 0.0;    ///< of the causal trajectory, horizontal
+  std::string health_at_end = "ok";   ///< `health` as text
+  double path_length_m = 0.0;         ///< of the optimised poses
+  double end_to_start_2d_m = 0.0;     ///< of the causal trajectory, horizontal
   double end_to_start_3d_m = 0.0;
-  MeasuredImuNoise imu_noise;                          ///< of the run, root mean square
-  std::optional<BarometerSummary> barometer;           ///< only with a barometer_topic
-  std::optional<GroundVehicleSummary> ground_vehicle;  ///< only with platform: ground_vehicle
-  Diagnosis diagnosis;                                 ///< whether the run is good, and if not, why
+  std::optional<BarometerCounts> barometer;           ///< only with a barometer_topic
+  std::optional<GroundVehicleCounts> ground_vehicle;  ///< only with platform: ground_vehicle
+  Diagnosis diagnosis;                                ///< whether the run is good, and if not, why
   std::optional<TruthErrors> truth;
   double estimation_seconds = 0.0;  ///< reading, decoding and estimating, wall clock
   double realtime_factor = 0.0;     ///< seconds of data in a second of that
@@ -99,8 +53,11 @@ struct RunSummary {
   // Over all radars.
   std::uint64_t scansTotal() const;
   std::uint64_t scansUsed() const;
-  std::map<std::string, std::uint64_t> scansRejected() const;
+  Counts scansRejected() const;
 };
+
+/// The text of summary.yaml. `saved`: the files of the run.
+std::string summaryText(const RunSummary& summary, const std::vector<std::string>& saved);
 
 /// A file of a run, and how it begins.
 struct RunFile {
@@ -156,7 +113,7 @@ class RunOutput {
   void finish(const RunSummary& summary);
 
  private:
-  /// A file with a large buffer of its own.
+  /// A table with a large buffer of its own. A line gets its columns one after the other.
   struct File {
     std::string path;
     std::ofstream stream;
@@ -165,15 +122,18 @@ class RunOutput {
     /// Empties it, and begins it with `text`.
     void open(const std::string& path_in, const std::string& text);
     void flush();
+    File& add(std::initializer_list<double> values, int decimals, char separator = ',');
+    File& add(const Eigen::Vector3d& v, int decimals, char separator = ',');
+    File& add(const Eigen::Quaterniond& q, int decimals, char separator = ',');  ///< x, y, z, w
+    File& add(const std::string& text);
     void endLine();
   };
 
   void removeOfEarlierRuns() const;
-  void addMap(File& file);
   File& file(std::string_view name) { return open_.find(name)->second; }  // one of files_
-  static void addExtrinsics(File& file, const ScanResult& result);
+  File& row(std::string_view name, Time stamp);                           // of that file
   void addAids(const ScanResult& result);
-  void addPose(File& file, Time time, const Eigen::Vector3d& p_W, const Eigen::Quaterniond& q_WI);
+  void addPose(std::string_view name, const StampedPose& pose);
 
   std::string folder_;
   RunFiles files_;

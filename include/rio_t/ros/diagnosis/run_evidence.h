@@ -17,8 +17,25 @@ using Counts = std::map<std::string, std::uint64_t>;
 /// Zero for a name that is not there.
 std::uint64_t countOf(const Counts& counts, const std::string& name);
 
-/// Counters of one radar.
-struct RadarEvidence {
+/// Where the estimate of a mounting started, and where it ended.
+struct ExtrinsicsSummary {
+  Extrinsics told, T_IR;
+  Eigen::Vector3d translation_sigma = Eigen::Vector3d::Zero();  ///< [m]; zero where not estimated
+  Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Zero();     ///< [rad] about the axes of I
+  /// In the tangent of ExtrinsicsManifold: 3x3 of the turn, or 6x6 of turn and lever arm. Not in the file.
+  Eigen::MatrixXd covariance;
+};
+
+/// The calibration of one radar at the end of a run.
+struct RadarEstimate {
+  double final_offset_s = 0.0;
+  double final_offset_sigma_s = 0.0;
+  std::optional<ExtrinsicsSummary> extrinsics;  ///< only where they are estimated
+};
+
+/// What a run shows of one radar; the live node has no estimates here. With several radars its keys in
+/// `summary.yaml` end in its name.
+struct RadarSummary : RadarEstimate {
   std::string name;               ///< empty if there is but one
   std::uint64_t scans_total = 0;  ///< received
   std::uint64_t scans_used = 0;
@@ -26,12 +43,17 @@ struct RadarEvidence {
   std::uint64_t scans_before_start = 0;  ///< before the estimate was initialised
   std::uint64_t scans_before_imu = 0;    ///< of these, stamped before the first IMU sample
   double seconds_before_imu = 0.0;       ///< by how much, of the first of them
-  Counts scans_rejected;                 ///< by reason, without those before the start
+  Counts scans_rejected;                 ///< by reason
   Counts velocity_status;                ///< of the scans before the start, by EgoVelocityStatus
   std::uint64_t points = 0;              ///< of all scans
   std::array<std::uint64_t, kPointVerdicts> points_by_verdict = {};
-  double snr_sum_db = 0.0;                         ///< over `points`
-  Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< of the newest mounting from the told one [rad]
+  double snr_sum_db = 0.0;   ///< over `points`
+  PointVariances noise;      ///< of its points, as learned; the file has its standard deviations
+  DopplerStep doppler_step;  ///< as known at the end; the file has its source as a key of its own
+  std::array<std::uint64_t, 3> points_per_scan = {};  ///< quantiles of 10, 50 and 90 % of the scans
+  std::vector<double> pass_offsets_s;                 ///< after each pass; only with mode refine
+  std::vector<double> pass_offset_sigmas_s;           ///< likewise
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero();     ///< of the newest mounting from the told one [rad]
 };
 
 /// The stamps of the IMU jumped, or left a gap that is too long to bridge: "imu_clock_restart".
@@ -47,11 +69,13 @@ struct RunEvidence {
   std::string waiting_for;     ///< while not initialised
   double heading_sigma = 0.0;  ///< of the newest state [rad]
   std::uint64_t imu_count = 0;
-  Counts faults;  ///< RadarInertialOdometry::faults(), with those of the messages
+  Counts input_faults;  ///< RadarInertialOdometry::faults(), with those of the messages
+  std::uint64_t divergences = 0, reinitializations = 0;
   Health health = Health::kOk;
   std::uint64_t scans_judged = 0;    ///< after the start
   std::uint64_t scans_diverged = 0;  ///< of them, after which the health was "diverged"
-  std::uint64_t windows = 0, windows_at_bound = 0;
+  /// Why the solver stopped: windows by reason; with mode batch the one solve of the whole run.
+  Counts solver_terminations;
   MeasuredImuNoise imu_noise;  ///< of the run, root mean square
   // In IMU time [s] since the start, jumps of its clock left out. Zero in the live node, whose monitor tells
   // of silence.
@@ -59,7 +83,7 @@ struct RunEvidence {
   double silent_seconds = 0.0;  ///< of them, later than `coasting_after` after the last scan that was used
   double silence_begin = 0.0, silence_end = 0.0;  ///< of the longest silence
   std::vector<ImuRestart> imu_restarts;  ///< none in the live node, whose evidence begins after the last one
-  std::vector<RadarEvidence> radars;
+  std::vector<RadarSummary> radars;      ///< in the order of the configuration
 };
 
 /// Collects the evidence from the results of the scans. Not thread-safe.
@@ -93,6 +117,7 @@ class EvidenceCollector {
 
 /// Counts of the means of the pressures, by outcome.
 struct BarometerCounts {
+  std::uint64_t pressures = 0;          ///< messages
   std::uint64_t used = 0;               ///< means that went into the window
   std::uint64_t steps = 0;              ///< after which the bias was estimated again
   Counts rejected;                      ///< means by reason
@@ -110,6 +135,8 @@ struct GroundVehicleCounts {
   std::optional<double> contradicted_at;  ///< [s] after the first scan judged
   std::optional<Time> first_judged;
   std::optional<GroundVehicleAnswer> last;
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  ///< of the vehicle frame, as known last
+  Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Zero();      ///< [rad] about the axes of I
 
   void add(const ScanResult& result);
 };

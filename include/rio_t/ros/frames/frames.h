@@ -4,7 +4,6 @@
 
 #include <string>
 
-#include "rio_t/odometry/body_odometry.h"
 #include "rio_t/radar/extrinsics.h"
 #include "rio_t/ros/parameters/parameters.h"
 
@@ -23,8 +22,5 @@ std::string cloudFrame(const Config& radar, const std::string& frame_id);
 /// tf2::TransformException if tf does not connect the two.
 Extrinsics radarExtrinsics(const tf2::BufferCore& tf, const Config& radar, const std::string& imu_frame,
                            const std::string& cloud_frame);
-
-/// T_BI: the pose of the IMU in base_link_frame. Throws tf2::TransformException.
-ImuInBody imuInBody(const tf2::BufferCore& tf, const Config& config, const std::string& imu_frame);
 
 }  // namespace rio_t

@@ -20,10 +20,12 @@ class BoundedTrajectory {
   std::size_t stride() const { return stride_; }
 
  private:
+  bool lastIsKept() const { return (count_ - 1) % stride_ == 0; }
+
   std::size_t capacity_;  // read-only after construction
   Trajectory kept_;
   std::size_t stride_ = 1;
-  std::size_t since_kept_ = 0;  ///< poses added since the newest of kept_
+  std::size_t count_ = 0;  ///< poses added
   StampedPose last_;
 };
 

@@ -17,6 +17,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -31,7 +32,6 @@
 #include "rio_t/ros/live/monitor.h"
 #include "rio_t/ros/live/publisher.h"
 #include "rio_t/ros/live/session.h"
-#include "rio_t/ros/live/topic_rate.h"
 
 namespace rio_t {
 
@@ -72,7 +72,7 @@ class LiveOdometry {
     PointCloudFormat format;
     std::optional<Extrinsics> T_IR;  ///< told; none until tf has it. Input thread only
     ros::Subscriber scans, triggers;
-    std::unique_ptr<TopicRate> scan_rate, trigger_rate;
+    std::function<void()> tick_scan, tick_trigger;  ///< for the rates in diagnostics
   };
 
   /// Subscribes to the topics as they were told.
@@ -124,8 +124,8 @@ class LiveOdometry {
   LivePublisher publisher_;                                 // see there
   BodyFrame frames_;                                        // thread-safe
   std::optional<diagnostic_updater::Updater> diagnostics_;  // input thread, but for ticks
-  std::unique_ptr<TopicRate> imu_rate_;
-  std::unique_ptr<TopicRate> odom_rate_;  // none before the first ~odom; input thread
+  std::function<void()> tick_imu_;
+  std::function<void()> tick_odom_;  // none before the first ~odom; input thread
   std::atomic<std::uint64_t> odom_published_{0};
 
   std::vector<Radar> radars_;  // read-only after construction, but for T_IR
@@ -139,19 +139,14 @@ class LiveOdometry {
   double rate_sigma_ = 0.0;
   std::map<std::string, std::chrono::steady_clock::time_point> told_at_;
 
-  struct Told {
-    std::uint64_t count = 0;
-    std::chrono::steady_clock::time_point at;
-  };
-  std::map<std::string, Told> faults_told_;  // input thread only, as the next
-  std::weak_ptr<LiveSession> faults_of_;     // whose faults these are
+  std::map<std::string, std::uint64_t> faults_told_;  // input thread only, as the next
+  std::weak_ptr<LiveSession> faults_of_;              // whose faults these are
 
   Config live_config_;                        // config_ with what was reconfigured; input thread only
   boost::recursive_mutex reconfigure_mutex_;  // the server's own
   std::unique_ptr<dynamic_reconfigure::Server<LiveParameters>> reconfigure_;
 
   ClockJumpDetector imu_stamps_;    // IMU thread only, as the next
-  std::optional<Time> newest_imu_;  // of the good stamps
   std::deque<Received> early_imu_;  // from before there was a session; it gets them first
 
   ros::Subscriber imu_subscriber_, barometer_subscriber_;

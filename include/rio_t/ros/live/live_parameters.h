@@ -7,14 +7,10 @@
 #include <cstdint>
 #include <map>
 #include <string>
-#include <variant>
-#include <vector>
 
 #include "rio_t/ros/parameters/parameters.h"
 
 namespace rio_t {
-
-using LiveValue = std::variant<bool, std::int64_t, double>;
 
 /// The parameters that may change while the live node runs (liveKeys()), as dynamic_reconfigure::Server wants
 /// its ConfigType. Its generated headers have the same members with the same names; here texts, units and
@@ -32,8 +28,8 @@ class LiveParameters {
   // NOLINTBEGIN(bugprone-reserved-identifier)
   static dynamic_reconfigure::ConfigDescription __getDescriptionMessage__();
   static LiveParameters __getDefault__() { return {}; }
-  static LiveParameters __getMin__();
-  static LiveParameters __getMax__();
+  static LiveParameters __getMin__() { return endsOfRanges(false); }
+  static LiveParameters __getMax__() { return endsOfRanges(true); }
   static int __getParamDescriptions__() { return 0; }  ///< not needed: each value knows its kind
   static int __getGroupDescriptions__() { return 0; }
   void __clamp__() {}  ///< a value out of range is refused, with a message, and not bent
@@ -51,7 +47,9 @@ class LiveParameters {
   // NOLINTEND(bugprone-reserved-identifier)
 
  private:
-  std::map<std::string, LiveValue> values_;  // by key
+  static LiveParameters endsOfRanges(bool upper);
+
+  std::map<std::string, ParameterValue> values_;  // by key
 };
 
 }  // namespace rio_t

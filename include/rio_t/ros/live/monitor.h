@@ -80,16 +80,10 @@ class LiveMonitor {
   };
 
   struct Barometer : BarometerCounts {
-    Counter messages;
     Clock::time_point told = Clock::now();
-    std::uint64_t not_usable = 0, used_told = 0;
+    std::uint64_t not_usable = 0, pressures_told = 0, used_told = 0;
     std::string why_not_usable;  ///< of the last one
   };
-  using GroundVehicle = GroundVehicleCounts;
-  void accountAids(const ScanResult& result) {  ///< call with mutex_ held
-    barometer_.add(result);
-    vehicle_.add(result);
-  }
 
   /// What has become of the scans of a radar.
   struct Account {
@@ -136,7 +130,7 @@ class LiveMonitor {
   std::uint64_t imu_before_session_ = 0;
   ImuNoise imu_noise_;
   Barometer barometer_;
-  GroundVehicle vehicle_;
+  GroundVehicleCounts vehicle_;
   Latency odometry_latency_, scan_latency_;
   std::map<std::string, std::uint64_t> imu_dropped_;
   std::uint64_t updates_ = 0, resets_ = 0, queue_full_told_ = 0;

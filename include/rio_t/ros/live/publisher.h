@@ -59,7 +59,6 @@ class LivePublisher {
   void radarFrame(Radar& radar, const LiveSession::Result& live, const Frames& frames, Time stamp);
   void extendPath(const BodyOdometry& body);
   nav_msgs::Path path();
-  void publishPathTo(const ros::SingleSubscriberPublisher& subscriber);
   void map(const ScanResult& result, const WorldInOdom& T_OW);
 
   const Config config_;

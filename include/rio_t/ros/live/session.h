@@ -99,7 +99,6 @@ class LiveSession {
   using ScanKey = std::pair<std::size_t, std::int64_t>;  // radar, stamp [ns]
 
   std::vector<GivenUp> takeStamped();  // call with stamper_mutex_ held
-  void takeStamped(std::size_t radar, std::vector<GivenUp>* given_up);
 
   std::atomic<double> gyro_density_;
   RadarInertialOdometry odometry_;

@@ -128,8 +128,9 @@ struct Config {
 /// that of RadarScan::radar.
 std::vector<Config> configsOfRadars(const Config& config);
 
+using TopicResolver = std::function<std::string(const std::string& key, const std::string& topic)>;
 /// The configuration with each topic as `resolve` gives it. An empty one stays empty.
-Config withTopics(Config config, const std::function<std::string(const std::string&)>& resolve);
+Config withTopics(Config config, const TopicResolver& resolve);
 /// The configuration with the topics as a node without a namespace has them, and as a bag holds them: a
 /// relative topic begins with `/`.
 Config withAbsoluteTopics(const Config& config);
