@@ -20,13 +20,6 @@ constexpr double kWellDetermined = 1e-6;
 constexpr double kSmallestLift = 1e-15;
 constexpr double kLargestLift = 1e-9;
 
-/// Some rows of numbers, one after the other.
-struct Rows {
-  const double* data;
-  Eigen::Index rows, columns;
-};
-Rows rowsOf(const RowMatrix& A) { return {A.data(), A.rows(), A.cols()}; }
-
 /// Calls part(first, width) for parts of the columns, with widths that the compiler knows: 15 of a state, 6
 /// and 3 of a mounting, 1 of an offset.
 template <typename Part>
@@ -41,80 +34,157 @@ void inParts(Eigen::Index columns, const Part& part) {
   take(std::integral_constant<int, 1>());
 }
 
-/// Column `i` of A times N columns of B, from column `first` on, added to `to`. The sums stay in registers.
+/// The symmetric product of a state is needed on one side of its diagonal only. Two widths that the compiler
+/// knows are faster than the exact one.
+constexpr int kState = 15, kHalf = 8;
+
+/// sum += sign A' x.
+void addProduct(const RowMatrix& A, const Eigen::VectorXd& x, double sign, Eigen::VectorXd& sum) {
+  for (Eigen::Index row = 0; row < A.rows(); ++row)
+    for (Eigen::Index i = 0; i < A.cols(); ++i) sum[i] += sign * x[row] * A.data()[row * A.cols() + i];
+}
+
+/// A column of A times N columns of B, over so many rows, times `sign`, added to `to`. `a` and `b` are their
+/// numbers in the first row, and the rows of A and B have that many columns. The sums stay in registers.
 template <int N>
-void addColumnProduct(const Rows& A, Eigen::Index i, const Rows& B, Eigen::Index first, double sign,
-                      double* to) {
+void addColumnProduct(const double* a, Eigen::Index a_columns, const double* b, Eigen::Index b_columns,
+                      Eigen::Index rows, double sign, double* to) {
   std::array<double, N> sums{};
   std::copy_n(to, N, sums.begin());
-  for (Eigen::Index row = 0; row < A.rows; ++row) {
-    const double a = sign * A.data[row * A.columns + i];
-    if (a == 0.0) continue;
-    const double* const b = B.data + row * B.columns + first;
-    for (std::size_t j = 0; j < N; ++j) sums[j] += a * b[j];
+  for (; rows > 0; --rows, a += a_columns, b += b_columns) {
+    const double factor = sign * *a;
+    for (std::size_t j = 0; j < N; ++j) sums[j] += factor * b[j];
   }
   std::copy_n(sums.begin(), N, to);
 }
 
-/// sum += sign A' B. Most derivatives are zero, and at these sizes Eigen's blocked product costs several
-/// times as much.
-void addProduct(const Rows& A, const Rows& B, double sign, RowMatrix& sum) {
-  if (sum.size() == 0) sum.setZero(A.columns, B.columns);
-  inParts(B.columns, [A, B, sign, to = sum.data()](Eigen::Index first, auto width) {
-    for (Eigen::Index i = 0; i < A.columns; ++i)
-      addColumnProduct<width>(A, i, B, first, sign, to + i * B.columns + first);
+template <int N>
+void addColumnProduct(const RowMatrix& A, Eigen::Index i, const RowMatrix& B, Eigen::Index first, double sign,
+                      RowMatrix& sum) {
+  addColumnProduct<N>(&A(0, i), A.cols(), &B(0, first), B.cols(), A.rows(), sign, &sum(i, first));
+}
+
+/// sum += sign A' B. At these sizes Eigen's blocked product costs several times as much.
+void addProduct(const RowMatrix& A, const RowMatrix& B, double sign, RowMatrix& sum) {
+  if (sum.size() == 0) sum.setZero(A.cols(), B.cols());
+  inParts(B.cols(), [&](Eigen::Index first, auto width) {
+    for (Eigen::Index i = 0; i < A.cols(); ++i) addColumnProduct<width>(A, i, B, first, sign, sum);
   });
 }
 
-/// sum += sign A' A, of which the lower triangle counts.
-void addSquare(const Rows& A, double sign, RowMatrix& sum) {
-  constexpr int kState = 15, kHalf = 8;
-  if (A.columns != kState) return addProduct(A, A, sign, sum);
-  // Two lengths that the compiler knows are faster than the exact one.
-  double* to = sum.data();
-  for (Eigen::Index i = 0; i < kHalf; ++i, to += kState) addColumnProduct<kHalf>(A, i, A, 0, sign, to);
-  for (Eigen::Index i = kHalf; i < kState; ++i, to += kState) addColumnProduct<kState>(A, i, A, 0, sign, to);
+/// sum -= A' A, of which the upper triangle counts.
+void subtractSquare(const RowMatrix& A, RowMatrix& sum) {
+  if (A.cols() != kState) return addProduct(A, A, -1.0, sum);
+  for (Eigen::Index i = 0; i < kState - kHalf; ++i) addColumnProduct<kState>(A, i, A, 0, -1.0, sum);
+  for (Eigen::Index i = kState - kHalf; i < kState; ++i)
+    addColumnProduct<kHalf>(A, i, A, kState - kHalf, -1.0, sum);
 }
 
-/// sum += sign A' x.
-void addProduct(const Rows& A, const Eigen::VectorXd& x, double sign, Eigen::VectorXd& sum) {
-  for (Eigen::Index row = 0; row < A.rows; ++row)
-    for (Eigen::Index i = 0; i < A.columns; ++i) sum[i] += sign * x[row] * A.data[row * A.columns + i];
-}
-
-/// N columns of W <- L^-1 W, from column `first` on.
+/// N columns of row i of W, from column `first` on: W_i <- (W_i - sum of U_ki W_k over k < i) / U_ii.
 template <int N>
-void forwardSubstitute(const RowMatrix& L, Eigen::Index first, RowMatrix& W) {
-  for (Eigen::Index i = 0; i < L.rows(); ++i) {
-    double* const to = W.data() + i * W.cols() + first;
-    std::array<double, N> sums{};
-    std::copy_n(to, N, sums.begin());
-    for (Eigen::Index j = 0; j < i; ++j) {
-      const double factor = L(i, j);
-      const double* const from = W.data() + j * W.cols() + first;
-      for (std::size_t k = 0; k < N; ++k) sums[k] -= factor * from[k];
-    }
-    const double inverse = 1.0 / L(i, i);
-    for (std::size_t k = 0; k < N; ++k) to[k] = sums[k] * inverse;
+void substituteRow(const RowMatrix& U, Eigen::Index i, Eigen::Index first, double inverse, double* W,
+                   Eigen::Index columns) {
+  double* const to = W + i * columns + first;
+  std::array<double, N> sums{};
+  std::copy_n(to, N, sums.begin());
+  const double* from = W + first;
+  for (Eigen::Index k = 0; k < i; ++k, from += columns) {
+    const double factor = U(k, i);
+    for (std::size_t j = 0; j < N; ++j) sums[j] -= factor * from[j];
   }
+  for (std::size_t j = 0; j < N; ++j) to[j] = sums[j] * inverse;
 }
 
-/// W <- L^-1 W for the lower triangle of L.
-void forwardSubstitute(const RowMatrix& L, RowMatrix& W) {
-  inParts(W.cols(), [&](Eigen::Index first, auto width) { forwardSubstitute<width>(L, first, W); });
+/// W <- U'^-1 W, for the upper triangle of U.
+template <typename Matrix>
+void forwardSubstitute(const RowMatrix& U, Matrix& W) {
+  for (Eigen::Index i = 0; i < U.rows(); ++i)
+    inParts(W.cols(), [&, inverse = 1.0 / U(i, i)](Eigen::Index first, auto width) {
+      substituteRow<width>(U, i, first, inverse, W.data(), W.cols());
+    });
 }
 
-/// S <- its Cholesky factor, in the lower triangle. False where S is not positive definite.
+/// S <- its Cholesky factor U, S = U'U, in the upper triangle; what is below means nothing. False if S is not
+/// positive definite.
 bool cholesky(RowMatrix& S) {
-  using State = Eigen::Matrix<double, 15, 15, Eigen::RowMajor>;
-  if (S.rows() == State::RowsAtCompileTime) {
-    Eigen::Map<State> state(S.data());
-    const Eigen::LLT<State> factor(state);
-    state = factor.matrixLLT();
-    return factor.info() == Eigen::Success;
+  for (Eigen::Index i = 0; i < S.rows(); ++i) {
+    double pivot = S(i, i);
+    for (Eigen::Index k = 0; k < i; ++k) pivot -= S(k, i) * S(k, i);
+    if (!(pivot > 0.0)) return false;
+    const auto substitute = [&, inverse = 1.0 / std::sqrt(pivot)](Eigen::Index first, auto width) {
+      substituteRow<width>(S, i, first, inverse, S.data(), S.cols());
+    };
+    if (S.rows() == kState && i >= kState - kHalf) {
+      substitute(kState - kHalf, std::integral_constant<int, kHalf>());
+    } else {
+      inParts(S.cols(), substitute);
+    }
   }
-  return Eigen::LLT<Eigen::Ref<RowMatrix>>(S).info() == Eigen::Success;
+  return true;
 }
+
+/// The derivatives of a term with respect to the tangent of a block. Most of those of an IMU factor are zero,
+/// so each column is known by the rows from its first number that is not zero to its last one.
+class Jacobian {
+ public:
+  /// Memory for a cost function to write to.
+  double* start(Eigen::Index rows, const Manifold& manifold) {
+    rows_ = rows;
+    columns_ = manifold.tangent();
+    const auto size = static_cast<std::size_t>(rows * manifold.size());
+    if (numbers_.size() < size) numbers_.resize(size);
+    return numbers_.data();
+  }
+  /// Moves the columns that carry the tangent together, times `root`.
+  void finish(const Manifold& manifold, double root) {
+    double* to = numbers_.data();
+    const double* from = to;
+    for (Eigen::Index row = 0; row < rows_; ++row, from += manifold.size())
+      for (const int column : manifold.columns()) *to++ = root * from[column];
+    ranges_.clear();
+    for (Eigen::Index i = 0; i < columns_; ++i) {
+      Range range{0, rows_};
+      while (range.first < range.end && at(range.first, i) == 0.0) ++range.first;
+      while (range.first < range.end && at(range.end - 1, i) == 0.0) --range.end;
+      ranges_.push_back(range.first < range.end ? range : Range{0, 0});
+    }
+  }
+
+  /// sum += this' r.
+  void addProduct(const Eigen::VectorXd& r, Eigen::VectorXd& sum) const {
+    for (Eigen::Index i = 0; i < columns_; ++i)
+      for (Eigen::Index row = ranges_[i].first; row < ranges_[i].end; ++row) sum[i] += at(row, i) * r[row];
+  }
+  /// sum += this' B.
+  void addProduct(const Jacobian& B, RowMatrix& sum) const {
+    if (sum.size() == 0) sum.setZero(columns_, B.columns_);
+    inParts(B.columns_, [&](Eigen::Index first, auto width) {
+      for (Eigen::Index i = 0; i < columns_; ++i) addColumnProduct<width>(i, B, first, &sum(i, first));
+    });
+  }
+  /// sum += this' this, of which the lower triangle counts.
+  void addSquare(RowMatrix& sum) const {
+    if (columns_ != kState) return addProduct(*this, sum);
+    for (Eigen::Index i = 0; i < kHalf; ++i) addColumnProduct<kHalf>(i, *this, 0, &sum(i, 0));
+    for (Eigen::Index i = kHalf; i < kState; ++i) addColumnProduct<kState>(i, *this, 0, &sum(i, 0));
+  }
+
+ private:
+  struct Range {
+    Eigen::Index first, end;
+  };
+  const double& at(Eigen::Index row, Eigen::Index i) const { return numbers_[row * columns_ + i]; }
+  template <int N>
+  void addColumnProduct(Eigen::Index i, const Jacobian& B, Eigen::Index first, double* to) const {
+    const auto [row, end] = ranges_[i];
+    rio_t::addColumnProduct<N>(&at(row, i), columns_, B.numbers_.data() + row * B.columns_ + first,
+                               B.columns_, end - row, 1.0, to);
+  }
+
+  Eigen::Index rows_ = 0, columns_ = 0;
+  std::vector<double> numbers_;  // by rows
+  std::vector<Range> ranges_;    // by columns
+};
 
 /// Residual and derivatives of a term with respect to the tangents of its blocks, after the loss. Keeps its
 /// memory from term to term.
@@ -122,20 +192,15 @@ class Linearized {
  public:
   void evaluate(const Term& term) {
     const Eigen::Index rows = term.cost->num_residuals();
-    if (numbers_.size() < term.blocks.size()) numbers_.resize(term.blocks.size());
+    if (J_.size() < term.blocks.size()) J_.resize(term.blocks.size());
     jacobians_.clear();
-    for (std::size_t i = 0; i < term.blocks.size(); ++i) {
-      const auto size = static_cast<std::size_t>(rows * term.blocks[i]->manifold->size());
-      if (numbers_[i].size() < size) numbers_[i].resize(size);
-      jacobians_.push_back(term.blocks[i]->is_constant ? nullptr : numbers_[i].data());
-    }
+    for (std::size_t i = 0; i < term.blocks.size(); ++i)
+      jacobians_.push_back(term.blocks[i]->is_constant ? nullptr
+                                                       : J_[i].start(rows, *term.blocks[i]->manifold));
     const double root = std::sqrt(evaluate(term, jacobians_.data()));
     r_ *= root;
-    J_.clear();
-    for (std::size_t i = 0; i < term.blocks.size(); ++i) {
-      const bool is_constant = jacobians_[i] == nullptr;
-      J_.push_back(is_constant ? Rows{nullptr, rows, 0} : tangents(i, *term.blocks[i]->manifold, root));
-    }
+    for (std::size_t i = 0; i < term.blocks.size(); ++i)
+      if (jacobians_[i] != nullptr) J_[i].finish(*term.blocks[i]->manifold, root);
   }
   /// Without derivatives.
   double costOf(const Term& term) {
@@ -143,7 +208,8 @@ class Linearized {
     return cost_;
   }
   const Eigen::VectorXd& r() const { return r_; }
-  const Rows& J(std::size_t i) const { return J_[i]; }
+  /// Of a block that is not constant.
+  const Jacobian& J(std::size_t i) const { return J_[i]; }
   double cost() const { return cost_; }
 
  private:
@@ -160,40 +226,31 @@ class Linearized {
     return rho[1];
   }
 
-  /// Moves the columns that carry the tangent together.
-  Rows tangents(std::size_t i, const Manifold& manifold, double root) {
-    const std::vector<int>& columns = manifold.columns();
-    double* to = numbers_[i].data();
-    const double* from = to;
-    for (Eigen::Index row = 0; row < r_.size(); ++row, from += manifold.size())
-      for (const int column : columns) *to++ = root * from[column];
-    return {numbers_[i].data(), r_.size(), static_cast<Eigen::Index>(columns.size())};
-  }
-
   Eigen::VectorXd r_;
-  std::vector<std::vector<double>> numbers_;
   std::vector<const double*> parameters_;
   std::vector<double*> jacobians_;
-  std::vector<Rows> J_;
+  std::vector<Jacobian> J_;
   double cost_ = 0.0;
 };
 
-void addTo(NormalEquations& system, const Term& term, const std::unordered_map<const Block*, int>& index,
-           Linearized& linear) {
-  linear.evaluate(term);
+/// The block in column j, added if it is not there.
+RowMatrix& blockAt(BlockRow& row, int j) {
+  auto at = std::lower_bound(row.begin(), row.end(), j,
+                             [](const auto& block, int column) { return block.first < column; });
+  if (at == row.end() || at->first != j) at = row.emplace(at, j, RowMatrix());
+  return at->second;
+}
+
+/// `indices` of the blocks of the term; -1: not solved for.
+void addTo(NormalEquations& system, const Linearized& linear, const std::vector<int>& indices) {
   system.cost += linear.cost();
-  std::vector<int> indices;  // -1: not solved for
-  for (const Block* block : term.blocks) {
-    const auto found = index.find(block);
-    indices.push_back(found == index.end() || block->is_constant ? -1 : found->second);
-  }
   for (std::size_t a = 0; a < indices.size(); ++a) {
     const int i = indices[a];
     if (i < 0) continue;
-    addSquare(linear.J(a), 1.0, system.diagonal[i]);
-    addProduct(linear.J(a), linear.r(), 1.0, system.gradient[i]);
+    linear.J(a).addSquare(system.diagonal[i]);
+    linear.J(a).addProduct(linear.r(), system.gradient[i]);
     for (std::size_t b = 0; b < indices.size(); ++b)
-      if (indices[b] > i) addProduct(linear.J(a), linear.J(b), 1.0, system.coupling[i][indices[b]]);
+      if (indices[b] > i) linear.J(a).addProduct(linear.J(b), blockAt(system.coupling[i], indices[b]));
   }
 }
 
@@ -214,7 +271,10 @@ int NormalEquations::indexOf(const Block& block) const {
 }
 
 void NormalEquations::hold(int i) {
-  for (int k = 0; k < i; ++k) coupling[k].erase(i);
+  for (int k = 0; k < i; ++k) {
+    const auto is_held = [i](const auto& block) { return block.first == i; };
+    coupling[k].erase(std::remove_if(coupling[k].begin(), coupling[k].end(), is_held), coupling[k].end());
+  }
   coupling[i].clear();
   diagonal[i].setIdentity();
   gradient[i].setZero();
@@ -225,7 +285,16 @@ NormalEquations linearize(std::vector<const Block*> blocks, const std::vector<co
   std::unordered_map<const Block*, int> index;
   for (std::size_t i = 0; i < system.blocks.size(); ++i) index[system.blocks[i]] = static_cast<int>(i);
   Linearized linear;
-  for (const Term* term : terms) addTo(system, *term, index, linear);
+  std::vector<int> indices;
+  for (const Term* term : terms) {
+    linear.evaluate(*term);
+    indices.clear();
+    for (const Block* block : term->blocks) {
+      const auto found = index.find(block);
+      indices.push_back(found == index.end() || block->is_constant ? -1 : found->second);
+    }
+    addTo(system, linear, indices);
+  }
   for (RowMatrix& H : system.diagonal)
     for (Eigen::Index i = 0; i < H.rows(); ++i)
       for (Eigen::Index j = 0; j < i; ++j) H(j, i) = H(i, j);
@@ -251,35 +320,30 @@ double costOf(const Window& window) {
 
 bool Elimination::factorise(const NormalEquations& system, double raise) {
   const std::size_t count = system.blocks.size();
-  L_ = system.diagonal;
+  U_ = system.diagonal;
   W_ = system.coupling;
   delta_.resize(count);
   for (std::size_t i = 0; i < count; ++i) {
     delta_[i] = -system.gradient[i];
-    L_[i].diagonal() *= 1.0 + raise;
+    U_[i].diagonal() *= 1.0 + raise;
   }
   for (std::size_t i = 0; i < count; ++i) {
-    if (!cholesky(L_[i])) return false;
-    L_[i].triangularView<Eigen::Lower>().solveInPlace(delta_[i]);
+    if (!cholesky(U_[i])) return false;
+    forwardSubstitute(U_[i], delta_[i]);
     for (auto& [j, W] : W_[i]) {
-      forwardSubstitute(L_[i], W);
-      addProduct(rowsOf(W), delta_[i], -1.0, delta_[j]);
+      forwardSubstitute(U_[i], W);
+      addProduct(W, delta_[i], -1.0, delta_[j]);
     }
     for (auto a = W_[i].begin(); a != W_[i].end(); ++a) {
-      addSquare(rowsOf(a->second), -1.0, L_[a->first]);
-      auto& row = W_[a->first];
-      auto to = row.begin();
-      for (auto b = std::next(a); b != W_[i].end(); ++b, ++to) {
-        while (to != row.end() && to->first < b->first) ++to;
-        to = row.try_emplace(to, b->first);
-        addProduct(rowsOf(a->second), rowsOf(b->second), -1.0, to->second);
-      }
+      subtractSquare(a->second, U_[a->first]);
+      for (auto b = std::next(a); b != W_[i].end(); ++b)
+        addProduct(a->second, b->second, -1.0, blockAt(W_[a->first], b->first));
     }
   }
   squared_length_ = 0.0;
   for (std::size_t i = count; i-- > 0;) {
     for (const auto& [j, W] : W_[i]) delta_[i].noalias() -= W * delta_[j];
-    L_[i].triangularView<Eigen::Lower>().transpose().solveInPlace(delta_[i]);
+    U_[i].triangularView<Eigen::Upper>().solveInPlace(delta_[i]);
     squared_length_ -= delta_[i].dot(system.gradient[i]);
   }
   return true;
@@ -294,41 +358,42 @@ std::optional<Elimination> Elimination::of(const NormalEquations& system, double
   return result;
 }
 
-Eigen::MatrixXd Elimination::covariance(const std::vector<int>& indices) const {
+const Eigen::MatrixXd& Elimination::covariance(const std::vector<int>& indices) const {
+  if (std::exchange(asked_, indices) == indices) return answer_;
   Eigen::Index columns = 0;
-  for (const int i : indices) columns += L_[i].rows();
-  // Y = L^-1 E, where E selects the blocks: their covariance is Y'Y.
+  for (const int i : indices) columns += U_[i].rows();
+  // Y = U'^-1 E, where E selects the blocks: their covariance is Y'Y.
   std::map<int, RowMatrix> Y;
   Eigen::Index first = 0;
   for (const int i : indices) {
-    Y[i].setZero(L_[i].rows(), columns);
-    Y[i].middleCols(first, L_[i].rows()).setIdentity();
-    first += L_[i].rows();
+    Y[i].setZero(U_[i].rows(), columns);
+    Y[i].middleCols(first, U_[i].rows()).setIdentity();
+    first += U_[i].rows();
   }
   RowMatrix result = RowMatrix::Zero(columns, columns);
   for (auto at = Y.begin(); at != Y.end(); ++at) {
     auto& [i, y] = *at;
-    forwardSubstitute(L_[i], y);
-    for (const auto& [j, W] : W_[i]) addProduct(rowsOf(W), rowsOf(y), -1.0, Y[j]);
-    addProduct(rowsOf(y), rowsOf(y), 1.0, result);
+    forwardSubstitute(U_[i], y);
+    for (const auto& [j, W] : W_[i]) addProduct(W, y, -1.0, Y[j]);
+    addProduct(y, y, 1.0, result);
   }
-  return result;
+  return answer_ = result;
 }
 
 std::vector<std::map<int, Eigen::MatrixXd>> Elimination::covariances() const {
-  std::vector<std::map<int, Eigen::MatrixXd>> P(L_.size());
+  std::vector<std::map<int, Eigen::MatrixXd>> P(U_.size());
   const auto at = [&](int a, int b) -> Eigen::MatrixXd {
     return a <= b ? P[a].at(b) : Eigen::MatrixXd(P[b].at(a).transpose());
   };
-  for (std::size_t i = L_.size(); i-- > 0;) {
-    const auto L = L_[i].triangularView<Eigen::Lower>();
-    const Eigen::MatrixXd inverse = L.solve(Eigen::MatrixXd::Identity(L_[i].rows(), L_[i].rows()));
-    P[i][static_cast<int>(i)] = inverse.transpose() * inverse;
-    // delta_i = G_i (...) - sum_j G_ij delta_j with G_ij = L_ii^-T W_ij.
+  for (std::size_t i = U_.size(); i-- > 0;) {
+    const auto U = U_[i].triangularView<Eigen::Upper>();
+    const Eigen::MatrixXd inverse = U.solve(Eigen::MatrixXd::Identity(U_[i].rows(), U_[i].rows()));
+    P[i][static_cast<int>(i)] = inverse * inverse.transpose();
+    // delta_i = G_i (...) - sum_j G_ij delta_j with G_ij = U_ii^-1 W_ij.
     std::map<int, Eigen::MatrixXd> G;
-    for (const auto& [j, W] : W_[i]) G[j] = L.transpose().solve(W);
+    for (const auto& [j, W] : W_[i]) G[j] = U.solve(W);
     for (const auto& [j, unused] : G) {
-      Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(L_[i].rows(), L_[j].rows());
+      Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(U_[i].rows(), U_[j].rows());
       for (const auto& [k, G_ik] : G) sum.noalias() -= G_ik * at(k, j);
       P[i][static_cast<int>(i)].noalias() -= sum * G[j].transpose();
       P[i][j] = std::move(sum);
@@ -339,36 +404,35 @@ std::vector<std::map<int, Eigen::MatrixXd>> Elimination::covariances() const {
 
 Information eliminateFirst(const NormalEquations& system, int count) {
   const int blocks = static_cast<int>(system.blocks.size());
-  Eigen::Index rows = 0, first_rows = 0;
+  Eigen::Index rows = 0, left = 0;
   std::vector<Eigen::Index> first;
   for (int i = 0; i < blocks; ++i) {
     first.push_back(rows);
     rows += system.diagonal[i].rows();
-    if (i < count) first_rows = rows;
+    if (i < count) left = rows;
   }
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(rows, rows);
-  Eigen::VectorXd b(rows);
+  // The gradient is one more column; the last row says nothing.
+  RowMatrix H = RowMatrix::Zero(rows + 1, rows + 1);
   for (int i = 0; i < blocks; ++i) {
-    b.segment(first[i], system.gradient[i].size()) = system.gradient[i];
+    H.col(rows).segment(first[i], system.gradient[i].size()) = system.gradient[i];
     H.block(first[i], first[i], system.diagonal[i].rows(), system.diagonal[i].rows()) = system.diagonal[i];
     for (const auto& [j, part] : system.coupling[i]) {
       H.block(first[i], first[j], part.rows(), part.cols()) = part;
-      H.block(first[j], first[i], part.cols(), part.rows()) = part.transpose();
+      if (i >= count) H.block(first[j], first[i], part.cols(), part.rows()) = part.transpose();
     }
   }
-  const Eigen::Index kept = rows - first_rows;
-  Eigen::MatrixXd H00 = H.topLeftCorner(first_rows, first_rows);
-  Eigen::LLT<Eigen::MatrixXd> factor(H00);
-  for (double lift = kSmallestLift; factor.info() != Eigen::Success; lift *= 10.0) {
+  RowMatrix U = H.topLeftCorner(left, left);
+  for (double lift = kSmallestLift; !cholesky(U); lift *= 10.0) {
     if (lift > kLargestLift) throw std::runtime_error("graph: a block that leaves is not determined");
-    H00.diagonal() = (1.0 + lift) * H.diagonal().head(first_rows);
-    factor.compute(H00);
+    U = H.topLeftCorner(left, left);
+    U.diagonal() *= 1.0 + lift;
   }
-  const Eigen::MatrixXd W = factor.matrixL().solve(H.topRightCorner(first_rows, kept));
-  Information result;
-  result.S = H.bottomRightCorner(kept, kept) - W.transpose() * W;
-  result.s = b.tail(kept) - W.transpose() * factor.matrixL().solve(b.head(first_rows));
-  return result;
+  const Eigen::Index kept = rows - left;
+  RowMatrix W = H.topRightCorner(left, kept + 1);
+  RowMatrix S = H.bottomRightCorner(kept + 1, kept + 1);
+  forwardSubstitute(U, W);
+  addProduct(W, W, -1.0, S);
+  return {S.topLeftCorner(kept, kept), S.col(kept).head(kept)};
 }
 
 SquareRoot squareRoot(const Information& information) {
@@ -381,10 +445,11 @@ SquareRoot squareRoot(const Information& information) {
   const Eigen::MatrixXd scaled = inverse.asDiagonal() * information.S * inverse.asDiagonal();
   const Eigen::VectorXd scaled_s = inverse.cwiseProduct(information.s);
   SquareRoot root{Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
-  const Eigen::LLT<Eigen::MatrixXd> cholesky(scaled);
-  if (cholesky.info() == Eigen::Success && cholesky.matrixLLT().diagonal().minCoeff() > kWellDetermined) {
-    root.J = Eigen::MatrixXd(cholesky.matrixU()) * scale.asDiagonal();
-    root.r0 = cholesky.matrixL().solve(scaled_s);
+  RowMatrix U = scaled;
+  if (cholesky(U) && U.diagonal().minCoeff() > kWellDetermined) {
+    root.J.triangularView<Eigen::Upper>() = U * scale.asDiagonal();
+    root.r0 = scaled_s;
+    forwardSubstitute(U, root.r0);
     return root;
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "rio_t/graph/window.h"
@@ -14,13 +15,16 @@ namespace rio_t {
 /// By rows, as Ceres writes Jacobians.
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+/// Blocks in a row of a matrix, in the order of their columns.
+using BlockRow = std::vector<std::pair<int, RowMatrix>>;
+
 /// H delta = -b in the tangents of `blocks`, in their order.
 struct NormalEquations {
   std::vector<const Block*> blocks;
-  std::vector<RowMatrix> diagonal;                 ///< H_ii
-  std::vector<std::map<int, RowMatrix>> coupling;  ///< H_ij, j > i; absent if zero
-  std::vector<Eigen::VectorXd> gradient;           ///< b_i = sum J'r
-  double cost = 0.0;                               ///< half the sum of squares, after the loss
+  std::vector<RowMatrix> diagonal;        ///< H_ii
+  std::vector<BlockRow> coupling;         ///< H_ij, j > i; absent if zero
+  std::vector<Eigen::VectorXd> gradient;  ///< b_i = sum J'r
+  double cost = 0.0;                      ///< half the sum of squares, after the loss
 
   /// Without any information.
   explicit NormalEquations(std::vector<const Block*> blocks = {});
@@ -36,7 +40,7 @@ NormalEquations linearize(const Window& window);
 /// NormalEquations::cost of the window, without derivatives.
 double costOf(const Window& window);
 
-/// Block Cholesky factor H = L L' in the order of the blocks: L_ii and W_ij = L_ii^-1 H_ij after the blocks
+/// Block Cholesky factor H = U'U in the order of the blocks: U_ii and W_ij = U_ii'^-1 H_ij after the blocks
 /// before i are eliminated.
 class Elimination {
  public:
@@ -47,18 +51,21 @@ class Elimination {
   const std::vector<Eigen::VectorXd>& delta() const { return delta_; }
   /// delta' H delta: the squared length of the step in sigmas.
   double squaredLength() const { return squared_length_; }
-  /// Joint covariance of some blocks, by their indices, in that order.
-  Eigen::MatrixXd covariance(const std::vector<int>& indices) const;
-  /// Covariance of every block, and of every two that L connects: [i][j], j >= i.
+  /// Joint covariance of some blocks, by their indices, in that order. Not for two threads: it keeps the last
+  /// answer. A scan needs the same one for the result and for the prediction of the next scan.
+  const Eigen::MatrixXd& covariance(const std::vector<int>& indices) const;
+  /// Covariance of every block, and of every two that U connects: [i][j], j >= i.
   std::vector<std::map<int, Eigen::MatrixXd>> covariances() const;
 
  private:
   bool factorise(const NormalEquations& system, double raise);
 
-  std::vector<RowMatrix> L_;
-  std::vector<std::map<int, RowMatrix>> W_;
+  std::vector<RowMatrix> U_;
+  std::vector<BlockRow> W_;
   std::vector<Eigen::VectorXd> delta_;
   double squared_length_ = 0.0;
+  mutable std::vector<int> asked_;  ///< of the covariance: a cache, as the next
+  mutable Eigen::MatrixXd answer_;
 };
 
 /// Information about some blocks after others are eliminated.
