@@ -159,7 +159,10 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
     answer.prediction_covariance = seen.prior->covariance;
   }
   if (!answer.at_rest) {
-    estimator_.learn(seen.pooled, measured, seen.prior, seen.pooled.points.size() - scan.points.size());
+    const DopplerLikelihood* world =
+        answer.doppler && !seen.has_borrowed ? answer.doppler->points.get() : nullptr;
+    estimator_.learn(seen.pooled, measured, seen.prior, seen.pooled.points.size() - scan.points.size(),
+                     world);
     learned_at_ = scan.stamp;
   }
   return answer;
@@ -176,7 +179,8 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
   seen.borrowed_since = scan.stamp - ScanPool::kMaxAge;
   const double scale = context.model_error_scale;
   if (!context.rest) rest_pool_.clear();
-  if (context.rest) answer.at_rest = confirmsRest(*context.rest, scan, scale, seen);
+  EgoVelocity alone;
+  if (context.rest) answer.at_rest = confirmsRest(*context.rest, scan, scale, seen, alone);
   seen.has_borrowed = seen.pooled.points.size() > scan.points.size();
   if (answer.at_rest) seen.prior = zeroVelocity(context.rest->velocity_sigma);
 
@@ -186,7 +190,10 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
   // little wrong.
   const double sigma = options_.smoother.innovation_model_error;
   if (expected && seen.has_borrowed) expected->covariance.diagonal().array() += sigma * sigma;
-  answer.ego_velocity = measure(seen.pooled, expected, scale);
+  // Points that read zero by themselves do so with the prior of a rest, too.
+  answer.ego_velocity = answer.at_rest && alone.status == EgoVelocityStatus::kZeroVelocity
+                            ? alone
+                            : measure(seen.pooled, expected, scale);
   answer.was_predicted = seen.prior.has_value();
   if (seen.prior) judge(seen.pooled, *seen.prior, expected.has_value(), scale, answer);
   if (answer.alone && sharesPoints(seen, alone_at_)) answer.alone.reset();
@@ -204,8 +211,9 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
   return seen;
 }
 
-bool RadarChannel::confirmsRest(const Rest& rest, const RadarScan& scan, double scale, Seen& seen) {
-  const EgoVelocity alone = measure(seen.pooled, std::nullopt, scale);
+bool RadarChannel::confirmsRest(const Rest& rest, const RadarScan& scan, double scale, Seen& seen,
+                                EgoVelocity& alone) {
+  alone = measure(seen.pooled, std::nullopt, scale);
   bool confirms = rest.shakes ? alone.status == EgoVelocityStatus::kZeroVelocity : !alone.denies_rest;
   // Few points show soon that a platform sets off, many show how slowly it creeps.
   for (std::size_t enough = RestPool::kMost / 16; confirms && enough <= RestPool::kMost; enough *= 4) {

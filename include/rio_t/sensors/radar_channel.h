@@ -133,8 +133,8 @@ class RadarChannel {
   Seen see(const RadarScan& scan, const ScanContext& context, const FixedLagSmoother& smoother,
            RadarAnswer& answer);
   /// Whether the points do not deny a rest that the IMU shows. If many scans together show a creep, `seen`
-  /// borrows their points.
-  bool confirmsRest(const Rest& rest, const RadarScan& scan, double scale, Seen& seen);
+  /// borrows their points. `alone` becomes the velocity of the scan without a prior.
+  bool confirmsRest(const Rest& rest, const RadarScan& scan, double scale, Seen& seen, EgoVelocity& alone);
   /// See OffsetEvidence; 0: the scan does not tell the offset. Sets `seen.dv_dt_O`.
   double offsetGain(Seen& seen);
   /// What of the scan goes into the window: its own points, which are the inliers, and the velocity at which
