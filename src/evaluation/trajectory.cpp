@@ -128,10 +128,15 @@ Trajectory readTum(const std::string& path) {
 
 std::string formatTime(Time time) {
   const std::int64_t ns = time.nanoseconds();
-  std::string text = std::to_string(std::abs(ns));
-  if (text.size() < 10) text.insert(0, 10 - text.size(), '0');
-  text.insert(text.size() - 9, 1, '.');
-  return ns < 0 ? "-" + text : text;
+  std::array<char, 24> text{};  // filled from the end
+  char* first = text.end();
+  std::int64_t left = std::abs(ns);
+  for (int i = 0; i <= 9 || left != 0; ++i, left /= 10) {
+    if (i == 9) *--first = '.';
+    *--first = static_cast<char>('0' + left % 10);
+  }
+  if (ns < 0) *--first = '-';
+  return {first, text.end()};
 }
 
 void writeTumLine(std::ostream& out, const StampedPose& pose) {

@@ -19,11 +19,13 @@ constexpr double kNothing = 1e-10;
 Eigen::Vector3d NoiseMeter::squaredDensities(double spacing) const {
   Eigen::Vector3d difference = Eigen::Vector3d::Zero();
   double gain = 0.0;
-  for (const Sample& sample : last_) {
+  std::array<double, 5> at{};  // [spacings]
+  for (std::size_t i = 1; i < at.size(); ++i) at[i] = (last_[i].time - last_[0].time) / spacing;
+  for (std::size_t i = 0; i < at.size(); ++i) {
     double product = 1.0;
-    for (const Sample& other : last_)
-      if (&other != &sample) product *= (sample.time - other.time) / spacing;
-    difference += sample.value / product;
+    for (std::size_t j = 0; j < at.size(); ++j)
+      if (j != i) product *= at[i] - at[j];
+    difference += last_[i].value / product;
     gain += 1.0 / (product * product);
   }
   return difference.cwiseAbs2() * (spacing / gain);

@@ -12,8 +12,9 @@ void ImuDelta::step(double step_dt, const Eigen::Vector3d& omega, const Eigen::V
   const Eigen::Matrix3d R_mid = (dR * half).toRotationMatrix();
   const Eigen::Vector3d a_i = R_mid * a;
 
-  // How the midpoint rotation moves with the gyro bias.
-  const Eigen::Matrix3d mid_dbg = half_T * dR_dbg - 0.5 * step_dt * so3::rightJacobian(half_angle);
+  // How the midpoint rotation moves with the gyro bias; the second half of the step does the same again.
+  const Eigen::Matrix3d half_dbg = 0.5 * step_dt * so3::rightJacobian(half_angle);
+  const Eigen::Matrix3d mid_dbg = half_T * dR_dbg - half_dbg;
   const Eigen::Matrix3d a_dbg = -R_mid * so3::hat(a) * mid_dbg;
 
   dp += dv * step_dt + 0.5 * step_dt * step_dt * a_i;
@@ -22,7 +23,7 @@ void ImuDelta::step(double step_dt, const Eigen::Vector3d& omega, const Eigen::V
   dv += step_dt * a_i;
   dv_dbg += step_dt * a_dbg;
   dv_dba -= step_dt * R_mid;
-  dR_dbg = half_T * half_T * dR_dbg - step_dt * so3::rightJacobian(2.0 * half_angle);
+  dR_dbg = half_T * mid_dbg - half_dbg;
   dR = (dR * half * half).normalized();
   dt += step_dt;
 }

@@ -109,7 +109,9 @@ Eigen::Vector3d solveTransposed(const Eigen::Matrix3d& U, const Eigen::Vector3d&
 //   earlier scans have shown (`left`, after the regression). The error of this angle is not in the direction.
 DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
                                      const PointVariances& noise)
-    : half_bin_(std::sqrt(3.0 * noise.quantization)), smallest_sigma_(std::numeric_limits<double>::max()) {
+    : about_(v_R),
+      half_bin_(std::sqrt(3.0 * noise.quantization)),
+      smallest_sigma_(std::numeric_limits<double>::max()) {
   const std::vector<double> azimuths = azimuthsOf(points);
   const std::vector<double> elevations = elevationsOf(points);
   const AngleRegression by_azimuth(azimuths, noise.azimuth, noise.azimuths);
@@ -175,13 +177,17 @@ double DopplerLikelihood::residual(std::size_t i, const Eigen::Vector3d& v_R,
 Eigen::Matrix3d DopplerLikelihood::binInformation() const {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   if (!(half_bin_ > smallest_sigma_)) return information;
-  const auto binOf = [this](const Point& p) { return std::lround(p.doppler / (2.0 * half_bin_)); };
   std::map<long, double> counts;
-  for (const Point& p : points_) ++counts[binOf(p)];
+  std::vector<double*> count_of;  // by point
   for (const Point& p : points_) {
+    count_of.push_back(&counts[std::lround(p.doppler / (2.0 * half_bin_))]);
+    ++*count_of.back();
+  }
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Point& p = points_[i];
     const double flat = std::max(0.0, 1.0 - p.sigma / half_bin_);
     const double variance = square(half_bin_) / 3.0 + square(p.sigma);
-    information += flat / (counts[binOf(p)] * variance) * p.u_R * p.u_R.transpose();
+    information += flat / (*count_of[i] * variance) * p.u_R * p.u_R.transpose();
   }
   return information;
 }

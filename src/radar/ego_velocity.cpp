@@ -19,11 +19,12 @@ constexpr double kTellsSide = 1.0 / 12.0;  // [spans] a quarter at three sigma
 constexpr double kAgrees = 3.0;            // [sigma] of a point
 
 std::vector<RadarDirection> filter(const RadarScan& scan, const EgoVelocityOptions& o) {
+  const PointFilter filter(o);
   std::vector<RadarDirection> directions;
   directions.reserve(scan.points.size());
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const RadarPoint& p = scan.points[i];
-    if (judgePoint(p, o) != PointVerdict::kKept) continue;
+    if (filter.judge(p) != PointVerdict::kKept) continue;
     directions.push_back({p.position_R / p.position_R.norm(), p.doppler, i});
   }
   return directions;
@@ -203,7 +204,8 @@ DopplerLikelihood EgoVelocityEstimator::likelihood(const RadarScan& scan,
 }
 
 void EgoVelocityEstimator::learn(const RadarScan& scan, const EgoVelocity& estimated,
-                                 const std::optional<VelocityPrior>& prior, std::size_t borrowed) {
+                                 const std::optional<VelocityPrior>& prior, std::size_t borrowed,
+                                 const DopplerLikelihood* world) {
   if (estimated.status != EgoVelocityStatus::kMoving) return;
   std::vector<RadarDirection> points = filter(scan, options_);
   const std::size_t own = scan.points.size() - borrowed;
@@ -211,9 +213,13 @@ void EgoVelocityEstimator::learn(const RadarScan& scan, const EgoVelocity& estim
       std::find_if(points.begin(), points.end(), [own](const auto& p) { return p.index >= own; });
   span_.learn({points.begin(), end}, estimated.v_R, options_.doppler_quantization);
   if (options_.solver != EgoVelocitySolver::kErrorsInVariables) return;
-  const EgoVelocity world = staticWorld(scan, estimated, prior);
-  unwrap(points, world.v_R, span_.value());
-  noise_.learn(points, world.inliers, world.v_R, prior);
+  std::optional<DopplerLikelihood> found;
+  if (world == nullptr) {
+    const EgoVelocity velocity = staticWorld(scan, estimated, prior);
+    world = &found.emplace(likelihood(scan, velocity.inliers, velocity.v_R));
+  }
+  unwrap(points, world->about(), span_.value());
+  noise_.learn(points, *world, prior);
 }
 
 bool hasMajority(const EgoVelocity& velocity) {

@@ -36,19 +36,30 @@ void markAmbiguous(std::vector<RadarPoint>& points) {
   }
 }
 
-PointVerdict judgePoint(const RadarPoint& point, const EgoVelocityOptions& o) {
+PointFilter::PointFilter(const EgoVelocityOptions& o)
+    : min_range_(o.min_range),
+      max_range_(o.max_range),
+      min_snr_db_(o.min_snr_db),
+      cos_azimuth_(std::cos(o.max_azimuth)),
+      sin_elevation_(std::sin(o.max_elevation)) {}
+
+PointVerdict PointFilter::judge(const RadarPoint& point) const {
   const double range = point.position_R.norm();
   // At range zero there is no direction, whatever min_range says. NaN fails every comparison.
   if (!(range > 0.0) || !std::isfinite(range) || !std::isfinite(point.doppler))
     return PointVerdict::kNoDirection;
-  if (range < o.min_range) return PointVerdict::kTooNear;
-  if (range > o.max_range) return PointVerdict::kTooFar;
-  if (!(point.snr_db >= o.min_snr_db)) return PointVerdict::kTooWeak;
+  if (range < min_range_) return PointVerdict::kTooNear;
+  if (range > max_range_) return PointVerdict::kTooFar;
+  if (!(point.snr_db >= min_snr_db_)) return PointVerdict::kTooWeak;
   const Eigen::Vector3d& p = point.position_R;
-  if (p.y() < std::cos(o.max_azimuth) * p.head<2>().norm()) return PointVerdict::kBesideView;
-  if (std::abs(p.z()) > std::sin(o.max_elevation) * range) return PointVerdict::kAboveView;
+  if (p.y() < cos_azimuth_ * p.head<2>().norm()) return PointVerdict::kBesideView;
+  if (std::abs(p.z()) > sin_elevation_ * range) return PointVerdict::kAboveView;
   if (point.is_ambiguous) return PointVerdict::kAmbiguous;
   return PointVerdict::kKept;
+}
+
+PointVerdict judgePoint(const RadarPoint& point, const EgoVelocityOptions& options) {
+  return PointFilter(options).judge(point);
 }
 
 }  // namespace rio_t

@@ -45,21 +45,6 @@ Eigen::Vector3d vectorOf(const PointVariances& noise) {
   return {noise.doppler, noise.azimuth, noise.elevation};
 }
 
-/// The points with these indices; both are in the order of the scan.
-std::vector<RadarDirection> selected(const std::vector<RadarDirection>& points,
-                                     const std::vector<std::size_t>& indices) {
-  std::vector<RadarDirection> found;
-  found.reserve(indices.size());
-  auto next = indices.begin();
-  for (const RadarDirection& p : points) {
-    if (next == indices.end()) break;
-    if (*next != p.index) continue;
-    found.push_back(p);
-    ++next;
-  }
-  return found;
-}
-
 }  // namespace
 
 PointNoise::PointNoise(const PointVariances& start) : start_(vectorOf(start)), variances_(start) {}
@@ -100,10 +85,9 @@ AngleSpread PointNoise::AngleMoments::spread() const {
   return spread;
 }
 
-void PointNoise::learn(const std::vector<RadarDirection>& points, const std::vector<std::size_t>& inliers,
-                       const Eigen::Vector3d& v_R, const std::optional<VelocityPrior>& prior) {
-  const std::vector<RadarDirection> agreeing = selected(points, inliers);
-  const LikeliestVelocity velocity = findLikeliest(DopplerLikelihood(agreeing, v_R, variances_), prior, v_R);
+void PointNoise::learn(const std::vector<RadarDirection>& points, const DopplerLikelihood& world,
+                       const std::optional<VelocityPrior>& prior) {
+  const LikeliestVelocity velocity = findLikeliest(world, prior, world.about());
   const Eigen::Matrix3d covariance = velocity.information.inverse();
 
   ++scans_;

@@ -2,11 +2,9 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <map>
 
 #include "consensus.h"
 #include "direction_noise.h"
@@ -94,10 +92,13 @@ bool directionsAgreeOnMotion(const std::vector<RadarDirection>& points, const Eg
   };
   const std::vector<RadarDirection> slow = selectSlow(points, o);
   if (std::all_of(slow.begin(), slow.end(), [&](const auto& p) { return readsZero(p, o); })) return false;
-  std::map<std::array<long, 3>, Cell> cells;
+  // So many cells lie beside each other along each axis of the unit cube, the middle one around zero.
+  constexpr auto kAlong = 2 * static_cast<std::size_t>(1.0 / kCellWidth + 0.5) + 1;
+  std::vector<Cell> cells(kAlong * kAlong * kAlong);
   for (const RadarDirection& p : slow) {
-    const Eigen::Vector3d corner = p.u_R / kCellWidth;
-    Cell& cell = cells[{std::lround(corner.x()), std::lround(corner.y()), std::lround(corner.z())}];
+    const Eigen::Vector3d at = p.u_R.array() / kCellWidth + 0.5 * kAlong;
+    const auto index = [&](int axis) { return static_cast<std::size_t>(at[axis]); };
+    Cell& cell = cells[(index(0) * kAlong + index(1)) * kAlong + index(2)];
     cell.count += 1.0;
     cell.sum_R += p.u_R;
     if (!readsZero(p, o)) cell.approaching -= std::copysign(1.0, p.doppler);
@@ -106,13 +107,16 @@ bool directionsAgreeOnMotion(const std::vector<RadarDirection>& points, const Eg
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
   double all = 0.0;
-  for (const auto& [index, cell] : cells) {
+  double count = 0.0;  // of cells with points
+  for (const Cell& cell : cells) {
+    if (cell.count == 0.0) continue;
+    count += 1.0;
     H += cell.sum_R * cell.sum_R.transpose() / cell.count;
     b += cell.sum_R * cell.approaching / cell.count;
     all += square(cell.approaching) / cell.count;
   }
   const double explained = b.dot(H.ldlt().solve(b));
-  const double freedom = static_cast<double>(cells.size()) - 3.0;
+  const double freedom = count - 3.0;
   if (!(freedom > 0.0)) return false;
   // Quantile of the F distribution, within 4 % from 20 degrees of freedom on.
   const double limit = kDeniesRest / 3.0 * (1.0 + 9.0 / freedom);

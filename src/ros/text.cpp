@@ -2,7 +2,6 @@
 
 #include <array>
 #include <boost/algorithm/string.hpp>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <locale>
@@ -10,17 +9,6 @@
 #include <vector>
 
 namespace rio_t {
-namespace {
-
-void appendDigits(std::string* text, std::uint64_t value, int at_least) {
-  std::array<char, 20> digits{};
-  const char* const end = std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
-  const auto count = static_cast<int>(end - digits.data());
-  if (count < at_least) text->append(static_cast<std::size_t>(at_least - count), '0');
-  text->append(digits.data(), static_cast<std::size_t>(count));
-}
-
-}  // namespace
 
 void appendFixed(std::string* text, double value, int decimals) {
   if (!std::isfinite(value)) {
@@ -38,13 +26,16 @@ void appendFixed(std::string* text, double value, int decimals) {
     *text += stream.str();
     return;
   }
-  const auto whole = static_cast<std::uint64_t>(scaled);
-  const auto divisor = static_cast<std::uint64_t>(scale);
-  if (value < 0.0 && whole != 0) text->push_back('-');
-  appendDigits(text, whole / divisor, 1);
-  if (decimals == 0) return;
-  text->push_back('.');
-  appendDigits(text, whole % divisor, decimals);
+  auto left = static_cast<std::uint64_t>(scaled);
+  const bool is_negative = value < 0.0 && left != 0;
+  std::array<char, 24> digits{};  // filled from the end
+  char* first = digits.end();
+  for (int i = 0; i <= decimals || left != 0; ++i, left /= 10) {
+    if (i == decimals && i > 0) *--first = '.';
+    *--first = static_cast<char>('0' + left % 10);
+  }
+  if (is_negative) *--first = '-';
+  text->append(first, digits.end());
 }
 
 std::string fixedText(double value, int decimals) {

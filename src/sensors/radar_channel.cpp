@@ -159,7 +159,10 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
     answer.prediction_covariance = seen.prior->covariance;
   }
   if (!answer.at_rest) {
-    estimator_.learn(seen.pooled, measured, seen.prior, seen.pooled.points.size() - scan.points.size());
+    const DopplerLikelihood* world =
+        answer.doppler && !seen.has_borrowed ? answer.doppler->points.get() : nullptr;
+    estimator_.learn(seen.pooled, measured, seen.prior, seen.pooled.points.size() - scan.points.size(),
+                     world);
     learned_at_ = scan.stamp;
   }
   return answer;

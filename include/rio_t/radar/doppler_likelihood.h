@@ -53,6 +53,7 @@ class DopplerLikelihood {
   std::size_t size() const { return points_.size(); }
   double smallestSigma() const { return smallest_sigma_; }  ///< of a point, without the bin [m/s]
   double halfBin() const { return half_bin_; }              ///< [m/s]
+  const Eigen::Vector3d& about() const { return about_; }   ///< where it was set up [m/s]
 
  private:
   struct Point {
@@ -67,6 +68,7 @@ class DopplerLikelihood {
   };
 
   std::vector<Point> points_;
+  Eigen::Vector3d about_;
   double half_bin_;  ///< [m/s]
   double smallest_sigma_;
 };

@@ -28,7 +28,19 @@ constexpr std::size_t kPointVerdicts = 8;
 /// Marks none if three points or more all have the same SNR: it then tells nothing.
 void markAmbiguous(std::vector<RadarPoint>& points);
 
-/// The first test that the point fails, in the order of PointVerdict.
+/// Judges points by the options of the ego-velocity.
+class PointFilter {
+ public:
+  explicit PointFilter(const EgoVelocityOptions& options);
+  /// The first test that the point fails, in the order of PointVerdict.
+  PointVerdict judge(const RadarPoint& point) const;
+
+ private:
+  double min_range_, max_range_, min_snr_db_;  // read-only after construction, as the next
+  double cos_azimuth_, sin_elevation_;         // of the largest ones
+};
+
+/// PointFilter for one point.
 PointVerdict judgePoint(const RadarPoint& point, const EgoVelocityOptions& options);
 
 }  // namespace rio_t

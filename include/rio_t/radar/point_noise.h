@@ -11,6 +11,8 @@
 
 namespace rio_t {
 
+class DopplerLikelihood;
+
 /// [s/m] Bounds of the density of the outliers, per point: 1 in 200 and every other one over 5 m/s. With a
 /// larger density, points would pass for outliers for long after their noise has grown.
 constexpr double kMinOutlierDensity = 0.001;
@@ -47,12 +49,11 @@ class PointNoise {
  public:
   explicit PointNoise(const PointVariances& start);
 
-  /// Learns from a scan. `points` passed the filter; `inliers` are the indices of those that `v_R` was solved
-  /// from. Both are in the order of the scan. `learn` also takes the other points, as far as they may belong
-  /// to the static world: otherwise the known noise would cut off its own tails. `prior`, if any, knows
-  /// nothing of this scan.
-  void learn(const std::vector<RadarDirection>& points, const std::vector<std::size_t>& inliers,
-             const Eigen::Vector3d& v_R, const std::optional<VelocityPrior>& prior);
+  /// Learns from a scan. `points` passed the filter; `world` is the likelihood of those that look static.
+  /// `learn` also takes the other points, as far as they may belong to the static world: otherwise the known
+  /// noise would cut off its own tails. `prior`, if any, knows nothing of this scan.
+  void learn(const std::vector<RadarDirection>& points, const DopplerLikelihood& world,
+             const std::optional<VelocityPrior>& prior);
   /// Learns how far the directions of a scan spread, moving or not. `points` passed the filter.
   void learnSpread(const std::vector<RadarDirection>& points);
   /// Sets the quantisation once it is known [m^2/s^2]. Earlier scans were learned with another one; they fade
