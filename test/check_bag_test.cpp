@@ -275,6 +275,22 @@ TEST_F(CheckBag, ExitStatusAndFiles) {
   EXPECT_EQ(runBag(bag_run).divergences, 0u);
 }
 
+TEST_F(CheckBag, AnEditedConfigurationIsReplacedOnlyIfToldTo) {
+  CheckRequest request;
+  request.bags = {bag_};
+  request.try_out = false;
+  request.out = folder_ + "/edited.yaml";
+  std::ofstream(request.out) << "# mine\n";
+  std::ostringstream out, err;
+  EXPECT_EQ(runCheck(request, out, err), 2);
+  EXPECT_EQ(err.str(), "check_bag: --out " + request.out +
+                           ": this file exists; choose another name, or replace it with --overwrite\n");
+  EXPECT_EQ(contents(request.out), "# mine\n");
+  request.overwrite = true;
+  EXPECT_EQ(runCheck(request, out, err), 0) << err.str();
+  EXPECT_NE(contents(request.out), "# mine\n");
+}
+
 TEST_F(CheckBag, ADamagedBagIsNamed) {
   std::string bytes = contents(bag_);
   const std::size_t at = bytes.rfind("v_doppler_mps");  // in the last cloud
@@ -302,6 +318,7 @@ TEST_F(CheckBag, TheNextCommandCanBePasted) {
   EXPECT_NE(out.str().find("--bag \"" + copy + "\" --config \"" + request.out + "\""), std::string::npos)
       << out.str();
   request.bags_go_away = true;
+  request.overwrite = true;
   EXPECT_EQ(runCheck(request, out, err), 0) << err.str();
   EXPECT_NE(out.str().find("--bag BAG --config"), std::string::npos) << out.str();
 }

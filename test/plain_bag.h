@@ -82,8 +82,10 @@ class PlainBag : public testing::Test {
     return path;
   }
 
-  static BagCheck check(const std::string& bag, bool try_out = true) {
+  static BagCheck check(const std::string& bag, bool try_out = true,
+                        const std::vector<std::string>& told = {}) {
     CheckRequest request;
+    for (const std::string& assignment : told) request.set.push_back(parseAssignment(assignment));
     request.bags = {bag};
     request.try_out = try_out;
     return checkBag(bag, request);

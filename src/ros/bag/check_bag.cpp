@@ -133,9 +133,11 @@ BagCheck checkBag(const std::string& bag, const CheckRequest& request) {
     return check;
   }
   std::vector<RadarInspection> radars;
+  std::string to_do;
   for (const CloudTopic& cloud : recording.clouds) {
-    RadarInspection radar = inspectRadar(recording, imu, cloud);
+    RadarInspection radar = inspectRadar(recording, imu, cloud, request.set);
     append(radar.findings, &check.findings);
+    if (to_do.find(radar.to_do) == std::string::npos) appendItem(&to_do, radar.to_do, " ");
     if (radar.usable) radars.push_back(std::move(radar));
   }
   if (radars.empty()) {
@@ -150,7 +152,10 @@ BagCheck checkBag(const std::string& bag, const CheckRequest& request) {
               : "Record the radar, too: a point cloud with positions and Doppler.",
           &check);
     } else {
-      check.to_do = "Use a radar driver that publishes positions and Doppler as sensor_msgs/PointCloud2.";
+      check.to_do =
+          to_do.empty()
+              ? "Use a radar driver that publishes positions and Doppler as sensor_msgs/PointCloud2."
+              : to_do;
     }
     return check;
   }
@@ -162,9 +167,9 @@ BagCheck checkBag(const std::string& bag, const CheckRequest& request) {
   for (const RadarInspection& radar : radars) {
     if (radar.search.enough) check.quality += 1.0 / radar.search.rotation_sigma.norm();
   }
-  const ProposedConfig config = proposedConfig(imu, radars);
+  const ProposedConfig config = proposedConfig(imu, radars, request.set);
   if (request.try_out) {
-    chooseByTrial(recording, header(recording), config, &check);
+    chooseByTrial(recording, header(recording), config, request.set, &check);
   } else {
     check.yaml = toYaml(config, header(recording));
     readBack(check.yaml);

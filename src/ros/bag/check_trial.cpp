@@ -102,12 +102,16 @@ void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
 }  // namespace
 
 void chooseByTrial(const Recording& recording, const std::string& header, const ProposedConfig& config,
-                   BagCheck* check) {
+                   const ParameterEntries& told, BagCheck* check) {
   const double duration = recording.read < recording.length ? recording.read : 0.0;
   Trial best;
   best.failure = "not tried";
   std::string note;
   for (const Attempt& attempt : kAttempts) {
+    const bool is_told = std::any_of(told.begin(), told.end(), [&](const ParameterEntry& entry) {
+      return attempt.key != nullptr && entry.key == attempt.key;
+    });
+    if (is_told) continue;
     ProposedConfig changed = config;
     if (attempt.key != nullptr) changed.top_level.set(attempt.key, attempt.value, attempt.why);
     const std::string yaml = toYaml(changed, header);

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "../text.h"
@@ -9,6 +10,13 @@
 
 namespace rio_t {
 namespace {
+
+/// Up is one of the axes of the IMU, or near it: which one.
+Eigen::Vector3d nearestAxis(const Eigen::Vector3d& direction) {
+  int axis = 0;
+  direction.cwiseAbs().maxCoeff(&axis);
+  return std::copysign(1.0, direction[axis]) * Eigen::Vector3d::Unit(axis);
+}
 
 std::string axisName(const Eigen::Vector3d& direction) {
   int axis = 0;
@@ -153,6 +161,26 @@ void describeRest(ImuInspection* imu) {
   }
 }
 
+/// base_link is the IMU by default, and REP-103 wants it with z up.
+void describeUp(ImuInspection* imu) {
+  const std::optional<Eigen::Vector3d> up = upOf(imu->report);
+  if (!up) return;
+  const Eigen::Vector3d axis = nearestAxis(*up);
+  if (axis.z() > 0.0) return;
+  // Half a turn about x leaves x forward.
+  const Eigen::Quaterniond q_BI = axis.z() < 0.0
+                                      ? Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0)
+                                      : Eigen::Quaterniond::FromTwoVectors(axis, Eigen::Vector3d::UnitZ());
+  std::string numbers;
+  for (const double number : q_BI.coeffs()) appendItem(&numbers, fixedText(rounded(number, 1e4), 4));
+  tell(imu, FindingLevel::kOdd, "IMU axes",
+       "gravity is on " + axisName(*up) +
+           ", so z of the IMU is not up: the odometry is right, but rviz shows base_link tilted, since it is "
+           "the "
+           "IMU by default. Give base_link by tf, or set base_extrinsics_rotation_xyzw: [" +
+           numbers + "] to make its z up (docs/frames.md)");
+}
+
 void describeNoise(ImuInspection* imu) {
   const ImuReport& r = imu->report;
   const double vibration = r.accel_density_median / std::max(r.accel_density_quiet, 1e-9);
@@ -179,6 +207,7 @@ void describe(ImuInspection* imu) {
   }
   describeUnits(imu);
   describeRest(imu);
+  describeUp(imu);
   describeNoise(imu);
   if (r.not_finite > 0)
     tell(imu, FindingLevel::kOdd, "IMU",
@@ -186,6 +215,13 @@ void describe(ImuInspection* imu) {
 }
 
 }  // namespace
+
+std::optional<Eigen::Vector3d> upOf(const ImuReport& report) {
+  constexpr double kMostlyUp = 7.5;  // [m/s^2] length of the mean: shorter, and the IMU turns over
+  const Eigen::Vector3d up = report.rests_at_start ? report.rest_acceleration : report.mean_acceleration;
+  if (report.mean_acceleration.norm() <= kMostlyUp || up.norm() <= kMostlyUp) return std::nullopt;
+  return up.normalized();
+}
 
 std::string rateText(const StreamTiming& timing, int decimals, bool with_duplicates) {
   std::string text = fixedText(timing.rate, decimals) + " Hz";

@@ -45,10 +45,7 @@ MountingSearchOptions searchOptions(const ImuInspection& imu, const InertialTrac
     options.rest_end = track.begin() + (imu.report.rest_begin + imu.report.rest);
     options.gravity_G = -(track.rotation(options.rest_end) * imu.report.rest_acceleration);
   }
-  constexpr double kMostlyUp = 7.5;  // [m/s^2] length of the mean: shorter, and the IMU turns over
-  const ImuReport& report = imu.report;
-  const Eigen::Vector3d up = report.rests_at_start ? report.rest_acceleration : report.mean_acceleration;
-  if (report.mean_acceleration.norm() > kMostlyUp && up.norm() > kMostlyUp) options.up_I = up.normalized();
+  options.up_I = upOf(imu.report);
   return options;
 }
 
@@ -229,13 +226,15 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
 
 }  // namespace
 
-RadarInspection inspectRadar(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud) {
+RadarInspection inspectRadar(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud,
+                             const ParameterEntries& told) {
   RadarInspection radar;
   radar.topic = cloud.topic;
   const StreamTiming timing = inspectTiming(cloud.times);
-  FormatProposal format = proposeFormat(cloud);
+  FormatProposal format = proposeFormat(cloud, told);
   if (!format.fault.empty()) {
     radar.findings.push_back({FindingLevel::kMissing, "radar", cloud.topic + ": " + format.fault});
+    radar.to_do = format.to_do;
     return radar;
   }
   const StampProposal stamps = proposeStamps(recording, imu.times, cloud);
@@ -254,7 +253,7 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   // If the ranges say nothing, a radar that looks along another axis and a contrary sign are one fault, not
   // two: two fields are swapped.
   const bool mirrored = looked.search.mirrored || (looked.sign.sign == 0 && looked.search.sign == -1);
-  if (correctAxes(looked.cloud, mirrored, &format))
+  if (correctAxes(looked.cloud, mirrored, told, &format))
     looked = look(recording, imu, cloud, stamps, format.format, track);
   radar.usable = true;
   radar.search = looked.search;

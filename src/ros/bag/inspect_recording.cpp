@@ -41,7 +41,7 @@ void addImu(const sensor_msgs::Imu& message, Time record, ImuTopic* topic) {
   topic->times.push_back({imu.time, record});
 }
 
-void readMessages(rosbag::View& view, Recording* recording) {
+void readMessages(rosbag::View& view, const ParameterEntries& told, Recording* recording) {
   std::set<std::string> judged, refused;  // topics with clouds
   for (const rosbag::MessageInstance& instance : view) {
     const Time record = toTime(instance.getTime());
@@ -57,7 +57,7 @@ void readMessages(rosbag::View& view, Recording* recording) {
       if (topic.messages.size() > 1 && isCopy(*topic.messages.back(), **std::prev(topic.messages.end(), 2)))
         ++topic.copies;
       const bool is_first = hasPoints(*topic.messages.back()) && judged.insert(name).second;
-      if (is_first && !proposeFormat(topic).fault.empty()) refused.insert(name);
+      if (is_first && !proposeFormat(topic, told).fault.empty()) refused.insert(name);
     } else {
       HeaderTopic& topic = topicOf(name, &recording->headers);
       topic.messages.push_back(*rio_t::read<std_msgs::Header>(instance));
@@ -94,7 +94,7 @@ Recording readRecording(const std::string& path, const CheckRequest& request) {
   rosbag::View view;
   bags.addTo(&view, is_wanted, all.getBeginTime(), end);
   try {
-    readMessages(view, &recording);
+    readMessages(view, request.set, &recording);
   } catch (const std::exception& error) {
     throw bagError(path, std::string("perhaps it is damaged (") + error.what() + ")");
   }

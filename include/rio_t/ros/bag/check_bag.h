@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "rio_t/ros/parameters/parameter_value.h"
+
 namespace rio_t {
 
 /// The recording, and where to write.
@@ -11,8 +13,10 @@ struct CheckRequest {
   std::vector<std::string> bags;          ///< paths
   std::string out;                        ///< gets the configuration; empty: none
   std::string rig;                        ///< PNG with the rig drawn; empty: none
+  bool overwrite = false;                 ///< whether files that are there are replaced
   std::string imu_topic;                  ///< empty: the best one
   std::vector<std::string> radar_topics;  ///< empty: all that fit
+  ParameterEntries set;                   ///< what the user knows; the cloud is read accordingly
   double duration = 120.0;                ///< [s] of each bag that are read; 0: all
   bool bags_go_away = false;              ///< they are temporary: nobody can run on them afterwards
   bool try_out = true;                    ///< whether the odometry runs on the bag with what is proposed
@@ -48,7 +52,7 @@ BagCheck checkBag(const std::string& bag, const CheckRequest& request);
 /// The report for people.
 std::string describeCheck(const BagCheck& check);
 
-/// Why the files of the request cannot be read or written; empty: they can.
+/// Why the request cannot be met; empty: it can. Throws ConfigError for parameters that are wrong.
 std::string faultOf(const CheckRequest& request);
 
 /// Checks all bags, prints the reports and writes the files. Returns the exit status: 0 ready, 1 something is
