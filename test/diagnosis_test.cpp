@@ -330,6 +330,34 @@ TEST(Diagnosis, AVagueHeadingAfterAStartInMotionIsDoubtful) {
   EXPECT_EQ(first(evidence), "none");
 }
 
+TEST(Diagnosis, AMountingThatTurnedFarIsDoubtful) {
+  Config config;
+  config.odometry.smoother.estimate_extrinsics = EstimateExtrinsics::kRotation;
+  config.odometry.smoother.extrinsics_rotation_sigma = 0.1;
+  RunEvidence evidence = goodRun();
+  evidence.radars.front().turn = {0.05, -0.29, 0.1};
+  EXPECT_EQ(first(evidence, config), "none");
+  evidence.radars.front().turn = {0.05, -0.35, 0.1};
+  EXPECT_EQ(diagnose(evidence, config).verdict, RunVerdict::kDoubtful);
+  expectSays(first(evidence, config), {"mounting_far", "by 20 deg", "3.5 times extrinsics_rotation_sigma",
+                                       "mounting_yaw_pitch_roll_deg"});
+}
+
+TEST(Diagnosis, TheTurnOfTheMountingIsThatSinceTheFirstUpdate) {
+  const Config config;
+  EvidenceCollector collector(config);
+  ScanResult result;
+  result.used = result.updated = true;
+  const Eigen::Quaterniond told(Eigen::AngleAxisd(1.0, Eigen::Vector3d::UnitX()));
+  for (const double turn : {0.0, 0.2, -0.4}) {
+    result.T_IR.q_IR = Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()) * told;
+    collector.add(result);
+  }
+  const RadarInertialOdometry odometry(config.odometry);
+  const Eigen::Vector3d found = collector.evidence(odometry, std::nullopt).radars.front().turn;
+  EXPECT_LT((found - Eigen::Vector3d(0.0, 0.0, -0.4)).norm(), 1e-9) << found.transpose();
+}
+
 TEST(Diagnosis, ATrajectoryThatBeginsAnewIsNeverGood) {
   RunEvidence evidence = goodRun();
   evidence.faults["imu_clock_restart"] = 1;

@@ -21,6 +21,8 @@ constexpr double kFewScansUsed = 0.5;
 constexpr double kMostlySilent = 0.5;
 /// [rad] A heading that is off by this much leads aside by a tenth of the way.
 constexpr double kVagueHeading = 0.1;
+/// [sigma] A mounting that is given within its sigma is not that far off.
+constexpr double kFarTurned = 3.0;
 constexpr const char* kImuFaults[] = {"imu_not_usable", "imu_saturated",  "imu_gap",  "imu_out_of_order",
                                       "imu_not_finite", "imu_stamp_jump", "imu_stuck"};
 /// Scans before anything is said: two seconds at ten a second.
@@ -84,11 +86,25 @@ class RadarCauses {
     addStamps();
     addVelocities();
     addContradictions();
+    addMounting();
   }
 
  private:
   void cause(const std::string& name, double share, const std::string& text, const std::string& remedy) {
     causes_->push_back({name, text, remedy, share});
+  }
+
+  /// A mounting that was given so wrong may have another turn that fits as well, and a sigma that is too
+  /// small.
+  void addMounting() {
+    const SmootherOptions& smoother = config_.odometry.smoother;
+    const double told = smoother.extrinsics_rotation_sigma, most = radar_.turn.cwiseAbs().maxCoeff();
+    if (smoother.estimate_extrinsics == EstimateExtrinsics::kNone || most < kFarTurned * told) return;
+    cause("mounting_far", 0.2,
+          "The estimate turned the mounting" + of_ + " by " + fixedText(most * 180.0 / M_PI, 0) +
+              " deg about one axis, " + fixedText(most / told, 1) + " times extrinsics_rotation_sigma.",
+          "Compare the mounting with the platform, and set " + key_ +
+              "mounting_yaw_pitch_roll_deg to what you measure.");
   }
 
   /// A reason why scans were rejected, or gave no velocity before the start.

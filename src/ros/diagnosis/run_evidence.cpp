@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "rio_t/core/so3.h"
 #include "rio_t/odometry/body_odometry.h"
 
 namespace rio_t {
@@ -18,6 +19,7 @@ EvidenceCollector::EvidenceCollector(const Config& config)
     options_.push_back(radar.odometry.ego_velocity);
     evidence_.radars.emplace_back().name = radar.radar_name;
   }
+  first_q_IR_.resize(options_.size());
 }
 
 void EvidenceCollector::add(const ScanResult& result) {
@@ -46,6 +48,9 @@ void EvidenceCollector::add(const ScanResult& result) {
     ++radar.scans_rejected[result.rejected_because];
   }
   if (!result.updated) return;
+  std::optional<Eigen::Quaterniond>& first = first_q_IR_.at(result.scan.radar);
+  if (!first) first = result.T_IR.q_IR;
+  radar.turn = so3::log(result.T_IR.q_IR * first->conjugate());
   evidence_.heading_sigma = std::sqrt(bodyOdometry(result.state, 0.0).pose_covariance(5, 5));
   ++evidence_.windows;
   if (result.solver_termination == SolverTermination::kAtBound) ++evidence_.windows_at_bound;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
 #include <map>
@@ -31,6 +32,8 @@ struct RadarEvidence {
   std::uint64_t points = 0;              ///< of all scans
   std::array<std::uint64_t, kPointVerdicts> points_by_verdict = {};
   double snr_sum_db = 0.0;  ///< over `points`
+  /// [rad] By how much the estimate has turned the radar since the first scan used, about each axis of I.
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero();
 };
 
 /// The stamps of the IMU jumped, or left a gap that is too long to bridge: "imu_clock_restart".
@@ -83,8 +86,9 @@ class EvidenceCollector {
                        const std::optional<RadarInertialOdometry::Start>& start) const;
 
  private:
-  std::vector<EgoVelocityOptions> options_;  // by RadarScan::radar
-  double coasting_after_, max_bridged_gap_;  // [s]
+  std::vector<EgoVelocityOptions> options_;                    // by RadarScan::radar
+  std::vector<std::optional<Eigen::Quaterniond>> first_q_IR_;  // likewise
+  double coasting_after_, max_bridged_gap_;                    // [s]
   std::optional<Time> first_imu_, newest_state_;
   Time last_used_;  // scan, or the start
   RunEvidence evidence_;
