@@ -45,7 +45,8 @@ struct Arguments {
 
 void addOptions(rio_t::OptionSet& options, Arguments& a) {
   rio_t::CheckRequest& r = a.request;
-  options.values("bag", "BAG", "a bag; `--bag` may be left out; each bag is looked at by itself",
+  options.values("bag", "BAG",
+                 "a bag; `--bag` may be left out; bags that follow one another are one recording",
                  [&r](const std::string& bag) { r.bags.push_back(bag); });
   options.positional("bag");
   options.text("out", "FILE.yaml", "gets the configuration; without it, it is printed", r.out);

@@ -1,6 +1,7 @@
 #include "rio_t/ros/bag/check_bag.h"
 
 #include <algorithm>
+#include <boost/algorithm/string/join.hpp>
 #include <set>
 #include <utility>
 
@@ -39,7 +40,7 @@ ImuInspection chooseImu(const Recording& recording, BagCheck* check) {
 }
 
 std::string header(const Recording& recording) {
-  return "Written by rio_t check_bag from " + oneLine(recording.bag) +
+  return "Written by rio_t check_bag from " + oneLine(boost::algorithm::join(recording.bags, ", ")) +
          ".\nIt has the keys that differ from the defaults; config/estimator.yaml lists all."
          "\nRun: rosrun rio_t rio_t_bag --bag BAG --config THIS_FILE --output-dir results";
 }
@@ -108,10 +109,10 @@ std::string levelText(FindingLevel level) {
 
 }  // namespace
 
-BagCheck checkBag(const std::string& bag, const CheckRequest& request) {
+BagCheck checkBag(const std::vector<std::string>& bags, const CheckRequest& request) {
   BagCheck check;
-  check.bag = bag;
-  const Recording recording = readRecording(bag, request);
+  check.bags = bags;
+  const Recording recording = readRecording(bags, request);
   if (recording.read < recording.length)
     check.findings.push_back({FindingLevel::kOk, "bag",
                               "the first " + fixedText(recording.read, 0) + " of " +
@@ -179,7 +180,7 @@ BagCheck checkBag(const std::string& bag, const CheckRequest& request) {
 
 std::string describeCheck(const BagCheck& check) {
   constexpr std::size_t kSubject = 11, kWidth = 118;
-  std::string text = check.bag + "\n";
+  std::string text = boost::algorithm::join(check.bags, "\n") + "\n";
   for (const Finding& finding : check.findings) {
     std::string line = "  " + levelText(finding.level) + finding.subject;
     line += std::string(finding.subject.size() < kSubject ? kSubject - finding.subject.size() : 1, ' ');

@@ -75,8 +75,9 @@ int runCheck(const CheckRequest& request, std::ostream& out, std::ostream& err) 
       err << "check_bag: " << fault << "\n";
       return kExitUsage;
     }
-    for (const std::string& bag : request.bags) {
-      const BagCheck check = checkBag(bag, request);
+    const std::vector<std::vector<std::string>> recordings = recordingsOf(request.bags);
+    for (const std::vector<std::string>& bags : recordings) {
+      const BagCheck check = checkBag(bags, request);
       out << describeCheck(check) << std::flush;
       all_ready = all_ready && check.ready() && check.to_do.empty();
       if (check.ready() && (!best || check.quality > best->quality)) best = check;
@@ -85,15 +86,16 @@ int runCheck(const CheckRequest& request, std::ostream& out, std::ostream& err) 
       out << "Not ready: no configuration is written.\n";
       return kExitFailed;
     }
-    if (request.bags.size() > 1)
-      out << "The configuration is that of " << best->bag << ", which shows most.\n";
+    if (recordings.size() > 1)
+      out << "The configuration is that of " << best->bags.front() << ", which shows most.\n";
     if (request.out.empty()) {
       out << "\n" << best->yaml;
     } else {
       writeFile(request.out, best->yaml);
-      out << "Written to " << request.out << ". Next: rosrun rio_t rio_t_bag --bag "
-          << (request.bags_go_away ? "BAG" : word(best->bag)) << " --config " << word(request.out)
-          << " --output-dir results\n";
+      out << "Written to " << request.out << ". Next: rosrun rio_t rio_t_bag";
+      for (const std::string& bag : best->bags)
+        out << " --bag " << (request.bags_go_away ? "BAG" : word(bag));
+      out << " --config " << word(request.out) << " --output-dir results\n";
     }
     if (!request.rig.empty()) {
       const std::string yaml = request.out.empty() ? request.rig + ".yaml" : request.out;

@@ -100,8 +100,9 @@ void guessFormat(const std::vector<std::string>& fields, const PointCloudOverrid
         "it has no position: neither x, y, z nor azimuth, elevation, range (fields: " + proposal->fields +
         ")";
     proposal->to_do =
-        "Name the fields of the position: --set radar_field_x=FIELD, the same for y and z, or for azimuth, "
-        "elevation and range.";
+        "Name the fields of the position, each by --set: radar_field_x=FIELD, radar_field_y, radar_field_z, "
+        "or "
+        "radar_field_azimuth, radar_field_elevation, radar_field_range.";
     return;
   }
   const std::string preset = is_cartesian ? "coloradar" : "ars548_hkust";

@@ -156,7 +156,9 @@ void describeRest(ImuInspection* imu) {
                     "At rest the accelerometer shows " + fixedText(norm, 2) + " m/s^2.");
   } else {
     tell(imu, FindingLevel::kOdd, "rest",
-         "no rest in the first 10 s, so the odometry starts in motion; 3 s at rest give a better start");
+         "the IMU shows no rest in the first 10 s, so the odometry starts in motion; 3 s at rest give a "
+         "better "
+         "start. If the platform did rest, it vibrates: mount the IMU softer");
     imu->keys.set("init_mode", "motion", "There is no rest at the start.");
   }
 }
@@ -190,6 +192,10 @@ void describeNoise(ImuInspection* imu) {
            (vibration > 2.0 ? ", in motion " + fixedText(r.accel_density_median, 4) : "") + "; gyro " +
            fixedText(r.gyro_density_quiet, 5) + " rad/s/sqrt(Hz)" +
            (vibrates ? ": the frame vibrates; mount the IMU softer if you can" : ""));
+  // What is expected is no reason to doubt a run.
+  if (vibrates)
+    imu->keys.set("imu_accel_noise_density", ParameterValue{rounded(r.accel_density_median, 1e3)},
+                  "The frame vibrates: more than the default expects.");
   if (r.saturated > 0)
     tell(imu, FindingLevel::kOdd, "range",
          std::to_string(r.saturated) + " samples are at the end of the range (largest " +

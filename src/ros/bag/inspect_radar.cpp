@@ -31,7 +31,7 @@ std::string sureness(const Eigen::Vector3d& sigma) {
   if (!unknown.empty())
     appendItem(
         &text,
-        "not observed about " + unknown + ": the motion does not show it, and an upright radar is assumed",
+        "not observed about " + unknown + ": the motion does not show it, so compare it with the robot",
         "; ");
   return text;
 }
@@ -99,7 +99,8 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
          fixedText(100.0 * c.ambiguous, 0) +
              " % have the range, Doppler and SNR of another point: one echo at several directions, left out");
   if (!looked.velocities.has_elevation)
-    tell(FindingLevel::kOdd, "points", "the radar measures no elevation: z will drift");
+    tell(FindingLevel::kOdd, "points",
+         "the radar measures no elevation: z will drift, and a mounting without tilt is assumed");
 }
 
 void limitsOfCloud(const CloudReport& cloud, ProposedKeys* keys) {
@@ -132,15 +133,21 @@ void describeSign(const Looked& looked, const FormatProposal& format, RadarInspe
                     "One axis of the cloud is inverted. This sign and the mounting below stand for it.");
   } else if (search.sign == -1) {
     radar->findings.push_back({FindingLevel::kOdd, "Doppler",
-                               field + " is positive for approaching targets, as " + evidence + " show"});
+                               field + " is positive for approaching targets, shown by " + evidence});
     radar->keys.set("radar_doppler_sign", ParameterValue{std::int64_t{-1}},
                     field + " is positive for approaching targets.");
   } else {
     radar->findings.push_back(
         {FindingLevel::kOk, "Doppler",
          field + " is positive for receding targets" +
-             (evidence.empty() ? " (assumed: the motion does not show it)" : ", as " + evidence + " show")});
+             (evidence.empty() ? " (assumed: the motion does not show it)" : ", shown by " + evidence)});
   }
+}
+
+/// A radar without elevation hardly shows its tilt, and most of them are mounted level.
+Eigen::Quaterniond levelled(const Eigen::Quaterniond& q_IR) {
+  const double roll = std::abs(mountingOf(q_IR).roll) > 0.5 * kStraight ? kStraight : 0.0;
+  return rotationOf({mountingOf(q_IR).yaw, 0.0, roll});
 }
 
 /// The 24 turns in words: where the axes of the radar point.
@@ -255,6 +262,10 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   const bool mirrored = looked.search.mirrored || (looked.sign.sign == 0 && looked.search.sign == -1);
   if (correctAxes(looked.cloud, mirrored, told, &format))
     looked = look(recording, imu, cloud, stamps, format.format, track);
+  const std::optional<Eigen::Vector3d> up = upOf(imu.report);
+  constexpr double kUpright = 0.9;  // cosine: z of the IMU is up, as the words for a mounting have it
+  if (!looked.velocities.has_elevation && looked.search.enough && up && up->z() > kUpright)
+    looked.search.q_IR = levelled(looked.search.q_IR);
   radar.usable = true;
   radar.search = looked.search;
   radar.points = looked.cloud.points_50;

@@ -8,10 +8,12 @@
 #include <boost/algorithm/cxx11/any_of.hpp>
 #include <iterator>
 #include <set>
+#include <utility>
 
 #include "bag_file.h"
 #include "bag_frames.h"
 #include "inspect_format.h"
+#include "rio_t/imu/input_check.h"
 #include "rio_t/ros/messages/conversions.h"
 
 namespace rio_t {
@@ -68,14 +70,40 @@ void readMessages(rosbag::View& view, const ParameterEntries& told, Recording* r
 
 }  // namespace
 
-Recording readRecording(const std::string& path, const CheckRequest& request) {
+std::vector<std::vector<std::string>> recordingsOf(std::vector<std::string> paths) {
+  struct Part {
+    std::string path;
+    ros::Time begin, end;
+  };
+  std::vector<Part> parts;
+  for (std::string& path : paths) {
+    const Bags bag({path});
+    rosbag::View all;
+    bag.addTo(&all, everyTopic);
+    if (all.size() == 0) throw bagError(path, "it holds no messages");
+    parts.push_back({std::move(path), all.getBeginTime(), all.getEndTime()});
+  }
+  std::stable_sort(parts.begin(), parts.end(),
+                   [](const Part& a, const Part& b) { return a.begin < b.begin; });
+  const double largest_gap = ImuInputCheckOptions().max_bridged_gap;
+  std::vector<std::vector<std::string>> recordings;
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    const bool follows = k > 0 && parts[k].begin >= parts[k - 1].end &&
+                         (parts[k].begin - parts[k - 1].end).toSec() <= largest_gap;
+    if (!follows) recordings.emplace_back();
+    recordings.back().push_back(parts[k].path);
+  }
+  return recordings;
+}
+
+Recording readRecording(const std::vector<std::string>& paths, const CheckRequest& request) {
   Recording recording;
-  recording.bag = path;
-  const Bags bags({path});
+  recording.bags = paths;
+  const Bags bags(paths);
   recording.types = bags.typesByTopic();
   rosbag::View all;
   bags.addTo(&all, everyTopic);
-  if (all.size() == 0) throw bagError(path, "it holds no messages");
+  if (all.size() == 0) throw bagError(bags.name(), "it holds no messages");
   recording.length = (all.getEndTime() - all.getBeginTime()).toSec();
   recording.read = request.duration > 0.0 ? std::min(request.duration, recording.length) : recording.length;
   const ros::Time end = recording.read < recording.length ? all.getBeginTime() + ros::Duration(recording.read)
@@ -96,7 +124,7 @@ Recording readRecording(const std::string& path, const CheckRequest& request) {
   try {
     readMessages(view, request.set, &recording);
   } catch (const std::exception& error) {
-    throw bagError(path, std::string("perhaps it is damaged (") + error.what() + ")");
+    throw bagError(bags.name(), std::string("perhaps it is damaged (") + error.what() + ")");
   }
   return recording;
 }

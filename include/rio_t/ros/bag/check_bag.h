@@ -35,9 +35,9 @@ struct Finding {
   std::string text;     ///< one sentence, or phrases
 };
 
-/// The findings about one bag, and the configuration for it.
+/// The findings about one recording, and the configuration for it.
 struct BagCheck {
-  std::string bag;
+  std::vector<std::string> bags;  ///< its parts
   std::vector<Finding> findings;
   std::string to_do;     ///< one sentence if something is missing
   std::string yaml;      ///< the configuration; empty if the odometry cannot run
@@ -46,8 +46,12 @@ struct BagCheck {
   bool ready() const { return !yaml.empty(); }
 };
 
-/// Looks at one bag of `request`. Throws std::runtime_error for a bag that cannot be read.
-BagCheck checkBag(const std::string& bag, const CheckRequest& request);
+/// Bags that follow one another, as `rosbag record --split` makes them, are the parts of one recording, in
+/// the order of time. Throws std::runtime_error for a bag that cannot be read.
+std::vector<std::vector<std::string>> recordingsOf(std::vector<std::string> bags);
+
+/// Looks at one recording as `request` says. Throws std::runtime_error for a bag that cannot be read.
+BagCheck checkBag(const std::vector<std::string>& bags, const CheckRequest& request);
 
 /// The report for people.
 std::string describeCheck(const BagCheck& check);
