@@ -44,8 +44,8 @@ def test_ambiguous_points_do_no_harm(simulate, programs_folder, tmp_path):
     def mean_error(*options):
         errors = []
         for seed in (1, 2):
-            simulate("--preset", "kart", "--seed", seed, "--time-offset", 0.03, "--ground-truth", tmp_path / "truth.txt", "--overwrite",
-                     *options)
+            simulate("--preset", "kart", "--seed", seed, "--time-offset", 0.03, "--ground-truth", tmp_path / "truth.txt",
+                     "--overwrite", *options)
             programs.output_of(programs_folder / "rio_t_bag", "--bag", tmp_path / "simulated.bag", "--config", "sparse",
                                "--output-dir", tmp_path / "run", "--set", f"ground_truth={tmp_path / 'truth.txt'}")
             errors.append(run_folder.read_yaml(tmp_path / "run/summary.yaml")["ate_m"])

@@ -108,7 +108,8 @@ def main(arguments):
     parser.add_argument("--config", required=True, metavar="NAME_OR_PATH",
                         help="a configuration, as for rio_t_bag")
     parser.add_argument("--out", required=True, type=pathlib.Path, metavar="FILE.png", help="gets the drawing")
-    parser.add_argument("--overwrite", action="store_true", help="replace a file that is there; without it it is refused")
+    parser.add_argument("--overwrite", action="store_true",
+                        help="replace a file that is there; without it, it is refused")
     parser.add_argument("--programs", type=pathlib.Path, metavar="FOLDER", help="folder that holds rio_t_bag")
     given = parser.parse_args(arguments)
     try:

@@ -61,7 +61,7 @@ void addOptions(rio_t::OptionSet& options, Arguments& a) {
       "a parameter that you know, such as a field of the cloud; it goes into the configuration; may be "
       "repeated",
       [&r](const std::string& text) { r.set.push_back(rio_t::parseAssignment(text)); });
-  options.value("duration", "S", "seconds to read of each bag (0: all), or to listen with --live",
+  options.value("duration", "S", "seconds to read of each recording (0: all), or to listen with --live",
                 "120; 30 live", [&a](const std::string& text) {
                   a.duration = rio_t::parseNumber(text, rio_t::NumberRange::kNotNegative);
                 });

@@ -291,7 +291,7 @@ void addBagOptions(OptionSet& options, std::vector<std::string>& bags, std::stri
 }
 
 void addOverwrite(OptionSet& options, bool& overwrite) {
-  options.flag("overwrite", "replace files that are there; without it they are refused", overwrite);
+  options.flag("overwrite", "replace files that are there; without it, they are refused", overwrite);
 }
 
 bool isSameFile(const std::string& a, const std::string& b) {
