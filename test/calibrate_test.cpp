@@ -72,10 +72,15 @@ class Calibrate : public RestBag {
   /// The bag with the mounting told wrong.
   Outcome calibrateBags(const std::vector<std::string>& bags,
                         const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> words = {"--config", "irs",
-                                      "--out",    yaml_,
-                                      "--set",    "extrinsics_rotation_xyzw=" + listText(told_.q_IR.coeffs()),
-                                      "--set",    "extrinsics_translation=" + listText(told_.l_I)};
+    std::vector<std::string> words = {"--config",
+                                      "irs",
+                                      "--out",
+                                      yaml_,
+                                      "--overwrite",
+                                      "--set",
+                                      "extrinsics_rotation_xyzw=" + listText(told_.q_IR.coeffs()),
+                                      "--set",
+                                      "extrinsics_translation=" + listText(told_.l_I)};
     for (const std::string& bag : bags) words.insert(words.end(), {"--bag", bag});
     words.insert(words.end(), more.begin(), more.end());
     return runCalibrate(words);
@@ -329,6 +334,9 @@ TEST_F(Calibrate, WhatIsWrongIsNamedBeforeTheWork) {
           {"extrinsics_source"});
   EXPECT_EQ(contents(own), "radar_format: irs\n");
   EXPECT_FALSE(fs::exists(yaml_));
+  std::ofstream(yaml_) << "# mine\n";
+  refused({"--bag", bag_, "--config", own, "--out", yaml_}, {"--out " + yaml_, "exists", "--overwrite"});
+  EXPECT_EQ(contents(yaml_), "# mine\n");
 }
 
 TEST_F(Calibrate, HelpSaysWhatItDoes) {

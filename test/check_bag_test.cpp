@@ -19,6 +19,7 @@
 
 #include "../src/ros/bag/inspect_recording.h"
 #include "plain_bag.h"
+#include "rio_t/radar/mounting.h"
 #include "rio_t/ros/bag/bag_runner.h"
 #include "rio_t/ros/bag/simulation_bag.h"
 #include "rio_t/ros/parameters/parameters.h"
@@ -75,7 +76,7 @@ TEST_F(CheckBag, AGyroBesideTheImuIsNotTakenForIt) {
   expectRuns(odd);
   CheckRequest request;
   request.imu_topic = "/camera/gyro/sample";
-  const BagCheck asked = checkBag(bag, request);
+  const BagCheck asked = checkBag({bag}, request);
   expectLine(asked, FindingLevel::kMissing, {"gravity is missing"});
 }
 
@@ -154,7 +155,7 @@ sensor_msgs::PointCloud2 lidarCloud() {
 
 TEST_F(CheckBag, CloudsOfALidarAreNotKeptButNamed) {
   const std::string bag = withTopic("lidar", "/lidar/points", 10.0, lidarCloud());
-  const Recording recording = readRecording(bag, {});
+  const Recording recording = readRecording({bag}, {});
   ASSERT_EQ(recording.clouds.size(), 2u);
   for (const CloudTopic& topic : recording.clouds) {
     if (topic.topic == "/lidar/points") {
@@ -174,11 +175,11 @@ TEST_F(CheckBag, OnlyTopicsThatAreAskedForAreRead) {
   request.imu_topic = "/sensor_platform/imu";
   request.radar_topics = {"/sensor_platform/radar/scan"};
   const Recording lidar =
-      readRecording(withTopic("asked_lidar", "/lidar/points", 10.0, lidarCloud()), request);
+      readRecording({withTopic("asked_lidar", "/lidar/points", 10.0, lidarCloud())}, request);
   ASSERT_EQ(lidar.clouds.size(), 1u);
   EXPECT_EQ(lidar.clouds.front().topic, request.radar_topics.front());
   const Recording imus =
-      readRecording(withTopic("asked_imu", "/camera/imu", 200.0, sensor_msgs::Imu()), request);
+      readRecording({withTopic("asked_imu", "/camera/imu", 200.0, sensor_msgs::Imu())}, request);
   ASSERT_EQ(imus.imus.size(), 1u);
   EXPECT_EQ(imus.imus.front().topic, request.imu_topic);
 }
@@ -187,7 +188,7 @@ TEST_F(CheckBag, ATopicMayBeRelative) {
   CheckRequest request;
   request.imu_topic = "sensor_platform/imu";
   request.radar_topics = {"sensor_platform/radar/scan"};
-  const Recording recording = readRecording(bag_, request);
+  const Recording recording = readRecording({bag_}, request);
   EXPECT_EQ(recording.imus.size(), 1u);
   EXPECT_EQ(recording.clouds.size(), 1u);
 }
@@ -195,12 +196,12 @@ TEST_F(CheckBag, ATopicMayBeRelative) {
 TEST_F(CheckBag, ATopicThatIsNotThereIsToBeChosenAnew) {
   CheckRequest request;
   request.imu_topic = "/imu";
-  const BagCheck imu = checkBag(bag_, request);
+  const BagCheck imu = checkBag({bag_}, request);
   expectLine(imu, FindingLevel::kMissing, {"no topic /imu", "/sensor_platform/imu (sensor_msgs/Imu)"});
   EXPECT_NE(imu.to_do.find("with --imu-topic"), std::string::npos) << imu.to_do;
   request.imu_topic = "";
   request.radar_topics = {"/scan"};
-  const BagCheck radar = checkBag(bag_, request);
+  const BagCheck radar = checkBag({bag_}, request);
   expectLine(radar, FindingLevel::kMissing, {"no topic /scan", "/sensor_platform/radar/scan"});
   EXPECT_NE(radar.to_do.find("with --radar-topic"), std::string::npos) << radar.to_do;
 }
@@ -255,6 +256,32 @@ TEST_F(CheckBag, ATrialRunThatIsBadSaysWhy) {
   EXPECT_EQ(runCheck(request, out, err), 1) << out.str();
 }
 
+TEST_F(CheckBag, ABagOfAFrameThatVibratesRunsWell) {
+  const double vibration = setup_.imu.accel_vibration;
+  setup_.imu.accel_vibration = 2.0;  // [m/s^2]
+  const std::string bag = folder_ + "/vibrates.bag";
+  write("medium", 50.0, BagFormat::kIrs, bag);
+  setup_.imu.accel_vibration = vibration;
+  const BagCheck odd = check(bag);
+  expectLine(odd, FindingLevel::kOdd, {"noise", "the frame vibrates"});
+  EXPECT_EQ(run(odd).diagnosis.verdict, RunVerdict::kGood) << odd.yaml;
+}
+
+TEST_F(CheckBag, ARadarWithoutElevationIsFoundAndTakenToBeLevel) {
+  const simulation::SimulationOptions before = setup_;
+  setup_.radar.measures_elevation = false;
+  setup_.radar.fov_elevation = 5.0;
+  setup_.T_IR.q_IR = rotationOf({30.0 * kDegree, 0.0, 0.0});
+  const std::string bag = folder_ + "/flat.bag";
+  write("ground_vehicle", 50.0, BagFormat::kIrs, bag);
+  const BagCheck odd = check(bag, false);
+  const double turn = turnFromTruth(odd);
+  setup_ = before;
+  expectLine(odd, FindingLevel::kOdd, {"points", "no elevation", "without tilt"});
+  expectLine(odd, FindingLevel::kOdd, {"mounting", "pitch 0.0, roll 0.0"});
+  EXPECT_LT(turn, 5.0) << describeCheck(odd);
+}
+
 TEST_F(CheckBag, ExitStatusAndFiles) {
   CheckRequest request;
   std::ostringstream out, err;
@@ -273,6 +300,45 @@ TEST_F(CheckBag, ExitStatusAndFiles) {
   bag_run.bags = {bag_};
   bag_run.config = makeConfig(readParameterFile(request.out));
   EXPECT_EQ(runBag(bag_run).divergences, 0u);
+}
+
+TEST_F(CheckBag, AnEditedConfigurationIsReplacedOnlyIfToldTo) {
+  CheckRequest request;
+  request.bags = {bag_};
+  request.try_out = false;
+  request.out = folder_ + "/edited.yaml";
+  std::ofstream(request.out) << "# mine\n";
+  std::ostringstream out, err;
+  EXPECT_EQ(runCheck(request, out, err), 2);
+  EXPECT_EQ(err.str(), "check_bag: --out " + request.out +
+                           ": this file exists; choose another name, or replace it with --overwrite\n");
+  EXPECT_EQ(contents(request.out), "# mine\n");
+  request.overwrite = true;
+  EXPECT_EQ(runCheck(request, out, err), 0) << err.str();
+  EXPECT_NE(contents(request.out), "# mine\n");
+}
+
+TEST_F(CheckBag, PartsOfOneRecordingAreReadAsOne) {
+  const std::string first = folder_ + "/part_0.bag", second = folder_ + "/part_1.bag";
+  {
+    const rosbag::Bag in(bag_);
+    rosbag::Bag a(first, rosbag::bagmode::Write), b(second, rosbag::bagmode::Write);
+    rosbag::View view(in);
+    const ros::Time middle = view.getBeginTime() + ros::Duration(25.0);
+    for (const rosbag::MessageInstance& instance : view)
+      (instance.getTime() < middle ? a : b).write(instance.getTopic(), instance.getTime(), instance);
+  }
+  using Parts = std::vector<std::vector<std::string>>;
+  EXPECT_EQ(recordingsOf({second, first}), (Parts{{first, second}}));
+  EXPECT_EQ(recordingsOf({bag_, first}), (Parts{{bag_}, {first}})) << "they are of the same time";
+  CheckRequest request;
+  request.bags = {second, first};
+  request.out = folder_ + "/parts.yaml";
+  std::ostringstream out, err;
+  ASSERT_EQ(runCheck(request, out, err), 0) << out.str() << err.str();
+  EXPECT_NE(out.str().find("--bag " + first + " --bag " + second + " --config"), std::string::npos)
+      << out.str();
+  EXPECT_EQ(contents(request.out).find("init_mode"), std::string::npos) << "the recording begins at rest";
 }
 
 TEST_F(CheckBag, ADamagedBagIsNamed) {
@@ -302,6 +368,7 @@ TEST_F(CheckBag, TheNextCommandCanBePasted) {
   EXPECT_NE(out.str().find("--bag \"" + copy + "\" --config \"" + request.out + "\""), std::string::npos)
       << out.str();
   request.bags_go_away = true;
+  request.overwrite = true;
   EXPECT_EQ(runCheck(request, out, err), 0) << err.str();
   EXPECT_NE(out.str().find("--bag BAG --config"), std::string::npos) << out.str();
 }

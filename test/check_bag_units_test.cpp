@@ -3,10 +3,15 @@
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/PointCloud2.h>
 
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "plain_bag.h"
 #include "rio_t/imu/units.h"
@@ -131,6 +136,129 @@ TEST_F(CheckBag, FieldsThatNoPresetHasAreGuessed) {
   const BagCheck odd = check(rewritten("guessed", changes));
   expectLine(odd, FindingLevel::kOdd, {"no preset has the fields", "RangeRate"});
   expectRuns(odd);
+}
+
+/// A cloud of float32 fields with other names and values.
+void rebuild(sensor_msgs::PointCloud2& cloud, const std::vector<std::string>& names,
+             const std::function<std::vector<double>(double right, double forward, double up, double doppler,
+                                                     double snr)>& values) {
+  const sensor_msgs::PointCloud2 old = cloud;
+  cloud.fields.clear();
+  for (const std::string& name : names) {
+    sensor_msgs::PointField field;
+    field.name = name;
+    field.offset = static_cast<std::uint32_t>(4 * cloud.fields.size());
+    field.datatype = sensor_msgs::PointField::FLOAT32;
+    field.count = 1;
+    cloud.fields.push_back(field);
+  }
+  cloud.point_step = static_cast<std::uint32_t>(4 * names.size());
+  cloud.row_step = cloud.point_step * cloud.width;
+  cloud.data.assign(std::size_t{cloud.row_step} * cloud.height, 0);
+  sensor_msgs::PointCloud2 from = old;
+  for (std::size_t i = 0; i < from.width; ++i) {
+    const auto of = [&](const char* name) { return static_cast<double>(*fieldOf(from, i, name)); };
+    const std::vector<double> point = values(of("x"), of("y"), of("z"), of("v_doppler_mps"), of("snr_db"));
+    for (std::size_t k = 0; k < names.size(); ++k)
+      *fieldOf(cloud, i, names[k]) = static_cast<float>(point[k]);
+  }
+}
+
+Changes polar(double unit) {
+  Changes changes;
+  changes.cloud = [unit](sensor_msgs::PointCloud2& cloud) {
+    rebuild(cloud, {"azimuth", "elevation", "range", "velocity", "rcs"},
+            [unit](double right, double forward, double up, double doppler, double snr) {
+              const double ground = std::hypot(right, forward);
+              return std::vector<double>{std::atan2(-right, forward) / unit, std::atan2(up, ground) / unit,
+                                         std::hypot(ground, up), doppler, snr};
+            });
+    return true;
+  };
+  return changes;
+}
+
+TEST_F(CheckBag, AnglesInDegreesAreNamed) {
+  const BagCheck odd = check(rewritten("polar_degrees", polar(kDegree)), false);
+  expectLine(
+      odd, FindingLevel::kMissing,
+      {"radar", "azimuth runs from -", "elevation runs from -", "looks like degrees; expected radians"});
+  EXPECT_FALSE(odd.ready());
+  EXPECT_NE(odd.to_do.find("radians"), std::string::npos) << odd.to_do;
+  const BagCheck radians = check(rewritten("polar_radians", polar(1.0)));
+  expectRuns(radians);
+  EXPECT_LT(turnFromTruth(radians), 5.0);
+}
+
+TEST_F(CheckBag, FieldsOfAnyNameCanBeTold) {
+  Changes changes;
+  changes.cloud = [](sensor_msgs::PointCloud2& cloud) {
+    rebuild(cloud, {"pos_a", "pos_b", "pos_c", "d", "quality"},
+            [](double right, double forward, double up, double doppler, double snr) {
+              return std::vector<double>{right, forward, up, doppler, 10.0 * snr};
+            });
+    return true;
+  };
+  const std::string bag = rewritten("own_names", changes);
+  const BagCheck no_doppler = check(bag, false);
+  expectLine(no_doppler, FindingLevel::kMissing, {"no field name looks like a Doppler", "quality"});
+  EXPECT_NE(no_doppler.to_do.find("--set radar_field_doppler=FIELD"), std::string::npos) << no_doppler.to_do;
+  const BagCheck no_position = check(bag, false, {"radar_field_doppler=d"});
+  expectLine(no_position, FindingLevel::kMissing, {"it has no position", "pos_a"});
+  EXPECT_NE(no_position.to_do.find("radar_field_x=FIELD"), std::string::npos) << no_position.to_do;
+  const std::vector<std::string> told = {"radar_field_doppler=d", "radar_field_x=pos_a",
+                                         "radar_field_y=pos_b", "radar_field_z=pos_c",
+                                         "radar_field_power=quality"};
+  const BagCheck good = check(bag, true, told);
+  expectRuns(good);
+  EXPECT_LT(turnFromTruth(good), 5.0);
+  EXPECT_EQ(configOf(good).radar_overrides.power, "quality");
+  EXPECT_EQ(configOf(good).radar_overrides.power_unit, PowerUnit::kSnrDeciDb) << good.yaml;
+}
+
+TEST_F(CheckBag, WhatIsToldStandsInTheConfiguration) {
+  const BagCheck told = check(bag_, false,
+                              {"extrinsics_rotation_xyzw=[0, 0, 0, 1]", "estimate_extrinsics=none",
+                               "radar_power_unit=not_snr", "radar_min_range=0.7"});
+  ASSERT_TRUE(told.ready()) << describeCheck(told);
+  const Config config = configOf(told);
+  EXPECT_LT(config.odometry.T_IR.q_IR.angularDistance(Eigen::Quaterniond::Identity()), 1e-9) << told.yaml;
+  EXPECT_EQ(config.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kNone);
+  EXPECT_EQ(config.radar_overrides.power_unit, PowerUnit::kNotSnr);
+  EXPECT_NE(told.yaml.find("radar_min_range: 0.7"), std::string::npos) << told.yaml;
+}
+
+TEST_F(CheckBag, WhatCannotBeToldIsRefused) {
+  const auto refused = [](const std::string& assignment, int status, const std::string& part) {
+    CheckRequest request;
+    request.bags = {bag_};
+    request.set = {parseAssignment(assignment)};
+    std::ostringstream out, err;
+    EXPECT_EQ(runCheck(request, out, err), status) << assignment;
+    EXPECT_NE(err.str().find(part), std::string::npos) << err.str();
+  };
+  refused("radar_topic=/scan", 2, "expected --radar-topic");
+  refused("left/radar_field_x=X", 2, "left/radar_field_x");
+  refused("radar_feild_x=X", 1, "radar_feild_x");
+}
+
+TEST_F(CheckBag, AnImuWhoseZIsNotUpIsNamed) {
+  const BagCheck odd =
+      check(rewritten("y_up", {[](sensor_msgs::Imu& imu) {
+                        for (geometry_msgs::Vector3* v : {&imu.linear_acceleration, &imu.angular_velocity}) {
+                          const double y = v->y;
+                          v->y = v->z;
+                          v->z = -y;
+                        }
+                        return true;
+                      }}));
+  expectLine(odd, FindingLevel::kOdd,
+             {"IMU axes", "gravity is on +y", "base_link",
+              "base_extrinsics_rotation_xyzw: [0.7071, 0.0000, 0.0000, "
+              "0.7071]",
+              "docs/frames.md"});
+  expectRuns(odd);
+  EXPECT_EQ(describeCheck(check(bag_, false)).find("IMU axes"), std::string::npos);
 }
 
 TEST_F(CheckBag, PositionsInMillimetresAreOdd) {

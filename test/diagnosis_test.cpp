@@ -315,7 +315,12 @@ TEST(Diagnosis, ADivergenceForLackOfScansNamesTheLack) {
 TEST(Diagnosis, TheImuIsNamed) {
   RunEvidence evidence = goodRun();
   evidence.imu_noise.accel_density = 0.2;
-  expectSays(first(evidence), {"imu_noisy", "accelerometer 0.2 against imu_accel_noise_density 0.02"});
+  expectSays(first(evidence), {"imu_noisy", "accelerometer", "0.2 against imu_accel_noise_density 0.02"});
+  EXPECT_EQ(first(evidence).find("gyro"), std::string::npos) << "it is as configured";
+  evidence = goodRun();
+  evidence.imu_noise.gyro_density = 0.004;
+  expectSays(first(evidence), {"imu_noisy", "gyro", "0.004 against imu_gyro_noise_density 0.0002"});
+  EXPECT_EQ(first(evidence).find("accel"), std::string::npos) << "it is as configured";
   evidence = goodRun();
   evidence.input_faults["imu_saturated"] = 400;
   expectSays(first(evidence), {"imu_saturated: 400 IMU samples", "imu_accel_range"});

@@ -23,7 +23,6 @@ class TwoRadarDiagnostics : public testing::Test {
   using Status = LiveMonitor::Status;
 
   TwoRadarDiagnostics() {
-    monitor.startWith(kMountings);
     rest(session, 0, 4);  // initialised
   }
 
@@ -67,6 +66,7 @@ class TwoRadarDiagnostics : public testing::Test {
     result.result.used = result.result.updated = true;
     result.result.time_offset = offset;
     result.result.T_IR = T_IR;
+    result.result.told_T_IR = kMountings[radar];
     result.result.T_IR_covariance.diagonal().head<3>().setConstant(lever_sigma * lever_sigma);
     result.result.T_IR_covariance.diagonal().tail<3>().setConstant(turn_sigma * turn_sigma);
     result.offset_observable = true;

@@ -20,10 +20,13 @@ struct Searched {
   Eigen::Vector3d error = Eigen::Vector3d::Zero();  // [rad] about the axes of I
 };
 
-Searched searchOn(const std::string& motion, std::uint64_t seed, int doppler_sign, const Extrinsics& T_IR) {
+Searched searchOn(const std::string& motion, std::uint64_t seed, int doppler_sign, const Extrinsics& T_IR,
+                  bool measures_elevation = true) {
   SimulatedRun simulated(motion, seed, 60.0, 5.0);
   simulated.setup.T_IR = T_IR;
   simulated.setup.time_offset.constant = 0.04;
+  simulated.setup.radar.measures_elevation = measures_elevation;
+  if (!measures_elevation) simulated.setup.radar.fov_elevation = 5.0;
   const simulation::SensorData data = simulation::simulate(simulated.motion, simulated.setup);
   std::vector<RadarScan> scans;
   for (const simulation::SimulatedScan& from : data.scans) {
@@ -77,6 +80,15 @@ TEST(MountingSearch, AVehicleThatOnlyDrivesAheadSaysThatItsRollIsNotObserved) {
   EXPECT_LT(found.search.rotation_sigma.minCoeff(), 0.1);
   // An upright radar is assumed, and this one is.
   EXPECT_LT(found.error.norm(), 15.0 * kDegree);
+}
+
+TEST(MountingSearch, ARadarWithoutElevationShowsWhereItLooks) {
+  const Searched found =
+      searchOn("ground_vehicle", 1, 1, {{0.0, 0.0, 0.0}, rotationOf({0.5, 0.0, 0.0})}, false);
+  ASSERT_TRUE(found.search.enough);
+  EXPECT_LT(std::abs(found.error.z()), 3.0 * kDegree);
+  EXPECT_LT(found.search.rotation_sigma.z(), 0.1);
+  EXPECT_GT(found.search.rotation_sigma.x(), 0.3) << found.error.transpose();
 }
 
 TEST(MountingSearch, RestSaysNothing) {

@@ -82,11 +82,13 @@ class PlainBag : public testing::Test {
     return path;
   }
 
-  static BagCheck check(const std::string& bag, bool try_out = true) {
+  static BagCheck check(const std::string& bag, bool try_out = true,
+                        const std::vector<std::string>& told = {}) {
     CheckRequest request;
+    for (const std::string& assignment : told) request.set.push_back(parseAssignment(assignment));
     request.bags = {bag};
     request.try_out = try_out;
-    return checkBag(bag, request);
+    return checkBag({bag}, request);
   }
 
   static Config configOf(const BagCheck& check) {
@@ -97,7 +99,7 @@ class PlainBag : public testing::Test {
   /// Runs the odometry with what was written, as a user would.
   static RunSummary run(const BagCheck& check) {
     BagRun bag_run;
-    bag_run.bags = {check.bag};
+    bag_run.bags = check.bags;
     bag_run.config = configOf(check);
     return runBag(bag_run);
   }

@@ -59,6 +59,7 @@ EgoVelocityOptions inspectionOptions() {
   options.max_range = 1e4;
   options.min_snr_db = -1e9;
   options.max_azimuth = M_PI;
+  options.max_elevation = M_PI_2;  // the default is a hair less, and addVertical() adds points straight up
   options.max_sigma = 2.0;
   return options;
 }

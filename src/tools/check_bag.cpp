@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 const rio_t::ProgramText kText = {
     "check_bag",
-    "BAG... [--out my.yaml] [--rig rig.png]\n"
+    "BAG... [--out my.yaml] [--rig rig.png] [--set key=value]...\n"
     "--live [--duration 30] [--out my.yaml]\n",
     "Looks at the IMU and the radars of a bag: topics, rates, stamps, units, axes, sign of the Doppler. It "
     "finds the\n"
@@ -29,6 +29,7 @@ const rio_t::ProgramText kText = {
     "Record 3 s at rest, then a minute of motion with turns about all axes.",
     "rosrun rio_t check_bag run.bag --out my.yaml\n"
     "rosrun rio_t rio_t_bag run.bag --config my.yaml --output-dir results\n"
+    "rosrun rio_t check_bag run.bag --set radar_field_doppler=v --out my.yaml --overwrite\n"
     "rosrun rio_t check_bag --live --duration 60 --keep live.bag --out my.yaml\n",
     "Each line of the report begins with OK, odd (the configuration deals with it) or missing (the odometry "
     "cannot\n"
@@ -44,22 +45,29 @@ struct Arguments {
 
 void addOptions(rio_t::OptionSet& options, Arguments& a) {
   rio_t::CheckRequest& r = a.request;
-  options.values("bag", "BAG", "a bag; `--bag` may be left out; each bag is looked at by itself",
+  options.values("bag", "BAG",
+                 "a bag; `--bag` may be left out; bags that follow one another are one recording",
                  [&r](const std::string& bag) { r.bags.push_back(bag); });
   options.positional("bag");
   options.text("out", "FILE.yaml", "gets the configuration; without it, it is printed", r.out);
   options.text("rig", "FILE.png", "gets a drawing of the rig: top and side view", r.rig);
+  rio_t::addOverwrite(options, r.overwrite);
   options.text("imu-topic", "TOPIC", "the IMU; by default the one that can be used, with most samples",
                r.imu_topic);
   options.values("radar-topic", "TOPIC", "a radar; may be repeated; by default all clouds with a Doppler",
                  [&r](const std::string& topic) { r.radar_topics.push_back(topic); });
-  options.value("duration", "S", "seconds to read of each bag (0: all), or to listen with --live",
+  options.values(
+      "set", "key=value",
+      "a parameter that you know, such as a field of the cloud; it goes into the configuration; may be "
+      "repeated",
+      [&r](const std::string& text) { r.set.push_back(rio_t::parseAssignment(text)); });
+  options.value("duration", "S", "seconds to read of each recording (0: all), or to listen with --live",
                 "120; 30 live", [&a](const std::string& text) {
                   a.duration = rio_t::parseNumber(text, rio_t::NumberRange::kNotNegative);
                 });
   options.flag("no-trial", "do not run the odometry with the configuration", a.no_trial);
   options.flag("live", "listen to the running topics instead of reading a bag", a.live);
-  options.text("keep", "BAG", "with --live: keep the messages in this new bag", a.keep);
+  options.text("keep", "BAG", "with --live: keep the messages in this bag", a.keep);
 }
 
 /// A folder that is gone at the end.
@@ -84,7 +92,10 @@ class TemporaryFolder {
 
 int runLive(rio_t::CheckRequest request, double duration, const std::string& keep) {
   // Before the recording, so that a wrong path costs no time.
-  if (fs::exists(keep)) throw rio_t::UsageError("--keep " + keep + ": expected a new file, this one exists");
+  if (!keep.empty()) {
+    const std::string fault = rio_t::faultOfOutput(keep, {}, request.overwrite);
+    if (!fault.empty()) throw rio_t::UsageError("--keep " + fault);
+  }
   const TemporaryFolder folder;
   const std::string bag = keep.empty() ? (folder.path() / "live.bag").string() : keep;
   request.bags = {bag};

@@ -34,6 +34,7 @@ const ProgramText kText = {
 struct Arguments {
   std::vector<std::string> trajectories;  ///< truth first
   std::string errors_file;
+  bool overwrite = false;
   std::string time_offset;
   std::optional<double> true_offset;
   double skip = 0.0;
@@ -53,6 +54,7 @@ void addOptions(OptionSet& options, Arguments& a) {
   options.text("errors", "FILE",
                "the error of every matched pose of the one estimate goes there (first poses aligned)",
                a.errors_file);
+  addOverwrite(options, a.overwrite);
   options.text("time-offset", "FILE", "estimates of the radar's time offset: columns stamp,offset_s,sigma_s",
                a.time_offset);
   options.value("true-offset", "S", "the constant true offset [s]", "",
@@ -69,11 +71,9 @@ void check(const Arguments& arguments) {
     throw UsageError("--errors goes with exactly one estimate");
   std::vector<std::string> inputs = arguments.trajectories;
   inputs.push_back(arguments.time_offset);
-  for (const std::string& input : inputs) {
-    if (isSameFile(arguments.errors_file, input))
-      throw UsageError("--errors " + arguments.errors_file +
-                       ": expected another file than those that are read");
-  }
+  const std::string fault =
+      arguments.errors_file.empty() ? "" : faultOfOutput(arguments.errors_file, inputs, arguments.overwrite);
+  if (!fault.empty()) throw UsageError("--errors " + fault);
   if (arguments.trajectories.size() == 1)
     throw UsageError("only one trajectory given, expected GROUND_TRUTH ESTIMATE...");
   if (arguments.trajectories.empty() && arguments.time_offset.empty())

@@ -29,6 +29,7 @@ struct Request {
   std::string trajectory;
   std::string out;
   std::string ground_truth;
+  bool overwrite = false;
   double duration = 0.0;
   std::optional<double> speed;
   Preset preset;  // what is moved unless --motion or --trajectory says so
@@ -78,6 +79,7 @@ void addGeneralOptions(OptionSet& options, Request& r) {
                r.trajectory);
   options.text("out", "BAG", "bag to write", r.out);
   options.text("ground-truth", "FILE", "also write the truth as a TUM file", r.ground_truth);
+  addOverwrite(options, r.overwrite);
   options.number("ground-truth-file-rate", "HZ", "rate of that file", r.ground_truth_file_rate,
                  NumberRange::kPositive);
   options.number("ground-truth-rate", "HZ", "rate of the truth in the bag", r.bag.ground_truth_rate,
@@ -446,10 +448,12 @@ void run(Request request) {
     throw UsageError("--pressure-shock needs --barometer");
   if (isSameFile(request.ground_truth, request.out))
     throw UsageError("--ground-truth " + request.ground_truth + ": expected another file than that of --out");
-  for (const std::string& file : {request.out, request.ground_truth}) {
-    if (isSameFile(file, request.trajectory))
-      throw UsageError("--trajectory " + request.trajectory +
-                       ": expected another file than those that are written");
+  const std::vector<std::string> inputs(request.trajectory.empty() ? 0 : 1, request.trajectory);
+  for (const auto& [name, file] :
+       {std::make_pair("--out ", request.out), std::make_pair("--ground-truth ", request.ground_truth)}) {
+    if (file.empty()) continue;
+    const std::string fault = faultOfOutput(file, inputs, request.overwrite);
+    if (!fault.empty()) throw UsageError(name + fault);
   }
   request.simulation.start = Time::fromSeconds(request.start_time);
   const Motion motion = motionOf(request);

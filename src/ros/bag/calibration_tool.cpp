@@ -32,12 +32,14 @@ struct Arguments {
   std::vector<std::string> bags;
   std::string config, out, output_folder;
   ParameterEntries set;
+  bool overwrite = false;
 };
 
 void addOptions(OptionSet& options, Arguments& a) {
   addBagOptions(options, a.bags, a.config, a.set);
   options.text("out", "FILE.yaml",
                "the configuration goes there: the keys of --config and --set, with what was found", a.out);
+  addOverwrite(options, a.overwrite);
   options.text("output-dir", "FOLDER", "gets a folder for each bag with the files that rio_t_bag writes",
                a.output_folder);
 }
@@ -50,7 +52,7 @@ void checkFiles(const Arguments& arguments, const std::string& config_file) {
   }
   std::vector<std::string> inputs = arguments.bags;
   inputs.push_back(config_file);
-  const std::string fault = faultOfOutput(arguments.out, inputs);
+  const std::string fault = faultOfOutput(arguments.out, inputs, arguments.overwrite);
   if (!fault.empty()) throw std::runtime_error("--out " + fault);
 }
 

@@ -1,6 +1,7 @@
 #include "rio_t/ros/bag/check_bag.h"
 
 #include <algorithm>
+#include <boost/algorithm/string/join.hpp>
 #include <set>
 #include <utility>
 
@@ -39,7 +40,7 @@ ImuInspection chooseImu(const Recording& recording, BagCheck* check) {
 }
 
 std::string header(const Recording& recording) {
-  return "Written by rio_t check_bag from " + oneLine(recording.bag) +
+  return "Written by rio_t check_bag from " + oneLine(boost::algorithm::join(recording.bags, ", ")) +
          ".\nIt has the keys that differ from the defaults; config/estimator.yaml lists all."
          "\nRun: rosrun rio_t rio_t_bag --bag BAG --config THIS_FILE --output-dir results";
 }
@@ -108,10 +109,10 @@ std::string levelText(FindingLevel level) {
 
 }  // namespace
 
-BagCheck checkBag(const std::string& bag, const CheckRequest& request) {
+BagCheck checkBag(const std::vector<std::string>& bags, const CheckRequest& request) {
   BagCheck check;
-  check.bag = bag;
-  const Recording recording = readRecording(bag, request);
+  check.bags = bags;
+  const Recording recording = readRecording(bags, request);
   if (recording.read < recording.length)
     check.findings.push_back({FindingLevel::kOk, "bag",
                               "the first " + fixedText(recording.read, 0) + " of " +
@@ -133,9 +134,11 @@ BagCheck checkBag(const std::string& bag, const CheckRequest& request) {
     return check;
   }
   std::vector<RadarInspection> radars;
+  std::string to_do;
   for (const CloudTopic& cloud : recording.clouds) {
-    RadarInspection radar = inspectRadar(recording, imu, cloud);
+    RadarInspection radar = inspectRadar(recording, imu, cloud, request.set);
     append(radar.findings, &check.findings);
+    if (to_do.find(radar.to_do) == std::string::npos) appendItem(&to_do, radar.to_do, " ");
     if (radar.usable) radars.push_back(std::move(radar));
   }
   if (radars.empty()) {
@@ -150,7 +153,10 @@ BagCheck checkBag(const std::string& bag, const CheckRequest& request) {
               : "Record the radar, too: a point cloud with positions and Doppler.",
           &check);
     } else {
-      check.to_do = "Use a radar driver that publishes positions and Doppler as sensor_msgs/PointCloud2.";
+      check.to_do =
+          to_do.empty()
+              ? "Use a radar driver that publishes positions and Doppler as sensor_msgs/PointCloud2."
+              : to_do;
     }
     return check;
   }
@@ -162,9 +168,9 @@ BagCheck checkBag(const std::string& bag, const CheckRequest& request) {
   for (const RadarInspection& radar : radars) {
     if (radar.search.enough) check.quality += 1.0 / radar.search.rotation_sigma.norm();
   }
-  const ProposedConfig config = proposedConfig(imu, radars);
+  const ProposedConfig config = proposedConfig(imu, radars, request.set);
   if (request.try_out) {
-    chooseByTrial(recording, header(recording), config, &check);
+    chooseByTrial(recording, header(recording), config, request.set, &check);
   } else {
     check.yaml = toYaml(config, header(recording));
     readBack(check.yaml);
@@ -174,7 +180,7 @@ BagCheck checkBag(const std::string& bag, const CheckRequest& request) {
 
 std::string describeCheck(const BagCheck& check) {
   constexpr std::size_t kSubject = 11, kWidth = 118;
-  std::string text = check.bag + "\n";
+  std::string text = boost::algorithm::join(check.bags, "\n") + "\n";
   for (const Finding& finding : check.findings) {
     std::string line = "  " + levelText(finding.level) + finding.subject;
     line += std::string(finding.subject.size() < kSubject ? kSubject - finding.subject.size() : 1, ' ');

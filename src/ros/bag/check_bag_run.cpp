@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <boost/algorithm/string/replace.hpp>
 #include <boost/process.hpp>
 #include <exception>
 #include <filesystem>
@@ -7,9 +8,11 @@
 #include <ostream>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include "command_line.h"
 #include "rio_t/ros/bag/check_bag.h"
+#include "rio_t/ros/parameters/parameters.h"
 
 namespace rio_t {
 namespace {
@@ -28,7 +31,7 @@ void drawRig(const std::string& yaml, const std::string& png) {
   const std::string script = drawRigScript();
   if (script.empty()) throw std::runtime_error("--rig: the script draw_rig.py is not installed");
   namespace process = boost::process;
-  if (process::system("/usr/bin/env", "python3", script, "--config", yaml, "--out", png) != 0)
+  if (process::system("/usr/bin/env", "python3", script, "--config", yaml, "--out", png, "--overwrite") != 0)
     throw std::runtime_error("--rig " + png + ": draw_rig.py failed");
 }
 
@@ -44,25 +47,37 @@ std::string word(const std::string& path) {
 
 std::string faultOf(const CheckRequest& request) {
   if (request.bags.empty()) return "expected a bag (see --help)";
-  for (const std::string& file : {request.out, request.rig}) {
+  for (const ParameterEntry& entry : request.set) {
+    if (entry.key == "imu_topic" || entry.key == "radar_topic")
+      return "--set " + entry.key + ": expected --" +
+             boost::algorithm::replace_all_copy(entry.key, "_", "-") + ", which chooses the topic";
+    if (entry.key == "radars" || entry.key.find('/') != std::string::npos)
+      return "--set " + entry.key +
+             ": expected a key of every radar, since the bag names the radars; --radar-topic looks at one "
+             "alone";
+  }
+  makeConfig(request.set);
+  for (const auto& [name, file] :
+       {std::make_pair("--out ", request.out), std::make_pair("--rig ", request.rig)}) {
     if (file.empty()) continue;
-    const std::string fault = faultOfOutput(file, request.bags);
-    if (!fault.empty()) return fault;
+    const std::string fault = faultOfOutput(file, request.bags, request.overwrite);
+    if (!fault.empty()) return name + fault;
   }
   return "";
 }
 
 int runCheck(const CheckRequest& request, std::ostream& out, std::ostream& err) {
-  const std::string fault = faultOf(request);
-  if (!fault.empty()) {
-    err << "check_bag: " << fault << "\n";
-    return kExitUsage;
-  }
   std::optional<BagCheck> best;
   bool all_ready = true;
   try {
-    for (const std::string& bag : request.bags) {
-      const BagCheck check = checkBag(bag, request);
+    const std::string fault = faultOf(request);
+    if (!fault.empty()) {
+      err << "check_bag: " << fault << "\n";
+      return kExitUsage;
+    }
+    const std::vector<std::vector<std::string>> recordings = recordingsOf(request.bags);
+    for (const std::vector<std::string>& bags : recordings) {
+      const BagCheck check = checkBag(bags, request);
       out << describeCheck(check) << std::flush;
       all_ready = all_ready && check.ready() && check.to_do.empty();
       if (check.ready() && (!best || check.quality > best->quality)) best = check;
@@ -71,15 +86,16 @@ int runCheck(const CheckRequest& request, std::ostream& out, std::ostream& err) 
       out << "Not ready: no configuration is written.\n";
       return kExitFailed;
     }
-    if (request.bags.size() > 1)
-      out << "The configuration is that of " << best->bag << ", which shows most.\n";
+    if (recordings.size() > 1)
+      out << "The configuration is that of " << best->bags.front() << ", which shows most.\n";
     if (request.out.empty()) {
       out << "\n" << best->yaml;
     } else {
       writeFile(request.out, best->yaml);
-      out << "Written to " << request.out << ". Next: rosrun rio_t rio_t_bag --bag "
-          << (request.bags_go_away ? "BAG" : word(best->bag)) << " --config " << word(request.out)
-          << " --output-dir results\n";
+      out << "Written to " << request.out << ". Next: rosrun rio_t rio_t_bag";
+      for (const std::string& bag : best->bags)
+        out << " --bag " << (request.bags_go_away ? "BAG" : word(bag));
+      out << " --config " << word(request.out) << " --output-dir results\n";
     }
     if (!request.rig.empty()) {
       const std::string yaml = request.out.empty() ? request.rig + ".yaml" : request.out;

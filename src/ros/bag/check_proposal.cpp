@@ -45,9 +45,31 @@ std::vector<std::string> radarNames(const std::vector<RadarInspection>& radars) 
   return names;
 }
 
+/// The keys of clouds are in `radars` already: with them the clouds were read.
+void addTold(const ParameterEntries& told, ProposedConfig* config) {
+  const std::vector<ParameterDescription> about = parameterDescriptions();
+  for (const ParameterEntry& entry : told) {
+    if (isCloudKey(entry.key)) continue;
+    const bool is_quaternion = entry.key == "extrinsics_rotation_xyzw";
+    const auto set = [&](ProposedKeys* keys) {
+      if (is_quaternion) keys->remove("mounting_yaw_pitch_roll_deg");
+      keys->set(entry.key, entry.value, "Given by --set.");
+    };
+    const bool of_radar = std::any_of(about.begin(), about.end(), [&](const ParameterDescription& each) {
+      return each.key == entry.key && each.of_radar;
+    });
+    if (!of_radar || config->radars.empty()) {
+      set(&config->top_level);
+      continue;
+    }
+    for (auto& [name, keys] : config->radars) set(&keys);
+  }
+}
+
 }  // namespace
 
-ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarInspection>& radars) {
+ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarInspection>& radars,
+                              const ParameterEntries& told) {
   ProposedConfig config;
   config.top_level.add(imu.keys);
   double worst = 0.0;
@@ -66,6 +88,7 @@ ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarI
                          "Standard deviation of the mounting below [rad], with a margin.");
   if (radars.size() == 1) {
     config.top_level.add(radars.front().keys);
+    addTold(told, &config);
     return config;
   }
   const std::vector<std::string> names = radarNames(radars);
@@ -73,6 +96,7 @@ ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarI
   for (const std::string& name : names) list.push_back({name});
   config.top_level.set("radars", ParameterValue{list});
   for (std::size_t k = 0; k < radars.size(); ++k) config.radars.emplace_back(names[k], radars[k].keys);
+  addTold(told, &config);
   return config;
 }
 

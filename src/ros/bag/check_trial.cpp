@@ -36,7 +36,7 @@ Trial tryOut(const Recording& recording, const std::string& yaml, double duratio
   for (const CloudTopic& cloud : recording.clouds) trial.copies += cloud.copies;
   try {
     BagRun run;
-    run.bags = {recording.bag};
+    run.bags = recording.bags;
     run.config = readBack(yaml);
     run.config.bag_duration = duration;
     trial.summary = runBag(run);
@@ -71,6 +71,15 @@ std::string offsetsText(const RunSummary& summary) {
   return text;
 }
 
+std::string verdictText(const Diagnosis& diagnosis) {
+  std::string text = "the run is " + toString(diagnosis.verdict);
+  if (diagnosis.causes.empty()) return text;
+  const Cause& cause = diagnosis.causes.front();
+  text += ": " + cause.text;
+  // The user runs check_bag already.
+  return cause.remedy.find("check_bag") == std::string::npos ? text + " " + cause.remedy : text;
+}
+
 void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
   if (!trial.failure.empty()) {
     check->findings.push_back({FindingLevel::kMissing, "trial run", trial.failure});
@@ -83,31 +92,34 @@ void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
   if (trial.good()) {
     check->findings.push_back({note.empty() ? FindingLevel::kOk : FindingLevel::kOdd, "trial run",
                                "no divergence, " + numbers + note});
+    if (s.diagnosis.verdict != RunVerdict::kGood)
+      check->findings.push_back({FindingLevel::kOdd, "trial run", verdictText(s.diagnosis)});
     return;
   }
   check->findings.push_back(
       {FindingLevel::kMissing, "trial run",
        "divergences: " + std::to_string(s.divergences) + ", at the end " + s.health_at_end + "; " + numbers});
-  std::string why = "the run is " + toString(s.diagnosis.verdict);
-  if (!s.diagnosis.causes.empty()) {
-    const Cause& cause = s.diagnosis.causes.front();
-    why += ": " + cause.text + " " + cause.remedy;
-  }
-  check->findings.push_back({FindingLevel::kOdd, "trial run", why});
+  check->findings.push_back({FindingLevel::kOdd, "trial run", verdictText(s.diagnosis)});
   check->to_do =
-      "The odometry does not run well with what the bag shows. Measure the mounting, set "
-      "mounting_yaw_pitch_roll_deg and extrinsics_translation, and see docs/your_sensors.md.";
+      "The odometry does not run well with what the bag shows. Look at the odd lines. Measure the mounting "
+      "and "
+      "give it: --set mounting_yaw_pitch_roll_deg=[YAW,PITCH,ROLL] --set extrinsics_translation=[X,Y,Z] "
+      "(docs/your_sensors.md, section 6).";
 }
 
 }  // namespace
 
 void chooseByTrial(const Recording& recording, const std::string& header, const ProposedConfig& config,
-                   BagCheck* check) {
+                   const ParameterEntries& told, BagCheck* check) {
   const double duration = recording.read < recording.length ? recording.read : 0.0;
   Trial best;
   best.failure = "not tried";
   std::string note;
   for (const Attempt& attempt : kAttempts) {
+    const bool is_told = std::any_of(told.begin(), told.end(), [&](const ParameterEntry& entry) {
+      return attempt.key != nullptr && entry.key == attempt.key;
+    });
+    if (is_told) continue;
     ProposedConfig changed = config;
     if (attempt.key != nullptr) changed.top_level.set(attempt.key, attempt.value, attempt.why);
     const std::string yaml = toYaml(changed, header);

@@ -9,8 +9,8 @@
 namespace rio_t {
 
 /// Runs the odometry on the bag and gives `check` the configuration with which it runs best: `config`, or one
-/// near it. `header`: lines for the beginning of the file.
+/// near it that leaves what the user has `told`. `header`: lines for the beginning of the file.
 void chooseByTrial(const Recording& recording, const std::string& header, const ProposedConfig& config,
-                   BagCheck* check);
+                   const ParameterEntries& told, BagCheck* check);
 
 }  // namespace rio_t

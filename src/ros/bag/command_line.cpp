@@ -283,6 +283,10 @@ void addBagOptions(OptionSet& options, std::vector<std::string>& bags, std::stri
       [&set](const std::string& text) { set.push_back(parseAssignment(text)); });
 }
 
+void addOverwrite(OptionSet& options, bool& overwrite) {
+  options.flag("overwrite", "replace files that are there; without it, they are refused", overwrite);
+}
+
 bool isSameFile(const std::string& a, const std::string& b) {
   namespace fs = std::filesystem;
   if (a.empty() || b.empty()) return false;
@@ -291,11 +295,14 @@ bool isSameFile(const std::string& a, const std::string& b) {
   return fs::weakly_canonical(fs::absolute(a)) == fs::weakly_canonical(fs::absolute(b));
 }
 
-std::string faultOfOutput(const std::string& path, const std::vector<std::string>& inputs) {
+std::string faultOfOutput(const std::string& path, const std::vector<std::string>& inputs, bool overwrite) {
   namespace fs = std::filesystem;
   for (const std::string& input : inputs)
     if (isSameFile(path, input)) return path + ": expected another file than " + input + ", which is read";
   if (fs::is_directory(path)) return path + ": expected a file, this is a folder";
+  std::error_code error;
+  if (!overwrite && fs::is_regular_file(path, error) && fs::file_size(path, error) > 0)
+    return path + ": this file exists; choose another name, or replace it with --overwrite";
   if (isWrittenInPlace(path)) return access(path.c_str(), W_OK) == 0 ? "" : path + ": cannot be written";
   const fs::path folder = fs::absolute(path).parent_path();
   if (!fs::is_directory(folder)) return path + ": there is no folder " + folder.string();

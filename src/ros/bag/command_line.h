@@ -109,6 +109,9 @@ int runProgramWith(const ProgramText& text, OptionSet& options, const std::vecto
 void addBagOptions(OptionSet& options, std::vector<std::string>& bags, std::string& config,
                    ParameterEntries& set);
 
+/// --overwrite: without it no program replaces a file.
+void addOverwrite(OptionSet& options, bool& overwrite);
+
 /// Throws UsageError that names all options which are needed and not given.
 void require(const std::vector<std::pair<std::string, bool>>& given_by_name);
 
@@ -117,8 +120,9 @@ void require(const std::vector<std::pair<std::string, bool>>& given_by_name);
 bool isSameFile(const std::string& a, const std::string& b);
 
 /// Why a program that reads `inputs` cannot write `path`; empty if it can. Programs ask before the work, so
-/// that a wrong path costs no time.
-std::string faultOfOutput(const std::string& path, const std::vector<std::string>& inputs);
+/// that a wrong path costs no time. A file that is not empty may be the work of the user: only `overwrite`
+/// replaces it.
+std::string faultOfOutput(const std::string& path, const std::vector<std::string>& inputs, bool overwrite);
 
 /// Writes the file beside `path` first, so that a program that fails leaves what was there. Writes to a link
 /// or a device as it is. Throws std::runtime_error that names the path.

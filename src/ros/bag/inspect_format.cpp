@@ -7,6 +7,7 @@
 #include <cmath>
 #include <exception>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "../text.h"
@@ -59,34 +60,57 @@ std::vector<double> valuesOf(const CloudTopic& topic, PointCloudFormat format, c
   return values;
 }
 
-/// Nobody's preset: names, one by one.
-void guessFormat(const std::vector<std::string>& fields, FormatProposal* proposal) {
-  const std::string doppler = fieldLike(fields, {"doppler", "radial_speed", "range_rate", "rangerate",
-                                                 "velocity", "vel", "speed", "v_r", "vr"});
+/// The field of that name, in capitals or not.
+std::string fieldNamed(const std::vector<std::string>& fields, const std::string& name) {
+  for (const std::string& field : fields) {
+    if (boost::algorithm::iequals(field, name)) return field;
+  }
+  return "";
+}
+
+/// Nobody's preset: names, one by one, unless the user has `told` them.
+void guessFormat(const std::vector<std::string>& fields, const PointCloudOverrides& told,
+                 FormatProposal* proposal) {
+  const auto either = [](const std::string& name, const std::string& guess) {
+    return name.empty() ? guess : name;
+  };
+  const std::string doppler =
+      either(told.doppler, fieldLike(fields, {"doppler", "radial_speed", "range_rate", "rangerate",
+                                              "velocity", "vel", "speed", "v_r", "vr"}));
   if (doppler.empty()) {
-    proposal->fault = "no field name looks like a Doppler (fields: " + proposal->fields +
-                      "); if one of them is, name it with radar_field_doppler, else use a driver that "
-                      "publishes the Doppler";
+    proposal->fault = "no field name looks like a Doppler (fields: " + proposal->fields + ")";
+    proposal->to_do =
+        "If a field holds the Doppler, name it: --set radar_field_doppler=FIELD. If none does, use a radar "
+        "driver that publishes positions and Doppler as sensor_msgs/PointCloud2.";
     return;
   }
-  const std::string azimuth = fieldLike(fields, {"azimuth"}), elevation = fieldLike(fields, {"elevation"});
-  const std::string range = fieldLike(fields, {"range", "distance"});
-  const auto has = [&](const char* name) { return boost::algorithm::any_of_equal(fields, name); };
-  const bool cartesian = has("x") && has("y") && has("z");
-  if (!cartesian && (azimuth.empty() || elevation.empty() || range.empty())) {
+  using Names = std::vector<std::pair<const char*, std::string>>;
+  const Names cartesian = {{"x", either(told.x, fieldNamed(fields, "x"))},
+                           {"y", either(told.y, fieldNamed(fields, "y"))},
+                           {"z", either(told.z, fieldNamed(fields, "z"))}};
+  const Names spherical = {{"azimuth", either(told.azimuth, fieldLike(fields, {"azimuth"}))},
+                           {"elevation", either(told.elevation, fieldLike(fields, {"elevation"}))},
+                           {"range", either(told.range, fieldLike(fields, {"range", "distance"}))}};
+  const auto complete = [](const Names& names) {
+    return std::none_of(names.begin(), names.end(), [](const auto& name) { return name.second.empty(); });
+  };
+  const bool is_cartesian = complete(cartesian) && told.coordinates != PointCoordinates::kSpherical;
+  if (!is_cartesian && !complete(spherical)) {
     proposal->fault =
         "it has no position: neither x, y, z nor azimuth, elevation, range (fields: " + proposal->fields +
-        "); set radar_field_x and the like by hand";
+        ")";
+    proposal->to_do =
+        "Name the fields of the position, each by --set: radar_field_x=FIELD, radar_field_y, radar_field_z, "
+        "or "
+        "radar_field_azimuth, radar_field_elevation, radar_field_range.";
     return;
   }
-  const std::string preset = cartesian ? "coloradar" : "ars548_hkust";
+  const std::string preset = is_cartesian ? "coloradar" : "ars548_hkust";
   proposal->keys.set("radar_format", preset,
                      "No preset has these fields; this one is near: " + proposal->fields);
   if (pointCloudPreset(preset).doppler != doppler) proposal->keys.set("radar_field_doppler", doppler);
-  if (!cartesian) {
-    if (azimuth != "azimuth") proposal->keys.set("radar_field_azimuth", azimuth);
-    if (elevation != "elevation") proposal->keys.set("radar_field_elevation", elevation);
-    if (range != "range") proposal->keys.set("radar_field_range", range);
+  for (const auto& [name, field] : is_cartesian ? cartesian : spherical) {
+    if (field != name) proposal->keys.set(std::string("radar_field_") + name, field);
   }
   const std::string power = fieldLike(fields, {"snr"});
   if (!power.empty()) {
@@ -94,7 +118,30 @@ void guessFormat(const std::vector<std::string>& fields, FormatProposal* proposa
     proposal->keys.set("radar_power_unit", "snr_db");
   }
   proposal->odd.push_back("no preset has the fields " + proposal->fields + "; " + doppler +
-                          " is taken for the Doppler");
+                          (told.doppler.empty() ? " is taken for the Doppler; if another field is, name it: "
+                                                  "--set radar_field_doppler=FIELD"
+                                                : " is the Doppler, as told"));
+}
+
+/// Names each angle whose values are too large for radians. A driver may count azimuths up to a whole turn.
+void findDegrees(const CloudTopic& topic, FormatProposal* proposal) {
+  const PointCloudFormat& format = proposal->format;
+  if (format.coordinates != PointCoordinates::kSpherical) return;
+  constexpr double kShare = 0.9;  // of the points: some drivers write nonsense into a few
+  std::string named;
+  for (const auto& [field, largest] :
+       {std::make_pair(format.azimuth, 2.0 * M_PI), std::make_pair(format.elevation, 0.5 * M_PI)}) {
+    const std::vector<double> values = valuesOf(topic, format, field);
+    const double low = quantile(values, 1.0 - kShare), high = quantile(values, kShare);
+    if (std::max(-low, high) > largest)
+      appendItem(&named,
+                 field + " runs from " + fixedText(quantile(values, 0.0), 1) + " to " +
+                     fixedText(quantile(values, 1.0), 1),
+                 " and ");
+  }
+  if (named.empty()) return;
+  proposal->fault = named + ": that looks like degrees; expected radians";
+  proposal->to_do = "Let the radar driver write angles in radians, or x, y, z in metres, and record again.";
 }
 
 void resolve(FormatProposal* proposal) {
@@ -118,7 +165,7 @@ PowerUnit unitOf(double median, PowerUnit of_preset) {
   return PowerUnit::kNotSnr;
 }
 
-void findPower(const CloudTopic& topic, FormatProposal* proposal) {
+void findPower(const CloudTopic& topic, bool unit_is_told, FormatProposal* proposal) {
   const PointCloudFormat& format = proposal->format;
   if (format.power_unit == PowerUnit::kNotSnr) {
     proposal->power = "no SNR is read";
@@ -127,7 +174,9 @@ void findPower(const CloudTopic& topic, FormatProposal* proposal) {
   const std::vector<double> values = valuesOf(topic, format, format.power);
   const double median = quantile(values, 0.5);
   const bool constant = quantile(values, 0.0) == quantile(values, 1.0);
-  const PowerUnit unit = constant ? PowerUnit::kNotSnr : unitOf(median, format.power_unit);
+  const PowerUnit unit = unit_is_told ? format.power_unit
+                         : constant   ? PowerUnit::kNotSnr
+                                      : unitOf(median, format.power_unit);
   const std::string said = "the values of " + format.power + " have the median " + fixedText(median, 1);
   if (unit != format.power_unit) {
     proposal->keys.set("radar_power_unit", toString(unit),
@@ -172,24 +221,38 @@ std::vector<RadarScan> decodeAll(const CloudTopic& topic, const PointCloudFormat
   return scans;
 }
 
-FormatProposal proposeFormat(const CloudTopic& topic) {
+bool isCloudKey(const std::string& key) {
+  static const std::set<std::string> others = {"radar_format", "radar_axes", "radar_coordinates",
+                                               "radar_power_unit", "radar_cloud_size"};
+  return boost::algorithm::starts_with(key, "radar_field_") || others.count(key) != 0;
+}
+
+FormatProposal proposeFormat(const CloudTopic& topic, const ParameterEntries& told) {
   FormatProposal proposal;
   const PointCloud2* message = example(topic);
   if (message == nullptr) {
     proposal.fault = "all of its clouds are empty";
+    proposal.to_do = "Look why the radar sees nothing, and record again.";
     return proposal;
   }
+  const PointCloudOverrides known = makeConfig(told).radar_overrides;
+  const bool format_is_told = std::any_of(
+      told.begin(), told.end(), [](const ParameterEntry& entry) { return entry.key == "radar_format"; });
   const std::vector<std::string> fields = fieldsOf(*message);
   proposal.fields = boost::algorithm::join(fields, ", ");
   proposal.fitting = fittingPresets(*message);
-  if (proposal.fitting.empty()) {
-    guessFormat(fields, &proposal);
+  if (proposal.fitting.empty() && !format_is_told) {
+    guessFormat(fields, known, &proposal);
     if (!proposal.fault.empty()) return proposal;
-  } else {
+  } else if (!format_is_told) {
     std::string why = "Fields: " + proposal.fields;
     if (proposal.fitting.size() > 1)
       why += ". These presets have them, too: " + boost::algorithm::join(proposal.fitting, ", ");
     proposal.keys.set("radar_format", proposal.fitting.front(), why);
+  }
+  if (!known.power.empty()) proposal.keys.set("radar_power_unit", "snr_db");
+  for (const ParameterEntry& entry : told) {
+    if (isCloudKey(entry.key)) proposal.keys.set(entry.key, entry.value, "Given by --set.");
   }
   resolve(&proposal);
   if ((message->width == 0 || message->height == 0) && !proposal.format.size_from_data) {
@@ -200,17 +263,24 @@ FormatProposal proposeFormat(const CloudTopic& topic) {
     decode(*message, proposal.format);
   } catch (const std::exception& error) {
     proposal.fault = error.what();
+    proposal.to_do =
+        "Correct the driver, or say with --set how the cloud is to be read (docs/your_sensors.md, section "
+        "7).";
     return proposal;
   }
-  findPower(topic, &proposal);
+  findDegrees(topic, &proposal);
+  if (!proposal.fault.empty()) return proposal;
+  findPower(topic, known.power_unit.has_value(), &proposal);
   return proposal;
 }
 
-bool correctAxes(const CloudReport& cloud, bool mirrored, FormatProposal* proposal) {
+bool correctAxes(const CloudReport& cloud, bool mirrored, const ParameterEntries& told,
+                 FormatProposal* proposal) {
   constexpr double kLooks = 0.4;  // length of the mean direction from which on a radar looks somewhere
   constexpr double kWider = 1.5;  // by which a field of view is wider in azimuth than in elevation
   PointCloudFormat& format = proposal->format;
   if (format.coordinates != PointCoordinates::kCartesian) return false;
+  if (makeConfig(told).radar_overrides.axes) return false;
   const std::array<std::string, 3> fields = {format.x, format.y, format.z};
   const Eigen::Vector3d mean = cloudFromRfu(format.axes) * cloud.mean_direction;  // along the fields
   const int forward = format.axes == PointAxes::kForwardLeftUp ? 0 : 1;

@@ -13,6 +13,7 @@ namespace rio_t {
 /// How a cloud is to be read.
 struct FormatProposal {
   std::string fault;                 ///< why it cannot be used, as one sentence; empty: it can
+  std::string to_do;                 ///< what to do about it
   std::string fields;                ///< "x, y, z, doppler"
   std::vector<std::string> fitting;  ///< presets whose fields are all there
   PointCloudFormat format;
@@ -24,13 +25,18 @@ struct FormatProposal {
 /// Whether a cloud shows what its fields hold.
 bool hasPoints(const sensor_msgs::PointCloud2& cloud);
 
-/// Chooses preset, names of fields and unit of the power from fields and values. A fault depends on the first
-/// cloud with points alone.
-FormatProposal proposeFormat(const CloudTopic& topic);
+/// Whether a key says how a cloud is read: its preset, fields, axes and units.
+bool isCloudKey(const std::string& key);
+
+/// Chooses preset, names of fields and unit of the power from fields and values. What the user has `told`
+/// comes first. Only the unit of angles needs more than the first cloud with points.
+FormatProposal proposeFormat(const CloudTopic& topic, const ParameterEntries& told);
 
 /// Turns the format so that the radar looks along the forward axis, as `cloud` shows it. `mirrored`: the axes
-/// are left-handed (see MountingSearch). Returns whether anything changed.
-bool correctAxes(const CloudReport& cloud, bool mirrored, FormatProposal* proposal);
+/// are left-handed (see MountingSearch). Axes that the user has `told` stay. Returns whether anything
+/// changed.
+bool correctAxes(const CloudReport& cloud, bool mirrored, const ParameterEntries& told,
+                 FormatProposal* proposal);
 
 /// The scans as the format reads them, without stamps. What cannot be decoded is empty.
 std::vector<RadarScan> decodeAll(const CloudTopic& topic, const PointCloudFormat& format);

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "../text.h"
@@ -9,6 +10,13 @@
 
 namespace rio_t {
 namespace {
+
+/// Up is one of the axes of the IMU, or near it: which one.
+Eigen::Vector3d nearestAxis(const Eigen::Vector3d& direction) {
+  int axis = 0;
+  direction.cwiseAbs().maxCoeff(&axis);
+  return std::copysign(1.0, direction[axis]) * Eigen::Vector3d::Unit(axis);
+}
 
 std::string axisName(const Eigen::Vector3d& direction) {
   int axis = 0;
@@ -148,9 +156,31 @@ void describeRest(ImuInspection* imu) {
                     "At rest the accelerometer shows " + fixedText(norm, 2) + " m/s^2.");
   } else {
     tell(imu, FindingLevel::kOdd, "rest",
-         "no rest in the first 10 s, so the odometry starts in motion; 3 s at rest give a better start");
+         "the IMU shows no rest in the first 10 s, so the odometry starts in motion; 3 s at rest give a "
+         "better "
+         "start. If the platform did rest, it vibrates: mount the IMU softer");
     imu->keys.set("init_mode", "motion", "There is no rest at the start.");
   }
+}
+
+/// base_link is the IMU by default, and REP-103 wants it with z up.
+void describeUp(ImuInspection* imu) {
+  const std::optional<Eigen::Vector3d> up = upOf(imu->report);
+  if (!up) return;
+  const Eigen::Vector3d axis = nearestAxis(*up);
+  if (axis.z() > 0.0) return;
+  // Half a turn about x leaves x forward.
+  const Eigen::Quaterniond q_BI = axis.z() < 0.0
+                                      ? Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0)
+                                      : Eigen::Quaterniond::FromTwoVectors(axis, Eigen::Vector3d::UnitZ());
+  std::string numbers;
+  for (const double number : q_BI.coeffs()) appendItem(&numbers, fixedText(rounded(number, 1e4), 4));
+  tell(imu, FindingLevel::kOdd, "IMU axes",
+       "gravity is on " + axisName(*up) +
+           ", so z of the IMU is not up: the odometry is right, but rviz shows base_link tilted, since it is "
+           "the "
+           "IMU by default. Give base_link by tf, or set base_extrinsics_rotation_xyzw: [" +
+           numbers + "] to make its z up (docs/frames.md)");
 }
 
 void describeNoise(ImuInspection* imu) {
@@ -162,6 +192,10 @@ void describeNoise(ImuInspection* imu) {
            (vibration > 2.0 ? ", in motion " + fixedText(r.accel_density_median, 4) : "") + "; gyro " +
            fixedText(r.gyro_density_quiet, 5) + " rad/s/sqrt(Hz)" +
            (vibrates ? ": the frame vibrates; mount the IMU softer if you can" : ""));
+  // What is expected is no reason to doubt a run.
+  if (vibrates)
+    imu->keys.set("imu_accel_noise_density", ParameterValue{rounded(r.accel_density_median, 1e3)},
+                  "The frame vibrates: more than the default expects.");
   if (r.saturated > 0)
     tell(imu, FindingLevel::kOdd, "range",
          std::to_string(r.saturated) + " samples are at the end of the range (largest " +
@@ -179,6 +213,7 @@ void describe(ImuInspection* imu) {
   }
   describeUnits(imu);
   describeRest(imu);
+  describeUp(imu);
   describeNoise(imu);
   if (r.not_finite > 0)
     tell(imu, FindingLevel::kOdd, "IMU",
@@ -186,6 +221,13 @@ void describe(ImuInspection* imu) {
 }
 
 }  // namespace
+
+std::optional<Eigen::Vector3d> upOf(const ImuReport& report) {
+  constexpr double kMostlyUp = 7.5;  // [m/s^2] length of the mean: shorter, and the IMU turns over
+  const Eigen::Vector3d up = report.rests_at_start ? report.rest_acceleration : report.mean_acceleration;
+  if (report.mean_acceleration.norm() <= kMostlyUp || up.norm() <= kMostlyUp) return std::nullopt;
+  return up.normalized();
+}
 
 std::string rateText(const StreamTiming& timing, int decimals, bool with_duplicates) {
   std::string text = fixedText(timing.rate, decimals) + " Hz";

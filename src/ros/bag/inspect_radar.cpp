@@ -31,7 +31,7 @@ std::string sureness(const Eigen::Vector3d& sigma) {
   if (!unknown.empty())
     appendItem(
         &text,
-        "not observed about " + unknown + ": the motion does not show it, and an upright radar is assumed",
+        "not observed about " + unknown + ": the motion does not show it, so compare it with the robot",
         "; ");
   return text;
 }
@@ -45,10 +45,7 @@ MountingSearchOptions searchOptions(const ImuInspection& imu, const InertialTrac
     options.rest_end = track.begin() + (imu.report.rest_begin + imu.report.rest);
     options.gravity_G = -(track.rotation(options.rest_end) * imu.report.rest_acceleration);
   }
-  constexpr double kMostlyUp = 7.5;  // [m/s^2] length of the mean: shorter, and the IMU turns over
-  const ImuReport& report = imu.report;
-  const Eigen::Vector3d up = report.rests_at_start ? report.rest_acceleration : report.mean_acceleration;
-  if (report.mean_acceleration.norm() > kMostlyUp && up.norm() > kMostlyUp) options.up_I = up.normalized();
+  options.up_I = upOf(imu.report);
   return options;
 }
 
@@ -102,7 +99,8 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
          fixedText(100.0 * c.ambiguous, 0) +
              " % have the range, Doppler and SNR of another point: one echo at several directions, left out");
   if (!looked.velocities.has_elevation)
-    tell(FindingLevel::kOdd, "points", "the radar measures no elevation: z will drift");
+    tell(FindingLevel::kOdd, "points",
+         "the radar measures no elevation: z will drift, and a mounting without tilt is assumed");
 }
 
 void limitsOfCloud(const CloudReport& cloud, ProposedKeys* keys) {
@@ -135,15 +133,21 @@ void describeSign(const Looked& looked, const FormatProposal& format, RadarInspe
                     "One axis of the cloud is inverted. This sign and the mounting below stand for it.");
   } else if (search.sign == -1) {
     radar->findings.push_back({FindingLevel::kOdd, "Doppler",
-                               field + " is positive for approaching targets, as " + evidence + " show"});
+                               field + " is positive for approaching targets, shown by " + evidence});
     radar->keys.set("radar_doppler_sign", ParameterValue{std::int64_t{-1}},
                     field + " is positive for approaching targets.");
   } else {
     radar->findings.push_back(
         {FindingLevel::kOk, "Doppler",
          field + " is positive for receding targets" +
-             (evidence.empty() ? " (assumed: the motion does not show it)" : ", as " + evidence + " show")});
+             (evidence.empty() ? " (assumed: the motion does not show it)" : ", shown by " + evidence)});
   }
+}
+
+/// A radar without elevation hardly shows its tilt, and most of them are mounted level.
+Eigen::Quaterniond levelled(const Eigen::Quaterniond& q_IR) {
+  const double roll = std::abs(mountingOf(q_IR).roll) > 0.5 * kStraight ? kStraight : 0.0;
+  return rotationOf({mountingOf(q_IR).yaw, 0.0, roll});
 }
 
 /// The 24 turns in words: where the axes of the radar point.
@@ -229,13 +233,15 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
 
 }  // namespace
 
-RadarInspection inspectRadar(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud) {
+RadarInspection inspectRadar(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud,
+                             const ParameterEntries& told) {
   RadarInspection radar;
   radar.topic = cloud.topic;
   const StreamTiming timing = inspectTiming(cloud.times);
-  FormatProposal format = proposeFormat(cloud);
+  FormatProposal format = proposeFormat(cloud, told);
   if (!format.fault.empty()) {
     radar.findings.push_back({FindingLevel::kMissing, "radar", cloud.topic + ": " + format.fault});
+    radar.to_do = format.to_do;
     return radar;
   }
   const StampProposal stamps = proposeStamps(recording, imu.times, cloud);
@@ -254,8 +260,12 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   // If the ranges say nothing, a radar that looks along another axis and a contrary sign are one fault, not
   // two: two fields are swapped.
   const bool mirrored = looked.search.mirrored || (looked.sign.sign == 0 && looked.search.sign == -1);
-  if (correctAxes(looked.cloud, mirrored, &format))
+  if (correctAxes(looked.cloud, mirrored, told, &format))
     looked = look(recording, imu, cloud, stamps, format.format, track);
+  const std::optional<Eigen::Vector3d> up = upOf(imu.report);
+  constexpr double kUpright = 0.9;  // cosine: z of the IMU is up, as the words for a mounting have it
+  if (!looked.velocities.has_elevation && looked.search.enough && up && up->z() > kUpright)
+    looked.search.q_IR = levelled(looked.search.q_IR);
   radar.usable = true;
   radar.search = looked.search;
   radar.points = looked.cloud.points_50;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,9 @@ struct ImuInspection {
 };
 ImuInspection inspectImuTopic(const ImuTopic& topic);
 
+/// Up in I, unless the IMU turns over so much that no direction is up on average.
+std::optional<Eigen::Vector3d> upOf(const ImuReport& report);
+
 /// [rad] Sigma of a turn below which the bag shows it.
 constexpr double kObservedTurn = 0.3;
 
@@ -36,6 +40,7 @@ struct RadarInspection {
   std::vector<Finding> findings;
   ProposedKeys keys;
   bool usable = false;
+  std::string to_do;  ///< what to do if it is not usable; may be empty
   MountingSearch search;
   double points = 0.0;  ///< of the median scan
 
@@ -43,6 +48,8 @@ struct RadarInspection {
   /// sigma.
   bool isSparse() const { return points < 15.0; }
 };
-RadarInspection inspectRadar(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud);
+/// The cloud is read as the user has `told`.
+RadarInspection inspectRadar(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud,
+                             const ParameterEntries& told);
 
 }  // namespace rio_t

@@ -8,10 +8,12 @@
 #include <boost/algorithm/cxx11/any_of.hpp>
 #include <iterator>
 #include <set>
+#include <utility>
 
 #include "bag_file.h"
 #include "bag_frames.h"
 #include "inspect_format.h"
+#include "rio_t/imu/input_check.h"
 #include "rio_t/ros/messages/conversions.h"
 
 namespace rio_t {
@@ -41,7 +43,7 @@ void addImu(const sensor_msgs::Imu& message, Time record, ImuTopic* topic) {
   topic->times.push_back({imu.time, record});
 }
 
-void readMessages(rosbag::View& view, Recording* recording) {
+void readMessages(rosbag::View& view, const ParameterEntries& told, Recording* recording) {
   std::set<std::string> judged, refused;  // topics with clouds
   for (const rosbag::MessageInstance& instance : view) {
     const Time record = toTime(instance.getTime());
@@ -57,7 +59,7 @@ void readMessages(rosbag::View& view, Recording* recording) {
       if (topic.messages.size() > 1 && isCopy(*topic.messages.back(), **std::prev(topic.messages.end(), 2)))
         ++topic.copies;
       const bool is_first = hasPoints(*topic.messages.back()) && judged.insert(name).second;
-      if (is_first && !proposeFormat(topic).fault.empty()) refused.insert(name);
+      if (is_first && !proposeFormat(topic, told).fault.empty()) refused.insert(name);
     } else {
       HeaderTopic& topic = topicOf(name, &recording->headers);
       topic.messages.push_back(*rio_t::read<std_msgs::Header>(instance));
@@ -68,14 +70,40 @@ void readMessages(rosbag::View& view, Recording* recording) {
 
 }  // namespace
 
-Recording readRecording(const std::string& path, const CheckRequest& request) {
+std::vector<std::vector<std::string>> recordingsOf(std::vector<std::string> paths) {
+  struct Part {
+    std::string path;
+    ros::Time begin, end;
+  };
+  std::vector<Part> parts;
+  for (std::string& path : paths) {
+    const Bags bag({path});
+    rosbag::View all;
+    bag.addTo(&all, everyTopic);
+    if (all.size() == 0) throw bagError(path, "it holds no messages");
+    parts.push_back({std::move(path), all.getBeginTime(), all.getEndTime()});
+  }
+  std::stable_sort(parts.begin(), parts.end(),
+                   [](const Part& a, const Part& b) { return a.begin < b.begin; });
+  const double largest_gap = ImuInputCheckOptions().max_bridged_gap;
+  std::vector<std::vector<std::string>> recordings;
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    const bool follows = k > 0 && parts[k].begin >= parts[k - 1].end &&
+                         (parts[k].begin - parts[k - 1].end).toSec() <= largest_gap;
+    if (!follows) recordings.emplace_back();
+    recordings.back().push_back(parts[k].path);
+  }
+  return recordings;
+}
+
+Recording readRecording(const std::vector<std::string>& paths, const CheckRequest& request) {
   Recording recording;
-  recording.bag = path;
-  const Bags bags({path});
+  recording.bags = paths;
+  const Bags bags(paths);
   recording.types = bags.typesByTopic();
   rosbag::View all;
   bags.addTo(&all, everyTopic);
-  if (all.size() == 0) throw bagError(path, "it holds no messages");
+  if (all.size() == 0) throw bagError(bags.name(), "it holds no messages");
   recording.length = (all.getEndTime() - all.getBeginTime()).toSec();
   recording.read = request.duration > 0.0 ? std::min(request.duration, recording.length) : recording.length;
   const ros::Time end = recording.read < recording.length ? all.getBeginTime() + ros::Duration(recording.read)
@@ -94,9 +122,9 @@ Recording readRecording(const std::string& path, const CheckRequest& request) {
   rosbag::View view;
   bags.addTo(&view, is_wanted, all.getBeginTime(), end);
   try {
-    readMessages(view, &recording);
+    readMessages(view, request.set, &recording);
   } catch (const std::exception& error) {
-    throw bagError(path, std::string("perhaps it is damaged (") + error.what() + ")");
+    throw bagError(bags.name(), std::string("perhaps it is damaged (") + error.what() + ")");
   }
   return recording;
 }

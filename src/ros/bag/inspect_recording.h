@@ -36,7 +36,7 @@ struct HeaderTopic {
 };
 
 struct Recording {
-  std::string bag;
+  std::vector<std::string> bags;             ///< its parts
   std::map<std::string, std::string> types;  ///< of all topics
   double length = 0.0;                       ///< [s] of the bag
   double read = 0.0;                         ///< [s] of it that was read
@@ -45,8 +45,8 @@ struct Recording {
   std::vector<HeaderTopic> headers;
 };
 
-/// Reads the topics and the seconds of a bag that `request` asks for. Throws std::runtime_error that names
-/// the bag.
-Recording readRecording(const std::string& path, const CheckRequest& request);
+/// Reads the topics and the seconds of a recording that `request` asks for. Throws std::runtime_error that
+/// names the bags.
+Recording readRecording(const std::vector<std::string>& paths, const CheckRequest& request);
 
 }  // namespace rio_t

@@ -311,13 +311,19 @@ void addImu(const RunEvidence& evidence, const Config& config, std::vector<Cause
         "Look at the cable and the driver of the IMU: an axis of its gyro fails.");
   const ImuNoise& told = config.odometry.imu_noise;
   const MeasuredImuNoise& noise = evidence.imu_noise;
-  if (!noise.isFarAbove(told)) return;
-  causes->push_back({"imu_noisy",
-                     "The IMU vibrates or is noisier than configured: accelerometer " +
-                         number(noise.accel_density) + " against imu_accel_noise_density " +
-                         number(told.accel_density) + ", gyro " + number(noise.gyro_density) +
-                         " against imu_gyro_noise_density " + number(told.gyro_density) + ".",
-                     "Mount the IMU softer, or raise these two keys.", 0.1});
+  const auto noisy = [&](const std::string& sensor, const std::string& key, double measured,
+                         const MeasuredImuNoise& alone, double configured) {
+    if (!alone.isFarAbove(told)) return;
+    causes->push_back({"imu_noisy",
+                       "The " + sensor + " vibrates or is noisier than configured: " + number(measured) +
+                           " against " + key + " " + number(configured) + ".",
+                       "Mount the IMU softer, or raise this key.", 0.1});
+  };
+  MeasuredImuNoise accel, gyro;
+  accel.accel_density = noise.accel_density;
+  gyro.gyro_density = noise.gyro_density;
+  noisy("accelerometer", "imu_accel_noise_density", noise.accel_density, accel, told.accel_density);
+  noisy("gyro", "imu_gyro_noise_density", noise.gyro_density, gyro, told.gyro_density);
 }
 
 /// After a start at rest the heading drifts, too, but only as the noise of the gyro says.

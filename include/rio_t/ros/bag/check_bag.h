@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "rio_t/ros/parameters/parameter_value.h"
+
 namespace rio_t {
 
 /// The recording, and where to write.
@@ -11,8 +13,10 @@ struct CheckRequest {
   std::vector<std::string> bags;          ///< paths
   std::string out;                        ///< gets the configuration; empty: none
   std::string rig;                        ///< PNG with the rig drawn; empty: none
+  bool overwrite = false;                 ///< whether files that are there are replaced
   std::string imu_topic;                  ///< empty: the best one
   std::vector<std::string> radar_topics;  ///< empty: all that fit
+  ParameterEntries set;                   ///< what the user knows; the cloud is read accordingly
   double duration = 120.0;                ///< [s] of each bag that are read; 0: all
   bool bags_go_away = false;              ///< they are temporary: nobody can run on them afterwards
   bool try_out = true;                    ///< whether the odometry runs on the bag with what is proposed
@@ -31,9 +35,9 @@ struct Finding {
   std::string text;     ///< one sentence, or phrases
 };
 
-/// The findings about one bag, and the configuration for it.
+/// The findings about one recording, and the configuration for it.
 struct BagCheck {
-  std::string bag;
+  std::vector<std::string> bags;  ///< its parts
   std::vector<Finding> findings;
   std::string to_do;     ///< one sentence if something is missing
   std::string yaml;      ///< the configuration; empty if the odometry cannot run
@@ -42,13 +46,17 @@ struct BagCheck {
   bool ready() const { return !yaml.empty(); }
 };
 
-/// Looks at one bag of `request`. Throws std::runtime_error for a bag that cannot be read.
-BagCheck checkBag(const std::string& bag, const CheckRequest& request);
+/// Bags that follow one another, as `rosbag record --split` makes them, are the parts of one recording, in
+/// the order of time. Throws std::runtime_error for a bag that cannot be read.
+std::vector<std::vector<std::string>> recordingsOf(std::vector<std::string> bags);
+
+/// Looks at one recording as `request` says. Throws std::runtime_error for a bag that cannot be read.
+BagCheck checkBag(const std::vector<std::string>& bags, const CheckRequest& request);
 
 /// The report for people.
 std::string describeCheck(const BagCheck& check);
 
-/// Why the files of the request cannot be read or written; empty: they can.
+/// Why the request cannot be met; empty: it can. Throws ConfigError for parameters that are wrong.
 std::string faultOf(const CheckRequest& request);
 
 /// Checks all bags, prints the reports and writes the files. Returns the exit status: 0 ready, 1 something is
