@@ -14,14 +14,13 @@ namespace {
 /// Rounding leaves some 1e-15 of a column that the rows do not determine.
 constexpr double kNothing = 1e-14;
 
-/// Rows of numbers whose length is a multiple of kPart, one after the other. Keeps its memory.
+/// Rows of numbers, one after the other. Keeps its memory.
 class Tableau {
  public:
-  static constexpr Eigen::Index kPart = 8;
-
   void reset(Eigen::Index rows, Eigen::Index columns) {
     rows_ = rows;
-    stride_ = (columns + kPart - 1) / kPart * kPart;
+    columns_ = columns;
+    stride_ = columns + kNarrow - 1;  // the last part of a row may reach beyond it, over zeros
     numbers_.assign(static_cast<std::size_t>(rows * stride_), 0.0);
   }
   Eigen::Index rows() const { return rows_; }
@@ -45,29 +44,32 @@ class Tableau {
       const double norm = std::sqrt(square);
       reflected_.front().v += pivot > 0.0 ? norm : -norm;
       const double scale = 1.0 / (norm * (norm + std::abs(pivot)));
-      // Whole parts: the columns before k are zero in these rows, and stay zero.
-      for (Eigen::Index part = k / kPart * kPart; part < stride_; part += kPart) reflect(part, scale);
+      Eigen::Index part = k + 1;
+      for (; part + kNarrow < columns_; part += kWide) reflect<kWide>(part, scale);
+      if (part < columns_) reflect<kNarrow>(part, scale);
       for (const Reflected& each : reflected_) each.row[k] = 0.0;
       row(k)[k] = pivot > 0.0 ? -norm : norm;
     }
   }
 
  private:
+  static constexpr int kWide = 8, kNarrow = 4;  ///< columns that are reflected at once
   struct Reflected {
     double* row;
     double v;  ///< of the reflection I - scale v v'
   };
 
-  /// The sums stay in registers.
+  /// Reflects some columns from `part` on. The sums stay in registers.
+  template <int Width>
   void reflect(Eigen::Index part, double scale) {
-    using Part = Eigen::Array<double, kPart, 1>;
+    using Part = Eigen::Array<double, Width, 1>;
     Part sums = Part::Zero();
     for (const Reflected& each : reflected_) sums += each.v * Eigen::Map<const Part>(each.row + part);
     sums *= scale;
     for (const Reflected& each : reflected_) Eigen::Map<Part>(each.row + part) -= each.v * sums;
   }
 
-  Eigen::Index rows_ = 0, stride_ = 0;
+  Eigen::Index rows_ = 0, columns_ = 0, stride_ = 0;
   std::vector<double> numbers_;
   std::vector<Reflected> reflected_;
 };
