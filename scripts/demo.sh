@@ -56,7 +56,7 @@ fi
 
 # From -20 ms (stamps too early) to 100 ms (late, as of a slow bus).
 offset=${RIO_T_DEMO_OFFSET:-$(awk -v r="$RANDOM" 'BEGIN { printf "%.5f", -0.02 + 0.12 * r / 32767 }')}
-"$programs/simulate" --motion difficult --time-offset "$offset" --seed 7 --out results/simulated.bag --overwrite \
+"$programs/simulate" --motion difficult --time-offset "$offset" --seed 7 --out results/simulated.bag \
   --ground-truth results/simulated.truth.txt >"$log" 2>&1 || { cat "$log" >&2; exit 1; }
 show simulated results/simulated.bag irs "$offset"
 

@@ -76,7 +76,6 @@ class Calibrate : public RestBag {
                                       "irs",
                                       "--out",
                                       yaml_,
-                                      "--overwrite",
                                       "--set",
                                       "extrinsics_rotation_xyzw=" + listText(told_.q_IR.coeffs()),
                                       "--set",
@@ -334,9 +333,6 @@ TEST_F(Calibrate, WhatIsWrongIsNamedBeforeTheWork) {
           {"extrinsics_source"});
   EXPECT_EQ(contents(own), "radar_format: irs\n");
   EXPECT_FALSE(fs::exists(yaml_));
-  std::ofstream(yaml_) << "# mine\n";
-  refused({"--bag", bag_, "--config", own, "--out", yaml_}, {"--out " + yaml_, "exists", "--overwrite"});
-  EXPECT_EQ(contents(yaml_), "# mine\n");
 }
 
 TEST_F(Calibrate, HelpSaysWhatItDoes) {

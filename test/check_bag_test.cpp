@@ -302,20 +302,20 @@ TEST_F(CheckBag, ExitStatusAndFiles) {
   EXPECT_EQ(runBag(bag_run).divergences, 0u);
 }
 
-TEST_F(CheckBag, AnEditedConfigurationIsReplacedOnlyIfToldTo) {
+TEST_F(CheckBag, AnEditedConfigurationIsKept) {
   CheckRequest request;
   request.bags = {bag_};
   request.try_out = false;
   request.out = folder_ + "/edited.yaml";
   std::ofstream(request.out) << "# mine\n";
-  std::ostringstream out, err;
-  EXPECT_EQ(runCheck(request, out, err), 2);
-  EXPECT_EQ(err.str(), "check_bag: --out " + request.out +
-                           ": this file exists; choose another name, or replace it with --overwrite\n");
-  EXPECT_EQ(contents(request.out), "# mine\n");
-  request.overwrite = true;
+  std::ostringstream out, again, err;
   EXPECT_EQ(runCheck(request, out, err), 0) << err.str();
-  EXPECT_NE(contents(request.out), "# mine\n");
+  EXPECT_NE(out.str().find("(what was there is now " + request.out + "~)"), std::string::npos) << out.str();
+  EXPECT_EQ(contents(request.out + "~"), "# mine\n");
+  // The same once more: nothing is replaced, and the older one stays.
+  EXPECT_EQ(runCheck(request, again, err), 0) << err.str();
+  EXPECT_EQ(again.str().find("what was there"), std::string::npos) << again.str();
+  EXPECT_EQ(contents(request.out + "~"), "# mine\n");
 }
 
 TEST_F(CheckBag, PartsOfOneRecordingAreReadAsOne) {
@@ -368,7 +368,6 @@ TEST_F(CheckBag, TheNextCommandCanBePasted) {
   EXPECT_NE(out.str().find("--bag \"" + copy + "\" --config \"" + request.out + "\""), std::string::npos)
       << out.str();
   request.bags_go_away = true;
-  request.overwrite = true;
   EXPECT_EQ(runCheck(request, out, err), 0) << err.str();
   EXPECT_NE(out.str().find("--bag BAG --config"), std::string::npos) << out.str();
 }

@@ -162,26 +162,23 @@ TEST(OutputFile, ALinkStaysALink) {
   const std::string file = temporary.path() + "/a.yaml", link = temporary.path() + "/link.yaml";
   writeFile(file, "old");
   std::filesystem::create_symlink(file, link);
-  EXPECT_EQ(faultOfOutput(link, {}, true), "");
+  EXPECT_EQ(faultOfOutput(link, {}), "");
   writeFile(link, "new");
   EXPECT_EQ(contentOf(file), "new");
   EXPECT_TRUE(std::filesystem::is_symlink(link));
 }
 
-TEST(OutputFile, WorkOfTheUserIsReplacedOnlyIfToldTo) {
+TEST(OutputFile, AnotherContentIsKept) {
   const TemporaryFolder temporary;
   const std::string file = temporary.path() + "/a.yaml", link = temporary.path() + "/link.yaml";
-  EXPECT_EQ(faultOfOutput(file, {}, false), "");
-  std::ofstream(file).close();
-  EXPECT_EQ(faultOfOutput(file, {}, false), "") << "mktemp makes an empty file";
-  writeFile(file, "mine");
+  EXPECT_EQ(writeFile(file, "mine"), "");
+  EXPECT_EQ(writeFile(file, "mine"), "");
+  EXPECT_EQ(writeFile(file, "new"), file + "~");
+  EXPECT_EQ(contentOf(file + "~"), "mine");
   std::filesystem::create_symlink(file, link);
-  for (const std::string& path : {file, link}) {
-    EXPECT_EQ(faultOfOutput(path, {}, false),
-              path + ": this file exists; choose another name, or replace it with --overwrite");
-    EXPECT_EQ(faultOfOutput(path, {}, true), "");
-  }
-  EXPECT_EQ(faultOfOutput("/dev/null", {}, false), "");
+  EXPECT_EQ(writeFile(link, "newer"), link + "~");
+  EXPECT_EQ(contentOf(link + "~"), "new");
+  EXPECT_EQ(writeFile("/dev/null", "text"), "");
 }
 
 TEST(OutputFile, WhatCannotBeWrittenIsKnownBeforeTheWork) {
@@ -190,12 +187,12 @@ TEST(OutputFile, WhatCannotBeWrittenIsKnownBeforeTheWork) {
   const auto expectFault = [](const std::string& fault, const std::string& part) {
     EXPECT_NE(fault.find(part), std::string::npos) << fault;
   };
-  EXPECT_EQ(faultOfOutput(file, {temporary.path() + "/b.yaml"}, false), "");
-  expectFault(faultOfOutput(file, {temporary.path() + "/./a.yaml"}, true), "expected another file");
-  expectFault(faultOfOutput(temporary.path(), {}, true), "this is a folder");
-  expectFault(faultOfOutput(temporary.path() + "/none/a.yaml", {}, false), "there is no folder");
+  EXPECT_EQ(faultOfOutput(file, {temporary.path() + "/b.yaml"}), "");
+  expectFault(faultOfOutput(file, {temporary.path() + "/./a.yaml"}), "expected another file");
+  expectFault(faultOfOutput(temporary.path(), {}), "this is a folder");
+  expectFault(faultOfOutput(temporary.path() + "/none/a.yaml", {}), "there is no folder");
   std::filesystem::permissions(temporary.path(), std::filesystem::perms::owner_read);
-  const std::string fault = faultOfOutput(file, {}, false);
+  const std::string fault = faultOfOutput(file, {});
   std::filesystem::permissions(temporary.path(), std::filesystem::perms::owner_all);
   if (geteuid() != 0) expectFault(fault, temporary.path() + " cannot be written");  // root writes anywhere
 }

@@ -45,7 +45,7 @@ def test_ambiguous_points_do_no_harm(simulate, programs_folder, tmp_path):
         errors = []
         for seed in (1, 2):
             simulate("--preset", "kart", "--seed", seed, "--time-offset", 0.03, "--ground-truth", tmp_path / "truth.txt",
-                     "--overwrite", *options)
+                     *options)
             programs.output_of(programs_folder / "rio_t_bag", "--bag", tmp_path / "simulated.bag", "--config", "sparse",
                                "--output-dir", tmp_path / "run", "--set", f"ground_truth={tmp_path / 'truth.txt'}")
             errors.append(run_folder.read_yaml(tmp_path / "run/summary.yaml")["ate_m"])
@@ -65,21 +65,6 @@ def test_no_program_overwrites_what_it_reads(simulate, programs_folder, simulate
     done = programs.run(programs_folder / "evaluate", simulated_run / "truth.txt", trajectory, "--errors", trajectory)
     assert done.returncode == 2 and "--errors" in done.stderr
     assert trajectory.read_bytes() == (simulated_run / "truth.txt").read_bytes()
-
-
-def test_a_file_is_replaced_only_if_told_to(programs_folder, simulated_run, tmp_path):
-    mine, truth = tmp_path / "mine.txt", simulated_run / "truth.txt"
-    simulate = ("simulate", "--motion", "easy", "--duration", 25)
-    for option, words in (("--out", simulate), ("--ground-truth", (*simulate, "--out", tmp_path / "a.bag")),
-                          ("--errors", ("evaluate", truth, truth))):
-        mine.write_text("mine")
-        words = (programs_folder / words[0], *words[1:], option, mine)
-        done = programs.run(*words)
-        assert done.returncode == 2
-        assert f"{option} {mine}: this file exists; choose another name, or replace it with --overwrite" in done.stderr
-        assert mine.read_text() == "mine"
-        assert programs.run(*words, "--overwrite").returncode == 0
-        assert mine.read_bytes() != b"mine"
 
 
 RADARS = ("--motion", "easy", "--duration", "25", "--radar")

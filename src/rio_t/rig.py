@@ -108,15 +108,11 @@ def main(arguments):
     parser.add_argument("--config", required=True, metavar="NAME_OR_PATH",
                         help="a configuration, as for rio_t_bag")
     parser.add_argument("--out", required=True, type=pathlib.Path, metavar="FILE.png", help="gets the drawing")
-    parser.add_argument("--overwrite", action="store_true",
-                        help="replace a file that is there; without it, it is refused")
     parser.add_argument("--programs", type=pathlib.Path, metavar="FOLDER", help="folder that holds rio_t_bag")
     given = parser.parse_args(arguments)
     try:
         if not given.out.parent.is_dir():
             raise RioTError(f"--out {given.out}: there is no folder {given.out.parent}")
-        if not given.overwrite and given.out.is_file() and given.out.stat().st_size > 0:
-            raise RioTError(f"--out {given.out}: this file exists; choose another name, or replace it with --overwrite")
         folder = programs.find(["rio_t_bag"], "--programs", given.programs)
         draw(radars_of(read_config(folder, given.config)), given.out)
     except (RioTError, OSError, ValueError, KeyError) as error:

@@ -29,7 +29,7 @@ const rio_t::ProgramText kText = {
     "Record 3 s at rest, then a minute of motion with turns about all axes.",
     "rosrun rio_t check_bag run.bag --out my.yaml\n"
     "rosrun rio_t rio_t_bag run.bag --config my.yaml --output-dir results\n"
-    "rosrun rio_t check_bag run.bag --set radar_field_doppler=v --out my.yaml --overwrite\n"
+    "rosrun rio_t check_bag run.bag --set radar_field_doppler=v --out my.yaml\n"
     "rosrun rio_t check_bag --live --duration 60 --keep live.bag --out my.yaml\n",
     "Each line of the report begins with OK, odd (the configuration deals with it) or missing (the odometry "
     "cannot\n"
@@ -51,7 +51,6 @@ void addOptions(rio_t::OptionSet& options, Arguments& a) {
   options.positional("bag");
   options.text("out", "FILE.yaml", "gets the configuration; without it, it is printed", r.out);
   options.text("rig", "FILE.png", "gets a drawing of the rig: top and side view", r.rig);
-  rio_t::addOverwrite(options, r.overwrite);
   options.text("imu-topic", "TOPIC", "the IMU; by default the one that can be used, with most samples",
                r.imu_topic);
   options.values("radar-topic", "TOPIC", "a radar; may be repeated; by default all clouds with a Doppler",
@@ -93,7 +92,7 @@ class TemporaryFolder {
 int runLive(rio_t::CheckRequest request, double duration, const std::string& keep) {
   // Before the recording, so that a wrong path costs no time.
   if (!keep.empty()) {
-    const std::string fault = rio_t::faultOfOutput(keep, {}, request.overwrite);
+    const std::string fault = rio_t::faultOfOutput(keep, {});
     if (!fault.empty()) throw rio_t::UsageError("--keep " + fault);
   }
   const TemporaryFolder folder;

@@ -34,7 +34,6 @@ const ProgramText kText = {
 struct Arguments {
   std::vector<std::string> trajectories;  ///< truth first
   std::string errors_file;
-  bool overwrite = false;
   std::string time_offset;
   std::optional<double> true_offset;
   double skip = 0.0;
@@ -54,7 +53,6 @@ void addOptions(OptionSet& options, Arguments& a) {
   options.text("errors", "FILE",
                "the error of every matched pose of the one estimate goes there (first poses aligned)",
                a.errors_file);
-  addOverwrite(options, a.overwrite);
   options.text("time-offset", "FILE", "estimates of the radar's time offset: columns stamp,offset_s,sigma_s",
                a.time_offset);
   options.value("true-offset", "S", "the constant true offset [s]", "",
@@ -72,7 +70,7 @@ void check(const Arguments& arguments) {
   std::vector<std::string> inputs = arguments.trajectories;
   inputs.push_back(arguments.time_offset);
   const std::string fault =
-      arguments.errors_file.empty() ? "" : faultOfOutput(arguments.errors_file, inputs, arguments.overwrite);
+      arguments.errors_file.empty() ? "" : faultOfOutput(arguments.errors_file, inputs);
   if (!fault.empty()) throw UsageError("--errors " + fault);
   if (arguments.trajectories.size() == 1)
     throw UsageError("only one trajectory given, expected GROUND_TRUTH ESTIMATE...");

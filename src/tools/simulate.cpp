@@ -29,7 +29,6 @@ struct Request {
   std::string trajectory;
   std::string out;
   std::string ground_truth;
-  bool overwrite = false;
   double duration = 0.0;
   std::optional<double> speed;
   Preset preset;  // what is moved unless --motion or --trajectory says so
@@ -79,7 +78,6 @@ void addGeneralOptions(OptionSet& options, Request& r) {
                r.trajectory);
   options.text("out", "BAG", "bag to write", r.out);
   options.text("ground-truth", "FILE", "also write the truth as a TUM file", r.ground_truth);
-  addOverwrite(options, r.overwrite);
   options.number("ground-truth-file-rate", "HZ", "rate of that file", r.ground_truth_file_rate,
                  NumberRange::kPositive);
   options.number("ground-truth-rate", "HZ", "rate of the truth in the bag", r.bag.ground_truth_rate,
@@ -452,7 +450,7 @@ void run(Request request) {
   for (const auto& [name, file] :
        {std::make_pair("--out ", request.out), std::make_pair("--ground-truth ", request.ground_truth)}) {
     if (file.empty()) continue;
-    const std::string fault = faultOfOutput(file, inputs, request.overwrite);
+    const std::string fault = faultOfOutput(file, inputs);
     if (!fault.empty()) throw UsageError(name + fault);
   }
   request.simulation.start = Time::fromSeconds(request.start_time);

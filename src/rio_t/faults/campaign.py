@@ -43,8 +43,7 @@ def bags_for(folder, scratch, given, config):
     if given:
         return [Bag("given", pathlib.Path(given).resolve(), config, topics_of(folder, config))]
     path, truth = scratch / "simulated.bag", scratch / "simulated.truth.txt"
-    programs.output_of(folder / "simulate", *SIMULATION, "--out", path, "--ground-truth", truth,
-                       "--overwrite")
+    programs.output_of(folder / "simulate", *SIMULATION, "--out", path, "--ground-truth", truth)
     bags = [Bag("simulated", path, "irs", topics_of(folder, "irs"), truth)]
     real = pathlib.Path(os.environ.get("RIO_T_DATA_DIR", "../shared/data")) / REAL_BAG
     if real.exists():

@@ -32,14 +32,12 @@ struct Arguments {
   std::vector<std::string> bags;
   std::string config, out, output_folder;
   ParameterEntries set;
-  bool overwrite = false;
 };
 
 void addOptions(OptionSet& options, Arguments& a) {
   addBagOptions(options, a.bags, a.config, a.set);
   options.text("out", "FILE.yaml",
                "the configuration goes there: the keys of --config and --set, with what was found", a.out);
-  addOverwrite(options, a.overwrite);
   options.text("output-dir", "FOLDER", "gets a folder for each bag with the files that rio_t_bag writes",
                a.output_folder);
 }
@@ -52,7 +50,7 @@ void checkFiles(const Arguments& arguments, const std::string& config_file) {
   }
   std::vector<std::string> inputs = arguments.bags;
   inputs.push_back(config_file);
-  const std::string fault = faultOfOutput(arguments.out, inputs, arguments.overwrite);
+  const std::string fault = faultOfOutput(arguments.out, inputs);
   if (!fault.empty()) throw std::runtime_error("--out " + fault);
 }
 
@@ -89,8 +87,10 @@ int run(const Arguments& arguments, std::ostream& out, std::ostream& err) {
   if (calibration.radars.empty())
     throw std::runtime_error("no bag is left; " + arguments.out + " is not written");
   out << describeCalibration(calibration);
-  writeFile(arguments.out, calibratedYaml(calibration, config, entries, arguments.config));
-  out << "written to " << arguments.out << "\n";
+  const std::string kept =
+      writeFile(arguments.out, calibratedYaml(calibration, config, entries, arguments.config));
+  out << "written to " << arguments.out << (kept.empty() ? "" : " (what was there is now " + kept + ")")
+      << "\n";
   return 0;
 }
 

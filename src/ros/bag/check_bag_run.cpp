@@ -31,7 +31,7 @@ void drawRig(const std::string& yaml, const std::string& png) {
   const std::string script = drawRigScript();
   if (script.empty()) throw std::runtime_error("--rig: the script draw_rig.py is not installed");
   namespace process = boost::process;
-  if (process::system("/usr/bin/env", "python3", script, "--config", yaml, "--out", png, "--overwrite") != 0)
+  if (process::system("/usr/bin/env", "python3", script, "--config", yaml, "--out", png) != 0)
     throw std::runtime_error("--rig " + png + ": draw_rig.py failed");
 }
 
@@ -60,7 +60,7 @@ std::string faultOf(const CheckRequest& request) {
   for (const auto& [name, file] :
        {std::make_pair("--out ", request.out), std::make_pair("--rig ", request.rig)}) {
     if (file.empty()) continue;
-    const std::string fault = faultOfOutput(file, request.bags, request.overwrite);
+    const std::string fault = faultOfOutput(file, request.bags);
     if (!fault.empty()) return name + fault;
   }
   return "";
@@ -91,8 +91,9 @@ int runCheck(const CheckRequest& request, std::ostream& out, std::ostream& err) 
     if (request.out.empty()) {
       out << "\n" << best->yaml;
     } else {
-      writeFile(request.out, best->yaml);
-      out << "Written to " << request.out << ". Next: rosrun rio_t rio_t_bag";
+      const std::string kept = writeFile(request.out, best->yaml);
+      out << "Written to " << request.out << (kept.empty() ? "" : " (what was there is now " + kept + ")")
+          << ". Next: rosrun rio_t rio_t_bag";
       for (const std::string& bag : best->bags)
         out << " --bag " << (request.bags_go_away ? "BAG" : word(bag));
       out << " --config " << word(request.out) << " --output-dir results\n";

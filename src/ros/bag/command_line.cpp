@@ -98,6 +98,20 @@ bool isWrittenInPlace(const std::string& path) {
   return std::filesystem::exists(status) && !std::filesystem::is_regular_file(status);
 }
 
+/// Copies a file with another content to PATH~, as editors do. Returns the name of the copy, empty if there is
+/// none.
+std::string keepOther(const std::string& path, const std::string& text) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (!fs::is_regular_file(path, error) || fs::file_size(path, error) == 0) return "";
+  std::ifstream file(path, std::ios::binary);
+  if (std::string(std::istreambuf_iterator<char>(file), {}) == text) return "";
+  const std::string backup = path + "~";
+  if (!fs::copy_file(path, backup, fs::copy_options::overwrite_existing, error) || error)
+    throw std::runtime_error(path + ": cannot be kept as " + backup + " (" + error.message() + ")");
+  return backup;
+}
+
 }  // namespace
 
 std::string shownNumber(double value) {
@@ -283,10 +297,6 @@ void addBagOptions(OptionSet& options, std::vector<std::string>& bags, std::stri
       [&set](const std::string& text) { set.push_back(parseAssignment(text)); });
 }
 
-void addOverwrite(OptionSet& options, bool& overwrite) {
-  options.flag("overwrite", "replace files that are there; without it, they are refused", overwrite);
-}
-
 bool isSameFile(const std::string& a, const std::string& b) {
   namespace fs = std::filesystem;
   if (a.empty() || b.empty()) return false;
@@ -295,14 +305,11 @@ bool isSameFile(const std::string& a, const std::string& b) {
   return fs::weakly_canonical(fs::absolute(a)) == fs::weakly_canonical(fs::absolute(b));
 }
 
-std::string faultOfOutput(const std::string& path, const std::vector<std::string>& inputs, bool overwrite) {
+std::string faultOfOutput(const std::string& path, const std::vector<std::string>& inputs) {
   namespace fs = std::filesystem;
   for (const std::string& input : inputs)
     if (isSameFile(path, input)) return path + ": expected another file than " + input + ", which is read";
   if (fs::is_directory(path)) return path + ": expected a file, this is a folder";
-  std::error_code error;
-  if (!overwrite && fs::is_regular_file(path, error) && fs::file_size(path, error) > 0)
-    return path + ": this file exists; choose another name, or replace it with --overwrite";
   if (isWrittenInPlace(path)) return access(path.c_str(), W_OK) == 0 ? "" : path + ": cannot be written";
   const fs::path folder = fs::absolute(path).parent_path();
   if (!fs::is_directory(folder)) return path + ": there is no folder " + folder.string();
@@ -310,16 +317,17 @@ std::string faultOfOutput(const std::string& path, const std::vector<std::string
   return "";
 }
 
-void writeFile(const std::string& path, const std::string& text) {
+std::string writeFile(const std::string& path, const std::string& text) {
+  const std::string backup = keepOther(path, text);
   const std::string written = isWrittenInPlace(path) ? path : path + ".part";
   std::ofstream file(written, std::ios::binary | std::ios::trunc);
   file << text;
   file.close();
   std::error_code error;
   if (file) {
-    if (written == path) return;
+    if (written == path) return backup;
     std::filesystem::rename(written, path, error);
-    if (!error) return;
+    if (!error) return backup;
   }
   if (written != path) std::filesystem::remove(written, error);
   throw std::runtime_error(path + ": cannot be written (disk full?)");

@@ -109,9 +109,6 @@ int runProgramWith(const ProgramText& text, OptionSet& options, const std::vecto
 void addBagOptions(OptionSet& options, std::vector<std::string>& bags, std::string& config,
                    ParameterEntries& set);
 
-/// --overwrite: without it no program replaces a file.
-void addOverwrite(OptionSet& options, bool& overwrite);
-
 /// Throws UsageError that names all options which are needed and not given.
 void require(const std::vector<std::pair<std::string, bool>>& given_by_name);
 
@@ -120,13 +117,13 @@ void require(const std::vector<std::pair<std::string, bool>>& given_by_name);
 bool isSameFile(const std::string& a, const std::string& b);
 
 /// Why a program that reads `inputs` cannot write `path`; empty if it can. Programs ask before the work, so
-/// that a wrong path costs no time. A file that is not empty may be the work of the user: only `overwrite`
-/// replaces it.
-std::string faultOfOutput(const std::string& path, const std::vector<std::string>& inputs, bool overwrite);
+/// that a wrong path costs no time.
+std::string faultOfOutput(const std::string& path, const std::vector<std::string>& inputs);
 
 /// Writes the file beside `path` first, so that a program that fails leaves what was there. Writes to a link
-/// or a device as it is. Throws std::runtime_error that names the path.
-void writeFile(const std::string& path, const std::string& text);
+/// or a device as it is. A file with another content may be the work of the user, and is kept as PATH~; returns
+/// the name of that copy, or nothing. Throws std::runtime_error that names the path.
+std::string writeFile(const std::string& path, const std::string& text);
 
 /// A bar on stderr with the time that is left, for a share of the work done from 0 to 1. Empty if stderr is
 /// no terminal. `label` stands before it.

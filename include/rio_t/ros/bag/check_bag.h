@@ -13,7 +13,6 @@ struct CheckRequest {
   std::vector<std::string> bags;          ///< paths
   std::string out;                        ///< gets the configuration; empty: none
   std::string rig;                        ///< PNG with the rig drawn; empty: none
-  bool overwrite = false;                 ///< whether files that are there are replaced
   std::string imu_topic;                  ///< empty: the best one
   std::vector<std::string> radar_topics;  ///< empty: all that fit
   ParameterEntries set;                   ///< what the user knows; the cloud is read accordingly
