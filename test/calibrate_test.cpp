@@ -72,14 +72,10 @@ class Calibrate : public RestBag {
   /// The bag with the mounting told wrong.
   Outcome calibrateBags(const std::vector<std::string>& bags,
                         const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> words = {"--config",
-                                      "irs",
-                                      "--out",
-                                      yaml_,
-                                      "--set",
-                                      "extrinsics_rotation_xyzw=" + listText(told_.q_IR.coeffs()),
-                                      "--set",
-                                      "extrinsics_translation=" + listText(told_.l_I)};
+    std::vector<std::string> words = {"--config", "irs",
+                                      "--out",    yaml_,
+                                      "--set",    "extrinsics_rotation_xyzw=" + listText(told_.q_IR.coeffs()),
+                                      "--set",    "extrinsics_translation=" + listText(told_.l_I)};
     for (const std::string& bag : bags) words.insert(words.end(), {"--bag", bag});
     words.insert(words.end(), more.begin(), more.end());
     return runCalibrate(words);

@@ -31,8 +31,7 @@ struct Dense {
       b += J.transpose() * rows.Jr.rightCols<1>();
     }
     for (std::size_t i = 0; i < first.size(); ++i)
-      if (system.is_held[i])
-        H.diagonal().segment(first[i], system.tangent(static_cast<int>(i))).setOnes();
+      if (system.is_held[i]) H.diagonal().segment(first[i], system.tangent(static_cast<int>(i))).setOnes();
   }
   std::vector<Eigen::Index> first;
   Eigen::MatrixXd H;

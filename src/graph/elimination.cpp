@@ -89,9 +89,9 @@ SquareRoot squareRootOf(const Tableau& tableau, Eigen::Index from, Eigen::Index 
 class BlockElimination {
  public:
   struct Eliminated {
-    RowMatrix L;               ///< R_ii transposed
+    RowMatrix L;                 ///< R_ii transposed
     std::map<int, RowMatrix> W;  ///< R_ij
-    Eigen::VectorXd z;         ///< their right side: R delta + z
+    Eigen::VectorXd z;           ///< their right side: R delta + z
   };
 
   BlockElimination(const LinearSystem& system, double damping)
@@ -112,8 +112,7 @@ class BlockElimination {
 
   /// None if the rows do not determine block i. What they say of later blocks waits for these.
   std::optional<Eliminated> eliminate(int i) {
-    const std::vector<const LinearRows*> stacked =
-        std::exchange(waiting_[static_cast<std::size_t>(i)], {});
+    const std::vector<const LinearRows*> stacked = std::exchange(waiting_[static_cast<std::size_t>(i)], {});
     const Eigen::VectorXd& squares = squares_[static_cast<std::size_t>(i)];
     const Eigen::Index own = squares.size();
     columns_.assign(1, i);
@@ -220,7 +219,7 @@ class BlockElimination {
 
   const LinearSystem& system_;
   double damping_;
-  std::vector<Eigen::VectorXd> squares_;  ///< of the columns of each block
+  std::vector<Eigen::VectorXd> squares_;                 ///< of the columns of each block
   std::vector<std::vector<const LinearRows*>> waiting_;  ///< by their first block
   std::deque<LinearRows> rest_;
   // Of the block that is eliminated: the blocks of its columns, and where they begin.
@@ -380,7 +379,8 @@ SquareRoot widened(const SquareRoot& known, Eigen::Index first, const Eigen::Vec
   for (Eigen::Index k = 0; k < walk; ++k) tableau.row(k)[k] = 1.0 / std::sqrt(variances[k]);
   for (Eigen::Index i = 0; i < rows; ++i) {
     Eigen::Map<Eigen::RowVectorXd>(tableau.row(walk + i), walk + columns + 1)
-        << -known.J.block(i, first, 1, walk), known.J.row(i), known.r0[i];
+        << -known.J.block(i, first, 1, walk),
+        known.J.row(i), known.r0[i];
   }
   tableau.triangularise(0, walk + columns);
   return squareRootOf(tableau, walk, columns);

@@ -98,8 +98,8 @@ void LinearSystem::hold(int i) {
   for (LinearRows& each : rows) {
     const auto at = std::find(each.blocks.begin(), each.blocks.end(), i);
     if (at == each.blocks.end()) continue;
-    const Eigen::Index first = std::accumulate(
-        each.blocks.begin(), at, Eigen::Index{0}, [&](Eigen::Index sum, int k) { return sum + tangent(k); });
+    const Eigen::Index first = std::accumulate(each.blocks.begin(), at, Eigen::Index{0},
+                                               [&](Eigen::Index sum, int k) { return sum + tangent(k); });
     const Eigen::Index after = each.Jr.cols() - first - tangent(i);
     RowMatrix rest(each.Jr.rows(), first + after);
     rest << each.Jr.leftCols(first), each.Jr.rightCols(after);

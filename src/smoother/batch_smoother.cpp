@@ -229,8 +229,7 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
 void BatchSmoother::read(const Graph& graph, const Solution& solved, BatchSolution& solution) const {
   const std::vector<std::map<int, Eigen::MatrixXd>> P = solved.elimination.covariances();
   std::unordered_map<const Block*, int> index;
-  for (const Block* block : solved.system.blocks)
-    index.emplace(block, static_cast<int>(index.size()));
+  for (const Block* block : solved.system.blocks) index.emplace(block, static_cast<int>(index.size()));
   for (const Block* node : graph.nodes)
     solution.covariances.emplace_back(P[index.at(node)].at(index.at(node)));
   for (const Graph::Scan& scan : graph.scans) {

@@ -69,8 +69,7 @@ void check(const Arguments& arguments) {
     throw UsageError("--errors goes with exactly one estimate");
   std::vector<std::string> inputs = arguments.trajectories;
   inputs.push_back(arguments.time_offset);
-  const std::string fault =
-      arguments.errors_file.empty() ? "" : faultOfOutput(arguments.errors_file, inputs);
+  const std::string fault = arguments.errors_file.empty() ? "" : faultOfOutput(arguments.errors_file, inputs);
   if (!fault.empty()) throw UsageError("--errors " + fault);
   if (arguments.trajectories.size() == 1)
     throw UsageError("only one trajectory given, expected GROUND_TRUTH ESTIMATE...");

@@ -60,8 +60,8 @@ struct BatchSolution {
   /// Of each radar, in the tangent of ExtrinsicsManifold; empty where the extrinsics are not estimated.
   std::vector<Eigen::MatrixXd> extrinsics_covariances;
   LinearSystem system;  ///< at the solution
-  int iterations = 0;                ///< of the solver, all placements together
-  int placements = 0;                ///< how often the nodes were placed
+  int iterations = 0;   ///< of the solver, all placements together
+  int placements = 0;   ///< how often the nodes were placed
   SolverTermination termination = SolverTermination::kIterationLimit;
   bool converged() const { return isConverged(termination); }
 };

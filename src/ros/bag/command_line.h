@@ -121,8 +121,8 @@ bool isSameFile(const std::string& a, const std::string& b);
 std::string faultOfOutput(const std::string& path, const std::vector<std::string>& inputs);
 
 /// Writes the file beside `path` first, so that a program that fails leaves what was there. Writes to a link
-/// or a device as it is. A file with another content may be the work of the user, and is kept as PATH~; returns
-/// the name of that copy, or nothing. Throws std::runtime_error that names the path.
+/// or a device as it is. A file with another content may be the work of the user, and is kept as PATH~;
+/// returns the name of that copy, or nothing. Throws std::runtime_error that names the path.
 std::string writeFile(const std::string& path, const std::string& text);
 
 /// A bar on stderr with the time that is left, for a share of the work done from 0 to 1. Empty if stderr is

@@ -231,8 +231,8 @@ class RadarCauses {
     constexpr double kDegree = M_PI / 180.0;
     const Eigen::Vector3d turn = radar_.turn / kDegree;
     cause("mounting_far", 1.0 - kFarMounting / sigmas,
-          "The estimated mounting" + of_ + " is turned from the told one by " + fixedText(turn.x(), 0) + ", " +
-              fixedText(turn.y(), 0) + ", " + fixedText(turn.z(), 0) +
+          "The estimated mounting" + of_ + " is turned from the told one by " + fixedText(turn.x(), 0) +
+              ", " + fixedText(turn.y(), 0) + ", " + fixedText(turn.z(), 0) +
               " degrees about x, y, z of the IMU, with " + key_ + "extrinsics_rotation_sigma " +
               number(config_.odometry.smoother.extrinsics_rotation_sigma / kDegree) + " degrees.",
           "Check " + key_ + "radar_doppler_sign, " + key_ + "radar_axes and the mounting (" + key_ +

@@ -92,7 +92,8 @@ void LiveMonitor::describeExtrinsics(Status& status, std::size_t radar) const {
         axesAbove(lever_sigma, kObserved * options.extrinsics_translation_sigma, "lever arm along ");
     if (!lever.empty()) appendItem(&kept, lever);
   }
-  const std::string far = axesAbove(turn.cwiseAbs(), kFarMounting * options.extrinsics_rotation_sigma, "about ");
+  const std::string far =
+      axesAbove(turn.cwiseAbs(), kFarMounting * options.extrinsics_rotation_sigma, "about ");
   if (!far.empty()) {
     status.summary(DiagnosticStatus::WARN,
                    "the estimated rotation of " + called(of) + " " + far +
