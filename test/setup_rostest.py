@@ -259,7 +259,7 @@ class SetupTest(tester.LiveTestCase):
         kept = self.path("kept.bag")
         status, told = listen("--keep", self.bag)
         self.assertEqual(status, 2)
-        self.assertIn("this file exists", told)
+        self.assertIn("expected a new file", told)
         status, told = listen("--keep", kept, "--out", self.path("nowhere/my.yaml"))
         self.assertEqual(status, 2)
         self.assertIn("there is no folder", told)

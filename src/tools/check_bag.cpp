@@ -66,7 +66,7 @@ void addOptions(rio_t::OptionSet& options, Arguments& a) {
                 });
   options.flag("no-trial", "do not run the odometry with the configuration", a.no_trial);
   options.flag("live", "listen to the running topics instead of reading a bag", a.live);
-  options.text("keep", "BAG", "with --live: keep the messages in this bag", a.keep);
+  options.text("keep", "BAG", "with --live: keep the messages in this new bag", a.keep);
 }
 
 /// A folder that is gone at the end.
@@ -91,10 +91,7 @@ class TemporaryFolder {
 
 int runLive(rio_t::CheckRequest request, double duration, const std::string& keep) {
   // Before the recording, so that a wrong path costs no time.
-  if (!keep.empty()) {
-    const std::string fault = rio_t::faultOfOutput(keep, {});
-    if (!fault.empty()) throw rio_t::UsageError("--keep " + fault);
-  }
+  if (fs::exists(keep)) throw rio_t::UsageError("--keep " + keep + ": expected a new file, this one exists");
   const TemporaryFolder folder;
   const std::string bag = keep.empty() ? (folder.path() / "live.bag").string() : keep;
   request.bags = {bag};
