@@ -208,6 +208,10 @@ std::vector<std::string> fittingPresets(const PointCloud2& message) {
 }
 
 DecodedScan decode(const PointCloud2& message, const PointCloudFormat& format) {
+  if (format.doppler_sign != 1 && format.doppler_sign != -1) {
+    throw std::invalid_argument("point cloud: doppler_sign must be 1 or -1, not " +
+                                std::to_string(format.doppler_sign));
+  }
   // If nothing was detected, some drivers leave out the fields, and some the size of a point.
   DecodedScan scan;
   if (message.data.empty() && (message.width == 0 || message.height == 0)) return scan;
