@@ -110,7 +110,7 @@ class BlockElimination {
     }
   }
 
-  /// None if the rows do not determine block i. What they say of later blocks waits for these.
+  /// None if the rows do not determine block i. The rows that remain wait for the later blocks.
   std::optional<Eliminated> eliminate(int i) {
     const std::vector<const LinearRows*> stacked = std::exchange(waiting_[static_cast<std::size_t>(i)], {});
     const Eigen::VectorXd& squares = squares_[static_cast<std::size_t>(i)];
@@ -143,7 +143,7 @@ class BlockElimination {
     return read(own, last);
   }
 
-  /// What the rows that still wait say of the blocks from `first` on that are not held.
+  /// The rows that still wait, over the blocks from `first` on that are not held.
   SquareRoot rest(int first) {
     columns_.clear();
     starts_.clear();
@@ -222,7 +222,7 @@ class BlockElimination {
   std::vector<Eigen::VectorXd> squares_;                 ///< of the columns of each block
   std::vector<std::vector<const LinearRows*>> waiting_;  ///< by their first block
   std::deque<LinearRows> rest_;
-  // Of the block that is eliminated: the blocks of its columns, and where they begin.
+  // The columns of the block that is being eliminated: their blocks, and where each begins.
   std::vector<int> columns_;
   std::vector<Eigen::Index> starts_;
   Tableau tableau_;

@@ -32,17 +32,18 @@ class Elimination {
   double squared_length_ = 0.0;
 };
 
-/// What rows say: J delta + r0. J has a row for each of its columns.
+/// Rows J delta + r0, as a prior holds them.
 struct SquareRoot {
   Eigen::MatrixXd J;
   Eigen::VectorXd r0;
 };
-/// The same J'J, J'r0 with a row for each column.
+/// Returns rows with the same J'J and J'r0, as many as J has columns.
 SquareRoot compressed(const SquareRoot& rows);
-/// What is known of the other blocks when the first `count` are eliminated. Throws std::runtime_error if the
-/// rows do not determine the first ones.
+/// Eliminates the first `count` blocks and returns the rows that remain, about the other blocks. Throws
+/// std::runtime_error if the rows do not determine the first ones.
 SquareRoot eliminateFirst(const LinearSystem& system, int count);
-/// The same about x' = x + w, where w is a random walk of the columns from `first` on, with these variances.
+/// Returns rows about x' = x + w, where w is a random walk of the columns from `first` on, with these
+/// variances.
 SquareRoot widened(const SquareRoot& known, Eigen::Index first, const Eigen::VectorXd& variances);
 
 }  // namespace rio_t
