@@ -7,8 +7,7 @@
 namespace rio_t {
 
 /// Uncertainty of position and heading that a re-initialisation keeps. No sensor observes them, so it is
-/// added only to what is published. Inside the window, a position known to hundreds of metres would cost the
-/// digits of all other states, and a free heading would wander.
+/// added only to what is published.
 class PoseInflation {
  public:
   PoseInflation() = default;
