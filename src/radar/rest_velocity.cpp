@@ -92,7 +92,7 @@ bool directionsAgreeOnMotion(const std::vector<RadarDirection>& points, const Eg
   };
   const std::vector<RadarDirection> slow = selectSlow(points, o);
   if (std::all_of(slow.begin(), slow.end(), [&](const auto& p) { return readsZero(p, o); })) return false;
-  // So many cells lie beside each other along each axis of the unit cube, the middle one around zero.
+  // Number of cells along each axis of the unit cube. The middle cell is around zero.
   constexpr auto kAlong = 2 * static_cast<std::size_t>(1.0 / kCellWidth + 0.5) + 1;
   std::vector<Cell> cells(kAlong * kAlong * kAlong);
   for (const RadarDirection& p : slow) {

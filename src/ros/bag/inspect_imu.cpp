@@ -192,7 +192,7 @@ void describeNoise(ImuInspection* imu) {
            (vibration > 2.0 ? ", in motion " + fixedText(r.accel_density_median, 4) : "") + "; gyro " +
            fixedText(r.gyro_density_quiet, 5) + " rad/s/sqrt(Hz)" +
            (vibrates ? ": the frame vibrates; mount the IMU softer if you can" : ""));
-  // What is expected is no reason to doubt a run.
+  // The diagnosis doubts a run only if the IMU is noisier than configured.
   if (vibrates)
     imu->keys.set("imu_accel_noise_density", ParameterValue{rounded(r.accel_density_median, 1e3)},
                   "The frame vibrates: more than the default expects.");

@@ -18,7 +18,7 @@ using Counts = std::map<std::string, std::uint64_t>;
 /// Zero for a name that is not there.
 std::uint64_t countOf(const Counts& counts, const std::string& name);
 
-/// Where the estimate of a mounting started, and where it ended.
+/// The mounting of a radar: as told at the start, and as estimated at the end.
 struct ExtrinsicsSummary {
   Extrinsics told, T_IR;
   Eigen::Vector3d translation_sigma = Eigen::Vector3d::Zero();  ///< [m]; zero where not estimated
@@ -34,8 +34,8 @@ struct RadarEstimate {
   std::optional<ExtrinsicsSummary> extrinsics;  ///< only where they are estimated
 };
 
-/// What a run shows of one radar; the live node has no estimates here. With several radars its keys in
-/// `summary.yaml` end in its name.
+/// The numbers of one radar. The live node leaves the estimates unset. With several radars, the keys in
+/// `summary.yaml` end in the name of the radar.
 struct RadarSummary : RadarEstimate {
   std::string name;               ///< empty if there is but one
   std::uint64_t scans_total = 0;  ///< received
