@@ -13,7 +13,7 @@ namespace rio_t {
 struct Dense {
   explicit Dense(const LinearSystem& system) {
     Eigen::Index size = 0;
-    for (int i = 0; i < static_cast<int>(system.blocks.size()); ++i) {
+    for (int i = 0; i < static_cast<int>(system.tangents.size()); ++i) {
       first.push_back(size);
       size += system.tangent(i);
     }

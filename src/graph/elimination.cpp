@@ -95,8 +95,8 @@ class BlockElimination {
   };
 
   BlockElimination(const LinearSystem& system, double damping)
-      : system_(system), damping_(damping), waiting_(system.blocks.size()) {
-    for (std::size_t i = 0; i < system.blocks.size(); ++i)
+      : system_(system), damping_(damping), waiting_(system.tangents.size()) {
+    for (std::size_t i = 0; i < system.tangents.size(); ++i)
       squares_.emplace_back(Eigen::VectorXd::Zero(system.tangent(static_cast<int>(i))));
     for (const LinearRows& each : system.rows) {
       if (each.blocks.empty()) continue;
@@ -283,8 +283,8 @@ void forwardSubstitute(const RowMatrix& L, RowMatrix& W) {
 
 std::optional<Elimination> Elimination::of(const LinearSystem& system, double damping) {
   Elimination result;
-  const int count = static_cast<int>(system.blocks.size());
-  result.delta_.resize(system.blocks.size());
+  const int count = static_cast<int>(system.tangents.size());
+  result.delta_.resize(system.tangents.size());
   BlockElimination elimination(system, damping);
   for (int i = 0; i < count; ++i) {
     BlockElimination::Eliminated of_block;
@@ -301,7 +301,7 @@ std::optional<Elimination> Elimination::of(const LinearSystem& system, double da
     result.L_.push_back(std::move(of_block.L));
     result.W_.push_back(std::move(of_block.W));
   }
-  for (std::size_t i = system.blocks.size(); i-- > 0;) {
+  for (std::size_t i = system.tangents.size(); i-- > 0;) {
     Eigen::VectorXd& delta = result.delta_[i];
     for (const auto& [j, W] : result.W_[i]) delta.noalias() -= W * result.delta_[static_cast<std::size_t>(j)];
     result.L_[i].triangularView<Eigen::Lower>().transpose().solveInPlace(delta);

@@ -113,6 +113,7 @@ LinearSystem linearize(std::vector<const Block*> blocks, const std::vector<const
   system.blocks = std::move(blocks);
   std::unordered_map<const Block*, int> index;
   for (const Block* block : system.blocks) {
+    system.tangents.push_back(block->manifold->tangent());
     system.is_held.push_back(block->is_constant);
     index.emplace(block, block->is_constant ? -1 : static_cast<int>(index.size()));
   }

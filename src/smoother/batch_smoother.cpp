@@ -218,6 +218,7 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
           placed || !solved.converged() ? solved.termination : SolverTermination::kIterationLimit;
       read(graph, solved, solution);
       solution.system = std::move(solved.system);
+      solution.system.blocks.clear();  // they go with the graph
       return solution;
     }
     for (std::size_t i = 0; i < t_O.size(); ++i) t_O[i] = graph.scans[i].offset->x[0];

@@ -21,12 +21,13 @@ struct LinearRows {
 /// worse than an IMU term knows their changes. The squares of both do not fit into the digits of a double.
 struct LinearSystem {
   std::vector<const Block*> blocks;
+  std::vector<Eigen::Index> tangents;  ///< dimension of each block
   std::vector<LinearRows> rows;
   std::vector<bool> is_held;  ///< blocks that are not solved for: no row has them
   double cost = 0.0;          ///< half the sum of squares, after the loss
 
   int indexOf(const Block& block) const;  ///< -1 if it is not among them
-  Eigen::Index tangent(int i) const { return blocks[i]->manifold->tangent(); }
+  Eigen::Index tangent(int i) const { return tangents[static_cast<std::size_t>(i)]; }
   Eigen::VectorXd gradient(int i) const;  ///< J'r of block i
   void hold(int i);                       ///< takes block i out of all rows
 };

@@ -59,7 +59,7 @@ struct BatchSolution {
   std::vector<Extrinsics> extrinsics;  ///< of each radar
   /// Of each radar, in the tangent of ExtrinsicsManifold; empty where the extrinsics are not estimated.
   std::vector<Eigen::MatrixXd> extrinsics_covariances;
-  LinearSystem system;  ///< at the solution
+  LinearSystem system;  ///< at the solution, without its blocks
   int iterations = 0;   ///< of the solver, all placements together
   int placements = 0;   ///< how often the nodes were placed
   SolverTermination termination = SolverTermination::kIterationLimit;
