@@ -32,6 +32,11 @@ class Smoother : public ::testing::Test {
   ImuBuffer imu;
 };
 
+double headingVariance(const RadarSmoother& smoother) {
+  const Eigen::Vector3d up_I = smoother.newest().x.q_WI().conjugate() * Eigen::Vector3d::UnitZ();
+  return up_I.dot(smoother.newestCovariance().topLeftCorner<3, 3>() * up_I);
+}
+
 TEST_F(Smoother, RecoversTheOffsetWithTheImuModel) {
   for (const double t_O : {-0.05, 0.0, 0.03, 0.12}) {
     SmootherOptions options;
@@ -103,11 +108,52 @@ TEST_F(Smoother, APositionAndAHeadingThatAreHardlyKnownStaySo) {
   EXPECT_NEAR(smoother.t_O(), 0.03, 2e-4);
   const Eigen::MatrixXd P = smoother.newestCovariance();
   EXPECT_NEAR(std::sqrt(P(StateBlock::kP, StateBlock::kP)), 1e5, 100.0);
-  const Eigen::Vector3d up_I = smoother.newest().x.q_WI().conjugate() * Eigen::Vector3d::UnitZ();
-  EXPECT_NEAR(std::sqrt(up_I.dot(P.topLeftCorner<3, 3>() * up_I)), 1.0, 1e-2);
+  EXPECT_NEAR(std::sqrt(headingVariance(smoother)), 1.0, 1e-2);
   const Eigen::Vector3d v_W = smoother.newest().x.v_W();
   EXPECT_LT(std::sqrt(P(StateBlock::kV + 2, StateBlock::kV + 2)), 0.1);
   EXPECT_LT(std::sqrt(P(StateBlock::kV, StateBlock::kV)), 0.1 + v_W.norm());
+}
+
+TEST_F(Smoother, AHeadingThatIsLostStaysLost) {
+  // For 0.1 s nobody knows how far the gyro turned: 0.5 rad^2. The platform turns on the spot: a velocity
+  // before and after would tell the turn between them.
+  motion.amplitude.setZero();
+  ImuBuffer blind;
+  motion.imu(0.0, kEnd + 0.5, 400.0)
+      .forEachSample(motion.time(0.0), motion.time(kEnd + 0.5), [&](ImuMeasurement s) {
+        if (s.time > motion.time(1.5) && s.time < motion.time(1.6)) s.unseen_gyro_variance = 0.5 / 0.1;
+        blind.add(s);
+      });
+  SmootherOptions options;
+  RadarSmoother smoother(options, skewMounting(), motion.g_W, blind);
+  smoother.initialize(motion.time(0.5),
+                      priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0, skewMounting()));
+  double lost = 0.0;
+  for (double stamp = 0.7; stamp < kEnd; stamp += 0.05) {
+    smoother.add(measurement(stamp, 0.0));
+    smoother.optimize();
+    smoother.marginalize();
+    if (stamp < 1.7) lost = headingVariance(smoother);
+  }
+  EXPECT_NEAR(lost, 0.5, 0.05);
+  EXPECT_GT(headingVariance(smoother), 0.999 * lost);
+}
+
+TEST_F(Smoother, ADriftWidensThePositionAlone) {
+  SmootherOptions options;
+  RadarSmoother smoother = make(options), drifted = make(options);
+  for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
+    for (RadarSmoother* each : {&smoother, &drifted}) {
+      if (each == &drifted && std::abs(stamp - 2.5) < 0.01) each->states.addDrift(4.0);
+      each->add(measurement(stamp, 0.0));
+      each->optimize();
+      each->marginalize();
+    }
+  }
+  Eigen::MatrixXd expected = smoother.newestCovariance();
+  expected.diagonal().segment<3>(StateBlock::kP).array() += 4.0;
+  EXPECT_LT((drifted.newestCovariance() - expected).norm(), 1e-6);
+  EXPECT_LT((drifted.newest().x.p_W() - smoother.newest().x.p_W()).norm(), 1e-6);
 }
 
 TEST_F(Smoother, ALateScanIsInsertedAtItsTime) {

@@ -71,7 +71,8 @@ void marginalize(Window& window, std::vector<const Block*> leaving, const std::v
   Eigen::Index first = 0;
   for (const Block* block : kept) {
     for (const Walk& walk : walks)
-      if (walk.block == block && walk.variance.minCoeff() > 0.0) known = widened(known, first, walk.variance);
+      if (walk.block == block && walk.variance.minCoeff() > 0.0)
+        known = widened(known, first + walk.first, walk.variance);
     first += block->manifold->tangent();
   }
   for (const Block* block : leaving) window.remove(*block);

@@ -235,9 +235,6 @@ bool Estimator::mustWait(const RadarScan& scan) const {
 
 void Estimator::addImu(const std::vector<ImuMeasurement>& samples) {
   for (const ImuMeasurement& sample : samples) {
-    if (sample.unseen_gyro_variance > 0.0 && initialized())
-      yaw_inflation_.add(sample.unseen_gyro_variance * (sample.time - imu_.newest()),
-                         smoother_.newest().x.p_W());
     imu_.add(sample);
     if (!initialized() && !sample.is_bridge) tryInitialize(sample);
   }
@@ -293,7 +290,6 @@ void Estimator::startAgain(std::uint64_t clock_restarts) {
   smoother_ = FixedLagSmoother(options_.smoother, options_.imu_noise, g_W_, imu_);
   model_error_scale_ = ModelErrorScale();
   health_ = RadarsHealth(options_.health, options_.smoother.innovation_gate, radars_.size());
-  pose_inflation_ = PoseInflation();
   if (landmarks_) landmarks_->forget();
   left_in_silence_.clear();
   radar_heard_.reset();
@@ -319,7 +315,6 @@ void Estimator::begin(const Initialization& found) {
   last_used_ = found.time;
   contradicted_since_ = found.time;
   corrected_W_.setZero();
-  yaw_inflation_ = YawInflation();
   if (landmarks_) landmarks_->forget();
   initialized_at_ = found.time;
   health_.startedAt(found.time);
@@ -333,7 +328,6 @@ bool Estimator::tryReinitialize(std::vector<StampedPose>& left) {
   if (!found) return false;
   for (std::size_t k = 0; k < smoother_.size(); ++k)
     if (smoother_.node(k).time < found->time) left.push_back(pose(smoother_.node(k)));
-  pose_inflation_ = PoseInflation(newestState(smoother_.newestCovariance({})));
   begin(*found);
   updateHealth();
   faults_.count("reinitialized");
@@ -343,9 +337,12 @@ bool Estimator::tryReinitialize(std::vector<StampedPose>& left) {
 PoseAnchor Estimator::anchorAt(Time time) const {
   // The IMU carries the newest node before `time`, as in Navigation, so that the published pose does not
   // jump.
-  const NodeEstimate node = smoother_.nodeBefore(time).value_or(smoother_.node(0));
-  const StateBlock x = node.time < time ? carried(node.x, node.time, time, imu_, g_W_) : node.x;
-  return {x.q_WI(), x.p_W()};  // pose_inflation_ keeps how well they are known
+  const Time since = std::max(time, smoother_.node(0).time);
+  const PredictedState predicted = *smoother_.predict(since, {});
+  NavigationState state = navigationState({since, predicted.x}, predicted.covariance, imu_);
+  health_.widen(state);
+  const auto E = poseInW(state.q_WI);
+  return {state.q_WI, state.p_W, E * state.covariance * E.transpose()};
 }
 
 Health Estimator::updateHealth() {
@@ -368,7 +365,7 @@ void Estimator::followContradiction(bool was_contradicted) {
     corrected_W_.setZero();
   } else if (was_contradicted && !is_contradicted) {
     const double seconds = imu_.newest() - contradicted_since_;
-    pose_inflation_.addPosition(corrected_W_.squaredNorm() * seconds * seconds);
+    smoother_.addDrift(corrected_W_.squaredNorm() * seconds * seconds);
   }
 }
 
@@ -395,8 +392,7 @@ ImuNoise Estimator::imuNoise() const {
 
 NavigationState Estimator::newestState(const StateCovariance& covariance) const {
   NavigationState state = navigationState(smoother_.newest(), covariance, imu_);
-  yaw_inflation_.addTo(state);
-  pose_inflation_.addTo(state);
+  addHeadingCurvature(state);
   health_.widen(state);
   return state;
 }

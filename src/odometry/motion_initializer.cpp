@@ -13,6 +13,7 @@
 #include "rio_t/graph/marginalization.h"
 #include "rio_t/graph/solver.h"
 #include "rio_t/imu/preintegration.h"
+#include "rio_t/odometry/navigation_state.h"
 #include "rio_t/odometry/options.h"
 #include "rio_t/sensors/offset_evidence.h"
 
@@ -134,10 +135,13 @@ std::optional<Initialization> MotionInitializer::solve(const ImuBuffer& imu,
     const auto set = [&](int first, double sigma) {
       result.prior.J.diagonal().segment<3>(first).setConstant(1.0 / sigma);
     };
-    // The prior holds the heading, and neither tilt nor velocity; theta lives in I.
-    result.prior.J.block<1, 3>(StateBlock::kTheta, StateBlock::kTheta) =
-        x.q_WI().toRotationMatrix().row(2) / smoother_.prior_sigma_yaw;
-    set(StateBlock::kP, smoother_.prior_sigma_position);
+    // The prior holds heading and position, and neither tilt nor velocity.
+    Eigen::Matrix4d covariance = anchor.covariance;
+    covariance(0, 0) += smoother_.prior_sigma_yaw * smoother_.prior_sigma_yaw;
+    covariance.diagonal().tail<3>().array() +=
+        smoother_.prior_sigma_position * smoother_.prior_sigma_position;
+    result.prior.J.topLeftCorner<4, StateBlock::kTangent>() =
+        covariance.llt().matrixL().solve(poseInW(x.q_WI()));
     set(StateBlock::kBg, options_.sigma_gyro_bias);
     set(StateBlock::kBa, options_.sigma_accel_bias);
     result.prior.J.diagonal().tail(calibration.size()) = calibration.cwiseInverse();

@@ -1,5 +1,7 @@
 #include "rio_t/odometry/navigation_state.h"
 
+#include <algorithm>
+
 namespace rio_t {
 
 NavigationState navigationState(const NodeEstimate& node, const StateCovariance& covariance,
@@ -14,6 +16,28 @@ NavigationState navigationState(const NodeEstimate& node, const StateCovariance&
   state.angular_velocity = imu.at(node.time).angular_velocity - state.b_g;
   state.covariance = covariance;
   return state;
+}
+
+Eigen::Matrix<double, 4, StateBlock::kTangent> poseInW(const Eigen::Quaterniond& q_WI) {
+  Eigen::Matrix<double, 4, StateBlock::kTangent> E = Eigen::Matrix<double, 4, StateBlock::kTangent>::Zero();
+  E.block<1, 3>(0, StateBlock::kTheta) = q_WI.toRotationMatrix().row(2);  // theta lives in I
+  E.block<3, 3>(1, StateBlock::kP).setIdentity();
+  return E;
+}
+
+void addHeadingCurvature(NavigationState& state) {
+  using S = StateBlock;
+  const Eigen::Matrix<double, S::kTangent, 1> with_heading =
+      state.covariance * poseInW(state.q_WI).row(0).transpose();
+  const double variance =
+      with_heading.segment<3>(S::kTheta).dot(state.q_WI.conjugate() * Eigen::Vector3d::UnitZ());
+  if (variance <= 0.0) return;
+  // A turn by psi moves p and v by psi u, and shortens them by psi^2 / 2 along z x u.
+  StateTangent shorten = StateTangent::Zero();
+  for (const int first : {S::kP, S::kV})
+    shorten.segment<3>(first) = Eigen::Vector3d::UnitZ().cross(with_heading.segment<3>(first) / variance);
+  // The mean square of psi^2 / 2, and not beyond that of 1 - cos(psi) for any psi.
+  state.covariance += std::min(0.75 * variance * variance, 1.5) * shorten * shorten.transpose();
 }
 
 }  // namespace rio_t

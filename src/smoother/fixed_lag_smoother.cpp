@@ -35,6 +35,7 @@ Block& FixedLagSmoother::start(Time time, const StateBlock& x0) {
   window_ = Window();
   Block& block = window_.addNode(time, manifold_, stored(x0));
   nodes_ = {Node{&block}};
+  drifted_ = 0.0;
   solution_ = Solution();
   return block;
 }
@@ -158,6 +159,9 @@ std::vector<NodeEstimate> FixedLagSmoother::marginalize(const std::vector<Random
     std::vector<Walk> gained;
     gained.reserve(walks.size());
     for (const RandomWalk& walk : walks) gained.push_back({walk.block, walk.density.cwiseAbs2() * dt});
+    if (drifted_ > 0.0)
+      gained.push_back(
+          {nodes_[1].block, Eigen::Vector3d::Constant(std::exchange(drifted_, 0.0)), StateBlock::kP});
     left.push_back(node(0));
     rio_t::marginalize(window_, leavingWith(*nodes_.front().block), gained);
     nodes_.erase(nodes_.begin());

@@ -27,10 +27,11 @@ class PriorTerm final : public ceres::CostFunction {
 /// Adds a prior on `blocks` around their current values.
 Term& addPrior(Window& window, const std::vector<Block*>& blocks, const SquareRoot& root);
 
-/// Random walk of a calibration block. It lowers the information that the prior has about the block.
+/// Random walk of a block. It lowers the information that the prior has about the block.
 struct Walk {
   const Block* block;
   Eigen::VectorXd variance;  ///< that the block gains, per direction of its tangent
+  Eigen::Index first = 0;    ///< direction that `variance` begins with
 };
 /// Removes `leaving` and the terms on them from the window. One prior on the neighbours of `leaving` keeps
 /// what these terms said.

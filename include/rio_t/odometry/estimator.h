@@ -12,7 +12,6 @@
 #include "rio_t/odometry/model_error_scale.h"
 #include "rio_t/odometry/navigation.h"
 #include "rio_t/odometry/options.h"
-#include "rio_t/odometry/pose_inflation.h"
 #include "rio_t/odometry/radars_health.h"
 #include "rio_t/odometry/scan_result.h"
 #include "rio_t/sensors/barometer_channel.h"
@@ -95,11 +94,9 @@ class Estimator {
   std::optional<BarometerChannel> barometer_;           ///< if it is used
   ModelErrorScale model_error_scale_;
   RadarsHealth health_;
-  PoseInflation pose_inflation_;
   Time contradicted_since_;
   Eigen::Vector3d corrected_W_ = Eigen::Vector3d::Zero();  ///< what scans added to v_W since then [m/s]
-  YawInflation yaw_inflation_;
-  std::optional<LandmarkMap> landmarks_;  ///< none if they are off
+  std::optional<LandmarkMap> landmarks_;                   ///< none if they are off
 
   std::optional<Initialization> start_;
   std::string waiting_for_;

@@ -59,6 +59,9 @@ class FixedLagSmoother {
   /// The platform is at rest at a node; `velocity_sigma` [m/s] per axis.
   void addZeroVelocity(Block& node, double velocity_sigma);
 
+  /// The position has drifted by this variance per axis [m^2]. It counts from the next `marginalize` on.
+  void addDrift(double variance) { drifted_ += variance; }
+
   const Solution& optimize();
   /// Random walk of a calibration block.
   struct RandomWalk {
@@ -101,7 +104,8 @@ class FixedLagSmoother {
   std::shared_ptr<const Manifold> manifold_;
   Window window_;
   std::vector<Node> nodes_;
-  Solution solution_;  ///< of the last solve
+  double drifted_ = 0.0;  ///< [m^2] that no prior contains yet
+  Solution solution_;     ///< of the last solve
   struct LastPreintegration {
     Time from, to;
     Preintegration value;
