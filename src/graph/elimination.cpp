@@ -20,7 +20,7 @@ class Tableau {
   void reset(Eigen::Index rows, Eigen::Index columns) {
     rows_ = rows;
     columns_ = columns;
-    stride_ = columns + kNarrow - 1;  // the last part of a row may reach beyond it, over zeros
+    stride_ = columns + 3;  // the last part of a row may reach beyond it, over zeros
     numbers_.assign(static_cast<std::size_t>(rows * stride_), 0.0);
   }
   Eigen::Index rows() const { return rows_; }
@@ -33,7 +33,7 @@ class Tableau {
     for (Eigen::Index k = first; k < std::min(end, rows_ - 1); ++k) {
       const double pivot = row(k)[k];
       double square = pivot * pivot;
-      reflected_ = {{row(k), pivot}};
+      reflected_.assign(1, {row(k), pivot});
       double* at = row(k + 1);
       for (Eigen::Index i = k + 1; i < rows_; ++i, at += stride_) {
         if (at[k] == 0.0) continue;
@@ -44,29 +44,32 @@ class Tableau {
       const double norm = std::sqrt(square);
       reflected_.front().v += pivot > 0.0 ? norm : -norm;
       const double scale = 1.0 / (norm * (norm + std::abs(pivot)));
-      Eigen::Index part = k + 1;
-      for (; part + kNarrow < columns_; part += kWide) reflect<kWide>(part, scale);
-      if (part < columns_) reflect<kNarrow>(part, scale);
+      for (Eigen::Index part = k + 1; part < columns_;) {
+        const Eigen::Index left = columns_ - part;
+        part += left > 12  ? reflect<16>(part, scale)
+                : left > 4 ? reflect<8>(part, scale)
+                           : reflect<4>(part, scale);
+      }
       for (const Reflected& each : reflected_) each.row[k] = 0.0;
       row(k)[k] = pivot > 0.0 ? -norm : norm;
     }
   }
 
  private:
-  static constexpr int kWide = 8, kNarrow = 4;  ///< columns that are reflected at once
   struct Reflected {
     double* row;
     double v;  ///< of the reflection I - scale v v'
   };
 
-  /// Reflects some columns from `part` on. The sums stay in registers.
+  /// Reflects some columns from `part` on, and returns how many. The sums stay in registers.
   template <int Width>
-  void reflect(Eigen::Index part, double scale) {
+  int reflect(Eigen::Index part, double scale) {
     using Part = Eigen::Array<double, Width, 1>;
     Part sums = Part::Zero();
     for (const Reflected& each : reflected_) sums += each.v * Eigen::Map<const Part>(each.row + part);
     sums *= scale;
     for (const Reflected& each : reflected_) Eigen::Map<Part>(each.row + part) -= each.v * sums;
+    return Width;
   }
 
   Eigen::Index rows_ = 0, columns_ = 0, stride_ = 0;
