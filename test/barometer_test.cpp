@@ -128,6 +128,22 @@ TEST(Barometer, TheSigmaOfTheHeightIsWhatItsErrorsAre) {
   EXPECT_LT(nees / count, 2.2);
 }
 
+// Nothing brings back the metres along the ground, but a pressure tells the height.
+TEST(Barometer, MendsTheHeightThatADivergenceLeftUncertain) {
+  DroneRun run(1, 70.0, true);
+  run.options.health.on_divergence = OnDivergence::kReport;
+  run.run([&](simulation::SensorData& data) {
+    for (ImuMeasurement& sample : data.imu.samples)
+      if (run.seconds(sample.time) > 35.0 && run.seconds(sample.time) < 38.0) sample.acceleration.x() += 1.0;
+  });
+  EXPECT_GE(run.odometry->faults()["diverged"], 1U);
+  const NavigationState& end = run.states.back();
+  const Eigen::Vector3d sigma = end.covariance.diagonal().segment<3>(StateBlock::kP).cwiseSqrt();
+  EXPECT_GT(sigma.head<2>().minCoeff(), 1.0);
+  EXPECT_LT(sigma.z(), 0.5);
+  EXPECT_LT(std::abs(run.heightError(end)), 3.0 * sigma.z());
+}
+
 TEST(Barometer, OneThatFallsSilentOrComesLateChangesNothingElse) {
   DroneRun run(5, 40.0, true);
   run.run([&](simulation::SensorData& data) {
