@@ -213,6 +213,14 @@ TEST(Diagnosis, TheOffsetAtItsBoundIsNamed) {
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
 }
 
+TEST(Diagnosis, AMountingThatDrivesTheOffsetToItsBoundIsNamedFirst) {
+  RunEvidence evidence = goodRun();
+  evidence.solver_terminations = {{"at_bound", 150}, {"converged", 30}};
+  evidence.radars.front().turn = Eigen::Vector3d(0.1, -0.6, 0.0);
+  expectSays(first(evidence), {"mounting_far: The estimated mounting is turned"});
+  EXPECT_EQ(diagnose(evidence, Config{}).causes.at(1).name, "offset_at_bound");
+}
+
 TEST(Diagnosis, ADivergenceIsBadIfItLastsAndDoubtfulIfNot) {
   RunEvidence evidence = goodRun();
   evidence.divergences = 1;

@@ -286,6 +286,12 @@ void addOffset(const RunEvidence& evidence, const Config& config, std::vector<Ca
                      "Raise max_time_offset, subtract a known delay with radar_stamp_shift, or set "
                      "stamp_source: arrival. A wrong mounting can have the same effect.",
                      share});
+  // A mounting that is far off drives the offset there: the farthest one explains these windows, too.
+  Cause* farthest = nullptr;
+  for (Cause& each : *causes)
+    if (each.name == "mounting_far" && (farthest == nullptr || each.share > farthest->share))
+      farthest = &each;
+  if (farthest != nullptr) farthest->share = std::max(farthest->share, share);
 }
 
 void addImu(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
