@@ -128,7 +128,7 @@ TEST(Barometer, TheSigmaOfTheHeightIsWhatItsErrorsAre) {
   EXPECT_LT(nees / count, 2.2);
 }
 
-// Nothing brings back the metres along the ground, but a pressure tells the height.
+// No sensor corrects the position along the ground, but the barometer corrects the height.
 TEST(Barometer, MendsTheHeightThatADivergenceLeftUncertain) {
   DroneRun run(1, 70.0, true);
   run.options.health.on_divergence = OnDivergence::kReport;

@@ -1,4 +1,4 @@
-// What a heading that may be wrong by much does to position and velocity.
+// Compares addHeadingCurvature with headings that are drawn at random.
 #include "rio_t/odometry/navigation_state.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ namespace {
 
 using S = StateBlock;
 
-/// Known without error but for the heading, which turned by up to `sigma` [rad] 30 m ago.
+/// A state whose only error is a turn of the heading, 30 m ago, with this sigma [rad].
 NavigationState turnedAt30m(double sigma) {
   NavigationState state;
   state.q_WI = so3::exp({0.3, -0.2, 0.7});
@@ -27,7 +27,7 @@ NavigationState turnedAt30m(double sigma) {
   return state;
 }
 
-/// Mean square along the way of what drawn headings do to 30 m.
+/// Draws headings and returns the mean square of what they take off 30 m [m^2].
 double drawn(double sigma) {
   std::mt19937 random(1);
   std::normal_distribution<double> normal(0.0, sigma);

@@ -27,10 +27,9 @@ Eigen::Matrix<double, 4, StateBlock::kTangent> poseInW(const Eigen::Quaterniond&
 
 void addHeadingCurvature(NavigationState& state) {
   using S = StateBlock;
-  const Eigen::Matrix<double, S::kTangent, 1> with_heading =
-      state.covariance * poseInW(state.q_WI).row(0).transpose();
-  const double variance =
-      with_heading.segment<3>(S::kTheta).dot(state.q_WI.conjugate() * Eigen::Vector3d::UnitZ());
+  const StateTangent heading = poseInW(state.q_WI).row(0);
+  const StateTangent with_heading = state.covariance * heading;
+  const double variance = heading.dot(with_heading);
   if (variance <= 0.0) return;
   // A turn by psi moves p and v by psi u, and shortens them by psi^2 / 2 along z x u.
   StateTangent shorten = StateTangent::Zero();

@@ -32,7 +32,7 @@ struct MotionInitializerOptions {
 struct PoseAnchor {
   Eigen::Quaterniond q_WI = Eigen::Quaterniond::Identity();  ///< heading is kept, tilt is replaced
   Eigen::Vector3d p_W = Eigen::Vector3d::Zero();             ///< [m]
-  /// Of the turn about the vertical [rad] and of p_W [m]. The sigmas of a new W add to it.
+  /// Joint, of the heading [rad] and of p_W [m]. The initializer adds the prior sigmas of the options.
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
 };
 
