@@ -57,20 +57,14 @@ bool DopplerFactor::Evaluate(double const* const* parameters, double* residuals,
   const Eigen::Vector3d r = solveTransposed(U, cost.gradient);
   Eigen::Map<Eigen::Vector4d>{residuals} << r, std::sqrt(std::max(0.0, 2.0 * cost.value - r.squaredNorm()));
   if (jacobians == nullptr) return true;
-  if (jacobians[0] != nullptr) {
-    Eigen::Map<StateJacobian<4>> J(jacobians[0]);
-    J.topRows<3>() = U * predicted.J_state;
-    J.row(3).setZero();
-  }
-  if (jacobians[1] != nullptr) {
-    Eigen::Map<Eigen::Vector4d> J(jacobians[1]);
-    J << U * predicted.dv_dt_O, 0.0;
-  }
-  if (jacobians[2] != nullptr) {
-    Eigen::Map<ExtrinsicsJacobian<4>> J(jacobians[2]);
-    J.topRows<3>() = U * predicted.J_extrinsics;
-    J.row(3).setZero();
-  }
+  if (jacobians[0] != nullptr)
+    Eigen::Map<MotionJacobian<4>>{jacobians[0]} << U * predicted.J_motion, MotionJacobian<1>::Zero();
+  if (jacobians[1] != nullptr)
+    Eigen::Map<BiasJacobian<4>>{jacobians[1]} << U * predicted.J_biases, BiasJacobian<1>::Zero();
+  if (jacobians[2] != nullptr) Eigen::Map<Eigen::Vector4d>{jacobians[2]} << U * predicted.dv_dt_O, 0.0;
+  if (jacobians[3] != nullptr)
+    Eigen::Map<ExtrinsicsJacobian<4>>{jacobians[3]} << U * predicted.J_extrinsics,
+        ExtrinsicsJacobian<1>::Zero();
   return true;
 }
 

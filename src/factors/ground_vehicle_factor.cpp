@@ -4,9 +4,7 @@
 
 namespace rio_t {
 
-VehicleVelocity vehicleVelocity(const double* state, const double* frame, const Eigen::Vector3d& omega_I) {
-  const StateView x(state);
-  const Extrinsics T_IV = toExtrinsics(frame);
+VehicleVelocity vehicleVelocity(const StateView& x, const Extrinsics& T_IV, const Eigen::Vector3d& omega_I) {
   const Eigen::Matrix3d R_VI = T_IV.R_RI();
   const Eigen::Matrix3d R_IW = x.q_WI.conjugate().toRotationMatrix();
   const Eigen::Vector3d v_I = R_IW * x.v_W;
@@ -15,10 +13,10 @@ VehicleVelocity vehicleVelocity(const double* state, const double* frame, const 
 
   VehicleVelocity result;
   result.v_V = R_VI * point_I;
-  result.J_state.setZero();
-  result.J_state.leftCols<3>() = R_VI * so3::hat(v_I);
-  result.J_state.middleCols<3>(StateBlock::kVStored) = R_VI * R_IW;
-  result.J_state.middleCols<3>(StateBlock::kBgStored) = R_VI * so3::hat(T_IV.l_I);
+  result.J_motion.setZero();
+  result.J_motion.leftCols<3>() = R_VI * so3::hat(v_I);
+  result.J_motion.middleCols<3>(StateBlock::kVStored) = R_VI * R_IW;
+  result.J_biases << R_VI * so3::hat(T_IV.l_I), Eigen::Matrix3d::Zero();
   result.J_frame.setZero();
   result.J_frame.leftCols<3>() = R_VI * so3::hat(point_I);
   result.J_frame.rightCols<3>() = R_VI * so3::hat(omega);
@@ -27,26 +25,29 @@ VehicleVelocity vehicleVelocity(const double* state, const double* frame, const 
 
 bool GroundVehicleFactor::Evaluate(double const* const* parameters, double* residuals,
                                    double** jacobians) const {
-  const VehicleVelocity velocity = vehicleVelocity(parameters[0], parameters[1], omega_I_);
+  const VehicleVelocity velocity =
+      vehicleVelocity(StateView(parameters[0], parameters[1]), toExtrinsics(parameters[2]), omega_I_);
   Eigen::Map<Eigen::Vector2d>{residuals} = weights_.cwiseProduct(velocity.v_V.tail<2>());
   if (jacobians == nullptr) return true;
   if (jacobians[0] != nullptr)
-    Eigen::Map<StateJacobian<2>>{jacobians[0]} = weights_.asDiagonal() * velocity.J_state.bottomRows<2>();
+    Eigen::Map<MotionJacobian<2>>{jacobians[0]} = weights_.asDiagonal() * velocity.J_motion.bottomRows<2>();
   if (jacobians[1] != nullptr)
-    Eigen::Map<ExtrinsicsJacobian<2>>{jacobians[1]} =
+    Eigen::Map<BiasJacobian<2>>{jacobians[1]} = weights_.asDiagonal() * velocity.J_biases.bottomRows<2>();
+  if (jacobians[2] != nullptr)
+    Eigen::Map<ExtrinsicsJacobian<2>>{jacobians[2]} =
         weights_.asDiagonal() * velocity.J_frame.bottomRows<2>();
   return true;
 }
 
 bool LevelGroundFactor::Evaluate(double const* const* parameters, double* residuals,
                                  double** jacobians) const {
-  const Eigen::Vector3d up_I = StateView(parameters[0]).q_WI.conjugate() * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d up_I = MotionView(parameters[0]).q_WI.conjugate() * Eigen::Vector3d::UnitZ();
   const Eigen::Matrix3d R_VI = toExtrinsics(parameters[1]).R_RI();
   Eigen::Map<Eigen::Vector2d>{residuals} = weight_ * (R_VI * up_I).head<2>();
   if (jacobians == nullptr) return true;
   const Eigen::Matrix<double, 2, 3> turned = weight_ * (R_VI * so3::hat(up_I)).topRows<2>();
   if (jacobians[0] != nullptr) {
-    Eigen::Map<StateJacobian<2>> J(jacobians[0]);
+    Eigen::Map<MotionJacobian<2>> J(jacobians[0]);
     J.setZero();
     J.leftCols<3>() = turned;
   }

@@ -7,12 +7,14 @@
 namespace rio_t {
 namespace {
 
-using NineRows = Eigen::Matrix<double, 9, StateBlock::kSize, Eigen::RowMajor>;
+template <int Columns>
+using NineRows = Eigen::Matrix<double, 9, Columns, Eigen::RowMajor>;
 
 /// L E for the lower triangle L, by rows: at this size Eigen's triangular product costs several times as
 /// much.
-NineRows lowerTimes(const Eigen::Matrix<double, 9, 9>& L, const NineRows& E) {
-  NineRows result;
+template <int Columns>
+NineRows<Columns> lowerTimes(const Eigen::Matrix<double, 9, 9>& L, const NineRows<Columns>& E) {
+  NineRows<Columns> result;
   for (int i = 0; i < 9; ++i) {
     result.row(i) = L(i, 0) * E.row(0);
     for (int j = 1; j <= i; ++j) result.row(i) += L(i, j) * E.row(j);
@@ -22,19 +24,16 @@ NineRows lowerTimes(const Eigen::Matrix<double, 9, 9>& L, const NineRows& E) {
 
 }  // namespace
 
-ImuFactor::ImuFactor(const Preintegration& preintegration, const ImuNoise& noise, const Eigen::Vector3d& g_W)
+ImuFactor::ImuFactor(const Preintegration& preintegration, const Eigen::Vector3d& g_W)
     : pre_(preintegration), g_W_(g_W) {
   // W = L^-1 where L L' is the covariance.
   whitening_.setIdentity();
   pre_.covariance.llt().matrixL().solveInPlace(whitening_);
-  const double root_dt = std::sqrt(pre_.delta.dt);
-  gyro_walk_weight_ = 1.0 / (noise.gyro_random_walk * root_dt);
-  accel_walk_weight_ = 1.0 / (noise.accel_random_walk * root_dt);
 }
 
 bool ImuFactor::Evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
-  const StateView i(parameters[0]);
-  const StateView j(parameters[1]);
+  const StateView i(parameters[0], parameters[2]);
+  const MotionView j(parameters[1]);
   const ImuDelta& d = pre_.delta;
   const double T = d.dt;
   const Eigen::Vector3d d_bg = i.b_g - pre_.b_g;
@@ -50,50 +49,42 @@ bool ImuFactor::Evaluate(double const* const* parameters, double* residuals, dou
   Eigen::Matrix<double, 9, 1> e;
   e << e_R, p_I - (d.dp + d.dp_dbg * d_bg + d.dp_dba * d_ba),
       v_I - (d.dv + d.dv_dbg * d_bg + d.dv_dba * d_ba);
-  Eigen::Map<Eigen::Matrix<double, 15, 1>> r(residuals);
-  r.head<9>().noalias() = whitening_.triangularView<Eigen::Lower>() * e;
-  r.segment<3>(9) = gyro_walk_weight_ * (j.b_g - i.b_g);
-  r.segment<3>(12) = accel_walk_weight_ * (j.b_a - i.b_a);
+  Eigen::Map<Eigen::Matrix<double, 9, 1>>{residuals}.noalias() =
+      whitening_.triangularView<Eigen::Lower>() * e;
   if (jacobians == nullptr) return true;
 
   using S = StateBlock;
   const Eigen::Matrix3d Jr_inv = so3::rightJacobianInverse(e_R);
   if (jacobians[0] != nullptr) {
-    Eigen::Map<StateJacobian<15>> J(jacobians[0]);
-    NineRows E = NineRows::Zero();
+    MotionJacobian<9> E = MotionJacobian<9>::Zero();
     E.block<3, 3>(0, S::kQStored) = -Jr_inv * (j.q_WI.conjugate() * i.q_WI).toRotationMatrix();
-    E.block<3, 3>(0, S::kBgStored) =
-        -Jr_inv * so3::exp(e_R).toRotationMatrix().transpose() * so3::rightJacobian(dR_correction) * d.dR_dbg;
     E.block<3, 3>(3, S::kQStored) = so3::hat(p_I);
     E.block<3, 3>(3, S::kPStored) = -R_i_T;
     E.block<3, 3>(3, S::kVStored) = -T * R_i_T;
-    E.block<3, 3>(3, S::kBgStored) = -d.dp_dbg;
-    E.block<3, 3>(3, S::kBaStored) = -d.dp_dba;
     E.block<3, 3>(6, S::kQStored) = so3::hat(v_I);
     E.block<3, 3>(6, S::kVStored) = -R_i_T;
-    E.block<3, 3>(6, S::kBgStored) = -d.dv_dbg;
-    E.block<3, 3>(6, S::kBaStored) = -d.dv_dba;
-    J.setZero();
-    J.topRows<9>() = lowerTimes(whitening_, E);
-    J.block<3, 3>(9, S::kBgStored).diagonal().setConstant(-gyro_walk_weight_);
-    J.block<3, 3>(12, S::kBaStored).diagonal().setConstant(-accel_walk_weight_);
+    Eigen::Map<MotionJacobian<9>>{jacobians[0]} = lowerTimes(whitening_, E);
   }
   if (jacobians[1] != nullptr) {
-    Eigen::Map<StateJacobian<15>> J(jacobians[1]);
-    NineRows E = NineRows::Zero();
+    MotionJacobian<9> E = MotionJacobian<9>::Zero();
     E.block<3, 3>(0, S::kQStored) = Jr_inv;
     E.block<3, 3>(3, S::kPStored) = R_i_T;
     E.block<3, 3>(6, S::kVStored) = R_i_T;
-    J.setZero();
-    J.topRows<9>() = lowerTimes(whitening_, E);
-    J.block<3, 3>(9, S::kBgStored).diagonal().setConstant(gyro_walk_weight_);
-    J.block<3, 3>(12, S::kBaStored).diagonal().setConstant(accel_walk_weight_);
+    Eigen::Map<MotionJacobian<9>>{jacobians[1]} = lowerTimes(whitening_, E);
+  }
+  if (jacobians[2] != nullptr) {
+    BiasJacobian<9> E;
+    E << -Jr_inv * so3::exp(e_R).toRotationMatrix().transpose() * so3::rightJacobian(dR_correction) *
+             d.dR_dbg,
+        Eigen::Matrix3d::Zero(),  //
+        -d.dp_dbg, -d.dp_dba,     //
+        -d.dv_dbg, -d.dv_dba;
+    Eigen::Map<BiasJacobian<9>>{jacobians[2]} = lowerTimes(whitening_, E);
   }
   return true;
 }
 
-ImuTransition transition(const StateBlock& state_i, const Preintegration& preintegration,
-                         const ImuNoise& noise) {
+ImuTransition transition(const StateBlock& state_i, const Preintegration& preintegration) {
   const ImuDelta& d = preintegration.delta;
   const double T = d.dt;
   const Eigen::Matrix3d R_i = state_i.q_WI().toRotationMatrix();
@@ -118,8 +109,6 @@ ImuTransition transition(const StateBlock& state_i, const Preintegration& preint
   turn.block<3, 3>(S::kV, S::kV) = R_i;
   result.Q.setZero();
   result.Q.topLeftCorner<9, 9>() = turn * preintegration.covariance * turn.transpose();
-  result.Q.diagonal().segment<3>(S::kBg).setConstant(noise.gyro_random_walk * noise.gyro_random_walk * T);
-  result.Q.diagonal().segment<3>(S::kBa).setConstant(noise.accel_random_walk * noise.accel_random_walk * T);
   return result;
 }
 

@@ -34,7 +34,7 @@ Eigen::Matrix3d PolarNoise::covariance() const {
   return axes_.transpose() * metres.cwiseAbs2().asDiagonal() * axes_;
 }
 
-SeenPoint seenFrom(const StateView& x, const ImuDelta& delta, const Eigen::Vector3d& g_W,
+SeenPoint seenFrom(const MotionView& x, const ImuDelta& delta, const Eigen::Vector3d& g_W,
                    const Extrinsics& T_IR, const Eigen::Vector3d& p_W) {
   const double T = delta.dt;
   const Eigen::Matrix3d R_IW = x.q_WI.toRotationMatrix().transpose();  // at the state
@@ -47,10 +47,10 @@ SeenPoint seenFrom(const StateView& x, const ImuDelta& delta, const Eigen::Vecto
 
   SeenPoint seen;
   seen.p_R = R_RI * from_radar;
-  seen.J_state.setZero();
-  seen.J_state.middleCols<3>(StateBlock::kQStored) = R_R_state * so3::hat(from_state);
-  seen.J_state.middleCols<3>(StateBlock::kPStored) = -R_RW;
-  seen.J_state.middleCols<3>(StateBlock::kVStored) = -T * R_RW;
+  seen.J_motion.setZero();
+  seen.J_motion.middleCols<3>(StateBlock::kQStored) = R_R_state * so3::hat(from_state);
+  seen.J_motion.middleCols<3>(StateBlock::kPStored) = -R_RW;
+  seen.J_motion.middleCols<3>(StateBlock::kVStored) = -T * R_RW;
   seen.J_extrinsics.setZero();
   seen.J_extrinsics.leftCols<3>() = R_RI * so3::hat(from_radar);
   seen.J_extrinsics.rightCols<3>() = -R_RI;
@@ -59,12 +59,12 @@ SeenPoint seenFrom(const StateView& x, const ImuDelta& delta, const Eigen::Vecto
 }
 
 bool LandmarkFactor::Evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
-  const SeenPoint seen = seenFrom(StateView(parameters[0]), delta_, g_W_, toExtrinsics(parameters[1]),
+  const SeenPoint seen = seenFrom(MotionView(parameters[0]), delta_, g_W_, toExtrinsics(parameters[1]),
                                   Eigen::Map<const Eigen::Vector3d>(parameters[2]));
   const PolarResidual residual = noise_.at(seen.p_R);
   Eigen::Map<Eigen::Vector3d>{residuals} = residual.value;
   if (jacobians == nullptr) return true;
-  if (jacobians[0] != nullptr) Eigen::Map<StateJacobian<3>>{jacobians[0]} = residual.J * seen.J_state;
+  if (jacobians[0] != nullptr) Eigen::Map<MotionJacobian<3>>{jacobians[0]} = residual.J * seen.J_motion;
   if (jacobians[1] != nullptr)
     Eigen::Map<ExtrinsicsJacobian<3>>{jacobians[1]} = residual.J * seen.J_extrinsics;
   if (jacobians[2] != nullptr)

@@ -9,9 +9,8 @@
 
 namespace rio_t {
 
-RadarMotion RadarMotionModel::at(const double* state, Time state_time, Time stamp, double t_O,
+RadarMotion RadarMotionModel::at(const StateView& x, Time state_time, Time stamp, double t_O,
                                  const Eigen::Vector3d& l_I, const ImuMean* mean) const {
-  const StateView x(state);
   if (kind == TimeOffsetModel::kConstantAcceleration)
     return carriedByOneAcceleration(x, stamp, t_O, l_I,
                                     mean != nullptr ? *mean : imu->mean(stamp, kOffsetHalfWidth));
@@ -41,11 +40,10 @@ RadarMotion RadarMotionModel::carriedByImu(const StateView& x, Time state_time, 
   motion.omega_I = imu->at(tau).angular_velocity - x.b_g;
   motion.v_I = v_tau + motion.omega_I.cross(l_I);
   if (mean == nullptr) return motion;
-  motion.J_state.middleCols<3>(StateBlock::kQStored) = dR_T * so3::hat(carried);
-  motion.J_state.middleCols<3>(StateBlock::kVStored) = dR_T * R_IW;
-  motion.J_state.middleCols<3>(StateBlock::kBgStored) =
-      dR_T * delta.dv_dbg + so3::hat(v_tau) * delta.dR_dbg + so3::hat(l_I);
-  motion.J_state.middleCols<3>(StateBlock::kBaStored) = dR_T * delta.dv_dba;
+  motion.J_motion.middleCols<3>(StateBlock::kQStored) = dR_T * so3::hat(carried);
+  motion.J_motion.middleCols<3>(StateBlock::kVStored) = dR_T * R_IW;
+  motion.J_biases.leftCols<3>() = dR_T * delta.dv_dbg + so3::hat(v_tau) * delta.dR_dbg + so3::hat(l_I);
+  motion.J_biases.rightCols<3>() = dR_T * delta.dv_dba;
   motion.dv_dt_O = -velocityRate(*mean, x.b_g, x.b_a, v_tau, dR_T * R_IW * g_W, l_I).a_I;
   motion.alpha_I = mean->angular_acceleration;
   return motion;
@@ -62,10 +60,10 @@ RadarMotion RadarMotionModel::carriedByOneAcceleration(const StateView& x, Time 
   RadarMotion motion;
   motion.omega_I = imu->at(stamp).angular_velocity - x.b_g;
   motion.v_I = v_I + motion.omega_I.cross(l_I) - t_O * a_c;
-  motion.J_state.middleCols<3>(StateBlock::kQStored) = so3::hat(v_I - t_O * g_I);
-  motion.J_state.middleCols<3>(StateBlock::kVStored) = R_IW;
-  motion.J_state.middleCols<3>(StateBlock::kBgStored) = so3::hat(l_I);
-  motion.J_state.middleCols<3>(StateBlock::kBaStored).diagonal().setConstant(t_O);
+  motion.J_motion.middleCols<3>(StateBlock::kQStored) = so3::hat(v_I - t_O * g_I);
+  motion.J_motion.middleCols<3>(StateBlock::kVStored) = R_IW;
+  motion.J_biases.leftCols<3>() = so3::hat(l_I);
+  motion.J_biases.rightCols<3>().diagonal().setConstant(t_O);
   motion.dv_dt_O = -a_c;
   return motion;
 }

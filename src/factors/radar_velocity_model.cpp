@@ -10,24 +10,25 @@ bool RadarVelocityModel::isCurrent(Time mean_time) const {
 }
 
 PredictedVelocity RadarVelocityModel::at(double const* const* parameters, bool derivatives) const {
-  const Extrinsics T_IR = toExtrinsics(parameters[2]);
-  const double t_O = scan_.linear_from_t_O.value_or(parameters[1][0]);
-  const double away = parameters[1][0] - t_O;
+  const Extrinsics T_IR = toExtrinsics(parameters[3]);
+  const double t_O = scan_.linear_from_t_O.value_or(parameters[2][0]);
+  const double away = parameters[2][0] - t_O;
   const bool is_linear = away != 0.0 && scan_.offset_gain > 0.0;
   // The value may depend on the mean, too.
   const bool needs_mean = derivatives || is_linear || model_.kind == TimeOffsetModel::kConstantAcceleration;
   const Time mean_time = model_.meanTime(scan_.stamp, t_O);
   if (needs_mean && !isCurrent(mean_time))
     mean_ = Mean{mean_time, model_.imu->newest(), model_.imu->mean(mean_time, scan_.offset_half_width)};
-  const RadarMotion motion =
-      model_.at(parameters[0], state_time_, scan_.stamp, t_O, T_IR.l_I, needs_mean ? &mean_->value : nullptr);
+  const RadarMotion motion = model_.at(StateView(parameters[0], parameters[1]), state_time_, scan_.stamp, t_O,
+                                       T_IR.l_I, needs_mean ? &mean_->value : nullptr);
   const Eigen::Matrix3d R_RI = T_IR.R_RI();
   PredictedVelocity predicted;
   predicted.dv_dt_O = scan_.offset_gain * (R_RI * motion.dv_dt_O);
   predicted.v_R = R_RI * motion.v_I;
   if (is_linear) predicted.v_R += away * predicted.dv_dt_O;
   if (!derivatives) return predicted;
-  predicted.J_state = R_RI * motion.J_state;
+  predicted.J_motion = R_RI * motion.J_motion;
+  predicted.J_biases = R_RI * motion.J_biases;
   predicted.J_extrinsics.setZero();
   predicted.J_extrinsics.leftCols<3>() = so3::hat(predicted.v_R) * R_RI;
   predicted.J_extrinsics.rightCols<3>() =

@@ -232,15 +232,15 @@ class BlockElimination {
   Tableau tableau_;
 };
 
-/// Calls part(first, width) for parts of the columns, with widths that the compiler knows: 15 of a state, 6
-/// and 3 of a mounting, 1 of an offset.
+/// Calls part(first, width) for parts of the columns, with widths that the compiler knows: 9 of a motion, 6
+/// of biases, 3 of a point, 1 of an offset.
 template <typename Part>
 void inParts(Eigen::Index columns, const Part& part) {
   Eigen::Index first = 0;
   const auto take = [&](auto width) {
     for (; columns - first >= width; first += width) part(first, width);
   };
-  take(std::integral_constant<int, 15>());
+  take(std::integral_constant<int, 9>());
   take(std::integral_constant<int, 6>());
   take(std::integral_constant<int, 3>());
   take(std::integral_constant<int, 1>());
@@ -375,16 +375,20 @@ SquareRoot eliminateFirst(const LinearSystem& system, int count) {
   return elimination.rest(count);
 }
 
-SquareRoot widened(const SquareRoot& known, Eigen::Index first, const Eigen::VectorXd& variances) {
+SquareRoot widened(const SquareRoot& known, const Eigen::VectorXd& variances) {
   // Rows in (w, x'): x = x' - w, and w = 0 +- its sigma.
-  const Eigen::Index walk = variances.size(), columns = known.J.cols(), rows = known.J.rows();
+  const Eigen::Index walk = (variances.array() > 0.0).count();
+  const Eigen::Index columns = known.J.cols(), rows = known.J.rows();
   Tableau tableau;
   tableau.reset(walk + rows, walk + columns + 1);
-  for (Eigen::Index k = 0; k < walk; ++k) tableau.row(k)[k] = 1.0 / std::sqrt(variances[k]);
   for (Eigen::Index i = 0; i < rows; ++i) {
-    Eigen::Map<Eigen::RowVectorXd>(tableau.row(walk + i), walk + columns + 1)
-        << -known.J.block(i, first, 1, walk),
-        known.J.row(i), known.r0[i];
+    Eigen::Map<Eigen::RowVectorXd>(tableau.row(walk + i) + walk, columns + 1) << known.J.row(i), known.r0[i];
+  }
+  for (Eigen::Index k = 0, w = 0; k < columns; ++k) {
+    if (variances[k] <= 0.0) continue;
+    tableau.row(w)[w] = 1.0 / std::sqrt(variances[k]);
+    for (Eigen::Index i = 0; i < rows; ++i) tableau.row(walk + i)[w] = -known.J(i, k);
+    ++w;
   }
   tableau.triangularise(0, walk + columns);
   return squareRootOf(tableau, walk, columns);

@@ -67,16 +67,16 @@ void marginalize(Window& window, std::vector<const Block*> leaving, const std::v
     kept.push_back(block.get());
     order.push_back(block.get());
   }
-  SquareRoot known = eliminateFirst(linearize(order, terms), static_cast<int>(leaving.size()));
+  const SquareRoot known = eliminateFirst(linearize(order, terms), static_cast<int>(leaving.size()));
+  Eigen::VectorXd gained = Eigen::VectorXd::Zero(known.J.cols());
   Eigen::Index first = 0;
   for (const Block* block : kept) {
     for (const Walk& walk : walks)
-      if (walk.block == block && walk.variance.minCoeff() > 0.0)
-        known = widened(known, first + walk.first, walk.variance);
+      if (walk.block == block) gained.segment(first + walk.first, walk.variance.size()) += walk.variance;
     first += block->manifold->tangent();
   }
   for (const Block* block : leaving) window.remove(*block);
-  if (!kept.empty()) addPrior(window, kept, known);
+  if (!kept.empty()) addPrior(window, kept, widened(known, gained));
 }
 
 }  // namespace rio_t

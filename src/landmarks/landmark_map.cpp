@@ -103,12 +103,12 @@ LandmarkMap::Association LandmarkMap::associate(const Prediction& prediction, co
   for (std::size_t column = 0; column < prediction.landmarks.size(); ++column) {
     const Landmark& landmark = landmarks_[prediction.landmarks[column]];
     const SeenPoint seen =
-        seenFrom(StateView(prediction.state.x.data()), ImuDelta(), g_W_, T_IR, landmark.p_W());
+        seenFrom(MotionView(prediction.state.x.data()), ImuDelta(), g_W_, T_IR, landmark.p_W());
     // The derivative by state, extrinsics and landmark, in their tangents.
     Eigen::Matrix<double, 3, Eigen::Dynamic> J(3, shared + 3);
     J.setZero();
-    J.leftCols<3>() = seen.J_state.leftCols<3>();
-    J.middleCols<3>(StateBlock::kP) = seen.J_state.middleCols<3>(StateBlock::kPStored);
+    J.leftCols<3>() = seen.J_motion.leftCols<3>();
+    J.middleCols<3>(StateBlock::kP) = seen.J_motion.middleCols<3>(StateBlock::kPStored);
     const Eigen::Index calibrated = shared - StateBlock::kTangent;
     if (calibrated > 0) J.middleCols<3>(StateBlock::kTangent) = seen.J_extrinsics.leftCols<3>();
     if (calibrated > 3) J.middleCols<3>(StateBlock::kTangent + 3) = seen.J_extrinsics.rightCols<3>();
@@ -165,7 +165,7 @@ LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<
     answer.dropped_map = true;
     return answer;
   }
-  const StateView at_node(node.x.data());
+  const StateView at_node(node.x.data(), smoother.biases().x.data());
   const ImuDelta delta = integrate(*imu_, *node.time, prediction.measured, at_node.b_g, at_node.b_a);
   for (const Match& match : association.matches) {
     Landmark& landmark = landmarks_[match.landmark];

@@ -221,14 +221,16 @@ MotionInitializer::Line MotionInitializer::fitLine(const Velocities& velocities,
 double MotionInitializer::refine(const Velocities& velocities, Time time, const ImuBuffer& imu,
                                  ModelErrorScale& scale, NodePrior& prior) const {
   Window window;
-  Block& state = window.addNode(time, std::make_shared<StateManifold>(), stored(prior.x0));
+  Block& motion = window.addNode(time, std::make_shared<MotionManifold>(), storedMotion(prior.x0));
+  const std::shared_ptr<Block> biases =
+      window.addCalibration(std::make_shared<VectorManifold>(StateBlock::kBiases), storedBiases(prior.x0));
   const std::shared_ptr<Block> offset =
       window.addCalibration(std::make_shared<VectorManifold>(1), Eigen::VectorXd::Constant(1, prior.t_O0));
   offset->bound = smoother_.max_time_offset;
   const EstimateExtrinsics estimate = smoother_.estimate_extrinsics;
   const std::shared_ptr<Block> extrinsics =
       window.addCalibration(std::make_shared<ExtrinsicsManifold>(estimate), stored(prior.T_IR0));
-  std::vector<Block*> blocks = {&state, offset.get()};
+  std::vector<Block*> blocks = {&motion, biases.get(), offset.get()};
   if (estimate == EstimateExtrinsics::kNone) {
     window.setConstant(*extrinsics, true);
   } else {
@@ -245,8 +247,8 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
   OffsetGains offset_gains;
   Solution solution;
   for (int round = 0; round < kMaxRounds; ++round) {
-    const OffsetGains last =
-        std::exchange(offset_gains, offsetGains(velocities, time, imu, state, offset->x[0]));
+    const OffsetGains last = std::exchange(
+        offset_gains, offsetGains(velocities, time, imu, stateOf(motion, *biases), offset->x[0]));
     const std::vector<double>& gains = offset_gains.gains;
     if (round > 0 && isNear(gains, last.gains)) break;
     for (const Term* term : terms) window.remove(*term);
@@ -258,7 +260,7 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
       z.offset_half_width = offset_gains.half_width;
       if (gains[i] == 0.0) z.linear_from_t_O = offset->x[0];
       terms.push_back(&window.add(std::make_unique<RadarVelocityFactor>(z, time, model),
-                                  {&state, offset.get(), extrinsics.get()}, loss));
+                                  {&motion, biases.get(), offset.get(), extrinsics.get()}, loss));
     }
     try {
       solution = rio_t::solve(window, {kMaxIterations, kConverged * kConverged}, smoother_.solver);
@@ -272,7 +274,7 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
   double mean_square = 0.0;
   double mean_share = 0.0;
   for (std::size_t i = 0; i < velocities.size(); ++i) {
-    const double* values[] = {state.x.data(), offset->x.data(), extrinsics->x.data()};
+    const double* values[] = {motion.x.data(), biases->x.data(), offset->x.data(), extrinsics->x.data()};
     Eigen::Vector3d e;
     terms[i]->cost->Evaluate(values, e.data(), nullptr);
     const double square = std::min(e.squaredNorm(), kOutlier * kOutlier);
@@ -281,7 +283,7 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
     mean_share += covariances[i].whole.ldlt().solve(covariances[i].scaled).trace() / (3.0 * n);
   }
   const SquareRoot root = eliminateFirst(solution.system, 0);
-  prior = {toStateBlock(state.x), offset->x[0], toExtrinsics(extrinsics->x.data()), root.J, root.r0};
+  prior = {stateOf(motion, *biases), offset->x[0], toExtrinsics(extrinsics->x.data()), root.J, root.r0};
   // The solution is drawn towards the velocities: what is left scatters less.
   const double left = 3.0 * n / (3.0 * n - kUnknowns);
   for (std::size_t i = 0; i < velocities.size(); ++i) scale.add(time, left * mean_square, mean_share);
@@ -289,7 +291,7 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
 }
 
 MotionInitializer::OffsetGains MotionInitializer::offsetGains(const Velocities& velocities, Time time,
-                                                              const ImuBuffer& imu, const Block& state,
+                                                              const ImuBuffer& imu, const StateBlock& x,
                                                               double t_O) const {
   OffsetGains result;
   result.gains.resize(velocities.size(), 0.0);
@@ -299,7 +301,7 @@ MotionInitializer::OffsetGains MotionInitializer::offsetGains(const Velocities& 
   for (const Velocity& z : velocities) {
     OffsetScan scan;
     scan.tau = z.stamp - t_O;
-    scan.x = carried(toStateBlock(state.x), time, scan.tau, imu, g_W_);
+    scan.x = carried(x, time, scan.tau, imu, g_W_);
     scan.T_IR = T_IR_;
     scan.measured = z.covariance;
     widths.add(scan);

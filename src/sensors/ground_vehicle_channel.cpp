@@ -37,7 +37,7 @@ void GroundVehicleChannel::join(FixedLagSmoother& smoother, bool at_rest) {
   frame_ = window.addCalibration(manifold_, stored(options_.T_IV));
   Block* node = smoother.nodeAt(smoother.newest().time);
   // This prior does not constrain the node. It leaves the window with it, and from then on the block walks.
-  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(3, StateBlock::kTangent + 3);
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(3, StateBlock::kMotionTangent + 3);
   J.rightCols<3>().diagonal().setConstant(1.0 / options_.rotation_sigma);
   addPrior(window, {node, frame_.get()}, {J, Eigen::VectorXd::Zero(3)});
   judged_at_.reset();
@@ -55,11 +55,11 @@ std::optional<GroundVehicleAnswer> GroundVehicleChannel::judge(const FixedLagSmo
   const auto predicted = smoother.predict(time, {frame_.get()});
   if (!predicted) return std::nullopt;
   const Eigen::MatrixXd& P = predicted->covariance;
-  const VehicleVelocity velocity = vehicleVelocity(predicted->x.data(), frame_->x.data(), omegaAt(time));
+  const VehicleVelocity velocity =
+      vehicleVelocity(StateView(predicted->x), toExtrinsics(frame_->x.data()), omegaAt(time));
   Eigen::Matrix<double, 2, StateBlock::kTangent + 3> J;
-  J << velocity.J_state.bottomLeftCorner<2, 3>(),
-      velocity.J_state.bottomRightCorner<2, StateBlock::kTangent - 3>(),
-      velocity.J_frame.bottomLeftCorner<2, 3>();
+  J << velocity.J_motion.bottomLeftCorner<2, 3>(), velocity.J_motion.bottomRightCorner<2, 6>(),
+      velocity.J_biases.bottomRows<2>(), velocity.J_frame.bottomLeftCorner<2, 3>();
   Eigen::Matrix2d S = J * P * J.transpose();
   S(0, 0) += options_.sideways_sigma * options_.sideways_sigma;
   S(1, 1) += options_.vertical_sigma * options_.vertical_sigma;
@@ -108,7 +108,7 @@ bool GroundVehicleChannel::add(const GroundVehicleAnswer& answer, FixedLagSmooth
   smoother.window().add(
       std::make_unique<GroundVehicleFactor>(
           omegaAt(*node->time), Eigen::Vector2d(options_.sideways_sigma, options_.vertical_sigma)),
-      {node, frame_.get()}, loss_);
+      {node, &smoother.biases(), frame_.get()}, loss_);
   return true;
 }
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "rio_t/factors/constant_offset_factor.h"
+#include "rio_t/factors/random_walk_factor.h"
 
 namespace rio_t {
 
@@ -36,7 +36,8 @@ void OffsetBlocks::step(FixedLagSmoother& smoother, Time stamp) {
   Window& window = smoother.window();
   Block& before = *epochs_.back().block;
   std::shared_ptr<Block> after = add(window, value());
-  window.add(std::make_unique<ConstantOffsetFactor>(options_.time_offset_sigma), {&before, after.get()});
+  window.add(std::make_unique<RandomWalkFactor>(Eigen::VectorXd::Constant(1, options_.time_offset_sigma)),
+             {&before, after.get()});
   before.is_retired = true;
   epochs_.push_back({stamp, std::move(after)});
   smoother.settle();

@@ -29,8 +29,8 @@ std::vector<Block*> RadarInWindow::addExtrinsics(Window& window, const Extrinsic
 }
 
 void RadarInWindow::start(FixedLagSmoother& smoother, Time time, const NodePrior& prior) {
-  Block& state = smoother.start(time, prior.x0);
-  std::vector<Block*> blocks = {&state, &offset_->start(smoother.window(), prior.t_O0)};
+  Block& node = smoother.start(time, prior.x0);
+  std::vector<Block*> blocks = {&node, &smoother.biases(), &offset_->start(smoother.window(), prior.t_O0)};
   for (Block* block : addExtrinsics(smoother.window(), prior.T_IR0)) blocks.push_back(block);
   addPrior(smoother.window(), blocks, {prior.J, prior.r0});
   smoother.settle();
@@ -44,7 +44,7 @@ void RadarInWindow::join(FixedLagSmoother& smoother) {
   Eigen::VectorXd sigmas = calibrationSigmas(options_);
   if (options_.time_offset_shared) sigmas = sigmas.tail(sigmas.size() - 1).eval();
   // This prior does not constrain the node. It leaves the window with it, and from then on the block walks.
-  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(sigmas.size(), StateBlock::kTangent + sigmas.size());
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(sigmas.size(), StateBlock::kMotionTangent + sigmas.size());
   J.rightCols(sigmas.size()) = sigmas.cwiseInverse().asDiagonal();
   if (blocks.size() > 1) addPrior(window, blocks, {J, Eigen::VectorXd::Zero(sigmas.size())});
   smoother.settle();
@@ -69,11 +69,11 @@ std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoo
   const Eigen::Matrix3d R_RI = T_IR.R_RI();
   // A short mean, even if the IMU vibrates: a wide one would smooth away what an unknown offset changes.
   const ImuMean mean = model_.imu->mean(time, kOffsetHalfWidth);
-  const RadarMotion motion = model_.at(state->x.data(), time, stamp, offset(), T_IR.l_I, &mean);
+  const RadarMotion motion = model_.at(StateView(state->x), time, stamp, offset(), T_IR.l_I, &mean);
   constexpr int kOffset = StateBlock::kTangent;
   const Eigen::MatrixXd& P = state->covariance;
   Eigen::Matrix<double, 3, Eigen::Dynamic> J(3, P.cols());
-  J.leftCols<kOffset>() << motion.J_state.leftCols<3>(), motion.J_state.rightCols<kOffset - 3>();
+  J.leftCols<kOffset>() << motion.J_motion.leftCols<3>(), motion.J_motion.rightCols<6>(), motion.J_biases;
   J.col(kOffset) = motion.dv_dt_O;
   const Eigen::Index calibrated = P.cols() - (kOffset + 1);  // directions of the extrinsics
   if (calibrated > 0) J.middleCols<3>(kOffset + 1) = so3::hat(motion.v_I);
@@ -112,7 +112,7 @@ std::optional<Eigen::Vector3d> RadarInWindow::velocityAt(const FixedLagSmoother&
   // One acceleration alone does not carry a state from its node to the scan.
   const StateBlock x = carried(node->x, node->time, time, *model_.imu, model_.g_W);
   const Extrinsics T_IR = extrinsics();
-  return T_IR.R_RI() * model_.at(x.data(), time, stamp, offset(), T_IR.l_I, nullptr).v_I;
+  return T_IR.R_RI() * model_.at(StateView(x), time, stamp, offset(), T_IR.l_I, nullptr).v_I;
 }
 
 template <class Factor, class Measurement>
@@ -124,8 +124,9 @@ bool RadarInWindow::addTerm(FixedLagSmoother& smoother, const Measurement& z,
   Block* node = smoother.nodeAt(nodeTime(z.stamp));
   if (node == nullptr) return false;
   stamps_.push_back(z.stamp);
-  smoother.window().add(std::make_unique<Factor>(z, *node->time, model_),
-                        {node, &offset_->of(smoother.window(), z.stamp), extrinsics_.get()}, loss);
+  smoother.window().add(
+      std::make_unique<Factor>(z, *node->time, model_),
+      {node, &smoother.biases(), &offset_->of(smoother.window(), z.stamp), extrinsics_.get()}, loss);
   return true;
 }
 

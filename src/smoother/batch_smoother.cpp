@@ -8,8 +8,8 @@
 #include <unordered_map>
 #include <utility>
 
-#include "rio_t/factors/constant_offset_factor.h"
 #include "rio_t/factors/imu_factor.h"
+#include "rio_t/factors/random_walk_factor.h"
 #include "rio_t/factors/zero_velocity_factor.h"
 #include "rio_t/graph/marginalization.h"
 #include "rio_t/imu/preintegration.h"
@@ -62,15 +62,17 @@ BatchSmoother::BatchSmoother(const SmootherOptions& options, const BatchOptions&
       noise_(noise),
       g_W_(g_W),
       imu_(&imu),
-      state_manifold_(std::make_shared<StateManifold>()),
+      motion_manifold_(std::make_shared<MotionManifold>()),
+      bias_manifold_(std::make_shared<VectorManifold>(StateBlock::kBiases)),
       offset_manifold_(std::make_shared<VectorManifold>(1)),
       extrinsics_manifold_(std::make_shared<ExtrinsicsManifold>(options.estimate_extrinsics)) {}
 
 std::vector<Block*> BatchSmoother::start(const BatchProblem& problem, const StateBlock& x,
                                          const std::vector<Extrinsics>& mounting, Graph& graph) const {
   Window& window = graph.window;
-  Block& state = window.addNode(problem.start, state_manifold_, stored(problem.prior.x0));
-  graph.nodes.push_back(&state);
+  Block& motion = window.addNode(problem.start, motion_manifold_, storedMotion(problem.prior.x0));
+  Block& biases = addBiases(window, problem.start, problem.prior.x0);
+  graph.nodes.push_back({&motion, &biases});
   const bool is_estimated = options_.estimate_extrinsics != EstimateExtrinsics::kNone;
   const Eigen::VectorXd sigmas = calibrationSigmas(options_);
   std::vector<Block*> offsets;
@@ -81,7 +83,7 @@ std::vector<Block*> BatchSmoother::start(const BatchProblem& problem, const Stat
     offsets.push_back(is_first ? &addOffset(window, problem.start, has_prior ? problem.prior.t_O0 : t_O)
                                : offsets.front());
   }
-  std::vector<Block*> known = {&state, offsets.at(problem.radar)};
+  std::vector<Block*> known = {&motion, &biases, offsets.at(problem.radar)};
   for (std::size_t k = 0; k < mounting.size(); ++k) {
     const bool has_prior = k == problem.radar;
     // The prior has its own mounting as its origin, so the block starts there.
@@ -101,7 +103,8 @@ std::vector<Block*> BatchSmoother::start(const BatchProblem& problem, const Stat
     if (is_estimated) add(extrinsics, sigmas.tail(sigmas.size() - 1));
   }
   addPrior(window, known, {problem.prior.J, problem.prior.r0});
-  state.x = stored(x);
+  motion.x = storedMotion(x);
+  biases.x = storedBiases(x);
   for (std::size_t k = 0; k < mounting.size(); ++k)
     if (is_estimated) graph.extrinsics[k]->x = stored(mounting[k]);
   return offsets;
@@ -135,29 +138,37 @@ BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std
   std::vector<bool> stepped(offsets.size(), false);  // since the newest
   for (const std::size_t i : order) {
     const BatchScan& scan = problem.scans[i];
-    Block* node = graph.nodes.back();
-    if (times[i] - *node->time > spacing) {
-      Block& previous = *node;
-      node = &window.addNode(times[i], state_manifold_, stored(stateAt(times[i])));
-      const StateView x(previous.x.data());
-      window.add(std::make_unique<ImuFactor>(
-                     preintegrate(*imu_, *previous.time, times[i], x.b_g, x.b_a, noise_), noise_, g_W_),
-                 {&previous, node});
-      graph.nodes.push_back(node);
+    if (times[i] - *graph.nodes.back().motion->time > spacing) {
+      const Graph::Node previous = graph.nodes.back();
+      const Time since = *previous.motion->time;
+      const StateBlock x = stateAt(times[i]);
+      Graph::Node next{&window.addNode(times[i], motion_manifold_, storedMotion(x)), previous.biases};
+      if (since >= *next.biases->time) {
+        next.biases = &addBiases(window, since, x);
+        const double dt = *next.biases->time - *previous.biases->time;
+        window.add(std::make_unique<RandomWalkFactor>(biasWalkVariance(noise_, dt).cwiseSqrt()),
+                   {previous.biases, next.biases});
+      }
+      const StateView at(next.motion->x.data(), next.biases->x.data());
+      window.add(
+          std::make_unique<ImuFactor>(preintegrate(*imu_, since, times[i], at.b_g, at.b_a, noise_), g_W_),
+          {previous.motion, next.motion, next.biases});
+      graph.nodes.push_back(next);
     }
+    const Graph::Node& node = graph.nodes.back();
     const std::size_t clock = options_.time_offset_shared ? 0 : scan.radar;
     Block*& offset = offsets[clock];
     stepped[clock] = stepped[clock] || scan.offset_stepped;
     if (options_.estimate_time_offset && *offset->time == problem.start) offset->x[0] = t_O[i];
-    const double dt = *node->time - *offset->time;
+    const double dt = *node.motion->time - *offset->time;
     if (dt > 0.0) {
       Block& previous = *offset;
-      offset = &addOffset(window, *node->time, t_O[i]);
+      offset = &addOffset(window, *node.motion->time, t_O[i]);
       const double anew = options_.time_offset_shared || problem.time_offset_sigmas.empty()
                               ? options_.time_offset_sigma
                               : problem.time_offset_sigmas[scan.radar];
-      window.add(std::make_unique<ConstantOffsetFactor>(
-                     stepped[clock] ? anew : options_.time_offset_noise * std::sqrt(dt)),
+      const double sigma = stepped[clock] ? anew : options_.time_offset_noise * std::sqrt(dt);
+      window.add(std::make_unique<RandomWalkFactor>(Eigen::VectorXd::Constant(1, sigma)),
                  {&previous, offset});
       stepped[clock] = false;
     }
@@ -169,14 +180,14 @@ BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std
       return z;
     };
     if (scan.doppler) {
-      window.add(std::make_unique<DopplerFactor>(placed(*scan.doppler), *node->time, model()),
-                 {node, offset, extrinsics});
+      window.add(std::make_unique<DopplerFactor>(placed(*scan.doppler), *node.motion->time, model()),
+                 {node.motion, node.biases, offset, extrinsics});
     } else if (scan.velocity) {
-      window.add(std::make_unique<RadarVelocityFactor>(placed(*scan.velocity), *node->time, model()),
-                 {node, offset, extrinsics}, loss);
+      window.add(std::make_unique<RadarVelocityFactor>(placed(*scan.velocity), *node.motion->time, model()),
+                 {node.motion, node.biases, offset, extrinsics}, loss);
     }
     if (scan.rest_velocity_sigma)
-      window.add(std::make_unique<ZeroVelocityFactor>(*scan.rest_velocity_sigma), {node});
+      window.add(std::make_unique<ZeroVelocityFactor>(*scan.rest_velocity_sigma), {node.motion});
   }
   return graph;
 }
@@ -186,6 +197,11 @@ Block& BatchSmoother::addOffset(Window& window, Time time, double t_O) const {
   offset.bound = options_.max_time_offset;
   if (!options_.estimate_time_offset) window.setConstant(offset, true);
   return offset;
+}
+
+Block& BatchSmoother::addBiases(Window& window, Time since, const StateBlock& x) const {
+  // Eliminated after the nodes that have them: so few rows fill up.
+  return window.addNode(since + options_.window, bias_manifold_, storedBiases(x));
 }
 
 RadarMotionModel BatchSmoother::model() const {
@@ -205,7 +221,8 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
                                    options_.solver);
     solution.iterations += solved.iterations;
     solution.nodes.clear();
-    for (const Block* node : graph.nodes) solution.nodes.push_back({*node->time, toStateBlock(node->x)});
+    for (const Graph::Node& node : graph.nodes)
+      solution.nodes.push_back({*node.motion->time, stateOf(*node.motion, *node.biases)});
     solution.extrinsics.clear();
     for (const Block* block : graph.extrinsics) solution.extrinsics.push_back(toExtrinsics(block->x.data()));
     double moved = 0.0;  // [s]
@@ -231,10 +248,11 @@ void BatchSmoother::read(const Graph& graph, const Solution& solved, BatchSoluti
   const std::vector<std::map<int, Eigen::MatrixXd>> P = solved.elimination.covariances();
   std::unordered_map<const Block*, int> index;
   for (const Block* block : solved.system.blocks) index.emplace(block, static_cast<int>(index.size()));
-  for (const Block* node : graph.nodes)
-    solution.covariances.emplace_back(P[index.at(node)].at(index.at(node)));
+  for (const Graph::Node& node : graph.nodes)
+    solution.covariances.emplace_back(jointCovariance(P, {index.at(node.motion), index.at(node.biases)}));
   for (const Graph::Scan& scan : graph.scans) {
-    std::vector<int> blocks = {index.at(graph.nodes[scan.node]), index.at(scan.offset)};
+    const Graph::Node& node = graph.nodes[scan.node];
+    std::vector<int> blocks = {index.at(node.motion), index.at(node.biases), index.at(scan.offset)};
     if (!scan.extrinsics->is_constant) blocks.push_back(index.at(scan.extrinsics));
     solution.scans.push_back({scan.node, scan.offset->x[0], jointCovariance(P, blocks)});
   }

@@ -12,19 +12,29 @@
 
 namespace rio_t {
 
-StateBlock toStateBlock(const Eigen::Ref<const Eigen::VectorXd>& stored) {
+StateBlock stateOf(const Block& motion, const Block& biases) {
   StateBlock x;
-  std::copy(stored.data(), stored.data() + StateBlock::kSize, x.data());
+  std::copy_n(motion.x.data(), StateBlock::kMotion, x.data());
+  std::copy_n(biases.x.data(), StateBlock::kBiases, x.data() + StateBlock::kMotion);
   return x;
 }
 
-Eigen::VectorXd stored(const StateBlock& x) {
-  return Eigen::Map<const Eigen::Matrix<double, StateBlock::kSize, 1>>(x.data());
+Eigen::VectorXd storedMotion(const StateBlock& x) {
+  return Eigen::Map<const Eigen::VectorXd>(x.data(), StateBlock::kMotion);
+}
+
+Eigen::VectorXd storedBiases(const StateBlock& x) {
+  return Eigen::Map<const Eigen::VectorXd>(x.biases(), StateBlock::kBiases);
 }
 
 FixedLagSmoother::FixedLagSmoother(const SmootherOptions& options, const ImuNoise& noise,
                                    const Eigen::Vector3d& g_W, const ImuBuffer& imu)
-    : options_(options), noise_(noise), g_W_(g_W), imu_(&imu), manifold_(std::make_shared<StateManifold>()) {}
+    : options_(options),
+      noise_(noise),
+      g_W_(g_W),
+      imu_(&imu),
+      motion_manifold_(std::make_shared<MotionManifold>()),
+      bias_manifold_(std::make_shared<VectorManifold>(StateBlock::kBiases)) {}
 
 void FixedLagSmoother::setImuNoise(const ImuNoise& noise) {
   noise_ = noise;
@@ -33,7 +43,8 @@ void FixedLagSmoother::setImuNoise(const ImuNoise& noise) {
 
 Block& FixedLagSmoother::start(Time time, const StateBlock& x0) {
   window_ = Window();
-  Block& block = window_.addNode(time, manifold_, stored(x0));
+  Block& block = window_.addNode(time, motion_manifold_, storedMotion(x0));
+  biases_ = window_.addCalibration(bias_manifold_, storedBiases(x0));
   nodes_ = {Node{&block}};
   drifted_ = 0.0;
   solution_ = Solution();
@@ -41,7 +52,7 @@ Block& FixedLagSmoother::start(Time time, const StateBlock& x0) {
 }
 
 NodeEstimate FixedLagSmoother::node(std::size_t k) const {
-  return {nodes_[k].time(), toStateBlock(nodes_[k].block->x)};
+  return {nodes_[k].time(), stateOf(*nodes_[k].block, *biases_)};
 }
 
 std::size_t FixedLagSmoother::indexBefore(Time time) const {
@@ -55,9 +66,16 @@ std::optional<NodeEstimate> FixedLagSmoother::nodeBefore(Time time) const {
   return node(indexBefore(time));
 }
 
+Eigen::VectorXd biasWalkVariance(const ImuNoise& noise, double dt) {
+  Eigen::VectorXd variance(StateBlock::kBiases);
+  variance << Eigen::Vector3d::Constant(noise.gyro_random_walk * noise.gyro_random_walk * dt),
+      Eigen::Vector3d::Constant(noise.accel_random_walk * noise.accel_random_walk * dt);
+  return variance;
+}
+
 Eigen::MatrixXd FixedLagSmoother::covarianceOf(const Block& node,
                                                const std::vector<const Block*>& calibration) const {
-  std::vector<int> indices = {solution_.system.indexOf(node)};
+  std::vector<int> indices = {solution_.system.indexOf(node), solution_.system.indexOf(*biases_)};
   for (const Block* block : calibration) indices.push_back(solution_.system.indexOf(*block));
   if (std::any_of(indices.begin(), indices.end(), [](int i) { return i < 0; }))
     throw std::logic_error("smoother: asked for the covariance of what was not solved for");
@@ -72,10 +90,10 @@ std::optional<PredictedState> FixedLagSmoother::predict(Time time,
                                                         const std::vector<const Block*>& calibration) const {
   if (time < nodes_.front().time()) return std::nullopt;
   const Node& node = nodes_[indexBefore(time)];
-  PredictedState predicted{toStateBlock(node.block->x), covarianceOf(*node.block, calibration)};
+  PredictedState predicted{stateOf(*node.block, *biases_), covarianceOf(*node.block, calibration)};
   if (time == node.time()) return predicted;
   const Preintegration& pre = preintegrateFrom(node, time);
-  const ImuTransition step = transition(predicted.x, pre, noise_);
+  const ImuTransition step = transition(predicted.x, pre);
   predicted.x = rio_t::predict(predicted.x, pre, g_W_);
   constexpr int kState = StateBlock::kTangent;
   Eigen::MatrixXd& P = predicted.covariance;
@@ -99,9 +117,8 @@ Block* FixedLagSmoother::nodeAt(Time time) {
   if (time - nodes_[before].time() <= spacing) return nodes_[before].block;
   if (after < nodes_.size() && nodes_[after].time() - time <= spacing) return nodes_[after].block;
 
-  const StateBlock x =
-      rio_t::predict(toStateBlock(nodes_[before].block->x), preintegrateFrom(nodes_[before], time), g_W_);
-  Block& block = window_.addNode(time, manifold_, stored(x));
+  const StateBlock x = rio_t::predict(node(before).x, preintegrateFrom(nodes_[before], time), g_W_);
+  Block& block = window_.addNode(time, motion_manifold_, storedMotion(x));
   nodes_.insert(nodes_.begin() + static_cast<std::ptrdiff_t>(after), Node{&block});
   linkToPrevious(after);
   if (after + 1 < nodes_.size()) linkToPrevious(after + 1);  // its IMU factor now starts at the new node
@@ -113,8 +130,8 @@ void FixedLagSmoother::linkToPrevious(std::size_t k) {
   const Node& previous = nodes_[k - 1];
   if (node.imu_from_previous != nullptr) window_.remove(*node.imu_from_previous);
   node.imu_from_previous =
-      &window_.add(std::make_unique<ImuFactor>(preintegrateFrom(previous, node.time()), noise_, g_W_),
-                   {previous.block, node.block});
+      &window_.add(std::make_unique<ImuFactor>(preintegrateFrom(previous, node.time()), g_W_),
+                   {previous.block, node.block, biases_.get()});
 }
 
 void FixedLagSmoother::addZeroVelocity(Block& node, double velocity_sigma) {
@@ -125,7 +142,7 @@ void FixedLagSmoother::addZeroVelocity(Block& node, double velocity_sigma) {
 
 const Preintegration& FixedLagSmoother::preintegrateFrom(const Node& node, Time to) const {
   LastPreintegration& last = last_preintegration_;
-  const StateView x(node.block->x.data());
+  const StateView x(node.block->x.data(), biases_->x.data());
   if (last.from != node.time() || last.to != to || last.value.b_g != x.b_g || last.value.b_a != x.b_a)
     last = {node.time(), to, preintegrate(*imu_, node.time(), to, x.b_g, x.b_a, noise_)};
   return last.value;
@@ -157,7 +174,7 @@ std::vector<NodeEstimate> FixedLagSmoother::marginalize(const std::vector<Random
   while (nodes_.size() > 2 && nodes_.back().time() - nodes_.front().time() > options_.window) {
     const double dt = nodes_[1].time() - nodes_[0].time();
     std::vector<Walk> gained;
-    gained.reserve(walks.size());
+    gained.push_back({biases_.get(), biasWalkVariance(noise_, dt)});
     for (const RandomWalk& walk : walks) gained.push_back({walk.block, walk.density.cwiseAbs2() * dt});
     if (drifted_ > 0.0)
       gained.push_back(

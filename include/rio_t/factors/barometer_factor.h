@@ -7,18 +7,18 @@
 namespace rio_t {
 
 /// A mean of heights by the pressure, above the place of the first pressure, off by a bias (docs/method.md,
-/// section 5.10): residual (p_W,z + delay v_W,z + bias - height) / sigma. Blocks: state, bias [m].
-class BarometerFactor final : public ceres::SizedCostFunction<1, StateBlock::kSize, 1> {
+/// section 5.10): residual (p_W,z + delay v_W,z + bias - height) / sigma. Blocks: motion, bias [m].
+class BarometerFactor final : public ceres::SizedCostFunction<1, StateBlock::kMotion, 1> {
  public:
   /// `height` [m] is the mean over samples whose mean time is `delay` [s] after the state. `sigma` [m].
   BarometerFactor(double height, double delay, double sigma)
       : height_(height), delay_(delay), weight_(1.0 / sigma) {}
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    const StateView x(parameters[0]);
+    const MotionView x(parameters[0]);
     residuals[0] = weight_ * (x.p_W.z() + delay_ * x.v_W.z() + parameters[1][0] - height_);
     if (jacobians == nullptr) return true;
     if (jacobians[0] != nullptr) {
-      Eigen::Map<StateJacobian<1>> J(jacobians[0]);
+      Eigen::Map<MotionJacobian<1>> J(jacobians[0]);
       J.setZero();
       J(StateBlock::kPStored + 2) = weight_;
       J(StateBlock::kVStored + 2) = weight_ * delay_;

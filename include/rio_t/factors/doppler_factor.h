@@ -21,12 +21,13 @@ struct DopplerMeasurement : RadarScanTime {
 };
 
 /// The Doppler of each point of a scan, tightly coupled (docs/method.md, section 5.7). Any number of points
-/// counts, in a plane or not. Blocks: state at `state_time`, t_O, extrinsics.
+/// counts, in a plane or not. Blocks: motion at `state_time`, biases, t_O, extrinsics.
 ///
 /// A residual a point, and all depend on the state through one velocity. So QR leaves three rows that depend
 /// on it, and one that is the misfit: the same cost, gradient and J'J as with a row for each point. The loss
 /// is in the rows.
-class DopplerFactor final : public ceres::SizedCostFunction<4, StateBlock::kSize, 1, ExtrinsicsBlock::kSize> {
+class DopplerFactor final : public ceres::SizedCostFunction<4, StateBlock::kMotion, StateBlock::kBiases, 1,
+                                                            ExtrinsicsBlock::kSize> {
  public:
   DopplerFactor(const DopplerMeasurement& z, Time state_time, const RadarMotionModel& model)
       : points_(z.points),

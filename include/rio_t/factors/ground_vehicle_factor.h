@@ -12,18 +12,19 @@ namespace rio_t {
 /// Velocity of a point of the vehicle in the vehicle frame V (x forward, y left, z up), and its derivatives:
 /// v_V = R_VI (R_IW v_W + (omega - b_g) x p_IV).
 struct VehicleVelocity {
-  Eigen::Vector3d v_V;            ///< [m/s]
-  StateJacobian<3> J_state;       ///< as StateBlock stores it
+  Eigen::Vector3d v_V;         ///< [m/s]
+  MotionJacobian<3> J_motion;  ///< as StateBlock stores it
+  BiasJacobian<3> J_biases;
   ExtrinsicsJacobian<3> J_frame;  ///< as ExtrinsicsBlock stores it
 };
-/// `state` as StateBlock stores it, `frame` as ExtrinsicsBlock: q_IV, then p_IV, the point in I [m].
-/// `omega_I` is what the gyro reads [rad/s], bias included.
-VehicleVelocity vehicleVelocity(const double* state, const double* frame, const Eigen::Vector3d& omega_I);
+/// `T_IV`: q_IV, and p_IV, the point in I [m]. `omega_I` is what the gyro reads [rad/s], bias included.
+VehicleVelocity vehicleVelocity(const StateView& x, const Extrinsics& T_IV, const Eigen::Vector3d& omega_I);
 
 /// A wheeled vehicle moves neither sideways nor up (docs/method.md, section 5.9): residual (v_V,y, v_V,z),
-/// each over its sigma. Blocks: state, vehicle frame (ExtrinsicsBlock with the manifold of its rotation).
+/// each over its sigma. Blocks: motion, biases, vehicle frame (ExtrinsicsBlock with the manifold of its
+/// rotation).
 class GroundVehicleFactor final
-    : public ceres::SizedCostFunction<2, StateBlock::kSize, ExtrinsicsBlock::kSize> {
+    : public ceres::SizedCostFunction<2, StateBlock::kMotion, StateBlock::kBiases, ExtrinsicsBlock::kSize> {
  public:
   /// `sigmas`: sideways and vertical [m/s].
   GroundVehicleFactor(const Eigen::Vector3d& omega_I, const Eigen::Vector2d& sigmas)
@@ -36,9 +37,9 @@ class GroundVehicleFactor final
 };
 
 /// The vehicle stands on level ground: residual (u_x, u_y) / sigma of the upward axis of W in V,
-/// u = R_VI R_IW e_z. Blocks: state, vehicle frame.
+/// u = R_VI R_IW e_z. Blocks: motion, vehicle frame.
 class LevelGroundFactor final
-    : public ceres::SizedCostFunction<2, StateBlock::kSize, ExtrinsicsBlock::kSize> {
+    : public ceres::SizedCostFunction<2, StateBlock::kMotion, ExtrinsicsBlock::kSize> {
  public:
   /// `slope_sigma` [rad] of the ground, along and across.
   explicit LevelGroundFactor(double slope_sigma) : weight_(1.0 / slope_sigma) {}

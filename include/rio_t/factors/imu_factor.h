@@ -3,31 +3,28 @@
 #include <ceres/sized_cost_function.h>
 
 #include "rio_t/factors/state_block.h"
-#include "rio_t/imu/noise.h"
 #include "rio_t/imu/preintegration.h"
 
 namespace rio_t {
 
-/// Preintegrated IMU between the states i and j, with bias random walk. Blocks: state i, state j.
+/// Preintegrated IMU between the states i and j with the same biases. Blocks: motion i, motion j, biases.
 ///
-/// docs/method.md, eq. 12; paper eq. (11); Forster et al. eq. (45). With d = b_i - b at integration and T the
+/// docs/method.md, eq. 12; paper eq. (11); Forster et al. eq. (45). With d = b - b at integration and T the
 /// time between:
 ///   e_R  = Log((dR Exp(dR_dbg d_g))^T R_i^T R_j)
 ///   e_p  = R_i^T (p_j - p_i - v_i T - g T^2 / 2) - (dp + dp_dbg d_g + dp_dba d_a)
 ///   e_v  = R_i^T (v_j - v_i - g T) - (dv + dv_dbg d_g + dv_dba d_a)
-///   e_bg = b_g,j - b_g,i,   e_ba = b_a,j - b_a,i
 /// all whitened with the covariance of the preintegration.
-class ImuFactor final : public ceres::SizedCostFunction<15, StateBlock::kSize, StateBlock::kSize> {
+class ImuFactor final
+    : public ceres::SizedCostFunction<9, StateBlock::kMotion, StateBlock::kMotion, StateBlock::kBiases> {
  public:
-  ImuFactor(const Preintegration& preintegration, const ImuNoise& noise, const Eigen::Vector3d& g_W);
+  ImuFactor(const Preintegration& preintegration, const Eigen::Vector3d& g_W);
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
 
  private:
   Preintegration pre_;
   Eigen::Vector3d g_W_;
   Eigen::Matrix<double, 9, 9> whitening_;  ///< W with W'W = covariance^-1
-  double gyro_walk_weight_ = 0.0;
-  double accel_walk_weight_ = 0.0;
 };
 
 /// Mean of state j given state i: the state at which the factor has no residual.
@@ -38,11 +35,10 @@ StateBlock predict(const StateBlock& state_i, const Preintegration& preintegrati
 StateBlock carried(const StateBlock& x, Time from, Time to, const ImuBuffer& imu, const Eigen::Vector3d& g_W);
 
 /// How an error of state i propagates to the predicted state j: d_j = A d_i + noise with covariance Q, in
-/// tangents. It is the whitened factor, J_i d_i + J_j d_j ~ N(0, 1), solved for d_j.
+/// tangents. It is the whitened factor, J_i d_i + J_j d_j ~ N(0, 1), solved for d_j; the biases stay.
 struct ImuTransition {
   Eigen::Matrix<double, StateBlock::kTangent, StateBlock::kTangent> A, Q;
 };
-ImuTransition transition(const StateBlock& state_i, const Preintegration& preintegration,
-                         const ImuNoise& noise);
+ImuTransition transition(const StateBlock& state_i, const Preintegration& preintegration);
 
 }  // namespace rio_t

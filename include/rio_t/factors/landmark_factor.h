@@ -41,21 +41,21 @@ class PolarNoise {
 /// Where the radar sees a point of the world, and how that depends on state, mounting and point.
 struct SeenPoint {
   Eigen::Vector3d p_R;                 ///< [m]
-  StateJacobian<3> J_state;            ///< as StateBlock stores it; not by the biases
+  MotionJacobian<3> J_motion;          ///< as StateBlock stores it
   ExtrinsicsJacobian<3> J_extrinsics;  ///< as ExtrinsicsBlock stores it
   Eigen::Matrix3d J_point;             ///< by p_W
 };
 /// `delta` carries the state to the time of measurement.
-SeenPoint seenFrom(const StateView& x, const ImuDelta& delta, const Eigen::Vector3d& g_W,
+SeenPoint seenFrom(const MotionView& x, const ImuDelta& delta, const Eigen::Vector3d& g_W,
                    const Extrinsics& T_IR, const Eigen::Vector3d& p_W);
 
-/// A landmark seen in a scan (docs/method.md, section 16). Blocks: state, extrinsics, landmark.
+/// A landmark seen in a scan (docs/method.md, section 16). Blocks: motion, extrinsics, landmark.
 ///
 /// The time of measurement is that of the moment when the scan came: the offset hardly moves within a window,
 /// and a position tells less of it than a velocity. The way from the state to that time, mostly below 5 ms,
 /// is integrated once.
 class LandmarkFactor final
-    : public ceres::SizedCostFunction<3, StateBlock::kSize, ExtrinsicsBlock::kSize, 3> {
+    : public ceres::SizedCostFunction<3, StateBlock::kMotion, ExtrinsicsBlock::kSize, 3> {
  public:
   LandmarkFactor(const PolarMeasurement& z, const ImuDelta& delta, const Eigen::Vector3d& g_W)
       : noise_(z), delta_(delta), g_W_(g_W) {}

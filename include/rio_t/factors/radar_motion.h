@@ -18,10 +18,11 @@ enum class TimeOffsetModel {
 /// Everything that a radar sees of its motion is a projection of this: a velocity, or the Doppler of a point.
 struct RadarMotion {
   Eigen::Vector3d v_I = Eigen::Vector3d::Zero();  ///< velocity of the radar's origin, in I at that time [m/s]
-  StateJacobian<3> J_state = StateJacobian<3>::Zero();  ///< of v_I
-  Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();    ///< of v_I [m/s^2]
-  Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();    ///< angular velocity of I, in I [rad/s]
-  Eigen::Vector3d alpha_I = Eigen::Vector3d::Zero();    ///< angular acceleration in dv_dt_O, in I [rad/s^2]
+  MotionJacobian<3> J_motion = MotionJacobian<3>::Zero();  ///< of v_I
+  BiasJacobian<3> J_biases = BiasJacobian<3>::Zero();      ///< of v_I
+  Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();       ///< of v_I [m/s^2]
+  Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();       ///< angular velocity of I, in I [rad/s]
+  Eigen::Vector3d alpha_I = Eigen::Vector3d::Zero();  ///< angular acceleration in dv_dt_O, in I [rad/s^2]
 };
 
 /// Carries the motion from a state to the time of measurement, tau = stamp - t_O (docs/method.md, section 5).
@@ -38,10 +39,10 @@ struct RadarMotionModel {
   /// is at the stamp:
   ///   v_I = R_IW v_W + (omega - b_g) x l_I - t_O a_c,   a_c = a - b_a + R_IW g_W,
   /// with omega at the stamp, and for a the mean around it.
-  /// `state` as StateBlock stores it; `l_I` is the radar in I [m]; `mean` is the mean of the IMU at meanTime.
+  /// `l_I` is the radar in I [m]; `mean` is the mean of the IMU at meanTime.
   /// Without `mean` the derivatives of kImu stay zero, and kConstantAcceleration takes that over
   /// kOffsetHalfWidth to either side.
-  RadarMotion at(const double* state, Time state_time, Time stamp, double t_O, const Eigen::Vector3d& l_I,
+  RadarMotion at(const StateView& x, Time state_time, Time stamp, double t_O, const Eigen::Vector3d& l_I,
                  const ImuMean* mean) const;
   /// Centre of the mean of the IMU for the derivative with respect to t_O: tau rounded to a millisecond, or
   /// the stamp. A smaller change of t_O needs no new mean.

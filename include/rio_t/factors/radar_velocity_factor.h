@@ -17,9 +17,9 @@ struct RadarVelocityMeasurement : RadarScanTime {
 };
 
 /// The radar's velocity (docs/method.md, eq. 13 and 14): residual R_RI v_I - z, whitened, with v_I by
-/// RadarMotionModel. Blocks: state at `state_time`, t_O, extrinsics.
-class RadarVelocityFactor final
-    : public ceres::SizedCostFunction<3, StateBlock::kSize, 1, ExtrinsicsBlock::kSize> {
+/// RadarMotionModel. Blocks: motion at `state_time`, biases, t_O, extrinsics.
+class RadarVelocityFactor final : public ceres::SizedCostFunction<3, StateBlock::kMotion, StateBlock::kBiases,
+                                                                  1, ExtrinsicsBlock::kSize> {
  public:
   RadarVelocityFactor(const RadarVelocityMeasurement& z, Time state_time, const RadarMotionModel& model);
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;

@@ -25,8 +25,9 @@ struct RadarScanTime {
 
 /// Velocity of the radar at the time of measurement of a scan, in R, and its derivatives.
 struct PredictedVelocity {
-  Eigen::Vector3d v_R;                                ///< [m/s]
-  StateJacobian<3> J_state;                           ///< as StateBlock stores it
+  Eigen::Vector3d v_R;         ///< [m/s]
+  MotionJacobian<3> J_motion;  ///< as StateBlock stores it
+  BiasJacobian<3> J_biases;
   Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();  ///< zero if the scan does not tell the offset [m/s^2]
   ExtrinsicsJacobian<3> J_extrinsics;                 ///< as ExtrinsicsBlock stores it
 };
@@ -38,7 +39,7 @@ class RadarVelocityModel {
   RadarVelocityModel(const RadarScanTime& scan, Time state_time, const RadarMotionModel& model)
       : scan_(scan), state_time_(state_time), model_(model) {}
 
-  /// `parameters`: state at `state_time`, t_O, extrinsics. Without `derivatives` only v_R is set.
+  /// `parameters`: motion at `state_time`, biases, t_O, extrinsics. Without `derivatives` only v_R is set.
   PredictedVelocity at(double const* const* parameters, bool derivatives) const;
 
  private:

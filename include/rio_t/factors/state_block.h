@@ -5,15 +5,17 @@
 
 namespace rio_t {
 
-/// State of the platform at one time, as one block of parameters for the solver.
+/// State of the platform at one time. The solver has it as two blocks: the motion of each node, and the
+/// biases of all nodes of a window (docs/method.md, section 6.1).
 ///
 /// Storage (16): q_WI (x y z w), p_W, v_W, b_g, b_a. Tangent (15), see `boxplus`: theta, p, v, b_g, b_a,
-/// where theta perturbs on the right to first order: R_WI <- R_WI Exp(theta). The time offset t_O is a block
-/// of its own.
+/// where theta perturbs on the right to first order: R_WI <- R_WI Exp(theta).
 class StateBlock {
  public:
-  static constexpr int kSize = 16;
-  static constexpr int kTangent = 15;
+  static constexpr int kMotion = 10, kBiases = 6;  ///< stored numbers of the two blocks
+  static constexpr int kSize = kMotion + kBiases;
+  static constexpr int kMotionTangent = 9;
+  static constexpr int kTangent = kMotionTangent + kBiases;
   enum Tangent { kTheta = 0, kP = 3, kV = 6, kBg = 9, kBa = 12 };  ///< first index in the tangent
   enum Storage { kQStored = 0, kPStored = 4, kVStored = 7, kBgStored = 10, kBaStored = 13 };
 
@@ -21,6 +23,7 @@ class StateBlock {
 
   double* data() { return values_.data(); }
   const double* data() const { return values_.data(); }
+  const double* biases() const { return data() + kMotion; }
 
   Eigen::Map<Eigen::Quaterniond> q_WI() { return Eigen::Map<Eigen::Quaterniond>(data() + kQStored); }
   Eigen::Map<Eigen::Vector3d> p_W() { return Eigen::Map<Eigen::Vector3d>(data() + kPStored); }
@@ -47,16 +50,21 @@ class StateBlock {
   std::array<double, kSize> values_;
 };
 
-/// Read-only view of a state block inside the solver.
-struct StateView {
-  explicit StateView(const double* x)
-      : q_WI(x + StateBlock::kQStored),
-        p_W(x + StateBlock::kPStored),
-        v_W(x + StateBlock::kVStored),
-        b_g(x + StateBlock::kBgStored),
-        b_a(x + StateBlock::kBaStored) {}
+/// Read-only view of the motion of a node inside the solver.
+struct MotionView {
+  explicit MotionView(const double* motion)
+      : q_WI(motion + StateBlock::kQStored),
+        p_W(motion + StateBlock::kPStored),
+        v_W(motion + StateBlock::kVStored) {}
   Eigen::Map<const Eigen::Quaterniond> q_WI;
-  Eigen::Map<const Eigen::Vector3d> p_W, v_W, b_g, b_a;
+  Eigen::Map<const Eigen::Vector3d> p_W, v_W;
+};
+/// The same with the biases.
+struct StateView : MotionView {
+  StateView(const double* motion, const double* biases)
+      : MotionView(motion), b_g(biases), b_a(biases + (StateBlock::kBaStored - StateBlock::kBgStored)) {}
+  explicit StateView(const StateBlock& x) : StateView(x.data(), x.biases()) {}
+  Eigen::Map<const Eigen::Vector3d> b_g, b_a;
 };
 
 using StateTangent = Eigen::Matrix<double, StateBlock::kTangent, 1>;
@@ -74,12 +82,15 @@ void boxplus(const double* x, const double* delta, double* x_plus_delta);
 /// y [-] x: the tangent that takes x to y.
 StateTangent boxminus(const double* y, const double* x);
 
-/// Jacobian of a residual with respect to a state block, as the solver wants it: N rows, 16 columns.
+/// Jacobian of a residual with respect to the motion of a node, as the solver wants it: N rows, 10 columns.
 ///
 /// The factors write derivatives with respect to the tangent: columns 0-2 hold theta, column 3 stays zero,
-/// and the rest stands where it is stored. `StateManifold` has the matching "plus Jacobian" (a selection), so
-/// the solver sees the exact tangent derivative, and no factor needs quaternion derivatives.
+/// and the rest stands where it is stored. `MotionManifold` has the matching "plus Jacobian" (a selection),
+/// so the solver sees the exact tangent derivative, and no factor needs quaternion derivatives.
 template <int N>
-using StateJacobian = Eigen::Matrix<double, N, StateBlock::kSize, Eigen::RowMajor>;
+using MotionJacobian = Eigen::Matrix<double, N, StateBlock::kMotion, Eigen::RowMajor>;
+/// With respect to the biases: b_g, then b_a.
+template <int N>
+using BiasJacobian = Eigen::Matrix<double, N, StateBlock::kBiases, Eigen::RowMajor>;
 
 }  // namespace rio_t

@@ -42,8 +42,7 @@ SquareRoot compressed(const SquareRoot& rows);
 /// Eliminates the first `count` blocks and returns the rows that remain, about the other blocks. Throws
 /// std::runtime_error if the rows do not determine the first ones.
 SquareRoot eliminateFirst(const LinearSystem& system, int count);
-/// Returns rows about x' = x + w, where w is a random walk of the columns from `first` on, with these
-/// variances.
-SquareRoot widened(const SquareRoot& known, Eigen::Index first, const Eigen::VectorXd& variances);
+/// Returns rows about x' = x + w, where w is a random walk with these variances. A variance of 0: no walk.
+SquareRoot widened(const SquareRoot& known, const Eigen::VectorXd& variances);
 
 }  // namespace rio_t

@@ -103,7 +103,7 @@ class MotionInitializer {
     std::vector<double> gains;  ///< of OffsetEvidence; 0: the velocity says nothing about the offset
     double half_width = kOffsetHalfWidth;  ///< of the mean of the IMU in the derivative [s]
   };
-  OffsetGains offsetGains(const Velocities& velocities, Time time, const ImuBuffer& imu, const Block& state,
+  OffsetGains offsetGains(const Velocities& velocities, Time time, const ImuBuffer& imu, const StateBlock& x,
                           double t_O) const;
   struct CarriedCovariance {
     Eigen::Matrix3d whole;   ///< of a velocity against the state at `time` [m^2/s^2]

@@ -67,7 +67,8 @@ struct BatchSolution {
 };
 
 /// The graph of FixedLagSmoother over all the data at once, with the same factors and nothing marginalised.
-/// Each scan has its own t_O, as in the paper (eq. 8-10), so that the offset may drift over the run. The
+/// Each scan has its own t_O, as in the paper (eq. 8-10), so that the offset may drift over the run. A block
+/// of biases holds for SmootherOptions::window seconds, and they walk from one to the next. The
 /// solution stands when the next step is shorter than a thousandth of a standard deviation in every
 /// direction.
 /// With the imu model a node stands at the time of measurement of its scan. If the offset moves, the nodes
@@ -87,7 +88,11 @@ class BatchSmoother {
   /// The whole run as one window.
   struct Graph {
     Window window;
-    std::vector<Block*> nodes;
+    struct Node {
+      Block* motion;
+      Block* biases;
+    };
+    std::vector<Node> nodes;
     struct Scan {
       std::size_t node;
       Block* offset;
@@ -103,6 +108,8 @@ class BatchSmoother {
   std::vector<Block*> start(const BatchProblem& problem, const StateBlock& x,
                             const std::vector<Extrinsics>& mounting, Graph& graph) const;
   Block& addOffset(Window& window, Time time, double t_O) const;
+  /// Biases that hold from `since` on.
+  Block& addBiases(Window& window, Time since, const StateBlock& x) const;
   /// Sets what the solution says of nodes, scans and extrinsics, with covariances.
   void read(const Graph& graph, const Solution& solved, BatchSolution& solution) const;
   RadarMotionModel model() const;
@@ -112,7 +119,7 @@ class BatchSmoother {
   ImuNoise noise_;
   Eigen::Vector3d g_W_;
   const ImuBuffer* imu_;
-  std::shared_ptr<const Manifold> state_manifold_, offset_manifold_, extrinsics_manifold_;
+  std::shared_ptr<const Manifold> motion_manifold_, bias_manifold_, offset_manifold_, extrinsics_manifold_;
 };
 
 /// Index of the node nearest to `time`; `nodes` in the order of their times, not empty.

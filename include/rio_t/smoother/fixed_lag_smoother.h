@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "rio_t/factors/state_manifold.h"
+#include "rio_t/factors/motion_manifold.h"
 #include "rio_t/graph/marginalization.h"
 #include "rio_t/graph/solver.h"
 #include "rio_t/graph/window.h"
@@ -30,7 +30,8 @@ struct PredictedState {
 };
 
 /// The states of the last `window` seconds, linked by the IMU; what leaves is marginalised. Sensors add their
-/// terms and calibration blocks to its window (paper, Fig. 2).
+/// terms and calibration blocks to its window (paper, Fig. 2). One block holds the biases of all nodes; like
+/// calibration, they walk when a node leaves.
 ///
 /// Nodes are in the order of their times, whatever the order of arrival. Not thread-safe.
 class FixedLagSmoother {
@@ -41,14 +42,15 @@ class FixedLagSmoother {
 
   /// Sets the noise of the IMU for the factors to come.
   void setImuNoise(const ImuNoise& noise);
-  /// Starts, or starts again, with one node that has no prior yet. The caller adds calibration blocks and
-  /// priors and then calls `settle`.
+  /// Starts, or starts again, with one node and biases that have no prior yet. The caller adds calibration
+  /// blocks and priors and then calls `settle`.
   Block& start(Time time, const StateBlock& x0);
   /// Computes the covariances without a solve: after a start, and after a calibration block came.
   void settle() { solution_ = linearized(window_); }
   bool started() const { return !nodes_.empty(); }
 
   Window& window() { return window_; }
+  Block& biases() { return *biases_; }
   /// The node at `time`, created if none is near. Null if `time` is before the window. The IMU must cover
   /// `time`.
   Block* nodeAt(Time time);
@@ -75,7 +77,8 @@ class FixedLagSmoother {
   std::size_t size() const { return nodes_.size(); }
   NodeEstimate node(std::size_t k) const;
   NodeEstimate newest() const { return node(nodes_.size() - 1); }
-  /// Joint covariance of the newest node and of calibration blocks, as of the last `optimize` or `settle`.
+  /// Joint covariance of the newest node, the biases and calibration blocks, as of the last `optimize` or
+  /// `settle`.
   Eigen::MatrixXd newestCovariance(const std::vector<const Block*>& calibration) const;
   /// Samples of the IMU before this time are not needed any more.
   Time imuNeededSince() const;
@@ -93,16 +96,17 @@ class FixedLagSmoother {
   void linkToPrevious(std::size_t k);
   Eigen::MatrixXd covarianceOf(const Block& node, const std::vector<const Block*>& calibration) const;
   std::vector<const Block*> leavingWith(const Block& node) const;
-  /// From `node` to `to` with the biases of `node`. A scan needs the same one for its prediction and for its
+  /// From `node` to `to`. A scan needs the same one for its prediction and for its
   /// node.
   const Preintegration& preintegrateFrom(const Node& node, Time to) const;
 
-  SmootherOptions options_;  // read-only after construction, as g_W_, imu_ and manifold_
+  SmootherOptions options_;  // read-only after construction, as g_W_, imu_ and the manifolds
   ImuNoise noise_;
   Eigen::Vector3d g_W_;
   const ImuBuffer* imu_;
-  std::shared_ptr<const Manifold> manifold_;
+  std::shared_ptr<const Manifold> motion_manifold_, bias_manifold_;
   Window window_;
+  std::shared_ptr<Block> biases_;
   std::vector<Node> nodes_;
   double drifted_ = 0.0;  ///< [m^2] that no prior contains yet
   Solution solution_;     ///< of the last solve
@@ -113,7 +117,11 @@ class FixedLagSmoother {
   mutable LastPreintegration last_preintegration_;  ///< a cache
 };
 
-StateBlock toStateBlock(const Eigen::Ref<const Eigen::VectorXd>& stored);
-Eigen::VectorXd stored(const StateBlock& x);
+/// That the biases gain in `dt` seconds, in the order of their block.
+Eigen::VectorXd biasWalkVariance(const ImuNoise& noise, double dt);
+/// A state of two blocks, and the way back.
+StateBlock stateOf(const Block& motion, const Block& biases);
+Eigen::VectorXd storedMotion(const StateBlock& x);
+Eigen::VectorXd storedBiases(const StateBlock& x);
 
 }  // namespace rio_t

@@ -1,16 +1,15 @@
 #pragma once
 
-#include <memory>
-
 #include "rio_t/factors/state_block.h"
 #include "rio_t/graph/manifold.h"
 
 namespace rio_t {
 
-/// StateBlock as a Manifold: theta in the first three of the four numbers of the quaternion.
-class StateManifold final : public Manifold {
+/// The motion part of StateBlock as a Manifold, with the same `boxplus`: theta in the first three of the four
+/// numbers of the quaternion, then p_W and v_W.
+class MotionManifold final : public Manifold {
  public:
-  StateManifold();
+  MotionManifold();
   void plus(const double* x, const double* delta, double* x_plus_delta) const override;
   Eigen::VectorXd minus(const double* y, const double* x) const override;
   Eigen::MatrixXd minusJacobian(const double* y, const double* x) const override;
