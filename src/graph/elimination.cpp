@@ -185,20 +185,24 @@ class BlockElimination {
     return row;
   }
 
-  /// The rows below the first `own` wait for the next block, no more of them than they have columns.
+  /// The rows below the first `own` wait: for the next block as many as it has columns, the others for the
+  /// block after it.
   void keepRest(Eigen::Index own, Eigen::Index last) {
     if (columns_.size() == 1) return;
-    Eigen::Index rows = tableau_.rows() - own;
-    if (rows > last - own) {
-      tableau_.triangularise(own, last);
-      rows = last - own;
-    }
-    if (rows <= 0) return;
+    const Eigen::Index next = columns_.size() > 2 ? starts_[2] : last;
+    tableau_.triangularise(own, next);
+    keep(1, own, std::min(next, tableau_.rows()), last);
+    if (next < last) keep(2, next, tableau_.rows(), last);
+  }
+
+  /// The rows from `first` to `end` wait for the block columns_[at].
+  void keep(std::size_t at, Eigen::Index first, Eigen::Index end, Eigen::Index last) {
+    if (first >= end) return;
     LinearRows& rest = rest_.emplace_back();
-    rest.blocks.assign(columns_.begin() + 1, columns_.end());
-    rest.Jr.resize(rows, last + 1 - own);
-    for (Eigen::Index i = 0; i < rows; ++i)
-      std::copy_n(tableau_.row(own + i) + own, rest.Jr.cols(), rest.Jr.data() + i * rest.Jr.cols());
+    rest.blocks.assign(columns_.begin() + static_cast<std::ptrdiff_t>(at), columns_.end());
+    rest.Jr.resize(end - first, last + 1 - starts_[at]);
+    for (Eigen::Index i = first; i < end; ++i)
+      std::copy_n(tableau_.row(i) + starts_[at], rest.Jr.cols(), rest.Jr.data() + (i - first) * rest.Jr.cols());
     // First of all: its rows are triangular, so few of them are reflected.
     auto& waiting = waiting_[static_cast<std::size_t>(rest.blocks.front())];
     waiting.insert(waiting.begin(), &rest);
