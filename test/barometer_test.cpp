@@ -19,11 +19,11 @@ Time at(double seconds) { return Time::fromSeconds(1000.0 + seconds); }
 
 TEST(BarometerFactor, JacobiansAreCorrectAndTheTruthHasNoResidual) {
   const StateBlock x = SyntheticMotion().state(1.3);
-  const std::vector<double> state(x.data(), x.data() + StateBlock::kSize);
+  const std::vector<double> motion = motionOf(x);
   const double height = x.p_W().z() + 0.05 * x.v_W().z() + 2.0;
-  expectJacobiansCorrect(BarometerFactor(height, 0.05, 0.3), {state, {1.5}});
+  expectJacobiansCorrect(BarometerFactor(height, 0.05, 0.3), {motion, {1.5}});
   const double bias = 2.0;
-  const double* const blocks[2] = {state.data(), &bias};
+  const double* const blocks[2] = {motion.data(), &bias};
   double residual = 1.0;
   ASSERT_TRUE(BarometerFactor(height, 0.05, 0.3).Evaluate(blocks, &residual, nullptr));
   EXPECT_NEAR(residual, 0.0, 1e-12);

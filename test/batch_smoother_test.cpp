@@ -118,6 +118,7 @@ TEST_F(Batch, EqualsTheFixedLagSmootherThatKeepsEverything) {
 
 TEST_F(Batch, CovarianceIsThatOfTheDenseInverse) {
   SmootherOptions options;
+  options.window = 10.0;  // one block of biases
   BatchProblem whole = problem(options);
   for (double stamp = 0.7; stamp < 2.0; stamp += 0.1) {
     BatchScan scan;
@@ -127,15 +128,28 @@ TEST_F(Batch, CovarianceIsThatOfTheDenseInverse) {
   }
   const BatchSolution batch = make(options).solve(whole);
   // Scaled to a unit diagonal: metres and biases together are beyond what a dense inverse can hold.
-  const Eigen::MatrixXd H = Dense(batch.system).H;
+  const Dense dense(batch.system);
+  const Eigen::MatrixXd& H = dense.H;
   const Eigen::VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * H * scale.asDiagonal();
   const Eigen::MatrixXd covariance = scale.asDiagonal() * scaled.inverse() * scale.asDiagonal();
-  // A node and its offset follow each other; the first pair is that of the start.
-  constexpr Eigen::Index kPair = StateBlock::kTangent + 1;
+  // A node and its offset follow each other, and the first pair is that of the start. Then come the biases.
   for (const BatchSolution::Scan& scan : batch.scans) {
-    const auto at = static_cast<Eigen::Index>(scan.node) * kPair;
-    EXPECT_LT(difference(scan.covariance, covariance.block(at, at, kPair, kPair)), 1e-6);
+    std::vector<Eigen::Index> order;
+    const auto add = [&](std::size_t block) {
+      for (int k = 0; k < batch.system.tangent(static_cast<int>(block)); ++k)
+        order.push_back(dense.first[block] + k);
+    };
+    add(2 * scan.node);
+    add(2 * batch.nodes.size());
+    add(2 * scan.node + 1);
+    const auto size = static_cast<Eigen::Index>(order.size());
+    ASSERT_EQ(size, StateBlock::kTangent + 1);
+    Eigen::MatrixXd expected(size, size);
+    for (Eigen::Index i = 0; i < size; ++i)
+      for (Eigen::Index j = 0; j < size; ++j)
+        expected(i, j) = covariance(order[static_cast<std::size_t>(i)], order[static_cast<std::size_t>(j)]);
+    EXPECT_LT(difference(scan.covariance, expected), 1e-6);
     EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(scan.covariance).eigenvalues().minCoeff(), 0.0);
   }
 }

@@ -38,7 +38,7 @@ struct DopplerScan {
 
   DopplerFactor factor() const { return {z, motion.time(0.98), imuModel(imu)}; }
   PredictedVelocity predicted(const StateBlock& at, double t_O) const {
-    const double* blocks[] = {at.data(), &t_O, storedMounting().data()};
+    const double* blocks[] = {at.data(), at.biases(), &t_O, storedMounting().data()};
     return RadarVelocityModel(z, motion.time(0.98), imuModel(imu)).at(blocks, true);
   }
   /// Half the sum of the squares of a factor that remembers nothing.
@@ -47,7 +47,7 @@ struct DopplerScan {
   }
   static double cost(const DopplerFactor& factor, const StateBlock& at, double t_O,
                      const std::vector<double>& T_IR = storedMounting()) {
-    const double* blocks[] = {at.data(), &t_O, T_IR.data()};
+    const double* blocks[] = {at.data(), at.biases(), &t_O, T_IR.data()};
     Eigen::Vector4d r;
     EXPECT_TRUE(factor.Evaluate(blocks, r.data(), nullptr));
     return 0.5 * r.squaredNorm();
@@ -57,13 +57,14 @@ struct DopplerScan {
   static constexpr int kStored = kExtrinsics + ExtrinsicsBlock::kSize;
   using Jacobian = Eigen::Matrix<double, 4, kStored>;
   Eigen::Vector4d linearized(const StateBlock& at, double t_O, Jacobian& J) const {
-    const double* blocks[] = {at.data(), &t_O, storedMounting().data()};
-    StateJacobian<4> J_state;
+    const double* blocks[] = {at.data(), at.biases(), &t_O, storedMounting().data()};
+    MotionJacobian<4> J_motion;
+    BiasJacobian<4> J_biases;
     ExtrinsicsJacobian<4> J_extrinsics;
     Eigen::Vector4d J_t, r;
-    double* jacobians[] = {J_state.data(), J_t.data(), J_extrinsics.data()};
+    double* jacobians[] = {J_motion.data(), J_biases.data(), J_t.data(), J_extrinsics.data()};
     EXPECT_TRUE(factor().Evaluate(blocks, r.data(), jacobians));
-    J << J_state, J_t, J_extrinsics;
+    J << J_motion, J_biases, J_t, J_extrinsics;
     return r;
   }
 
@@ -106,8 +107,8 @@ TEST(DopplerFactor, SaysTheSameAsARowForEachPoint) {
         Eigen::Vector3d derivative;
         const double r = scan.z.points->residual(i, predicted.v_R, derivative);
         RowJacobian row;
-        row << derivative.transpose() * predicted.J_state, derivative.dot(predicted.dv_dt_O),
-            derivative.transpose() * predicted.J_extrinsics;
+        row << derivative.transpose() * predicted.J_motion, derivative.transpose() * predicted.J_biases,
+            derivative.dot(predicted.dv_dt_O), derivative.transpose() * predicted.J_extrinsics;
         cost += 0.5 * r * r;
         b += r * row.transpose();
         H += row.transpose() * row;

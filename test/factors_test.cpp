@@ -8,11 +8,11 @@
 #include "noise.h"
 #include "numeric_jacobian.h"
 #include "rio_t/core/so3.h"
-#include "rio_t/factors/constant_offset_factor.h"
 #include "rio_t/factors/imu_factor.h"
+#include "rio_t/factors/motion_manifold.h"
 #include "rio_t/factors/offset_derivative.h"
 #include "rio_t/factors/radar_velocity_factor.h"
-#include "rio_t/factors/state_manifold.h"
+#include "rio_t/factors/random_walk_factor.h"
 #include "rio_t/factors/zero_velocity_factor.h"
 #include "rio_t/graph/marginalization.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
@@ -20,8 +20,6 @@
 
 namespace rio_t {
 namespace {
-
-std::vector<double> values(const StateBlock& x) { return {x.data(), x.data() + StateBlock::kSize}; }
 
 TEST(StateBlock, BoxminusInvertsBoxplus) {
   const StateBlock x = SyntheticMotion().state(1.0);
@@ -65,17 +63,18 @@ TEST(StateBlock, ATurnOfTheWorldIsLinearInTheTangentWhateverTheState) {
   }
 }
 
-TEST(StateManifold, MinusJacobianIsCorrect) {
+TEST(MotionManifold, MinusJacobianIsCorrect) {
   const StateBlock x = SyntheticMotion().state(1.0);
   const StateBlock y = moved(SyntheticMotion().state(1.4), 0.3);
-  const StateManifold manifold;
-  Eigen::MatrixXd numeric(StateBlock::kTangent, StateBlock::kTangent);
+  const MotionManifold manifold;
+  const int tangent = manifold.tangent();
+  Eigen::MatrixXd numeric(tangent, tangent);
   constexpr double h = 1e-6;
-  for (int i = 0; i < StateBlock::kTangent; ++i) {
+  for (int i = 0; i < tangent; ++i) {
     StateBlock ends[2];
     for (const int side : {0, 1}) {
-      const StateTangent step = (side == 0 ? -h : h) * StateTangent::Unit(i);
-      boxplus(y.data(), step.data(), ends[side].data());
+      const Eigen::VectorXd step = (side == 0 ? -h : h) * Eigen::VectorXd::Unit(tangent, i);
+      manifold.plus(y.data(), step.data(), ends[side].data());
     }
     numeric.col(i) =
         (manifold.minus(ends[1].data(), x.data()) - manifold.minus(ends[0].data(), x.data())) / (2.0 * h);
@@ -117,9 +116,10 @@ TEST(ImuFactor, JacobiansAreCorrect) {
   const Preintegration pre =
       preintegrate(imu, motion.time(1.0), motion.time(1.1), x_i.b_g() + Eigen::Vector3d(1e-3, 2e-3, -1e-3),
                    x_i.b_a(), ImuNoise());
-  const ImuFactor factor(pre, ImuNoise(), motion.g_W);
-  expectJacobiansCorrect(factor, {values(moved(x_i, 0.1)), values(moved(motion.state(1.1), -0.2))}, 1e-6,
-                         1e-4);
+  const ImuFactor factor(pre, motion.g_W);
+  const StateBlock near = moved(x_i, 0.1);
+  expectJacobiansCorrect(factor, {motionOf(near), motionOf(moved(motion.state(1.1), -0.2)), biasesOf(near)},
+                         1e-6, 1e-4);
 }
 
 TEST(ImuFactor, ResidualIsZeroAtTheTruth) {
@@ -130,9 +130,9 @@ TEST(ImuFactor, ResidualIsZeroAtTheTruth) {
       preintegrate(imu, motion.time(1.0), motion.time(1.1), x_i.b_g(), x_i.b_a(), ImuNoise());
   const StateBlock x_j = predict(x_i, pre, motion.g_W);
   EXPECT_LT(boxminus(x_j.data(), motion.state(1.1).data()).norm(), 2e-6);
-  Eigen::Matrix<double, 15, 1> r;
-  const double* blocks[] = {x_i.data(), x_j.data()};
-  ImuFactor(pre, ImuNoise(), motion.g_W).Evaluate(blocks, r.data(), nullptr);
+  Eigen::Matrix<double, 9, 1> r;
+  const double* blocks[] = {x_i.data(), x_j.data(), x_i.biases()};
+  ImuFactor(pre, motion.g_W).Evaluate(blocks, r.data(), nullptr);
   EXPECT_LT(r.norm(), 1e-7);
 }
 
@@ -140,10 +140,10 @@ TEST(ImuFactor, TransitionSaysTheSameAsTheFactor) {
   const SyntheticMotion motion;
   const ImuBuffer imu = motion.imu(0.9, 1.3, 400.0);
   const StateBlock x_i = motion.state(1.0);
-  const ImuNoise noise;
-  const Preintegration pre = preintegrate(imu, motion.time(1.0), motion.time(1.1),
-                                          x_i.b_g() + Eigen::Vector3d(1e-3, 2e-3, -1e-3), x_i.b_a(), noise);
-  const ImuTransition step = transition(x_i, pre, noise);
+  const Preintegration pre =
+      preintegrate(imu, motion.time(1.0), motion.time(1.1), x_i.b_g() + Eigen::Vector3d(1e-3, 2e-3, -1e-3),
+                   x_i.b_a(), ImuNoise());
+  const ImuTransition step = transition(x_i, pre);
 
   // A against central differences of the prediction, on the manifold.
   const StateBlock x_j = predict(x_i, pre, motion.g_W);
@@ -161,18 +161,25 @@ TEST(ImuFactor, TransitionSaysTheSameAsTheFactor) {
   }
   EXPECT_LT((step.A - numeric).cwiseAbs().maxCoeff(), 1e-7);
 
-  // The factor: J_i d_i + J_j d_j ~ N(0, 1).
-  const double* blocks[] = {x_i.data(), x_j.data()};
-  StateJacobian<15> J_i, J_j;
-  double* jacobians[] = {J_i.data(), J_j.data()};
-  Eigen::Matrix<double, 15, 1> r;
-  ImuFactor(pre, noise, motion.g_W).Evaluate(blocks, r.data(), jacobians);
-  Eigen::Matrix<double, 15, 15> T_i, T_j;
-  T_i << J_i.leftCols<3>(), J_i.rightCols<12>();
-  T_j << J_j.leftCols<3>(), J_j.rightCols<12>();
-  const Eigen::Matrix<double, 15, 15> whitened_Q = T_j * step.Q * T_j.transpose();
-  EXPECT_LT((whitened_Q - Eigen::Matrix<double, 15, 15>::Identity()).cwiseAbs().maxCoeff(), 1e-6);
-  EXPECT_LT((T_i + T_j * step.A).norm(), 1e-6 * T_i.norm());
+  // The factor: J_i d_i + J_j d_j ~ N(0, 1), where d_i has the biases.
+  const double* blocks[] = {x_i.data(), x_j.data(), x_i.biases()};
+  MotionJacobian<9> J_i, J_j;
+  BiasJacobian<9> J_b;
+  double* jacobians[] = {J_i.data(), J_j.data(), J_b.data()};
+  Eigen::Matrix<double, 9, 1> r;
+  ImuFactor(pre, motion.g_W).Evaluate(blocks, r.data(), jacobians);
+  Eigen::Matrix<double, 9, 15> T_i;
+  Eigen::Matrix<double, 9, 9> T_j;
+  T_i << J_i.leftCols<3>(), J_i.rightCols<6>(), J_b;
+  T_j << J_j.leftCols<3>(), J_j.rightCols<6>();
+  const Eigen::Matrix<double, 9, 9> whitened_Q = T_j * step.Q.topLeftCorner<9, 9>() * T_j.transpose();
+  EXPECT_LT((whitened_Q - Eigen::Matrix<double, 9, 9>::Identity()).cwiseAbs().maxCoeff(), 1e-6);
+  EXPECT_LT((T_i + T_j * step.A.topRows<9>()).norm(), 1e-6 * T_i.norm());
+  // The biases stay.
+  Eigen::Matrix<double, 6, 15> stay;
+  stay << Eigen::Matrix<double, 6, 9>::Zero(), Eigen::Matrix<double, 6, 6>::Identity();
+  EXPECT_EQ(step.A.bottomRows<6>(), stay);
+  EXPECT_EQ(step.Q.bottomRows<6>().norm(), 0.0);
 }
 
 RadarMotionModel constantAcceleration(const ImuBuffer& imu) {
@@ -184,7 +191,8 @@ TEST(ConstantAccelerationRadarFactor, JacobiansAreCorrect) {
   const ImuBuffer imu = motion.imu(0.9, 1.3, 400.0);
   const RadarVelocityFactor factor(measurement(motion.time(1.0)), motion.time(1.0),
                                    constantAcceleration(imu));
-  expectJacobiansCorrect(factor, {values(moved(motion.state(1.0), 0.1)), {0.04}, storedMounting()});
+  const StateBlock x = moved(motion.state(1.0), 0.1);
+  expectJacobiansCorrect(factor, {motionOf(x), biasesOf(x), {0.04}, storedMounting()});
 }
 
 TEST(ConstantAccelerationRadarFactor, SaysTheSameWithAndWithoutJacobians) {
@@ -195,10 +203,10 @@ TEST(ConstantAccelerationRadarFactor, SaysTheSameWithAndWithoutJacobians) {
   const RadarVelocityFactor factor(z, motion.time(1.0), constantAcceleration(imu));
   const StateBlock x = moved(motion.state(1.0), 0.1);
   const double t_O = 0.1;
-  const double* blocks[] = {x.data(), &t_O, storedMounting().data()};
+  const double* blocks[] = {x.data(), x.biases(), &t_O, storedMounting().data()};
   Eigen::Vector3d alone, r;
-  StateJacobian<3> J;
-  double* jacobians[] = {J.data(), nullptr, nullptr};
+  MotionJacobian<3> J;
+  double* jacobians[] = {J.data(), nullptr, nullptr, nullptr};
   factor.Evaluate(blocks, alone.data(), nullptr);
   factor.Evaluate(blocks, r.data(), jacobians);
   EXPECT_LT((alone - r).norm(), 1e-12);
@@ -213,7 +221,7 @@ TEST(ConstantAccelerationRadarFactor, AtRestTheCorrectedAccelerationIsZero) {
     imu.add({Time::fromSeconds(t), Eigen::Vector3d::Zero(), Eigen::Vector3d(0.0, 0.0, 9.81)});
   const StateBlock x;
   const double t_O = 0.1;
-  const double* blocks[] = {x.data(), &t_O, storedMounting().data()};
+  const double* blocks[] = {x.data(), x.biases(), &t_O, storedMounting().data()};
   Eigen::Vector3d r;
   RadarVelocityFactor(z, z.stamp, constantAcceleration(imu)).Evaluate(blocks, r.data(), nullptr);
   EXPECT_LT(r.norm(), 1e-12);
@@ -227,9 +235,9 @@ TEST(ImuRadarFactor, JacobiansAreCorrectForwardsAndBackwards) {
     RadarVelocityMeasurement z = measurement(motion.time(1.0));
     z.linear_from_t_O = t_O;
     z.offset_gain = 0.0;
+    const StateBlock x = moved(motion.state(0.98), 0.05);
     expectJacobiansCorrect(RadarVelocityFactor(z, motion.time(0.98), imuModel(imu)),
-                           {values(moved(motion.state(0.98), 0.05)), {0.2 - t_O}, storedMounting()}, 1e-6,
-                           1e-4);
+                           {motionOf(x), biasesOf(x), {0.2 - t_O}, storedMounting()}, 1e-6, 1e-4);
   }
 }
 
@@ -244,13 +252,13 @@ TEST(ImuRadarFactor, TheDerivativeInTheExtrinsicsIsExactAwayFromWhereTheScanWasP
   const ExtrinsicsManifold manifold(EstimateExtrinsics::kPose);
   const double t_O = 0.1;
   const auto residual = [&](const std::vector<double>& T_IR, double** jacobians = nullptr) {
-    const double* blocks[] = {x.data(), &t_O, T_IR.data()};
+    const double* blocks[] = {x.data(), x.biases(), &t_O, T_IR.data()};
     Eigen::Vector3d r;
     factor.Evaluate(blocks, r.data(), jacobians);
     return r;
   };
   ExtrinsicsJacobian<3> J;
-  double* jacobians[] = {nullptr, nullptr, J.data()};
+  double* jacobians[] = {nullptr, nullptr, nullptr, J.data()};
   residual(storedMounting(), jacobians);
   constexpr double h = 1e-6;
   for (int i = 0; i < manifold.tangent(); ++i) {
@@ -272,13 +280,13 @@ TEST(ImuRadarFactor, TheDerivativeInTheOffsetIsThatOverItsWindow) {
   for (const double t_O : {-0.11, -0.0113, 0.0037, 0.0521, 0.1731}) {
     const RadarVelocityFactor factor(measurement(motion.time(1.0)), motion.time(0.98), imuModel(imu, 0.5));
     const auto residual = [&](double offset, double** jacobians = nullptr) {
-      const double* blocks[] = {x.data(), &offset, storedMounting().data()};
+      const double* blocks[] = {x.data(), x.biases(), &offset, storedMounting().data()};
       Eigen::Vector3d r;
       factor.Evaluate(blocks, r.data(), jacobians);
       return r;
     };
     Eigen::Vector3d J_t;
-    double* jacobians[] = {nullptr, J_t.data(), nullptr};
+    double* jacobians[] = {nullptr, nullptr, J_t.data(), nullptr};
     residual(t_O, jacobians);
     // The derivative of the mean with weights that fall linearly: from the mean of one side to that of the
     // other.
@@ -299,7 +307,7 @@ TEST(ImuRadarFactor, AHeldOffsetIsAllThatCounts) {
   RadarVelocityMeasurement z = measurement(motion.time(1.0));
   const StateBlock x = motion.state(0.98);
   const auto residual = [&](double t_O) {
-    const double* blocks[] = {x.data(), &t_O, storedMounting().data()};
+    const double* blocks[] = {x.data(), x.biases(), &t_O, storedMounting().data()};
     Eigen::Vector3d r;
     RadarVelocityFactor(z, motion.time(0.98), imuModel(imu)).Evaluate(blocks, r.data(), nullptr);
     return r;
@@ -323,8 +331,8 @@ TEST(ImuRadarFactor, AroundWhereAScanWasPlacedTheOffsetCountsToFirstOrder) {
     z.linear_from_t_O = std::nullopt;
     const RadarVelocityFactor exact(z, motion.time(0.98), imuModel(imu));
     const auto residual = [&](const RadarVelocityFactor& f, double t_O, Eigen::Vector3d* J_t = nullptr) {
-      const double* blocks[] = {x.data(), &t_O, storedMounting().data()};
-      double* jacobians[] = {nullptr, J_t != nullptr ? J_t->data() : nullptr, nullptr};
+      const double* blocks[] = {x.data(), x.biases(), &t_O, storedMounting().data()};
+      double* jacobians[] = {nullptr, nullptr, J_t != nullptr ? J_t->data() : nullptr, nullptr};
       Eigen::Vector3d r;
       f.Evaluate(blocks, r.data(), J_t != nullptr ? jacobians : nullptr);
       return r;
@@ -378,31 +386,32 @@ TEST(ImuRadarFactor, ResidualIsZeroAtTheTrueOffset) {
     z.v_R = motion.radarVelocity(1.0 - t_O, mounting().R_RI(), mounting().l_I);
     z.covariance.setIdentity();
     const StateBlock x = motion.state(1.02);
-    const double* blocks[] = {x.data(), &t_O, storedMounting().data()};
+    const double* blocks[] = {x.data(), x.biases(), &t_O, storedMounting().data()};
     Eigen::Vector3d r;
     RadarVelocityFactor(z, motion.time(1.02), imuModel(imu)).Evaluate(blocks, r.data(), nullptr);
     EXPECT_LT(r.norm(), 1e-4) << "offset " << t_O;
   }
 }
 
-TEST(ConstantOffsetFactor, JacobiansAreCorrect) {
-  expectJacobiansCorrect(ConstantOffsetFactor(3e-3), {{0.01}, {-0.02}}, 1e-6, 1e-3);
+TEST(RandomWalkFactor, JacobiansAreCorrect) {
+  expectJacobiansCorrect(RandomWalkFactor(Eigen::Vector2d(3e-3, 0.1)), {{0.01, 0.3}, {-0.02, 0.2}}, 1e-6,
+                         1e-3);
 }
 
 TEST(ZeroVelocityFactor, JacobiansAreCorrect) {
-  expectJacobiansCorrect(ZeroVelocityFactor(0.05), {values(moved(SyntheticMotion().state(1.0), 0.1))});
+  expectJacobiansCorrect(ZeroVelocityFactor(0.05), {motionOf(moved(SyntheticMotion().state(1.0), 0.1))});
 }
 
 TEST(PriorTerm, JacobiansAreCorrect) {
   const StateBlock x0 = SyntheticMotion().state(1.0);
-  SquareRoot root{Eigen::MatrixXd(16, 16), Eigen::VectorXd(16)};
-  for (int i = 0; i < 16; ++i) {
+  SquareRoot root{Eigen::MatrixXd(10, 10), Eigen::VectorXd(10)};
+  for (int i = 0; i < 10; ++i) {
     root.r0(i) = std::sin(0.7 * i);
-    for (int j = 0; j < 16; ++j) root.J(i, j) = std::sin(1.0 + 3.1 * i + 1.7 * j);
+    for (int j = 0; j < 10; ++j) root.J(i, j) = std::sin(1.0 + 3.1 * i + 1.7 * j);
   }
-  const PriorTerm prior({std::make_shared<StateManifold>(), std::make_shared<VectorManifold>(1)},
-                        {stored(x0), Eigen::VectorXd::Constant(1, 0.02)}, root);
-  expectJacobiansCorrect(prior, {values(moved(x0, 0.4)), {-0.01}});
+  const PriorTerm prior({std::make_shared<MotionManifold>(), std::make_shared<VectorManifold>(1)},
+                        {storedMotion(x0), Eigen::VectorXd::Constant(1, 0.02)}, root);
+  expectJacobiansCorrect(prior, {motionOf(moved(x0, 0.4)), {-0.01}});
 }
 
 }  // namespace

@@ -13,9 +13,9 @@
 
 #include "dense_system.h"
 #include "radar_smoother.h"
-#include "rio_t/factors/constant_offset_factor.h"
 #include "rio_t/factors/doppler_factor.h"
 #include "rio_t/factors/imu_factor.h"
+#include "rio_t/factors/random_walk_factor.h"
 #include "rio_t/factors/zero_velocity_factor.h"
 #include "rio_t/graph/marginalization.h"
 #include "rio_t/graph/solver.h"
@@ -232,7 +232,10 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
   void make(double t_O, double bound = 0.25, double start = 0.0, bool wrong_sign = false,
             TimeOffsetModel kind = TimeOffsetModel::kImu, bool tightly = false) {
     window = Window();
-    const auto manifold = std::make_shared<StateManifold>();
+    const auto manifold = std::make_shared<MotionManifold>();
+    const StateBlock first = motion.state(0.5);
+    biases =
+        window.addCalibration(std::make_shared<VectorManifold>(StateBlock::kBiases), storedBiases(first));
     const auto loss = std::make_shared<ceres::HuberLoss>(1.5);
     const RadarMotionModel model{kind, bound, motion.g_W, &imu};
     offset = window.addCalibration(std::make_shared<VectorManifold>(1), Eigen::VectorXd::Constant(1, start));
@@ -251,33 +254,33 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
       const StateBlock truth = motion.state(t);
       StateBlock x;
       boxplus(truth.data(), beside.data(), x.data());
-      Block& node = window.addNode(motion.time(t), manifold, stored(x));
+      Block& node = window.addNode(motion.time(t), manifold, storedMotion(x));
       if (previous == nullptr) {
         const NodePrior prior = priorAtRest(known, ImuNoise(), truth, 9.81, 3.0, skewMounting());
-        node.x = stored(truth);
+        node.x = storedMotion(truth);
         offset->x[0] = 0.0;
-        addPrior(window, {&node, offset.get(), extrinsics.get()}, {prior.J, prior.r0});
-        node.x = stored(x);
+        addPrior(window, {&node, biases.get(), offset.get(), extrinsics.get()}, {prior.J, prior.r0});
+        node.x = storedMotion(x);
+        biases->x = storedBiases(x);
         offset->x[0] = start;
       } else {
-        const StateBlock from = motion.state(t - 0.1);
         window.add(std::make_unique<ImuFactor>(
-                       preintegrate(imu, *previous->time, *node.time, from.b_g(), from.b_a(), ImuNoise()),
-                       ImuNoise(), motion.g_W),
-                   {previous, &node});
+                       preintegrate(imu, *previous->time, *node.time, first.b_g(), first.b_a(), ImuNoise()),
+                       motion.g_W),
+                   {previous, &node, biases.get()});
       }
       RadarVelocityMeasurement z = radarMeasurement(motion, t + t_O, t_O);
       for (int i = 0; i < 3; ++i) z.v_R(i) += 0.01 * wave(5 * k + i);
       if (k % 4 == 2) z.v_R.x() += 0.5;  // for the loss
       if (tightly) {
         window.add(std::make_unique<DopplerFactor>(dopplers(z, k), *node.time, model),
-                   {&node, offset.get(), extrinsics.get()});
+                   {&node, biases.get(), offset.get(), extrinsics.get()});
         previous = &node;
         continue;
       }
       std::unique_ptr<ceres::CostFunction> cost = std::make_unique<RadarVelocityFactor>(z, *node.time, model);
       if (wrong_sign) cost = std::make_unique<WrongSigned>(std::move(cost));
-      window.add(std::move(cost), {&node, offset.get(), extrinsics.get()}, loss);
+      window.add(std::move(cost), {&node, biases.get(), offset.get(), extrinsics.get()}, loss);
       if (k % 3 == 1) window.add(std::make_unique<ZeroVelocityFactor>(3.0), {&node});
       previous = &node;
     }
@@ -306,14 +309,16 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
   }
 
   /// With the Jacobians of the wrong sign.
-  class WrongSigned final : public ceres::SizedCostFunction<3, StateBlock::kSize, 1, ExtrinsicsBlock::kSize> {
+  class WrongSigned final : public ceres::SizedCostFunction<3, StateBlock::kMotion, StateBlock::kBiases, 1,
+                                                            ExtrinsicsBlock::kSize> {
    public:
     explicit WrongSigned(std::unique_ptr<ceres::CostFunction> right) : right_(std::move(right)) {}
     bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
       if (!right_->Evaluate(parameters, residuals, jacobians)) return false;
       if (jacobians == nullptr) return true;
-      if (jacobians[0] != nullptr) Eigen::Map<StateJacobian<3>>{jacobians[0]} *= -1.0;
-      if (jacobians[1] != nullptr) Eigen::Map<Eigen::Vector3d>{jacobians[1]} *= -1.0;
+      if (jacobians[0] != nullptr) Eigen::Map<MotionJacobian<3>>{jacobians[0]} *= -1.0;
+      if (jacobians[1] != nullptr) Eigen::Map<BiasJacobian<3>>{jacobians[1]} *= -1.0;
+      if (jacobians[2] != nullptr) Eigen::Map<Eigen::Vector3d>{jacobians[2]} *= -1.0;
       return true;
     }
 
@@ -340,7 +345,7 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
   SyntheticMotion motion;
   ImuBuffer imu;
   Window window;
-  std::shared_ptr<Block> offset, extrinsics;
+  std::shared_ptr<Block> biases, offset, extrinsics;
 };
 
 TEST_P(Windows, TheLinearSystemIsThatOfCeres) {
@@ -468,16 +473,16 @@ INSTANTIATE_TEST_SUITE_P(Solver, Windows, ::testing::Values(WindowSolver::kChain
                            return solver.param == WindowSolver::kChain ? "chain" : "ceres";
                          });
 
-/// A height above the start, off by a bias that is calibrated: z - (p_W,z + bias), whitened. Blocks: state,
+/// A height above the start, off by a bias that is calibrated: z - (p_W,z + bias), whitened. Blocks: motion,
 /// bias. All that a new sensor needs: this cost function, and where it is added to the window.
-class AltimeterFactor final : public ceres::SizedCostFunction<1, StateBlock::kSize, 1> {
+class AltimeterFactor final : public ceres::SizedCostFunction<1, StateBlock::kMotion, 1> {
  public:
   AltimeterFactor(double height, double sigma) : height_(height), weight_(1.0 / sigma) {}
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    residuals[0] = weight_ * (StateView(parameters[0]).p_W.z() + parameters[1][0] - height_);
+    residuals[0] = weight_ * (MotionView(parameters[0]).p_W.z() + parameters[1][0] - height_);
     if (jacobians == nullptr) return true;
     if (jacobians[0] != nullptr) {
-      Eigen::Map<StateJacobian<1>> J(jacobians[0]);
+      Eigen::Map<MotionJacobian<1>> J(jacobians[0]);
       J.setZero();
       J(StateBlock::kPStored + 2) = weight_;
     }

@@ -20,10 +20,10 @@ std::vector<double> values(const Eigen::VectorXd& x) { return {x.data(), x.data(
 
 TEST(GroundVehicleFactor, JacobiansAreCorrect) {
   const StateBlock x = SyntheticMotion().state(1.3);
-  const std::vector<double> state(x.data(), x.data() + StateBlock::kSize);
   const Extrinsics T_IV{{-0.8, 0.1, -0.3}, Eigen::Quaterniond(so3::exp({0.1, -0.3, 0.7}))};
-  expectJacobiansCorrect(GroundVehicleFactor({0.1, -0.2, 0.9}, {0.05, 0.08}), {state, values(stored(T_IV))});
-  expectJacobiansCorrect(LevelGroundFactor(0.01), {state, values(stored(T_IV))});
+  expectJacobiansCorrect(GroundVehicleFactor({0.1, -0.2, 0.9}, {0.05, 0.08}),
+                         {motionOf(x), biasesOf(x), values(stored(T_IV))});
+  expectJacobiansCorrect(LevelGroundFactor(0.01), {motionOf(x), values(stored(T_IV))});
 }
 
 TEST(GroundVehicleFactor, ATurnAboutTheRearAxleHasNoResidual) {
@@ -35,13 +35,13 @@ TEST(GroundVehicleFactor, ATurnAboutTheRearAxleHasNoResidual) {
   x.q_WI() = so3::exp({0.05, 0.1, 1.0});
   x.v_W() = x.q_WI() * (T_IV.q_IR * forward_V - omega.cross(T_IV.l_I));
   const Eigen::VectorXd frame = stored(T_IV);
-  const double* const blocks[2] = {x.data(), frame.data()};
+  const double* const blocks[] = {x.data(), x.biases(), frame.data()};
   Eigen::Vector2d residual;
   ASSERT_TRUE(GroundVehicleFactor(omega, {0.05, 0.05}).Evaluate(blocks, residual.data(), nullptr));
   EXPECT_LT(residual.norm(), 1e-12);
   // About the IMU itself it has.
   Eigen::VectorXd wrong = stored({Eigen::Vector3d::Zero(), T_IV.q_IR});
-  const double* const about_imu[2] = {x.data(), wrong.data()};
+  const double* const about_imu[] = {x.data(), x.biases(), wrong.data()};
   ASSERT_TRUE(GroundVehicleFactor(omega, {0.05, 0.05}).Evaluate(about_imu, residual.data(), nullptr));
   EXPECT_NEAR(std::abs(residual[0]), 1.2 * 0.8 / 0.05, 1e-9);
 }

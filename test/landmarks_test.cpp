@@ -33,7 +33,6 @@ ImuDelta someDelta(double dt) {
 PolarMeasurement polar(const Eigen::Vector3d& p_R) { return {p_R, 0.05, 0.04, 0.08}; }
 
 std::vector<double> numbers(const Eigen::Vector3d& p) { return {p.x(), p.y(), p.z()}; }
-std::vector<double> numbers(const StateBlock& x) { return {x.data(), x.data() + StateBlock::kSize}; }
 std::vector<double> numbers(const Extrinsics& T_IR) {
   const Eigen::VectorXd x = stored(T_IR);
   return {x.data(), x.data() + x.size()};
@@ -42,7 +41,8 @@ std::vector<double> numbers(const Extrinsics& T_IR) {
 TEST(LandmarkFactor, JacobiansAreExact) {
   for (const double dt : {0.0, 0.004, -0.05}) {
     const LandmarkFactor factor(polar({1.0, 5.0, -0.7}), someDelta(dt), g_W);
-    expectJacobiansCorrect(factor, {numbers(someState()), numbers(someMounting()), numbers({4.0, 2.0, 1.5})});
+    expectJacobiansCorrect(factor,
+                           {motionOf(someState()), numbers(someMounting()), numbers({4.0, 2.0, 1.5})});
   }
 }
 
@@ -52,7 +52,7 @@ TEST(LandmarkFactor, IsZeroWhereThePointIs) {
   const Eigen::Vector3d p_R(1.0, 5.0, -0.7);
   const Eigen::Vector3d p_W = x.p_W() + x.q_WI() * (T_IR.l_I + T_IR.q_IR * p_R);
   const LandmarkFactor factor(polar(p_R), ImuDelta(), g_W);
-  const std::vector<double> state = numbers(x), mounting = numbers(T_IR), point = numbers(p_W);
+  const std::vector<double> state = motionOf(x), mounting = numbers(T_IR), point = numbers(p_W);
   const double* const parameters[] = {state.data(), mounting.data(), point.data()};
   Eigen::Vector3d r;
   ASSERT_TRUE(factor.Evaluate(parameters, r.data(), nullptr));

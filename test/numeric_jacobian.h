@@ -8,18 +8,24 @@
 #include <vector>
 
 #include "rio_t/factors/extrinsics_manifold.h"
-#include "rio_t/factors/state_manifold.h"
+#include "rio_t/factors/motion_manifold.h"
 #include "rio_t/graph/manifold.h"
 
 namespace rio_t {
 
 inline std::shared_ptr<const Manifold> manifoldOf(std::size_t size) {
-  if (size == StateBlock::kSize) return std::make_shared<StateManifold>();
+  if (size == StateBlock::kMotion) return std::make_shared<MotionManifold>();
   if (size == ExtrinsicsBlock::kSize) return std::make_shared<ExtrinsicsManifold>(EstimateExtrinsics::kPose);
   return std::make_shared<VectorManifold>(static_cast<int>(size));
 }
 
-/// Compares the Jacobians of a factor with central differences on the manifold: blocks of 16 are states,
+/// The two blocks of a state.
+inline std::vector<double> motionOf(const StateBlock& x) { return {x.data(), x.biases()}; }
+inline std::vector<double> biasesOf(const StateBlock& x) {
+  return {x.biases(), x.biases() + StateBlock::kBiases};
+}
+
+/// Compares the Jacobians of a factor with central differences on the manifold: blocks of 10 are motions,
 /// blocks of 7 are extrinsics, both moved on their manifolds; other blocks add up. `tolerance` is
 /// relative to the largest entry of the block's Jacobian.
 inline void expectJacobiansCorrect(const ceres::CostFunction& cost, std::vector<std::vector<double>> blocks,
