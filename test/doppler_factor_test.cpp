@@ -190,7 +190,7 @@ TEST(DopplerFactor, AnErrorThatThePointsShareLowersTheInformation) {
     const Eigen::Matrix3d expected =
         A * (Eigen::Matrix3d::Identity() + Eigen::Matrix3d(D.asDiagonal()) * A).inverse();
     Eigen::Matrix<double, 3, DopplerScan::kStored> J_v;
-    J_v << predicted.J_state, predicted.dv_dt_O, predicted.J_extrinsics;
+    J_v << predicted.J_motion, predicted.J_biases, predicted.dv_dt_O, predicted.J_extrinsics;
     DopplerScan::Jacobian J;
     scan.linearized(scan.x, DopplerScan::kPlacedAt, J);
     const auto H = (J_v.transpose() * expected * J_v).eval();

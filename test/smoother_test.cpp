@@ -317,7 +317,7 @@ TEST(PriorAtRest, TiltAndBiasAreKnownTogether) {
   for (int i = 0; i < 2; ++i) EXPECT_NEAR(std::sqrt(tilt(i, i)), options.prior_sigma_accel_bias / 9.81, 3e-4);
   EXPECT_NEAR(std::sqrt(tilt(2, 2)), options.prior_sigma_yaw, 1e-6);
   // What the accelerometer reads is known by its noise, though neither of the two is.
-  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(3, StateBlock::kMotionTangent + 1);
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(3, StateBlock::kTangent + 1);
   J.leftCols<3>() = so3::hat(9.81 * R_WI.row(2).transpose());
   J.middleCols<3>(StateBlock::kBa).setIdentity();
   EXPECT_LT(std::sqrt((J * P * J.transpose()).trace() / 3.0), 0.02);

@@ -92,12 +92,6 @@ SquareRoot squareRootOf(const Tableau& tableau, Eigen::Index from, Eigen::Index 
 /// Eliminates the blocks of a system, first to last.
 class BlockElimination {
  public:
-  struct Eliminated {
-    RowMatrix L;                 ///< R_ii transposed
-    std::map<int, RowMatrix> W;  ///< R_ij
-    Eigen::VectorXd z;           ///< their right side: R delta + z
-  };
-
   BlockElimination(const LinearSystem& system, double damping)
       : system_(system), damping_(damping), waiting_(system.tangents.size()) {
     for (std::size_t i = 0; i < system.tangents.size(); ++i)
@@ -114,8 +108,8 @@ class BlockElimination {
     }
   }
 
-  /// None if the rows do not determine block i. The rows that remain wait for the later blocks.
-  std::optional<Eliminated> eliminate(int i) {
+  /// The rows of R of block i. None if the rows do not determine it. Those that remain wait for later blocks.
+  std::optional<LinearRows> eliminate(int i) {
     const std::vector<const LinearRows*> stacked = std::exchange(waiting_[static_cast<std::size_t>(i)], {});
     const Eigen::VectorXd& squares = squares_[static_cast<std::size_t>(i)];
     const Eigen::Index own = squares.size();
@@ -144,7 +138,7 @@ class BlockElimination {
     for (Eigen::Index k = 0; k < own; ++k)
       if (!(std::abs(tableau_.row(k)[k]) > kNothing * std::sqrt(squares[k]))) return std::nullopt;
     keepRest(own, last);
-    return read(own, last);
+    return copied(0, 0, own, last);
   }
 
   /// The rows that still wait, over the blocks from `first` on that are not held.
@@ -198,30 +192,20 @@ class BlockElimination {
   /// The rows from `first` to `end` wait for the block columns_[at].
   void keep(std::size_t at, Eigen::Index first, Eigen::Index end, Eigen::Index last) {
     if (first >= end) return;
-    LinearRows& rest = rest_.emplace_back();
-    rest.blocks.assign(columns_.begin() + static_cast<std::ptrdiff_t>(at), columns_.end());
-    rest.Jr.resize(end - first, last + 1 - starts_[at]);
-    for (Eigen::Index i = first; i < end; ++i)
-      std::copy_n(tableau_.row(i) + starts_[at], rest.Jr.cols(), rest.Jr.data() + (i - first) * rest.Jr.cols());
+    const LinearRows& rest = rest_.emplace_back(copied(at, first, end, last));
     // First of all: its rows are triangular, so few of them are reflected.
     auto& waiting = waiting_[static_cast<std::size_t>(rest.blocks.front())];
     waiting.insert(waiting.begin(), &rest);
   }
 
-  Eliminated read(Eigen::Index own, Eigen::Index last) const {
-    Eliminated result;
-    result.L.setZero(own, own);
-    result.z.resize(own);
-    for (Eigen::Index k = 0; k < own; ++k) {
-      for (Eigen::Index j = k; j < own; ++j) result.L(j, k) = tableau_.row(k)[j];
-      result.z[k] = tableau_.row(k)[last];
-    }
-    for (std::size_t at = 1; at < columns_.size(); ++at) {
-      RowMatrix& W = result.W.emplace_hint(result.W.end(), columns_[at], RowMatrix())->second;
-      W.resize(own, system_.tangent(columns_[at]));
-      for (Eigen::Index k = 0; k < own; ++k)
-        std::copy_n(tableau_.row(k) + starts_[at], W.cols(), W.data() + k * W.cols());
-    }
+  /// The rows from `first` to `end`, from the block columns_[at] on.
+  LinearRows copied(std::size_t at, Eigen::Index first, Eigen::Index end, Eigen::Index last) const {
+    LinearRows result;
+    result.blocks.assign(columns_.begin() + static_cast<std::ptrdiff_t>(at), columns_.end());
+    result.Jr.resize(end - first, last + 1 - starts_[at]);
+    for (Eigen::Index i = first; i < end; ++i)
+      std::copy_n(tableau_.row(i) + starts_[at], result.Jr.cols(),
+                  result.Jr.data() + (i - first) * result.Jr.cols());
     return result;
   }
 
@@ -250,15 +234,24 @@ void inParts(Eigen::Index columns, const Part& part) {
   take(std::integral_constant<int, 1>());
 }
 
+/// Some columns of a matrix by rows.
+struct Columns {
+  const double* first;
+  Eigen::Index rows, columns, stride;
+  double operator()(Eigen::Index i, Eigen::Index j) const { return first[i * stride + j]; }
+};
+
+Columns allOf(const RowMatrix& A) { return {A.data(), A.rows(), A.cols(), A.cols()}; }
+
 /// sum += sign A' B. At these sizes Eigen's blocked product costs several times as much.
-void addProduct(const RowMatrix& A, const RowMatrix& B, double sign, RowMatrix& sum) {
-  if (sum.size() == 0) sum.setZero(A.cols(), B.cols());
+void addProduct(const Columns& A, const RowMatrix& B, double sign, RowMatrix& sum) {
+  if (sum.size() == 0) sum.setZero(A.columns, B.cols());
   inParts(B.cols(), [&](Eigen::Index first, auto width) {
-    for (Eigen::Index i = 0; i < A.cols(); ++i) {
+    for (Eigen::Index i = 0; i < A.columns; ++i) {
       double* const to = sum.data() + i * B.cols() + first;
       std::array<double, width> sums{};
       std::copy_n(to, width, sums.begin());
-      for (Eigen::Index row = 0; row < A.rows(); ++row) {
+      for (Eigen::Index row = 0; row < A.rows; ++row) {
         const double a = sign * A(row, i);
         if (a == 0.0) continue;
         const double* const b = B.data() + row * B.cols() + first;
@@ -269,89 +262,118 @@ void addProduct(const RowMatrix& A, const RowMatrix& B, double sign, RowMatrix& 
   });
 }
 
-/// W <- L^-1 W for the lower triangle of L.
-void forwardSubstitute(const RowMatrix& L, RowMatrix& W) {
+/// W <- R'^-1 W for the upper triangle R.
+void forwardSubstitute(const Columns& R, RowMatrix& W) {
   inParts(W.cols(), [&](Eigen::Index first, auto width) {
-    for (Eigen::Index i = 0; i < L.rows(); ++i) {
+    for (Eigen::Index i = 0; i < R.rows; ++i) {
       double* const to = W.data() + i * W.cols() + first;
       std::array<double, width> sums{};
       std::copy_n(to, width, sums.begin());
       for (Eigen::Index j = 0; j < i; ++j) {
-        const double factor = L(i, j);
+        const double factor = R(j, i);
         const double* const from = W.data() + j * W.cols() + first;
         for (std::size_t k = 0; k < width; ++k) sums[k] -= factor * from[k];
       }
-      const double inverse = 1.0 / L(i, i);
+      const double inverse = 1.0 / R(i, i);
       for (std::size_t k = 0; k < width; ++k) to[k] = sums[k] * inverse;
     }
   });
+}
+
+/// Calls part(j, R_ij) for each block that the rows of block i touch, R_ii first.
+template <typename Part>
+void eachBlock(const LinearRows& rows, const std::vector<Eigen::Index>& tangents, const Part& part) {
+  const double* first = rows.Jr.data();
+  for (const int j : rows.blocks) {
+    const Eigen::Index width = tangents[static_cast<std::size_t>(j)];
+    part(static_cast<std::size_t>(j), Columns{first, rows.Jr.rows(), width, rows.Jr.cols()});
+    first += width;
+  }
 }
 
 }  // namespace
 
 std::optional<Elimination> Elimination::of(const LinearSystem& system, double damping) {
   Elimination result;
-  const int count = static_cast<int>(system.tangents.size());
-  result.delta_.resize(system.tangents.size());
+  const std::size_t count = system.tangents.size();
+  result.tangents_ = system.tangents;
+  result.R_.reserve(count);
+  result.delta_.reserve(count);
   BlockElimination elimination(system, damping);
-  for (int i = 0; i < count; ++i) {
-    BlockElimination::Eliminated of_block;
-    if (system.is_held[static_cast<std::size_t>(i)]) {
-      of_block.L.setIdentity(system.tangent(i), system.tangent(i));
-      of_block.z.setZero(system.tangent(i));
-    } else if (auto eliminated = elimination.eliminate(i)) {
-      of_block = std::move(*eliminated);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto block = static_cast<int>(i);
+    if (system.is_held[i]) {
+      const Eigen::Index size = system.tangents[i];
+      result.R_.push_back({{block}, RowMatrix::Identity(size, size + 1)});
+    } else if (auto rows = elimination.eliminate(block)) {
+      result.R_.push_back(std::move(*rows));
     } else {
       return std::nullopt;
     }
-    result.squared_length_ += of_block.z.squaredNorm();
-    result.delta_[static_cast<std::size_t>(i)] = -of_block.z;
-    result.L_.push_back(std::move(of_block.L));
-    result.W_.push_back(std::move(of_block.W));
+    const auto z = result.R_.back().Jr.rightCols<1>();
+    result.squared_length_ += z.squaredNorm();
+    result.delta_.emplace_back(-z);
   }
-  for (std::size_t i = system.tangents.size(); i-- > 0;) {
+  for (std::size_t i = count; i-- > 0;) {
     Eigen::VectorXd& delta = result.delta_[i];
-    for (const auto& [j, W] : result.W_[i]) delta.noalias() -= W * result.delta_[static_cast<std::size_t>(j)];
-    result.L_[i].triangularView<Eigen::Lower>().transpose().solveInPlace(delta);
+    eachBlock(result.R_[i], result.tangents_, [&](std::size_t j, const Columns& R_ij) {
+      if (j == i) return;
+      for (Eigen::Index row = 0; row < R_ij.rows; ++row)
+        for (Eigen::Index k = 0; k < R_ij.columns; ++k) delta[row] -= R_ij(row, k) * result.delta_[j][k];
+    });
+    result.R_[i].Jr.leftCols(delta.size()).triangularView<Eigen::Upper>().solveInPlace(delta);
   }
   return result;
 }
 
 Eigen::MatrixXd Elimination::covariance(const std::vector<int>& indices) const {
   Eigen::Index columns = 0;
-  for (const int i : indices) columns += L_[i].rows();
-  // Y = L^-1 E, where E selects the blocks: their covariance is Y'Y.
-  std::map<int, RowMatrix> Y;
+  for (const int i : indices) columns += tangents_[static_cast<std::size_t>(i)];
+  // Y = R'^-1 E, where E selects the blocks: their covariance is Y'Y.
+  std::vector<RowMatrix> Y(R_.size());
   Eigen::Index first = 0;
   for (const int i : indices) {
-    Y[i].setZero(L_[i].rows(), columns);
-    Y[i].middleCols(first, L_[i].rows()).setIdentity();
-    first += L_[i].rows();
+    const Eigen::Index size = tangents_[static_cast<std::size_t>(i)];
+    Y[static_cast<std::size_t>(i)].setZero(size, columns);
+    Y[static_cast<std::size_t>(i)].middleCols(first, size).setIdentity();
+    first += size;
   }
   RowMatrix result = RowMatrix::Zero(columns, columns);
-  for (auto at = Y.begin(); at != Y.end(); ++at) {
-    auto& [i, y] = *at;
-    forwardSubstitute(L_[i], y);
-    for (const auto& [j, W] : W_[i]) addProduct(W, y, -1.0, Y[j]);
-    addProduct(y, y, 1.0, result);
+  for (std::size_t i = 0; i < R_.size(); ++i) {
+    if (Y[i].size() == 0) continue;
+    eachBlock(R_[i], tangents_, [&](std::size_t j, const Columns& R_ij) {
+      if (j == i) {
+        forwardSubstitute(R_ij, Y[i]);
+      } else {
+        addProduct(R_ij, Y[i], -1.0, Y[j]);
+      }
+    });
+    addProduct(allOf(Y[i]), Y[i], 1.0, result);
   }
   return result;
 }
 
 std::vector<std::map<int, Eigen::MatrixXd>> Elimination::covariances() const {
-  std::vector<std::map<int, Eigen::MatrixXd>> P(L_.size());
+  std::vector<std::map<int, Eigen::MatrixXd>> P(R_.size());
   const auto at = [&](int a, int b) -> Eigen::MatrixXd {
     return a <= b ? P[a].at(b) : Eigen::MatrixXd(P[b].at(a).transpose());
   };
-  for (std::size_t i = L_.size(); i-- > 0;) {
-    const auto L = L_[i].triangularView<Eigen::Lower>();
-    const Eigen::MatrixXd inverse = L.solve(Eigen::MatrixXd::Identity(L_[i].rows(), L_[i].rows()));
-    P[i][static_cast<int>(i)] = inverse.transpose() * inverse;
+  for (std::size_t i = R_.size(); i-- > 0;) {
+    const Eigen::Index size = tangents_[i];
+    const RowMatrix& rows = R_[i].Jr;
+    const Eigen::MatrixXd inverse =
+        rows.leftCols(size).triangularView<Eigen::Upper>().solve(Eigen::MatrixXd::Identity(size, size));
+    P[i][static_cast<int>(i)] = inverse * inverse.transpose();
     // delta_i = G_i (...) - sum_j G_ij delta_j with G_ij = R_ii^-1 R_ij.
     std::map<int, Eigen::MatrixXd> G;
-    for (const auto& [j, W] : W_[i]) G[j] = L.transpose().solve(W);
+    Eigen::Index first = size;
+    for (auto j = R_[i].blocks.begin() + 1; j != R_[i].blocks.end(); ++j) {
+      const Eigen::Index width = tangents_[static_cast<std::size_t>(*j)];
+      G[*j] = inverse * rows.middleCols(first, width);
+      first += width;
+    }
     for (const auto& [j, unused] : G) {
-      Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(L_[i].rows(), L_[j].rows());
+      Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(size, tangents_[static_cast<std::size_t>(j)]);
       for (const auto& [k, G_ik] : G) sum.noalias() -= G_ik * at(k, j);
       P[i][static_cast<int>(i)].noalias() -= sum * G[j].transpose();
       P[i][j] = std::move(sum);

@@ -42,6 +42,7 @@ class Evaluation {
       }
       *to++ = root * r_[row];
     }
+    result.blocks.reserve(order_.size());
     for (const std::size_t i : order_) result.blocks.push_back(indices[i]);
     return result;
   }

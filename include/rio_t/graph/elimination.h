@@ -9,8 +9,7 @@
 /// Block elimination of the linearised graph by QR (docs/method.md, section 6.3).
 namespace rio_t {
 
-/// The factor R of J = Q R, block by block in their order: R_ii, and R_ij for the later blocks j that the
-/// rows of block i touch.
+/// The factor R of J = Q R, block by block in their order.
 class Elimination {
  public:
   /// None if the rows do not determine every block. `damping` (Levenberg-Marquardt) raises the squares of the
@@ -26,8 +25,9 @@ class Elimination {
   std::vector<std::map<int, Eigen::MatrixXd>> covariances() const;
 
  private:
-  std::vector<RowMatrix> L_;                 ///< R_ii transposed
-  std::vector<std::map<int, RowMatrix>> W_;  ///< R_ij
+  /// Of each block, as many as its tangent: R_ii, then R_ij for the later blocks j that they touch.
+  std::vector<LinearRows> R_;
+  std::vector<Eigen::Index> tangents_;
   std::vector<Eigen::VectorXd> delta_;
   double squared_length_ = 0.0;
 };
