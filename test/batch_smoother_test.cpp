@@ -202,6 +202,35 @@ TEST_F(Batch, KnowsThePastBetterThanTheWindowDid) {
   for (const int i : {0, 1, 6, 7, 8, 12, 13, 14, 15}) EXPECT_LT(now(i), 0.95 * then(i)) << i;
 }
 
+TEST_F(Batch, TheBiasesOfABatchWalk) {
+  // The gyro drifts by 0.01 rad/s, evenly over the run.
+  constexpr double kDrift = 0.01 / kEnd;  // [rad/s^2]
+  ImuBuffer drifting;
+  imu.forEachSample(motion.time(0.0), motion.time(kEnd + 0.5), [&](ImuMeasurement s) {
+    s.angular_velocity.x() += kDrift * (s.time - motion.time(0.5));
+    drifting.add(s);
+  });
+  ImuNoise noise;
+  noise.gyro_random_walk = 0.05;
+  SmootherOptions options;
+  options.window = 0.5;
+  BatchProblem whole = problem(options);
+  for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
+    BatchScan scan;
+    scan.velocity = measurement(stamp, 0.0);
+    scan.velocity->covariance *= 0.01;
+    scan.stamp = scan.velocity->stamp;
+    whole.scans.push_back(scan);
+  }
+  const BatchSolution batch =
+      BatchSmoother(options, BatchOptions(), noise, motion.g_W, drifting).solve(whole);
+  EXPECT_TRUE(batch.converged());
+  const auto drift = [&](const NodeEstimate& node) { return node.x.b_g().x() - motion.b_g.x(); };
+  EXPECT_NEAR(drift(batch.nodes.front()), 0.0, 2e-3);
+  EXPECT_NEAR(drift(batch.nodes[batch.nodes.size() / 2]), 0.5 * kDrift * (kEnd - 0.5), 2e-3);
+  EXPECT_NEAR(drift(batch.nodes.back()), kDrift * (kEnd - 0.5), 2e-3);
+}
+
 TEST_F(Batch, AStepOfTheOffsetIsFollowedWhereItIsTold) {
   SmootherOptions options;
   BatchProblem whole = problem(options);

@@ -139,6 +139,27 @@ TEST_F(Smoother, AHeadingThatIsLostStaysLost) {
   EXPECT_GT(headingVariance(smoother), 0.999 * lost);
 }
 
+TEST_F(Smoother, TheBiasesWalkWhenANodeLeaves) {
+  // With a walk of 0.1 (rad/s)/sqrt(s) the window forgets the biases from one node to the next.
+  const auto sigmaOfGyroBias = [&](double walk) {
+    SmootherOptions options;
+    ImuNoise noise;
+    noise.gyro_random_walk = walk;
+    RadarSmoother smoother = make(options);
+    smoother.states.setImuNoise(noise);
+    double last = 0.0;
+    for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
+      smoother.add(measurement(stamp, 0.0));
+      smoother.optimize();
+      last = smoother.newestCovariance()(StateBlock::kBg, StateBlock::kBg);
+      smoother.marginalize();
+    }
+    return std::sqrt(last);
+  };
+  EXPECT_LT(sigmaOfGyroBias(1e-9), 1.5e-4);
+  EXPECT_GT(sigmaOfGyroBias(0.1), 5e-3);
+}
+
 TEST_F(Smoother, ADriftWidensThePositionAlone) {
   SmootherOptions options;
   RadarSmoother smoother = make(options), drifted = make(options);
