@@ -52,8 +52,8 @@ TEST(LandmarkFactor, IsZeroWhereThePointIs) {
   const Eigen::Vector3d p_R(1.0, 5.0, -0.7);
   const Eigen::Vector3d p_W = x.p_W() + x.q_WI() * (T_IR.l_I + T_IR.q_IR * p_R);
   const LandmarkFactor factor(polar(p_R), ImuDelta(), g_W);
-  const std::vector<double> state = motionOf(x), mounting = numbers(T_IR), point = numbers(p_W);
-  const double* const parameters[] = {state.data(), mounting.data(), point.data()};
+  const std::vector<double> motion = motionOf(x), mounting = numbers(T_IR), point = numbers(p_W);
+  const double* const parameters[] = {motion.data(), mounting.data(), point.data()};
   Eigen::Vector3d r;
   ASSERT_TRUE(factor.Evaluate(parameters, r.data(), nullptr));
   EXPECT_LT(r.norm(), 1e-9);

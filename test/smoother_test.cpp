@@ -140,7 +140,7 @@ TEST_F(Smoother, AHeadingThatIsLostStaysLost) {
 }
 
 TEST_F(Smoother, TheBiasesWalkWhenANodeLeaves) {
-  // With a walk of 0.1 (rad/s)/sqrt(s) the window forgets the biases from one node to the next.
+  // With a walk of 0.1 (rad/s)/sqrt(s) the prior forgets the biases whenever a node leaves.
   const auto sigmaOfGyroBias = [&](double walk) {
     SmootherOptions options;
     ImuNoise noise;

@@ -107,8 +107,7 @@ ImuTransition transition(const StateBlock& state_i, const Preintegration& preint
   Eigen::Matrix<double, 9, 9> turn = Eigen::Matrix<double, 9, 9>::Identity();  // p and v errors stand in I_i
   turn.block<3, 3>(S::kP, S::kP) = R_i;
   turn.block<3, 3>(S::kV, S::kV) = R_i;
-  result.Q.setZero();
-  result.Q.topLeftCorner<9, 9>() = turn * preintegration.covariance * turn.transpose();
+  result.Q = turn * preintegration.covariance * turn.transpose();
   return result;
 }
 

@@ -9,7 +9,7 @@ namespace {
 
 using S = StateBlock;
 
-/// theta in W, of Exp(turn_W) Exp(tilt_W) = R_WI(y) R_IW(x).
+/// theta in W, of Exp(turn_W) Exp(tilt_W) = R_WI(to) R_IW(from).
 Eigen::Vector3d thetaInW(const MotionView& to, const MotionView& from) {
   const Eigen::Quaterniond both = to.q_WI * from.q_WI.conjugate();
   const double turn = std::remainder(2.0 * std::atan2(both.z(), both.w()), 2.0 * M_PI);

@@ -12,9 +12,9 @@ Eigen::Map<const Biases> biases(const double* from) { return Eigen::Map<const Bi
 }  // namespace
 
 void boxplus(const double* x, const double* delta, double* x_plus_delta) {
-  const Biases moved = biases(x + StateBlock::kMotion) + biases(delta + StateBlock::kMotionTangent);
   MotionManifold().plus(x, delta, x_plus_delta);
-  Eigen::Map<Biases>{x_plus_delta + StateBlock::kMotion} = moved;
+  Eigen::Map<Biases>{x_plus_delta + StateBlock::kMotion} =
+      biases(x + StateBlock::kMotion) + biases(delta + StateBlock::kMotionTangent);
 }
 
 StateTangent boxminus(const double* y, const double* x) {

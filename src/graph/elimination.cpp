@@ -108,7 +108,8 @@ class BlockElimination {
     }
   }
 
-  /// The rows of R of block i. None if the rows do not determine it. Those that remain wait for later blocks.
+  /// Returns the rows of R of block i, or none if the rows do not determine it. The rows that remain wait for
+  /// later blocks.
   std::optional<LinearRows> eliminate(int i) {
     const std::vector<const LinearRows*> stacked = std::exchange(waiting_[static_cast<std::size_t>(i)], {});
     const Eigen::VectorXd& squares = squares_[static_cast<std::size_t>(i)];
@@ -180,20 +181,21 @@ class BlockElimination {
   }
 
   /// The rows below the first `own` wait: for the next block as many as it has columns, the others for the
-  /// block after it.
+  /// block after it. If they were more than they have columns, they would pile up over a batch.
   void keepRest(Eigen::Index own, Eigen::Index last) {
     if (columns_.size() == 1) return;
     const Eigen::Index next = columns_.size() > 2 ? starts_[2] : last;
-    tableau_.triangularise(own, next);
-    keep(1, own, std::min(next, tableau_.rows()), last);
-    if (next < last) keep(2, next, tableau_.rows(), last);
+    tableau_.triangularise(own, tableau_.rows() > last ? last : next);
+    const Eigen::Index rows = std::min(tableau_.rows(), last);
+    keep(1, own, std::min(next, rows), last);
+    keep(2, next, rows, last);
   }
 
   /// The rows from `first` to `end` wait for the block columns_[at].
   void keep(std::size_t at, Eigen::Index first, Eigen::Index end, Eigen::Index last) {
     if (first >= end) return;
     const LinearRows& rest = rest_.emplace_back(copied(at, first, end, last));
-    // First of all: its rows are triangular, so few of them are reflected.
+    // First of all: those of the next block are triangular, so few of them are reflected.
     auto& waiting = waiting_[static_cast<std::size_t>(rest.blocks.front())];
     waiting.insert(waiting.begin(), &rest);
   }
@@ -411,7 +413,7 @@ SquareRoot widened(const SquareRoot& known, const Eigen::VectorXd& variances) {
     Eigen::Map<Eigen::RowVectorXd>(tableau.row(walk + i) + walk, columns + 1) << known.J.row(i), known.r0[i];
   }
   for (Eigen::Index k = 0, w = 0; k < columns; ++k) {
-    if (variances[k] <= 0.0) continue;
+    if (!(variances[k] > 0.0)) continue;
     tableau.row(w)[w] = 1.0 / std::sqrt(variances[k]);
     for (Eigen::Index i = 0; i < rows; ++i) tableau.row(walk + i)[w] = -known.J(i, k);
     ++w;

@@ -134,13 +134,16 @@ std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solu
   for (std::size_t k = 0; k + 1 < nodes.size(); ++k) {
     const NodeEstimate& node = nodes[k];
     const NodeEstimate& next = nodes[k + 1];
-    // The distance by which the IMU alone misses the next node is spread over the way to it.
-    const StateBlock missed_by = carried(node.x, node.time, next.time, imu_, g_W_);
+    // The distance by which the IMU alone misses the next node is spread over the way to it, with the biases
+    // of its factor.
+    StateBlock x = node.x;
+    x.b_g() = next.x.b_g();
+    x.b_a() = next.x.b_a();
+    const StateBlock missed_by = carried(x, node.time, next.time, imu_, g_W_);
     const StateTangent miss = boxminus(next.x.data(), missed_by.data());
     if (k == 0) states.push_back(navigationState(node, solution.covariances[0], imu_));
     NodeEstimate at = node;
     Time carried_to = node.time;
-    StateBlock x = node.x;
     imu_.forEachSample(node.time, next.time, [&](const ImuMeasurement& sample) {
       x = carried(x, carried_to, sample.time, imu_, g_W_);
       carried_to = sample.time;

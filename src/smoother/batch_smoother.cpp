@@ -200,7 +200,7 @@ Block& BatchSmoother::addOffset(Window& window, Time time, double t_O) const {
 }
 
 Block& BatchSmoother::addBiases(Window& window, Time since, const StateBlock& x) const {
-  // Eliminated after the nodes that have them: so few rows fill up.
+  // Eliminated after the nodes that have them, but for the last one: so few rows fill up.
   return window.addNode(since + options_.window, bias_manifold_, storedBiases(x));
 }
 

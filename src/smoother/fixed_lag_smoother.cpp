@@ -52,7 +52,7 @@ Block& FixedLagSmoother::start(Time time, const StateBlock& x0) {
 }
 
 NodeEstimate FixedLagSmoother::node(std::size_t k) const {
-  return {nodes_[k].time(), stateOf(*nodes_[k].block, *biases_)};
+  return {nodes_[k].time(), stateOf(*nodes_[k].motion, *biases_)};
 }
 
 std::size_t FixedLagSmoother::indexBefore(Time time) const {
@@ -83,23 +83,23 @@ Eigen::MatrixXd FixedLagSmoother::covarianceOf(const Block& node,
 }
 
 Eigen::MatrixXd FixedLagSmoother::newestCovariance(const std::vector<const Block*>& calibration) const {
-  return covarianceOf(*nodes_.back().block, calibration);
+  return covarianceOf(*nodes_.back().motion, calibration);
 }
 
 std::optional<PredictedState> FixedLagSmoother::predict(Time time,
                                                         const std::vector<const Block*>& calibration) const {
   if (time < nodes_.front().time()) return std::nullopt;
   const Node& node = nodes_[indexBefore(time)];
-  PredictedState predicted{stateOf(*node.block, *biases_), covarianceOf(*node.block, calibration)};
+  PredictedState predicted{stateOf(*node.motion, *biases_), covarianceOf(*node.motion, calibration)};
   if (time == node.time()) return predicted;
   const Preintegration& pre = preintegrateFrom(node, time);
   const ImuTransition step = transition(predicted.x, pre);
   predicted.x = rio_t::predict(predicted.x, pre, g_W_);
-  constexpr int kState = StateBlock::kTangent;
+  constexpr int kMotion = StateBlock::kMotionTangent, kState = StateBlock::kTangent;
   Eigen::MatrixXd& P = predicted.covariance;
-  P.topRows(kState) = (step.A * P.topRows(kState)).eval();
-  P.leftCols(kState) = (P.leftCols(kState) * step.A.transpose()).eval();
-  P.topLeftCorner(kState, kState) += step.Q;
+  P.topRows<kMotion>() = (step.A * P.topRows<kState>()).eval();
+  P.leftCols<kMotion>() = (P.leftCols<kState>() * step.A.transpose()).eval();
+  P.topLeftCorner<kMotion, kMotion>() += step.Q;
   return predicted;
 }
 
@@ -114,8 +114,8 @@ Block* FixedLagSmoother::nodeAt(Time time) {
   const double spacing = minNodeSpacing(options_.time_offset_model);
   const std::size_t before = indexBefore(time);
   const std::size_t after = before + 1;
-  if (time - nodes_[before].time() <= spacing) return nodes_[before].block;
-  if (after < nodes_.size() && nodes_[after].time() - time <= spacing) return nodes_[after].block;
+  if (time - nodes_[before].time() <= spacing) return nodes_[before].motion;
+  if (after < nodes_.size() && nodes_[after].time() - time <= spacing) return nodes_[after].motion;
 
   const StateBlock x = rio_t::predict(node(before).x, preintegrateFrom(nodes_[before], time), g_W_);
   Block& block = window_.addNode(time, motion_manifold_, storedMotion(x));
@@ -131,18 +131,19 @@ void FixedLagSmoother::linkToPrevious(std::size_t k) {
   if (node.imu_from_previous != nullptr) window_.remove(*node.imu_from_previous);
   node.imu_from_previous =
       &window_.add(std::make_unique<ImuFactor>(preintegrateFrom(previous, node.time()), g_W_),
-                   {previous.block, node.block, biases_.get()});
+                   {previous.motion, node.motion, biases_.get()});
 }
 
 void FixedLagSmoother::addZeroVelocity(Block& node, double velocity_sigma) {
-  const auto at = std::find_if(nodes_.begin(), nodes_.end(), [&](const Node& n) { return n.block == &node; });
+  const auto at =
+      std::find_if(nodes_.begin(), nodes_.end(), [&](const Node& n) { return n.motion == &node; });
   if (at->zero_velocity != nullptr) window_.remove(*at->zero_velocity);
   at->zero_velocity = &window_.add(std::make_unique<ZeroVelocityFactor>(velocity_sigma), {&node});
 }
 
 const Preintegration& FixedLagSmoother::preintegrateFrom(const Node& node, Time to) const {
   LastPreintegration& last = last_preintegration_;
-  const StateView x(node.block->x.data(), biases_->x.data());
+  const StateView x(node.motion->x.data(), biases_->x.data());
   if (last.from != node.time() || last.to != to || last.value.b_g != x.b_g || last.value.b_a != x.b_a)
     last = {node.time(), to, preintegrate(*imu_, node.time(), to, x.b_g, x.b_a, noise_)};
   return last.value;
@@ -178,9 +179,9 @@ std::vector<NodeEstimate> FixedLagSmoother::marginalize(const std::vector<Random
     for (const RandomWalk& walk : walks) gained.push_back({walk.block, walk.density.cwiseAbs2() * dt});
     if (drifted_ > 0.0)
       gained.push_back(
-          {nodes_[1].block, Eigen::Vector3d::Constant(std::exchange(drifted_, 0.0)), StateBlock::kP});
+          {nodes_[1].motion, Eigen::Vector3d::Constant(std::exchange(drifted_, 0.0)), StateBlock::kP});
     left.push_back(node(0));
-    rio_t::marginalize(window_, leavingWith(*nodes_.front().block), gained);
+    rio_t::marginalize(window_, leavingWith(*nodes_.front().motion), gained);
     nodes_.erase(nodes_.begin());
     nodes_.front().imu_from_previous = nullptr;
   }

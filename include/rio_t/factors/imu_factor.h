@@ -7,10 +7,11 @@
 
 namespace rio_t {
 
-/// Preintegrated IMU between the states i and j with the same biases. Blocks: motion i, motion j, biases.
+/// Preintegrated IMU between the nodes i and j, which have the same biases. Blocks: motion i, motion j,
+/// biases.
 ///
-/// docs/method.md, eq. 12; paper eq. (11); Forster et al. eq. (45). With d = b - b at integration and T the
-/// time between:
+/// docs/method.md, eq. 12; paper eq. (11); Forster et al. eq. (45). With the change of the biases since the
+/// integration, d_g and d_a, and the time between the nodes, T:
 ///   e_R  = Log((dR Exp(dR_dbg d_g))^T R_i^T R_j)
 ///   e_p  = R_i^T (p_j - p_i - v_i T - g T^2 / 2) - (dp + dp_dbg d_g + dp_dba d_a)
 ///   e_v  = R_i^T (v_j - v_i - g T) - (dv + dv_dbg d_g + dv_dba d_a)
@@ -34,10 +35,11 @@ StateBlock predict(const StateBlock& state_i, const Preintegration& preintegrati
 /// `x` at `from`, carried by the IMU to `to`, forwards or backwards, at its own biases.
 StateBlock carried(const StateBlock& x, Time from, Time to, const ImuBuffer& imu, const Eigen::Vector3d& g_W);
 
-/// How an error of state i propagates to the predicted state j: d_j = A d_i + noise with covariance Q, in
-/// tangents. It is the whitened factor, J_i d_i + J_j d_j ~ N(0, 1), solved for d_j; the biases stay.
+/// How an error of state i, biases included, propagates to the predicted motion j: d_j = A d_i + noise with
+/// covariance Q, in tangents. It is the whitened factor, J_i d_i + J_j d_j ~ N(0, 1), solved for d_j.
 struct ImuTransition {
-  Eigen::Matrix<double, StateBlock::kTangent, StateBlock::kTangent> A, Q;
+  Eigen::Matrix<double, StateBlock::kMotionTangent, StateBlock::kTangent> A;
+  Eigen::Matrix<double, StateBlock::kMotionTangent, StateBlock::kMotionTangent> Q;
 };
 ImuTransition transition(const StateBlock& state_i, const Preintegration& preintegration);
 

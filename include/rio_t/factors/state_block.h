@@ -6,7 +6,7 @@
 namespace rio_t {
 
 /// State of the platform at one time. The solver has it as two blocks: the motion of each node, and the
-/// biases of all nodes of a window (docs/method.md, section 6.1).
+/// biases of all nodes of a window (docs/method.md, section 6.2).
 ///
 /// Storage (16): q_WI (x y z w), p_W, v_W, b_g, b_a. Tangent (15), see `boxplus`: theta, p, v, b_g, b_a,
 /// where theta perturbs on the right to first order: R_WI <- R_WI Exp(theta).

@@ -25,7 +25,7 @@ class Elimination {
   std::vector<std::map<int, Eigen::MatrixXd>> covariances() const;
 
  private:
-  /// Of each block, as many as its tangent: R_ii, then R_ij for the later blocks j that they touch.
+  /// The rows of each block: R_ii, then R_ij for the later blocks j that they have, then the right side z.
   std::vector<LinearRows> R_;
   std::vector<Eigen::Index> tangents_;
   std::vector<Eigen::VectorXd> delta_;

@@ -29,7 +29,9 @@ struct Block {
   Block(const Block&) = delete;
   Block& operator=(const Block&) = delete;
 
-  std::optional<Time> time;  ///< of a node; none for calibration, which holds at all times
+  /// Of a node. In a batch, offsets and biases have one, too, for their place in the order. None for
+  /// calibration, which holds at all times.
+  std::optional<Time> time;
   std::shared_ptr<const Manifold> manifold;
   std::vector<double> storage;
   Eigen::Map<Eigen::VectorXd> x;                           ///< as stored; its address stays

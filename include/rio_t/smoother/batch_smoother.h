@@ -67,8 +67,8 @@ struct BatchSolution {
 };
 
 /// The graph of FixedLagSmoother over all the data at once, with the same factors and nothing marginalised.
-/// Each scan has its own t_O, as in the paper (eq. 8-10), so that the offset may drift over the run. A block
-/// of biases holds for SmootherOptions::window seconds, and they walk from one to the next. The
+/// Each scan has its own t_O, as in the paper (eq. 8-10), so that the offset may drift over the run. Each
+/// block of biases holds for SmootherOptions::window seconds, and a random walk links it to the next. The
 /// solution stands when the next step is shorter than a thousandth of a standard deviation in every
 /// direction.
 /// With the imu model a node stands at the time of measurement of its scan. If the offset moves, the nodes
@@ -108,7 +108,7 @@ class BatchSmoother {
   std::vector<Block*> start(const BatchProblem& problem, const StateBlock& x,
                             const std::vector<Extrinsics>& mounting, Graph& graph) const;
   Block& addOffset(Window& window, Time time, double t_O) const;
-  /// Biases that hold from `since` on.
+  /// Biases that hold from `since` on. The time of the block is their end, `window` later.
   Block& addBiases(Window& window, Time since, const StateBlock& x) const;
   /// Sets what the solution says of nodes, scans and extrinsics, with covariances.
   void read(const Graph& graph, const Solution& solved, BatchSolution& solution) const;

@@ -30,8 +30,8 @@ struct PredictedState {
 };
 
 /// The states of the last `window` seconds, linked by the IMU; what leaves is marginalised. Sensors add their
-/// terms and calibration blocks to its window (paper, Fig. 2). One block holds the biases of all nodes; like
-/// calibration, they walk when a node leaves.
+/// terms and calibration blocks to its window (paper, Fig. 2). All nodes share one block of
+/// biases. It walks when a node leaves, as calibration does.
 ///
 /// Nodes are in the order of their times, whatever the order of arrival. Not thread-safe.
 class FixedLagSmoother {
@@ -40,7 +40,7 @@ class FixedLagSmoother {
   FixedLagSmoother(const SmootherOptions& options, const ImuNoise& noise, const Eigen::Vector3d& g_W,
                    const ImuBuffer& imu);
 
-  /// Sets the noise of the IMU for the factors to come.
+  /// Sets the noise of the IMU for the factors, and for the walk of the biases, to come.
   void setImuNoise(const ImuNoise& noise);
   /// Starts, or starts again, with one node and biases that have no prior yet. The caller adds calibration
   /// blocks and priors and then calls `settle`.
@@ -50,6 +50,7 @@ class FixedLagSmoother {
   bool started() const { return !nodes_.empty(); }
 
   Window& window() { return window_; }
+  /// The biases that all nodes share. Only after start.
   Block& biases() { return *biases_; }
   /// The node at `time`, created if none is near. Null if `time` is before the window. The IMU must cover
   /// `time`.
@@ -85,10 +86,10 @@ class FixedLagSmoother {
 
  private:
   struct Node {
-    Block* block = nullptr;
+    Block* motion = nullptr;
     const Term* imu_from_previous = nullptr;  ///< none at the first node
     const Term* zero_velocity = nullptr;
-    Time time() const { return *block->time; }
+    Time time() const { return *motion->time; }
   };
 
   /// Index of the newest node that is not later than `time`; `time` is not before the window.
@@ -96,8 +97,7 @@ class FixedLagSmoother {
   void linkToPrevious(std::size_t k);
   Eigen::MatrixXd covarianceOf(const Block& node, const std::vector<const Block*>& calibration) const;
   std::vector<const Block*> leavingWith(const Block& node) const;
-  /// From `node` to `to`. A scan needs the same one for its prediction and for its
-  /// node.
+  /// From `node` to `to`. A scan needs the same one for its prediction and for its node.
   const Preintegration& preintegrateFrom(const Node& node, Time to) const;
 
   SmootherOptions options_;  // read-only after construction, as g_W_, imu_ and the manifolds
@@ -117,9 +117,9 @@ class FixedLagSmoother {
   mutable LastPreintegration last_preintegration_;  ///< a cache
 };
 
-/// That the biases gain in `dt` seconds, in the order of their block.
+/// Variances that the biases gain in `dt` seconds: b_g, then b_a.
 Eigen::VectorXd biasWalkVariance(const ImuNoise& noise, double dt);
-/// A state of two blocks, and the way back.
+/// The state that a node and the biases make, and its two parts as the blocks store them.
 StateBlock stateOf(const Block& motion, const Block& biases);
 Eigen::VectorXd storedMotion(const StateBlock& x);
 Eigen::VectorXd storedBiases(const StateBlock& x);

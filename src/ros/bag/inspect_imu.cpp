@@ -174,7 +174,7 @@ void describeUp(ImuInspection* imu) {
                                       ? Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0)
                                       : Eigen::Quaterniond::FromTwoVectors(axis, Eigen::Vector3d::UnitZ());
   std::string numbers;
-  for (const double number : q_BI.coeffs()) appendItem(&numbers, fixedText(rounded(number, 1e4), 4));
+  for (int i = 0; i < 4; ++i) appendItem(&numbers, fixedText(rounded(q_BI.coeffs()[i], 1e4), 4));
   tell(imu, FindingLevel::kOdd, "IMU axes",
        "gravity is on " + axisName(*up) +
            ", so z of the IMU is not up: the odometry is right, but rviz shows base_link tilted, since it is "

@@ -9,7 +9,8 @@ void listWindow(ParameterList& list, Config& c) {
       "window", "s", above(0, 60), smoother.window,
       "The smoother optimises the states of this last stretch of time. States that leave the window become a "
       "prior. 0.5 to 3 s are typical. A longer window costs more time per scan and helps little. Raise it if "
-      "scans are rare. The biases of the IMU are constant over the window.");
+      "scans are rare. The biases of the IMU are constant over the window, and in a "
+      "batch over each stretch of this length.");
   list.number(
       "huber_threshold", "", atLeast(0), smoother.huber_threshold,
       "A scan with a larger whitened residual counts less (Huber loss). 1 to 2 are typical. 0 switches the "
