@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
+#include <iterator>
 #include <utility>
 
 #include "consensus.h"
@@ -237,25 +237,10 @@ bool isValid(EgoVelocityStatus status) {
 }
 
 std::string toString(EgoVelocityStatus status) {
-  switch (status) {
-    case EgoVelocityStatus::kMoving:
-      return "moving";
-    case EgoVelocityStatus::kZeroVelocity:
-      return "zero_velocity";
-    case EgoVelocityStatus::kTooFewPoints:
-      return "too_few_points";
-    case EgoVelocityStatus::kTooFewInliers:
-      return "too_few_inliers";
-    case EgoVelocityStatus::kIllConditioned:
-      return "ill_conditioned";
-    case EgoVelocityStatus::kSigmaTooLarge:
-      return "sigma_too_large";
-    case EgoVelocityStatus::kAmbiguous:
-      return "ambiguous";
-    case EgoVelocityStatus::kNotEstimated:
-      return "not_estimated";
-  }
-  throw std::invalid_argument("ego velocity: not a status");
+  constexpr const char* kNames[] = {"moving",          "zero_velocity",   "too_few_points", "too_few_inliers",
+                                    "ill_conditioned", "sigma_too_large", "ambiguous",      "not_estimated"};
+  static_assert(std::size(kNames) == static_cast<std::size_t>(EgoVelocityStatus::kNotEstimated) + 1);
+  return kNames[static_cast<std::size_t>(status)];
 }
 
 }  // namespace rio_t

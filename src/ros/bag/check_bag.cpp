@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <boost/algorithm/string/join.hpp>
+#include <iterator>
 #include <set>
 #include <utility>
 
@@ -96,15 +97,9 @@ void leaveOutCopies(std::vector<RadarInspection>* radars, const Recording& recor
 }
 
 std::string levelText(FindingLevel level) {
-  switch (level) {
-    case FindingLevel::kOk:
-      return "OK      ";
-    case FindingLevel::kOdd:
-      return "odd     ";
-    case FindingLevel::kMissing:
-      break;
-  }
-  return "missing ";
+  constexpr const char* kNames[] = {"OK      ", "odd     ", "missing "};
+  static_assert(std::size(kNames) == static_cast<std::size_t>(FindingLevel::kMissing) + 1);
+  return kNames[static_cast<std::size_t>(level)];
 }
 
 }  // namespace
