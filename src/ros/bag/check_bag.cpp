@@ -7,8 +7,7 @@
 #include <utility>
 
 #include "../text.h"
-#include "check_proposal.h"
-#include "check_trial.h"
+#include "check_config.h"
 #include "inspect_radar.h"
 
 namespace rio_t {
