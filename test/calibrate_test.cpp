@@ -220,6 +220,19 @@ TEST_F(Calibrate, EachOfTwoRadarsHasItsSection) {
   expectTruth(config.radars[1], right, 0.041, {half, sigmas.end()});
 }
 
+TEST(CalibratedYaml, ARadarThatWasTakenOutHasNoSection) {
+  std::istringstream file(
+      "radars: [left, right]\nleft: {radar_topic: /left}\nright: {radar_topic: /right}\n");
+  ParameterEntries entries = readParameters(file, "FILE");
+  entries.push_back(parseAssignment("radars=[left]"));
+  BagCalibration calibration;
+  calibration.radars.emplace_back().name = "left";
+  std::istringstream yaml(calibratedYaml(calibration, makeConfig(entries), entries, "FILE"));
+  const Config config = makeConfig(readParameters(yaml, "calibrated"));
+  ASSERT_EQ(config.radars.size(), 1u);
+  EXPECT_EQ(config.radars[0].radar_topic, "/left");
+}
+
 TEST_F(Calibrate, WhatAStraightRideDoesNotShowStaysAsTold) {
   simulateBag(bag_, "constant_speed", 1, kOffset, truth_);
   told_ = truth_;

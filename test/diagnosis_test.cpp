@@ -433,7 +433,9 @@ TEST(Diagnosis, FewScansSayNothing) {
 
 TEST(PointFilter, TheFirstFailedTestIsNamed) {
   const EgoVelocityOptions o;
-  const auto judge = [&](const Eigen::Vector3d& p, double snr) { return judgePoint({p, 0.0, snr}, o); };
+  const auto judge = [&](const Eigen::Vector3d& p, double snr) {
+    return PointFilter(o).judge({p, 0.0, snr});
+  };
   EXPECT_EQ(judge({0.0, 5.0, 0.0}, 10.0), PointVerdict::kKept);
   EXPECT_EQ(judge({0.0, 0.0, 0.0}, 10.0), PointVerdict::kNoDirection);
   EXPECT_EQ(judge({0.0, 0.1, 0.0}, 10.0), PointVerdict::kTooNear);
@@ -442,8 +444,8 @@ TEST(PointFilter, TheFirstFailedTestIsNamed) {
   EXPECT_EQ(judge({0.1, -5.0, 0.0}, 10.0), PointVerdict::kBesideView);
   EgoVelocityOptions flat;
   flat.max_elevation = 0.1;
-  EXPECT_EQ(judgePoint({{0.0, 5.0, -3.0}, 0.0, 10.0}, flat), PointVerdict::kAboveView);
-  EXPECT_EQ(judgePoint({{0.0, 5.0, 0.0}, 0.0, 10.0, true}, o), PointVerdict::kAmbiguous);
+  EXPECT_EQ(PointFilter(flat).judge({{0.0, 5.0, -3.0}, 0.0, 10.0}), PointVerdict::kAboveView);
+  EXPECT_EQ(PointFilter(o).judge({{0.0, 5.0, 0.0}, 0.0, 10.0, true}), PointVerdict::kAmbiguous);
 }
 
 /// Which of these points are ambiguous, as a string of zeros and ones.

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <limits>
 #include <set>
-#include <stdexcept>
 #include <string>
 
 #include "rio_t/radar/point_filter.h"
@@ -235,23 +234,6 @@ TEST(EgoVelocity, EachStatusHasItsName) {
     names.insert(toString(status));
   }
   EXPECT_EQ(names.size(), 7u);
-}
-
-TEST(EgoVelocity, RefusesSenselessOptions) {
-  const auto refused = [](void (*spoil)(EgoVelocityOptions&)) {
-    EgoVelocityOptions o;
-    spoil(o);
-    EXPECT_THROW(EgoVelocityEstimator{o}, std::invalid_argument);
-  };
-  refused([](EgoVelocityOptions& o) { o.max_azimuth = 3.2; });
-  refused([](EgoVelocityOptions& o) { o.max_elevation = 1.6; });
-  refused([](EgoVelocityOptions& o) { o.max_range = 0.1; });
-  refused([](EgoVelocityOptions& o) { o.ransac_success_probability = 1.0; });
-  refused([](EgoVelocityOptions& o) { o.ransac_outlier_probability = 1.0; });
-  refused(
-      [](EgoVelocityOptions& o) { o.ransac_inlier_threshold = std::numeric_limits<double>::quiet_NaN(); });
-  refused([](EgoVelocityOptions& o) { o.doppler_quantization = -0.1; });
-  refused([](EgoVelocityOptions& o) { o.added_sigma.z() = -1.0; });
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <stdexcept>
 #include <utility>
@@ -241,17 +242,9 @@ Solution solve(Window& window, const SolverLimits& limits, WindowSolver solver) 
 }
 
 std::string toString(SolverTermination termination) {
-  switch (termination) {
-    case SolverTermination::kConverged:
-      return "converged";
-    case SolverTermination::kAtBound:
-      return "at_bound";
-    case SolverTermination::kIterationLimit:
-      return "iteration_limit";
-    case SolverTermination::kNoDecrease:
-      return "no_decrease";
-  }
-  return "";
+  constexpr const char* kNames[] = {"converged", "at_bound", "iteration_limit", "no_decrease"};
+  static_assert(std::size(kNames) == static_cast<std::size_t>(SolverTermination::kNoDecrease) + 1);
+  return kNames[static_cast<std::size_t>(termination)];
 }
 
 }  // namespace rio_t

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
 #include <utility>
 
@@ -229,15 +230,9 @@ CombinedOffset combine(const OffsetEstimate& prior, const std::vector<OffsetEsti
 }
 
 std::string toString(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::kObserved:
-      return "observed";
-    case Verdict::kNotObserved:
-      return "not observed";
-    case Verdict::kNotEstimated:
-      return "not estimated";
-  }
-  throw std::invalid_argument("not a Verdict");
+  constexpr const char* kNames[] = {"observed", "not observed", "not estimated"};
+  static_assert(std::size(kNames) == static_cast<std::size_t>(Verdict::kNotEstimated) + 1);
+  return kNames[static_cast<std::size_t>(verdict)];
 }
 
 std::string whatToMove(CalibrationAxis axis) {

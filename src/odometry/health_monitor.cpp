@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "rio_t/core/so3.h"
 #include "rio_t/factors/state_block.h"
@@ -39,15 +40,9 @@ Eigen::Vector3d bodyVelocityVariance(const NavigationState& state) {
 }  // namespace
 
 std::string toString(Health health) {
-  switch (health) {
-    case Health::kOk:
-      return "ok";
-    case Health::kCoasting:
-      return "coasting";
-    case Health::kDiverged:
-      return "diverged";
-  }
-  return "";
+  constexpr const char* kNames[] = {"ok", "coasting", "diverged"};
+  static_assert(std::size(kNames) == static_cast<std::size_t>(Health::kDiverged) + 1);
+  return kNames[static_cast<std::size_t>(health)];
 }
 
 HealthMonitor::HealthMonitor(const HealthOptions& options, double gate) : options_(options) { setGate(gate); }

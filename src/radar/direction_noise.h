@@ -13,16 +13,12 @@ inline double square(double a) { return a * a; }
 
 inline double azimuthOf(const Eigen::Vector3d& u) { return std::atan2(u.x(), u.y()); }
 inline double elevationOf(const Eigen::Vector3d& u) { return std::atan2(u.z(), u.head<2>().norm()); }
-inline std::vector<double> azimuthsOf(const std::vector<RadarDirection>& points) {
+/// `angle`: azimuthOf or elevationOf.
+inline std::vector<double> anglesOf(const std::vector<RadarDirection>& points,
+                                    double (*angle)(const Eigen::Vector3d&)) {
   std::vector<double> angles;
   angles.reserve(points.size());
-  for (const RadarDirection& p : points) angles.push_back(azimuthOf(p.u_R));
-  return angles;
-}
-inline std::vector<double> elevationsOf(const std::vector<RadarDirection>& points) {
-  std::vector<double> angles;
-  angles.reserve(points.size());
-  for (const RadarDirection& p : points) angles.push_back(elevationOf(p.u_R));
+  for (const RadarDirection& p : points) angles.push_back(angle(p.u_R));
   return angles;
 }
 inline Eigen::Vector3d directionOf(double azimuth, double elevation) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <stdexcept>
 
@@ -163,15 +164,9 @@ void DopplerGrid::judge() {
 }
 
 std::string toString(DopplerStepSource source) {
-  switch (source) {
-    case DopplerStepSource::kUnknown:
-      return "unknown";
-    case DopplerStepSource::kGiven:
-      return "given";
-    case DopplerStepSource::kData:
-      return "data";
-  }
-  throw std::invalid_argument("Doppler grid: not a source");
+  constexpr const char* kNames[] = {"unknown", "given", "data"};
+  static_assert(std::size(kNames) == static_cast<std::size_t>(DopplerStepSource::kData) + 1);
+  return kNames[static_cast<std::size_t>(source)];
 }
 
 }  // namespace rio_t

@@ -112,8 +112,8 @@ DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, 
     : about_(v_R),
       half_bin_(std::sqrt(3.0 * noise.quantization)),
       smallest_sigma_(std::numeric_limits<double>::max()) {
-  const std::vector<double> azimuths = azimuthsOf(points);
-  const std::vector<double> elevations = elevationsOf(points);
+  const std::vector<double> azimuths = anglesOf(points, azimuthOf);
+  const std::vector<double> elevations = anglesOf(points, elevationOf);
   const AngleRegression by_azimuth(azimuths, noise.azimuth, noise.azimuths);
   const AngleRegression by_elevation(elevations, noise.elevation, noise.elevations);
   const bool shows_azimuth = showsSpread(azimuths, noise.azimuth);

@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
+#include <iterator>
 #include <utility>
 
 #include "consensus.h"
 #include "direction_noise.h"
-#include "ego_velocity_options.h"
 #include "rest_velocity.h"
 #include "rio_t/radar/point_filter.h"
 #include "velocity_solver.h"
@@ -95,10 +94,23 @@ PointVariances startNoise(const EgoVelocityOptions& o) {
   return noise;
 }
 
+/// The options with the step that holds, and with the thresholds that were left to it (0).
+/// - Inlier: the step rounds by up to half of itself; 2.5 sigma keep 99 % of the noise besides.
+/// - Zero: within the zero bin. If the noise is larger than that, 1.5 sigma keep 87 % of the points at rest,
+///   and zero_velocity_outlier_fraction of them may lie beyond.
+/// A sigma of 0 counts as PointNoise::kMinStartDopplerSigma.
+EgoVelocityOptions withStep(EgoVelocityOptions o, double step) {
+  const double sigma = std::max(o.doppler_sigma, PointNoise::kMinStartDopplerSigma);
+  o.doppler_quantization = step;
+  if (o.ransac_inlier_threshold == 0.0) o.ransac_inlier_threshold = 0.5 * step + 2.5 * sigma;
+  if (o.zero_velocity_threshold == 0.0) o.zero_velocity_threshold = std::max(0.5 * step, 1.5 * sigma);
+  return o;
+}
+
 }  // namespace
 
 EgoVelocityEstimator::EgoVelocityEstimator(const EgoVelocityOptions& options)
-    : given_(validated(options)),
+    : given_(options),
       ransac_iterations_(ransacIterations(given_)),
       grid_(given_.doppler_quantization),
       span_(given_.doppler_span),
@@ -237,25 +249,10 @@ bool isValid(EgoVelocityStatus status) {
 }
 
 std::string toString(EgoVelocityStatus status) {
-  switch (status) {
-    case EgoVelocityStatus::kMoving:
-      return "moving";
-    case EgoVelocityStatus::kZeroVelocity:
-      return "zero_velocity";
-    case EgoVelocityStatus::kTooFewPoints:
-      return "too_few_points";
-    case EgoVelocityStatus::kTooFewInliers:
-      return "too_few_inliers";
-    case EgoVelocityStatus::kIllConditioned:
-      return "ill_conditioned";
-    case EgoVelocityStatus::kSigmaTooLarge:
-      return "sigma_too_large";
-    case EgoVelocityStatus::kAmbiguous:
-      return "ambiguous";
-    case EgoVelocityStatus::kNotEstimated:
-      return "not_estimated";
-  }
-  throw std::invalid_argument("ego velocity: not a status");
+  constexpr const char* kNames[] = {"moving",          "zero_velocity",   "too_few_points", "too_few_inliers",
+                                    "ill_conditioned", "sigma_too_large", "ambiguous",      "not_estimated"};
+  static_assert(std::size(kNames) == static_cast<std::size_t>(EgoVelocityStatus::kNotEstimated) + 1);
+  return kNames[static_cast<std::size_t>(status)];
 }
 
 }  // namespace rio_t

@@ -58,8 +58,4 @@ PointVerdict PointFilter::judge(const RadarPoint& point) const {
   return PointVerdict::kKept;
 }
 
-PointVerdict judgePoint(const RadarPoint& point, const EgoVelocityOptions& options) {
-  return PointFilter(options).judge(point);
-}
-
 }  // namespace rio_t

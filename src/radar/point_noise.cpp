@@ -52,8 +52,8 @@ PointNoise::PointNoise(const PointVariances& start) : start_(vectorOf(start)), v
 void PointNoise::learnSpread(const std::vector<RadarDirection>& points) {
   if (points.empty()) return;
   constexpr double kKept = 1.0 - 1.0 / kMemory;
-  azimuth_moments_.add(azimuthsOf(points), kKept);
-  elevation_moments_.add(elevationsOf(points), kKept);
+  azimuth_moments_.add(anglesOf(points, azimuthOf), kKept);
+  elevation_moments_.add(anglesOf(points, elevationOf), kKept);
   variances_.azimuths = azimuth_moments_.spread();
   variances_.elevations = elevation_moments_.spread();
 }

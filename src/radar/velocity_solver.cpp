@@ -71,8 +71,8 @@ VelocitySolution solveLikelihood(const std::vector<RadarDirection>& points, cons
   PointVariances known = noise;
   known.outlier_density = kMinOutlierDensity;  // RANSAC has left them out
   // The scan alone tells how far it spreads: an object in a corner of the view must not pass for the world.
-  known.azimuths = spreadOf(azimuthsOf(points));
-  known.elevations = spreadOf(elevationsOf(points));
+  known.azimuths = spreadOf(anglesOf(points, azimuthOf));
+  known.elevations = spreadOf(anglesOf(points, elevationOf));
   const LikeliestVelocity likeliest = findLikeliest(DopplerLikelihood(points, v_R, known), std::nullopt, v_R);
   const double squares = 2.0 * likeliest.cost;  // in sigmas
   const double wider = std::max(1.0, squares / degreesOfFreedom(points.size()));

@@ -41,8 +41,7 @@ void appendFixed(std::string* text, double value, int decimals) {
 std::string fixedText(double value, int decimals) {
   std::string text;
   appendFixed(&text, value, decimals);
-  return text.find_first_of("123456789in") == std::string::npos && text.front() == '-' ? text.substr(1)
-                                                                                       : text;
+  return text;
 }
 
 void appendItem(std::string* list, const std::string& item, const std::string& separator) {

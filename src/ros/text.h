@@ -6,8 +6,9 @@
 namespace rio_t {
 
 /// Appends `value` with that many decimals (at most 12), with a point whatever the locale; "nan", "inf".
+/// Never minus zero.
 void appendFixed(std::string* text, double value, int decimals);
-/// The same as a text of its own, without the sign of a minus zero.
+/// The same as a text of its own.
 std::string fixedText(double value, int decimals);
 
 /// Appends an item to a list in a text: "a, b".

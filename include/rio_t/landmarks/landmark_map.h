@@ -36,7 +36,6 @@ class LandmarkMap {
                      Block& extrinsics, FixedLagSmoother& smoother);
   /// The window has started again, without landmarks.
   void forget();
-  std::vector<LandmarkPoint> points() const;
 
  private:
   struct Landmark {
@@ -65,6 +64,7 @@ class LandmarkMap {
   /// Judges the map by the matches lately.
   void judge(const Prediction& prediction, const Extrinsics& T_IR, const Association& association);
   bool contradicts() const;
+  std::vector<LandmarkPoint> points() const;
 
   LandmarkOptions options_;  // read-only after construction, as the next three
   Eigen::Vector3d g_W_;

@@ -103,7 +103,8 @@ bool isUnanimous(const EgoVelocity& velocity);
 /// A static target in direction u gives v_d = -u . v_R (Kellner et al., ITSC 2013).
 class EgoVelocityEstimator {
  public:
-  /// Throws std::invalid_argument, naming the option, if one is out of its range.
+  /// The options must be in the ranges of their parameters (docs/parameters.md), which are checked there.
+  /// Throws std::invalid_argument if doppler_quantization is negative or not finite.
   explicit EgoVelocityEstimator(const EgoVelocityOptions& options);
 
   /// A prior helps to tell the static world from a moving object that fills half of the view; one scan alone

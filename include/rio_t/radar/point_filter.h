@@ -40,7 +40,4 @@ class PointFilter {
   double cos_azimuth_, sin_elevation_;         // of the largest ones
 };
 
-/// PointFilter for one point.
-PointVerdict judgePoint(const RadarPoint& point, const EgoVelocityOptions& options);
-
 }  // namespace rio_t

@@ -1,36 +1,18 @@
 #include <algorithm>
-#include <map>
 #include <string>
-#include <variant>
 #include <vector>
 
+#include "../parameters/parameter_list.h"
 #include "inspect_keys.h"
 #include "rio_t/ros/bag/calibration.h"
 
 namespace rio_t {
 namespace {
 
-/// What the user gave: the top level, and the section of each radar.
-struct Given {
-  ProposedKeys top_level;
-  std::map<std::string, ProposedKeys> sections;
-};
-
-Given sorted(const ParameterEntries& entries, const std::vector<Config>& radars) {
-  Given given;
-  for (const ParameterEntry& entry : entries) {
-    const std::size_t slash = entry.key.find('/');
-    const bool is_radar = std::any_of(radars.begin(), radars.end(),
-                                      [&](const Config& radar) { return radar.radar_name == entry.key; });
-    if (slash != std::string::npos) {
-      given.sections[entry.key.substr(0, slash)].set(entry.key.substr(slash + 1), entry.value);
-    } else if (!is_radar) {
-      given.top_level.set(entry.key, entry.value);
-    } else if (const auto* nested = std::get_if<ParameterValue::Map>(&entry.value.data)) {
-      for (const ParameterEntry& own : *nested) given.sections[entry.key].set(own.key, own.value);
-    }
-  }
-  return given;
+ProposedKeys keysOf(const ParameterEntries& entries) {
+  ProposedKeys keys;
+  for (const ParameterEntry& entry : entries) keys.set(entry.key, entry.value);
+  return keys;
 }
 
 /// As told to the last digit, else without digits that say nothing.
@@ -93,10 +75,13 @@ std::string estimateNext(bool all_turns_observed) {
 std::string calibratedYaml(const BagCalibration& calibration, const Config& config,
                            const ParameterEntries& given, const std::string& name) {
   const std::vector<Config> told = configsOfRadars(config);
-  Given entries = sorted(given, config.radars);
+  Config any;
+  SortedEntries sorted = sortedEntries(given, parametersOf(any));
+  ProposedKeys top_level = keysOf(sorted.top_level);
   // The mounting found is written as a quaternion of RIO's axes. Told in another way, it would count twice.
   for (const char* key : {"estimate_extrinsics", "mounting_yaw_pitch_roll_deg", "extrinsics_axes"})
-    entries.top_level.remove(key);
+    top_level.remove(key);
+  for (const Config& radar : config.radars) top_level.remove(radar.radar_name);  // `left:` and no more
   const bool all_turns_observed =
       std::all_of(calibration.radars.begin(), calibration.radars.end(),
                   [](const CalibratedRadar& radar) { return radar.calibration.allTurnsObserved(); });
@@ -105,7 +90,8 @@ std::string calibratedYaml(const BagCalibration& calibration, const Config& conf
   for (std::size_t k = 0; k < told.size(); ++k) {
     const CalibratedRadar& radar = calibration.radars[k];
     const std::string indent = has_sections ? "  " : "";
-    ProposedKeys& own = has_sections ? entries.sections[radar.name] : entries.top_level;
+    ProposedKeys section = keysOf(sorted.sections[radar.name].entries);
+    ProposedKeys& own = has_sections ? section : top_level;
     for (const char* key :
          {"extrinsics_translation", "extrinsics_rotation_xyzw", "mounting_yaw_pitch_roll_deg",
           "extrinsics_axes", "time_offset_initial", "time_offset_sigma"})
@@ -115,8 +101,8 @@ std::string calibratedYaml(const BagCalibration& calibration, const Config& conf
                 "# If the driver's restart changes the offset, raise time_offset_sigma.\n" +
                 toYaml(calibratedKeys(radar.calibration, told[k]), indent);
   }
-  return header(calibration, name) + "\n" + toYaml(entries.top_level, "") + "\n" +
-         estimateNext(all_turns_observed) + sections;
+  return header(calibration, name) + "\n" + toYaml(top_level, "") + "\n" + estimateNext(all_turns_observed) +
+         sections;
 }
 
 }  // namespace rio_t

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <boost/algorithm/string/join.hpp>
+#include <iterator>
 #include <set>
 #include <utility>
 
 #include "../text.h"
-#include "check_proposal.h"
-#include "check_trial.h"
+#include "check_config.h"
 #include "inspect_radar.h"
 
 namespace rio_t {
@@ -96,15 +96,9 @@ void leaveOutCopies(std::vector<RadarInspection>* radars, const Recording& recor
 }
 
 std::string levelText(FindingLevel level) {
-  switch (level) {
-    case FindingLevel::kOk:
-      return "OK      ";
-    case FindingLevel::kOdd:
-      return "odd     ";
-    case FindingLevel::kMissing:
-      break;
-  }
-  return "missing ";
+  constexpr const char* kNames[] = {"OK      ", "odd     ", "missing "};
+  static_assert(std::size(kNames) == static_cast<std::size_t>(FindingLevel::kMissing) + 1);
+  return kNames[static_cast<std::size_t>(level)];
 }
 
 }  // namespace

@@ -1,5 +1,3 @@
-#include "check_proposal.h"
-
 #include <algorithm>
 #include <boost/algorithm/string.hpp>
 #include <cctype>
@@ -7,6 +5,7 @@
 #include <string>
 
 #include "../text.h"
+#include "check_config.h"
 
 namespace rio_t {
 namespace {

@@ -1,9 +1,8 @@
-#include "check_trial.h"
-
 #include <algorithm>
 #include <exception>
 
 #include "../text.h"
+#include "check_config.h"
 #include "rio_t/ros/bag/bag_runner.h"
 
 namespace rio_t {

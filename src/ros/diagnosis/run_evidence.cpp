@@ -15,7 +15,7 @@ EvidenceCollector::EvidenceCollector(const Config& config)
     : coasting_after_(config.odometry.health.coasting_after),
       max_bridged_gap_(config.odometry.imu_input_check.max_bridged_gap) {
   for (const Config& radar : configsOfRadars(config)) {
-    options_.push_back(radar.odometry.ego_velocity);
+    filters_.emplace_back(radar.odometry.ego_velocity);
     evidence_.radars.emplace_back().name = radar.radar_name;
   }
 }
@@ -24,10 +24,11 @@ void EvidenceCollector::add(const ScanResult& result) {
   if (!result.used && result.rejected_because.empty()) return;  // only carries the last poses
   RadarSummary& radar = evidence_.radars.at(result.scan.radar);
   ++radar.scans_total;
+  const PointFilter& filter = filters_[result.scan.radar];
   for (const RadarPoint& point : result.scan.points) {
     ++radar.points;
     radar.snr_sum_db += point.snr_db;
-    ++radar.points_by_verdict[static_cast<std::size_t>(judgePoint(point, options_[result.scan.radar]))];
+    ++radar.points_by_verdict[static_cast<std::size_t>(filter.judge(point))];
   }
   if (result.rejected_because == "before_initialization") {
     ++radar.scans_before_start;

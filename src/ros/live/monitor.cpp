@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -35,17 +36,11 @@ bool isEarly(const std::string& reason) {
 
 /// What to do about windows that keep ending so.
 std::string advice(SolverTermination termination) {
-  switch (termination) {
-    case SolverTermination::kAtBound:
-      return "at the bound of the offset: max_time_offset is too small, or the stamps are wrong";
-    case SolverTermination::kIterationLimit:
-      return "at max_iterations";
-    case SolverTermination::kNoDecrease:
-      return "without a step that lowers the cost";
-    case SolverTermination::kConverged:
-      break;
-  }
-  return "";
+  constexpr const char* kAdvice[] = {
+      "", "at the bound of the offset: max_time_offset is too small, or the stamps are wrong",
+      "at max_iterations", "without a step that lowers the cost"};
+  static_assert(std::size(kAdvice) == static_cast<std::size_t>(SolverTermination::kNoDecrease) + 1);
+  return kAdvice[static_cast<std::size_t>(termination)];
 }
 
 }  // namespace

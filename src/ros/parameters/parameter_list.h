@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -151,6 +152,18 @@ void ParameterList::choice(const std::string& key, const std::vector<std::pair<s
 
 /// The registry: every key of `config`, once.
 ParameterList parametersOf(Config& config);
+
+struct Section {
+  std::string origin;  ///< of what stands first in it
+  ParameterEntries entries;
+};
+
+/// Entries of the top level, and those of each section: nested keys, or `name/key`.
+struct SortedEntries {
+  ParameterEntries top_level;
+  std::map<std::string, Section> sections;  ///< by name
+};
+SortedEntries sortedEntries(const ParameterEntries& entries, const ParameterList& list);
 
 /// The radar's configuration before its section is read: two radars share all but the frame.
 Config withoutSection(const Config& top_level, const std::string& name);

@@ -93,36 +93,6 @@ bool isRadar(const std::string& name, const std::vector<Config>& radars) {
                      [&](const Config& each) { return each.radar_name == name; });
 }
 
-struct Section {
-  std::string origin;  // of what stands first in it
-  ParameterEntries entries;
-};
-
-/// Entries of the top level, and those of each section: nested keys, or `name/key`.
-struct SortedEntries {
-  ParameterEntries top_level;
-  std::map<std::string, Section> sections;  // by name
-};
-
-SortedEntries sortedEntries(const ParameterEntries& entries, const ParameterList& list) {
-  SortedEntries result;
-  for (const ParameterEntry& entry : entries) {
-    const std::size_t slash = entry.key.find('/');
-    const auto* nested = std::get_if<ParameterValue::Map>(&entry.value.data);
-    if (slash != std::string::npos) {
-      Section& section =
-          result.sections.try_emplace(entry.key.substr(0, slash), Section{entry.origin, {}}).first->second;
-      section.entries.push_back({entry.key.substr(slash + 1), entry.value, entry.origin});
-    } else if (nested != nullptr && find(list, entry.key) == nullptr) {
-      Section& section = result.sections.try_emplace(entry.key, Section{entry.origin, {}}).first->second;
-      section.entries.insert(section.entries.end(), nested->begin(), nested->end());
-    } else {
-      result.top_level.push_back(entry);
-    }
-  }
-  return result;
-}
-
 /// The values of the top level, `radars` with no more than their names; what is wrong goes into `faults`.
 void setTopLevel(const ParameterEntries& entries, const ParameterList& list,
                  const std::vector<Config>& radars, std::vector<std::string>* faults) {
@@ -260,6 +230,25 @@ std::string configFolder() {
 }
 
 }  // namespace
+
+SortedEntries sortedEntries(const ParameterEntries& entries, const ParameterList& list) {
+  SortedEntries result;
+  for (const ParameterEntry& entry : entries) {
+    const std::size_t slash = entry.key.find('/');
+    const auto* nested = std::get_if<ParameterValue::Map>(&entry.value.data);
+    if (slash != std::string::npos) {
+      Section& section =
+          result.sections.try_emplace(entry.key.substr(0, slash), Section{entry.origin, {}}).first->second;
+      section.entries.push_back({entry.key.substr(slash + 1), entry.value, entry.origin});
+    } else if (nested != nullptr && find(list, entry.key) == nullptr) {
+      Section& section = result.sections.try_emplace(entry.key, Section{entry.origin, {}}).first->second;
+      section.entries.insert(section.entries.end(), nested->begin(), nested->end());
+    } else {
+      result.top_level.push_back(entry);
+    }
+  }
+  return result;
+}
 
 Config withoutSection(const Config& top_level, const std::string& name) {
   Config config = top_level;

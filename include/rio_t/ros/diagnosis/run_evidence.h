@@ -109,7 +109,7 @@ class EvidenceCollector {
                        const std::optional<RadarInertialOdometry::Start>& start) const;
 
  private:
-  std::vector<EgoVelocityOptions> options_;  // by RadarScan::radar
+  std::vector<PointFilter> filters_;         // by RadarScan::radar
   double coasting_after_, max_bridged_gap_;  // [s]
   std::optional<Time> first_imu_, newest_state_;
   Time last_used_;  // scan, or the start

@@ -1,12 +1,19 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "inspect_keys.h"
+#include "inspect_radar.h"
 #include "inspect_recording.h"
 #include "rio_t/ros/bag/check_bag.h"
 
 namespace rio_t {
+
+/// The configuration for an IMU and radars as they were found. What the user has `told` stands in it as it
+/// is.
+ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarInspection>& radars,
+                              const ParameterEntries& told);
 
 /// Runs the odometry on the bag and gives `check` the configuration with which it runs best: `config`, or one
 /// near it that leaves what the user has `told`. `header`: lines for the beginning of the file.
