@@ -117,40 +117,53 @@ TEST_F(Batch, EqualsTheFixedLagSmootherThatKeepsEverything) {
 }
 
 TEST_F(Batch, CovarianceIsThatOfTheDenseInverse) {
-  SmootherOptions options;
-  options.window = 10.0;  // one block of biases
-  BatchProblem whole = problem(options);
-  for (double stamp = 0.7; stamp < 2.0; stamp += 0.1) {
-    BatchScan scan;
-    scan.velocity = measurement(stamp, 0.01, 0.03);
-    scan.stamp = scan.velocity->stamp;
-    whole.scans.push_back(scan);
-  }
-  const BatchSolution batch = make(options).solve(whole);
-  // Scaled to a unit diagonal: metres and biases together are beyond what a dense inverse can hold.
-  const Dense dense(batch.system);
-  const Eigen::MatrixXd& H = dense.H;
-  const Eigen::VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd scaled = scale.asDiagonal() * H * scale.asDiagonal();
-  const Eigen::MatrixXd covariance = scale.asDiagonal() * scaled.inverse() * scale.asDiagonal();
-  // A node and its offset follow each other, and the first pair is that of the start. Then come the biases.
-  for (const BatchSolution::Scan& scan : batch.scans) {
-    std::vector<Eigen::Index> order;
-    const auto add = [&](std::size_t block) {
-      for (int k = 0; k < batch.system.tangent(static_cast<int>(block)); ++k)
-        order.push_back(dense.first[block] + k);
-    };
-    add(2 * scan.node);
-    add(2 * batch.nodes.size());
-    add(2 * scan.node + 1);
-    const auto size = static_cast<Eigen::Index>(order.size());
-    ASSERT_EQ(size, StateBlock::kTangent + 1);
-    Eigen::MatrixXd expected(size, size);
-    for (Eigen::Index i = 0; i < size; ++i)
-      for (Eigen::Index j = 0; j < size; ++j)
-        expected(i, j) = covariance(order[static_cast<std::size_t>(i)], order[static_cast<std::size_t>(j)]);
-    EXPECT_LT(difference(scan.covariance, expected), 1e-6);
-    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(scan.covariance).eigenvalues().minCoeff(), 0.0);
+  for (const double window : {10.0, 0.3}) {  // one block of biases, and several
+    SmootherOptions options;
+    options.window = window;
+    BatchProblem whole = problem(options);
+    for (double stamp = 0.7; stamp < 2.0; stamp += 0.1) {
+      BatchScan scan;
+      scan.velocity = measurement(stamp, 0.01, 0.03);
+      scan.stamp = scan.velocity->stamp;
+      whole.scans.push_back(scan);
+    }
+    const BatchSolution batch = make(options).solve(whole);
+    // Scaled to a unit diagonal: metres and biases together are beyond what a dense inverse can hold.
+    const Dense dense(batch.system);
+    const Eigen::VectorXd scale = dense.H.diagonal().cwiseSqrt().cwiseInverse();
+    const Eigen::MatrixXd scaled = scale.asDiagonal() * dense.H * scale.asDiagonal();
+    const Eigen::MatrixXd covariance = scale.asDiagonal() * scaled.inverse() * scale.asDiagonal();
+    std::vector<Eigen::Index> motions, biases, offsets;  // first columns; each node has an offset
+    for (std::size_t i = 0; i < dense.first.size(); ++i) {
+      if (batch.system.is_held[i]) continue;
+      const Eigen::Index size = batch.system.tangents[i];
+      (size == StateBlock::kMotionTangent ? motions : size == 1 ? offsets : biases).push_back(dense.first[i]);
+    }
+    ASSERT_EQ(biases.size(), window > 1.0 ? 1u : 4u);
+    std::vector<std::size_t> biases_of = {0};  // by node
+    Time end = batch.nodes.front().time + window;
+    for (std::size_t k = 1; k < batch.nodes.size(); ++k) {
+      const Time before = batch.nodes[k - 1].time;
+      biases_of.push_back(biases_of.back() + (before >= end ? 1 : 0));
+      if (before >= end) end = before + window;
+    }
+    for (const BatchSolution::Scan& scan : batch.scans) {
+      std::vector<Eigen::Index> order;
+      const auto add = [&](Eigen::Index first, int size) {
+        for (int k = 0; k < size; ++k) order.push_back(first + k);
+      };
+      add(motions[scan.node], StateBlock::kMotionTangent);
+      add(biases[biases_of[scan.node]], StateBlock::kBiases);
+      add(offsets[scan.node], 1);
+      Eigen::MatrixXd expected(16, 16);
+      for (std::size_t i = 0; i < order.size(); ++i)
+        for (std::size_t j = 0; j < order.size(); ++j)
+          expected(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
+              covariance(order[i], order[j]);
+      EXPECT_LT(difference(scan.covariance, expected), 1e-6) << window;
+      EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(scan.covariance).eigenvalues().minCoeff(),
+                0.0);
+    }
   }
 }
 
