@@ -44,6 +44,16 @@ class Batch : public ::testing::Test {
     return problem;
   }
 
+  /// Scans of one radar with one t_O, from `begin` to `end` [s]; `error` as in measurement().
+  void addScans(double begin, double end, double t_O, BatchProblem& problem, double error = 0.0) const {
+    for (double stamp = begin; stamp < end; stamp += 0.1) {
+      BatchScan scan;
+      scan.velocity = measurement(stamp, t_O, error);
+      scan.stamp = scan.velocity->stamp;
+      problem.scans.push_back(scan);
+    }
+  }
+
   /// Scans of one radar; t_O steps from `before` to `after` in the middle, and the first scan after it tells.
   void addScansWithStep(double before, double after, BatchProblem& problem) const {
     for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
@@ -121,12 +131,7 @@ TEST_F(Batch, CovarianceIsThatOfTheDenseInverse) {
     SmootherOptions options;
     options.window = window;
     BatchProblem whole = problem(options);
-    for (double stamp = 0.7; stamp < 2.0; stamp += 0.1) {
-      BatchScan scan;
-      scan.velocity = measurement(stamp, 0.01, 0.03);
-      scan.stamp = scan.velocity->stamp;
-      whole.scans.push_back(scan);
-    }
+    addScans(0.7, 2.0, 0.01, whole, 0.03);
     const BatchSolution batch = make(options).solve(whole);
     // Scaled to a unit diagonal: metres and biases together are beyond what a dense inverse can hold.
     const Dense dense(batch.system);
@@ -173,12 +178,7 @@ TEST_F(Batch, PlacesItsNodesWhereTheOffsetPutsThem) {
     SmootherOptions options;
     options.time_offset_sigma = 1.0;  // so that the prior does not pull at these few scans
     BatchProblem whole = problem(options);
-    for (double stamp = 0.8; stamp < kEnd; stamp += 0.1) {
-      BatchScan scan;
-      scan.velocity = measurement(stamp, t_O);
-      scan.stamp = scan.velocity->stamp;
-      whole.scans.push_back(scan);
-    }
+    addScans(0.8, kEnd, t_O, whole);
     const BatchSolution batch = make(options).solve(whole);
     EXPECT_TRUE(batch.converged());
     EXPECT_GT(batch.placements, 1);
@@ -228,13 +228,8 @@ TEST_F(Batch, TheBiasesOfABatchWalk) {
   SmootherOptions options;
   options.window = 0.5;
   BatchProblem whole = problem(options);
-  for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
-    BatchScan scan;
-    scan.velocity = measurement(stamp, 0.0);
-    scan.velocity->covariance *= 0.01;
-    scan.stamp = scan.velocity->stamp;
-    whole.scans.push_back(scan);
-  }
+  addScans(0.7, kEnd, 0.0, whole);
+  for (BatchScan& scan : whole.scans) scan.velocity->covariance *= 0.01;
   const BatchSolution batch =
       BatchSmoother(options, BatchOptions(), noise, motion.g_W, drifting).solve(whole);
   EXPECT_TRUE(batch.converged());
@@ -308,12 +303,7 @@ TEST_F(Batch, ATruthBeyondTheBoundIsTold) {
   SmootherOptions options;
   options.max_time_offset = 0.05;
   BatchProblem whole = problem(options);
-  for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
-    BatchScan scan;
-    scan.velocity = measurement(stamp, 0.08);
-    scan.stamp = scan.velocity->stamp;
-    whole.scans.push_back(scan);
-  }
+  addScans(0.7, kEnd, 0.08, whole);
   const BatchSolution batch = make(options).solve(whole);
   EXPECT_EQ(batch.termination, SolverTermination::kAtBound);
   EXPECT_LT(batch.iterations, 50);

@@ -180,8 +180,8 @@ class BlockElimination {
     return row;
   }
 
-  /// The rows below the first `own` wait: for the next block as many as it has columns, the others for the
-  /// block after it. If they were more than they have columns, they would pile up over a batch.
+  /// Keeps the rows below the first `own`. As many as the next block has columns wait for it, the others for
+  /// the block after it. No more wait than have columns: in a batch they would pile up.
   void keepRest(Eigen::Index own, Eigen::Index last) {
     if (columns_.size() == 1) return;
     const Eigen::Index next = columns_.size() > 2 ? starts_[2] : last;

@@ -38,7 +38,7 @@ class PolarNoise {
   Eigen::Vector3d sigmas_;  ///< [m], [rad], [rad]
 };
 
-/// Where the radar sees a point of the world, and how that depends on motion, mounting and point.
+/// A point of the world as the radar sees it, with the derivatives by motion, mounting and point.
 struct SeenPoint {
   Eigen::Vector3d p_R;                 ///< [m]
   MotionJacobian<3> J_motion;          ///< as StateBlock stores it

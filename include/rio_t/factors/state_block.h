@@ -71,7 +71,7 @@ using StateTangent = Eigen::Matrix<double, StateBlock::kTangent, 1>;
 /// Covariance of a tangent. Its order: theta (right perturbation of R_WI, in I), p_W, v_W, b_g, b_a.
 using StateCovariance = Eigen::Matrix<double, StateBlock::kTangent, StateBlock::kTangent>;
 
-/// x_plus_delta = x [+] delta; all of them in storage and tangent order. May alias.
+/// x_plus_delta = x [+] delta; in storage and tangent order. x_plus_delta may be x.
 ///
 /// theta is split in W into a turn about the vertical, psi z_W, and a tilt about a horizontal axis, beta:
 ///   R_WI <- Exp(psi z_W) Exp(beta) R_WI

@@ -29,8 +29,8 @@ struct Block {
   Block(const Block&) = delete;
   Block& operator=(const Block&) = delete;
 
-  /// Of a node. In a batch, offsets and biases have one, too, for their place in the order. None for
-  /// calibration, which holds at all times.
+  /// Nodes have one. A batch gives one to its offsets and biases, too: it sets their place in the order.
+  /// Other calibration holds at all times and has none.
   std::optional<Time> time;
   std::shared_ptr<const Manifold> manifold;
   std::vector<double> storage;
