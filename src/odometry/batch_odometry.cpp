@@ -160,7 +160,8 @@ std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solu
   ImuPropagator propagator(imuNoise(), g_W_);
   propagator.anchor(navigationState(nodes.back(), solution.covariances.back(), imu_));
   imu_.forEachSample(nodes.back().time - 0.1, imu_.newest(), [&](const ImuMeasurement& sample) {
-    const std::optional<NavigationState> state = propagator.add(sample);
+    propagator.add(sample);
+    const std::optional<NavigationState> state = propagator.state();
     if (state && state->time > nodes.back().time && !sample.is_bridge) states.push_back(*state);
   });
   return states;

@@ -370,7 +370,7 @@ void Estimator::followContradiction(bool was_contradicted) {
 }
 
 void Estimator::anchor(const NavigationState& state, bool at_rest) {
-  navigation_.anchor(state, at_rest, imuNoise(), clock_restarts_);
+  navigation_.anchor(state, at_rest, imuNoise(), imu_.oldest(), clock_restarts_);
 }
 
 std::vector<StampedPose> Estimator::remainingPoses() {

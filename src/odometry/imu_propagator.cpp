@@ -16,13 +16,14 @@ constexpr double kMoves = 4.0;
 
 }  // namespace
 
-std::optional<NavigationState> ImuPropagator::add(const ImuMeasurement& imu) {
-  if (state_) {
-    propagate(history_.empty() ? imu : history_.back(), imu);
-  }
+void ImuPropagator::add(const ImuMeasurement& imu) {
+  if (state_) propagate(history_.empty() ? imu : history_.back(), imu);
   history_.push_back(imu);
-  while (imu.time - history_.front().time > kHistory) history_.pop_front();
-  return state();
+  dropBefore(imu.time - kHistory);
+}
+
+void ImuPropagator::dropBefore(Time time) {
+  while (history_.size() > 1 && history_[1].time <= time) history_.pop_front();
 }
 
 std::optional<NavigationState> ImuPropagator::state() const {

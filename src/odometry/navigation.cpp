@@ -27,18 +27,21 @@ Navigation::Checked Navigation::add(const ImuMeasurement& imu) {
   accel_noises_ += sample.accel_noise;
   gyro_noises_ += sample.gyro_noise;
   samples_ += 1.0;
-  checked.samples = std::move(verdict.bridge);
-  checked.samples.push_back(sample);
-  for (const ImuMeasurement& each : checked.samples) checked.state = propagator_.add(each);
+  for (const ImuMeasurement& each : verdict.bridge) propagator_.add(each);
+  propagator_.add(sample);
+  checked.bridge = std::move(verdict.bridge);
+  checked.sample = sample;
+  checked.state = propagator_.state();
   return checked;
 }
 
-void Navigation::anchor(const NavigationState& state, bool at_rest, const ImuNoise& noise,
+void Navigation::anchor(const NavigationState& state, bool at_rest, const ImuNoise& noise, Time oldest,
                         std::uint64_t clock_restarts) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (clock_restarts != clock_restarts_) return;
   propagator_.setNoise(noise);
   propagator_.anchor(state, at_rest);
+  propagator_.dropBefore(oldest);
 }
 
 std::optional<NavigationState> Navigation::state() const {

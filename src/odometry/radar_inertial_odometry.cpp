@@ -62,7 +62,7 @@ std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasuremen
   Impl& m = *impl_;
   Navigation::Checked checked = m.navigation.add(imu);
   for (const char* fault : checked.faults) m.faults.count(fault);
-  if (checked.samples.empty()) return std::nullopt;
+  if (!checked.sample) return std::nullopt;
   const std::lock_guard<std::mutex> lock(m.inbox_mutex);
   if (m.inbox.clock_restarts != checked.clock_restarts) {
     m.inbox.clock_restarts = checked.clock_restarts;
@@ -70,7 +70,8 @@ std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasuremen
     m.inbox.pressures.clear();
     m.status.initialized = false;
   }
-  m.inbox.imu.insert(m.inbox.imu.end(), checked.samples.begin(), checked.samples.end());
+  m.inbox.imu.insert(m.inbox.imu.end(), checked.bridge.begin(), checked.bridge.end());
+  m.inbox.imu.push_back(*checked.sample);
   return checked.state;
 }
 

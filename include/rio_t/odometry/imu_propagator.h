@@ -16,14 +16,16 @@ class ImuPropagator {
   /// `g_W`: gravity in W [m/s^2].
   ImuPropagator(const ImuNoise& noise, const Eigen::Vector3d& g_W) : noise_(noise), g_W_(g_W) {}
 
-  /// State at this sample; none before the first anchor. Samples must be in time order.
-  std::optional<NavigationState> add(const ImuMeasurement& imu);
+  /// Samples must be in time order.
+  void add(const ImuMeasurement& imu);
 
   /// Starts again from a new optimised state, usually some 100 ms before the newest sample, and integrates
   /// all samples since then. Ignores a state older than 30 s.
   /// `at_rest`: the platform stood still then, and `state` has no velocity. While the IMU vibrates, velocity
   /// and position stay where they are until the IMU shows more than its noise.
   void anchor(const NavigationState& state, bool at_rest = false);
+  /// Forgets samples that only anchors before `time` need.
+  void dropBefore(Time time);
   /// Sets the noise of the IMU for the samples to come.
   void setNoise(const ImuNoise& noise) { noise_ = noise; }
   /// At the newest sample; none before the first anchor. Its covariance may be kCovarianceStep older.

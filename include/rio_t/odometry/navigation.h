@@ -19,16 +19,18 @@ class Navigation {
 
   /// The result of one sample.
   struct Checked {
-    std::vector<ImuMeasurement> samples;   ///< bridge over a gap, then the sample; empty if it was dropped
+    std::vector<ImuMeasurement> bridge;    ///< over the gap before the sample
+    std::optional<ImuMeasurement> sample;  ///< none if it was dropped
     std::vector<const char*> faults;       ///< names for FaultCounters
     std::uint64_t clock_restarts = 0;      ///< how often the clock of the IMU has jumped so far
     std::optional<NavigationState> state;  ///< at the sample; none before the first anchor
   };
   Checked add(const ImuMeasurement& imu);
 
-  /// Takes the newest optimised state, and the noise of the IMU for the samples to come. Ignores both if the
-  /// clock restarted since `clock_restarts`, because they belong to another time.
-  void anchor(const NavigationState& state, bool at_rest, const ImuNoise& noise,
+  /// Takes the newest optimised state, and the noise of the IMU for the samples to come. No later anchor is
+  /// older than `oldest`. Ignores all if the clock restarted since `clock_restarts`, because they belong to
+  /// another time.
+  void anchor(const NavigationState& state, bool at_rest, const ImuNoise& noise, Time oldest,
               std::uint64_t clock_restarts);
 
   std::optional<NavigationState> state() const;  ///< at the newest sample
