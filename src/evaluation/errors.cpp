@@ -140,6 +140,10 @@ std::vector<Pair> allPairs(const std::vector<double>& lengths, double delta) {
   return pairs;
 }
 
+StampedPose transformed(const RigidTransform& T_TE, const StampedPose& pose) {
+  return {pose.time, T_TE.q_TE * pose.p_W + T_TE.t_T, (T_TE.q_TE * pose.q_WI).normalized()};
+}
+
 }  // namespace
 
 RigidTransform alignment(const Trajectory& truth, const Trajectory& estimate,
@@ -165,24 +169,15 @@ RigidTransform alignment(const Trajectory& truth, const Trajectory& estimate,
   return T_TE;
 }
 
-Trajectory transformed(const RigidTransform& T_TE, const Trajectory& estimate) {
-  Trajectory result = estimate;
-  for (StampedPose& pose : result) {
-    pose.p_W = T_TE.q_TE * pose.p_W + T_TE.t_T;
-    pose.q_WI = (T_TE.q_TE * pose.q_WI).normalized();
-  }
-  return result;
-}
-
 std::vector<PoseError> poseErrors(const Trajectory& truth, const Trajectory& estimate, Alignment kind,
                                   double max_difference) {
   const std::vector<Match> matches = requireMatches(truth, estimate, max_difference);
-  const Trajectory aligned = transformed(alignment(truth, estimate, matches, kind), estimate);
+  const RigidTransform T_TE = alignment(truth, estimate, matches, kind);
   std::vector<PoseError> errors;
   errors.reserve(matches.size());
   for (const Match& match : matches) {
     const StampedPose& t = truth[match.truth];
-    const StampedPose& e = aligned[match.estimate];
+    const StampedPose e = transformed(T_TE, estimate[match.estimate]);
     errors.push_back({e.time, e.p_W, t.p_W, angleDegrees(t.q_WI, e.q_WI), yawDegrees(t.q_WI, e.q_WI)});
   }
   return errors;

@@ -52,7 +52,6 @@ Trajectory groundTruth(const Motion& motion, double rate, Time start) {
   if (!(rate > 0.0)) throw std::invalid_argument("ground truth: rate must be positive");
   Trajectory poses;
   const auto count = static_cast<std::size_t>(std::floor(motion.duration() * rate)) + 1;
-  poses.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
     StampedPose pose;
     pose.time = start + static_cast<double>(i) / rate;

@@ -36,7 +36,6 @@ struct RigidTransform {
 /// otherwise.
 RigidTransform alignment(const Trajectory& truth, const Trajectory& estimate,
                          const std::vector<Match>& matches, Alignment kind);
-Trajectory transformed(const RigidTransform& T_TE, const Trajectory& estimate);
 
 /// Error of one matched pose after alignment; what the statistics are made of, for plots.
 struct PoseError {

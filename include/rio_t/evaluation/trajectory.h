@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <deque>
 #include <iosfwd>
 #include <string>
 #include <vector>
@@ -9,8 +10,9 @@
 
 namespace rio_t {
 
-/// Poses of the IMU frame I in a world frame W, stamps strictly increasing.
-using Trajectory = std::vector<StampedPose>;
+/// Poses of the IMU frame I in a world frame W, stamps strictly increasing. A deque: a run may have millions
+/// of them, and none is copied while it grows.
+using Trajectory = std::deque<StampedPose>;
 
 /// Reads a TUM trajectory: `stamp x y z qx qy qz qw` a line, seconds and metres; `#` comments and blank lines
 /// are skipped. Stamps keep their nanoseconds. Quaternions are normalised; they must be unit to 1 %. Throws

@@ -6,8 +6,6 @@ namespace rio_t {
 
 BoundedTrajectory::BoundedTrajectory(std::size_t capacity) : capacity_(capacity) {
   if (capacity < 2) throw std::invalid_argument("BoundedTrajectory: expected a capacity of at least 2");
-  // At once: growing in steps leaves the heap with holes of megabytes. It is only used as poses come.
-  kept_.reserve(capacity);
 }
 
 void BoundedTrajectory::add(const StampedPose& pose) {
