@@ -25,8 +25,9 @@ Eigen::Vector3d NoiseMeter::squaredDensities(double spacing) const {
     double product = 1.0;
     for (std::size_t j = 0; j < at.size(); ++j)
       if (j != i) product *= at[i] - at[j];
-    difference += last_[i].value / product;
-    gain += 1.0 / (product * product);
+    const double weight = 1.0 / product;
+    difference += weight * last_[i].value;
+    gain += weight * weight;
   }
   return difference.cwiseAbs2() * (spacing / gain);
 }

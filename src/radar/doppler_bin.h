@@ -8,12 +8,12 @@ namespace rio_t {
 /// of that of any radar known.
 constexpr double kMinDopplerVariance = 1e-6;
 
-/// Probability that a value with the error `e` and the noise `sigma` falls into a bin of half width
-/// `half_bin` around it (docs/method.md, eq. 19a, times the width).
-inline double binProbability(double e, double sigma, double half_bin) {
-  const auto beyond = [&](double edge) { return 0.5 * std::erfc(edge / sigma * M_SQRT1_2); };
-  const double size = std::abs(e);  // the bin is even, and erfc is exact in its upper tail only
-  return beyond(size - half_bin) - beyond(size + half_bin);
+/// Probability that a value with the error `z` falls into a bin of half width `half` around it, both in
+/// sigmas of the noise (docs/method.md, eq. 19a, times the width).
+inline double binProbability(double z, double half) {
+  const auto beyond = [](double edge) { return 0.5 * std::erfc(edge * M_SQRT1_2); };
+  const double size = std::abs(z);  // the bin is even, and erfc is exact in its upper tail only
+  return beyond(size - half) - beyond(size + half);
 }
 
 /// Density of a Doppler of the static world, and its derivative by the variance.
@@ -30,7 +30,7 @@ inline DopplerDensity dopplerDensity(double e, double variance, double quantizat
     const auto byVariance = [&](double edge) {  // of the probability beyond it
       return edge * std::exp(-0.5 * edge * edge / variance) / (std::sqrt(8.0 * M_PI) * sigma * variance);
     };
-    return {binProbability(e, sigma, half_bin) / (2.0 * half_bin),
+    return {binProbability(e / sigma, half_bin / sigma) / (2.0 * half_bin),
             (byVariance(e - half_bin) - byVariance(e + half_bin)) / (2.0 * half_bin)};
   }
   const double whole = variance + quantization;

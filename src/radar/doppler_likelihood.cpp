@@ -23,38 +23,35 @@ constexpr double kSpreads = 4.0;  // [variances] of the noise
 
 double density(double z) { return std::exp(-0.5 * z * z) * (0.5 * M_SQRT1_2 * M_2_SQRTPI); }
 
-/// A residual r and its derivative by the error of the Doppler.
+/// A residual r and its derivative by the error.
 struct Residual {
   double value, slope;
 };
 
-/// Noise larger than the bin: r^2 / 2 = -log((exp(-x) + outlier) / (1 + outlier)), x = e^2 / (2 s^2).
-Residual fineResidual(double e, double s, double outlier) {
-  const double z = e / s;
+/// Noise larger than the bin: r^2 / 2 = -log((exp(-z^2 / 2) + outlier) / (1 + outlier)), where z is the error
+/// in sigmas. The derivative is by z, too.
+Residual fineResidual(double z, double outlier) {
   const double inlier = std::exp(-0.5 * z * z);
   const double probability = inlier / (inlier + outlier);
   const double half_square = -std::log((inlier + outlier) / (1.0 + outlier));
   const double value = std::sqrt(2.0 * std::max(0.0, half_square));
-  if (value < kNoResidual) return {std::sqrt(probability) * z, std::sqrt(probability) / s};
-  return {std::copysign(value, e), probability * std::abs(z) / (value * s)};
+  if (value < kNoResidual) return {std::sqrt(probability) * z, std::sqrt(probability)};
+  return {std::copysign(value, z), probability * std::abs(z) / value};
 }
 
-/// The same for a bin of half width h around the Doppler: exp(-x) becomes the probability of the bin. That of
-/// the bin around e = 0 is `centre`.
-Residual coarseResidual(double e, double s, double h, double centre, double outlier) {
-  const double a = std::abs(e);
-  const double below = (a - h) / s;
-  const double above = (a + h) / s;
-  const double edge = h / s;
+/// The same for a bin of `half` width around the Doppler: exp(-z^2 / 2) becomes the probability of the bin.
+/// That of the bin around z = 0 is `centre`.
+Residual coarseResidual(double z, double half, double centre, double outlier) {
   const double floor = outlier * centre;
-  const double bin = binProbability(e, s, h);
+  const double bin = binProbability(z, half);
   const double half_square = -std::log((bin + floor) / (centre + floor));
   const double value = std::sqrt(2.0 * std::max(0.0, half_square));
-  if (value < kNoResidual) {  // r = e sqrt(-bin'' / bin) around zero
-    const double root = std::sqrt(2.0 * edge * density(edge) / (centre + floor)) / s;
-    return {root * e, root};
+  if (value < kNoResidual) {  // r = z sqrt(-bin'' / bin) around zero
+    const double root = std::sqrt(2.0 * half * density(half) / (centre + floor));
+    return {root * z, root};
   }
-  return {std::copysign(value, e), (density(below) - density(above)) / (s * (bin + floor) * value)};
+  const double size = std::abs(z);
+  return {std::copysign(value, z), (density(size - half) - density(size + half)) / ((bin + floor) * value)};
 }
 
 /// Whether the points surely show by themselves how far an angle spreads, and that its noise is a small part.
@@ -153,9 +150,16 @@ DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, 
     const double sigma = std::sqrt(variance);
     smallest_sigma_ = std::min(smallest_sigma_, sigma);
     const double whole = std::sqrt(variance + noise.quantization);
-    points_.push_back({shorter * longer.cwiseProduct(expected), points[i].doppler, spread, fixed_variance,
-                       sigma, whole, noise.outlier_density * std::sqrt(2.0 * M_PI) * whole,
-                       half_bin_ > sigma ? binProbability(0.0, sigma, half_bin_) : 0.0});
+    Point& point = points_.emplace_back();
+    point.u_R = shorter * longer.cwiseProduct(expected);
+    point.doppler = points[i].doppler;
+    point.spread = spread;
+    point.fixed_variance = fixed_variance + noise.quantization;
+    point.outlier = noise.outlier_density * std::sqrt(2.0 * M_PI) * whole;
+    if (half_bin_ <= sigma) continue;
+    point.half_bin = half_bin_ / sigma;
+    point.whole_sigma = whole / sigma;
+    point.centre = binProbability(0.0, point.half_bin);
   }
 }
 
@@ -164,11 +168,11 @@ double DopplerLikelihood::residual(std::size_t i, const Eigen::Vector3d& v_R,
   const Point& p = points_[i];
   const double e = p.doppler + p.u_R.dot(v_R);
   const Eigen::Vector3d spread_v = p.spread * v_R;
-  const double variance = p.fixed_variance + square(half_bin_) / 3.0 + v_R.dot(spread_v);
-  const double scale = p.whole_sigma / std::sqrt(variance);
-  const Residual r = half_bin_ > p.sigma ? coarseResidual(scale * e, p.sigma, half_bin_, p.centre, p.outlier)
-                                         : fineResidual(scale * e, p.whole_sigma, p.outlier);
-  derivative = r.slope * scale * (p.u_R - (e / variance) * spread_v);
+  const double inverse = 1.0 / (p.fixed_variance + v_R.dot(spread_v));
+  const double scale = p.whole_sigma * std::sqrt(inverse);
+  const Residual r = p.half_bin > 0.0 ? coarseResidual(scale * e, p.half_bin, p.centre, p.outlier)
+                                      : fineResidual(scale * e, p.outlier);
+  derivative = r.slope * scale * (p.u_R - (inverse * e) * spread_v);
   return r.value;
 }
 
@@ -185,8 +189,9 @@ Eigen::Matrix3d DopplerLikelihood::binInformation() const {
   }
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Point& p = points_[i];
-    const double flat = std::max(0.0, 1.0 - p.sigma / half_bin_);
-    const double variance = square(half_bin_) / 3.0 + square(p.sigma);
+    if (p.half_bin == 0.0) continue;
+    const double flat = 1.0 - 1.0 / p.half_bin;
+    const double variance = square(p.whole_sigma * half_bin_ / p.half_bin);
     information += flat / (*count_of[i] * variance) * p.u_R * p.u_R.transpose();
   }
   return information;

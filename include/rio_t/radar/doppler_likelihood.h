@@ -60,11 +60,12 @@ class DopplerLikelihood {
     Eigen::Vector3d u_R;
     double doppler;
     Eigen::Matrix3d spread;  ///< v' spread v: variance of the residual by the direction's noise, if it grows
-    double fixed_variance;   ///< [m^2/s^2] the rest of it, without the bin
-    double sigma;            ///< of the noise at the first velocity [m/s]
-    double whole_sigma;      ///< the same with the bin
+    double fixed_variance;   ///< [m^2/s^2] the rest of it, with the bin
     double outlier;          ///< density of outliers over that of the static world, at its largest
-    double centre;           ///< probability of the bin around no error; 0 if the noise is wider
+    // If the bin is wider than the noise. In sigmas of the noise at the first velocity:
+    double half_bin = 0.0;     ///< 0: it is not
+    double whole_sigma = 1.0;  ///< of noise and bin
+    double centre = 0.0;       ///< probability of the bin around no error
   };
 
   std::vector<Point> points_;
