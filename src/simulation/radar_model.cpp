@@ -12,8 +12,7 @@
 namespace rio_t::simulation {
 namespace {
 
-constexpr double kPi = 3.141592653589793;
-constexpr double kDegree = kPi / 180.0;
+constexpr double kDegree = M_PI / 180.0;
 constexpr std::uint64_t kSceneStream = 20;
 constexpr std::uint64_t kScanStream = 21;
 constexpr std::uint64_t kPersonStream = 22;
@@ -110,7 +109,7 @@ Person makePerson(const RadarState& radar, double from, double until, Random& ra
   person.p_W =
       radar.p_W + radar.q_WR * fromPolar(random.uniform(2.5, 6.0), random.uniform(-40.0, 40.0) * kDegree,
                                          random.uniform(-10.0, 10.0) * kDegree);
-  const double heading = random.uniform(-kPi, kPi);
+  const double heading = random.uniform(-M_PI, M_PI);
   person.v_W = random.uniform(0.7, 1.6) * Eigen::Vector3d(std::cos(heading), std::sin(heading), 0.0);
   return person;
 }
@@ -340,7 +339,7 @@ std::vector<Eigen::Vector3d> makeScene(const Motion& motion, std::uint64_t seed,
     stations.push_back(p_W);
     for (int i = 0; i < per_station; ++i) {
       const double radius = kRadius * std::sqrt(random.uniform());  // even over the disc
-      const double direction = random.uniform(-kPi, kPi);
+      const double direction = random.uniform(-M_PI, M_PI);
       const double height = random.uniform(-2.0, 3.5);
       scene_W.emplace_back(
           p_W + Eigen::Vector3d(radius * std::cos(direction), radius * std::sin(direction), height));

@@ -422,7 +422,7 @@ void printSummary(const Request& request, const Motion& motion, const SensorData
             << acceleration << " m/s^2\n";
   if (!request.trajectory.empty()) {
     std::cout << "spline: poses of the file are " << 1e3 * motion.path().positionResidual() << " mm and "
-              << motion.path().rotationResidual() * 57.29577951308232 << " deg (rms) from it\n";
+              << motion.path().rotationResidual() * (180.0 / M_PI) << " deg (rms) from it\n";
   }
   std::cout << "IMU: " << data.imu.samples.size() << " samples\n"
             << "true accelerometer bias [m/s^2]: " << triple(data.imu.b_a.front()) << " at the start, "
@@ -446,11 +446,10 @@ void run(Request request) {
     throw UsageError("--pressure-shock needs --barometer");
   if (isSameFile(request.ground_truth, request.out))
     throw UsageError("--ground-truth " + request.ground_truth + ": expected another file than that of --out");
-  const std::vector<std::string> inputs(request.trajectory.empty() ? 0 : 1, request.trajectory);
   for (const auto& [name, file] :
        {std::make_pair("--out ", request.out), std::make_pair("--ground-truth ", request.ground_truth)}) {
     if (file.empty()) continue;
-    const std::string fault = faultOfOutput(file, inputs);
+    const std::string fault = faultOfOutput(file, {request.trajectory});
     if (!fault.empty()) throw UsageError(name + fault);
   }
   request.simulation.start = Time::fromSeconds(request.start_time);

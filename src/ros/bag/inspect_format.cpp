@@ -38,11 +38,9 @@ std::string fieldLike(const std::vector<std::string>& fields, const std::vector<
   for (const std::string& word : words) {
     for (const std::string& field : fields) {
       const std::string lower = boost::algorithm::to_lower_copy(field);
-      const bool derived =
-          boost::algorithm::contains(lower, "std") || boost::algorithm::contains(lower, "var") ||
-          boost::algorithm::contains(lower, "noise") || boost::algorithm::contains(lower, "bin") ||
-          boost::algorithm::contains(lower, "idx");
-      if (!derived && boost::algorithm::contains(lower, word)) return field;
+      const auto has = [&](const std::string& part) { return lower.find(part) != std::string::npos; };
+      const bool derived = has("std") || has("var") || has("noise") || has("bin") || has("idx");
+      if (!derived && has(word)) return field;
     }
   }
   return "";
