@@ -14,6 +14,8 @@
 #include <sstream>
 #include <system_error>
 
+#include "../text.h"
+
 namespace rio_t {
 namespace {
 
@@ -114,12 +116,7 @@ std::string keepOther(const std::string& path, const std::string& text) {
 
 }  // namespace
 
-std::string shownNumber(double value) {
-  std::ostringstream out;
-  out.precision(10);
-  out << value;
-  return out.str();
-}
+std::string shownNumber(double value) { return shortText(value, 10); }
 
 double parseNumber(const std::string& text, NumberRange range) {
   std::istringstream stream(text);

@@ -12,7 +12,6 @@ namespace rio_t {
 namespace {
 
 constexpr double kStraight = M_PI;  // [rad]
-constexpr double kDegree = M_PI / 180.0;
 
 std::string degrees(double radians) { return fixedText(radians / kDegree, 0); }
 

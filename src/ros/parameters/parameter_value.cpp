@@ -14,6 +14,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "../text.h"
 #include "parameter_list.h"
 
 namespace rio_t {
@@ -136,13 +137,7 @@ std::string ParameterValue::describe() const {
     std::string operator()(std::monostate) const { return "nothing"; }
     std::string operator()(bool value) const { return value ? "true" : "false"; }
     std::string operator()(std::int64_t value) const { return std::to_string(value); }
-    std::string operator()(double value) const {
-      std::ostringstream text;
-      text.imbue(std::locale::classic());
-      text.precision(12);
-      text << value;
-      return text.str();
-    }
+    std::string operator()(double value) const { return shortText(value, 12); }
     std::string operator()(const std::string& value) const { return '"' + value + '"'; }
     std::string operator()(const List& list) const {
       std::string text = "[";
