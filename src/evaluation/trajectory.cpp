@@ -66,26 +66,23 @@ Time parseTime(const std::string& text) {
   const auto refuse = [&text]() -> std::invalid_argument {
     return std::invalid_argument("'" + text + "' is not a time in seconds within +-9.2e9");
   };
-  std::size_t at = 0;
-  const bool negative = !text.empty() && text[0] == '-';
-  if (negative || (!text.empty() && text[0] == '+')) ++at;
-
+  const char* at = text.c_str();
+  const bool negative = *at == '-';
+  if (negative || *at == '+') ++at;
   std::string digits;
-  for (; at < text.size() && isDigit(text[at]); ++at) digits += text[at];
+  while (isDigit(*at)) digits += *at++;
   long point = static_cast<long>(digits.size());  // the decimal point stands before digits[point]
-  if (at < text.size() && text[at] == '.') {
-    for (++at; at < text.size() && isDigit(text[at]); ++at) digits += text[at];
-  }
+  if (*at == '.') ++at;
+  while (isDigit(*at)) digits += *at++;
   if (digits.empty()) throw refuse();
-  if (at < text.size() && (text[at] == 'e' || text[at] == 'E')) {  // as numpy.savetxt and evo write
-    const std::string exponent = text.substr(at + 1);
+  if (*at == 'e' || *at == 'E') {  // as numpy.savetxt and evo write
     char* end = nullptr;
-    const long shift = std::strtol(exponent.c_str(), &end, 10);
-    if (end == exponent.c_str() || *end != '\0' || std::abs(shift) > 400) throw refuse();
+    const long shift = std::strtol(at + 1, &end, 10);
+    if (end == at + 1 || shift < -400 || shift > 400) throw refuse();
     point += shift;
-    at = text.size();
+    at = end;
   }
-  if (at != text.size()) throw refuse();
+  if (at != text.c_str() + text.size()) throw refuse();
 
   // Digits before the ninth decimal make up the nanoseconds; the next one rounds.
   const long last = point + 9;
