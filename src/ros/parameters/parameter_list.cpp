@@ -37,9 +37,8 @@ bool isOneLine(const std::string& text) {
 
 /// What a radar may be called: its name becomes part of keys, topics and file names.
 bool isRadarName(const std::string& text) {
-  return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
-  });
+  return !text.empty() &&
+         text.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") == std::string::npos;
 }
 
 }  // namespace
