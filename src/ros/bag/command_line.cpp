@@ -23,10 +23,6 @@ namespace po = boost::program_options;
 
 constexpr unsigned kLineLength = 110;
 
-std::string withDefault(const std::string& help, const std::string& shown_default) {
-  return shown_default.empty() ? help : help + " [" + shown_default + "]";
-}
-
 /// `set`, with the name of the option in what it throws.
 OptionSet::Setter named(const std::string& name, const OptionSet::Setter& set) {
   return [name, set](const std::string& value) {
@@ -184,7 +180,7 @@ void OptionSet::count(const std::string& name, const std::string& help, int& tar
 void OptionSet::value(const std::string& name, const std::string& argument, const std::string& help,
                       const std::string& shown_default, const Setter& set) {
   add(name, po::value<std::string>()->value_name(argument)->notifier(named(name, set)),
-      withDefault(help, shown_default));
+      shown_default.empty() ? help : help + " [" + shown_default + "]");
 }
 
 void OptionSet::valueOrNothing(const std::string& name, const std::string& argument, const std::string& help,

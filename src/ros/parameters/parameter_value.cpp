@@ -34,25 +34,15 @@ bool isOneOf(const std::string& text, std::initializer_list<const char*> words) 
   return std::any_of(words.begin(), words.end(), [&](const char* word) { return text == word; });
 }
 
-ParameterValue fromYamlScalar(const YAML::Node& node) {
-  if (node.Tag() == "!") return {node.Scalar()};  // quoted: text, whatever it looks like
-  return parsePlainScalar(node.Scalar());
-}
-
 ParameterValue fromYaml(const YAML::Node& node) {
   if (!node.IsDefined() || node.IsNull()) return {};
-  if (node.IsScalar()) return fromYamlScalar(node);
+  if (node.IsScalar() && node.Tag() == "!") return {node.Scalar()};  // quoted: text, whatever it looks like
+  if (node.IsScalar()) return parsePlainScalar(node.Scalar());
   if (node.IsMap()) return {ParameterValue::Map{}};  // no deeper than a section
   ParameterValue::List list;
   for (const auto& element : node) {
     // No deeper: no parameter takes lists of lists, and by its anchors a list may hold itself.
-    if (element.IsScalar()) {
-      list.push_back(fromYamlScalar(element));
-    } else if (element.IsNull()) {
-      list.push_back({});
-    } else {
-      list.push_back({ParameterValue::Map{}});
-    }
+    list.push_back(element.IsSequence() ? ParameterValue{ParameterValue::Map{}} : fromYaml(element));
   }
   return {std::move(list)};
 }
