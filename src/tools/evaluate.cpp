@@ -50,7 +50,7 @@ void addOptions(OptionSet& options, Arguments& a) {
   options.number(
       "max-difference", "S",
       "largest difference of the stamps of two poses that are compared [s]; the default is that of evo",
-      a.max_difference, NumberRange::kNotNegative);
+      a.max_difference);
   options.text("errors", "FILE",
                "the error of every matched pose of the one estimate goes there (first poses aligned)",
                a.errors_file);
@@ -58,8 +58,7 @@ void addOptions(OptionSet& options, Arguments& a) {
                a.time_offset);
   options.value("true-offset", "S", "the constant true offset [s]", "",
                 [&a](const std::string& text) { a.true_offset = parseNumber(text); });
-  options.number("skip", "S", "leaves out the first S seconds of the offsets (convergence)", a.skip,
-                 NumberRange::kNotNegative);
+  options.number("skip", "S", "leaves out the first S seconds of the offsets (convergence)", a.skip);
   options.flag("yaml", "prints YAML for programs", a.yaml);
 }
 
