@@ -138,12 +138,12 @@ std::vector<Person> makePersons(const Motion& motion, const RadarModelOptions& o
 // All that is needed to take a scan at one moment.
 class Sensor {
  public:
-  Sensor(const Motion& motion, const RadarModelOptions& options, const Extrinsics& T_IR, std::uint64_t seed)
+  Sensor(const Motion& motion, const RadarSetup& setup, std::uint64_t seed)
       : motion_(motion),
-        options_(options),
-        T_IR_(T_IR),
-        scene_W_(makeScene(motion, seed, options.points_mean)),
-        persons_(makePersons(motion, options, T_IR, seed)) {}
+        options_(setup.radar),
+        T_IR_(setup.T_IR),
+        scene_W_(makeScene(motion, seed, options_.points_mean)),
+        persons_(makePersons(motion, options_, T_IR_, seed)) {}
 
   // Each point is a ghost with the chance of `ghost_share`.
   std::vector<SimulatedPoint> measure(double t, double ghost_share, Random& random) const {
@@ -348,11 +348,11 @@ std::vector<Eigen::Vector3d> makeScene(const Motion& motion, std::uint64_t seed,
   return scene_W;
 }
 
-std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarModelOptions& options,
-                                         const TimeOffsetProfile& time_offset, const Extrinsics& T_IR,
-                                         std::uint64_t seed, Time start) {
+std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarSetup& setup, std::uint64_t seed,
+                                         Time start) {
+  const RadarModelOptions& options = setup.radar;
   check(options);
-  const Sensor sensor(motion, options, T_IR, seed);
+  const Sensor sensor(motion, setup, seed);
   std::vector<SimulatedScan> scans;
   std::uint32_t seq = 0;
   for (std::uint32_t k = 0;; ++k) {
@@ -360,7 +360,7 @@ std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarModelO
     if (stamp > motion.duration()) break;
     SimulatedScan scan;
     scan.stamp = start + stamp;
-    scan.time_offset = time_offset.at(stamp);
+    scan.time_offset = setup.time_offset.at(stamp);
     scan.measured = scan.stamp - scan.time_offset;
     const double measured = scan.measured - start;
     if (measured < 0.0 || measured > motion.duration()) continue;
@@ -368,7 +368,7 @@ std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarModelO
     Random latency_random(seed, kLatencyStream, k);
     scan.arrival =
         scan.stamp + std::max(0.0, options.latency + options.latency_sigma * latency_random.gaussian());
-    scan.v_R = radarVelocity(motion.at(measured), T_IR);
+    scan.v_R = radarVelocity(motion.at(measured), setup.T_IR);
     Random dropout_random(seed, kDropoutStream, k);
     scan.delivered = !inAnyOf(options.blackouts, stamp) && !dropout_random.chance(options.dropout_share);
     if (scan.delivered) {

@@ -31,14 +31,11 @@ SensorData simulate(const Motion& motion, const SimulationOptions& options) {
   SensorData data;
   data.imu = simulateImu(motion, options.imu, options.seed, options.start);
   data.pressures = simulateBarometer(motion, options.barometer, options.seed, options.start);
-  const auto scansOf = [&](const RadarSetup& setup, std::uint64_t seed) {
-    return simulateRadar(motion, setup.radar, setup.time_offset, setup.T_IR, seed, options.start);
-  };
-  if (options.radars.empty()) data.scans = scansOf(options, options.seed);
+  if (options.radars.empty()) data.scans = simulateRadar(motion, options, options.seed, options.start);
   for (const auto& [name, setup] : options.radars) {
     try {
       checkName(name);
-      data.radars[name] = scansOf(setup, seedOf(name, options.seed));
+      data.radars[name] = simulateRadar(motion, setup, seedOf(name, options.seed), options.start);
     } catch (const std::invalid_argument& error) {
       throw std::invalid_argument("radar '" + name + "': " + error.what());
     }
