@@ -104,7 +104,7 @@ std::string keepOther(const std::string& path, const std::string& text) {
   if (!fs::is_regular_file(path, error) || fs::file_size(path, error) == 0) return "";
   std::ifstream file(path, std::ios::binary);
   if (std::string(std::istreambuf_iterator<char>(file), {}) == text) return "";
-  const std::string backup = path + "~";
+  std::string backup = path + "~";
   if (!fs::copy_file(path, backup, fs::copy_options::overwrite_existing, error) || error)
     throw std::runtime_error(path + ": cannot be kept as " + backup + " (" + error.message() + ")");
   return backup;
@@ -311,7 +311,7 @@ std::string faultOfOutput(const std::string& path, const std::vector<std::string
 }
 
 std::string writeFile(const std::string& path, const std::string& text) {
-  const std::string backup = keepOther(path, text);
+  std::string backup = keepOther(path, text);
   const std::string written = isWrittenInPlace(path) ? path : path + ".part";
   std::ofstream file(written, std::ios::binary | std::ios::trunc);
   file << text;
