@@ -25,7 +25,7 @@ bool isGiven(const ParameterEntry* entry) {
 /// The file, the command line, or the parameter server: the origin without line and key.
 std::string sourceOf(const ParameterEntry& entry) {
   const std::string& origin = entry.origin;
-  const std::string of_server = "parameter ";
+  std::string of_server = "parameter ";
   if (origin.rfind(of_server, 0) == 0) return of_server;
   const std::size_t colon = origin.rfind(':');
   if (colon == std::string::npos) return origin;
