@@ -26,7 +26,7 @@ class CommandLine : public testing::Test {
     options.values("file", "FILE", "files", [this](const std::string& file) { files_.push_back(file); });
     options.positional("file");
     options.number("speed", "M/S", "how fast", speed_, NumberRange::kPositive);
-    options.number("shift", "S", "may be negative", shift_);
+    options.number("shift", "S", "may be negative", shift_, NumberRange::kAny);
     options.count("count", "how many", count_);
     options.flag("quiet", "says less", quiet_);
     options.text("out", "FILE", "goes there", out_file_);

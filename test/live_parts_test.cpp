@@ -16,7 +16,7 @@ namespace {
 
 /// Ten scans a second, radar velocities with 0.05 m/s per axis, of a platform that accelerates.
 bool observableAt(double acceleration, double yaw_rate, bool used = true, int rest_scans = 0) {
-  OffsetObservability observability(1.0, 0.02);
+  OffsetObservability observability;
   for (int k = 0; k < 20 + rest_scans; ++k) {
     const double t = 0.1 * k;
     const double moved = 0.1 * std::min(k, 20);

@@ -108,7 +108,7 @@ class PlainBag : public testing::Test {
     ASSERT_TRUE(check.ready()) << describeCheck(check);
     const RunSummary summary = run(check);
     EXPECT_EQ(summary.divergences, 0u) << check.yaml;
-    EXPECT_EQ(summary.health_at_end, "ok") << check.yaml;
+    EXPECT_EQ(toString(summary.health), "ok") << check.yaml;
     EXPECT_GT(summary.scansUsed(), 7 * summary.scansTotal() / 10) << check.yaml;
   }
 

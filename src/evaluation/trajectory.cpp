@@ -66,26 +66,23 @@ Time parseTime(const std::string& text) {
   const auto refuse = [&text]() -> std::invalid_argument {
     return std::invalid_argument("'" + text + "' is not a time in seconds within +-9.2e9");
   };
-  std::size_t at = 0;
-  const bool negative = !text.empty() && text[0] == '-';
-  if (negative || (!text.empty() && text[0] == '+')) ++at;
-
+  const char* at = text.c_str();
+  const bool negative = *at == '-';
+  if (negative || *at == '+') ++at;
   std::string digits;
-  for (; at < text.size() && isDigit(text[at]); ++at) digits += text[at];
+  while (isDigit(*at)) digits += *at++;
   long point = static_cast<long>(digits.size());  // the decimal point stands before digits[point]
-  if (at < text.size() && text[at] == '.') {
-    for (++at; at < text.size() && isDigit(text[at]); ++at) digits += text[at];
-  }
+  if (*at == '.') ++at;
+  while (isDigit(*at)) digits += *at++;
   if (digits.empty()) throw refuse();
-  if (at < text.size() && (text[at] == 'e' || text[at] == 'E')) {  // as numpy.savetxt and evo write
-    const std::string exponent = text.substr(at + 1);
+  if (*at == 'e' || *at == 'E') {  // as numpy.savetxt and evo write
     char* end = nullptr;
-    const long shift = std::strtol(exponent.c_str(), &end, 10);
-    if (end == exponent.c_str() || *end != '\0' || std::abs(shift) > 400) throw refuse();
+    const long shift = std::strtol(at + 1, &end, 10);
+    if (end == at + 1 || shift < -400 || shift > 400) throw refuse();
     point += shift;
-    at = text.size();
+    at = end;
   }
-  if (at != text.size()) throw refuse();
+  if (at != text.c_str() + text.size()) throw refuse();
 
   // Digits before the ninth decimal make up the nanoseconds; the next one rounds.
   const long last = point + 9;
@@ -127,16 +124,10 @@ Trajectory readTum(const std::string& path) {
 }
 
 std::string formatTime(Time time) {
-  const std::int64_t ns = time.nanoseconds();
-  std::array<char, 24> text{};  // filled from the end
-  char* first = text.end();
-  std::int64_t left = std::abs(ns);
-  for (int i = 0; i <= 9 || left != 0; ++i, left /= 10) {
-    if (i == 9) *--first = '.';
-    *--first = static_cast<char>('0' + left % 10);
-  }
-  if (ns < 0) *--first = '-';
-  return {first, text.end()};
+  const std::lldiv_t split = std::lldiv(std::abs(time.nanoseconds()), 1'000'000'000);
+  std::array<char, 24> text{};
+  std::snprintf(text.data(), text.size(), "%s%lld.%09lld", time < Time() ? "-" : "", split.quot, split.rem);
+  return text.data();
 }
 
 void writeTumLine(std::ostream& out, const StampedPose& pose) {

@@ -236,23 +236,13 @@ std::string toString(Verdict verdict) {
 }
 
 std::string whatToMove(CalibrationAxis axis) {
-  switch (axis) {
-    case CalibrationAxis::kOffset:
-      return "change speed or turn quickly";
-    case CalibrationAxis::kTurnX:
-      return "change speed along y or z of the IMU";
-    case CalibrationAxis::kTurnY:
-      return "change speed along x or z of the IMU";
-    case CalibrationAxis::kTurnZ:
-      return "change speed along x or y of the IMU";
-    case CalibrationAxis::kLeverX:
-      return "rotate about y or z of the IMU";
-    case CalibrationAxis::kLeverY:
-      return "rotate about x or z of the IMU";
-    case CalibrationAxis::kLeverZ:
-      return "rotate about x or y of the IMU";
-  }
-  throw std::invalid_argument("not a CalibrationAxis");
+  constexpr const char* kMotions[] = {
+      "change speed or turn quickly",         "change speed along y or z of the IMU",
+      "change speed along x or z of the IMU", "change speed along x or y of the IMU",
+      "rotate about y or z of the IMU",       "rotate about x or z of the IMU",
+      "rotate about x or y of the IMU"};
+  static_assert(std::size(kMotions) == kCalibrationAxes);
+  return kMotions[static_cast<std::size_t>(axis)];
 }
 
 bool RadarCalibration::allTurnsObserved() const {

@@ -44,6 +44,14 @@ std::string fixedText(double value, int decimals) {
   return text;
 }
 
+std::string shortText(double value, int digits) {
+  std::ostringstream text;
+  text.imbue(std::locale::classic());
+  text.precision(digits);
+  text << value;
+  return text.str();
+}
+
 void appendItem(std::string* list, const std::string& item, const std::string& separator) {
   *list += (list->empty() ? "" : separator) + item;
 }

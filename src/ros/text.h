@@ -1,15 +1,21 @@
 #pragma once
 
+#include <cmath>
 #include <string>
 
 /// Texts for people and files.
 namespace rio_t {
+
+constexpr double kDegree = M_PI / 180.0;  ///< [rad]
 
 /// Appends `value` with that many decimals (at most 12), with a point whatever the locale; "nan", "inf".
 /// Never minus zero.
 void appendFixed(std::string* text, double value, int decimals);
 /// The same as a text of its own.
 std::string fixedText(double value, int decimals);
+
+/// With at most that many digits, with a point whatever the locale: "0.25", "1e-05".
+std::string shortText(double value, int digits);
 
 /// Appends an item to a list in a text: "a, b".
 void appendItem(std::string* list, const std::string& item, const std::string& separator = ", ");

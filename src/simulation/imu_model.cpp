@@ -18,24 +18,20 @@ Eigen::Vector3d saturated(const Eigen::Vector3d& value, double limit) {
 }
 
 void check(const ImuModelOptions& options) {
-  if (!(options.rate > 0.0)) throw std::invalid_argument("IMU rate must be positive");
+  const auto require = [](bool ok, const char* what) {
+    if (!ok) throw std::invalid_argument(what);
+  };
   const ImuNoise& n = options.noise;
-  if (n.accel_density < 0.0 || n.gyro_density < 0.0 || n.accel_random_walk < 0.0 ||
-      n.gyro_random_walk < 0.0) {
-    throw std::invalid_argument("IMU noise cannot be negative");
-  }
-  if (options.accel_vibration < 0.0 || options.gyro_vibration < 0.0) {
-    throw std::invalid_argument("IMU vibration cannot be negative");
-  }
-  if (options.vibration_frequency < 0.0) {
-    throw std::invalid_argument("frequency of the IMU vibration cannot be negative");
-  }
-  if (!(options.dropout_share >= 0.0 && options.dropout_share < 1.0)) {
-    throw std::invalid_argument("share of lost IMU samples must be at least 0 and below 1");
-  }
-  if (!(options.accel_saturation > 0.0) || !(options.gyro_saturation > 0.0)) {
-    throw std::invalid_argument("IMU saturation must be positive");
-  }
+  require(options.rate > 0.0, "IMU rate must be positive");
+  require(n.accel_density >= 0.0 && n.gyro_density >= 0.0 && n.accel_random_walk >= 0.0 &&
+              n.gyro_random_walk >= 0.0,
+          "IMU noise cannot be negative");
+  require(options.accel_vibration >= 0.0 && options.gyro_vibration >= 0.0,
+          "IMU vibration cannot be negative");
+  require(options.vibration_frequency >= 0.0, "frequency of the IMU vibration cannot be negative");
+  require(options.dropout_share >= 0.0 && options.dropout_share < 1.0,
+          "share of lost IMU samples must be at least 0 and below 1");
+  require(options.accel_saturation > 0.0 && options.gyro_saturation > 0.0, "IMU saturation must be positive");
 }
 
 // What one sensor feels of the vibration.

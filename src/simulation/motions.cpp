@@ -210,60 +210,61 @@ PoseFunction groundVehicle(Random& random, double duration) {
                 [&](double t) { return 0.45 * turn(t) / turn_peak; }, duration);
 }
 
-// Corridors: straight stretches with turns of about a right angle between them.
-class Corridors {
- public:
-  // At walking pace `pace` [m/s].
-  Corridors(Random& random, double duration, double pace) : pace_(pace) {
-    for (double t = 0.0; t < duration;) {
-      Turn turn;
-      turn.start = t + random.uniform(2.0, 14.0) / pace_;
-      const double angle = random.uniform(75.0, 105.0) * M_PI / 180.0;
-      const double peak = random.uniform(0.7, 0.9);
-      turn.length = 2.0 * angle / peak;  // the mean of sin^2 is a half
-      turn.rate = random.chance(0.5) ? peak : -peak;
-      turns_.push_back(turn);
-      t = turn.start + turn.length;
-    }
-  }
+// A stretch of a path in the plane.
+struct Section {
+  double start, length;    // [s]
+  double yaw_rate = 0.0;   // [rad/s] in the middle; zero: it is straight
+  double top_speed = 0.0;  // [m/s] in the middle, if that differs from section to section
 
-  double yawRate(double t) const {
-    const Turn* turn = turnAt(t);
-    return turn != nullptr ? turn->rate * shape(*turn, t) : 0.0;
-  }
-  // Slower in the turns.
-  double speed(double t) const {
-    const Turn* turn = turnAt(t);
-    return pace_ * (turn != nullptr ? 1.0 - 0.3 * shape(*turn, t) : 1.0);
-  }
-
- private:
-  struct Turn {
-    double start, length;  // [s]
-    double rate;           // peak [rad/s]
-  };
-  static double shape(const Turn& turn, double t) {
-    const double s = std::sin(M_PI * (t - turn.start) / turn.length);
+  // Rises from 0 to 1 in the middle and falls again; its mean is a half.
+  double shape(double t) const {
+    const double s = std::sin(M_PI * (t - start) / length);
     return s * s;
   }
-  const Turn* turnAt(double t) const {
-    const auto found = std::find_if(turns_.begin(), turns_.end(), [t](const Turn& turn) {
-      return t >= turn.start && t < turn.start + turn.length;
-    });
-    return found != turns_.end() ? &*found : nullptr;
-  }
-
-  double pace_;
-  std::vector<Turn> turns_;
 };
+// Each begins where the one before ends.
+using Course = std::vector<Section>;
+
+const Section& sectionAt(const Course& course, double t) {
+  const auto next = std::find_if(course.begin() + 1, course.end(),
+                                 [t](const Section& section) { return section.start > t; });
+  return *(next - 1);
+}
+
+double yawRateAt(const Course& course, double t) {
+  const Section& section = sectionAt(course, t);
+  return section.yaw_rate * section.shape(t);
+}
+
+// Straight stretches with turns of about a right angle between them, at walking pace `pace` [m/s].
+Course corridors(Random& random, double duration, double pace) {
+  Course course;
+  double end = 0.0;
+  const auto add = [&](double length, double yaw_rate) {
+    course.push_back({end, length, yaw_rate});
+    end += length;
+  };
+  while (end < duration) {
+    add(random.uniform(2.0, 14.0) / pace, 0.0);
+    const double angle = random.uniform(75.0, 105.0) * M_PI / 180.0;
+    const double peak = random.uniform(0.7, 0.9);
+    add(2.0 * angle / peak, random.chance(0.5) ? peak : -peak);
+  }
+  add(1.0, 0.0);  // the samples run a little past the end
+  return course;
+}
 
 // A sensor held in front of somebody who walks through a building. Steps heave it by 2.5 cm from lowest to
 // highest, and nod, swing and roll it; their rate wanders about 2 Hz.
 PoseFunction walk(Random& random, double duration, double pace) {
-  const Corridors corridors(random, duration, pace);
+  const Course course = corridors(random, duration, pace);
   const Waves hurry(random, 3, 0.02, 0.1, 0.003);
-  const PoseFunction body = planar([&](double t) { return corridors.speed(t) + hurry(t); },
-                                   [&](double t) { return corridors.yawRate(t); }, duration);
+  const auto speed = [&](double t) {  // slower in the turns
+    const Section& section = sectionAt(course, t);
+    return pace * (section.yaw_rate != 0.0 ? 1.0 - 0.3 * section.shape(t) : 1.0) + hurry(t);
+  };
+  const PoseFunction body = planar(
+      speed, [&](double t) { return yawRateAt(course, t); }, duration);
   const Waves stride(random, 3, 0.02, 0.1, 0.005);
   const VectorFunction sway = withPeakRate(waves(random, 3, 0.2, 0.9, {0.5, 0.5, 1.0}), 0.15, duration);
   return [=](double t) {
@@ -278,65 +279,31 @@ PoseFunction walk(Random& random, double duration, double pace) {
 
 // Straights between bends and loops, as one drives a kart round a hall: it speeds up on each straight and
 // brakes before the next bend.
-class Circuit {
- public:
-  Circuit(Random& random, double duration) {
-    for (double t = 0.0; t < duration;) {
-      Section straight;
-      straight.start = t;
-      straight.top_speed = random.uniform(2.2, 2.9);
-      const double length = random.uniform(4.0, 9.0);  // [m]
-      straight.length =
-          length / (0.5 * (kBendSpeed + straight.top_speed));  // the mean of the shape is a half
-      t += straight.length;
-      Section bend;
-      bend.start = t;
-      // Bends to the left make laps, which stay in a hall; every fourth is a full loop to the right.
-      const bool loop = sections_.size() % 8 == 4;
-      const double angle = (loop ? 360.0 : random.uniform(60.0, 150.0)) * M_PI / 180.0;
-      const double radius = random.uniform(1.2, 1.8);  // [m] where it is narrowest
-      const double peak = kBendSpeed / radius;
-      bend.length = 2.0 * angle / peak;
-      bend.peak_rate = loop ? -peak : peak;
-      t += bend.length;
-      sections_.push_back(straight);
-      sections_.push_back(bend);
-    }
-  }
-
-  double speed(double t) const {
-    const Section& section = sectionAt(t);
-    return kBendSpeed + (section.top_speed - kBendSpeed) * shape(section, t);
-  }
-  double yawRate(double t) const {
-    const Section& section = sectionAt(t);
-    return section.peak_rate * shape(section, t);
-  }
-
- private:
-  static constexpr double kBendSpeed = 1.2;  // [m/s]
-  struct Section {
-    double start = 0.0, length = 0.0;  // [s]
-    double top_speed = kBendSpeed;     // [m/s]
-    double peak_rate = 0.0;            // [rad/s]
-  };
-  static double shape(const Section& section, double t) {
-    const double s = std::sin(M_PI * (t - section.start) / section.length);
-    return s * s;
-  }
-  const Section& sectionAt(double t) const {
-    const auto next = std::find_if(sections_.begin() + 1, sections_.end(),
-                                   [t](const Section& section) { return section.start > t; });
-    return *(next - 1);
-  }
-
-  std::vector<Section> sections_;
-};
-
 PoseFunction kart(Random& random, double duration) {
-  const Circuit circuit(random, duration + 1.0);  // the samples run a little past the end
-  return planar([&](double t) { return circuit.speed(t); }, [&](double t) { return circuit.yawRate(t); },
-                duration);
+  constexpr double kBendSpeed = 1.2;  // [m/s]
+  Course course;
+  double end = 0.0;
+  const auto add = [&](double length, double yaw_rate, double top_speed) {
+    course.push_back({end, length, yaw_rate, top_speed});
+    end += length;
+  };
+  while (end < duration + 1.0) {  // the samples run a little past the end
+    const double top_speed = random.uniform(2.2, 2.9);
+    const double straight = random.uniform(4.0, 9.0);  // [m]
+    add(straight / (0.5 * (kBendSpeed + top_speed)), 0.0, top_speed);
+    // Bends to the left make laps, which stay in a hall; every fourth is a full loop to the right.
+    const bool loop = course.size() % 8 == 5;
+    const double angle = (loop ? 360.0 : random.uniform(60.0, 150.0)) * M_PI / 180.0;
+    const double radius = random.uniform(1.2, 1.8);  // [m] where it is narrowest
+    const double peak = kBendSpeed / radius;
+    add(2.0 * angle / peak, loop ? -peak : peak, kBendSpeed);
+  }
+  const auto speed = [&](double t) {
+    const Section& section = sectionAt(course, t);
+    return kBendSpeed + (section.top_speed - kBendSpeed) * section.shape(t);
+  };
+  return planar(
+      speed, [&](double t) { return yawRateAt(course, t); }, duration);
 }
 
 PoseFunction constantSpeed(double speed) {

@@ -12,8 +12,7 @@
 namespace rio_t::simulation {
 namespace {
 
-constexpr double kPi = 3.141592653589793;
-constexpr double kDegree = kPi / 180.0;
+constexpr double kDegree = M_PI / 180.0;
 constexpr std::uint64_t kSceneStream = 20;
 constexpr std::uint64_t kScanStream = 21;
 constexpr std::uint64_t kPersonStream = 22;
@@ -110,7 +109,7 @@ Person makePerson(const RadarState& radar, double from, double until, Random& ra
   person.p_W =
       radar.p_W + radar.q_WR * fromPolar(random.uniform(2.5, 6.0), random.uniform(-40.0, 40.0) * kDegree,
                                          random.uniform(-10.0, 10.0) * kDegree);
-  const double heading = random.uniform(-kPi, kPi);
+  const double heading = random.uniform(-M_PI, M_PI);
   person.v_W = random.uniform(0.7, 1.6) * Eigen::Vector3d(std::cos(heading), std::sin(heading), 0.0);
   return person;
 }
@@ -139,12 +138,12 @@ std::vector<Person> makePersons(const Motion& motion, const RadarModelOptions& o
 // All that is needed to take a scan at one moment.
 class Sensor {
  public:
-  Sensor(const Motion& motion, const RadarModelOptions& options, const Extrinsics& T_IR, std::uint64_t seed)
+  Sensor(const Motion& motion, const RadarSetup& setup, std::uint64_t seed)
       : motion_(motion),
-        options_(options),
-        T_IR_(T_IR),
-        scene_W_(makeScene(motion, seed, options.points_mean)),
-        persons_(makePersons(motion, options, T_IR, seed)) {}
+        options_(setup.radar),
+        T_IR_(setup.T_IR),
+        scene_W_(makeScene(motion, seed, options_.points_mean)),
+        persons_(makePersons(motion, options_, T_IR_, seed)) {}
 
   // Each point is a ghost with the chance of `ghost_share`.
   std::vector<SimulatedPoint> measure(double t, double ghost_share, Random& random) const {
@@ -340,7 +339,7 @@ std::vector<Eigen::Vector3d> makeScene(const Motion& motion, std::uint64_t seed,
     stations.push_back(p_W);
     for (int i = 0; i < per_station; ++i) {
       const double radius = kRadius * std::sqrt(random.uniform());  // even over the disc
-      const double direction = random.uniform(-kPi, kPi);
+      const double direction = random.uniform(-M_PI, M_PI);
       const double height = random.uniform(-2.0, 3.5);
       scene_W.emplace_back(
           p_W + Eigen::Vector3d(radius * std::cos(direction), radius * std::sin(direction), height));
@@ -349,11 +348,11 @@ std::vector<Eigen::Vector3d> makeScene(const Motion& motion, std::uint64_t seed,
   return scene_W;
 }
 
-std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarModelOptions& options,
-                                         const TimeOffsetProfile& time_offset, const Extrinsics& T_IR,
-                                         std::uint64_t seed, Time start) {
+std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarSetup& setup, std::uint64_t seed,
+                                         Time start) {
+  const RadarModelOptions& options = setup.radar;
   check(options);
-  const Sensor sensor(motion, options, T_IR, seed);
+  const Sensor sensor(motion, setup, seed);
   std::vector<SimulatedScan> scans;
   std::uint32_t seq = 0;
   for (std::uint32_t k = 0;; ++k) {
@@ -361,7 +360,7 @@ std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarModelO
     if (stamp > motion.duration()) break;
     SimulatedScan scan;
     scan.stamp = start + stamp;
-    scan.time_offset = time_offset.at(stamp);
+    scan.time_offset = setup.time_offset.at(stamp);
     scan.measured = scan.stamp - scan.time_offset;
     const double measured = scan.measured - start;
     if (measured < 0.0 || measured > motion.duration()) continue;
@@ -369,7 +368,7 @@ std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarModelO
     Random latency_random(seed, kLatencyStream, k);
     scan.arrival =
         scan.stamp + std::max(0.0, options.latency + options.latency_sigma * latency_random.gaussian());
-    scan.v_R = radarVelocity(motion.at(measured), T_IR);
+    scan.v_R = radarVelocity(motion.at(measured), setup.T_IR);
     Random dropout_random(seed, kDropoutStream, k);
     scan.delivered = !inAnyOf(options.blackouts, stamp) && !dropout_random.chance(options.dropout_share);
     if (scan.delivered) {

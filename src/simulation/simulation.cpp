@@ -25,22 +25,17 @@ std::uint64_t seedOf(const std::string& name, std::uint64_t seed) {
   return Random(seed, kNamedRadarStream, hash).bits();
 }
 
-std::vector<SimulatedScan> scansOf(const Motion& motion, const RadarSetup& setup, std::uint64_t seed,
-                                   Time start) {
-  return simulateRadar(motion, setup.radar, setup.time_offset, setup.T_IR, seed, start);
-}
-
 }  // namespace
 
 SensorData simulate(const Motion& motion, const SimulationOptions& options) {
   SensorData data;
   data.imu = simulateImu(motion, options.imu, options.seed, options.start);
   data.pressures = simulateBarometer(motion, options.barometer, options.seed, options.start);
-  if (options.radars.empty()) data.scans = scansOf(motion, options, options.seed, options.start);
+  if (options.radars.empty()) data.scans = simulateRadar(motion, options, options.seed, options.start);
   for (const auto& [name, setup] : options.radars) {
     try {
       checkName(name);
-      data.radars[name] = scansOf(motion, setup, seedOf(name, options.seed), options.start);
+      data.radars[name] = simulateRadar(motion, setup, seedOf(name, options.seed), options.start);
     } catch (const std::invalid_argument& error) {
       throw std::invalid_argument("radar '" + name + "': " + error.what());
     }

@@ -1,4 +1,5 @@
 /// Errors of trajectories, and of a time offset, against the truth. Figures agree with evo's.
+#include <boost/algorithm/string/replace.hpp>
 #include <cstdio>
 #include <fstream>
 #include <iomanip>
@@ -49,7 +50,7 @@ void addOptions(OptionSet& options, Arguments& a) {
   options.number(
       "max-difference", "S",
       "largest difference of the stamps of two poses that are compared [s]; the default is that of evo",
-      a.max_difference, NumberRange::kNotNegative);
+      a.max_difference);
   options.text("errors", "FILE",
                "the error of every matched pose of the one estimate goes there (first poses aligned)",
                a.errors_file);
@@ -57,8 +58,7 @@ void addOptions(OptionSet& options, Arguments& a) {
                a.time_offset);
   options.value("true-offset", "S", "the constant true offset [s]", "",
                 [&a](const std::string& text) { a.true_offset = parseNumber(text); });
-  options.number("skip", "S", "leaves out the first S seconds of the offsets (convergence)", a.skip,
-                 NumberRange::kNotNegative);
+  options.number("skip", "S", "leaves out the first S seconds of the offsets (convergence)", a.skip);
   options.flag("yaml", "prints YAML for programs", a.yaml);
 }
 
@@ -159,9 +159,7 @@ void printTable(const std::string& file, double truth, const OffsetError& e) {
 
 /// Single-quoted, so that any file name is one YAML string.
 std::string quoted(const std::string& text) {
-  std::string result = "'";
-  for (const char c : text) result += c == '\'' ? std::string("''") : std::string(1, c);
-  return result + "'";
+  return "'" + boost::algorithm::replace_all_copy(text, "'", "''") + "'";
 }
 
 // Numbers as %#.9g: with a point, without which YAML 1.1 takes 2e-05 for text.

@@ -92,20 +92,19 @@ void addGeneralOptions(OptionSet& options, Request& r) {
                 });
   options.number("duration", "S",
                  "length of the bag with rest; 0 = the motion's own (with --trajectory: that of the file)",
-                 r.duration, NumberRange::kNotNegative);
+                 r.duration);
   options.value("speed", "M/S", "speed of the motions constant_speed and walk; the others have their own",
                 "1; walk 1.3",
                 [&r](const std::string& v) { r.speed = parseNumber(v, NumberRange::kPositive); });
-  options.number("static-start", "S", "rest at the start; 0 = starts in motion", r.rest.static_start,
-                 NumberRange::kNotNegative);
-  options.number("static-end", "S", "rest at the end; 0 = ends in motion", r.rest.static_end,
-                 NumberRange::kNotNegative);
+  options.number("static-start", "S", "rest at the start; 0 = starts in motion", r.rest.static_start);
+  options.number("static-end", "S", "rest at the end; 0 = ends in motion", r.rest.static_end);
   options.number("ramp", "S", "time from rest to full speed, and back", r.rest.ramp, NumberRange::kPositive);
   options.number("smoothing", "HZ",
                  "with --trajectory: faster motion than this is taken for noise of the poses", r.fit.cutoff,
                  NumberRange::kPositive);
   options.number("start-time", "S", "stamp of the first IMU sample", r.start_time, NumberRange::kPositive);
-  options.number("record-offset", "S", "clock of the recorder minus clock of the IMU", r.bag.record_offset);
+  options.number("record-offset", "S", "clock of the recorder minus clock of the IMU", r.bag.record_offset,
+                 NumberRange::kAny);
   options.number("gravity", "M/S^2", "size of gravity", r.simulation.imu.gravity, NumberRange::kPositive);
   options.flag(
       "noise-free",
@@ -117,31 +116,24 @@ void addGeneralOptions(OptionSet& options, Request& r) {
 void addImuOptions(OptionSet& options, ImuModelOptions& imu) {
   options.section("IMU");
   options.number("imu-rate", "HZ", "rate", imu.rate, NumberRange::kPositive);
-  options.number("accel-noise", "M/S^2/RTHZ", "density of the noise", imu.noise.accel_density,
-                 NumberRange::kNotNegative);
-  options.number("gyro-noise", "RAD/S/RTHZ", "density of the noise", imu.noise.gyro_density,
-                 NumberRange::kNotNegative);
-  options.number("accel-random-walk", "M/S^3/RTHZ", "random walk of the bias", imu.noise.accel_random_walk,
-                 NumberRange::kNotNegative);
-  options.number("gyro-random-walk", "RAD/S^2/RTHZ", "random walk of the bias", imu.noise.gyro_random_walk,
-                 NumberRange::kNotNegative);
+  options.number("accel-noise", "M/S^2/RTHZ", "density of the noise", imu.noise.accel_density);
+  options.number("gyro-noise", "RAD/S/RTHZ", "density of the noise", imu.noise.gyro_density);
+  options.number("accel-random-walk", "M/S^3/RTHZ", "random walk of the bias", imu.noise.accel_random_walk);
+  options.number("gyro-random-walk", "RAD/S^2/RTHZ", "random walk of the bias", imu.noise.gyro_random_walk);
   options.value("accel-bias", "X,Y,Z", "bias at the start [m/s^2]", "random",
                 [&imu](const std::string& v) { imu.accel_bias = parseVector(v); });
   options.value("gyro-bias", "X,Y,Z", "bias at the start [rad/s]", "random",
                 [&imu](const std::string& v) { imu.gyro_bias = parseVector(v); });
-  options.number("accel-bias-sigma", "M/S^2", "sigma of the random bias", imu.accel_bias_sigma,
-                 NumberRange::kNotNegative);
-  options.number("gyro-bias-sigma", "RAD/S", "sigma of the random bias", imu.gyro_bias_sigma,
-                 NumberRange::kNotNegative);
+  options.number("accel-bias-sigma", "M/S^2", "sigma of the random bias", imu.accel_bias_sigma);
+  options.number("gyro-bias-sigma", "RAD/S", "sigma of the random bias", imu.gyro_bias_sigma);
   options.number(
       "vibration", "M/S^2",
       "sigma of what a vibrating frame adds to each axis and sample of the accelerometer, at rest too",
-      imu.accel_vibration, NumberRange::kNotNegative);
-  options.number("vibration-gyro", "RAD/S", "sigma of what it adds to the gyro", imu.gyro_vibration,
-                 NumberRange::kNotNegative);
+      imu.accel_vibration);
+  options.number("vibration-gyro", "RAD/S", "sigma of what it adds to the gyro", imu.gyro_vibration);
   options.number("vibration-frequency", "HZ",
                  "the vibration is a narrow band there and aliases above half the IMU rate; 0 = it is white",
-                 imu.vibration_frequency, NumberRange::kNotNegative);
+                 imu.vibration_frequency);
   options.number("imu-dropouts", "SHARE", "share of the samples that are lost", imu.dropout_share,
                  NumberRange::kShare);
   options.number("accel-saturation", "M/S^2", "largest reading of an axis", imu.accel_saturation,
@@ -154,10 +146,9 @@ void addBarometerOptions(OptionSet& options, BarometerModelOptions& barometer) {
   options.section("Barometer");
   options.flag("barometer", "the platform carries one; topic /sensor_platform/baro", barometer.enabled);
   options.number("barometer-rate", "HZ", "rate", barometer.rate, NumberRange::kPositive);
-  options.number("barometer-noise", "PA", "sigma of a sample; 12 Pa are a metre", barometer.noise,
-                 NumberRange::kNotNegative);
+  options.number("barometer-noise", "PA", "sigma of a sample; 12 Pa are a metre", barometer.noise);
   options.number("barometer-drift", "PA/RTS", "random walk: weather, and warmth of the sensor",
-                 barometer.drift, NumberRange::kNotNegative);
+                 barometer.drift);
   options.values("pressure-shock", "S,S,PA",
                  "START,DURATION,CHANGE: a door or a rotor changes the pressure; may be repeated",
                  [&barometer](const std::string& v) {
@@ -174,8 +165,9 @@ void addRadarOptions(OptionSet& options, RadarRequest& r) {
   TimeOffsetProfile& offset = r.setup.time_offset;
 
   options.section("Time offset t_O: a scan stamped s was measured at s - t_O");
-  options.number("time-offset", "S", "constant part", offset.constant);
-  options.number("time-offset-drift", "S/S", "growth, from the start of the bag", offset.drift);
+  options.number("time-offset", "S", "constant part", offset.constant, NumberRange::kAny);
+  options.number("time-offset-drift", "S/S", "growth, from the start of the bag", offset.drift,
+                 NumberRange::kAny);
   options.values("time-offset-step", "S,S",
                  "TIME,CHANGE: from TIME after the start on the offset is CHANGE more; may be repeated",
                  [&offset](const std::string& v) {
@@ -197,20 +189,18 @@ void addRadarOptions(OptionSet& options, RadarRequest& r) {
                 });
   options.number("radar-rate", "HZ", "scans a second", radar.rate, NumberRange::kPositive);
   options.number("first-trigger", "S", "time of the first trigger, from the start of the bag",
-                 radar.first_trigger, NumberRange::kNotNegative);
+                 radar.first_trigger);
   options.number("frame-length", "S",
                  "the Doppler is the mean over this time around the measurement; 0 = an instant",
-                 radar.frame_length, NumberRange::kNotNegative);
-  options.number("latency", "S", "time from stamp to arrival (record time) of a scan", radar.latency,
-                 NumberRange::kNotNegative);
-  options.number("latency-sigma", "S", "sigma of the latency", radar.latency_sigma,
-                 NumberRange::kNotNegative);
+                 radar.frame_length);
+  options.number("latency", "S", "time from stamp to arrival (record time) of a scan", radar.latency);
+  options.number("latency-sigma", "S", "sigma of the latency", radar.latency_sigma);
   options.number("points", "N", "mean number of points a scan", radar.points_mean, NumberRange::kPositive);
-  options.number("points-sigma", "N", "sigma of that number", radar.points_sigma, NumberRange::kNotNegative);
+  options.number("points-sigma", "N", "sigma of that number", radar.points_sigma);
   options.count("points-min", "fewest points a scan; 0 allows empty scans", radar.points_min, 0);
   options.count("points-max", "most points a scan", radar.points_max);
   options.flag("skip-empty", "scans without points are not published", radar.publish_empty, false);
-  options.number("min-range", "M", "nearest point", radar.min_range, NumberRange::kNotNegative);
+  options.number("min-range", "M", "nearest point", radar.min_range);
   options.number("max-range", "M", "farthest point", radar.max_range, NumberRange::kPositive);
   options.number("fov-azimuth-deg", "DEG", "half angle of view", radar.fov_azimuth, NumberRange::kPositive);
   options.value(
@@ -220,16 +210,14 @@ void addRadarOptions(OptionSet& options, RadarRequest& r) {
   options.flag("no-elevation",
                "a flat radar: sees what is within --fov-elevation-deg, reports it in its own plane, z = 0",
                radar.measures_elevation, false);
-  options.number("range-noise", "M", "sigma", radar.range_noise, NumberRange::kNotNegative);
-  options.number("azimuth-noise-deg", "DEG", "sigma", radar.azimuth_noise, NumberRange::kNotNegative);
-  options.number("elevation-noise-deg", "DEG", "sigma", radar.elevation_noise, NumberRange::kNotNegative);
-  options.number("doppler-noise", "M/S", "sigma, before quantisation", radar.doppler_noise,
-                 NumberRange::kNotNegative);
-  options.number("doppler-step", "M/S", "quantisation; 0 = none", radar.doppler_step,
-                 NumberRange::kNotNegative);
+  options.number("range-noise", "M", "sigma", radar.range_noise);
+  options.number("azimuth-noise-deg", "DEG", "sigma", radar.azimuth_noise);
+  options.number("elevation-noise-deg", "DEG", "sigma", radar.elevation_noise);
+  options.number("doppler-noise", "M/S", "sigma, before quantisation", radar.doppler_noise);
+  options.number("doppler-step", "M/S", "quantisation; 0 = none", radar.doppler_step);
   options.number("doppler-span", "M/S",
                  "whole unambiguous span, a whole number of steps: 3 wraps into [-1.5, 1.5); 0 = unlimited",
-                 radar.doppler_span, NumberRange::kNotNegative);
+                 radar.doppler_span);
   options.number("ghosts", "SHARE", "share of the points that are ghosts: anywhere, any Doppler",
                  radar.ghost_share, NumberRange::kShare);
   options.number("ambiguous", "SHARE",
@@ -422,7 +410,7 @@ void printSummary(const Request& request, const Motion& motion, const SensorData
             << acceleration << " m/s^2\n";
   if (!request.trajectory.empty()) {
     std::cout << "spline: poses of the file are " << 1e3 * motion.path().positionResidual() << " mm and "
-              << motion.path().rotationResidual() * 57.29577951308232 << " deg (rms) from it\n";
+              << motion.path().rotationResidual() * (180.0 / M_PI) << " deg (rms) from it\n";
   }
   std::cout << "IMU: " << data.imu.samples.size() << " samples\n"
             << "true accelerometer bias [m/s^2]: " << triple(data.imu.b_a.front()) << " at the start, "
@@ -446,11 +434,10 @@ void run(Request request) {
     throw UsageError("--pressure-shock needs --barometer");
   if (isSameFile(request.ground_truth, request.out))
     throw UsageError("--ground-truth " + request.ground_truth + ": expected another file than that of --out");
-  const std::vector<std::string> inputs(request.trajectory.empty() ? 0 : 1, request.trajectory);
   for (const auto& [name, file] :
        {std::make_pair("--out ", request.out), std::make_pair("--ground-truth ", request.ground_truth)}) {
     if (file.empty()) continue;
-    const std::string fault = faultOfOutput(file, inputs);
+    const std::string fault = faultOfOutput(file, {request.trajectory});
     if (!fault.empty()) throw UsageError(name + fault);
   }
   request.simulation.start = Time::fromSeconds(request.start_time);

@@ -80,6 +80,14 @@ struct RadarModelOptions {
   void removeErrors();
 };
 
+/// A radar on the rig: what it is, how late its stamps are, where it sits.
+struct RadarSetup {
+  RadarModelOptions radar;
+  TimeOffsetProfile time_offset;
+  Extrinsics T_IR{Eigen::Vector3d(0.03, 0.03, -0.06),
+                  Eigen::Quaterniond(0.00524, 0.69946, 0.71461, 0.00723).normalized()};  ///< of the IRS rig
+};
+
 struct SimulatedPoint {
   Eigen::Vector3d position_R =
       Eigen::Vector3d::Zero();  ///< as measured [m], RIO axes: x right, y forward, z up
@@ -109,8 +117,7 @@ std::vector<Eigen::Vector3d> makeScene(const Motion& motion, std::uint64_t seed,
 /// Scans of a radar carried along `motion`; scans whose measurement time is not inside the motion are left
 /// out. Each scan draws from a sequence of its own, so that a lost scan leaves the others as they are. Throws
 /// std::invalid_argument for options out of range.
-std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarModelOptions& options,
-                                         const TimeOffsetProfile& time_offset, const Extrinsics& T_IR,
-                                         std::uint64_t seed, Time start);
+std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarSetup& setup, std::uint64_t seed,
+                                         Time start);
 
 }  // namespace rio_t::simulation

@@ -10,14 +10,6 @@
 
 namespace rio_t::simulation {
 
-/// A radar on the rig: what it is, how late its stamps are, where it sits.
-struct RadarSetup {
-  RadarModelOptions radar;
-  TimeOffsetProfile time_offset;
-  Extrinsics T_IR{Eigen::Vector3d(0.03, 0.03, -0.06),
-                  Eigen::Quaterniond(0.00524, 0.69946, 0.71461, 0.00723).normalized()};  ///< of the IRS rig
-};
-
 /// A rig with one radar, the RadarSetup it is itself, unless `radars` names several.
 struct SimulationOptions : RadarSetup {
   std::uint64_t seed = 0;

@@ -58,7 +58,6 @@ RunSummary BagPlayer::summary(const RunLog& log) const {
   log.fill(&summary);
   summary.imu_count = imu_count_;
   summary.imu_restarts = imu_restarts_;
-  summary.health_at_end = toString(summary.health);
   if (summary.barometer) summary.barometer->pressures = pressure_count_;
   const auto warn = [&](const NotUsableByKind& kinds) {
     for (const auto& [kind, what] : kinds)

@@ -20,7 +20,7 @@ struct Trial {
     return static_cast<double>(summary.scansUsed()) / static_cast<double>(std::max<std::uint64_t>(1, judged));
   }
   bool good() const {
-    return failure.empty() && summary.divergences == 0 && summary.health_at_end == toString(Health::kOk) &&
+    return failure.empty() && summary.divergences == 0 && summary.health == Health::kOk &&
            summary.diagnosis.verdict != RunVerdict::kBad && shareUsed() > 0.5;
   }
   /// Larger is better; a good one is better than all others.
@@ -44,17 +44,6 @@ Trial tryOut(const Recording& recording, const std::string& yaml, double duratio
   }
   return trial;
 }
-
-struct Attempt {
-  const char* key;
-  const char* value;
-  const char* why;
-};
-/// The configurations that are tried one after the other if the odometry does not run well.
-constexpr Attempt kAttempts[] = {
-    {nullptr, nullptr, nullptr},
-    {"estimate_extrinsics", "pose", "With a fixed lever arm the odometry diverged."},
-};
 
 std::string shareText(const Trial& trial) {
   return fixedText(100.0 * trial.shareUsed(), 0) + " % of the scans used";
@@ -95,9 +84,9 @@ void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
       check->findings.push_back({FindingLevel::kOdd, "trial run", verdictText(s.diagnosis)});
     return;
   }
-  check->findings.push_back(
-      {FindingLevel::kMissing, "trial run",
-       "divergences: " + std::to_string(s.divergences) + ", at the end " + s.health_at_end + "; " + numbers});
+  check->findings.push_back({FindingLevel::kMissing, "trial run",
+                             "divergences: " + std::to_string(s.divergences) + ", at the end " +
+                                 toString(s.health) + "; " + numbers});
   check->findings.push_back({FindingLevel::kOdd, "trial run", verdictText(s.diagnosis)});
   check->to_do =
       "The odometry does not run well with what the bag shows. Look at the odd lines. Measure the mounting "
@@ -112,25 +101,23 @@ void chooseByTrial(const Recording& recording, const std::string& header, const 
                    const ParameterEntries& told, BagCheck* check) {
   const double duration = recording.read < recording.length ? recording.read : 0.0;
   Trial best;
-  best.failure = "not tried";
-  std::string note;
-  for (const Attempt& attempt : kAttempts) {
-    const bool is_told = std::any_of(told.begin(), told.end(), [&](const ParameterEntry& entry) {
-      return attempt.key != nullptr && entry.key == attempt.key;
-    });
-    if (is_told) continue;
-    ProposedConfig changed = config;
-    if (attempt.key != nullptr) changed.top_level.set(attempt.key, attempt.value, attempt.why);
-    const std::string yaml = toYaml(changed, header);
+  std::string note;  // on the best one
+  const auto attempt = [&](const ProposedConfig& proposed, const std::string& its_note) {
+    const std::string yaml = toYaml(proposed, header);
     const Trial trial = tryOut(recording, yaml, duration);
-    if (check->yaml.empty() || trial.score() > best.score()) {
-      best = trial;
-      check->yaml = yaml;
-      note = attempt.key == nullptr ? ""
-                                    : std::string(" (with ") + attempt.key + ": " + attempt.value +
-                                          "; without it, it does not run as well)";
-    }
-    if (trial.good()) break;
+    if (!check->yaml.empty() && trial.score() <= best.score()) return;
+    best = trial;
+    check->yaml = yaml;
+    note = its_note;
+  };
+  attempt(config, "");
+  const bool is_told = std::any_of(told.begin(), told.end(), [](const ParameterEntry& entry) {
+    return entry.key == "estimate_extrinsics";
+  });
+  if (!best.good() && !is_told) {
+    ProposedConfig changed = config;
+    changed.top_level.set("estimate_extrinsics", "pose", "With a fixed lever arm the odometry diverged.");
+    attempt(changed, " (with estimate_extrinsics: pose; without it, it does not run as well)");
   }
   // One radar alone may do.
   for (const auto& [name, keys] : config.radars) {
@@ -138,12 +125,7 @@ void chooseByTrial(const Recording& recording, const std::string& header, const 
     ProposedConfig alone{config.top_level, {}};
     alone.top_level.remove("radars");
     alone.top_level.add(keys);
-    const std::string yaml = toYaml(alone, header);
-    const Trial trial = tryOut(recording, yaml, duration);
-    if (trial.score() <= best.score()) continue;
-    best = trial;
-    check->yaml = yaml;
-    note = " (with the radar " + name + " alone; together the odometry does not run as well)";
+    attempt(alone, " (with the radar " + name + " alone; together the odometry does not run as well)");
   }
   tellTrial(best, note, check);
   if (!best.good()) check->quality -= 1e3;

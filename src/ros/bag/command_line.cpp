@@ -14,16 +14,14 @@
 #include <sstream>
 #include <system_error>
 
+#include "../text.h"
+
 namespace rio_t {
 namespace {
 
 namespace po = boost::program_options;
 
 constexpr unsigned kLineLength = 110;
-
-std::string withDefault(const std::string& help, const std::string& shown_default) {
-  return shown_default.empty() ? help : help + " [" + shown_default + "]";
-}
 
 /// `set`, with the name of the option in what it throws.
 OptionSet::Setter named(const std::string& name, const OptionSet::Setter& set) {
@@ -106,7 +104,7 @@ std::string keepOther(const std::string& path, const std::string& text) {
   if (!fs::is_regular_file(path, error) || fs::file_size(path, error) == 0) return "";
   std::ifstream file(path, std::ios::binary);
   if (std::string(std::istreambuf_iterator<char>(file), {}) == text) return "";
-  const std::string backup = path + "~";
+  std::string backup = path + "~";
   if (!fs::copy_file(path, backup, fs::copy_options::overwrite_existing, error) || error)
     throw std::runtime_error(path + ": cannot be kept as " + backup + " (" + error.message() + ")");
   return backup;
@@ -114,12 +112,7 @@ std::string keepOther(const std::string& path, const std::string& text) {
 
 }  // namespace
 
-std::string shownNumber(double value) {
-  std::ostringstream out;
-  out.precision(10);
-  out << value;
-  return out.str();
-}
+std::string shownNumber(double value) { return shortText(value, 10); }
 
 double parseNumber(const std::string& text, NumberRange range) {
   std::istringstream stream(text);
@@ -187,7 +180,7 @@ void OptionSet::count(const std::string& name, const std::string& help, int& tar
 void OptionSet::value(const std::string& name, const std::string& argument, const std::string& help,
                       const std::string& shown_default, const Setter& set) {
   add(name, po::value<std::string>()->value_name(argument)->notifier(named(name, set)),
-      withDefault(help, shown_default));
+      shown_default.empty() ? help : help + " [" + shown_default + "]");
 }
 
 void OptionSet::valueOrNothing(const std::string& name, const std::string& argument, const std::string& help,
@@ -318,7 +311,7 @@ std::string faultOfOutput(const std::string& path, const std::vector<std::string
 }
 
 std::string writeFile(const std::string& path, const std::string& text) {
-  const std::string backup = keepOther(path, text);
+  std::string backup = keepOther(path, text);
   const std::string written = isWrittenInPlace(path) ? path : path + ".part";
   std::ofstream file(written, std::ios::binary | std::ios::trunc);
   file << text;

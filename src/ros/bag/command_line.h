@@ -52,7 +52,7 @@ class OptionSet {
   void text(const std::string& name, const std::string& argument, const std::string& help,
             std::string& target);
   void number(const std::string& name, const std::string& argument, const std::string& help, double& target,
-              NumberRange range = NumberRange::kAny);
+              NumberRange range = NumberRange::kNotNegative);
   /// A whole number from `least` to 100000.
   void count(const std::string& name, const std::string& help, int& target, int least = 1);
   /// `shown_default` is for --help; empty: none.

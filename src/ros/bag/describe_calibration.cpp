@@ -9,8 +9,6 @@
 namespace rio_t {
 namespace {
 
-constexpr double kDegreesPerRadian = 180.0 / M_PI;
-
 struct AxisText {
   const char* name;
   const char* unit;
@@ -20,9 +18,9 @@ struct AxisText {
 /// By CalibrationAxis.
 constexpr std::array<AxisText, kCalibrationAxes> kAxes = {{
     {"time offset", "ms", 1e3, 2},
-    {"turn about x", "deg", kDegreesPerRadian, 2},
-    {"turn about y", "deg", kDegreesPerRadian, 2},
-    {"turn about z", "deg", kDegreesPerRadian, 2},
+    {"turn about x", "deg", 1.0 / kDegree, 2},
+    {"turn about y", "deg", 1.0 / kDegree, 2},
+    {"turn about z", "deg", 1.0 / kDegree, 2},
     {"lever arm x", "mm", 1e3, 1},
     {"lever arm y", "mm", 1e3, 1},
     {"lever arm z", "mm", 1e3, 1},
@@ -76,7 +74,7 @@ std::string remarks(const CalibratedRadar& radar) {
 /// The mounting found, as mounting_yaw_pitch_roll_deg has it.
 std::string mountingWords(const CalibratedRadar& radar) {
   const MountingAngles found = mountingOf(radar.calibration.T_IR.q_IR);
-  const auto degrees = [](double angle) { return fixedText(kDegreesPerRadian * angle, 1); };
+  const auto degrees = [](double angle) { return fixedText(1.0 / kDegree * angle, 1); };
   return "  mounting: yaw " + degrees(found.yaw) + " (left), pitch " + degrees(found.pitch) + " (up), roll " +
          degrees(found.roll) + " (right side down) deg, seen from x forward, y left, z up of the IMU\n";
 }

@@ -50,10 +50,9 @@ void describePasses(const RadarSummary& radar, const Row& row) {
 
 /// The mounting as people can compare it: how far it went from the one told, by the axes of the IMU.
 void describeExtrinsics(const ExtrinsicsSummary& extrinsics, const Row& row) {
-  constexpr double kDegreesPerRadian = 180.0 / M_PI;
-  row("turned by", decimals(turnBetween(extrinsics.told, extrinsics.T_IR), kDegreesPerRadian, 2) +
+  row("turned by", decimals(turnBetween(extrinsics.told, extrinsics.T_IR), 1.0 / kDegree, 2) +
                        " deg about x y z of the IMU, sigma " +
-                       decimals(extrinsics.rotation_sigma, kDegreesPerRadian, 2) + " deg");
+                       decimals(extrinsics.rotation_sigma, 1.0 / kDegree, 2) + " deg");
   if (extrinsics.translation_sigma.isZero()) return;
   row("moved by", decimals(extrinsics.T_IR.l_I - extrinsics.told.l_I, 1e3, 1) + " mm, sigma " +
                       decimals(extrinsics.translation_sigma, 1e3, 1) + " mm");
@@ -132,10 +131,10 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
   describeSolver(summary.solver_terminations, row);
   if (!summary.input_faults.empty()) row("input faults", listOf(summary.input_faults));
   row("started from", toString(summary.initialized_from));
-  if (summary.divergences > 0 || summary.health_at_end != "ok") {
+  if (summary.divergences > 0 || summary.health != Health::kOk) {
     row("diverged", std::to_string(summary.divergences) + " times, re-initialised " +
                         std::to_string(summary.reinitializations) + " times, at the end " +
-                        summary.health_at_end);
+                        toString(summary.health));
   }
   for (const RadarSummary& radar : summary.radars) {
     if (one_radar) break;

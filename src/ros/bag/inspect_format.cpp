@@ -38,11 +38,9 @@ std::string fieldLike(const std::vector<std::string>& fields, const std::vector<
   for (const std::string& word : words) {
     for (const std::string& field : fields) {
       const std::string lower = boost::algorithm::to_lower_copy(field);
-      const bool derived =
-          boost::algorithm::contains(lower, "std") || boost::algorithm::contains(lower, "var") ||
-          boost::algorithm::contains(lower, "noise") || boost::algorithm::contains(lower, "bin") ||
-          boost::algorithm::contains(lower, "idx");
-      if (!derived && boost::algorithm::contains(lower, word)) return field;
+      const auto has = [&](const std::string& part) { return lower.find(part) != std::string::npos; };
+      const bool derived = has("std") || has("var") || has("noise") || has("bin") || has("idx");
+      if (!derived && has(word)) return field;
     }
   }
   return "";
@@ -284,10 +282,10 @@ bool correctAxes(const CloudReport& cloud, bool mirrored, const ParameterEntries
   const std::array<std::string, 3> fields = {format.x, format.y, format.z};
   const Eigen::Vector3d mean = cloudFromRfu(format.axes) * cloud.mean_direction;  // along the fields
   const int forward = format.axes == PointAxes::kForwardLeftUp ? 0 : 1;
+  const auto name = [&](int field) { return fields[static_cast<std::size_t>(field)]; };
   const auto rename = [&](int field, int from) {
-    const std::array<const char*, 3> keys = {"radar_field_x", "radar_field_y", "radar_field_z"};
     proposal->keys.set(
-        keys[static_cast<std::size_t>(field)], fields[static_cast<std::size_t>(from)],
+        std::string("radar_field_") + "xyz"[field], name(from),
         mirrored ? "Two fields of the cloud are swapped." : "The radar looks along another field.");
   };
   int looks = 0;
@@ -296,21 +294,20 @@ bool correctAxes(const CloudReport& cloud, bool mirrored, const ParameterEntries
     if (mirrored) {
       rename(forward, looks);
       rename(looks, forward);
-      proposal->odd.push_back("the fields " + fields[static_cast<std::size_t>(forward)] + " and " +
-                              fields[static_cast<std::size_t>(looks)] +
-                              " are swapped: the radar looks along " +
-                              fields[static_cast<std::size_t>(looks)] + ", and the axes are left-handed");
+      proposal->odd.push_back("the fields " + name(forward) + " and " + name(looks) +
+                              " are swapped: the radar looks along " + name(looks) +
+                              ", and the axes are left-handed");
     } else if (looks != 2) {
       const char* axes = looks == 0 ? "flu" : "rfu";
       proposal->keys.set("radar_axes", axes, "The radar looks along this forward axis.");
-      proposal->odd.push_back("the radar looks along " + fields[static_cast<std::size_t>(looks)] +
-                              ", so its axes are " + axes + ", not those of the preset");
+      proposal->odd.push_back("the radar looks along " + name(looks) + ", so its axes are " + axes +
+                              ", not those of the preset");
     } else {  // a camera's axes, turned on: forward is z
       proposal->keys.set("radar_axes", "flu", "The radar looks along z.");
       rename(0, 2);
       rename(1, 0);
       rename(2, 1);
-      proposal->odd.push_back("the radar looks along " + fields[2]);
+      proposal->odd.push_back("the radar looks along " + name(2));
     }
     resolve(proposal);
     return true;
@@ -320,7 +317,7 @@ bool correctAxes(const CloudReport& cloud, bool mirrored, const ParameterEntries
     const int lateral = forward == 0 ? 1 : 0;
     rename(lateral, 2);
     rename(2, lateral);
-    proposal->odd.push_back("the fields " + fields[static_cast<std::size_t>(lateral)] + " and " + fields[2] +
+    proposal->odd.push_back("the fields " + name(lateral) + " and " + name(2) +
                             " are swapped: the axes are left-handed");
     resolve(proposal);
     return true;

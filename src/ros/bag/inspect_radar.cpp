@@ -12,7 +12,6 @@ namespace rio_t {
 namespace {
 
 constexpr double kStraight = M_PI;  // [rad]
-constexpr double kDegree = M_PI / 180.0;
 
 std::string degrees(double radians) { return fixedText(radians / kDegree, 0); }
 
@@ -69,22 +68,23 @@ Looked look(const Recording& recording, const ImuInspection& imu, const CloudTop
   return looked;
 }
 
+void tell(RadarInspection* radar, FindingLevel level, const std::string& subject, const std::string& text) {
+  radar->findings.push_back({level, subject, text});
+}
+
 void describeCloud(const Looked& looked, const FormatProposal& format, const StreamTiming& timing,
                    RadarInspection* radar) {
-  const auto tell = [&](FindingLevel level, const std::string& subject, const std::string& text) {
-    radar->findings.push_back({level, subject, text});
-  };
   const CloudReport& c = looked.cloud;
-  tell(timing.gaps > timing.messages / 50 ? FindingLevel::kOdd : FindingLevel::kOk, "radar",
+  tell(radar, timing.gaps > timing.messages / 50 ? FindingLevel::kOdd : FindingLevel::kOk, "radar",
        radar->topic + ": " + rateText(timing, 1, timing.zero == 0 && !timing.constant) + "; format " +
            format.format.name +
            (format.fitting.size() > 1 ? " (fitting: " + boost::algorithm::join(format.fitting, ", ") + ")"
                                       : "") +
            ", " + format.power);
-  for (const std::string& odd : format.odd) tell(FindingLevel::kOdd, "format", odd);
+  for (const std::string& odd : format.odd) tell(radar, FindingLevel::kOdd, "format", odd);
   const DopplerStep& step = looked.velocities.doppler_step;
   const bool sparse = radar->isSparse();
-  tell(sparse ? FindingLevel::kOdd : FindingLevel::kOk, "points",
+  tell(radar, sparse ? FindingLevel::kOdd : FindingLevel::kOk, "points",
        fixedText(c.points_10, 0) + " / " + fixedText(c.points_50, 0) + " / " + fixedText(c.points_90, 0) +
            " a scan (10, 50, 90 %), to " + fixedText(c.range_99, 1) + " m, field of view +-" +
            degrees(c.azimuth_95) + " by +-" + degrees(c.elevation_95) + " deg, Doppler step " +
@@ -92,14 +92,14 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
            (sparse ? ": few points, so start at rest" : ""));
   constexpr double kIncredible = 500.0;  // [m] farther than radars see
   if (c.range_99 > kIncredible)
-    tell(FindingLevel::kOdd, "points",
+    tell(radar, FindingLevel::kOdd, "points",
          "the ranges reach " + fixedText(c.range_99, 0) + " m: are the positions in m?");
   if (c.ambiguous > 0.005)  // one per cent
-    tell(FindingLevel::kOk, "points",
+    tell(radar, FindingLevel::kOk, "points",
          fixedText(100.0 * c.ambiguous, 0) +
              " % have the range, Doppler and SNR of another point: one echo at several directions, left out");
   if (!looked.velocities.has_elevation)
-    tell(FindingLevel::kOdd, "points",
+    tell(radar, FindingLevel::kOdd, "points",
          "the radar measures no elevation: z will drift, and a mounting without tilt is assumed");
 }
 
@@ -124,23 +124,21 @@ void describeSign(const Looked& looked, const FormatProposal& format, RadarInspe
       imu_knows ? "the IMU (" + fixedText(std::sqrt(search.sign_significance), 0) + " sigma)" : "";
   const std::string evidence = by_ranges + (by_ranges.empty() || by_imu.empty() ? "" : " and ") + by_imu;
   if (search.mirrored) {
-    radar->findings.push_back(
-        {FindingLevel::kOdd, "axes",
+    tell(radar, FindingLevel::kOdd, "axes",
          "the axes of the cloud are left-handed (one axis is inverted): the ranges say that " + field +
              " is " + (looked.sign.sign > 0 ? "positive for receding" : "negative for receding") +
-             " targets, the IMU the contrary; radar_doppler_sign and the mounting stand for it"});
+             " targets, the IMU the contrary; radar_doppler_sign and the mounting stand for it");
     radar->keys.set("radar_doppler_sign", ParameterValue{std::int64_t{search.sign}},
                     "One axis of the cloud is inverted. This sign and the mounting below stand for it.");
   } else if (search.sign == -1) {
-    radar->findings.push_back({FindingLevel::kOdd, "Doppler",
-                               field + " is positive for approaching targets, shown by " + evidence});
+    tell(radar, FindingLevel::kOdd, "Doppler",
+         field + " is positive for approaching targets, shown by " + evidence);
     radar->keys.set("radar_doppler_sign", ParameterValue{std::int64_t{-1}},
                     field + " is positive for approaching targets.");
   } else {
-    radar->findings.push_back(
-        {FindingLevel::kOk, "Doppler",
+    tell(radar, FindingLevel::kOk, "Doppler",
          field + " is positive for receding targets" +
-             (evidence.empty() ? " (assumed: the motion does not show it)" : ", shown by " + evidence)});
+             (evidence.empty() ? " (assumed: the motion does not show it)" : ", shown by " + evidence));
   }
 }
 
@@ -172,11 +170,8 @@ Eigen::Matrix3d nearestTurn(const Eigen::Matrix3d& R) {
 }
 
 void describeMounting(const MountingSearch& search, RadarInspection* radar) {
-  const auto tell = [&](FindingLevel level, const std::string& subject, const std::string& text) {
-    radar->findings.push_back({level, subject, text});
-  };
   if (!search.enough) {
-    tell(FindingLevel::kOdd, "mounting",
+    tell(radar, FindingLevel::kOdd, "mounting",
          "not found: less than 3 s with motion; the radar is taken to look forward. Record with motion, or "
          "set "
          "mounting_yaw_pitch_roll_deg by hand");
@@ -193,7 +188,7 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
   const std::string sure = sureness(sigma);
   // Few points a scan may show another mounting that fits as well: upside down, or a view beside the motion.
   const bool observed = search.rotation_sigma.maxCoeff() < kObservedTurn && !radar->isSparse();
-  tell(observed ? FindingLevel::kOk : FindingLevel::kOdd, "mounting",
+  tell(radar, observed ? FindingLevel::kOk : FindingLevel::kOdd, "mounting",
        "yaw " + fixedText(yaw, 1) + ", pitch " + fixedText(pitch, 1) + ", roll " + fixedText(roll, 1) +
            " deg (radar's " + turnText(nearestTurn(search.q_IR.toRotationMatrix())) + " of the IMU); " +
            sure +
@@ -212,13 +207,13 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
     text += (k == 0 ? "" : ", ") + fixedText(l[k], 2) + " +- " + fixedText(l_sigma[k], 2);
   }
   const bool any = std::any_of(lever.begin(), lever.end(), [](double x) { return x != 0.0; });
-  tell(FindingLevel::kOk, "lever arm",
+  tell(radar, FindingLevel::kOk, "lever arm",
        "about [" + text + "] m: " + (any ? "what is clear of zero is taken over" : "zero is proposed") +
            "; measure it with a tape");
   if (any)
     radar->keys.set("extrinsics_translation", listOf(lever),
                     "Origin of the radar in the IMU frame, roughly [m]. Measure it with a tape.");
-  tell(FindingLevel::kOk, "offset",
+  tell(radar, FindingLevel::kOk, "offset",
        fixedText(1e3 * search.offset, 0) + " +- " + fixedText(1e3 * search.offset_sigma, 0) +
            " ms, roughly; the odometry estimates it");
   constexpr double kKnown = 0.03;  // [s]
@@ -240,7 +235,7 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   const StreamTiming timing = inspectTiming(cloud.times);
   FormatProposal format = proposeFormat(cloud, told);
   if (!format.fault.empty()) {
-    radar.findings.push_back({FindingLevel::kMissing, "radar", cloud.topic + ": " + format.fault});
+    tell(&radar, FindingLevel::kMissing, "radar", cloud.topic + ": " + format.fault);
     radar.to_do = format.to_do;
     return radar;
   }
@@ -251,10 +246,9 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
     const std::vector<RadarScan> decoded = decodeAll(cloud, format.format);
     const bool none_finite = std::all_of(decoded.begin(), decoded.end(),
                                          [](const RadarScan& scan) { return scan.points.empty(); });
-    radar.findings.push_back({FindingLevel::kMissing, "radar",
-                              cloud.topic + ": the " + (none_finite ? "position or the " : "") + "field " +
-                                  format.format.doppler + " is " + (none_finite ? "not finite" : "zero") +
-                                  " in every point"});
+    tell(&radar, FindingLevel::kMissing, "radar",
+         cloud.topic + ": the " + (none_finite ? "position or the " : "") + "field " + format.format.doppler +
+             " is " + (none_finite ? "not finite" : "zero") + " in every point");
     return radar;
   }
   // If the ranges say nothing, a radar that looks along another axis and a contrary sign are one fault, not
@@ -274,8 +268,8 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   radar.keys.add(stamps.keys);
   limitsOfCloud(looked.cloud, &radar.keys);
   describeCloud(looked, format, timing, &radar);
-  for (const std::string& odd : stamps.odd) radar.findings.push_back({FindingLevel::kOdd, "stamps", odd});
-  if (stamps.odd.empty()) radar.findings.push_back({FindingLevel::kOk, "stamps", stamps.text});
+  for (const std::string& odd : stamps.odd) tell(&radar, FindingLevel::kOdd, "stamps", odd);
+  if (stamps.odd.empty()) tell(&radar, FindingLevel::kOk, "stamps", stamps.text);
   describeSign(looked, format, &radar);
   describeMounting(looked.search, &radar);
   return radar;

@@ -27,6 +27,9 @@ namespace {
 using simulation::SimulatedPoint;
 using simulation::SimulatedScan;
 
+constexpr double kImuLatency = 0.001;        // [s] from stamp to arrival, also of the triggers
+constexpr double kBarometerLatency = 0.002;  // [s] likewise
+
 // What differs between the formats.
 struct Layout {
   std::string scan_topic;
@@ -211,18 +214,17 @@ std::vector<Arrival> arrivals(const simulation::Motion& motion, const simulation
   const double orientation_covariance = layoutOf(options.format).orientation_covariance;
   std::uint32_t seq = 0;
   for (const ImuMeasurement& sample : data.imu.samples)
-    add(sample.time + options.imu_latency, "/sensor_platform/imu",
-        [&sample, seq = seq++, orientation_covariance] {
-          return imuMessage(sample, seq, orientation_covariance);
-        });
+    add(sample.time + kImuLatency, "/sensor_platform/imu", [&sample, seq = seq++, orientation_covariance] {
+      return imuMessage(sample, seq, orientation_covariance);
+    });
   seq = 0;
   for (const simulation::SimulatedPressure& sample : data.pressures)
-    add(sample.stamp + options.barometer_latency, "/sensor_platform/baro",
+    add(sample.stamp + kBarometerLatency, "/sensor_platform/baro",
         [&sample, seq = seq++] { return pressureMessage(sample, seq); });
   for (const RadarTrack& radar : radars) {
     const Layout& layout = radar.layout;
     for (const SimulatedScan& scan : *radar.scans) {
-      add(scan.stamp + options.imu_latency, layout.trigger_topic,
+      add(scan.stamp + kImuLatency, layout.trigger_topic,
           [&scan, &layout] { return headerOf(scan.seq, scan.stamp, layout.trigger_frame); });
       if (scan.delivered)
         add(scan.arrival, layout.scan_topic, [&scan, &layout] { return scanMessage(scan, layout); });

@@ -133,7 +133,7 @@ std::string summaryText(const RunSummary& summary, const std::vector<std::string
   lines.add("input_faults", summary.input_faults);
   lines.add("solver_terminations", summary.solver_terminations);
   lines.add("initialized_from", toString(summary.initialized_from));
-  lines.add("health_at_end", summary.health_at_end);
+  lines.add("health_at_end", toString(summary.health));
   lines.add("divergences", summary.divergences);
   lines.add("reinitializations", summary.reinitializations);
   lines.add("scans_diverged", summary.scans_diverged);

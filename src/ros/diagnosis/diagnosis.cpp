@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 #include <stdexcept>
 
 #include "../text.h"
@@ -28,6 +27,10 @@ constexpr std::uint64_t kEnoughScans = 20;
 constexpr std::size_t kMostCauses = 3;
 /// The remedy for a wrong mounting, sign or axes.
 constexpr const char* kCheckBag = " Run `rosrun rio_t check_bag BAG`: it finds all three.";
+
+std::uint64_t pointsOf(const RadarSummary& radar, PointVerdict verdict) {
+  return radar.points_by_verdict[static_cast<std::size_t>(verdict)];
+}
 
 double shareOf(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
@@ -55,12 +58,7 @@ double silentShare(const RunEvidence& evidence) {
   return evidence.run_seconds > 0.0 ? evidence.silent_seconds / evidence.run_seconds : 0.0;
 }
 
-std::string number(double value) {
-  std::ostringstream text;
-  text.precision(3);
-  text << value;
-  return text.str();
-}
+std::string number(double value) { return shortText(value, 3); }
 
 /// A stamp, to the millisecond.
 std::string stampText(Time time) { return fixedText(time.seconds(), 3) + " s"; }
@@ -111,7 +109,7 @@ class RadarCauses {
     const EgoVelocityOptions& o = config_.odometry.ego_velocity;
     const auto filter = [&](PointVerdict verdict, const std::string& name, const std::string& are,
                             const std::string& remedy) {
-      const std::uint64_t taken = radar_.points_by_verdict[static_cast<std::size_t>(verdict)];
+      const std::uint64_t taken = pointsOf(radar_, verdict);
       const double share = shareOf(taken, radar_.points);
       if (share < kManyPoints) return;
       cause(name, share, outOf(taken, radar_.points, "points") + of_ + " are " + are, remedy);
@@ -189,13 +187,12 @@ class RadarCauses {
 
   /// Scans whose points give no velocity, before the start and after it.
   void addVelocities() {
-    const double kept =
-        static_cast<double>(radar_.points_by_verdict[static_cast<std::size_t>(PointVerdict::kKept)]);
-    const double kept_per_scan = kept / static_cast<double>(radar_.scans_total);
+    const std::uint64_t kept = pointsOf(radar_, PointVerdict::kKept);
     // The points that the filter took are a cause of their own.
-    if (shareOf(static_cast<std::uint64_t>(kept), radar_.points) > 1.0 - kManyPoints || radar_.points == 0) {
+    if (shareOf(kept, radar_.points) > 1.0 - kManyPoints || radar_.points == 0) {
       scans("too_few_points",
-            "have too few points for a velocity: " + number(kept_per_scan) + " on average after the filter.",
+            "have too few points for a velocity: " + number(shareOf(kept, radar_.scans_total)) +
+                " on average after the filter.",
             "Set a lower detection threshold in the driver of the radar. Set radar_factor: doppler if it is "
             "velocity.");
     }
@@ -228,7 +225,6 @@ class RadarCauses {
   void addMounting() {
     const double sigmas = turnSigmas(radar_, config_);
     if (sigmas <= kFarMounting) return;
-    constexpr double kDegree = M_PI / 180.0;
     const Eigen::Vector3d turn = radar_.turn / kDegree;
     cause("mounting_far", 1.0 - kFarMounting / sigmas,
           "The estimated mounting" + of_ + " is turned from the told one by " + fixedText(turn.x(), 0) +
@@ -325,11 +321,9 @@ void addImu(const RunEvidence& evidence, const Config& config, std::vector<Cause
                            " against " + key + " " + number(configured) + ".",
                        "Mount the IMU softer, or raise this key.", 0.1});
   };
-  MeasuredImuNoise accel, gyro;
-  accel.accel_density = noise.accel_density;
-  gyro.gyro_density = noise.gyro_density;
-  noisy("accelerometer", "imu_accel_noise_density", noise.accel_density, accel, told.accel_density);
-  noisy("gyro", "imu_gyro_noise_density", noise.gyro_density, gyro, told.gyro_density);
+  noisy("accelerometer", "imu_accel_noise_density", noise.accel_density, {noise.accel_density, 0.0},
+        told.accel_density);
+  noisy("gyro", "imu_gyro_noise_density", noise.gyro_density, {0.0, noise.gyro_density}, told.gyro_density);
 }
 
 /// After a start at rest the heading drifts, too, but only as the noise of the gyro says.
@@ -414,10 +408,8 @@ std::vector<Check> checksOf(const RunEvidence& evidence, const std::vector<Confi
   double kept = 1.0, turned = 0.0;
   for (std::size_t k = 0; k < evidence.radars.size(); ++k)
     turned = std::max(turned, turnSigmas(evidence.radars[k], radars.at(k)));
-  for (const RadarSummary& radar : evidence.radars) {
-    const std::uint64_t passed = radar.points_by_verdict[static_cast<std::size_t>(PointVerdict::kKept)];
-    if (radar.points > 0) kept = std::min(kept, shareOf(passed, radar.points));
-  }
+  for (const RadarSummary& radar : evidence.radars)
+    if (radar.points > 0) kept = std::min(kept, shareOf(pointsOf(radar, PointVerdict::kKept), radar.points));
   std::uint64_t imu_faults = 0;
   for (const char* fault : kImuFaults) imu_faults += countOf(evidence.input_faults, fault);
   return {

@@ -18,7 +18,6 @@ using diagnostic_msgs::DiagnosticStatus;
 constexpr double kRecent = 1.0;
 /// The motion has shown what it told better than this share of the sigma that it was told with.
 constexpr double kObserved = 0.5;
-constexpr double kDegree = M_PI / 180.0;
 
 std::string listOf(const Eigen::VectorXd& numbers) {
   std::ostringstream text;

@@ -13,13 +13,13 @@ void OffsetObservability::add(const ScanResult& result) {
     if (variance > 0.0) samples_.push_back({state.time, change.squaredNorm() / (dt * dt * variance)});
   }
   if (!previous_ || dt > 0.0) previous_ = state;
-  while (!samples_.empty() && previous_->time - samples_.front().time > window_) samples_.pop_front();
+  while (!samples_.empty() && previous_->time - samples_.front().time > kWindow) samples_.pop_front();
 }
 
 bool OffsetObservability::observable() const {
   double information = 0.0;
   for (const Sample& sample : samples_) information += sample.information;
-  return information * max_sigma_ * max_sigma_ > 1.0;
+  return information * kMaxSigma * kMaxSigma > 1.0;
 }
 
 }  // namespace rio_t

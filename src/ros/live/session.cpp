@@ -6,8 +6,6 @@
 namespace rio_t {
 namespace {
 
-constexpr double kObservabilityWindow = 1.0;     // [s]
-constexpr double kObservableSigma = 0.02;        // [s] a fifth of a radar period: better than not knowing
 constexpr std::size_t kMaxScansInFlight = 1000;  // bounds the memory of arrivals
 
 }  // namespace
@@ -17,7 +15,7 @@ LiveSession::LiveSession(const Config& config, const OdometryOptions& options)
   for (const Config& radar : configsOfRadars(config)) {
     const Extrinsics T_IR = optionsOfRadar(options, radars_.size()).T_IR;
     stampers_.push_back({ScanStamper(stampingOptions(radar)), {}});
-    radars_.push_back({OffsetObservability(kObservabilityWindow, kObservableSigma), T_IR, std::nullopt});
+    radars_.push_back({OffsetObservability(), T_IR, std::nullopt});
   }
 }
 

@@ -1,7 +1,5 @@
 #include "mounting_parameters.h"
 
-#include <algorithm>
-#include <cctype>
 #include <variant>
 
 #include "../text.h"
@@ -27,12 +25,11 @@ bool isGiven(const ParameterEntry* entry) {
 /// The file, the command line, or the parameter server: the origin without line and key.
 std::string sourceOf(const ParameterEntry& entry) {
   const std::string& origin = entry.origin;
-  const std::string of_server = "parameter ";
+  std::string of_server = "parameter ";
   if (origin.rfind(of_server, 0) == 0) return of_server;
   const std::size_t colon = origin.rfind(':');
   if (colon == std::string::npos) return origin;
-  const bool is_line = std::all_of(origin.begin() + static_cast<std::ptrdiff_t>(colon) + 1, origin.end(),
-                                   [](unsigned char c) { return std::isdigit(c) != 0; });
+  const bool is_line = origin.find_first_not_of("0123456789", colon + 1) == std::string::npos;
   return is_line ? origin.substr(0, colon) : origin;
 }
 

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <locale>
 #include <optional>
-#include <sstream>
+
+#include "../text.h"
 
 namespace rio_t {
 namespace {
@@ -37,9 +37,8 @@ bool isOneLine(const std::string& text) {
 
 /// What a radar may be called: its name becomes part of keys, topics and file names.
 bool isRadarName(const std::string& text) {
-  return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
-  });
+  return !text.empty() &&
+         text.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") == std::string::npos;
 }
 
 }  // namespace
@@ -59,18 +58,10 @@ std::optional<double> asNumber(const ParameterValue& value) {
 std::string numberText(double value) {
   std::string text;
   for (int digits = 1; digits <= 17; ++digits) {
-    std::ostringstream stream;
-    stream.imbue(std::locale::classic());
-    stream.precision(digits);
-    stream << value;
-    text = stream.str();
-    std::istringstream back(text);
-    back.imbue(std::locale::classic());
-    double read = 0.0;
-    back >> read;
+    text = shortText(value, digits);
     // As many digits as it needs, and as stand before the point: 60, not 6e+01.
     const bool whole_part_shown = std::abs(value) < std::pow(10.0, digits) || std::abs(value) >= 1e15;
-    if (read == value && whole_part_shown) break;
+    if (asNumber(parsePlainScalar(text)) == value && whole_part_shown) break;
   }
   if (text.find('.') == std::string::npos) {
     const std::size_t exponent = text.find('e');
@@ -143,7 +134,6 @@ void ParameterList::rotation(const std::string& key, Eigen::Quaterniond& member,
 
 void ParameterList::mounting(const std::string& key, std::optional<MountingAngles>& member,
                              const std::string& text) {
-  constexpr double kDegree = M_PI / 180.0;
   using Angles = std::optional<MountingAngles>;
   bind(
       {key, "list", "deg", "[], or a list of 3 finite numbers, each of at least -360 and at most 360", text},

@@ -14,6 +14,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "../text.h"
 #include "parameter_list.h"
 
 namespace rio_t {
@@ -33,25 +34,15 @@ bool isOneOf(const std::string& text, std::initializer_list<const char*> words) 
   return std::any_of(words.begin(), words.end(), [&](const char* word) { return text == word; });
 }
 
-ParameterValue fromYamlScalar(const YAML::Node& node) {
-  if (node.Tag() == "!") return {node.Scalar()};  // quoted: text, whatever it looks like
-  return parsePlainScalar(node.Scalar());
-}
-
 ParameterValue fromYaml(const YAML::Node& node) {
   if (!node.IsDefined() || node.IsNull()) return {};
-  if (node.IsScalar()) return fromYamlScalar(node);
+  if (node.IsScalar() && node.Tag() == "!") return {node.Scalar()};  // quoted: text, whatever it looks like
+  if (node.IsScalar()) return parsePlainScalar(node.Scalar());
   if (node.IsMap()) return {ParameterValue::Map{}};  // no deeper than a section
   ParameterValue::List list;
   for (const auto& element : node) {
     // No deeper: no parameter takes lists of lists, and by its anchors a list may hold itself.
-    if (element.IsScalar()) {
-      list.push_back(fromYamlScalar(element));
-    } else if (element.IsNull()) {
-      list.push_back({});
-    } else {
-      list.push_back({ParameterValue::Map{}});
-    }
+    list.push_back(element.IsSequence() ? ParameterValue{ParameterValue::Map{}} : fromYaml(element));
   }
   return {std::move(list)};
 }
@@ -136,13 +127,7 @@ std::string ParameterValue::describe() const {
     std::string operator()(std::monostate) const { return "nothing"; }
     std::string operator()(bool value) const { return value ? "true" : "false"; }
     std::string operator()(std::int64_t value) const { return std::to_string(value); }
-    std::string operator()(double value) const {
-      std::ostringstream text;
-      text.imbue(std::locale::classic());
-      text.precision(12);
-      text << value;
-      return text.str();
-    }
+    std::string operator()(double value) const { return shortText(value, 12); }
     std::string operator()(const std::string& value) const { return '"' + value + '"'; }
     std::string operator()(const List& list) const {
       std::string text = "[";

@@ -39,7 +39,6 @@ struct RunSummary : RunEvidence {
   std::string mode = "online";
   std::optional<BatchSummary> batch;  ///< only with mode batch
   std::vector<std::string> warnings;  ///< for people; not in the file
-  std::string health_at_end = "ok";   ///< `health` as text
   double path_length_m = 0.0;         ///< of the optimised poses
   double end_to_start_2d_m = 0.0;     ///< of the causal trajectory, horizontal
   double end_to_start_3d_m = 0.0;

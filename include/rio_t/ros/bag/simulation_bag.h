@@ -15,10 +15,8 @@ enum class BagFormat {
 
 struct SimulationBagOptions {
   BagFormat format = BagFormat::kIrs;
-  double ground_truth_rate = 50.0;   ///< [Hz]
-  double barometer_latency = 0.002;  ///< [s] from stamp to arrival
-  double imu_latency = 0.001;        ///< [s] from stamp to arrival, also of the triggers
-  double record_offset = 0.0;        ///< [s] clock of the recorder minus clock of the IMU
+  double ground_truth_rate = 50.0;  ///< [Hz]
+  double record_offset = 0.0;       ///< [s] clock of the recorder minus clock of the IMU
 };
 
 /// Writes what the sensors measured on `motion` to the bag `path`, in the order of arrival; record times are
