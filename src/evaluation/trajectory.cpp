@@ -124,10 +124,16 @@ Trajectory readTum(const std::string& path) {
 }
 
 std::string formatTime(Time time) {
-  const std::lldiv_t split = std::lldiv(std::abs(time.nanoseconds()), 1'000'000'000);
-  std::array<char, 24> text{};
-  std::snprintf(text.data(), text.size(), "%s%lld.%09lld", time < Time() ? "-" : "", split.quot, split.rem);
-  return text.data();
+  const std::int64_t ns = time.nanoseconds();
+  std::array<char, 24> text{};  // filled from the end
+  char* first = text.end();
+  std::int64_t left = std::abs(ns);
+  for (int i = 0; i <= 9 || left != 0; ++i, left /= 10) {
+    if (i == 9) *--first = '.';
+    *--first = static_cast<char>('0' + left % 10);
+  }
+  if (ns < 0) *--first = '-';
+  return {first, text.end()};
 }
 
 void writeTumLine(std::ostream& out, const StampedPose& pose) {
