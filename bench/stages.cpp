@@ -104,10 +104,10 @@ void ImuPropagator::anchor(const NavigationState& state, bool at_rest) {
   (this->*original)(state, at_rest);
 }
 
-std::optional<NavigationState> ImuPropagator::add(const ImuMeasurement& imu) {
+void ImuPropagator::add(const ImuMeasurement& imu) {
   static const auto original = libraryFunction(&ImuPropagator::add);
   const Scope scope(Stage::kNavigation);
-  return (this->*original)(imu);
+  (this->*original)(imu);
 }
 
 std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasurement& imu) {

@@ -31,8 +31,12 @@ inline Trajectory helix(int poses = 101) {
   return trajectory;
 }
 
-inline Trajectory moved(const Trajectory& trajectory, const Eigen::Quaterniond& q, const Eigen::Vector3d& t) {
-  return transformed(RigidTransform{q, t}, trajectory);
+inline Trajectory moved(Trajectory trajectory, const Eigen::Quaterniond& q, const Eigen::Vector3d& t) {
+  for (StampedPose& pose : trajectory) {
+    pose.p_W = q * pose.p_W + t;
+    pose.q_WI = q * pose.q_WI;
+  }
+  return trajectory;
 }
 
 inline bool contains(const std::string& text, const std::string& part) {
