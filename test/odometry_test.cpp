@@ -244,6 +244,33 @@ TEST(ImuPropagator, AnAnchorOlderThanItsHistoryIsNotTaken) {
   EXPECT_EQ(propagator.state()->time, imu.time);
 }
 
+TEST(ImuPropagator, KeepsWhatAnAnchorNeedsOfTheSamplesBefore) {
+  ImuPropagator all(ImuNoise(), {0.0, 0.0, -9.81});
+  NavigationState state;
+  state.time = Time::fromSeconds(100.0);
+  all.anchor(state);
+  ImuMeasurement imu;
+  for (int i = 0; i <= 1000; ++i) {
+    imu.time = state.time + 0.01 * i;
+    imu.angular_velocity = {0.1 * std::sin(0.1 * i), 0.2, 0.0};
+    imu.acceleration = {0.5 * std::cos(0.3 * i), 0.0, 9.81};
+    all.add(imu);
+  }
+  ImuPropagator few = all;
+  const Time oldest = imu.time - 2.0;
+  few.dropBefore(oldest);
+  state.time = oldest - 0.1;
+  few.anchor(state);
+  EXPECT_EQ(few.state()->p_W, all.state()->p_W) << "the samples after this anchor are gone: it is not taken";
+  state.time = oldest + 0.005;  // between two samples
+  state.p_W.x() = 7.0;
+  few.anchor(state);
+  all.anchor(state);
+  EXPECT_EQ(few.state()->p_W, all.state()->p_W);
+  EXPECT_EQ(few.state()->covariance, all.state()->covariance);
+  EXPECT_GT(few.state()->p_W.x(), 6.0);
+}
+
 TEST_F(AtRest, UncertaintyGrowsOverAnImuGap) {
   run(104.0);
   const StateCovariance before = states.back().covariance;

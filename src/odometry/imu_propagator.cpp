@@ -8,7 +8,7 @@
 namespace rio_t {
 namespace {
 
-/// [s] How far back the history reaches. An older anchor is ignored.
+/// [s] How far back the history reaches at most, if no anchor comes.
 constexpr double kHistory = 30.0;
 /// [sigma] A velocity that the IMU gained since rest and that its noise does not explain (chi-squared, 3
 /// degrees of freedom: once in 900 times).
@@ -42,7 +42,7 @@ std::optional<NavigationState> ImuPropagator::state() const {
 }
 
 void ImuPropagator::anchor(const NavigationState& state, bool at_rest) {
-  if (state_ && history_.back().time - state.time > kHistory) return;
+  if (state_ && !history_.empty() && state.time < history_.front().time) return;
   state_ = state;
   samples_ = {};
   rest_ = at_rest ? state_ : std::nullopt;

@@ -20,11 +20,12 @@ class ImuPropagator {
   void add(const ImuMeasurement& imu);
 
   /// Starts again from a new optimised state, usually some 100 ms before the newest sample, and integrates
-  /// all samples since then. Ignores a state older than 30 s.
+  /// all samples since then. Ignores a state older than the samples that are kept: those of 30 s, or those
+  /// since dropBefore().
   /// `at_rest`: the platform stood still then, and `state` has no velocity. While the IMU vibrates, velocity
   /// and position stay where they are until the IMU shows more than its noise.
   void anchor(const NavigationState& state, bool at_rest = false);
-  /// Forgets samples that only anchors before `time` need.
+  /// Forgets the samples that only anchors before `time` need.
   void dropBefore(Time time);
   /// Sets the noise of the IMU for the samples to come.
   void setNoise(const ImuNoise& noise) { noise_ = noise; }
