@@ -272,6 +272,16 @@ TEST(ImuModel, RefusesNegativeVibration) {
   EXPECT_THROW(simulateImu(motion, options, 1, Time()), std::invalid_argument);
 }
 
+TEST(ImuModel, RefusesNoiseThatIsNotANumber) {
+  const Motion motion = builtIn("easy", 1, 30.0);
+  ImuModelOptions options;
+  options.noise.gyro_density = std::nan("");
+  EXPECT_THROW(simulateImu(motion, options, 1, Time()), std::invalid_argument);
+  options = ImuModelOptions{};
+  options.accel_vibration = std::nan("");
+  EXPECT_THROW(simulateImu(motion, options, 1, Time()), std::invalid_argument);
+}
+
 TEST(ImuModel, DefaultNoiseIsTheMeasuredOneWhateverTheEstimatorExpects) {
   const ImuModelOptions options;
   EXPECT_EQ(options.noise.accel_density, 2.4e-3);

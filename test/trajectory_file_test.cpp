@@ -48,9 +48,10 @@ TEST(ParseTime, ReadsExponentsAsNumpyWritesThem) {
 
 TEST(ParseTime, RefusesWhatIsNoTime) {
   for (const char* text : {"", "-", ".", "abc", "1.5s", "1e", "1e5x", "1.2.3", "nan", "inf", "0x10", " 1",
-                           "1700000010012222000", "1e300"}) {
+                           "1700000010012222000", "1e300", "1e-99999999999999999999"}) {
     EXPECT_THROW(parseTime(text), std::invalid_argument) << "'" << text << "'";
   }
+  EXPECT_THROW(parseTime(std::string("1e0\0x", 5)), std::invalid_argument) << "text after a zero byte";
 }
 
 // --- Files ---

@@ -39,8 +39,8 @@ Residual fineResidual(double z, double outlier) {
   return {std::copysign(value, z), probability * std::abs(z) / value};
 }
 
-/// The same for a bin of `half` width around the Doppler: exp(-z^2 / 2) becomes the probability of the bin.
-/// That of the bin around z = 0 is `centre`.
+/// The same for a bin that reaches `half` to either side of the Doppler: exp(-z^2 / 2) becomes the
+/// probability of the bin. `centre` is the probability of the bin around z = 0.
 Residual coarseResidual(double z, double half, double centre, double outlier) {
   const double floor = outlier * centre;
   const double bin = binProbability(z, half);

@@ -20,8 +20,8 @@ class ImuPropagator {
   void add(const ImuMeasurement& imu);
 
   /// Starts again from a new optimised state, usually some 100 ms before the newest sample, and integrates
-  /// all samples since then. Ignores a state older than the samples that are kept: those of 30 s, or those
-  /// since dropBefore().
+  /// all samples since then. Ignores a state that is older than the oldest sample it has kept: it keeps 30 s
+  /// at most, and fewer after dropBefore().
   /// `at_rest`: the platform stood still then, and `state` has no velocity. While the IMU vibrates, velocity
   /// and position stay where they are until the IMU shows more than its noise.
   void anchor(const NavigationState& state, bool at_rest = false);
