@@ -130,6 +130,26 @@ TEST(Elimination, CovariancesAreThoseOfTheDenseInverse) {
   }
 }
 
+/// An outlier has hardly any derivative. Its square underflows.
+TEST(Elimination, ATinyDerivativeCountsAsNone) {
+  for (const double tiny : {1e-150, 1e-160, 1e-170, 1e-300}) {
+    LinearWindow linear(5);
+    LinearSystem system = linearize(linear.window);
+    for (LinearRows& each : system.rows)
+      if (each.blocks == std::vector<int>{0, 5} || each.blocks == std::vector<int>{1, 5})
+        each.Jr.middleCols(3, 2) *= tiny;
+    const Dense dense(system);
+    const Eigen::VectorXd expected = dense.H.ldlt().solve(-dense.b);
+    const auto elimination = Elimination::of(system);
+    ASSERT_TRUE(elimination) << tiny;
+    for (std::size_t i = 0; i < dense.first.size(); ++i) {
+      const Eigen::VectorXd& delta = elimination->delta()[i];
+      EXPECT_LT((delta - expected.segment(dense.first[i], delta.size())).norm(), 1e-9 * expected.norm())
+          << tiny;
+    }
+  }
+}
+
 TEST(Elimination, WhatIsNotDeterminedIsRefused) {
   Window window;
   window.addNode(Time(), std::make_shared<VectorManifold>(3), Eigen::VectorXd::Zero(3));

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <deque>
+#include <limits>
 #include <stdexcept>
 #include <type_traits>
 #include <utility>
@@ -36,9 +37,13 @@ class Tableau {
       reflected_.assign(1, {row(k), pivot});
       double* at = row(k + 1);
       for (Eigen::Index i = k + 1; i < rows_; ++i, at += stride_) {
-        if (at[k] == 0.0) continue;
+        const double squared = at[k] * at[k];
+        if (squared < std::numeric_limits<double>::min()) {  // its inverse would not be finite
+          at[k] = 0.0;
+          continue;
+        }
         reflected_.push_back({at, at[k]});
-        square += at[k] * at[k];
+        square += squared;
       }
       if (reflected_.size() == 1) continue;
       const double norm = std::sqrt(square);
