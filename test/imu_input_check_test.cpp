@@ -317,6 +317,26 @@ TEST_F(Gate, AFastTurnThatGoesOnIsNotStuck) {
   EXPECT_EQ(sample.angular_velocity.x(), 6.1);
 }
 
+TEST_F(Gate, AFastTurnAfterAGapIsNotStuck) {
+  EXPECT_EQ(feed({motion.time(1.3), {4.0, 0.0, 0.0}, {0.0, 0.0, 9.81}}), "imu_gap");
+  EXPECT_EQ(sample.angular_velocity.x(), 4.0);
+  EXPECT_EQ(feed({motion.time(1.31), {4.1, 0.0, 0.0}, {0.0, 0.0, 9.81}}), "");
+}
+
+TEST_F(Gate, AnAxisThatSticksInAGapIsReplacedOnceItRepeats) {
+  EXPECT_EQ(feed({motion.time(1.3), {17.4, 0.0, 0.0}, {0.0, 0.0, 9.81}}), "imu_gap");
+  EXPECT_EQ(feed({motion.time(1.31), {17.4, 0.01, 0.0}, {0.0, 0.0, 9.81}}), "imu_stuck");
+  EXPECT_LT(sample.angular_velocity.x(), 2.0);
+}
+
+TEST_F(Gate, MotionOverAGapIsNoNoise) {
+  const double before = std::sqrt(sample.accel_noise);
+  for (t = 2.5; t < 4.0; t += 0.01) {
+    feed(t);
+    EXPECT_LT(std::sqrt(sample.accel_noise), 2.0 * before + 1e-3) << t;
+  }
+}
+
 TEST_F(Gate, AClockThatJumpsIsNoNoise) {
   for (const double jump : {-800.0, -100.0, 1000.0}) {
     gate = ImuInputCheck(0.04, ImuInputCheckOptions());

@@ -296,6 +296,14 @@ TEST(StaticInitializer, SixMountingsWithBias) {
   }
 }
 
+TEST(StaticInitializer, AGapIsNoRest) {
+  StaticInitializer initializer(twoSeconds(), 9.81);
+  const Eigen::Vector3d up(0.0, 0.0, 9.81);
+  EXPECT_FALSE(feed(initializer, 100.0, 1.0, Eigen::Vector3d::Zero(), up));
+  EXPECT_FALSE(feed(initializer, 103.0, 1.9, Eigen::Vector3d::Zero(), up));
+  EXPECT_TRUE(feed(initializer, 104.9, 0.2, Eigen::Vector3d::Zero(), up));
+}
+
 /// Noise, or the line of an engine at this frequency [Hz].
 TEST(StaticInitializer, AnIdlingEngineIsRest) {
   for (const double frequency : {0.0, 12.0, 17.0, 33.0, 70.0}) {

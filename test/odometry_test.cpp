@@ -127,6 +127,15 @@ TEST_F(AtRest, ScansOfAnImuGapWaitForItsEnd) {
   EXPECT_TRUE(results[0].used) << results[0].rejected_because;
 }
 
+/// What the gap may hide is not in the means of the rest.
+TEST_F(AtRest, AGapAsTheRestEndsTakesNothingFromTheBias) {
+  run(102.95);
+  time = 103.06;
+  run(103.1);
+  ASSERT_TRUE(odometry.initialized());
+  EXPECT_LT(std::sqrt(states.back().covariance(StateBlock::kBg + 2, StateBlock::kBg + 2)), 2e-3);
+}
+
 TEST_F(AtRest, TooManyWaitingScansAreReportedNotLost) {
   run(104.0);
   OdometryOptions options;

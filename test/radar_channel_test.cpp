@@ -84,17 +84,30 @@ TEST(RadarChannel, BorrowedPointsCountOnceForARestart) {
 /// A duplicate must not lend its points to the scans after it, nor teach.
 TEST(RadarChannel, AScanThatComesTwiceCountsOnce) {
   OneRadar once, twice;
+  std::size_t rejected = 0;
   for (double stamp = 0.7; stamp < 3.0; stamp += 0.05) {
-    const RadarAnswer expected = once.use(stamp, 6);
-    const RadarAnswer first = twice.use(stamp, 6);
+    const int points = std::fmod(stamp, 0.5) < 0.05 ? 0 : 6;
+    const RadarAnswer expected = once.use(stamp, points);
+    const RadarAnswer first = twice.use(stamp, points);
+    rejected += first.rejected_because.empty() ? 0 : 1;
     ASSERT_EQ(first.rejected_because, expected.rejected_because) << stamp;
     EXPECT_EQ(first.ego_velocity.v_R, expected.ego_velocity.v_R) << stamp;
-    if (!first.rejected_because.empty()) continue;
-    const RadarAnswer second = twice.answer(stamp, 6);
+    const RadarAnswer second = twice.answer(stamp, points);
     EXPECT_EQ(second.rejected_because, "duplicate_stamp");
     EXPECT_FALSE(second.was_predicted || second.innovation || second.alone);
   }
   EXPECT_EQ(once.channel.noise().doppler, twice.channel.noise().doppler);
+  EXPECT_GT(rejected, 0u);
+}
+
+TEST(RadarChannel, AVelocityThatNoPlatformReachesIsInfeasible) {
+  OneRadar radar;
+  for (double stamp = 0.7; stamp < 1.5; stamp += 0.1) ASSERT_EQ(radar.use(stamp, 30).rejected_because, "");
+  RadarScan jump = radar.scan(1.6, 30);
+  for (RadarPoint& point : jump.points) point.doppler -= 60.0 * point.position_R.normalized().y();
+  ScanContext context;
+  context.last_used = radar.motion.time(1.5);
+  EXPECT_EQ(radar.channel.use(jump, context, radar.smoother).rejected_because, "infeasible_velocity");
 }
 
 /// The change of velocity that a borrowed Doppler gets.

@@ -13,8 +13,8 @@ TEST(SlidingQueue, DoesAsADequeDoes) {
   std::deque<int> expected;
   // Longer and shorter, and empty once in a while.
   for (int i = 0; i < 2000; ++i) {
-    const bool shrinks = i % 100 > 50;
-    if (shrinks ? !expected.empty() : true) {
+    const bool shrinks = i % 100 > 40;
+    if (!shrinks || !expected.empty()) {
       if (shrinks) {
         queue.pop_front();
         expected.pop_front();

@@ -57,7 +57,8 @@ ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
     verdict.faults.push_back("imu_stuck");
     raise(imu.unseen_gyro_variance, options_.unseen_gyro_density);
   }
-  if (saturated.accel || saturated.gyro || is_stuck) {
+  // Motion over a long gap would look like noise.
+  if (saturated.accel || saturated.gyro || is_stuck || gap > kMotionCorrelationTime) {
     accel_noise_.interrupt();
     gyro_noise_.interrupt();
   } else {

@@ -44,8 +44,9 @@ std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, con
       x.b_g() = rest->b_g;
       x.b_a() = rest->b_a;
       ImuNoise noise = options_.imu_noise;
-      noise.accel_density = std::sqrt(noise.accelVariance(newest));
-      noise.gyro_density = std::sqrt(noise.gyroVariance(newest));
+      // That of a mean over many samples: the motion that one interval hides is not in it.
+      noise.accel_density = std::max(noise.accel_density, std::sqrt(newest.accel_mean_noise));
+      noise.gyro_density = std::max(noise.gyro_density, std::sqrt(newest.gyro_mean_noise));
       return Initialization{
           rest->time,
           priorAtRest(of_first.smoother, noise, x, options_.gravity, rest->duration, of_first.T_IR),

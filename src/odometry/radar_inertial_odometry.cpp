@@ -109,6 +109,7 @@ std::vector<ScanResult> RadarInertialOdometry::process(std::size_t max_scans) {
     ScanResult lost;
     lost.scan = std::move(m.waiting_scans.front());
     lost.rejected_because = "queue_full";
+    lost.health = m.estimator.updateHealth();
     m.waiting_scans.erase(m.waiting_scans.begin());
     results.push_back(std::move(lost));
   }

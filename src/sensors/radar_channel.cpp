@@ -78,6 +78,7 @@ void RadarChannel::forget() {
   feasibility_ = FeasibilityCheck(options_.feasibility);
   pool_.clear();
   rest_pool_.clear();
+  judged_at_.reset();
   learned_at_.reset();
   alone_at_.reset();
   gate_.used();
@@ -101,7 +102,8 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   };
   followOffsetSteps();
   // Before its points count a second time, for health or in a pool.
-  if (in_window_.has(scan.stamp)) return reject("duplicate_stamp");
+  if (in_window_.has(scan.stamp) || judged_at_ == scan.stamp) return reject("duplicate_stamp");
+  judged_at_ = scan.stamp;
   Seen seen = see(scan, context, smoother, answer);
   const EgoVelocity& measured = seen.velocity;
   if (!isValid(measured.status)) return reject(toString(answer.ego_velocity.status));
@@ -135,9 +137,9 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
       of_own = around(*seen.prior, scan, measured);
       of_own.covariance.diagonal().array() += answer.rate_variance;
     }
-    own = innovation(scan.stamp, *seen.prior, of_own, &seen);
-    answer.offset_stepped = step_detector_.stepped(*own);
+    if (isValid(of_own.status)) own = innovation(scan.stamp, *seen.prior, of_own, &seen);
   }
+  if (own) answer.offset_stepped = step_detector_.stepped(*own);
   if (answer.offset_stepped) {
     in_window_.stepOffset(smoother, scan.stamp);
     followOffsetSteps();

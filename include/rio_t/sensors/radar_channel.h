@@ -162,6 +162,7 @@ class RadarChannel {
   FeasibilityCheck feasibility_;
   ScanPool pool_;
   RestPool rest_pool_;
+  std::optional<Time> judged_at_;              ///< the last scan, used or not
   std::optional<Time> learned_at_, alone_at_;  ///< of the points: those borrowed count once
   OffsetWidths offset_widths_;
   OffsetStepDetector step_detector_;
