@@ -35,7 +35,7 @@ def test_a_run_as_it_must_be_passes():
     ({"velocity": 0.5}, "velocity error 0.50 m/s"), ({"after": 0.25}, "not recovered"), ({"sigma": 0.15}, "sigma grew 1.5 times"),
     ({"used": 1}, "3 scans came, 2 accounted for"), ({"faults": ()}, "imu_gap not counted"),
     ({"ends": 39.0}, "output ends 1.0 s before the IMU"), ({"not_a_number": ["a.csv"]}, "nan or inf in a.csv"),
-    ({"status": 1}, "does not run"), ({"status": -11}, "does not run")])
+    ({"status": 1}, "does not run"), ({"status": None}, "does not run"), ({"status": -11}, "does not run")])
 def test_a_run_as_it_must_not_be_fails(change, wrong):
     happened, (told,) = MUST.judge(outcome(**change), 10.0, 20.0)
     assert wrong in told
