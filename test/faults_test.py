@@ -57,6 +57,14 @@ def test_a_case_that_fails_is_the_exit_status(monkeypatch, capsys, tmp_path):
     assert "**FAIL**: wrong" in (tmp_path / "table.md").read_text()
 
 
+def test_the_run_without_the_fault_is_made_anew(monkeypatch, tmp_path):
+    for name in ("usual_", "bag_loop"):
+        (tmp_path / "simulated" / name).mkdir(parents=True)
+    monkeypatch.setattr(main, "run", lambda *_: [])
+    assert main.main(["--no-live", "--output-dir", str(tmp_path)]) == 0
+    assert [path.name for path in (tmp_path / "simulated").iterdir()] == ["bag_loop"]
+
+
 def test_a_case_is_judged(scripts, programs_folder, tmp_path):
     # Without data, on the simulated bag alone.
     done = programs.run(sys.executable, scripts / "faults.py", "--no-live", "--only", "bag_loop", "--only", "imu_in_g",

@@ -86,6 +86,8 @@ def run_campaign(arguments, bag_cases, live_cases):
     started = time.monotonic()
     scratch = pathlib.Path(arguments.output_dir or tempfile.mkdtemp(prefix="rio_t_faults_")).resolve()
     scratch.mkdir(parents=True, exist_ok=True)
+    for old in scratch.glob("*/usual_*"):  # of other settings, another bag or another build
+        shutil.rmtree(old)
     try:
         rows = run(arguments, bag_cases, live_cases, scratch)
         write_table(scratch / "table.md", rows)
