@@ -204,6 +204,13 @@ def test_a_given_bag_is_run(succeed, simulated_run, tmp_path):
     assert "bags: run.bag; configuration irs" in (tmp_path / "table1.md").read_text()
 
 
+def test_a_configuration_of_several_radars_is_refused(experiment, two_radar_run):
+    done = experiment("table1", "--bag", two_radar_run / "run.bag", "--config", two_radar_run / "config.yaml")
+    assert done.returncode == 1
+    assert "expected a configuration of one radar: the experiments compare one time offset" in done.stderr
+    assert done.stderr.count("\n") == 1, done.stderr
+
+
 def test_a_run_without_result_is_counted():
     good = (Run(31.0, 0.5, {"ate_m": 0.1, "health_at_end": "diverged"}, {}, {}),
             nees.Consistency(numpy.ones((3, 9)), numpy.ones(3)))
