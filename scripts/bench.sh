@@ -21,7 +21,7 @@ fi
 repository=$(pwd)
 cd "$folder"
 case "$1" in
-  micro) shift; exec "$build/devel/lib/rio_t/micro_benchmark" "$@" ;;
-  growth) shift; exec python3 "$repository/bench/growth.py" --programs "$build/devel/lib/rio_t" "$@" ;;
-  *) exec python3 "$repository/bench/bench.py" --programs "$build/devel/lib/rio_t" --repository "$repository" "$@" ;;
+  micro) shift; "$build/devel/lib/rio_t/micro_benchmark" "$@" ;;
+  growth) shift; python3 "$repository/bench/growth.py" --programs "$build/devel/lib/rio_t" "$@" ;;
+  *) python3 "$repository/bench/bench.py" --programs "$build/devel/lib/rio_t" --repository "$repository" "$@" ;;
 esac

@@ -30,12 +30,14 @@ done)
 clean=true
 catkin_lint --offline --strict --quiet . 2> >(grep -v 'rosdep\|unknown dependencies' >&2) || clean=false
 clang-format-14 --dry-run --Werror "${files[@]}" || clean=false
-# Our own headers, and not those that are made from the messages.
-printf '%s\0' "${sources[@]}" |
-  xargs -0 -n 1 -P "$(nproc)" clang-tidy-14 --quiet -p "$build" \
-    --header-filter="^$PWD/(include|src|test|fuzz|bench)/" 2> >(grep -v 'warnings\? generated\.$' >&2) || clean=false
-cppcheck --quiet --enable=warning,performance,portability --inline-suppr --std=c++17 --language=c++ --library=googletest -j "$(nproc)" \
-  --error-exitcode=1 -I include "${sources[@]}" || clean=false
+if [ ${#sources[@]} -gt 0 ]; then  # without any, both fail
+  # Our own headers, and not those that are made from the messages.
+  printf '%s\0' "${sources[@]}" |
+    xargs -0 -n 1 -P "$(nproc)" clang-tidy-14 --quiet -p "$build" \
+      --header-filter="^$PWD/(include|src|test|fuzz|bench)/" 2> >(grep -v 'warnings\? generated\.$' >&2) || clean=false
+  cppcheck --quiet --enable=warning,performance,portability --inline-suppr --std=c++17 --language=c++ --library=googletest -j "$(nproc)" \
+    --error-exitcode=1 -I include "${sources[@]}" || clean=false
+fi
 if ! $clean; then
   echo "lint.sh: findings, see above" >&2
   exit 1

@@ -9,7 +9,7 @@ import yaml
 
 from rio_t import nees, programs
 from rio_t.errors import RioTError
-from rio_t.experiments import consistency, options, platforms, runner
+from rio_t.experiments import aids, consistency, options, platforms, runner
 from rio_t.experiments.laboratory import Run, Source
 
 MODELS = {"imu", "constant_acceleration"}
@@ -172,6 +172,24 @@ def test_a_platform_that_is_sure_and_wrong_is_marked():
     assert {len(row) for row in page.tables[1].rows} == {len(page.tables[1].columns)}
 
 
+def test_aids_tell_their_platform_and_cost(succeed, tmp_path):
+    succeed("aids", "--motion", "ground_vehicle", "--motion", "drone", *SHORT)
+    rows = {(row["motion"], row["aid"]): row for row in rows_of(tmp_path / "aids.csv")}
+    assert list(rows) == [(motion, aid) for motion in ("ground_vehicle", "drone") for aid in aids.AIDS]
+    for (motion, aid), row in rows.items():
+        assert (row["runs"], row["failed"]) == ("1", "0")
+        # Only the drone contradicts, and only where it is told to be a vehicle.
+        assert row["contradicted"] == str(int(motion == "drone" and aid in ("ground vehicle", "all"))), (motion, aid)
+        assert aid != "none" or row["cost"] == "1.00"
+    for motion in ("ground_vehicle", "drone"):
+        assert numbers(rows[motion, "barometer"], "height rms [m]") < numbers(rows[motion, "none"], "height rms [m]")
+    single = rows_of(tmp_path / "aids_runs.csv")
+    assert [(row["motion"], row["aid"]) for row in single] == list(rows)
+    for row in single:
+        mean = numbers(rows[row["motion"], row["aid"]], "height rms [m]")  # of this run
+        assert numbers(row, "height rms [m]") == pytest.approx(mean, abs=6e-4)
+
+
 def test_options_reach_the_simulator(succeed, tmp_path):
     sigmas = {}
     for points in (20, 60):
@@ -184,6 +202,13 @@ def test_a_given_bag_is_run(succeed, simulated_run, tmp_path):
     succeed("table1", "--bag", simulated_run / "run.bag")
     assert {row["sequence"] for row in rows_of(tmp_path / "table1.csv")} == {"run"}
     assert "bags: run.bag; configuration irs" in (tmp_path / "table1.md").read_text()
+
+
+def test_a_configuration_of_several_radars_is_refused(experiment, two_radar_run):
+    done = experiment("table1", "--bag", two_radar_run / "run.bag", "--config", two_radar_run / "config.yaml")
+    assert done.returncode == 1
+    assert "expected a configuration of one radar: the experiments compare one time offset" in done.stderr
+    assert done.stderr.count("\n") == 1, done.stderr
 
 
 def test_a_run_without_result_is_counted():

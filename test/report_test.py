@@ -228,6 +228,13 @@ def test_a_truth_of_another_time_is_told(report, run_folder, tmp_path):
     assert report("--ground-truth", tmp_path / "truth", run_folder).returncode == 1
 
 
+def test_a_sparse_truth_has_no_velocity(report, run_folder, simulated_run, tmp_path):
+    poses = (simulated_run / "truth.txt").read_text().splitlines()[2400:7201:2400]  # of 6, 12 and 18 s
+    (tmp_path / "truth").write_text("\n".join(poses) + "\n")
+    page = page_of(report("--ground-truth", tmp_path / "truth", run_folder))
+    assert list(figures_of(page)) == FIGURES
+
+
 def refused(done, message):
     assert done.returncode == 1
     assert message in done.stderr

@@ -56,6 +56,8 @@ class Run:
 def read_run(folder):
     """What rio_t_bag left in the folder, with the passes that it keeps in folders below."""
     summary = run_folder.read_yaml(folder / "summary.yaml")
+    if run_folder.radars(folder) != [""]:
+        raise RioTError("expected a configuration of one radar: the experiments compare one time offset")
     names = ["online"] + [f"pass_{i}" for i in range(1, len(summary.get("pass_offsets_s", [])))]
     return Run(1e3 * float(summary["final_offset_s"]), 1e3 * float(summary["final_offset_sigma_s"]), summary,
                run_folder.read(folder, "time_offset.csv"), run_folder.read(folder, "ego_velocity.csv"),

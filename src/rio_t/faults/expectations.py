@@ -47,7 +47,7 @@ class Survives:
     def judge(self, outcome, begin, end):
         """(what happened, [what of it is wrong])"""
         if outcome.status not in programs.HAS_RESULT:
-            return "exit status %d: %s" % (outcome.status, first_line(outcome.messages)), ["does not run"]
+            return f"exit status {outcome.status}: {first_line(outcome.messages)}", ["does not run"]
         wrong, happened = list(common(outcome)), []
         errors = outcome.errors
         if errors is None:

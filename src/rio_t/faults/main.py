@@ -72,8 +72,13 @@ def run(arguments, bag_cases, live_cases, scratch):
         tasks = [(case, bag, pool.submit(campaign.run_case, folder, bag, case.name, scratch / bag.name / case.name,
                                          bool(arguments.output_dir)))
                  for bag in bags for case in bag_cases if bag.name == "given" or bag.name in case.bags]
-        for case, bag, task in tasks:
-            add(case.name, bag.name, case.must, *task.result())
+        try:
+            for case, bag, task in tasks:
+                add(case.name, bag.name, case.must, *task.result())
+        except BaseException:
+            for _, _, task in tasks:
+                task.cancel()
+            raise
     # One after the other: each has a roscore and real time to itself.
     if live_cases:
         with live.session() as tester:
@@ -86,6 +91,8 @@ def run_campaign(arguments, bag_cases, live_cases):
     started = time.monotonic()
     scratch = pathlib.Path(arguments.output_dir or tempfile.mkdtemp(prefix="rio_t_faults_")).resolve()
     scratch.mkdir(parents=True, exist_ok=True)
+    for old in scratch.glob("*/usual_*"):  # of other settings, another bag or another build
+        shutil.rmtree(old)
     try:
         rows = run(arguments, bag_cases, live_cases, scratch)
         write_table(scratch / "table.md", rows)

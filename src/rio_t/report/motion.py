@@ -10,12 +10,14 @@ USED = ("moving", "zero_velocity")  # status of a scan that entered the estimate
 
 
 def motion(t, trajectory):
-    """Central differences over at least 50 ms: times, v_I, omega_I, one row each. None of a trajectory too short."""
+    """Central differences over at least 50 ms: times, v_I, omega_I, one row each. None if too short or sparse."""
     p, q = trajectory.position, trajectory.quaternion
     if len(t) < 3 or t[-1] - t[0] < 0.3:
         return None
     step = max(0.025, float(np.median(np.diff(t))))
     at = t[(t > t[0] + step) & (t < t[-1] - step)]
+    if len(at) == 0:
+        return None
     v_W = (interpolate(at + step, t, p) - interpolate(at - step, t, p)) / (2 * step)
     turn = interpolate_rotations(at - step, t, q).inv() * interpolate_rotations(at + step, t, q)
     return at, interpolate_rotations(at, t, q).apply(v_W, inverse=True), turn.as_rotvec() / (2 * step)
