@@ -1,7 +1,7 @@
 # Completes the options of rio_t's programs, after `rosrun rio_t` and by their names. Sourced by setup.bash.
 # It asks the programs themselves: --help lists the options, --print-parameters the keys of --set.
 
-_rio_t_programs="rio_t_bag rio_t_node calibrate evaluate simulate check_bag report.py experiment.py"
+_rio_t_programs="rio_t_bag rio_t_node calibrate evaluate simulate check_bag report.py draw_rig.py experiment.py"
 
 _rio_t_find() {  # the program's path
   if [[ -x "$1" ]]; then echo "$1"; else catkin_find --first-only --libexec rio_t "$(basename "$1")" 2>/dev/null; fi
