@@ -90,6 +90,30 @@ TEST_F(BagRunnerErrors, ZeroStampsAreNamedWithTheOtherSources) {
   expectError(run(), {"/sensor_platform/imu", "zero"});
 }
 
+TEST_F(BagRunnerErrors, AFaultOfMostMessagesIsNamedThoughOthersAreGood) {
+  const ros::Time stamp(1004.01), record = stamp + ros::Duration(100.0);
+  const auto write_with_one = [&](const BagContents& what, const BagContents& odd) {
+    writeBag(what);
+    rosbag::Bag bag(bag_, rosbag::bagmode::Append);
+    writeCloud(odd, stamp, record, 0, &bag);
+  };
+  BagContents of_other_field, empty, unstamped, what;
+  of_other_field.doppler_field = "speed";
+  empty.points = 0;
+  write_with_one(of_other_field, empty);
+  expectError(run(), {"v_doppler_mps", "speed", "(messages: 80)"});
+  unstamped.stamped = false;
+  write_with_one(unstamped, of_other_field);
+  expectError(run(), {"the stamp in the header is zero", "(messages: 80)"});
+
+  what.imu_stamped = false;
+  writeBag(what);
+  sensor_msgs::Imu imu;
+  imu.header.stamp = stamp;
+  rosbag::Bag(bag_, rosbag::bagmode::Append).write("/sensor_platform/imu", record, imu);
+  expectError(run(), {"/sensor_platform/imu: the stamp in the header is zero", "(messages: 1600)"});
+}
+
 TEST_F(BagRunnerErrors, TriggersWithAStampOfZeroAreNamed) {
   const auto writeTriggers = [&](int zero) {
     writeBag({});

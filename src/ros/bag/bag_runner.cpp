@@ -63,11 +63,19 @@ void checkOutcome(const std::string& bag, const Config& config, const RunSummary
     for (const Config& radar : configsOfRadars(config)) appendItem(&topics, noMessages(radar), "; ");
     throw bagError(bag, topics);
   }
-  // If none of a topic's messages can be used, the fault of the first one says it.
+  // If most messages of a topic cannot be used, that is the cause, not what became of the rest. The player
+  // warns of clouds first, by radar and kind, and of IMU samples last.
   const Counts rejected = summary.scansRejected();
-  if (countOf(rejected, "cloud_not_usable") + countOf(rejected, "stamp_zero") == summary.scansTotal())
-    throw bagError(bag, summary.warnings.front());
-  if (countOf(summary.input_faults, "imu_not_usable") == summary.imu_count)
+  const std::uint64_t unusable = countOf(rejected, "cloud_not_usable") + countOf(rejected, "stamp_zero");
+  if (summary.scansUsed() == 0 && 2 * unusable > summary.scansTotal()) {
+    std::string faults;
+    auto warning = summary.warnings.begin();
+    for (const RadarSummary& radar : summary.radars)
+      for (const char* kind : {"cloud_not_usable", "stamp_zero"})
+        if (countOf(radar.scans_rejected, kind) > 0) appendItem(&faults, *warning++, "; ");
+    throw bagError(bag, faults);
+  }
+  if (!summary.initialized && 2 * countOf(summary.input_faults, "imu_not_usable") > summary.imu_count)
     throw bagError(bag, summary.warnings.back());
   const auto failed = [&](const std::string& what) {
     return RunFailed(bagError(bag, what).what(), summary.diagnosis);
