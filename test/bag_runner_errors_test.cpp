@@ -196,6 +196,9 @@ TEST_F(BagRunnerErrors, EveryScanRejectedSaysWhy) {
   expectError(run({"--set", "radar_factor=velocity"}),
               {"every one of the 80 scans was rejected", "too_few_points"});
   EXPECT_FALSE(fs::exists(out_ + "/summary.yaml"));
+  const std::string table = contents(out_ + "/ego_velocity.csv");  // says it for each
+  EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 81);
+  EXPECT_NE(table.find(",2,too_few_points\n"), std::string::npos) << table;
   what.points = 0;
   writeBag(what);
   expectError(run(), {"every one of the 80 scans was rejected", "too_few_points"});

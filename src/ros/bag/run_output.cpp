@@ -137,6 +137,15 @@ RunOutput::RunOutput(const std::string& folder, const RunFiles& files) : folder_
   for (const RunFile& file : files.all()) open_[file.name].open(folder + "/" + file.name, file.header);
 }
 
+RunOutput::~RunOutput() {
+  for (auto& [name, file] : open_) {
+    try {
+      file.flush();
+    } catch (const std::exception&) {  // the run failed for another reason, or this one was told
+    }
+  }
+}
+
 void RunOutput::removeOfEarlierRuns() const {
   namespace fs = std::filesystem;
   std::error_code error;
