@@ -1,7 +1,9 @@
 // What a run of a bag writes and says.
 #include "rio_t/ros/bag/bag_runner.h"
 
+#include <geometry_msgs/PoseStamped.h>
 #include <gtest/gtest.h>
+#include <rosbag/bag.h>
 #include <sensor_msgs/FluidPressure.h>
 
 #include <algorithm>
@@ -193,6 +195,29 @@ TEST_F(BagRunner, EveryModeSavesItsEstimateThoughTheGroundTruthDoesNotMatch) {
     EXPECT_NE(contents(out_ + "/summary.yaml").find("mode: " + mode + "\n"), std::string::npos) << mode;
     EXPECT_GT(readTum(out_ + "/trajectory.txt").size(), 100U) << mode;
   }
+}
+
+TEST_F(BagRunner, ItSavesItsEstimateThoughTheTruthTopicCannotBeUsed) {
+  const auto run_with = [&](const geometry_msgs::PoseStamped& pose, const std::string& md5) {
+    BagContents what;
+    what.ground_truth = true;
+    writeBag(what);
+    const auto header = boost::make_shared<ros::M_string>();
+    *header = {{"type", "geometry_msgs/PoseStamped"}, {"md5sum", md5}, {"message_definition", "other"}};
+    rosbag::Bag(bag_, rosbag::bagmode::Append)
+        .write("/ground_truth/pose", pose.header.stamp + ros::Duration(100.0), pose, header);
+    fs::remove_all(out_);
+    Outcome outcome = run();
+    EXPECT_GT(readTum(out_ + "/trajectory.txt").size(), 100U);
+    EXPECT_NE(contents(out_ + "/summary.yaml").find("verdict: "), std::string::npos);
+    EXPECT_EQ(contents(out_ + "/summary.yaml").find("ate_m"), std::string::npos);
+    return outcome;
+  };
+  geometry_msgs::PoseStamped pose;
+  pose.header.stamp = ros::Time(1008.5);
+  pose.pose.orientation.w = 1.0;
+  const std::string name = "ground truth topic /ground_truth/pose: ";
+  expectError(run_with(pose, std::string(32, '0')), {name, "a message of another version of its type"});
 }
 
 TEST_F(BagRunner, ATrajectoryThatStartsAgainIsDoubtful) {

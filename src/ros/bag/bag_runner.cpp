@@ -276,9 +276,9 @@ class BagJob {
     summary.realtime_factor = (end_ - begin_).toSec() / took.count();
     const Trajectory trajectory = log.takeTrajectory();
     truth_error_.reset();
-    if (truth_in_bag_ && truth_.empty()) truth_ = readPoses(bags_, run_.config.ground_truth_topic);
     if (truth_in_bag_ || !run_.config.ground_truth.empty()) {
       try {
+        if (truth_in_bag_ && truth_.empty()) truth_ = readPoses(bags_, run_.config.ground_truth_topic);
         summary.truth = errorsAgainst(truth_, trajectory);
       } catch (const std::exception& error) {
         const std::string name =
