@@ -98,6 +98,22 @@ TEST_F(CommandLine, TheExitStatusSaysWhatHappened) {
   EXPECT_EQ(run({}, []() -> int { throw UsageError("a file is missing"); }), kExitUsage);
 }
 
+TEST_F(CommandLine, AnOutputThatCannotBeWrittenIsAFault) {
+  for (const char* word : {"--help", "--version", "a.txt"}) {
+    OptionSet options("Options");
+    options.values("file", "FILE", "files", [](const std::string& /*file*/) {});
+    options.positional("file");
+    std::ofstream full("/dev/full");
+    std::ostringstream err;
+    const auto body = [&] {
+      full << "result\n";
+      return 0;
+    };
+    EXPECT_EQ(runProgram(kText, options, {word}, full, err, body), kExitFailed) << word;
+    EXPECT_EQ(err.str(), "tool: the output cannot be written (disk full?)\n") << word;
+  }
+}
+
 TEST_F(CommandLine, HelpAndVersionComeBeforeAllElse) {
   EXPECT_EQ(run({"--wrong", "--help"}), kExitOk);
   for (const char* part : {"usage: rosrun rio_t tool FILE...", "--speed M/S", "how fast [1.5]", "--quiet",

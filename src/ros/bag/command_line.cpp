@@ -247,14 +247,15 @@ int runProgramWith(const ProgramText& text, OptionSet& options, const std::vecto
     for (const std::string& word : words) help = help || word == "--help" || word == "-h";
     version = words == std::vector<std::string>{"--version"};
     if (help) {
+    int status = kExitOk;
       printHelp(text, options, out);
-      return kExitOk;
-    }
-    if (version) {
+    } else if (version) {
       out << text.name << " of rio_t " RIO_T_VERSION "\n";
-      return kExitOk;
+    } else {
+      status = body(options.parse(words));
     }
-    return body(options.parse(words));
+    if (!out.flush()) throw std::runtime_error("the output cannot be written (disk full?)");
+    return status;
   } catch (const UsageError& error) {
     err << text.name << ": " << error.what() << " (see --help)\n";
     return kExitUsage;
