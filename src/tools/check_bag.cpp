@@ -33,8 +33,7 @@ const rio_t::ProgramText kText = {
     "rosrun rio_t check_bag --live --duration 60 --keep live.bag --out my.yaml\n",
     "Each line of the report begins with OK, odd (the configuration deals with it) or missing (the odometry "
     "cannot\n"
-    "run). docs/your_sensors.md explains each. Exit status: 0 ready, 1 something is missing, 2 wrong "
-    "arguments.\n"};
+    "run). docs/your_sensors.md explains each.\n"};
 
 struct Arguments {
   rio_t::CheckRequest request;

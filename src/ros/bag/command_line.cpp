@@ -70,8 +70,9 @@ void printHelp(const ProgramText& text, const OptionSet& options, std::ostream& 
   out << "\nExamples:\n";
   std::istringstream examples(text.examples);
   for (std::string line; std::getline(examples, line);) out << "  " << line << "\n";
-  out << "\nExit status: 0 if it worked, 1 if data, a file or a parameter was wrong, 2 if the command line "
-         "was wrong,\n3 if rio_t_bag has a result that is not to be trusted.\n";
+  out << "\nExit status: 0 if it worked, 1 if data, a file or a parameter was wrong or missing, 2 if the "
+         "command "
+         "line was wrong;\nrio_t_bag also has 3, a result that is not to be trusted.\n";
 }
 
 /// A line of the progress bar: "[####    ]  40 %, 12 s left".
@@ -246,8 +247,8 @@ int runProgramWith(const ProgramText& text, OptionSet& options, const std::vecto
     // Before anything else is read, so that it helps with a wrong command line, too.
     for (const std::string& word : words) help = help || word == "--help" || word == "-h";
     version = words == std::vector<std::string>{"--version"};
-    if (help) {
     int status = kExitOk;
+    if (help) {
       printHelp(text, options, out);
     } else if (version) {
       out << text.name << " of rio_t " RIO_T_VERSION "\n";
