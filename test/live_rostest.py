@@ -7,6 +7,7 @@ import numpy
 import rosbag
 import rospy
 from geometry_msgs.msg import TransformStamped
+from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import Empty
 from tf2_msgs.msg import TFMessage
 
@@ -134,7 +135,8 @@ class LiveTest(tester.LiveTestCase):
             self.assertIsNone(manager.process.poll(), "the manager died")
 
     def test_reset_starts_again(self):
-        with tester.Listener() as listener, tester.node("config:=irs"):
+        topics = {**tester.TOPICS, "map": PointCloud2}
+        with tester.Listener(topics) as listener, tester.node("config:=irs", "landmarks:=true"):
             listener.wait_until_heard()
             # No more than the rest at the start: long enough to initialise. After the reset nothing comes that could
             # start it again before we look.
@@ -148,9 +150,11 @@ class LiveTest(tester.LiveTestCase):
             self.assertIn("initialising", listener.diagnostics["odometry"].message)
             self.assertEqual(listener.value("odometry", "last_reset_because"), "asked for by ~reset")
             self.assertIn("reset_pose: keep", listener.value("odometry", "after_reset"))
-            heard = len(listener.messages["odom"])
+            heard, maps = len(listener.messages["odom"]), len(listener.messages["map"])
             with tester.feed(listener, self.bag, start=0.5, duration=4.5):
                 listener.wait_for("odometry again", lambda: len(listener.messages["odom"]) > heard)
+                listener.wait_for("an empty map in place of the old one, which is latched", lambda: any(
+                    m.width == 0 and m.header.stamp.is_zero() for m in listener.messages["map"][maps:]))
 
     def test_an_odd_stamp_resets_nothing(self):
         """One scan is stamped so early that the stamp minus the offset, its time of measurement, is below zero."""

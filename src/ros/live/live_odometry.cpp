@@ -408,7 +408,7 @@ void LiveOdometry::solve() {
     const Session now = session_.get();
     if (!now) continue;
     if (published != now) {
-      if (published) publisher_.clearPath();
+      if (published) publisher_.clear();
       published = now;
       told.assign(radars_.size(), DopplerStep());
       has_told_start = false;

@@ -101,7 +101,7 @@ void LivePublisher::result(const LiveSession::Result& live, const Frames& frames
   if (radar.inliers.getNumSubscribers() > 0 && isValid(result.ego_velocity.status))
     publishCloud(radar.inliers, result.scan, result.ego_velocity.inliers, radar.frame, stamp);
   if (!result.updated) return;
-  if (map_ && result.landmarks && frames.world) map(result, *frames.world);
+  if (map_ && result.landmarks && frames.world) map(result.landmarks->map, *frames.world, result.state.time);
   publish(imu_bias_, toImuBias(result.state, frames.imu));
   TimeOffset offset;
   offset.header.stamp = toRosTime(result.scan.stamp);
@@ -138,9 +138,9 @@ void LivePublisher::radarFrame(Radar& radar, const LiveSession::Result& live, co
   radar_tf_->sendTransform(transform);
 }
 
-void LivePublisher::map(const ScanResult& result, const WorldInOdom& T_OW) {
-  sensor_msgs::PointCloud2 cloud = toPointCloud2(result.landmarks->map, T_OW);
-  cloud.header.stamp = toRosTime(result.state.time);
+void LivePublisher::map(const std::vector<LandmarkPoint>& points, const WorldInOdom& T_OW, Time stamp) {
+  sensor_msgs::PointCloud2 cloud = toPointCloud2(points, T_OW);
+  cloud.header.stamp = toRosTime(stamp);
   cloud.header.frame_id = config_.odom_frame;
   publish(*map_, std::move(cloud));
 }
@@ -168,12 +168,13 @@ nav_msgs::Path LivePublisher::path() {
   return path_message_;
 }
 
-void LivePublisher::clearPath() {
+void LivePublisher::clear() {
   {
     const std::lock_guard<std::mutex> lock(path_mutex_);
     path_message_.poses.clear();
   }
   publish(path_, path());
+  if (map_) map({}, {}, Time());
 }
 
 }  // namespace rio_t

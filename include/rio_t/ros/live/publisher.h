@@ -20,7 +20,7 @@
 namespace rio_t {
 
 /// Everything that the live node says, as messages. `odometry` belongs to the IMU thread, `result` and
-/// `clearPath` to the optimisation thread, `tune` to any. Topics of one radar are in its name's namespace, if
+/// `clear` to the optimisation thread, `tune` to any. Topics of one radar are in its name's namespace, if
 /// the radars have names. Messages go out as shared pointers, so that subscribers in the same nodelet manager
 /// get them without a copy; nobody changes a message after it was published.
 class LivePublisher {
@@ -41,7 +41,8 @@ class LivePublisher {
   /// ~odom_optimized, ~imu_bias, ~path; of the radar: ~time_offset, ~ego_velocity, ~innovation, ~points,
   /// ~inliers, tf and, if they are estimated, ~extrinsics. ~map, if landmarks are on.
   void result(const LiveSession::Result& live, const Frames& frames);
-  void clearPath();
+  /// Empties ~path and ~map: a new session begins.
+  void clear();
 
   /// Takes odom_rate, tf_rate, path_max_poses and correct_stamps; in effect from the next message on.
   void tune(const Config& config);
@@ -59,7 +60,7 @@ class LivePublisher {
   void radarFrame(Radar& radar, const LiveSession::Result& live, const Frames& frames, Time stamp);
   void extendPath(const BodyOdometry& body);
   nav_msgs::Path path();
-  void map(const ScanResult& result, const WorldInOdom& T_OW);
+  void map(const std::vector<LandmarkPoint>& points, const WorldInOdom& T_OW, Time stamp);
 
   const Config config_;
   std::vector<Radar> radars_;  // optimisation thread only, after construction
