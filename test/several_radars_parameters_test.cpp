@@ -95,7 +95,9 @@ TEST(SeveralRadars, NamesAreChecked) {
                  "radars: expected a list of at most 16 different names of lower case letters, digits and _"))
         << names;
   }
-  EXPECT_EQ(faultOf("radars=[window]"), "radars: expected names that are no parameters, got \"window\"");
+  for (const std::string name : {"window", "config", "effective", "diagnostic_period", "diagnostic_updater"})
+    EXPECT_EQ(faultOf("radars=[" + name + "]"),
+              "radars: expected names that are no parameters, got \"" + name + "\"");
   EXPECT_TRUE(contains(faultOf("radars=[a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q]"), "at most 16"));
   EXPECT_TRUE(fromAssignments({"radars=[]"}).radars.empty());
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
 
 #include "../text.h"
 
@@ -199,6 +200,12 @@ void ParameterList::radarNames(const std::string& key, std::vector<Config>& memb
         for (const Config& radar : radars) names.emplace_back().data = radar.radar_name;
         return ParameterValue{std::move(names)};
       });
+}
+
+bool isReserved(const std::string& key) {
+  static const std::set<std::string> reserved = {"config", "diagnostic_period", "diagnostic_updater",
+                                                 "effective"};
+  return reserved.count(key) != 0;
 }
 
 }  // namespace rio_t

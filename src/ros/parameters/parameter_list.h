@@ -158,6 +158,10 @@ struct Section {
   ParameterEntries entries;
 };
 
+/// Whether others than the registry use the key in the namespace of the node, so that no radar may have it as
+/// its name.
+bool isReserved(const std::string& key);
+
 /// Entries of the top level, and those of each section: nested keys, or `name/key`.
 struct SortedEntries {
   ParameterEntries top_level;

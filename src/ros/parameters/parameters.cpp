@@ -110,7 +110,7 @@ void setTopLevel(const ParameterEntries& entries, const ParameterList& list,
     }
   }
   for (const Config& radar : radars) {
-    if (find(list, radar.radar_name) == nullptr) continue;
+    if (find(list, radar.radar_name) == nullptr && !isReserved(radar.radar_name)) continue;
     faults->push_back("radars: expected names that are no parameters, got \"" + radar.radar_name + "\"");
   }
 }

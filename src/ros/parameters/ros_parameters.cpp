@@ -4,9 +4,10 @@
 #include <ros/param.h>
 
 #include <limits>
-#include <set>
 #include <sstream>
 #include <stdexcept>
+
+#include "parameter_list.h"
 
 namespace rio_t {
 namespace {
@@ -84,12 +85,10 @@ XmlRpc::XmlRpcValue toXmlRpc(const ParameterEntries& entries) {
 }
 
 ParameterEntries toParameterEntries(XmlRpc::XmlRpcValue& map, const std::string& name_space) {
-  static const std::set<std::string> of_others = {"config", "diagnostic_period", "diagnostic_updater",
-                                                  kEffective};
   ParameterEntries entries;
   if (map.getType() != XmlRpc::XmlRpcValue::TypeStruct) return entries;
   for (auto& [key, value] : map) {
-    if (of_others.count(key) != 0) continue;
+    if (isReserved(key)) continue;
     const std::string path = name_space + "/" + key;
     ParameterValue::Map section;
     if (value.getType() == XmlRpc::XmlRpcValue::TypeStruct) {
