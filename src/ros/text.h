@@ -8,8 +8,8 @@ namespace rio_t {
 
 constexpr double kDegree = M_PI / 180.0;  ///< [rad]
 
-/// Appends `value` with that many decimals (at most 12), with a point whatever the locale; "nan", "inf".
-/// Never minus zero.
+/// Appends `value` with that many decimals (at most 12), with a point whatever the locale; ".nan",
+/// ".inf", "-.inf" as in YAML. Never minus zero.
 void appendFixed(std::string* text, double value, int decimals);
 /// The same as a text of its own.
 std::string fixedText(double value, int decimals);
