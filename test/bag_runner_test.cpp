@@ -218,6 +218,13 @@ TEST_F(BagRunner, ItSavesItsEstimateThoughTheTruthTopicCannotBeUsed) {
   pose.pose.orientation.w = 1.0;
   const std::string name = "ground truth topic /ground_truth/pose: ";
   expectError(run_with(pose, std::string(32, '0')), {name, "a message of another version of its type"});
+  const std::string md5 = ros::message_traits::MD5Sum<geometry_msgs::PoseStamped>::value();
+  pose.pose.orientation.w = 1.02;
+  expectError(run_with(pose, md5), {name, "the pose of stamp 1008.500000000 has a quaternion of norm 1.02",
+                                    "expected finite numbers and a norm of 1"});
+  pose.pose.orientation.w = 1.0;
+  pose.pose.position.x = std::nan("");
+  expectError(run_with(pose, md5), {name, "1008.500000000 has a position that is not finite"});
 }
 
 TEST_F(BagRunner, ATrajectoryThatStartsAgainIsDoubtful) {

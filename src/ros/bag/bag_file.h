@@ -61,7 +61,8 @@ void checkTopics(const std::string& bag, const std::map<std::string, std::string
 /// Begin and end of what is played, by the keys bag_start and bag_duration.
 std::pair<ros::Time, ros::Time> playedSpan(const Bags& bags, const Config& config);
 
-/// Poses of a topic of geometry_msgs/PoseStamped, in the order of their stamps.
+/// Poses of a topic of geometry_msgs/PoseStamped, in the order of their stamps. Throws
+/// std::runtime_error for one that is not finite or whose quaternion is not of norm 1.
 Trajectory readPoses(const Bags& bags, const std::string& topic);
 
 template <typename Message>
