@@ -71,8 +71,7 @@ void printHelp(const ProgramText& text, const OptionSet& options, std::ostream& 
   std::istringstream examples(text.examples);
   for (std::string line; std::getline(examples, line);) out << "  " << line << "\n";
   out << "\nExit status: 0 if it worked, 1 if data, a file or a parameter was wrong or missing, 2 if the "
-         "command "
-         "line was wrong;\nrio_t_bag also has 3, a result that is not to be trusted.\n";
+         "command line was wrong;\nrio_t_bag also has 3, a result that is not to be trusted.\n";
 }
 
 /// A line of the progress bar: "[####    ]  40 %, 12 s left".
