@@ -144,7 +144,7 @@ TEST(Barometer, MendsTheHeightThatADivergenceLeftUncertain) {
   EXPECT_LT(std::abs(run.heightError(end)), 3.0 * sigma.z());
 }
 
-TEST(Barometer, OneThatFallsSilentOrComesLateChangesNothingElse) {
+TEST(Barometer, OneThatFallsSilentChangesNothingElse) {
   DroneRun run(5, 40.0, true);
   run.run([&](simulation::SensorData& data) {
     for (simulation::SimulatedPressure& pressure : data.pressures)
@@ -154,6 +154,21 @@ TEST(Barometer, OneThatFallsSilentOrComesLateChangesNothingElse) {
   EXPECT_EQ(run.odometry->health(), Health::kOk);
   EXPECT_GT(run.count(31.0, 40.0, isUsed), 70);
   EXPECT_LT(run.heightRms(30.0, 40.0), 0.3);
+}
+
+/// A minute of pressures waits for a node. The older ones are counted, and so are those of the minute that
+/// come to no node.
+TEST(Barometer, ASilentRadarLeavesNoPressureUnsaid) {
+  DroneRun run(2, 100.0, true);
+  run.run([&](simulation::SensorData& data) {
+    for (simulation::SimulatedScan& scan : data.scans)
+      if (run.seconds(scan.stamp) > 20.0 && run.seconds(scan.stamp) < 90.0) scan.delivered = false;
+  });
+  EXPECT_NEAR(static_cast<double>(run.odometry->faults()["pressure_without_node"]), 100.0, 20.0);
+  const auto is_late = [](const BarometerAnswer& answer) {
+    return answer.rejected_because == "older_than_window" || answer.rejected_because == "no_node_near";
+  };
+  EXPECT_GT(run.count(20.0, 90.0, is_late), 550);
 }
 
 TEST(Barometer, OffItTakesNothing) {

@@ -205,7 +205,7 @@ void listTimeOffset(ParameterList& list, Config& c) {
   list.first().number(
       "max_time_offset", "s", above(0, 1), smoother.max_time_offset,
       "The offset cannot exceed this in size. Raise it if a run ends with the offset at this bound; the "
-      "buffers grow with it. Use radar_stamp_shift for delays above 1 s.");
+      "buffers grow with it. For a larger delay that you know, use radar_stamp_shift.");
   listOffsetSteps(list, c.odometry.offset_step_detector);
 }
 
