@@ -26,6 +26,6 @@ def test_links_lead_somewhere(page):
 
 def test_the_contents_of_the_method_name_every_section():
     page = ROOT / "docs" / "method.md"
-    contents = page.read_text().split("## What the model leaves out")[0]
+    contents = page.read_text().split("## Limits of the model")[0]
     for anchor in anchors(page)[1:]:
         assert f"(#{anchor})" in contents, anchor

@@ -127,7 +127,7 @@ TEST_F(AtRest, ScansOfAnImuGapWaitForItsEnd) {
   EXPECT_TRUE(results[0].used) << results[0].rejected_because;
 }
 
-/// What the gap may hide is not in the means of the rest.
+/// The biases are means over the rest. A gap at its end must not make them vague.
 TEST_F(AtRest, AGapAsTheRestEndsTakesNothingFromTheBias) {
   run(102.95);
   time = 103.06;

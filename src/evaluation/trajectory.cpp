@@ -41,7 +41,7 @@ bool parseLine(const std::string& line, StampedPose& pose) {
   for (std::size_t i = 0; i < v.size(); ++i) v[i] = parseNumber(fields[i + 1]);
   pose.p_W = {v[0], v[1], v[2]};
   pose.q_WI = Eigen::Quaterniond(v[6], v[3], v[4], v[5]);
-  if (std::abs(pose.q_WI.norm() - 1.0) > 0.01) {
+  if (!isUnit(pose.q_WI)) {
     throw std::invalid_argument("the quaternion has norm " + std::to_string(pose.q_WI.norm()) + ", not 1");
   }
   pose.q_WI.normalize();
@@ -61,6 +61,8 @@ std::vector<double> evoSeconds(const Trajectory& trajectory) {
 }
 
 }  // namespace
+
+bool isUnit(const Eigen::Quaterniond& q) { return std::abs(q.norm() - 1.0) <= 0.01; }
 
 Time parseTime(const std::string& text) {
   const auto refuse = [&text]() -> std::invalid_argument {

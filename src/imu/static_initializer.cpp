@@ -141,7 +141,7 @@ bool StaticInitializer::endsNow() {
 }
 
 std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement& imu) {
-  // Nobody saw whether the platform stood still over so long a gap.
+  // The platform may have moved during so long a gap.
   if (!samples_.empty() && imu.time - samples_.back().time > kNewest) samples_.clear();
   samples_.push_back(imu);
   const bool is_ending = endsNow();

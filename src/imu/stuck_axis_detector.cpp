@@ -11,7 +11,7 @@ namespace {
 /// [rad/s] No platform that carries a radar turns faster by this within a sample: at 100 Hz that is 200
 /// rad/s^2, at 400 Hz 800 rad/s^2, and a hand that shakes with 3 rad/s at 3 Hz reaches 60 rad/s^2.
 constexpr double kSmallestJump = 2.0;
-constexpr double kHandShakes = 60.0;   // [rad/s^2]
+constexpr double kHandShakes = 60.0;   // [rad/s^2] that hand
 constexpr double kUnusual = 5.0;       // times the usual jump: a vibrating gyro is not stuck
 constexpr double kForgetting = 0.999;  // of the usual jump, each sample
 
@@ -24,7 +24,8 @@ std::optional<double> StuckAxisDetector::check(Time time, double reading) {
   if (repeats || jumps_away) stuck_at_ = reading;
   if (repeats || (jumps_away && jump > kHandShakes * (time - good_at_)))
     return *good_ * std::exp(-std::max(0.0, time - good_at_) / kMotionCorrelationTime);
-  if (jumps_away) return std::nullopt;  // over a gap a platform may turn so; if it repeats, it sticks
+  // Over a gap a platform may turn so fast. If the reading repeats, it sticks.
+  if (jumps_away) return std::nullopt;
   if (!stuck_at_) usual_jump_ = std::max(kForgetting * usual_jump_, jump);
   stuck_at_.reset();
   good_ = reading;

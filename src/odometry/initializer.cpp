@@ -44,7 +44,7 @@ std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, con
       x.b_g() = rest->b_g;
       x.b_a() = rest->b_a;
       ImuNoise noise = options_.imu_noise;
-      // That of a mean over many samples: the motion that one interval hides is not in it.
+      // The rest is a mean over many samples. The motion that a gap may hide belongs to one of them only.
       noise.accel_density = std::max(noise.accel_density, std::sqrt(newest.accel_mean_noise));
       noise.gyro_density = std::max(noise.gyro_density, std::sqrt(newest.gyro_mean_noise));
       return Initialization{

@@ -14,6 +14,9 @@ namespace rio_t {
 /// of them, and none is copied while it grows.
 using Trajectory = std::deque<StampedPose>;
 
+/// Whether `q` may stand for a rotation: rounding in a file changes its norm by less than 1 %. False for NaN.
+bool isUnit(const Eigen::Quaterniond& q);
+
 /// Reads a TUM trajectory: `stamp x y z qx qy qz qw` a line, seconds and metres; `#` comments and blank lines
 /// are skipped. Stamps keep their nanoseconds. Quaternions are normalised; they must be unit to 1 %. Throws
 /// std::runtime_error naming the file, the line number and what was expected.

@@ -62,7 +62,8 @@ class DopplerLikelihood {
     Eigen::Matrix3d spread;  ///< v' spread v: variance of the residual by the direction's noise, if it grows
     double fixed_variance;   ///< [m^2/s^2] the rest of it, with the bin
     double outlier;          ///< density of outliers over that of the static world, at its largest
-    // Of a bin that is wider than the noise; the first two in sigmas of the noise at the first velocity.
+    // The next three describe a bin that is wider than the noise. Their unit is the sigma of the noise at the
+    // first velocity, but for `centre`.
     double half_bin = 0.0;     ///< half its width; 0 if the noise is wider
     double whole_sigma = 1.0;  ///< of noise and bin together
     double centre = 0.0;       ///< probability of the bin around no error

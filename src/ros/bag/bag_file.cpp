@@ -4,7 +4,6 @@
 #include <tf2_eigen/tf2_eigen.h>
 
 #include <boost/algorithm/string/join.hpp>
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <system_error>
@@ -132,13 +131,12 @@ Trajectory readPoses(const Bags& bags, const std::string& topic) {
     if (!truth.empty() && pose.time <= truth.back().time) continue;
     tf2::fromMsg(message->pose.position, pose.p_W);
     tf2::fromMsg(message->pose.orientation, pose.q_WI);
-    const double norm = pose.q_WI.norm();
     const bool is_finite = pose.p_W.allFinite();
-    if (!is_finite || !(std::abs(norm - 1.0) <= 0.01))  // as in readTum(); also false for NaN
-      throw std::runtime_error(
-          "the pose of stamp " + formatTime(pose.time) + " has " +
-          (is_finite ? "a quaternion of norm " + std::to_string(norm) : "a position that is not finite") +
-          "; expected finite numbers and a norm of 1");
+    if (!is_finite || !isUnit(pose.q_WI))
+      throw std::runtime_error("the pose of stamp " + formatTime(pose.time) + " has " +
+                               (is_finite ? "a quaternion of norm " + std::to_string(pose.q_WI.norm())
+                                          : "a position that is not finite") +
+                               "; expected finite numbers and a norm of 1");
     pose.q_WI.normalize();
     truth.push_back(pose);
   }

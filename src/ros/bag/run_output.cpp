@@ -141,7 +141,7 @@ RunOutput::~RunOutput() {
   for (auto& [name, file] : open_) {
     try {
       file.flush();
-    } catch (const std::exception&) {  // the run failed for another reason, or this one was told
+    } catch (const std::exception&) {  // the run has failed already, and its message says why
     }
   }
 }

@@ -159,7 +159,7 @@ sensor_msgs::PointCloud2 toPointCloud2(const std::vector<LandmarkPoint>& map, co
   modifier.setPointCloud2Fields(6, "x", 1, kFloat, "y", 1, kFloat, "z", 1, kFloat, "sigma", 1, kFloat,
                                 "intensity", 1, kFloat, "sightings", 1, kFloat);
   modifier.resize(map.size());
-  if (map.empty()) return cloud;  // an iterator refers to the first byte at once
+  if (map.empty()) return cloud;  // an iterator needs a first byte
   sensor_msgs::PointCloud2Iterator<float> field(cloud, "x");
   for (const LandmarkPoint& point : map) {
     const Eigen::Vector3d p_O = T_OW.p_O + T_OW.q_OW * point.p_W;

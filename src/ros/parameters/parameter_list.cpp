@@ -204,7 +204,7 @@ void ParameterList::radarNames(const std::string& key, std::vector<Config>& memb
 
 bool isReserved(const std::string& key) {
   static const std::set<std::string> reserved = {"config", "diagnostic_period", "diagnostic_updater",
-                                                 "effective"};
+                                                 kEffective};
   return reserved.count(key) != 0;
 }
 

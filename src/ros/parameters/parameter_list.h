@@ -158,8 +158,9 @@ struct Section {
   ParameterEntries entries;
 };
 
-/// Whether others than the registry use the key in the namespace of the node, so that no radar may have it as
-/// its name.
+constexpr const char* kEffective = "effective";  ///< where the node writes what it runs with
+/// Whether the node's namespace has this key, but no parameter of the registry. No radar may have such a
+/// name.
 bool isReserved(const std::string& key);
 
 /// Entries of the top level, and those of each section: nested keys, or `name/key`.

@@ -12,8 +12,6 @@
 namespace rio_t {
 namespace {
 
-constexpr const char* kEffective = "effective";
-
 struct ToXmlRpc {
   XmlRpc::XmlRpcValue operator()(std::monostate) const { return {}; }
   XmlRpc::XmlRpcValue operator()(bool value) const { return {value}; }

@@ -105,7 +105,7 @@ class RunOutput {
   /// summary of an earlier run and files of radars that this run has not are removed, so that they are never
   /// taken for its own.
   explicit RunOutput(const std::string& folder, const RunFiles& files = {});
-  /// Of a run that failed, the tables are written as far as they go; there is no summary.yaml.
+  /// If the run failed, this saves its tables as far as they go. Such a run has no summary.yaml.
   ~RunOutput();
   RunOutput(const RunOutput&) = delete;
   RunOutput& operator=(const RunOutput&) = delete;
