@@ -281,7 +281,7 @@ TEST(DopplerLikelihood, SpeedsFarBelowABinAreSeenBetterThanByRounding) {
 }
 
 TEST(DopplerLikelihood, AnOutlierHasNoWeight) {
-  Scene scene(simulatedRadar(0.125));
+  Scene scene(variances(0.02, 0, 0, 0.125));
   const Eigen::Vector3d v_R(0.2, 1.5, 0.6);
   std::vector<RadarDirection> scan = scene.scan(v_R, 40);
   const Eigen::Vector3d without = minimum(DopplerLikelihood(scan, v_R, scene.noise), v_R);
@@ -316,6 +316,43 @@ TEST(DopplerLikelihood, ScansThatLookUpAndDownDoNotShortenTheVelocityEither) {
   EXPECT_LT(largest(result.bias), 0.25 * largest(result.least_squares_bias)) << result.bias.transpose();
   scene.noise.elevations.within = scene.noise.elevations.variance;
   EXPECT_GT(largest(monteCarlo(scene, v_R, 20, 0.1).bias), 2.0 * largest(result.bias));
+}
+
+/// Bias of the vertical velocity over all scans together, at a level drive. More points lie below the mean
+/// elevation than above, as a radar sees the floor and a few walls.
+double biasBySkewness(int points, bool skewness_is_known) {
+  const Eigen::Vector3d v_R(0.0, 1.2, 0.0);
+  PointVariances noise = variances(0.02, 0.03, 0.14, 0.0);
+  PointNoise learned{noise};
+  Random random(22);
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  for (int k = 0; k < 100000 / points; ++k) {
+    std::vector<RadarDirection> scan;
+    for (int i = 0; i < points; ++i) {
+      const double azimuth = random.uniform(-0.9, 0.9), root = random.uniform(0.0, 1.0);
+      const double elevation = -0.35 + 0.9 * root * root;
+      scan.push_back({direction(azimuth + 0.03 * random.normal(), elevation + 0.14 * random.normal()),
+                      -direction(azimuth, elevation).dot(v_R) + 0.02 * random.normal(), 0});
+    }
+    learned.learnSpread(scan);
+    if (k < 300) continue;
+    noise.azimuths = learned.variances().azimuths;
+    noise.elevations = learned.variances().elevations;
+    if (!skewness_is_known) noise.elevations.skewness = 0.0;
+    const VelocityCost cost = DopplerLikelihood(scan, v_R, noise).at(v_R);
+    gradient += cost.gradient;
+    information += cost.information;
+  }
+  return std::abs((information.inverse() * gradient).z());
+}
+
+TEST(DopplerLikelihood, SkewedElevationsLeaveNoVerticalVelocity) {
+  for (const int points : {5, 40}) {
+    const double bias = biasBySkewness(points, false);
+    EXPECT_GT(bias, 0.025) << points;
+    EXPECT_LT(biasBySkewness(points, true), 0.25 * bias) << points;
+  }
 }
 
 TEST(DopplerLikelihood, WhatAPlanarScanDoesNotSeeStaysWhereItWas) {

@@ -129,6 +129,19 @@ TEST(EgoVelocityNoise, IsLearnedFromWrongStarts) {
   }
 }
 
+/// The measured elevations lie farther out than the true ones.
+TEST(EgoVelocityNoise, IsLearnedInANarrowView) {
+  const ScanNoise much{0.05, 0.14, 0.05, 0.0}, little{0.03, 0.04, 0.02, 0.0};
+  for (const auto& [truth, view] : {std::pair{much, 0.5}, {much, 0.35}, {little, 0.25}}) {
+    for (EgoVelocityOptions o : kWrongStarts) {
+      o.doppler_quantization = kNoStep;
+      EgoVelocityEstimator estimator(o);
+      learnFrom(estimator, kDrive, truth, 2000, 0.0, view);
+      expectLearned(estimator, truth, 0.1);
+    }
+  }
+}
+
 TEST(EgoVelocityNoise, GhostsDoNotBlowItUp) {
   for (const EgoVelocityOptions& o : kWrongStarts) {
     EgoVelocityEstimator estimator(o);

@@ -28,11 +28,19 @@ AngleRegression::AngleRegression(const std::vector<double>& measured, double noi
   mean_ = scan_mean_;
   remaining_ = noise;
   if (!std::isfinite(spread.variance)) return;
-  share_ = trueShare(varianceWithin(measured, scan_mean_, spread), noise);
+  const double within = varianceWithin(measured, scan_mean_, spread);
+  share_ = trueShare(within, noise);
+  // The mean of true^2 grows with a measured angle by the third moment over `within`, the square of the
+  // expected angle by share^2 of that. Noise without skewness leaves the third moment as it is.
+  growth_ = (1.0 - square(share_)) * spread.skewness * std::sqrt(within);
   const double of_means = spread.variance - spread.within + spread.within / n;
   const double mean_share = trueShare(of_means, noise / n);
   mean_ = spread.mean + mean_share * (scan_mean_ - spread.mean);
   remaining_ = noise * (share_ * (1.0 - 1.0 / n) + mean_share / n);
+}
+
+double AngleRegression::shortening(double measured) const {
+  return std::exp(-0.5 * (remaining_ + growth_ * (measured - scan_mean_)));
 }
 
 }  // namespace rio_t

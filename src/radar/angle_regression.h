@@ -16,12 +16,16 @@ class AngleRegression {
   AngleRegression(const std::vector<double>& measured, double noise, const AngleSpread& spread);
   double expected(double measured) const { return mean_ + share_ * (measured - scan_mean_); }
   double remaining() const { return remaining_; }  ///< variance of the error of `expected` [rad^2]
+  /// The mean of the true directions is shorter than the direction at the expected angle, by this factor. It
+  /// is exp(-remaining / 2) if the angles spread to both sides alike.
+  double shortening(double measured) const;
 
  private:
   double scan_mean_ = 0.0;
   double mean_ = 0.0;  // expected
   double share_ = 1.0;
   double remaining_ = 0.0;
+  double growth_ = 0.0;  // of the squares that `expected` leaves out, by the measured angle [rad]
 };
 
 }  // namespace rio_t

@@ -122,25 +122,38 @@ DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, 
   if (!shows_azimuth) left.azimuth = by_azimuth.remaining();
   if (!shows_elevation) left.elevation = by_elevation.remaining();
 
-  const double shorter = std::exp(-0.5 * (left.azimuth + left.elevation));  // the mean of such directions
   // The mean direction of a noisy one is shorter than the true one: E[cos(a + e)] = exp(-s^2 / 2) cos(a).
   const double longer_el = std::exp(0.5 * shown.elevation);
   const double longer_az = longer_el * std::exp(0.5 * shown.azimuth);
   const Eigen::Vector3d longer(longer_az, longer_az, longer_el);
   const double along_az = 0.75 * shown.azimuth + 0.25 * shown.elevation;
   const double along_el = 0.75 * shown.elevation + 0.25 * shown.azimuth;
-  points_.reserve(points.size());
+  points_.resize(points.size());
+  std::vector<Eigen::Vector3d> expected(points.size());
+  double variance_left = 0.0;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const double azimuth = shows_azimuth ? azimuths[i] : by_azimuth.expected(azimuths[i]);
-    const double elevation = shows_elevation ? elevations[i] : by_elevation.expected(elevations[i]);
-    const bool is_measured = shows_azimuth && shows_elevation;
-    const Eigen::Vector3d expected = is_measured ? points[i].u_R : directionOf(azimuth, elevation);
-    const double fixed_variance =
-        noise.doppler + kMinDopplerVariance + residualVariance(Angles(expected), v_R, left);
-    shown.doppler = fixed_variance;
+    double azimuth = azimuths[i], elevation = elevations[i];
+    Eigen::Vector3d length = longer;
+    if (!shows_azimuth) {
+      length.head<2>() *= by_azimuth.shortening(azimuth);
+      azimuth = by_azimuth.expected(azimuth);
+    }
+    if (!shows_elevation) {
+      length *= by_elevation.shortening(elevation);
+      elevation = by_elevation.expected(elevation);
+    }
+    expected[i] = shows_azimuth && shows_elevation ? points[i].u_R : directionOf(azimuth, elevation);
+    points_[i].u_R = length.cwiseProduct(expected[i]);
+    variance_left += residualVariance(Angles(expected[i]), v_R, left) / static_cast<double>(points.size());
+  }
+  // All points have the same one. The regression is right for all of them together, not at each measured
+  // angle, and weights that differ with the angle would prefer some.
+  const double fixed_variance = noise.doppler + kMinDopplerVariance + variance_left;
+  shown.doppler = fixed_variance;
+  for (std::size_t i = 0; i < points.size(); ++i) {
     // The spread is that at the direction corrected by the residual. At the measured direction it would
     // correlate with the residual.
-    const Angles a = correctedDirection(expected, points[i].doppler + expected.dot(v_R), v_R, shown);
+    const Angles a = correctedDirection(expected[i], points[i].doppler + expected[i].dot(v_R), v_R, shown);
     const Eigen::Vector3d u = a.direction();
     const Eigen::Matrix3d spread =
         shown.azimuth * a.byAzimuth() * a.byAzimuth().transpose() +
@@ -150,8 +163,7 @@ DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, 
     const double sigma = std::sqrt(variance);
     smallest_sigma_ = std::min(smallest_sigma_, sigma);
     const double whole = std::sqrt(variance + noise.quantization);
-    Point& point = points_.emplace_back();
-    point.u_R = shorter * longer.cwiseProduct(expected);
+    Point& point = points_[i];
     point.doppler = points[i].doppler;
     point.spread = spread;
     point.fixed_variance = fixed_variance + noise.quantization;

@@ -7,6 +7,7 @@
 #include "direction_noise.h"
 #include "doppler_bin.h"
 #include "likeliest_velocity.h"
+#include "residual_moments.h"
 
 namespace rio_t {
 namespace {
@@ -69,6 +70,9 @@ void PointNoise::AngleMoments::add(const std::vector<double>& angles, double kep
   const double own = squares - sum * sum / n;
   within = kept * within + own;
   freedom = kept * freedom + n - 1.0;
+  cubes *= kept;
+  for (const double angle : angles) cubes += std::pow(angle - sum / n, 3);
+  cube_freedom = kept * cube_freedom + (n - 1.0) * (n - 2.0) / n;
   if (n < kFewPoints || own <= 0.0) return;
   const double logarithm = std::log(own / (n - 1.0) / (within / freedom));
   scatter = (1.0 - 1.0 / kViewMemory) * scatter +
@@ -80,6 +84,8 @@ AngleSpread PointNoise::AngleMoments::spread() const {
   spread.mean = all[1] / all[0];
   spread.variance = std::max(0.0, all[2] / all[0] - square(spread.mean));
   spread.within = freedom > 0.0 ? std::min(within / freedom, spread.variance) : spread.variance;
+  if (cube_freedom > 0.0 && spread.within > 0.0)
+    spread.skewness = cubes / cube_freedom / std::pow(spread.within, 1.5);
   const double excess = scatter[2] > 0.0 ? (scatter[0] - scatter[1]) / scatter[2] : 0.0;
   if (excess > 0.0) spread.within_freedom = (1.0 + std::sqrt(1.0 + 2.0 * excess)) / excess;
   return spread;
@@ -96,11 +102,12 @@ void PointNoise::learn(const std::vector<RadarDirection>& points, const DopplerL
   information_vector_ *= 1.0 - share;
   const auto count = static_cast<double>(points.size());
   Eigen::Vector3d mean_shares = Eigen::Vector3d::Zero();
+  Eigen::Vector3d squares = Eigen::Vector3d::Zero();
   double outlier_density = 0.0;
+  ResidualMoments moments(velocity.v_R);
   for (const RadarDirection& p : points) {
     const double residual = p.doppler + p.u_R.dot(velocity.v_R);
-    const Eigen::Vector3d shares =
-        noiseShares(correctedDirection(p.u_R, residual, velocity.v_R, variances_), velocity.v_R, variances_);
+    const Eigen::Vector3d shares = noiseShares(Angles(p.u_R), velocity.v_R, variances_);
     const double variance = std::max(kMinVariance, shares.dot(vectorOf(variances_)));
     const auto densityAt = [&](double e) { return dopplerDensity(e, variance, variances_.quantization); };
     // Derivative of the log of the likelihood, that of an outlier included, by the variance.
@@ -115,9 +122,9 @@ void PointNoise::learn(const std::vector<RadarDirection>& points, const DopplerL
     const double slope =
         (slopeOf(densityAt(residual - open)) + 4.0 * slopeOf(density) + slopeOf(densityAt(residual + open))) /
         6.0;
-    const double information = probability * varianceInformation(variance, variances_.quantization);
-    information_ += information * shares * shares.transpose();
-    information_vector_ += (slope + information * variance) * shares;
+    const double excess = slope / varianceInformation(variance, variances_.quantization);
+    moments.add(p.u_R, probability);
+    squares += (excess + probability * variance) * moments.weights(p.u_R);
     mean_shares += shares / count;
     if (std::abs(residual) < kOutlierSpan)
       outlier_density += (1.0 - probability) / (2.0 * kOutlierSpan * count);
@@ -126,18 +133,29 @@ void PointNoise::learn(const std::vector<RadarDirection>& points, const DopplerL
   believed_density += share * (outlier_density - believed_density);
   believed_density = std::clamp(believed_density, kMinOutlierDensity, kMaxOutlierDensity);
 
+  const double squared_speed = velocity.v_R.squaredNorm();
   mean_shares_ += share * (mean_shares - mean_shares_);
-  const double believed = informationOfPoint();
+  mean_squared_speed_ += share * (squared_speed - mean_squared_speed_);
+  // All points of a scan count alike. A weight that differs with the direction would depend on its noise.
+  const double faster = mean_squared_speed_ > 0.0 ? squared_speed / mean_squared_speed_ : 1.0;
+  const double weight = informationAbout({1.0, faster * mean_shares_[1], faster * mean_shares_[2]});
+  // An angle has no more noise than spread.
+  PointVariances possible = variances_;
+  possible.azimuth = std::min(possible.azimuth, possible.azimuths.variance);
+  possible.elevation = std::min(possible.elevation, possible.elevations.variance);
+  information_ += weight * moments.shares(possible);
+  information_vector_ += weight * squares;
+  const double believed = informationAbout(mean_shares_);
   solve();
   // The scans so far were weighted with the noise believed then. If it was much too small, they would
   // outweigh all scans to come.
-  const double reweighting = informationOfPoint() / believed;
+  const double reweighting = informationAbout(mean_shares_) / believed;
   information_ *= reweighting;
   information_vector_ *= reweighting;
 }
 
-double PointNoise::informationOfPoint() const {
-  const double variance = mean_shares_.dot(vectorOf(variances_));
+double PointNoise::informationAbout(const Eigen::Vector3d& shares) const {
+  const double variance = shares.dot(vectorOf(variances_));
   return varianceInformation(std::max(kMinVariance, variance), variances_.quantization);
 }
 

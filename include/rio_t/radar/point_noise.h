@@ -23,6 +23,7 @@ struct AngleSpread {
   double mean = 0.0;                                          ///< of all points [rad]
   double variance = std::numeric_limits<double>::infinity();  ///< about it
   double within = std::numeric_limits<double>::infinity();    ///< about the mean of their scan
+  double skewness = 0.0;                                      ///< likewise, the mean cube over within^(3/2)
   /// For the variance of a scan, earlier scans count as so many squares: few if the scans differ.
   double within_freedom = std::numeric_limits<double>::infinity();
 };
@@ -67,13 +68,15 @@ class PointNoise {
 
  private:
   void solve();
-  double informationOfPoint() const;  // of a typical one, about the variance of its residual
+  /// Information of a point about the variance of its residual, given the shares of the variances in it.
+  double informationAbout(const Eigen::Vector3d& shares) const;
 
   /// Sums over the points of earlier scans.
   struct AngleMoments {
     Eigen::Vector3d all = Eigen::Vector3d::Zero();  // of the powers 0, 1 and 2
     double within = 0.0;                            // squares about the mean of the scan
     double freedom = 0.0;                           // of these squares
+    double cubes = 0.0, cube_freedom = 0.0;         // likewise
     // Over the last scans: squares of the logarithms of their variances over `within`, those that chance
     // gives, and their number.
     Eigen::Vector3d scatter = Eigen::Vector3d::Zero();
@@ -87,6 +90,7 @@ class PointNoise {
   Eigen::Matrix3d information_ = Eigen::Matrix3d::Zero();         // of the scans
   Eigen::Vector3d information_vector_ = Eigen::Vector3d::Zero();  // that times the variances
   Eigen::Vector3d mean_shares_ = Eigen::Vector3d::Zero();         // of the variances in that of a residual
+  double mean_squared_speed_ = 0.0;                               // [m^2/s^2]
   AngleMoments azimuth_moments_, elevation_moments_;
   double scans_ = 0.0;
 };
