@@ -65,6 +65,68 @@ bool showsSpread(const std::vector<double>& angles, double noise) {
   return squares / n * (1.0 - kSurely * std::sqrt(2.0 / n)) > kSpreads * noise;
 }
 
+/// What is known of the directions before the Dopplers.
+struct ExpectedDirections {
+  PointVariances shown;                 ///< the noise that the sigma of a residual has to follow
+  std::vector<Eigen::Vector3d> u_R;     ///< expected
+  std::vector<Eigen::Vector3d> mean_R;  ///< what the speed along the ray is taken with
+  std::vector<double> variances;        ///< of the residuals, by all other noise [m^2/s^2]
+};
+
+// The noise of an angle is in the measured direction and in the residual. Two ways undo what this does:
+// - Many points show by themselves how far they spread. Then the sigma of a residual grows with the velocity,
+//   and its derivative undoes it (`shown`: errors in variables).
+// - Few points do not. Then the true angle is expected nearer to the mean than the measured one, by what
+//   earlier scans have shown (`left`, after the regression). The error of this angle is not in the direction.
+ExpectedDirections expectedDirections(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
+                                      const PointVariances& noise) {
+  const std::vector<double> azimuths = anglesOf(points, azimuthOf);
+  const std::vector<double> elevations = anglesOf(points, elevationOf);
+  const AngleRegression by_azimuth(azimuths, noise.azimuth, noise.azimuths);
+  const AngleRegression by_elevation(elevations, noise.elevation, noise.elevations);
+  const bool shows_azimuth = showsSpread(azimuths, noise.azimuth);
+  const bool shows_elevation = showsSpread(elevations, noise.elevation);
+  ExpectedDirections result;
+  result.shown = noise;
+  PointVariances left;
+  left.doppler = noise.doppler + kMinDopplerVariance;
+  (shows_azimuth ? left : result.shown).azimuth = 0.0;
+  (shows_elevation ? left : result.shown).elevation = 0.0;
+  if (!shows_azimuth) left.azimuth = by_azimuth.remaining();
+  if (!shows_elevation) left.elevation = by_elevation.remaining();
+
+  // The mean direction of a noisy one is shorter than the true one: E[cos(a + e)] = exp(-s^2 / 2) cos(a).
+  const double longer_el = std::exp(0.5 * result.shown.elevation);
+  const double longer_az = longer_el * std::exp(0.5 * result.shown.azimuth);
+  result.u_R.reserve(points.size());
+  result.mean_R.reserve(points.size());
+  result.variances.reserve(points.size());
+  double mean_variance = 0.0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    double azimuth = azimuths[i], elevation = elevations[i];
+    Eigen::Vector3d length(longer_az, longer_az, longer_el);
+    if (!shows_azimuth) {
+      length.head<2>() *= by_azimuth.shortening(azimuth);
+      azimuth = by_azimuth.expected(azimuth);
+    }
+    if (!shows_elevation) {
+      length *= by_elevation.shortening(elevation);
+      elevation = by_elevation.expected(elevation);
+    }
+    const bool is_measured = shows_azimuth && shows_elevation;
+    result.u_R.push_back(is_measured ? points[i].u_R : directionOf(azimuth, elevation));
+    result.mean_R.emplace_back(length.cwiseProduct(result.u_R.back()));
+    result.variances.push_back(residualVariance(Angles(result.u_R.back()), v_R, left));
+    mean_variance += result.variances.back() / static_cast<double>(points.size());
+  }
+  // Without bins this is least squares, and all points have the same variance: the regression is right for
+  // all of them together, not at each measured angle, and weights that differ with the angle would prefer
+  // some. Bins wider than the noise bound the velocity by their edges, each as sharp as the noise of its
+  // point.
+  if (3.0 * noise.quantization <= mean_variance) result.variances.assign(points.size(), mean_variance);
+  return result;
+}
+
 }  // namespace
 
 VelocityCost withSharedError(const VelocityCost& cost, const Eigen::Vector3d& variances,
@@ -99,74 +161,36 @@ Eigen::Vector3d solveTransposed(const Eigen::Matrix3d& U, const Eigen::Vector3d&
   return x;
 }
 
-// The noise of an angle is in the measured direction and in the residual. Two ways undo what this does:
-// - Many points show by themselves how far they spread. Then the sigma of a residual grows with the velocity,
-//   and its derivative undoes it (`shown`: errors in variables).
-// - Few points do not. Then the true angle is expected nearer to the mean than the measured one, by what
-//   earlier scans have shown (`left`, after the regression). The error of this angle is not in the direction.
 DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
                                      const PointVariances& noise)
     : about_(v_R),
       half_bin_(std::sqrt(3.0 * noise.quantization)),
       smallest_sigma_(std::numeric_limits<double>::max()) {
-  const std::vector<double> azimuths = anglesOf(points, azimuthOf);
-  const std::vector<double> elevations = anglesOf(points, elevationOf);
-  const AngleRegression by_azimuth(azimuths, noise.azimuth, noise.azimuths);
-  const AngleRegression by_elevation(elevations, noise.elevation, noise.elevations);
-  const bool shows_azimuth = showsSpread(azimuths, noise.azimuth);
-  const bool shows_elevation = showsSpread(elevations, noise.elevation);
-  PointVariances shown = noise;
-  PointVariances left;
-  (shows_azimuth ? left : shown).azimuth = 0.0;
-  (shows_elevation ? left : shown).elevation = 0.0;
-  if (!shows_azimuth) left.azimuth = by_azimuth.remaining();
-  if (!shows_elevation) left.elevation = by_elevation.remaining();
-
-  // The mean direction of a noisy one is shorter than the true one: E[cos(a + e)] = exp(-s^2 / 2) cos(a).
-  const double longer_el = std::exp(0.5 * shown.elevation);
-  const double longer_az = longer_el * std::exp(0.5 * shown.azimuth);
-  const Eigen::Vector3d longer(longer_az, longer_az, longer_el);
+  ExpectedDirections expected = expectedDirections(points, v_R, noise);
+  PointVariances& shown = expected.shown;
   const double along_az = 0.75 * shown.azimuth + 0.25 * shown.elevation;
   const double along_el = 0.75 * shown.elevation + 0.25 * shown.azimuth;
-  points_.resize(points.size());
-  std::vector<Eigen::Vector3d> expected(points.size());
-  double variance_left = 0.0;
+  points_.reserve(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    double azimuth = azimuths[i], elevation = elevations[i];
-    Eigen::Vector3d length = longer;
-    if (!shows_azimuth) {
-      length.head<2>() *= by_azimuth.shortening(azimuth);
-      azimuth = by_azimuth.expected(azimuth);
-    }
-    if (!shows_elevation) {
-      length *= by_elevation.shortening(elevation);
-      elevation = by_elevation.expected(elevation);
-    }
-    expected[i] = shows_azimuth && shows_elevation ? points[i].u_R : directionOf(azimuth, elevation);
-    points_[i].u_R = length.cwiseProduct(expected[i]);
-    variance_left += residualVariance(Angles(expected[i]), v_R, left) / static_cast<double>(points.size());
-  }
-  // All points have the same one. The regression is right for all of them together, not at each measured
-  // angle, and weights that differ with the angle would prefer some.
-  const double fixed_variance = noise.doppler + kMinDopplerVariance + variance_left;
-  shown.doppler = fixed_variance;
-  for (std::size_t i = 0; i < points.size(); ++i) {
+    shown.doppler = expected.variances[i];
     // The spread is that at the direction corrected by the residual. At the measured direction it would
     // correlate with the residual.
-    const Angles a = correctedDirection(expected[i], points[i].doppler + expected[i].dot(v_R), v_R, shown);
+    const double residual = points[i].doppler + expected.u_R[i].dot(v_R);
+    const Angles a = correctedDirection(expected.u_R[i], residual, v_R, shown);
     const Eigen::Vector3d u = a.direction();
     const Eigen::Matrix3d spread =
         shown.azimuth * a.byAzimuth() * a.byAzimuth().transpose() +
         shown.elevation * a.byElevation() * a.byElevation().transpose() +
         (shown.azimuth * along_az + shown.elevation * along_el) * u * u.transpose();
-    const double variance = fixed_variance + v_R.dot(spread * v_R);
+    const double variance = expected.variances[i] + v_R.dot(spread * v_R);
     const double sigma = std::sqrt(variance);
     smallest_sigma_ = std::min(smallest_sigma_, sigma);
     const double whole = std::sqrt(variance + noise.quantization);
-    Point& point = points_[i];
+    Point& point = points_.emplace_back();
+    point.u_R = expected.mean_R[i];
     point.doppler = points[i].doppler;
     point.spread = spread;
-    point.fixed_variance = fixed_variance + noise.quantization;
+    point.fixed_variance = expected.variances[i] + noise.quantization;
     point.outlier = noise.outlier_density * std::sqrt(2.0 * M_PI) * whole;
     if (half_bin_ <= sigma) continue;
     point.half_bin = half_bin_ / sigma;

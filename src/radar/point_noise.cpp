@@ -71,7 +71,10 @@ void PointNoise::AngleMoments::add(const std::vector<double>& angles, double kep
   within = kept * within + own;
   freedom = kept * freedom + n - 1.0;
   cubes *= kept;
-  for (const double angle : angles) cubes += std::pow(angle - sum / n, 3);
+  for (const double angle : angles) {
+    const double away = angle - sum / n;
+    cubes += away * away * away;
+  }
   cube_freedom = kept * cube_freedom + (n - 1.0) * (n - 2.0) / n;
   if (n < kFewPoints || own <= 0.0) return;
   const double logarithm = std::log(own / (n - 1.0) / (within / freedom));

@@ -51,9 +51,9 @@ ResidualMoments::ResidualMoments(const Eigen::Vector3d& v_R) : v_R_(v_R) {
   const Complex level = 0.25 * Complex(v_R.y(), -v_R.x());
   speed_ = {{1, 1, level},
             {1, -1, level},
-            {-1, 1, std::conj(level)},
-            {-1, -1, std::conj(level)},
             {0, 1, -0.5 * i * v_R.z()},
+            {-1, -1, std::conj(level)},
+            {-1, 1, std::conj(level)},
             {0, -1, 0.5 * i * v_R.z()}};
   // Across: the derivative by azimuth over cos(elevation).
   const Complex across = 0.5 * Complex(v_R.x(), v_R.y());
@@ -75,14 +75,15 @@ Eigen::Vector3d ResidualMoments::weights(const Eigen::Vector3d& u_R) const {
 void ResidualMoments::add(const Eigen::Vector3d& u_R, double share) {
   const Angles a(u_R);
   const Complex azimuth(a.cos_az, a.sin_az), elevation(a.cos_el, a.sin_el);
-  std::array<Complex, kOrder + 1> by_elevation{1.0};
-  for (std::size_t q = 1; q <= kOrder; ++q) by_elevation[q] = by_elevation[q - 1] * elevation;
-  Complex factor = share;
-  for (int p = 0; p <= kOrder; ++p, factor *= azimuth) {
-    for (int q = -kOrder; q <= kOrder; ++q) {
-      const Complex power = by_elevation[static_cast<std::size_t>(std::abs(q))];
-      sums_(p, q + kOrder) += factor * (q < 0 ? std::conj(power) : power);
-    }
+  Eigen::Array<Complex, 1, 2 * kOrder + 1> powers;  // share e^(i (p a + q e)), over q
+  powers[kOrder] = share;
+  for (int q = 1; q <= kOrder; ++q) {
+    powers[kOrder + q] = powers[kOrder + q - 1] * elevation;
+    powers[kOrder - q] = std::conj(powers[kOrder + q]);
+  }
+  for (int p = 0; p <= kOrder; ++p) {
+    sums_.row(p) += powers;
+    powers *= azimuth;
   }
 }
 
@@ -101,10 +102,11 @@ Eigen::Matrix3d ResidualMoments::shares(const PointVariances& noise) const {
   for (int i = 0; i < 3; ++i) {
     for (const Harmonic& g : weights_[static_cast<std::size_t>(i)]) {
       result(i, 0) += (g.c * sumOf(g.azimuth, g.elevation)).real();
-      for (const Harmonic& k : speed_) {
+      for (std::size_t half = 0; half < speed_.size() / 2; ++half) {  // the others give the conjugate
+        const Harmonic& k = speed_[half];
+        const int p = g.azimuth + k.azimuth, q = g.elevation + k.elevation;
         for (const Harmonic& l : speed_) {
-          const int p = g.azimuth + k.azimuth, q = g.elevation + k.elevation;
-          const double sum = (g.c * k.c * l.c * sumOf(p + l.azimuth, q + l.elevation)).real();
+          const double sum = 2.0 * (g.c * k.c * l.c * sumOf(p + l.azimuth, q + l.elevation)).real();
           const auto part = [](const Powers& powers, int at_m, int at_t) {
             return powers[at_t * at_t + 2 * at_m * at_t];
           };

@@ -13,9 +13,10 @@ namespace rio_t {
 /// What the variances of Doppler, azimuth and elevation add to the squares r^2 of a scan's residuals.
 ///
 /// The squares are summed with three weights, which tell the three variances apart: one, and the squares of
-/// the derivatives of the radial speed by azimuth and by elevation. These derivatives are known at the
-/// measured direction only, whose noise is also in r. So each sum takes the mean over the noise of what the
-/// measured directions show, for angles with normal noise exactly (docs/method.md, section 9.2).
+/// the derivatives of the radial speed by azimuth (over the cosine of the elevation) and by elevation. These
+/// derivatives are known at the measured direction only, and its noise is also in r. What a sum is on average
+/// follows from the measured directions alone, for angles with normal noise exactly (docs/method.md, section
+/// 9.2).
 class ResidualMoments {
  public:
   /// `v_R` [m/s] is the radar's velocity.
@@ -41,10 +42,10 @@ class ResidualMoments {
 
   static constexpr int kOrder = 4;  // of a weight times r^2
   Eigen::Vector3d v_R_;
-  Harmonics speed_;  // the radial one
+  Harmonics speed_;  // the radial one; the second half are the conjugates of the first
   std::array<Harmonics, 3> weights_;
   // Sums over the points of e^(i (p a + q e)), p from 0 to kOrder, q from -kOrder to kOrder.
-  Eigen::Matrix<std::complex<double>, kOrder + 1, 2 * kOrder + 1> sums_;
+  Eigen::Array<std::complex<double>, kOrder + 1, 2 * kOrder + 1, Eigen::RowMajor> sums_;
 };
 
 }  // namespace rio_t
