@@ -24,7 +24,7 @@ class Powers {
 
  private:
   static constexpr int kLeast = -8, kMost = 16;
-  std::array<double, kMost - kLeast + 1> powers_;
+  std::array<double, kMost - kLeast + 1> powers_{};
 };
 
 }  // namespace

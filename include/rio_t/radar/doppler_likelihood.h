@@ -57,11 +57,11 @@ class DopplerLikelihood {
 
  private:
   struct Point {
-    Eigen::Vector3d u_R;
-    double doppler;
+    Eigen::Vector3d u_R = Eigen::Vector3d::Zero();
+    double doppler = 0.0;
     Eigen::Matrix3d spread;  ///< v' spread v: variance of the residual by the direction's noise, if it grows
-    double fixed_variance;   ///< [m^2/s^2] the rest of it, with the bin
-    double outlier;          ///< density of outliers over that of the static world, at its largest
+    double fixed_variance = 0.0;  ///< [m^2/s^2] the rest of it, with the bin
+    double outlier = 0.0;         ///< density of outliers over that of the static world, at its largest
     // The next three describe a bin that is wider than the noise. Their unit is the sigma of the noise at the
     // first velocity, but for `centre`.
     double half_bin = 0.0;     ///< half its width; 0 if the noise is wider
