@@ -13,7 +13,7 @@ using Complex = std::complex<double>;
 /// [rad^2] Less noise counts as this: its share is a quotient of two that vanish.
 constexpr double kLeastVariance = 1e-6;
 
-/// (e^(s / 2))^k for the k of `at`.
+/// e^(k s / 2) for a variance s and k = q^2 + 2 p q, |q| <= 1 with |p| <= 3 or |q| <= 2 with |p| <= 2.
 class Powers {
  public:
   explicit Powers(double variance) {
@@ -23,7 +23,7 @@ class Powers {
   double operator[](int k) const { return powers_[static_cast<std::size_t>(k - kLeast)]; }
 
  private:
-  static constexpr int kLeast = -8, kMost = 16;
+  static constexpr int kLeast = -5, kMost = 12;
   std::array<double, kMost - kLeast + 1> powers_{};
 };
 
