@@ -1,4 +1,4 @@
-// What noise of the directions adds to the squares of the residuals, against drawn points.
+// ResidualMoments predicts squared residuals. These tests draw points and compare.
 #include "../src/radar/residual_moments.h"
 
 #include <gtest/gtest.h>
@@ -16,11 +16,6 @@ struct View {
   double azimuth, elevation;  // half the angle of view [rad]
 };
 
-/// Elevations below the horizon, as a radar sees the floor.
-double drawElevation(const View& view, Random& random) {
-  return -0.1 + random.uniform(-view.elevation, view.elevation);
-}
-
 void expectMoments(const View& view, const ScanNoise& sigmas) {
   constexpr int kPoints = 200000;
   PointVariances noise;
@@ -31,7 +26,8 @@ void expectMoments(const View& view, const ScanNoise& sigmas) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero(), squares = Eigen::Vector3d::Zero();
   for (int i = 0; i < kPoints; ++i) {
     const double azimuth = random.uniform(-view.azimuth, view.azimuth);
-    const double elevation = drawElevation(view, random);
+    const double elevation =
+        random.uniform(-view.elevation, view.elevation) - 0.1;  // the radar sees the floor
     const Eigen::Vector3d u_R =
         direction(azimuth + sigmas.azimuth * random.normal(), elevation + sigmas.elevation * random.normal());
     const double doppler = -direction(azimuth, elevation).dot(view.v_R) + sigmas.doppler * random.normal();

@@ -65,12 +65,12 @@ bool showsSpread(const std::vector<double>& angles, double noise) {
   return squares / n * (1.0 - kSurely * std::sqrt(2.0 / n)) > kSpreads * noise;
 }
 
-/// What is known of the directions before the Dopplers.
+/// The directions that the measured angles lead us to expect. The Dopplers have no part in them.
 struct ExpectedDirections {
-  PointVariances shown;                 ///< the noise that the sigma of a residual has to follow
+  PointVariances shown;                 ///< noise that `u_R` still has
   std::vector<Eigen::Vector3d> u_R;     ///< expected
-  std::vector<Eigen::Vector3d> mean_R;  ///< what the speed along the ray is taken with
-  std::vector<double> variances;        ///< of the residuals, by all other noise [m^2/s^2]
+  std::vector<Eigen::Vector3d> mean_R;  ///< mean of the true directions; its length is not 1
+  std::vector<double> variances;        ///< of the residuals, without `shown` [m^2/s^2]
 };
 
 // The noise of an angle is in the measured direction and in the residual. Two ways undo what this does:

@@ -6,11 +6,10 @@
 #include <vector>
 
 #include "rio_t/radar/point_noise.h"
-#include "rio_t/radar/scan.h"
 
 namespace rio_t {
 
-/// What the variances of Doppler, azimuth and elevation add to the squares r^2 of a scan's residuals.
+/// Predicts the squared residuals r^2 of a scan from the variances of Doppler, azimuth and elevation.
 ///
 /// The squares are summed with three weights, which tell the three variances apart: one, and the squares of
 /// the derivatives of the radial speed by azimuth (over the cosine of the elevation) and by elevation. These
