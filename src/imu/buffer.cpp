@@ -43,6 +43,7 @@ ImuMean ImuBuffer::mean(Time time, double half_width) const {
   };
   ImuMean result;
   const Time middle = std::clamp(time, oldest(), newest());
+  const double per_second = 1.0 / half_width;
   double weights = 0.0;
   double squared_weights = 0.0;
   const auto half = [&](Time from, Time to) {
@@ -52,14 +53,15 @@ ImuMean ImuBuffer::mean(Time time, double half_width) const {
     const bool rises = to == middle;
     forEachInterval(from, to, [&](double dt, const auto& gyro, const auto& accel, const auto& later) {
       const double away = rises ? reach - elapsed - 0.5 * dt : elapsed + 0.5 * dt;
-      const double weight = dt * (1.0 - away / half_width);
+      const double share = 1.0 - per_second * away;
+      const double weight = share * dt;
       elapsed += dt;
       sums.gyro += dt * gyro;
       sums.duration += dt;
       result.angular_velocity += weight * gyro;
       result.acceleration += weight * accel;
       weights += weight;
-      squared_weights += weight * weight / dt;
+      squared_weights += share * weight;
       result.gyro_variance = std::max(result.gyro_variance, later.gyro_noise + later.unseen_gyro_variance);
       result.accel_variance =
           std::max(result.accel_variance, later.accel_noise + later.unseen_accel_variance);

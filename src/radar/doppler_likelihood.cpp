@@ -195,7 +195,7 @@ DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, 
     if (half_bin_ <= sigma) continue;
     point.half_bin = half_bin_ / sigma;
     point.whole_sigma = whole / sigma;
-    point.centre = binProbability(0.0, point.half_bin);
+    point.centre = std::erf(point.half_bin * M_SQRT1_2);
   }
 }
 
