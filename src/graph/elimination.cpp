@@ -99,6 +99,7 @@ class BlockElimination {
  public:
   BlockElimination(const LinearSystem& system, double damping)
       : system_(system), damping_(damping), waiting_(system.tangents.size()) {
+    squares_.reserve(system.tangents.size());
     for (std::size_t i = 0; i < system.tangents.size(); ++i)
       squares_.emplace_back(Eigen::VectorXd::Zero(system.tangent(static_cast<int>(i))));
     for (const LinearRows& each : system.rows) {

@@ -45,6 +45,7 @@ struct RadarInertialOdometry::Impl {
   Status status;
 
   // Only the thread in process() touches these.
+  Inbox taken;  ///< from `inbox`; swapped with it, so that both keep their memory
   Estimator estimator;
   std::vector<RadarScan> waiting_scans;  ///< in the order in which they came
   std::uint64_t clock_restarts = 0;
@@ -142,7 +143,10 @@ std::vector<RadarScan>::iterator RadarInertialOdometry::Impl::nextReadyScan() {
 }
 
 void RadarInertialOdometry::Impl::takeInbox() {
-  Inbox taken;
+  taken.imu.clear();
+  taken.scans.clear();
+  taken.pressures.clear();
+  taken.tuning.reset();
   {
     const std::lock_guard<std::mutex> lock(inbox_mutex);
     taken.clock_restarts = inbox.clock_restarts;

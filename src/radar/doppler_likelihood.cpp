@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <numeric>
 
 #include "angle_regression.h"
@@ -217,18 +216,18 @@ double DopplerLikelihood::residual(std::size_t i, const Eigen::Vector3d& v_R,
 Eigen::Matrix3d DopplerLikelihood::binInformation() const {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   if (!(half_bin_ > smallest_sigma_)) return information;
-  std::map<long, double> counts;
-  std::vector<double*> count_of;  // by point
-  for (const Point& p : points_) {
-    count_of.push_back(&counts[std::lround(p.doppler / (2.0 * half_bin_))]);
-    ++*count_of.back();
-  }
+  std::vector<long> bins;  // by point
+  bins.reserve(points_.size());
+  for (const Point& p : points_) bins.push_back(std::lround(p.doppler / (2.0 * half_bin_)));
+  std::vector<long> sorted = bins;
+  std::sort(sorted.begin(), sorted.end());
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Point& p = points_[i];
     if (p.half_bin == 0.0) continue;
     const double flat = 1.0 - 1.0 / p.half_bin;
     const double variance = square(p.whole_sigma * half_bin_ / p.half_bin);
-    information += flat / (*count_of[i] * variance) * p.u_R * p.u_R.transpose();
+    const auto [first, last] = std::equal_range(sorted.begin(), sorted.end(), bins[i]);
+    information += flat / (static_cast<double>(last - first) * variance) * p.u_R * p.u_R.transpose();
   }
   return information;
 }

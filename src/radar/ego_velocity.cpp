@@ -181,6 +181,8 @@ EgoVelocity EgoVelocityEstimator::around(const RadarScan& scan, const VelocityPr
   result.status = EgoVelocityStatus::kTooFewInliers;
   std::vector<RadarDirection> points = filter(scan, options_);
   unwrap(points, prior.v_R, span_.value());
+  result.points.reserve(points.size());
+  result.inliers.reserve(points.size());
   for (const RadarDirection& p : points) {
     const double variance =
         residualVariance(Angles(p.u_R), prior.v_R, noise()) + p.u_R.dot(prior.covariance * p.u_R);
@@ -207,6 +209,7 @@ DopplerLikelihood EgoVelocityEstimator::likelihood(const RadarScan& scan,
                                                    const std::vector<std::size_t>& points,
                                                    const Eigen::Vector3d& v_R) const {
   std::vector<RadarDirection> directions;
+  directions.reserve(points.size());
   for (const std::size_t i : points) {
     const RadarPoint& p = scan.points[i];
     directions.push_back({p.position_R.normalized(), p.doppler, i});

@@ -62,6 +62,7 @@ bool mostReadZero(const std::vector<RadarDirection>& points, const EgoVelocityOp
 std::vector<RadarDirection> selectZeros(const std::vector<RadarDirection>& points,
                                         const EgoVelocityOptions& o) {
   std::vector<RadarDirection> zeros;
+  zeros.reserve(points.size());
   std::copy_if(points.begin(), points.end(), std::back_inserter(zeros),
                [&](const RadarDirection& p) { return readsZero(p, o); });
   return zeros;
@@ -70,6 +71,7 @@ std::vector<RadarDirection> selectZeros(const std::vector<RadarDirection>& point
 std::vector<RadarDirection> selectSlow(const std::vector<RadarDirection>& points,
                                        const EgoVelocityOptions& o) {
   std::vector<RadarDirection> slow;
+  slow.reserve(points.size());
   std::copy_if(points.begin(), points.end(), std::back_inserter(slow), [&](const RadarDirection& p) {
     return std::abs(p.doppler) <= o.zero_velocity_threshold + o.doppler_quantization;
   });
