@@ -77,7 +77,7 @@ TEST(Diagnosis, AGoodRunHasNoCauses) {
   const Diagnosis diagnosis = diagnose(goodRun(), Config{});
   EXPECT_EQ(toString(diagnosis.verdict), "good");
   EXPECT_EQ(describeCauses(diagnosis), "");
-  EXPECT_EQ(diagnosis.checks.size(), 9u);
+  EXPECT_EQ(diagnosis.checks.size(), 10u);
   for (const Check& check : diagnosis.checks) EXPECT_TRUE(check.good()) << check.name;
 }
 
@@ -210,6 +210,24 @@ TEST(Diagnosis, TheOffsetAtItsBoundIsNamed) {
   evidence.solver_terminations = {{"at_bound", 150}, {"converged", 30}};
   expectSays(first(evidence),
              {"offset_at_bound: 150 of 180 windows", "max_time_offset 0.25 s", "radar_stamp_shift"});
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
+}
+
+TEST(Diagnosis, ABatchThatDidNotConvergeIsDoubtful) {
+  RunEvidence evidence = goodRun();
+  Config config;
+  config.mode = RunMode::kBatch;
+  evidence.solver_terminations = {{"converged", 1}};
+  EXPECT_EQ(diagnose(evidence, config).verdict, RunVerdict::kGood);
+  evidence.solver_terminations = {{"iteration_limit", 1}};
+  expectSays(first(evidence, config), {"not_converged", "batch_max_iterations 100"});
+  EXPECT_EQ(diagnose(evidence, config).verdict, RunVerdict::kDoubtful);
+}
+
+TEST(Diagnosis, PointsThatAreNotFiniteAreLost) {
+  RunEvidence evidence = goodRun();
+  evidence.input_faults["points_not_finite"] = 4 * evidence.radars.front().points;
+  expectSays(first(evidence), {"points_not_finite", "radar_field_"});
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
 }
 

@@ -1,6 +1,7 @@
 // The constraint of a vehicle on wheels: the factor, and its effect in the whole pipeline.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -109,6 +110,21 @@ TEST(GroundVehicle, IsJudgedAgainAfterAClockThatJumped) {
   });
   EXPECT_EQ(run.odometry->faults()["imu_clock_restart"], 1u);
   EXPECT_EQ(run.odometry->faults()["ground_vehicle_contradicted"], 2u);
+}
+
+/// After a blow to the IMU the estimate contradicts the vehicle. That is not the vehicle's fault.
+TEST(GroundVehicle, IsJudgedAnewByANewEstimate) {
+  VehicleRun run("ground_vehicle", 1, 80.0, true);
+  run.run([&](simulation::SensorData& data) {
+    for (ImuMeasurement& sample : data.imu.samples)
+      if (run.seconds(sample.time) > 30.0 && run.seconds(sample.time) < 30.5) sample.acceleration.y() += 30.0;
+  });
+  EXPECT_EQ(run.odometry->faults()["ground_vehicle_contradicted"], 1u);
+  EXPECT_EQ(run.odometry->faults()["reinitialized"], 1u);
+  const auto used = std::count_if(run.results.begin(), run.results.end(), [&](const ScanResult& result) {
+    return run.seconds(result.scan.stamp) > 50.0 && result.ground_vehicle && result.ground_vehicle->used;
+  });
+  EXPECT_GT(used, 100);
 }
 
 /// Turns the IMU, and with it the radar, against the vehicle: `q_VI` turns new vectors of I into old ones.

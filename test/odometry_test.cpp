@@ -397,6 +397,33 @@ TEST(StuckGyro, CostsLittle) {
   }
 }
 
+/// The gap loses the heading for good, and with it the direction of the velocity in W. At this speed that is
+/// metres per second, but the motion is known all the same.
+TEST(ImuGap, AtSpeedIsNoDivergence) {
+  simulation::MotionRequest request;
+  request.name = "constant_speed";
+  request.duration = 40.0;
+  request.speed = 8.0;
+  request.rest.static_start = 5.0;
+  SimulatedRun run("constant_speed", 1, 40.0, 5.0);
+  run.motion = simulation::makeMotion(request);
+  run.run([&](simulation::SensorData& data) {
+    std::vector<ImuMeasurement>& samples = data.imu.samples;
+    const auto in_gap = [&](const ImuMeasurement& sample) {
+      return run.seconds(sample.time) > 15.0 && run.seconds(sample.time) < 17.0;
+    };
+    samples.erase(std::remove_if(samples.begin(), samples.end(), in_gap), samples.end());
+  });
+  for (const NavigationState& state : run.states) {
+    if (run.seconds(state.time) < 18.0 || run.seconds(state.time) > 30.0) continue;
+    ASSERT_GT(std::sqrt(state.covariance(StateBlock::kV + 1, StateBlock::kV + 1)), 2.0);
+  }
+  const auto diverged = std::count_if(run.results.begin(), run.results.end(), [&](const ScanResult& result) {
+    return run.seconds(result.scan.stamp) > 17.5 && result.health == Health::kDiverged;
+  });
+  EXPECT_EQ(diverged, 0);
+}
+
 /// An engine that is off at the end must not make the run look quiet.
 TEST(Vibration, NoiseOfTheRunIsNotThatOfItsEnd) {
   Navigation navigation(OdometryOptions(), Eigen::Vector3d(0.0, 0.0, -9.81));

@@ -206,6 +206,7 @@ void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
   // offset. The published platform stands still.
   if (result.at_rest) result.state.v_W.setZero();
   anchor(result.state, result.at_rest);
+  addHeadingCurvature(result.state);
 }
 
 std::vector<StampedPose> Estimator::marginalize() {
@@ -392,7 +393,6 @@ ImuNoise Estimator::imuNoise() const {
 
 NavigationState Estimator::newestState(const StateCovariance& covariance) const {
   NavigationState state = navigationState(smoother_.newest(), covariance, imu_);
-  addHeadingCurvature(state);
   health_.widen(state);
   return state;
 }

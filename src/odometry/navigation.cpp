@@ -32,6 +32,7 @@ Navigation::Checked Navigation::add(const ImuMeasurement& imu) {
   checked.bridge = std::move(verdict.bridge);
   checked.sample = sample;
   checked.state = propagator_.state();
+  if (checked.state) addHeadingCurvature(*checked.state);
   return checked;
 }
 

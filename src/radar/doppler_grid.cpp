@@ -119,7 +119,10 @@ void DopplerGrid::add(const RadarScan& scan) {
     // Zero is a multiple of every step.
     if (!(size > 0.5 * kLeastStep && size < kLargestDoppler)) continue;
     batch_[count_] = size;
-    if (++count_ == kBatch) judge();
+    if (++count_ < kBatch) continue;
+    judge();
+    // The search among values without a step is long. One batch of a scan is enough.
+    if (step_.value == 0.0) return;
   }
 }
 

@@ -40,7 +40,11 @@ void GroundVehicleChannel::join(FixedLagSmoother& smoother, bool at_rest) {
   Eigen::MatrixXd J = Eigen::MatrixXd::Zero(3, StateBlock::kMotionTangent + 3);
   J.rightCols<3>().diagonal().setConstant(1.0 / options_.rotation_sigma);
   addPrior(window, {node, frame_.get()}, {J, Eigen::VectorXd::Zero(3)});
+  // What the estimate before showed may have been its own fault.
   judged_at_.reset();
+  judged_.clear();
+  judged_span_ = 0.0;
+  is_contradicted_ = false;
   if (at_rest && options_.start_slope_sigma > 0.0)
     window.add(std::make_unique<LevelGroundFactor>(options_.start_slope_sigma), {node, frame_.get()});
   smoother.settle();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <numeric>
 #include <stdexcept>
@@ -216,6 +217,8 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
   BatchSolution solution;
   Graph graph = place(problem, t_O, problem.guess, problem.mounting);
   solution.placements = 1;
+  double moved_before = std::numeric_limits<double>::infinity();
+  double share = 1.0;  // of the way that the offsets are taken
   for (;;) {
     Solution solved = rio_t::solve(graph.window, {batch_.max_iterations - solution.iterations, kConverged},
                                    options_.solver);
@@ -238,7 +241,10 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
       solution.system.blocks.clear();  // they go with the graph
       return solution;
     }
-    for (std::size_t i = 0; i < t_O.size(); ++i) t_O[i] = graph.scans[i].offset->x[0];
+    // A sparse radar's offset may come out early where it was placed late, and the other way round.
+    if (moved > 0.5 * moved_before) share *= 0.5;
+    moved_before = moved;
+    for (std::size_t i = 0; i < t_O.size(); ++i) t_O[i] += share * (graph.scans[i].offset->x[0] - t_O[i]);
     graph = place(problem, t_O, solution.nodes, solution.extrinsics);
     ++solution.placements;
   }

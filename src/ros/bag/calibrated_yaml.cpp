@@ -36,11 +36,13 @@ ProposedKeys calibratedKeys(const RadarCalibration& calibration, const Config& t
   keys.set("extrinsics_translation", writtenList(calibration.T_IR.l_I, mounting.l_I, kMicro));
   keys.set("extrinsics_rotation_xyzw",
            writtenList(calibration.T_IR.q_IR.coeffs(), mounting.q_IR.coeffs(), kNano));
-  // A sigma below a microsecond would be written as zero.
+  // The sigma is the prior of the next run, whose offset may differ by what the detector takes for no step.
+  const double least = told.odometry.offset_step_detector.min_change;
   const OffsetEstimate offset =
-      offset_found ? OffsetEstimate{rounded(calibration.offset.t_O, kMicro),
-                                    std::max(rounded(calibration.offset.sigma, kMicro), 1.0 / kMicro)}
-                   : OffsetEstimate{smoother.time_offset_initial, smoother.time_offset_sigma};
+      offset_found
+          ? OffsetEstimate{rounded(calibration.offset.t_O, kMicro),
+                           std::max({rounded(calibration.offset.sigma, kMicro), least, 1.0 / kMicro})}
+          : OffsetEstimate{smoother.time_offset_initial, smoother.time_offset_sigma};
   keys.set("time_offset_initial", ParameterValue{offset.t_O});
   keys.set("time_offset_sigma", ParameterValue{offset.sigma});
   return keys;

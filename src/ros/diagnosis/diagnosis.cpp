@@ -36,11 +36,29 @@ double shareOf(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
-/// Windows, and those of them that ended with the offset at its bound.
-std::pair<std::uint64_t, std::uint64_t> windowsAtBound(const RunEvidence& evidence) {
-  std::uint64_t windows = 0;
-  for (const auto& [reason, count] : evidence.solver_terminations) windows += count;
-  return {windows, countOf(evidence.solver_terminations, toString(SolverTermination::kAtBound))};
+/// Windows that were solved, and those of them that ended with the offset at its bound or at the iteration
+/// limit.
+struct Windows {
+  std::uint64_t all = 0, at_bound = 0, at_limit = 0;
+};
+Windows windowsOf(const RunEvidence& evidence) {
+  Windows windows;
+  for (const auto& [reason, count] : evidence.solver_terminations) windows.all += count;
+  windows.at_bound = countOf(evidence.solver_terminations, toString(SolverTermination::kAtBound));
+  windows.at_limit = countOf(evidence.solver_terminations, toString(SolverTermination::kIterationLimit));
+  return windows;
+}
+
+/// Share of the points that the filter kept, of those that came: the decoder drops what is not finite.
+double keptShare(const RunEvidence& evidence) {
+  double kept = 1.0;
+  std::uint64_t decoded = 0;
+  for (const RadarSummary& radar : evidence.radars) {
+    decoded += radar.points;
+    if (radar.points > 0) kept = std::min(kept, shareOf(pointsOf(radar, PointVerdict::kKept), radar.points));
+  }
+  const std::uint64_t came = decoded + countOf(evidence.input_faults, "points_not_finite");
+  return came > 0 ? kept * shareOf(decoded, came) : kept;
 }
 
 /// Share of the scans after the start that were used.
@@ -272,12 +290,12 @@ void addStart(const RunEvidence& evidence, const Config& config, std::vector<Cau
 }
 
 void addOffset(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
-  const auto [windows, at_bound] = windowsAtBound(evidence);
-  const double share = shareOf(at_bound, windows);
-  if (share < kManyWindows || windows < kEnoughScans) return;
+  const Windows windows = windowsOf(evidence);
+  const double share = shareOf(windows.at_bound, windows.all);
+  if (share < kManyWindows || windows.all < kEnoughScans) return;
   const double bound = config.odometry.smoother.max_time_offset;
   causes->push_back({"offset_at_bound",
-                     outOf(at_bound, windows, "windows") +
+                     outOf(windows.at_bound, windows.all, "windows") +
                          " end with the time offset at its bound, max_time_offset " + number(bound) + " s.",
                      "Raise max_time_offset, subtract a known delay with radar_stamp_shift, or set "
                      "stamp_source: arrival. A wrong mounting can have the same effect.",
@@ -288,6 +306,35 @@ void addOffset(const RunEvidence& evidence, const Config& config, std::vector<Ca
     if (each.name == "mounting_far" && (farthest == nullptr || each.share > farthest->share))
       farthest = &each;
   if (farthest != nullptr) farthest->share = std::max(farthest->share, share);
+}
+
+void addSolver(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
+  const Windows windows = windowsOf(evidence);
+  const double share = shareOf(windows.at_limit, windows.all);
+  if (share < kManyWindows) return;
+  if (config.mode == RunMode::kBatch) {
+    causes->push_back({"not_converged", "The batch stopped before it converged.",
+                       "Raise batch_max_iterations " + std::to_string(config.batch_max_iterations) + ".",
+                       share});
+  } else if (windows.all >= kEnoughScans) {
+    causes->push_back({"not_converged",
+                       outOf(windows.at_limit, windows.all, "windows") + " stop before they converge.",
+                       "Raise max_iterations " + std::to_string(config.odometry.smoother.max_iterations) +
+                           ". A wrong mounting can have the same effect.",
+                       share});
+  }
+}
+
+void addPoints(const RunEvidence& evidence, std::vector<Cause>* causes) {
+  std::uint64_t came = countOf(evidence.input_faults, "points_not_finite");
+  const std::uint64_t dropped = came;
+  for (const RadarSummary& radar : evidence.radars) came += radar.points;
+  const double share = shareOf(dropped, came);
+  if (share < kManyPoints) return;
+  causes->push_back({"points_not_finite",
+                     outOf(dropped, came, "points") + " have a position or a Doppler that is not finite.",
+                     "Look for what the driver of the radar writes there, and check the radar_field_ keys.",
+                     share});
 }
 
 void addImu(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
@@ -404,21 +451,20 @@ void addMissingMounting(const Config& config, std::vector<Cause>* causes) {
 }
 
 std::vector<Check> checksOf(const RunEvidence& evidence, const std::vector<Config>& radars) {
-  const auto [windows, at_bound] = windowsAtBound(evidence);
-  double kept = 1.0, turned = 0.0;
+  const Windows windows = windowsOf(evidence);
+  double turned = 0.0;
   for (std::size_t k = 0; k < evidence.radars.size(); ++k)
     turned = std::max(turned, turnSigmas(evidence.radars[k], radars.at(k)));
-  for (const RadarSummary& radar : evidence.radars)
-    if (radar.points > 0) kept = std::min(kept, shareOf(pointsOf(radar, PointVerdict::kKept), radar.points));
   std::uint64_t imu_faults = 0;
   for (const char* fault : kImuFaults) imu_faults += countOf(evidence.input_faults, fault);
   return {
       {"started", evidence.initialized ? 1.0 : 0.0, 1.0, true},
       {"scans_used_share", usedShare(evidence), kFewScansUsed, true},
       {"silent_time_share", silentShare(evidence), kMostlySilent, false},
-      {"points_kept_share", kept, 1.0 - kManyPoints, true},
+      {"points_kept_share", keptShare(evidence), 1.0 - kManyPoints, true},
       {"scans_diverged_share", shareOf(evidence.scans_diverged, evidence.scans_judged), kManyDiverged, false},
-      {"windows_at_offset_bound_share", shareOf(at_bound, windows), kManyWindows, false},
+      {"windows_at_offset_bound_share", shareOf(windows.at_bound, windows.all), kManyWindows, false},
+      {"windows_not_converged_share", shareOf(windows.at_limit, windows.all), kManyWindows, false},
       {"mounting_turned_sigmas", turned, kFarMounting, false},
       {"imu_faults_share", std::min(1.0, shareOf(imu_faults, evidence.imu_count)), kManySamples, false},
       {"healthy_at_end", evidence.health == Health::kOk ? 1.0 : 0.0, 1.0, true}};
@@ -449,6 +495,8 @@ Diagnosis diagnose(const RunEvidence& evidence, const Config& config) {
     RadarCauses(evidence.radars[k], radars.at(k), &result.causes).add();
   addStart(evidence, config, &result.causes);
   addOffset(evidence, config, &result.causes);
+  addSolver(evidence, config, &result.causes);
+  addPoints(evidence, &result.causes);
   addImu(evidence, config, &result.causes);
   addHeading(evidence, &result.causes);
   addRestarts(evidence, config, &result.causes);
