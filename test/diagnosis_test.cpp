@@ -353,8 +353,10 @@ TEST(Diagnosis, TheImuIsNamed) {
   evidence = goodRun();
   evidence.input_faults["imu_gap"] = 100;
   expectSays(first(evidence), {"imu_gap: 100 gaps", "max_imu_gap"});
-  const std::pair<std::string, std::string> more[] = {
-      {"imu_not_finite", "NaN"}, {"imu_stamp_jump", "imu_jump_patience"}, {"imu_stuck", "gyro"}};
+  const std::pair<std::string, std::string> more[] = {{"imu_not_finite", "NaN"},
+                                                      {"imu_not_plausible", "imu_accel_range"},
+                                                      {"imu_stamp_jump", "imu_jump_patience"},
+                                                      {"imu_stuck", "gyro"}};
   for (const auto& [name, part] : more) {
     evidence = goodRun();
     evidence.input_faults[name] = 400;

@@ -64,6 +64,10 @@ TEST_F(Gate, SamplesOutOfPlaceAreDroppedAndTheOthersGoOn) {
   bad.angular_velocity.y() = std::numeric_limits<double>::infinity();
   EXPECT_EQ(feed(bad), "imu_not_finite");
   EXPECT_EQ(decision, Decision::kDrop);
+  bad = motion.imuSample(1.0);
+  bad.acceleration.x() = -1e4;
+  EXPECT_EQ(feed(bad), "imu_not_plausible");
+  EXPECT_EQ(decision, Decision::kDrop);
   EXPECT_EQ(feed(1.0), "");
   EXPECT_EQ(decision, Decision::kTake);
 }

@@ -397,6 +397,17 @@ TEST(StuckGyro, CostsLittle) {
   }
 }
 
+TEST(ImuSpike, OneImpossibleSampleCostsNothing) {
+  SimulatedRun run("difficult", 1, 40.0, 5.0);
+  run.run([&](simulation::SensorData& data) {
+    auto& samples = data.imu.samples;
+    samples[samples.size() / 2].acceleration.x() = 1e4;
+  });
+  EXPECT_EQ(run.odometry->faults()["imu_not_plausible"], 1u);
+  EXPECT_EQ(run.odometry->faults()["diverged"], 0u);
+  EXPECT_LT(run.rms(15.0, 40.0, [&](const NavigationState& state) { return run.velocityError(state); }), 0.1);
+}
+
 /// The gap loses the heading for good, and with it the direction of the velocity in W. At this speed that is
 /// metres per second, but the motion is known all the same.
 TEST(ImuGap, AtSpeedIsNoDivergence) {

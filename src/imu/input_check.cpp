@@ -6,6 +6,11 @@
 namespace rio_t {
 namespace {
 
+/// [m/s^2] 200 g. No IMU that navigates reads more.
+constexpr double kImpossibleAcceleration = 2000.0;
+/// Likewise, of the range that was told, which may be a round number.
+constexpr double kImpossibleShareOfRange = 2.0;
+
 void raise(double& variance, double density) { variance = std::max(variance, density * density); }
 
 }  // namespace
@@ -19,6 +24,10 @@ ImuInputCheck::ImuInputCheck(double max_gap, const ImuInputCheckOptions& options
 ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
   if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite())
     return {Decision::kDrop, {"imu_not_finite"}};
+  const double most =
+      options_.accel_range > 0.0 ? kImpossibleShareOfRange * options_.accel_range : kImpossibleAcceleration;
+  // Of the gyro, the check for a stuck axis replaces such a reading.
+  if (imu.acceleration.cwiseAbs().maxCoeff() > most) return {Decision::kDrop, {"imu_not_plausible"}};
 
   Verdict verdict;
   switch (stamps_.check(imu.time)) {

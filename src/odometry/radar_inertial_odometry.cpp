@@ -103,8 +103,9 @@ std::vector<ScanResult> RadarInertialOdometry::process(std::size_t max_scans) {
   while (results.size() < max_scans) {
     const auto scan = m.nextReadyScan();
     if (scan == m.waiting_scans.end()) break;
-    results.push_back(m.estimator.useScan(std::move(*scan), false));
-    m.waiting_scans.erase(scan);
+    RadarScan next = std::move(*scan);
+    m.waiting_scans.erase(scan);  // even if the estimator throws
+    results.push_back(m.estimator.useScan(std::move(next), false));
   }
   while (m.waiting_scans.size() > m.options.max_queued_scans) {
     ScanResult lost;

@@ -50,8 +50,8 @@ class ImuInputCheck {
   };
   struct Verdict {
     Decision decision = Decision::kTake;
-    /// Snake case: "imu_not_finite", "imu_out_of_order", "imu_stamp_jump", "imu_clock_restart", "imu_gap",
-    /// "imu_saturated", "imu_stuck".
+    /// Snake case: "imu_not_finite", "imu_not_plausible", "imu_out_of_order", "imu_stamp_jump",
+    /// "imu_clock_restart", "imu_gap", "imu_saturated", "imu_stuck".
     std::vector<const char*> faults = {};
     /// Samples to take first: they stand for a gap before this sample.
     std::vector<ImuMeasurement> bridge = {};

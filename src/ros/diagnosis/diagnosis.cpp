@@ -20,8 +20,9 @@ constexpr double kFewScansUsed = 0.5;
 constexpr double kMostlySilent = 0.5;
 /// [rad] A heading that is off by this much leads aside by a tenth of the way.
 constexpr double kVagueHeading = 0.1;
-constexpr const char* kImuFaults[] = {"imu_not_usable", "imu_saturated",  "imu_gap",  "imu_out_of_order",
-                                      "imu_not_finite", "imu_stamp_jump", "imu_stuck"};
+constexpr const char* kImuFaults[] = {"imu_not_usable",   "imu_saturated",  "imu_gap",
+                                      "imu_out_of_order", "imu_not_finite", "imu_not_plausible",
+                                      "imu_stamp_jump",   "imu_stuck"};
 /// Scans before anything is said: two seconds at ten a second.
 constexpr std::uint64_t kEnoughScans = 20;
 constexpr std::size_t kMostCauses = 3;
@@ -354,6 +355,8 @@ void addImu(const RunEvidence& evidence, const Config& config, std::vector<Cause
   fault("imu_out_of_order", 1, "IMU samples are out of order.", "Look for a second publisher on imu_topic.");
   fault("imu_not_finite", 1, "IMU samples are not finite.",
         "Correct the driver of the IMU: it writes NaN or infinity.");
+  fault("imu_not_plausible", 1, "IMU samples have an acceleration that no IMU measures.",
+        "Check imu_acceleration_unit and imu_accel_range, the cable and the driver of the IMU.");
   fault("imu_stamp_jump", 1, "IMU samples are stamped far ahead of the one before.",
         "Look at the clock of the driver. For an IMU with pauses, raise imu_jump_patience.");
   fault("imu_stuck", 1, "IMU samples have a gyro axis that jumps away and stays there.",
