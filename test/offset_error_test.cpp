@@ -52,7 +52,7 @@ TEST(Offset, NamesFileLineAndExpectation) {
   expectFailure("stamp,offset_s,sigma_s\n1,2,3\nx,2,3\n", "offset.csv:3: ", "'x' is not a time");
   expectFailure("stamp,offset_s,sigma_s\n1,,3\n", "offset.csv:2: ", "offset_s is ''");
   expectFailure("stamp,offset_s,sigma_s\n1,2,nan\n", "offset.csv:2: ", "sigma_s is 'nan'");
-  expectFailure("stamp,offset_s,sigma_s\n1,2,0\n", "offset.csv:2: ", "not greater than zero");
+  expectFailure("stamp,offset_s,sigma_s\n1,2,-1\n", "offset.csv:2: ", "sigma_s is below zero");
 }
 
 TEST(Offset, ErrorsAndConsistencyOfAKnownSeries) {
@@ -78,6 +78,14 @@ TEST(Offset, ConvergenceCanBeLeftOut) {
   EXPECT_EQ(offsetError(samples, 0.0, 1.5).rmse, 0.0);
   EXPECT_THROW(offsetError(samples, 0.0, 3.0), std::invalid_argument);
   EXPECT_THROW(offsetError({}, 0.0), std::invalid_argument);
+}
+
+/// The sigma of an offset that is not estimated is zero.
+TEST(Offset, WithoutASigmaThereAreNoShares) {
+  const OffsetError error = offsetError(readOffsets("stamp,offset_s,sigma_s\n1,0.05,0\n2,0.05,0\n"), 0.03);
+  EXPECT_NEAR(error.rmse, 0.02, 1e-12);
+  EXPECT_EQ(error.with_sigma, 0u);
+  EXPECT_EQ(error.share_3_sigma, 0.0);
 }
 
 }  // namespace

@@ -171,8 +171,11 @@ TEST(SeveralRadars, ContradictionsNameTheRadar) {
                        "since time_offset_shared is true"));
   EXPECT_NO_THROW(fromAssignments(withTwoRadars({"time_offset_shared=true", "time_offset_initial=0.1"})));
   // Overridden by both, the value of the top level is nobody's.
-  EXPECT_NO_THROW(fromAssignments(withTwoRadars(
-      {"time_offset_initial=0.3", "left/time_offset_initial=0.1", "right/time_offset_initial=0.1"})));
+  const TemporaryFile file(
+      "radars: [left, right]\ntime_offset_initial: 0.3\n"
+      "left: {radar_topic: /left, time_offset_initial: 0.1}\n"
+      "right: {radar_topic: /right, time_offset_initial: 0.1}\n");
+  EXPECT_NO_THROW(makeConfig(readParameterFile(file.path())));
 }
 
 TEST(SeveralRadars, PrintedConfigurationReadsBack) {
@@ -197,6 +200,22 @@ TEST(SeveralRadars, PrintedConfigurationReadsBack) {
   EXPECT_EQ(back.radars[2].radar_frame, "radar");
   EXPECT_EQ(back.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kPose);
   EXPECT_EQ(back.odometry.radars[1].ego_velocity.min_range, 0.3);
+}
+
+TEST(SeveralRadars, AValueThatEachSectionHidesIsRefused) {
+  const std::vector<std::string> sections = {"radars=[left, right]", "left/radar_topic=/a",
+                                             "right/radar_topic=/b",
+                                             "left/extrinsics_rotation_xyzw=[0, 0, 0, 1]"};
+  const auto with = [&](const std::string& more) {
+    std::vector<std::string> all = sections;
+    all.push_back(more);
+    return faultsOf(all);
+  };
+  EXPECT_EQ(
+      with("radar_topic=/c"),
+      std::vector<std::string>{"--set: radar_topic would do nothing, since each radar has its own; expected "
+                               "left/radar_topic, right/radar_topic"});
+  EXPECT_TRUE(with("mounting_yaw_pitch_roll_deg=[0, 0, 180]").empty()) << "the right radar takes it";
 }
 
 TEST(SeveralRadars, WhatARadarMayHaveOfItsOwn) {

@@ -65,7 +65,7 @@ std::vector<OffsetSample> readTimeOffsets(std::istream& in, const std::string& n
     try {
       const OffsetSample sample{parseTime(cells[stamp]), parseNumber(cells[offset], "offset_s"),
                                 parseNumber(cells[sigma], "sigma_s")};
-      if (!(sample.sigma > 0.0)) throw std::invalid_argument("sigma_s is not greater than zero");
+      if (!(sample.sigma >= 0.0)) throw std::invalid_argument("sigma_s is below zero");
       samples.push_back(sample);
     } catch (const std::invalid_argument& error) {
       throw fail(error.what());
@@ -85,13 +85,15 @@ OffsetError offsetError(const std::vector<OffsetSample>& samples, double true_of
   for (const OffsetSample& sample : samples) {
     if (sample.time - samples.front().time < skip) continue;
     const double error = sample.offset - true_offset;
-    const double normalised = std::abs(error) / sample.sigma;
     ++result.samples;
     result.mean += error;
     result.rmse += error * error;
     result.max = std::max(result.max, std::abs(error));
     result.final_error = error;
     result.final_sigma = sample.sigma;
+    if (sample.sigma == 0.0) continue;
+    const double normalised = std::abs(error) / sample.sigma;
+    ++result.with_sigma;
     result.share_1_sigma += normalised <= 1.0 ? 1.0 : 0.0;
     result.share_2_sigma += normalised <= 2.0 ? 1.0 : 0.0;
     result.share_3_sigma += normalised <= 3.0 ? 1.0 : 0.0;
@@ -104,10 +106,12 @@ OffsetError offsetError(const std::vector<OffsetSample>& samples, double true_of
   const double n = static_cast<double>(result.samples);
   result.mean /= n;
   result.rmse = std::sqrt(result.rmse / n);
-  result.share_1_sigma /= n;
-  result.share_2_sigma /= n;
-  result.share_3_sigma /= n;
-  result.mean_normalised_square /= n;
+  if (result.with_sigma == 0) return result;
+  const double m = static_cast<double>(result.with_sigma);
+  result.share_1_sigma /= m;
+  result.share_2_sigma /= m;
+  result.share_3_sigma /= m;
+  result.mean_normalised_square /= m;
   return result;
 }
 

@@ -152,6 +152,7 @@ void printTable(const std::string& file, double truth, const OffsetError& e) {
   std::printf("%s against %.3f ms, %zu samples\n", file.c_str(), 1e3 * truth, e.samples);
   std::printf("  error [ms]             mean %.3f, rmse %.3f, max %.3f, at the end %.3f (sigma %.3f)\n",
               1e3 * e.mean, 1e3 * e.rmse, 1e3 * e.max, 1e3 * e.final_error, 1e3 * e.final_sigma);
+  if (e.with_sigma == 0) return;
   std::printf("  within 1, 2, 3 sigma   %.1f %%, %.1f %%, %.1f %% (honest: 68.3, 95.4, 99.7)\n",
               100.0 * e.share_1_sigma, 100.0 * e.share_2_sigma, 100.0 * e.share_3_sigma);
   std::printf("  mean (error/sigma)^2   %.3f (honest: 1)\n", e.mean_normalised_square);
@@ -186,9 +187,10 @@ void printYaml(const std::string& file, double truth, const OffsetError& e) {
               e.samples);
   std::printf("  mean_error_s: %#.9g\n  rmse_s: %#.9g\n  max_error_s: %#.9g\n  final_error_s: %#.9g\n",
               e.mean, e.rmse, e.max, e.final_error);
-  std::printf(
-      "  final_sigma_s: %#.9g\n  share_1_sigma: %#.9g\n  share_2_sigma: %#.9g\n  share_3_sigma: %#.9g\n",
-      e.final_sigma, e.share_1_sigma, e.share_2_sigma, e.share_3_sigma);
+  std::printf("  final_sigma_s: %#.9g\n", e.final_sigma);
+  if (e.with_sigma == 0) return;
+  std::printf("  share_1_sigma: %#.9g\n  share_2_sigma: %#.9g\n  share_3_sigma: %#.9g\n", e.share_1_sigma,
+              e.share_2_sigma, e.share_3_sigma);
   std::printf("  mean_normalised_square: %#.9g\n", e.mean_normalised_square);
 }
 

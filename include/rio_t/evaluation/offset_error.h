@@ -28,6 +28,7 @@ std::vector<OffsetSample> readTimeOffsets(std::istream& in, const std::string& n
 /// runs means a wrong sigma.
 struct OffsetError {
   std::size_t samples = 0;
+  std::size_t with_sigma = 0;  ///< of them; an offset that is not estimated has a sigma of 0, and no shares
   double mean = 0.0;           ///< estimate minus truth [s]
   double rmse = 0.0;           ///< [s]
   double max = 0.0;            ///< largest magnitude [s]

@@ -39,14 +39,18 @@ def accuracy_rows(evaluations):
 
 
 def offset_rows(e):
-    return [
+    rows = [
         ["truth [ms]", f"{1e3 * e['true_s']:.3f}"],
         ["last estimate minus truth [ms]", f"{1e3 * e['final_error_s']:.3f} (sigma {1e3 * e['final_sigma_s']:.3f})"],
         ["mean error [ms]", f"{1e3 * e['mean_error_s']:.3f}"],
         ["rmse [ms]", f"{1e3 * e['rmse_s']:.3f}"],
         ["largest error [ms]", f"{1e3 * e['max_error_s']:.3f}"],
-        ["within 1, 2, 3 sigma",
-         ", ".join(f"{100 * e[f'share_{k}_sigma']:.1f} %" for k in (1, 2, 3)) + " (honest: 68.3, 95.4, 99.7)"],
-        ["mean of (error / sigma)\u00b2", f"{e['mean_normalised_square']:.3f} (honest: 1)"],
         ["estimates", str(e["samples"])],
     ]
+    if "share_1_sigma" in e:  # the offset was estimated
+        rows += [
+            ["within 1, 2, 3 sigma",
+             ", ".join(f"{100 * e[f'share_{k}_sigma']:.1f} %" for k in (1, 2, 3)) + " (honest: 68.3, 95.4, 99.7)"],
+            ["mean of (error / sigma)\u00b2", f"{e['mean_normalised_square']:.3f} (honest: 1)"],
+        ]
+    return rows

@@ -112,8 +112,13 @@ def draw_offset(table, true_offset):
     low, high = min(shown) - settled, max(shown) + settled
     margin = 0.08 * max(high - low, 0.1)
     axes[0].set_ylim(low - margin, high + margin)
-    axes[1].semilogy(t, sigma, color=ESTIMATE, linewidth=1.5, label="sigma")
     finish_axes(axes[0], "time offset [ms]")
+    if not np.any(sigma > 0):  # not estimated
+        axes[1].set_visible(False)
+        axes[0].tick_params(labelbottom=True)
+        axes[0].set_xlabel("time [s]")
+        return figure
+    axes[1].semilogy(t, sigma, color=ESTIMATE, linewidth=1.5, label="sigma")
     axes[1].yaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if sigma.max() < 100 * sigma.min() else (1,)))
     axes[1].yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes[1].yaxis.set_minor_formatter(NullFormatter())

@@ -208,8 +208,8 @@ ParameterEntry parseAssignment(const std::string& text) {
   try {
     const YAML::Node value = YAML::Load(text.substr(equals + 1));
     const std::string key = text.substr(0, equals);
-    if (!value.IsMap()) return {key, fromYaml(value), "--set"};
-    return {key, {fromYamlMap(value, false, [](int) { return "--set"; })}, "--set"};
+    if (!value.IsMap()) return {key, fromYaml(value), kCommandLine};
+    return {key, {fromYamlMap(value, false, [](int) { return kCommandLine; })}, kCommandLine};
   } catch (const YAML::Exception& error) {
     throw std::invalid_argument("--set " + text + ": the value is not YAML (" + error.msg + ")");
   } catch (const std::runtime_error& error) {

@@ -135,6 +135,33 @@ bool wasRadar(const std::string& name, const ParameterEntries& top_level) {
   });
 }
 
+/// A value on the command line that the section of each radar hides would do nothing, without a word.
+void refuseHidden(const SortedEntries& sorted, const std::vector<Config>& radars,
+                  std::vector<std::string>* faults) {
+  // Both say how the radar is turned, and the later one holds.
+  const auto isTurn = [](const std::string& key) {
+    return key == "mounting_yaw_pitch_roll_deg" || key == "extrinsics_rotation_xyzw";
+  };
+  const auto hides = [&](const Config& radar, const std::string& key) {
+    const auto section = sorted.sections.find(radar.radar_name);
+    if (section == sorted.sections.end()) return false;
+    const ParameterEntries& own = section->second.entries;
+    return std::any_of(own.begin(), own.end(), [&](const ParameterEntry& each) {
+      return each.key == key || (isTurn(each.key) && isTurn(key));
+    });
+  };
+  for (const ParameterEntry& entry : sorted.top_level) {
+    const bool is_hidden =
+        !radars.empty() && std::all_of(radars.begin(), radars.end(),
+                                       [&](const Config& radar) { return hides(radar, entry.key); });
+    if (!is_hidden || entry.origin != kCommandLine) continue;
+    std::string expected;
+    for (const Config& radar : radars) appendItem(&expected, radar.radar_name + "/" + entry.key);
+    faults->push_back(entry.origin + ": " + entry.key +
+                      " would do nothing, since each radar has its own; expected " + expected);
+  }
+}
+
 /// Completes `radars`, whose names are known, from the top level and the sections.
 void setRadars(const SortedEntries& sorted, const Config& top_level, std::vector<Config>* radars,
                std::vector<std::string>* faults) {
@@ -325,6 +352,7 @@ Config makeConfig(const ParameterEntries& entries) {
   const SortedEntries sorted = sortedEntries(entries, list);
   beginMounting(sorted.top_level, "", &config, &faults);
   setTopLevel(sorted.top_level, list, config.radars, &faults);
+  refuseHidden(sorted, config.radars, &faults);
   const Config top_level = config;
   setRadars(sorted, top_level, &config.radars, &faults);
   config.odometry.use_barometer = !config.barometer_topic.empty();

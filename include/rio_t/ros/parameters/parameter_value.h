@@ -36,6 +36,8 @@ struct ParameterEntry {
   std::string origin;
 };
 using ParameterEntries = std::vector<ParameterEntry>;
+/// Origin of an entry from parseAssignment.
+inline const std::string kCommandLine = "--set";
 
 /// Reads a YAML file, flat but for the sections of radars; throws std::runtime_error with one line naming
 /// file, line and what was expected.
