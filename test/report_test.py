@@ -72,6 +72,19 @@ def test_page_holds_its_figures_and_numbers(report, run_folder, simulated_run, p
     assert float(cell_after(page, "last estimate minus truth [ms]").split()[0]) == pytest.approx(error, abs=2e-3)
 
 
+def test_an_offset_that_is_not_estimated_has_no_sigma(report, run_folder, recwarn):
+    table = run_folder / "time_offset.csv"
+    header, *rows = table.read_text(encoding="utf-8").splitlines()
+    sigma = header.split(",").index("sigma_s")
+    cells = [row.split(",") for row in rows]
+    table.write_text("\n".join([header] + [",".join(row[:sigma] + ["0"] + row[sigma + 1:]) for row in cells]) + "\n",
+                     encoding="utf-8")
+    page = page_of(report("--true-offset", 0.03, run_folder))
+    assert list(figures_of(page)).count("time_offset") == 1
+    assert "rmse [ms]" in page and "within 1, 2, 3 sigma" not in page
+    assert not recwarn.list
+
+
 def test_animation_covers_the_run(report, run_folder, tmp_path):
     page_of(report("--true-offset", 0.03, "--output", tmp_path / "out", "--animation", tmp_path / "run.gif", run_folder))
     with Image.open(tmp_path / "run.gif") as image:

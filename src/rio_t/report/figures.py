@@ -96,34 +96,36 @@ def draw_velocity(motions):
 
 def draw_offset(table, true_offset):
     t, offset, sigma = table["time"], 1e3 * table["offset_s"], 1e3 * table["sigma_s"]
-    figure, axes = new_figure(2, 6.0, sharex=True, gridspec_kw={"height_ratios": [2, 1]})
-    axes[0].fill_between(t, offset - 3 * sigma, offset + 3 * sigma, color=ESTIMATE, alpha=0.18, linewidth=0,
-                         label="3 sigma")
-    axes[0].plot(t, offset, color=ESTIMATE, linewidth=1.5, label="estimate")
     shown = list(offset)
     if true_offset is not None:
-        axes[0].axhline(1e3 * true_offset, color=TRUTH, linewidth=1.2, linestyle="--",
-                        label=f"truth, {1e3 * true_offset:.2f} ms")
         shown.append(1e3 * true_offset)
-        error = np.abs(offset - 1e3 * true_offset)
-        axes[1].semilogy(t, np.maximum(error, 1e-4), color=REJECTED, linewidth=1.0, label="size of the error")
     # The first sigma spans the whole prior: scaled to the estimates and the settled band.
     settled = 3 * float(np.median(sigma[len(sigma) // 2:]))
     low, high = min(shown) - settled, max(shown) + settled
     margin = 0.08 * max(high - low, 0.1)
+    is_estimated = bool(np.any(sigma > 0))
+    if is_estimated:
+        figure, axes = new_figure(2, 6.0, sharex=True, gridspec_kw={"height_ratios": [2, 1]})
+        axes[0].fill_between(t, offset - 3 * sigma, offset + 3 * sigma, color=ESTIMATE, alpha=0.18, linewidth=0,
+                             label="3 sigma")
+    else:
+        figure, axes = new_figure(1, 4.0)
+    axes[0].plot(t, offset, color=ESTIMATE, linewidth=1.5, label="estimate" if is_estimated else "as given")
+    if true_offset is not None:
+        axes[0].axhline(1e3 * true_offset, color=TRUTH, linewidth=1.2, linestyle="--",
+                        label=f"truth, {1e3 * true_offset:.2f} ms")
     axes[0].set_ylim(low - margin, high + margin)
     finish_axes(axes[0], "time offset [ms]")
-    if not np.any(sigma > 0):  # not estimated
-        axes[1].set_visible(False)
-        axes[0].tick_params(labelbottom=True)
-        axes[0].set_xlabel("time [s]")
-        return figure
-    axes[1].semilogy(t, sigma, color=ESTIMATE, linewidth=1.5, label="sigma")
-    axes[1].yaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if sigma.max() < 100 * sigma.min() else (1,)))
-    axes[1].yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes[1].yaxis.set_minor_formatter(NullFormatter())
-    finish_axes(axes[1], "[ms]")
-    axes[1].set_xlabel("time [s]")
+    if is_estimated:
+        if true_offset is not None:
+            error = np.abs(offset - 1e3 * true_offset)
+            axes[1].semilogy(t, np.maximum(error, 1e-4), color=REJECTED, linewidth=1.0, label="size of the error")
+        axes[1].semilogy(t, sigma, color=ESTIMATE, linewidth=1.5, label="sigma")
+        axes[1].yaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if sigma.max() < 100 * sigma.min() else (1,)))
+        axes[1].yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes[1].yaxis.set_minor_formatter(NullFormatter())
+        finish_axes(axes[1], "[ms]")
+    axes[-1].set_xlabel("time [s]")
     return figure
 
 
