@@ -43,6 +43,16 @@ TEST_F(CheckBag, StampsOfAnotherClockAreNamed) {
   expectRuns(odd);
 }
 
+TEST_F(CheckBag, AClockThatJumpsBackHalfwayIsNamed) {
+  Changes changes;
+  changes.cloud = [count = 0](sensor_msgs::PointCloud2& cloud) mutable {
+    if (++count > 300) cloud.header.stamp -= ros::Duration(10.0);
+    return true;
+  };
+  expectLine(check(rewritten("jump", changes)), FindingLevel::kOdd,
+             {"stamps", "after their stamps", "clock of the radar"});
+}
+
 TEST_F(CheckBag, AnImuSampleWithAWrongStampIsLeftOutAlone) {
   int count = 0;
   const BagCheck ahead = check(rewritten("imu_ahead", {[&](sensor_msgs::Imu& imu) {

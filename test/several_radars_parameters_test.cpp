@@ -202,6 +202,13 @@ TEST(SeveralRadars, PrintedConfigurationReadsBack) {
   EXPECT_EQ(back.odometry.radars[1].ego_velocity.min_range, 0.3);
 }
 
+TEST(SeveralRadars, NamesThatWouldShareAKeyAreRefused) {
+  const auto faults =
+      faultsOf({"radars=[left, from_left]", "left/radar_topic=/a", "from_left/radar_topic=/b"});
+  ASSERT_EQ(faults.size(), 1u);
+  EXPECT_EQ(faults[0], "radars: left and from_left would share keys of summary.yaml; expected another name");
+}
+
 TEST(SeveralRadars, AValueThatEachSectionHidesIsRefused) {
   const std::vector<std::string> sections = {"radars=[left, right]", "left/radar_topic=/a",
                                              "right/radar_topic=/b",

@@ -83,6 +83,10 @@ StampProposal proposeStamps(const Recording& recording, const std::vector<Messag
       proposal.odd.push_back("the scans are stamped " + milliseconds(-delay.median) +
                              " ahead of their arrival; the offset estimate covers up to " +
                              milliseconds(SmootherOptions().max_time_offset));
+    if (delay.most > kLargestDelay)
+      proposal.odd.push_back("a tenth of the scans or more arrive " + secondsText(delay.most) +
+                             " after their stamps: the clock of the radar jumps; stamp_source: arrival does "
+                             "without it");
     return proposal;
   }
   if (const HeaderTopic* trigger = triggerOf(recording, imu, cloud)) {

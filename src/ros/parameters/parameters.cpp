@@ -113,6 +113,14 @@ void setTopLevel(const ParameterEntries& entries, const ParameterList& list,
     if (find(list, radar.radar_name) == nullptr && !isReserved(radar.radar_name)) continue;
     faults->push_back("radars: expected names that are no parameters, got \"" + radar.radar_name + "\"");
   }
+  // radar_doppler_step_from_left, final_extrinsics_rotation_sigma_left
+  for (const Config& radar : radars) {
+    for (const char* part : {"from_", "sigma_"}) {
+      if (!isRadar(part + radar.radar_name, radars)) continue;
+      faults->push_back("radars: " + radar.radar_name + " and " + part + radar.radar_name +
+                        " would share keys of summary.yaml; expected another name");
+    }
+  }
 }
 
 /// Sets what stands in the section of a radar.
