@@ -52,6 +52,15 @@ TEST(HealthMonitor, ManyScansMustContradict) {
   EXPECT_EQ(feed(monitor, 13.0, 14.0, 1.0), Health::kOk);
 }
 
+/// The monitor keeps 1000 scans, here those of 100 s.
+TEST(HealthMonitor, AWindowOfMoreScansThanItKeepsIsFull) {
+  HealthOptions options;
+  options.window = 200.0;
+  HealthMonitor monitor(options, 4.0);
+  EXPECT_EQ(feed(monitor, 0.0, 95.0, 10.0), Health::kOk);
+  EXPECT_EQ(feed(monitor, 95.0, 105.0, 10.0), Health::kDiverged);
+}
+
 TEST(HealthMonitor, ScansThatDecideNothingContradictNothing) {
   // Half of the scans: a crowd that fills the view.
   HealthMonitor monitor(HealthOptions(), 4.0);

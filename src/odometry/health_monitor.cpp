@@ -70,9 +70,9 @@ void HealthMonitor::add(const Entry& entry) {
 }
 
 std::optional<double> HealthMonitor::contradiction() const {
-  if (entries_.size() < kMinScans ||
-      entries_.back().stamp - entries_.front().stamp < kMinSpan * options_.window)
-    return std::nullopt;
+  if (entries_.size() < kMinScans) return std::nullopt;
+  const bool spans_window = entries_.back().stamp - entries_.front().stamp >= kMinSpan * options_.window;
+  if (!spans_window && entries_.size() < kMaxScans) return std::nullopt;
   double sum = 0.0;
   for (const Entry& entry : entries_) sum += entry.contradiction;
   return sum / static_cast<double>(entries_.size());
