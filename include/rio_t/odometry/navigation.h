@@ -23,7 +23,8 @@ class Navigation {
     std::optional<ImuMeasurement> sample;  ///< none if it was dropped
     std::vector<const char*> faults;       ///< names for FaultCounters
     std::uint64_t clock_restarts = 0;      ///< how often the clock of the IMU has jumped so far
-    std::optional<NavigationState> state;  ///< at the sample; none before the first anchor
+    /// As published, at the sample; none before the first anchor.
+    std::optional<NavigationState> state;
   };
   Checked add(const ImuMeasurement& imu);
 
@@ -33,7 +34,8 @@ class Navigation {
   void anchor(const NavigationState& state, bool at_rest, const ImuNoise& noise, Time oldest,
               std::uint64_t clock_restarts);
 
-  std::optional<NavigationState> state() const;  ///< at the newest sample
+  /// At the newest sample. Its covariance is linear in the heading (without docs/method.md, eq. 34a).
+  std::optional<NavigationState> state() const;
   MeasuredImuNoise imuNoise() const;             ///< over the last second
   MeasuredImuNoise imuNoiseOfRun() const;        ///< root mean square of it since the first sample
 
