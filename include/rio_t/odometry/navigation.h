@@ -36,8 +36,8 @@ class Navigation {
 
   /// At the newest sample. Its covariance is linear in the heading (without docs/method.md, eq. 34a).
   std::optional<NavigationState> state() const;
-  MeasuredImuNoise imuNoise() const;             ///< over the last second
-  MeasuredImuNoise imuNoiseOfRun() const;        ///< root mean square of it since the first sample
+  MeasuredImuNoise imuNoise() const;       ///< over the last second
+  MeasuredImuNoise imuNoiseOfRun() const;  ///< root mean square of it since the first sample
 
  private:
   const ImuNoise imu_noise_;
