@@ -226,7 +226,7 @@ TEST(Diagnosis, ABatchThatDidNotConvergeIsDoubtful) {
 
 TEST(Diagnosis, PointsThatAreNotFiniteAreLost) {
   RunEvidence evidence = goodRun();
-  evidence.input_faults["points_not_finite"] = 4 * evidence.radars.front().points;
+  evidence.radars.front().points_not_finite = 4 * evidence.radars.front().points;
   expectSays(first(evidence), {"points_not_finite", "radar_field_"});
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
 }

@@ -222,6 +222,13 @@ TEST(SeveralRadars, AValueThatEachSectionHidesIsRefused) {
       with("radar_topic=/c"),
       std::vector<std::string>{"--set: radar_topic would do nothing, since each radar has its own; expected "
                                "left/radar_topic, right/radar_topic"});
+  EXPECT_EQ(
+      faultsOf({"radars=[left, right]", "left/radar_topic=/a", "right/radar_topic=/b",
+                "left/extrinsics_rotation_xyzw=[0, 0, 0, 1]", "right/extrinsics_rotation_xyzw=[0, 0, 0, 1]",
+                "mounting_yaw_pitch_roll_deg=[0, 0, 180]"})
+          .size(),
+      1u)
+      << "either key turns the radar";
   EXPECT_TRUE(with("mounting_yaw_pitch_roll_deg=[0, 0, 180]").empty()) << "the right radar takes it";
 }
 

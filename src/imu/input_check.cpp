@@ -6,9 +6,9 @@
 namespace rio_t {
 namespace {
 
-/// [m/s^2] 200 g. No IMU that navigates reads more.
+/// [m/s^2] 200 g: no IMU for navigation reads more.
 constexpr double kImpossibleAcceleration = 2000.0;
-/// Likewise, of the range that was told, which may be a round number.
+/// [ranges] Nor does an IMU whose range was told read twice that range. The told range may be rounded.
 constexpr double kImpossibleShareOfRange = 2.0;
 
 void raise(double& variance, double density) { variance = std::max(variance, density * density); }
@@ -26,7 +26,7 @@ ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
     return {Decision::kDrop, {"imu_not_finite"}};
   const double most =
       options_.accel_range > 0.0 ? kImpossibleShareOfRange * options_.accel_range : kImpossibleAcceleration;
-  // Of the gyro, the check for a stuck axis replaces such a reading.
+  // The check for a stuck axis replaces such a reading of the gyro.
   if (imu.acceleration.cwiseAbs().maxCoeff() > most) return {Decision::kDrop, {"imu_not_plausible"}};
 
   Verdict verdict;

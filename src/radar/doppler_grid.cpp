@@ -121,7 +121,7 @@ void DopplerGrid::add(const RadarScan& scan) {
     batch_[count_] = size;
     if (++count_ < kBatch) continue;
     judge();
-    // The search among values without a step is long. One batch of a scan is enough.
+    // Values without a step take the longest search: one batch a scan is enough.
     if (step_.value == 0.0) return;
   }
 }

@@ -40,7 +40,7 @@ void GroundVehicleChannel::join(FixedLagSmoother& smoother, bool at_rest) {
   Eigen::MatrixXd J = Eigen::MatrixXd::Zero(3, StateBlock::kMotionTangent + 3);
   J.rightCols<3>().diagonal().setConstant(1.0 / options_.rotation_sigma);
   addPrior(window, {node, frame_.get()}, {J, Eigen::VectorXd::Zero(3)});
-  // What the estimate before showed may have been its own fault.
+  // The old estimate may have been wrong when it contradicted the vehicle.
   judged_at_.reset();
   judged_.clear();
   judged_span_ = 0.0;

@@ -218,7 +218,7 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
   Graph graph = place(problem, t_O, problem.guess, problem.mounting);
   solution.placements = 1;
   double moved_before = std::numeric_limits<double>::infinity();
-  double share = 1.0;  // of the way that the offsets are taken
+  double share = 1.0;  // of its move that an offset takes
   for (;;) {
     Solution solved = rio_t::solve(graph.window, {batch_.max_iterations - solution.iterations, kConverged},
                                    options_.solver);
@@ -241,7 +241,7 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
       solution.system.blocks.clear();  // they go with the graph
       return solution;
     }
-    // A sparse radar's offset may come out early where it was placed late, and the other way round.
+    // The nodes of a sparse radar may swing: placed late, its offset comes out early, and then late again.
     if (moved > 0.5 * moved_before) share *= 0.5;
     moved_before = moved;
     for (std::size_t i = 0; i < t_O.size(); ++i) t_O[i] += share * (graph.scans[i].offset->x[0] - t_O[i]);

@@ -76,12 +76,13 @@ RunSummary BagPlayer::summary(const RunLog& log) const {
       told.points_per_scan[i] = static_cast<std::uint64_t>(quantile(radar.scan_sizes, kShares[i]));
     }
     told.scans_total = radar.scans_total;
+    told.points_not_finite = radar.points_not_finite;
+    if (radar.points_not_finite > 0) summary.input_faults["points_not_finite"] += radar.points_not_finite;
     for (const auto& [reason, given_up] : radar.stamper.givenUp()) told.scans_rejected[reason] += given_up;
     count(radar.not_usable, &told.scans_rejected);
     count(radar.triggers_not_usable, &summary.input_faults);
     warn(radar.not_usable);
   }
-  if (points_not_finite_ > 0) summary.input_faults["points_not_finite"] = points_not_finite_;
   count(imu_not_usable_, &summary.input_faults);
   count(pressure_not_usable_, &summary.input_faults);
   for (const Radar& radar : radars_) warn(radar.triggers_not_usable);
@@ -149,7 +150,7 @@ void BagPlayer::addCloud(const sensor_msgs::PointCloud2& message, Time record, R
     notUsable("cloud_not_usable", "topic " + radar.topic + ": " + error.what(), &radar.not_usable);
     return;
   }
-  points_not_finite_ += decoded.dropped_not_finite;
+  radar.points_not_finite += decoded.dropped_not_finite;
   radar.scan_sizes.push_back(static_cast<double>(decoded.cloud.size()));
   try {
     radar.stamper.addScan(message.header.seq, toTime(message.header.stamp), record,

@@ -53,7 +53,7 @@ class BagPlayer {
     std::string topic, trigger_topic;  // the latter is empty if triggers are not read
     PointCloudFormat format;
     ScanStamper stamper;
-    std::uint64_t scans_total = 0;
+    std::uint64_t scans_total = 0, points_not_finite = 0;
     std::vector<double> scan_sizes;  // numbers of points
     NotUsableByKind not_usable, triggers_not_usable;
   };
@@ -78,7 +78,7 @@ class BagPlayer {
   EvidenceCollector evidence_;
   ClockJumpDetector imu_stamps_;  // the same judgement as the odometry's own
   std::vector<ImuRestart> imu_restarts_;
-  std::uint64_t imu_count_ = 0, pressure_count_ = 0, points_not_finite_ = 0;
+  std::uint64_t imu_count_ = 0, pressure_count_ = 0;
   NotUsableByKind imu_not_usable_, pressure_not_usable_;
 };
 

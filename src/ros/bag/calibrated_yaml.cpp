@@ -36,7 +36,7 @@ ProposedKeys calibratedKeys(const RadarCalibration& calibration, const Config& t
   keys.set("extrinsics_translation", writtenList(calibration.T_IR.l_I, mounting.l_I, kMicro));
   keys.set("extrinsics_rotation_xyzw",
            writtenList(calibration.T_IR.q_IR.coeffs(), mounting.q_IR.coeffs(), kNano));
-  // The sigma is the prior of the next run, whose offset may differ by what the detector takes for no step.
+  // The next run starts from this sigma. Its offset may differ by as much as the step detector ignores.
   const double least = told.odometry.offset_step_detector.min_change;
   const OffsetEstimate offset =
       offset_found

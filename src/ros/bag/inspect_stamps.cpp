@@ -85,8 +85,8 @@ StampProposal proposeStamps(const Recording& recording, const std::vector<Messag
                              milliseconds(SmootherOptions().max_time_offset));
     if (delay.most > kLargestDelay)
       proposal.odd.push_back("a tenth of the scans or more arrive " + secondsText(delay.most) +
-                             " after their stamps: the clock of the radar jumps; stamp_source: arrival does "
-                             "without it");
+                             " after their stamps: the clock of the radar jumps; stamp_source: arrival "
+                             "ignores its stamps");
     return proposal;
   }
   if (const HeaderTopic* trigger = triggerOf(recording, imu, cloud)) {

@@ -5,14 +5,12 @@
 #include <stdexcept>
 
 #include "../text.h"
+#include "radar_causes.h"
 
 namespace rio_t {
 namespace {
 
-// A cause shows if it explains at least this share of the evidence. Good runs stay far below: on one real and
-// two simulated bags the gate rejected at most 0.2 % of the scans and the filter no point (docs/tools.md).
-constexpr double kManyScans = 0.3;
-constexpr double kManyPoints = 0.6;
+// As kManyScans.
 constexpr double kManyWindows = 0.3;
 constexpr double kManyDiverged = 0.1;
 constexpr double kManySamples = 0.05;
@@ -23,19 +21,7 @@ constexpr double kVagueHeading = 0.1;
 constexpr const char* kImuFaults[] = {"imu_not_usable",   "imu_saturated",  "imu_gap",
                                       "imu_out_of_order", "imu_not_finite", "imu_not_plausible",
                                       "imu_stamp_jump",   "imu_stuck"};
-/// Scans before anything is said: two seconds at ten a second.
-constexpr std::uint64_t kEnoughScans = 20;
 constexpr std::size_t kMostCauses = 3;
-/// The remedy for a wrong mounting, sign or axes.
-constexpr const char* kCheckBag = " Run `rosrun rio_t check_bag BAG`: it finds all three.";
-
-std::uint64_t pointsOf(const RadarSummary& radar, PointVerdict verdict) {
-  return radar.points_by_verdict[static_cast<std::size_t>(verdict)];
-}
-
-double shareOf(std::uint64_t part, std::uint64_t whole) {
-  return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
-}
 
 /// Windows that were solved, and those of them that ended with the offset at its bound or at the iteration
 /// limit.
@@ -48,18 +34,6 @@ Windows windowsOf(const RunEvidence& evidence) {
   windows.at_bound = countOf(evidence.solver_terminations, toString(SolverTermination::kAtBound));
   windows.at_limit = countOf(evidence.solver_terminations, toString(SolverTermination::kIterationLimit));
   return windows;
-}
-
-/// Share of the points that the filter kept, of those that came: the decoder drops what is not finite.
-double keptShare(const RunEvidence& evidence) {
-  double kept = 1.0;
-  std::uint64_t decoded = 0;
-  for (const RadarSummary& radar : evidence.radars) {
-    decoded += radar.points;
-    if (radar.points > 0) kept = std::min(kept, shareOf(pointsOf(radar, PointVerdict::kKept), radar.points));
-  }
-  const std::uint64_t came = decoded + countOf(evidence.input_faults, "points_not_finite");
-  return came > 0 ? kept * shareOf(decoded, came) : kept;
 }
 
 /// Share of the scans after the start that were used.
@@ -77,188 +51,8 @@ double silentShare(const RunEvidence& evidence) {
   return evidence.run_seconds > 0.0 ? evidence.silent_seconds / evidence.run_seconds : 0.0;
 }
 
-std::string number(double value) { return shortText(value, 3); }
-
 /// A stamp, to the millisecond.
 std::string stampText(Time time) { return fixedText(time.seconds(), 3) + " s"; }
-
-std::string outOf(std::uint64_t part, std::uint64_t whole, const std::string& what) {
-  return std::to_string(part) + " of " + std::to_string(whole) + " " + what;
-}
-
-/// How far the estimated mounting is turned from the told one, about the worst axis.
-double turnSigmas(const RadarSummary& radar, const Config& config) {
-  return radar.turn.cwiseAbs().maxCoeff() / config.odometry.smoother.extrinsics_rotation_sigma;
-}
-
-/// Everything that speaks of one radar.
-class RadarCauses {
- public:
-  RadarCauses(const RadarSummary& radar, const Config& config, std::vector<Cause>* causes)
-      : radar_(radar),
-        config_(config),
-        key_(prefixOf(radar.name)),
-        of_(radar.name.empty() ? "" : " of radar " + radar.name),
-        causes_(causes) {}
-
-  void add() {
-    if (radar_.scans_total < kEnoughScans) return;
-    addPointFilter();
-    addStamps();
-    addVelocities();
-    addContradictions();
-    addMounting();
-  }
-
- private:
-  void cause(const std::string& name, double share, const std::string& text, const std::string& remedy) {
-    causes_->push_back({name, text, remedy, share});
-  }
-
-  /// A reason why scans were rejected, or gave no velocity before the start.
-  void scans(const std::string& reason, const std::string& text, const std::string& remedy) {
-    const std::uint64_t count =
-        countOf(radar_.scans_rejected, reason) + countOf(radar_.velocity_status, reason);
-    const double share = shareOf(count, radar_.scans_total);
-    if (share < kManyScans) return;
-    cause(reason, share, outOf(count, radar_.scans_total, "scans") + of_ + " " + text, remedy);
-  }
-
-  void addPointFilter() {
-    const EgoVelocityOptions& o = config_.odometry.ego_velocity;
-    const auto filter = [&](PointVerdict verdict, const std::string& name, const std::string& are,
-                            const std::string& remedy) {
-      const std::uint64_t taken = pointsOf(radar_, verdict);
-      const double share = shareOf(taken, radar_.points);
-      if (share < kManyPoints) return;
-      cause(name, share, outOf(taken, radar_.points, "points") + of_ + " are " + are, remedy);
-    };
-    filter(PointVerdict::kTooWeak, "points_too_weak",
-           "below " + key_ + "radar_min_snr_db " + number(o.min_snr_db) + " dB: their mean is " +
-               number(radar_.snr_sum_db / static_cast<double>(std::max<std::uint64_t>(1, radar_.points))) +
-               " dB, and " + powerReader() + " reads the power as " +
-               toString(pointCloudFormat(config_).power_unit) + ".",
-           "Set " + key_ +
-               "radar_power_unit to the unit of your driver (not_snr if it is no SNR), or lower " + key_ +
-               "radar_min_snr_db.");
-    filter(PointVerdict::kTooNear, "points_too_near",
-           "nearer than " + key_ + "radar_min_range " + number(o.min_range) + " m.",
-           "Lower " + key_ + "radar_min_range, and check the unit of the positions.");
-    filter(PointVerdict::kTooFar, "points_too_far",
-           "farther than " + key_ + "radar_max_range " + number(o.max_range) + " m.",
-           "Raise " + key_ + "radar_max_range, and check the unit of the positions.");
-    filter(PointVerdict::kBesideView, "points_beside_view",
-           "farther than " + key_ + "radar_max_azimuth " + number(o.max_azimuth) +
-               " rad to either side of forward.",
-           "The axes of the cloud are probably others: set " + key_ + "radar_axes to rfu or flu.");
-    filter(PointVerdict::kAboveView, "points_above_view",
-           "higher or lower than " + key_ + "radar_max_elevation " + number(o.max_elevation) + " rad.",
-           "The axes of the cloud are probably others: set " + key_ + "radar_axes to rfu or flu.");
-    filter(PointVerdict::kNoDirection, "points_without_direction", "at range zero.",
-           "Check the names of the position fields: " + key_ + "radar_field_x and the next ones.");
-    filter(
-        PointVerdict::kAmbiguous, "points_ambiguous",
-        "ambiguous: the radar reports one echo at several directions, with the same range, Doppler and SNR.",
-        "Let the driver of the radar report one direction for each echo (multiObjBeamForming of TI radars).");
-  }
-
-  std::string powerReader() const {
-    return config_.radar_overrides.power_unit ? key_ + "radar_power_unit"
-                                              : "the preset " + config_.radar_format;
-  }
-
-  void addStamps() {
-    const std::string other =
-        "Set " + key_ + "stamp_source: arrival, or correct the clock with " + key_ + "radar_stamp_shift.";
-    scans("stamp_zero", "have a stamp of zero.", "Set " + key_ + "stamp_source to trigger or arrival.");
-    scans("stamp_out_of_range", "have a stamp below zero or later than ROS can hold.",
-          "Correct " + key_ + "radar_stamp_shift or the stamps of the driver.");
-    const double before_imu = shareOf(radar_.scans_before_imu, radar_.scans_total);
-    if (before_imu >= kManyScans)
-      cause("stamp_before_imu", before_imu,
-            outOf(radar_.scans_before_imu, radar_.scans_total, "scans") + of_ +
-                " are stamped before the first IMU sample, the first of them by " +
-                fixedText(radar_.seconds_before_imu, 1) + " s.",
-            other);
-    scans("stamp_ahead_of_imu", "are stamped ahead of the newest IMU sample.", other);
-    scans("older_than_window", "are stamped before the IMU samples that are kept.", other);
-    scans("imu_not_covering", "are stamped at a time without IMU samples.", other);
-    const double zero_triggers = shareOf(radar_.triggers_zero, radar_.scans_total);
-    if (zero_triggers < kManyScans) {
-      scans("trigger_missing", "have no trigger message.",
-            "Check " + key_ + "trigger_topic, or set " + key_ + "stamp_source to header or arrival.");
-    } else {
-      cause("trigger_stamp_zero", std::min(1.0, zero_triggers),
-            std::to_string(radar_.triggers_zero) + " messages on " + key_ + "trigger_topic " +
-                config_.trigger_topic + " have a stamp of zero, for " + std::to_string(radar_.scans_total) +
-                " scans.",
-            "Correct the driver of the trigger, or set " + key_ + "stamp_source to header or arrival.");
-    }
-    scans("duplicate_stamp", "have the stamp of another scan.",
-          "The driver repeats its stamps: set " + key_ + "stamp_source: arrival.");
-    scans("queue_full", "waited too long for the IMU or the solver.",
-          "Set " + key_ +
-              "stamp_source: arrival if the stamps are ahead of the IMU; lower window if the computer "
-              "is too slow.");
-    scans("cloud_not_usable", "cannot be read.",
-          "Set " + key_ + "radar_format and the radar_field_ keys to the fields of your cloud.");
-  }
-
-  /// Scans whose points give no velocity, before the start and after it.
-  void addVelocities() {
-    const std::uint64_t kept = pointsOf(radar_, PointVerdict::kKept);
-    // The points that the filter took are a cause of their own.
-    if (shareOf(kept, radar_.points) > 1.0 - kManyPoints || radar_.points == 0) {
-      scans("too_few_points",
-            "have too few points for a velocity: " + number(shareOf(kept, radar_.scans_total)) +
-                " on average after the filter.",
-            "Set a lower detection threshold in the driver of the radar. Set radar_factor: doppler if it is "
-            "velocity.");
-    }
-    scans("too_few_inliers", "have no velocity that enough of their points agree on.",
-          "Check " + key_ + "radar_field_doppler, " + key_ +
-              "radar_axes and the positions. Moving things in view have the same effect.");
-    scans("ill_conditioned", "have all their points in one direction.",
-          "Widen the view of the radar: " + key_ + "radar_max_azimuth and " + key_ + "radar_max_elevation.");
-    scans("sigma_too_large", "have a velocity that is too uncertain.",
-          "Raise " + key_ + "ego_velocity_max_sigma, or let the radar report more points.");
-    scans("ambiguous", "show two velocities, and nothing tells which is that of the static world.",
-          "Something that moves fills the view: turn the radar away from it.");
-  }
-
-  /// Scans that give a velocity that the IMU contradicts.
-  void addContradictions() {
-    const std::uint64_t judged = radar_.scans_total - radar_.scans_before_start;
-    const std::uint64_t contradicted =
-        countOf(radar_.scans_rejected, "innovation") + countOf(radar_.scans_rejected, "infeasible_velocity");
-    const double share = shareOf(contradicted, judged);
-    if (share < kManyScans) return;
-    cause("contradicts_imu", share,
-          outOf(contradicted, judged, "scans") + of_ + " show a velocity that contradicts the IMU.",
-          "Check the mounting (" + key_ + "extrinsics_rotation_xyzw, order x, y, z, w), " + key_ +
-              "radar_doppler_sign and " + key_ + "radar_axes." + kCheckBag +
-              " estimate_extrinsics: rotation corrects up to 10 degrees by itself.");
-  }
-
-  /// An estimate that follows a wrong sign turns the mounting around, and then contradicts nothing.
-  void addMounting() {
-    const double sigmas = turnSigmas(radar_, config_);
-    if (sigmas <= kFarMounting) return;
-    const Eigen::Vector3d turn = radar_.turn / kDegree;
-    cause("mounting_far", 1.0 - kFarMounting / sigmas,
-          "The estimated mounting" + of_ + " is turned from the told one by " + fixedText(turn.x(), 0) +
-              ", " + fixedText(turn.y(), 0) + ", " + fixedText(turn.z(), 0) +
-              " degrees about x, y, z of the IMU, with " + key_ + "extrinsics_rotation_sigma " +
-              number(config_.odometry.smoother.extrinsics_rotation_sigma / kDegree) + " degrees.",
-          "Check " + key_ + "radar_doppler_sign, " + key_ + "radar_axes and the mounting (" + key_ +
-              "extrinsics_rotation_xyzw, order x, y, z, w)." + kCheckBag);
-  }
-
-  const RadarSummary& radar_;
-  const Config& config_;
-  const std::string key_, of_;
-  std::vector<Cause>* causes_;
-};
 
 bool has(const std::string& text, const char* part) { return text.find(part) != std::string::npos; }
 
@@ -324,18 +118,6 @@ void addSolver(const RunEvidence& evidence, const Config& config, std::vector<Ca
                            ". A wrong mounting can have the same effect.",
                        share});
   }
-}
-
-void addPoints(const RunEvidence& evidence, std::vector<Cause>* causes) {
-  std::uint64_t came = countOf(evidence.input_faults, "points_not_finite");
-  const std::uint64_t dropped = came;
-  for (const RadarSummary& radar : evidence.radars) came += radar.points;
-  const double share = shareOf(dropped, came);
-  if (share < kManyPoints) return;
-  causes->push_back({"points_not_finite",
-                     outOf(dropped, came, "points") + " have a position or a Doppler that is not finite.",
-                     "Look for what the driver of the radar writes there, and check the radar_field_ keys.",
-                     share});
 }
 
 void addImu(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
@@ -455,16 +237,19 @@ void addMissingMounting(const Config& config, std::vector<Cause>* causes) {
 
 std::vector<Check> checksOf(const RunEvidence& evidence, const std::vector<Config>& radars) {
   const Windows windows = windowsOf(evidence);
-  double turned = 0.0;
+  double kept = 1.0, turned = 0.0;
   for (std::size_t k = 0; k < evidence.radars.size(); ++k)
     turned = std::max(turned, turnSigmas(evidence.radars[k], radars.at(k)));
+  for (const RadarSummary& radar : evidence.radars)
+    if (pointsReceived(radar) > 0)
+      kept = std::min(kept, shareOf(pointsOf(radar, PointVerdict::kKept), pointsReceived(radar)));
   std::uint64_t imu_faults = 0;
   for (const char* fault : kImuFaults) imu_faults += countOf(evidence.input_faults, fault);
   return {
       {"started", evidence.initialized ? 1.0 : 0.0, 1.0, true},
       {"scans_used_share", usedShare(evidence), kFewScansUsed, true},
       {"silent_time_share", silentShare(evidence), kMostlySilent, false},
-      {"points_kept_share", keptShare(evidence), 1.0 - kManyPoints, true},
+      {"points_kept_share", kept, 1.0 - kManyPoints, true},
       {"scans_diverged_share", shareOf(evidence.scans_diverged, evidence.scans_judged), kManyDiverged, false},
       {"windows_at_offset_bound_share", shareOf(windows.at_bound, windows.all), kManyWindows, false},
       {"windows_not_converged_share", shareOf(windows.at_limit, windows.all), kManyWindows, false},
@@ -495,11 +280,10 @@ Diagnosis diagnose(const RunEvidence& evidence, const Config& config) {
   Diagnosis result;
   const std::vector<Config> radars = configsOfRadars(config);
   for (std::size_t k = 0; k < evidence.radars.size(); ++k)
-    RadarCauses(evidence.radars[k], radars.at(k), &result.causes).add();
+    addCausesOfRadar(evidence.radars[k], radars.at(k), &result.causes);
   addStart(evidence, config, &result.causes);
   addOffset(evidence, config, &result.causes);
   addSolver(evidence, config, &result.causes);
-  addPoints(evidence, &result.causes);
   addImu(evidence, config, &result.causes);
   addHeading(evidence, &result.causes);
   addRestarts(evidence, config, &result.causes);

@@ -117,7 +117,9 @@ void LiveMonitor::dropped(std::size_t radar, const std::string& reason, std::uin
   of.dropped[reason] += count;
   if (isEarly(reason)) {
     of.early += count;
-  } else if (reason != "points_not_finite") {
+  } else if (reason == "points_not_finite") {
+    collector_.addNotFinite(radar, count);
+  } else {
     collector_.addDropped(radar, reason, count);
   }
 }

@@ -113,7 +113,8 @@ void setTopLevel(const ParameterEntries& entries, const ParameterList& list,
     if (find(list, radar.radar_name) == nullptr && !isReserved(radar.radar_name)) continue;
     faults->push_back("radars: expected names that are no parameters, got \"" + radar.radar_name + "\"");
   }
-  // radar_doppler_step_from_left, final_extrinsics_rotation_sigma_left
+  // `radar_doppler_step_from_left` must belong to one radar, and so must
+  // `final_extrinsics_rotation_sigma_left`.
   for (const Config& radar : radars) {
     for (const char* part : {"from_", "sigma_"}) {
       if (!isRadar(part + radar.radar_name, radars)) continue;
@@ -143,7 +144,8 @@ bool wasRadar(const std::string& name, const ParameterEntries& top_level) {
   });
 }
 
-/// A value on the command line that the section of each radar hides would do nothing, without a word.
+/// Refuses a value on the command line that every radar overrides in its section: it would silently do
+/// nothing.
 void refuseHidden(const SortedEntries& sorted, const std::vector<Config>& radars,
                   std::vector<std::string>* faults) {
   // Both say how the radar is turned, and the later one holds.

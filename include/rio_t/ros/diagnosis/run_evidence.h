@@ -47,6 +47,7 @@ struct RadarSummary : RadarEstimate {
   Counts scans_rejected;                 ///< by reason
   Counts velocity_status;                ///< of the scans before the start, by EgoVelocityStatus
   std::uint64_t points = 0;              ///< of all scans
+  std::uint64_t points_not_finite = 0;   ///< besides these: the decoder drops them
   std::array<std::uint64_t, kPointVerdicts> points_by_verdict = {};
   double snr_sum_db = 0.0;   ///< over `points`
   PointVariances noise;      ///< of its points, as learned; the file has its standard deviations
@@ -101,6 +102,10 @@ class EvidenceCollector {
   void addState(Time time);
   /// Scans that were dropped before the odometry saw them.
   void addDropped(std::size_t radar, const std::string& reason, std::uint64_t count);
+  /// Points that the decoder dropped.
+  void addNotFinite(std::size_t radar, std::uint64_t count) {
+    evidence_.radars.at(radar).points_not_finite += count;
+  }
   /// A trigger that was dropped, as its stamp is zero.
   void addZeroTrigger(std::size_t radar) { ++evidence_.radars.at(radar).triggers_zero; }
   /// The evidence so far, with what `odometry` knows and its `start`. `scans_total` counts the results and
