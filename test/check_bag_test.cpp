@@ -132,6 +132,32 @@ TEST_F(CheckBag, ADopplerThatIsNotFiniteIsNamed) {
   EXPECT_FALSE(odd.ready());
 }
 
+TEST_F(CheckBag, PointsThatAreNotFiniteAreNamed) {
+  int points = 0;
+  Changes changes;
+  changes.cloud = [&](sensor_msgs::PointCloud2& cloud) {
+    sensor_msgs::PointCloud2Iterator<float> doppler(cloud, "v_doppler_mps");
+    for (; doppler != doppler.end(); ++doppler)
+      if (++points % 5 == 0) *doppler = std::nanf("");
+    return true;
+  };
+  const BagCheck odd = check(rewritten("some_nan", changes));
+  expectLine(odd, FindingLevel::kOdd, {"points", "20 % have a position or a Doppler that is not finite"});
+  EXPECT_TRUE(odd.ready());
+}
+
+TEST_F(CheckBag, ScansBeforeTheStartAreNotMissed) {
+  const BagCheck plain = check(bag_);
+  const RunSummary summary = run(plain);
+  std::uint64_t before = 0;
+  for (const RadarSummary& radar : summary.radars) before += radar.scans_before_start;
+  ASSERT_GT(before, 0u);
+  const double share =
+      100.0 * static_cast<double>(summary.scansUsed()) / static_cast<double>(summary.scansTotal() - before);
+  expectLine(plain, FindingLevel::kOk,
+             {"trial run", std::to_string(std::lround(share)) + " % of the scans after the start used"});
+}
+
 TEST_F(CheckBag, ACloudWithoutDopplerIsNamedWithItsFields) {
   Changes changes;
   changes.cloud = [](sensor_msgs::PointCloud2& cloud) {
@@ -250,6 +276,7 @@ TEST_F(CheckBag, ATrialRunThatIsBadSaysWhy) {
   const BagCheck odd = check(bag);
   expectLine(odd, FindingLevel::kOdd, {"trial run", "the run is bad: No scan was used from"});
   EXPECT_NE(odd.to_do, "");
+  EXPECT_EQ(odd.to_do.find("mounting"), std::string::npos) << odd.to_do;
   CheckRequest request;
   request.bags = {bag};
   std::ostringstream out, err;

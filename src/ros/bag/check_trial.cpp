@@ -13,10 +13,11 @@ struct Trial {
   RunSummary summary;
   std::uint64_t copies = 0;  ///< clouds that were recorded twice: they say nothing about the configuration
 
-  /// Copies do not count.
+  /// Neither copies nor scans before the start count.
   double shareUsed() const {
     const std::uint64_t duplicates = countOf(summary.scansRejected(), "duplicate_stamp");
-    const std::uint64_t judged = summary.scansTotal() - std::min(copies, duplicates);
+    std::uint64_t judged = summary.scansTotal() - std::min(copies, duplicates);
+    for (const RadarSummary& radar : summary.radars) judged -= radar.scans_before_start;
     return static_cast<double>(summary.scansUsed()) / static_cast<double>(std::max<std::uint64_t>(1, judged));
   }
   bool good() const {
@@ -46,7 +47,7 @@ Trial tryOut(const Recording& recording, const std::string& yaml, double duratio
 }
 
 std::string shareText(const Trial& trial) {
-  return fixedText(100.0 * trial.shareUsed(), 0) + " % of the scans used";
+  return fixedText(100.0 * trial.shareUsed(), 0) + " % of the scans after the start used";
 }
 
 std::string offsetsText(const RunSummary& summary) {
@@ -59,13 +60,15 @@ std::string offsetsText(const RunSummary& summary) {
   return text;
 }
 
+/// Such a cause sends the user to check_bag, which runs already.
+bool isAboutMounting(const Cause& cause) { return cause.remedy.find("check_bag") != std::string::npos; }
+
 std::string verdictText(const Diagnosis& diagnosis) {
   std::string text = "the run is " + toString(diagnosis.verdict);
   if (diagnosis.causes.empty()) return text;
   const Cause& cause = diagnosis.causes.front();
   text += ": " + cause.text;
-  // The user runs check_bag already.
-  return cause.remedy.find("check_bag") == std::string::npos ? text + " " + cause.remedy : text;
+  return isAboutMounting(cause) ? text : text + " " + cause.remedy;
 }
 
 void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
@@ -88,11 +91,12 @@ void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
                              "divergences: " + std::to_string(s.divergences) + ", at the end " +
                                  toString(s.health) + "; " + numbers});
   check->findings.push_back({FindingLevel::kOdd, "trial run", verdictText(s.diagnosis)});
-  check->to_do =
-      "The odometry does not run well with what the bag shows. Look at the odd lines. Measure the mounting "
-      "and "
-      "give it: --set mounting_yaw_pitch_roll_deg=[YAW,PITCH,ROLL] --set extrinsics_translation=[X,Y,Z] "
-      "(docs/your_sensors.md, section 6).";
+  check->to_do = "The odometry does not run well with what the bag shows. Look at the odd lines.";
+  const std::vector<Cause>& causes = s.diagnosis.causes;
+  if (causes.empty() || isAboutMounting(causes.front()))
+    check->to_do +=
+        " Measure the mounting and give it: --set mounting_yaw_pitch_roll_deg=[YAW,PITCH,ROLL] "
+        "--set extrinsics_translation=[X,Y,Z] (docs/your_sensors.md, section 6).";
 }
 
 }  // namespace

@@ -52,7 +52,7 @@ std::vector<double> valuesOf(const CloudTopic& topic, PointCloudFormat format, c
   format.doppler_sign = 1;
   format.power_unit = PowerUnit::kNotSnr;
   std::vector<double> values;
-  for (const RadarScan& scan : decodeAll(topic, format)) {
+  for (const RadarScan& scan : decodeAll(topic, format).scans) {
     for (const RadarPoint& point : scan.points) values.push_back(point.doppler);
   }
   return values;
@@ -188,7 +188,7 @@ void findPower(const CloudTopic& topic, bool unit_is_told, FormatProposal* propo
     return;
   }
   std::vector<double> decibels;
-  for (const RadarScan& scan : decodeAll(topic, proposal->format)) {
+  for (const RadarScan& scan : decodeAll(topic, proposal->format).scans) {
     for (const RadarPoint& point : scan.points) decibels.push_back(point.snr_db);
   }
   proposal->power = "SNR " + fixedText(quantile(decibels, 0.1), 0) + " to " +
@@ -207,16 +207,18 @@ void findPower(const CloudTopic& topic, bool unit_is_told, FormatProposal* propo
 
 bool hasPoints(const PointCloud2& cloud) { return !cloud.data.empty() && !cloud.fields.empty(); }
 
-std::vector<RadarScan> decodeAll(const CloudTopic& topic, const PointCloudFormat& format) {
-  std::vector<RadarScan> scans;
+DecodedClouds decodeAll(const CloudTopic& topic, const PointCloudFormat& format) {
+  DecodedClouds clouds;
   for (const auto& message : topic.messages) {
     try {
-      scans.push_back(toRadarScan(decode(*message, format).cloud, Time()));
+      const DecodedScan decoded = decode(*message, format);
+      clouds.scans.push_back(toRadarScan(decoded.cloud, Time()));
+      clouds.points_not_finite += decoded.dropped_not_finite;
     } catch (const std::exception&) {
-      scans.emplace_back();
+      clouds.scans.emplace_back();
     }
   }
-  return scans;
+  return clouds;
 }
 
 bool isCloudKey(const std::string& key) {

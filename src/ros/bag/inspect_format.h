@@ -38,7 +38,12 @@ FormatProposal proposeFormat(const CloudTopic& topic, const ParameterEntries& to
 bool correctAxes(const CloudReport& cloud, bool mirrored, const ParameterEntries& told,
                  FormatProposal* proposal);
 
-/// The scans as the format reads them, without stamps. What cannot be decoded is empty.
-std::vector<RadarScan> decodeAll(const CloudTopic& topic, const PointCloudFormat& format);
+struct DecodedClouds {
+  std::vector<RadarScan> scans;       ///< without stamps; what cannot be decoded is empty
+  std::size_t points_not_finite = 0;  ///< left out of the scans
+};
+
+/// The clouds as the format reads them.
+DecodedClouds decodeAll(const CloudTopic& topic, const PointCloudFormat& format);
 
 }  // namespace rio_t

@@ -11,7 +11,8 @@
 namespace rio_t {
 namespace {
 
-constexpr double kStraight = M_PI;  // [rad]
+constexpr double kStraight = M_PI;     // [rad]
+constexpr double kOnePercent = 0.005;  // rounded
 
 std::string degrees(double radians) { return fixedText(radians / kDegree, 0); }
 
@@ -50,6 +51,7 @@ MountingSearchOptions searchOptions(const ImuInspection& imu, const InertialTrac
 
 struct Looked {
   std::vector<RadarScan> scans;
+  std::size_t points_not_finite = 0;
   CloudReport cloud;
   RadarVelocities velocities;
   DopplerSign sign;
@@ -59,7 +61,9 @@ struct Looked {
 Looked look(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud,
             const StampProposal& stamps, const PointCloudFormat& format, const InertialTrack& track) {
   Looked looked;
-  looked.scans = stampScans(recording, imu.times, cloud, stamps, decodeAll(cloud, format));
+  DecodedClouds decoded = decodeAll(cloud, format);
+  looked.points_not_finite = decoded.points_not_finite;
+  looked.scans = stampScans(recording, imu.times, cloud, stamps, std::move(decoded.scans));
   looked.cloud = inspectCloud(looked.scans);
   looked.velocities = radarVelocities(looked.scans);
   looked.sign = dopplerSignFromRanges(looked.scans, track);
@@ -94,7 +98,13 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
   if (c.range_99 > kIncredible)
     tell(radar, FindingLevel::kOdd, "points",
          "the ranges reach " + fixedText(c.range_99, 0) + " m: are the positions in m?");
-  if (c.ambiguous > 0.005)  // one per cent
+  const double not_finite = static_cast<double>(looked.points_not_finite);
+  const double share_not_finite = not_finite / (not_finite + static_cast<double>(c.points));
+  if (share_not_finite > kOnePercent)
+    tell(radar, FindingLevel::kOdd, "points",
+         fixedText(100.0 * share_not_finite, 0) +
+             " % have a position or a Doppler that is not finite: look for what the driver writes there");
+  if (c.ambiguous > kOnePercent)
     tell(radar, FindingLevel::kOk, "points",
          fixedText(100.0 * c.ambiguous, 0) +
              " % have the range, Doppler and SNR of another point: one echo at several directions, left out");
@@ -243,7 +253,7 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   const InertialTrack track(imu.samples, imu.report.rest_rate);
   Looked looked = look(recording, imu, cloud, stamps, format.format, track);
   if (looked.cloud.points == 0 || !looked.cloud.has_doppler) {
-    const std::vector<RadarScan> decoded = decodeAll(cloud, format.format);
+    const std::vector<RadarScan> decoded = decodeAll(cloud, format.format).scans;
     const bool none_finite = std::all_of(decoded.begin(), decoded.end(),
                                          [](const RadarScan& scan) { return scan.points.empty(); });
     tell(&radar, FindingLevel::kMissing, "radar",
