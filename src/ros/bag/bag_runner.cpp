@@ -193,7 +193,7 @@ class BagJob {
     if (summary.barometer || summary.ground_vehicle)
       summary.warnings.insert(
           summary.warnings.begin(),
-          "mode: batch uses neither the barometer nor platform: ground_vehicle; the run in online/ does");
+          "mode: batch uses neither the barometer nor platform: ground_vehicle; the online run does");
     summary.barometer.reset();
     summary.ground_vehicle.reset();
     return finish(std::move(summary), log, output_.get());
