@@ -32,11 +32,14 @@ void addHeadingCurvature(NavigationState& state) {
   const double variance = heading.dot(with_heading);
   if (variance <= 0.0) return;
   // A turn by psi moves p and v by psi u, and shortens them by psi^2 / 2 along z x u.
-  StateTangent shorten = StateTangent::Zero();
-  for (const int first : {S::kP, S::kV})
-    shorten.segment<3>(first) = Eigen::Vector3d::UnitZ().cross(with_heading.segment<3>(first) / variance);
+  static_assert(S::kV == S::kP + 3);
+  Eigen::Matrix<double, 6, 1> shorten;
+  for (const int first : {0, 3})
+    shorten.segment<3>(first) =
+        Eigen::Vector3d::UnitZ().cross(with_heading.segment<3>(S::kP + first) / variance);
   // The mean square of psi^2 / 2, and not beyond that of 1 - cos(psi) for any psi.
-  state.covariance += std::min(0.75 * variance * variance, 1.5) * shorten * shorten.transpose();
+  state.covariance.block<6, 6>(S::kP, S::kP) +=
+      std::min(0.75 * variance * variance, 1.5) * shorten * shorten.transpose();
 }
 
 }  // namespace rio_t
