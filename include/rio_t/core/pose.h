@@ -6,7 +6,7 @@
 
 namespace rio_t {
 
-/// Pose of the IMU frame I (= base_link) in the world frame W (z up) at a time.
+/// Pose of the IMU frame I in the world frame W (z up) at a time.
 struct StampedPose {
   Time time;
   Eigen::Vector3d p_W = Eigen::Vector3d::Zero();             ///< origin of I in W [m]

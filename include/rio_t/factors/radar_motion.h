@@ -34,7 +34,8 @@ struct RadarMotionModel {
   const ImuBuffer* imu = nullptr;
 
   /// kImu, eq. 14-18: dR and dv integrate the IMU from the state to tau, forwards or backwards, at the biases
-  /// of the state, with T = tau - state_time. Exact for any shift that the IMU covers:
+  /// of the state, with T = tau - state_time. Exact for any shift that the IMU covers.
+  ///
   /// kConstantAcceleration, eq. 13, paper eq. (4)-(5): one acceleration stands for the whole shift; the state
   /// is at the stamp:
   ///   v_I = R_IW v_W + (omega - b_g) x l_I - t_O a_c,   a_c = a - b_a + R_IW g_W,

@@ -62,7 +62,7 @@ struct EgoVelocityOptions {
   /// radar frame (20 ms at 1 m/s^2), multipath. On a walk with an IWR6843AOP the velocity errors are 0.06 m/s
   /// and last for several scans.
   Eigen::Vector3d added_sigma = {0.04, 0.04, 0.04};
-  double max_condition_number = 1000.0;  ///< of H'H (unit directions)
+  double max_condition_number = 1000.0;  ///< of H'H (unit directions), and of the information
   double max_sigma = 0.5;                ///< [m/s] largest axis of the estimate, in motion
 };
 
