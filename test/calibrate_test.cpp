@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "rest_bag.h"
+#include "rio_t/core/angle.h"
 #include "rio_t/core/so3.h"
 #include "rio_t/ros/bag/bag_runner.h"
 #include "rio_t/ros/bag/calibration.h"
@@ -121,7 +122,6 @@ class Calibrate : public RestBag {
       EXPECT_NE(text.find(part), std::string::npos) << part << "\nnot in\n" << text;
   }
 
-  static constexpr double kDegree = 3.14159265358979323846 / 180.0;
   const Extrinsics truth_ = simulation::SimulationOptions{}.T_IR;
   Extrinsics told_ = truth_;
   std::string yaml_;

@@ -19,6 +19,7 @@
 
 #include "../src/ros/bag/inspect_recording.h"
 #include "plain_bag.h"
+#include "rio_t/core/angle.h"
 #include "rio_t/radar/mounting.h"
 #include "rio_t/ros/bag/bag_runner.h"
 #include "rio_t/ros/bag/simulation_bag.h"

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "plain_bag.h"
+#include "rio_t/core/angle.h"
 #include "rio_t/imu/units.h"
 #include "rio_t/ros/bag/check_bag.h"
 

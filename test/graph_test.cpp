@@ -279,7 +279,7 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
         const NodePrior prior = priorAtRest(known, ImuNoise(), truth, 9.81, 3.0, skewMounting());
         node.x = storedMotion(truth);
         offset->x[0] = 0.0;
-        addPrior(window, {&node, biases.get(), offset.get(), extrinsics.get()}, {prior.J, prior.r0});
+        addPrior(window, {&node, biases.get(), offset.get(), extrinsics.get()}, prior.root);
         node.x = storedMotion(x);
         biases->x = storedBiases(x);
         offset->x[0] = start;

@@ -97,7 +97,9 @@ struct Rig {
   ImuBuffer imu;
 };
 
-Eigen::MatrixXd covarianceOf(const NodePrior& prior) { return (prior.J.transpose() * prior.J).inverse(); }
+Eigen::MatrixXd covarianceOf(const NodePrior& prior) {
+  return (prior.root.J.transpose() * prior.root.J).inverse();
+}
 
 TEST(MotionInitializer, FindsTiltVelocityAndOffsetAndKnowsHowWell) {
   double tilt_squares = 0.0;

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "rio_t/core/angle.h"
 #include "rio_t/core/so3.h"
 #include "rio_t/inspection/cloud_report.h"
 #include "rio_t/inspection/imu_report.h"
@@ -11,8 +12,6 @@
 
 namespace rio_t {
 namespace {
-
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
 
 struct Searched {
   MountingSearch search;

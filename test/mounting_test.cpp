@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "rio_t/core/angle.h"
 #include "rio_t/imu/units.h"
 #include "rio_t/simulation/presets.h"
 
@@ -13,7 +14,6 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
 const Vector3d kRight = Vector3d::UnitX(), kForward = Vector3d::UnitY(), kUp = Vector3d::UnitZ();
 
 Quaterniond rotation(double yaw, double pitch, double roll) {

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "rio_t/core/angle.h"
 #include "rio_t/ros/bag/bag_runner.h"
 #include "rio_t/ros/bag/check_bag.h"
 #include "rio_t/ros/bag/simulation_bag.h"
@@ -22,8 +23,6 @@
 #include "run_files.h"
 
 namespace rio_t {
-
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
 
 /// Changes a message; false leaves it out.
 struct Changes {

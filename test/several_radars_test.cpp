@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "rio_t/core/angle.h"
 #include "rio_t/core/so3.h"
 #include "rio_t/evaluation/errors.h"
 #include "rio_t/simulation/presets.h"
@@ -10,8 +11,6 @@
 
 namespace rio_t {
 namespace {
-
-constexpr double kDegree = M_PI / 180.0;
 
 /// Looks forward (yaw 0), and turned about the vertical and up. R: right, forward, up; I: forward, left, up.
 Eigen::Quaterniond looking(double yaw_deg, double pitch_deg) {

@@ -331,7 +331,7 @@ TEST(PriorAtRest, TiltAndBiasAreKnownTogether) {
   StateBlock x;
   x.q_WI() = so3::exp({0.4, -0.3, 0.9});
   const NodePrior prior = priorAtRest(options, ImuNoise(), x, 9.81, 3.0, skewMounting());
-  const Eigen::MatrixXd P = (prior.J.transpose() * prior.J).inverse();
+  const Eigen::MatrixXd P = (prior.root.J.transpose() * prior.root.J).inverse();
   const Eigen::Matrix3d R_WI = x.q_WI().toRotationMatrix();
   const Eigen::Matrix3d tilt = R_WI * P.topLeftCorner<3, 3>() * R_WI.transpose();
   // A tilt error is b_a / g.

@@ -8,16 +8,15 @@
 #include <stdexcept>
 #include <utility>
 
+#include "rio_t/core/angle.h"
 #include "rio_t/core/so3.h"
 
 namespace rio_t {
 namespace {
 
-constexpr double kDegrees = 180.0 / M_PI;
-
 /// Angle between two orientations [deg].
 double angleDegrees(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
-  return kDegrees * so3::log(a.conjugate() * b).norm();
+  return so3::log(a.conjugate() * b).norm() / kDegree;
 }
 
 /// Heading of the x axis of `q` [rad].
@@ -28,7 +27,7 @@ double yaw(const Eigen::Quaterniond& q) {
 
 /// Heading of `estimate` minus that of `truth`, the short way round [deg].
 double yawDegrees(const Eigen::Quaterniond& truth, const Eigen::Quaterniond& estimate) {
-  return kDegrees * std::remainder(yaw(estimate) - yaw(truth), 2.0 * M_PI);
+  return std::remainder(yaw(estimate) - yaw(truth), 2.0 * M_PI) / kDegree;
 }
 
 Statistics statistics(std::vector<double> values) {

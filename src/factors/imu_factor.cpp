@@ -5,24 +5,6 @@
 #include "rio_t/core/so3.h"
 
 namespace rio_t {
-namespace {
-
-template <int Columns>
-using NineRows = Eigen::Matrix<double, 9, Columns, Eigen::RowMajor>;
-
-/// L E for the lower triangle L, by rows: at this size Eigen's triangular product costs several times as
-/// much.
-template <int Columns>
-NineRows<Columns> lowerTimes(const Eigen::Matrix<double, 9, 9>& L, const NineRows<Columns>& E) {
-  NineRows<Columns> result;
-  for (int i = 0; i < 9; ++i) {
-    result.row(i) = L(i, 0) * E.row(0);
-    for (int j = 1; j <= i; ++j) result.row(i) += L(i, j) * E.row(j);
-  }
-  return result;
-}
-
-}  // namespace
 
 ImuFactor::ImuFactor(const Preintegration& preintegration, const Eigen::Vector3d& g_W)
     : pre_(preintegration), g_W_(g_W) {
@@ -63,14 +45,14 @@ bool ImuFactor::Evaluate(double const* const* parameters, double* residuals, dou
     E.block<3, 3>(3, S::kVStored) = -T * R_i_T;
     E.block<3, 3>(6, S::kQStored) = so3::hat(v_I);
     E.block<3, 3>(6, S::kVStored) = -R_i_T;
-    Eigen::Map<MotionJacobian<9>>{jacobians[0]} = lowerTimes(whitening_, E);
+    Eigen::Map<MotionJacobian<9>>{jacobians[0]} = whitening_.lazyProduct(E);
   }
   if (jacobians[1] != nullptr) {
     MotionJacobian<9> E = MotionJacobian<9>::Zero();
     E.block<3, 3>(0, S::kQStored) = Jr_inv;
     E.block<3, 3>(3, S::kPStored) = R_i_T;
     E.block<3, 3>(6, S::kVStored) = R_i_T;
-    Eigen::Map<MotionJacobian<9>>{jacobians[1]} = lowerTimes(whitening_, E);
+    Eigen::Map<MotionJacobian<9>>{jacobians[1]} = whitening_.lazyProduct(E);
   }
   if (jacobians[2] != nullptr) {
     BiasJacobian<9> E;
@@ -79,7 +61,7 @@ bool ImuFactor::Evaluate(double const* const* parameters, double* residuals, dou
         Eigen::Matrix3d::Zero(),  //
         -d.dp_dbg, -d.dp_dba,     //
         -d.dv_dbg, -d.dv_dba;
-    Eigen::Map<BiasJacobian<9>>{jacobians[2]} = lowerTimes(whitening_, E);
+    Eigen::Map<BiasJacobian<9>>{jacobians[2]} = whitening_.lazyProduct(E);
   }
   return true;
 }

@@ -1,12 +1,10 @@
 #include "rio_t/graph/elimination.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <deque>
 #include <limits>
 #include <stdexcept>
-#include <type_traits>
 #include <utility>
 
 namespace rio_t {
@@ -228,64 +226,25 @@ class BlockElimination {
   Tableau tableau_;
 };
 
-/// Calls part(first, width) for parts of the columns, with widths that the compiler knows: 9 of a motion, 6
-/// of biases, 3 of a point, 1 of an offset.
-template <typename Part>
-void inParts(Eigen::Index columns, const Part& part) {
-  Eigen::Index first = 0;
-  const auto take = [&](auto width) {
-    for (; columns - first >= width; first += width) part(first, width);
-  };
-  take(std::integral_constant<int, 9>());
-  take(std::integral_constant<int, 6>());
-  take(std::integral_constant<int, 3>());
-  take(std::integral_constant<int, 1>());
-}
-
 /// Some columns of a matrix by rows.
-struct Columns {
-  const double* first;
-  Eigen::Index rows, columns, stride;
-  double operator()(Eigen::Index i, Eigen::Index j) const { return first[i * stride + j]; }
-};
+using Columns = Eigen::Map<const RowMatrix, 0, Eigen::OuterStride<>>;
 
-Columns allOf(const RowMatrix& A) { return {A.data(), A.rows(), A.cols(), A.cols()}; }
+// Row by row: at these sizes Eigen's products and triangular solves cost several times as much.
 
-/// sum += sign A' B. At these sizes Eigen's blocked product costs several times as much.
-void addProduct(const Columns& A, const RowMatrix& B, double sign, RowMatrix& sum) {
-  if (sum.size() == 0) sum.setZero(A.columns, B.cols());
-  inParts(B.cols(), [&](Eigen::Index first, auto width) {
-    for (Eigen::Index i = 0; i < A.columns; ++i) {
-      double* const to = sum.data() + i * B.cols() + first;
-      std::array<double, width> sums{};
-      std::copy_n(to, width, sums.begin());
-      for (Eigen::Index row = 0; row < A.rows; ++row) {
-        const double a = sign * A(row, i);
-        if (a == 0.0) continue;
-        const double* const b = B.data() + row * B.cols() + first;
-        for (std::size_t j = 0; j < width; ++j) sums[j] += a * b[j];
-      }
-      std::copy_n(sums.begin(), width, to);
-    }
-  });
+/// sum += sign A' B.
+template <typename Left>
+void addProduct(const Left& A, const RowMatrix& B, double sign, RowMatrix& sum) {
+  for (Eigen::Index k = 0; k < A.rows(); ++k)
+    for (Eigen::Index i = 0; i < A.cols(); ++i)
+      if (A(k, i) != 0.0) sum.row(i) += sign * A(k, i) * B.row(k);
 }
 
 /// W <- R'^-1 W for the upper triangle R.
 void forwardSubstitute(const Columns& R, RowMatrix& W) {
-  inParts(W.cols(), [&](Eigen::Index first, auto width) {
-    for (Eigen::Index i = 0; i < R.rows; ++i) {
-      double* const to = W.data() + i * W.cols() + first;
-      std::array<double, width> sums{};
-      std::copy_n(to, width, sums.begin());
-      for (Eigen::Index j = 0; j < i; ++j) {
-        const double factor = R(j, i);
-        const double* const from = W.data() + j * W.cols() + first;
-        for (std::size_t k = 0; k < width; ++k) sums[k] -= factor * from[k];
-      }
-      const double inverse = 1.0 / R(i, i);
-      for (std::size_t k = 0; k < width; ++k) to[k] = sums[k] * inverse;
-    }
-  });
+  for (Eigen::Index i = 0; i < R.rows(); ++i) {
+    for (Eigen::Index j = 0; j < i; ++j) W.row(i) -= R(j, i) * W.row(j);
+    W.row(i) /= R(i, i);
+  }
 }
 
 /// Calls part(j, R_ij) for each block that the rows of block i touch, R_ii first.
@@ -294,7 +253,8 @@ void eachBlock(const LinearRows& rows, const std::vector<Eigen::Index>& tangents
   const double* first = rows.Jr.data();
   for (const int j : rows.blocks) {
     const Eigen::Index width = tangents[static_cast<std::size_t>(j)];
-    part(static_cast<std::size_t>(j), Columns{first, rows.Jr.rows(), width, rows.Jr.cols()});
+    part(static_cast<std::size_t>(j),
+         Columns(first, rows.Jr.rows(), width, Eigen::OuterStride<>(rows.Jr.cols())));
     first += width;
   }
 }
@@ -326,8 +286,7 @@ std::optional<Elimination> Elimination::of(const LinearSystem& system, double da
     Eigen::VectorXd& delta = result.delta_[i];
     eachBlock(result.R_[i], result.tangents_, [&](std::size_t j, const Columns& R_ij) {
       if (j == i) return;
-      for (Eigen::Index row = 0; row < R_ij.rows; ++row)
-        for (Eigen::Index k = 0; k < R_ij.columns; ++k) delta[row] -= R_ij(row, k) * result.delta_[j][k];
+      delta.noalias() -= R_ij.lazyProduct(result.delta_[j]);
     });
     result.R_[i].Jr.leftCols(delta.size()).triangularView<Eigen::Upper>().solveInPlace(delta);
   }
@@ -353,10 +312,11 @@ Eigen::MatrixXd Elimination::covariance(const std::vector<int>& indices) const {
       if (j == i) {
         forwardSubstitute(R_ij, Y[i]);
       } else {
+        if (Y[j].size() == 0) Y[j].setZero(R_ij.cols(), columns);
         addProduct(R_ij, Y[i], -1.0, Y[j]);
       }
     });
-    addProduct(allOf(Y[i]), Y[i], 1.0, result);
+    addProduct(Y[i], Y[i], 1.0, result);
   }
   return result;
 }

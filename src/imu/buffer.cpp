@@ -1,6 +1,7 @@
 #include "rio_t/imu/buffer.h"
 
 #include <algorithm>
+#include <iterator>
 #include <stdexcept>
 
 namespace rio_t {
@@ -15,18 +16,17 @@ void ImuBuffer::dropBefore(Time time) {
   while (samples_.size() > 1 && samples_[1].time <= time) samples_.pop_front();
 }
 
-std::size_t ImuBuffer::firstAfter(Time time) const {
-  const auto it = std::upper_bound(samples_.begin(), samples_.end(), time,
-                                   [](Time t, const ImuMeasurement& sample) { return t < sample.time; });
-  return static_cast<std::size_t>(it - samples_.begin());
+ImuBuffer::Samples::const_iterator ImuBuffer::firstAfter(Time time) const {
+  return std::upper_bound(samples_.begin(), samples_.end(), time,
+                          [](Time t, const ImuMeasurement& sample) { return t < sample.time; });
 }
 
 ImuMeasurement ImuBuffer::at(Time time) const {
-  const std::size_t after = firstAfter(time);
-  ImuMeasurement result = after == samples_.size() ? samples_.back() : samples_[after];
-  if (after > 0 && after < samples_.size()) {  // the later sample carries the noise of the interval
-    const ImuMeasurement& a = samples_[after - 1];
-    const ImuMeasurement& b = samples_[after];
+  const auto after = firstAfter(time);
+  ImuMeasurement result = after == samples_.end() ? samples_.back() : *after;
+  if (after != samples_.begin() && after != samples_.end()) {
+    const ImuMeasurement& a = *std::prev(after);
+    const ImuMeasurement& b = *after;  // carries the noise of the interval
     const double share = (time - a.time) / (b.time - a.time);
     result.angular_velocity = a.angular_velocity + share * (b.angular_velocity - a.angular_velocity);
     result.acceleration = a.acceleration + share * (b.acceleration - a.acceleration);

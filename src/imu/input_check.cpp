@@ -15,6 +15,14 @@ void raise(double& variance, double density) { variance = std::max(variance, den
 
 }  // namespace
 
+const char* faultOfValues(const ImuMeasurement& imu, const ImuInputCheckOptions& options) {
+  if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite()) return "imu_not_finite";
+  const double most =
+      options.accel_range > 0.0 ? kImpossibleShareOfRange * options.accel_range : kImpossibleAcceleration;
+  // The check for a stuck axis replaces such a reading of the gyro.
+  return imu.acceleration.cwiseAbs().maxCoeff() > most ? "imu_not_plausible" : nullptr;
+}
+
 ImuInputCheck::ImuInputCheck(double max_gap, const ImuInputCheckOptions& options)
     : max_gap_(max_gap),
       options_(options),
@@ -22,13 +30,7 @@ ImuInputCheck::ImuInputCheck(double max_gap, const ImuInputCheckOptions& options
       saturation_(options.accel_range, options.gyro_range) {}
 
 ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
-  if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite())
-    return {Decision::kDrop, {"imu_not_finite"}};
-  const double most =
-      options_.accel_range > 0.0 ? kImpossibleShareOfRange * options_.accel_range : kImpossibleAcceleration;
-  // The check for a stuck axis replaces such a reading of the gyro.
-  if (imu.acceleration.cwiseAbs().maxCoeff() > most) return {Decision::kDrop, {"imu_not_plausible"}};
-
+  if (const char* fault = faultOfValues(imu, options_)) return {Decision::kDrop, {fault}};
   Verdict verdict;
   switch (stamps_.check(imu.time)) {
     case ClockJumpDetector::Verdict::kGood:

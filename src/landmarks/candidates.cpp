@@ -27,8 +27,6 @@ void addTo(Candidate& candidate, const PlacedDetection& seen) {
   const Eigen::Vector3d way = seen.radar_W - candidate.first_radar_W;
   Eigen::Matrix<double, 3, 4> J;
   J << Eigen::Matrix3d::Identity(), way - ray.dot(way) * ray;
-  candidate.information += information;
-  candidate.vector += information * seen.p_W;
   candidate.fit_information += J.transpose() * information * J;
   candidate.fit_vector += J.transpose() * information * seen.p_W;
   candidate.snr_sum += seen.snr_db;
@@ -56,7 +54,7 @@ void Candidates::add(const std::vector<PlacedDetection>& detections) {
   std::vector<Eigen::Matrix3d> covariances;
   for (const Candidate& candidate : candidates_) {
     positions.push_back(candidate.position());
-    covariances.emplace_back(candidate.information.inverse());
+    covariances.emplace_back(candidate.information().inverse());
   }
   std::vector<Fit> fits;
   std::vector<int> fits_of_detection(detections.size(), 0), fits_of_candidate(known, 0);
@@ -97,7 +95,7 @@ void Candidates::forgetOld(Time now, Time oldest_node) {
 bool Candidates::isAlone(std::size_t k, const std::vector<Eigen::Vector3d>& landmarks_W) const {
   const Candidate& own = candidates_[k];
   const Eigen::Vector3d p_W = own.position();
-  const Eigen::Matrix3d of_one = static_cast<double>(own.count) * own.information.inverse();
+  const Eigen::Matrix3d of_one = static_cast<double>(own.count) * own.information().inverse();
   const auto isNear = [&](const Eigen::Vector3d& other_W) {
     return squaredSigmas(other_W - p_W, of_one) < kApart;
   };

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "rio_t/factors/imu_factor.h"
-#include "rio_t/imu/rest_detector.h"
 #include "rio_t/odometry/imu_propagator.h"
 
 namespace rio_t {

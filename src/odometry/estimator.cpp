@@ -212,12 +212,12 @@ void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
 std::vector<StampedPose> Estimator::marginalize() {
   std::vector<StampedPose> left;
   std::vector<FixedLagSmoother::RandomWalk> walks;
-  for (const RadarChannel& radar : radars_)
-    for (const FixedLagSmoother::RandomWalk& walk : radar.randomWalks()) addWalk(walks, walk);
-  if (ground_vehicle_)
-    for (const FixedLagSmoother::RandomWalk& walk : ground_vehicle_->randomWalks()) walks.push_back(walk);
-  if (barometer_)
-    for (const FixedLagSmoother::RandomWalk& walk : barometer_->randomWalks()) walks.push_back(walk);
+  const auto addWalksOf = [&](const auto& channel) {
+    for (const FixedLagSmoother::RandomWalk& walk : channel.randomWalks()) addWalk(walks, walk);
+  };
+  for (const RadarChannel& radar : radars_) addWalksOf(radar);
+  if (ground_vehicle_) addWalksOf(*ground_vehicle_);
+  if (barometer_) addWalksOf(*barometer_);
   for (const NodeEstimate& node : smoother_.marginalize(walks)) left.push_back(pose(node));
   return left;
 }

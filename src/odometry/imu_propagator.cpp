@@ -1,6 +1,7 @@
 #include "rio_t/odometry/imu_propagator.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "rio_t/core/so3.h"
 #include "rio_t/factors/state_block.h"
@@ -48,9 +49,9 @@ void ImuPropagator::anchor(const NavigationState& state, bool at_rest) {
   rest_ = at_rest ? state_ : std::nullopt;
   const auto later = std::upper_bound(history_.begin(), history_.end(), state.time,
                                       [](Time time, const ImuMeasurement& imu) { return time < imu.time; });
-  for (const ImuMeasurement* imu = later; imu != history_.end(); ++imu) {
+  for (auto imu = later; imu != history_.end(); ++imu) {
     // If no sample at the anchor's time is kept, the first sample stands for it.
-    propagate(imu == history_.begin() ? *imu : *(imu - 1), *imu);
+    propagate(imu == history_.begin() ? *imu : *std::prev(imu), *imu);
   }
 }
 

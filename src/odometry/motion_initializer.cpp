@@ -116,7 +116,6 @@ std::optional<Initialization> MotionInitializer::solve(const ImuBuffer& imu,
 
   const Line line = fitLine(window, time, imu);
   const double gravity_error = line.g_I.norm() + g_W_.z();
-  double outliers = 1.0;
   Initialization result;
   result.time = time;
   result.from = InitializedFrom::kMotion;
@@ -130,36 +129,39 @@ std::optional<Initialization> MotionInitializer::solve(const ImuBuffer& imu,
     result.prior.T_IR0 = T_IR_;
     const Eigen::VectorXd calibration = calibrationSigmas(smoother_);
     const Eigen::Index size = StateBlock::kTangent + calibration.size();
-    result.prior.J = Eigen::MatrixXd::Zero(size, size);
-    result.prior.r0 = Eigen::VectorXd::Zero(size);
+    result.prior.root.J = Eigen::MatrixXd::Zero(size, size);
+    result.prior.root.r0 = Eigen::VectorXd::Zero(size);
     const auto set = [&](int first, double sigma) {
-      result.prior.J.diagonal().segment<3>(first).setConstant(1.0 / sigma);
+      result.prior.root.J.diagonal().segment<3>(first).setConstant(1.0 / sigma);
     };
     // The prior holds heading and position, and neither tilt nor velocity.
     Eigen::Matrix4d covariance = anchor.covariance;
     covariance(0, 0) += smoother_.prior_sigma_yaw * smoother_.prior_sigma_yaw;
     covariance.diagonal().tail<3>().array() +=
         smoother_.prior_sigma_position * smoother_.prior_sigma_position;
-    result.prior.J.topLeftCorner<4, StateBlock::kTangent>() =
+    result.prior.root.J.topLeftCorner<4, StateBlock::kTangent>() =
         covariance.llt().matrixL().solve(poseInW(x.q_WI()));
     set(StateBlock::kBg, options_.sigma_gyro_bias);
     set(StateBlock::kBa, options_.sigma_accel_bias);
-    result.prior.J.diagonal().tail(calibration.size()) = calibration.cwiseInverse();
+    result.prior.root.J.diagonal().tail(calibration.size()) = calibration.cwiseInverse();
     const NodePrior known = result.prior;
-    for (int round = 0; round < kScaleRounds && (round == 0 || outliers <= options_.max_outlier_fraction);
+    std::optional<double> outliers = 0.0;
+    for (int round = 0; round < kScaleRounds && outliers && *outliers <= options_.max_outlier_fraction;
          ++round) {
       result.prior = known;
       outliers = refine(window, time, imu, result.model_error_scale, result.prior);
     }
-    if (outliers <= options_.max_outlier_fraction) {
+    if (outliers && *outliers <= options_.max_outlier_fraction) {
       waiting_for_.clear();
       clear();
       return result;
     }
-    waiting_for_ = format(
-        "radar and IMU that agree: %.0f %% of the radar velocities do not fit the IMU, at most %.0f %% "
-        "allowed: extrinsics, Doppler sign, units?",
-        100.0 * outliers, 100.0 * options_.max_outlier_fraction);
+    waiting_for_ =
+        !outliers ? "motion: the radar velocities do not determine tilt and velocity"
+                  : format(
+                        "radar and IMU that agree: %.0f %% of the radar velocities do not fit the IMU, at "
+                        "most %.0f %% allowed: extrinsics, Doppler sign, units?",
+                        100.0 * *outliers, 100.0 * options_.max_outlier_fraction);
   } else {
     waiting_for_ = format(
         "radar and IMU that agree: together they show %.2f m/s^2 as gravity instead of %.2f: units, "
@@ -218,8 +220,8 @@ MotionInitializer::Line MotionInitializer::fitLine(const Velocities& velocities,
   return line;
 }
 
-double MotionInitializer::refine(const Velocities& velocities, Time time, const ImuBuffer& imu,
-                                 ModelErrorScale& scale, NodePrior& prior) const {
+std::optional<double> MotionInitializer::refine(const Velocities& velocities, Time time, const ImuBuffer& imu,
+                                                ModelErrorScale& scale, NodePrior& prior) const {
   Window window;
   Block& motion = window.addNode(time, std::make_shared<MotionManifold>(), storedMotion(prior.x0));
   const std::shared_ptr<Block> biases =
@@ -236,7 +238,7 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
   } else {
     blocks.push_back(extrinsics.get());
   }
-  addPrior(window, blocks, {prior.J, prior.r0});
+  addPrior(window, blocks, prior.root);
   const std::shared_ptr<ceres::LossFunction> loss = huberLoss(smoother_.huber_threshold);
   const RadarMotionModel model{TimeOffsetModel::kImu, smoother_.max_time_offset, g_W_, &imu};
 
@@ -265,7 +267,7 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
     try {
       solution = rio_t::solve(window, {kMaxIterations, kConverged * kConverged}, smoother_.solver);
     } catch (const std::runtime_error&) {
-      return 1.0;
+      return std::nullopt;
     }
   }
 
@@ -283,7 +285,7 @@ double MotionInitializer::refine(const Velocities& velocities, Time time, const 
     mean_share += covariances[i].whole.ldlt().solve(covariances[i].scaled).trace() / (3.0 * n);
   }
   const SquareRoot root = eliminateFirst(solution.system, 0);
-  prior = {stateOf(motion, *biases), offset->x[0], toExtrinsics(extrinsics->x.data()), root.J, root.r0};
+  prior = {stateOf(motion, *biases), offset->x[0], toExtrinsics(extrinsics->x.data()), root};
   // The solution is drawn towards the velocities: what is left scatters less.
   const double left = 3.0 * n / (3.0 * n - kUnknowns);
   for (std::size_t i = 0; i < velocities.size(); ++i) scale.add(time, left * mean_square, mean_share);

@@ -1,7 +1,6 @@
 #include "rio_t/radar/ego_velocity.h"
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <utility>
 

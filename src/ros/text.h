@@ -1,12 +1,9 @@
 #pragma once
 
-#include <cmath>
 #include <string>
 
 /// Texts for people and files.
 namespace rio_t {
-
-constexpr double kDegree = M_PI / 180.0;  ///< [rad]
 
 /// Appends `value` with that many decimals (at most 12), with a point whatever the locale; ".nan",
 /// ".inf", "-.inf" as in YAML. Never minus zero.

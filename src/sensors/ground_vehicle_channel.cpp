@@ -2,7 +2,6 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "rio_t/factors/radar_velocity_factor.h"
@@ -36,10 +35,7 @@ void GroundVehicleChannel::join(FixedLagSmoother& smoother, bool at_rest) {
   Window& window = smoother.window();
   frame_ = window.addCalibration(manifold_, stored(options_.T_IV));
   Block* node = smoother.nodeAt(smoother.newest().time);
-  // This prior does not constrain the node. It leaves the window with it, and from then on the block walks.
-  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(3, StateBlock::kMotionTangent + 3);
-  J.rightCols<3>().diagonal().setConstant(1.0 / options_.rotation_sigma);
-  addPrior(window, {node, frame_.get()}, {J, Eigen::VectorXd::Zero(3)});
+  smoother.addCalibrationPrior({frame_.get()}, Eigen::Vector3d::Constant(options_.rotation_sigma));
   // The old estimate may have been wrong when it contradicted the vehicle.
   judged_at_.reset();
   judged_.clear();

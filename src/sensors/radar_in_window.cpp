@@ -32,21 +32,18 @@ void RadarInWindow::start(FixedLagSmoother& smoother, Time time, const NodePrior
   Block& node = smoother.start(time, prior.x0);
   std::vector<Block*> blocks = {&node, &smoother.biases(), &offset_->start(smoother.window(), prior.t_O0)};
   for (Block* block : addExtrinsics(smoother.window(), prior.T_IR0)) blocks.push_back(block);
-  addPrior(smoother.window(), blocks, {prior.J, prior.r0});
+  addPrior(smoother.window(), blocks, prior.root);
   smoother.settle();
 }
 
 void RadarInWindow::join(FixedLagSmoother& smoother) {
   Window& window = smoother.window();
-  std::vector<Block*> blocks = {smoother.nodeAt(smoother.newest().time)};
+  std::vector<Block*> blocks;
   if (!options_.time_offset_shared) blocks.push_back(&offset_->start(window, options_.time_offset_initial));
   for (Block* block : addExtrinsics(window, T_IR_)) blocks.push_back(block);
   Eigen::VectorXd sigmas = calibrationSigmas(options_);
   if (options_.time_offset_shared) sigmas = sigmas.tail(sigmas.size() - 1).eval();
-  // This prior does not constrain the node. It leaves the window with it, and from then on the block walks.
-  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(sigmas.size(), StateBlock::kMotionTangent + sigmas.size());
-  J.rightCols(sigmas.size()) = sigmas.cwiseInverse().asDiagonal();
-  if (blocks.size() > 1) addPrior(window, blocks, {J, Eigen::VectorXd::Zero(sigmas.size())});
+  if (!blocks.empty()) smoother.addCalibrationPrior(std::move(blocks), sigmas);
   smoother.settle();
 }
 

@@ -5,6 +5,7 @@
 #include <functional>
 #include <stdexcept>
 
+#include "rio_t/core/angle.h"
 #include "rio_t/core/so3.h"
 #include "rio_t/simulation/random.h"
 
@@ -246,7 +247,7 @@ Course corridors(Random& random, double duration, double pace) {
   };
   while (end < duration) {
     add(random.uniform(2.0, 14.0) / pace, 0.0);
-    const double angle = random.uniform(75.0, 105.0) * M_PI / 180.0;
+    const double angle = random.uniform(75.0, 105.0) * kDegree;
     const double peak = random.uniform(0.7, 0.9);
     add(2.0 * angle / peak, random.chance(0.5) ? peak : -peak);
   }
@@ -293,7 +294,7 @@ PoseFunction kart(Random& random, double duration) {
     add(straight / (0.5 * (kBendSpeed + top_speed)), 0.0, top_speed);
     // Bends to the left make laps, which stay in a hall; every fourth is a full loop to the right.
     const bool loop = course.size() % 8 == 5;
-    const double angle = (loop ? 360.0 : random.uniform(60.0, 150.0)) * M_PI / 180.0;
+    const double angle = (loop ? 360.0 : random.uniform(60.0, 150.0)) * kDegree;
     const double radius = random.uniform(1.2, 1.8);  // [m] where it is narrowest
     const double peak = kBendSpeed / radius;
     add(2.0 * angle / peak, loop ? -peak : peak, kBendSpeed);

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "rio_t/core/angle.h"
+
 namespace rio_t::simulation {
 namespace {
-
-constexpr double kDegree = M_PI / 180.0;
 
 // Rotation from the axes of a radar (x right, y forward, z up) to those of an IMU (x forward, y left, z up)
 // for a radar that looks `left` to the left and `up` upwards [rad].

@@ -3,16 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
 #include <stdexcept>
 #include <string>
 
+#include "rio_t/core/angle.h"
 #include "rio_t/simulation/random.h"
 
 namespace rio_t::simulation {
 namespace {
 
-constexpr double kDegree = M_PI / 180.0;
 constexpr std::uint64_t kSceneStream = 20;
 constexpr std::uint64_t kScanStream = 21;
 constexpr std::uint64_t kPersonStream = 22;

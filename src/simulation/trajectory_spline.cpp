@@ -10,8 +10,8 @@
 namespace rio_t::simulation {
 namespace {
 
-constexpr int kDegree = 5;
-constexpr int kOrder = kDegree + 1;  // coefficients that act at one time
+constexpr int kSplineDegree = 5;
+constexpr int kOrder = kSplineDegree + 1;  // coefficients that act at one time
 
 using Weights = Eigen::Matrix<double, kOrder, 1>;
 using Vector7d = Eigen::Matrix<double, 7, 1>;
@@ -39,7 +39,7 @@ Weights difference(const Weights& w) {
 
 // `order`-th derivative of the weights with respect to u.
 Weights basisDerivative(int order, double u) {
-  Weights w = uniformBasis(kDegree - order, u);
+  Weights w = uniformBasis(kSplineDegree - order, u);
   for (int i = 0; i < order; ++i) w = difference(w);
   return w;
 }
@@ -55,8 +55,8 @@ Segment locate(double t, double knot_spacing, int segments) {
   return {index, s - index};
 }
 
-// Symmetric positive definite matrix of `kDegree` bands below the diagonal, solved by Cholesky's method in
-// place.
+// Symmetric positive definite matrix of `kSplineDegree` bands below the diagonal, solved by Cholesky's method
+// in place.
 class BandMatrix {
  public:
   explicit BandMatrix(int size) : bands_(Eigen::Matrix<double, kOrder, Eigen::Dynamic>::Zero(kOrder, size)) {}
@@ -72,7 +72,7 @@ class BandMatrix {
   void solve(Eigen::Matrix<double, 7, Eigen::Dynamic>& rhs) {
     const int n = static_cast<int>(bands_.cols());
     for (int c = 0; c < n; ++c) {
-      const int below = std::min(kDegree, n - 1 - c);
+      const int below = std::min(kSplineDegree, n - 1 - c);
       bands_(0, c) = std::sqrt(bands_(0, c));
       for (int r = 1; r <= below; ++r) bands_(r, c) /= bands_(0, c);
       for (int k = 1; k <= below; ++k) {
@@ -81,10 +81,12 @@ class BandMatrix {
     }
     for (int c = 0; c < n; ++c) {
       rhs.col(c) /= bands_(0, c);
-      for (int r = 1; r <= std::min(kDegree, n - 1 - c); ++r) rhs.col(c + r) -= bands_(r, c) * rhs.col(c);
+      for (int r = 1; r <= std::min(kSplineDegree, n - 1 - c); ++r)
+        rhs.col(c + r) -= bands_(r, c) * rhs.col(c);
     }
     for (int c = n - 1; c >= 0; --c) {
-      for (int r = 1; r <= std::min(kDegree, n - 1 - c); ++r) rhs.col(c) -= bands_(r, c) * rhs.col(c + r);
+      for (int r = 1; r <= std::min(kSplineDegree, n - 1 - c); ++r)
+        rhs.col(c) -= bands_(r, c) * rhs.col(c + r);
       rhs.col(c) /= bands_(0, c);
     }
   }
@@ -147,13 +149,13 @@ TrajectorySpline::TrajectorySpline(const Trajectory& poses, const SplineFitOptio
   const std::vector<Vector7d> vectors = poseVectors(poses);
   duration_ = poses.back().time - poses.front().time;
   const int segments = std::max(1, static_cast<int>(std::ceil(duration_ / knot_spacing_)));
-  const int size = segments + kDegree;
+  const int size = segments + kSplineDegree;
 
   BandMatrix normal(size);
   coefficients_.setZero(7, size);
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const Segment s = locate(poses[i].time - poses.front().time, knot_spacing_, segments);
-    const Weights w = uniformBasis(kDegree, s.u);
+    const Weights w = uniformBasis(kSplineDegree, s.u);
     normal.add(s.index, w * w.transpose());
     coefficients_.middleCols<kOrder>(s.index) += vectors[i] * w.transpose();
   }
@@ -183,9 +185,9 @@ MotionState TrajectorySpline::at(double t) const {
     throw std::out_of_range("spline: time " + std::to_string(t) + " s is outside [0, " +
                             std::to_string(duration_) + "]");
   }
-  const Segment s = locate(t, knot_spacing_, static_cast<int>(coefficients_.cols()) - kDegree);
+  const Segment s = locate(t, knot_spacing_, static_cast<int>(coefficients_.cols()) - kSplineDegree);
   const auto active = coefficients_.middleCols<kOrder>(s.index);
-  const Vector7d x = active * uniformBasis(kDegree, s.u);
+  const Vector7d x = active * uniformBasis(kSplineDegree, s.u);
   const Vector7d dx = active * basisDerivative(1, s.u) / knot_spacing_;
   const Vector7d ddx = active * basisDerivative(2, s.u) / (knot_spacing_ * knot_spacing_);
 

@@ -103,7 +103,7 @@ std::vector<Block*> BatchSmoother::start(const BatchProblem& problem, const Stat
     if (!options_.time_offset_shared) add(*offsets[k], Eigen::VectorXd::Constant(1, sigma));
     if (is_estimated) add(extrinsics, sigmas.tail(sigmas.size() - 1));
   }
-  addPrior(window, known, {problem.prior.J, problem.prior.r0});
+  addPrior(window, known, problem.prior.root);
   motion.x = storedMotion(x);
   biases.x = storedBiases(x);
   for (std::size_t k = 0; k < mounting.size(); ++k)

@@ -125,6 +125,13 @@ Block* FixedLagSmoother::nodeAt(Time time) {
   return &block;
 }
 
+void FixedLagSmoother::addCalibrationPrior(std::vector<Block*> calibration, const Eigen::VectorXd& sigmas) {
+  calibration.insert(calibration.begin(), nodes_.back().motion);
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(sigmas.size(), StateBlock::kMotionTangent + sigmas.size());
+  J.rightCols(sigmas.size()) = sigmas.cwiseInverse().asDiagonal();
+  addPrior(window_, calibration, {J, Eigen::VectorXd::Zero(sigmas.size())});
+}
+
 void FixedLagSmoother::linkToPrevious(std::size_t k) {
   Node& node = nodes_[k];
   const Node& previous = nodes_[k - 1];

@@ -48,8 +48,7 @@ NodePrior priorAtRest(const SmootherOptions& options, const ImuNoise& noise, con
   J.middleCols<3>(S::kBa).setIdentity();
   add(J, 0, sigma);
   known.r0.setZero(known.J.rows());
-  const SquareRoot root = compressed(known);
-  return {x, options.time_offset_initial, T_IR, root.J, root.r0};
+  return {x, options.time_offset_initial, T_IR, compressed(known)};
 }
 
 }  // namespace rio_t

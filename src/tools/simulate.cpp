@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "../ros/bag/command_line.h"
+#include "rio_t/core/angle.h"
 #include "rio_t/evaluation/trajectory.h"
 #include "rio_t/ros/bag/simulation_bag.h"
 #include "rio_t/simulation/motions.h"
@@ -410,7 +411,7 @@ void printSummary(const Request& request, const Motion& motion, const SensorData
             << acceleration << " m/s^2\n";
   if (!request.trajectory.empty()) {
     std::cout << "spline: poses of the file are " << 1e3 * motion.path().positionResidual() << " mm and "
-              << motion.path().rotationResidual() * (180.0 / M_PI) << " deg (rms) from it\n";
+              << motion.path().rotationResidual() / kDegree << " deg (rms) from it\n";
   }
   std::cout << "IMU: " << data.imu.samples.size() << " samples\n"
             << "true accelerometer bias [m/s^2]: " << triple(data.imu.b_a.front()) << " at the start, "

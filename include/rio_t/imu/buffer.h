@@ -1,10 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstddef>
+#include <deque>
 #include <type_traits>
 
-#include "rio_t/core/sliding_queue.h"
 #include "rio_t/imu/measurement.h"
 
 namespace rio_t {
@@ -53,14 +52,15 @@ class ImuBuffer {
   /// Calls visit(sample) for each sample later than `from` and not later than `to`.
   template <typename Visit>
   void forEachSample(Time from, Time to, Visit&& visit) const {
-    for (std::size_t i = firstAfter(from); i < samples_.size() && samples_[i].time <= to; ++i)
-      visit(samples_[i]);
+    for (auto sample = firstAfter(from); sample != samples_.end() && sample->time <= to; ++sample)
+      visit(*sample);
   }
 
  private:
-  std::size_t firstAfter(Time time) const;  ///< index of the first sample later than `time`; size() if none
+  using Samples = std::deque<ImuMeasurement>;
+  Samples::const_iterator firstAfter(Time time) const;  ///< the first sample later than `time`
 
-  SlidingQueue<ImuMeasurement> samples_;
+  Samples samples_;
 };
 
 template <typename Step>
@@ -84,10 +84,11 @@ void ImuBuffer::forEachInterval(Time from, Time to, Step&& step) const {
     previous = &next;
   };
   if (from < to) {
-    for (std::size_t i = firstAfter(from); i < samples_.size() && samples_[i].time < to; ++i)
-      advance(samples_[i]);
+    for (auto sample = firstAfter(from); sample != samples_.end() && sample->time < to; ++sample)
+      advance(*sample);
   } else {
-    for (std::size_t i = firstAfter(from); i-- > 0 && samples_[i].time > to;) advance(samples_[i]);
+    for (auto sample = firstAfter(from); sample != samples_.begin() && (--sample)->time > to;)
+      advance(*sample);
   }
   interval(*previous, at(to));
 }

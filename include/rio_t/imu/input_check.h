@@ -35,6 +35,10 @@ struct MeasuredImuNoise {
   }
 };
 
+/// The fault of a sample by its values alone: "imu_not_finite" or "imu_not_plausible"; null if it has none.
+/// Such a sample is dropped before its stamp is looked at.
+const char* faultOfValues(const ImuMeasurement& imu, const ImuInputCheckOptions& options);
+
 /// Checks IMU samples. It drops those that cannot be used, writes into the others how much of the motion they
 /// miss, and bridges gaps. Not thread-safe.
 ///

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "rio_t/core/angle.h"
 #include "rio_t/imu/measurement.h"
 
 namespace rio_t {
@@ -25,7 +26,7 @@ inline double inMetresPerSecondSquared(AccelerationUnit unit) {
 }
 /// [rad/s] in one unit.
 inline double inRadiansPerSecond(RateUnit unit) {
-  return unit == RateUnit::kDegreesPerSecond ? 3.14159265358979323846 / 180.0 : 1.0;
+  return unit == RateUnit::kDegreesPerSecond ? kDegree : 1.0;
 }
 
 /// A sample as the driver wrote it, in m/s^2 and rad/s.

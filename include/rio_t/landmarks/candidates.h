@@ -37,14 +37,14 @@ struct Candidate {
   std::vector<Sighting> sightings;  ///< those of the window, in the order of time
   Time last_seen;
   Eigen::Vector3d first_radar_W = Eigen::Vector3d::Zero();    ///< where the radar was at first [m]
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();      ///< of the position alone [1/m^2]
-  Eigen::Vector3d vector = Eigen::Vector3d::Zero();           ///< information times position
   Eigen::Matrix4d fit_information = Eigen::Matrix4d::Zero();  ///< of (m, s)
-  Eigen::Vector4d fit_vector = Eigen::Vector4d::Zero();
+  Eigen::Vector4d fit_vector = Eigen::Vector4d::Zero();       ///< fit_information times (m, s)
   double snr_sum = 0.0;
   std::size_t count = 0;  ///< of all detections
 
-  Eigen::Vector3d position() const { return information.llt().solve(vector); }  ///< p_W [m]
+  /// Of the position of a point of the world, s = 0 [1/m^2].
+  Eigen::Matrix3d information() const { return fit_information.topLeftCorner<3, 3>(); }
+  Eigen::Vector3d position() const { return information().llt().solve(fit_vector.head<3>()); }  ///< p_W [m]
   double snr_db() const { return snr_sum / static_cast<double>(count); }
   /// Whether the detections tell that it does not slide.
   bool isProven() const;

@@ -1,10 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <deque>
 #include <optional>
 #include <string>
 
-#include "rio_t/core/sliding_queue.h"
 #include "rio_t/core/time.h"
 #include "rio_t/odometry/navigation_state.h"
 #include "rio_t/sensors/innovation.h"
@@ -87,9 +87,9 @@ class HealthMonitor {
 
   HealthOptions options_;  // read-only after construction
   double gate_ = 0.0;
-  SlidingQueue<Entry> entries_;
+  std::deque<Entry> entries_;
   Time last_update_;
-  SlidingQueue<Time> steps_;         ///< of the offset, within 20 s of the last
+  std::deque<Time> steps_;           ///< of the offset, within 20 s of the last
   std::optional<Time> diverged_at_;  ///< start of the divergence, or the last start after it
   Time contradicted_since_;
   Time latest_;  ///< stamp of the newest entry, also after the entries were cleared

@@ -1,8 +1,8 @@
 #pragma once
 
+#include <deque>
 #include <optional>
 
-#include "rio_t/core/sliding_queue.h"
 #include "rio_t/imu/error_step.h"
 #include "rio_t/imu/measurement.h"
 #include "rio_t/imu/noise.h"
@@ -37,7 +37,7 @@ class ImuPropagator {
 
   ImuNoise noise_;
   Eigen::Vector3d g_W_;  // read-only after construction
-  SlidingQueue<ImuMeasurement> history_;
+  std::deque<ImuMeasurement> history_;
   std::optional<NavigationState> state_;
   SamplesInOne samples_;                 ///< since the time of the covariance
   std::optional<NavigationState> rest_;  ///< the anchor, if the platform was at rest there

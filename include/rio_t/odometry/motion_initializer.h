@@ -96,9 +96,9 @@ class MotionInitializer {
   Line fitLine(const Velocities& velocities, Time time, const ImuBuffer& imu) const;
   /// Improves `prior.x0` and `prior.t_O0`, around which it starts, and adds the information of the
   /// velocities, with model errors of `scale`. Improves `scale` by the scatter of the velocities around the
-  /// solution. Returns the share of outliers.
-  double refine(const Velocities& velocities, Time time, const ImuBuffer& imu, ModelErrorScale& scale,
-                NodePrior& prior) const;
+  /// solution. Returns the share of outliers; none if the velocities do not determine the state.
+  std::optional<double> refine(const Velocities& velocities, Time time, const ImuBuffer& imu,
+                               ModelErrorScale& scale, NodePrior& prior) const;
   struct OffsetGains {
     std::vector<double> gains;  ///< of OffsetEvidence; 0: the velocity says nothing about the offset
     double half_width = kOffsetHalfWidth;  ///< of the mean of the IMU in the derivative [s]

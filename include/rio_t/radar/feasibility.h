@@ -1,8 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <deque>
 
-#include "rio_t/core/sliding_queue.h"
 #include "rio_t/core/time.h"
 
 namespace rio_t {
@@ -28,7 +28,7 @@ class FeasibilityCheck {
     Eigen::Vector3d v_R;
   };
   FeasibilityOptions options_;  // read-only after construction
-  SlidingQueue<Entry> accepted_;
+  std::deque<Entry> accepted_;
 };
 
 }  // namespace rio_t

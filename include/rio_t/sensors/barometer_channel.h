@@ -1,11 +1,11 @@
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "rio_t/core/sliding_queue.h"
 #include "rio_t/core/time.h"
 #include "rio_t/imu/noise_meter.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
@@ -96,9 +96,9 @@ class BarometerChannel {
   std::optional<Time> newest_;
   double spacing_ = 0.0;  ///< [s] of the newest two samples; 0: not known
   NoiseMeter noise_;
-  SlidingQueue<Sample> recent_;
-  Mean open_;                   ///< the mean that is being filled
-  SlidingQueue<Mean> waiting_;  ///< for a node
+  std::deque<Sample> recent_;
+  Mean open_;                 ///< the mean that is being filled
+  std::deque<Mean> waiting_;  ///< for a node
   std::shared_ptr<Block> bias_;
   std::optional<Time> rejected_since_;
 };

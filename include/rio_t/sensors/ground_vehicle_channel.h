@@ -1,12 +1,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "rio_t/core/sliding_queue.h"
 #include "rio_t/factors/ground_vehicle_factor.h"
 #include "rio_t/imu/buffer.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
@@ -79,7 +79,7 @@ class GroundVehicleChannel {
   std::shared_ptr<const Manifold> manifold_;
   std::shared_ptr<Block> frame_;
   std::optional<Time> judged_at_;
-  SlidingQueue<Judged> judged_;
+  std::deque<Judged> judged_;
   double judged_span_ = 0.0;  ///< [s] of judged_
   bool is_contradicted_ = false;
 };

@@ -1,8 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <deque>
 
-#include "rio_t/core/sliding_queue.h"
 #include "rio_t/radar/scan.h"
 
 namespace rio_t {
@@ -26,7 +26,7 @@ class RestPool {
   void clear() { scans_.clear(); }
 
  private:
-  SlidingQueue<RadarScan> scans_;
+  std::deque<RadarScan> scans_;
 };
 
 }  // namespace rio_t

@@ -1,10 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <deque>
 #include <functional>
 #include <optional>
 
-#include "rio_t/core/sliding_queue.h"
 #include "rio_t/radar/scan.h"
 
 namespace rio_t {
@@ -27,7 +27,7 @@ class ScanPool {
   void clear() { scans_.clear(); }
 
  private:
-  SlidingQueue<RadarScan> scans_;
+  std::deque<RadarScan> scans_;
 };
 
 }  // namespace rio_t

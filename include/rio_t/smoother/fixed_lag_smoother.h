@@ -59,6 +59,9 @@ class FixedLagSmoother {
   std::optional<PredictedState> predict(Time time, const std::vector<const Block*>& calibration) const;
   /// The newest node that is not later than `time`. None if `time` is before the window.
   std::optional<NodeEstimate> nodeBefore(Time time) const;
+  /// Prior on calibration blocks that join a running window, with the sigmas of their tangents. It does not
+  /// constrain the newest node, but leaves the window with it; from then on the blocks walk.
+  void addCalibrationPrior(std::vector<Block*> calibration, const Eigen::VectorXd& sigmas);
   /// The platform is at rest at a node; `velocity_sigma` [m/s] per axis.
   void addZeroVelocity(Block& node, double velocity_sigma);
 

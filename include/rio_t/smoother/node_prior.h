@@ -14,14 +14,12 @@ namespace rio_t {
 /// estimated, the turn [rad] and the lever arm [m] of the extrinsics (see ExtrinsicsManifold).
 Eigen::VectorXd calibrationSigmas(const SmootherOptions& options);
 
-/// Prior on the first node and on the calibration of a radar: residual r0 + J (x [-] x0), where x is the
-/// state, t_O and, if they are estimated, the extrinsics.
+/// Prior on the first node and on the calibration of a radar.
 struct NodePrior {
   StateBlock x0;
   double t_O0 = 0.0;  ///< [s]
   Extrinsics T_IR0;
-  Eigen::MatrixXd J;
-  Eigen::VectorXd r0;
+  SquareRoot root;  ///< of x [-] x0, where x is the state, t_O and, if they are estimated, the extrinsics
 };
 
 /// Prior on the first state after `duration` seconds at rest. Yaw and position define W. The mean of the

@@ -1,7 +1,6 @@
 #include "bag_player.h"
 
 #include <array>
-#include <stdexcept>
 #include <utility>
 
 #include "bag_file.h"
@@ -32,10 +31,9 @@ void BagPlayer::play(const rosbag::MessageInstance& instance) {
   if (topic == config_.imu_topic) addImu(*read<sensor_msgs::Imu>(instance), record);
   if (topic == config_.barometer_topic) addPressure(*read<sensor_msgs::FluidPressure>(instance));
   for (std::size_t k = 0; k < radars_.size(); ++k) {
-    Radar& radar = radars_[k];
-    if (topic == radar.topic) addCloud(*read<sensor_msgs::PointCloud2>(instance), record, radar);
+    if (topic == radars_[k].topic) addCloud(*read<sensor_msgs::PointCloud2>(instance), record, k);
     // One line may trigger several radars.
-    if (topic == radar.trigger_topic) addTrigger(*read<std_msgs::Header>(instance), record, k);
+    if (topic == radars_[k].trigger_topic) addTrigger(*read<std_msgs::Header>(instance), record, k);
   }
   for (std::size_t k = 0; k < radars_.size(); ++k) feed(radars_[k].stamper.take(), k);
   for (ScanResult& result : odometry_.process()) account(result);
@@ -76,8 +74,7 @@ RunSummary BagPlayer::summary(const RunLog& log) const {
       told.points_per_scan[i] = static_cast<std::uint64_t>(quantile(radar.scan_sizes, kShares[i]));
     }
     told.scans_total = radar.scans_total;
-    told.points_not_finite = radar.points_not_finite;
-    if (radar.points_not_finite > 0) summary.input_faults["points_not_finite"] += radar.points_not_finite;
+    if (told.points_not_finite > 0) summary.input_faults["points_not_finite"] += told.points_not_finite;
     for (const auto& [reason, given_up] : radar.stamper.givenUp()) told.scans_rejected[reason] += given_up;
     count(radar.not_usable, &told.scans_rejected);
     count(radar.triggers_not_usable, &summary.input_faults);
@@ -116,7 +113,7 @@ void BagPlayer::addImu(const sensor_msgs::Imu& message, Time record) {
 }
 
 void BagPlayer::followImuStamps(const ImuMeasurement& imu) {
-  if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite()) return;  // dropped unseen
+  if (faultOfValues(imu, config_.odometry.imu_input_check) != nullptr) return;
   const std::optional<Time> before = imu_stamps_.newest();
   const bool restarts = imu_stamps_.check(imu.time) == ClockJumpDetector::Verdict::kRestart;
   if (restarts && odometry_.initialized()) imu_restarts_.push_back({*before, imu.time});
@@ -141,7 +138,8 @@ void BagPlayer::addPressure(const sensor_msgs::FluidPressure& message) {
   }
 }
 
-void BagPlayer::addCloud(const sensor_msgs::PointCloud2& message, Time record, Radar& radar) {
+void BagPlayer::addCloud(const sensor_msgs::PointCloud2& message, Time record, std::size_t k) {
+  Radar& radar = radars_[k];
   ++radar.scans_total;
   DecodedScan decoded;
   try {
@@ -150,7 +148,7 @@ void BagPlayer::addCloud(const sensor_msgs::PointCloud2& message, Time record, R
     notUsable("cloud_not_usable", "topic " + radar.topic + ": " + error.what(), &radar.not_usable);
     return;
   }
-  radar.points_not_finite += decoded.dropped_not_finite;
+  evidence_.addNotFinite(k, decoded.dropped_not_finite);
   radar.scan_sizes.push_back(static_cast<double>(decoded.cloud.size()));
   try {
     radar.stamper.addScan(message.header.seq, toTime(message.header.stamp), record,

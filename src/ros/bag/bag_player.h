@@ -53,7 +53,7 @@ class BagPlayer {
     std::string topic, trigger_topic;  // the latter is empty if triggers are not read
     PointCloudFormat format;
     ScanStamper stamper;
-    std::uint64_t scans_total = 0, points_not_finite = 0;
+    std::uint64_t scans_total = 0;
     std::vector<double> scan_sizes;  // numbers of points
     NotUsableByKind not_usable, triggers_not_usable;
   };
@@ -63,7 +63,7 @@ class BagPlayer {
   void followImuStamps(const ImuMeasurement& imu);
   void addTrigger(const std_msgs::Header& message, Time record, std::size_t radar);
   void addPressure(const sensor_msgs::FluidPressure& message);
-  void addCloud(const sensor_msgs::PointCloud2& message, Time record, Radar& radar);
+  void addCloud(const sensor_msgs::PointCloud2& message, Time record, std::size_t k);
   void feed(std::vector<RadarScan> scans, std::size_t radar);
   /// One bad message among good ones is counted; `why` is told at the end, the first one of each kind.
   static void notUsable(const std::string& kind, const std::string& why, NotUsableByKind* kinds);

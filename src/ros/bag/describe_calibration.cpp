@@ -3,6 +3,7 @@
 #include <string>
 
 #include "../text.h"
+#include "rio_t/core/angle.h"
 #include "rio_t/radar/mounting.h"
 #include "rio_t/ros/bag/calibration.h"
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "../text.h"
+#include "rio_t/core/angle.h"
 #include "rio_t/ros/bag/bag_runner.h"
 
 namespace rio_t {

@@ -6,7 +6,6 @@
 #include <boost/algorithm/string.hpp>
 #include <cmath>
 #include <exception>
-#include <optional>
 #include <set>
 #include <utility>
 

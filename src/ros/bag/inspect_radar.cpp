@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "../text.h"
+#include "rio_t/core/angle.h"
 #include "rio_t/radar/mounting.h"
 
 namespace rio_t {

@@ -5,12 +5,10 @@
 #include <cmath>
 #include <filesystem>
 #include <regex>
-#include <stdexcept>
 #include <system_error>
 
 #include "../text.h"
 #include "rio_t/factors/state_block.h"
-#include "rio_t/ros/messages/conversions.h"
 
 namespace rio_t {
 namespace {

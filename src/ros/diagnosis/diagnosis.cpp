@@ -1,8 +1,6 @@
 #include "rio_t/ros/diagnosis/diagnosis.h"
 
 #include <algorithm>
-#include <cmath>
-#include <stdexcept>
 
 #include "../text.h"
 #include "radar_causes.h"
@@ -18,10 +16,36 @@ constexpr double kFewScansUsed = 0.5;
 constexpr double kMostlySilent = 0.5;
 /// [rad] A heading that is off by this much leads aside by a tenth of the way.
 constexpr double kVagueHeading = 0.1;
-constexpr const char* kImuFaults[] = {"imu_not_usable",   "imu_saturated",  "imu_gap",
-                                      "imu_out_of_order", "imu_not_finite", "imu_not_plausible",
-                                      "imu_stamp_jump",   "imu_stuck"};
 constexpr std::size_t kMostCauses = 3;
+
+struct ImuFault {
+  const char* name;
+  std::uint64_t samples;  ///< that one of them takes
+  const char* text;
+  const char* remedy;
+};
+constexpr ImuFault kImuFaults[] = {
+    {"imu_not_usable", 1, "IMU messages cannot be used.", "Check the stamps and the values of imu_topic."},
+    {"imu_saturated", 1, "IMU samples are at the end of the range.",
+     "Take an IMU with a larger range. If the range found is too small, set imu_accel_range and "
+     "imu_gyro_range."},
+    {"imu_gap", 10, "gaps between IMU samples are longer than max_imu_gap.",
+     "Raise max_imu_gap for a slow IMU, or look for what loses its messages."},
+    {"imu_out_of_order", 1, "IMU samples are out of order.", "Look for a second publisher on imu_topic."},
+    {"imu_not_finite", 1, "IMU samples are not finite.",
+     "Correct the driver of the IMU: it writes NaN or infinity."},
+    {"imu_not_plausible", 1, "IMU samples have an acceleration that no IMU measures.",
+     "Check imu_acceleration_unit and imu_accel_range, the cable and the driver of the IMU."},
+    {"imu_stamp_jump", 1, "IMU samples are stamped far ahead of the one before.",
+     "Look at the clock of the driver. For an IMU with pauses, raise imu_jump_patience."},
+    {"imu_stuck", 1, "IMU samples have a gyro axis that jumps away and stays there.",
+     "Look at the cable and the driver of the IMU: an axis of its gyro fails."}};
+
+/// Share of the IMU samples that a fault takes.
+double takenBy(const ImuFault& fault, const RunEvidence& evidence) {
+  return std::min(1.0,
+                  shareOf(countOf(evidence.input_faults, fault.name) * fault.samples, evidence.imu_count));
+}
 
 /// Windows that were solved, and those of them that ended with the offset at its bound or at the iteration
 /// limit.
@@ -121,28 +145,13 @@ void addSolver(const RunEvidence& evidence, const Config& config, std::vector<Ca
 }
 
 void addImu(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
-  const auto fault = [&](const std::string& name, std::uint64_t samples_of_one, const std::string& text,
-                         const std::string& remedy) {
-    const std::uint64_t count = countOf(evidence.input_faults, name);
-    const double share = shareOf(count * samples_of_one, evidence.imu_count);
-    if (share > kManySamples)
-      causes->push_back({name, std::to_string(count) + " " + text, remedy, std::min(1.0, share)});
-  };
-  fault("imu_not_usable", 1, "IMU messages cannot be used.", "Check the stamps and the values of imu_topic.");
-  fault("imu_saturated", 1, "IMU samples are at the end of the range.",
-        "Take an IMU with a larger range. If the range found is too small, set imu_accel_range and "
-        "imu_gyro_range.");
-  fault("imu_gap", 10, "gaps between IMU samples are longer than max_imu_gap.",
-        "Raise max_imu_gap for a slow IMU, or look for what loses its messages.");
-  fault("imu_out_of_order", 1, "IMU samples are out of order.", "Look for a second publisher on imu_topic.");
-  fault("imu_not_finite", 1, "IMU samples are not finite.",
-        "Correct the driver of the IMU: it writes NaN or infinity.");
-  fault("imu_not_plausible", 1, "IMU samples have an acceleration that no IMU measures.",
-        "Check imu_acceleration_unit and imu_accel_range, the cable and the driver of the IMU.");
-  fault("imu_stamp_jump", 1, "IMU samples are stamped far ahead of the one before.",
-        "Look at the clock of the driver. For an IMU with pauses, raise imu_jump_patience.");
-  fault("imu_stuck", 1, "IMU samples have a gyro axis that jumps away and stays there.",
-        "Look at the cable and the driver of the IMU: an axis of its gyro fails.");
+  for (const ImuFault& fault : kImuFaults) {
+    const double share = takenBy(fault, evidence);
+    if (share <= kManySamples) continue;
+    causes->push_back({fault.name,
+                       std::to_string(countOf(evidence.input_faults, fault.name)) + " " + fault.text,
+                       fault.remedy, share});
+  }
   const ImuNoise& told = config.odometry.imu_noise;
   const MeasuredImuNoise& noise = evidence.imu_noise;
   const auto noisy = [&](const std::string& sensor, const std::string& key, double measured,
@@ -243,8 +252,8 @@ std::vector<Check> checksOf(const RunEvidence& evidence, const std::vector<Confi
   for (const RadarSummary& radar : evidence.radars)
     if (pointsReceived(radar) > 0)
       kept = std::min(kept, shareOf(pointsOf(radar, PointVerdict::kKept), pointsReceived(radar)));
-  std::uint64_t imu_faults = 0;
-  for (const char* fault : kImuFaults) imu_faults += countOf(evidence.input_faults, fault);
+  double imu_faults = 0.0;
+  for (const ImuFault& fault : kImuFaults) imu_faults += takenBy(fault, evidence);
   return {
       {"started", evidence.initialized ? 1.0 : 0.0, 1.0, true},
       {"scans_used_share", usedShare(evidence), kFewScansUsed, true},
@@ -254,7 +263,7 @@ std::vector<Check> checksOf(const RunEvidence& evidence, const std::vector<Confi
       {"windows_at_offset_bound_share", shareOf(windows.at_bound, windows.all), kManyWindows, false},
       {"windows_not_converged_share", shareOf(windows.at_limit, windows.all), kManyWindows, false},
       {"mounting_turned_sigmas", turned, kFarMounting, false},
-      {"imu_faults_share", std::min(1.0, shareOf(imu_faults, evidence.imu_count)), kManySamples, false},
+      {"imu_faults_share", std::min(1.0, imu_faults), kManySamples, false},
       {"healthy_at_end", evidence.health == Health::kOk ? 1.0 : 0.0, 1.0, true}};
 }
 

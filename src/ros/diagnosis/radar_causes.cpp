@@ -1,5 +1,7 @@
 #include "radar_causes.h"
 
+#include "rio_t/core/angle.h"
+
 namespace rio_t {
 namespace {
 

@@ -60,7 +60,7 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
 
 void LiveOdometry::followImuStamps(const ImuMeasurement& imu) {
   // The same judgement as the session's own, so that the whole session starts again, with what it stamps by.
-  if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite()) return;  // the session drops it
+  if (faultOfValues(imu, config_.odometry.imu_input_check) != nullptr) return;
   const std::optional<Time> before = imu_stamps_.newest();
   if (imu_stamps_.check(imu.time) != ClockJumpDetector::Verdict::kRestart) return;
   const double jump = imu.time - *before;

@@ -14,7 +14,6 @@
 
 #include "radar_texts.h"
 #include "rio_t/evaluation/trajectory.h"
-#include "rio_t/ros/messages/conversions.h"
 #include "rio_t/ros/parameters/ros_parameters.h"
 #include "topic_rate.h"
 

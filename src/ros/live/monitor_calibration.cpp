@@ -6,6 +6,7 @@
 #include <string>
 
 #include "../text.h"
+#include "rio_t/core/angle.h"
 #include "rio_t/ros/diagnosis/diagnosis.h"
 #include "rio_t/ros/live/monitor.h"
 

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "../text.h"
+#include "rio_t/core/angle.h"
 
 namespace rio_t {
 namespace {
