@@ -64,7 +64,7 @@ TEST_F(BagRunnerErrors, MissingTopicsListThoseOfTheBag) {
 
 TEST_F(BagRunnerErrors, WrongTypesAreNamed) {
   writeBag({});
-  expectError(run({"--set", "radar_topic=/sensor_platform/imu"}),
+  expectError(run({"--set", "radar_topic=/sensor_platform/imu", "--set", "imu_topic=/other"}),
               {"/sensor_platform/imu (radar_topic) is sensor_msgs/Imu", "expected sensor_msgs/PointCloud2"});
   expectError(run({"--set", "ground_truth_topic=/other"}),
               {"/other (ground_truth_topic) is std_msgs/Header"});

@@ -179,6 +179,10 @@ TEST_F(BagRunner, GroundTruthComesFromTheTopicOrAFile) {
   // The estimate rests, the truth moved 3 m: rmse of 0 and 3.
   EXPECT_NE(contents(out_ + "/summary.yaml").find("\nate_m: 2.1"), std::string::npos);
 
+  outcome = run({"--ground-truth", folder_ + "/truth.txt"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_NE(contents(out_ + "/summary.yaml").find("\nate_m: 2.1"), std::string::npos) << "the option, too";
+
   expectError(run({"--set", "ground_truth=" + folder_ + "/none.txt"}), {folder_ + "/none.txt"});
   std::ofstream(folder_ + "/elsewhen.txt") << "5.0 0 0 0 0 0 0 1\n6.0 3 0 0 0 0 0 1\n";
   expectError(run({"--set", "ground_truth=" + folder_ + "/elsewhen.txt"}), {"ground truth", "elsewhen.txt"});

@@ -43,6 +43,37 @@ TEST_F(CheckBag, StampsOfAnotherClockAreNamed) {
   expectRuns(odd);
 }
 
+/// The offset estimate does not reach so far.
+TEST_F(CheckBag, StampsFarAheadOfTheirArrivalAreNotUsed) {
+  Changes changes;
+  changes.cloud = [](sensor_msgs::PointCloud2& cloud) {
+    cloud.header.stamp += ros::Duration(0.9);
+    return true;
+  };
+  const std::string bag = rewritten("ahead", changes);
+  const BagCheck odd = check(bag);
+  expectLine(odd, FindingLevel::kOdd, {"stamps", "ahead of their arrival", "stamp_source: arrival is used"});
+  EXPECT_EQ(configOf(odd).stamp_source, StampSource::kArrival);
+  EXPECT_LT(turnFromTruth(odd), 5.0);
+  expectRuns(odd);
+  // What is told is used to look at the bag, too.
+  for (const char* told : {"stamp_source=arrival", "radar_stamp_shift=-0.9"}) {
+    const BagCheck by_told = check(bag, true, {told});
+    EXPECT_LT(turnFromTruth(by_told), 5.0) << told;
+    expectRuns(by_told);
+  }
+}
+
+TEST_F(CheckBag, ScansThatComeLateAreNamed) {
+  Changes changes;
+  changes.cloud = [](sensor_msgs::PointCloud2& cloud) {
+    cloud.header.stamp -= ros::Duration(0.5);
+    return true;
+  };
+  expectLine(check(rewritten("late", changes), false), FindingLevel::kOdd,
+             {"stamps", "after their stamps", "--set stamp_source=arrival"});
+}
+
 TEST_F(CheckBag, AClockThatJumpsBackHalfwayIsNamed) {
   Changes changes;
   changes.cloud = [count = 0](sensor_msgs::PointCloud2& cloud) mutable {

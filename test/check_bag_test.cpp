@@ -9,6 +9,7 @@
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <sensor_msgs/point_cloud2_iterator.h>
+#include <std_msgs/Header.h>
 
 #include <algorithm>
 #include <cmath>
@@ -282,6 +283,37 @@ TEST_F(CheckBag, ATrialRunThatIsBadSaysWhy) {
   request.bags = {bag};
   std::ostringstream out, err;
   EXPECT_EQ(runCheck(request, out, err), 1) << out.str();
+}
+
+/// Nothing shows the mounting: what is written is a guess, and a script must not take it for ready.
+TEST_F(CheckBag, ABagAtRestIsNotReady) {
+  std::optional<ros::Time> begin;
+  const auto at_rest = [&](const std_msgs::Header& header) {
+    if (!begin) begin = header.stamp;
+    return header.stamp < *begin + ros::Duration(4.5);
+  };
+  Changes changes;
+  changes.imu = [&](sensor_msgs::Imu& imu) { return at_rest(imu.header); };
+  changes.cloud = [&](sensor_msgs::PointCloud2& cloud) { return at_rest(cloud.header); };
+  CheckRequest request;
+  request.bags = {rewritten("rest", changes)};
+  std::ostringstream out, err;
+  EXPECT_EQ(runCheck(request, out, err), 1) << out.str();
+  EXPECT_NE(out.str().find("The mounting is a guess"), std::string::npos) << out.str();
+  request.set = {parseAssignment("mounting_yaw_pitch_roll_deg=[0,0,180]")};
+  std::ostringstream told;
+  EXPECT_EQ(runCheck(request, told, err), 0) << told.str();
+}
+
+TEST_F(CheckBag, WhatIsToldAndFarFromWhatTheBagShowsIsNamed) {
+  const BagCheck mounting = check(bag_, false, {"mounting_yaw_pitch_roll_deg=[90,0,0]"});
+  expectLine(mounting, FindingLevel::kOdd, {"mounting", "the told mounting", "degrees apart"});
+  expectLine(check(bag_, false, {"radar_doppler_sign=-1"}), FindingLevel::kOdd,
+             {"Doppler", "the told radar_doppler_sign is -1, and the bag shows 1"});
+  // The sigma of what the bag shows is not that of what is told.
+  const double usual = SmootherOptions().extrinsics_rotation_sigma;
+  EXPECT_EQ(configOf(mounting).odometry.smoother.extrinsics_rotation_sigma, usual);
+  EXPECT_LT(configOf(check(bag_, false)).odometry.smoother.extrinsics_rotation_sigma, usual);
 }
 
 TEST_F(CheckBag, ABagOfAFrameThatVibratesRunsWell) {

@@ -77,7 +77,7 @@ TEST(Diagnosis, AGoodRunHasNoCauses) {
   const Diagnosis diagnosis = diagnose(goodRun(), Config{});
   EXPECT_EQ(toString(diagnosis.verdict), "good");
   EXPECT_EQ(describeCauses(diagnosis), "");
-  EXPECT_EQ(diagnosis.checks.size(), 10u);
+  EXPECT_EQ(diagnosis.checks.size(), 11u);
   for (const Check& check : diagnosis.checks) EXPECT_TRUE(check.good()) << check.name;
 }
 
@@ -242,7 +242,7 @@ TEST(Diagnosis, AMountingThatDrivesTheOffsetToItsBoundIsNamedFirst) {
 TEST(Diagnosis, ADivergenceIsBadIfItLastsAndDoubtfulIfNot) {
   RunEvidence evidence = goodRun();
   evidence.divergences = 1;
-  evidence.scans_diverged = 30;
+  evidence.scans_diverged = evidence.scans_contradicted = 30;
   expectSays(first(evidence), {"diverged 1 times, for 30 of 190 scans", "radar_doppler_sign"});
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
   evidence.scans_diverged = 100;
@@ -329,6 +329,20 @@ TEST(Diagnosis, TheTimeWithoutScansIsCounted) {
   EXPECT_NEAR(collector.evidence(odometry, std::nullopt).silent_seconds, 14.0, 0.11) << "it stands still";
 }
 
+TEST(Diagnosis, ScansThatComeLateAreNoSilence) {
+  const Config config;
+  const RadarInertialOdometry odometry(config.odometry);
+  EvidenceCollector collector(config);
+  for (int k = 0; k <= 200; ++k) {
+    collector.addState(Time::fromSeconds(100.0 + 0.1 * k));
+    ScanResult late;
+    late.scan.stamp = Time::fromSeconds(98.5 + 0.1 * k);
+    late.used = true;
+    collector.add(late);
+  }
+  EXPECT_EQ(collector.evidence(odometry, std::nullopt).silent_seconds, 0.0);
+}
+
 TEST(Diagnosis, ADivergenceForLackOfScansNamesTheLack) {
   RunEvidence evidence = withRejected("stamp_ahead_of_imu");
   evidence.divergences = 1;
@@ -362,6 +376,35 @@ TEST(Diagnosis, TheImuIsNamed) {
     evidence.input_faults[name] = 400;
     expectSays(first(evidence), {name + ": 400 IMU samples", part});
   }
+}
+
+TEST(Diagnosis, AStartAfterMostOfTheScansIsNamed) {
+  RunEvidence evidence = goodRun();
+  evidence.radars.front().scans_before_start = 199;
+  evidence.radars.front().scans_used = 1;
+  evidence.radars.front().scans_rejected.clear();
+  expectSays(first(evidence), {"started_late: 100 % of the scans", "init_duration"});
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
+  Config config;
+  config.odometry.init_mode = InitMode::kStatic;
+  expectSays(first(evidence, config), {"set init_mode: auto"});
+}
+
+TEST(Diagnosis, AVelocityThatWasLostIsNoContradiction) {
+  RunEvidence evidence = goodRun();
+  evidence.divergences = 1;
+  evidence.scans_diverged = 5;
+  expectSays(first(evidence),
+             {"velocity_lost: The velocity was lost 1 times, for 5 of 190 scans", "imu_gap"});
+  evidence.scans_contradicted = 5;
+  expectSays(first(evidence), {"diverged: The estimate diverged 1 times", "contradict each other"});
+}
+
+TEST(Diagnosis, TheMountingOfASparseRadarIsToBeMeasured) {
+  RunEvidence evidence = withRejected("innovation");
+  expectSays(first(evidence), {"contradicts_imu", "Run `rosrun rio_t check_bag BAG`"});
+  evidence.radars.front().points_per_scan = {4, 6, 9};
+  expectSays(first(evidence), {"contradicts_imu", "Measure the mounting"});
 }
 
 TEST(Diagnosis, AVagueHeadingAfterAStartInMotionIsDoubtful) {
@@ -408,7 +451,7 @@ TEST(Diagnosis, TheLikeliestThreeComeFirst) {
   RunEvidence evidence = withRejected("innovation");
   evidence.divergences = 2;
   evidence.input_faults = {{"imu_saturated", 400}, {"imu_gap", 100}};
-  evidence.scans_diverged = 150;
+  evidence.scans_diverged = evidence.scans_contradicted = 150;
   const Diagnosis diagnosis = diagnose(evidence, Config{});
   ASSERT_EQ(diagnosis.causes.size(), 3u);
   EXPECT_EQ(diagnosis.causes[0].name, "contradicts_imu");

@@ -313,12 +313,24 @@ TEST_F(Gate, AStuckGyroAxisIsReplaced) {
   EXPECT_EQ(sample.angular_velocity, motion.imuSample(1.3).angular_velocity);
 }
 
+/// The readings of an axis at its end, through the calibration of a driver and with the noise of the others.
+TEST_F(Gate, AStuckAxisMayHaveNoise) {
+  Noise noise;
+  for (double s = 1.0; s < 1.3; s += 0.01) {
+    ImuMeasurement stuck = motion.imuSample(s);
+    stuck.angular_velocity.y() = 17.4 + 0.01 * noise.vector().x();
+    EXPECT_NE(feed(stuck).find("imu_stuck"), std::string::npos) << s;
+    EXPECT_LT(sample.angular_velocity.y(), 2.0);
+  }
+  feed(1.3);
+  EXPECT_EQ(sample.angular_velocity, motion.imuSample(1.3).angular_velocity);
+}
+
 TEST_F(Gate, AFastTurnThatGoesOnIsNotStuck) {
-  // From nothing to 6 rad/s in one sample, as where samples are missing, and then as gyros read: never twice
-  // the same.
+  // From nothing to 6 rad/s in one sample, as where samples are missing; and then it goes on to change.
   EXPECT_EQ(feed({motion.time(1.0), {6.0, 0.0, 0.0}, {0.0, 0.0, 9.81}}), "imu_stuck");
-  EXPECT_EQ(feed({motion.time(1.01), {6.1, 0.0, 0.0}, {0.0, 0.0, 9.81}}), "");
-  EXPECT_EQ(sample.angular_velocity.x(), 6.1);
+  EXPECT_EQ(feed({motion.time(1.01), {6.5, 0.0, 0.0}, {0.0, 0.0, 9.81}}), "");
+  EXPECT_EQ(sample.angular_velocity.x(), 6.5);
 }
 
 TEST_F(Gate, AFastTurnAfterAGapIsNotStuck) {
@@ -346,6 +358,28 @@ TEST_F(Gate, AGapAddsNoNoise) {
     feedNoise(t);
     EXPECT_LT(std::sqrt(sample.accel_noise), 1.3 * before) << t;
   }
+}
+
+/// Over the samples that see it, the variance is the square of the velocity that the wrong sample adds.
+TEST_F(Gate, AWrongSampleIsInTheSigma) {
+  Noise noise;
+  double unseen_accel = 0.0, unseen_gyro = 0.0;
+  for (int i = 0; i < 300; ++i) {
+    ImuMeasurement imu = motion.imuSample(1.0 + 0.01 * i);
+    imu.acceleration += 0.1 * noise.vector();
+    imu.angular_velocity += 0.01 * noise.vector();
+    if (i == 100) unseen_accel = unseen_gyro = 0.0;  // the noise was new
+    if (i == 200) {
+      EXPECT_EQ(unseen_accel, 0.0);
+      imu.acceleration.x() += 50.0;
+      imu.angular_velocity.z() += 1.0;
+    }
+    feed(imu);
+    unseen_accel += 0.01 * sample.unseen_accel_variance;
+    unseen_gyro += 0.01 * sample.unseen_gyro_variance;
+  }
+  EXPECT_NEAR(std::sqrt(unseen_accel), 50.0 * 0.01, 0.05);
+  EXPECT_NEAR(std::sqrt(unseen_gyro), 1.0 * 0.01, 0.001);
 }
 
 TEST_F(Gate, AClockThatJumpsIsNoNoise) {

@@ -40,7 +40,7 @@ class TwoRadarDiagnostics : public testing::Test {
   }
   /// A second in which the IMU and these numbers of scans come; so many of those of right are used.
   Status second(int left, int right, int right_used) {
-    monitor.imu();
+    monitor.imu(Time());
     for (int k = 0; k < left; ++k) feed(0, true);
     for (int k = 0; k < right; ++k) feed(1, k < right_used);
     Status status;
@@ -130,6 +130,36 @@ TEST_F(TwoRadarDiagnostics, IsAnErrorIfTheImuFallsSilent) {
   monitor.describeInput(status, &session);
   EXPECT_EQ(status.level, DiagnosticStatus::ERROR);
   EXPECT_EQ(status.message, "the IMU is silent, topic " + config.imu_topic);
+  const Status estimate = odometry(session);
+  EXPECT_EQ(estimate.level, DiagnosticStatus::ERROR);
+  EXPECT_EQ(estimate.message, "the IMU is silent: no odometry is published");
+}
+
+/// The estimate runs, and the clock of a radar is far behind that of the IMU.
+TEST_F(TwoRadarDiagnostics, NameScansThatAlwaysComeBeforeTheStart) {
+  monitor.odometry(NavigationState(), 0.0);
+  Status status;
+  for (int k = 0; k < 5; ++k) {
+    monitor.imu(Time::fromSeconds(1000.0 + k));
+    for (int i = 0; i < 10; ++i) {
+      feed(0, true);
+      monitor.scan(1);
+      monitor.trigger(1);
+      LiveSession::Result result;
+      result.result.scan.radar = 1;
+      result.result.scan.stamp = Time::fromSeconds(10.0 + k);
+      result.result.rejected_because = "before_initialization";
+      monitor.result(result);
+    }
+    status = Status();
+    monitor.describeInput(status, &session);
+  }
+  EXPECT_EQ(status.level, DiagnosticStatus::WARN);
+  EXPECT_EQ(status.message,
+            "radar right: 0 of the last 40 scans were used, rejected mostly as before_initialization");
+  EXPECT_EQ(value(odometry(session), "likely_cause_1")
+                .find("50 of 50 scans of radar right are stamped before the first IMU sample"),
+            0U);
 }
 
 TEST_F(TwoRadarDiagnostics, SayHowTheOdometryGoesOnAfterAReset) {
@@ -165,14 +195,14 @@ TEST_F(TwoRadarDiagnostics, AreAnErrorWithItsCauseWhereNoScanWasEverUsed) {
 }
 
 TEST_F(TwoRadarDiagnostics, TakeTheShareOfFaultySamplesSinceTheReset) {
-  for (int k = 0; k < 10000; ++k) monitor.imu();
+  for (int k = 0; k < 10000; ++k) monitor.imu(Time());
   monitor.reset("~reset called");
   LiveSession fresh(config, config.odometry);
   rest(fresh, 0, 4);
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   for (int k = 0; k < 200; ++k)
     fresh.addImu({Time::fromSeconds(4.0 + 0.0025 * k), {kNan, 0.0, 0.0}, {0.0, 0.0, 9.81}});
-  for (int k = 0; k < 1800; ++k) monitor.imu();
+  for (int k = 0; k < 1800; ++k) monitor.imu(Time());
   EXPECT_EQ(value(odometry(fresh), "likely_cause_1").find("200 IMU samples are not finite."), 0U)
       << value(odometry(fresh), "likely_cause_1");
 }
@@ -227,7 +257,7 @@ TEST_F(TwoRadarDiagnostics, NameTheRadarThatIsMostlyRejected) {
 
 TEST_F(TwoRadarDiagnostics, DoNotJudgeScansThatCameBeforeTheStart) {
   for (int k = 0; k < 20; ++k) {
-    monitor.imu();
+    monitor.imu(Time());
     for (int i = 0; i < 10; ++i) {
       for (const std::size_t radar : {0U, 1U}) {
         monitor.scan(radar);
@@ -247,7 +277,7 @@ TEST_F(TwoRadarDiagnostics, DoNotJudgeScansThatCameBeforeTheStart) {
 TEST_F(TwoRadarDiagnostics, DoNotDoubtARunWhoseScansLongWaitedForTf) {
   for (const char* reason : {"scan_before_extrinsics", "frame_not_usable"}) monitor.dropped(0, reason, 100);
   for (int k = 0; k < 30; ++k) feed(0, true);
-  for (int k = 0; k < 1600; ++k) monitor.imu();
+  for (int k = 0; k < 1600; ++k) monitor.imu(Time());
   const Status status = odometry(session);
   EXPECT_EQ(value(status, "verdict"), "good");
   EXPECT_EQ(value(status, "likely_cause_1"), "no likely_cause_1");

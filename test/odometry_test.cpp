@@ -347,7 +347,6 @@ TEST(LateScans, PassTheSameGatesAsPunctualOnes) {
   }
 }
 
-/// Wild motion in which a gyro axis reads 17.4 rad/s for 0.3 s.
 // Both solvers and both models of the offset, through everything.
 TEST(Solvers, SayTheSame) {
   for (const TimeOffsetModel model : {TimeOffsetModel::kImu, TimeOffsetModel::kConstantAcceleration}) {
@@ -376,6 +375,7 @@ TEST(Solvers, SayTheSame) {
   }
 }
 
+/// Wild motion in which a gyro axis reads 17.4 rad/s for 0.3 s.
 TEST(StuckGyro, CostsLittle) {
   for (const int axis : {0, 1, 2}) {
     SimulatedRun run("difficult", 1, 60.0, 5.0);
@@ -406,6 +406,20 @@ TEST(ImuSpike, OneImpossibleSampleCostsNothing) {
   EXPECT_EQ(run.odometry->faults()["imu_not_plausible"], 1u);
   EXPECT_EQ(run.odometry->faults()["diverged"], 0u);
   EXPECT_LT(run.rms(15.0, 40.0, [&](const NavigationState& state) { return run.velocityError(state); }), 0.1);
+}
+
+/// The IMU says that the velocity jumped by 0.5 and 2.5 m/s, and no other sample confirms it.
+TEST(ImuSpike, OneWrongSampleIsOutvotedAtOnce) {
+  for (const double spike : {200.0, 1000.0}) {
+    SimulatedRun run("difficult", 1, 40.0, 5.0);
+    run.run([&](simulation::SensorData& data) {
+      auto& samples = data.imu.samples;
+      samples[samples.size() / 2].acceleration.x() += spike;
+    });
+    EXPECT_LT(run.rms(25.0, 40.0, [&](const NavigationState& state) { return run.velocityError(state); }),
+              0.1)
+        << spike;
+  }
 }
 
 /// The gap loses the heading for good, and with it the direction of the velocity in W. At this speed that is

@@ -18,7 +18,8 @@ double secondsToStep(double offset_error, double acceleration, double noise = 0.
     const Eigen::Vector3d e(std::sin(2.1 * i * i), std::cos(1.3 * i * i), std::sin(0.7 * i * i + 1.0));
     const double error = 0.1 * i < quiet ? 0.0 : offset_error;
     const Eigen::Vector3d d = error * J + std::sqrt(2.0) * noise * e;
-    if (detector.stepped({Time::fromSeconds(0.1 * i), d, S, S, J})) return 0.1 * i;
+    if (detector.stepped({Time::fromSeconds(0.1 * i), d, S, S, J}, Eigen::Matrix3d::Identity()))
+      return 0.1 * i;
   }
   return 60.0;
 }
@@ -40,6 +41,31 @@ TEST(OffsetStepDetector, SeesALargeStepSoon) {
   EXPECT_LT(secondsToStep(-0.1, 2.0, 0.03, 30.0), 31.5);
 }
 
+// A platform that turns its acceleration in ten seconds. The estimated velocity follows each scan by a third
+// of its innovation, so an innovation shows only what has changed within some scans.
+TEST(OffsetStepDetector, SeesAStepThatTheVelocityFollows) {
+  OffsetStepDetector detector(OffsetStepDetectorOptions(), 0.25);
+  const Eigen::Matrix3d S = 0.02 * 0.02 * Eigen::Matrix3d::Identity();
+  const double step = 0.06, begin = 30.0;
+  OffsetScan scan;
+  scan.predicted = S / 3.0;
+  scan.measured = S - scan.predicted;
+  Eigen::Vector3d followed = Eigen::Vector3d::Zero();  // by the velocity, because of the step
+  double found = 60.0;
+  for (int i = 0; i < 600 && found == 60.0; ++i) {
+    const double t = 0.1 * i;
+    const Eigen::Vector3d J = 2.0 * Eigen::Vector3d(std::sin(0.6 * t), std::cos(0.6 * t), 0.3);
+    const Eigen::Vector3d e(std::sin(2.1 * i * i), std::cos(1.3 * i * i), std::sin(0.7 * i * i + 1.0));
+    const Eigen::Vector3d due = (t < begin ? 0.0 : step) * J - followed;
+    const Eigen::Vector3d d = due + 0.01 * e;
+    if (detector.stepped({Time::fromSeconds(t), d, S, S, J}, scan.R_WR())) found = t;
+    detector.follow(J, scan);
+    followed += due / 3.0;
+  }
+  EXPECT_GE(found, begin);
+  EXPECT_LT(found, begin + 10.0);
+}
+
 TEST(OffsetStepDetector, AChangeBeyondTheBoundsIsNoStep) { EXPECT_EQ(secondsToStep(0.8, 2.0), 60.0); }
 
 TEST(OffsetStepDetector, LeavesSmallChangesToTheRandomWalk) {
@@ -54,7 +80,8 @@ TEST(OffsetStepDetector, CanBeTurnedOff) {
   OffsetStepDetector detector(options, 0.25);
   for (int i = 0; i < 200; ++i) {
     const Eigen::Matrix3d S = 1e-4 * Eigen::Matrix3d::Identity();
-    EXPECT_FALSE(detector.stepped({Time::fromSeconds(0.1 * i), {1, 0, 0}, S, S, {2, 0, 0}}));
+    EXPECT_FALSE(detector.stepped({Time::fromSeconds(0.1 * i), {1, 0, 0}, S, S, {2, 0, 0}},
+                                  Eigen::Matrix3d::Identity()));
   }
 }
 

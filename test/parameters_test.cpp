@@ -194,6 +194,11 @@ TEST(Parameters, ContradictionsAreRefused) {
   EXPECT_TRUE(contains(faultsOf({"time_offset_initial=-0.3"}).at(0), "max_time_offset"));
   EXPECT_TRUE(contains(faultsOf({"stamp_source=trigger", "trigger_topic=\"\""}).at(0), "trigger_topic"));
   EXPECT_NO_THROW(fromAssignments({"trigger_topic=\"\""}));
+  EXPECT_TRUE(contains(faultsOf({"radar_topic=/a", "imu_topic=/a"}).at(0),
+                       "radar_topic: expected another topic than imu_topic, got \"/a\" for both"));
+  EXPECT_TRUE(contains(faultsOf({"radar_topic=/a", "stamp_source=trigger", "trigger_topic=/a"}).at(0),
+                       "trigger_topic: expected another topic than radar_topic"));
+  EXPECT_NO_THROW(fromAssignments({"radar_topic=/a", "trigger_topic=/a"})) << "no trigger is read";
 }
 
 TEST(Parameters, AllFaultsAreReportedAtOnce) {

@@ -73,8 +73,10 @@ ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
     accel_noise_.interrupt();
     gyro_noise_.interrupt();
   } else {
-    accel_noise_.add(imu.time, imu.acceleration);
-    gyro_noise_.add(imu.time, imu.angular_velocity);
+    imu.unseen_accel_variance =
+        std::max(imu.unseen_accel_variance, accel_noise_.add(imu.time, imu.acceleration));
+    imu.unseen_gyro_variance =
+        std::max(imu.unseen_gyro_variance, gyro_noise_.add(imu.time, imu.angular_velocity));
   }
   imu.accel_noise = accel_noise_.squaredDensity();
   imu.gyro_noise = gyro_noise_.squaredDensity();

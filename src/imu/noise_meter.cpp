@@ -34,22 +34,24 @@ Eigen::Vector3d NoiseMeter::squaredDensities(double spacing) const {
 
 bool NoiseMeter::isSettled() const { return weight_ * spacing_ > kMemory / 2.0; }
 
-void NoiseMeter::add(Time time, const Eigen::Vector3d& value) {
+double NoiseMeter::add(Time time, const Eigen::Vector3d& value) {
   if (count_ == 5) {
     std::rotate(last_.begin(), last_.begin() + 1, last_.end());
     --count_;
   }
   last_[static_cast<std::size_t>(count_++)] = {time, value};
-  if (count_ < 5) return;
+  if (count_ < 5) return 0.0;
 
   spacing_ = (last_[4].time - last_[0].time) / 4.0;
-  Eigen::Vector3d squares = squaredDensities(spacing_);
+  const Eigen::Vector3d shown = squaredDensities(spacing_);
   const double mean = squaredDensity();
   // A signal that stood still to the last bit has no mean to compare with.
-  if (mean > kNothing && isSettled()) squares = squares.cwiseMin(kLargestSquare * mean);
+  const bool can_tell = mean > kNothing && isSettled();
+  const Eigen::Vector3d squares = can_tell ? shown.cwiseMin(kLargestSquare * mean).eval() : shown;
   const double fade = std::exp(-(time - last_[3].time) / kMemory);
   squares_ = fade * squares_ + squares;
   weight_ = fade * weight_ + 1.0;
+  return (shown - squares).maxCoeff();
 }
 
 }  // namespace rio_t

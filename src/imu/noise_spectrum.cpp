@@ -10,20 +10,23 @@ constexpr double kLongest = 0.1;
 
 }  // namespace
 
-void NoiseSpectrum::add(Time time, const Eigen::Vector3d& value) {
+double NoiseSpectrum::add(Time time, const Eigen::Vector3d& value) {
   Time at = time;
   Eigen::Vector3d mean = value;
+  double knock = 0.0;
   for (Rate& rate : rates_) {
-    rate.meter.add(at, mean);
+    const double of_means = rate.meter.add(at, mean);
+    if (&rate == &rates_.front()) knock = of_means;
     rate.has_first = !rate.has_first;
     if (rate.has_first) {
       rate.first_time = at;
       rate.first = mean;
-      return;
+      return knock;
     }
     at = rate.first_time + 0.5 * (at - rate.first_time);
     mean = 0.5 * (rate.first + mean);
   }
+  return knock;
 }
 
 void NoiseSpectrum::interrupt() {

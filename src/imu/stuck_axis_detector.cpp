@@ -12,17 +12,22 @@ namespace {
 /// rad/s^2, at 400 Hz 800 rad/s^2, and a hand that shakes with 3 rad/s at 3 Hz reaches 60 rad/s^2.
 constexpr double kSmallestJump = 2.0;
 constexpr double kHandShakes = 60.0;   // [rad/s^2] that hand
-constexpr double kUnusual = 5.0;       // times the usual jump: a vibrating gyro is not stuck
+constexpr double kUnusual = 5.0;       // times the usual jump: more is a jump away, less is noise
 constexpr double kForgetting = 0.999;  // of the usual jump, each sample
 
 }  // namespace
 
 std::optional<double> StuckAxisDetector::check(Time time, double reading) {
   const double jump = good_ ? std::abs(reading - *good_) : 0.0;
-  const bool repeats = stuck_at_ && reading == *stuck_at_;
+  // After a jump that no mass makes, the noise of a stuck axis is no motion either.
+  const bool repeats =
+      stuck_at_ && std::abs(reading - *stuck_at_) <= (is_impossible_ ? kUnusual * usual_jump_ : 0.0);
   const bool jumps_away = !stuck_at_ && jump > std::max(kSmallestJump, kUnusual * usual_jump_);
-  if (repeats || jumps_away) stuck_at_ = reading;
-  if (repeats || (jumps_away && jump > kHandShakes * (time - good_at_)))
+  if (jumps_away) {
+    stuck_at_ = reading;
+    is_impossible_ = jump > kHandShakes * (time - good_at_);
+  }
+  if (repeats || (jumps_away && is_impossible_))
     return *good_ * std::exp(-std::max(0.0, time - good_at_) / kMotionCorrelationTime);
   // Over a gap a platform may turn so fast. If the reading repeats, it sticks.
   if (jumps_away) return std::nullopt;

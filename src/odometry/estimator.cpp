@@ -123,6 +123,7 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
     if (!result.updated && health_.health() == Health::kDiverged) publishNewest();
   }
   result.health = health_.health();
+  result.is_contradicted = health_.isContradicted();
   return result;
 }
 

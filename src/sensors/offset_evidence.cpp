@@ -1,7 +1,5 @@
 #include "rio_t/sensors/offset_evidence.h"
 
-#include <Eigen/Geometry>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -65,9 +63,9 @@ double OffsetEvidence::varianceOfChange(Time tau, const OffsetDerivative& deriva
 void OffsetEvidence::add(const OffsetScan& scan, const OffsetDerivative& derivative) {
   const double fade = fading(last_, scan.tau, kMemory);
   last_ = scan.tau;
-  const Eigen::Matrix3d R_WR = (scan.x.q_WI() * scan.T_IR.q_IR).toRotationMatrix();
+  const Eigen::Matrix3d R_WR = scan.R_WR();
   const Eigen::Matrix3d W = (scan.predicted + scan.measured).inverse();
-  const Eigen::Matrix3d K = scan.predicted * W;
+  const Eigen::Matrix3d K = scan.share();
   const auto change = [&](const Eigen::Vector3d& now, Eigen::Vector3d& followed) {
     Eigen::Vector3d changed = now - R_WR.transpose() * followed;
     followed += R_WR * K * changed;

@@ -15,36 +15,47 @@ constexpr double kMinScatter = 0.2;  // of the variance: fewer scans than it see
 
 }  // namespace
 
-bool OffsetStepDetector::showsStep(const Average& average) const {
-  if (average.count < kMinCount || average.information <= 0.0) return false;
-  const double change = average.projection / average.information;
+bool OffsetStepDetector::showsStep(const Average& average, const Average::Change& asked) const {
+  if (average.count < kMinCount || asked.information <= 0.0) return false;
+  const double change = asked.projection / asked.information;
   // The scatter that the change does not explain. S is an upper bound, so the scatter may well be below 1.
-  const double scatter =
-      std::max(kMinScatter, (average.squares - change * average.projection) / average.count);
-  const double sigma = std::sqrt(scatter / average.information);
+  const double scatter = std::max(kMinScatter, (average.squares - change * asked.projection) / average.count);
+  const double sigma = std::sqrt(scatter / asked.information);
   return std::abs(change) >= std::max(options_.significance * sigma, options_.min_change) &&
          std::abs(change) <= max_change_;
 }
 
-bool OffsetStepDetector::stepped(const Innovation& innovation) {
+bool OffsetStepDetector::stepped(const Innovation& innovation, const Eigen::Matrix3d& R_WR) {
   if (!options_.enabled) return false;
   const Time before = std::exchange(last_, innovation.stamp);
   const Eigen::LDLT<Eigen::Matrix3d> weight = innovation.S_at_offset.ldlt();
-  const Eigen::Vector3d weighted_J = weight.solve(innovation.J_O);
   const double squares = innovation.d.dot(weight.solve(innovation.d));
   double memory = options_.memory;
   for (Average& average : averages_) {
     const double fade = fading(before, innovation.stamp, memory);
-    average.information = fade * average.information + innovation.J_O.dot(weighted_J);
-    average.projection = fade * average.projection + innovation.d.dot(weighted_J);
+    average.followed *= fade;
+    const auto add = [&](const Eigen::Vector3d& J, Average::Change& change) {
+      const Eigen::Vector3d weighted_J = weight.solve(J);
+      change.information = fade * change.information + J.dot(weighted_J);
+      change.projection = fade * change.projection + innovation.d.dot(weighted_J);
+    };
+    add(innovation.J_O, average.whole);
+    add(innovation.J_O - R_WR.transpose() * average.followed, average.unfollowed);
     average.squares = fade * average.squares + squares;
     average.count = fade * average.count + 3.0;
     memory *= 0.5;
   }
-  if (std::none_of(averages_.begin(), averages_.end(), [this](const Average& a) { return showsStep(a); }))
-    return false;
-  averages_ = {};
-  return true;
+  const bool shows = std::any_of(averages_.begin(), averages_.end(), [this](const Average& a) {
+    return showsStep(a, a.whole) || showsStep(a, a.unfollowed);
+  });
+  if (shows) averages_ = {};
+  return shows;
+}
+
+void OffsetStepDetector::follow(const Eigen::Vector3d& J_O, const OffsetScan& scan) {
+  const Eigen::Matrix3d R_WR = scan.R_WR();
+  for (Average& average : averages_)
+    average.followed += R_WR * scan.share() * (J_O - R_WR.transpose() * average.followed);
 }
 
 }  // namespace rio_t

@@ -139,7 +139,7 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
     }
     if (isValid(of_own.status)) own = innovation(scan.stamp, *seen.prior, of_own, &seen);
   }
-  if (own) answer.offset_stepped = step_detector_.stepped(*own);
+  if (own) answer.offset_stepped = step_detector_.stepped(*own, seen.prediction->scan.R_WR());
   if (answer.offset_stepped) {
     in_window_.stepOffset(smoother, scan.stamp);
     followOffsetSteps();
@@ -154,6 +154,11 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   if (!added) return reject("older_than_window");
   gate_.used();
   if (own) offset_uncertainty_.add(*own);
+  if (seen.moves) {
+    OffsetScan followed = seen.prediction->scan;
+    followed.measured = measured.covariance;
+    step_detector_.follow(changeWithOffset(seen), followed);
+  }
   // A borrowed point must not teach twice.
   if (!seen.is_own || sharesPoints(seen, learned_at_)) return answer;
   if (can_be_judged) {
@@ -275,10 +280,14 @@ Innovation RadarChannel::innovation(Time stamp, const VelocityPrior& prior, cons
   // The scale of the model errors takes a step for noise: with its part, the scans after a step would count
   // for little.
   result.S_at_offset.diagonal() -= measured.told_variance;
+  result.J_O = changeWithOffset(*seen);
+  return result;
+}
+
+Eigen::Vector3d RadarChannel::changeWithOffset(const Seen& seen) const {
   // The prediction holds the noise before the scan. A derivative with the same noise would let both look like
   // a wrong offset.
-  result.J_O = offset_widths_.gain() * seen->dv_dt_O.after;
-  return result;
+  return offset_widths_.gain() * seen.dv_dt_O.after;
 }
 
 void RadarChannel::judge(const RadarScan& scan, const VelocityPrior& prior, bool had_prior, double scale,

@@ -14,8 +14,10 @@ namespace rio_t {
 /// alone is left in it, whatever the spacing of the samples. Not thread-safe.
 class NoiseMeter {
  public:
-  /// Takes one sample [unit] at `time`; times must rise.
-  void add(Time time, const Eigen::Vector3d& value);
+  /// Takes one sample [unit] at `time`; times must rise. Returns the squared density that is too large for
+  /// noise and does not count, of the noisiest axis [unit^2/Hz]: a knock. Over the five samples that see a
+  /// single wrong value, its integral is the square of what the value adds to the integral of the signal.
+  double add(Time time, const Eigen::Vector3d& value);
   /// Squared density of the noisiest axis over the last second [unit^2/Hz]; 0 before the first five samples.
   double squaredDensity() const { return weight_ > 0.0 ? squares_.maxCoeff() / weight_ : 0.0; }
   double spacing() const { return spacing_; }  ///< of the samples [s]

@@ -15,8 +15,8 @@ namespace rio_t {
 /// thread-safe.
 class NoiseSpectrum {
  public:
-  /// As in NoiseMeter.
-  void add(Time time, const Eigen::Vector3d& value);
+  /// As in NoiseMeter; the knock is that of the samples.
+  double add(Time time, const Eigen::Vector3d& value);
   void interrupt();
   double squaredDensity() const { return rates_.front().meter.squaredDensity(); }  ///< of the samples
   /// The smallest density of all rates down to 10 Hz. It is never above that of the samples.

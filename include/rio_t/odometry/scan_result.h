@@ -37,8 +37,9 @@ struct ScanResult : ScanAnswer {
   Eigen::Matrix<double, 6, 6> T_IR_covariance = Eigen::Matrix<double, 6, 6>::Zero();
   int solver_iterations = 0;
   SolverTermination solver_termination = SolverTermination::kIterationLimit;
-  Health health = Health::kOk;                        ///< after this scan
-  bool reinitialized = false;                         ///< the estimate was re-initialised before this scan
+  Health health = Health::kOk;   ///< after this scan
+  bool is_contradicted = false;  ///< diverged, and not only because the velocity is unknown
+  bool reinitialized = false;    ///< the estimate was re-initialised before this scan
   std::optional<GroundVehicleAnswer> ground_vehicle;  ///< if the constraint was judged at this scan
   std::vector<BarometerAnswer> barometer;  ///< means of pressures that were judged before this scan
   std::vector<StampedPose> left_window;    ///< optimised poses that this scan pushed out, oldest first

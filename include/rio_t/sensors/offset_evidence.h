@@ -1,6 +1,7 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <array>
 #include <deque>
 
@@ -41,6 +42,10 @@ struct OffsetScan {
   /// follow the scans.
   Eigen::Matrix3d predicted = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d measured = Eigen::Matrix3d::Zero();  ///< covariance in R of the scan's velocity [m^2/s^2]
+
+  Eigen::Matrix3d R_WR() const { return (x.q_WI() * T_IR.q_IR).toRotationMatrix(); }
+  /// The share of its innovation by which the estimated velocity follows the scan, in R.
+  Eigen::Matrix3d share() const { return predicted * (predicted + measured).inverse(); }
 };
 
 /// Tells how much of the derivative with respect to t_O is motion, and how much is noise of the IMU.

@@ -138,6 +138,8 @@ class RadarChannel {
   bool confirmsRest(const Rest& rest, const RadarScan& scan, double scale, Seen& seen);
   /// See OffsetEvidence; 0: the scan does not tell the offset. Sets `seen.dv_dt_O`.
   double offsetGain(Seen& seen);
+  /// J_O of an Innovation, of a scan that moves.
+  Eigen::Vector3d changeWithOffset(const Seen& seen) const;
   /// What of the scan goes into the window: its own points, which are the inliers, and the velocity at which
   /// their likelihood is set up.
   EgoVelocity staticWorld(const RadarScan& scan, const Seen& seen) const;

@@ -25,7 +25,7 @@ const ProgramText kText = {
 
 struct Arguments {
   std::vector<std::string> bags;
-  std::string config, output_folder;
+  std::string config, output_folder, ground_truth;
   ParameterEntries set;
   bool print_config = false;
   std::string print_parameters;
@@ -35,6 +35,8 @@ void addOptions(OptionSet& options, Arguments& a) {
   addBagOptions(options, a.bags, a.config, a.set);
   options.text("output-dir", "FOLDER", "the files go there; without it, only the summary is printed",
                a.output_folder);
+  options.text("ground-truth", "FILE",
+               "compares with these true poses (TUM); the same as --set ground_truth=FILE", a.ground_truth);
   options.section("Instead of playing");
   options.flag("print-config", "prints the configuration with every parameter", a.print_config);
   options.valueOrNothing("print-parameters", "FORMAT",
@@ -74,6 +76,8 @@ int run(const Arguments& arguments, std::ostream& out, std::ostream& err) {
   ParameterEntries entries;
   if (!arguments.config.empty()) entries = readParameterFile(findConfigFile(arguments.config));
   entries.insert(entries.end(), arguments.set.begin(), arguments.set.end());
+  if (!arguments.ground_truth.empty())
+    entries.push_back({"ground_truth", {arguments.ground_truth}, "--ground-truth"});
   const Config config = makeConfig(entries);
   if (!arguments.print_config) return play(arguments, config, out, err);
   out << toYaml(config);

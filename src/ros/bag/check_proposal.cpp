@@ -83,7 +83,7 @@ ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarI
   config.top_level.set("estimate_extrinsics", "rotation",
                        "The mounting below is coarse. The estimate starts there and refines it.");
   constexpr double kLeast = 0.05, kSafety = 3.0;  // [rad]
-  if (all_observed && kSafety * worst < SmootherOptions().extrinsics_rotation_sigma)
+  if (all_observed && !isMountingTold(told) && kSafety * worst < SmootherOptions().extrinsics_rotation_sigma)
     config.top_level.set("extrinsics_rotation_sigma",
                          ParameterValue{rounded(std::max(kLeast, kSafety * worst), 100.0)},
                          "Standard deviation of the mounting below [rad], with a margin.");

@@ -115,10 +115,7 @@ void chooseByTrial(const Recording& recording, const std::string& header, const 
     note = its_note;
   };
   attempt(config, "");
-  const bool is_told = std::any_of(told.begin(), told.end(), [](const ParameterEntry& entry) {
-    return entry.key == "estimate_extrinsics";
-  });
-  if (!best.good() && !is_told) {
+  if (!best.good() && !isTold("estimate_extrinsics", told)) {
     ProposedConfig changed = config;
     changed.top_level.set("estimate_extrinsics", "pose", "With a fixed lever arm the odometry diverged.");
     attempt(changed, " (with estimate_extrinsics: pose; without it, it does not run as well)");

@@ -235,8 +235,7 @@ FormatProposal proposeFormat(const CloudTopic& topic, const ParameterEntries& to
     return proposal;
   }
   const PointCloudOverrides known = makeConfig(told).radar_overrides;
-  const bool format_is_told = std::any_of(
-      told.begin(), told.end(), [](const ParameterEntry& entry) { return entry.key == "radar_format"; });
+  const bool format_is_told = isTold("radar_format", told);
   const std::vector<std::string> fields = fieldsOf(*message);
   proposal.fields = boost::algorithm::join(fields, ", ");
   proposal.fitting = fittingPresets(*message);

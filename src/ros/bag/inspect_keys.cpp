@@ -27,6 +27,10 @@ void ProposedKeys::remove(const std::string& key) {
       keys_.end());
 }
 
+bool isTold(const std::string& key, const ParameterEntries& told) {
+  return std::any_of(told.begin(), told.end(), [&](const ParameterEntry& entry) { return entry.key == key; });
+}
+
 double rounded(double value, double per) { return std::round(value * per) / per + 0.0; }
 
 std::string commented(const std::string& text, const std::string& indent) {

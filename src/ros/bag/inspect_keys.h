@@ -36,6 +36,9 @@ struct ProposedConfig {
   std::vector<std::pair<std::string, ProposedKeys>> radars;  ///< by name; empty: one radar, at the top level
 };
 
+/// Whether the user has told the key.
+bool isTold(const std::string& key, const ParameterEntries& told);
+
 /// To the nearest of the numbers that lie 1 / `per` apart; never minus zero.
 double rounded(double value, double per);
 

@@ -237,7 +237,27 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
                     "Found roughly, in seconds.");
 }
 
+/// What the user has told stands in the configuration. If the bag clearly shows another thing, it says so.
+void compareWithTold(const MountingSearch& search, const ParameterEntries& told, RadarInspection* radar) {
+  if (!search.enough || search.rotation_sigma.maxCoeff() > kObservedTurn || radar->isSparse()) return;
+  const Config known = makeConfig(told);
+  constexpr double kMisjudged = 0.26;  // [rad] by eye
+  const double turn = known.odometry.T_IR.q_IR.angularDistance(search.q_IR);
+  if (isMountingTold(told) && turn > kMisjudged)
+    tell(radar, FindingLevel::kOdd, "mounting",
+         "the told mounting and the one that the bag shows are " + degrees(turn) + " degrees apart");
+  const int sign = known.radar_overrides.doppler_sign;
+  if (sign != 0 && sign != search.sign)
+    tell(radar, FindingLevel::kOdd, "Doppler",
+         "the told radar_doppler_sign is " + std::to_string(sign) + ", and the bag shows " +
+             std::to_string(search.sign));
+}
+
 }  // namespace
+
+bool isMountingTold(const ParameterEntries& told) {
+  return isTold("mounting_yaw_pitch_roll_deg", told) || isTold("extrinsics_rotation_xyzw", told);
+}
 
 RadarInspection inspectRadar(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud,
                              const ParameterEntries& told) {
@@ -250,7 +270,7 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
     radar.to_do = format.to_do;
     return radar;
   }
-  const StampProposal stamps = proposeStamps(recording, imu.times, cloud);
+  const StampProposal stamps = proposeStamps(recording, imu.times, cloud, told);
   const InertialTrack track(imu.samples, imu.report.rest_rate);
   Looked looked = look(recording, imu, cloud, stamps, format.format, track);
   if (looked.cloud.points == 0 || !looked.cloud.has_doppler) {
@@ -283,6 +303,7 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   if (stamps.odd.empty()) tell(&radar, FindingLevel::kOk, "stamps", stamps.text);
   describeSign(looked, format, &radar);
   describeMounting(looked.search, &radar);
+  compareWithTold(looked.search, told, &radar);
   return radar;
 }
 

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "../diagnosis/radar_causes.h"
 #include "inspect_format.h"
 #include "inspect_recording.h"
 #include "inspect_stamps.h"
@@ -44,10 +45,11 @@ struct RadarInspection {
   MountingSearch search;
   double points = 0.0;  ///< of the median scan
 
-  /// Velocities of so few points are biased: the coarse mounting may be off by 20 degrees, whatever its
-  /// sigma.
-  bool isSparse() const { return points < 15.0; }
+  /// The mounting may be far off, whatever its sigma.
+  bool isSparse() const { return points < kSparsePoints; }
 };
+/// Whether the user has told the rotation of the mounting.
+bool isMountingTold(const ParameterEntries& told);
 /// The cloud is read as the user has `told`.
 RadarInspection inspectRadar(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud,
                              const ParameterEntries& told);

@@ -58,10 +58,21 @@ const HeaderTopic* triggerOf(const Recording& recording, const std::vector<Messa
 }  // namespace
 
 StampProposal proposeStamps(const Recording& recording, const std::vector<MessageTimes>& imu,
-                            const CloudTopic& cloud) {
+                            const CloudTopic& cloud, const ParameterEntries& told) {
+  const Config known = withAbsoluteTopics(makeConfig(told));
   StampProposal proposal;
+  proposal.shift = known.radar_stamp_shift;
+  if (isTold("stamp_source", told)) {
+    proposal.source = known.stamp_source;
+    proposal.trigger_topic = known.trigger_topic;
+    proposal.text = "as told, stamp_source: " + toString(known.stamp_source);
+    return proposal;
+  }
   const StreamTiming timing = inspectTiming(cloud.times);
-  const StreamDelay delay = delayAgainstImu(cloud.times, imu);
+  StreamDelay delay = delayAgainstImu(cloud.times, imu);
+  delay.median -= proposal.shift;
+  delay.most -= proposal.shift;
+  const double bound = known.odometry.smoother.max_time_offset;
   std::string fault;
   if (timing.zero == timing.messages) {
     fault = "the stamps in its headers are zero";
@@ -74,6 +85,9 @@ StampProposal proposeStamps(const Recording& recording, const std::vector<Messag
   } else if (std::abs(delay.median) > kLargestDelay) {
     fault = "its stamps are on another clock than those of the IMU: " + secondsText(std::abs(delay.median)) +
             (delay.median > 0.0 ? " behind" : " ahead");
+  } else if (delay.median < -bound) {
+    fault = "its stamps are " + milliseconds(-delay.median) +
+            " ahead of their arrival, and the offset estimate covers up to " + milliseconds(bound);
   }
   if (fault.empty()) {
     proposal.text = "stamps in the header; scans arrive " + milliseconds(delay.median) +
@@ -82,7 +96,11 @@ StampProposal proposeStamps(const Recording& recording, const std::vector<Messag
     if (delay.median < -kAhead)
       proposal.odd.push_back("the scans are stamped " + milliseconds(-delay.median) +
                              " ahead of their arrival; the offset estimate covers up to " +
-                             milliseconds(SmootherOptions().max_time_offset));
+                             milliseconds(bound));
+    if (delay.median > bound)
+      proposal.odd.push_back("the scans arrive " + milliseconds(delay.median) +
+                             " after their stamps. If that is the clock of the radar and not its driver, the "
+                             "offset estimate does not cover it: --set stamp_source=arrival");
     if (delay.most > kLargestDelay)
       proposal.odd.push_back("a tenth of the scans or more arrive " + secondsText(delay.most) +
                              " after their stamps: the clock of the radar jumps; stamp_source: arrival "
@@ -112,6 +130,7 @@ std::vector<RadarScan> stampScans(const Recording& recording, const std::vector<
                                   const std::vector<RadarScan>& scans) {
   StampingOptions options;
   options.source = stamps.source;
+  options.shift = stamps.shift;
   options.radar_topic = cloud.topic;
   options.trigger_topic = stamps.trigger_topic;
   ScanStamper stamper(options);

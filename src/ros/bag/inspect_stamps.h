@@ -15,13 +15,14 @@ struct StampProposal {
   ProposedKeys keys;
   StampSource source = StampSource::kHeader;
   std::string trigger_topic;
+  double shift = 0.0;            ///< [s] added to every stamp
   std::string text;              ///< what the stamps are like, as one phrase
   std::vector<std::string> odd;  ///< sentences
 };
 
-/// Chooses stamp_source for a cloud. No stamp of the IMU may be out of place.
+/// Chooses stamp_source for a cloud, unless the user has `told` it. No stamp of the IMU may be out of place.
 StampProposal proposeStamps(const Recording& recording, const std::vector<MessageTimes>& imu,
-                            const CloudTopic& cloud);
+                            const CloudTopic& cloud, const ParameterEntries& told);
 
 /// Stamps scans as the programs would. `scans`: one for each message of the topic.
 std::vector<RadarScan> stampScans(const Recording& recording, const std::vector<MessageTimes>& imu,

@@ -13,6 +13,7 @@ constexpr double kManyWindows = 0.3;
 constexpr double kManyDiverged = 0.1;
 constexpr double kManySamples = 0.05;
 constexpr double kFewScansUsed = 0.5;
+constexpr double kLateStart = 0.5;
 constexpr double kMostlySilent = 0.5;
 /// [rad] A heading that is off by this much leads aside by a tenth of the way.
 constexpr double kVagueHeading = 0.1;
@@ -70,6 +71,16 @@ double usedShare(const RunEvidence& evidence) {
   return shareOf(used, after_start);
 }
 
+/// Share of the scans that came before the estimate began, and not because of their stamps.
+double lateStart(const RunEvidence& evidence) {
+  std::uint64_t before_start = 0, all = 0;
+  for (const RadarSummary& radar : evidence.radars) {
+    before_start += radar.scans_before_start - radar.scans_before_imu;
+    all += radar.scans_total;
+  }
+  return all < kEnoughScans ? 0.0 : shareOf(before_start, all);
+}
+
 /// Share of the time in which the IMU alone carried the estimate.
 double silentShare(const RunEvidence& evidence) {
   return evidence.run_seconds > 0.0 ? evidence.silent_seconds / evidence.run_seconds : 0.0;
@@ -83,7 +94,17 @@ bool has(const std::string& text, const char* part) { return text.find(part) != 
 void addStart(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
   const std::string& waiting = evidence.waiting_for;
   const std::string text = "The start waits for " + waiting + ".";
-  if (evidence.initialized) return;
+  if (evidence.initialized) {
+    const double late = lateStart(evidence);
+    if (late > kLateStart)
+      causes->push_back({"started_late",
+                         fixedText(100.0 * late, 0) + " % of the scans came before the estimate began.",
+                         config.odometry.init_mode == InitMode::kStatic
+                             ? "Let the platform rest at the start, or set init_mode: auto."
+                             : "Let the platform rest for init_duration at the start.",
+                         late});
+    return;
+  }
   // The start in motion names gravity and mounting, the start at rest what moves.
   if (has(waiting, "radar and IMU that agree")) {
     causes->push_back({"start_contradicts", text,
@@ -219,13 +240,27 @@ void addDivergence(const RunEvidence& evidence, std::vector<Cause>* causes) {
                        "Look for what keeps the scans of the radar away.", 0.05});
     return;
   }
+  if (evidence.scans_contradicted == 0) {
+    causes->push_back({"velocity_lost",
+                       "The velocity was lost " + std::to_string(divergences) + " times, for " +
+                           outOf(evidence.scans_diverged, evidence.scans_judged, "scans") +
+                           ": the data had gaps or wrong samples, and no scan contradicts the estimate.",
+                       "Look for what loses messages of the IMU (imu_gap among the input faults) or of the "
+                       "radar, and for samples of the IMU that jump.",
+                       std::max(0.05, share)});
+    return;
+  }
+  const auto fewest = std::min_element(evidence.radars.begin(), evidence.radars.end(),
+                                       [](const RadarSummary& a, const RadarSummary& b) {
+                                         return a.points_per_scan[1] < b.points_per_scan[1];
+                                       });
   causes->push_back({"diverged",
                      "The estimate diverged " + std::to_string(divergences) + " times, for " +
                          outOf(evidence.scans_diverged, evidence.scans_judged, "scans") +
                          ": radar and IMU contradict each other.",
                      "Check the mounting (extrinsics_rotation_xyzw has the order x, y, z, w), "
                      "radar_doppler_sign and radar_axes." +
-                         std::string(kCheckBag) +
+                         mountingAdvice(*fewest) +
                          " If the estimate diverged only near large moving things, it is good again after "
                          "them.",
                      std::max(0.05, share)});
@@ -256,6 +291,7 @@ std::vector<Check> checksOf(const RunEvidence& evidence, const std::vector<Confi
   for (const ImuFault& fault : kImuFaults) imu_faults += takenBy(fault, evidence);
   return {
       {"started", evidence.initialized ? 1.0 : 0.0, 1.0, true},
+      {"scans_before_start_share", lateStart(evidence), kLateStart, false},
       {"scans_used_share", usedShare(evidence), kFewScansUsed, true},
       {"silent_time_share", silentShare(evidence), kMostlySilent, false},
       {"points_kept_share", kept, 1.0 - kManyPoints, true},

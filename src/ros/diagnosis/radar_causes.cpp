@@ -159,7 +159,7 @@ class RadarCauses {
     cause("contradicts_imu", share,
           outOf(contradicted, judged, "scans") + of_ + " show a velocity that contradicts the IMU.",
           "Check the mounting (" + key_ + "extrinsics_rotation_xyzw, order x, y, z, w), " + key_ +
-              "radar_doppler_sign and " + key_ + "radar_axes." + kCheckBag +
+              "radar_doppler_sign and " + key_ + "radar_axes." + mountingAdvice(radar_) +
               " estimate_extrinsics: rotation corrects up to 10 degrees by itself.");
   }
 
@@ -174,7 +174,7 @@ class RadarCauses {
               " degrees about x, y, z of the IMU, with " + key_ + "extrinsics_rotation_sigma " +
               number(config_.odometry.smoother.extrinsics_rotation_sigma / kDegree) + " degrees.",
           "Check " + key_ + "radar_doppler_sign, " + key_ + "radar_axes and the mounting (" + key_ +
-              "extrinsics_rotation_xyzw, order x, y, z, w)." + kCheckBag);
+              "extrinsics_rotation_xyzw, order x, y, z, w)." + mountingAdvice(radar_));
   }
 
   const RadarSummary& radar_;

@@ -18,6 +18,9 @@ inline constexpr double kManyPoints = 0.6;
 inline constexpr std::uint64_t kEnoughScans = 20;
 /// The remedy for a wrong mounting, sign or axes.
 inline constexpr const char* kCheckBag = " Run `rosrun rio_t check_bag BAG`: it finds all three.";
+/// Velocities of so few points a scan are biased: the mounting that check_bag finds may be off by 20 degrees
+/// or upside down.
+inline constexpr double kSparsePoints = 15.0;
 
 inline std::uint64_t pointsOf(const RadarSummary& radar, PointVerdict verdict) {
   return radar.points_by_verdict[static_cast<std::size_t>(verdict)];
@@ -36,6 +39,14 @@ inline std::string number(double value) { return shortText(value, 3); }
 
 inline std::string outOf(std::uint64_t part, std::uint64_t whole, const std::string& what) {
   return std::to_string(part) + " of " + std::to_string(whole) + " " + what;
+}
+
+/// How to find the mounting, for the end of a remedy.
+inline std::string mountingAdvice(const RadarSummary& radar) {
+  const auto points = static_cast<double>(radar.points_per_scan[1]);  // 0: not known
+  return 0.0 < points && points < kSparsePoints
+             ? " Measure the mounting: so few points a scan do not show it to check_bag for sure."
+             : kCheckBag;
 }
 
 /// How far the estimated mounting is turned from the told one, about the worst axis.

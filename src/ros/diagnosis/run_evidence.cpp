@@ -1,5 +1,6 @@
 #include "rio_t/ros/diagnosis/run_evidence.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "rio_t/odometry/body_odometry.h"
@@ -39,9 +40,12 @@ void EvidenceCollector::add(const ScanResult& result) {
     return;
   }
   // A radar that filters what stands still has no scan to use at rest, and is not silent.
-  if (result.used || result.at_rest) last_used_ = result.scan.stamp;
+  // It came now, however late.
+  if (result.used || result.at_rest)
+    last_used_ = std::max(result.scan.stamp, newest_state_.value_or(result.scan.stamp));
   ++evidence_.scans_judged;
   if (result.health == Health::kDiverged) ++evidence_.scans_diverged;
+  if (result.is_contradicted) ++evidence_.scans_contradicted;
   if (result.used) {
     ++radar.scans_used;
   } else {

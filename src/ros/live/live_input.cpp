@@ -12,7 +12,7 @@ namespace rio_t {
 
 void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
   const auto start = std::chrono::steady_clock::now();
-  monitor_.imu();
+  monitor_.imu(toTime(event.getConstMessage()->header.stamp));
   tick_imu_();
   try {
     const ImuMeasurement imu =

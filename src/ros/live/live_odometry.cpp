@@ -429,8 +429,9 @@ void LiveOdometry::solve() {
       }
       if (!has_told_start && now->odometry().start()) {
         has_told_start = true;
-        ROS_INFO_STREAM(name_ << ": started from " << toString(now->odometry().start()->from)
-                              << "; ~odom is published");
+        const std::string waiting_for = frames_.waitingFor();
+        ROS_INFO_STREAM(name_ << ": started from " << toString(now->odometry().start()->from) << "; ~odom "
+                              << (waiting_for.empty() ? "is published" : "waits for " + waiting_for));
       }
       for (std::size_t k = 0; k < radars_.size(); ++k)
         tellDopplerStep(radars_[k], now->odometry().radarDopplerStep(k), &told[k]);

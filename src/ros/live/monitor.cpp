@@ -27,11 +27,9 @@ double velocitySigma(const NavigationState& state) {
   return std::sqrt(std::max(0.0, variances.maxCoeff()));
 }
 
-/// Whether a scan could not be used because it came too early: before the start, or before tf had named the
-/// radar.
-bool isEarly(const std::string& reason) {
-  return reason == "scan_before_extrinsics" || reason == "frame_not_usable" ||
-         reason == "before_initialization";
+/// Whether a scan could not be used because it came before tf had named the radar.
+bool isBeforeExtrinsics(const std::string& reason) {
+  return reason == "scan_before_extrinsics" || reason == "frame_not_usable";
 }
 
 /// What to do about windows that keep ending so.
@@ -79,9 +77,10 @@ void LiveMonitor::Latency::add(double seconds) {
   ++count;
 }
 
-void LiveMonitor::imu() {
+void LiveMonitor::imu(Time stamp) {
   const std::lock_guard<std::mutex> lock(mutex_);
   ++imu_.count;
+  collector_.addImu(stamp);
 }
 
 void LiveMonitor::scan(std::size_t radar) {
@@ -115,7 +114,7 @@ void LiveMonitor::dropped(std::size_t radar, const std::string& reason, std::uin
   const std::lock_guard<std::mutex> lock(mutex_);
   Radar& of = radars_.at(radar);
   of.dropped[reason] += count;
-  if (isEarly(reason)) {
+  if (isBeforeExtrinsics(reason)) {
     of.early += count;
   } else if (reason == "points_not_finite") {
     collector_.addNotFinite(radar, count);
@@ -135,7 +134,8 @@ void LiveMonitor::result(const LiveSession::Result& result) {
     last_used_ = result.result.scan.stamp;
   } else if (!result.result.rejected_because.empty()) {
     ++radar.dropped[result.result.rejected_because];
-    if (isEarly(result.result.rejected_because)) ++radar.early;
+    // Once the estimate runs, such a scan has a stamp of another clock.
+    if (result.result.rejected_because == "before_initialization" && !newest_state_) ++radar.early;
   }
   if (!result.result.updated) return;
   ++updates_;
@@ -244,6 +244,10 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) c
   }
   std::string likely_cause;
   if (session != nullptr) likely_cause = addDiagnosis(status, *session);
+  if (initialized && imu_is_silent_) {
+    status.summary(DiagnosticStatus::ERROR, "the IMU is silent: no odometry is published");
+    return;
+  }
   if (!initialized || !waiting_for_.empty()) {
     const std::string what = waiting_for_.empty() ? session->odometry().waitingFor() : waiting_for_;
     status.add("waiting_for", what);
@@ -327,7 +331,7 @@ std::optional<std::string> LiveMonitor::judgeUse(Radar& radar, bool initialized)
   if (now.usable < then.usable + kInputsJudged || 2 * used >= now.usable - then.usable) return std::nullopt;
   std::pair<std::string, std::uint64_t> most;
   for (const auto& [reason, count] : now.dropped) {
-    if (isEarly(reason) || reason == "points_not_finite") continue;  // the latter counts points
+    if (isBeforeExtrinsics(reason) || reason == "points_not_finite") continue;  // the latter counts points
     const std::uint64_t fresh = count - countOf(then.dropped, reason);
     if (fresh > most.second) most = {reason, fresh};
   }
@@ -337,7 +341,7 @@ std::optional<std::string> LiveMonitor::judgeUse(Radar& radar, bool initialized)
 
 void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const bool imu_is_silent = imu_.isSilent();
+  imu_is_silent_ = imu_.isSilent();
   status.add("imu_messages", imu_.count);
   for (const auto& [reason, count] : imu_dropped_) status.add("dropped_" + reason, count);
   if (session != nullptr) {
@@ -365,7 +369,7 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   if (imu_.count == 0) {
     status.summary(DiagnosticStatus::ERROR, "no IMU message yet on " + config_.imu_topic +
                                                 wrongType(config_.imu_topic, "sensor_msgs/Imu"));
-  } else if (imu_is_silent) {
+  } else if (imu_is_silent_) {
     status.summary(DiagnosticStatus::ERROR, "the IMU is silent, topic " + config_.imu_topic);
   } else if (!findings.empty()) {
     status.summary(radars.level, radars.text);

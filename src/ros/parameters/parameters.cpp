@@ -218,6 +218,26 @@ void addContradictions(const Config& config, std::vector<std::string>* faults) {
     faults->push_back(section + "trigger_topic: expected a topic, since stamp_source is trigger, got \"\"");
 }
 
+/// Two topics of different types with one name.
+void addSharedTopics(const Config& config, std::vector<std::string>* faults) {
+  std::vector<std::pair<std::string, std::string>> known = {{"imu_topic", config.imu_topic}};
+  if (config.odometry.use_barometer) known.emplace_back("barometer_topic", config.barometer_topic);
+  for (const Config& radar : configsOfRadars(config)) {
+    const std::string section = prefixOf(radar.radar_name);
+    std::vector<std::pair<std::string, std::string>> own = {{section + "radar_topic", radar.radar_topic}};
+    if (radar.stamp_source == StampSource::kTrigger)
+      own.emplace_back(section + "trigger_topic", radar.trigger_topic);
+    for (std::size_t k = 0; k < own.size(); ++k) {
+      std::vector<std::pair<std::string, std::string>> others = known;
+      others.insert(others.end(), own.begin(), own.begin() + static_cast<std::ptrdiff_t>(k));
+      for (const auto& [key, topic] : others)
+        if (topic == own[k].second)
+          faults->push_back(own[k].first + ": expected another topic than " + key + ", got \"" + topic +
+                            "\" for both");
+    }
+  }
+}
+
 /// What one radar cannot show.
 void addContradictionsAmong(const std::vector<Config>& radars, std::vector<std::string>* faults) {
   for (std::size_t k = 0; k < radars.size(); ++k) {
@@ -245,6 +265,7 @@ void addContradictionsAmong(const std::vector<Config>& radars, std::vector<std::
 std::vector<std::string> contradictions(const Config& config) {
   std::vector<std::string> faults;
   for (const Config& radar : configsOfRadars(config)) addContradictions(radar, &faults);
+  addSharedTopics(config, &faults);
   addContradictionsAmong(config.radars, &faults);
   return faults;
 }

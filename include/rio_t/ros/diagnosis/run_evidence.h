@@ -74,8 +74,9 @@ struct RunEvidence {
   Counts input_faults;  ///< RadarInertialOdometry::faults(), with those of the messages
   std::uint64_t divergences = 0, reinitializations = 0;
   Health health = Health::kOk;
-  std::uint64_t scans_judged = 0;    ///< after the start
-  std::uint64_t scans_diverged = 0;  ///< of them, after which the health was "diverged"
+  std::uint64_t scans_judged = 0;        ///< after the start
+  std::uint64_t scans_diverged = 0;      ///< of them, after which the health was "diverged"
+  std::uint64_t scans_contradicted = 0;  ///< of these, those after which the scans contradicted the estimate
   /// Why the solver stopped: windows by reason; with mode batch the one solve of the whole run.
   Counts solver_terminations;
   MeasuredImuNoise imu_noise;  ///< of the run, root mean square
@@ -94,7 +95,7 @@ class EvidenceCollector {
   explicit EvidenceCollector(const Config& config);
 
   void add(const ScanResult& result);
-  /// A sample of the IMU. Not called in the live node.
+  /// A sample of the IMU.
   void addImu(Time time) {
     if (!first_imu_) first_imu_ = time;
   }

@@ -28,7 +28,7 @@ class LiveMonitor {
   /// `config`: with the topics as they are resolved.
   explicit LiveMonitor(const Config& config);
 
-  void imu();  ///< a message came, as the next
+  void imu(Time stamp);  ///< a message came, as the next
   void scan(std::size_t radar = 0);
   void trigger(std::size_t radar = 0);
   void zeroTrigger(std::size_t radar);  ///< one with a stamp of zero, which stamps no scan
@@ -127,6 +127,7 @@ class LiveMonitor {
   std::vector<Radar> radars_;
   EvidenceCollector collector_;  // since the session started
   Counter imu_;
+  bool imu_is_silent_ = false;  ///< as of the last call of describeInput
   std::uint64_t imu_before_session_ = 0;
   ImuNoise imu_noise_;
   Barometer barometer_;
