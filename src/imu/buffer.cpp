@@ -61,10 +61,10 @@ ImuMean ImuBuffer::mean(Time time, double half_width) const {
       result.angular_velocity += weight * gyro;
       result.acceleration += weight * accel;
       weights += weight;
-      squared_weights += share * weight;
-      result.gyro_variance = std::max(result.gyro_variance, later.gyro_noise + later.unseen_gyro_variance);
-      result.accel_variance =
-          std::max(result.accel_variance, later.accel_noise + later.unseen_accel_variance);
+      const double squared_weight = share * weight;
+      squared_weights += squared_weight;
+      result.gyro_variance += squared_weight * (later.gyro_noise + later.unseen_gyro_variance);
+      result.accel_variance += squared_weight * (later.accel_noise + later.unseen_accel_variance);
     });
     return sums;
   };
@@ -78,6 +78,8 @@ ImuMean ImuBuffer::mean(Time time, double half_width) const {
   }
   result.angular_velocity /= weights;
   result.acceleration /= weights;
+  result.gyro_variance /= squared_weights;
+  result.accel_variance /= squared_weights;
   result.duration = weights * weights / squared_weights;
   if (before.duration > 0.0 && after.duration > 0.0) {
     result.half_duration = 0.5 * (before.duration + after.duration);

@@ -323,17 +323,17 @@ MotionInitializer::CarriedCovariance MotionInitializer::carriedCovariance(const 
                                                                           double scale) const {
   const double T = std::abs(z.stamp - time);
   const double tilt = noise_.gyro_density * g_W_.norm();
-  double measured = 0.0;
-  imu.forEachSample(std::min(z.stamp, time), std::max(z.stamp, time), [&](const ImuMeasurement& sample) {
-    measured = std::max(measured, sample.accel_noise + sample.unseen_accel_variance);
-  });
-  const double told = scale * noise_.accel_density * noise_.accel_density;
+  double measured = 0.0;  // [m^2/s^2], as `told`
+  imu.forEachInterval(std::min(z.stamp, time), std::max(z.stamp, time),
+                      [&](double dt, const auto&, const auto&, const ImuMeasurement& later) {
+                        measured += dt * (later.accel_noise + later.unseen_accel_variance);
+                      });
+  const double told = scale * noise_.accel_density * noise_.accel_density * T;
   Eigen::Vector3d scaled = scale * z.told_variance;
-  if (told > measured) scaled.array() += told * T;
+  if (told > measured) scaled.array() += told;
   CarriedCovariance covariance{z.covariance, scaled.asDiagonal()};
   covariance.whole.diagonal() += scaled - z.told_variance;
-  covariance.whole.diagonal().array() +=
-      tilt * tilt * T * T * T / 3.0 + (told > measured ? 0.0 : measured * T);
+  covariance.whole.diagonal().array() += tilt * tilt * T * T * T / 3.0 + (told > measured ? 0.0 : measured);
   return covariance;
 }
 

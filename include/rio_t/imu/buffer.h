@@ -16,7 +16,8 @@ struct ImuMean {
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();      ///< [rad/s]
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();          ///< specific force [m/s^2]
   Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();  ///< of that mean [rad/s^2]
-  double gyro_variance = 0.0;   ///< noise and unseen motion, the largest squared density [rad^2/s]
+  /// Squared density of noise and unseen motion; over the duration, it is the variance of the mean [rad^2/s].
+  double gyro_variance = 0.0;
   double accel_variance = 0.0;  ///< likewise [m^2/s^3]
 };
 

@@ -291,8 +291,8 @@ std::vector<Check> checksOf(const RunEvidence& evidence, const std::vector<Confi
   for (const ImuFault& fault : kImuFaults) imu_faults += takenBy(fault, evidence);
   return {
       {"started", evidence.initialized ? 1.0 : 0.0, 1.0, true},
-      {"scans_before_start_share", lateStart(evidence), kLateStart, false},
       {"scans_used_share", usedShare(evidence), kFewScansUsed, true},
+      {"scans_before_start_share", lateStart(evidence), kLateStart, false},
       {"silent_time_share", silentShare(evidence), kMostlySilent, false},
       {"points_kept_share", kept, 1.0 - kManyPoints, true},
       {"scans_diverged_share", shareOf(evidence.scans_diverged, evidence.scans_judged), kManyDiverged, false},

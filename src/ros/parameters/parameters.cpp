@@ -218,24 +218,25 @@ void addContradictions(const Config& config, std::vector<std::string>* faults) {
     faults->push_back(section + "trigger_topic: expected a topic, since stamp_source is trigger, got \"\"");
 }
 
-/// Two topics of different types with one name.
+/// A topic has one type.
 void addSharedTopics(const Config& config, std::vector<std::string>* faults) {
-  std::vector<std::pair<std::string, std::string>> known = {{"imu_topic", config.imu_topic}};
-  if (config.odometry.use_barometer) known.emplace_back("barometer_topic", config.barometer_topic);
+  struct Input {
+    std::string key, topic, type;
+  };
+  std::vector<Input> inputs = {{"imu_topic", config.imu_topic, "Imu"}};
+  if (config.odometry.use_barometer)
+    inputs.push_back({"barometer_topic", config.barometer_topic, "FluidPressure"});
   for (const Config& radar : configsOfRadars(config)) {
     const std::string section = prefixOf(radar.radar_name);
-    std::vector<std::pair<std::string, std::string>> own = {{section + "radar_topic", radar.radar_topic}};
+    inputs.push_back({section + "radar_topic", radar.radar_topic, "PointCloud2"});
     if (radar.stamp_source == StampSource::kTrigger)
-      own.emplace_back(section + "trigger_topic", radar.trigger_topic);
-    for (std::size_t k = 0; k < own.size(); ++k) {
-      std::vector<std::pair<std::string, std::string>> others = known;
-      others.insert(others.end(), own.begin(), own.begin() + static_cast<std::ptrdiff_t>(k));
-      for (const auto& [key, topic] : others)
-        if (topic == own[k].second)
-          faults->push_back(own[k].first + ": expected another topic than " + key + ", got \"" + topic +
-                            "\" for both");
-    }
+      inputs.push_back({section + "trigger_topic", radar.trigger_topic, "Header"});
   }
+  for (std::size_t k = 0; k < inputs.size(); ++k)
+    for (std::size_t other = 0; other < k; ++other)
+      if (inputs[k].topic == inputs[other].topic && inputs[k].type != inputs[other].type)
+        faults->push_back(inputs[k].key + ": expected another topic than " + inputs[other].key + ", got \"" +
+                          inputs[k].topic + "\" for both");
 }
 
 /// What one radar cannot show.
