@@ -22,8 +22,8 @@ int ransacIterations(const EgoVelocityOptions& options);
 std::optional<Eigen::Vector3d> ransac(const std::vector<RadarDirection>& points,
                                       const EgoVelocityOptions& options, int iterations, double span);
 
-/// Points that agree with `v_R`: within the threshold, or, with `ego_velocity_solver: eiv`, within three sigma of
-/// Doppler and direction together.
+/// Points that agree with `v_R`: within the threshold, or, with `ego_velocity_solver: eiv`, within three
+/// sigma of Doppler and direction together.
 std::vector<RadarDirection> selectInliers(const std::vector<RadarDirection>& points,
                                           const Eigen::Vector3d& v_R, const PointVariances& noise,
                                           const EgoVelocityOptions& options);
