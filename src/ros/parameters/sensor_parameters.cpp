@@ -103,12 +103,11 @@ void listPointNoise(ParameterList& list, EgoVelocityOptions& radar) {
       "The estimator adds this standard deviation (right, forward, up) in quadrature to that of the velocity "
       "of a scan. It stands for errors that the points share, such as multipath and slow objects. This is "
       "the start value: the estimator scales it by what the scans show.");
-  list.number("ego_velocity_max_condition_number", "", above(1), radar.max_condition_number,
-              "This bounds the condition number of H'H, with the unit directions of the inliers as the rows "
-              "of H, and "
-              "that of the information of the velocity. A scan above it is rejected, for example if all "
-              "points lie in "
-              "one direction.");
+  list.number(
+      "ego_velocity_max_condition_number", "", above(1), radar.max_condition_number,
+      "This bounds two condition numbers: that of H'H, with the unit directions of the inliers as the rows "
+      "of H, and that of the information of the velocity. A scan above it is rejected, for example if all "
+      "points lie in one direction.");
   list.number(
       "ego_velocity_max_sigma", "m/s", above(0), radar.max_sigma,
       "A scan in motion is rejected if the standard deviation of its velocity is larger than this along any "
