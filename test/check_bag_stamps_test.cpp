@@ -56,7 +56,7 @@ TEST_F(CheckBag, StampsFarAheadOfTheirArrivalAreNotUsed) {
   EXPECT_EQ(configOf(odd).stamp_source, StampSource::kArrival);
   EXPECT_LT(turnFromTruth(odd), 5.0);
   expectRuns(odd);
-  // What is told is used to look at the bag, too.
+  // check_bag also looks at the bag with the keys that the user tells.
   for (const char* told : {"stamp_source=arrival", "radar_stamp_shift=-0.9"}) {
     const BagCheck by_told = check(bag, true, {told});
     EXPECT_LT(turnFromTruth(by_told), 5.0) << told;

@@ -42,7 +42,7 @@ struct Candidate {
   double snr_sum = 0.0;
   std::size_t count = 0;  ///< of all detections
 
-  /// Of the position of a point of the world, s = 0 [1/m^2].
+  /// Information of the position, if the point does not slide (s = 0) [1/m^2].
   Eigen::Matrix3d information() const { return fit_information.topLeftCorner<3, 3>(); }
   Eigen::Vector3d position() const { return information().llt().solve(fit_vector.head<3>()); }  ///< p_W [m]
   double snr_db() const { return snr_sum / static_cast<double>(count); }

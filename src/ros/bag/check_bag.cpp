@@ -81,8 +81,7 @@ void leaveOutCopies(std::vector<RadarInspection>* radars, const Recording& recor
       const auto both =
           std::count_if(of_a.begin(), of_a.end(), [&](std::int64_t s) { return of_b.count(s) != 0; });
       const double turn = a.search.q_IR.angularDistance(b.search.q_IR);
-      constexpr double kSame = 0.26;  // [rad]
-      const bool same_mounting = !a.search.enough || !b.search.enough || turn < kSame;
+      const bool same_mounting = !a.search.enough || !b.search.enough || turn < kFarApart;
       if (of_a.empty() || 10 * static_cast<std::size_t>(both) < 9 * std::min(of_a.size(), of_b.size()) ||
           !same_mounting)
         continue;

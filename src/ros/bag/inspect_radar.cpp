@@ -237,13 +237,13 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
                     "Found roughly, in seconds.");
 }
 
-/// What the user has told stands in the configuration. If the bag clearly shows another thing, it says so.
+/// The configuration keeps what the user has told. If the bag clearly shows something else, the report says
+/// so.
 void compareWithTold(const MountingSearch& search, const ParameterEntries& told, RadarInspection* radar) {
   if (!search.enough || search.rotation_sigma.maxCoeff() > kObservedTurn || radar->isSparse()) return;
   const Config known = makeConfig(told);
-  constexpr double kMisjudged = 0.26;  // [rad] by eye
   const double turn = known.odometry.T_IR.q_IR.angularDistance(search.q_IR);
-  if (isMountingTold(told) && turn > kMisjudged)
+  if (isMountingTold(told) && turn > kFarApart)
     tell(radar, FindingLevel::kOdd, "mounting",
          "the told mounting and the one that the bag shows are " + degrees(turn) + " degrees apart");
   const int sign = known.radar_overrides.doppler_sign;

@@ -4,13 +4,13 @@
 #include <string>
 #include <vector>
 
-#include "../diagnosis/radar_causes.h"
 #include "inspect_format.h"
 #include "inspect_recording.h"
 #include "inspect_stamps.h"
 #include "rio_t/inspection/imu_report.h"
 #include "rio_t/inspection/mounting_search.h"
 #include "rio_t/ros/bag/check_bag.h"
+#include "rio_t/ros/diagnosis/run_evidence.h"
 
 namespace rio_t {
 
@@ -34,6 +34,8 @@ std::optional<Eigen::Vector3d> upOf(const ImuReport& report);
 
 /// [rad] Sigma of a turn below which the bag shows it.
 constexpr double kObservedTurn = 0.3;
+/// [rad] 15 degrees between two mountings: an eye does not misjudge one by more.
+constexpr double kFarApart = 0.26;
 
 /// A radar of a recording.
 struct RadarInspection {

@@ -18,9 +18,6 @@ inline constexpr double kManyPoints = 0.6;
 inline constexpr std::uint64_t kEnoughScans = 20;
 /// The remedy for a wrong mounting, sign or axes.
 inline constexpr const char* kCheckBag = " Run `rosrun rio_t check_bag BAG`: it finds all three.";
-/// Velocities of so few points a scan are biased: the mounting that check_bag finds may be off by 20 degrees
-/// or upside down.
-inline constexpr double kSparsePoints = 15.0;
 
 inline std::uint64_t pointsOf(const RadarSummary& radar, PointVerdict verdict) {
   return radar.points_by_verdict[static_cast<std::size_t>(verdict)];

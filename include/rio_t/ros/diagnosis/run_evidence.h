@@ -14,6 +14,10 @@
 
 namespace rio_t {
 
+/// Velocities of fewer points in the median scan are biased: the mounting that check_bag finds may be off by
+/// 20 degrees, or upside down.
+constexpr double kSparsePoints = 15.0;
+
 using Counts = std::map<std::string, std::uint64_t>;
 /// Zero for a name that is not there.
 std::uint64_t countOf(const Counts& counts, const std::string& name);
