@@ -1,7 +1,6 @@
 // Small parts of the live node: observability of the offset, rates of publication, and a bounded path.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cstddef>
 #include <stdexcept>
 
@@ -10,43 +9,63 @@
 #include "rio_t/ros/live/bounded_trajectory.h"
 #include "rio_t/ros/live/offset_observability.h"
 #include "rio_t/ros/live/publish_rate.h"
+#include "simulated_run.h"
 
 namespace rio_t {
 namespace {
 
-/// Ten scans a second, radar velocities with 0.05 m/s per axis, of a platform that accelerates.
-bool observableAt(double acceleration, double yaw_rate, bool used = true, int rest_scans = 0) {
+/// Ten scans a second, each of which tells the offset with this sigma [s].
+bool observableAt(double sigma, bool used = true, int rest_scans = 0) {
   OffsetObservability observability;
   for (int k = 0; k < 20 + rest_scans; ++k) {
-    const double t = 0.1 * k;
-    const double moved = 0.1 * std::min(k, 20);
     ScanResult result;
-    result.updated = true;
+    result.scan.stamp = Time::fromSeconds(0.1 * k);
     result.used = used;
-    result.state.time = Time::fromSeconds(t);
-    result.state.q_WI = Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rate * moved, Eigen::Vector3d::UnitZ()));
-    result.state.v_W = Eigen::Vector3d(1.0 + acceleration * moved, 0.0, 0.0);
-    result.ego_velocity.covariance = 0.0025 * Eigen::Matrix3d::Identity();
+    result.offset_information = k < 20 ? 1.0 / (sigma * sigma) : 0.0;
     observability.add(result);
   }
   return observability.observable();
 }
 
-TEST(OffsetObservability, AccelerationShowsTheOffset) {
-  // 0.05 m/s over sqrt(10) scans against |a| * 0.02 s: enough from 0.79 m/s^2 on.
-  EXPECT_TRUE(observableAt(1.0, 0.0));
-  EXPECT_FALSE(observableAt(0.6, 0.0));
+TEST(OffsetObservability, ScansOfASecondTogetherShowTheOffset) {
+  // 0.02 s times the root of ten scans is 0.063 s.
+  EXPECT_TRUE(observableAt(0.06));
+  EXPECT_FALSE(observableAt(0.07));
 }
 
-TEST(OffsetObservability, ConstantVelocityShowsNothing) { EXPECT_FALSE(observableAt(0.0, 0.0)); }
-
-TEST(OffsetObservability, TurningAtSpeedShowsTheOffset) { EXPECT_TRUE(observableAt(0.0, 1.0)); }
-
-TEST(OffsetObservability, RejectedScansShowNothing) { EXPECT_FALSE(observableAt(2.0, 0.0, false)); }
+TEST(OffsetObservability, RejectedScansShowNothing) { EXPECT_FALSE(observableAt(0.01, false)); }
 
 TEST(OffsetObservability, IsOfTheLastSecondOnly) {
-  EXPECT_TRUE(observableAt(2.0, 0.0, true, 5));
-  EXPECT_FALSE(observableAt(2.0, 0.0, true, 15));
+  EXPECT_TRUE(observableAt(0.03, true, 5));
+  EXPECT_FALSE(observableAt(0.03, true, 15));
+}
+
+/// Share of the scans after `since` [s] at which the motion shows the offset.
+double shareObservable(const SimulatedRun& run, double since) {
+  OffsetObservability observability;
+  int scans = 0;
+  int observable = 0;
+  for (const ScanResult& result : run.results) {
+    observability.add(result);
+    if (run.seconds(result.scan.stamp) < since) continue;
+    ++scans;
+    observable += observability.observable() ? 1 : 0;
+  }
+  return static_cast<double>(observable) / scans;
+}
+
+TEST(OffsetObservability, MotionShowsTheOffset) {
+  SimulatedRun run("medium", 1, 30.0);
+  run.run();
+  EXPECT_GT(shareObservable(run, 16.0), 0.9);
+}
+
+TEST(OffsetObservability, VibrationAtConstantVelocityShowsNothing) {
+  SimulatedRun run("constant_speed", 1, 40.0);
+  run.setup.imu.rate = 100.0;
+  run.setup.imu.accel_vibration = 2.0;
+  run.run();
+  EXPECT_EQ(shareObservable(run, 20.0), 0.0);
 }
 
 TEST(PublishRate, TakesTheFirstOfEachPeriodWhateverTheStart) {

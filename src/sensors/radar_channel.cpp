@@ -117,6 +117,10 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
     answer.rate_variance = seen.dv_dt_O.variance * seen.prediction->t_O_variance;
   }
   seen.velocity.covariance.diagonal().array() += answer.rate_variance;
+  if (informs_offset) {
+    const Eigen::Vector3d J = answer.offset_gain * seen.dv_dt_O.mean;
+    answer.offset_information = J.dot(measured.covariance.ldlt().solve(J));
+  }
   const RadarScanTime taken{scan.stamp, answer.offset_gain, answer.offset_half_width, offset()};
   if (isTightlyCoupled() && measured.status == EgoVelocityStatus::kMoving) {
     const EgoVelocity world = staticWorld(scan, seen);

@@ -46,6 +46,7 @@ struct ScanAnswer {
   bool offset_stepped = false;                  ///< t_O stepped before this scan
   double offset_gain = 0.0;                     ///< see OffsetEvidence; 0: the scan does not tell the offset
   double offset_half_width = kOffsetHalfWidth;  ///< of the mean of the IMU in the derivative [s]
+  double offset_information = 0.0;              ///< what the scan tells of the offset, if used [1/s^2]
   /// Per axis, what the noise of the derivative adds to what went into the window (18e) [m^2/s^2].
   double rate_variance = 0.0;
 };

@@ -1,21 +1,16 @@
 #pragma once
 
 #include <deque>
-#include <optional>
 
-#include "rio_t/odometry/radar_inertial_odometry.h"
+#include "rio_t/odometry/scan_result.h"
 
 namespace rio_t {
 
-/// Whether the motion of the last second says something about the time offset.
-///
-/// A scan sees v(s - t_O), so one with covariance sigma_v^2 tells t_O with information |dv/dt|^2 / sigma_v^2,
-/// v being the velocity in the body frame. Summed over that second; enough where that alone, without what was
-/// known before, gives the offset to kMaxSigma. At constant velocity it gives nothing, however small the
+/// Whether the motion of the last second tells the time offset: its scans alone, without what was known
+/// before, would give the offset to kMaxSigma. At constant velocity they do not, however small the
 /// estimate's own sigma.
 class OffsetObservability {
  public:
-  /// Feeds one result; only those that are `updated` are read.
   void add(const ScanResult& result);
   bool observable() const;
 
@@ -24,12 +19,10 @@ class OffsetObservability {
   static constexpr double kMaxSigma = 0.02;  // [s] a fifth of a radar period: better than not knowing
 
   struct Sample {
-    Time time;
+    Time stamp;
     double information = 0.0;  // [1/s^2]
   };
-
   std::deque<Sample> samples_;  // oldest first
-  std::optional<NavigationState> previous_;
 };
 
 }  // namespace rio_t
