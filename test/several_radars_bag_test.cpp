@@ -4,6 +4,7 @@
 #include <rosbag/view.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -148,12 +149,14 @@ TEST_F(TwoRadars, FilesOfAnEarlierRunAreNotTakenForItsOwn) {
   writeBag(what);
   ASSERT_EQ(runTwo({"--set", "estimate_extrinsics=rotation"}).status, 0);
   EXPECT_TRUE(has("extrinsics_right.csv"));
-  std::ofstream(out_ + "/time_offset_truth.csv") << "stamp,offset\n";  // somebody's own
-  std::ofstream(out_ + "/notes.txt") << "somebody's own\n";
+  for (const char* name : {"time_offset_left.csv", "ego_velocity_right.csv"})
+    std::filesystem::copy_file(out_ + "/" + name, out_ + "/my_" + name);
+  std::filesystem::copy_file(out_ + "/time_offset_left.csv", out_ + "/time_offset_old.csv");
   ASSERT_EQ(run().status, 0);
   for (const char* name : {"time_offset_left.csv", "ego_velocity_right.csv", "extrinsics_left.csv"})
     EXPECT_FALSE(has(name)) << name;
-  for (const char* name : {"time_offset.csv", "ego_velocity.csv", "time_offset_truth.csv", "notes.txt"})
+  for (const char* name : {"time_offset.csv", "ego_velocity.csv", "my_time_offset_left.csv",
+                           "my_ego_velocity_right.csv", "time_offset_old.csv"})
     EXPECT_TRUE(has(name)) << name;
   ASSERT_EQ(runTwo().status, 0);
   EXPECT_FALSE(has("time_offset.csv"));

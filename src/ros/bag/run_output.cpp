@@ -1,10 +1,10 @@
 #include "rio_t/ros/bag/run_output.h"
 
-#include <algorithm>
+#include <yaml-cpp/yaml.h>
+
 #include <cerrno>
 #include <cmath>
 #include <filesystem>
-#include <regex>
 #include <system_error>
 
 #include "../text.h"
@@ -35,12 +35,13 @@ const char* const kMapHeader = "id,x,y,z,sigma,snr_db,sightings\n";
 const char* const kExtrinsicsHeader =
     "stamp,x,y,z,qx,qy,qz,qw,sigma_x,sigma_y,sigma_z,sigma_rx,sigma_ry,sigma_rz\n";
 
-/// Whether a run wrote it, or began to.
-bool isEmptyOrBeginsWith(const std::filesystem::path& path, const std::string& header) {
-  std::string start(header.size(), '\0');
-  std::ifstream file(path, std::ios::binary);
-  file.read(start.data(), static_cast<std::streamsize>(start.size()));
-  return file.gcount() == 0 || start == header;
+/// The files of the run before, as its summary names them.
+std::vector<std::string> savedBefore(const std::string& folder) {
+  try {
+    return YAML::LoadFile(folder + "/summary.yaml")["saved"].as<std::vector<std::string>>();
+  } catch (const YAML::Exception&) {  // no summary, or not one of ours
+    return {};
+  }
 }
 
 }  // namespace
@@ -131,7 +132,9 @@ RunOutput::RunOutput(const std::string& folder, const RunFiles& files) : folder_
     throw OutputError("output folder " + folder + ": cannot be made (" +
                       (error ? error.message() : "a file of that name exists") + ")");
   }
-  removeOfEarlierRuns();
+  for (const std::string& name : savedBefore(folder))
+    std::filesystem::remove(std::filesystem::path(folder) / std::filesystem::path(name).filename(), error);
+  std::filesystem::remove(folder + "/summary.yaml", error);
   for (const RunFile& file : files.all()) open_[file.name].open(folder + "/" + file.name, file.header);
 }
 
@@ -142,31 +145,6 @@ RunOutput::~RunOutput() {
     } catch (const std::exception&) {  // the run has failed already, and its message says why
     }
   }
-}
-
-void RunOutput::removeOfEarlierRuns() const {
-  namespace fs = std::filesystem;
-  std::error_code error;
-  fs::remove(folder_ + "/summary.yaml", error);
-  // Not every run writes these.
-  static const std::regex optional("(time_offset|ego_velocity|extrinsics)_[a-z0-9_]+\\.csv|(.+)\\.csv");
-  const std::vector<std::string> own = files_.names();
-  const std::vector<RunFile> possible = RunFiles{{""}, true, true, true, true}.all();
-  std::vector<fs::path> earlier;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) {
-    const std::string name = entry.path().filename().string();
-    std::smatch kind;
-    if (name.size() > 255 || !std::regex_match(name, kind, optional) || !entry.is_regular_file(error))
-      continue;
-    if (std::find(own.begin(), own.end(), name) != own.end()) continue;
-    const std::string stem = kind[1].str() + kind[2].str();
-    const auto file = std::find_if(possible.begin(), possible.end(),
-                                   [&](const RunFile& each) { return each.name == stem + ".csv"; });
-    if (file == possible.end()) continue;
-    // A user's own time_offset_truth.csv stays.
-    if (isEmptyOrBeginsWith(entry.path(), file->header)) earlier.push_back(entry.path());
-  }
-  for (const fs::path& path : earlier) fs::remove(path, error);
 }
 
 RunOutput::File& RunOutput::row(std::string_view name, Time stamp) {

@@ -101,9 +101,8 @@ class OutputError : public std::runtime_error {
 /// the IMU [rad]; zero where it is not estimated.
 class RunOutput {
  public:
-  /// Makes the folder and opens the files; throws OutputError naming what cannot be written. The
-  /// summary of an earlier run and files of radars that this run has not are removed, so that they are never
-  /// taken for its own.
+  /// Makes the folder and opens the files; throws OutputError naming what cannot be written. The files that
+  /// an earlier run lists in its summary.yaml are removed, so that they are never taken for its own.
   explicit RunOutput(const std::string& folder, const RunFiles& files = {});
   /// If the run failed, this saves its tables as far as they go. Such a run has no summary.yaml.
   ~RunOutput();
@@ -132,7 +131,6 @@ class RunOutput {
     void endLine();
   };
 
-  void removeOfEarlierRuns() const;
   File& file(std::string_view name) { return open_.find(name)->second; }  // one of files_
   File& row(std::string_view name, Time stamp);                           // of that file
   void addAids(const ScanResult& result);
