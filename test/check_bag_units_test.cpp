@@ -165,14 +165,15 @@ void rebuild(sensor_msgs::PointCloud2& cloud, const std::vector<std::string>& na
   }
 }
 
-Changes polar(double unit) {
+/// `range`, `doppler`: names of these fields.
+Changes polar(double unit, const std::string& range = "range", const std::string& doppler_name = "velocity") {
   Changes changes;
-  changes.cloud = [unit](sensor_msgs::PointCloud2& cloud) {
-    rebuild(cloud, {"azimuth", "elevation", "range", "velocity", "rcs"},
+  changes.cloud = [=](sensor_msgs::PointCloud2& cloud) {
+    rebuild(cloud, {doppler_name, "azimuth", "elevation", range, "rcs"},
             [unit](double right, double forward, double up, double doppler, double snr) {
               const double ground = std::hypot(right, forward);
-              return std::vector<double>{std::atan2(-right, forward) / unit, std::atan2(up, ground) / unit,
-                                         std::hypot(ground, up), doppler, snr};
+              return std::vector<double>{doppler, std::atan2(-right, forward) / unit,
+                                         std::atan2(up, ground) / unit, std::hypot(ground, up), snr};
             });
     return true;
   };
@@ -189,6 +190,16 @@ TEST_F(CheckBag, AnglesInDegreesAreNamed) {
   const BagCheck radians = check(rewritten("polar_radians", polar(1.0)));
   expectRuns(radians);
   EXPECT_LT(turnFromTruth(radians), 5.0);
+}
+
+TEST_F(CheckBag, ARangeRateIsNoRange) {
+  for (const char* range : {"range", "range_m"}) {
+    SCOPED_TRACE(range);
+    const BagCheck good = check(rewritten("range_rate", polar(1.0, range, "range_rate")));
+    expectRuns(good);
+    EXPECT_EQ(configOf(good).radar_overrides.doppler, "range_rate") << good.yaml;
+    EXPECT_LT(turnFromTruth(good), 5.0);
+  }
 }
 
 TEST_F(CheckBag, FieldsOfAnyNameCanBeTold) {

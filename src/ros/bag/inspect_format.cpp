@@ -32,14 +32,28 @@ std::vector<std::string> fieldsOf(const PointCloud2& message) {
   return names;
 }
 
-/// The first field whose name looks like one of the words; it must not be a standard deviation and the like.
-std::string fieldLike(const std::vector<std::string>& fields, const std::vector<std::string>& words) {
+/// The field of that name, in capitals or not.
+std::string fieldNamed(const std::vector<std::string>& fields, const std::string& name) {
+  for (const std::string& field : fields) {
+    if (boost::algorithm::iequals(field, name)) return field;
+  }
+  return "";
+}
+
+/// The field that has one of the words as its name, or else the first whose name contains one. It must be
+/// none of `taken`, and no standard deviation and the like.
+std::string fieldLike(const std::vector<std::string>& fields, const std::vector<std::string>& words,
+                      const std::vector<std::string>& taken = {}) {
+  for (const std::string& word : words) {
+    const std::string named = fieldNamed(fields, word);
+    if (!named.empty()) return named;
+  }
   for (const std::string& word : words) {
     for (const std::string& field : fields) {
       const std::string lower = boost::algorithm::to_lower_copy(field);
       const auto has = [&](const std::string& part) { return lower.find(part) != std::string::npos; };
       const bool derived = has("std") || has("var") || has("noise") || has("bin") || has("idx");
-      if (!derived && has(word)) return field;
+      if (!derived && has(word) && std::find(taken.begin(), taken.end(), field) == taken.end()) return field;
     }
   }
   return "";
@@ -55,14 +69,6 @@ std::vector<double> valuesOf(const CloudTopic& topic, PointCloudFormat format, c
     for (const RadarPoint& point : scan.points) values.push_back(point.doppler);
   }
   return values;
-}
-
-/// The field of that name, in capitals or not.
-std::string fieldNamed(const std::vector<std::string>& fields, const std::string& name) {
-  for (const std::string& field : fields) {
-    if (boost::algorithm::iequals(field, name)) return field;
-  }
-  return "";
 }
 
 /// Nobody's preset: names, one by one, unless the user has `told` them.
@@ -85,9 +91,10 @@ void guessFormat(const std::vector<std::string>& fields, const PointCloudOverrid
   const Names cartesian = {{"x", either(told.x, fieldNamed(fields, "x"))},
                            {"y", either(told.y, fieldNamed(fields, "y"))},
                            {"z", either(told.z, fieldNamed(fields, "z"))}};
-  const Names spherical = {{"azimuth", either(told.azimuth, fieldLike(fields, {"azimuth"}))},
-                           {"elevation", either(told.elevation, fieldLike(fields, {"elevation"}))},
-                           {"range", either(told.range, fieldLike(fields, {"range", "distance"}))}};
+  const Names spherical = {
+      {"azimuth", either(told.azimuth, fieldLike(fields, {"azimuth"}))},
+      {"elevation", either(told.elevation, fieldLike(fields, {"elevation"}))},
+      {"range", either(told.range, fieldLike(fields, {"range", "distance"}, {doppler}))}};
   const auto complete = [](const Names& names) {
     return std::none_of(names.begin(), names.end(), [](const auto& name) { return name.second.empty(); });
   };
