@@ -100,14 +100,14 @@ TEST(RadarChannel, AScanThatComesTwiceCountsOnce) {
   EXPECT_GT(rejected, 0u);
 }
 
-TEST(RadarChannel, AVelocityThatNoPlatformReachesIsInfeasible) {
+TEST(RadarChannel, AJumpThatNoPlatformMakesIsRejected) {
   OneRadar radar;
   for (double stamp = 0.7; stamp < 1.5; stamp += 0.1) ASSERT_EQ(radar.use(stamp, 30).rejected_because, "");
   RadarScan jump = radar.scan(1.6, 30);
   for (RadarPoint& point : jump.points) point.doppler -= 60.0 * point.position_R.normalized().y();
   ScanContext context;
   context.last_used = radar.motion.time(1.5);
-  EXPECT_EQ(radar.channel.use(jump, context, radar.smoother).rejected_because, "infeasible_velocity");
+  EXPECT_EQ(radar.channel.use(jump, context, radar.smoother).rejected_because, "innovation");
 }
 
 /// The change of velocity that a borrowed Doppler gets.

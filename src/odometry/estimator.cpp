@@ -29,7 +29,7 @@ std::vector<RadarChannel> radarChannels(const OdometryOptions& options, const Ei
   std::vector<RadarChannel> channels;
   for (std::size_t k = 0; k < options.radarCount(); ++k) {
     const OdometryOptions own = optionsOfRadar(options, k);
-    const RadarChannelOptions channel{own.T_IR, own.ego_velocity, own.feasibility, own.offset_step_detector,
+    const RadarChannelOptions channel{own.T_IR, own.ego_velocity, own.offset_step_detector,
                                       own.smoother};
     channels.emplace_back(channel, g_W, imu, shared);
   }

@@ -75,6 +75,7 @@ void Initializer::forgetVelocities() {
 }
 
 void Initializer::setImuNoise(const ImuNoise& noise) {
+  options_.imu_noise = noise;
   for (MotionInitializer& radar : motion_) radar.setImuNoise(noise);
 }
 

@@ -51,7 +51,6 @@ RadarChannel::RadarChannel(const RadarChannelOptions& options, const Eigen::Vect
       estimator_(options.ego_velocity),
       in_window_(options.smoother, options.T_IR, g_W, imu,
                  offset ? std::move(offset) : std::make_shared<OffsetBlocks>(options.smoother)),
-      feasibility_(options.feasibility),
       offset_widths_(imu, g_W),
       step_detector_(options.offset_step_detector, options.smoother.max_time_offset),
       offset_uncertainty_(options.smoother.huber_threshold) {}
@@ -75,7 +74,6 @@ void RadarChannel::tune(const SmootherOptions& options) {
 void RadarChannel::forget() {
   forgetOffset();
   offset_widths_.clear();
-  feasibility_ = FeasibilityCheck(options_.feasibility);
   pool_.clear();
   rest_pool_.clear();
   judged_at_.reset();
@@ -107,7 +105,6 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   Seen seen = see(scan, context, smoother, answer);
   const EgoVelocity& measured = seen.velocity;
   if (!isValid(measured.status)) return reject(toString(answer.ego_velocity.status));
-  if (seen.is_own && !feasibility_.accept(scan.stamp, measured.v_R)) return reject("infeasible_velocity");
 
   answer.offset_gain = offsetGain(seen);
   const bool informs_offset = answer.offset_gain > 0.0;

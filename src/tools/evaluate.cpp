@@ -211,7 +211,7 @@ void writeErrors(const std::string& file, const Trajectory& truth, const Traject
 }
 
 void run(const Arguments& arguments) {
-  // All is computed before anything is printed: a failure leaves no half output.
+  // All is computed before anything is written: a failure leaves no half output.
   std::vector<Evaluation> evaluations;
   if (!arguments.trajectories.empty()) {
     const std::string& truth_file = arguments.trajectories.front();
@@ -220,9 +220,6 @@ void run(const Arguments& arguments) {
       const std::string& file = arguments.trajectories[i];
       const Trajectory estimate = readTum(file);
       evaluations.push_back(evaluate(truth, truth_file, estimate, file, arguments.max_difference));
-      if (!arguments.errors_file.empty()) {
-        writeErrors(arguments.errors_file, truth, estimate, arguments.max_difference);
-      }
     }
   }
   std::optional<OffsetError> offset;
@@ -235,6 +232,9 @@ void run(const Arguments& arguments) {
     }
   }
 
+  if (!arguments.errors_file.empty())
+    writeErrors(arguments.errors_file, readTum(arguments.trajectories.front()),
+                readTum(arguments.trajectories.back()), arguments.max_difference);
   if (arguments.yaml) {
     if (!evaluations.empty()) {
       std::printf("ground_truth: %s\nmax_difference_s: %#.9g\nestimates:\n",

@@ -441,6 +441,10 @@ void run(Request request) {
     const std::string fault = faultOfOutput(file, {request.trajectory});
     if (!fault.empty()) throw UsageError(name + fault);
   }
+  constexpr double kLastStamp = 4294967295.0;  // [s] ROS counts them in 32 bits
+  if (request.start_time > kLastStamp)
+    throw UsageError("--start-time " + std::to_string(request.start_time) +
+                     ": expected at most 4294967295, the last stamp of ROS");
   request.simulation.start = Time::fromSeconds(request.start_time);
   const Motion motion = motionOf(request);
   const SensorData data = simulate(motion, request.simulation);

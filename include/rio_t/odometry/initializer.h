@@ -40,7 +40,7 @@ class Initializer {
   /// Whether the radars show motion in that time, and none shows rest.
   bool isMoving(Time from, Time to) const;
 
-  OdometryOptions options_;  // read-only after construction
+  OdometryOptions options_;  // only setImuNoise() changes them
   StaticInitializer rest_;
   std::vector<MotionInitializer> motion_;  ///< by radar
   std::optional<Time> first_, newest_;

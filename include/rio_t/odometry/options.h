@@ -11,7 +11,6 @@
 #include "rio_t/odometry/motion_initializer.h"
 #include "rio_t/radar/ego_velocity.h"
 #include "rio_t/radar/extrinsics.h"
-#include "rio_t/radar/feasibility.h"
 #include "rio_t/sensors/barometer_channel.h"
 #include "rio_t/sensors/ground_vehicle_channel.h"
 #include "rio_t/sensors/offset_step_detector.h"
@@ -44,7 +43,6 @@ struct OdometryOptions {
   StaticInitializerOptions initialization;
   MotionInitializerOptions motion_initialization;
   EgoVelocityOptions ego_velocity;
-  FeasibilityOptions feasibility;
   RestOptions rest;
   SmootherOptions smoother;
   LandmarkOptions landmarks;

@@ -5,7 +5,6 @@
 
 #include "rio_t/imu/rest_detector.h"
 #include "rio_t/radar/ego_velocity.h"
-#include "rio_t/radar/feasibility.h"
 #include "rio_t/sensors/innovation_gate.h"
 #include "rio_t/sensors/offset_step_detector.h"
 #include "rio_t/sensors/offset_uncertainty.h"
@@ -20,7 +19,6 @@ namespace rio_t {
 struct RadarChannelOptions {
   Extrinsics T_IR;
   EgoVelocityOptions ego_velocity;
-  FeasibilityOptions feasibility;
   OffsetStepDetectorOptions offset_step_detector;
   SmootherOptions smoother;
 };
@@ -73,7 +71,6 @@ struct RadarAnswer : ScanAnswer {
 /// | --- | --- | --- |
 /// | rest | the IMU's rest counts if neither this scan nor those since it began deny it | - |
 /// | prior in RANSAC | chooses the points that agree with the prediction; rejects `ambiguous` | diverged |
-/// | feasibility | rejects a jump that no platform makes (paper, II-B1) | - |
 /// | step of the offset | gives t_O a new block | no majority; tilt unknown; scan does not tell t_O |
 /// | gate | rejects a velocity beyond `innovation_gate` sigma | tilt unknown; silence; all points agree |
 /// | health | counts, rejects nothing | no majority, or outvoted by witnesses |
@@ -162,7 +159,6 @@ class RadarChannel {
   RadarChannelOptions options_;  // changed by tune() alone
   EgoVelocityEstimator estimator_;
   RadarInWindow in_window_;
-  FeasibilityCheck feasibility_;
   ScanPool pool_;
   RestPool rest_pool_;
   std::optional<Time> judged_at_;              ///< the last scan, used or not

@@ -199,12 +199,12 @@ class BagJob {
     return finish(std::move(summary), log, output_.get());
   }
 
-  /// The offset found is taken off the stamps, and the rest is estimated from the prior of the first pass:
-  /// the data are the same in each pass, and a prior from the pass before would count them twice.
+  /// The offset found is taken off the stamps. The rest is estimated from zero, with the sigma of the first
+  /// pass: the data are the same in each pass, and a sigma from the pass before would count them twice.
   RunSummary refine() {
     const int passes = run_.config.refine_passes;
     std::vector<double> taken_off = nothingTakenOff();  // [s] by radar
-    std::vector<std::vector<double>> offsets(taken_off.size()), sigmas(taken_off.size());
+    std::vector<std::vector<double>> offsets(taken_off.size());
     for (int pass = 1;; ++pass) {
       Config config = run_.config;
       if (pass > 1) takeOff(taken_off, &config);
@@ -218,10 +218,7 @@ class BagJob {
       for (std::size_t k = 0; k < taken_off.size(); ++k) {
         RadarSummary& radar = summary.radars[k];
         offsets[k].push_back(taken_off[k] = radar.final_offset_s);
-        sigmas[k].push_back(radar.final_offset_sigma_s);
-        if (!last) continue;
-        radar.pass_offsets_s = offsets[k];
-        radar.pass_offset_sigmas_s = sigmas[k];
+        if (last) radar.pass_offsets_s = offsets[k];
       }
       if (last) summary.mode = "refine";
       summary = finish(std::move(summary), log, output);

@@ -273,14 +273,16 @@ int runProgram(const ProgramText& text, OptionSet& options, const std::vector<st
   });
 }
 
+void addBag(const std::string& bag, std::vector<std::string>& bags) {
+  for (const std::string& other : bags)
+    if (isSameFile(bag, other)) throw UsageError(bag + ": expected each bag once");
+  bags.push_back(bag);
+}
+
 void addBagOptions(OptionSet& options, std::vector<std::string>& bags, std::string& config,
                    ParameterEntries& set) {
   options.values("bag", "BAG", "a bag with IMU and radar; `--bag` itself may be left out",
-                 [&bags](const std::string& bag) {
-                   for (const std::string& other : bags)
-                     if (isSameFile(bag, other)) throw UsageError(bag + ": expected each bag once");
-                   bags.push_back(bag);
-                 });
+                 [&bags](const std::string& bag) { addBag(bag, bags); });
   options.positional("bag");
   options.text("config", "NAME_OR_PATH", "irs, ti_mmwave, ... of the package's config/, or a YAML file",
                config);

@@ -105,6 +105,8 @@ int runProgramWith(const ProgramText& text, OptionSet& options, const std::vecto
                    std::ostream& out, std::ostream& err,
                    const std::function<int(const OptionSet::Given&)>& body);
 
+/// Appends a bag. Throws UsageError if it is one of `bags` already.
+void addBag(const std::string& bag, std::vector<std::string>& bags);
 /// The options of all programs that read bags: BAG... or --bag, --config, --set.
 void addBagOptions(OptionSet& options, std::vector<std::string>& bags, std::string& config,
                    ParameterEntries& set);

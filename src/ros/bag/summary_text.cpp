@@ -149,7 +149,6 @@ std::string summaryText(const RunSummary& summary, const std::vector<std::string
   for (const RadarSummary& radar : summary.radars) {
     if (radar.pass_offsets_s.empty()) continue;
     lines.add("pass_offsets_s" + suffixOf(radar.name), fixedTexts(radar.pass_offsets_s, 9));
-    lines.add("pass_offset_sigmas_s" + suffixOf(radar.name), fixedTexts(radar.pass_offset_sigmas_s, 9));
   }
   if (summary.batch) {
     lines.add("batch_iterations", summary.batch->iterations);

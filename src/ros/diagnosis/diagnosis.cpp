@@ -89,6 +89,8 @@ double silentShare(const RunEvidence& evidence) {
 /// A stamp, to the millisecond.
 std::string stampText(Time time) { return fixedText(time.seconds(), 3) + " s"; }
 
+std::string timesText(std::uint64_t count) { return count == 1 ? "once" : std::to_string(count) + " times"; }
+
 bool has(const std::string& text, const char* part) { return text.find(part) != std::string::npos; }
 
 void addStart(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
@@ -235,14 +237,14 @@ void addDivergence(const RunEvidence& evidence, std::vector<Cause>* causes) {
     return;
   if (evidence.scans_diverged == 0) {
     causes->push_back({"no_scans",
-                       "The estimate diverged " + std::to_string(divergences) +
-                           " times while no scan came that can be used: the IMU alone carried it.",
+                       "The estimate diverged " + timesText(divergences) +
+                           " while no scan came that can be used: the IMU alone carried it.",
                        "Look for what keeps the scans of the radar away.", 0.05});
     return;
   }
   if (evidence.scans_contradicted == 0) {
     causes->push_back({"velocity_lost",
-                       "The velocity was lost " + std::to_string(divergences) + " times, for " +
+                       "The velocity was lost " + timesText(divergences) + ", for " +
                            outOf(evidence.scans_diverged, evidence.scans_judged, "scans") +
                            ": the data had gaps or wrong samples, and no scan contradicts the estimate.",
                        "Look for what loses messages of the IMU (imu_gap among the input faults) or of the "
@@ -255,7 +257,7 @@ void addDivergence(const RunEvidence& evidence, std::vector<Cause>* causes) {
                                          return a.points_per_scan[1] < b.points_per_scan[1];
                                        });
   causes->push_back({"diverged",
-                     "The estimate diverged " + std::to_string(divergences) + " times, for " +
+                     "The estimate diverged " + timesText(divergences) + ", for " +
                          outOf(evidence.scans_diverged, evidence.scans_judged, "scans") +
                          ": radar and IMU contradict each other.",
                      "Check the mounting (extrinsics_rotation_xyzw has the order x, y, z, w), "

@@ -152,8 +152,7 @@ class RadarCauses {
   /// Scans that give a velocity that the IMU contradicts.
   void addContradictions() {
     const std::uint64_t judged = radar_.scans_total - radar_.scans_before_start;
-    const std::uint64_t contradicted =
-        countOf(radar_.scans_rejected, "innovation") + countOf(radar_.scans_rejected, "infeasible_velocity");
+    const std::uint64_t contradicted = countOf(radar_.scans_rejected, "innovation");
     const double share = shareOf(contradicted, judged);
     if (share < kManyScans) return;
     cause("contradicts_imu", share,

@@ -33,8 +33,8 @@ void EvidenceCollector::add(const ScanResult& result) {
   }
   if (result.rejected_because == "before_initialization") {
     ++radar.scans_before_start;
-    if (first_imu_ && result.scan.stamp < *first_imu_ && ++radar.scans_before_imu == 1)
-      radar.seconds_before_imu = *first_imu_ - result.scan.stamp;
+    if (oldest_imu_ && result.scan.stamp < *oldest_imu_ && ++radar.scans_before_imu == 1)
+      radar.seconds_before_imu = *oldest_imu_ - result.scan.stamp;
     ++radar.scans_rejected[result.rejected_because];
     ++radar.velocity_status[toString(result.ego_velocity.status)];
     return;

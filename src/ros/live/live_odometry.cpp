@@ -280,17 +280,17 @@ void LiveOdometry::startSessionWhenReady() {
   OdometryOptions options = live_config_.odometry;
   options.T_IR = T_IR.front();
   for (std::size_t k = 0; k < options.radars.size(); ++k) options.radars[k].T_IR = T_IR.at(k);
-  monitor_.waitFor("");
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     options_ = options;
   }
   session_.replace(std::make_shared<LiveSession>(config_, options));
+  monitor_.waitFor("");
 }
 
 void LiveOdometry::reset(const std::string& reason, bool at_once) {
   ROS_WARN_STREAM(name_ << ": reset: " << reason << "; starts again" << (at_once ? "" : ", stand still"));
-  // Where it still waits for its extrinsics there is nothing to forget.
+  // Without a session there is nothing to reset.
   if (session_.get()) {
     OdometryOptions options;
     {
@@ -437,7 +437,6 @@ void LiveOdometry::solve() {
         tellDopplerStep(radars_[k], now->odometry().radarDopplerStep(k), &told[k]);
       if (more) wakeSolver();  // one scan at a time, so that stopping and resets are heeded between them
     } catch (const std::exception& error) {
-      monitor_.solverFailed(error.what());
       ROS_ERROR_STREAM(name_ << ": the estimator failed: " << error.what());
       if (session_.get() == now) reset(std::string("the estimator failed: ") + error.what());
     }

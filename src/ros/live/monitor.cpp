@@ -144,15 +144,9 @@ void LiveMonitor::result(const LiveSession::Result& result) {
   last_terminations_.push_back(termination);
   if (last_terminations_.size() > kWindowsJudged) last_terminations_.pop_front();
   scan_latency_.add(result.latency);
-  solver_failure_.clear();
   last_update_ = result;
   last_update_->result.scan.points.clear();  // not needed here
   radar.last_update = last_update_;
-}
-
-void LiveMonitor::solverFailed(const std::string& what) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  solver_failure_ = what;
 }
 
 void LiveMonitor::reset(const std::string& reason) {
@@ -394,10 +388,6 @@ void LiveMonitor::describeSolver(Status& status) const {
   latency("scan_to_optimised", scan_latency_);
   status.add("updates", updates_);
   for (const auto& [termination, count] : terminations_) status.add(toString(termination), count);
-  if (!solver_failure_.empty()) {
-    status.summary(DiagnosticStatus::ERROR, solver_failure_);
-    return;
-  }
   if (!last_update_) {
     status.summary(DiagnosticStatus::OK, "nothing to solve yet");
     return;

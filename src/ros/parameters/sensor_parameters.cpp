@@ -192,17 +192,6 @@ void listRadar(ParameterList& list, Config& c) {
   listStandstill(list, radar);
   listConsensus(list, radar);
   listPointNoise(list, radar);
-
-  list.group("Radar: jumps of the velocity that no platform can make");
-  list.number("feasibility_window", "s", above(0), c.odometry.feasibility.window,
-              "The velocity of a scan is compared with the mean velocity over this time before it.");
-  list.number(
-      "feasibility_max_acceleration", "m/s^2", above(0), c.odometry.feasibility.max_acceleration,
-      "A scan is rejected as infeasible if its velocity departs from the mean over feasibility_window faster "
-      "than this. Three g suit people and drones. Lower it for a heavy vehicle.");
-  list.number("feasibility_margin", "m/s", atLeast(0), c.odometry.feasibility.margin,
-              "A difference from the mean of up to this is always allowed. It stands for the noise of the "
-              "radar's velocity.");
 }
 
 }  // namespace rio_t

@@ -46,7 +46,7 @@ struct RadarSummary : RadarEstimate {
   std::uint64_t scans_used = 0;
   std::uint64_t triggers_zero = 0;       ///< trigger messages with a stamp of zero
   std::uint64_t scans_before_start = 0;  ///< before the estimate was initialised
-  std::uint64_t scans_before_imu = 0;    ///< of these, stamped before the first IMU sample
+  std::uint64_t scans_before_imu = 0;    ///< of these, stamped before the oldest IMU sample
   double seconds_before_imu = 0.0;       ///< by how much, of the first of them
   Counts scans_rejected;                 ///< by reason
   Counts velocity_status;                ///< of the scans before the start, by EgoVelocityStatus
@@ -58,7 +58,6 @@ struct RadarSummary : RadarEstimate {
   DopplerStep doppler_step;  ///< as known at the end; the file has its source as a key of its own
   std::array<std::uint64_t, 3> points_per_scan = {};  ///< quantiles of 10, 50 and 90 % of the scans
   std::vector<double> pass_offsets_s;                 ///< after each pass; only with mode refine
-  std::vector<double> pass_offset_sigmas_s;           ///< likewise
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();     ///< of the newest mounting from the told one [rad]
 };
 
@@ -101,7 +100,7 @@ class EvidenceCollector {
   void add(const ScanResult& result);
   /// A sample of the IMU.
   void addImu(Time time) {
-    if (!first_imu_) first_imu_ = time;
+    if (!oldest_imu_ || time < *oldest_imu_) oldest_imu_ = time;  // its clock may jump back
   }
   /// A sample of the IMU after the start.
   void addState(Time time);
@@ -121,7 +120,7 @@ class EvidenceCollector {
  private:
   std::vector<PointFilter> filters_;         // by RadarScan::radar
   double coasting_after_, max_bridged_gap_;  // [s]
-  std::optional<Time> first_imu_, newest_state_;
+  std::optional<Time> oldest_imu_, newest_state_;
   Time last_used_;  // scan, or the start
   RunEvidence evidence_;
 };
@@ -154,8 +153,8 @@ struct GroundVehicleCounts {
 
 /// The warning for a person whose platform is no ground vehicle.
 constexpr const char* kGroundVehicleContradicted =
-    "the motion contradicted platform: ground_vehicle, and the constraint is switched off until a reset: the "
-    "platform moves sideways or upwards. Is it a ground vehicle, and does vehicle_frame_rotation_xyzw say "
+    "the motion contradicted platform: ground_vehicle, and the constraint is switched off until the "
+    "estimate starts again: the platform moves sideways or upwards. Is it a ground vehicle, and does vehicle_frame_rotation_xyzw say "
     "which way it drives?";
 
 }  // namespace rio_t

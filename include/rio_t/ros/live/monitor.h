@@ -40,7 +40,6 @@ class LiveMonitor {
   void pressure();                               ///< a message came
   void pressureDropped(const std::string& why);  ///< one that cannot be used
   void result(const LiveSession::Result& result);
-  void solverFailed(const std::string& what);
   /// The session starts again; counters of the node go on.
   void reset(const std::string& reason);
   /// What is missing before there is a session at all; empty: nothing.
@@ -137,7 +136,7 @@ class LiveMonitor {
   std::uint64_t updates_ = 0, resets_ = 0, queue_full_told_ = 0;
   std::map<SolverTermination, std::uint64_t> terminations_;
   std::deque<SolverTermination> last_terminations_;  // of the last windows, newest last
-  std::string last_reset_, waiting_for_, solver_failure_, refused_because_;
+  std::string last_reset_, waiting_for_, refused_because_;
   std::uint64_t reconfigurations_ = 0;
   std::map<std::string, std::string> frames_, topic_types_;
   std::optional<LiveSession::Result> last_update_;
