@@ -1,6 +1,6 @@
 # rio_t with ROS Noetic (Ubuntu 20.04), built and tested in a catkin workspace. From the folder of the repository:
 #   docker build -f docker/noetic.Dockerfile -t rio_t:noetic .
-#   docker run --rm -v $PWD:/data -w /data rio_t:noetic rosrun rio_t rio_t_bag --bag run.bag --config irs --output-dir out
+#   docker run --rm -v $PWD:/data -w /data rio_t:noetic rosrun rio_t rio_t_bag run.bag --config irs --output-dir out
 FROM ros:noetic
 SHELL ["/bin/bash", "-c"]
 ENV DEBIAN_FRONTEND=noninteractive

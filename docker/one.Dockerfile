@@ -1,7 +1,7 @@
 # rio_t with ROS One (Ubuntu 22.04 or 24.04), built and tested in a catkin workspace. From the folder of the repository:
 #   docker build -f docker/one.Dockerfile -t rio_t:one .                                 Ubuntu 24.04
 #   docker build -f docker/one.Dockerfile -t rio_t:one --build-arg UBUNTU=22.04 .
-#   docker run --rm -v $PWD:/data -w /data rio_t:one rosrun rio_t rio_t_bag --bag run.bag --config irs --output-dir out
+#   docker run --rm -v $PWD:/data -w /data rio_t:one rosrun rio_t rio_t_bag run.bag --config irs --output-dir out
 ARG UBUNTU=24.04
 FROM ubuntu:${UBUNTU}
 SHELL ["/bin/bash", "-c"]

@@ -42,5 +42,5 @@ Larger sets, to be fetched by hand from their pages (we know no checksums of the
 
 Now:
   export RIO_T_DATA_DIR=$(realpath "$folder")
-  devel/lib/rio_t/rio_t_bag --bag $(realpath "$bag") --config ti_mmwave
+  devel/lib/rio_t/rio_t_bag $(realpath "$bag") --config ti_mmwave
 TEXT

@@ -256,6 +256,7 @@ USAGE = [
     (["montecarlo", "--seeds", "0"], "--seeds"),
     (["consistency", "--bag", __file__], "consistency draws its bags itself"),
     (["consistency", "--set", "mode=batch"], "sets mode itself"),
+    (["aids", "--set", "landmarks=true"], "sets landmarks itself"),
     (["platforms", "--simulate", "--points 5"], "--simulate: platforms draws these options itself"),
     (["shifts", "--bag", __file__, "--simulate", "--noise-free"], "--simulate: for simulated bags only"),
     (["shifts", "--simulate", "--seed 3"], "sets --seed itself"),

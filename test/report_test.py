@@ -12,7 +12,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from rio_t import programs
-from rio_t.report.main import main
+from rio_t.report.main import CHECKS, main
 from rio_t.rig import radars_of, read_config
 
 FIGURES = ["trajectory", "errors", "velocity", "time_offset", "ego_velocity", "biases"]
@@ -70,6 +70,11 @@ def test_page_holds_its_figures_and_numbers(report, run_folder, simulated_run, p
     assert cell_after(page, "ATE: position, origin aligned, rmse [m]") == f"{ate:.4f}"
     error = 1e3 * (summary["final_offset_s"] - 0.03)
     assert float(cell_after(page, "last estimate minus truth [ms]").split()[0]) == pytest.approx(error, abs=2e-3)
+
+
+def test_each_check_of_a_run_has_a_text(run_folder):
+    summary = yaml.safe_load((run_folder / "summary.yaml").read_text())
+    assert [check["name"] for check in summary["checks"]] == list(CHECKS)
 
 
 def test_an_offset_that_is_not_estimated_has_no_sigma(report, run_folder, recwarn):

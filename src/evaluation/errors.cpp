@@ -89,8 +89,7 @@ Eigen::Matrix3d leastSquaresYaw(const Points& truth, const Points& estimate) {
   return Eigen::AngleAxisd(std::atan2(across, along), Eigen::Vector3d::UnitZ()).toRotationMatrix();
 }
 
-/// Length of the estimate's step to each match from the one before, in the unit of the pieces; the first is
-/// zero.
+/// Length of the estimate's step to each match, in the unit of the pieces; the first is zero.
 std::vector<double> steps(const Trajectory& estimate, const std::vector<Match>& matches, DeltaUnit unit) {
   std::vector<double> lengths(matches.size(), 0.0);
   for (std::size_t i = 1; i < matches.size(); ++i) {

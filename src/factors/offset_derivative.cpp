@@ -11,8 +11,7 @@ VelocityRate velocityRate(const ImuMean& imu, const Eigen::Vector3d& b_g, const 
   VelocityRate rate;
   rate.a_I = imu.acceleration - b_a + g_I - omega.cross(v_I) + imu.angular_acceleration.cross(l_I);
   if (imu.duration == 0.0) return rate;
-  // A mean over w has the variance density^2 / w; the difference of two such means, over w, 2 density^2 /
-  // w^3.
+  // A mean over w has the variance density^2 / w. The difference of two, over w, has 2 density^2 / w^3.
   rate.variance = (imu.accel_variance + imu.gyro_variance * v_I.squaredNorm()) / imu.duration;
   const double w = imu.half_duration;
   if (w > 0.0) rate.variance += 2.0 * imu.gyro_variance * l_I.squaredNorm() / (w * w * w);

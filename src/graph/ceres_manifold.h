@@ -4,8 +4,7 @@
 
 #include "rio_t/graph/manifold.h"
 
-// The one place that knows which Ceres is there: manifolds since 2.1, local parameterizations before (Noetic:
-// 1.14).
+// Only this file knows the version of Ceres: manifolds since 2.1, else local parameterizations (Noetic).
 #define RIO_T_CERES_HAS_MANIFOLD \
   (CERES_VERSION_MAJOR > 2 || (CERES_VERSION_MAJOR == 2 && CERES_VERSION_MINOR >= 1))
 

@@ -112,8 +112,7 @@ class BlockElimination {
     }
   }
 
-  /// Returns the rows of R of block i, or none if the rows do not determine it. The rows that remain wait for
-  /// later blocks.
+  /// Rows of R of block i; none if the rows do not determine it. The other rows wait for later blocks.
   std::optional<LinearRows> eliminate(int i) {
     const std::vector<const LinearRows*> stacked = std::exchange(waiting_[static_cast<std::size_t>(i)], {});
     const Eigen::VectorXd& squares = squares_[static_cast<std::size_t>(i)];

@@ -85,15 +85,12 @@ ceres::Solver::Options solverOptions() {
 }
 
 /// The smallest share of a step that is tried if the whole step raises the cost. A lost tilt makes steps of a
-/// radian: the graph is not linear over them, but their direction is right. Damping would make them too
-/// short.
+/// radian: the graph is not linear over them, but their direction is right. Damping makes them too short.
 constexpr double kShortestShare = 0.06;
 constexpr double kFirstDamping = 1e-4;
-/// Squared length of a step in standard deviations. A shorter step is taken without a look at the cost: the
-/// graph is linear over a tenth of a sigma, and rounding changes the cost of a long run by more than the step
-/// does.
+/// A step shorter than a tenth of a sigma is taken without comparing costs: rounding exceeds its gain.
 constexpr double kSurelyRight = 1e-2;
-/// Likewise, of the longest step that may be the last one.
+/// Squared length [sigma^2] of the longest step after which the solver may stop.
 constexpr double kLongestLastStep = 1.0;
 
 /// Moves all blocks by `share` of the step, no farther than to their bounds. Whether one was stopped there.

@@ -8,9 +8,8 @@
 namespace rio_t {
 namespace {
 
-constexpr double kStep = 0.02;  // [s] between samples that are made up
-constexpr double kGravityTime =
-    1.5;  // [s] of the accelerometer that show gravity: a few swings of the motion
+constexpr double kStep = 0.02;        // [s] between samples that are made up
+constexpr double kGravityTime = 1.5;  // [s] of acceleration that show gravity: a few swings of the motion
 
 /// sinh(a) / sinh(b) for 0 <= a <= b, b > 0; each by itself overflows from 711 on, a gap of six minutes.
 double sinhRatio(double a, double b) { return std::exp(a - b) * std::expm1(-2.0 * a) / std::expm1(-2.0 * b); }

@@ -9,8 +9,7 @@ namespace {
 
 constexpr double kWrongUnits = 0.4;  // of gravity that the mean accelerometer is off
 
-/// [s] An engine that idles at 600 turns a minute or more shakes the IMU and does not move the mean over so
-/// long.
+/// [s] An engine that idles at 600 turns a minute or more does not move the mean over this time.
 constexpr double kMean = 0.1;
 /// [s] Rest ends if the mean over so long differs from that before.
 constexpr double kNewest = 0.5;
@@ -86,8 +85,7 @@ std::string noRestBecause(const RestStatistics& rest, const StaticInitializerOpt
                           double gravity) {
   const Statistics& gyro = rest.gyro;
   const Statistics& accel = rest.accel;
-  // In any motion of people and drones the accelerometer reads about gravity on average. If not, the units
-  // are wrong.
+  // In any motion of people and drones the accelerometer reads gravity on average. If not, units are wrong.
   if (std::abs(rest.mean_size - gravity) > kWrongUnits * gravity) {
     return format(
         "rest: the accelerometer reads %.2f m/s^2 on the mean, expected gravity %.2f m/s^2: gravity removed, "

@@ -24,8 +24,8 @@ constexpr double kLeastTilt = 0.03;  // [rad] rms of the turns of gravity in 0.6
 /// Means of the specific force, in steps of `kMeanWidth`, and the turn from one to the next, by the gyro.
 struct Steps {
   std::vector<Vector3d> force;
-  std::vector<Vector3d>
-      turn;  // integral of the rates, as written, from the middle of a step to that of the next
+  /// Integral of the rates, as written, from the middle of a step to that of the next.
+  std::vector<Vector3d> turn;
 };
 
 Steps stepsOf(const std::vector<ImuMeasurement>& imu) {

@@ -127,8 +127,8 @@ BySign tryOffsets(int first, int last, const std::optional<Matrix3d>& M,
   return curves;
 }
 
-/// Chooses the sign that fits better; if neither does clearly, the ranges decide. `unit`: the cost of one
-/// independent sigma^2.
+/// Chooses the sign that fits better. If neither does so clearly, the ranges decide. `unit` is the cost of
+/// one independent sigma^2.
 void chooseSign(const BySign& curves, double unit, int sign_from_ranges, MountingSearch* result) {
   const double difference = (curves[1].least.cost - curves[0].least.cost) / unit;  // > 0: receding is better
   const int likelier = difference < 0.0 ? -1 : 1;

@@ -8,8 +8,7 @@ namespace rio_t {
 
 /// The true angles of the points of a scan, by linear regression on the measured ones: a point is expected
 /// between where it was measured and the mean of its scan, and this mean between where it was measured and
-/// that of earlier scans. The error of an expected angle does not correlate with it (docs/method.md, section
-/// 5.7).
+/// that of earlier scans. The error of an expected angle does not correlate with it (docs/method.md, 5.7).
 class AngleRegression {
  public:
   /// `measured` are the angles of the scan [rad], at least one. `noise` is the variance of one [rad^2].

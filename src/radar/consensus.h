@@ -11,8 +11,7 @@ namespace rio_t {
 constexpr double kMajority = 0.6;    ///< of the points
 constexpr double kUnanimous = 0.85;  ///< of the points
 
-/// Draws needed so that one of them is free of outliers with the wanted probability (Fischler and Bolles,
-/// 1981).
+/// Draws needed so that one is free of outliers with the wanted probability (Fischler and Bolles, 1981).
 int ransacIterations(const EgoVelocityOptions& options);
 
 /// The velocity that most points agree with, among rest and those of three random points each. Each point

@@ -40,8 +40,7 @@ struct Angles {
 };
 
 /// Factors of the variances of Doppler, azimuth and elevation in the variance of a residual. The terms with
-/// the radial speed come from the second derivatives; if the radar looks along its velocity, the first ones
-/// vanish.
+/// the radial speed come from second derivatives; the first ones vanish along the velocity.
 inline Eigen::Vector3d noiseShares(const Angles& a, const Eigen::Vector3d& v_R, const PointVariances& noise) {
   const double radial = square(a.direction().dot(v_R));
   return {1.0, square(a.byAzimuth().dot(v_R)) + radial * (0.75 * noise.azimuth + 0.25 * noise.elevation),

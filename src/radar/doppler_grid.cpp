@@ -24,8 +24,7 @@ constexpr double kSame = 1e-6;
 /// The number of misfits (values that are no multiples) that a batch of 16 may have. If every fiftieth value
 /// of a radar is a misfit, one batch in 270 has more, and four in a row never have. If every twentieth is,
 /// one batch in 23 has more, and one in 300 000 is the last of four. If a radar has no steps, a value is near
-/// a multiple of a wrong step once in 25 times at most (kMaxTolerance), and 14 of 16 values are once in 10^17
-/// times.
+/// a multiple of a wrong step once in 25 times at most (kMaxTolerance), and 14 of 16 once in 10^17 times.
 constexpr std::size_t kMaxMisfits = 2;
 constexpr int kBatchesWithoutStep = 4;
 
@@ -55,8 +54,7 @@ std::size_t countMisfits(const Batch& values, const Reading& reading) {
 /// The reading `start`, refined by the values; none if more than kMaxMisfits values are no multiples.
 ///
 /// The values ascend, and each larger multiple gives a better step. Only the first value of a multiple
-/// counts: a step that followed each would creep through values that lie close together without being the
-/// same.
+/// counts: a step that followed each would creep through values that lie close together.
 template <typename Batch>
 std::optional<Reading> explain(const Batch& ascending, const Reading& start) {
   Reading reading = start;

@@ -120,8 +120,7 @@ ExpectedDirections expectedDirections(const std::vector<RadarDirection>& points,
   }
   // Without bins this is least squares, and all points have the same variance: the regression is right for
   // all of them together, not at each measured angle, and weights that differ with the angle would prefer
-  // some. Bins wider than the noise bound the velocity by their edges, each as sharp as the noise of its
-  // point.
+  // some. Bins wider than the noise bound the velocity by their edges, as sharp as the noise of a point.
   if (3.0 * noise.quantization <= mean_variance) result.variances.assign(points.size(), mean_variance);
   return result;
 }

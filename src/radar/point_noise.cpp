@@ -12,13 +12,12 @@
 namespace rio_t {
 namespace {
 
-/// The noise at the start counts as so many points, whose residuals show nothing but that noise.
+/// The noise at the start counts as n points, whose residuals show nothing but that noise.
 constexpr double kStartPoints = 10.0;
 /// [scans] that PointNoise remembers, 100 s at 10 Hz. At a walk they show the elevation noise, which shows
 /// least, to 3 %.
 constexpr double kMemory = 1000.0;
-/// [scans] over which the spread of the directions is watched for changes: a platform turns to another view
-/// in seconds.
+/// [scans] over which changes of the spread of the directions show: a platform turns within seconds.
 constexpr double kViewMemory = 100.0;
 /// A scan of fewer points hardly shows how far its directions spread.
 constexpr double kFewPoints = 5.0;
@@ -32,10 +31,10 @@ constexpr double kMinStartAngleSigma = 0.01;  // [rad]
 /// [m^2/s^2] Variance of a residual; it bounds the weights if there is no noise at all.
 constexpr double kMinVariance = 1e-4;
 
-/// Share of a new scan in what is known, after so many scans.
+/// Share of a new scan in what is known, after n scans.
 double forgotten(double scans) { return std::max(1.0 / kMemory, 1.0 / (scans + 1.0)); }
 
-/// Variance of the logarithm of a variance that has so many degrees of freedom: trigamma of half of them.
+/// Variance of the logarithm of a variance that has n degrees of freedom: trigamma of half of them.
 double varianceOfLogarithm(double freedom) {
   const double x = 0.5 * freedom;
   const double y = x + 1.0;
@@ -119,8 +118,7 @@ void PointNoise::learn(const std::vector<RadarDirection>& points, const DopplerL
     };
     const DopplerDensity density = densityAt(residual);
     const double probability = density.value / (density.value + variances_.outlier_density);
-    // A fit hides some of the noise. So this is the mean over the velocities that the scan leaves open, by
-    // three points.
+    // A fit hides some of the noise. So this is a mean over the velocities left open, by three points.
     const double open = std::sqrt(std::max(0.0, 3.0 * p.u_R.dot(covariance * p.u_R)));
     const double slope =
         (slopeOf(densityAt(residual - open)) + 4.0 * slopeOf(density) + slopeOf(densityAt(residual + open))) /

@@ -14,8 +14,7 @@ namespace rio_t {
 /// The squares are summed with three weights, which tell the three variances apart: one, and the squares of
 /// the derivatives of the radial speed by azimuth (over the cosine of the elevation) and by elevation. These
 /// derivatives are known at the measured direction only, and its noise is also in r. What a sum is on average
-/// follows from the measured directions alone, for angles with normal noise exactly (docs/method.md, section
-/// 9.2).
+/// follows from the measured directions alone, for angles with normal noise exactly (docs/method.md, 9.2).
 class ResidualMoments {
  public:
   /// `v_R` [m/s] is the radar's velocity.

@@ -16,8 +16,7 @@ struct VelocitySolution {
 /// [m/s] Sigma along the largest axis of a covariance.
 double largestSigma(const Eigen::Matrix3d& covariance);
 
-/// v = -(H'H)^-1 H'd, covariance s^2 (H'H)^-1; s^2 is the residual variance, at least the quantisation's
-/// q^2/12.
+/// v = -(H'H)^-1 H'd, covariance s^2 (H'H)^-1; s^2 is the variance of the residuals, or q^2/12 if larger.
 VelocitySolution solveLeastSquares(const std::vector<RadarDirection>& points,
                                    const EgoVelocityOptions& options);
 

@@ -97,7 +97,7 @@ class PacedPlayer:
             p.get_num_connections() > 0 for p in self._publishers.values()))
 
     def _play(self, bag):
-        begin = bag.get_start_time() + self._start
+        t = begin = bag.get_start_time() + self._start
         wall_begin = time.monotonic()
         for topic, (_, data, _, _, _), record in bag.read_messages(
                 list(self._topics), start_time=rospy.Time.from_sec(begin), raw=True):

@@ -9,13 +9,12 @@ import yaml
 from . import tum
 from .errors import RioTError
 
+# What is read of each file. A file that lacks a column is told by its name and line.
 COLUMNS = {
     "navigation.csv": "stamp,vx,vy,vz,sigma_px,sigma_py,sigma_pz,sigma_rx,sigma_ry,sigma_rz,sigma_vx,sigma_vy,sigma_vz",
     "time_offset.csv": "stamp,offset_s,sigma_s",
     "ego_velocity.csv": "stamp,vx,vy,vz,sigma_x,sigma_y,sigma_z,inliers,points,status",
     "extrinsics.csv": "stamp,x,y,z,qx,qy,qz,qw,sigma_x,sigma_y,sigma_z,sigma_rx,sigma_ry,sigma_rz",
-    "barometer.csv": "stamp,height,innovation,innovation_sigma,bias,bias_sigma,samples,status",
-    "ground_vehicle.csv": "stamp,vx,vy,vz,sigmas,qx,qy,qz,qw,sigma_rx,sigma_ry,sigma_rz,status",
     "map.csv": "id,x,y,z,sigma,snr_db,sightings",
     "biases.csv": "stamp,bgx,bgy,bgz,bax,bay,baz"}
 KINDS = {"stamp": tum.nanoseconds, "status": str}  # all other columns are numbers

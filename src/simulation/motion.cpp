@@ -8,8 +8,7 @@
 namespace rio_t::simulation {
 namespace {
 
-// Rises from 0 to 1 with three derivatives zero at both ends; its integral and its derivative. Times in
-// ramps.
+// Rises from 0 to 1 with three derivatives zero at both ends; its integral and derivative. Times in ramps.
 double paceIntegral(double u) { return u * u * u * u * u * (7.0 + u * (-14.0 + u * (10.0 - 2.5 * u))); }
 double pace(double u) { return u * u * u * u * (35.0 + u * (-84.0 + u * (70.0 - 20.0 * u))); }
 double paceDerivative(double u) { return 140.0 * u * u * u * (1.0 - u) * (1.0 - u) * (1.0 - u); }

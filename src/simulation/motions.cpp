@@ -23,8 +23,7 @@ using PoseFunction = std::function<StampedPose(double)>;
 // A sum of sines along one axis.
 class Waves {
  public:
-  // `count` frequencies spread over [low, high] Hz; amplitudes fall with frequency so that each adds equal
-  // speed.
+  // `count` frequencies spread over [low, high] Hz. Each adds equal speed, so amplitudes fall with frequency.
   Waves(Random& random, int count, double low, double high, double weight) {
     for (int i = 0; i < count; ++i) {
       const double f = low + (high - low) * (i + random.uniform()) / count;

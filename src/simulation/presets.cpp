@@ -34,8 +34,7 @@ Preset kart() {
 
   RadarModelOptions& radar = p.options.radar;
   radar.rate = 30.0;
-  // 10, 50 and 90 % of the scans have at most 3, 6 and 10 points; its driver sends no empty
-  // clouds.
+  // 10, 50 and 90 % of the scans have at most 3, 6 and 10 points; its driver sends no empty clouds.
   radar.points_mean = 6.3;
   radar.points_sigma = 2.7;
   radar.points_min = 0;

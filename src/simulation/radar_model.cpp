@@ -88,8 +88,7 @@ bool visible(const Eigen::Vector3d& p_R, const RadarModelOptions& o) {
          std::abs(elevation(p_R)) <= o.fov_elevation * kDegree;
 }
 
-// Range rate of something at p_W that moves with v_W. Relative velocity along the line of sight needs no
-// frame.
+// Range rate of something at p_W that moves with v_W. The relative velocity along the ray needs no frame.
 double rangeRate(const RadarState& radar, const Eigen::Vector3d& p_W, const Eigen::Vector3d& v_W) {
   return (p_W - radar.p_W).normalized().dot(v_W - radar.v_W);
 }
@@ -216,8 +215,7 @@ class Sensor {
     return echoes;
   }
 
-  // The `wanted` strongest of the visible reflectors; strength falls with range and fluctuates from scan to
-  // scan.
+  // The `wanted` strongest visible reflectors; strength falls with range and fluctuates from scan to scan.
   std::vector<Echo> sceneEchoes(const Frame& frame, int wanted, Random& random) const {
     std::vector<Echo> echoes;
     if (wanted <= 0) return echoes;

@@ -55,8 +55,7 @@ Segment locate(double t, double knot_spacing, int segments) {
   return {index, s - index};
 }
 
-// Symmetric positive definite matrix of `kSplineDegree` bands below the diagonal, solved by Cholesky's method
-// in place.
+// Symmetric positive definite matrix of `kSplineDegree` bands below the diagonal, with a Cholesky solver.
 class BandMatrix {
  public:
   explicit BandMatrix(int size) : bands_(Eigen::Matrix<double, kOrder, Eigen::Dynamic>::Zero(kOrder, size)) {}

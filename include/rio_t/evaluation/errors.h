@@ -5,9 +5,8 @@
 
 #include "rio_t/evaluation/trajectory.h"
 
-/// Trajectory errors with the definitions of evo (github.com/MichaelGrupp/evo), so that the figures can be
-/// compared with published ones. See Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM Systems",
-/// IROS 2012.
+/// Trajectory errors as evo (github.com/MichaelGrupp/evo) defines them, so that the figures can be compared
+/// with published ones. See Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM Systems", IROS 2012.
 namespace rio_t {
 
 /// How the estimate is moved onto the truth before poses are compared.
@@ -31,9 +30,8 @@ struct RigidTransform {
   Eigen::Vector3d t_T = Eigen::Vector3d::Zero();
 };
 
-/// Transform that aligns the estimate to the truth over `matches`, of which there must be one for kOrigin,
-/// two with horizontal distance for kYaw, three that are not on a line for kSe3; throws std::invalid_argument
-/// otherwise.
+/// Transform that aligns the estimate to the truth over `matches`: one for kOrigin, two with horizontal
+/// distance for kYaw, three that are not on a line for kSe3. Throws std::invalid_argument otherwise.
 RigidTransform alignment(const Trajectory& truth, const Trajectory& estimate,
                          const std::vector<Match>& matches, Alignment kind);
 

@@ -24,8 +24,7 @@ Trajectory readTum(const std::string& path);
 /// The same from a stream; `name` stands for the file in messages.
 Trajectory readTum(std::istream& in, const std::string& name);
 
-/// Writes the format above, stamps with nine decimals. Throws std::runtime_error if the file cannot be
-/// written.
+/// Writes the format above, stamps with nine decimals. Throws std::runtime_error if it cannot write.
 void writeTum(const std::string& path, const Trajectory& trajectory);
 /// One line of it, for programs that write as they go.
 void writeTumLine(std::ostream& out, const StampedPose& pose);

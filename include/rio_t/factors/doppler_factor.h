@@ -14,8 +14,7 @@ namespace rio_t {
 /// The Dopplers of one scan, as the factor needs them.
 struct DopplerMeasurement : RadarScanTime {
   std::shared_ptr<const DopplerLikelihood> points;
-  /// The points share an error of the velocity. These are its variances along the axes of R [m^2/s^2], see
-  /// EgoVelocityOptions::added_sigma.
+  /// [m^2/s^2] Variances of the velocity error that the points share, along the axes of R (added_sigma).
   Eigen::Vector3d shared_variances = Eigen::Vector3d::Zero();
   double huber_threshold = 0.0;  ///< [sigma] of the shared error; 0: no robust loss
 };

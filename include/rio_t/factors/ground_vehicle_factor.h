@@ -21,8 +21,7 @@ struct VehicleVelocity {
 VehicleVelocity vehicleVelocity(const StateView& x, const Extrinsics& T_IV, const Eigen::Vector3d& omega_I);
 
 /// A wheeled vehicle moves neither sideways nor up (docs/method.md, section 5.9): residual (v_V,y, v_V,z),
-/// each over its sigma. Blocks: motion, biases, vehicle frame (ExtrinsicsBlock with the manifold of its
-/// rotation).
+/// each over its sigma. Blocks: motion, biases, vehicle frame (ExtrinsicsBlock, its lever arm held).
 class GroundVehicleFactor final
     : public ceres::SizedCostFunction<2, StateBlock::kMotion, StateBlock::kBiases, ExtrinsicsBlock::kSize> {
  public:

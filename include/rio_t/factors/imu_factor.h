@@ -7,8 +7,7 @@
 
 namespace rio_t {
 
-/// Preintegrated IMU between the nodes i and j, which have the same biases. Blocks: motion i, motion j,
-/// biases.
+/// Preintegrated IMU between nodes i and j, which share their biases. Blocks: motion i, motion j, biases.
 ///
 /// docs/method.md, eq. 12; paper eq. (11); Forster et al. eq. (45). With the change of the biases since the
 /// integration, d_g and d_a, and the time between the nodes, T:

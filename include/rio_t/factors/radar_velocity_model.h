@@ -32,8 +32,7 @@ struct PredictedVelocity {
   ExtrinsicsJacobian<3> J_extrinsics;                 ///< as ExtrinsicsBlock stores it
 };
 
-/// RadarMotionModel as the factors of one scan use it. Not for two threads: it keeps the last mean of the
-/// IMU.
+/// RadarMotionModel for the factors of one scan. Not for two threads: it keeps the last mean of the IMU.
 class RadarVelocityModel {
  public:
   RadarVelocityModel(const RadarScanTime& scan, Time state_time, const RadarMotionModel& model)

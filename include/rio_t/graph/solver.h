@@ -15,8 +15,7 @@ enum class WindowSolver {
 /// When to stop.
 struct SolverLimits {
   int max_iterations = 30;
-  /// A step is the last one if its squared length in standard deviations is below this (docs/method.md, eq.
-  /// 23a).
+  /// A step is the last one if its squared length [sigma^2] is below this (docs/method.md, eq. 23a).
   double short_step = 1e-2;
 };
 

@@ -8,8 +8,7 @@
 
 namespace rio_t {
 
-/// Mean of the IMU around a time, with weights that fall linearly to zero on both sides; biases included, in
-/// I.
+/// Mean of the IMU around a time, in I, biases included. The weights fall linearly to zero on both sides.
 struct ImuMean {
   double duration = 0.0;       ///< of an even mean with the same noise [s]
   double half_duration = 0.0;  ///< of either side; 0 where there is only one [s]
@@ -39,14 +38,12 @@ class ImuBuffer {
   /// not be empty.
   ImuMeasurement at(Time time) const;
 
-  /// Mean over [time - half_width, time + half_width], as far as there are samples. The buffer must not be
-  /// empty.
+  /// Mean over [time - half_width, time + half_width], as far as there are samples. Not for an empty buffer.
   ImuMean mean(Time time, double half_width) const;
 
   /// Calls step(dt, angular_velocity, acceleration) for each interval between samples from `from` to `to`,
   /// with the mean of both ends; the ends at `from` and `to` are interpolated. Goes backwards with dt < 0 if
-  /// `to` < `from`. A step with a fourth argument gets the later of the two ends, whose noise is that of the
-  /// interval.
+  /// `to` < `from`. A fourth argument is the later end, whose noise is that of the interval.
   template <typename Step>
   void forEachInterval(Time from, Time to, Step&& step) const;
 

@@ -18,8 +18,7 @@ struct ImuInputCheckOptions {
   double jump_patience = 0.5;    ///< [s] of stamps at another time, after which the clock has jumped
   double accel_range = 0.0;      ///< [m/s^2] largest reading of an axis; 0: found from flat tops
   double gyro_range = 0.0;       ///< [rad/s] likewise
-  /// Motion that the IMU does not see, in gaps and beyond its range, as white noise of the size of human and
-  /// drone motion.
+  /// Motion that the IMU does not see, in gaps and beyond its range, as white noise: people and drones.
   double unseen_accel_density = 2.0;  ///< [m/s^2/sqrt(Hz)]
   double unseen_gyro_density = 0.5;   ///< [rad/s/sqrt(Hz)]
 };
@@ -42,9 +41,8 @@ const char* faultOfValues(const ImuMeasurement& imu, const ImuInputCheckOptions&
 /// Checks IMU samples. It drops those that cannot be used, writes into the others how much of the motion they
 /// miss, and bridges gaps. Not thread-safe.
 ///
-/// A signal with the correlation time tau deviates from the straight line over a gap of T << tau by far less
-/// than over a long one. So the density of a gap is the full one times min(1, T / tau), with tau of the
-/// motion.
+/// A signal with the correlation time tau deviates far less from the straight line over a gap of T << tau
+/// than over a long one. So the density of a gap is the full one times min(1, T / kMotionCorrelationTime).
 class ImuInputCheck {
  public:
   enum class Decision {
@@ -63,8 +61,7 @@ class ImuInputCheck {
 
   /// `max_gap` [s] between samples: a longer gap is reported and bridged.
   ImuInputCheck(double max_gap, const ImuInputCheckOptions& options);
-  /// Checks `imu`. If it is taken, sets its noise, the unseen motion included, and replaces the reading of a
-  /// stuck axis.
+  /// Checks `imu`. If it is taken, sets its noise with the unseen motion, and replaces a stuck reading.
   Verdict check(ImuMeasurement& imu);
   MeasuredImuNoise noise() const;
 

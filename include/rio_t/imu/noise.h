@@ -9,8 +9,7 @@ namespace rio_t {
 /// Continuous-time noise of the IMU.
 struct ImuNoise {
   /// [m/s^2/sqrt(Hz)] Ten times the white noise of an ADIS16448 at rest. It also stands for vibration, scale
-  /// factor and misalignment; on a walking platform these are errors of some 0.1 m/s^2 that last for a
-  /// second.
+  /// factor and misalignment; on a walking platform these are some 0.1 m/s^2 that last for a second.
   double accel_density = 2.0e-2;
   double gyro_density = 2.0e-4;       ///< [rad/s/sqrt(Hz)]
   double accel_random_walk = 1.0e-4;  ///< [m/s^3/sqrt(Hz)]

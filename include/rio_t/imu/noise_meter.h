@@ -31,8 +31,7 @@ class NoiseMeter {
     Time time;
     Eigen::Vector3d value = Eigen::Vector3d::Zero();
   };
-  /// Returns the squared density that the five samples show, per axis [unit^2/Hz]; `spacing` is their mean
-  /// spacing [s].
+  /// Squared density that five samples show, per axis [unit^2/Hz]; `spacing` is their mean spacing [s].
   Eigen::Vector3d squaredDensities(double spacing) const;
 
   std::array<Sample, 5> last_ = {};  ///< oldest first

@@ -11,8 +11,7 @@ namespace rio_t {
 /// The noise of a three-axis signal at the rate of its samples, and at a half, a quarter, ... of it.
 ///
 /// White noise has the same density at all these rates. A vibration has less at the lower ones: it averages
-/// out. Motion has more. Preintegration uses the smallest density (docs/method.md, section 4.3). Not
-/// thread-safe.
+/// out. Motion has more. Preintegration uses the smallest density (docs/method.md, 4.3). Not thread-safe.
 class NoiseSpectrum {
  public:
   /// As in NoiseMeter; the knock is that of the samples.

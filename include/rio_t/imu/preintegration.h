@@ -9,8 +9,7 @@ namespace rio_t {
 
 /// Motion between two times from the IMU alone, free of the state it starts from, with bias Jacobians.
 ///
-/// Forster et al., TRO 2017, eq. (33) with midpoint rotation instead of Euler: with T the time and g the
-/// gravity,
+/// Forster et al., TRO 2017, eq. (33) with midpoint rotation instead of Euler; T is the time, g the gravity:
 ///   R_j = R_i dR,   v_j = v_i + g T + R_i dv,   p_j = p_i + v_i T + g T^2 / 2 + R_i dp.
 /// Steps with dt < 0 integrate backwards.
 struct ImuDelta {

@@ -30,8 +30,7 @@ struct RestContext {
 
 /// Rest over a window, as the IMU shows it.
 struct Rest {
-  /// The IMU vibrates, as on a vehicle whose engine idles. It takes a radar that sees no motion to call this
-  /// rest.
+  /// The IMU vibrates, as with an engine that idles. Only a radar that sees no motion makes this a rest.
   bool shakes = false;
   /// [m/s] per axis, of the zero velocity. With the mean acceleration that is not explained, the platform may
   /// have set off within the window.

@@ -42,8 +42,7 @@ class StaticInitializer {
   bool hasSeenMotion() const { return has_seen_motion_; }
 
  private:
-  /// Whether the newest samples show that the platform sets off: a fifth of max_accel_std, and more than
-  /// noise.
+  /// Whether the newest samples show a platform that sets off: a fifth of max_accel_std, and more than noise.
   bool endsNow();
 
   StaticInitializerOptions options_;  // read-only after construction
@@ -55,8 +54,7 @@ class StaticInitializer {
 };
 
 /// Shortest rotation that turns the measured specific force at rest, in I, onto the upward axis of W; yaw
-/// zero in the sense that no rotation about the vertical is added. Works for every direction of `f_I`, also
-/// straight down.
+/// zero in the sense that no rotation about the vertical is added. Works for every `f_I`, also straight down.
 Eigen::Quaterniond levelingRotation(const Eigen::Vector3d& f_I);
 
 }  // namespace rio_t

@@ -39,7 +39,7 @@ class InertialTrack {
   std::vector<Time> times_;
   std::vector<Eigen::Quaterniond> q_GI_;
   std::vector<Eigen::Vector3d> impulse_;
-  std::vector<std::size_t> gaps_;  ///< so many gaps up to each sample
+  std::vector<std::size_t> gaps_;  ///< n gaps up to each sample
 };
 
 }  // namespace rio_t

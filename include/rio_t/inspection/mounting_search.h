@@ -40,14 +40,10 @@ struct MountingSearch {
   double offset_sigma = 0.0;  ///< [s]
 };
 
-/// Searches mounting, sign of the Doppler and time offset, coarsely, over all rotations, both signs and all
-/// offsets.
+/// Searches mounting, sign of the Doppler and time offset, coarsely, over all rotations, signs and offsets.
 ///
-/// In the gyro's frame G the velocity of the IMU is a straight line in time, its slope the gravity, plus the
-/// integral of the specific force. The velocities of a window of 3 s therefore are linear in M, lever arm,
-/// first velocity and gravity (about which the mean specific force says what it can). The last two are
-/// eliminated in each window; what is left over all windows is a quadratic in M and lever arm, whose minimum
-/// over the rotations is found from the 24 turns of the axes, for both signs. See docs/method.md, section 15.
+/// Fits M (the rotation), lever arm, and per window a velocity and gravity, by linear least squares. Method:
+/// docs/method.md, section 15.
 MountingSearch searchMounting(const std::vector<RadarVelocity>& velocities, const InertialTrack& track,
                               const MountingSearchOptions& options);
 

@@ -60,8 +60,7 @@ struct PlacedDetection {
   Sighting sighting;
 };
 
-/// The candidates. Bounded: there are no more than kMax, and one that is not seen for kMaxUnseen goes. Not
-/// thread-safe.
+/// At most kMax candidates; one that is not seen for kMaxUnseen goes. Not thread-safe.
 class Candidates {
  public:
   static constexpr std::size_t kMax = 300;
@@ -70,8 +69,7 @@ class Candidates {
   /// Adds the detections of a scan, each to the one candidate that it fits, or as a new one. A detection that
   /// fits several is left out.
   void add(const std::vector<PlacedDetection>& detections);
-  /// Forgets candidates that are not seen any more, and sightings from before `oldest_node`: their poses are
-  /// gone.
+  /// Forgets unseen candidates, and sightings from before `oldest_node`: their poses are gone.
   void forgetOld(Time now, Time oldest_node);
   void clear() { candidates_.clear(); }
   std::size_t size() const { return candidates_.size(); }

@@ -15,9 +15,8 @@ struct VelocityCost {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< J'J; may be singular
 };
 
-/// The same cost if the points share an error of the velocity; the cost is minimised over this error.
-/// `variances` [m^2/s^2] are those of the error's axes. `error`, if given, receives the error at the minimum
-/// [m/s].
+/// The same cost if the points share an error of the velocity, at its minimum over this error. `variances`
+/// [m^2/s^2] are those of the error's axes. `error` receives the error at the minimum [m/s], if given.
 VelocityCost withSharedError(const VelocityCost& cost, const Eigen::Vector3d& variances,
                              Eigen::Vector3d* error = nullptr);
 

@@ -17,9 +17,8 @@ inline double unwrapped(double doppler, double expected, double span) {
 
 /// The span of a radar's Doppler. A Doppler beyond the span comes back on the other side (aliasing).
 ///
-/// If the span is not given, DopplerSpan reads it off the data. A span shows in two ways: no Doppler lies
-/// beyond it, and points whose Doppler must lie beyond, by the platform's velocity, are a whole span off. Not
-/// thread-safe.
+/// If the span is not given, DopplerSpan reads it off the data. A span shows in two ways: no Doppler is
+/// beyond it, and points that must be beyond, by the platform's velocity, are one span off. Not thread-safe.
 class DopplerSpan {
  public:
   explicit DopplerSpan(double given) : given_(given) {}  ///< [m/s] 0: read it off the data

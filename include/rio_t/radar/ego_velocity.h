@@ -26,8 +26,8 @@ struct EgoVelocityOptions {
   double min_range = 0.25;   ///< [m]
   double max_range = 100.0;  ///< [m]
   double min_snr_db = 3.0;   ///< [dB]
-  double max_azimuth =
-      1.570796;  ///< [rad] from the y (forward) axis, either side; the noise model weighs points at the edge
+  /// [rad] from the y (forward) axis, either side. The noise model weighs points at the edge.
+  double max_azimuth = 1.570796;
   double max_elevation = 1.570796;  ///< [rad] either side
 
   /// [m/s] a Doppler below counts as zero; 0: half the step, or 1.5 doppler_sigma if that is more

@@ -14,8 +14,7 @@ struct Extrinsics {
   Eigen::Matrix3d R_RI() const { return q_IR.conjugate().toRotationMatrix(); }  ///< turns I into R
 };
 
-/// The turn about the axes of I [rad] that leads from one mounting to another: q_IR(to) = Exp(turn)
-/// q_IR(from).
+/// Turn about the axes of I [rad] from one mounting to another: q_IR(to) = Exp(turn) q_IR(from).
 inline Eigen::Vector3d turnBetween(const Extrinsics& from, const Extrinsics& to) {
   return so3::log(to.q_IR * from.q_IR.conjugate());
 }

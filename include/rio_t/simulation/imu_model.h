@@ -37,9 +37,8 @@ struct ImuModelOptions {
   /// What a vibrating frame adds to every sample, at rest too, each axis on its own. The radar feels nothing.
   double accel_vibration = 0.0;  ///< [m/s^2] sigma per axis and sample
   double gyro_vibration = 0.0;   ///< [rad/s] sigma per axis and sample
-  /// [Hz] 0: white from sample to sample. Above: a line 0.6 Hz wide there, as a motor makes it; its amplitude
-  /// and phase hold for about half a second. Above half the rate it aliases: no filter stands before a
-  /// sample.
+  /// [Hz] 0: white from sample to sample. Above: a line 0.6 Hz wide there, as a motor makes it; amplitude and
+  /// phase hold for half a second. Above half the rate it aliases: there is no filter.
   double vibration_frequency = 0.0;
   double dropout_share = 0.0;  ///< of the samples but the first: taken, never delivered
 

@@ -33,9 +33,9 @@ struct TimeOffsetProfile {
 struct RadarModelOptions {
   double rate = 10.0;           ///< [Hz] of triggers
   double first_trigger = 0.05;  ///< [s] from the start of the bag: radars of one rate need not be in phase
-  double frame_length =
-      0.0;                ///< [s] the Doppler is the mean over it, centred at the measurement; 0 = an instant
-  double latency = 0.06;  ///< [s] from stamp to arrival (record time)
+  /// [s] The Doppler is the mean over it, centred at the measurement; 0 = an instant.
+  double frame_length = 0.0;
+  double latency = 0.06;       ///< [s] from stamp to arrival (record time)
   double latency_sigma = 0.0;  ///< [s] scatter of it; never arrives before the stamp
 
   double points_mean = 43.0;    ///< points a scan
@@ -61,8 +61,7 @@ struct RadarModelOptions {
   double doppler_span = 0.0;
 
   double ghost_share = 0.03;  ///< of the points: anywhere, any Doppler
-  /// The radar reports this share of the points at a second direction, too. Range, Doppler and SNR are the
-  /// same.
+  /// Share of the points that the radar reports at a second direction, too: same range, Doppler and SNR.
   double ambiguous_share = 0.0;
   double moving_share = 0.10;  ///< of the time: walking persons in view
   int crowd = 1;               ///< so many at once; their points take the place of the room's

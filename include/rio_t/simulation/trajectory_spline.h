@@ -19,8 +19,7 @@ struct MotionState {
 
 struct SplineFitOptions {
   double knot_spacing = 0.05;  ///< [s]
-  /// Half-power frequency of the smoothing [Hz]: slower motion passes, faster (motion-capture noise) does
-  /// not.
+  /// Half-power frequency of the smoothing [Hz]: faster motion, as motion-capture noise, does not pass.
   double cutoff = 5.0;
 };
 
@@ -39,8 +38,7 @@ class TrajectorySpline {
 
   /// Seconds from the first to the last pose.
   double duration() const { return duration_; }
-  /// At `t` seconds after the first pose, 0 <= t <= duration (1 us of grace). Throws std::out_of_range
-  /// outside.
+  /// At `t` seconds after the first pose, 0 <= t <= duration (1 us of grace); else throws std::out_of_range.
   MotionState at(double t) const;
 
   /// RMS distance of the given poses from the spline: what the smoothing took away.

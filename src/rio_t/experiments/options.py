@@ -39,7 +39,7 @@ PLANS = {
     "platforms": Plan((*HANDHELD, "gym_loop", "walk", "drone", "ground_vehicle", "kart", "constant_speed",
                        "start_in_motion"), (30.0,), 10, True, PASSES),
     "aids": Plan(("ground_vehicle", "kart", "drone", "difficult"), (30.0,), 3, True,
-                 (*PASSES, "platform", "barometer_topic"))}
+                 (*PASSES, "platform", "barometer_topic", "landmarks"))}
 
 
 EXAMPLES = """Examples:

@@ -96,6 +96,7 @@ def read_run(folder, truth_file):
 CHECKS = {  # name in summary.yaml: for people
     "started": "the estimate started",
     "scans_used_share": "share of the scans after the start that were used",
+    "scans_before_start_share": "share of the scans that came before the estimate started",
     "silent_time_share": "share of the time after the start without a used scan",
     "points_kept_share": "share of the points that the filter kept",
     "scans_diverged_share": "share of the scans with a diverged estimate",
