@@ -135,7 +135,7 @@ TEST_F(Calibrate, AMountingToldWrongIsFoundAndTheNextRunReadsIt) {
   EXPECT_EQ(countOf("   observed\n", outcome.out), 7u) << outcome.out;
   const Config config = written();
   expectTruth(config, truth_, kOffset, sigmasOf(outcome.out));
-  EXPECT_EQ(config.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kNone);
+  EXPECT_EQ(config.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kRotation);
   EXPECT_EQ(config.radar_format, "irs");
   expectSays(contents(yaml_), {"# Bags that count:\n#   " + bag_, "#   lever arm z", "imu_topic: "});
   EXPECT_FALSE(fs::exists(yaml_ + ".part"));
@@ -241,7 +241,7 @@ TEST_F(Calibrate, EachOfTwoRadarsHasItsSection) {
   ASSERT_EQ(config.radars.size(), 2u);
   EXPECT_EQ(config.radars[1].radar_topic, "/right");
   EXPECT_EQ(config.radars[1].radar_stamp_shift, 0.001);
-  EXPECT_EQ(config.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kNone);
+  EXPECT_EQ(config.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kRotation);
   const auto half = sigmas.begin() + kCalibrationAxes;
   expectTruth(config.radars[0], truth_, -0.009, {sigmas.begin(), half});
   // Its stamps are a millisecond later.

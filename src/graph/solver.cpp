@@ -140,6 +140,7 @@ Solution solveByChain(Window& window, const SolverLimits& limits) {
   system = linearize(window);
   double damping = 0.0;
   bool tested = false;  // the undamped step from here is long
+  double surely_right = kSurelyRight;
   std::optional<Elimination> elimination;
   std::vector<int> held;
   const auto lower = [&] {
@@ -152,7 +153,8 @@ Solution solveByChain(Window& window, const SolverLimits& limits) {
     const double squared_length =
         elimination ? elimination->squaredLength() : std::numeric_limits<double>::infinity();
     const bool is_short = squared_length < limits.short_step;
-    if (damping == 0.0 && (is_short || squared_length < kSurelyRight)) {
+    if (damping == 0.0 && (is_short || squared_length < surely_right)) {
+      surely_right = squared_length;  // steps that do not get shorter may go back and forth
       const bool stopped_at_bound = take(elimination->delta(), 1.0, window);
       if (is_short && !stopped_at_bound) {
         solution.termination = held.empty() ? SolverTermination::kConverged : SolverTermination::kAtBound;

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <stdexcept>
@@ -152,7 +153,8 @@ void calibrateExtrinsics(const ExtrinsicsEstimate& told, const std::vector<Radar
   calibration->extrinsics_agreement = combined.agreement;
 
   const Eigen::Vector3d found = so3::log(combined.estimate.T_IR.q_IR * told.T_IR.q_IR.conjugate());
-  Eigen::Vector3d turn = Eigen::Vector3d::Zero();  // of it what is observed
+  Eigen::Vector3d unobserved = Eigen::Vector3d::Zero();  // its part
+  bool any_observed = false;
   for (Eigen::Index i = 0; i < told.covariance.rows(); ++i) {
     const std::size_t first = i < 3 ? kTurn : kLever;
     const Eigen::Index k = i % 3;
@@ -161,10 +163,18 @@ void calibrateExtrinsics(const ExtrinsicsEstimate& told, const std::vector<Radar
     axis.sigma = std::sqrt(combined.estimate.covariance(i, i));
     axis.told_sigma = std::sqrt(told.covariance(i, i));
     axis.verdict = verdictOf(axis.sigma, axis.told_sigma);
-    if (axis.verdict != Verdict::kObserved) continue;
-    (i < 3 ? turn : calibration->T_IR.l_I)[k] = axis.found;
+    const bool is_observed = axis.verdict == Verdict::kObserved;
+    if (i >= 3) {
+      if (is_observed) calibration->T_IR.l_I[k] = axis.found;
+    } else if (is_observed) {
+      any_observed = true;
+    } else {
+      unobserved[k] = axis.found;
+    }
   }
-  if (!turn.isZero(0.0)) calibration->T_IR.q_IR = (so3::exp(turn) * told.T_IR.q_IR).normalized();
+  // Taken back about the axes of I. The other turns keep what the runs found, also to second order.
+  if (any_observed)
+    calibration->T_IR.q_IR = (so3::exp(-unobserved) * combined.estimate.T_IR.q_IR).normalized();
 }
 
 }  // namespace
@@ -245,11 +255,14 @@ std::string whatToMove(CalibrationAxis axis) {
   return kMotions[static_cast<std::size_t>(axis)];
 }
 
-bool RadarCalibration::allTurnsObserved() const {
-  for (const CalibrationAxis axis :
-       {CalibrationAxis::kTurnX, CalibrationAxis::kTurnY, CalibrationAxis::kTurnZ})
-    if (axes[static_cast<std::size_t>(axis)].verdict != Verdict::kObserved) return false;
-  return true;
+double RadarCalibration::turnSigma() const {
+  double largest = 0.0;
+  for (const CalibrationAxis turn :
+       {CalibrationAxis::kTurnX, CalibrationAxis::kTurnY, CalibrationAxis::kTurnZ}) {
+    const AxisCalibration& axis = axes[static_cast<std::size_t>(turn)];
+    largest = std::max(largest, axis.verdict == Verdict::kObserved ? axis.sigma : axis.told_sigma);
+  }
+  return largest;
 }
 
 double AxisCalibration::farFromTold() const {

@@ -18,12 +18,26 @@
 namespace rio_t {
 namespace {
 
-/// Squared length of the step that is left, in standard deviations, below which the solution stands.
-constexpr double kConverged = 1e-6;
+/// Squared length of the step that is left, in standard deviations, below which the solver stops.
+constexpr double kConverged = 1e-4;
+/// Likewise, of its part in each block: the solution stands, even if the solver cannot do better.
+constexpr double kNear = 1e-2;
+
+using BlockCovariances = std::vector<std::map<int, Eigen::MatrixXd>>;
+
+/// Whether the step that is left moves every block by less than a tenth of its standard deviation.
+bool isNear(const Solution& solved, const BlockCovariances& P) {
+  const std::vector<Eigen::VectorXd>& delta = solved.elimination.delta();
+  for (std::size_t i = 0; i < delta.size(); ++i) {
+    if (delta[i].isZero(0.0)) continue;  // also where it is held
+    const Eigen::MatrixXd& P_ii = P[i].at(static_cast<int>(i));
+    if (delta[i].dot(P_ii.ldlt().solve(delta[i])) > kNear) return false;
+  }
+  return true;
+}
 
 /// Joint covariance of some blocks that the elimination connects.
-Eigen::MatrixXd jointCovariance(const std::vector<std::map<int, Eigen::MatrixXd>>& P,
-                                const std::vector<int>& blocks) {
+Eigen::MatrixXd jointCovariance(const BlockCovariances& P, const std::vector<int>& blocks) {
   Eigen::Index size = 0;
   for (const int i : blocks) size += P[i].at(i).rows();
   Eigen::MatrixXd result = Eigen::MatrixXd::Zero(size, size);
@@ -234,9 +248,11 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
     const bool placed = !atMeasurement() || moved <= batch_.placement_tolerance;
     const bool is_last = placed || solution.iterations >= batch_.max_iterations;
     if (is_last) {
+      const BlockCovariances P = solved.elimination.covariances();
+      if (!solved.converged() && isNear(solved, P)) solved.termination = SolverTermination::kConverged;
       solution.termination =
           placed || !solved.converged() ? solved.termination : SolverTermination::kIterationLimit;
-      read(graph, solved, solution);
+      read(graph, solved, P, solution);
       solution.system = std::move(solved.system);
       solution.system.blocks.clear();  // they go with the graph
       return solution;
@@ -250,8 +266,8 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
   }
 }
 
-void BatchSmoother::read(const Graph& graph, const Solution& solved, BatchSolution& solution) const {
-  const std::vector<std::map<int, Eigen::MatrixXd>> P = solved.elimination.covariances();
+void BatchSmoother::read(const Graph& graph, const Solution& solved, const BlockCovariances& P,
+                         BatchSolution& solution) const {
   std::unordered_map<const Block*, int> index;
   for (const Block* block : solved.system.blocks) index.emplace(block, static_cast<int>(index.size()));
   for (const Graph::Node& node : graph.nodes)

@@ -114,7 +114,8 @@ struct RadarCalibration {
   bool offsets_agree = true;
   Agreement extrinsics_agreement;
 
-  bool allTurnsObserved() const;
+  /// [rad] The largest sigma of a turn of T_IR: as found, or as told if it is not observed.
+  double turnSigma() const;
 };
 
 /// `runs`: at least one.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -69,8 +70,8 @@ struct BatchSolution {
 /// The graph of FixedLagSmoother over all the data at once, with the same factors and nothing marginalised.
 /// Each scan has its own t_O, as in the paper (eq. 8-10), so that the offset may drift over the run. Each
 /// block of biases holds for SmootherOptions::window seconds, and a random walk links it to the next. The
-/// solution stands when the next step is shorter than a thousandth of a standard deviation in every
-/// direction.
+/// solver stops when the next step is shorter than a hundredth of a standard deviation in every direction.
+/// The solution stands if that step moves no block by more than a tenth of its standard deviation.
 /// With the imu model a node stands at the time of measurement of its scan. If the offset moves, the nodes
 /// are placed again (docs/method.md, section 10).
 class BatchSmoother {
@@ -111,7 +112,8 @@ class BatchSmoother {
   /// Biases that hold from `since` on. The time of the block is their end, `window` later.
   Block& addBiases(Window& window, Time since, const StateBlock& x) const;
   /// Sets what the solution says of nodes, scans and extrinsics, with covariances.
-  void read(const Graph& graph, const Solution& solved, BatchSolution& solution) const;
+  void read(const Graph& graph, const Solution& solved, const std::vector<std::map<int, Eigen::MatrixXd>>& P,
+            BatchSolution& solution) const;
   RadarMotionModel model() const;
 
   SmootherOptions options_;  // all read-only after construction

@@ -190,6 +190,7 @@ class BagJob {
     summary.batch =
         BatchSummary{result.solution.iterations, result.solution.placements, result.solution.converged()};
     summary.solver_terminations = {{toString(result.solution.termination), 1}};
+    summary.diagnosis = diagnose(summary, run_.config);
     if (summary.barometer || summary.ground_vehicle)
       summary.warnings.insert(
           summary.warnings.begin(),

@@ -63,13 +63,14 @@ std::string header(const BagCalibration& calibration, const std::string& name) {
   return commented(text, "");
 }
 
-std::string estimateNext(bool all_turns_observed) {
-  if (all_turns_observed) {
-    return "# The bags show every turn of the mounting, so the next run need not estimate it.\n"
-           "estimate_extrinsics: none\n";
-  }
-  return "# The bags do not show every turn of the mounting, so the next run goes on with the estimate.\n"
-         "estimate_extrinsics: rotation\n";
+/// How the next run goes on from a mounting that is known to `turn_sigma` [rad].
+std::string estimateNext(double turn_sigma) {
+  ProposedKeys keys;
+  keys.set("estimate_extrinsics", "rotation",
+           "The bags show the mounting to the sigmas below. The next run starts from the largest of a turn, "
+           "and goes on with the estimate: an error of the mounting is then in its sigmas.");
+  keys.set("extrinsics_rotation_sigma", ParameterValue{std::max(rounded(turn_sigma, 1e6), 1e-6)});
+  return toYaml(keys, "");
 }
 
 }  // namespace
@@ -81,12 +82,13 @@ std::string calibratedYaml(const BagCalibration& calibration, const Config& conf
   SortedEntries sorted = sortedEntries(given, parametersOf(any));
   ProposedKeys top_level = keysOf(sorted.top_level);
   // The mounting found is written as a quaternion of RIO's axes. Told in another way, it would count twice.
-  for (const char* key : {"estimate_extrinsics", "mounting_yaw_pitch_roll_deg", "extrinsics_axes"})
+  for (const char* key :
+       {"estimate_extrinsics", "extrinsics_rotation_sigma", "mounting_yaw_pitch_roll_deg", "extrinsics_axes"})
     top_level.remove(key);
   for (const Config& radar : config.radars) top_level.remove(radar.radar_name);  // `left:` and no more
-  const bool all_turns_observed =
-      std::all_of(calibration.radars.begin(), calibration.radars.end(),
-                  [](const CalibratedRadar& radar) { return radar.calibration.allTurnsObserved(); });
+  double turn_sigma = 0.0;
+  for (const CalibratedRadar& radar : calibration.radars)
+    turn_sigma = std::max(turn_sigma, radar.calibration.turnSigma());
   const bool has_sections = !config.radars.empty();
   std::string sections;
   for (std::size_t k = 0; k < told.size(); ++k) {
@@ -103,7 +105,7 @@ std::string calibratedYaml(const BagCalibration& calibration, const Config& conf
                 "# If the driver's restart changes the offset, raise time_offset_sigma.\n" +
                 toYaml(calibratedKeys(radar.calibration, told[k]), indent);
   }
-  return header(calibration, name) + "\n" + toYaml(top_level, "") + "\n" + estimateNext(all_turns_observed) +
+  return header(calibration, name) + "\n" + toYaml(top_level, "") + "\n" + estimateNext(turn_sigma) +
          sections;
 }
 

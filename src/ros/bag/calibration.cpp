@@ -52,12 +52,16 @@ std::vector<std::string> foldersOf(const CalibrationRun& run) {
 }  // namespace
 
 std::string failureOf(const RunSummary& summary) {
+  std::string failure;
   if (2 * summary.scans_diverged > summary.scansTotal()) {
-    return "the odometry diverged for " + std::to_string(summary.scans_diverged) + " of " +
-           std::to_string(summary.scansTotal()) + " scans";
+    failure = "the odometry diverged for " + std::to_string(summary.scans_diverged) + " of " +
+              std::to_string(summary.scansTotal()) + " scans";
+  } else if (!summary.batch || !summary.batch->converged) {
+    failure = "the batch did not converge";
   }
-  if (!summary.batch || !summary.batch->converged) return "the batch did not converge (batch_max_iterations)";
-  return "";
+  if (failure.empty() || summary.diagnosis.causes.empty()) return failure;
+  const Cause& likeliest = summary.diagnosis.causes.front();
+  return failure + ". " + likeliest.text + " " + likeliest.remedy;
 }
 
 BagCalibration calibrateFromBags(const CalibrationRun& run) {

@@ -48,16 +48,17 @@ double takenBy(const ImuFault& fault, const RunEvidence& evidence) {
                   shareOf(countOf(evidence.input_faults, fault.name) * fault.samples, evidence.imu_count));
 }
 
-/// Windows that were solved, and those of them that ended with the offset at its bound or at the iteration
-/// limit.
+/// Windows that were solved, and those of them that ended with the offset at its bound or did not converge.
 struct Windows {
-  std::uint64_t all = 0, at_bound = 0, at_limit = 0;
+  std::uint64_t all = 0, at_bound = 0, not_converged = 0;
 };
 Windows windowsOf(const RunEvidence& evidence) {
   Windows windows;
   for (const auto& [reason, count] : evidence.solver_terminations) windows.all += count;
   windows.at_bound = countOf(evidence.solver_terminations, toString(SolverTermination::kAtBound));
-  windows.at_limit = countOf(evidence.solver_terminations, toString(SolverTermination::kIterationLimit));
+  for (const SolverTermination termination :
+       {SolverTermination::kIterationLimit, SolverTermination::kNoDecrease})
+    windows.not_converged += countOf(evidence.solver_terminations, toString(termination));
   return windows;
 }
 
@@ -152,7 +153,7 @@ void addOffset(const RunEvidence& evidence, const Config& config, std::vector<Ca
 
 void addSolver(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
   const Windows windows = windowsOf(evidence);
-  const double share = shareOf(windows.at_limit, windows.all);
+  const double share = shareOf(windows.not_converged, windows.all);
   if (share < kManyWindows) return;
   if (config.mode == RunMode::kBatch) {
     causes->push_back({"not_converged", "The batch stopped before it converged.",
@@ -160,7 +161,7 @@ void addSolver(const RunEvidence& evidence, const Config& config, std::vector<Ca
                        share});
   } else if (windows.all >= kEnoughScans) {
     causes->push_back({"not_converged",
-                       outOf(windows.at_limit, windows.all, "windows") + " stop before they converge.",
+                       outOf(windows.not_converged, windows.all, "windows") + " stop before they converge.",
                        "Raise max_iterations " + std::to_string(config.odometry.smoother.max_iterations) +
                            ". A wrong mounting can have the same effect.",
                        share});
@@ -299,7 +300,7 @@ std::vector<Check> checksOf(const RunEvidence& evidence, const std::vector<Confi
       {"points_kept_share", kept, 1.0 - kManyPoints, true},
       {"scans_diverged_share", shareOf(evidence.scans_diverged, evidence.scans_judged), kManyDiverged, false},
       {"windows_at_offset_bound_share", shareOf(windows.at_bound, windows.all), kManyWindows, false},
-      {"windows_not_converged_share", shareOf(windows.at_limit, windows.all), kManyWindows, false},
+      {"windows_not_converged_share", shareOf(windows.not_converged, windows.all), kManyWindows, false},
       {"mounting_turned_sigmas", turned, kFarMounting, false},
       {"imu_faults_share", std::min(1.0, imu_faults), kManySamples, false},
       {"healthy_at_end", evidence.health == Health::kOk ? 1.0 : 0.0, 1.0, true}};
