@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <deque>
 #include <iosfwd>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,8 @@ void writeTumLine(std::ostream& out, const StampedPose& pose);
 Time parseTime(const std::string& text);
 /// Its inverse: seconds with nine decimals, exact.
 std::string formatTime(Time time);
+/// The finite number that the whole text stands for; none if it is no such text.
+std::optional<double> finiteNumber(const std::string& text);
 
 /// Largest difference of the stamps of two poses that are compared, by default [s]. It is evo's default, so
 /// that figures agree with evo's without options on either side; the nearest pose wins anyhow, so it only
