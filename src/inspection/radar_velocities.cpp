@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rio_t/radar/direction.h"
 #include "rio_t/radar/ego_velocity.h"
 
 namespace rio_t {
@@ -13,16 +14,12 @@ constexpr double kGroupSpan = 0.12;      // [s]
 constexpr double kFlatElevation = 0.02;  // [rad] of nine points in ten: below, the radar has no elevation
 constexpr double kVerticalSigma = 1.0;   // [m/s] of a radar without elevation
 
-double elevationOf(const RadarPoint& point) {
-  return std::atan2(point.position_R.z(), point.position_R.head<2>().norm());
-}
-
 bool hasElevation(const std::vector<RadarScan>& scans) {
   std::size_t all = 0, flat = 0;
   for (const RadarScan& scan : scans) {
     for (const RadarPoint& point : scan.points) {
       ++all;
-      if (std::abs(elevationOf(point)) < kFlatElevation) ++flat;
+      if (std::abs(elevationOf(point.position_R)) < kFlatElevation) ++flat;
     }
   }
   return 10 * flat < 9 * all;
