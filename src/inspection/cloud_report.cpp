@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "rio_t/inspection/stream_timing.h"
+#include "rio_t/core/quantile.h"
 #include "rio_t/radar/direction.h"
 
 namespace rio_t {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "rio_t/core/format.h"
+#include "rio_t/core/quantile.h"
 #include "rio_t/factors/imu_factor.h"
 #include "rio_t/graph/marginalization.h"
 #include "rio_t/graph/solver.h"
@@ -77,11 +78,7 @@ std::optional<bool> MotionInitializer::isMoving(Time from, Time to, double max_s
   }
   if (axes[0].empty()) return std::nullopt;
   Eigen::Vector3d median;
-  for (int i = 0; i < 3; ++i) {
-    const auto middle = axes[i].begin() + static_cast<std::ptrdiff_t>(axes[i].size() / 2);
-    std::nth_element(axes[i].begin(), middle, axes[i].end());
-    median[i] = *middle;
-  }
+  for (int i = 0; i < 3; ++i) median[i] = quantile(axes[i], 0.5);
   return median.norm() > max_speed;
 }
 

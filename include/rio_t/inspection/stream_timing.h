@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "rio_t/core/quantile.h"  // for inspect_format.cpp
 #include "rio_t/core/time.h"
 
 namespace rio_t {
@@ -39,8 +40,5 @@ struct StreamDelay {
 /// carries the record times over into its clock, as ClockMap does. Both must not be empty. One stamp of the
 /// IMU that is ahead would decide, so leave out those that are out of place.
 StreamDelay delayAgainstImu(const std::vector<MessageTimes>& times, const std::vector<MessageTimes>& imu);
-
-/// The value that a share of the values does not exceed; 0 for none.
-double quantile(std::vector<double> values, double share);
 
 }  // namespace rio_t

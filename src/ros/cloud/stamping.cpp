@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "rio_t/inspection/stream_timing.h"
+#include "rio_t/core/quantile.h"
 
 namespace rio_t {
 namespace {
