@@ -5,11 +5,11 @@
 
 #include "rio_t/radar/direction.h"
 #include "rio_t/radar/ego_velocity.h"
+#include "rio_t/sensors/scan_pool.h"
 
 namespace rio_t {
 namespace {
 
-constexpr std::size_t kEnoughPoints = 20;
 constexpr double kGroupSpan = 0.12;      // [s]
 constexpr double kFlatElevation = 0.02;  // [rad] of nine points in ten: below, the radar has no elevation
 constexpr double kVerticalSigma = 1.0;   // [m/s] of a radar without elevation
@@ -30,7 +30,7 @@ RadarScan nextGroup(const std::vector<RadarScan>& scans, std::size_t* next) {
   RadarScan group = scans[*next];
   double stamps = 0.0;  // mean, from the first on, weighted with the points
   const Time first = group.stamp;
-  for (++*next; *next < scans.size() && group.points.size() < kEnoughPoints; ++*next) {
+  for (++*next; *next < scans.size() && group.points.size() < ScanPool::kEnoughPoints; ++*next) {
     const RadarScan& scan = scans[*next];
     const double after = scan.stamp - first;
     if (after < 0.0 || after > kGroupSpan) break;
