@@ -50,11 +50,8 @@ struct Match {
   std::size_t estimate = 0;
 };
 
-/// For every pose of the shorter trajectory the pose of the longer one with the nearest stamp (the earlier of
-/// two equally near), if it is at most `max_difference` [s] away. Equal lengths count the estimate as the
-/// shorter. The convention of evo's `associate_trajectories`, down to its arithmetic: differences are those
-/// of stamps rounded to double seconds, which at a Unix epoch (0.24 us) decides between two poses that are
-/// equally near. A pose of the longer trajectory may be used twice.
+/// Matches by nearest stamp, at most `max_difference` [s] away, as evo's `associate_trajectories`, including
+/// its rounding to double. A pose may be matched twice.
 std::vector<Match> associate(const Trajectory& truth, const Trajectory& estimate,
                              double max_difference = kDefaultMaxDifference);
 

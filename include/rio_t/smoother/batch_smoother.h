@@ -16,8 +16,7 @@ namespace rio_t {
 
 struct BatchOptions {
   int max_iterations = 100;  ///< of the solver, all together
-  /// [s] If a time of measurement moves farther than this from its node, all nodes are placed again (imu
-  /// model).
+  /// [s] If a time of measurement moves farther from its node, all nodes are placed again (imu model).
   double placement_tolerance = 1.0e-4;
 };
 
@@ -69,8 +68,7 @@ struct BatchSolution {
 /// The graph of FixedLagSmoother over all the data at once, with the same factors and nothing marginalised.
 /// Each scan has its own t_O, as in the paper (eq. 8-10), so that the offset may drift over the run. Each
 /// block of biases holds for SmootherOptions::window seconds, and a random walk links it to the next. The
-/// solution stands when the next step is shorter than a thousandth of a standard deviation in every
-/// direction.
+/// solution stands when the next step is shorter than a thousandth of a standard deviation in all directions.
 /// With the imu model a node stands at the time of measurement of its scan. If the offset moves, the nodes
 /// are placed again (docs/method.md, section 10).
 class BatchSmoother {
@@ -103,8 +101,7 @@ class BatchSmoother {
   };
   Graph place(const BatchProblem& problem, const std::vector<double>& t_O,
               const std::vector<NodeEstimate>& guess, const std::vector<Extrinsics>& mounting) const;
-  /// Adds the first node, the calibration of each radar and their priors. Returns the first offsets, by
-  /// radar.
+  /// Adds the first node, the calibration of each radar and their priors. Returns each radar's first offset.
   std::vector<Block*> start(const BatchProblem& problem, const StateBlock& x,
                             const std::vector<Extrinsics>& mounting, Graph& graph) const;
   Block& addOffset(Window& window, Time time, double t_O) const;
