@@ -3,12 +3,12 @@
 
 #include <string>
 
+#include "../src/ros/temporary_folder.h"
 #include "rio_t/ros/bag/bag_runner.h"
 #include "rio_t/ros/bag/simulation_bag.h"
 #include "rio_t/ros/messages/conversions.h"
 #include "rio_t/simulation/motions.h"
 #include "run_files.h"
-#include "temporary_folder.h"
 
 namespace rio_t {
 namespace {

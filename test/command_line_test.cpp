@@ -8,8 +8,8 @@
 #include <iterator>
 #include <sstream>
 
+#include "../src/ros/temporary_folder.h"
 #include "full_disk.h"
-#include "temporary_folder.h"
 
 namespace rio_t {
 namespace {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "../src/ros/temporary_folder.h"
 #include "rio_t/ros/parameters/parameters.h"
-#include "temporary_folder.h"
 
 /// Parameters from texts, and what is wrong with them.
 namespace rio_t {

@@ -12,11 +12,11 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "../src/ros/temporary_folder.h"
 #include "parameter_faults.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
 #include "rio_t/simulation/presets.h"
 #include "run_files.h"
-#include "temporary_folder.h"
 
 namespace rio_t {
 namespace {

@@ -5,9 +5,9 @@
 #include <fstream>
 #include <string>
 
+#include "../src/ros/temporary_folder.h"
 #include "rio_t/ros/bag/bag_runner.h"
 #include "run_files.h"
-#include "temporary_folder.h"
 
 namespace rio_t {
 namespace {

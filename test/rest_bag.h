@@ -14,9 +14,9 @@
 #include <string>
 #include <vector>
 
+#include "../src/ros/temporary_folder.h"
 #include "rio_t/ros/bag/bag_runner.h"
 #include "run_files.h"
-#include "temporary_folder.h"
 
 namespace rio_t {
 

@@ -17,10 +17,10 @@
 #include <iterator>
 #include <map>
 
+#include "../src/ros/temporary_folder.h"
 #include "full_disk.h"
 #include "rio_t/simulation/motions.h"
 #include "rio_t/simulation/presets.h"
-#include "temporary_folder.h"
 
 namespace rio_t {
 namespace {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
@@ -24,12 +23,9 @@ std::vector<std::string> split(const std::string& line) {
 }
 
 double parseNumber(const std::string& cell, const std::string& column) {
-  char* end = nullptr;
-  const double value = std::strtod(cell.c_str(), &end);
-  if (end == cell.c_str() || *end != '\0' || !std::isfinite(value)) {
-    throw std::invalid_argument(column + " is '" + cell + "', expected a finite number");
-  }
-  return value;
+  const std::optional<double> value = finiteNumber(cell);
+  if (!value) throw std::invalid_argument(column + " is '" + cell + "', expected a finite number");
+  return *value;
 }
 
 }  // namespace

@@ -20,15 +20,6 @@ constexpr const char* kLineFormat = "`stamp x y z qx qy qz qw` (8 numbers, separ
   throw std::runtime_error(name + ":" + std::to_string(line) + ": " + what);
 }
 
-double parseNumber(const std::string& word) {
-  char* end = nullptr;
-  const double value = std::strtod(word.c_str(), &end);
-  if (end == word.c_str() || *end != '\0' || !std::isfinite(value)) {
-    throw std::invalid_argument("'" + word + "' is not a finite number");
-  }
-  return value;
-}
-
 /// Nothing if the line holds no pose.
 bool parseLine(const std::string& line, StampedPose& pose) {
   std::istringstream words(line);
@@ -38,7 +29,11 @@ bool parseLine(const std::string& line, StampedPose& pose) {
   if (fields.size() != 8) throw std::invalid_argument("found " + std::to_string(fields.size()) + " fields");
   pose.time = parseTime(fields[0]);
   std::array<double, 7> v{};
-  for (std::size_t i = 0; i < v.size(); ++i) v[i] = parseNumber(fields[i + 1]);
+  for (std::size_t i = 0; i < v.size(); ++i) {
+    const std::optional<double> number = finiteNumber(fields[i + 1]);
+    if (!number) throw std::invalid_argument("'" + fields[i + 1] + "' is not a finite number");
+    v[i] = *number;
+  }
   pose.p_W = {v[0], v[1], v[2]};
   pose.q_WI = Eigen::Quaterniond(v[6], v[3], v[4], v[5]);
   if (!isUnit(pose.q_WI)) {
@@ -97,6 +92,13 @@ Time parseTime(const std::string& text) {
   if (last >= 0 && last < static_cast<long>(digits.size()) && digits[static_cast<std::size_t>(last)] >= '5')
     ++ns;
   return Time::fromNanoseconds(negative ? -ns : ns);
+}
+
+std::optional<double> finiteNumber(const std::string& text) {
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  if (end == text.c_str() || *end != '\0' || !std::isfinite(value)) return std::nullopt;
+  return value;
 }
 
 Trajectory readTum(std::istream& in, const std::string& name) {

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+
+#include "rio_t/core/format.h"
 
 namespace rio_t {
 namespace {
@@ -74,12 +75,6 @@ RestStatistics statistics(const std::vector<ImuMeasurement>& samples) {
   return result;
 }
 
-std::string format(const char* text, double value, double limit) {
-  char line[200];
-  std::snprintf(line, sizeof line, text, value, limit);
-  return line;
-}
-
 /// Says why the samples do not show a platform at rest; nothing if they do.
 std::string noRestBecause(const RestStatistics& rest, const StaticInitializerOptions& options,
                           double gravity) {
@@ -87,25 +82,26 @@ std::string noRestBecause(const RestStatistics& rest, const StaticInitializerOpt
   const Statistics& accel = rest.accel;
   // In any motion of people and drones the accelerometer reads gravity on average. If not, units are wrong.
   if (std::abs(rest.mean_size - gravity) > kWrongUnits * gravity) {
-    return format(
+    return formatted(
         "rest: the accelerometer reads %.2f m/s^2 on the mean, expected gravity %.2f m/s^2: gravity removed, "
         "or not in m/s^2?",
         rest.mean_size, gravity);
   }
   if (gyro.std.maxCoeff() > options.max_gyro_std) {
-    return format("rest: the gyro moves by %.3f rad/s (std), at most %.3f allowed: moving, or not in rad/s?",
-                  gyro.std.maxCoeff(), options.max_gyro_std);
+    return formatted(
+        "rest: the gyro moves by %.3f rad/s (std), at most %.3f allowed: moving, or not in rad/s?",
+        gyro.std.maxCoeff(), options.max_gyro_std);
   }
   if (accel.std.maxCoeff() > options.max_accel_std) {
-    return format("rest: the accelerometer moves by %.2f m/s^2 (std), at most %.2f allowed",
-                  accel.std.maxCoeff(), options.max_accel_std);
+    return formatted("rest: the accelerometer moves by %.2f m/s^2 (std), at most %.2f allowed",
+                     accel.std.maxCoeff(), options.max_accel_std);
   }
   if (gyro.mean.norm() > options.max_gyro_mean) {
-    return format("rest: mean gyro %.3f rad/s, at most %.3f allowed: turning, or not in rad/s?",
-                  gyro.mean.norm(), options.max_gyro_mean);
+    return formatted("rest: mean gyro %.3f rad/s, at most %.3f allowed: turning, or not in rad/s?",
+                     gyro.mean.norm(), options.max_gyro_mean);
   }
   if (std::abs(accel.mean.norm() - gravity) > options.max_gravity_error) {
-    return format(
+    return formatted(
         "rest: mean accelerometer %.2f m/s^2 instead of gravity %.2f: accelerating, or not in m/s^2?",
         accel.mean.norm(), gravity);
   }
@@ -150,12 +146,12 @@ std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement&
   if (collected < (is_ending ? kShortest : options_.duration) || samples_.size() < 10) {
     // A reason that was reported stays until rest has been seen for a whole duration.
     if (waiting_for_.rfind("rest", 0) != 0) {
-      waiting_for_ = format("standing still: %.1f of %.1f s seen", collected, options_.duration);
+      waiting_for_ = formatted("standing still: %.1f of %.1f s seen", collected, options_.duration);
     }
     if (is_ending) {
       waiting_for_ =
-          format("rest: the mean acceleration changes after %.1f s, at least %.1f expected: moving?",
-                 collected, kShortest);
+          formatted("rest: the mean acceleration changes after %.1f s, at least %.1f expected: moving?",
+                    collected, kShortest);
       has_seen_motion_ = true;
       samples_ = {imu};
     }

@@ -2,7 +2,8 @@
 
 #include <cmath>
 
-#include "rio_t/inspection/stream_timing.h"
+#include "rio_t/core/quantile.h"
+#include "rio_t/radar/direction.h"
 
 namespace rio_t {
 
@@ -19,8 +20,8 @@ CloudReport inspectCloud(const std::vector<RadarScan>& scans) {
       if (point.doppler != 0.0) report.has_doppler = true;
       if (!(range > 0.0)) continue;
       ranges.push_back(range);
-      azimuths.push_back(std::abs(std::atan2(p.x(), p.y())));
-      elevations.push_back(std::abs(std::atan2(p.z(), p.head<2>().norm())));
+      azimuths.push_back(std::abs(azimuthOf(p)));
+      elevations.push_back(std::abs(elevationOf(p)));
       report.mean_direction += p / range;
       squares += (p / range).cwiseAbs2();
       if (p.y() < 0.0) behind += 1.0;

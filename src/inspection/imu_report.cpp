@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rio_t/core/quantile.h"
 #include "rio_t/core/so3.h"
 #include "rio_t/imu/input_check.h"
 #include "rio_t/imu/noise_meter.h"
 #include "rio_t/imu/saturation_detector.h"
 #include "rio_t/imu/static_initializer.h"
-#include "rio_t/inspection/stream_timing.h"
 
 namespace rio_t {
 namespace {

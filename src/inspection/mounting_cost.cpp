@@ -5,8 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "rio_t/core/quantile.h"
 #include "rio_t/core/so3.h"
-#include "rio_t/inspection/stream_timing.h"
 
 namespace rio_t {
 namespace {

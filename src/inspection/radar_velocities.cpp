@@ -3,26 +3,23 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rio_t/radar/direction.h"
 #include "rio_t/radar/ego_velocity.h"
+#include "rio_t/sensors/scan_pool.h"
 
 namespace rio_t {
 namespace {
 
-constexpr std::size_t kEnoughPoints = 20;
 constexpr double kGroupSpan = 0.12;      // [s]
 constexpr double kFlatElevation = 0.02;  // [rad] of nine points in ten: below, the radar has no elevation
 constexpr double kVerticalSigma = 1.0;   // [m/s] of a radar without elevation
-
-double elevationOf(const RadarPoint& point) {
-  return std::atan2(point.position_R.z(), point.position_R.head<2>().norm());
-}
 
 bool hasElevation(const std::vector<RadarScan>& scans) {
   std::size_t all = 0, flat = 0;
   for (const RadarScan& scan : scans) {
     for (const RadarPoint& point : scan.points) {
       ++all;
-      if (std::abs(elevationOf(point)) < kFlatElevation) ++flat;
+      if (std::abs(elevationOf(point.position_R)) < kFlatElevation) ++flat;
     }
   }
   return 10 * flat < 9 * all;
@@ -33,7 +30,7 @@ RadarScan nextGroup(const std::vector<RadarScan>& scans, std::size_t* next) {
   RadarScan group = scans[*next];
   double stamps = 0.0;  // mean, from the first on, weighted with the points
   const Time first = group.stamp;
-  for (++*next; *next < scans.size() && group.points.size() < kEnoughPoints; ++*next) {
+  for (++*next; *next < scans.size() && group.points.size() < ScanPool::kEnoughPoints; ++*next) {
     const RadarScan& scan = scans[*next];
     const double after = scan.stamp - first;
     if (after < 0.0 || after > kGroupSpan) break;

@@ -5,15 +5,9 @@
 #include <cstdint>
 #include <limits>
 
-namespace rio_t {
+#include "rio_t/core/quantile.h"
 
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0.0;
-  const double last = static_cast<double>(values.size() - 1);
-  const auto at = values.begin() + std::lround(std::clamp(share, 0.0, 1.0) * last);
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
+namespace rio_t {
 
 StreamTiming inspectTiming(const std::vector<MessageTimes>& times) {
   constexpr double kGapFactor = 3.5;

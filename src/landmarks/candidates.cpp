@@ -7,8 +7,6 @@
 namespace rio_t {
 namespace {
 
-/// chi-squared of 3 degrees of freedom: 1 % of the true pairs lie beyond.
-constexpr double kGate = 11.34;
 /// A second thing nearer than this, squared and in sigmas of one detection, could be taken for the first.
 constexpr double kApart = 16.0;
 

@@ -9,8 +9,6 @@
 namespace rio_t {
 namespace {
 
-/// chi-squared of 3 degrees of freedom: 1 % of the true pairs lie beyond.
-constexpr double kGate = 11.34;
 /// Beyond this, squared and in sigmas, a detection is of something else: 1 in 100 000 of the true pairs.
 constexpr double kElsewhere = 25.9;
 /// A second explanation must be this much less likely, as twice the logarithm of the ratio: 20 times.
@@ -21,7 +19,7 @@ constexpr double kLoss = 4.0;
 constexpr double kLongUnseen = 30.0;
 /// Pairs that match by chance are even over the gate, so the mean of their squared sigmas is 3/5 of it; that
 /// of true ones is 3. Half way between, the map contradicts the estimate. 100 matches tell it to 0.08.
-constexpr double kMaxMeanSquare = 0.5 * (1.0 + kGate / 5.0);
+constexpr double kMaxMeanSquare = 0.5 * (1.0 + Candidates::kGate / 5.0);
 /// The number of matches that the map needs before it is trusted: they tell that mean to 0.15.
 constexpr double kProof = 30.0;
 /// A reflector in view shows itself at least so often. In a scene full of highlights that come and go, hardly
@@ -141,7 +139,7 @@ LandmarkMap::Association LandmarkMap::associate(const Prediction& prediction, co
   for (std::size_t i = 0; i < detections.size(); ++i)
     if (is_free[i]) result.free.push_back(i);
   for (const Pair& pair : pairs) {
-    if (pair.squared_sigmas > kGate) continue;
+    if (pair.squared_sigmas > Candidates::kGate) continue;
     const bool is_clear = std::none_of(pairs.begin(), pairs.end(), [&](const Pair& other) {
       const bool competes = (other.detection == pair.detection) != (other.landmark == pair.landmark);
       return competes && other.score < pair.score + kClearly;
@@ -149,7 +147,7 @@ LandmarkMap::Association LandmarkMap::associate(const Prediction& prediction, co
     if (is_clear) result.matches.push_back({pair.detection, pair.landmark, pair.squared_sigmas});
   }
   for (std::size_t k = 0; k < landmarks_.size(); ++k)
-    if (nearest[k] > kGate && nearest[k] <= kElsewhere) result.conflicts.push_back(k);
+    if (nearest[k] > Candidates::kGate && nearest[k] <= kElsewhere) result.conflicts.push_back(k);
   return result;
 }
 

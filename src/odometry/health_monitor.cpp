@@ -23,8 +23,7 @@ constexpr double kMaxModelErrorScale = 25.0;
 constexpr double kMetresPerSecond2 = 10;  // an attitude that is off by x turns x g into velocity each second
 
 /// Variance of the velocity in I [m^2/s^2]. A heading that was lost in an IMU gap makes v_W vague for good
-/// and is no divergence. An error delta of the state is an error R_IW (delta_v + A delta_theta) of the
-/// velocity.
+/// and is no divergence. An error delta of the state gives the velocity error R_IW (delta_v + A delta_theta).
 Eigen::Vector3d bodyVelocityVariance(const NavigationState& state) {
   using S = StateBlock;
   const Eigen::Matrix3d R_WI = state.q_WI.toRotationMatrix();

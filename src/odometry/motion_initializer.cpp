@@ -3,12 +3,13 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <iterator>
 #include <memory>
 #include <stdexcept>
 #include <utility>
 
+#include "rio_t/core/format.h"
+#include "rio_t/core/quantile.h"
 #include "rio_t/factors/imu_factor.h"
 #include "rio_t/graph/marginalization.h"
 #include "rio_t/graph/solver.h"
@@ -34,12 +35,6 @@ constexpr double kUnknowns = 7.0;      // that the velocities determine: velocit
 /// Whether no gain differs by more than 0.01, which changes nothing.
 bool isNear(const std::vector<double>& a, const std::vector<double>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), [](double x, double y) { return std::abs(x - y) < 0.01; });
-}
-
-std::string format(const char* text, double value, double limit) {
-  char line[200];
-  std::snprintf(line, sizeof line, text, value, limit);
-  return line;
 }
 
 /// The anchor with its tilt replaced: the shortest turn that makes `g_I` point down.
@@ -83,11 +78,7 @@ std::optional<bool> MotionInitializer::isMoving(Time from, Time to, double max_s
   }
   if (axes[0].empty()) return std::nullopt;
   Eigen::Vector3d median;
-  for (int i = 0; i < 3; ++i) {
-    const auto middle = axes[i].begin() + static_cast<std::ptrdiff_t>(axes[i].size() / 2);
-    std::nth_element(axes[i].begin(), middle, axes[i].end());
-    median[i] = *middle;
-  }
+  for (int i = 0; i < 3; ++i) median[i] = quantile(axes[i], 0.5);
   return median.norm() > max_speed;
 }
 
@@ -109,7 +100,7 @@ std::optional<Initialization> MotionInitializer::solve(const ImuBuffer& imu,
   if (span < kMinSpan * options_.window || window.size() < kMinVelocities) {
     // A reason that was reported stays until there is a new window.
     if (waiting_for_.rfind("radar and IMU", 0) != 0) {
-      waiting_for_ = format("radar velocities in motion: %.1f of %.1f s seen", span, options_.window);
+      waiting_for_ = formatted("radar velocities in motion: %.1f of %.1f s seen", span, options_.window);
     }
     return std::nullopt;
   }
@@ -158,12 +149,12 @@ std::optional<Initialization> MotionInitializer::solve(const ImuBuffer& imu,
     }
     waiting_for_ =
         !outliers ? "motion: the radar velocities do not determine tilt and velocity"
-                  : format(
+                  : formatted(
                         "radar and IMU that agree: %.0f %% of the radar velocities do not fit the IMU, at "
                         "most %.0f %% allowed: extrinsics, Doppler sign, units?",
                         100.0 * *outliers, 100.0 * options_.max_outlier_fraction);
   } else {
-    waiting_for_ = format(
+    waiting_for_ = formatted(
         "radar and IMU that agree: together they show %.2f m/s^2 as gravity instead of %.2f: units, "
         "extrinsics, Doppler sign?",
         line.g_I.norm(), -g_W_.z());

@@ -1,9 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cmath>
 #include <vector>
 
+#include "rio_t/radar/direction.h"
 #include "rio_t/radar/point_noise.h"
 #include "rio_t/radar/scan.h"
 
@@ -11,8 +11,6 @@ namespace rio_t {
 
 inline double square(double a) { return a * a; }
 
-inline double azimuthOf(const Eigen::Vector3d& u) { return std::atan2(u.x(), u.y()); }
-inline double elevationOf(const Eigen::Vector3d& u) { return std::atan2(u.z(), u.head<2>().norm()); }
 /// `angle`: azimuthOf or elevationOf.
 inline std::vector<double> anglesOf(const std::vector<RadarDirection>& points,
                                     double (*angle)(const Eigen::Vector3d&)) {
@@ -20,10 +18,6 @@ inline std::vector<double> anglesOf(const std::vector<RadarDirection>& points,
   angles.reserve(points.size());
   for (const RadarDirection& p : points) angles.push_back(angle(p.u_R));
   return angles;
-}
-inline Eigen::Vector3d directionOf(double azimuth, double elevation) {
-  return {std::cos(elevation) * std::sin(azimuth), std::cos(elevation) * std::cos(azimuth),
-          std::sin(elevation)};
 }
 
 /// Azimuth and elevation of a unit vector, by their sines and cosines.

@@ -44,6 +44,13 @@ std::string fixedText(double value, int decimals) {
   return text;
 }
 
+std::string fixedTexts(const Eigen::VectorXd& values, int decimals, const std::string& separator) {
+  std::string text;
+  for (Eigen::Index i = 0; i < values.size(); ++i)
+    appendItem(&text, fixedText(values[i], decimals), separator);
+  return text;
+}
+
 std::string shortText(double value, int digits) {
   std::ostringstream text;
   text.imbue(std::locale::classic());

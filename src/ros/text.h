@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <string>
 
 /// Texts for people and files.
@@ -10,6 +11,8 @@ namespace rio_t {
 void appendFixed(std::string* text, double value, int decimals);
 /// The same as a text of its own.
 std::string fixedText(double value, int decimals);
+/// Several values: "1.20, -0.30, 0.05".
+std::string fixedTexts(const Eigen::VectorXd& values, int decimals, const std::string& separator = ", ");
 
 /// With at most that many digits, with a point whatever the locale: "0.25", "1e-05".
 std::string shortText(double value, int digits);

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <utility>
 
+#include "rio_t/core/format.h"
 #include "rio_t/factors/barometer_factor.h"
 #include "rio_t/graph/marginalization.h"
 
@@ -42,11 +42,9 @@ double heightOfPressure(double pascal, double reference_pascal, double temperatu
 
 std::string faultOf(double pascal) {
   if (pascal >= kLeastPressure && pascal <= kMostPressure) return "";
-  char text[200];
   const bool is_hectopascal = pascal >= 0.01 * kLeastPressure && pascal <= 0.01 * kMostPressure;
-  std::snprintf(text, sizeof text, "the pressure is %g, expected %g to %g Pa%s", pascal, kLeastPressure,
-                kMostPressure, is_hectopascal ? ": is it in hPa? 1 hPa is 100 Pa" : "");
-  return text;
+  return formatted("the pressure is %g, expected %g to %g Pa%s", pascal, kLeastPressure, kMostPressure,
+                   is_hectopascal ? ": is it in hPa? 1 hPa is 100 Pa" : "");
 }
 
 const char* BarometerChannel::add(const Pressure& pressure, Time newest_imu) {

@@ -18,8 +18,7 @@ void OffsetUncertainty::add(const Innovation& innovation) {
   last_ = innovation.stamp;
   const auto& [stamp, d, S, S_at_offset, J] = innovation;
   const Eigen::LDLT<Eigen::Matrix3d> weight = S.ldlt();
-  // The weights are those of the window. Otherwise a scan that the window ignores would ask for a change for
-  // good.
+  // The window's weights: otherwise a scan that the window ignores would ask for a change for good.
   const double length = std::sqrt(d.dot(weight.solve(d)));
   const double share = huber_threshold_ > 0.0 && length > huber_threshold_ ? huber_threshold_ / length : 1.0;
   const Eigen::Vector3d weighted_J = weight.solve(J);

@@ -1,13 +1,6 @@
 #include "rio_t/sensors/scan_pool.h"
 
 namespace rio_t {
-namespace {
-
-/// With so many points, three of them outliers in ten, RANSAC finds the static world (docs/method.md, section
-/// 9.9).
-constexpr std::size_t kEnoughPoints = 20;
-
-}  // namespace
 
 RadarScan ScanPool::filled(const RadarScan& scan, const VelocityAt& velocityAt) {
   if (!scans_.empty() && scan.stamp <= scans_.back().stamp)

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "rio_t/core/angle.h"
+#include "rio_t/radar/direction.h"
 #include "rio_t/simulation/random.h"
 
 namespace rio_t::simulation {
@@ -67,12 +68,10 @@ RadarState radarState(const MotionState& imu, const Extrinsics& T_IR) {
           imu.v_W + imu.q_WI * imu.omega_I.cross(T_IR.l_I)};
 }
 
-double azimuth(const Eigen::Vector3d& p_R) { return std::atan2(p_R.x(), p_R.y()); }
+// Not elevationOf(), which rounds another way: the same seed must give the same bag for good.
 double elevation(const Eigen::Vector3d& p_R) { return std::atan2(p_R.z(), std::hypot(p_R.x(), p_R.y())); }
 
-Eigen::Vector3d fromPolar(double range, double az, double el) {
-  return range * Eigen::Vector3d(std::cos(el) * std::sin(az), std::cos(el) * std::cos(az), std::sin(el));
-}
+Eigen::Vector3d fromPolar(double range, double az, double el) { return range * directionOf(az, el); }
 
 /// A point at this range, anywhere in the view.
 Eigen::Vector3d anywhere(double range, const RadarModelOptions& o, Random& random) {
@@ -84,7 +83,7 @@ Eigen::Vector3d anywhere(double range, const RadarModelOptions& o, Random& rando
 bool visible(const Eigen::Vector3d& p_R, const RadarModelOptions& o) {
   const double range2 = p_R.squaredNorm();
   if (range2 > o.max_range * o.max_range || range2 < o.min_range * o.min_range) return false;
-  return std::abs(azimuth(p_R)) <= o.fov_azimuth * kDegree &&
+  return std::abs(azimuthOf(p_R)) <= o.fov_azimuth * kDegree &&
          std::abs(elevation(p_R)) <= o.fov_elevation * kDegree;
 }
 
@@ -264,7 +263,7 @@ class Sensor {
     const Eigen::Vector3d seen_R = options_.measures_elevation ? p_R : flattened(p_R);
     SimulatedPoint point;
     const double range = std::max(options_.min_range, p_R.norm() + options_.range_noise * random.gaussian());
-    const double az = azimuth(seen_R) + options_.azimuth_noise * kDegree * random.gaussian();
+    const double az = azimuthOf(seen_R) + options_.azimuth_noise * kDegree * random.gaussian();
     const double el = elevation(seen_R) + options_.elevation_noise * kDegree * random.gaussian();
     point.position_R = fromPolar(range, az, options_.measures_elevation ? el : 0.0);
     point.doppler = reported(trueDoppler(frame, echo) + options_.doppler_noise * random.gaussian());

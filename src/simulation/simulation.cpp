@@ -3,19 +3,13 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "rio_t/radar/scan.h"
 #include "rio_t/simulation/random.h"
 
 namespace rio_t::simulation {
 namespace {
 
 constexpr std::uint64_t kNamedRadarStream = 30;
-
-// A name becomes part of topics.
-void checkName(const std::string& name) {
-  if (name.empty() || name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") != std::string::npos) {
-    throw std::invalid_argument("the name must be of lower case letters, digits and underscores");
-  }
-}
 
 // By the name alone, so that a radar measures the same whichever others there are. FNV-1a, since std::hash
 // differs from library to library.
@@ -34,7 +28,8 @@ SensorData simulate(const Motion& motion, const SimulationOptions& options) {
   if (options.radars.empty()) data.scans = simulateRadar(motion, options, options.seed, options.start);
   for (const auto& [name, setup] : options.radars) {
     try {
-      checkName(name);
+      if (!isRadarName(name))
+        throw std::invalid_argument("the name must be of lower case letters, digits and underscores");
       data.radars[name] = simulateRadar(motion, setup, seedOf(name, options.seed), options.start);
     } catch (const std::invalid_argument& error) {
       throw std::invalid_argument("radar '" + name + "': " + error.what());

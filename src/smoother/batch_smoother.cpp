@@ -36,6 +36,20 @@ bool isNear(const Solution& solved, const BlockCovariances& P) {
   return true;
 }
 
+/// The same of the offsets and of those by which the nodes were placed.
+bool isNear(const BatchSolution& solution, const std::vector<double>& placed_by) {
+  for (std::size_t i = 0; i < placed_by.size(); ++i) {
+    const BatchSolution::Scan& scan = solution.scans[i];
+    const double variance = scan.covariance(StateBlock::kTangent, StateBlock::kTangent);
+    const double apart = scan.t_O - placed_by[i];
+    if (apart * apart > kNear * variance) return false;
+  }
+  return true;
+}
+
+/// The offsets swing from placement to placement once they may take only this share of their move.
+constexpr double kLeastShare = 0.01;
+
 /// Joint covariance of some blocks that the elimination connects.
 Eigen::MatrixXd jointCovariance(const BlockCovariances& P, const std::vector<int>& blocks) {
   Eigen::Index size = 0;
@@ -246,13 +260,14 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
     for (std::size_t i = 0; i < t_O.size(); ++i)
       moved = std::max(moved, std::abs(graph.scans[i].offset->x[0] - t_O[i]));
     const bool placed = !atMeasurement() || moved <= batch_.placement_tolerance;
-    const bool is_last = placed || solution.iterations >= batch_.max_iterations;
-    if (is_last) {
+    const bool swings = share < kLeastShare;
+    if (placed || swings || solution.iterations >= batch_.max_iterations) {
       const BlockCovariances P = solved.elimination.covariances();
-      if (!solved.converged() && isNear(solved, P)) solved.termination = SolverTermination::kConverged;
-      solution.termination =
-          placed || !solved.converged() ? solved.termination : SolverTermination::kIterationLimit;
       read(graph, solved, P, solution);
+      solution.termination = solved.termination;
+      if (!solved.converged() && isNear(solved, P)) solution.termination = SolverTermination::kConverged;
+      if (solution.converged() && !placed && !isNear(solution, t_O))
+        solution.termination = swings ? SolverTermination::kNoDecrease : SolverTermination::kIterationLimit;
       solution.system = std::move(solved.system);
       solution.system.blocks.clear();  // they go with the graph
       return solution;

@@ -2,7 +2,6 @@
 #include "rio_t/ros/bag/check_bag.h"
 
 #include <ros/ros.h>
-#include <stdlib.h>
 
 #include <filesystem>
 #include <iostream>
@@ -13,6 +12,7 @@
 
 #include "ros/bag/command_line.h"
 #include "ros/live/record_topics.h"
+#include "ros/temporary_folder.h"
 
 namespace {
 
@@ -68,31 +68,11 @@ void addOptions(rio_t::OptionSet& options, Arguments& a) {
   options.text("keep", "BAG", "with --live: keep the messages in this new bag", a.keep);
 }
 
-/// A folder that is gone at the end.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name = (fs::temp_directory_path() / "rio_t_check_XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder can be made");
-    path_ = name;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
-
 int runLive(rio_t::CheckRequest request, double duration, const std::string& keep) {
   // Before the recording, so that a wrong path costs no time.
   if (fs::exists(keep)) throw rio_t::UsageError("--keep " + keep + ": expected a new file, this one exists");
-  const TemporaryFolder folder;
-  const std::string bag = keep.empty() ? (folder.path() / "live.bag").string() : keep;
+  const rio_t::TemporaryFolder folder;
+  const std::string bag = keep.empty() ? folder.path() + "/live.bag" : keep;
   request.bags = {bag};
   request.bags_go_away = keep.empty();
   request.duration = 0.0;

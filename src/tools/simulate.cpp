@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "../ros/bag/command_line.h"
+#include "../ros/text.h"
 #include "rio_t/core/angle.h"
 #include "rio_t/evaluation/trajectory.h"
 #include "rio_t/ros/bag/simulation_bag.h"
@@ -368,11 +369,7 @@ Motion motionOf(const Request& request) {
   return makeMotion({name, request.simulation.seed, duration, request.rest, request.speed});
 }
 
-std::string triple(const Eigen::Vector3d& v) {
-  std::ostringstream out;
-  out << std::fixed << std::setprecision(5) << v.x() << " " << v.y() << " " << v.z();
-  return out.str();
-}
+std::string triple(const Eigen::Vector3d& v) { return fixedTexts(v, 5, " "); }
 
 void printRadar(const std::string& title, const RadarSetup& setup, const std::vector<SimulatedScan>& scans) {
   std::size_t delivered = 0, points = 0;

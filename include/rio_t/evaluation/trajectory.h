@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <deque>
 #include <iosfwd>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,8 @@ void writeTumLine(std::ostream& out, const StampedPose& pose);
 Time parseTime(const std::string& text);
 /// Its inverse: seconds with nine decimals, exact.
 std::string formatTime(Time time);
+/// The finite number that the whole text stands for; none if it is no such text.
+std::optional<double> finiteNumber(const std::string& text);
 
 /// Largest difference of the stamps of two poses that are compared, by default [s]. It is evo's default, so
 /// that figures agree with evo's without options on either side; the nearest pose wins anyhow, so it only
@@ -46,11 +49,8 @@ struct Match {
   std::size_t estimate = 0;
 };
 
-/// For every pose of the shorter trajectory the pose of the longer one with the nearest stamp (the earlier of
-/// two equally near), if it is at most `max_difference` [s] away. Equal lengths count the estimate as the
-/// shorter. The convention of evo's `associate_trajectories`, down to its arithmetic: differences are those
-/// of stamps rounded to double seconds, which at a Unix epoch (0.24 us) decides between two poses that are
-/// equally near. A pose of the longer trajectory may be used twice.
+/// Matches by nearest stamp, at most `max_difference` [s] away, as evo's `associate_trajectories`, including
+/// its rounding to double. A pose may be matched twice.
 std::vector<Match> associate(const Trajectory& truth, const Trajectory& estimate,
                              double max_difference = kDefaultMaxDifference);
 

@@ -77,7 +77,7 @@ class Window {
   std::shared_ptr<Block> insert(std::vector<std::shared_ptr<Block>>::iterator before,
                                 std::shared_ptr<Block> added);
 
-  // Destroyed last: the problem refers to them.
+  // Declared before problem_, which refers to them.
   std::map<const Manifold*, std::unique_ptr<CeresManifold>> ceres_manifolds_;
   std::vector<std::shared_ptr<Block>> blocks_;
   std::vector<std::unique_ptr<Term>> terms_;

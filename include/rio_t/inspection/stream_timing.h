@@ -40,7 +40,4 @@ struct StreamDelay {
 /// IMU that is ahead would decide, so leave out those that are out of place.
 StreamDelay delayAgainstImu(const std::vector<MessageTimes>& times, const std::vector<MessageTimes>& imu);
 
-/// The value that a share of the values does not exceed; 0 for none.
-double quantile(std::vector<double> values, double share);
-
 }  // namespace rio_t

@@ -63,6 +63,8 @@ struct PlacedDetection {
 /// At most kMax candidates; one that is not seen for kMaxUnseen goes. Not thread-safe.
 class Candidates {
  public:
+  /// chi-squared of 3 degrees of freedom: 1 % of the true pairs of detections and points lie beyond.
+  static constexpr double kGate = 11.34;
   static constexpr std::size_t kMax = 300;
   static constexpr double kMaxUnseen = 2.0;  ///< [s]
 

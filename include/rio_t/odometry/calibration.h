@@ -35,12 +35,10 @@ struct Combined {
 };
 
 /// Combines the posteriors of runs that started from the same prior. Each posterior contains the prior, which
-/// must count only once: L = L0 + sum (L_i - L0). If the runs disagree, `widening` lowers what they add to
-/// the prior.
+/// must count only once: L = L0 + sum (L_i - L0). If the runs disagree, `widening` lowers the sum.
 Combined combine(const Gaussian& prior, const std::vector<Gaussian>& posteriors);
 
-/// Extrinsics with their covariance in the tangent of ExtrinsicsManifold: 3x3 of a turn, or 6x6 of turn and
-/// lever arm.
+/// Extrinsics with their covariance in the tangent of ExtrinsicsManifold: 3x3 of a turn, or 6x6 with lever.
 struct ExtrinsicsEstimate {
   Extrinsics T_IR;
   Eigen::MatrixXd covariance;
@@ -63,16 +61,14 @@ struct OffsetEstimate {
 
 struct CombinedOffset {
   OffsetEstimate estimate;
-  /// False: each run may have its own offset. The estimate is then their mean, with a sigma that covers their
-  /// scatter.
+  /// False: each run may have its own offset. The estimate is their mean; its sigma covers their scatter.
   bool agree = true;
 };
 
 CombinedOffset combine(const OffsetEstimate& prior, const std::vector<OffsetEstimate>& posteriors);
 
 /// A number is observed if its sigma is at most this share of what it was when it was told. The runs then say
-/// three times as much of it as what was told: 1 / 0.5^2 = 1 + 3. Above that, much of the number found is the
-/// number told.
+/// three times as much of it as what was told: 1 / 0.5^2 = 1 + 3. Above that, much of it is the number told.
 inline constexpr double kObservedSigmaShare = 0.5;
 
 enum class Verdict {

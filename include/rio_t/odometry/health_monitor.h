@@ -71,8 +71,7 @@ class HealthMonitor {
   /// Whether the divergence has lasted long enough for a re-initialisation.
   bool wantsReinitialization(Time now) const;
 
-  /// While diverged, adds the mean squared innovation to the covariance (docs/method.md, eq. 49). Otherwise
-  /// does nothing.
+  /// Adds the mean squared innovation to the covariance, only while diverged (docs/method.md, eq. 49).
   void widen(NavigationState& state) const;
 
  private:

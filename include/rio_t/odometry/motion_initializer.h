@@ -49,8 +49,7 @@ struct Initialization {
   ModelErrorScale model_error_scale;  ///< of the velocities around it
 };
 
-/// Finds the first state of a moving platform from some seconds of radar velocities and IMU (docs/method.md,
-/// section 11).
+/// Finds the first state of a moving platform from seconds of radar and IMU (docs/method.md, section 11).
 ///
 /// Let dR, dv integrate the IMU from the state's time to a scan T later (T <= 0), and v_k be the velocity of
 /// I, in I, that the scan shows. Then dR v_k - dv = v_I + g_I T: a straight line over T whose slope is the
@@ -65,8 +64,7 @@ class MotionInitializer {
   /// Velocity of one scan, estimated without a prior. Invalid ones are ignored.
   void add(Time stamp, const EgoVelocity& velocity);
   /// The state, as soon as the IMU covers a window of velocities and both agree. If they do not agree, drops
-  /// the older half of the window and says why in waitingFor(). `anchor` gives the pose at the time of the
-  /// state.
+  /// the older half of the window and says why in waitingFor(). `anchor` gives the pose at a time.
   std::optional<Initialization> solve(const ImuBuffer& imu, const std::function<PoseAnchor(Time)>& anchor);
   /// Forgets the velocities.
   void clear();
@@ -88,8 +86,7 @@ class MotionInitializer {
 
   /// The velocities of the window that ends with `time`, as far as the IMU covers them without a gap.
   Velocities windowUntil(Time time, const ImuBuffer& imu) const;
-  /// Gravity and velocity at `time`, in I, as the line through all velocities; biases zero, t_O as
-  /// configured.
+  /// Gravity and velocity at `time`, in I, as the line through all velocities; no biases, t_O as configured.
   struct Line {
     Eigen::Vector3d g_I, v_I;
   };

@@ -29,8 +29,7 @@ class Navigation {
   Checked add(const ImuMeasurement& imu);
 
   /// Takes the newest optimised state, and the noise of the IMU for the samples to come. No later anchor is
-  /// older than `oldest`. Ignores all if the clock restarted since `clock_restarts`, because they belong to
-  /// another time.
+  /// older than `oldest`. Ignores all if the clock restarted since `clock_restarts`.
   void anchor(const NavigationState& state, bool at_rest, const ImuNoise& noise, Time oldest,
               std::uint64_t clock_restarts);
 

@@ -38,9 +38,8 @@ class RadarInertialOdometry {
   /// radar that the options do not have.
   void addScan(RadarScan scan);
 
-  /// Queues a pressure, if the options use the barometer. What cannot be used is counted in `faults()`:
-  /// "pressure_not_usable" (see faultOf), "pressure_out_of_order", "pressure_ahead_of_imu",
-  /// "pressure_without_node".
+  /// Queues a pressure, if the options use the barometer. `faults()` counts "pressure_not_usable" (see
+  /// faultOf), "pressure_out_of_order", "pressure_ahead_of_imu" and "pressure_without_node".
   void addPressure(const Pressure& pressure);
 
   /// Does the work that is due: initialisation, ego-velocity, window. Returns a result for each scan that it
@@ -52,16 +51,14 @@ class RadarInertialOdometry {
   void tune(const Tuning& tuning);
 
   /// At the end of the data: finishes the scans that still wait (rejected as "imu_not_covering" if the IMU
-  /// never came) and empties the window. `left_window` of the last result has the poses that were still in
-  /// it.
+  /// never came) and empties the window. `left_window` of the last result has the poses from it.
   std::vector<ScanResult> finish();
 
   bool initialized() const;
   /// Whether the estimate can be trusted, as of the last `process`. Any thread. `faults()` counts each
   /// divergence as "diverged" and each re-initialisation as "reinitialized".
   Health health() const;
-  /// The time and the prior of the first node; none before initialisation. Call it from the thread that calls
-  /// `process`.
+  /// The time and the prior of the first node; none before initialisation. Only in the thread of `process`.
   using Start = Initialization;
   std::optional<Start> start() const;
   /// Noise of a radar's points, as learned so far. Call it from the thread that calls `process`.

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "rio_t/core/time.h"
@@ -22,6 +23,12 @@ struct RadarScan {
   std::vector<RadarPoint> points;
   std::size_t radar = 0;  ///< which one it is from, see Estimator
 };
+
+/// What a radar may be called: its name becomes part of keys, topics and file names.
+inline bool isRadarName(const std::string& text) {
+  return !text.empty() &&
+         text.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") == std::string::npos;
+}
 
 /// A detection as the solvers see it.
 struct RadarDirection {

@@ -24,8 +24,7 @@ struct GroundVehicleOptions {
   /// point that moves only forward, e.g. the centre of the rear axle.
   Extrinsics T_IV;
   double rotation_sigma = 0.02;  ///< [rad] prior on the rotation, about each axis: one degree
-  /// [rad] of the ground where the vehicle starts at rest, along and across: a floor. 0: nothing is known of
-  /// it
+  /// [rad] of the ground where the vehicle starts at rest, along and across: a floor. 0: not known
   double start_slope_sigma = 0.002;
   double rotation_noise = 1.0e-5;  ///< [rad/sqrt(s)] its random walk, about each axis
   double sideways_sigma = 0.05;    ///< [m/s] of the velocity of the point

@@ -6,8 +6,7 @@
 namespace rio_t {
 
 /// Uncertainty of the time offset (docs/method.md, eq. 32b): its marginal variance plus the square of its
-/// lag. If the offset drifts, its estimate lags behind, and the scans keep asking for the same change.
-/// Not thread-safe.
+/// lag. If the offset drifts, its estimate lags, and the scans ask for the same change. Not thread-safe.
 class OffsetUncertainty {
  public:
   /// `huber_threshold` on the root of d' S^-1 d, as on the radar factors; 0: no robust loss.
@@ -17,8 +16,7 @@ class OffsetUncertainty {
 
   /// Standard deviation of the offset [s], given its marginal variance [s^2].
   double sigma(double variance) const;
-  /// Random walk with which the estimate follows the change that the scans ask for [s/sqrt(s)]; 0 if they ask
-  /// for none.
+  /// Random walk with which the estimate follows the change that the scans ask for [s/sqrt(s)]; 0 for none.
   double walk() const;
 
  private:

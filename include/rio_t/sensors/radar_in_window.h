@@ -26,8 +26,7 @@ struct RadarVelocityPrediction {
   double tilt_sigma = 0.0;    ///< of roll and pitch, the larger [rad]
 };
 
-/// One radar in the window of the smoother: its calibration blocks, t_O and extrinsics, and its terms. Not
-/// thread-safe.
+/// One radar in the window: its calibration blocks, t_O and extrinsics, and its terms. Not thread-safe.
 class RadarInWindow {
  public:
   /// `T_IR` is the mounting as told. `offset` is shared by the radars that share t_O. `imu` must outlive it.
@@ -38,8 +37,7 @@ class RadarInWindow {
   void start(FixedLagSmoother& smoother, Time time, const NodePrior& prior);
   /// Joins a window that another radar has started, with its calibration as told.
   void join(FixedLagSmoother& smoother);
-  /// Time of the node of a scan: its stamp (constant_acceleration), or its time of measurement as now
-  /// estimated (imu).
+  /// Time of a scan's node: its stamp (constant_acceleration), or its estimated time of measurement (imu).
   Time nodeTime(Time stamp) const;
   /// Predicts from the newest node before the scan. None for a scan older than the window.
   std::optional<RadarVelocityPrediction> predict(const FixedLagSmoother& smoother, Time stamp) const;

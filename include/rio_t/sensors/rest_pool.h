@@ -14,8 +14,7 @@ namespace rio_t {
 /// one scan do not. Not thread-safe.
 class RestPool {
  public:
-  /// [points] They show a platform that creeps at a third of a Doppler bin
-  /// (*ManyPointsTellACreepOfAThirdOfABin*).
+  /// [points] They show a creep at a third of a Doppler bin (*ManyPointsTellACreepOfAThirdOfABin*).
   static constexpr std::size_t kMost = 500;
 
   /// `slow`: a scan without the points that no platform at rest sees.

@@ -18,6 +18,8 @@ class ScanPool {
  public:
   /// Predicted velocity of the radar, in R [m/s], at the measurement of the scan with that stamp.
   using VelocityAt = std::function<std::optional<Eigen::Vector3d>(Time stamp)>;
+  /// RANSAC finds the static world in so many points if three in ten are outliers (docs/method.md, 9.9).
+  static constexpr std::size_t kEnoughPoints = 20;
 
   /// [s] Over this time the IMU predicts a change of velocity to some cm/s, even if it vibrates.
   static constexpr double kMaxAge = 0.2;

@@ -17,8 +17,7 @@ namespace rio_t {
 
 struct BatchOptions {
   int max_iterations = 100;  ///< of the solver, all together
-  /// [s] If a time of measurement moves farther than this from its node, all nodes are placed again (imu
-  /// model).
+  /// [s] If a time of measurement moves farther from its node, all nodes are placed again (imu model).
   double placement_tolerance = 1.0e-4;
 };
 
@@ -104,8 +103,7 @@ class BatchSmoother {
   };
   Graph place(const BatchProblem& problem, const std::vector<double>& t_O,
               const std::vector<NodeEstimate>& guess, const std::vector<Extrinsics>& mounting) const;
-  /// Adds the first node, the calibration of each radar and their priors. Returns the first offsets, by
-  /// radar.
+  /// Adds the first node, the calibration of each radar and their priors. Returns each radar's first offset.
   std::vector<Block*> start(const BatchProblem& problem, const StateBlock& x,
                             const std::vector<Extrinsics>& mounting, Graph& graph) const;
   Block& addOffset(Window& window, Time time, double t_O) const;

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "bag_file.h"
-#include "rio_t/inspection/stream_timing.h"
+#include "rio_t/core/quantile.h"
 #include "rio_t/ros/messages/conversions.h"
 
 namespace rio_t {

@@ -33,8 +33,7 @@ class BagPlayer {
   /// At the end of the bag.
   void finish();
 
-  /// Returns the counts of messages and scans, the measured noise, the diagnosis, and the estimates of
-  /// `log`.
+  /// Returns counts of messages and scans, the measured noise, the diagnosis, and the estimates of `log`.
   RunSummary summary(const RunLog& log) const;
   /// The first initialisation; none before it.
   const std::optional<RadarInertialOdometry::Start>& start() const { return start_; }

@@ -10,8 +10,7 @@
 
 namespace rio_t {
 
-/// The configuration for an IMU and radars as they were found. What the user has `told` stands in it as it
-/// is.
+/// The configuration for an IMU and radars as they were found. It keeps what the user has `told`.
 ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarInspection>& radars,
                               const ParameterEntries& told);
 

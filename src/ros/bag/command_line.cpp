@@ -96,8 +96,7 @@ bool isWrittenInPlace(const std::string& path) {
   return std::filesystem::exists(status) && !std::filesystem::is_regular_file(status);
 }
 
-/// Copies a file with another content to PATH~, as editors do. Returns the name of the copy, empty if there
-/// is none.
+/// Copies a file with another content to PATH~, as editors do. Returns the name of the copy, or nothing.
 std::string keepOther(const std::string& path, const std::string& text) {
   namespace fs = std::filesystem;
   std::error_code error;

@@ -12,8 +12,7 @@
 #include "rio_t/ros/parameters/parameter_value.h"
 
 /// The part that the command lines of all programs share: boost::program_options with checked numbers, one
-/// form of
-/// --help, and one meaning of the exit status.
+/// form of --help, and one meaning of the exit status.
 namespace rio_t {
 
 /// Exit status of every program.

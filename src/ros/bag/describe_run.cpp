@@ -34,12 +34,6 @@ std::string describeScans(std::uint64_t used, std::uint64_t total, const Counts&
          (rejected.empty() ? "" : ", " + listOf(rejected));
 }
 
-/// "1.20 -0.30 0.05", in the unit of which there are `per` in one of `v`.
-std::string decimals(const Eigen::Vector3d& v, double per, int count) {
-  return fixedText(per * v.x(), count) + " " + fixedText(per * v.y(), count) + " " +
-         fixedText(per * v.z(), count);
-}
-
 using Row = std::function<void(const std::string& name, const std::string& value)>;
 
 void describePasses(const RadarSummary& radar, const Row& row) {
@@ -51,12 +45,12 @@ void describePasses(const RadarSummary& radar, const Row& row) {
 
 /// The mounting as people can compare it: how far it went from the one told, by the axes of the IMU.
 void describeExtrinsics(const ExtrinsicsSummary& extrinsics, const Row& row) {
-  row("turned by", decimals(turnBetween(extrinsics.told, extrinsics.T_IR), 1.0 / kDegree, 2) +
+  row("turned by", fixedTexts(1.0 / kDegree * turnBetween(extrinsics.told, extrinsics.T_IR), 2, " ") +
                        " deg about x y z of the IMU, sigma " +
-                       decimals(extrinsics.rotation_sigma, 1.0 / kDegree, 2) + " deg");
+                       fixedTexts(1.0 / kDegree * extrinsics.rotation_sigma, 2, " ") + " deg");
   if (extrinsics.translation_sigma.isZero()) return;
-  row("moved by", decimals(extrinsics.T_IR.l_I - extrinsics.told.l_I, 1e3, 1) + " mm, sigma " +
-                      decimals(extrinsics.translation_sigma, 1e3, 1) + " mm");
+  row("moved by", fixedTexts(1e3 * (extrinsics.T_IR.l_I - extrinsics.told.l_I), 1, " ") + " mm, sigma " +
+                      fixedTexts(1e3 * extrinsics.translation_sigma, 1, " ") + " mm");
 }
 
 void describeRadar(const RadarSummary& radar, const Row& row) {

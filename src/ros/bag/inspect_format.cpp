@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "../text.h"
-#include "rio_t/inspection/stream_timing.h"
+#include "rio_t/core/quantile.h"
 #include "rio_t/ros/cloud/point_cloud.h"
 
 namespace rio_t {

@@ -173,14 +173,12 @@ void describeUp(ImuInspection* imu) {
   const Eigen::Quaterniond q_BI = axis.z() < 0.0
                                       ? Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0)
                                       : Eigen::Quaterniond::FromTwoVectors(axis, Eigen::Vector3d::UnitZ());
-  std::string numbers;
-  for (int i = 0; i < 4; ++i) appendItem(&numbers, fixedText(rounded(q_BI.coeffs()[i], 1e4), 4));
   tell(imu, FindingLevel::kOdd, "IMU axes",
        "gravity is on " + axisName(*up) +
            ", so z of the IMU is not up: the odometry is right, but rviz shows base_link tilted, since it is "
            "the "
            "IMU by default. Give base_link by tf, or set base_extrinsics_rotation_xyzw: [" +
-           numbers + "] to make its z up (docs/frames.md)");
+           fixedTexts(q_BI.coeffs(), 4) + "] to make its z up (docs/frames.md)");
 }
 
 void describeNoise(ImuInspection* imu) {

@@ -237,8 +237,7 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
                     "Found roughly, in seconds.");
 }
 
-/// The configuration keeps what the user has told. If the bag clearly shows something else, the report says
-/// so.
+/// The configuration keeps what the user has told. The report says if the bag clearly shows something else.
 void compareWithTold(const MountingSearch& search, const ParameterEntries& told, RadarInspection* radar) {
   if (!search.enough || search.rotation_sigma.maxCoeff() > kObservedTurn || radar->isSparse()) return;
   const Config known = makeConfig(told);

@@ -20,8 +20,7 @@ struct ImuTopic {
   std::vector<MessageTimes> times;
 };
 
-/// One cloud with points tells why a topic cannot serve. No more of such a topic is kept: a lidar would fill
-/// the memory.
+/// One cloud with points tells why a topic cannot serve. More of a lidar would fill the memory.
 struct CloudTopic {
   std::string topic;
   std::vector<sensor_msgs::PointCloud2::ConstPtr> messages;

@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "rio_t/inspection/stream_timing.h"
+#include "rio_t/core/quantile.h"
 
 namespace rio_t {
 namespace {
@@ -151,8 +151,7 @@ ScanStamper::Decision ScanStamper::stampFront(Time* stamp) {
 
 ScanStamper::Trigger* ScanStamper::triggerOfSeq(const Held& scan) {
   Trigger* found = nullptr;
-  // A busy machine delivers connections in any order. Once the two are known to count alike, the seq is
-  // enough.
+  // A busy machine delivers connections in any order. Once the two count alike, the seq is enough.
   const double overtake = counting_ == Counting::kAlike ? options_.max_delay : options_.max_overtake;
   for (Trigger& trigger : triggers_) {
     const double delay = scan.record - trigger.record;

@@ -157,7 +157,8 @@ void addSolver(const RunEvidence& evidence, const Config& config, std::vector<Ca
   if (share < kManyWindows) return;
   if (config.mode == RunMode::kBatch) {
     causes->push_back({"not_converged", "The batch stopped before it converged.",
-                       "Raise batch_max_iterations " + std::to_string(config.batch_max_iterations) + ".",
+                       "Raise batch_max_iterations " + std::to_string(config.batch_max_iterations) +
+                           ". A wrong mounting can have the same effect.",
                        share});
   } else if (windows.all >= kEnoughScans) {
     causes->push_back({"not_converged",

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "../text.h"
 #include "rio_t/ros/live/monitor.h"
 
 namespace rio_t {
@@ -69,9 +70,7 @@ void LiveMonitor::describeGroundVehicle(Status& status) const {
   status.add("velocity_sideways_m_s", last.v_V.y());
   status.add("velocity_upwards_m_s", last.v_V.z());
   if (last.contradiction) status.add("contradiction", *last.contradiction);
-  const Eigen::Vector4d q = last.q_IV.coeffs();
-  status.add("vehicle_frame_rotation_xyzw", "[" + std::to_string(q[0]) + ", " + std::to_string(q[1]) + ", " +
-                                                std::to_string(q[2]) + ", " + std::to_string(q[3]) + "]");
+  status.add("vehicle_frame_rotation_xyzw", "[" + fixedTexts(last.q_IV.coeffs(), 6) + "]");
   if (last.is_contradicted) {
     status.summary(DiagnosticStatus::WARN, kGroundVehicleContradicted);
   } else {

@@ -7,6 +7,7 @@
 
 #include "../text.h"
 #include "rio_t/core/angle.h"
+#include "rio_t/radar/scan.h"
 
 namespace rio_t {
 namespace {
@@ -35,12 +36,6 @@ std::optional<std::vector<double>> asNumbers(const ParameterValue& value, std::s
 /// is written for people.
 bool isOneLine(const std::string& text) {
   return std::none_of(text.begin(), text.end(), [](char c) { return (c >= 0 && c < ' ') || c == '\x7f'; });
-}
-
-/// What a radar may be called: its name becomes part of keys, topics and file names.
-bool isRadarName(const std::string& text) {
-  return !text.empty() &&
-         text.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") == std::string::npos;
 }
 
 }  // namespace

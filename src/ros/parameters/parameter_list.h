@@ -159,8 +159,7 @@ struct Section {
 };
 
 constexpr const char* kEffective = "effective";  ///< where the node writes what it runs with
-/// Whether the node's namespace has this key, but no parameter of the registry. No radar may have such a
-/// name.
+/// Whether the node's namespace has this key, but the registry has not. No radar may have such a name.
 bool isReserved(const std::string& key);
 
 /// Entries of the top level, and those of each section: nested keys, or `name/key`.

@@ -51,13 +51,11 @@ std::string describeCalibration(const BagCalibration& calibration);
 std::string describeCalibration(const CalibratedRadar& radar);
 
 /// The configuration to use next time, as YAML: what the user gave, with offset and extrinsics of each radar
-/// replaced. `given`: the entries of file and command line that made `config`; `name`: of the file, for a
-/// comment.
+/// replaced. `given`: the entries of file and command line that made `config`. A comment has the `name`.
 std::string calibratedYaml(const BagCalibration& calibration, const Config& config,
                            const ParameterEntries& given, const std::string& name);
 
-/// The program calibrate: `words` are its arguments. Returns the exit status; what went wrong is told in
-/// `err`.
+/// The program calibrate: `words` are its arguments. Returns the exit status; `err` gets what went wrong.
 int runCalibrationTool(const std::vector<std::string>& words, std::ostream& out, std::ostream& err);
 
 }  // namespace rio_t

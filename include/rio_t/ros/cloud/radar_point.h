@@ -11,9 +11,8 @@ namespace rio_t {
 constexpr float kUnknownSnrDb = 1000.0F;
 
 /// One detection as a PCL point, in RIO axes: x right, y forward, z up, in metres. PCL's own templates take
-/// it
-/// (`pcl::transformPointCloud`, filters, `pcl::fromROSMsg` of `~points` and `~inliers`). Those that PCL ships
-/// compiled need `#define PCL_NO_PRECOMPILE` before the first include of PCL.
+/// it (`pcl::transformPointCloud`, filters, `pcl::fromROSMsg` of `~points` and `~inliers`); those that PCL
+/// ships compiled need `#define PCL_NO_PRECOMPILE` before the first include of PCL.
 struct EIGEN_ALIGN16 RadarPointPcl {
   PCL_ADD_POINT4D            // x, y, z; data[3] is 1
       float doppler = 0.0F;  ///< range rate [m/s], positive = receding

@@ -77,8 +77,7 @@ class ScanStamper {
   std::vector<RadarScan> finish();
 
   std::size_t held() const { return held_.size(); }
-  /// Scans given up by reason, in snake case: "trigger_missing", "imu_missing", "too_many_held",
-  /// "stamp_out_of_range".
+  /// Scans given up: "trigger_missing", "imu_missing", "too_many_held" or "stamp_out_of_range".
   const std::map<std::string, std::uint64_t>& givenUp() const { return given_up_; }
 
  private:

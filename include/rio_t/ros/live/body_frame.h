@@ -14,9 +14,8 @@
 
 namespace rio_t {
 
-/// The frames of the live node: the IMU's, and the body whose odometry is published. It holds T_BI, and the
-/// place of each session's world in the odometry frame, so that a reset goes on from the last pose.
-/// Thread-safe.
+/// The frames of the live node: the IMU's, and the body whose odometry is published. Thread-safe. It holds
+/// T_BI, and each session's world in the odometry frame, so that a reset goes on from the last pose.
 class BodyFrame {
  public:
   /// Listens to tf only if something is wanted from it.

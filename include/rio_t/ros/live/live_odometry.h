@@ -78,8 +78,8 @@ class LiveOdometry {
   /// Subscribes to the topics as they were told.
   void subscribe(const Config& told);
   void addDiagnostics();
-  /// Calls `callback`. What it throws is told once in a while, and nothing else: no message may end the node
-  /// or reset the estimate. Any thread.
+  /// Calls `callback`. Logs an exception, at most every 5 s: no message may end the node or reset the
+  /// estimate. Any thread.
   template <typename Callback>
   void guarded(const std::string& what, Callback&& callback);
   void onDiagnosticsTimer();

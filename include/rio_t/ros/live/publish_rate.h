@@ -27,8 +27,7 @@ class PublishRate {
 
  private:
   std::atomic<double> hz_;
-  double last_ =
-      std::numeric_limits<double>::quiet_NaN();  // the period of the last one; equals none at first
+  double last_ = std::numeric_limits<double>::quiet_NaN();  ///< period of the last message; NaN equals none
 };
 
 }  // namespace rio_t

@@ -63,8 +63,8 @@ class LiveSession {
     Extrinsics T_IR;       ///< of this radar, as they hold now; also where the window was not updated
     double latency = 0.0;  ///< [s] from the arrival of the scan to now; 0 where that is not known
   };
-  /// Optimisation thread: works off what is due, but at most one scan that needs the solver, so that who
-  /// waits for the end or for a reset waits for one solution. `more` tells whether there may be another.
+  /// Optimisation thread. Uses at most one scan, so that a reset waits for one solution only. `more` tells
+  /// whether there may be another.
   std::vector<Result> process(bool* more);
 
   /// Optimised poses so far, those that left the window, and the newest. Of more than `kMaxPoses`, one in so

@@ -24,8 +24,7 @@
 
 namespace rio_t {
 
-/// The landmarks in the odometry frame: x, y, z, sigma [m], intensity (mean SNR) and sightings. The header is
-/// the caller's.
+/// The landmarks in the odometry frame: x, y, z, sigma [m], intensity (mean SNR), sightings. Without header.
 sensor_msgs::PointCloud2 toPointCloud2(const std::vector<LandmarkPoint>& map, const WorldInOdom& T_OW = {});
 
 Time toTime(const ros::Time& time);

@@ -26,9 +26,8 @@ ParameterEntries toParameterEntries(XmlRpc::XmlRpcValue& map, const std::string&
 /// the server keeps a misspelt one after the command was corrected.
 ConfigError withHintOfServer(const ConfigError& error, const std::string& name_space);
 
-/// Configuration of a node: the file that its private parameter `config` names (a name of the package's
-/// config/, or a path), if any, with the other private parameters on top. Throws ConfigError, or
-/// std::runtime_error.
+/// Configuration of a node: the file that its private parameter `config` names (of the package's config/, or
+/// a path), if any, with the other private parameters on top. Throws ConfigError or std::runtime_error.
 Config configFromRos(const ros::NodeHandle& private_node);
 
 /// Writes every parameter of the run to the parameter server, as `~effective`, and removes that of an earlier

@@ -7,11 +7,11 @@
 
 namespace rio_t {
 
-/// A folder that no other test has, gone at the end: tests of several builds may run at the same time.
+/// A folder that no other process has, gone at the end.
 class TemporaryFolder {
  public:
-  TemporaryFolder() : path_((std::filesystem::temp_directory_path() / "rio_t_test_XXXXXX").string()) {
-    if (mkdtemp(path_.data()) == nullptr) throw std::runtime_error("no temporary folder " + path_);
+  TemporaryFolder() : path_((std::filesystem::temp_directory_path() / "rio_t_XXXXXX").string()) {
+    if (mkdtemp(path_.data()) == nullptr) throw std::runtime_error("no temporary folder can be made");
   }
   ~TemporaryFolder() {
     std::error_code ignored;
