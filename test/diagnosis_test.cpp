@@ -346,6 +346,62 @@ TEST(Diagnosis, TheTimeWithoutScansIsCounted) {
   EXPECT_NEAR(collector.evidence(odometry, std::nullopt).silent_seconds, 14.0, 0.11) << "it stands still";
 }
 
+TEST(Diagnosis, ASilentRadarBesideAnotherIsNamed) {
+  const Config config =
+      makeConfig({parseAssignment("radars=[left, right]"), parseAssignment("left/radar_topic=/left"),
+                  parseAssignment("right/radar_topic=/right")});
+  EvidenceCollector collector(config);
+  for (int k = 0; k <= 200; ++k) {
+    const Time time = Time::fromSeconds(100.0 + 0.1 * k);
+    collector.addState(time);
+    ScanResult result;
+    result.scan.stamp = time;
+    result.used = true;
+    collector.add(result);
+    result.scan.radar = 1;
+    if (k < 50) collector.add(result);
+  }
+  RunEvidence evidence = collector.evidence(RadarInertialOdometry(config.odometry), std::nullopt);
+  EXPECT_EQ(evidence.silent_seconds, 0.0);
+  EXPECT_NEAR(evidence.radars[1].silent_seconds, 14.0, 0.2);
+  evidence.initialized = true;
+  expectSays(first(evidence, config), {"radar_silent: No scan of radar right was used for 14.", "of 20.0 s"});
+  EXPECT_EQ(diagnose(evidence, config).verdict, RunVerdict::kDoubtful);
+}
+
+TEST(Diagnosis, AnOffsetThatStepsAgainAndAgainIsDoubtful) {
+  RunEvidence evidence = goodRun();
+  evidence.input_faults["time_offset_step"] = 2;
+  EXPECT_EQ(first(evidence), "none") << "one restart of the driver may count twice";
+  evidence.input_faults["time_offset_step"] = 3;
+  expectSays(first(evidence), {"offset_steps: The time offset stepped 3 times", "wrong mounting", "persons"});
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
+}
+
+TEST(Diagnosis, AVehicleFrameThatTurnsFarIsNamed) {
+  Config config;
+  config.odometry.ground_vehicle.T_IV.q_IR = Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX());
+  EvidenceCollector collector(config);
+  ScanResult result;
+  result.used = true;
+  result.ground_vehicle.emplace();
+  const auto turnedBy = [&](double angle) {
+    result.ground_vehicle->q_IV =
+        Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()) * config.odometry.ground_vehicle.T_IV.q_IR;
+    collector.add(result);
+    RunEvidence evidence = goodRun();
+    evidence.vehicle_turn =
+        collector.evidence(RadarInertialOdometry(config.odometry), std::nullopt).vehicle_turn;
+    return evidence;
+  };
+  const double sigma = config.odometry.ground_vehicle.rotation_sigma;
+  EXPECT_EQ(first(turnedBy(2.9 * sigma)), "none");
+  const RunEvidence far = turnedBy(6.0 * sigma);
+  expectSays(first(far),
+             {"vehicle_frame_far", "6 vehicle_frame_rotation_sigma", "vehicle_frame_rotation_xyzw"});
+  EXPECT_EQ(diagnose(far, config).verdict, RunVerdict::kDoubtful);
+}
+
 TEST(Diagnosis, ScansThatComeLateAreNoSilence) {
   const Config config;
   const RadarInertialOdometry odometry(config.odometry);
@@ -411,8 +467,7 @@ TEST(Diagnosis, AVelocityThatWasLostIsNoContradiction) {
   RunEvidence evidence = goodRun();
   evidence.divergences = 1;
   evidence.scans_diverged = 5;
-  expectSays(first(evidence),
-             {"velocity_lost: The velocity was lost once, for 5 of 190 scans", "imu_gap"});
+  expectSays(first(evidence), {"velocity_lost: The velocity was lost once, for 5 of 190 scans", "imu_gap"});
   evidence.scans_contradicted = 5;
   expectSays(first(evidence), {"diverged: The estimate diverged once", "contradict each other"});
 }

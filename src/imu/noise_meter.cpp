@@ -8,6 +8,8 @@ namespace {
 
 /// [s] over which the noise is averaged: long against a footstep, short against a change of speed of a motor.
 constexpr double kMemory = 1.0;
+/// A slow sensor needs more time: fewer squares have no mean.
+constexpr double kFewest = 25.0;
 /// A square counts at most this many times the mean: four sigma. A knock is not noise, and a vibration that
 /// begins still multiplies the mean within a few hundredths of a second.
 constexpr double kLargestSquare = 16.0;
@@ -32,7 +34,9 @@ Eigen::Vector3d NoiseMeter::squaredDensities(double spacing) const {
   return difference.cwiseAbs2() * (spacing / gain);
 }
 
-bool NoiseMeter::isSettled() const { return weight_ * spacing_ > kMemory / 2.0; }
+double NoiseMeter::memory() const { return std::max(kMemory, kFewest * spacing_); }
+
+bool NoiseMeter::isSettled() const { return weight_ * spacing_ > memory() / 2.0; }
 
 double NoiseMeter::add(Time time, const Eigen::Vector3d& value) {
   if (count_ == 5) {
@@ -48,7 +52,7 @@ double NoiseMeter::add(Time time, const Eigen::Vector3d& value) {
   // A signal that stood still to the last bit has no mean to compare with.
   const bool can_tell = mean > kNothing && isSettled();
   const Eigen::Vector3d squares = can_tell ? shown.cwiseMin(kLargestSquare * mean).eval() : shown;
-  const double fade = std::exp(-(time - last_[3].time) / kMemory);
+  const double fade = std::exp(-(time - last_[3].time) / memory());
   squares_ = fade * squares_ + squares;
   weight_ = fade * weight_ + 1.0;
   return (shown - squares).maxCoeff();

@@ -46,7 +46,7 @@ void addOptions(rio_t::OptionSet& options, Arguments& a) {
   rio_t::CheckRequest& r = a.request;
   options.values("bag", "BAG",
                  "a bag; `--bag` may be left out; bags that follow one another are one recording",
-                 [&r](const std::string& bag) { addBag(bag, r.bags); });
+                 [&r](const std::string& bag) { rio_t::addBag(bag, r.bags); });
   options.positional("bag");
   options.text("out", "FILE.yaml", "gets the configuration; without it, it is printed", r.out);
   options.text("rig", "FILE.png", "gets a drawing of the rig: top and side view", r.rig);

@@ -18,15 +18,17 @@ class NoiseMeter {
   /// noise and does not count, of the noisiest axis [unit^2/Hz]: a knock. Over the five samples that see a
   /// single wrong value, its integral is the square of what the value adds to the integral of the signal.
   double add(Time time, const Eigen::Vector3d& value);
-  /// Squared density of the noisiest axis over the last second [unit^2/Hz]; 0 before the first five samples.
+  /// Squared density of the noisiest axis over the last second, or 25 samples [unit^2/Hz]; 0 before the first
+  /// five samples.
   double squaredDensity() const { return weight_ > 0.0 ? squares_.maxCoeff() / weight_ : 0.0; }
   double spacing() const { return spacing_; }  ///< of the samples [s]
-  /// Whether the density is a mean over at least half a second.
+  /// Whether the density is a mean over at least half of that time.
   bool isSettled() const;
   /// Begins a new run of five, e.g. after a wrong sample.
   void interrupt() { count_ = 0; }
 
  private:
+  double memory() const;  ///< [s]
   struct Sample {
     Time time;
     Eigen::Vector3d value = Eigen::Vector3d::Zero();

@@ -4,6 +4,7 @@
 
 #include "../text.h"
 #include "radar_causes.h"
+#include "rio_t/core/angle.h"
 
 namespace rio_t {
 namespace {
@@ -17,6 +18,8 @@ constexpr double kLateStart = 0.5;
 constexpr double kMostlySilent = 0.5;
 /// [rad] A heading that is off by this much leads aside by a tenth of the way.
 constexpr double kVagueHeading = 0.1;
+/// Of each radar. One restart of a driver may count twice.
+constexpr std::uint64_t kMostSteps = 2;
 constexpr std::size_t kMostCauses = 3;
 
 struct ImuFault {
@@ -87,6 +90,18 @@ double silentShare(const RunEvidence& evidence) {
   return evidence.run_seconds > 0.0 ? evidence.silent_seconds / evidence.run_seconds : 0.0;
 }
 
+/// The same of the radar that gave the least.
+double worstSilentShare(const RunEvidence& evidence) {
+  double seconds = evidence.silent_seconds;
+  for (const RadarSummary& radar : evidence.radars) seconds = std::max(seconds, radar.silent_seconds);
+  return evidence.run_seconds > 0.0 ? seconds / evidence.run_seconds : 0.0;
+}
+
+/// How far the estimated vehicle frame is turned from the told one, about the worst axis.
+double vehicleTurnSigmas(const RunEvidence& evidence, const Config& config) {
+  return evidence.vehicle_turn.cwiseAbs().maxCoeff() / config.odometry.ground_vehicle.rotation_sigma;
+}
+
 /// A stamp, to the millisecond.
 std::string stampText(Time time) { return fixedText(time.seconds(), 3) + " s"; }
 
@@ -151,6 +166,30 @@ void addOffset(const RunEvidence& evidence, const Config& config, std::vector<Ca
   if (farthest != nullptr) farthest->share = std::max(farthest->share, share);
 }
 
+void addOffsetSteps(const RunEvidence& evidence, std::vector<Cause>* causes) {
+  const std::uint64_t steps = countOf(evidence.input_faults, "time_offset_step");
+  if (steps <= kMostSteps * evidence.radars.size()) return;
+  causes->push_back(
+      {"offset_steps", "The time offset stepped " + std::to_string(steps) + " times.",
+       "A driver that restarts makes one step. A wrong mounting, persons in front of few points "
+       "and a wrong scale of the gyro look like steps, too: check them, or set "
+       "time_offset_step_detection: false.",
+       0.1});
+}
+
+void addVehicleFrame(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
+  const double sigmas = vehicleTurnSigmas(evidence, config);
+  if (sigmas <= kFarMounting) return;
+  const Eigen::Vector3d turn = evidence.vehicle_turn / kDegree;
+  causes->push_back(
+      {"vehicle_frame_far",
+       "The estimated vehicle frame is turned from the told one by " + fixedText(turn.x(), 0) + ", " +
+           fixedText(turn.y(), 0) + ", " + fixedText(turn.z(), 0) + " degrees about x, y, z of the IMU, " +
+           number(sigmas) + " vehicle_frame_rotation_sigma.",
+       "Check vehicle_frame_rotation_xyzw (order x, y, z, w): which way does the vehicle drive?",
+       1.0 - kFarMounting / sigmas});
+}
+
 void addSolver(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
   const Windows windows = windowsOf(evidence);
   const double share = shareOf(windows.not_converged, windows.all);
@@ -213,6 +252,20 @@ void addRestarts(const RunEvidence& evidence, const Config& config, std::vector<
                      1.0});
 }
 
+/// One of several radars that is silent while another works.
+void addSilentRadar(const RunEvidence& evidence, std::vector<Cause>* causes) {
+  if (silentShare(evidence) > kMostlySilent) return;
+  for (const RadarSummary& radar : evidence.radars) {
+    const double share = evidence.run_seconds > 0.0 ? radar.silent_seconds / evidence.run_seconds : 0.0;
+    if (share <= kMostlySilent) continue;
+    causes->push_back({"radar_silent",
+                       "No scan of radar " + radar.name + " was used for " +
+                           fixedText(radar.silent_seconds, 1) + " of " + fixedText(evidence.run_seconds, 1) +
+                           " s.",
+                       "Look for what stops this radar or loses its messages.", share});
+  }
+}
+
 /// Scans that came and were rejected have causes of their own.
 void addSilence(const RunEvidence& evidence, std::vector<Cause>* causes) {
   const double share = silentShare(evidence);
@@ -254,6 +307,8 @@ void addDivergence(const RunEvidence& evidence, std::vector<Cause>* causes) {
                        std::max(0.05, share)});
     return;
   }
+  // Briefly, near a person: the estimate outvoted it, or its sigmas have grown by what it may have lost.
+  if (share <= kManyDiverged && evidence.reinitializations == 0 && evidence.health == Health::kOk) return;
   const auto fewest = std::min_element(evidence.radars.begin(), evidence.radars.end(),
                                        [](const RadarSummary& a, const RadarSummary& b) {
                                          return a.points_per_scan[1] < b.points_per_scan[1];
@@ -283,9 +338,10 @@ void addMissingMounting(const Config& config, std::vector<Cause>* causes) {
   causes->insert(causes->begin(), missing.begin(), missing.end());
 }
 
-std::vector<Check> checksOf(const RunEvidence& evidence, const std::vector<Config>& radars) {
+std::vector<Check> checksOf(const RunEvidence& evidence, const Config& config,
+                            const std::vector<Config>& radars) {
   const Windows windows = windowsOf(evidence);
-  double kept = 1.0, turned = 0.0;
+  double kept = 1.0, turned = vehicleTurnSigmas(evidence, config);
   for (std::size_t k = 0; k < evidence.radars.size(); ++k)
     turned = std::max(turned, turnSigmas(evidence.radars[k], radars.at(k)));
   for (const RadarSummary& radar : evidence.radars)
@@ -297,7 +353,7 @@ std::vector<Check> checksOf(const RunEvidence& evidence, const std::vector<Confi
       {"started", evidence.initialized ? 1.0 : 0.0, 1.0, true},
       {"scans_used_share", usedShare(evidence), kFewScansUsed, true},
       {"scans_before_start_share", lateStart(evidence), kLateStart, false},
-      {"silent_time_share", silentShare(evidence), kMostlySilent, false},
+      {"silent_time_share", worstSilentShare(evidence), kMostlySilent, false},
       {"points_kept_share", kept, 1.0 - kManyPoints, true},
       {"scans_diverged_share", shareOf(evidence.scans_diverged, evidence.scans_judged), kManyDiverged, false},
       {"windows_at_offset_bound_share", shareOf(windows.at_bound, windows.all), kManyWindows, false},
@@ -332,18 +388,21 @@ Diagnosis diagnose(const RunEvidence& evidence, const Config& config) {
     addCausesOfRadar(evidence.radars[k], radars.at(k), &result.causes);
   addStart(evidence, config, &result.causes);
   addOffset(evidence, config, &result.causes);
+  addOffsetSteps(evidence, &result.causes);
+  addVehicleFrame(evidence, config, &result.causes);
   addSolver(evidence, config, &result.causes);
   addImu(evidence, config, &result.causes);
   addHeading(evidence, &result.causes);
   addRestarts(evidence, config, &result.causes);
   addSilence(evidence, &result.causes);
+  addSilentRadar(evidence, &result.causes);
   addDivergence(evidence, &result.causes);
   addMissingMounting(config, &result.causes);
   // Stable: of causes that explain the same, the one nearer to the sensor comes first.
   std::stable_sort(result.causes.begin(), result.causes.end(),
                    [](const Cause& a, const Cause& b) { return a.share > b.share; });
   if (result.causes.size() > kMostCauses) result.causes.resize(kMostCauses);
-  result.checks = checksOf(evidence, radars);
+  result.checks = checksOf(evidence, config, radars);
   result.verdict = verdictOf(evidence, result);
   return result;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rio_t/core/so3.h"
 #include "rio_t/odometry/body_odometry.h"
 
 namespace rio_t {
@@ -14,10 +15,12 @@ std::uint64_t countOf(const Counts& counts, const std::string& name) {
 
 EvidenceCollector::EvidenceCollector(const Config& config)
     : coasting_after_(config.odometry.health.coasting_after),
-      max_bridged_gap_(config.odometry.imu_input_check.max_bridged_gap) {
+      max_bridged_gap_(config.odometry.imu_input_check.max_bridged_gap),
+      told_q_IV_(config.odometry.ground_vehicle.T_IV.q_IR) {
   for (const Config& radar : configsOfRadars(config)) {
     filters_.emplace_back(radar.odometry.ego_velocity);
     evidence_.radars.emplace_back().name = radar.radar_name;
+    last_used_.emplace_back();
   }
 }
 
@@ -42,7 +45,9 @@ void EvidenceCollector::add(const ScanResult& result) {
   // A radar that filters what stands still has no scan to use at rest, and is not silent.
   // It came now, however late.
   if (result.used || result.at_rest)
-    last_used_ = std::max(result.scan.stamp, newest_state_.value_or(result.scan.stamp));
+    last_used_[result.scan.radar] = std::max(result.scan.stamp, newest_state_.value_or(result.scan.stamp));
+  if (result.ground_vehicle)
+    evidence_.vehicle_turn = so3::log(result.ground_vehicle->q_IV * told_q_IV_.conjugate());
   ++evidence_.scans_judged;
   if (result.health == Health::kDiverged) ++evidence_.scans_diverged;
   if (result.is_contradicted) ++evidence_.scans_contradicted;
@@ -61,11 +66,13 @@ void EvidenceCollector::addState(Time time) {
   const double step = newest_state_ ? time - *newest_state_ : 0.0;
   newest_state_ = time;
   if (step <= 0.0 || step > max_bridged_gap_) {  // the first one, or the clock jumped
-    last_used_ = time;
+    std::fill(last_used_.begin(), last_used_.end(), time);
     return;
   }
   evidence_.run_seconds += step;
-  const double silence = time - last_used_;
+  for (std::size_t k = 0; k < last_used_.size(); ++k)
+    if (time - last_used_[k] > coasting_after_) evidence_.radars[k].silent_seconds += step;
+  const double silence = time - *std::max_element(last_used_.begin(), last_used_.end());
   if (silence <= coasting_after_) return;
   evidence_.silent_seconds += step;
   if (silence <= evidence_.silence_end - evidence_.silence_begin) return;

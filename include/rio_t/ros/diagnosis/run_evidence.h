@@ -53,9 +53,10 @@ struct RadarSummary : RadarEstimate {
   std::uint64_t points = 0;              ///< of all scans
   std::uint64_t points_not_finite = 0;   ///< besides these: the decoder drops them
   std::array<std::uint64_t, kPointVerdicts> points_by_verdict = {};
-  double snr_sum_db = 0.0;   ///< over `points`
-  PointVariances noise;      ///< of its points, as learned; the file has its standard deviations
-  DopplerStep doppler_step;  ///< as known at the end; the file has its source as a key of its own
+  double snr_sum_db = 0.0;      ///< over `points`
+  double silent_seconds = 0.0;  ///< as RunEvidence::silent_seconds, but without the scans of other radars
+  PointVariances noise;         ///< of its points, as learned; the file has its standard deviations
+  DopplerStep doppler_step;     ///< as known at the end; the file has its source as a key of its own
   std::array<std::uint64_t, 3> points_per_scan = {};  ///< quantiles of 10, 50 and 90 % of the scans
   std::vector<double> pass_offsets_s;                 ///< after each pass; only with mode refine
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();     ///< of the newest mounting from the told one [rad]
@@ -88,6 +89,8 @@ struct RunEvidence {
   double run_seconds = 0.0;
   double silent_seconds = 0.0;  ///< of them, later than `coasting_after` after the last scan that was used
   double silence_begin = 0.0, silence_end = 0.0;  ///< of the longest silence
+  /// Of the newest vehicle frame from the told one [rad]; zero if the platform is no ground vehicle.
+  Eigen::Vector3d vehicle_turn = Eigen::Vector3d::Zero();
   std::vector<ImuRestart> imu_restarts;  ///< none in the live node, whose evidence begins after the last one
   std::vector<RadarSummary> radars;      ///< in the order of the configuration
 };
@@ -121,7 +124,8 @@ class EvidenceCollector {
   std::vector<PointFilter> filters_;         // by RadarScan::radar
   double coasting_after_, max_bridged_gap_;  // [s]
   std::optional<Time> oldest_imu_, newest_state_;
-  Time last_used_;  // scan, or the start
+  std::vector<Time> last_used_;   // scan of each radar, or the start
+  Eigen::Quaterniond told_q_IV_;  // vehicle frame
   RunEvidence evidence_;
 };
 
@@ -154,7 +158,8 @@ struct GroundVehicleCounts {
 /// The warning for a person whose platform is no ground vehicle.
 constexpr const char* kGroundVehicleContradicted =
     "the motion contradicted platform: ground_vehicle, and the constraint is switched off until the "
-    "estimate starts again: the platform moves sideways or upwards. Is it a ground vehicle, and does vehicle_frame_rotation_xyzw say "
+    "estimate starts again: the platform moves sideways or upwards. Is it a ground vehicle, and does "
+    "vehicle_frame_rotation_xyzw say "
     "which way it drives?";
 
 }  // namespace rio_t
