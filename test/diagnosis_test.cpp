@@ -469,6 +469,8 @@ TEST(Diagnosis, AVelocityThatWasLostIsNoContradiction) {
   evidence.scans_diverged = 5;
   expectSays(first(evidence), {"velocity_lost: The velocity was lost once, for 5 of 190 scans", "imu_gap"});
   evidence.scans_contradicted = 5;
+  EXPECT_EQ(first(evidence), "none") << "as near a person, briefly";
+  evidence.reinitializations = 1;
   expectSays(first(evidence), {"diverged: The estimate diverged once", "contradict each other"});
 }
 
