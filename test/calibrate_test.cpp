@@ -325,8 +325,8 @@ TEST_F(Calibrate, ABagThatFailsIsNamedAndTheOthersCount) {
 
 TEST_F(Calibrate, AQuietWalkConverges) {
   // The cost has kinks: near one, no step lowers it, though one of 0.14 sigma of the whole run is left.
-  for (const std::uint64_t seed : {1, 3}) {
-    simulateBag(bag_, "easy", seed, kOffset, truth_, 90.0);
+  for (const std::uint64_t seed : {6, 7}) {
+    simulateBag(bag_, "easy", seed, kOffset, truth_, 40.0);
     told_ = truth_;
     const Outcome outcome = calibrateBags({bag_});
     EXPECT_EQ(outcome.status, 0) << seed << ": " << outcome.err;
