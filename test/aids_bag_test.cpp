@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
 
 #include "../src/ros/temporary_folder.h"
 #include "rio_t/ros/bag/bag_runner.h"
@@ -27,8 +28,14 @@ class AidsBag : public testing::Test {
     rig.barometer.enabled = true;
     simulation::SensorData data = simulation::simulate(motion, rig);
     writeSimulationBag(folder_ + "/pascal.bag", motion, data, rig.start, {});
+    const std::vector<simulation::SimulatedPressure> pressures = data.pressures;
     for (simulation::SimulatedPressure& pressure : data.pressures) pressure.pascal *= 0.01;
     writeSimulationBag(folder_ + "/hectopascal.bag", motion, data, rig.start, {});
+    data.pressures = pressures;
+    const std::size_t frozen = pressures.size() / 3;
+    for (std::size_t k = frozen; k < pressures.size(); ++k)
+      data.pressures[k].pascal = pressures[frozen].pascal;
+    writeSimulationBag(folder_ + "/frozen.bag", motion, data, rig.start, {});
   }
 
   RunSummary run(const std::string& bag, const ParameterEntries& entries) const {
@@ -75,6 +82,14 @@ TEST_F(AidsBag, PressuresInHectopascalAreTold) {
       << summary.warnings.front();
   EXPECT_NE(summary.warnings.front().find("is it in hPa?"), std::string::npos);
   EXPECT_NE(summary.warnings.back().find("barometer_topic"), std::string::npos);
+}
+
+TEST_F(AidsBag, ABarometerThatFreezesIsTold) {
+  const RunSummary summary = run("frozen", parse("barometer_topic", "/sensor_platform/baro"));
+  EXPECT_GT(summary.barometer->steps, 0u);
+  ASSERT_EQ(summary.warnings.size(), 1u);
+  EXPECT_NE(summary.warnings.front().find("(barometer_topic) stepped"), std::string::npos);
+  EXPECT_NE(summary.warnings.front().find("freezes"), std::string::npos);
 }
 
 TEST_F(AidsBag, ATopicThatIsNotThereIsAnError) {

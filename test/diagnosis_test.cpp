@@ -93,6 +93,14 @@ TEST(Diagnosis, AMountingFarFromTheToldOneIsNoGoodRun) {
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
 }
 
+TEST(Diagnosis, TooFewPointsNameThoseThatAreNotFinite) {
+  RunEvidence evidence = withRejected("too_few_points");
+  EXPECT_EQ(first(evidence).find("not finite"), std::string::npos);
+  evidence.radars.front().points_not_finite = 21;
+  expectSays(first(evidence),
+             {"too_few_points", "Look at the driver of the radar: 21 more points are not finite"});
+}
+
 TEST(Diagnosis, FilteredPointsNameTheFilterAndTheUnit) {
   RunEvidence evidence = withRejected("too_few_points");
   pointsOf(evidence, PointVerdict::kKept) = 0;
@@ -376,6 +384,9 @@ TEST(Diagnosis, AnOffsetThatStepsAgainAndAgainIsDoubtful) {
   evidence.input_faults["time_offset_step"] = 3;
   expectSays(first(evidence), {"offset_steps: The time offset stepped 3 times", "wrong mounting", "persons"});
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
+  Config shared;
+  shared.odometry.smoother.time_offset_shared = true;
+  expectSays(first(evidence, shared), {"offset_steps", "time_offset_shared: true"});
 }
 
 TEST(Diagnosis, AVehicleFrameThatTurnsFarIsNamed) {

@@ -76,7 +76,8 @@ TEST_F(TwoRadars, MissingTopicsAndWrongTypesNameTheirRadar) {
   BagContents what;
   what.radar_topics = {"/left"};
   writeBag(what);
-  expectError(runTwo(), {"no topic /right (right/radar_topic, sensor_msgs/PointCloud2)"});
+  expectError(runTwo(), {"no topic /right (right/radar_topic, sensor_msgs/PointCloud2)",
+                         "--set radars=[NAME of the other]"});
   expectError(
       runTwo({"--set", "right/radar_topic=/other", "--set", "left/stamp_source=trigger", "--set",
               "left/trigger_topic=/absent"}),

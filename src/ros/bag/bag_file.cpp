@@ -87,8 +87,9 @@ std::map<std::string, std::string> Bags::typesByTopic() const {
 void checkTopics(const std::string& bag, const std::map<std::string, std::string>& types,
                  const std::vector<Wanted>& wanted) {
   std::string faults;
-  bool missing = false;
+  bool missing = false, several_radars = false;
   for (const Wanted& want : wanted) {
+    several_radars = several_radars || want.key.find('/') != std::string::npos;
     const auto found = types.find(want.topic);
     if (found != types.end() && found->second == want.type) continue;
     missing = missing || found == types.end();
@@ -103,6 +104,7 @@ void checkTopics(const std::string& bag, const std::map<std::string, std::string
     std::string known;
     for (const auto& [topic, type] : types) appendItem(&known, topic + " (" + type + ")");
     faults += "; the bag has " + (known.empty() ? "no topics" : known);
+    if (several_radars) faults += ". To leave a radar out: --set radars=[NAME of the other]";
   }
   throw bagError(bag, faults);
 }

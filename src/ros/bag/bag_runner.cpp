@@ -40,6 +40,12 @@ void warnOfAids(const Config& config, RunSummary* summary) {
     summary->warnings.push_back("no pressure of topic " + config.barometer_topic +
                                 " (barometer_topic) was used, of " +
                                 std::to_string(summary->barometer->pressures) + " messages");
+  if (summary->barometer && summary->barometer->steps > 0)
+    summary->warnings.push_back(
+        "the pressure of topic " + config.barometer_topic + " (barometer_topic) " +
+        "stepped, and the bias was estimated again: " + std::to_string(summary->barometer->steps) +
+        ". Doors and rotors do that. A sensor that freezes or rounds to whole hPa "
+        "steps all the time: leave it out");
   if (summary->ground_vehicle && summary->ground_vehicle->contradicted_at)
     summary->warnings.push_back("after " + fixedText(*summary->ground_vehicle->contradicted_at, 1) + " s " +
                                 kGroundVehicleContradicted);

@@ -166,15 +166,16 @@ void addOffset(const RunEvidence& evidence, const Config& config, std::vector<Ca
   if (farthest != nullptr) farthest->share = std::max(farthest->share, share);
 }
 
-void addOffsetSteps(const RunEvidence& evidence, std::vector<Cause>* causes) {
+void addOffsetSteps(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
   const std::uint64_t steps = countOf(evidence.input_faults, "time_offset_step");
   if (steps <= kMostSteps * evidence.radars.size()) return;
+  std::string remedy =
+      "A driver that restarts makes one step. A wrong mounting, persons in front of few points and a wrong "
+      "scale of the gyro look like steps, too: check them, or set time_offset_step_detection: false.";
+  if (config.odometry.smoother.time_offset_shared)
+    remedy += " With time_offset_shared: true, radars of different offsets do so, too.";
   causes->push_back(
-      {"offset_steps", "The time offset stepped " + std::to_string(steps) + " times.",
-       "A driver that restarts makes one step. A wrong mounting, persons in front of few points "
-       "and a wrong scale of the gyro look like steps, too: check them, or set "
-       "time_offset_step_detection: false.",
-       0.1});
+      {"offset_steps", "The time offset stepped " + std::to_string(steps) + " times.", remedy, 0.1});
 }
 
 void addVehicleFrame(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
@@ -388,7 +389,7 @@ Diagnosis diagnose(const RunEvidence& evidence, const Config& config) {
     addCausesOfRadar(evidence.radars[k], radars.at(k), &result.causes);
   addStart(evidence, config, &result.causes);
   addOffset(evidence, config, &result.causes);
-  addOffsetSteps(evidence, &result.causes);
+  addOffsetSteps(evidence, config, &result.causes);
   addVehicleFrame(evidence, config, &result.causes);
   addSolver(evidence, config, &result.causes);
   addImu(evidence, config, &result.causes);

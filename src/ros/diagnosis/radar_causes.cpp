@@ -132,11 +132,18 @@ class RadarCauses {
     const std::uint64_t kept = pointsOf(radar_, PointVerdict::kKept);
     // The points that the filter took are a cause of their own.
     if (shareOf(kept, radar_.points) > 1.0 - kManyPoints || radar_.points == 0) {
+      const std::string broken =
+          radar_.points_not_finite == 0
+              ? ""
+              : "Look at the driver of the radar: " + std::to_string(radar_.points_not_finite) +
+                    " more points are not finite. ";
       scans("too_few_points",
             "have too few points for a velocity: " + number(shareOf(kept, radar_.scans_total)) +
                 " on average after the filter.",
-            "Set a lower detection threshold in the driver of the radar. Set radar_factor: doppler if it is "
-            "velocity.");
+            broken +
+                "Set a lower detection threshold in the driver of the radar. Set radar_factor: doppler if it "
+                "is "
+                "velocity.");
     }
     scans("too_few_inliers", "have no velocity that enough of their points agree on.",
           "Check " + key_ + "radar_field_doppler, " + key_ +

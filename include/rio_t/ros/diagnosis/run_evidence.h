@@ -158,8 +158,8 @@ struct GroundVehicleCounts {
 /// The warning for a person whose platform is no ground vehicle.
 constexpr const char* kGroundVehicleContradicted =
     "the motion contradicted platform: ground_vehicle, and the constraint is switched off until the "
-    "estimate starts again: the platform moves sideways or upwards. Is it a ground vehicle, and does "
-    "vehicle_frame_rotation_xyzw say "
-    "which way it drives?";
+    "estimate starts again: the platform moves sideways or upwards. Is it a ground vehicle, does "
+    "vehicle_frame_rotation_xyzw say which way it drives, and vehicle_frame_translation which point does not "
+    "slip?";
 
 }  // namespace rio_t
