@@ -1,4 +1,4 @@
-#include "../src/ros/bag/command_line.h"
+#include "../src/ros/command_line.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "ros/bag/command_line.h"
+#include "ros/command_line.h"
 #include "ros/live/record_topics.h"
 #include "ros/temporary_folder.h"
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "../ros/bag/command_line.h"
+#include "../ros/command_line.h"
 #include "rio_t/evaluation/errors.h"
 #include "rio_t/evaluation/offset_error.h"
 

@@ -4,7 +4,7 @@
 #include <exception>
 #include <iostream>
 
-#include "../ros/bag/command_line.h"
+#include "../ros/command_line.h"
 #include "rio_t/ros/live/live_odometry.h"
 
 namespace {

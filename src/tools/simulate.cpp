@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "../ros/bag/command_line.h"
+#include "../ros/command_line.h"
 #include "../ros/text.h"
 #include "rio_t/core/angle.h"
 #include "rio_t/evaluation/trajectory.h"

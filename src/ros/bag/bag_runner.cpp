@@ -9,11 +9,11 @@
 #include <tuple>
 #include <utility>
 
+#include "../command_line.h"
 #include "../text.h"
 #include "bag_file.h"
 #include "bag_frames.h"
 #include "bag_player.h"
-#include "command_line.h"
 #include "rio_t/evaluation/errors.h"
 #include "rio_t/odometry/batch_odometry.h"
 #include "run_log.h"

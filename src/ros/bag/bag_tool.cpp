@@ -1,6 +1,6 @@
 #include <ostream>
 
-#include "command_line.h"
+#include "../command_line.h"
 #include "rio_t/ros/bag/bag_runner.h"
 
 namespace rio_t {

@@ -2,7 +2,7 @@
 #include <ostream>
 #include <stdexcept>
 
-#include "command_line.h"
+#include "../command_line.h"
 #include "rio_t/ros/bag/calibration.h"
 
 namespace rio_t {

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "command_line.h"
+#include "../command_line.h"
 #include "rio_t/ros/bag/check_bag.h"
 #include "rio_t/ros/parameters/parameters.h"
 

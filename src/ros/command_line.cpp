@@ -14,7 +14,7 @@
 #include <sstream>
 #include <system_error>
 
-#include "../text.h"
+#include "text.h"
 
 namespace rio_t {
 namespace {
