@@ -6,10 +6,6 @@
 namespace rio_t {
 namespace {
 
-/// [s] over which the noise is averaged: long against a footstep, short against a change of speed of a motor.
-constexpr double kMemory = 1.0;
-/// A slow sensor needs more time: fewer squares have no mean.
-constexpr double kFewest = 25.0;
 /// A square counts at most this many times the mean: four sigma. A knock is not noise, and a vibration that
 /// begins still multiplies the mean within a few hundredths of a second.
 constexpr double kLargestSquare = 16.0;
@@ -33,10 +29,6 @@ Eigen::Vector3d NoiseMeter::squaredDensities(double spacing) const {
   }
   return difference.cwiseAbs2() * (spacing / gain);
 }
-
-double NoiseMeter::memory() const { return std::max(kMemory, kFewest * spacing_); }
-
-bool NoiseMeter::isSettled() const { return weight_ * spacing_ > memory() / 2.0; }
 
 double NoiseMeter::add(Time time, const Eigen::Vector3d& value) {
   if (count_ == 5) {

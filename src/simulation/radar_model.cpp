@@ -103,9 +103,9 @@ Person makePerson(const RadarState& radar, double from, double until, Random& ra
   Person person;
   person.from = from;
   person.until = until;
-  person.p_W =
-      radar.p_W + radar.q_WR * fromPolar(random.uniform(2.5, 6.0), random.uniform(-40.0, 40.0) * kDegree,
-                                         random.uniform(-10.0, 10.0) * kDegree);
+  const double elevation = random.uniform(-10.0, 10.0) * kDegree;
+  const double azimuth = random.uniform(-40.0, 40.0) * kDegree;
+  person.p_W = radar.p_W + radar.q_WR * fromPolar(random.uniform(2.5, 6.0), azimuth, elevation);
   const double heading = random.uniform(-M_PI, M_PI);
   person.v_W = random.uniform(0.7, 1.6) * Eigen::Vector3d(std::cos(heading), std::sin(heading), 0.0);
   return person;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 
 #include "rio_t/core/time.h"
@@ -23,12 +24,18 @@ class NoiseMeter {
   double squaredDensity() const { return weight_ > 0.0 ? squares_.maxCoeff() / weight_ : 0.0; }
   double spacing() const { return spacing_; }  ///< of the samples [s]
   /// Whether the density is a mean over at least half of that time.
-  bool isSettled() const;
+  bool isSettled() const { return weight_ * spacing_ > memory() / 2.0; }
   /// Begins a new run of five, e.g. after a wrong sample.
   void interrupt() { count_ = 0; }
 
  private:
-  double memory() const;  ///< [s]
+  /// [s] over which the noise is averaged: long against a footstep, short against a change of speed of a
+  /// motor.
+  static constexpr double kMemory = 1.0;
+  /// [samples] A slow sensor needs more time: fewer squares have no mean.
+  static constexpr double kFewest = 25.0;
+  double memory() const { return std::max(kMemory, kFewest * spacing_); }
+
   struct Sample {
     Time time;
     Eigen::Vector3d value = Eigen::Vector3d::Zero();
