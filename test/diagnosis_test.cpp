@@ -212,24 +212,6 @@ TEST(Diagnosis, AClockOfTheRadarThatIsBehindIsNamed) {
                                "stamp_source: arrival", "radar_stamp_shift"});
 }
 
-TEST(Diagnosis, ScansBeforeASecondStartCount) {
-  Config config;
-  EvidenceCollector collector(config);
-  ScanResult result;
-  result.rejected_because = "before_initialization";
-  // All clocks jump back by 80 s.
-  for (const double second : {100.0, 20.0}) {
-    collector.addImu(Time::fromSeconds(second));
-    for (int k = 0; k < 30; ++k) {
-      result.scan.stamp = Time::fromSeconds(second + 0.1 * k);
-      collector.add(result);
-    }
-  }
-  const RunEvidence evidence = collector.evidence(RadarInertialOdometry(config.odometry), std::nullopt);
-  EXPECT_EQ(evidence.radars[0].scans_before_start, 60u);
-  EXPECT_EQ(evidence.radars[0].scans_before_imu, 0u);
-}
-
 TEST(Diagnosis, TheOffsetAtItsBoundIsNamed) {
   RunEvidence evidence = goodRun();
   evidence.solver_terminations = {{"at_bound", 150}, {"converged", 30}};
@@ -318,42 +300,6 @@ TEST(Diagnosis, ARadarThatIsSilentForMostOfTheTimeIsBad) {
   EXPECT_EQ(diagnose(rejected, Config{}).causes[0].name, "contradicts_imu");
 }
 
-/// Seconds of states at 10 Hz from `from` on, with a scan after each of those before `heard_until`.
-void feed(EvidenceCollector& collector, double from, double heard_until, double to) {
-  const int states = static_cast<int>(std::lround(10.0 * (to - from)));
-  for (int k = 0; k <= states; ++k) {
-    const Time time = Time::fromSeconds(from + 0.1 * k);
-    collector.addState(time);
-    ScanResult result;
-    result.scan.stamp = time;
-    result.used = true;
-    if (time < Time::fromSeconds(heard_until)) collector.add(result);
-  }
-}
-
-TEST(Diagnosis, TheTimeWithoutScansIsCounted) {
-  const Config config;
-  const RadarInertialOdometry odometry(config.odometry);
-  EvidenceCollector collector(config);
-  feed(collector, 100.0, 105.05, 120.0);
-  RunEvidence evidence = collector.evidence(odometry, std::nullopt);
-  EXPECT_NEAR(evidence.run_seconds, 20.0, 1e-6);
-  EXPECT_NEAR(evidence.silent_seconds, 14.0, 0.11) << "it coasts from one second after the last scan on";
-  EXPECT_NEAR(evidence.silence_begin, 5.0, 1e-6);
-  EXPECT_NEAR(evidence.silence_end, 20.0, 1e-6);
-  feed(collector, 50.0, 70.0, 60.0);  // the clock jumped back, and no time went by
-  evidence = collector.evidence(odometry, std::nullopt);
-  EXPECT_NEAR(evidence.run_seconds, 30.0, 1e-6);
-  EXPECT_NEAR(evidence.silent_seconds, 14.0, 0.11);
-  ScanResult at_rest;
-  at_rest.scan.stamp = Time::fromSeconds(69.9);
-  at_rest.rejected_because = "too_few_points";
-  at_rest.at_rest = true;
-  collector.add(at_rest);
-  feed(collector, 60.1, 0.0, 70.0);
-  EXPECT_NEAR(collector.evidence(odometry, std::nullopt).silent_seconds, 14.0, 0.11) << "it stands still";
-}
-
 TEST(Diagnosis, ASilentRadarBesideAnotherIsNamed) {
   const Config config =
       makeConfig({parseAssignment("radars=[left, right]"), parseAssignment("left/radar_topic=/left"),
@@ -411,20 +357,6 @@ TEST(Diagnosis, AVehicleFrameThatTurnsFarIsNamed) {
   expectSays(first(far),
              {"vehicle_frame_far", "6 vehicle_frame_rotation_sigma", "vehicle_frame_rotation_xyzw"});
   EXPECT_EQ(diagnose(far, config).verdict, RunVerdict::kDoubtful);
-}
-
-TEST(Diagnosis, ScansThatComeLateAreNoSilence) {
-  const Config config;
-  const RadarInertialOdometry odometry(config.odometry);
-  EvidenceCollector collector(config);
-  for (int k = 0; k <= 200; ++k) {
-    collector.addState(Time::fromSeconds(100.0 + 0.1 * k));
-    ScanResult late;
-    late.scan.stamp = Time::fromSeconds(98.5 + 0.1 * k);
-    late.used = true;
-    collector.add(late);
-  }
-  EXPECT_EQ(collector.evidence(odometry, std::nullopt).silent_seconds, 0.0);
 }
 
 TEST(Diagnosis, ADivergenceForLackOfScansNamesTheLack) {

@@ -9,7 +9,7 @@ import yaml
 from . import tum
 from .errors import RioTError
 
-# What is read of each file. A file that lacks a column is told by its name and line.
+# The columns that the scripts read from each file. If a file lacks one, the error names both.
 COLUMNS = {
     "navigation.csv": "stamp,vx,vy,vz,sigma_px,sigma_py,sigma_pz,sigma_rx,sigma_ry,sigma_rz,sigma_vx,sigma_vy,sigma_vz",
     "time_offset.csv": "stamp,offset_s,sigma_s",

@@ -24,7 +24,7 @@ struct RadarScan {
   std::size_t radar = 0;  ///< which one it is from, see Estimator
 };
 
-/// What a radar may be called: its name becomes part of keys, topics and file names.
+/// Whether a radar may have this name. Keys, topics and files contain it.
 inline bool isRadarName(const std::string& text) {
   return !text.empty() &&
          text.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") == std::string::npos;

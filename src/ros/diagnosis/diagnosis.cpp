@@ -18,7 +18,7 @@ constexpr double kLateStart = 0.5;
 constexpr double kMostlySilent = 0.5;
 /// [rad] A heading that is off by this much leads aside by a tenth of the way.
 constexpr double kVagueHeading = 0.1;
-/// Of each radar. One restart of a driver may count twice.
+/// More steps of the offset, for each radar, are a cause: one restart of a driver counts twice at most.
 constexpr std::uint64_t kMostSteps = 2;
 constexpr std::size_t kMostCauses = 3;
 
@@ -85,16 +85,18 @@ double lateStart(const RunEvidence& evidence) {
   return all < kEnoughScans ? 0.0 : shareOf(before_start, all);
 }
 
-/// Share of the time in which the IMU alone carried the estimate.
-double silentShare(const RunEvidence& evidence) {
-  return evidence.run_seconds > 0.0 ? evidence.silent_seconds / evidence.run_seconds : 0.0;
+double shareOfRun(const RunEvidence& evidence, double seconds) {
+  return evidence.run_seconds > 0.0 ? seconds / evidence.run_seconds : 0.0;
 }
 
-/// The same of the radar that gave the least.
+/// Share of the time in which the IMU alone carried the estimate.
+double silentShare(const RunEvidence& evidence) { return shareOfRun(evidence, evidence.silent_seconds); }
+
+/// Share of the time without scans of the radar that gave the least.
 double worstSilentShare(const RunEvidence& evidence) {
   double seconds = evidence.silent_seconds;
   for (const RadarSummary& radar : evidence.radars) seconds = std::max(seconds, radar.silent_seconds);
-  return evidence.run_seconds > 0.0 ? seconds / evidence.run_seconds : 0.0;
+  return shareOfRun(evidence, seconds);
 }
 
 /// How far the estimated vehicle frame is turned from the told one, about the worst axis.
@@ -257,7 +259,7 @@ void addRestarts(const RunEvidence& evidence, const Config& config, std::vector<
 void addSilentRadar(const RunEvidence& evidence, std::vector<Cause>* causes) {
   if (silentShare(evidence) > kMostlySilent) return;
   for (const RadarSummary& radar : evidence.radars) {
-    const double share = evidence.run_seconds > 0.0 ? radar.silent_seconds / evidence.run_seconds : 0.0;
+    const double share = shareOfRun(evidence, radar.silent_seconds);
     if (share <= kMostlySilent) continue;
     causes->push_back({"radar_silent",
                        "No scan of radar " + radar.name + " was used for " +

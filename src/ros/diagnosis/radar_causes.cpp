@@ -137,13 +137,13 @@ class RadarCauses {
               ? ""
               : "Look at the driver of the radar: " + std::to_string(radar_.points_not_finite) +
                     " more points are not finite. ";
-      scans("too_few_points",
-            "have too few points for a velocity: " + number(shareOf(kept, radar_.scans_total)) +
-                " on average after the filter.",
-            broken +
-                "Set a lower detection threshold in the driver of the radar. Set radar_factor: doppler if it "
-                "is "
-                "velocity.");
+      scans(
+          "too_few_points",
+          "have too few points for a velocity: " + number(shareOf(kept, radar_.scans_total)) +
+              " on average after the filter.",
+          broken +
+              "Set a lower detection threshold in the driver of the radar. If radar_factor is velocity, set "
+              "doppler.");
     }
     scans("too_few_inliers", "have no velocity that enough of their points agree on.",
           "Check " + key_ + "radar_field_doppler, " + key_ +

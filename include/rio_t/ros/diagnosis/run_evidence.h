@@ -89,7 +89,7 @@ struct RunEvidence {
   double run_seconds = 0.0;
   double silent_seconds = 0.0;  ///< of them, later than `coasting_after` after the last scan that was used
   double silence_begin = 0.0, silence_end = 0.0;  ///< of the longest silence
-  /// Of the newest vehicle frame from the told one [rad]; zero if the platform is no ground vehicle.
+  /// [rad] How far the estimate has turned the vehicle frame from the told one; zero without such a frame.
   Eigen::Vector3d vehicle_turn = Eigen::Vector3d::Zero();
   std::vector<ImuRestart> imu_restarts;  ///< none in the live node, whose evidence begins after the last one
   std::vector<RadarSummary> radars;      ///< in the order of the configuration
