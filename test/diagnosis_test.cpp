@@ -93,6 +93,20 @@ TEST(Diagnosis, AMountingFarFromTheToldOneIsNoGoodRun) {
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
 }
 
+TEST(Diagnosis, AMountingThatIsHeldAndContradictedIsNoGoodRun) {
+  RunEvidence evidence = goodRun();
+  const Eigen::Matrix3d covariance = 1e-4 * Eigen::Matrix3d::Identity();  // a sigma of 0.6 degrees
+  evidence.radars.front().told_turn = MountingTurn{Eigen::Vector3d(0.03, 0.03, 0.03), covariance};
+  EXPECT_EQ(first(evidence), "none");
+  evidence.radars.front().told_turn->turn.y() = -0.1;
+  expectSays(first(evidence),
+             {"mounting_far: The scans fit better if the mounting is turned by 2, -6, 2 degrees",
+              "with sigmas of 0.6, 0.6, 0.6", "estimate_extrinsics: rotation"});
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
+  evidence.radars.front().told_turn->covariance *= 100.0;  // noise explains it
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
+}
+
 TEST(Diagnosis, TooFewPointsNameThoseThatAreNotFinite) {
   RunEvidence evidence = withRejected("too_few_points");
   EXPECT_EQ(first(evidence).find("not finite"), std::string::npos);

@@ -258,6 +258,18 @@ TEST_F(TwoSimulatedRadars, MountingsAreFoundEachItsOwn) {
   expectInSummary({"final_extrinsics_rotation_xyzw_left: [", "final_extrinsics_rotation_sigma_right: [0.0"});
 }
 
+TEST_F(TwoSimulatedRadars, AWrongMountingThatIsHeldIsDoubtful) {
+  Config config = this->config();
+  config.odometry.radars[1].T_IR.q_IR = Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitZ()) * right_.q_IR;
+  const Diagnosis diagnosis = runBag({{bag_}, out_, config, nullptr}).diagnosis;
+  EXPECT_EQ(diagnosis.verdict, RunVerdict::kDoubtful);
+  ASSERT_FALSE(diagnosis.causes.empty());
+  EXPECT_EQ(diagnosis.causes.front().name, "mounting_far");
+  EXPECT_NE(diagnosis.causes.front().text.find("radar right"), std::string::npos)
+      << diagnosis.causes.front().text;
+  expectInSummary({"mounting_turn_left: [", "mounting_turn_sigma_right: [0.0"});
+}
+
 TEST_F(TwoSimulatedRadars, SameBagSameBytes) {
   const Config config = this->config();
   runBag({{bag_}, out_ + "/a", config, nullptr});

@@ -61,6 +61,20 @@ TEST(TwoRadars, EachHasItsOffset) {
   }
 }
 
+// One is told 15 degrees wrong. The estimate lies between the two, and both contradict it.
+TEST(TwoRadars, TheOneWhoseMountingIsWrongIsNamed) {
+  for (const char* motion : {"medium", "drone"}) {
+    SimulatedRun run = pair(motion, 1, 50.0);
+    run.options.radars[0].T_IR.q_IR = looking(55.0, 0.0);
+    run.run();
+    const Eigen::Vector3d left = run.last(0).told_turn->turn / kDegree;
+    const Eigen::Vector3d right = run.last(1).told_turn->turn / kDegree;
+    EXPECT_LT(left.z(), -7.5) << motion;  // the offset takes a part
+    EXPECT_LT(left.head<2>().norm(), 3.0) << motion << ": " << left.transpose();
+    EXPECT_LT(right.norm(), 3.0) << motion << ": " << right.transpose();
+  }
+}
+
 // A live node takes the IMU samples in bunches, as threads happen to run; the bag runner one by one. The two
 // offsets differ, so the scans do not get ready in the order in which they come.
 TEST(TwoRadars, AreUsedInTheSameOrderHoweverTheImuComes) {

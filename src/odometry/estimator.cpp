@@ -29,8 +29,7 @@ std::vector<RadarChannel> radarChannels(const OdometryOptions& options, const Ei
   std::vector<RadarChannel> channels;
   for (std::size_t k = 0; k < options.radarCount(); ++k) {
     const OdometryOptions own = optionsOfRadar(options, k);
-    const RadarChannelOptions channel{own.T_IR, own.ego_velocity, own.offset_step_detector,
-                                      own.smoother};
+    const RadarChannelOptions channel{own.T_IR, own.ego_velocity, own.offset_step_detector, own.smoother};
     channels.emplace_back(channel, g_W, imu, shared);
   }
   return channels;
@@ -59,6 +58,7 @@ Estimator::Estimator(const OdometryOptions& options, Navigation& navigation, Fau
       initializer_(options),
       smoother_(options.smoother, options.imu_noise, g_W_, imu_),
       radars_(radarChannels(options, g_W_, imu_)),
+      mounting_check_(options.radarCount()),
       health_(options.health, options.smoother.innovation_gate, options.radarCount()),
       waiting_for_(initializer_.waitingFor()) {
   if (options.platform == Platform::kGroundVehicle)
@@ -141,7 +141,8 @@ std::string Estimator::whyNotNow(Time node_time, bool imu_has_ended) const {
   return imu_has_ended ? "imu_not_covering" : "older_than_window";
 }
 
-/// Passes the innovations of the scan to health, recovery and the scale of the model errors.
+/// Passes the innovations of the scan to health, recovery, the scale of the model errors and the check of the
+/// mounting.
 void Estimator::judge(const RadarAnswer& answer, const RadarScan& scan) {
   HealthMonitor& health = health_.of(scan.radar);
   if (answer.innovation) {
@@ -154,13 +155,15 @@ void Estimator::judge(const RadarAnswer& answer, const RadarScan& scan) {
     health.offsetStepped(scan.stamp);
     faults_.count("time_offset_step");
   }
+  if (answer.at_rest) mounting_check_.velocityKnown();
   if (!answer.used) return;
+  if (!health_.isContradicted()) mounting_check_.add(scan.radar, *answer.used);
   // The state's variance grows about as the root of the accelerometer's, unless that is measured.
   const ImuMeasurement sample = imu_.at(scan.stamp);
   const ImuNoise noise = imuNoise();
   const bool accel_is_told = noise.accel_density * noise.accel_density > sample.accel_mean_noise;
   Eigen::Matrix3d scaled = answer.ego_velocity.told_variance.asDiagonal();
-  if (accel_is_told) scaled += 0.5 * answer.prediction_covariance;
+  if (accel_is_told) scaled += 0.5 * answer.used->predicted;
   const double share = answer.used->S.ldlt().solve(scaled).trace() / 3.0;
   model_error_scale_.add(scan.stamp, answer.used->squaredSigmas(), share);
 }
@@ -196,11 +199,12 @@ void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
   constexpr int kState = StateBlock::kTangent;
   const Eigen::MatrixXd covariance = smoother_.newestCovariance(radar.calibration());
   result.state = newestState(covariance.topLeftCorner<kState, kState>());
+  const Eigen::Index estimated = covariance.rows() - (kState + 1);  // of the mounting
   result.time_offset = radar.offset();
   result.time_offset_sigma = radar.offsetSigma(covariance(kState, kState));
   result.T_IR = radar.extrinsics();
   result.told_T_IR = radar.toldExtrinsics();
-  const Eigen::Index estimated = covariance.rows() - (kState + 1);
+  if (estimated == 0) result.told_turn = mounting_check_.turnOf(result.scan.radar, result.told_T_IR);
   result.T_IR_covariance = extrinsicsCovariance(covariance.bottomRightCorner(estimated, estimated));
   for (const StampedPose& left : marginalize()) result.left_window.push_back(left);
   // On a frame that shakes the window believes rest little: the start of a gentle drive must not look like an
@@ -314,6 +318,7 @@ void Estimator::begin(const Initialization& found) {
   if (barometer_) barometer_->join(smoother_, found.time, at_rest);
   initializer_.forgetVelocities();
   model_error_scale_ = found.model_error_scale;
+  mounting_check_.velocityKnown();
   last_used_ = found.time;
   contradicted_since_ = found.time;
   corrected_W_.setZero();

@@ -162,10 +162,8 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   }
   // A borrowed point must not teach twice.
   if (!seen.is_own || sharesPoints(seen, learned_at_)) return answer;
-  if (can_be_judged) {
-    answer.used = all;
-    answer.prediction_covariance = seen.prior->covariance;
-  }
+  if (can_be_judged)
+    answer.used = UsedInnovation{*all, measured.v_R, seen.prior->covariance, seen.prediction->scan.R_WR()};
   if (!answer.at_rest) {
     const DopplerLikelihood* world =
         answer.doppler && !seen.has_borrowed ? answer.doppler->points.get() : nullptr;

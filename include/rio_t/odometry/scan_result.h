@@ -7,6 +7,7 @@
 #include "rio_t/graph/solver_termination.h"
 #include "rio_t/landmarks/landmark_answer.h"
 #include "rio_t/odometry/health_monitor.h"
+#include "rio_t/odometry/mounting_check.h"
 #include "rio_t/odometry/navigation_state.h"
 #include "rio_t/radar/scan.h"
 #include "rio_t/sensors/barometer_channel.h"
@@ -28,10 +29,11 @@ struct ScanResult : ScanAnswer {
   bool updated = false;
   // The newest state of the window.
   NavigationState state;
-  double time_offset = 0.0;        ///< t_O [s]
-  double time_offset_sigma = 0.0;  ///< [s]
-  Extrinsics T_IR;                 ///< of this radar
-  Extrinsics told_T_IR;            ///< the mounting that the options tell
+  double time_offset = 0.0;               ///< t_O [s]
+  double time_offset_sigma = 0.0;         ///< [s]
+  Extrinsics T_IR;                        ///< of this radar
+  Extrinsics told_T_IR;                   ///< the mounting that the options tell
+  std::optional<MountingTurn> told_turn;  ///< how wrong the scans say it is; none if it is estimated
   /// Covariance of T_IR, if it is estimated; zero if not. Translation of the radar in I [m], then turn about
   /// the axes of I [rad]: the order of ROS.
   Eigen::Matrix<double, 6, 6> T_IR_covariance = Eigen::Matrix<double, 6, 6>::Zero();

@@ -49,6 +49,13 @@ struct ScanAnswer {
   double rate_variance = 0.0;
 };
 
+/// The innovation of a scan that went into the window.
+struct UsedInnovation : Innovation {
+  Eigen::Vector3d v_R = Eigen::Vector3d::Zero();        ///< measured [m/s]
+  Eigen::Matrix3d predicted = Eigen::Matrix3d::Zero();  ///< part of the prediction in S [m^2/s^2]
+  Eigen::Matrix3d R_WR = Eigen::Matrix3d::Identity();   ///< as predicted
+};
+
 /// The channel's answer to a scan. All else that reports a scan reads this value.
 struct RadarAnswer : ScanAnswer {
   bool was_predicted = false;  ///< if not, neither `innovation` nor what follows is set
@@ -56,10 +63,8 @@ struct RadarAnswer : ScanAnswer {
   /// points that agree are no majority, are outvoted by witnesses of the prediction, or are partly those of
   /// the last one.
   std::optional<EgoVelocity> alone;
-  /// For the scale of the model errors: the innovation of a used velocity in motion that most points agree
-  /// on, if the prediction is linear.
-  std::optional<Innovation> used;
-  Eigen::Matrix3d prediction_covariance = Eigen::Matrix3d::Zero();  ///< its part in used->S [m^2/s^2]
+  /// Of a used velocity in motion that most points agree on, if the prediction is linear.
+  std::optional<UsedInnovation> used;
 };
 
 /// One radar, from scan to window: ego-velocity, decisions, time offset. Not thread-safe.

@@ -102,7 +102,7 @@ CHECKS = {  # name in summary.yaml: for people
     "scans_diverged_share": "share of the scans with a diverged estimate",
     "windows_at_offset_bound_share": "share of the windows with the offset at max_time_offset",
     "windows_not_converged_share": "share of the windows that stopped before they converged",
-    "mounting_turned_sigmas": "turn of the estimated mounting or vehicle frame from the told one, in its sigma",
+    "mounting_turned_sigmas": "turn of mounting or vehicle frame from the told one, in sigmas",
     "imu_faults_share": "share of the IMU samples with a fault",
     "healthy_at_end": "the estimate is healthy at the end"}
 VERDICTS = {

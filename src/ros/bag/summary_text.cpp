@@ -61,6 +61,10 @@ void addEstimates(SummaryLines& lines, const RadarSummary& radar) {
   const std::string suffix = suffixOf(radar.name);
   lines.add("final_offset_s" + suffix, fixedText(radar.final_offset_s, 9));
   lines.add("final_offset_sigma_s" + suffix, fixedText(radar.final_offset_sigma_s, 9));
+  if (radar.told_turn) {  // about the axes of the IMU [rad]
+    lines.add("mounting_turn" + suffix, fixedTexts(radar.told_turn->turn, 6));
+    lines.add("mounting_turn_sigma" + suffix, fixedTexts(radar.told_turn->sigma(), 6));
+  }
   if (!radar.extrinsics) return;
   const ExtrinsicsSummary& extrinsics = *radar.extrinsics;
   lines.add("told_extrinsics_translation" + suffix, fixedTexts(extrinsics.told.l_I, 9));

@@ -169,18 +169,30 @@ class RadarCauses {
               " estimate_extrinsics: rotation corrects up to 10 degrees by itself.");
   }
 
-  /// An estimate that follows a wrong sign turns the mounting around, and then contradicts nothing.
   void addMounting() {
     const double sigmas = turnSigmas(radar_, config_);
     if (sigmas <= kFarMounting) return;
-    const Eigen::Vector3d turn = radar_.turn / kDegree;
-    cause("mounting_far", 1.0 - kFarMounting / sigmas,
-          "The estimated mounting" + of_ + " is turned from the told one by " + fixedText(turn.x(), 0) +
-              ", " + fixedText(turn.y(), 0) + ", " + fixedText(turn.z(), 0) +
-              " degrees about x, y, z of the IMU, with " + key_ + "extrinsics_rotation_sigma " +
+    const double share = 1.0 - kFarMounting / sigmas;
+    if (radar_.told_turn) {
+      cause("mounting_far", share,
+            "The scans fit better if the mounting" + of_ + " is turned by " +
+                degrees(radar_.told_turn->turn) + ", with sigmas of " +
+                fixedTexts(radar_.told_turn->sigma() / kDegree, 1) + ".",
+            "Set estimate_extrinsics: rotation, or correct " + key_ +
+                "extrinsics_rotation_xyzw (order x, y, z, w): `rosrun rio_t calibrate` finds it.");
+      return;
+    }
+    // An estimate that follows a wrong sign turns the mounting around, and then contradicts nothing.
+    cause("mounting_far", share,
+          "The estimated mounting" + of_ + " is turned from the told one by " + degrees(radar_.turn) +
+              ", with " + key_ + "extrinsics_rotation_sigma " +
               number(config_.odometry.smoother.extrinsics_rotation_sigma / kDegree) + " degrees.",
           "Check " + key_ + "radar_doppler_sign, " + key_ + "radar_axes and the mounting (" + key_ +
               "extrinsics_rotation_xyzw, order x, y, z, w)." + mountingAdvice(radar_));
+  }
+
+  static std::string degrees(const Eigen::Vector3d& turn) {
+    return fixedTexts(turn / kDegree, 0, ", ") + " degrees about x, y, z of the IMU";
   }
 
   const RadarSummary& radar_;

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
 
 #include "../text.h"
+#include "rio_t/core/angle.h"
 #include "rio_t/ros/diagnosis/diagnosis.h"
 
 namespace rio_t {
@@ -46,8 +49,17 @@ inline std::string mountingAdvice(const RadarSummary& radar) {
              : kCheckBag;
 }
 
-/// How far the estimated mounting is turned from the told one, about the worst axis.
+/// [rad] So well a protractor tells a mounting that is held.
+inline constexpr double kToldSigma = 1.0 * kDegree;
+
+/// How far the mounting is turned from the told one: as the scans say of a mounting that is held, or as
+/// estimated, about the worst axis.
 inline double turnSigmas(const RadarSummary& radar, const Config& config) {
+  if (radar.told_turn) {
+    const Eigen::Vector3d& turn = radar.told_turn->turn;
+    const Eigen::Matrix3d told = kToldSigma * kToldSigma * Eigen::Matrix3d::Identity();
+    return std::sqrt(turn.dot((radar.told_turn->covariance + told).ldlt().solve(turn)));
+  }
   return radar.turn.cwiseAbs().maxCoeff() / config.odometry.smoother.extrinsics_rotation_sigma;
 }
 

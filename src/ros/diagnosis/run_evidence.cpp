@@ -58,6 +58,7 @@ void EvidenceCollector::add(const ScanResult& result) {
   }
   if (!result.updated) return;
   radar.turn = turnBetween(result.told_T_IR, result.T_IR);
+  radar.told_turn = result.told_turn;
   evidence_.heading_sigma = std::sqrt(bodyOdometry(result.state, 0.0).pose_covariance(5, 5));
   ++evidence_.solver_terminations[toString(result.solver_termination)];
 }

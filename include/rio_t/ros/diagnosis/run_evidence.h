@@ -60,6 +60,7 @@ struct RadarSummary : RadarEstimate {
   std::array<std::uint64_t, 3> points_per_scan = {};  ///< quantiles of 10, 50 and 90 % of the scans
   std::vector<double> pass_offsets_s;                 ///< after each pass; only with mode refine
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();     ///< of the newest mounting from the told one [rad]
+  std::optional<MountingTurn> told_turn;              ///< of a mounting that is held, as the scans say
 };
 
 /// The stamps of the IMU jumped, or left a gap that is too long to bridge: "imu_clock_restart".
