@@ -4,7 +4,9 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
 #include <string>
+#include <vector>
 
 #include "rio_t/core/angle.h"
 #include "rio_t/core/so3.h"
@@ -15,22 +17,66 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// What the check says at the end of a run whose mounting is turned by `turn` from the told one, about the
-/// axes of I [rad].
-MountingTurn found(const std::string& motion, std::uint64_t seed, const Vector3d& turn) {
+/// Filters the velocities of radars that are turned by `turns`, about their own axes, without any noise. All
+/// that the check sees comes from the turns.
+MountingCheck checkOf(const std::vector<Vector3d>& turns) {
+  const Eigen::Matrix3d P = Vector3d(1e-4, 2e-4, 4e-4).asDiagonal(),
+                        R = Vector3d(3e-4, 2e-4, 1e-4).asDiagonal();
+  MountingCheck check(turns.size());
+  Vector3d v_W(1.0, 0.0, 0.2), estimate_W = v_W;
+  for (int k = 0; k < 600; ++k) {
+    const Vector3d change_W(0.02 * std::cos(0.05 * k), 0.02 * std::sin(0.03 * k), 0.01 * std::cos(0.07 * k));
+    v_W += change_W;
+    estimate_W += change_W;
+    const std::size_t radar = static_cast<std::size_t>(k) % turns.size();
+    UsedInnovation innovation;
+    innovation.R_WR =
+        so3::exp(Vector3d(0.3 * std::sin(0.2 * k), 0.3 * std::cos(0.13 * k), 0.02 * k)).toRotationMatrix();
+    innovation.v_R = so3::exp(-turns[radar]) * (innovation.R_WR.transpose() * v_W);
+    innovation.d = innovation.v_R - innovation.R_WR.transpose() * estimate_W;
+    innovation.predicted = P;
+    innovation.S = P + R;
+    check.add(radar, innovation);
+    estimate_W += innovation.R_WR * P * innovation.S.inverse() * innovation.d;
+  }
+  return check;
+}
+
+TEST(MountingCheck, IsExactForSmallTurnsWithoutNoise) {
+  const std::vector<Vector3d> turns = {Vector3d(1e-4, -2e-4, 3e-4), Vector3d(-2e-4, 1e-4, 2e-4)};
+  for (const std::size_t radars : {1U, 2U}) {
+    const MountingCheck check = checkOf({turns.begin(), turns.begin() + radars});
+    for (std::size_t k = 0; k < radars; ++k)
+      EXPECT_LT((check.turnOf(k, {}).turn - turns[k]).norm(), 1e-3 * turns[k].norm())
+          << radars << " radars: " << check.turnOf(k, {}).turn.transpose();
+  }
+}
+
+/// A run with a mounting that is turned by `turn` from the told one, about the axes of I [rad].
+SimulatedRun turnedBy(const Vector3d& turn, const std::string& motion, std::uint64_t seed) {
   SimulatedRun run(motion, seed, 50.0, 5.0);
   run.options.T_IR.q_IR = so3::exp(-turn) * run.setup.T_IR.q_IR;
   run.run();
-  return run.last(0).told_turn.value();
+  return run;
+}
+
+double squaredSigmas(const MountingTurn& turn, double told_sigma) {
+  const Eigen::Matrix3d told = told_sigma * told_sigma * Eigen::Matrix3d::Identity();
+  return turn.turn.dot((turn.covariance + told).ldlt().solve(turn.turn));
 }
 
 TEST(MountingCheck, ItsSigmasAreWhatItsErrorsAre) {
   constexpr int kSeeds = 8;
   for (const char* motion : {"difficult", "drone", "start_in_motion"}) {
     double sum = 0.0;
-    for (int seed = 1; seed <= kSeeds; ++seed) {
-      const MountingTurn turn = found(motion, static_cast<std::uint64_t>(seed), Vector3d::Zero());
-      sum += turn.turn.dot(turn.covariance.ldlt().solve(turn.turn)) / 3.0;
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+      const SimulatedRun run = turnedBy(Vector3d::Zero(), motion, seed);
+      sum += squaredSigmas(*run.last(0).told_turn, 0.0) / 3.0;
+      for (const ScanResult& result : run.results) {
+        if (!result.told_turn) continue;
+        EXPECT_LT(squaredSigmas(*result.told_turn, kDegree), 9.0)
+            << motion << ", seed " << seed << ", at " << run.seconds(result.state.time) << " s";
+      }
     }
     EXPECT_GT(sum / kSeeds, 0.5) << motion;
     EXPECT_LT(sum / kSeeds, 2.0) << motion;
@@ -41,7 +87,7 @@ TEST(MountingCheck, FindsAWrongMounting) {
   for (const Vector3d& axis : {Vector3d(1, 0, 0), Vector3d(0, 1, 0), Vector3d(0, 0, 1)}) {
     for (const char* motion : {"difficult", "medium", "drone"}) {
       const Vector3d turn = 8.0 * kDegree * axis;
-      const MountingTurn result = found(motion, 1, turn);
+      const MountingTurn result = *turnedBy(turn, motion, 1).last(0).told_turn;
       // Tilt and biases of the estimate give way, too, so what is found may be short.
       EXPECT_LT((result.turn - turn).norm(), turn.norm() / 4.0)
           << motion << ": " << (result.turn / kDegree).transpose();
