@@ -73,7 +73,8 @@ Config withExtrinsicsOfBag(Config config, const Bags& bags) {
     for (const rosbag::MessageInstance& instance : view) {
       if (missing.empty()) break;
       bool is_new = false;
-      for (const auto& transform : read<tf2_msgs::TFMessage>(instance)->transforms) {
+      const auto message = read<tf2_msgs::TFMessage>(instance);
+      for (const auto& transform : message->transforms) {
         if (tf._frameExists(transform.child_frame_id) &&
             tf.canTransform(transform.header.frame_id, transform.child_frame_id, ros::Time(0)))
           continue;
