@@ -1,4 +1,4 @@
-// What the collector counts of a run: time without scans, and scans before a start.
+// The collector counts the time without scans and the scans before a start.
 #include "rio_t/ros/diagnosis/run_evidence.h"
 
 #include <gtest/gtest.h>

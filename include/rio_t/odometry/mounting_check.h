@@ -26,7 +26,7 @@ class MountingCheck {
 
   /// The innovation of a scan that went into the window.
   void add(std::size_t radar, const UsedInnovation& innovation);
-  /// The velocity does not depend on the mountings: at rest. A new start begins so, too.
+  /// Call it at rest and at a new start: the velocity then does not depend on the mountings.
   void velocityKnown() { dv_W_.setZero(); }
   MountingTurn turnOf(std::size_t radar, const Extrinsics& told) const;
 

@@ -63,7 +63,8 @@ struct RadarAnswer : ScanAnswer {
   /// points that agree are no majority, are outvoted by witnesses of the prediction, or are partly those of
   /// the last one.
   std::optional<EgoVelocity> alone;
-  /// Of a used velocity in motion that most points agree on, if the prediction is linear.
+  /// Set if the scan was used, the radar moves, most points agree on its velocity, and the prediction is
+  /// linear.
   std::optional<UsedInnovation> used;
 };
 

@@ -49,7 +49,7 @@ inline std::string mountingAdvice(const RadarSummary& radar) {
              : kCheckBag;
 }
 
-/// [rad] So well a protractor tells a mounting that is held.
+/// [rad] A protractor measures a mounting so well. The user told it, and the estimator holds it.
 inline constexpr double kToldSigma = 1.0 * kDegree;
 
 /// How far the mounting is turned from the told one: as the scans say of a mounting that is held, or as
