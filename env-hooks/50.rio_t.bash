@@ -1,5 +1,5 @@
 # Completes the options of rio_t's programs, after `rosrun rio_t` and by their names. Sourced by setup.bash.
-# It asks the programs themselves: --help lists the options, --print-parameters the keys of --set.
+# It asks the programs themselves: --help lists the options, --print-config the keys of --set.
 
 _rio_t_programs="rio_t_bag rio_t_node calibrate evaluate simulate check_bag report.py draw_rig.py experiment.py"
 
@@ -15,7 +15,7 @@ _rio_t_configs() {
 
 _rio_t_keys() {
   local bag
-  bag=$(_rio_t_find rio_t_bag) && "$bag" --print-parameters 2>/dev/null | sed -n 's/^- key: \(.*\)$/\1=/p'
+  bag=$(_rio_t_find rio_t_bag) && "$bag" --print-config 2>/dev/null | sed -n 's/^\([a-z_]*\): .*$/\1=/p'
 }
 
 # Fills COMPREPLY for the program $1, the word $2 and the word before it $3.

@@ -182,16 +182,6 @@ void OptionSet::value(const std::string& name, const std::string& argument, cons
       shown_default.empty() ? help : help + " [" + shown_default + "]");
 }
 
-void OptionSet::valueOrNothing(const std::string& name, const std::string& argument, const std::string& help,
-                               const std::string& nothing_means, const Setter& set) {
-  add(name,
-      po::value<std::string>()
-          ->value_name(argument)
-          ->implicit_value(nothing_means)
-          ->notifier(named(name, set)),
-      help);
-}
-
 void OptionSet::values(const std::string& name, const std::string& argument, const std::string& help,
                        const Setter& set) {
   using Words = std::vector<std::string>;

@@ -57,9 +57,6 @@ class OptionSet {
   /// `shown_default` is for --help; empty: none.
   void value(const std::string& name, const std::string& argument, const std::string& help,
              const std::string& shown_default, const Setter& set);
-  /// `--name` alone means `--name=nothing_means`.
-  void valueOrNothing(const std::string& name, const std::string& argument, const std::string& help,
-                      const std::string& nothing_means, const Setter& set);
   /// It may be given several times; `set` is called for each value.
   void values(const std::string& name, const std::string& argument, const std::string& help,
               const Setter& set);

@@ -10,7 +10,7 @@ const ProgramText kText = {
     "rio_t_bag",
     "BAG... --config NAME_OR_PATH [--output-dir FOLDER] [--set key=value]...\n"
     "--print-config [--config NAME_OR_PATH] [--set key=value]...\n"
-    "--print-parameters[=markdown]\n",
+    "--print-parameters\n",
     "Plays ROS 1 bags through the radar-inertial odometry, as fast as the computer can. It needs no roscore.",
     "rosrun rio_t rio_t_bag walk.bag --config irs --output-dir out\n"
     "rosrun rio_t rio_t_bag part_0.bag part_1.bag --config my.yaml --output-dir out\n"
@@ -28,7 +28,7 @@ struct Arguments {
   std::string config, output_folder, ground_truth;
   ParameterEntries set;
   bool print_config = false;
-  std::string print_parameters;
+  bool print_parameters = false;
 };
 
 void addOptions(OptionSet& options, Arguments& a) {
@@ -39,13 +39,7 @@ void addOptions(OptionSet& options, Arguments& a) {
                "compares with these true poses (TUM); the same as --set ground_truth=FILE", a.ground_truth);
   options.section("Instead of playing");
   options.flag("print-config", "prints the configuration with every parameter", a.print_config);
-  options.valueOrNothing("print-parameters", "FORMAT",
-                         "prints the reference of all parameters: yaml, or markdown", "yaml",
-                         [&a](const std::string& format) {
-                           if (format != "yaml" && format != "markdown")
-                             throw UsageError("'" + format + "' is not one of yaml, markdown");
-                           a.print_parameters = format;
-                         });
+  options.flag("print-parameters", "prints the page docs/parameters.md", a.print_parameters);
 }
 
 int play(const Arguments& arguments, const Config& config, std::ostream& out, std::ostream& err) {
@@ -66,8 +60,8 @@ int play(const Arguments& arguments, const Config& config, std::ostream& out, st
 }
 
 int run(const Arguments& arguments, std::ostream& out, std::ostream& err) {
-  if (!arguments.print_parameters.empty()) {
-    out << (arguments.print_parameters == "yaml" ? parametersYaml() : parametersMarkdown());
+  if (arguments.print_parameters) {
+    out << parametersMarkdown();
     return kExitOk;
   }
   if (!arguments.print_config) {

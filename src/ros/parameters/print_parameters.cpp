@@ -1,8 +1,4 @@
-// The texts about the parameters, for people and programs. The registry has all of them.
-#include <yaml-cpp/yaml.h>
-
-#include <cmath>
-
+// The texts about the parameters. The registry has all of them.
 #include "../text.h"
 #include "parameter_list.h"
 
@@ -78,42 +74,9 @@ std::string toYaml(const Config& config) {
   return yaml;
 }
 
-std::string parametersYaml() {
-  Config config;
-  YAML::Emitter out;
-  out << YAML::BeginSeq;
-  const ParameterList list = parametersOf(config);
-  for (const Parameter& parameter : list.all()) {
-    const ParameterDescription& about = parameter.description;
-    const auto add = [&](const char* key, const auto& value) {
-      out << YAML::Key << key << YAML::Value << value;
-    };
-    out << YAML::BeginMap;
-    add("key", about.key);
-    add("section", about.group);
-    add("first", about.first);
-    add("type", about.type);
-    if (!about.unit.empty()) add("unit", about.unit);
-    if (std::isfinite(about.min)) add("min", numberText(about.min));
-    if (std::isfinite(about.max)) add("max", numberText(about.max));
-    if (!about.choices.empty()) {
-      out << YAML::Key << "choices" << YAML::Value << YAML::Flow << YAML::BeginSeq;
-      for (const std::string& each : about.choices) out << YAML::DoubleQuoted << each;
-      out << YAML::EndSeq;
-    }
-    add("expected", about.expected);
-    add("per_radar", about.of_radar);
-    out << YAML::Key << "default" << YAML::Value << YAML::Load(parameter.get().yaml());
-    out << YAML::Key << "description" << YAML::Value << YAML::DoubleQuoted << about.description;
-    out << YAML::EndMap;
-  }
-  out << YAML::EndSeq;
-  return std::string(out.c_str()) + "\n";
-}
-
 std::string parametersMarkdown() {
   std::string text =
-      "<!-- Written by `rio_t_bag --print-parameters=markdown`; do not edit by hand. -->\n"
+      "<!-- Written by `rio_t_bag --print-parameters`; do not edit by hand. -->\n"
       "# Parameters\n\n"
       "A configuration is a YAML file that names only what differs from the defaults below. The bag programs "
       "take it with `--config`, the live node with `config:=`. `--set key=value` changes one parameter. An "

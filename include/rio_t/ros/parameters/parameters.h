@@ -192,12 +192,7 @@ std::vector<ParameterDescription> parameterDescriptions();
 /// default-constructed one. Reading it back gives the same configuration.
 std::string toYaml(const Config& config);
 
-/// All that is known of every parameter, with its default, for programs: a YAML list of maps with the keys
-/// key, section, first, type, unit, min, max, choices, expected, per_radar, default and description. A key
-/// without a value (no unit, no bound) is left out.
-std::string parametersYaml();
-
-/// The same for people: docs/parameters.md.
+/// The page docs/parameters.md.
 std::string parametersMarkdown();
 
 /// Path of a configuration: `name_or_path` itself if it is a file, else that name, with or without ".yaml",
