@@ -103,75 +103,86 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   if (in_window_.has(scan.stamp) || judged_at_ == scan.stamp) return reject("duplicate_stamp");
   judged_at_ = scan.stamp;
   Seen seen = see(scan, context, smoother, answer);
-  const EgoVelocity& measured = seen.velocity;
-  if (!isValid(measured.status)) return reject(toString(answer.ego_velocity.status));
-
-  answer.offset_gain = offsetGain(seen);
-  const bool informs_offset = answer.offset_gain > 0.0;
-  // An offset that is wrong by c shows as (J + noise) c; nothing else tells of the noise's part.
-  if (informs_offset) {
-    answer.offset_half_width = seen.dv_dt_O.half_width;
-    answer.rate_variance = seen.dv_dt_O.variance * seen.prediction->t_O_variance;
-  }
-  seen.velocity.covariance.diagonal().array() += answer.rate_variance;
-  if (informs_offset) {
-    const Eigen::Vector3d J = answer.offset_gain * seen.dv_dt_O.mean;
-    answer.offset_information = J.dot(measured.covariance.ldlt().solve(J));
-  }
+  if (!isValid(seen.velocity.status)) return reject(toString(answer.ego_velocity.status));
+  informOffset(seen, answer);
   const RadarScanTime taken{scan.stamp, answer.offset_gain, answer.offset_half_width, offset()};
-  if (isTightlyCoupled() && measured.status == EgoVelocityStatus::kMoving) {
-    const EgoVelocity world = staticWorld(scan, seen);
-    if (world.inliers.empty()) return reject("too_few_inliers");
-    answer.doppler = DopplerMeasurement{
-        taken, std::make_shared<DopplerLikelihood>(estimator_.likelihood(scan, world.inliers, world.v_R)),
-        measured.told_variance.array() + answer.rate_variance, options_.smoother.huber_threshold};
+  if (isTightlyCoupled() && seen.velocity.status == EgoVelocityStatus::kMoving) {
+    answer.doppler = dopplerOf(scan, seen, taken, answer.rate_variance);
+    if (!answer.doppler) return reject("too_few_inliers");
   }
 
-  // A minority that sides with the prediction has more noise than its covariance says.
-  const bool can_be_judged = seen.moves && seen.tilt_is_known && hasMajority(measured);
-  std::optional<Innovation> all;  // of the points borrowed, too
-  if (seen.prior) all = innovation(scan.stamp, *seen.prior, measured, &seen);
-  std::optional<Innovation> own;  // of its own points, if it tells the offset
-  if (can_be_judged && informs_offset) {
-    EgoVelocity of_own = measured;
-    if (seen.has_borrowed) {
-      of_own = around(*seen.prior, scan, measured);
-      of_own.covariance.diagonal().array() += answer.rate_variance;
-    }
-    if (isValid(of_own.status)) own = innovation(scan.stamp, *seen.prior, of_own, &seen);
-  }
-  if (own) answer.offset_stepped = step_detector_.stepped(*own, seen.prediction->scan.R_WR());
+  Innovations d;
+  if (seen.prior) d.all = innovation(scan.stamp, *seen.prior, seen.velocity, &seen);
+  if (answer.offset_gain > 0.0) d.own = ownInnovation(scan, seen, answer.rate_variance);
+  answer.offset_stepped = d.own && step_detector_.stepped(*d.own, seen.prediction->scan.R_WR());
   if (answer.offset_stepped) {
     in_window_.stepOffset(smoother, scan.stamp);
     followOffsetSteps();
   }
-  if (all &&
-      gate_.rejects(options_.smoother, *all, isUnanimous(measured), seen.tilt_is_known, context.last_used))
+  if (d.all && gate_.rejects(options_.smoother, *d.all, isUnanimous(seen.velocity), seen.tilt_is_known,
+                             context.last_used))
     return reject("innovation");
-  const bool added =
-      answer.doppler
-          ? in_window_.add(smoother, *answer.doppler)
-          : in_window_.add(smoother, RadarVelocityMeasurement{taken, measured.v_R, measured.covariance});
+  const bool added = answer.doppler
+                         ? in_window_.add(smoother, *answer.doppler)
+                         : in_window_.add(smoother, RadarVelocityMeasurement{taken, seen.velocity.v_R,
+                                                                             seen.velocity.covariance});
   if (!added) return reject("older_than_window");
   gate_.used();
-  if (own) offset_uncertainty_.add(*own);
+  learn(scan, seen, d, answer);
+  return answer;
+}
+
+void RadarChannel::informOffset(Seen& seen, RadarAnswer& answer) {
+  answer.offset_gain = offsetGain(seen);
+  if (answer.offset_gain == 0.0) return;
+  // An offset that is wrong by c shows as (J + noise) c; nothing else tells of the noise's part.
+  answer.offset_half_width = seen.dv_dt_O.half_width;
+  answer.rate_variance = seen.dv_dt_O.variance * seen.prediction->t_O_variance;
+  seen.velocity.covariance.diagonal().array() += answer.rate_variance;
+  const Eigen::Vector3d J = answer.offset_gain * seen.dv_dt_O.mean;
+  answer.offset_information = J.dot(seen.velocity.covariance.ldlt().solve(J));
+}
+
+std::optional<DopplerMeasurement> RadarChannel::dopplerOf(const RadarScan& scan, const Seen& seen,
+                                                          const RadarScanTime& taken,
+                                                          double rate_variance) const {
+  const EgoVelocity world = staticWorld(scan, seen);
+  if (world.inliers.empty()) return std::nullopt;
+  return DopplerMeasurement{
+      taken, std::make_shared<DopplerLikelihood>(estimator_.likelihood(scan, world.inliers, world.v_R)),
+      seen.velocity.told_variance.array() + rate_variance, options_.smoother.huber_threshold};
+}
+
+std::optional<Innovation> RadarChannel::ownInnovation(const RadarScan& scan, const Seen& seen,
+                                                      double rate_variance) const {
+  if (!seen.canBeJudged()) return std::nullopt;
+  EgoVelocity own = seen.velocity;
+  if (seen.has_borrowed) {
+    own = around(*seen.prior, scan, seen.velocity);
+    own.covariance.diagonal().array() += rate_variance;
+  }
+  if (!isValid(own.status)) return std::nullopt;
+  return innovation(scan.stamp, *seen.prior, own, &seen);
+}
+
+void RadarChannel::learn(const RadarScan& scan, const Seen& seen, const Innovations& d, RadarAnswer& answer) {
+  if (d.own) offset_uncertainty_.add(*d.own);
   if (seen.moves) {
     OffsetScan followed = seen.prediction->scan;
-    followed.measured = measured.covariance;
+    followed.measured = seen.velocity.covariance;
     step_detector_.follow(changeWithOffset(seen), followed);
   }
   // A borrowed point must not teach twice.
-  if (!seen.is_own || sharesPoints(seen, learned_at_)) return answer;
-  if (can_be_judged)
-    answer.used = UsedInnovation{*all, measured.v_R, seen.prior->covariance, seen.prediction->scan.R_WR()};
-  if (!answer.at_rest) {
-    const DopplerLikelihood* world =
-        answer.doppler && !seen.has_borrowed ? answer.doppler->points.get() : nullptr;
-    estimator_.learn(seen.pooled, measured, seen.prior, seen.pooled.points.size() - scan.points.size(),
-                     world);
-    learned_at_ = scan.stamp;
-  }
-  return answer;
+  if (!seen.is_own || sharesPoints(seen, learned_at_)) return;
+  if (seen.canBeJudged())
+    answer.used =
+        UsedInnovation{*d.all, seen.velocity.v_R, seen.prior->covariance, seen.prediction->scan.R_WR()};
+  if (answer.at_rest) return;
+  const DopplerLikelihood* world =
+      answer.doppler && !seen.has_borrowed ? answer.doppler->points.get() : nullptr;
+  estimator_.learn(seen.pooled, seen.velocity, seen.prior, seen.pooled.points.size() - scan.points.size(),
+                   world);
+  learned_at_ = scan.stamp;
 }
 
 RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& context,

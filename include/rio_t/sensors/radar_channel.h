@@ -133,6 +133,12 @@ class RadarChannel {
     bool moves = false;
     OffsetDerivative dv_dt_O;  ///< if it moves, of the predicted velocity with respect to t_O
     bool tilt_is_known = false;
+    /// A minority that sides with the prediction has more noise than its covariance says.
+    bool canBeJudged() const { return moves && tilt_is_known && hasMajority(velocity); }
+  };
+  struct Innovations {
+    std::optional<Innovation> all;  ///< of all points, borrowed ones too
+    std::optional<Innovation> own;  ///< of the scan's own points, if they tell the offset
   };
   /// Also sets what the answer says of velocity, rest and health.
   Seen see(const RadarScan& scan, const ScanContext& context, const FixedLagSmoother& smoother,
@@ -144,6 +150,16 @@ class RadarChannel {
   double offsetGain(Seen& seen);
   /// J_O of an Innovation, of a scan that moves.
   Eigen::Vector3d changeWithOffset(const Seen& seen) const;
+  /// Sets what the scan tells of the offset, and adds the noise of the derivative to the velocity.
+  void informOffset(Seen& seen, RadarAnswer& answer);
+  /// The scan's own points as a term of the window; none if no point is of the static world.
+  std::optional<DopplerMeasurement> dopplerOf(const RadarScan& scan, const Seen& seen,
+                                              const RadarScanTime& taken, double rate_variance) const;
+  /// See Innovations; of a scan that tells the offset.
+  std::optional<Innovation> ownInnovation(const RadarScan& scan, const Seen& seen,
+                                          double rate_variance) const;
+  /// What a scan that was used teaches: the lag of the offset, the noise of the points.
+  void learn(const RadarScan& scan, const Seen& seen, const Innovations& d, RadarAnswer& answer);
   /// What of the scan goes into the window: its own points, which are the inliers, and the velocity at which
   /// their likelihood is set up.
   EgoVelocity staticWorld(const RadarScan& scan, const Seen& seen) const;
