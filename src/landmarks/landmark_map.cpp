@@ -81,74 +81,82 @@ std::optional<LandmarkMap::Prediction> LandmarkMap::predict(const FixedLagSmooth
   return prediction;
 }
 
-LandmarkMap::Association LandmarkMap::associate(const Prediction& prediction, const Extrinsics& T_IR,
-                                                const std::vector<Detection>& detections) const {
-  struct Pair {
-    std::size_t detection, landmark;
-    double squared_sigmas, score;
-  };
+LandmarkMap::Expected LandmarkMap::expected(const Prediction& prediction, const Extrinsics& T_IR,
+                                            std::size_t column) const {
   const Eigen::MatrixXd& P = prediction.state.covariance;
   const auto shared = static_cast<Eigen::Index>(prediction.first_landmark);
-  std::vector<Pair> pairs;
-  std::vector<bool> is_free(detections.size(), true);
+  const SeenPoint seen = seenFrom(MotionView(prediction.state.x.data()), ImuDelta(), g_W_, T_IR,
+                                  landmarks_[prediction.landmarks[column]].p_W());
+  // The derivative by state, extrinsics and landmark, in their tangents.
+  Eigen::Matrix<double, 3, Eigen::Dynamic> J(3, shared + 3);
+  J.setZero();
+  J.leftCols<3>() = seen.J_motion.leftCols<3>();
+  J.middleCols<3>(StateBlock::kP) = seen.J_motion.middleCols<3>(StateBlock::kPStored);
+  const Eigen::Index calibrated = shared - StateBlock::kTangent;
+  if (calibrated > 0) J.middleCols<3>(StateBlock::kTangent) = seen.J_extrinsics.leftCols<3>();
+  if (calibrated > 3) J.middleCols<3>(StateBlock::kTangent + 3) = seen.J_extrinsics.rightCols<3>();
+  J.rightCols<3>() = seen.J_point;
+  Eigen::MatrixXd own(shared + 3, shared + 3);
+  const Eigen::Index at = shared + 3 * static_cast<Eigen::Index>(column);
+  own.topLeftCorner(shared, shared) = P.topLeftCorner(shared, shared);
+  own.topRightCorner(shared, 3) = P.block(0, at, shared, 3);
+  own.bottomLeftCorner(3, shared) = P.block(at, 0, 3, shared);
+  own.bottomRightCorner<3, 3>() = P.block<3, 3>(at, at);
+  return {seen.p_R, J * own * J.transpose()};
+}
+
+LandmarkMap::Association LandmarkMap::associate(const Prediction& prediction, const Extrinsics& T_IR,
+                                                const std::vector<Detection>& detections) const {
   std::vector<PolarNoise> noises;
   std::vector<double> spreads;  // [m^2] trace of the covariance
   for (const Detection& detection : detections) {
     noises.emplace_back(detection.z);
     spreads.push_back(noises.back().covariance().trace());
   }
-  std::vector<double> nearest(landmarks_.size(), std::numeric_limits<double>::infinity());
+  Association result;
+  std::vector<Pair> pairs;
+  std::vector<bool> is_free(detections.size(), true);
   for (std::size_t column = 0; column < prediction.landmarks.size(); ++column) {
-    const Landmark& landmark = landmarks_[prediction.landmarks[column]];
-    const SeenPoint seen =
-        seenFrom(MotionView(prediction.state.x.data()), ImuDelta(), g_W_, T_IR, landmark.p_W());
-    // The derivative by state, extrinsics and landmark, in their tangents.
-    Eigen::Matrix<double, 3, Eigen::Dynamic> J(3, shared + 3);
-    J.setZero();
-    J.leftCols<3>() = seen.J_motion.leftCols<3>();
-    J.middleCols<3>(StateBlock::kP) = seen.J_motion.middleCols<3>(StateBlock::kPStored);
-    const Eigen::Index calibrated = shared - StateBlock::kTangent;
-    if (calibrated > 0) J.middleCols<3>(StateBlock::kTangent) = seen.J_extrinsics.leftCols<3>();
-    if (calibrated > 3) J.middleCols<3>(StateBlock::kTangent + 3) = seen.J_extrinsics.rightCols<3>();
-    J.rightCols<3>() = seen.J_point;
-    Eigen::MatrixXd own(shared + 3, shared + 3);
-    const Eigen::Index at = shared + 3 * static_cast<Eigen::Index>(column);
-    own.topLeftCorner(shared, shared) = P.topLeftCorner(shared, shared);
-    own.topRightCorner(shared, 3) = P.block(0, at, shared, 3);
-    own.bottomLeftCorner(3, shared) = P.block(at, 0, 3, shared);
-    own.bottomRightCorner<3, 3>() = P.block<3, 3>(at, at);
-    const Eigen::Matrix3d predicted = J * own * J.transpose();  // of the point in R [m^2]
+    const std::size_t k = prediction.landmarks[column];
+    const LandmarkPoint& point = landmarks_[k].point;
+    const Expected expected = this->expected(prediction, T_IR, column);
+    double nearest = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < detections.size(); ++i) {
       const Detection& detection = detections[i];
-      const double away = (detection.z.position_R - seen.p_R).squaredNorm();
-      if (away > kElsewhere * (predicted.trace() + spreads[i])) continue;
-      const PolarResidual residual = noises[i].at(seen.p_R);
-      Eigen::Matrix3d S = residual.J * predicted * residual.J.transpose();
+      const double away = (detection.z.position_R - expected.p_R).squaredNorm();
+      if (away > kElsewhere * (expected.covariance.trace() + spreads[i])) continue;
+      const PolarResidual residual = noises[i].at(expected.p_R);
+      Eigen::Matrix3d S = residual.J * expected.covariance * residual.J.transpose();
       S.diagonal().array() += 1.0;
       const double squared = residual.value.dot(S.llt().solve(residual.value));
       if (squared > kElsewhere) continue;
       is_free[i] = false;
-      nearest[prediction.landmarks[column]] = std::min(nearest[prediction.landmarks[column]], squared);
-      const double strength = (detection.snr_db - landmark.point.snr_db) / kEchoScatter;
-      const double n = static_cast<double>(landmark.point.sightings);
+      nearest = std::min(nearest, squared);
+      const double strength = (detection.snr_db - point.snr_db) / kEchoScatter;
+      const double n = static_cast<double>(point.sightings);
       const double score = squared + std::log(S.determinant()) + strength * strength / (1.0 + 1.0 / n);
-      pairs.push_back({i, prediction.landmarks[column], squared, score});
+      pairs.push_back({{i, k, squared}, score});
     }
+    if (nearest > Candidates::kGate && nearest <= kElsewhere) result.conflicts.push_back(k);
   }
-  Association result;
   for (std::size_t i = 0; i < detections.size(); ++i)
     if (is_free[i]) result.free.push_back(i);
+  result.matches = clearMatches(pairs);
+  return result;
+}
+
+std::vector<LandmarkMap::Match> LandmarkMap::clearMatches(const std::vector<Pair>& pairs) {
+  std::vector<Match> matches;
   for (const Pair& pair : pairs) {
-    if (pair.squared_sigmas > Candidates::kGate) continue;
+    if (pair.match.squared_sigmas > Candidates::kGate) continue;
     const bool is_clear = std::none_of(pairs.begin(), pairs.end(), [&](const Pair& other) {
-      const bool competes = (other.detection == pair.detection) != (other.landmark == pair.landmark);
+      const bool competes =
+          (other.match.detection == pair.match.detection) != (other.match.landmark == pair.match.landmark);
       return competes && other.score < pair.score + kClearly;
     });
-    if (is_clear) result.matches.push_back({pair.detection, pair.landmark, pair.squared_sigmas});
+    if (is_clear) matches.push_back(pair.match);
   }
-  for (std::size_t k = 0; k < landmarks_.size(); ++k)
-    if (nearest[k] > Candidates::kGate && nearest[k] <= kElsewhere) result.conflicts.push_back(k);
-  return result;
+  return matches;
 }
 
 LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<Detection>& detections,
@@ -184,12 +192,23 @@ LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<
   }
   answer.matched = association.matches.size();
   for (const std::size_t k : association.conflicts) landmarks_[k].conflicts += 1.0;
+  for (const Detection& detection : detections) reach_ = std::max(reach_, detection.z.position_R.norm());
+  candidates_.forgetOld(prediction.measured, smoother.node(0).time);
+  addCandidates(prediction, detections, association, node, delta, extrinsics);
+  dropUseless(prediction.state.x.p_W());
+  promote(smoother, prediction.measured);
+  answer.map = points();
+  return answer;
+}
 
+void LandmarkMap::addCandidates(const Prediction& prediction, const std::vector<Detection>& detections,
+                                const Association& association, const Block& node, const ImuDelta& delta,
+                                Block& extrinsics) {
   const StateBlock& x = prediction.state.x;
+  const Extrinsics T_IR = toExtrinsics(extrinsics.x.data());
   const Eigen::Quaterniond q_WR = x.q_WI() * T_IR.q_IR;
   const Eigen::Matrix3d R_WR = q_WR.toRotationMatrix();
   const Eigen::Vector3d radar_W = x.p_W() + x.q_WI() * T_IR.l_I;
-  for (const Detection& detection : detections) reach_ = std::max(reach_, detection.z.position_R.norm());
   std::vector<PlacedDetection> placed;
   for (const std::size_t i : association.free) {
     const Detection& detection = detections[i];
@@ -198,12 +217,7 @@ LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<
                       detection.snr_db, prediction.measured,
                       Sighting{*node.time, delta, &extrinsics, detection.z}});
   }
-  candidates_.forgetOld(prediction.measured, smoother.node(0).time);
   candidates_.add(placed);
-  dropUseless(x.p_W());
-  promote(smoother, prediction.measured);
-  answer.map = points();
-  return answer;
 }
 
 void LandmarkMap::judge(const Prediction& prediction, const Extrinsics& T_IR,

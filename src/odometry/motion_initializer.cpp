@@ -105,64 +105,71 @@ std::optional<Initialization> MotionInitializer::solve(const ImuBuffer& imu,
     return std::nullopt;
   }
 
-  const Line line = fitLine(window, time, imu);
-  const double gravity_error = line.g_I.norm() + g_W_.z();
-  Initialization result;
-  result.time = time;
-  result.from = InitializedFrom::kMotion;
-  if (std::abs(gravity_error) < options_.max_gravity_error) {
-    const PoseAnchor anchor = anchorAt(time);
-    StateBlock& x = result.prior.x0;
-    x.q_WI() = withGravity(anchor.q_WI, line.g_I);
-    x.p_W() = anchor.p_W;
-    x.v_W() = x.q_WI() * line.v_I;
-    result.prior.t_O0 = smoother_.time_offset_initial;
-    result.prior.T_IR0 = T_IR_;
-    const Eigen::VectorXd calibration = calibrationSigmas(smoother_);
-    const Eigen::Index size = StateBlock::kTangent + calibration.size();
-    result.prior.root.J = Eigen::MatrixXd::Zero(size, size);
-    result.prior.root.r0 = Eigen::VectorXd::Zero(size);
-    const auto set = [&](int first, double sigma) {
-      result.prior.root.J.diagonal().segment<3>(first).setConstant(1.0 / sigma);
-    };
-    // The prior holds heading and position, and neither tilt nor velocity.
-    Eigen::Matrix4d covariance = anchor.covariance;
-    covariance(0, 0) += smoother_.prior_sigma_yaw * smoother_.prior_sigma_yaw;
-    covariance.diagonal().tail<3>().array() +=
-        smoother_.prior_sigma_position * smoother_.prior_sigma_position;
-    result.prior.root.J.topLeftCorner<4, StateBlock::kTangent>() =
-        covariance.llt().matrixL().solve(poseInW(x.q_WI()));
-    set(StateBlock::kBg, options_.sigma_gyro_bias);
-    set(StateBlock::kBa, options_.sigma_accel_bias);
-    result.prior.root.J.diagonal().tail(calibration.size()) = calibration.cwiseInverse();
-    const NodePrior known = result.prior;
-    std::optional<double> outliers = 0.0;
-    for (int round = 0; round < kScaleRounds && outliers && *outliers <= options_.max_outlier_fraction;
-         ++round) {
-      result.prior = known;
-      outliers = refine(window, time, imu, result.model_error_scale, result.prior);
-    }
-    if (outliers && *outliers <= options_.max_outlier_fraction) {
-      waiting_for_.clear();
-      clear();
-      return result;
-    }
-    waiting_for_ =
-        !outliers ? "motion: the radar velocities do not determine tilt and velocity"
-                  : formatted(
-                        "radar and IMU that agree: %.0f %% of the radar velocities do not fit the IMU, at "
-                        "most %.0f %% allowed: extrinsics, Doppler sign, units?",
-                        100.0 * *outliers, 100.0 * options_.max_outlier_fraction);
-  } else {
-    waiting_for_ = formatted(
-        "radar and IMU that agree: together they show %.2f m/s^2 as gravity instead of %.2f: units, "
-        "extrinsics, Doppler sign?",
-        line.g_I.norm(), -g_W_.z());
+  if (std::optional<Initialization> found = initialize(window, time, imu, anchorAt)) {
+    clear();
+    return found;
   }
   velocities_.erase(velocities_.begin(),
                     std::find_if(velocities_.begin(), velocities_.end(),
                                  [&](const auto& z) { return z.stamp > time - 0.5 * options_.window; }));
   return std::nullopt;
+}
+
+std::optional<Initialization> MotionInitializer::initialize(const Velocities& window, Time time,
+                                                            const ImuBuffer& imu,
+                                                            const std::function<PoseAnchor(Time)>& anchorAt) {
+  const Line line = fitLine(window, time, imu);
+  if (std::abs(line.g_I.norm() - g_W_.norm()) >= options_.max_gravity_error) {
+    waiting_for_ = formatted(
+        "radar and IMU that agree: together they show %.2f m/s^2 as gravity instead of %.2f: units, "
+        "extrinsics, Doppler sign?",
+        line.g_I.norm(), g_W_.norm());
+    return std::nullopt;
+  }
+  const NodePrior known = priorOf(line, anchorAt(time));
+  Initialization result;
+  result.time = time;
+  result.from = InitializedFrom::kMotion;
+  for (int round = 0; round < kScaleRounds; ++round) {
+    result.prior = known;
+    const std::optional<double> outliers = refine(window, time, imu, result.model_error_scale, result.prior);
+    if (!outliers) {
+      waiting_for_ = "motion: the radar velocities do not determine tilt and velocity";
+      return std::nullopt;
+    }
+    if (*outliers > options_.max_outlier_fraction) {
+      waiting_for_ = formatted(
+          "radar and IMU that agree: %.0f %% of the radar velocities do not fit the IMU, at most %.0f %% "
+          "allowed: extrinsics, Doppler sign, units?",
+          100.0 * *outliers, 100.0 * options_.max_outlier_fraction);
+      return std::nullopt;
+    }
+  }
+  waiting_for_.clear();
+  return result;
+}
+
+NodePrior MotionInitializer::priorOf(const Line& line, const PoseAnchor& anchor) const {
+  NodePrior prior;
+  StateBlock& x = prior.x0;
+  x.q_WI() = withGravity(anchor.q_WI, line.g_I);
+  x.p_W() = anchor.p_W;
+  x.v_W() = x.q_WI() * line.v_I;
+  prior.t_O0 = smoother_.time_offset_initial;
+  prior.T_IR0 = T_IR_;
+  const Eigen::VectorXd calibration = calibrationSigmas(smoother_);
+  const Eigen::Index size = StateBlock::kTangent + calibration.size();
+  Eigen::MatrixXd& J = prior.root.J;
+  J = Eigen::MatrixXd::Zero(size, size);
+  prior.root.r0 = Eigen::VectorXd::Zero(size);
+  Eigen::Matrix4d covariance = anchor.covariance;
+  covariance(0, 0) += smoother_.prior_sigma_yaw * smoother_.prior_sigma_yaw;
+  covariance.diagonal().tail<3>().array() += smoother_.prior_sigma_position * smoother_.prior_sigma_position;
+  J.topLeftCorner<4, StateBlock::kTangent>() = covariance.llt().matrixL().solve(poseInW(x.q_WI()));
+  J.diagonal().segment<3>(StateBlock::kBg).setConstant(1.0 / options_.sigma_gyro_bias);
+  J.diagonal().segment<3>(StateBlock::kBa).setConstant(1.0 / options_.sigma_accel_bias);
+  J.diagonal().tail(calibration.size()) = calibration.cwiseInverse();
+  return prior;
 }
 
 std::string toString(InitializedFrom from) { return from == InitializedFrom::kRest ? "rest" : "motion"; }

@@ -94,10 +94,11 @@ BatchSmoother::BatchSmoother(const SmootherOptions& options, const BatchOptions&
       motion_manifold_(std::make_shared<MotionManifold>()),
       bias_manifold_(std::make_shared<VectorManifold>(StateBlock::kBiases)),
       offset_manifold_(std::make_shared<VectorManifold>(1)),
-      extrinsics_manifold_(std::make_shared<ExtrinsicsManifold>(options.estimate_extrinsics)) {}
+      extrinsics_manifold_(std::make_shared<ExtrinsicsManifold>(options.estimate_extrinsics)),
+      loss_(huberLoss(options.huber_threshold)) {}
 
-std::vector<Block*> BatchSmoother::start(const BatchProblem& problem, const StateBlock& x,
-                                         const std::vector<Extrinsics>& mounting, Graph& graph) const {
+void BatchSmoother::start(const BatchProblem& problem, const StateBlock& x,
+                          const std::vector<Extrinsics>& mounting, Graph& graph) const {
   Window& window = graph.window;
   Block& motion = window.addNode(problem.start, motion_manifold_, storedMotion(problem.prior.x0));
   Block& biases = addBiases(window, problem.start, problem.prior.x0);
@@ -136,7 +137,7 @@ std::vector<Block*> BatchSmoother::start(const BatchProblem& problem, const Stat
   biases.x = storedBiases(x);
   for (std::size_t k = 0; k < mounting.size(); ++k)
     if (is_estimated) graph.extrinsics[k]->x = stored(mounting[k]);
-  return offsets;
+  for (Block* offset : offsets) graph.clocks.push_back({offset});
 }
 
 BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std::vector<double>& t_O,
@@ -157,68 +158,74 @@ BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std
     return carried(near.x, near.time, time, *imu_, g_W_);
   };
 
-  const std::shared_ptr<ceres::LossFunction> loss = huberLoss(options_.huber_threshold);
   const double spacing = minNodeSpacing(options_.time_offset_model);
   Graph graph;
   graph.scans.resize(scans);
-  Window& window = graph.window;
-  // The newest of each radar.
-  std::vector<Block*> offsets = start(problem, stateAt(problem.start), mounting, graph);
-  std::vector<bool> stepped(offsets.size(), false);  // since the newest
+  start(problem, stateAt(problem.start), mounting, graph);
   for (const std::size_t i : order) {
     const BatchScan& scan = problem.scans[i];
-    if (times[i] - *graph.nodes.back().motion->time > spacing) {
-      const Graph::Node previous = graph.nodes.back();
-      const Time since = *previous.motion->time;
-      const StateBlock x = stateAt(times[i]);
-      Graph::Node next{&window.addNode(times[i], motion_manifold_, storedMotion(x)), previous.biases};
-      if (since >= *next.biases->time) {
-        next.biases = &addBiases(window, since, x);
-        const double dt = *next.biases->time - *previous.biases->time;
-        window.add(std::make_unique<RandomWalkFactor>(biasWalkVariance(noise_, dt).cwiseSqrt()),
-                   {previous.biases, next.biases});
-      }
-      const StateView at(next.motion->x.data(), next.biases->x.data());
-      window.add(
-          std::make_unique<ImuFactor>(preintegrate(*imu_, since, times[i], at.b_g, at.b_a, noise_), g_W_),
-          {previous.motion, next.motion, next.biases});
-      graph.nodes.push_back(next);
-    }
-    const Graph::Node& node = graph.nodes.back();
-    const std::size_t clock = options_.time_offset_shared ? 0 : scan.radar;
-    Block*& offset = offsets[clock];
-    stepped[clock] = stepped[clock] || scan.offset_stepped;
-    if (options_.estimate_time_offset && *offset->time == problem.start) offset->x[0] = t_O[i];
-    const double dt = *node.motion->time - *offset->time;
-    if (dt > 0.0) {
-      Block& previous = *offset;
-      offset = &addOffset(window, *node.motion->time, t_O[i]);
-      const double anew = options_.time_offset_shared || problem.time_offset_sigmas.empty()
-                              ? options_.time_offset_sigma
-                              : problem.time_offset_sigmas[scan.radar];
-      const double sigma = stepped[clock] ? anew : options_.time_offset_noise * std::sqrt(dt);
-      window.add(std::make_unique<RandomWalkFactor>(Eigen::VectorXd::Constant(1, sigma)),
-                 {&previous, offset});
-      stepped[clock] = false;
-    }
-    Block* extrinsics = graph.extrinsics[scan.radar];
-    graph.scans[i] = {graph.nodes.size() - 1, offset, extrinsics};
-    // Placed anew where the offset moves, so first order is enough.
-    const auto placed = [&](auto z) {
-      if (atMeasurement() || z.offset_gain == 0.0) z.linear_from_t_O = t_O[i];
-      return z;
-    };
-    if (scan.doppler) {
-      window.add(std::make_unique<DopplerFactor>(placed(*scan.doppler), *node.motion->time, model()),
-                 {node.motion, node.biases, offset, extrinsics});
-    } else if (scan.velocity) {
-      window.add(std::make_unique<RadarVelocityFactor>(placed(*scan.velocity), *node.motion->time, model()),
-                 {node.motion, node.biases, offset, extrinsics}, loss);
-    }
-    if (scan.rest_velocity_sigma)
-      window.add(std::make_unique<ZeroVelocityFactor>(*scan.rest_velocity_sigma), {node.motion});
+    if (times[i] - *graph.nodes.back().motion->time > spacing) addNode(times[i], stateAt(times[i]), graph);
+    Block* offset = offsetOf(problem, scan, t_O[i], graph);
+    graph.scans[i] = {graph.nodes.size() - 1, offset, graph.extrinsics[scan.radar]};
+    addTerms(scan, graph.scans[i], t_O[i], graph);
   }
   return graph;
+}
+
+void BatchSmoother::addNode(Time time, const StateBlock& x, Graph& graph) const {
+  Window& window = graph.window;
+  const Graph::Node previous = graph.nodes.back();
+  const Time since = *previous.motion->time;
+  Graph::Node next{&window.addNode(time, motion_manifold_, storedMotion(x)), previous.biases};
+  if (since >= *next.biases->time) {
+    next.biases = &addBiases(window, since, x);
+    const double dt = *next.biases->time - *previous.biases->time;
+    window.add(std::make_unique<RandomWalkFactor>(biasWalkVariance(noise_, dt).cwiseSqrt()),
+               {previous.biases, next.biases});
+  }
+  const StateView at(next.motion->x.data(), next.biases->x.data());
+  window.add(std::make_unique<ImuFactor>(preintegrate(*imu_, since, time, at.b_g, at.b_a, noise_), g_W_),
+             {previous.motion, next.motion, next.biases});
+  graph.nodes.push_back(next);
+}
+
+Block* BatchSmoother::offsetOf(const BatchProblem& problem, const BatchScan& scan, double t_O,
+                               Graph& graph) const {
+  auto& [offset, stepped] = graph.clocks[options_.time_offset_shared ? 0 : scan.radar];
+  stepped = stepped || scan.offset_stepped;
+  if (options_.estimate_time_offset && *offset->time == problem.start) offset->x[0] = t_O;
+  const Time time = *graph.nodes.back().motion->time;
+  const double dt = time - *offset->time;
+  if (dt <= 0.0) return offset;
+  Block& previous = *offset;
+  offset = &addOffset(graph.window, time, t_O);
+  const double anew = options_.time_offset_shared || problem.time_offset_sigmas.empty()
+                          ? options_.time_offset_sigma
+                          : problem.time_offset_sigmas[scan.radar];
+  const double sigma = stepped ? anew : options_.time_offset_noise * std::sqrt(dt);
+  graph.window.add(std::make_unique<RandomWalkFactor>(Eigen::VectorXd::Constant(1, sigma)),
+                   {&previous, offset});
+  stepped = false;
+  return offset;
+}
+
+void BatchSmoother::addTerms(const BatchScan& scan, const Graph::Scan& at, double t_O, Graph& graph) const {
+  const Graph::Node& node = graph.nodes[at.node];
+  const Time time = *node.motion->time;
+  const std::vector<Block*> blocks = {node.motion, node.biases, at.offset, at.extrinsics};
+  // Placed anew where the offset moves, so first order is enough.
+  const auto placed = [&](auto z) {
+    if (atMeasurement() || z.offset_gain == 0.0) z.linear_from_t_O = t_O;
+    return z;
+  };
+  if (scan.doppler) {
+    graph.window.add(std::make_unique<DopplerFactor>(placed(*scan.doppler), time, model()), blocks);
+  } else if (scan.velocity) {
+    graph.window.add(std::make_unique<RadarVelocityFactor>(placed(*scan.velocity), time, model()), blocks,
+                     loss_);
+  }
+  if (scan.rest_velocity_sigma)
+    graph.window.add(std::make_unique<ZeroVelocityFactor>(*scan.rest_velocity_sigma), {node.motion});
 }
 
 Block& BatchSmoother::addOffset(Window& window, Time time, double t_O) const {

@@ -57,6 +57,22 @@ class LandmarkMap {
   };
   Association associate(const Prediction& prediction, const Extrinsics& T_IR,
                         const std::vector<Detection>& detections) const;
+  /// Where a landmark of the prediction is seen.
+  struct Expected {
+    Eigen::Vector3d p_R;
+    Eigen::Matrix3d covariance;  ///< of p_R [m^2]
+  };
+  Expected expected(const Prediction& prediction, const Extrinsics& T_IR, std::size_t column) const;
+  struct Pair {
+    Match match;
+    double score;  ///< twice the negative logarithm of its likelihood
+  };
+  /// The pairs within the gate whose detection and landmark have no other likely pair.
+  static std::vector<Match> clearMatches(const std::vector<Pair>& pairs);
+  /// The detections that belong to no landmark become candidates. `delta` as in a LandmarkFactor.
+  void addCandidates(const Prediction& prediction, const std::vector<Detection>& detections,
+                     const Association& association, const Block& node, const ImuDelta& delta,
+                     Block& extrinsics);
   void retire(std::size_t k);
   void dropUseless(const Eigen::Vector3d& p_W);
   void makeRoom(Time now);

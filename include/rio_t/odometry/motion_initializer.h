@@ -91,6 +91,11 @@ class MotionInitializer {
     Eigen::Vector3d g_I, v_I;
   };
   Line fitLine(const Velocities& velocities, Time time, const ImuBuffer& imu) const;
+  /// The state at `time`, or none; then waitingFor() says why.
+  std::optional<Initialization> initialize(const Velocities& window, Time time, const ImuBuffer& imu,
+                                           const std::function<PoseAnchor(Time)>& anchorAt);
+  /// The state of the line. Heading, position, biases and calibration have sigmas, tilt and velocity none.
+  NodePrior priorOf(const Line& line, const PoseAnchor& anchor) const;
   /// Improves `prior.x0` and `prior.t_O0`, around which it starts, and adds the information of the
   /// velocities, with model errors of `scale`. Improves `scale` by the scatter of the velocities around the
   /// solution. Returns the share of outliers; none if the velocities do not determine the state.

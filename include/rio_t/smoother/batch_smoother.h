@@ -100,12 +100,23 @@ class BatchSmoother {
     };
     std::vector<Scan> scans;
     std::vector<Block*> extrinsics;  ///< by radar
+    struct Clock {
+      Block* offset;         ///< the newest
+      bool stepped = false;  ///< since the newest
+    };
+    std::vector<Clock> clocks;  ///< by radar; the first is that of all if the offset is shared
   };
   Graph place(const BatchProblem& problem, const std::vector<double>& t_O,
               const std::vector<NodeEstimate>& guess, const std::vector<Extrinsics>& mounting) const;
-  /// Adds the first node, the calibration of each radar and their priors. Returns each radar's first offset.
-  std::vector<Block*> start(const BatchProblem& problem, const StateBlock& x,
-                            const std::vector<Extrinsics>& mounting, Graph& graph) const;
+  /// Adds the first node, the calibration of each radar and their priors.
+  void start(const BatchProblem& problem, const StateBlock& x, const std::vector<Extrinsics>& mounting,
+             Graph& graph) const;
+  /// Adds a node after the last, and the IMU between them.
+  void addNode(Time time, const StateBlock& x, Graph& graph) const;
+  /// The offset of a scan at the last node: a new one if the last is of an earlier node.
+  Block* offsetOf(const BatchProblem& problem, const BatchScan& scan, double t_O, Graph& graph) const;
+  /// Adds what a scan shows: its points or its velocity, and rest.
+  void addTerms(const BatchScan& scan, const Graph::Scan& at, double t_O, Graph& graph) const;
   Block& addOffset(Window& window, Time time, double t_O) const;
   /// Biases that hold from `since` on. The time of the block is their end, `window` later.
   Block& addBiases(Window& window, Time since, const StateBlock& x) const;
@@ -120,6 +131,7 @@ class BatchSmoother {
   Eigen::Vector3d g_W_;
   const ImuBuffer* imu_;
   std::shared_ptr<const Manifold> motion_manifold_, bias_manifold_, offset_manifold_, extrinsics_manifold_;
+  std::shared_ptr<ceres::LossFunction> loss_;  // of velocities; the points have their own
 };
 
 /// Index of the node nearest to `time`; `nodes` in the order of their times, not empty.
