@@ -341,7 +341,7 @@ TEST_F(BagRunner, EstimatedExtrinsicsAreWritten) {
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), std::count(offsets.begin(), offsets.end(), '\n'));
   const std::string yaml = contents(out_ + "/summary.yaml");
   // At rest nothing shows where the radar is: it stays as told, and as unsure as told.
-  for (const char* line : {"told_extrinsics_translation: [0.030000000, 0.030000000, -0.060000000]\n",
+  for (const char* line : {"configured_extrinsics_translation: [0.030000000, 0.030000000, -0.060000000]\n",
                            "final_extrinsics_translation: [0.0", "final_extrinsics_translation_sigma: [0.0",
                            "final_extrinsics_rotation_xyzw: [0.69", "final_extrinsics_rotation_sigma: [0."}) {
     EXPECT_NE(yaml.find(line), std::string::npos) << line << yaml;

@@ -81,10 +81,10 @@ class CombineExtrinsics : public testing::Test {
  protected:
   static ExtrinsicsEstimate estimate(const Eigen::Vector3d& turn, const Eigen::Vector3d& l_I,
                                      const Eigen::VectorXd& sigmas) {
-    return {{l_I, so3::exp(turn) * kTold}, sigmas.cwiseAbs2().asDiagonal()};
+    return {{l_I, so3::exp(turn) * kConfigured}, sigmas.cwiseAbs2().asDiagonal()};
   }
   static Eigen::Vector3d turnOf(const ExtrinsicsEstimate& found) {
-    return so3::log(found.T_IR.q_IR * kTold.conjugate());
+    return so3::log(found.T_IR.q_IR * kConfigured.conjugate());
   }
   static Eigen::VectorXd sigmas(double turn, double lever) {
     Eigen::VectorXd result(6);
@@ -92,7 +92,7 @@ class CombineExtrinsics : public testing::Test {
     return result;
   }
 
-  inline static const Eigen::Quaterniond kTold = so3::exp(Eigen::Vector3d(0.4, -1.2, 0.7));
+  inline static const Eigen::Quaterniond kConfigured = so3::exp(Eigen::Vector3d(0.4, -1.2, 0.7));
   const ExtrinsicsEstimate prior_ =
       estimate(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), sigmas(0.17, 0.05));
 };
@@ -190,13 +190,13 @@ TEST_F(Verdicts, HalfOfTheSigmaToldIsTheLimit) {
   EXPECT_EQ(calibration.offset.t_O, 0.0);
   EXPECT_EQ(calibration.offset.sigma, 0.08);
   EXPECT_TRUE(calibration.T_IR.q_IR.isApprox(
-      so3::exp({0.0, 0.0, -0.04}) * so3::exp({0.02, 0.03, 0.04}) * kTold, 1e-9));
+      so3::exp({0.0, 0.0, -0.04}) * so3::exp({0.02, 0.03, 0.04}) * kConfigured, 1e-9));
   EXPECT_TRUE(calibration.T_IR.l_I.isApprox(Eigen::Vector3d(0.01, 0.02, 0.0), 1e-9));
 }
 
 TEST_F(Verdicts, NothingObservedIsAsToldToTheLastDigit) {
   const RadarCalibration calibration = calibrate(told_, {{{0.0, 0.08}, prior_}, {{0.0, 0.08}, prior_}});
-  EXPECT_EQ(calibration.T_IR.q_IR.coeffs(), kTold.coeffs());
+  EXPECT_EQ(calibration.T_IR.q_IR.coeffs(), kConfigured.coeffs());
   for (const AxisCalibration& axis : calibration.axes) EXPECT_EQ(axis.verdict, Verdict::kNotObserved);
   EXPECT_NEAR(axisOf(calibration, CalibrationAxis::kLeverY).sigma, 0.05, 1e-9);
 }

@@ -307,9 +307,9 @@ TEST_F(CheckBag, ABagAtRestIsNotReady) {
 
 TEST_F(CheckBag, WhatIsToldAndFarFromWhatTheBagShowsIsNamed) {
   const BagCheck mounting = check(bag_, false, {"mounting_yaw_pitch_roll_deg=[90,0,0]"});
-  expectLine(mounting, FindingLevel::kOdd, {"mounting", "the told mounting", "degrees apart"});
+  expectLine(mounting, FindingLevel::kOdd, {"mounting", "the configured mounting", "degrees apart"});
   expectLine(check(bag_, false, {"radar_doppler_sign=-1"}), FindingLevel::kOdd,
-             {"Doppler", "the told radar_doppler_sign is -1, and the bag shows 1"});
+             {"Doppler", "the configured radar_doppler_sign is -1, and the bag shows 1"});
   // The sigma of what the bag shows is not that of what is told.
   const double usual = SmootherOptions().extrinsics_rotation_sigma;
   EXPECT_EQ(configOf(mounting).odometry.smoother.extrinsics_rotation_sigma, usual);

@@ -88,7 +88,7 @@ TEST(Diagnosis, AMountingFarFromTheToldOneIsNoGoodRun) {
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
   evidence.radars.front().turn.y() = -1.5;
   expectSays(first(evidence),
-             {"mounting_far: The estimated mounting is turned from the told one by 6, -86, -26 degrees",
+             {"mounting_far: The estimated mounting is turned from the configured one by 6, -86, -26 degrees",
               "extrinsics_rotation_sigma 9.74 degrees", "Check radar_doppler_sign"});
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
 }
@@ -96,14 +96,14 @@ TEST(Diagnosis, AMountingFarFromTheToldOneIsNoGoodRun) {
 TEST(Diagnosis, AMountingThatIsHeldAndContradictedIsNoGoodRun) {
   RunEvidence evidence = goodRun();
   const Eigen::Matrix3d covariance = 1e-4 * Eigen::Matrix3d::Identity();  // a sigma of 0.6 degrees
-  evidence.radars.front().told_turn = MountingTurn{Eigen::Vector3d(0.03, 0.03, 0.03), covariance};
+  evidence.radars.front().mounting_turn = MountingTurn{Eigen::Vector3d(0.03, 0.03, 0.03), covariance};
   EXPECT_EQ(first(evidence), "none");
-  evidence.radars.front().told_turn->turn.y() = -0.1;
+  evidence.radars.front().mounting_turn->turn.y() = -0.1;
   expectSays(first(evidence),
              {"mounting_far: The scans fit better if the mounting is turned by 2, -6, 2 degrees",
               "with sigmas of 0.6, 0.6, 0.6", "estimate_extrinsics: rotation"});
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
-  evidence.radars.front().told_turn->covariance *= 100.0;  // noise explains it
+  evidence.radars.front().mounting_turn->covariance *= 100.0;  // noise explains it
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
 }
 

@@ -66,7 +66,7 @@ class TwoRadarDiagnostics : public testing::Test {
     result.result.used = result.result.updated = true;
     result.result.time_offset = offset;
     result.result.T_IR = T_IR;
-    result.result.told_T_IR = kMountings[radar];
+    result.result.configured_T_IR = kMountings[radar];
     result.result.T_IR_covariance.diagonal().head<3>().setConstant(lever_sigma * lever_sigma);
     result.result.T_IR_covariance.diagonal().tail<3>().setConstant(turn_sigma * turn_sigma);
     result.offset_observable = true;
@@ -312,11 +312,12 @@ TEST_F(TwoRadarDiagnostics, TellTheMountingAgainstWhatWasTold) {
   EXPECT_EQ(status.level, DiagnosticStatus::OK);
   EXPECT_EQ(status.message, "observed by the motion");
   double x = 1.0, y = 0.0, z = 1.0;
-  ASSERT_EQ(std::sscanf(value(status, "turn_from_told_deg").c_str(), "[%lf, %lf, %lf]", &x, &y, &z), 3);
+  ASSERT_EQ(std::sscanf(value(status, "turn_from_configured_deg").c_str(), "[%lf, %lf, %lf]", &x, &y, &z), 3);
   EXPECT_NEAR(x, 0.0, 1e-5);
   EXPECT_NEAR(y, 2.864789, 1e-4);
   EXPECT_NEAR(z, 0.0, 1e-5);
-  ASSERT_EQ(std::sscanf(value(status, "lever_arm_from_told_m").c_str(), "[%lf, %lf, %lf]", &x, &y, &z), 3);
+  ASSERT_EQ(std::sscanf(value(status, "lever_arm_from_configured_m").c_str(), "[%lf, %lf, %lf]", &x, &y, &z),
+            3);
   EXPECT_NEAR(y, 0.02, 1e-6);
   ASSERT_EQ(std::sscanf(value(status, "turn_sigma_deg").c_str(), "[%lf, %lf, %lf]", &x, &y, &z), 3);
   EXPECT_NEAR(z, 1.145916, 1e-4);

@@ -60,8 +60,8 @@ SimulatedRun turnedBy(const Vector3d& turn, const std::string& motion, std::uint
   return run;
 }
 
-double squaredSigmas(const MountingTurn& turn, double told_sigma) {
-  const Eigen::Matrix3d told = told_sigma * told_sigma * Eigen::Matrix3d::Identity();
+double squaredSigmas(const MountingTurn& turn, double configured_sigma) {
+  const Eigen::Matrix3d told = configured_sigma * configured_sigma * Eigen::Matrix3d::Identity();
   return turn.turn.dot((turn.covariance + told).ldlt().solve(turn.turn));
 }
 
@@ -71,10 +71,10 @@ TEST(MountingCheck, ItsSigmasAreWhatItsErrorsAre) {
     double sum = 0.0;
     for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
       const SimulatedRun run = turnedBy(Vector3d::Zero(), motion, seed);
-      sum += squaredSigmas(*run.last(0).told_turn, 0.0) / 3.0;
+      sum += squaredSigmas(*run.last(0).mounting_turn, 0.0) / 3.0;
       for (const ScanResult& result : run.results) {
-        if (!result.told_turn) continue;
-        EXPECT_LT(squaredSigmas(*result.told_turn, kDegree), 9.0)
+        if (!result.mounting_turn) continue;
+        EXPECT_LT(squaredSigmas(*result.mounting_turn, kDegree), 9.0)
             << motion << ", seed " << seed << ", at " << run.seconds(result.state.time) << " s";
       }
     }
@@ -87,7 +87,7 @@ TEST(MountingCheck, FindsAWrongMounting) {
   for (const Vector3d& axis : {Vector3d(1, 0, 0), Vector3d(0, 1, 0), Vector3d(0, 0, 1)}) {
     for (const char* motion : {"difficult", "medium", "drone"}) {
       const Vector3d turn = 8.0 * kDegree * axis;
-      const MountingTurn result = *turnedBy(turn, motion, 1).last(0).told_turn;
+      const MountingTurn result = *turnedBy(turn, motion, 1).last(0).mounting_turn;
       // Tilt and biases of the estimate give way, too, so what is found may be short.
       EXPECT_LT((result.turn - turn).norm(), turn.norm() / 4.0)
           << motion << ": " << (result.turn / kDegree).transpose();
@@ -105,14 +105,14 @@ TEST(MountingCheck, RestShowsNothing) {
                   samples.end());
   });
   ASSERT_TRUE(run.last(0).at_rest);
-  EXPECT_GT(run.last(0).told_turn->sigma().minCoeff(), 0.5);
+  EXPECT_GT(run.last(0).mounting_turn->sigma().minCoeff(), 0.5);
 }
 
 TEST(MountingCheck, AMountingThatIsEstimatedNeedsNoCheck) {
   SimulatedRun run("difficult", 1, 20.0, 5.0);
   run.options.smoother.estimate_extrinsics = EstimateExtrinsics::kRotation;
   run.run();
-  EXPECT_FALSE(run.last(0).told_turn);
+  EXPECT_FALSE(run.last(0).mounting_turn);
 }
 
 }  // namespace

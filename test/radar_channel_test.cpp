@@ -68,7 +68,7 @@ TEST(RadarChannel, AVelocityForARestartHasTheSigmasAsTold) {
   const RadarAnswer scaled = OneRadar().use(0.7, 30, 9.0);
   ASSERT_TRUE(plain.alone && scaled.alone);
   EXPECT_LT((scaled.alone->covariance - plain.alone->covariance).norm(), 1e-12);
-  EXPECT_LT((scaled.alone->told_variance - plain.alone->told_variance).norm(), 1e-12);
+  EXPECT_LT((scaled.alone->added_variance - plain.alone->added_variance).norm(), 1e-12);
   EXPECT_GT(scaled.ego_velocity.covariance(0, 0), plain.ego_velocity.covariance(0, 0) + 1e-3);
 }
 

@@ -119,7 +119,7 @@ def test_each_of_two_radars_has_its_sections(report, two_radar_run, simulated_ru
 
     def rotation(key):
         return Rotation.from_quat(summary[f"{key}_extrinsics_rotation_xyzw_right"])
-    turn = numpy.degrees((rotation("final") * rotation("told").inv()).as_rotvec())
+    turn = numpy.degrees((rotation("final") * rotation("configured").inv()).as_rotvec())
     section = page.split("<h2>Extrinsics: right")[1]
     for axis, expected in zip("xyz", turn):
         assert float(cell_after(section, f"turn about {axis} [deg]")) == pytest.approx(expected, abs=2e-3)

@@ -162,7 +162,7 @@ class TwoRadarsTest(tester.LiveTestCase):
         self.assertLess(numpy.linalg.norm(error), 0.5 * numpy.linalg.norm(TURN), name)
         listener.wait_for_diagnosis("extrinsics " + name, "observed by the motion", OK)
         listener.wait_for("the turn in the diagnostics", lambda: numpy.allclose(
-            yaml.safe_load(listener.value("extrinsics " + name, "turn_from_told_deg")),
+            yaml.safe_load(listener.value("extrinsics " + name, "turn_from_configured_deg")),
             numpy.degrees(turn_between(listed(pose.pose.orientation), self.told[name])), atol=0.01))
 
     def test_mounting_of_a_single_radar_is_told_without_a_name(self):

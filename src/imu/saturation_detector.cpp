@@ -10,7 +10,7 @@ constexpr int kFlatTop = 5;               // equal readings in a row
 constexpr double kFarAcceleration = 0.5;  // [m/s^2] noise and coarse steps at rest stay below
 constexpr double kFarAngularRate = 0.1;   // [rad/s] likewise
 constexpr int kStretch = 200;             // over which a reading must be the largest, at least
-constexpr double kShareOfRange = 0.999;   // of a range that was told
+constexpr double kShareOfRange = 0.999;   // of a range that was configured
 
 }  // namespace
 

@@ -126,7 +126,7 @@ void findNoise(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
 void findRest(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
   constexpr double kStart = 10.0;  // [s] in which rest must begin
   StaticInitializerOptions options;
-  options.max_gravity_error = 2.0;  // what is off by more is told as such
+  options.max_gravity_error = 2.0;  // what is off by more is reported as such
   StaticInitializer rest(options, kGravity);
   const Time begin = imu.front().time;
   ImuInputCheck check(0.04, {});  // measures the noise, which a vibrating frame has at rest, too

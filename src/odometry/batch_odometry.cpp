@@ -73,7 +73,7 @@ RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) co
   z.v_R = result.ego_velocity.v_R;
   z.covariance = result.ego_velocity.covariance;
   z.covariance.diagonal() +=
-      (model_error_scale_ / result.model_error_scale - 1.0) * result.ego_velocity.told_variance;
+      (model_error_scale_ / result.model_error_scale - 1.0) * result.ego_velocity.added_variance;
   z.covariance.diagonal().array() += result.rate_variance;
   z.offset_gain = result.offset_gain;
   z.offset_half_width = result.offset_half_width;

@@ -95,16 +95,16 @@ Gaussian asGaussian(const OffsetEstimate& offset) {
           Eigen::MatrixXd::Constant(1, 1, offset.sigma * offset.sigma)};
 }
 
-Verdict verdictOf(double sigma, double told_sigma) {
-  if (told_sigma == 0.0) return Verdict::kNotEstimated;
-  return sigma <= kObservedSigmaShare * told_sigma ? Verdict::kObserved : Verdict::kNotObserved;
+Verdict verdictOf(double sigma, double configured_sigma) {
+  if (configured_sigma == 0.0) return Verdict::kNotEstimated;
+  return sigma <= kObservedSigmaShare * configured_sigma ? Verdict::kObserved : Verdict::kNotObserved;
 }
 
 /// The mean over the runs that observed it. Each run may have another, and so may the next.
-OffsetEstimate scattered(double told_sigma, const std::vector<OffsetEstimate>& runs) {
+OffsetEstimate scattered(double configured_sigma, const std::vector<OffsetEstimate>& runs) {
   std::vector<OffsetEstimate> observed;
   for (const OffsetEstimate& run : runs)
-    if (verdictOf(run.sigma, told_sigma) == Verdict::kObserved) observed.push_back(run);
+    if (verdictOf(run.sigma, configured_sigma) == Verdict::kObserved) observed.push_back(run);
   const auto count = static_cast<double>(observed.size());
   OffsetEstimate result;
   for (const OffsetEstimate& run : observed) result.t_O += run.t_O / count;
@@ -117,52 +117,52 @@ OffsetEstimate scattered(double told_sigma, const std::vector<OffsetEstimate>& r
   return result;
 }
 
-void calibrateOffset(const OffsetEstimate& told, const std::vector<RadarCalibrationEstimate>& runs,
+void calibrateOffset(const OffsetEstimate& configured, const std::vector<RadarCalibrationEstimate>& runs,
                      RadarCalibration* calibration) {
   AxisCalibration& axis = calibration->axes[static_cast<std::size_t>(CalibrationAxis::kOffset)];
-  axis.told = axis.found = told.t_O;
-  calibration->offset = told;
-  if (told.sigma == 0.0) return;
+  axis.configured = axis.found = configured.t_O;
+  calibration->offset = configured;
+  if (configured.sigma == 0.0) return;
   std::vector<OffsetEstimate> offsets;
   offsets.reserve(runs.size());
   for (const RadarCalibrationEstimate& run : runs) offsets.push_back(run.offset);
-  const CombinedOffset combined = combine(told, offsets);
+  const CombinedOffset combined = combine(configured, offsets);
   calibration->offsets_agree = combined.agree;
   axis.found = combined.estimate.t_O;
   axis.sigma = combined.estimate.sigma;
-  axis.told_sigma = told.sigma;
+  axis.configured_sigma = configured.sigma;
   // Runs that disagree have each observed it.
-  axis.verdict = combined.agree ? verdictOf(axis.sigma, told.sigma) : Verdict::kObserved;
+  axis.verdict = combined.agree ? verdictOf(axis.sigma, configured.sigma) : Verdict::kObserved;
   if (axis.verdict == Verdict::kObserved) calibration->offset = combined.estimate;
 }
 
-void calibrateExtrinsics(const ExtrinsicsEstimate& told, const std::vector<RadarCalibrationEstimate>& runs,
-                         RadarCalibration* calibration) {
+void calibrateExtrinsics(const ExtrinsicsEstimate& configured,
+                         const std::vector<RadarCalibrationEstimate>& runs, RadarCalibration* calibration) {
   constexpr auto kTurn = static_cast<std::size_t>(CalibrationAxis::kTurnX);
   constexpr auto kLever = static_cast<std::size_t>(CalibrationAxis::kLeverX);
-  calibration->T_IR = told.T_IR;
+  calibration->T_IR = configured.T_IR;
   for (std::size_t i = 0; i < 3; ++i) {
     AxisCalibration& lever = calibration->axes[kLever + i];
-    lever.told = lever.found = told.T_IR.l_I[static_cast<Eigen::Index>(i)];
+    lever.configured = lever.found = configured.T_IR.l_I[static_cast<Eigen::Index>(i)];
   }
-  if (told.covariance.rows() == 0) return;
+  if (configured.covariance.rows() == 0) return;
   std::vector<ExtrinsicsEstimate> estimates;
   estimates.reserve(runs.size());
   for (const RadarCalibrationEstimate& run : runs) estimates.push_back(run.extrinsics);
-  const CombinedExtrinsics combined = combine(told, estimates);
+  const CombinedExtrinsics combined = combine(configured, estimates);
   calibration->extrinsics_agreement = combined.agreement;
 
-  const Eigen::Vector3d found = so3::log(combined.estimate.T_IR.q_IR * told.T_IR.q_IR.conjugate());
+  const Eigen::Vector3d found = so3::log(combined.estimate.T_IR.q_IR * configured.T_IR.q_IR.conjugate());
   Eigen::Vector3d unobserved = Eigen::Vector3d::Zero();  // its part
   bool any_observed = false;
-  for (Eigen::Index i = 0; i < told.covariance.rows(); ++i) {
+  for (Eigen::Index i = 0; i < configured.covariance.rows(); ++i) {
     const std::size_t first = i < 3 ? kTurn : kLever;
     const Eigen::Index k = i % 3;
     AxisCalibration& axis = calibration->axes[first + static_cast<std::size_t>(k)];
     axis.found = i < 3 ? found[k] : combined.estimate.T_IR.l_I[k];
     axis.sigma = std::sqrt(combined.estimate.covariance(i, i));
-    axis.told_sigma = std::sqrt(told.covariance(i, i));
-    axis.verdict = verdictOf(axis.sigma, axis.told_sigma);
+    axis.configured_sigma = std::sqrt(configured.covariance(i, i));
+    axis.verdict = verdictOf(axis.sigma, axis.configured_sigma);
     const bool is_observed = axis.verdict == Verdict::kObserved;
     if (i >= 3) {
       if (is_observed) calibration->T_IR.l_I[k] = axis.found;
@@ -190,7 +190,7 @@ Combined combine(const Gaussian& prior, const std::vector<Gaussian>& posteriors)
   // In units of the prior's sigma, about its mean: the prior has information 1 in each direction.
   const Eigen::LLT<Eigen::MatrixXd> root(prior.covariance);
   if (root.info() != Eigen::Success)
-    throw std::invalid_argument("calibration: the covariance of what is told is not positive definite");
+    throw std::invalid_argument("calibration: the covariance of what is configured is not positive definite");
   const auto whitened = [&](const Eigen::MatrixXd& x) -> Eigen::MatrixXd { return root.matrixL().solve(x); };
   const Eigen::Index size = prior.mean.size();
   const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(size, size);
@@ -260,20 +260,20 @@ double RadarCalibration::turnSigma() const {
   for (const CalibrationAxis turn :
        {CalibrationAxis::kTurnX, CalibrationAxis::kTurnY, CalibrationAxis::kTurnZ}) {
     const AxisCalibration& axis = axes[static_cast<std::size_t>(turn)];
-    largest = std::max(largest, axis.verdict == Verdict::kObserved ? axis.sigma : axis.told_sigma);
+    largest = std::max(largest, axis.verdict == Verdict::kObserved ? axis.sigma : axis.configured_sigma);
   }
   return largest;
 }
 
-double AxisCalibration::farFromTold() const {
-  return verdict == Verdict::kNotEstimated ? 0.0 : std::abs(found - told) / told_sigma;
+double AxisCalibration::farFromConfigured() const {
+  return verdict == Verdict::kNotEstimated ? 0.0 : std::abs(found - configured) / configured_sigma;
 }
 
-RadarCalibration calibrate(const RadarCalibrationEstimate& told,
+RadarCalibration calibrate(const RadarCalibrationEstimate& configured,
                            const std::vector<RadarCalibrationEstimate>& runs) {
   RadarCalibration calibration;
-  calibrateOffset(told.offset, runs, &calibration);
-  calibrateExtrinsics(told.extrinsics, runs, &calibration);
+  calibrateOffset(configured.offset, runs, &calibration);
+  calibrateExtrinsics(configured.extrinsics, runs, &calibration);
   return calibration;
 }
 

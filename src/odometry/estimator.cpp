@@ -161,9 +161,9 @@ void Estimator::judge(const RadarAnswer& answer, const RadarScan& scan) {
   // The state's variance grows about as the root of the accelerometer's, unless that is measured.
   const ImuMeasurement sample = imu_.at(scan.stamp);
   const ImuNoise noise = imuNoise();
-  const bool accel_is_told = noise.accel_density * noise.accel_density > sample.accel_mean_noise;
-  Eigen::Matrix3d scaled = answer.ego_velocity.told_variance.asDiagonal();
-  if (accel_is_told) scaled += 0.5 * answer.used->predicted;
+  const bool accel_is_configured = noise.accel_density * noise.accel_density > sample.accel_mean_noise;
+  Eigen::Matrix3d scaled = answer.ego_velocity.added_variance.asDiagonal();
+  if (accel_is_configured) scaled += 0.5 * answer.used->predicted;
   const double share = answer.used->S.ldlt().solve(scaled).trace() / 3.0;
   model_error_scale_.add(scan.stamp, answer.used->squaredSigmas(), share);
 }
@@ -203,8 +203,9 @@ void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
   result.time_offset = radar.offset();
   result.time_offset_sigma = radar.offsetSigma(covariance(kState, kState));
   result.T_IR = radar.extrinsics();
-  result.told_T_IR = radar.toldExtrinsics();
-  if (estimated == 0) result.told_turn = mounting_check_.turnOf(result.scan.radar, result.told_T_IR);
+  result.configured_T_IR = radar.configuredExtrinsics();
+  if (estimated == 0)
+    result.mounting_turn = mounting_check_.turnOf(result.scan.radar, result.configured_T_IR);
   result.T_IR_covariance = extrinsicsCovariance(covariance.bottomRightCorner(estimated, estimated));
   for (const StampedPose& left : marginalize()) result.left_window.push_back(left);
   // On a frame that shakes the window believes rest little: the start of a gentle drive must not look like an

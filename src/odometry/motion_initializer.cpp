@@ -66,7 +66,7 @@ void MotionInitializer::add(Time stamp, const EgoVelocity& velocity) {
   const auto after = std::lower_bound(velocities_.begin(), velocities_.end(), stamp,
                                       [](const Velocity& z, Time t) { return z.stamp < t; });
   if (after != velocities_.end() && after->stamp == stamp) return;
-  velocities_.insert(after, Velocity{{{stamp}, velocity.v_R, velocity.covariance}, velocity.told_variance});
+  velocities_.insert(after, Velocity{{{stamp}, velocity.v_R, velocity.covariance}, velocity.added_variance});
   if (velocities_.size() > kMaxVelocities) velocities_.erase(velocities_.begin());
 }
 
@@ -321,17 +321,18 @@ MotionInitializer::CarriedCovariance MotionInitializer::carriedCovariance(const 
                                                                           double scale) const {
   const double T = std::abs(z.stamp - time);
   const double tilt = noise_.gyro_density * g_W_.norm();
-  double measured = 0.0;  // [m^2/s^2], as `told`
+  double measured = 0.0;  // [m^2/s^2], as `configured`
   imu.forEachInterval(std::min(z.stamp, time), std::max(z.stamp, time),
                       [&](double dt, const auto&, const auto&, const ImuMeasurement& later) {
                         measured += dt * (later.accel_noise + later.unseen_accel_variance);
                       });
-  const double told = scale * noise_.accel_density * noise_.accel_density * T;
-  Eigen::Vector3d scaled = scale * z.told_variance;
-  if (told > measured) scaled.array() += told;
+  const double configured = scale * noise_.accel_density * noise_.accel_density * T;
+  Eigen::Vector3d scaled = scale * z.added_variance;
+  if (configured > measured) scaled.array() += configured;
   CarriedCovariance covariance{z.covariance, scaled.asDiagonal()};
-  covariance.whole.diagonal() += scaled - z.told_variance;
-  covariance.whole.diagonal().array() += tilt * tilt * T * T * T / 3.0 + (told > measured ? 0.0 : measured);
+  covariance.whole.diagonal() += scaled - z.added_variance;
+  covariance.whole.diagonal().array() +=
+      tilt * tilt * T * T * T / 3.0 + (configured > measured ? 0.0 : measured);
   return covariance;
 }
 

@@ -33,11 +33,11 @@ void MountingCheck::add(std::size_t radar, const UsedInnovation& innovation) {
   dv_W_ += innovation.R_WR * innovation.predicted * weighted;
 }
 
-MountingTurn MountingCheck::turnOf(std::size_t radar, const Extrinsics& told) const {
+MountingTurn MountingCheck::turnOf(std::size_t radar, const Extrinsics& configured) const {
   const Eigen::Index first = 3 * static_cast<Eigen::Index>(radar);
   const Eigen::MatrixXd covariance =
       information_.ldlt().solve(Eigen::MatrixXd::Identity(score_.size(), score_.size()));
-  const Eigen::Matrix3d R_IR = told.q_IR.toRotationMatrix();
+  const Eigen::Matrix3d R_IR = configured.q_IR.toRotationMatrix();
   return {R_IR * (covariance.middleRows<3>(first) * score_),
           R_IR * covariance.block<3, 3>(first, first) * R_IR.transpose()};
 }

@@ -65,7 +65,7 @@ EgoVelocity concluded(EgoVelocity result, const std::vector<RadarDirection>& inl
   } else {
     result.v_R = solution.v_R;
     result.covariance = solution.covariance;
-    result.covariance.diagonal() += result.told_variance;
+    result.covariance.diagonal() += result.added_variance;
     const bool is_vague =
         valid == EgoVelocityStatus::kMoving && largestSigma(result.covariance) > o.max_sigma;
     result.status = is_vague ? EgoVelocityStatus::kSigmaTooLarge : valid;
@@ -80,7 +80,7 @@ EgoVelocity concludedAtRest(const EgoVelocity& result, const std::vector<RadarDi
 
 EgoVelocity concludedInMotion(EgoVelocity result, const std::vector<RadarDirection>& inliers,
                               const VelocitySolution& solution, const EgoVelocityOptions& o) {
-  result.told_variance = o.added_sigma.cwiseAbs2();
+  result.added_variance = o.added_sigma.cwiseAbs2();
   return concluded(std::move(result), inliers, solution, EgoVelocityStatus::kMoving, o);
 }
 
@@ -193,7 +193,7 @@ EgoVelocity EgoVelocityEstimator::around(const RadarScan& scan, const VelocityPr
   if (!result.inliers.empty() && static_cast<double>(result.inliers.size()) >= share)
     result.status = EgoVelocityStatus::kMoving;
   result.v_R = prior.v_R;
-  result.told_variance = options_.added_sigma.cwiseAbs2();
+  result.added_variance = options_.added_sigma.cwiseAbs2();
   return result;
 }
 

@@ -83,8 +83,8 @@ void BarometerChannel::add(const Sample& sample, Mean& mean) {
 }
 
 double BarometerChannel::variance(const Mean& mean) const {
-  const double told = options_.noise_density * options_.noise_density;
-  return std::max(told, noise_.squaredDensity()) / mean.span;
+  const double configured = options_.noise_density * options_.noise_density;
+  return std::max(configured, noise_.squaredDensity()) / mean.span;
 }
 
 void BarometerChannel::addBias(FixedLagSmoother& smoother, double bias) {

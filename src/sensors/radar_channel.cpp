@@ -34,8 +34,8 @@ EgoVelocity withOwnPoints(EgoVelocity velocity, const RadarScan& scan) {
 
 /// With the errors that the options tell multiplied by `factor` in their variance.
 EgoVelocity scaled(EgoVelocity velocity, double factor) {
-  velocity.covariance.diagonal() += (factor - 1.0) * velocity.told_variance;
-  velocity.told_variance *= factor;
+  velocity.covariance.diagonal() += (factor - 1.0) * velocity.added_variance;
+  velocity.added_variance *= factor;
   return velocity;
 }
 
@@ -150,7 +150,7 @@ std::optional<DopplerMeasurement> RadarChannel::dopplerOf(const RadarScan& scan,
   if (world.inliers.empty()) return std::nullopt;
   return DopplerMeasurement{
       taken, std::make_shared<DopplerLikelihood>(estimator_.likelihood(scan, world.inliers, world.v_R)),
-      seen.velocity.told_variance.array() + rate_variance, options_.smoother.huber_threshold};
+      seen.velocity.added_variance.array() + rate_variance, options_.smoother.huber_threshold};
 }
 
 std::optional<Innovation> RadarChannel::ownInnovation(const RadarScan& scan, const Seen& seen,
@@ -217,7 +217,7 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
   seen.is_own = isValid(seen.velocity.status);
   if (!seen.is_own && isTightlyCoupled() && seen.prior && !context.is_contradicted) {
     EgoVelocity consensus = estimator_.around(seen.pooled, *seen.prior);
-    consensus.told_variance *= scale;
+    consensus.added_variance *= scale;
     seen.velocity = around(*seen.prior, scan, consensus);
   }
   seen.moves = seen.prediction && !answer.at_rest && seen.velocity.status == EgoVelocityStatus::kMoving;
@@ -271,7 +271,7 @@ EgoVelocity RadarChannel::around(const VelocityPrior& prior, const RadarScan& sc
   if (result.inliers.empty()) result.status = EgoVelocityStatus::kTooFewInliers;
   if (!isValid(result.status)) return result;
   const VelocityCost cost = withSharedError(
-      estimator_.likelihood(scan, result.inliers, prior.v_R).at(prior.v_R), result.told_variance);
+      estimator_.likelihood(scan, result.inliers, prior.v_R).at(prior.v_R), result.added_variance);
   Eigen::Matrix3d information = cost.information;
   information.diagonal().array() += 1.0 / (kUnseen * kUnseen);
   result.covariance = information.inverse();
@@ -289,7 +289,7 @@ Innovation RadarChannel::innovation(Time stamp, const VelocityPrior& prior, cons
   result.S_at_offset = seen->prediction->scan.predicted + measured.covariance;
   // The scale of the model errors takes a step for noise: with its part, the scans after a step would count
   // for little.
-  result.S_at_offset.diagonal() -= measured.told_variance;
+  result.S_at_offset.diagonal() -= measured.added_variance;
   result.J_O = changeWithOffset(*seen);
   return result;
 }

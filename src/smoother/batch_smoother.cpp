@@ -117,8 +117,8 @@ void BatchSmoother::start(const BatchProblem& problem, const StateBlock& x,
   for (std::size_t k = 0; k < mounting.size(); ++k) {
     const bool has_prior = k == problem.radar;
     // The prior has its own mounting as its origin, so the block starts there.
-    const Extrinsics& told = has_prior ? problem.prior.T_IR0 : problem.mounting[k];
-    Block& extrinsics = *window.addCalibration(extrinsics_manifold_, stored(told));
+    const Extrinsics& configured = has_prior ? problem.prior.T_IR0 : problem.mounting[k];
+    Block& extrinsics = *window.addCalibration(extrinsics_manifold_, stored(configured));
     graph.extrinsics.push_back(&extrinsics);
     if (!is_estimated) window.setConstant(extrinsics, true);
     if (has_prior) {

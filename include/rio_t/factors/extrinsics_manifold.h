@@ -9,7 +9,7 @@ namespace rio_t {
 
 /// Which part of a mounting is estimated.
 enum class EstimateExtrinsics {
-  kNone,      ///< "none": the mounting is as told
+  kNone,      ///< "none": the mounting is as configured
   kRotation,  ///< "rotation"
   kPose,      ///< "pose": rotation and lever arm
 };

@@ -29,8 +29,8 @@ struct MeasuredImuNoise {
   double gyro_density = 0.0;   ///< [rad/s/sqrt(Hz)]
 
   /// Three times the densities of the options, or more: no honest guess is so far off.
-  bool isFarAbove(const ImuNoise& told) const {
-    return accel_density > 3.0 * told.accel_density || gyro_density > 3.0 * told.gyro_density;
+  bool isFarAbove(const ImuNoise& configured) const {
+    return accel_density > 3.0 * configured.accel_density || gyro_density > 3.0 * configured.gyro_density;
   }
 };
 

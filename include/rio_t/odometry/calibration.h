@@ -67,14 +67,15 @@ struct CombinedOffset {
 
 CombinedOffset combine(const OffsetEstimate& prior, const std::vector<OffsetEstimate>& posteriors);
 
-/// A number is observed if its sigma is at most this share of what it was when it was told. The runs then say
-/// three times as much of it as what was told: 1 / 0.5^2 = 1 + 3. Above that, much of it is the number told.
+/// A number is observed if its sigma is at most this share of the configured one. The runs then say three
+/// times as much of it as the configuration: 1 / 0.5^2 = 1 + 3. Above that, much of it is the configured
+/// number.
 inline constexpr double kObservedSigmaShare = 0.5;
 
 enum class Verdict {
   kObserved,
   kNotObserved,
-  kNotEstimated,  ///< it is as told
+  kNotEstimated,  ///< it is as configured
 };
 std::string toString(Verdict verdict);  ///< "observed", "not observed", "not estimated"
 
@@ -86,18 +87,18 @@ inline constexpr std::size_t kCalibrationAxes = 7;
 std::string whatToMove(CalibrationAxis axis);
 
 struct AxisCalibration {
-  double told = 0.0;   ///< [s], [rad] zero, [m]
-  double found = 0.0;  ///< a turn: about the axis of I, from what was told
+  double configured = 0.0;  ///< [s], [rad] zero, [m]
+  double found = 0.0;       ///< a turn: about the axis of I, from what was configured
   double sigma = 0.0;
-  double told_sigma = 0.0;  ///< zero: not estimated
+  double configured_sigma = 0.0;  ///< zero: not estimated
   Verdict verdict = Verdict::kNotEstimated;
 
-  /// In sigmas of what was told; 0 if it is not estimated.
-  double farFromTold() const;
+  /// In sigmas of what was configured; 0 if it is not estimated.
+  double farFromConfigured() const;
 };
 
-/// Calibration of a radar: as the user told it, or as one run found it. A sigma of zero says that the run did
-/// not estimate the number.
+/// Calibration of a radar: as the user configured it, or as one run found it. A sigma of zero says that the
+/// run did not estimate the number.
 struct RadarCalibrationEstimate {
   OffsetEstimate offset;
   ExtrinsicsEstimate extrinsics;
@@ -105,17 +106,17 @@ struct RadarCalibrationEstimate {
 
 struct RadarCalibration {
   std::array<AxisCalibration, kCalibrationAxes> axes;  ///< by CalibrationAxis
-  OffsetEstimate offset;                               ///< as told if it is not observed
+  OffsetEstimate offset;                               ///< as configured if it is not observed
   Extrinsics T_IR;                                     ///< likewise, each axis by itself
   bool offsets_agree = true;
   Agreement extrinsics_agreement;
 
-  /// [rad] The largest sigma of a turn of T_IR: as found, or as told if it is not observed.
+  /// [rad] The largest sigma of a turn of T_IR: as found, or as configured if it is not observed.
   double turnSigma() const;
 };
 
 /// `runs`: at least one.
-RadarCalibration calibrate(const RadarCalibrationEstimate& told,
+RadarCalibration calibrate(const RadarCalibrationEstimate& configured,
                            const std::vector<RadarCalibrationEstimate>& runs);
 
 }  // namespace rio_t

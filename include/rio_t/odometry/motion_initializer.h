@@ -80,7 +80,7 @@ class MotionInitializer {
 
  private:
   struct Velocity : RadarVelocityMeasurement {
-    Eigen::Vector3d told_variance;  ///< see EgoVelocity
+    Eigen::Vector3d added_variance;  ///< see EgoVelocity
   };
   using Velocities = std::vector<Velocity>;
 

@@ -86,7 +86,7 @@ struct EgoVelocity {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< [m^2/s^2], radar frame
   /// The part of the covariance's diagonal that comes from the options, not from the data: `added_sigma`
   /// squared, or zero at rest [m^2/s^2].
-  Eigen::Vector3d told_variance = Eigen::Vector3d::Zero();
+  Eigen::Vector3d added_variance = Eigen::Vector3d::Zero();
   /// Points near zero show a slow motion: the platform is not at rest, whatever the IMU shows.
   bool denies_rest = false;
   /// The points that passed the filter: indices into the scan's points, ascending.

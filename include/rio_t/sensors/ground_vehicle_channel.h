@@ -53,8 +53,8 @@ class GroundVehicleChannel {
   /// `imu` must outlive the channel.
   GroundVehicleChannel(const GroundVehicleOptions& options, double huber_threshold, const ImuBuffer& imu);
 
-  /// Joins a window that begins with one node: adds the vehicle frame as told, with its prior; `at_rest`: the
-  /// vehicle stands on the ground there.
+  /// Joins a window that begins with one node: adds the vehicle frame as configured, with its prior;
+  /// `at_rest`: the vehicle stands on the ground there.
   void join(FixedLagSmoother& smoother, bool at_rest);
   /// Compares the estimate at `time` with the constraint. None if the constraint is
   /// off, or was judged less than a tenth of a second ago. Before the terms of that time are added.

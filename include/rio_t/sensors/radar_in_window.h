@@ -29,13 +29,14 @@ struct RadarVelocityPrediction {
 /// One radar in the window: its calibration blocks, t_O and extrinsics, and its terms. Not thread-safe.
 class RadarInWindow {
  public:
-  /// `T_IR` is the mounting as told. `offset` is shared by the radars that share t_O. `imu` must outlive it.
+  /// `T_IR` is the mounting as configured. `offset` is shared by the radars that share t_O. `imu` must
+  /// outlive it.
   RadarInWindow(const SmootherOptions& options, const Extrinsics& T_IR, const Eigen::Vector3d& g_W,
                 const ImuBuffer& imu, std::shared_ptr<OffsetBlocks> offset);
 
   /// Starts `smoother` with the prior on its first state and on the calibration of this radar.
   void start(FixedLagSmoother& smoother, Time time, const NodePrior& prior);
-  /// Joins a window that another radar has started, with its calibration as told.
+  /// Joins a window that another radar has started, with its calibration as configured.
   void join(FixedLagSmoother& smoother);
   /// Time of a scan's node: its stamp (constant_acceleration), or its estimated time of measurement (imu).
   Time nodeTime(Time stamp) const;

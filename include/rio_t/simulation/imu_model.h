@@ -12,7 +12,7 @@
 namespace rio_t::simulation {
 
 /// The noise of an ADIS16448 as measured on a real bag. Fixed here, apart from the defaults of the estimator:
-/// what the estimator is told to expect may be tuned, and the simulated world must not change with it.
+/// what the estimator is configured to expect may be tuned, and the simulated world must not change with it.
 inline ImuNoise measuredImuNoise() {
   ImuNoise noise;
   noise.accel_density = 2.4e-3;

@@ -36,7 +36,7 @@ struct BatchProblem {
   Time start;                        ///< of the first node
   NodePrior prior;                   ///< on it, and on the calibration of `radar`
   std::size_t radar = 0;             ///< which one the prior knows
-  std::vector<Extrinsics> mounting;  ///< of each radar: as told, and where the solver starts
+  std::vector<Extrinsics> mounting;  ///< of each radar: as configured, and where the solver starts
   /// Priors on t_O of the radars [s], and the sigma of a step. Not used for the start of `radar`. Empty:
   /// zero, and time_offset_sigma of the options.
   std::vector<double> time_offsets, time_offset_sigmas;

@@ -10,8 +10,8 @@
 
 namespace rio_t {
 
-/// Sigmas of the calibration of a radar as told, in the order of its tangent: t_O [s]; then, if they are
-/// estimated, the turn [rad] and the lever arm [m] of the extrinsics (see ExtrinsicsManifold).
+/// Sigmas of the calibration of a radar as configured, in the order of its tangent: t_O [s]; then, if they
+/// are estimated, the turn [rad] and the lever arm [m] of the extrinsics (see ExtrinsicsManifold).
 Eigen::VectorXd calibrationSigmas(const SmootherOptions& options);
 
 /// Prior on the first node and on the calibration of a radar.
@@ -24,7 +24,7 @@ struct NodePrior {
 
 /// Prior on the first state after `duration` seconds at rest. Yaw and position define W. The mean of the
 /// accelerometer is gravity plus b_a, so tilt and b_a are known far better together than each by itself
-/// (docs/method.md, eq. 7a). `gravity` [m/s^2]. `T_IR` is the mounting as told.
+/// (docs/method.md, eq. 7a). `gravity` [m/s^2]. `T_IR` is the mounting as configured.
 NodePrior priorAtRest(const SmootherOptions& options, const ImuNoise& noise, const StateBlock& x,
                       double gravity, double duration, const Extrinsics& T_IR);
 

@@ -129,9 +129,9 @@ def draw_offset(table, true_offset):
     return figure
 
 
-def draw_extrinsics(table, told):
-    """Turn and, if it was estimated, lever arm, both from those told. `told`: lever arm and R_IR."""
-    lever, R_IR = told
+def draw_extrinsics(table, configured):
+    """Turn and, if it was estimated, lever arm, both from those configured. `configured`: lever arm and R_IR."""
+    lever, R_IR = configured
     turn = (Rotation.from_quat(np.stack([table["q" + k] for k in "xyzw"], -1)) * R_IR.inv()).as_rotvec()
     moved = np.stack([table[k] for k in "xyz"], -1) - lever
     rows = [("turn [deg]", turn, "sigma_r", 180.0 / np.pi)]
@@ -146,8 +146,8 @@ def draw_extrinsics(table, told):
             axes.fill_between(t, value - sigma, value + sigma, color=colour, alpha=0.15, linewidth=0)
             axes.plot(t, value, color=colour, linewidth=1.2, label=axis)
             settled = max(settled, 2 * float(np.median(sigma[len(sigma) // 2:])))
-        axes.axhline(0.0, color=TRUTH, linewidth=1.2, linestyle="--", label="told")
-        # The first sigma is that of the prior: scaled to the estimates, the value told and the settled band.
+        axes.axhline(0.0, color=TRUTH, linewidth=1.2, linestyle="--", label="configured")
+        # The first sigma is that of the prior: scaled to the estimates, the value configured and the settled band.
         reach = 1.08 * max(unit * float(np.abs(values).max()) + settled, 1e-3)
         axes.set_ylim(-reach, reach)
         finish_axes(axes, label)

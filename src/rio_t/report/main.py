@@ -102,7 +102,7 @@ CHECKS = {  # name in summary.yaml: for people
     "scans_diverged_share": "share of the scans with a diverged estimate",
     "windows_at_offset_bound_share": "share of the windows with the offset at max_time_offset",
     "windows_not_converged_share": "share of the windows that stopped before they converged",
-    "mounting_turned_sigmas": "turn of mounting or vehicle frame from the told one, in sigmas",
+    "mounting_turned_sigmas": "turn of mounting or vehicle frame from the configured one, in sigmas",
     "imu_faults_share": "share of the IMU samples with a fault",
     "healthy_at_end": "the estimate is healthy at the end"}
 VERDICTS = {
@@ -196,28 +196,28 @@ def last_extrinsics(table):
 
 
 def add_extrinsics(page, radar, folder):
-    """The estimate over time, and how far it went from the mounting told."""
+    """The estimate over time, and how far it went from the mounting configured."""
     path = folder / "summary.yaml"
     if path.is_file():
-        told = extrinsics_in(run_folder.read_yaml(path), path, "told_", radar.name)
+        configured = extrinsics_in(run_folder.read_yaml(path), path, "configured_", radar.name)
         note = ""
-    else:  # the run did not finish: only its first estimate is left of what was told
-        told = last_extrinsics({name: column[:1] for name, column in radar.extrinsics.items()})
+    else:  # the run did not finish: only its first estimate is left of what was configured
+        configured = last_extrinsics({name: column[:1] for name, column in radar.extrinsics.items()})
         note = "Without summary.yaml: from its first estimate."
     page.heading(radar.title("Extrinsics"), "How far the radar is from where the configuration puts it, about and along "
                                             "the axes of the IMU, with a band of 1 sigma. " + note)
     lever, rotation = last_extrinsics(radar.extrinsics)
-    turn = np.degrees((rotation * told[1].inv()).as_rotvec())
+    turn = np.degrees((rotation * configured[1].inv()).as_rotvec())
     sigma = {name: radar.extrinsics["sigma_" + name][-1] for name in ("x", "y", "z", "rx", "ry", "rz")}
     rows = [[f"turn about {axis} [deg]", f"{turn[i]:.3f}", f"{np.degrees(sigma['r' + axis]):.3f}"]
             for i, axis in enumerate("xyz")]
-    rows += [[f"lever arm along {axis} [mm]", f"{1e3 * (lever[i] - told[0][i]):.1f}", f"{1e3 * sigma[axis]:.1f}"]
+    rows += [[f"lever arm along {axis} [mm]", f"{1e3 * (lever[i] - configured[0][i]):.1f}", f"{1e3 * sigma[axis]:.1f}"]
              for i, axis in enumerate("xyz") if sigma[axis] > 0]
     page.table(rows, ["last estimate minus the configured value", "", "sigma"])
-    page.figure(run_folder.of_radar("extrinsics", radar.name), figures.draw_extrinsics(radar.extrinsics, told))
+    page.figure(run_folder.of_radar("extrinsics", radar.name), figures.draw_extrinsics(radar.extrinsics, configured))
 
 
-def told_mountings(arguments):
+def configured_mountings(arguments):
     """Those of --config, by the name of the radar."""
     if not arguments.config:
         return {}
@@ -225,11 +225,11 @@ def told_mountings(arguments):
     return {name: (lever, rotation) for name, lever, rotation in radars_of(read_config(folder, arguments.config))}
 
 
-def mounting(radar, told):
+def mounting(radar, configured):
     """Position of the radar in the IMU frame and R_IR, None if not known, and where that is from."""
     if radar.extrinsics is not None:
         return last_extrinsics(radar.extrinsics), "as estimated at the end"
-    return told.get(radar.name), "from the configuration"
+    return configured.get(radar.name), "from the configuration"
 
 
 def add_ego_velocity(page, radar, motions, extrinsics, source):
@@ -261,8 +261,8 @@ def report(arguments):
     """Writes the page; its path."""
     run = read_run(arguments.run, arguments.ground_truth)
     true_offsets = true_offsets_of(run.radars, arguments.true_offset)
-    told = told_mountings(arguments)
-    mountings = {radar.name: mounting(radar, told) for radar in run.radars}
+    configured = configured_mountings(arguments)
+    mountings = {radar.name: mounting(radar, configured) for radar in run.radars}
     judge_poses = run.truth and run.estimates
     judge_offset = any(radar.name in true_offsets and radar.offset is not None for radar in run.radars)
     program = arguments.evaluate

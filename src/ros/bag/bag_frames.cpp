@@ -43,11 +43,11 @@ std::vector<Extrinsics> lookUp(const tf2::BufferCore& tf, const std::vector<Conf
 
 }  // namespace
 
-std::string topicOfBag(const std::string& told, const std::map<std::string, std::string>& types) {
-  if (told.empty() || types.count(told) != 0) return told;
-  std::string other = told.front() == '/' ? told.substr(1) : "/" + told;
+std::string topicOfBag(const std::string& configured, const std::map<std::string, std::string>& types) {
+  if (configured.empty() || types.count(configured) != 0) return configured;
+  std::string other = configured.front() == '/' ? configured.substr(1) : "/" + configured;
   if (types.count(other) != 0) return other;
-  return told.front() == '/' ? told : other;
+  return configured.front() == '/' ? configured : other;
 }
 
 Config withExtrinsicsOfBag(Config config, const Bags& bags) {

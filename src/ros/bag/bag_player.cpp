@@ -66,17 +66,19 @@ RunSummary BagPlayer::summary(const RunLog& log) const {
   };
   for (std::size_t k = 0; k < radars_.size(); ++k) {
     const Radar& radar = radars_[k];
-    RadarSummary& told = summary.radars[k];
-    told.noise = odometry_.radarNoise(k);
-    told.doppler_step = odometry_.radarDopplerStep(k);
+    RadarSummary& radar_summary = summary.radars[k];
+    radar_summary.noise = odometry_.radarNoise(k);
+    radar_summary.doppler_step = odometry_.radarDopplerStep(k);
     for (std::size_t i = 0; i < 3; ++i) {
       constexpr std::array<double, 3> kShares = {0.1, 0.5, 0.9};
-      told.points_per_scan[i] = static_cast<std::uint64_t>(quantile(radar.scan_sizes, kShares[i]));
+      radar_summary.points_per_scan[i] = static_cast<std::uint64_t>(quantile(radar.scan_sizes, kShares[i]));
     }
-    told.scans_total = radar.scans_total;
-    if (told.points_not_finite > 0) summary.input_faults["points_not_finite"] += told.points_not_finite;
-    for (const auto& [reason, given_up] : radar.stamper.givenUp()) told.scans_rejected[reason] += given_up;
-    count(radar.not_usable, &told.scans_rejected);
+    radar_summary.scans_total = radar.scans_total;
+    if (radar_summary.points_not_finite > 0)
+      summary.input_faults["points_not_finite"] += radar_summary.points_not_finite;
+    for (const auto& [reason, given_up] : radar.stamper.givenUp())
+      radar_summary.scans_rejected[reason] += given_up;
+    count(radar.not_usable, &radar_summary.scans_rejected);
     count(radar.triggers_not_usable, &summary.input_faults);
     warn(radar.not_usable);
   }

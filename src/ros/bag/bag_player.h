@@ -64,7 +64,7 @@ class BagPlayer {
   void addPressure(const sensor_msgs::FluidPressure& message);
   void addCloud(const sensor_msgs::PointCloud2& message, Time record, std::size_t k);
   void feed(std::vector<RadarScan> scans, std::size_t radar);
-  /// One bad message among good ones is counted; `why` is told at the end, the first one of each kind.
+  /// One bad message among good ones is counted; `why` is reported at the end, the first one of each kind.
   static void notUsable(const std::string& kind, const std::string& why, NotUsableByKind* kinds);
   void account(ScanResult& result);
 

@@ -253,12 +253,12 @@ class BagJob {
     try {
       rosbag::View view;
       bags_.addTo(&view, rosbag::TopicQuery(topics_), begin_, end_);
-      double told = -1.0;
+      double reported = -1.0;
       for (const rosbag::MessageInstance& instance : view) {
         player.play(instance);
         if (!run_.progress) continue;
         const double done = length > 0.0 ? (instance.getTime() - begin_).toSec() / length : 1.0;
-        if (done - told > 0.01) run_.progress(from + (to - from) * (told = done));
+        if (done - reported > 0.01) run_.progress(from + (to - from) * (reported = done));
       }
       player.finish();
     } catch (const OutputError&) {

@@ -15,21 +15,23 @@ ProposedKeys keysOf(const ParameterEntries& entries) {
   return keys;
 }
 
-/// As told to the last digit, else without digits that say nothing.
-double written(double value, double told, double per) { return value == told ? told : rounded(value, per); }
+/// As configured to the last digit, else without digits that say nothing.
+double written(double value, double configured, double per) {
+  return value == configured ? configured : rounded(value, per);
+}
 
 template <typename Vector>
-ParameterValue writtenList(const Vector& values, const Vector& told, double per) {
+ParameterValue writtenList(const Vector& values, const Vector& configured, double per) {
   std::vector<double> list;
-  for (Eigen::Index i = 0; i < values.size(); ++i) list.push_back(written(values[i], told[i], per));
+  for (Eigen::Index i = 0; i < values.size(); ++i) list.push_back(written(values[i], configured[i], per));
   return listOf(list);
 }
 
 /// The keys of a radar that are calibrated.
-ProposedKeys calibratedKeys(const RadarCalibration& calibration, const Config& told) {
+ProposedKeys calibratedKeys(const RadarCalibration& calibration, const Config& configured) {
   constexpr double kMicro = 1e6, kNano = 1e9;  // in one
-  const SmootherOptions& smoother = told.odometry.smoother;
-  const Extrinsics& mounting = told.odometry.T_IR;
+  const SmootherOptions& smoother = configured.odometry.smoother;
+  const Extrinsics& mounting = configured.odometry.T_IR;
   const bool offset_found =
       calibration.axes[static_cast<std::size_t>(CalibrationAxis::kOffset)].verdict == Verdict::kObserved;
   ProposedKeys keys;
@@ -37,7 +39,7 @@ ProposedKeys calibratedKeys(const RadarCalibration& calibration, const Config& t
   keys.set("extrinsics_rotation_xyzw",
            writtenList(calibration.T_IR.q_IR.coeffs(), mounting.q_IR.coeffs(), kNano));
   // The next run starts from this sigma. Its offset may differ by as much as the step detector ignores.
-  const double least = told.odometry.offset_step_detector.min_change;
+  const double least = configured.odometry.offset_step_detector.min_change;
   const OffsetEstimate offset =
       offset_found
           ? OffsetEstimate{rounded(calibration.offset.t_O, kMicro),
@@ -77,11 +79,12 @@ std::string estimateNext(double turn_sigma) {
 
 std::string calibratedYaml(const BagCalibration& calibration, const Config& config,
                            const ParameterEntries& given, const std::string& name) {
-  const std::vector<Config> told = configsOfRadars(config);
+  const std::vector<Config> configured = configsOfRadars(config);
   Config any;
   SortedEntries sorted = sortedEntries(given, parametersOf(any));
   ProposedKeys top_level = keysOf(sorted.top_level);
-  // The mounting found is written as a quaternion of RIO's axes. Told in another way, it would count twice.
+  // The mounting found is written as a quaternion of RIO's axes. Configured in another way, it would count
+  // twice.
   for (const char* key :
        {"estimate_extrinsics", "extrinsics_rotation_sigma", "mounting_yaw_pitch_roll_deg", "extrinsics_axes"})
     top_level.remove(key);
@@ -91,7 +94,7 @@ std::string calibratedYaml(const BagCalibration& calibration, const Config& conf
     turn_sigma = std::max(turn_sigma, radar.calibration.turnSigma());
   const bool has_sections = !config.radars.empty();
   std::string sections;
-  for (std::size_t k = 0; k < told.size(); ++k) {
+  for (std::size_t k = 0; k < configured.size(); ++k) {
     const CalibratedRadar& radar = calibration.radars[k];
     const std::string indent = has_sections ? "  " : "";
     ProposedKeys section = keysOf(sorted.sections[radar.name].entries);
@@ -103,7 +106,7 @@ std::string calibratedYaml(const BagCalibration& calibration, const Config& conf
     if (has_sections) sections += "\n" + radar.name + ":\n" + toYaml(own, indent);
     sections += (has_sections ? "" : "\n") + commented(describeCalibration(radar), indent) + indent +
                 "# If the driver's restart changes the offset, raise time_offset_sigma.\n" +
-                toYaml(calibratedKeys(radar.calibration, told[k]), indent);
+                toYaml(calibratedKeys(radar.calibration, configured[k]), indent);
   }
   return header(calibration, name) + "\n" + toYaml(top_level, "") + "\n" + estimateNext(turn_sigma) +
          sections;

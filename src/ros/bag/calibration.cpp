@@ -21,14 +21,14 @@ Config batchConfig(const Config& config) {
   return batch;
 }
 
-RadarCalibrationEstimate toldOf(const Config& radar) {
+RadarCalibrationEstimate configuredOf(const Config& radar) {
   const SmootherOptions& smoother = radar.odometry.smoother;
   const Eigen::VectorXd sigmas = calibrationSigmas(smoother);
-  RadarCalibrationEstimate told;
-  told.offset = {smoother.time_offset_initial,
-                 smoother.estimate_time_offset ? smoother.time_offset_sigma : 0.0};
-  told.extrinsics = {radar.odometry.T_IR, sigmas.tail(sigmas.size() - 1).cwiseAbs2().asDiagonal()};
-  return told;
+  RadarCalibrationEstimate configured;
+  configured.offset = {smoother.time_offset_initial,
+                       smoother.estimate_time_offset ? smoother.time_offset_sigma : 0.0};
+  configured.extrinsics = {radar.odometry.T_IR, sigmas.tail(sigmas.size() - 1).cwiseAbs2().asDiagonal()};
+  return configured;
 }
 
 RadarCalibrationEstimate foundOf(const RadarSummary& radar) {
@@ -92,7 +92,7 @@ BagCalibration calibrateFromBags(const CalibrationRun& run) {
       found.push_back(foundOf(summary.radars[k]));
       radar.offsets.push_back(found.back().offset);
     }
-    radar.calibration = calibrate(toldOf(radars[k]), found);
+    radar.calibration = calibrate(configuredOf(radars[k]), found);
   }
   return result;
 }

@@ -170,7 +170,7 @@ BagCheck checkBag(const std::vector<std::string>& bags, const CheckRequest& requ
   }
   const bool all_found = std::all_of(radars.begin(), radars.end(),
                                      [](const RadarInspection& each) { return each.search.enough; });
-  if (!all_found && !isMountingTold(request.set) && check.to_do.empty())
+  if (!all_found && !isMountingConfigured(request.set) && check.to_do.empty())
     check.to_do =
         "The mounting is a guess. Record with motion for 3 s or more, or give it: --set "
         "mounting_yaw_pitch_roll_deg=[YAW,PITCH,ROLL] (docs/your_sensors.md, section 6).";

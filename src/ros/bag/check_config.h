@@ -10,13 +10,13 @@
 
 namespace rio_t {
 
-/// The configuration for an IMU and radars as they were found. It keeps what the user has `told`.
+/// The configuration for an IMU and radars as they were found. It keeps what the user has `configured`.
 ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarInspection>& radars,
-                              const ParameterEntries& told);
+                              const ParameterEntries& configured);
 
 /// Runs the odometry on the bag and gives `check` the configuration with which it runs best: `config`, or one
-/// near it that leaves what the user has `told`. `header`: lines for the beginning of the file.
+/// near it that leaves what the user has `configured`. `header`: lines for the beginning of the file.
 void chooseByTrial(const Recording& recording, const std::string& header, const ProposedConfig& config,
-                   const ParameterEntries& told, BagCheck* check);
+                   const ParameterEntries& configured, BagCheck* check);
 
 }  // namespace rio_t

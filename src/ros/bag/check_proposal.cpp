@@ -47,9 +47,9 @@ std::vector<std::string> radarNames(const std::vector<RadarInspection>& radars) 
 }
 
 /// The keys of clouds are in `radars` already: with them the clouds were read.
-void addTold(const ParameterEntries& told, ProposedConfig* config) {
+void addConfigured(const ParameterEntries& configured, ProposedConfig* config) {
   const std::vector<ParameterDescription> about = parameterDescriptions();
-  for (const ParameterEntry& entry : told) {
+  for (const ParameterEntry& entry : configured) {
     if (isCloudKey(entry.key)) continue;
     const bool is_quaternion = entry.key == "extrinsics_rotation_xyzw";
     const auto set = [&](ProposedKeys* keys) {
@@ -70,7 +70,7 @@ void addTold(const ParameterEntries& told, ProposedConfig* config) {
 }  // namespace
 
 ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarInspection>& radars,
-                              const ParameterEntries& told) {
+                              const ParameterEntries& configured) {
   ProposedConfig config;
   config.top_level.add(imu.keys);
   double worst = 0.0;
@@ -83,13 +83,14 @@ ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarI
   config.top_level.set("estimate_extrinsics", "rotation",
                        "The mounting below is coarse. The estimate starts there and refines it.");
   constexpr double kLeast = 0.05, kSafety = 3.0;  // [rad]
-  if (all_observed && !isMountingTold(told) && kSafety * worst < SmootherOptions().extrinsics_rotation_sigma)
+  if (all_observed && !isMountingConfigured(configured) &&
+      kSafety * worst < SmootherOptions().extrinsics_rotation_sigma)
     config.top_level.set("extrinsics_rotation_sigma",
                          ParameterValue{rounded(std::max(kLeast, kSafety * worst), 100.0)},
                          "Standard deviation of the mounting below [rad], with a margin.");
   if (radars.size() == 1) {
     config.top_level.add(radars.front().keys);
-    addTold(told, &config);
+    addConfigured(configured, &config);
     return config;
   }
   const std::vector<std::string> names = radarNames(radars);
@@ -97,7 +98,7 @@ ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarI
   for (const std::string& name : names) list.push_back({name});
   config.top_level.set("radars", ParameterValue{list});
   for (std::size_t k = 0; k < radars.size(); ++k) config.radars.emplace_back(names[k], radars[k].keys);
-  addTold(told, &config);
+  addConfigured(configured, &config);
   return config;
 }
 

@@ -102,7 +102,7 @@ void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
 }  // namespace
 
 void chooseByTrial(const Recording& recording, const std::string& header, const ProposedConfig& config,
-                   const ParameterEntries& told, BagCheck* check) {
+                   const ParameterEntries& configured, BagCheck* check) {
   const double duration = recording.read < recording.length ? recording.read : 0.0;
   Trial best;
   std::string note;  // on the best one
@@ -115,7 +115,7 @@ void chooseByTrial(const Recording& recording, const std::string& header, const 
     note = its_note;
   };
   attempt(config, "");
-  if (!best.good() && !isTold("estimate_extrinsics", told)) {
+  if (!best.good() && !isConfigured("estimate_extrinsics", configured)) {
     ProposedConfig changed = config;
     changed.top_level.set("estimate_extrinsics", "pose", "With a fixed lever arm the odometry diverged.");
     attempt(changed, " (with estimate_extrinsics: pose; without it, it does not run as well)");

@@ -37,8 +37,9 @@ std::string axisRow(std::size_t axis, const AxisCalibration& values) {
   const auto column = [&](double value) {
     return padded(fixedText(text.per * value, text.decimals), 10, true);
   };
-  std::string row = "  " + padded(text.name, 14, false) + padded(text.unit, 4, false) + column(values.told) +
-                    column(values.found) + column(values.sigma) + "   " + toString(values.verdict);
+  std::string row = "  " + padded(text.name, 14, false) + padded(text.unit, 4, false) +
+                    column(values.configured) + column(values.found) + column(values.sigma) + "   " +
+                    toString(values.verdict);
   if (values.verdict == Verdict::kNotObserved)
     row += ": to observe it, " + whatToMove(static_cast<CalibrationAxis>(axis));
   return row + "\n";
@@ -49,7 +50,7 @@ std::string remarks(const CalibratedRadar& radar) {
   std::string text;
   for (std::size_t axis = 0; axis < kCalibrationAxes; ++axis) {
     constexpr double kFar = 3.0;
-    const double far = radar.calibration.axes[axis].farFromTold();
+    const double far = radar.calibration.axes[axis].farFromConfigured();
     if (far < kFar) continue;
     text += std::string("  The ") + kAxes[axis].name + " is " + fixedText(far, 1) +
             " sigma away from it, by the given sigma: are topic, axes, signs and units right?\n";

@@ -43,14 +43,14 @@ void describePasses(const RadarSummary& radar, const Row& row) {
   row("after passes", offsets + " ms");
 }
 
-/// The mounting as people can compare it: how far it went from the one told, by the axes of the IMU.
+/// The mounting as people can compare it: how far it went from the one configured, by the axes of the IMU.
 void describeExtrinsics(const ExtrinsicsSummary& extrinsics, const Row& row) {
-  row("turned by", fixedTexts(1.0 / kDegree * turnBetween(extrinsics.told, extrinsics.T_IR), 2, " ") +
+  row("turned by", fixedTexts(1.0 / kDegree * turnBetween(extrinsics.configured, extrinsics.T_IR), 2, " ") +
                        " deg about x y z of the IMU, sigma " +
                        fixedTexts(1.0 / kDegree * extrinsics.rotation_sigma, 2, " ") + " deg");
   if (extrinsics.translation_sigma.isZero()) return;
-  row("moved by", fixedTexts(1e3 * (extrinsics.T_IR.l_I - extrinsics.told.l_I), 1, " ") + " mm, sigma " +
-                      fixedTexts(1e3 * extrinsics.translation_sigma, 1, " ") + " mm");
+  row("moved by", fixedTexts(1e3 * (extrinsics.T_IR.l_I - extrinsics.configured.l_I), 1, " ") +
+                      " mm, sigma " + fixedTexts(1e3 * extrinsics.translation_sigma, 1, " ") + " mm");
 }
 
 void describeRadar(const RadarSummary& radar, const Row& row) {

@@ -71,15 +71,15 @@ std::vector<double> valuesOf(const CloudTopic& topic, PointCloudFormat format, c
   return values;
 }
 
-/// Nobody's preset: names, one by one, unless the user has `told` them.
-void guessFormat(const std::vector<std::string>& fields, const PointCloudOverrides& told,
+/// Nobody's preset: names, one by one, unless the user has `configured` them.
+void guessFormat(const std::vector<std::string>& fields, const PointCloudOverrides& configured,
                  FormatProposal* proposal) {
   const auto either = [](const std::string& name, const std::string& guess) {
     return name.empty() ? guess : name;
   };
   const std::string doppler =
-      either(told.doppler, fieldLike(fields, {"doppler", "radial_speed", "range_rate", "rangerate",
-                                              "velocity", "vel", "speed", "v_r", "vr"}));
+      either(configured.doppler, fieldLike(fields, {"doppler", "radial_speed", "range_rate", "rangerate",
+                                                    "velocity", "vel", "speed", "v_r", "vr"}));
   if (doppler.empty()) {
     proposal->fault = "no field name looks like a Doppler (fields: " + proposal->fields + ")";
     proposal->to_do =
@@ -88,17 +88,17 @@ void guessFormat(const std::vector<std::string>& fields, const PointCloudOverrid
     return;
   }
   using Names = std::vector<std::pair<const char*, std::string>>;
-  const Names cartesian = {{"x", either(told.x, fieldNamed(fields, "x"))},
-                           {"y", either(told.y, fieldNamed(fields, "y"))},
-                           {"z", either(told.z, fieldNamed(fields, "z"))}};
+  const Names cartesian = {{"x", either(configured.x, fieldNamed(fields, "x"))},
+                           {"y", either(configured.y, fieldNamed(fields, "y"))},
+                           {"z", either(configured.z, fieldNamed(fields, "z"))}};
   const Names spherical = {
-      {"azimuth", either(told.azimuth, fieldLike(fields, {"azimuth"}))},
-      {"elevation", either(told.elevation, fieldLike(fields, {"elevation"}))},
-      {"range", either(told.range, fieldLike(fields, {"range", "distance"}, {doppler}))}};
+      {"azimuth", either(configured.azimuth, fieldLike(fields, {"azimuth"}))},
+      {"elevation", either(configured.elevation, fieldLike(fields, {"elevation"}))},
+      {"range", either(configured.range, fieldLike(fields, {"range", "distance"}, {doppler}))}};
   const auto complete = [](const Names& names) {
     return std::none_of(names.begin(), names.end(), [](const auto& name) { return name.second.empty(); });
   };
-  const bool is_cartesian = complete(cartesian) && told.coordinates != PointCoordinates::kSpherical;
+  const bool is_cartesian = complete(cartesian) && configured.coordinates != PointCoordinates::kSpherical;
   if (!is_cartesian && !complete(spherical)) {
     proposal->fault =
         "it has no position: neither x, y, z nor azimuth, elevation, range (fields: " + proposal->fields +
@@ -122,9 +122,10 @@ void guessFormat(const std::vector<std::string>& fields, const PointCloudOverrid
     proposal->keys.set("radar_power_unit", "snr_db");
   }
   proposal->odd.push_back("no preset has the fields " + proposal->fields + "; " + doppler +
-                          (told.doppler.empty() ? " is taken for the Doppler; if another field is, name it: "
-                                                  "--set radar_field_doppler=FIELD"
-                                                : " is the Doppler, as told"));
+                          (configured.doppler.empty()
+                               ? " is taken for the Doppler; if another field is, name it: "
+                                 "--set radar_field_doppler=FIELD"
+                               : " is the Doppler, as configured"));
 }
 
 /// Names each angle whose values are too large for radians. A driver may count azimuths up to a whole turn.
@@ -169,7 +170,7 @@ PowerUnit unitOf(double median, PowerUnit of_preset) {
   return PowerUnit::kNotSnr;
 }
 
-void findPower(const CloudTopic& topic, bool unit_is_told, FormatProposal* proposal) {
+void findPower(const CloudTopic& topic, bool unit_is_configured, FormatProposal* proposal) {
   const PointCloudFormat& format = proposal->format;
   if (format.power_unit == PowerUnit::kNotSnr) {
     proposal->power = "no SNR is read";
@@ -178,9 +179,9 @@ void findPower(const CloudTopic& topic, bool unit_is_told, FormatProposal* propo
   const std::vector<double> values = valuesOf(topic, format, format.power);
   const double median = quantile(values, 0.5);
   const bool constant = quantile(values, 0.0) == quantile(values, 1.0);
-  const PowerUnit unit = unit_is_told ? format.power_unit
-                         : constant   ? PowerUnit::kNotSnr
-                                      : unitOf(median, format.power_unit);
+  const PowerUnit unit = unit_is_configured ? format.power_unit
+                         : constant         ? PowerUnit::kNotSnr
+                                            : unitOf(median, format.power_unit);
   const std::string said = "the values of " + format.power + " have the median " + fixedText(median, 1);
   if (unit != format.power_unit) {
     proposal->keys.set("radar_power_unit", toString(unit),
@@ -233,7 +234,7 @@ bool isCloudKey(const std::string& key) {
   return boost::algorithm::starts_with(key, "radar_field_") || others.count(key) != 0;
 }
 
-FormatProposal proposeFormat(const CloudTopic& topic, const ParameterEntries& told) {
+FormatProposal proposeFormat(const CloudTopic& topic, const ParameterEntries& configured) {
   FormatProposal proposal;
   const PointCloud2* message = example(topic);
   if (message == nullptr) {
@@ -241,22 +242,22 @@ FormatProposal proposeFormat(const CloudTopic& topic, const ParameterEntries& to
     proposal.to_do = "Look why the radar sees nothing, and record again.";
     return proposal;
   }
-  const PointCloudOverrides known = makeConfig(told).radar_overrides;
-  const bool format_is_told = isTold("radar_format", told);
+  const PointCloudOverrides known = makeConfig(configured).radar_overrides;
+  const bool format_is_configured = isConfigured("radar_format", configured);
   const std::vector<std::string> fields = fieldsOf(*message);
   proposal.fields = boost::algorithm::join(fields, ", ");
   proposal.fitting = fittingPresets(*message);
-  if (proposal.fitting.empty() && !format_is_told) {
+  if (proposal.fitting.empty() && !format_is_configured) {
     guessFormat(fields, known, &proposal);
     if (!proposal.fault.empty()) return proposal;
-  } else if (!format_is_told) {
+  } else if (!format_is_configured) {
     std::string why = "Fields: " + proposal.fields;
     if (proposal.fitting.size() > 1)
       why += ". These presets have them, too: " + boost::algorithm::join(proposal.fitting, ", ");
     proposal.keys.set("radar_format", proposal.fitting.front(), why);
   }
   if (!known.power.empty()) proposal.keys.set("radar_power_unit", "snr_db");
-  for (const ParameterEntry& entry : told) {
+  for (const ParameterEntry& entry : configured) {
     if (isCloudKey(entry.key)) proposal.keys.set(entry.key, entry.value, "Given by --set.");
   }
   resolve(&proposal);
@@ -279,13 +280,13 @@ FormatProposal proposeFormat(const CloudTopic& topic, const ParameterEntries& to
   return proposal;
 }
 
-bool correctAxes(const CloudReport& cloud, bool mirrored, const ParameterEntries& told,
+bool correctAxes(const CloudReport& cloud, bool mirrored, const ParameterEntries& configured,
                  FormatProposal* proposal) {
   constexpr double kLooks = 0.4;  // length of the mean direction from which on a radar looks somewhere
   constexpr double kWider = 1.5;  // by which a field of view is wider in azimuth than in elevation
   PointCloudFormat& format = proposal->format;
   if (format.coordinates != PointCoordinates::kCartesian) return false;
-  if (makeConfig(told).radar_overrides.axes) return false;
+  if (makeConfig(configured).radar_overrides.axes) return false;
   const std::array<std::string, 3> fields = {format.x, format.y, format.z};
   const Eigen::Vector3d mean = cloudFromRfu(format.axes) * cloud.mean_direction;  // along the fields
   const int forward = format.axes == PointAxes::kForwardLeftUp ? 0 : 1;

@@ -28,14 +28,14 @@ bool hasPoints(const sensor_msgs::PointCloud2& cloud);
 /// Whether a key says how a cloud is read: its preset, fields, axes and units.
 bool isCloudKey(const std::string& key);
 
-/// Chooses preset, names of fields and unit of the power from fields and values. What the user has `told`
-/// comes first. Only the unit of angles needs more than the first cloud with points.
-FormatProposal proposeFormat(const CloudTopic& topic, const ParameterEntries& told);
+/// Chooses preset, names of fields and unit of the power from fields and values. What the user has
+/// `configured` comes first. Only the unit of angles needs more than the first cloud with points.
+FormatProposal proposeFormat(const CloudTopic& topic, const ParameterEntries& configured);
 
 /// Turns the format so that the radar looks along the forward axis, as `cloud` shows it. `mirrored`: the axes
-/// are left-handed (see MountingSearch). Axes that the user has `told` stay. Returns whether anything
+/// are left-handed (see MountingSearch). Axes that the user has `configured` stay. Returns whether anything
 /// changed.
-bool correctAxes(const CloudReport& cloud, bool mirrored, const ParameterEntries& told,
+bool correctAxes(const CloudReport& cloud, bool mirrored, const ParameterEntries& configured,
                  FormatProposal* proposal);
 
 struct DecodedClouds {

@@ -27,8 +27,9 @@ void ProposedKeys::remove(const std::string& key) {
       keys_.end());
 }
 
-bool isTold(const std::string& key, const ParameterEntries& told) {
-  return std::any_of(told.begin(), told.end(), [&](const ParameterEntry& entry) { return entry.key == key; });
+bool isConfigured(const std::string& key, const ParameterEntries& configured) {
+  return std::any_of(configured.begin(), configured.end(),
+                     [&](const ParameterEntry& entry) { return entry.key == key; });
 }
 
 double rounded(double value, double per) { return std::round(value * per) / per + 0.0; }

@@ -36,8 +36,8 @@ struct ProposedConfig {
   std::vector<std::pair<std::string, ProposedKeys>> radars;  ///< by name; empty: one radar, at the top level
 };
 
-/// Whether the user has told the key.
-bool isTold(const std::string& key, const ParameterEntries& told);
+/// Whether the user has configured the key.
+bool isConfigured(const std::string& key, const ParameterEntries& configured);
 
 /// To the nearest of the numbers that lie 1 / `per` apart; never minus zero.
 double rounded(double value, double per);

@@ -237,39 +237,42 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
                     "Found roughly, in seconds.");
 }
 
-/// The configuration keeps what the user has told. The report says if the bag clearly shows something else.
-void compareWithTold(const MountingSearch& search, const ParameterEntries& told, RadarInspection* radar) {
+/// The configuration keeps what the user has configured. The report says if the bag clearly shows something
+/// else.
+void compareWithConfigured(const MountingSearch& search, const ParameterEntries& configured,
+                           RadarInspection* radar) {
   if (!search.enough || search.rotation_sigma.maxCoeff() > kObservedTurn || radar->isSparse()) return;
-  const Config known = makeConfig(told);
+  const Config known = makeConfig(configured);
   const double turn = known.odometry.T_IR.q_IR.angularDistance(search.q_IR);
-  if (isMountingTold(told) && turn > kFarApart)
+  if (isMountingConfigured(configured) && turn > kFarApart)
     tell(radar, FindingLevel::kOdd, "mounting",
-         "the told mounting and the one that the bag shows are " + degrees(turn) + " degrees apart");
+         "the configured mounting and the one that the bag shows are " + degrees(turn) + " degrees apart");
   const int sign = known.radar_overrides.doppler_sign;
   if (sign != 0 && sign != search.sign)
     tell(radar, FindingLevel::kOdd, "Doppler",
-         "the told radar_doppler_sign is " + std::to_string(sign) + ", and the bag shows " +
+         "the configured radar_doppler_sign is " + std::to_string(sign) + ", and the bag shows " +
              std::to_string(search.sign));
 }
 
 }  // namespace
 
-bool isMountingTold(const ParameterEntries& told) {
-  return isTold("mounting_yaw_pitch_roll_deg", told) || isTold("extrinsics_rotation_xyzw", told);
+bool isMountingConfigured(const ParameterEntries& configured) {
+  return isConfigured("mounting_yaw_pitch_roll_deg", configured) ||
+         isConfigured("extrinsics_rotation_xyzw", configured);
 }
 
 RadarInspection inspectRadar(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud,
-                             const ParameterEntries& told) {
+                             const ParameterEntries& configured) {
   RadarInspection radar;
   radar.topic = cloud.topic;
   const StreamTiming timing = inspectTiming(cloud.times);
-  FormatProposal format = proposeFormat(cloud, told);
+  FormatProposal format = proposeFormat(cloud, configured);
   if (!format.fault.empty()) {
     tell(&radar, FindingLevel::kMissing, "radar", cloud.topic + ": " + format.fault);
     radar.to_do = format.to_do;
     return radar;
   }
-  const StampProposal stamps = proposeStamps(recording, imu.times, cloud, told);
+  const StampProposal stamps = proposeStamps(recording, imu.times, cloud, configured);
   const InertialTrack track(imu.samples, imu.report.rest_rate);
   Looked looked = look(recording, imu, cloud, stamps, format.format, track);
   if (looked.cloud.points == 0 || !looked.cloud.has_doppler) {
@@ -284,7 +287,7 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   // If the ranges say nothing, a radar that looks along another axis and a contrary sign are one fault, not
   // two: two fields are swapped.
   const bool mirrored = looked.search.mirrored || (looked.sign.sign == 0 && looked.search.sign == -1);
-  if (correctAxes(looked.cloud, mirrored, told, &format))
+  if (correctAxes(looked.cloud, mirrored, configured, &format))
     looked = look(recording, imu, cloud, stamps, format.format, track);
   const std::optional<Eigen::Vector3d> up = upOf(imu.report);
   constexpr double kUpright = 0.9;  // cosine: z of the IMU is up, as the words for a mounting have it
@@ -302,7 +305,7 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   if (stamps.odd.empty()) tell(&radar, FindingLevel::kOk, "stamps", stamps.text);
   describeSign(looked, format, &radar);
   describeMounting(looked.search, &radar);
-  compareWithTold(looked.search, told, &radar);
+  compareWithConfigured(looked.search, configured, &radar);
   return radar;
 }
 

@@ -50,10 +50,10 @@ struct RadarInspection {
   /// The mounting may be far off, whatever its sigma.
   bool isSparse() const { return points < kSparsePoints; }
 };
-/// Whether the user has told the rotation of the mounting.
-bool isMountingTold(const ParameterEntries& told);
-/// The cloud is read as the user has `told`.
+/// Whether the user has configured the rotation of the mounting.
+bool isMountingConfigured(const ParameterEntries& configured);
+/// The cloud is read as the user has `configured`.
 RadarInspection inspectRadar(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud,
-                             const ParameterEntries& told);
+                             const ParameterEntries& configured);
 
 }  // namespace rio_t

@@ -43,7 +43,7 @@ void addImu(const sensor_msgs::Imu& message, Time record, ImuTopic* topic) {
   topic->times.push_back({imu.time, record});
 }
 
-void readMessages(rosbag::View& view, const ParameterEntries& told, Recording* recording) {
+void readMessages(rosbag::View& view, const ParameterEntries& configured, Recording* recording) {
   std::set<std::string> judged, refused;  // topics with clouds
   for (const rosbag::MessageInstance& instance : view) {
     const Time record = toTime(instance.getTime());
@@ -59,7 +59,7 @@ void readMessages(rosbag::View& view, const ParameterEntries& told, Recording* r
       if (topic.messages.size() > 1 && isCopy(*topic.messages.back(), **std::prev(topic.messages.end(), 2)))
         ++topic.copies;
       const bool is_first = hasPoints(*topic.messages.back()) && judged.insert(name).second;
-      if (is_first && !proposeFormat(topic, told).fault.empty()) refused.insert(name);
+      if (is_first && !proposeFormat(topic, configured).fault.empty()) refused.insert(name);
     } else {
       HeaderTopic& topic = topicOf(name, &recording->headers);
       topic.messages.push_back(*rio_t::read<std_msgs::Header>(instance));

@@ -58,14 +58,14 @@ const HeaderTopic* triggerOf(const Recording& recording, const std::vector<Messa
 }  // namespace
 
 StampProposal proposeStamps(const Recording& recording, const std::vector<MessageTimes>& imu,
-                            const CloudTopic& cloud, const ParameterEntries& told) {
-  const Config known = withAbsoluteTopics(makeConfig(told));
+                            const CloudTopic& cloud, const ParameterEntries& configured) {
+  const Config known = withAbsoluteTopics(makeConfig(configured));
   StampProposal proposal;
   proposal.shift = known.radar_stamp_shift;
-  if (isTold("stamp_source", told)) {
+  if (isConfigured("stamp_source", configured)) {
     proposal.source = known.stamp_source;
     proposal.trigger_topic = known.trigger_topic;
-    proposal.text = "as told, stamp_source: " + toString(known.stamp_source);
+    proposal.text = "as configured, stamp_source: " + toString(known.stamp_source);
     return proposal;
   }
   const StreamTiming timing = inspectTiming(cloud.times);

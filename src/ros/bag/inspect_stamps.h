@@ -20,9 +20,10 @@ struct StampProposal {
   std::vector<std::string> odd;  ///< sentences
 };
 
-/// Chooses stamp_source for a cloud, unless the user has `told` it. No stamp of the IMU may be out of place.
+/// Chooses stamp_source for a cloud, unless the user has `configured` it. No stamp of the IMU may be out of
+/// place.
 StampProposal proposeStamps(const Recording& recording, const std::vector<MessageTimes>& imu,
-                            const CloudTopic& cloud, const ParameterEntries& told);
+                            const CloudTopic& cloud, const ParameterEntries& configured);
 
 /// Stamps scans as the programs would. `scans`: one for each message of the topic.
 std::vector<RadarScan> stampScans(const Recording& recording, const std::vector<MessageTimes>& imu,

@@ -5,7 +5,7 @@
 namespace rio_t {
 namespace {
 
-/// The estimates of a radar before its first scan: what was told.
+/// The estimates of a radar before its first scan: what was configured.
 RadarEstimate before(const OdometryOptions& options) {
   const SmootherOptions& smoother = options.smoother;
   RadarEstimate radar;
@@ -13,7 +13,7 @@ RadarEstimate before(const OdometryOptions& options) {
   if (smoother.estimate_time_offset) radar.final_offset_sigma_s = smoother.time_offset_sigma;
   if (smoother.estimate_extrinsics == EstimateExtrinsics::kNone) return radar;
   radar.extrinsics.emplace();
-  radar.extrinsics->told = radar.extrinsics->T_IR = options.T_IR;
+  radar.extrinsics->configured = radar.extrinsics->T_IR = options.T_IR;
   radar.extrinsics->rotation_sigma.setConstant(smoother.extrinsics_rotation_sigma);
   if (smoother.estimate_extrinsics == EstimateExtrinsics::kPose)
     radar.extrinsics->translation_sigma.setConstant(smoother.extrinsics_translation_sigma);

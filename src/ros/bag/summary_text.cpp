@@ -61,14 +61,15 @@ void addEstimates(SummaryLines& lines, const RadarSummary& radar) {
   const std::string suffix = suffixOf(radar.name);
   lines.add("final_offset_s" + suffix, fixedText(radar.final_offset_s, 9));
   lines.add("final_offset_sigma_s" + suffix, fixedText(radar.final_offset_sigma_s, 9));
-  if (radar.told_turn) {  // about the axes of the IMU [rad]
-    lines.add("mounting_turn" + suffix, fixedTexts(radar.told_turn->turn, 6));
-    lines.add("mounting_turn_sigma" + suffix, fixedTexts(radar.told_turn->sigma(), 6));
+  if (radar.mounting_turn) {  // about the axes of the IMU [rad]
+    lines.add("mounting_turn" + suffix, fixedTexts(radar.mounting_turn->turn, 6));
+    lines.add("mounting_turn_sigma" + suffix, fixedTexts(radar.mounting_turn->sigma(), 6));
   }
   if (!radar.extrinsics) return;
   const ExtrinsicsSummary& extrinsics = *radar.extrinsics;
-  lines.add("told_extrinsics_translation" + suffix, fixedTexts(extrinsics.told.l_I, 9));
-  lines.add("told_extrinsics_rotation_xyzw" + suffix, fixedTexts(extrinsics.told.q_IR.coeffs(), 9));
+  lines.add("configured_extrinsics_translation" + suffix, fixedTexts(extrinsics.configured.l_I, 9));
+  lines.add("configured_extrinsics_rotation_xyzw" + suffix,
+            fixedTexts(extrinsics.configured.q_IR.coeffs(), 9));
   lines.add("final_extrinsics_translation" + suffix, fixedTexts(extrinsics.T_IR.l_I, 9));
   lines.add("final_extrinsics_translation_sigma" + suffix, fixedTexts(extrinsics.translation_sigma, 9));
   lines.add("final_extrinsics_rotation_xyzw" + suffix, fixedTexts(extrinsics.T_IR.q_IR.coeffs(), 9));

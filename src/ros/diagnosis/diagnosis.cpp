@@ -99,7 +99,7 @@ double worstSilentShare(const RunEvidence& evidence) {
   return shareOfRun(evidence, seconds);
 }
 
-/// How far the estimated vehicle frame is turned from the told one, about the worst axis.
+/// How far the estimated vehicle frame is turned from the configured one, about the worst axis.
 double vehicleTurnSigmas(const RunEvidence& evidence, const Config& config) {
   return evidence.vehicle_turn.cwiseAbs().maxCoeff() / config.odometry.ground_vehicle.rotation_sigma;
 }
@@ -186,7 +186,7 @@ void addVehicleFrame(const RunEvidence& evidence, const Config& config, std::vec
   const Eigen::Vector3d turn = evidence.vehicle_turn / kDegree;
   causes->push_back(
       {"vehicle_frame_far",
-       "The estimated vehicle frame is turned from the told one by " + fixedText(turn.x(), 0) + ", " +
+       "The estimated vehicle frame is turned from the configured one by " + fixedText(turn.x(), 0) + ", " +
            fixedText(turn.y(), 0) + ", " + fixedText(turn.z(), 0) + " degrees about x, y, z of the IMU, " +
            number(sigmas) + " vehicle_frame_rotation_sigma.",
        "Check vehicle_frame_rotation_xyzw (order x, y, z, w): which way does the vehicle drive?",
@@ -219,19 +219,20 @@ void addImu(const RunEvidence& evidence, const Config& config, std::vector<Cause
                        std::to_string(countOf(evidence.input_faults, fault.name)) + " " + fault.text,
                        fault.remedy, share});
   }
-  const ImuNoise& told = config.odometry.imu_noise;
+  const ImuNoise& expected = config.odometry.imu_noise;
   const MeasuredImuNoise& noise = evidence.imu_noise;
   const auto noisy = [&](const std::string& sensor, const std::string& key, double measured,
                          const MeasuredImuNoise& alone, double configured) {
-    if (!alone.isFarAbove(told)) return;
+    if (!alone.isFarAbove(expected)) return;
     causes->push_back({"imu_noisy",
                        "The " + sensor + " vibrates or is noisier than configured: " + number(measured) +
                            " against " + key + " " + number(configured) + ".",
                        "Mount the IMU softer, or raise this key.", 0.1});
   };
   noisy("accelerometer", "imu_accel_noise_density", noise.accel_density, {noise.accel_density, 0.0},
-        told.accel_density);
-  noisy("gyro", "imu_gyro_noise_density", noise.gyro_density, {0.0, noise.gyro_density}, told.gyro_density);
+        expected.accel_density);
+  noisy("gyro", "imu_gyro_noise_density", noise.gyro_density, {0.0, noise.gyro_density},
+        expected.gyro_density);
 }
 
 /// After a start at rest the heading drifts, too, but only as the noise of the gyro says.

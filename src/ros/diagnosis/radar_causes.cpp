@@ -173,18 +173,18 @@ class RadarCauses {
     const double sigmas = turnSigmas(radar_, config_);
     if (sigmas <= kFarMounting) return;
     const double share = 1.0 - kFarMounting / sigmas;
-    if (radar_.told_turn) {
+    if (radar_.mounting_turn) {
       cause("mounting_far", share,
             "The scans fit better if the mounting" + of_ + " is turned by " +
-                degrees(radar_.told_turn->turn) + ", with sigmas of " +
-                fixedTexts(radar_.told_turn->sigma() / kDegree, 1) + ".",
+                degrees(radar_.mounting_turn->turn) + ", with sigmas of " +
+                fixedTexts(radar_.mounting_turn->sigma() / kDegree, 1) + ".",
             "Set estimate_extrinsics: rotation, or correct " + key_ +
                 "extrinsics_rotation_xyzw (order x, y, z, w): `rosrun rio_t calibrate` finds it.");
       return;
     }
     // An estimate that follows a wrong sign turns the mounting around, and then contradicts nothing.
     cause("mounting_far", share,
-          "The estimated mounting" + of_ + " is turned from the told one by " + degrees(radar_.turn) +
+          "The estimated mounting" + of_ + " is turned from the configured one by " + degrees(radar_.turn) +
               ", with " + key_ + "extrinsics_rotation_sigma " +
               number(config_.odometry.smoother.extrinsics_rotation_sigma / kDegree) + " degrees.",
           "Check " + key_ + "radar_doppler_sign, " + key_ + "radar_axes and the mounting (" + key_ +

@@ -49,16 +49,16 @@ inline std::string mountingAdvice(const RadarSummary& radar) {
              : kCheckBag;
 }
 
-/// [rad] A protractor measures a mounting so well. The user told it, and the estimator holds it.
-inline constexpr double kToldSigma = 1.0 * kDegree;
+/// [rad] A protractor measures a mounting so well. The user configured it, and the estimator holds it.
+inline constexpr double kConfiguredSigma = 1.0 * kDegree;
 
-/// How far the mounting is turned from the told one: as the scans say of a mounting that is held, or as
+/// How far the mounting is turned from the configured one: as the scans say of a mounting that is held, or as
 /// estimated, about the worst axis.
 inline double turnSigmas(const RadarSummary& radar, const Config& config) {
-  if (radar.told_turn) {
-    const Eigen::Vector3d& turn = radar.told_turn->turn;
-    const Eigen::Matrix3d told = kToldSigma * kToldSigma * Eigen::Matrix3d::Identity();
-    return std::sqrt(turn.dot((radar.told_turn->covariance + told).ldlt().solve(turn)));
+  if (radar.mounting_turn) {
+    const Eigen::Vector3d& turn = radar.mounting_turn->turn;
+    const Eigen::Matrix3d configured = kConfiguredSigma * kConfiguredSigma * Eigen::Matrix3d::Identity();
+    return std::sqrt(turn.dot((radar.mounting_turn->covariance + configured).ldlt().solve(turn)));
   }
   return radar.turn.cwiseAbs().maxCoeff() / config.odometry.smoother.extrinsics_rotation_sigma;
 }

@@ -16,7 +16,7 @@ std::uint64_t countOf(const Counts& counts, const std::string& name) {
 EvidenceCollector::EvidenceCollector(const Config& config)
     : coasting_after_(config.odometry.health.coasting_after),
       max_bridged_gap_(config.odometry.imu_input_check.max_bridged_gap),
-      told_q_IV_(config.odometry.ground_vehicle.T_IV.q_IR) {
+      configured_q_IV_(config.odometry.ground_vehicle.T_IV.q_IR) {
   for (const Config& radar : configsOfRadars(config)) {
     filters_.emplace_back(radar.odometry.ego_velocity);
     evidence_.radars.emplace_back().name = radar.radar_name;
@@ -47,7 +47,7 @@ void EvidenceCollector::add(const ScanResult& result) {
   if (result.used || result.at_rest)
     last_used_[result.scan.radar] = std::max(result.scan.stamp, newest_state_.value_or(result.scan.stamp));
   if (result.ground_vehicle)
-    evidence_.vehicle_turn = so3::log(result.ground_vehicle->q_IV * told_q_IV_.conjugate());
+    evidence_.vehicle_turn = so3::log(result.ground_vehicle->q_IV * configured_q_IV_.conjugate());
   ++evidence_.scans_judged;
   if (result.health == Health::kDiverged) ++evidence_.scans_diverged;
   if (result.is_contradicted) ++evidence_.scans_contradicted;
@@ -57,8 +57,8 @@ void EvidenceCollector::add(const ScanResult& result) {
     ++radar.scans_rejected[result.rejected_because];
   }
   if (!result.updated) return;
-  radar.turn = turnBetween(result.told_T_IR, result.T_IR);
-  radar.told_turn = result.told_turn;
+  radar.turn = turnBetween(result.configured_T_IR, result.T_IR);
+  radar.mounting_turn = result.mounting_turn;
   evidence_.heading_sigma = std::sqrt(bodyOdometry(result.state, 0.0).pose_covariance(5, 5));
   ++evidence_.solver_terminations[toString(result.solver_termination)];
 }

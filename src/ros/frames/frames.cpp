@@ -10,8 +10,8 @@
 namespace rio_t {
 
 std::string imuFrame(const Config& config, const std::string& frame_id) {
-  const std::string& told = config.imu_frame.empty() ? frame_id : config.imu_frame;
-  return withoutSlash(told.empty() ? config.base_link_frame : told);
+  const std::string& configured = config.imu_frame.empty() ? frame_id : config.imu_frame;
+  return withoutSlash(configured.empty() ? config.base_link_frame : configured);
 }
 
 std::string cloudFrame(const Config& radar, const std::string& frame_id) {

@@ -26,9 +26,9 @@ constexpr std::uint32_t kScanQueue = 200;
 
 /// The topics with namespace and remappings, for messages to people. Throws ConfigError that names the keys
 /// of topics that ROS does not take.
-Config withResolvedTopics(const Config& told, const ros::NodeHandle& node) {
+Config withResolvedTopics(const Config& configured, const ros::NodeHandle& node) {
   std::vector<std::string> faults;
-  Config config = withTopics(told, [&](const std::string& key, const std::string& topic) {
+  Config config = withTopics(configured, [&](const std::string& key, const std::string& topic) {
     try {
       return key == "ground_truth_topic" ? topic : node.resolveName(topic);
     } catch (const ros::InvalidNameException& error) {
@@ -68,9 +68,9 @@ LiveOdometry::Radar::Radar(const Config& its_config) : config(its_config), forma
 LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
                            const std::string& name)
     : name_(name),
-      told_(configFromRos(private_node)),
+      configured_(configFromRos(private_node)),
       // Checks again, since remapping and namespace may give two radars one topic.
-      config_(withParameters(withResolvedTopics(told_, node), {})),
+      config_(withParameters(withResolvedTopics(configured_, node), {})),
       node_(node),
       private_node_(private_node),
       monitor_(config_),
@@ -83,7 +83,7 @@ LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& p
   showEffectiveParameters(private_node_, config_);
   startSessionWhenReady();
   addDiagnostics();
-  subscribe(told_);
+  subscribe(configured_);
   solver_ = std::thread([this] { solve(); });
   imu_spinner_.emplace(1, &imu_queue_);
   input_spinner_.emplace(1, &input_queue_);
@@ -127,12 +127,12 @@ void LiveOdometry::guarded(const std::string& what, Callback&& callback) {
   }
 }
 
-void LiveOdometry::subscribe(const Config& told) {
+void LiveOdometry::subscribe(const Config& configured) {
   const ros::TransportHints fast = ros::TransportHints().tcpNoDelay();
   ros::NodeHandle imu_node = onQueue(node_, &imu_queue_);
   ros::NodeHandle input_node = onQueue(node_, &input_queue_);
   ros::NodeHandle service_node = onQueue(private_node_, &input_queue_);
-  const std::vector<Config> told_of_radars = configsOfRadars(told);
+  const std::vector<Config> configured_radars = configsOfRadars(configured);
 
   for (std::size_t k = 0; k < radars_.size(); ++k) {
     Radar& radar = radars_[k];
@@ -143,15 +143,15 @@ void LiveOdometry::subscribe(const Config& told) {
       onScan(k, event);
     };
     if (radar.config.stamp_source == StampSource::kTrigger)
-      radar.triggers = input_node.subscribe<std_msgs::Header>(told_of_radars[k].trigger_topic, kImuQueue,
+      radar.triggers = input_node.subscribe<std_msgs::Header>(configured_radars[k].trigger_topic, kImuQueue,
                                                               trigger, ros::VoidConstPtr(), fast);
-    radar.scans = input_node.subscribe<sensor_msgs::PointCloud2>(told_of_radars[k].radar_topic, kScanQueue,
+    radar.scans = input_node.subscribe<sensor_msgs::PointCloud2>(configured_radars[k].radar_topic, kScanQueue,
                                                                  scan, ros::VoidConstPtr(), fast);
   }
-  if (!told.barometer_topic.empty())
+  if (!configured.barometer_topic.empty())
     barometer_subscriber_ =
-        input_node.subscribe(told.barometer_topic, kImuQueue, &LiveOdometry::onPressure, this, fast);
-  imu_subscriber_ = imu_node.subscribe(told.imu_topic, kImuQueue, &LiveOdometry::onImu, this, fast);
+        input_node.subscribe(configured.barometer_topic, kImuQueue, &LiveOdometry::onPressure, this, fast);
+  imu_subscriber_ = imu_node.subscribe(configured.imu_topic, kImuQueue, &LiveOdometry::onImu, this, fast);
   reset_server_ = service_node.advertiseService("reset", &LiveOdometry::onReset, this);
   save_server_ = service_node.advertiseService("save_trajectory", &LiveOdometry::onSaveTrajectory, this);
   reconfigure_ =
@@ -249,13 +249,13 @@ void LiveOdometry::tellFaults() {
   if (!now) return;
   if (faults_of_.lock() != now) {
     faults_of_ = now;
-    faults_told_.clear();
+    faults_reported_.clear();
   }
   for (const auto& [fault, count] : now->odometry().faults()) {
-    std::uint64_t& told = faults_told_[fault];
-    if (count == told || !isTimeToTell("input fault " + fault)) continue;
+    std::uint64_t& reported = faults_reported_[fault];
+    if (count == reported || !isTimeToTell("input fault " + fault)) continue;
     ROS_WARN_STREAM(name_ << ": input fault " << fault << ", " << count << " so far");
-    told = count;
+    reported = count;
   }
 }
 
@@ -325,9 +325,9 @@ void LiveOdometry::tellStatus(const LiveMonitor::Status& status) {
 bool LiveOdometry::isTimeToTell(const std::string& what, double period) {
   const auto now = std::chrono::steady_clock::now();
   const std::lock_guard<std::mutex> lock(mutex_);
-  const auto [told, is_first] = told_at_.try_emplace(what, now);
-  if (!is_first && now - told->second < std::chrono::duration<double>(period)) return false;
-  told->second = now;
+  const auto [reported, is_first] = reported_at_.try_emplace(what, now);
+  if (!is_first && now - reported->second < std::chrono::duration<double>(period)) return false;
+  reported->second = now;
   return true;
 }
 
@@ -378,10 +378,10 @@ void LiveOdometry::tellHealth(const ScanResult& result) {
   }
 }
 
-void LiveOdometry::tellDopplerStep(const Radar& radar, const DopplerStep& step, DopplerStep* told) const {
+void LiveOdometry::tellDopplerStep(const Radar& radar, const DopplerStep& step, DopplerStep* reported) const {
   if (step.source == DopplerStepSource::kUnknown) return;
-  if (step.source == told->source && step.value == told->value) return;
-  *told = step;
+  if (step.source == reported->source && step.value == reported->value) return;
+  *reported = step;
   const char* from = step.source == DopplerStepSource::kGiven ? "given" : "read off the data";
   const std::string whose = withName(name_ + ": Doppler of radar", radar.config);
   if (step.value > 0.0) {
@@ -392,9 +392,9 @@ void LiveOdometry::tellDopplerStep(const Radar& radar, const DopplerStep& step, 
 }
 
 void LiveOdometry::solve() {
-  Session published;              // whose results ~path holds
-  std::vector<DopplerStep> told;  // of the radars of that session
-  bool has_told_start = false;    // of that session
+  Session published;                  // whose results ~path holds
+  std::vector<DopplerStep> reported;  // of the radars of that session
+  bool has_reported_start = false;    // of that session
   while (true) {
     double rate_sigma = 0.0;
     {
@@ -409,8 +409,8 @@ void LiveOdometry::solve() {
     if (published != now) {
       if (published) publisher_.clear();
       published = now;
-      told.assign(radars_.size(), DopplerStep());
-      has_told_start = false;
+      reported.assign(radars_.size(), DopplerStep());
+      has_reported_start = false;
     }
     try {
       bool more = false;
@@ -427,14 +427,14 @@ void LiveOdometry::solve() {
         });
         if (!current) break;  // reset meanwhile: not of this world any more
       }
-      if (!has_told_start && now->odometry().start()) {
-        has_told_start = true;
+      if (!has_reported_start && now->odometry().start()) {
+        has_reported_start = true;
         const std::string waiting_for = frames_.waitingFor();
         ROS_INFO_STREAM(name_ << ": started from " << toString(now->odometry().start()->from) << "; ~odom "
                               << (waiting_for.empty() ? "is published" : "waits for " + waiting_for));
       }
       for (std::size_t k = 0; k < radars_.size(); ++k)
-        tellDopplerStep(radars_[k], now->odometry().radarDopplerStep(k), &told[k]);
+        tellDopplerStep(radars_[k], now->odometry().radarDopplerStep(k), &reported[k]);
       if (more) wakeSolver();  // one scan at a time, so that stopping and resets are heeded between them
     } catch (const std::exception& error) {
       ROS_ERROR_STREAM(name_ << ": the estimator failed: " << error.what());

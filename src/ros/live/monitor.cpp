@@ -43,11 +43,11 @@ std::string advice(SolverTermination termination) {
 
 }  // namespace
 
-std::string noisyImu(const MeasuredImuNoise& noise, const ImuNoise& told) {
+std::string noisyImu(const MeasuredImuNoise& noise, const ImuNoise& configured) {
   std::ostringstream text;
   text << "the IMU vibrates or is noisier than configured: accelerometer " << noise.accel_density
-       << " m/s^2/sqrt(Hz), imu_accel_noise_density " << told.accel_density << "; gyro " << noise.gyro_density
-       << " rad/s/sqrt(Hz), imu_gyro_noise_density " << told.gyro_density
+       << " m/s^2/sqrt(Hz), imu_accel_noise_density " << configured.accel_density << "; gyro "
+       << noise.gyro_density << " rad/s/sqrt(Hz), imu_gyro_noise_density " << configured.gyro_density
        << ". The estimate takes the measured noise. A softer mount makes it better.";
   return text.str();
 }
@@ -197,9 +197,9 @@ std::string LiveMonitor::wrongType(const std::string& topic, const std::string& 
   return ", which is published as " + found->second + ", expected " + expected;
 }
 
-void LiveMonitor::tune(const ImuNoise& told) {
+void LiveMonitor::tune(const ImuNoise& configured) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  imu_noise_ = told;
+  imu_noise_ = configured;
 }
 
 void LiveMonitor::reconfigured(const std::string& refused_because) {
@@ -340,11 +340,11 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   for (const auto& [reason, count] : imu_dropped_) status.add("dropped_" + reason, count);
   if (session != nullptr) {
     for (const auto& [name, count] : session->odometry().faults()) {
-      // Told with the odometry.
+      // Reported with the odometry.
       if (name != "diverged" && name != "reinitialized") status.add("fault_" + name, count);
     }
   }
-  const ImuNoise& told = imu_noise_;
+  const ImuNoise& configured = imu_noise_;
   const MeasuredImuNoise noise = session != nullptr ? session->odometry().imuNoise() : MeasuredImuNoise();
   status.add("imu_accel_noise_measured", noise.accel_density);
   status.add("imu_gyro_noise_measured", noise.gyro_density);
@@ -367,15 +367,15 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
     status.summary(DiagnosticStatus::ERROR, "the IMU is silent, topic " + config_.imu_topic);
   } else if (!findings.empty()) {
     status.summary(radars.level, radars.text);
-  } else if (queue_full > queue_full_told_) {
+  } else if (queue_full > queue_full_reported_) {
     status.summary(DiagnosticStatus::WARN, kSolverFallsBehind);
-  } else if (noise.isFarAbove(told)) {
-    status.summary(DiagnosticStatus::WARN, noisyImu(noise, told));
+  } else if (noise.isFarAbove(configured)) {
+    status.summary(DiagnosticStatus::WARN, noisyImu(noise, configured));
   } else {
     status.summary(DiagnosticStatus::OK,
                    radars_.size() == 1 ? "IMU and radar are coming" : "IMU and radars are coming");
   }
-  queue_full_told_ = queue_full;
+  queue_full_reported_ = queue_full;
 }
 
 void LiveMonitor::describeSolver(Status& status) const {

@@ -25,12 +25,12 @@ void LiveMonitor::pressureDropped(const std::string& why) {
 void LiveMonitor::describeBarometer(Status& status) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const Clock::time_point now = Clock::now();
-  const double seconds = std::max(1e-3, std::chrono::duration<double>(now - barometer_.told).count());
-  const std::uint64_t fresh = barometer_.pressures - barometer_.pressures_told;
-  const std::uint64_t fresh_used = barometer_.used - barometer_.used_told;
-  barometer_.told = now;
-  barometer_.pressures_told = barometer_.pressures;
-  barometer_.used_told = barometer_.used;
+  const double seconds = std::max(1e-3, std::chrono::duration<double>(now - barometer_.reported).count());
+  const std::uint64_t fresh = barometer_.pressures - barometer_.pressures_reported;
+  const std::uint64_t fresh_used = barometer_.used - barometer_.used_reported;
+  barometer_.reported = now;
+  barometer_.pressures_reported = barometer_.pressures;
+  barometer_.used_reported = barometer_.used;
   status.add("pressure_rate_hz", static_cast<double>(fresh) / seconds);
   status.add("pressures", barometer_.pressures);
   status.add("pressures_not_usable", barometer_.not_usable);

@@ -17,7 +17,7 @@ using diagnostic_msgs::DiagnosticStatus;
 
 /// [s] A radar that gave no estimate for so long shows nothing now.
 constexpr double kRecent = 1.0;
-/// The motion has shown what it told better than this share of the sigma that it was told with.
+/// The sigma of what the motion shows is below this share of the configured one.
 constexpr double kObserved = 0.5;
 
 std::string listOf(const Eigen::VectorXd& numbers) {
@@ -76,17 +76,17 @@ void LiveMonitor::describeExtrinsics(Status& status, std::size_t radar) const {
   const ScanResult& result = of.last_update->result;
   const SmootherOptions& options = of.config.odometry.smoother;
   const Eigen::Matrix<double, 6, 1> sigma = result.T_IR_covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-  const Eigen::Vector3d turn = turnBetween(result.told_T_IR, result.T_IR);
+  const Eigen::Vector3d turn = turnBetween(result.configured_T_IR, result.T_IR);
   const Eigen::Vector3d turn_sigma = sigma.tail<3>();
   // As the parameters want them.
   status.add("extrinsics_rotation_xyzw", listOf(result.T_IR.q_IR.coeffs()));
   status.add("extrinsics_translation", listOf(result.T_IR.l_I));
-  status.add("turn_from_told_deg", listOf(turn / kDegree));
+  status.add("turn_from_configured_deg", listOf(turn / kDegree));
   status.add("turn_sigma_deg", listOf(turn_sigma / kDegree));
   std::string kept = axesAbove(turn_sigma, kObserved * options.extrinsics_rotation_sigma, "turn about ");
   if (options.estimate_extrinsics == EstimateExtrinsics::kPose) {
     const Eigen::Vector3d lever_sigma = sigma.head<3>();
-    status.add("lever_arm_from_told_m", listOf(result.T_IR.l_I - result.told_T_IR.l_I));
+    status.add("lever_arm_from_configured_m", listOf(result.T_IR.l_I - result.configured_T_IR.l_I));
     status.add("lever_arm_sigma_m", listOf(lever_sigma));
     const std::string lever =
         axesAbove(lever_sigma, kObserved * options.extrinsics_translation_sigma, "lever arm along ");

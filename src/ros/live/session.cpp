@@ -63,7 +63,7 @@ std::vector<LiveSession::GivenUp> LiveSession::takeStamped() {
       odometry_.addScan(std::move(scan));
     }
     for (const auto& [reason, count] : from.stamper.givenUp())
-      for (std::uint64_t& told = from.given_up[reason]; told < count; ++told)
+      for (std::uint64_t& reported = from.given_up[reason]; reported < count; ++reported)
         given_up.push_back({radar, reason});
   }
   return given_up;

@@ -39,7 +39,7 @@ RunSummary runBag(const BagRun& run);
 /// A short table for people. `files` is the folder that it names.
 std::string describeRun(const RunSummary& summary, const std::string& files);
 
-/// The program rio_t_bag: `words` are its arguments. Returns the exit status; what went wrong is told in
+/// The program rio_t_bag: `words` are its arguments. Returns the exit status; what went wrong is reported in
 /// `err`.
 int runBagTool(const std::vector<std::string>& words, std::ostream& out, std::ostream& err);
 

@@ -14,7 +14,7 @@ namespace rio_t {
 struct CalibrationRun {
   std::vector<std::string> bags;  ///< paths
   std::string output_folder;      ///< gets a folder with the files of each bag's run; empty: no files
-  Config config;                  ///< what is told
+  Config config;                  ///< what is configured
   /// Makes BagRun::progress for a bag; may be empty.
   std::function<std::function<void(double)>(const std::string& bag)> progress;
 };
@@ -45,7 +45,8 @@ BagCalibration calibrateFromBags(const CalibrationRun& run);
 /// Why a run that ended does not count; empty if it does.
 std::string failureOf(const RunSummary& summary);
 
-/// A table for people: what was told and found, sigmas, verdicts, and what to move for what was not observed.
+/// A table for people: what was configured and found, sigmas, verdicts, and what to move for what was not
+/// observed.
 std::string describeCalibration(const BagCalibration& calibration);
 /// The part of one radar.
 std::string describeCalibration(const CalibratedRadar& radar);

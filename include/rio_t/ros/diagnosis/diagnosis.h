@@ -15,7 +15,7 @@ enum class RunVerdict {
 };
 std::string toString(RunVerdict verdict);  ///< "good", "doubtful", "bad"
 
-/// An estimated mounting is far from the told one if it is turned by more than so many
+/// An estimated mounting is far from the configured one if it is turned by more than so many
 /// `extrinsics_rotation_sigma` about an axis. If that sigma is right, one radar in 120 is.
 constexpr double kFarMounting = 3.0;
 

@@ -22,9 +22,9 @@ using Counts = std::map<std::string, std::uint64_t>;
 /// Zero for a name that is not there.
 std::uint64_t countOf(const Counts& counts, const std::string& name);
 
-/// The mounting of a radar: as told at the start, and as estimated at the end.
+/// The mounting of a radar: as configured at the start, and as estimated at the end.
 struct ExtrinsicsSummary {
-  Extrinsics told, T_IR;
+  Extrinsics configured, T_IR;
   Eigen::Vector3d translation_sigma = Eigen::Vector3d::Zero();  ///< [m]; zero where not estimated
   Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Zero();     ///< [rad] about the axes of I
   /// In the tangent of ExtrinsicsManifold: 3x3 of the turn, or 6x6 of turn and lever arm. Not in the file.
@@ -59,8 +59,8 @@ struct RadarSummary : RadarEstimate {
   DopplerStep doppler_step;     ///< as known at the end; the file has its source as a key of its own
   std::array<std::uint64_t, 3> points_per_scan = {};  ///< quantiles of 10, 50 and 90 % of the scans
   std::vector<double> pass_offsets_s;                 ///< after each pass; only with mode refine
-  Eigen::Vector3d turn = Eigen::Vector3d::Zero();     ///< of the newest mounting from the told one [rad]
-  std::optional<MountingTurn> told_turn;              ///< of a mounting that is held, as the scans say
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< of the newest mounting from the configured one [rad]
+  std::optional<MountingTurn> mounting_turn;       ///< of a mounting that is held, as the scans say
 };
 
 /// The stamps of the IMU jumped, or left a gap that is too long to bridge: "imu_clock_restart".
@@ -90,7 +90,8 @@ struct RunEvidence {
   double run_seconds = 0.0;
   double silent_seconds = 0.0;  ///< of them, later than `coasting_after` after the last scan that was used
   double silence_begin = 0.0, silence_end = 0.0;  ///< of the longest silence
-  /// [rad] How far the estimate has turned the vehicle frame from the told one; zero without such a frame.
+  /// [rad] How far the estimate has turned the vehicle frame from the configured one; zero without such a
+  /// frame.
   Eigen::Vector3d vehicle_turn = Eigen::Vector3d::Zero();
   std::vector<ImuRestart> imu_restarts;  ///< none in the live node, whose evidence begins after the last one
   std::vector<RadarSummary> radars;      ///< in the order of the configuration
@@ -125,8 +126,8 @@ class EvidenceCollector {
   std::vector<PointFilter> filters_;         // by RadarScan::radar
   double coasting_after_, max_bridged_gap_;  // [s]
   std::optional<Time> oldest_imu_, newest_state_;
-  std::vector<Time> last_used_;   // scan of each radar, or the start
-  Eigen::Quaterniond told_q_IV_;  // vehicle frame
+  std::vector<Time> last_used_;         // scan of each radar, or the start
+  Eigen::Quaterniond configured_q_IV_;  // vehicle frame
   RunEvidence evidence_;
 };
 

@@ -70,13 +70,13 @@ class LiveOdometry {
 
     Config config;  ///< with its topics as they are resolved
     PointCloudFormat format;
-    std::optional<Extrinsics> T_IR;  ///< told; none until tf has it. Input thread only
+    std::optional<Extrinsics> T_IR;  ///< configured; none until tf has it. Input thread only
     ros::Subscriber scans, triggers;
     std::function<void()> tick_scan, tick_trigger;  ///< for the rates in diagnostics
   };
 
-  /// Subscribes to the topics as they were told.
-  void subscribe(const Config& told);
+  /// Subscribes to the topics as they were configured.
+  void subscribe(const Config& configured);
   void addDiagnostics();
   /// Calls `callback`. Logs an exception, at most every 5 s: no message may end the node or reset the
   /// estimate. Any thread.
@@ -104,7 +104,8 @@ class LiveOdometry {
   /// Gives a sample to a session. Returns the state that is to be published, if there is one.
   std::optional<NavigationState> feed(LiveSession& session, const Received& received, double* rate_sigma);
   void account(const std::vector<LiveSession::GivenUp>& given_up);
-  /// Whether this was not told for `period` [s]. Each radar has its own turn, unlike with ROS's throttles.
+  /// Whether this was not reported for `period` [s]. Each radar has its own turn, unlike with ROS's
+  /// throttles.
   bool isTimeToTell(const std::string& what, double period = kWarnPeriod);
   void wakeSolver();
   void tellFaults();  ///< what is new among the faults of the input; input thread
@@ -112,12 +113,12 @@ class LiveOdometry {
   void tellStatus(const LiveMonitor::Status& status);
   void tellHealth(const ScanResult& result);
   void tellDopplerStep(const Radar& radar, const DopplerStep& step,
-                       DopplerStep* told) const;  ///< where it is not as told
-  void solve();                                   ///< body of the optimisation thread
+                       DopplerStep* configured) const;  ///< where it is not as configured
+  void solve();                                         ///< body of the optimisation thread
 
   const std::string name_;
-  const Config told_;    // topics as the user wrote them
-  const Config config_;  // topics as they are resolved
+  const Config configured_;  // topics as the user wrote them
+  const Config config_;      // topics as they are resolved
   ros::NodeHandle node_, private_node_;
   ros::CallbackQueue imu_queue_, input_queue_;
   LiveMonitor monitor_;                                     // thread-safe
@@ -137,10 +138,10 @@ class LiveOdometry {
   bool has_work_ = false;
   bool stopping_ = false;
   double rate_sigma_ = 0.0;
-  std::map<std::string, std::chrono::steady_clock::time_point> told_at_;
+  std::map<std::string, std::chrono::steady_clock::time_point> reported_at_;
 
-  std::map<std::string, std::uint64_t> faults_told_;  // input thread only, as the next
-  std::weak_ptr<LiveSession> faults_of_;              // whose faults these are
+  std::map<std::string, std::uint64_t> faults_reported_;  // input thread only, as the next
+  std::weak_ptr<LiveSession> faults_of_;                  // whose faults these are
 
   Config live_config_;                        // config_ with what was reconfigured; input thread only
   boost::recursive_mutex reconfigure_mutex_;  // the server's own

@@ -19,7 +19,7 @@ namespace rio_t {
 
 /// Keeps the accounts of the live node and judges them, for `diagnostics`. Radars are counted as in
 /// configsOfRadars; keys of one radar begin with its name, as "left/scans", where the radars have names. The
-/// rates of the topics are told by tasks of diagnostic_updater beside it.
+/// rates of the topics are reported by tasks of diagnostic_updater beside it.
 /// Thread-safe.
 class LiveMonitor {
  public:
@@ -50,7 +50,7 @@ class LiveMonitor {
   bool lacksInput() const;
   /// The types of what is published, by topic: a topic of a wrong type brings no message.
   void setTopicTypes(const std::map<std::string, std::string>& types);
-  void tune(const ImuNoise& told);  ///< the noise of the IMU as it is told now
+  void tune(const ImuNoise& configured);  ///< the noise of the IMU as it is configured now
   /// A change of parameters was refused, for that reason; or was made, if it is empty.
   void reconfigured(const std::string& refused_because);
 
@@ -72,15 +72,15 @@ class LiveMonitor {
   };
   struct Counter {
     std::uint64_t count = 0;
-    std::uint64_t told = 0;  // count when it was last told
+    std::uint64_t reported = 0;  // count when it was last reported
 
     /// Whether nothing came since the last call.
-    bool isSilent() { return std::exchange(told, count) == count; }
+    bool isSilent() { return std::exchange(reported, count) == count; }
   };
 
   struct Barometer : BarometerCounts {
-    Clock::time_point told = Clock::now();
-    std::uint64_t not_usable = 0, pressures_told = 0, used_told = 0;
+    Clock::time_point reported = Clock::now();
+    std::uint64_t not_usable = 0, pressures_reported = 0, used_reported = 0;
     std::string why_not_usable;  ///< of the last one
   };
 
@@ -133,7 +133,7 @@ class LiveMonitor {
   GroundVehicleCounts vehicle_;
   Latency odometry_latency_, scan_latency_;
   std::map<std::string, std::uint64_t> imu_dropped_;
-  std::uint64_t updates_ = 0, resets_ = 0, queue_full_told_ = 0;
+  std::uint64_t updates_ = 0, resets_ = 0, queue_full_reported_ = 0;
   std::map<SolverTermination, std::uint64_t> terminations_;
   std::deque<SolverTermination> last_terminations_;  // of the last windows, newest last
   std::string last_reset_, waiting_for_, refused_because_;
@@ -149,6 +149,6 @@ constexpr const char* kSolverFallsBehind =
     "the solver falls behind, the oldest scans were dropped (max_queued_scans)";
 
 /// The warning for a person whose IMU is far noisier than the options say.
-std::string noisyImu(const MeasuredImuNoise& noise, const ImuNoise& told);
+std::string noisyImu(const MeasuredImuNoise& noise, const ImuNoise& configured);
 
 }  // namespace rio_t

@@ -88,7 +88,7 @@ class LiveSession {
   /// A radar's way from messages to stamped scans.
   struct Stamper {
     ScanStamper stamper;
-    std::map<std::string, std::uint64_t> given_up;  ///< what was told so far
+    std::map<std::string, std::uint64_t> given_up;  ///< what was reported so far
   };
   /// What the results of one radar leave behind.
   struct Radar {
