@@ -50,15 +50,17 @@ TEST(ImuBuffer, IntervalsCoverTheSpanBothWays) {
   const SyntheticMotion motion;
   double forward = 0.0, backward = 0.0;
   int steps = 0;
-  buffer.forEachInterval(motion.time(0.1234), motion.time(0.5678), [&](double dt, const auto&, const auto&) {
-    EXPECT_GT(dt, 0.0);
-    forward += dt;
-    ++steps;
-  });
-  buffer.forEachInterval(motion.time(0.5678), motion.time(0.1234), [&](double dt, const auto&, const auto&) {
-    EXPECT_LT(dt, 0.0);
-    backward += dt;
-  });
+  buffer.forEachInterval(motion.time(0.1234), motion.time(0.5678),
+                         [&](double dt, const auto&, const auto&, const auto&) {
+                           EXPECT_GT(dt, 0.0);
+                           forward += dt;
+                           ++steps;
+                         });
+  buffer.forEachInterval(motion.time(0.5678), motion.time(0.1234),
+                         [&](double dt, const auto&, const auto&, const auto&) {
+                           EXPECT_LT(dt, 0.0);
+                           backward += dt;
+                         });
   EXPECT_NEAR(forward, 0.4444, 1e-9);
   EXPECT_NEAR(backward, -0.4444, 1e-9);
   EXPECT_EQ(steps, 45);
@@ -81,7 +83,7 @@ TEST(Preintegration, ForwardThenBackwardIsTheIdentity) {
   const SyntheticMotion motion;
   const ImuBuffer imu = motion.imu(0.0, 1.0, 400.0);
   ImuDelta delta;
-  const auto step = [&](double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
+  const auto step = [&](double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel, const auto&) {
     delta.step(dt, gyro - motion.b_g, accel - motion.b_a);
   };
   imu.forEachInterval(motion.time(0.2), motion.time(0.7), step);

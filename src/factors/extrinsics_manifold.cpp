@@ -39,7 +39,7 @@ Eigen::VectorXd ExtrinsicsManifold::minus(const double* y, const double* x) cons
   const Extrinsics from = toExtrinsics(x);
   const Extrinsics to = toExtrinsics(y);
   Eigen::VectorXd delta(tangent());
-  delta.head<3>() = so3::log(to.q_IR * from.q_IR.conjugate());
+  delta.head<3>() = turnBetween(from, to);
   if (tangent() > 3) delta.tail<3>() = to.l_I - from.l_I;
   return delta;
 }

@@ -70,19 +70,16 @@ ImuTransition transition(const StateBlock& state_i, const Preintegration& preint
   const ImuDelta& d = preintegration.delta;
   const double T = d.dt;
   const Eigen::Matrix3d R_i = state_i.q_WI().toRotationMatrix();
-  const Eigen::Vector3d d_bg = state_i.b_g() - preintegration.b_g;
-  const Eigen::Vector3d d_ba = state_i.b_a() - preintegration.b_a;
-  const Eigen::Vector3d correction = d.dR_dbg * d_bg;
   using S = StateBlock;
   ImuTransition result;
   result.A.setIdentity();
-  result.A.block<3, 3>(S::kTheta, S::kTheta) = (d.dR * so3::exp(correction)).toRotationMatrix().transpose();
-  result.A.block<3, 3>(S::kTheta, S::kBg) = so3::rightJacobian(correction) * d.dR_dbg;
-  result.A.block<3, 3>(S::kP, S::kTheta) = -R_i * so3::hat(d.dp + d.dp_dbg * d_bg + d.dp_dba * d_ba);
+  result.A.block<3, 3>(S::kTheta, S::kTheta) = d.dR.toRotationMatrix().transpose();
+  result.A.block<3, 3>(S::kTheta, S::kBg) = d.dR_dbg;
+  result.A.block<3, 3>(S::kP, S::kTheta) = -R_i * so3::hat(d.dp);
   result.A.block<3, 3>(S::kP, S::kV).diagonal().setConstant(T);
   result.A.block<3, 3>(S::kP, S::kBg) = R_i * d.dp_dbg;
   result.A.block<3, 3>(S::kP, S::kBa) = R_i * d.dp_dba;
-  result.A.block<3, 3>(S::kV, S::kTheta) = -R_i * so3::hat(d.dv + d.dv_dbg * d_bg + d.dv_dba * d_ba);
+  result.A.block<3, 3>(S::kV, S::kTheta) = -R_i * so3::hat(d.dv);
   result.A.block<3, 3>(S::kV, S::kBg) = R_i * d.dv_dbg;
   result.A.block<3, 3>(S::kV, S::kBa) = R_i * d.dv_dba;
 
@@ -93,27 +90,19 @@ ImuTransition transition(const StateBlock& state_i, const Preintegration& preint
   return result;
 }
 
-StateBlock predict(const StateBlock& state_i, const Preintegration& preintegration,
-                   const Eigen::Vector3d& g_W) {
-  const ImuDelta& d = preintegration.delta;
-  const Eigen::Vector3d d_bg = state_i.b_g() - preintegration.b_g;
-  const Eigen::Vector3d d_ba = state_i.b_a() - preintegration.b_a;
+StateBlock predict(const StateBlock& state_i, const ImuDelta& delta, const Eigen::Vector3d& g_W) {
   const Eigen::Quaterniond q_WI = state_i.q_WI();
-  const double T = d.dt;
+  const double T = delta.dt;
   StateBlock state_j = state_i;
-  state_j.q_WI() = (q_WI * d.dR * so3::exp(d.dR_dbg * d_bg)).normalized();
-  state_j.p_W() += T * state_i.v_W() + 0.5 * T * T * g_W + q_WI * (d.dp + d.dp_dbg * d_bg + d.dp_dba * d_ba);
-  state_j.v_W() += T * g_W + q_WI * (d.dv + d.dv_dbg * d_bg + d.dv_dba * d_ba);
+  state_j.q_WI() = (q_WI * delta.dR).normalized();
+  state_j.p_W() += T * state_i.v_W() + 0.5 * T * T * g_W + q_WI * delta.dp;
+  state_j.v_W() += T * g_W + q_WI * delta.dv;
   return state_j;
 }
 
 StateBlock carried(const StateBlock& x, Time from, Time to, const ImuBuffer& imu,
                    const Eigen::Vector3d& g_W) {
-  Preintegration pre;
-  pre.b_g = x.b_g();
-  pre.b_a = x.b_a();
-  pre.delta = integrate(imu, from, to, pre.b_g, pre.b_a);
-  return predict(x, pre, g_W);
+  return predict(x, integrate(imu, from, to, x.b_g(), x.b_a()), g_W);
 }
 
 }  // namespace rio_t

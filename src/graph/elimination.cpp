@@ -349,16 +349,7 @@ std::vector<std::map<int, Eigen::MatrixXd>> Elimination::covariances() const {
   return P;
 }
 
-SquareRoot compressed(const SquareRoot& rows) {
-  const Eigen::Index columns = rows.J.cols();
-  Tableau tableau;
-  tableau.reset(rows.J.rows(), columns + 1);
-  for (Eigen::Index i = 0; i < rows.J.rows(); ++i) {
-    Eigen::Map<Eigen::RowVectorXd>(tableau.row(i), columns + 1) << rows.J.row(i), rows.r0[i];
-  }
-  tableau.triangularise(0, columns);
-  return squareRootOf(tableau, 0, columns);
-}
+SquareRoot compressed(const SquareRoot& rows) { return widened(rows, Eigen::VectorXd::Zero(rows.J.cols())); }
 
 SquareRoot eliminateFirst(const LinearSystem& system, int count) {
   BlockElimination elimination(system, 0.0);

@@ -48,14 +48,12 @@ ImuMean ImuBuffer::mean(Time time, double half_width) const {
   double squared_weights = 0.0;
   const auto half = [&](Time from, Time to) {
     Half sums;
-    double elapsed = 0.0;
     const double reach = to - from;
     const bool rises = to == middle;
     forEachInterval(from, to, [&](double dt, const auto& gyro, const auto& accel, const auto& later) {
-      const double away = rises ? reach - elapsed - 0.5 * dt : elapsed + 0.5 * dt;
+      const double away = rises ? reach - sums.duration - 0.5 * dt : sums.duration + 0.5 * dt;
       const double share = 1.0 - per_second * away;
       const double weight = share * dt;
-      elapsed += dt;
       sums.gyro += dt * gyro;
       sums.duration += dt;
       result.angular_velocity += weight * gyro;

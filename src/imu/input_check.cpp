@@ -33,6 +33,7 @@ ImuInputCheck::ImuInputCheck(double max_gap, const ImuInputCheckOptions& options
 ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
   if (const char* fault = faultOfValues(imu, options_)) return {Decision::kDrop, {fault}};
   Verdict verdict;
+  std::optional<Time> before = stamps_.newest();
   switch (stamps_.check(imu.time)) {
     case ClockJumpDetector::Verdict::kGood:
       break;
@@ -42,15 +43,14 @@ ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
       return {Decision::kDrop, {"imu_stamp_jump"}};
     case ClockJumpDetector::Verdict::kRestart:
       verdict = {Decision::kRestart, {"imu_clock_restart"}};
-      newest_.reset();
+      before.reset();
       bridge_.reset();
       gyro_axes_ = {};
       accel_noise_.interrupt();
       gyro_noise_.interrupt();
       break;
   }
-  const double gap = newest_ ? imu.time - *newest_ : 0.0;
-  newest_ = imu.time;
+  const double gap = before ? imu.time - *before : 0.0;
   if (gap > max_gap_) {
     verdict.faults.push_back("imu_gap");
     const double share = std::min(1.0, gap / kMotionCorrelationTime);

@@ -31,7 +31,7 @@ void ImuDelta::step(double step_dt, const Eigen::Vector3d& omega, const Eigen::V
 ImuDelta integrate(const ImuBuffer& imu, Time from, Time to, const Eigen::Vector3d& b_g,
                    const Eigen::Vector3d& b_a) {
   ImuDelta delta;
-  imu.forEachInterval(from, to, [&](double dt, const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {
+  imu.forEachInterval(from, to, [&](double dt, const auto& gyro, const auto& accel, const auto&) {
     delta.step(dt, gyro - b_g, accel - b_a);
   });
   return delta;

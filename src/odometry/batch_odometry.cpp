@@ -51,7 +51,8 @@ void BatchOdometry::addResult(ScanResult result) {
 }
 
 BatchResult BatchOdometry::solve(const RadarInertialOdometry::Start& start) const {
-  const BatchSmoother smoother(options_.smoother, batch_, imuNoise(), g_W_, imu_);
+  const BatchSmoother smoother(options_.smoother, batch_, options_.imu_noise.scaled(model_error_scale_), g_W_,
+                               imu_);
   const Run run = makeRun(start);
   if (run.problem.scans.empty()) throw std::runtime_error("batch: the online run used no scan");
   BatchResult batch;
@@ -59,12 +60,6 @@ BatchResult BatchOdometry::solve(const RadarInertialOdometry::Start& start) cons
   batch.trajectory = trajectory(batch.solution);
   batch.scans = results(run, batch.solution);
   return batch;
-}
-
-ImuNoise BatchOdometry::imuNoise() const {
-  ImuNoise noise = options_.imu_noise;
-  noise.accel_density *= std::sqrt(model_error_scale_);
-  return noise;
 }
 
 RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) const {
@@ -156,7 +151,7 @@ std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solu
     });
   }
   // After the last scan, the IMU alone carries the state.
-  ImuPropagator propagator(imuNoise(), g_W_);
+  ImuPropagator propagator(options_.imu_noise.scaled(model_error_scale_), g_W_);
   propagator.anchor(navigationState(nodes.back(), solution.covariances.back(), imu_));
   imu_.forEachSample(nodes.back().time - 0.1, imu_.newest(), [&](const ImuMeasurement& sample) {
     propagator.add(sample);

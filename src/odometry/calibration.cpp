@@ -152,7 +152,7 @@ void calibrateExtrinsics(const ExtrinsicsEstimate& configured,
   const CombinedExtrinsics combined = combine(configured, estimates);
   calibration->extrinsics_agreement = combined.agreement;
 
-  const Eigen::Vector3d found = so3::log(combined.estimate.T_IR.q_IR * configured.T_IR.q_IR.conjugate());
+  const Eigen::Vector3d found = turnBetween(configured.T_IR, combined.estimate.T_IR);
   Eigen::Vector3d unobserved = Eigen::Vector3d::Zero();  // its part
   bool any_observed = false;
   for (Eigen::Index i = 0; i < configured.covariance.rows(); ++i) {

@@ -392,12 +392,6 @@ RestContext Estimator::restContext() const {
   return {x.q_WI(), x.v_W(), x.b_g(), x.b_a(), g_W_};
 }
 
-ImuNoise Estimator::imuNoise() const {
-  ImuNoise noise = options_.imu_noise;
-  noise.accel_density *= std::sqrt(model_error_scale_.value());
-  return noise;
-}
-
 NavigationState Estimator::newestState(const StateCovariance& covariance) const {
   NavigationState state = navigationState(smoother_.newest(), covariance, imu_);
   health_.widen(state);

@@ -14,6 +14,7 @@
 #include "rio_t/graph/marginalization.h"
 #include "rio_t/graph/solver.h"
 #include "rio_t/imu/preintegration.h"
+#include "rio_t/imu/static_initializer.h"
 #include "rio_t/odometry/navigation_state.h"
 #include "rio_t/odometry/options.h"
 #include "rio_t/sensors/offset_evidence.h"
@@ -40,7 +41,7 @@ bool isNear(const std::vector<double>& a, const std::vector<double>& b) {
 /// The anchor with its tilt replaced: the shortest turn that makes `g_I` point down.
 Eigen::Quaterniond withGravity(const Eigen::Quaterniond& q_WI, const Eigen::Vector3d& g_I) {
   const Eigen::Vector3d up_W = q_WI * -g_I;
-  return (Eigen::Quaterniond::FromTwoVectors(up_W, Eigen::Vector3d::UnitZ()) * q_WI).normalized();
+  return (levelingRotation(up_W) * q_WI).normalized();
 }
 
 }  // namespace

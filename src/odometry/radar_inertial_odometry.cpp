@@ -45,10 +45,8 @@ struct RadarInertialOdometry::Impl {
   Status status;
 
   // Only the thread in process() touches these.
-  Inbox taken;  ///< from `inbox`; swapped with it, so that both keep their memory
   Estimator estimator;
   std::vector<RadarScan> waiting_scans;  ///< in the order in which they came
-  std::uint64_t clock_restarts = 0;
 };
 
 RadarInertialOdometry::RadarInertialOdometry(const OdometryOptions& options)
@@ -144,23 +142,16 @@ std::vector<RadarScan>::iterator RadarInertialOdometry::Impl::nextReadyScan() {
 }
 
 void RadarInertialOdometry::Impl::takeInbox() {
-  taken.imu.clear();
-  taken.scans.clear();
-  taken.pressures.clear();
-  taken.tuning.reset();
+  Inbox taken;
   {
     const std::lock_guard<std::mutex> lock(inbox_mutex);
-    taken.clock_restarts = inbox.clock_restarts;
-    std::swap(taken.imu, inbox.imu);
-    std::swap(taken.scans, inbox.scans);
-    std::swap(taken.tuning, inbox.tuning);
-    std::swap(taken.pressures, inbox.pressures);
+    taken.clock_restarts = inbox.clock_restarts;  // goes on counting
+    std::swap(taken, inbox);
   }
   if (taken.tuning) estimator.tune(*taken.tuning);
   const bool scan_came = !taken.scans.empty();
   for (RadarScan& scan : taken.scans) waiting_scans.push_back(std::move(scan));
-  if (std::exchange(clock_restarts, taken.clock_restarts) != taken.clock_restarts)
-    estimator.startAgain(clock_restarts);
+  if (estimator.clockRestarts() != taken.clock_restarts) estimator.startAgain(taken.clock_restarts);
   estimator.addImu(taken.imu);
   for (const Pressure& pressure : taken.pressures) estimator.addPressure(pressure);
   estimator.keepUp(scan_came, waiting_scans);
@@ -170,7 +161,7 @@ void RadarInertialOdometry::Impl::shareStatus() {
   const Health health = estimator.updateHealth();
   const std::lock_guard<std::mutex> lock(inbox_mutex);
   // If the clock restarted meanwhile, the odometry waits for a new start.
-  status.initialized = estimator.initialized() && inbox.clock_restarts == clock_restarts;
+  status.initialized = estimator.initialized() && inbox.clock_restarts == estimator.clockRestarts();
   status.waiting_for = estimator.waitingFor();
   status.health = health;
 }

@@ -22,7 +22,6 @@ Health RadarsHealth::judge(Time now, const NavigationState& state, double model_
   // A radar that is silent says nothing, neither good nor bad.
   const auto isBetter = [&](const HealthMonitor& a, const HealthMonitor& b) {
     if (a.hears(now) != b.hears(now)) return a.hears(now);
-    if (a.health() != b.health()) return a.health() < b.health();
     return !a.isContradicted() && b.isContradicted();
   };
   for (std::size_t k = 0; k < monitors_.size(); ++k)

@@ -23,6 +23,14 @@ bool readsZero(const RadarDirection& p, const EgoVelocityOptions& o) {
   return std::abs(p.doppler) <= o.zero_velocity_threshold;
 }
 
+/// The points whose Doppler is at most `limit` [m/s], to either side.
+std::vector<RadarDirection> slowerThan(double limit, const std::vector<RadarDirection>& points) {
+  std::vector<RadarDirection> slow;
+  std::copy_if(points.begin(), points.end(), std::back_inserter(slow),
+               [limit](const RadarDirection& p) { return std::abs(p.doppler) <= limit; });
+  return slow;
+}
+
 /// Minus the log-likelihood of rest if some of the points read the bin beside zero for reasons of their own,
 /// on either side. DopplerLikelihood takes the points as independent, so it holds that so many of them cannot
 /// be wrong by chance.
@@ -53,29 +61,19 @@ std::optional<VelocitySolution> fitSlowMotion(const std::vector<RadarDirection>&
 
 }  // namespace
 
-bool mostReadZero(const std::vector<RadarDirection>& points, const EgoVelocityOptions& o) {
-  const auto zeros = static_cast<double>(
-      std::count_if(points.begin(), points.end(), [&](const RadarDirection& p) { return readsZero(p, o); }));
-  return zeros >= (1.0 - o.zero_velocity_outlier_fraction) * static_cast<double>(points.size());
-}
-
 std::vector<RadarDirection> selectZeros(const std::vector<RadarDirection>& points,
                                         const EgoVelocityOptions& o) {
-  std::vector<RadarDirection> zeros;
-  zeros.reserve(points.size());
-  std::copy_if(points.begin(), points.end(), std::back_inserter(zeros),
-               [&](const RadarDirection& p) { return readsZero(p, o); });
-  return zeros;
+  return slowerThan(o.zero_velocity_threshold, points);
 }
 
 std::vector<RadarDirection> selectSlow(const std::vector<RadarDirection>& points,
                                        const EgoVelocityOptions& o) {
-  std::vector<RadarDirection> slow;
-  slow.reserve(points.size());
-  std::copy_if(points.begin(), points.end(), std::back_inserter(slow), [&](const RadarDirection& p) {
-    return std::abs(p.doppler) <= o.zero_velocity_threshold + o.doppler_quantization;
-  });
-  return slow;
+  return slowerThan(o.zero_velocity_threshold + o.doppler_quantization, points);
+}
+
+bool mostReadZero(const std::vector<RadarDirection>& points, const EgoVelocityOptions& o) {
+  const auto zeros = static_cast<double>(selectZeros(points, o).size());
+  return zeros >= (1.0 - o.zero_velocity_outlier_fraction) * static_cast<double>(points.size());
 }
 
 VelocitySolution solveRest(const std::vector<RadarDirection>& inliers, const PointVariances& noise,

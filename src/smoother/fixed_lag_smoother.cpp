@@ -94,7 +94,7 @@ std::optional<PredictedState> FixedLagSmoother::predict(Time time,
   if (time == node.time()) return predicted;
   const Preintegration& pre = preintegrateFrom(node, time);
   const ImuTransition step = transition(predicted.x, pre);
-  predicted.x = rio_t::predict(predicted.x, pre, g_W_);
+  predicted.x = rio_t::predict(predicted.x, pre.delta, g_W_);
   constexpr int kMotion = StateBlock::kMotionTangent, kState = StateBlock::kTangent;
   Eigen::MatrixXd& P = predicted.covariance;
   P.topRows<kMotion>() = (step.A * P.topRows<kState>()).eval();
@@ -117,7 +117,7 @@ Block* FixedLagSmoother::nodeAt(Time time) {
   if (time - nodes_[before].time() <= spacing) return nodes_[before].motion;
   if (after < nodes_.size() && nodes_[after].time() - time <= spacing) return nodes_[after].motion;
 
-  const StateBlock x = rio_t::predict(node(before).x, preintegrateFrom(nodes_[before], time), g_W_);
+  const StateBlock x = rio_t::predict(node(before).x, preintegrateFrom(nodes_[before], time).delta, g_W_);
   Block& block = window_.addNode(time, motion_manifold_, storedMotion(x));
   nodes_.insert(nodes_.begin() + static_cast<std::ptrdiff_t>(after), Node{&block});
   linkToPrevious(after);

@@ -27,15 +27,15 @@ class ImuFactor final
   Eigen::Matrix<double, 9, 9> whitening_;  ///< W with W'W = covariance^-1
 };
 
-/// Mean of state j given state i: the state at which the factor has no residual.
-StateBlock predict(const StateBlock& state_i, const Preintegration& preintegration,
-                   const Eigen::Vector3d& g_W);
+/// Mean of state j given state i. `delta` is integrated at the biases of state i.
+StateBlock predict(const StateBlock& state_i, const ImuDelta& delta, const Eigen::Vector3d& g_W);
 
 /// `x` at `from`, carried by the IMU to `to`, forwards or backwards, at its own biases.
 StateBlock carried(const StateBlock& x, Time from, Time to, const ImuBuffer& imu, const Eigen::Vector3d& g_W);
 
 /// How an error of state i, biases included, propagates to the predicted motion j: d_j = A d_i + noise with
 /// covariance Q, in tangents. It is the whitened factor, J_i d_i + J_j d_j ~ N(0, 1), solved for d_j.
+/// The preintegration is at the biases of state i.
 struct ImuTransition {
   Eigen::Matrix<double, StateBlock::kMotionTangent, StateBlock::kTangent> A;
   Eigen::Matrix<double, StateBlock::kMotionTangent, StateBlock::kMotionTangent> Q;

@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <deque>
-#include <type_traits>
 
 #include "rio_t/imu/measurement.h"
 
@@ -41,9 +40,9 @@ class ImuBuffer {
   /// Mean over [time - half_width, time + half_width], as far as there are samples. Not for an empty buffer.
   ImuMean mean(Time time, double half_width) const;
 
-  /// Calls step(dt, angular_velocity, acceleration) for each interval between samples from `from` to `to`,
-  /// with the mean of both ends; the ends at `from` and `to` are interpolated. Goes backwards with dt < 0 if
-  /// `to` < `from`. A fourth argument is the later end, whose noise is that of the interval.
+  /// Calls step(dt, angular_velocity, acceleration, later) for each interval between samples from `from` to
+  /// `to`, with the mean of both ends and the later end, whose noise is that of the interval. The ends at
+  /// `from` and `to` are interpolated. Goes backwards with dt < 0 if `to` < `from`.
   template <typename Step>
   void forEachInterval(Time from, Time to, Step&& step) const;
 
@@ -69,11 +68,7 @@ void ImuBuffer::forEachInterval(Time from, Time to, Step&& step) const {
     if (dt == 0.0) return;
     const Eigen::Vector3d gyro = 0.5 * (a.angular_velocity + b.angular_velocity);
     const Eigen::Vector3d accel = 0.5 * (a.acceleration + b.acceleration);
-    if constexpr (std::is_invocable_v<Step, double, Eigen::Vector3d, Eigen::Vector3d, ImuMeasurement>) {
-      step(dt, gyro, accel, dt > 0.0 ? b : a);
-    } else {
-      step(dt, gyro, accel);
-    }
+    step(dt, gyro, accel, dt > 0.0 ? b : a);
   };
   const ImuMeasurement first = at(from);
   const ImuMeasurement* previous = &first;

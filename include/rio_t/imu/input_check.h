@@ -76,7 +76,6 @@ class ImuInputCheck {
   std::array<StuckAxisDetector, 3> gyro_axes_;
   GapBridge bridge_;
   NoiseSpectrum accel_noise_, gyro_noise_;
-  std::optional<Time> newest_;
   SaturationDetector::Saturated was_saturated_;
 };
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 
 #include "rio_t/imu/measurement.h"
 
@@ -14,6 +15,13 @@ struct ImuNoise {
   double gyro_density = 2.0e-4;       ///< [rad/s/sqrt(Hz)]
   double accel_random_walk = 1.0e-4;  ///< [m/s^3/sqrt(Hz)]
   double gyro_random_walk = 4.0e-6;   ///< [rad/s^2/sqrt(Hz)]
+
+  /// With the variance of the accelerometer times `model_error_scale`, see ModelErrorScale.
+  ImuNoise scaled(double model_error_scale) const {
+    ImuNoise noise = *this;
+    noise.accel_density *= std::sqrt(model_error_scale);
+    return noise;
+  }
 
   /// Squared densities of integrated samples for the interval that ends with `imu`: the larger of option and
   /// measurement, plus the hidden motion of the interval. A vibrating frame is noisier than a data sheet.

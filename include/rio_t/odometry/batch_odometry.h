@@ -42,7 +42,6 @@ class BatchOdometry {
     std::vector<std::size_t> source;
   };
 
-  ImuNoise imuNoise() const;  ///< as the options tell it, times the scale of the model errors
   RadarVelocityMeasurement measurement(const ScanResult& result) const;
   Run makeRun(const RadarInertialOdometry::Start& start) const;
   /// Sets what the scan gives to the graph.

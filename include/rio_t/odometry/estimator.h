@@ -39,6 +39,7 @@ class Estimator {
   void addPressure(const Pressure& pressure);
   /// The IMU's clock jumped. No earlier data can be related to later data, so all state is dropped.
   void startAgain(std::uint64_t clock_restarts);
+  std::uint64_t clockRestarts() const { return clock_restarts_; }
   /// Call it after addImu. Counts times without radar, and moves the window on if no scan does; `waiting`
   /// are the scans that come next.
   void keepUp(bool scan_came, const std::vector<RadarScan>& waiting);
@@ -78,7 +79,7 @@ class Estimator {
   RestContext restContext() const;
   /// Sees that the scans begin or cease to contradict the estimate.
   void followContradiction(bool was_contradicted);
-  ImuNoise imuNoise() const;  ///< scaled by the model errors found so far
+  ImuNoise imuNoise() const { return options_.imu_noise.scaled(model_error_scale_.value()); }
   NavigationState newestState(const StateCovariance& covariance) const;
 
   OdometryOptions options_;  ///< changed by tune() alone
