@@ -254,7 +254,7 @@ TEST_F(TwoSimulatedRadars, MountingsAreFoundEachItsOwn) {
   EXPECT_LT(error(0, left_), 0.02);
   EXPECT_LT(error(1, right_), 0.02);
   EXPECT_NEAR(summary.radars[1].extrinsics->configured.q_IR.angularDistance(right_.q_IR), 0.08, 1e-9);
-  EXPECT_TRUE(summary.radars[1].extrinsics->translation_sigma.isZero());
+  EXPECT_TRUE(summary.radars[1].extrinsics->translationSigma().isZero());
   expectInSummary({"final_extrinsics_rotation_xyzw_left: [", "final_extrinsics_rotation_sigma_right: [0.0"});
 }
 

@@ -147,16 +147,6 @@ TEST(SeveralRadars, OneCanBeTakenOutAndItsSectionStays) {
   EXPECT_THROW(makeConfig(entriesWith({"radars=[left]", "middle/radar_topic=/x"})), ConfigError);
 }
 
-TEST(SeveralRadars, TopicsOfABagAreThoseOfANodeWithoutNamespace) {
-  const Config config = withAbsoluteTopics(
-      fromAssignments({"radars=[left, right]", "imu_topic=imu", "left/radar_topic=left/scan",
-                       "right/radar_topic=/right/scan", "ground_truth_topic="}));
-  EXPECT_EQ(config.imu_topic, "/imu");
-  EXPECT_EQ(config.ground_truth_topic, "");
-  EXPECT_EQ(config.radars[0].radar_topic, "/left/scan");
-  EXPECT_EQ(config.radars[1].radar_topic, "/right/scan");
-}
-
 TEST(SeveralRadars, ContradictionsNameTheRadar) {
   EXPECT_TRUE(contains(faultOf("radars=[left, right]"),
                        "right/radar_topic: expected another than that of left, got \"sensor_platform"));

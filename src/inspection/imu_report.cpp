@@ -80,7 +80,8 @@ void findAccelerationUnit(double least_norm, ImuReport* report) {
   }
 }
 
-void findRateUnit(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
+/// `fast`: |angular velocity| that nine in ten samples do not exceed.
+void findRateUnit(const std::vector<ImuMeasurement>& imu, double fast, ImuReport* report) {
   const Steps steps = stepsOf(imu);
   if (steps.force.size() < 10) return;
   const double degrees = inRadiansPerSecond(RateUnit::kDegreesPerSecond);
@@ -89,8 +90,7 @@ void findRateUnit(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
   const double least = std::min(as_radians, as_degrees);
   const double pairs = static_cast<double>(steps.force.size());
   const bool turns = still / pairs > std::pow(kGravity * kLeastTilt, 2);  // enough to show the unit
-  const bool are_degrees =
-      turns && least < 0.7 * still ? as_degrees < as_radians : report->written_rate > kFastest;
+  const bool are_degrees = turns && least < 0.7 * still ? as_degrees < as_radians : fast > kFastest;
   if (are_degrees) report->units.rate = RateUnit::kDegreesPerSecond;
   const double scale = are_degrees ? degrees : 1.0;
   const double right = misfit(steps, scale), inverted = misfit(steps, -scale);
@@ -153,9 +153,10 @@ void findRest(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
 
 }  // namespace
 
-ImuReport inspectImu(const std::vector<ImuMeasurement>& written) {
+ImuReport inspectImu(const std::vector<ImuMeasurement>& written, std::vector<ImuMeasurement>* samples) {
   ImuReport report;
-  std::vector<ImuMeasurement> imu;
+  std::vector<ImuMeasurement>& imu = *samples;
+  imu.clear();
   std::vector<double> norms, rates;
   for (const ImuMeasurement& sample : written) {
     if (!sample.acceleration.allFinite() || !sample.angular_velocity.allFinite()) {
@@ -168,14 +169,14 @@ ImuReport inspectImu(const std::vector<ImuMeasurement>& written) {
   }
   if (imu.empty()) return report;
   report.written_norm = quantile(norms, 0.5);
-  report.written_rate = quantile(rates, 0.9);
   findAccelerationUnit(quantile(norms, 0.02), &report);
   const double scale = inMetresPerSecondSquared(report.units.acceleration);
   for (ImuMeasurement& sample : imu) sample.acceleration *= scale;
-  if (report.written_rate == 0.0) {
+  const double fast = quantile(rates, 0.9);
+  if (fast == 0.0) {
     report.rate_fault = "the angular velocity is zero throughout";
   } else {
-    findRateUnit(imu, &report);
+    findRateUnit(imu, fast, &report);
   }
   for (ImuMeasurement& sample : imu) {
     sample.angular_velocity *= inRadiansPerSecond(report.units.rate);

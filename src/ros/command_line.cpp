@@ -111,8 +111,6 @@ std::string keepOther(const std::string& path, const std::string& text) {
 
 }  // namespace
 
-std::string shownNumber(double value) { return shortText(value, 10); }
-
 double parseNumber(const std::string& text, NumberRange range) {
   std::istringstream stream(text);
   stream.imbue(std::locale::classic());
@@ -162,7 +160,7 @@ void OptionSet::text(const std::string& name, const std::string& argument, const
 
 void OptionSet::number(const std::string& name, const std::string& argument, const std::string& help,
                        double& target, NumberRange range) {
-  value(name, argument, help, shownNumber(target),
+  value(name, argument, help, shortText(target, 10),
         [&target, range](const std::string& text) { target = parseNumber(text, range); });
 }
 

@@ -80,9 +80,6 @@ class OptionSet {
   boost::program_options::positional_options_description positional_;
 };
 
-/// A number as --help shows it.
-std::string shownNumber(double value);
-
 /// The texts of --help besides the options.
 struct ProgramText {
   std::string name;      ///< as in `rosrun rio_t NAME`

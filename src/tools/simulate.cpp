@@ -207,7 +207,7 @@ void addRadarOptions(OptionSet& options, RadarRequest& r) {
   options.number("fov-azimuth-deg", "DEG", "half angle of view", radar.fov_azimuth, NumberRange::kPositive);
   options.value(
       "fov-elevation-deg", "DEG", "half angle of view",
-      shownNumber(radar.fov_elevation) + "; " + shownNumber(kFlatFovElevation) + " with --no-elevation",
+      shortText(radar.fov_elevation, 10) + "; " + shortText(kFlatFovElevation, 10) + " with --no-elevation",
       [&r](const std::string& v) { r.fov_elevation = parseNumber(v, NumberRange::kPositive); });
   options.flag("no-elevation",
                "a flat radar: sees what is within --fov-elevation-deg, reports it in its own plane, z = 0",

@@ -13,7 +13,6 @@ namespace rio_t {
 struct ImuReport {
   std::size_t not_finite = 0;
   double written_norm = 0.0;  ///< median of |acceleration|, as written
-  double written_rate = 0.0;  ///< |angular velocity| that nine in ten samples do not exceed, as written
   ImuUnits units;             ///< found
   /// Empty if acceleration and rates can be used; else why not, in one sentence.
   std::string acceleration_fault, rate_fault;
@@ -32,7 +31,8 @@ struct ImuReport {
   std::size_t saturated = 0;                              ///< samples at the end of the range
 };
 
-/// `written`: as the driver writes them, in the order of time; times must rise.
-ImuReport inspectImu(const std::vector<ImuMeasurement>& written);
+/// `written`: as the driver writes them, in the order of time; times must rise. `samples` gets those that are
+/// finite, in m/s^2 and rad/s.
+ImuReport inspectImu(const std::vector<ImuMeasurement>& written, std::vector<ImuMeasurement>* samples);
 
 }  // namespace rio_t

@@ -84,11 +84,17 @@ std::map<std::string, std::string> Bags::typesByTopic() const {
   return types;
 }
 
+std::string topicsText(const std::map<std::string, std::string>& types) {
+  std::string text;
+  for (const auto& [topic, type] : types) appendItem(&text, topic + " (" + type + ")");
+  return text.empty() ? "no topics" : text;
+}
+
 void checkTopics(const std::string& bag, const std::map<std::string, std::string>& types,
-                 const std::vector<Wanted>& wanted) {
+                 const std::vector<InputTopic>& wanted) {
   std::string faults;
   bool missing = false, several_radars = false;
-  for (const Wanted& want : wanted) {
+  for (const InputTopic& want : wanted) {
     several_radars = several_radars || want.key.find('/') != std::string::npos;
     const auto found = types.find(want.topic);
     if (found != types.end() && found->second == want.type) continue;
@@ -101,9 +107,7 @@ void checkTopics(const std::string& bag, const std::map<std::string, std::string
   }
   if (faults.empty()) return;
   if (missing) {
-    std::string known;
-    for (const auto& [topic, type] : types) appendItem(&known, topic + " (" + type + ")");
-    faults += "; the bag has " + (known.empty() ? "no topics" : known);
+    faults += "; the bag has " + topicsText(types);
     if (several_radars) faults += ". To leave a radar out: --set radars=[NAME of the other]";
   }
   throw bagError(bag, faults);

@@ -47,16 +47,11 @@ class Bags {
   std::vector<std::unique_ptr<rosbag::Bag>> bags_;
 };
 
-/// The topic of a configuration key and the type it must have.
-struct Wanted {
-  std::string key;
-  std::string topic;
-  std::string type;
-};
-
+/// "/imu (sensor_msgs/Imu), ..."
+std::string topicsText(const std::map<std::string, std::string>& types);
 /// Throws bagError that names all which are missing or of another type.
 void checkTopics(const std::string& bag, const std::map<std::string, std::string>& types,
-                 const std::vector<Wanted>& wanted);
+                 const std::vector<InputTopic>& wanted);
 
 /// Begin and end of what is played, by the keys bag_start and bag_duration.
 std::pair<ros::Time, ros::Time> playedSpan(const Bags& bags, const Config& config);

@@ -1,5 +1,6 @@
 #include "bag_player.h"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -42,6 +43,8 @@ void BagPlayer::play(const rosbag::MessageInstance& instance) {
 void BagPlayer::finish() {
   for (std::size_t k = 0; k < radars_.size(); ++k) feed(radars_[k].stamper.finish(), k);
   for (ScanResult& result : odometry_.finish()) account(result);
+  for (std::size_t k = 0; k < radars_.size(); ++k)
+    for (const auto& [reason, count] : radars_[k].stamper.givenUp()) evidence_.addDropped(k, reason, count);
 }
 
 void BagPlayer::feed(std::vector<RadarScan> scans, std::size_t radar) {
@@ -57,13 +60,6 @@ RunSummary BagPlayer::summary(const RunLog& log) const {
   summary.imu_count = imu_count_;
   summary.imu_restarts = imu_restarts_;
   if (summary.barometer) summary.barometer->pressures = pressure_count_;
-  const auto warn = [&](const NotUsableByKind& kinds) {
-    for (const auto& [kind, what] : kinds)
-      summary.warnings.push_back(what.why + " (messages: " + std::to_string(what.count) + ")");
-  };
-  const auto count = [&](const NotUsableByKind& kinds, Counts* counts) {
-    for (const auto& [kind, what] : kinds) (*counts)[kind] += what.count;
-  };
   for (std::size_t k = 0; k < radars_.size(); ++k) {
     const Radar& radar = radars_[k];
     RadarSummary& radar_summary = summary.radars[k];
@@ -73,23 +69,17 @@ RunSummary BagPlayer::summary(const RunLog& log) const {
       constexpr std::array<double, 3> kShares = {0.1, 0.5, 0.9};
       radar_summary.points_per_scan[i] = static_cast<std::uint64_t>(quantile(radar.scan_sizes, kShares[i]));
     }
-    radar_summary.scans_total = radar.scans_total;
     if (radar_summary.points_not_finite > 0)
       summary.input_faults["points_not_finite"] += radar_summary.points_not_finite;
-    for (const auto& [reason, given_up] : radar.stamper.givenUp())
-      radar_summary.scans_rejected[reason] += given_up;
-    count(radar.not_usable, &radar_summary.scans_rejected);
-    count(radar.triggers_not_usable, &summary.input_faults);
-    warn(radar.not_usable);
   }
-  count(imu_not_usable_, &summary.input_faults);
-  count(pressure_not_usable_, &summary.input_faults);
-  for (const Radar& radar : radars_) warn(radar.triggers_not_usable);
-  warn(pressure_not_usable_);
+  summary.not_usable = not_usable_;
+  for (const NotUsable& each : not_usable_) {
+    summary.warnings.push_back(each.text());
+    if (!each.is_scan) summary.input_faults[each.kind] += each.count;
+  }
   if (!imu_restarts_.empty())
     summary.warnings.push_back("topic " + config_.imu_topic + ": " +
                                describeRestarts(imu_restarts_, config_));
-  warn(imu_not_usable_);
   summary.diagnosis = diagnose(summary, config_);
   // Keys and files of the only radar carry no name.
   if (summary.radars.size() == 1) summary.radars.front().name.clear();
@@ -102,7 +92,7 @@ void BagPlayer::addImu(const sensor_msgs::Imu& message, Time record) {
   try {
     imu = toImuMeasurement(message, config_.imu_topic, config_.imu_units);
   } catch (const std::exception& error) {
-    notUsable("imu_not_usable", error.what(), &imu_not_usable_);
+    notUsable("imu_not_usable", config_.imu_topic, error.what());
     return;
   }
   followImuStamps(imu);
@@ -126,7 +116,7 @@ void BagPlayer::addTrigger(const std_msgs::Header& message, Time record, std::si
   try {
     radars_[radar].stamper.addTrigger(message.seq, toTime(message.stamp), record);
   } catch (const std::exception& error) {
-    notUsable("trigger_stamp_zero", error.what(), &radars_[radar].triggers_not_usable);
+    notUsable("trigger_stamp_zero", radars_[radar].trigger_topic, error.what());
     evidence_.addZeroTrigger(radar);
   }
 }
@@ -136,18 +126,17 @@ void BagPlayer::addPressure(const sensor_msgs::FluidPressure& message) {
   try {
     odometry_.addPressure(toPressure(message, config_.barometer_topic));
   } catch (const std::exception& error) {
-    notUsable("pressure_not_usable", error.what(), &pressure_not_usable_);
+    notUsable("pressure_not_usable", config_.barometer_topic, error.what());
   }
 }
 
 void BagPlayer::addCloud(const sensor_msgs::PointCloud2& message, Time record, std::size_t k) {
   Radar& radar = radars_[k];
-  ++radar.scans_total;
   DecodedScan decoded;
   try {
     decoded = decode(message, radar.format);
   } catch (const std::exception& error) {
-    notUsable("cloud_not_usable", "topic " + radar.topic + ": " + error.what(), &radar.not_usable);
+    dropScan("cloud_not_usable", "topic " + radar.topic + ": " + error.what(), k);
     return;
   }
   evidence_.addNotFinite(k, decoded.dropped_not_finite);
@@ -156,12 +145,21 @@ void BagPlayer::addCloud(const sensor_msgs::PointCloud2& message, Time record, s
     radar.stamper.addScan(message.header.seq, toTime(message.header.stamp), record,
                           toRadarScan(decoded.cloud, Time()));
   } catch (const std::exception& error) {
-    notUsable("stamp_zero", error.what(), &radar.not_usable);
+    dropScan("stamp_zero", error.what(), k);
   }
 }
 
-void BagPlayer::notUsable(const std::string& kind, const std::string& why, NotUsableByKind* kinds) {
-  ++kinds->try_emplace(kind, NotUsable{why, 0}).first->second.count;
+NotUsable& BagPlayer::notUsable(const std::string& kind, const std::string& topic, const std::string& why) {
+  auto found = std::find_if(not_usable_.begin(), not_usable_.end(),
+                            [&](const NotUsable& each) { return each.kind == kind && each.topic == topic; });
+  if (found == not_usable_.end()) found = not_usable_.insert(found, {kind, topic, why});
+  ++found->count;
+  return *found;
+}
+
+void BagPlayer::dropScan(const std::string& kind, const std::string& why, std::size_t radar) {
+  evidence_.addDropped(radar, kind, 1);
+  notUsable(kind, radars_[radar].topic, why).is_scan = true;
 }
 
 void BagPlayer::account(ScanResult& result) {

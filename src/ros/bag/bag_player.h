@@ -39,12 +39,6 @@ class BagPlayer {
   const std::optional<RadarInertialOdometry::Start>& start() const { return start_; }
 
  private:
-  struct NotUsable {
-    std::string why;  // the first of them
-    std::uint64_t count = 0;
-  };
-  using NotUsableByKind = std::map<std::string, NotUsable>;
-
   /// The input of one radar.
   struct Radar {
     explicit Radar(const Config& config);
@@ -52,9 +46,7 @@ class BagPlayer {
     std::string topic, trigger_topic;  // the latter is empty if triggers are not read
     PointCloudFormat format;
     ScanStamper stamper;
-    std::uint64_t scans_total = 0;
     std::vector<double> scan_sizes;  // numbers of points
-    NotUsableByKind not_usable, triggers_not_usable;
   };
 
   void addImu(const sensor_msgs::Imu& message, Time record);
@@ -65,7 +57,8 @@ class BagPlayer {
   void addCloud(const sensor_msgs::PointCloud2& message, Time record, std::size_t k);
   void feed(std::vector<RadarScan> scans, std::size_t radar);
   /// One bad message among good ones is counted; `why` is reported at the end, the first one of each kind.
-  static void notUsable(const std::string& kind, const std::string& why, NotUsableByKind* kinds);
+  NotUsable& notUsable(const std::string& kind, const std::string& topic, const std::string& why);
+  void dropScan(const std::string& kind, const std::string& why, std::size_t radar);
   void account(ScanResult& result);
 
   const Config& config_;
@@ -78,7 +71,7 @@ class BagPlayer {
   ClockJumpDetector imu_stamps_;  // the same judgement as the odometry's own
   std::vector<ImuRestart> imu_restarts_;
   std::uint64_t imu_count_ = 0, pressure_count_ = 0;
-  NotUsableByKind imu_not_usable_, pressure_not_usable_;
+  std::vector<NotUsable> not_usable_;
 };
 
 }  // namespace rio_t

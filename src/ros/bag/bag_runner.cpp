@@ -69,20 +69,17 @@ void checkOutcome(const std::string& bag, const Config& config, const RunSummary
     for (const Config& radar : configsOfRadars(config)) appendItem(&topics, noMessages(radar), "; ");
     throw bagError(bag, topics);
   }
-  // If most messages of a topic cannot be used, that is the cause, not what became of the rest. The player
-  // warns of clouds first, by radar and kind, and of IMU samples last.
-  const Counts rejected = summary.scansRejected();
-  const std::uint64_t unusable = countOf(rejected, "cloud_not_usable") + countOf(rejected, "stamp_zero");
-  if (summary.scansUsed() == 0 && 2 * unusable > summary.scansTotal()) {
-    std::string faults;
-    auto warning = summary.warnings.begin();
-    for (const RadarSummary& radar : summary.radars)
-      for (const char* kind : {"cloud_not_usable", "stamp_zero"})
-        if (countOf(radar.scans_rejected, kind) > 0) appendItem(&faults, *warning++, "; ");
-    throw bagError(bag, faults);
+  // If most messages of a topic cannot be used, that is the cause, not what became of the rest.
+  std::string unusable_scans;
+  std::uint64_t unusable = 0;
+  for (const NotUsable& each : summary.not_usable) {
+    if (!summary.initialized && each.kind == "imu_not_usable" && 2 * each.count > summary.imu_count)
+      throw bagError(bag, each.text());
+    if (!each.is_scan) continue;
+    appendItem(&unusable_scans, each.text(), "; ");
+    unusable += each.count;
   }
-  if (!summary.initialized && 2 * countOf(summary.input_faults, "imu_not_usable") > summary.imu_count)
-    throw bagError(bag, summary.warnings.back());
+  if (summary.scansUsed() == 0 && 2 * unusable > summary.scansTotal()) throw bagError(bag, unusable_scans);
   const auto failed = [&](const std::string& what) {
     return RunFailed(bagError(bag, what).what(), summary.diagnosis);
   };
@@ -95,21 +92,6 @@ void checkOutcome(const std::string& bag, const Config& config, const RunSummary
   std::string reasons;
   for (const RadarSummary& radar : summary.radars) appendItem(&reasons, allRejected(radar), "; ");
   throw failed(reasons);
-}
-
-/// The topics to read, with the keys that name them.
-std::vector<Wanted> wantedTopics(const Config& config) {
-  std::vector<Wanted> wanted = {{"imu_topic", config.imu_topic, "sensor_msgs/Imu"}};
-  if (!config.barometer_topic.empty())
-    wanted.push_back({"barometer_topic", config.barometer_topic, "sensor_msgs/FluidPressure"});
-  for (const Config& radar : configsOfRadars(config)) {
-    wanted.push_back(
-        {prefixOf(radar.radar_name) + "radar_topic", radar.radar_topic, "sensor_msgs/PointCloud2"});
-    if (radar.stamp_source == StampSource::kTrigger)
-      wanted.push_back(
-          {prefixOf(radar.radar_name) + "trigger_topic", radar.trigger_topic, "std_msgs/Header"});
-  }
-  return wanted;
 }
 
 /// Takes the offsets [s], by radar, off the stamps, so that those that are left start at zero.
@@ -144,12 +126,14 @@ class BagJob {
   explicit BagJob(const BagRun& run)
       : run_(run), files_(runFiles(run.config)), bags_(run.bags), started_(std::chrono::steady_clock::now()) {
     const std::map<std::string, std::string> types = bags_.typesByTopic();
-    run_.config = withTopics(run.config, [&](const std::string& /*key*/, const std::string& topic) {
-      return topicOfBag(topic, types);
-    });
+    // The check again: with the names that the bag has, two radars may have one topic.
+    run_.config = withParameters(
+        withTopics(run.config, [&](const std::string& /*key*/,
+                                   const std::string& topic) { return topicOfBag(topic, types); }),
+        {});
     const Config& config = run_.config;
-    std::vector<Wanted> wanted = wantedTopics(config);
-    for (const Wanted& want : wanted) topics_.push_back(want.topic);
+    std::vector<InputTopic> wanted = inputTopics(config);
+    for (const InputTopic& want : wanted) topics_.push_back(want.topic);
     truth_in_bag_ = config.ground_truth.empty() && types.count(config.ground_truth_topic) != 0;
     if (truth_in_bag_)
       wanted.push_back({"ground_truth_topic", config.ground_truth_topic, "geometry_msgs/PoseStamped"});
@@ -308,11 +292,6 @@ class BagJob {
 
 }  // namespace
 
-RunSummary runBag(const BagRun& run) {
-  BagRun with_topics_of_bag = run;
-  // The check again: with a slash before each topic, two radars may have one topic.
-  with_topics_of_bag.config = withParameters(withAbsoluteTopics(run.config), {});
-  return BagJob(with_topics_of_bag).execute();
-}
+RunSummary runBag(const BagRun& run) { return BagJob(run).execute(); }
 
 }  // namespace rio_t

@@ -5,6 +5,7 @@
 #include <set>
 #include <utility>
 
+#include "rio_t/factors/extrinsics_manifold.h"
 #include "rio_t/ros/bag/bag_runner.h"
 #include "rio_t/smoother/node_prior.h"
 
@@ -31,9 +32,9 @@ RadarCalibrationEstimate configuredOf(const Config& radar) {
   return configured;
 }
 
-RadarCalibrationEstimate foundOf(const RadarSummary& radar) {
+RadarCalibrationEstimate foundOf(const RadarSummary& radar, EstimateExtrinsics estimated) {
   return {{radar.final_offset_s, radar.final_offset_sigma_s},
-          {radar.extrinsics->T_IR, radar.extrinsics->covariance}};
+          {radar.extrinsics->T_IR, tangentCovariance(radar.extrinsics->covariance, estimated)}};
 }
 
 /// A folder for each bag, named after it: FOLDER/run, FOLDER/run_2.
@@ -89,7 +90,7 @@ BagCalibration calibrateFromBags(const CalibrationRun& run) {
     radar.name = radars[k].radar_name;
     std::vector<RadarCalibrationEstimate> found;
     for (const RunSummary& summary : summaries) {
-      found.push_back(foundOf(summary.radars[k]));
+      found.push_back(foundOf(summary.radars[k], config.odometry.smoother.estimate_extrinsics));
       radar.offsets.push_back(found.back().offset);
     }
     radar.calibration = calibrate(configuredOf(radars[k]), found);

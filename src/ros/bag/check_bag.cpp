@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "../text.h"
+#include "bag_file.h"
 #include "check_config.h"
 #include "inspect_radar.h"
 
@@ -33,9 +34,8 @@ ImuInspection chooseImu(const Recording& recording, BagCheck* check) {
     appendItem(&others, imu.topic + (imu.to_do.empty() ? "" : " (cannot be used)"));
   }
   if (!others.empty())
-    check->findings.push_back({FindingLevel::kOdd, "IMU",
-                               best->topic + " is chosen; the other topics of type sensor_msgs/Imu: " +
-                                   others + "; --imu-topic chooses another"});
+    check->odd("IMU", best->topic + " is chosen; the other topics of type sensor_msgs/Imu: " + others +
+                          "; --imu-topic chooses another");
   return std::move(*best);
 }
 
@@ -45,20 +45,9 @@ std::string header(const Recording& recording) {
          "\nRun: rosrun rio_t rio_t_bag --bag BAG --config THIS_FILE --output-dir results";
 }
 
-std::string topicsOf(const Recording& recording) {
-  std::string text;
-  for (const auto& [topic, type] : recording.types) appendItem(&text, topic + " (" + type + ")");
-  return text.empty() ? "none" : text;
-}
-
 bool hasType(const Recording& recording, const std::string& type) {
   return std::any_of(recording.types.begin(), recording.types.end(),
                      [&](const auto& topic) { return topic.second == type; });
-}
-
-void missing(const std::string& subject, const std::string& text, const std::string& to_do, BagCheck* check) {
-  check->findings.push_back({FindingLevel::kMissing, subject, text});
-  check->to_do = to_do;
 }
 
 /// Two topics of one radar, one filtered: the other has more points.
@@ -86,9 +75,8 @@ void leaveOutCopies(std::vector<RadarInspection>* radars, const Recording& recor
           !same_mounting)
         continue;
       if (b.points > a.points) std::swap(a, b);
-      check->findings.push_back({FindingLevel::kOdd, "radar",
-                                 b.topic + " has the stamps and the mounting of " + a.topic +
-                                     ": one radar, so only the topic with more points is used"});
+      check->odd("radar", b.topic + " has the stamps and the mounting of " + a.topic +
+                              ": one radar, so only the topic with more points is used");
       radars->erase(radars->begin() + static_cast<std::ptrdiff_t>(k));
     }
   }
@@ -107,17 +95,16 @@ BagCheck checkBag(const std::vector<std::string>& bags, const CheckRequest& requ
   check.bags = bags;
   const Recording recording = readRecording(bags, request);
   if (recording.read < recording.length)
-    check.findings.push_back({FindingLevel::kOk, "bag",
-                              "the first " + fixedText(recording.read, 0) + " of " +
-                                  fixedText(recording.length, 0) + " s were read (--duration)"});
+    check.ok("bag", "the first " + fixedText(recording.read, 0) + " of " + fixedText(recording.length, 0) +
+                        " s were read (--duration)");
   if (recording.imus.empty()) {
-    missing("IMU",
-            "the bag has no topic " + (request.imu_topic.empty() ? "" : request.imu_topic + " ") +
-                "of type sensor_msgs/Imu; it has " + topicsOf(recording),
-            !request.imu_topic.empty() && hasType(recording, "sensor_msgs/Imu")
-                ? "Choose a topic of that type which the bag has with --imu-topic, or leave the option out."
-                : "Record the IMU, too: 100 Hz or more, with raw acceleration and angular velocity.",
-            &check);
+    check.missing(
+        "IMU",
+        "the bag has no topic " + (request.imu_topic.empty() ? "" : request.imu_topic + " ") +
+            "of type sensor_msgs/Imu; it has " + topicsText(recording.types),
+        !request.imu_topic.empty() && hasType(recording, "sensor_msgs/Imu")
+            ? "Choose a topic of that type which the bag has with --imu-topic, or leave the option out."
+            : "Record the IMU, too: 100 Hz or more, with raw acceleration and angular velocity.");
     return check;
   }
   const ImuInspection imu = chooseImu(recording, &check);
@@ -138,13 +125,13 @@ BagCheck checkBag(const std::vector<std::string>& bags, const CheckRequest& requ
     if (recording.clouds.empty()) {
       std::string wanted;
       for (const std::string& topic : request.radar_topics) wanted += topic + " ";
-      missing(
+      check.missing(
           "radar",
-          "the bag has no topic " + wanted + "of type sensor_msgs/PointCloud2; it has " + topicsOf(recording),
+          "the bag has no topic " + wanted + "of type sensor_msgs/PointCloud2; it has " +
+              topicsText(recording.types),
           !request.radar_topics.empty() && hasType(recording, "sensor_msgs/PointCloud2")
               ? "Choose topics of that type which the bag has with --radar-topic, or leave the option out."
-              : "Record the radar, too: a point cloud with positions and Doppler.",
-          &check);
+              : "Record the radar, too: a point cloud with positions and Doppler.");
     } else {
       check.to_do =
           to_do.empty()

@@ -35,12 +35,11 @@ std::vector<std::string> radarNames(const std::vector<RadarInspection>& radars) 
       if (!shared && !word.empty()) appendItem(&name, word, "_");
     }
     // A name that YAML takes for a number or a truth value is none.
-    const bool is_text = !name.empty() && std::isalpha(static_cast<unsigned char>(name.front())) != 0;
+    const bool is_text = !name.empty() && std::isalpha(static_cast<unsigned char>(name.front())) != 0 &&
+                         std::holds_alternative<std::string>(parsePlainScalar(name).data);
     const bool taken = std::find(names.begin(), names.end(), name) != names.end() || keys.count(name) != 0 ||
                        isReserved(name);
-    static const std::set<std::string> words_of_yaml = {"y",   "n",    "yes",   "no",  "on",
-                                                        "off", "true", "false", "null"};
-    if (!is_text || taken || words_of_yaml.count(name) != 0) name = "radar" + std::to_string(k + 1);
+    if (!is_text || taken) name = "radar" + std::to_string(k + 1);
     names.push_back(name);
   }
   return names;

@@ -73,7 +73,7 @@ std::string verdictText(const Diagnosis& diagnosis) {
 
 void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
   if (!trial.failure.empty()) {
-    check->findings.push_back({FindingLevel::kMissing, "trial run", trial.failure});
+    check->tell(FindingLevel::kMissing, "trial run", trial.failure);
     check->to_do = "See the lines marked odd; then record again, at rest for 3 s and then in motion.";
     return;
   }
@@ -81,16 +81,15 @@ void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
   const std::string numbers =
       shareText(trial) + ", " + fixedText(s.path_length_m, 1) + " m, " + offsetsText(s);
   if (trial.good()) {
-    check->findings.push_back({note.empty() ? FindingLevel::kOk : FindingLevel::kOdd, "trial run",
-                               "no divergence, " + numbers + note});
-    if (s.diagnosis.verdict != RunVerdict::kGood)
-      check->findings.push_back({FindingLevel::kOdd, "trial run", verdictText(s.diagnosis)});
+    check->tell(note.empty() ? FindingLevel::kOk : FindingLevel::kOdd, "trial run",
+                "no divergence, " + numbers + note);
+    if (s.diagnosis.verdict != RunVerdict::kGood) check->odd("trial run", verdictText(s.diagnosis));
     return;
   }
-  check->findings.push_back({FindingLevel::kMissing, "trial run",
-                             "divergences: " + std::to_string(s.divergences) + ", at the end " +
-                                 toString(s.health) + "; " + numbers});
-  check->findings.push_back({FindingLevel::kOdd, "trial run", verdictText(s.diagnosis)});
+  check->tell(FindingLevel::kMissing, "trial run",
+              "divergences: " + std::to_string(s.divergences) + ", at the end " + toString(s.health) + "; " +
+                  numbers);
+  check->odd("trial run", verdictText(s.diagnosis));
   check->to_do = "The odometry does not run well with what the bag shows. Look at the odd lines.";
   const std::vector<Cause>& causes = s.diagnosis.causes;
   if (causes.empty() || isAboutMounting(causes.front()))

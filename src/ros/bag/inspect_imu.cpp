@@ -89,9 +89,8 @@ void describeOrder(const StampedInOrder& order, std::size_t messages, ImuInspect
     appendItem(&why, "the clock jumped, and only the longest part without a jump is used", "; ");
   if (why.empty()) return;
   const std::size_t left_out = messages - order.kept.times.size() - order.duplicates;
-  imu->findings.push_back({FindingLevel::kOdd, "IMU stamps",
-                           "check_bag leaves out " + std::to_string(left_out) + " of " +
-                               std::to_string(messages) + " samples: " + why});
+  imu->odd("IMU stamps", "check_bag leaves out " + std::to_string(left_out) + " of " +
+                             std::to_string(messages) + " samples: " + why);
 }
 
 /// Why the stamps cannot be used; empty: they can, but for a few.
@@ -107,14 +106,9 @@ std::string faultOf(const StreamTiming& timing) {
 void describeRate(const StreamTiming& timing, ImuInspection* imu) {
   constexpr double kSlow = 50.0;  // [Hz]
   const bool odd = timing.rate < kSlow || timing.gaps > 0 || 20 * timing.duplicates > timing.messages;
-  imu->findings.push_back(
-      {odd ? FindingLevel::kOdd : FindingLevel::kOk, "IMU",
-       imu->topic + ": " + rateText(timing, timing.rate < 20.0 ? 1 : 0, true) +
-           (timing.rate < kSlow ? ", slower than the 50 Hz that a hand-held platform needs" : "")});
-}
-
-void tell(ImuInspection* imu, FindingLevel level, const std::string& subject, const std::string& text) {
-  imu->findings.push_back({level, subject, text});
+  imu->tell(odd ? FindingLevel::kOdd : FindingLevel::kOk, "IMU",
+            imu->topic + ": " + rateText(timing, timing.rate < 20.0 ? 1 : 0, true) +
+                (timing.rate < kSlow ? ", slower than the 50 Hz that a hand-held platform needs" : ""));
 }
 
 void describeUnits(ImuInspection* imu) {
@@ -124,17 +118,17 @@ void describeUnits(ImuInspection* imu) {
   if (in_g) {
     imu->keys.set("imu_acceleration_unit", "g",
                   "The median size of the acceleration is " + fixedText(r.written_norm, 2) + ".");
-    tell(imu, FindingLevel::kOdd, "IMU unit",
-         "the acceleration is in g (median size " + fixedText(r.written_norm, 2) + "), not in m/s^2");
+    imu->odd("IMU unit",
+             "the acceleration is in g (median size " + fixedText(r.written_norm, 2) + "), not in m/s^2");
   }
   if (in_degrees) {
     imu->keys.set("imu_rate_unit", "deg/s", "The turns of gravity fit these rates only in degrees.");
-    tell(imu, FindingLevel::kOdd, "IMU unit", "the angular velocity is in deg/s, not in rad/s");
+    imu->odd("IMU unit", "the angular velocity is in deg/s, not in rad/s");
   }
   for (const std::string& fault : {r.acceleration_fault, r.rate_fault}) {
     if (fault.empty()) continue;
-    tell(imu, FindingLevel::kMissing, "IMU",
-         fault + " (median size as written " + fixedText(r.written_norm, 2) + ")");
+    imu->tell(FindingLevel::kMissing, "IMU",
+              fault + " (median size as written " + fixedText(r.written_norm, 2) + ")");
     imu->to_do =
         "Set the IMU driver to raw acceleration in m/s^2 and angular velocity in rad/s, with the axes of "
         "one right-handed frame, and record again.";
@@ -147,18 +141,18 @@ void describeRest(ImuInspection* imu) {
     const OdometryOptions options;
     const double norm = r.rest_acceleration.norm(), error = std::abs(norm - options.gravity);
     const double allowed = options.initialization.max_gravity_error;
-    tell(imu, error < 0.3 ? FindingLevel::kOk : FindingLevel::kOdd, "rest",
-         "at rest from " + fixedText(r.rest_begin, 1) + " s; gravity " + fixedText(norm, 2) +
-             " m/s^2, up is " + axisName(r.rest_acceleration) + "; gyro bias " +
-             fixedText(r.rest_rate.norm(), 4) + " rad/s");
+    imu->tell(error < 0.3 ? FindingLevel::kOk : FindingLevel::kOdd, "rest",
+              "at rest from " + fixedText(r.rest_begin, 1) + " s; gravity " + fixedText(norm, 2) +
+                  " m/s^2, up is " + axisName(r.rest_acceleration) + "; gyro bias " +
+                  fixedText(r.rest_rate.norm(), 4) + " rad/s");
     if (error > 0.9 * allowed)
       imu->keys.set("init_max_gravity_error", ParameterValue{rounded(error + allowed, 10.0)},
                     "At rest the accelerometer shows " + fixedText(norm, 2) + " m/s^2.");
   } else {
-    tell(imu, FindingLevel::kOdd, "rest",
-         "the IMU shows no rest in the first 10 s, so the odometry starts in motion; 3 s at rest give a "
-         "better "
-         "start. If the platform did rest, it vibrates: mount the IMU softer");
+    imu->odd("rest",
+             "the IMU shows no rest in the first 10 s, so the odometry starts in motion; 3 s at rest give a "
+             "better "
+             "start. If the platform did rest, it vibrates: mount the IMU softer");
     imu->keys.set("init_mode", "motion", "There is no rest at the start.");
   }
 }
@@ -173,39 +167,40 @@ void describeUp(ImuInspection* imu) {
   const Eigen::Quaterniond q_BI = axis.z() < 0.0
                                       ? Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0)
                                       : Eigen::Quaterniond::FromTwoVectors(axis, Eigen::Vector3d::UnitZ());
-  tell(imu, FindingLevel::kOdd, "IMU axes",
-       "gravity is on " + axisName(*up) +
-           ", so z of the IMU is not up: the odometry is right, but rviz shows base_link tilted, since it is "
-           "the "
-           "IMU by default. Give base_link by tf, or set base_extrinsics_rotation_xyzw: [" +
-           fixedTexts(q_BI.coeffs(), 4) + "] to make its z up (docs/frames.md)");
+  imu->tell(
+      FindingLevel::kOdd, "IMU axes",
+      "gravity is on " + axisName(*up) +
+          ", so z of the IMU is not up: the odometry is right, but rviz shows base_link tilted, since it is "
+          "the "
+          "IMU by default. Give base_link by tf, or set base_extrinsics_rotation_xyzw: [" +
+          fixedTexts(q_BI.coeffs(), 4) + "] to make its z up (docs/frames.md)");
 }
 
 void describeNoise(ImuInspection* imu) {
   const ImuReport& r = imu->report;
   const double vibration = r.accel_density_median / std::max(r.accel_density_quiet, 1e-9);
   const bool vibrates = r.accel_density_median > 0.04;
-  tell(imu, vibrates ? FindingLevel::kOdd : FindingLevel::kOk, "noise",
-       "accelerometer " + fixedText(r.accel_density_quiet, 4) + " m/s^2/sqrt(Hz)" +
-           (vibration > 2.0 ? ", in motion " + fixedText(r.accel_density_median, 4) : "") + "; gyro " +
-           fixedText(r.gyro_density_quiet, 5) + " rad/s/sqrt(Hz)" +
-           (vibrates ? ": the frame vibrates; mount the IMU softer if you can" : ""));
+  imu->tell(vibrates ? FindingLevel::kOdd : FindingLevel::kOk, "noise",
+            "accelerometer " + fixedText(r.accel_density_quiet, 4) + " m/s^2/sqrt(Hz)" +
+                (vibration > 2.0 ? ", in motion " + fixedText(r.accel_density_median, 4) : "") + "; gyro " +
+                fixedText(r.gyro_density_quiet, 5) + " rad/s/sqrt(Hz)" +
+                (vibrates ? ": the frame vibrates; mount the IMU softer if you can" : ""));
   // The diagnosis doubts a run only if the IMU is noisier than configured.
   if (vibrates)
     imu->keys.set("imu_accel_noise_density", ParameterValue{rounded(r.accel_density_median, 1e3)},
                   "The frame vibrates: more than the default expects.");
   if (r.saturated > 0)
-    tell(imu, FindingLevel::kOdd, "range",
-         std::to_string(r.saturated) + " samples are at the end of the range (largest " +
-             fixedText(r.largest_acceleration, 1) + " m/s^2, " + fixedText(r.largest_rate, 2) + " rad/s)");
+    imu->odd("range", std::to_string(r.saturated) + " samples are at the end of the range (largest " +
+                          fixedText(r.largest_acceleration, 1) + " m/s^2, " + fixedText(r.largest_rate, 2) +
+                          " rad/s)");
 }
 
 void describe(ImuInspection* imu) {
   const ImuReport& r = imu->report;
   const std::size_t samples = imu->samples.size() + r.not_finite;
   if (10 * r.not_finite > samples) {  // the rest of the report would be of what is left
-    tell(imu, FindingLevel::kMissing, "IMU",
-         std::to_string(r.not_finite) + " of " + std::to_string(samples) + " samples are not finite");
+    imu->tell(FindingLevel::kMissing, "IMU",
+              std::to_string(r.not_finite) + " of " + std::to_string(samples) + " samples are not finite");
     imu->to_do = "Correct the IMU driver, which writes NaN or infinity, and record again.";
     return;
   }
@@ -214,8 +209,7 @@ void describe(ImuInspection* imu) {
   describeUp(imu);
   describeNoise(imu);
   if (r.not_finite > 0)
-    tell(imu, FindingLevel::kOdd, "IMU",
-         std::to_string(r.not_finite) + " samples are not finite; they are left out");
+    imu->odd("IMU", std::to_string(r.not_finite) + " samples are not finite; they are left out");
 }
 
 }  // namespace
@@ -245,8 +239,7 @@ ImuInspection inspectImuTopic(const ImuTopic& topic) {
   const std::string fault = faultOf(written);
   if (!fault.empty()) {
     describeRate(written, &imu);
-    imu.findings.push_back(
-        {FindingLevel::kMissing, "IMU stamps", fault + "; rio_t needs the time of each sample"});
+    imu.tell(FindingLevel::kMissing, "IMU stamps", fault + "; rio_t needs the time of each sample");
     imu.to_do = "Let the IMU driver set header.stamp, and record again.";
     return imu;
   }
@@ -256,14 +249,7 @@ ImuInspection inspectImuTopic(const ImuTopic& topic) {
   describeRate(timing, &imu);
   describeOrder(order, written.messages, &imu);
   imu.times = std::move(order.kept.times);
-  imu.samples = std::move(order.kept.written);
-  imu.report = inspectImu(imu.samples);
-  std::vector<ImuMeasurement> finite;
-  for (const ImuMeasurement& sample : imu.samples) {
-    if (sample.acceleration.allFinite() && sample.angular_velocity.allFinite())
-      finite.push_back(converted(sample, imu.report.units));
-  }
-  imu.samples = std::move(finite);
+  imu.report = inspectImu(order.kept.written, &imu.samples);
   describe(&imu);
   return imu;
 }

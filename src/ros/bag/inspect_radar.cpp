@@ -73,45 +73,44 @@ Looked look(const Recording& recording, const ImuInspection& imu, const CloudTop
   return looked;
 }
 
-void tell(RadarInspection* radar, FindingLevel level, const std::string& subject, const std::string& text) {
-  radar->findings.push_back({level, subject, text});
-}
-
 void describeCloud(const Looked& looked, const FormatProposal& format, const StreamTiming& timing,
                    RadarInspection* radar) {
   const CloudReport& c = looked.cloud;
-  tell(radar, timing.gaps > timing.messages / 50 ? FindingLevel::kOdd : FindingLevel::kOk, "radar",
-       radar->topic + ": " + rateText(timing, 1, timing.zero == 0 && !timing.constant) + "; format " +
-           format.format.name +
-           (format.fitting.size() > 1 ? " (fitting: " + boost::algorithm::join(format.fitting, ", ") + ")"
-                                      : "") +
-           ", " + format.power);
-  for (const std::string& odd : format.odd) tell(radar, FindingLevel::kOdd, "format", odd);
+  radar->tell(
+      timing.gaps > timing.messages / 50 ? FindingLevel::kOdd : FindingLevel::kOk, "radar",
+      radar->topic + ": " + rateText(timing, 1, timing.zero == 0 && !timing.constant) + "; format " +
+          format.format.name +
+          (format.fitting.size() > 1 ? " (fitting: " + boost::algorithm::join(format.fitting, ", ") + ")"
+                                     : "") +
+          ", " + format.power);
+  for (const std::string& odd : format.odd) radar->odd("format", odd);
   const DopplerStep& step = looked.velocities.doppler_step;
   const bool sparse = radar->isSparse();
-  tell(radar, sparse ? FindingLevel::kOdd : FindingLevel::kOk, "points",
-       fixedText(c.points_10, 0) + " / " + fixedText(c.points_50, 0) + " / " + fixedText(c.points_90, 0) +
-           " a scan (10, 50, 90 %), to " + fixedText(c.range_99, 1) + " m, field of view +-" +
-           degrees(c.azimuth_95) + " by +-" + degrees(c.elevation_95) + " deg, Doppler step " +
-           (step.value > 0.0 ? fixedText(step.value, 3) + " m/s" : std::string("none")) +
-           (sparse ? ": few points, so start at rest" : ""));
+  radar->tell(sparse ? FindingLevel::kOdd : FindingLevel::kOk, "points",
+              fixedText(c.points_10, 0) + " / " + fixedText(c.points_50, 0) + " / " +
+                  fixedText(c.points_90, 0) + " a scan (10, 50, 90 %), to " + fixedText(c.range_99, 1) +
+                  " m, field of view +-" + degrees(c.azimuth_95) + " by +-" + degrees(c.elevation_95) +
+                  " deg, Doppler step " +
+                  (step.value > 0.0 ? fixedText(step.value, 3) + " m/s" : std::string("none")) +
+                  (sparse ? ": few points, so start at rest" : ""));
   constexpr double kIncredible = 500.0;  // [m] farther than radars see
   if (c.range_99 > kIncredible)
-    tell(radar, FindingLevel::kOdd, "points",
-         "the ranges reach " + fixedText(c.range_99, 0) + " m: are the positions in m?");
+    radar->odd("points", "the ranges reach " + fixedText(c.range_99, 0) + " m: are the positions in m?");
   const double not_finite = static_cast<double>(looked.points_not_finite);
   const double share_not_finite = not_finite / (not_finite + static_cast<double>(c.points));
   if (share_not_finite > kOnePercent)
-    tell(radar, FindingLevel::kOdd, "points",
-         fixedText(100.0 * share_not_finite, 0) +
-             " % have a position or a Doppler that is not finite: look for what the driver writes there");
+    radar->tell(
+        FindingLevel::kOdd, "points",
+        fixedText(100.0 * share_not_finite, 0) +
+            " % have a position or a Doppler that is not finite: look for what the driver writes there");
   if (c.ambiguous > kOnePercent)
-    tell(radar, FindingLevel::kOk, "points",
-         fixedText(100.0 * c.ambiguous, 0) +
-             " % have the range, Doppler and SNR of another point: one echo at several directions, left out");
+    radar->tell(
+        FindingLevel::kOk, "points",
+        fixedText(100.0 * c.ambiguous, 0) +
+            " % have the range, Doppler and SNR of another point: one echo at several directions, left out");
   if (!looked.velocities.has_elevation)
-    tell(radar, FindingLevel::kOdd, "points",
-         "the radar measures no elevation: z will drift, and a mounting without tilt is assumed");
+    radar->odd("points",
+               "the radar measures no elevation: z will drift, and a mounting without tilt is assumed");
 }
 
 void limitsOfCloud(const CloudReport& cloud, ProposedKeys* keys) {
@@ -135,21 +134,21 @@ void describeSign(const Looked& looked, const FormatProposal& format, RadarInspe
       imu_knows ? "the IMU (" + fixedText(std::sqrt(search.sign_significance), 0) + " sigma)" : "";
   const std::string evidence = by_ranges + (by_ranges.empty() || by_imu.empty() ? "" : " and ") + by_imu;
   if (search.mirrored) {
-    tell(radar, FindingLevel::kOdd, "axes",
-         "the axes of the cloud are left-handed (one axis is inverted): the ranges say that " + field +
-             " is " + (looked.sign.sign > 0 ? "positive for receding" : "negative for receding") +
-             " targets, the IMU the contrary; radar_doppler_sign and the mounting stand for it");
+    radar->odd("axes",
+               "the axes of the cloud are left-handed (one axis is inverted): the ranges say that " + field +
+                   " is " + (looked.sign.sign > 0 ? "positive for receding" : "negative for receding") +
+                   " targets, the IMU the contrary; radar_doppler_sign and the mounting stand for it");
     radar->keys.set("radar_doppler_sign", ParameterValue{std::int64_t{search.sign}},
                     "One axis of the cloud is inverted. This sign and the mounting below stand for it.");
   } else if (search.sign == -1) {
-    tell(radar, FindingLevel::kOdd, "Doppler",
-         field + " is positive for approaching targets, shown by " + evidence);
+    radar->odd("Doppler", field + " is positive for approaching targets, shown by " + evidence);
     radar->keys.set("radar_doppler_sign", ParameterValue{std::int64_t{-1}},
                     field + " is positive for approaching targets.");
   } else {
-    tell(radar, FindingLevel::kOk, "Doppler",
-         field + " is positive for receding targets" +
-             (evidence.empty() ? " (assumed: the motion does not show it)" : ", shown by " + evidence));
+    radar->tell(
+        FindingLevel::kOk, "Doppler",
+        field + " is positive for receding targets" +
+            (evidence.empty() ? " (assumed: the motion does not show it)" : ", shown by " + evidence));
   }
 }
 
@@ -182,10 +181,11 @@ Eigen::Matrix3d nearestTurn(const Eigen::Matrix3d& R) {
 
 void describeMounting(const MountingSearch& search, RadarInspection* radar) {
   if (!search.enough) {
-    tell(radar, FindingLevel::kOdd, "mounting",
-         "not found: less than 3 s with motion; the radar is taken to look forward. Record with motion, or "
-         "set "
-         "mounting_yaw_pitch_roll_deg by hand");
+    radar->tell(
+        FindingLevel::kOdd, "mounting",
+        "not found: less than 3 s with motion; the radar is taken to look forward. Record with motion, or "
+        "set "
+        "mounting_yaw_pitch_roll_deg by hand");
     radar->keys.set("mounting_yaw_pitch_roll_deg", listOf({0.0, 0.0, 0.0}),
                     "Assumed: the bag does not show it. Yaw left, pitch up, roll right side down.");
     return;
@@ -199,11 +199,11 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
   const std::string sure = sureness(sigma);
   // Few points a scan may show another mounting that fits as well: upside down, or a view beside the motion.
   const bool observed = search.rotation_sigma.maxCoeff() < kObservedTurn && !radar->isSparse();
-  tell(radar, observed ? FindingLevel::kOk : FindingLevel::kOdd, "mounting",
-       "yaw " + fixedText(yaw, 1) + ", pitch " + fixedText(pitch, 1) + ", roll " + fixedText(roll, 1) +
-           " deg (radar's " + turnText(nearestTurn(search.q_IR.toRotationMatrix())) + " of the IMU); " +
-           sure +
-           (radar->isSparse() ? "; so few points may show a wrong one: compare it with the robot" : ""));
+  radar->tell(
+      observed ? FindingLevel::kOk : FindingLevel::kOdd, "mounting",
+      "yaw " + fixedText(yaw, 1) + ", pitch " + fixedText(pitch, 1) + ", roll " + fixedText(roll, 1) +
+          " deg (radar's " + turnText(nearestTurn(search.q_IR.toRotationMatrix())) + " of the IMU); " + sure +
+          (radar->isSparse() ? "; so few points may show a wrong one: compare it with the robot" : ""));
   radar->keys.set("mounting_yaw_pitch_roll_deg", listOf({yaw, pitch, roll}),
                   "Yaw left, pitch up, roll right side down, seen from x forward, y left, z up of the IMU. " +
                       sure + ".");
@@ -218,15 +218,14 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
     text += (k == 0 ? "" : ", ") + fixedText(l[k], 2) + " +- " + fixedText(l_sigma[k], 2);
   }
   const bool any = std::any_of(lever.begin(), lever.end(), [](double x) { return x != 0.0; });
-  tell(radar, FindingLevel::kOk, "lever arm",
-       "about [" + text + "] m: " + (any ? "what is clear of zero is taken over" : "zero is proposed") +
-           "; measure it with a tape");
+  radar->ok("lever arm", "about [" + text +
+                             "] m: " + (any ? "what is clear of zero is taken over" : "zero is proposed") +
+                             "; measure it with a tape");
   if (any)
     radar->keys.set("extrinsics_translation", listOf(lever),
                     "Origin of the radar in the IMU frame, roughly [m]. Measure it with a tape.");
-  tell(radar, FindingLevel::kOk, "offset",
-       fixedText(1e3 * search.offset, 0) + " +- " + fixedText(1e3 * search.offset_sigma, 0) +
-           " ms, roughly; the odometry estimates it");
+  radar->ok("offset", fixedText(1e3 * search.offset, 0) + " +- " + fixedText(1e3 * search.offset_sigma, 0) +
+                          " ms, roughly; the odometry estimates it");
   constexpr double kKnown = 0.03;  // [s]
   const SmootherOptions defaults;
   const double bound = 0.8 * defaults.max_time_offset;
@@ -245,13 +244,12 @@ void compareWithConfigured(const MountingSearch& search, const ParameterEntries&
   const Config known = makeConfig(configured);
   const double turn = known.odometry.T_IR.q_IR.angularDistance(search.q_IR);
   if (isMountingConfigured(configured) && turn > kFarApart)
-    tell(radar, FindingLevel::kOdd, "mounting",
-         "the configured mounting and the one that the bag shows are " + degrees(turn) + " degrees apart");
+    radar->odd("mounting", "the configured mounting and the one that the bag shows are " + degrees(turn) +
+                               " degrees apart");
   const int sign = known.radar_overrides.doppler_sign;
   if (sign != 0 && sign != search.sign)
-    tell(radar, FindingLevel::kOdd, "Doppler",
-         "the configured radar_doppler_sign is " + std::to_string(sign) + ", and the bag shows " +
-             std::to_string(search.sign));
+    radar->odd("Doppler", "the configured radar_doppler_sign is " + std::to_string(sign) +
+                              ", and the bag shows " + std::to_string(search.sign));
 }
 
 }  // namespace
@@ -268,7 +266,7 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   const StreamTiming timing = inspectTiming(cloud.times);
   FormatProposal format = proposeFormat(cloud, configured);
   if (!format.fault.empty()) {
-    tell(&radar, FindingLevel::kMissing, "radar", cloud.topic + ": " + format.fault);
+    radar.tell(FindingLevel::kMissing, "radar", cloud.topic + ": " + format.fault);
     radar.to_do = format.to_do;
     return radar;
   }
@@ -279,9 +277,10 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
     const std::vector<RadarScan> decoded = decodeAll(cloud, format.format).scans;
     const bool none_finite = std::all_of(decoded.begin(), decoded.end(),
                                          [](const RadarScan& scan) { return scan.points.empty(); });
-    tell(&radar, FindingLevel::kMissing, "radar",
-         cloud.topic + ": the " + (none_finite ? "position or the " : "") + "field " + format.format.doppler +
-             " is " + (none_finite ? "not finite" : "zero") + " in every point");
+    radar.tell(FindingLevel::kMissing, "radar",
+               cloud.topic + ": the " + (none_finite ? "position or the " : "") + "field " +
+                   format.format.doppler + " is " + (none_finite ? "not finite" : "zero") +
+                   " in every point");
     return radar;
   }
   // If the ranges say nothing, a radar that looks along another axis and a contrary sign are one fault, not
@@ -301,8 +300,8 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   radar.keys.add(stamps.keys);
   limitsOfCloud(looked.cloud, &radar.keys);
   describeCloud(looked, format, timing, &radar);
-  for (const std::string& odd : stamps.odd) tell(&radar, FindingLevel::kOdd, "stamps", odd);
-  if (stamps.odd.empty()) tell(&radar, FindingLevel::kOk, "stamps", stamps.text);
+  for (const std::string& odd : stamps.odd) radar.odd("stamps", odd);
+  if (stamps.odd.empty()) radar.ok("stamps", stamps.text);
   describeSign(looked, format, &radar);
   describeMounting(looked.search, &radar);
   compareWithConfigured(looked.search, configured, &radar);

@@ -18,14 +18,12 @@ namespace rio_t {
 std::string rateText(const StreamTiming& timing, int decimals, bool with_duplicates);
 
 /// The IMU of a recording, ready to be compared with radars.
-struct ImuInspection {
+struct ImuInspection : Findings {
   std::string topic;
   std::vector<MessageTimes> times;  ///< of the samples whose stamps are in place
   ImuReport report;
   std::vector<ImuMeasurement> samples;  ///< those that are finite, in m/s^2 and rad/s, stamps rising
-  std::vector<Finding> findings;
   ProposedKeys keys;
-  std::string to_do;  ///< what to do if it cannot be used; empty: it can
 };
 ImuInspection inspectImuTopic(const ImuTopic& topic);
 
@@ -38,12 +36,10 @@ constexpr double kObservedTurn = 0.3;
 constexpr double kFarApart = 0.26;
 
 /// A radar of a recording.
-struct RadarInspection {
+struct RadarInspection : Findings {
   std::string topic;
-  std::vector<Finding> findings;
   ProposedKeys keys;
   bool usable = false;
-  std::string to_do;  ///< what to do if it is not usable; may be empty
   MountingSearch search;
   double points = 0.0;  ///< of the median scan
 

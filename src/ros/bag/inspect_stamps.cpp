@@ -7,6 +7,7 @@
 #include <set>
 
 #include "../text.h"
+#include "bag_frames.h"
 
 namespace rio_t {
 namespace {
@@ -59,12 +60,12 @@ const HeaderTopic* triggerOf(const Recording& recording, const std::vector<Messa
 
 StampProposal proposeStamps(const Recording& recording, const std::vector<MessageTimes>& imu,
                             const CloudTopic& cloud, const ParameterEntries& configured) {
-  const Config known = withAbsoluteTopics(makeConfig(configured));
+  const Config known = makeConfig(configured);
   StampProposal proposal;
   proposal.shift = known.radar_stamp_shift;
   if (isConfigured("stamp_source", configured)) {
     proposal.source = known.stamp_source;
-    proposal.trigger_topic = known.trigger_topic;
+    proposal.trigger_topic = topicOfBag(known.trigger_topic, recording.types);
     proposal.text = "as configured, stamp_source: " + toString(known.stamp_source);
     return proposal;
   }

@@ -1,7 +1,5 @@
 #include "run_log.h"
 
-#include "rio_t/smoother/node_prior.h"
-
 namespace rio_t {
 namespace {
 
@@ -12,22 +10,20 @@ RadarEstimate before(const OdometryOptions& options) {
   radar.final_offset_s = smoother.time_offset_initial;
   if (smoother.estimate_time_offset) radar.final_offset_sigma_s = smoother.time_offset_sigma;
   if (smoother.estimate_extrinsics == EstimateExtrinsics::kNone) return radar;
+  const bool pose = smoother.estimate_extrinsics == EstimateExtrinsics::kPose;
+  Eigen::Matrix<double, 6, 1> sigmas;
+  sigmas << Eigen::Vector3d::Constant(pose ? smoother.extrinsics_translation_sigma : 0.0),
+      Eigen::Vector3d::Constant(smoother.extrinsics_rotation_sigma);
   radar.extrinsics.emplace();
   radar.extrinsics->configured = radar.extrinsics->T_IR = options.T_IR;
-  radar.extrinsics->rotation_sigma.setConstant(smoother.extrinsics_rotation_sigma);
-  if (smoother.estimate_extrinsics == EstimateExtrinsics::kPose)
-    radar.extrinsics->translation_sigma.setConstant(smoother.extrinsics_translation_sigma);
-  const Eigen::VectorXd sigmas = calibrationSigmas(smoother);
-  radar.extrinsics->covariance = sigmas.tail(sigmas.size() - 1).cwiseAbs2().asDiagonal();
+  radar.extrinsics->covariance = sigmas.cwiseAbs2().asDiagonal();
   return radar;
 }
 
 }  // namespace
 
 RunLog::RunLog(const Config& config, RunOutput* output, const std::vector<double>& taken_off)
-    : output_(output),
-      offset_shared_(config.odometry.smoother.time_offset_shared),
-      estimate_extrinsics_(config.odometry.smoother.estimate_extrinsics) {
+    : output_(output), offset_shared_(config.odometry.smoother.time_offset_shared) {
   if (config.odometry.use_barometer) barometer_.emplace();
   if (config.odometry.platform == Platform::kGroundVehicle) {
     ground_vehicle_.emplace();
@@ -65,11 +61,8 @@ void RunLog::addResult(ScanResult& result) {
     each.estimate.final_offset_sigma_s = result.time_offset_sigma;
   }
   if (!radar.estimate.extrinsics) return;
-  const Eigen::Matrix<double, 6, 1> sigmas = result.T_IR_covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
   radar.estimate.extrinsics->T_IR = result.T_IR;
-  radar.estimate.extrinsics->translation_sigma = sigmas.head<3>();
-  radar.estimate.extrinsics->rotation_sigma = sigmas.tail<3>();
-  radar.estimate.extrinsics->covariance = tangentCovariance(result.T_IR_covariance, estimate_extrinsics_);
+  radar.estimate.extrinsics->covariance = result.T_IR_covariance;
 }
 
 void RunLog::fill(RunSummary* summary) const {

@@ -30,7 +30,6 @@ class RunLog {
 
   RunOutput* output_;
   bool offset_shared_;
-  EstimateExtrinsics estimate_extrinsics_;
   std::vector<Radar> radars_;
   Trajectory trajectory_;
   std::optional<BarometerCounts> barometer_;           // if there is one

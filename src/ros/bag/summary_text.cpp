@@ -71,9 +71,9 @@ void addEstimates(SummaryLines& lines, const RadarSummary& radar) {
   lines.add("configured_extrinsics_rotation_xyzw" + suffix,
             fixedTexts(extrinsics.configured.q_IR.coeffs(), 9));
   lines.add("final_extrinsics_translation" + suffix, fixedTexts(extrinsics.T_IR.l_I, 9));
-  lines.add("final_extrinsics_translation_sigma" + suffix, fixedTexts(extrinsics.translation_sigma, 9));
+  lines.add("final_extrinsics_translation_sigma" + suffix, fixedTexts(extrinsics.translationSigma(), 9));
   lines.add("final_extrinsics_rotation_xyzw" + suffix, fixedTexts(extrinsics.T_IR.q_IR.coeffs(), 9));
-  lines.add("final_extrinsics_rotation_sigma" + suffix, fixedTexts(extrinsics.rotation_sigma, 9));
+  lines.add("final_extrinsics_rotation_sigma" + suffix, fixedTexts(extrinsics.rotationSigma(), 9));
 }
 
 void addMeasured(SummaryLines& lines, const RadarSummary& radar) {

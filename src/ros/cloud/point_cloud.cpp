@@ -33,8 +33,7 @@ std::string fieldsOf(const PointCloud2& message) {
 }
 
 bool hasField(const PointCloud2& message, const std::string& name) {
-  return std::any_of(message.fields.begin(), message.fields.end(),
-                     [&](const PointField& field) { return field.name == name; });
+  return pcl::getFieldIndex(message, name) >= 0;
 }
 
 [[noreturn]] void throwMissing(const PointCloud2& message, const PointCloudFormat& format,

@@ -91,8 +91,7 @@ std::optional<ImuInBody> BodyFrame::imuInBody() {
   return T_BI_;
 }
 
-std::optional<BodyOdometry> BodyFrame::place(LiveSession& session, const NavigationState& state,
-                                             double rate_sigma) {
+std::optional<BodyOdometry> BodyFrame::place(LiveSession& session, const NavigationState& state) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!tryTf()) {
     if (config_.base_extrinsics_source == BaseExtrinsicsSource::kTf) return std::nullopt;
@@ -111,7 +110,7 @@ std::optional<BodyOdometry> BodyFrame::place(LiveSession& session, const Navigat
     T_OW = placeWorld(pose, *T_BI_, goes_on ? *last_ : BodyOdometry());
     session.setWorld(*T_OW);
   }
-  return bodyOdometry(state, rate_sigma, *T_BI_, *T_OW);
+  return bodyOdometry(state, session.rateSigma(), *T_BI_, *T_OW);
 }
 
 void BodyFrame::published(const BodyOdometry& body) {

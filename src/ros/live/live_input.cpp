@@ -29,10 +29,9 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
       monitor_.imuDropped("imu_before_extrinsics");
       return;
     }
-    double rate_sigma = 0.0;
-    for (; !early_imu_.empty(); early_imu_.pop_front()) feed(*now, early_imu_.front(), &rate_sigma);
-    if (const std::optional<NavigationState> state = feed(*now, received, &rate_sigma)) {
-      if (const std::optional<BodyOdometry> body = frames_.place(*now, *state, rate_sigma)) {
+    for (; !early_imu_.empty(); early_imu_.pop_front()) feed(*now, early_imu_.front());
+    if (const std::optional<NavigationState> state = feed(*now, received)) {
+      if (const std::optional<BodyOdometry> body = frames_.place(*now, *state)) {
         session_.speak(Speaker::kNavigation, now, [&] {
           if (publisher_.odometry(*body)) ++odom_published_;
           frames_.published(*body);
@@ -46,10 +45,6 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
     if (now->imuPilesUp()) {
       reset("the optimisation thread took none of the last " + std::to_string(LiveSession::kMaxWaitingImu) +
             " IMU samples");
-    }
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      rate_sigma_ = rate_sigma;
     }
     wakeSolver();
   } catch (const std::exception& error) {
@@ -70,9 +65,7 @@ void LiveOdometry::followImuStamps(const ImuMeasurement& imu) {
   early_imu_.clear();
 }
 
-std::optional<NavigationState> LiveOdometry::feed(LiveSession& session, const Received& received,
-                                                  double* rate_sigma) {
-  *rate_sigma = session.rateSigma(received.imu.time);
+std::optional<NavigationState> LiveOdometry::feed(LiveSession& session, const Received& received) {
   const std::optional<NavigationState> state = session.addImu(received.imu);
   account(session.stampWithImu(received.imu.time, received.record));
   return state;

@@ -1,6 +1,7 @@
 #include "rio_t/ros/live/live_odometry.h"
 
 #include <diagnostic_msgs/DiagnosticStatus.h>
+#include <diagnostic_updater/publisher.h>  // Debian 11: only one file may include it
 #include <ros/console.h>
 #include <ros/exceptions.h>
 #include <ros/master.h>
@@ -10,12 +11,12 @@
 #include <cctype>
 #include <filesystem>
 #include <iterator>
+#include <limits>
 #include <utility>
 
 #include "radar_texts.h"
 #include "rio_t/evaluation/trajectory.h"
 #include "rio_t/ros/parameters/ros_parameters.h"
-#include "topic_rate.h"
 
 namespace rio_t {
 namespace {
@@ -47,6 +48,19 @@ Config withResolvedTopics(const Config& configured, const ros::NodeHandle& node)
 ros::NodeHandle onQueue(ros::NodeHandle node, ros::CallbackQueue* queue) {
   node.setCallbackQueue(queue);
   return node;
+}
+
+/// Makes a task of /diagnostics: how often a topic comes. Silence is an error, any rate is right. What it
+/// returns is to be called for each message, by any thread.
+std::function<void()> topicRate(const std::string& topic, diagnostic_updater::Updater& updater) {
+  struct Task {
+    double least = 0.0, most = std::numeric_limits<double>::infinity();  // [Hz]
+    std::optional<diagnostic_updater::HeaderlessTopicDiagnostic> diagnostic;
+  };
+  const auto task = std::make_shared<Task>();
+  task->diagnostic.emplace(topic, updater,
+                           diagnostic_updater::FrequencyStatusParam(&task->least, &task->most, 0.0));
+  return [task] { task->diagnostic->tick(); };
 }
 
 /// The types of what is published, by topic; none without a master.
@@ -396,13 +410,11 @@ void LiveOdometry::solve() {
   std::vector<DopplerStep> reported;  // of the radars of that session
   bool has_reported_start = false;    // of that session
   while (true) {
-    double rate_sigma = 0.0;
     {
       std::unique_lock<std::mutex> lock(mutex_);
       work_to_do_.wait(lock, [this] { return has_work_ || stopping_; });
       if (stopping_) return;
       has_work_ = false;
-      rate_sigma = rate_sigma_;
     }
     const Session now = session_.get();
     if (!now) continue;
@@ -417,7 +429,7 @@ void LiveOdometry::solve() {
       for (const LiveSession::Result& result : now->process(&more)) {
         LivePublisher::Frames frames{
             frames_.imuFrame().value_or(config_.base_link_frame), frames_.imuInBody(), {}, {}};
-        if (result.result.updated) frames.body = frames_.place(*now, result.result.state, rate_sigma);
+        if (result.result.updated) frames.body = frames_.place(*now, result.result.state);
         frames.world = now->world();
         const bool current = session_.speak(Speaker::kOptimisation, now, [&] {
           // Not a fault of the estimator: `stamp - t_O` of an odd stamp may be no time that ROS can hold.

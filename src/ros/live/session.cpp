@@ -1,6 +1,5 @@
 #include "rio_t/ros/live/session.h"
 
-#include <cmath>
 #include <utility>
 
 namespace rio_t {
@@ -21,15 +20,11 @@ LiveSession::LiveSession(const Config& config, const OdometryOptions& options)
 
 std::optional<NavigationState> LiveSession::addImu(const ImuMeasurement& imu) {
   ++waiting_imu_;
-  return odometry_.addImu(imu);
-}
-
-double LiveSession::rateSigma(Time sample) {
-  if (!first_imu_) first_imu_ = sample;
+  if (!first_imu_) first_imu_ = imu.time;
+  const double seconds = imu.time - *first_imu_;
+  if (seconds > 0.0) imu_rate_ = static_cast<double>(imu_count_) / seconds;
   ++imu_count_;
-  const double seconds = sample - *first_imu_;
-  if (seconds <= 0.0) return gyro_density_;
-  return gyro_density_ * std::sqrt(static_cast<double>(imu_count_ - 1) / seconds);
+  return odometry_.addImu(imu);
 }
 
 std::vector<LiveSession::GivenUp> LiveSession::stampWithImu(Time stamp, Time record) {

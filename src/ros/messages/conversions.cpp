@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "rio_t/factors/state_block.h"
+#include "rio_t/radar/mounting.h"
 
 namespace rio_t {
 namespace {
@@ -80,15 +81,13 @@ geometry_msgs::TransformStamped toTransform(const BodyOdometry& body, const std:
   return transform;
 }
 
-Eigen::Quaterniond radarFrameAxes() { return cloudFromRfu(PointAxes::kForwardLeftUp); }
-
 geometry_msgs::TwistWithCovarianceStamped toTwist(const Eigen::Vector3d& v_R,
                                                   const Eigen::Matrix3d& covariance, Time stamp,
                                                   const std::string& radar_frame) {
   geometry_msgs::TwistWithCovarianceStamped message;
   message.header.stamp = toRosTime(stamp);
   message.header.frame_id = radar_frame;
-  const Eigen::Matrix3d axes = radarFrameAxes().toRotationMatrix();
+  const Eigen::Matrix3d axes = fluFromRfu().toRotationMatrix();
   tf2::toMsg(Eigen::Vector3d(axes * v_R), message.twist.twist.linear);
   Covariance6 both = kUnknownVariance * Covariance6::Identity();
   both.topLeftCorner<3, 3>() = axes * covariance * axes.transpose();
@@ -146,8 +145,7 @@ geometry_msgs::TransformStamped toTransform(const Extrinsics& T_IR, const ImuInB
   transform.header.frame_id = base_link_frame;
   transform.child_frame_id = radar_frame;
   tf2::toMsg(Eigen::Vector3d(T_BI.p_B + T_BI.q_BI * T_IR.l_I), transform.transform.translation);
-  transform.transform.rotation =
-      tf2::toMsg((T_BI.q_BI * T_IR.q_IR * radarFrameAxes().conjugate()).normalized());
+  transform.transform.rotation = tf2::toMsg((T_BI.q_BI * T_IR.q_IR * fluFromRfu().conjugate()).normalized());
   return transform;
 }
 

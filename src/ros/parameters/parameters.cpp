@@ -220,18 +220,7 @@ void addContradictions(const Config& config, std::vector<std::string>* faults) {
 
 /// A topic has one type.
 void addSharedTopics(const Config& config, std::vector<std::string>* faults) {
-  struct Input {
-    std::string key, topic, type;
-  };
-  std::vector<Input> inputs = {{"imu_topic", config.imu_topic, "Imu"}};
-  if (config.odometry.use_barometer)
-    inputs.push_back({"barometer_topic", config.barometer_topic, "FluidPressure"});
-  for (const Config& radar : configsOfRadars(config)) {
-    const std::string section = prefixOf(radar.radar_name);
-    inputs.push_back({section + "radar_topic", radar.radar_topic, "PointCloud2"});
-    if (radar.stamp_source == StampSource::kTrigger)
-      inputs.push_back({section + "trigger_topic", radar.trigger_topic, "Header"});
-  }
+  const std::vector<InputTopic> inputs = inputTopics(config);
   for (std::size_t k = 0; k < inputs.size(); ++k)
     for (std::size_t other = 0; other < k; ++other)
       if (inputs[k].topic == inputs[other].topic && inputs[k].type != inputs[other].type)
@@ -367,10 +356,17 @@ Config withTopics(Config config, const TopicResolver& resolve) {
   return config;
 }
 
-Config withAbsoluteTopics(const Config& config) {
-  return withTopics(config, [](const std::string& /*key*/, const std::string& topic) {
-    return topic.front() == '/' ? topic : "/" + topic;
-  });
+std::vector<InputTopic> inputTopics(const Config& config) {
+  std::vector<InputTopic> topics = {{"imu_topic", config.imu_topic, "sensor_msgs/Imu"}};
+  if (!config.barometer_topic.empty())
+    topics.push_back({"barometer_topic", config.barometer_topic, "sensor_msgs/FluidPressure"});
+  for (const Config& radar : configsOfRadars(config)) {
+    const std::string section = prefixOf(radar.radar_name);
+    topics.push_back({section + "radar_topic", radar.radar_topic, "sensor_msgs/PointCloud2"});
+    if (radar.stamp_source == StampSource::kTrigger)
+      topics.push_back({section + "trigger_topic", radar.trigger_topic, "std_msgs/Header"});
+  }
+  return topics;
 }
 
 std::string withoutSlash(const std::string& frame) {

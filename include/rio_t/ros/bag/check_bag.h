@@ -34,13 +34,26 @@ struct Finding {
   std::string text;     ///< one sentence, or phrases
 };
 
-/// The findings about one recording, and the configuration for it.
-struct BagCheck {
-  std::vector<std::string> bags;  ///< its parts
+struct Findings {
   std::vector<Finding> findings;
-  std::string to_do;     ///< one sentence if something is missing
-  std::string yaml;      ///< the configuration; empty if the odometry cannot run
-  double quality = 0.0;  ///< larger: the bag shows more of the mounting
+  std::string to_do;  ///< one sentence if something is missing
+
+  void tell(FindingLevel level, const std::string& subject, const std::string& text) {
+    findings.push_back({level, subject, text});
+  }
+  void ok(const std::string& subject, const std::string& text) { tell(FindingLevel::kOk, subject, text); }
+  void odd(const std::string& subject, const std::string& text) { tell(FindingLevel::kOdd, subject, text); }
+  void missing(const std::string& subject, const std::string& what, const std::string& what_to_do) {
+    tell(FindingLevel::kMissing, subject, what);
+    to_do = what_to_do;
+  }
+};
+
+/// The findings about one recording, and the configuration for it.
+struct BagCheck : Findings {
+  std::vector<std::string> bags;  ///< its parts
+  std::string yaml;               ///< the configuration; empty if the odometry cannot run
+  double quality = 0.0;           ///< larger: the bag shows more of the mounting
 
   bool ready() const { return !yaml.empty(); }
 };

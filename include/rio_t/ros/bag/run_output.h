@@ -32,6 +32,16 @@ struct BatchSummary {
   bool converged = false;
 };
 
+/// Messages of one topic that cannot be used for one reason.
+struct NotUsable {
+  std::string kind, topic;
+  std::string why;  ///< of the first of them
+  std::uint64_t count = 0;
+  bool is_scan = false;
+
+  std::string text() const { return why + " (messages: " + std::to_string(count) + ")"; }
+};
+
 /// The result of a run: what the diagnosis needs, and what the files and the people get besides.
 struct RunSummary : RunEvidence {
   explicit RunSummary(RunEvidence evidence = {}) : RunEvidence(std::move(evidence)) {}
@@ -39,6 +49,7 @@ struct RunSummary : RunEvidence {
   std::string mode = "online";
   std::optional<BatchSummary> batch;  ///< only with mode batch
   std::vector<std::string> warnings;  ///< for people; not in the file
+  std::vector<NotUsable> not_usable;  ///< likewise
   double path_length_m = 0.0;         ///< of the optimised poses
   double end_to_start_2d_m = 0.0;     ///< of the causal trajectory, horizontal
   double end_to_start_3d_m = 0.0;

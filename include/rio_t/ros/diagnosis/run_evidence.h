@@ -25,10 +25,13 @@ std::uint64_t countOf(const Counts& counts, const std::string& name);
 /// The mounting of a radar: as configured at the start, and as estimated at the end.
 struct ExtrinsicsSummary {
   Extrinsics configured, T_IR;
-  Eigen::Vector3d translation_sigma = Eigen::Vector3d::Zero();  ///< [m]; zero where not estimated
-  Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Zero();     ///< [rad] about the axes of I
-  /// In the tangent of ExtrinsicsManifold: 3x3 of the turn, or 6x6 of turn and lever arm. Not in the file.
-  Eigen::MatrixXd covariance;
+  Covariance6 covariance;  ///< as ScanResult::T_IR_covariance
+
+  Eigen::Vector3d translationSigma() const { return sigmas().head<3>(); }  ///< [m]; zero where not estimated
+  Eigen::Vector3d rotationSigma() const { return sigmas().tail<3>(); }     ///< [rad] about the axes of I
+
+ private:
+  Eigen::Matrix<double, 6, 1> sigmas() const { return covariance.diagonal().cwiseMax(0.0).cwiseSqrt(); }
 };
 
 /// The calibration of one radar at the end of a run.

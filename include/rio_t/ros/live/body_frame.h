@@ -35,7 +35,7 @@ class BodyFrame {
   std::optional<ImuInBody> imuInBody();
   /// The odometry of the body. None while its frames are not known (see waitingFor()). Here `auto` decides
   /// for the parameters if tf does not connect IMU and body.
-  std::optional<BodyOdometry> place(LiveSession& session, const NavigationState& state, double rate_sigma);
+  std::optional<BodyOdometry> place(LiveSession& session, const NavigationState& state);
   /// The odometry that was published last: the next session goes on from there.
   void published(const BodyOdometry& body);
 

@@ -102,7 +102,7 @@ class LiveOdometry {
   /// Resets if the clock of the IMU jumped. IMU thread.
   void followImuStamps(const ImuMeasurement& imu);
   /// Gives a sample to a session. Returns the state that is to be published, if there is one.
-  std::optional<NavigationState> feed(LiveSession& session, const Received& received, double* rate_sigma);
+  std::optional<NavigationState> feed(LiveSession& session, const Received& received);
   void account(const std::vector<LiveSession::GivenUp>& given_up);
   /// Whether this was not reported for `period` [s]. Each radar has its own turn, unlike with ROS's
   /// throttles.
@@ -137,7 +137,6 @@ class LiveOdometry {
   OdometryOptions options_;  // with the extrinsics that hold, tuned
   bool has_work_ = false;
   bool stopping_ = false;
-  double rate_sigma_ = 0.0;
   std::map<std::string, std::chrono::steady_clock::time_point> reported_at_;
 
   std::map<std::string, std::uint64_t> faults_reported_;  // input thread only, as the next

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -43,8 +44,8 @@ class LiveSession {
   /// waits for it would grow without end. Any thread.
   bool imuPilesUp() const { return waiting_imu_ >= kMaxWaitingImu; }
   static constexpr std::size_t kMaxWaitingImu = 20000;  ///< 49 s at 409 Hz
-  /// White noise of one gyro sample [rad/s], from its density and the rate seen so far. IMU thread.
-  double rateSigma(Time sample);
+  /// White noise of one gyro sample [rad/s], from its density and the rate seen so far. Any thread.
+  double rateSigma() const { return gyro_density_ * std::sqrt(imu_rate_); }
 
   // Stamping; any thread, `record` is the time of receipt. They return the scans that get no stamp.
   std::vector<GivenUp> stampWithImu(Time stamp, Time record);
@@ -104,7 +105,8 @@ class LiveSession {
   RadarInertialOdometry odometry_;
   std::atomic<std::size_t> waiting_imu_{0};  // samples since the optimisation thread last took them
 
-  std::optional<Time> first_imu_;  // IMU thread only, as the next
+  std::atomic<double> imu_rate_{1.0};  // [Hz]
+  std::optional<Time> first_imu_;      // IMU thread only, as the next
   std::uint64_t imu_count_ = 0;
 
   std::mutex stamper_mutex_;

@@ -53,12 +53,8 @@ geometry_msgs::TransformStamped toTransform(const BodyOdometry& body, const std:
 /// can still invert it beside variances of 1e-6.
 constexpr double kUnknownVariance = 1e6;
 
-/// Turns vectors of the radar's axes (x right, y forward, z up) into those of its frame in tf, `radar_frame`
-/// (REP-103: x forward, y left, z up).
-Eigen::Quaterniond radarFrameAxes();
-
-/// A velocity `v_R` in the radar's axes with its covariance, in `radar_frame`. The radar says nothing of the
-/// angular velocity: it is zero with kUnknownVariance.
+/// A velocity `v_R` in the radar's axes with its covariance, in `radar_frame` (x forward, y left, z up). The
+/// radar says nothing of the angular velocity: it is zero with kUnknownVariance.
 geometry_msgs::TwistWithCovarianceStamped toTwist(const Eigen::Vector3d& v_R,
                                                   const Eigen::Matrix3d& covariance, Time stamp,
                                                   const std::string& radar_frame);
@@ -73,7 +69,7 @@ ImuInBody toImuInBody(const geometry_msgs::Transform& T_base_imu);
 /// T_IR as a pose in `imu_frame`. `covariance` as ScanResult::T_IR_covariance, which has the order of ROS.
 geometry_msgs::PoseWithCovarianceStamped toPose(const Extrinsics& T_IR, const Covariance6& covariance,
                                                 Time stamp, const std::string& imu_frame);
-/// base_link -> radar_frame, with the axes of radarFrameAxes().
+/// base_link -> radar_frame (x forward, y left, z up).
 geometry_msgs::TransformStamped toTransform(const Extrinsics& T_IR, const ImuInBody& T_BI,
                                             const std::string& base_link_frame,
                                             const std::string& radar_frame);

@@ -131,9 +131,12 @@ std::vector<Config> configsOfRadars(const Config& config);
 using TopicResolver = std::function<std::string(const std::string& key, const std::string& topic)>;
 /// The configuration with each topic as `resolve` gives it. An empty one stays empty.
 Config withTopics(Config config, const TopicResolver& resolve);
-/// The configuration with the topics as a node without a namespace has them, and as a bag holds them: a
-/// relative topic begins with `/`.
-Config withAbsoluteTopics(const Config& config);
+
+/// A topic that the estimator reads: its key, and the type that it must have.
+struct InputTopic {
+  std::string key, topic, type;
+};
+std::vector<InputTopic> inputTopics(const Config& config);
 
 /// The name of a frame for tf2, which refuses the leading slash that tf1 had.
 std::string withoutSlash(const std::string& frame);
