@@ -126,9 +126,9 @@ std::optional<TakenStep> lowerCost(const std::vector<Eigen::VectorXd>& step, dou
   return std::nullopt;
 }
 
-/// After a whole step whose cost differs by `unforeseen` from what the linear system promised. A
-/// difference that grows with the cube of the step leaves three times as much slope along it. A step of more
-/// than a sigma tells nothing: it may leave slope across it, too.
+/// Squared length of the next step, after a whole step whose cost differs by `unforeseen` from what the
+/// linear system promised. The difference grows with the cube of the step, so the slope that is left along it
+/// is three times as large. Infinite after a step of more than a sigma: slope across it may be left, too.
 double squaredLengthLeft(double unforeseen, double squared_length) {
   if (squared_length > kLongestLastStep) return std::numeric_limits<double>::infinity();
   return 9.0 * unforeseen * unforeseen / squared_length;

@@ -8,8 +8,7 @@ namespace {
 
 /// [m/s^2] 200 g: no IMU for navigation reads more.
 constexpr double kImpossibleAcceleration = 2000.0;
-/// [ranges] Nor does an IMU whose range was configured read twice that range. The configured range may be
-/// rounded.
+/// [ranges] No IMU reads more than twice its range. The configured range may be rounded.
 constexpr double kImpossibleShareOfRange = 2.0;
 
 void raise(double& variance, double density) { variance = std::max(variance, density * density); }

@@ -135,7 +135,8 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
 void RadarChannel::informOffset(Seen& seen, RadarAnswer& answer) {
   answer.offset_gain = offsetGain(seen);
   if (answer.offset_gain == 0.0) return;
-  // An offset that is wrong by c shows as (J + noise) c; nothing else tells of the noise's part.
+  // An offset that is wrong by c changes the velocity by (J + noise) c. J is in the factor; this is the
+  // noise.
   answer.offset_half_width = seen.dv_dt_O.half_width;
   answer.rate_variance = seen.dv_dt_O.variance * seen.prediction->t_O_variance;
   seen.velocity.covariance.diagonal().array() += answer.rate_variance;
@@ -287,8 +288,8 @@ Innovation RadarChannel::innovation(Time stamp, const VelocityPrior& prior, cons
   result.S = prior.covariance + measured.covariance;
   if (seen == nullptr || !seen->prediction) return result;
   result.S_at_offset = seen->prediction->scan.predicted + measured.covariance;
-  // The scale of the model errors takes a step for noise: with its part, the scans after a step would count
-  // for little.
+  // A step of the offset looks like model errors, and raises their scale. Without their part, the scans after
+  // a step keep their weight.
   result.S_at_offset.diagonal() -= measured.added_variance;
   result.J_O = changeWithOffset(*seen);
   return result;

@@ -47,7 +47,7 @@ bool isNear(const BatchSolution& solution, const std::vector<double>& placed_by)
   return true;
 }
 
-/// The offsets swing from placement to placement once they may take only this share of their move.
+/// If the offsets may take only this share of their move, they only swing from placement to placement.
 constexpr double kLeastShare = 0.01;
 
 /// Joint covariance of some blocks that the elimination connects.

@@ -6,8 +6,8 @@
 
 namespace rio_t {
 
-/// Some samples of the IMU in one: the covariance of what is integrated from them follows in steps of
-/// kCovarianceStep, in which a platform hardly turns.
+/// Collects the samples of kCovarianceStep. The covariance takes one step for all of them: a platform hardly
+/// turns in that time.
 struct SamplesInOne {
   static constexpr double kCovarianceStep = 0.01;  // [s]
 

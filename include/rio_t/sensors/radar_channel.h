@@ -35,8 +35,8 @@ struct ScanContext {
 /// The part of a channel's answer to a scan that ScanResult repeats.
 struct ScanAnswer {
   EgoVelocity ego_velocity;
-  /// Health uses this innovation. It is that of the velocity that the points show without the prediction.
-  /// None if the points do not decide.
+  /// Of the velocity that the points show without the prediction; for health. None if no majority of them
+  /// agrees.
   std::optional<Innovation> innovation;
   std::optional<DopplerMeasurement> doppler;    ///< its points, if they and not the velocity count
   std::string rejected_because;                 ///< snake case, empty if used; keys of `scans_rejected`

@@ -63,7 +63,7 @@ Config withExtrinsicsOfBag(Config config, const Bags& bags) {
   }
   if (!is_wanted) return config;
   const std::string imu_frame = imuFrame(config, firstFrame<sensor_msgs::Imu>(bags, config.imu_topic));
-  // The mountings stand still, wherever they are published: all of tf is taken as static, the first of each.
+  // A mounting does not move, wherever it is published: the first transform of each frame holds for good.
   tf2::BufferCore tf;
   std::string missing;
   std::vector<Extrinsics> T_IR = lookUp(tf, radars, imu_frame, cloud_frames, &missing);

@@ -20,7 +20,6 @@ struct ImuTopic {
   std::vector<MessageTimes> times;
 };
 
-/// One cloud with points tells why a topic cannot serve. More of a lidar would fill the memory.
 struct CloudTopic {
   std::string topic;
   std::vector<sensor_msgs::PointCloud2::ConstPtr> messages;

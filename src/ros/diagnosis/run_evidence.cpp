@@ -42,8 +42,8 @@ void EvidenceCollector::add(const ScanResult& result) {
     ++radar.velocity_status[toString(result.ego_velocity.status)];
     return;
   }
-  // A radar that filters what stands still has no scan to use at rest, and is not silent.
-  // It came now, however late.
+  // A radar that filters what stands still has no scan to use at rest, and is not silent. A late scan came
+  // now.
   if (result.used || result.at_rest)
     last_used_[result.scan.radar] = std::max(result.scan.stamp, newest_state_.value_or(result.scan.stamp));
   if (result.ground_vehicle)

@@ -403,9 +403,8 @@ Config withParameters(const Config& config, const ParameterEntries& entries) {
     for (const ParameterEntry& entry : entries) setParameter(entry, "", list, faults_of_each);
   };
   set(changed, &faults);
-  // The same faults again.
-  std::vector<std::string> again;
-  for (Config& radar : changed.radars) set(radar, &again);
+  std::vector<std::string> same_faults;
+  for (Config& radar : changed.radars) set(radar, &same_faults);
   if (faults.empty()) faults = contradictions(changed);
   if (!faults.empty()) throw ConfigError(std::move(faults));
   return changed;
