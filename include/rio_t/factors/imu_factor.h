@@ -27,7 +27,7 @@ class ImuFactor final
   Eigen::Matrix<double, 9, 9> whitening_;  ///< W with W'W = covariance^-1
 };
 
-/// Mean of state j given state i. `delta` is integrated at the biases of state i.
+/// Mean of state j given state i. The caller integrates `delta` at the biases of state i.
 StateBlock predict(const StateBlock& state_i, const ImuDelta& delta, const Eigen::Vector3d& g_W);
 
 /// `x` at `from`, carried by the IMU to `to`, forwards or backwards, at its own biases.

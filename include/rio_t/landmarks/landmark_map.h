@@ -57,17 +57,18 @@ class LandmarkMap {
   };
   Association associate(const Prediction& prediction, const Extrinsics& T_IR,
                         const std::vector<Detection>& detections) const;
-  /// Where a landmark of the prediction is seen.
+  /// The position at which the radar should see a landmark.
   struct Expected {
     Eigen::Vector3d p_R;
     Eigen::Matrix3d covariance;  ///< of p_R [m^2]
   };
+  /// Of the landmark in this column of the prediction.
   Expected expected(const Prediction& prediction, const Extrinsics& T_IR, std::size_t column) const;
   struct Pair {
     Match match;
     double score;  ///< twice the negative logarithm of its likelihood
   };
-  /// The pairs within the gate whose detection and landmark have no other likely pair.
+  /// Returns the pairs within the gate whose detection and landmark are in no other likely pair.
   static std::vector<Match> clearMatches(const std::vector<Pair>& pairs);
   /// The detections that belong to no landmark become candidates. `delta` as in a LandmarkFactor.
   void addCandidates(const Prediction& prediction, const std::vector<Detection>& detections,

@@ -94,7 +94,8 @@ class MotionInitializer {
   /// The state at `time`, or none; then waitingFor() says why.
   std::optional<Initialization> initialize(const Velocities& window, Time time, const ImuBuffer& imu,
                                            const std::function<PoseAnchor(Time)>& anchorAt);
-  /// The state of the line. Heading, position, biases and calibration have sigmas, tilt and velocity none.
+  /// Returns the state of the line. The prior holds heading, position, biases and calibration, and neither
+  /// tilt nor velocity.
   NodePrior priorOf(const Line& line, const PoseAnchor& anchor) const;
   /// Improves `prior.x0` and `prior.t_O0`, around which it starts, and adds the information of the
   /// velocities, with model errors of `scale`. Improves `scale` by the scatter of the velocities around the

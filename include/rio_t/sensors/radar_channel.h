@@ -35,8 +35,8 @@ struct ScanContext {
 /// The part of a channel's answer to a scan that ScanResult repeats.
 struct ScanAnswer {
   EgoVelocity ego_velocity;
-  /// Of the velocity that the points show without the prediction; for health. None if no majority of them
-  /// agrees.
+  /// Health judges this innovation. Its velocity is measured without the prediction. None if no majority of
+  /// the points agrees.
   std::optional<Innovation> innovation;
   std::optional<DopplerMeasurement> doppler;    ///< its points, if they and not the velocity count
   std::string rejected_because;                 ///< snake case, empty if used; keys of `scans_rejected`
@@ -152,13 +152,13 @@ class RadarChannel {
   Eigen::Vector3d changeWithOffset(const Seen& seen) const;
   /// Sets what the scan tells of the offset, and adds the noise of the derivative to the velocity.
   void informOffset(Seen& seen, RadarAnswer& answer);
-  /// The scan's own points as a term of the window; none if no point is of the static world.
+  /// Makes the term of the scan's own points. None if no point is of the static world.
   std::optional<DopplerMeasurement> dopplerOf(const RadarScan& scan, const Seen& seen,
                                               const RadarScanTime& taken, double rate_variance) const;
-  /// See Innovations; of a scan that tells the offset.
+  /// Computes Innovations::own of a scan that tells the offset. None if it cannot be judged.
   std::optional<Innovation> ownInnovation(const RadarScan& scan, const Seen& seen,
                                           double rate_variance) const;
-  /// What a scan that was used teaches: the lag of the offset, the noise of the points.
+  /// Learns the lag of the offset and the noise of the points from a scan that was used.
   void learn(const RadarScan& scan, const Seen& seen, const Innovations& d, RadarAnswer& answer);
   /// What of the scan goes into the window: its own points, which are the inliers, and the velocity at which
   /// their likelihood is set up.

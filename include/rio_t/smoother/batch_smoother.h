@@ -113,7 +113,7 @@ class BatchSmoother {
              Graph& graph) const;
   /// Adds a node after the last, and the IMU between them.
   void addNode(Time time, const StateBlock& x, Graph& graph) const;
-  /// The offset of a scan at the last node: a new one if the last is of an earlier node.
+  /// Returns the offset of a scan at the last node. Adds one if the newest belongs to an earlier node.
   Block* offsetOf(const BatchProblem& problem, const BatchScan& scan, double t_O, Graph& graph) const;
   /// Adds what a scan shows: its points or its velocity, and rest.
   void addTerms(const BatchScan& scan, const Graph::Scan& at, double t_O, Graph& graph) const;

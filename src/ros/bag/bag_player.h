@@ -58,6 +58,7 @@ class BagPlayer {
   void feed(std::vector<RadarScan> scans, std::size_t radar);
   /// One bad message among good ones is counted; `why` is reported at the end, the first one of each kind.
   NotUsable& notUsable(const std::string& kind, const std::string& topic, const std::string& why);
+  /// The same for a scan, which then counts as rejected.
   void dropScan(const std::string& kind, const std::string& why, std::size_t radar);
   void account(ScanResult& result);
 

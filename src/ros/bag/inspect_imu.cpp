@@ -151,8 +151,7 @@ void describeRest(ImuInspection* imu) {
   } else {
     imu->odd("rest",
              "the IMU shows no rest in the first 10 s, so the odometry starts in motion; 3 s at rest give a "
-             "better "
-             "start. If the platform did rest, it vibrates: mount the IMU softer");
+             "better start. If the platform did rest, it vibrates: mount the IMU softer");
     imu->keys.set("init_mode", "motion", "There is no rest at the start.");
   }
 }
@@ -171,8 +170,7 @@ void describeUp(ImuInspection* imu) {
       FindingLevel::kOdd, "IMU axes",
       "gravity is on " + axisName(*up) +
           ", so z of the IMU is not up: the odometry is right, but rviz shows base_link tilted, since it is "
-          "the "
-          "IMU by default. Give base_link by tf, or set base_extrinsics_rotation_xyzw: [" +
+          "the IMU by default. Give base_link by tf, or set base_extrinsics_rotation_xyzw: [" +
           fixedTexts(q_BI.coeffs(), 4) + "] to make its z up (docs/frames.md)");
 }
 

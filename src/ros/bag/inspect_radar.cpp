@@ -184,8 +184,7 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
     radar->tell(
         FindingLevel::kOdd, "mounting",
         "not found: less than 3 s with motion; the radar is taken to look forward. Record with motion, or "
-        "set "
-        "mounting_yaw_pitch_roll_deg by hand");
+        "set mounting_yaw_pitch_roll_deg by hand");
     radar->keys.set("mounting_yaw_pitch_roll_deg", listOf({0.0, 0.0, 0.0}),
                     "Assumed: the bag does not show it. Yaw left, pitch up, roll right side down.");
     return;

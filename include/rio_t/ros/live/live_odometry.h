@@ -113,8 +113,8 @@ class LiveOdometry {
   void tellStatus(const LiveMonitor::Status& status);
   void tellHealth(const ScanResult& result);
   void tellDopplerStep(const Radar& radar, const DopplerStep& step,
-                       DopplerStep* configured) const;  ///< where it is not as configured
-  void solve();                                         ///< body of the optimisation thread
+                       DopplerStep* reported) const;  ///< where it is not as reported
+  void solve();                                       ///< body of the optimisation thread
 
   const std::string name_;
   const Config configured_;  // topics as the user wrote them
