@@ -39,7 +39,7 @@ class Batch : public ::testing::Test {
     BatchProblem problem;
     problem.start = motion.time(0.5);
     problem.prior = priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0, skewMounting());
-    problem.mounting = {skewMounting()};
+    problem.radars = {{skewMounting(), 0.0, options.time_offset_sigma}};
     problem.guess = {{problem.start, motion.state(0.5)}};
     return problem;
   }
@@ -252,8 +252,7 @@ TEST_F(Batch, AStepHasTheSigmaOfItsRadar) {
   SmootherOptions options;
   options.time_offset_sigma = 1e-4;  // of the radars that have no section of their own
   BatchProblem whole = problem(options);
-  whole.time_offsets = {0.0};
-  whole.time_offset_sigmas = {0.075};
+  whole.radars.front().time_offset_sigma = 0.075;
   addScansWithStep(0.0, 0.05, whole);
   EXPECT_NEAR(make(options).solve(whole).scans.back().t_O, 0.05, 3e-4);
 }
@@ -263,7 +262,7 @@ TEST_F(Batch, AStepIsFollowedThoughAnotherRadarHasTheNode) {
   SmootherOptions options;
   options.time_offset_shared = true;
   BatchProblem whole = problem(options);
-  whole.mounting.push_back(skewMounting());
+  whole.radars.push_back(whole.radars.front());
   for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
     const bool after = stamp > 2.25;
     for (const std::size_t radar : {0, 1}) {
@@ -284,8 +283,7 @@ TEST_F(Batch, ASharedOffsetBeginsWhereItsPriorIs) {
   options.time_offset_shared = true;
   options.time_offset_sigma = 1e-4;
   BatchProblem whole = problem(options);
-  whole.mounting.push_back(skewMounting());
-  whole.time_offsets = {0.0, 0.0};
+  whole.radars.push_back(whole.radars.front());
   whole.radar = 1;
   whole.prior.t_O0 = 0.04;
   for (double stamp = 0.7; stamp < 1.5; stamp += 0.1) {

@@ -61,8 +61,8 @@ TEST(LiveParameters, ChangeAllRadars) {
   const ParameterEntries changes = wanted.changesFrom(config);
   ASSERT_EQ(changes.size(), 1U);
   config = withParameters(config, changes);
-  EXPECT_EQ(config.odometry.smoother.innovation_gate, 5.5);
-  for (const Config& radar : config.radars) EXPECT_EQ(radar.odometry.smoother.innovation_gate, 5.5);
+  EXPECT_EQ(config.odometry.innovation_gate.sigmas, 5.5);
+  for (const Config& radar : config.radars) EXPECT_EQ(radar.odometry.innovation_gate.sigmas, 5.5);
 }
 
 TEST(LiveParameters, RefuseWhatTheRegistryRefuses) {

@@ -421,7 +421,8 @@ std::size_t keysChanging(const std::string& group) {
 
 TEST(Parameters, EveryMemberOfTheOptionsHasAKey) {
   EXPECT_EQ(keysChanging("Smoother") + keysChanging("Time offset") + keysChanging("Estimate of T_IR"),
-            memberCount<SmootherOptions>() + memberCount<OffsetStepDetectorOptions>() + 1)
+            memberCount<SmootherOptions>() + memberCount<InnovationGateOptions>() +
+                memberCount<OffsetStepDetectorOptions>() + 1)
       << "with max_queued_scans; a member of SmootherOptions lacks a key in "
          "src/ros/parameters/";
   EXPECT_EQ(keysChanging("Radar: which points"), memberCount<EgoVelocityOptions>());
@@ -437,7 +438,7 @@ TEST(Parameters, EveryMemberOfTheOptionsHasAKey) {
       << "with extrinsics_source, extrinsics_axes and the mounting in words";
   EXPECT_EQ(memberCount<RadarOptions>(), 4u)
       << "a new member needs its place in radarOptions in src/ros/parameters/parameters.cpp";
-  EXPECT_EQ(memberCount<OdometryOptions>(), 22u) << "a new member needs keys in src/ros/parameters/";
+  EXPECT_EQ(memberCount<OdometryOptions>(), 23u) << "a new member needs keys in src/ros/parameters/";
   EXPECT_EQ(memberCount<PointCloudFormat>() - 1, memberCount<PointCloudOverrides>()) << "all but its name";
 }
 

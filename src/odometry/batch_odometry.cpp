@@ -94,12 +94,10 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
   problem.radar = start.radar;
   for (std::size_t k = 0; k < options_.radarCount(); ++k) {
     const OdometryOptions own = optionsOfRadar(options_, k);
-    problem.mounting.push_back(own.T_IR);
-    problem.time_offsets.push_back(own.smoother.time_offset_initial);
-    problem.time_offset_sigmas.push_back(own.smoother.time_offset_sigma);
+    problem.radars.push_back({own.T_IR, own.smoother.time_offset_initial, own.smoother.time_offset_sigma});
   }
   problem.guess.push_back({start.time, start.prior.x0});
-  std::vector<bool> stepped(problem.mounting.size(), false);
+  std::vector<bool> stepped(problem.radars.size(), false);
   // A step found at a scan that is not in the graph counts for the next.
   for (std::size_t i = 0; i < scans_.size(); ++i) {
     const ScanResult& result = scans_[i];

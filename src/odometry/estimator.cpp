@@ -29,7 +29,8 @@ std::vector<RadarChannel> radarChannels(const OdometryOptions& options, const Ei
   std::vector<RadarChannel> channels;
   for (std::size_t k = 0; k < options.radarCount(); ++k) {
     const OdometryOptions own = optionsOfRadar(options, k);
-    const RadarChannelOptions channel{own.T_IR, own.ego_velocity, own.offset_step_detector, own.smoother};
+    const RadarChannelOptions channel{own.T_IR, own.ego_velocity, own.innovation_gate,
+                                      own.offset_step_detector, own.smoother};
     channels.emplace_back(channel, g_W, imu, shared);
   }
   return channels;
@@ -59,7 +60,7 @@ Estimator::Estimator(const OdometryOptions& options, Navigation& navigation, Fau
       smoother_(options.smoother, options.imu_noise, g_W_, imu_),
       radars_(radarChannels(options, g_W_, imu_)),
       mounting_check_(options.radarCount()),
-      health_(options.health, options.smoother.innovation_gate, options.radarCount()),
+      health_(options.health, options.innovation_gate.sigmas, options.radarCount()),
       waiting_for_(initializer_.waitingFor()) {
   if (options.platform == Platform::kGroundVehicle)
     ground_vehicle_.emplace(options.ground_vehicle, options.smoother.huber_threshold, imu_);
@@ -249,9 +250,9 @@ void Estimator::addImu(const std::vector<ImuMeasurement>& samples) {
 
 void Estimator::tune(const Tuning& tuning) {
   apply(tuning, options_);
-  for (RadarChannel& radar : radars_) radar.tune(options_.smoother);
+  for (RadarChannel& radar : radars_) radar.setGate(options_.innovation_gate);
   initializer_.setImuNoise(options_.imu_noise);
-  health_.setGate(options_.smoother.innovation_gate);
+  health_.setGate(options_.innovation_gate.sigmas);
 }
 
 void Estimator::addPressure(const Pressure& pressure) {
@@ -296,7 +297,7 @@ void Estimator::startAgain(std::uint64_t clock_restarts) {
   initializer_ = Initializer(at_once);
   smoother_ = FixedLagSmoother(options_.smoother, options_.imu_noise, g_W_, imu_);
   model_error_scale_ = ModelErrorScale();
-  health_ = RadarsHealth(options_.health, options_.smoother.innovation_gate, radars_.size());
+  health_ = RadarsHealth(options_.health, options_.innovation_gate.sigmas, radars_.size());
   if (landmarks_) landmarks_->forget();
   left_in_silence_.clear();
   radar_heard_.reset();

@@ -14,17 +14,11 @@ OdometryOptions optionsOfRadar(const OdometryOptions& options, std::size_t radar
   return result;
 }
 
-Tuning tuningOf(const OdometryOptions& options) {
-  const SmootherOptions& smoother = options.smoother;
-  return {options.imu_noise, smoother.innovation_gate, smoother.innovation_model_error,
-          smoother.innovation_gate_timeout};
-}
+Tuning tuningOf(const OdometryOptions& options) { return {options.imu_noise, options.innovation_gate}; }
 
 void apply(const Tuning& tuning, OdometryOptions& options) {
   options.imu_noise = tuning.imu_noise;
-  options.smoother.innovation_gate = tuning.innovation_gate;
-  options.smoother.innovation_model_error = tuning.innovation_model_error;
-  options.smoother.innovation_gate_timeout = tuning.innovation_gate_timeout;
+  options.innovation_gate = tuning.innovation_gate;
 }
 
 }  // namespace rio_t

@@ -9,13 +9,12 @@ constexpr double kUnanimousTime = 0.5;  // [s] of scans that are unanimous: one 
 
 }  // namespace
 
-bool InnovationGate::rejects(const SmootherOptions& options, const Innovation& innovation, bool is_unanimous,
-                             bool tilt_is_known, Time last_used) {
-  const double gate = options.innovation_gate;
+bool InnovationGate::rejects(const InnovationGateOptions& options, const Innovation& innovation,
+                             bool is_unanimous, bool tilt_is_known, Time last_used) {
+  const double gate = options.sigmas;
   const Time stamp = innovation.stamp;
-  if (gate == 0.0 || innovation.widened(options.innovation_model_error).squaredSigmas() <= gate * gate)
-    return false;
-  if (!tilt_is_known || std::abs(stamp - last_used) > options.innovation_gate_timeout) return false;
+  if (gate == 0.0 || innovation.widened(options.model_error).squaredSigmas() <= gate * gate) return false;
+  if (!tilt_is_known || std::abs(stamp - last_used) > options.timeout) return false;
   if (!is_unanimous) {
     unanimous_since_.reset();
   } else if (!unanimous_since_) {

@@ -65,12 +65,6 @@ void RadarChannel::join(FixedLagSmoother& smoother) {
   forget();
 }
 
-void RadarChannel::tune(const SmootherOptions& options) {
-  options_.smoother.innovation_gate = options.innovation_gate;
-  options_.smoother.innovation_gate_timeout = options.innovation_gate_timeout;
-  options_.smoother.innovation_model_error = options.innovation_model_error;
-}
-
 void RadarChannel::forget() {
   forgetOffset();
   offset_widths_.clear();
@@ -119,8 +113,8 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
     in_window_.stepOffset(smoother, scan.stamp);
     followOffsetSteps();
   }
-  if (d.all && gate_.rejects(options_.smoother, *d.all, isUnanimous(seen.velocity), seen.tilt_is_known,
-                             context.last_used))
+  if (d.all &&
+      gate_.rejects(options_.gate, *d.all, isUnanimous(seen.velocity), seen.tilt_is_known, context.last_used))
     return reject("innovation");
   const bool added = answer.doppler
                          ? in_window_.add(smoother, *answer.doppler)
@@ -205,7 +199,7 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
   if (context.has_diverged) expected.reset();
   // Few and coarse points agree with many velocities: they must not all side with a prediction that is a
   // little wrong.
-  const double sigma = options_.smoother.innovation_model_error;
+  const double sigma = options_.gate.model_error;
   if (expected && seen.has_borrowed) expected->covariance.diagonal().array() += sigma * sigma;
   answer.ego_velocity = measure(seen.pooled, expected, scale);
   answer.was_predicted = seen.prior.has_value();
@@ -315,7 +309,7 @@ void RadarChannel::judge(const RadarScan& scan, const VelocityPrior& prior, bool
   if (is_outvoted && !isValid(measured.status)) return;
   if (!is_outvoted) answer.alone = scaled(alone, 1.0 / scale);
   answer.innovation = innovation(scan.stamp, prior, is_outvoted ? measured : alone, nullptr)
-                          .widened(options_.smoother.innovation_model_error);
+                          .widened(options_.gate.model_error);
 }
 
 double RadarChannel::offsetSigma(double variance) const {

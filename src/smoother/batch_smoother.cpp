@@ -109,15 +109,14 @@ void BatchSmoother::start(const BatchProblem& problem, const StateBlock& x,
   for (std::size_t k = 0; k < mounting.size(); ++k) {
     const bool is_first = k == 0 || !options_.time_offset_shared;
     const bool has_prior = k == problem.radar || options_.time_offset_shared;
-    const double t_O = problem.time_offsets.empty() ? 0.0 : problem.time_offsets[k];
-    offsets.push_back(is_first ? &addOffset(window, problem.start, has_prior ? problem.prior.t_O0 : t_O)
-                               : offsets.front());
+    const double t_O = has_prior ? problem.prior.t_O0 : problem.radars[k].time_offset_initial;
+    offsets.push_back(is_first ? &addOffset(window, problem.start, t_O) : offsets.front());
   }
   std::vector<Block*> known = {&motion, &biases, offsets.at(problem.radar)};
   for (std::size_t k = 0; k < mounting.size(); ++k) {
     const bool has_prior = k == problem.radar;
     // The prior has its own mounting as its origin, so the block starts there.
-    const Extrinsics& configured = has_prior ? problem.prior.T_IR0 : problem.mounting[k];
+    const Extrinsics& configured = has_prior ? problem.prior.T_IR0 : problem.radars[k].T_IR;
     Block& extrinsics = *window.addCalibration(extrinsics_manifold_, stored(configured));
     graph.extrinsics.push_back(&extrinsics);
     if (!is_estimated) window.setConstant(extrinsics, true);
@@ -128,8 +127,8 @@ void BatchSmoother::start(const BatchProblem& problem, const StateBlock& x,
     const auto add = [&](Block& block, const Eigen::VectorXd& sigma) {
       addPrior(window, {&block}, {sigma.cwiseInverse().asDiagonal(), Eigen::VectorXd::Zero(sigma.size())});
     };
-    const double sigma = problem.time_offset_sigmas.empty() ? sigmas[0] : problem.time_offset_sigmas[k];
-    if (!options_.time_offset_shared) add(*offsets[k], Eigen::VectorXd::Constant(1, sigma));
+    if (!options_.time_offset_shared)
+      add(*offsets[k], Eigen::VectorXd::Constant(1, problem.radars[k].time_offset_sigma));
     if (is_estimated) add(extrinsics, sigmas.tail(sigmas.size() - 1));
   }
   addPrior(window, known, problem.prior.root);
@@ -199,10 +198,8 @@ Block* BatchSmoother::offsetOf(const BatchProblem& problem, const BatchScan& sca
   if (dt <= 0.0) return offset;
   Block& previous = *offset;
   offset = &addOffset(graph.window, time, t_O);
-  const double anew = options_.time_offset_shared || problem.time_offset_sigmas.empty()
-                          ? options_.time_offset_sigma
-                          : problem.time_offset_sigmas[scan.radar];
-  const double sigma = stepped ? anew : options_.time_offset_noise * std::sqrt(dt);
+  const double sigma =
+      stepped ? problem.radars[scan.radar].time_offset_sigma : options_.time_offset_noise * std::sqrt(dt);
   graph.window.add(std::make_unique<RandomWalkFactor>(Eigen::VectorXd::Constant(1, sigma)),
                    {&previous, offset});
   stepped = false;
@@ -250,7 +247,8 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
   for (const BatchScan& scan : problem.scans) t_O.push_back(scan.t_O);
 
   BatchSolution solution;
-  Graph graph = place(problem, t_O, problem.guess, problem.mounting);
+  for (const BatchRadar& radar : problem.radars) solution.extrinsics.push_back(radar.T_IR);
+  Graph graph = place(problem, t_O, problem.guess, solution.extrinsics);
   solution.placements = 1;
   double moved_before = std::numeric_limits<double>::infinity();
   double share = 1.0;  // of its move that an offset takes

@@ -13,6 +13,7 @@
 #include "rio_t/radar/extrinsics.h"
 #include "rio_t/sensors/barometer_channel.h"
 #include "rio_t/sensors/ground_vehicle_channel.h"
+#include "rio_t/sensors/innovation_gate.h"
 #include "rio_t/sensors/offset_step_detector.h"
 #include "rio_t/smoother/options.h"
 
@@ -45,6 +46,7 @@ struct OdometryOptions {
   EgoVelocityOptions ego_velocity;
   RestOptions rest;
   SmootherOptions smoother;
+  InnovationGateOptions innovation_gate;
   LandmarkOptions landmarks;
   OffsetStepDetectorOptions offset_step_detector;
   HealthOptions health;
@@ -66,9 +68,7 @@ struct OdometryOptions {
 /// The options that may change while the estimator runs, for all radars.
 struct Tuning {
   ImuNoise imu_noise;
-  double innovation_gate = 0.0;  ///< as in SmootherOptions, like the next two
-  double innovation_model_error = 0.0;
-  double innovation_gate_timeout = 0.0;
+  InnovationGateOptions innovation_gate;
 };
 Tuning tuningOf(const OdometryOptions& options);
 void apply(const Tuning& tuning, OdometryOptions& options);

@@ -19,6 +19,7 @@ namespace rio_t {
 struct RadarChannelOptions {
   Extrinsics T_IR;
   EgoVelocityOptions ego_velocity;
+  InnovationGateOptions gate;
   OffsetStepDetectorOptions offset_step_detector;
   SmootherOptions smoother;
 };
@@ -97,8 +98,7 @@ class RadarChannel {
   /// Decides about a scan and, if it is used, adds its term to the window.
   RadarAnswer use(const RadarScan& scan, const ScanContext& context, FixedLagSmoother& smoother);
 
-  /// Takes the gate of `options` (the keys innovation_*), and nothing else of them.
-  void tune(const SmootherOptions& options);
+  void setGate(const InnovationGateOptions& gate) { options_.gate = gate; }  ///< for the scans to come
 
   Time nodeTime(Time stamp) const { return in_window_.nodeTime(stamp); }
   double offset() const { return in_window_.offset(); }  ///< t_O [s]
@@ -178,7 +178,7 @@ class RadarChannel {
   void judge(const RadarScan& scan, const VelocityPrior& prior, bool had_prior, double scale,
              RadarAnswer& answer) const;
 
-  RadarChannelOptions options_;  // changed by tune() alone
+  RadarChannelOptions options_;  // changed by setGate() alone
   EgoVelocityEstimator estimator_;
   RadarInWindow in_window_;
   ScanPool pool_;

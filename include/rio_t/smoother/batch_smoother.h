@@ -32,14 +32,18 @@ struct BatchScan {
   bool offset_stepped = false;                ///< t_O may have stepped since the scan before
 };
 
+/// What is known of a radar before its scans.
+struct BatchRadar {
+  Extrinsics T_IR;                   ///< as configured, and where the solver starts
+  double time_offset_initial = 0.0;  ///< [s] prior on t_O
+  double time_offset_sigma = 0.075;  ///< [s] its sigma, and that of a step
+};
+
 struct BatchProblem {
-  Time start;                        ///< of the first node
-  NodePrior prior;                   ///< on it, and on the calibration of `radar`
-  std::size_t radar = 0;             ///< which one the prior knows
-  std::vector<Extrinsics> mounting;  ///< of each radar: as configured, and where the solver starts
-  /// Priors on t_O of the radars [s], and the sigma of a step. Not used for the start of `radar`. Empty:
-  /// zero, and time_offset_sigma of the options.
-  std::vector<double> time_offsets, time_offset_sigmas;
+  Time start;             ///< of the first node
+  NodePrior prior;        ///< on it, and on the calibration of `radar`
+  std::size_t radar = 0;  ///< which one the prior knows
+  std::vector<BatchRadar> radars;
   std::vector<BatchScan> scans;
   /// Initial states in order of time, at least one. The IMU carries them to the nodes.
   std::vector<NodeEstimate> guess;

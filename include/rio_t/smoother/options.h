@@ -18,13 +18,6 @@ struct SmootherOptions {
   RadarFactor radar_factor = RadarFactor::kDoppler;
   WindowSolver solver = WindowSolver::kChain;
   int max_iterations = 30;  ///< of the solver, each scan
-  /// [sigma] A scan farther than this from the prediction is rejected. The sigma includes that of the offset.
-  /// 0 = no gate.
-  double innovation_gate = 4.0;
-  /// [m/s] Added to the sigma of each axis of the innovation, for gate and health only. It stands for small
-  /// errors of the extrinsics and of the IMU's scale.
-  double innovation_model_error = 0.1;
-  double innovation_gate_timeout = 3.0;  ///< [s] without a used scan; then the gate lets the next one in
 
   bool estimate_time_offset = true;  ///< false: LC-RIO, offset fixed at time_offset_initial
   TimeOffsetModel time_offset_model = TimeOffsetModel::kImu;

@@ -33,16 +33,16 @@ void listWindow(ParameterList& list, Config& c) {
       "node drops the oldest and counts it as queue_full. Raise it if the IMU arrives in bursts.");
 }
 
-void listGate(ParameterList& list, SmootherOptions& smoother) {
+void listGate(ParameterList& list, InnovationGateOptions& gate) {
   list.number(
-      "innovation_gate", "", atLeast(0), smoother.innovation_gate,
+      "innovation_gate", "", atLeast(0), gate.sigmas,
       "A scan is rejected as an outlier if its velocity is farther from the prediction than this many "
       "standard deviations. 3 to 6 are typical. 0 takes every scan.");
   list.number(
-      "innovation_model_error", "m/s", atLeast(0), smoother.innovation_model_error,
+      "innovation_model_error", "m/s", atLeast(0), gate.model_error,
       "The gate adds this to the standard deviation of the prediction, along each axis. It stands for small "
       "errors of the mounting and of the IMU's scale. Raise it for a platform that is faster than 10 m/s.");
-  list.number("innovation_gate_timeout", "s", above(0), smoother.innovation_gate_timeout,
+  list.number("innovation_gate_timeout", "s", above(0), gate.timeout,
               "If no scan was used for this time, the gate takes the next one in any case. A wrong "
               "prediction then cannot lock the radar out.");
 }
@@ -212,7 +212,7 @@ void listTimeOffset(ParameterList& list, Config& c) {
 void listSmoother(ParameterList& list, Config& c) {
   list.group("Smoother");
   listWindow(list, c);
-  listGate(list, c.odometry.smoother);
+  listGate(list, c.odometry.innovation_gate);
   listPriors(list, c.odometry.smoother);
 }
 
