@@ -8,6 +8,7 @@
 
 #include "count_allocations.h"
 #include "rio_t/ros/bag/bag_runner.h"
+#include "rio_t/ros/parameters/parameters.h"
 #include "stage_clock.h"
 
 namespace {

@@ -8,6 +8,7 @@
 #include "rio_t/ros/bag/bag_runner.h"
 #include "rio_t/ros/bag/simulation_bag.h"
 #include "rio_t/ros/messages/conversions.h"
+#include "rio_t/ros/parameters/parameters.h"
 #include "rio_t/simulation/motions.h"
 #include "run_files.h"
 

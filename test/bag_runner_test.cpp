@@ -14,6 +14,7 @@
 
 #include "../src/ros/text.h"
 #include "rest_bag.h"
+#include "rio_t/ros/parameters/parameters.h"
 
 namespace rio_t {
 namespace {

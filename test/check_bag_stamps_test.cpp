@@ -8,7 +8,7 @@
 
 #include "plain_bag.h"
 #include "rio_t/ros/bag/check_bag.h"
-#include "rio_t/ros/parameters/parameters.h"
+#include "rio_t/ros/parameters/config.h"
 
 namespace rio_t {
 namespace {

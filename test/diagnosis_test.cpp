@@ -7,6 +7,8 @@
 #include <cmath>
 #include <optional>
 
+#include "rio_t/ros/parameters/parameters.h"
+
 namespace rio_t {
 namespace {
 

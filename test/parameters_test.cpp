@@ -437,7 +437,7 @@ TEST(Parameters, EveryMemberOfTheOptionsHasAKey) {
   EXPECT_EQ(keysChanging("T_IR"), memberCount<Extrinsics>() + 3)
       << "with extrinsics_source, extrinsics_axes and the mounting in words";
   EXPECT_EQ(memberCount<RadarOptions>(), 4u)
-      << "a new member needs its place in radarOptions in src/ros/parameters/parameters.cpp";
+      << "a new member needs its place in radarOptions in src/ros/parameters/make_config.cpp";
   EXPECT_EQ(memberCount<OdometryOptions>(), 23u) << "a new member needs keys in src/ros/parameters/";
   EXPECT_EQ(memberCount<PointCloudFormat>() - 1, memberCount<PointCloudOverrides>()) << "all but its name";
 }

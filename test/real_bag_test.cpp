@@ -7,6 +7,7 @@
 
 #include "../src/ros/temporary_folder.h"
 #include "rio_t/ros/bag/bag_runner.h"
+#include "rio_t/ros/parameters/parameters.h"
 #include "run_files.h"
 
 namespace rio_t {

@@ -12,6 +12,7 @@
 #include "rest_bag.h"
 #include "rio_t/ros/bag/bag_runner.h"
 #include "rio_t/ros/bag/simulation_bag.h"
+#include "rio_t/ros/parameters/parameters.h"
 #include "rio_t/simulation/motions.h"
 
 namespace rio_t {

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "rio_t/evaluation/trajectory.h"
-#include "rio_t/ros/parameters/parameters.h"
+#include "rio_t/ros/parameters/config.h"
 
 /// Bags as files: what is in them, and errors that name them.
 namespace rio_t {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "bag_file.h"
-#include "rio_t/ros/parameters/parameters.h"
+#include "rio_t/ros/parameters/config.h"
 
 /// Names that a bag resolves: topics, and frames by its tf.
 namespace rio_t {

@@ -18,7 +18,7 @@
 #include "rio_t/ros/cloud/point_cloud.h"
 #include "rio_t/ros/cloud/stamping.h"
 #include "rio_t/ros/diagnosis/diagnosis.h"
-#include "rio_t/ros/parameters/parameters.h"
+#include "rio_t/ros/parameters/config.h"
 #include "run_log.h"
 
 namespace rio_t {

@@ -16,6 +16,7 @@
 #include "bag_player.h"
 #include "rio_t/evaluation/errors.h"
 #include "rio_t/odometry/batch_odometry.h"
+#include "rio_t/ros/parameters/parameters.h"
 #include "run_log.h"
 
 namespace rio_t {

@@ -2,6 +2,7 @@
 
 #include "../command_line.h"
 #include "rio_t/ros/bag/bag_runner.h"
+#include "rio_t/ros/parameters/parameters.h"
 
 namespace rio_t {
 namespace {

@@ -5,6 +5,7 @@
 #include "../text.h"
 #include "radar_causes.h"
 #include "rio_t/core/angle.h"
+#include "rio_t/ros/parameters/parameters.h"
 
 namespace rio_t {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "rio_t/ros/parameters/parameters.h"
+#include "rio_t/ros/parameters/config.h"
 
 /// Texts for people that name a radar if there are several.
 namespace rio_t {

@@ -80,6 +80,12 @@ std::string Range::text() const {
   return text;
 }
 
+const Parameter* ParameterList::find(const std::string& key) const {
+  const auto found = std::find_if(all_.begin(), all_.end(),
+                                  [&](const Parameter& each) { return each.description.key == key; });
+  return found == all_.end() ? nullptr : &*found;
+}
+
 void ParameterList::number(const std::string& key, const std::string& unit, Range range, double& member,
                            const std::string& text) {
   bind({key, "number", unit, "a finite number" + range.text(), text, range.min, range.max}, member,

@@ -76,6 +76,7 @@ class ParameterList {
   void radarNames(const std::string& key, std::vector<Config>& member, const std::string& text);
 
   const std::vector<Parameter>& all() const { return all_; }
+  const Parameter* find(const std::string& key) const;  ///< null for a key that does not exist
 
  private:
   /// `kept`: turns a text into that which is kept.
@@ -132,8 +133,7 @@ void ParameterList::choice(const std::string& key, const std::vector<std::pair<s
                            T& member, const std::string& text) {
   ParameterDescription about = {key, "choice", "", "one of ", text};
   for (const auto& [word, meant] : choices) {
-    about.expected += (about.choices.empty() ? "" : ", ") + (word.empty() ? "\"\"" : word);
-    about.choices.push_back(word);
+    about.expected += (&word == &choices.front().first ? "" : ", ") + (word.empty() ? "\"\"" : word);
   }
   bind(
       std::move(about), member,

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "rio_t/ros/bag/run_output.h"
-#include "rio_t/ros/parameters/parameters.h"
+#include "rio_t/ros/parameters/config.h"
 
 namespace rio_t {
 

@@ -14,7 +14,7 @@
 
 #include "rio_t/evaluation/trajectory.h"
 #include "rio_t/ros/diagnosis/diagnosis.h"
-#include "rio_t/ros/parameters/parameters.h"
+#include "rio_t/ros/parameters/config.h"
 
 namespace rio_t {
 

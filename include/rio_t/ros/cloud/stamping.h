@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "rio_t/radar/scan.h"
-#include "rio_t/ros/parameters/parameters.h"
+#include "rio_t/ros/parameters/config.h"
 
 namespace rio_t {
 

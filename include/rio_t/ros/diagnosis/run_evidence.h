@@ -10,7 +10,7 @@
 
 #include "rio_t/odometry/radar_inertial_odometry.h"
 #include "rio_t/radar/point_filter.h"
-#include "rio_t/ros/parameters/parameters.h"
+#include "rio_t/ros/parameters/config.h"
 
 namespace rio_t {
 

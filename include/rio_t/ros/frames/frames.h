@@ -5,7 +5,7 @@
 #include <string>
 
 #include "rio_t/radar/extrinsics.h"
-#include "rio_t/ros/parameters/parameters.h"
+#include "rio_t/ros/parameters/config.h"
 
 /// Mountings of the sensors from tf; live node and bag runner ask the same questions (docs/frames.md).
 namespace rio_t {

@@ -10,7 +10,7 @@
 
 #include "rio_t/odometry/body_odometry.h"
 #include "rio_t/ros/live/session.h"
-#include "rio_t/ros/parameters/parameters.h"
+#include "rio_t/ros/parameters/config.h"
 
 namespace rio_t {
 

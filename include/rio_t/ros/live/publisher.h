@@ -15,7 +15,7 @@
 #include "rio_t/odometry/body_odometry.h"
 #include "rio_t/ros/live/publish_rate.h"
 #include "rio_t/ros/live/session.h"
-#include "rio_t/ros/parameters/parameters.h"
+#include "rio_t/ros/parameters/config.h"
 
 namespace rio_t {
 

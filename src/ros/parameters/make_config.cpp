@@ -1,17 +1,12 @@
-#include "rio_t/ros/parameters/parameters.h"
-
-#include <dlfcn.h>
-
 #include <algorithm>
-#include <boost/algorithm/string/join.hpp>
-#include <cmath>
-#include <filesystem>
 #include <map>
 #include <utility>
 
 #include "../text.h"
+#include "contradictions.h"
 #include "mounting_parameters.h"
 #include "parameter_list.h"
+#include "rio_t/ros/parameters/parameters.h"
 
 namespace rio_t {
 namespace {
@@ -30,12 +25,6 @@ std::size_t editDistance(const std::string& a, const std::string& b) {
     }
   }
   return row.back();
-}
-
-const Parameter* find(const ParameterList& list, const std::string& key) {
-  const auto found = std::find_if(list.all().begin(), list.all().end(),
-                                  [&](const Parameter& each) { return each.description.key == key; });
-  return found == list.all().end() ? nullptr : &*found;
 }
 
 /// `section`: empty, or that of a radar as "left/".
@@ -59,7 +48,7 @@ std::string unknownKey(const ParameterEntry& entry, const std::string& section, 
 /// Sets the parameter of that key; what is wrong goes into `faults`.
 void setParameter(const ParameterEntry& entry, const std::string& section, const ParameterList& list,
                   std::vector<std::string>* faults) {
-  const Parameter* parameter = find(list, entry.key);
+  const Parameter* parameter = list.find(entry.key);
   if (parameter == nullptr) {
     faults->push_back(unknownKey(entry, section, list));
     return;
@@ -102,7 +91,7 @@ void setTopLevel(const ParameterEntries& entries, const ParameterList& list,
   }
   for (const ParameterEntry& entry : entries) {
     if (entry.key == "radars") continue;
-    if (find(list, entry.key) != nullptr || !isRadar(entry.key, radars)) {
+    if (list.find(entry.key) != nullptr || !isRadar(entry.key, radars)) {
       setParameter(entry, "", list, faults);
     } else if (!std::holds_alternative<std::monostate>(entry.value.data)) {  // `left:` and no more
       faults->push_back(entry.origin + ": " + entry.key + ": expected nested keys, as " + entry.key +
@@ -110,7 +99,7 @@ void setTopLevel(const ParameterEntries& entries, const ParameterList& list,
     }
   }
   for (const Config& radar : radars) {
-    if (find(list, radar.radar_name) == nullptr && !isReserved(radar.radar_name)) continue;
+    if (list.find(radar.radar_name) == nullptr && !isReserved(radar.radar_name)) continue;
     faults->push_back("radars: expected names that are no parameters, got \"" + radar.radar_name + "\"");
   }
   // `radar_doppler_step_from_left` must belong to one radar, and so must
@@ -194,87 +183,11 @@ void setRadars(const SortedEntries& sorted, const Config& top_level, std::vector
   }
 }
 
-/// What single values of one radar cannot show.
-void addContradictions(const Config& config, std::vector<std::string>* faults) {
-  const std::string section = prefixOf(config.radar_name);
-  if (config.odom_frame == config.base_link_frame)
-    faults->push_back("odom_frame: expected another frame than base_link_frame, got \"" + config.odom_frame +
-                      "\" for both");
-  if (config.radar_frame == config.base_link_frame || config.radar_frame == config.odom_frame)
-    faults->push_back(section + "radar_frame: expected a frame of its own, got \"" + config.radar_frame +
-                      "\", which is base_link_frame or odom_frame");
-  const EgoVelocityOptions& radar = config.odometry.ego_velocity;
-  const SmootherOptions& smoother = config.odometry.smoother;
-  if (radar.min_range >= radar.max_range) {
-    faults->push_back(section + "radar_min_range: expected less than radar_max_range (" +
-                      numberText(radar.max_range) + " m), got " + numberText(radar.min_range));
-  }
-  if (std::abs(smoother.time_offset_initial) > smoother.max_time_offset) {
-    faults->push_back(section + "time_offset_initial: expected at most max_time_offset (" +
-                      numberText(smoother.max_time_offset) + " s) in size, got " +
-                      numberText(smoother.time_offset_initial));
-  }
-  if (config.stamp_source == StampSource::kTrigger && config.trigger_topic.empty())
-    faults->push_back(section + "trigger_topic: expected a topic, since stamp_source is trigger, got \"\"");
-}
-
-/// A topic has one type.
-void addSharedTopics(const Config& config, std::vector<std::string>* faults) {
-  const std::vector<InputTopic> inputs = inputTopics(config);
-  for (std::size_t k = 0; k < inputs.size(); ++k)
-    for (std::size_t other = 0; other < k; ++other)
-      if (inputs[k].topic == inputs[other].topic && inputs[k].type != inputs[other].type)
-        faults->push_back(inputs[k].key + ": expected another topic than " + inputs[other].key + ", got \"" +
-                          inputs[k].topic + "\" for both");
-}
-
-/// What one radar cannot show.
-void addContradictionsAmong(const std::vector<Config>& radars, std::vector<std::string>* faults) {
-  for (std::size_t k = 0; k < radars.size(); ++k) {
-    const Config& radar = radars[k];
-    for (std::size_t other = 0; other < k; ++other) {
-      const auto same = [&](const char* key, const std::string& value) {
-        faults->push_back(radar.radar_name + "/" + key + ": expected another than that of " +
-                          radars[other].radar_name + ", got \"" + value + "\" for both");
-      };
-      if (radar.radar_topic == radars[other].radar_topic) same("radar_topic", radar.radar_topic);
-      if (radar.radar_frame == radars[other].radar_frame) same("radar_frame", radar.radar_frame);
-    }
-    const SmootherOptions& first = radars.front().odometry.smoother;
-    const SmootherOptions& smoother = radar.odometry.smoother;
-    if (!smoother.time_offset_shared) continue;
-    if (smoother.time_offset_initial != first.time_offset_initial ||
-        smoother.time_offset_sigma != first.time_offset_sigma) {
-      faults->push_back(radar.radar_name +
-                        "/: expected time_offset_initial and time_offset_sigma as those of " +
-                        radars.front().radar_name + ", since time_offset_shared is true");
-    }
-  }
-}
-
-std::vector<std::string> contradictions(const Config& config) {
-  std::vector<std::string> faults;
-  for (const Config& radar : configsOfRadars(config)) addContradictions(radar, &faults);
-  addSharedTopics(config, &faults);
-  addContradictionsAmong(config.radars, &faults);
-  return faults;
-}
-
 std::string joinFaults(const std::vector<std::string>& faults) {
   if (faults.size() == 1) return faults.front();
   std::string text = std::to_string(faults.size()) + " faults in the configuration:";
   for (const std::string& fault : faults) text += "\n  " + fault;
   return text;
-}
-
-/// The folder of the configurations that came with this library: PREFIX/lib/librio_t_ros.so and
-/// PREFIX/share/rio_t/config, in the install space as in the devel space. No workspace needs to be sourced.
-std::string configFolder() {
-  static const char in_this_library = 0;
-  Dl_info library;
-  if (dladdr(&in_this_library, &library) == 0) return "";
-  const auto path = std::filesystem::canonical(library.dli_fname);
-  return (path.parent_path().parent_path() / "share/rio_t/config").string();
 }
 
 }  // namespace
@@ -288,7 +201,7 @@ SortedEntries sortedEntries(const ParameterEntries& entries, const ParameterList
       Section& section =
           result.sections.try_emplace(entry.key.substr(0, slash), Section{entry.origin, {}}).first->second;
       section.entries.push_back({entry.key.substr(slash + 1), entry.value, entry.origin});
-    } else if (nested != nullptr && find(list, entry.key) == nullptr) {
+    } else if (nested != nullptr && list.find(entry.key) == nullptr) {
       Section& section = result.sections.try_emplace(entry.key, Section{entry.origin, {}}).first->second;
       section.entries.insert(section.entries.end(), nested->begin(), nested->end());
     } else {
@@ -306,72 +219,8 @@ Config withoutSection(const Config& top_level, const std::string& name) {
   return config;
 }
 
-std::string toString(StampSource source) {
-  return source == StampSource::kHeader ? "header" : source == StampSource::kTrigger ? "trigger" : "arrival";
-}
-
 ConfigError::ConfigError(std::vector<std::string> faults)
     : std::runtime_error(joinFaults(faults)), faults_(std::move(faults)) {}
-
-PointCloudFormat pointCloudFormat(const Config& config) {
-  PointCloudFormat format = pointCloudPreset(config.radar_format);
-  const PointCloudOverrides& overrides = config.radar_overrides;
-  format.coordinates = overrides.coordinates.value_or(format.coordinates);
-  format.axes = overrides.axes.value_or(format.axes);
-  format.power_unit = overrides.power_unit.value_or(format.power_unit);
-  format.size_from_data = overrides.size_from_data.value_or(format.size_from_data);
-  if (overrides.doppler_sign != 0) format.doppler_sign = overrides.doppler_sign;
-  const std::pair<const std::string*, std::string*> names[] = {
-      {&overrides.x, &format.x},
-      {&overrides.y, &format.y},
-      {&overrides.z, &format.z},
-      {&overrides.azimuth, &format.azimuth},
-      {&overrides.elevation, &format.elevation},
-      {&overrides.range, &format.range},
-      {&overrides.doppler, &format.doppler},
-      {&overrides.power, &format.power},
-  };
-  for (const auto& [from, to] : names) {
-    if (!from->empty()) *to = *from;
-  }
-  return format;
-}
-
-std::vector<Config> configsOfRadars(const Config& config) {
-  return config.radars.empty() ? std::vector<Config>{config} : config.radars;
-}
-
-Config withTopics(Config config, const TopicResolver& resolve) {
-  const std::string section = prefixOf(config.radar_name);
-  const std::pair<std::string, std::string*> topics[] = {
-      {"imu_topic", &config.imu_topic},
-      {"barometer_topic", &config.barometer_topic},
-      {section + "radar_topic", &config.radar_topic},
-      {section + "trigger_topic", &config.trigger_topic},
-      {"ground_truth_topic", &config.ground_truth_topic},
-  };
-  for (const auto& [key, topic] : topics)
-    if (!topic->empty()) *topic = resolve(key, *topic);
-  for (Config& radar : config.radars) radar = withTopics(radar, resolve);
-  return config;
-}
-
-std::vector<InputTopic> inputTopics(const Config& config) {
-  std::vector<InputTopic> topics = {{"imu_topic", config.imu_topic, "sensor_msgs/Imu"}};
-  if (!config.barometer_topic.empty())
-    topics.push_back({"barometer_topic", config.barometer_topic, "sensor_msgs/FluidPressure"});
-  for (const Config& radar : configsOfRadars(config)) {
-    const std::string section = prefixOf(radar.radar_name);
-    topics.push_back({section + "radar_topic", radar.radar_topic, "sensor_msgs/PointCloud2"});
-    if (radar.stamp_source == StampSource::kTrigger)
-      topics.push_back({section + "trigger_topic", radar.trigger_topic, "std_msgs/Header"});
-  }
-  return topics;
-}
-
-std::string withoutSlash(const std::string& frame) {
-  return !frame.empty() && frame.front() == '/' ? frame.substr(1) : frame;
-}
 
 Config makeConfig(const ParameterEntries& entries) {
   Config config;
@@ -413,7 +262,7 @@ Config withParameters(const Config& config, const ParameterEntries& entries) {
 ParameterValue parameterValue(const Config& config, const std::string& key) {
   Config copy = config;  // the list wants members that it could set
   const ParameterList list = parametersOf(copy);
-  const Parameter* parameter = find(list, key);
+  const Parameter* parameter = list.find(key);
   if (parameter == nullptr) throw std::invalid_argument("no parameter \"" + key + "\"");
   return parameter->get();
 }
@@ -431,31 +280,6 @@ const std::vector<std::string>& liveKeys() {
                                                 "path_max_poses",
                                                 "correct_stamps"};
   return keys;
-}
-
-std::string findConfigFile(const std::string& name_or_path) {
-  namespace fs = std::filesystem;
-  // A folder of that name says nothing: `--config irs` works beside a folder with the results for irs.
-  if (name_or_path.find('/') != std::string::npos || fs::is_regular_file(name_or_path)) {
-    if (!fs::exists(name_or_path))
-      throw std::runtime_error("configuration " + name_or_path + ": no such file");
-    return name_or_path;
-  }
-  const std::string folder = configFolder();
-  for (const char* extension : {"", ".yaml"}) {
-    std::string path = folder + "/" + name_or_path + extension;
-    if (fs::is_regular_file(path)) return path;
-  }
-  std::vector<std::string> names;
-  if (fs::is_directory(folder)) {
-    for (const auto& file : fs::directory_iterator(folder)) {
-      if (file.path().extension() == ".yaml") names.push_back(file.path().stem().string());
-    }
-  }
-  std::sort(names.begin(), names.end());
-  throw std::runtime_error(
-      "configuration " + name_or_path +
-      ": no such file; configurations of the package: " + boost::algorithm::join(names, ", "));
 }
 
 }  // namespace rio_t
