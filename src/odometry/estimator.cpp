@@ -68,7 +68,7 @@ Estimator::Estimator(const OdometryOptions& options, Navigation& navigation, Fau
   if (options.landmarks.enabled) landmarks_.emplace(options.landmarks, g_W_, imu_);
 }
 
-/// One scan: finds its time, measures its velocity, adds it to the window, solves, reports.
+/// One scan: before the start, it helps to find the start. Then it goes into the window, if its time allows.
 ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
   ScanResult result;
   result.scan = std::move(scan);
@@ -87,45 +87,47 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
     result.reinitialized = tryReinitialize(result.left_window);
   const Time node_time = radar.nodeTime(stamp);
   result.rejected_because = whyNotNow(node_time, imu_has_ended);
-  if (result.rejected_because.empty()) {
-    result.model_error_scale = model_error_scale_.value();
-    smoother_.setImuNoise(imuNoise());
-    const std::optional<Rest> rest = findRest(imu_, node_time, restContext(), options_.rest);
-    const bool is_still = rest && !rest->shakes;
-    const bool has_diverged = health_.health() == Health::kDiverged;
-    // These come before the radar adds its node, because a new node has no estimate yet.
-    if (barometer_) result.barometer = barometer_->use(smoother_);
-    if (ground_vehicle_ && !is_still) result.ground_vehicle = ground_vehicle_->judge(smoother_, node_time);
-    std::optional<LandmarkMap::Prediction> expected;
-    if (landmarks_)
-      expected = landmarks_->predict(smoother_, stamp - radar.offset(), radar.extrinsicsBlock());
-    const RadarAnswer answer = radar.use(
-        result.scan, {rest, has_diverged, health_.isContradicted(), result.model_error_scale, last_used_},
-        smoother_);
-    judge(answer, result.scan);
-    static_cast<ScanAnswer&>(result) = static_cast<const ScanAnswer&>(answer);
-    result.used = result.updated = answer.rejected_because.empty();
-    if (result.used) last_used_ = stamp;
-    if (expected && result.used) seeLandmarks(*expected, answer, radar, result);
-    if (answer.at_rest) {
-      if (Block* node = smoother_.nodeAt(radar.nodeTime(stamp))) {
-        result.rest_velocity_sigma = rest->velocity_sigma;
-        smoother_.addZeroVelocity(*node, rest->velocity_sigma);
-        result.updated = true;
-      }
-    }
-    // The constraint of a vehicle holds whether or not a scan is used, but it is no sign that the radar
-    // works.
-    const bool by_radar = result.updated;
-    if (result.ground_vehicle) constrainToGround(answer.at_rest, result);
-    if (result.updated) updateWindow(radar, result);
-    if (by_radar) health_.updated(result.state.time);
-    updateHealth();
-    if (!result.updated && health_.health() == Health::kDiverged) publishNewest();
-  }
+  if (result.rejected_because.empty()) putIntoWindow(node_time, radar, result);
   result.health = health_.health();
   result.is_contradicted = health_.isContradicted();
   return result;
+}
+
+void Estimator::putIntoWindow(Time node_time, RadarChannel& radar, ScanResult& result) {
+  const Time stamp = result.scan.stamp;
+  result.model_error_scale = model_error_scale_.value();
+  smoother_.setImuNoise(imuNoise());
+  const std::optional<Rest> rest = findRest(imu_, node_time, restContext(), options_.rest);
+  const bool is_still = rest && !rest->shakes;
+  const bool has_diverged = health_.health() == Health::kDiverged;
+  // These come before the radar adds its node, because a new node has no estimate yet.
+  if (barometer_) result.barometer = barometer_->use(smoother_);
+  if (ground_vehicle_ && !is_still) result.ground_vehicle = ground_vehicle_->judge(smoother_, node_time);
+  std::optional<LandmarkMap::Prediction> expected;
+  if (landmarks_) expected = landmarks_->predict(smoother_, stamp - radar.offset(), radar.extrinsicsBlock());
+  const RadarAnswer answer = radar.use(
+      result.scan, {rest, has_diverged, health_.isContradicted(), result.model_error_scale, last_used_},
+      smoother_);
+  judge(answer, result.scan);
+  static_cast<ScanAnswer&>(result) = static_cast<const ScanAnswer&>(answer);
+  result.used = result.updated = answer.rejected_because.empty();
+  if (result.used) last_used_ = stamp;
+  if (expected && result.used) seeLandmarks(*expected, answer, radar, result);
+  if (answer.at_rest) {
+    if (Block* node = smoother_.nodeAt(radar.nodeTime(stamp))) {
+      result.rest_velocity_sigma = rest->velocity_sigma;
+      smoother_.addZeroVelocity(*node, rest->velocity_sigma);
+      result.updated = true;
+    }
+  }
+  // The constraint of a vehicle holds whether or not a scan is used, but it is no sign that the radar
+  // works.
+  const bool by_radar = result.updated;
+  if (result.ground_vehicle) constrainToGround(answer.at_rest, result);
+  if (result.updated) updateWindow(radar, result);
+  if (by_radar) health_.updated(result.state.time);
+  updateHealth();
+  if (!result.updated && health_.health() == Health::kDiverged) publishNewest();
 }
 
 void Estimator::constrainToGround(bool at_rest, ScanResult& result) {

@@ -62,6 +62,8 @@ class Estimator {
  private:
   /// Empty, or why the scan of a node at that time cannot be used now.
   std::string whyNotNow(Time node_time, bool imu_has_ended) const;
+  /// Adds what radar and aids say of a scan at `node_time`, solves the window and judges its health.
+  void putIntoWindow(Time node_time, RadarChannel& radar, ScanResult& result);
   void tryInitialize(const ImuMeasurement& sample);
   /// Starts a window.
   void begin(const Initialization& found);
