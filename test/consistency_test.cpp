@@ -140,6 +140,28 @@ TEST(Consistency, OffsetOfAFastRadarBesideAnImuThatVibrates) {
   EXPECT_LT(mean, 2.8);
 }
 
+/// A gyro that reads some tenths of a percent too much, as most do, on a motion that turns fast.
+TEST(Consistency, AGyroWithAWrongScaleIsInTheSigma) {
+  Nees mean;
+  std::uint64_t steps = 0;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    SimulatedRun run("drone", seed, 45.0, kStart);
+    run.setup.time_offset.constant = 0.03;
+    run.setup.radar.rate = 25.0;
+    run.setup.imu.noise.gyro_scale_error = run.options.imu_noise.gyro_scale_error = 0.005;
+    run.run();
+    const Nees nees = neesOf(run);
+    mean.velocity += nees.velocity / kSeeds;
+    mean.tilt += nees.tilt / kSeeds;
+    steps += run.odometry->faults()["time_offset_step"];
+  }
+  std::printf("wrong scale of the gyro: velocity %.2f, tilt %.2f, steps %d\n", mean.velocity, mean.tilt,
+              static_cast<int>(steps));
+  EXPECT_LT(mean.velocity, 2.0);
+  EXPECT_LT(mean.tilt, 2.0);
+  EXPECT_EQ(steps, 0U);
+}
+
 TEST(Consistency, Medium) { expectConsistent("medium", 0.0); }
 TEST(Consistency, Drone) { expectConsistent("drone", 0.0); }
 TEST(Consistency, GroundVehicle) { expectConsistent("ground_vehicle", 0.0); }

@@ -128,6 +128,22 @@ TEST(ImuModel, NoiseAndBiasWalkHaveTheirDensities) {
   EXPECT_NEAR(std::sqrt(walk_g / n * options.rate), 1e-3, 1.2e-5);
 }
 
+TEST(ImuModel, AWrongScaleOfTheGyroMultipliesTheRatesOfAnAxis) {
+  const Motion motion = builtIn("difficult", 1, 40.0);
+  ImuModelOptions options;
+  options.removeErrors();
+  const std::vector<ImuMeasurement> exact = simulateImu(motion, options, 1, Time()).samples;
+  options.noise.gyro_scale_error = 0.01;
+  const std::vector<ImuMeasurement> wrong = simulateImu(motion, options, 1, Time()).samples;
+  const Eigen::Vector3d scale = wrong.back().angular_velocity.cwiseQuotient(exact.back().angular_velocity);
+  EXPECT_GT((scale - Eigen::Vector3d::Ones()).norm(), 0.001);
+  EXPECT_LT((scale - Eigen::Vector3d::Ones()).norm(), 0.06);
+  for (std::size_t i = 0; i < exact.size(); ++i) {
+    ASSERT_LT((wrong[i].angular_velocity - scale.cwiseProduct(exact[i].angular_velocity)).norm(), 1e-12) << i;
+    ASSERT_EQ(wrong[i].acceleration, exact[i].acceleration) << i;
+  }
+}
+
 // What the vibration adds to the samples of 400 s of rest: those with it minus those without it.
 std::vector<ImuMeasurement> vibrationAtRest(const ImuModelOptions& vibrating) {
   MotionRestOptions rest;

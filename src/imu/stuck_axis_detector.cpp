@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rio_t/imu/gap_bridge.h"
+#include "rio_t/imu/noise.h"
 
 namespace rio_t {
 namespace {

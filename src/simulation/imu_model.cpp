@@ -12,6 +12,7 @@ constexpr std::uint64_t kBiasStream = 10;
 constexpr std::uint64_t kNoiseStream = 11;
 constexpr std::uint64_t kVibrationStream = 12;
 constexpr std::uint64_t kDropoutStream = 13;
+constexpr std::uint64_t kScaleStream = 14;
 
 Eigen::Vector3d saturated(const Eigen::Vector3d& value, double limit) {
   return value.cwiseMax(-limit).cwiseMin(limit);
@@ -24,7 +25,7 @@ void check(const ImuModelOptions& options) {
   const ImuNoise& n = options.noise;
   require(options.rate > 0.0, "IMU rate must be positive");
   require(n.accel_density >= 0.0 && n.gyro_density >= 0.0 && n.accel_random_walk >= 0.0 &&
-              n.gyro_random_walk >= 0.0,
+              n.gyro_random_walk >= 0.0 && n.gyro_scale_error >= 0.0,
           "IMU noise cannot be negative");
   require(options.accel_vibration >= 0.0 && options.gyro_vibration >= 0.0,
           "IMU vibration cannot be negative");
@@ -75,7 +76,7 @@ class Vibration {
 
 void ImuModelOptions::removeErrors() {
   noise.accel_density = noise.gyro_density = 0.0;
-  noise.accel_random_walk = noise.gyro_random_walk = 0.0;
+  noise.accel_random_walk = noise.gyro_random_walk = noise.gyro_scale_error = 0.0;
   accel_vibration = gyro_vibration = 0.0;
   dropout_share = 0.0;
   accel_bias = Eigen::Vector3d::Zero();
@@ -95,6 +96,8 @@ ImuData simulateImu(const Motion& motion, const ImuModelOptions& options, std::u
   const Eigen::Vector3d drawn_b_g = options.gyro_bias_sigma * bias_random.gaussianVector();
   Eigen::Vector3d b_a = options.accel_bias.value_or(drawn_b_a);
   Eigen::Vector3d b_g = options.gyro_bias.value_or(drawn_b_g);
+  const Eigen::Vector3d scale =
+      Eigen::Vector3d::Ones() + options.noise.gyro_scale_error * Random(seed, kScaleStream).gaussianVector();
   const double root_rate = std::sqrt(options.rate);
   const Eigen::Vector3d g_W(0.0, 0.0, -options.gravity);
 
@@ -110,8 +113,8 @@ ImuData simulateImu(const Motion& motion, const ImuModelOptions& options, std::u
     const double t = sample.time - start;
     const MotionState state = motion.at(t);
     sample.angular_velocity =
-        saturated(state.omega_I + b_g + options.noise.gyro_density * root_rate * random.gaussianVector() +
-                      gyro_vibration.at(t),
+        saturated(scale.cwiseProduct(state.omega_I) + b_g +
+                      options.noise.gyro_density * root_rate * random.gaussianVector() + gyro_vibration.at(t),
                   options.gyro_saturation);
     sample.acceleration = saturated(state.q_WI.conjugate() * (state.a_W - g_W) + b_a +
                                         options.noise.accel_density * root_rate * random.gaussianVector() +

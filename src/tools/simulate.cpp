@@ -122,6 +122,8 @@ void addImuOptions(OptionSet& options, ImuModelOptions& imu) {
   options.number("gyro-noise", "RAD/S/RTHZ", "density of the noise", imu.noise.gyro_density);
   options.number("accel-random-walk", "M/S^3/RTHZ", "random walk of the bias", imu.noise.accel_random_walk);
   options.number("gyro-random-walk", "RAD/S^2/RTHZ", "random walk of the bias", imu.noise.gyro_random_walk);
+  options.number("gyro-scale-error", "SHARE", "sigma of the scale of each axis of the gyro",
+                 imu.noise.gyro_scale_error);
   options.value("accel-bias", "X,Y,Z", "bias at the start [m/s^2]", "random",
                 [&imu](const std::string& v) { imu.accel_bias = parseVector(v); });
   options.value("gyro-bias", "X,Y,Z", "bias at the start [rad/s]", "random",

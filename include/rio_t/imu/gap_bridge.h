@@ -4,12 +4,9 @@
 #include <vector>
 
 #include "rio_t/imu/measurement.h"
+#include "rio_t/imu/noise.h"
 
 namespace rio_t {
-
-/// Correlation time of rate of turn and acceleration [s]. The autocorrelation of the gyros of a hand-held rig
-/// falls to 1/e in 0.5 to 0.7 s.
-constexpr double kMotionCorrelationTime = 0.5;
 
 /// The most likely readings of the IMU over a gap, as samples like its own.
 ///

@@ -7,6 +7,10 @@
 
 namespace rio_t {
 
+/// Correlation time of rate of turn and acceleration [s]. The autocorrelation of the gyros of a hand-held rig
+/// falls to 1/e in 0.5 to 0.7 s.
+constexpr double kMotionCorrelationTime = 0.5;
+
 /// Continuous-time noise of the IMU.
 struct ImuNoise {
   /// [m/s^2/sqrt(Hz)] Ten times the white noise of an ADIS16448 at rest. It also stands for vibration, scale
@@ -15,6 +19,7 @@ struct ImuNoise {
   double gyro_density = 2.0e-4;       ///< [rad/s/sqrt(Hz)]
   double accel_random_walk = 1.0e-4;  ///< [m/s^3/sqrt(Hz)]
   double gyro_random_walk = 4.0e-6;   ///< [rad/s^2/sqrt(Hz)]
+  double gyro_scale_error = 0.0;      ///< sigma of the gyro's scale, as a share of the rate
 
   /// With the variance of the accelerometer times `model_error_scale`, see ModelErrorScale.
   ImuNoise scaled(double model_error_scale) const {
@@ -24,12 +29,15 @@ struct ImuNoise {
   }
 
   /// Squared densities of integrated samples for the interval that ends with `imu`: the larger of option and
-  /// measurement, plus the hidden motion of the interval. A vibrating frame is noisier than a data sheet.
+  /// measurement, plus the hidden motion of the interval and, of a gyro, the error of its scale. A vibrating
+  /// frame is noisier than a data sheet.
   double accelVariance(const ImuMeasurement& imu) const {
     return std::max(accel_density * accel_density, imu.accel_mean_noise) + imu.unseen_accel_variance;
   }
   double gyroVariance(const ImuMeasurement& imu) const {
-    return std::max(gyro_density * gyro_density, imu.gyro_mean_noise) + imu.unseen_gyro_variance;
+    const double wrong_rate = gyro_scale_error * imu.angular_velocity.norm();
+    return std::max(gyro_density * gyro_density, imu.gyro_mean_noise) + imu.unseen_gyro_variance +
+           wrong_rate * wrong_rate * kMotionCorrelationTime;
   }
 };
 

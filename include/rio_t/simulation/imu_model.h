@@ -24,7 +24,8 @@ inline ImuNoise measuredImuNoise() {
 
 struct ImuModelOptions {
   double rate = 409.0;  ///< [Hz]
-  /// a sample gets density * sqrt(rate); a bias walks by random_walk / sqrt(rate) a sample
+  /// a sample gets density * sqrt(rate); a bias walks by random_walk / sqrt(rate) a sample;
+  /// the scale of each axis of the gyro is drawn once
   ImuNoise noise = measuredImuNoise();
   /// Biases at the start; drawn from the sigmas where not given.
   std::optional<Eigen::Vector3d> accel_bias;  ///< [m/s^2]

@@ -272,6 +272,7 @@ const std::vector<std::string>& liveKeys() {
                                                 "imu_gyro_noise_density",
                                                 "imu_accel_random_walk",
                                                 "imu_gyro_random_walk",
+                                                "imu_gyro_scale_error",
                                                 "innovation_gate",
                                                 "innovation_model_error",
                                                 "innovation_gate_timeout",

@@ -148,6 +148,10 @@ void listImu(ParameterList& list, Config& c) {
       "imu_gyro_random_walk", "rad/s^2/sqrt(Hz)", above(0), c.odometry.imu_noise.gyro_random_walk,
       "The bias of the gyro wanders by this random walk. Raise it if the biases cannot follow, for example "
       "while the IMU warms up.");
+  list.number("imu_gyro_scale_error", "", between(0, 1), c.odometry.imu_noise.gyro_scale_error,
+              "The rates of the gyro are too large or too small by this share (sigma). A third of the "
+              "tolerance in the data sheet is a good choice: 0.003 for the 1 % of most MEMS gyros. 0 is for "
+              "a gyro whose scale was calibrated.");
 
   ImuInputCheckOptions& gate = c.odometry.imu_input_check;
   list.group("Gaps of the sensors");
