@@ -316,6 +316,47 @@ TEST_F(CheckBag, WhatIsToldAndFarFromWhatTheBagShowsIsNamed) {
   EXPECT_LT(configOf(check(bag_, false)).odometry.smoother.extrinsics_rotation_sigma, usual);
 }
 
+TEST_F(CheckBag, ALeverArmIsEstimatedFromWhereTheBagShowsIt) {
+  const Extrinsics mounting = setup_.T_IR;
+  setup_.T_IR.l_I = {0.04, -0.07, 0.21};
+  const std::string bag = folder_ + "/lever.bag";
+  write("medium", 60.0, BagFormat::kIrs, bag);
+  const Eigen::Vector3d true_l_I = std::exchange(setup_.T_IR, mounting).l_I;
+  const BagCheck odd = check(bag);
+  EXPECT_TRUE(odd.ready()) << describeCheck(odd);
+  const Config config = configOf(odd);
+  EXPECT_EQ(config.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kPose);
+  EXPECT_LT((config.odometry.T_IR.l_I - true_l_I).norm(), 0.1) << config.odometry.T_IR.l_I.transpose();
+  const RadarSummary radar = run(odd).radars.front();
+  EXPECT_NEAR(radar.final_offset_s, setup_.time_offset.constant, 3.0 * radar.final_offset_sigma_s);
+  // What the user has measured is held.
+  EXPECT_EQ(configOf(check(bag, false, {"extrinsics_translation=[0.04,-0.07,0.21]"}))
+                .odometry.smoother.estimate_extrinsics,
+            EstimateExtrinsics::kRotation);
+}
+
+/// The run is good: the estimate outvoted the points at wrong directions.
+TEST_F(CheckBag, ABriefDivergenceDoesNotMakeATrialRunBad) {
+  const simulation::SimulationOptions plain = setup_;
+  setup_.seed = 9;
+  setup_.time_offset.constant = 0.0;
+  setup_.T_IR.q_IR = rotationOf({0.0, 0.0, 0.0});
+  setup_.radar.rate = 20.0;
+  setup_.radar.points_mean = 20.0;
+  setup_.radar.points_sigma = 3.0;
+  setup_.radar.ambiguous_share = 0.2;
+  const std::string bag = folder_ + "/ambiguous.bag";
+  simulation::MotionRequest request;
+  request.name = "walk";
+  request.seed = setup_.seed;
+  request.duration = 100.0;
+  const simulation::Motion motion = simulation::makeMotion(request);
+  writeSimulationBag(bag, motion, simulation::simulate(motion, setup_), setup_.start, {});
+  setup_ = plain;
+  const BagCheck good = check(bag);
+  EXPECT_TRUE(good.ready()) << describeCheck(good);
+}
+
 TEST_F(CheckBag, ABagOfAFrameThatVibratesRunsWell) {
   const double vibration = setup_.imu.accel_vibration;
   setup_.imu.accel_vibration = 2.0;  // [m/s^2]

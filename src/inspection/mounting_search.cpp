@@ -157,12 +157,28 @@ int findOffset(const std::vector<double>& costs, int first, int steps, double sc
   return first + bottom;
 }
 
-/// Sets the sigmas that the data alone give, without prior knowledge. `cost`: depends on M alone; `H_l`: the
-/// information about the lever arm.
+/// Half the second derivative of the cost by a turn in R, no smaller than 0. It has the second derivative of
+/// M, too: without it, the noise of the velocities, which costs the same for all rotations, counts as
+/// information.
+Matrix3d curvature(const Quadratic& cost, const Matrix3d& M) {
+  const MatrixXd J = tangent(M);
+  const VectorXd gradient = cost.H * columnsOf(M) - cost.b;
+  Matrix3d sum = J.transpose() * cost.H * J;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      const Matrix3d by_i = so3::hat(Vector3d::Unit(i)), by_j = so3::hat(Vector3d::Unit(j));
+      sum(i, j) += gradient.dot(columnsOf(0.5 * M * (by_i * by_j + by_j * by_i)));
+    }
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> axes(sum);
+  return axes.eigenvectors() * axes.eigenvalues().cwiseMax(0.0).asDiagonal() *
+         axes.eigenvectors().transpose();
+}
+
+/// Sets the sigmas that the data alone give, without prior knowledge. `cost`: depends on M alone, and costs
+/// noise the same in all directions; `H_l`: the information about the lever arm.
 void setSigmas(const Quadratic& cost, const Matrix3d& H_l, double unit, MountingSearch* result) {
   const Matrix3d R = result->q_IR.toRotationMatrix();
-  const MatrixXd J = tangent(result->sign * R);
-  const Matrix3d in_R = J.transpose() * cost.H * J / unit;
+  const Matrix3d in_R = curvature(cost, result->sign * R) / unit;
   const Matrix3d in_I = R * in_R * R.transpose();
   const Matrix3d covariance = (in_I + Matrix3d::Identity() / (M_PI * M_PI)).inverse();
   result->rotation_sigma = covariance.diagonal().cwiseSqrt();
@@ -253,9 +269,13 @@ MountingSearch searchMounting(const std::vector<RadarVelocity>& velocities, cons
         H_l.inverse() * (with_lever_arm.b.tail(kMountingL) -
                          with_lever_arm.H.bottomLeftCorner(kMountingL, kMountingM) * columnsOf(*M));
     scale = reweigh(result.offset, *M, result.lever_arm_I, &problem);
-    setSigmas(cost, H_l, kAlike * scale, &result);
+    if (round < kRounds - 1) continue;
+    // With covariances that are turned by M, any other turn puts the noisy axis where little noise is
+    // expected: noise would look like evidence.
+    const Quadratic even = withoutLast(mountingCost(result.offset, std::nullopt, problem), kMountingL);
+    setSigmas(even, H_l, kAlike * scale, &result);
+    findOtherMounting(even, kAlike * scale, &result);
   }
-  findOtherMounting(cost, kAlike * scale, &result);
   return result;
 }
 

@@ -150,7 +150,7 @@ BagCheck checkBag(const std::vector<std::string>& bags, const CheckRequest& requ
   }
   const ProposedConfig config = proposedConfig(imu, radars, request.set);
   if (request.try_out) {
-    chooseByTrial(recording, header(recording), config, request.set, &check);
+    chooseByTrial(recording, header(recording), config, &check);
   } else {
     check.yaml = toYaml(config, header(recording));
     readBack(check.yaml);

@@ -14,9 +14,9 @@ namespace rio_t {
 ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarInspection>& radars,
                               const ParameterEntries& configured);
 
-/// Runs the odometry on the bag and gives `check` the configuration with which it runs best: `config`, or one
-/// near it that leaves what the user has `configured`. `header`: lines for the beginning of the file.
+/// Runs the odometry on the bag and gives `check` the configuration with which it runs best: `config`, or
+/// that of one of its radars alone. `header`: lines for the beginning of the file.
 void chooseByTrial(const Recording& recording, const std::string& header, const ProposedConfig& config,
-                   const ParameterEntries& configured, BagCheck* check);
+                   BagCheck* check);
 
 }  // namespace rio_t

@@ -66,6 +66,22 @@ void addConfigured(const ParameterEntries& configured, ProposedConfig* config) {
   }
 }
 
+/// The mounting that the bag shows is coarse: the odometry starts there and refines it. A lever arm that is a
+/// decimetre wrong and held moves the offset by several sigma.
+void proposeEstimate(const std::vector<RadarInspection>& radars, const ParameterEntries& configured,
+                     ProposedKeys* keys) {
+  const std::string text = "The mounting below is coarse. The estimate starts there and refines it.";
+  if (isConfigured("extrinsics_translation", configured)) {
+    keys->set("estimate_extrinsics", "rotation", text);
+    return;
+  }
+  keys->set("estimate_extrinsics", "pose", text);
+  double worst = SmootherOptions().extrinsics_translation_sigma;
+  for (const RadarInspection& radar : radars) worst = std::max(worst, radar.lever_arm_sigma);
+  keys->set("extrinsics_translation_sigma", ParameterValue{rounded(worst, 100.0)},
+            "Standard deviation of extrinsics_translation [m].");
+}
+
 }  // namespace
 
 ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarInspection>& radars,
@@ -79,8 +95,7 @@ ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarI
     if (!radar.search.enough || sigma.maxCoeff() > kObservedTurn || radar.isSparse()) all_observed = false;
     worst = std::max(worst, sigma.maxCoeff());
   }
-  config.top_level.set("estimate_extrinsics", "rotation",
-                       "The mounting below is coarse. The estimate starts there and refines it.");
+  proposeEstimate(radars, configured, &config.top_level);
   constexpr double kLeast = 0.05, kSafety = 3.0;  // [rad]
   if (all_observed && !isMountingConfigured(configured) &&
       kSafety * worst < SmootherOptions().extrinsics_rotation_sigma)

@@ -21,7 +21,7 @@ struct Trial {
     return static_cast<double>(summary.scansUsed()) / static_cast<double>(std::max<std::uint64_t>(1, judged));
   }
   bool good() const {
-    return failure.empty() && summary.divergences == 0 && summary.health == Health::kOk &&
+    return failure.empty() && summary.health == Health::kOk &&
            summary.diagnosis.verdict != RunVerdict::kBad && shareUsed() > 0.5;
   }
   /// Larger is better; a good one is better than all others.
@@ -60,6 +60,10 @@ std::string offsetsText(const RunSummary& summary) {
   return text;
 }
 
+std::string divergencesText(const RunSummary& summary) {
+  return summary.divergences == 0 ? "no divergence" : "divergences: " + std::to_string(summary.divergences);
+}
+
 /// Such a cause sends the user to check_bag, which runs already.
 bool isAboutMounting(const Cause& cause) { return cause.remedy.find("check_bag") != std::string::npos; }
 
@@ -82,13 +86,12 @@ void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
       shareText(trial) + ", " + fixedText(s.path_length_m, 1) + " m, " + offsetsText(s);
   if (trial.good()) {
     check->tell(note.empty() ? FindingLevel::kOk : FindingLevel::kOdd, "trial run",
-                "no divergence, " + numbers + note);
+                divergencesText(s) + ", " + numbers + note);
     if (s.diagnosis.verdict != RunVerdict::kGood) check->odd("trial run", verdictText(s.diagnosis));
     return;
   }
   check->tell(FindingLevel::kMissing, "trial run",
-              "divergences: " + std::to_string(s.divergences) + ", at the end " + toString(s.health) + "; " +
-                  numbers);
+              divergencesText(s) + ", at the end " + toString(s.health) + "; " + numbers);
   check->odd("trial run", verdictText(s.diagnosis));
   check->to_do = "The odometry does not run well with what the bag shows. Look at the odd lines.";
   const std::vector<Cause>& causes = s.diagnosis.causes;
@@ -101,7 +104,7 @@ void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
 }  // namespace
 
 void chooseByTrial(const Recording& recording, const std::string& header, const ProposedConfig& config,
-                   const ParameterEntries& configured, BagCheck* check) {
+                   BagCheck* check) {
   const double duration = recording.read < recording.length ? recording.read : 0.0;
   Trial best;
   std::string note;  // on the best one
@@ -114,11 +117,6 @@ void chooseByTrial(const Recording& recording, const std::string& header, const 
     note = its_note;
   };
   attempt(config, "");
-  if (!best.good() && !isConfigured("estimate_extrinsics", configured)) {
-    ProposedConfig changed = config;
-    changed.top_level.set("estimate_extrinsics", "pose", "With a fixed lever arm the odometry diverged.");
-    attempt(changed, " (with estimate_extrinsics: pose; without it, it does not run as well)");
-  }
   // One radar alone may do.
   for (const auto& [name, keys] : config.radars) {
     if (best.good()) break;

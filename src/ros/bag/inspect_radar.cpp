@@ -208,21 +208,21 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
                       sure + ".");
   const Eigen::Vector3d& l = search.lever_arm_I;
   const Eigen::Vector3d& l_sigma = search.lever_arm_sigma;
-  std::vector<double> lever;
   std::string text;
-  for (int k = 0; k < 3; ++k) {
-    // Three sigma away from zero: better than zero.
-    const bool found = std::abs(l[k]) > 3.0 * l_sigma[k] && l_sigma[k] < 0.3;
-    lever.push_back(found ? rounded(l[k], 100.0) : 0.0);
+  for (int k = 0; k < 3; ++k)
     text += (k == 0 ? "" : ", ") + fixedText(l[k], 2) + " +- " + fixedText(l_sigma[k], 2);
-  }
-  const bool any = std::any_of(lever.begin(), lever.end(), [](double x) { return x != 0.0; });
-  radar->ok("lever arm", "about [" + text +
-                             "] m: " + (any ? "what is clear of zero is taken over" : "zero is proposed") +
-                             "; measure it with a tape");
-  if (any)
-    radar->keys.set("extrinsics_translation", listOf(lever),
+  // Of few points a lever arm may be as wrong as a mounting.
+  const bool is_known = l_sigma.maxCoeff() < kUnknownLeverArm && !radar->isSparse();
+  radar->ok("lever arm",
+            "about [" + text + "] m: " +
+                (is_known ? "the estimate starts there" : "too vague, the estimate starts at zero") +
+                "; measure it with a tape");
+  if (is_known) {
+    radar->lever_arm_sigma = l_sigma.maxCoeff();
+    radar->keys.set("extrinsics_translation",
+                    listOf({rounded(l.x(), 100.0), rounded(l.y(), 100.0), rounded(l.z(), 100.0)}),
                     "Origin of the radar in the IMU frame, roughly [m]. Measure it with a tape.");
+  }
   radar->ok("offset", fixedText(1e3 * search.offset, 0) + " +- " + fixedText(1e3 * search.offset_sigma, 0) +
                           " ms, roughly; the odometry estimates it");
   constexpr double kKnown = 0.03;  // [s]

@@ -120,7 +120,8 @@ void BodyFrame::published(const BodyOdometry& body) {
 
 std::string BodyFrame::waitingFor() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return T_BI_ ? "" : waiting_for_;
+  // With `auto`, nothing waits: the parameters hold if tf knows nothing once the odometry starts.
+  return T_BI_ || config_.base_extrinsics_source != BaseExtrinsicsSource::kTf ? "" : waiting_for_;
 }
 
 std::string BodyFrame::source() const {

@@ -17,7 +17,7 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
   try {
     const ImuMeasurement imu =
         toImuMeasurement(*event.getConstMessage(), config_.imu_topic, config_.imu_units);
-    followImuStamps(imu);
+    if (const char* fault = followImuStamps(imu)) monitor_.imuUnusable(fault);
     frames_.hear(event.getConstMessage()->header.frame_id);
     const Received received{imu, toTime(event.getReceiptTime())};
     const Session now = session_.get();
@@ -49,20 +49,31 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
     wakeSolver();
   } catch (const std::exception& error) {
     monitor_.imuDropped("imu_not_usable");
+    monitor_.imuUnusable(error.what());
     if (isTimeToTell("imu_not_usable")) ROS_ERROR_STREAM(name_ << ": " << error.what());
   }
 }
 
-void LiveOdometry::followImuStamps(const ImuMeasurement& imu) {
+const char* LiveOdometry::followImuStamps(const ImuMeasurement& imu) {
   // The same judgement as the session's own, so that the whole session starts again, with what it stamps by.
-  if (faultOfValues(imu, config_.odometry.imu_input_check) != nullptr) return;
+  if (const char* fault = faultOfValues(imu, config_.odometry.imu_input_check)) return fault;
   const std::optional<Time> before = imu_stamps_.newest();
-  if (imu_stamps_.check(imu.time) != ClockJumpDetector::Verdict::kRestart) return;
+  switch (imu_stamps_.check(imu.time)) {
+    case ClockJumpDetector::Verdict::kGood:
+      return nullptr;
+    case ClockJumpDetector::Verdict::kBehind:
+      return "imu_out_of_order";
+    case ClockJumpDetector::Verdict::kAhead:
+      return "imu_stamp_jump";
+    case ClockJumpDetector::Verdict::kRestart:
+      break;
+  }
   const double jump = imu.time - *before;
   reset(std::string("the IMU's stamps jumped ") + (jump < 0.0 ? "back" : "ahead") + " by " +
             std::to_string(std::abs(jump)) + " s",
         true);
   early_imu_.clear();
+  return nullptr;
 }
 
 std::optional<NavigationState> LiveOdometry::feed(LiveSession& session, const Received& received) {

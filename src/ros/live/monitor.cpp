@@ -80,6 +80,7 @@ void LiveMonitor::Latency::add(double seconds) {
 void LiveMonitor::imu(Time stamp) {
   const std::lock_guard<std::mutex> lock(mutex_);
   ++imu_.count;
+  ++usable_imu_.count;
   collector_.addImu(stamp);
 }
 
@@ -108,6 +109,12 @@ void LiveMonitor::odometry(const NavigationState& state, double latency) {
 void LiveMonitor::imuDropped(const std::string& reason) {
   const std::lock_guard<std::mutex> lock(mutex_);
   ++imu_dropped_[reason];
+}
+
+void LiveMonitor::imuUnusable(const std::string& why) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  --usable_imu_.count;
+  why_unusable_ = why;
 }
 
 void LiveMonitor::dropped(std::size_t radar, const std::string& reason, std::uint64_t count) {
@@ -238,8 +245,8 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) c
   }
   std::string likely_cause;
   if (session != nullptr) likely_cause = addDiagnosis(status, *session);
-  if (initialized && imu_is_silent_) {
-    status.summary(DiagnosticStatus::ERROR, "the IMU is silent: no odometry is published");
+  if (initialized && !imu_fault_.empty()) {
+    status.summary(DiagnosticStatus::ERROR, imu_fault_ + ": no odometry is published");
     return;
   }
   if (!initialized || !waiting_for_.empty()) {
@@ -335,7 +342,10 @@ std::optional<std::string> LiveMonitor::judgeUse(Radar& radar, bool initialized)
 
 void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  imu_is_silent_ = imu_.isSilent();
+  const bool none_came = imu_.isSilent(), none_is_usable = usable_imu_.isSilent();
+  imu_fault_ = none_came        ? "the IMU is silent"
+               : none_is_usable ? "no IMU message can be used (" + why_unusable_ + ")"
+                                : "";
   status.add("imu_messages", imu_.count);
   for (const auto& [reason, count] : imu_dropped_) status.add("dropped_" + reason, count);
   if (session != nullptr) {
@@ -363,8 +373,8 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   if (imu_.count == 0) {
     status.summary(DiagnosticStatus::ERROR, "no IMU message yet on " + config_.imu_topic +
                                                 wrongType(config_.imu_topic, "sensor_msgs/Imu"));
-  } else if (imu_is_silent_) {
-    status.summary(DiagnosticStatus::ERROR, "the IMU is silent, topic " + config_.imu_topic);
+  } else if (!imu_fault_.empty()) {
+    status.summary(DiagnosticStatus::ERROR, imu_fault_ + ", topic " + config_.imu_topic);
   } else if (!findings.empty()) {
     status.summary(radars.level, radars.text);
   } else if (queue_full > queue_full_reported_) {

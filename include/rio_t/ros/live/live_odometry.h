@@ -99,8 +99,9 @@ class LiveOdometry {
   /// When it returns, nothing more is published of what was before. Any thread.
   /// `at_once`: does not wait for rest first.
   void reset(const std::string& reason, bool at_once = false);
-  /// Resets if the clock of the IMU jumped. IMU thread.
-  void followImuStamps(const ImuMeasurement& imu);
+  /// Resets if the clock of the IMU jumped. Returns why the session will drop the sample, or null. IMU
+  /// thread.
+  const char* followImuStamps(const ImuMeasurement& imu);
   /// Gives a sample to a session. Returns the state that is to be published, if there is one.
   std::optional<NavigationState> feed(LiveSession& session, const Received& received);
   void account(const std::vector<LiveSession::GivenUp>& given_up);

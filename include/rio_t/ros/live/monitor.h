@@ -35,6 +35,7 @@ class LiveMonitor {
   /// A state was ready `latency` seconds after the IMU message came.
   void odometry(const NavigationState& state, double latency);
   void imuDropped(const std::string& reason);  ///< a sample that goes no further
+  void imuUnusable(const std::string& why);    ///< the last message moves no estimate
   /// Scans, or points of them, that go no further.
   void dropped(std::size_t radar, const std::string& reason, std::uint64_t count = 1);
   void pressure();                               ///< a message came
@@ -126,7 +127,9 @@ class LiveMonitor {
   std::vector<Radar> radars_;
   EvidenceCollector collector_;  // since the session started
   Counter imu_;
-  bool imu_is_silent_ = false;  ///< as of the last call of describeInput
+  Counter usable_imu_;        ///< messages that move the estimate
+  std::string why_unusable_;  ///< of the last other message
+  std::string imu_fault_;  ///< why no odometry comes, as of the last call of describeInput; empty: it comes
   std::uint64_t imu_before_session_ = 0;
   ImuNoise imu_noise_;
   Barometer barometer_;
