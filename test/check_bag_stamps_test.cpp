@@ -4,6 +4,8 @@
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/PointCloud2.h>
 
+#include <functional>
+#include <map>
 #include <string>
 
 #include "plain_bag.h"
@@ -168,6 +170,68 @@ TEST_F(CheckBag, TwoScansOfOneStampAreNoCopies) {
     if (finding.subject != "trial run") continue;
     EXPECT_EQ(finding.text.find("100 %"), std::string::npos) << finding.text;
   }
+}
+
+/// The header stamps are those of one clock. Only the clock of the recorder, or of a converter, runs oddly.
+TEST_F(CheckBag, AnOddClockOfTheRecordsIsNotThatOfTheRadar) {
+  const auto rerecorded = [](const std::string& name, const std::function<double(double)>& secondsOf) {
+    std::string path = folder_ + "/" + name + ".bag";
+    const rosbag::Bag in(bag_);
+    rosbag::Bag out(path, rosbag::bagmode::Write);
+    rosbag::View view(in);
+    const ros::Time begin = view.getBeginTime();
+    for (const rosbag::MessageInstance& instance : view)
+      out.write(instance.getTopic(), begin + ros::Duration(secondsOf((instance.getTime() - begin).toSec())),
+                instance);
+    return path;
+  };
+  for (const auto& [name, secondsOf] : std::map<std::string, std::function<double(double)>>{
+           {"steps", [](double t) { return t < 20.0 ? t : t + 3.0; }},
+           {"is_fast", [](double t) { return 1.1 * t; }},
+           {"of_a_converter", [](double t) { return 0.05 * t; }}}) {
+    const BagCheck odd = check(rerecorded("record_clock_" + name, secondsOf), false);
+    EXPECT_EQ(configOf(odd).stamp_source, StampSource::kHeader) << name << "\n" << describeCheck(odd);
+    EXPECT_LT(turnFromTruth(odd), 5.0) << name;
+  }
+}
+
+TEST_F(CheckBag, TopicsThatWereWrittenOneAfterTheOtherAreNamed) {
+  const std::string path = folder_ + "/one_after_the_other.bag";
+  {
+    const rosbag::Bag in(bag_);
+    rosbag::Bag out(path, rosbag::bagmode::Write);
+    ros::Time record(1000.0);
+    for (const char* type : {"sensor_msgs/Imu", "sensor_msgs/PointCloud2"}) {
+      rosbag::View view(in, rosbag::TypeQuery(type));
+      for (const rosbag::MessageInstance& instance : view)
+        out.write(instance.getTopic(), record += ros::Duration(1e-4), instance);
+    }
+  }
+  const BagCheck odd = check(path, false);
+  expectLine(odd, FindingLevel::kOdd, {"stamps", "one after the other", "record time"});
+  EXPECT_EQ(configOf(odd).stamp_source, StampSource::kHeader);
+}
+
+TEST_F(CheckBag, ATriggerThatIsAsFarAheadAsTheScansIsNotChosen) {
+  const std::string path = folder_ + "/ahead.bag";
+  {
+    const rosbag::Bag in(bag_);
+    rosbag::Bag out(path, rosbag::bagmode::Write);
+    rosbag::View view(in);
+    for (const rosbag::MessageInstance& instance : view) {
+      const ros::Duration ahead(0.5);
+      if (const auto cloud = instance.instantiate<sensor_msgs::PointCloud2>()) {
+        cloud->header.stamp += ahead;
+        out.write(instance.getTopic(), instance.getTime(), *cloud);
+      } else if (const auto trigger = instance.instantiate<std_msgs::Header>()) {
+        trigger->stamp += ahead;
+        out.write(instance.getTopic(), instance.getTime(), *trigger);
+      } else {
+        out.write(instance.getTopic(), instance.getTime(), instance);
+      }
+    }
+  }
+  EXPECT_EQ(configOf(check(path, false)).stamp_source, StampSource::kArrival);
 }
 
 }  // namespace

@@ -8,6 +8,15 @@
 #include "rio_t/core/quantile.h"
 
 namespace rio_t {
+namespace {
+
+/// [s] The clock of the records may run oddly over a bag, but hardly within this.
+constexpr double kRecordedNear = 0.5;
+/// Messages of the IMU before a scan that are compared with it. A bus may hand over several at once, the
+/// newest last. More would compare a scan with samples of another time.
+constexpr std::size_t kCompared = 8;
+
+}  // namespace
 
 StreamTiming inspectTiming(const std::vector<MessageTimes>& times) {
   constexpr double kGapFactor = 3.5;
@@ -41,15 +50,22 @@ StreamTiming inspectTiming(const std::vector<MessageTimes>& times) {
   return timing;
 }
 
-StreamDelay delayAgainstImu(const std::vector<MessageTimes>& times, const std::vector<MessageTimes>& imu) {
-  std::int64_t smallest = std::numeric_limits<std::int64_t>::max();
-  for (const MessageTimes& each : imu)
-    smallest = std::min(smallest, each.record.nanoseconds() - each.stamp.nanoseconds());
+std::optional<StreamDelay> delayAgainstImu(const std::vector<MessageTimes>& times,
+                                           const std::vector<MessageTimes>& imu) {
   std::vector<double> delays;
-  delays.reserve(times.size());
-  for (const MessageTimes& each : times)
+  std::size_t recorded = 0;
+  for (const MessageTimes& each : times) {
+    const std::size_t before = recorded;
+    while (recorded < imu.size() && imu[recorded].record <= each.record) ++recorded;
+    if (recorded == before || each.record - imu[recorded - 1].record > kRecordedNear) continue;
+    std::int64_t smallest = std::numeric_limits<std::int64_t>::max();
+    for (std::size_t i = recorded - std::min(recorded, kCompared); i < recorded; ++i)
+      smallest = std::min(smallest, imu[i].record.nanoseconds() - imu[i].stamp.nanoseconds());
     delays.push_back(Time::fromNanoseconds(each.record.nanoseconds() - smallest) - each.stamp);
-  return {quantile(delays, 0.5), quantile(delays, 0.9)};
+  }
+  // Written topic after topic: the times of the records say nothing.
+  if (10 * delays.size() < times.size()) return std::nullopt;
+  return StreamDelay{quantile(delays, 0.5), quantile(delays, 0.9)};
 }
 
 }  // namespace rio_t

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "rio_t/core/time.h"
@@ -35,9 +36,12 @@ struct StreamDelay {
   double median = 0.0, most = 0.0;  ///< most: of nine in ten
 };
 
-/// The delays of a topic beyond those of the IMU: the smallest difference between record and stamp of the IMU
-/// carries the record times over into its clock, as ClockMap does. Both must not be empty. One stamp of the
-/// IMU that is ahead would decide, so leave out those that are out of place.
-StreamDelay delayAgainstImu(const std::vector<MessageTimes>& times, const std::vector<MessageTimes>& imu);
+/// The delays of a topic beyond those of the IMU. The smallest difference between record and stamp of the IMU
+/// messages that were recorded just before a message carries its record time over into the IMU clock. None if
+/// hardly any message has such neighbours: then the topics were written one after the other. Both must not be
+/// empty, in the order of the records. One stamp of the IMU that is ahead would decide, so leave out those
+/// that are out of place.
+std::optional<StreamDelay> delayAgainstImu(const std::vector<MessageTimes>& times,
+                                           const std::vector<MessageTimes>& imu);
 
 }  // namespace rio_t

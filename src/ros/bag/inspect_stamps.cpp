@@ -30,9 +30,10 @@ std::size_t sharedWords(const std::string& a, const std::string& b) {
       of_a.begin(), of_a.end(), [&](const std::string& word) { return of_b.count(word) != 0; }));
 }
 
-/// The header topic that stamps most of the scans, if it stamps eight in ten.
+/// The header topic that stamps most of the scans, if it stamps eight in ten, and none more than `bound`
+/// ahead of its arrival.
 const HeaderTopic* triggerOf(const Recording& recording, const std::vector<MessageTimes>& imu,
-                             const CloudTopic& cloud) {
+                             const CloudTopic& cloud, double bound) {
   const HeaderTopic* best = nullptr;
   std::size_t most = 0, shared = 0;
   const std::vector<RadarScan> empty(cloud.messages.size());
@@ -40,8 +41,8 @@ const HeaderTopic* triggerOf(const Recording& recording, const std::vector<Messa
     if (10 * topic.messages.size() < 8 * cloud.messages.size()) continue;
     const StreamTiming timing = inspectTiming(topic.times);
     if (!timing.stampsAreUsable()) continue;
-    const StreamDelay delay = delayAgainstImu(topic.times, imu);
-    if (std::abs(delay.median) > kLargestDelay) continue;
+    const std::optional<StreamDelay> delay = delayAgainstImu(topic.times, imu);
+    if (delay && (delay->median > kLargestDelay || delay->median < -bound)) continue;
     StampProposal stamps;
     stamps.source = StampSource::kTrigger;
     stamps.trigger_topic = topic.topic;
@@ -70,7 +71,8 @@ StampProposal proposeStamps(const Recording& recording, const std::vector<Messag
     return proposal;
   }
   const StreamTiming timing = inspectTiming(cloud.times);
-  StreamDelay delay = delayAgainstImu(cloud.times, imu);
+  const std::optional<StreamDelay> known_delay = delayAgainstImu(cloud.times, imu);
+  StreamDelay delay = known_delay.value_or(StreamDelay());
   delay.median -= proposal.shift;
   delay.most -= proposal.shift;
   const double bound = known.odometry.smoother.max_time_offset;
@@ -94,6 +96,11 @@ StampProposal proposeStamps(const Recording& recording, const std::vector<Messag
     proposal.text = "stamps in the header; scans arrive " + milliseconds(delay.median) +
                     " after them (90 %: " + milliseconds(delay.most) + "), jitter " +
                     milliseconds(timing.jitter);
+    if (!known_delay)
+      proposal.odd.push_back(
+          "scans and IMU were written one after the other, and rio_t reads a bag in the order of its "
+          "records: "
+          "write it again with a record time near the stamp of each message");
     if (delay.median < -kAhead)
       proposal.odd.push_back("the scans are stamped " + milliseconds(-delay.median) +
                              " ahead of their arrival; the offset estimate covers up to " +
@@ -108,7 +115,7 @@ StampProposal proposeStamps(const Recording& recording, const std::vector<Messag
                              "ignores its stamps");
     return proposal;
   }
-  if (const HeaderTopic* trigger = triggerOf(recording, imu, cloud)) {
+  if (const HeaderTopic* trigger = triggerOf(recording, imu, cloud, bound)) {
     proposal.source = StampSource::kTrigger;
     proposal.trigger_topic = trigger->topic;
     proposal.keys.set("stamp_source", "trigger", "By itself " + fault + ".");

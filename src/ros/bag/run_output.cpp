@@ -44,6 +44,13 @@ std::vector<std::string> savedBefore(const std::string& folder) {
   }
 }
 
+/// What became of a scan. Points that agree on no velocity by themselves may count one by one.
+std::string statusOf(const ScanResult& result) {
+  if (!result.used) return result.rejected_because;
+  const EgoVelocityStatus status = result.ego_velocity.status;
+  return isValid(status) ? toString(status) : "points_only";
+}
+
 }  // namespace
 
 std::vector<RunFile> RunFiles::all() const {
@@ -184,7 +191,7 @@ void RunOutput::addResult(const ScanResult& result) {
       .add(sigmasOf(velocity.covariance.diagonal()), 6)
       .add(std::to_string(velocity.inliers.size()))
       .add(std::to_string(velocity.points.size()))
-      .add(result.used ? toString(velocity.status) : result.rejected_because)
+      .add(statusOf(result))
       .endLine();
   if (!result.updated) return;
   row("time_offset" + end, stamp).add({result.time_offset, result.time_offset_sigma}, 9).endLine();
