@@ -7,6 +7,7 @@
 
 #include "full_disk.h"
 #include "rest_bag.h"
+#include "rio_t/ros/bag/run_output.h"
 
 namespace rio_t {
 namespace {
@@ -48,6 +49,12 @@ TEST_F(BagRunnerErrors, ATruncatedOrDamagedBagIsNamed) {
   std::ofstream(bag_, std::ios::binary | std::ios::trunc) << damaged;
   const Outcome outcome = run();
   if (outcome.status != 0) expectError(outcome, {bag_});
+}
+
+TEST_F(BagRunnerErrors, TwoRunsDoNotWriteIntoOneFolder) {
+  writeBag({});
+  const RunOutput other(out_);
+  expectError(run(), {"output folder", out_, "another run"});
 }
 
 TEST_F(BagRunnerErrors, MissingTopicsListThoseOfTheBag) {

@@ -183,8 +183,8 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
   if (!search.enough) {
     radar->tell(
         FindingLevel::kOdd, "mounting",
-        "not found: less than 3 s with motion; the radar is taken to look forward. Record with motion, or "
-        "set mounting_yaw_pitch_roll_deg by hand");
+        "not found: less than 3 s with motion and two velocities a second; the radar is taken to look "
+        "forward. Record with motion, or set mounting_yaw_pitch_roll_deg by hand");
     radar->keys.set("mounting_yaw_pitch_roll_deg", listOf({0.0, 0.0, 0.0}),
                     "Assumed: the bag does not show it. Yaw left, pitch up, roll right side down.");
     return;

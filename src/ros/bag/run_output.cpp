@@ -1,5 +1,8 @@
 #include "rio_t/ros/bag/run_output.h"
 
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
 #include <yaml-cpp/yaml.h>
 
 #include <cerrno>
@@ -132,6 +135,17 @@ void RunOutput::File::endLine() {
   if (buffer.size() > kBufferSize) flush();
 }
 
+FolderLock::FolderLock(const std::string& folder) : descriptor_(open(folder.c_str(), O_RDONLY | O_CLOEXEC)) {
+  // Some file systems know no locks.
+  if (descriptor_ < 0 || flock(descriptor_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
+  close(descriptor_);
+  throw OutputError("output folder " + folder + ": another run writes there; expected a folder of its own");
+}
+
+FolderLock::~FolderLock() {
+  if (descriptor_ >= 0) close(descriptor_);
+}
+
 RunOutput::RunOutput(const std::string& folder, const RunFiles& files) : folder_(folder), files_(files) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
@@ -139,6 +153,7 @@ RunOutput::RunOutput(const std::string& folder, const RunFiles& files) : folder_
     throw OutputError("output folder " + folder + ": cannot be made (" +
                       (error ? error.message() : "a file of that name exists") + ")");
   }
+  lock_.emplace(folder);
   for (const std::string& name : savedBefore(folder))
     std::filesystem::remove(std::filesystem::path(folder) / std::filesystem::path(name).filename(), error);
   std::filesystem::remove(folder + "/summary.yaml", error);

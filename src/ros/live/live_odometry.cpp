@@ -197,6 +197,9 @@ void LiveOdometry::addDiagnostics() {
     // Before the monitor is locked: the master may take its time.
     if (monitor_.lacksInput()) monitor_.setTopicTypes(publishedTypes());
     monitor_.describeInput(s, session_.get().get());
+    if (ros::Time::isSimTime() && ros::Time::now().isZero())
+      s.mergeSummary(diagnostic_msgs::DiagnosticStatus::WARN,
+                     "use_sim_time is true, and nothing publishes /clock");
     if (s.message != kSolverFallsBehind) tellStatus(s);  // else tellHealth tells it
   });
   if (!config_.barometer_topic.empty())
@@ -387,8 +390,9 @@ void LiveOdometry::tellHealth(const ScanResult& result) {
     ROS_WARN_STREAM(name_ << ": " << kGroundVehicleContradicted);
   if (result.health == Health::kDiverged && isTimeToTell("diverged")) {
     ROS_ERROR_STREAM(
-        name_ << ": diverged, radar and IMU contradict each other: do not trust the estimate (see "
-                 "diagnostics, on_divergence)");
+        name_ << ": diverged, "
+              << (result.is_contradicted ? "radar and IMU contradict each other" : "the velocity is lost")
+              << ": do not trust the estimate (see diagnostics, on_divergence)");
   }
 }
 

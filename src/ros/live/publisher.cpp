@@ -133,6 +133,7 @@ void LivePublisher::radarFrame(Radar& radar, const LiveSession::Result& live, co
   // stamp has been judged.
   const std::string& why_not = live.result.rejected_because;
   if (why_not == "stamp_ahead_of_imu" || why_not == "before_initialization") return;
+  if (why_not == "duplicate_stamp") return;  // tf has it
   // Also with a scan that is rejected: its cloud is shown.
   transform.header.stamp = toRosTime(stamp);
   radar_tf_->sendTransform(transform);

@@ -94,6 +94,19 @@ class OutputError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Holds a folder for one run at a time, if the file system knows locks. Throws OutputError if another has
+/// it.
+class FolderLock {
+ public:
+  explicit FolderLock(const std::string& folder);
+  ~FolderLock();
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+ private:
+  int descriptor_;
+};
+
 /// The files of a run: trajectory.txt and trajectory_optimized.txt (TUM), navigation.csv, biases.csv,
 /// summary.yaml; of each radar time_offset.csv, ego_velocity.csv and, if they are estimated, extrinsics.csv.
 /// With several radars these carry their names: time_offset_left.csv. The same calls write the same bytes.
@@ -112,7 +125,8 @@ class OutputError : public std::runtime_error {
 /// the IMU [rad]; zero where it is not estimated.
 class RunOutput {
  public:
-  /// Makes the folder and opens the files; throws OutputError naming what cannot be written. The files that
+  /// Makes the folder and opens the files; throws OutputError naming what cannot be written, or
+  /// if another run writes there. The files that
   /// an earlier run lists in its summary.yaml are removed, so that they are never taken for its own.
   explicit RunOutput(const std::string& folder, const RunFiles& files = {});
   /// If the run failed, this saves its tables as far as they go. Such a run has no summary.yaml.
@@ -149,6 +163,7 @@ class RunOutput {
 
   std::string folder_;
   RunFiles files_;
+  std::optional<FolderLock> lock_;
   std::map<std::string, File, std::less<>> open_;     // by name
   std::map<std::uint64_t, LandmarkPoint> landmarks_;  // all that there were, by id, as they were last
   std::optional<Time> last_navigation_;               // of the last line in navigation.csv
