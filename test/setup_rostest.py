@@ -12,6 +12,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Header
+from std_srvs.srv import Empty
 
 from rio_t import live_tester as tester
 from rio_t import tum
@@ -217,10 +218,12 @@ class SetupTest(tester.LiveTestCase):
         words = ("__name:=rio_t", "_config:=irs", "_trajectory_file:=poses.txt")
         with tester.Listener() as listener, tester.Process(tester.program("rio_t", "rio_t_node"), *words, cwd=self.folder):
             listener.wait_until_heard()
+            tester.call("/rio_t/reset", Empty)
             with tester.feed(listener, self.bag):
                 listener.wait_for("optimised odometry", lambda: listener.messages["odom_optimized"])
                 response = tester.call("/rio_t/save_trajectory")
         self.assertIn(" poses in " + os.path.realpath(self.path("poses.txt")), response.message)
+        self.assertIn("all since the last reset", response.message)
         self.assertTrue(os.path.isfile(self.path("poses.txt")))
 
     def test_a_topic_of_a_wrong_type_is_told(self):

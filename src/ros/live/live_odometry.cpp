@@ -370,6 +370,7 @@ bool LiveOdometry::onSaveTrajectory(std_srvs::Trigger::Request& /*request*/,
     writeTum(file, trajectory);
     response.success = 1U;
     response.message = std::to_string(trajectory.size()) + " poses in " + file;
+    if (monitor_.wasReset()) response.message += ", all since the last reset";
     if (stride > 1)
       response.message += ", one in " + std::to_string(stride) + ": more than " +
                           std::to_string(LiveSession::kMaxPoses) + " are not kept";

@@ -156,6 +156,11 @@ void LiveMonitor::result(const LiveSession::Result& result) {
   radar.last_update = last_update_;
 }
 
+bool LiveMonitor::wasReset() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return resets_ > 0;
+}
+
 void LiveMonitor::reset(const std::string& reason) {
   const std::lock_guard<std::mutex> lock(mutex_);
   ++resets_;

@@ -43,6 +43,7 @@ class LiveMonitor {
   void result(const LiveSession::Result& result);
   /// The session starts again; counters of the node go on.
   void reset(const std::string& reason);
+  bool wasReset() const;
   /// What is missing before there is a session at all; empty: nothing.
   void waitFor(const std::string& what);
   /// Texts about the frames, by key.
