@@ -105,8 +105,8 @@ class BatchSmoother {
     std::vector<Scan> scans;
     std::vector<Block*> extrinsics;  ///< by radar
     struct Clock {
-      Block* offset;         ///< the newest
-      bool stepped = false;  ///< since the newest
+      Block* offset = nullptr;  ///< the newest
+      bool stepped = false;     ///< since the newest
     };
     std::vector<Clock> clocks;  ///< by radar; the first is that of all if the offset is shared
   };

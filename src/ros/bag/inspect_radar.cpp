@@ -62,9 +62,9 @@ struct Looked {
 Looked look(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud,
             const StampProposal& stamps, const PointCloudFormat& format, const InertialTrack& track) {
   Looked looked;
-  DecodedClouds decoded = decodeAll(cloud, format);
+  const DecodedClouds decoded = decodeAll(cloud, format);
   looked.points_not_finite = decoded.points_not_finite;
-  looked.scans = stampScans(recording, imu.times, cloud, stamps, std::move(decoded.scans));
+  looked.scans = stampScans(recording, imu.times, cloud, stamps, decoded.scans);
   looked.cloud = inspectCloud(looked.scans);
   looked.velocities = radarVelocities(looked.scans);
   looked.sign = dopplerSignFromRanges(looked.scans, track);

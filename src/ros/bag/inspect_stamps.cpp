@@ -97,10 +97,9 @@ StampProposal proposeStamps(const Recording& recording, const std::vector<Messag
                     " after them (90 %: " + milliseconds(delay.most) + "), jitter " +
                     milliseconds(timing.jitter);
     if (!known_delay)
-      proposal.odd.push_back(
+      proposal.odd.emplace_back(
           "scans and IMU were written one after the other, and rio_t reads a bag in the order of its "
-          "records: "
-          "write it again with a record time near the stamp of each message");
+          "records: write it again with a record time near the stamp of each message");
     if (delay.median < -kAhead)
       proposal.odd.push_back("the scans are stamped " + milliseconds(-delay.median) +
                              " ahead of their arrival; the offset estimate covers up to " +

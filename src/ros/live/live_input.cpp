@@ -77,7 +77,7 @@ const char* LiveOdometry::followImuStamps(const ImuMeasurement& imu) {
 }
 
 std::optional<NavigationState> LiveOdometry::feed(LiveSession& session, const Received& received) {
-  const std::optional<NavigationState> state = session.addImu(received.imu);
+  std::optional<NavigationState> state = session.addImu(received.imu);
   account(session.stampWithImu(received.imu.time, received.record));
   return state;
 }
