@@ -123,32 +123,25 @@ TEST_F(TwoRadarDiagnostics, NameTheRadarThatIsSilent) {
   EXPECT_EQ(second(20, 20, 20).level, DiagnosticStatus::OK);
 }
 
-TEST_F(TwoRadarDiagnostics, IsAnErrorIfTheImuFallsSilent) {
+TEST_F(TwoRadarDiagnostics, IsAnErrorIfTheImuFallsSilentOrCannotBeUsed) {
+  const auto expectNoOdometry = [&](const std::string& because) {
+    Status status;
+    monitor.describeInput(status, &session);
+    EXPECT_EQ(status.level, DiagnosticStatus::ERROR);
+    EXPECT_EQ(status.message, because + ", topic " + config.imu_topic);
+    const Status estimate = odometry(session);
+    EXPECT_EQ(estimate.level, DiagnosticStatus::ERROR);
+    EXPECT_EQ(estimate.message, because + ": no odometry is published");
+  };
   second(20, 20, 20);
   for (int k = 0; k < 10; ++k) feed(0, true);
-  Status status;
-  monitor.describeInput(status, &session);
-  EXPECT_EQ(status.level, DiagnosticStatus::ERROR);
-  EXPECT_EQ(status.message, "the IMU is silent, topic " + config.imu_topic);
-  const Status estimate = odometry(session);
-  EXPECT_EQ(estimate.level, DiagnosticStatus::ERROR);
-  EXPECT_EQ(estimate.message, "the IMU is silent: no odometry is published");
-}
-
-TEST_F(TwoRadarDiagnostics, IsAnErrorIfNoMessageOfTheImuCanBeUsed) {
-  second(20, 20, 20);
+  expectNoOdometry("the IMU is silent");
   for (int k = 0; k < 10; ++k) {
     feed(0, true);
     monitor.imu(Time());
     monitor.imuUnusable("imu_not_finite");
   }
-  Status status;
-  monitor.describeInput(status, &session);
-  EXPECT_EQ(status.level, DiagnosticStatus::ERROR);
-  EXPECT_EQ(status.message, "no IMU message can be used (imu_not_finite), topic " + config.imu_topic);
-  const Status estimate = odometry(session);
-  EXPECT_EQ(estimate.level, DiagnosticStatus::ERROR);
-  EXPECT_EQ(estimate.message, "no IMU message can be used (imu_not_finite): no odometry is published");
+  expectNoOdometry("no IMU message can be used (imu_not_finite)");
 }
 
 /// The estimate runs, and the clock of a radar is far behind that of the IMU.

@@ -248,7 +248,7 @@ MountingSearch searchMounting(const std::vector<RadarVelocity>& velocities, cons
   double scale = 1.0;
   std::optional<Matrix3d> M;
   std::optional<std::array<Matrix3d, 2>> near;
-  Quadratic cost(kMountingM);
+  Matrix3d H_l;  // the information about the lever arm
   for (int round = 0; round < kRounds; ++round) {
     const int reach = round == 0 ? steps : kNear;
     const int first = std::max(-steps, middle - reach), last = std::min(steps, middle + reach);
@@ -258,24 +258,23 @@ MountingSearch searchMounting(const std::vector<RadarVelocity>& velocities, cons
     middle = findOffset(curves[s].costs, first, steps, scale, &result);
 
     const Quadratic with_lever_arm = mountingCost(result.offset, M, problem);
-    cost = withoutLast(with_lever_arm, kMountingL);
+    const Quadratic cost = withoutLast(with_lever_arm, kMountingL);
     near = {curves[0].least.R, curves[1].least.R};
     Matrix3d& R = (*near)[s];
     R = descend(withUpright(cost, options.up_I, result.sign), result.sign, R).R;
     M = result.sign * R;
     result.q_IR = Eigen::Quaterniond(R);
-    const Matrix3d H_l = with_lever_arm.H.bottomRightCorner(kMountingL, kMountingL);
+    H_l = with_lever_arm.H.bottomRightCorner(kMountingL, kMountingL);
     result.lever_arm_I =
         H_l.inverse() * (with_lever_arm.b.tail(kMountingL) -
                          with_lever_arm.H.bottomLeftCorner(kMountingL, kMountingM) * columnsOf(*M));
     scale = reweigh(result.offset, *M, result.lever_arm_I, &problem);
-    if (round < kRounds - 1) continue;
-    // With covariances that are turned by M, any other turn puts the noisy axis where little noise is
-    // expected: noise would look like evidence.
-    const Quadratic even = withoutLast(mountingCost(result.offset, std::nullopt, problem), kMountingL);
-    setSigmas(even, H_l, kAlike * scale, &result);
-    findOtherMounting(even, kAlike * scale, &result);
   }
+  // With covariances that are turned by M, any other turn puts the noisy axis where little noise is expected:
+  // noise would look like evidence.
+  const Quadratic even = withoutLast(mountingCost(result.offset, std::nullopt, problem), kMountingL);
+  setSigmas(even, H_l, kAlike * scale, &result);
+  findOtherMounting(even, kAlike * scale, &result);
   return result;
 }
 

@@ -62,7 +62,7 @@ class LandmarkMap {
     Eigen::Vector3d p_R;
     Eigen::Matrix3d covariance;  ///< of p_R [m^2]
   };
-  /// Of the landmark in this column of the prediction.
+  /// Predicts the landmark in this column of the prediction.
   Expected expected(const Prediction& prediction, const Extrinsics& T_IR, std::size_t column) const;
   struct Pair {
     Match match;

@@ -32,7 +32,7 @@ struct BatchScan {
   bool offset_stepped = false;                ///< t_O may have stepped since the scan before
 };
 
-/// What is known of a radar before its scans.
+/// A radar as it is known before its scans.
 struct BatchRadar {
   Extrinsics T_IR;                   ///< as configured, and where the solver starts
   double time_offset_initial = 0.0;  ///< [s] prior on t_O

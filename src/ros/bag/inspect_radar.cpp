@@ -211,7 +211,7 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
   std::string text;
   for (int k = 0; k < 3; ++k)
     text += (k == 0 ? "" : ", ") + fixedText(l[k], 2) + " +- " + fixedText(l_sigma[k], 2);
-  // Of few points a lever arm may be as wrong as a mounting.
+  // If the scans have few points, the lever arm may be as wrong as the mounting.
   const bool is_known = l_sigma.maxCoeff() < kUnknownLeverArm && !radar->isSparse();
   radar->ok("lever arm",
             "about [" + text + "] m: " +

@@ -47,7 +47,7 @@ std::vector<std::string> savedBefore(const std::string& folder) {
   }
 }
 
-/// What became of a scan. Points that agree on no velocity by themselves may count one by one.
+/// Says what became of a scan. If its points agree on no velocity, they may still count one by one.
 std::string statusOf(const ScanResult& result) {
   if (!result.used) return result.rejected_because;
   const EgoVelocityStatus status = result.ego_velocity.status;

@@ -34,7 +34,7 @@ struct Finding {
   std::string text;     ///< one sentence, or phrases
 };
 
-/// What check_bag says of a bag, an IMU or a radar.
+/// check_bag says this of a bag, an IMU or a radar.
 struct Findings {
   std::vector<Finding> findings;
   std::string to_do;  ///< one sentence if something is missing

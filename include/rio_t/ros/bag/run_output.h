@@ -125,9 +125,9 @@ class FolderLock {
 /// the IMU [rad]; zero where it is not estimated.
 class RunOutput {
  public:
-  /// Makes the folder and opens the files; throws OutputError naming what cannot be written, or
-  /// if another run writes there. The files that
-  /// an earlier run lists in its summary.yaml are removed, so that they are never taken for its own.
+  /// Makes the folder and opens the files. Throws OutputError naming what cannot be written, or if another
+  /// run writes there. It removes the files that an earlier run lists in its summary.yaml, so that they are
+  /// never taken for its own.
   explicit RunOutput(const std::string& folder, const RunFiles& files = {});
   /// If the run failed, this saves its tables as far as they go. Such a run has no summary.yaml.
   ~RunOutput();

@@ -14,7 +14,7 @@
 
 namespace rio_t {
 
-/// Where the stamp of a scan comes from (see stamping.h).
+/// The source of the stamp of a scan (see stamping.h).
 enum class StampSource {
   kHeader,   ///< "header": the cloud's own header
   kTrigger,  ///< "trigger": the trigger message that belongs to the scan
@@ -35,14 +35,14 @@ enum class ExtrinsicsSource {
   kTf,          ///< "tf": the transform from the cloud's frame_id to the frame of the IMU
 };
 
-/// Where the live node takes T_BI from, the pose of the IMU in base_link.
+/// The live node takes T_BI, the pose of the IMU in base_link, from here.
 enum class BaseExtrinsicsSource {
   kAuto,        ///< "auto": tf, if it knows both frames when the odometry starts; else the parameters
   kParameters,  ///< "parameters": base_extrinsics_translation and base_extrinsics_rotation_xyzw
   kTf,          ///< "tf": the transform from the frame of the IMU to base_link_frame, which is waited for
 };
 
-/// Where the odometry of the live node goes on after a reset.
+/// After a reset, the odometry of the live node goes on here.
 enum class ResetPose {
   kKeep,  ///< "keep": at the last pose
   kZero,  ///< "zero": at the origin
