@@ -1,6 +1,7 @@
 #include "bag_file.h"
 
 #include <geometry_msgs/PoseStamped.h>
+#include <ros/exception.h>
 #include <tf2_eigen/tf2_eigen.h>
 
 #include <boost/algorithm/string/join.hpp>
@@ -38,6 +39,13 @@ void openBag(const std::string& path, rosbag::Bag* bag) {
 
 std::runtime_error bagError(const std::string& bag, const std::string& what) {
   return std::runtime_error("bag " + bag + ": " + what);
+}
+
+std::runtime_error bagError(const std::string& bag, const std::exception& thrown) {
+  // What rosbag and the reading of messages throw. It says neither which file nor why.
+  const bool is_of_bytes = dynamic_cast<const ros::Exception*>(&thrown) != nullptr;
+  return bagError(bag,
+                  is_of_bytes ? std::string("perhaps it is damaged (") + thrown.what() + ")" : thrown.what());
 }
 
 bool everyTopic(const rosbag::ConnectionInfo* /*connection*/) { return true; }

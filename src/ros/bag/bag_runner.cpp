@@ -249,7 +249,7 @@ class BagJob {
     } catch (const OutputError&) {
       throw;
     } catch (const std::exception& error) {
-      throw bagError(bags_.name(), error.what());
+      throw bagError(bags_.name(), error);
     }
     RunSummary summary = player.summary(log);
     checkOutcome(bags_.name(), config, summary);

@@ -125,7 +125,7 @@ Recording readRecording(const std::vector<std::string>& paths, const CheckReques
   try {
     readMessages(view, request.set, &recording);
   } catch (const std::exception& error) {
-    throw bagError(bags.name(), std::string("perhaps it is damaged (") + error.what() + ")");
+    throw bagError(bags.name(), error);
   }
   return recording;
 }
