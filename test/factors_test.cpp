@@ -268,6 +268,33 @@ TEST(ImuRadarFactor, TheDerivativeInTheExtrinsicsIsExactAwayFromWhereTheScanWasP
   }
 }
 
+TEST(ImuRadarFactor, TheMountingCountsToFirstOrderFromWhereItIsLinear) {
+  const SyntheticMotion motion;
+  const ImuBuffer imu = motion.imu(0.5, 1.6, 400.0);
+  RadarVelocityMeasurement z = measurement(motion.time(1.0));
+  const StateBlock x = moved(motion.state(0.98), 0.05);
+  const auto residual = [&](const std::vector<double>& T_IR) {
+    const double t_O = 0.02;
+    const double* blocks[] = {x.data(), x.biases(), &t_O, T_IR.data()};
+    Eigen::Vector3d r;
+    RadarVelocityFactor(z, motion.time(0.98), imuModel(imu)).Evaluate(blocks, r.data(), nullptr);
+    return r;
+  };
+  const Eigen::Vector3d exact = residual(storedMounting());
+  z.linear_from_t_O = 0.02;
+  z.offset_gain = 0.6;
+  // Its mean motion is another one than that of the state.
+  z.slow = std::make_shared<SlowMotion>(SlowMotion{mounting(), {0.4, 0.9, -0.3}, {0.2, -0.5, 0.7}});
+  EXPECT_LT((residual(storedMounting()) - exact).norm(), 1e-12);
+
+  std::vector<double> turned = storedMounting();
+  Eigen::VectorXd delta(6);
+  delta << 0.1, -0.2, 0.15, 0.05, 0.02, -0.03;
+  ExtrinsicsManifold(EstimateExtrinsics::kPose).plus(turned.data(), delta.data(), turned.data());
+  expectJacobiansCorrect(RadarVelocityFactor(z, motion.time(0.98), imuModel(imu)),
+                         {motionOf(x), biasesOf(x), {0.02}, turned}, 1e-6, 1e-4);
+}
+
 TEST(ImuRadarFactor, TheDerivativeInTheOffsetIsThatOverItsWindow) {
   const SyntheticMotion motion;
   const ImuBuffer imu = motion.imu(0.5, 1.6, 400.0);

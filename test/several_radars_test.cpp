@@ -225,6 +225,58 @@ TEST(Extrinsics, WithoutExcitationKeepTheirSigma) {
   EXPECT_GT(sigmas[3], 0.7 * told.extrinsics_rotation_sigma);
 }
 
+TEST(Extrinsics, VibrationDoesNotShowThem) {
+  // The velocity that the window estimates follows the vibration, and does not show the turn about the way
+  // ahead.
+  const simulation::Preset preset = simulation::presetOf("kart");
+  simulation::MotionRequest request;
+  request.name = "constant_speed";
+  request.seed = 1;
+  request.duration = 60.0;
+  request.speed = 2.0;
+  request.rest.static_start = 3.0;
+  request.rest.static_end = 0.0;
+  for (const auto radar : {RadarFactor::kDoppler, RadarFactor::kVelocity}) {
+    SimulatedRun run("constant_speed", 1, 60.0, 3.0);
+    run.motion = simulation::makeMotion(request);
+    run.setup = preset.options;
+    run.setup.seed = 1;
+    run.setup.imu.accel_vibration = 1.6;
+    run.setup.imu.gyro_vibration = 0.04;
+    run.options.T_IR = run.setup.T_IR;
+    run.options.smoother.radar_factor = radar;
+    run.options.smoother.estimate_extrinsics = EstimateExtrinsics::kPose;
+    run.run();
+    const SmootherOptions& told = run.options.smoother;
+    const Eigen::Matrix<double, 6, 1> sigmas = run.last(0).T_IR_covariance.diagonal().cwiseSqrt();
+    EXPECT_GT(sigmas[3], 0.5 * told.extrinsics_rotation_sigma);
+    for (int i = 0; i < 3; ++i) EXPECT_GT(sigmas[i], 0.9 * told.extrinsics_translation_sigma) << i;
+  }
+}
+
+/// A kart that shakes: the lever arm of a metre turns the vibration of the gyro into velocity.
+TEST(Extrinsics, OfAKartThatShakesHaveHonestSigmas) {
+  const simulation::Preset preset = simulation::presetOf("kart");
+  Eigen::Vector3d squares = Eigen::Vector3d::Zero();
+  constexpr int kSeeds = 6;
+  for (int seed = 1; seed <= kSeeds; ++seed) {
+    SimulatedRun run(preset.motion, static_cast<std::uint64_t>(seed), 60.0, 2.0);
+    run.setup = preset.options;
+    run.setup.seed = static_cast<std::uint64_t>(seed);
+    run.setup.imu.accel_vibration = 1.6;
+    run.setup.imu.gyro_vibration = 0.04;
+    run.options.T_IR = preset.options.T_IR;
+    run.options.T_IR.q_IR = so3::exp(Eigen::Vector3d(0.0, 7.0 * kDegree, 0.0)) * run.options.T_IR.q_IR;
+    run.options.smoother.estimate_extrinsics = EstimateExtrinsics::kRotation;
+    run.run();
+    const Eigen::Vector3d e = so3::log(run.last(0).T_IR.q_IR * preset.options.T_IR.q_IR.conjugate());
+    const Eigen::Vector3d sigmas = run.last(0).T_IR_covariance.diagonal().tail<3>().cwiseSqrt();
+    squares += e.cwiseQuotient(sigmas).cwiseAbs2() / kSeeds;
+  }
+  EXPECT_LT(squares.maxCoeff(), 2.5) << squares.transpose();
+  EXPECT_LT(squares.mean(), 2.0) << squares.transpose();
+}
+
 TEST(Extrinsics, AtRestNothingIsLearnt) {
   SimulatedRun run("medium", 1, 40.0, 30.0);
   run.options.smoother.estimate_extrinsics = EstimateExtrinsics::kPose;

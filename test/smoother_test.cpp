@@ -344,5 +344,22 @@ TEST(PriorAtRest, TiltAndBiasAreKnownTogether) {
   EXPECT_LT(std::sqrt((J * P * J.transpose()).trace() / 3.0), 0.02);
 }
 
+TEST(SlowMotion, IsTheMeanAroundANodeWithWeightsThatFall) {
+  const SyntheticMotion motion;
+  const ImuBuffer imu = motion.imu(0.0, 2.0, 400.0);
+  std::vector<NodeEstimate> nodes;
+  for (const double t : {0.5, 0.85, 0.95, 1.0, 1.1, 1.5}) nodes.push_back({motion.time(t), motion.state(t)});
+  const Extrinsics T_IR = skewMounting();
+  const SlowMotion slow = slowMotion(nodes, 3, 0.2, imu, T_IR, Extrinsics());
+  const auto v_I = [&](std::size_t k) -> Eigen::Vector3d {
+    return nodes[k].x.q_WI().conjugate() * nodes[k].x.v_W();
+  };
+  const Eigen::Vector3d mean_I = (0.25 * v_I(1) + 0.75 * v_I(2) + v_I(3) + 0.5 * v_I(4)) / 2.5;
+  const Eigen::Vector3d omega_I = imu.mean(nodes[3].time, 0.2).angular_velocity - nodes[3].x.b_g();
+  EXPECT_LT((slow.omega_I - omega_I).norm(), 1e-12);
+  EXPECT_LT((slow.v_R - T_IR.R_RI() * (mean_I + omega_I.cross(T_IR.l_I))).norm(), 1e-9);
+  EXPECT_LT(slow.T_IR.q_IR.angularDistance(Eigen::Quaterniond::Identity()), 1e-12);
+}
+
 }  // namespace
 }  // namespace rio_t

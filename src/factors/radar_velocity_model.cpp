@@ -10,7 +10,8 @@ bool RadarVelocityModel::isCurrent(Time mean_time) const {
 }
 
 PredictedVelocity RadarVelocityModel::at(double const* const* parameters, bool derivatives) const {
-  const Extrinsics T_IR = toExtrinsics(parameters[3]);
+  const Extrinsics mounting = toExtrinsics(parameters[3]);
+  const Extrinsics& T_IR = scan_.slow ? scan_.slow->T_IR : mounting;
   const double t_O = scan_.linear_from_t_O.value_or(parameters[2][0]);
   const double away = parameters[2][0] - t_O;
   const bool is_linear = away != 0.0 && scan_.offset_gain > 0.0;
@@ -26,13 +27,25 @@ PredictedVelocity RadarVelocityModel::at(double const* const* parameters, bool d
   predicted.dv_dt_O = scan_.offset_gain * (R_RI * motion.dv_dt_O);
   predicted.v_R = R_RI * motion.v_I;
   if (is_linear) predicted.v_R += away * predicted.dv_dt_O;
+  Eigen::Matrix3d by_turn, by_lever;  // derivatives of v_R
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero();
+  if (scan_.slow) {
+    by_turn = so3::hat(scan_.slow->v_R) * R_RI;
+    by_lever = R_RI * so3::hat(scan_.slow->omega_I);
+    turn = so3::log(mounting.q_IR * T_IR.q_IR.conjugate());
+    predicted.v_R += by_turn * turn + by_lever * (mounting.l_I - T_IR.l_I);
+  }
   if (!derivatives) return predicted;
+  if (!scan_.slow) {
+    by_turn = so3::hat(predicted.v_R) * R_RI;
+    by_lever = R_RI * so3::hat(motion.omega_I - away * scan_.offset_gain * motion.alpha_I);
+  }
   predicted.J_motion = R_RI * motion.J_motion;
   predicted.J_biases = R_RI * motion.J_biases;
   predicted.J_extrinsics.setZero();
-  predicted.J_extrinsics.leftCols<3>() = so3::hat(predicted.v_R) * R_RI;
-  predicted.J_extrinsics.rightCols<3>() =
-      R_RI * so3::hat(motion.omega_I - away * scan_.offset_gain * motion.alpha_I);
+  // The block turns on the left: Log(Exp(d) Exp(turn)) ~ turn + Jr^-1(-turn) d.
+  predicted.J_extrinsics.leftCols<3>() = by_turn * so3::rightJacobianInverse(-turn);
+  predicted.J_extrinsics.rightCols<3>() = by_lever;
   return predicted;
 }
 

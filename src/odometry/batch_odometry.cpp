@@ -110,6 +110,7 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
     scan.stamp = result.scan.stamp;
     scan.t_O = result.time_offset;
     scan.radar = radar;
+    scan.slow_half_width = result.slow_half_width;
     scan.offset_stepped = stepped[radar];
     stepped[radar] = false;
     if (result.at_rest) scan.rest_velocity_sigma = result.rest_velocity_sigma;

@@ -99,7 +99,8 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   Seen seen = see(scan, context, smoother, answer);
   if (!isValid(seen.velocity.status)) return reject(toString(answer.ego_velocity.status));
   informOffset(seen, answer);
-  const RadarScanTime taken{scan.stamp, answer.offset_gain, answer.offset_half_width, offset()};
+  const RadarScanTime taken{scan.stamp, answer.offset_gain, answer.offset_half_width, answer.slow_half_width,
+                            offset()};
   if (isTightlyCoupled() && seen.velocity.status == EgoVelocityStatus::kMoving) {
     answer.doppler = dopplerOf(scan, seen, taken, answer.rate_variance);
     if (!answer.doppler) return reject("too_few_inliers");
@@ -128,6 +129,7 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
 
 void RadarChannel::informOffset(Seen& seen, RadarAnswer& answer) {
   answer.offset_gain = offsetGain(seen);
+  if (seen.moves && offset_widths_.gain() > 0.0) answer.slow_half_width = seen.dv_dt_O.half_width;
   if (answer.offset_gain == 0.0) return;
   // An offset that is wrong by c changes the velocity by (J + noise) c. J is in the factor; this is the
   // noise.
@@ -235,13 +237,15 @@ bool RadarChannel::confirmsRest(const Rest& rest, const RadarScan& scan, double 
 }
 
 double RadarChannel::offsetGain(Seen& seen) {
-  if (!seen.moves || !options_.smoother.estimate_time_offset) return 0.0;
+  const SmootherOptions& o = options_.smoother;
+  if (!seen.moves || !(o.estimate_time_offset || o.estimate_extrinsics != EstimateExtrinsics::kNone))
+    return 0.0;
   OffsetScan scan = seen.prediction->scan;
   scan.measured = seen.velocity.covariance;
   offset_widths_.add(scan);
   seen.dv_dt_O = offset_widths_.derivative(scan);
-  const bool moves_enough = seen.dv_dt_O.mean.norm() > options_.smoother.time_offset_min_acceleration;
-  return moves_enough ? offset_widths_.gain() : 0.0;
+  const bool moves_enough = seen.dv_dt_O.mean.norm() > o.time_offset_min_acceleration;
+  return o.estimate_time_offset && moves_enough ? offset_widths_.gain() : 0.0;
 }
 
 EgoVelocity RadarChannel::staticWorld(const RadarScan& scan, const Seen& seen) const {

@@ -21,7 +21,7 @@ RadarInWindow::RadarInWindow(const SmootherOptions& options, const Extrinsics& T
       offset_(std::move(offset)) {}
 
 std::vector<Block*> RadarInWindow::addExtrinsics(Window& window, const Extrinsics& T_IR) {
-  stamps_.clear();
+  scans_.clear();
   extrinsics_ = window.addCalibration(extrinsics_manifold_, stored(T_IR));
   if (options_.estimate_extrinsics != EstimateExtrinsics::kNone) return {extrinsics_.get()};
   window.setConstant(*extrinsics_, true);
@@ -112,15 +112,30 @@ std::optional<Eigen::Vector3d> RadarInWindow::velocityAt(const FixedLagSmoother&
   return T_IR.R_RI() * model_.at(StateView(x), time, stamp, offset(), T_IR.l_I, nullptr).v_I;
 }
 
+void RadarInWindow::updateSlowMotion(const FixedLagSmoother& smoother) {
+  const std::vector<NodeEstimate> nodes = smoother.nodes();
+  const Extrinsics T_IR = extrinsics();
+  for (const Scan& scan : scans_) {
+    if (scan.node < nodes.front().time) continue;
+    *scan.slow =
+        slowMotion(nodes, nearestNode(nodes, scan.node), scan.half_width, *model_.imu, T_IR, scan.slow->T_IR);
+  }
+}
+
 template <class Factor, class Measurement>
-bool RadarInWindow::addTerm(FixedLagSmoother& smoother, const Measurement& z,
+bool RadarInWindow::addTerm(FixedLagSmoother& smoother, Measurement z,
                             const std::shared_ptr<ceres::LossFunction>& loss) {
   const Time oldest = smoother.node(0).time - 2.0 * options_.max_time_offset;
-  stamps_.erase(std::remove_if(stamps_.begin(), stamps_.end(), [&](Time stamp) { return stamp < oldest; }),
-                stamps_.end());
+  scans_.erase(
+      std::remove_if(scans_.begin(), scans_.end(), [&](const Scan& scan) { return scan.stamp < oldest; }),
+      scans_.end());
   Block* node = smoother.nodeAt(nodeTime(z.stamp));
   if (node == nullptr) return false;
-  stamps_.push_back(z.stamp);
+  const bool is_estimated = options_.estimate_extrinsics != EstimateExtrinsics::kNone;
+  const auto slow = is_estimated ? std::make_shared<SlowMotion>(SlowMotion{extrinsics()}) : nullptr;
+  scans_.push_back({z.stamp, *node->time, z.slow_half_width, slow});
+  if (is_estimated) updateSlowMotion(smoother);
+  z.slow = slow;
   smoother.window().add(
       std::make_unique<Factor>(z, *node->time, model_),
       {node, &smoother.biases(), &offset_->of(smoother.window(), z.stamp), extrinsics_.get()}, loss);

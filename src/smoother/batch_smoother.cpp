@@ -9,6 +9,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "rio_t/core/so3.h"
 #include "rio_t/factors/imu_factor.h"
 #include "rio_t/factors/random_walk_factor.h"
 #include "rio_t/factors/zero_velocity_factor.h"
@@ -47,6 +48,10 @@ bool isNear(const BatchSolution& solution, const std::vector<double>& placed_by)
   return true;
 }
 
+/// [rad] A turn of the mounting over which its factors are linear enough: half its square is 5e-5 of the
+/// velocity.
+constexpr double kLinear = 0.01;
+
 /// If the offsets may take only this share of their move, they only swing from placement to placement.
 constexpr double kLeastShare = 0.01;
 
@@ -75,14 +80,6 @@ Eigen::MatrixXd jointCovariance(const BlockCovariances& P, const std::vector<int
 }
 
 }  // namespace
-
-std::size_t nearestNode(const std::vector<NodeEstimate>& nodes, Time time) {
-  const auto after = std::lower_bound(nodes.begin(), nodes.end(), time,
-                                      [](const NodeEstimate& node, Time t) { return node.time < t; });
-  const auto k = static_cast<std::size_t>(after - nodes.begin());
-  if (k == 0) return k;
-  return after == nodes.end() || time - nodes[k - 1].time < after->time - time ? k - 1 : k;
-}
 
 BatchSmoother::BatchSmoother(const SmootherOptions& options, const BatchOptions& batch, const ImuNoise& noise,
                              const Eigen::Vector3d& g_W, const ImuBuffer& imu)
@@ -139,9 +136,15 @@ void BatchSmoother::start(const BatchProblem& problem, const StateBlock& x,
   for (Block* offset : offsets) graph.clocks.push_back({offset});
 }
 
+std::vector<NodeEstimate> BatchSmoother::Graph::states() const {
+  std::vector<NodeEstimate> states;
+  states.reserve(nodes.size());
+  for (const Node& node : nodes) states.push_back({*node.motion->time, stateOf(*node.motion, *node.biases)});
+  return states;
+}
+
 BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std::vector<double>& t_O,
-                                          const std::vector<NodeEstimate>& guess,
-                                          const std::vector<Extrinsics>& mounting) const {
+                                          const BatchSolution& guess) const {
   const std::size_t scans = problem.scans.size();
   std::vector<Time> times(scans);
   for (std::size_t i = 0; i < scans; ++i) {
@@ -153,20 +156,29 @@ BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return times[a] < times[b]; });
   const auto stateAt = [&](Time time) {
-    const NodeEstimate& near = guess[nearestNode(guess, time)];
+    const NodeEstimate& near = guess.nodes[nearestNode(guess.nodes, time)];
     return carried(near.x, near.time, time, *imu_, g_W_);
   };
 
   const double spacing = minNodeSpacing(options_.time_offset_model);
+  const bool is_estimated = options_.estimate_extrinsics != EstimateExtrinsics::kNone;
   Graph graph;
   graph.scans.resize(scans);
-  start(problem, stateAt(problem.start), mounting, graph);
+  start(problem, stateAt(problem.start), guess.extrinsics, graph);
   for (const std::size_t i : order) {
     const BatchScan& scan = problem.scans[i];
     if (times[i] - *graph.nodes.back().motion->time > spacing) addNode(times[i], stateAt(times[i]), graph);
     Block* offset = offsetOf(problem, scan, t_O[i], graph);
-    graph.scans[i] = {graph.nodes.size() - 1, offset, graph.extrinsics[scan.radar]};
+    graph.scans[i] = {graph.nodes.size() - 1, offset, graph.extrinsics[scan.radar],
+                      is_estimated ? std::make_shared<SlowMotion>() : nullptr};
     addTerms(scan, graph.scans[i], t_O[i], graph);
+  }
+  if (!is_estimated) return graph;
+  const std::vector<NodeEstimate> nodes = graph.states();
+  for (std::size_t i = 0; i < scans; ++i) {
+    const BatchScan& scan = problem.scans[i];
+    const Extrinsics& T_IR = guess.extrinsics[scan.radar];
+    *graph.scans[i].slow = slowMotion(nodes, graph.scans[i].node, scan.slow_half_width, *imu_, T_IR, T_IR);
   }
   return graph;
 }
@@ -213,6 +225,7 @@ void BatchSmoother::addTerms(const BatchScan& scan, const Graph::Scan& at, doubl
   // Placed anew where the offset moves, so first order is enough.
   const auto placed = [&](auto z) {
     if (atMeasurement() || z.offset_gain == 0.0) z.linear_from_t_O = t_O;
+    z.slow = at.slow;
     return z;
   };
   if (scan.doppler) {
@@ -245,30 +258,29 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
   if (problem.guess.empty()) throw std::invalid_argument("batch: no state to begin from");
   std::vector<double> t_O;
   for (const BatchScan& scan : problem.scans) t_O.push_back(scan.t_O);
-
   BatchSolution solution;
+  solution.nodes = problem.guess;
   for (const BatchRadar& radar : problem.radars) solution.extrinsics.push_back(radar.T_IR);
-  Graph graph = place(problem, t_O, problem.guess, solution.extrinsics);
-  solution.placements = 1;
+
   double moved_before = std::numeric_limits<double>::infinity();
   double share = 1.0;  // of its move that an offset takes
   for (;;) {
+    Graph graph = place(problem, t_O, solution);
+    ++solution.placements;
+    const std::vector<Extrinsics> linear_from = std::exchange(solution.extrinsics, {});
     Solution solved = rio_t::solve(graph.window, {batch_.max_iterations - solution.iterations, kConverged},
                                    options_.solver);
     solution.iterations += solved.iterations;
-    solution.nodes.clear();
-    for (const Graph::Node& node : graph.nodes)
-      solution.nodes.push_back({*node.motion->time, stateOf(*node.motion, *node.biases)});
-    solution.extrinsics.clear();
-    for (const Block* block : graph.extrinsics) solution.extrinsics.push_back(toExtrinsics(block->x.data()));
+    read(graph, solution);
     double moved = 0.0;  // [s]
     for (std::size_t i = 0; i < t_O.size(); ++i)
-      moved = std::max(moved, std::abs(graph.scans[i].offset->x[0] - t_O[i]));
-    const bool placed = !atMeasurement() || moved <= batch_.placement_tolerance;
+      moved = std::max(moved, std::abs(solution.scans[i].t_O - t_O[i]));
+    const bool offsets_hold = !atMeasurement() || moved <= batch_.placement_tolerance;
+    const bool placed = offsets_hold && mountingsHold(graph, solved, linear_from);
     const bool swings = share < kLeastShare;
     if (placed || swings || solution.iterations >= batch_.max_iterations) {
       const BlockCovariances P = solved.elimination.covariances();
-      read(graph, solved, P, solution);
+      readCovariances(graph, solved, P, solution);
       solution.termination = solved.termination;
       if (!solved.converged() && isNear(solved, P)) solution.termination = SolverTermination::kConverged;
       if (solution.converged() && !placed && !isNear(solution, t_O))
@@ -277,26 +289,48 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
       solution.system.blocks.clear();  // they go with the graph
       return solution;
     }
+    if (offsets_hold) continue;
     // The nodes of a sparse radar may swing: placed late, its offset comes out early, and then late again.
     if (moved > 0.5 * moved_before) share *= 0.5;
     moved_before = moved;
-    for (std::size_t i = 0; i < t_O.size(); ++i) t_O[i] += share * (graph.scans[i].offset->x[0] - t_O[i]);
-    graph = place(problem, t_O, solution.nodes, solution.extrinsics);
-    ++solution.placements;
+    for (std::size_t i = 0; i < t_O.size(); ++i) t_O[i] += share * (solution.scans[i].t_O - t_O[i]);
   }
 }
 
-void BatchSmoother::read(const Graph& graph, const Solution& solved, const BlockCovariances& P,
-                         BatchSolution& solution) const {
+bool BatchSmoother::mountingsHold(const Graph& graph, const Solution& solved,
+                                  const std::vector<Extrinsics>& linear_from) {
+  for (std::size_t k = 0; k < linear_from.size(); ++k) {
+    const Block& block = *graph.extrinsics[k];
+    if (block.is_constant) continue;
+    const Eigen::Vector3d turn =
+        so3::log(toExtrinsics(block.x.data()).q_IR * linear_from[k].q_IR.conjugate());
+    if (turn.norm() <= kLinear) continue;
+    const Eigen::MatrixXd P = solved.elimination.covariance({solved.system.indexOf(block)});
+    if (turn.dot(P.topLeftCorner<3, 3>().ldlt().solve(turn)) > 1.0) return false;
+  }
+  return true;
+}
+
+void BatchSmoother::read(const Graph& graph, BatchSolution& solution) {
+  solution.nodes = graph.states();
+  solution.scans.clear();
+  for (const Graph::Scan& scan : graph.scans) solution.scans.push_back({scan.node, scan.offset->x[0], {}});
+  solution.extrinsics.clear();
+  for (const Block* block : graph.extrinsics) solution.extrinsics.push_back(toExtrinsics(block->x.data()));
+}
+
+void BatchSmoother::readCovariances(const Graph& graph, const Solution& solved, const BlockCovariances& P,
+                                    BatchSolution& solution) {
   std::unordered_map<const Block*, int> index;
   for (const Block* block : solved.system.blocks) index.emplace(block, static_cast<int>(index.size()));
   for (const Graph::Node& node : graph.nodes)
     solution.covariances.emplace_back(jointCovariance(P, {index.at(node.motion), index.at(node.biases)}));
-  for (const Graph::Scan& scan : graph.scans) {
+  for (std::size_t i = 0; i < graph.scans.size(); ++i) {
+    const Graph::Scan& scan = graph.scans[i];
     const Graph::Node& node = graph.nodes[scan.node];
     std::vector<int> blocks = {index.at(node.motion), index.at(node.biases), index.at(scan.offset)};
     if (!scan.extrinsics->is_constant) blocks.push_back(index.at(scan.extrinsics));
-    solution.scans.push_back({scan.node, scan.offset->x[0], jointCovariance(P, blocks)});
+    solution.scans[i].covariance = jointCovariance(P, blocks);
   }
   for (const Block* block : graph.extrinsics)
     solution.extrinsics_covariances.push_back(block->is_constant ? Eigen::MatrixXd()

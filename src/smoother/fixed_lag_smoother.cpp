@@ -55,6 +55,13 @@ NodeEstimate FixedLagSmoother::node(std::size_t k) const {
   return {nodes_[k].time(), stateOf(*nodes_[k].motion, *biases_)};
 }
 
+std::vector<NodeEstimate> FixedLagSmoother::nodes() const {
+  std::vector<NodeEstimate> nodes;
+  nodes.reserve(size());
+  for (std::size_t k = 0; k < size(); ++k) nodes.push_back(node(k));
+  return nodes;
+}
+
 std::size_t FixedLagSmoother::indexBefore(Time time) const {
   std::size_t k = nodes_.size() - 1;
   while (k > 0 && nodes_[k].time() > time) --k;

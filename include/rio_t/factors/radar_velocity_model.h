@@ -1,12 +1,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <optional>
 
 #include "rio_t/core/time.h"
 #include "rio_t/factors/extrinsics_manifold.h"
 #include "rio_t/factors/offset_derivative.h"
 #include "rio_t/factors/radar_motion.h"
+#include "rio_t/factors/slow_motion.h"
 #include "rio_t/factors/state_block.h"
 
 namespace rio_t {
@@ -17,10 +19,15 @@ struct RadarScanTime {
   /// Share of the derivative with respect to t_O that is motion and not noise of the IMU, see OffsetEvidence.
   double offset_gain = 1.0;
   double offset_half_width = kOffsetHalfWidth;  ///< of the mean in that derivative [s]
+  /// Of the mean in SlowMotion [s]. A scan that shows no motion of its radar has the widest.
+  double slow_half_width = kMaxOffsetHalfWidth;
   /// If set, the motion is taken at this t_O [s], and to first order from there. Exactly at each t_O, the
   /// noise of the IMU over a shift raises the cost whatever the direction of the shift. With a gain of 0, the
   /// scan does not tell the offset.
   std::optional<double> linear_from_t_O = std::nullopt;
+  /// If set, the velocity is linear in the mounting, with the derivatives that this motion gives. It may
+  /// change between two solves, not during one.
+  std::shared_ptr<const SlowMotion> slow = nullptr;
 };
 
 /// Velocity of the radar at the time of measurement of a scan, in R, and its derivatives.

@@ -39,13 +39,14 @@ struct ScanAnswer {
   /// Health judges this innovation. Its velocity is measured without the prediction. None if no majority of
   /// the points agrees.
   std::optional<Innovation> innovation;
-  std::optional<DopplerMeasurement> doppler;    ///< its points, if they and not the velocity count
-  std::string rejected_because;                 ///< snake case, empty if used; keys of `scans_rejected`
-  bool at_rest = false;                         ///< the IMU shows rest, and the points do not deny it
-  bool offset_stepped = false;                  ///< t_O stepped before this scan
-  double offset_gain = 0.0;                     ///< see OffsetEvidence; 0: the scan does not tell the offset
-  double offset_half_width = kOffsetHalfWidth;  ///< of the mean of the IMU in the derivative [s]
-  double offset_information = 0.0;              ///< what the scan tells of the offset, if used [1/s^2]
+  std::optional<DopplerMeasurement> doppler;     ///< its points, if they and not the velocity count
+  std::string rejected_because;                  ///< snake case, empty if used; keys of `scans_rejected`
+  bool at_rest = false;                          ///< the IMU shows rest, and the points do not deny it
+  bool offset_stepped = false;                   ///< t_O stepped before this scan
+  double offset_gain = 0.0;                      ///< see OffsetEvidence; 0: the scan does not tell the offset
+  double offset_half_width = kOffsetHalfWidth;   ///< of the mean of the IMU in the derivative [s]
+  double slow_half_width = kMaxOffsetHalfWidth;  ///< see SlowMotion [s]
+  double offset_information = 0.0;               ///< what the scan tells of the offset, if used [1/s^2]
   /// Per axis, what the noise of the derivative adds to what went into the window (18e) [m^2/s^2].
   double rate_variance = 0.0;
 };

@@ -45,7 +45,9 @@ class RadarInWindow {
   /// The velocity alone, in R [m/s].
   std::optional<Eigen::Vector3d> velocityAt(const FixedLagSmoother& smoother, Time stamp) const;
   /// Whether the scan with that stamp has a term already.
-  bool has(Time stamp) const { return std::find(stamps_.begin(), stamps_.end(), stamp) != stamps_.end(); }
+  bool has(Time stamp) const {
+    return std::any_of(scans_.begin(), scans_.end(), [&](const Scan& scan) { return scan.stamp == stamp; });
+  }
   /// Adds the term of a scan that has none; false if the scan is older than the window.
   bool add(FixedLagSmoother& smoother, const RadarVelocityMeasurement& z);
   bool add(FixedLagSmoother& smoother, const DopplerMeasurement& z);
@@ -63,9 +65,10 @@ class RadarInWindow {
  private:
   /// Adds the block to a window that starts. Returns it if it is estimated.
   std::vector<Block*> addExtrinsics(Window& window, const Extrinsics& T_IR);
+  /// Sets the slow motion of all scans anew, with all the scans that came after them.
+  void updateSlowMotion(const FixedLagSmoother& smoother);
   template <class Factor, class Measurement>
-  bool addTerm(FixedLagSmoother& smoother, const Measurement& z,
-               const std::shared_ptr<ceres::LossFunction>& loss);
+  bool addTerm(FixedLagSmoother& smoother, Measurement z, const std::shared_ptr<ceres::LossFunction>& loss);
 
   SmootherOptions options_;  // read-only after construction, as the next four
   Extrinsics T_IR_;
@@ -74,7 +77,12 @@ class RadarInWindow {
   std::shared_ptr<const Manifold> extrinsics_manifold_;
   std::shared_ptr<OffsetBlocks> offset_;
   std::shared_ptr<Block> extrinsics_;
-  std::vector<Time> stamps_;  ///< of the scans in the window
+  struct Scan {
+    Time stamp, node;
+    double half_width;                 ///< [s] of the mean in `slow`
+    std::shared_ptr<SlowMotion> slow;  ///< that of its factor; null if the mounting is not estimated
+  };
+  std::vector<Scan> scans_;  ///< in the window
 };
 
 }  // namespace rio_t

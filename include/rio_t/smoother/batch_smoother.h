@@ -27,9 +27,10 @@ struct BatchScan {
   std::size_t radar = 0;
   double t_O = 0.0;  ///< [s] initial value; also places the node (imu model)
   std::optional<RadarVelocityMeasurement> velocity;
-  std::optional<DopplerMeasurement> doppler;  ///< instead of the velocity; neither: the scan is not used
-  std::optional<double> rest_velocity_sigma;  ///< [m/s] set if the platform is at rest
-  bool offset_stepped = false;                ///< t_O may have stepped since the scan before
+  std::optional<DopplerMeasurement> doppler;     ///< instead of the velocity; neither: the scan is not used
+  std::optional<double> rest_velocity_sigma;     ///< [m/s] set if the platform is at rest
+  double slow_half_width = kMaxOffsetHalfWidth;  ///< of the mean in SlowMotion [s]
+  bool offset_stepped = false;                   ///< t_O may have stepped since the scan before
 };
 
 /// A radar as it is known before its scans.
@@ -97,10 +98,12 @@ class BatchSmoother {
       Block* biases;
     };
     std::vector<Node> nodes;
+    std::vector<NodeEstimate> states() const;
     struct Scan {
       std::size_t node;
       Block* offset;
       Block* extrinsics;
+      std::shared_ptr<SlowMotion> slow;  ///< null if the mounting is not estimated
     };
     std::vector<Scan> scans;
     std::vector<Block*> extrinsics;  ///< by radar
@@ -110,8 +113,9 @@ class BatchSmoother {
     };
     std::vector<Clock> clocks;  ///< by radar; the first is that of all if the offset is shared
   };
-  Graph place(const BatchProblem& problem, const std::vector<double>& t_O,
-              const std::vector<NodeEstimate>& guess, const std::vector<Extrinsics>& mounting) const;
+  /// The solver starts from the nodes and extrinsics of `guess`, and the factors are linear in the mounting
+  /// from there.
+  Graph place(const BatchProblem& problem, const std::vector<double>& t_O, const BatchSolution& guess) const;
   /// Adds the first node, the calibration of each radar and their priors.
   void start(const BatchProblem& problem, const StateBlock& x, const std::vector<Extrinsics>& mounting,
              Graph& graph) const;
@@ -124,9 +128,14 @@ class BatchSmoother {
   Block& addOffset(Window& window, Time time, double t_O) const;
   /// Biases that hold from `since` on. The time of the block is their end, `window` later.
   Block& addBiases(Window& window, Time since, const StateBlock& x) const;
-  /// Sets what the solution says of nodes, scans and extrinsics, with covariances.
-  void read(const Graph& graph, const Solution& solved, const std::vector<std::map<int, Eigen::MatrixXd>>& P,
-            BatchSolution& solution) const;
+  /// Whether no mounting is turned by more than a standard deviation from where the factors are linear. A
+  /// smaller turn is noise: to follow it would add it up.
+  static bool mountingsHold(const Graph& graph, const Solution& solved,
+                            const std::vector<Extrinsics>& linear_from);
+  /// Sets nodes, scans and extrinsics of the solution, without covariances.
+  static void read(const Graph& graph, BatchSolution& solution);
+  static void readCovariances(const Graph& graph, const Solution& solved,
+                              const std::vector<std::map<int, Eigen::MatrixXd>>& P, BatchSolution& solution);
   RadarMotionModel model() const;
 
   SmootherOptions options_;  // all read-only after construction
@@ -137,8 +146,5 @@ class BatchSmoother {
   std::shared_ptr<const Manifold> motion_manifold_, bias_manifold_, offset_manifold_, extrinsics_manifold_;
   std::shared_ptr<ceres::LossFunction> loss_;  // of velocities; the points have their own
 };
-
-/// Index of the node nearest to `time`; `nodes` in the order of their times, not empty.
-std::size_t nearestNode(const std::vector<NodeEstimate>& nodes, Time time);
 
 }  // namespace rio_t

@@ -10,18 +10,13 @@
 #include "rio_t/imu/buffer.h"
 #include "rio_t/imu/noise.h"
 #include "rio_t/imu/preintegration.h"
+#include "rio_t/smoother/node_estimate.h"
 #include "rio_t/smoother/options.h"
 
 namespace rio_t {
 
 /// [s] A scan as near as this to a node shares it: an IMU factor over no time would have infinite weight.
 double minNodeSpacing(TimeOffsetModel model);
-
-/// A node of the window: its time and its state.
-struct NodeEstimate {
-  Time time;
-  StateBlock x;
-};
 
 /// A state carried to a time, with the joint covariance of it and of calibration blocks, in this order.
 struct PredictedState {
@@ -81,6 +76,7 @@ class FixedLagSmoother {
   std::size_t size() const { return nodes_.size(); }
   NodeEstimate node(std::size_t k) const;
   NodeEstimate newest() const { return node(nodes_.size() - 1); }
+  std::vector<NodeEstimate> nodes() const;
   /// Joint covariance of the newest node, the biases and calibration blocks, as of the last `optimize` or
   /// `settle`.
   Eigen::MatrixXd newestCovariance(const std::vector<const Block*>& calibration) const;
