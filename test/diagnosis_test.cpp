@@ -375,6 +375,21 @@ TEST(Diagnosis, AVehicleFrameThatTurnsFarIsNamed) {
   EXPECT_EQ(diagnose(far, config).verdict, RunVerdict::kDoubtful);
 }
 
+TEST(Diagnosis, AMotionThatIsNotAVehiclesMakesARunDoubtful) {
+  EvidenceCollector collector{Config()};
+  ScanResult result;
+  result.used = true;
+  result.ground_vehicle.emplace().is_contradicted = true;
+  collector.add(result);
+  result.ground_vehicle->is_contradicted = false;  // the estimate started again
+  collector.add(result);
+  RunEvidence evidence = goodRun();
+  evidence.vehicle_contradicted =
+      collector.evidence(RadarInertialOdometry(OdometryOptions()), std::nullopt).vehicle_contradicted;
+  expectSays(first(evidence), {"vehicle_contradicted", "platform: free"});
+  EXPECT_EQ(diagnose(evidence, Config()).verdict, RunVerdict::kDoubtful);
+}
+
 TEST(Diagnosis, ADivergenceForLackOfScansNamesTheLack) {
   RunEvidence evidence = withRejected("stamp_ahead_of_imu");
   evidence.divergences = 1;

@@ -169,9 +169,13 @@ void describeUp(ImuInspection* imu) {
   imu->tell(
       FindingLevel::kOdd, "IMU axes",
       "gravity is on " + axisName(*up) +
-          ", so z of the IMU is not up: the odometry is right, but rviz shows base_link tilted, since it is "
-          "the IMU by default. Give base_link by tf, or set base_extrinsics_rotation_xyzw: [" +
-          fixedTexts(q_BI.coeffs(), 4) + "] to make its z up (docs/frames.md)");
+          ", so z of the IMU is not up. If it is mounted so, the odometry is right, but rviz shows base_link "
+          "tilted, since it is the IMU by default. Give base_link by tf, or set "
+          "base_extrinsics_rotation_xyzw: [" +
+          fixedTexts(q_BI.coeffs(), 4) + "] to make its z up (docs/frames.md)" +
+          (axis.z() < 0.0 ? ". If z of the IMU does look up, its driver negates the acceleration, and the "
+                            "track will be a mirror image"
+                          : ""));
 }
 
 void describeNoise(ImuInspection* imu) {

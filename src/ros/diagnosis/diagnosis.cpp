@@ -181,7 +181,16 @@ void addOffsetSteps(const RunEvidence& evidence, const Config& config, std::vect
       {"offset_steps", "The time offset stepped " + std::to_string(steps) + " times.", remedy, 0.1});
 }
 
-void addVehicleFrame(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
+void addVehicle(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
+  // It is certain, and the estimate keeps what the constraint did before.
+  if (evidence.vehicle_contradicted)
+    causes->push_back({"vehicle_contradicted",
+                       "The motion contradicted platform: ground_vehicle: the platform moves sideways or "
+                       "upwards.",
+                       "If it is no ground vehicle, set platform: free. If it is one, check "
+                       "vehicle_frame_rotation_xyzw, the way it drives, and vehicle_frame_translation, the "
+                       "point that does not slip.",
+                       1.0});
   const double sigmas = vehicleTurnSigmas(evidence, config);
   if (sigmas <= kFarMounting) return;
   const Eigen::Vector3d turn = evidence.vehicle_turn / kDegree;
@@ -394,7 +403,7 @@ Diagnosis diagnose(const RunEvidence& evidence, const Config& config) {
   addStart(evidence, config, &result.causes);
   addOffset(evidence, config, &result.causes);
   addOffsetSteps(evidence, config, &result.causes);
-  addVehicleFrame(evidence, config, &result.causes);
+  addVehicle(evidence, config, &result.causes);
   addSolver(evidence, config, &result.causes);
   addImu(evidence, config, &result.causes);
   addHeading(evidence, &result.causes);

@@ -46,8 +46,10 @@ void EvidenceCollector::add(const ScanResult& result) {
   // now.
   if (result.used || result.at_rest)
     last_used_[result.scan.radar] = std::max(result.scan.stamp, newest_state_.value_or(result.scan.stamp));
-  if (result.ground_vehicle)
+  if (result.ground_vehicle) {
     evidence_.vehicle_turn = so3::log(result.ground_vehicle->q_IV * configured_q_IV_.conjugate());
+    evidence_.vehicle_contradicted = evidence_.vehicle_contradicted || result.ground_vehicle->is_contradicted;
+  }
   ++evidence_.scans_judged;
   if (result.health == Health::kDiverged) ++evidence_.scans_diverged;
   if (result.is_contradicted) ++evidence_.scans_contradicted;

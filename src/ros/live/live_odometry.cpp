@@ -188,11 +188,7 @@ void LiveOdometry::addDiagnostics() {
   diagnostics_.emplace(node_, private_node_, name_);
   diagnostics_->setHardwareID("none");
   using Status = LiveMonitor::Status;
-  diagnostics_->add("odometry", [this](Status& s) {
-    const Session now = session_.get();
-    monitor_.describeOdometry(s, now.get());
-    tellStatus(s);  // a divergence, too: tellHealth tells it only while scans come
-  });
+  // Before the odometry, which says what is wrong with its IMU.
   diagnostics_->add("input", [this](Status& s) {
     // Before the monitor is locked: the master may take its time.
     if (monitor_.lacksInput()) monitor_.setTopicTypes(publishedTypes());
@@ -201,6 +197,11 @@ void LiveOdometry::addDiagnostics() {
       s.mergeSummary(diagnostic_msgs::DiagnosticStatus::WARN,
                      "use_sim_time is true, and nothing publishes /clock");
     if (s.message != kSolverFallsBehind) tellStatus(s);  // else tellHealth tells it
+  });
+  diagnostics_->add("odometry", [this](Status& s) {
+    const Session now = session_.get();
+    monitor_.describeOdometry(s, now.get());
+    tellStatus(s);  // a divergence, too: tellHealth tells it only while scans come
   });
   if (!config_.barometer_topic.empty())
     diagnostics_->add("barometer", [this](Status& s) { monitor_.describeBarometer(s); });

@@ -96,6 +96,7 @@ struct RunEvidence {
   /// [rad] How far the estimate has turned the vehicle frame from the configured one; zero without such a
   /// frame.
   Eigen::Vector3d vehicle_turn = Eigen::Vector3d::Zero();
+  bool vehicle_contradicted = false;     ///< the motion was that of no ground vehicle
   std::vector<ImuRestart> imu_restarts;  ///< none in the live node, whose evidence begins after the last one
   std::vector<RadarSummary> radars;      ///< in the order of the configuration
 };
