@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rio_t/factors/offset_derivative.h"
+
 namespace rio_t {
 
 std::size_t nearestNode(const std::vector<NodeEstimate>& nodes, Time time) {
@@ -29,7 +31,10 @@ SlowMotion slowMotion(const std::vector<NodeEstimate>& nodes, std::size_t k, dou
   for (std::size_t i = k; i-- > 0 && add(nodes[i]);) continue;
   SlowMotion slow;
   slow.T_IR = linear_from;
-  slow.omega_I = imu.mean(time, half_width).angular_velocity - nodes[k].x.b_g();
+  // The IMU reaches kOffsetHalfWidth past the newest node. It may reach further, but then the order of the
+  // messages would change the result.
+  const double reached = nodes.back().time + kOffsetHalfWidth - time;
+  slow.omega_I = imu.mean(time, std::min(half_width, reached)).angular_velocity - nodes[k].x.b_g();
   slow.v_R = T_IR.R_RI() * (v_I / weights + slow.omega_I.cross(T_IR.l_I));
   return slow;
 }
