@@ -205,17 +205,23 @@ TEST(Extrinsics, OfASparseRadarAreTheSameFromDifferentStarts) {
   EXPECT_LT(turnDegrees(found[0], found[1]), 1.5);
 }
 
-TEST(Extrinsics, WithoutExcitationKeepTheirSigma) {
-  // A constant speed straight ahead: the turn about the way ahead does not show, nor does the lever arm.
+/// A minute at a constant speed [m/s], after a rest.
+SimulatedRun straightAhead(double speed) {
   simulation::MotionRequest request;
   request.name = "constant_speed";
   request.seed = 1;
   request.duration = 60.0;
-  request.speed = 1.0;
+  request.speed = speed;
   request.rest.static_start = 5.0;
   request.rest.static_end = 0.0;
-  SimulatedRun run("constant_speed", 1, 60.0, 5.0);
+  SimulatedRun run(request.name, request.seed, request.duration);
   run.motion = simulation::makeMotion(request);
+  return run;
+}
+
+TEST(Extrinsics, WithoutExcitationKeepTheirSigma) {
+  // A constant speed straight ahead: the turn about the way ahead does not show, nor does the lever arm.
+  SimulatedRun run = straightAhead(1.0);
   run.options.smoother.estimate_extrinsics = EstimateExtrinsics::kPose;
   run.run();
   const SmootherOptions& told = run.options.smoother;
@@ -229,16 +235,8 @@ TEST(Extrinsics, VibrationDoesNotShowThem) {
   // The velocity that the window estimates follows the vibration, and does not show the turn about the way
   // ahead.
   const simulation::Preset preset = simulation::presetOf("kart");
-  simulation::MotionRequest request;
-  request.name = "constant_speed";
-  request.seed = 1;
-  request.duration = 60.0;
-  request.speed = 2.0;
-  request.rest.static_start = 3.0;
-  request.rest.static_end = 0.0;
   for (const auto radar : {RadarFactor::kDoppler, RadarFactor::kVelocity}) {
-    SimulatedRun run("constant_speed", 1, 60.0, 3.0);
-    run.motion = simulation::makeMotion(request);
+    SimulatedRun run = straightAhead(2.0);
     run.setup = preset.options;
     run.setup.seed = 1;
     run.setup.imu.accel_vibration = 1.6;

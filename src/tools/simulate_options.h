@@ -12,7 +12,7 @@
 
 namespace rio_t::simulation {
 
-/// What the command line of `simulate` asks for.
+/// The user asks for this on the command line of `simulate`.
 struct Request {
   std::string motion;
   std::string trajectory;
@@ -31,7 +31,7 @@ struct Request {
   std::map<std::string, OptionSet::Given> radars;  // what --radar gives, by name
 };
 
-/// What the options of one radar set; --radar takes them, too.
+/// The options of one radar set this. --radar takes the same options.
 struct RadarRequest {
   RadarSetup setup;
   std::optional<double> fov_elevation = std::nullopt;

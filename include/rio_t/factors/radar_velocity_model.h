@@ -19,7 +19,7 @@ struct RadarScanTime {
   /// Share of the derivative with respect to t_O that is motion and not noise of the IMU, see OffsetEvidence.
   double offset_gain = 1.0;
   double offset_half_width = kOffsetHalfWidth;  ///< of the mean in that derivative [s]
-  /// Of the mean in SlowMotion [s]. A scan that shows no motion of its radar has the widest.
+  /// SlowMotion averages over this time to either side [s]. It is the longest if the scan shows no motion.
   double slow_half_width = kMaxOffsetHalfWidth;
   /// If set, the motion is taken at this t_O [s], and to first order from there. Exactly at each t_O, the
   /// noise of the IMU over a shift raises the cost whatever the direction of the shift. With a gain of 0, the

@@ -42,7 +42,7 @@ std::runtime_error bagError(const std::string& bag, const std::string& what) {
 }
 
 std::runtime_error bagError(const std::string& bag, const std::exception& thrown) {
-  // What rosbag and the reading of messages throw. It says neither which file nor why.
+  // rosbag and the reader of messages throw these. Their texts name neither the file nor the reason.
   const bool is_of_bytes = dynamic_cast<const ros::Exception*>(&thrown) != nullptr;
   return bagError(bag,
                   is_of_bytes ? std::string("perhaps it is damaged (") + thrown.what() + ")" : thrown.what());
