@@ -94,7 +94,8 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
   problem.radar = start.radar;
   for (std::size_t k = 0; k < options_.radarCount(); ++k) {
     const OdometryOptions own = optionsOfRadar(options_, k);
-    problem.radars.push_back({own.T_IR, own.smoother.time_offset_initial, own.smoother.time_offset_sigma});
+    problem.radars.push_back({own.T_IR, own.smoother.time_offset_initial, own.smoother.time_offset_sigma,
+                              extrinsicsSigmas(own.smoother)});
   }
   problem.guess.push_back({start.time, start.prior.x0});
   std::vector<bool> stepped(problem.radars.size(), false);
@@ -178,7 +179,8 @@ std::vector<ScanResult> BatchOdometry::results(const Run& run, const BatchSoluti
     result.state = navigationState(solution.nodes[k], solution.covariances[k], imu_);
     result.time_offset = solved.t_O;
     result.T_IR = solution.extrinsics[result.scan.radar];
-    result.T_IR_covariance = extrinsicsCovariance(solution.extrinsics_covariances[result.scan.radar]);
+    result.T_IR_covariance = extrinsicsCovariance(solution.extrinsics_covariances[result.scan.radar],
+                                                  options_.smoother.estimate_extrinsics);
     result.solver_termination = solution.termination;
     result.time_offset_sigma =
         options_.smoother.estimate_time_offset ? std::sqrt(solved.covariance(kState, kState)) : 0.0;

@@ -255,13 +255,11 @@ std::string whatToMove(CalibrationAxis axis) {
   return kMotions[static_cast<std::size_t>(axis)];
 }
 
-double RadarCalibration::turnSigma() const {
+double RadarCalibration::largestSigma(CalibrationAxis first) const {
   double largest = 0.0;
-  for (const CalibrationAxis turn :
-       {CalibrationAxis::kTurnX, CalibrationAxis::kTurnY, CalibrationAxis::kTurnZ}) {
-    const AxisCalibration& axis = axes[static_cast<std::size_t>(turn)];
-    largest = std::max(largest, axis.verdict == Verdict::kObserved ? axis.sigma : axis.configured_sigma);
-  }
+  for (auto i = static_cast<std::size_t>(first); i < static_cast<std::size_t>(first) + 3; ++i)
+    largest =
+        std::max(largest, axes[i].verdict == Verdict::kObserved ? axes[i].sigma : axes[i].configured_sigma);
   return largest;
 }
 

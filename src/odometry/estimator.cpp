@@ -207,9 +207,10 @@ void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
   result.time_offset_sigma = radar.offsetSigma(covariance(kState, kState));
   result.T_IR = radar.extrinsics();
   result.configured_T_IR = radar.configuredExtrinsics();
-  if (estimated == 0)
+  const EstimateExtrinsics estimate = options_.smoother.estimate_extrinsics;
+  if (!estimatesTurn(estimate))
     result.mounting_turn = mounting_check_.turnOf(result.scan.radar, result.configured_T_IR);
-  result.T_IR_covariance = extrinsicsCovariance(covariance.bottomRightCorner(estimated, estimated));
+  result.T_IR_covariance = extrinsicsCovariance(covariance.bottomRightCorner(estimated, estimated), estimate);
   for (const StampedPose& left : marginalize()) result.left_window.push_back(left);
   // On a frame that shakes the window believes rest little: the start of a gentle drive must not look like an
   // offset. The published platform stands still.

@@ -11,6 +11,7 @@ OdometryOptions optionsOfRadar(const OdometryOptions& options, std::size_t radar
   result.ego_velocity = particular.ego_velocity;
   result.smoother.time_offset_initial = particular.time_offset_initial;
   result.smoother.time_offset_sigma = particular.time_offset_sigma;
+  result.smoother.extrinsics_translation_sigma = particular.extrinsics_translation_sigma;
   return result;
 }
 

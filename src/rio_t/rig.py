@@ -32,7 +32,7 @@ def radars_of(config):
     result = []
     for name in names:
         own = {**config, **(config.get(name) or {})} if name else config
-        result.append((str(name), np.array(own["extrinsics_translation"], float),
+        result.append((str(name), np.array(own["extrinsics_translation"] or [0, 0, 0], float),
                        Rotation.from_quat(own["extrinsics_rotation_xyzw"])))
     return result
 

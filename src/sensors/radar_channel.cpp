@@ -330,10 +330,10 @@ std::vector<FixedLagSmoother::RandomWalk> RadarChannel::randomWalks() const {
   std::vector<FixedLagSmoother::RandomWalk> walks = {
       {blocks[0], Eigen::VectorXd::Constant(1, std::hypot(o.time_offset_noise, offset_uncertainty_.walk()))}};
   if (blocks.size() == 1) return walks;
-  Eigen::VectorXd densities(6);
+  Eigen::Matrix<double, 6, 1> densities;
   densities << Eigen::Vector3d::Constant(o.extrinsics_rotation_noise),
       Eigen::Vector3d::Constant(o.extrinsics_translation_noise);
-  walks.push_back({blocks[1], densities.head(blocks[1]->manifold->tangent())});
+  walks.push_back({blocks[1], estimatedPart(densities, o.estimate_extrinsics)});
   return walks;
 }
 

@@ -41,8 +41,8 @@ void RadarInWindow::join(FixedLagSmoother& smoother) {
   std::vector<Block*> blocks;
   if (!options_.time_offset_shared) blocks.push_back(&offset_->start(window, options_.time_offset_initial));
   for (Block* block : addExtrinsics(window, T_IR_)) blocks.push_back(block);
-  Eigen::VectorXd sigmas = calibrationSigmas(options_);
-  if (options_.time_offset_shared) sigmas = sigmas.tail(sigmas.size() - 1).eval();
+  const Eigen::VectorXd sigmas =
+      options_.time_offset_shared ? extrinsicsSigmas(options_) : calibrationSigmas(options_);
   if (!blocks.empty()) smoother.addCalibrationPrior(std::move(blocks), sigmas);
   smoother.settle();
 }
@@ -72,9 +72,8 @@ std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoo
   Eigen::Matrix<double, 3, Eigen::Dynamic> J(3, P.cols());
   J.leftCols<kOffset>() << motion.J_motion.leftCols<3>(), motion.J_motion.rightCols<6>(), motion.J_biases;
   J.col(kOffset) = motion.dv_dt_O;
-  const Eigen::Index calibrated = P.cols() - (kOffset + 1);  // directions of the extrinsics
-  if (calibrated > 0) J.middleCols<3>(kOffset + 1) = so3::hat(motion.v_I);
-  if (calibrated > 3) J.rightCols<3>() = so3::hat(motion.omega_I);
+  if (estimatesTurn(options_.estimate_extrinsics)) J.middleCols<3>(kOffset + 1) = so3::hat(motion.v_I);
+  if (estimatesLeverArm(options_.estimate_extrinsics)) J.rightCols<3>() = so3::hat(motion.omega_I);
   J = (R_RI * J).eval();
 
   RadarVelocityPrediction prediction;

@@ -101,7 +101,6 @@ void BatchSmoother::start(const BatchProblem& problem, const StateBlock& x,
   Block& biases = addBiases(window, problem.start, problem.prior.x0);
   graph.nodes.push_back({&motion, &biases});
   const bool is_estimated = options_.estimate_extrinsics != EstimateExtrinsics::kNone;
-  const Eigen::VectorXd sigmas = calibrationSigmas(options_);
   std::vector<Block*> offsets;
   for (std::size_t k = 0; k < mounting.size(); ++k) {
     const bool is_first = k == 0 || !options_.time_offset_shared;
@@ -126,7 +125,7 @@ void BatchSmoother::start(const BatchProblem& problem, const StateBlock& x,
     };
     if (!options_.time_offset_shared)
       add(*offsets[k], Eigen::VectorXd::Constant(1, problem.radars[k].time_offset_sigma));
-    if (is_estimated) add(extrinsics, sigmas.tail(sigmas.size() - 1));
+    if (is_estimated) add(extrinsics, problem.radars[k].extrinsics_sigmas);
   }
   addPrior(window, known, problem.prior.root);
   motion.x = storedMotion(x);

@@ -6,12 +6,17 @@
 
 namespace rio_t {
 
-Eigen::VectorXd calibrationSigmas(const SmootherOptions& options) {
-  Eigen::VectorXd sigmas(7);
-  sigmas << options.time_offset_sigma, Eigen::Vector3d::Constant(options.extrinsics_rotation_sigma),
+Eigen::VectorXd extrinsicsSigmas(const SmootherOptions& options) {
+  Eigen::Matrix<double, 6, 1> sigmas;
+  sigmas << Eigen::Vector3d::Constant(options.extrinsics_rotation_sigma),
       Eigen::Vector3d::Constant(options.extrinsics_translation_sigma);
-  if (options.estimate_extrinsics == EstimateExtrinsics::kNone) return sigmas.head<1>();
-  if (options.estimate_extrinsics == EstimateExtrinsics::kRotation) return sigmas.head<4>();
+  return estimatedPart(sigmas, options.estimate_extrinsics);
+}
+
+Eigen::VectorXd calibrationSigmas(const SmootherOptions& options) {
+  const Eigen::VectorXd extrinsics = extrinsicsSigmas(options);
+  Eigen::VectorXd sigmas(1 + extrinsics.size());
+  sigmas << options.time_offset_sigma, extrinsics;
   return sigmas;
 }
 

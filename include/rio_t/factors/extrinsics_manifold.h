@@ -10,9 +10,14 @@ namespace rio_t {
 /// Which part of a mounting is estimated.
 enum class EstimateExtrinsics {
   kNone,      ///< "none": the mounting is as configured
+  kLeverArm,  ///< "none", but nobody has measured the lever arm
   kRotation,  ///< "rotation"
   kPose,      ///< "pose": rotation and lever arm
 };
+bool estimatesTurn(EstimateExtrinsics estimate);
+bool estimatesLeverArm(EstimateExtrinsics estimate);
+/// The part that is estimated of six numbers: turn, then lever arm.
+Eigen::VectorXd estimatedPart(const Eigen::Matrix<double, 6, 1>& of_pose, EstimateExtrinsics estimate);
 
 /// Extrinsics as a block: q_IR as x, y, z, w, then l_I.
 struct ExtrinsicsBlock {
@@ -26,8 +31,8 @@ using ExtrinsicsJacobian = Eigen::Matrix<double, Rows, ExtrinsicsBlock::kSize, E
 Extrinsics toExtrinsics(const double* stored);
 Eigen::VectorXd stored(const Extrinsics& T_IR);
 
-/// Extrinsics as a Manifold. The tangent is a turn about the axes of I [rad] and, if the lever arm is
-/// estimated, the change of l_I [m]: q_IR <- Exp(turn) q_IR. So a covariance is in I, as in ROS messages.
+/// Extrinsics as a Manifold. The tangent is what is estimated of a turn about the axes of I [rad], q_IR <-
+/// Exp(turn) q_IR, and of the change of l_I [m]. So a covariance is in I, as in ROS messages.
 class ExtrinsicsManifold final : public Manifold {
  public:
   /// With kNone the block has to be constant; it still has the tangent of a pose.
@@ -35,11 +40,14 @@ class ExtrinsicsManifold final : public Manifold {
   void plus(const double* x, const double* delta, double* x_plus_delta) const override;
   Eigen::VectorXd minus(const double* y, const double* x) const override;
   Eigen::MatrixXd minusJacobian(const double* y, const double* x) const override;
+
+ private:
+  bool has_turn_, has_lever_arm_;
 };
 
 /// Covariance in the order of ROS, translation [m^2] then turn [rad^2], of that of the tangent; zero where
-/// nothing is estimated and `tangent` is empty.
-Eigen::Matrix<double, 6, 6> extrinsicsCovariance(const Eigen::MatrixXd& tangent);
+/// nothing is estimated. `tangent` is empty for kNone.
+Eigen::Matrix<double, 6, 6> extrinsicsCovariance(const Eigen::MatrixXd& tangent, EstimateExtrinsics estimate);
 /// The way back: empty for kNone.
 Eigen::MatrixXd tangentCovariance(const Eigen::Matrix<double, 6, 6>& ros, EstimateExtrinsics estimate);
 

@@ -112,7 +112,11 @@ struct RadarCalibration {
   Agreement extrinsics_agreement;
 
   /// [rad] The largest sigma of a turn of T_IR: as found, or as configured if it is not observed.
-  double turnSigma() const;
+  double turnSigma() const { return largestSigma(CalibrationAxis::kTurnX); }
+  double leverArmSigma() const { return largestSigma(CalibrationAxis::kLeverX); }  ///< [m] likewise
+
+ private:
+  double largestSigma(CalibrationAxis first) const;  ///< of three axes
 };
 
 /// `runs`: at least one.

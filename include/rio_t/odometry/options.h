@@ -30,8 +30,9 @@ enum class InitMode {
 struct RadarOptions {
   Extrinsics T_IR;
   EgoVelocityOptions ego_velocity;
-  double time_offset_initial = 0.0;  ///< [s]
-  double time_offset_sigma = 0.075;  ///< [s] prior
+  double time_offset_initial = 0.0;            ///< [s]
+  double time_offset_sigma = 0.075;            ///< [s] prior
+  double extrinsics_translation_sigma = 0.05;  ///< [m] prior, per axis
 };
 
 /// All options of the estimator. The defaults suit an ADIS16448 and a TI IWR6843AOP.

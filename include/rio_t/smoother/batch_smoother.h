@@ -35,9 +35,10 @@ struct BatchScan {
 
 /// A radar as it is known before its scans.
 struct BatchRadar {
-  Extrinsics T_IR;                   ///< as configured, and where the solver starts
-  double time_offset_initial = 0.0;  ///< [s] prior on t_O
-  double time_offset_sigma = 0.075;  ///< [s] its sigma, and that of a step
+  Extrinsics T_IR;                    ///< as configured, and where the solver starts
+  double time_offset_initial = 0.0;   ///< [s] prior on t_O
+  double time_offset_sigma = 0.075;   ///< [s] its sigma, and that of a step
+  Eigen::VectorXd extrinsics_sigmas;  ///< prior on T_IR, see extrinsicsSigmas
 };
 
 struct BatchProblem {

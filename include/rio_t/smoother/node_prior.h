@@ -10,8 +10,10 @@
 
 namespace rio_t {
 
-/// Sigmas of the calibration of a radar as configured, in the order of its tangent: t_O [s]; then, if they
-/// are estimated, the turn [rad] and the lever arm [m] of the extrinsics (see ExtrinsicsManifold).
+/// Sigmas of the extrinsics of a radar as configured, in the tangent of ExtrinsicsManifold [rad, m]. Empty if
+/// they are not estimated.
+Eigen::VectorXd extrinsicsSigmas(const SmootherOptions& options);
+/// Sigmas of the calibration of a radar as configured: t_O [s], then those of the extrinsics.
 Eigen::VectorXd calibrationSigmas(const SmootherOptions& options);
 
 /// Prior on the first node and on the calibration of a radar.

@@ -36,6 +36,10 @@ ProposedKeys calibratedKeys(const RadarCalibration& calibration, const Config& c
       calibration.axes[static_cast<std::size_t>(CalibrationAxis::kOffset)].verdict == Verdict::kObserved;
   ProposedKeys keys;
   keys.set("extrinsics_translation", writtenList(calibration.T_IR.l_I, mounting.l_I, kMicro));
+  if (!hasLeverArm(configured))
+    keys.set("extrinsics_translation_sigma",
+             ParameterValue{std::max(rounded(calibration.leverArmSigma(), kMicro), 1e-6)},
+             "Nobody has measured the lever arm, so the next run goes on with the estimate.");
   keys.set("extrinsics_rotation_xyzw",
            writtenList(calibration.T_IR.q_IR.coeffs(), mounting.q_IR.coeffs(), kNano));
   // The next run starts from this sigma. Its offset may differ by as much as the step detector ignores.
@@ -66,9 +70,9 @@ std::string header(const BagCalibration& calibration, const std::string& name) {
 }
 
 /// How the next run goes on from a mounting that is known to `turn_sigma` [rad].
-std::string estimateNext(double turn_sigma) {
+std::string estimateNext(double turn_sigma, bool has_lever_arms) {
   ProposedKeys keys;
-  keys.set("estimate_extrinsics", "rotation",
+  keys.set("estimate_extrinsics", has_lever_arms ? "rotation" : "pose",
            "The bags show the mounting to the sigmas below. The next run starts from the largest of a turn, "
            "and goes on with the estimate: an error of the mounting is then in its sigmas.");
   keys.set("extrinsics_rotation_sigma", ParameterValue{std::max(rounded(turn_sigma, 1e6), 1e-6)});
@@ -100,16 +104,16 @@ std::string calibratedYaml(const BagCalibration& calibration, const Config& conf
     ProposedKeys section = keysOf(sorted.sections[radar.name].entries);
     ProposedKeys& own = has_sections ? section : top_level;
     for (const char* key :
-         {"extrinsics_translation", "extrinsics_rotation_xyzw", "mounting_yaw_pitch_roll_deg",
-          "extrinsics_axes", "time_offset_initial", "time_offset_sigma"})
+         {"extrinsics_translation", "extrinsics_translation_sigma", "extrinsics_rotation_xyzw",
+          "mounting_yaw_pitch_roll_deg", "extrinsics_axes", "time_offset_initial", "time_offset_sigma"})
       own.remove(key);
     if (has_sections) sections += "\n" + radar.name + ":\n" + toYaml(own, indent);
     sections += (has_sections ? "" : "\n") + commented(describeCalibration(radar), indent) + indent +
                 "# If the driver's restart changes the offset, raise time_offset_sigma.\n" +
                 toYaml(calibratedKeys(radar.calibration, configured[k]), indent);
   }
-  return header(calibration, name) + "\n" + toYaml(top_level, "") + "\n" + estimateNext(turn_sigma) +
-         sections;
+  return header(calibration, name) + "\n" + toYaml(top_level, "") + "\n" +
+         estimateNext(turn_sigma, std::all_of(configured.begin(), configured.end(), hasLeverArm)) + sections;
 }
 
 }  // namespace rio_t

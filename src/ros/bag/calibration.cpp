@@ -16,19 +16,18 @@ Config batchConfig(const Config& config) {
   Config batch = config;
   batch.mode = RunMode::kBatch;
   EstimateExtrinsics& estimated = batch.odometry.smoother.estimate_extrinsics;
-  // `none` is the default and means pose here.
-  if (estimated == EstimateExtrinsics::kNone) estimated = EstimateExtrinsics::kPose;
+  // `none` is the default and means pose here, with a lever arm or without.
+  if (!estimatesTurn(estimated)) estimated = EstimateExtrinsics::kPose;
   for (Config& radar : batch.radars) radar.odometry.smoother.estimate_extrinsics = estimated;
   return batch;
 }
 
 RadarCalibrationEstimate configuredOf(const Config& radar) {
   const SmootherOptions& smoother = radar.odometry.smoother;
-  const Eigen::VectorXd sigmas = calibrationSigmas(smoother);
   RadarCalibrationEstimate configured;
   configured.offset = {smoother.time_offset_initial,
                        smoother.estimate_time_offset ? smoother.time_offset_sigma : 0.0};
-  configured.extrinsics = {radar.odometry.T_IR, sigmas.tail(sigmas.size() - 1).cwiseAbs2().asDiagonal()};
+  configured.extrinsics = {radar.odometry.T_IR, extrinsicsSigmas(smoother).cwiseAbs2().asDiagonal()};
   return configured;
 }
 

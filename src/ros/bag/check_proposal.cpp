@@ -50,9 +50,9 @@ void addConfigured(const ParameterEntries& configured, ProposedConfig* config) {
   const std::vector<ParameterDescription> about = parameterDescriptions();
   for (const ParameterEntry& entry : configured) {
     if (isCloudKey(entry.key)) continue;
-    const bool is_quaternion = entry.key == "extrinsics_rotation_xyzw";
     const auto set = [&](ProposedKeys* keys) {
-      if (is_quaternion) keys->remove("mounting_yaw_pitch_roll_deg");
+      if (entry.key == "extrinsics_rotation_xyzw") keys->remove("mounting_yaw_pitch_roll_deg");
+      if (entry.key == "extrinsics_translation") keys->remove("extrinsics_translation_sigma");
       keys->set(entry.key, entry.value, "Given by --set.");
     };
     const bool of_radar = std::any_of(about.begin(), about.end(), [&](const ParameterDescription& each) {
@@ -68,18 +68,9 @@ void addConfigured(const ParameterEntries& configured, ProposedConfig* config) {
 
 /// The mounting that the bag shows is coarse: the odometry starts there and refines it. A lever arm that is a
 /// decimetre wrong and held moves the offset by several sigma.
-void proposeEstimate(const std::vector<RadarInspection>& radars, const ParameterEntries& configured,
-                     ProposedKeys* keys) {
-  const std::string text = "The mounting below is coarse. The estimate starts there and refines it.";
-  if (isConfigured("extrinsics_translation", configured)) {
-    keys->set("estimate_extrinsics", "rotation", text);
-    return;
-  }
-  keys->set("estimate_extrinsics", "pose", text);
-  double worst = SmootherOptions().extrinsics_translation_sigma;
-  for (const RadarInspection& radar : radars) worst = std::max(worst, radar.lever_arm_sigma);
-  keys->set("extrinsics_translation_sigma", ParameterValue{rounded(worst, 100.0)},
-            "Standard deviation of extrinsics_translation [m].");
+void proposeEstimate(const ParameterEntries& configured, ProposedKeys* keys) {
+  keys->set("estimate_extrinsics", isConfigured("extrinsics_translation", configured) ? "rotation" : "pose",
+            "The mounting below is coarse. The estimate starts there and refines it.");
 }
 
 }  // namespace
@@ -95,7 +86,7 @@ ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarI
     if (!radar.search.enough || sigma.maxCoeff() > kObservedTurn || radar.isSparse()) all_observed = false;
     worst = std::max(worst, sigma.maxCoeff());
   }
-  proposeEstimate(radars, configured, &config.top_level);
+  proposeEstimate(configured, &config.top_level);
   constexpr double kLeast = 0.05, kSafety = 3.0;  // [rad]
   if (all_observed && !isMountingConfigured(configured) &&
       kSafety * worst < SmootherOptions().extrinsics_rotation_sigma)

@@ -45,9 +45,10 @@ void describePasses(const RadarSummary& radar, const Row& row) {
 
 /// The mounting as people can compare it: how far it went from the one configured, by the axes of the IMU.
 void describeExtrinsics(const ExtrinsicsSummary& extrinsics, const Row& row) {
-  row("turned by", fixedTexts(1.0 / kDegree * turnBetween(extrinsics.configured, extrinsics.T_IR), 2, " ") +
-                       " deg about x y z of the IMU, sigma " +
-                       fixedTexts(1.0 / kDegree * extrinsics.rotationSigma(), 2, " ") + " deg");
+  if (!extrinsics.rotationSigma().isZero())
+    row("turned by", fixedTexts(1.0 / kDegree * turnBetween(extrinsics.configured, extrinsics.T_IR), 2, " ") +
+                         " deg about x y z of the IMU, sigma " +
+                         fixedTexts(1.0 / kDegree * extrinsics.rotationSigma(), 2, " ") + " deg");
   if (extrinsics.translationSigma().isZero()) return;
   row("moved by", fixedTexts(1e3 * (extrinsics.T_IR.l_I - extrinsics.configured.l_I), 1, " ") +
                       " mm, sigma " + fixedTexts(1e3 * extrinsics.translationSigma(), 1, " ") + " mm");

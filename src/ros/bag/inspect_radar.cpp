@@ -5,6 +5,7 @@
 #include <boost/algorithm/string/join.hpp>
 #include <cmath>
 
+#include "../parameters/mounting_parameters.h"
 #include "../text.h"
 #include "rio_t/core/angle.h"
 #include "rio_t/radar/mounting.h"
@@ -212,16 +213,19 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
   for (int k = 0; k < 3; ++k)
     text += (k == 0 ? "" : ", ") + fixedText(l[k], 2) + " +- " + fixedText(l_sigma[k], 2);
   // If the scans have few points, the lever arm may be as wrong as the mounting.
-  const bool is_known = l_sigma.maxCoeff() < kUnknownLeverArm && !radar->isSparse();
+  const bool is_known = l_sigma.maxCoeff() < kUnmeasuredLeverArm && !radar->isSparse();
   radar->ok("lever arm",
             "about [" + text + "] m: " +
                 (is_known ? "the estimate starts there" : "too vague, the estimate starts at zero") +
                 "; measure it with a tape");
   if (is_known) {
-    radar->lever_arm_sigma = l_sigma.maxCoeff();
     radar->keys.set("extrinsics_translation",
                     listOf({rounded(l.x(), 100.0), rounded(l.y(), 100.0), rounded(l.z(), 100.0)}),
                     "Origin of the radar in the IMU frame, roughly [m]. Measure it with a tape.");
+    const double least = SmootherOptions().extrinsics_translation_sigma;
+    radar->keys.set("extrinsics_translation_sigma",
+                    ParameterValue{rounded(std::max(least, l_sigma.maxCoeff()), 100.0)},
+                    "Standard deviation of extrinsics_translation [m].");
   }
   radar->ok("offset", fixedText(1e3 * search.offset, 0) + " +- " + fixedText(1e3 * search.offset_sigma, 0) +
                           " ms, roughly; the odometry estimates it");

@@ -35,9 +35,6 @@ constexpr double kObservedTurn = 0.3;
 /// [rad] 15 degrees between two mountings: an eye does not misjudge one by more.
 constexpr double kFarApart = 0.26;
 
-/// [m] Sigma of a lever arm of which the bag shows nothing: radar and IMU are on one robot.
-constexpr double kUnknownLeverArm = 0.3;
-
 /// A radar of a recording.
 struct RadarInspection : Findings {
   std::string topic;
@@ -47,7 +44,6 @@ struct RadarInspection : Findings {
   double points = 0.0;  ///< of the median scan
 
   /// The mounting may be far off, whatever its sigma.
-  double lever_arm_sigma = kUnknownLeverArm;  ///< [m] of extrinsics_translation as proposed
   bool isSparse() const { return points < kSparsePoints; }
 };
 /// Whether the user has configured the rotation of the mounting.

@@ -1,5 +1,7 @@
 #include "run_log.h"
 
+#include "rio_t/smoother/node_prior.h"
+
 namespace rio_t {
 namespace {
 
@@ -10,13 +12,10 @@ RadarEstimate before(const OdometryOptions& options) {
   radar.final_offset_s = smoother.time_offset_initial;
   if (smoother.estimate_time_offset) radar.final_offset_sigma_s = smoother.time_offset_sigma;
   if (smoother.estimate_extrinsics == EstimateExtrinsics::kNone) return radar;
-  const bool pose = smoother.estimate_extrinsics == EstimateExtrinsics::kPose;
-  Eigen::Matrix<double, 6, 1> sigmas;
-  sigmas << Eigen::Vector3d::Constant(pose ? smoother.extrinsics_translation_sigma : 0.0),
-      Eigen::Vector3d::Constant(smoother.extrinsics_rotation_sigma);
   radar.extrinsics.emplace();
   radar.extrinsics->configured = radar.extrinsics->T_IR = options.T_IR;
-  radar.extrinsics->covariance = sigmas.cwiseAbs2().asDiagonal();
+  radar.extrinsics->covariance = extrinsicsCovariance(
+      extrinsicsSigmas(smoother).cwiseAbs2().asDiagonal().toDenseMatrix(), smoother.estimate_extrinsics);
   return radar;
 }
 

@@ -81,10 +81,12 @@ void LiveMonitor::describeExtrinsics(Status& status, std::size_t radar) const {
   // As the parameters want them.
   status.add("extrinsics_rotation_xyzw", listOf(result.T_IR.q_IR.coeffs()));
   status.add("extrinsics_translation", listOf(result.T_IR.l_I));
-  status.add("turn_from_configured_deg", listOf(turn / kDegree));
-  status.add("turn_sigma_deg", listOf(turn_sigma / kDegree));
+  if (estimatesTurn(options.estimate_extrinsics)) {
+    status.add("turn_from_configured_deg", listOf(turn / kDegree));
+    status.add("turn_sigma_deg", listOf(turn_sigma / kDegree));
+  }
   std::string kept = axesAbove(turn_sigma, kObserved * options.extrinsics_rotation_sigma, "turn about ");
-  if (options.estimate_extrinsics == EstimateExtrinsics::kPose) {
+  if (estimatesLeverArm(options.estimate_extrinsics)) {
     const Eigen::Vector3d lever_sigma = sigma.head<3>();
     status.add("lever_arm_from_configured_m", listOf(result.T_IR.l_I - result.configured_T_IR.l_I));
     status.add("lever_arm_sigma_m", listOf(lever_sigma));

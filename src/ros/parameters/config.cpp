@@ -38,6 +38,10 @@ std::vector<Config> configsOfRadars(const Config& config) {
   return config.radars.empty() ? std::vector<Config>{config} : config.radars;
 }
 
+bool hasLeverArm(const Config& radar) {
+  return radar.lever_arm || radar.extrinsics_source == ExtrinsicsSource::kTf;
+}
+
 Config withTopics(Config config, const TopicResolver& resolve) {
   const std::string section = prefixOf(config.radar_name);
   const std::pair<std::string, std::string*> topics[] = {

@@ -184,10 +184,12 @@ void listExtrinsics(ParameterList& list, Config& c) {
       "This says where the mounting of the radar comes from. parameters takes the keys of this section. tf "
       "takes the transform from the frame_id of the cloud to the frame of the IMU, in the axes of the cloud. "
       "rio_t_bag takes the transform from the tf in the bag.");
-  list.first().vector3(
-      "extrinsics_translation", "m", between(-100, 100), c.odometry.T_IR.l_I,
-      "This is the position of the radar in the IMU frame, x, y, z. A tape measure is good enough: "
-      "1 cm of error matters only if the platform turns fast.");
+  list.first().vector3OrEmpty(
+      "extrinsics_translation", "m", between(-100, 100), c.lever_arm,
+      "This is the lever arm, the position of the radar in the IMU frame, x, y, z. A tape measure is good "
+      "enough: 1 cm of error matters only if the platform turns fast. [] means that nobody has measured it. "
+      "rio_t then estimates it, whatever estimate_extrinsics says: with none only the lever arm, with "
+      "rotation the whole pose.");
   list.first().rotation(
       "extrinsics_rotation_xyzw", c.odometry.T_IR.q_IR,
       "This quaternion turns radar vectors (x right, y forward, z up) into the IMU frame. An error of a "
@@ -199,8 +201,8 @@ void listExtrinsics(ParameterList& list, Config& c) {
                               "This says which radar axes extrinsics_rotation_xyzw turns. rfu: x right, y "
                               "forward, z up, whatever the axes of the cloud. cloud: the axes of the cloud "
                               "itself, as a tf or a calibration tool gives them.");
-  list.first().mounting(
-      "mounting_yaw_pitch_roll_deg", c.mounting,
+  list.first().vector3OrEmpty(
+      "mounting_yaw_pitch_roll_deg", "deg", between(-360, 360), c.mounting,
       "These angles replace extrinsics_rotation_xyzw: yaw to the left, pitch up, roll right side down. They "
       "assume an IMU with x forward, y left, z up. [0, 0, 0] is an upright radar that looks forward. [] "
       "means that extrinsics_rotation_xyzw is used. Give only one of the two in a file. --set and the "
@@ -213,25 +215,26 @@ void listExtrinsics(ParameterList& list, Config& c) {
       {{"none", EstimateExtrinsics::kNone},
        {"rotation", EstimateExtrinsics::kRotation},
        {"pose", EstimateExtrinsics::kPose}},
-      smoother.estimate_extrinsics,
+      c.estimate_extrinsics,
       "none takes the mounting as it is. rotation estimates the rotation of the radar on the way. pose "
       "estimates its position as well, which needs fast turns. Use rotation for a mounting by eye, and none "
-      "after a calibration.");
+      "after a calibration. A position that is not given is estimated in any case.");
   list.number(
       "extrinsics_rotation_sigma", "rad", above(0, M_PI), smoother.extrinsics_rotation_sigma,
       "The estimate of the rotation starts with this standard deviation about each axis. 0.17 rad (10 "
       "degrees) suits a mounting by eye, 0.02 rad a mounting from a drawing.");
-  list.number("extrinsics_translation_sigma", "m", above(0, 100), smoother.extrinsics_translation_sigma,
-              "The estimate of the position starts with this standard deviation along each axis. Only "
-              "estimate_extrinsics: pose uses it.");
+  list.ofRadar(true);
+  list.number(
+      "extrinsics_translation_sigma", "m", between(0, 100), c.lever_arm_sigma,
+      "The estimate of the position starts with this standard deviation along each axis. 0 means 0.05 "
+      "m if extrinsics_translation is given, and 0.5 m if it is not.");
+  list.ofRadar(false);
   list.number(
       "extrinsics_rotation_noise", "rad/sqrt(s)", above(0), smoother.extrinsics_rotation_noise,
       "The rotation may wander by this random walk about each axis. Raise it for a mounting that bends or "
       "slips.");
-  list.number(
-      "extrinsics_translation_noise", "m/sqrt(s)", above(0), smoother.extrinsics_translation_noise,
-      "The position may wander by this random walk along each axis. Only estimate_extrinsics: pose uses "
-      "it.");
+  list.number("extrinsics_translation_noise", "m/sqrt(s)", above(0), smoother.extrinsics_translation_noise,
+              "The position may wander by this random walk along each axis.");
 }
 
 }  // namespace rio_t

@@ -67,7 +67,7 @@ void setParameter(const ParameterEntry& entry, const std::string& section, const
 RadarOptions radarOptions(const Config& config) {
   const OdometryOptions& odometry = config.odometry;
   return {odometry.T_IR, odometry.ego_velocity, odometry.smoother.time_offset_initial,
-          odometry.smoother.time_offset_sigma};
+          odometry.smoother.time_offset_sigma, odometry.smoother.extrinsics_translation_sigma};
 }
 
 /// "left, right"
@@ -238,6 +238,7 @@ Config makeConfig(const ParameterEntries& entries) {
     resolveMounting(&radar);
     config.odometry.radars.push_back(radarOptions(radar));
   }
+  resolveEstimate(&config);
   // Judged only where each value is right by itself: otherwise a default might be blamed.
   if (faults.empty()) faults = contradictions(config);
   if (!faults.empty()) throw ConfigError(std::move(faults));

@@ -1,8 +1,11 @@
 #include "mounting_parameters.h"
 
+#include <algorithm>
 #include <variant>
 
 #include "../text.h"
+#include "rio_t/core/angle.h"
+#include "rio_t/radar/mounting.h"
 
 namespace rio_t {
 namespace {
@@ -56,9 +59,18 @@ void beginMounting(const ParameterEntries& entries, const std::string& section, 
 }
 
 void resolveMounting(Config* config) {
+  SmootherOptions& smoother = config->odometry.smoother;
+  config->odometry.T_IR.l_I = config->lever_arm.value_or(Eigen::Vector3d::Zero());
+  if (config->lever_arm_sigma > 0.0) {
+    smoother.extrinsics_translation_sigma = config->lever_arm_sigma;
+  } else if (!hasLeverArm(*config)) {
+    smoother.extrinsics_translation_sigma = kUnmeasuredLeverArm;
+  }
+
   Eigen::Quaterniond& q_IR = config->odometry.T_IR.q_IR;
   if (config->mounting && !config->rotation_replaces_mounting) {
-    q_IR = rotationOf(*config->mounting);
+    const Eigen::Vector3d angles = kDegree * *config->mounting;
+    q_IR = rotationOf({angles[0], angles[1], angles[2]});
   } else if (config->extrinsics_axes == ExtrinsicsAxes::kCloud) {
     q_IR = (q_IR * cloudFromRfu(pointCloudFormat(*config).axes)).normalized();
   }
@@ -67,15 +79,28 @@ void resolveMounting(Config* config) {
   config->extrinsics_axes = ExtrinsicsAxes::kRightForwardUp;
 }
 
+void resolveEstimate(Config* config) {
+  const std::vector<Config> radars = configsOfRadars(*config);
+  EstimateExtrinsics estimate = config->estimate_extrinsics;
+  if (!std::all_of(radars.begin(), radars.end(), hasLeverArm))
+    estimate = estimatesTurn(estimate) ? EstimateExtrinsics::kPose : EstimateExtrinsics::kLeverArm;
+  config->odometry.smoother.estimate_extrinsics = estimate;
+  for (Config& radar : config->radars) radar.odometry.smoother.estimate_extrinsics = estimate;
+}
+
 std::vector<std::string> mountingWarnings(const Config& config) {
   std::vector<std::string> warnings;
   for (const Config& radar : configsOfRadars(config)) {
-    if (!radar.has_default_mounting || radar.extrinsics_source != ExtrinsicsSource::kParameters) continue;
     const std::string key = prefixOf(radar.radar_name);
-    warnings.push_back("The configuration gives no mounting: the radar " +
-                       (key.empty() ? "" : radar.radar_name + " ") +
-                       "is taken to look along y of the IMU. Set " + key + "mounting_yaw_pitch_roll_deg or " +
-                       key + "extrinsics_rotation_xyzw.");
+    const std::string called = key.empty() ? "the radar" : "the radar " + radar.radar_name;
+    if (radar.has_default_mounting && radar.extrinsics_source == ExtrinsicsSource::kParameters)
+      warnings.push_back("The configuration gives no mounting: " + called +
+                         " is taken to look along y of the IMU. Set " + key +
+                         "mounting_yaw_pitch_roll_deg or " + key + "extrinsics_rotation_xyzw.");
+    if (!hasLeverArm(radar))
+      warnings.push_back("The configuration gives no lever arm: where " + called +
+                         " sits is estimated, which needs turns. Measure it with a tape, and set " + key +
+                         "extrinsics_translation.");
   }
   return warnings;
 }

@@ -6,7 +6,6 @@
 #include <set>
 
 #include "../text.h"
-#include "rio_t/core/angle.h"
 #include "rio_t/radar/scan.h"
 
 namespace rio_t {
@@ -135,22 +134,21 @@ void ParameterList::rotation(const std::string& key, Eigen::Quaterniond& member,
       });
 }
 
-void ParameterList::mounting(const std::string& key, std::optional<MountingAngles>& member,
-                             const std::string& text) {
-  using Angles = std::optional<MountingAngles>;
+void ParameterList::vector3OrEmpty(const std::string& key, const std::string& unit, Range range,
+                                   std::optional<Eigen::Vector3d>& member, const std::string& text) {
+  using Vector = std::optional<Eigen::Vector3d>;
   bind(
-      {key, "list", "deg", "[], or a list of 3 finite numbers, each of at least -360 and at most 360", text},
-      member,
-      [](const ParameterValue& value) -> std::optional<Angles> {
+      {key, "list", unit, "[], or a list of 3 finite numbers, each" + range.text(), text}, member,
+      [range](const ParameterValue& value) -> std::optional<Vector> {
         const auto* list = std::get_if<ParameterValue::List>(&value.data);
-        if (list != nullptr && list->empty()) return Angles();
-        const auto x = asNumbers(value, 3, Range{-360.0, 360.0});
+        if (list != nullptr && list->empty()) return Vector();
+        const auto x = asNumbers(value, 3, range);
         if (!x) return std::nullopt;
-        return Angles(MountingAngles{kDegree * (*x)[0], kDegree * (*x)[1], kDegree * (*x)[2]});
+        return Vector(Eigen::Vector3d(x->data()));
       },
-      [](const Angles& angles) {
-        if (!angles) return ParameterValue{ParameterValue::List{}};
-        return listOf({angles->yaw / kDegree, angles->pitch / kDegree, angles->roll / kDegree});
+      [](const Vector& v) {
+        if (!v) return ParameterValue{ParameterValue::List{}};
+        return listOf({v->x(), v->y(), v->z()});
       });
 }
 

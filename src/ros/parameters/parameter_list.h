@@ -60,10 +60,11 @@ class ParameterList {
   /// Three numbers, each in the range.
   void vector3(const std::string& key, const std::string& unit, Range range, Eigen::Vector3d& member,
                const std::string& text);
+  /// The same, or [] for none.
+  void vector3OrEmpty(const std::string& key, const std::string& unit, Range range,
+                      std::optional<Eigen::Vector3d>& member, const std::string& text);
   /// Unit quaternion x, y, z, w; normalised.
   void rotation(const std::string& key, Eigen::Quaterniond& member, const std::string& text);
-  /// Yaw, pitch and roll in degrees, or [] for none.
-  void mounting(const std::string& key, std::optional<MountingAngles>& member, const std::string& text);
   void text(const std::string& key, std::string& member, const std::string& text);
   void textOrEmpty(const std::string& key, std::string& member, const std::string& text);
   /// A text that is kept without a leading slash.

@@ -9,7 +9,6 @@
 #include "rio_t/imu/units.h"
 #include "rio_t/odometry/body_odometry.h"
 #include "rio_t/odometry/options.h"
-#include "rio_t/radar/mounting.h"
 #include "rio_t/ros/parameters/point_cloud_format.h"
 
 namespace rio_t {
@@ -100,9 +99,13 @@ struct Config {
   std::string trajectory_file = "rio_t_trajectory.txt";
 
   ExtrinsicsSource extrinsics_source = ExtrinsicsSource::kParameters;
+  // makeConfig turns these three into odometry.T_IR and odometry.smoother.
+  std::optional<Eigen::Vector3d> lever_arm;  ///< [m] in I; nothing: nobody has measured it
+  double lever_arm_sigma = 0.0;              ///< [m] per axis; 0: by whether `lever_arm` is given
+  EstimateExtrinsics estimate_extrinsics = EstimateExtrinsics::kNone;
   // Two other ways to give the rotation of T_IR. makeConfig turns them into odometry.T_IR, which always has
   // the axes of RIO, and sets them back to their defaults.
-  std::optional<MountingAngles> mounting;
+  std::optional<Eigen::Vector3d> mounting;  ///< yaw, pitch, roll as MountingAngles, but in degrees
   ExtrinsicsAxes extrinsics_axes = ExtrinsicsAxes::kRightForwardUp;
   bool rotation_replaces_mounting = false;  ///< the quaternion comes from a later source than `mounting`
   bool has_default_mounting = false;        ///< makeConfig found no key that gives the rotation of T_IR
@@ -125,6 +128,9 @@ struct Config {
 /// The configuration as each radar has it: `config.radars`, or `config` alone for one radar. The index is
 /// that of RadarScan::radar.
 std::vector<Config> configsOfRadars(const Config& config);
+
+/// Whether the configuration or tf gives the lever arm of this radar.
+bool hasLeverArm(const Config& radar);
 
 using TopicResolver = std::function<std::string(const std::string& key, const std::string& topic)>;
 /// The configuration with each topic as `resolve` gives it. An empty one stays empty.
