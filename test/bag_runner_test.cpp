@@ -352,6 +352,12 @@ TEST_F(BagRunner, EstimatedExtrinsicsAreWritten) {
   EXPECT_NE(contents(out_ + "/summary.yaml")
                 .find("final_extrinsics_translation_sigma: [0.000000000, 0.000000000, 0.000000000]"),
             std::string::npos);
+  const Outcome unmeasured = run({"--set", "extrinsics_translation=[]"});
+  ASSERT_EQ(unmeasured.status, 0);
+  EXPECT_NE(unmeasured.out.find("moved by"), std::string::npos) << unmeasured.out;
+  EXPECT_EQ(unmeasured.out.find("turned by"), std::string::npos) << unmeasured.out;
+  EXPECT_NE(contents(out_ + "/summary.yaml").find("final_extrinsics_translation_sigma: [0.5"),
+            std::string::npos);
   ASSERT_EQ(run().status, 0);
   EXPECT_FALSE(fs::exists(out_ + "/extrinsics.csv"));
   EXPECT_EQ(contents(out_ + "/summary.yaml").find("extrinsics"), std::string::npos);

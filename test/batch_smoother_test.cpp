@@ -39,7 +39,7 @@ class Batch : public ::testing::Test {
     BatchProblem problem;
     problem.start = motion.time(0.5);
     problem.prior = priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0, skewMounting());
-    problem.radars = {{skewMounting(), 0.0, options.time_offset_sigma}};
+    problem.radars = {{skewMounting(), 0.0, options.time_offset_sigma, extrinsicsSigmas(options)}};
     problem.guess = {{problem.start, motion.state(0.5)}};
     return problem;
   }

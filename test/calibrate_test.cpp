@@ -303,6 +303,18 @@ TEST_F(Calibrate, WhatAStraightRideDoesNotShowStaysAsTold) {
   EXPECT_EQ(config.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kRotation);
 }
 
+TEST_F(Calibrate, ALeverArmThatNobodyMeasuredIsFoundAndEstimatedOn) {
+  simulateBag(bag_, "difficult", 1, kOffset, truth_);
+  const Outcome outcome = calibrateBags({bag_}, {"--set", "extrinsics_translation=[]"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const std::vector<double> sigmas = sigmasOf(outcome.out);
+  const Config config = written();
+  expectTruth(config, truth_, kOffset, sigmas);
+  EXPECT_EQ(config.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kPose);
+  EXPECT_NEAR(1e3 * config.odometry.smoother.extrinsics_translation_sigma,
+              *std::max_element(sigmas.end() - 3, sigmas.end()), 0.1);
+}
+
 TEST_F(Calibrate, RestShowsNothing) {
   BagContents what;
   what.duration = 20.0;

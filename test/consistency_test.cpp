@@ -162,6 +162,34 @@ TEST(Consistency, AGyroWithAWrongScaleIsInTheSigma) {
   EXPECT_EQ(steps, 0U);
 }
 
+/// A radar half a metre from the IMU, of which the odometry is not told.
+TEST(Consistency, ALeverArmThatNobodyMeasured) {
+  Nees mean;
+  double lever_arm = 0.0;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    SimulatedRun run("walk", seed, 60.0, kStart);
+    run.setup.time_offset.constant = 0.03;
+    run.setup.T_IR.l_I = {0.3, 0.1, 0.4};
+    run.options.T_IR.l_I.setZero();
+    run.options.smoother.estimate_extrinsics = EstimateExtrinsics::kLeverArm;
+    run.options.smoother.extrinsics_translation_sigma = 0.5;
+    run.run();
+    const Nees nees = neesOf(run);
+    mean.velocity += nees.velocity / kSeeds;
+    mean.time_offset += nees.time_offset / kSeeds;
+    const ScanResult& last = run.results.back();
+    const Eigen::Vector3d error = last.T_IR.l_I - run.setup.T_IR.l_I;
+    const Eigen::Matrix3d P = last.T_IR_covariance.topLeftCorner<3, 3>();
+    EXPECT_LT(P.diagonal().maxCoeff(), 0.02 * 0.02);
+    lever_arm += error.dot(P.ldlt().solve(error)) / 3.0 / kSeeds;
+  }
+  std::printf("unknown lever arm: velocity %.2f, offset %.2f, lever arm %.2f\n", mean.velocity,
+              mean.time_offset, lever_arm);
+  EXPECT_LT(mean.velocity, 2.0);
+  EXPECT_LT(mean.time_offset, 2.0);
+  EXPECT_LT(lever_arm, 2.0);
+}
+
 TEST(Consistency, Medium) { expectConsistent("medium", 0.0); }
 TEST(Consistency, Drone) { expectConsistent("drone", 0.0); }
 TEST(Consistency, GroundVehicle) { expectConsistent("ground_vehicle", 0.0); }

@@ -83,7 +83,8 @@ TEST(MotionManifold, MinusJacobianIsCorrect) {
 }
 
 TEST(ExtrinsicsManifold, MinusInvertsPlusAndItsJacobianIsCorrect) {
-  for (const EstimateExtrinsics estimate : {EstimateExtrinsics::kRotation, EstimateExtrinsics::kPose}) {
+  for (const EstimateExtrinsics estimate :
+       {EstimateExtrinsics::kLeverArm, EstimateExtrinsics::kRotation, EstimateExtrinsics::kPose}) {
     const ExtrinsicsManifold manifold(estimate);
     Eigen::VectorXd delta(manifold.tangent());
     for (int i = 0; i < manifold.tangent(); ++i) delta(i) = 0.4 * std::cos(1.7 * i);
@@ -91,9 +92,13 @@ TEST(ExtrinsicsManifold, MinusInvertsPlusAndItsJacobianIsCorrect) {
     std::vector<double> y = x;
     manifold.plus(x.data(), delta.data(), y.data());
     EXPECT_LT((manifold.minus(y.data(), x.data()) - delta).norm(), 1e-12);
-    // A turn about the axes of I.
-    const Eigen::Quaterniond turned = so3::exp(delta.head<3>()) * mounting().q_IR;
-    EXPECT_LT(toExtrinsics(y.data()).q_IR.angularDistance(turned), 1e-12);
+    // A turn about the axes of I, then a move along them.
+    const Extrinsics moved = toExtrinsics(y.data());
+    Eigen::Vector3d turn = Eigen::Vector3d::Zero(), move = turn;
+    if (estimatesTurn(estimate)) turn = delta.head<3>();
+    if (estimatesLeverArm(estimate)) move = delta.tail<3>();
+    EXPECT_LT(moved.q_IR.angularDistance(so3::exp(turn) * mounting().q_IR), 1e-12);
+    EXPECT_LT((moved.l_I - mounting().l_I - move).norm(), 1e-12);
     Eigen::MatrixXd numeric(manifold.tangent(), manifold.tangent());
     constexpr double h = 1e-6;
     for (int i = 0; i < manifold.tangent(); ++i) {

@@ -96,6 +96,17 @@ TEST(MountingCheck, FindsAWrongMounting) {
   }
 }
 
+TEST(MountingCheck, FindsAWrongTurnIfTheLeverArmIsEstimated) {
+  const Vector3d turn(0.0, 8.0 * kDegree, 0.0);
+  SimulatedRun run("difficult", 1, 50.0, 5.0);
+  run.options.smoother.estimate_extrinsics = EstimateExtrinsics::kLeverArm;
+  run.options.T_IR.q_IR = so3::exp(-turn) * run.options.T_IR.q_IR;
+  run.run();
+  ASSERT_TRUE(run.last(0).mounting_turn);
+  const Vector3d found = run.last(0).mounting_turn->turn;
+  EXPECT_LT((found - turn).norm(), turn.norm() / 4.0) << (found / kDegree).transpose();
+}
+
 TEST(MountingCheck, RestShowsNothing) {
   SimulatedRun run("medium", 1, 40.0, 25.0);
   run.run([&](simulation::SensorData& data) {  // ends before the platform moves

@@ -1,9 +1,10 @@
-// The three ways to tell the rotation of T_IR, and the units of the IMU.
+// The three ways to tell the rotation of T_IR, its lever arm, and the units of the IMU.
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <sstream>
 
+#include "rio_t/radar/mounting.h"
 #include "rio_t/ros/messages/conversions.h"
 #include "rio_t/ros/parameters/parameters.h"
 
@@ -126,6 +127,42 @@ TEST(MountingParameters, AMountingThatNoSourceGivesIsAWarning) {
                 "right/mounting_yaw_pitch_roll_deg=[-30, 0, 0]"});
   ASSERT_EQ(of_left.size(), 1u);
   EXPECT_NE(of_left.front().find("left/mounting_yaw_pitch_roll_deg"), std::string::npos) << of_left.front();
+}
+
+EstimateExtrinsics estimated(const Config& config) { return config.odometry.smoother.estimate_extrinsics; }
+double leverArmSigma(const OdometryOptions& options, std::size_t radar) {
+  return optionsOfRadar(options, radar).smoother.extrinsics_translation_sigma;
+}
+
+TEST(MountingParameters, ALeverArmThatNobodyMeasuredIsEstimated) {
+  for (const std::string none : {"mode=online", "extrinsics_translation=[]"}) {
+    EXPECT_EQ(estimated(from({none})), EstimateExtrinsics::kLeverArm);
+    EXPECT_EQ(estimated(from({none, "estimate_extrinsics=rotation"})), EstimateExtrinsics::kPose);
+    EXPECT_EQ(from({none}).odometry.T_IR.l_I, Vector3d::Zero());
+    EXPECT_EQ(leverArmSigma(from({none}).odometry, 0), 0.5);
+    EXPECT_EQ(leverArmSigma(from({none, "extrinsics_translation_sigma=0.2"}).odometry, 0), 0.2);
+  }
+  const Config measured = from({"extrinsics_translation=[0, 0, 0]", "estimate_extrinsics=pose"});
+  EXPECT_EQ(leverArmSigma(measured.odometry, 0), 0.05);
+  EXPECT_EQ(estimated(from({"extrinsics_translation=[0, 0, 0]"})), EstimateExtrinsics::kNone);
+  EXPECT_EQ(estimated(from({"extrinsics_translation=[0, 0, 0]", "estimate_extrinsics=rotation"})),
+            EstimateExtrinsics::kRotation);
+  EXPECT_EQ(estimated(from({"extrinsics_source=tf"})), EstimateExtrinsics::kNone) << "tf gives it";
+  // What the configuration says stays as it is, so that a printed one can be changed.
+  const std::string yaml = toYaml(from({"estimate_extrinsics=rotation"}));
+  for (const char* line : {"\nextrinsics_translation: []\n", "\nestimate_extrinsics: rotation\n",
+                           "\nextrinsics_translation_sigma: 0.0\n"})
+    EXPECT_NE(yaml.find(line), std::string::npos) << line;
+}
+
+TEST(MountingParameters, AMissingLeverArmIsThatOfOneRadar) {
+  const Config config = from({"radars=[left, right]", "left/radar_topic=/left", "right/radar_topic=/right",
+                              "left/extrinsics_translation=[0.2, 0, 0]", "estimate_extrinsics=rotation"});
+  // What is estimated holds for all radars. A tape is good to some centimetres.
+  EXPECT_EQ(estimated(config), EstimateExtrinsics::kPose);
+  EXPECT_EQ(estimated(config.radars[0]), EstimateExtrinsics::kPose);
+  EXPECT_EQ(leverArmSigma(config.odometry, 0), 0.05);
+  EXPECT_EQ(leverArmSigma(config.odometry, 1), 0.5);
 }
 
 TEST(MountingParameters, EachRadarHasItsOwn) {

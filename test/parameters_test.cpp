@@ -83,9 +83,10 @@ TEST(Parameters, WrongTypesAreNamedWithWhatWasExpected) {
   EXPECT_TRUE(contains(faultOf("estimate_time_offset=1"), "expected true or false, got 1"));
   EXPECT_TRUE(contains(faultOf("imu_topic=3"), "expected one line of text, not empty, got 3"));
   EXPECT_TRUE(contains(faultOf("imu_topic=\"\""), "expected one line of text, not empty, got \"\""));
-  EXPECT_TRUE(contains(faultOf("extrinsics_translation=[1, 2]"), "expected a list of 3 finite numbers"));
-  EXPECT_TRUE(contains(faultOf("extrinsics_translation=[1, 2, x]"), "expected a list of 3 finite numbers"));
-  EXPECT_TRUE(contains(faultOf("extrinsics_translation=1"), "expected a list of 3 finite numbers"));
+  EXPECT_TRUE(contains(faultOf("extrinsics_translation=[1, 2]"), "expected [], or a list of 3 finite"));
+  EXPECT_TRUE(contains(faultOf("extrinsics_translation=[1, 2, x]"), "expected [], or a list of 3 finite"));
+  EXPECT_TRUE(contains(faultOf("extrinsics_translation=1"), "expected [], or a list of 3 finite"));
+  EXPECT_TRUE(contains(faultOf("base_extrinsics_translation=1"), "expected a list of 3 finite numbers"));
 }
 
 TEST(Parameters, ListsInListsAndListsThatHoldThemselvesAreRefused) {
@@ -436,7 +437,7 @@ TEST(Parameters, EveryMemberOfTheOptionsHasAKey) {
       << "with max_imu_gap, max_radar_gap";
   EXPECT_EQ(keysChanging("T_IR"), memberCount<Extrinsics>() + 3)
       << "with extrinsics_source, extrinsics_axes and the mounting in words";
-  EXPECT_EQ(memberCount<RadarOptions>(), 4u)
+  EXPECT_EQ(memberCount<RadarOptions>(), 5u)
       << "a new member needs its place in radarOptions in src/ros/parameters/make_config.cpp";
   EXPECT_EQ(memberCount<OdometryOptions>(), 23u) << "a new member needs keys in src/ros/parameters/";
   EXPECT_EQ(memberCount<PointCloudFormat>() - 1, memberCount<PointCloudOverrides>()) << "all but its name";

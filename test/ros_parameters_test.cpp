@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "rio_t/radar/mounting.h"
+
 namespace rio_t {
 namespace {
 

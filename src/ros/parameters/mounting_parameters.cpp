@@ -91,16 +91,12 @@ void resolveEstimate(Config* config) {
 std::vector<std::string> mountingWarnings(const Config& config) {
   std::vector<std::string> warnings;
   for (const Config& radar : configsOfRadars(config)) {
+    if (!radar.has_default_mounting || radar.extrinsics_source != ExtrinsicsSource::kParameters) continue;
     const std::string key = prefixOf(radar.radar_name);
-    const std::string called = key.empty() ? "the radar" : "the radar " + radar.radar_name;
-    if (radar.has_default_mounting && radar.extrinsics_source == ExtrinsicsSource::kParameters)
-      warnings.push_back("The configuration gives no mounting: " + called +
-                         " is taken to look along y of the IMU. Set " + key +
-                         "mounting_yaw_pitch_roll_deg or " + key + "extrinsics_rotation_xyzw.");
-    if (!hasLeverArm(radar))
-      warnings.push_back("The configuration gives no lever arm: where " + called +
-                         " sits is estimated, which needs turns. Measure it with a tape, and set " + key +
-                         "extrinsics_translation.");
+    warnings.push_back("The configuration gives no mounting: the radar " +
+                       (key.empty() ? "" : radar.radar_name + " ") +
+                       "is taken to look along y of the IMU. Set " + key + "mounting_yaw_pitch_roll_deg or " +
+                       key + "extrinsics_rotation_xyzw.");
   }
   return warnings;
 }
