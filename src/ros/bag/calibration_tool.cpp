@@ -21,9 +21,10 @@ const ProgramText kText = {
     "rosrun rio_t calibrate walk.bag --config my.yaml --out calibrated.yaml --set "
     "estimate_extrinsics=rotation\n",
     "The estimate starts from offset and mounting of the configuration, with the sigmas time_offset_sigma,\n"
-    "extrinsics_rotation_sigma and extrinsics_translation_sigma. estimate_extrinsics: rotation leaves the "
+    "extrinsics_rotation_sigma and extrinsics_translation_sigma. estimate_extrinsics: rotation leaves a "
     "lever\n"
-    "arm as it is; pose and none, which is the default, estimate it, too. mode is always batch here.\n"
+    "arm that is given as it is; pose and none, which is the default, estimate it, too. mode is always batch "
+    "here.\n"
     "A number is observed if its sigma is at most half of the sigma at the start. A number that is not "
     "observed\n"
     "stays as it was, and the table says what to move. A bag that fails does not count; the others do.\n"};
