@@ -460,13 +460,14 @@ TEST_F(CheckBag, ADamagedBagIsNamed) {
 TEST_F(CheckBag, TheNextCommandCanBePasted) {
   CheckRequest request;
   request.try_out = false;
-  const std::string copy = folder_ + "/a copy.bag";
+  const std::string copy = folder_ + "/Bob's copy.bag";
   fs::copy_file(bag_, copy);
   request.bags = {copy};
   request.out = folder_ + "/my own.yaml";
   std::ostringstream out, err;
   EXPECT_EQ(runCheck(request, out, err), 0) << err.str();
-  EXPECT_NE(out.str().find("--bag \"" + copy + "\" --config \"" + request.out + "\""), std::string::npos)
+  EXPECT_NE(out.str().find("--bag '" + folder_ + "/Bob'\\''s copy.bag' --config '" + request.out + "'"),
+            std::string::npos)
       << out.str();
   request.bags_go_away = true;
   EXPECT_EQ(runCheck(request, out, err), 0) << err.str();

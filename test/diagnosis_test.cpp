@@ -105,6 +105,10 @@ TEST(Diagnosis, AMountingThatIsHeldAndContradictedIsNoGoodRun) {
              {"mounting_far: The scans fit better if the mounting is turned by 2, -6, 2 degrees",
               "with sigmas of 0.6, 0.6, 0.6", "estimate_extrinsics: rotation"});
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
+  Config tf;
+  tf.extrinsics_source = ExtrinsicsSource::kTf;
+  EXPECT_NE(diagnose(evidence, tf).causes.front().remedy.find("correct the tf of the cloud"),
+            std::string::npos);
   evidence.radars.front().mounting_turn->covariance *= 100.0;  // noise explains it
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
 }

@@ -100,6 +100,12 @@ TEST(RadarChannel, AScanThatComesTwiceCountsOnce) {
   EXPECT_GT(rejected, 0u);
 }
 
+TEST(RadarChannel, AScanWithoutPointsHasTooFew) {
+  OneRadar radar;
+  for (double stamp = 0.7; stamp < 1.5; stamp += 0.1) ASSERT_EQ(radar.use(stamp, 30).rejected_because, "");
+  EXPECT_EQ(radar.use(1.6, 0).rejected_because, "too_few_points");
+}
+
 TEST(RadarChannel, AJumpThatNoPlatformMakesIsRejected) {
   OneRadar radar;
   for (double stamp = 0.7; stamp < 1.5; stamp += 0.1) ASSERT_EQ(radar.use(stamp, 30).rejected_because, "");

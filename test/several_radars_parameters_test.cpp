@@ -220,6 +220,15 @@ TEST(SeveralRadars, AValueThatEachSectionHidesIsRefused) {
       1u)
       << "either key turns the radar";
   EXPECT_TRUE(with("mounting_yaw_pitch_roll_deg=[0, 0, 180]").empty()) << "the right radar takes it";
+  // As roslaunch radar_topic:=/c sets it beside a file. One file may hold both levels.
+  std::istringstream file("radars: [left]\nradar_topic: /c\nleft: {radar_topic: /a}\n");
+  ParameterEntries entries = readParameters(file, "FILE");
+  EXPECT_NO_THROW(makeConfig(entries));
+  entries.push_back({"radar_topic", {"/d"}, kParameterServer + "/rio_t/radar_topic"});
+  EXPECT_THROW(makeConfig(entries), ConfigError);
+  for (ParameterEntry& entry : entries) entry.origin = kParameterServer + "/rio_t/" + entry.key;
+  std::get<ParameterValue::Map>(entries[2].value.data).front().origin = kParameterServer + "/rio_t/left/x";
+  EXPECT_NO_THROW(makeConfig(entries)) << "a file that rosparam loaded";
 }
 
 TEST(SeveralRadars, WhatARadarMayHaveOfItsOwn) {

@@ -246,6 +246,9 @@ int runProgramWith(const ProgramText& text, OptionSet& options, const std::vecto
   } catch (const UsageError& error) {
     err << text.name << ": " << error.what() << " (see --help)\n";
     return kExitUsage;
+  } catch (const std::bad_alloc&) {
+    err << text.name << ": out of memory\n";
+    return kExitFailed;
   } catch (const std::exception& error) {
     err << text.name << ": " << error.what() << "\n";
     return kExitFailed;

@@ -103,7 +103,9 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
                             offset()};
   if (isTightlyCoupled() && seen.velocity.status == EgoVelocityStatus::kMoving) {
     answer.doppler = dopplerOf(scan, seen, taken, answer.rate_variance);
-    if (!answer.doppler) return reject("too_few_inliers");
+    // Its velocity is that of borrowed points.
+    if (!answer.doppler)
+      return reject(answer.ego_velocity.points.empty() ? "too_few_points" : "too_few_inliers");
   }
 
   Innovations d;

@@ -168,7 +168,11 @@ int main(int argc, char** argv) {
   CommandLine command_line;
   return runProgramWith(programText(), command_line.options(), {argv + 1, argv + argc}, std::cout, std::cerr,
                         [&](const OptionSet::Given& given) {
-                          run(command_line.read(given));
+                          try {
+                            run(command_line.read(given));
+                          } catch (const std::invalid_argument& error) {
+                            throw UsageError(error.what());  // everything comes from the command line
+                          }
                           return kExitOk;
                         });
 }

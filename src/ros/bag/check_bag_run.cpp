@@ -3,10 +3,8 @@
 #include <boost/process.hpp>
 #include <exception>
 #include <filesystem>
-#include <iomanip>
 #include <optional>
 #include <ostream>
-#include <sstream>
 #include <stdexcept>
 #include <utility>
 
@@ -37,10 +35,10 @@ void drawRig(const std::string& yaml, const std::string& png) {
 
 /// For a shell.
 std::string word(const std::string& path) {
-  if (path.find(' ') == std::string::npos) return path;
-  std::ostringstream text;
-  text << std::quoted(path);
-  return text.str();
+  const std::string special = " \t'\"\\$`~*?[](){}<>|&;#!";
+  return path.find_first_of(special) == std::string::npos
+             ? path
+             : "'" + boost::algorithm::replace_all_copy(path, "'", "'\\''") + "'";
 }
 
 }  // namespace

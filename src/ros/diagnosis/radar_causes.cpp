@@ -164,8 +164,8 @@ class RadarCauses {
     if (share < kManyScans) return;
     cause("contradicts_imu", share,
           outOf(contradicted, judged, "scans") + of_ + " show a velocity that contradicts the IMU.",
-          "Check the mounting (" + key_ + "extrinsics_rotation_xyzw, order x, y, z, w), " + key_ +
-              "radar_doppler_sign and " + key_ + "radar_axes." + mountingAdvice(radar_) +
+          "Check the mounting (" + mountingKey() + "), " + key_ + "radar_doppler_sign and " + key_ +
+              "radar_axes." + mountingAdvice(radar_) +
               " estimate_extrinsics: rotation corrects up to 10 degrees by itself.");
   }
 
@@ -178,8 +178,8 @@ class RadarCauses {
             "The scans fit better if the mounting" + of_ + " is turned by " +
                 degrees(radar_.mounting_turn->turn) + ", with sigmas of " +
                 fixedTexts(radar_.mounting_turn->sigma() / kDegree, 1) + ".",
-            "Set estimate_extrinsics: rotation, or correct " + key_ +
-                "extrinsics_rotation_xyzw (order x, y, z, w): `rosrun rio_t calibrate` finds it.");
+            "Set estimate_extrinsics: rotation, or correct " + mountingKey() +
+                ": `rosrun rio_t calibrate` finds it.");
       return;
     }
     // An estimate that follows a wrong sign turns the mounting around, and then contradicts nothing.
@@ -187,8 +187,14 @@ class RadarCauses {
           "The estimated mounting" + of_ + " is turned from the configured one by " + degrees(radar_.turn) +
               ", with " + key_ + "extrinsics_rotation_sigma " +
               number(config_.odometry.smoother.extrinsics_rotation_sigma / kDegree) + " degrees.",
-          "Check " + key_ + "radar_doppler_sign, " + key_ + "radar_axes and the mounting (" + key_ +
-              "extrinsics_rotation_xyzw, order x, y, z, w)." + mountingAdvice(radar_));
+          "Check " + key_ + "radar_doppler_sign, " + key_ + "radar_axes and the mounting (" + mountingKey() +
+              ")." + mountingAdvice(radar_));
+  }
+
+  /// What says how the radar is turned.
+  std::string mountingKey() const {
+    if (config_.extrinsics_source == ExtrinsicsSource::kTf) return "the tf of the cloud in the IMU";
+    return key_ + "extrinsics_rotation_xyzw, order x, y, z, w";
   }
 
   static std::string degrees(const Eigen::Vector3d& turn) {

@@ -133,27 +133,28 @@ bool wasRadar(const std::string& name, const ParameterEntries& top_level) {
   });
 }
 
-/// Refuses a value on the command line that every radar overrides in its section: it would silently do
-/// nothing.
+/// Refuses a value on the command line, or on the parameter server beside a file, that every radar overrides
+/// in its section: it would silently do nothing.
 void refuseHidden(const SortedEntries& sorted, const std::vector<Config>& radars,
                   std::vector<std::string>* faults) {
   // Both say how the radar is turned, and the later one holds.
   const auto isTurn = [](const std::string& key) {
     return key == "mounting_yaw_pitch_roll_deg" || key == "extrinsics_rotation_xyzw";
   };
-  const auto hides = [&](const Config& radar, const std::string& key) {
+  const auto hides = [&](const Config& radar, const ParameterEntry& entry) {
     const auto section = sorted.sections.find(radar.radar_name);
     if (section == sorted.sections.end()) return false;
     const ParameterEntries& own = section->second.entries;
     return std::any_of(own.begin(), own.end(), [&](const ParameterEntry& each) {
-      return each.key == key || (isTurn(each.key) && isTurn(key));
+      return (each.key == entry.key || (isTurn(each.key) && isTurn(entry.key))) &&
+             (entry.origin == kCommandLine || !isOfServer(each));
     });
   };
   for (const ParameterEntry& entry : sorted.top_level) {
     const bool is_hidden =
-        !radars.empty() && std::all_of(radars.begin(), radars.end(),
-                                       [&](const Config& radar) { return hides(radar, entry.key); });
-    if (!is_hidden || entry.origin != kCommandLine) continue;
+        !radars.empty() &&
+        std::all_of(radars.begin(), radars.end(), [&](const Config& radar) { return hides(radar, entry); });
+    if (!is_hidden || (entry.origin != kCommandLine && !isOfServer(entry))) continue;
     std::string expected;
     for (const Config& radar : radars) appendItem(&expected, radar.radar_name + "/" + entry.key);
     faults->push_back(entry.origin + ": " + entry.key +

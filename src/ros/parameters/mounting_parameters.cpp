@@ -28,8 +28,7 @@ bool isGiven(const ParameterEntry* entry) {
 /// The file, the command line, or the parameter server: the origin without line and key.
 std::string sourceOf(const ParameterEntry& entry) {
   const std::string& origin = entry.origin;
-  std::string of_server = "parameter ";
-  if (origin.rfind(of_server, 0) == 0) return of_server;
+  if (isOfServer(entry)) return kParameterServer;
   const std::size_t colon = origin.rfind(':');
   if (colon == std::string::npos) return origin;
   const bool is_line = origin.find_first_not_of("0123456789", colon + 1) == std::string::npos;

@@ -199,6 +199,8 @@ ParameterEntries readParameters(std::istream& yaml, const std::string& name) {
   return fromYamlMap(root, true, [&](int line) { return name + ":" + std::to_string(line); });
 }
 
+bool isOfServer(const ParameterEntry& entry) { return entry.origin.rfind(kParameterServer, 0) == 0; }
+
 ParameterEntry parseAssignment(const std::string& text) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0) {

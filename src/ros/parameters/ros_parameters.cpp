@@ -91,10 +91,10 @@ ParameterEntries toParameterEntries(XmlRpc::XmlRpcValue& map, const std::string&
     ParameterValue::Map section;
     if (value.getType() == XmlRpc::XmlRpcValue::TypeStruct) {
       for (auto& [inner, inner_value] : value)
-        section.push_back({inner, toValueOf(inner, inner_value), "parameter " + path + "/" + inner});
+        section.push_back({inner, toValueOf(inner, inner_value), kParameterServer + path + "/" + inner});
     }
     entries.push_back(
-        {key, section.empty() ? toValueOf(key, value) : ParameterValue{section}, "parameter " + path});
+        {key, section.empty() ? toValueOf(key, value) : ParameterValue{section}, kParameterServer + path});
   }
   return entries;
 }
@@ -102,7 +102,7 @@ ParameterEntries toParameterEntries(XmlRpc::XmlRpcValue& map, const std::string&
 ConfigError withHintOfServer(const ConfigError& error, const std::string& name_space) {
   std::vector<std::string> faults = error.faults();
   for (std::string& fault : faults)
-    if (fault.rfind("parameter " + name_space + "/", 0) == 0)
+    if (fault.rfind(kParameterServer + name_space + "/", 0) == 0)
       fault += " (perhaps left by an earlier run: rosparam delete " + name_space + ")";
   return ConfigError(std::move(faults));
 }
@@ -114,7 +114,7 @@ Config configFromRos(const ros::NodeHandle& private_node) {
     std::string file;
     if (!private_node.getParam("config", file) || file.empty()) {
       throw ConfigError(
-          {"parameter " + name_space + "/config: expected the name or the path of a configuration"});
+          {kParameterServer + name_space + "/config: expected the name or the path of a configuration"});
     }
     entries = readParameterFile(findConfigFile(file));
   }

@@ -38,6 +38,9 @@ struct ParameterEntry {
 using ParameterEntries = std::vector<ParameterEntry>;
 /// Origin of an entry from parseAssignment.
 inline const std::string kCommandLine = "--set";
+/// With these words begins the origin of one from the parameter server.
+inline const std::string kParameterServer = "parameter ";
+bool isOfServer(const ParameterEntry& entry);
 
 /// Reads a YAML file, flat but for the sections of radars; throws std::runtime_error with one line naming
 /// file, line and what was expected.
