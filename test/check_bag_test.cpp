@@ -357,6 +357,24 @@ TEST_F(CheckBag, ABriefDivergenceDoesNotMakeATrialRunBad) {
   EXPECT_TRUE(good.ready()) << describeCheck(good);
 }
 
+/// A vehicle turns about one axis only, so gravity does not show it. The radar contradicts each turn.
+TEST_F(CheckBag, AGyroThatIsInvertedIsNotReady) {
+  simulation::MotionRequest request;
+  request.name = "ground_vehicle";
+  request.seed = 1;
+  request.duration = 60.0;
+  const simulation::Motion motion = simulation::makeMotion(request);
+  simulation::SimulationOptions setup = setup_;
+  setup.seed = 1;
+  simulation::SensorData data = simulation::simulate(motion, setup);
+  for (ImuMeasurement& sample : data.imu.samples) sample.angular_velocity = -sample.angular_velocity;
+  const std::string bag = folder_ + "/inverted.bag";
+  writeSimulationBag(bag, motion, data, setup.start, {});
+  const BagCheck odd = check(bag);
+  expectLine(odd, FindingLevel::kMissing, {"trial run"});
+  EXPECT_NE(odd.to_do.find("inverted axis of the gyro"), std::string::npos) << odd.to_do;
+}
+
 TEST_F(CheckBag, ABagOfAFrameThatVibratesRunsWell) {
   const double vibration = setup_.imu.accel_vibration;
   setup_.imu.accel_vibration = 2.0;  // [m/s^2]

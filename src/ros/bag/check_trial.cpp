@@ -22,7 +22,9 @@ struct Trial {
   }
   bool good() const {
     return failure.empty() && summary.health == Health::kOk &&
-           summary.diagnosis.verdict != RunVerdict::kBad && shareUsed() > 0.5;
+           summary.diagnosis.verdict != RunVerdict::kBad && shareUsed() > 0.5 &&
+           static_cast<double>(summary.scans_diverged) <=
+               kManyDiverged * static_cast<double>(summary.scans_judged);
   }
   /// Larger is better; a good one is better than all others.
   double score() const {
@@ -98,7 +100,8 @@ void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
   if (causes.empty() || isAboutMounting(causes.front()))
     check->to_do +=
         " Measure the mounting and give it: --set mounting_yaw_pitch_roll_deg=[YAW,PITCH,ROLL] "
-        "--set extrinsics_translation=[X,Y,Z] (docs/your_sensors.md, section 6).";
+        "--set extrinsics_translation=[X,Y,Z] (docs/your_sensors.md, section 6). If that does not help, look "
+        "at the axes of the IMU: an inverted axis of the gyro contradicts every radar.";
 }
 
 }  // namespace

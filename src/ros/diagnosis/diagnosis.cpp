@@ -12,7 +12,6 @@ namespace {
 
 // As kManyScans.
 constexpr double kManyWindows = 0.3;
-constexpr double kManyDiverged = 0.1;
 constexpr double kManySamples = 0.05;
 constexpr double kFewScansUsed = 0.5;
 constexpr double kLateStart = 0.5;

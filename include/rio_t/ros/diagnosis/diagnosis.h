@@ -19,6 +19,9 @@ std::string toString(RunVerdict verdict);  ///< "good", "doubtful", "bad"
 /// `extrinsics_rotation_sigma` about an axis. If that sigma is right, one radar in 120 is.
 constexpr double kFarMounting = 3.0;
 
+/// A run is doubtful if the estimate diverged for a larger share of its scans.
+constexpr double kManyDiverged = 0.1;
+
 /// A likely cause of trouble.
 struct Cause {
   std::string name;    ///< in snake case: "points_too_weak"
