@@ -72,6 +72,7 @@ RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) co
   z.covariance.diagonal().array() += result.rate_variance;
   z.offset_gain = result.offset_gain;
   z.offset_half_width = result.offset_half_width;
+  z.slow_half_width = result.slow_half_width;
   return z;
 }
 
@@ -111,7 +112,6 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
     scan.stamp = result.scan.stamp;
     scan.t_O = result.time_offset;
     scan.radar = radar;
-    scan.slow_half_width = result.slow_half_width;
     scan.offset_stepped = stepped[radar];
     stepped[radar] = false;
     if (result.at_rest) scan.rest_velocity_sigma = result.rest_velocity_sigma;

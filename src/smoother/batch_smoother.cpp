@@ -175,9 +175,10 @@ BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std
   if (!is_estimated) return graph;
   const std::vector<NodeEstimate> nodes = graph.states();
   for (std::size_t i = 0; i < scans; ++i) {
-    const BatchScan& scan = problem.scans[i];
-    const Extrinsics& T_IR = guess.extrinsics[scan.radar];
-    *graph.scans[i].slow = slowMotion(nodes, graph.scans[i].node, scan.slow_half_width, *imu_, T_IR, T_IR);
+    const RadarScanTime* taken = problem.scans[i].measurement();
+    if (taken == nullptr) continue;
+    const Extrinsics& T_IR = guess.extrinsics[problem.scans[i].radar];
+    *graph.scans[i].slow = slowMotion(nodes, graph.scans[i].node, taken->slow_half_width, *imu_, T_IR, T_IR);
   }
   return graph;
 }

@@ -27,10 +27,15 @@ struct BatchScan {
   std::size_t radar = 0;
   double t_O = 0.0;  ///< [s] initial value; also places the node (imu model)
   std::optional<RadarVelocityMeasurement> velocity;
-  std::optional<DopplerMeasurement> doppler;     ///< instead of the velocity; neither: the scan is not used
-  std::optional<double> rest_velocity_sigma;     ///< [m/s] set if the platform is at rest
-  double slow_half_width = kMaxOffsetHalfWidth;  ///< of the mean in SlowMotion [s]
-  bool offset_stepped = false;                   ///< t_O may have stepped since the scan before
+  std::optional<DopplerMeasurement> doppler;  ///< instead of the velocity; neither: the scan is not used
+  std::optional<double> rest_velocity_sigma;  ///< [m/s] set if the platform is at rest
+  bool offset_stepped = false;                ///< t_O may have stepped since the scan before
+
+  /// Null if the scan is not used.
+  const RadarScanTime* measurement() const {
+    if (doppler) return &*doppler;
+    return velocity ? &*velocity : nullptr;
+  }
 };
 
 /// A radar as it is known before its scans.
