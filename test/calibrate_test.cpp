@@ -315,6 +315,21 @@ TEST_F(Calibrate, ALeverArmThatNobodyMeasuredIsFoundAndEstimatedOn) {
               *std::max_element(sigmas.end() - 3, sigmas.end()), 0.1);
 }
 
+TEST_F(Calibrate, ALeverArmThatNoRunHasShownStaysOpen) {
+  // A vehicle does not show how high the radar sits.
+  simulateBag(bag_, "ground_vehicle", 1, kOffset, truth_, 50.0);
+  ASSERT_EQ(calibrateBags({bag_}, {"--set", "extrinsics_translation=[]"}).status, 0);
+  for (const char* next : {"", "once more"}) {
+    const Config config = written();
+    EXPECT_EQ(config.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kPose) << next;
+    EXPECT_EQ(config.odometry.smoother.extrinsics_translation_sigma, 0.5) << next;
+    EXPECT_EQ(config.odometry.T_IR.l_I.z(), 0.0) << next;
+    const std::string from = folder_ + "/from.yaml";
+    fs::copy_file(yaml_, from, fs::copy_options::overwrite_existing);
+    ASSERT_EQ(runCalibrate({"--bag", bag_, "--config", from, "--out", yaml_}).status, 0);
+  }
+}
+
 TEST_F(Calibrate, RestShowsNothing) {
   BagContents what;
   what.duration = 20.0;

@@ -329,6 +329,10 @@ TEST_F(CheckBag, ALeverArmIsEstimatedFromWhereTheBagShowsIt) {
   EXPECT_LT((config.odometry.T_IR.l_I - true_l_I).norm(), 0.1) << config.odometry.T_IR.l_I.transpose();
   const RadarSummary radar = run(odd).radars.front();
   EXPECT_NEAR(radar.final_offset_s, setup_.time_offset.constant, 3.0 * radar.final_offset_sigma_s);
+  // A run that holds the mounting would hold an arm that is a decimetre wrong.
+  const Config held = configOf(check(bag, false, {"estimate_extrinsics=none"}));
+  EXPECT_EQ(held.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kLeverArm);
+  EXPECT_EQ(held.odometry.T_IR.l_I, Eigen::Vector3d::Zero());
   // What the user has measured is held.
   EXPECT_EQ(configOf(check(bag, false, {"extrinsics_translation=[0.04,-0.07,0.21]"}))
                 .odometry.smoother.estimate_extrinsics,

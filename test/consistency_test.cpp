@@ -190,6 +190,19 @@ TEST(Consistency, ALeverArmThatNobodyMeasured) {
   EXPECT_LT(lever_arm, 2.0);
 }
 
+/// It never turns. The noise of the gyro must not look like turns that show the lever arm.
+TEST(Consistency, AStraightDriveDoesNotShowTheLeverArm) {
+  SimulatedRun run("constant_speed", 1, 120.0, kStart);
+  run.setup.imu.noise.gyro_density = 0.001;
+  run.setup.radar.rate = 20.0;
+  run.options.T_IR.l_I.setZero();
+  run.options.smoother.estimate_extrinsics = EstimateExtrinsics::kLeverArm;
+  run.options.smoother.extrinsics_translation_sigma = 0.5;
+  run.run();
+  const Eigen::Vector3d sigma = run.results.back().T_IR_covariance.diagonal().head<3>().cwiseSqrt();
+  EXPECT_GT(sigma.minCoeff(), 0.45) << sigma.transpose();
+}
+
 TEST(Consistency, Medium) { expectConsistent("medium", 0.0); }
 TEST(Consistency, Drone) { expectConsistent("drone", 0.0); }
 TEST(Consistency, GroundVehicle) { expectConsistent("ground_vehicle", 0.0); }

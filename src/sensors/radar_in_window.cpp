@@ -114,11 +114,14 @@ std::optional<Eigen::Vector3d> RadarInWindow::velocityAt(const FixedLagSmoother&
 void RadarInWindow::updateSlowMotion(const FixedLagSmoother& smoother) {
   const std::vector<NodeEstimate> nodes = smoother.nodes();
   const Extrinsics T_IR = extrinsics();
+  std::vector<SlowMotion*> motions;
   for (const Scan& scan : scans_) {
     if (scan.node < nodes.front().time) continue;
     *scan.slow =
         slowMotion(nodes, nearestNode(nodes, scan.node), scan.half_width, *model_.imu, T_IR, scan.slow->T_IR);
+    motions.push_back(scan.slow.get());
   }
+  keepTurns(motions);
 }
 
 template <class Factor, class Measurement>

@@ -174,12 +174,15 @@ BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std
   }
   if (!is_estimated) return graph;
   const std::vector<NodeEstimate> nodes = graph.states();
+  std::vector<std::vector<SlowMotion*>> motions(graph.extrinsics.size());
   for (std::size_t i = 0; i < scans; ++i) {
     const RadarScanTime* taken = problem.scans[i].measurement();
     if (taken == nullptr) continue;
     const Extrinsics& T_IR = guess.extrinsics[problem.scans[i].radar];
     *graph.scans[i].slow = slowMotion(nodes, graph.scans[i].node, taken->slow_half_width, *imu_, T_IR, T_IR);
+    motions[problem.scans[i].radar].push_back(graph.scans[i].slow.get());
   }
+  for (const std::vector<SlowMotion*>& of_radar : motions) keepTurns(of_radar);
   return graph;
 }
 

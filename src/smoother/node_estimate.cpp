@@ -1,11 +1,19 @@
 #include "rio_t/smoother/node_estimate.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "rio_t/factors/offset_derivative.h"
 
 namespace rio_t {
+namespace {
+
+/// Noise alone does not reach so many of its sigmas as rms over a window, which has two or three independent
+/// means.
+constexpr double kTurning = 3.0;
+
+}  // namespace
 
 std::size_t nearestNode(const std::vector<NodeEstimate>& nodes, Time time) {
   const auto after = std::lower_bound(nodes.begin(), nodes.end(), time,
@@ -34,9 +42,26 @@ SlowMotion slowMotion(const std::vector<NodeEstimate>& nodes, std::size_t k, dou
   // The IMU reaches kOffsetHalfWidth past the newest node. It may reach further, but then the order of the
   // messages would change the result.
   const double reached = nodes.back().time + kOffsetHalfWidth - time;
-  slow.omega_I = imu.mean(time, std::min(half_width, reached)).angular_velocity - nodes[k].x.b_g();
+  const ImuMean mean = imu.mean(time, std::min(half_width, reached));
+  slow.omega_I = mean.angular_velocity - nodes[k].x.b_g();
+  if (mean.duration > 0.0) slow.omega_variance = mean.gyro_variance / mean.duration;
   slow.v_R = T_IR.R_RI() * (v_I / weights + slow.omega_I.cross(T_IR.l_I));
   return slow;
+}
+
+void keepTurns(const std::vector<SlowMotion*>& motions) {
+  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+  double noise = 0.0;
+  for (const SlowMotion* motion : motions) {
+    squares += motion->omega_I * motion->omega_I.transpose();
+    noise += motion->omega_variance;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares);
+  Eigen::Matrix3d turning = Eigen::Matrix3d::Zero();  // projects on the axes about which the platform turns
+  for (int i = 0; i < 3; ++i)
+    if (axes.eigenvalues()[i] > kTurning * kTurning * noise)
+      turning += axes.eigenvectors().col(i) * axes.eigenvectors().col(i).transpose();
+  for (SlowMotion* motion : motions) motion->omega_I = turning * motion->omega_I;
 }
 
 }  // namespace rio_t

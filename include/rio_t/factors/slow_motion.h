@@ -14,6 +14,7 @@ struct SlowMotion {
   Extrinsics T_IR;                                    ///< mounting from which the factor is linear
   Eigen::Vector3d v_R = Eigen::Vector3d::Zero();      ///< velocity of the radar, in R [m/s]
   Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();  ///< angular velocity of I, in I [rad/s]
+  double omega_variance = 0.0;                        ///< of its noise, about each axis [rad^2/s^2]
 };
 
 }  // namespace rio_t

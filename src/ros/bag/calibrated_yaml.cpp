@@ -28,7 +28,7 @@ ParameterValue writtenList(const Vector& values, const Vector& configured, doubl
 }
 
 /// The keys of a radar that are calibrated.
-ProposedKeys calibratedKeys(const RadarCalibration& calibration, const Config& configured) {
+ProposedKeys calibratedKeys(const RadarCalibration& calibration, const Config& configured, bool pose) {
   constexpr double kMicro = 1e6, kNano = 1e9;  // in one
   const SmootherOptions& smoother = configured.odometry.smoother;
   const Extrinsics& mounting = configured.odometry.T_IR;
@@ -36,10 +36,10 @@ ProposedKeys calibratedKeys(const RadarCalibration& calibration, const Config& c
       calibration.axes[static_cast<std::size_t>(CalibrationAxis::kOffset)].verdict == Verdict::kObserved;
   ProposedKeys keys;
   keys.set("extrinsics_translation", writtenList(calibration.T_IR.l_I, mounting.l_I, kMicro));
-  if (!hasLeverArm(configured))
+  if (pose)
     keys.set("extrinsics_translation_sigma",
              ParameterValue{std::max(rounded(calibration.leverArmSigma(), kMicro), 1e-6)},
-             "Nobody has measured the lever arm, so the next run goes on with the estimate.");
+             "The next run goes on with the estimate from here.");
   keys.set("extrinsics_rotation_xyzw",
            writtenList(calibration.T_IR.q_IR.coeffs(), mounting.q_IR.coeffs(), kNano));
   // The next run starts from this sigma. Its offset may differ by as much as the step detector ignores.
@@ -70,9 +70,9 @@ std::string header(const BagCalibration& calibration, const std::string& name) {
 }
 
 /// How the next run goes on from a mounting that is known to `turn_sigma` [rad].
-std::string estimateNext(double turn_sigma, bool has_lever_arms) {
+std::string estimateNext(double turn_sigma, bool pose) {
   ProposedKeys keys;
-  keys.set("estimate_extrinsics", has_lever_arms ? "rotation" : "pose",
+  keys.set("estimate_extrinsics", pose ? "pose" : "rotation",
            "The bags show the mounting to the sigmas below. The next run starts from the largest of a turn, "
            "and goes on with the estimate: an error of the mounting is then in its sigmas.");
   keys.set("extrinsics_rotation_sigma", ParameterValue{std::max(rounded(turn_sigma, 1e6), 1e-6)});
@@ -93,6 +93,9 @@ std::string calibratedYaml(const BagCalibration& calibration, const Config& conf
        {"estimate_extrinsics", "extrinsics_rotation_sigma", "mounting_yaw_pitch_roll_deg", "extrinsics_axes"})
     top_level.remove(key);
   for (const Config& radar : config.radars) top_level.remove(radar.radar_name);  // `left:` and no more
+  // A lever arm that the user has measured is known from here on.
+  const bool pose = config.estimate_extrinsics == EstimateExtrinsics::kPose ||
+                    !std::all_of(configured.begin(), configured.end(), hasLeverArm);
   double turn_sigma = 0.0;
   for (const CalibratedRadar& radar : calibration.radars)
     turn_sigma = std::max(turn_sigma, radar.calibration.turnSigma());
@@ -110,10 +113,10 @@ std::string calibratedYaml(const BagCalibration& calibration, const Config& conf
     if (has_sections) sections += "\n" + radar.name + ":\n" + toYaml(own, indent);
     sections += (has_sections ? "" : "\n") + commented(describeCalibration(radar), indent) + indent +
                 "# If the driver's restart changes the offset, raise time_offset_sigma.\n" +
-                toYaml(calibratedKeys(radar.calibration, configured[k]), indent);
+                toYaml(calibratedKeys(radar.calibration, configured[k], pose), indent);
   }
-  return header(calibration, name) + "\n" + toYaml(top_level, "") + "\n" +
-         estimateNext(turn_sigma, std::all_of(configured.begin(), configured.end(), hasLeverArm)) + sections;
+  return header(calibration, name) + "\n" + toYaml(top_level, "") + "\n" + estimateNext(turn_sigma, pose) +
+         sections;
 }
 
 }  // namespace rio_t

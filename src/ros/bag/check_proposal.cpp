@@ -73,6 +73,18 @@ void proposeEstimate(const ParameterEntries& configured, ProposedKeys* keys) {
             "The mounting below is coarse. The estimate starts there and refines it.");
 }
 
+/// The keys of a radar. The lever arm that the bag shows is too coarse for a run that would hold it, so such
+/// a run estimates one that is missing.
+ProposedKeys keysOf(const RadarInspection& radar, const ParameterEntries& configured) {
+  ProposedKeys keys = radar.keys;
+  if (!isConfigured("estimate_extrinsics", configured) ||
+      makeConfig(configured).estimate_extrinsics == EstimateExtrinsics::kPose)
+    return keys;
+  keys.remove("extrinsics_translation");
+  keys.remove("extrinsics_translation_sigma");
+  return keys;
+}
+
 }  // namespace
 
 ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarInspection>& radars,
@@ -94,7 +106,7 @@ ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarI
                          ParameterValue{rounded(std::max(kLeast, kSafety * worst), 100.0)},
                          "Standard deviation of the mounting below [rad], with a margin.");
   if (radars.size() == 1) {
-    config.top_level.add(radars.front().keys);
+    config.top_level.add(keysOf(radars.front(), configured));
     addConfigured(configured, &config);
     return config;
   }
@@ -102,7 +114,8 @@ ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarI
   ParameterValue::List list;
   for (const std::string& name : names) list.push_back({name});
   config.top_level.set("radars", ParameterValue{list});
-  for (std::size_t k = 0; k < radars.size(); ++k) config.radars.emplace_back(names[k], radars[k].keys);
+  for (std::size_t k = 0; k < radars.size(); ++k)
+    config.radars.emplace_back(names[k], keysOf(radars[k], configured));
   addConfigured(configured, &config);
   return config;
 }

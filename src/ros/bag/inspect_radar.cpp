@@ -217,7 +217,7 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
   radar->ok("lever arm",
             "about [" + text + "] m: " +
                 (is_known ? "the estimate starts there" : "too vague, the estimate starts at zero") +
-                "; measure it with a tape");
+                ", unless you give it; measure it with a tape");
   if (is_known) {
     radar->keys.set("extrinsics_translation",
                     listOf({rounded(l.x(), 100.0), rounded(l.y(), 100.0), rounded(l.z(), 100.0)}),

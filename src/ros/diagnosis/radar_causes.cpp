@@ -185,7 +185,7 @@ class RadarCauses {
     // An estimate that follows a wrong sign turns the mounting around, and then contradicts nothing.
     cause("mounting_far", share,
           "The estimated mounting" + of_ + " is turned from the configured one by " + degrees(radar_.turn) +
-              ", with " + key_ + "extrinsics_rotation_sigma " +
+              ", with extrinsics_rotation_sigma " +
               number(config_.odometry.smoother.extrinsics_rotation_sigma / kDegree) + " degrees.",
           "Check " + key_ + "radar_doppler_sign, " + key_ + "radar_axes and the mounting (" + mountingKey() +
               ")." + mountingAdvice(radar_));

@@ -189,7 +189,7 @@ void listExtrinsics(ParameterList& list, Config& c) {
       "This is the lever arm, the position of the radar in the IMU frame, x, y, z. A tape measure is good "
       "enough: 1 cm of error matters only if the platform turns fast. [] means that nobody has measured it. "
       "rio_t then estimates it, whatever estimate_extrinsics says: with none only the lever arm, with "
-      "rotation the whole pose.");
+      "rotation the whole pose. If one of several radars has none, the lever arms of all are estimated.");
   list.first().rotation(
       "extrinsics_rotation_xyzw", c.odometry.T_IR.q_IR,
       "This quaternion turns radar vectors (x right, y forward, z up) into the IMU frame. An error of a "
