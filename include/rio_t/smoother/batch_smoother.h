@@ -106,9 +106,9 @@ class BatchSmoother {
     std::vector<Node> nodes;
     std::vector<NodeEstimate> states() const;
     struct Scan {
-      std::size_t node;
-      Block* offset;
-      Block* extrinsics;
+      std::size_t node = 0;
+      Block* offset = nullptr;
+      Block* extrinsics = nullptr;
       std::shared_ptr<SlowMotion> slow;  ///< null if the mounting is not estimated
     };
     std::vector<Scan> scans;
