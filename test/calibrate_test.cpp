@@ -137,7 +137,7 @@ TEST_F(Calibrate, AMountingToldWrongIsFoundAndTheNextRunReadsIt) {
   EXPECT_EQ(countOf("   observed\n", outcome.out), 7u) << outcome.out;
   const Config config = written();
   expectTruth(config, truth_, kOffset, sigmasOf(outcome.out));
-  EXPECT_EQ(config.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kRotation);
+  EXPECT_EQ(config.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kPose);
   EXPECT_EQ(config.radar_format, "irs");
   expectSays(contents(yaml_), {"# Bags that count:\n#   " + bag_, "#   lever arm z", "imu_topic: "});
   EXPECT_FALSE(fs::exists(yaml_ + ".part"));
@@ -265,7 +265,7 @@ TEST_F(Calibrate, EachOfTwoRadarsHasItsSection) {
   ASSERT_EQ(config.radars.size(), 2u);
   EXPECT_EQ(config.radars[1].radar_topic, "/right");
   EXPECT_EQ(config.radars[1].radar_stamp_shift, 0.001);
-  EXPECT_EQ(config.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kRotation);
+  EXPECT_EQ(config.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kPose);
   const auto half = sigmas.begin() + kCalibrationAxes;
   expectTruth(config.radars[0], truth_, -0.009, {sigmas.begin(), half});
   // Its stamps are a millisecond later.
@@ -300,7 +300,7 @@ TEST_F(Calibrate, WhatAStraightRideDoesNotShowStaysAsTold) {
   EXPECT_EQ(config.odometry.T_IR.l_I, truth_.l_I);
   // To second order in the turns about y and z, which are a milliradian.
   EXPECT_NEAR(so3::log(config.odometry.T_IR.q_IR * truth_.q_IR.conjugate()).x(), 0.0, 1e-6);
-  EXPECT_EQ(config.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kRotation);
+  EXPECT_EQ(config.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kPose);
 }
 
 TEST_F(Calibrate, ALeverArmThatNobodyMeasuredIsFoundAndEstimatedOn) {
@@ -349,6 +349,7 @@ TEST_F(Calibrate, RotationAloneLeavesTheLeverArm) {
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_EQ(countOf("   not estimated\n", outcome.out), 3u) << outcome.out;
   EXPECT_EQ(written().odometry.T_IR.l_I, truth_.l_I);
+  EXPECT_EQ(written().odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kRotation);
   EXPECT_LT(written().odometry.T_IR.q_IR.angularDistance(truth_.q_IR), 0.6 * kDegree);
 }
 

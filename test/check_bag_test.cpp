@@ -333,10 +333,11 @@ TEST_F(CheckBag, ALeverArmIsEstimatedFromWhereTheBagShowsIt) {
   const Config held = configOf(check(bag, false, {"estimate_extrinsics=none"}));
   EXPECT_EQ(held.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kLeverArm);
   EXPECT_EQ(held.odometry.T_IR.l_I, Eigen::Vector3d::Zero());
-  // What the user has measured is held.
-  EXPECT_EQ(configOf(check(bag, false, {"extrinsics_translation=[0.04,-0.07,0.21]"}))
-                .odometry.smoother.estimate_extrinsics,
-            EstimateExtrinsics::kRotation);
+  // The estimate starts from what the user has measured.
+  const Config measured = configOf(check(bag, false, {"extrinsics_translation=[0.04,-0.07,0.21]"}));
+  EXPECT_EQ(measured.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kPose);
+  EXPECT_EQ(measured.odometry.T_IR.l_I, true_l_I);
+  EXPECT_EQ(measured.odometry.smoother.extrinsics_translation_sigma, 0.05);
 }
 
 /// The run is good: the estimate outvoted the points at wrong directions.

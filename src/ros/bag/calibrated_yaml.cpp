@@ -93,8 +93,7 @@ std::string calibratedYaml(const BagCalibration& calibration, const Config& conf
        {"estimate_extrinsics", "extrinsics_rotation_sigma", "mounting_yaw_pitch_roll_deg", "extrinsics_axes"})
     top_level.remove(key);
   for (const Config& radar : config.radars) top_level.remove(radar.radar_name);  // `left:` and no more
-  // A lever arm that the user has measured is known from here on.
-  const bool pose = config.estimate_extrinsics == EstimateExtrinsics::kPose ||
+  const bool pose = config.estimate_extrinsics != EstimateExtrinsics::kRotation ||
                     !std::all_of(configured.begin(), configured.end(), hasLeverArm);
   double turn_sigma = 0.0;
   for (const CalibratedRadar& radar : calibration.radars)

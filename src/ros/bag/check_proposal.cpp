@@ -66,13 +66,6 @@ void addConfigured(const ParameterEntries& configured, ProposedConfig* config) {
   }
 }
 
-/// The mounting that the bag shows is coarse: the odometry starts there and refines it. A lever arm that is a
-/// decimetre wrong and held moves the offset by several sigma.
-void proposeEstimate(const ParameterEntries& configured, ProposedKeys* keys) {
-  keys->set("estimate_extrinsics", isConfigured("extrinsics_translation", configured) ? "rotation" : "pose",
-            "The mounting below is coarse. The estimate starts there and refines it.");
-}
-
 /// The keys of a radar. The lever arm that the bag shows is too coarse for a run that would hold it, so such
 /// a run estimates one that is missing.
 ProposedKeys keysOf(const RadarInspection& radar, const ParameterEntries& configured) {
@@ -98,7 +91,8 @@ ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarI
     if (!radar.search.enough || sigma.maxCoeff() > kObservedTurn || radar.isSparse()) all_observed = false;
     worst = std::max(worst, sigma.maxCoeff());
   }
-  proposeEstimate(configured, &config.top_level);
+  config.top_level.set("estimate_extrinsics", "pose",
+                       "The mounting below is coarse. The estimate starts there and refines it.");
   constexpr double kLeast = 0.05, kSafety = 3.0;  // [rad]
   if (all_observed && !isMountingConfigured(configured) &&
       kSafety * worst < SmootherOptions().extrinsics_rotation_sigma)

@@ -194,7 +194,7 @@ void listExtrinsics(ParameterList& list, Config& c) {
       "extrinsics_rotation_xyzw", c.odometry.T_IR.q_IR,
       "This quaternion turns radar vectors (x right, y forward, z up) into the IMU frame. An error of a "
       "degree bends the path by about 2 % of its length. If you know the rotation only to 10 degrees, set "
-      "estimate_extrinsics: rotation, or run `calibrate`.");
+      "estimate_extrinsics: pose, or run `calibrate`.");
   list.choice<ExtrinsicsAxes>("extrinsics_axes",
                               {{"rfu", ExtrinsicsAxes::kRightForwardUp}, {"cloud", ExtrinsicsAxes::kCloud}},
                               c.extrinsics_axes,
@@ -216,9 +216,11 @@ void listExtrinsics(ParameterList& list, Config& c) {
        {"rotation", EstimateExtrinsics::kRotation},
        {"pose", EstimateExtrinsics::kPose}},
       c.estimate_extrinsics,
-      "none takes the mounting as it is. rotation estimates the rotation of the radar on the way. pose "
-      "estimates its position as well, which needs fast turns. Use rotation for a mounting by eye, and none "
-      "after a calibration. A position that is not given is estimated in any case.");
+      "none takes the mounting as it is. rotation estimates the rotation of the radar on the way, and takes "
+      "its position as exact. pose estimates its position as well, as far as the platform turns. Use pose "
+      "for "
+      "a mounting by eye, and none after a calibration. A position that is not given is estimated in any "
+      "case.");
   list.number(
       "extrinsics_rotation_sigma", "rad", above(0, M_PI), smoother.extrinsics_rotation_sigma,
       "The estimate of the rotation starts with this standard deviation about each axis. 0.17 rad (10 "
