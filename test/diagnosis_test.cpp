@@ -103,7 +103,7 @@ TEST(Diagnosis, AMountingThatIsHeldAndContradictedIsNoGoodRun) {
   evidence.radars.front().mounting_turn->turn.y() = -0.1;
   expectSays(first(evidence),
              {"mounting_far: The scans fit better if the mounting is turned by 2, -6, 2 degrees",
-              "with sigmas of 0.6, 0.6, 0.6", "estimate_extrinsics: rotation"});
+              "with sigmas of 0.6, 0.6, 0.6", "estimate_extrinsics: pose"});
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
   Config tf;
   tf.extrinsics_source = ExtrinsicsSource::kTf;

@@ -166,7 +166,7 @@ class RadarCauses {
           outOf(contradicted, judged, "scans") + of_ + " show a velocity that contradicts the IMU.",
           "Check the mounting (" + mountingKey() + "), " + key_ + "radar_doppler_sign and " + key_ +
               "radar_axes." + mountingAdvice(radar_) +
-              " estimate_extrinsics: rotation corrects up to 10 degrees by itself.");
+              " estimate_extrinsics: pose corrects up to 10 degrees by itself.");
   }
 
   void addMounting() {
@@ -178,7 +178,7 @@ class RadarCauses {
             "The scans fit better if the mounting" + of_ + " is turned by " +
                 degrees(radar_.mounting_turn->turn) + ", with sigmas of " +
                 fixedTexts(radar_.mounting_turn->sigma() / kDegree, 1) + ".",
-            "Set estimate_extrinsics: rotation, or correct " + mountingKey() +
+            "Set estimate_extrinsics: pose, or correct " + mountingKey() +
                 ": `rosrun rio_t calibrate` finds it.");
       return;
     }
