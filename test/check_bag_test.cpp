@@ -334,10 +334,13 @@ TEST_F(CheckBag, ALeverArmIsEstimatedFromWhereTheBagShowsIt) {
   EXPECT_EQ(held.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kLeverArm);
   EXPECT_EQ(held.odometry.T_IR.l_I, Eigen::Vector3d::Zero());
   // The estimate starts from what the user has measured.
-  const Config measured = configOf(check(bag, false, {"extrinsics_translation=[0.04,-0.07,0.21]"}));
+  const std::string tape = "extrinsics_translation=[0.04,-0.07,0.21]";
+  const Config measured = configOf(check(bag, false, {tape}));
   EXPECT_EQ(measured.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kPose);
   EXPECT_EQ(measured.odometry.T_IR.l_I, true_l_I);
   EXPECT_EQ(measured.odometry.smoother.extrinsics_translation_sigma, 0.05);
+  const Config exact = configOf(check(bag, false, {"extrinsics_translation_sigma=0.01", tape}));
+  EXPECT_EQ(exact.odometry.smoother.extrinsics_translation_sigma, 0.01);
 }
 
 /// The run is good: the estimate outvoted the points at wrong directions.

@@ -148,7 +148,7 @@ TEST(MountingParameters, ALeverArmThatNobodyMeasuredIsEstimated) {
   EXPECT_EQ(estimated(from({"extrinsics_translation=[0, 0, 0]", "estimate_extrinsics=rotation"})),
             EstimateExtrinsics::kRotation);
   EXPECT_EQ(estimated(from({"extrinsics_source=tf"})), EstimateExtrinsics::kNone) << "tf gives it";
-  // What the configuration says stays as it is, so that a printed one can be changed.
+  // makeConfig keeps what the user gave, so the user can edit a printed configuration.
   const std::string yaml = toYaml(from({"estimate_extrinsics=rotation"}));
   for (const char* line : {"\nextrinsics_translation: []\n", "\nestimate_extrinsics: rotation\n",
                            "\nextrinsics_translation_sigma: 0.0\n"})
@@ -158,7 +158,7 @@ TEST(MountingParameters, ALeverArmThatNobodyMeasuredIsEstimated) {
 TEST(MountingParameters, AMissingLeverArmIsThatOfOneRadar) {
   const Config config = from({"radars=[left, right]", "left/radar_topic=/left", "right/radar_topic=/right",
                               "left/extrinsics_translation=[0.2, 0, 0]", "estimate_extrinsics=rotation"});
-  // What is estimated holds for all radars. A tape is good to some centimetres.
+  // All radars share one mode. A tape measures the left lever arm to some centimetres.
   EXPECT_EQ(estimated(config), EstimateExtrinsics::kPose);
   EXPECT_EQ(estimated(config.radars[0]), EstimateExtrinsics::kPose);
   EXPECT_EQ(leverArmSigma(config.odometry, 0), 0.05);

@@ -103,7 +103,7 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
                             offset()};
   if (isTightlyCoupled() && seen.velocity.status == EgoVelocityStatus::kMoving) {
     answer.doppler = dopplerOf(scan, seen, taken, answer.rate_variance);
-    // Its velocity is that of borrowed points.
+    // The scan has no inlier of its own: the velocity comes from borrowed points.
     if (!answer.doppler)
       return reject(answer.ego_velocity.points.empty() ? "too_few_points" : "too_few_inliers");
   }

@@ -52,7 +52,6 @@ void addConfigured(const ParameterEntries& configured, ProposedConfig* config) {
     if (isCloudKey(entry.key)) continue;
     const auto set = [&](ProposedKeys* keys) {
       if (entry.key == "extrinsics_rotation_xyzw") keys->remove("mounting_yaw_pitch_roll_deg");
-      if (entry.key == "extrinsics_translation") keys->remove("extrinsics_translation_sigma");
       keys->set(entry.key, entry.value, "Given by --set.");
     };
     const bool of_radar = std::any_of(about.begin(), about.end(), [&](const ParameterDescription& each) {
@@ -66,13 +65,13 @@ void addConfigured(const ParameterEntries& configured, ProposedConfig* config) {
   }
 }
 
-/// The keys of a radar. The lever arm that the bag shows is too coarse for a run that would hold it, so such
-/// a run estimates one that is missing.
+/// The keys of a radar. A lever arm that the user gives replaces that of the bag. The latter is too coarse
+/// for a run that would hold it: such a run gets none, and so estimates it.
 ProposedKeys keysOf(const RadarInspection& radar, const ParameterEntries& configured) {
   ProposedKeys keys = radar.keys;
-  if (!isConfigured("estimate_extrinsics", configured) ||
-      makeConfig(configured).estimate_extrinsics == EstimateExtrinsics::kPose)
-    return keys;
+  const bool holds = isConfigured("estimate_extrinsics", configured) &&
+                     makeConfig(configured).estimate_extrinsics != EstimateExtrinsics::kPose;
+  if (!holds && !isConfigured("extrinsics_translation", configured)) return keys;
   keys.remove("extrinsics_translation");
   keys.remove("extrinsics_translation_sigma");
   return keys;

@@ -191,7 +191,7 @@ class RadarCauses {
               ")." + mountingAdvice(radar_));
   }
 
-  /// What says how the radar is turned.
+  /// The key, or the tf, that gives the rotation of the radar.
   std::string mountingKey() const {
     if (config_.extrinsics_source == ExtrinsicsSource::kTf) return "the tf of the cloud in the IMU";
     return key_ + "extrinsics_rotation_xyzw, order x, y, z, w";
