@@ -361,5 +361,32 @@ TEST(SlowMotion, IsTheMeanAroundANodeWithWeightsThatFall) {
   EXPECT_LT(slow.T_IR.q_IR.angularDistance(Eigen::Quaterniond::Identity()), 1e-12);
 }
 
+TEST(SlowMotion, KeepsTheTurnsAndNotTheNoise) {
+  const Eigen::Vector3d axis = Eigen::Vector3d(0.2, -0.5, 0.8).normalized();
+  const Eigen::Vector3d across = axis.unitOrthogonal();
+  const double sigma = 0.01;
+  std::vector<SlowMotion> motions(20);
+  std::vector<SlowMotion*> all;
+  const auto set = [&](double turn, double noise) {
+    all.clear();
+    for (std::size_t k = 0; k < motions.size(); ++k) {
+      const double sign = k % 2 == 0 ? 1.0 : -1.0;
+      motions[k].omega_I = turn * axis + sign * noise * across;
+      motions[k].omega_variance = sigma * sigma;
+      all.push_back(&motions[k]);
+    }
+    keepTurns(all);
+  };
+  // A turn stays, and the noise about the other axes goes.
+  set(0.5, 2.0 * sigma);
+  for (const SlowMotion& motion : motions) EXPECT_LT((motion.omega_I - 0.5 * axis).norm(), 1e-12);
+  // What changes sign from scan to scan is a turn, too, if noise does not reach so far.
+  set(0.5, 4.0 * sigma);
+  EXPECT_NEAR(motions[1].omega_I.dot(across), -4.0 * sigma, 1e-12);
+  // Noise alone is no turn.
+  set(0.0, 2.0 * sigma);
+  for (const SlowMotion& motion : motions) EXPECT_LT(motion.omega_I.norm(), 1e-12);
+}
+
 }  // namespace
 }  // namespace rio_t
