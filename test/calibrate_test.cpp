@@ -129,6 +129,14 @@ class Calibrate : public RestBag {
   std::string yaml_;
 };
 
+TEST_F(Calibrate, KeysOfOneBagAreNotForTheNextOnes) {
+  simulateBag(bag_, "difficult", 1, kOffset, truth_);
+  ASSERT_EQ(calibrateBags({bag_}, {"--set", "bag_duration=25", "--set", "gravity=9.81"}).status, 0);
+  const std::string yaml = contents(yaml_);
+  EXPECT_NE(yaml.find("gravity: 9.81"), std::string::npos) << yaml;
+  EXPECT_EQ(yaml.find("bag_duration"), std::string::npos) << yaml;
+}
+
 TEST_F(Calibrate, AMountingToldWrongIsFoundAndTheNextRunReadsIt) {
   simulateBag(bag_, "difficult", 1, kOffset, truth_);
   const Outcome outcome = calibrateBags({bag_}, {"--output-dir", out_});
@@ -428,11 +436,11 @@ TEST_F(Calibrate, WhatIsWrongIsNamedBeforeTheWork) {
   refused({"--bag", folder_ + "/none.bag", "--config", "irs", "--out", yaml_}, {"/none.bag", "no such file"});
   refused({"--bag", bag_, "--bag", bag_, "--config", "irs", "--out", yaml_}, {bag_, "each bag once"}, 2);
   refused({"--bag", bag_, "--config", "none", "--out", yaml_}, {"none"});
-  refused({"--bag", bag_, "--config", own, "--out", own}, {own, "which is read"});
-  refused({"--bag", bag_, "--config", own, "--out", folder_ + "/./own.yaml"}, {"own.yaml, which is read"});
-  refused({"--bag", bag_, "--config", own, "--out", bag_}, {"--out", bag_ + ", which is read"});
-  refused({"--bag", bag_, "--config", own, "--out", folder_ + "/no/such.yaml"}, {"--out", "no folder"});
-  refused({"--bag", bag_, "--config", own, "--out", folder_}, {"--out", "folder"});
+  refused({"--bag", bag_, "--config", own, "--out", own}, {own, "which is read"}, 2);
+  refused({"--bag", bag_, "--config", own, "--out", folder_ + "/./own.yaml"}, {"own.yaml, which is read"}, 2);
+  refused({"--bag", bag_, "--config", own, "--out", bag_}, {"--out", bag_ + ", which is read"}, 2);
+  refused({"--bag", bag_, "--config", own, "--out", folder_ + "/no/such.yaml"}, {"--out", "no folder"}, 2);
+  refused({"--bag", bag_, "--config", own, "--out", folder_}, {"--out", "folder"}, 2);
   refused({"--bag", bag_, "--config", own, "--out", yaml_, "--set", "gravitee=9.8"}, {"gravitee", "gravity"});
   refused({"--bag", bag_, "--config", own, "--out", yaml_, "--set", "extrinsics_source=tf"},
           {"extrinsics_source"});

@@ -34,6 +34,34 @@ TEST_F(CheckBag, ZeroStampsAreNamed) {
   expectRuns(trigger);
 }
 
+TEST_F(CheckBag, ScansThatTheStampSourceOfTheUserDoesNotStampAreNamed) {
+  Changes changes;
+  const std::string bag = rewritten("no_triggers", changes);
+  const std::vector<std::string> trigger = {"stamp_source=trigger",
+                                            "trigger_topic=/sensor_platform/radar/trigger"};
+  const BagCheck none = check(bag, false, trigger);
+  expectLine(none, FindingLevel::kMissing, {"radar", "no scan gets a stamp", "stamp_source: trigger"});
+  EXPECT_NE(none.to_do.find("stamp_source"), std::string::npos) << none.to_do;
+  // One trigger without a stamp among good ones does no harm.
+  const std::string path = folder_ + "/zero_trigger.bag";
+  {
+    const rosbag::Bag in(bag_);
+    rosbag::Bag out(path, rosbag::bagmode::Write);
+    rosbag::View view(in);
+    int triggers = 0;
+    for (const rosbag::MessageInstance& instance : view) {
+      const auto header = instance.instantiate<std_msgs::Header>();
+      if (header && ++triggers == 100) header->stamp = ros::Time();
+      if (header) {
+        out.write(instance.getTopic(), instance.getTime(), *header);
+      } else {
+        out.write(instance.getTopic(), instance.getTime(), instance);
+      }
+    }
+  }
+  EXPECT_TRUE(check(path, false, trigger).ready());
+}
+
 TEST_F(CheckBag, StampsOfAnotherClockAreNamed) {
   Changes changes;
   changes.cloud = [](sensor_msgs::PointCloud2& cloud) {

@@ -232,6 +232,13 @@ TEST_F(CheckBag, ATopicThatIsNotThereIsToBeChosenAnew) {
   const BagCheck radar = checkBag({bag_}, request);
   expectLine(radar, FindingLevel::kMissing, {"no topic /scan", "/sensor_platform/radar/scan"});
   EXPECT_NE(radar.to_do.find("with --radar-topic"), std::string::npos) << radar.to_do;
+  // Beside one that is there, too: the bag runs without it, but that is not what was asked for.
+  request.radar_topics = {"/sensor_platform/radar/scan", "/typo"};
+  request.try_out = false;
+  const BagCheck both = checkBag({bag_}, request);
+  EXPECT_TRUE(both.ready());
+  expectLine(both, FindingLevel::kMissing, {"no topic /typo", "/sensor_platform/radar/scan"});
+  EXPECT_NE(both.to_do.find("with --radar-topic"), std::string::npos) << both.to_do;
 }
 
 TEST_F(CheckBag, TheOtherFormatOfTheSimulatorIsReady) {
@@ -268,6 +275,24 @@ TEST_F(CheckBag, TwoRadarsGetASectionEach) {
     const Extrinsics& truth = kart.options.radars.at(radar.radar_name).T_IR;
     EXPECT_LT(radar.odometry.T_IR.q_IR.angularDistance(truth.q_IR) / kDegree, 15.0) << radar.radar_name;
   }
+  // A topic that says nothing gets the first name that is free.
+  const std::string renamed = folder_ + "/renamed.bag";
+  {
+    const rosbag::Bag in(path);
+    rosbag::Bag out(renamed, rosbag::bagmode::Write);
+    rosbag::View view(in);
+    for (const rosbag::MessageInstance& instance : view) {
+      const std::string& topic = instance.getTopic();
+      out.write(topic == "/sensor_platform/radar_right/scan"  ? "/radar2/scan"
+                : topic == "/sensor_platform/radar_left/scan" ? "/scan"
+                                                              : topic,
+                instance.getTime(), instance);
+    }
+  }
+  const Config other = configOf(check(renamed, false));
+  ASSERT_EQ(other.radars.size(), 2u);
+  EXPECT_EQ(other.radars[0].radar_name, "radar2");
+  EXPECT_EQ(other.radars[1].radar_name, "radar1");
 }
 
 TEST_F(CheckBag, ATrialRunThatIsBadSaysWhy) {
@@ -421,11 +446,13 @@ TEST_F(CheckBag, ExitStatusAndFiles) {
   EXPECT_EQ(runCheck(request, out, err), 2);
   EXPECT_NE(faultOf(request), "");
   request.out = folder_ + "/my.yaml";
+  request.set = {parseAssignment("bag_duration=40")};  // of this bag alone
   EXPECT_EQ(faultOf(request), "");
   EXPECT_EQ(runCheck(request, out, err), 0) << err.str();
   BagRun bag_run;
   bag_run.bags = {bag_};
   bag_run.config = makeConfig(readParameterFile(request.out));
+  EXPECT_EQ(bag_run.config.bag_duration, 0.0);
   EXPECT_EQ(runBag(bag_run).divergences, 0u);
 }
 

@@ -194,6 +194,17 @@ class FramesTest(tester.LiveTestCase):
             self.assertIn("since tf does not have it", listener.value("odometry", "base_extrinsics_from"))
             self.assertEqual(listener.value("odometry", "imu_frame"), "imu_link")
 
+    def test_parameters_place_an_imu_whose_frame_is_base_link(self):
+        self.set_by_hand()
+        rospy.set_param("/rio_t/base_extrinsics_translation", self.p_BI.tolist())
+        rospy.set_param("/rio_t/base_extrinsics_rotation_xyzw", self.q_BI.as_quat().tolist())
+        with tester.Listener() as listener, tester.node("config:=irs", "imu_frame:=base_link"):
+            listener.wait_until_heard()
+            self.play_whole(listener)
+            self.assertIn("parameters base_extrinsics_*", listener.value("odometry", "base_extrinsics_from"))
+            odom = listener.messages["odom"]
+        self.check_against_the_imu(odom, LIVE_BOUND_M)
+
     def test_odometry_waits_for_a_tf_that_is_demanded(self):
         self.set_by_hand()
         with tester.Listener() as listener, tester.node("config:=irs", "base_extrinsics_source:=tf"):

@@ -38,9 +38,13 @@ class TwoRadarDiagnostics : public testing::Test {
       if (each.key == key) return each.value;
     return "no " + key;
   }
+  void imuSample(Time stamp = Time()) {
+    monitor.imu();
+    monitor.imuUsable(stamp);
+  }
   /// A second in which the IMU and these numbers of scans come; so many of those of right are used.
   Status second(int left, int right, int right_used) {
-    monitor.imu(Time());
+    imuSample();
     for (int k = 0; k < left; ++k) feed(0, true);
     for (int k = 0; k < right; ++k) feed(1, k < right_used);
     Status status;
@@ -138,7 +142,7 @@ TEST_F(TwoRadarDiagnostics, IsAnErrorIfTheImuFallsSilentOrCannotBeUsed) {
   expectNoOdometry("the IMU is silent");
   for (int k = 0; k < 10; ++k) {
     feed(0, true);
-    monitor.imu(Time());
+    monitor.imu();
     monitor.imuUnusable("imu_not_finite");
   }
   expectNoOdometry("no IMU message can be used (imu_not_finite)");
@@ -149,7 +153,7 @@ TEST_F(TwoRadarDiagnostics, NameScansThatAlwaysComeBeforeTheStart) {
   monitor.odometry(NavigationState(), 0.0);
   Status status;
   for (int k = 0; k < 5; ++k) {
-    monitor.imu(Time::fromSeconds(1000.0 + k));
+    imuSample(Time::fromSeconds(1000.0 + k));
     for (int i = 0; i < 10; ++i) {
       feed(0, true);
       monitor.scan(1);
@@ -204,16 +208,54 @@ TEST_F(TwoRadarDiagnostics, AreAnErrorWithItsCauseWhereNoScanWasEverUsed) {
 }
 
 TEST_F(TwoRadarDiagnostics, TakeTheShareOfFaultySamplesSinceTheReset) {
-  for (int k = 0; k < 10000; ++k) monitor.imu(Time());
+  for (int k = 0; k < 10000; ++k) imuSample();
   monitor.reset("~reset called");
   LiveSession fresh(config, config.odometry);
   rest(fresh, 0, 4);
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   for (int k = 0; k < 200; ++k)
     fresh.addImu({Time::fromSeconds(4.0 + 0.0025 * k), {kNan, 0.0, 0.0}, {0.0, 0.0, 9.81}});
-  for (int k = 0; k < 1800; ++k) monitor.imu(Time());
+  for (int k = 0; k < 1800; ++k) imuSample();
   EXPECT_EQ(value(odometry(fresh), "likely_cause_1").find("200 IMU samples are not finite."), 0U)
       << value(odometry(fresh), "likely_cause_1");
+}
+
+TEST_F(TwoRadarDiagnostics, DoubtARunWithManyImuMessagesThatCannotBeUsed) {
+  const auto bad = [&](int count) {
+    for (int k = 0; k < count; ++k) {
+      monitor.imu();
+      monitor.imuDropped(kImuNotUsable);
+      monitor.imuUnusable("its stamp is zero");
+    }
+  };
+  bad(1000);
+  monitor.reset("~reset called");
+  for (int k = 0; k < 30; ++k) feed(0, true);
+  for (int k = 0; k < 800; ++k) imuSample();
+  EXPECT_EQ(value(odometry(session), "verdict"), "good");
+  bad(200);
+  const Status status = odometry(session);
+  EXPECT_EQ(value(status, "verdict"), "doubtful");
+  EXPECT_EQ(value(status, "likely_cause_1").find("200 IMU messages cannot be used."), 0U)
+      << value(status, "likely_cause_1");
+}
+
+TEST_F(TwoRadarDiagnostics, ForgetANoisyImuOnceItIsConfiguredSo) {
+  for (int k = 0; k < 30; ++k) feed(0, true);
+  LiveSession noisy(config, config.odometry);
+  for (int k = 0; k < 8000; ++k) {
+    const double shake = k % 2 == 0 ? 1.0 : -1.0;  // [m/s^2] at 400 Hz: 0.05 m/s^2/sqrt(Hz)
+    noisy.addImu({Time::fromSeconds(0.0025 * k), Eigen::Vector3d::Zero(), {shake, 0.0, 9.81}});
+    imuSample();
+  }
+  bool more = false;
+  noisy.process(&more);
+  EXPECT_EQ(value(odometry(noisy), "likely_cause_1").find("The accelerometer vibrates or is noisier"), 0U)
+      << value(odometry(noisy), "likely_cause_1");
+  ImuNoise configured = config.odometry.imu_noise;
+  configured.accel_density = 0.1;
+  monitor.tune(configured);
+  EXPECT_EQ(value(odometry(noisy), "likely_cause_1"), "no likely_cause_1");
 }
 
 TEST_F(TwoRadarDiagnostics, TellTheStateOfTheNewestImuSampleThoughNoScanComes) {
@@ -266,7 +308,7 @@ TEST_F(TwoRadarDiagnostics, NameTheRadarThatIsMostlyRejected) {
 
 TEST_F(TwoRadarDiagnostics, DoNotJudgeScansThatCameBeforeTheStart) {
   for (int k = 0; k < 20; ++k) {
-    monitor.imu(Time());
+    imuSample();
     for (int i = 0; i < 10; ++i) {
       for (const std::size_t radar : {0U, 1U}) {
         monitor.scan(radar);
@@ -286,7 +328,7 @@ TEST_F(TwoRadarDiagnostics, DoNotJudgeScansThatCameBeforeTheStart) {
 TEST_F(TwoRadarDiagnostics, DoNotDoubtARunWhoseScansLongWaitedForTf) {
   for (const char* reason : {"scan_before_extrinsics", "frame_not_usable"}) monitor.dropped(0, reason, 100);
   for (int k = 0; k < 30; ++k) feed(0, true);
-  for (int k = 0; k < 1600; ++k) monitor.imu(Time());
+  for (int k = 0; k < 1600; ++k) imuSample();
   const Status status = odometry(session);
   EXPECT_EQ(value(status, "verdict"), "good");
   EXPECT_EQ(value(status, "likely_cause_1"), "no likely_cause_1");

@@ -11,7 +11,8 @@ namespace {
 
 ProposedKeys keysOf(const ParameterEntries& entries) {
   ProposedKeys keys;
-  for (const ParameterEntry& entry : entries) keys.set(entry.key, entry.value);
+  for (const ParameterEntry& entry : entries)
+    if (!isOfOneBag(entry.key)) keys.set(entry.key, entry.value);
   return keys;
 }
 
@@ -58,7 +59,8 @@ std::string header(const BagCalibration& calibration, const std::string& name) {
   std::string text =
       "Written by rio_t calibrate. It is ready for --config of rio_t_bag, and for the live node.\n";
   text += "It holds the keys of " + oneLine(name) +
-          " and of --set. The comments of that file are not repeated here.\nBags that count:\n";
+          " and of --set, without those of one bag. The comments of that file are not repeated here.\n"
+          "Bags that count:\n";
   for (const CalibrationBag& bag : calibration.bags)
     if (bag.failure.empty()) text += "  " + oneLine(bag.path) + "\n";
   for (const CalibrationBag& bag : calibration.bags)

@@ -52,7 +52,7 @@ void checkFiles(const Arguments& arguments, const std::string& config_file) {
   std::vector<std::string> inputs = arguments.bags;
   inputs.push_back(config_file);
   const std::string fault = faultOfOutput(arguments.out, inputs);
-  if (!fault.empty()) throw std::runtime_error("--out " + fault);
+  if (!fault.empty()) throw UsageError("--out " + fault);
 }
 
 void checkConfig(const Config& config) {

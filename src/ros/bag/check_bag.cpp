@@ -8,6 +8,7 @@
 
 #include "../text.h"
 #include "bag_file.h"
+#include "bag_frames.h"
 #include "check_config.h"
 #include "inspect_radar.h"
 
@@ -48,6 +49,24 @@ std::string header(const Recording& recording) {
 bool hasType(const Recording& recording, const std::string& type) {
   return std::any_of(recording.types.begin(), recording.types.end(),
                      [&](const auto& topic) { return topic.second == type; });
+}
+
+bool hasCloud(const Recording& recording, const std::string& topic) {
+  return std::any_of(recording.clouds.begin(), recording.clouds.end(),
+                     [&](const CloudTopic& cloud) { return cloud.topic == topic; });
+}
+
+/// Says that the bag has no clouds on these topics; empty: on any topic.
+void missRadar(const std::vector<std::string>& topics, const Recording& recording, BagCheck* check) {
+  std::string wanted;
+  for (const std::string& topic : topics) wanted += topic + " ";
+  check->missing(
+      "radar",
+      "the bag has no topic " + wanted + "of type sensor_msgs/PointCloud2; it has " +
+          topicsText(recording.types),
+      !topics.empty() && hasType(recording, "sensor_msgs/PointCloud2")
+          ? "Choose topics of that type which the bag has with --radar-topic, or leave the option out."
+          : "Record the radar, too: a point cloud with positions and Doppler.");
 }
 
 /// Two topics of one radar, one filtered: the other has more points.
@@ -123,15 +142,7 @@ BagCheck checkBag(const std::vector<std::string>& bags, const CheckRequest& requ
   }
   if (radars.empty()) {
     if (recording.clouds.empty()) {
-      std::string wanted;
-      for (const std::string& topic : request.radar_topics) wanted += topic + " ";
-      check.missing(
-          "radar",
-          "the bag has no topic " + wanted + "of type sensor_msgs/PointCloud2; it has " +
-              topicsText(recording.types),
-          !request.radar_topics.empty() && hasType(recording, "sensor_msgs/PointCloud2")
-              ? "Choose topics of that type which the bag has with --radar-topic, or leave the option out."
-              : "Record the radar, too: a point cloud with positions and Doppler.");
+      missRadar(request.radar_topics, recording, &check);
     } else {
       check.to_do =
           to_do.empty()
@@ -144,6 +155,8 @@ BagCheck checkBag(const std::vector<std::string>& bags, const CheckRequest& requ
   for (Finding& finding : check.findings) {
     if (finding.level == FindingLevel::kMissing) finding.level = FindingLevel::kOdd;
   }
+  for (const std::string& topic : request.radar_topics)
+    if (!hasCloud(recording, topicOfBag(topic, recording.types))) missRadar({topic}, recording, &check);
   leaveOutCopies(&radars, recording, &check);
   for (const RadarInspection& radar : radars) {
     if (radar.search.enough) check.quality += 1.0 / radar.search.rotation_sigma.norm();
@@ -160,7 +173,7 @@ BagCheck checkBag(const std::vector<std::string>& bags, const CheckRequest& requ
   if (!all_found && !isMountingConfigured(request.set) && check.to_do.empty())
     check.to_do =
         "The mounting is a guess. Record with motion for 3 s or more, or give it: --set "
-        "mounting_yaw_pitch_roll_deg=[YAW,PITCH,ROLL] (docs/your_sensors.md, section 6).";
+        "mounting_yaw_pitch_roll_deg=[YAW,PITCH,ROLL] (docs/your_sensors.md, section 3).";
   return check;
 }
 

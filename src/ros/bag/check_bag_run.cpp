@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "../command_line.h"
+#include "../temporary_folder.h"
 #include "rio_t/ros/bag/check_bag.h"
 #include "rio_t/ros/parameters/parameters.h"
 
@@ -97,10 +98,10 @@ int runCheck(const CheckRequest& request, std::ostream& out, std::ostream& err) 
       out << " --config " << word(request.out) << " --output-dir results\n";
     }
     if (!request.rig.empty()) {
-      const std::string yaml = request.out.empty() ? request.rig + ".yaml" : request.out;
-      if (request.out.empty()) writeFile(yaml, best->yaml);
+      const TemporaryFolder folder;
+      const std::string yaml = folder.path() + "/rig.yaml";
+      writeFile(yaml, best->yaml);
       drawRig(yaml, request.rig);
-      if (request.out.empty()) fs::remove(yaml);
       out << "The rig is drawn in " << request.rig << "\n";
     }
   } catch (const std::exception& error) {

@@ -39,9 +39,14 @@ std::vector<std::string> radarNames(const std::vector<RadarInspection>& radars) 
                          std::holds_alternative<std::string>(parsePlainScalar(name).data);
     const bool taken = std::find(names.begin(), names.end(), name) != names.end() || keys.count(name) != 0 ||
                        isReserved(name);
-    if (!is_text || taken) name = "radar" + std::to_string(k + 1);
-    names.push_back(name);
+    names.push_back(!is_text || taken ? "" : name);
   }
+  std::size_t number = 0;
+  for (std::string& name : names)
+    while (name.empty()) {
+      const std::string next = "radar" + std::to_string(++number);
+      if (std::find(names.begin(), names.end(), next) == names.end()) name = next;
+    }
   return names;
 }
 
@@ -49,7 +54,7 @@ std::vector<std::string> radarNames(const std::vector<RadarInspection>& radars) 
 void addConfigured(const ParameterEntries& configured, ProposedConfig* config) {
   const std::vector<ParameterDescription> about = parameterDescriptions();
   for (const ParameterEntry& entry : configured) {
-    if (isCloudKey(entry.key)) continue;
+    if (isCloudKey(entry.key) || isOfOneBag(entry.key)) continue;
     const auto set = [&](ProposedKeys* keys) {
       if (entry.key == "extrinsics_rotation_xyzw") keys->remove("mounting_yaw_pitch_roll_deg");
       keys->set(entry.key, entry.value, "Given by --set.");

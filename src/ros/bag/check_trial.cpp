@@ -100,7 +100,7 @@ void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
   if (causes.empty() || isAboutMounting(causes.front()))
     check->to_do +=
         " Measure the mounting and give it: --set mounting_yaw_pitch_roll_deg=[YAW,PITCH,ROLL] "
-        "--set extrinsics_translation=[X,Y,Z] (docs/your_sensors.md, section 6). If that does not help, look "
+        "--set extrinsics_translation=[X,Y,Z] (docs/your_sensors.md, section 3). If that does not help, look "
         "at the axes of the IMU: an inverted axis of the gyro contradicts every radar.";
 }
 

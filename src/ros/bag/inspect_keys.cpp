@@ -32,6 +32,10 @@ bool isConfigured(const std::string& key, const ParameterEntries& configured) {
                      [&](const ParameterEntry& entry) { return entry.key == key; });
 }
 
+bool isOfOneBag(const std::string& key) {
+  return key == "bag_start" || key == "bag_duration" || key == "ground_truth";
+}
+
 double rounded(double value, double per) { return std::round(value * per) / per + 0.0; }
 
 std::string commented(const std::string& text, const std::string& indent) {

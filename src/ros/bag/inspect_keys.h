@@ -39,6 +39,9 @@ struct ProposedConfig {
 /// Whether the user has configured the key.
 bool isConfigured(const std::string& key, const ParameterEntries& configured);
 
+/// Whether the key belongs to one bag, and so not to a configuration for the next ones.
+bool isOfOneBag(const std::string& key);
+
 /// To the nearest of the numbers that lie 1 / `per` apart; never minus zero.
 double rounded(double value, double per);
 

@@ -53,7 +53,8 @@ MountingSearchOptions searchOptions(const ImuInspection& imu, const InertialTrac
 
 struct Looked {
   std::vector<RadarScan> scans;
-  std::size_t points_not_finite = 0;
+  std::size_t points = 0;             // before the scans get their stamps
+  std::size_t points_not_finite = 0;  // besides these
   CloudReport cloud;
   RadarVelocities velocities;
   DopplerSign sign;
@@ -64,6 +65,7 @@ Looked look(const Recording& recording, const ImuInspection& imu, const CloudTop
             const StampProposal& stamps, const PointCloudFormat& format, const InertialTrack& track) {
   Looked looked;
   const DecodedClouds decoded = decodeAll(cloud, format);
+  for (const RadarScan& scan : decoded.scans) looked.points += scan.points.size();
   looked.points_not_finite = decoded.points_not_finite;
   looked.scans = stampScans(recording, imu.times, cloud, stamps, decoded.scans);
   looked.cloud = inspectCloud(looked.scans);
@@ -72,6 +74,18 @@ Looked look(const Recording& recording, const ImuInspection& imu, const CloudTop
   looked.search =
       searchMounting(looked.velocities.velocities, track, searchOptions(imu, track, looked.sign.sign));
   return looked;
+}
+
+/// Why the radar cannot be used; empty: it can.
+std::string faultOf(const Looked& looked, const PointCloudFormat& format, const StampProposal& stamps) {
+  if (looked.points == 0)
+    return looked.points_not_finite == 0
+               ? "no cloud has a point"
+               : "the position or the field " + format.doppler + " is not finite in every point";
+  if (looked.scans.empty()) return "no scan gets a stamp: " + stamps.text;
+  if (looked.cloud.points == 0) return "every point lies at the radar itself";
+  if (!looked.cloud.has_doppler) return "the field " + format.doppler + " is zero in every point";
+  return "";
 }
 
 void describeCloud(const Looked& looked, const FormatProposal& format, const StreamTiming& timing,
@@ -276,14 +290,10 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   const StampProposal stamps = proposeStamps(recording, imu.times, cloud, configured);
   const InertialTrack track(imu.samples, imu.report.rest_rate);
   Looked looked = look(recording, imu, cloud, stamps, format.format, track);
-  if (looked.cloud.points == 0 || !looked.cloud.has_doppler) {
-    const std::vector<RadarScan> decoded = decodeAll(cloud, format.format).scans;
-    const bool none_finite = std::all_of(decoded.begin(), decoded.end(),
-                                         [](const RadarScan& scan) { return scan.points.empty(); });
-    radar.tell(FindingLevel::kMissing, "radar",
-               cloud.topic + ": the " + (none_finite ? "position or the " : "") + "field " +
-                   format.format.doppler + " is " + (none_finite ? "not finite" : "zero") +
-                   " in every point");
+  if (const std::string fault = faultOf(looked, format.format, stamps); !fault.empty()) {
+    radar.tell(FindingLevel::kMissing, "radar", cloud.topic + ": " + fault);
+    if (looked.scans.empty())
+      radar.to_do = "Set stamp_source to header or to arrival, or leave it out: check_bag then chooses.";
     return radar;
   }
   // If the ranges say nothing, a radar that looks along another axis and a contrary sign are one fault, not

@@ -145,6 +145,13 @@ std::vector<RadarScan> stampScans(const Recording& recording, const std::vector<
   for (const HeaderTopic& topic : recording.headers) {
     if (stamps.source == StampSource::kTrigger && topic.topic == stamps.trigger_topic) trigger = &topic;
   }
+  const auto add = [](const auto& message) {
+    try {
+      message();
+    } catch (const std::exception&) {
+      // A stamp of zero among good ones.
+    }
+  };
   std::vector<RadarScan> stamped;
   std::size_t next_imu = 0, next_trigger = 0;
   for (std::size_t k = 0; k < scans.size(); ++k) {
@@ -155,13 +162,9 @@ std::vector<RadarScan> stampScans(const Recording& recording, const std::vector<
            trigger->times[next_trigger].record <= record;
          ++next_trigger) {
       const MessageTimes& times = trigger->times[next_trigger];
-      stamper.addTrigger(trigger->messages[next_trigger].seq, times.stamp, times.record);
+      add([&] { stamper.addTrigger(trigger->messages[next_trigger].seq, times.stamp, times.record); });
     }
-    try {
-      stamper.addScan(cloud.messages[k]->header.seq, cloud.times[k].stamp, record, scans[k]);
-    } catch (const std::exception&) {
-      continue;  // a stamp of zero among good ones
-    }
+    add([&] { stamper.addScan(cloud.messages[k]->header.seq, cloud.times[k].stamp, record, scans[k]); });
     for (RadarScan& scan : stamper.take()) stamped.push_back(std::move(scan));
   }
   for (RadarScan& scan : stamper.finish()) stamped.push_back(std::move(scan));

@@ -69,7 +69,12 @@ bool BodyFrame::tryTf() {
   if (T_BI_) return true;
   if (!imu_frame_) return false;
   if (*imu_frame_ == config_.base_link_frame) {
-    decide({}, "the IMU is " + config_.base_link_frame);
+    // tf has nothing to say, so with `auto` the parameters hold.
+    if (config_.base_extrinsics_source == BaseExtrinsicsSource::kTf)
+      decide({}, "the IMU's frame is " + config_.base_link_frame);
+    else
+      decide(config_.T_BI,
+             "parameters base_extrinsics_*, since the IMU's frame is " + config_.base_link_frame);
     return true;
   }
   try {

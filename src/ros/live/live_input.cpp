@@ -12,12 +12,16 @@ namespace rio_t {
 
 void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
   const auto start = std::chrono::steady_clock::now();
-  monitor_.imu(toTime(event.getConstMessage()->header.stamp));
+  monitor_.imu();
   tick_imu_();
   try {
     const ImuMeasurement imu =
         toImuMeasurement(*event.getConstMessage(), config_.imu_topic, config_.imu_units);
-    if (const char* fault = followImuStamps(imu)) monitor_.imuUnusable(fault);
+    if (const char* fault = followImuStamps(imu)) {
+      monitor_.imuUnusable(fault);
+    } else {
+      monitor_.imuUsable(imu.time);
+    }
     frames_.hear(event.getConstMessage()->header.frame_id);
     const Received received{imu, toTime(event.getReceiptTime())};
     const Session now = session_.get();
@@ -48,9 +52,9 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
     }
     wakeSolver();
   } catch (const std::exception& error) {
-    monitor_.imuDropped("imu_not_usable");
+    monitor_.imuDropped(kImuNotUsable);
     monitor_.imuUnusable(error.what());
-    if (isTimeToTell("imu_not_usable")) ROS_ERROR_STREAM(name_ << ": " << error.what());
+    if (isTimeToTell(kImuNotUsable)) ROS_ERROR_STREAM(name_ << ": " << error.what());
   }
 }
 

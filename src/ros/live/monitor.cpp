@@ -52,8 +52,7 @@ std::string noisyImu(const MeasuredImuNoise& noise, const ImuNoise& configured) 
   return text.str();
 }
 
-LiveMonitor::LiveMonitor(const Config& config)
-    : config_(config), collector_(config), imu_noise_(config.odometry.imu_noise) {
+LiveMonitor::LiveMonitor(const Config& config) : config_(config), collector_(config) {
   for (Config& radar : configsOfRadars(config)) radars_.emplace_back(std::move(radar));
 }
 
@@ -77,11 +76,9 @@ void LiveMonitor::Latency::add(double seconds) {
   ++count;
 }
 
-void LiveMonitor::imu(Time stamp) {
+void LiveMonitor::imu() {
   const std::lock_guard<std::mutex> lock(mutex_);
   ++imu_.count;
-  ++usable_imu_.count;
-  collector_.addImu(stamp);
 }
 
 void LiveMonitor::scan(std::size_t radar) {
@@ -111,9 +108,14 @@ void LiveMonitor::imuDropped(const std::string& reason) {
   ++imu_dropped_[reason];
 }
 
+void LiveMonitor::imuUsable(Time stamp) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ++usable_imu_.count;
+  collector_.addImu(stamp);
+}
+
 void LiveMonitor::imuUnusable(const std::string& why) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  --usable_imu_.count;
   why_unusable_ = why;
 }
 
@@ -166,6 +168,7 @@ void LiveMonitor::reset(const std::string& reason) {
   ++resets_;
   collector_ = EvidenceCollector(config_);
   imu_before_session_ = imu_.count;
+  not_usable_before_session_ = countOf(imu_dropped_, kImuNotUsable);
   last_reset_ = reason;
   last_terminations_.clear();
   last_update_.reset();
@@ -211,7 +214,7 @@ std::string LiveMonitor::wrongType(const std::string& topic, const std::string& 
 
 void LiveMonitor::tune(const ImuNoise& configured) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  imu_noise_ = configured;
+  config_.odometry.imu_noise = configured;
 }
 
 void LiveMonitor::reconfigured(const std::string& refused_because) {
@@ -223,6 +226,8 @@ void LiveMonitor::reconfigured(const std::string& refused_because) {
 std::string LiveMonitor::addDiagnosis(Status& status, const LiveSession& session) const {
   RunEvidence evidence = collector_.evidence(session.odometry(), session.start());
   evidence.imu_count = imu_.count - imu_before_session_;
+  if (const std::uint64_t all = countOf(imu_dropped_, kImuNotUsable); all > not_usable_before_session_)
+    evidence.input_faults[kImuNotUsable] = all - not_usable_before_session_;
   const Diagnosis diagnosis = diagnose(evidence, config_);
   if (evidence.initialized) status.add("verdict", toString(diagnosis.verdict));
   for (std::size_t i = 0; i < diagnosis.causes.size(); ++i) {
@@ -359,7 +364,7 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
       if (name != "diverged" && name != "reinitialized") status.add("fault_" + name, count);
     }
   }
-  const ImuNoise& configured = imu_noise_;
+  const ImuNoise& configured = config_.odometry.imu_noise;
   const MeasuredImuNoise noise = session != nullptr ? session->odometry().imuNoise() : MeasuredImuNoise();
   status.add("imu_accel_noise_measured", noise.accel_density);
   status.add("imu_gyro_noise_measured", noise.gyro_density);

@@ -28,14 +28,15 @@ class LiveMonitor {
   /// `config`: with the topics as they are resolved.
   explicit LiveMonitor(const Config& config);
 
-  void imu(Time stamp);  ///< a message came, as the next
+  void imu();  ///< a message came, as the next
   void scan(std::size_t radar = 0);
   void trigger(std::size_t radar = 0);
   void zeroTrigger(std::size_t radar);  ///< one with a stamp of zero, which stamps no scan
   /// A state was ready `latency` seconds after the IMU message came.
   void odometry(const NavigationState& state, double latency);
   void imuDropped(const std::string& reason);  ///< a sample that goes no further
-  void imuUnusable(const std::string& why);    ///< the last message moves no estimate
+  void imuUsable(Time stamp);                  ///< the last message moves the estimate
+  void imuUnusable(const std::string& why);    ///< it does not
   /// Scans, or points of them, that go no further.
   void dropped(std::size_t radar, const std::string& reason, std::uint64_t count = 1);
   void pressure();                               ///< a message came
@@ -44,7 +45,7 @@ class LiveMonitor {
   /// The session starts again; counters of the node go on.
   void reset(const std::string& reason);
   bool wasReset() const;
-  /// What is missing before there is a session at all; empty: nothing.
+  /// Sets what the node waits for before its first session. An empty text means nothing.
   void waitFor(const std::string& what);
   /// Texts about the frames, by key.
   void setFrames(const std::map<std::string, std::string>& frames);
@@ -123,16 +124,15 @@ class LiveMonitor {
   /// Whether the newest estimate is of a scan of this radar, or nearly so.
   bool isRecent(const Radar& radar) const;
 
-  const Config config_;
   mutable std::mutex mutex_;  // guards all that follows
+  Config config_;
   std::vector<Radar> radars_;
   EvidenceCollector collector_;  // since the session started
   Counter imu_;
   Counter usable_imu_;        ///< messages that move the estimate
   std::string why_unusable_;  ///< of the last other message
   std::string imu_fault_;  ///< why no odometry comes, as of the last call of describeInput; empty: it comes
-  std::uint64_t imu_before_session_ = 0;
-  ImuNoise imu_noise_;
+  std::uint64_t imu_before_session_ = 0, not_usable_before_session_ = 0;
   Barometer barometer_;
   GroundVehicleCounts vehicle_;
   Latency odometry_latency_, scan_latency_;
@@ -147,6 +147,9 @@ class LiveMonitor {
   std::optional<Time> last_used_;                // stamp of the last scan used
   std::optional<NavigationState> newest_state_;  // at the newest IMU sample
 };
+
+/// Why an IMU message that cannot be read goes no further. The bag runner names it so, too.
+constexpr const char* kImuNotUsable = "imu_not_usable";
 
 /// The warning for a person whose computer is too slow.
 constexpr const char* kSolverFallsBehind =
