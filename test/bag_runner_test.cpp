@@ -235,6 +235,7 @@ TEST_F(BagRunner, ItSavesItsEstimateThoughTheTruthTopicCannotBeUsed) {
 TEST_F(BagRunner, ATrajectoryThatStartsAgainIsDoubtful) {
   BagContents what;
   what.duration = 16.0;
+  what.ground_truth = true;
   for (const double jump : {5.0, -5.0}) {
     what.jump = jump;
     writeBag(what);
@@ -250,7 +251,12 @@ TEST_F(BagRunner, ATrajectoryThatStartsAgainIsDoubtful) {
     const std::string yaml = contents(out_ + "/summary.yaml");
     for (const char* part : {"verdict: doubtful\n", "imu_clock_restart: 1", "name: imu_clock_restart"})
       EXPECT_NE(yaml.find(part), std::string::npos) << part << yaml;
+    // No number across the jump, and no pose lost before it.
+    EXPECT_NE(outcome.err.find("ground truth judges no trajectory that starts again"), std::string::npos);
+    for (const char* part : {"ate_m", "end_to_start"}) EXPECT_EQ(yaml.find(part), std::string::npos) << yaml;
+    EXPECT_NE(contents(out_ + "/trajectory_optimized.txt").find("\n1007.8"), std::string::npos);
   }
+  what.ground_truth = false;
   // Before there is a trajectory, none starts again. A driver may set its clock first.
   what.jump = 5.0;
   what.jump_at = 0.5;

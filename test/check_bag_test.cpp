@@ -144,7 +144,8 @@ TEST_F(CheckBag, PointsThatAreNotFiniteAreNamed) {
     return true;
   };
   const BagCheck odd = check(rewritten("some_nan", changes));
-  expectLine(odd, FindingLevel::kOdd, {"points", "20 % have a position or a Doppler that is not finite"});
+  expectLine(odd, FindingLevel::kOdd,
+             {"points", "20 % have a position, a Doppler or a power that is not finite"});
   EXPECT_TRUE(odd.ready());
 }
 

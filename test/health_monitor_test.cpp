@@ -114,6 +114,15 @@ TEST(HealthMonitor, AnOffsetThatStepsAllTheTimeIsADivergence) {
   }
 }
 
+TEST(HealthMonitor, StepsOfADivergenceAreNoneAfterIt) {
+  HealthMonitor monitor(HealthOptions(), 4.0);
+  feed(monitor, 0.0, 10.0, 1.0);
+  EXPECT_EQ(feed(monitor, 10.0, 14.0, 100.0), Health::kDiverged);
+  for (const double step : {14.0, 15.0, 16.0}) monitor.offsetStepped(at(step));
+  EXPECT_EQ(feed(monitor, 16.0, 20.0, 1.0), Health::kOk);
+  EXPECT_EQ(feed(monitor, 20.0, 22.0, 1.0), Health::kOk);
+}
+
 TEST(HealthMonitor, CoastsWithoutScansAndDivergesWhereNothingIsKnown) {
   HealthMonitor monitor(HealthOptions(), 4.0);
   feed(monitor, 0.0, 5.0, 1.0);

@@ -218,6 +218,11 @@ TEST_F(AtRest, AClockThatJumpsStartsTheEstimateAgain) {
     const auto results = run(time + 0.1);
     ASSERT_EQ(results.size(), 1u);
     EXPECT_TRUE(results[0].used) << results[0].rejected_because;
+    // The poses that were in the window when the clock jumped are not lost.
+    const auto& poses = results[0].left_window;
+    EXPECT_TRUE(std::any_of(poses.begin(), poses.end(), [&](const StampedPose& pose) {
+      return std::abs(pose.time - Time::fromSeconds(begin)) > 10.0;
+    })) << jump;
   }
   EXPECT_EQ(odometry.faults().at("imu_clock_restart"), 2u);
 }

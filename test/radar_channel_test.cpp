@@ -106,6 +106,22 @@ TEST(RadarChannel, AScanWithoutPointsHasTooFew) {
   EXPECT_EQ(radar.use(1.6, 0).rejected_because, "too_few_points");
 }
 
+TEST(RadarChannel, AScanWithoutPointsHasTooFewAtRestToo) {
+  OneRadar radar;
+  const auto atRest = [&](double stamp, int points) {
+    RadarScan scan = radar.scan(stamp, points);
+    for (RadarPoint& point : scan.points) point.doppler = 0.0;
+    ScanContext context;
+    context.rest = Rest();
+    context.last_used = radar.motion.time(stamp - 0.1);
+    const RadarAnswer answer = radar.channel.use(scan, context, radar.smoother);
+    radar.smoother.optimize();
+    return answer.rejected_because;
+  };
+  for (double stamp = 0.7; stamp < 0.95; stamp += 0.1) ASSERT_EQ(atRest(stamp, 6), "") << stamp;
+  EXPECT_EQ(atRest(1.0, 0), "too_few_points");
+}
+
 TEST(RadarChannel, AJumpThatNoPlatformMakesIsRejected) {
   OneRadar radar;
   for (double stamp = 0.7; stamp < 1.5; stamp += 0.1) ASSERT_EQ(radar.use(stamp, 30).rejected_because, "");

@@ -3,11 +3,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 
+#include "../src/ros/temporary_folder.h"
 #include "evaluation_setup.h"
+#include "full_disk.h"
 #include "rio_t/evaluation/trajectory.h"
 
 namespace rio_t {
@@ -117,6 +120,18 @@ TEST(Tum, MissingFileIsNamed) {
     EXPECT_TRUE(contains(error.what(), "no/such/file.txt")) << error.what();
   }
   EXPECT_THROW(writeTum("no/such/folder/file.txt", helix()), std::runtime_error);
+}
+
+TEST(Tum, AFullDiskLeavesWhatWasThere) {
+  const TemporaryFolder folder;
+  const std::string path = folder.path() + "/trajectory.txt";
+  writeTum(path, helix());
+  {
+    const FullDisk disk(100);
+    EXPECT_THROW(writeTum(path, helix()), std::runtime_error);
+  }
+  EXPECT_EQ(readTum(path).size(), helix().size());
+  EXPECT_FALSE(std::filesystem::exists(path + ".part"));
 }
 
 TEST(Tum, WritesWhatItReads) {

@@ -11,6 +11,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "rio_t/core/replace_file.h"
+
 namespace rio_t {
 namespace {
 
@@ -148,10 +150,9 @@ void writeTumLine(std::ostream& out, const StampedPose& pose) {
 }
 
 void writeTum(const std::string& path, const Trajectory& trajectory) {
-  std::ofstream file(path);
-  for (const StampedPose& pose : trajectory) writeTumLine(file, pose);
-  file.flush();
-  if (!file) throw std::runtime_error(path + ": cannot be written");
+  std::ostringstream text;
+  for (const StampedPose& pose : trajectory) writeTumLine(text, pose);
+  replaceFile(path, text.str());
 }
 
 std::vector<Match> associate(const Trajectory& truth, const Trajectory& estimate, double max_difference) {

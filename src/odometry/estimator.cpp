@@ -72,7 +72,7 @@ Estimator::Estimator(const OdometryOptions& options, Navigation& navigation, Fau
 ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
   ScanResult result;
   result.scan = std::move(scan);
-  result.left_window = std::exchange(left_in_silence_, {});
+  result.left_window = std::exchange(left_between_, {});
   const Time stamp = result.scan.stamp;
   RadarChannel& radar = radars_.at(result.scan.radar);
   radar.observe(result.scan);
@@ -280,7 +280,7 @@ void Estimator::keepUp(bool scan_came, const std::vector<RadarScan>& waiting) {
   if (precedes_all && time - smoother_.newest().time >= kSilentStep) {
     smoother_.nodeAt(time);
     smoother_.optimize();
-    for (const StampedPose& left : marginalize()) left_in_silence_.push_back(left);
+    for (const StampedPose& left : marginalize()) left_between_.push_back(left);
   }
   const bool keep_for_recovery = options_.health.on_divergence == OnDivergence::kReinitialize;
   const Time needed = smoother_.imuNeededSince();
@@ -290,6 +290,8 @@ void Estimator::keepUp(bool scan_came, const std::vector<RadarScan>& waiting) {
 
 void Estimator::startAgain(std::uint64_t clock_restarts) {
   clock_restarts_ = clock_restarts;
+  left_between_ = remainingPoses();
+  start_.reset();
   imu_.clear();
   if (barometer_) barometer_->startAgain();
   if (ground_vehicle_)
@@ -302,7 +304,6 @@ void Estimator::startAgain(std::uint64_t clock_restarts) {
   model_error_scale_ = ModelErrorScale();
   health_ = RadarsHealth(options_.health, options_.innovation_gate.sigmas, radars_.size());
   if (landmarks_) landmarks_->forget();
-  left_in_silence_.clear();
   radar_heard_.reset();
 }
 
@@ -386,7 +387,7 @@ void Estimator::anchor(const NavigationState& state, bool at_rest) {
 }
 
 std::vector<StampedPose> Estimator::remainingPoses() {
-  std::vector<StampedPose> poses = std::exchange(left_in_silence_, {});
+  std::vector<StampedPose> poses = std::exchange(left_between_, {});
   for (std::size_t k = 0; k < smoother_.size(); ++k) poses.push_back(pose(smoother_.node(k)));
   return poses;
 }

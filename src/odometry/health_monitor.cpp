@@ -113,6 +113,7 @@ Health HealthMonitor::judge(Time now, const NavigationState& state, double model
       contradicted_since_ = entries_.front().stamp;
     } else if (diverged_at_ && *share < 0.5 * options_.max_contradiction) {
       diverged_at_.reset();
+      steps_.clear();  // made by the divergence
     }
   }
   const double variance = bodyVelocityVariance(state).maxCoeff();

@@ -82,7 +82,8 @@ void Initializer::setImuNoise(const ImuNoise& noise) {
 std::string Initializer::waitingFor() const {
   if (options_.init_mode == InitMode::kMotion) return motion_.front().waitingFor();
   const std::string rest =
-      rest_.waitingFor() + (radar_contradicts_rest_ ? " (what looked like it, moved by the radar)" : "");
+      rest_.waitingFor() +
+      (radar_contradicts_rest_ ? " (the IMU seemed at rest, but the radar saw motion)" : "");
   return mayStartInMotion() ? rest + "; or " + motion_.front().waitingFor() : rest;
 }
 

@@ -27,7 +27,8 @@ constexpr std::size_t kMinVelocities = 8;     // 6 unknowns to start with, and w
 constexpr std::size_t kMaxVelocities = 1000;  // bounds the memory
 constexpr double kMaxLatency = 1.0;           // [s] of a scan, that the IMU is kept for
 constexpr int kMaxIterations = 15;
-constexpr int kMaxRounds = 3;          // of finding the state and which scans tell the offset
+constexpr int kMaxRounds = 10;         // of finding the state and which scans tell the offset
+constexpr double kOffsetHolds = 1e-3;  // [s] from which the derivatives by the offset are as good
 constexpr double kConverged = 1.0e-4;  // [sigma]
 constexpr double kOutlier = 4.0;       // [sigma]
 constexpr int kScaleRounds = 3;        // of finding the state and the size of the errors around it
@@ -246,12 +247,14 @@ std::optional<double> MotionInitializer::refine(const Velocities& velocities, Ti
   // Which scans tell the offset depends on the state, and the state on them.
   std::vector<const Term*> terms;
   OffsetGains offset_gains;
-  Solution solution;
+  double linear_from = offset->x[0];  // [s]
   for (int round = 0; round < kMaxRounds; ++round) {
     const OffsetGains last = std::exchange(
         offset_gains, offsetGains(velocities, time, imu, stateOf(motion, *biases), offset->x[0]));
     const std::vector<double>& gains = offset_gains.gains;
-    if (round > 0 && isNear(gains, last.gains)) break;
+    const bool holds = std::abs(offset->x[0] - linear_from) < kOffsetHolds;
+    if (round > 0 && holds && isNear(gains, last.gains)) break;
+    linear_from = offset->x[0];
     for (const Term* term : terms) window.remove(*term);
     terms.clear();
     for (std::size_t i = 0; i < velocities.size(); ++i) {
@@ -259,12 +262,12 @@ std::optional<double> MotionInitializer::refine(const Velocities& velocities, Ti
       z.covariance = covariances[i].whole;
       z.offset_gain = gains[i];
       z.offset_half_width = offset_gains.half_width;
-      if (gains[i] == 0.0) z.linear_from_t_O = offset->x[0];
+      z.linear_from_t_O = linear_from;
       terms.push_back(&window.add(std::make_unique<RadarVelocityFactor>(z, time, model),
                                   {&motion, biases.get(), offset.get(), extrinsics.get()}, loss));
     }
     try {
-      solution = rio_t::solve(window, {kMaxIterations, kConverged * kConverged}, smoother_.solver);
+      rio_t::solve(window, {kMaxIterations, kConverged * kConverged}, smoother_.solver);
     } catch (const std::runtime_error&) {
       return std::nullopt;
     }
@@ -283,7 +286,7 @@ std::optional<double> MotionInitializer::refine(const Velocities& velocities, Ti
     mean_square += square / n;
     mean_share += covariances[i].whole.ldlt().solve(covariances[i].scaled).trace() / (3.0 * n);
   }
-  const SquareRoot root = eliminateFirst(solution.system, 0);
+  const SquareRoot root = eliminateFirst(linearize(window), 0);
   prior = {stateOf(motion, *biases), offset->x[0], toExtrinsics(extrinsics->x.data()), root};
   // The solution is drawn towards the velocities: what is left scatters less.
   const double left = 3.0 * n / (3.0 * n - kUnknowns);
@@ -322,18 +325,18 @@ MotionInitializer::CarriedCovariance MotionInitializer::carriedCovariance(const 
                                                                           double scale) const {
   const double T = std::abs(z.stamp - time);
   const double tilt = noise_.gyro_density * g_W_.norm();
-  double measured = 0.0;  // [m^2/s^2], as `configured`
+  const ImuNoise noise = noise_.scaled(scale);
+  const double configured = noise.accel_density * noise.accel_density;
+  double accel = 0.0, accel_scaled = 0.0;  // [m^2/s^2]
   imu.forEachInterval(std::min(z.stamp, time), std::max(z.stamp, time),
                       [&](double dt, const auto&, const auto&, const ImuMeasurement& later) {
-                        measured += dt * (later.accel_noise + later.unseen_accel_variance);
+                        accel += dt * noise.accelVariance(later);
+                        if (configured > later.accel_mean_noise) accel_scaled += dt * configured;
                       });
-  const double configured = scale * noise_.accel_density * noise_.accel_density * T;
-  Eigen::Vector3d scaled = scale * z.added_variance;
-  if (configured > measured) scaled.array() += configured;
-  CarriedCovariance covariance{z.covariance, scaled.asDiagonal()};
-  covariance.whole.diagonal() += scaled - z.added_variance;
-  covariance.whole.diagonal().array() +=
-      tilt * tilt * T * T * T / 3.0 + (configured > measured ? 0.0 : measured);
+  const Eigen::Vector3d added = scale * z.added_variance;
+  CarriedCovariance covariance{z.covariance, (added.array() + accel_scaled).matrix().asDiagonal()};
+  covariance.whole.diagonal() += added - z.added_variance;
+  covariance.whole.diagonal().array() += accel + tilt * tilt * T * T * T / 3.0;
   return covariance;
 }
 

@@ -142,7 +142,7 @@ EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
   const bool tells_side = prior && largestSigma(prior->covariance) < kTellsSide * span;
   if (tells_side) unwrap(points, prior->v_R, span);
 
-  if (const std::optional<SlowMotion> slow = findSlowMotion(points, noise(), o)) {
+  if (const std::optional<SlowVelocity> slow = findSlowVelocity(points, noise(), o)) {
     result.denies_rest = true;
     return concludedInMotion(result, slow->inliers, slow->solution, o);
   }
@@ -164,7 +164,7 @@ EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
 
 bool EgoVelocityEstimator::deniesRest(const RadarScan& scan) const {
   const std::vector<RadarDirection> points = filter(scan, options_);
-  return directionsAgreeOnMotion(points, options_) && findSlowMotion(points, noise(), options_);
+  return directionsAgreeOnMotion(points, options_) && findSlowVelocity(points, noise(), options_);
 }
 
 RadarScan EgoVelocityEstimator::slowPoints(const RadarScan& scan) const {

@@ -43,8 +43,8 @@ double restWithPointsBeside(const std::vector<RadarDirection>& points, const Ego
 }
 
 /// The likeliest velocity of `points`, which read at most one bin. None if rest is about as likely.
-std::optional<VelocitySolution> fitSlowMotion(const std::vector<RadarDirection>& points,
-                                              const PointVariances& noise, const EgoVelocityOptions& o) {
+std::optional<VelocitySolution> fitSlowVelocity(const std::vector<RadarDirection>& points,
+                                                const PointVariances& noise, const EgoVelocityOptions& o) {
   if (points.size() < o.min_inliers) return std::nullopt;
   const bool has_bins = o.doppler_quantization > 0.0;
   const double beside = has_bins ? restWithPointsBeside(points, o) : std::numeric_limits<double>::infinity();
@@ -123,14 +123,14 @@ bool directionsAgreeOnMotion(const std::vector<RadarDirection>& points, const Eg
   return explained / 3.0 > limit * (all - explained) / freedom;
 }
 
-std::optional<SlowMotion> findSlowMotion(const std::vector<RadarDirection>& points,
-                                         const PointVariances& noise, const EgoVelocityOptions& o) {
+std::optional<SlowVelocity> findSlowVelocity(const std::vector<RadarDirection>& points,
+                                             const PointVariances& noise, const EgoVelocityOptions& o) {
   const std::vector<RadarDirection> slow = selectSlow(points, o);
   if (static_cast<double>(slow.size()) < kMajority * static_cast<double>(points.size())) return std::nullopt;
-  const std::optional<VelocitySolution> first = fitSlowMotion(slow, noise, o);
+  const std::optional<VelocitySolution> first = fitSlowVelocity(slow, noise, o);
   if (!first) return std::nullopt;
-  SlowMotion found{*first, selectInliers(points, first->v_R, noise, o)};
-  if (const auto refined = fitSlowMotion(found.inliers, noise, o)) found.solution = *refined;
+  SlowVelocity found{*first, selectInliers(points, first->v_R, noise, o)};
+  if (const auto refined = fitSlowVelocity(found.inliers, noise, o)) found.solution = *refined;
   return found;
 }
 

@@ -28,14 +28,14 @@ VelocitySolution solveRest(const std::vector<RadarDirection>& inliers, const Poi
 /// once: F test of the motion against what the directions differ otherwise.
 bool directionsAgreeOnMotion(const std::vector<RadarDirection>& points, const EgoVelocityOptions& options);
 
-struct SlowMotion {
+struct SlowVelocity {
   VelocitySolution solution;
   std::vector<RadarDirection> inliers;  ///< the points that agree with the solution
 };
 
 /// A slow motion that hides in the bins around zero: most points read zero, but those along the motion do
 /// not. None if rest explains the points about as well, or if most points read more than one bin.
-std::optional<SlowMotion> findSlowMotion(const std::vector<RadarDirection>& points,
-                                         const PointVariances& noise, const EgoVelocityOptions& options);
+std::optional<SlowVelocity> findSlowVelocity(const std::vector<RadarDirection>& points,
+                                             const PointVariances& noise, const EgoVelocityOptions& options);
 
 }  // namespace rio_t

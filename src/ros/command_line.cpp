@@ -14,6 +14,7 @@
 #include <sstream>
 #include <system_error>
 
+#include "rio_t/core/replace_file.h"
 #include "text.h"
 
 namespace rio_t {
@@ -87,13 +88,6 @@ std::string progressLine(const std::string& label, double done, double elapsed) 
     line << ", " << std::lround(elapsed / done * (1.0 - done)) << " s left";
   }
   return line.str();
-}
-
-/// A link or a device stays what it is; all else is replaced.
-bool isWrittenInPlace(const std::string& path) {
-  std::error_code error;
-  const std::filesystem::file_status status = std::filesystem::symlink_status(path, error);
-  return std::filesystem::exists(status) && !std::filesystem::is_regular_file(status);
 }
 
 /// Copies a file with another content to PATH~, as editors do. Returns the name of the copy, or nothing.
@@ -305,18 +299,8 @@ std::string faultOfOutput(const std::string& path, const std::vector<std::string
 
 std::string writeFile(const std::string& path, const std::string& text) {
   std::string backup = keepOther(path, text);
-  const std::string written = isWrittenInPlace(path) ? path : path + ".part";
-  std::ofstream file(written, std::ios::binary | std::ios::trunc);
-  file << text;
-  file.close();
-  std::error_code error;
-  if (file) {
-    if (written == path) return backup;
-    std::filesystem::rename(written, path, error);
-    if (!error) return backup;
-  }
-  if (written != path) std::filesystem::remove(written, error);
-  throw std::runtime_error(path + ": cannot be written (disk full?)");
+  replaceFile(path, text);
+  return backup;
 }
 
 void require(const std::vector<std::pair<std::string, bool>>& given_by_name) {

@@ -66,9 +66,11 @@ const char* BarometerChannel::add(const Pressure& pressure, Time newest_imu) {
 }
 
 const char* BarometerChannel::collect(const Sample& sample) {
+  // A mean must not reach over a silence.
+  if (open_.count > 0 && sample.time - open_.first > 2.0 * kMeanSpan)
+    waiting_.push_back(std::exchange(open_, Mean()));
   add(sample, open_);
-  if (open_.span < kMeanSpan) return nullptr;
-  waiting_.push_back(std::exchange(open_, Mean()));
+  if (open_.span >= kMeanSpan) waiting_.push_back(std::exchange(open_, Mean()));
   if (waiting_.size() <= kMaxWaiting) return nullptr;
   waiting_.pop_front();
   return "pressure_without_node";

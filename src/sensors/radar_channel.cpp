@@ -98,14 +98,15 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   judged_at_ = scan.stamp;
   Seen seen = see(scan, context, smoother, answer);
   if (!isValid(seen.velocity.status)) return reject(toString(answer.ego_velocity.status));
+  // The velocity comes from borrowed points alone.
+  const char* const not_own = answer.ego_velocity.points.empty() ? "too_few_points" : "too_few_inliers";
+  if (seen.has_borrowed && answer.at_rest && answer.ego_velocity.inliers.empty()) return reject(not_own);
   informOffset(seen, answer);
   const RadarScanTime taken{scan.stamp, answer.offset_gain, answer.offset_half_width, answer.slow_half_width,
                             offset()};
   if (isTightlyCoupled() && seen.velocity.status == EgoVelocityStatus::kMoving) {
     answer.doppler = dopplerOf(scan, seen, taken, answer.rate_variance);
-    // The scan has no inlier of its own: the velocity comes from borrowed points.
-    if (!answer.doppler)
-      return reject(answer.ego_velocity.points.empty() ? "too_few_points" : "too_few_inliers");
+    if (!answer.doppler) return reject(not_own);
   }
 
   Innovations d;

@@ -1,15 +1,16 @@
 /// Errors of trajectories, and of a time offset, against the truth. Figures agree with evo's.
 #include <boost/algorithm/string/replace.hpp>
 #include <cstdio>
-#include <fstream>
 #include <iomanip>
 #include <iostream>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "../ros/command_line.h"
+#include "rio_t/core/replace_file.h"
 #include "rio_t/evaluation/errors.h"
 #include "rio_t/evaluation/offset_error.h"
 
@@ -196,7 +197,7 @@ void printYaml(const std::string& file, double truth, const OffsetError& e) {
 
 void writeErrors(const std::string& file, const Trajectory& truth, const Trajectory& estimate,
                  double max_difference) {
-  std::ofstream out(file);
+  std::ostringstream out;
   out << std::setprecision(9) << "stamp,x,y,z,truth_x,truth_y,truth_z,angle_deg,yaw_deg\n";
   for (const PoseError& e : poseErrors(truth, estimate, Alignment::kOrigin, max_difference)) {
     out << formatTime(e.time);
@@ -206,8 +207,7 @@ void writeErrors(const std::string& file, const Trajectory& truth, const Traject
     }
     out << '\n';
   }
-  out.flush();
-  if (!out) throw std::runtime_error(file + ": cannot be written");
+  replaceFile(file, out.str());
 }
 
 void run(const Arguments& arguments) {

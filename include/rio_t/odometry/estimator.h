@@ -37,7 +37,8 @@ class Estimator {
   void tune(const Tuning& tuning);
   /// In the order of arrival; counts what cannot be used in the faults.
   void addPressure(const Pressure& pressure);
-  /// The IMU's clock jumped. No earlier data can be related to later data, so all state is dropped.
+  /// The IMU's clock jumped. No earlier data can be related to later data, so the state is dropped. The poses
+  /// of the window go to the next result.
   void startAgain(std::uint64_t clock_restarts);
   std::uint64_t clockRestarts() const { return clock_restarts_; }
   /// Call it after addImu. Counts times without radar, and moves the window on if no scan does; `waiting`
@@ -106,8 +107,8 @@ class Estimator {
   std::optional<Initialization> start_;
   std::string waiting_for_;
   Time initialized_at_;
-  Time last_used_;                            ///< stamp of the last scan that went into the window
-  std::vector<StampedPose> left_in_silence_;  ///< left while the radar was silent; for the next result
+  Time last_used_;                         ///< stamp of the last scan that went into the window
+  std::vector<StampedPose> left_between_;  ///< left the window between two results; for the next one
   std::uint64_t clock_restarts_ = 0;
   std::optional<Time> radar_heard_;  ///< time of the IMU when the last scan came
   bool radar_is_silent_ = false;

@@ -139,8 +139,8 @@ class EgoVelocityEstimator {
 
   /// Learns the noise of the points from the result of `estimate` for this scan, for the scans to come. Only
   /// the errors-in-variables solver uses it. Call it once per scan, in motion, if the velocity was used.
-  /// A `prior` that knows nothing of the scan shows noise that the bins hide. So many of the last points are
-  /// `borrowed` from other scans: their Dopplers do not show the span. `world` is the likelihood of
+  /// A `prior` that knows nothing of the scan shows noise that the bins hide. The last
+  /// `borrowed` points come from other scans: the span is not learned from them. `world` is the likelihood of
   /// `staticWorld`, if it is there already.
   void learn(const RadarScan& scan, const EgoVelocity& estimated,
              const std::optional<VelocityPrior>& prior = std::nullopt, std::size_t borrowed = 0,

@@ -36,8 +36,8 @@ struct ScanContext {
 /// The part of a channel's answer to a scan that ScanResult repeats.
 struct ScanAnswer {
   EgoVelocity ego_velocity;
-  /// Health judges this innovation. Its velocity is measured without the prediction. None if no majority of
-  /// the points agrees.
+  /// Health judges this innovation. None if no majority of the points agrees on a velocity without the
+  /// prediction.
   std::optional<Innovation> innovation;
   std::optional<DopplerMeasurement> doppler;     ///< its points, if they and not the velocity count
   std::string rejected_because;                  ///< snake case, empty if used; keys of `scans_rejected`
@@ -72,16 +72,8 @@ struct RadarAnswer : ScanAnswer {
 
 /// One radar, from scan to window: ego-velocity, decisions, time offset. Not thread-safe.
 ///
-/// The decisions in their order (docs/method.md, section 7.2). All judge the innovation of the scan against
-/// the prediction of IMU and window; at rest, against zero.
-///
-/// | decision | effect | skipped if |
-/// | --- | --- | --- |
-/// | rest | the IMU's rest counts if neither this scan nor those since it began deny it | - |
-/// | prior in RANSAC | chooses the points that agree with the prediction; rejects `ambiguous` | diverged |
-/// | step of the offset | gives t_O a new block | no majority; tilt unknown; scan does not tell t_O |
-/// | gate | rejects a velocity beyond `innovation_gate` sigma | tilt unknown; silence; all points agree |
-/// | health | counts, rejects nothing | no majority, or outvoted by witnesses |
+/// docs/method.md, section 7.2, has the decisions in their order. All judge the innovation of the scan
+/// against the prediction of IMU and window; at rest, against zero.
 class RadarChannel {
  public:
   /// `imu` must outlive the channel. `offset` is what the radars that share t_O have in common, or null.
@@ -171,7 +163,7 @@ class RadarChannel {
   /// The velocity that the inliers among the scan's own points show around the prediction. Directions that
   /// they do not see have a large sigma.
   EgoVelocity around(const VelocityPrior& prior, const RadarScan& scan, EgoVelocity result) const;
-  /// Without `seen`, it does not tell how it depends on the offset.
+  /// If `seen` is null, J_O and S_at_offset are not set.
   Innovation innovation(Time stamp, const VelocityPrior& prior, const EgoVelocity& measured,
                         const Seen* seen) const;
   /// Sets what health and a re-initialisation get from the scan. `had_prior`: its velocity was measured with

@@ -21,7 +21,8 @@
 namespace rio_t {
 
 std::runtime_error bagError(const std::string& bag, const std::string& what);
-/// The same for what was thrown while its messages were read: a bag whose bytes make no sense may be damaged.
+/// The same for an exception that was thrown while messages were read. If rosbag threw it, the text says that
+/// the bag may be damaged.
 std::runtime_error bagError(const std::string& bag, const std::exception& thrown);
 
 /// Finds all, as a query of Bags::addTo().

@@ -265,7 +265,11 @@ class BagJob {
     summary.realtime_factor = (end_ - begin_).toSec() / took.count();
     const Trajectory trajectory = log.takeTrajectory();
     truth_error_.reset();
-    if (truth_in_bag_ || !run_.config.ground_truth.empty()) {
+    const bool has_truth = truth_in_bag_ || !run_.config.ground_truth.empty();
+    if (has_truth && !summary.imu_restarts.empty()) {
+      summary.warnings.emplace_back(
+          "the ground truth judges no trajectory that starts again: run each part by itself");
+    } else if (has_truth) {
       try {
         if (truth_in_bag_ && truth_.empty()) truth_ = readPoses(bags_, run_.config.ground_truth_topic);
         summary.truth = errorsAgainst(truth_, trajectory);

@@ -110,9 +110,10 @@ std::string describeRun(const RunSummary& summary, const std::string& files) {
   const bool one_radar = summary.radars.size() == 1;
   if (one_radar) describePasses(summary.radars.front(), row);
   row("path", fixedText(summary.path_length_m, 2) + " m");
-  row("end to start", fixedText(summary.end_to_start_2d_m, 3) + " m" + percent(summary.end_to_start_2d_m) +
-                          " horizontal, " + fixedText(summary.end_to_start_3d_m, 3) + " m" +
-                          percent(summary.end_to_start_3d_m) + " in 3D");
+  if (summary.imu_restarts.empty())
+    row("end to start", fixedText(summary.end_to_start_2d_m, 3) + " m" + percent(summary.end_to_start_2d_m) +
+                            " horizontal, " + fixedText(summary.end_to_start_3d_m, 3) + " m" +
+                            percent(summary.end_to_start_3d_m) + " in 3D");
   if (one_radar) describeRadar(summary.radars.front(), row);
   if (summary.truth) {
     std::string errors = "ATE " + fixedText(summary.truth->ate_m, 3) + " m";

@@ -81,7 +81,7 @@ std::string faultOf(const Looked& looked, const PointCloudFormat& format, const 
   if (looked.points == 0)
     return looked.points_not_finite == 0
                ? "no cloud has a point"
-               : "the position or the field " + format.doppler + " is not finite in every point";
+               : "the position, the power or the field " + format.doppler + " is not finite in every point";
   if (looked.scans.empty()) return "no scan gets a stamp: " + stamps.text;
   if (looked.cloud.points == 0) return "every point lies at the radar itself";
   if (!looked.cloud.has_doppler) return "the field " + format.doppler + " is zero in every point";
@@ -114,10 +114,10 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
   const double not_finite = static_cast<double>(looked.points_not_finite);
   const double share_not_finite = not_finite / (not_finite + static_cast<double>(c.points));
   if (share_not_finite > kOnePercent)
-    radar->tell(
-        FindingLevel::kOdd, "points",
-        fixedText(100.0 * share_not_finite, 0) +
-            " % have a position or a Doppler that is not finite: look for what the driver writes there");
+    radar->tell(FindingLevel::kOdd, "points",
+                fixedText(100.0 * share_not_finite, 0) +
+                    " % have a position, a Doppler or a power that is not finite: look for what the driver "
+                    "writes there");
   if (c.ambiguous > kOnePercent)
     radar->tell(
         FindingLevel::kOk, "points",

@@ -22,7 +22,9 @@ RadarEstimate before(const OdometryOptions& options) {
 }  // namespace
 
 RunLog::RunLog(const Config& config, RunOutput* output, const std::vector<double>& taken_off)
-    : output_(output), offset_shared_(config.odometry.smoother.time_offset_shared) {
+    : output_(output),
+      offset_shared_(config.odometry.smoother.time_offset_shared),
+      max_bridged_gap_(config.odometry.imu_input_check.max_bridged_gap) {
   if (config.odometry.use_barometer) barometer_.emplace();
   if (config.odometry.platform == Platform::kGroundVehicle) {
     ground_vehicle_.emplace();
@@ -48,7 +50,9 @@ void RunLog::addResult(ScanResult& result) {
   }
   if (output_ != nullptr) output_->addResult(result);
   for (const StampedPose& pose : result.left_window) {
-    if (newest_optimized_) path_length_m_ += (pose.p_W - newest_optimized_->p_W).norm();
+    const double step = newest_optimized_ ? pose.time - newest_optimized_->time : 0.0;
+    if (step > 0.0 && step <= max_bridged_gap_)  // else the trajectory starts again
+      path_length_m_ += (pose.p_W - newest_optimized_->p_W).norm();
     newest_optimized_ = pose;
   }
   if (barometer_) barometer_->add(result);

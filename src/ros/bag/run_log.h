@@ -30,6 +30,7 @@ class RunLog {
 
   RunOutput* output_;
   bool offset_shared_;
+  double max_bridged_gap_;  // [s]
   std::vector<Radar> radars_;
   Trajectory trajectory_;
   std::optional<BarometerCounts> barometer_;           // if there is one

@@ -252,9 +252,16 @@ void RunOutput::finish(const RunSummary& summary) {
     map.endLine();
   }
   for (auto& [name, file] : open_) file.flush();
-  File yaml;
-  yaml.open(folder_ + "/summary.yaml", summaryText(summary, files_.names()));
-  yaml.flush();
+  const std::string path = folder_ + "/summary.yaml";
+  try {
+    File yaml;
+    yaml.open(path, summaryText(summary, files_.names()));
+    yaml.flush();
+  } catch (const OutputError&) {
+    std::error_code ignored;
+    std::filesystem::remove(path, ignored);  // half of it
+    throw;
+  }
 }
 
 }  // namespace rio_t

@@ -143,8 +143,10 @@ std::string summaryText(const RunSummary& summary, const std::vector<std::string
   lines.add("reinitializations", summary.reinitializations);
   lines.add("scans_diverged", summary.scans_diverged);
   lines.add("path_length_m", fixedText(summary.path_length_m, 6));
-  lines.add("end_to_start_2d_m", fixedText(summary.end_to_start_2d_m, 6));
-  lines.add("end_to_start_3d_m", fixedText(summary.end_to_start_3d_m, 6));
+  if (summary.imu_restarts.empty()) {
+    lines.add("end_to_start_2d_m", fixedText(summary.end_to_start_2d_m, 6));
+    lines.add("end_to_start_3d_m", fixedText(summary.end_to_start_3d_m, 6));
+  }
   for (const RadarSummary& radar : summary.radars) addEstimates(lines, radar);
   lines.beginMap("imu_noise");
   lines.add("accel", fixedText(summary.imu_noise.accel_density, 6));

@@ -34,7 +34,7 @@ class RadarCauses {
     if (share < kManyPoints) return;
     cause("points_not_finite", share,
           outOf(radar_.points_not_finite, pointsReceived(radar_), "points") + of_ +
-              " have a position or a Doppler that is not finite.",
+              " have a position, a Doppler or a power that is not finite.",
           "Look for what the driver of the radar writes there, and check the " + key_ + "radar_field_ keys.");
   }
 

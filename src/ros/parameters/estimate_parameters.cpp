@@ -103,7 +103,7 @@ void listStart(ParameterList& list, Config& c) {
       "init_mode: auto starts in motion after this time without rest. Lower it for bags that begin in "
       "motion.");
   list.number(
-      "init_duration", "s", above(0), init.duration,
+      "init_duration", "s", atLeast(1), init.duration,
       "A start at rest averages the IMU over this time for attitude and gyro bias. 2 to 5 s are typical.");
   list.number(
       "init_max_gyro_std", "rad/s", above(0), init.max_gyro_std,

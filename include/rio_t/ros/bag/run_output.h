@@ -51,14 +51,15 @@ struct RunSummary : RunEvidence {
   std::vector<std::string> warnings;  ///< for people; not in the file
   std::vector<NotUsable> not_usable;  ///< likewise
   double path_length_m = 0.0;         ///< of the optimised poses
-  double end_to_start_2d_m = 0.0;     ///< of the causal trajectory, horizontal
+  // Of the causal trajectory, if it is one: not if it starts again on the way (`imu_restarts`).
+  double end_to_start_2d_m = 0.0;  ///< horizontal
   double end_to_start_3d_m = 0.0;
   std::optional<BarometerCounts> barometer;           ///< only with a barometer_topic
   std::optional<GroundVehicleCounts> ground_vehicle;  ///< only with platform: ground_vehicle
   Diagnosis diagnosis;                                ///< whether the run is good, and if not, why
-  std::optional<TruthErrors> truth;
-  double estimation_seconds = 0.0;  ///< reading, decoding and estimating, wall clock
-  double realtime_factor = 0.0;     ///< seconds of data in a second of that
+  std::optional<TruthErrors> truth;                   ///< likewise
+  double estimation_seconds = 0.0;                    ///< reading, decoding and estimating, wall clock
+  double realtime_factor = 0.0;                       ///< seconds of data in a second of that
 
   // Over all radars.
   std::uint64_t scansTotal() const;

@@ -96,7 +96,7 @@ class LiveOdometry {
   void lookUpExtrinsics(Radar& radar, const std::string& cloud_frame);
   /// Starts the session if T_IR of all radars is known; else says what is waited for.
   void startSessionWhenReady();
-  /// When it returns, nothing more is published of what was before. Any thread.
+  /// After it returns, the node publishes nothing of the old session. Any thread.
   /// `at_once`: does not wait for rest first.
   void reset(const std::string& reason, bool at_once = false);
   /// Resets if the clock of the IMU jumped. Returns why the session will drop the sample, or null. IMU
