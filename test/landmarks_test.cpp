@@ -137,6 +137,7 @@ TEST_F(CandidatesTest, GhostsFillABoundedListAndProveNothing) {
 
 struct Outcome {
   double rms = 0.0, nees = 0.0, matched = 0.0;
+  double worst = 0.0;  ///< [sigma] of an axis
   std::size_t dropped = 0, largest_map = 0;
 };
 
@@ -161,8 +162,11 @@ Outcome outcomeOf(const SimulatedRun& run, double from) {
     if (run.seconds(x.time) < from) continue;
     const Eigen::Vector3d e = x.p_W - *turn * (run.truth(x).p_W - origin.p_W);
     outcome.rms += e.squaredNorm();
-    for (int i = 0; i < 3; ++i)
-      outcome.nees += e[i] * e[i] / x.covariance(StateBlock::kP + i, StateBlock::kP + i) / 3.0;
+    for (int i = 0; i < 3; ++i) {
+      const double square = e[i] * e[i] / x.covariance(StateBlock::kP + i, StateBlock::kP + i);
+      outcome.nees += square / 3.0;
+      outcome.worst = std::max(outcome.worst, std::sqrt(square));
+    }
     count += 1.0;
   }
   outcome.rms = std::sqrt(outcome.rms / count);
@@ -195,6 +199,18 @@ TEST(Landmarks, HoldThePositionInARoom) {
   }
   EXPECT_LT(with, 0.6 * without);
   EXPECT_LT(nees, 2.0);
+}
+
+/// After a gap of 20 s, some detection lies wherever a landmark might be.
+TEST(Landmarks, AreNotGuessedAfterAGap) {
+  for (const std::uint64_t seed : {2, 3, 5, 6}) {
+    const Outcome gap = outcome("drone", seed, true, [](simulation::RadarModelOptions& radar) {
+      radar.blackouts = {{25.0, 20.0}};
+    });
+    std::printf("seed %d: worst error %.1f sigma\n", static_cast<int>(seed), gap.worst);
+    EXPECT_LT(gap.worst, 4.0) << seed;
+    EXPECT_GE(gap.dropped, 1u) << seed;
+  }
 }
 
 TEST(Landmarks, DoNoHarmAmongCrowdsAndGhosts) {

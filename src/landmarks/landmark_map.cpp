@@ -30,6 +30,15 @@ constexpr double kMemory = 100.0;
 /// In view: within this of the middle of the field of view, as the cosine.
 constexpr double kCosView = 0.707;
 
+/// [m^3] within which a detection passes the gate, if its own noise does not count.
+double gateVolume(const Eigen::Matrix3d& covariance) {
+  return 4.0 / 3.0 * M_PI * std::pow(Candidates::kGate, 1.5) *
+         std::sqrt(std::max(0.0, covariance.determinant()));
+}
+
+/// [m^3] that a radar sees to this range.
+double viewVolume(double range) { return 2.0 / 3.0 * M_PI * (1.0 - kCosView) * range * range * range; }
+
 }  // namespace
 
 LandmarkMap::LandmarkMap(const LandmarkOptions& options, const Eigen::Vector3d& g_W, const ImuBuffer& imu)
@@ -120,6 +129,9 @@ LandmarkMap::Association LandmarkMap::associate(const Prediction& prediction, co
     const std::size_t k = prediction.landmarks[column];
     const LandmarkPoint& point = landmarks_[k].point;
     const Expected expected = this->expected(prediction, T_IR, column);
+    const double by_chance =
+        static_cast<double>(detections.size()) * gateVolume(expected.covariance) / viewVolume(reach_);
+    result.is_vague.push_back(by_chance > std::exp(-0.5 * kClearly));  // as likely as a second explanation
     double nearest = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < detections.size(); ++i) {
       const Detection& detection = detections[i];
@@ -162,10 +174,10 @@ std::vector<LandmarkMap::Match> LandmarkMap::clearMatches(const std::vector<Pair
 LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<Detection>& detections,
                                 Block& node, Block& extrinsics, FixedLagSmoother& smoother) {
   LandmarkAnswer answer;
+  for (const Detection& detection : detections) reach_ = std::max(reach_, detection.z.position_R.norm());
   const Extrinsics T_IR = toExtrinsics(extrinsics.x.data());
   const Association association = associate(prediction, T_IR, detections);
-  judge(prediction, T_IR, association);
-  if (contradicts()) {
+  if (!judge(prediction, T_IR, association)) {
     while (!landmarks_.empty()) retire(landmarks_.size() - 1);
     forget();
     answer.dropped_map = true;
@@ -192,7 +204,6 @@ LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<
   }
   answer.matched = association.matches.size();
   for (const std::size_t k : association.conflicts) landmarks_[k].conflicts += 1.0;
-  for (const Detection& detection : detections) reach_ = std::max(reach_, detection.z.position_R.norm());
   candidates_.forgetOld(prediction.measured, smoother.node(0).time);
   addCandidates(prediction, detections, association, node, delta, extrinsics);
   dropUseless(prediction.state.x.p_W());
@@ -220,7 +231,7 @@ void LandmarkMap::addCandidates(const Prediction& prediction, const std::vector<
   candidates_.add(placed);
 }
 
-void LandmarkMap::judge(const Prediction& prediction, const Extrinsics& T_IR,
+bool LandmarkMap::judge(const Prediction& prediction, const Extrinsics& T_IR,
                         const Association& association) {
   const double keep = 1.0 - 1.0 / kMemory;
   in_view_ *= keep;
@@ -229,17 +240,23 @@ void LandmarkMap::judge(const Prediction& prediction, const Extrinsics& T_IR,
   const StateBlock& x = prediction.state.x;
   const Eigen::Vector3d radar_W = x.p_W() + x.q_WI() * T_IR.l_I;
   const Eigen::Vector3d forward_W = x.q_WI() * T_IR.q_IR * Eigen::Vector3d::UnitY();
-  for (const std::size_t k : prediction.landmarks) {
+  double in_view = 0.0, vague = 0.0;
+  for (std::size_t column = 0; column < prediction.landmarks.size(); ++column) {
+    const std::size_t k = prediction.landmarks[column];
     if (forward_W.dot((landmarks_[k].p_W() - radar_W).normalized()) < kCosView) continue;
     landmarks_[k].in_view += 1.0;
-    in_view_ += 1.0;
+    in_view += 1.0;
+    if (association.is_vague[column]) vague += 1.0;
   }
+  in_view_ += in_view;
   for (const Match& match : association.matches) {
     landmarks_[match.landmark].seen_again += 1.0;
     matched_ += 1.0;
     sigmas_ += match.squared_sigmas / 3.0;
   }
-  if (matched_ >= kProof && matched_ >= kMinShare * in_view_ && !contradicts()) is_trusted_ = true;
+  const bool is_wrong = contradicts();
+  if (matched_ >= kProof && matched_ >= kMinShare * in_view_ && !is_wrong) is_trusted_ = true;
+  return !is_wrong && vague <= 0.5 * in_view;
 }
 
 /// With less than the proof, or with hardly any landmark seen again, nothing is known and nothing counts.

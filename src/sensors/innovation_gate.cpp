@@ -10,12 +10,14 @@ constexpr double kUnanimousTime = 0.5;  // [s] of scans that are unanimous: one 
 }  // namespace
 
 bool InnovationGate::rejects(const InnovationGateOptions& options, const Innovation& innovation,
-                             bool is_unanimous, bool tilt_is_known, Time last_used) {
+                             const EgoVelocity& velocity, bool tilt_is_known, Time last_used) {
   const double gate = options.sigmas;
   const Time stamp = innovation.stamp;
   if (gate == 0.0 || innovation.widened(options.model_error).squaredSigmas() <= gate * gate) return false;
-  if (!tilt_is_known || std::abs(stamp - last_used) > options.timeout) return false;
-  if (!is_unanimous) {
+  if (!tilt_is_known) return false;
+  // Ghosts agree by chance on some velocity now and then, but seldom most of them.
+  if (std::abs(stamp - last_used) > options.timeout && hasMajority(velocity)) return false;
+  if (!isUnanimous(velocity)) {
     unanimous_since_.reset();
   } else if (!unanimous_since_) {
     unanimous_since_ = stamp;

@@ -117,8 +117,7 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
     in_window_.stepOffset(smoother, scan.stamp);
     followOffsetSteps();
   }
-  if (d.all &&
-      gate_.rejects(options_.gate, *d.all, isUnanimous(seen.velocity), seen.tilt_is_known, context.last_used))
+  if (d.all && gate_.rejects(options_.gate, *d.all, seen.velocity, seen.tilt_is_known, context.last_used))
     return reject("innovation");
   const bool added = answer.doppler
                          ? in_window_.add(smoother, *answer.doppler)

@@ -54,6 +54,8 @@ class LandmarkMap {
     std::vector<Match> matches;
     std::vector<std::size_t> free;       ///< detections far from every landmark
     std::vector<std::size_t> conflicts;  ///< landmarks with a detection just beyond the gate, and no match
+    /// By column of the prediction: its place is so uncertain that some detection is in the gate by chance.
+    std::vector<bool> is_vague;
   };
   Association associate(const Prediction& prediction, const Extrinsics& T_IR,
                         const std::vector<Detection>& detections) const;
@@ -78,8 +80,8 @@ class LandmarkMap {
   void dropUseless(const Eigen::Vector3d& p_W);
   void makeRoom(Time now);
   void promote(FixedLagSmoother& smoother, Time now);
-  /// Judges the map by the matches lately.
-  void judge(const Prediction& prediction, const Extrinsics& T_IR, const Association& association);
+  /// Judges the map by the matches lately. Returns whether it is worth keeping.
+  bool judge(const Prediction& prediction, const Extrinsics& T_IR, const Association& association);
   bool contradicts() const;
   std::vector<LandmarkPoint> points() const;
 

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "rio_t/core/time.h"
+#include "rio_t/radar/ego_velocity.h"
 #include "rio_t/sensors/innovation.h"
 
 namespace rio_t {
@@ -14,7 +15,8 @@ struct InnovationGateOptions {
   /// [m/s] Added to the sigma of each axis of the innovation, for gate and health only. It stands for small
   /// errors of the extrinsics and of the IMU's scale.
   double model_error = 0.1;
-  double timeout = 3.0;  ///< [s] without a used scan; then the gate lets the next one in
+  double timeout =
+      3.0;  ///< [s] without a used scan; then the gate lets the next one in, if most points agree
 };
 
 /// Rejects velocities that contradict the prediction (docs/method.md, eq. 30). The gate opens if the
@@ -22,11 +24,12 @@ struct InnovationGateOptions {
 /// correct one. Not thread-safe.
 class InnovationGate {
  public:
-  /// Whether to reject a scan. The gate is open if `tilt_is_known` is false (the prediction is not linear in
-  /// roll and pitch), `options.timeout` after the scan stamped `last_used` was used, whatever radar it is
-  /// from, and after half a second of unanimous scans (nearly all points of each agree).
-  bool rejects(const InnovationGateOptions& options, const Innovation& innovation, bool is_unanimous,
-               bool tilt_is_known, Time last_used);
+  /// Whether to reject a scan of that `velocity`. The gate is open if `tilt_is_known` is false (the
+  /// prediction is not linear in roll and pitch). `options.timeout` after the scan stamped `last_used` was
+  /// used, whatever radar it is from, it is open if most points agree. After half a second of unanimous scans
+  /// (nearly all points of each agree) it is open, too.
+  bool rejects(const InnovationGateOptions& options, const Innovation& innovation,
+               const EgoVelocity& velocity, bool tilt_is_known, Time last_used);
   /// The scan was used.
   void used() { unanimous_since_.reset(); }
 

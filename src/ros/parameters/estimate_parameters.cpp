@@ -43,8 +43,8 @@ void listGate(ParameterList& list, InnovationGateOptions& gate) {
       "The gate adds this to the standard deviation of the prediction, along each axis. It stands for small "
       "errors of the mounting and of the IMU's scale. Raise it for a platform that is faster than 10 m/s.");
   list.number("innovation_gate_timeout", "s", above(0), gate.timeout,
-              "If no scan was used for this time, the gate takes the next one in any case. A wrong "
-              "prediction then cannot lock the radar out.");
+              "If no scan was used for this time, the gate takes the next one of which most points agree. A "
+              "wrong prediction then cannot lock the radar out.");
 }
 
 void listPriors(ParameterList& list, SmootherOptions& smoother) {
