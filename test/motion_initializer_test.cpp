@@ -303,6 +303,22 @@ TEST(Initializer, PrefersRest) {
   }
 }
 
+/// A crowd walks past in the first seconds. Then the platform is seen to rest.
+TEST(Initializer, PrefersRestAfterACrowd) {
+  Rig rig("start_in_motion", 11, 0.0);
+  still(rig);
+  for (simulation::SimulatedScan& scan : rig.data.scans) {
+    const bool crowded = scan.stamp - rig.setup.start < 2.2;
+    for (simulation::SimulatedPoint& point : scan.points)
+      point.doppler = crowded ? -point.position_R.normalized().x() : 0.0;
+  }
+  std::string waiting_for;
+  const auto found = startBy(InitMode::kAuto, rig, &waiting_for);
+  ASSERT_TRUE(found) << waiting_for;
+  EXPECT_EQ(found->first, InitializedFrom::kRest);
+  EXPECT_NEAR(found->second, 6.0, 0.1);
+}
+
 TEST(Initializer, DoesNotTakeASmoothRideForRest) {
   Rig rig("ground_vehicle", 12, 0.0);
   still(rig);  // straight on, at constant speed

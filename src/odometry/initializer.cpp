@@ -25,8 +25,7 @@ bool Initializer::mayStartInMotion() const {
   if (options_.init_mode != InitMode::kAuto) return options_.init_mode == InitMode::kMotion;
   // Not while a long init_duration is still under way at rest.
   return first_ && *newest_ - *first_ >= options_.init_motion_after &&
-         (rest_.hasSeenMotion() || radar_contradicts_rest_ ||
-          isMoving(*newest_ - options_.init_motion_after, *newest_));
+         (rest_.hasSeenMotion() || isMoving(*newest_ - options_.init_motion_after, *newest_));
 }
 
 std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, const ImuBuffer& imu) {

@@ -199,7 +199,9 @@ EgoVelocity EgoVelocityEstimator::around(const RadarScan& scan, const VelocityPr
 
 EgoVelocity EgoVelocityEstimator::staticWorld(const RadarScan& scan, const EgoVelocity& estimated,
                                               const std::optional<VelocityPrior>& prior) const {
-  if (!prior) return estimated;
+  // Around the velocity of the scan itself, such a threshold reaches the points that read the next bin.
+  const bool reaches_next_bin = options_.ransac_inlier_threshold >= options_.doppler_quantization;
+  if (!prior || reaches_next_bin) return estimated;
   const EgoVelocity predicted = around(scan, *prior);
   return isValid(predicted.status) ? predicted : estimated;
 }
