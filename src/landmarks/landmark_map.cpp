@@ -30,6 +30,9 @@ constexpr double kMemory = 100.0;
 /// In view: within this of the middle of the field of view, as the cosine.
 constexpr double kCosView = 0.707;
 
+/// Detections in the gate by chance. In a room a landmark shows itself in 0.2 to 0.4 of the scans.
+constexpr double kMostByChance = 0.5;
+
 /// [m^3] within which a detection passes the gate, if its own noise does not count.
 double gateVolume(const Eigen::Matrix3d& covariance) {
   return 4.0 / 3.0 * M_PI * std::pow(Candidates::kGate, 1.5) *
@@ -131,7 +134,7 @@ LandmarkMap::Association LandmarkMap::associate(const Prediction& prediction, co
     const Expected expected = this->expected(prediction, T_IR, column);
     const double by_chance =
         static_cast<double>(detections.size()) * gateVolume(expected.covariance) / viewVolume(reach_);
-    result.is_vague.push_back(by_chance > std::exp(-0.5 * kClearly));  // as likely as a second explanation
+    result.is_vague.push_back(by_chance > kMostByChance);
     double nearest = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < detections.size(); ++i) {
       const Detection& detection = detections[i];
