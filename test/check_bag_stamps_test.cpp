@@ -213,10 +213,11 @@ TEST_F(CheckBag, AnOddClockOfTheRecordsIsNotThatOfTheRadar) {
                 instance);
     return path;
   };
-  for (const auto& [name, secondsOf] : std::map<std::string, std::function<double(double)>>{
-           {"steps", [](double t) { return t < 20.0 ? t : t + 3.0; }},
-           {"is_fast", [](double t) { return 1.1 * t; }},
-           {"of_a_converter", [](double t) { return 0.05 * t; }}}) {
+  const std::map<std::string, std::function<double(double)>> clocks = {
+      {"steps", [](double t) { return t < 20.0 ? t : t + 3.0; }},
+      {"is_fast", [](double t) { return 1.1 * t; }},
+      {"of_a_converter", [](double t) { return 0.05 * t; }}};
+  for (const auto& [name, secondsOf] : clocks) {
     const BagCheck odd = check(rerecorded("record_clock_" + name, secondsOf), false);
     EXPECT_EQ(configOf(odd).stamp_source, StampSource::kHeader) << name << "\n" << describeCheck(odd);
     EXPECT_LT(turnFromTruth(odd), 5.0) << name;

@@ -126,6 +126,7 @@ TEST_F(CandidatesTest, GhostsFillABoundedListAndProveNothing) {
   std::uniform_real_distribution<double> anywhere(-10.0, 10.0);
   for (int i = 0; i < 300; ++i) {
     std::vector<PlacedDetection> ghosts;
+    ghosts.reserve(40);
     for (int k = 0; k < 40; ++k)
       ghosts.push_back(seen(i / 30.0, 1.0, {anywhere(random_), anywhere(random_), anywhere(random_)}));
     candidates_.add(ghosts);

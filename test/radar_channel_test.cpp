@@ -49,7 +49,7 @@ struct OneRadar {
     return channel.use(scan(stamp, points), context, smoother);
   }
   RadarAnswer use(double stamp, int points, double model_error_scale = 1.0) {
-    const RadarAnswer answer = this->answer(stamp, points, model_error_scale);
+    RadarAnswer answer = this->answer(stamp, points, model_error_scale);
     smoother.optimize();
     smoother.marginalize(channel.randomWalks());
     return answer;

@@ -93,7 +93,8 @@ bool directionsAgreeOnMotion(const std::vector<RadarDirection>& points, const Eg
   const std::vector<RadarDirection> slow = selectSlow(points, o);
   if (std::all_of(slow.begin(), slow.end(), [&](const auto& p) { return readsZero(p, o); })) return false;
   // Number of cells along each axis of the unit cube. The middle cell is around zero.
-  constexpr auto kAlong = 2 * static_cast<std::size_t>(1.0 / kCellWidth + 0.5) + 1;
+  constexpr std::size_t kAlong = 9;
+  static_assert(kAlong * kCellWidth > 2.0);
   std::vector<Cell> cells(kAlong * kAlong * kAlong);
   for (const RadarDirection& p : slow) {
     const Eigen::Vector3d at = p.u_R.array() / kCellWidth + 0.5 * kAlong;

@@ -55,7 +55,7 @@ struct PlacedDetection {
   Eigen::Vector3d p_W;
   Eigen::Matrix3d covariance;  ///< of the measurement alone, in W [m^2]
   Eigen::Vector3d radar_W;     ///< where the radar was [m]
-  double snr_db;
+  double snr_db = 0.0;
   Time time;
   Sighting sighting;
 };
