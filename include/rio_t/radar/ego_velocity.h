@@ -128,9 +128,10 @@ class EgoVelocityEstimator {
   /// sigma of the prior. The result is valid if the inliers are the majority of the points; one point is
   /// enough. v_R is that of the prior, and there is no covariance.
   EgoVelocity around(const RadarScan& scan, const VelocityPrior& prior) const;
-  /// The prior with the points that agree with it, if they are the majority; else `estimated`. An estimate
-  /// from rounded Dopplers lies near the middle of a bin. Its inliers leave out points that read the next
-  /// bin, and the others are all too slow.
+  /// The points of the static world: those of `estimated`. If the steps of the Doppler are wider than the
+  /// threshold of the inliers, it is the prior with the points that agree with it, as long as these are the
+  /// majority. An estimate from such Dopplers lies near the middle of a bin. Its inliers leave out points
+  /// that read the next bin, and the others are all too slow.
   EgoVelocity staticWorld(const RadarScan& scan, const EgoVelocity& estimated,
                           const std::optional<VelocityPrior>& prior) const;
   /// Likelihood of the Dopplers of some points. These look static at about `v_R` [m/s].
@@ -139,8 +140,8 @@ class EgoVelocityEstimator {
 
   /// Learns the noise of the points from the result of `estimate` for this scan, for the scans to come. Only
   /// the errors-in-variables solver uses it. Call it once per scan, in motion, if the velocity was used.
-  /// A `prior` that knows nothing of the scan shows noise that the bins hide. The last
-  /// `borrowed` points come from other scans: the span is not learned from them. `world` is the likelihood of
+  /// A `prior` that knows nothing of the scan shows noise that the bins hide. The last `borrowed` points come
+  /// from other scans: the span is not learned from them. `world` is the likelihood of
   /// `staticWorld`, if it is there already.
   void learn(const RadarScan& scan, const EgoVelocity& estimated,
              const std::optional<VelocityPrior>& prior = std::nullopt, std::size_t borrowed = 0,

@@ -15,8 +15,8 @@ struct InnovationGateOptions {
   /// [m/s] Added to the sigma of each axis of the innovation, for gate and health only. It stands for small
   /// errors of the extrinsics and of the IMU's scale.
   double model_error = 0.1;
-  double timeout =
-      3.0;  ///< [s] without a used scan; then the gate lets the next one in, if most points agree
+  /// [s] without a used scan; then the gate lets in the next one of which most points agree.
+  double timeout = 3.0;
 };
 
 /// Rejects velocities that contradict the prediction (docs/method.md, eq. 30). The gate opens if the
