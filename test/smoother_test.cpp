@@ -380,7 +380,7 @@ TEST(SlowMotion, KeepsTheTurnsAndNotTheNoise) {
   // A turn stays, and the noise about the other axes goes.
   set(0.5, 2.0 * sigma);
   for (const SlowMotion& motion : motions) EXPECT_LT((motion.omega_I - 0.5 * axis).norm(), 1e-12);
-  // What changes sign from scan to scan is a turn, too, if noise does not reach so far.
+  // A rate of four sigma is a turn, too, although its sign changes from scan to scan.
   set(0.5, 4.0 * sigma);
   EXPECT_NEAR(motions[1].omega_I.dot(across), -4.0 * sigma, 1e-12);
   // Noise alone is no turn.

@@ -51,13 +51,13 @@ struct RunSummary : RunEvidence {
   std::vector<std::string> warnings;  ///< for people; not in the file
   std::vector<NotUsable> not_usable;  ///< likewise
   double path_length_m = 0.0;         ///< of the optimised poses
-  // Of the causal trajectory, if it is one: not if it starts again on the way (`imu_restarts`).
+  // The causal trajectory has these two only if it never starts again on the way (`imu_restarts`).
   double end_to_start_2d_m = 0.0;  ///< horizontal
   double end_to_start_3d_m = 0.0;
   std::optional<BarometerCounts> barometer;           ///< only with a barometer_topic
   std::optional<GroundVehicleCounts> ground_vehicle;  ///< only with platform: ground_vehicle
   Diagnosis diagnosis;                                ///< whether the run is good, and if not, why
-  std::optional<TruthErrors> truth;                   ///< likewise
+  std::optional<TruthErrors> truth;                   ///< none if the trajectory starts again
   double estimation_seconds = 0.0;                    ///< reading, decoding and estimating, wall clock
   double realtime_factor = 0.0;                       ///< seconds of data in a second of that
 
