@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "dense_system.h"
+#include "noise.h"
 #include "radar_smoother.h"
 #include "rio_t/core/so3.h"
 

@@ -7,6 +7,9 @@
 
 namespace rio_t {
 
+/// Made-up numbers around zero.
+inline double wave(int i) { return std::sin(1.0 + 2.71 * i) + 0.4 * std::cos(0.9 * i * i); }
+
 /// Deterministic noise of unit variance: a sum of twelve uniforms, the same with every standard library.
 class Noise {
  public:

@@ -57,7 +57,4 @@ inline RadarVelocityMeasurement radarMeasurement(const SyntheticMotion& motion, 
   return z;
 }
 
-/// Made-up numbers around zero.
-inline double wave(int i) { return std::sin(1.0 + 2.71 * i) + 0.4 * std::cos(0.9 * i * i); }
-
 }  // namespace rio_t

@@ -79,10 +79,14 @@ void Window::remove(const Block& block) {
   const auto touches = [&](const std::unique_ptr<Term>& term) {
     return std::find(term->blocks.begin(), term->blocks.end(), &block) != term->blocks.end();
   };
+  // Ceres would remove these terms in the order of their addresses. Then the order of those that stay, and
+  // with it the rounding of every sum, would depend on where the memory lies.
+  for (const auto& term : terms_)
+    if (touches(term)) problem_->RemoveResidualBlock(term->in_problem);
+  terms_.erase(std::remove_if(terms_.begin(), terms_.end(), touches), terms_.end());
   const auto at =
       std::find_if(blocks_.begin(), blocks_.end(), [&](const auto& other) { return other.get() == &block; });
-  problem_->RemoveParameterBlock((*at)->x.data());  // and the residual blocks on it
-  terms_.erase(std::remove_if(terms_.begin(), terms_.end(), touches), terms_.end());
+  problem_->RemoveParameterBlock((*at)->x.data());
   blocks_.erase(at);
 }
 
