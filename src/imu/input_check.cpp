@@ -15,41 +15,45 @@ void raise(double& variance, double density) { variance = std::max(variance, den
 
 }  // namespace
 
-const char* faultOfValues(const ImuMeasurement& imu, const ImuInputCheckOptions& options) {
-  if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite()) return "imu_not_finite";
-  const double most =
-      options.accel_range > 0.0 ? kImpossibleShareOfRange * options.accel_range : kImpossibleAcceleration;
-  // The check for a stuck axis replaces such a reading of the gyro.
-  return imu.acceleration.cwiseAbs().maxCoeff() > most ? "imu_not_plausible" : nullptr;
+ImuSampleCheck::ImuSampleCheck(const ImuInputCheckOptions& options)
+    : most_acceleration_(options.accel_range > 0.0 ? kImpossibleShareOfRange * options.accel_range
+                                                   : kImpossibleAcceleration),
+      stamps_(options.max_bridged_gap, options.jump_patience) {}
+
+ImuSampleCheck::Verdict ImuSampleCheck::check(const ImuMeasurement& imu) {
+  Verdict verdict;
+  verdict.before = stamps_.newest();
+  if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite()) {
+    verdict.fault = "imu_not_finite";
+  } else if (imu.acceleration.cwiseAbs().maxCoeff() > most_acceleration_) {
+    verdict.fault = "imu_not_plausible";  // of the gyro, ImuInputCheck replaces such a reading
+  } else {
+    const ClockJumpDetector::Verdict stamp = stamps_.check(imu.time);
+    if (stamp == ClockJumpDetector::Verdict::kBehind) verdict.fault = "imu_out_of_order";
+    if (stamp == ClockJumpDetector::Verdict::kAhead) verdict.fault = "imu_stamp_jump";
+    verdict.is_restart = stamp == ClockJumpDetector::Verdict::kRestart;
+  }
+  return verdict;
 }
 
 ImuInputCheck::ImuInputCheck(double max_gap, const ImuInputCheckOptions& options)
     : max_gap_(max_gap),
       options_(options),
-      stamps_(options.max_bridged_gap, options.jump_patience),
+      samples_(options),
       saturation_(options.accel_range, options.gyro_range) {}
 
 ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
-  if (const char* fault = faultOfValues(imu, options_)) return {Decision::kDrop, {fault}};
+  const ImuSampleCheck::Verdict sample = samples_.check(imu);
+  if (sample.fault != nullptr) return {Decision::kDrop, {sample.fault}};
   Verdict verdict;
-  std::optional<Time> before = stamps_.newest();
-  switch (stamps_.check(imu.time)) {
-    case ClockJumpDetector::Verdict::kGood:
-      break;
-    case ClockJumpDetector::Verdict::kBehind:
-      return {Decision::kDrop, {"imu_out_of_order"}};
-    case ClockJumpDetector::Verdict::kAhead:
-      return {Decision::kDrop, {"imu_stamp_jump"}};
-    case ClockJumpDetector::Verdict::kRestart:
-      verdict = {Decision::kRestart, {"imu_clock_restart"}};
-      before.reset();
-      bridge_.reset();
-      gyro_axes_ = {};
-      accel_noise_.interrupt();
-      gyro_noise_.interrupt();
-      break;
+  if (sample.is_restart) {
+    verdict = {Decision::kRestart, {"imu_clock_restart"}};
+    bridge_.reset();
+    gyro_axes_ = {};
+    accel_noise_.interrupt();
+    gyro_noise_.interrupt();
   }
-  const double gap = before ? imu.time - *before : 0.0;
+  const double gap = sample.before && !sample.is_restart ? imu.time - *sample.before : 0.0;
   if (gap > max_gap_) {
     verdict.faults.push_back("imu_gap");
     const double share = std::min(1.0, gap / kMotionCorrelationTime);

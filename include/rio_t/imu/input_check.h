@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "rio_t/imu/clock_jump_detector.h"
@@ -34,9 +35,25 @@ struct MeasuredImuNoise {
   }
 };
 
-/// The fault of a sample by its values alone: "imu_not_finite" or "imu_not_plausible"; null if it has none.
-/// Such a sample is dropped before its stamp is looked at.
-const char* faultOfValues(const ImuMeasurement& imu, const ImuInputCheckOptions& options);
+/// Says which IMU samples the estimate takes, and after which of them it starts again. ImuInputCheck does as
+/// it says. Who needs the same answers beside the odometry has one of its own. Not thread-safe.
+class ImuSampleCheck {
+ public:
+  struct Verdict {
+    /// Why the sample is dropped; null: it is taken. "imu_not_finite" or "imu_not_plausible" by its values,
+    /// whatever its stamp; "imu_out_of_order" or "imu_stamp_jump" by its stamp.
+    const char* fault = nullptr;
+    bool is_restart = false;     ///< the clock jumped, or the gap was too long: forget all before
+    std::optional<Time> before;  ///< stamp of the newest sample taken before; none of the first sample
+  };
+
+  explicit ImuSampleCheck(const ImuInputCheckOptions& options);
+  Verdict check(const ImuMeasurement& imu);
+
+ private:
+  double most_acceleration_;  // [m/s^2] read-only after construction
+  ClockJumpDetector stamps_;
+};
 
 /// Checks IMU samples. It drops those that cannot be used, writes into the others how much of the motion they
 /// miss, and bridges gaps. Not thread-safe.
@@ -71,7 +88,7 @@ class ImuInputCheck {
 
   double max_gap_;  // read-only after construction, as the next
   ImuInputCheckOptions options_;
-  ClockJumpDetector stamps_;
+  ImuSampleCheck samples_;
   SaturationDetector saturation_;
   std::array<StuckAxisDetector, 3> gyro_axes_;
   GapBridge bridge_;

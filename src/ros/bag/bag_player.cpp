@@ -15,8 +15,7 @@ BagPlayer::BagPlayer(const Config& config, RunLog* log, BatchOdometry* recorder)
       log_(log),
       recorder_(recorder),
       evidence_(config),
-      imu_stamps_(config.odometry.imu_input_check.max_bridged_gap,
-                  config.odometry.imu_input_check.jump_patience) {
+      imu_check_(config.odometry.imu_input_check) {
   for (const Config& radar : configsOfRadars(config)) radars_.emplace_back(radar);
 }
 
@@ -95,21 +94,15 @@ void BagPlayer::addImu(const sensor_msgs::Imu& message, Time record) {
     notUsable("imu_not_usable", config_.imu_topic, error.what());
     return;
   }
-  followImuStamps(imu);
+  const ImuSampleCheck::Verdict checked = imu_check_.check(imu);
+  if (checked.is_restart && odometry_.initialized()) imu_restarts_.push_back({*checked.before, imu.time});
+  if (checked.fault == nullptr) evidence_.addImu(imu.time);
   for (Radar& radar : radars_) radar.stamper.addImu(imu.time, record);
   if (recorder_ != nullptr) recorder_->addImu(imu);
   const std::optional<NavigationState> state = odometry_.addImu(imu);
   if (!state) return;
   evidence_.addState(state->time);
   log_->addState(*state);
-}
-
-void BagPlayer::followImuStamps(const ImuMeasurement& imu) {
-  if (faultOfValues(imu, config_.odometry.imu_input_check) != nullptr) return;
-  const std::optional<Time> before = imu_stamps_.newest();
-  const bool restarts = imu_stamps_.check(imu.time) == ClockJumpDetector::Verdict::kRestart;
-  if (restarts && odometry_.initialized()) imu_restarts_.push_back({*before, imu.time});
-  if (imu_stamps_.newest() == imu.time) evidence_.addImu(imu.time);
 }
 
 void BagPlayer::addTrigger(const std_msgs::Header& message, Time record, std::size_t radar) {

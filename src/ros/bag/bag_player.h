@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "rio_t/imu/clock_jump_detector.h"
+#include "rio_t/imu/input_check.h"
 #include "rio_t/odometry/batch_odometry.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
 #include "rio_t/ros/cloud/point_cloud.h"
@@ -50,8 +50,6 @@ class BagPlayer {
   };
 
   void addImu(const sensor_msgs::Imu& message, Time record);
-  /// Records where the odometry starts again.
-  void followImuStamps(const ImuMeasurement& imu);
   void addTrigger(const std_msgs::Header& message, Time record, std::size_t radar);
   void addPressure(const sensor_msgs::FluidPressure& message);
   void addCloud(const sensor_msgs::PointCloud2& message, Time record, std::size_t k);
@@ -69,7 +67,7 @@ class BagPlayer {
   BatchOdometry* recorder_;
   std::optional<RadarInertialOdometry::Start> start_;
   EvidenceCollector evidence_;
-  ClockJumpDetector imu_stamps_;  // the same judgement as the odometry's own
+  ImuSampleCheck imu_check_;  // answers as the odometry's own
   std::vector<ImuRestart> imu_restarts_;
   std::uint64_t imu_count_ = 0, pressure_count_ = 0;
   std::vector<NotUsable> not_usable_;

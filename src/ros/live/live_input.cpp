@@ -17,8 +17,10 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
   try {
     const ImuMeasurement imu =
         toImuMeasurement(*event.getConstMessage(), config_.imu_topic, config_.imu_units);
-    if (const char* fault = followImuStamps(imu)) {
-      monitor_.imuUnusable(fault);
+    const ImuSampleCheck::Verdict checked = imu_check_.check(imu);
+    if (checked.is_restart) restartClock(imu.time - *checked.before);
+    if (checked.fault != nullptr) {
+      monitor_.imuUnusable(checked.fault);
     } else {
       monitor_.imuUsable(imu.time);
     }
@@ -58,26 +60,11 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
   }
 }
 
-const char* LiveOdometry::followImuStamps(const ImuMeasurement& imu) {
-  // The same judgement as the session's own, so that the whole session starts again, with what it stamps by.
-  if (const char* fault = faultOfValues(imu, config_.odometry.imu_input_check)) return fault;
-  const std::optional<Time> before = imu_stamps_.newest();
-  switch (imu_stamps_.check(imu.time)) {
-    case ClockJumpDetector::Verdict::kGood:
-      return nullptr;
-    case ClockJumpDetector::Verdict::kBehind:
-      return "imu_out_of_order";
-    case ClockJumpDetector::Verdict::kAhead:
-      return "imu_stamp_jump";
-    case ClockJumpDetector::Verdict::kRestart:
-      break;
-  }
-  const double jump = imu.time - *before;
+void LiveOdometry::restartClock(double jump) {
   reset(std::string("the IMU's stamps jumped ") + (jump < 0.0 ? "back" : "ahead") + " by " +
             std::to_string(std::abs(jump)) + " s",
         true);
   early_imu_.clear();
-  return nullptr;
 }
 
 std::optional<NavigationState> LiveOdometry::feed(LiveSession& session, const Received& received) {

@@ -92,7 +92,7 @@ LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& p
       frames_(config_, node, name),
       options_(config_.odometry),
       live_config_(config_),
-      imu_stamps_(options_.imu_input_check.max_bridged_gap, options_.imu_input_check.jump_patience) {
+      imu_check_(options_.imu_input_check) {
   for (const Config& radar : configsOfRadars(config_)) radars_.emplace_back(radar);
   showEffectiveParameters(private_node_, config_);
   startSessionWhenReady();

@@ -99,9 +99,8 @@ class LiveOdometry {
   /// After it returns, the node publishes nothing of the old session. Any thread.
   /// `at_once`: does not wait for rest first.
   void reset(const std::string& reason, bool at_once = false);
-  /// Resets if the clock of the IMU jumped. Returns why the session will drop the sample, or null. IMU
-  /// thread.
-  const char* followImuStamps(const ImuMeasurement& imu);
+  /// Resets the whole session, with what it stamps by: the clock of the IMU jumped by `jump` [s]. IMU thread.
+  void restartClock(double jump);
   /// Gives a sample to a session. Returns the state that is to be published, if there is one.
   std::optional<NavigationState> feed(LiveSession& session, const Received& received);
   void account(const std::vector<LiveSession::GivenUp>& given_up);
@@ -147,7 +146,7 @@ class LiveOdometry {
   boost::recursive_mutex reconfigure_mutex_;  // the server's own
   std::unique_ptr<dynamic_reconfigure::Server<LiveParameters>> reconfigure_;
 
-  ClockJumpDetector imu_stamps_;    // IMU thread only, as the next
+  ImuSampleCheck imu_check_;        // answers as the session's own. IMU thread only, as the next
   std::deque<Received> early_imu_;  // from before there was a session; it gets them first
 
   ros::Subscriber imu_subscriber_, barometer_subscriber_;
