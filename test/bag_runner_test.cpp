@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "../src/ros/text.h"
 #include "rest_bag.h"
+#include "rio_t/core/format.h"
 #include "rio_t/ros/parameters/parameters.h"
 
 namespace rio_t {

@@ -140,9 +140,9 @@ TEST(Tum, WritesWhatItReads) {
   written[1].time = Time::fromNanoseconds(-1);
   written[2].time = Time::fromNanoseconds(1234567890123456789);
   written.resize(3);
-  std::ostringstream text;
-  for (const StampedPose& p : written) writeTumLine(text, p);
-  const Trajectory back = read(text.str());
+  std::string text;
+  for (const StampedPose& p : written) appendTumLine(&text, p);
+  const Trajectory back = read(text);
   ASSERT_EQ(back.size(), written.size());
   for (std::size_t i = 0; i < back.size(); ++i) {
     EXPECT_EQ(back[i].time, written[i].time) << i;

@@ -4,13 +4,13 @@
 #include <array>
 #include <cctype>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <limits>
 #include <sstream>
 #include <stdexcept>
 
+#include "rio_t/core/format.h"
 #include "rio_t/core/replace_file.h"
 
 namespace rio_t {
@@ -131,28 +131,25 @@ Trajectory readTum(const std::string& path) {
 
 std::string formatTime(Time time) {
   const std::int64_t ns = time.nanoseconds();
-  std::array<char, 24> text{};  // filled from the end
-  char* first = text.end();
-  std::int64_t left = std::abs(ns);
-  for (int i = 0; i <= 9 || left != 0; ++i, left /= 10) {
-    if (i == 9) *--first = '.';
-    *--first = static_cast<char>('0' + left % 10);
-  }
-  if (ns < 0) *--first = '-';
-  return {first, text.end()};
+  std::string text;
+  appendDecimal(&text, ns < 0, static_cast<std::uint64_t>(std::abs(ns)), 9);
+  return text;
 }
 
-void writeTumLine(std::ostream& out, const StampedPose& pose) {
-  std::array<char, 256> text{};
-  std::snprintf(text.data(), text.size(), " %.9f %.9f %.9f %.9f %.9f %.9f %.9f\n", pose.p_W.x(), pose.p_W.y(),
-                pose.p_W.z(), pose.q_WI.x(), pose.q_WI.y(), pose.q_WI.z(), pose.q_WI.w());
-  out << formatTime(pose.time) << text.data();
+void appendTumLine(std::string* text, const StampedPose& pose) {
+  *text += formatTime(pose.time);
+  for (const double value : {pose.p_W.x(), pose.p_W.y(), pose.p_W.z(), pose.q_WI.x(), pose.q_WI.y(),
+                             pose.q_WI.z(), pose.q_WI.w()}) {
+    text->push_back(' ');
+    appendFixed(text, value, 9);
+  }
+  text->push_back('\n');
 }
 
 void writeTum(const std::string& path, const Trajectory& trajectory) {
-  std::ostringstream text;
-  for (const StampedPose& pose : trajectory) writeTumLine(text, pose);
-  replaceFile(path, text.str());
+  std::string text;
+  for (const StampedPose& pose : trajectory) appendTumLine(&text, pose);
+  replaceFile(path, text);
 }
 
 std::vector<Match> associate(const Trajectory& truth, const Trajectory& estimate, double max_difference) {

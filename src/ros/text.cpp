@@ -1,42 +1,13 @@
 #include "text.h"
 
-#include <array>
 #include <boost/algorithm/string.hpp>
-#include <cmath>
-#include <cstdint>
 #include <locale>
 #include <sstream>
 #include <vector>
 
-namespace rio_t {
+#include "rio_t/core/format.h"
 
-void appendFixed(std::string* text, double value, int decimals) {
-  if (!std::isfinite(value)) {
-    *text += std::isnan(value) ? ".nan" : value > 0.0 ? ".inf" : "-.inf";
-    return;
-  }
-  double scale = 1.0;
-  for (int i = 0; i < decimals; ++i) scale *= 10.0;
-  const double scaled = std::round(std::abs(value) * scale);
-  if (scaled > 9e18) {  // beyond 64 bits
-    std::ostringstream stream;
-    stream.imbue(std::locale::classic());
-    stream.precision(decimals);
-    stream << std::fixed << value;
-    *text += stream.str();
-    return;
-  }
-  auto left = static_cast<std::uint64_t>(scaled);
-  const bool is_negative = value < 0.0 && left != 0;
-  std::array<char, 24> digits{};  // filled from the end
-  char* first = digits.end();
-  for (int i = 0; i <= decimals || left != 0; ++i, left /= 10) {
-    if (i == decimals && i > 0) *--first = '.';
-    *--first = static_cast<char>('0' + left % 10);
-  }
-  if (is_negative) *--first = '-';
-  text->append(first, digits.end());
-}
+namespace rio_t {
 
 std::string fixedText(double value, int decimals) {
   std::string text;

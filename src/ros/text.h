@@ -6,10 +6,7 @@
 /// Texts for people and files.
 namespace rio_t {
 
-/// Appends `value` with that many decimals (at most 12), with a point whatever the locale; ".nan",
-/// ".inf", "-.inf" as in YAML. Never minus zero.
-void appendFixed(std::string* text, double value, int decimals);
-/// The same as a text of its own.
+/// As appendFixed (core/format.h).
 std::string fixedText(double value, int decimals);
 /// Several values: "1.20, -0.30, 0.05".
 std::string fixedTexts(const Eigen::VectorXd& values, int decimals, const std::string& separator = ", ");

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <cstdio>
 #include <string>
 
@@ -12,5 +13,11 @@ std::string formatted(const char* text, Values... values) {
   std::snprintf(line, sizeof line, text, values...);
   return line;
 }
+
+/// Appends a number by its digits: the last `decimals` of them (at most 18) stand after the point.
+void appendDecimal(std::string* text, bool is_negative, std::uint64_t digits, int decimals);
+/// Appends `value` with that many decimals (at most 12), with a point whatever the locale; ".nan",
+/// ".inf", "-.inf" as in YAML. Never minus zero.
+void appendFixed(std::string* text, double value, int decimals);
 
 }  // namespace rio_t

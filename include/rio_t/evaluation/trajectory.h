@@ -28,7 +28,7 @@ Trajectory readTum(std::istream& in, const std::string& name);
 /// Writes the format above, stamps with nine decimals. Throws std::runtime_error if it cannot write.
 void writeTum(const std::string& path, const Trajectory& trajectory);
 /// One line of it, for programs that write as they go.
-void writeTumLine(std::ostream& out, const StampedPose& pose);
+void appendTumLine(std::string* text, const StampedPose& pose);
 
 /// Exact time of a decimal text such as `1700000010.012222` or `1.700000010012222e+09`, rounded to the
 /// nearest nanosecond. Never goes through double. Throws std::invalid_argument if the text is no such number.

@@ -11,6 +11,7 @@
 #include <system_error>
 
 #include "../text.h"
+#include "rio_t/core/format.h"
 #include "rio_t/factors/state_block.h"
 
 namespace rio_t {
@@ -109,20 +110,20 @@ void RunOutput::File::flush() {
   if (!stream) throw OutputError("output " + path + ": writing failed (disk full?)");
 }
 
-RunOutput::File& RunOutput::File::add(std::initializer_list<double> values, int decimals, char separator) {
+RunOutput::File& RunOutput::File::add(std::initializer_list<double> values, int decimals) {
   for (const double x : values) {
-    buffer.push_back(separator);
+    buffer.push_back(',');
     appendFixed(&buffer, x, decimals);
   }
   return *this;
 }
 
-RunOutput::File& RunOutput::File::add(const Eigen::Vector3d& v, int decimals, char separator) {
-  return add({v.x(), v.y(), v.z()}, decimals, separator);
+RunOutput::File& RunOutput::File::add(const Eigen::Vector3d& v, int decimals) {
+  return add({v.x(), v.y(), v.z()}, decimals);
 }
 
-RunOutput::File& RunOutput::File::add(const Eigen::Quaterniond& q, int decimals, char separator) {
-  return add({q.x(), q.y(), q.z(), q.w()}, decimals, separator);
+RunOutput::File& RunOutput::File::add(const Eigen::Quaterniond& q, int decimals) {
+  return add({q.x(), q.y(), q.z(), q.w()}, decimals);
 }
 
 RunOutput::File& RunOutput::File::add(const std::string& text) {
@@ -132,6 +133,10 @@ RunOutput::File& RunOutput::File::add(const std::string& text) {
 
 void RunOutput::File::endLine() {
   buffer.push_back('\n');
+  flushIfFull();
+}
+
+void RunOutput::File::flushIfFull() {
   if (buffer.size() > kBufferSize) flush();
 }
 
@@ -176,7 +181,9 @@ RunOutput::File& RunOutput::row(std::string_view name, Time stamp) {
 }
 
 void RunOutput::addPose(std::string_view name, const StampedPose& pose) {
-  row(name, pose.time).add(pose.p_W, 9, ' ').add(pose.q_WI, 9, ' ').endLine();
+  File& trajectory = file(name);
+  appendTumLine(&trajectory.buffer, pose);
+  trajectory.flushIfFull();
 }
 
 void RunOutput::addState(const NavigationState& state) {

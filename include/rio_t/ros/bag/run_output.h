@@ -150,9 +150,10 @@ class RunOutput {
     /// Empties it, and begins it with `text`.
     void open(const std::string& path_in, const std::string& text);
     void flush();
-    File& add(std::initializer_list<double> values, int decimals, char separator = ',');
-    File& add(const Eigen::Vector3d& v, int decimals, char separator = ',');
-    File& add(const Eigen::Quaterniond& q, int decimals, char separator = ',');  ///< x, y, z, w
+    void flushIfFull();
+    File& add(std::initializer_list<double> values, int decimals);
+    File& add(const Eigen::Vector3d& v, int decimals);
+    File& add(const Eigen::Quaterniond& q, int decimals);  ///< x, y, z, w
     File& add(const std::string& text);
     void endLine();
   };
