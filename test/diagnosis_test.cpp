@@ -357,6 +357,7 @@ TEST(Diagnosis, AnOffsetThatStepsAgainAndAgainIsDoubtful) {
 
 TEST(Diagnosis, AVehicleFrameThatTurnsFarIsNamed) {
   Config config;
+  config.odometry.platform = Platform::kGroundVehicle;
   config.odometry.ground_vehicle.T_IV.q_IR = Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX());
   EvidenceCollector collector(config);
   ScanResult result;
@@ -367,20 +368,21 @@ TEST(Diagnosis, AVehicleFrameThatTurnsFarIsNamed) {
         Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()) * config.odometry.ground_vehicle.T_IV.q_IR;
     collector.add(result);
     RunEvidence evidence = goodRun();
-    evidence.vehicle_turn =
-        collector.evidence(RadarInertialOdometry(config.odometry), std::nullopt).vehicle_turn;
+    evidence.ground_vehicle = collector.groundVehicle();
     return evidence;
   };
   const double sigma = config.odometry.ground_vehicle.rotation_sigma;
-  EXPECT_EQ(first(turnedBy(2.9 * sigma)), "none");
+  EXPECT_EQ(first(turnedBy(2.9 * sigma), config), "none");
   const RunEvidence far = turnedBy(6.0 * sigma);
-  expectSays(first(far),
+  expectSays(first(far, config),
              {"vehicle_frame_far", "6 vehicle_frame_rotation_sigma", "vehicle_frame_rotation_xyzw"});
   EXPECT_EQ(diagnose(far, config).verdict, RunVerdict::kDoubtful);
 }
 
 TEST(Diagnosis, AMotionThatIsNotAVehiclesMakesARunDoubtful) {
-  EvidenceCollector collector{Config()};
+  Config config;
+  config.odometry.platform = Platform::kGroundVehicle;
+  EvidenceCollector collector(config);
   ScanResult result;
   result.used = true;
   result.ground_vehicle.emplace().is_contradicted = true;
@@ -388,10 +390,9 @@ TEST(Diagnosis, AMotionThatIsNotAVehiclesMakesARunDoubtful) {
   result.ground_vehicle->is_contradicted = false;  // the estimate started again
   collector.add(result);
   RunEvidence evidence = goodRun();
-  evidence.vehicle_contradicted =
-      collector.evidence(RadarInertialOdometry(OdometryOptions()), std::nullopt).vehicle_contradicted;
-  expectSays(first(evidence), {"vehicle_contradicted", "platform: free"});
-  EXPECT_EQ(diagnose(evidence, Config()).verdict, RunVerdict::kDoubtful);
+  evidence.ground_vehicle = collector.groundVehicle();
+  expectSays(first(evidence, config), {"vehicle_contradicted", "platform: free"});
+  EXPECT_EQ(diagnose(evidence, config).verdict, RunVerdict::kDoubtful);
 }
 
 TEST(Diagnosis, ADivergenceForLackOfScansNamesTheLack) {

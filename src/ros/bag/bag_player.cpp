@@ -16,6 +16,7 @@ BagPlayer::BagPlayer(const Config& config, RunLog* log, BatchOdometry* recorder)
       recorder_(recorder),
       evidence_(config),
       imu_check_(config.odometry.imu_input_check) {
+  if (config.odometry.use_barometer) barometer_.emplace();
   for (const Config& radar : configsOfRadars(config)) radars_.emplace_back(radar);
 }
 
@@ -58,7 +59,7 @@ RunSummary BagPlayer::summary(const RunLog& log) const {
   log.fill(&summary);
   summary.imu_count = imu_count_;
   summary.imu_restarts = imu_restarts_;
-  if (summary.barometer) summary.barometer->pressures = pressure_count_;
+  summary.barometer = barometer_;
   for (std::size_t k = 0; k < radars_.size(); ++k) {
     const Radar& radar = radars_[k];
     RadarSummary& radar_summary = summary.radars[k];
@@ -115,7 +116,7 @@ void BagPlayer::addTrigger(const std_msgs::Header& message, Time record, std::si
 }
 
 void BagPlayer::addPressure(const sensor_msgs::FluidPressure& message) {
-  ++pressure_count_;
+  if (barometer_) ++barometer_->pressures;
   try {
     odometry_.addPressure(toPressure(message, config_.barometer_topic));
   } catch (const std::exception& error) {
@@ -159,6 +160,7 @@ void BagPlayer::account(ScanResult& result) {
   if (!start_) start_ = odometry_.start();
   evidence_.add(result);
   if (recorder_ != nullptr) recorder_->addResult(result);
+  if (barometer_) barometer_->add(result);
   log_->addResult(result);
 }
 

@@ -69,7 +69,8 @@ class BagPlayer {
   EvidenceCollector evidence_;
   ImuSampleCheck imu_check_;  // answers as the odometry's own
   std::vector<ImuRestart> imu_restarts_;
-  std::uint64_t imu_count_ = 0, pressure_count_ = 0;
+  std::uint64_t imu_count_ = 0;
+  std::optional<BarometerCounts> barometer_;  // if there is one
   std::vector<NotUsable> not_usable_;
 };
 

@@ -157,7 +157,7 @@ class BagJob {
 
  private:
   RunSummary online() {
-    RunLog log(run_.config, output_.get(), nothingTakenOff());
+    RunLog log(run_.config, output_.get(), nothingTakenOff(), hasTruth());
     BagPlayer player(run_.config, &log, nullptr);
     return finish(play(player, run_.config, log, 0.0, 1.0), log, output_.get());
   }
@@ -168,12 +168,12 @@ class BagJob {
     batch_options.max_iterations = run_.config.batch_max_iterations;
     BatchOdometry recorder(options, batch_options);
     const std::unique_ptr<RunOutput> online_output = openOutput("/online");
-    RunLog online_log(run_.config, online_output.get(), nothingTakenOff());
+    RunLog online_log(run_.config, online_output.get(), nothingTakenOff(), hasTruth());
     BagPlayer player(run_.config, &online_log, &recorder);
     finish(play(player, run_.config, online_log, 0.0, 0.9), online_log, online_output.get());
 
     const BatchResult result = recorder.solve(*player.start());
-    RunLog log(run_.config, output_.get(), nothingTakenOff());
+    RunLog log(run_.config, output_.get(), nothingTakenOff(), hasTruth());
     for (const NavigationState& state : result.trajectory) log.addState(state);
     for (ScanResult scan : result.scans) log.addResult(scan);
     RunSummary summary = player.summary(log);  // what the batch does not change, and its estimates
@@ -203,7 +203,7 @@ class BagJob {
       const bool last = pass == passes;
       const std::unique_ptr<RunOutput> earlier = last ? nullptr : openOutput("/pass_" + std::to_string(pass));
       RunOutput* output = last ? output_.get() : earlier.get();
-      RunLog log(config, output, taken_off);
+      RunLog log(config, output, taken_off, hasTruth());
       BagPlayer player(config, &log, nullptr);
       RunSummary summary =
           play(player, config, log, (pass - 1.0) / passes, static_cast<double>(pass) / passes);
@@ -230,6 +230,7 @@ class BagJob {
     return std::make_unique<RunOutput>(run_.output_folder + subfolder, files_);
   }
 
+  bool hasTruth() const { return truth_in_bag_ || !run_.config.ground_truth.empty(); }
   std::vector<double> nothingTakenOff() const { return std::vector<double>(files_.radars.size(), 0.0); }
 
   /// The whole bag; progress goes from `from` to `to`.
@@ -265,11 +266,10 @@ class BagJob {
     summary.realtime_factor = (end_ - begin_).toSec() / took.count();
     const Trajectory trajectory = log.takeTrajectory();
     truth_error_.reset();
-    const bool has_truth = truth_in_bag_ || !run_.config.ground_truth.empty();
-    if (has_truth && !summary.imu_restarts.empty()) {
+    if (hasTruth() && !summary.imu_restarts.empty()) {
       summary.warnings.emplace_back(
           "the ground truth judges no trajectory that starts again: run each part by itself");
-    } else if (has_truth) {
+    } else if (hasTruth()) {
       try {
         if (truth_in_bag_ && truth_.empty()) truth_ = readPoses(bags_, run_.config.ground_truth_topic);
         summary.truth = errorsAgainst(truth_, trajectory);

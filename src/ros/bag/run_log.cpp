@@ -21,16 +21,12 @@ RadarEstimate before(const OdometryOptions& options) {
 
 }  // namespace
 
-RunLog::RunLog(const Config& config, RunOutput* output, const std::vector<double>& taken_off)
+RunLog::RunLog(const Config& config, RunOutput* output, const std::vector<double>& taken_off,
+               bool keeps_trajectory)
     : output_(output),
       offset_shared_(config.odometry.smoother.time_offset_shared),
-      max_bridged_gap_(config.odometry.imu_input_check.max_bridged_gap) {
-  if (config.odometry.use_barometer) barometer_.emplace();
-  if (config.odometry.platform == Platform::kGroundVehicle) {
-    ground_vehicle_.emplace();
-    ground_vehicle_->rotation = config.odometry.ground_vehicle.T_IV.q_IR;
-    ground_vehicle_->rotation_sigma.setConstant(config.odometry.ground_vehicle.rotation_sigma);
-  }
+      max_bridged_gap_(config.odometry.imu_input_check.max_bridged_gap),
+      keeps_trajectory_(keeps_trajectory) {
   for (std::size_t k = 0; k < taken_off.size(); ++k) {
     Radar& radar = radars_.emplace_back(Radar{before(optionsOfRadar(config.odometry, k)), taken_off[k]});
     radar.estimate.final_offset_s += radar.taken_off;
@@ -39,7 +35,9 @@ RunLog::RunLog(const Config& config, RunOutput* output, const std::vector<double
 
 void RunLog::addState(const NavigationState& state) {
   if (output_ != nullptr) output_->addState(state);
-  trajectory_.push_back({state.time, state.p_W, state.q_WI});
+  if (!first_p_W_) first_p_W_ = state.p_W;
+  last_p_W_ = state.p_W;
+  if (keeps_trajectory_) trajectory_.push_back({state.time, state.p_W, state.q_WI});
 }
 
 void RunLog::addResult(ScanResult& result) {
@@ -55,8 +53,6 @@ void RunLog::addResult(ScanResult& result) {
       path_length_m_ += (pose.p_W - newest_optimized_->p_W).norm();
     newest_optimized_ = pose;
   }
-  if (barometer_) barometer_->add(result);
-  if (ground_vehicle_) ground_vehicle_->add(result);
   if (!result.updated) return;
   for (Radar& each : radars_) {
     if (&each != &radar && !offset_shared_) continue;
@@ -71,11 +67,9 @@ void RunLog::addResult(ScanResult& result) {
 void RunLog::fill(RunSummary* summary) const {
   for (std::size_t k = 0; k < radars_.size(); ++k)
     static_cast<RadarEstimate&>(summary->radars.at(k)) = radars_[k].estimate;
-  summary->barometer = barometer_;
-  summary->ground_vehicle = ground_vehicle_;
   summary->path_length_m = path_length_m_;
-  if (trajectory_.empty()) return;
-  const Eigen::Vector3d moved = trajectory_.back().p_W - trajectory_.front().p_W;
+  if (!first_p_W_) return;
+  const Eigen::Vector3d moved = last_p_W_ - *first_p_W_;
   summary->end_to_start_2d_m = moved.head<2>().norm();
   summary->end_to_start_3d_m = moved.norm();
 }

@@ -13,13 +13,16 @@ namespace rio_t {
 class RunLog {
  public:
   /// `taken_off` [s], by radar: the stamps are earlier, and the offset smaller, by so much.
-  RunLog(const Config& config, RunOutput* output, const std::vector<double>& taken_off);
+  /// `keeps_trajectory`: for takeTrajectory(), 90 MB an hour.
+  RunLog(const Config& config, RunOutput* output, const std::vector<double>& taken_off,
+         bool keeps_trajectory);
 
   void addState(const NavigationState& state);
   /// Puts what was taken off the stamps back on.
   void addResult(ScanResult& result);
   /// Sets what the log knows.
   void fill(RunSummary* summary) const;
+  /// The poses at the IMU samples; empty if they are not kept.
   Trajectory takeTrajectory() { return std::move(trajectory_); }
 
  private:
@@ -31,10 +34,11 @@ class RunLog {
   RunOutput* output_;
   bool offset_shared_;
   double max_bridged_gap_;  // [s]
+  bool keeps_trajectory_;
   std::vector<Radar> radars_;
   Trajectory trajectory_;
-  std::optional<BarometerCounts> barometer_;           // if there is one
-  std::optional<GroundVehicleCounts> ground_vehicle_;  // if the platform is one
+  std::optional<Eigen::Vector3d> first_p_W_;
+  Eigen::Vector3d last_p_W_ = Eigen::Vector3d::Zero();
   std::optional<StampedPose> newest_optimized_;
   double path_length_m_ = 0.0;
 };

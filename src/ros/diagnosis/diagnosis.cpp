@@ -5,6 +5,7 @@
 #include "../text.h"
 #include "radar_causes.h"
 #include "rio_t/core/angle.h"
+#include "rio_t/core/so3.h"
 #include "rio_t/ros/parameters/parameters.h"
 
 namespace rio_t {
@@ -100,9 +101,16 @@ double worstSilentShare(const RunEvidence& evidence) {
   return shareOfRun(evidence, seconds);
 }
 
-/// How far the estimated vehicle frame is turned from the configured one, about the worst axis.
+/// How far the estimate has turned the vehicle frame from the configured one [rad about the axes of I]; zero
+/// if there is no estimate.
+Eigen::Vector3d vehicleTurn(const RunEvidence& evidence, const Config& config) {
+  if (!evidence.ground_vehicle || !evidence.ground_vehicle->last) return Eigen::Vector3d::Zero();
+  return so3::log(evidence.ground_vehicle->rotation * config.odometry.ground_vehicle.T_IV.q_IR.conjugate());
+}
+
+/// The same about the worst axis.
 double vehicleTurnSigmas(const RunEvidence& evidence, const Config& config) {
-  return evidence.vehicle_turn.cwiseAbs().maxCoeff() / config.odometry.ground_vehicle.rotation_sigma;
+  return vehicleTurn(evidence, config).cwiseAbs().maxCoeff() / config.odometry.ground_vehicle.rotation_sigma;
 }
 
 /// A stamp, to the millisecond.
@@ -183,7 +191,7 @@ void addOffsetSteps(const RunEvidence& evidence, const Config& config, std::vect
 
 void addVehicle(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
   // It is certain, and the estimate keeps what the constraint did before.
-  if (evidence.vehicle_contradicted)
+  if (evidence.ground_vehicle && evidence.ground_vehicle->contradicted_at)
     causes->push_back({"vehicle_contradicted",
                        "The motion contradicted platform: ground_vehicle: the platform moves sideways or "
                        "upwards.",
@@ -193,7 +201,7 @@ void addVehicle(const RunEvidence& evidence, const Config& config, std::vector<C
                        1.0});
   const double sigmas = vehicleTurnSigmas(evidence, config);
   if (sigmas <= kFarMounting) return;
-  const Eigen::Vector3d turn = evidence.vehicle_turn / kDegree;
+  const Eigen::Vector3d turn = vehicleTurn(evidence, config) / kDegree;
   causes->push_back(
       {"vehicle_frame_far",
        "The estimated vehicle frame is turned from the configured one by " + fixedText(turn.x(), 0) + ", " +

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rio_t/core/so3.h"
 #include "rio_t/odometry/body_odometry.h"
 
 namespace rio_t {
@@ -15,16 +14,20 @@ std::uint64_t countOf(const Counts& counts, const std::string& name) {
 
 EvidenceCollector::EvidenceCollector(const Config& config)
     : coasting_after_(config.odometry.health.coasting_after),
-      max_bridged_gap_(config.odometry.imu_input_check.max_bridged_gap),
-      configured_q_IV_(config.odometry.ground_vehicle.T_IV.q_IR) {
+      max_bridged_gap_(config.odometry.imu_input_check.max_bridged_gap) {
   for (const Config& radar : configsOfRadars(config)) {
     filters_.emplace_back(radar.odometry.ego_velocity);
     evidence_.radars.emplace_back().name = radar.radar_name;
     last_used_.emplace_back();
   }
+  if (config.odometry.platform != Platform::kGroundVehicle) return;
+  GroundVehicleCounts& vehicle = evidence_.ground_vehicle.emplace();
+  vehicle.rotation = config.odometry.ground_vehicle.T_IV.q_IR;
+  vehicle.rotation_sigma.setConstant(config.odometry.ground_vehicle.rotation_sigma);
 }
 
 void EvidenceCollector::add(const ScanResult& result) {
+  if (evidence_.ground_vehicle) evidence_.ground_vehicle->add(result);
   if (!result.used && result.rejected_because.empty()) return;  // only carries the last poses
   RadarSummary& radar = evidence_.radars.at(result.scan.radar);
   ++radar.scans_total;
@@ -46,10 +49,6 @@ void EvidenceCollector::add(const ScanResult& result) {
   // now.
   if (result.used || result.at_rest)
     last_used_[result.scan.radar] = std::max(result.scan.stamp, newest_state_.value_or(result.scan.stamp));
-  if (result.ground_vehicle) {
-    evidence_.vehicle_turn = so3::log(result.ground_vehicle->q_IV * configured_q_IV_.conjugate());
-    evidence_.vehicle_contradicted = evidence_.vehicle_contradicted || result.ground_vehicle->is_contradicted;
-  }
   ++evidence_.scans_judged;
   if (result.health == Health::kDiverged) ++evidence_.scans_diverged;
   if (result.is_contradicted) ++evidence_.scans_contradicted;

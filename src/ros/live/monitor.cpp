@@ -137,7 +137,6 @@ void LiveMonitor::result(const LiveSession::Result& result) {
   Radar& radar = radars_.at(result.result.scan.radar);
   collector_.add(result.result);
   barometer_.add(result.result);
-  vehicle_.add(result.result);
   if (result.result.used) {
     ++radar.used;
     last_used_ = result.result.scan.stamp;
@@ -174,7 +173,6 @@ void LiveMonitor::reset(const std::string& reason) {
   last_update_.reset();
   last_used_.reset();
   newest_state_.reset();
-  vehicle_ = GroundVehicleCounts();
   barometer_.last.reset();
   for (Radar& radar : radars_) {
     radar.last_update.reset();

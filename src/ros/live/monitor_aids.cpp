@@ -60,13 +60,14 @@ void LiveMonitor::describeBarometer(Status& status) {
 
 void LiveMonitor::describeGroundVehicle(Status& status) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  status.add("terms_used", vehicle_.used);
-  status.add("terms_left_out", vehicle_.left_out);
-  if (!vehicle_.last) {
+  const GroundVehicleCounts& vehicle = collector_.groundVehicle().value();
+  status.add("terms_used", vehicle.used);
+  status.add("terms_left_out", vehicle.left_out);
+  if (!vehicle.last) {
     status.summary(DiagnosticStatus::OK, "no motion judged yet");
     return;
   }
-  const GroundVehicleAnswer& last = *vehicle_.last;
+  const GroundVehicleAnswer& last = *vehicle.last;
   status.add("velocity_sideways_m_s", last.v_V.y());
   status.add("velocity_upwards_m_s", last.v_V.z());
   if (last.contradiction) status.add("contradiction", *last.contradiction);

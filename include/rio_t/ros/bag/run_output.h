@@ -54,12 +54,11 @@ struct RunSummary : RunEvidence {
   // The causal trajectory has these two only if it never starts again on the way (`imu_restarts`).
   double end_to_start_2d_m = 0.0;  ///< horizontal
   double end_to_start_3d_m = 0.0;
-  std::optional<BarometerCounts> barometer;           ///< only with a barometer_topic
-  std::optional<GroundVehicleCounts> ground_vehicle;  ///< only with platform: ground_vehicle
-  Diagnosis diagnosis;                                ///< whether the run is good, and if not, why
-  std::optional<TruthErrors> truth;                   ///< none if the trajectory starts again
-  double estimation_seconds = 0.0;                    ///< reading, decoding and estimating, wall clock
-  double realtime_factor = 0.0;                       ///< seconds of data in a second of that
+  std::optional<BarometerCounts> barometer;  ///< only with a barometer_topic
+  Diagnosis diagnosis;                       ///< whether the run is good, and if not, why
+  std::optional<TruthErrors> truth;          ///< none if the trajectory starts again
+  double estimation_seconds = 0.0;           ///< reading, decoding and estimating, wall clock
+  double realtime_factor = 0.0;              ///< seconds of data in a second of that
 
   // Over all radars.
   std::uint64_t scansTotal() const;

@@ -72,69 +72,6 @@ struct ImuRestart {
   Time after;   ///< first stamp used after it
 };
 
-/// Counters of a run: enough to say why it disappoints.
-struct RunEvidence {
-  bool initialized = false;
-  InitializedFrom initialized_from = InitializedFrom::kRest;
-  std::string waiting_for;     ///< while not initialised
-  double heading_sigma = 0.0;  ///< of the newest state [rad]
-  std::uint64_t imu_count = 0;
-  Counts input_faults;  ///< RadarInertialOdometry::faults(), with those of the messages
-  std::uint64_t divergences = 0, reinitializations = 0;
-  Health health = Health::kOk;
-  std::uint64_t scans_judged = 0;        ///< after the start
-  std::uint64_t scans_diverged = 0;      ///< of them, after which the health was "diverged"
-  std::uint64_t scans_contradicted = 0;  ///< of these, those after which the scans contradicted the estimate
-  /// Why the solver stopped: windows by reason; with mode batch the one solve of the whole run.
-  Counts solver_terminations;
-  MeasuredImuNoise imu_noise;  ///< of the run, root mean square
-  // In IMU time [s] since the start, jumps of its clock left out. Zero in the live node, whose monitor tells
-  // of silence.
-  double run_seconds = 0.0;
-  double silent_seconds = 0.0;  ///< of them, later than `coasting_after` after the last scan that was used
-  double silence_begin = 0.0, silence_end = 0.0;  ///< of the longest silence
-  /// [rad] How far the estimate has turned the vehicle frame from the configured one; zero without such a
-  /// frame.
-  Eigen::Vector3d vehicle_turn = Eigen::Vector3d::Zero();
-  bool vehicle_contradicted = false;     ///< the motion was that of no ground vehicle
-  std::vector<ImuRestart> imu_restarts;  ///< none in the live node, whose evidence begins after the last one
-  std::vector<RadarSummary> radars;      ///< in the order of the configuration
-};
-
-/// Collects the evidence from the results of the scans. Not thread-safe.
-class EvidenceCollector {
- public:
-  explicit EvidenceCollector(const Config& config);
-
-  void add(const ScanResult& result);
-  /// A sample of the IMU.
-  void addImu(Time time) {
-    if (!oldest_imu_ || time < *oldest_imu_) oldest_imu_ = time;  // its clock may jump back
-  }
-  /// A sample of the IMU after the start.
-  void addState(Time time);
-  /// Scans that were dropped before the odometry saw them.
-  void addDropped(std::size_t radar, const std::string& reason, std::uint64_t count);
-  /// Points that the decoder dropped.
-  void addNotFinite(std::size_t radar, std::uint64_t count) {
-    evidence_.radars.at(radar).points_not_finite += count;
-  }
-  /// A trigger that was dropped, as its stamp is zero.
-  void addZeroTrigger(std::size_t radar) { ++evidence_.radars.at(radar).triggers_zero; }
-  /// The evidence so far, with what `odometry` knows and its `start`. `scans_total` counts the results and
-  /// the scans that were dropped.
-  RunEvidence evidence(const RadarInertialOdometry& odometry,
-                       const std::optional<RadarInertialOdometry::Start>& start) const;
-
- private:
-  std::vector<PointFilter> filters_;         // by RadarScan::radar
-  double coasting_after_, max_bridged_gap_;  // [s]
-  std::optional<Time> oldest_imu_, newest_state_;
-  std::vector<Time> last_used_;         // scan of each radar, or the start
-  Eigen::Quaterniond configured_q_IV_;  // vehicle frame
-  RunEvidence evidence_;
-};
-
 /// Counts of the means of the pressures, by outcome.
 struct BarometerCounts {
   std::uint64_t pressures = 0;          ///< messages
@@ -159,6 +96,67 @@ struct GroundVehicleCounts {
   Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Zero();      ///< [rad] about the axes of I
 
   void add(const ScanResult& result);
+};
+
+/// Counters of a run: enough to say why it disappoints.
+struct RunEvidence {
+  bool initialized = false;
+  InitializedFrom initialized_from = InitializedFrom::kRest;
+  std::string waiting_for;     ///< while not initialised
+  double heading_sigma = 0.0;  ///< of the newest state [rad]
+  std::uint64_t imu_count = 0;
+  Counts input_faults;  ///< RadarInertialOdometry::faults(), with those of the messages
+  std::uint64_t divergences = 0, reinitializations = 0;
+  Health health = Health::kOk;
+  std::uint64_t scans_judged = 0;        ///< after the start
+  std::uint64_t scans_diverged = 0;      ///< of them, after which the health was "diverged"
+  std::uint64_t scans_contradicted = 0;  ///< of these, those after which the scans contradicted the estimate
+  /// Why the solver stopped: windows by reason; with mode batch the one solve of the whole run.
+  Counts solver_terminations;
+  MeasuredImuNoise imu_noise;  ///< of the run, root mean square
+  // In IMU time [s] since the start, jumps of its clock left out. Zero in the live node, whose monitor tells
+  // of silence.
+  double run_seconds = 0.0;
+  double silent_seconds = 0.0;  ///< of them, later than `coasting_after` after the last scan that was used
+  double silence_begin = 0.0, silence_end = 0.0;  ///< of the longest silence
+  std::vector<ImuRestart> imu_restarts;  ///< none in the live node, whose evidence begins after the last one
+  std::vector<RadarSummary> radars;      ///< in the order of the configuration
+  std::optional<GroundVehicleCounts> ground_vehicle;  ///< only with platform: ground_vehicle
+};
+
+/// Collects the evidence from the results of the scans. Not thread-safe.
+class EvidenceCollector {
+ public:
+  explicit EvidenceCollector(const Config& config);
+
+  void add(const ScanResult& result);
+  /// A sample of the IMU.
+  void addImu(Time time) {
+    if (!oldest_imu_ || time < *oldest_imu_) oldest_imu_ = time;  // its clock may jump back
+  }
+  /// A sample of the IMU after the start.
+  void addState(Time time);
+  /// Scans that were dropped before the odometry saw them.
+  void addDropped(std::size_t radar, const std::string& reason, std::uint64_t count);
+  /// Points that the decoder dropped.
+  void addNotFinite(std::size_t radar, std::uint64_t count) {
+    evidence_.radars.at(radar).points_not_finite += count;
+  }
+  /// A trigger that was dropped, as its stamp is zero.
+  void addZeroTrigger(std::size_t radar) { ++evidence_.radars.at(radar).triggers_zero; }
+  /// Only with platform: ground_vehicle.
+  const std::optional<GroundVehicleCounts>& groundVehicle() const { return evidence_.ground_vehicle; }
+  /// The evidence so far, with what `odometry` knows and its `start`. `scans_total` counts the results and
+  /// the scans that were dropped.
+  RunEvidence evidence(const RadarInertialOdometry& odometry,
+                       const std::optional<RadarInertialOdometry::Start>& start) const;
+
+ private:
+  std::vector<PointFilter> filters_;         // by RadarScan::radar
+  double coasting_after_, max_bridged_gap_;  // [s]
+  std::optional<Time> oldest_imu_, newest_state_;
+  std::vector<Time> last_used_;  // scan of each radar, or the start
+  RunEvidence evidence_;
 };
 
 /// The warning for a person whose platform is no ground vehicle.

@@ -134,7 +134,6 @@ class LiveMonitor {
   std::string imu_fault_;  ///< why no odometry comes, as of the last call of describeInput; empty: it comes
   std::uint64_t imu_before_session_ = 0, not_usable_before_session_ = 0;
   Barometer barometer_;
-  GroundVehicleCounts vehicle_;
   Latency odometry_latency_, scan_latency_;
   std::map<std::string, std::uint64_t> imu_dropped_;
   std::uint64_t updates_ = 0, resets_ = 0, queue_full_reported_ = 0;
