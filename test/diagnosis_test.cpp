@@ -66,6 +66,8 @@ RunEvidence neverStarted(const std::string& waiting_for) {
 std::string first(const RunEvidence& evidence, const Config& config = Config{}) {
   const Diagnosis diagnosis = diagnose(evidence, config);
   if (diagnosis.causes.empty()) return "none";
+  for (const Cause& each : diagnosis.causes)
+    EXPECT_EQ(each.remedy_is_check_bag, each.remedy.find("check_bag") != std::string::npos) << each.name;
   const Cause& cause = diagnosis.causes.front();
   return cause.name + ": " + cause.text + " " + cause.remedy;
 }

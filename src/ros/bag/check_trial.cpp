@@ -66,15 +66,13 @@ std::string divergencesText(const RunSummary& summary) {
   return summary.divergences == 0 ? "no divergence" : "divergences: " + std::to_string(summary.divergences);
 }
 
-/// Such a cause sends the user to check_bag, which runs already.
-bool isAboutMounting(const Cause& cause) { return cause.remedy.find("check_bag") != std::string::npos; }
-
 std::string verdictText(const Diagnosis& diagnosis) {
   std::string text = "the run is " + toString(diagnosis.verdict);
   if (diagnosis.causes.empty()) return text;
   const Cause& cause = diagnosis.causes.front();
   text += ": " + cause.text;
-  return isAboutMounting(cause) ? text : text + " " + cause.remedy;
+  // check_bag runs already.
+  return cause.remedy_is_check_bag ? text : text + " " + cause.remedy;
 }
 
 void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
@@ -97,7 +95,7 @@ void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
   check->odd("trial run", verdictText(s.diagnosis));
   check->to_do = "The odometry does not run well with what the bag shows. Look at the odd lines.";
   const std::vector<Cause>& causes = s.diagnosis.causes;
-  if (causes.empty() || isAboutMounting(causes.front()))
+  if (causes.empty() || causes.front().remedy_is_check_bag)
     check->to_do +=
         " Measure the mounting and give it: --set mounting_yaw_pitch_roll_deg=[YAW,PITCH,ROLL] "
         "--set extrinsics_translation=[X,Y,Z] (docs/your_sensors.md, section 3). If that does not help, look "

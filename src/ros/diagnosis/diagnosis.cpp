@@ -140,7 +140,7 @@ void addStart(const RunEvidence& evidence, const Config& config, std::vector<Cau
                        "Check radar_doppler_sign, radar_axes, extrinsics_rotation_xyzw (order x, y, z, w), "
                        "imu_acceleration_unit and imu_rate_unit. Run `rosrun rio_t check_bag BAG`: it finds "
                        "them all.",
-                       0.9});
+                       0.9, true});
   } else if (has(waiting, "not in m/s^2?")) {
     causes->push_back({"imu_units", text,
                        "The driver of the IMU may publish g: then set imu_acceleration_unit: g. The driver "
@@ -344,7 +344,7 @@ void addDivergence(const RunEvidence& evidence, std::vector<Cause>* causes) {
                          mountingAdvice(*fewest) +
                          " If the estimate diverged only near large moving things, it is good again after "
                          "them.",
-                     std::max(0.05, share)});
+                     std::max(0.05, share), true});
 }
 
 /// A mounting that nobody set is the likeliest cause of a contradiction.
@@ -356,7 +356,8 @@ void addMissingMounting(const Config& config, std::vector<Cause>* causes) {
   if (share < 0.0) return;
   std::vector<Cause> missing;
   for (const std::string& warning : mountingWarnings(config))
-    missing.push_back({"no_mounting", warning, "`rosrun rio_t check_bag BAG` finds the mounting.", share});
+    missing.push_back(
+        {"no_mounting", warning, "`rosrun rio_t check_bag BAG` finds the mounting.", share, true});
   causes->insert(causes->begin(), missing.begin(), missing.end());
 }
 

@@ -25,8 +25,9 @@ class RadarCauses {
   }
 
  private:
-  void cause(const std::string& name, double share, const std::string& text, const std::string& remedy) {
-    causes_->push_back({name, text, remedy, share});
+  void cause(const std::string& name, double share, const std::string& text, const std::string& remedy,
+             bool remedy_is_check_bag = false) {
+    causes_->push_back({name, text, remedy, share, remedy_is_check_bag});
   }
 
   void addNotFinite() {
@@ -166,7 +167,8 @@ class RadarCauses {
           outOf(contradicted, judged, "scans") + of_ + " show a velocity that contradicts the IMU.",
           "Check the mounting (" + mountingKey() + "), " + key_ + "radar_doppler_sign and " + key_ +
               "radar_axes." + mountingAdvice(radar_) +
-              " estimate_extrinsics: pose corrects up to 10 degrees by itself.");
+              " estimate_extrinsics: pose corrects up to 10 degrees by itself.",
+          true);
   }
 
   void addMounting() {
@@ -188,7 +190,8 @@ class RadarCauses {
               ", with extrinsics_rotation_sigma " +
               number(config_.odometry.smoother.extrinsics_rotation_sigma / kDegree) + " degrees.",
           "Check " + key_ + "radar_doppler_sign, " + key_ + "radar_axes and the mounting (" + mountingKey() +
-              ")." + mountingAdvice(radar_));
+              ")." + mountingAdvice(radar_),
+          true);
   }
 
   /// The key, or the tf, that gives the rotation of the radar.

@@ -24,10 +24,11 @@ constexpr double kManyDiverged = 0.1;
 
 /// A likely cause of trouble.
 struct Cause {
-  std::string name;    ///< in snake case: "points_too_weak"
-  std::string text;    ///< a sentence with the numbers that point there
-  std::string remedy;  ///< a sentence with the key to change
-  double share = 0.0;  ///< 0 to 1: how much of the evidence it explains
+  std::string name;                  ///< in snake case: "points_too_weak"
+  std::string text;                  ///< a sentence with the numbers that point there
+  std::string remedy;                ///< a sentence with the key to change
+  double share = 0.0;                ///< 0 to 1: how much of the evidence it explains
+  bool remedy_is_check_bag = false;  ///< the remedy sends the user to check_bag, for the mounting
 };
 
 /// A number that is red or green.
