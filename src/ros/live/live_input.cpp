@@ -56,7 +56,7 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
   } catch (const std::exception& error) {
     monitor_.imuDropped(kImuNotUsable);
     monitor_.imuUnusable(error.what());
-    if (isTimeToTell(kImuNotUsable)) ROS_ERROR_STREAM(name_ << ": " << error.what());
+    log_.error(kImuNotUsable, error.what());
   }
 }
 
@@ -103,8 +103,7 @@ void LiveOdometry::onScan(std::size_t radar, const Event<sensor_msgs::PointCloud
     wakeSolver();
   } catch (const std::exception& error) {
     monitor_.dropped(radar, what);
-    if (isTimeToTell(what + " " + from.config.radar_topic))
-      ROS_ERROR_STREAM(beginning(name_, from.config) << error.what());
+    log_.error(what + " " + from.config.radar_topic, beginning(from.config) + error.what());
   }
 }
 
@@ -115,7 +114,7 @@ void LiveOdometry::onPressure(const Event<sensor_msgs::FluidPressure>& event) {
     if (const Session now = session_.get()) now->addPressure(pressure);
   } catch (const std::exception& error) {
     monitor_.pressureDropped(error.what());
-    if (isTimeToTell("pressure")) ROS_ERROR_STREAM(name_ << ": " << error.what());
+    log_.error("pressure", error.what());
   }
 }
 
@@ -131,8 +130,7 @@ void LiveOdometry::onTrigger(std::size_t radar, const Event<std_msgs::Header>& e
   } catch (const std::exception& error) {
     monitor_.zeroTrigger(radar);
     const Config& config = radars_[radar].config;
-    if (isTimeToTell("trigger_stamp_zero " + config.radar_topic))
-      ROS_ERROR_STREAM(beginning(name_, config) << error.what());
+    log_.error("trigger_stamp_zero " + config.radar_topic, beginning(config) + error.what());
   }
 }
 
@@ -140,11 +138,9 @@ void LiveOdometry::account(const std::vector<LiveSession::GivenUp>& given_up) {
   for (const auto& [radar, reason] : given_up) {
     monitor_.dropped(radar, reason);
     const Config& config = radars_[radar].config;
-    if (isTimeToTell("no stamp for " + config.radar_topic + ": " + reason)) {
-      ROS_WARN_STREAM(beginning(name_, config) << "a scan got no stamp: " << reason
-                                               << " (stamp_source: " << toString(config.stamp_source)
-                                               << ", trigger_topic: " << config.trigger_topic << ")");
-    }
+    log_.warn("no stamp for " + config.radar_topic + ": " + reason,
+              beginning(config) + "a scan got no stamp: " + reason + " (stamp_source: " +
+                  toString(config.stamp_source) + ", trigger_topic: " + config.trigger_topic + ")");
   }
 }
 

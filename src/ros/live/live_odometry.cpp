@@ -8,9 +8,7 @@
 
 #include <algorithm>
 #include <boost/function.hpp>
-#include <cctype>
 #include <filesystem>
-#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -82,6 +80,7 @@ LiveOdometry::Radar::Radar(const Config& its_config) : config(its_config), forma
 LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
                            const std::string& name)
     : name_(name),
+      log_(name),
       configured_(configFromRos(private_node)),
       // Checks again, since remapping and namespace may give two radars one topic.
       config_(withParameters(withResolvedTopics(configured_, node), {})),
@@ -132,15 +131,6 @@ LiveOdometry::~LiveOdometry() {
   if (solver_.joinable()) solver_.join();
 }
 
-template <typename Callback>
-void LiveOdometry::guarded(const std::string& what, Callback&& callback) {
-  try {
-    callback();
-  } catch (const std::exception& error) {
-    if (isTimeToTell(what)) ROS_ERROR_STREAM(name_ << ": " << what << ": " << error.what());
-  }
-}
-
 void LiveOdometry::subscribe(const Config& configured) {
   const ros::TransportHints fast = ros::TransportHints().tcpNoDelay();
   ros::NodeHandle imu_node = onQueue(node_, &imu_queue_);
@@ -179,7 +169,7 @@ void LiveOdometry::subscribe(const Config& configured) {
     }
   });
   const boost::function<void(const ros::WallTimerEvent&)> tell = [this](const ros::WallTimerEvent&) {
-    guarded("diagnostics", [this] { onDiagnosticsTimer(); });
+    log_.guarded("diagnostics", [this] { onDiagnosticsTimer(); });
   };
   diagnostics_timer_ = service_node.createWallTimer(ros::WallDuration(kDiagnosticPeriod), tell);
 }
@@ -196,12 +186,12 @@ void LiveOdometry::addDiagnostics() {
     if (ros::Time::isSimTime() && ros::Time::now().isZero())
       s.mergeSummary(diagnostic_msgs::DiagnosticStatus::WARN,
                      "use_sim_time is true, and nothing publishes /clock");
-    if (s.message != kSolverFallsBehind) tellStatus(s);  // else tellHealth tells it
+    if (s.message != kSolverFallsBehind) log_.status(s);  // else log_.health tells it
   });
   diagnostics_->add("odometry", [this](Status& s) {
     const Session now = session_.get();
     monitor_.describeOdometry(s, now.get());
-    tellStatus(s);  // a divergence, too: tellHealth tells it only while scans come
+    log_.status(s);  // a divergence, too: log_.health tells it only while scans come
   });
   if (!config_.barometer_topic.empty())
     diagnostics_->add("barometer", [this](Status& s) { monitor_.describeBarometer(s); });
@@ -236,7 +226,7 @@ void LiveOdometry::onDiagnosticsTimer() {
   for (; published > 0; --published) tick_odom_();
   // Not update(), which looks at ROS time: also a clock that stands still is worth a diagnosis.
   diagnostics_->force_update();
-  tellFaults();
+  log_.faults(session_.get());
 }
 
 void LiveOdometry::onReconfigure(LiveParameters& values) {
@@ -260,21 +250,6 @@ void LiveOdometry::onReconfigure(LiveParameters& values) {
   if (refused_because.empty() && ros::master::check()) showEffectiveParameters(private_node_, live_config_);
   monitor_.reconfigured(refused_because);
   values = LiveParameters(live_config_);
-}
-
-void LiveOdometry::tellFaults() {
-  const Session now = session_.get();
-  if (!now) return;
-  if (faults_of_.lock() != now) {
-    faults_of_ = now;
-    faults_reported_.clear();
-  }
-  for (const auto& [fault, count] : now->odometry().faults()) {
-    std::uint64_t& reported = faults_reported_[fault];
-    if (count == reported || !isTimeToTell("input fault " + fault)) continue;
-    ROS_WARN_STREAM(name_ << ": input fault " << fault << ", " << count << " so far");
-    reported = count;
-  }
 }
 
 void LiveOdometry::wakeSolver() {
@@ -325,30 +300,6 @@ void LiveOdometry::reset(const std::string& reason, bool at_once) {
   monitor_.reset(reason);
 }
 
-void LiveOdometry::tellStatus(const LiveMonitor::Status& status) {
-  constexpr double kStatusPeriod = 60.0;  // [s] A status may stay for as long as the node runs.
-  std::string problem = status.name + ": ";
-  // The numbers in it change all the time.
-  std::copy_if(status.message.begin(), status.message.end(), std::back_inserter(problem),
-               [](unsigned char c) { return std::isdigit(c) == 0 && c != '.'; });
-  using Level = diagnostic_msgs::DiagnosticStatus;
-  if (status.level == Level::OK || !isTimeToTell(problem, kStatusPeriod)) return;
-  if (status.level == Level::WARN) {
-    ROS_WARN_STREAM(name_ << ": " << status.message);
-  } else {
-    ROS_ERROR_STREAM(name_ << ": " << status.message);
-  }
-}
-
-bool LiveOdometry::isTimeToTell(const std::string& what, double period) {
-  const auto now = std::chrono::steady_clock::now();
-  const std::lock_guard<std::mutex> lock(mutex_);
-  const auto [reported, is_first] = reported_at_.try_emplace(what, now);
-  if (!is_first && now - reported->second < std::chrono::duration<double>(period)) return false;
-  reported->second = now;
-  return true;
-}
-
 bool LiveOdometry::onReset(std_srvs::Empty::Request& /*request*/, std_srvs::Empty::Response& /*response*/) {
   try {
     reset("asked for by ~reset");
@@ -382,35 +333,6 @@ bool LiveOdometry::onSaveTrajectory(std_srvs::Trigger::Request& /*request*/,
   return true;
 }
 
-void LiveOdometry::tellHealth(const ScanResult& result) {
-  if (result.rejected_because == "queue_full" && isTimeToTell("queue_full"))
-    ROS_WARN_STREAM(name_ << ": " << kSolverFallsBehind);
-  if (result.reinitialized) {
-    ROS_WARN_STREAM(name_ << ": re-initialised in motion; position and heading go on");
-  }
-  if (result.ground_vehicle && result.ground_vehicle->is_contradicted)
-    ROS_WARN_STREAM(name_ << ": " << kGroundVehicleContradicted);
-  if (result.health == Health::kDiverged && isTimeToTell("diverged")) {
-    ROS_ERROR_STREAM(
-        name_ << ": diverged, "
-              << (result.is_contradicted ? "radar and IMU contradict each other" : "the velocity is lost")
-              << ": do not trust the estimate (see diagnostics, on_divergence)");
-  }
-}
-
-void LiveOdometry::tellDopplerStep(const Radar& radar, const DopplerStep& step, DopplerStep* reported) const {
-  if (step.source == DopplerStepSource::kUnknown) return;
-  if (step.source == reported->source && step.value == reported->value) return;
-  *reported = step;
-  const char* from = step.source == DopplerStepSource::kGiven ? "given" : "read off the data";
-  const std::string whose = withName(name_ + ": Doppler of radar", radar.config);
-  if (step.value > 0.0) {
-    ROS_INFO_STREAM(whose << " comes in steps of " << step.value << " m/s, " << from);
-  } else {
-    ROS_INFO_STREAM(whose << " has no steps, " << from);
-  }
-}
-
 void LiveOdometry::solve() {
   Session published;                  // whose results ~path holds
   std::vector<DopplerStep> reported;  // of the radars of that session
@@ -439,8 +361,8 @@ void LiveOdometry::solve() {
         frames.world = now->world();
         const bool current = session_.speak(Speaker::kOptimisation, now, [&] {
           // Not a fault of the estimator: `stamp - t_O` of an odd stamp may be no time that ROS can hold.
-          guarded("a result was not published", [&] { publisher_.result(result, frames); });
-          tellHealth(result.result);
+          log_.guarded("a result was not published", [&] { publisher_.result(result, frames); });
+          log_.health(result.result);
           monitor_.result(result);
         });
         if (!current) break;  // reset meanwhile: not of this world any more
@@ -452,7 +374,7 @@ void LiveOdometry::solve() {
                               << (waiting_for.empty() ? "is published" : "waits for " + waiting_for));
       }
       for (std::size_t k = 0; k < radars_.size(); ++k)
-        tellDopplerStep(radars_[k], now->odometry().radarDopplerStep(k), &reported[k]);
+        log_.dopplerStep(radars_[k].config, now->odometry().radarDopplerStep(k), &reported[k]);
       if (more) wakeSolver();  // one scan at a time, so that stopping and resets are heeded between them
     } catch (const std::exception& error) {
       ROS_ERROR_STREAM(name_ << ": the estimator failed: " << error.what());

@@ -12,9 +12,9 @@ inline std::string withName(const std::string& what, const Config& radar, const 
   return radar.radar_name.empty() ? what : what + between + radar.radar_name;
 }
 
-/// The beginning of a message to people: it names the node and the radar, e.g. "/rio_t: radar left: ".
-inline std::string beginning(const std::string& node, const Config& radar) {
-  return withName(node, radar, ": radar ") + ": ";
+/// The beginning of a message to people: "radar left: ", or nothing for the only radar.
+inline std::string beginning(const Config& radar) {
+  return radar.radar_name.empty() ? "" : "radar " + radar.radar_name + ": ";
 }
 
 }  // namespace rio_t

@@ -28,6 +28,7 @@
 
 #include "rio_t/ros/live/body_frame.h"
 #include "rio_t/ros/live/current_session.h"
+#include "rio_t/ros/live/live_log.h"
 #include "rio_t/ros/live/live_parameters.h"
 #include "rio_t/ros/live/monitor.h"
 #include "rio_t/ros/live/publisher.h"
@@ -56,7 +57,6 @@ class LiveOdometry {
   template <typename Message>
   using Event = ros::MessageEvent<const Message>;
 
-  static constexpr double kWarnPeriod = 5.0;  ///< [s] between warnings of one kind
   /// Samples: seconds of input, so that nothing is lost while a callback is late.
   static constexpr std::uint32_t kImuQueue = 5000;
 
@@ -78,10 +78,6 @@ class LiveOdometry {
   /// Subscribes to the topics as they were configured.
   void subscribe(const Config& configured);
   void addDiagnostics();
-  /// Calls `callback`. Logs an exception, at most every 5 s: no message may end the node or reset the
-  /// estimate. Any thread.
-  template <typename Callback>
-  void guarded(const std::string& what, Callback&& callback);
   void onDiagnosticsTimer();
   /// Changes what may change while the node runs; what is refused stays as it was. Input thread.
   void onReconfigure(LiveParameters& values);
@@ -104,19 +100,11 @@ class LiveOdometry {
   /// Gives a sample to a session. Returns the state that is to be published, if there is one.
   std::optional<NavigationState> feed(LiveSession& session, const Received& received);
   void account(const std::vector<LiveSession::GivenUp>& given_up);
-  /// Whether this was not reported for `period` [s]. Each radar has its own turn, unlike with ROS's
-  /// throttles.
-  bool isTimeToTell(const std::string& what, double period = kWarnPeriod);
   void wakeSolver();
-  void tellFaults();  ///< what is new among the faults of the input; input thread
-  /// Logs what a status of the diagnostics says if it is not OK. Input thread.
-  void tellStatus(const LiveMonitor::Status& status);
-  void tellHealth(const ScanResult& result);
-  void tellDopplerStep(const Radar& radar, const DopplerStep& step,
-                       DopplerStep* reported) const;  ///< where it is not as reported
-  void solve();                                       ///< body of the optimisation thread
+  void solve();  ///< body of the optimisation thread
 
   const std::string name_;
+  LiveLog log_;              // thread-safe, but for the faults: input thread
   const Config configured_;  // topics as the user wrote them
   const Config config_;      // topics as they are resolved
   ros::NodeHandle node_, private_node_;
@@ -137,10 +125,6 @@ class LiveOdometry {
   OdometryOptions options_;  // with the extrinsics that hold, tuned
   bool has_work_ = false;
   bool stopping_ = false;
-  std::map<std::string, std::chrono::steady_clock::time_point> reported_at_;
-
-  std::map<std::string, std::uint64_t> faults_reported_;  // input thread only, as the next
-  std::weak_ptr<LiveSession> faults_of_;                  // whose faults these are
 
   Config live_config_;                        // config_ with what was reconfigured; input thread only
   boost::recursive_mutex reconfigure_mutex_;  // the server's own
