@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "../text.h"
+#include "imu_causes.h"
 #include "radar_causes.h"
 #include "rio_t/core/angle.h"
 #include "rio_t/core/so3.h"
@@ -13,7 +14,6 @@ namespace {
 
 // As kManyScans.
 constexpr double kManyWindows = 0.3;
-constexpr double kManySamples = 0.05;
 constexpr double kFewScansUsed = 0.5;
 constexpr double kLateStart = 0.5;
 constexpr double kMostlySilent = 0.5;
@@ -22,36 +22,6 @@ constexpr double kVagueHeading = 0.1;
 /// More steps of the offset, for each radar, are a cause: one restart of a driver counts twice at most.
 constexpr std::uint64_t kMostSteps = 2;
 constexpr std::size_t kMostCauses = 3;
-
-struct ImuFault {
-  const char* name;
-  std::uint64_t samples;  ///< that one of them takes
-  const char* text;
-  const char* remedy;
-};
-constexpr ImuFault kImuFaults[] = {
-    {"imu_not_usable", 1, "IMU messages cannot be used.", "Check the stamps and the values of imu_topic."},
-    {"imu_saturated", 1, "IMU samples are at the end of the range.",
-     "Take an IMU with a larger range. If the range found is too small, set imu_accel_range and "
-     "imu_gyro_range."},
-    {"imu_gap", 10, "gaps between IMU samples are longer than max_imu_gap.",
-     "Raise max_imu_gap for a slow IMU, or look for what loses its messages."},
-    {"imu_out_of_order", 1, "IMU samples are out of order, or came twice.",
-     "Look for a second publisher on imu_topic."},
-    {"imu_not_finite", 1, "IMU samples are not finite.",
-     "Correct the driver of the IMU: it writes NaN or infinity."},
-    {"imu_not_plausible", 1, "IMU samples have an acceleration that no IMU measures.",
-     "Check imu_acceleration_unit and imu_accel_range, the cable and the driver of the IMU."},
-    {"imu_stamp_jump", 1, "IMU samples are stamped far ahead of the one before.",
-     "Look at the clock of the driver. For an IMU with pauses, raise imu_jump_patience."},
-    {"imu_stuck", 1, "IMU samples have a gyro axis that jumps away and stays there.",
-     "Look at the cable and the driver of the IMU: an axis of its gyro fails."}};
-
-/// Share of the IMU samples that a fault takes.
-double takenBy(const ImuFault& fault, const RunEvidence& evidence) {
-  return std::min(1.0,
-                  shareOf(countOf(evidence.input_faults, fault.name) * fault.samples, evidence.imu_count));
-}
 
 /// Windows that were solved, and those of them that ended with the offset at its bound or did not converge.
 struct Windows {
@@ -229,30 +199,6 @@ void addSolver(const RunEvidence& evidence, const Config& config, std::vector<Ca
   }
 }
 
-void addImu(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
-  for (const ImuFault& fault : kImuFaults) {
-    const double share = takenBy(fault, evidence);
-    if (share <= kManySamples) continue;
-    causes->push_back({fault.name,
-                       std::to_string(countOf(evidence.input_faults, fault.name)) + " " + fault.text,
-                       fault.remedy, share});
-  }
-  const ImuNoise& expected = config.odometry.imu_noise;
-  const MeasuredImuNoise& noise = evidence.imu_noise;
-  const auto noisy = [&](const std::string& sensor, const std::string& key, double measured,
-                         const MeasuredImuNoise& alone, double configured) {
-    if (!alone.isFarAbove(expected)) return;
-    causes->push_back({"imu_noisy",
-                       "The " + sensor + " vibrates or is noisier than configured: " + number(measured) +
-                           " against " + key + " " + number(configured) + ".",
-                       "Mount the IMU softer, or raise this key.", 0.1});
-  };
-  noisy("accelerometer", "imu_accel_noise_density", noise.accel_density, {noise.accel_density, 0.0},
-        expected.accel_density);
-  noisy("gyro", "imu_gyro_noise_density", noise.gyro_density, {0.0, noise.gyro_density},
-        expected.gyro_density);
-}
-
 /// After a start at rest the heading drifts, too, but only as the noise of the gyro says.
 void addHeading(const RunEvidence& evidence, std::vector<Cause>* causes) {
   if (evidence.initialized_from != InitializedFrom::kMotion || evidence.heading_sigma <= kVagueHeading)
@@ -370,8 +316,6 @@ std::vector<Check> checksOf(const RunEvidence& evidence, const Config& config,
   for (const RadarSummary& radar : evidence.radars)
     if (pointsReceived(radar) > 0)
       kept = std::min(kept, shareOf(pointsOf(radar, PointVerdict::kKept), pointsReceived(radar)));
-  double imu_faults = 0.0;
-  for (const ImuFault& fault : kImuFaults) imu_faults += takenBy(fault, evidence);
   return {
       {"started", evidence.initialized ? 1.0 : 0.0, 1.0, true},
       {"scans_used_share", usedShare(evidence), kFewScansUsed, true},
@@ -382,7 +326,7 @@ std::vector<Check> checksOf(const RunEvidence& evidence, const Config& config,
       {"windows_at_offset_bound_share", shareOf(windows.at_bound, windows.all), kManyWindows, false},
       {"windows_not_converged_share", shareOf(windows.not_converged, windows.all), kManyWindows, false},
       {"mounting_turned_sigmas", turned, kFarMounting, false},
-      {"imu_faults_share", std::min(1.0, imu_faults), kManySamples, false},
+      {"imu_faults_share", shareOfImuFaults(evidence), kManySamples, false},
       {"healthy_at_end", evidence.health == Health::kOk ? 1.0 : 0.0, 1.0, true}};
 }
 
@@ -414,7 +358,7 @@ Diagnosis diagnose(const RunEvidence& evidence, const Config& config) {
   addOffsetSteps(evidence, config, &result.causes);
   addVehicle(evidence, config, &result.causes);
   addSolver(evidence, config, &result.causes);
-  addImu(evidence, config, &result.causes);
+  addCausesOfImu(evidence, config, &result.causes);
   addHeading(evidence, &result.causes);
   addRestarts(evidence, config, &result.causes);
   addSilence(evidence, &result.causes);

@@ -1,0 +1,73 @@
+#include "imu_causes.h"
+
+#include <algorithm>
+#include <string>
+
+#include "radar_causes.h"
+
+namespace rio_t {
+namespace {
+
+struct ImuFault {
+  const char* name;
+  std::uint64_t samples;  ///< that one of them takes
+  const char* text;
+  const char* remedy;
+};
+constexpr ImuFault kImuFaults[] = {
+    {"imu_not_usable", 1, "IMU messages cannot be used.", "Check the stamps and the values of imu_topic."},
+    {"imu_saturated", 1, "IMU samples are at the end of the range.",
+     "Take an IMU with a larger range. If the range found is too small, set imu_accel_range and "
+     "imu_gyro_range."},
+    {"imu_gap", 10, "gaps between IMU samples are longer than max_imu_gap.",
+     "Raise max_imu_gap for a slow IMU, or look for what loses its messages."},
+    {"imu_out_of_order", 1, "IMU samples are out of order, or came twice.",
+     "Look for a second publisher on imu_topic."},
+    {"imu_not_finite", 1, "IMU samples are not finite.",
+     "Correct the driver of the IMU: it writes NaN or infinity."},
+    {"imu_not_plausible", 1, "IMU samples have an acceleration that no IMU measures.",
+     "Check imu_acceleration_unit and imu_accel_range, the cable and the driver of the IMU."},
+    {"imu_stamp_jump", 1, "IMU samples are stamped far ahead of the one before.",
+     "Look at the clock of the driver. For an IMU with pauses, raise imu_jump_patience."},
+    {"imu_stuck", 1, "IMU samples have a gyro axis that jumps away and stays there.",
+     "Look at the cable and the driver of the IMU: an axis of its gyro fails."}};
+
+/// Share of the IMU samples that a fault takes.
+double takenBy(const ImuFault& fault, const RunEvidence& evidence) {
+  return std::min(1.0,
+                  shareOf(countOf(evidence.input_faults, fault.name) * fault.samples, evidence.imu_count));
+}
+
+}  // namespace
+
+double shareOfImuFaults(const RunEvidence& evidence) {
+  double share = 0.0;
+  for (const ImuFault& fault : kImuFaults) share += takenBy(fault, evidence);
+  return std::min(1.0, share);
+}
+
+void addCausesOfImu(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
+  for (const ImuFault& fault : kImuFaults) {
+    const double share = takenBy(fault, evidence);
+    if (share <= kManySamples) continue;
+    causes->push_back({fault.name,
+                       std::to_string(countOf(evidence.input_faults, fault.name)) + " " + fault.text,
+                       fault.remedy, share});
+  }
+  const ImuNoise& expected = config.odometry.imu_noise;
+  const MeasuredImuNoise& noise = evidence.imu_noise;
+  const auto noisy = [&](const std::string& sensor, const std::string& key, double measured,
+                         const MeasuredImuNoise& alone, double configured) {
+    if (!alone.isFarAbove(expected)) return;
+    causes->push_back({"imu_noisy",
+                       "The " + sensor + " vibrates or is noisier than configured: " + number(measured) +
+                           " against " + key + " " + number(configured) + ".",
+                       "Mount the IMU softer, or raise this key.", 0.1});
+  };
+  noisy("accelerometer", "imu_accel_noise_density", noise.accel_density, {noise.accel_density, 0.0},
+        expected.accel_density);
+  noisy("gyro", "imu_gyro_noise_density", noise.gyro_density, {0.0, noise.gyro_density},
+        expected.gyro_density);
+}
+
+}  // namespace rio_t
