@@ -12,6 +12,7 @@
 
 #include "../text.h"
 #include "rio_t/core/format.h"
+#include "rio_t/core/sigmas.h"
 #include "rio_t/factors/state_block.h"
 
 namespace rio_t {
@@ -19,12 +20,6 @@ namespace {
 
 constexpr std::size_t kBufferSize = 1 << 18;
 constexpr double kNavigationPeriod = 0.0999;  // [s] between lines of navigation.csv
-
-/// Standard deviations.
-template <typename Variances>
-Eigen::Vector3d sigmasOf(const Variances& variances) {
-  return variances.cwiseMax(0.0).cwiseSqrt();
-}
 
 const char* const kNavigationHeader =
     "stamp,vx,vy,vz,sigma_px,sigma_py,sigma_pz,sigma_rx,sigma_ry,sigma_rz,sigma_vx,sigma_vy,sigma_vz\n";
@@ -191,12 +186,12 @@ void RunOutput::addState(const NavigationState& state) {
   // Also where time runs back (a bag that loops): a line, then ten a second again.
   if (last_navigation_ && std::abs(state.time - *last_navigation_) < kNavigationPeriod) return;
   last_navigation_ = state.time;
-  const Covariance6 pose = bodyOdometry(state, 0.0).pose_covariance;
+  const Eigen::Matrix<double, 6, 1> pose = sigmasOf(bodyOdometry(state, 0.0).pose_covariance);
   row("navigation.csv", state.time)
       .add(state.v_W, 6)
-      .add(sigmasOf(pose.diagonal().head<3>()), 6)
-      .add(sigmasOf(pose.diagonal().tail<3>()), 6)
-      .add(sigmasOf(state.covariance.diagonal().segment<3>(StateBlock::kV)), 6)
+      .add(pose.head<3>(), 6)
+      .add(pose.tail<3>(), 6)
+      .add(sigmasOf(state.covariance).segment<3>(StateBlock::kV), 6)
       .endLine();
 }
 
@@ -210,7 +205,7 @@ void RunOutput::addResult(const ScanResult& result) {
   const EgoVelocity& velocity = result.ego_velocity;
   row("ego_velocity" + end, stamp)
       .add(velocity.v_R, 6)
-      .add(sigmasOf(velocity.covariance.diagonal()), 6)
+      .add(sigmasOf(velocity.covariance), 6)
       .add(std::to_string(velocity.inliers.size()))
       .add(std::to_string(velocity.points.size()))
       .add(statusOf(result))
@@ -221,8 +216,8 @@ void RunOutput::addResult(const ScanResult& result) {
     row("extrinsics" + end, stamp)
         .add(result.T_IR.l_I, 9)
         .add(result.T_IR.q_IR, 9)
-        .add(sigmasOf(result.T_IR_covariance.diagonal().head<3>()), 9)
-        .add(sigmasOf(result.T_IR_covariance.diagonal().tail<3>()), 9)
+        .add(sigmasOf(result.T_IR_covariance).head<3>(), 9)
+        .add(sigmasOf(result.T_IR_covariance).tail<3>(), 9)
         .endLine();
   if (result.landmarks && files_.map)
     for (const LandmarkPoint& point : result.landmarks->map) landmarks_[point.id] = point;

@@ -3,13 +3,13 @@
 #include <diagnostic_msgs/DiagnosticStatus.h>
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <sstream>
 #include <string>
 #include <utility>
 
 #include "../text.h"
+#include "rio_t/core/sigmas.h"
 #include "rio_t/factors/state_block.h"
 
 namespace rio_t {
@@ -23,8 +23,7 @@ constexpr std::size_t kWindowsJudged = 20;
 constexpr std::size_t kInputsJudged = 4;
 
 double velocitySigma(const NavigationState& state) {
-  const Eigen::Vector3d variances = state.covariance.diagonal().segment<3>(StateBlock::kV);
-  return std::sqrt(std::max(0.0, variances.maxCoeff()));
+  return sigmasOf(state.covariance).segment<3>(StateBlock::kV).maxCoeff();
 }
 
 /// Whether a scan could not be used because it came before tf had named the radar.

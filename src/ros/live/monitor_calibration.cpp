@@ -7,6 +7,7 @@
 
 #include "../text.h"
 #include "rio_t/core/angle.h"
+#include "rio_t/core/sigmas.h"
 #include "rio_t/ros/diagnosis/diagnosis.h"
 #include "rio_t/ros/live/monitor.h"
 
@@ -75,7 +76,7 @@ void LiveMonitor::describeExtrinsics(Status& status, std::size_t radar) const {
   }
   const ScanResult& result = of.last_update->result;
   const SmootherOptions& options = of.config.odometry.smoother;
-  const Eigen::Matrix<double, 6, 1> sigma = result.T_IR_covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::Matrix<double, 6, 1> sigma = sigmasOf(result.T_IR_covariance);
   const Eigen::Vector3d turn = turnBetween(result.configured_T_IR, result.T_IR);
   const Eigen::Vector3d turn_sigma = sigma.tail<3>();
   // As the parameters want them.

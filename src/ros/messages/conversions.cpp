@@ -3,18 +3,15 @@
 #include <sensor_msgs/point_cloud2_iterator.h>
 #include <tf2_eigen/tf2_eigen.h>
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 #include <stdexcept>
 
+#include "rio_t/core/sigmas.h"
 #include "rio_t/factors/state_block.h"
 #include "rio_t/radar/mounting.h"
 
 namespace rio_t {
 namespace {
-
-using S = StateBlock;
 
 template <typename Array>
 void assign(const Covariance6& from, Array* to) {
@@ -99,12 +96,13 @@ ImuBias toImuBias(const NavigationState& state, const std::string& imu_frame) {
   ImuBias message;
   message.header.stamp = toRosTime(state.time);
   message.header.frame_id = imu_frame;
+  const auto sigmas = sigmasOf(state.covariance);
   for (int axis = 0; axis < 3; ++axis) {
     const auto k = static_cast<std::size_t>(axis);
     message.gyroscope[k] = state.b_g[axis];
     message.accelerometer[k] = state.b_a[axis];
-    message.gyroscope_sigma[k] = std::sqrt(std::max(0.0, state.covariance(S::kBg + axis, S::kBg + axis)));
-    message.accelerometer_sigma[k] = std::sqrt(std::max(0.0, state.covariance(S::kBa + axis, S::kBa + axis)));
+    message.gyroscope_sigma[k] = sigmas[StateBlock::kBg + axis];
+    message.accelerometer_sigma[k] = sigmas[StateBlock::kBa + axis];
   }
   return message;
 }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "rio_t/core/sigmas.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
 #include "rio_t/radar/point_filter.h"
 #include "rio_t/ros/parameters/config.h"
@@ -27,11 +28,9 @@ struct ExtrinsicsSummary {
   Extrinsics configured, T_IR;
   Covariance6 covariance;  ///< as ScanResult::T_IR_covariance
 
-  Eigen::Vector3d translationSigma() const { return sigmas().head<3>(); }  ///< [m]; zero where not estimated
-  Eigen::Vector3d rotationSigma() const { return sigmas().tail<3>(); }     ///< [rad] about the axes of I
-
- private:
-  Eigen::Matrix<double, 6, 1> sigmas() const { return covariance.diagonal().cwiseMax(0.0).cwiseSqrt(); }
+  // Zero where not estimated.
+  Eigen::Vector3d translationSigma() const { return sigmasOf(covariance).head<3>(); }  ///< [m]
+  Eigen::Vector3d rotationSigma() const { return sigmasOf(covariance).tail<3>(); }  ///< [rad] about axes of I
 };
 
 /// The calibration of one radar at the end of a run.
