@@ -96,6 +96,47 @@ TEST_F(Gate, AShortGlitchOfTheStampsIsAGap) {
   EXPECT_GT(sample.unseen_gyro_variance, 0.0);
 }
 
+/// Stamps of a clock that steps back by `step` [s]: the samples until it has caught up are dropped.
+class ClockStepsBack : public Gate, public ::testing::WithParamInterface<double> {};
+
+TEST_P(ClockStepsBack, WhatTheMotionDidMeanwhileIsUnseen) {
+  const double step = GetParam(), from = t;
+  const ImuMeasurement before = motion.imuSample(from - 0.01);
+  std::string told;
+  for (; told.empty() || told == "imu_out_of_order"; t += 0.01) {
+    ImuMeasurement imu = motion.imuSample(t);
+    imu.time = imu.time + -step;
+    told = feed(imu);
+    ASSERT_LT(t, from + step + 0.02);
+  }
+  EXPECT_EQ(told, "imu_clock_back");
+  EXPECT_EQ(decision, Decision::kTake);
+  EXPECT_NEAR(sample.lost_time, step, 0.011);
+  const double dt = sample.time - before.time;
+  const double turned = motion.q_WI(from - 0.01).angularDistance(motion.q_WI(t - 0.01));
+  const double sigma = std::sqrt(sample.unseen_gyro_variance * dt);
+  EXPECT_LT(turned, 1.5 * sigma);
+  EXPECT_GT(turned, 0.3 * sigma);
+  EXPECT_EQ(feed(motion.imuSample(t - step)), "");
+  EXPECT_EQ(sample.lost_time, 0.0);
+}
+
+INSTANTIATE_TEST_SUITE_P(By, ClockStepsBack, ::testing::Values(0.02, 0.05, 0.2, 0.45), [](const auto& step) {
+  return std::to_string(std::lround(1e3 * step.param)) + "ms";
+});
+
+TEST_F(Gate, MessagesThatWereOvertakenAreNoClockThatStepsBack) {
+  for (const int overtaken : {1, 2, 8}) {
+    const double first = t;
+    for (int i = 0; i < overtaken; ++i) feed(first + 0.01 * (overtaken + i));
+    for (int i = 0; i < overtaken; ++i) EXPECT_EQ(feed(first + 0.01 * i), "imu_out_of_order");
+    t = first + 0.02 * overtaken;
+    EXPECT_EQ(feed(t), "") << overtaken;
+    EXPECT_EQ(sample.lost_time, 0.0);
+    t += 0.01;
+  }
+}
+
 // A sample ahead that ended a gap would put all samples that follow behind it, until the clock seems to jump.
 TEST_F(Gate, OneStampAheadIsNoGap) {
   for (const double ahead : {0.6, 1.0, 2.5}) {

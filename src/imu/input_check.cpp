@@ -32,6 +32,7 @@ ImuSampleCheck::Verdict ImuSampleCheck::check(const ImuMeasurement& imu) {
     if (stamp == ClockJumpDetector::Verdict::kBehind) verdict.fault = "imu_out_of_order";
     if (stamp == ClockJumpDetector::Verdict::kAhead) verdict.fault = "imu_stamp_jump";
     verdict.is_restart = stamp == ClockJumpDetector::Verdict::kRestart;
+    verdict.stepped_back = stamps_.steppedBack();
   }
   return verdict;
 }
@@ -60,6 +61,11 @@ ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
     raise(imu.unseen_gyro_variance, share * options_.unseen_gyro_density);
     raise(imu.unseen_accel_variance, share * options_.unseen_accel_density);
   }
+  imu.lost_time = sample.stepped_back;
+  if (imu.lost_time > 0.0) {
+    verdict.faults.push_back("imu_clock_back");
+    addLostMotion(gap, imu);
+  }
   // The interval before and the one after a saturated sample both hide something.
   const SaturationDetector::Saturated saturated = saturation_.check(imu);
   if (saturated.accel || saturated.gyro) verdict.faults.push_back("imu_saturated");
@@ -73,7 +79,7 @@ ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
     raise(imu.unseen_gyro_variance, options_.unseen_gyro_density);
   }
   // Motion over a long gap would look like noise.
-  if (saturated.accel || saturated.gyro || is_stuck || gap > kMotionCorrelationTime) {
+  if (saturated.accel || saturated.gyro || is_stuck || gap > kMotionCorrelationTime || imu.lost_time > 0.0) {
     accel_noise_.interrupt();
     gyro_noise_.interrupt();
   } else {
@@ -93,6 +99,19 @@ ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
 
 MeasuredImuNoise ImuInputCheck::noise() const {
   return {std::sqrt(accel_noise_.squaredDensity()), std::sqrt(gyro_noise_.squaredDensity())};
+}
+
+// As over a gap, the motion is about that at its end, and deviates from it by the unseen motion. But nothing
+// covers a gap of the stamps, so the first part counts, too.
+void ImuInputCheck::addLostMotion(double dt, ImuMeasurement& imu) const {
+  const double lost = imu.lost_time;
+  const double share = std::min(1.0, lost / kMotionCorrelationTime);
+  const auto density = [&](double rate, double unseen) {
+    return std::sqrt((rate * rate * lost + share * share * unseen * unseen) * lost / dt);
+  };
+  raise(imu.unseen_gyro_variance, density(imu.angular_velocity.norm(), options_.unseen_gyro_density));
+  raise(imu.unseen_accel_variance,
+        density((imu.acceleration - bridge_.gravity()).norm(), options_.unseen_accel_density));
 }
 
 bool ImuInputCheck::replaceStuck(ImuMeasurement& imu) {

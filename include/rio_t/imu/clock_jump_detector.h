@@ -24,13 +24,20 @@ class ClockJumpDetector {
   Verdict check(Time stamp);
   /// The newest good stamp.
   const std::optional<Time>& newest() const { return newest_; }
+  /// [s] by which the clock had stepped back before the newest good stamp; 0 if it had not. The stamps that
+  /// were behind belong to that time, and nothing that came with them was used.
+  double steppedBack() const { return stepped_back_; }
 
  private:
+  double stepBackBefore(Time stamp) const;
+
   double max_gap_;   // read-only after construction, as the next
   double patience_;  // [s]
   std::optional<Time> newest_;
-  std::optional<Time> elsewhere_since_,
-      elsewhere_newest_;  ///< of the stamps dropped since the newest good one
+  // Of the stamps dropped since the newest good one, the last that go on from each other.
+  std::optional<Time> elsewhere_since_, elsewhere_newest_;
+  int elsewhere_ = 0;
+  double stepped_back_ = 0.0;  // [s]
 };
 
 }  // namespace rio_t

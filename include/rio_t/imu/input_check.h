@@ -44,6 +44,7 @@ class ImuSampleCheck {
     /// whatever its stamp; "imu_out_of_order" or "imu_stamp_jump" by its stamp.
     const char* fault = nullptr;
     bool is_restart = false;     ///< the clock jumped, or the gap was too long: forget all before
+    double stepped_back = 0.0;   ///< [s] by which the clock had stepped back before this sample
     std::optional<Time> before;  ///< stamp of the newest sample taken before; none of the first sample
   };
 
@@ -70,7 +71,7 @@ class ImuInputCheck {
   struct Verdict {
     Decision decision = Decision::kTake;
     /// Snake case: "imu_not_finite", "imu_not_plausible", "imu_out_of_order", "imu_stamp_jump",
-    /// "imu_clock_restart", "imu_gap", "imu_saturated", "imu_stuck".
+    /// "imu_clock_restart", "imu_clock_back", "imu_gap", "imu_saturated", "imu_stuck".
     std::vector<const char*> faults = {};
     /// Samples to take first: they stand for a gap before this sample.
     std::vector<ImuMeasurement> bridge = {};
@@ -83,6 +84,9 @@ class ImuInputCheck {
   MeasuredImuNoise noise() const;
 
  private:
+  /// Tells the sample of the motion that is lost because the clock stepped back before it, `dt` [s] after the
+  /// sample before.
+  void addLostMotion(double dt, ImuMeasurement& imu) const;
   /// Replaces the readings of stuck axes. Returns whether there were any.
   bool replaceStuck(ImuMeasurement& imu);
 

@@ -17,6 +17,9 @@ struct ImuMeasurement {
   // white noise per axis. They add to those of ImuNoise; see ImuInputCheck.
   double unseen_gyro_variance = 0.0;   ///< [rad^2/s]
   double unseen_accel_variance = 0.0;  ///< [m^2/s^3]
+  /// [s] of motion before this sample that no interval of stamps covers: the clock stepped back. The unseen
+  /// variances contain what it may have changed in attitude and velocity.
+  double lost_time = 0.0;
 
   // White noise measured by NoiseSpectrum, as squared densities per axis: that of the samples, and what is
   // left of it in their means.

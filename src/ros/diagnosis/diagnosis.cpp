@@ -86,8 +86,6 @@ double vehicleTurnSigmas(const RunEvidence& evidence, const Config& config) {
 /// A stamp, to the millisecond.
 std::string stampText(Time time) { return fixedText(time.seconds(), 3) + " s"; }
 
-std::string timesText(std::uint64_t count) { return count == 1 ? "once" : std::to_string(count) + " times"; }
-
 bool has(const std::string& text, const char* part) { return text.find(part) != std::string::npos; }
 
 void addStart(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {

@@ -54,6 +54,13 @@ void addCausesOfImu(const RunEvidence& evidence, const Config& config, std::vect
                        std::to_string(countOf(evidence.input_faults, fault.name)) + " " + fault.text,
                        fault.remedy, share});
   }
+  // Certain, and each step moves the rest of the trajectory.
+  if (const std::uint64_t steps = countOf(evidence.input_faults, "imu_clock_back"))
+    causes->push_back({"imu_clock_back",
+                       "The clock of the IMU stepped back " + timesText(steps) +
+                           ": its stamps went on from an earlier time, and the motion meanwhile is lost.",
+                       "Let the clock of the computer slew, not step, while it records (NTP, chrony, PTP).",
+                       1.0});
   const ImuNoise& expected = config.odometry.imu_noise;
   const MeasuredImuNoise& noise = evidence.imu_noise;
   const auto noisy = [&](const std::string& sensor, const std::string& key, double measured,

@@ -37,6 +37,9 @@ inline std::uint64_t pointsReceived(const RadarSummary& radar) {
 
 inline std::string number(double value) { return shortText(value, 3); }
 
+inline std::string timesText(std::uint64_t count) {
+  return count == 1 ? "once" : std::to_string(count) + " times";
+}
 inline std::string outOf(std::uint64_t part, std::uint64_t whole, const std::string& what) {
   return std::to_string(part) + " of " + std::to_string(whole) + " " + what;
 }
