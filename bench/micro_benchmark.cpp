@@ -119,9 +119,9 @@ void smoother(benchmark::State& state, Timed timed, double window) {
   SmootherOptions options;
   options.window = window;
   FixedLagSmoother smoother(options, ImuNoise(), kGravity, run().imu);
-  const Extrinsics& T_IR = run().options.T_IR;
-  const auto offset = std::make_shared<OffsetBlocks>(options);
-  RadarInWindow radar(options, T_IR, kGravity, run().imu, offset);
+  const CalibrationPrior configured{run().options.T_IR};
+  const auto offset = std::make_shared<OffsetBlocks>(options, configured);
+  RadarInWindow radar(options, configured, kGravity, run().imu, offset);
   const auto marginalize = [&] {
     return smoother.marginalize(
         {{&offset->newest(), Eigen::VectorXd::Constant(1, options.time_offset_noise)}});
@@ -136,7 +136,7 @@ void smoother(benchmark::State& state, Timed timed, double window) {
     if (next >= run().velocities.size()) {
       const StateBlock x = run().state(kStart - 0.5);
       radar.start(smoother, run().options.start + (kStart - 0.5),
-                  priorAtRest(options, ImuNoise(), x, 9.81, 3.0, T_IR));
+                  priorAtRest(options, ImuNoise(), x, 9.81, 3.0, configured));
       // Not timed: the window fills.
       for (next = 0; next < 30; ++next) {
         radar.add(smoother, run().velocities[next]);

@@ -36,11 +36,12 @@ class Batch : public ::testing::Test {
     return z;
   }
 
-  BatchProblem problem(const SmootherOptions& options) const {
+  BatchProblem problem(const SmootherOptions& options,
+                       const CalibrationPrior& radar = {skewMounting()}) const {
     BatchProblem problem;
     problem.start = motion.time(0.5);
-    problem.prior = priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0, skewMounting());
-    problem.radars = {{skewMounting(), 0.0, options.time_offset_sigma, extrinsicsSigmas(options)}};
+    problem.prior = priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0, radar);
+    problem.radars = {radar};
     problem.guess = {{problem.start, motion.state(0.5)}};
     return problem;
   }
@@ -84,10 +85,10 @@ TEST_F(Batch, EqualsTheFixedLagSmootherThatKeepsEverything) {
       options.window = 100.0;
       options.time_offset_noise =
           1e-7;  // the paper's t_O of each node, and one for all, are the same where it is constant
-      options.time_offset_initial = options.time_offset_sigma = 0.02;
+      const CalibrationPrior radar{skewMounting(), 0.02, 0.02};
       options.max_iterations = 50;
-      RadarSmoother online(options, skewMounting(), motion.g_W, imu);
-      BatchProblem whole = problem(options);
+      RadarSmoother online(options, radar, motion.g_W, imu);
+      BatchProblem whole = problem(options, radar);
       online.initialize(whole.start, whole.prior);
       for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
         BatchScan scan;
@@ -176,9 +177,9 @@ TEST_F(Batch, CovarianceIsThatOfTheDenseInverse) {
 TEST_F(Batch, PlacesItsNodesWhereTheOffsetPutsThem) {
   // From zero, with an offset that the nodes must follow by as much as the time between two scans.
   for (const double t_O : {-0.05, 0.1, 0.2}) {
-    SmootherOptions options;
-    options.time_offset_sigma = 1.0;  // so that the prior does not pull at these few scans
-    BatchProblem whole = problem(options);
+    const SmootherOptions options;
+    // So that the prior does not pull at these few scans.
+    BatchProblem whole = problem(options, {skewMounting(), 0.0, 1.0});
     addScans(0.8, kEnd, t_O, whole);
     const BatchSolution batch = make(options).solve(whole);
     EXPECT_TRUE(batch.converged());
@@ -197,7 +198,7 @@ TEST_F(Batch, PlacesItsNodesWhereTheOffsetPutsThem) {
 
 TEST_F(Batch, KnowsThePastBetterThanTheWindowDid) {
   SmootherOptions options;
-  RadarSmoother online(options, skewMounting(), motion.g_W, imu);
+  RadarSmoother online(options, {skewMounting()}, motion.g_W, imu);
   BatchProblem whole = problem(options);
   online.initialize(whole.start, whole.prior);
   Eigen::VectorXd then;
@@ -250,9 +251,8 @@ TEST_F(Batch, AStepOfTheOffsetIsFollowedWhereItIsTold) {
 }
 
 TEST_F(Batch, AStepHasTheSigmaOfItsRadar) {
-  SmootherOptions options;
-  options.time_offset_sigma = 1e-4;  // of the radars that have no section of their own
-  BatchProblem whole = problem(options);
+  const SmootherOptions options;
+  BatchProblem whole = problem(options, {skewMounting(), 0.0, 1e-4});
   whole.radars.front().time_offset_sigma = 0.075;
   addScansWithStep(0.0, 0.05, whole);
   EXPECT_NEAR(make(options).solve(whole).scans.back().t_O, 0.05, 3e-4);
@@ -282,8 +282,7 @@ TEST_F(Batch, AStepIsFollowedThoughAnotherRadarHasTheNode) {
 TEST_F(Batch, ASharedOffsetBeginsWhereItsPriorIs) {
   SmootherOptions options;
   options.time_offset_shared = true;
-  options.time_offset_sigma = 1e-4;
-  BatchProblem whole = problem(options);
+  BatchProblem whole = problem(options, {skewMounting(), 0.0, 1e-4});
   whole.radars.push_back(whole.radars.front());
   whole.radar = 1;
   whole.prior.t_O0 = 0.04;
@@ -312,8 +311,7 @@ TEST_F(Batch, ATruthBeyondTheBoundIsTold) {
 TEST_F(Batch, WithoutEstimationTheOffsetStays) {
   SmootherOptions options;
   options.estimate_time_offset = false;
-  options.time_offset_initial = 0.01;
-  BatchProblem whole = problem(options);
+  BatchProblem whole = problem(options, {skewMounting(), 0.01});
   for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
     BatchScan scan;
     scan.velocity = measurement(stamp, 0.03);

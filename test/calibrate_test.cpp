@@ -106,10 +106,10 @@ class Calibrate : public RestBag {
   void expectTruth(const Config& found, const Extrinsics& truth, double offset,
                    const std::vector<double>& sigmas) const {
     ASSERT_EQ(sigmas.size(), kCalibrationAxes);
-    EXPECT_NEAR(1e3 * found.odometry.smoother.time_offset_initial, 1e3 * offset, 3.0 * sigmas[0]);
-    EXPECT_NEAR(1e3 * found.odometry.smoother.time_offset_sigma, std::max(5.0, sigmas[0]), 0.006);
-    const Eigen::Vector3d turn = so3::log(found.odometry.T_IR.q_IR * truth.q_IR.conjugate()) / kDegree;
-    const Eigen::Vector3d lever = 1e3 * (found.odometry.T_IR.l_I - truth.l_I);
+    EXPECT_NEAR(1e3 * found.odometry.radar.time_offset_initial, 1e3 * offset, 3.0 * sigmas[0]);
+    EXPECT_NEAR(1e3 * found.odometry.radar.time_offset_sigma, std::max(5.0, sigmas[0]), 0.006);
+    const Eigen::Vector3d turn = so3::log(found.odometry.radar.T_IR.q_IR * truth.q_IR.conjugate()) / kDegree;
+    const Eigen::Vector3d lever = 1e3 * (found.odometry.radar.T_IR.l_I - truth.l_I);
     for (Eigen::Index i = 0; i < 3; ++i) {
       EXPECT_NEAR(turn[i], 0.0, 3.0 * sigmas[1 + static_cast<std::size_t>(i)]) << i;
       EXPECT_NEAR(lever[i], 0.0, 3.0 * sigmas[4 + static_cast<std::size_t>(i)]) << i;
@@ -180,11 +180,11 @@ TEST_F(Calibrate, AnOffsetThatDiffersIsSaidAndItsSigmaCoversIt) {
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   expectSays(outcome.out,
              {"The offset differs between the bags: 1", " ms, 4", "a driver's restart may change it"});
-  const SmootherOptions smoother = written().odometry.smoother;
-  EXPECT_NEAR(smoother.time_offset_initial, 0.0285, 0.001);
-  EXPECT_NEAR(smoother.time_offset_sigma, 0.033 / std::sqrt(2.0), 0.001);
+  const RadarOptions radar = written().odometry.radar;
+  EXPECT_NEAR(radar.time_offset_initial, 0.0285, 0.001);
+  EXPECT_NEAR(radar.time_offset_sigma, 0.033 / std::sqrt(2.0), 0.001);
   // The mounting is the same in both.
-  EXPECT_LT(written().odometry.T_IR.q_IR.angularDistance(truth_.q_IR), 0.6 * kDegree);
+  EXPECT_LT(written().odometry.radar.T_IR.q_IR.angularDistance(truth_.q_IR), 0.6 * kDegree);
 }
 
 /// The next bag starts from what the first one showed, and still finds another offset.
@@ -195,8 +195,8 @@ TEST_F(Calibrate, AnotherOffsetNextTimeIsFound) {
   const std::string next = folder_ + "/next.yaml";
   const Outcome outcome = runCalibrate({"--config", yaml_, "--out", next, "--bag", bag_});
   ASSERT_EQ(outcome.status, 0) << outcome.err;
-  const SmootherOptions smoother = makeConfig(readParameterFile(next)).odometry.smoother;
-  EXPECT_NEAR(smoother.time_offset_initial, 0.04, 0.001) << outcome.out;
+  const RadarOptions radar = makeConfig(readParameterFile(next)).odometry.radar;
+  EXPECT_NEAR(radar.time_offset_initial, 0.04, 0.001) << outcome.out;
 }
 
 /// The offset of such a radar comes out late where its nodes are placed early, and the other way round.
@@ -240,7 +240,7 @@ TEST_F(Calibrate, AVibrationDoesNotShortenTheLeverArm) {
     simulateBag(bag_, "medium", seed, 0.02, truth_, 60.0, shaking);
     const Outcome outcome = calibrateBags({bag_});
     ASSERT_EQ(outcome.status, 0) << outcome.err;
-    const Eigen::Vector3d lever = 1e3 * (written().odometry.T_IR.l_I - truth_.l_I);
+    const Eigen::Vector3d lever = 1e3 * (written().odometry.radar.T_IR.l_I - truth_.l_I);
     const std::vector<double> sigmas = sigmasOf(outcome.out);
     for (std::size_t i = 0; i < 3; ++i)
       squares += std::pow(lever[static_cast<Eigen::Index>(i)] / sigmas[4 + i], 2);
@@ -305,9 +305,9 @@ TEST_F(Calibrate, WhatAStraightRideDoesNotShowStaysAsTold) {
                            "not observed: to observe it, rotate about x or y"});
   EXPECT_EQ(countOf("not observed", outcome.out), 4u) << outcome.out;
   const Config config = written();
-  EXPECT_EQ(config.odometry.T_IR.l_I, truth_.l_I);
+  EXPECT_EQ(config.odometry.radar.T_IR.l_I, truth_.l_I);
   // To second order in the turns about y and z, which are a milliradian.
-  EXPECT_NEAR(so3::log(config.odometry.T_IR.q_IR * truth_.q_IR.conjugate()).x(), 0.0, 1e-6);
+  EXPECT_NEAR(so3::log(config.odometry.radar.T_IR.q_IR * truth_.q_IR.conjugate()).x(), 0.0, 1e-6);
   EXPECT_EQ(config.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kPose);
 }
 
@@ -319,7 +319,7 @@ TEST_F(Calibrate, ALeverArmThatNobodyMeasuredIsFoundAndEstimatedOn) {
   const Config config = written();
   expectTruth(config, truth_, kOffset, sigmas);
   EXPECT_EQ(config.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kPose);
-  EXPECT_NEAR(1e3 * config.odometry.smoother.extrinsics_translation_sigma,
+  EXPECT_NEAR(1e3 * config.odometry.radar.extrinsics_translation_sigma,
               *std::max_element(sigmas.end() - 3, sigmas.end()), 0.1);
 }
 
@@ -330,8 +330,8 @@ TEST_F(Calibrate, ALeverArmThatNoRunHasShownStaysOpen) {
   for (const char* next : {"", "once more"}) {
     const Config config = written();
     EXPECT_EQ(config.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kPose) << next;
-    EXPECT_EQ(config.odometry.smoother.extrinsics_translation_sigma, 0.5) << next;
-    EXPECT_EQ(config.odometry.T_IR.l_I.z(), 0.0) << next;
+    EXPECT_EQ(config.odometry.radar.extrinsics_translation_sigma, 0.5) << next;
+    EXPECT_EQ(config.odometry.radar.T_IR.l_I.z(), 0.0) << next;
     const std::string from = folder_ + "/from.yaml";
     fs::copy_file(yaml_, from, fs::copy_options::overwrite_existing);
     ASSERT_EQ(runCalibrate({"--bag", bag_, "--config", from, "--out", yaml_}).status, 0);
@@ -346,8 +346,8 @@ TEST_F(Calibrate, RestShowsNothing) {
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_EQ(countOf("not observed", outcome.out), 7u) << outcome.out;
   const Config config = written();
-  EXPECT_EQ(config.odometry.smoother.time_offset_sigma, 0.075);
-  EXPECT_LT(config.odometry.T_IR.q_IR.angularDistance(told_.q_IR), 1e-9);
+  EXPECT_EQ(config.odometry.radar.time_offset_sigma, 0.075);
+  EXPECT_LT(config.odometry.radar.T_IR.q_IR.angularDistance(told_.q_IR), 1e-9);
 }
 
 TEST_F(Calibrate, RotationAloneLeavesTheLeverArm) {
@@ -356,9 +356,9 @@ TEST_F(Calibrate, RotationAloneLeavesTheLeverArm) {
   const Outcome outcome = calibrateBags({bag_}, {"--set", "estimate_extrinsics=rotation"});
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_EQ(countOf("   not estimated\n", outcome.out), 3u) << outcome.out;
-  EXPECT_EQ(written().odometry.T_IR.l_I, truth_.l_I);
+  EXPECT_EQ(written().odometry.radar.T_IR.l_I, truth_.l_I);
   EXPECT_EQ(written().odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kRotation);
-  EXPECT_LT(written().odometry.T_IR.q_IR.angularDistance(truth_.q_IR), 0.6 * kDegree);
+  EXPECT_LT(written().odometry.radar.T_IR.q_IR.angularDistance(truth_.q_IR), 0.6 * kDegree);
 }
 
 TEST_F(Calibrate, ABagThatFailsIsNamedAndTheOthersCount) {

@@ -274,7 +274,7 @@ TEST_F(CheckBag, TwoRadarsGetASectionEach) {
   ASSERT_EQ(config.radars.size(), 2u) << pair.yaml;
   for (const Config& radar : config.radars) {
     const Extrinsics& truth = kart.options.radars.at(radar.radar_name).T_IR;
-    EXPECT_LT(radar.odometry.T_IR.q_IR.angularDistance(truth.q_IR) / kDegree, 15.0) << radar.radar_name;
+    EXPECT_LT(radar.odometry.radar.T_IR.q_IR.angularDistance(truth.q_IR) / kDegree, 15.0) << radar.radar_name;
   }
   // A topic that says nothing gets the first name that is free.
   const std::string renamed = folder_ + "/renamed.bag";
@@ -352,21 +352,22 @@ TEST_F(CheckBag, ALeverArmIsEstimatedFromWhereTheBagShowsIt) {
   EXPECT_TRUE(odd.ready()) << describeCheck(odd);
   const Config config = configOf(odd);
   EXPECT_EQ(config.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kPose);
-  EXPECT_LT((config.odometry.T_IR.l_I - true_l_I).norm(), 0.1) << config.odometry.T_IR.l_I.transpose();
+  EXPECT_LT((config.odometry.radar.T_IR.l_I - true_l_I).norm(), 0.1)
+      << config.odometry.radar.T_IR.l_I.transpose();
   const RadarSummary radar = run(odd).radars.front();
   EXPECT_NEAR(radar.final_offset_s, setup_.time_offset.constant, 3.0 * radar.final_offset_sigma_s);
   // A run that holds the mounting would hold an arm that is a decimetre wrong.
   const Config held = configOf(check(bag, false, {"estimate_extrinsics=none"}));
   EXPECT_EQ(held.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kLeverArm);
-  EXPECT_EQ(held.odometry.T_IR.l_I, Eigen::Vector3d::Zero());
+  EXPECT_EQ(held.odometry.radar.T_IR.l_I, Eigen::Vector3d::Zero());
   // The estimate starts from what the user has measured.
   const std::string tape = "extrinsics_translation=[0.04,-0.07,0.21]";
   const Config measured = configOf(check(bag, false, {tape}));
   EXPECT_EQ(measured.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kPose);
-  EXPECT_EQ(measured.odometry.T_IR.l_I, true_l_I);
-  EXPECT_EQ(measured.odometry.smoother.extrinsics_translation_sigma, 0.05);
+  EXPECT_EQ(measured.odometry.radar.T_IR.l_I, true_l_I);
+  EXPECT_EQ(measured.odometry.radar.extrinsics_translation_sigma, 0.05);
   const Config exact = configOf(check(bag, false, {"extrinsics_translation_sigma=0.01", tape}));
-  EXPECT_EQ(exact.odometry.smoother.extrinsics_translation_sigma, 0.01);
+  EXPECT_EQ(exact.odometry.radar.extrinsics_translation_sigma, 0.01);
 }
 
 /// The run is good: the estimate outvoted the points at wrong directions.

@@ -234,7 +234,8 @@ TEST_F(CheckBag, WhatIsToldStandsInTheConfiguration) {
                                "radar_power_unit=not_snr", "radar_min_range=0.7"});
   ASSERT_TRUE(told.ready()) << describeCheck(told);
   const Config config = configOf(told);
-  EXPECT_LT(config.odometry.T_IR.q_IR.angularDistance(Eigen::Quaterniond::Identity()), 1e-9) << told.yaml;
+  EXPECT_LT(config.odometry.radar.T_IR.q_IR.angularDistance(Eigen::Quaterniond::Identity()), 1e-9)
+      << told.yaml;
   EXPECT_EQ(config.estimate_extrinsics, EstimateExtrinsics::kNone);
   EXPECT_EQ(config.radar_overrides.power_unit, PowerUnit::kNotSnr);
   EXPECT_NE(told.yaml.find("radar_min_range: 0.7"), std::string::npos) << told.yaml;

@@ -170,9 +170,9 @@ TEST(Consistency, ALeverArmThatNobodyMeasured) {
     SimulatedRun run("walk", seed, 60.0, kStart);
     run.setup.time_offset.constant = 0.03;
     run.setup.T_IR.l_I = {0.3, 0.1, 0.4};
-    run.options.T_IR.l_I.setZero();
+    run.options.radar.T_IR.l_I.setZero();
     run.options.smoother.estimate_extrinsics = EstimateExtrinsics::kLeverArm;
-    run.options.smoother.extrinsics_translation_sigma = 0.5;
+    run.options.radar.extrinsics_translation_sigma = 0.5;
     run.run();
     const Nees nees = neesOf(run);
     mean.velocity += nees.velocity / kSeeds;
@@ -195,9 +195,9 @@ TEST(Consistency, AStraightDriveDoesNotShowTheLeverArm) {
   SimulatedRun run("constant_speed", 1, 120.0, kStart);
   run.setup.imu.noise.gyro_density = 0.001;
   run.setup.radar.rate = 20.0;
-  run.options.T_IR.l_I.setZero();
+  run.options.radar.T_IR.l_I.setZero();
   run.options.smoother.estimate_extrinsics = EstimateExtrinsics::kLeverArm;
-  run.options.smoother.extrinsics_translation_sigma = 0.5;
+  run.options.radar.extrinsics_translation_sigma = 0.5;
   run.run();
   const Eigen::Vector3d sigma = run.results.back().T_IR_covariance.diagonal().head<3>().cwiseSqrt();
   EXPECT_GT(sigma.minCoeff(), 0.45) << sigma.transpose();

@@ -45,7 +45,9 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
     offset->bound = bound;
     SmootherOptions known;
     known.estimate_extrinsics = EstimateExtrinsics::kPose;
-    known.extrinsics_rotation_sigma = known.extrinsics_translation_sigma = 0.01;
+    known.extrinsics_rotation_sigma = 0.01;
+    CalibrationPrior configured{skewMounting()};
+    configured.extrinsics_translation_sigma = 0.01;
     extrinsics = window.addCalibration(std::make_shared<ExtrinsicsManifold>(known.estimate_extrinsics),
                                        stored(skewMounting()));
     Block* previous = nullptr;
@@ -59,7 +61,7 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
       boxplus(truth.data(), beside.data(), x.data());
       Block& node = window.addNode(motion.time(t), manifold, storedMotion(x));
       if (previous == nullptr) {
-        const NodePrior prior = priorAtRest(known, ImuNoise(), truth, 9.81, 3.0, skewMounting());
+        const NodePrior prior = priorAtRest(known, ImuNoise(), truth, 9.81, 3.0, configured);
         node.x = storedMotion(truth);
         offset->x[0] = 0.0;
         addPrior(window, {&node, biases.get(), offset.get(), extrinsics.get()}, prior.root);
@@ -303,9 +305,9 @@ TEST(AddASensor, AnAltimeterNeedsAFactorAndABlock) {
   const SmootherOptions options;
   double sigma_without = 0.0;
   for (const bool with_altimeter : {false, true}) {
-    RadarSmoother smoother(options, skewMounting(), motion.g_W, imu);
+    RadarSmoother smoother(options, {skewMounting()}, motion.g_W, imu);
     smoother.initialize(motion.time(0.5),
-                        priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0, skewMounting()));
+                        priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0, {skewMounting()}));
     Window& window = smoother.states.window();
     const auto bias = window.addCalibration(std::make_shared<VectorManifold>(1), Eigen::VectorXd::Zero(1));
     // 1 m is known of it beforehand.

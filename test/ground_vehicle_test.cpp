@@ -56,7 +56,7 @@ struct VehicleRun : SimulatedRun {
     const std::uint64_t seed = setup.seed;
     setup = simulation::presetOf("kart").options;
     setup.seed = seed;
-    options.T_IR = setup.T_IR;
+    options.radar.T_IR = setup.T_IR;
     // The vehicle tells how the radar is tilted, and not the other way round.
     options.smoother.estimate_extrinsics = EstimateExtrinsics::kRotation;
   }
@@ -147,7 +147,7 @@ TEST(GroundVehicle, ItsFrameIsFoundAsWellAsItSays) {
     Extrinsics turned = run.setup.T_IR;
     simulation::SensorData none;
     mountTurned(q_VI, none, turned);
-    run.options.T_IR = turned;
+    run.options.radar.T_IR = turned;
     run.options.ground_vehicle.rotation_sigma = 0.1;
     run.run([&](simulation::SensorData& data) {
       Extrinsics unused;

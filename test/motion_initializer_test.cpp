@@ -30,15 +30,15 @@ struct Rig {
     setup.seed = seed;
     setup.time_offset.constant = offset;
     data = simulation::simulate(motion, setup);
-    options.T_IR = setup.T_IR;
+    options.radar.T_IR = setup.T_IR;
     options.init_mode = InitMode::kMotion;
     // The same sensors in a frame I' that is turned against I.
     for (ImuMeasurement& sample : data.imu.samples) {
       sample.angular_velocity = q_BI.conjugate() * sample.angular_velocity;
       sample.acceleration = q_BI.conjugate() * sample.acceleration;
     }
-    options.T_IR.q_IR = q_BI.conjugate() * options.T_IR.q_IR;
-    options.T_IR.l_I = q_BI.conjugate() * options.T_IR.l_I;
+    options.radar.T_IR.q_IR = q_BI.conjugate() * options.radar.T_IR.q_IR;
+    options.radar.T_IR.l_I = q_BI.conjugate() * options.radar.T_IR.l_I;
   }
   static simulation::Motion makeMotion(const std::string& name, std::uint64_t seed) {
     simulation::MotionRequest request;
@@ -61,7 +61,7 @@ struct Rig {
   /// Feeds everything in the order of the stamps from `begin` seconds on, until the state is found.
   std::optional<Initialization> run(MotionInitializer& initializer, double begin = 0.0,
                                     const PoseAnchor& anchor = PoseAnchor()) {
-    EgoVelocityEstimator estimator(options.ego_velocity);
+    EgoVelocityEstimator estimator(options.radar.ego_velocity);
     auto next = data.scans.begin();
     for (const ImuMeasurement& sample : data.imu.samples) {
       if (sample.time - setup.start < begin) continue;
@@ -111,7 +111,7 @@ TEST(MotionInitializer, FindsTiltVelocityAndOffsetAndKnowsHowWell) {
         SCOPED_TRACE(name + std::string(", offset ") + std::to_string(offset) + ", seed " +
                      std::to_string(seed));
         Rig rig(name, seed, offset);
-        MotionInitializer initializer(rig.options);
+        MotionInitializer initializer(rig.options, rig.options.radar);
         const auto found = rig.run(initializer, 1.7);
         ASSERT_TRUE(found) << initializer.waitingFor();
         EXPECT_EQ(initializer.waitingFor(), "");
@@ -143,7 +143,7 @@ TEST(MotionInitializer, WorksForAnyMounting) {
   for (const Eigen::Vector3d& turn : {Eigen::Vector3d(M_PI, 0, 0), Eigen::Vector3d(0, 0.5 * M_PI, 0),
                                       Eigen::Vector3d(-0.5 * M_PI, 0.3, 2.0)}) {
     Rig rig("difficult", 4, 0.03, so3::exp(turn));
-    MotionInitializer initializer(rig.options);
+    MotionInitializer initializer(rig.options, rig.options.radar);
     const auto found = rig.run(initializer);
     ASSERT_TRUE(found) << initializer.waitingFor();
     EXPECT_LT(rig.tiltError(*found), 0.025);
@@ -162,7 +162,7 @@ TEST(MotionInitializer, KeepsHeadingAndPositionOfTheAnchor) {
   // A heading and a position that are wrong together.
   const Eigen::Vector4d together(0.3, 0.5, -0.2, 0.0);
   anchor.covariance = together * together.transpose() + 0.01 * Eigen::Matrix4d::Identity();
-  MotionInitializer initializer(rig.options);
+  MotionInitializer initializer(rig.options, rig.options.radar);
   const auto found = rig.run(initializer, 0.0, anchor);
   ASSERT_TRUE(found) << initializer.waitingFor();
   const StateBlock& x = found->prior.x0;
@@ -186,7 +186,7 @@ TEST(MotionInitializer, ATenthOfTheScansMayBeWrong) {
   for (std::size_t k = 3; k < rig.data.scans.size(); k += 10) {
     for (simulation::SimulatedPoint& point : rig.data.scans[k].points) point.doppler -= 2.0;
   }
-  MotionInitializer initializer(rig.options);
+  MotionInitializer initializer(rig.options, rig.options.radar);
   const auto found = rig.run(initializer);
   ASSERT_TRUE(found) << initializer.waitingFor();
   EXPECT_LT(rig.tiltError(*found), 0.025);
@@ -206,8 +206,8 @@ TEST(MotionInitializer, WrongUnitsAndSignsAreToldAndNotStartedFrom) {
         if (fault == "Doppler sign") point.doppler = -point.doppler;
     }
     if (fault == "extrinsics")
-      rig.options.T_IR.q_IR = rig.options.T_IR.q_IR * so3::exp({0.0, 0.0, 0.5 * M_PI});
-    MotionInitializer initializer(rig.options);
+      rig.options.radar.T_IR.q_IR = rig.options.radar.T_IR.q_IR * so3::exp({0.0, 0.0, 0.5 * M_PI});
+    MotionInitializer initializer(rig.options, rig.options.radar);
     EXPECT_FALSE(rig.run(initializer));
     EXPECT_NE(initializer.waitingFor().find("radar and IMU that agree"), std::string::npos)
         << initializer.waitingFor();
@@ -218,7 +218,7 @@ TEST(MotionInitializer, DoesNotCountOnWhatBridgesAGapOfTheImu) {
   Rig rig("start_in_motion", 8, 0.0);
   const Time gap = rig.setup.start + 2.0;
   for (ImuMeasurement& sample : rig.data.imu.samples) sample.is_bridge = std::abs(sample.time - gap) < 0.2;
-  MotionInitializer initializer(rig.options);
+  MotionInitializer initializer(rig.options, rig.options.radar);
   const auto found = rig.run(initializer);
   ASSERT_TRUE(found) << initializer.waitingFor();
   EXPECT_GT(found->time - gap, 0.2 + 0.8 * rig.options.motion_initialization.window);
@@ -227,7 +227,7 @@ TEST(MotionInitializer, DoesNotCountOnWhatBridgesAGapOfTheImu) {
 
 TEST(MotionInitializer, SaysWhatItWaitsForAndBearsNonsense) {
   Rig rig("start_in_motion", 9, 0.0);
-  MotionInitializer initializer(rig.options);
+  MotionInitializer initializer(rig.options, rig.options.radar);
   EXPECT_FALSE(initializer.solve(rig.imu, [](Time) { return PoseAnchor(); }));  // no IMU at all
   EXPECT_NE(initializer.waitingFor().find("radar velocity"), std::string::npos);
   EgoVelocity none;
@@ -247,7 +247,7 @@ TEST(MotionInitializer, SaysWhatItWaitsForAndBearsNonsense) {
 std::optional<std::pair<InitializedFrom, double>> startBy(InitMode mode, Rig& rig, std::string* waiting_for) {
   rig.options.init_mode = mode;
   Initializer initializer(rig.options);
-  EgoVelocityEstimator estimator(rig.options.ego_velocity);
+  EgoVelocityEstimator estimator(rig.options.radar.ego_velocity);
   auto next = rig.data.scans.begin();
   for (const ImuMeasurement& sample : rig.data.imu.samples) {
     rig.imu.add(sample);

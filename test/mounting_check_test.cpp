@@ -55,7 +55,7 @@ TEST(MountingCheck, IsExactForSmallTurnsWithoutNoise) {
 /// A run with a mounting that is turned by `turn` from the told one, about the axes of I [rad].
 SimulatedRun turnedBy(const Vector3d& turn, const std::string& motion, std::uint64_t seed) {
   SimulatedRun run(motion, seed, 50.0, 5.0);
-  run.options.T_IR.q_IR = so3::exp(-turn) * run.setup.T_IR.q_IR;
+  run.options.radar.T_IR.q_IR = so3::exp(-turn) * run.setup.T_IR.q_IR;
   run.run();
   return run;
 }
@@ -100,7 +100,7 @@ TEST(MountingCheck, FindsAWrongTurnIfTheLeverArmIsEstimated) {
   const Vector3d turn(0.0, 8.0 * kDegree, 0.0);
   SimulatedRun run("difficult", 1, 50.0, 5.0);
   run.options.smoother.estimate_extrinsics = EstimateExtrinsics::kLeverArm;
-  run.options.T_IR.q_IR = so3::exp(-turn) * run.options.T_IR.q_IR;
+  run.options.radar.T_IR.q_IR = so3::exp(-turn) * run.options.radar.T_IR.q_IR;
   run.run();
   ASSERT_TRUE(run.last(0).mounting_turn);
   const Vector3d found = run.last(0).mounting_turn->turn;

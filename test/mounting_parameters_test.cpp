@@ -33,18 +33,18 @@ const Quaterniond kAhead(std::sqrt(0.5), 0, 0, -std::sqrt(0.5));  // of x right,
 
 TEST(MountingParameters, WordsAreTheQuaternion) {
   const Config kart = from({"mounting_yaw_pitch_roll_deg=[30, 22, 0]"});
-  EXPECT_LT(
-      kart.odometry.T_IR.q_IR.angularDistance(Quaterniond(0.8501141, 0.1652454, -0.0954045, -0.4908136)),
-      1e-6);
-  EXPECT_LT(from({"mounting_yaw_pitch_roll_deg=[0, 0, 0]"}).odometry.T_IR.q_IR.angularDistance(kAhead),
+  EXPECT_LT(kart.odometry.radar.T_IR.q_IR.angularDistance(
+                Quaterniond(0.8501141, 0.1652454, -0.0954045, -0.4908136)),
+            1e-6);
+  EXPECT_LT(from({"mounting_yaw_pitch_roll_deg=[0, 0, 0]"}).odometry.radar.T_IR.q_IR.angularDistance(kAhead),
             1e-12);
-  EXPECT_EQ(from({"mounting_yaw_pitch_roll_deg=[]"}).odometry.T_IR.q_IR.w(), 1.0);
+  EXPECT_EQ(from({"mounting_yaw_pitch_roll_deg=[]"}).odometry.radar.T_IR.q_IR.w(), 1.0);
 }
 
 TEST(MountingParameters, TheWordsDoNotDependOnTheAxesOfTheCloud) {
   for (const std::string& preset : pointCloudPresets()) {
     const Config config = from({"radar_format=" + preset, "mounting_yaw_pitch_roll_deg=[0, 0, 0]"});
-    EXPECT_LT(config.odometry.T_IR.q_IR.angularDistance(kAhead), 1e-12) << preset;
+    EXPECT_LT(config.odometry.radar.T_IR.q_IR.angularDistance(kAhead), 1e-12) << preset;
   }
 }
 
@@ -53,16 +53,17 @@ TEST(MountingParameters, ARotationOfTheCloudsOwnAxesIsTurnedForAllPresets) {
   for (const std::string& preset : pointCloudPresets()) {
     const Config config = from({"radar_format=" + preset, "extrinsics_axes=cloud"});
     const bool flu = pointCloudPreset(preset).axes == PointAxes::kForwardLeftUp;
-    const Vector3d forward_I = config.odometry.T_IR.q_IR * Vector3d::UnitY();
+    const Vector3d forward_I = config.odometry.radar.T_IR.q_IR * Vector3d::UnitY();
     EXPECT_LT((forward_I - (flu ? Vector3d(1, 0, 0) : Vector3d(0, 1, 0))).norm(), 1e-12) << preset;
-    EXPECT_LT((config.odometry.T_IR.q_IR * Vector3d::UnitZ() - Vector3d(0, 0, 1)).norm(), 1e-12) << preset;
+    EXPECT_LT((config.odometry.radar.T_IR.q_IR * Vector3d::UnitZ() - Vector3d(0, 0, 1)).norm(), 1e-12)
+        << preset;
   }
   // The same as from tf.
   geometry_msgs::Transform tf;
   tf.rotation.x = tf.rotation.y = tf.rotation.z = tf.rotation.w = 0.5;
   const Config config = from(
       {"radar_format=coloradar", "extrinsics_axes=cloud", "extrinsics_rotation_xyzw=[0.5, 0.5, 0.5, 0.5]"});
-  EXPECT_LT(config.odometry.T_IR.q_IR.angularDistance(toExtrinsics(tf, PointAxes::kForwardLeftUp).q_IR),
+  EXPECT_LT(config.odometry.radar.T_IR.q_IR.angularDistance(toExtrinsics(tf, PointAxes::kForwardLeftUp).q_IR),
             1e-12);
 }
 
@@ -87,15 +88,15 @@ Config fromFile(const std::string& lines, const std::vector<std::string>& assign
 }
 
 double rollOf(const Config& config) {
-  return mountingOf(configsOfRadars(config).front().odometry.T_IR.q_IR).roll * 57.2957795;
+  return mountingOf(configsOfRadars(config).front().odometry.radar.T_IR.q_IR).roll * 57.2957795;
 }
 
 TEST(MountingParameters, TheCommandLineReplacesTheMountingOfTheFileInEitherWay) {
   const std::string quaternion = "imu_topic: imu\nextrinsics_rotation_xyzw: [0.0, 0.0, 0.0, 1.0]\n";
   EXPECT_NEAR(rollOf(fromFile(quaternion, {"mounting_yaw_pitch_roll_deg=[0, 0, 180]"})), 180.0, 1e-6);
-  EXPECT_EQ(fromFile(quaternion, {"mounting_yaw_pitch_roll_deg=[]"}).odometry.T_IR.q_IR.w(), 1.0);
+  EXPECT_EQ(fromFile(quaternion, {"mounting_yaw_pitch_roll_deg=[]"}).odometry.radar.T_IR.q_IR.w(), 1.0);
   const std::string words = "mounting_yaw_pitch_roll_deg: [0, 0, 180]\n";
-  EXPECT_EQ(fromFile(words, {"extrinsics_rotation_xyzw=[0, 0, 0, 1]"}).odometry.T_IR.q_IR.w(), 1.0);
+  EXPECT_EQ(fromFile(words, {"extrinsics_rotation_xyzw=[0, 0, 0, 1]"}).odometry.radar.T_IR.q_IR.w(), 1.0);
   EXPECT_THROW(fromFile(quaternion + words, {}), ConfigError);
 }
 
@@ -131,14 +132,14 @@ TEST(MountingParameters, AMountingThatNoSourceGivesIsAWarning) {
 
 EstimateExtrinsics estimated(const Config& config) { return config.odometry.smoother.estimate_extrinsics; }
 double leverArmSigma(const OdometryOptions& options, std::size_t radar) {
-  return optionsOfRadar(options, radar).smoother.extrinsics_translation_sigma;
+  return options.ofRadar(radar).extrinsics_translation_sigma;
 }
 
 TEST(MountingParameters, ALeverArmThatNobodyMeasuredIsEstimated) {
   for (const std::string none : {"mode=online", "extrinsics_translation=[]"}) {
     EXPECT_EQ(estimated(from({none})), EstimateExtrinsics::kLeverArm);
     EXPECT_EQ(estimated(from({none, "estimate_extrinsics=rotation"})), EstimateExtrinsics::kPose);
-    EXPECT_EQ(from({none}).odometry.T_IR.l_I, Vector3d::Zero());
+    EXPECT_EQ(from({none}).odometry.radar.T_IR.l_I, Vector3d::Zero());
     EXPECT_EQ(leverArmSigma(from({none}).odometry, 0), 0.5);
     EXPECT_EQ(leverArmSigma(from({none, "extrinsics_translation_sigma=0.2"}).odometry, 0), 0.2);
   }
@@ -182,7 +183,7 @@ TEST(MountingParameters, WhatIsPrintedReadsBackAsTheSameRotation) {
   const Config config = from({"radar_format=coloradar", "mounting_yaw_pitch_roll_deg=[12, -34, 56]"});
   std::istringstream yaml(toYaml(config));
   const Config back = makeConfig(readParameters(yaml, "printed"));
-  EXPECT_LT(back.odometry.T_IR.q_IR.angularDistance(config.odometry.T_IR.q_IR), 1e-9);
+  EXPECT_LT(back.odometry.radar.T_IR.q_IR.angularDistance(config.odometry.radar.T_IR.q_IR), 1e-9);
   EXPECT_EQ(toYaml(back), toYaml(config));
 }
 

@@ -313,9 +313,9 @@ TEST_F(AtRest, NothingIsLearntOfTheOffset) {
     for (ScanResult& result : run(time + 0.1)) last = std::move(result);
   }
   ASSERT_TRUE(last.used) << last.rejected_because;
-  const OdometryOptions options;
-  EXPECT_NEAR(last.time_offset, options.smoother.time_offset_initial, 1e-4);
-  EXPECT_GE(last.time_offset_sigma, options.smoother.time_offset_sigma * (1.0 - 1e-6));
+  const CalibrationPrior configured;
+  EXPECT_NEAR(last.time_offset, configured.time_offset_initial, 1e-4);
+  EXPECT_GE(last.time_offset_sigma, configured.time_offset_sigma * (1.0 - 1e-6));
 }
 
 /// Every tenth scan from 15 s on is wrong by 1.8 m/s, and comes `delay` [s] later than it should: how many of

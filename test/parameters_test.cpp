@@ -33,7 +33,7 @@ TEST(Parameters, EveryKindOfValueIsRead) {
   EXPECT_EQ(config.imu_topic, "/imu");
   EXPECT_EQ(config.stamp_source, StampSource::kArrival);
   EXPECT_EQ(config.odometry.smoother.time_offset_model, TimeOffsetModel::kImu);
-  EXPECT_EQ(config.odometry.T_IR.l_I, Eigen::Vector3d(1.0, -2.5, 0.3));
+  EXPECT_EQ(config.odometry.radar.T_IR.l_I, Eigen::Vector3d(1.0, -2.5, 0.3));
   EXPECT_EQ(config.odometry.smoother.time_offset_noise, 1e-4);
 }
 
@@ -165,9 +165,9 @@ TEST(Parameters, RotationsMustBeUnitAndAreNormalised) {
   EXPECT_TRUE(contains(faultOf("extrinsics_rotation_xyzw=[0, 0, 0, 0]"), "norm 1"));
   EXPECT_TRUE(contains(faultOf("extrinsics_rotation_xyzw=[0, 0, 0, 1.01]"), "norm 1"));
   const Config config = fromAssignments({"extrinsics_rotation_xyzw=[0.69946, 0.71461, 0.00723, 0.00524]"});
-  EXPECT_NEAR(config.odometry.T_IR.q_IR.norm(), 1.0, 1e-15);
-  EXPECT_NEAR(config.odometry.T_IR.q_IR.x(), 0.69946, 1e-4);
-  EXPECT_NEAR(config.odometry.T_IR.q_IR.w(), 0.00524, 1e-6);
+  EXPECT_NEAR(config.odometry.radar.T_IR.q_IR.norm(), 1.0, 1e-15);
+  EXPECT_NEAR(config.odometry.radar.T_IR.q_IR.x(), 0.69946, 1e-4);
+  EXPECT_NEAR(config.odometry.radar.T_IR.q_IR.w(), 0.00524, 1e-6);
 }
 
 TEST(Parameters, UnknownKeysAreErrorsWithTheNearestKey) {
@@ -316,7 +316,7 @@ TEST(Parameters, PrintedConfigurationReadsBack) {
   EXPECT_EQ(toYaml(back), toYaml(config));
   EXPECT_EQ(back.odometry.smoother.window, 0.3333333333333333);
   EXPECT_EQ(back.odometry.imu_noise.gyro_random_walk, 1.2345678901234567e-7);
-  EXPECT_EQ(back.odometry.T_IR.l_I.z(), 0.30000000000000004);
+  EXPECT_EQ(back.odometry.radar.T_IR.l_I.z(), 0.30000000000000004);
   EXPECT_EQ(back.ground_truth, "a \"b\".txt");
 }
 
@@ -328,20 +328,20 @@ TEST(Parameters, SensorConfigurationsLoad) {
   EXPECT_EQ(pointCloudFormat(ti).doppler, "velocity");
   EXPECT_EQ(pointCloudFormat(ti).axes, PointAxes::kForwardLeftUp);
   EXPECT_EQ(ti.stamp_source, StampSource::kTrigger);
-  EXPECT_EQ(ti.odometry.T_IR.l_I, Eigen::Vector3d(0.03, 0.03, -0.06));
+  EXPECT_EQ(ti.odometry.radar.T_IR.l_I, Eigen::Vector3d(0.03, 0.03, -0.06));
   // The mounting is that of the simulated kart, which its first lines promise.
   const Config sparse = makeConfig(readParameterFile(kConfigFolder + "/sparse.yaml"));
   const Extrinsics kart = simulation::presetOf("kart").options.T_IR;
   EXPECT_EQ(pointCloudFormat(sparse).doppler, "v_doppler_mps");
-  EXPECT_EQ(sparse.odometry.T_IR.l_I, kart.l_I);
-  EXPECT_LT(sparse.odometry.T_IR.q_IR.angularDistance(kart.q_IR), 1e-6);
+  EXPECT_EQ(sparse.odometry.radar.T_IR.l_I, kart.l_I);
+  EXPECT_LT(sparse.odometry.radar.T_IR.q_IR.angularDistance(kart.q_IR), 1e-6);
 }
 
 TEST(Parameters, TheTwoRadarsOfTheExampleAreMirrorImages) {
   const std::vector<Config> radars =
       configsOfRadars(makeConfig(readParameterFile(kConfigFolder + "/two_radars.yaml")));
   ASSERT_EQ(radars.size(), 2u);
-  const Extrinsics left = radars[0].odometry.T_IR, right = radars[1].odometry.T_IR;
+  const Extrinsics left = radars[0].odometry.radar.T_IR, right = radars[1].odometry.radar.T_IR;
   const Extrinsics kart = simulation::presetOf("kart").options.T_IR;
   EXPECT_EQ(left.l_I, kart.l_I);
   EXPECT_LT(left.q_IR.angularDistance(kart.q_IR), 1e-6);
@@ -422,9 +422,10 @@ std::size_t keysChanging(const std::string& group) {
 
 TEST(Parameters, EveryMemberOfTheOptionsHasAKey) {
   EXPECT_EQ(keysChanging("Smoother") + keysChanging("Time offset") + keysChanging("Estimate of T_IR"),
-            memberCount<SmootherOptions>() + memberCount<InnovationGateOptions>() +
-                memberCount<OffsetStepDetectorOptions>() + 1)
-      << "with max_queued_scans; a member of SmootherOptions lacks a key in "
+            memberCount<SmootherOptions>() + memberCount<CalibrationPrior>() - 1 +
+                memberCount<InnovationGateOptions>() + memberCount<OffsetStepDetectorOptions>() + 1)
+      << "without T_IR, with max_queued_scans; a member of SmootherOptions or CalibrationPrior lacks a key "
+         "in "
          "src/ros/parameters/";
   EXPECT_EQ(keysChanging("Radar: which points"), memberCount<EgoVelocityOptions>());
   EXPECT_EQ(keysChanging("Initialisation"),
@@ -437,9 +438,8 @@ TEST(Parameters, EveryMemberOfTheOptionsHasAKey) {
       << "with max_imu_gap, max_radar_gap";
   EXPECT_EQ(keysChanging("T_IR"), memberCount<Extrinsics>() + 3)
       << "with extrinsics_source, extrinsics_axes and the mounting in words";
-  EXPECT_EQ(memberCount<RadarOptions>(), 5u)
-      << "a new member needs its place in radarOptions in src/ros/parameters/make_config.cpp";
-  EXPECT_EQ(memberCount<OdometryOptions>(), 23u) << "a new member needs keys in src/ros/parameters/";
+  EXPECT_EQ(memberCount<RadarOptions>(), 2u) << "CalibrationPrior and ego_velocity; a new member needs keys";
+  EXPECT_EQ(memberCount<OdometryOptions>(), 22u) << "a new member needs keys in src/ros/parameters/";
   EXPECT_EQ(memberCount<PointCloudFormat>() - 1, memberCount<PointCloudOverrides>()) << "all but its name";
 }
 

@@ -127,7 +127,7 @@ class PlainBag : public testing::Test {
   }
 
   static double turnFromTruth(const BagCheck& check) {
-    return configOf(check).odometry.T_IR.q_IR.angularDistance(setup_.T_IR.q_IR) / kDegree;
+    return configOf(check).odometry.radar.T_IR.q_IR.angularDistance(setup_.T_IR.q_IR) / kDegree;
   }
 
   inline static std::string folder_, bag_;

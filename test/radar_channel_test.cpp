@@ -20,14 +20,14 @@ struct OneRadar {
     start(0.5);
   }
   static RadarChannelOptions withMounting(RadarChannelOptions& options) {
-    options.T_IR = skewMounting();
-    options.ego_velocity.doppler_quantization = 0.02;
+    options.radar.T_IR = skewMounting();
+    options.radar.ego_velocity.doppler_quantization = 0.02;
     return options;
   }
   void start(double t) {
     smoother = FixedLagSmoother(options.smoother, ImuNoise(), motion.g_W, imu);
     channel.start(smoother, motion.time(t),
-                  priorAtRest(options.smoother, ImuNoise(), motion.state(t), 9.81, 3.0, skewMounting()));
+                  priorAtRest(options.smoother, ImuNoise(), motion.state(t), 9.81, 3.0, {skewMounting()}));
   }
   /// A scan of a still world, without noise.
   RadarScan scan(double stamp, int points) const {
@@ -140,9 +140,11 @@ TEST(RadarInWindow, TellsTheVelocityOfTheLastScansInBothModels) {
     const SyntheticMotion motion;
     const ImuBuffer imu = motion.imu(0.0, 4.0, 200.0);
     FixedLagSmoother smoother(options, ImuNoise(), motion.g_W, imu);
-    RadarInWindow radar(options, skewMounting(), motion.g_W, imu, std::make_shared<OffsetBlocks>(options));
+    const CalibrationPrior configured{skewMounting()};
+    RadarInWindow radar(options, configured, motion.g_W, imu,
+                        std::make_shared<OffsetBlocks>(options, configured));
     radar.start(smoother, motion.time(1.0),
-                priorAtRest(options, ImuNoise(), motion.state(1.0), 9.81, 3.0, skewMounting()));
+                priorAtRest(options, ImuNoise(), motion.state(1.0), 9.81, 3.0, {skewMounting()}));
     for (const double t : {1.05, 1.1, 1.15}) {
       const Eigen::Vector3d true_R = motion.radarVelocity(t, skewMounting().R_RI(), skewMounting().l_I);
       EXPECT_LT((radar.velocityAt(smoother, motion.time(t)).value() - true_R).norm(), 0.01) << t;

@@ -11,12 +11,12 @@ namespace rio_t {
 
 /// A fixed-lag smoother with one radar, without the decisions of a channel.
 struct RadarSmoother {
-  RadarSmoother(const SmootherOptions& options, const Extrinsics& T_IR, const Eigen::Vector3d& g_W,
-                const ImuBuffer& imu)
+  RadarSmoother(const SmootherOptions& options, const CalibrationPrior& configured,
+                const Eigen::Vector3d& g_W, const ImuBuffer& imu)
       : walk(options.time_offset_noise),
         states(options, ImuNoise(), g_W, imu),
-        offset(std::make_shared<OffsetBlocks>(options)),
-        radar(options, T_IR, g_W, imu, offset) {}
+        offset(std::make_shared<OffsetBlocks>(options, configured)),
+        radar(options, configured, g_W, imu, offset) {}
 
   void initialize(Time time, const NodePrior& prior) { radar.start(states, time, prior); }
   bool add(const RadarVelocityMeasurement& z) { return radar.add(states, z); }

@@ -33,7 +33,7 @@ TEST(RosParameters, EveryTypeReachesTheConfiguration) {
   EXPECT_EQ(config.odometry.smoother.window, 2.0);
   EXPECT_EQ(config.odometry.gravity, 9.805);
   EXPECT_EQ(config.imu_topic, "/my/imu");
-  EXPECT_EQ(config.odometry.T_IR.l_I, Eigen::Vector3d(0.0, 0.5, 1.0));
+  EXPECT_EQ(config.odometry.radar.T_IR.l_I, Eigen::Vector3d(0.0, 0.5, 1.0));
 }
 
 TEST(RosParameters, AListOfTheCommandLineArrivesAsText) {
@@ -44,8 +44,8 @@ TEST(RosParameters, AListOfTheCommandLineArrivesAsText) {
   map["left"]["extrinsics_translation"] = std::string("[1, 2.5, 3e-1]");
   map["trajectory_file"] = std::string("[1].txt");  // a text stays one
   const Config config = makeConfig(toParameterEntries(map, "/rio_t"));
-  EXPECT_NEAR(std::abs(mountingOf(config.radars.front().odometry.T_IR.q_IR).roll), M_PI, 1e-9);
-  EXPECT_EQ(config.radars.front().odometry.T_IR.l_I, Eigen::Vector3d(1.0, 2.5, 0.3));
+  EXPECT_NEAR(std::abs(mountingOf(config.radars.front().odometry.radar.T_IR.q_IR).roll), M_PI, 1e-9);
+  EXPECT_EQ(config.radars.front().odometry.radar.T_IR.l_I, Eigen::Vector3d(1.0, 2.5, 0.3));
   EXPECT_EQ(config.trajectory_file, "[1].txt");
 
   XmlRpc::XmlRpcValue broken;
@@ -64,7 +64,7 @@ TEST(RosParameters, TheServerReplacesTheMountingOfTheFileInEitherWay) {
   XmlRpc::XmlRpcValue map;
   for (int k = 0; k < 3; ++k) map["mounting_yaw_pitch_roll_deg"][k] = 60 * k;
   for (ParameterEntry& entry : toParameterEntries(map, "/rio_t")) entries.push_back(std::move(entry));
-  EXPECT_NEAR(mountingOf(makeConfig(entries).odometry.T_IR.q_IR).roll, 2.0 / 3.0 * M_PI, 1e-9);
+  EXPECT_NEAR(mountingOf(makeConfig(entries).odometry.radar.T_IR.q_IR).roll, 2.0 / 3.0 * M_PI, 1e-9);
 }
 
 TEST(RosParameters, FaultsNameTheParameterWithItsNamespace) {
@@ -127,10 +127,10 @@ TEST(RosParameters, NamespacesAreTheSectionsOfRadars) {
   const std::vector<Config> radars = configsOfRadars(makeConfig(toParameterEntries(map, "/rio_t")));
   ASSERT_EQ(radars.size(), 2U);
   EXPECT_EQ(radars[0].radar_topic, "/left");
-  EXPECT_EQ(radars[0].odometry.T_IR.l_I, Eigen::Vector3d(0.0, 0.5, 1.0));
+  EXPECT_EQ(radars[0].odometry.radar.T_IR.l_I, Eigen::Vector3d(0.0, 0.5, 1.0));
   EXPECT_EQ(radars[1].radar_topic, "/right");
-  EXPECT_EQ(radars[1].odometry.ego_velocity.min_range, 1.0);
-  EXPECT_EQ(radars[1].odometry.T_IR.l_I, Eigen::Vector3d(1.0, 2.0, 3.0));
+  EXPECT_EQ(radars[1].odometry.radar.ego_velocity.min_range, 1.0);
+  EXPECT_EQ(radars[1].odometry.radar.T_IR.l_I, Eigen::Vector3d(1.0, 2.0, 3.0));
 }
 
 TEST(RosParameters, FaultsInASectionNameItsNamespace) {

@@ -43,11 +43,11 @@ TEST(SeveralRadars, ASectionOverridesTheTopLevel) {
   EXPECT_EQ(radars[0].radar_topic, "/left");
   EXPECT_EQ(pointCloudFormat(radars[0]).name, "ti_mmwave");
   EXPECT_EQ(radars[0].stamp_source, StampSource::kHeader);
-  EXPECT_EQ(radars[0].odometry.smoother.time_offset_initial, 0.02);
+  EXPECT_EQ(radars[0].odometry.radar.time_offset_initial, 0.02);
   EXPECT_EQ(radars[1].radar_topic, "/right");
   EXPECT_EQ(pointCloudFormat(radars[1]).name, "irs");
   EXPECT_EQ(radars[1].stamp_source, StampSource::kArrival);
-  EXPECT_EQ(radars[1].odometry.smoother.time_offset_initial, 0.01);
+  EXPECT_EQ(radars[1].odometry.radar.time_offset_initial, 0.01);
 
   const std::vector<RadarOptions>& options = config.odometry.radars;
   ASSERT_EQ(options.size(), 2u);
@@ -57,7 +57,7 @@ TEST(SeveralRadars, ASectionOverridesTheTopLevel) {
   EXPECT_EQ(options[1].time_offset_sigma, 0.03);
   EXPECT_EQ(options[1].ego_velocity.min_range, 0.9);
   EXPECT_EQ(options[1].T_IR.l_I, Eigen::Vector3d(1.0, 2.0, 3.0));
-  EXPECT_EQ(config.odometry.T_IR.l_I, OdometryOptions{}.T_IR.l_I);
+  EXPECT_EQ(config.odometry.radar.T_IR.l_I, OdometryOptions{}.radar.T_IR.l_I);
 }
 
 TEST(SeveralRadars, EachHasAFrameOfItsOwn) {
@@ -74,7 +74,7 @@ TEST(SeveralRadars, SectionsAreNestedKeysOfAFile) {
   const std::vector<Config> radars = configsOfRadars(makeConfig(readParameterFile(file.path())));
   ASSERT_EQ(radars.size(), 3u);
   EXPECT_EQ(radars[0].radar_topic, "/left");
-  EXPECT_EQ(radars[0].odometry.T_IR.l_I, Eigen::Vector3d(1.0, 0.0, 0.0));
+  EXPECT_EQ(radars[0].odometry.radar.T_IR.l_I, Eigen::Vector3d(1.0, 0.0, 0.0));
   EXPECT_EQ(radars[1].radar_topic, "/right");
   EXPECT_EQ(radars[2].radar_topic, Config{}.radar_topic);
 }
@@ -84,7 +84,7 @@ TEST(SeveralRadars, LaterEntriesHoldInASectionToo) {
                                                         "radars=[left]", "left/radar_topic=/second"}))
                            .front();
   EXPECT_EQ(radar.radar_topic, "/second");
-  EXPECT_EQ(radar.odometry.ego_velocity.min_range, 0.8);
+  EXPECT_EQ(radar.odometry.radar.ego_velocity.min_range, 0.8);
 }
 
 TEST(SeveralRadars, NamesAreChecked) {
@@ -184,7 +184,7 @@ TEST(SeveralRadars, PrintedConfigurationReadsBack) {
   const Config back = makeConfig(readParameterFile(file.path()));
   EXPECT_EQ(toYaml(back), yaml);
   ASSERT_EQ(back.radars.size(), 3u);
-  EXPECT_EQ(back.radars[0].odometry.smoother.time_offset_initial, 0.1234567890123456);
+  EXPECT_EQ(back.radars[0].odometry.radar.time_offset_initial, 0.1234567890123456);
   EXPECT_EQ(back.radars[0].radar_overrides.x, "a \"b");
   EXPECT_EQ(back.radars[0].radar_frame, "rio_t_radar_left");
   EXPECT_EQ(back.radars[2].radar_frame, "radar");

@@ -191,9 +191,9 @@ TEST(Extrinsics, OfASparseRadarAreTheSameFromDifferentStarts) {
     SimulatedRun run(preset.motion, 2, preset.duration, 2.0);
     run.setup = preset.options;
     run.setup.seed = 2;
-    run.options.T_IR = preset.options.T_IR;
+    run.options.radar.T_IR = preset.options.T_IR;
     const Eigen::Vector3d turn(0.0, (start == 0 ? 7.0 : -7.0) * kDegree, 3.0 * kDegree);
-    run.options.T_IR.q_IR = so3::exp(turn) * run.options.T_IR.q_IR;
+    run.options.radar.T_IR.q_IR = so3::exp(turn) * run.options.radar.T_IR.q_IR;
     run.options.smoother.estimate_extrinsics = EstimateExtrinsics::kRotation;
     run.run();
     found[start] = run.last(0).T_IR;
@@ -226,7 +226,7 @@ TEST(Extrinsics, WithoutExcitationKeepTheirSigma) {
   run.run();
   const SmootherOptions& told = run.options.smoother;
   const Eigen::Matrix<double, 6, 1> sigmas = run.last(0).T_IR_covariance.diagonal().cwiseSqrt();
-  for (int i = 0; i < 3; ++i) EXPECT_GT(sigmas[i], 0.8 * told.extrinsics_translation_sigma) << i;
+  for (int i = 0; i < 3; ++i) EXPECT_GT(sigmas[i], 0.8 * run.options.radar.extrinsics_translation_sigma) << i;
   // The platform moves along x.
   EXPECT_GT(sigmas[3], 0.7 * told.extrinsics_rotation_sigma);
 }
@@ -241,14 +241,15 @@ TEST(Extrinsics, VibrationDoesNotShowThem) {
     run.setup.seed = 1;
     run.setup.imu.accel_vibration = 1.6;
     run.setup.imu.gyro_vibration = 0.04;
-    run.options.T_IR = run.setup.T_IR;
+    run.options.radar.T_IR = run.setup.T_IR;
     run.options.smoother.radar_factor = radar;
     run.options.smoother.estimate_extrinsics = EstimateExtrinsics::kPose;
     run.run();
     const SmootherOptions& told = run.options.smoother;
     const Eigen::Matrix<double, 6, 1> sigmas = run.last(0).T_IR_covariance.diagonal().cwiseSqrt();
     EXPECT_GT(sigmas[3], 0.5 * told.extrinsics_rotation_sigma);
-    for (int i = 0; i < 3; ++i) EXPECT_GT(sigmas[i], 0.9 * told.extrinsics_translation_sigma) << i;
+    for (int i = 0; i < 3; ++i)
+      EXPECT_GT(sigmas[i], 0.9 * run.options.radar.extrinsics_translation_sigma) << i;
   }
 }
 
@@ -263,8 +264,9 @@ TEST(Extrinsics, OfAKartThatShakesHaveHonestSigmas) {
     run.setup.seed = static_cast<std::uint64_t>(seed);
     run.setup.imu.accel_vibration = 1.6;
     run.setup.imu.gyro_vibration = 0.04;
-    run.options.T_IR = preset.options.T_IR;
-    run.options.T_IR.q_IR = so3::exp(Eigen::Vector3d(0.0, 7.0 * kDegree, 0.0)) * run.options.T_IR.q_IR;
+    run.options.radar.T_IR = preset.options.T_IR;
+    run.options.radar.T_IR.q_IR =
+        so3::exp(Eigen::Vector3d(0.0, 7.0 * kDegree, 0.0)) * run.options.radar.T_IR.q_IR;
     run.options.smoother.estimate_extrinsics = EstimateExtrinsics::kRotation;
     run.run();
     const Eigen::Vector3d e = so3::log(run.last(0).T_IR.q_IR * preset.options.T_IR.q_IR.conjugate());
@@ -286,7 +288,7 @@ TEST(Extrinsics, AtRestNothingIsLearnt) {
   const Eigen::Matrix<double, 6, 1> sigmas = std::prev(moving)->T_IR_covariance.diagonal().cwiseSqrt();
   const SmootherOptions& told = run.options.smoother;
   for (int i = 0; i < 3; ++i) {
-    EXPECT_GT(sigmas[i], 0.95 * told.extrinsics_translation_sigma) << i;
+    EXPECT_GT(sigmas[i], 0.95 * run.options.radar.extrinsics_translation_sigma) << i;
     EXPECT_GT(sigmas[3 + i], 0.95 * told.extrinsics_rotation_sigma) << i;
   }
 }

@@ -18,7 +18,7 @@ struct SimulatedRun {
   SimulatedRun(const std::string& name, std::uint64_t seed, double duration, double static_start = 12.0)
       : motion(makeMotion(name, seed, duration, static_start)) {
     setup.seed = seed;
-    options.T_IR = setup.T_IR;
+    options.radar.T_IR = setup.T_IR;
   }
 
   static simulation::Motion makeMotion(const std::string& name, std::uint64_t seed, double duration,

@@ -21,10 +21,10 @@ class Smoother : public ::testing::Test {
     return radarMeasurement(motion, stamp, t_O);
   }
 
-  RadarSmoother make(const SmootherOptions& options) const {
-    RadarSmoother smoother(options, skewMounting(), motion.g_W, imu);
+  RadarSmoother make(const SmootherOptions& options, const CalibrationPrior& radar = {skewMounting()}) const {
+    RadarSmoother smoother(options, radar, motion.g_W, imu);
     smoother.initialize(motion.time(0.5),
-                        priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0, skewMounting()));
+                        priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0, radar));
     return smoother;
   }
 
@@ -125,9 +125,9 @@ TEST_F(Smoother, AHeadingThatIsLostStaysLost) {
         blind.add(s);
       });
   SmootherOptions options;
-  RadarSmoother smoother(options, skewMounting(), motion.g_W, blind);
+  RadarSmoother smoother(options, {skewMounting()}, motion.g_W, blind);
   smoother.initialize(motion.time(0.5),
-                      priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0, skewMounting()));
+                      priorAtRest(options, ImuNoise(), motion.state(0.5), 9.81, 3.0, {skewMounting()}));
   double lost = 0.0;
   for (double stamp = 0.7; stamp < kEnd; stamp += 0.05) {
     smoother.add(measurement(stamp, 0.0));
@@ -221,14 +221,13 @@ TEST_F(Smoother, ScansThatSayNothingOfTheOffsetLeaveIt) {
   EXPECT_NEAR(smoother.t_O(), 0.0, 1e-9);
   const Eigen::MatrixXd P = smoother.newestCovariance();
   EXPECT_GE(std::sqrt(P(StateBlock::kTangent, StateBlock::kTangent)),
-            options.time_offset_sigma * (1.0 - 1e-9));
+            CalibrationPrior().time_offset_sigma * (1.0 - 1e-9));
 }
 
 TEST_F(Smoother, WithoutEstimationTheOffsetStays) {
   SmootherOptions options;
   options.estimate_time_offset = false;
-  options.time_offset_initial = 0.01;
-  RadarSmoother smoother = make(options);
+  RadarSmoother smoother = make(options, {skewMounting(), 0.01});
   for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
     smoother.add(measurement(stamp, 0.03));
     smoother.optimize();
@@ -238,17 +237,14 @@ TEST_F(Smoother, WithoutEstimationTheOffsetStays) {
 }
 
 TEST_F(Smoother, PredictsTheVelocityOfTheNextScan) {
-  SmootherOptions options;
-  options.time_offset_initial = 0.02;
-  options.time_offset_sigma = 0.001;
-  RadarSmoother smoother = make(options);
+  const SmootherOptions options;
+  RadarSmoother smoother = make(options, {skewMounting(), 0.02, 0.001});
   const RadarVelocityMeasurement z = measurement(0.7, 0.02);
   const auto prior = smoother.predict(z.stamp);
   ASSERT_TRUE(prior);
   EXPECT_LT((prior->velocity.v_R - z.v_R).norm(), 2e-3);
   // An offset that is less known makes the prediction less certain, where the platform accelerates.
-  options.time_offset_sigma = 0.1;
-  const auto unsure = make(options).predict(z.stamp);
+  const auto unsure = make(options, {skewMounting(), 0.02, 0.1}).predict(z.stamp);
   EXPECT_GT(unsure->velocity.covariance.trace(), 4.0 * prior->velocity.covariance.trace());
 }
 
@@ -290,11 +286,12 @@ TEST_F(Smoother, AStepOfTheOffsetSurvivesANodeThatIsInsertedBeforeIt) {
   // A new start knows of no step.
   smoother.stepOffset(motion.time(2.3));
   smoother.initialize(motion.time(2.5),
-                      priorAtRest(options, ImuNoise(), motion.state(2.5), 9.81, 3.0, skewMounting()));
+                      priorAtRest(options, ImuNoise(), motion.state(2.5), 9.81, 3.0, {skewMounting()}));
   use(2.6, 0.0);
   use(2.7, 0.0);
   const Eigen::MatrixXd P = smoother.newestCovariance();
-  EXPECT_LT(std::sqrt(P(StateBlock::kTangent, StateBlock::kTangent)), 0.5 * options.time_offset_sigma);
+  EXPECT_LT(std::sqrt(P(StateBlock::kTangent, StateBlock::kTangent)),
+            0.5 * CalibrationPrior().time_offset_sigma);
 }
 
 TEST_F(Smoother, TwoStepsOfTheOffsetWithinAWindowKeepTheirOwn) {
@@ -330,7 +327,7 @@ TEST(PriorAtRest, TiltAndBiasAreKnownTogether) {
   const SmootherOptions options;
   StateBlock x;
   x.q_WI() = so3::exp({0.4, -0.3, 0.9});
-  const NodePrior prior = priorAtRest(options, ImuNoise(), x, 9.81, 3.0, skewMounting());
+  const NodePrior prior = priorAtRest(options, ImuNoise(), x, 9.81, 3.0, {skewMounting()});
   const Eigen::MatrixXd P = (prior.root.J.transpose() * prior.root.J).inverse();
   const Eigen::Matrix3d R_WI = x.q_WI().toRotationMatrix();
   const Eigen::Matrix3d tilt = R_WI * P.topLeftCorner<3, 3>() * R_WI.transpose();

@@ -176,7 +176,7 @@ TEST(TemporalCalibration, CoastingTeachesNothing) {
     const OffsetAt begin = offsetAt(run, 10.0);
     const OffsetAt end = offsetAt(run, 60.0);
     // The ramp tells something, the ride does not.
-    EXPECT_LT(begin.sigma, 0.5 * run.options.smoother.time_offset_sigma);
+    EXPECT_LT(begin.sigma, 0.5 * run.options.radar.time_offset_sigma);
     EXPECT_GT(end.sigma, 0.98 * begin.sigma);
     // It tells tilt and bias apart, on which the offset depended: no more than that.
     const double learnt = std::sqrt(begin.sigma * begin.sigma - end.sigma * end.sigma);

@@ -27,7 +27,7 @@ inline Config twoRadars() {
   for (const std::string& text : texts) entries.push_back(parseAssignment(text));
   Config config = makeConfig(entries);
   for (std::size_t k = 0; k < 2; ++k) {
-    config.radars[k].odometry.T_IR = config.odometry.radars[k].T_IR = kMountings[k];
+    config.radars[k].odometry.radar.T_IR = config.odometry.radars[k].T_IR = kMountings[k];
     config.radars[k].has_default_mounting = false;
   }
   return config;

@@ -93,11 +93,7 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
   problem.start = start.time;
   problem.prior = start.prior;
   problem.radar = start.radar;
-  for (std::size_t k = 0; k < options_.radarCount(); ++k) {
-    const OdometryOptions own = optionsOfRadar(options_, k);
-    problem.radars.push_back({own.T_IR, own.smoother.time_offset_initial, own.smoother.time_offset_sigma,
-                              extrinsicsSigmas(own.smoother)});
-  }
+  for (std::size_t k = 0; k < options_.radarCount(); ++k) problem.radars.push_back(options_.ofRadar(k));
   problem.guess.push_back({start.time, start.prior.x0});
   std::vector<bool> stepped(problem.radars.size(), false);
   // A step found at a scan that is not in the graph counts for the next.

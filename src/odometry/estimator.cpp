@@ -24,13 +24,13 @@ constexpr double kLateScan = 1.0;
 
 std::vector<RadarChannel> radarChannels(const OdometryOptions& options, const Eigen::Vector3d& g_W,
                                         const ImuBuffer& imu) {
-  const auto shared =
-      options.smoother.time_offset_shared ? std::make_shared<OffsetBlocks>(options.smoother) : nullptr;
+  const auto shared = options.smoother.time_offset_shared
+                          ? std::make_shared<OffsetBlocks>(options.smoother, options.radar)
+                          : nullptr;
   std::vector<RadarChannel> channels;
   for (std::size_t k = 0; k < options.radarCount(); ++k) {
-    const OdometryOptions own = optionsOfRadar(options, k);
-    const RadarChannelOptions channel{own.T_IR, own.ego_velocity, own.innovation_gate,
-                                      own.offset_step_detector, own.smoother};
+    const RadarChannelOptions channel{options.ofRadar(k), options.innovation_gate,
+                                      options.offset_step_detector, options.smoother};
     channels.emplace_back(channel, g_W, imu, shared);
   }
   return channels;
@@ -176,11 +176,11 @@ void Estimator::seeLandmarks(const LandmarkMap::Prediction& expected, const Rada
                              const RadarChannel& radar, ScanResult& result) {
   Block* node = smoother_.nodeAt(radar.nodeTime(result.scan.stamp));
   if (node == nullptr || answer.at_rest || answer.ego_velocity.status != EgoVelocityStatus::kMoving) return;
-  const OdometryOptions own = optionsOfRadar(options_, result.scan.radar);
+  const EgoVelocityOptions& own = options_.ofRadar(result.scan.radar).ego_velocity;
   const PointVariances& noise = radar.noise();
   // The noise that the Dopplers show does not contain how far an echo wanders over an object.
-  const double azimuth_sigma = std::max(own.ego_velocity.azimuth_sigma, std::sqrt(noise.azimuth));
-  const double elevation_sigma = std::max(own.ego_velocity.elevation_sigma, std::sqrt(noise.elevation));
+  const double azimuth_sigma = std::max(own.azimuth_sigma, std::sqrt(noise.azimuth));
+  const double elevation_sigma = std::max(own.elevation_sigma, std::sqrt(noise.elevation));
   constexpr double kMinLevel = 0.5;  // steeper than 60 degrees, an azimuth says little
   std::vector<Detection> detections;
   for (const std::size_t i : answer.ego_velocity.inliers) {

@@ -9,7 +9,7 @@ namespace rio_t {
 
 Initializer::Initializer(const OdometryOptions& options)
     : options_(options), rest_(options.initialization, options.gravity) {
-  for (std::size_t k = 0; k < options.radarCount(); ++k) motion_.emplace_back(optionsOfRadar(options, k));
+  for (std::size_t k = 0; k < options.radarCount(); ++k) motion_.emplace_back(options, options.ofRadar(k));
 }
 
 bool Initializer::isMoving(Time from, Time to) const {
@@ -37,7 +37,6 @@ std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, con
     radar_contradicts_rest_ =
         rest ? isMoving(rest->time - rest->duration, rest->time) : radar_contradicts_rest_;
     if (rest && !radar_contradicts_rest_) {
-      const OdometryOptions of_first = optionsOfRadar(options_, 0);
       StateBlock x;
       x.q_WI() = rest->q_WI;
       x.b_g() = rest->b_g;
@@ -48,7 +47,7 @@ std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, con
       noise.gyro_density = std::max(noise.gyro_density, std::sqrt(newest.gyro_mean_noise));
       return Initialization{
           rest->time,
-          priorAtRest(of_first.smoother, noise, x, options_.gravity, rest->duration, of_first.T_IR),
+          priorAtRest(options_.smoother, noise, x, options_.gravity, rest->duration, options_.ofRadar(0)),
           0,
           InitializedFrom::kRest,
           {}};

@@ -47,11 +47,11 @@ Eigen::Quaterniond withGravity(const Eigen::Quaterniond& q_WI, const Eigen::Vect
 
 }  // namespace
 
-MotionInitializer::MotionInitializer(const OdometryOptions& options)
+MotionInitializer::MotionInitializer(const OdometryOptions& options, const CalibrationPrior& radar)
     : options_(options.motion_initialization),
       smoother_(options.smoother),
       g_W_(0.0, 0.0, -options.gravity),
-      T_IR_(options.T_IR),
+      radar_(radar),
       noise_(options.imu_noise) {}
 
 double MotionInitializer::imuHistory() const {
@@ -157,9 +157,9 @@ NodePrior MotionInitializer::priorOf(const Line& line, const PoseAnchor& anchor)
   x.q_WI() = withGravity(anchor.q_WI, line.g_I);
   x.p_W() = anchor.p_W;
   x.v_W() = x.q_WI() * line.v_I;
-  prior.t_O0 = smoother_.time_offset_initial;
-  prior.T_IR0 = T_IR_;
-  const Eigen::VectorXd calibration = calibrationSigmas(smoother_);
+  prior.t_O0 = radar_.time_offset_initial;
+  prior.T_IR0 = radar_.T_IR;
+  const Eigen::VectorXd calibration = calibrationSigmas(smoother_, radar_);
   const Eigen::Index size = StateBlock::kTangent + calibration.size();
   Eigen::MatrixXd& J = prior.root.J;
   J = Eigen::MatrixXd::Zero(size, size);
@@ -200,9 +200,10 @@ MotionInitializer::Line MotionInitializer::fitLine(const Velocities& velocities,
   Eigen::Vector3d mean_y = Eigen::Vector3d::Zero();
   Eigen::Vector3d mean_Ty = Eigen::Vector3d::Zero();
   for (const Velocity& z : velocities) {
-    const Time tau = z.stamp - smoother_.time_offset_initial;
+    const Time tau = z.stamp - radar_.time_offset_initial;
     const ImuDelta delta = integrate(imu, time, tau, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
-    const Eigen::Vector3d v_I = T_IR_.q_IR * z.v_R - imu.at(tau).angular_velocity.cross(T_IR_.l_I);
+    const Eigen::Vector3d v_I =
+        radar_.T_IR.q_IR * z.v_R - imu.at(tau).angular_velocity.cross(radar_.T_IR.l_I);
     const Eigen::Vector3d y = delta.dR * v_I - delta.dv;
     mean_T += delta.dt;
     mean_TT += delta.dt * delta.dt;
@@ -306,7 +307,7 @@ MotionInitializer::OffsetGains MotionInitializer::offsetGains(const Velocities& 
     OffsetScan scan;
     scan.tau = z.stamp - t_O;
     scan.x = carried(x, time, scan.tau, imu, g_W_);
-    scan.T_IR = T_IR_;
+    scan.T_IR = radar_.T_IR;
     scan.measured = z.covariance;
     widths.add(scan);
     scans.push_back(scan);

@@ -7,8 +7,8 @@
 
 namespace rio_t {
 
-OffsetBlocks::OffsetBlocks(const SmootherOptions& options)
-    : options_(options), manifold_(std::make_shared<VectorManifold>(1)) {}
+OffsetBlocks::OffsetBlocks(const SmootherOptions& options, const CalibrationPrior& radar)
+    : options_(options), radar_(radar), manifold_(std::make_shared<VectorManifold>(1)) {}
 
 Block& OffsetBlocks::start(Window& window, double t_O) {
   epochs_ = {{Time(), add(window, t_O)}};
@@ -36,7 +36,7 @@ void OffsetBlocks::step(FixedLagSmoother& smoother, Time stamp) {
   Window& window = smoother.window();
   Block& before = *epochs_.back().block;
   std::shared_ptr<Block> after = add(window, value());
-  window.add(std::make_unique<RandomWalkFactor>(Eigen::VectorXd::Constant(1, options_.time_offset_sigma)),
+  window.add(std::make_unique<RandomWalkFactor>(Eigen::VectorXd::Constant(1, radar_.time_offset_sigma)),
              {&before, after.get()});
   before.is_retired = true;
   epochs_.push_back({stamp, std::move(after)});

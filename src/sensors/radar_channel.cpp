@@ -48,9 +48,10 @@ VelocityPrior zeroVelocity(double sigma) {
 RadarChannel::RadarChannel(const RadarChannelOptions& options, const Eigen::Vector3d& g_W,
                            const ImuBuffer& imu, std::shared_ptr<OffsetBlocks> offset)
     : options_(options),
-      estimator_(options.ego_velocity),
-      in_window_(options.smoother, options.T_IR, g_W, imu,
-                 offset ? std::move(offset) : std::make_shared<OffsetBlocks>(options.smoother)),
+      estimator_(options.radar.ego_velocity),
+      in_window_(
+          options.smoother, options.radar, g_W, imu,
+          offset ? std::move(offset) : std::make_shared<OffsetBlocks>(options.smoother, options.radar)),
       offset_widths_(imu, g_W),
       step_detector_(options.offset_step_detector, options.smoother.max_time_offset),
       offset_uncertainty_(options.smoother.huber_threshold) {}
@@ -311,7 +312,8 @@ void RadarChannel::judge(const RadarScan& scan, const VelocityPrior& prior, bool
   if (!hasMajority(alone)) return;
   // A crowd may outnumber the static world. What then sides with the prediction alone is its witness: noise
   // does not give so many of them.
-  const bool is_outvoted = countOthers(measured.inliers, alone.inliers) >= options_.ego_velocity.min_inliers;
+  const bool is_outvoted =
+      countOthers(measured.inliers, alone.inliers) >= options_.radar.ego_velocity.min_inliers;
   if (is_outvoted && !isValid(measured.status)) return;
   if (!is_outvoted) answer.alone = scaled(alone, 1.0 / scale);
   answer.innovation = innovation(scan.stamp, prior, is_outvoted ? measured : alone, nullptr)

@@ -10,11 +10,11 @@
 
 namespace rio_t {
 
-RadarInWindow::RadarInWindow(const SmootherOptions& options, const Extrinsics& T_IR,
+RadarInWindow::RadarInWindow(const SmootherOptions& options, const CalibrationPrior& radar,
                              const Eigen::Vector3d& g_W, const ImuBuffer& imu,
                              std::shared_ptr<OffsetBlocks> offset)
     : options_(options),
-      T_IR_(T_IR),
+      radar_(radar),
       model_{options.time_offset_model, options.max_time_offset, g_W, &imu},
       loss_(huberLoss(options.huber_threshold)),
       extrinsics_manifold_(std::make_shared<ExtrinsicsManifold>(options.estimate_extrinsics)),
@@ -39,10 +39,10 @@ void RadarInWindow::start(FixedLagSmoother& smoother, Time time, const NodePrior
 void RadarInWindow::join(FixedLagSmoother& smoother) {
   Window& window = smoother.window();
   std::vector<Block*> blocks;
-  if (!options_.time_offset_shared) blocks.push_back(&offset_->start(window, options_.time_offset_initial));
-  for (Block* block : addExtrinsics(window, T_IR_)) blocks.push_back(block);
+  if (!options_.time_offset_shared) blocks.push_back(&offset_->start(window, radar_.time_offset_initial));
+  for (Block* block : addExtrinsics(window, radar_.T_IR)) blocks.push_back(block);
   const Eigen::VectorXd sigmas =
-      options_.time_offset_shared ? extrinsicsSigmas(options_) : calibrationSigmas(options_);
+      options_.time_offset_shared ? extrinsicsSigmas(options_, radar_) : calibrationSigmas(options_, radar_);
   if (!blocks.empty()) smoother.addCalibrationPrior(std::move(blocks), sigmas);
   smoother.settle();
 }

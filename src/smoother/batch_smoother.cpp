@@ -125,7 +125,7 @@ void BatchSmoother::start(const BatchProblem& problem, const StateBlock& x,
     };
     if (!options_.time_offset_shared)
       add(*offsets[k], Eigen::VectorXd::Constant(1, problem.radars[k].time_offset_sigma));
-    if (is_estimated) add(extrinsics, problem.radars[k].extrinsics_sigmas);
+    if (is_estimated) add(extrinsics, extrinsicsSigmas(options_, problem.radars[k]));
   }
   addPrior(window, known, problem.prior.root);
   motion.x = storedMotion(x);
@@ -263,7 +263,7 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
   for (const BatchScan& scan : problem.scans) t_O.push_back(scan.t_O);
   BatchSolution solution;
   solution.nodes = problem.guess;
-  for (const BatchRadar& radar : problem.radars) solution.extrinsics.push_back(radar.T_IR);
+  for (const CalibrationPrior& radar : problem.radars) solution.extrinsics.push_back(radar.T_IR);
 
   double moved_before = std::numeric_limits<double>::infinity();
   double share = 1.0;  // of its move that an offset takes

@@ -6,24 +6,24 @@
 
 namespace rio_t {
 
-Eigen::VectorXd extrinsicsSigmas(const SmootherOptions& options) {
+Eigen::VectorXd extrinsicsSigmas(const SmootherOptions& options, const CalibrationPrior& radar) {
   Eigen::Matrix<double, 6, 1> sigmas;
   sigmas << Eigen::Vector3d::Constant(options.extrinsics_rotation_sigma),
-      Eigen::Vector3d::Constant(options.extrinsics_translation_sigma);
+      Eigen::Vector3d::Constant(radar.extrinsics_translation_sigma);
   return estimatedPart(sigmas, options.estimate_extrinsics);
 }
 
-Eigen::VectorXd calibrationSigmas(const SmootherOptions& options) {
-  const Eigen::VectorXd extrinsics = extrinsicsSigmas(options);
+Eigen::VectorXd calibrationSigmas(const SmootherOptions& options, const CalibrationPrior& radar) {
+  const Eigen::VectorXd extrinsics = extrinsicsSigmas(options, radar);
   Eigen::VectorXd sigmas(1 + extrinsics.size());
-  sigmas << options.time_offset_sigma, extrinsics;
+  sigmas << radar.time_offset_sigma, extrinsics;
   return sigmas;
 }
 
 NodePrior priorAtRest(const SmootherOptions& options, const ImuNoise& noise, const StateBlock& x,
-                      double gravity, double duration, const Extrinsics& T_IR) {
+                      double gravity, double duration, const CalibrationPrior& radar) {
   using S = StateBlock;
-  const Eigen::VectorXd calibration = calibrationSigmas(options);
+  const Eigen::VectorXd calibration = calibrationSigmas(options, radar);
   const Eigen::Index size = S::kTangent + calibration.size();
   SquareRoot known{Eigen::MatrixXd(0, size), {}};
   const auto add = [&](const Eigen::MatrixXd& rows, Eigen::Index first, double sigma) {
@@ -53,7 +53,7 @@ NodePrior priorAtRest(const SmootherOptions& options, const ImuNoise& noise, con
   J.middleCols<3>(S::kBa).setIdentity();
   add(J, 0, sigma);
   known.r0.setZero(known.J.rows());
-  return {x, options.time_offset_initial, T_IR, compressed(known)};
+  return {x, radar.time_offset_initial, radar.T_IR, compressed(known)};
 }
 
 }  // namespace rio_t

@@ -58,8 +58,7 @@ struct Initialization {
 /// smoother must not use the same scans again. Not thread-safe.
 class MotionInitializer {
  public:
-  /// `options`: as this radar has them, see optionsOfRadar.
-  explicit MotionInitializer(const OdometryOptions& options);
+  MotionInitializer(const OdometryOptions& options, const CalibrationPrior& radar);
 
   /// Velocity of one scan, estimated without a prior. Invalid ones are ignored.
   void add(Time stamp, const EgoVelocity& velocity);
@@ -117,7 +116,7 @@ class MotionInitializer {
   MotionInitializerOptions options_;  // read-only after construction, as the next three
   SmootherOptions smoother_;
   Eigen::Vector3d g_W_;
-  Extrinsics T_IR_;
+  CalibrationPrior radar_;
   ImuNoise noise_;
 
   Velocities velocities_;  // by stamp

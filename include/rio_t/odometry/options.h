@@ -9,12 +9,11 @@
 #include "rio_t/landmarks/options.h"
 #include "rio_t/odometry/health_monitor.h"
 #include "rio_t/odometry/motion_initializer.h"
-#include "rio_t/radar/ego_velocity.h"
-#include "rio_t/radar/extrinsics.h"
 #include "rio_t/sensors/barometer_channel.h"
 #include "rio_t/sensors/ground_vehicle_channel.h"
 #include "rio_t/sensors/innovation_gate.h"
 #include "rio_t/sensors/offset_step_detector.h"
+#include "rio_t/sensors/radar_channel.h"
 #include "rio_t/smoother/options.h"
 
 namespace rio_t {
@@ -26,25 +25,14 @@ enum class InitMode {
   kAuto,    ///< "auto": from rest; as kMotion after `init_motion_after` without rest
 };
 
-/// The options that each of several radars has for itself.
-struct RadarOptions {
-  Extrinsics T_IR;
-  EgoVelocityOptions ego_velocity;
-  double time_offset_initial = 0.0;            ///< [s]
-  double time_offset_sigma = 0.075;            ///< [s] prior
-  double extrinsics_translation_sigma = 0.05;  ///< [m] prior, per axis
-};
-
 /// All options of the estimator. The defaults suit an ADIS16448 and a TI IWR6843AOP.
 struct OdometryOptions {
   double gravity = 9.81;  ///< [m/s^2] magnitude
   ImuNoise imu_noise;
-  Extrinsics T_IR;
   InitMode init_mode = InitMode::kAuto;
   double init_motion_after = 5.0;  ///< [s] of IMU without rest, for kAuto
   StaticInitializerOptions initialization;
   MotionInitializerOptions motion_initialization;
-  EgoVelocityOptions ego_velocity;
   RestOptions rest;
   SmootherOptions smoother;
   InnovationGateOptions innovation_gate;
@@ -61,9 +49,10 @@ struct OdometryOptions {
   double max_radar_gap = 0.5;         ///< [s] without a scan; a longer gap is counted
   std::size_t max_queued_scans = 50;  ///< scans that may wait for the IMU or the solver
 
-  /// Several radars, by RadarScan::radar. Empty: one, with the members above.
-  std::vector<RadarOptions> radars;
+  RadarOptions radar;                ///< the only one
+  std::vector<RadarOptions> radars;  ///< several, by RadarScan::radar. Empty: `radar` alone
   std::size_t radarCount() const { return radars.empty() ? 1 : radars.size(); }
+  const RadarOptions& ofRadar(std::size_t k) const { return radars.empty() ? radar : radars.at(k); }
 };
 
 /// The options that may change while the estimator runs, for all radars.
@@ -73,8 +62,5 @@ struct Tuning {
 };
 Tuning tuningOf(const OdometryOptions& options);
 void apply(const Tuning& tuning, OdometryOptions& options);
-
-/// The options as one radar has them: without `radars`, and with those that this radar has for itself.
-OdometryOptions optionsOfRadar(const OdometryOptions& options, std::size_t radar);
 
 }  // namespace rio_t

@@ -16,7 +16,7 @@ namespace rio_t {
 /// offset, a new block takes over. Not thread-safe.
 class OffsetBlocks {
  public:
-  explicit OffsetBlocks(const SmootherOptions& options);
+  OffsetBlocks(const SmootherOptions& options, const CalibrationPrior& radar);
 
   /// Adds the first block to a window that starts.
   Block& start(Window& window, double t_O);
@@ -29,7 +29,7 @@ class OffsetBlocks {
   std::size_t steps() const { return steps_; }  ///< so far, of all radars that share t_O
   const Block& newest() const { return *epochs_.back().block; }
   /// t_O [s]; before the start, the value it is configured to begin at.
-  double value() const { return epochs_.empty() ? options_.time_offset_initial : newest().x[0]; }
+  double value() const { return epochs_.empty() ? radar_.time_offset_initial : newest().x[0]; }
 
  private:
   /// Scans from `since` on share one offset.
@@ -39,7 +39,8 @@ class OffsetBlocks {
   };
   std::shared_ptr<Block> add(Window& window, double t_O) const;
 
-  SmootherOptions options_;  // read-only after construction, as the next
+  SmootherOptions options_;  // read-only after construction, as the next two
+  CalibrationPrior radar_;
   std::shared_ptr<const Manifold> manifold_;
   std::vector<Epoch> epochs_;  ///< those still in the window
   std::size_t steps_ = 0;

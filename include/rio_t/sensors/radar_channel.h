@@ -16,9 +16,13 @@
 
 namespace rio_t {
 
-struct RadarChannelOptions {
-  Extrinsics T_IR;
+/// The options that each radar has for itself.
+struct RadarOptions : CalibrationPrior {
   EgoVelocityOptions ego_velocity;
+};
+
+struct RadarChannelOptions {
+  RadarOptions radar;
   InnovationGateOptions gate;
   OffsetStepDetectorOptions offset_step_detector;
   SmootherOptions smoother;
@@ -96,7 +100,7 @@ class RadarChannel {
   Time nodeTime(Time stamp) const { return in_window_.nodeTime(stamp); }
   double offset() const { return in_window_.offset(); }  ///< t_O [s]
   Extrinsics extrinsics() const { return in_window_.extrinsics(); }
-  const Extrinsics& configuredExtrinsics() const { return options_.T_IR; }
+  const Extrinsics& configuredExtrinsics() const { return options_.radar.T_IR; }
   /// The blocks that are estimated: t_O, which is always there, and the extrinsics.
   std::vector<const Block*> calibration() const { return in_window_.calibration(); }
   Block& extrinsicsBlock() const { return in_window_.extrinsicsBlock(); }  ///< for terms on it

@@ -29,9 +29,8 @@ struct RadarVelocityPrediction {
 /// One radar in the window: its calibration blocks, t_O and extrinsics, and its terms. Not thread-safe.
 class RadarInWindow {
  public:
-  /// `T_IR` is the mounting as configured. `offset` is shared by the radars that share t_O. `imu` must
-  /// outlive it.
-  RadarInWindow(const SmootherOptions& options, const Extrinsics& T_IR, const Eigen::Vector3d& g_W,
+  /// `offset` is shared by the radars that share t_O. `imu` must outlive it.
+  RadarInWindow(const SmootherOptions& options, const CalibrationPrior& radar, const Eigen::Vector3d& g_W,
                 const ImuBuffer& imu, std::shared_ptr<OffsetBlocks> offset);
 
   /// Starts `smoother` with the prior on its first state and on the calibration of this radar.
@@ -71,7 +70,7 @@ class RadarInWindow {
   bool addTerm(FixedLagSmoother& smoother, Measurement z, const std::shared_ptr<ceres::LossFunction>& loss);
 
   SmootherOptions options_;  // read-only after construction, as the next four
-  Extrinsics T_IR_;
+  CalibrationPrior radar_;
   RadarMotionModel model_;
   std::shared_ptr<ceres::LossFunction> loss_;
   std::shared_ptr<const Manifold> extrinsics_manifold_;

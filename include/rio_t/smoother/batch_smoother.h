@@ -38,19 +38,11 @@ struct BatchScan {
   }
 };
 
-/// A radar as it is known before its scans.
-struct BatchRadar {
-  Extrinsics T_IR;                    ///< as configured, and where the solver starts
-  double time_offset_initial = 0.0;   ///< [s] prior on t_O
-  double time_offset_sigma = 0.075;   ///< [s] its sigma, and that of a step
-  Eigen::VectorXd extrinsics_sigmas;  ///< prior on T_IR, see extrinsicsSigmas
-};
-
 struct BatchProblem {
   Time start;             ///< of the first node
   NodePrior prior;        ///< on it, and on the calibration of `radar`
   std::size_t radar = 0;  ///< which one the prior knows
-  std::vector<BatchRadar> radars;
+  std::vector<CalibrationPrior> radars;
   std::vector<BatchScan> scans;
   /// Initial states in order of time, at least one. The IMU carries them to the nodes.
   std::vector<NodeEstimate> guess;

@@ -12,9 +12,9 @@ namespace rio_t {
 
 /// Sigmas of the extrinsics of a radar as configured, in the tangent of ExtrinsicsManifold [rad, m]. Empty if
 /// they are not estimated.
-Eigen::VectorXd extrinsicsSigmas(const SmootherOptions& options);
+Eigen::VectorXd extrinsicsSigmas(const SmootherOptions& options, const CalibrationPrior& radar);
 /// Sigmas of the calibration of a radar as configured: t_O [s], then those of the extrinsics.
-Eigen::VectorXd calibrationSigmas(const SmootherOptions& options);
+Eigen::VectorXd calibrationSigmas(const SmootherOptions& options, const CalibrationPrior& radar);
 
 /// Prior on the first node and on the calibration of a radar.
 struct NodePrior {
@@ -26,8 +26,8 @@ struct NodePrior {
 
 /// Prior on the first state after `duration` seconds at rest. Yaw and position define W. The mean of the
 /// accelerometer is gravity plus b_a, so tilt and b_a are known far better together than each by itself
-/// (docs/method.md, eq. 7a). `gravity` [m/s^2]. `T_IR` is the mounting as configured.
+/// (docs/method.md, eq. 7a). `gravity` [m/s^2].
 NodePrior priorAtRest(const SmootherOptions& options, const ImuNoise& noise, const StateBlock& x,
-                      double gravity, double duration, const Extrinsics& T_IR);
+                      double gravity, double duration, const CalibrationPrior& radar);
 
 }  // namespace rio_t

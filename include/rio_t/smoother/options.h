@@ -3,6 +3,7 @@
 #include "rio_t/factors/extrinsics_manifold.h"
 #include "rio_t/factors/radar_motion.h"
 #include "rio_t/graph/solver.h"
+#include "rio_t/radar/extrinsics.h"
 
 namespace rio_t {
 
@@ -21,8 +22,6 @@ struct SmootherOptions {
 
   bool estimate_time_offset = true;  ///< false: LC-RIO, offset fixed at time_offset_initial
   TimeOffsetModel time_offset_model = TimeOffsetModel::kImu;
-  double time_offset_initial = 0.0;   ///< [s]
-  double time_offset_sigma = 0.075;   ///< [s] prior
   double time_offset_noise = 2.0e-5;  ///< [s/sqrt(s)] random walk of the offset, while it is constant
   /// [m/s^2] A scan with less acceleration does not tell the offset: at rest and at constant velocity it
   /// shows only noise.
@@ -32,7 +31,6 @@ struct SmootherOptions {
 
   EstimateExtrinsics estimate_extrinsics = EstimateExtrinsics::kNone;
   double extrinsics_rotation_sigma = 0.17;       ///< [rad] prior, per axis: 10 degrees
-  double extrinsics_translation_sigma = 0.05;    ///< [m] prior, per axis
   double extrinsics_rotation_noise = 1.0e-5;     ///< [rad/sqrt(s)] random walk, per axis
   double extrinsics_translation_noise = 1.0e-5;  ///< [m/sqrt(s)] likewise
 
@@ -42,6 +40,14 @@ struct SmootherOptions {
   /// [rad/s] besides the noise of the mean at rest: the in-run stability of an ADIS16448, 14.5 deg/h
   double prior_sigma_gyro_bias = 7.0e-5;
   double prior_sigma_accel_bias = 0.1;  ///< [m/s^2]
+};
+
+/// The calibration of one radar as configured: the estimate starts there, with these sigmas.
+struct CalibrationPrior {
+  Extrinsics T_IR;
+  double time_offset_initial = 0.0;            ///< [s]
+  double time_offset_sigma = 0.075;            ///< [s] also of a step
+  double extrinsics_translation_sigma = 0.05;  ///< [m] per axis
 };
 
 }  // namespace rio_t

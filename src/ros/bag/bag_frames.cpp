@@ -29,7 +29,7 @@ std::vector<Extrinsics> lookUp(const tf2::BufferCore& tf, const std::vector<Conf
   missing->clear();
   std::vector<Extrinsics> T_IR;
   for (std::size_t k = 0; k < radars.size(); ++k) {
-    T_IR.push_back(radars[k].odometry.T_IR);
+    T_IR.push_back(radars[k].odometry.radar.T_IR);
     if (radars[k].extrinsics_source != ExtrinsicsSource::kTf) continue;
     try {
       T_IR.back() = radarExtrinsics(tf, radars[k], imu_frame, cloud_frames[k]);
@@ -88,9 +88,9 @@ Config withExtrinsicsOfBag(Config config, const Bags& bags) {
     throw bagError(bags.name(),
                    missing + (frames.empty() ? "; the bag has no tf" : "; the bag's tf has: " + frames));
   }
-  config.odometry.T_IR = T_IR.front();
+  config.odometry.radar.T_IR = T_IR.front();
   for (std::size_t k = 0; k < config.radars.size(); ++k)
-    config.radars[k].odometry.T_IR = config.odometry.radars[k].T_IR = T_IR[k];
+    config.radars[k].odometry.radar.T_IR = config.odometry.radars[k].T_IR = T_IR[k];
   return config;
 }
 

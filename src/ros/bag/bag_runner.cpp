@@ -99,10 +99,10 @@ void checkOutcome(const std::string& bag, const Config& config, const RunSummary
 void takeOff(const std::vector<double>& offsets, Config* config) {
   const auto of = [](double offset, Config* radar) {
     radar->radar_stamp_shift -= offset;
-    radar->odometry.smoother.time_offset_initial = 0.0;
+    radar->odometry.radar.time_offset_initial = 0.0;
   };
   if (config->radars.empty()) return of(offsets.front(), config);
-  config->odometry.smoother.time_offset_initial = 0.0;
+  config->odometry.radar.time_offset_initial = 0.0;
   for (std::size_t k = 0; k < config->radars.size(); ++k) {
     of(offsets[k], &config->radars[k]);
     config->odometry.radars[k].time_offset_initial = 0.0;

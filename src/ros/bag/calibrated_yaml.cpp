@@ -31,25 +31,24 @@ ParameterValue writtenList(const Vector& values, const Vector& configured, doubl
 /// The keys of a radar that are calibrated.
 ProposedKeys calibratedKeys(const RadarCalibration& calibration, const Config& configured, bool pose) {
   constexpr double kMicro = 1e6, kNano = 1e9;  // in one
-  const SmootherOptions& smoother = configured.odometry.smoother;
-  const Extrinsics& mounting = configured.odometry.T_IR;
+  const CalibrationPrior& prior = configured.odometry.radar;
   const bool offset_found =
       calibration.axes[static_cast<std::size_t>(CalibrationAxis::kOffset)].verdict == Verdict::kObserved;
   ProposedKeys keys;
-  keys.set("extrinsics_translation", writtenList(calibration.T_IR.l_I, mounting.l_I, kMicro));
+  keys.set("extrinsics_translation", writtenList(calibration.T_IR.l_I, prior.T_IR.l_I, kMicro));
   if (pose)
     keys.set("extrinsics_translation_sigma",
              ParameterValue{std::max(rounded(calibration.leverArmSigma(), kMicro), 1e-6)},
              "The next run goes on with the estimate from here.");
   keys.set("extrinsics_rotation_xyzw",
-           writtenList(calibration.T_IR.q_IR.coeffs(), mounting.q_IR.coeffs(), kNano));
+           writtenList(calibration.T_IR.q_IR.coeffs(), prior.T_IR.q_IR.coeffs(), kNano));
   // The next run starts from this sigma. Its offset may differ by as much as the step detector ignores.
   const double least = configured.odometry.offset_step_detector.min_change;
   const OffsetEstimate offset =
       offset_found
           ? OffsetEstimate{rounded(calibration.offset.t_O, kMicro),
                            std::max({rounded(calibration.offset.sigma, kMicro), least, 1.0 / kMicro})}
-          : OffsetEstimate{smoother.time_offset_initial, smoother.time_offset_sigma};
+          : OffsetEstimate{prior.time_offset_initial, prior.time_offset_sigma};
   keys.set("time_offset_initial", ParameterValue{offset.t_O});
   keys.set("time_offset_sigma", ParameterValue{offset.sigma});
   return keys;

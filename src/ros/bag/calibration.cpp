@@ -24,11 +24,9 @@ Config batchConfig(const Config& config) {
 
 RadarCalibrationEstimate configuredOf(const Config& radar) {
   const SmootherOptions& smoother = radar.odometry.smoother;
-  RadarCalibrationEstimate configured;
-  configured.offset = {smoother.time_offset_initial,
-                       smoother.estimate_time_offset ? smoother.time_offset_sigma : 0.0};
-  configured.extrinsics = {radar.odometry.T_IR, extrinsicsSigmas(smoother).cwiseAbs2().asDiagonal()};
-  return configured;
+  const CalibrationPrior& prior = radar.odometry.radar;
+  return {{prior.time_offset_initial, smoother.estimate_time_offset ? prior.time_offset_sigma : 0.0},
+          {prior.T_IR, extrinsicsSigmas(smoother, prior).cwiseAbs2().asDiagonal()}};
 }
 
 RadarCalibrationEstimate foundOf(const RadarSummary& radar, EstimateExtrinsics estimated) {

@@ -236,7 +236,7 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
     radar->keys.set("extrinsics_translation",
                     listOf({rounded(l.x(), 100.0), rounded(l.y(), 100.0), rounded(l.z(), 100.0)}),
                     "Origin of the radar in the IMU frame, roughly [m]. Measure it with a tape.");
-    const double least = SmootherOptions().extrinsics_translation_sigma;
+    const double least = CalibrationPrior().extrinsics_translation_sigma;
     radar->keys.set("extrinsics_translation_sigma",
                     ParameterValue{rounded(std::max(least, l_sigma.maxCoeff()), 100.0)},
                     "Standard deviation of extrinsics_translation [m].");
@@ -244,9 +244,8 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
   radar->ok("offset", fixedText(1e3 * search.offset, 0) + " +- " + fixedText(1e3 * search.offset_sigma, 0) +
                           " ms, roughly; the odometry estimates it");
   constexpr double kKnown = 0.03;  // [s]
-  const SmootherOptions defaults;
-  const double bound = 0.8 * defaults.max_time_offset;
-  if (std::abs(search.offset) > 0.8 * defaults.time_offset_sigma && search.offset_sigma < kKnown &&
+  const double bound = 0.8 * SmootherOptions().max_time_offset;
+  if (std::abs(search.offset) > 0.8 * CalibrationPrior().time_offset_sigma && search.offset_sigma < kKnown &&
       !radar->isSparse())
     radar->keys.set("time_offset_initial",
                     ParameterValue{rounded(std::clamp(search.offset, -bound, bound), 1e3)},
@@ -259,7 +258,7 @@ void compareWithConfigured(const MountingSearch& search, const ParameterEntries&
                            RadarInspection* radar) {
   if (!search.enough || search.rotation_sigma.maxCoeff() > kObservedTurn || radar->isSparse()) return;
   const Config known = makeConfig(configured);
-  const double turn = known.odometry.T_IR.q_IR.angularDistance(search.q_IR);
+  const double turn = known.odometry.radar.T_IR.q_IR.angularDistance(search.q_IR);
   if (isMountingConfigured(configured) && turn > kFarApart)
     radar->odd("mounting", "the configured mounting and the one that the bag shows are " + degrees(turn) +
                                " degrees apart");

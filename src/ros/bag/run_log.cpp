@@ -6,16 +6,16 @@ namespace rio_t {
 namespace {
 
 /// The estimates of a radar before its first scan: what was configured.
-RadarEstimate before(const OdometryOptions& options) {
-  const SmootherOptions& smoother = options.smoother;
+RadarEstimate before(const SmootherOptions& smoother, const CalibrationPrior& configured) {
   RadarEstimate radar;
-  radar.final_offset_s = smoother.time_offset_initial;
-  if (smoother.estimate_time_offset) radar.final_offset_sigma_s = smoother.time_offset_sigma;
+  radar.final_offset_s = configured.time_offset_initial;
+  if (smoother.estimate_time_offset) radar.final_offset_sigma_s = configured.time_offset_sigma;
   if (smoother.estimate_extrinsics == EstimateExtrinsics::kNone) return radar;
   radar.extrinsics.emplace();
-  radar.extrinsics->configured = radar.extrinsics->T_IR = options.T_IR;
-  radar.extrinsics->covariance = extrinsicsCovariance(
-      extrinsicsSigmas(smoother).cwiseAbs2().asDiagonal().toDenseMatrix(), smoother.estimate_extrinsics);
+  radar.extrinsics->configured = radar.extrinsics->T_IR = configured.T_IR;
+  radar.extrinsics->covariance =
+      extrinsicsCovariance(extrinsicsSigmas(smoother, configured).cwiseAbs2().asDiagonal().toDenseMatrix(),
+                           smoother.estimate_extrinsics);
   return radar;
 }
 
@@ -28,7 +28,8 @@ RunLog::RunLog(const Config& config, RunOutput* output, const std::vector<double
       max_bridged_gap_(config.odometry.imu_input_check.max_bridged_gap),
       keeps_trajectory_(keeps_trajectory) {
   for (std::size_t k = 0; k < taken_off.size(); ++k) {
-    Radar& radar = radars_.emplace_back(Radar{before(optionsOfRadar(config.odometry, k)), taken_off[k]});
+    Radar& radar = radars_.emplace_back(
+        Radar{before(config.odometry.smoother, config.odometry.ofRadar(k)), taken_off[k]});
     radar.estimate.final_offset_s += radar.taken_off;
   }
 }

@@ -49,7 +49,7 @@ class RadarCauses {
   }
 
   void addPointFilter() {
-    const EgoVelocityOptions& o = config_.odometry.ego_velocity;
+    const EgoVelocityOptions& o = config_.odometry.radar.ego_velocity;
     const auto filter = [&](PointVerdict verdict, const std::string& name, const std::string& are,
                             const std::string& remedy) {
       const std::uint64_t taken = pointsOf(radar_, verdict);

@@ -16,7 +16,7 @@ EvidenceCollector::EvidenceCollector(const Config& config)
     : coasting_after_(config.odometry.health.coasting_after),
       max_bridged_gap_(config.odometry.imu_input_check.max_bridged_gap) {
   for (const Config& radar : configsOfRadars(config)) {
-    filters_.emplace_back(radar.odometry.ego_velocity);
+    filters_.emplace_back(radar.odometry.radar.ego_velocity);
     evidence_.radars.emplace_back().name = radar.radar_name;
     last_used_.emplace_back();
   }

@@ -74,7 +74,7 @@ std::map<std::string, std::string> publishedTypes() {
 }  // namespace
 
 LiveOdometry::Radar::Radar(const Config& its_config) : config(its_config), format(pointCloudFormat(config)) {
-  if (config.extrinsics_source == ExtrinsicsSource::kParameters) T_IR = config.odometry.T_IR;
+  if (config.extrinsics_source == ExtrinsicsSource::kParameters) T_IR = config.odometry.radar.T_IR;
 }
 
 LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
@@ -271,7 +271,7 @@ void LiveOdometry::startSessionWhenReady() {
     T_IR.push_back(*radar.T_IR);
   }
   OdometryOptions options = live_config_.odometry;
-  options.T_IR = T_IR.front();
+  options.radar.T_IR = T_IR.front();
   for (std::size_t k = 0; k < options.radars.size(); ++k) options.radars[k].T_IR = T_IR.at(k);
   {
     const std::lock_guard<std::mutex> lock(mutex_);

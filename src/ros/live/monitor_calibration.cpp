@@ -91,8 +91,8 @@ void LiveMonitor::describeExtrinsics(Status& status, std::size_t radar) const {
     const Eigen::Vector3d lever_sigma = sigma.head<3>();
     status.add("lever_arm_from_configured_m", listOf(result.T_IR.l_I - result.configured_T_IR.l_I));
     status.add("lever_arm_sigma_m", listOf(lever_sigma));
-    const std::string lever =
-        axesAbove(lever_sigma, kObserved * options.extrinsics_translation_sigma, "lever arm along ");
+    const std::string lever = axesAbove(
+        lever_sigma, kObserved * of.config.odometry.radar.extrinsics_translation_sigma, "lever arm along ");
     if (!lever.empty()) appendItem(&kept, lever);
   }
   const std::string far =

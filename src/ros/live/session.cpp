@@ -12,9 +12,8 @@ constexpr std::size_t kMaxScansInFlight = 1000;  // bounds the memory of arrival
 LiveSession::LiveSession(const Config& config, const OdometryOptions& options)
     : gyro_density_(options.imu_noise.gyro_density), odometry_(options) {
   for (const Config& radar : configsOfRadars(config)) {
-    const Extrinsics T_IR = optionsOfRadar(options, radars_.size()).T_IR;
     stampers_.push_back({ScanStamper(stampingOptions(radar)), {}});
-    radars_.push_back({OffsetObservability(), T_IR, std::nullopt});
+    radars_.push_back({OffsetObservability(), options.ofRadar(radars_.size()).T_IR, std::nullopt});
   }
 }
 

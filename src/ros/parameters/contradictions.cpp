@@ -17,16 +17,17 @@ void addContradictions(const Config& config, std::vector<std::string>* faults) {
   if (config.radar_frame == config.base_link_frame || config.radar_frame == config.odom_frame)
     faults->push_back(section + "radar_frame: expected a frame of its own, got \"" + config.radar_frame +
                       "\", which is base_link_frame or odom_frame");
-  const EgoVelocityOptions& radar = config.odometry.ego_velocity;
-  const SmootherOptions& smoother = config.odometry.smoother;
-  if (radar.min_range >= radar.max_range) {
+  const RadarOptions& radar = config.odometry.radar;
+  const EgoVelocityOptions& points = radar.ego_velocity;
+  const double max_time_offset = config.odometry.smoother.max_time_offset;
+  if (points.min_range >= points.max_range) {
     faults->push_back(section + "radar_min_range: expected less than radar_max_range (" +
-                      numberText(radar.max_range) + " m), got " + numberText(radar.min_range));
+                      numberText(points.max_range) + " m), got " + numberText(points.min_range));
   }
-  if (std::abs(smoother.time_offset_initial) > smoother.max_time_offset) {
+  if (std::abs(radar.time_offset_initial) > max_time_offset) {
     faults->push_back(section + "time_offset_initial: expected at most max_time_offset (" +
-                      numberText(smoother.max_time_offset) + " s) in size, got " +
-                      numberText(smoother.time_offset_initial));
+                      numberText(max_time_offset) + " s) in size, got " +
+                      numberText(radar.time_offset_initial));
   }
   if (config.stamp_source == StampSource::kTrigger && config.trigger_topic.empty())
     faults->push_back(section + "trigger_topic: expected a topic, since stamp_source is trigger, got \"\"");
@@ -54,11 +55,11 @@ void addContradictionsAmong(const std::vector<Config>& radars, std::vector<std::
       if (radar.radar_topic == radars[other].radar_topic) same("radar_topic", radar.radar_topic);
       if (radar.radar_frame == radars[other].radar_frame) same("radar_frame", radar.radar_frame);
     }
-    const SmootherOptions& first = radars.front().odometry.smoother;
-    const SmootherOptions& smoother = radar.odometry.smoother;
-    if (!smoother.time_offset_shared) continue;
-    if (smoother.time_offset_initial != first.time_offset_initial ||
-        smoother.time_offset_sigma != first.time_offset_sigma) {
+    if (!radar.odometry.smoother.time_offset_shared) continue;
+    const RadarOptions& first = radars.front().odometry.radar;
+    const RadarOptions& own = radar.odometry.radar;
+    if (own.time_offset_initial != first.time_offset_initial ||
+        own.time_offset_sigma != first.time_offset_sigma) {
       faults->push_back(radar.radar_name +
                         "/: expected time_offset_initial and time_offset_sigma as those of " +
                         radars.front().radar_name + ", since time_offset_shared is true");

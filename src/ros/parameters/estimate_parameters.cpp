@@ -186,11 +186,11 @@ void listTimeOffset(ParameterList& list, Config& c) {
       "gives each radar its own offset.");
   list.ofRadar(true);
   list.first().number(
-      "time_offset_initial", "s", anyNumber(), smoother.time_offset_initial,
+      "time_offset_initial", "s", anyNumber(), c.odometry.radar.time_offset_initial,
       "The estimate of the offset starts here. A positive offset means that the stamps are late. Set "
       "it to what an earlier run or `calibrate` found; zero works for offsets of up to 0.2 s.");
   list.number(
-      "time_offset_sigma", "s", above(0), smoother.time_offset_sigma,
+      "time_offset_sigma", "s", above(0), c.odometry.radar.time_offset_sigma,
       "The estimate of the offset starts with this standard deviation. Lower it after a calibration. Raise "
       "it if you raise max_time_offset.");
   list.ofRadar(false);

@@ -191,7 +191,7 @@ void listExtrinsics(ParameterList& list, Config& c) {
       "rio_t then estimates it, whatever estimate_extrinsics says: with none only the lever arm, with "
       "rotation the whole pose. If one of several radars has none, the lever arms of all are estimated.");
   list.first().rotation(
-      "extrinsics_rotation_xyzw", c.odometry.T_IR.q_IR,
+      "extrinsics_rotation_xyzw", c.odometry.radar.T_IR.q_IR,
       "This quaternion turns radar vectors (x right, y forward, z up) into the IMU frame. An error of a "
       "degree bends the path by about 2 % of its length. If you know the rotation only to 10 degrees, set "
       "estimate_extrinsics: pose, or run `calibrate`.");

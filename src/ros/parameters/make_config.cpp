@@ -64,12 +64,6 @@ void setParameter(const ParameterEntry& entry, const std::string& section, const
   }
 }
 
-RadarOptions radarOptions(const Config& config) {
-  const OdometryOptions& odometry = config.odometry;
-  return {odometry.T_IR, odometry.ego_velocity, odometry.smoother.time_offset_initial,
-          odometry.smoother.time_offset_sigma, odometry.smoother.extrinsics_translation_sigma};
-}
-
 /// "left, right"
 std::string namesOf(const std::vector<Config>& radars) {
   std::string names;
@@ -237,7 +231,7 @@ Config makeConfig(const ParameterEntries& entries) {
   resolveMounting(&config);
   for (Config& radar : config.radars) {
     resolveMounting(&radar);
-    config.odometry.radars.push_back(radarOptions(radar));
+    config.odometry.radars.push_back(radar.odometry.radar);
   }
   resolveEstimate(&config);
   // Judged only where each value is right by itself: otherwise a default might be blamed.

@@ -58,15 +58,15 @@ void beginMounting(const ParameterEntries& entries, const std::string& section, 
 }
 
 void resolveMounting(Config* config) {
-  SmootherOptions& smoother = config->odometry.smoother;
-  config->odometry.T_IR.l_I = config->lever_arm.value_or(Eigen::Vector3d::Zero());
+  CalibrationPrior& radar = config->odometry.radar;
+  radar.T_IR.l_I = config->lever_arm.value_or(Eigen::Vector3d::Zero());
   if (config->lever_arm_sigma > 0.0) {
-    smoother.extrinsics_translation_sigma = config->lever_arm_sigma;
+    radar.extrinsics_translation_sigma = config->lever_arm_sigma;
   } else if (!hasLeverArm(*config)) {
-    smoother.extrinsics_translation_sigma = kUnmeasuredLeverArm;
+    radar.extrinsics_translation_sigma = kUnmeasuredLeverArm;
   }
 
-  Eigen::Quaterniond& q_IR = config->odometry.T_IR.q_IR;
+  Eigen::Quaterniond& q_IR = radar.T_IR.q_IR;
   if (config->mounting && !config->rotation_replaces_mounting) {
     const Eigen::Vector3d angles = kDegree * *config->mounting;
     q_IR = rotationOf({angles[0], angles[1], angles[2]});

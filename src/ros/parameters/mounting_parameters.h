@@ -19,7 +19,8 @@ constexpr double kUnmeasuredLeverArm = 0.5;
 void beginMounting(const ParameterEntries& entries, const std::string& section, Config* config,
                    std::vector<std::string>* faults);
 
-/// Call it once all entries are set: what was given becomes odometry.T_IR, with the sigma of its lever arm.
+/// Call it once all entries are set: what was given becomes odometry.radar.T_IR, with the sigma of its lever
+/// arm.
 void resolveMounting(Config* config);
 
 /// Call it next: what is estimated of the mountings. If one lever arm is missing, all are estimated.

@@ -189,7 +189,7 @@ void listImu(ParameterList& list, Config& c) {
 }
 
 void listRadar(ParameterList& list, Config& c) {
-  EgoVelocityOptions& radar = c.odometry.ego_velocity;
+  EgoVelocityOptions& radar = c.odometry.radar.ego_velocity;
   list.group("Radar: which points count, and the velocity from them");
   list.ofRadar(true);
   listPointFilter(list, radar);

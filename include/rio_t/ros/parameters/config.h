@@ -99,12 +99,12 @@ struct Config {
   std::string trajectory_file = "rio_t_trajectory.txt";
 
   ExtrinsicsSource extrinsics_source = ExtrinsicsSource::kParameters;
-  // makeConfig turns these three into odometry.T_IR and odometry.smoother.
+  // makeConfig turns these three into odometry.radar and odometry.smoother.
   std::optional<Eigen::Vector3d> lever_arm;  ///< [m] in I; nothing: nobody has measured it
   double lever_arm_sigma = 0.0;              ///< [m] per axis; 0: by whether `lever_arm` is given
   EstimateExtrinsics estimate_extrinsics = EstimateExtrinsics::kNone;
-  // Two other ways to give the rotation of T_IR. makeConfig turns them into odometry.T_IR, which always has
-  // the axes of RIO, and sets them back to their defaults.
+  // Two other ways to give the rotation of T_IR. makeConfig turns them into odometry.radar.T_IR, which always
+  // has the axes of RIO, and sets them back to their defaults.
   std::optional<Eigen::Vector3d> mounting;  ///< yaw, pitch, roll as MountingAngles, but in degrees
   ExtrinsicsAxes extrinsics_axes = ExtrinsicsAxes::kRightForwardUp;
   bool rotation_replaces_mounting = false;  ///< the quaternion comes from a later source than `mounting`
