@@ -63,16 +63,11 @@ BatchResult BatchOdometry::solve(const RadarInertialOdometry::Start& start) cons
 }
 
 RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) const {
-  RadarVelocityMeasurement z;
-  z.stamp = result.scan.stamp;
-  z.v_R = result.ego_velocity.v_R;
-  z.covariance = result.ego_velocity.covariance;
+  RadarVelocityMeasurement z{result.taken, result.ego_velocity.v_R, result.ego_velocity.covariance};
+  z.linear_from_t_O.reset();  // the batch sets its own
   z.covariance.diagonal() +=
       (model_error_scale_ / result.model_error_scale - 1.0) * result.ego_velocity.added_variance;
   z.covariance.diagonal().array() += result.rate_variance;
-  z.offset_gain = result.offset_gain;
-  z.offset_half_width = result.offset_half_width;
-  z.slow_half_width = result.slow_half_width;
   return z;
 }
 

@@ -103,16 +103,16 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   const char* const not_own = answer.ego_velocity.points.empty() ? "too_few_points" : "too_few_inliers";
   if (seen.has_borrowed && answer.at_rest && answer.ego_velocity.inliers.empty()) return reject(not_own);
   informOffset(seen, answer);
-  const RadarScanTime taken{scan.stamp, answer.offset_gain, answer.offset_half_width, answer.slow_half_width,
-                            offset()};
+  answer.taken.stamp = scan.stamp;
+  answer.taken.linear_from_t_O = offset();
   if (isTightlyCoupled() && seen.velocity.status == EgoVelocityStatus::kMoving) {
-    answer.doppler = dopplerOf(scan, seen, taken, answer.rate_variance);
+    answer.doppler = dopplerOf(scan, seen, answer);
     if (!answer.doppler) return reject(not_own);
   }
 
   Innovations d;
   if (seen.prior) d.all = innovation(scan.stamp, *seen.prior, seen.velocity, &seen);
-  if (answer.offset_gain > 0.0) d.own = ownInnovation(scan, seen, answer.rate_variance);
+  if (answer.taken.offset_gain > 0.0) d.own = ownInnovation(scan, seen, answer.rate_variance);
   answer.offset_stepped = d.own && step_detector_.stepped(*d.own, seen.prediction->scan.R_WR());
   if (answer.offset_stepped) {
     in_window_.stepOffset(smoother, scan.stamp);
@@ -122,7 +122,7 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
     return reject("innovation");
   const bool added = answer.doppler
                          ? in_window_.add(smoother, *answer.doppler)
-                         : in_window_.add(smoother, RadarVelocityMeasurement{taken, seen.velocity.v_R,
+                         : in_window_.add(smoother, RadarVelocityMeasurement{answer.taken, seen.velocity.v_R,
                                                                              seen.velocity.covariance});
   if (!added) return reject("older_than_window");
   gate_.used();
@@ -131,26 +131,26 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
 }
 
 void RadarChannel::informOffset(Seen& seen, RadarAnswer& answer) {
-  answer.offset_gain = offsetGain(seen);
-  if (seen.moves && offset_widths_.gain() > 0.0) answer.slow_half_width = seen.dv_dt_O.half_width;
-  if (answer.offset_gain == 0.0) return;
+  answer.taken.offset_gain = offsetGain(seen);
+  if (seen.moves && offset_widths_.gain() > 0.0) answer.taken.slow_half_width = seen.dv_dt_O.half_width;
+  if (answer.taken.offset_gain == 0.0) return;
   // An offset that is wrong by c changes the velocity by (J + noise) c. J is in the factor; this is the
   // noise.
-  answer.offset_half_width = seen.dv_dt_O.half_width;
+  answer.taken.offset_half_width = seen.dv_dt_O.half_width;
   answer.rate_variance = seen.dv_dt_O.variance * seen.prediction->t_O_variance;
   seen.velocity.covariance.diagonal().array() += answer.rate_variance;
-  const Eigen::Vector3d J = answer.offset_gain * seen.dv_dt_O.mean;
+  const Eigen::Vector3d J = answer.taken.offset_gain * seen.dv_dt_O.mean;
   answer.offset_information = J.dot(seen.velocity.covariance.ldlt().solve(J));
 }
 
 std::optional<DopplerMeasurement> RadarChannel::dopplerOf(const RadarScan& scan, const Seen& seen,
-                                                          const RadarScanTime& taken,
-                                                          double rate_variance) const {
+                                                          const RadarAnswer& answer) const {
   const EgoVelocity world = staticWorld(scan, seen);
   if (world.inliers.empty()) return std::nullopt;
   return DopplerMeasurement{
-      taken, std::make_shared<DopplerLikelihood>(estimator_.likelihood(scan, world.inliers, world.v_R)),
-      seen.velocity.added_variance.array() + rate_variance, options_.smoother.huber_threshold};
+      answer.taken,
+      std::make_shared<DopplerLikelihood>(estimator_.likelihood(scan, world.inliers, world.v_R)),
+      seen.velocity.added_variance.array() + answer.rate_variance, options_.smoother.huber_threshold};
 }
 
 std::optional<Innovation> RadarChannel::ownInnovation(const RadarScan& scan, const Seen& seen,

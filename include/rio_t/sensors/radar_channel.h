@@ -43,14 +43,12 @@ struct ScanAnswer {
   /// Health judges this innovation. None if no majority of the points agrees on a velocity without the
   /// prediction.
   std::optional<Innovation> innovation;
-  std::optional<DopplerMeasurement> doppler;     ///< its points, if they and not the velocity count
-  std::string rejected_because;                  ///< snake case, empty if used; keys of `scans_rejected`
-  bool at_rest = false;                          ///< the IMU shows rest, and the points do not deny it
-  bool offset_stepped = false;                   ///< t_O stepped before this scan
-  double offset_gain = 0.0;                      ///< see OffsetEvidence; 0: the scan does not tell the offset
-  double offset_half_width = kOffsetHalfWidth;   ///< of the mean of the IMU in the derivative [s]
-  double slow_half_width = kMaxOffsetHalfWidth;  ///< see SlowMotion [s]
-  double offset_information = 0.0;               ///< what the scan tells of the offset, if used [1/s^2]
+  std::optional<DopplerMeasurement> doppler;  ///< its points, if they and not the velocity count
+  std::string rejected_because;               ///< snake case, empty if used; keys of `scans_rejected`
+  bool at_rest = false;                       ///< the IMU shows rest, and the points do not deny it
+  bool offset_stepped = false;                ///< t_O stepped before this scan
+  RadarScanTime taken{Time(), 0.0};           ///< with a gain of 0, the scan does not tell the offset
+  double offset_information = 0.0;            ///< what the scan tells of the offset, if used [1/s^2]
   /// Per axis, what the noise of the derivative adds to what went into the window (18e) [m^2/s^2].
   double rate_variance = 0.0;
 };
@@ -151,7 +149,7 @@ class RadarChannel {
   void informOffset(Seen& seen, RadarAnswer& answer);
   /// Makes the term of the scan's own points. None if no point is of the static world.
   std::optional<DopplerMeasurement> dopplerOf(const RadarScan& scan, const Seen& seen,
-                                              const RadarScanTime& taken, double rate_variance) const;
+                                              const RadarAnswer& answer) const;
   /// Computes Innovations::own of a scan that tells the offset. None if it cannot be judged.
   std::optional<Innovation> ownInnovation(const RadarScan& scan, const Seen& seen,
                                           double rate_variance) const;
