@@ -69,12 +69,7 @@ void RadarChannel::join(FixedLagSmoother& smoother) {
 void RadarChannel::forget() {
   forgetOffset();
   offset_widths_.clear();
-  pool_.clear();
-  rest_pool_.clear();
-  judged_at_.reset();
-  learned_at_.reset();
-  alone_at_.reset();
-  gate_.used();
+  memory_ = {};
 }
 
 void RadarChannel::forgetOffset() {
@@ -95,8 +90,8 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   };
   followOffsetSteps();
   // Before its points count a second time, for health or in a pool.
-  if (in_window_.has(scan.stamp) || judged_at_ == scan.stamp) return reject("duplicate_stamp");
-  judged_at_ = scan.stamp;
+  if (in_window_.has(scan.stamp) || memory_.judged_at == scan.stamp) return reject("duplicate_stamp");
+  memory_.judged_at = scan.stamp;
   Seen seen = see(scan, context, smoother, answer);
   if (!isValid(seen.velocity.status)) return reject(toString(answer.ego_velocity.status));
   // The velocity comes from borrowed points alone.
@@ -118,14 +113,15 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
     in_window_.stepOffset(smoother, scan.stamp);
     followOffsetSteps();
   }
-  if (d.all && gate_.rejects(options_.gate, *d.all, seen.velocity, seen.tilt_is_known, context.last_used))
+  if (d.all &&
+      memory_.gate.rejects(options_.gate, *d.all, seen.velocity, seen.tilt_is_known, context.last_used))
     return reject("innovation");
   const bool added = answer.doppler
                          ? in_window_.add(smoother, *answer.doppler)
                          : in_window_.add(smoother, RadarVelocityMeasurement{answer.taken, seen.velocity.v_R,
                                                                              seen.velocity.covariance});
   if (!added) return reject("older_than_window");
-  gate_.used();
+  memory_.gate.used();
   learn(scan, seen, d, answer);
   return answer;
 }
@@ -173,7 +169,7 @@ void RadarChannel::learn(const RadarScan& scan, const Seen& seen, const Innovati
     step_detector_.follow(changeWithOffset(seen), followed);
   }
   // A borrowed point must not teach twice.
-  if (!seen.is_own || sharesPoints(seen, learned_at_)) return;
+  if (!seen.is_own || sharesPoints(seen, memory_.learned_at)) return;
   if (seen.canBeJudged())
     answer.used =
         UsedInnovation{*d.all, seen.velocity.v_R, seen.prior->covariance, seen.prediction->scan.R_WR()};
@@ -182,7 +178,7 @@ void RadarChannel::learn(const RadarScan& scan, const Seen& seen, const Innovati
       answer.doppler && !seen.has_borrowed ? answer.doppler->points.get() : nullptr;
   estimator_.learn(seen.pooled, seen.velocity, seen.prior, seen.pooled.points.size() - scan.points.size(),
                    world);
-  learned_at_ = scan.stamp;
+  memory_.learned_at = scan.stamp;
 }
 
 RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& context,
@@ -192,10 +188,10 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
   if (seen.prediction) seen.prior = seen.prediction->velocity;
   seen.tilt_is_known = !seen.prediction || seen.prediction->tilt_sigma < kMaxTiltSigma;
   const auto velocityAt = [&](Time stamp) { return in_window_.velocityAt(smoother, stamp); };
-  seen.pooled = isTightlyCoupled() ? pool_.filled(scan, velocityAt) : scan;
+  seen.pooled = isTightlyCoupled() ? memory_.pool.filled(scan, velocityAt) : scan;
   seen.borrowed_since = scan.stamp - ScanPool::kMaxAge;
   const double scale = context.model_error_scale;
-  if (!context.rest) rest_pool_.clear();
+  if (!context.rest) memory_.rest_pool = {};
   if (context.rest) answer.at_rest = confirmsRest(*context.rest, scan, scale, seen);
   seen.has_borrowed = seen.pooled.points.size() > scan.points.size();
   if (answer.at_rest) seen.prior = zeroVelocity(context.rest->velocity_sigma);
@@ -209,8 +205,8 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
   answer.ego_velocity = measure(seen.pooled, expected, scale);
   answer.was_predicted = seen.prior.has_value();
   if (seen.prior) judge(seen.pooled, *seen.prior, expected.has_value(), scale, answer);
-  if (answer.alone && sharesPoints(seen, alone_at_)) answer.alone.reset();
-  if (answer.alone) alone_at_ = scan.stamp;
+  if (answer.alone && sharesPoints(seen, memory_.alone_at)) answer.alone.reset();
+  if (answer.alone) memory_.alone_at = scan.stamp;
 
   seen.velocity = answer.ego_velocity;
   answer.ego_velocity = withOwnPoints(std::move(answer.ego_velocity), scan);
@@ -229,13 +225,13 @@ bool RadarChannel::confirmsRest(const Rest& rest, const RadarScan& scan, double 
   bool confirms = rest.shakes ? alone.status == EgoVelocityStatus::kZeroVelocity : !alone.denies_rest;
   // Few points show soon that a platform sets off, many show how slowly it creeps.
   for (std::size_t enough = RestPool::kMost / 16; confirms && enough <= RestPool::kMost; enough *= 4) {
-    RadarScan filled = rest_pool_.filled(scan, enough);
+    RadarScan filled = memory_.rest_pool.filled(scan, enough);
     confirms = !estimator_.deniesRest(filled);
     if (confirms || !isTightlyCoupled()) continue;
-    if (filled.points.size() > scan.points.size()) seen.borrowed_since = rest_pool_.oldest();
+    if (filled.points.size() > scan.points.size()) seen.borrowed_since = memory_.rest_pool.oldest();
     seen.pooled = std::move(filled);
   }
-  rest_pool_.add(estimator_.slowPoints(scan));
+  memory_.rest_pool.add(estimator_.slowPoints(scan));
   return confirms;
 }
 

@@ -176,15 +176,19 @@ class RadarChannel {
   RadarChannelOptions options_;  // changed by setGate() alone
   EgoVelocityEstimator estimator_;
   RadarInWindow in_window_;
-  ScanPool pool_;
-  RestPool rest_pool_;
-  std::optional<Time> judged_at_;              ///< the last scan, used or not
-  std::optional<Time> learned_at_, alone_at_;  ///< of the points: those borrowed count once
+  /// What the scans of one window have shown.
+  struct Memory {
+    ScanPool pool;
+    RestPool rest_pool;
+    std::optional<Time> judged_at;             ///< the last scan, used or not
+    std::optional<Time> learned_at, alone_at;  ///< of the points: those borrowed count once
+    InnovationGate gate;
+  };
+  Memory memory_;
   OffsetWidths offset_widths_;
   OffsetStepDetector step_detector_;
   OffsetUncertainty offset_uncertainty_;
   std::size_t offset_steps_ = 0;  ///< those that the last two know of
-  InnovationGate gate_;
 };
 
 }  // namespace rio_t

@@ -22,7 +22,6 @@ class RestPool {
   /// The points of the scan, followed by those of the newest scans that were added, until there are `enough`.
   RadarScan filled(const RadarScan& scan, std::size_t enough) const;
   Time oldest() const { return scans_.front().stamp; }  ///< stamp of the oldest scan; the pool is not empty
-  void clear() { scans_.clear(); }
 
  private:
   std::deque<RadarScan> scans_;

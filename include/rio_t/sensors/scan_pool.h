@@ -26,7 +26,6 @@ class ScanPool {
 
   /// The points of the scan, followed by the borrowed ones.
   RadarScan filled(const RadarScan& scan, const VelocityAt& velocityAt);
-  void clear() { scans_.clear(); }
 
  private:
   std::deque<RadarScan> scans_;
