@@ -63,18 +63,11 @@ double OffsetEvidence::varianceOfChange(Time tau, const OffsetDerivative& deriva
 void OffsetEvidence::add(const OffsetScan& scan, const OffsetDerivative& derivative) {
   const double fade = fading(last_, scan.tau, kMemory);
   last_ = scan.tau;
-  const Eigen::Matrix3d R_WR = scan.R_WR();
   const Eigen::Matrix3d W = (scan.predicted + scan.measured).inverse();
-  const Eigen::Matrix3d K = scan.share();
-  const auto change = [&](const Eigen::Vector3d& now, Eigen::Vector3d& followed) {
-    Eigen::Vector3d changed = now - R_WR.transpose() * followed;
-    followed += R_WR * K * changed;
-    return changed;
-  };
-  const Eigen::Vector3d mean = change(derivative.mean, mean_);
-  const Eigen::Vector3d before = change(derivative.before, before_);
-  const Eigen::Vector3d after = change(derivative.after, after_);
-  const double share = K.trace() / 3.0;
+  const Eigen::Vector3d mean = scan.follow(derivative.mean, mean_);
+  const Eigen::Vector3d before = scan.follow(derivative.before, before_);
+  const Eigen::Vector3d after = scan.follow(derivative.after, after_);
+  const double share = scan.share().trace() / 3.0;
   const double variance = varianceOfChange(scan.tau, derivative, share);
   const double unfollowed = 1.0 - constant_;
   constant_ += share * unfollowed;

@@ -53,9 +53,7 @@ bool OffsetStepDetector::stepped(const Innovation& innovation, const Eigen::Matr
 }
 
 void OffsetStepDetector::follow(const Eigen::Vector3d& J_O, const OffsetScan& scan) {
-  const Eigen::Matrix3d R_WR = scan.R_WR();
-  for (Average& average : averages_)
-    average.followed += R_WR * scan.share() * (J_O - R_WR.transpose() * average.followed);
+  for (Average& average : averages_) scan.follow(J_O, average.followed);
 }
 
 }  // namespace rio_t
