@@ -205,7 +205,6 @@ LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<
     landmarks_[prediction.landmarks[column]].point.sigma =
         std::sqrt(prediction.state.covariance.diagonal().segment<3>(at).sum());
   }
-  answer.matched = association.matches.size();
   for (const std::size_t k : association.conflicts) landmarks_[k].conflicts += 1.0;
   candidates_.forgetOld(prediction.measured, smoother.node(0).time);
   addCandidates(prediction, detections, association, node, delta, extrinsics);

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -18,7 +17,6 @@ struct LandmarkPoint {
 
 /// The map's answer to a scan.
 struct LandmarkAnswer {
-  std::size_t matched = 0;   ///< landmarks that the scan saw
   bool dropped_map = false;  ///< map and estimate contradicted each other
   std::vector<LandmarkPoint> map;
 };

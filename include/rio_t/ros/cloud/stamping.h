@@ -76,7 +76,6 @@ class ScanStamper {
   /// At the end of the data: decides what is held with what there is.
   std::vector<RadarScan> finish();
 
-  std::size_t held() const { return held_.size(); }
   /// Scans given up: "trigger_missing", "imu_missing", "too_many_held" or "stamp_out_of_range".
   const std::map<std::string, std::uint64_t>& givenUp() const { return given_up_; }
 
