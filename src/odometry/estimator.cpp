@@ -25,7 +25,7 @@ constexpr double kLateScan = 1.0;
 std::vector<RadarChannel> radarChannels(const OdometryOptions& options, const Eigen::Vector3d& g_W,
                                         const ImuBuffer& imu) {
   const auto shared = options.smoother.time_offset_shared
-                          ? std::make_shared<OffsetBlocks>(options.smoother, options.radar)
+                          ? std::make_shared<OffsetBlocks>(options.smoother, options.ofRadar(0))
                           : nullptr;
   std::vector<RadarChannel> channels;
   for (std::size_t k = 0; k < options.radarCount(); ++k) {

@@ -102,7 +102,6 @@ void takeOff(const std::vector<double>& offsets, Config* config) {
     radar->odometry.radar.time_offset_initial = 0.0;
   };
   if (config->radars.empty()) return of(offsets.front(), config);
-  config->odometry.radar.time_offset_initial = 0.0;
   for (std::size_t k = 0; k < config->radars.size(); ++k) {
     of(offsets[k], &config->radars[k]);
     config->odometry.radars[k].time_offset_initial = 0.0;
