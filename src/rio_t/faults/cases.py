@@ -115,6 +115,8 @@ CASES = [
          Survives(5.0, 8.0, counted=("imu_clock_restart",), world_goes_on=False), lasting(0), shift=30.0),
     Case("clock_jump_back", inject.clock_jump(-5.0, record=False),
          Survives(5.0, 8.0, counted=("imu_clock_restart",), world_goes_on=False), lasting(0), shift=-5.0),
+    Case("clock_step_back_50ms", inject.clock_jump(-0.05, record=False),
+         Survives(1.0, 2.0, counted=("imu_clock_back",)), lasting(0), shift=-0.05),
     Case("recorder_clock_jump", inject.clock_jump(30.0, stamps=False), Survives(5.0, 8.0, world_goes_on=False),
          lasting(0), settings=("stamp_source=arrival",)),
     Case("bag_loop", inject.bag_loop, Survives(VELOCITY, POSITION, counted=("imu_clock_restart",), world_goes_on=False),
