@@ -103,8 +103,28 @@ TEST_F(CheckBag, AnInvertedAxisIsNamed) {
     return true;
   };
   const BagCheck odd = check(rewritten("inverted", changes));
-  expectLine(odd, FindingLevel::kOdd, {"left-handed"});
+  expectLine(odd, FindingLevel::kOdd, {"axes", "left-handed", "Or the accelerometer is negated"});
   expectRuns(odd);
+}
+
+/// The same data but for the direction of gravity: only a person can tell them apart.
+TEST_F(CheckBag, ANegatedAccelerometerMayLookLikeAnInvertedAxis) {
+  const BagCheck odd = check(rewritten("negated", {[](sensor_msgs::Imu& imu) {
+                                         imu.linear_acceleration.x *= -1.0;
+                                         imu.linear_acceleration.y *= -1.0;
+                                         imu.linear_acceleration.z *= -1.0;
+                                         return true;
+                                       }}));
+  const std::string how_to_tell =
+      "at rest, ROS expects +9.81 m/s^2 along the direction that points up, and this IMU shows it along -z. "
+      "If -z points down, the accelerometer is negated";
+  expectLine(odd, FindingLevel::kOdd,
+             {"axes", "the axes of the cloud are left-handed", "Or the accelerometer is negated",
+              "mirror image", how_to_tell});
+  expectLine(odd, FindingLevel::kOdd,
+             {"IMU axes", "gravity is on -z", "Either z of the IMU is not up",
+              "Or the accelerometer is negated", "mirror image", how_to_tell});
+  expectLine(odd, FindingLevel::kOdd, {"trial run", "If the accelerometer is negated", "mirror image"});
 }
 
 TEST_F(CheckBag, AxesOfAnotherConventionAreNamed) {

@@ -30,7 +30,8 @@ struct MountingSearch {
   int sign = 1;
   /// Whether the IMU tells the sign: the best mounting of the other sign fits so much worse [sigma^2].
   double sign_significance = 0.0;
-  /// The ranges say one sign, the IMU the other: one axis of the cloud is inverted, or two are swapped.
+  /// The ranges say one sign, the IMU the other: one axis of the cloud is inverted, or two are swapped, or
+  /// the accelerometer is negated.
   bool mirrored = false;
   Eigen::Quaterniond q_IR = Eigen::Quaterniond::Identity();
   Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Zero();   ///< [rad] about the axes of I; pi: not observed

@@ -101,6 +101,18 @@ void leaveOutCopies(std::vector<RadarInspection>* radars, const Recording& recor
   }
 }
 
+/// The odometry runs well with a negated accelerometer, too: its track is a mirror image.
+void doubtMirrored(const std::vector<RadarInspection>& radars, BagCheck* check) {
+  const bool is_mirrored = std::any_of(radars.begin(), radars.end(),
+                                       [](const RadarInspection& each) { return each.search.mirrored; });
+  if (!is_mirrored) return;
+  for (Finding& finding : check->findings) {
+    if (finding.subject != "trial run" || finding.level != FindingLevel::kOk) continue;
+    finding.level = FindingLevel::kOdd;
+    finding.text += ". If the accelerometer is negated, this track is a mirror image: see the line axes";
+  }
+}
+
 std::string levelText(FindingLevel level) {
   constexpr const char* kNames[] = {"OK      ", "odd     ", "missing "};
   static_assert(std::size(kNames) == static_cast<std::size_t>(FindingLevel::kMissing) + 1);
@@ -164,6 +176,7 @@ BagCheck checkBag(const std::vector<std::string>& bags, const CheckRequest& requ
   const ProposedConfig config = proposedConfig(imu, radars, request.set);
   if (request.try_out) {
     chooseByTrial(recording, header(recording), config, &check);
+    doubtMirrored(radars, &check);
   } else {
     check.yaml = toYaml(config, header(recording));
     readBack(check.yaml);

@@ -169,13 +169,13 @@ void describeUp(ImuInspection* imu) {
   imu->tell(
       FindingLevel::kOdd, "IMU axes",
       "gravity is on " + axisName(*up) +
-          ", so z of the IMU is not up. If it is mounted so, the odometry is right, but rviz shows base_link "
-          "tilted, since it is the IMU by default. Give base_link by tf, or set "
-          "base_extrinsics_rotation_xyzw: [" +
-          fixedTexts(q_BI.coeffs(), 4) + "] to make its z up (docs/frames.md)" +
-          (axis.z() < 0.0 ? ". If z of the IMU does look up, its driver negates the acceleration, and the "
-                            "track will be a mirror image"
-                          : ""));
+          ". Either z of the IMU is not up: then the odometry is right, but rviz shows base_link tilted, "
+          "since it is the IMU by default. Give base_link by tf, or set base_extrinsics_rotation_xyzw: [" +
+          fixedTexts(q_BI.coeffs(), 4) +
+          "] to make its z up (docs/frames.md). Or the accelerometer is negated (it measures gravity, not "
+          "the "
+          "specific force): then the track is a mirror image, so correct the driver of the IMU. " +
+          howToTellNegated(imu->report));
 }
 
 void describeNoise(ImuInspection* imu) {
@@ -221,6 +221,15 @@ std::optional<Eigen::Vector3d> upOf(const ImuReport& report) {
   const Eigen::Vector3d up = report.rests_at_start ? report.rest_acceleration : report.mean_acceleration;
   if (report.mean_acceleration.norm() <= kMostlyUp || up.norm() <= kMostlyUp) return std::nullopt;
   return up.normalized();
+}
+
+std::string howToTellNegated(const ImuReport& report) {
+  const std::string expected = "To tell: at rest, ROS expects +9.81 m/s^2 along the direction that points up";
+  const std::optional<Eigen::Vector3d> up = upOf(report);
+  if (!up) return expected;
+  const std::string axis = axisName(*up);
+  return expected + ", and this IMU shows it along " + axis + ". If " + axis +
+         " points down, the accelerometer is negated";
 }
 
 std::string rateText(const StreamTiming& timing, int decimals, bool with_duplicates) {

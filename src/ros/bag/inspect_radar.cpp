@@ -139,7 +139,8 @@ void limitsOfCloud(const CloudReport& cloud, ProposedKeys* keys) {
               "The radar sees farther than " + fixedText(max_range, 0) + " m.");
 }
 
-void describeSign(const Looked& looked, const FormatProposal& format, RadarInspection* radar) {
+void describeSign(const Looked& looked, const FormatProposal& format, const ImuReport& imu,
+                  RadarInspection* radar) {
   const MountingSearch& search = looked.search;
   const std::string field = format.format.doppler;
   const std::string by_ranges =
@@ -149,12 +150,19 @@ void describeSign(const Looked& looked, const FormatProposal& format, RadarInspe
       imu_knows ? "the IMU (" + fixedText(std::sqrt(search.sign_significance), 0) + " sigma)" : "";
   const std::string evidence = by_ranges + (by_ranges.empty() || by_imu.empty() ? "" : " and ") + by_imu;
   if (search.mirrored) {
-    radar->odd("axes",
-               "the axes of the cloud are left-handed (one axis is inverted): the ranges say that " + field +
-                   " is " + (looked.sign.sign > 0 ? "positive for receding" : "negative for receding") +
-                   " targets, the IMU the contrary; radar_doppler_sign and the mounting stand for it");
-    radar->keys.set("radar_doppler_sign", ParameterValue{std::int64_t{search.sign}},
-                    "One axis of the cloud is inverted. This sign and the mounting below stand for it.");
+    radar->odd(
+        "axes",
+        "the ranges say that " + field + " is " +
+            (looked.sign.sign > 0 ? "positive for receding" : "negative for receding") +
+            " targets, the IMU the contrary. Either the axes of the cloud are left-handed (one axis is "
+            "inverted): radar_doppler_sign and the mounting stand for it. Or the accelerometer is "
+            "negated (it measures gravity, not the specific force): then the track is a mirror image, "
+            "so correct the driver of the IMU. " +
+            howToTellNegated(imu));
+    radar->keys.set(
+        "radar_doppler_sign", ParameterValue{std::int64_t{search.sign}},
+        "One axis of the cloud is inverted: this sign and the mounting below stand for it. Or the "
+        "accelerometer is negated: then correct the driver of the IMU.");
   } else if (search.sign == -1) {
     radar->odd("Doppler", field + " is positive for approaching targets, shown by " + evidence);
     radar->keys.set("radar_doppler_sign", ParameterValue{std::int64_t{-1}},
@@ -314,7 +322,7 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   describeCloud(looked, format, timing, &radar);
   for (const std::string& odd : stamps.odd) radar.odd("stamps", odd);
   if (stamps.odd.empty()) radar.ok("stamps", stamps.text);
-  describeSign(looked, format, &radar);
+  describeSign(looked, format, imu.report, &radar);
   describeMounting(looked.search, &radar);
   compareWithConfigured(looked.search, configured, &radar);
   return radar;

@@ -30,6 +30,9 @@ ImuInspection inspectImuTopic(const ImuTopic& topic);
 /// Up in I, unless the IMU turns over so much that no direction is up on average.
 std::optional<Eigen::Vector3d> upOf(const ImuReport& report);
 
+/// How to tell whether the accelerometer is negated. The data cannot: gravity shows it to a person only.
+std::string howToTellNegated(const ImuReport& report);
+
 /// [rad] Sigma of a turn below which the bag shows it.
 constexpr double kObservedTurn = 0.3;
 /// [rad] 15 degrees between two mountings: an eye does not misjudge one by more.
