@@ -489,6 +489,21 @@ TEST(Diagnosis, ATrajectoryThatBeginsAnewIsNeverGood) {
              {"jump back from 40.000 s to 10.000 s. The", "at the origin; more such jumps: 1."});
 }
 
+TEST(Diagnosis, AGapOfSamplesThatCannotBeUsedIsNoJumpOfTheStamps) {
+  RunEvidence evidence = goodRun();
+  evidence.input_faults["imu_clock_restart"] = 1;
+  evidence.imu_restarts = {{Time::fromSeconds(1700000030.0),
+                            Time::fromSeconds(1700000033.5),
+                            {{"imu_not_finite", 1227}, {"imu_stamp_jump", 204}},
+                            true}};
+  const std::string text = first(evidence);
+  expectSays(text, {"imu_clock_restart: No sample of the IMU that can be used came for 3.5 s, from "
+                    "1700000030.000 s to 1700000033.500 s, more than max_bridged_imu_gap 3 s: 1227 were not "
+                    "finite, 204 were good ones after the gap, dropped for imu_jump_patience. There the "
+                    "trajectory starts again at the origin. Correct what the driver of the IMU writes"});
+  EXPECT_EQ(text.find("jump ahead"), std::string::npos) << text;
+}
+
 TEST(Diagnosis, TriggersWithAStampOfZeroAreNamed) {
   RunEvidence evidence = withRejected("trigger_missing");
   evidence.radars.front().name = "left";

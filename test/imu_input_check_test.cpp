@@ -458,5 +458,25 @@ TEST_F(Gate, NoiseFarAboveWhatWasToldIsSeen) {
   EXPECT_NEAR(sample.accel_noise, std::pow(gate.noise().accel_density, 2), 1e-12);
 }
 
+TEST(ImuSampleCheck, SaysWhetherTheStampsWentOnOverAGap) {
+  SyntheticMotion motion;
+  for (const bool is_jump : {false, true}) {
+    ImuSampleCheck samples{ImuInputCheckOptions()};
+    ImuSampleCheck::Verdict restart;
+    for (int k = 0; k < 800; ++k) {
+      const double t = 0.01 * k;
+      ImuMeasurement imu = motion.imuSample(t);
+      if (1.0 < t && t < 4.2) imu.acceleration.x() = std::nan("");
+      if (is_jump && t > 1.0) imu.time = imu.time + 10.0;
+      const ImuSampleCheck::Verdict verdict = samples.check(imu);
+      if (verdict.is_restart) restart = verdict;
+    }
+    ASSERT_TRUE(restart.is_restart);
+    EXPECT_EQ(restart.stamps_went_on, !is_jump);
+    EXPECT_NEAR(static_cast<double>(restart.dropped["imu_not_finite"]), 319.0, 1.0);
+    EXPECT_NEAR(static_cast<double>(restart.dropped["imu_stamp_jump"]), 50.0, 1.0);
+  }
+}
+
 }  // namespace
 }  // namespace rio_t

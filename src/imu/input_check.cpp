@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace rio_t {
 namespace {
@@ -18,22 +19,38 @@ void raise(double& variance, double density) { variance = std::max(variance, den
 ImuSampleCheck::ImuSampleCheck(const ImuInputCheckOptions& options)
     : most_acceleration_(options.accel_range > 0.0 ? kImpossibleShareOfRange * options.accel_range
                                                    : kImpossibleAcceleration),
+      max_gap_(options.max_bridged_gap),
       stamps_(options.max_bridged_gap, options.jump_patience) {}
+
+const char* ImuSampleCheck::faultOfValues(const ImuMeasurement& imu) const {
+  if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite()) return "imu_not_finite";
+  // A reading of the gyro that is not plausible is replaced by ImuInputCheck.
+  return imu.acceleration.cwiseAbs().maxCoeff() > most_acceleration_ ? "imu_not_plausible" : nullptr;
+}
 
 ImuSampleCheck::Verdict ImuSampleCheck::check(const ImuMeasurement& imu) {
   Verdict verdict;
   verdict.before = stamps_.newest();
-  if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite()) {
-    verdict.fault = "imu_not_finite";
-  } else if (imu.acceleration.cwiseAbs().maxCoeff() > most_acceleration_) {
-    verdict.fault = "imu_not_plausible";  // of the gyro, ImuInputCheck replaces such a reading
-  } else {
+  if (latest_) longest_step_ = std::max(longest_step_, imu.time - *latest_);
+  latest_ = imu.time;
+  verdict.fault = faultOfValues(imu);
+  if (verdict.fault == nullptr) {
     const ClockJumpDetector::Verdict stamp = stamps_.check(imu.time);
     if (stamp == ClockJumpDetector::Verdict::kBehind) verdict.fault = "imu_out_of_order";
     if (stamp == ClockJumpDetector::Verdict::kAhead) verdict.fault = "imu_stamp_jump";
     verdict.is_restart = stamp == ClockJumpDetector::Verdict::kRestart;
     verdict.stepped_back = stamps_.steppedBack();
   }
+  if (verdict.fault != nullptr) {
+    ++dropped_[verdict.fault];
+    return verdict;
+  }
+  if (verdict.is_restart) {
+    verdict.stamps_went_on = *verdict.before < imu.time && longest_step_ <= max_gap_;
+    verdict.dropped = std::move(dropped_);
+  }
+  dropped_.clear();
+  longest_step_ = 0.0;
   return verdict;
 }
 

@@ -1,7 +1,10 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "rio_t/imu/clock_jump_detector.h"
@@ -46,14 +49,25 @@ class ImuSampleCheck {
     bool is_restart = false;     ///< the clock jumped, or the gap was too long: forget all before
     double stepped_back = 0.0;   ///< [s] by which the clock had stepped back before this sample
     std::optional<Time> before;  ///< stamp of the newest sample taken before; none of the first sample
+    // Only of a restart:
+    std::map<std::string, std::uint64_t> dropped = {};  ///< samples since `before`, by fault
+    /// No stamp jumped: samples came all the time, and none of them could be used.
+    bool stamps_went_on = false;
   };
 
   explicit ImuSampleCheck(const ImuInputCheckOptions& options);
   Verdict check(const ImuMeasurement& imu);
 
  private:
-  double most_acceleration_;  // [m/s^2] read-only after construction
+  /// Why the sample is dropped by its values; null: it is not.
+  const char* faultOfValues(const ImuMeasurement& imu) const;
+
+  double most_acceleration_, max_gap_;  // [m/s^2], [s] read-only after construction
   ClockJumpDetector stamps_;
+  // Of the samples since the newest one that was taken:
+  std::map<std::string, std::uint64_t> dropped_;
+  std::optional<Time> latest_;  // stamp, of that one, too
+  double longest_step_ = 0.0;   // [s] from one stamp to the next
 };
 
 /// Checks IMU samples. It drops those that cannot be used, writes into the others how much of the motion they

@@ -96,7 +96,8 @@ void BagPlayer::addImu(const sensor_msgs::Imu& message, Time record) {
     return;
   }
   const ImuSampleCheck::Verdict checked = imu_check_.check(imu);
-  if (checked.is_restart && odometry_.initialized()) imu_restarts_.push_back({*checked.before, imu.time});
+  if (checked.is_restart && odometry_.initialized())
+    imu_restarts_.push_back({*checked.before, imu.time, checked.dropped, checked.stamps_went_on});
   if (checked.fault == nullptr) evidence_.addImu(imu.time);
   for (Radar& radar : radars_) radar.stamper.addImu(imu.time, record);
   if (recorder_ != nullptr) recorder_->addImu(imu);

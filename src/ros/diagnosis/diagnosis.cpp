@@ -213,8 +213,11 @@ void addRestarts(const RunEvidence& evidence, const Config& config, std::vector<
   if (evidence.imu_restarts.empty()) return;
   // It is certain, and it concerns the whole trajectory: the share is 1.
   causes->push_back({"imu_clock_restart", describeRestarts(evidence.imu_restarts, config),
-                     "Run each part by itself (bag_start, bag_duration). For a short gap, raise "
-                     "max_bridged_imu_gap.",
+                     evidence.imu_restarts.front().stamps_went_on
+                         ? "Correct what the driver of the IMU writes there, or run each part by itself "
+                           "(bag_start, bag_duration)."
+                         : "Run each part by itself (bag_start, bag_duration). For a short gap, raise "
+                           "max_bridged_imu_gap.",
                      1.0});
 }
 
@@ -375,14 +378,34 @@ Diagnosis diagnose(const RunEvidence& evidence, const Config& config) {
 std::string describeRestarts(const std::vector<ImuRestart>& restarts, const Config& config) {
   const ImuRestart& first = restarts.front();
   const bool is_ahead = first.before < first.after;
-  std::string text = std::string("The stamps of the IMU jump ") + (is_ahead ? "ahead" : "back") + " from " +
-                     stampText(first.before) + " to " + stampText(first.after);
+  const std::string from_to = " from " + stampText(first.before) + " to " + stampText(first.after);
+  std::string text = first.stamps_went_on ? "No sample of the IMU that can be used came for " +
+                                                fixedText(first.after - first.before, 1) + " s," + from_to
+                                          : std::string("The stamps of the IMU jump ") +
+                                                (is_ahead ? "ahead" : "back") + from_to;
   if (is_ahead)
     text +=
         ", more than max_bridged_imu_gap " + number(config.odometry.imu_input_check.max_bridged_gap) + " s";
+  if (first.stamps_went_on) text += ": " + describeDropped(first.dropped);
   text += ". There the trajectory starts again at the origin";
-  if (restarts.size() > 1) text += "; more such jumps: " + std::to_string(restarts.size() - 1);
+  if (restarts.size() > 1)
+    text += std::string(first.stamps_went_on ? "; more such gaps and jumps: " : "; more such jumps: ") +
+            std::to_string(restarts.size() - 1);
   return text + ".";
+}
+
+std::string describeDropped(const Counts& dropped) {
+  static const std::map<std::string, std::string> kTexts = {
+      {"imu_not_finite", "were not finite"},
+      {"imu_not_plausible", "had an acceleration that no IMU measures"},
+      {"imu_out_of_order", "were out of order"},
+      {"imu_stamp_jump", "were good ones after the gap, dropped for imu_jump_patience"}};
+  std::string text;
+  for (const auto& [fault, count] : dropped) {
+    const auto known = kTexts.find(fault);
+    appendItem(&text, std::to_string(count) + " " + (known == kTexts.end() ? fault : known->second));
+  }
+  return text;
 }
 
 std::string describeCauses(const Diagnosis& diagnosis) {

@@ -18,7 +18,7 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
     const ImuMeasurement imu =
         toImuMeasurement(*event.getConstMessage(), config_.imu_topic, config_.imu_units);
     const ImuSampleCheck::Verdict checked = imu_check_.check(imu);
-    if (checked.is_restart) restartClock(imu.time - *checked.before);
+    if (checked.is_restart) restartClock(checked, imu.time);
     if (checked.fault != nullptr) {
       monitor_.imuUnusable(checked.fault);
     } else {
@@ -60,9 +60,13 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
   }
 }
 
-void LiveOdometry::restartClock(double jump) {
-  reset(std::string("the IMU's stamps jumped ") + (jump < 0.0 ? "back" : "ahead") + " by " +
-            std::to_string(std::abs(jump)) + " s",
+void LiveOdometry::restartClock(const ImuSampleCheck::Verdict& checked, Time time) {
+  const double step = time - *checked.before;
+  const std::string seconds = std::to_string(std::abs(step)) + " s";
+  reset(checked.stamps_went_on
+            ? "no sample of topic " + config_.imu_topic + " that can be used came for " + seconds +
+                  ", more than max_bridged_imu_gap: " + describeDropped(checked.dropped)
+            : std::string("the IMU's stamps jumped ") + (step < 0.0 ? "back" : "ahead") + " by " + seconds,
         true);
   early_imu_.clear();
 }

@@ -53,6 +53,9 @@ Diagnosis diagnose(const RunEvidence& evidence, const Config& config);
 /// not be empty.
 std::string describeRestarts(const std::vector<ImuRestart>& restarts, const Config& config);
 
+/// What became of the samples of a gap that no jump of the stamps explains: "1227 were not finite, ...".
+std::string describeDropped(const Counts& dropped);
+
 /// A line for each cause, and for each check that is not good.
 std::string describeCauses(const Diagnosis& diagnosis);
 

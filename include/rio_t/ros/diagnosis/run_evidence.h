@@ -65,10 +65,12 @@ struct RadarSummary : RadarEstimate {
   std::optional<MountingTurn> mounting_turn;       ///< of a mounting that is held, as the scans say
 };
 
-/// The stamps of the IMU jumped, or left a gap that is too long to bridge: "imu_clock_restart".
+/// The stamps of the IMU jumped, or no sample could be used for too long to bridge: "imu_clock_restart".
 struct ImuRestart {
-  Time before;  ///< newest stamp used before it
-  Time after;   ///< first stamp used after it
+  Time before;                  ///< newest stamp used before it
+  Time after;                   ///< first stamp used after it
+  Counts dropped = {};          ///< samples between the two, by fault
+  bool stamps_went_on = false;  ///< no stamp jumped: what was dropped makes the gap
 };
 
 /// Counts of the means of the pressures, by outcome.

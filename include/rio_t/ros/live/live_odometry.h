@@ -96,7 +96,7 @@ class LiveOdometry {
   /// `at_once`: does not wait for rest first.
   void reset(const std::string& reason, bool at_once = false);
   /// Resets the whole session, with what it stamps by: the clock of the IMU jumped by `jump` [s]. IMU thread.
-  void restartClock(double jump);
+  void restartClock(const ImuSampleCheck::Verdict& checked, Time time);
   /// Gives a sample to a session. Returns the state that is to be published, if there is one.
   std::optional<NavigationState> feed(LiveSession& session, const Received& received);
   void account(const std::vector<LiveSession::GivenUp>& given_up);
