@@ -174,6 +174,74 @@ TEST_F(CheckBag, ACloudWithoutDopplerIsNamedWithItsFields) {
   EXPECT_FALSE(odd.ready());
 }
 
+/// Two nodes publish the IMU, by turns: whatever else is said misleads.
+TEST_F(CheckBag, SeveralPublishersOfOneTopicAreNamed) {
+  const std::string path = folder_ + "/two_publishers.bag";
+  {
+    const rosbag::Bag in(bag_);
+    rosbag::Bag out(path, rosbag::bagmode::Write);
+    rosbag::View view(in);
+    const auto header_of = [](const std::string& caller) {
+      const auto header = boost::make_shared<ros::M_string>();
+      (*header)["callerid"] = caller;
+      (*header)["type"] = ros::message_traits::DataType<sensor_msgs::Imu>::value();
+      (*header)["md5sum"] = ros::message_traits::MD5Sum<sensor_msgs::Imu>::value();
+      (*header)["message_definition"] = ros::message_traits::Definition<sensor_msgs::Imu>::value();
+      return header;
+    };
+    const auto one = header_of("/driver"), other = header_of("/camera");
+    int clouds = 0;
+    for (const rosbag::MessageInstance& instance : view) {
+      const std::string& topic = instance.getTopic();
+      if (const auto imu = instance.instantiate<sensor_msgs::Imu>()) {
+        imu->header.frame_id = "imu";
+        out.write(topic, instance.getTime(), *imu, one);
+        std::swap(imu->linear_acceleration.y, imu->linear_acceleration.z);
+        imu->header.frame_id = "camera_imu";
+        imu->header.stamp += ros::Duration(5e-4);
+        out.write(topic, instance.getTime(), *imu, other);
+      } else if (const auto cloud = instance.instantiate<sensor_msgs::PointCloud2>()) {
+        cloud->header.frame_id = ++clouds % 2 == 0 ? "front" : "rear";
+        out.write(topic, instance.getTime(), *cloud);
+      }
+    }
+  }
+  const BagCheck odd = check(path);
+  const std::string imu =
+      "Topic /sensor_platform/imu has messages of 2 publishers by turns: /camera (frame_id \"camera_imu\") "
+      "and "
+      "/driver (frame_id \"imu\").";
+  const std::string radar = "Topic /sensor_platform/radar/scan has messages of 2 frame_ids by turns";
+  expectLine(odd, FindingLevel::kOdd, {"IMU", imu, "remap"});
+  expectLine(odd, FindingLevel::kOdd, {"radar", radar, "\"front\" and \"rear\"", "remap"});
+  EXPECT_EQ(odd.findings.front().text.find(imu), 0U) << describeCheck(odd);
+  // The run says it first, too.
+  BagRun bag_run;
+  bag_run.bags = {path};
+  Diagnosis diagnosis;
+  try {
+    diagnosis = runBag(bag_run).diagnosis;
+  } catch (const RunFailed& failed) {
+    diagnosis = failed.diagnosis();
+  }
+  EXPECT_NE(describeCauses(diagnosis).find("1. " + imu), std::string::npos) << describeCauses(diagnosis);
+  EXPECT_NE(describeCauses(diagnosis).find("2. " + radar), std::string::npos) << describeCauses(diagnosis);
+}
+
+/// A node that starts again under another name publishes alone.
+TEST(Publishers, ComeByTurns) {
+  Publishers one, restarted, two;
+  for (int k = 0; k < 100; ++k) {
+    one.add("/a", "imu");
+    restarted.add(k < 50 ? "/a_1" : "/a_2", "imu");
+    two.add("/a", k % 10 == 0 ? "radar" : "imu");
+  }
+  one.add("/b", "imu");
+  EXPECT_EQ(one.describeSeveral("/imu"), "");
+  EXPECT_EQ(restarted.describeSeveral("/imu"), "");
+  EXPECT_EQ(two.describeSeveral("/imu").find("Topic /imu has messages of 2 frame_ids"), 0U);
+}
+
 sensor_msgs::PointCloud2 lidarCloud() {
   sensor_msgs::PointCloud2 cloud;
   sensor_msgs::PointCloud2Modifier modifier(cloud);

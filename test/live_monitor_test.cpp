@@ -295,6 +295,15 @@ TEST_F(TwoRadarDiagnostics, NameTheTypeOfATopicThatIsPublishedAsAnother) {
   EXPECT_FALSE(monitor.lacksInput());
 }
 
+TEST_F(TwoRadarDiagnostics, WarnOfATopicWithTwoPublishers) {
+  monitor.setPublishers({{config.imu_topic, 2}, {"/left", 1}, {"/right", 1}});
+  const Status status = second(20, 20, 20);
+  EXPECT_EQ(status.level, DiagnosticStatus::WARN);
+  EXPECT_EQ(status.message.find("topic " + config.imu_topic + " has 2 publishers"), 0U) << status.message;
+  monitor.setPublishers({{config.imu_topic, 1}, {"/left", 1}, {"/right", 1}});
+  EXPECT_EQ(second(20, 20, 20).level, DiagnosticStatus::OK);
+}
+
 TEST_F(TwoRadarDiagnostics, NameTheRadarThatIsMostlyRejected) {
   for (int k = 0; k < 5; ++k) EXPECT_EQ(second(20, 20, 10).level, DiagnosticStatus::OK) << "half are enough";
   Status status;

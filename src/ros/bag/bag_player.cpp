@@ -29,10 +29,18 @@ BagPlayer::Radar::Radar(const Config& config)
 void BagPlayer::play(const rosbag::MessageInstance& instance) {
   const std::string& topic = instance.getTopic();
   const Time record = toTime(instance.getTime());
-  if (topic == config_.imu_topic) addImu(*read<sensor_msgs::Imu>(instance), record);
+  if (topic == config_.imu_topic) {
+    const auto message = read<sensor_msgs::Imu>(instance);
+    publishers_[topic].add(instance.getCallerId(), message->header.frame_id);
+    addImu(*message, record);
+  }
   if (topic == config_.barometer_topic) addPressure(*read<sensor_msgs::FluidPressure>(instance));
   for (std::size_t k = 0; k < radars_.size(); ++k) {
-    if (topic == radars_[k].topic) addCloud(*read<sensor_msgs::PointCloud2>(instance), record, k);
+    if (topic == radars_[k].topic) {
+      const auto message = read<sensor_msgs::PointCloud2>(instance);
+      publishers_[topic].add(instance.getCallerId(), message->header.frame_id);
+      addCloud(*message, record, k);
+    }
     // One line may trigger several radars.
     if (topic == radars_[k].trigger_topic) addTrigger(*read<std_msgs::Header>(instance), record, k);
   }
@@ -80,6 +88,10 @@ RunSummary BagPlayer::summary(const RunLog& log) const {
   if (!imu_restarts_.empty())
     summary.warnings.push_back("topic " + config_.imu_topic + ": " +
                                describeRestarts(imu_restarts_, config_));
+  for (const auto& [topic, publishers] : publishers_) {
+    const std::string several = publishers.describeSeveral(topic);
+    if (!several.empty()) summary.several_publishers.push_back(several);
+  }
   summary.diagnosis = diagnose(summary, config_);
   // Keys and files of the only radar carry no name.
   if (summary.radars.size() == 1) summary.radars.front().name.clear();

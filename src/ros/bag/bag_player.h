@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "publishers.h"
 #include "rio_t/imu/input_check.h"
 #include "rio_t/odometry/batch_odometry.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
@@ -72,6 +73,7 @@ class BagPlayer {
   std::uint64_t imu_count_ = 0;
   std::optional<BarometerCounts> barometer_;  // if there is one
   std::vector<NotUsable> not_usable_;
+  std::map<std::string, Publishers> publishers_;  // by topic
 };
 
 }  // namespace rio_t

@@ -113,18 +113,27 @@ void doubtMirrored(const std::vector<RadarInspection>& radars, BagCheck* check) 
   }
 }
 
+/// Before all else: with two nodes on one topic, all that follows misleads. Returns whether there are any.
+bool nameSeveralPublishers(const Recording& recording, BagCheck* check) {
+  const std::size_t before = check->findings.size();
+  const auto name = [check](const std::string& subject, const auto& topic) {
+    const std::string several = topic.publishers.describeSeveral(topic.topic);
+    if (!several.empty()) check->odd(subject, several + " " + kSeveralPublishersRemedy);
+  };
+  for (const ImuTopic& topic : recording.imus) name("IMU", topic);
+  for (const CloudTopic& topic : recording.clouds) name("radar", topic);
+  return check->findings.size() > before;
+}
+
 std::string levelText(FindingLevel level) {
   constexpr const char* kNames[] = {"OK      ", "odd     ", "missing "};
   static_assert(std::size(kNames) == static_cast<std::size_t>(FindingLevel::kMissing) + 1);
   return kNames[static_cast<std::size_t>(level)];
 }
 
-}  // namespace
-
-BagCheck checkBag(const std::vector<std::string>& bags, const CheckRequest& request) {
+BagCheck checkRecording(const Recording& recording, const CheckRequest& request) {
   BagCheck check;
-  check.bags = bags;
-  const Recording recording = readRecording(bags, request);
+  check.bags = recording.bags;
   if (recording.read < recording.length)
     check.ok("bag", "the first " + fixedText(recording.read, 0) + " of " + fixedText(recording.length, 0) +
                         " s were read (--duration)");
@@ -187,6 +196,20 @@ BagCheck checkBag(const std::vector<std::string>& bags, const CheckRequest& requ
     check.to_do =
         "The mounting is a guess. Record with motion for 3 s or more, or give it: --set "
         "mounting_yaw_pitch_roll_deg=[YAW,PITCH,ROLL] (docs/your_sensors.md, section 3).";
+  return check;
+}
+
+}  // namespace
+
+BagCheck checkBag(const std::vector<std::string>& bags, const CheckRequest& request) {
+  const Recording recording = readRecording(bags, request);
+  BagCheck check = checkRecording(recording, request);
+  BagCheck named;
+  if (nameSeveralPublishers(recording, &named)) {
+    check.findings.insert(check.findings.begin(), named.findings.begin(), named.findings.end());
+    if (!check.to_do.empty())
+      check.to_do = "First give each publisher of a topic a topic of its own. " + check.to_do;
+  }
   return check;
 }
 

@@ -50,12 +50,16 @@ void readMessages(rosbag::View& view, const ParameterEntries& configured, Record
     const std::string& type = instance.getDataType();
     const std::string& name = instance.getTopic();
     if (type == kTypes[0]) {
-      addImu(*rio_t::read<sensor_msgs::Imu>(instance), record, &topicOf(name, &recording->imus));
+      const auto message = rio_t::read<sensor_msgs::Imu>(instance);
+      ImuTopic& topic = topicOf(name, &recording->imus);
+      addImu(*message, record, &topic);
+      topic.publishers.add(instance.getCallerId(), message->header.frame_id);
     } else if (type == kTypes[1]) {
       if (refused.count(name) != 0) continue;
       CloudTopic& topic = topicOf(name, &recording->clouds);
       topic.messages.emplace_back(rio_t::read<sensor_msgs::PointCloud2>(instance));
       topic.times.push_back({toTime(topic.messages.back()->header.stamp), record});
+      topic.publishers.add(instance.getCallerId(), topic.messages.back()->header.frame_id);
       if (topic.messages.size() > 1 && isCopy(*topic.messages.back(), **std::prev(topic.messages.end(), 2)))
         ++topic.copies;
       // One cloud with points tells why a topic cannot serve. More of a lidar would fill the memory.

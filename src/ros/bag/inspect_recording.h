@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "publishers.h"
 #include "rio_t/imu/measurement.h"
 #include "rio_t/inspection/stream_timing.h"
 #include "rio_t/ros/bag/check_bag.h"
@@ -18,6 +19,7 @@ struct ImuTopic {
   std::string topic;
   std::vector<ImuMeasurement> written;  ///< in the units of the driver; those with a stamp of zero, too
   std::vector<MessageTimes> times;
+  Publishers publishers;
 };
 
 struct CloudTopic {
@@ -25,6 +27,7 @@ struct CloudTopic {
   std::vector<sensor_msgs::PointCloud2::ConstPtr> messages;
   std::vector<MessageTimes> times;
   std::uint64_t copies = 0;  ///< messages that are the same as the one before
+  Publishers publishers;
 };
 
 struct HeaderTopic {

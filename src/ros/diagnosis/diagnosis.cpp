@@ -88,6 +88,13 @@ std::string stampText(Time time) { return fixedText(time.seconds(), 3) + " s"; }
 
 bool has(const std::string& text, const char* part) { return text.find(part) != std::string::npos; }
 
+/// It is certain, and it explains whatever else there is.
+void addPublishers(const RunEvidence& evidence, std::vector<Cause>* causes) {
+  for (const std::string& text : evidence.several_publishers)
+    causes->push_back(
+        {"several_publishers", text, "Stop one of them, or remap it to a topic of its own.", 1.0});
+}
+
 void addStart(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
   const std::string& waiting = evidence.waiting_for;
   const std::string text = "The start waits for " + waiting + ".";
@@ -352,6 +359,7 @@ std::string toString(RunVerdict verdict) {
 Diagnosis diagnose(const RunEvidence& evidence, const Config& config) {
   Diagnosis result;
   const std::vector<Config> radars = configsOfRadars(config);
+  addPublishers(evidence, &result.causes);
   for (std::size_t k = 0; k < evidence.radars.size(); ++k)
     addCausesOfRadar(evidence.radars[k], radars.at(k), &result.causes);
   addStart(evidence, config, &result.causes);

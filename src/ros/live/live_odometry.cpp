@@ -182,6 +182,10 @@ void LiveOdometry::addDiagnostics() {
   diagnostics_->add("input", [this](Status& s) {
     // Before the monitor is locked: the master may take its time.
     if (monitor_.lacksInput()) monitor_.setTopicTypes(publishedTypes());
+    std::map<std::string, std::uint32_t> publishers = {
+        {config_.imu_topic, imu_subscriber_.getNumPublishers()}};
+    for (const Radar& radar : radars_) publishers[radar.config.radar_topic] = radar.scans.getNumPublishers();
+    monitor_.setPublishers(publishers);
     monitor_.describeInput(s, session_.get().get());
     if (ros::Time::isSimTime() && ros::Time::now().isZero())
       s.mergeSummary(diagnostic_msgs::DiagnosticStatus::WARN,

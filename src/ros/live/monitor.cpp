@@ -202,6 +202,11 @@ void LiveMonitor::setTopicTypes(const std::map<std::string, std::string>& types)
   topic_types_ = types;
 }
 
+void LiveMonitor::setPublishers(const std::map<std::string, std::uint32_t>& counts) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  publishers_ = counts;
+}
+
 std::string LiveMonitor::wrongType(const std::string& topic, const std::string& expected) const {
   const auto found = topic_types_.find(topic);
   // "*": whatever the publisher has.
@@ -393,6 +398,13 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
                    radars_.size() == 1 ? "IMU and radar are coming" : "IMU and radars are coming");
   }
   queue_full_reported_ = queue_full;
+  for (const auto& [topic, count] : publishers_) {
+    if (count < 2) continue;
+    status.mergeSummary(DiagnosticStatus::WARN,
+                        "topic " + topic + " has " + std::to_string(count) +
+                            " publishers, and rio_t takes them for one sensor: stop one of them, or remap it "
+                            "to a topic of its own");
+  }
 }
 
 void LiveMonitor::describeSolver(Status& status) const {

@@ -121,7 +121,8 @@ struct RunEvidence {
   double silent_seconds = 0.0;  ///< of them, later than `coasting_after` after the last scan that was used
   double silence_begin = 0.0, silence_end = 0.0;  ///< of the longest silence
   std::vector<ImuRestart> imu_restarts;  ///< none in the live node, whose evidence begins after the last one
-  std::vector<RadarSummary> radars;      ///< in the order of the configuration
+  std::vector<std::string> several_publishers;        ///< a sentence for each topic of a bag that has several
+  std::vector<RadarSummary> radars;                   ///< in the order of the configuration
   std::optional<GroundVehicleCounts> ground_vehicle;  ///< only with platform: ground_vehicle
 };
 

@@ -53,6 +53,8 @@ class LiveMonitor {
   bool lacksInput() const;
   /// The types of what is published, by topic: a topic of a wrong type brings no message.
   void setTopicTypes(const std::map<std::string, std::string>& types);
+  /// How many nodes publish on each topic of the IMU and the radars.
+  void setPublishers(const std::map<std::string, std::uint32_t>& counts);
   void tune(const ImuNoise& configured);  ///< the noise of the IMU as it is configured now
   /// A change of parameters was refused, for that reason; or was made, if it is empty.
   void reconfigured(const std::string& refused_because);
@@ -142,6 +144,7 @@ class LiveMonitor {
   std::string last_reset_, waiting_for_, refused_because_;
   std::uint64_t reconfigurations_ = 0;
   std::map<std::string, std::string> frames_, topic_types_;
+  std::map<std::string, std::uint32_t> publishers_;  // by topic
   std::optional<LiveSession::Result> last_update_;
   std::optional<Time> last_used_;                // stamp of the last scan used
   std::optional<NavigationState> newest_state_;  // at the newest IMU sample

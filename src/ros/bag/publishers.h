@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+
+namespace rio_t {
+
+/// Counts who publishes on one topic of a bag. Two nodes on one topic look like one sensor that jumps.
+class Publishers {
+ public:
+  /// A message. `caller`: the node, as the bag has it, or empty; `frame`: the frame_id of its header.
+  void add(const std::string& caller, const std::string& frame);
+  /// A sentence that names them if there are several; else empty. A node that starts again under another
+  /// name, or one message among many, is no second publisher: their messages must come by turns.
+  std::string describeSeveral(const std::string& topic) const;
+
+ private:
+  using Publisher = std::pair<std::string, std::string>;  // caller, frame
+  std::map<Publisher, std::uint64_t> messages_;
+  Publisher last_;
+  std::uint64_t turns_ = 0;
+};
+
+/// What to do about them.
+inline constexpr const char* kSeveralPublishersRemedy =
+    "Stop one of them, or remap it to a topic of its own.";
+
+}  // namespace rio_t
