@@ -149,6 +149,17 @@ TEST_F(CheckBag, PointsThatAreNotFiniteAreNamed) {
   EXPECT_TRUE(odd.ready());
 }
 
+TEST_F(CheckBag, ManyEmptyCloudsAreOdd) {
+  int clouds = 0;
+  Changes changes;
+  changes.cloud = [&](sensor_msgs::PointCloud2& cloud) {
+    if (++clouds % 5 < 2) sensor_msgs::PointCloud2Modifier(cloud).resize(0);
+    return true;
+  };
+  expectLine(check(rewritten("often_empty", changes), false), FindingLevel::kOdd,
+             {"points", "0 /", "40 % of the clouds are empty"});
+}
+
 TEST_F(CheckBag, ScansBeforeTheStartAreNotMissed) {
   const BagCheck plain = check(bag_);
   const RunSummary summary = run(plain);

@@ -123,6 +123,28 @@ TEST(Diagnosis, TooFewPointsNameThoseThatAreNotFinite) {
              {"too_few_points", "Look at the driver of the radar: 21 more points are not finite"});
 }
 
+TEST(Diagnosis, TooFewPointsSayWhetherTheCloudsAreEmptyOrWhichKeyTookThem) {
+  RunEvidence evidence = withRejected("too_few_points");
+  RadarSummary& radar = evidence.radars.front();
+  expectSays(first(evidence), {"too_few_points: 190 of 200 scans have too few points for a velocity: 35 on "
+                               "average after the filter. Set a lower detection threshold"});
+  radar.scans_empty = 120;
+  radar.scans_emptied[static_cast<std::size_t>(PointVerdict::kBesideView)] = 70;
+  expectSays(
+      first(evidence),
+      {"190 of 200 scans have too few points for a velocity: 120 clouds are empty, 70 lost their points "
+       "to radar_max_azimuth 1.57 rad, the other 10 have 700 on average after the filter. Look for what "
+       "empties the clouds in the driver of the radar"});
+  radar.scans_empty = 0;
+  radar.scans_emptied[static_cast<std::size_t>(PointVerdict::kBesideView)] = 190;
+  expectSays(first(evidence), {": 190 lost their points to radar_max_azimuth 1.57 rad, the other 10 have",
+                               "Change radar_max_azimuth if"});
+  radar.scans_emptied = {};
+  radar.scans_empty = 200;
+  radar.points = 0;
+  expectSays(first(evidence), {": 200 clouds are empty. Look for"});
+}
+
 TEST(Diagnosis, FilteredPointsNameTheFilterAndTheUnit) {
   RunEvidence evidence = withRejected("too_few_points");
   pointsOf(evidence, PointVerdict::kKept) = 0;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 namespace rio_t {
@@ -75,6 +76,30 @@ TEST(EvidenceCollector, ScansBeforeASecondStartCount) {
   const RunEvidence evidence = collector.evidence(RadarInertialOdometry(config.odometry), std::nullopt);
   EXPECT_EQ(evidence.radars[0].scans_before_start, 60u);
   EXPECT_EQ(evidence.radars[0].scans_before_imu, 0u);
+}
+
+TEST(EvidenceCollector, ScansWithoutPointsAreCountedByTheirReason) {
+  const Config config;
+  EvidenceCollector collector(config);
+  ScanResult result;
+  result.rejected_because = "too_few_points";
+  collector.add(result);
+  RadarPoint behind, ahead;
+  behind.position_R = {0.0, -5.0, 0.0};
+  ahead.position_R = {0.0, 5.0, 0.0};
+  behind.snr_db = ahead.snr_db = 20.0;
+  result.scan.points = {behind, behind, behind, ahead};
+  collector.add(result);
+  result.scan.points = {ahead, ahead};  // too few came
+  collector.add(result);
+  result.scan.points = {ahead, ahead, ahead, behind};
+  collector.add(result);
+  const RunEvidence evidence = collector.evidence(RadarInertialOdometry(config.odometry), std::nullopt);
+  const RadarSummary& radar = evidence.radars.front();
+  EXPECT_EQ(radar.scans_empty, 1U);
+  EXPECT_EQ(radar.scans_emptied[static_cast<std::size_t>(PointVerdict::kBesideView)], 1U);
+  EXPECT_EQ(std::accumulate(radar.scans_emptied.begin(), radar.scans_emptied.end(), std::uint64_t{0}), 1U);
+  EXPECT_EQ(radar.points, 10U);
 }
 
 }  // namespace

@@ -11,9 +11,10 @@ CloudReport inspectCloud(const std::vector<RadarScan>& scans) {
   CloudReport report;
   std::vector<double> counts, ranges, azimuths, elevations;
   Eigen::Vector3d squares = Eigen::Vector3d::Zero();
-  double behind = 0.0, ambiguous = 0.0;
+  double behind = 0.0, ambiguous = 0.0, empty = 0.0;
   for (const RadarScan& scan : scans) {
     counts.push_back(static_cast<double>(scan.points.size()));
+    if (scan.points.empty()) empty += 1.0;
     for (const RadarPoint& point : scan.points) {
       const Eigen::Vector3d& p = point.position_R;
       const double range = p.norm();
@@ -35,6 +36,7 @@ CloudReport inspectCloud(const std::vector<RadarScan>& scans) {
   report.spread = (squares / n - report.mean_direction.cwiseAbs2()).cwiseMax(0.0).cwiseSqrt();
   report.behind = behind / n;
   report.ambiguous = ambiguous / n;
+  report.empty = empty / static_cast<double>(scans.size());
   report.points_10 = quantile(counts, 0.1);
   report.points_50 = quantile(counts, 0.5);
   report.points_90 = quantile(counts, 0.9);

@@ -13,6 +13,7 @@ struct CloudReport {
   std::size_t points = 0;
   double points_10 = 0.0, points_50 = 0.0,
          points_90 = 0.0;                       ///< a scan: 10, 50 and 90 % of the scans have fewer
+  double empty = 0.0;                           ///< share of the scans, those without a point
   double range_99 = 0.0;                        ///< [m]
   double azimuth_95 = 0.0, elevation_95 = 0.0;  ///< [rad] to either side of forward (y) hold 95 %
   double behind = 0.0;                          ///< share of the points with a negative y

@@ -101,13 +101,18 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
   for (const std::string& odd : format.odd) radar->odd("format", odd);
   const DopplerStep& step = looked.velocities.doppler_step;
   const bool sparse = radar->isSparse();
-  radar->tell(sparse ? FindingLevel::kOdd : FindingLevel::kOk, "points",
+  constexpr double kManyEmpty = 0.2;  // a radar that leaves out what stands still sees nothing at rest
+  const bool often_empty = c.empty > kManyEmpty;
+  radar->tell(sparse || often_empty ? FindingLevel::kOdd : FindingLevel::kOk, "points",
               fixedText(c.points_10, 0) + " / " + fixedText(c.points_50, 0) + " / " +
                   fixedText(c.points_90, 0) + " a scan (10, 50, 90 %), to " + fixedText(c.range_99, 1) +
                   " m, field of view +-" + degrees(c.azimuth_95) + " by +-" + degrees(c.elevation_95) +
                   " deg, Doppler step " +
                   (step.value > 0.0 ? fixedText(step.value, 3) + " m/s" : std::string("none")) +
-                  (sparse ? ": few points, so start at rest" : ""));
+                  (sparse ? ": few points, so start at rest" : "") +
+                  (often_empty ? "; " + fixedText(100.0 * c.empty, 0) +
+                                     " % of the clouds are empty: look for what empties them in the driver"
+                               : ""));
   constexpr double kIncredible = 500.0;  // [m] farther than radars see
   if (c.range_99 > kIncredible)
     radar->odd("points", "the ranges reach " + fixedText(c.range_99, 0) + " m: are the positions in m?");

@@ -1,5 +1,7 @@
 #include "radar_causes.h"
 
+#include <algorithm>
+
 #include "rio_t/core/angle.h"
 
 namespace rio_t {
@@ -132,20 +134,7 @@ class RadarCauses {
   void addVelocities() {
     const std::uint64_t kept = pointsOf(radar_, PointVerdict::kKept);
     // The points that the filter took are a cause of their own.
-    if (shareOf(kept, radar_.points) > 1.0 - kManyPoints || radar_.points == 0) {
-      const std::string broken =
-          radar_.points_not_finite == 0
-              ? ""
-              : "Look at the driver of the radar: " + std::to_string(radar_.points_not_finite) +
-                    " more points are not finite. ";
-      scans(
-          "too_few_points",
-          "have too few points for a velocity: " + number(shareOf(kept, radar_.scans_total)) +
-              " on average after the filter.",
-          broken +
-              "Set a lower detection threshold in the driver of the radar. If radar_factor is velocity, set "
-              "doppler.");
-    }
+    if (shareOf(kept, radar_.points) > 1.0 - kManyPoints || radar_.points == 0) addTooFewPoints(kept);
     scans("too_few_inliers", "have no velocity that enough of their points agree on.",
           "Check " + key_ + "radar_field_doppler, " + key_ +
               "radar_axes and the positions. Moving things in view have the same effect.");
@@ -155,6 +144,64 @@ class RadarCauses {
           "Raise " + key_ + "ego_velocity_max_sigma, or let the radar report more points.");
     scans("ambiguous", "show two velocities, and nothing tells which is that of the static world.",
           "Something that moves fills the view: turn the radar away from it.");
+  }
+
+  /// The key that sets a limit of the filter, with its value; empty: no key does.
+  std::string keyOf(PointVerdict verdict) const {
+    const EgoVelocityOptions& o = config_.odometry.ego_velocity;
+    switch (verdict) {
+      case PointVerdict::kTooNear:
+        return key_ + "radar_min_range " + number(o.min_range) + " m";
+      case PointVerdict::kTooFar:
+        return key_ + "radar_max_range " + number(o.max_range) + " m";
+      case PointVerdict::kTooWeak:
+        return key_ + "radar_min_snr_db " + number(o.min_snr_db) + " dB";
+      case PointVerdict::kBesideView:
+        return key_ + "radar_max_azimuth " + number(o.max_azimuth) + " rad";
+      case PointVerdict::kAboveView:
+        return key_ + "radar_max_elevation " + number(o.max_elevation) + " rad";
+      default:
+        return "";
+    }
+  }
+
+  /// Which of the scans were empty, and which key took the points of the others. `kept`: points.
+  void addTooFewPoints(std::uint64_t kept) {
+    const auto& emptied = radar_.scans_emptied;
+    const auto most =
+        static_cast<std::size_t>(std::max_element(emptied.begin(), emptied.end()) - emptied.begin());
+    std::uint64_t others = radar_.scans_total - std::min(radar_.scans_total, radar_.scans_empty);
+    std::string why;
+    if (radar_.scans_empty > 0) appendItem(&why, std::to_string(radar_.scans_empty) + " clouds are empty");
+    for (std::size_t k = 0; k < kPointVerdicts; ++k) {
+      if (emptied[k] == 0) continue;
+      others -= std::min(others, emptied[k]);
+      const std::string key = keyOf(static_cast<PointVerdict>(k));
+      appendItem(&why, std::to_string(emptied[k]) + " lost their points to " +
+                           (key.empty() ? "a range of zero or to echoes at several directions" : key));
+    }
+    if (others > 0)
+      appendItem(&why, (why.empty() ? "" : "the other " + std::to_string(others) + " have ") +
+                           number(shareOf(kept, others)) + " on average after the filter");
+    const std::uint64_t count =
+        countOf(radar_.scans_rejected, "too_few_points") + countOf(radar_.velocity_status, "too_few_points");
+    std::string remedy =
+        "Set a lower detection threshold in the driver of the radar. If radar_factor is velocity, set "
+        "doppler.";
+    if (2 * radar_.scans_empty > count) {
+      remedy =
+          "Look for what empties the clouds in the driver of the radar: its detection threshold, a filter "
+          "of what stands still, or a second publisher on " +
+          key_ + "radar_topic.";
+    } else if (2 * emptied[most] > count && !keyOf(static_cast<PointVerdict>(most)).empty()) {
+      const std::string key = keyOf(static_cast<PointVerdict>(most));
+      remedy = "Change " + key.substr(0, key.find(' ')) +
+               " if the radar sees well there, or look for a second publisher on " + key_ + "radar_topic.";
+    }
+    if (radar_.points_not_finite > 0)
+      remedy = "Look at the driver of the radar: " + std::to_string(radar_.points_not_finite) +
+               " more points are not finite. " + remedy;
+    scans("too_few_points", "have too few points for a velocity: " + why + ".", remedy);
   }
 
   /// Scans that give a velocity that the IMU contradicts.

@@ -32,11 +32,13 @@ void EvidenceCollector::add(const ScanResult& result) {
   RadarSummary& radar = evidence_.radars.at(result.scan.radar);
   ++radar.scans_total;
   const PointFilter& filter = filters_[result.scan.radar];
+  std::array<std::uint64_t, kPointVerdicts> of_scan = {};
   for (const RadarPoint& point : result.scan.points) {
     ++radar.points;
     radar.snr_sum_db += point.snr_db;
-    ++radar.points_by_verdict[static_cast<std::size_t>(filter.judge(point))];
+    ++of_scan[static_cast<std::size_t>(filter.judge(point))];
   }
+  addPoints(of_scan, &radar);
   if (result.rejected_because == "before_initialization") {
     ++radar.scans_before_start;
     if (oldest_imu_ && result.scan.stamp < *oldest_imu_ && ++radar.scans_before_imu == 1)
@@ -62,6 +64,22 @@ void EvidenceCollector::add(const ScanResult& result) {
   radar.mounting_turn = result.mounting_turn;
   evidence_.heading_sigma = sigmasOf(bodyOdometry(result.state, 0.0).pose_covariance)[5];
   ++evidence_.solver_terminations[toString(result.solver_termination)];
+}
+
+void EvidenceCollector::addPoints(const std::array<std::uint64_t, kPointVerdicts>& of_scan,
+                                  RadarSummary* radar) {
+  constexpr std::uint64_t kEnough = 3;  // as EgoVelocityStatus::kTooFewPoints
+  std::uint64_t all = 0;
+  for (std::size_t k = 0; k < kPointVerdicts; ++k) {
+    all += of_scan[k];
+    radar->points_by_verdict[k] += of_scan[k];
+  }
+  if (all == 0) ++radar->scans_empty;
+  const auto kept = static_cast<std::size_t>(PointVerdict::kKept);
+  static_assert(static_cast<std::size_t>(PointVerdict::kKept) == 0);
+  if (all < kEnough || of_scan[kept] >= kEnough) return;
+  const auto most = std::max_element(of_scan.begin() + 1, of_scan.end());
+  ++radar->scans_emptied[static_cast<std::size_t>(most - of_scan.begin())];
 }
 
 void EvidenceCollector::addState(Time time) {

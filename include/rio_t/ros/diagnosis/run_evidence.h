@@ -55,6 +55,10 @@ struct RadarSummary : RadarEstimate {
   std::uint64_t points = 0;              ///< of all scans
   std::uint64_t points_not_finite = 0;   ///< besides these: the decoder drops them
   std::array<std::uint64_t, kPointVerdicts> points_by_verdict = {};
+  std::uint64_t scans_empty = 0;  ///< scans without a point
+  /// Scans that had enough points for a velocity, and too few after the filter: by the verdict that took
+  /// most.
+  std::array<std::uint64_t, kPointVerdicts> scans_emptied = {};
   double snr_sum_db = 0.0;      ///< over `points`
   double silent_seconds = 0.0;  ///< as RunEvidence::silent_seconds, but without the scans of other radars
   PointVariances noise;         ///< of its points, as learned; the file has its standard deviations
@@ -154,6 +158,9 @@ class EvidenceCollector {
                        const std::optional<RadarInertialOdometry::Start>& start) const;
 
  private:
+  /// The points of one scan, by the verdict on them.
+  static void addPoints(const std::array<std::uint64_t, kPointVerdicts>& of_scan, RadarSummary* radar);
+
   std::vector<PointFilter> filters_;         // by RadarScan::radar
   double coasting_after_, max_bridged_gap_;  // [s]
   std::optional<Time> oldest_imu_, newest_state_;
