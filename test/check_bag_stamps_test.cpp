@@ -104,6 +104,24 @@ TEST_F(CheckBag, ScansThatComeLateAreNamed) {
              {"stamps", "after their stamps", "--set stamp_source=arrival"});
 }
 
+TEST_F(CheckBag, AnOffsetNearItsBoundIsOddAndNamesTheKey) {
+  const double offset = setup_.time_offset.constant;
+  const auto with = [&](const std::string& name, double seconds) {
+    setup_.time_offset.constant = seconds;
+    const std::string path = folder_ + "/offset_" + name + ".bag";
+    write("medium", 50.0, BagFormat::kIrs, path);
+    setup_.time_offset.constant = offset;
+    return path;
+  };
+  for (const auto& [name, sign] : {std::make_pair("late", 1.0), std::make_pair("early", -1.0)})
+    expectLine(check(with(name, 0.4 * sign), false), FindingLevel::kOdd,
+               {"offset", "ms or beyond: check_bag searches no farther", "max_time_offset 0.25 s",
+                "radar_stamp_shift"});
+  const std::string near = with("near", 0.22);
+  expectLine(check(near, false), FindingLevel::kOdd, {"offset", "near or beyond max_time_offset"});
+  expectLine(check(near, false, {"max_time_offset=0.6"}), FindingLevel::kOk, {"offset", "roughly"});
+}
+
 TEST_F(CheckBag, AClockThatJumpsBackHalfwayIsNamed) {
   Changes changes;
   changes.cloud = [count = 0](sensor_msgs::PointCloud2& cloud) mutable {

@@ -16,8 +16,8 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr double kMinDuration = 3.0;    // [s] of motion, below which nothing is said
-constexpr double kMaxOffset = 0.3;      // [s] to either side: a little beyond the default max_time_offset
+constexpr double kMinDuration = 3.0;  // [s] of motion, below which nothing is said
+constexpr double kMaxOffset = kMaxSearchedOffset;
 constexpr double kOffsetStep = 0.01;    // [s]
 constexpr double kLevelSigma = 0.17;    // [rad] of the roll, if nothing else is known
 constexpr double kAheadSigma = 0.5;     // [rad] of the pitch, likewise

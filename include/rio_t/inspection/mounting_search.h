@@ -10,6 +10,9 @@
 
 namespace rio_t {
 
+/// [s] The search looks at offsets up to this, to either side: a little beyond the default max_time_offset.
+inline constexpr double kMaxSearchedOffset = 0.3;
+
 struct MountingSearchOptions {
   double accel_density = 0.02;  ///< [m/s^2/sqrt(Hz)] white noise of the accelerometer, vibration included
   /// Gravity in G from a rest [m/s^2], and the end of this rest: the gyro carries it on. Without a rest the

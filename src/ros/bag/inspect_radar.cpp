@@ -207,7 +207,28 @@ Eigen::Matrix3d nearestTurn(const Eigen::Matrix3d& R) {
                            });
 }
 
-void describeMounting(const MountingSearch& search, RadarInspection* radar) {
+/// `largest` [s]: max_time_offset.
+void describeOffset(const MountingSearch& search, double largest, RadarInspection* radar) {
+  const double size = std::abs(search.offset);
+  constexpr double kNearEnd = 0.02;  // [s]
+  const std::string found =
+      fixedText(1e3 * search.offset, 0) + " +- " + fixedText(1e3 * search.offset_sigma, 0) + " ms";
+  const std::string advice = " The odometry estimates offsets up to max_time_offset " +
+                             fixedText(largest, 2) +
+                             " s: if the offset is larger, --set max_time_offset=S (up to 1 s), or take a "
+                             "known delay off the stamps "
+                             "(radar_stamp_shift)";
+  if (size > kMaxSearchedOffset - kNearEnd) {
+    radar->odd("offset",
+               fixedText(1e3 * search.offset, 0) + " ms or beyond: check_bag searches no farther." + advice);
+  } else if (size > 0.8 * largest) {
+    radar->odd("offset", found + ", roughly, near or beyond max_time_offset." + advice);
+  } else {
+    radar->ok("offset", found + ", roughly; the odometry estimates it");
+  }
+}
+
+void describeMounting(const MountingSearch& search, double largest_offset, RadarInspection* radar) {
   if (!search.enough) {
     radar->tell(
         FindingLevel::kOdd, "mounting",
@@ -254,8 +275,7 @@ void describeMounting(const MountingSearch& search, RadarInspection* radar) {
                     ParameterValue{rounded(std::max(least, l_sigma.maxCoeff()), 100.0)},
                     "Standard deviation of extrinsics_translation [m].");
   }
-  radar->ok("offset", fixedText(1e3 * search.offset, 0) + " +- " + fixedText(1e3 * search.offset_sigma, 0) +
-                          " ms, roughly; the odometry estimates it");
+  describeOffset(search, largest_offset, radar);
   constexpr double kKnown = 0.03;  // [s]
   const double bound = 0.8 * SmootherOptions().max_time_offset;
   if (std::abs(search.offset) > 0.8 * CalibrationPrior().time_offset_sigma && search.offset_sigma < kKnown &&
@@ -328,7 +348,7 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   for (const std::string& odd : stamps.odd) radar.odd("stamps", odd);
   if (stamps.odd.empty()) radar.ok("stamps", stamps.text);
   describeSign(looked, format, imu.report, &radar);
-  describeMounting(looked.search, &radar);
+  describeMounting(looked.search, makeConfig(configured).odometry.smoother.max_time_offset, &radar);
   compareWithConfigured(looked.search, configured, &radar);
   return radar;
 }
