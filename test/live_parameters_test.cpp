@@ -66,7 +66,7 @@ TEST(LiveParameters, ChangeAllRadars) {
 }
 
 TEST(LiveParameters, RefuseWhatTheRegistryRefuses) {
-  for (const double wrong : {-1.0, std::numeric_limits<double>::quiet_NaN()}) {
+  for (const double wrong : {-1.0, 1e9, std::numeric_limits<double>::quiet_NaN()}) {
     dynamic_reconfigure::Config message;
     LiveParameters(Config()).__toMessage__(message);
     doubleOf(message, "imu_gyro_noise_density") = wrong;

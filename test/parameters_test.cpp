@@ -199,6 +199,18 @@ TEST(Parameters, ContradictionsAreRefused) {
   EXPECT_NO_THROW(fromAssignments({"radar_topic=/a", "trigger_topic=/a"})) << "no trigger is read";
 }
 
+/// The estimate would explode.
+TEST(Parameters, NoisesThatNoSensorHasAreRefused) {
+  for (const char* key :
+       {"imu_accel_noise_density", "imu_gyro_noise_density", "imu_accel_random_walk", "imu_gyro_random_walk",
+        "imu_unseen_accel_density", "imu_unseen_gyro_density", "barometer_noise_density"}) {
+    const std::string fault = faultsOf({std::string(key) + "=1e9"}).at(0);
+    EXPECT_TRUE(contains(fault, std::string(key) + ": expected a finite number above 0 and at most "))
+        << fault;
+  }
+  EXPECT_NO_THROW(fromAssignments({"imu_accel_noise_density=2.0", "imu_gyro_noise_density=0.1"}));
+}
+
 TEST(Parameters, AllFaultsAreReportedAtOnce) {
   const std::vector<std::string> faults =
       faultsOf({"window=fast", "widnow=1", "stamp_source=never", "max_iterations=0", "imu_topic=/imu"});

@@ -188,8 +188,10 @@ void describeNoise(ImuInspection* imu) {
                 fixedText(r.gyro_density_quiet, 5) + " rad/s/sqrt(Hz)" +
                 (vibrates ? ": the frame vibrates; mount the IMU softer if you can" : ""));
   // The diagnosis doubts a run only if the IMU is noisier than configured.
+  constexpr double kMost = 10.0;  // [m/s^2/sqrt(Hz)] that the parameter takes
   if (vibrates)
-    imu->keys.set("imu_accel_noise_density", ParameterValue{rounded(r.accel_density_median, 1e3)},
+    imu->keys.set("imu_accel_noise_density",
+                  ParameterValue{rounded(std::min(r.accel_density_median, kMost), 1e3)},
                   "The frame vibrates: more than the default expects.");
   if (r.saturated > 0)
     imu->odd("range", std::to_string(r.saturated) + " samples are at the end of the range (largest " +

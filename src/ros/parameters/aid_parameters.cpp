@@ -48,7 +48,7 @@ void listAids(ParameterList& list, Config& c) {
       "barometer_topic", c.barometer_topic,
       "The barometer publishes sensor_msgs/FluidPressure on this topic, in Pa and stamped in the IMU "
       "clock. If it is empty, there is no barometer.");
-  list.number("barometer_noise_density", "m/sqrt(Hz)", above(0), barometer.noise_density,
+  list.number("barometer_noise_density", "m/sqrt(Hz)", above(0, 100), barometer.noise_density,
               "This is the white noise of the height. The estimator takes more if the samples show more.");
   list.number("barometer_drift", "m/sqrt(s)", above(0), barometer.drift,
               "The bias of the height wanders by this random walk, since the weather and the temperature of "

@@ -132,20 +132,20 @@ void listImu(ParameterList& list, Config& c) {
   list.number("gravity", "m/s^2", between(9.5, 10.0), c.odometry.gravity,
               "This is the size of gravity at your place: 9.78 at the equator, 9.83 at the poles.");
   list.first().number(
-      "imu_accel_noise_density", "m/s^2/sqrt(Hz)", above(0), c.odometry.imu_noise.accel_density,
+      "imu_accel_noise_density", "m/s^2/sqrt(Hz)", above(0, 10), c.odometry.imu_noise.accel_density,
       "This is the white noise of the accelerometer, from its data sheet or an Allan plot. 0.001 to 0.02 are "
       "typical. This is the start value: the estimator takes more if the samples or the radar show more. A "
       "value two or three times that of the data sheet is a good choice.");
   list.first().number(
-      "imu_gyro_noise_density", "rad/s/sqrt(Hz)", above(0), c.odometry.imu_noise.gyro_density,
+      "imu_gyro_noise_density", "rad/s/sqrt(Hz)", above(0, 1), c.odometry.imu_noise.gyro_density,
       "This is the white noise of the gyro, from its data sheet or an Allan plot. 0.00005 to 0.001 "
       "are typical. The estimator takes more if the samples show more.");
   list.number(
-      "imu_accel_random_walk", "m/s^3/sqrt(Hz)", above(0), c.odometry.imu_noise.accel_random_walk,
+      "imu_accel_random_walk", "m/s^3/sqrt(Hz)", above(0, 1), c.odometry.imu_noise.accel_random_walk,
       "The bias of the accelerometer wanders by this random walk. Raise it if the biases cannot follow, for "
       "example while the IMU warms up.");
   list.number(
-      "imu_gyro_random_walk", "rad/s^2/sqrt(Hz)", above(0), c.odometry.imu_noise.gyro_random_walk,
+      "imu_gyro_random_walk", "rad/s^2/sqrt(Hz)", above(0, 0.1), c.odometry.imu_noise.gyro_random_walk,
       "The bias of the gyro wanders by this random walk. Raise it if the biases cannot follow, for example "
       "while the IMU warms up.");
   list.number("imu_gyro_scale_error", "", between(0, 1), c.odometry.imu_noise.gyro_scale_error,
@@ -175,11 +175,11 @@ void listImu(ParameterList& list, Config& c) {
       "This is the largest reading of the gyro on one axis. A sample at this value is clipped and counts "
       "less. 0 finds the range from flat tops in the data. If the data sheet says 2000 deg/s, set 34.9.");
   list.number(
-      "imu_unseen_accel_density", "m/s^2/sqrt(Hz)", above(0), gate.unseen_accel_density,
+      "imu_unseen_accel_density", "m/s^2/sqrt(Hz)", above(0, 100), gate.unseen_accel_density,
       "This noise stands for the acceleration that the IMU does not see, in gaps and beyond its range. The "
       "default suits people and drones. Lower it for a slow vehicle.");
   list.number(
-      "imu_unseen_gyro_density", "rad/s/sqrt(Hz)", above(0), gate.unseen_gyro_density,
+      "imu_unseen_gyro_density", "rad/s/sqrt(Hz)", above(0, 10), gate.unseen_gyro_density,
       "This noise stands for the rotation that the IMU does not see: in gaps, beyond its range, and while an "
       "axis sticks. The default suits people and drones. Lower it for a slow vehicle.");
   list.number(
