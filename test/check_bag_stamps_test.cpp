@@ -4,9 +4,12 @@
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/PointCloud2.h>
 
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "plain_bag.h"
 #include "rio_t/ros/bag/check_bag.h"
@@ -187,6 +190,32 @@ TEST_F(CheckBag, APauseOfTheImuIsNoJumpOfItsClock) {
   expectLine(odd, FindingLevel::kOdd, {"IMU", "gaps: 1"});
   for (const Finding& finding : odd.findings) EXPECT_NE(finding.subject, "IMU stamps") << describeCheck(odd);
   EXPECT_LT(turnFromTruth(odd), 5.0);
+}
+
+/// The driver reads twenty samples at once, and stamps them then.
+TEST_F(CheckBag, StampsInBurstsAreNamedAndNoGaps) {
+  std::vector<ros::Time> stamps;
+  rewritten("stamps", {[&](sensor_msgs::Imu& imu) {
+              stamps.push_back(imu.header.stamp);
+              return true;
+            }});
+  for (const std::size_t size : {8, 20}) {
+    std::size_t count = 0;
+    Changes changes;
+    changes.imu = [&](sensor_msgs::Imu& imu) {
+      const std::size_t k = count++, last = std::min(stamps.size() - 1, k / size * size + size - 1);
+      imu.header.stamp = stamps[last] - ros::Duration(5e-5 * static_cast<double>(last - k));
+      return true;
+    };
+    const BagCheck odd = check(rewritten("bursts_" + std::to_string(size), changes));
+    const std::string text = describeCheck(odd);
+    expectLine(
+        odd, FindingLevel::kOdd,
+        {"IMU", "/sensor_platform/imu: 409 Hz: the stamps come in bursts of " + std::to_string(size) + ",",
+         "No sample is lost"});
+    EXPECT_EQ(text.find("gaps"), std::string::npos) << text;
+    EXPECT_EQ(text.find("loses"), std::string::npos) << text;
+  }
 }
 
 TEST_F(CheckBag, ABagRecordedTwiceIsReady) {

@@ -454,6 +454,25 @@ TEST(Diagnosis, TheImuIsNamed) {
   }
 }
 
+TEST(Diagnosis, BurstsOfStampsAreNoLoss) {
+  RunEvidence evidence = goodRun();
+  evidence.input_faults["imu_gap"] = 1226;
+  evidence.imu_count = evidence.imu_steps = 24520;
+  evidence.imu_gaps = 1226;
+  evidence.imu_seconds = 60.0;
+  evidence.imu_gap_seconds = 58.8;
+  expectSays(first(evidence),
+             {"imu_bursts: The stamps of the IMU come in bursts of 20, one burst each 0.0489 s",
+              "no sample is lost", "let it give each sample the time"});
+  // As many gaps, with half of the time between them.
+  evidence.imu_gap_seconds = 30.0;
+  expectSays(first(evidence), {"imu_gap: 1226 gaps", "look for what loses its messages"});
+  // A slow IMU: each step is a gap.
+  evidence.imu_steps = evidence.imu_gaps;
+  evidence.imu_gap_seconds = evidence.imu_seconds;
+  expectSays(first(evidence), {"imu_gap: 1226 gaps", "Raise max_imu_gap for a slow IMU"});
+}
+
 TEST(Diagnosis, AStartAfterMostOfTheScansIsNamed) {
   RunEvidence evidence = goodRun();
   evidence.radars.front().scans_before_start = 199;

@@ -16,6 +16,27 @@ constexpr double kRecordedNear = 0.5;
 /// newest last. More would compare a scan with samples of another time.
 constexpr std::size_t kCompared = 8;
 
+/// Sets the rate and the burst, if the intervals show bursts around this median.
+bool findBursts(const std::vector<double>& intervals, double median, double factor, StreamTiming* timing) {
+  constexpr std::size_t kEnoughBursts = 10;
+  constexpr double kMostOfTheTime = 0.8, kLeastBurst = 2.5;
+  std::vector<double> between;
+  double span = 0.0, pauses = 0.0;
+  for (const double interval : intervals) {
+    span += interval;
+    if (interval < factor * median) continue;
+    pauses += interval;
+    between.push_back(interval);
+  }
+  const double size =
+      static_cast<double>(intervals.size()) / static_cast<double>(std::max<std::size_t>(1, between.size()));
+  if (between.size() < kEnoughBursts || pauses < kMostOfTheTime * span || size < kLeastBurst) return false;
+  timing->rate = static_cast<double>(intervals.size()) / span;
+  timing->burst = size;
+  timing->burst_period = span / static_cast<double>(between.size());
+  return true;
+}
+
 }  // namespace
 
 StreamTiming inspectTiming(const std::vector<MessageTimes>& times) {
@@ -39,9 +60,10 @@ StreamTiming inspectTiming(const std::vector<MessageTimes>& times) {
   }
   timing.constant = times.size() > 2 && same_as_first == times.size() && timing.zero == 0;
   if (timing.zero > 0 || timing.constant || intervals.empty()) intervals = record_intervals;
-  const double median = quantile(intervals, 0.5);
+  double median = quantile(intervals, 0.5);
   timing.rate = median > 0.0 ? 1.0 / median : 0.0;
   timing.jitter = 0.5 * (quantile(intervals, 5.0 / 6.0) - quantile(intervals, 1.0 / 6.0));
+  if (findBursts(intervals, median, kGapFactor, &timing)) median = timing.burst_period;
   for (const double interval : intervals) {
     if (interval < kGapFactor * median || interval < kLeastGap) continue;
     ++timing.gaps;

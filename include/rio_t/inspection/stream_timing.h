@@ -16,9 +16,14 @@ struct MessageTimes {
 /// How the messages of one topic come.
 struct StreamTiming {
   std::size_t messages = 0;
-  double rate = 0.0;      ///< [Hz] of the median interval of the stamps; of the records if they tell nothing
-  std::size_t zero = 0;   ///< stamps of zero
-  bool constant = false;  ///< all stamps are the same, and not zero
+  /// [Hz] of the median interval of the stamps, or of the records if they tell nothing; of bursts, the mean.
+  double rate = 0.0;
+  /// Messages of a burst, if nearly all the time passes between bursts of stamps; else 0. The driver stamps
+  /// them when it reads them, and no gap between bursts is a loss.
+  double burst = 0.0;
+  double burst_period = 0.0;   ///< [s] from burst to burst
+  std::size_t zero = 0;        ///< stamps of zero
+  bool constant = false;       ///< all stamps are the same, and not zero
   std::size_t duplicates = 0;  ///< stamps as the one before
   std::size_t backwards = 0;   ///< stamps before the one before
   std::size_t gaps = 0;        ///< intervals above 3.5 times the median, and above 20 ms

@@ -105,10 +105,17 @@ std::string faultOf(const StreamTiming& timing) {
 
 void describeRate(const StreamTiming& timing, ImuInspection* imu) {
   constexpr double kSlow = 50.0;  // [Hz]
-  const bool odd = timing.rate < kSlow || timing.gaps > 0 || 20 * timing.duplicates > timing.messages;
+  const bool bursts = timing.burst > 0.0;
+  const bool odd =
+      bursts || timing.rate < kSlow || timing.gaps > 0 || 20 * timing.duplicates > timing.messages;
   imu->tell(odd ? FindingLevel::kOdd : FindingLevel::kOk, "IMU",
             imu->topic + ": " + rateText(timing, timing.rate < 20.0 ? 1 : 0, true) +
-                (timing.rate < kSlow ? ", slower than the 50 Hz that a hand-held platform needs" : ""));
+                (timing.rate < kSlow ? ", slower than the 50 Hz that a hand-held platform needs" : "") +
+                (bursts ? ": the stamps come in bursts of " + fixedText(timing.burst, 0) +
+                              ", one burst each " + fixedText(timing.burst_period, 3) +
+                              " s. No sample is lost: the driver stamps them when it reads them. Let it give "
+                              "each sample the time at which it was measured"
+                        : ""));
 }
 
 void describeUnits(ImuInspection* imu) {

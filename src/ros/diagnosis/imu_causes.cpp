@@ -38,6 +38,28 @@ double takenBy(const ImuFault& fault, const RunEvidence& evidence) {
                   shareOf(countOf(evidence.input_faults, fault.name) * fault.samples, evidence.imu_count));
 }
 
+/// Nearly all the time passes in gaps, and yet there are many samples: their stamps come in bursts.
+bool stampsComeInBursts(const RunEvidence& evidence, const Config& config) {
+  constexpr std::uint64_t kEnoughBursts = 10;
+  constexpr double kMostOfTheTime = 0.8;
+  return evidence.imu_gaps >= kEnoughBursts &&
+         evidence.imu_gap_seconds > kMostOfTheTime * evidence.imu_seconds &&
+         evidence.imu_seconds < config.odometry.max_imu_gap * static_cast<double>(evidence.imu_steps);
+}
+
+void addBursts(const RunEvidence& evidence, double share, std::vector<Cause>* causes) {
+  const double gaps = static_cast<double>(evidence.imu_gaps);
+  causes->push_back(
+      {"imu_bursts",
+       "The stamps of the IMU come in bursts of " +
+           fixedText(static_cast<double>(evidence.imu_steps) / gaps, 0) + ", one burst each " +
+           number(evidence.imu_seconds / gaps) +
+           " s: that is longer than max_imu_gap, but no sample is lost.",
+       "The driver of the IMU stamps the samples when it reads them: let it give each sample the "
+       "time at which it was measured.",
+       share});
+}
+
 }  // namespace
 
 double shareOfImuFaults(const RunEvidence& evidence) {
@@ -50,6 +72,10 @@ void addCausesOfImu(const RunEvidence& evidence, const Config& config, std::vect
   for (const ImuFault& fault : kImuFaults) {
     const double share = takenBy(fault, evidence);
     if (share <= kManySamples) continue;
+    if (fault.name == std::string("imu_gap") && stampsComeInBursts(evidence, config)) {
+      addBursts(evidence, share, causes);
+      continue;
+    }
     causes->push_back({fault.name,
                        std::to_string(countOf(evidence.input_faults, fault.name)) + " " + fault.text,
                        fault.remedy, share});

@@ -14,7 +14,8 @@ std::uint64_t countOf(const Counts& counts, const std::string& name) {
 
 EvidenceCollector::EvidenceCollector(const Config& config)
     : coasting_after_(config.odometry.health.coasting_after),
-      max_bridged_gap_(config.odometry.imu_input_check.max_bridged_gap) {
+      max_bridged_gap_(config.odometry.imu_input_check.max_bridged_gap),
+      max_imu_gap_(config.odometry.max_imu_gap) {
   for (const Config& radar : configsOfRadars(config)) {
     filters_.emplace_back(radar.odometry.radar.ego_velocity);
     evidence_.radars.emplace_back().name = radar.radar_name;

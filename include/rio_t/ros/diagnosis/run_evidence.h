@@ -110,6 +110,10 @@ struct RunEvidence {
   std::string waiting_for;     ///< while not initialised
   double heading_sigma = 0.0;  ///< of the newest state [rad]
   std::uint64_t imu_count = 0;
+  // Steps from stamp to stamp of the IMU samples that can be used, but for jumps and gaps that nothing
+  // bridges:
+  std::uint64_t imu_steps = 0, imu_gaps = 0;        ///< the gaps are those above max_imu_gap
+  double imu_seconds = 0.0, imu_gap_seconds = 0.0;  ///< [s] in all of them, and in those gaps
   Counts input_faults;  ///< RadarInertialOdometry::faults(), with those of the messages
   std::uint64_t divergences = 0, reinitializations = 0;
   Health health = Health::kOk;
@@ -139,6 +143,14 @@ class EvidenceCollector {
   /// A sample of the IMU.
   void addImu(Time time) {
     if (!oldest_imu_ || time < *oldest_imu_) oldest_imu_ = time;  // its clock may jump back
+    const double step = newest_imu_ ? time - *newest_imu_ : 0.0;
+    newest_imu_ = time;
+    if (step <= 0.0 || step > max_bridged_gap_) return;
+    ++evidence_.imu_steps;
+    evidence_.imu_seconds += step;
+    if (step <= max_imu_gap_) return;
+    ++evidence_.imu_gaps;
+    evidence_.imu_gap_seconds += step;
   }
   /// A sample of the IMU after the start.
   void addState(Time time);
@@ -161,9 +173,9 @@ class EvidenceCollector {
   /// The points of one scan, by the verdict on them.
   static void addPoints(const std::array<std::uint64_t, kPointVerdicts>& of_scan, RadarSummary* radar);
 
-  std::vector<PointFilter> filters_;         // by RadarScan::radar
-  double coasting_after_, max_bridged_gap_;  // [s]
-  std::optional<Time> oldest_imu_, newest_state_;
+  std::vector<PointFilter> filters_;                       // by RadarScan::radar
+  double coasting_after_, max_bridged_gap_, max_imu_gap_;  // [s]
+  std::optional<Time> oldest_imu_, newest_imu_, newest_state_;
   std::vector<Time> last_used_;  // scan of each radar, or the start
   RunEvidence evidence_;
 };
