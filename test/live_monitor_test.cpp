@@ -304,6 +304,21 @@ TEST_F(TwoRadarDiagnostics, WarnOfATopicWithTwoPublishers) {
   EXPECT_EQ(second(20, 20, 20).level, DiagnosticStatus::OK);
 }
 
+/// rio_t.launch lets the player of a bag wait until all have subscribed.
+TEST_F(TwoRadarDiagnostics, GiveTheClockOfABagTimeToBegin) {
+  Status status;
+  monitor.describeInput(status, &session);
+  EXPECT_EQ(status.level, DiagnosticStatus::ERROR);
+  EXPECT_FALSE(LiveMonitor::describeMissingClock(status, 5.0));
+  EXPECT_EQ(status.level, DiagnosticStatus::WARN);
+  EXPECT_EQ(status.message, "waits for /clock, since use_sim_time is true");
+  Status late;
+  monitor.describeInput(late, &session);
+  EXPECT_TRUE(LiveMonitor::describeMissingClock(late, 11.0));
+  EXPECT_EQ(late.level, DiagnosticStatus::ERROR);
+  EXPECT_NE(late.message.find("nothing publishes /clock"), std::string::npos) << late.message;
+}
+
 TEST_F(TwoRadarDiagnostics, NameTheRadarThatIsMostlyRejected) {
   for (int k = 0; k < 5; ++k) EXPECT_EQ(second(20, 20, 10).level, DiagnosticStatus::OK) << "half are enough";
   Status status;

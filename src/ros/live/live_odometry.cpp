@@ -187,9 +187,9 @@ void LiveOdometry::addDiagnostics() {
     for (const Radar& radar : radars_) publishers[radar.config.radar_topic] = radar.scans.getNumPublishers();
     monitor_.setPublishers(publishers);
     monitor_.describeInput(s, session_.get().get());
-    if (ros::Time::isSimTime() && ros::Time::now().isZero())
-      s.mergeSummary(diagnostic_msgs::DiagnosticStatus::WARN,
-                     "use_sim_time is true, and nothing publishes /clock");
+    const std::chrono::duration<double> ran = std::chrono::steady_clock::now() - began_;
+    const bool lacks_clock = ros::Time::isSimTime() && ros::Time::now().isZero();
+    if (lacks_clock && !LiveMonitor::describeMissingClock(s, ran.count())) return;  // nothing to log yet
     if (s.message != kSolverFallsBehind) log_.status(s);  // else log_.health tells it
   });
   diagnostics_->add("odometry", [this](Status& s) {

@@ -407,6 +407,15 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   }
 }
 
+bool LiveMonitor::describeMissingClock(Status& status, double seconds) {
+  if (seconds > kClockPatience) {
+    status.mergeSummary(DiagnosticStatus::WARN, "use_sim_time is true, and nothing publishes /clock");
+    return true;
+  }
+  status.summary(DiagnosticStatus::WARN, "waits for /clock, since use_sim_time is true");
+  return false;
+}
+
 void LiveMonitor::describeSolver(Status& status) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   const auto latency = [&](const std::string& name, const Latency& of) {

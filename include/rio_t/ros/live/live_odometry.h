@@ -117,6 +117,7 @@ class LiveOdometry {
   std::function<void()> tick_odom_;  // none before the first ~odom; input thread
   std::atomic<std::uint64_t> odom_published_{0};
 
+  const std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
   std::vector<Radar> radars_;  // read-only after construction, but for T_IR
   CurrentSession session_;     // thread-safe; null until the extrinsics are known
 

@@ -63,6 +63,11 @@ class LiveMonitor {
   void describeOdometry(Status& status, const LiveSession* session) const;
   void describeInput(Status& status, const LiveSession* session);
   void describeSolver(Status& status) const;
+  /// For a node with use_sim_time and no /clock for so many seconds, after describeInput: nothing can come.
+  /// Until `kClockPatience`, the player of a bag may still wait, as rio_t.launch lets it: that is no fault.
+  /// Returns whether it is one.
+  static bool describeMissingClock(Status& status, double seconds);
+  static constexpr double kClockPatience = 10.0;  ///< [s] more than the delay of the player in rio_t.launch
   void describeTimeOffset(Status& status, std::size_t radar = 0) const;
   void describeExtrinsics(Status& status, std::size_t radar = 0) const;
   void describeBarometer(Status& status);
