@@ -81,7 +81,7 @@ TEST(Diagnosis, AGoodRunHasNoCauses) {
   const Diagnosis diagnosis = diagnose(goodRun(), Config{});
   EXPECT_EQ(toString(diagnosis.verdict), "good");
   EXPECT_EQ(describeCauses(diagnosis), "");
-  EXPECT_EQ(diagnosis.checks.size(), 11u);
+  EXPECT_EQ(diagnosis.checks.size(), 12u);
   for (const Check& check : diagnosis.checks) EXPECT_TRUE(check.good()) << check.name;
 }
 
@@ -112,6 +112,31 @@ TEST(Diagnosis, AMountingThatIsHeldAndContradictedIsNoGoodRun) {
   EXPECT_NE(diagnose(evidence, tf).causes.front().remedy.find("correct the tf of the cloud"),
             std::string::npos);
   evidence.radars.front().mounting_turn->covariance *= 100.0;  // noise explains it
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
+}
+
+TEST(Diagnosis, AWrongScaleOfTheDopplerIsNoGoodRun) {
+  RunEvidence evidence = goodRun();
+  evidence.radars.front().doppler_scale = {-0.09, 1e-6};  // an accelerometer may be off, too
+  EXPECT_EQ(first(evidence), "none");
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
+  evidence.radars.front().doppler_scale.error = -1.0;
+  expectSays(first(evidence), {"doppler_scale: The Doppler seems to be 0.5 times the velocity that the IMU "
+                               "feels, or less.",
+                               "radar_format", "radar_field_doppler", "in m/s"});
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
+  // It explains a mounting that seems turned a little, and an offset at its bound.
+  evidence.radars.front().mounting_turn =
+      MountingTurn{Eigen::Vector3d(0.0, 0.1, 0.0), 1e-4 * Eigen::Matrix3d::Identity()};
+  evidence.solver_terminations = {{"at_bound", 178}, {"converged", 2}};
+  expectSays(first(evidence), {"doppler_scale: "});
+  evidence.radars.front().doppler_scale = {-0.2, 0.0};
+  evidence.radars.front().mounting_turn->turn.y() = 1.0;  // the better explanation
+  expectSays(first(evidence), {"mounting_far: "});
+  evidence = goodRun();
+  evidence.radars.front().doppler_scale = {0.5, 1e-4};
+  expectSays(first(evidence), {"2 times the velocity that the IMU feels, or more."});
+  evidence.radars.front().doppler_scale.variance = 0.1;  // noise explains it
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
 }
 

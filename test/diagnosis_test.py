@@ -1,5 +1,6 @@
 """Runs that disappoint say why, and good runs do not."""
 import pathlib
+import struct
 
 import pytest
 import rosbag
@@ -84,6 +85,28 @@ def test_a_mounting_that_follows_a_wrong_sign_is_named(run_with, programs_folder
     _, summary = run_with("right/radar_doppler_sign=-1", bag=bag, config="two_radars")
     assert summary["verdict"] != "good"
     assert "mounting_far" in causes_of(summary)
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_a_doppler_that_is_not_in_metres_per_second_is_named(run_with, programs_folder, tmp_path, factor):
+    true, scaled = tmp_path / "true.bag", tmp_path / "scaled.bag"
+    programs.output_of(programs_folder / "simulate", "--motion", "walk", "--seed", 2, "--duration", 60, "--out", true)
+    with rosbag.Bag(str(true)) as bag, rosbag.Bag(str(scaled), "w") as to:
+        for topic, message, stamp in bag.read_messages():
+            if message._type == "sensor_msgs/PointCloud2":  # pylint: disable=protected-access
+                offset = next(field.offset for field in message.fields if field.name == "v_doppler_mps")
+                data = bytearray(message.data)
+                for at in range(offset, len(data), message.point_step):
+                    struct.pack_into("<f", data, at, factor * struct.unpack_from("<f", data, at)[0])
+                message.data = bytes(data)
+            to.write(topic, message, stamp)
+    _, summary = run_with(bag=true)
+    assert (summary["verdict"], summary["causes"]) == ("good", [])
+    assert abs(summary["doppler_scale_error"]) < 0.02
+    _, summary = run_with(bag=scaled)
+    assert summary["verdict"] != "good"
+    assert causes_of(summary)[0] == "doppler_scale"
+    assert not next(check for check in summary["checks"] if check["name"] == "doppler_scaled_sigmas")["good"]
 
 
 def test_a_radar_that_falls_silent_is_bad(run_with, simulated_run, tmp_path):

@@ -17,9 +17,9 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Filters the velocities of radars that are turned by `turns`, about their own axes, without any noise. All
-/// that the check sees comes from the turns.
-MountingCheck checkOf(const std::vector<Vector3d>& turns) {
+/// Filters the velocities of radars that are turned by `turns`, about their own axes, and read 1 / (1 -
+/// `scales`) times the velocity, without any noise. All that the check sees comes from these errors.
+MountingCheck checkOf(const std::vector<Vector3d>& turns, const std::vector<double>& scales) {
   const Eigen::Matrix3d P = Vector3d(1e-4, 2e-4, 4e-4).asDiagonal(),
                         R = Vector3d(3e-4, 2e-4, 1e-4).asDiagonal();
   MountingCheck check(turns.size());
@@ -32,7 +32,7 @@ MountingCheck checkOf(const std::vector<Vector3d>& turns) {
     UsedInnovation innovation;
     innovation.R_WR =
         so3::exp(Vector3d(0.3 * std::sin(0.2 * k), 0.3 * std::cos(0.13 * k), 0.02 * k)).toRotationMatrix();
-    innovation.v_R = so3::exp(-turns[radar]) * (innovation.R_WR.transpose() * v_W);
+    innovation.v_R = so3::exp(-turns[radar]) * (innovation.R_WR.transpose() * v_W) / (1.0 - scales[radar]);
     innovation.d = innovation.v_R - innovation.R_WR.transpose() * estimate_W;
     innovation.predicted = P;
     innovation.S = P + R;
@@ -44,12 +44,30 @@ MountingCheck checkOf(const std::vector<Vector3d>& turns) {
 
 TEST(MountingCheck, IsExactForSmallTurnsWithoutNoise) {
   const std::vector<Vector3d> turns = {Vector3d(1e-4, -2e-4, 3e-4), Vector3d(-2e-4, 1e-4, 2e-4)};
+  const std::vector<double> scales = {3e-4, -2e-4};
   for (const std::size_t radars : {1U, 2U}) {
-    const MountingCheck check = checkOf({turns.begin(), turns.begin() + radars});
-    for (std::size_t k = 0; k < radars; ++k)
-      EXPECT_LT((check.turnOf(k, {}).turn - turns[k]).norm(), 1e-3 * turns[k].norm())
-          << radars << " radars: " << check.turnOf(k, {}).turn.transpose();
+    for (const double scaled : {0.0, 1.0}) {
+      const MountingCheck check =
+          checkOf({turns.begin(), turns.begin() + radars}, {scaled * scales[0], scaled * scales[1]});
+      for (std::size_t k = 0; k < radars; ++k) {
+        EXPECT_LT((check.turnOf(k, {}).turn - turns[k]).norm(), 1e-3 * turns[k].norm())
+            << radars << " radars: " << check.turnOf(k, {}).turn.transpose();
+        EXPECT_NEAR(check.scaleOf(k).error, scaled * scales[k], 1e-3 * std::abs(scales[k]));
+      }
+    }
   }
+}
+
+/// A run with Dopplers that are `factor` times the true ones.
+SimulatedRun scaledBy(double factor, const std::string& motion, std::uint64_t seed,
+                      EstimateExtrinsics estimate = EstimateExtrinsics::kNone) {
+  SimulatedRun run(motion, seed, 50.0, 5.0);
+  run.options.smoother.estimate_extrinsics = estimate;
+  run.run([&](simulation::SensorData& data) {
+    for (simulation::SimulatedScan& scan : data.scans)
+      for (simulation::SimulatedPoint& point : scan.points) point.doppler *= factor;
+  });
+  return run;
 }
 
 /// A run with a mounting that is turned by `turn` from the told one, about the axes of I [rad].
@@ -65,21 +83,30 @@ double squaredSigmas(const MountingTurn& turn, double configured_sigma) {
   return turn.turn.dot((turn.covariance + told).ldlt().solve(turn.turn));
 }
 
+double squaredSigmas(const DopplerScale& scale, double told_sigma) {
+  return scale.error * scale.error / (scale.variance + told_sigma * told_sigma);
+}
+
 TEST(MountingCheck, ItsSigmasAreWhatItsErrorsAre) {
   constexpr int kSeeds = 8;
   for (const char* motion : {"difficult", "drone", "start_in_motion"}) {
-    double sum = 0.0;
+    double sum = 0.0, sum_of_scales = 0.0;
     for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
       const SimulatedRun run = turnedBy(Vector3d::Zero(), motion, seed);
       sum += squaredSigmas(*run.last(0).mounting_turn, 0.0) / 3.0;
+      sum_of_scales += squaredSigmas(run.last(0).doppler_scale, 0.0);
       for (const ScanResult& result : run.results) {
         if (!result.mounting_turn) continue;
         EXPECT_LT(squaredSigmas(*result.mounting_turn, kDegree), 9.0)
+            << motion << ", seed " << seed << ", at " << run.seconds(result.state.time) << " s";
+        EXPECT_LT(squaredSigmas(result.doppler_scale, 0.03), 9.0)
             << motion << ", seed " << seed << ", at " << run.seconds(result.state.time) << " s";
       }
     }
     EXPECT_GT(sum / kSeeds, 0.5) << motion;
     EXPECT_LT(sum / kSeeds, 2.0) << motion;
+    EXPECT_GT(sum_of_scales / kSeeds, 0.3) << motion;
+    EXPECT_LT(sum_of_scales / kSeeds, 2.5) << motion;
   }
 }
 
@@ -92,6 +119,22 @@ TEST(MountingCheck, FindsAWrongMounting) {
       EXPECT_LT((result.turn - turn).norm(), turn.norm() / 4.0)
           << motion << ": " << (result.turn / kDegree).transpose();
       EXPECT_LT(3.0 * result.sigma().maxCoeff(), 0.5 * turn.norm()) << motion;
+    }
+  }
+}
+
+TEST(MountingCheck, FindsAWrongScale) {
+  for (const EstimateExtrinsics estimate : {EstimateExtrinsics::kNone, EstimateExtrinsics::kPose}) {
+    for (const char* motion : {"difficult", "medium", "drone"}) {
+      for (const double factor : {0.5, 0.8, 1.25}) {
+        const DopplerScale found = scaledBy(factor, motion, 1, estimate).last(0).doppler_scale;
+        const double error = 1.0 - 1.0 / factor;
+        // Tilt and biases of the estimate give way, too, so what is found may be short.
+        const double share = found.error / error;
+        EXPECT_GT(share, factor == 0.5 ? 0.4 : 0.6) << motion << ": " << found.error;
+        EXPECT_LT(share, 1.2) << motion << ": " << found.error;
+        EXPECT_GT(squaredSigmas(found, 0.03), 9.0) << motion << ": " << found.error;
+      }
     }
   }
 }
@@ -117,6 +160,7 @@ TEST(MountingCheck, RestShowsNothing) {
   });
   ASSERT_TRUE(run.last(0).at_rest);
   EXPECT_GT(run.last(0).mounting_turn->sigma().minCoeff(), 0.5);
+  EXPECT_GT(run.last(0).doppler_scale.variance, 0.25);
 }
 
 TEST(MountingCheck, AMountingThatIsEstimatedNeedsNoCheck) {

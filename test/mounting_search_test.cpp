@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "rio_t/core/angle.h"
 #include "rio_t/core/so3.h"
 #include "rio_t/inspection/cloud_report.h"
@@ -16,11 +18,13 @@ namespace {
 struct Searched {
   MountingSearch search;
   DopplerSign sign;
+  RangeRatio ratio;
   Eigen::Vector3d error = Eigen::Vector3d::Zero();  // [rad] about the axes of I
 };
 
-Searched searchOn(const std::string& motion, std::uint64_t seed, int doppler_sign, const Extrinsics& T_IR,
-                  bool measures_elevation = true) {
+/// `doppler_factor`: what the driver makes of the Doppler.
+Searched searchOn(const std::string& motion, std::uint64_t seed, double doppler_factor,
+                  const Extrinsics& T_IR, bool measures_elevation = true) {
   SimulatedRun simulated(motion, seed, 60.0, 5.0);
   simulated.setup.T_IR = T_IR;
   simulated.setup.time_offset.constant = 0.04;
@@ -31,11 +35,12 @@ Searched searchOn(const std::string& motion, std::uint64_t seed, int doppler_sig
   for (const simulation::SimulatedScan& from : data.scans) {
     if (!from.delivered) continue;
     scans.push_back(SimulatedRun::scan(from));
-    for (RadarPoint& point : scans.back().points) point.doppler *= doppler_sign;
+    for (RadarPoint& point : scans.back().points) point.doppler *= doppler_factor;
   }
   const InertialTrack track(data.imu.samples, Eigen::Vector3d::Zero());
   Searched result;
   result.sign = dopplerSignFromRanges(scans, track);
+  result.ratio = rangeRatio(scans, track);
   MountingSearchOptions options;
   options.sign_from_ranges = result.sign.sign;
   options.up_I = Eigen::Vector3d::UnitZ();
@@ -128,6 +133,33 @@ TEST(MountingSearch, The24TurnsAreRotations) {
 TEST(DopplerSignFromRanges, IsThatOfTheDriver) {
   EXPECT_EQ(searchOn("drone", 1, 1, {}).sign.sign, 1);
   EXPECT_EQ(searchOn("drone", 1, -1, {}).sign.sign, -1);
+}
+
+TEST(RangeRatio, IsThatOfTheDoppler) {
+  for (const char* motion : {"drone", "medium", "ground_vehicle"}) {
+    for (const double factor : {0.5, 1.0, 2.0, -2.0, 3.6, 100.0}) {
+      const RangeRatio found = searchOn(motion, 1, factor, {}).ratio;
+      ASSERT_GT(found.ratio, 0.0) << motion << ", " << factor;
+      const double error = std::log(found.ratio * std::abs(factor));
+      EXPECT_LT(std::abs(error), 3.0 * found.log_sigma) << motion << ", " << factor << ": " << found.ratio;
+      EXPECT_LT(found.log_sigma, 0.1) << motion << ", " << factor;
+    }
+  }
+}
+
+TEST(RangeRatio, RestShowsNothing) {
+  RadarScan scan;
+  scan.points.push_back({{0.0, 5.0, 0.0}, 0.0, 20.0});
+  std::vector<RadarScan> scans;
+  std::vector<ImuMeasurement> imu;
+  for (int i = 0; i < 100; ++i) {
+    scan.stamp = Time() + 0.1 * i;
+    scans.push_back(scan);
+    ImuMeasurement sample;
+    sample.time = scan.stamp;
+    imu.push_back(sample);
+  }
+  EXPECT_EQ(rangeRatio(scans, InertialTrack(imu, Eigen::Vector3d::Zero())).ratio, 0.0);
 }
 
 }  // namespace

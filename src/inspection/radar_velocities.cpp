@@ -61,6 +61,78 @@ EgoVelocityOptions inspectionOptions() {
   return options;
 }
 
+// Pairs of scans whose ranges are compared.
+constexpr double kMinApart = 0.15, kMaxApart = 0.6;  // [s]
+constexpr double kMaxTurn = 0.12;                    // [rad]
+const double kSameDirection = std::cos(0.14);        // 8 degrees: the noise of an elevation
+
+/// Calls `compare` with the two scans of each pair, and the time between them [s].
+template <typename Compare>
+void forPairs(const std::vector<RadarScan>& scans, const InertialTrack& track, Compare&& compare) {
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    for (std::size_t k = i + 1; k < scans.size(); ++k) {
+      const double apart = scans[k].stamp - scans[i].stamp;
+      if (apart < kMinApart) continue;
+      if (apart > kMaxApart) break;
+      if (!track.covers(scans[i].stamp) || !track.covers(scans[k].stamp)) break;
+      if (track.rotation(scans[i].stamp).angularDistance(track.rotation(scans[k].stamp)) > kMaxTurn) continue;
+      compare(scans[i], scans[k], apart);
+    }
+  }
+}
+
+/// Half of what nine Dopplers in ten stay below: noise matters little above. It needs no unit.
+double largeDoppler(const std::vector<RadarScan>& scans) {
+  std::vector<double> dopplers;
+  for (const RadarScan& scan : scans)
+    for (const RadarPoint& point : scan.points) dopplers.push_back(std::abs(point.doppler));
+  if (dopplers.empty()) return 0.0;
+  const auto high = dopplers.begin() + static_cast<std::ptrdiff_t>(dopplers.size() * 9 / 10);
+  std::nth_element(dopplers.begin(), high, dopplers.end());
+  return 0.5 * *high;
+}
+
+/// How many matches agree on a ratio, over the logarithm of the ratio, for both signs.
+class RatioVotes {
+ public:
+  RatioVotes() : votes_(2 * kBins, 0.0) {}
+
+  /// A range changed by `change`, and the Doppler says `shift` [m].
+  void add(double change, double shift) {
+    const double size = std::abs(change), said = std::abs(shift);
+    const std::size_t sign = (change > 0.0) == (shift > 0.0) ? 0 : kBins;
+    const double first = std::ceil(binOf((size - kTolerance) / said));
+    const double last = std::floor(binOf((size + kTolerance) / said));
+    for (double bin = std::max(0.0, first); bin <= std::min(kBins - 1.0, last); bin += 1.0) {
+      const double error = (size - said * std::exp(logOf(bin))) / kTolerance;
+      votes_[sign + static_cast<std::size_t>(bin)] += std::max(0.0, 1.0 - error * error);
+    }
+  }
+  void add(const RatioVotes& other, double sign) {
+    for (std::size_t k = 0; k < votes_.size(); ++k) votes_[k] += sign * other.votes_[k];
+  }
+  /// The logarithm of the ratio with the most votes.
+  double peak() const {
+    const auto top =
+        static_cast<std::size_t>(std::max_element(votes_.begin(), votes_.end()) - votes_.begin());
+    const std::size_t bin = top % kBins;
+    if (bin == 0 || bin == kBins - 1) return logOf(static_cast<double>(bin));
+    const double before = votes_[top - 1], at = votes_[top], after = votes_[top + 1];
+    const double curvature = before - 2.0 * at + after;  // a parabola through the three
+    return logOf(static_cast<double>(bin) + (curvature < 0.0 ? 0.5 * (before - after) / curvature : 0.0));
+  }
+
+  static constexpr double kTolerance = 0.1;  ///< [m] a match that is farther off is none
+
+ private:
+  static constexpr double kLargest = 200.0, kStep = 0.02;
+  static constexpr std::size_t kBins = 531;  // from 1 / kLargest to kLargest
+  static double binOf(double ratio) { return (std::log(ratio) + std::log(kLargest)) / kStep; }
+  static double logOf(double bin) { return bin * kStep - std::log(kLargest); }
+
+  std::vector<double> votes_;  // same sign, then the contrary
+};
+
 }  // namespace
 
 RadarVelocities radarVelocities(const std::vector<RadarScan>& scans) {
@@ -85,47 +157,78 @@ RadarVelocities radarVelocities(const std::vector<RadarScan>& scans) {
 }
 
 DopplerSign dopplerSignFromRanges(const std::vector<RadarScan>& scans, const InertialTrack& track) {
-  constexpr double kMinApart = 0.15, kMaxApart = 0.6;  // [s]
-  const double kSameDirection = std::cos(0.14);        // 8 degrees: the noise of an elevation
-  constexpr double kMaxTurn = 0.12;                    // [rad]
-  constexpr double kMinShift = 0.15;                   // [m] by which a range must change
-  constexpr double kFar = 0.3;                         // [m] a match that is farther off is none
-  constexpr double kClear = 3.0;                       // [sigma]
+  constexpr double kMinShift = 0.15;  // [m] by which a range must change
+  constexpr double kFar = 0.3;        // [m] a match that is farther off is none
+  constexpr double kClear = 3.0;      // [sigma]
   DopplerSign result;
   double sum = 0.0, squares = 0.0;
   int pairs = 0;  // of scans that voted
-  for (std::size_t i = 0; i < scans.size(); ++i) {
-    for (std::size_t k = i + 1; k < scans.size(); ++k) {
-      const double apart = scans[k].stamp - scans[i].stamp;
-      if (apart < kMinApart) continue;
-      if (apart > kMaxApart) break;
-      if (!track.covers(scans[i].stamp) || !track.covers(scans[k].stamp)) break;
-      if (track.rotation(scans[i].stamp).angularDistance(track.rotation(scans[k].stamp)) > kMaxTurn) continue;
-      double vote = 0.0;
-      for (const RadarPoint& point : scans[i].points) {
-        const double shift = point.doppler * apart;
-        if (std::abs(shift) < kMinShift) continue;
-        const double range = point.position_R.norm();
-        double receding = kFar, approaching = kFar;  // nearest match under either sign
-        for (const RadarPoint& other : scans[k].points) {
-          const double other_range = other.position_R.norm();
-          if (point.position_R.dot(other.position_R) < kSameDirection * range * other_range) continue;
-          receding = std::min(receding, std::abs(other_range - range - shift));
-          approaching = std::min(approaching, std::abs(other_range - range + shift));
-        }
-        vote += approaching - receding;
+  forPairs(scans, track, [&](const RadarScan& scan, const RadarScan& later, double apart) {
+    double vote = 0.0;
+    for (const RadarPoint& point : scan.points) {
+      const double shift = point.doppler * apart;
+      if (std::abs(shift) < kMinShift) continue;
+      const double range = point.position_R.norm();
+      double receding = kFar, approaching = kFar;  // nearest match under either sign
+      for (const RadarPoint& other : later.points) {
+        const double other_range = other.position_R.norm();
+        if (point.position_R.dot(other.position_R) < kSameDirection * range * other_range) continue;
+        receding = std::min(receding, std::abs(other_range - range - shift));
+        approaching = std::min(approaching, std::abs(other_range - range + shift));
       }
-      if (vote == 0.0) continue;
-      ++pairs;
-      sum += vote;
-      squares += vote * vote;
+      vote += approaching - receding;
     }
-  }
+    if (vote == 0.0) return;
+    ++pairs;
+    sum += vote;
+    squares += vote * vote;
+  });
   // Neighbouring pairs share their points, up to all pairs that one scan is in.
   if (pairs < 20) return result;
   constexpr double kShared = 4.0;
   result.significance = sum / std::sqrt(squares) / std::sqrt(kShared);
   if (std::abs(result.significance) > kClear) result.sign = result.significance > 0.0 ? 1 : -1;
+  return result;
+}
+
+RangeRatio rangeRatio(const std::vector<RadarScan>& scans, const InertialTrack& track) {
+  constexpr std::size_t kParts = 10, kMinMatches = 200;
+  constexpr double kMinChange = 2.0 * RatioVotes::kTolerance;  // else matches of anything would vote
+  RangeRatio result;
+  const double large = largeDoppler(scans);
+  if (large == 0.0) return result;
+  RatioVotes all;
+  std::vector<RatioVotes> parts(kParts);
+  std::size_t matches = 0;
+  forPairs(scans, track, [&](const RadarScan& scan, const RadarScan& later, double apart) {
+    const auto index = static_cast<std::size_t>(&scan - scans.data());
+    RatioVotes& part = parts[index * kParts / scans.size()];
+    for (const RadarPoint& point : scan.points) {
+      if (std::abs(point.doppler) < large) continue;
+      const double range = point.position_R.norm();
+      for (const RadarPoint& other : later.points) {
+        const double other_range = other.position_R.norm(), change = other_range - range;
+        if (std::abs(change) < kMinChange) continue;
+        if (point.position_R.dot(other.position_R) < kSameDirection * range * other_range) continue;
+        const double doppler = 0.5 * (point.doppler + other.doppler);  // it may change on the way
+        if (std::abs(doppler) < large) continue;
+        part.add(change, doppler * apart);
+        ++matches;
+      }
+    }
+  });
+  if (matches < kMinMatches) return result;
+  for (const RatioVotes& part : parts) all.add(part, 1.0);
+  const double peak = all.peak();
+  double squares = 0.0;
+  for (const RatioVotes& part : parts) {
+    RatioVotes others = all;
+    others.add(part, -1.0);
+    squares += std::pow(others.peak() - peak, 2);
+  }
+  constexpr double kFloor = 0.02;  // the ranges have a scale, too
+  result.ratio = std::exp(peak);
+  result.log_sigma = std::sqrt(kFloor * kFloor + squares * (kParts - 1.0) / kParts);
   return result;
 }
 

@@ -210,6 +210,7 @@ void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
   const EstimateExtrinsics estimate = options_.smoother.estimate_extrinsics;
   if (!estimatesTurn(estimate))
     result.mounting_turn = mounting_check_.turnOf(result.scan.radar, result.configured_T_IR);
+  result.doppler_scale = mounting_check_.scaleOf(result.scan.radar);
   result.T_IR_covariance = extrinsicsCovariance(covariance.bottomRightCorner(estimated, estimated), estimate);
   for (const StampedPose& left : marginalize()) result.left_window.push_back(left);
   // On a frame that shakes the window believes rest little: the start of a gentle drive must not look like an

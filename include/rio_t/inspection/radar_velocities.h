@@ -39,4 +39,15 @@ struct DopplerSign {
 /// than 7 degrees do not count.
 DopplerSign dopplerSignFromRanges(const std::vector<RadarScan>& scans, const InertialTrack& track);
 
+/// By how much the ranges change, divided by what the Doppler says: 1 if it is in m/s.
+struct RangeRatio {
+  double ratio = 0.0;      ///< of their sizes, without a sign; 0: the ranges do not show it
+  double log_sigma = 0.0;  ///< of its logarithm
+};
+
+/// Compares the points of the same pairs of scans, with any ratio from 1 / 200 to 200 and either sign. The
+/// ratio on which most matches agree is the likeliest. Its sigma is that of a jackknife over parts of the
+/// recording.
+RangeRatio rangeRatio(const std::vector<RadarScan>& scans, const InertialTrack& track);
+
 }  // namespace rio_t

@@ -34,6 +34,7 @@ struct ScanResult : ScanAnswer {
   Extrinsics T_IR;                            ///< of this radar
   Extrinsics configured_T_IR;                 ///< the mounting of the options
   std::optional<MountingTurn> mounting_turn;  ///< from it, as the scans say; none if T_IR is estimated
+  DopplerScale doppler_scale;                 ///< as the scans say
   /// Covariance of T_IR, if it is estimated; zero if not. Translation of the radar in I [m], then turn about
   /// the axes of I [rad]: the order of ROS.
   Eigen::Matrix<double, 6, 6> T_IR_covariance = Eigen::Matrix<double, 6, 6>::Zero();

@@ -58,6 +58,7 @@ struct Looked {
   CloudReport cloud;
   RadarVelocities velocities;
   DopplerSign sign;
+  RangeRatio ratio;
   MountingSearch search;
 };
 
@@ -71,6 +72,7 @@ Looked look(const Recording& recording, const ImuInspection& imu, const CloudTop
   looked.cloud = inspectCloud(looked.scans);
   looked.velocities = radarVelocities(looked.scans);
   looked.sign = dopplerSignFromRanges(looked.scans, track);
+  looked.ratio = rangeRatio(looked.scans, track);
   looked.search =
       searchMounting(looked.velocities.velocities, track, searchOptions(imu, track, looked.sign.sign));
   return looked;
@@ -178,6 +180,16 @@ void describeSign(const Looked& looked, const FormatProposal& format, const ImuR
         field + " is positive for receding targets" +
             (evidence.empty() ? " (assumed: the motion does not show it)" : ", shown by " + evidence));
   }
+}
+
+/// Whether the ranges change at the rate that the Doppler says, whatever its sign.
+void describeUnit(const RangeRatio& ranges, const std::string& field, RadarInspection* radar) {
+  constexpr double kFactor = 1.2, kSigmas = 3.0;
+  if (ranges.ratio == 0.0) return;
+  if (std::abs(std::log(ranges.ratio)) <= std::max(std::log(kFactor), kSigmas * ranges.log_sigma)) return;
+  radar->odd("Doppler", "ranges change at " + shortText(ranges.ratio, 2) + " +- " +
+                            shortText(ranges.ratio * ranges.log_sigma, 1) + " times the Doppler: is " +
+                            field + " in m/s? The odometry takes it as m/s, and no parameter scales it");
 }
 
 /// A radar without elevation hardly shows its tilt, and most of them are mounted level.
@@ -348,6 +360,7 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   for (const std::string& odd : stamps.odd) radar.odd("stamps", odd);
   if (stamps.odd.empty()) radar.ok("stamps", stamps.text);
   describeSign(looked, format, imu.report, &radar);
+  describeUnit(looked.ratio, format.format.doppler, &radar);
   describeMounting(looked.search, makeConfig(configured).odometry.smoother.max_time_offset, &radar);
   compareWithConfigured(looked.search, configured, &radar);
   return radar;

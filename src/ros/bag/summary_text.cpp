@@ -65,6 +65,8 @@ void addEstimates(SummaryLines& lines, const RadarSummary& radar) {
     lines.add("mounting_turn" + suffix, fixedTexts(radar.mounting_turn->turn, 6));
     lines.add("mounting_turn_sigma" + suffix, fixedTexts(radar.mounting_turn->sigma(), 6));
   }
+  lines.add("doppler_scale_error" + suffix, fixedText(radar.doppler_scale.error, 4));
+  lines.add("doppler_scale_error_sigma" + suffix, fixedText(std::sqrt(radar.doppler_scale.variance), 4));
   if (!radar.extrinsics) return;
   const ExtrinsicsSummary& extrinsics = *radar.extrinsics;
   lines.add("configured_extrinsics_translation" + suffix, fixedTexts(extrinsics.configured.l_I, 9));

@@ -144,10 +144,12 @@ void addOffset(const RunEvidence& evidence, const Config& config, std::vector<Ca
                      "Raise max_time_offset, subtract a known delay with radar_stamp_shift, or set "
                      "stamp_source: arrival. A wrong mounting can have the same effect.",
                      share});
-  // A mounting that is far off drives the offset there: the farthest one explains these windows, too.
+  // A mounting or a scale of the Doppler that is far off drives the offset there: the farthest one explains
+  // these windows, too.
   Cause* farthest = nullptr;
   for (Cause& each : *causes)
-    if (each.name == "mounting_far" && (farthest == nullptr || each.share > farthest->share))
+    if ((each.name == "mounting_far" || each.name == "doppler_scale") &&
+        (farthest == nullptr || each.share > farthest->share))
       farthest = &each;
   if (farthest != nullptr) farthest->share = std::max(farthest->share, share);
 }
@@ -294,7 +296,7 @@ void addDivergence(const RunEvidence& evidence, std::vector<Cause>* causes) {
                          outOf(evidence.scans_diverged, evidence.scans_judged, "scans") +
                          ": radar and IMU contradict each other.",
                      "Check the mounting (extrinsics_rotation_xyzw has the order x, y, z, w), "
-                     "radar_doppler_sign and radar_axes." +
+                     "radar_doppler_sign and radar_axes. Is the Doppler in m/s?" +
                          mountingAdvice(*fewest) +
                          " If the estimate diverged only near large moving things, it is good again after "
                          "them.",
@@ -318,9 +320,10 @@ void addMissingMounting(const Config& config, std::vector<Cause>* causes) {
 std::vector<Check> checksOf(const RunEvidence& evidence, const Config& config,
                             const std::vector<Config>& radars) {
   const Windows windows = windowsOf(evidence);
-  double kept = 1.0, turned = vehicleTurnSigmas(evidence, config);
+  double kept = 1.0, turned = vehicleTurnSigmas(evidence, config), scaled = 0.0;
   for (std::size_t k = 0; k < evidence.radars.size(); ++k)
     turned = std::max(turned, turnSigmas(evidence.radars[k], radars.at(k)));
+  for (const RadarSummary& radar : evidence.radars) scaled = std::max(scaled, scaleSigmas(radar));
   for (const RadarSummary& radar : evidence.radars)
     if (pointsReceived(radar) > 0)
       kept = std::min(kept, shareOf(pointsOf(radar, PointVerdict::kKept), pointsReceived(radar)));
@@ -334,6 +337,7 @@ std::vector<Check> checksOf(const RunEvidence& evidence, const Config& config,
       {"windows_at_offset_bound_share", shareOf(windows.at_bound, windows.all), kManyWindows, false},
       {"windows_not_converged_share", shareOf(windows.not_converged, windows.all), kManyWindows, false},
       {"mounting_turned_sigmas", turned, kFarMounting, false},
+      {"doppler_scaled_sigmas", scaled, kWrongScale, false},
       {"imu_faults_share", shareOfImuFaults(evidence), kManySamples, false},
       {"healthy_at_end", evidence.health == Health::kOk ? 1.0 : 0.0, 1.0, true}};
 }

@@ -23,6 +23,7 @@ class RadarCauses {
     addStamps();
     addVelocities();
     addContradictions();
+    addScale();
     addMounting();
   }
 
@@ -141,7 +142,9 @@ class RadarCauses {
     scans("ill_conditioned", "have all their points in one direction.",
           "Widen the view of the radar: " + key_ + "radar_max_azimuth and " + key_ + "radar_max_elevation.");
     scans("sigma_too_large", "have a velocity that is too uncertain.",
-          "Raise " + key_ + "ego_velocity_max_sigma, or let the radar report more points.");
+          "Raise " + key_ +
+              "ego_velocity_max_sigma, or let the radar report more points. Is the "
+              "Doppler in m/s?");
     scans("ambiguous", "show two velocities, and nothing tells which is that of the static world.",
           "Something that moves fills the view: turn the radar away from it.");
   }
@@ -213,9 +216,25 @@ class RadarCauses {
     cause("contradicts_imu", share,
           outOf(contradicted, judged, "scans") + of_ + " show a velocity that contradicts the IMU.",
           "Check the mounting (" + mountingKey() + "), " + key_ + "radar_doppler_sign and " + key_ +
-              "radar_axes." + mountingAdvice(radar_) +
+              "radar_axes. Is the Doppler in m/s?" + mountingAdvice(radar_) +
               " estimate_extrinsics: pose corrects up to 10 degrees by itself.",
           true);
+  }
+
+  void addScale() {
+    const double sigmas = scaleSigmas(radar_);
+    if (sigmas <= kWrongScale) return;
+    // A large error comes out short: tilt and biases follow it.
+    const double left = 1.0 - radar_.doppler_scale.error;
+    constexpr double kLeast = 0.01;  // zero would be a factor without end
+    cause("doppler_scale", 1.0 - kWrongScale / sigmas,
+          "The Doppler" + of_ + " seems to be " + shortText(1.0 / std::max(left, kLeast), 2) +
+              (left > 1.0 ? " times the velocity that the IMU feels, or less."
+                          : " times the velocity that the IMU feels, or more."),
+          "Check that " + key_ + "radar_format and " + key_ +
+              "radar_field_doppler fit the driver, and that this field is in m/s: no parameter scales it. "
+              "Check imu_acceleration_unit, too. `rosrun rio_t check_bag BAG` compares the Doppler with the "
+              "ranges.");
   }
 
   void addMounting() {

@@ -20,7 +20,7 @@ inline constexpr double kManyPoints = 0.6;
 /// Scans before anything is said: two seconds at ten a second.
 inline constexpr std::uint64_t kEnoughScans = 20;
 /// The remedy for a wrong mounting, sign or axes.
-inline constexpr const char* kCheckBag = " Run `rosrun rio_t check_bag BAG`: it finds all three.";
+inline constexpr const char* kCheckBag = " Run `rosrun rio_t check_bag BAG`: it finds them.";
 
 inline std::uint64_t pointsOf(const RadarSummary& radar, PointVerdict verdict) {
   return radar.points_by_verdict[static_cast<std::size_t>(verdict)];
@@ -64,6 +64,16 @@ inline double turnSigmas(const RadarSummary& radar, const Config& config) {
     return std::sqrt(turn.dot((radar.mounting_turn->covariance + configured).ldlt().solve(turn)));
   }
   return radar.turn.cwiseAbs().maxCoeff() / config.odometry.smoother.extrinsics_rotation_sigma;
+}
+
+/// The scale of the Doppler may be off by a tenth at three sigma: an accelerometer, and a mounting that is a
+/// few degrees off, show it no better.
+inline constexpr double kDopplerScaleSigma = 0.1 / 3.0;
+
+/// How far the scale of the Doppler seems to be off.
+inline double scaleSigmas(const RadarSummary& radar) {
+  return std::abs(radar.doppler_scale.error) /
+         std::hypot(std::sqrt(radar.doppler_scale.variance), kDopplerScaleSigma);
 }
 
 /// Everything that speaks of one radar.

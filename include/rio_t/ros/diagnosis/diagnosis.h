@@ -19,6 +19,9 @@ std::string toString(RunVerdict verdict);  ///< "good", "doubtful", "bad"
 /// `extrinsics_rotation_sigma` about an axis. If that sigma is right, one radar in 120 is.
 constexpr double kFarMounting = 3.0;
 
+/// The scale of the Doppler is wrong if it is off by more sigmas.
+constexpr double kWrongScale = 3.0;
+
 /// A run is doubtful if the estimate diverged for a larger share of its scans.
 constexpr double kManyDiverged = 0.1;
 
