@@ -234,7 +234,8 @@ class RadarCauses {
           "Check that " + key_ + "radar_format and " + key_ +
               "radar_field_doppler fit the driver, and that this field is in m/s: no parameter scales it. "
               "Check imu_acceleration_unit, too. `rosrun rio_t check_bag BAG` compares the Doppler with the "
-              "ranges.");
+              "ranges.",
+          true);
   }
 
   void addMounting() {
