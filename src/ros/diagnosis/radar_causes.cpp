@@ -151,7 +151,7 @@ class RadarCauses {
 
   /// The key that sets a limit of the filter, with its value; empty: no key does.
   std::string keyOf(PointVerdict verdict) const {
-    const EgoVelocityOptions& o = config_.odometry.ego_velocity;
+    const EgoVelocityOptions& o = config_.odometry.radar.ego_velocity;
     switch (verdict) {
       case PointVerdict::kTooNear:
         return key_ + "radar_min_range " + number(o.min_range) + " m";
