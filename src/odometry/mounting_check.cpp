@@ -41,7 +41,9 @@ void MountingCheck::add(std::size_t radar, const UsedInnovation& innovation) {
   const double weight = std::min(1.0, kLongest / std::sqrt(innovation.squaredSigmas()));
   information_ += weight * J.transpose() * weighted;
   score_ += weight * weighted.transpose() * innovation.d;
-  alike_[static_cast<Eigen::Index>(radar)] += weight * correction.dot(weighted_d);
+  alike_[static_cast<Eigen::Index>(radar)] +=
+      weight *
+      std::min(correction.dot(weighted_d), S.solve(innovation.predicted).trace());  // a fault makes d large
   dv_W_ += innovation.R_WR * innovation.predicted * weighted;
 }
 

@@ -184,7 +184,9 @@ void describeSign(const Looked& looked, const FormatProposal& format, const ImuR
 
 /// Whether the ranges change at the rate that the Doppler says, whatever its sign.
 void describeUnit(const RangeRatio& ranges, const std::string& field, RadarInspection* radar) {
-  constexpr double kFactor = 1.2, kSigmas = 3.0;
+  // On gentle motions the ratio comes out up to 1.3 for a right Doppler. A wrong unit is farther off: knots
+  // are nearest, with 1.94.
+  constexpr double kFactor = 1.5, kSigmas = 3.0;
   if (ranges.ratio == 0.0) return;
   if (std::abs(std::log(ranges.ratio)) <= std::max(std::log(kFactor), kSigmas * ranges.log_sigma)) return;
   radar->odd("Doppler", "ranges change at " + shortText(ranges.ratio, 2) + " +- " +
