@@ -226,7 +226,7 @@ RangeRatio rangeRatio(const std::vector<RadarScan>& scans, const InertialTrack& 
     others.add(part, -1.0);
     squares += std::pow(others.peak() - peak, 2);
   }
-  constexpr double kFloor = 0.02;  // the ranges have a scale, too
+  constexpr double kFloor = 0.1;  // slow motions and noise give a ratio of up to 1.3 for a right Doppler
   result.ratio = std::exp(peak);
   result.log_sigma = std::sqrt(kFloor * kFloor + squares * (kParts - 1.0) / kParts);
   return result;

@@ -144,14 +144,19 @@ void addOffset(const RunEvidence& evidence, const Config& config, std::vector<Ca
                      "Raise max_time_offset, subtract a known delay with radar_stamp_shift, or set "
                      "stamp_source: arrival. A wrong mounting can have the same effect.",
                      share});
-  // A mounting or a scale of the Doppler that is far off drives the offset there: the farthest one explains
-  // these windows, too.
-  Cause* farthest = nullptr;
-  for (Cause& each : *causes)
-    if ((each.name == "mounting_far" || each.name == "doppler_scale") &&
-        (farthest == nullptr || each.share > farthest->share))
-      farthest = &each;
-  if (farthest != nullptr) farthest->share = std::max(farthest->share, share);
+  // A mounting that is far off drives the offset there: the farthest one explains these windows, too. So does
+  // the scale of a Doppler that is farther off.
+  const auto farthest = [&](const char* name) {
+    Cause* result = nullptr;
+    for (Cause& each : *causes)
+      if (each.name == name && (result == nullptr || each.share > result->share)) result = &each;
+    return result;
+  };
+  Cause* mounting = farthest("mounting_far");
+  Cause* scale = farthest("doppler_scale");
+  if (scale != nullptr && (mounting == nullptr || scale->share > mounting->share))
+    scale->share = std::max(scale->share, share);
+  if (mounting != nullptr) mounting->share = std::max(mounting->share, share);
 }
 
 void addOffsetSteps(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
