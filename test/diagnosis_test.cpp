@@ -121,8 +121,8 @@ TEST(Diagnosis, AWrongScaleOfTheDopplerIsNoGoodRun) {
   EXPECT_EQ(first(evidence), "none");
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
   evidence.radars.front().doppler_scale.error = -1.0;
-  expectSays(first(evidence), {"doppler_scale: The Doppler seems to be 0.5 times the velocity that the IMU "
-                               "feels, or less.",
+  expectSays(first(evidence), {"doppler_scale: The Doppler seems to be about 0.5 times the velocity that the "
+                               "IMU feels.",
                                "radar_format", "radar_field_doppler", "in m/s"});
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
   // It explains a mounting that seems turned a little, and an offset at its bound.
@@ -135,7 +135,7 @@ TEST(Diagnosis, AWrongScaleOfTheDopplerIsNoGoodRun) {
   expectSays(first(evidence), {"mounting_far: "});
   evidence = goodRun();
   evidence.radars.front().doppler_scale = {0.5, 1e-4};
-  expectSays(first(evidence), {"2 times the velocity that the IMU feels, or more."});
+  expectSays(first(evidence), {"about 2 times the velocity that the IMU feels."});
   evidence.radars.front().doppler_scale.variance = 0.1;  // noise explains it
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
 }

@@ -29,3 +29,9 @@ def test_the_contents_of_the_method_name_every_section():
     contents = page.read_text().split("## Limits of the model")[0]
     for anchor in anchors(page)[1:]:
         assert f"(#{anchor})" in contents, anchor
+
+
+def test_no_two_equations_of_the_method_have_one_number():
+    numbers = re.findall(r"\\tag\{([^}]+)\}", (ROOT / "docs" / "method.md").read_text())
+    assert len(numbers) > 50
+    assert sorted(set(numbers)) == sorted(numbers)

@@ -111,10 +111,15 @@ class RatioVotes {
   void add(const RatioVotes& other, double sign) {
     for (std::size_t k = 0; k < votes_.size(); ++k) votes_[k] += sign * other.votes_[k];
   }
+  /// The bin with the most votes.
+  std::size_t top() const {
+    return static_cast<std::size_t>(std::max_element(votes_.begin(), votes_.end()) - votes_.begin());
+  }
+  /// The votes of a bin less those for the same ratio with the contrary sign.
+  double contrast(std::size_t bin) const { return votes_[bin] - votes_[(bin + kBins) % (2 * kBins)]; }
   /// The logarithm of the ratio with the most votes.
   double peak() const {
-    const auto top =
-        static_cast<std::size_t>(std::max_element(votes_.begin(), votes_.end()) - votes_.begin());
+    const std::size_t top = this->top();
     const std::size_t bin = top % kBins;
     if (bin == 0 || bin == kBins - 1) return logOf(static_cast<double>(bin));
     const double before = votes_[top - 1], at = votes_[top], after = votes_[top + 1];
@@ -193,6 +198,7 @@ DopplerSign dopplerSignFromRanges(const std::vector<RadarScan>& scans, const Ine
 
 RangeRatio rangeRatio(const std::vector<RadarScan>& scans, const InertialTrack& track) {
   constexpr std::size_t kParts = 10, kMinMatches = 200;
+  constexpr double kClear = 3.0;                               // [sigma]
   constexpr double kMinChange = 2.0 * RatioVotes::kTolerance;  // else matches of anything would vote
   RangeRatio result;
   const double large = largeDoppler(scans);
@@ -219,6 +225,13 @@ RangeRatio rangeRatio(const std::vector<RadarScan>& scans, const InertialTrack& 
   });
   if (matches < kMinMatches) return result;
   for (const RatioVotes& part : parts) all.add(part, 1.0);
+  // Matches by chance vote for both signs alike.
+  const std::size_t top = all.top();
+  double contrasts = 0.0;
+  for (const RatioVotes& part : parts) contrasts += std::pow(part.contrast(top), 2);
+  const double contrast = all.contrast(top);
+  const double variance = (contrasts - contrast * contrast / kParts) * kParts / (kParts - 1.0);
+  if (contrast < kClear * std::sqrt(variance)) return result;
   const double peak = all.peak();
   double squares = 0.0;
   for (const RatioVotes& part : parts) {

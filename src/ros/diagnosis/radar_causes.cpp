@@ -224,13 +224,12 @@ class RadarCauses {
   void addScale() {
     const double sigmas = scaleSigmas(radar_);
     if (sigmas <= kWrongScale) return;
-    // A large error comes out short: tilt and biases follow it.
+    // A large error is not exact: tilt and biases follow it.
     const double left = 1.0 - radar_.doppler_scale.error;
     constexpr double kLeast = 0.01;  // zero would be a factor without end
     cause("doppler_scale", 1.0 - kWrongScale / sigmas,
-          "The Doppler" + of_ + " seems to be " + shortText(1.0 / std::max(left, kLeast), 2) +
-              (left > 1.0 ? " times the velocity that the IMU feels, or less."
-                          : " times the velocity that the IMU feels, or more."),
+          "The Doppler" + of_ + " seems to be about " + shortText(1.0 / std::max(left, kLeast), 2) +
+              " times the velocity that the IMU feels.",
           "Check that " + key_ + "radar_format and " + key_ +
               "radar_field_doppler fit the driver, and that this field is in m/s: no parameter scales it. "
               "Check imu_acceleration_unit, too. `rosrun rio_t check_bag BAG` compares the Doppler with the "
