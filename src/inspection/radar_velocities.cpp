@@ -111,18 +111,15 @@ class RatioVotes {
   void add(const RatioVotes& other, double sign) {
     for (std::size_t k = 0; k < votes_.size(); ++k) votes_[k] += sign * other.votes_[k];
   }
-  /// The bin with the most votes.
-  std::size_t top() const {
-    return static_cast<std::size_t>(std::max_element(votes_.begin(), votes_.end()) - votes_.begin());
-  }
-  /// The votes of a bin less those for the same ratio with the contrary sign.
-  double contrast(std::size_t bin) const { return votes_[bin] - votes_[(bin + kBins) % (2 * kBins)]; }
-  /// The logarithm of the ratio with the most votes.
+  /// The logarithm of the ratio that leads its contrary, the same with the other sign, by the most votes:
+  /// matches by chance vote for both alike.
   double peak() const {
-    const std::size_t top = this->top();
+    std::size_t top = 0;
+    for (std::size_t k = 1; k < votes_.size(); ++k)
+      if (lead(k) > lead(top)) top = k;
     const std::size_t bin = top % kBins;
     if (bin == 0 || bin == kBins - 1) return logOf(static_cast<double>(bin));
-    const double before = votes_[top - 1], at = votes_[top], after = votes_[top + 1];
+    const double before = lead(top - 1), at = lead(top), after = lead(top + 1);
     const double curvature = before - 2.0 * at + after;  // a parabola through the three
     return logOf(static_cast<double>(bin) + (curvature < 0.0 ? 0.5 * (before - after) / curvature : 0.0));
   }
@@ -133,6 +130,7 @@ class RatioVotes {
   static constexpr double kLargest = 200.0, kStep = 0.02;
   static constexpr std::size_t kBins = 531;  // from 1 / kLargest to kLargest
   static double binOf(double ratio) { return (std::log(ratio) + std::log(kLargest)) / kStep; }
+  double lead(std::size_t bin) const { return votes_[bin] - votes_[(bin + kBins) % (2 * kBins)]; }
   static double logOf(double bin) { return bin * kStep - std::log(kLargest); }
 
   std::vector<double> votes_;  // same sign, then the contrary
@@ -198,7 +196,6 @@ DopplerSign dopplerSignFromRanges(const std::vector<RadarScan>& scans, const Ine
 
 RangeRatio rangeRatio(const std::vector<RadarScan>& scans, const InertialTrack& track) {
   constexpr std::size_t kParts = 10, kMinMatches = 200;
-  constexpr double kClear = 3.0;                               // [sigma]
   constexpr double kMinChange = 2.0 * RatioVotes::kTolerance;  // else matches of anything would vote
   RangeRatio result;
   const double large = largeDoppler(scans);
@@ -225,13 +222,6 @@ RangeRatio rangeRatio(const std::vector<RadarScan>& scans, const InertialTrack& 
   });
   if (matches < kMinMatches) return result;
   for (const RatioVotes& part : parts) all.add(part, 1.0);
-  // Matches by chance vote for both signs alike.
-  const std::size_t top = all.top();
-  double contrasts = 0.0;
-  for (const RatioVotes& part : parts) contrasts += std::pow(part.contrast(top), 2);
-  const double contrast = all.contrast(top);
-  const double variance = (contrasts - contrast * contrast / kParts) * kParts / (kParts - 1.0);
-  if (contrast < kClear * std::sqrt(variance)) return result;
   const double peak = all.peak();
   double squares = 0.0;
   for (const RatioVotes& part : parts) {
