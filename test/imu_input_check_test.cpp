@@ -318,13 +318,15 @@ TEST(Saturation, AToldRangeHolds) {
 
 TEST(Preintegration, UnseenMotionInAnIntervalWidensWhatCrossesIt) {
   const SyntheticMotion motion;
-  const auto covariance = [&](double unseen_gyro_variance, double unseen_accel_variance) {
+  const auto covariance = [&](double unseen_gyro_variance, double unseen_accel_variance,
+                              double unseen_velocity_variance) {
     ImuBuffer buffer;
     for (int i = 0; i <= 20; ++i) {
       ImuMeasurement imu = motion.imuSample(0.01 * i);
       if (i == 10) {
         imu.unseen_gyro_variance = unseen_gyro_variance;
         imu.unseen_accel_variance = unseen_accel_variance;
+        imu.unseen_velocity_variance = unseen_velocity_variance;
       }
       buffer.add(imu);
     }
@@ -332,11 +334,14 @@ TEST(Preintegration, UnseenMotionInAnIntervalWidensWhatCrossesIt) {
     return preintegrate(buffer, motion.time(0.0), motion.time(0.095), motion.b_g, motion.b_a, ImuNoise())
         .covariance;
   };
-  const auto usual = covariance(0.0, 0.0);
-  const auto doubtful = covariance(0.04, 9.0);
+  const auto usual = covariance(0.0, 0.0, 0.0);
+  const auto doubtful = covariance(0.04, 9.0, 0.0);
+  const auto displaced = covariance(0.0, 0.0, 16.0);
   for (int k = 0; k < 3; ++k) {
     EXPECT_NEAR(doubtful(k, k) - usual(k, k), 0.04 * 0.005, 1e-9);
     EXPECT_GT(doubtful(6 + k, 6 + k) - usual(6 + k, 6 + k), 9.0 * 0.005 - 1e-9);
+    EXPECT_NEAR(displaced(3 + k, 3 + k) - usual(3 + k, 3 + k), 16.0 * 0.005, 1e-9);
+    EXPECT_EQ(displaced(6 + k, 6 + k), usual(6 + k, 6 + k));
   }
 }
 

@@ -285,6 +285,26 @@ TEST(ImuPropagator, KeepsWhatAnAnchorNeedsOfTheSamplesBefore) {
   EXPECT_GT(few.state()->p_W.x(), 6.0);
 }
 
+TEST(ClockThatStepsBack, LeavesThePositionUncertainByTheWayMeanwhile) {
+  constexpr double kSpeed = 2.0, kStep = 0.05;
+  Navigation navigation(OdometryOptions(), {0.0, 0.0, -9.81});
+  NavigationState start;
+  start.time = Time::fromSeconds(100.0);
+  start.v_W.x() = kSpeed;
+  navigation.add(restSample(100.0));
+  navigation.anchor(start, false, ImuNoise(), start.time, 0);
+  const auto feed = [&](double from, double to) {
+    for (double t = from; t < to - 1e-6; t += 0.005) navigation.add(restSample(t));
+  };
+  const auto sigma = [&] {
+    return std::sqrt(navigation.state()->covariance(StateBlock::kP, StateBlock::kP));
+  };
+  feed(100.005, 101.0);
+  const double before = sigma();
+  feed(101.0 - kStep, 101.05);
+  EXPECT_NEAR(std::sqrt(sigma() * sigma() - before * before), kSpeed * kStep, 0.02);
+}
+
 TEST_F(AtRest, UncertaintyGrowsOverAnImuGap) {
   run(104.0);
   const StateCovariance before = states.back().covariance;

@@ -46,7 +46,8 @@ Preintegration preintegrate(const ImuBuffer& buffer, Time from, Time to, const E
   buffer.forEachInterval(from, to, [&](double dt, const auto& gyro, const auto& accel, const auto& later) {
     const Eigen::Vector3d omega = gyro - b_g;
     const Eigen::Vector3d a = accel - b_a;
-    samples.add(result.delta.dR, dt, omega, a, noise.gyroVariance(later), noise.accelVariance(later));
+    samples.add(result.delta.dR, dt, omega, a, noise.gyroVariance(later), noise.accelVariance(later),
+                later.unseen_velocity_variance);
     result.delta.step(dt, omega, a);
     if (samples.isWhole()) propagateCovariance(samples, result.covariance);
   });

@@ -248,10 +248,6 @@ bool Estimator::mustWait(const RadarScan& scan) const {
 void Estimator::addImu(const std::vector<ImuMeasurement>& samples) {
   for (const ImuMeasurement& sample : samples) {
     imu_.add(sample);
-    if (initialized() && sample.lost_time > 0.0) {
-      const double lost = sample.lost_time * smoother_.newest().x.v_W().norm();
-      smoother_.addDrift(lost * lost);
-    }
     if (!initialized() && !sample.is_bridge) tryInitialize(sample);
   }
 }

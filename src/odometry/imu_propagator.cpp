@@ -71,7 +71,8 @@ void ImuPropagator::propagate(const ImuMeasurement& from, const ImuMeasurement& 
   const Eigen::Quaterniond half = so3::exp(0.5 * dt * omega);
   const Eigen::Vector3d a_W = (x.q_WI * half) * a + g_W_;
 
-  samples_.add(x.q_WI, dt, omega, a, noise_.gyroVariance(to), noise_.accelVariance(to));
+  samples_.add(x.q_WI, dt, omega, a, noise_.gyroVariance(to), noise_.accelVariance(to),
+               to.unseen_velocity_variance);
   x.p_W += dt * x.v_W + 0.5 * dt * dt * a_W;
   x.v_W += dt * a_W;
   x.q_WI = (x.q_WI * half * half).normalized();

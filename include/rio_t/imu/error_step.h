@@ -17,16 +17,18 @@ struct SamplesInOne {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();     ///< integral of the specific force, in I [m/s]
   double gyro_variance = 0.0;                             ///< of `angle`, per axis [rad^2]
   double accel_variance = 0.0;                            ///< of `velocity`, per axis [m^2/s^2]
+  double position_variance = 0.0;                         ///< beside that of the velocity, per axis [m^2]
 
   /// `now` is the attitude before the sample; rates without biases; squared densities of their noise.
   void add(const Eigen::Quaterniond& now, double step, const Eigen::Vector3d& omega, const Eigen::Vector3d& a,
-           double gyro_density, double accel_density) {
+           double gyro_density, double accel_density, double velocity_density) {
     if (dt == 0.0) q = now;
     dt += step;
     angle += step * omega;
     velocity += step * a;
     gyro_variance += step * gyro_density;
     accel_variance += step * accel_density;
+    position_variance += step * velocity_density;
   }
   bool isWhole() const { return dt >= kCovarianceStep; }
 };
@@ -87,7 +89,7 @@ void propagateCovariance(SamplesInOne& samples, Eigen::Matrix<double, Size, Size
   };
   add(kTheta, kTheta, samples.gyro_variance);
   // White noise of the acceleration: the errors of position and velocity correlate (double integration).
-  add(kP, kP, samples.accel_variance * samples.dt * samples.dt / 3.0);
+  add(kP, kP, samples.accel_variance * samples.dt * samples.dt / 3.0 + samples.position_variance);
   add(kP, kV, samples.accel_variance * samples.dt / 2.0);
   add(kV, kP, samples.accel_variance * samples.dt / 2.0);
   add(kV, kV, samples.accel_variance);

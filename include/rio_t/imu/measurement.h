@@ -15,10 +15,11 @@ struct ImuMeasurement {
 
   // Motion that the interval ending with this sample hides (a gap, saturated axes), as squared densities of
   // white noise per axis. They add to those of ImuNoise; see ImuInputCheck.
-  double unseen_gyro_variance = 0.0;   ///< [rad^2/s]
-  double unseen_accel_variance = 0.0;  ///< [m^2/s^3]
+  double unseen_gyro_variance = 0.0;      ///< [rad^2/s]
+  double unseen_accel_variance = 0.0;     ///< [m^2/s^3]
+  double unseen_velocity_variance = 0.0;  ///< [m^2/s], of a velocity that the position alone misses
   /// [s] of motion before this sample that no interval of stamps covers: the clock stepped back. The unseen
-  /// variances contain what it may have changed in attitude and velocity.
+  /// variances contain what it may have changed.
   double lost_time = 0.0;
 
   // White noise measured by NoiseSpectrum, as squared densities per axis: that of the samples, and what is
