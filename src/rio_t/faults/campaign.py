@@ -100,7 +100,7 @@ def judge_case(folder, bag, case, scratch, keep):
     ensure_usual(folder, bag, case.settings, usual)
     origin = 1e-9 * next(m for m in messages if m.kind == "imu").stamp
     truth = judge.read_truth(bag.truth) if bag.truth else judge.read_run(usual)
-    outcome = judge.read_outcome(scratch / "run", status, errors, truth, origin, case.shift)
+    outcome = judge.read_outcome(scratch / "run", status, errors, truth, origin, case.shift, begin)
     outcome.reference = judge.errors_against(truth, judge.read_run(usual), origin)
     outcome.last_imu = 1e-9 * [m for m in faulty if m.kind == "imu"][-1].stamp - case.shift
     outcome.has_truth = bag.truth is not None

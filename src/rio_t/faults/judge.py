@@ -45,13 +45,16 @@ def read_truth(path):
     return States(poses.seconds(0), poses.position, Rotation.from_quat(poses.quaternion), geometry.velocities(poses))
 
 
-def shifted_back(run, shift):
-    """Undoes a jump by `shift` seconds of the stamps of the output, so that it can be compared with a reference."""
+def shifted_back(run, shift, begin):
+    """Undoes a jump by `shift` seconds of the stamps of the output, so that it can be compared with a reference. A small
+    step back at the time `begin` leaves no jump: the samples until the clock has caught up have no output."""
     steps = numpy.diff(run.time)
     jumps = numpy.flatnonzero((steps > 0.5 * shift) if shift > 0 else (steps < 0.1 * shift))
     time = run.time.copy()
     if len(jumps):
         time[jumps[0] + 1:] -= shift
+    else:
+        time[run.time > begin] -= shift
     return dataclasses.replace(run, time=time)
 
 
@@ -129,14 +132,14 @@ def files_with_nan(folder):
     return spoiled
 
 
-def read_outcome(folder, status, messages, reference, origin, shift=0.0):
+def read_outcome(folder, status, messages, reference, origin, shift=0.0, begin=0.0):
     folder = pathlib.Path(folder)
     summary = run_folder.read_yaml(folder / "summary.yaml") if (folder / "summary.yaml").exists() else {}
     outcome = Outcome(status, messages, summary, files_with_nan(folder) if folder.exists() else [])
     if summary:
         outcome.run = read_run(folder)
         if outcome.run is not None and shift != 0.0:
-            outcome.run = shifted_back(outcome.run, shift)
+            outcome.run = shifted_back(outcome.run, shift, origin + begin)
         if outcome.run is not None and reference is not None:
             outcome.errors = errors_against(reference, outcome.run, origin)
     return outcome
