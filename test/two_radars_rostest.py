@@ -92,7 +92,9 @@ class TwoRadarsTest(tester.LiveTestCase):
         parameters = ("config:=two_radars", "trajectory_file:=" + saved, "correct_stamps:=false", *TRIGGERED)
         with tester.Listener(TOPICS) as listener, tester.node(*parameters):
             listener.wait_until_heard()
-            with self.feed(listener, self.bag, TRIGGER) as player:
+            # The node takes the scans in the order in which they come. It is that of the bag if no message is late by
+            # 0.1 s of data.
+            with self.feed(listener, self.bag, TRIGGER, rate=1.0) as player:
                 listener.wait_for_diagnosis("input", "IMU and radars are coming", OK)
                 player.wait()
             listener.wait_for_stamp("odom", self.last_imu)

@@ -102,8 +102,8 @@ CHECKS = {  # name in summary.yaml: for people
     "scans_diverged_share": "share of the scans with a diverged estimate",
     "windows_at_offset_bound_share": "share of the windows with the offset at max_time_offset",
     "windows_not_converged_share": "share of the windows that stopped before they converged",
-    "doppler_scaled_sigmas": "error of the scale of the Doppler, in sigmas",
     "mounting_turned_sigmas": "turn of mounting or vehicle frame from the configured one, in sigmas",
+    "doppler_scaled_sigmas": "error of the scale of the Doppler, in sigmas",
     "imu_faults_share": "share of the IMU samples with a fault",
     "healthy_at_end": "the estimate is healthy at the end"}
 VERDICTS = {
