@@ -34,7 +34,7 @@ class ClockJumpDetector {
   double max_gap_;   // read-only after construction, as the next
   double patience_;  // [s]
   std::optional<Time> newest_;
-  // Of the stamps dropped since the newest good one, the last that go on from each other.
+  // The stamps dropped last, each of which goes on from the one before: first, last, count.
   std::optional<Time> elsewhere_since_, elsewhere_newest_;
   int elsewhere_ = 0;
   double stepped_back_ = 0.0;  // [s]

@@ -25,7 +25,7 @@ class GapBridge {
   /// Samples between the last one taken and `next`, without those two. `is_bridge` is set, and the noise is
   /// that of `next`. None before the first sample.
   std::vector<ImuMeasurement> until(const ImuMeasurement& next) const;
-  /// What the accelerometer would read now without motion [m/s^2], in the IMU frame.
+  /// The accelerometer would read this now without motion [m/s^2], in the IMU frame.
   const Eigen::Vector3d& gravity() const { return gravity_I_; }
 
  private:

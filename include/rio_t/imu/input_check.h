@@ -64,7 +64,7 @@ class ImuSampleCheck {
 
   double most_acceleration_, max_gap_;  // [m/s^2], [s] read-only after construction
   ClockJumpDetector stamps_;
-  // Of the samples since the newest one that was taken:
+  // These describe the samples that came after the newest one that was taken.
   std::map<std::string, std::uint64_t> dropped_;
   std::optional<Time> latest_;  // stamp, of that one, too
   double longest_step_ = 0.0;   // [s] from one stamp to the next

@@ -176,7 +176,7 @@ class RadarChannel {
   RadarChannelOptions options_;  // changed by setGate() alone
   EgoVelocityEstimator estimator_;
   RadarInWindow in_window_;
-  /// What the scans of one window have shown.
+  /// The channel remembers this of the scans of one window. A new window forgets it.
   struct Memory {
     ScanPool pool;
     RestPool rest_pool;

@@ -56,7 +56,7 @@ Diagnosis diagnose(const RunEvidence& evidence, const Config& config);
 /// not be empty.
 std::string describeRestarts(const std::vector<ImuRestart>& restarts, const Config& config);
 
-/// What became of the samples of a gap that no jump of the stamps explains: "1227 were not finite, ...".
+/// Says why the samples of a gap were dropped: "1227 were not finite, ...".
 std::string describeDropped(const Counts& dropped);
 
 /// A line for each cause, and for each check that is not good.

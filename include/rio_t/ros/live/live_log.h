@@ -13,8 +13,8 @@
 
 namespace rio_t {
 
-/// What the live node logs about its input and its estimate. A line that would come with each message comes
-/// at most once in a period. Thread-safe, but for `faults`.
+/// Logs the input and the estimate of the live node. A line that would come with each message comes at most
+/// once in a period. Thread-safe, but for `faults`.
 class LiveLog {
  public:
   /// `name`: of the node, at the beginning of each line.
@@ -35,12 +35,12 @@ class LiveLog {
     }
   }
 
-  /// What a status of the diagnostics says, if it is not OK.
+  /// Logs a status of the diagnostics, if it is not OK.
   void status(const LiveMonitor::Status& status);
   void health(const ScanResult& result);
-  /// What is new among the faults of the session's input. Always in the same thread.
+  /// Logs the new faults of the session's input. Call it always from the same thread.
   void faults(const std::shared_ptr<LiveSession>& session);
-  /// The step of a radar's Doppler, if it is not as reported.
+  /// Logs the step of a radar's Doppler, if it differs from the one reported.
   void dopplerStep(const Config& radar, const DopplerStep& step, DopplerStep* reported) const;
 
  private:
