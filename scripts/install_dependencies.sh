@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs with apt what is missing to build, test and run rio_t on Debian 11, 12 or 13, and the packages given as
-# arguments. It says what it will install. On a terminal it asks before it uses sudo. If all is there it does nothing.
+# Installs with apt what is missing to build, test and run rio_t on Debian 11, 12 or 13 or Ubuntu 22.04, and the
+# packages given as arguments. It says what it will install. On a terminal it asks before it uses sudo. If all is there it does nothing.
 #
 # On a machine with another ROS (a folder in /opt/ros) or another system it installs nothing: there Debian's packages of
 # ROS may remove the ROS that is installed. It then checks what package.xml asks for with rosdep. Exit status 0 if all
@@ -10,6 +10,7 @@ set -euo pipefail
 case "${1:-}" in -h | --help) sed -n '2,8s/^# \?//p' "$0"; exit 0 ;; esac
 system=${RIO_T_SYSTEM_ROOT:-}
 repository=$(cd "$(dirname "$0")/.." && pwd)
+ros_1='melodic|noetic|one'
 
 packages=(
   build-essential cmake catkin
@@ -37,17 +38,26 @@ missing_of() {
   for package in "$@"; do is_installed "$package" || echo "$package"; done
 }
 
-# The distribution of the sourced ROS, else of the one that is installed, else Noetic.
+# The distribution of the sourced ROS, else of one that is installed, ROS 1 first, else of the one that this system could have.
 ros_distribution() {
-  local installed
-  installed=$(find "$system/opt/ros" -mindepth 1 -maxdepth 1 -printf '%f\n' 2>/dev/null | sort | tail -n 1)
-  echo "${ROS_DISTRO:-${installed:-noetic}}"
+  local installed first
+  installed=$(find "$system/opt/ros" -mindepth 1 -maxdepth 1 -printf '%f\n' 2>/dev/null || true)
+  first=$(grep -m 1 -xE "$ros_1" <<<"$installed" || head -n 1 <<<"$installed")
+  case "$(os_release VERSION_ID)" in
+    22.04 | 24.04) echo "${ROS_DISTRO:-${first:-one}}" ;;
+    *) echo "${ROS_DISTRO:-${first:-noetic}}" ;;
+  esac
 }
 
 # For systems that are not ours to change.
 check_with_rosdep() {
   local distribution reason
   distribution=$(ros_distribution)
+  if ! grep -qxE "$ros_1" <<<"$distribution"; then
+    echo "install_dependencies.sh: nothing was installed: rio_t needs ROS 1, and the packages of ROS 1 may remove the ROS 2" \
+      "($distribution) of this machine. docker/one.Dockerfile has ROS One, which is ROS 1 for Ubuntu 22.04 and 24.04." >&2
+    exit 3
+  fi
   if [ -n "${ROS_DISTRO:-}" ] && command -v rosdep >/dev/null &&
     rosdep check --rosdistro "$distribution" --from-paths "$repository" --ignore-src >/dev/null 2>&1; then
     mapfile -t missing < <(missing_of "$@")
@@ -58,7 +68,7 @@ check_with_rosdep() {
   if [ -d "$system/opt/ros" ]; then
     reason="there is a ROS in /opt/ros, and Debian's packages of ROS may remove it"
   else
-    reason="this is not Debian 11, 12 or 13 but $(os_release PRETTY_NAME)"
+    reason="this is not Debian 11, 12 or 13 or Ubuntu 22.04 but $(os_release PRETTY_NAME)"
   fi
   cat >&2 <<END
 install_dependencies.sh: nothing was installed: $reason.
@@ -75,7 +85,7 @@ END
 
 case "$(os_release ID)-$(os_release VERSION_ID)" in
   debian-11) ;;
-  debian-12 | debian-13) packages+=(python3-ament-package) ;;  # catkin's setup.bash reads it; Debian 11 has none
+  debian-12 | debian-13 | ubuntu-22.04) packages+=(python3-ament-package) ;;  # catkin's setup.bash reads it; Debian 11 has none
   *) check_with_rosdep "$@" ;;
 esac
 if [ -d "$system/opt/ros" ]; then check_with_rosdep "$@"; fi

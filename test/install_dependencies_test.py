@@ -5,7 +5,7 @@ import subprocess
 
 import pytest
 
-DEBIAN = {"11": "bullseye", "12": "bookworm", "13": "trixie"}
+SYSTEMS = [("debian", "11"), ("debian", "12"), ("debian", "13"), ("ubuntu", "22.04")]
 
 
 class Machine:
@@ -61,12 +61,12 @@ def machine(tmp_path, scripts):
     return Machine(tmp_path, scripts / "install_dependencies.sh")
 
 
-@pytest.mark.parametrize("version", DEBIAN)
-def test_debian_as_root_says_what_it_installs_and_goes_on(machine, version):
-    machine.system("debian", version)
+@pytest.mark.parametrize("name, version", SYSTEMS)
+def test_root_is_told_what_it_installs_and_it_goes_on(machine, name, version):
+    machine.system(name, version)
     done = machine.run("clang-14")
     assert done.returncode == 0, done.stderr
-    assert "librostest-dev" in done.stdout and "clang-14" in done.stdout and f"A debian {version}" in done.stdout
+    assert "librostest-dev" in done.stdout and "clang-14" in done.stdout and f"A {name} {version}" in done.stdout
     assert "sudo" not in machine.calls
     assert ("python3-ament-package" in machine.calls) == (version != "11")  # Debian 11 has no such package
     assert "apt-get update" in machine.calls and "clang-14" in machine.calls
@@ -104,7 +104,8 @@ def test_on_a_terminal_it_installs_after_a_yes(machine):
 
 
 @pytest.mark.parametrize("system, version, distribution", [("ubuntu", "20.04", "noetic"), ("ubuntu", "22.04", "one"),
-                                                           ("debian", "12", "noetic"), ("fedora", "41", None)])
+                                                           ("ubuntu", "24.04", None), ("debian", "12", "noetic"),
+                                                           ("fedora", "41", None)])
 def test_elsewhere_nothing_changes_and_the_right_lines_are_told(machine, system, version, distribution):
     machine.system(system, version)
     if distribution:
@@ -112,11 +113,27 @@ def test_elsewhere_nothing_changes_and_the_right_lines_are_told(machine, system,
     done = machine.run("clang-14")
     assert done.returncode == 3
     assert machine.calls == ""
-    distribution = distribution or "noetic"
+    distribution = distribution or ("one" if version == "24.04" else "noetic")
     for line in (f"source /opt/ros/{distribution}/setup.bash", f"--ignore-src --rosdistro {distribution}", "catkin_make",
                  "also needs: clang-14"):
         assert line in done.stderr
     assert "/opt/ros, and Debian's packages" in done.stderr or f"A {system} {version}" in done.stderr
+
+
+@pytest.mark.parametrize("sourced", [False, True])
+def test_ros_2_is_not_touched(machine, sourced):
+    machine.system("ubuntu", "22.04")
+    machine.ros("humble", sourced)
+    done = machine.run()
+    assert (done.returncode, machine.calls) == (3, "")
+    assert "needs ROS 1" in done.stderr and "ROS 2 (humble)" in done.stderr
+
+
+def test_ros_1_beside_ros_2_is_taken(machine):
+    machine.system("ubuntu", "22.04")
+    machine.ros("humble", sourced=False)
+    machine.ros("one", sourced=False)
+    assert "source /opt/ros/one/setup.bash" in machine.run().stderr
 
 
 def test_a_sourced_ros_that_has_everything_lets_the_build_go_on(machine):

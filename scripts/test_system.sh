@@ -1,31 +1,33 @@
 #!/usr/bin/env bash
-# Builds this tree and runs every test in another Debian, in a folder that debootstrap makes.
-#   scripts/test_debian.sh bullseye|bookworm|trixie             scripts/test.sh in Debian 11, 12 or 13
-#   scripts/test_debian.sh bullseye|bookworm|trixie COMMAND...  runs COMMAND instead, in the tree, e.g. a shell
+# Builds this tree and runs every test in another system, in a folder that debootstrap makes.
+#   scripts/test_system.sh SUITE             scripts/test.sh there. SUITE is bullseye, bookworm or trixie (Debian 11, 12, 13), or jammy (Ubuntu 22.04)
+#   scripts/test_system.sh SUITE COMMAND...  runs COMMAND instead, in the tree, e.g. a shell
 # It needs root, debootstrap and 6 GB. The first run takes about an hour on two cores. The folder keeps its packages and its
 # build, and later runs build only what changed. The tree is visible read-only inside, and every mount ends with the script.
-# RIO_T_DEBIAN_DIR: where the folders are, else /var/tmp/rio_t_debian. RIO_T_DEBIAN_MIRROR: else deb.debian.org.
+# RIO_T_SYSTEMS_DIR: where the folders are, else /var/tmp/rio_t_systems. RIO_T_MIRROR: else deb.debian.org or archive.ubuntu.com.
 set -euo pipefail
 suite=${1:-}
 case "$suite" in
   -h | --help) sed -n '2,7s/^# \?//p' "$0"; exit 0 ;;
-  bullseye | bookworm | trixie) shift ;;
-  *) echo "test_debian.sh: expected bullseye, bookworm or trixie, not '$suite'" >&2; exit 1 ;;
+  bullseye | bookworm | trixie) mirror=http://deb.debian.org/debian components=main ;;
+  jammy) mirror=http://archive.ubuntu.com/ubuntu components=main,universe ;;
+  *) echo "test_system.sh: expected bullseye, bookworm, trixie or jammy, not '$suite'" >&2; exit 1 ;;
 esac
-[ "$(id -u)" -eq 0 ] || { echo "test_debian.sh: must run as root, to mount and to change the root folder" >&2; exit 1; }
-command -v debootstrap >/dev/null || { echo "test_debian.sh: debootstrap is missing: apt-get install debootstrap" >&2; exit 1; }
+shift
+[ "$(id -u)" -eq 0 ] || { echo "test_system.sh: must run as root, to mount and to change the root folder" >&2; exit 1; }
+command -v debootstrap >/dev/null || { echo "test_system.sh: debootstrap is missing: apt-get install debootstrap" >&2; exit 1; }
 
 source=$(cd "$(dirname "$0")/.." && pwd)
-root=${RIO_T_DEBIAN_DIR:-/var/tmp/rio_t_debian}/$suite
+root=${RIO_T_SYSTEMS_DIR:-/var/tmp/rio_t_systems}/$suite
 data=${RIO_T_DATA_DIR:-$(realpath -m "$source/../shared/data")}
 
 # The last step that makes the folder writes the mark: a folder that was interrupted starts again.
 if [ ! -f "$root/.rio_t_complete" ]; then
-  echo "test_debian.sh: making $root"
+  echo "test_system.sh: making $root"
   mkdir -p "$root"
   log=$root.log
-  debootstrap --variant=minbase --include=ca-certificates "$suite" "$root" \
-    "${RIO_T_DEBIAN_MIRROR:-http://deb.debian.org/debian}" >"$log" 2>&1 || { tail -n 20 "$log" >&2; exit 1; }
+  debootstrap --variant=minbase --include=ca-certificates --components="$components" "$suite" "$root" \
+    "${RIO_T_MIRROR:-$mirror}" >"$log" 2>&1 || { tail -n 20 "$log" >&2; exit 1; }
   mkdir -p "$root"/{rio_t,data,build,ccache}
   # The folder need not survive a power cut and needs no manuals.
   printf '%s\n' force-unsafe-io 'path-exclude=/usr/share/doc/*' 'path-exclude=/usr/share/man/*' >"$root/etc/dpkg/dpkg.cfg.d/rio_t"
