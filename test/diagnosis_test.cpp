@@ -48,10 +48,10 @@ RunEvidence withRejected(const std::string& reason) {
   return evidence;
 }
 
-RunEvidence neverStarted(const std::string& waiting_for) {
+RunEvidence neverStarted(StartObstacle obstacle, const std::string& text) {
   RunEvidence evidence = goodRun();
   evidence.initialized = false;
-  evidence.waiting_for = waiting_for;
+  evidence.waiting_for = {obstacle, text};
   evidence.scans_judged = 0;
   evidence.solver_terminations.clear();
   RadarSummary& radar = evidence.radars.front();
@@ -229,24 +229,22 @@ TEST(Diagnosis, RejectedScansNameReasonAndKey) {
 }
 
 TEST(Diagnosis, AStartThatNeverCameSaysWhatItWaitsFor) {
-  expectSays(
-      first(neverStarted("rest: x; or radar and IMU that agree: together they show 3 m/s^2 as gravity")),
-      {"start_contradicts", "together they show 3 m/s^2", "radar_doppler_sign"});
-  expectSays(
-      first(neverStarted("rest: mean accelerometer 1.00 m/s^2 instead of gravity 9.81: accelerating, or "
-                         "not in m/s^2?")),
-      {"imu_units", "may publish g"});
-  expectSays(first(neverStarted("standing still: 1.2 of 3.0 s seen")), {"too_short", "init_duration"});
+  expectSays(first(neverStarted(StartObstacle::kContradiction, "together they show 3 m/s^2 as gravity")),
+             {"start_contradicts", "together they show 3 m/s^2", "radar_doppler_sign"});
+  expectSays(first(neverStarted(StartObstacle::kWrongGravity, "mean accelerometer 1.00 m/s^2")),
+             {"imu_units", "1.00 m/s^2", "may publish g"});
+  const RunEvidence short_rest = neverStarted(StartObstacle::kTooFewData, "1.2 of 3.0 s seen");
+  expectSays(first(short_rest), {"too_short", "1.2 of 3.0 s", "init_duration"});
+  EXPECT_EQ(diagnose(short_rest, Config{}).verdict, RunVerdict::kBad);
   Config config;
   config.odometry.init_mode = InitMode::kStatic;
-  expectSays(first(neverStarted("rest: the gyro moves by 1 rad/s"), config),
+  expectSays(first(neverStarted(StartObstacle::kMotion, "the gyro moves by 1 rad/s"), config),
              {"never_at_rest", "init_mode: auto"});
-  EXPECT_EQ(diagnose(neverStarted("rest"), Config{}).verdict, RunVerdict::kBad);
 }
 
 TEST(Diagnosis, AStartWithoutVelocitiesNamesTheirReason) {
   RunEvidence evidence =
-      neverStarted("rest: the gyro moves; or radar velocities in motion: 0.0 of 2.5 s seen");
+      neverStarted(StartObstacle::kMotion, "radar velocities in motion: 0.0 of 2.5 s seen");
   evidence.radars.front().velocity_status = {{"too_few_inliers", 180}, {"moving", 20}};
   expectSays(first(evidence), {"too_few_inliers: 180 of 200 scans"});
 }

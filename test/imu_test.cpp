@@ -289,7 +289,7 @@ TEST(StaticInitializer, SixMountingsWithBias) {
       StaticInitializer initializer(twoSeconds(), 9.81);
       const Eigen::Vector3d up_I = sign * Eigen::Vector3d::Unit(axis);
       const auto result = feed(initializer, 100.0, 3.0, b_g, 9.91 * up_I);
-      ASSERT_TRUE(result) << initializer.waitingFor();
+      ASSERT_TRUE(result) << initializer.waitingFor().text;
       EXPECT_LT((result->q_WI * up_I - Eigen::Vector3d::UnitZ()).norm(), 1e-3);
       EXPECT_LT((result->b_g - b_g).norm(), 5e-4);
       EXPECT_LT((result->b_a - 0.1 * up_I).norm(), 5e-3);
@@ -323,7 +323,7 @@ TEST(StaticInitializer, AnIdlingEngineIsRest) {
       check.check(sample);
       found = initializer.add(sample);
     }
-    ASSERT_TRUE(found) << frequency << " Hz: " << initializer.waitingFor();
+    ASSERT_TRUE(found) << frequency << " Hz: " << initializer.waitingFor().text;
     EXPECT_LT((found->b_g - Eigen::Vector3d(0.01, 0.0, -0.02)).norm(), 1e-9);
   }
 }
@@ -352,7 +352,7 @@ TEST(StaticInitializer, ASmoothStartEndsTheRestAndIsNotAveraged) {
       const auto found = feedMotion(initializer, 6.0, noise, [&](double t) {
         return t < 2.0 ? 0.0 : t < 2.0 + ramp ? 0.5 * (t - 2.0) / ramp : 0.5;
       });
-      ASSERT_TRUE(found) << initializer.waitingFor();
+      ASSERT_TRUE(found) << initializer.waitingFor().text;
       // What it averaged is 0.5 m/s^2 / g = 0.05 rad off where it had moved.
       const Eigen::Vector3d up_W = found->q_WI * Eigen::Vector3d::UnitZ();
       EXPECT_LT(std::acos(up_W.z()), 0.01) << "ramp " << ramp << ", noise " << noise;
@@ -378,7 +378,7 @@ TEST(StaticInitializer, AnEngineThatIdlesIsAveragedOverTheWholeDuration) {
     const StaticInitializerOptions options;
     StaticInitializer initializer(options, 9.81);
     const auto found = feedMotion(initializer, 6.0, noise, [](double) { return 0.0; });
-    ASSERT_TRUE(found) << initializer.waitingFor();
+    ASSERT_TRUE(found) << initializer.waitingFor().text;
     EXPECT_NEAR(found->duration, options.duration, 0.01) << noise;
     EXPECT_FALSE(initializer.hasSeenMotion());
   }
@@ -387,17 +387,20 @@ TEST(StaticInitializer, AnEngineThatIdlesIsAveragedOverTheWholeDuration) {
 TEST(StaticInitializer, SaysWhatItWaitsForAndRecoversFromMotion) {
   StaticInitializer initializer(twoSeconds(), 9.81);
   EXPECT_FALSE(feed(initializer, 0.0, 4.0, Eigen::Vector3d::Zero(), {0, 0, 9.81}, 0.3));
-  EXPECT_NE(initializer.waitingFor().find("gyro moves"), std::string::npos) << initializer.waitingFor();
+  EXPECT_EQ(initializer.waitingFor().obstacle, StartObstacle::kMotion);
+  EXPECT_NE(initializer.waitingFor().text.find("gyro moves"), std::string::npos);
   EXPECT_TRUE(feed(initializer, 4.0, 5.0, Eigen::Vector3d::Zero(), {0, 0, 9.81}));
 }
 
 TEST(StaticInitializer, NamesWrongUnits) {
   StaticInitializer in_g(twoSeconds(), 9.81);
   EXPECT_FALSE(feed(in_g, 0.0, 3.0, Eigen::Vector3d::Zero(), {0, 0, 1.0}));
-  EXPECT_NE(in_g.waitingFor().find("not in m/s^2"), std::string::npos) << in_g.waitingFor();
+  EXPECT_EQ(in_g.waitingFor().obstacle, StartObstacle::kWrongGravity);
+  EXPECT_NE(in_g.waitingFor().text.find("not in m/s^2"), std::string::npos);
   StaticInitializer turning(twoSeconds(), 9.81);
   EXPECT_FALSE(feed(turning, 0.0, 3.0, {0, 0, 0.5}, {0, 0, 9.81}));
-  EXPECT_NE(turning.waitingFor().find("not in rad/s"), std::string::npos) << turning.waitingFor();
+  EXPECT_EQ(turning.waitingFor().obstacle, StartObstacle::kMotion);
+  EXPECT_NE(turning.waitingFor().text.find("not in rad/s"), std::string::npos);
 }
 
 ImuBuffer still(const Eigen::Vector3d& gyro, const Eigen::Vector3d& accel) {

@@ -50,7 +50,8 @@ class AtRest : public ::testing::Test {
 TEST_F(AtRest, SaysWhatItWaitsForThenStaysWhereItIs) {
   run(101.0);
   EXPECT_FALSE(odometry.initialized());
-  EXPECT_NE(odometry.waitingFor().find("standing still"), std::string::npos) << odometry.waitingFor();
+  EXPECT_NE(odometry.waitingFor().text.find("standing still"), std::string::npos)
+      << odometry.waitingFor().text;
   run(104.0);
   ASSERT_TRUE(odometry.initialized());
   for (int i = 0; i < 20; ++i) {
@@ -210,7 +211,7 @@ TEST_F(AtRest, AClockThatJumpsStartsTheEstimateAgain) {
     EXPECT_TRUE(states.empty());
     EXPECT_FALSE(odometry.initialized());
     run(begin + 4.0);
-    ASSERT_TRUE(odometry.initialized()) << odometry.waitingFor();
+    ASSERT_TRUE(odometry.initialized()) << odometry.waitingFor().text;
     ASSERT_FALSE(states.empty());
     EXPECT_GT(states.front().time, Time::fromSeconds(begin));
     EXPECT_LT(states.back().p_W.norm(), 1e-3);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "rio_t/core/format.h"
 
@@ -75,37 +76,41 @@ RestStatistics statistics(const std::vector<ImuMeasurement>& samples) {
   return result;
 }
 
-/// Says why the samples do not show a platform at rest; nothing if they do.
-std::string noRestBecause(const RestStatistics& rest, const StaticInitializerOptions& options,
-                          double gravity) {
+/// Why the samples do not show a platform at rest; nothing if they do.
+std::optional<StartWait> noRestBecause(const RestStatistics& rest, const StaticInitializerOptions& options,
+                                       double gravity) {
   const Statistics& gyro = rest.gyro;
   const Statistics& accel = rest.accel;
+  const auto moving = [](std::string text) { return StartWait{StartObstacle::kMotion, std::move(text)}; };
   // In any motion of people and drones the accelerometer reads gravity on average. If not, units are wrong.
   if (std::abs(rest.mean_size - gravity) > kWrongUnits * gravity) {
-    return formatted(
-        "rest: the accelerometer reads %.2f m/s^2 on the mean, expected gravity %.2f m/s^2: gravity removed, "
-        "or not in m/s^2?",
-        rest.mean_size, gravity);
+    return StartWait{
+        StartObstacle::kWrongGravity,
+        formatted("rest: the accelerometer reads %.2f m/s^2 on the mean, expected gravity %.2f m/s^2: "
+                  "gravity removed, or not in m/s^2?",
+                  rest.mean_size, gravity)};
   }
   if (gyro.std.maxCoeff() > options.max_gyro_std) {
-    return formatted(
-        "rest: the gyro moves by %.3f rad/s (std), at most %.3f allowed: moving, or not in rad/s?",
-        gyro.std.maxCoeff(), options.max_gyro_std);
+    return moving(
+        formatted("rest: the gyro moves by %.3f rad/s (std), at most %.3f allowed: moving, or not in rad/s?",
+                  gyro.std.maxCoeff(), options.max_gyro_std));
   }
   if (accel.std.maxCoeff() > options.max_accel_std) {
-    return formatted("rest: the accelerometer moves by %.2f m/s^2 (std), at most %.2f allowed",
-                     accel.std.maxCoeff(), options.max_accel_std);
+    return moving(formatted("rest: the accelerometer moves by %.2f m/s^2 (std), at most %.2f allowed",
+                            accel.std.maxCoeff(), options.max_accel_std));
   }
   if (gyro.mean.norm() > options.max_gyro_mean) {
-    return formatted("rest: mean gyro %.3f rad/s, at most %.3f allowed: turning, or not in rad/s?",
-                     gyro.mean.norm(), options.max_gyro_mean);
+    return moving(formatted("rest: mean gyro %.3f rad/s, at most %.3f allowed: turning, or not in rad/s?",
+                            gyro.mean.norm(), options.max_gyro_mean));
   }
   if (std::abs(accel.mean.norm() - gravity) > options.max_gravity_error) {
-    return formatted(
-        "rest: mean accelerometer %.2f m/s^2 instead of gravity %.2f: accelerating, or not in m/s^2?",
-        accel.mean.norm(), gravity);
+    return StartWait{
+        StartObstacle::kWrongGravity,
+        formatted(
+            "rest: mean accelerometer %.2f m/s^2 instead of gravity %.2f: accelerating, or not in m/s^2?",
+            accel.mean.norm(), gravity)};
   }
-  return "";
+  return std::nullopt;
 }
 
 }  // namespace
@@ -145,13 +150,14 @@ std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement&
   const double collected = samples_.back().time - samples_.front().time;
   if (collected < (is_ending ? kShortest : options_.duration) || samples_.size() < 10) {
     // A reason that was reported stays until rest has been seen for a whole duration.
-    if (waiting_for_.rfind("rest", 0) != 0) {
-      waiting_for_ = formatted("standing still: %.1f of %.1f s seen", collected, options_.duration);
+    if (waiting_for_.obstacle == StartObstacle::kTooFewData) {
+      waiting_for_.text = formatted("standing still: %.1f of %.1f s seen", collected, options_.duration);
     }
     if (is_ending) {
-      waiting_for_ =
+      waiting_for_ = {
+          StartObstacle::kMotion,
           formatted("rest: the mean acceleration changes after %.1f s, at least %.1f expected: moving?",
-                    collected, kShortest);
+                    collected, kShortest)};
       has_seen_motion_ = true;
       samples_ = {imu};
     }
@@ -159,9 +165,8 @@ std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement&
   }
 
   const RestStatistics rest = statistics(samples_);
-  const std::string fault = noRestBecause(rest, options_, gravity_);
-  if (!fault.empty()) {
-    waiting_for_ = fault;
+  if (std::optional<StartWait> fault = noRestBecause(rest, options_, gravity_)) {
+    waiting_for_ = std::move(*fault);
     has_seen_motion_ = true;
     samples_.erase(samples_.begin(), samples_.begin() + static_cast<std::ptrdiff_t>(samples_.size() / 4 + 1));
     return std::nullopt;
@@ -173,7 +178,7 @@ std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement&
   result.b_g = rest.gyro.mean;
   result.b_a = rest.accel.mean * ((rest.accel.mean.norm() - gravity_) / rest.accel.mean.norm());
   result.duration = collected;
-  waiting_for_.clear();
+  waiting_for_ = {};
   samples_.clear();
   return result;
 }

@@ -77,12 +77,16 @@ void Initializer::setImuNoise(const ImuNoise& noise) {
   for (MotionInitializer& radar : motion_) radar.setImuNoise(noise);
 }
 
-std::string Initializer::waitingFor() const {
-  if (options_.init_mode == InitMode::kMotion) return motion_.front().waitingFor();
-  const std::string rest =
-      rest_.waitingFor() +
-      (radar_contradicts_rest_ ? " (the IMU seemed at rest, but the radar saw motion)" : "");
-  return mayStartInMotion() ? rest + "; or " + motion_.front().waitingFor() : rest;
+StartWait Initializer::waitingFor() const {
+  const StartWait& motion = motion_.front().waitingFor();
+  if (options_.init_mode == InitMode::kMotion) return motion;
+  StartWait wait = rest_.waitingFor();
+  if (radar_contradicts_rest_) wait.text += " (the IMU seemed at rest, but the radar saw motion)";
+  if (!mayStartInMotion()) return wait;
+  wait.text += "; or " + motion.text;
+  // This one says the most: it names gravity and mounting.
+  if (motion.obstacle == StartObstacle::kContradiction) wait.obstacle = motion.obstacle;
+  return wait;
 }
 
 }  // namespace rio_t

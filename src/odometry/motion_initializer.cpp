@@ -101,8 +101,8 @@ std::optional<Initialization> MotionInitializer::solve(const ImuBuffer& imu,
   const double span = time - window.front().stamp;
   if (span < kMinSpan * options_.window || window.size() < kMinVelocities) {
     // A reason that was reported stays until there is a new window.
-    if (waiting_for_.rfind("radar and IMU", 0) != 0) {
-      waiting_for_ = formatted("radar velocities in motion: %.1f of %.1f s seen", span, options_.window);
+    if (waiting_for_.obstacle != StartObstacle::kContradiction) {
+      waiting_for_.text = formatted("radar velocities in motion: %.1f of %.1f s seen", span, options_.window);
     }
     return std::nullopt;
   }
@@ -122,10 +122,12 @@ std::optional<Initialization> MotionInitializer::initialize(const Velocities& wi
                                                             const std::function<PoseAnchor(Time)>& anchorAt) {
   const Line line = fitLine(window, time, imu);
   if (std::abs(line.g_I.norm() - g_W_.norm()) >= options_.max_gravity_error) {
-    waiting_for_ = formatted(
-        "radar and IMU that agree: together they show %.2f m/s^2 as gravity instead of %.2f: units, "
-        "extrinsics, Doppler sign?",
-        line.g_I.norm(), g_W_.norm());
+    waiting_for_ = {
+        StartObstacle::kContradiction,
+        formatted(
+            "radar and IMU that agree: together they show %.2f m/s^2 as gravity instead of %.2f: units, "
+            "extrinsics, Doppler sign?",
+            line.g_I.norm(), g_W_.norm())};
     return std::nullopt;
   }
   const NodePrior known = priorOf(line, anchorAt(time));
@@ -136,18 +138,20 @@ std::optional<Initialization> MotionInitializer::initialize(const Velocities& wi
     result.prior = known;
     const std::optional<double> outliers = refine(window, time, imu, result.model_error_scale, result.prior);
     if (!outliers) {
-      waiting_for_ = "motion: the radar velocities do not determine tilt and velocity";
+      waiting_for_ = {StartObstacle::kTooFewData,
+                      "motion: the radar velocities do not determine tilt and velocity"};
       return std::nullopt;
     }
     if (*outliers > options_.max_outlier_fraction) {
-      waiting_for_ = formatted(
-          "radar and IMU that agree: %.0f %% of the radar velocities do not fit the IMU, at most %.0f %% "
-          "allowed: extrinsics, Doppler sign, units?",
-          100.0 * *outliers, 100.0 * options_.max_outlier_fraction);
+      waiting_for_ = {
+          StartObstacle::kContradiction,
+          formatted("radar and IMU that agree: %.0f %% of the radar velocities do not fit the IMU, at most "
+                    "%.0f %% allowed: extrinsics, Doppler sign, units?",
+                    100.0 * *outliers, 100.0 * options_.max_outlier_fraction)};
       return std::nullopt;
     }
   }
-  waiting_for_.clear();
+  waiting_for_ = {};
   return result;
 }
 

@@ -37,7 +37,7 @@ struct RadarInertialOdometry::Impl {
   // Status of the estimator; guarded by inbox_mutex, too.
   struct Status {
     bool initialized = false;
-    std::string waiting_for;
+    StartWait waiting_for;
     Health health = Health::kOk;
   };
   mutable std::mutex inbox_mutex;
@@ -192,7 +192,7 @@ Health RadarInertialOdometry::health() const {
   return impl_->status.health;
 }
 
-std::string RadarInertialOdometry::waitingFor() const {
+StartWait RadarInertialOdometry::waitingFor() const {
   const std::lock_guard<std::mutex> lock(impl_->inbox_mutex);
   return impl_->status.waiting_for;
 }

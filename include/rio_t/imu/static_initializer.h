@@ -2,10 +2,10 @@
 
 #include <Eigen/Geometry>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "rio_t/imu/measurement.h"
+#include "rio_t/imu/start_wait.h"
 
 namespace rio_t {
 
@@ -35,9 +35,7 @@ class StaticInitializer {
   StaticInitializer(const StaticInitializerOptions& options, double gravity);
   /// Feeds one sample; the result once enough rest has been seen. Samples must be in time order.
   std::optional<StaticInitialization> add(const ImuMeasurement& imu);
-  /// Tells people what the start is waiting for: "standing still: 1.2 of 3.0 s seen", or "rest: ..." and why
-  /// this is none.
-  const std::string& waitingFor() const { return waiting_for_; }
+  const StartWait& waitingFor() const { return waiting_for_; }
   /// Whether the platform moved for a while.
   bool hasSeenMotion() const { return has_seen_motion_; }
 
@@ -48,7 +46,7 @@ class StaticInitializer {
   StaticInitializerOptions options_;  // read-only after construction
   double gravity_;                    // read-only after construction
   std::vector<ImuMeasurement> samples_;
-  std::string waiting_for_ = "the first IMU sample";
+  StartWait waiting_for_{StartObstacle::kTooFewData, "the first IMU sample"};
   bool has_seen_motion_ = false;
   Time checked_at_;
 };

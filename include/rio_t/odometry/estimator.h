@@ -56,7 +56,7 @@ class Estimator {
   std::vector<StampedPose> remainingPoses();
 
   bool initialized() const { return smoother_.started(); }
-  const std::string& waitingFor() const { return waiting_for_; }  ///< while not initialised, for people
+  const StartWait& waitingFor() const { return waiting_for_; }  ///< while not initialised
   const std::optional<Initialization>& start() const { return start_; }
   const RadarChannel& radar(std::size_t radar) const { return radars_.at(radar); }
 
@@ -105,7 +105,7 @@ class Estimator {
   std::optional<LandmarkMap> landmarks_;                   ///< none if they are off
 
   std::optional<Initialization> start_;
-  std::string waiting_for_;
+  StartWait waiting_for_;
   Time initialized_at_;
   Time last_used_;                         ///< stamp of the last scan that went into the window
   std::vector<StampedPose> left_between_;  ///< left the window between two results; for the next one

@@ -2,7 +2,6 @@
 
 #include <functional>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "rio_t/imu/static_initializer.h"
@@ -31,8 +30,7 @@ class Initializer {
     motion_.at(radar).add(stamp, velocity);
   }
 
-  /// Tells people what the start is waiting for.
-  std::string waitingFor() const;
+  StartWait waitingFor() const;
   double imuHistory() const { return motion_.front().imuHistory(); }  ///< [s]
 
  private:

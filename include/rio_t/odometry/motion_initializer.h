@@ -3,12 +3,12 @@
 #include <Eigen/Geometry>
 #include <functional>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "rio_t/factors/radar_velocity_factor.h"
 #include "rio_t/imu/buffer.h"
 #include "rio_t/imu/noise.h"
+#include "rio_t/imu/start_wait.h"
 #include "rio_t/odometry/model_error_scale.h"
 #include "rio_t/radar/ego_velocity.h"
 #include "rio_t/smoother/node_prior.h"
@@ -72,8 +72,7 @@ class MotionInitializer {
   /// [m/s]. None without scans.
   std::optional<bool> isMoving(Time from, Time to, double max_speed) const;
 
-  /// Tells people what the start is waiting for.
-  const std::string& waitingFor() const { return waiting_for_; }
+  const StartWait& waitingFor() const { return waiting_for_; }
   /// How far back the IMU must reach for solve() [s].
   double imuHistory() const;
 
@@ -121,7 +120,7 @@ class MotionInitializer {
 
   Velocities velocities_;  // by stamp
   std::optional<Time> tried_at_;
-  std::string waiting_for_ = "the first radar velocity";
+  StartWait waiting_for_{StartObstacle::kTooFewData, "the first radar velocity"};
 };
 
 }  // namespace rio_t

@@ -69,8 +69,8 @@ class RadarInertialOdometry {
   MeasuredImuNoise imuNoise() const;
   /// Root mean square of it since the first sample. Any thread.
   MeasuredImuNoise imuNoiseOfRun() const;
-  /// While not initialised: what the start is waiting for, as text for people.
-  std::string waitingFor() const;
+  /// While not initialised. Any thread.
+  StartWait waitingFor() const;
   /// Faults of the input so far, by name in snake case, e.g. "imu_out_of_order", "imu_not_finite", "imu_gap".
   std::map<std::string, std::uint64_t> faults() const;
 

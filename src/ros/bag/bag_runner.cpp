@@ -85,7 +85,7 @@ void checkOutcome(const std::string& bag, const Config& config, const RunSummary
     return RunFailed(bagError(bag, what).what(), summary.diagnosis);
   };
   if (!summary.initialized) {
-    throw failed("never initialised, waited for " + summary.waiting_for + " (" +
+    throw failed("never initialised, waited for " + summary.waiting_for.text + " (" +
                  std::to_string(summary.imu_count) + " IMU samples, init_duration " +
                  std::to_string(config.odometry.initialization.duration) + " s)");
   }

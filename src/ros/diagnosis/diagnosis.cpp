@@ -86,8 +86,6 @@ double vehicleTurnSigmas(const RunEvidence& evidence, const Config& config) {
 /// A stamp, to the millisecond.
 std::string stampText(Time time) { return fixedText(time.seconds(), 3) + " s"; }
 
-bool has(const std::string& text, const char* part) { return text.find(part) != std::string::npos; }
-
 /// It is certain, and it explains whatever else there is.
 void addPublishers(const RunEvidence& evidence, std::vector<Cause>* causes) {
   for (const std::string& text : evidence.several_publishers)
@@ -96,8 +94,8 @@ void addPublishers(const RunEvidence& evidence, std::vector<Cause>* causes) {
 }
 
 void addStart(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
-  const std::string& waiting = evidence.waiting_for;
-  const std::string text = "The start waits for " + waiting + ".";
+  const StartObstacle obstacle = evidence.waiting_for.obstacle;
+  const std::string text = "The start waits for " + evidence.waiting_for.text + ".";
   if (evidence.initialized) {
     const double late = lateStart(evidence);
     if (late > kLateStart)
@@ -109,14 +107,13 @@ void addStart(const RunEvidence& evidence, const Config& config, std::vector<Cau
                          late});
     return;
   }
-  // The start in motion names gravity and mounting, the start at rest what moves.
-  if (has(waiting, "radar and IMU that agree")) {
+  if (obstacle == StartObstacle::kContradiction) {
     causes->push_back({"start_contradicts", text,
                        "Check radar_doppler_sign, radar_axes, extrinsics_rotation_xyzw (order x, y, z, w), "
                        "imu_acceleration_unit and imu_rate_unit. Run `rosrun rio_t check_bag BAG`: it finds "
                        "them all.",
                        0.9, true});
-  } else if (has(waiting, "not in m/s^2?")) {
+  } else if (obstacle == StartObstacle::kWrongGravity) {
     causes->push_back({"imu_units", text,
                        "The driver of the IMU may publish g: then set imu_acceleration_unit: g. The driver "
                        "must not remove gravity.",

@@ -262,7 +262,7 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) c
     return;
   }
   if (!initialized || !waiting_for_.empty()) {
-    const std::string what = waiting_for_.empty() ? session->odometry().waitingFor() : waiting_for_;
+    const std::string what = waiting_for_.empty() ? session->odometry().waitingFor().text : waiting_for_;
     status.add("waiting_for", what);
     status.summary(DiagnosticStatus::WARN, "initialising, waiting for " + what);
     return;

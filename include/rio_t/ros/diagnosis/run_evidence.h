@@ -108,7 +108,7 @@ struct GroundVehicleCounts {
 struct RunEvidence {
   bool initialized = false;
   InitializedFrom initialized_from = InitializedFrom::kRest;
-  std::string waiting_for;     ///< while not initialised
+  StartWait waiting_for;       ///< while not initialised
   double heading_sigma = 0.0;  ///< of the newest state [rad]
   std::uint64_t imu_count = 0;
   // Steps from stamp to stamp of the IMU samples that can be used, but for jumps and gaps that nothing
