@@ -188,3 +188,5 @@ void navigationAnchor(benchmark::State& state) {
 BENCHMARK(navigationAnchor);
 
 }  // namespace
+
+BENCHMARK_MAIN();  // Ubuntu 20.04: libbenchmark_main.so hides its main

@@ -76,7 +76,7 @@ class TwoRadarDiagnostics : public testing::Test {
     result.offset_observable = true;
     monitor.result(result);
   }
-  Status odometry(const LiveSession& of) const {
+  Status odometry(const LiveSession& of) {
     Status status;
     monitor.describeOdometry(status, &of);
     return status;
@@ -146,6 +146,16 @@ TEST_F(TwoRadarDiagnostics, IsAnErrorIfTheImuFallsSilentOrCannotBeUsed) {
     monitor.imuUnusable("imu_not_finite");
   }
   expectNoOdometry("no IMU message can be used (imu_not_finite)");
+}
+
+TEST_F(TwoRadarDiagnostics, AClockThatStandsIsNoFaultOfTheSensors) {
+  second(20, 20, 20);
+  monitor.setClockStands(true);
+  EXPECT_EQ(second(0, 0, 0).level, DiagnosticStatus::WARN);
+  EXPECT_NE(second(0, 0, 0).message.find("ROS time stands still"), std::string::npos);
+  EXPECT_NE(odometry(session).message.find("ROS time stands still"), std::string::npos);
+  monitor.setClockStands(false);
+  EXPECT_EQ(second(0, 0, 0).level, DiagnosticStatus::ERROR);  // the IMU is silent
 }
 
 /// The estimate runs, and the clock of a radar is far behind that of the IMU.

@@ -12,6 +12,7 @@
 #include <limits>
 #include <utility>
 
+#include "../command_line.h"
 #include "radar_texts.h"
 #include "rio_t/evaluation/trajectory.h"
 #include "rio_t/ros/parameters/ros_parameters.h"
@@ -93,6 +94,11 @@ LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& p
       live_config_(config_),
       imu_check_(options_.imu_input_check) {
   for (const Config& radar : configsOfRadars(config_)) radars_.emplace_back(radar);
+  if (config_.publish_tf)
+    tf_watch_.emplace(onQueue(node, &input_queue_),
+                      config_.invert_tf ? config_.odom_frame : config_.base_link_frame);
+  if (const std::string fault = faultOfOutput(config_.trajectory_file, {}); !fault.empty())
+    ROS_WARN_STREAM(name_ << ": ~save_trajectory will fail, trajectory_file " << fault);
   showEffectiveParameters(private_node_, config_);
   startSessionWhenReady();
   addDiagnostics();
@@ -186,15 +192,23 @@ void LiveOdometry::addDiagnostics() {
         {config_.imu_topic, imu_subscriber_.getNumPublishers()}};
     for (const Radar& radar : radars_) publishers[radar.config.radar_topic] = radar.scans.getNumPublishers();
     monitor_.setPublishers(publishers);
+    const ros::Time clock = ros::Time::now();
+    monitor_.setClockStands(ros::Time::isSimTime() && !clock.isZero() && clock == last_clock_);
+    last_clock_ = clock;
     monitor_.describeInput(s, session_.get().get());
     const std::chrono::duration<double> ran = std::chrono::steady_clock::now() - began_;
-    const bool lacks_clock = ros::Time::isSimTime() && ros::Time::now().isZero();
+    const bool lacks_clock = ros::Time::isSimTime() && clock.isZero();
     if (lacks_clock && !LiveMonitor::describeMissingClock(s, ran.count())) return;  // nothing to log yet
     if (s.message != kSolverFallsBehind) log_.status(s);  // else log_.health tells it
   });
   diagnostics_->add("odometry", [this](Status& s) {
     const Session now = session_.get();
     monitor_.describeOdometry(s, now.get());
+    if (const std::string others = tf_watch_ ? tf_watch_->others() : ""; !others.empty())
+      s.mergeSummary(diagnostic_msgs::DiagnosticStatus::WARN,
+                     "others publish tf to the same frame as rio_t, " + others +
+                         ", and it jumps between them: stop them, set publish_tf: false, or leave the tf out "
+                         "of the bag that is played (bag_topics)");
     log_.status(s);  // a divergence, too: log_.health tells it only while scans come
   });
   if (!config_.barometer_topic.empty())
@@ -323,6 +337,7 @@ bool LiveOdometry::onSaveTrajectory(std_srvs::Trigger::Request& /*request*/,
     if (trajectory.empty()) throw std::runtime_error("no optimised pose yet");
     // With its folder, since who calls may not know where the node runs.
     const std::string file = std::filesystem::absolute(config_.trajectory_file).string();
+    if (const std::string fault = faultOfOutput(file, {}); !fault.empty()) throw std::runtime_error(fault);
     writeTum(file, trajectory);
     response.success = 1U;
     response.message = std::to_string(trajectory.size()) + " poses in " + file;

@@ -21,6 +21,12 @@ using diagnostic_msgs::DiagnosticStatus;
 constexpr std::size_t kWindowsJudged = 20;
 /// Calls of describeInput, seconds that is, over which the use of a radar's scans is judged.
 constexpr std::size_t kInputsJudged = 4;
+/// Calls of describeOdometry, seconds that is, after which a verdict that is not good is a warning: one bad
+/// second early in a run is a large share of it.
+constexpr std::size_t kVerdictHolds = 5;
+/// No message comes then, and no sensor is at fault.
+constexpr const char* kClockStands =
+    "ROS time stands still: /clock is paused, or its publisher has ended (a bag?)";
 
 double velocitySigma(const NavigationState& state) {
   return sigmasOf(state.covariance).segment<3>(StateBlock::kV).maxCoeff();
@@ -214,6 +220,11 @@ std::string LiveMonitor::wrongType(const std::string& topic, const std::string& 
   return ", which is published as " + found->second + ", expected " + expected;
 }
 
+void LiveMonitor::setClockStands(bool stands) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  clock_stands_ = stands;
+}
+
 void LiveMonitor::tune(const ImuNoise& configured) {
   const std::lock_guard<std::mutex> lock(mutex_);
   config_.odometry.imu_noise = configured;
@@ -225,22 +236,21 @@ void LiveMonitor::reconfigured(const std::string& refused_because) {
   refused_because_ = refused_because;
 }
 
-std::string LiveMonitor::addDiagnosis(Status& status, const LiveSession& session) const {
+Diagnosis LiveMonitor::addDiagnosis(Status& status, const LiveSession& session) const {
   RunEvidence evidence = collector_.evidence(session.odometry(), session.start());
   evidence.imu_count = imu_.count - imu_before_session_;
   if (const std::uint64_t all = countOf(imu_dropped_, kImuNotUsable); all > not_usable_before_session_)
     evidence.input_faults[kImuNotUsable] = all - not_usable_before_session_;
-  const Diagnosis diagnosis = diagnose(evidence, config_);
+  Diagnosis diagnosis = diagnose(evidence, config_);
   if (evidence.initialized) status.add("verdict", toString(diagnosis.verdict));
   for (std::size_t i = 0; i < diagnosis.causes.size(); ++i) {
     const Cause& cause = diagnosis.causes[i];
     status.add("likely_cause_" + std::to_string(i + 1), cause.text + " " + cause.remedy);
   }
-  if (diagnosis.causes.empty()) return "";
-  return ". Likely cause: " + diagnosis.causes.front().text + " " + diagnosis.causes.front().remedy;
+  return diagnosis;
 }
 
-void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) const {
+void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const bool initialized = session != nullptr && session->odometry().initialized();
   status.add("initialized", initialized ? "true" : "false");
@@ -255,8 +265,16 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) c
     status.add("reconfigurations", reconfigurations_);
     status.add("last_reconfiguration", refused_because_.empty() ? "done" : "refused: " + refused_because_);
   }
+  const Diagnosis diagnosis = session != nullptr ? addDiagnosis(status, *session) : Diagnosis();
   std::string likely_cause;
-  if (session != nullptr) likely_cause = addDiagnosis(status, *session);
+  if (!diagnosis.causes.empty())
+    likely_cause =
+        ". Likely cause: " + diagnosis.causes.front().text + " " + diagnosis.causes.front().remedy;
+  calls_not_good_ = initialized && diagnosis.verdict != RunVerdict::kGood ? calls_not_good_ + 1 : 0;
+  if (clock_stands_) {
+    status.summary(DiagnosticStatus::WARN, kClockStands);
+    return;
+  }
   if (initialized && !imu_fault_.empty()) {
     status.summary(DiagnosticStatus::ERROR, imu_fault_ + ": no odometry is published");
     return;
@@ -294,6 +312,9 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) c
                    "no scan is used: the IMU alone carries the estimate" + likely_cause);
   } else if (!last_update_) {
     status.summary(DiagnosticStatus::WARN, "initialised, no scan used yet");
+  } else if (calls_not_good_ > kVerdictHolds) {
+    status.summary(DiagnosticStatus::WARN,
+                   "running, but the run is " + toString(diagnosis.verdict) + likely_cause);
   } else {
     status.summary(DiagnosticStatus::OK, "running");
   }
@@ -355,7 +376,8 @@ std::optional<std::string> LiveMonitor::judgeUse(Radar& radar, bool initialized)
 void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const bool none_came = imu_.isSilent(), none_is_usable = usable_imu_.isSilent();
-  imu_fault_ = none_came        ? "the IMU is silent"
+  imu_fault_ = clock_stands_    ? ""
+               : none_came      ? "the IMU is silent"
                : none_is_usable ? "no IMU message can be used (" + why_unusable_ + ")"
                                 : "";
   status.add("imu_messages", imu_.count);
@@ -385,6 +407,8 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   if (imu_.count == 0) {
     status.summary(DiagnosticStatus::ERROR, "no IMU message yet on " + config_.imu_topic +
                                                 wrongType(config_.imu_topic, "sensor_msgs/Imu"));
+  } else if (clock_stands_) {
+    status.summary(DiagnosticStatus::WARN, kClockStands);
   } else if (!imu_fault_.empty()) {
     status.summary(DiagnosticStatus::ERROR, imu_fault_ + ", topic " + config_.imu_topic);
   } else if (!findings.empty()) {

@@ -161,7 +161,7 @@ void LivePublisher::extendPath(const BodyOdometry& body) {
     const std::size_t most = path_max_poses_;
     if (poses.size() > most) poses.erase(poses.begin(), poses.end() - static_cast<std::ptrdiff_t>(most));
   }
-  if (path_.getNumSubscribers() > 0) publish(path_, path());
+  if (path_.getNumSubscribers() > 0 && path_rate_.isDue(body.time)) publish(path_, path());
 }
 
 nav_msgs::Path LivePublisher::path() {

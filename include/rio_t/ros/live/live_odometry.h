@@ -33,6 +33,7 @@
 #include "rio_t/ros/live/monitor.h"
 #include "rio_t/ros/live/publisher.h"
 #include "rio_t/ros/live/session.h"
+#include "rio_t/ros/live/tf_watch.h"
 
 namespace rio_t {
 
@@ -112,8 +113,10 @@ class LiveOdometry {
   LiveMonitor monitor_;                                     // thread-safe
   LivePublisher publisher_;                                 // see there
   BodyFrame frames_;                                        // thread-safe
+  std::optional<TfWatch> tf_watch_;                         // thread-safe; none if no tf is published
   std::optional<diagnostic_updater::Updater> diagnostics_;  // input thread, but for ticks
   std::function<void()> tick_imu_;
+  ros::Time last_clock_;  // of ROS, when `input` was told last; input thread
   std::function<void()> tick_odom_;  // none before the first ~odom; input thread
   std::atomic<std::uint64_t> odom_published_{0};
 

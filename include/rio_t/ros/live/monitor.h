@@ -55,12 +55,14 @@ class LiveMonitor {
   void setTopicTypes(const std::map<std::string, std::string>& types);
   /// How many nodes publish on each topic of the IMU and the radars.
   void setPublishers(const std::map<std::string, std::uint32_t>& counts);
+  /// ROS time comes from /clock, and has stood still since the last call.
+  void setClockStands(bool stands);
   void tune(const ImuNoise& configured);  ///< the noise of the IMU as it is configured now
   /// A change of parameters was refused, for that reason; or was made, if it is empty.
   void reconfigured(const std::string& refused_because);
 
   // The tasks. `session` is the running one, null before there is one.
-  void describeOdometry(Status& status, const LiveSession* session) const;
+  void describeOdometry(Status& status, const LiveSession* session);
   void describeInput(Status& status, const LiveSession* session);
   void describeSolver(Status& status) const;
   /// For a node with use_sim_time and no /clock for so many seconds, after describeInput: nothing can come.
@@ -122,9 +124,8 @@ class LiveMonitor {
   std::optional<Finding> describeRadar(Status& status, Radar& radar, bool initialized) const;
   /// How few of its last scans were used, and why, if it is less than half.
   static std::optional<std::string> judgeUse(Radar& radar, bool initialized);
-  /// Adds whether the run is good so far and, if not, why. Returns the likeliest cause for the end of a
-  /// message; empty if there is none.
-  std::string addDiagnosis(Status& status, const LiveSession& session) const;
+  /// Adds whether the run is good so far and, if not, why.
+  Diagnosis addDiagnosis(Status& status, const LiveSession& session) const;
   /// For the end of a message about a topic on which nothing came; empty if its type is right or unknown.
   std::string wrongType(const std::string& topic, const std::string& expected) const;
   static Finding join(const std::vector<Finding>& findings, bool another_works);
@@ -139,6 +140,8 @@ class LiveMonitor {
   Counter usable_imu_;        ///< messages that move the estimate
   std::string why_unusable_;  ///< of the last other message
   std::string imu_fault_;  ///< why no odometry comes, as of the last call of describeInput; empty: it comes
+  bool clock_stands_ = false;
+  std::size_t calls_not_good_ = 0;  ///< of describeOdometry, in which the verdict was not good
   std::uint64_t imu_before_session_ = 0, not_usable_before_session_ = 0;
   Barometer barometer_;
   Latency odometry_latency_, scan_latency_;

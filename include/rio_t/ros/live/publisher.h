@@ -67,6 +67,7 @@ class LivePublisher {
   ros::Publisher odom_, odom_optimized_, path_, imu_bias_;
   std::optional<ros::Publisher> map_;  ///< none without landmarks
   PublishRate odom_rate_, tf_rate_;
+  PublishRate path_rate_{1.0};  ///< [Hz] for people: a path of 2000 poses has 160 kB
   std::atomic<bool> correct_stamps_;
   std::atomic<std::size_t> path_max_poses_;
   // None where they are not wanted. One for each thread: they share nothing.
