@@ -94,6 +94,7 @@ def test_config_is_a_name_or_a_path_from_where_the_user_stands(tmp_path):
     with pytest.raises(RioTError, match="config:=isr: .*, irs, "):
         path_of("isr", tmp_path)
     assert parameters("rio_t", "irs.launch", "config:=sub/own.yaml", folder=tmp_path) == {"/rio_t/config": str(own)}
+    (tmp_path / "b").touch()
     assert parameters("rio_t", "bag.launch", "bag:=b", "output_dir:=o", "config:=sub/own.yaml",
                       folder=tmp_path) == {"/rio_t_bag/config": str(own)}
 
@@ -112,7 +113,23 @@ def test_an_argument_without_a_default_says_that_it_is_optional(name):
         assert (attributes.get("default") == "") == attributes["doc"].startswith("Optional. "), attributes
 
 
+@pytest.mark.parametrize("word", ("bag_rate:=0", "bag_rate:=fast", "clock_hz:=-1", "bag_start:=-1", "bag_start:=nan"))
+def test_a_number_that_the_player_would_refuse_is_refused(word):
+    with pytest.raises(RioTError, match=f"{word}: expected a number"):
+        launch_config.check_player(["roslaunch", "rio_t", "irs.launch", word])
+    launch_config.check_player(["roslaunch", "rio_t", "irs.launch", "bag_rate:=0.5", "bag_start:=0", "clock_hz:=1e3"])
+
+
+@pytest.mark.parametrize("name", sorted(file.name for file in (LAUNCH / "examples").glob("*.launch")))
+def test_examples_refuse_what_the_others_refuse(name, tmp_path):
+    assert "mavros.launch has no argument" in roslaunch("--nodes", "rio_t", "mavros.launch", "cnfig:=irs").stderr
+    done = roslaunch("--nodes", "rio_t", name, "config:=isr", folder=tmp_path)
+    assert "rio_t: config:=isr: there is no file" in done.stderr
+
+
 def test_a_bag_that_is_not_there_is_refused(tmp_path):
+    done = roslaunch("--nodes", "rio_t", "bag.launch", "bag:=nope.bag", "output_dir:=o", folder=tmp_path)
+    assert "rio_t: bag nope.bag: no such file" in done.stderr
     for bag, path in (("nope.bag", tmp_path / "nope.bag"), (tmp_path, tmp_path)):
         done = roslaunch("--nodes", "rio_t", "irs.launch", f"bag:={bag}", folder=tmp_path)
         assert f"rio_t: bag {path}: no such file" in done.stderr
@@ -130,6 +147,12 @@ def test_namespace_and_topics_reach_the_node_and_the_bag(tmp_path):
         "/bag_player", "/robot/rio_t_manager", "/robot/rio_t", "/robot/rviz"]
     play = roslaunch("--args", "bag_player", *words, folder=tmp_path).stdout
     assert "--prefix=robot" in play and "--hz=200" in play and "--loop" in play and str(tmp_path / "run.bag") in play
+
+
+def test_topics_of_the_bag_can_be_chosen(tmp_path):
+    (tmp_path / "run.bag").touch()
+    play = roslaunch("--args", "bag_player", "rio_t", "irs.launch", "bag:=run.bag", "bag_topics:=/a /b", folder=tmp_path).stdout
+    assert "--topics /a /b --bags" in play
 
 
 def test_a_bag_played_into_a_namespace_keeps_its_tf(tmp_path):

@@ -149,13 +149,18 @@ TEST_F(TwoRadarDiagnostics, IsAnErrorIfTheImuFallsSilentOrCannotBeUsed) {
 }
 
 TEST_F(TwoRadarDiagnostics, AClockThatStandsIsNoFaultOfTheSensors) {
+  const auto input = [this] {
+    Status status;
+    monitor.describeInput(status, &session);
+    return status;
+  };
   second(20, 20, 20);
   monitor.setClockStands(true);
-  EXPECT_EQ(second(0, 0, 0).level, DiagnosticStatus::WARN);
-  EXPECT_NE(second(0, 0, 0).message.find("ROS time stands still"), std::string::npos);
+  EXPECT_EQ(input().level, DiagnosticStatus::WARN);
+  EXPECT_NE(input().message.find("ROS time stands still"), std::string::npos);
   EXPECT_NE(odometry(session).message.find("ROS time stands still"), std::string::npos);
   monitor.setClockStands(false);
-  EXPECT_EQ(second(0, 0, 0).level, DiagnosticStatus::ERROR);  // the IMU is silent
+  EXPECT_EQ(input().message, "the IMU is silent, topic " + config.imu_topic);
 }
 
 /// The estimate runs, and the clock of a radar is far behind that of the IMU.
@@ -248,6 +253,17 @@ TEST_F(TwoRadarDiagnostics, DoubtARunWithManyImuMessagesThatCannotBeUsed) {
   EXPECT_EQ(value(status, "verdict"), "doubtful");
   EXPECT_EQ(value(status, "likely_cause_1").find("200 IMU messages cannot be used."), 0U)
       << value(status, "likely_cause_1");
+}
+
+TEST_F(TwoRadarDiagnostics, WarnOfARunThatIsDoubtfulForSeconds) {
+  update(0, 0.31, 0.0, kMountings[0]);
+  for (int k = 0; k < 1000; ++k) monitor.imuDropped(kImuNotUsable);
+  EXPECT_EQ(odometry(session).message, "running");
+  for (int k = 0; k < 5; ++k) odometry(session);
+  const Status status = odometry(session);
+  EXPECT_NE(value(status, "verdict"), "good");
+  EXPECT_EQ(status.level, DiagnosticStatus::WARN);
+  EXPECT_EQ(status.message.find("running, but the run is " + value(status, "verdict")), 0U);
 }
 
 TEST_F(TwoRadarDiagnostics, ForgetANoisyImuOnceItIsConfiguredSo) {

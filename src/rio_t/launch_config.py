@@ -3,9 +3,10 @@
 Prints the configuration that the argument `config` names, and refuses arguments that the launch file does not have:
 roslaunch itself takes every NAME:=VALUE on its command line, and a misspelt one would change nothing without a word.
 It also refuses a configuration that is not there, since the node would end and roslaunch would go on, and a bag that is
-not there, since its player would end and the node would wait for it for ever."""
+not there or a speed that is none, since the player would end and the node would wait for it for ever."""
 import argparse
 import difflib
+import math
 import os
 import pathlib
 import sys
@@ -46,6 +47,20 @@ def check_arguments(words, launch_folder):
                         f"rio_t {files[0].name} describes them.")
 
 
+def check_player(words):
+    """Raises RioTError if an argument in `words` is no number that rosbag play takes."""
+    for word in words:
+        name, assigned, value = word.partition(":=")
+        if assigned and name in ("bag_rate", "clock_hz", "bag_start"):
+            try:
+                number = float(value)
+            except ValueError:
+                number = math.nan
+            least = 0.0 if name == "bag_start" else sys.float_info.min
+            if not least <= number < math.inf:
+                raise RioTError(f"{word}: expected a number {'of at least' if name == 'bag_start' else 'above'} 0")
+
+
 def words_of(process):
     """The command line of a process; empty if it has ended or belongs to somebody else."""
     try:
@@ -61,10 +76,14 @@ def main(arguments):
     parser.add_argument("--bag", default="", help="the bag that is to be played; empty: none")
     options = parser.parse_args(arguments)
     try:
-        check_arguments(words_of(os.getppid()), options.launch_folder)
+        words = words_of(os.getppid())
+        check_arguments(words, options.launch_folder)
+        check_player(words)
+        configs = next(folder / "config" for folder in options.launch_folder.resolve().parents if (folder / "config").is_dir())
+        config = config_path(options.config, os.getcwd(), configs)
         if options.bag and not pathlib.Path(options.bag).is_file():
             raise RioTError(f"bag {options.bag}: no such file")
-        print(config_path(options.config, os.getcwd(), options.launch_folder.parent / "config"), end="")
+        print(config, end="")
     except RioTError as error:
         print(f"rio_t: {error}", file=sys.stderr)
         return 1

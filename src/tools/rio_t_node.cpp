@@ -1,11 +1,15 @@
 // The live odometry as a node of its own; parameters are private (~), see docs/parameters.md.
 #include <ros/ros.h>
 
+#include <algorithm>
 #include <exception>
 #include <iostream>
+#include <string>
+#include <vector>
 
 #include "../ros/command_line.h"
 #include "rio_t/ros/live/live_odometry.h"
+#include "rio_t/ros/parameters/parameters.h"
 
 namespace {
 
@@ -16,6 +20,17 @@ const rio_t::ProgramText kText = {"rio_t_node", "[_config:=NAME_OR_PATH] [_KEY:=
                                   "roslaunch rio_t rio_t.launch config:=irs\n",
                                   "Parameters are private; docs/parameters.md describes every key. "
                                   "docs/ros.md lists topics and services.\n"};
+
+/// ROS takes NAME:=VALUE for a topic that is renamed, and says nothing if there is none of that name.
+void refuseParametersAsRemappings(int argc, char** argv) {
+  std::vector<std::string> keys = {"config"};
+  for (const rio_t::ParameterDescription& each : rio_t::parameterDescriptions()) keys.push_back(each.key);
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (std::find(keys.begin(), keys.end(), word.substr(0, word.find(":="))) != keys.end())
+      throw rio_t::UsageError(word + ": a parameter is set with an underscore, _" + word);
+  }
+}
 
 int spin() {
   // Outside of try: the console goes with the last handle, and the message would be lost.
@@ -39,6 +54,7 @@ int main(int argc, char** argv) {
   words.erase(words.begin());  // the program itself
   rio_t::OptionSet options("Options");
   return rio_t::runProgram(kText, options, words, std::cout, std::cerr, [&] {
+    refuseParametersAsRemappings(argc, argv);
     ros::init(argc, argv, "rio_t");
     return spin();
   });

@@ -268,8 +268,7 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) {
   const Diagnosis diagnosis = session != nullptr ? addDiagnosis(status, *session) : Diagnosis();
   std::string likely_cause;
   if (!diagnosis.causes.empty())
-    likely_cause =
-        ". Likely cause: " + diagnosis.causes.front().text + " " + diagnosis.causes.front().remedy;
+    likely_cause = ". Likely cause: " + diagnosis.causes.front().text + " " + diagnosis.causes.front().remedy;
   calls_not_good_ = initialized && diagnosis.verdict != RunVerdict::kGood ? calls_not_good_ + 1 : 0;
   if (clock_stands_) {
     status.summary(DiagnosticStatus::WARN, kClockStands);

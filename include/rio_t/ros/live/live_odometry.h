@@ -116,7 +116,7 @@ class LiveOdometry {
   std::optional<TfWatch> tf_watch_;                         // thread-safe; none if no tf is published
   std::optional<diagnostic_updater::Updater> diagnostics_;  // input thread, but for ticks
   std::function<void()> tick_imu_;
-  ros::Time last_clock_;  // of ROS, when `input` was told last; input thread
+  ros::Time last_clock_;             // of ROS, when `input` was told last; input thread
   std::function<void()> tick_odom_;  // none before the first ~odom; input thread
   std::atomic<std::uint64_t> odom_published_{0};
 
