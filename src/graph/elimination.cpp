@@ -95,8 +95,7 @@ SquareRoot squareRootOf(const Tableau& tableau, Eigen::Index from, Eigen::Index 
 /// Eliminates the blocks of a system, first to last.
 class BlockElimination {
  public:
-  BlockElimination(const LinearSystem& system, double damping)
-      : system_(system), damping_(damping), waiting_(system.tangents.size()) {
+  explicit BlockElimination(const LinearSystem& system) : system_(system), waiting_(system.tangents.size()) {
     squares_.reserve(system.tangents.size());
     for (std::size_t i = 0; i < system.tangents.size(); ++i)
       squares_.emplace_back(Eigen::VectorXd::Zero(system.tangent(static_cast<int>(i))));
@@ -118,7 +117,7 @@ class BlockElimination {
     const Eigen::VectorXd& squares = squares_[static_cast<std::size_t>(i)];
     const Eigen::Index own = squares.size();
     columns_.assign(1, i);
-    Eigen::Index rows = damping_ > 0.0 ? own : 0;
+    Eigen::Index rows = 0;
     for (const LinearRows* each : stacked) {
       columns_.insert(columns_.end(), each->blocks.begin(), each->blocks.end());
       rows += each->Jr.rows();
@@ -136,8 +135,6 @@ class BlockElimination {
     tableau_.reset(rows, last + 1);
     Eigen::Index row = 0;
     for (const LinearRows* each : stacked) row = stack(*each, row, last);
-    if (damping_ > 0.0)
-      for (Eigen::Index k = 0; k < own; ++k) tableau_.row(row + k)[k] = std::sqrt(damping_ * squares[k]);
     tableau_.triangularise(0, own);
     for (Eigen::Index k = 0; k < own; ++k)
       if (!(std::abs(tableau_.row(k)[k]) > kNothing * std::sqrt(squares[k]))) return std::nullopt;
@@ -215,7 +212,6 @@ class BlockElimination {
   }
 
   const LinearSystem& system_;
-  double damping_;
   std::vector<Eigen::VectorXd> squares_;                 ///< of the columns of each block
   std::vector<std::vector<const LinearRows*>> waiting_;  ///< by their first block
   std::deque<LinearRows> rest_;
@@ -260,13 +256,13 @@ void eachBlock(const LinearRows& rows, const std::vector<Eigen::Index>& tangents
 
 }  // namespace
 
-std::optional<Elimination> Elimination::of(const LinearSystem& system, double damping) {
+std::optional<Elimination> Elimination::of(const LinearSystem& system) {
   Elimination result;
   const std::size_t count = system.tangents.size();
   result.tangents_ = system.tangents;
   result.R_.reserve(count);
   result.delta_.reserve(count);
-  BlockElimination elimination(system, damping);
+  BlockElimination elimination(system);
   for (std::size_t i = 0; i < count; ++i) {
     const auto block = static_cast<int>(i);
     if (system.is_held[i]) {
@@ -352,7 +348,7 @@ std::vector<std::map<int, Eigen::MatrixXd>> Elimination::covariances() const {
 SquareRoot compressed(const SquareRoot& rows) { return widened(rows, Eigen::VectorXd::Zero(rows.J.cols())); }
 
 SquareRoot eliminateFirst(const LinearSystem& system, int count) {
-  BlockElimination elimination(system, 0.0);
+  BlockElimination elimination(system);
   for (int i = 0; i < count; ++i)
     if (!system.is_held[static_cast<std::size_t>(i)] && !elimination.eliminate(i))
       throw std::runtime_error("graph: a block that leaves is not determined");

@@ -87,7 +87,6 @@ ceres::Solver::Options solverOptions() {
 /// The smallest share of a step that is tried if the whole step raises the cost. A lost tilt makes steps of a
 /// radian: the graph is not linear over them, but their direction is right. Damping makes them too short.
 constexpr double kShortestShare = 0.06;
-constexpr double kFirstDamping = 1e-4;
 /// A step shorter than a tenth of a sigma is taken without comparing costs: rounding exceeds its gain.
 constexpr double kSurelyRight = 1e-2;
 /// Squared length [sigma^2] of the longest step after which the solver may stop.
@@ -137,57 +136,39 @@ double squaredLengthLeft(double unforeseen, double squared_length) {
 Solution solveByChain(Window& window, const SolverLimits& limits) {
   Solution solution;
   LinearSystem& system = solution.system;
-  system = linearize(window);
-  double damping = 0.0;
-  bool tested = false;  // the undamped step from here is long
   double surely_right = kSurelyRight;
-  std::optional<Elimination> elimination;
-  std::vector<int> held;
-  const auto lower = [&] {
-    return elimination ? lowerCost(elimination->delta(), system.cost, window) : std::nullopt;
-  };
   for (solution.iterations = 1;; ++solution.iterations) {
-    held = pushedOutwards(window, system);
-    elimination =
-        held.empty() ? Elimination::of(system, damping) : Elimination::of(holding(held, system), damping);
-    const double squared_length =
-        elimination ? elimination->squaredLength() : std::numeric_limits<double>::infinity();
+    system = linearize(window);
+    const std::vector<int> held = pushedOutwards(window, system);
+    solution.elimination = held.empty() ? eliminationOf(system) : eliminationOf(holding(held, system));
+    const double squared_length = solution.elimination.squaredLength();
     const bool is_short = squared_length < limits.short_step;
-    if (damping == 0.0 && (is_short || squared_length < surely_right)) {
+    const bool is_last = solution.iterations >= limits.max_iterations;
+    bool has_ended = is_last;
+    if (is_short || squared_length < surely_right) {
       surely_right = squared_length;  // steps that do not get shorter may go back and forth
-      const bool stopped_at_bound = take(elimination->delta(), 1.0, window);
+      const bool stopped_at_bound = take(solution.elimination.delta(), 1.0, window);
       if (is_short && !stopped_at_bound) {
         solution.termination = held.empty() ? SolverTermination::kConverged : SolverTermination::kAtBound;
-        break;
+        has_ended = true;
       }
-      if (solution.iterations >= limits.max_iterations) break;
-      system = linearize(window);
-      continue;
-    }
-    if (solution.iterations >= limits.max_iterations) break;
-    if (damping == 0.0) tested = true;
-    if (is_short && damping > 0.0 && !tested) {
-      damping = 0.0;  // short by the damping, or because little is left to go
-    } else if (const std::optional<TakenStep> taken = lower()) {
-      const double unforeseen = taken->cost - (system.cost - 0.5 * squared_length);
-      if (damping == 0.0 && held.empty() && taken->is_whole &&
-          squaredLengthLeft(unforeseen, squared_length) < limits.short_step) {
-        solution.termination = SolverTermination::kConverged;
-        break;
+    } else if (!is_last) {
+      const std::optional<TakenStep> taken = lowerCost(solution.elimination.delta(), system.cost, window);
+      if (!taken) {
+        solution.termination = SolverTermination::kNoDecrease;
+        has_ended = true;
+      } else if (held.empty() && taken->is_whole) {
+        const double unforeseen = taken->cost - (system.cost - 0.5 * squared_length);
+        if (squaredLengthLeft(unforeseen, squared_length) < limits.short_step) {
+          solution.termination = SolverTermination::kConverged;
+          has_ended = true;
+        }
       }
-      system = linearize(window);
-      tested = false;
-      damping = damping > kFirstDamping ? 0.1 * damping : 0.0;
-    } else if (is_short && damping > 0.0) {
-      solution.termination = SolverTermination::kNoDecrease;
-      break;
-    } else {
-      damping = std::max(kFirstDamping, 10.0 * damping);
     }
+    if (!has_ended) continue;
+    if (!held.empty()) solution.elimination = eliminationOf(system);  // the covariance is without the bound
+    return solution;
   }
-  const bool is_of_system = elimination && damping == 0.0 && held.empty();
-  solution.elimination = is_of_system ? std::move(*elimination) : eliminationOf(system);
-  return solution;
 }
 
 Solution solveByCeres(Window& window, const SolverLimits& limits) {

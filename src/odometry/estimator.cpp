@@ -161,12 +161,9 @@ void Estimator::judge(const RadarAnswer& answer, const RadarScan& scan) {
   if (answer.at_rest) mounting_check_.velocityKnown();
   if (!answer.used) return;
   if (!health_.isContradicted()) mounting_check_.add(scan.radar, *answer.used);
-  // The state's variance grows about as the root of the accelerometer's, unless that is measured.
-  const ImuMeasurement sample = imu_.at(scan.stamp);
-  const ImuNoise noise = imuNoise();
-  const bool accel_is_configured = noise.accel_density * noise.accel_density > sample.accel_mean_noise;
-  Eigen::Matrix3d scaled = answer.ego_velocity.added_variance.asDiagonal();
-  if (accel_is_configured) scaled += 0.5 * answer.used->predicted;
+  // The state's variance grows about as the root of the accelerometer's.
+  Eigen::Matrix3d scaled = 0.5 * answer.used->predicted;
+  scaled.diagonal() += answer.ego_velocity.added_variance;
   const double share = answer.used->S.ldlt().solve(scaled).trace() / 3.0;
   model_error_scale_.add(scan.stamp, answer.used->squaredSigmas(), share);
 }

@@ -12,9 +12,8 @@ namespace rio_t {
 /// The factor R of J = Q R, block by block in their order.
 class Elimination {
  public:
-  /// None if the rows do not determine every block. `damping` (Levenberg-Marquardt) raises the squares of the
-  /// columns by this share.
-  static std::optional<Elimination> of(const LinearSystem& system, double damping = 0.0);
+  /// None if the rows do not determine every block.
+  static std::optional<Elimination> of(const LinearSystem& system);
 
   const std::vector<Eigen::VectorXd>& delta() const { return delta_; }
   /// |R delta|^2: the squared length of the step in sigmas.

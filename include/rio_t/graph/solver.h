@@ -31,12 +31,11 @@ struct Solution {
 /// std::runtime_error if the terms do not determine the blocks.
 ///
 /// kChain: Gauss-Newton from the current values. If a step does not lower the cost, the solver tries a half
-/// of it and less, and then Levenberg-Marquardt damping. It has converged when the undamped step is short; it
-/// still takes that step. It has also converged when the cost after a whole undamped step is near enough to
-/// what the linear system promised (docs/method.md, eq. 23c). A damped step may be short because of the
-/// damping alone, so it proves nothing.
+/// of it and less. It has converged when the step is short; it still takes that step. It has also converged
+/// when the cost after a whole step is near enough to what the linear system promised (docs/method.md,
+/// eq. 23c).
 /// kCeres: ceres::Solve on the problem that lives as long as the window. Ceres also reports convergence when
-/// its trust region made a step short. So the undamped step at its solution decides why it ended.
+/// its trust region made a step short. So the step of Gauss-Newton at its solution decides why it ended.
 Solution solve(Window& window, const SolverLimits& limits, WindowSolver solver = WindowSolver::kChain);
 
 /// The same without moving any block: no iterations.

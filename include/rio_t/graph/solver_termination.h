@@ -6,10 +6,10 @@ namespace rio_t {
 
 /// Why the solver of a window stopped.
 enum class SolverTermination {
-  kConverged,       ///< the undamped Gauss-Newton step is short (docs/method.md, eq. 23a)
+  kConverged,       ///< the Gauss-Newton step is short (docs/method.md, eq. 23a)
   kAtBound,         ///< the same, with a t_O held at its bound max_time_offset
   kIterationLimit,  ///< the solver reached `max_iterations` first
-  kNoDecrease,      ///< the step is long, and no shorter or damped step lowers the cost
+  kNoDecrease,      ///< the step is long, and no shorter step lowers the cost
 };
 
 /// The solver found the minimum, or the minimum within the bound.
