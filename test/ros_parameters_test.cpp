@@ -15,7 +15,7 @@ namespace {
 
 XmlRpc::XmlRpcValue serverMap() {
   XmlRpc::XmlRpcValue map;
-  map["publish_tf"] = false;
+  map["publish_tf"] = XmlRpc::XmlRpcValue(false);
   map["max_iterations"] = 9;
   map["window"] = 2;  // the server holds a whole number where the YAML had none after the point
   map["gravity"] = 9.805;
@@ -112,7 +112,7 @@ TEST(RosParameters, WhatANodeShowsIsTheConfigurationItRan) {
 TEST(RosParameters, WhatAnEarlierRunShowedIsNotRead) {
   XmlRpc::XmlRpcValue map = serverMap();
   map["effective"]["gravity"] = 9.7;
-  map["effective"]["left_over"] = true;
+  map["effective"]["left_over"] = XmlRpc::XmlRpcValue(true);
   EXPECT_EQ(makeConfig(toParameterEntries(map, "/rio_t")).odometry.gravity, 9.805);
 }
 

@@ -224,7 +224,7 @@ TEST(SeveralRadars, AValueThatEachSectionHidesIsRefused) {
   std::istringstream file("radars: [left]\nradar_topic: /c\nleft: {radar_topic: /a}\n");
   ParameterEntries entries = readParameters(file, "FILE");
   EXPECT_NO_THROW(makeConfig(entries));
-  entries.push_back({"radar_topic", {"/d"}, kParameterServer + "/rio_t/radar_topic"});
+  entries.push_back({"radar_topic", {std::string("/d")}, kParameterServer + "/rio_t/radar_topic"});
   EXPECT_THROW(makeConfig(entries), ConfigError);
   for (ParameterEntry& entry : entries) entry.origin = kParameterServer + "/rio_t/" + entry.key;
   std::get<ParameterValue::Map>(entries[2].value.data).front().origin = kParameterServer + "/rio_t/left/x";
