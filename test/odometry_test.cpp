@@ -286,6 +286,31 @@ TEST(ImuPropagator, KeepsWhatAnAnchorNeedsOfTheSamplesBefore) {
   EXPECT_GT(few.state()->p_W.x(), 6.0);
 }
 
+// The noise of the shaking frame is no motion; a velocity beyond four sigma of it is.
+TEST(ImuPropagator, StandsStillAtRestOnAFrameThatShakesUntilItMoves) {
+  ImuPropagator propagator(ImuNoise(), {0.0, 0.0, -9.81});
+  NavigationState rest;
+  rest.time = Time::fromSeconds(100.0);
+  rest.p_W = {1.0, 2.0, 3.0};
+  propagator.anchor(rest, true);
+  ImuMeasurement imu;
+  imu.accel_noise = imu.accel_mean_noise = 0.1 * 0.1;  // [m^2/s^3]
+  int samples = 0;
+  const auto feed = [&](double acceleration) {
+    for (int k = 0; k <= 40; ++k, ++samples) {
+      imu.time = rest.time + 0.005 * samples;
+      imu.acceleration = {acceleration, 0.0, 9.81};
+      propagator.add(imu);
+    }
+  };
+  feed(0.3);  // 0.06 m/s, with a sigma of 0.1 sqrt(0.2) = 0.045
+  EXPECT_EQ(propagator.state()->v_W.x(), 0.0);
+  EXPECT_EQ(propagator.state()->p_W, rest.p_W);
+  feed(2.0);
+  EXPECT_GT(propagator.state()->v_W.x(), 0.4);
+  EXPECT_GT(propagator.state()->p_W.x(), 1.0);
+}
+
 TEST(ClockThatStepsBack, LeavesThePositionUncertainByTheWayMeanwhile) {
   constexpr double kSpeed = 2.0, kStep = 0.05;
   Navigation navigation(OdometryOptions(), {0.0, 0.0, -9.81});
