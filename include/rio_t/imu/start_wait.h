@@ -12,10 +12,10 @@ enum class StartObstacle {
   kContradiction,  ///< radar and IMU contradict each other
 };
 
-/// What the start is waiting for.
+/// An initialiser returns this while it has not started the estimate.
 struct StartWait {
   StartObstacle obstacle = StartObstacle::kTooFewData;
-  std::string text;  ///< tells people
+  std::string text;  ///< tells people what the initialiser waits for
 };
 
 }  // namespace rio_t
