@@ -218,7 +218,6 @@ TEST(Diagnosis, RejectedScansNameReasonAndKey) {
       {"too_few_inliers", "radar_field_doppler"},
       {"ill_conditioned", "radar_max_azimuth"},
       {"sigma_too_large", "ego_velocity_max_sigma"},
-      {"ambiguous", "moves"},
       {"innovation", "extrinsics_rotation_xyzw"},
   };
   for (const auto& [reason, key] : reasons) {
@@ -615,7 +614,7 @@ TEST(Diagnosis, ManyReasonsForRejectionAreDoubtfulTogether) {
   RunEvidence evidence = goodRun();
   evidence.radars.front().scans_used = 80;
   evidence.radars.front().scans_rejected = {
-      {"innovation", 28}, {"too_few_points", 28}, {"too_few_inliers", 28}, {"ambiguous", 26}};
+      {"innovation", 28}, {"too_few_points", 28}, {"too_few_inliers", 28}, {"sigma_too_large", 26}};
   const Diagnosis diagnosis = diagnose(evidence, Config{});
   EXPECT_EQ(diagnosis.verdict, RunVerdict::kDoubtful);
   EXPECT_TRUE(diagnosis.causes.empty());

@@ -52,61 +52,6 @@ TEST(EgoVelocityPrior, AWrongOneIsOverruled) {
   }
 }
 
-// What the IMU leaves vague, where it is blind, must not find a few points that side with it.
-TEST(EgoVelocityPrior, AVagueOneIsOneWitnessMore) {
-  const EgoVelocityEstimator estimator{knownStep()};
-  Random random(33);
-  const Eigen::Vector3d object_v_R(0.8, 0.9, 0.0);
-  VelocityPrior prior;
-  prior.covariance = 0.25 * 0.25 * Eigen::Matrix3d::Identity();
-  int unaided_wrong = 0;
-  for (int trial = 0; trial < 50; ++trial) {
-    // Four fifths are static; the prior sides with the object.
-    RadarScan scan = staticScene(kVelocity, 40, {0.01, 0.02, 0.01, 0.125}, random);
-    const RadarScan object = sceneWithObject(kVelocity, object_v_R, random);
-    scan.points.insert(scan.points.end(), object.points.end() - 10, object.points.end());
-    prior.v_R = kVelocity - object_v_R;
-    const EgoVelocity overruled = estimator.estimate(scan, prior);
-    ASSERT_TRUE(isValid(overruled.status)) << trial;
-    EXPECT_LT((overruled.v_R - kVelocity).norm(), 0.3) << trial;
-
-    // About as many of each: it decides.
-    const RadarScan even = sceneWithObject(kVelocity, object_v_R, random);
-    if ((estimator.estimate(even).v_R - kVelocity).norm() > 0.3) ++unaided_wrong;
-    VelocityPrior nearer = prior;
-    nearer.v_R = kVelocity + Eigen::Vector3d(0.1, -0.1, 0.05);
-    nearer.covariance = 0.12 * 0.12 * Eigen::Matrix3d::Identity();
-    const EgoVelocity aided = estimator.estimate(even, nearer);
-    EXPECT_LT((aided.v_R - kVelocity).norm(), 0.3) << trial;
-  }
-  EXPECT_GT(unaided_wrong, 25);
-}
-
-TEST(EgoVelocityPrior, WhereItCannotDecideTheScanIsAmbiguous) {
-  const EgoVelocityEstimator estimator{knownStep()};
-  Random random(34);
-  const Eigen::Vector3d object_v_R(0.8, 0.9, 0.0);
-  VelocityPrior prior;
-  prior.v_R = kVelocity;
-  int ambiguous = 0;
-  for (int trial = 0; trial < 50; ++trial) {
-    // Most are of the object, but not all.
-    RadarScan scan = staticScene(kVelocity, 19, {0.01, 0.02, 0.01, 0.125}, random);
-    const RadarScan object = sceneWithObject(kVelocity, object_v_R, random);
-    scan.points.insert(scan.points.end(), object.points.end() - 25, object.points.end());
-    prior.covariance = 0.4 * 0.4 * Eigen::Matrix3d::Identity();
-    const EgoVelocity undecided = estimator.estimate(scan, prior);
-    if (undecided.status == EgoVelocityStatus::kAmbiguous) {
-      ++ambiguous;
-    } else {
-      EXPECT_LT((undecided.v_R - kVelocity).norm(), 0.3) << "the draws found the world " << trial;
-    }
-    prior.covariance = 0.05 * 0.05 * Eigen::Matrix3d::Identity();
-    EXPECT_LT((estimator.estimate(scan, prior).v_R - kVelocity).norm(), 0.3) << trial;
-  }
-  EXPECT_GT(ambiguous, 40);
-}
-
 TEST(EgoVelocityPrior, AGoodOneAddsNoInformation) {
   const EgoVelocityEstimator estimator{knownStep()};
   Random random(32);

@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <limits>
 #include <random>
-#include <utility>
 
 #include "direction_noise.h"
 #include "velocity_solver.h"
@@ -15,12 +14,6 @@
 namespace rio_t {
 namespace {
 
-/// A prior with a sigma below this outweighs a majority of the points [m/s]. A moving object and the world
-/// differ by more.
-constexpr double kMaxSharpSigma = 0.1;
-/// Log-likelihood ratio of a point that the velocity explains to one that it does not: a Gaussian of 0.05 m/s
-/// against a uniform density over some m/s.
-constexpr double kEvidenceOfAPoint = 4.0;
 constexpr int kSides[] = {0, -1, 1};  // [spans] that a Doppler may have come back from
 
 /// Draws of indices without std::uniform_int_distribution, whose results differ between standard libraries.
@@ -46,11 +39,11 @@ bool solveThree(const RadarDirection& a, const RadarDirection& b, const RadarDir
   return true;
 }
 
-/// Squared sigmas between a velocity and the prior.
-double squaredDistance(const VelocitySolution& solution, const VelocityPrior& prior) {
+/// Whether a velocity is near enough to the prior.
+bool agrees(const VelocitySolution& solution, const VelocityPrior& prior, double gate) {
   const Eigen::Matrix3d covariance = prior.covariance + solution.covariance;
   const Eigen::Vector3d d = solution.v_R - prior.v_R;
-  return d.dot(covariance.inverse() * d);
+  return solution.solved && d.dot(covariance.inverse() * d) <= gate * gate;
 }
 
 }  // namespace
@@ -120,31 +113,22 @@ std::vector<RadarDirection> selectInliers(const std::vector<RadarDirection>& poi
   return inliers;
 }
 
-bool selectInliersWithPrior(const std::vector<RadarDirection>& points, const VelocityPrior& prior,
-                            const PointVariances& noise, const EgoVelocityOptions& o,
-                            std::vector<RadarDirection>& inliers) {
-  const double gate = o.prior_gate * o.prior_gate;
-  const auto n = static_cast<double>(points.size());
-  const bool is_sharp = largestSigma(prior.covariance) < kMaxSharpSigma;
-  const VelocitySolution unaided = solveLeastSquares(inliers, o);
-  const double d2_unaided =
-      unaided.solved ? squaredDistance(unaided, prior) : std::numeric_limits<double>::max();
-  if (is_sharp && d2_unaided <= gate) return true;
-  std::vector<RadarDirection> supporters = selectInliers(points, prior.v_R, noise, o);
-  VelocitySolution aided = solveLeastSquares(supporters, o);
-  if (!aided.solved) return true;
-  supporters = selectInliers(points, aided.v_R, noise, o);
-  aided = solveLeastSquares(supporters, o);
-  if (!aided.solved || static_cast<double>(supporters.size()) < o.prior_min_inlier_fraction * n) return true;
-  const double d2_aided = squaredDistance(aided, prior);
-  const double fewer = static_cast<double>(inliers.size()) - static_cast<double>(supporters.size());
-  if (is_sharp ? d2_aided <= gate : kEvidenceOfAPoint * fewer < 0.5 * (d2_unaided - d2_aided)) {
-    inliers = std::move(supporters);
-    return true;
+std::vector<RadarDirection> selectInliersWithPrior(const std::vector<RadarDirection>& points,
+                                                   std::vector<RadarDirection> inliers,
+                                                   const VelocityPrior& prior, const PointVariances& noise,
+                                                   const EgoVelocityOptions& o) {
+  if (agrees(solveLeastSquares(inliers, o), prior, o.prior_gate)) return inliers;
+  VelocitySolution near_prior;
+  near_prior.v_R = prior.v_R;
+  std::vector<RadarDirection> supporters;
+  for (int round = 0; round < 2; ++round) {
+    supporters = selectInliers(points, near_prior.v_R, noise, o);
+    near_prior = solveLeastSquares(supporters, o);
+    if (!near_prior.solved) return inliers;
   }
-  if (is_sharp || d2_unaided > gate || d2_aided > gate) return true;
-  const bool is_unanimous = static_cast<double>(inliers.size()) > kUnanimous * n;
-  return is_unanimous || squaredDistance(unaided, {aided.v_R, aided.covariance}) <= gate;
+  const double least = o.prior_min_inlier_fraction * static_cast<double>(points.size());
+  const bool are_enough = static_cast<double>(supporters.size()) >= least;
+  return are_enough && agrees(near_prior, prior, o.prior_gate) ? supporters : inliers;
 }
 
 }  // namespace rio_t

@@ -27,13 +27,11 @@ std::vector<RadarDirection> selectInliers(const std::vector<RadarDirection>& poi
                                           const Eigen::Vector3d& v_R, const PointVariances& noise,
                                           const EgoVelocityOptions& options);
 
-/// Replaces `inliers` by the points that support a velocity near the prior, if that is the better choice. A
-/// sharp prior that contradicts the velocity of `inliers` outweighs even a majority of the points. A vague
-/// prior is weighed against their number: if it is wrong, it must not find a minority that sides with it.
-/// False if the scan is ambiguous: a vague prior contradicts neither of two velocities, and the number of
-/// points does not decide.
-bool selectInliersWithPrior(const std::vector<RadarDirection>& points, const VelocityPrior& prior,
-                            const PointVariances& noise, const EgoVelocityOptions& options,
-                            std::vector<RadarDirection>& inliers);
+/// `inliers`, unless their velocity contradicts the prior and enough other points have one that does not:
+/// then those.
+std::vector<RadarDirection> selectInliersWithPrior(const std::vector<RadarDirection>& points,
+                                                   std::vector<RadarDirection> inliers,
+                                                   const VelocityPrior& prior, const PointVariances& noise,
+                                                   const EgoVelocityOptions& options);
 
 }  // namespace rio_t

@@ -153,8 +153,7 @@ EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
   if (!consensus) return refused(EgoVelocityStatus::kIllConditioned);
   if (!tells_side) unwrap(points, *consensus, span);
   std::vector<RadarDirection> inliers = selectInliers(points, *consensus, noise(), o);
-  if (prior && !selectInliersWithPrior(points, *prior, noise(), o, inliers))
-    return refused(EgoVelocityStatus::kAmbiguous);
+  if (prior) inliers = selectInliersWithPrior(points, std::move(inliers), *prior, noise(), o);
   // At rest in front of an object that moves, too few points read zero, but most inliers do.
   if (mostReadZero(inliers, o)) return concludedAtRest(result, selectZeros(inliers, o), noise(), o);
 
@@ -254,7 +253,7 @@ bool isValid(EgoVelocityStatus status) {
 
 std::string toString(EgoVelocityStatus status) {
   constexpr const char* kNames[] = {"moving",          "zero_velocity",   "too_few_points", "too_few_inliers",
-                                    "ill_conditioned", "sigma_too_large", "ambiguous",      "not_estimated"};
+                                    "ill_conditioned", "sigma_too_large", "not_estimated"};
   static_assert(std::size(kNames) == static_cast<std::size_t>(EgoVelocityStatus::kNotEstimated) + 1);
   return kNames[static_cast<std::size_t>(status)];
 }

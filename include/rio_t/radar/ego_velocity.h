@@ -74,7 +74,6 @@ enum class EgoVelocityStatus {
   kTooFewInliers,   ///< no velocity that enough points agree on
   kIllConditioned,  ///< the directions do not span 3D
   kSigmaTooLarge,   ///< in motion, uncertainty above max_sigma
-  kAmbiguous,       ///< two velocities, and a prior too vague to decide between them
   kNotEstimated,    ///< nobody asked
 };
 bool isValid(EgoVelocityStatus status);          ///< kMoving or kZeroVelocity
@@ -109,8 +108,7 @@ class EgoVelocityEstimator {
 
   /// A prior helps to tell the static world from a moving object that fills half of the view; one scan alone
   /// cannot. If the RANSAC velocity contradicts the prior, and `prior_min_inlier_fraction` of the points
-  /// agree with a velocity that does not, those points are the inliers. A vague prior (above 0.1 m/s) only
-  /// counts like some points more. The velocity and its covariance come from the points alone, so fusing the
+  /// agree with a velocity that does not, those points are the inliers. The velocity and its covariance come from the points alone, so fusing the
   /// result with the prior counts nothing twice.
   EgoVelocity estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior = std::nullopt) const;
 

@@ -145,8 +145,6 @@ class RadarCauses {
           "Raise " + key_ +
               "ego_velocity_max_sigma, or let the radar report more points. Is the "
               "Doppler in m/s?");
-    scans("ambiguous", "show two velocities, and nothing tells which is that of the static world.",
-          "Something that moves fills the view: turn the radar away from it.");
   }
 
   /// The key that sets a limit of the filter, with its value; empty: no key does.
