@@ -67,16 +67,13 @@ RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) co
   z.linear_from_t_O.reset();  // the batch sets its own
   z.covariance.diagonal() +=
       (model_error_scale_ / result.model_error_scale - 1.0) * result.ego_velocity.added_variance;
-  z.covariance.diagonal().array() += result.rate_variance;
   return z;
 }
 
 void BatchOdometry::setMeasurement(const ScanResult& result, BatchScan& scan) const {
   if (result.doppler) {
     scan.doppler = result.doppler;
-    auto shared = scan.doppler->shared_variances.array();
-    shared = (shared - result.rate_variance) * (model_error_scale_ / result.model_error_scale) +
-             result.rate_variance;
+    scan.doppler->shared_variances *= model_error_scale_ / result.model_error_scale;
   } else {
     scan.velocity = measurement(result);
   }

@@ -107,7 +107,7 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
 
   Innovations d;
   if (seen.prior) d.all = innovation(scan.stamp, *seen.prior, seen.velocity, &seen);
-  if (answer.taken.offset_gain > 0.0) d.own = ownInnovation(scan, seen, answer.rate_variance);
+  if (answer.taken.offset_gain > 0.0) d.own = ownInnovation(scan, seen);
   answer.offset_stepped = d.own && step_detector_.stepped(*d.own, seen.prediction->scan.R_WR());
   if (answer.offset_stepped) {
     in_window_.stepOffset(smoother, scan.stamp);
@@ -130,11 +130,7 @@ void RadarChannel::informOffset(Seen& seen, RadarAnswer& answer) {
   answer.taken.offset_gain = offsetGain(seen);
   if (seen.moves && offset_widths_.gain() > 0.0) answer.taken.slow_half_width = seen.dv_dt_O.half_width;
   if (answer.taken.offset_gain == 0.0) return;
-  // An offset that is wrong by c changes the velocity by (J + noise) c. J is in the factor; this is the
-  // noise.
   answer.taken.offset_half_width = seen.dv_dt_O.half_width;
-  answer.rate_variance = seen.dv_dt_O.variance * seen.prediction->t_O_variance;
-  seen.velocity.covariance.diagonal().array() += answer.rate_variance;
   const Eigen::Vector3d J = answer.taken.offset_gain * seen.dv_dt_O.mean;
   answer.offset_information = J.dot(seen.velocity.covariance.ldlt().solve(J));
 }
@@ -146,17 +142,13 @@ std::optional<DopplerMeasurement> RadarChannel::dopplerOf(const RadarScan& scan,
   return DopplerMeasurement{
       answer.taken,
       std::make_shared<DopplerLikelihood>(estimator_.likelihood(scan, world.inliers, world.v_R)),
-      seen.velocity.added_variance.array() + answer.rate_variance, options_.smoother.huber_threshold};
+      seen.velocity.added_variance, options_.smoother.huber_threshold};
 }
 
-std::optional<Innovation> RadarChannel::ownInnovation(const RadarScan& scan, const Seen& seen,
-                                                      double rate_variance) const {
+std::optional<Innovation> RadarChannel::ownInnovation(const RadarScan& scan, const Seen& seen) const {
   if (!seen.canBeJudged()) return std::nullopt;
   EgoVelocity own = seen.velocity;
-  if (seen.has_borrowed) {
-    own = around(*seen.prior, scan, seen.velocity);
-    own.covariance.diagonal().array() += rate_variance;
-  }
+  if (seen.has_borrowed) own = around(*seen.prior, scan, seen.velocity);
   if (!isValid(own.status)) return std::nullopt;
   return innovation(scan.stamp, *seen.prior, own, &seen);
 }

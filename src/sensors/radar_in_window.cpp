@@ -93,7 +93,6 @@ std::optional<RadarVelocityPrediction> RadarInWindow::predict(const FixedLagSmoo
   J_rate.middleCols<3>(StateBlock::kTheta) = R_RI * so3::hat(g_I);
   J_rate.middleCols<3>(StateBlock::kBa) = -R_RI;
   prediction.scan.shared = J_rate * P.topLeftCorner<kOffset, kOffset>() * J_rate.transpose();
-  if (options_.estimate_time_offset) prediction.t_O_variance = P(kOffset, kOffset);
   const Eigen::Matrix<double, 2, 3> horizontal = state->x.q_WI().toRotationMatrix().topRows<2>();
   const Eigen::Matrix2d tilt =
       horizontal * P.block<3, 3>(StateBlock::kTheta, StateBlock::kTheta) * horizontal.transpose();

@@ -49,8 +49,6 @@ struct ScanAnswer {
   bool offset_stepped = false;                ///< t_O stepped before this scan
   RadarScanTime taken{Time(), 0.0};           ///< with a gain of 0, the scan does not tell the offset
   double offset_information = 0.0;            ///< what the scan tells of the offset, if used [1/s^2]
-  /// Per axis, what the noise of the derivative adds to what went into the window (18e) [m^2/s^2].
-  double rate_variance = 0.0;
 };
 
 /// The innovation of a scan that went into the window.
@@ -145,14 +143,13 @@ class RadarChannel {
   double offsetGain(Seen& seen);
   /// J_O of an Innovation, of a scan that moves.
   Eigen::Vector3d changeWithOffset(const Seen& seen) const;
-  /// Sets what the scan tells of the offset, and adds the noise of the derivative to the velocity.
+  /// Sets what the scan tells of the offset.
   void informOffset(Seen& seen, RadarAnswer& answer);
   /// Makes the term of the scan's own points. None if no point is of the static world.
   std::optional<DopplerMeasurement> dopplerOf(const RadarScan& scan, const Seen& seen,
                                               const RadarAnswer& answer) const;
   /// Computes Innovations::own of a scan that tells the offset. None if it cannot be judged.
-  std::optional<Innovation> ownInnovation(const RadarScan& scan, const Seen& seen,
-                                          double rate_variance) const;
+  std::optional<Innovation> ownInnovation(const RadarScan& scan, const Seen& seen) const;
   /// Learns the lag of the offset and the noise of the points from a scan that was used.
   void learn(const RadarScan& scan, const Seen& seen, const Innovations& d, RadarAnswer& answer);
   /// What of the scan goes into the window: its own points, which are the inliers, and the velocity at which

@@ -22,7 +22,6 @@ namespace rio_t {
 struct RadarVelocityPrediction {
   VelocityPrior velocity;     ///< with all uncertainties
   OffsetScan scan;            ///< without what is measured
-  double t_O_variance = 0.0;  ///< 0 if t_O is not estimated [s^2]
   double tilt_sigma = 0.0;    ///< of roll and pitch, the larger [rad]
 };
 
