@@ -66,6 +66,26 @@ TEST(OffsetStepDetector, SeesAStepThatTheVelocityFollows) {
   EXPECT_LT(found, begin + 10.0);
 }
 
+// A large step makes outliers of the scans, and the window follows them little. What the velocity would have
+// followed hides the step, the whole J does not.
+TEST(OffsetStepDetector, SeesAStepThatTheVelocityDoesNotFollow) {
+  OffsetStepDetector detector(OffsetStepDetectorOptions(), 0.25);
+  const Eigen::Matrix3d S = 0.02 * 0.02 * Eigen::Matrix3d::Identity();
+  OffsetScan scan;
+  scan.predicted = scan.measured = 0.5 * S;
+  double found = 60.0;
+  for (int i = 0; i < 600 && found == 60.0; ++i) {
+    const double t = 0.1 * i;
+    const Eigen::Vector3d J = 2.0 * Eigen::Vector3d(std::sin(0.6 * t), std::cos(0.6 * t), 0.3);
+    const Eigen::Vector3d e(std::sin(2.1 * i * i), std::cos(1.3 * i * i), std::sin(0.7 * i * i + 1.0));
+    const Eigen::Vector3d d = (t < 30.0 ? 0.0 : 0.1) * J + 0.01 * e;
+    if (detector.stepped({Time::fromSeconds(t), d, S, S, J}, scan.R_WR())) found = t;
+    detector.follow(J, scan);
+  }
+  EXPECT_GE(found, 30.0);
+  EXPECT_LT(found, 32.0);
+}
+
 TEST(OffsetStepDetector, AChangeBeyondTheBoundsIsNoStep) { EXPECT_EQ(secondsToStep(0.8, 2.0), 60.0); }
 
 TEST(OffsetStepDetector, LeavesSmallChangesToTheRandomWalk) {
