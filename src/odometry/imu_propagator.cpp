@@ -12,8 +12,8 @@ namespace {
 /// [s] How far back the history reaches at most, if no anchor comes.
 constexpr double kHistory = 30.0;
 /// [sigma] A velocity that the IMU gained since rest and that its noise does not explain (chi-squared, 3
-/// degrees of freedom: once in 900 times).
-constexpr double kMoves = 4.0;
+/// degrees of freedom: once in 70,000 times, two hours of rest at 10 scans a second).
+constexpr double kMoves = 5.0;
 
 }  // namespace
 
