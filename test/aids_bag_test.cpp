@@ -54,6 +54,17 @@ ParameterEntries parse(const std::string& key, const std::string& value) {
   return {parseAssignment(key + "=" + value)};
 }
 
+TEST_F(AidsBag, TheMapOfLandmarksIsAccountedFor) {
+  const RunSummary summary = run("pascal", parse("landmarks", "true"));
+  ASSERT_TRUE(summary.landmarks.has_value());
+  EXPECT_GT(summary.landmarks->scans, 150u);
+  EXPECT_GT(summary.landmarks->scans_trusted, 0u);
+  EXPECT_LT(summary.landmarks->scans_trusted, summary.landmarks->scans) << "at first it has no proof";
+  EXPECT_GT(summary.landmarks->most_in_map, 10u);
+  EXPECT_NE(out("summary.yaml").find("landmarks: {scans: "), std::string::npos);
+  EXPECT_FALSE(run("pascal", {}).landmarks.has_value());
+}
+
 TEST_F(AidsBag, ABarometerIsReadAndAccountedFor) {
   const RunSummary summary = run("pascal", parse("barometer_topic", "/sensor_platform/baro"));
   ASSERT_TRUE(summary.barometer.has_value());

@@ -210,6 +210,7 @@ LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<
   addCandidates(prediction, detections, association, node, delta, extrinsics);
   dropUseless(prediction.state.x.p_W());
   promote(smoother, prediction.measured);
+  answer.is_trusted = is_trusted_;
   answer.map = points();
   return answer;
 }

@@ -17,6 +17,7 @@ struct LandmarkPoint {
 
 /// The map's answer to a scan.
 struct LandmarkAnswer {
+  bool is_trusted = false;   ///< enough landmarks were seen again: the map has terms in the window
   bool dropped_map = false;  ///< map and estimate contradicted each other
   std::vector<LandmarkPoint> map;
 };

@@ -77,6 +77,11 @@ void describeAids(const RunSummary& summary, const Row& row) {
                               : std::to_string(summary.ground_vehicle->used) + " terms, " +
                                     std::to_string(summary.ground_vehicle->left_out) + " left out");
   }
+  if (summary.landmarks) {
+    row("landmarks", "the map was trusted in " + std::to_string(summary.landmarks->scans_trusted) + " of " +
+                         std::to_string(summary.landmarks->scans) + " scans, at most " +
+                         std::to_string(summary.landmarks->most_in_map) + " landmarks");
+  }
 }
 
 /// Tells of the windows that did not converge.

@@ -119,6 +119,14 @@ void addGroundVehicle(SummaryLines& lines, const GroundVehicleCounts& vehicle) {
   lines.endMap();
 }
 
+void addLandmarks(SummaryLines& lines, const LandmarkCounts& landmarks) {
+  lines.beginMap("landmarks");
+  lines.add("scans", landmarks.scans);
+  lines.add("scans_trusted", landmarks.scans_trusted);
+  lines.add("most_in_map", landmarks.most_in_map);
+  lines.endMap();
+}
+
 }  // namespace
 
 std::string summaryText(const RunSummary& summary, const std::vector<std::string>& saved) {
@@ -166,6 +174,7 @@ std::string summaryText(const RunSummary& summary, const std::vector<std::string
   }
   if (summary.barometer) addBarometer(lines, *summary.barometer);
   if (summary.ground_vehicle) addGroundVehicle(lines, *summary.ground_vehicle);
+  if (summary.landmarks) addLandmarks(lines, *summary.landmarks);
   if (summary.truth) {
     lines.add("ate_m", fixedText(summary.truth->ate_m, 9));
     if (summary.truth->t_rel) lines.add("t_rel", fixedText(*summary.truth->t_rel, 9));

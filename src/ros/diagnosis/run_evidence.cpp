@@ -21,6 +21,7 @@ EvidenceCollector::EvidenceCollector(const Config& config)
     evidence_.radars.emplace_back().name = radar.radar_name;
     last_used_.emplace_back();
   }
+  if (config.odometry.landmarks.enabled) evidence_.landmarks.emplace();
   if (config.odometry.platform != Platform::kGroundVehicle) return;
   GroundVehicleCounts& vehicle = evidence_.ground_vehicle.emplace();
   vehicle.rotation = config.odometry.ground_vehicle.T_IV.q_IR;
@@ -29,6 +30,7 @@ EvidenceCollector::EvidenceCollector(const Config& config)
 
 void EvidenceCollector::add(const ScanResult& result) {
   if (evidence_.ground_vehicle) evidence_.ground_vehicle->add(result);
+  if (evidence_.landmarks) evidence_.landmarks->add(result);
   if (!result.used && result.rejected_because.empty()) return;  // only carries the last poses
   RadarSummary& radar = evidence_.radars.at(result.scan.radar);
   ++radar.scans_total;
@@ -150,6 +152,15 @@ void GroundVehicleCounts::add(const ScanResult& result) {
   if (last->is_contradicted) contradicted_at = last->time - *first_judged;
   rotation = last->q_IV;
   rotation_sigma = last->q_IV_sigma;
+}
+
+void LandmarkCounts::add(const ScanResult& result) {
+  if (!result.landmarks) return;
+  ++scans;
+  is_trusted = result.landmarks->is_trusted;
+  if (is_trusted) ++scans_trusted;
+  in_map = result.landmarks->map.size();
+  most_in_map = std::max(most_in_map, in_map);
 }
 
 }  // namespace rio_t

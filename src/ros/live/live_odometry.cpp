@@ -215,6 +215,8 @@ void LiveOdometry::addDiagnostics() {
     diagnostics_->add("barometer", [this](Status& s) { monitor_.describeBarometer(s); });
   if (config_.odometry.platform == Platform::kGroundVehicle)
     diagnostics_->add("ground vehicle", [this](Status& s) { monitor_.describeGroundVehicle(s); });
+  if (config_.odometry.landmarks.enabled)
+    diagnostics_->add("landmarks", [this](Status& s) { monitor_.describeLandmarks(s); });
   diagnostics_->add("solver", [this](Status& s) { monitor_.describeSolver(s); });
   for (std::size_t k = 0; k < radars_.size(); ++k) {
     const Config& radar = radars_[k].config;

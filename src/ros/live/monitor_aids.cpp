@@ -1,4 +1,4 @@
-// LiveMonitor: barometer and ground vehicle.
+// LiveMonitor: barometer, ground vehicle and landmarks.
 #include <diagnostic_msgs/DiagnosticStatus.h>
 
 #include <cmath>
@@ -77,6 +77,17 @@ void LiveMonitor::describeGroundVehicle(Status& status) const {
   } else {
     status.summary(DiagnosticStatus::OK, "the motion agrees");
   }
+}
+
+void LiveMonitor::describeLandmarks(Status& status) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const LandmarkCounts& landmarks = collector_.landmarks().value();
+  status.add("landmarks", landmarks.in_map);
+  status.add("scans", landmarks.scans);
+  status.add("scans_trusted", landmarks.scans_trusted);
+  status.summary(DiagnosticStatus::OK, landmarks.is_trusted
+                                           ? "the map helps the estimate"
+                                           : "too few landmarks were seen again, the map waits");
 }
 
 }  // namespace rio_t

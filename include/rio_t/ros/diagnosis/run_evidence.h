@@ -104,6 +104,17 @@ struct GroundVehicleCounts {
   void add(const ScanResult& result);
 };
 
+/// What became of the map of landmarks.
+struct LandmarkCounts {
+  std::uint64_t scans = 0;          ///< that the map was asked about
+  std::uint64_t scans_trusted = 0;  ///< of them, those after which the map was trusted
+  std::uint64_t most_in_map = 0;    ///< landmarks at once
+  bool is_trusted = false;          ///< now
+  std::uint64_t in_map = 0;         ///< now
+
+  void add(const ScanResult& result);
+};
+
 /// Counters of a run: enough to say why it disappoints.
 struct RunEvidence {
   bool initialized = false;
@@ -133,6 +144,7 @@ struct RunEvidence {
   std::vector<std::string> several_publishers;        ///< a sentence for each topic of a bag that has several
   std::vector<RadarSummary> radars;                   ///< in the order of the configuration
   std::optional<GroundVehicleCounts> ground_vehicle;  ///< only with platform: ground_vehicle
+  std::optional<LandmarkCounts> landmarks;            ///< only with landmarks: true
 };
 
 /// Collects the evidence from the results of the scans. Not thread-safe.
@@ -165,6 +177,8 @@ class EvidenceCollector {
   void addZeroTrigger(std::size_t radar) { ++evidence_.radars.at(radar).triggers_zero; }
   /// Only with platform: ground_vehicle.
   const std::optional<GroundVehicleCounts>& groundVehicle() const { return evidence_.ground_vehicle; }
+  /// Only with landmarks: true.
+  const std::optional<LandmarkCounts>& landmarks() const { return evidence_.landmarks; }
   /// The evidence so far, with what `odometry` knows and its `start`. `scans_total` counts the results and
   /// the scans that were dropped.
   RunEvidence evidence(const RadarInertialOdometry& odometry,

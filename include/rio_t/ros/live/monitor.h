@@ -74,6 +74,7 @@ class LiveMonitor {
   void describeExtrinsics(Status& status, std::size_t radar = 0) const;
   void describeBarometer(Status& status);
   void describeGroundVehicle(Status& status) const;
+  void describeLandmarks(Status& status) const;
 
  private:
   using Clock = std::chrono::steady_clock;
