@@ -10,8 +10,8 @@
               all times (NEES); 1 is honest, `!` marks what is below 0.5 or above 2
   platforms   seeds x motions, each run with sensors drawn at random: NEES, verdict and options of each run; `!` marks
               an estimate that is sure and wrong
-  aids        seeds x motions: without and with the constraint of a ground vehicle and the barometer, each alone and
-              both; the error of the height, and what it costs
+  aids        seeds x motions: without an aid, with the constraint of a ground vehicle, the barometer and the landmarks,
+              each alone, and with all; the error of the height, and what it costs
 
 Both models of the offset run side by side: `imu` (ours) and `constant_acceleration` (the paper's). `consistency`,
 `platforms` and `aids` run one model, that of the configuration or of --set time_offset_model=...
