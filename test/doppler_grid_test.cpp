@@ -223,25 +223,33 @@ TEST(DopplerGrid, SameScansSameAnswer) {
 constexpr double kStep = 0.125;
 constexpr double kSpan = 3.0;
 
-/// A walk at up to 2.4 m/s before a radar of +-1.5 m/s. The driver marks a point without Doppler.
+/// A scan of a walk before a radar of +-1.5 m/s. The driver marks a point without Doppler.
+std::vector<RadarDirection> scanOfWalk(const Eigen::Vector3d& v_R, Random& random) {
+  std::vector<RadarDirection> points = {{Eigen::Vector3d::UnitY(), -999.0}};
+  for (int i = 0; i < 40; ++i) {
+    const double azimuth = random.uniform(-1.2, 1.2);
+    const Eigen::Vector3d u_R(std::sin(azimuth), std::cos(azimuth), 0.0);
+    const double doppler = unwrapped(-u_R.dot(v_R), 0.0, kSpan);
+    points.push_back({u_R, kStep * (std::floor(doppler / kStep) + 0.5)});
+  }
+  return points;
+}
+
+/// A walk at up to 2.4 m/s.
 DopplerSpan spanOfWalk() {
   Random random(1);
   DopplerSpan span(0.0);
-  for (const double speed : {0.5, 1.0, 1.4, 1.8, 2.1, 2.4, 2.4, 2.4}) {
-    const Eigen::Vector3d v_R(0.0, speed, 0.0);
-    std::vector<RadarDirection> points = {{Eigen::Vector3d::UnitY(), -999.0}};
-    for (int i = 0; i < 40; ++i) {
-      const double azimuth = random.uniform(-1.2, 1.2);
-      const Eigen::Vector3d u_R(std::sin(azimuth), std::cos(azimuth), 0.0);
-      const double doppler = unwrapped(-u_R.dot(v_R), 0.0, kSpan);
-      points.push_back({u_R, kStep * (std::floor(doppler / kStep) + 0.5)});
-    }
-    span.learn(points, v_R, kStep);
+  for (int k = 0; k < 20; ++k) {
+    const Eigen::Vector3d v_R(0.0, std::min(2.4, 0.5 + 0.2 * k), 0.0);
+    span.learn(scanOfWalk(v_R, random), v_R, kStep);
   }
   return span;
 }
 
-TEST(DopplerSpan, IsFoundBesideAMarkOfTheDriver) { EXPECT_NEAR(spanOfWalk().value(), kSpan, 0.5 * kStep); }
+TEST(DopplerSpan, IsFoundBesideAMarkOfTheDriver) {
+  EXPECT_NEAR(spanOfWalk().value(), kSpan, 0.5 * kStep);
+  EXPECT_EQ(spanOfWalk().known().source, DopplerStepSource::kData);
+}
 
 TEST(DopplerSpan, OneWildDopplerDoesNotEndIt) {
   DopplerSpan span = spanOfWalk();
@@ -250,6 +258,19 @@ TEST(DopplerSpan, OneWildDopplerDoesNotEndIt) {
   span.learn(std::vector<RadarDirection>(20, {Eigen::Vector3d::UnitY(), 2.5}),
              Eigen::Vector3d(0.0, -2.5, 0.0), kStep);
   EXPECT_EQ(span.value(), 0.0) << "many show that it was wrong";
+}
+
+/// The points of a scan share its velocity: however many, they are one witness.
+TEST(DopplerSpan, IsNotShownByAFewScans) {
+  Random random(2);
+  DopplerSpan span(0.0);
+  const Eigen::Vector3d v_R(0.0, 2.4, 0.0);
+  for (int k = 0; k < 5; ++k) span.learn(scanOfWalk(v_R, random), v_R, kStep);
+  EXPECT_EQ(span.value(), 0.0);
+  // A velocity that fits the wrapped Dopplers as they read.
+  for (int k = 0; k < 50; ++k) span.learn(scanOfWalk(v_R, random), Eigen::Vector3d(0.0, -0.6, 0.0), kStep);
+  EXPECT_EQ(span.value(), 0.0);
+  EXPECT_NEAR(span.possible(), kSpan, 0.5 * kStep);
 }
 
 }  // namespace

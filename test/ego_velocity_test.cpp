@@ -236,5 +236,36 @@ TEST(EgoVelocity, EachStatusHasItsName) {
   EXPECT_EQ(names.size(), 6u);
 }
 
+/// Each scan alone shows a velocity, modulo the span that the Dopplers fill. The next scan confirms it.
+TEST(EgoVelocity, TheSpanShowsInTheScansAlone) {
+  constexpr double kSpan = 3.0;
+  const Eigen::Vector3d fast(0.3, 2.4, 0.1);
+  for (const double span : {kSpan, 0.0}) {
+    Random random(7);
+    EgoVelocityEstimator estimator(knownStep());
+    RadarScan scan;
+    for (int i = 0; i < 20; ++i) {
+      scan = staticScene(fast, 40, {0.02, 0.03, 0.02, 0.125}, random);
+      scan.stamp += 0.1 * i;
+      for (RadarPoint& p : scan.points) p.doppler = unwrapped(p.doppler, 0.0, span);
+      estimator.observe(scan);
+      if (i < 5) EXPECT_EQ(estimator.dopplerSpan().value, 0.0) << "few scans may agree by chance";
+    }
+    EXPECT_NEAR(estimator.dopplerSpan().value, span, span > 0.0 ? 0.13 : 0.0);
+    const EgoVelocity e = estimator.estimate(scan);
+    EXPECT_EQ(e.status, EgoVelocityStatus::kMoving);
+    EXPECT_LT((e.v_R - fast).norm(), 0.3);
+  }
+}
+
+TEST(EgoVelocity, AScanThatComesTwiceDoesNotConfirmItself) {
+  Random random(8);
+  EgoVelocityEstimator estimator(knownStep());
+  RadarScan scan = staticScene({0.3, 2.4, 0.1}, 40, {0.02, 0.03, 0.02, 0.125}, random);
+  for (RadarPoint& p : scan.points) p.doppler = unwrapped(p.doppler, 0.0, 3.0);
+  for (int i = 0; i < 20; ++i) estimator.observe(scan);
+  EXPECT_EQ(estimator.dopplerSpan().value, 0.0);
+}
+
 }  // namespace
 }  // namespace rio_t

@@ -75,7 +75,10 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
   result.left_window = std::exchange(left_between_, {});
   const Time stamp = result.scan.stamp;
   RadarChannel& radar = radars_.at(result.scan.radar);
+  const bool had_span = radar.dopplerSpan().value > 0.0;
   radar.observe(result.scan);
+  // What earlier scans showed with, or without, a span holds no more.
+  if ((radar.dopplerSpan().value > 0.0) != had_span) initializer_.forgetVelocities();
   if (!initialized()) {
     result.ego_velocity = radar.velocityOf(result.scan);
     initializer_.addVelocity(result.scan.radar, stamp, result.ego_velocity);

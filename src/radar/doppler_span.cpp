@@ -11,35 +11,46 @@ namespace {
 /// [steps] Rounding and the noise of a direction may move a point by this much. A point must lie beyond the
 /// Dopplers seen by more, and be a span off to within less.
 constexpr double kClearly = 1.5;
-/// The number of points that shows a span. Moving objects are off by any amount. It is no chance if most of
-/// ten points are off by one amount and the Dopplers span that same amount. As many show that a span is too
-/// small: fewer are errors of the transmission.
-constexpr std::size_t kEnough = 10;
+/// The number of scans that shows a span. The points of one scan share its velocity, so they are one witness.
+/// It is no chance if ten scans more show the span than do not. As many points show that a span is too small:
+/// fewer are errors of the transmission.
+constexpr int kEnough = 10;
 /// [spans] A step may be finer than the noise; it then counts as this.
 constexpr double kFinestStep = 0.05;
 
 }  // namespace
 
-void DopplerSpan::learn(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R, double step) {
+void DopplerSpan::learn(const std::vector<RadarDirection>& points,
+                        const std::optional<Eigen::Vector3d>& expected_v_R, double step) {
   if (given_ > 0.0) return;
   for (const RadarDirection& p : points) {
     if (std::abs(p.doppler) >= DopplerGrid::kLargestDoppler) continue;
     if (lowest_ <= p.doppler && p.doppler <= highest_) continue;
-    if (found_ > 0.0 && ++outside_ < kEnough) continue;
+    if (found_ && ++outside_ < kEnough) continue;
     lowest_ = std::min(lowest_, p.doppler);
     highest_ = std::max(highest_, p.doppler);
-    beyond_ = back_ = outside_ = 0;
-    found_ = 0.0;
+    outside_ = 0;
   }
-  const double span = highest_ - lowest_ + step;
-  const double clearly = kClearly * std::max(step, kFinestStep * span);
+  if (lowest_ > highest_) return;
+  possible_ = highest_ - lowest_ + step;
+  const double clearly = kClearly * std::max(step, kFinestStep * possible_);
+  // Dopplers without steps fill the span little by little.
+  if (possible_ > judged_ + clearly) {
+    judged_ = possible_;
+    scans_ = 0;
+    found_ = false;
+  }
+  if (found_ || !expected_v_R) return;
+  std::size_t beyond = 0;  // points whose Doppler must lie beyond those seen
+  std::size_t back = 0;    // of these, the ones that are a span off
   for (const RadarDirection& p : points) {
-    const double expected = -p.u_R.dot(v_R);
+    const double expected = -p.u_R.dot(*expected_v_R);
     if (expected > lowest_ - clearly && expected < highest_ + clearly) continue;
-    ++beyond_;
-    if (std::abs(std::abs(expected - p.doppler) - span) < clearly) ++back_;
+    ++beyond;
+    if (std::abs(std::abs(expected - p.doppler) - possible_) < clearly) ++back;
   }
-  if (back_ >= kEnough && 2 * back_ > beyond_) found_ = span;
+  scans_ = std::max(0, scans_ + (2 * back > beyond ? 1 : -1));
+  found_ = scans_ >= kEnough;
 }
 
 }  // namespace rio_t

@@ -118,11 +118,23 @@ EgoVelocityEstimator::EgoVelocityEstimator(const EgoVelocityOptions& options)
 
 void EgoVelocityEstimator::observe(const RadarScan& scan) {
   grid_.add(scan);
-  noise_.learnSpread(filter(scan, options_));
+  const std::vector<RadarDirection> points = filter(scan, options_);
+  noise_.learnSpread(points);
   const double step = grid_.step().value;
-  if (step == options_.doppler_quantization) return;
-  options_ = withStep(given_, step);
-  noise_.setQuantization(square(step) / 12.0);
+  if (step != options_.doppler_quantization) {
+    options_ = withStep(given_, step);
+    noise_.setQuantization(square(step) / 12.0);
+  }
+  if (given_.doppler_span == 0.0 && scan.stamp != observed_) learnSpan(points);
+  observed_ = scan.stamp;
+}
+
+/// Needs no estimate: before the start there is none, and one that took wrapped Dopplers at face value would
+/// never show the span.
+void EgoVelocityEstimator::learnSpan(const std::vector<RadarDirection>& points) {
+  span_.learn(points, std::exchange(last_v_R_, std::nullopt), options_.doppler_quantization);
+  if (points.size() < 3 || mostReadZero(points, options_)) return;
+  last_v_R_ = ransac(points, options_, ransac_iterations_, span_.possible());
 }
 
 EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
@@ -219,15 +231,10 @@ DopplerLikelihood EgoVelocityEstimator::likelihood(const RadarScan& scan,
 }
 
 void EgoVelocityEstimator::learn(const RadarScan& scan, const EgoVelocity& estimated,
-                                 const std::optional<VelocityPrior>& prior, std::size_t borrowed,
-                                 const DopplerLikelihood* world) {
+                                 const std::optional<VelocityPrior>& prior, const DopplerLikelihood* world) {
   if (estimated.status != EgoVelocityStatus::kMoving) return;
-  std::vector<RadarDirection> points = filter(scan, options_);
-  const std::size_t own = scan.points.size() - borrowed;
-  const auto end =
-      std::find_if(points.begin(), points.end(), [own](const auto& p) { return p.index >= own; });
-  span_.learn({points.begin(), end}, estimated.v_R, options_.doppler_quantization);
   if (options_.solver != EgoVelocitySolver::kErrorsInVariables) return;
+  std::vector<RadarDirection> points = filter(scan, options_);
   std::optional<DopplerLikelihood> found;
   if (world == nullptr) {
     const EgoVelocity velocity = staticWorld(scan, estimated, prior);

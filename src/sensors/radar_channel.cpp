@@ -168,8 +168,7 @@ void RadarChannel::learn(const RadarScan& scan, const Seen& seen, const Innovati
   if (answer.at_rest) return;
   const DopplerLikelihood* world =
       answer.doppler && !seen.has_borrowed ? answer.doppler->points.get() : nullptr;
-  estimator_.learn(seen.pooled, seen.velocity, seen.prior, seen.pooled.points.size() - scan.points.size(),
-                   world);
+  estimator_.learn(seen.pooled, seen.velocity, seen.prior, world);
   memory_.learned_at = scan.stamp;
 }
 

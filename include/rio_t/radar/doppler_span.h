@@ -2,10 +2,11 @@
 
 #include <Eigen/Core>
 #include <cmath>
-#include <cstddef>
 #include <limits>
+#include <optional>
 #include <vector>
 
+#include "rio_t/radar/doppler_grid.h"
 #include "rio_t/radar/scan.h"
 
 namespace rio_t {
@@ -15,6 +16,12 @@ inline double unwrapped(double doppler, double expected, double span) {
   return span > 0.0 ? doppler + span * std::round((expected - doppler) / span) : doppler;
 }
 
+/// A span as far as it is known.
+struct KnownSpan {
+  double value = 0.0;  ///< [m/s]; 0: the data show none
+  DopplerStepSource source = DopplerStepSource::kUnknown;
+};
+
 /// The span of a radar's Doppler. A Doppler beyond the span comes back on the other side (aliasing).
 ///
 /// If the span is not given, DopplerSpan reads it off the data. A span shows in two ways: no Doppler is
@@ -23,19 +30,28 @@ class DopplerSpan {
  public:
   explicit DopplerSpan(double given) : given_(given) {}  ///< [m/s] 0: read it off the data
 
-  /// Takes the points of a scan whose velocity is known [m/s]. `step` is that of the Doppler [m/s].
-  void learn(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R, double step);
-  /// [m/s] 0: no span is known.
-  double value() const { return given_ > 0.0 ? given_ : found_; }
+  /// Takes the points of a scan. `expected_v_R` is its velocity as the scan before it shows it, with Dopplers
+  /// modulo `possible` [m/s]; none: unknown, or at rest. The velocity must know nothing of the points, which
+  /// would confirm any span that it was fitted with. `step` is that of the Doppler [m/s].
+  void learn(const std::vector<RadarDirection>& points, const std::optional<Eigen::Vector3d>& expected_v_R,
+             double step);
+  KnownSpan known() const {
+    if (given_ > 0.0) return {given_, DopplerStepSource::kGiven};
+    return found_ ? KnownSpan{possible_, DopplerStepSource::kData} : KnownSpan{};
+  }
+  double value() const { return known().value; }  ///< [m/s] 0: no span is known
+  /// [m/s] The span if there is one: that of the Dopplers seen. 0: none was seen.
+  double possible() const { return given_ > 0.0 ? given_ : possible_; }
 
  private:
   double given_;  // read-only after construction
-  double found_ = 0.0;
   double lowest_ = std::numeric_limits<double>::infinity();
   double highest_ = -std::numeric_limits<double>::infinity();
-  std::size_t beyond_ = 0;   ///< points whose Doppler must lie beyond those seen
-  std::size_t back_ = 0;     ///< of these, the ones that are a span off
-  std::size_t outside_ = 0;  ///< points that read more than the span that was found
+  double possible_ = 0.0;
+  double judged_ = 0.0;  ///< the span that scans_ is about
+  bool found_ = false;
+  int scans_ = 0;    ///< by how many more scans showed the span than did not, of late
+  int outside_ = 0;  ///< points that read more than the span that was found
 };
 
 }  // namespace rio_t

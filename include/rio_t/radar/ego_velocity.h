@@ -118,7 +118,8 @@ class EgoVelocityEstimator {
   /// The scan with those points alone that read zero or the bin beside it, and that the filter keeps.
   RadarScan slowPoints(const RadarScan& scan) const;
 
-  /// Learns the step of the Doppler, the thresholds that follow from it, and how far the directions spread.
+  /// Learns the step of the Doppler, the thresholds that follow from it, its span, and how far the directions
+  /// spread.
   /// Call it once per scan, before `estimate`, whether the scan is used or not.
   void observe(const RadarScan& scan);
 
@@ -138,24 +139,28 @@ class EgoVelocityEstimator {
 
   /// Learns the noise of the points from the result of `estimate` for this scan, for the scans to come. Only
   /// the errors-in-variables solver uses it. Call it once per scan, in motion, if the velocity was used.
-  /// A `prior` that knows nothing of the scan shows noise that the bins hide. The last `borrowed` points come
-  /// from other scans: the span is not learned from them. `world` is the likelihood of
+  /// A `prior` that knows nothing of the scan shows noise that the bins hide. `world` is the likelihood of
   /// `staticWorld`, if it is there already.
   void learn(const RadarScan& scan, const EgoVelocity& estimated,
-             const std::optional<VelocityPrior>& prior = std::nullopt, std::size_t borrowed = 0,
+             const std::optional<VelocityPrior>& prior = std::nullopt,
              const DopplerLikelihood* world = nullptr);
   /// The noise as learned so far.
   const PointVariances& noise() const { return noise_.variances(); }
   DopplerStep dopplerStep() const { return grid_.step(); }
+  KnownSpan dopplerSpan() const { return span_.known(); }
   /// The options in use. Those that are 0, "from the step", have the values that follow from it.
   const EgoVelocityOptions& options() const { return options_; }
 
  private:
+  void learnSpan(const std::vector<RadarDirection>& points);
+
   EgoVelocityOptions given_;  // read-only after construction
   int ransac_iterations_;     // read-only after construction
   DopplerGrid grid_;
   DopplerSpan span_;
-  EgoVelocityOptions options_;  // given_, with what follows from the step
+  std::optional<Time> observed_;             ///< stamp of the last scan: one that comes twice is one witness
+  std::optional<Eigen::Vector3d> last_v_R_;  ///< of that scan by its points alone, modulo the possible span
+  EgoVelocityOptions options_;               // given_, with what follows from the step
   PointNoise noise_;
 };
 

@@ -106,6 +106,7 @@ class RadarChannel {
   std::vector<FixedLagSmoother::RandomWalk> randomWalks() const;
   const PointVariances& noise() const { return estimator_.noise(); }  ///< of the points, as learned so far
   DopplerStep dopplerStep() const { return estimator_.dopplerStep(); }
+  KnownSpan dopplerSpan() const { return estimator_.dopplerSpan(); }
 
  private:
   /// Forgets what an earlier window has shown.
