@@ -57,7 +57,8 @@ TEST_F(BagRunner, EveryScanIsAccountedFor) {
        {"imu_count: 1600\n", "scans_total: 80\n", "scans_used: ", "scans_rejected: {",
         "solver_terminations: {converged: ", "path_length_m: ", "end_to_start_2d_m: ", "end_to_start_3d_m: ",
         "final_offset_s: ", "final_offset_sigma_s: ", "imu_noise: {accel: 0.", "radar_noise: {doppler: 0.",
-        "radar_doppler_step: 0.5", "radar_doppler_step_from: unknown\n", "radar_points_per_scan: {p10: ",
+        "radar_doppler_step: 0.5", "radar_doppler_step_from: unknown\n",
+        "radar_doppler_span: 0.000000\nradar_doppler_span_from: unknown\n", "radar_points_per_scan: {p10: ",
         "saved: [trajectory.txt", "estimation_seconds: ", "realtime_factor: "}) {
     EXPECT_NE(yaml.find(key), std::string::npos) << key;
   }
@@ -80,6 +81,24 @@ TEST_F(BagRunner, TheDopplerStepIsToldWithItsSource) {
        "0.490 m/s, given");
   told(0.0, DopplerStepSource::kData, "radar_doppler_step: 0.000000\nradar_doppler_step_from: data\n",
        "none, from the data");
+}
+
+TEST_F(BagRunner, TheDopplerSpanIsToldWithItsSource) {
+  RunSummary summary;
+  summary.radars.emplace_back();
+  const auto told = [&](double value, DopplerStepSource source, const char* in_summary,
+                        const char* in_table) {
+    summary.radars.front().doppler_span = {value, source};
+    RunOutput(out_).finish(summary);
+    EXPECT_NE(contents(out_ + "/summary.yaml").find(in_summary), std::string::npos) << in_summary;
+    EXPECT_NE(describeRun(summary, out_).find(in_table), std::string::npos) << in_table;
+  };
+  told(0.0, DopplerStepSource::kUnknown, "radar_doppler_span: 0.000000\nradar_doppler_span_from: unknown\n",
+       "none seen");
+  told(4.0, DopplerStepSource::kGiven, "radar_doppler_span: 4.000000\nradar_doppler_span_from: given\n",
+       "4.000 m/s, given");
+  told(3.0, DopplerStepSource::kData, "radar_doppler_span: 3.000000\nradar_doppler_span_from: data\n",
+       "3.000 m/s, from the data");
 }
 
 TEST_F(BagRunner, WhyTheSolverStoppedIsTold) {

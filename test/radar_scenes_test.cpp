@@ -154,6 +154,20 @@ TEST(FewPoints, ShowTheSpanOfTheirOwnDopplersOnly) {
   EXPECT_LT(refused, 30u);
 }
 
+/// Before the start there is no estimate that could show the span, and wrapped Dopplers give no start.
+TEST(Aliasing, ShowsItsSpanBeforeAStartInMotion) {
+  SimulatedRun run("ground_vehicle", 1, 30.0, 0.0);
+  run.setup.radar.doppler_span = 4.0;
+  run.run();
+  EXPECT_EQ(run.odometry->radarDopplerSpan().source, DopplerStepSource::kData);
+  EXPECT_NEAR(run.odometry->radarDopplerSpan().value, 4.0, 1e-6);
+  ASSERT_TRUE(run.odometry->start());
+  EXPECT_EQ(run.odometry->start()->from, InitializedFrom::kMotion);
+  EXPECT_LT(run.seconds(run.odometry->start()->time), 10.0);
+  EXPECT_LT(run.rms(10.0, 30.0, [&](const NavigationState& state) { return run.velocityError(state); }), 0.2);
+  for (const ScanResult& result : run.results) ASSERT_NE(result.health, Health::kDiverged);
+}
+
 /// The points that read the next bin tell the speed. A velocity fitted to all points leaves them out, or
 /// takes them for noise.
 TEST(CoarseRadar, TellsTheSpeedByTheEdgesOfItsBins) {

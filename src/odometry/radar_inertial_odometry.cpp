@@ -183,6 +183,10 @@ DopplerStep RadarInertialOdometry::radarDopplerStep(std::size_t radar) const {
   return impl_->estimator.radar(radar).dopplerStep();
 }
 
+KnownSpan RadarInertialOdometry::radarDopplerSpan(std::size_t radar) const {
+  return impl_->estimator.radar(radar).dopplerSpan();
+}
+
 MeasuredImuNoise RadarInertialOdometry::imuNoise() const { return impl_->navigation.imuNoise(); }
 
 MeasuredImuNoise RadarInertialOdometry::imuNoiseOfRun() const { return impl_->navigation.imuNoiseOfRun(); }

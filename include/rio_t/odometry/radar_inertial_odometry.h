@@ -65,6 +65,8 @@ class RadarInertialOdometry {
   PointVariances radarNoise(std::size_t radar = 0) const;
   /// Step of a radar's Doppler, as known so far. Call it from the thread that calls `process`.
   DopplerStep radarDopplerStep(std::size_t radar = 0) const;
+  /// Span of a radar's Doppler, likewise.
+  KnownSpan radarDopplerSpan(std::size_t radar = 0) const;
   /// Noise of the IMU, measured over the last second. Any thread.
   MeasuredImuNoise imuNoise() const;
   /// Root mean square of it since the first sample. Any thread.

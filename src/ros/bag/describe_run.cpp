@@ -22,6 +22,12 @@ std::string describeStep(const DopplerStep& step) {
   return (step.value > 0.0 ? fixedText(step.value, 3) + " m/s" : std::string("none")) + ", from the data";
 }
 
+std::string describeSpan(const KnownSpan& span) {
+  if (span.source == DopplerStepSource::kUnknown) return "none seen";
+  return fixedText(span.value, 3) + " m/s, " +
+         (span.source == DopplerStepSource::kGiven ? "given" : "from the data: faster points come back");
+}
+
 /// "3 late, 1 empty"
 std::string listOf(const Counts& counts) {
   std::string list;
@@ -62,6 +68,7 @@ void describeRadar(const RadarSummary& radar, const Row& row) {
                          fixedText(std::sqrt(radar.noise.azimuth), 3) + " rad, elevation " +
                          fixedText(std::sqrt(radar.noise.elevation), 3) + " rad");
   row("Doppler step", describeStep(radar.doppler_step));
+  row("Doppler span", describeSpan(radar.doppler_span));
 }
 
 void describeAids(const RunSummary& summary, const Row& row) {

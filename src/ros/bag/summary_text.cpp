@@ -87,6 +87,8 @@ void addMeasured(SummaryLines& lines, const RadarSummary& radar) {
   lines.endMap();
   lines.add("radar_doppler_step" + suffix, fixedText(radar.doppler_step.value, 6));  // [m/s]
   lines.add("radar_doppler_step_from" + suffix, toString(radar.doppler_step.source));
+  lines.add("radar_doppler_span" + suffix, fixedText(radar.doppler_span.value, 6));  // [m/s]
+  lines.add("radar_doppler_span_from" + suffix, toString(radar.doppler_span.source));
   lines.beginMap("radar_points_per_scan" + suffix);
   lines.add("p10", radar.points_per_scan[0]);
   lines.add("p50", radar.points_per_scan[1]);

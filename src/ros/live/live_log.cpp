@@ -86,4 +86,13 @@ void LiveLog::dopplerStep(const Config& radar, const DopplerStep& step, DopplerS
   }
 }
 
+void LiveLog::dopplerSpan(const Config& radar, const KnownSpan& span, KnownSpan* reported) const {
+  if (span.source == DopplerStepSource::kUnknown || span.value == reported->value) return;
+  *reported = span;
+  ROS_INFO_STREAM(withName(name_ + ": Doppler of radar", radar)
+                  << " spans " << span.value << " m/s, "
+                  << (span.source == DopplerStepSource::kGiven ? "given" : "read off the data")
+                  << ": faster points come back on the other side");
+}
+
 }  // namespace rio_t

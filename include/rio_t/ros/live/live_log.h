@@ -42,6 +42,8 @@ class LiveLog {
   void faults(const std::shared_ptr<LiveSession>& session);
   /// Logs the step of a radar's Doppler, if it differs from the one reported.
   void dopplerStep(const Config& radar, const DopplerStep& step, DopplerStep* reported) const;
+  /// Logs that a radar's Doppler has a span, if it differs from the one reported.
+  void dopplerSpan(const Config& radar, const KnownSpan& span, KnownSpan* reported) const;
 
  private:
   static constexpr double kPeriod = 5.0;  // [s]
