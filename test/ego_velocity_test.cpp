@@ -246,7 +246,7 @@ TEST(EgoVelocity, TheSpanShowsInTheScansAlone) {
     RadarScan scan;
     for (int i = 0; i < 20; ++i) {
       scan = staticScene(fast, 40, {0.02, 0.03, 0.02, 0.125}, random);
-      scan.stamp += 0.1 * i;
+      scan.stamp = scan.stamp + 0.1 * i;
       for (RadarPoint& p : scan.points) p.doppler = unwrapped(p.doppler, 0.0, span);
       estimator.observe(scan);
       if (i < 5) EXPECT_EQ(estimator.dopplerSpan().value, 0.0) << "few scans may agree by chance";
