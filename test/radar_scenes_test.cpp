@@ -156,7 +156,7 @@ TEST(FewPoints, ShowTheSpanOfTheirOwnDopplersOnly) {
 
 /// Before the start there is no estimate that could show the span, and wrapped Dopplers give no start.
 TEST(Aliasing, ShowsItsSpanBeforeAStartInMotion) {
-  SimulatedRun run("ground_vehicle", 1, 30.0, 0.0);
+  SimulatedRun run("ground_vehicle", 2, 30.0, 0.0);
   run.setup.radar.doppler_span = 4.0;
   run.run();
   EXPECT_EQ(run.odometry->radarDopplerSpan().source, DopplerStepSource::kData);
