@@ -249,7 +249,9 @@ TEST(EgoVelocity, TheSpanShowsInTheScansAlone) {
       scan.stamp = scan.stamp + 0.1 * i;
       for (RadarPoint& p : scan.points) p.doppler = unwrapped(p.doppler, 0.0, span);
       estimator.observe(scan);
-      if (i < 5) EXPECT_EQ(estimator.dopplerSpan().value, 0.0) << "few scans may agree by chance";
+      if (i < 5) {
+        EXPECT_EQ(estimator.dopplerSpan().value, 0.0) << "few scans may agree by chance";
+      }
     }
     EXPECT_NEAR(estimator.dopplerSpan().value, span, span > 0.0 ? 0.13 : 0.0);
     const EgoVelocity e = estimator.estimate(scan);

@@ -20,6 +20,15 @@ constexpr double kFinestStep = 0.05;
 
 }  // namespace
 
+double DopplerSpan::clearly(double step) const { return kClearly * std::max(step, kFinestStep * possible_); }
+
+bool DopplerSpan::reachesBothEnds(const std::vector<RadarDirection>& points, double step) const {
+  const double low = lowest_ + clearly(step), high = highest_ - clearly(step);
+  const auto any = [&](const auto& reads) { return std::any_of(points.begin(), points.end(), reads); };
+  return any([low](const RadarDirection& p) { return p.doppler < low; }) &&
+         any([high](const RadarDirection& p) { return p.doppler > high; });
+}
+
 void DopplerSpan::learn(const std::vector<RadarDirection>& points,
                         const std::optional<Eigen::Vector3d>& expected_v_R, double step) {
   if (given_ > 0.0) return;
@@ -33,7 +42,7 @@ void DopplerSpan::learn(const std::vector<RadarDirection>& points,
   }
   if (lowest_ > highest_) return;
   possible_ = highest_ - lowest_ + step;
-  const double clearly = kClearly * std::max(step, kFinestStep * possible_);
+  const double clearly = this->clearly(step);
   // Dopplers without steps fill the span little by little.
   if (possible_ > judged_ + clearly) {
     judged_ = possible_;

@@ -133,7 +133,8 @@ void EgoVelocityEstimator::observe(const RadarScan& scan) {
 /// never show the span.
 void EgoVelocityEstimator::learnSpan(const std::vector<RadarDirection>& points) {
   span_.learn(points, std::exchange(last_v_R_, std::nullopt), options_.doppler_quantization);
-  if (points.size() < 3 || mostReadZero(points, options_)) return;
+  const bool may_show = span_.value() == 0.0 && span_.reachesBothEnds(points, options_.doppler_quantization);
+  if (!may_show || points.size() < 3 || mostReadZero(points, options_)) return;
   last_v_R_ = ransac(points, options_, ransac_iterations_, span_.possible());
 }
 

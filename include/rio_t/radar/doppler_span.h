@@ -40,10 +40,15 @@ class DopplerSpan {
     return found_ ? KnownSpan{possible_, DopplerStepSource::kData} : KnownSpan{};
   }
   double value() const { return known().value; }  ///< [m/s] 0: no span is known
+  /// Whether a scan can show the span: some of its points read about the lowest Doppler seen, and some about
+  /// the highest. The world comes back at one end where it leaves at the other.
+  bool reachesBothEnds(const std::vector<RadarDirection>& points, double step) const;
   /// [m/s] The span if there is one: that of the Dopplers seen. 0: none was seen.
   double possible() const { return given_ > 0.0 ? given_ : possible_; }
 
  private:
+  double clearly(double step) const;  ///< [m/s]
+
   double given_;  // read-only after construction
   double lowest_ = std::numeric_limits<double>::infinity();
   double highest_ = -std::numeric_limits<double>::infinity();
