@@ -77,7 +77,7 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
   RadarChannel& radar = radars_.at(result.scan.radar);
   const bool had_span = radar.dopplerSpan().value > 0.0;
   radar.observe(result.scan);
-  // What earlier scans showed with, or without, a span holds no more.
+  // The velocities so far took the Dopplers with another span, or without one. They are wrong.
   if ((radar.dopplerSpan().value > 0.0) != had_span) initializer_.forgetVelocities();
   if (!initialized()) {
     result.ego_velocity = radar.velocityOf(result.scan);

@@ -42,9 +42,9 @@ void DopplerSpan::learn(const std::vector<RadarDirection>& points,
   }
   if (lowest_ > highest_) return;
   possible_ = highest_ - lowest_ + step;
-  const double clearly = this->clearly(step);
+  const double margin = clearly(step);
   // Dopplers without steps fill the span little by little.
-  if (possible_ > judged_ + clearly) {
+  if (possible_ > judged_ + margin) {
     judged_ = possible_;
     scans_ = 0;
     found_ = false;
@@ -54,9 +54,9 @@ void DopplerSpan::learn(const std::vector<RadarDirection>& points,
   std::size_t back = 0;    // of these, the ones that are a span off
   for (const RadarDirection& p : points) {
     const double expected = -p.u_R.dot(*expected_v_R);
-    if (expected > lowest_ - clearly && expected < highest_ + clearly) continue;
+    if (expected > lowest_ - margin && expected < highest_ + margin) continue;
     ++beyond;
-    if (std::abs(std::abs(expected - p.doppler) - possible_) < clearly) ++back;
+    if (std::abs(std::abs(expected - p.doppler) - possible_) < margin) ++back;
   }
   scans_ = std::max(0, scans_ + (2 * back > beyond ? 1 : -1));
   found_ = scans_ >= kEnough;

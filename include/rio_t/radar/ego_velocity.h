@@ -108,8 +108,8 @@ class EgoVelocityEstimator {
 
   /// A prior helps to tell the static world from a moving object that fills half of the view; one scan alone
   /// cannot. If the RANSAC velocity contradicts the prior, and `prior_min_inlier_fraction` of the points
-  /// agree with a velocity that does not, those points are the inliers. The velocity and its covariance come from the points alone, so fusing the
-  /// result with the prior counts nothing twice.
+  /// agree with a velocity that does not, those points are the inliers. The velocity and its covariance come
+  /// from the points alone, so fusing the result with the prior counts nothing twice.
   EgoVelocity estimate(const RadarScan& scan, const std::optional<VelocityPrior>& prior = std::nullopt) const;
 
   /// Whether the points of many scans with one velocity are those of a slow motion and not of rest, as
@@ -119,8 +119,7 @@ class EgoVelocityEstimator {
   RadarScan slowPoints(const RadarScan& scan) const;
 
   /// Learns the step of the Doppler, the thresholds that follow from it, its span, and how far the directions
-  /// spread.
-  /// Call it once per scan, before `estimate`, whether the scan is used or not.
+  /// spread. Call it once per scan, before `estimate`, whether the scan is used or not.
   void observe(const RadarScan& scan);
 
   /// Compares a scan that has no velocity of its own with a prior. The inliers are the points within three

@@ -105,7 +105,7 @@ struct GroundVehicleCounts {
   void add(const ScanResult& result);
 };
 
-/// What became of the map of landmarks.
+/// Counts of the scans that the map of landmarks answered.
 struct LandmarkCounts {
   std::uint64_t scans = 0;          ///< that the map was asked about
   std::uint64_t scans_trusted = 0;  ///< of them, those after which the map was trusted
