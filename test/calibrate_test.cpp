@@ -402,7 +402,8 @@ TEST_F(Calibrate, ABatchThatDoesNotConvergeDoesNotCount) {
                                  "batch_max_iterations=1", "--output-dir", folder_ + "/batch"});
   expectSays(contents(folder_ + "/batch/summary.yaml"),
              {"verdict: doubtful", "name: not_converged", "batch_converged: false"});
-  expectSays(outcome.err, {bag_ + " does not count: the batch did not converge", "batch_max_iterations"});
+  expectSays(outcome.err, {bag_ + " does not count: the batch did not converge", "batch_max_iterations",
+                           "check_bag BAG` finds one"});
 }
 
 TEST(CalibrateFailure, MostScansDivergedDoesNotCount) {
