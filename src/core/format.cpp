@@ -15,7 +15,7 @@ void appendDecimal(std::string* text, bool is_negative, std::uint64_t digits, in
     *--first = static_cast<char>('0' + digits % 10);
   }
   if (is_negative) *--first = '-';
-  text->append(first, reversed.end());
+  text->append(first, static_cast<std::size_t>(reversed.end() - first));
 }
 
 void appendFixed(std::string* text, double value, int decimals) {
