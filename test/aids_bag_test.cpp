@@ -1,10 +1,14 @@
 // Runs of bags with a barometer, and with the platform told.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
 #include "../src/ros/temporary_folder.h"
+#include "rio_t/core/angle.h"
+#include "rio_t/evaluation/trajectory.h"
 #include "rio_t/ros/bag/bag_runner.h"
 #include "rio_t/ros/bag/simulation_bag.h"
 #include "rio_t/ros/messages/conversions.h"
@@ -39,6 +43,19 @@ class AidsBag : public testing::Test {
     writeSimulationBag(folder_ + "/frozen.bag", motion, data, rig.start, {});
   }
 
+  /// A vehicle whose radar is tilted by 7 degrees more than the configuration says.
+  void writeVehicle() const {
+    simulation::MotionRequest request;
+    request.name = "kart";
+    request.seed = 1;
+    request.duration = 40.0;
+    request.rest = {4.0, 0.0, 2.0};
+    const simulation::Motion motion = simulation::makeMotion(request);
+    simulation::SimulationOptions rig;
+    rig.seed = 1;
+    rig.T_IR.q_IR = rig.T_IR.q_IR * Eigen::AngleAxisd(7.0 * kDegree, Eigen::Vector3d::UnitX());
+    writeSimulationBag(folder_ + "/vehicle.bag", motion, simulation::simulate(motion, rig), rig.start, {});
+  }
   RunSummary run(const std::string& bag, const ParameterEntries& entries) const {
     ParameterEntries all = readParameterFile(findConfigFile("irs"));
     all.insert(all.end(), entries.begin(), entries.end());
@@ -126,6 +143,21 @@ TEST_F(AidsBag, ADroneThatIsToldToBeAVehicleIsToldSo) {
   EXPECT_EQ(summary.input_faults.at("ground_vehicle_contradicted"), 1u);
   EXPECT_NE(out("summary.yaml").find("contradicted: true"), std::string::npos);
   EXPECT_NE(out("ground_vehicle.csv").find(",contradicted\n"), std::string::npos);
+}
+
+TEST_F(AidsBag, AVehicleKeepsItsHeightWithAMountingThatIsToldWrong) {
+  writeVehicle();
+  const RunSummary summary = run("vehicle", parse("platform", "ground_vehicle"));
+  double height = 0.0;
+  for (const StampedPose& pose : readTum(folder_ + "/out/trajectory.txt"))
+    height = std::max(height, std::abs(pose.p_W.z()));
+  EXPECT_LT(height, 0.2);
+  EXPECT_EQ(summary.diagnosis.verdict, RunVerdict::kDoubtful);
+  ASSERT_EQ(summary.diagnosis.causes.size(), 1u);
+  const Cause& cause = summary.diagnosis.causes.front();
+  EXPECT_EQ(cause.name, "mounting_far");
+  EXPECT_NE(cause.text.find("none takes it to be right to 1 degrees"), std::string::npos) << cause.text;
+  EXPECT_NE(cause.remedy.find("Set estimate_extrinsics: rotation"), std::string::npos) << cause.remedy;
 }
 
 }  // namespace

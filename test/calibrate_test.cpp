@@ -361,6 +361,15 @@ TEST_F(Calibrate, RotationAloneLeavesTheLeverArm) {
   EXPECT_LT(written().odometry.radar.T_IR.q_IR.angularDistance(truth_.q_IR), 0.6 * kDegree);
 }
 
+/// To the odometry, the mounting of a vehicle is known to a degree.
+TEST_F(Calibrate, OnAVehicleItLooksForThePose) {
+  simulateBag(bag_, "difficult", 1, kOffset, truth_);
+  const Outcome outcome = calibrateBags({bag_}, {"--set", "platform=ground_vehicle"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(written().odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kPose);
+  EXPECT_LT(written().odometry.radar.T_IR.q_IR.angularDistance(truth_.q_IR), 0.6 * kDegree);
+}
+
 TEST_F(Calibrate, ABagThatFailsIsNamedAndTheOthersCount) {
   const std::string good = folder_ + "/good.bag";
   simulateBag(good, "difficult", 1, kOffset, truth_);

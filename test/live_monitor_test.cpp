@@ -437,7 +437,7 @@ TEST_F(TwoRadarDiagnostics, WarnOfAMountingFarFromWhatWasTold) {
   EXPECT_EQ(extrinsics(0).level, DiagnosticStatus::WARN);
   EXPECT_EQ(extrinsics(0).message,
             "the estimated rotation of radar left about x differs from the configured one by more than 3 "
-            "extrinsics_rotation_sigma");
+            "extrinsics_rotation_sigma, 17 degrees");
 }
 
 /// What `diagnostics` says of the solver.

@@ -156,6 +156,23 @@ TEST(MountingParameters, ALeverArmThatNobodyMeasuredIsEstimated) {
     EXPECT_NE(yaml.find(line), std::string::npos) << line;
 }
 
+TEST(MountingParameters, AVehicleTakesNoRotationForExact) {
+  const auto sigma = [](const Config& config) { return config.odometry.smoother.extrinsics_rotation_sigma; };
+  const std::string arm = "extrinsics_translation=[0, 0, 0]", vehicle = "platform=ground_vehicle";
+  const Config held = from({arm, vehicle});
+  EXPECT_EQ(estimated(held), EstimateExtrinsics::kRotation);
+  EXPECT_DOUBLE_EQ(sigma(held), M_PI / 180.0);
+  EXPECT_EQ(estimated(from({vehicle})), EstimateExtrinsics::kPose);
+  EXPECT_EQ(sigma(from({arm, vehicle, "extrinsics_rotation_sigma=0.001"})), 0.001);
+  EXPECT_EQ(sigma(from({arm, vehicle, "estimate_extrinsics=rotation"})), 0.17) << "as the user says";
+  const Config pair =
+      from({arm, vehicle, "radars=[left, right]", "left/radar_topic=/left", "right/radar_topic=/right"});
+  EXPECT_EQ(estimated(pair.radars[1]), EstimateExtrinsics::kRotation);
+  EXPECT_DOUBLE_EQ(sigma(pair.radars[1]), M_PI / 180.0);
+  for (const char* line : {"\nestimate_extrinsics: none\n", "\nextrinsics_rotation_sigma: 0.17\n"})
+    EXPECT_NE(toYaml(held).find(line), std::string::npos) << line;
+}
+
 TEST(MountingParameters, AMissingLeverArmIsThatOfOneRadar) {
   const Config config = from({"radars=[left, right]", "left/radar_topic=/left", "right/radar_topic=/right",
                               "left/extrinsics_translation=[0.2, 0, 0]", "estimate_extrinsics=rotation"});

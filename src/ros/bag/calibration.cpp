@@ -15,10 +15,14 @@ namespace {
 Config batchConfig(const Config& config) {
   Config batch = config;
   batch.mode = RunMode::kBatch;
-  EstimateExtrinsics& estimated = batch.odometry.smoother.estimate_extrinsics;
-  // `none` is the default and means pose here, with a lever arm or without.
-  if (!estimatesTurn(estimated)) estimated = EstimateExtrinsics::kPose;
-  for (Config& radar : batch.radars) radar.odometry.smoother.estimate_extrinsics = estimated;
+  // `none` is the default and means pose here, with a lever arm or without, and on any platform.
+  if (config.estimate_extrinsics != EstimateExtrinsics::kNone) return batch;
+  const auto estimate = [&](SmootherOptions& smoother) {
+    smoother.estimate_extrinsics = EstimateExtrinsics::kPose;
+    smoother.extrinsics_rotation_sigma = config.extrinsics_rotation_sigma;
+  };
+  estimate(batch.odometry.smoother);
+  for (Config& radar : batch.radars) estimate(radar.odometry.smoother);
   return batch;
 }
 

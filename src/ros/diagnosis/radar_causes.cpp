@@ -248,6 +248,15 @@ class RadarCauses {
                 ": `rosrun rio_t calibrate` finds it.");
       return;
     }
+    if (refinesHeldMounting(config_)) {
+      cause("mounting_far", share,
+            "The motion of the vehicle shows that the mounting" + of_ +
+                " is turned from the configured one by " + degrees(radar_.turn) +
+                ", and estimate_extrinsics: none takes it to be right to " +
+                number(config_.odometry.smoother.extrinsics_rotation_sigma / kDegree) + " degrees.",
+            "Set estimate_extrinsics: rotation, or correct " + mountingKey() + ".");
+      return;
+    }
     // An estimate that follows a wrong sign turns the mounting around, and then contradicts nothing.
     cause("mounting_far", share,
           "The estimated mounting" + of_ + " is turned from the configured one by " + degrees(radar_.turn) +

@@ -52,9 +52,6 @@ inline std::string mountingAdvice(const RadarSummary& radar) {
              : kCheckBag;
 }
 
-/// [rad] A protractor measures a mounting so well. The user configured it, and the estimator holds it.
-inline constexpr double kConfiguredSigma = 1.0 * kDegree;
-
 /// How far the mounting is turned from the configured one: as the scans say of a mounting that is held, or as
 /// estimated, about the worst axis.
 inline double turnSigmas(const RadarSummary& radar, const Config& config) {

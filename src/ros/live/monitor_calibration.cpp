@@ -100,7 +100,8 @@ void LiveMonitor::describeExtrinsics(Status& status, std::size_t radar) const {
   if (!far.empty()) {
     status.summary(DiagnosticStatus::WARN,
                    "the estimated rotation of " + called(of) + " " + far +
-                       " differs from the configured one by more than 3 extrinsics_rotation_sigma");
+                       " differs from the configured one by more than 3 extrinsics_rotation_sigma, " +
+                       fixedText(kFarMounting * options.extrinsics_rotation_sigma / kDegree, 0) + " degrees");
   } else if (!kept.empty()) {
     status.summary(DiagnosticStatus::OK, "kept: the motion has not shown the " + kept);
   } else {

@@ -12,8 +12,9 @@ void listAids(ParameterList& list, Config& c) {
       "platform", {{"free", Platform::kFree}, {"ground_vehicle", Platform::kGroundVehicle}},
       c.odometry.platform,
       "free allows any motion. ground_vehicle is a vehicle on wheels: one point of it moves neither sideways "
-      "nor upwards. This constraint holds the height. Set estimate_extrinsics: rotation with it. The log and "
-      "the diagnostics say so if the motion contradicts the constraint.");
+      "nor upwards. This constraint holds the height. If you know the mounting of the radar to some degrees "
+      "only, set estimate_extrinsics: rotation with it. The log and the diagnostics say so if the motion "
+      "contradicts the constraint.");
   list.rotation(
       "vehicle_frame_rotation_xyzw", vehicle.T_IV.q_IR,
       "This rotation turns vectors of the vehicle (x forward, y left, z up) into the IMU frame. The estimate "

@@ -218,11 +218,11 @@ void listExtrinsics(ParameterList& list, Config& c) {
       c.estimate_extrinsics,
       "none takes the mounting as it is. rotation estimates the rotation of the radar on the way, and takes "
       "its position as exact. pose estimates its position as well, as far as the platform turns. Use pose "
-      "for "
-      "a mounting by eye, and none after a calibration. A position that is not given is estimated in any "
-      "case.");
+      "for a mounting by eye, and none after a calibration. A position that is not given is estimated in any "
+      "case. With platform: ground_vehicle, none estimates the rotation, too, but takes it to be right to a "
+      "degree (or to extrinsics_rotation_sigma, if that is smaller).");
   list.number(
-      "extrinsics_rotation_sigma", "rad", above(0, M_PI), smoother.extrinsics_rotation_sigma,
+      "extrinsics_rotation_sigma", "rad", above(0, M_PI), c.extrinsics_rotation_sigma,
       "The estimate of the rotation starts with this standard deviation about each axis. 0.17 rad (10 "
       "degrees) suits a mounting by eye, 0.02 rad a mounting from a drawing.");
   list.ofRadar(true);

@@ -78,13 +78,27 @@ void resolveMounting(Config* config) {
   config->extrinsics_axes = ExtrinsicsAxes::kRightForwardUp;
 }
 
+bool refinesHeldMounting(const Config& config) {
+  return config.odometry.platform == Platform::kGroundVehicle &&
+         config.estimate_extrinsics == EstimateExtrinsics::kNone;
+}
+
 void resolveEstimate(Config* config) {
   const std::vector<Config> radars = configsOfRadars(*config);
   EstimateExtrinsics estimate = config->estimate_extrinsics;
+  double turn_sigma = config->extrinsics_rotation_sigma;
+  if (refinesHeldMounting(*config)) {
+    estimate = EstimateExtrinsics::kRotation;
+    turn_sigma = std::min(turn_sigma, kConfiguredSigma);
+  }
   if (!std::all_of(radars.begin(), radars.end(), hasLeverArm))
     estimate = estimatesTurn(estimate) ? EstimateExtrinsics::kPose : EstimateExtrinsics::kLeverArm;
-  config->odometry.smoother.estimate_extrinsics = estimate;
-  for (Config& radar : config->radars) radar.odometry.smoother.estimate_extrinsics = estimate;
+  const auto set = [&](SmootherOptions& smoother) {
+    smoother.estimate_extrinsics = estimate;
+    smoother.extrinsics_rotation_sigma = turn_sigma;
+  };
+  set(config->odometry.smoother);
+  for (Config& radar : config->radars) set(radar.odometry.smoother);
 }
 
 std::vector<std::string> mountingWarnings(const Config& config) {

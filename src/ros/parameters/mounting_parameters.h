@@ -24,6 +24,7 @@ void beginMounting(const ParameterEntries& entries, const std::string& section, 
 void resolveMounting(Config* config);
 
 /// Call it next: what is estimated of the mountings. If one lever arm is missing, all are estimated.
+/// See refinesHeldMounting, too.
 void resolveEstimate(Config* config);
 
 }  // namespace rio_t

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "rio_t/core/angle.h"
 #include "rio_t/imu/units.h"
 #include "rio_t/odometry/body_odometry.h"
 #include "rio_t/odometry/options.h"
@@ -99,10 +100,11 @@ struct Config {
   std::string trajectory_file = "rio_t_trajectory.txt";
 
   ExtrinsicsSource extrinsics_source = ExtrinsicsSource::kParameters;
-  // makeConfig turns these three into odometry.radar and odometry.smoother.
+  // makeConfig turns these four into odometry.radar and odometry.smoother.
   std::optional<Eigen::Vector3d> lever_arm;  ///< [m] in I; nothing: nobody has measured it
   double lever_arm_sigma = 0.0;              ///< [m] per axis; 0: by whether `lever_arm` is given
   EstimateExtrinsics estimate_extrinsics = EstimateExtrinsics::kNone;
+  double extrinsics_rotation_sigma = SmootherOptions().extrinsics_rotation_sigma;  ///< [rad] per axis
   // Two other ways to give the rotation of T_IR. makeConfig turns them into odometry.radar.T_IR, which always
   // has the axes of RIO, and sets them back to their defaults.
   std::optional<Eigen::Vector3d> mounting;  ///< yaw, pitch, roll as MountingAngles, but in degrees
@@ -131,6 +133,13 @@ std::vector<Config> configsOfRadars(const Config& config);
 
 /// Whether the configuration or tf gives the lever arm of this radar.
 bool hasLeverArm(const Config& radar);
+
+/// [rad] A protractor measures a mounting so well.
+constexpr double kConfiguredSigma = 1.0 * kDegree;
+
+/// Whether a mounting that is to be held is estimated all the same, with a prior of kConfiguredSigma: on a
+/// vehicle, an error of a mounting that is exact would tilt the frame of the vehicle.
+bool refinesHeldMounting(const Config& config);
 
 using TopicResolver = std::function<std::string(const std::string& key, const std::string& topic)>;
 /// The configuration with each topic as `resolve` gives it. An empty one stays empty.
