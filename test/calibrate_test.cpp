@@ -366,6 +366,7 @@ TEST_F(Calibrate, OnAVehicleItLooksForThePose) {
   simulateBag(bag_, "difficult", 1, kOffset, truth_);
   const Outcome outcome = calibrateBags({bag_}, {"--set", "platform=ground_vehicle"});
   ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(countOf("   not estimated\n", outcome.out), 0u) << outcome.out;
   EXPECT_EQ(written().odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kPose);
   EXPECT_LT(written().odometry.radar.T_IR.q_IR.angularDistance(truth_.q_IR), 0.6 * kDegree);
 }
