@@ -96,12 +96,14 @@ void BarometerChannel::addBias(FixedLagSmoother& smoother, double bias) {
   addPrior(window, {bias_.get()},
            {Eigen::MatrixXd::Constant(1, 1, 1.0 / kUnknownBias), Eigen::VectorXd::Zero(1)});
   smoother.settle();
-  rejected_since_.reset();
 }
 
 void BarometerChannel::join(FixedLagSmoother& smoother, Time time, bool at_rest) {
   open_ = Mean();
   waiting_.clear();
+  rejected_since_.reset();
+  deviations_.clear();
+  moved_at_.reset();
   Mean at_start;
   for (const Sample& sample : recent_)
     if (sample.time <= time && time - sample.time <= kBeforeStart) add(sample, at_start);
@@ -139,6 +141,52 @@ std::vector<BarometerAnswer> BarometerChannel::use(FixedLagSmoother& smoother) {
   return answers;
 }
 
+std::optional<BarometerChannel::Slope> BarometerChannel::slopeWith(Deviation deviation, double noise,
+                                                                   double span,
+                                                                   const FixedLagSmoother& smoother) {
+  // The two nodes are of one solution: the barometer pulls both. After a silence the last one has left.
+  const auto last = deviations_.empty() ? std::nullopt : smoother.nodeBefore(deviations_.back().node);
+  if (last) {
+    const auto now = smoother.nodeBefore(deviation.node);
+    deviation.path = deviations_.back().path + now->x.p_W().z() - last->x.p_W().z();
+    deviation.height -= deviation.path;
+  } else {
+    deviations_.clear();
+  }
+  deviations_.push_back(deviation);
+  const double memory = std::cbrt(12.0 * noise * span * std::pow(options_.gate / options_.gate_slope, 2));
+  while (deviations_.size() > 3 && deviation.time - deviations_[1].time >= memory) deviations_.pop_front();
+  if (deviations_.size() < 3 || deviation.time - deviations_.front().time < memory) return std::nullopt;
+  Slope slope;
+  double mean_time = 0.0, velocity_variance = 0.0;  // the time counts from the newest
+  for (const Deviation& each : deviations_) {
+    const double weight = 1.0 / static_cast<double>(deviations_.size());
+    mean_time += weight * (each.time - deviation.time);
+    velocity_variance += weight * each.velocity_variance;
+    slope.innovation += weight * each.innovation;
+  }
+  double square = 0.0, product = 0.0;
+  for (const Deviation& each : deviations_) {
+    const double dt = each.time - deviation.time - mean_time;
+    square += dt * dt;
+    product += dt * each.height;
+  }
+  slope.value = product / square;
+  slope.sigma = std::sqrt(noise / square + velocity_variance);
+  return slope;
+}
+
+void BarometerChannel::distrust(Time time, FixedLagSmoother& smoother) {
+  // The pressure went astray before it was noticed: what the window still holds must not pull.
+  std::vector<const Term*> suspects;
+  for (const auto& term : smoother.window().terms())
+    if (dynamic_cast<const BarometerFactor*>(term->cost.get()) != nullptr) suspects.push_back(term.get());
+  for (const Term* term : suspects) smoother.window().remove(*term);
+  deviations_.clear();
+  rejected_since_.reset();
+  moved_at_ = time;
+}
+
 BarometerAnswer BarometerChannel::use(const Mean& mean, const NodeEstimate& node,
                                       FixedLagSmoother& smoother) {
   const double delay = mean.time() - node.time;
@@ -156,21 +204,34 @@ BarometerAnswer BarometerChannel::use(const Mean& mean, const NodeEstimate& node
   answer.bias_sigma = std::sqrt(std::max(0.0, P(StateBlock::kTangent, StateBlock::kTangent)));
   answer.height = mean.height() - answer.bias;
   answer.innovation = answer.height - (predicted->x.p_W().z() + delay * predicted->x.v_W().z());
-  answer.innovation_sigma = std::sqrt(std::max(0.0, (J * P * J.transpose())(0, 0)) + noise);
+  const double variance_of_prediction = std::max(0.0, (J * P * J.transpose())(0, 0));
+  answer.innovation_sigma = std::sqrt(variance_of_prediction + noise);
   const bool contradicts =
       options_.gate > 0.0 && std::abs(answer.innovation) > options_.gate * answer.innovation_sigma;
-  if (!contradicts) {
-    rejected_since_.reset();
-  } else if (!rejected_since_) {
-    rejected_since_ = answer.time;
-  }
-  if (contradicts && answer.time - *rejected_since_ < options_.gate_timeout) {
+  if (!moved_at_ && contradicts) {
+    if (!rejected_since_) rejected_since_ = answer.time;
+    if (answer.time - *rejected_since_ >= options_.gate_timeout) distrust(answer.time, smoother);
     answer.rejected_because = "innovation";
     return answer;
   }
-  if (contradicts) {
-    addBias(smoother, answer.bias + answer.innovation);
-    answer.stepped = true;
+  rejected_since_.reset();
+  const std::optional<Slope> slope =
+      slopeWith({answer.time, node.time, mean.height() - delay * node.x.v_W().z(), 0.0, answer.innovation,
+                 P(StateBlock::kV + 2, StateBlock::kV + 2)},
+                noise, mean.span, smoother);
+  const bool is_steep = options_.gate > 0.0 && slope &&
+                        std::abs(slope->value) > options_.gate_slope + options_.gate * slope->sigma;
+  if (!moved_at_ && is_steep) distrust(answer.time, smoother);
+  if (moved_at_) {
+    if (!slope || std::abs(slope->value) > options_.gate_slope) moved_at_ = answer.time;
+    if (answer.time - *moved_at_ < options_.gate_timeout) {
+      answer.rejected_because = "pressure_moves";
+      return answer;
+    }
+    moved_at_.reset();
+    const double sigma = std::sqrt(variance_of_prediction + noise / static_cast<double>(deviations_.size()));
+    answer.stepped = std::abs(slope->innovation) > options_.gate * sigma;
+    if (answer.stepped) addBias(smoother, answer.bias + slope->innovation);
   }
   smoother.window().add(std::make_unique<BarometerFactor>(mean.height(), delay, std::sqrt(noise)),
                         {smoother.nodeAt(node.time), bias_.get()});

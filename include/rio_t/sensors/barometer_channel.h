@@ -17,7 +17,8 @@ struct BarometerOptions {
   double noise_density = 0.05;
   double drift = 0.005;       ///< [m/sqrt(s)] random walk of the bias: weather, and warmth of the sensor
   double gate = 4.0;          ///< [sigma] a mean farther from the estimate is rejected; 0: no gate
-  double gate_timeout = 1.0;  ///< [s] of rejected means, after which the pressure has stepped for good
+  double gate_timeout = 1.0;  ///< [s] of rejected means show that the pressure moves; of rest, that it rests
+  double gate_slope = 0.07;   ///< [m/s] between barometer and radar, for which the radar may be to blame
   double temperature = 15.0;  ///< [deg C] of the air at the start
 };
 
@@ -52,7 +53,8 @@ struct BarometerAnswer {
 ///
 /// Means over a tenth of a second join the nearest node, as heights off by a bias that walks. A mean that
 /// contradicts the estimate is rejected: doors and rotors shock the pressure. If the means contradict it for
-/// `gate_timeout`, the pressure has stepped, and the bias is estimated again: the height goes on as it is.
+/// `gate_timeout`, or slope against the motion, the pressure moves. No mean is used until it rests. If it
+/// then rests elsewhere, the bias is estimated again: the height goes on as it is.
 class BarometerChannel {
  public:
   explicit BarometerChannel(const BarometerOptions& options) : options_(options) {}
@@ -85,11 +87,28 @@ class BarometerChannel {
     Time time() const { return first + time_sum / count; }
     double height() const { return height_sum / count; }
   };
+  /// A mean against the motion that the radar and the IMU tell.
+  struct Deviation {
+    Time time, node;
+    double height = 0.0;             ///< [m] of the mean minus `path`
+    double path = 0.0;               ///< [m] that the nodes have climbed
+    double innovation = 0.0;         ///< [m]
+    double velocity_variance = 0.0;  ///< [m^2/s^2]
+  };
+  /// That of the deviations.
+  struct Slope {
+    double value = 0.0, sigma = 0.0;  ///< [m/s]
+    double innovation = 0.0;          ///< [m] their mean
+  };
   static void add(const Sample& sample, Mean& mean);
   const char* collect(const Sample& sample);
   double variance(const Mean& mean) const;  ///< [m^2]
   void addBias(FixedLagSmoother& smoother, double bias);
   BarometerAnswer use(const Mean& mean, const NodeEstimate& node, FixedLagSmoother& smoother);
+  /// None before the deviations last long enough.
+  std::optional<Slope> slopeWith(Deviation deviation, double noise, double span,
+                                 const FixedLagSmoother& smoother);
+  void distrust(Time time, FixedLagSmoother& smoother);
 
   BarometerOptions options_;
   std::optional<double> reference_;  ///< the first pressure [Pa]
@@ -101,6 +120,8 @@ class BarometerChannel {
   std::deque<Mean> waiting_;  ///< for a node
   std::shared_ptr<Block> bias_;
   std::optional<Time> rejected_since_;
+  std::deque<Deviation> deviations_;  ///< so many that the slope is known
+  std::optional<Time> moved_at_;      ///< last, since the pressure moves; none while it rests
 };
 
 }  // namespace rio_t

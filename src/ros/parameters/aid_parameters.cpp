@@ -63,8 +63,13 @@ void listAids(ParameterList& list, Config& c) {
       "from the estimate. 0 takes every height.");
   list.number(
       "barometer_gate_timeout", "s", above(0), barometer.gate_timeout,
-      "If heights are rejected for this time, the pressure has stepped for good, and the bias is estimated "
-      "again.");
+      "If heights are rejected for this time, the pressure moves, and no height is used until it rests for "
+      "this time. If it rests elsewhere, the bias is estimated again.");
+  list.number(
+      "barometer_gate_slope", "m/s", above(0), barometer.gate_slope,
+      "If the heights slope by more than this against the motion that the radar tells, beyond what noise "
+      "explains, the pressure moves. Raise it if the radar may be wrong by more: a mounting that is wrong by "
+      "2 degrees makes 0.07 m/s at 2 m/s.");
 }
 
 }  // namespace rio_t
