@@ -25,8 +25,9 @@ EgoVelocity velocityOf(const RadarScan& scan, EgoVelocityEstimator& estimator) {
 /// A rig on a simulated motion that starts at full speed.
 struct Rig {
   Rig(const std::string& name, std::uint64_t seed, double offset,
-      const Eigen::Quaterniond& q_mount = Eigen::Quaterniond::Identity())
-      : q_BI(q_mount), motion(makeMotion(name, seed)) {
+      const Eigen::Quaterniond& q_mount = Eigen::Quaterniond::Identity(),
+      const simulation::SimulationOptions& sensors = {})
+      : q_BI(q_mount), motion(makeMotion(name, seed)), setup(sensors) {
     setup.seed = seed;
     setup.time_offset.constant = offset;
     data = simulation::simulate(motion, setup);
@@ -137,6 +138,34 @@ TEST(MotionInitializer, FindsTiltVelocityAndOffsetAndKnowsHowWell) {
   EXPECT_GT(tilt_squares / runs, 0.1);
   EXPECT_LT(offset_squares / runs, 1.5);
   EXPECT_GT(offset_squares / runs, 0.3);
+}
+
+// A narrow view, with noise of directions and Dopplers that is two to three times what the options say.
+TEST(MotionInitializer, VelocitiesThatScatterWidenItsSigmas) {
+  simulation::SimulationOptions poor;
+  poor.radar.rate = 50.0;
+  poor.radar.points_mean = 20.0;
+  poor.radar.fov_azimuth = 30.0;
+  poor.radar.azimuth_noise = 5.0;
+  poor.radar.doppler_noise = 0.1;
+  poor.radar.doppler_step = 0.04;
+  double squares = 0.0;
+  int runs = 0;
+  for (const char* name : {"start_in_motion", "difficult", "drone"}) {
+    for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
+      SCOPED_TRACE(name + std::string(", seed ") + std::to_string(seed));
+      Rig rig(name, seed, 0.03, Eigen::Quaterniond::Identity(), poor);
+      MotionInitializer initializer(rig.options, rig.options.radar);
+      const auto found = rig.run(initializer, 1.7);
+      ASSERT_TRUE(found) << initializer.waitingFor().text;
+      const Eigen::Matrix3d P = covarianceOf(found->prior).block<3, 3>(StateBlock::kV, StateBlock::kV);
+      const double error = rig.velocityError(*found);
+      squares += error * error / P.trace();
+      ++runs;
+    }
+  }
+  EXPECT_LT(squares / runs, 1.0);
+  EXPECT_GT(squares / runs, 0.2);
 }
 
 TEST(MotionInitializer, WorksForAnyMounting) {

@@ -302,6 +302,7 @@ void Estimator::startAgain(std::uint64_t clock_restarts) {
   at_once.init_motion_after = 0.0;
   initializer_ = Initializer(at_once);
   smoother_ = FixedLagSmoother(options_.smoother, options_.imu_noise, g_W_, imu_);
+  model_error_scale_ = ModelErrorScale();
   health_ = RadarsHealth(options_.health, options_.innovation_gate.sigmas, radars_.size());
   if (landmarks_) landmarks_->forget();
   radar_heard_.reset();
@@ -323,7 +324,7 @@ void Estimator::begin(const Initialization& found) {
   if (ground_vehicle_) ground_vehicle_->join(smoother_, at_rest);
   if (barometer_) barometer_->join(smoother_, found.time, at_rest);
   initializer_.forgetVelocities();
-  model_error_scale_ = ModelErrorScale();
+  model_error_scale_ = found.model_error_scale;
   mounting_check_.velocityKnown();
   last_used_ = found.time;
   contradicted_since_ = found.time;

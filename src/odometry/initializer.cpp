@@ -47,8 +47,10 @@ std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, con
       noise.gyro_density = std::max(noise.gyro_density, std::sqrt(newest.gyro_mean_noise));
       return Initialization{
           rest->time,
-          priorAtRest(options_.smoother, noise, x, options_.gravity, rest->duration, options_.ofRadar(0)), 0,
-          InitializedFrom::kRest};
+          priorAtRest(options_.smoother, noise, x, options_.gravity, rest->duration, options_.ofRadar(0)),
+          0,
+          InitializedFrom::kRest,
+          {}};
     }
   }
   if (!mayStartInMotion()) return std::nullopt;

@@ -31,6 +31,8 @@ constexpr int kMaxRounds = 10;         // of finding the state and which scans t
 constexpr double kOffsetHolds = 1e-3;  // [s] from which the derivatives by the offset are as good
 constexpr double kConverged = 1.0e-4;  // [sigma]
 constexpr double kOutlier = 4.0;       // [sigma]
+constexpr int kScaleRounds = 3;        // of finding the state and the size of the errors around it
+constexpr double kUnknowns = 7.0;      // that the velocities determine: velocity, gravity in I, t_O
 
 /// Whether no gain differs by more than 0.01, which changes nothing.
 bool isNear(const std::vector<double>& a, const std::vector<double>& b) {
@@ -64,15 +66,15 @@ void MotionInitializer::clear() {
 void MotionInitializer::add(Time stamp, const EgoVelocity& velocity) {
   if (!isValid(velocity.status)) return;
   const auto after = std::lower_bound(velocities_.begin(), velocities_.end(), stamp,
-                                      [](const RadarVelocityMeasurement& z, Time t) { return z.stamp < t; });
+                                      [](const Velocity& z, Time t) { return z.stamp < t; });
   if (after != velocities_.end() && after->stamp == stamp) return;
-  velocities_.insert(after, RadarVelocityMeasurement{{stamp}, velocity.v_R, velocity.covariance});
+  velocities_.insert(after, Velocity{{{stamp}, velocity.v_R, velocity.covariance}, velocity.added_variance});
   if (velocities_.size() > kMaxVelocities) velocities_.erase(velocities_.begin());
 }
 
 std::optional<bool> MotionInitializer::isMoving(Time from, Time to, double max_speed) const {
   std::vector<double> axes[3];
-  for (const RadarVelocityMeasurement& z : velocities_) {
+  for (const Velocity& z : velocities_) {
     if (z.stamp < from || to < z.stamp) continue;
     for (int i = 0; i < 3; ++i) axes[i].push_back(z.v_R[i]);
   }
@@ -85,14 +87,12 @@ std::optional<bool> MotionInitializer::isMoving(Time from, Time to, double max_s
 std::optional<Initialization> MotionInitializer::solve(const ImuBuffer& imu,
                                                        const std::function<PoseAnchor(Time)>& anchorAt) {
   if (velocities_.empty() || imu.empty()) return std::nullopt;
-  const auto outOfReach = [&](const RadarVelocityMeasurement& z) {
-    return std::abs(z.stamp - imu.newest()) > imuHistory();
-  };
+  const auto outOfReach = [&](const Velocity& z) { return std::abs(z.stamp - imu.newest()) > imuHistory(); };
   velocities_.erase(std::remove_if(velocities_.begin(), velocities_.end(), outOfReach), velocities_.end());
   // Any offset within the bound must be covered by the IMU.
   const Time covered = imu.newest() - smoother_.max_time_offset;
   const auto after = std::upper_bound(velocities_.begin(), velocities_.end(), covered,
-                                      [](Time t, const RadarVelocityMeasurement& z) { return t < z.stamp; });
+                                      [](Time t, const Velocity& z) { return t < z.stamp; });
   if (after == velocities_.begin() || std::prev(after)->stamp == tried_at_) return std::nullopt;
   const Time time = std::prev(after)->stamp;
   tried_at_ = time;
@@ -130,23 +130,26 @@ std::optional<Initialization> MotionInitializer::initialize(const Velocities& wi
             line.g_I.norm(), g_W_.norm())};
     return std::nullopt;
   }
+  const NodePrior known = priorOf(line, anchorAt(time));
   Initialization result;
   result.time = time;
   result.from = InitializedFrom::kMotion;
-  result.prior = priorOf(line, anchorAt(time));
-  const std::optional<double> outliers = refine(window, time, imu, result.prior);
-  if (!outliers) {
-    waiting_for_ = {StartObstacle::kTooFewData,
-                    "motion: the radar velocities do not determine tilt and velocity"};
-    return std::nullopt;
-  }
-  if (*outliers > options_.max_outlier_fraction) {
-    waiting_for_ = {
-        StartObstacle::kContradiction,
-        formatted("radar and IMU that agree: %.0f %% of the radar velocities do not fit the IMU, at most "
-                  "%.0f %% allowed: extrinsics, Doppler sign, units?",
-                  100.0 * *outliers, 100.0 * options_.max_outlier_fraction)};
-    return std::nullopt;
+  for (int round = 0; round < kScaleRounds; ++round) {
+    result.prior = known;
+    const std::optional<double> outliers = refine(window, time, imu, result.model_error_scale, result.prior);
+    if (!outliers) {
+      waiting_for_ = {StartObstacle::kTooFewData,
+                      "motion: the radar velocities do not determine tilt and velocity"};
+      return std::nullopt;
+    }
+    if (*outliers > options_.max_outlier_fraction) {
+      waiting_for_ = {
+          StartObstacle::kContradiction,
+          formatted("radar and IMU that agree: %.0f %% of the radar velocities do not fit the IMU, at most "
+                    "%.0f %% allowed: extrinsics, Doppler sign, units?",
+                    100.0 * *outliers, 100.0 * options_.max_outlier_fraction)};
+      return std::nullopt;
+    }
   }
   waiting_for_ = {};
   return result;
@@ -187,7 +190,7 @@ MotionInitializer::Velocities MotionInitializer::windowUntil(Time time, const Im
   });
   const Time first = std::max(time - options_.window, covered + reach);
   Velocities result;
-  for (const RadarVelocityMeasurement& z : velocities_) {
+  for (const Velocity& z : velocities_) {
     if (first <= z.stamp && z.stamp <= time) result.push_back(z);
   }
   return result;
@@ -200,7 +203,7 @@ MotionInitializer::Line MotionInitializer::fitLine(const Velocities& velocities,
   double mean_TT = 0.0;
   Eigen::Vector3d mean_y = Eigen::Vector3d::Zero();
   Eigen::Vector3d mean_Ty = Eigen::Vector3d::Zero();
-  for (const RadarVelocityMeasurement& z : velocities) {
+  for (const Velocity& z : velocities) {
     const Time tau = z.stamp - radar_.time_offset_initial;
     const ImuDelta delta = integrate(imu, time, tau, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
     const Eigen::Vector3d v_I =
@@ -223,7 +226,7 @@ MotionInitializer::Line MotionInitializer::fitLine(const Velocities& velocities,
 }
 
 std::optional<double> MotionInitializer::refine(const Velocities& velocities, Time time, const ImuBuffer& imu,
-                                                NodePrior& prior) const {
+                                                ModelErrorScale& scale, NodePrior& prior) const {
   Window window;
   Block& motion = window.addNode(time, std::make_shared<MotionManifold>(), storedMotion(prior.x0));
   const std::shared_ptr<Block> biases =
@@ -244,6 +247,8 @@ std::optional<double> MotionInitializer::refine(const Velocities& velocities, Ti
   const std::shared_ptr<ceres::LossFunction> loss = huberLoss(smoother_.huber_threshold);
   const RadarMotionModel model{TimeOffsetModel::kImu, smoother_.max_time_offset, g_W_, &imu};
 
+  std::vector<CarriedCovariance> covariances;
+  for (const Velocity& z : velocities) covariances.push_back(carriedCovariance(z, time, imu, scale.value()));
   // Which scans tell the offset depends on the state, and the state on them.
   std::vector<const Term*> terms;
   OffsetGains offset_gains;
@@ -259,7 +264,7 @@ std::optional<double> MotionInitializer::refine(const Velocities& velocities, Ti
     terms.clear();
     for (std::size_t i = 0; i < velocities.size(); ++i) {
       RadarVelocityMeasurement z = velocities[i];
-      z.covariance.diagonal().array() += carriedVariance(z.stamp, time, imu);
+      z.covariance = covariances[i].whole;
       z.offset_gain = gains[i];
       z.offset_half_width = offset_gains.half_width;
       z.linear_from_t_O = linear_from;
@@ -275,14 +280,22 @@ std::optional<double> MotionInitializer::refine(const Velocities& velocities, Ti
 
   const double n = static_cast<double>(velocities.size());
   double outliers = 0.0;
+  double mean_square = 0.0;
+  double mean_share = 0.0;
   for (std::size_t i = 0; i < velocities.size(); ++i) {
     const double* values[] = {motion.x.data(), biases->x.data(), offset->x.data(), extrinsics->x.data()};
     Eigen::Vector3d e;
     terms[i]->cost->Evaluate(values, e.data(), nullptr);
+    const double square = std::min(e.squaredNorm(), kOutlier * kOutlier);
     if (e.norm() > kOutlier) outliers += 1.0 / n;
+    mean_square += square / n;
+    mean_share += covariances[i].whole.ldlt().solve(covariances[i].scaled).trace() / (3.0 * n);
   }
   const SquareRoot root = eliminateFirst(linearize(window), 0);
   prior = {stateOf(motion, *biases), offset->x[0], toExtrinsics(extrinsics->x.data()), root};
+  // The solution is drawn towards the velocities: what is left scatters less.
+  const double left = 3.0 * n / (3.0 * n - kUnknowns);
+  for (std::size_t i = 0; i < velocities.size(); ++i) scale.add(time, left * mean_square, mean_share);
   return outliers;
 }
 
@@ -294,7 +307,7 @@ MotionInitializer::OffsetGains MotionInitializer::offsetGains(const Velocities& 
   if (!smoother_.estimate_time_offset) return result;
   OffsetWidths widths(imu, g_W_);
   std::vector<OffsetScan> scans;
-  for (const RadarVelocityMeasurement& z : velocities) {
+  for (const Velocity& z : velocities) {
     OffsetScan scan;
     scan.tau = z.stamp - t_O;
     scan.x = carried(x, time, scan.tau, imu, g_W_);
@@ -311,15 +324,25 @@ MotionInitializer::OffsetGains MotionInitializer::offsetGains(const Velocities& 
   return result;
 }
 
-double MotionInitializer::carriedVariance(Time stamp, Time time, const ImuBuffer& imu) const {
-  const double T = std::abs(stamp - time);
+/// Covariance that the IMU adds between the state and a scan: noise of the accelerometer, and of the tilt.
+MotionInitializer::CarriedCovariance MotionInitializer::carriedCovariance(const Velocity& z, Time time,
+                                                                          const ImuBuffer& imu,
+                                                                          double scale) const {
+  const double T = std::abs(z.stamp - time);
   const double tilt = noise_.gyro_density * g_W_.norm();
-  double variance = tilt * tilt * T * T * T / 3.0;
-  imu.forEachInterval(std::min(stamp, time), std::max(stamp, time),
+  const ImuNoise noise = noise_.scaled(scale);
+  const double configured = noise.accel_density * noise.accel_density;
+  double accel = 0.0, accel_scaled = 0.0;  // [m^2/s^2]
+  imu.forEachInterval(std::min(z.stamp, time), std::max(z.stamp, time),
                       [&](double dt, const auto&, const auto&, const ImuMeasurement& later) {
-                        variance += dt * noise_.accelVariance(later);
+                        accel += dt * noise.accelVariance(later);
+                        if (configured > later.accel_mean_noise) accel_scaled += dt * configured;
                       });
-  return variance;
+  const Eigen::Vector3d added = scale * z.added_variance;
+  CarriedCovariance covariance{z.covariance, (added.array() + accel_scaled).matrix().asDiagonal()};
+  covariance.whole.diagonal() += added - z.added_variance;
+  covariance.whole.diagonal().array() += accel + tilt * tilt * T * T * T / 3.0;
+  return covariance;
 }
 
 }  // namespace rio_t

@@ -9,6 +9,7 @@
 #include "rio_t/imu/buffer.h"
 #include "rio_t/imu/noise.h"
 #include "rio_t/imu/start_wait.h"
+#include "rio_t/odometry/model_error_scale.h"
 #include "rio_t/radar/ego_velocity.h"
 #include "rio_t/smoother/node_prior.h"
 #include "rio_t/smoother/options.h"
@@ -45,6 +46,7 @@ struct Initialization {
   NodePrior prior;        ///< on the state and on the calibration of `radar`, correlations included
   std::size_t radar = 0;  ///< whose velocities it is from; the first, from rest
   InitializedFrom from = InitializedFrom::kRest;
+  ModelErrorScale model_error_scale;  ///< of the velocities around it
 };
 
 /// Finds the first state of a moving platform from seconds of radar and IMU (docs/method.md, section 11).
@@ -75,7 +77,10 @@ class MotionInitializer {
   double imuHistory() const;
 
  private:
-  using Velocities = std::vector<RadarVelocityMeasurement>;
+  struct Velocity : RadarVelocityMeasurement {
+    Eigen::Vector3d added_variance;  ///< see EgoVelocity
+  };
+  using Velocities = std::vector<Velocity>;
 
   /// The velocities of the window that ends with `time`, as far as the IMU covers them without a gap.
   Velocities windowUntil(Time time, const ImuBuffer& imu) const;
@@ -91,17 +96,21 @@ class MotionInitializer {
   /// tilt nor velocity.
   NodePrior priorOf(const Line& line, const PoseAnchor& anchor) const;
   /// Improves `prior.x0` and `prior.t_O0`, around which it starts, and adds the information of the
-  /// velocities. Returns the share of outliers; none if the velocities do not determine the state.
+  /// velocities, with model errors of `scale`. Improves `scale` by the scatter of the velocities around the
+  /// solution. Returns the share of outliers; none if the velocities do not determine the state.
   std::optional<double> refine(const Velocities& velocities, Time time, const ImuBuffer& imu,
-                               NodePrior& prior) const;
+                               ModelErrorScale& scale, NodePrior& prior) const;
   struct OffsetGains {
     std::vector<double> gains;  ///< of OffsetEvidence; 0: the velocity says nothing about the offset
     double half_width = kOffsetHalfWidth;  ///< of the mean of the IMU in the derivative [s]
   };
   OffsetGains offsetGains(const Velocities& velocities, Time time, const ImuBuffer& imu, const StateBlock& x,
                           double t_O) const;
-  /// Variance per axis that the IMU adds between the state at `time` and a velocity [m^2/s^2].
-  double carriedVariance(Time stamp, Time time, const ImuBuffer& imu) const;
+  struct CarriedCovariance {
+    Eigen::Matrix3d whole;   ///< of a velocity against the state at `time` [m^2/s^2]
+    Eigen::Matrix3d scaled;  ///< its part that the model errors scale
+  };
+  CarriedCovariance carriedCovariance(const Velocity& z, Time time, const ImuBuffer& imu, double scale) const;
 
   MotionInitializerOptions options_;  // read-only after construction, as the next three
   SmootherOptions smoother_;
