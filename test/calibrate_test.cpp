@@ -413,7 +413,7 @@ TEST_F(Calibrate, ABatchThatDoesNotConvergeDoesNotCount) {
   expectSays(contents(folder_ + "/batch/summary.yaml"),
              {"verdict: doubtful", "name: not_converged", "batch_converged: false"});
   expectSays(outcome.err, {bag_ + " does not count: the batch did not converge", "batch_max_iterations",
-                           "check_bag BAG` finds one"});
+                           "check_bag BAG` finds a mounting"});
 }
 
 TEST(CalibrateFailure, MostScansDivergedDoesNotCount) {

@@ -59,7 +59,7 @@ std::string failureOf(const RunSummary& summary) {
     failure = "the odometry diverged for " + std::to_string(summary.scans_diverged) + " of " +
               std::to_string(summary.scansTotal()) + " scans";
   } else if (!summary.batch || !summary.batch->converged) {
-    failure = "the batch did not converge";
+    failure = "the batch did not converge (`rosrun rio_t check_bag BAG` finds a mounting to start from)";
   }
   if (failure.empty() || summary.diagnosis.causes.empty()) return failure;
   const Cause& likeliest = summary.diagnosis.causes.front();

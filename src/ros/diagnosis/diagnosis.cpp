@@ -190,23 +190,21 @@ void addVehicle(const RunEvidence& evidence, const Config& config, std::vector<C
        1.0 - kFarMounting / sigmas});
 }
 
-constexpr const char* kOrMounting =
-    ". A wrong mounting can have the same effect; `rosrun rio_t check_bag BAG` finds one to start from.";
-
 void addSolver(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
   const Windows windows = windowsOf(evidence);
   const double share = shareOf(windows.not_converged, windows.all);
   if (share < kManyWindows) return;
   if (config.mode == RunMode::kBatch) {
-    causes->push_back(
-        {"not_converged", "The batch stopped before it converged.",
-         "Raise batch_max_iterations " + std::to_string(config.batch_max_iterations) + kOrMounting, share});
+    causes->push_back({"not_converged", "The batch stopped before it converged.",
+                       "Raise batch_max_iterations " + std::to_string(config.batch_max_iterations) +
+                           ". A wrong mounting can have the same effect.",
+                       share});
   } else if (windows.all >= kEnoughScans) {
-    causes->push_back(
-        {"not_converged",
-         outOf(windows.not_converged, windows.all, "windows") + " stop before they converge.",
-         "Raise max_iterations " + std::to_string(config.odometry.smoother.max_iterations) + kOrMounting,
-         share});
+    causes->push_back({"not_converged",
+                       outOf(windows.not_converged, windows.all, "windows") + " stop before they converge.",
+                       "Raise max_iterations " + std::to_string(config.odometry.smoother.max_iterations) +
+                           ". A wrong mounting can have the same effect.",
+                       share});
   }
 }
 
