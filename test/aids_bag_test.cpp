@@ -56,6 +56,7 @@ class AidsBag : public testing::Test {
     rig.T_IR.q_IR = rig.T_IR.q_IR * Eigen::AngleAxisd(7.0 * kDegree, Eigen::Vector3d::UnitX());
     writeSimulationBag(folder_ + "/vehicle.bag", motion, simulation::simulate(motion, rig), rig.start, {});
   }
+
   RunSummary run(const std::string& bag, const ParameterEntries& entries) const {
     ParameterEntries all = readParameterFile(findConfigFile("irs"));
     all.insert(all.end(), entries.begin(), entries.end());

@@ -112,12 +112,13 @@ TEST(Barometer, ShocksOfThePressureDoNoHarm) {
             std::abs(calm.heightError(calm.states.back())) + 0.2);
 }
 
-/// What a disturbance of the pressure [Pa] over the time [s] does to a drone.
+/// How much a disturbance of the pressure harms the estimate of a drone.
 struct Disturbed {
   double harm = 0.0;  ///< [m] the height differs by at most this from that without the disturbance
   int steps = 0;
 };
 
+/// Adds `disturbance` [Pa], a function of the time [s], to the pressures of a flight.
 Disturbed disturbed(const std::function<double(double)>& disturbance) {
   DroneRun calm(4, 90.0, true), run(4, 90.0, true);
   calm.run();
@@ -130,7 +131,6 @@ Disturbed disturbed(const std::function<double(double)>& disturbance) {
   for (std::size_t k = 0; k < std::min(calm.states.size(), run.states.size()); ++k)
     result.harm = std::max(result.harm, std::abs(run.states[k].p_W.z() - calm.states[k].p_W.z()));
   result.steps = run.count(0.0, 90.0, isStep);
-  std::printf("harm %.2f m, %d steps\n", result.harm, result.steps);
   return result;
 }
 

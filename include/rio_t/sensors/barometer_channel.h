@@ -95,10 +95,10 @@ class BarometerChannel {
     double innovation = 0.0;         ///< [m]
     double velocity_variance = 0.0;  ///< [m^2/s^2]
   };
-  /// That of the deviations.
+  /// The straight line through the deviations (docs/method.md, eq. 19i).
   struct Slope {
     double value = 0.0, sigma = 0.0;  ///< [m/s]
-    double innovation = 0.0;          ///< [m] their mean
+    double innovation = 0.0;          ///< [m] the mean of the deviations' innovations
   };
   static void add(const Sample& sample, Mean& mean);
   const char* collect(const Sample& sample);
@@ -108,6 +108,7 @@ class BarometerChannel {
   /// None before the deviations last long enough.
   std::optional<Slope> slopeWith(Deviation deviation, double noise, double span,
                                  const FixedLagSmoother& smoother);
+  /// The pressure moves since `time`: the window gives up its terms of the barometer.
   void distrust(Time time, FixedLagSmoother& smoother);
 
   BarometerOptions options_;
@@ -120,7 +121,7 @@ class BarometerChannel {
   std::deque<Mean> waiting_;  ///< for a node
   std::shared_ptr<Block> bias_;
   std::optional<Time> rejected_since_;
-  std::deque<Deviation> deviations_;  ///< so many that the slope is known
+  std::deque<Deviation> deviations_;  ///< of the time that the slope needs
   std::optional<Time> moved_at_;      ///< last, since the pressure moves; none while it rests
 };
 
