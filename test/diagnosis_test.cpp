@@ -468,6 +468,7 @@ TEST(Diagnosis, TheImuIsNamed) {
   const std::pair<std::string, std::string> more[] = {{"imu_not_finite", "NaN"},
                                                       {"imu_not_plausible", "imu_accel_range"},
                                                       {"imu_stamp_jump", "imu_jump_patience"},
+                                                      {"imu_repeated", "read a new one"},
                                                       {"imu_stuck", "gyro"}};
   for (const auto& [name, part] : more) {
     evidence = goodRun();

@@ -72,6 +72,47 @@ TEST_F(Gate, SamplesOutOfPlaceAreDroppedAndTheOthersGoOn) {
   EXPECT_EQ(decision, Decision::kTake);
 }
 
+/// A driver that could not read its sensor publishes the last sample again.
+TEST_F(Gate, ASampleThatRepeatsIsDropped) {
+  ImuMeasurement last = motion.imuSample(1.0);
+  last.angular_velocity.z() = 0.5;
+  EXPECT_EQ(feed(last), "");
+  for (double s = 1.01; s < 1.295; s += 0.01) {
+    last.time = motion.time(s);
+    ASSERT_EQ(feed(last), "imu_repeated") << s;
+    ASSERT_EQ(decision, Decision::kDrop);
+  }
+  EXPECT_EQ(feed(1.3), "imu_gap");
+  EXPECT_GT(bridge.size(), 10u);
+  EXPECT_GT(sample.unseen_gyro_variance, 0.0);
+}
+
+TEST_F(Gate, ASampleThatRepeatsForLongIsHardlyBelieved) {
+  ImuMeasurement last = motion.imuSample(1.0);
+  last.angular_velocity.z() = 0.5;
+  EXPECT_EQ(feed(last), "");
+  for (double s = 1.01; s < 1.995; s += 0.01) {
+    last.time = motion.time(s);
+    ASSERT_NE(feed(last).find("imu_repeated"), std::string::npos) << s;
+    ASSERT_EQ(decision, s < 1.495 ? Decision::kDrop : Decision::kTake) << s;
+  }
+  EXPECT_GT(sample.unseen_gyro_variance, 0.1);
+  EXPECT_GT(sample.unseen_accel_variance, 1.0);
+  EXPECT_EQ(feed(2.0), "");
+  EXPECT_GT(sample.unseen_gyro_variance, 0.1) << "in the interval before";
+  EXPECT_EQ(feed(2.01), "");
+  EXPECT_EQ(sample.unseen_gyro_variance, 0.0);
+}
+
+/// Simulators have such IMUs.
+TEST_F(Gate, AnImuWithoutNoiseMayRepeatItselfAtRest) {
+  for (double s = 1.0; s < 2.0; s += 0.01) {
+    ASSERT_EQ(feed({motion.time(s), {0.02, 0.0, 0.0}, {0.0, 0.0, 9.81}}), "") << s;
+    ASSERT_EQ(decision, Decision::kTake);
+  }
+  EXPECT_EQ(sample.unseen_gyro_variance, 0.0);
+}
+
 TEST_F(Gate, StampsThatRunElsewhereMakeAJumpOnlyAfterAWhile) {
   for (const double jump : {500.0, -700.0, 300.0}) {
     t += jump;

@@ -11,6 +11,8 @@ namespace {
 constexpr double kImpossibleAcceleration = 2000.0;
 /// [ranges] No IMU reads more than twice its range. The configured range may be rounded.
 constexpr double kImpossibleShareOfRange = 2.0;
+/// [rad/s] No bias of a gyro is as large: the IMU turns.
+constexpr double kTurns = 0.1;
 
 void raise(double& variance, double density) { variance = std::max(variance, density * density); }
 
@@ -28,12 +30,26 @@ const char* ImuSampleCheck::faultOfValues(const ImuMeasurement& imu) const {
   return imu.acceleration.cwiseAbs().maxCoeff() > most_acceleration_ ? "imu_not_plausible" : nullptr;
 }
 
+// Where the IMU turns, gravity moves in it, so no two samples are the same. At rest an IMU without noise, as
+// some simulators have, repeats itself.
+bool ImuSampleCheck::repeats(const ImuMeasurement& imu) {
+  const bool is_new =
+      !new_ || new_->angular_velocity != imu.angular_velocity || new_->acceleration != imu.acceleration;
+  if (is_new) new_ = imu;
+  return !is_new && new_->time < imu.time && imu.angular_velocity.norm() > kTurns;
+}
+
 ImuSampleCheck::Verdict ImuSampleCheck::check(const ImuMeasurement& imu) {
   Verdict verdict;
   verdict.before = stamps_.newest();
   if (latest_) longest_step_ = std::max(longest_step_, imu.time - *latest_);
   latest_ = imu.time;
   verdict.fault = faultOfValues(imu);
+  if (verdict.fault == nullptr && repeats(imu)) {
+    verdict.repeats = true;
+    // For so long a bridged gap is better than the old values. An IMU of a simulator may go on for ever.
+    if (imu.time - new_->time < kMotionCorrelationTime) verdict.fault = "imu_repeated";
+  }
   if (verdict.fault == nullptr) {
     const ClockJumpDetector::Verdict stamp = stamps_.check(imu.time);
     if (stamp == ClockJumpDetector::Verdict::kBehind) verdict.fault = "imu_out_of_order";
@@ -83,20 +99,20 @@ ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
     verdict.faults.push_back("imu_clock_back");
     addLostMotion(gap, imu);
   }
-  // The interval before and the one after a saturated sample both hide something.
-  const SaturationDetector::Saturated saturated = saturation_.check(imu);
-  if (saturated.accel || saturated.gyro) verdict.faults.push_back("imu_saturated");
-  if (saturated.gyro || was_saturated_.gyro) raise(imu.unseen_gyro_variance, options_.unseen_gyro_density);
-  if (saturated.accel || was_saturated_.accel)
-    raise(imu.unseen_accel_variance, options_.unseen_accel_density);
-  was_saturated_ = saturated;
+  // The interval before and the one after a saturated sample both hide something. So do those of a repeat.
+  const SaturationDetector::Saturated hides =
+      sample.repeats ? SaturationDetector::Saturated{true, true} : saturation_.check(imu);
+  if (hides.accel || hides.gyro) verdict.faults.push_back(sample.repeats ? "imu_repeated" : "imu_saturated");
+  if (hides.gyro || hid_.gyro) raise(imu.unseen_gyro_variance, options_.unseen_gyro_density);
+  if (hides.accel || hid_.accel) raise(imu.unseen_accel_variance, options_.unseen_accel_density);
+  hid_ = hides;
   const bool is_stuck = replaceStuck(imu);
   if (is_stuck) {
     verdict.faults.push_back("imu_stuck");
     raise(imu.unseen_gyro_variance, options_.unseen_gyro_density);
   }
   // Motion over a long gap would look like noise.
-  if (saturated.accel || saturated.gyro || is_stuck || gap > kMotionCorrelationTime || imu.lost_time > 0.0) {
+  if (hides.accel || hides.gyro || is_stuck || gap > kMotionCorrelationTime || imu.lost_time > 0.0) {
     accel_noise_.interrupt();
     gyro_noise_.interrupt();
   } else {

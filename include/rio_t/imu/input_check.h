@@ -44,8 +44,10 @@ class ImuSampleCheck {
  public:
   struct Verdict {
     /// Why the sample is dropped; null: it is taken. "imu_not_finite" or "imu_not_plausible" by its values,
-    /// whatever its stamp; "imu_out_of_order" or "imu_stamp_jump" by its stamp.
+    /// whatever its stamp; "imu_repeated" by those of the sample before; "imu_out_of_order" or
+    /// "imu_stamp_jump" by its stamp.
     const char* fault = nullptr;
+    bool repeats = false;        ///< the sample is the one before, with a new stamp
     bool is_restart = false;     ///< the clock jumped, or the gap was too long: forget all before
     double stepped_back = 0.0;   ///< [s] by which the clock had stepped back before this sample
     std::optional<Time> before;  ///< stamp of the newest sample taken before; none of the first sample
@@ -61,9 +63,12 @@ class ImuSampleCheck {
  private:
   /// Why the sample is dropped by its values; null: it is not.
   const char* faultOfValues(const ImuMeasurement& imu) const;
+  /// Whether the sample is the one before once more, with a new stamp.
+  bool repeats(const ImuMeasurement& imu);
 
   double most_acceleration_, max_gap_;  // [m/s^2], [s] read-only after construction
   ClockJumpDetector stamps_;
+  std::optional<ImuMeasurement> new_;  // the newest that did not repeat the one before
   // These describe the samples that came after the newest one that was taken.
   std::map<std::string, std::uint64_t> dropped_;
   std::optional<Time> latest_;  // stamp, of that one, too
@@ -84,8 +89,8 @@ class ImuInputCheck {
   };
   struct Verdict {
     Decision decision = Decision::kTake;
-    /// Snake case: "imu_not_finite", "imu_not_plausible", "imu_out_of_order", "imu_stamp_jump",
-    /// "imu_clock_restart", "imu_clock_back", "imu_gap", "imu_saturated", "imu_stuck".
+    /// Snake case: "imu_not_finite", "imu_not_plausible", "imu_repeated", "imu_out_of_order",
+    /// "imu_stamp_jump", "imu_clock_restart", "imu_clock_back", "imu_gap", "imu_saturated", "imu_stuck".
     std::vector<const char*> faults = {};
     /// Samples to take first: they stand for a gap before this sample.
     std::vector<ImuMeasurement> bridge = {};
@@ -111,7 +116,7 @@ class ImuInputCheck {
   std::array<StuckAxisDetector, 3> gyro_axes_;
   GapBridge bridge_;
   NoiseSpectrum accel_noise_, gyro_noise_;
-  SaturationDetector::Saturated was_saturated_;
+  SaturationDetector::Saturated hid_;  // what the sample before did not show
 };
 
 }  // namespace rio_t

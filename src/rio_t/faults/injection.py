@@ -225,6 +225,24 @@ def imu_stamps_repeated(messages, site):
     return edit(messages, "imu", site.covers, repeat)
 
 
+def imu_repeats(every=None):
+    """The driver publishes the sample before once more: all the time, or but for one of `every` samples."""
+    def inject(messages, site):
+        new, count = None, 0
+        result = []
+        for m in messages:
+            if m.kind == "imu":
+                count += 1
+                if new is not None and site.covers(m) and (every is None or count % every):
+                    m = m.changed()
+                    m.content.linear_acceleration, m.content.angular_velocity = new
+                else:
+                    new = m.content.linear_acceleration, m.content.angular_velocity
+            result.append(m)
+        return result
+    return inject
+
+
 def imu_saturated(accel=False, gyro=False, share=0.6):
     """Readings of all axes end at that share of what the motion of this bag reaches in a hundredth of the time; the
     accelerometer's beyond gravity, on the axis that is upright at rest."""

@@ -27,6 +27,8 @@ constexpr ImuFault kImuFaults[] = {
      "Correct the driver of the IMU: it writes NaN or infinity."},
     {"imu_not_plausible", 1, "IMU samples have an acceleration that no IMU measures.",
      "Check imu_acceleration_unit and imu_accel_range, the cable and the driver of the IMU."},
+    {"imu_repeated", 1, "IMU samples have the values of the sample before, although the IMU turns.",
+     "Let the driver of the IMU publish a sample only if it has read a new one."},
     {"imu_stamp_jump", 1, "IMU samples are stamped far ahead of the one before.",
      "Look at the clock of the driver. For an IMU with pauses, raise imu_jump_patience."},
     {"imu_stuck", 1, "IMU samples have a gyro axis that jumps away and stays there.",
