@@ -212,6 +212,7 @@ TEST(Diagnosis, RejectedScansNameReasonAndKey) {
       {"imu_not_covering", "radar_stamp_shift"},
       {"trigger_missing", "trigger_topic"},
       {"duplicate_stamp", "stamp_source: arrival"},
+      {"scan_repeated", "only if it has measured"},
       {"queue_full", "window"},
       {"cloud_not_usable", "radar_format"},
       {"too_few_points", "detection threshold"},

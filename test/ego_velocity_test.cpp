@@ -269,5 +269,27 @@ TEST(EgoVelocity, AScanThatComesTwiceDoesNotConfirmItself) {
   EXPECT_EQ(estimator.dopplerSpan().value, 0.0);
 }
 
+/// A driver that publishes its last scan again, with a new stamp.
+TEST(EgoVelocity, InMotionNoTwoScansAreTheSame) {
+  Random random(9);
+  EgoVelocityEstimator estimator(knownStep());
+  RadarScan scan = staticScene(kVelocity, 40, {0.02, 0.03, 0.02, 0.125}, random);
+  scan.stamp = Time::fromSeconds(10.0);
+  EXPECT_TRUE(estimator.observe(scan));
+  EXPECT_TRUE(estimator.observe(scan)) << "the stamp is the fault";
+  for (const double later : {0.05, 0.1}) {
+    scan.stamp = Time::fromSeconds(10.0 + later);
+    EXPECT_FALSE(estimator.observe(scan)) << later;
+  }
+  scan.points.front().doppler += 0.125;
+  EXPECT_TRUE(estimator.observe(scan));
+  // At rest some radars repeat themselves.
+  for (RadarPoint& p : scan.points) p.doppler = 0.0;
+  for (const double later : {0.2, 0.3}) {
+    scan.stamp = Time::fromSeconds(10.0 + later);
+    EXPECT_TRUE(estimator.observe(scan)) << later;
+  }
+}
+
 }  // namespace
 }  // namespace rio_t

@@ -9,6 +9,7 @@
 #include "rio_t/imu/gap_bridge.h"
 #include "rio_t/imu/input_check.h"
 #include "rio_t/imu/preintegration.h"
+#include "rio_t/imu/stuck_axis_detector.h"
 #include "synthetic_motion.h"
 
 namespace rio_t {
@@ -411,6 +412,31 @@ TEST_F(Gate, AStuckAxisMayHaveNoise) {
   }
   feed(1.3);
   EXPECT_EQ(sample.angular_velocity, motion.imuSample(1.3).angular_velocity);
+}
+
+/// At a reading that is plausible, while the IMU turns about another axis.
+TEST_F(Gate, AGyroAxisThatFreezesIsReplaced) {
+  for (double s = 1.0; s < 1.3; s += 0.01) {
+    ImuMeasurement frozen = motion.imuSample(s);
+    frozen.angular_velocity.x() += 0.5;
+    frozen.angular_velocity.y() = 0.02;
+    const bool is_found = s > 1.105;  // more than ten repeats
+    ASSERT_EQ(feed(frozen), is_found ? "imu_stuck" : "") << s;
+    ASSERT_EQ(sample.angular_velocity.y() < 0.02, is_found) << s;
+    ASSERT_EQ(sample.unseen_gyro_variance > 0.1, is_found) << s;
+  }
+  EXPECT_EQ(feed(1.3), "");
+  EXPECT_EQ(sample.angular_velocity, motion.imuSample(1.3).angular_velocity);
+}
+
+/// An axis about which a vehicle hardly turns, with steps coarser than its noise. The rest before the start
+/// shows its runs.
+TEST(StuckAxisDetector, ACoarseGyroRepeatsItself) {
+  StuckAxisDetector axis;
+  for (int i = 0; i < 1000; ++i) {
+    const double reading = i / 20 % 2 == 0 ? 0.0 : 0.001;
+    ASSERT_FALSE(axis.check(Time::fromSeconds(0.01 * i), reading, i >= 100, false)) << i;
+  }
 }
 
 TEST_F(Gate, AFastTurnThatGoesOnIsNotStuck) {

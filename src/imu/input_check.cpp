@@ -11,8 +11,6 @@ namespace {
 constexpr double kImpossibleAcceleration = 2000.0;
 /// [ranges] No IMU reads more than twice its range. The configured range may be rounded.
 constexpr double kImpossibleShareOfRange = 2.0;
-/// [rad/s] No bias of a gyro is as large: the IMU turns.
-constexpr double kTurns = 0.1;
 
 void raise(double& variance, double density) { variance = std::max(variance, density * density); }
 
@@ -106,7 +104,7 @@ ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
   if (hides.gyro || hid_.gyro) raise(imu.unseen_gyro_variance, options_.unseen_gyro_density);
   if (hides.accel || hid_.accel) raise(imu.unseen_accel_variance, options_.unseen_accel_density);
   hid_ = hides;
-  const bool is_stuck = replaceStuck(imu);
+  const bool is_stuck = replaceStuck(imu, hides.gyro);
   if (is_stuck) {
     verdict.faults.push_back("imu_stuck");
     raise(imu.unseen_gyro_variance, options_.unseen_gyro_density);
@@ -147,11 +145,12 @@ void ImuInputCheck::addLostMotion(double dt, ImuMeasurement& imu) const {
         density((imu.acceleration - bridge_.gravity()).norm(), options_.unseen_accel_density));
 }
 
-bool ImuInputCheck::replaceStuck(ImuMeasurement& imu) {
+bool ImuInputCheck::replaceStuck(ImuMeasurement& imu, bool is_saturated) {
   bool is_stuck = false;
+  const bool turns = imu.angular_velocity.norm() > kTurns;
   for (int k = 0; k < 3; ++k) {
     const std::optional<double> likely =
-        gyro_axes_[static_cast<std::size_t>(k)].check(imu.time, imu.angular_velocity[k]);
+        gyro_axes_[static_cast<std::size_t>(k)].check(imu.time, imu.angular_velocity[k], turns, is_saturated);
     if (!likely) continue;
     imu.angular_velocity[k] = *likely;
     is_stuck = true;

@@ -76,12 +76,12 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
   const Time stamp = result.scan.stamp;
   RadarChannel& radar = radars_.at(result.scan.radar);
   const bool had_span = radar.dopplerSpan().value > 0.0;
-  radar.observe(result.scan);
+  const bool is_new = radar.observe(result.scan);
   // The velocities so far took the Dopplers with another span, or without one. They are wrong.
   if ((radar.dopplerSpan().value > 0.0) != had_span) initializer_.forgetVelocities();
   if (!initialized()) {
     result.ego_velocity = radar.velocityOf(result.scan);
-    initializer_.addVelocity(result.scan.radar, stamp, result.ego_velocity);
+    if (is_new) initializer_.addVelocity(result.scan.radar, stamp, result.ego_velocity);
     result.rejected_because = "before_initialization";
     return result;
   }
@@ -89,7 +89,7 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
   if (health_.wantsReinitialization(imu_.newest()))
     result.reinitialized = tryReinitialize(result.left_window);
   const Time node_time = radar.nodeTime(stamp);
-  result.rejected_because = whyNotNow(node_time, imu_has_ended);
+  result.rejected_because = is_new ? whyNotNow(node_time, imu_has_ended) : "scan_repeated";
   if (result.rejected_because.empty()) putIntoWindow(node_time, radar, result);
   result.health = health_.health();
   result.is_contradicted = health_.isContradicted();

@@ -33,6 +33,13 @@ void unwrap(std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R, dou
   for (RadarDirection& p : points) p.doppler = unwrapped(p.doppler, -p.u_R.dot(v_R), span);
 }
 
+bool haveSamePoints(const RadarScan& a, const RadarScan& b) {
+  const auto same = [](const RadarPoint& p, const RadarPoint& q) {
+    return p.position_R == q.position_R && p.doppler == q.doppler && p.snr_db == q.snr_db;
+  };
+  return std::equal(a.points.begin(), a.points.end(), b.points.begin(), b.points.end(), same);
+}
+
 std::vector<std::size_t> indicesOf(const std::vector<RadarDirection>& points) {
   std::vector<std::size_t> indices;
   indices.reserve(points.size());
@@ -116,17 +123,20 @@ EgoVelocityEstimator::EgoVelocityEstimator(const EgoVelocityOptions& options)
       options_(withStep(given_, grid_.step().value)),
       noise_(startNoise(options_)) {}
 
-void EgoVelocityEstimator::observe(const RadarScan& scan) {
-  grid_.add(scan);
+bool EgoVelocityEstimator::observe(const RadarScan& scan) {
   const std::vector<RadarDirection> points = filter(scan, options_);
+  const bool has_new_stamp = scan.stamp != observed_.stamp;
+  if (has_new_stamp && haveSamePoints(scan, observed_) && !mostReadZero(points, options_)) return false;
+  observed_ = scan;
+  grid_.add(scan);
   noise_.learnSpread(points);
   const double step = grid_.step().value;
   if (step != options_.doppler_quantization) {
     options_ = withStep(given_, step);
     noise_.setQuantization(square(step) / 12.0);
   }
-  if (given_.doppler_span == 0.0 && scan.stamp != observed_) learnSpan(points);
-  observed_ = scan.stamp;
+  if (given_.doppler_span == 0.0 && has_new_stamp) learnSpan(points);
+  return true;
 }
 
 /// Needs no estimate: before the start there is none, and one that took wrapped Dopplers at face value would

@@ -106,8 +106,8 @@ class ImuInputCheck {
   /// Tells the sample of the motion that is lost because the clock stepped back before it, `dt` [s] after the
   /// sample before.
   void addLostMotion(double dt, ImuMeasurement& imu) const;
-  /// Replaces the readings of stuck axes. Returns whether there were any.
-  bool replaceStuck(ImuMeasurement& imu);
+  /// Replaces the readings of stuck axes of the gyro. Returns whether there were any.
+  bool replaceStuck(ImuMeasurement& imu, bool is_saturated);
 
   double max_gap_;  // read-only after construction, as the next
   ImuInputCheckOptions options_;

@@ -119,8 +119,10 @@ class EgoVelocityEstimator {
   RadarScan slowPoints(const RadarScan& scan) const;
 
   /// Learns the step of the Doppler, the thresholds that follow from it, its span, and how far the directions
-  /// spread. Call it once per scan, before `estimate`, whether the scan is used or not.
-  void observe(const RadarScan& scan);
+  /// spread. Call it once per scan, before `estimate`, whether the scan is used or not. False, and nothing
+  /// is learned, if the scan has the points of the last one and a stamp of its own, and does not read zero:
+  /// while the radar moves, no two scans are the same to the last bit.
+  bool observe(const RadarScan& scan);
 
   /// Compares a scan that has no velocity of its own with a prior. The inliers are the points within three
   /// sigma of the prior. The result is valid if the inliers are the majority of the points; one point is
@@ -157,7 +159,7 @@ class EgoVelocityEstimator {
   int ransac_iterations_;     // read-only after construction
   DopplerGrid grid_;
   DopplerSpan span_;
-  std::optional<Time> observed_;             ///< stamp of the last scan: one that comes twice is one witness
+  RadarScan observed_;                       ///< the last one: what comes twice is one witness
   std::optional<Eigen::Vector3d> last_v_R_;  ///< of that scan by its points alone, modulo the possible span
   EgoVelocityOptions options_;               // given_, with what follows from the step
   PointNoise noise_;

@@ -80,8 +80,8 @@ class RadarChannel {
   RadarChannel(const RadarChannelOptions& options, const Eigen::Vector3d& g_W, const ImuBuffer& imu,
                std::shared_ptr<OffsetBlocks> offset);
 
-  /// Takes what a scan shows of the radar itself. Once per scan, first of all.
-  void observe(const RadarScan& scan) { estimator_.observe(scan); }
+  /// Takes what a scan shows of the radar itself. Once per scan, first of all. False: it repeats the last one.
+  bool observe(const RadarScan& scan) { return estimator_.observe(scan); }
   /// Velocity of a scan from its points alone, for the time before there is a state.
   EgoVelocity velocityOf(const RadarScan& scan) const { return estimator_.estimate(scan); }
   /// Starts a window at `time` with the first node and the calibration of this radar.

@@ -71,6 +71,24 @@ def vector(of):
     return numpy.array([of.x, of.y, of.z])
 
 
+def repeats(kind, every=None):
+    """The driver publishes the data of the message before under a new header: all the time, or but for one of `every`."""
+    def inject(messages, site):
+        new, count, result = None, 0, []
+        for m in messages:
+            if m.kind == kind:
+                count += 1
+                if new is not None and site.covers(m) and (every is None or count % every):
+                    again = new.changed(m.record)
+                    again.content.header = m.content.header
+                    m = again
+                else:
+                    new = m
+            result.append(m)
+        return result
+    return inject
+
+
 # --- Radar ---
 
 
@@ -225,22 +243,16 @@ def imu_stamps_repeated(messages, site):
     return edit(messages, "imu", site.covers, repeat)
 
 
-def imu_repeats(every=None):
-    """The driver publishes the sample before once more: all the time, or but for one of `every` samples."""
-    def inject(messages, site):
-        new, count = None, 0
-        result = []
-        for m in messages:
-            if m.kind == "imu":
-                count += 1
-                if new is not None and site.covers(m) and (every is None or count % every):
-                    m = m.changed()
-                    m.content.linear_acceleration, m.content.angular_velocity = new
-                else:
-                    new = m.content.linear_acceleration, m.content.angular_velocity
-            result.append(m)
-        return result
-    return inject
+def gyro_axis_freezes(messages, site):
+    """The axis that turns fastest when the fault begins stays at its reading."""
+    frozen = []
+    def freeze(of):
+        if not frozen:
+            axis = numpy.abs(of).argmax()
+            frozen.extend((axis, of[axis]))
+        of[frozen[0]] = frozen[1]
+        return of
+    return edit_imu(messages, site, gyro=freeze)
 
 
 def imu_saturated(accel=False, gyro=False, share=0.6):

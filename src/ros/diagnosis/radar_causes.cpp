@@ -123,6 +123,8 @@ class RadarCauses {
     }
     scans("duplicate_stamp", "have the stamp of another scan.",
           "The driver repeats its stamps: set " + key_ + "stamp_source: arrival.");
+    scans("scan_repeated", "have the points of the scan before, although the radar moves.",
+          "Let the driver of the radar publish a scan only if it has measured a new one.");
     scans("queue_full", "waited too long for the IMU or the solver.",
           "Set " + key_ +
               "stamp_source: arrival if the stamps are ahead of the IMU; lower window if the computer "
