@@ -65,4 +65,14 @@ Eigen::MatrixXd MotionManifold::minusJacobian(const double* y, const double* x) 
   return J;
 }
 
+std::optional<PointFromNode> MotionManifold::see(const double* x, const double* point) const {
+  const MotionView from(x);
+  const Eigen::Matrix3d R_IW = from.q_WI.toRotationMatrix().transpose();
+  PointFromNode seen{R_IW * (Eigen::Map<const Eigen::Vector3d>(point) - from.p_W),
+                     Eigen::Matrix3Xd::Zero(3, S::kMotionTangent), R_IW};
+  seen.J_node.middleCols<3>(S::kTheta) = so3::hat(seen.p);
+  seen.J_node.middleCols<3>(S::kP) = -R_IW;
+  return seen;
+}
+
 }  // namespace rio_t

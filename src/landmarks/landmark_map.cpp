@@ -48,7 +48,7 @@ LandmarkMap::LandmarkMap(const LandmarkOptions& options, const Eigen::Vector3d& 
     : options_(options),
       g_W_(g_W),
       imu_(&imu),
-      manifold_(std::make_shared<VectorManifold>(3)),
+      manifold_(std::make_shared<PointManifold>()),
       loss_(std::make_shared<ceres::CauchyLoss>(kLoss)) {}
 
 void LandmarkMap::forget() {

@@ -13,6 +13,7 @@ class MotionManifold final : public Manifold {
   void plus(const double* x, const double* delta, double* x_plus_delta) const override;
   Eigen::VectorXd minus(const double* y, const double* x) const override;
   Eigen::MatrixXd minusJacobian(const double* y, const double* x) const override;
+  std::optional<PointFromNode> see(const double* x, const double* point) const override;  ///< in I
 };
 
 }  // namespace rio_t

@@ -3,10 +3,19 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <numeric>
+#include <optional>
 #include <utility>
 #include <vector>
 
 namespace rio_t {
+
+/// Where a node sees a point of the world, in its own axes, with the derivatives by the tangent of the node
+/// and by the point.
+struct PointFromNode {
+  Eigen::Vector3d p;  ///< [m]
+  Eigen::Matrix3Xd J_node;
+  Eigen::Matrix3d J_point;
+};
 
 /// How a block of parameters moves: x [+] delta, with `size()` stored numbers and `tangent()` directions.
 ///
@@ -25,6 +34,13 @@ class Manifold {
   /// Derivative of y [-] x with respect to the tangent at y.
   virtual Eigen::MatrixXd minusJacobian(const double* y, const double* x) const = 0;
 
+  /// Whether the block is a point of the world. A prior holds it where a node sees it (PriorTerm).
+  virtual bool isPoint() const { return false; }
+  /// A point of the world as the node x sees it; none if the block has no pose.
+  virtual std::optional<PointFromNode> see(const double* /*x*/, const double* /*point*/) const {
+    return std::nullopt;
+  }
+
  protected:
   Manifold(int size, std::vector<int> columns) : size_(size), columns_(std::move(columns)) {}
 
@@ -34,7 +50,7 @@ class Manifold {
 };
 
 /// `size` numbers that add up, such as a time offset or a point.
-class VectorManifold final : public Manifold {
+class VectorManifold : public Manifold {
  public:
   explicit VectorManifold(int size) : Manifold(size, allColumns(size)) {}
   void plus(const double* x, const double* delta, double* x_plus_delta) const override {
@@ -54,6 +70,13 @@ class VectorManifold final : public Manifold {
     std::iota(columns.begin(), columns.end(), 0);
     return columns;
   }
+};
+
+/// A point of the world, in W.
+class PointManifold final : public VectorManifold {
+ public:
+  PointManifold() : VectorManifold(3) {}
+  bool isPoint() const override { return true; }
 };
 
 }  // namespace rio_t

@@ -2,6 +2,8 @@
 
 #include <ceres/cost_function.h>
 
+#include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "rio_t/graph/elimination.h"
@@ -11,6 +13,10 @@ namespace rio_t {
 
 /// A prior on some blocks, linear in their tangents at x0: residual r0 + J (x [-] x0). A window starts with
 /// one, and marginalisation adds one that stands for all that has left.
+///
+/// Points are the exception: the residual is linear in where the first node among the blocks sees them. What
+/// nothing observes, a turn or a shift of the world with all that is in it, then leaves this part of the
+/// prior as it is, whatever the estimates have become since (docs/method.md, section 16).
 class PriorTerm final : public ceres::CostFunction {
  public:
   /// `x0` and `manifolds` of each block; the columns of J are their tangents, one after the other.
@@ -19,9 +25,16 @@ class PriorTerm final : public ceres::CostFunction {
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
 
  private:
+  /// Rewrites x0 and the columns of J for points that the node sees.
+  void holdPointsBySight();
+  void addPoints(double const* const* parameters, double* residuals, double** jacobians) const;
+
   std::vector<std::shared_ptr<const Manifold>> manifolds_;
-  std::vector<Eigen::VectorXd> x0_;
-  SquareRoot root_;
+  std::vector<Eigen::VectorXd> x0_;  ///< of a point: where the node saw it
+  SquareRoot root_;                  ///< its columns of a point are by that place
+  std::vector<Eigen::Index> first_;  ///< column of each block
+  std::optional<std::size_t> node_;  ///< the block that sees the points
+  std::vector<std::size_t> points_;  ///< blocks; none without a node
 };
 
 /// Adds a prior on `blocks` around their current values.
