@@ -441,5 +441,68 @@ TEST(PriorTerm, JacobiansAreCorrect) {
   expectJacobiansCorrect(prior, {motionOf(moved(x0, 0.4)), {-0.01}});
 }
 
+/// A node and a point of the world.
+class PriorOnAPoint : public ::testing::Test {
+ protected:
+  static PriorTerm prior(const Eigen::MatrixXd& J) {
+    return {{std::make_shared<MotionManifold>(), std::make_shared<PointManifold>()},
+            {storedMotion(x0()), point0_W()},
+            {J, Eigen::VectorXd::Zero(J.rows())}};
+  }
+  static StateBlock x0() { return SyntheticMotion().state(1.0); }
+  static Eigen::VectorXd point0_W() { return Eigen::Vector3d(4.0, 7.0, 1.0); }
+  /// Another estimate.
+  static StateBlock x() { return moved(x0(), 0.3); }
+  static Eigen::Vector3d point_W() { return {4.5, 6.4, 1.3}; }
+
+  /// Derivative of the residual by the tangents of both blocks.
+  static Eigen::MatrixXd derivative(const PriorTerm& prior, const StateBlock& x,
+                                    const Eigen::Vector3d& point_W) {
+    using Stored = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    Stored by_motion(prior.num_residuals(), StateBlock::kMotion), by_point(prior.num_residuals(), 3);
+    Eigen::VectorXd r(prior.num_residuals());
+    const std::vector<double> motion = motionOf(x);
+    const double* const parameters[] = {motion.data(), point_W.data()};
+    double* jacobians[] = {by_motion.data(), by_point.data()};
+    EXPECT_TRUE(prior.Evaluate(parameters, r.data(), jacobians));
+    Eigen::MatrixXd J(prior.num_residuals(), StateBlock::kMotionTangent + 3);
+    J << by_motion.leftCols<3>(), by_motion.rightCols<6>(), by_point;
+    return J;
+  }
+};
+
+TEST_F(PriorOnAPoint, JacobiansAreCorrect) {
+  Eigen::MatrixXd J(12, 12);
+  for (int i = 0; i < 12; ++i)
+    for (int j = 0; j < 12; ++j) J(i, j) = std::sin(1.0 + 3.1 * i + 1.7 * j);
+  const PriorTerm term = prior(J);
+  expectJacobiansCorrect(term, {motionOf(x()), {4.5, 6.4, 1.3}});
+  EXPECT_LT((derivative(term, x0(), point0_W()) - J).norm(), 1e-9 * J.norm());
+}
+
+/// The prior knows only where the node sees the point. A turn of the world with all that is in it, about any
+/// axis, and a shift tell it nothing, wherever the estimates have moved since.
+TEST_F(PriorOnAPoint, KnowsNothingOfATurnOfTheWorld) {
+  const Eigen::Matrix3d R_IW = x0().q_WI().toRotationMatrix().transpose();
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(3, StateBlock::kMotionTangent + 3);
+  J.middleCols<3>(StateBlock::kTheta) = so3::hat(R_IW * (point0_W() - x0().p_W()));
+  J.middleCols<3>(StateBlock::kP) = -R_IW;
+  J.rightCols<3>() = R_IW;
+  const Eigen::MatrixXd now = derivative(prior(J), x(), point_W());
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d turn_W = Eigen::Vector3d::Unit(axis);
+    Eigen::VectorXd turned = Eigen::VectorXd::Zero(StateBlock::kMotionTangent + 3);
+    turned.segment<3>(StateBlock::kTheta) = x().q_WI().conjugate() * turn_W;
+    turned.segment<3>(StateBlock::kP) = turn_W.cross(x().p_W());
+    turned.segment<3>(StateBlock::kV) = turn_W.cross(x().v_W());
+    turned.tail<3>() = turn_W.cross(point_W());
+    EXPECT_LT((now * turned).norm(), 1e-9) << "turn about axis " << axis;
+    Eigen::VectorXd shifted = Eigen::VectorXd::Zero(StateBlock::kMotionTangent + 3);
+    shifted.segment<3>(StateBlock::kP) = turn_W;
+    shifted.tail<3>() = turn_W;
+    EXPECT_LT((now * shifted).norm(), 1e-9) << "shift along axis " << axis;
+  }
+}
+
 }  // namespace
 }  // namespace rio_t

@@ -201,6 +201,24 @@ TEST(Landmarks, HoldThePositionInARoom) {
   EXPECT_LT(nees, 2.0);
 }
 
+/// On a straight line nothing tells a tilt from a bias of the accelerometer, and landmarks do not, either.
+TEST(Landmarks, MakeUpNoKnowledgeOfTheTilt) {
+  const auto tiltSigma = [](std::uint64_t seed, bool landmarks) {
+    SimulatedRun run("constant_speed", seed, 50.0);
+    run.options.landmarks.enabled = landmarks;
+    run.run();
+    const ScanResult& last = run.results.back();
+    EXPECT_EQ(landmarks, last.landmarks && last.landmarks->is_trusted) << "the run tests nothing";
+    return std::sqrt(last.state.covariance.topLeftCorner<2, 2>().trace());
+  };
+  for (const std::uint64_t seed : {2, 3, 8}) {
+    const double without = tiltSigma(seed, false), with = tiltSigma(seed, true);
+    std::printf("seed %d: tilt known to %.4f mrad without, %.4f mrad with\n", static_cast<int>(seed),
+                1e3 * without, 1e3 * with);
+    EXPECT_NEAR(with, without, 1e-3 * without);
+  }
+}
+
 /// After a gap of 20 s, some detection lies wherever a landmark might be.
 TEST(Landmarks, AreNotGuessedAfterAGap) {
   for (const std::uint64_t seed : {2, 3, 5, 6}) {
