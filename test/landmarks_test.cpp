@@ -1,6 +1,7 @@
 // Landmarks: the factor, what may become one, and the whole pipeline with them.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <random>
@@ -8,6 +9,7 @@
 #include "numeric_jacobian.h"
 #include "rio_t/core/so3.h"
 #include "rio_t/landmarks/candidates.h"
+#include "rio_t/landmarks/landmark_map.h"
 #include "simulated_run.h"
 
 namespace rio_t {
@@ -134,6 +136,31 @@ TEST_F(CandidatesTest, GhostsFillABoundedListAndProveNothing) {
     EXPECT_LE(candidates_.size(), Candidates::kMax);
     EXPECT_TRUE(candidates_.takeProven({}, 10).empty());
   }
+}
+
+/// Of pairs of which some match by chance, as many are true as the probability says, near the landmark and
+/// near the edge of the gate.
+TEST(ProbabilityOfTruth, IsTheShareOfTruePairs) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> gauss;
+  std::uniform_real_distribution<double> even(-4.0, 4.0), share(0.0, 1.0);
+  constexpr double kByChance = 0.3;
+  constexpr std::size_t kBins = 4;
+  std::array<double, kBins> pairs{}, true_pairs{}, expected{};
+  for (int i = 0; i < 200000; ++i) {
+    const bool by_chance = share(random) < kByChance;
+    const auto draw = [&] { return by_chance ? even(random) : gauss(random); };
+    double q = Candidates::kGate;
+    while (q >= Candidates::kGate) q = Eigen::Vector3d(draw(), draw(), draw()).squaredNorm();
+    const auto bin = static_cast<std::size_t>(q / Candidates::kGate * kBins);
+    pairs[bin] += 1.0;
+    true_pairs[bin] += by_chance ? 0.0 : 1.0;
+    expected[bin] += probabilityOfTruth(q, kByChance);
+  }
+  for (std::size_t bin = 0; bin < kBins; ++bin)
+    EXPECT_NEAR(expected[bin] / pairs[bin], true_pairs[bin] / pairs[bin], 0.02) << bin;
+  EXPECT_GT(true_pairs.front() / pairs.front(), 0.9);
+  EXPECT_LT(true_pairs.back() / pairs.back(), 0.3);
 }
 
 struct Outcome {

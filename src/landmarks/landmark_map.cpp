@@ -18,8 +18,13 @@ constexpr double kLoss = 4.0;
 /// [s] unseen; then a landmark makes room for a new one, if there is none else.
 constexpr double kLongUnseen = 30.0;
 /// Pairs that match by chance are even over the gate, so the mean of their squared sigmas is 3/5 of it; that
-/// of true ones is 3. Half way between, the map contradicts the estimate. 100 matches tell it to 0.08.
-constexpr double kMaxMeanSquare = 0.5 * (1.0 + Candidates::kGate / 5.0);
+/// of true ones is 3. This is the first mean over the second.
+constexpr double kMeanSquareByChance = Candidates::kGate / 5.0;
+/// Half way between, the map contradicts the estimate. 100 matches tell it to 0.08.
+constexpr double kMaxMeanSquare = 0.5 * (1.0 + kMeanSquareByChance);
+/// Shares of the pairs that may be by chance. With more than the upper one the guard drops the map; the gate
+/// leaves out the lower one of the true pairs, so it cannot tell less.
+constexpr double kLeastByChance = 0.01, kMostPairsByChance = 0.5;
 /// The number of matches that the map needs before it is trusted: they tell that mean to 0.15.
 constexpr double kProof = 30.0;
 /// A reflector in view shows itself at least so often. In a scene full of highlights that come and go, hardly
@@ -42,7 +47,23 @@ double gateVolume(const Eigen::Matrix3d& covariance) {
 /// [m^3] that a radar sees to this range.
 double viewVolume(double range) { return 2.0 / 3.0 * M_PI * (1.0 - kCosView) * range * range * range; }
 
+/// The measurement with so much of its information.
+PolarMeasurement weighted(PolarMeasurement z, double weight) {
+  const double wider = 1.0 / std::sqrt(weight);
+  z.range_sigma *= wider;
+  z.azimuth_sigma *= wider;
+  z.elevation_sigma *= wider;
+  return z;
+}
+
 }  // namespace
+
+double probabilityOfTruth(double squared_sigmas, double by_chance) {
+  const double true_density =
+      (1.0 - by_chance) * std::pow(2.0 * M_PI, -1.5) * std::exp(-0.5 * squared_sigmas);
+  const double chance_density = by_chance / gateVolume(Eigen::Matrix3d::Identity());
+  return true_density / (true_density + chance_density);
+}
 
 LandmarkMap::LandmarkMap(const LandmarkOptions& options, const Eigen::Vector3d& g_W, const ImuBuffer& imu)
     : options_(options),
@@ -190,9 +211,12 @@ LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<
   const ImuDelta delta = integrate(*imu_, *node.time, prediction.measured, at_node.b_g, at_node.b_a);
   for (const Match& match : association.matches) {
     Landmark& landmark = landmarks_[match.landmark];
-    if (is_trusted_)
-      smoother.window().add(std::make_unique<LandmarkFactor>(detections[match.detection].z, delta, g_W_),
+    if (is_trusted_) {
+      const double weight = probabilityOfTruth(match.squared_sigmas, shareByChance());
+      const PolarMeasurement z = weighted(detections[match.detection].z, weight);
+      smoother.window().add(std::make_unique<LandmarkFactor>(z, delta, g_W_),
                             {&node, &extrinsics, landmark.block.get()}, loss_);
+    }
     landmark.last_seen = prediction.measured;
     LandmarkPoint& point = landmark.point;
     ++point.sightings;
@@ -260,6 +284,12 @@ bool LandmarkMap::judge(const Prediction& prediction, const Extrinsics& T_IR,
   const bool is_wrong = contradicts();
   if (matched_ >= kProof && matched_ >= kMinShare * in_view_ && !is_wrong) is_trusted_ = true;
   return !is_wrong && vague <= 0.5 * in_view;
+}
+
+double LandmarkMap::shareByChance() const {
+  if (matched_ <= 0.0) return kMostPairsByChance;
+  const double share = (sigmas_ / matched_ - 1.0) / (kMeanSquareByChance - 1.0);
+  return std::clamp(share, kLeastByChance, kMostPairsByChance);
 }
 
 /// With less than the proof, or with hardly any landmark seen again, nothing is known and nothing counts.
