@@ -470,7 +470,7 @@ TEST(Diagnosis, TheImuIsNamed) {
                                                       {"imu_not_plausible", "imu_accel_range"},
                                                       {"imu_stamp_jump", "imu_jump_patience"},
                                                       {"imu_repeated", "read a new one"},
-                                                      {"imu_stuck", "gyro"}};
+                                                      {"imu_stuck", "one of its axes"}};
   for (const auto& [name, part] : more) {
     evidence = goodRun();
     evidence.input_faults[name] = 400;

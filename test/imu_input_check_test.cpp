@@ -429,6 +429,19 @@ TEST_F(Gate, AGyroAxisThatFreezesIsReplaced) {
   EXPECT_EQ(sample.angular_velocity, motion.imuSample(1.3).angular_velocity);
 }
 
+TEST_F(Gate, AnAccelerometerAxisThatFreezesIsHardlyBelieved) {
+  for (double s = 1.0; s < 1.3; s += 0.01) {
+    ImuMeasurement frozen = motion.imuSample(s);
+    frozen.angular_velocity.x() += 0.5;
+    frozen.acceleration.y() = 0.1;
+    const bool is_found = s > 1.105;  // more than ten repeats
+    ASSERT_EQ(feed(frozen), is_found ? "imu_stuck" : "") << s;
+    ASSERT_EQ(sample.unseen_accel_variance > 1.0, is_found) << s;
+    ASSERT_EQ(sample.unseen_gyro_variance, 0.0) << s;
+  }
+  EXPECT_EQ(feed(1.3), "");
+}
+
 /// An axis about which a vehicle hardly turns, with steps coarser than its noise. The rest before the start
 /// shows its runs.
 TEST(StuckAxisDetector, ACoarseGyroRepeatsItself) {

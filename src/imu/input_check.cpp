@@ -81,6 +81,7 @@ ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
   if (sample.is_restart) {
     verdict = {Decision::kRestart, {"imu_clock_restart"}};
     bridge_.reset();
+    accel_axes_ = {};
     gyro_axes_ = {};
     accel_noise_.interrupt();
     gyro_noise_.interrupt();
@@ -104,13 +105,15 @@ ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
   if (hides.gyro || hid_.gyro) raise(imu.unseen_gyro_variance, options_.unseen_gyro_density);
   if (hides.accel || hid_.accel) raise(imu.unseen_accel_variance, options_.unseen_accel_density);
   hid_ = hides;
-  const bool is_stuck = replaceStuck(imu, hides.gyro);
-  if (is_stuck) {
-    verdict.faults.push_back("imu_stuck");
-    raise(imu.unseen_gyro_variance, options_.unseen_gyro_density);
-  }
+  const bool turns = imu.angular_velocity.norm() > kTurns;
+  const bool accel_sticks = findFrozen(imu, turns) && !hides.accel;
+  const bool gyro_sticks = replaceStuck(imu, turns, hides.gyro);
+  if (accel_sticks || gyro_sticks) verdict.faults.push_back("imu_stuck");
+  if (accel_sticks) raise(imu.unseen_accel_variance, options_.unseen_accel_density);
+  if (gyro_sticks) raise(imu.unseen_gyro_variance, options_.unseen_gyro_density);
   // Motion over a long gap would look like noise.
-  if (hides.accel || hides.gyro || is_stuck || gap > kMotionCorrelationTime || imu.lost_time > 0.0) {
+  if (hides.accel || hides.gyro || accel_sticks || gyro_sticks || gap > kMotionCorrelationTime ||
+      imu.lost_time > 0.0) {
     accel_noise_.interrupt();
     gyro_noise_.interrupt();
   } else {
@@ -145,9 +148,15 @@ void ImuInputCheck::addLostMotion(double dt, ImuMeasurement& imu) const {
         density((imu.acceleration - bridge_.gravity()).norm(), options_.unseen_accel_density));
 }
 
-bool ImuInputCheck::replaceStuck(ImuMeasurement& imu, bool is_saturated) {
+bool ImuInputCheck::findFrozen(const ImuMeasurement& imu, bool turns) {
+  bool is_frozen = false;
+  for (int k = 0; k < 3; ++k)  // each axis must see each sample
+    is_frozen |= accel_axes_[static_cast<std::size_t>(k)].isFrozen(imu.acceleration[k], turns);
+  return is_frozen;
+}
+
+bool ImuInputCheck::replaceStuck(ImuMeasurement& imu, bool turns, bool is_saturated) {
   bool is_stuck = false;
-  const bool turns = imu.angular_velocity.norm() > kTurns;
   for (int k = 0; k < 3; ++k) {
     const std::optional<double> likely =
         gyro_axes_[static_cast<std::size_t>(k)].check(imu.time, imu.angular_velocity[k], turns, is_saturated);

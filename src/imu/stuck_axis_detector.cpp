@@ -22,19 +22,29 @@ constexpr double kUnusualRun = 3.0;
 
 }  // namespace
 
-std::optional<double> StuckAxisDetector::check(Time time, double reading, bool turns, bool is_saturated) {
+bool FrozenAxisDetector::isFrozen(double reading, bool turns) {
   const bool is_last = last_ && *last_ == reading;
-  if (!is_last && !stuck_at_) longest_run_ = std::max(longest_run_, repeats_);
-  repeats_ = is_last ? repeats_ + 1.0 : 0.0;
-  longest_run_ *= kForgetting;
   last_ = reading;
+  longest_run_ *= kForgetting;
+  if (is_last) {
+    repeats_ += 1.0;
+    is_frozen_ |= turns && repeats_ > std::max(kFewRepeats, kUnusualRun * longest_run_);
+  } else {
+    if (!is_frozen_) longest_run_ = std::max(longest_run_, repeats_);
+    repeats_ = 0.0;
+    is_frozen_ = false;
+  }
+  return is_frozen_;
+}
+
+std::optional<double> StuckAxisDetector::check(Time time, double reading, bool turns, bool is_saturated) {
+  const bool is_frozen = frozen_.isFrozen(reading, turns);
   const double jump = good_ ? std::abs(reading - *good_) : 0.0;
   // After a jump that no mass makes, the noise of a stuck axis is no motion either.
   const bool stays =
       stuck_at_ && std::abs(reading - *stuck_at_) <= (is_impossible_ ? kUnusual * usual_jump_ : 0.0);
   const bool jumps_away = !stuck_at_ && jump > std::max(kSmallestJump, kUnusual * usual_jump_);
-  const bool freezes =
-      !stuck_at_ && turns && !is_saturated && repeats_ > std::max(kFewRepeats, kUnusualRun * longest_run_);
+  const bool freezes = !stuck_at_ && is_frozen && !is_saturated;
   if (jumps_away || freezes) {
     stuck_at_ = reading;
     is_impossible_ = jump > kHandShakes * (time - good_at_);

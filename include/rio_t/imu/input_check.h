@@ -106,13 +106,16 @@ class ImuInputCheck {
   /// Tells the sample of the motion that is lost because the clock stepped back before it, `dt` [s] after the
   /// sample before.
   void addLostMotion(double dt, ImuMeasurement& imu) const;
+  /// Whether an axis of the accelerometer is frozen.
+  bool findFrozen(const ImuMeasurement& imu, bool turns);
   /// Replaces the readings of stuck axes of the gyro. Returns whether there were any.
-  bool replaceStuck(ImuMeasurement& imu, bool is_saturated);
+  bool replaceStuck(ImuMeasurement& imu, bool turns, bool is_saturated);
 
   double max_gap_;  // read-only after construction, as the next
   ImuInputCheckOptions options_;
   ImuSampleCheck samples_;
   SaturationDetector saturation_;
+  std::array<FrozenAxisDetector, 3> accel_axes_;
   std::array<StuckAxisDetector, 3> gyro_axes_;
   GapBridge bridge_;
   NoiseSpectrum accel_noise_, gyro_noise_;

@@ -9,14 +9,27 @@ namespace rio_t {
 /// [rad/s] No bias of a gyro is as large: the IMU turns.
 constexpr double kTurns = 0.1;
 
+/// Follows one axis and finds a reading that freezes: while the IMU turns, it repeats itself to the last bit,
+/// far more often in a row than it did lately. Not thread-safe.
+class FrozenAxisDetector {
+ public:
+  /// `turns`: whether the IMU does, about any axis. A frozen reading stays so until it changes.
+  bool isFrozen(double reading, bool turns);
+
+ private:
+  std::optional<double> last_;
+  double repeats_ = 0.0;      ///< of last_
+  double longest_run_ = 0.0;  ///< of repeats lately
+  bool is_frozen_ = false;
+};
+
 /// Follows one axis of a gyro and finds a reading that sticks: it jumps away from one sample to the next, as
-/// no mass can, and then stays there within its noise; or it jumps over a gap, or the IMU turns, and it
-/// repeats itself to the last bit. Not thread-safe.
+/// no mass can, and then stays there within its noise; or it jumps over a gap and then repeats itself; or it
+/// freezes. Not thread-safe.
 class StuckAxisDetector {
  public:
   /// Takes a reading [rad/s]. None if it may be used. Otherwise the most likely reading: the last good one,
-  /// fading with the correlation time of the motion. Repeats count if the IMU `turns` about any axis, and if
-  /// no axis is at the end of its range.
+  /// fading with the correlation time of the motion. If an axis is at the end of its range, none freezes.
   std::optional<double> check(Time time, double reading, bool turns, bool is_saturated);
 
  private:
@@ -25,9 +38,7 @@ class StuckAxisDetector {
   std::optional<double> stuck_at_;  ///< the reading that jumped away or froze, while it repeats
   bool is_impossible_ = false;      ///< that jump, for any mass
   double usual_jump_ = 0.0;         ///< largest between neighbours lately [rad/s]
-  std::optional<double> last_;
-  double repeats_ = 0.0;      ///< of last_, to the last bit
-  double longest_run_ = 0.0;  ///< of repeats lately
+  FrozenAxisDetector frozen_;
 };
 
 }  // namespace rio_t

@@ -243,16 +243,16 @@ def imu_stamps_repeated(messages, site):
     return edit(messages, "imu", site.covers, repeat)
 
 
-def gyro_axis_freezes(messages, site):
-    """The axis that turns fastest when the fault begins stays at its reading."""
-    frozen = []
-    def freeze(of):
-        if not frozen:
-            axis = numpy.abs(of).argmax()
-            frozen.extend((axis, of[axis]))
-        of[frozen[0]] = frozen[1]
-        return of
-    return edit_imu(messages, site, gyro=freeze)
+def axis_freezes(sensor, axis=0):
+    """An axis of the gyro or the accelerometer stays at the reading that it has when the fault begins."""
+    def inject(messages, site):
+        frozen = []
+        def freeze(of):
+            frozen.append(of[axis])
+            of[axis] = frozen[0]
+            return of
+        return edit_imu(messages, site, **{sensor: freeze})
+    return inject
 
 
 def imu_saturated(accel=False, gyro=False, share=0.6):
