@@ -20,9 +20,9 @@ namespace rio_t {
 
 /// Predicted velocity of a scan.
 struct RadarVelocityPrediction {
-  VelocityPrior velocity;     ///< with all uncertainties
-  OffsetScan scan;            ///< without what is measured
-  double tilt_sigma = 0.0;    ///< of roll and pitch, the larger [rad]
+  VelocityPrior velocity;   ///< with all uncertainties
+  OffsetScan scan;          ///< without what is measured
+  double tilt_sigma = 0.0;  ///< of roll and pitch, the larger [rad]
 };
 
 /// One radar in the window: its calibration blocks, t_O and extrinsics, and its terms. Not thread-safe.
