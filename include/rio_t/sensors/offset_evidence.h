@@ -50,7 +50,7 @@ struct OffsetScan {
   /// before have moved the estimated one by `followed` [m/s^2], in W. Returns the difference, and adds the
   /// share of it that this scan moves (Friedland; see MountingCheck).
   Eigen::Vector3d follow(const Eigen::Vector3d& J, Eigen::Vector3d& followed) const {
-    const Eigen::Vector3d unfollowed = J - R_WR().transpose() * followed;
+    Eigen::Vector3d unfollowed = J - R_WR().transpose() * followed;
     followed += R_WR() * share() * unfollowed;
     return unfollowed;
   }

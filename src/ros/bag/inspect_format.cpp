@@ -45,7 +45,7 @@ std::string fieldNamed(const std::vector<std::string>& fields, const std::string
 std::string fieldLike(const std::vector<std::string>& fields, const std::vector<std::string>& words,
                       const std::vector<std::string>& taken = {}) {
   for (const std::string& word : words) {
-    const std::string named = fieldNamed(fields, word);
+    std::string named = fieldNamed(fields, word);
     if (!named.empty()) return named;
   }
   for (const std::string& word : words) {

@@ -233,7 +233,7 @@ std::optional<Eigen::Vector3d> upOf(const ImuReport& report) {
 }
 
 std::string howToTellNegated(const ImuReport& report) {
-  const std::string expected = "To tell: at rest, ROS expects +9.81 m/s^2 along the direction that points up";
+  std::string expected = "To tell: at rest, ROS expects +9.81 m/s^2 along the direction that points up";
   const std::optional<Eigen::Vector3d> up = upOf(report);
   if (!up) return expected;
   const std::string axis = axisName(*up);

@@ -61,7 +61,7 @@ struct BagCheck : Findings {
 
 /// Bags that follow one another, as `rosbag record --split` makes them, are the parts of one recording, in
 /// the order of time. Throws std::runtime_error for a bag that cannot be read.
-std::vector<std::vector<std::string>> recordingsOf(std::vector<std::string> bags);
+std::vector<std::vector<std::string>> recordingsOf(std::vector<std::string> paths);
 
 /// Looks at one recording as `request` says. Throws std::runtime_error for a bag that cannot be read.
 BagCheck checkBag(const std::vector<std::string>& bags, const CheckRequest& request);
