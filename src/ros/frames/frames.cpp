@@ -22,7 +22,7 @@ std::string cloudFrame(const Config& radar, const std::string& frame_id) {
         ": the cloud has no frame_id, and extrinsics_source is tf; expected one that tf knows, "
         "or " +
         key + "extrinsics_source: parameters");
-  const std::string frame = withoutSlash(frame_id);
+  std::string frame = withoutSlash(frame_id);
   if (frame == radar.radar_frame && radar.publish_radar_tf)
     throw std::runtime_error(
         key + "radar_frame: \"" + frame +
