@@ -69,6 +69,7 @@ void requireRoundTrip(const rio_t::RadarScan& scan) {
   std::iota(all.begin(), all.end(), std::size_t{0});
   PointCloudFormat own;
   own.doppler = "doppler";
+  own.axes = rio_t::PointAxes::kForwardLeftUp;  // of all that we publish
   const rio_t::RadarScan again = toRadarScan(decode(toPointCloud2(scan, all), own).cloud, scan.stamp);
   require(again.points.size() == scan.points.size(), "published clouds hold every point");
   for (std::size_t i = 0; i < scan.points.size(); ++i) {

@@ -10,9 +10,10 @@ namespace rio_t {
 /// Stands for "not known": above every sensible minimum, so that the SNR filter lets such points through.
 constexpr float kUnknownSnrDb = 1000.0F;
 
-/// One detection as a PCL point, in RIO axes: x right, y forward, z up, in metres. PCL's own templates take
-/// it (`pcl::transformPointCloud`, filters, `pcl::fromROSMsg` of `~points` and `~inliers`); those that PCL
-/// ships compiled need `#define PCL_NO_PRECOMPILE` before the first include of PCL.
+/// One detection as a PCL point, in metres. Decoded, it has RIO axes: x right, y forward, z up; in `~points`
+/// and `~inliers`, x is forward, y left, z up. PCL's own templates take it (`pcl::transformPointCloud`,
+/// filters, `pcl::fromROSMsg` of those topics); those that PCL ships compiled need
+/// `#define PCL_NO_PRECOMPILE` before the first include of PCL.
 struct EIGEN_ALIGN16 RadarPointPcl {
   PCL_ADD_POINT4D            // x, y, z; data[3] is 1
       float doppler = 0.0F;  ///< range rate [m/s], positive = receding
