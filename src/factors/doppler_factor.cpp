@@ -61,7 +61,10 @@ bool DopplerFactor::Evaluate(double const* const* parameters, double* residuals,
     Eigen::Map<MotionJacobian<4>>{jacobians[0]} << U * predicted.J_motion, MotionJacobian<1>::Zero();
   if (jacobians[1] != nullptr)
     Eigen::Map<BiasJacobian<4>>{jacobians[1]} << U * predicted.J_biases, BiasJacobian<1>::Zero();
-  if (jacobians[2] != nullptr) Eigen::Map<Eigen::Vector4d>{jacobians[2]} << U * predicted.dv_dt_O, 0.0;
+  if (jacobians[2] != nullptr) {
+    Eigen::Map<Eigen::Vector4d> J(jacobians[2]);
+    J << U * predicted.dv_dt_O, 0.0;
+  }
   if (jacobians[3] != nullptr)
     Eigen::Map<ExtrinsicsJacobian<4>>{jacobians[3]} << U * predicted.J_extrinsics,
         ExtrinsicsJacobian<1>::Zero();
