@@ -51,7 +51,7 @@ class OffsetStepDetector {
     /// this, in W [m/s^2].
     Eigen::Vector3d followed = Eigen::Vector3d::Zero();
   };
-  bool showsStep(const Average& average, const Average::Change& change) const;
+  bool showsStep(const Average& average, const Average::Change& asked) const;
 
   OffsetStepDetectorOptions options_;  // read-only after construction, as the next
   double max_change_;                  ///< [s]
