@@ -121,6 +121,21 @@ TEST_F(CheckBag, AnImuThatIsNotFiniteIsNotUsed) {
   EXPECT_NE(odd.to_do.find("NaN"), std::string::npos);
 }
 
+TEST_F(CheckBag, AnImuThatIsPolledTooOftenIsNamed) {
+  std::optional<sensor_msgs::Imu> last;
+  int count = 0;
+  const BagCheck odd = check(rewritten("imu_twice", {[&](sensor_msgs::Imu& imu) {
+                                         if (++count % 2 == 0) {
+                                           imu.angular_velocity = last->angular_velocity;
+                                           imu.linear_acceleration = last->linear_acceleration;
+                                         }
+                                         last = imu;
+                                         return true;
+                                       }}));
+  expectLine(odd, FindingLevel::kOdd, {"repeats", "samples have the values of the one before"});
+  EXPECT_TRUE(odd.ready());
+}
+
 TEST_F(CheckBag, ADopplerThatIsNotFiniteIsNamed) {
   Changes changes;
   changes.cloud = [](sensor_msgs::PointCloud2& cloud) {

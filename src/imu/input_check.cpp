@@ -28,8 +28,8 @@ const char* ImuSampleCheck::faultOfValues(const ImuMeasurement& imu) const {
   return imu.acceleration.cwiseAbs().maxCoeff() > most_acceleration_ ? "imu_not_plausible" : nullptr;
 }
 
-// Where the IMU turns, gravity moves in it, so no two samples are the same. At rest an IMU without noise, as
-// some simulators have, repeats itself.
+// If the IMU turns, gravity moves in it, so no two samples are the same. At rest an IMU without noise repeats
+// itself; some simulators have one.
 bool ImuSampleCheck::repeats(const ImuMeasurement& imu) {
   const bool is_new =
       !new_ || new_->angular_velocity != imu.angular_velocity || new_->acceleration != imu.acceleration;
@@ -45,7 +45,8 @@ ImuSampleCheck::Verdict ImuSampleCheck::check(const ImuMeasurement& imu) {
   verdict.fault = faultOfValues(imu);
   if (verdict.fault == nullptr && repeats(imu)) {
     verdict.repeats = true;
-    // For so long a bridged gap is better than the old values. An IMU of a simulator may go on for ever.
+    // For so long, a bridged gap is better than the old values. Then they are taken: the IMU of a simulator
+    // may repeat itself for ever.
     if (imu.time - new_->time < kMotionCorrelationTime) verdict.fault = "imu_repeated";
   }
   if (verdict.fault == nullptr) {
@@ -98,7 +99,8 @@ ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
     verdict.faults.push_back("imu_clock_back");
     addLostMotion(gap, imu);
   }
-  // The interval before and the one after a saturated sample both hide something. So do those of a repeat.
+  // The interval before and the one after a saturated sample both hide something. So do those of a repeat
+  // that is taken.
   const SaturationDetector::Saturated hides =
       sample.repeats ? SaturationDetector::Saturated{true, true} : saturation_.check(imu);
   if (hides.accel || hides.gyro) verdict.faults.push_back(sample.repeats ? "imu_repeated" : "imu_saturated");

@@ -100,6 +100,17 @@ void findRateUnit(const std::vector<ImuMeasurement>& imu, double fast, ImuReport
         "are left-handed";
 }
 
+/// Returns how many there were.
+std::size_t leaveOutRepeats(std::vector<ImuMeasurement>* imu) {
+  ImuSampleCheck check{ImuInputCheckOptions()};
+  std::vector<ImuMeasurement> kept;
+  kept.reserve(imu->size());
+  for (const ImuMeasurement& sample : *imu)
+    if (!check.check(sample).repeats) kept.push_back(sample);
+  std::swap(*imu, kept);
+  return kept.size() - imu->size();
+}
+
 void findNoise(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
   NoiseMeter accel, gyro;
   SaturationDetector saturation(0.0, 0.0);
@@ -178,10 +189,10 @@ ImuReport inspectImu(const std::vector<ImuMeasurement>& written, std::vector<Imu
   } else {
     findRateUnit(imu, fast, &report);
   }
-  for (ImuMeasurement& sample : imu) {
-    sample.angular_velocity *= inRadiansPerSecond(report.units.rate);
+  for (ImuMeasurement& sample : imu) sample.angular_velocity *= inRadiansPerSecond(report.units.rate);
+  report.repeated = leaveOutRepeats(&imu);
+  for (const ImuMeasurement& sample : imu)
     report.mean_acceleration += sample.acceleration / static_cast<double>(imu.size());
-  }
   findNoise(imu, &report);
   findRest(imu, &report);
   return report;

@@ -29,10 +29,11 @@ struct ImuReport {
   double gyro_density_quiet = 0.0;    ///< [rad/s/sqrt(Hz)]
   double largest_acceleration = 0.0, largest_rate = 0.0;  ///< of an axis
   std::size_t saturated = 0;                              ///< samples at the end of the range
+  std::size_t repeated = 0;  ///< samples with the values of the one before, although the IMU turns
 };
 
 /// `written`: as the driver writes them, in the order of time; times must rise. `samples` gets those that are
-/// finite, in m/s^2 and rad/s.
+/// finite and do not repeat the one before, in m/s^2 and rad/s.
 ImuReport inspectImu(const std::vector<ImuMeasurement>& written, std::vector<ImuMeasurement>* samples);
 
 }  // namespace rio_t

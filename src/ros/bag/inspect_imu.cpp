@@ -208,7 +208,7 @@ void describeNoise(ImuInspection* imu) {
 
 void describe(ImuInspection* imu) {
   const ImuReport& r = imu->report;
-  const std::size_t samples = imu->samples.size() + r.not_finite;
+  const std::size_t samples = imu->samples.size() + r.not_finite + r.repeated;
   if (10 * r.not_finite > samples) {  // the rest of the report would be of what is left
     imu->tell(FindingLevel::kMissing, "IMU",
               std::to_string(r.not_finite) + " of " + std::to_string(samples) + " samples are not finite");
@@ -221,6 +221,10 @@ void describe(ImuInspection* imu) {
   describeNoise(imu);
   if (r.not_finite > 0)
     imu->odd("IMU", std::to_string(r.not_finite) + " samples are not finite; they are left out");
+  if (r.repeated > 0)
+    imu->odd("repeats", std::to_string(r.repeated) +
+                            " samples have the values of the one before, although the IMU turns; they are "
+                            "left out. Let the driver publish a sample only if it has read a new one");
 }
 
 }  // namespace

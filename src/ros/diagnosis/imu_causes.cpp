@@ -31,7 +31,7 @@ constexpr ImuFault kImuFaults[] = {
      "Let the driver of the IMU publish a sample only if it has read a new one."},
     {"imu_stamp_jump", 1, "IMU samples are stamped far ahead of the one before.",
      "Look at the clock of the driver. For an IMU with pauses, raise imu_jump_patience."},
-    {"imu_stuck", 1, "IMU samples have an axis that stays at one reading while the IMU turns.",
+    {"imu_stuck", 1, "IMU samples have an axis that stays at one reading.",
      "Look at the cable and the driver of the IMU: one of its axes fails."}};
 
 /// Share of the IMU samples that a fault takes.
