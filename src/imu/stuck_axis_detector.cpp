@@ -24,13 +24,14 @@ constexpr double kUnusualRun = 3.0;
 
 bool FrozenAxisDetector::isFrozen(double reading, bool turns) {
   const bool is_last = last_ && *last_ == reading;
+  const bool is_first = !last_;
   last_ = reading;
-  longest_run_ *= kForgetting;
+  if (longest_run_) *longest_run_ *= kForgetting;
   if (is_last) {
     repeats_ += 1.0;
-    is_frozen_ |= turns && repeats_ > std::max(kFewRepeats, kUnusualRun * longest_run_);
-  } else {
-    if (!is_frozen_) longest_run_ = std::max(longest_run_, repeats_);
+    is_frozen_ |= turns && longest_run_ && repeats_ > std::max(kFewRepeats, kUnusualRun * *longest_run_);
+  } else if (!is_first) {
+    if (!is_frozen_) longest_run_ = std::max(longest_run_.value_or(0.0), repeats_);
     repeats_ = 0.0;
     is_frozen_ = false;
   }
