@@ -138,8 +138,8 @@ TEST_F(CandidatesTest, GhostsFillABoundedListAndProveNothing) {
   }
 }
 
-/// Of pairs of which some match by chance, as many are true as the probability says, near the landmark and
-/// near the edge of the gate.
+/// The test draws pairs, some of them by chance. The probability tells the share of true ones, near the
+/// landmark and near the edge of the gate.
 TEST(ProbabilityOfTruth, IsTheShareOfTruePairs) {
   std::mt19937 random(3);
   std::normal_distribution<double> gauss;

@@ -39,7 +39,7 @@ void PriorTerm::holdPointsBySight() {
   const Manifold& node = *manifolds_[*node_];
   for (const std::size_t i : points_) {
     const PointFromNode seen = *node.see(x0_[*node_].data(), x0_[i].data());
-    // Of d(seen) = J_node d(node) + J_point d(point), solved for d(point).
+    // d(seen) = J_node d(node) + J_point d(point). This replaces d(point) in the residual by d(seen).
     root_.J.middleCols<3>(first_[i]) *= seen.J_point.inverse();
     root_.J.middleCols(first_[*node_], node.tangent()) -= root_.J.middleCols<3>(first_[i]) * seen.J_node;
     x0_[i] = seen.p;

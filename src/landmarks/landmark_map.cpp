@@ -22,8 +22,8 @@ constexpr double kLongUnseen = 30.0;
 constexpr double kMeanSquareByChance = Candidates::kGate / 5.0;
 /// Half way between, the map contradicts the estimate. 100 matches tell it to 0.08.
 constexpr double kMaxMeanSquare = 0.5 * (1.0 + kMeanSquareByChance);
-/// Shares of the pairs that may be by chance. With more than the upper one the guard drops the map; the gate
-/// leaves out the lower one of the true pairs, so it cannot tell less.
+/// The share of pairs by chance lies between these. The gate leaves out a hundredth of the true pairs, so the
+/// map cannot tell a smaller share. With half of them the guard drops the map.
 constexpr double kLeastByChance = 0.01, kMostPairsByChance = 0.5;
 /// The number of matches that the map needs before it is trusted: they tell that mean to 0.15.
 constexpr double kProof = 30.0;

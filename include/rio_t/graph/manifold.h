@@ -9,12 +9,11 @@
 
 namespace rio_t {
 
-/// Where a node sees a point of the world, in its own axes, with the derivatives by the tangent of the node
-/// and by the point.
+/// A point of the world in the axes of a node.
 struct PointFromNode {
-  Eigen::Vector3d p;  ///< [m]
-  Eigen::Matrix3Xd J_node;
-  Eigen::Matrix3d J_point;
+  Eigen::Vector3d p;        ///< [m]
+  Eigen::Matrix3Xd J_node;  ///< derivative of p by the tangent of the node
+  Eigen::Matrix3d J_point;  ///< derivative of p by the point in W
 };
 
 /// How a block of parameters moves: x [+] delta, with `size()` stored numbers and `tangent()` directions.

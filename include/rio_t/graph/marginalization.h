@@ -14,9 +14,9 @@ namespace rio_t {
 /// A prior on some blocks, linear in their tangents at x0: residual r0 + J (x [-] x0). A window starts with
 /// one, and marginalisation adds one that stands for all that has left.
 ///
-/// Points are the exception: the residual is linear in where the first node among the blocks sees them. What
-/// nothing observes, a turn or a shift of the world with all that is in it, then leaves this part of the
-/// prior as it is, whatever the estimates have become since (docs/method.md, section 16).
+/// Points are the exception: the residual is linear in their places in the axes of the first node among the
+/// blocks. Nothing observes a turn or a shift of the whole world, and such a residual does not change with
+/// it, however the estimates have moved (docs/method.md, section 16).
 class PriorTerm final : public ceres::CostFunction {
  public:
   /// `x0` and `manifolds` of each block; the columns of J are their tangents, one after the other.

@@ -72,7 +72,7 @@ def vector(of):
 
 
 def repeats(kind, every=None):
-    """The driver publishes the data of the message before under a new header: all the time, or but for one of `every`."""
+    """The driver publishes the message before again, under a new header: always, or but for one of `every`."""
     def inject(messages, site):
         new, count, result = None, 0, []
         for m in messages:

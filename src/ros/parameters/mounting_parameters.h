@@ -24,7 +24,7 @@ void beginMounting(const ParameterEntries& entries, const std::string& section, 
 void resolveMounting(Config* config);
 
 /// Call it next: what is estimated of the mountings. If one lever arm is missing, all are estimated.
-/// Of a mounting that is to be held on a vehicle, the rotation is, too: see refinesHeldMounting.
+/// On a vehicle it also estimates the rotation of a mounting that is to be held: see refinesHeldMounting.
 void resolveEstimate(Config* config);
 
 }  // namespace rio_t
