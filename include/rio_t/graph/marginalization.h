@@ -15,8 +15,8 @@ namespace rio_t {
 /// one, and marginalisation adds one that stands for all that has left.
 ///
 /// Points are the exception: the residual is linear in their places in the axes of the first node among the
-/// blocks. Nothing observes a turn or a shift of the whole world, and such a residual does not change with
-/// it, however the estimates have moved (docs/method.md, section 16).
+/// blocks. A turn or a shift of the whole world does not change such a residual, however the estimates have
+/// moved (docs/method.md, section 16).
 class PriorTerm final : public ceres::CostFunction {
  public:
   /// `x0` and `manifolds` of each block; the columns of J are their tangents, one after the other.
