@@ -6,8 +6,6 @@
 #include <limits>
 
 #include "noise.h"
-#include "rio_t/core/so3.h"
-#include "rio_t/imu/gap_bridge.h"
 #include "rio_t/imu/input_check.h"
 #include "rio_t/imu/preintegration.h"
 #include "rio_t/imu/stuck_axis_detector.h"
@@ -243,120 +241,6 @@ TEST_F(Gate, OverAShortGapTheBridgeIsAlmostStraight) {
               0.005 * std::max(before.angular_velocity.norm(), sample.angular_velocity.norm()));
   }
   EXPECT_FALSE(sample.is_bridge);
-}
-
-// What a gap leaves out is not known; that gravity does not let go in the meantime is.
-TEST(GapBridge, OverALongGapGravityTurnsWithThePlatformAndTheRestDiesAway) {
-  const double tau = kMotionCorrelationTime;
-  GapBridge bridge;
-  ImuMeasurement imu;
-  const Eigen::Vector3d gravity(0.0, 6.0, 7.0);
-  for (int i = 0; i < 2000; ++i) {
-    imu.time = Time::fromNanoseconds(1) + 0.005 * i;
-    imu.acceleration = gravity;
-    bridge.follow(imu);
-  }
-  imu.time = imu.time + 0.005;
-  imu.acceleration = gravity + Eigen::Vector3d(4.0, 0.0, 0.0);
-  imu.angular_velocity = {0.0, 0.0, 2.0};
-  bridge.follow(imu);
-  ImuMeasurement next = imu;
-  next.time = imu.time + 2.5;
-  next.acceleration = {0.0, -9.0, -3.0};
-  next.angular_velocity.setZero();
-  Eigen::Vector3d turned = Eigen::Vector3d::Zero();
-  const auto samples = bridge.until(next);
-  ASSERT_EQ(samples.size(), 124u);
-  for (const ImuMeasurement& sample : samples) turned += 0.02 * sample.angular_velocity;
-  // The half step next to each end belongs to the trapezia of the ends.
-  EXPECT_NEAR(turned.z(), 2.0 * tau * std::tanh(2.5 / (2.0 * tau)) - 0.02, 0.002)
-      << "2 rad/s for one correlation time, not for 2.5 s";
-  const Eigen::Vector3d expected = so3::exp({0.0, 0.0, -2.0 * tau}) * gravity;
-  EXPECT_LT((samples.back().acceleration - expected).norm(), 0.3) << samples.back().acceleration.transpose();
-  EXPECT_LT((samples[60].acceleration - expected).norm(), 0.1 * 4.0 + 0.1 * gravity.norm())
-      << "hardly any acceleration besides";
-  EXPECT_GT((samples[0].acceleration - gravity).x(), 3.5);
-}
-
-TEST(GapBridge, AGapOfAnHourGivesFiniteSamples) {
-  GapBridge bridge;
-  ImuMeasurement imu;
-  imu.time = Time::fromNanoseconds(1);
-  imu.acceleration = {0.0, 0.0, 9.8};
-  imu.angular_velocity = {0.0, 0.0, 2.0};
-  bridge.follow(imu);
-  ImuMeasurement next = imu;
-  next.time = imu.time + 3600.0;
-  const auto samples = bridge.until(next);
-  ASSERT_FALSE(samples.empty());
-  for (const ImuMeasurement& sample : samples) {
-    ASSERT_TRUE(sample.angular_velocity.allFinite());
-    ASSERT_TRUE(sample.acceleration.allFinite());
-  }
-  EXPECT_NEAR(samples.back().angular_velocity.z(), 2.0, 0.1) << "as the end of the gap has it";
-}
-
-// An accelerometer that ends at 1 m/s^2 beyond what it first read shows flat tops; the noise at rest does
-// not.
-TEST(Saturation, FlatTopsAreFoundWithoutKnowingTheRange) {
-  SyntheticMotion motion;
-  SaturationDetector detector(0.0, 0.0);
-  const Eigen::Vector3d limit =
-      motion.imuSample(0.0).acceleration.cwiseAbs() + Eigen::Vector3d::Constant(1.0);
-  int beyond = 0, found = 0, false_alarms = 0;
-  for (int i = 0; i < 2000; ++i) {
-    ImuMeasurement imu = motion.imuSample(0.005 * i);
-    const bool clipped = (imu.acceleration.cwiseAbs().array() >= limit.array()).any();
-    imu.acceleration = imu.acceleration.cwiseMin(limit).cwiseMax(-limit);
-    const bool saturated = detector.check(imu).accel;
-    beyond += clipped ? 1 : 0;
-    found += clipped && saturated ? 1 : 0;
-    false_alarms += !clipped && saturated ? 1 : 0;
-  }
-  ASSERT_GT(beyond, 100);
-  EXPECT_GT(found, beyond - 20) << "of " << beyond;
-  EXPECT_EQ(false_alarms, 0);
-}
-
-TEST(Saturation, ARestingSensorWithCoarseStepsIsNotSaturated) {
-  SaturationDetector detector(0.0, 0.0);
-  ImuMeasurement imu;
-  for (int i = 0; i < 1000; ++i) {
-    imu.acceleration = {0.0, 0.01 * (i / 7 % 3), 9.81 + 0.01 * (i / 5 % 2)};
-    imu.angular_velocity = {0.0, 7e-4 * (i / 4 % 3), 0.0};
-    const auto saturated = detector.check(imu);
-    ASSERT_FALSE(saturated.accel || saturated.gyro) << i;
-  }
-}
-
-TEST(Saturation, ALargerReadingTakesTheLimitBack) {
-  SaturationDetector detector(0.0, 0.0);
-  ImuMeasurement imu;
-  const auto gyro = [&](double rate) {
-    imu.angular_velocity.x() = rate;
-    return detector.check(imu).gyro;
-  };
-  EXPECT_FALSE(gyro(0.0));
-  for (int i = 0; i < 4; ++i) EXPECT_FALSE(gyro(1.0));
-  EXPECT_TRUE(gyro(1.0));
-  EXPECT_FALSE(gyro(0.5));
-  EXPECT_TRUE(gyro(-1.0)) << "the limit is known now, for both signs";
-  EXPECT_FALSE(gyro(1.5));
-  EXPECT_FALSE(gyro(1.0));
-}
-
-TEST(Saturation, AToldRangeHolds) {
-  SaturationDetector detector(20.0, 5.0);
-  ImuMeasurement imu;
-  EXPECT_FALSE(detector.check(imu).gyro);
-  imu.angular_velocity.z() = -5.0;
-  EXPECT_TRUE(detector.check(imu).gyro);
-  EXPECT_FALSE(detector.check(imu).accel);
-  imu.angular_velocity.z() = 0.0;
-  imu.acceleration.x() = 19.99;
-  EXPECT_TRUE(detector.check(imu).accel);
-  imu.acceleration.x() = 19.0;
-  for (int i = 0; i < 8; ++i) EXPECT_FALSE(detector.check(imu).accel) << "flat, but not at the range";
 }
 
 TEST(Preintegration, UnseenMotionInAnIntervalWidensWhatCrossesIt) {
