@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <limits>
 #include <stdexcept>
 #include <utility>
@@ -13,28 +12,30 @@ namespace {
 /// Rounding leaves some 1e-15 of a column that the rows do not determine.
 constexpr double kNothing = 1e-14;
 
-/// Rows of numbers, one after the other. Keeps its memory.
-class Tableau {
- public:
-  void reset(Eigen::Index rows, Eigen::Index columns) {
-    rows_ = rows;
-    columns_ = columns;
-    stride_ = columns + 3;  // the last part of a row may reach beyond it, over zeros
-    numbers_.assign(static_cast<std::size_t>(rows * stride_), 0.0);
-  }
-  Eigen::Index rows() const { return rows_; }
-  double* row(Eigen::Index i) { return numbers_.data() + i * stride_; }
-  const double* row(Eigen::Index i) const { return numbers_.data() + i * stride_; }
+/// Some columns of a matrix by rows.
+using Columns = Eigen::Map<const RowMatrix, 0, Eigen::OuterStride<>>;
 
-  /// Householder reflections that clear the columns from `first` to `end` below the diagonal. They pass over
-  /// rows with a zero in the column: most derivatives are zero.
-  void triangularise(Eigen::Index first, Eigen::Index end) {
-    for (Eigen::Index k = first; k < std::min(end, rows_ - 1); ++k) {
-      const double pivot = row(k)[k];
+/// Zeros behind the last column of a tableau: the last part of a row that is reflected may reach into them.
+constexpr Eigen::Index kPadding = 3;
+
+RowMatrix zeroTableau(Eigen::Index rows, Eigen::Index columns) {
+  return RowMatrix::Zero(rows, columns + kPadding);
+}
+
+/// Householder reflections of the rows of a tableau. Keeps its memory.
+class Reflections {
+ public:
+  /// Clears the columns from `first` to `end` below the diagonal. Passes over rows with a zero in the column:
+  /// most derivatives are zero.
+  void triangularise(Eigen::Index first, Eigen::Index end, RowMatrix& tableau) {
+    const Eigen::Index rows = tableau.rows(), columns = tableau.cols() - kPadding;
+    for (Eigen::Index k = first; k < std::min(end, rows - 1); ++k) {
+      double& diagonal = tableau(k, k);
+      const double pivot = diagonal;
       double square = pivot * pivot;
-      reflected_.assign(1, {row(k), pivot});
-      double* at = row(k + 1);
-      for (Eigen::Index i = k + 1; i < rows_; ++i, at += stride_) {
+      reflected_.assign(1, {&tableau(k, 0), pivot});
+      double* at = &tableau(k + 1, 0);
+      for (Eigen::Index i = k + 1; i < rows; ++i, at += tableau.cols()) {
         const double squared = at[k] * at[k];
         if (squared < std::numeric_limits<double>::min()) {  // its inverse would not be finite
           at[k] = 0.0;
@@ -48,14 +49,14 @@ class Tableau {
       reflected_.front().v += pivot > 0.0 ? norm : -norm;
       const double scale = 1.0 / (norm * (norm + std::abs(pivot)));
       // 16 sums fill the registers; narrower parts waste less at the end of a row.
-      for (Eigen::Index part = k + 1; part < columns_;) {
-        const Eigen::Index left = columns_ - part;
+      for (Eigen::Index part = k + 1; part < columns;) {
+        const Eigen::Index left = columns - part;
         part += left > 12  ? reflect<16>(part, scale)
                 : left > 4 ? reflect<8>(part, scale)
                            : reflect<4>(part, scale);
       }
       for (const Reflected& each : reflected_) each.row[k] = 0.0;
-      row(k)[k] = pivot > 0.0 ? -norm : norm;
+      diagonal = pivot > 0.0 ? -norm : norm;
     }
   }
 
@@ -76,70 +77,67 @@ class Tableau {
     return Width;
   }
 
-  Eigen::Index rows_ = 0, columns_ = 0, stride_ = 0;
-  std::vector<double> numbers_;
   std::vector<Reflected> reflected_;
 };
 
 /// The rows of a tableau from `from` on, as many as columns.
-SquareRoot squareRootOf(const Tableau& tableau, Eigen::Index from, Eigen::Index columns) {
+SquareRoot squareRootOf(const RowMatrix& tableau, Eigen::Index from, Eigen::Index columns) {
   SquareRoot result{Eigen::MatrixXd::Zero(columns, columns), Eigen::VectorXd::Zero(columns)};
-  for (Eigen::Index i = 0; i < std::min(columns, tableau.rows() - from); ++i) {
-    const Eigen::Map<const Eigen::RowVectorXd> row(tableau.row(from + i) + from, columns + 1);
-    result.J.row(i) = row.head(columns);
-    result.r0[i] = row[columns];
-  }
+  const Eigen::Index rows = std::min(columns, tableau.rows() - from);
+  result.J.topRows(rows) = tableau.block(from, from, rows, columns);
+  result.r0.head(rows) = tableau.col(from + columns).segment(from, rows);
   return result;
 }
 
 /// Eliminates the blocks of a system, first to last.
 class BlockElimination {
  public:
-  explicit BlockElimination(const LinearSystem& system) : system_(system), waiting_(system.tangents.size()) {
-    squares_.reserve(system.tangents.size());
-    for (std::size_t i = 0; i < system.tangents.size(); ++i)
-      squares_.emplace_back(Eigen::VectorXd::Zero(system.tangent(static_cast<int>(i))));
-    for (const LinearRows& each : system.rows) {
-      if (each.blocks.empty()) continue;
-      waiting_[static_cast<std::size_t>(each.blocks.front())].push_back(&each);
-      Eigen::Index first = 0;
-      for (const int k : each.blocks) {
-        Eigen::VectorXd& squares = squares_[static_cast<std::size_t>(k)];
-        squares += each.Jr.middleCols(first, squares.size()).colwise().squaredNorm().transpose();
-        first += squares.size();
-      }
+  explicit BlockElimination(const LinearSystem& system)
+      : system_(system), eliminated_(system.tangents.size()), waiting_(system.tangents.size(), nullptr) {
+    firsts_.reserve(system.tangents.size());
+    Eigen::Index columns = 0;
+    for (const Eigen::Index tangent : system.tangents) {
+      firsts_.push_back(columns);
+      columns += tangent;
     }
+    squares_.setZero(columns);
+    rows_.reserve(system.rows.size() + 2 * system.tangents.size());  // their addresses stay
+    for (auto each = system.rows.rbegin(); each != system.rows.rend(); ++each)
+      wait(each->blocks.data(), each->blocks.data() + each->blocks.size(), each->Jr, 0, each->Jr.rows(), 0);
   }
 
-  /// Rows of R of block i; none if the rows do not determine it. The other rows wait for later blocks.
-  std::optional<LinearRows> eliminate(int i) {
-    const std::vector<const LinearRows*> stacked = std::exchange(waiting_[static_cast<std::size_t>(i)], {});
-    const Eigen::VectorXd& squares = squares_[static_cast<std::size_t>(i)];
-    const Eigen::Index own = squares.size();
+  /// Whether the rows determine block i. The rows below those of its R wait for later blocks.
+  bool eliminate(int i) {
+    const Eigen::Index own = system_.tangent(i);
     columns_.assign(1, i);
     Eigen::Index rows = 0;
-    for (const LinearRows* each : stacked) {
-      columns_.insert(columns_.end(), each->blocks.begin(), each->blocks.end());
-      rows += each->Jr.rows();
+    for (const Rows* each = waiting_[i]; each != nullptr; each = each->next) {
+      columns_.insert(columns_.end(), each->blocks, each->blocks_end);
+      rows += each->count;
     }
     std::sort(columns_.begin(), columns_.end());
     columns_.erase(std::unique(columns_.begin(), columns_.end()), columns_.end());
     starts_.clear();
-    Eigen::Index others = 0;
+    Eigen::Index last = 0;  // the column of r
     for (const int k : columns_) {
-      starts_.push_back(others);
-      others += system_.tangent(k);
+      starts_.push_back(last);
+      last += system_.tangent(k);
     }
-    if (rows < own) return std::nullopt;
-    const Eigen::Index last = others;  // the column of r
-    tableau_.reset(rows, last + 1);
-    Eigen::Index row = 0;
-    for (const LinearRows* each : stacked) row = stack(*each, row, last);
-    tableau_.triangularise(0, own);
+    if (rows < own) return false;
+    LinearRows& result = eliminated_[i];
+    result = {columns_, zeroTableau(rows, last + 1)};
+    stack(i, 0, last, result.Jr);
+    reflections_.triangularise(0, own, result.Jr);
+    // The columns of R are as long as those of J.
+    for (std::size_t at = 0; at < columns_.size(); ++at) {
+      const Eigen::Index width = system_.tangent(columns_[at]);
+      squares_.segment(firsts_[columns_[at]], width) +=
+          result.Jr.block(0, starts_[at], own, width).colwise().squaredNorm();
+    }
     for (Eigen::Index k = 0; k < own; ++k)
-      if (!(std::abs(tableau_.row(k)[k]) > kNothing * std::sqrt(squares[k]))) return std::nullopt;
-    keepRest(own, last);
-    return copied(0, 0, own, last);
+      if (!(std::abs(result.Jr(k, k)) > kNothing * std::sqrt(squares_[firsts_[i] + k]))) return false;
+    keepRest(own, last, result);
+    return true;
   }
 
   /// The rows that still wait, over the blocks from `first` on that are not held.
@@ -152,77 +150,81 @@ class BlockElimination {
       columns_.push_back(k);
       starts_.push_back(last);
       last += system_.tangent(k);
-      for (const LinearRows* each : waiting_[static_cast<std::size_t>(k)]) rows += each->Jr.rows();
+      for (const Rows* each = waiting_[k]; each != nullptr; each = each->next) rows += each->count;
     }
-    tableau_.reset(rows, last + 1);
+    RowMatrix tableau = zeroTableau(rows, last + 1);
     Eigen::Index row = 0;
-    for (const int k : columns_)
-      for (const LinearRows* each : waiting_[static_cast<std::size_t>(k)]) row = stack(*each, row, last);
-    tableau_.triangularise(0, last);
-    return squareRootOf(tableau_, 0, last);
+    for (const int k : columns_) row = stack(k, row, last, tableau);
+    reflections_.triangularise(0, last, tableau);
+    return squareRootOf(tableau, 0, last);
   }
 
+  /// The tableaus of the eliminated blocks.
+  std::vector<LinearRows> eliminated() && { return std::move(eliminated_); }
+
  private:
-  /// Copies rows into the tableau; returns the row after them.
-  Eigen::Index stack(const LinearRows& rows, Eigen::Index row, Eigen::Index last) {
-    for (Eigen::Index i = 0; i < rows.Jr.rows(); ++i, ++row) {
-      const double* from = rows.Jr.data() + i * rows.Jr.cols();
-      double* const to = tableau_.row(row);
-      std::size_t at = 0;
-      for (const int k : rows.blocks) {
-        while (columns_[at] != k) ++at;
-        const Eigen::Index width = system_.tangent(k);
-        std::copy_n(from, width, to + starts_[at]);
+  /// Some rows of a matrix.
+  struct Rows {
+    const int *blocks, *blocks_end;
+    const double* numbers;  ///< of the first row
+    Eigen::Index stride, count;
+    const Rows* next;  ///< that wait for the same block
+  };
+
+  /// Some rows of a matrix, from a column on, wait for the first of their blocks.
+  void wait(const int* blocks, const int* blocks_end, const RowMatrix& from, Eigen::Index row,
+            Eigen::Index count, Eigen::Index column) {
+    if (blocks == blocks_end || count <= 0) return;
+    const Rows*& first = waiting_[*blocks];
+    rows_.push_back({blocks, blocks_end, &from(row, column), from.cols(), count, first});
+    first = &rows_.back();
+  }
+
+  /// Copies the rows that wait for block i into the tableau, from `row` on; returns the row after them.
+  Eigen::Index stack(int i, Eigen::Index row, Eigen::Index last, RowMatrix& tableau) const {
+    for (const Rows* each = waiting_[i]; each != nullptr; each = each->next) {
+      const double* from = each->numbers;
+      const auto copyTo = [&](Eigen::Index column, Eigen::Index width) {
+        for (Eigen::Index k = 0; k < each->count; ++k)
+          std::copy_n(from + k * each->stride, width, &tableau(row + k, column));
         from += width;
+      };
+      std::size_t at = 0;
+      for (const int* block = each->blocks; block != each->blocks_end; ++block) {
+        while (columns_[at] != *block) ++at;
+        copyTo(starts_[at], system_.tangent(*block));
       }
-      to[last] = *from;
+      copyTo(last, 1);
+      row += each->count;
     }
     return row;
   }
 
   /// Keeps the rows below the first `own`. As many as the next block has columns wait for it, the others for
   /// the block after it. No more wait than have columns: in a batch they would pile up.
-  void keepRest(Eigen::Index own, Eigen::Index last) {
+  void keepRest(Eigen::Index own, Eigen::Index last, LinearRows& result) {
     if (columns_.size() == 1) return;
     const Eigen::Index next = columns_.size() > 2 ? starts_[2] : last;
-    tableau_.triangularise(own, tableau_.rows() > last ? last : next);
-    const Eigen::Index rows = std::min(tableau_.rows(), last);
-    keep(1, own, std::min(next, rows), last);
-    keep(2, next, rows, last);
-  }
-
-  /// The rows from `first` to `end` wait for the block columns_[at].
-  void keep(std::size_t at, Eigen::Index first, Eigen::Index end, Eigen::Index last) {
-    if (first >= end) return;
-    const LinearRows& rest = rest_.emplace_back(copied(at, first, end, last));
-    // First of all: those of the next block are triangular, so few of them are reflected.
-    auto& waiting = waiting_[static_cast<std::size_t>(rest.blocks.front())];
-    waiting.insert(waiting.begin(), &rest);
-  }
-
-  /// The rows from `first` to `end`, from the block columns_[at] on.
-  LinearRows copied(std::size_t at, Eigen::Index first, Eigen::Index end, Eigen::Index last) const {
-    LinearRows result;
-    result.blocks.assign(columns_.begin() + static_cast<std::ptrdiff_t>(at), columns_.end());
-    result.Jr.resize(end - first, last + 1 - starts_[at]);
-    for (Eigen::Index i = first; i < end; ++i)
-      std::copy_n(tableau_.row(i) + starts_[at], result.Jr.cols(),
-                  result.Jr.data() + (i - first) * result.Jr.cols());
-    return result;
+    reflections_.triangularise(own, result.Jr.rows() > last ? last : next, result.Jr);
+    const Eigen::Index rows = std::min(result.Jr.rows(), last);
+    // Before the others that wait: those of the next block are triangular, so few of them are reflected.
+    const int* const blocks = result.blocks.data();
+    const int* const end = blocks + result.blocks.size();
+    wait(blocks + 1, end, result.Jr, own, std::min(next, rows) - own, own);
+    wait(blocks + 2, end, result.Jr, next, rows - next, next);
   }
 
   const LinearSystem& system_;
-  std::vector<Eigen::VectorXd> squares_;                 ///< of the columns of each block
-  std::vector<std::vector<const LinearRows*>> waiting_;  ///< by their first block
-  std::deque<LinearRows> rest_;
+  std::vector<LinearRows> eliminated_;
+  std::vector<Rows> rows_;
+  std::vector<const Rows*> waiting_;  ///< the first of those that wait for each block
+  std::vector<Eigen::Index> firsts_;  ///< column of each block
+  Eigen::RowVectorXd squares_;        ///< of the columns of R
   // The columns of the block that is being eliminated: their blocks, and where each begins.
   std::vector<int> columns_;
   std::vector<Eigen::Index> starts_;
-  Tableau tableau_;
+  Reflections reflections_;
 };
-
-/// Some columns of a matrix by rows.
-using Columns = Eigen::Map<const RowMatrix, 0, Eigen::OuterStride<>>;
 
 // Row by row: at these sizes Eigen's products and triangular solves cost several times as much.
 
@@ -246,10 +248,10 @@ void forwardSubstitute(const Columns& R, RowMatrix& W) {
 template <typename Part>
 void eachBlock(const LinearRows& rows, const std::vector<Eigen::Index>& tangents, const Part& part) {
   const double* first = rows.Jr.data();
+  const Eigen::Index own = tangents[static_cast<std::size_t>(rows.blocks.front())];
   for (const int j : rows.blocks) {
     const Eigen::Index width = tangents[static_cast<std::size_t>(j)];
-    part(static_cast<std::size_t>(j),
-         Columns(first, rows.Jr.rows(), width, Eigen::OuterStride<>(rows.Jr.cols())));
+    part(static_cast<std::size_t>(j), Columns(first, own, width, Eigen::OuterStride<>(rows.Jr.cols())));
     first += width;
   }
 }
@@ -259,21 +261,20 @@ void eachBlock(const LinearRows& rows, const std::vector<Eigen::Index>& tangents
 std::optional<Elimination> Elimination::of(const LinearSystem& system) {
   Elimination result;
   const std::size_t count = system.tangents.size();
-  result.tangents_ = system.tangents;
-  result.R_.reserve(count);
-  result.delta_.reserve(count);
   BlockElimination elimination(system);
+  for (std::size_t i = 0; i < count; ++i)
+    if (!system.is_held[i] && !elimination.eliminate(static_cast<int>(i))) return std::nullopt;
+  result.tangents_ = system.tangents;
+  result.R_ = std::move(elimination).eliminated();
+  result.delta_.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
-    const auto block = static_cast<int>(i);
+    LinearRows& R = result.R_[i];
+    const Eigen::Index size = system.tangents[i];
     if (system.is_held[i]) {
-      const Eigen::Index size = system.tangents[i];
-      result.R_.push_back({{block}, RowMatrix::Identity(size, size + 1)});
-    } else if (auto rows = elimination.eliminate(block)) {
-      result.R_.push_back(std::move(*rows));
-    } else {
-      return std::nullopt;
+      R = {{static_cast<int>(i)}, zeroTableau(size, size + 1)};
+      R.Jr.topLeftCorner(size, size).setIdentity();
     }
-    const auto z = result.R_.back().Jr.rightCols<1>();
+    const auto z = R.Jr.col(R.Jr.cols() - kPadding - 1).head(size);
     result.squared_length_ += z.squaredNorm();
     result.delta_.emplace_back(-z);
   }
@@ -283,7 +284,10 @@ std::optional<Elimination> Elimination::of(const LinearSystem& system) {
       if (j == i) return;
       delta.noalias() -= R_ij.lazyProduct(result.delta_[j]);
     });
-    result.R_[i].Jr.leftCols(delta.size()).triangularView<Eigen::Upper>().solveInPlace(delta);
+    result.R_[i]
+        .Jr.topLeftCorner(delta.size(), delta.size())
+        .triangularView<Eigen::Upper>()
+        .solveInPlace(delta);
   }
   return result;
 }
@@ -324,15 +328,16 @@ std::vector<std::map<int, Eigen::MatrixXd>> Elimination::covariances() const {
   for (std::size_t i = R_.size(); i-- > 0;) {
     const Eigen::Index size = tangents_[i];
     const RowMatrix& rows = R_[i].Jr;
-    const Eigen::MatrixXd inverse =
-        rows.leftCols(size).triangularView<Eigen::Upper>().solve(Eigen::MatrixXd::Identity(size, size));
+    const Eigen::MatrixXd inverse = rows.topLeftCorner(size, size)
+                                        .triangularView<Eigen::Upper>()
+                                        .solve(Eigen::MatrixXd::Identity(size, size));
     P[i][static_cast<int>(i)] = inverse * inverse.transpose();
     // delta_i = G_i (...) - sum_j G_ij delta_j with G_ij = R_ii^-1 R_ij.
     std::map<int, Eigen::MatrixXd> G;
     Eigen::Index first = size;
     for (auto j = R_[i].blocks.begin() + 1; j != R_[i].blocks.end(); ++j) {
       const Eigen::Index width = tangents_[static_cast<std::size_t>(*j)];
-      G[*j] = inverse * rows.middleCols(first, width);
+      G[*j] = inverse * rows.block(0, first, size, width);
       first += width;
     }
     for (const auto& [j, unused] : G) {
@@ -359,18 +364,16 @@ SquareRoot widened(const SquareRoot& known, const Eigen::VectorXd& variances) {
   // Rows in (w, x'): x = x' - w, and w = 0 +- its sigma.
   const Eigen::Index walk = (variances.array() > 0.0).count();
   const Eigen::Index columns = known.J.cols(), rows = known.J.rows();
-  Tableau tableau;
-  tableau.reset(walk + rows, walk + columns + 1);
-  for (Eigen::Index i = 0; i < rows; ++i) {
-    Eigen::Map<Eigen::RowVectorXd>(tableau.row(walk + i) + walk, columns + 1) << known.J.row(i), known.r0[i];
-  }
+  RowMatrix tableau = zeroTableau(walk + rows, walk + columns + 1);
+  tableau.block(walk, walk, rows, columns) = known.J;
+  tableau.col(walk + columns).tail(rows) = known.r0;
   for (Eigen::Index k = 0, w = 0; k < columns; ++k) {
     if (!(variances[k] > 0.0)) continue;
-    tableau.row(w)[w] = 1.0 / std::sqrt(variances[k]);
-    for (Eigen::Index i = 0; i < rows; ++i) tableau.row(walk + i)[w] = -known.J(i, k);
+    tableau(w, w) = 1.0 / std::sqrt(variances[k]);
+    tableau.col(w).tail(rows) = -known.J.col(k);
     ++w;
   }
-  tableau.triangularise(0, walk + columns);
+  Reflections().triangularise(0, walk + columns, tableau);
   return squareRootOf(tableau, walk, columns);
 }
 

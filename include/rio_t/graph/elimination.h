@@ -25,6 +25,7 @@ class Elimination {
 
  private:
   /// The rows of each block: R_ii, then R_ij for the later blocks j that they have, then the right side z.
+  /// More rows may follow, and columns of zeros.
   std::vector<LinearRows> R_;
   std::vector<Eigen::Index> tangents_;
   std::vector<Eigen::VectorXd> delta_;
