@@ -29,11 +29,13 @@ class Reflections {
   /// most derivatives are zero.
   void triangularise(Eigen::Index first, Eigen::Index end, RowMatrix& tableau) {
     const Eigen::Index rows = tableau.rows(), columns = tableau.cols() - kPadding;
+    reflected_.resize(static_cast<std::size_t>(rows));
     for (Eigen::Index k = first; k < std::min(end, rows - 1); ++k) {
       double& diagonal = tableau(k, k);
       const double pivot = diagonal;
       double square = pivot * pivot;
-      reflected_.assign(1, {&tableau(k, 0), pivot});
+      Reflected* behind = reflected_.data();
+      *behind++ = {&tableau(k, 0), pivot};
       double* at = &tableau(k + 1, 0);
       for (Eigen::Index i = k + 1; i < rows; ++i, at += tableau.cols()) {
         const double squared = at[k] * at[k];
@@ -41,21 +43,24 @@ class Reflections {
           at[k] = 0.0;
           continue;
         }
-        reflected_.push_back({at, at[k]});
+        *behind++ = {at, at[k]};
         square += squared;
       }
-      if (reflected_.size() == 1) continue;
+      if (behind == reflected_.data() + 1) continue;
       const double norm = std::sqrt(square);
       reflected_.front().v += pivot > 0.0 ? norm : -norm;
       const double scale = 1.0 / (norm * (norm + std::abs(pivot)));
-      // 16 sums fill the registers; narrower parts waste less at the end of a row.
+      // 24 sums fit into the registers.
       for (Eigen::Index part = k + 1; part < columns;) {
         const Eigen::Index left = columns - part;
-        part += left > 12  ? reflect<16>(part, scale)
-                : left > 4 ? reflect<8>(part, scale)
-                           : reflect<4>(part, scale);
+        part += left > 20   ? reflect<24>(part, scale, behind)
+                : left > 16 ? reflect<20>(part, scale, behind)
+                : left > 12 ? reflect<16>(part, scale, behind)
+                : left > 8  ? reflect<12>(part, scale, behind)
+                : left > 4  ? reflect<8>(part, scale, behind)
+                            : reflect<4>(part, scale, behind);
       }
-      for (const Reflected& each : reflected_) each.row[k] = 0.0;
+      for (const Reflected* each = reflected_.data(); each != behind; ++each) each->row[k] = 0.0;
       diagonal = pivot > 0.0 ? -norm : norm;
     }
   }
@@ -68,12 +73,14 @@ class Reflections {
 
   /// Reflects some columns from `part` on, and returns how many. The sums stay in registers.
   template <int Width>
-  int reflect(Eigen::Index part, double scale) {
+  int reflect(Eigen::Index part, double scale, const Reflected* behind) const {
     using Part = Eigen::Array<double, Width, 1>;
     Part sums = Part::Zero();
-    for (const Reflected& each : reflected_) sums += each.v * Eigen::Map<const Part>(each.row + part);
+    for (const Reflected* each = reflected_.data(); each != behind; ++each)
+      sums += each->v * Eigen::Map<const Part>(each->row + part);
     sums *= scale;
-    for (const Reflected& each : reflected_) Eigen::Map<Part>(each.row + part) -= each.v * sums;
+    for (const Reflected* each = reflected_.data(); each != behind; ++each)
+      Eigen::Map<Part>(each->row + part) -= each->v * sums;
     return Width;
   }
 
