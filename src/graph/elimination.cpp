@@ -12,9 +12,6 @@ namespace {
 /// Rounding leaves some 1e-15 of a column that the rows do not determine.
 constexpr double kNothing = 1e-14;
 
-/// Some columns of a matrix by rows.
-using Columns = Eigen::Map<const RowMatrix, 0, Eigen::OuterStride<>>;
-
 /// Zeros behind the last column of a tableau: the last part of a row that is reflected may reach into them.
 constexpr Eigen::Index kPadding = 3;
 
@@ -233,36 +230,6 @@ class BlockElimination {
   Reflections reflections_;
 };
 
-// Row by row: at these sizes Eigen's products and triangular solves cost several times as much.
-
-/// sum += sign A' B.
-template <typename Left>
-void addProduct(const Left& A, const RowMatrix& B, double sign, RowMatrix& sum) {
-  for (Eigen::Index k = 0; k < A.rows(); ++k)
-    for (Eigen::Index i = 0; i < A.cols(); ++i)
-      if (A(k, i) != 0.0) sum.row(i) += sign * A(k, i) * B.row(k);
-}
-
-/// W <- R'^-1 W for the upper triangle R.
-void forwardSubstitute(const Columns& R, RowMatrix& W) {
-  for (Eigen::Index i = 0; i < R.rows(); ++i) {
-    for (Eigen::Index j = 0; j < i; ++j) W.row(i) -= R(j, i) * W.row(j);
-    W.row(i) /= R(i, i);
-  }
-}
-
-/// Calls part(j, R_ij) for each block that the rows of block i touch, R_ii first.
-template <typename Part>
-void eachBlock(const LinearRows& rows, const std::vector<Eigen::Index>& tangents, const Part& part) {
-  const double* first = rows.Jr.data();
-  const Eigen::Index own = tangents[static_cast<std::size_t>(rows.blocks.front())];
-  for (const int j : rows.blocks) {
-    const Eigen::Index width = tangents[static_cast<std::size_t>(j)];
-    part(static_cast<std::size_t>(j), Columns(first, own, width, Eigen::OuterStride<>(rows.Jr.cols())));
-    first += width;
-  }
-}
-
 }  // namespace
 
 std::optional<Elimination> Elimination::of(const LinearSystem& system) {
@@ -287,44 +254,48 @@ std::optional<Elimination> Elimination::of(const LinearSystem& system) {
   }
   for (std::size_t i = count; i-- > 0;) {
     Eigen::VectorXd& delta = result.delta_[i];
-    eachBlock(result.R_[i], result.tangents_, [&](std::size_t j, const Columns& R_ij) {
-      if (j == i) return;
-      delta.noalias() -= R_ij.lazyProduct(result.delta_[j]);
-    });
-    result.R_[i]
-        .Jr.topLeftCorner(delta.size(), delta.size())
-        .triangularView<Eigen::Upper>()
-        .solveInPlace(delta);
+    const LinearRows& R = result.R_[i];
+    Eigen::Index first = delta.size();
+    for (auto j = R.blocks.begin() + 1; j != R.blocks.end(); ++j) {
+      const Eigen::VectorXd& later = result.delta_[static_cast<std::size_t>(*j)];
+      delta.noalias() -= R.Jr.block(0, first, delta.size(), later.size()).lazyProduct(later);
+      first += later.size();
+    }
+    R.Jr.topLeftCorner(delta.size(), delta.size()).triangularView<Eigen::Upper>().solveInPlace(delta);
   }
   return result;
 }
 
 Eigen::MatrixXd Elimination::covariance(const std::vector<int>& indices) const {
-  Eigen::Index columns = 0;
-  for (const int i : indices) columns += tangents_[static_cast<std::size_t>(i)];
-  // Y = R'^-1 E, where E selects the blocks: their covariance is Y'Y.
-  std::vector<RowMatrix> Y(R_.size());
+  // Y = R'^-1 E, where E selects the blocks: their covariance is Y'Y. The rows of earlier blocks are zero.
+  const auto begin = static_cast<std::size_t>(*std::min_element(indices.begin(), indices.end()));
+  std::vector<Eigen::Index> starts(R_.size());
+  Eigen::Index rows = 0, columns = 0;
+  for (std::size_t i = begin; i < R_.size(); ++i) {
+    starts[i] = rows;
+    rows += tangents_[i];
+  }
+  for (const int i : indices) columns += tangents_[i];
+  RowMatrix Y = RowMatrix::Zero(rows, columns);
   Eigen::Index first = 0;
   for (const int i : indices) {
-    const Eigen::Index size = tangents_[static_cast<std::size_t>(i)];
-    Y[static_cast<std::size_t>(i)].setZero(size, columns);
-    Y[static_cast<std::size_t>(i)].middleCols(first, size).setIdentity();
-    first += size;
+    Y.block(starts[i], first, tangents_[i], tangents_[i]).setIdentity();
+    first += tangents_[i];
   }
-  RowMatrix result = RowMatrix::Zero(columns, columns);
-  for (std::size_t i = 0; i < R_.size(); ++i) {
-    if (Y[i].size() == 0) continue;
-    eachBlock(R_[i], tangents_, [&](std::size_t j, const Columns& R_ij) {
-      if (j == i) {
-        forwardSubstitute(R_ij, Y[i]);
-      } else {
-        if (Y[j].size() == 0) Y[j].setZero(R_ij.cols(), columns);
-        addProduct(R_ij, Y[i], -1.0, Y[j]);
+  // Row by row: at these sizes Eigen's triangular solves cost several times as much.
+  for (std::size_t i = begin; i < R_.size(); ++i) {
+    for (Eigen::Index k = 0; k < tangents_[i]; ++k) {
+      auto Y_k = Y.row(starts[i] + k);
+      const double* R_k = &R_[i].Jr(k, 0);
+      Y_k /= R_k[k];
+      for (const int j : R_[i].blocks) {
+        const Eigen::Index above = j == static_cast<int>(i) ? k + 1 : 0;
+        for (Eigen::Index c = above; c < tangents_[j]; ++c) Y.row(starts[j] + c) -= R_k[c] * Y_k;
+        R_k += tangents_[j];
       }
-    });
-    addProduct(Y[i], Y[i], 1.0, result);
+    }
   }
-  return result;
+  return Y.transpose() * Y;
 }
 
 std::vector<std::map<int, Eigen::MatrixXd>> Elimination::covariances() const {
