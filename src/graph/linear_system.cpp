@@ -33,15 +33,13 @@ class Evaluation {
     const double root = std::sqrt(evaluate(term, jacobians_.data()));
     LinearRows result;
     result.Jr.resize(rows, columns);
-    double* to = result.Jr.data();
-    for (Eigen::Index row = 0; row < rows; ++row) {
-      for (const std::size_t i : order_) {
-        const Manifold& manifold = *term.blocks[i]->manifold;
-        const double* from = numbers_[i].data() + row * manifold.size();
-        for (const int column : manifold.columns()) *to++ = root * from[column];
-      }
-      *to++ = root * r_[row];
+    Eigen::Index to = 0;
+    for (const std::size_t i : order_) {
+      const Manifold& manifold = *term.blocks[i]->manifold;
+      const Eigen::Map<const RowMatrix> from(numbers_[i].data(), rows, manifold.size());
+      for (const int column : manifold.columns()) result.Jr.col(to++) = root * from.col(column);
     }
+    result.Jr.col(to) = root * residuals();
     result.blocks.reserve(order_.size());
     for (const std::size_t i : order_) result.blocks.push_back(indices[i]);
     return result;
@@ -56,18 +54,22 @@ class Evaluation {
  private:
   /// Sets residual and cost; returns the derivative of the loss.
   double evaluate(const Term& term, double** jacobians) {
-    r_.resize(term.cost->num_residuals());
+    r_.resize(static_cast<std::size_t>(term.cost->num_residuals()));
     parameters_.clear();
     for (const Block* block : term.blocks) parameters_.push_back(block->x.data());
     if (!term.cost->Evaluate(parameters_.data(), r_.data(), jacobians))
       throw std::runtime_error("graph: a factor cannot be evaluated");
-    double rho[3] = {r_.squaredNorm(), 1.0, 0.0};
+    double rho[3] = {residuals().squaredNorm(), 1.0, 0.0};
     if (term.loss) term.loss->Evaluate(rho[0], rho);
     cost_ = 0.5 * rho[0];
     return rho[1];
   }
 
-  Eigen::VectorXd r_;
+  Eigen::Map<const Eigen::VectorXd> residuals() const {
+    return {r_.data(), static_cast<Eigen::Index>(r_.size())};
+  }
+
+  std::vector<double> r_;
   std::vector<std::vector<double>> numbers_;
   std::vector<const double*> parameters_;
   std::vector<double*> jacobians_;
