@@ -27,9 +27,9 @@ Eigen::Matrix<double, 4, StateBlock::kTangent> poseInW(const Eigen::Quaterniond&
 
 void addHeadingCurvature(NavigationState& state) {
   using S = StateBlock;
-  const StateTangent heading = poseInW(state.q_WI).row(0);
-  const StateTangent with_heading = state.covariance * heading;
-  const double variance = heading.dot(with_heading);
+  const Eigen::Vector3d heading = state.q_WI.toRotationMatrix().row(2);  // by theta, which lives in I
+  const StateTangent with_heading = state.covariance.middleCols<3>(S::kTheta) * heading;
+  const double variance = heading.dot(with_heading.segment<3>(S::kTheta));
   if (variance <= 0.0) return;
   // A turn by psi moves p and v by psi u, and shortens them by psi^2 / 2 along z x u.
   static_assert(S::kV == S::kP + 3);
