@@ -8,9 +8,9 @@ namespace rio_t {
 namespace {
 
 constexpr int kMaxIterations = 10;
-/// A step that promises to lower the cost by less is the last one: a fifth of a sigma, over which the
+/// A step that promises to lower the cost by less is the last one: a tenth of a sigma, over which the
 /// likelihood is quadratic.
-constexpr double kLittleProgress = 2e-2;
+constexpr double kLittleProgress = 0.5e-2;
 
 VelocityCost costAt(const Eigen::Vector3d& v_R, const DopplerLikelihood& likelihood,
                     const std::optional<VelocityPrior>& prior) {
