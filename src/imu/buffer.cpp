@@ -21,8 +21,7 @@ ImuBuffer::Samples::const_iterator ImuBuffer::firstAfter(Time time) const {
                           [](Time t, const ImuMeasurement& sample) { return t < sample.time; });
 }
 
-ImuMeasurement ImuBuffer::at(Time time) const {
-  const auto after = firstAfter(time);
+ImuMeasurement ImuBuffer::interpolated(Samples::const_iterator after, Time time) const {
   ImuMeasurement result = after == samples_.end() ? samples_.back() : *after;
   if (after != samples_.begin() && after != samples_.end()) {
     const ImuMeasurement& a = *std::prev(after);

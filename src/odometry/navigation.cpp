@@ -28,9 +28,10 @@ Navigation::Checked Navigation::add(const ImuMeasurement& imu) {
   gyro_noises_ += sample.gyro_noise;
   samples_ += 1.0;
   for (const ImuMeasurement& each : verdict.bridge) propagator_.add(each);
-  if (const std::optional<NavigationState> state = propagator_.state(); state && sample.lost_time > 0.0) {
-    const double lost = sample.lost_time * state->v_W.norm();
-    sample.unseen_velocity_variance = lost * lost / (sample.time - state->time);
+  const std::optional<NavigationState> before = sample.lost_time > 0.0 ? propagator_.state() : std::nullopt;
+  if (before) {
+    const double lost = sample.lost_time * before->v_W.norm();
+    sample.unseen_velocity_variance = lost * lost / (sample.time - before->time);
   }
   propagator_.add(sample);
   checked.bridge = std::move(verdict.bridge);

@@ -35,7 +35,7 @@ class ImuBuffer {
 
   /// Linear interpolation; outside of the samples the nearest one, with `time` as its time. The buffer must
   /// not be empty.
-  ImuMeasurement at(Time time) const;
+  ImuMeasurement at(Time time) const { return interpolated(firstAfter(time), time); }
 
   /// Mean over [time - half_width, time + half_width], as far as there are samples. Not for an empty buffer.
   ImuMean mean(Time time, double half_width) const;
@@ -56,6 +56,8 @@ class ImuBuffer {
  private:
   using Samples = std::deque<ImuMeasurement>;
   Samples::const_iterator firstAfter(Time time) const;  ///< the first sample later than `time`
+  /// As `at`. `after` is firstAfter(time).
+  ImuMeasurement interpolated(Samples::const_iterator after, Time time) const;
 
   Samples samples_;
 };
@@ -70,18 +72,17 @@ void ImuBuffer::forEachInterval(Time from, Time to, Step&& step) const {
     const Eigen::Vector3d accel = 0.5 * (a.acceleration + b.acceleration);
     step(dt, gyro, accel, dt > 0.0 ? b : a);
   };
-  const ImuMeasurement first = at(from);
+  auto sample = firstAfter(from);
+  const ImuMeasurement first = interpolated(sample, from);
   const ImuMeasurement* previous = &first;
   const auto advance = [&](const ImuMeasurement& next) {
     interval(*previous, next);
     previous = &next;
   };
   if (from < to) {
-    for (auto sample = firstAfter(from); sample != samples_.end() && sample->time < to; ++sample)
-      advance(*sample);
+    for (; sample != samples_.end() && sample->time < to; ++sample) advance(*sample);
   } else {
-    for (auto sample = firstAfter(from); sample != samples_.begin() && (--sample)->time > to;)
-      advance(*sample);
+    while (sample != samples_.begin() && (--sample)->time > to) advance(*sample);
   }
   interval(*previous, at(to));
 }
