@@ -9,7 +9,7 @@
 namespace rio_t {
 namespace {
 
-// What a gap leaves out is not known; that gravity does not let go in the meantime is.
+// Nobody knows the motion within a gap, but gravity acts all the time.
 TEST(GapBridge, OverALongGapGravityTurnsWithThePlatformAndTheRestDiesAway) {
   const double tau = kMotionCorrelationTime;
   GapBridge bridge;

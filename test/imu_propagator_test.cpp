@@ -9,7 +9,7 @@
 namespace rio_t {
 namespace {
 
-// What the IMU read since is not kept for ever: better an old anchor than one with a hole behind it.
+// The history is bounded. An anchor before its first sample would leave out the motion up to that sample.
 TEST(ImuPropagator, AnAnchorOlderThanItsHistoryIsNotTaken) {
   ImuPropagator propagator(ImuNoise(), {0.0, 0.0, -9.81});
   ImuMeasurement imu;

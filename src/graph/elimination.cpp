@@ -211,7 +211,8 @@ class BlockElimination {
     const Eigen::Index next = columns_.size() > 2 ? starts_[2] : last;
     reflections_.triangularise(own, result.Jr.rows() > last ? last : next, result.Jr);
     const Eigen::Index rows = std::min(result.Jr.rows(), last);
-    // Before the others that wait: those of the next block are triangular, so few of them are reflected.
+    // They come before the others that wait. Those of the next block are triangular, so few of them are
+    // reflected.
     const int* const blocks = result.blocks.data();
     const int* const end = blocks + result.blocks.size();
     wait(blocks + 1, end, result.Jr, own, std::min(next, rows) - own, own);

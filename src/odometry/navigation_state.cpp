@@ -3,6 +3,12 @@
 #include <algorithm>
 
 namespace rio_t {
+namespace {
+
+/// Derivative of the heading by theta, which lives in I.
+Eigen::RowVector3d headingByTheta(const Eigen::Quaterniond& q_WI) { return q_WI.toRotationMatrix().row(2); }
+
+}  // namespace
 
 NavigationState navigationState(const NodeEstimate& node, const StateCovariance& covariance,
                                 const ImuBuffer& imu) {
@@ -20,14 +26,14 @@ NavigationState navigationState(const NodeEstimate& node, const StateCovariance&
 
 Eigen::Matrix<double, 4, StateBlock::kTangent> poseInW(const Eigen::Quaterniond& q_WI) {
   Eigen::Matrix<double, 4, StateBlock::kTangent> E = Eigen::Matrix<double, 4, StateBlock::kTangent>::Zero();
-  E.block<1, 3>(0, StateBlock::kTheta) = q_WI.toRotationMatrix().row(2);  // theta lives in I
+  E.block<1, 3>(0, StateBlock::kTheta) = headingByTheta(q_WI);
   E.block<3, 3>(1, StateBlock::kP).setIdentity();
   return E;
 }
 
 void addHeadingCurvature(NavigationState& state) {
   using S = StateBlock;
-  const Eigen::Vector3d heading = state.q_WI.toRotationMatrix().row(2);  // by theta, which lives in I
+  const Eigen::Vector3d heading = headingByTheta(state.q_WI);
   const StateTangent with_heading = state.covariance.middleCols<3>(S::kTheta) * heading;
   const double variance = heading.dot(with_heading.segment<3>(S::kTheta));
   if (variance <= 0.0) return;
