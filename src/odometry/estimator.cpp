@@ -59,7 +59,7 @@ Estimator::Estimator(const OdometryOptions& options, Navigation& navigation, Fau
       initializer_(options),
       smoother_(options.smoother, options.imu_noise, g_W_, imu_),
       radars_(radarChannels(options, g_W_, imu_)),
-      mounting_check_(options.radarCount()),
+      calibration_check_(options.radarCount(), !options.smoother.estimate_time_offset),
       health_(options.health, options.innovation_gate.sigmas, options.radarCount()),
       waiting_for_(initializer_.waitingFor()) {
   if (options.platform == Platform::kGroundVehicle)
@@ -148,7 +148,7 @@ std::string Estimator::whyNotNow(Time node_time, bool imu_has_ended) const {
 }
 
 /// Passes the innovations of the scan to health, recovery, the scale of the model errors and the check of the
-/// mounting.
+/// calibration.
 void Estimator::judge(const RadarAnswer& answer, const RadarScan& scan) {
   HealthMonitor& health = health_.of(scan.radar);
   if (answer.innovation) {
@@ -161,9 +161,9 @@ void Estimator::judge(const RadarAnswer& answer, const RadarScan& scan) {
     health.offsetStepped(scan.stamp);
     faults_.count("time_offset_step");
   }
-  if (answer.at_rest) mounting_check_.velocityKnown();
+  if (answer.at_rest) calibration_check_.velocityKnown();
   if (!answer.used) return;
-  if (!health_.isContradicted()) mounting_check_.add(scan.radar, *answer.used);
+  if (!health_.isContradicted()) calibration_check_.add(scan.radar, *answer.used);
   // The state's variance grows about as the root of the accelerometer's.
   Eigen::Matrix3d scaled = 0.5 * answer.used->predicted;
   scaled.diagonal() += answer.ego_velocity.added_variance;
@@ -208,9 +208,10 @@ void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
   result.T_IR = radar.extrinsics();
   result.configured_T_IR = radar.configuredExtrinsics();
   const EstimateExtrinsics estimate = options_.smoother.estimate_extrinsics;
-  if (!estimatesTurn(estimate))
-    result.mounting_turn = mounting_check_.turnOf(result.scan.radar, result.configured_T_IR);
-  result.doppler_scale = mounting_check_.scaleOf(result.scan.radar);
+  const CalibrationErrors errors = calibration_check_.errorsOf(result.scan.radar, result.configured_T_IR);
+  if (!estimatesTurn(estimate)) result.mounting_turn = errors.turn;
+  result.doppler_scale = errors.scale;
+  result.offset_error = errors.offset;
   result.T_IR_covariance = extrinsicsCovariance(covariance.bottomRightCorner(estimated, estimated), estimate);
   for (const StampedPose& left : marginalize()) result.left_window.push_back(left);
   // On a frame that shakes the window believes rest little: the start of a gentle drive must not look like an
@@ -325,7 +326,7 @@ void Estimator::begin(const Initialization& found) {
   if (barometer_) barometer_->join(smoother_, found.time, at_rest);
   initializer_.forgetVelocities();
   model_error_scale_ = found.model_error_scale;
-  mounting_check_.velocityKnown();
+  calibration_check_.velocityKnown();
   last_used_ = found.time;
   contradicted_since_ = found.time;
   corrected_W_.setZero();

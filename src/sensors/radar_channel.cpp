@@ -163,8 +163,8 @@ void RadarChannel::learn(const RadarScan& scan, const Seen& seen, const Innovati
   // A borrowed point must not teach twice.
   if (!seen.is_own || sharesPoints(seen, memory_.learned_at)) return;
   if (seen.canBeJudged())
-    answer.used =
-        UsedInnovation{*d.all, seen.velocity.v_R, seen.prior->covariance, seen.prediction->scan.R_WR()};
+    answer.used = UsedInnovation{*d.all, seen.velocity.v_R, seen.prior->covariance,
+                                 seen.prediction->scan.R_WR(), offset_widths_.gain() * seen.dv_dt_O.mean};
   if (answer.at_rest) return;
   const DopplerLikelihood* world =
       answer.doppler && !seen.has_borrowed ? answer.doppler->points.get() : nullptr;
@@ -227,13 +227,12 @@ bool RadarChannel::confirmsRest(const Rest& rest, const RadarScan& scan, double 
 }
 
 double RadarChannel::offsetGain(Seen& seen) {
-  const SmootherOptions& o = options_.smoother;
-  if (!seen.moves || !(o.estimate_time_offset || o.estimate_extrinsics != EstimateExtrinsics::kNone))
-    return 0.0;
+  if (!seen.moves) return 0.0;
   OffsetScan scan = seen.prediction->scan;
   scan.measured = seen.velocity.covariance;
   offset_widths_.add(scan);
   seen.dv_dt_O = offset_widths_.derivative(scan);
+  const SmootherOptions& o = options_.smoother;
   const bool moves_enough = seen.dv_dt_O.mean.norm() > o.time_offset_min_acceleration;
   return o.estimate_time_offset && moves_enough ? offset_widths_.gain() : 0.0;
 }

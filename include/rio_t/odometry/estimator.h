@@ -10,7 +10,7 @@
 #include "rio_t/odometry/fault_counters.h"
 #include "rio_t/odometry/initializer.h"
 #include "rio_t/odometry/model_error_scale.h"
-#include "rio_t/odometry/mounting_check.h"
+#include "rio_t/odometry/calibration_check.h"
 #include "rio_t/odometry/navigation.h"
 #include "rio_t/odometry/options.h"
 #include "rio_t/odometry/radars_health.h"
@@ -98,7 +98,7 @@ class Estimator {
   std::optional<GroundVehicleChannel> ground_vehicle_;  ///< if the platform is one
   std::optional<BarometerChannel> barometer_;           ///< if it is used
   ModelErrorScale model_error_scale_;
-  MountingCheck mounting_check_;
+  CalibrationCheck calibration_check_;
   RadarsHealth health_;
   Time contradicted_since_;
   Eigen::Vector3d corrected_W_ = Eigen::Vector3d::Zero();  ///< what scans added to v_W since then [m/s]

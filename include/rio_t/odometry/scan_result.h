@@ -7,7 +7,7 @@
 #include "rio_t/graph/solver_termination.h"
 #include "rio_t/landmarks/landmark_answer.h"
 #include "rio_t/odometry/health_monitor.h"
-#include "rio_t/odometry/mounting_check.h"
+#include "rio_t/odometry/calibration_check.h"
 #include "rio_t/odometry/navigation_state.h"
 #include "rio_t/radar/scan.h"
 #include "rio_t/sensors/barometer_channel.h"
@@ -35,6 +35,7 @@ struct ScanResult : ScanAnswer {
   Extrinsics configured_T_IR;                 ///< the mounting of the options
   std::optional<MountingTurn> mounting_turn;  ///< from it, as the scans say; none if T_IR is estimated
   DopplerScale doppler_scale;                 ///< as the scans say
+  std::optional<OffsetError> offset_error;    ///< likewise; none if t_O is estimated
   /// Covariance of T_IR, if it is estimated; zero if not. Translation of the radar in I [m], then turn about
   /// the axes of I [rad]: the order of ROS.
   Eigen::Matrix<double, 6, 6> T_IR_covariance = Eigen::Matrix<double, 6, 6>::Zero();

@@ -48,7 +48,7 @@ struct OffsetScan {
   Eigen::Matrix3d share() const { return predicted * (predicted + measured).inverse(); }
   /// An offset that is wrong by one second changes the scan's velocity by `J` [m/s^2], in R, and the scans
   /// before have moved the estimated one by `followed` [m/s^2], in W. Returns the difference, and adds the
-  /// share of it that this scan moves (Friedland; see MountingCheck).
+  /// share of it that this scan moves (Friedland; see CalibrationCheck).
   Eigen::Vector3d follow(const Eigen::Vector3d& J, Eigen::Vector3d& followed) const {
     Eigen::Vector3d unfollowed = J - R_WR().transpose() * followed;
     followed += R_WR() * share() * unfollowed;

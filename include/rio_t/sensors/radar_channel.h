@@ -56,6 +56,10 @@ struct UsedInnovation : Innovation {
   Eigen::Vector3d v_R = Eigen::Vector3d::Zero();        ///< measured [m/s]
   Eigen::Matrix3d predicted = Eigen::Matrix3d::Zero();  ///< part of the prediction in S [m^2/s^2]
   Eigen::Matrix3d R_WR = Eigen::Matrix3d::Identity();   ///< as predicted
+  /// As J_O, but a mean over both sides of the scan. Less what the estimate has followed of it, it has no
+  /// noise in common with d: half of its noise comes from before the scan, and so does half of what was
+  /// followed.
+  Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();
 };
 
 /// The channel's answer to a scan. All else that reports a scan reads this value.
@@ -80,7 +84,8 @@ class RadarChannel {
   RadarChannel(const RadarChannelOptions& options, const Eigen::Vector3d& g_W, const ImuBuffer& imu,
                std::shared_ptr<OffsetBlocks> offset);
 
-  /// Takes what a scan shows of the radar itself. Once per scan, first of all. False: it repeats the last one.
+  /// Takes what a scan shows of the radar itself. Once per scan, first of all. False: it repeats the last
+  /// one.
   bool observe(const RadarScan& scan) { return estimator_.observe(scan); }
   /// Velocity of a scan from its points alone, for the time before there is a state.
   EgoVelocity velocityOf(const RadarScan& scan) const { return estimator_.estimate(scan); }

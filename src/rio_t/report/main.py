@@ -104,6 +104,7 @@ CHECKS = {  # name in summary.yaml: for people
     "windows_not_converged_share": "share of the windows that stopped before they converged",
     "mounting_turned_sigmas": "turn of mounting or vehicle frame from the configured one, in sigmas",
     "doppler_scaled_sigmas": "error of the scale of the Doppler, in sigmas",
+    "held_offset_error_sigmas": "error of a time offset that is not estimated, in sigmas",
     "imu_faults_share": "share of the IMU samples with a fault",
     "healthy_at_end": "the estimate is healthy at the end"}
 VERDICTS = {

@@ -67,6 +67,10 @@ void addEstimates(SummaryLines& lines, const RadarSummary& radar) {
   }
   lines.add("doppler_scale_error" + suffix, fixedText(radar.doppler_scale.error, 4));
   lines.add("doppler_scale_error_sigma" + suffix, fixedText(std::sqrt(radar.doppler_scale.variance), 4));
+  if (radar.offset_error) {  // of an offset that is not estimated
+    lines.add("offset_error_s" + suffix, fixedText(radar.offset_error->error, 9));
+    lines.add("offset_error_sigma_s" + suffix, fixedText(std::sqrt(radar.offset_error->variance), 9));
+  }
   if (!radar.extrinsics) return;
   const ExtrinsicsSummary& extrinsics = *radar.extrinsics;
   lines.add("configured_extrinsics_translation" + suffix, fixedTexts(extrinsics.configured.l_I, 9));

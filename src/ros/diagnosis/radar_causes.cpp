@@ -24,6 +24,7 @@ class RadarCauses {
     addVelocities();
     addContradictions();
     addScale();
+    addOffset();
     addMounting();
   }
 
@@ -235,6 +236,17 @@ class RadarCauses {
               "Check imu_acceleration_unit, too. `rosrun rio_t check_bag BAG` compares the Doppler with the "
               "ranges.",
           true);
+  }
+
+  void addOffset() {
+    const double sigmas = offsetSigmas(radar_);
+    if (sigmas <= kWrongOffset) return;
+    const double held = config_.odometry.radar.time_offset_initial;
+    cause("offset_far", 1.0 - kWrongOffset / sigmas,
+          "The scans fit better with a time offset" + of_ + " of about " +
+              fixedText(held + radar_.offset_error->error, 3) +
+              " s, and estimate_time_offset: false holds it at " + fixedText(held, 3) + " s.",
+          "Set estimate_time_offset: true, or correct " + key_ + "time_offset_initial.");
   }
 
   void addMounting() {

@@ -73,6 +73,17 @@ inline double scaleSigmas(const RadarSummary& radar) {
          std::hypot(std::sqrt(radar.doppler_scale.variance), kDopplerScaleSigma);
 }
 
+/// An offset that is held may be off by 5 ms at three sigma. At 5 m/s^2 this is 0.025 m/s, about the noise of
+/// a Doppler.
+inline constexpr double kHeldOffsetSigma = 0.005 / 3.0;
+
+/// How far the offset seems to be off; 0 if it is estimated.
+inline double offsetSigmas(const RadarSummary& radar) {
+  if (!radar.offset_error) return 0.0;
+  return std::abs(radar.offset_error->error) /
+         std::hypot(std::sqrt(radar.offset_error->variance), kHeldOffsetSigma);
+}
+
 /// Everything that speaks of one radar.
 void addCausesOfRadar(const RadarSummary& radar, const Config& config, std::vector<Cause>* causes);
 

@@ -1,4 +1,4 @@
-#include "rio_t/odometry/mounting_check.h"
+#include "rio_t/odometry/calibration_check.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -13,21 +13,21 @@ namespace {
 /// it may be an outlier.
 constexpr double kLongest = 4.0;
 
-// The errors of a radar: its turn, then its scale.
-constexpr int kTurn = 3, kErrors = kTurn + 1;
-Eigen::Index turnAt(std::size_t radar) { return kErrors * static_cast<Eigen::Index>(radar); }
-Eigen::Index scaleAt(std::size_t radar) { return turnAt(radar) + kTurn; }
+constexpr int kTurn = 3;
 
 }  // namespace
 
-// The prior: a turn of a radian, beyond which nothing here is linear, and a scale that is off by itself.
-MountingCheck::MountingCheck(std::size_t radars)
-    : dv_W_(Eigen::MatrixXd::Zero(3, kErrors * static_cast<Eigen::Index>(radars))),
+// The prior: a turn of a radian, beyond which nothing here is linear, a scale that is off by itself, an
+// offset of a second.
+CalibrationCheck::CalibrationCheck(std::size_t radars, bool holds_offsets)
+    : holds_offsets_(holds_offsets),
+      each_(kTurn + (holds_offsets ? 2 : 1)),
+      dv_W_(Eigen::MatrixXd::Zero(3, each_ * static_cast<Eigen::Index>(radars))),
       information_(Eigen::MatrixXd::Identity(dv_W_.cols(), dv_W_.cols())),
       score_(Eigen::VectorXd::Zero(dv_W_.cols())),
       alike_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(radars))) {}
 
-void MountingCheck::add(std::size_t radar, const UsedInnovation& innovation) {
+void CalibrationCheck::add(std::size_t radar, const UsedInnovation& innovation) {
   // A radar turned by theta measures v_R + v_R x theta. The prediction has followed the scans before.
   Eigen::MatrixXd J = -innovation.R_WR.transpose() * dv_W_;
   J.middleCols<kTurn>(turnAt(radar)) += so3::hat(innovation.v_R);
@@ -37,6 +37,7 @@ void MountingCheck::add(std::size_t radar, const UsedInnovation& innovation) {
   const Eigen::Vector3d weighted_d = S.solve(innovation.d);
   const Eigen::Vector3d correction = innovation.predicted * weighted_d;
   J.col(scaleAt(radar)) += innovation.v_R - innovation.d + correction;
+  if (holds_offsets_) J.col(offsetAt(radar)) += innovation.dv_dt_O;
   const Eigen::MatrixXd weighted = S.solve(J);
   const double weight = std::min(1.0, kLongest / std::sqrt(innovation.squaredSigmas()));
   information_ += weight * J.transpose() * weighted;
@@ -47,23 +48,24 @@ void MountingCheck::add(std::size_t radar, const UsedInnovation& innovation) {
   dv_W_ += innovation.R_WR * innovation.predicted * weighted;
 }
 
-Eigen::MatrixXd MountingCheck::covariance() const {
-  return information_.ldlt().solve(Eigen::MatrixXd::Identity(score_.size(), score_.size()));
-}
+CalibrationErrors CalibrationCheck::errorsOf(std::size_t radar, const Extrinsics& configured) const {
+  const Eigen::MatrixXd P =
+      information_.ldlt().solve(Eigen::MatrixXd::Identity(score_.size(), score_.size()));
+  const Eigen::VectorXd errors = P * score_;
+  Eigen::MatrixXd covariance = P;
+  for (Eigen::Index k = 0; k < alike_.size(); ++k) {
+    const Eigen::VectorXd bias = alike_[k] * P.col(scaleAt(static_cast<std::size_t>(k)));
+    covariance += bias * bias.transpose();
+  }
 
-MountingTurn MountingCheck::turnOf(std::size_t radar, const Extrinsics& configured) const {
-  const Eigen::Index first = turnAt(radar);
-  const Eigen::MatrixXd P = covariance();
+  const Eigen::Index turn = turnAt(radar), scale = scaleAt(radar), offset = offsetAt(radar);
   const Eigen::Matrix3d R_IR = configured.q_IR.toRotationMatrix();
-  return {R_IR * (P.middleRows<kTurn>(first) * score_),
-          R_IR * P.block<kTurn, kTurn>(first, first) * R_IR.transpose()};
-}
-
-DopplerScale MountingCheck::scaleOf(std::size_t radar) const {
-  const Eigen::Index k = scaleAt(radar);
-  const Eigen::MatrixXd P = covariance();
-  const double bias = P(k, k) * alike_[static_cast<Eigen::Index>(radar)];
-  return {P.row(k) * score_, P(k, k) + bias * bias};
+  CalibrationErrors result;
+  result.turn.turn = R_IR * errors.segment<kTurn>(turn);
+  result.turn.covariance = R_IR * covariance.block<kTurn, kTurn>(turn, turn) * R_IR.transpose();
+  result.scale = {errors[scale], covariance(scale, scale)};
+  if (holds_offsets_) result.offset = OffsetError{errors[offset], covariance(offset, offset)};
+  return result;
 }
 
 }  // namespace rio_t

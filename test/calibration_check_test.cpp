@@ -1,4 +1,4 @@
-#include "rio_t/odometry/mounting_check.h"
+#include "rio_t/odometry/calibration_check.h"
 
 #include <gtest/gtest.h>
 
@@ -17,12 +17,15 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Filters the velocities of radars that are turned by `turns`, about their own axes, and read 1 / (1 -
-/// `scales`) times the velocity, without any noise. All that the check sees comes from these errors.
-MountingCheck checkOf(const std::vector<Vector3d>& turns, const std::vector<double>& scales) {
+/// Filters the velocities of radars that are turned by `turns`, about their own axes, read 1 / (1 - `scales`)
+/// times the velocity, and are `offsets` [s] off, without any noise. All that the check sees comes from these
+/// errors.
+CalibrationCheck checkOf(const std::vector<Vector3d>& turns, const std::vector<double>& scales,
+                         const std::vector<double>& offsets) {
+  constexpr double kSpacing = 0.01;  // [s] of the scans, short: they show the offset well
   const Eigen::Matrix3d P = Vector3d(1e-4, 2e-4, 4e-4).asDiagonal(),
                         R = Vector3d(3e-4, 2e-4, 1e-4).asDiagonal();
-  MountingCheck check(turns.size());
+  CalibrationCheck check(turns.size(), true);
   Vector3d v_W(1.0, 0.0, 0.2), estimate_W = v_W;
   for (int k = 0; k < 600; ++k) {
     const Vector3d change_W(0.02 * std::cos(0.05 * k), 0.02 * std::sin(0.03 * k), 0.01 * std::cos(0.07 * k));
@@ -32,7 +35,9 @@ MountingCheck checkOf(const std::vector<Vector3d>& turns, const std::vector<doub
     UsedInnovation innovation;
     innovation.R_WR =
         so3::exp(Vector3d(0.3 * std::sin(0.2 * k), 0.3 * std::cos(0.13 * k), 0.02 * k)).toRotationMatrix();
-    innovation.v_R = so3::exp(-turns[radar]) * (innovation.R_WR.transpose() * v_W) / (1.0 - scales[radar]);
+    innovation.dv_dt_O = -innovation.R_WR.transpose() * change_W / kSpacing;
+    innovation.v_R = so3::exp(-turns[radar]) * (innovation.R_WR.transpose() * v_W) / (1.0 - scales[radar]) +
+                     innovation.dv_dt_O * offsets[radar];
     innovation.d = innovation.v_R - innovation.R_WR.transpose() * estimate_W;
     innovation.predicted = P;
     innovation.S = P + R;
@@ -42,17 +47,20 @@ MountingCheck checkOf(const std::vector<Vector3d>& turns, const std::vector<doub
   return check;
 }
 
-TEST(MountingCheck, IsExactForSmallTurnsWithoutNoise) {
+TEST(CalibrationCheck, IsExactForSmallTurnsWithoutNoise) {
   const std::vector<Vector3d> turns = {Vector3d(1e-4, -2e-4, 3e-4), Vector3d(-2e-4, 1e-4, 2e-4)};
-  const std::vector<double> scales = {3e-4, -2e-4};
+  const std::vector<double> scales = {3e-4, -2e-4}, offsets = {-1e-4, 2e-4};
   for (const std::size_t radars : {1U, 2U}) {
     for (const double scaled : {0.0, 1.0}) {
-      const MountingCheck check =
-          checkOf({turns.begin(), turns.begin() + radars}, {scaled * scales[0], scaled * scales[1]});
+      const CalibrationCheck check =
+          checkOf({turns.begin(), turns.begin() + radars}, {scaled * scales[0], scaled * scales[1]}, offsets);
       for (std::size_t k = 0; k < radars; ++k) {
-        EXPECT_LT((check.turnOf(k, {}).turn - turns[k]).norm(), 1e-3 * turns[k].norm())
-            << radars << " radars: " << check.turnOf(k, {}).turn.transpose();
-        EXPECT_NEAR(check.scaleOf(k).error, scaled * scales[k], 1e-3 * std::abs(scales[k]));
+        const CalibrationErrors found = check.errorsOf(k, {});
+        EXPECT_LT((found.turn.turn - turns[k]).norm(), 1e-3 * turns[k].norm())
+            << radars << " radars: " << found.turn.turn.transpose();
+        EXPECT_NEAR(found.scale.error, scaled * scales[k], 1e-3 * std::abs(scales[k]));
+        ASSERT_TRUE(found.offset);
+        EXPECT_NEAR(found.offset->error, offsets[k], 1e-3 * std::abs(offsets[k]));
       }
     }
   }
@@ -78,16 +86,30 @@ SimulatedRun turnedBy(const Vector3d& turn, const std::string& motion, std::uint
   return run;
 }
 
+/// A run of radars that are held at an offset that is `error` [s] short of the true one. The IMU vibrates by
+/// `vibration` [m/s^2].
+SimulatedRun heldOffBy(double error, const std::string& motion, std::uint64_t seed, double vibration = 0.0) {
+  SimulatedRun run(motion, seed, 50.0, 5.0);
+  run.setup.time_offset.constant = 0.03;
+  run.setup.imu.accel_vibration = vibration;
+  run.options.smoother.estimate_time_offset = false;
+  run.options.radar.time_offset_initial = run.setup.time_offset.constant - error;
+  run.run();
+  return run;
+}
+
 double squaredSigmas(const MountingTurn& turn, double configured_sigma) {
   const Eigen::Matrix3d told = configured_sigma * configured_sigma * Eigen::Matrix3d::Identity();
   return turn.turn.dot((turn.covariance + told).ldlt().solve(turn.turn));
 }
 
-double squaredSigmas(const DopplerScale& scale, double told_sigma) {
-  return scale.error * scale.error / (scale.variance + told_sigma * told_sigma);
+/// Of a scale or an offset.
+template <class Error>
+double squaredSigmas(const Error& found, double told_sigma) {
+  return found.error * found.error / (found.variance + told_sigma * told_sigma);
 }
 
-TEST(MountingCheck, ItsSigmasAreWhatItsErrorsAre) {
+TEST(CalibrationCheck, ItsSigmasAreWhatItsErrorsAre) {
   constexpr int kSeeds = 8;
   for (const char* motion : {"difficult", "drone", "start_in_motion"}) {
     double sum = 0.0, sum_of_scales = 0.0;
@@ -110,7 +132,7 @@ TEST(MountingCheck, ItsSigmasAreWhatItsErrorsAre) {
   }
 }
 
-TEST(MountingCheck, FindsAWrongMounting) {
+TEST(CalibrationCheck, FindsAWrongMounting) {
   for (const Vector3d& axis : {Vector3d(1, 0, 0), Vector3d(0, 1, 0), Vector3d(0, 0, 1)}) {
     for (const char* motion : {"difficult", "medium", "drone"}) {
       const Vector3d turn = 8.0 * kDegree * axis;
@@ -123,7 +145,7 @@ TEST(MountingCheck, FindsAWrongMounting) {
   }
 }
 
-TEST(MountingCheck, FindsAWrongScale) {
+TEST(CalibrationCheck, FindsAWrongScale) {
   for (const EstimateExtrinsics estimate : {EstimateExtrinsics::kNone, EstimateExtrinsics::kPose}) {
     for (const char* motion : {"difficult", "medium", "drone"}) {
       for (const double factor : {0.5, 0.8, 1.25}) {
@@ -139,7 +161,47 @@ TEST(MountingCheck, FindsAWrongScale) {
   }
 }
 
-TEST(MountingCheck, FindsAWrongTurnIfTheLeverArmIsEstimated) {
+TEST(CalibrationCheck, FindsAWrongOffset) {
+  for (const char* motion : {"difficult", "medium", "drone"}) {
+    for (const double error : {-0.02, 0.05}) {
+      const SimulatedRun run = heldOffBy(error, motion, 1);
+      const OffsetError found = *run.last(0).offset_error;
+      EXPECT_LT(std::abs(found.error - error), std::abs(error) / 4.0) << motion << ": " << found.error;
+      EXPECT_GT(squaredSigmas(found, 0.0), 9.0) << motion << ": " << found.error;
+      // The others are not blamed for it.
+      EXPECT_LT(squaredSigmas(*run.last(0).mounting_turn, kDegree), 9.0) << motion;
+      EXPECT_LT(squaredSigmas(run.last(0).doppler_scale, 0.03), 9.0) << motion;
+    }
+  }
+}
+
+// Noise of the IMU is in the innovations and in the derivatives by the offset.
+TEST(CalibrationCheck, AVibrationIsNoWrongOffset) {
+  double sum = 0.0;
+  constexpr int kSeeds = 4;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    const OffsetError found = *heldOffBy(0.0, "walk", seed, 2.0).last(0).offset_error;
+    EXPECT_LT(squaredSigmas(found, 0.0), 9.0) << found.error << " +- " << std::sqrt(found.variance);
+    sum += found.error;
+  }
+  EXPECT_LT(std::abs(sum / kSeeds), 0.003);
+}
+
+TEST(CalibrationCheck, TheSigmaOfAHeldOffsetIsWhatItsErrorIs) {
+  constexpr int kSeeds = 8;
+  for (const char* motion : {"difficult", "drone"}) {
+    double sum = 0.0;
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+      const OffsetError found = *heldOffBy(0.0, motion, seed).last(0).offset_error;
+      EXPECT_LT(squaredSigmas(found, 0.0), 9.0) << motion << ", seed " << seed;
+      sum += squaredSigmas(found, 0.0);
+    }
+    EXPECT_GT(sum / kSeeds, 0.3) << motion;
+    EXPECT_LT(sum / kSeeds, 2.5) << motion;
+  }
+}
+
+TEST(CalibrationCheck, FindsAWrongTurnIfTheLeverArmIsEstimated) {
   const Vector3d turn(0.0, 8.0 * kDegree, 0.0);
   SimulatedRun run("difficult", 1, 50.0, 5.0);
   run.options.smoother.estimate_extrinsics = EstimateExtrinsics::kLeverArm;
@@ -150,7 +212,7 @@ TEST(MountingCheck, FindsAWrongTurnIfTheLeverArmIsEstimated) {
   EXPECT_LT((found - turn).norm(), turn.norm() / 4.0) << (found / kDegree).transpose();
 }
 
-TEST(MountingCheck, RestShowsNothing) {
+TEST(CalibrationCheck, RestShowsNothing) {
   SimulatedRun run("medium", 1, 40.0, 25.0);
   run.run([&](simulation::SensorData& data) {  // ends before the platform moves
     auto& samples = data.imu.samples;
@@ -163,7 +225,7 @@ TEST(MountingCheck, RestShowsNothing) {
   EXPECT_GT(run.last(0).doppler_scale.variance, 0.25);
 }
 
-TEST(MountingCheck, AMountingThatIsEstimatedNeedsNoCheck) {
+TEST(CalibrationCheck, AMountingThatIsEstimatedNeedsNoCheck) {
   SimulatedRun run("difficult", 1, 20.0, 5.0);
   run.options.smoother.estimate_extrinsics = EstimateExtrinsics::kRotation;
   run.run();
