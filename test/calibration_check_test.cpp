@@ -35,9 +35,9 @@ CalibrationCheck checkOf(const std::vector<Vector3d>& turns, const std::vector<d
     UsedInnovation innovation;
     innovation.R_WR =
         so3::exp(Vector3d(0.3 * std::sin(0.2 * k), 0.3 * std::cos(0.13 * k), 0.02 * k)).toRotationMatrix();
-    innovation.dv_dt_O = -innovation.R_WR.transpose() * change_W / kSpacing;
+    innovation.J_mean = -innovation.R_WR.transpose() * change_W / kSpacing;
     innovation.v_R = so3::exp(-turns[radar]) * (innovation.R_WR.transpose() * v_W) / (1.0 - scales[radar]) +
-                     innovation.dv_dt_O * offsets[radar];
+                     innovation.J_mean * offsets[radar];
     innovation.d = innovation.v_R - innovation.R_WR.transpose() * estimate_W;
     innovation.predicted = P;
     innovation.S = P + R;

@@ -18,7 +18,7 @@ double secondsToStep(double offset_error, double acceleration, double noise = 0.
     const Eigen::Vector3d e(std::sin(2.1 * i * i), std::cos(1.3 * i * i), std::sin(0.7 * i * i + 1.0));
     const double error = 0.1 * i < quiet ? 0.0 : offset_error;
     const Eigen::Vector3d d = error * J + std::sqrt(2.0) * noise * e;
-    if (detector.stepped({Time::fromSeconds(0.1 * i), d, S, S, J}, Eigen::Matrix3d::Identity()))
+    if (detector.stepped({Time::fromSeconds(0.1 * i), d, S, S, J, J}, Eigen::Matrix3d::Identity()))
       return 0.1 * i;
   }
   return 60.0;
@@ -58,7 +58,7 @@ TEST(OffsetStepDetector, SeesAStepThatTheVelocityFollows) {
     const Eigen::Vector3d e(std::sin(2.1 * i * i), std::cos(1.3 * i * i), std::sin(0.7 * i * i + 1.0));
     const Eigen::Vector3d due = (t < begin ? 0.0 : step) * J - followed;
     const Eigen::Vector3d d = due + 0.01 * e;
-    if (detector.stepped({Time::fromSeconds(t), d, S, S, J}, scan.R_WR())) found = t;
+    if (detector.stepped({Time::fromSeconds(t), d, S, S, J, J}, scan.R_WR())) found = t;
     detector.follow(J, scan);
     followed += due / 3.0;
   }
@@ -79,7 +79,7 @@ TEST(OffsetStepDetector, SeesAStepThatTheVelocityDoesNotFollow) {
     const Eigen::Vector3d J = 2.0 * Eigen::Vector3d(std::sin(0.6 * t), std::cos(0.6 * t), 0.3);
     const Eigen::Vector3d e(std::sin(2.1 * i * i), std::cos(1.3 * i * i), std::sin(0.7 * i * i + 1.0));
     const Eigen::Vector3d d = (t < 30.0 ? 0.0 : 0.1) * J + 0.01 * e;
-    if (detector.stepped({Time::fromSeconds(t), d, S, S, J}, scan.R_WR())) found = t;
+    if (detector.stepped({Time::fromSeconds(t), d, S, S, J, J}, scan.R_WR())) found = t;
     detector.follow(J, scan);
   }
   EXPECT_GE(found, 30.0);
@@ -100,7 +100,7 @@ TEST(OffsetStepDetector, CanBeTurnedOff) {
   OffsetStepDetector detector(options, 0.25);
   for (int i = 0; i < 200; ++i) {
     const Eigen::Matrix3d S = 1e-4 * Eigen::Matrix3d::Identity();
-    EXPECT_FALSE(detector.stepped({Time::fromSeconds(0.1 * i), {1, 0, 0}, S, S, {2, 0, 0}},
+    EXPECT_FALSE(detector.stepped({Time::fromSeconds(0.1 * i), {1, 0, 0}, S, S, {2, 0, 0}, {2, 0, 0}},
                                   Eigen::Matrix3d::Identity()));
   }
 }

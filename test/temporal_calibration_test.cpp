@@ -223,6 +223,20 @@ TEST(TemporalCalibration, VibrationTeachesNothing) {
   }
 }
 
+// The estimated velocity and the derivative hold the same noise.
+TEST(TemporalCalibration, VibrationIsNoStep) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    SimulatedRun run("walk", seed, 100.0, kStart);
+    run.setup.radar.rate = 25.0;
+    run.setup.imu.rate = 100.0;
+    run.setup.imu.accel_vibration = 2.0;
+    run.setup.time_offset.constant = 0.03;
+    run.run();
+    EXPECT_EQ(run.odometry->faults()["time_offset_step"], 0U) << seed;
+    EXPECT_EQ(run.odometry->faults()["diverged"], 0U) << seed;
+  }
+}
+
 TEST(TemporalCalibration, AStepIsFoundAtAnyRate) {
   for (const double rate : {5.0, 25.0, 50.0}) {
     SimulatedRun run("difficult", 2, 45.0, kStart);

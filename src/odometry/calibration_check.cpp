@@ -37,7 +37,7 @@ void CalibrationCheck::add(std::size_t radar, const UsedInnovation& innovation) 
   const Eigen::Vector3d weighted_d = S.solve(innovation.d);
   const Eigen::Vector3d correction = innovation.predicted * weighted_d;
   J.col(scaleAt(radar)) += innovation.v_R - innovation.d + correction;
-  if (holds_offsets_) J.col(offsetAt(radar)) += innovation.dv_dt_O;
+  if (holds_offsets_) J.col(offsetAt(radar)) += innovation.J_mean;
   const Eigen::MatrixXd weighted = S.solve(J);
   const double weight = std::min(1.0, kLongest / std::sqrt(innovation.squaredSigmas()));
   information_ += weight * J.transpose() * weighted;

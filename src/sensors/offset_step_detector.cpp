@@ -39,8 +39,8 @@ bool OffsetStepDetector::stepped(const Innovation& innovation, const Eigen::Matr
       change.information = fade * change.information + J.dot(weighted_J);
       change.projection = fade * change.projection + innovation.d.dot(weighted_J);
     };
-    add(innovation.J_O, average.whole);
-    add(innovation.J_O - R_WR.transpose() * average.followed, average.unfollowed);
+    add(innovation.J_after, average.whole);
+    add(innovation.J_mean - R_WR.transpose() * average.followed, average.unfollowed);
     average.squares = fade * average.squares + squares;
     average.count = fade * average.count + 3.0;
     memory *= 0.5;
@@ -52,8 +52,8 @@ bool OffsetStepDetector::stepped(const Innovation& innovation, const Eigen::Matr
   return shows;
 }
 
-void OffsetStepDetector::follow(const Eigen::Vector3d& J_O, const OffsetScan& scan) {
-  for (Average& average : averages_) scan.follow(J_O, average.followed);
+void OffsetStepDetector::follow(const Eigen::Vector3d& J_mean, const OffsetScan& scan) {
+  for (Average& average : averages_) scan.follow(J_mean, average.followed);
 }
 
 }  // namespace rio_t

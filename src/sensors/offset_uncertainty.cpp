@@ -16,13 +16,13 @@ constexpr double kMemory = 40.0;
 void OffsetUncertainty::add(const Innovation& innovation) {
   const double fade = fading(last_, innovation.stamp, kMemory);
   last_ = innovation.stamp;
-  const auto& [stamp, d, S, S_at_offset, J] = innovation;
-  const Eigen::LDLT<Eigen::Matrix3d> weight = S.ldlt();
+  const Eigen::Vector3d& d = innovation.d;
+  const Eigen::LDLT<Eigen::Matrix3d> weight = innovation.S.ldlt();
   // The window's weights: otherwise a scan that the window ignores would ask for a change for good.
   const double length = std::sqrt(d.dot(weight.solve(d)));
   const double share = huber_threshold_ > 0.0 && length > huber_threshold_ ? huber_threshold_ / length : 1.0;
-  const Eigen::Vector3d weighted_J = weight.solve(J);
-  const double information = J.dot(weighted_J);
+  const Eigen::Vector3d weighted_J = weight.solve(innovation.J_after);
+  const double information = innovation.J_after.dot(weighted_J);
   information_ = fade * information_ + share * information;
   spread_ = fade * fade * spread_ + share * share * information;
   projection_ = fade * projection_ + share * d.dot(weighted_J);

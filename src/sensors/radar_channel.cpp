@@ -158,13 +158,13 @@ void RadarChannel::learn(const RadarScan& scan, const Seen& seen, const Innovati
   if (seen.moves) {
     OffsetScan followed = seen.prediction->scan;
     followed.measured = seen.velocity.covariance;
-    step_detector_.follow(changeWithOffset(seen), followed);
+    step_detector_.follow(offset_widths_.gain() * seen.dv_dt_O.mean, followed);
   }
   // A borrowed point must not teach twice.
   if (!seen.is_own || sharesPoints(seen, memory_.learned_at)) return;
   if (seen.canBeJudged())
-    answer.used = UsedInnovation{*d.all, seen.velocity.v_R, seen.prior->covariance,
-                                 seen.prediction->scan.R_WR(), offset_widths_.gain() * seen.dv_dt_O.mean};
+    answer.used =
+        UsedInnovation{*d.all, seen.velocity.v_R, seen.prior->covariance, seen.prediction->scan.R_WR()};
   if (answer.at_rest) return;
   const DopplerLikelihood* world =
       answer.doppler && !seen.has_borrowed ? answer.doppler->points.get() : nullptr;
@@ -278,14 +278,9 @@ Innovation RadarChannel::innovation(Time stamp, const VelocityPrior& prior, cons
   // A step of the offset looks like model errors, and raises their scale. Without their part, the scans after
   // a step keep their weight.
   result.S_at_offset.diagonal() -= measured.added_variance;
-  result.J_O = changeWithOffset(*seen);
+  result.J_after = offset_widths_.gain() * seen->dv_dt_O.after;
+  result.J_mean = offset_widths_.gain() * seen->dv_dt_O.mean;
   return result;
-}
-
-Eigen::Vector3d RadarChannel::changeWithOffset(const Seen& seen) const {
-  // The prediction holds the noise before the scan. A derivative with the same noise would let both look like
-  // a wrong offset.
-  return offset_widths_.gain() * seen.dv_dt_O.after;
 }
 
 void RadarChannel::judge(const RadarScan& scan, const VelocityPrior& prior, bool had_prior, double scale,

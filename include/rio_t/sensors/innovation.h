@@ -14,7 +14,11 @@ struct Innovation {
   Eigen::Vector3d d = Eigen::Vector3d::Zero();      ///< measured minus predicted velocity, in R [m/s]
   Eigen::Matrix3d S = Eigen::Matrix3d::Identity();  ///< covariance of d [m^2/s^2]
   Eigen::Matrix3d S_at_offset = Eigen::Matrix3d::Identity();  ///< the same if the offset were known
-  Eigen::Vector3d J_O = Eigen::Vector3d::Zero();              ///< change of the velocity with t_O [m/s^2]
+  // The change of the velocity with t_O [m/s^2]. The noise of the IMU before the scan is also in d. So d goes
+  // with J_after, whose noise is none of it, or with J_mean less what the estimate has followed of it, in
+  // which this noise cancels (docs/method.md, eq. 18h).
+  Eigen::Vector3d J_after = Eigen::Vector3d::Zero();  ///< from the samples after the scan
+  Eigen::Vector3d J_mean = Eigen::Vector3d::Zero();   ///< from both sides
 
   double squaredSigmas() const { return d.dot(S.ldlt().solve(d)); }
   /// The same with `sigma` [m/s] added on each axis of S.

@@ -34,8 +34,8 @@ class OffsetStepDetector {
   /// True if the offset has stepped; the averages then start again. S is here S_at_offset, without the
   /// uncertainty of the offset. `R_WR` turns R into W at the scan.
   bool stepped(const Innovation& innovation, const Eigen::Matrix3d& R_WR);
-  /// The window has taken the scan, and its velocity follows it. `J_O` as in the innovation.
-  void follow(const Eigen::Vector3d& J_O, const OffsetScan& scan);
+  /// The window has taken the scan, and its velocity follows it. `J_mean` as in the innovation.
+  void follow(const Eigen::Vector3d& J_mean, const OffsetScan& scan);
 
  private:
   /// Sums over the scans, fading.

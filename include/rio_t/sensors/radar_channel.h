@@ -56,10 +56,6 @@ struct UsedInnovation : Innovation {
   Eigen::Vector3d v_R = Eigen::Vector3d::Zero();        ///< measured [m/s]
   Eigen::Matrix3d predicted = Eigen::Matrix3d::Zero();  ///< part of the prediction in S [m^2/s^2]
   Eigen::Matrix3d R_WR = Eigen::Matrix3d::Identity();   ///< as predicted
-  /// As J_O, but a mean over both sides of the scan. Less what the estimate has followed of it, it has no
-  /// noise in common with d: half of its noise comes from before the scan, and so does half of what was
-  /// followed.
-  Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();
 };
 
 /// The channel's answer to a scan. All else that reports a scan reads this value.
@@ -147,8 +143,6 @@ class RadarChannel {
   bool confirmsRest(const Rest& rest, const RadarScan& scan, double scale, Seen& seen);
   /// See OffsetEvidence; 0: the scan does not tell the offset. Sets `seen.dv_dt_O`.
   double offsetGain(Seen& seen);
-  /// J_O of an Innovation, of a scan that moves.
-  Eigen::Vector3d changeWithOffset(const Seen& seen) const;
   /// Sets what the scan tells of the offset.
   void informOffset(Seen& seen, RadarAnswer& answer);
   /// Makes the term of the scan's own points. None if no point is of the static world.
@@ -168,7 +162,7 @@ class RadarChannel {
   /// The velocity that the inliers among the scan's own points show around the prediction. Directions that
   /// they do not see have a large sigma.
   EgoVelocity around(const VelocityPrior& prior, const RadarScan& scan, EgoVelocity result) const;
-  /// If `seen` is null, J_O and S_at_offset are not set.
+  /// If `seen` is null, S_at_offset and the changes with t_O are not set.
   Innovation innovation(Time stamp, const VelocityPrior& prior, const EgoVelocity& measured,
                         const Seen* seen) const;
   /// Sets what health and a re-initialisation get from the scan. `had_prior`: its velocity was measured with
