@@ -66,8 +66,7 @@ TEST(OffsetStepDetector, SeesAStepThatTheVelocityFollows) {
   EXPECT_LT(found, begin + 10.0);
 }
 
-// A large step makes outliers of the scans, and the window follows them little. What the velocity would have
-// followed hides the step, the whole J does not.
+// A large step makes outliers of the scans, and the window follows them less than the detector assumes.
 TEST(OffsetStepDetector, SeesAStepThatTheVelocityDoesNotFollow) {
   OffsetStepDetector detector(OffsetStepDetectorOptions(), 0.25);
   const Eigen::Matrix3d S = 0.02 * 0.02 * Eigen::Matrix3d::Identity();

@@ -15,12 +15,13 @@ constexpr double kMinScatter = 0.2;  // of the variance: fewer scans than it see
 
 }  // namespace
 
-bool OffsetStepDetector::showsStep(const Average& average, const Average::Change& asked) const {
-  if (average.count < kMinCount || asked.information <= 0.0) return false;
-  const double change = asked.projection / asked.information;
+bool OffsetStepDetector::showsStep(const Average& average) const {
+  if (average.count < kMinCount || average.information <= 0.0) return false;
+  const double change = average.projection / average.information;
   // The scatter that the change does not explain. S is an upper bound, so the scatter may well be below 1.
-  const double scatter = std::max(kMinScatter, (average.squares - change * asked.projection) / average.count);
-  const double sigma = std::sqrt(scatter / asked.information);
+  const double scatter =
+      std::max(kMinScatter, (average.squares - change * average.projection) / average.count);
+  const double sigma = std::sqrt(scatter / average.information);
   return std::abs(change) >= std::max(options_.significance * sigma, options_.min_change) &&
          std::abs(change) <= max_change_;
 }
@@ -34,20 +35,16 @@ bool OffsetStepDetector::stepped(const Innovation& innovation, const Eigen::Matr
   for (Average& average : averages_) {
     const double fade = fading(before, innovation.stamp, memory);
     average.followed *= fade;
-    const auto add = [&](const Eigen::Vector3d& J, Average::Change& change) {
-      const Eigen::Vector3d weighted_J = weight.solve(J);
-      change.information = fade * change.information + J.dot(weighted_J);
-      change.projection = fade * change.projection + innovation.d.dot(weighted_J);
-    };
-    add(innovation.J_after, average.whole);
-    add(innovation.J_mean - R_WR.transpose() * average.followed, average.unfollowed);
+    const Eigen::Vector3d J = innovation.J_mean - R_WR.transpose() * average.followed;
+    const Eigen::Vector3d weighted_J = weight.solve(J);
+    average.information = fade * average.information + J.dot(weighted_J);
+    average.projection = fade * average.projection + innovation.d.dot(weighted_J);
     average.squares = fade * average.squares + squares;
     average.count = fade * average.count + 3.0;
     memory *= 0.5;
   }
-  const bool shows = std::any_of(averages_.begin(), averages_.end(), [this](const Average& a) {
-    return showsStep(a, a.whole) || showsStep(a, a.unfollowed);
-  });
+  const bool shows = std::any_of(averages_.begin(), averages_.end(),
+                                 [this](const Average& average) { return showsStep(average); });
   if (shows) averages_ = {};
   return shows;
 }

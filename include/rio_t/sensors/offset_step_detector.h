@@ -18,13 +18,12 @@ struct OffsetStepDetectorOptions {
 /// Detects steps of the time offset. A driver that restarts may change the offset by many sigma, and a
 /// smoother that is sure of the old value would take minutes to follow.
 ///
-/// An offset that is wrong by c shows as innovations d = J c + noise, J = d(velocity)/d(t_O). The weighted
-/// average over the last scans, sum(J' S^-1 d) / sum(J' S^-1 J), is the change that they ask for. The
-/// variance of this change is 1 / sum(J' S^-1 J), scaled by the scatter of the innovations against S
-/// (docs/method.md, eq. 32). In slow motion the estimated velocity follows the wrong offset, and d shows only
-/// what of J it has not followed yet. A step shows with either J. Several averages run side by side, each
-/// over half the time of the one before: a long one sees small steps, and a short one sees a step before the
-/// scans from before it are forgotten.
+/// An offset that is wrong by c shows as innovations d = J c + noise, where J is what the estimated velocity
+/// has not followed yet of d(velocity)/d(t_O). The weighted average over the last scans,
+/// sum(J' S^-1 d) / sum(J' S^-1 J), is the change that they ask for. The variance of this change is
+/// 1 / sum(J' S^-1 J), scaled by the scatter of the innovations against S (docs/method.md, eq. 32). Several
+/// averages run side by side, each over half the time of the one before: a long one sees small steps, and a
+/// short one sees a step before the scans from before it are forgotten.
 class OffsetStepDetector {
  public:
   /// `max_time_offset` [s] is the bound of the offset: no step is longer than from bound to bound.
@@ -40,18 +39,15 @@ class OffsetStepDetector {
  private:
   /// Sums over the scans, fading.
   struct Average {
-    struct Change {
-      double information = 0.0;  ///< J' S^-1 J
-      double projection = 0.0;   ///< J' S^-1 d
-    };
-    Change whole, unfollowed;  ///< with the whole J, and with what is left of it
+    double information = 0.0;  ///< J' S^-1 J
+    double projection = 0.0;   ///< J' S^-1 d
     double squares = 0.0;      ///< d' S^-1 d
     double count = 0.0;        ///< 3
     /// If the offset stepped by one second when this average began, the scans have moved the velocity by
     /// this, in W [m/s^2].
     Eigen::Vector3d followed = Eigen::Vector3d::Zero();
   };
-  bool showsStep(const Average& average, const Average::Change& asked) const;
+  bool showsStep(const Average& average) const;
 
   OffsetStepDetectorOptions options_;  // read-only after construction, as the next
   double max_change_;                  ///< [s]
