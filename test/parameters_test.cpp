@@ -230,6 +230,8 @@ TEST(Parameters, AWrongFileIsOneLineWithFileLineAndExpectation) {
             "FILE:3: window: expected a finite number above 0 and at most 60 [s], got \"fast\"");
   EXPECT_TRUE(contains(messageOfFile("imu_topic: /imu\nwindow: [1\n"), "FILE:3: not YAML"));
   EXPECT_TRUE(contains(messageOfFile("window: 1.0\n: :\n  - x: [\n"), "not YAML"));
+  EXPECT_TRUE(
+      contains(messageOfFile("\n, window: 1.0\n"), "FILE:2: not YAML"));  // yaml-cpp alone would not end
   EXPECT_TRUE(contains(messageOfFile("- 1\n- 2\n"), "FILE:1: expected one `key: value` a line"));
   EXPECT_TRUE(contains(messageOfFile("just text\n"), "FILE:1: expected one `key: value` a line"));
   EXPECT_TRUE(contains(messageOfFile("window: 1.0\ngravity: 9.8\nwindow: 2.0\n"),

@@ -1,5 +1,6 @@
 #include "rio_t/ros/parameters/parameter_value.h"
 
+#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
@@ -45,6 +46,28 @@ ParameterValue fromYaml(const YAML::Node& node) {
   }
   return {std::move(list)};
 }
+
+/// Throws where a document begins at the place of the one before: yaml-cpp reads a comma there for ever.
+class Progress : public YAML::EventHandler {
+ public:
+  void OnDocumentStart(const YAML::Mark& mark) override {
+    if (mark.pos == begin_) throw YAML::ParserException(mark, "unexpected character");
+    begin_ = mark.pos;
+  }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
+  }
+  void OnMapEnd() override {}
+
+ private:
+  int begin_ = -1;
+};
 
 /// What YAML says only as "illegal map value": empty if that line, counted from 0, has no tab.
 std::string hintOfTab(const std::string& yaml, int line) {
@@ -183,6 +206,11 @@ ParameterEntries readParameters(std::istream& yaml, const std::string& name) {
   const std::string text{std::istreambuf_iterator<char>(yaml), std::istreambuf_iterator<char>()};
   YAML::Node root;
   try {
+    std::istringstream stream(text);
+    YAML::Parser parser(stream);
+    Progress progress;
+    while (parser.HandleNextDocument(progress)) {
+    }
     for (const YAML::Node& document : YAML::LoadAll(text)) {
       if (document.IsNull()) continue;
       if (!root.IsNull())
