@@ -80,7 +80,7 @@ TEST(Diagnosis, AGoodRunHasNoCauses) {
   const Diagnosis diagnosis = diagnose(goodRun(), Config{});
   EXPECT_EQ(toString(diagnosis.verdict), "good");
   EXPECT_EQ(describeCauses(diagnosis), "");
-  EXPECT_EQ(diagnosis.checks.size(), 12u);
+  EXPECT_EQ(diagnosis.checks.size(), 13u);
   for (const Check& check : diagnosis.checks) EXPECT_TRUE(check.good()) << check.name;
 }
 
@@ -136,6 +136,19 @@ TEST(Diagnosis, AWrongScaleOfTheDopplerIsNoGoodRun) {
   evidence.radars.front().doppler_scale = {0.5, 1e-4};
   expectSays(first(evidence), {"about 2 times the velocity that the IMU feels."});
   evidence.radars.front().doppler_scale.variance = 0.1;  // noise explains it
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
+}
+
+TEST(Diagnosis, AWrongOffsetThatIsHeldIsNoGoodRun) {
+  RunEvidence evidence = goodRun();
+  evidence.radars.front().offset_error = OffsetError{0.004, 1e-8};  // less than a scan notices
+  EXPECT_EQ(first(evidence), "none");
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
+  evidence.radars.front().offset_error->error = 0.03;
+  expectSays(first(evidence), {"offset_far: The scans fit better with a time offset of about 0.030 s",
+                               "estimate_time_offset: false holds it at 0.000 s", "time_offset_initial"});
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
+  evidence.radars.front().offset_error->variance = 1e-4;  // noise explains it
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
 }
 

@@ -109,6 +109,19 @@ def test_a_doppler_that_is_not_in_metres_per_second_is_named(run_with, programs_
     assert not next(check for check in summary["checks"] if check["name"] == "doppler_scaled_sigmas")["good"]
 
 
+def test_a_wrong_offset_that_is_held_is_named(run_with, programs_folder, tmp_path):
+    bag = tmp_path / "late.bag"
+    programs.output_of(programs_folder / "simulate", "--motion", "medium", "--duration", 60, "--time-offset", 0.03, "--out", bag)
+    _, summary = run_with("estimate_time_offset=false", bag=bag)
+    assert summary["verdict"] == "doubtful"
+    assert causes_of(summary) == ["offset_far"]
+    assert abs(summary["offset_error_s"] - 0.03) < 0.006
+    _, summary = run_with("estimate_time_offset=false", "time_offset_initial=0.03", bag=bag)
+    assert (summary["verdict"], summary["causes"]) == ("good", [])
+    _, summary = run_with(bag=bag)
+    assert "offset_error_s" not in summary
+
+
 def test_a_radar_that_falls_silent_is_bad(run_with, simulated_run, tmp_path):
     bag = tmp_path / "silent.bag"
     with rosbag.Bag(str(simulated_run / "run.bag")) as whole, rosbag.Bag(str(bag), "w") as silent:

@@ -275,6 +275,20 @@ TEST(TemporalCalibration, AStepIsFoundUnderVibration) {
   EXPECT_LT(std::sqrt(squares / kRuns), 5.0e-3);
 }
 
+TEST(TemporalCalibration, AStepIsFoundSoonUnderStrongVibration) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    SimulatedRun run("difficult", seed, 45.0, kStart);
+    run.setup.radar.rate = 25.0;
+    run.setup.imu.rate = 100.0;
+    run.setup.imu.accel_vibration = 0.8;
+    run.setup.time_offset.constant = 0.03;
+    run.setup.time_offset.steps = {{40.0, 0.1}};
+    run.run();
+    EXPECT_LE(run.odometry->faults()["time_offset_step"], 2U) << seed;
+    EXPECT_LT(std::abs(offsetAt(run, 43.0).error), 0.03) << seed;
+  }
+}
+
 // The velocity follows the wrong offset, and the innovations hardly show the step.
 TEST(TemporalCalibration, AStepInSlowMotionIsFound) {
   for (const std::uint64_t seed : {41, 44}) {

@@ -7,10 +7,10 @@
 
 #include "rio_t/imu/buffer.h"
 #include "rio_t/landmarks/landmark_map.h"
+#include "rio_t/odometry/calibration_check.h"
 #include "rio_t/odometry/fault_counters.h"
 #include "rio_t/odometry/initializer.h"
 #include "rio_t/odometry/model_error_scale.h"
-#include "rio_t/odometry/calibration_check.h"
 #include "rio_t/odometry/navigation.h"
 #include "rio_t/odometry/options.h"
 #include "rio_t/odometry/radars_health.h"

@@ -34,8 +34,8 @@ bool LiveLog::error(const std::string& kind, const std::string& text, double per
 
 void LiveLog::status(const LiveMonitor::Status& status) {
   constexpr double kStatusPeriod = 60.0;  // [s] A status may stay for as long as the node runs.
-  std::string problem;  // two statuses may have the same
-  // The numbers in it change all the time.
+  // Two statuses may have the same text. The numbers in it change all the time.
+  std::string problem;
   std::copy_if(status.message.begin(), status.message.end(), std::back_inserter(problem),
                [](unsigned char c) { return std::isdigit(c) == 0 && c != '.'; });
   using Level = diagnostic_msgs::DiagnosticStatus;
