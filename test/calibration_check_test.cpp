@@ -165,7 +165,7 @@ TEST(CalibrationCheck, FindsAWrongOffset) {
   for (const char* motion : {"difficult", "medium", "drone"}) {
     for (const double error : {-0.02, 0.05}) {
       const SimulatedRun run = heldOffBy(error, motion, 1);
-      const OffsetError found = *run.last(0).offset_error;
+      const TimeOffsetError found = *run.last(0).offset_error;
       EXPECT_LT(std::abs(found.error - error), std::abs(error) / 4.0) << motion << ": " << found.error;
       EXPECT_GT(squaredSigmas(found, 0.0), 9.0) << motion << ": " << found.error;
       // The others are not blamed for it.
@@ -180,7 +180,7 @@ TEST(CalibrationCheck, AVibrationIsNoWrongOffset) {
   double sum = 0.0;
   constexpr int kSeeds = 4;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-    const OffsetError found = *heldOffBy(0.0, "walk", seed, 2.0).last(0).offset_error;
+    const TimeOffsetError found = *heldOffBy(0.0, "walk", seed, 2.0).last(0).offset_error;
     EXPECT_LT(squaredSigmas(found, 0.0), 9.0) << found.error << " +- " << std::sqrt(found.variance);
     sum += found.error;
   }
@@ -192,7 +192,7 @@ TEST(CalibrationCheck, TheSigmaOfAHeldOffsetIsWhatItsErrorIs) {
   for (const char* motion : {"difficult", "drone"}) {
     double sum = 0.0;
     for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-      const OffsetError found = *heldOffBy(0.0, motion, seed).last(0).offset_error;
+      const TimeOffsetError found = *heldOffBy(0.0, motion, seed).last(0).offset_error;
       EXPECT_LT(squaredSigmas(found, 0.0), 9.0) << motion << ", seed " << seed;
       sum += squaredSigmas(found, 0.0);
     }

@@ -141,7 +141,7 @@ TEST(Diagnosis, AWrongScaleOfTheDopplerIsNoGoodRun) {
 
 TEST(Diagnosis, AWrongOffsetThatIsHeldIsNoGoodRun) {
   RunEvidence evidence = goodRun();
-  evidence.radars.front().offset_error = OffsetError{0.004, 1e-8};  // less than a scan notices
+  evidence.radars.front().offset_error = TimeOffsetError{0.004, 1e-8};  // less than a scan notices
   EXPECT_EQ(first(evidence), "none");
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
   evidence.radars.front().offset_error->error = 0.03;

@@ -64,7 +64,7 @@ CalibrationErrors CalibrationCheck::errorsOf(std::size_t radar, const Extrinsics
   result.turn.turn = R_IR * errors.segment<kTurn>(turn);
   result.turn.covariance = R_IR * covariance.block<kTurn, kTurn>(turn, turn) * R_IR.transpose();
   result.scale = {errors[scale], covariance(scale, scale)};
-  if (holds_offsets_) result.offset = OffsetError{errors[offset], covariance(offset, offset)};
+  if (holds_offsets_) result.offset = TimeOffsetError{errors[offset], covariance(offset, offset)};
   return result;
 }
 

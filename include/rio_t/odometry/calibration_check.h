@@ -23,7 +23,7 @@ struct DopplerScale {
 };
 
 /// How far a time offset that is held seems to be off.
-struct OffsetError {
+struct TimeOffsetError {
   double error = 0.0;     ///< the true t_O is larger by this [s]
   double variance = 0.0;  ///< of the error [s^2]
 };
@@ -32,7 +32,7 @@ struct OffsetError {
 struct CalibrationErrors {
   MountingTurn turn;
   DopplerScale scale;
-  std::optional<OffsetError> offset;  ///< none if the offsets are estimated
+  std::optional<TimeOffsetError> offset;  ///< none if the offsets are estimated
 };
 
 /// Checks what the estimator holds where it was configured: the mountings, the scale of the Dopplers and, if

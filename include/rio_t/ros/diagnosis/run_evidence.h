@@ -69,7 +69,7 @@ struct RadarSummary : RadarEstimate {
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< of the newest mounting from the configured one [rad]
   std::optional<MountingTurn> mounting_turn;       ///< of a mounting that is held, as the scans say
   DopplerScale doppler_scale;                      ///< as the scans say
-  std::optional<OffsetError> offset_error;         ///< of an offset that is held, as the scans say
+  std::optional<TimeOffsetError> offset_error;     ///< of an offset that is held, as the scans say
 };
 
 /// The stamps of the IMU jumped, or no sample could be used for too long to bridge: "imu_clock_restart".
