@@ -103,7 +103,7 @@ double squaredSigmas(const MountingTurn& turn, double configured_sigma) {
   return turn.turn.dot((turn.covariance + told).ldlt().solve(turn.turn));
 }
 
-/// Of a scale or an offset.
+/// `found` is the error of a scale or of an offset.
 template <class Error>
 double squaredSigmas(const Error& found, double told_sigma) {
   return found.error * found.error / (found.variance + told_sigma * told_sigma);

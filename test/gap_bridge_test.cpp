@@ -9,7 +9,7 @@
 namespace rio_t {
 namespace {
 
-// Nobody knows the motion within a gap, but gravity acts all the time.
+// The bridge does not know the motion within a gap, but gravity acts all the time.
 TEST(GapBridge, OverALongGapGravityTurnsWithThePlatformAndTheRestDiesAway) {
   const double tau = kMotionCorrelationTime;
   GapBridge bridge;

@@ -28,7 +28,7 @@ struct TimeOffsetError {
   double variance = 0.0;  ///< of the error [s^2]
 };
 
-/// What one radar seems to be held wrong by.
+/// How far the configured calibration of one radar seems to be off.
 struct CalibrationErrors {
   MountingTurn turn;
   DopplerScale scale;
@@ -55,7 +55,7 @@ class CalibrationCheck {
   CalibrationErrors errorsOf(std::size_t radar, const Extrinsics& configured) const;
 
  private:
-  // Where the errors of a radar are.
+  // The first column of each error of a radar.
   Eigen::Index turnAt(std::size_t radar) const { return each_ * static_cast<Eigen::Index>(radar); }
   Eigen::Index scaleAt(std::size_t radar) const { return turnAt(radar) + 3; }
   Eigen::Index offsetAt(std::size_t radar) const { return scaleAt(radar) + 1; }

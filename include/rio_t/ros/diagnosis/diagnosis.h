@@ -22,7 +22,7 @@ constexpr double kFarMounting = 3.0;
 /// The scale of the Doppler is wrong if it is off by more sigmas.
 constexpr double kWrongScale = 3.0;
 
-/// So is a time offset that is held.
+/// A time offset that is held is wrong if it is off by more sigmas.
 constexpr double kWrongOffset = 3.0;
 
 /// A run is doubtful if the estimate diverged for a larger share of its scans.
