@@ -62,8 +62,8 @@ show simulated results/simulated.bag irs "$offset"
 
 real=$data/real/ti_mmwave_rospkg_demo.bag
 if [ -f "$real" ]; then
-  # The mounting that came with this bag is about 7 degrees off; the estimate finds it.
-  show real "$real" ti_mmwave "" estimate_extrinsics=rotation
+  # The mounting that came with this bag is about 7 degrees and 15 cm off; the estimate finds it.
+  show real "$real" ti_mmwave "" estimate_extrinsics=pose
 else
   echo
   echo "No real bag at $real; set RIO_T_DATA_DIR to the folder that holds real/ti_mmwave_rospkg_demo.bag to run it too."

@@ -80,7 +80,7 @@ TEST(Diagnosis, AGoodRunHasNoCauses) {
   const Diagnosis diagnosis = diagnose(goodRun(), Config{});
   EXPECT_EQ(toString(diagnosis.verdict), "good");
   EXPECT_EQ(describeCauses(diagnosis), "");
-  EXPECT_EQ(diagnosis.checks.size(), 13u);
+  EXPECT_EQ(diagnosis.checks.size(), 14u);
   for (const Check& check : diagnosis.checks) EXPECT_TRUE(check.good()) << check.name;
 }
 
@@ -99,9 +99,9 @@ TEST(Diagnosis, AMountingFarFromTheToldOneIsNoGoodRun) {
 TEST(Diagnosis, AMountingThatIsHeldAndContradictedIsNoGoodRun) {
   RunEvidence evidence = goodRun();
   const Eigen::Matrix3d covariance = 1e-4 * Eigen::Matrix3d::Identity();  // a sigma of 0.6 degrees
-  evidence.radars.front().mounting_turn = MountingTurn{Eigen::Vector3d(0.03, 0.03, 0.03), covariance};
+  evidence.radars.front().errors.turn = VectorError{Eigen::Vector3d(0.03, 0.03, 0.03), covariance};
   EXPECT_EQ(first(evidence), "none");
-  evidence.radars.front().mounting_turn->turn.y() = -0.1;
+  evidence.radars.front().errors.turn->error.y() = -0.1;
   expectSays(first(evidence),
              {"mounting_far: The scans fit better if the mounting is turned by 2, -6, 2 degrees",
               "with sigmas of 0.6, 0.6, 0.6", "estimate_extrinsics: pose"});
@@ -110,46 +110,63 @@ TEST(Diagnosis, AMountingThatIsHeldAndContradictedIsNoGoodRun) {
   tf.extrinsics_source = ExtrinsicsSource::kTf;
   EXPECT_NE(diagnose(evidence, tf).causes.front().remedy.find("correct the tf of the cloud"),
             std::string::npos);
-  evidence.radars.front().mounting_turn->covariance *= 100.0;  // noise explains it
+  evidence.radars.front().errors.turn->covariance *= 100.0;  // noise explains it
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
 }
 
 TEST(Diagnosis, AWrongScaleOfTheDopplerIsNoGoodRun) {
   RunEvidence evidence = goodRun();
-  evidence.radars.front().doppler_scale = {-0.09, 1e-6};  // an accelerometer may be off, too
+  evidence.radars.front().errors.scale = {-0.09, 1e-6};  // an accelerometer may be off, too
   EXPECT_EQ(first(evidence), "none");
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
-  evidence.radars.front().doppler_scale.error = -1.0;
+  evidence.radars.front().errors.scale.error = -1.0;
   expectSays(first(evidence), {"doppler_scale: The Doppler seems to be about 0.5 times the velocity that the "
                                "IMU feels.",
                                "radar_format", "radar_field_doppler", "in m/s"});
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
   // It explains a mounting that seems turned a little, and an offset at its bound.
-  evidence.radars.front().mounting_turn =
-      MountingTurn{Eigen::Vector3d(0.0, 0.1, 0.0), 1e-4 * Eigen::Matrix3d::Identity()};
+  evidence.radars.front().errors.turn =
+      VectorError{Eigen::Vector3d(0.0, 0.1, 0.0), 1e-4 * Eigen::Matrix3d::Identity()};
   evidence.solver_terminations = {{"at_bound", 178}, {"converged", 2}};
   expectSays(first(evidence), {"doppler_scale: "});
-  evidence.radars.front().doppler_scale = {-0.2, 0.0};
-  evidence.radars.front().mounting_turn->turn.y() = 1.0;  // the better explanation
+  evidence.radars.front().errors.scale = {-0.2, 0.0};
+  evidence.radars.front().errors.turn->error.y() = 1.0;  // the better explanation
   expectSays(first(evidence), {"mounting_far: "});
   evidence = goodRun();
-  evidence.radars.front().doppler_scale = {0.5, 1e-4};
+  evidence.radars.front().errors.scale = {0.5, 1e-4};
   expectSays(first(evidence), {"about 2 times the velocity that the IMU feels."});
-  evidence.radars.front().doppler_scale.variance = 0.1;  // noise explains it
+  evidence.radars.front().errors.scale.variance = 0.1;  // noise explains it
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
 }
 
 TEST(Diagnosis, AWrongOffsetThatIsHeldIsNoGoodRun) {
   RunEvidence evidence = goodRun();
-  evidence.radars.front().offset_error = TimeOffsetError{0.004, 1e-8};  // less than a scan notices
+  evidence.radars.front().errors.offset = ScalarError{0.004, 1e-8};  // less than a scan notices
   EXPECT_EQ(first(evidence), "none");
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
-  evidence.radars.front().offset_error->error = 0.03;
+  evidence.radars.front().errors.offset->error = 0.03;
   expectSays(first(evidence), {"offset_far: The scans fit better with a time offset of about 0.030 s",
                                "estimate_time_offset: false holds it at 0.000 s", "time_offset_initial"});
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
-  evidence.radars.front().offset_error->variance = 1e-4;  // noise explains it
+  evidence.radars.front().errors.offset->variance = 1e-4;  // noise explains it
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
+}
+
+TEST(Diagnosis, AWrongLeverArmThatIsHeldIsNoGoodRun) {
+  RunEvidence evidence = goodRun();
+  const Eigen::Matrix3d covariance = 1e-6 * Eigen::Matrix3d::Identity();
+  evidence.radars.front().errors.lever_arm = VectorError{Eigen::Vector3d(0.03, 0.03, 0.03), covariance};
+  EXPECT_EQ(first(evidence), "none");  // a ruler measures no better
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
+  evidence.radars.front().errors.lever_arm->error.z() = -0.2;
+  Config config;
+  config.odometry.radar.T_IR.l_I = Eigen::Vector3d(0.5, 0.0, 0.1);
+  expectSays(first(evidence, config),
+             {"lever_arm_far: The scans fit better with the radar at 0.530, 0.030, -0.100 m in the IMU",
+              "with sigmas of 0.001, 0.001, 0.001", "estimate_extrinsics: pose", "extrinsics_translation"});
+  EXPECT_EQ(diagnose(evidence, config).verdict, RunVerdict::kDoubtful);
+  evidence.radars.front().errors.lever_arm->covariance(2, 2) = 0.01;  // noise explains it
+  EXPECT_EQ(diagnose(evidence, config).verdict, RunVerdict::kGood);
 }
 
 TEST(Diagnosis, TooFewPointsNameThoseThatAreNotFinite) {

@@ -122,6 +122,20 @@ def test_a_wrong_offset_that_is_held_is_named(run_with, programs_folder, tmp_pat
     assert "offset_error_s" not in summary
 
 
+def test_a_wrong_lever_arm_that_is_held_is_named(run_with, programs_folder, tmp_path):
+    bag = tmp_path / "arm.bag"
+    programs.output_of(programs_folder / "simulate", "--motion", "difficult", "--duration", 40, "--out", bag)
+    _, summary = run_with("extrinsics_translation=[0.03,0.03,0.14]", bag=bag)
+    assert summary["verdict"] == "doubtful"
+    assert causes_of(summary)[0] == "lever_arm_far"
+    assert abs(summary["lever_arm_error"][2] + 0.2) < 0.05
+    assert not next(check for check in summary["checks"] if check["name"] == "held_lever_arm_error_sigmas")["good"]
+    _, summary = run_with(bag=bag)
+    assert (summary["verdict"], summary["causes"]) == ("good", [])
+    _, summary = run_with("extrinsics_translation=[]", bag=bag)
+    assert "lever_arm_error" not in summary
+
+
 def test_a_radar_that_falls_silent_is_bad(run_with, simulated_run, tmp_path):
     bag = tmp_path / "silent.bag"
     with rosbag.Bag(str(simulated_run / "run.bag")) as whole, rosbag.Bag(str(bag), "w") as silent:

@@ -67,8 +67,8 @@ TEST(TwoRadars, TheOneWhoseMountingIsWrongIsNamed) {
     SimulatedRun run = pair(motion, 1, 50.0);
     run.options.radars[0].T_IR.q_IR = looking(55.0, 0.0);
     run.run();
-    const Eigen::Vector3d left = run.last(0).mounting_turn->turn / kDegree;
-    const Eigen::Vector3d right = run.last(1).mounting_turn->turn / kDegree;
+    const Eigen::Vector3d left = run.last(0).errors.turn->error / kDegree;
+    const Eigen::Vector3d right = run.last(1).errors.turn->error / kDegree;
     EXPECT_LT(left.z(), -7.5) << motion;  // the offset takes a part
     EXPECT_LT(left.head<2>().norm(), 3.0) << motion << ": " << left.transpose();
     EXPECT_LT(right.norm(), 3.0) << motion << ": " << right.transpose();

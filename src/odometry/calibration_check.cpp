@@ -13,31 +13,49 @@ namespace {
 /// it may be an outlier.
 constexpr double kLongest = 4.0;
 
-constexpr int kTurn = 3;
+// The errors of a radar, by their first column.
+constexpr Eigen::Index kTurn = 0, kLeverArm = 3, kScale = 6, kOffset = 7, kErrors = 8;
+
+Eigen::Index firstOf(std::size_t radar) { return kErrors * static_cast<Eigen::Index>(radar); }
 
 }  // namespace
 
-// The prior: a turn of a radian, beyond which nothing here is linear, a scale that is off by itself, an
-// offset of a second.
-CalibrationCheck::CalibrationCheck(std::size_t radars, bool holds_offsets)
-    : holds_offsets_(holds_offsets),
-      each_(kTurn + (holds_offsets ? 2 : 1)),
-      dv_W_(Eigen::MatrixXd::Zero(3, each_ * static_cast<Eigen::Index>(radars))),
+double VectorError::sigmas(double told_sigma) const {
+  const Eigen::Matrix3d told = told_sigma * told_sigma * Eigen::Matrix3d::Identity();
+  return std::sqrt(error.dot((covariance + told).ldlt().solve(error)));
+}
+
+double ScalarError::sigma() const { return std::sqrt(variance); }
+
+double ScalarError::sigmas(double told_sigma) const {
+  return std::abs(error) / std::hypot(sigma(), told_sigma);
+}
+
+// The prior: a turn of a radian, beyond which nothing here is linear, a lever arm of a metre, a scale that is
+// off by itself, an offset of a second.
+CalibrationCheck::CalibrationCheck(std::size_t radars)
+    : dv_W_(Eigen::MatrixXd::Zero(3, firstOf(radars))),
       information_(Eigen::MatrixXd::Identity(dv_W_.cols(), dv_W_.cols())),
       score_(Eigen::VectorXd::Zero(dv_W_.cols())),
-      alike_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(radars))) {}
+      alike_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(radars))),
+      turning_(radars) {}
 
 void CalibrationCheck::add(std::size_t radar, const UsedInnovation& innovation) {
-  // A radar turned by theta measures v_R + v_R x theta. The prediction has followed the scans before.
+  // The prediction has followed the scans before.
   Eigen::MatrixXd J = -innovation.R_WR.transpose() * dv_W_;
-  J.middleCols<kTurn>(turnAt(radar)) += so3::hat(innovation.v_R);
+  auto own = J.middleCols<kErrors>(firstOf(radar));
+  // A radar turned by theta measures v_R + v_R x theta.
+  own.middleCols<3>(kTurn) += so3::hat(innovation.v_R);
+  TurningAxes& turning = turning_[radar];
+  turning.add(innovation.omega_R, innovation.omega_variance);
+  own.middleCols<3>(kLeverArm) += so3::hat(turning.projection() * innovation.omega_R);
   // The noise of v_R and that of the prediction are also in d, and would look like a scale. The error of
   // their mean, weighted as the window weighs them, does not depend on d if P and S are right.
   const Eigen::LDLT<Eigen::Matrix3d> S(innovation.S);
   const Eigen::Vector3d weighted_d = S.solve(innovation.d);
   const Eigen::Vector3d correction = innovation.predicted * weighted_d;
-  J.col(scaleAt(radar)) += innovation.v_R - innovation.d + correction;
-  if (holds_offsets_) J.col(offsetAt(radar)) += innovation.J_mean;
+  own.col(kScale) += innovation.v_R - innovation.d + correction;
+  own.col(kOffset) += innovation.J_mean;
   const Eigen::MatrixXd weighted = S.solve(J);
   const double weight = std::min(1.0, kLongest / std::sqrt(innovation.squaredSigmas()));
   information_ += weight * J.transpose() * weighted;
@@ -53,19 +71,22 @@ CalibrationErrors CalibrationCheck::errorsOf(std::size_t radar, const Extrinsics
       information_.ldlt().solve(Eigen::MatrixXd::Identity(score_.size(), score_.size()));
   const Eigen::VectorXd errors = P * score_;
   Eigen::MatrixXd covariance = P;
-  for (Eigen::Index k = 0; k < alike_.size(); ++k) {
-    const Eigen::VectorXd bias = alike_[k] * P.col(scaleAt(static_cast<std::size_t>(k)));
+  for (std::size_t k = 0; k < turning_.size(); ++k) {
+    const Eigen::VectorXd bias = alike_[static_cast<Eigen::Index>(k)] * P.col(firstOf(k) + kScale);
     covariance += bias * bias.transpose();
   }
 
-  const Eigen::Index turn = turnAt(radar), scale = scaleAt(radar), offset = offsetAt(radar);
   const Eigen::Matrix3d R_IR = configured.q_IR.toRotationMatrix();
-  CalibrationErrors result;
-  result.turn.turn = R_IR * errors.segment<kTurn>(turn);
-  result.turn.covariance = R_IR * covariance.block<kTurn, kTurn>(turn, turn) * R_IR.transpose();
-  result.scale = {errors[scale], covariance(scale, scale)};
-  if (holds_offsets_) result.offset = TimeOffsetError{errors[offset], covariance(offset, offset)};
-  return result;
+  const auto vector = [&](Eigen::Index at) {
+    at += firstOf(radar);
+    return VectorError{R_IR * errors.segment<3>(at),
+                       R_IR * covariance.block<3, 3>(at, at) * R_IR.transpose()};
+  };
+  const auto scalar = [&](Eigen::Index at) {
+    at += firstOf(radar);
+    return ScalarError{errors[at], covariance(at, at)};
+  };
+  return {vector(kTurn), vector(kLeverArm), scalar(kScale), scalar(kOffset)};
 }
 
 }  // namespace rio_t

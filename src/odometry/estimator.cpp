@@ -59,7 +59,7 @@ Estimator::Estimator(const OdometryOptions& options, Navigation& navigation, Fau
       initializer_(options),
       smoother_(options.smoother, options.imu_noise, g_W_, imu_),
       radars_(radarChannels(options, g_W_, imu_)),
-      calibration_check_(options.radarCount(), !options.smoother.estimate_time_offset),
+      calibration_check_(options.radarCount()),
       health_(options.health, options.innovation_gate.sigmas, options.radarCount()),
       waiting_for_(initializer_.waitingFor()) {
   if (options.platform == Platform::kGroundVehicle)
@@ -208,10 +208,10 @@ void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
   result.T_IR = radar.extrinsics();
   result.configured_T_IR = radar.configuredExtrinsics();
   const EstimateExtrinsics estimate = options_.smoother.estimate_extrinsics;
-  const CalibrationErrors errors = calibration_check_.errorsOf(result.scan.radar, result.configured_T_IR);
-  if (!estimatesTurn(estimate)) result.mounting_turn = errors.turn;
-  result.doppler_scale = errors.scale;
-  result.offset_error = errors.offset;
+  result.errors = calibration_check_.errorsOf(result.scan.radar, result.configured_T_IR);
+  if (estimatesTurn(estimate)) result.errors.turn.reset();
+  if (estimatesLeverArm(estimate)) result.errors.lever_arm.reset();
+  if (options_.smoother.estimate_time_offset) result.errors.offset.reset();
   result.T_IR_covariance = extrinsicsCovariance(covariance.bottomRightCorner(estimated, estimated), estimate);
   for (const StampedPose& left : marginalize()) result.left_window.push_back(left);
   // On a frame that shakes the window believes rest little: the start of a gentle drive must not look like an

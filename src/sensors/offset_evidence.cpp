@@ -28,20 +28,23 @@ OffsetDerivative offsetDerivative(const ImuBuffer& imu, Time tau, const StateBlo
                                   const Eigen::Vector3d& g_W, const Extrinsics& T_IR, double half_width) {
   const Eigen::Matrix3d R_RI = T_IR.R_RI();
   const Eigen::Quaterniond q_IW = x.q_WI().conjugate();
-  const auto over = [&](Time time, double width) {
-    return velocityRate(imu.mean(time, width), x.b_g(), x.b_a(), q_IW * x.v_W(), q_IW * g_W, T_IR.l_I);
+  const auto rateOf = [&](const ImuMean& mean) {
+    return velocityRate(mean, x.b_g(), x.b_a(), q_IW * x.v_W(), q_IW * g_W, T_IR.l_I);
   };
   // A mean around a time without samples would move to the next sample, and take in some of the other side.
   const auto quarter = [&](double reach) { return 0.5 * std::clamp(reach, 0.0, half_width); };
   const double before = quarter(tau - imu.oldest());
   const double after = quarter(imu.newest() - tau);
-  const VelocityRate mean = over(tau, half_width);
+  const ImuMean mean = imu.mean(tau, half_width);
+  const VelocityRate rate = rateOf(mean);
   OffsetDerivative result;
-  result.mean = -R_RI * mean.a_I;
-  result.before = -R_RI * over(tau - before, before).a_I;
-  result.after = -R_RI * over(tau + after, after).a_I;
+  result.mean = -R_RI * rate.a_I;
+  result.before = -R_RI * rateOf(imu.mean(tau - before, before)).a_I;
+  result.after = -R_RI * rateOf(imu.mean(tau + after, after)).a_I;
   result.half_width = half_width;
-  result.variance = mean.variance;
+  result.variance = rate.variance;
+  result.omega_I = mean.angular_velocity - x.b_g();
+  if (mean.duration > 0.0) result.omega_variance = mean.gyro_variance / mean.duration;
   return result;
 }
 

@@ -162,9 +162,15 @@ void RadarChannel::learn(const RadarScan& scan, const Seen& seen, const Innovati
   }
   // A borrowed point must not teach twice.
   if (!seen.is_own || sharesPoints(seen, memory_.learned_at)) return;
-  if (seen.canBeJudged())
-    answer.used =
-        UsedInnovation{*d.all, seen.velocity.v_R, seen.prior->covariance, seen.prediction->scan.R_WR()};
+  if (seen.canBeJudged()) {
+    const OffsetScan& predicted = seen.prediction->scan;
+    answer.used = UsedInnovation{*d.all,
+                                 seen.velocity.v_R,
+                                 seen.prior->covariance,
+                                 predicted.R_WR(),
+                                 predicted.T_IR.R_RI() * seen.dv_dt_O.omega_I,
+                                 seen.dv_dt_O.omega_variance};
+  }
   if (answer.at_rest) return;
   const DopplerLikelihood* world =
       answer.doppler && !seen.has_borrowed ? answer.doppler->points.get() : nullptr;

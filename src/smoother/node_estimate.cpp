@@ -1,20 +1,12 @@
 #include "rio_t/smoother/node_estimate.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "rio_t/factors/offset_derivative.h"
+#include "rio_t/imu/turning_axes.h"
 
 namespace rio_t {
-namespace {
-
-/// Noise alone does not reach so many of its sigmas as rms over a window, which has two or three independent
-/// means.
-constexpr double kTurning = 3.0;
-
-}  // namespace
-
 std::size_t nearestNode(const std::vector<NodeEstimate>& nodes, Time time) {
   const auto after = std::lower_bound(nodes.begin(), nodes.end(), time,
                                       [](const NodeEstimate& node, Time t) { return node.time < t; });
@@ -50,17 +42,9 @@ SlowMotion slowMotion(const std::vector<NodeEstimate>& nodes, std::size_t k, dou
 }
 
 void keepTurns(const std::vector<SlowMotion*>& motions) {
-  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
-  double noise = 0.0;
-  for (const SlowMotion* motion : motions) {
-    squares += motion->omega_I * motion->omega_I.transpose();
-    noise += motion->omega_variance;
-  }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares);
-  Eigen::Matrix3d turning = Eigen::Matrix3d::Zero();  // projects on the axes about which the platform turns
-  for (int i = 0; i < 3; ++i)
-    if (axes.eigenvalues()[i] > kTurning * kTurning * noise)
-      turning += axes.eigenvectors().col(i) * axes.eigenvectors().col(i).transpose();
+  TurningAxes axes;
+  for (const SlowMotion* motion : motions) axes.add(motion->omega_I, motion->omega_variance);
+  const Eigen::Matrix3d turning = axes.projection();
   for (SlowMotion* motion : motions) motion->omega_I = turning * motion->omega_I;
 }
 

@@ -29,13 +29,11 @@ struct ScanResult : ScanAnswer {
   bool updated = false;
   // The newest state of the window.
   NavigationState state;
-  double time_offset = 0.0;                     ///< t_O [s]
-  double time_offset_sigma = 0.0;               ///< [s]
-  Extrinsics T_IR;                              ///< of this radar
-  Extrinsics configured_T_IR;                   ///< the mounting of the options
-  std::optional<MountingTurn> mounting_turn;    ///< from it, as the scans say; none if T_IR is estimated
-  DopplerScale doppler_scale;                   ///< as the scans say
-  std::optional<TimeOffsetError> offset_error;  ///< likewise; none if t_O is estimated
+  double time_offset = 0.0;        ///< t_O [s]
+  double time_offset_sigma = 0.0;  ///< [s]
+  Extrinsics T_IR;                 ///< of this radar
+  Extrinsics configured_T_IR;      ///< the mounting of the options
+  CalibrationErrors errors;        ///< of what is not estimated, as the scans say
   /// Covariance of T_IR, if it is estimated; zero if not. Translation of the radar in I [m], then turn about
   /// the axes of I [rad]: the order of ROS.
   Eigen::Matrix<double, 6, 6> T_IR_covariance = Eigen::Matrix<double, 6, 6>::Zero();

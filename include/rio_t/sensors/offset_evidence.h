@@ -21,6 +21,9 @@ struct OffsetDerivative {
   Eigen::Vector3d after = Eigen::Vector3d::Zero();
   double half_width = kOffsetHalfWidth;  ///< of `mean` [s]
   double variance = 0.0;  ///< of the IMU's noise in `mean`, per axis, as far as it is known [m^2/s^4]
+  Eigen::Vector3d omega_I =
+      Eigen::Vector3d::Zero();  ///< angular velocity of I, in I, over the same time [rad/s]
+  double omega_variance = 0.0;  ///< of its noise, about each axis [rad^2/s^2]
 
   /// The mean exceeds five sigma of its noise, so it is motion.
   bool isCertain() const;

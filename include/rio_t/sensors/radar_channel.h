@@ -56,6 +56,8 @@ struct UsedInnovation : Innovation {
   Eigen::Vector3d v_R = Eigen::Vector3d::Zero();        ///< measured [m/s]
   Eigen::Matrix3d predicted = Eigen::Matrix3d::Zero();  ///< part of the prediction in S [m^2/s^2]
   Eigen::Matrix3d R_WR = Eigen::Matrix3d::Identity();   ///< as predicted
+  Eigen::Vector3d omega_R = Eigen::Vector3d::Zero();    ///< mean angular velocity, in R [rad/s]
+  double omega_variance = 0.0;                          ///< of its noise, about each axis [rad^2/s^2]
 };
 
 /// The channel's answer to a scan. All else that reports a scan reads this value.

@@ -26,8 +26,7 @@ std::size_t nearestNode(const std::vector<NodeEstimate>& nodes, Time time);
 SlowMotion slowMotion(const std::vector<NodeEstimate>& nodes, std::size_t k, double half_width,
                       const ImuBuffer& imu, const Extrinsics& T_IR, const Extrinsics& linear_from);
 
-/// Keeps the angular velocity about the axes about which the platform turns in these motions. About the
-/// others it is noise, which would look like a turn that shows the lever arm (docs/method.md, section 5.8).
+/// Keeps the angular velocity about the axes about which the platform turns in these motions.
 void keepTurns(const std::vector<SlowMotion*>& motions);
 
 }  // namespace rio_t

@@ -103,6 +103,7 @@ CHECKS = {  # name in summary.yaml: for people
     "windows_at_offset_bound_share": "share of the windows with the offset at max_time_offset",
     "windows_not_converged_share": "share of the windows that stopped before they converged",
     "mounting_turned_sigmas": "turn of mounting or vehicle frame from the configured one, in sigmas",
+    "held_lever_arm_error_sigmas": "error of a lever arm that is not estimated, in sigmas",
     "doppler_scaled_sigmas": "error of the scale of the Doppler, in sigmas",
     "held_offset_error_sigmas": "error of a time offset that is not estimated, in sigmas",
     "imu_faults_share": "share of the IMU samples with a fault",

@@ -61,15 +61,20 @@ void addEstimates(SummaryLines& lines, const RadarSummary& radar) {
   const std::string suffix = suffixOf(radar.name);
   lines.add("final_offset_s" + suffix, fixedText(radar.final_offset_s, 9));
   lines.add("final_offset_sigma_s" + suffix, fixedText(radar.final_offset_sigma_s, 9));
-  if (radar.mounting_turn) {  // about the axes of the IMU [rad]
-    lines.add("mounting_turn" + suffix, fixedTexts(radar.mounting_turn->turn, 6));
-    lines.add("mounting_turn_sigma" + suffix, fixedTexts(radar.mounting_turn->sigma(), 6));
+  const CalibrationErrors& errors = radar.errors;  // of what is not estimated
+  if (errors.turn) {                               // about the axes of the IMU [rad]
+    lines.add("mounting_turn" + suffix, fixedTexts(errors.turn->error, 6));
+    lines.add("mounting_turn_sigma" + suffix, fixedTexts(errors.turn->sigma(), 6));
   }
-  lines.add("doppler_scale_error" + suffix, fixedText(radar.doppler_scale.error, 4));
-  lines.add("doppler_scale_error_sigma" + suffix, fixedText(std::sqrt(radar.doppler_scale.variance), 4));
-  if (radar.offset_error) {  // of an offset that is not estimated
-    lines.add("offset_error_s" + suffix, fixedText(radar.offset_error->error, 9));
-    lines.add("offset_error_sigma_s" + suffix, fixedText(std::sqrt(radar.offset_error->variance), 9));
+  if (errors.lever_arm) {  // along the axes of the IMU [m]
+    lines.add("lever_arm_error" + suffix, fixedTexts(errors.lever_arm->error, 4));
+    lines.add("lever_arm_error_sigma" + suffix, fixedTexts(errors.lever_arm->sigma(), 4));
+  }
+  lines.add("doppler_scale_error" + suffix, fixedText(errors.scale.error, 4));
+  lines.add("doppler_scale_error_sigma" + suffix, fixedText(errors.scale.sigma(), 4));
+  if (errors.offset) {
+    lines.add("offset_error_s" + suffix, fixedText(errors.offset->error, 9));
+    lines.add("offset_error_sigma_s" + suffix, fixedText(errors.offset->sigma(), 9));
   }
   if (!radar.extrinsics) return;
   const ExtrinsicsSummary& extrinsics = *radar.extrinsics;

@@ -322,12 +322,13 @@ void addMissingMounting(const Config& config, std::vector<Cause>* causes) {
 std::vector<Check> checksOf(const RunEvidence& evidence, const Config& config,
                             const std::vector<Config>& radars) {
   const Windows windows = windowsOf(evidence);
-  double kept = 1.0, turned = vehicleTurnSigmas(evidence, config), scaled = 0.0, offset = 0.0;
+  double kept = 1.0, turned = vehicleTurnSigmas(evidence, config), scaled = 0.0, offset = 0.0, moved = 0.0;
   for (std::size_t k = 0; k < evidence.radars.size(); ++k)
     turned = std::max(turned, turnSigmas(evidence.radars[k], radars.at(k)));
   for (const RadarSummary& radar : evidence.radars) {
     scaled = std::max(scaled, scaleSigmas(radar));
     offset = std::max(offset, offsetSigmas(radar));
+    moved = std::max(moved, leverArmSigmas(radar));
   }
   for (const RadarSummary& radar : evidence.radars)
     if (pointsReceived(radar) > 0)
@@ -342,6 +343,7 @@ std::vector<Check> checksOf(const RunEvidence& evidence, const Config& config,
       {"windows_at_offset_bound_share", shareOf(windows.at_bound, windows.all), kManyWindows, false},
       {"windows_not_converged_share", shareOf(windows.not_converged, windows.all), kManyWindows, false},
       {"mounting_turned_sigmas", turned, kFarMounting, false},
+      {"held_lever_arm_error_sigmas", moved, kWrongLeverArm, false},
       {"doppler_scaled_sigmas", scaled, kWrongScale, false},
       {"held_offset_error_sigmas", offset, kWrongOffset, false},
       {"imu_faults_share", shareOfImuFaults(evidence), kManySamples, false},

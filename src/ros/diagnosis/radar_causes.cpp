@@ -25,6 +25,7 @@ class RadarCauses {
     addContradictions();
     addScale();
     addOffset();
+    addLeverArm();
     addMounting();
   }
 
@@ -226,7 +227,7 @@ class RadarCauses {
     const double sigmas = scaleSigmas(radar_);
     if (sigmas <= kWrongScale) return;
     // A large error is not exact: tilt and biases follow it.
-    const double left = 1.0 - radar_.doppler_scale.error;
+    const double left = 1.0 - radar_.errors.scale.error;
     constexpr double kLeast = 0.01;  // zero would be a factor without end
     cause("doppler_scale", 1.0 - kWrongScale / sigmas,
           "The Doppler" + of_ + " seems to be about " + shortText(1.0 / std::max(left, kLeast), 2) +
@@ -244,20 +245,31 @@ class RadarCauses {
     const double held = config_.odometry.radar.time_offset_initial;
     cause("offset_far", 1.0 - kWrongOffset / sigmas,
           "The scans fit better with a time offset" + of_ + " of about " +
-              fixedText(held + radar_.offset_error->error, 3) +
+              fixedText(held + radar_.errors.offset->error, 3) +
               " s, and estimate_time_offset: false holds it at " + fixedText(held, 3) + " s.",
           "Set estimate_time_offset: true, or correct " + key_ + "time_offset_initial.");
+  }
+
+  void addLeverArm() {
+    const double sigmas = leverArmSigmas(radar_);
+    if (sigmas <= kWrongLeverArm) return;
+    const Eigen::Vector3d better = config_.odometry.radar.T_IR.l_I + radar_.errors.lever_arm->error;
+    cause("lever_arm_far", 1.0 - kWrongLeverArm / sigmas,
+          "The scans fit better with the radar" + of_ + " at " + fixedTexts(better, 3, ", ") +
+              " m in the IMU, with sigmas of " + fixedTexts(radar_.errors.lever_arm->sigma(), 3) + ".",
+          "Set estimate_extrinsics: pose, or correct " + leverArmKey() +
+              ": `rosrun rio_t calibrate` finds it.");
   }
 
   void addMounting() {
     const double sigmas = turnSigmas(radar_, config_);
     if (sigmas <= kFarMounting) return;
     const double share = 1.0 - kFarMounting / sigmas;
-    if (radar_.mounting_turn) {
+    if (radar_.errors.turn) {
       cause("mounting_far", share,
             "The scans fit better if the mounting" + of_ + " is turned by " +
-                degrees(radar_.mounting_turn->turn) + ", with sigmas of " +
-                fixedTexts(radar_.mounting_turn->sigma() / kDegree, 1) + ".",
+                degrees(radar_.errors.turn->error) + ", with sigmas of " +
+                fixedTexts(radar_.errors.turn->sigma() / kDegree, 1) + ".",
             "Set estimate_extrinsics: pose, or correct " + mountingKey() +
                 ": `rosrun rio_t calibrate` finds it.");
       return;
@@ -285,6 +297,12 @@ class RadarCauses {
   std::string mountingKey() const {
     if (config_.extrinsics_source == ExtrinsicsSource::kTf) return "the tf of the cloud in the IMU";
     return key_ + "extrinsics_rotation_xyzw, order x, y, z, w";
+  }
+
+  /// The key, or the tf, that gives the position of the radar.
+  std::string leverArmKey() const {
+    if (config_.extrinsics_source == ExtrinsicsSource::kTf) return "the tf of the cloud in the IMU";
+    return key_ + "extrinsics_translation";
   }
 
   static std::string degrees(const Eigen::Vector3d& turn) {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -55,11 +54,7 @@ inline std::string mountingAdvice(const RadarSummary& radar) {
 /// How far the mounting is turned from the configured one: as the scans say of a mounting that is held, or as
 /// estimated, about the worst axis.
 inline double turnSigmas(const RadarSummary& radar, const Config& config) {
-  if (radar.mounting_turn) {
-    const Eigen::Vector3d& turn = radar.mounting_turn->turn;
-    const Eigen::Matrix3d configured = kConfiguredSigma * kConfiguredSigma * Eigen::Matrix3d::Identity();
-    return std::sqrt(turn.dot((radar.mounting_turn->covariance + configured).ldlt().solve(turn)));
-  }
+  if (radar.errors.turn) return radar.errors.turn->sigmas(kConfiguredSigma);
   return radar.turn.cwiseAbs().maxCoeff() / config.odometry.smoother.extrinsics_rotation_sigma;
 }
 
@@ -68,10 +63,7 @@ inline double turnSigmas(const RadarSummary& radar, const Config& config) {
 inline constexpr double kDopplerScaleSigma = 0.1 / 3.0;
 
 /// How far the scale of the Doppler seems to be off.
-inline double scaleSigmas(const RadarSummary& radar) {
-  return std::abs(radar.doppler_scale.error) /
-         std::hypot(std::sqrt(radar.doppler_scale.variance), kDopplerScaleSigma);
-}
+inline double scaleSigmas(const RadarSummary& radar) { return radar.errors.scale.sigmas(kDopplerScaleSigma); }
 
 /// An offset that is held may be off by 5 ms at three sigma. At 5 m/s^2 this is 0.025 m/s, about the noise of
 /// a Doppler.
@@ -79,9 +71,15 @@ inline constexpr double kHeldOffsetSigma = 0.005 / 3.0;
 
 /// How far the offset seems to be off; 0 if it is estimated.
 inline double offsetSigmas(const RadarSummary& radar) {
-  if (!radar.offset_error) return 0.0;
-  return std::abs(radar.offset_error->error) /
-         std::hypot(std::sqrt(radar.offset_error->variance), kHeldOffsetSigma);
+  return radar.errors.offset ? radar.errors.offset->sigmas(kHeldOffsetSigma) : 0.0;
+}
+
+/// A lever arm that is held may be off by a centimetre, as a tape measures.
+inline constexpr double kHeldLeverArmSigma = 0.01;
+
+/// How far the lever arm seems to be off; 0 if it is estimated.
+inline double leverArmSigmas(const RadarSummary& radar) {
+  return radar.errors.lever_arm ? radar.errors.lever_arm->sigmas(kHeldLeverArmSigma) : 0.0;
 }
 
 /// Everything that speaks of one radar.

@@ -64,9 +64,7 @@ void EvidenceCollector::add(const ScanResult& result) {
   }
   if (!result.updated) return;
   radar.turn = turnBetween(result.configured_T_IR, result.T_IR);
-  radar.mounting_turn = result.mounting_turn;
-  radar.doppler_scale = result.doppler_scale;
-  radar.offset_error = result.offset_error;
+  radar.errors = result.errors;
   evidence_.heading_sigma = sigmasOf(bodyOdometry(result.state, 0.0).pose_covariance)[5];
   ++evidence_.solver_terminations[toString(result.solver_termination)];
 }

@@ -25,6 +25,10 @@ constexpr double kWrongScale = 3.0;
 /// A time offset that is held is wrong if it is off by more sigmas.
 constexpr double kWrongOffset = 3.0;
 
+/// A lever arm that is held is wrong if it is off by more sigmas. Noise brings three numbers there as seldom
+/// as one number to three sigma (chi-squared).
+constexpr double kWrongLeverArm = 3.77;
+
 /// A run is doubtful if the estimate diverged for a larger share of its scans.
 constexpr double kManyDiverged = 0.1;
 

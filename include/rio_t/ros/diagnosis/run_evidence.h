@@ -67,9 +67,7 @@ struct RadarSummary : RadarEstimate {
   std::array<std::uint64_t, 3> points_per_scan = {};  ///< quantiles of 10, 50 and 90 % of the scans
   std::vector<double> pass_offsets_s;                 ///< after each pass; only with mode refine
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< of the newest mounting from the configured one [rad]
-  std::optional<MountingTurn> mounting_turn;       ///< of a mounting that is held, as the scans say
-  DopplerScale doppler_scale;                      ///< as the scans say
-  std::optional<TimeOffsetError> offset_error;     ///< of an offset that is held, as the scans say
+  CalibrationErrors errors;                        ///< of what is not estimated, as the scans say
 };
 
 /// The stamps of the IMU jumped, or no sample could be used for too long to bridge: "imu_clock_restart".
