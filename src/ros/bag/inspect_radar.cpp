@@ -31,10 +31,7 @@ std::string sureness(const Eigen::Vector3d& sigma) {
   }
   std::string text = known.empty() ? "" : "sigma " + known + " deg about the axes of the IMU";
   if (!unknown.empty())
-    appendItem(
-        &text,
-        "not observed about " + unknown + ": the motion does not show it, so compare it with the robot",
-        "; ");
+    appendItem(&text, "not observed about " + unknown + ": the motion does not show it", "; ");
   return text;
 }
 
@@ -258,14 +255,15 @@ void describeMounting(const MountingSearch& search, double largest_offset, Radar
   Eigen::Vector3d sigma = search.rotation_sigma;
   constexpr double kSparseSigma = 0.2;  // [rad]
   if (radar->isSparse()) sigma = (sigma.array().square() + kSparseSigma * kSparseSigma).sqrt().min(kStraight);
-  const std::string sure = sureness(sigma);
+  std::string sure = sureness(sigma);
   // Few points a scan may show another mounting that fits as well: upside down, or a view beside the motion.
   const bool observed = search.rotation_sigma.maxCoeff() < kObservedTurn && !radar->isSparse();
-  radar->tell(
-      observed ? FindingLevel::kOk : FindingLevel::kOdd, "mounting",
-      "yaw " + fixedText(yaw, 1) + ", pitch " + fixedText(pitch, 1) + ", roll " + fixedText(roll, 1) +
-          " deg (radar's " + turnText(nearestTurn(search.q_IR.toRotationMatrix())) + " of the IMU); " + sure +
-          (radar->isSparse() ? "; so few points may show a wrong one: compare it with the robot" : ""));
+  if (radar->isSparse()) appendItem(&sure, "so few points may show a wrong one", "; ");
+  if (!observed) appendItem(&sure, "compare it with the robot", "; ");
+  radar->tell(observed ? FindingLevel::kOk : FindingLevel::kOdd, "mounting",
+              "yaw " + fixedText(yaw, 1) + ", pitch " + fixedText(pitch, 1) + ", roll " + fixedText(roll, 1) +
+                  " deg (radar's " + turnText(nearestTurn(search.q_IR.toRotationMatrix())) +
+                  " of the IMU); " + sure);
   radar->keys.set("mounting_yaw_pitch_roll_deg", listOf({yaw, pitch, roll}),
                   "Yaw left, pitch up, roll right side down, seen from x forward, y left, z up of the IMU. " +
                       sure + ".");
