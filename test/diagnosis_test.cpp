@@ -155,14 +155,14 @@ TEST(Diagnosis, AWrongOffsetThatIsHeldIsNoGoodRun) {
 TEST(Diagnosis, AWrongLeverArmThatIsHeldIsNoGoodRun) {
   RunEvidence evidence = goodRun();
   const Eigen::Matrix3d covariance = 1e-6 * Eigen::Matrix3d::Identity();
-  evidence.radars.front().errors.lever_arm = VectorError{Eigen::Vector3d(0.03, 0.03, 0.03), covariance};
-  EXPECT_EQ(first(evidence), "none");  // a ruler measures no better
+  evidence.radars.front().errors.lever_arm = VectorError{Eigen::Vector3d(0.02, 0.02, 0.02), covariance};
+  EXPECT_EQ(first(evidence), "none");  // a tape measures no better
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
   evidence.radars.front().errors.lever_arm->error.z() = -0.2;
   Config config;
   config.odometry.radar.T_IR.l_I = Eigen::Vector3d(0.5, 0.0, 0.1);
   expectSays(first(evidence, config),
-             {"lever_arm_far: The scans fit better with the radar at 0.530, 0.030, -0.100 m in the IMU",
+             {"lever_arm_far: The scans fit better with the radar at 0.520, 0.020, -0.100 m in the IMU",
               "with sigmas of 0.001, 0.001, 0.001", "estimate_extrinsics: pose", "extrinsics_translation"});
   EXPECT_EQ(diagnose(evidence, config).verdict, RunVerdict::kDoubtful);
   evidence.radars.front().errors.lever_arm->covariance(2, 2) = 0.01;  // noise explains it
