@@ -134,7 +134,7 @@ TEST(CalibrationCheck, ItsSigmasAreWhatItsErrorsAre) {
         std::ostringstream when;
         when << motion << ", seed " << seed << ", at " << run.seconds(result.state.time) << " s";
         EXPECT_LT(result.errors.turn->sigmas(kDegree), 3.0) << when.str();
-        EXPECT_LT(result.errors.lever_arm->sigmas(0.017), 3.77) << when.str();
+        EXPECT_LT(result.errors.lever_arm->sigmas(0.01), 3.77) << when.str();
         EXPECT_LT(result.errors.scale.sigmas(0.03), 3.0) << when.str();
       }
     }
@@ -185,7 +185,7 @@ TEST(CalibrationCheck, FindsAWrongOffset) {
       EXPECT_GT(found.sigmas(0.0), 3.0) << motion << ": " << found.error;
       // The others are not blamed for it.
       EXPECT_LT(run.last(0).errors.turn->sigmas(kDegree), 3.0) << motion;
-      EXPECT_LT(run.last(0).errors.lever_arm->sigmas(0.017), 3.77) << motion;
+      EXPECT_LT(run.last(0).errors.lever_arm->sigmas(0.01), 3.77) << motion;
       EXPECT_LT(run.last(0).errors.scale.sigmas(0.03), 3.0) << motion;
     }
   }
@@ -200,7 +200,7 @@ TEST(CalibrationCheck, FindsAWrongLeverArm) {
       // Tilt and offset of the estimate give way, too, so what is found may be short.
       EXPECT_LT((found.error - error).norm(), error.norm() / 2.0)
           << motion << ": " << found.error.transpose();
-      EXPECT_GT(found.sigmas(0.017), 3.77) << motion << ": " << found.error.transpose();
+      EXPECT_GT(found.sigmas(0.01), 3.77) << motion << ": " << found.error.transpose();
       // The others are not blamed for it.
       EXPECT_LT(run.last(0).errors.turn->sigmas(kDegree), 3.0) << motion;
       EXPECT_LT(run.last(0).errors.scale.sigmas(0.03), 3.0) << motion;
@@ -213,7 +213,7 @@ TEST(CalibrationCheck, AVibrationIsNoWrongLeverArm) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     const VectorError found =
         *movedBy(Vector3d::Zero(), "constant_speed", seed, 0.02).last(0).errors.lever_arm;
-    EXPECT_LT(found.sigmas(0.017), 3.0) << found.error.transpose() << " +- " << found.sigma().transpose();
+    EXPECT_LT(found.sigmas(0.01), 3.0) << found.error.transpose() << " +- " << found.sigma().transpose();
   }
 }
 

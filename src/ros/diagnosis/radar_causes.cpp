@@ -253,10 +253,11 @@ class RadarCauses {
   void addLeverArm() {
     const double sigmas = leverArmSigmas(radar_);
     if (sigmas <= kWrongLeverArm) return;
-    const Eigen::Vector3d better = config_.odometry.radar.T_IR.l_I + radar_.errors.lever_arm->error;
     cause("lever_arm_far", 1.0 - kWrongLeverArm / sigmas,
-          "The scans fit better with the radar" + of_ + " at " + fixedTexts(better, 3, ", ") +
-              " m in the IMU, with sigmas of " + fixedTexts(radar_.errors.lever_arm->sigma(), 3) + ".",
+          "The scans fit better if the lever arm" + of_ + " changes by " +
+              fixedTexts(radar_.errors.lever_arm->error, 3, ", ") +
+              " m along x, y, z of the IMU, with sigmas of " +
+              fixedTexts(radar_.errors.lever_arm->sigma(), 3) + ".",
           "Set estimate_extrinsics: pose, or correct " + leverArmKey() +
               ": `rosrun rio_t calibrate` finds it.");
   }
