@@ -25,7 +25,7 @@ struct DopplerScan {
     const RadarVelocityMeasurement mounted = measurement(motion.time(1.0));
     z.stamp = mounted.stamp;
     z.offset_gain = 1.0;
-    z.linear_from_t_O = kPlacedAt;
+    z.linear_from_t_O = std::make_shared<const double>(kPlacedAt);
     const Eigen::Vector3d v_R = motion.radarVelocity(1.0 - kPlacedAt, mounting().R_RI(), mounting().l_I);
     Noise draw;
     for (std::size_t i = 0; i < count; ++i) {

@@ -140,7 +140,7 @@ TEST(ImuRadarFactor, JacobiansAreCorrectForwardsAndBackwards) {
   for (const double t_O : {-0.11, -0.0113, 0.0037, 0.0521, 0.2031}) {
     // Without a part of t_O in it, the derivatives in the state are exact.
     RadarVelocityMeasurement z = measurement(motion.time(1.0));
-    z.linear_from_t_O = t_O;
+    z.linear_from_t_O = std::make_shared<const double>(t_O);
     z.offset_gain = 0.0;
     const StateBlock x = moved(motion.state(0.98), 0.05);
     expectJacobiansCorrect(RadarVelocityFactor(z, motion.time(0.98), imuModel(imu)),
@@ -153,7 +153,7 @@ TEST(ImuRadarFactor, TheDerivativeInTheExtrinsicsIsExactAwayFromWhereTheScanWasP
   const ImuBuffer imu = motion.imu(0.5, 1.6, 400.0);
   const StateBlock x = moved(motion.state(0.98), 0.05);
   RadarVelocityMeasurement z = measurement(motion.time(1.0));
-  z.linear_from_t_O = 0.02;
+  z.linear_from_t_O = std::make_shared<const double>(0.02);
   z.offset_gain = 0.6;
   const RadarVelocityFactor factor(z, motion.time(0.98), imuModel(imu));
   const ExtrinsicsManifold manifold(EstimateExtrinsics::kPose);
@@ -193,7 +193,7 @@ TEST(ImuRadarFactor, TheMountingCountsToFirstOrderFromWhereItIsLinear) {
     return r;
   };
   const Eigen::Vector3d exact = residual(storedMounting());
-  z.linear_from_t_O = 0.02;
+  z.linear_from_t_O = std::make_shared<const double>(0.02);
   z.offset_gain = 0.6;
   // Its mean motion is another one than that of the state.
   z.slow = std::make_shared<SlowMotion>(SlowMotion{mounting(), {0.4, 0.9, -0.3}, {0.2, -0.5, 0.7}});
@@ -247,7 +247,7 @@ TEST(ImuRadarFactor, AHeldOffsetIsAllThatCounts) {
     return r;
   };
   const Eigen::Vector3d free = residual(0.02);
-  z.linear_from_t_O = 0.02;
+  z.linear_from_t_O = std::make_shared<const double>(0.02);
   z.offset_gain = 0.0;
   EXPECT_EQ(residual(0.02), free);
   EXPECT_EQ(residual(-0.1), free);
@@ -259,10 +259,10 @@ TEST(ImuRadarFactor, AroundWhereAScanWasPlacedTheOffsetCountsToFirstOrder) {
   const StateBlock x = moved(motion.state(0.98), 0.05);
   for (const double gain : {1.0, 0.4}) {
     RadarVelocityMeasurement z = measurement(motion.time(1.0));
-    z.linear_from_t_O = 0.02;
+    z.linear_from_t_O = std::make_shared<const double>(0.02);
     z.offset_gain = gain;
     const RadarVelocityFactor factor(z, motion.time(0.98), imuModel(imu));
-    z.linear_from_t_O = std::nullopt;
+    z.linear_from_t_O = nullptr;
     const RadarVelocityFactor exact(z, motion.time(0.98), imuModel(imu));
     const auto residual = [&](const RadarVelocityFactor& f, double t_O, Eigen::Vector3d* J_t = nullptr) {
       const double* blocks[] = {x.data(), x.biases(), &t_O, storedMounting().data()};

@@ -106,7 +106,7 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
     }
     DopplerMeasurement result;
     result.stamp = z.stamp;
-    result.linear_from_t_O = 0.0;
+    result.linear_from_t_O = std::make_shared<const double>(0.0);
     result.points = std::make_shared<DopplerLikelihood>(points, z.v_R, noise);
     result.shared_variances.setConstant(0.04 * 0.04);
     result.huber_threshold = 1.5;
@@ -153,29 +153,45 @@ class Windows : public ::testing::TestWithParam<WindowSolver> {
   std::shared_ptr<Block> biases, offset, extrinsics;
 };
 
+void expectLinearSystemOfCeres(Window& window) {
+  ceres::Problem::EvaluateOptions order;
+  for (const auto& block : window.blocks()) order.parameter_blocks.push_back(block->x.data());
+  double cost = 0.0;
+  std::vector<double> gradient;
+  ceres::CRSMatrix sparse;
+  ASSERT_TRUE(window.problem().Evaluate(order, &cost, nullptr, &gradient, &sparse));
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(sparse.num_rows, sparse.num_cols);
+  for (int row = 0; row < sparse.num_rows; ++row)
+    for (int i = sparse.rows[row]; i < sparse.rows[row + 1]; ++i) J(row, sparse.cols[i]) = sparse.values[i];
+  const Eigen::MatrixXd H = J.transpose() * J;
+  const Eigen::Map<const Eigen::VectorXd> b(gradient.data(), J.cols());
+
+  const LinearSystem system = linearize(window);
+  const Dense dense(system);
+  EXPECT_NEAR(system.cost, cost, 1e-12 * cost);
+  ASSERT_EQ(dense.H.rows(), H.rows());
+  const Eigen::VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
+  EXPECT_LT((scale.asDiagonal() * (dense.H - H) * scale.asDiagonal()).cwiseAbs().maxCoeff(), 1e-10);
+  EXPECT_LT(scale.cwiseProduct(dense.b - b).norm(), 1e-10 * scale.cwiseProduct(b).norm());
+}
+
 TEST_P(Windows, TheLinearSystemIsThatOfCeres) {
   for (const TimeOffsetModel kind : {TimeOffsetModel::kConstantAcceleration, TimeOffsetModel::kImu}) {
     make(0.01, 0.25, 0.0, false, kind);
-    ceres::Problem::EvaluateOptions order;
-    for (const auto& block : window.blocks()) order.parameter_blocks.push_back(block->x.data());
-    double cost = 0.0;
-    std::vector<double> gradient;
-    ceres::CRSMatrix sparse;
-    ASSERT_TRUE(window.problem().Evaluate(order, &cost, nullptr, &gradient, &sparse));
-    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(sparse.num_rows, sparse.num_cols);
-    for (int row = 0; row < sparse.num_rows; ++row)
-      for (int i = sparse.rows[row]; i < sparse.rows[row + 1]; ++i) J(row, sparse.cols[i]) = sparse.values[i];
-    const Eigen::MatrixXd H = J.transpose() * J;
-    const Eigen::Map<const Eigen::VectorXd> b(gradient.data(), J.cols());
-
-    const LinearSystem system = linearize(window);
-    const Dense dense(system);
-    EXPECT_NEAR(system.cost, cost, 1e-12 * cost);
-    ASSERT_EQ(dense.H.rows(), H.rows());
-    const Eigen::VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
-    EXPECT_LT((scale.asDiagonal() * (dense.H - H) * scale.asDiagonal()).cwiseAbs().maxCoeff(), 1e-10);
-    EXPECT_LT(scale.cwiseProduct(dense.b - b).norm(), 1e-10 * scale.cwiseProduct(b).norm());
+    expectLinearSystemOfCeres(window);
   }
+}
+
+TEST_P(Windows, ATermTakesAnotherBlockForBoth) {
+  make(0.01);
+  const auto other = window.addCalibration(offset->manifold, Eigen::VectorXd::Constant(1, 0.02));
+  Term& last = *window.terms().back();
+  const std::size_t terms = window.terms().size();
+  window.exchange(last, *offset, *other);
+  EXPECT_EQ(window.terms().size(), terms);
+  EXPECT_EQ(last.blocks[2], other.get());
+  EXPECT_EQ(last.blocks[1], biases.get());
+  expectLinearSystemOfCeres(window);
 }
 
 TEST(Solve, ALinearWindowIsSolvedAtOnceAndIsNotLookedAtAgain) {

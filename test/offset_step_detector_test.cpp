@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 
 namespace rio_t {
 namespace {
@@ -18,7 +19,7 @@ double secondsToStep(double offset_error, double acceleration, double noise = 0.
     const Eigen::Vector3d e(std::sin(2.1 * i * i), std::cos(1.3 * i * i), std::sin(0.7 * i * i + 1.0));
     const double error = 0.1 * i < quiet ? 0.0 : offset_error;
     const Eigen::Vector3d d = error * J + std::sqrt(2.0) * noise * e;
-    if (detector.stepped({Time::fromSeconds(0.1 * i), d, S, S, J, J}, Eigen::Matrix3d::Identity()))
+    if (detector.stepped({Time::fromSeconds(0.1 * i), d, S, S, J, J}, Eigen::Matrix3d::Identity(), 0.0))
       return 0.1 * i;
   }
   return 60.0;
@@ -35,10 +36,47 @@ TEST(OffsetStepDetector, SeesAStepOfEitherSign) {
   EXPECT_LT(secondsToStep(0.05, 0.7), 20.0);
 }
 
-// Four seconds of scans from before it would outweigh the first second.
 TEST(OffsetStepDetector, SeesALargeStepSoon) {
   EXPECT_LT(secondsToStep(0.1, 2.0, 0.03, 30.0), 31.5);
   EXPECT_LT(secondsToStep(-0.1, 2.0, 0.03, 30.0), 31.5);
+}
+
+/// Scans at `rate` [Hz] of a platform that accelerates evenly; `error(t)` [s] is what their velocities show.
+template <class Error>
+std::optional<OffsetStep> stepOf(double rate, const Error& error, double t_O = 0.0) {
+  OffsetStepDetector detector(OffsetStepDetectorOptions(), 0.25);
+  const Eigen::Matrix3d S = 0.03 * 0.03 * Eigen::Matrix3d::Identity();
+  const Eigen::Vector3d J(1.5, -1.0, 0.5);
+  for (int i = 0; i < 20.0 * rate; ++i) {
+    const Eigen::Vector3d e(std::sin(2.1 * i * i), std::cos(1.3 * i * i), std::sin(0.7 * i * i + 1.0));
+    const Time stamp = Time::fromSeconds(i / rate);
+    const Eigen::Vector3d d = error(i / rate) * J + 0.03 * e;
+    if (const auto step = detector.stepped({stamp, d, S, S, J, J}, Eigen::Matrix3d::Identity(), t_O))
+      return step;
+  }
+  return std::nullopt;
+}
+
+TEST(OffsetStepDetector, TellsWhenAndByHowMuch) {
+  for (const double rate : {5.0, 10.0, 25.0, 50.0}) {
+    const auto step = stepOf(rate, [](double t) { return t < 9.99 ? 0.0 : 0.1; });
+    ASSERT_TRUE(step) << rate;
+    EXPECT_NEAR(step->first.seconds(), 10.0, 1e-6) << rate;
+    EXPECT_NEAR(step->change, 0.1, 0.02) << rate;
+  }
+}
+
+// A person in front of the radar, whose velocity happens to lie along the derivative.
+TEST(OffsetStepDetector, WhatPassesWithinASecondIsNoStep) {
+  for (const double rate : {10.0, 25.0, 50.0})
+    EXPECT_FALSE(stepOf(rate, [](double t) { return t > 9.99 && t < 10.9 ? 0.1 : 0.0; })) << rate;
+}
+
+TEST(OffsetStepDetector, NoStepLeavesTheBounds) {
+  const auto step = [](double t) { return t < 9.99 ? 0.0 : 0.1; };
+  EXPECT_TRUE(stepOf(10.0, step, 0.1));
+  EXPECT_TRUE(stepOf(10.0, step, -0.2));
+  EXPECT_FALSE(stepOf(10.0, step, 0.2)) << "0.3 s is beyond 0.25 s";
 }
 
 // A platform that turns its acceleration in ten seconds. The estimated velocity follows each scan by a third
@@ -58,7 +96,7 @@ TEST(OffsetStepDetector, SeesAStepThatTheVelocityFollows) {
     const Eigen::Vector3d e(std::sin(2.1 * i * i), std::cos(1.3 * i * i), std::sin(0.7 * i * i + 1.0));
     const Eigen::Vector3d due = (t < begin ? 0.0 : step) * J - followed;
     const Eigen::Vector3d d = due + 0.01 * e;
-    if (detector.stepped({Time::fromSeconds(t), d, S, S, J, J}, scan.R_WR())) found = t;
+    if (detector.stepped({Time::fromSeconds(t), d, S, S, J, J}, scan.R_WR(), 0.0)) found = t;
     detector.follow(J, scan);
     followed += due / 3.0;
   }
@@ -66,23 +104,31 @@ TEST(OffsetStepDetector, SeesAStepThatTheVelocityFollows) {
   EXPECT_LT(found, begin + 10.0);
 }
 
-// A large step makes outliers of the scans, and the window follows them less than the detector assumes.
-TEST(OffsetStepDetector, SeesAStepThatTheVelocityDoesNotFollow) {
+// The loss of the window makes outliers of the scans after a large step: it follows them half as much as the
+// detector assumes.
+TEST(OffsetStepDetector, SeesAStepThatTheVelocityFollowsLess) {
   OffsetStepDetector detector(OffsetStepDetectorOptions(), 0.25);
   const Eigen::Matrix3d S = 0.02 * 0.02 * Eigen::Matrix3d::Identity();
   OffsetScan scan;
   scan.predicted = scan.measured = 0.5 * S;
+  Eigen::Vector3d followed = Eigen::Vector3d::Zero();
   double found = 60.0;
   for (int i = 0; i < 600 && found == 60.0; ++i) {
     const double t = 0.1 * i;
     const Eigen::Vector3d J = 2.0 * Eigen::Vector3d(std::sin(0.6 * t), std::cos(0.6 * t), 0.3);
     const Eigen::Vector3d e(std::sin(2.1 * i * i), std::cos(1.3 * i * i), std::sin(0.7 * i * i + 1.0));
-    const Eigen::Vector3d d = (t < 30.0 ? 0.0 : 0.1) * J + 0.01 * e;
-    if (detector.stepped({Time::fromSeconds(t), d, S, S, J, J}, scan.R_WR())) found = t;
+    const Eigen::Vector3d due = (t < 30.0 ? 0.0 : 0.1) * J - followed;
+    if (detector.stepped({Time::fromSeconds(t), due + 0.01 * e, S, S, J, J}, scan.R_WR(), 0.0)) found = t;
     detector.follow(J, scan);
+    followed += 0.25 * due;
   }
   EXPECT_GE(found, 30.0);
-  EXPECT_LT(found, 32.0);
+  EXPECT_LT(found, 35.0);
+}
+
+// The window does not take a scan that the gate rejects, so nobody calls follow.
+TEST(OffsetStepDetector, SeesAStepWhoseScansAreRejected) {
+  EXPECT_LT(secondsToStep(0.2, 2.0, 0.01, 30.0), 31.5);
 }
 
 TEST(OffsetStepDetector, AChangeBeyondTheBoundsIsNoStep) { EXPECT_EQ(secondsToStep(0.8, 2.0), 60.0); }
@@ -100,7 +146,7 @@ TEST(OffsetStepDetector, CanBeTurnedOff) {
   for (int i = 0; i < 200; ++i) {
     const Eigen::Matrix3d S = 1e-4 * Eigen::Matrix3d::Identity();
     EXPECT_FALSE(detector.stepped({Time::fromSeconds(0.1 * i), {1, 0, 0}, S, S, {2, 0, 0}, {2, 0, 0}},
-                                  Eigen::Matrix3d::Identity()));
+                                  Eigen::Matrix3d::Identity(), 0.0));
   }
 }
 

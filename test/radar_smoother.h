@@ -28,7 +28,8 @@ struct RadarSmoother {
     return states.marginalize({{&offset->newest(), Eigen::VectorXd::Constant(1, walk)}});
   }
   std::optional<RadarVelocityPrediction> predict(Time stamp) const { return radar.predict(states, stamp); }
-  void stepOffset(Time stamp) { radar.stepOffset(states, stamp); }
+  /// The offset stepped before the scan stamped `stamp`, which is the newest.
+  void stepOffset(Time stamp) { radar.stepOffset(states, {stamp}, stamp); }
 
   std::size_t size() const { return states.size(); }
   NodeEstimate node(std::size_t k) const { return states.node(k); }

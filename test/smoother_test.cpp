@@ -212,7 +212,7 @@ TEST_F(Smoother, ScansThatSayNothingOfTheOffsetLeaveIt) {
   RadarSmoother smoother = make(options);
   for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
     RadarVelocityMeasurement z = measurement(stamp, 0.0);
-    z.linear_from_t_O = smoother.t_O();
+    z.linear_from_t_O = std::make_shared<const double>(smoother.t_O());
     z.offset_gain = 0.0;
     smoother.add(z);
     smoother.optimize();

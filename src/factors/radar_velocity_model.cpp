@@ -12,7 +12,7 @@ bool RadarVelocityModel::isCurrent(Time mean_time) const {
 PredictedVelocity RadarVelocityModel::at(double const* const* parameters, bool derivatives) const {
   const Extrinsics mounting = toExtrinsics(parameters[3]);
   const Extrinsics& T_IR = scan_.slow ? scan_.slow->T_IR : mounting;
-  const double t_O = scan_.linear_from_t_O.value_or(parameters[2][0]);
+  const double t_O = scan_.linear_from_t_O ? *scan_.linear_from_t_O : parameters[2][0];
   const double away = parameters[2][0] - t_O;
   const bool is_linear = away != 0.0 && scan_.offset_gain > 0.0;
   // The value may depend on the mean, too.

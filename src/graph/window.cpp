@@ -61,11 +61,15 @@ Term& Window::add(std::unique_ptr<ceres::CostFunction> cost, std::vector<Block*>
   term->cost = std::move(cost);
   term->loss = std::move(loss);
   term->blocks = std::move(blocks);
-  std::vector<double*> parameters;
-  for (Block* block : term->blocks) parameters.push_back(block->x.data());
-  term->in_problem = problem_->AddResidualBlock(term->cost.get(), term->loss.get(), parameters);
+  addToProblem(*term);
   terms_.push_back(std::move(term));
   return *terms_.back();
+}
+
+void Window::addToProblem(Term& term) {
+  std::vector<double*> parameters;
+  for (Block* block : term.blocks) parameters.push_back(block->x.data());
+  term.in_problem = problem_->AddResidualBlock(term.cost.get(), term.loss.get(), parameters);
 }
 
 void Window::remove(const Term& term) {
@@ -73,6 +77,13 @@ void Window::remove(const Term& term) {
       std::find_if(terms_.begin(), terms_.end(), [&](const auto& other) { return other.get() == &term; });
   problem_->RemoveResidualBlock(term.in_problem);
   terms_.erase(at);
+}
+
+void Window::exchange(Term& term, const Block& from, Block& to) {
+  for (Block*& block : term.blocks)
+    if (block == &from) block = &to;
+  problem_->RemoveResidualBlock(term.in_problem);
+  addToProblem(term);
 }
 
 void Window::remove(const Block& block) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <stdexcept>
 #include <utility>
 
@@ -87,12 +88,12 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
   problem.radar = start.radar;
   for (std::size_t k = 0; k < options_.radarCount(); ++k) problem.radars.push_back(options_.ofRadar(k));
   problem.guess.push_back({start.time, start.prior.x0});
-  std::vector<bool> stepped(problem.radars.size(), false);
-  // A step found at a scan that is not in the graph counts for the next.
+  std::vector<std::deque<Time>> steps(problem.radars.size());  // the stamps of the first scans after them
+  for (const ScanResult& result : scans_)
+    if (result.offset_stepped) steps[result.scan.radar].push_back(result.offset_stepped->first);
   for (std::size_t i = 0; i < scans_.size(); ++i) {
     const ScanResult& result = scans_[i];
     const std::size_t radar = result.scan.radar;
-    stepped[radar] = stepped[radar] || result.offset_stepped;
     if (!result.updated) continue;
     const NodeEstimate node{result.state.time, stateBlock(result.state)};
     if (node.time > problem.guess.back().time) problem.guess.push_back(node);
@@ -100,8 +101,8 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
     scan.stamp = result.scan.stamp;
     scan.t_O = result.time_offset;
     scan.radar = radar;
-    scan.offset_stepped = stepped[radar];
-    stepped[radar] = false;
+    for (; !steps[radar].empty() && steps[radar].front() <= scan.stamp; steps[radar].pop_front())
+      scan.offset_stepped = true;
     if (result.at_rest) scan.rest_velocity_sigma = result.rest_velocity_sigma;
     if (result.used) setMeasurement(result, scan);
     problem.scans.push_back(scan);

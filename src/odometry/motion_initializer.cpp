@@ -267,7 +267,7 @@ std::optional<double> MotionInitializer::refine(const Velocities& velocities, Ti
       z.covariance = covariances[i].whole;
       z.offset_gain = gains[i];
       z.offset_half_width = offset_gains.half_width;
-      z.linear_from_t_O = linear_from;
+      z.linear_from_t_O = std::make_shared<const double>(linear_from);
       terms.push_back(&window.add(std::make_unique<RadarVelocityFactor>(z, time, model),
                                   {&motion, biases.get(), offset.get(), extrinsics.get()}, loss));
     }

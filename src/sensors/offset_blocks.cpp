@@ -22,24 +22,38 @@ std::shared_ptr<Block> OffsetBlocks::add(Window& window, double t_O) const {
   return block;
 }
 
-Block& OffsetBlocks::of(Window& window, Time stamp) {
+OffsetBlocks::OfScan OffsetBlocks::of(Window& window, Time stamp) {
   const auto is_gone = [&](const Epoch& epoch) { return !window.has(*epoch.block); };
   epochs_.erase(std::remove_if(epochs_.begin(), epochs_.end() - 1, is_gone), epochs_.end() - 1);
   auto epoch = epochs_.end() - 1;
   while (epoch != epochs_.begin() && stamp < epoch->since) --epoch;
-  return *epoch->block;
+
+  const auto has_left = [](const Scan& scan) { return scan.linear_from.expired(); };
+  scans_.erase(std::remove_if(scans_.begin(), scans_.end(), has_left), scans_.end());
+  const auto linear_from = std::make_shared<double>(epoch->block->x[0]);
+  scans_.push_back({stamp, linear_from});
+  return {epoch->block.get(), linear_from};
 }
 
-void OffsetBlocks::step(FixedLagSmoother& smoother, Time stamp) {
+void OffsetBlocks::step(FixedLagSmoother& smoother, const OffsetStep& step, Time covered) {
   if (!options_.estimate_time_offset) return;
   ++steps_;
   Window& window = smoother.window();
   Block& before = *epochs_.back().block;
-  std::shared_ptr<Block> after = add(window, value());
+  std::shared_ptr<Block> after = add(window, value() + step.change);
   window.add(std::make_unique<RandomWalkFactor>(Eigen::VectorXd::Constant(1, radar_.time_offset_sigma)),
              {&before, after.get()});
+  // With the old offset they have pulled velocity and biases, and these would pull the new one.
+  for (const auto& term : window.terms()) {
+    const bool uses_it = std::find(term->blocks.begin(), term->blocks.end(), &before) != term->blocks.end();
+    if (uses_it && term->stamp && *term->stamp >= step.first) window.exchange(*term, before, *after);
+  }
+  for (const Scan& scan : scans_) {
+    const auto linear_from = scan.linear_from.lock();
+    if (linear_from && scan.stamp >= step.first) *linear_from = std::max(after->x[0], scan.stamp - covered);
+  }
   before.is_retired = true;
-  epochs_.push_back({stamp, std::move(after)});
+  epochs_.push_back({step.first, std::move(after)});
   smoother.settle();
 }
 

@@ -1,56 +1,72 @@
 #include "rio_t/sensors/offset_step_detector.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <utility>
-
-#include "rio_t/core/fading.h"
 
 namespace rio_t {
 namespace {
 
-constexpr double kMinCount = 30.0;   // of components: ten scans, since one may be an outlier
+/// [s] A person who walks by may pull the velocity for this long, and to the estimate it looks like a step.
+/// After a step, the innovations ask for the same change in every scan.
+constexpr double kPull = 1.0;
 constexpr double kMinScatter = 0.2;  // of the variance: fewer scans than it seems may agree by chance
 
 }  // namespace
 
-bool OffsetStepDetector::showsStep(const Average& average) const {
-  if (average.count < kMinCount || average.information <= 0.0) return false;
-  const double change = average.projection / average.information;
+bool OffsetStepDetector::isStep(const Candidate& candidate, double t_O) const {
+  const Sums& all = candidate.all;
+  const double change = all.projection / all.information;
+  if (std::abs(change) < options_.min_change || std::abs(t_O + change) > max_time_offset_) return false;
   // The scatter that the change does not explain. S is an upper bound, so the scatter may well be below 1.
   const double scatter =
-      std::max(kMinScatter, (average.squares - change * average.projection) / average.count);
-  const double sigma = std::sqrt(scatter / average.information);
-  return std::abs(change) >= std::max(options_.significance * sigma, options_.min_change) &&
-         std::abs(change) <= max_change_;
+      std::max(kMinScatter, (candidate.squares - change * all.projection) / candidate.count);
+  const auto isSignificant = [&](const Sums& sums) {
+    return sums.information > 0.0 && std::copysign(1.0, change) * sums.projection >=
+                                         options_.significance * std::sqrt(scatter * sums.information);
+  };
+  return isSignificant(all) && isSignificant(candidate.late);
 }
 
-bool OffsetStepDetector::stepped(const Innovation& innovation, const Eigen::Matrix3d& R_WR) {
-  if (!options_.enabled) return false;
-  const Time before = std::exchange(last_, innovation.stamp);
-  const Eigen::LDLT<Eigen::Matrix3d> weight = innovation.S_at_offset.ldlt();
-  const double squares = innovation.d.dot(weight.solve(innovation.d));
-  double memory = options_.memory;
-  for (Average& average : averages_) {
-    const double fade = fading(before, innovation.stamp, memory);
-    average.followed *= fade;
-    const Eigen::Vector3d J = innovation.J_mean - R_WR.transpose() * average.followed;
-    const Eigen::Vector3d weighted_J = weight.solve(J);
-    average.information = fade * average.information + J.dot(weighted_J);
-    average.projection = fade * average.projection + innovation.d.dot(weighted_J);
-    average.squares = fade * average.squares + squares;
-    average.count = fade * average.count + 3.0;
-    memory *= 0.5;
+std::optional<OffsetStep> OffsetStepDetector::stepped(const Innovation& innovation,
+                                                      const Eigen::Matrix3d& R_WR, double t_O) {
+  if (!options_.enabled) return std::nullopt;
+  while (!candidates_.empty() && innovation.stamp - candidates_.front().first > options_.memory)
+    candidates_.pop_front();
+  candidates_.emplace_back();
+  candidates_.back().first = innovation.stamp;
+
+  const Eigen::Matrix3d weight_W = R_WR * innovation.S_at_offset.inverse() * R_WR.transpose();
+  const Eigen::Vector3d J_W = R_WR * innovation.J_mean;
+  const Eigen::Vector3d d_W = R_WR * innovation.d;
+  const Eigen::Vector3d weighted_d = weight_W * d_W;
+  const double squares = d_W.dot(weighted_d);
+  const Candidate* best = nullptr;
+  double best_fit = 0.0;  // twice the logarithm of its likelihood ratio
+  for (Candidate& candidate : candidates_) {
+    if (innovation.stamp < candidate.first) continue;
+    const Eigen::Vector3d G_W = J_W - candidate.followed;
+    const Sums added{G_W.dot(weight_W * G_W), G_W.dot(weighted_d)};
+    candidate.all += added;
+    if (innovation.stamp - candidate.first >= kPull) candidate.late += added;
+    candidate.squares += squares;
+    candidate.count += 3.0;
+    const double fit = candidate.all.projection * candidate.all.projection / candidate.all.information;
+    if (!(fit > best_fit)) continue;  // nor without information
+    best_fit = fit;
+    best = &candidate;
   }
-  const bool shows = std::any_of(averages_.begin(), averages_.end(),
-                                 [this](const Average& average) { return showsStep(average); });
-  if (shows) averages_ = {};
-  return shows;
+  if (best == nullptr || !isStep(*best, t_O)) return std::nullopt;
+  const OffsetStep step{best->first, best->all.projection / best->all.information};
+  candidates_.clear();
+  return step;
 }
 
 void OffsetStepDetector::follow(const Eigen::Vector3d& J_mean, const OffsetScan& scan) {
-  for (Average& average : averages_) scan.follow(J_mean, average.followed);
+  const Eigen::Matrix3d R_WR = scan.R_WR();
+  const Eigen::Matrix3d share_W = R_WR * scan.share() * R_WR.transpose();
+  const Eigen::Vector3d J_W = R_WR * J_mean;
+  for (Candidate& candidate : candidates_) candidate.followed += share_W * (J_W - candidate.followed);
 }
 
 }  // namespace rio_t

@@ -99,7 +99,7 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   if (seen.has_borrowed && answer.at_rest && answer.ego_velocity.inliers.empty()) return reject(not_own);
   informOffset(seen, answer);
   answer.taken.stamp = scan.stamp;
-  answer.taken.linear_from_t_O = offset();
+  answer.taken.linear_from_t_O = std::make_shared<const double>(offset());
   if (isTightlyCoupled() && seen.velocity.status == EgoVelocityStatus::kMoving) {
     answer.doppler = dopplerOf(scan, seen, answer);
     if (!answer.doppler) return reject(not_own);
@@ -108,9 +108,9 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   Innovations d;
   if (seen.prior) d.all = innovation(scan.stamp, *seen.prior, seen.velocity, &seen);
   if (answer.taken.offset_gain > 0.0) d.own = ownInnovation(scan, seen);
-  answer.offset_stepped = d.own && step_detector_.stepped(*d.own, seen.prediction->scan.R_WR());
+  if (d.own) answer.offset_stepped = step_detector_.stepped(*d.own, seen.prediction->scan.R_WR(), offset());
   if (answer.offset_stepped) {
-    in_window_.stepOffset(smoother, scan.stamp);
+    in_window_.stepOffset(smoother, *answer.offset_stepped, scan.stamp);
     followOffsetSteps();
   }
   if (d.all &&

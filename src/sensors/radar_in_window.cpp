@@ -137,10 +137,11 @@ bool RadarInWindow::addTerm(FixedLagSmoother& smoother, Measurement z,
   scans_.push_back({z.stamp, *node->time, z.slow_half_width, slow});
   if (is_estimated) updateSlowMotion(smoother);
   z.slow = slow;
-  Block& offset = offset_->of(smoother.window(), z.stamp);
-  if (z.linear_from_t_O) z.linear_from_t_O = offset.x[0];  // of a late scan, the offset before a step
-  smoother.window().add(std::make_unique<Factor>(z, *node->time, model_),
-                        {node, &smoother.biases(), &offset, extrinsics_.get()}, loss);
+  const OffsetBlocks::OfScan offset = offset_->of(smoother.window(), z.stamp);
+  if (z.linear_from_t_O) z.linear_from_t_O = offset.linear_from;
+  Term& term = smoother.window().add(std::make_unique<Factor>(z, *node->time, model_),
+                                     {node, &smoother.biases(), offset.block, extrinsics_.get()}, loss);
+  term.stamp = z.stamp;
   return true;
 }
 

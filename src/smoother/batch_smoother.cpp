@@ -227,7 +227,7 @@ void BatchSmoother::addTerms(const BatchScan& scan, const Graph::Scan& at, doubl
   const std::vector<Block*> blocks = {node.motion, node.biases, at.offset, at.extrinsics};
   // Placed anew where the offset moves, so first order is enough.
   const auto placed = [&](auto z) {
-    if (atMeasurement() || z.offset_gain == 0.0) z.linear_from_t_O = t_O;
+    if (atMeasurement() || z.offset_gain == 0.0) z.linear_from_t_O = std::make_shared<const double>(t_O);
     z.slow = at.slow;
     return z;
   };

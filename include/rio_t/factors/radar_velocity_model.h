@@ -23,10 +23,9 @@ struct RadarScanTime {
   double slow_half_width = kMaxOffsetHalfWidth;
   /// If set, the motion is taken at this t_O [s], and to first order from there. Exactly at each t_O, the
   /// noise of the IMU over a shift raises the cost whatever the direction of the shift. With a gain of 0, the
-  /// scan does not tell the offset.
-  std::optional<double> linear_from_t_O = std::nullopt;
-  /// If set, the velocity is linear in the mounting, with the derivatives that this motion gives. It may
-  /// change between two solves, not during one.
+  /// scan does not tell the offset. May change between two solves, not during one, as the next.
+  std::shared_ptr<const double> linear_from_t_O = nullptr;
+  /// If set, the velocity is linear in the mounting, with the derivatives that this motion gives.
   std::shared_ptr<const SlowMotion> slow = nullptr;
 };
 

@@ -45,6 +45,7 @@ struct Term {
   std::unique_ptr<ceres::CostFunction> cost;
   std::shared_ptr<ceres::LossFunction> loss;  ///< null: none
   std::vector<Block*> blocks;                 ///< in the order of the cost function
+  std::optional<Time> stamp = {};             ///< of a scan
   ceres::ResidualBlockId in_problem = nullptr;
 };
 
@@ -63,6 +64,8 @@ class Window {
   Term& add(std::unique_ptr<ceres::CostFunction> cost, std::vector<Block*> blocks,
             std::shared_ptr<ceres::LossFunction> loss = nullptr);
   void remove(const Term& term);
+  /// The term takes `to` in the place of `from`.
+  void exchange(Term& term, const Block& from, Block& to);
   /// The block and the terms on it.
   void remove(const Block& block);
   void setConstant(Block& block, bool is_constant);
@@ -76,6 +79,7 @@ class Window {
  private:
   std::shared_ptr<Block> insert(std::vector<std::shared_ptr<Block>>::iterator before,
                                 std::shared_ptr<Block> added);
+  void addToProblem(Term& term);
 
   // Declared before problem_, which refers to them.
   std::map<const Manifold*, std::unique_ptr<CeresManifold>> ceres_manifolds_;

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "rio_t/sensors/offset_step_detector.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
 #include "rio_t/smoother/options.h"
 
@@ -20,11 +21,14 @@ class OffsetBlocks {
 
   /// Adds the first block to a window that starts.
   Block& start(Window& window, double t_O);
-  /// The offset stepped before the scan stamped `stamp`. That scan and later ones use a new block, which
-  /// time_offset_sigma links to the old one.
-  void step(FixedLagSmoother& smoother, Time stamp);
-  /// The block of a scan.
-  Block& of(Window& window, Time stamp);
+  /// The scans since the step, also those in the window, use a new block. It begins at the offset after the
+  /// step, and time_offset_sigma links it to the old one. The IMU covers the time until `covered`.
+  void step(FixedLagSmoother& smoother, const OffsetStep& step, Time covered);
+  struct OfScan {
+    Block* block;
+    std::shared_ptr<const double> linear_from;  ///< see RadarScanTime; a step moves it
+  };
+  OfScan of(Window& window, Time stamp);
 
   std::size_t steps() const { return steps_; }  ///< so far, of all radars that share t_O
   const Block& newest() const { return *epochs_.back().block; }
@@ -43,6 +47,11 @@ class OffsetBlocks {
   CalibrationPrior radar_;
   std::shared_ptr<const Manifold> manifold_;
   std::vector<Epoch> epochs_;  ///< those still in the window
+  struct Scan {
+    Time stamp;
+    std::weak_ptr<double> linear_from;  ///< lives as long as its factor
+  };
+  std::vector<Scan> scans_;
   std::size_t steps_ = 0;
 };
 

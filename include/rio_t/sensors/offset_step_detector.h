@@ -1,6 +1,7 @@
 #pragma once
 
-#include <array>
+#include <deque>
+#include <optional>
 
 #include "rio_t/core/time.h"
 #include "rio_t/sensors/innovation.h"
@@ -10,49 +11,62 @@ namespace rio_t {
 
 struct OffsetStepDetectorOptions {
   bool enabled = true;
-  double memory = 4.0;         ///< [s] longest time constant of the average over scans
+  double memory = 8.0;         ///< [s] how long ago a step may have been that is found
   double significance = 6.0;   ///< [sigma] of the change that the innovations ask for
   double min_change = 5.0e-3;  ///< [s] the random walk of the offset follows smaller steps
+};
+
+struct OffsetStep {
+  Time first;           ///< stamp of the first scan after it
+  double change = 0.0;  ///< of t_O [s]
 };
 
 /// Detects steps of the time offset. A driver that restarts may change the offset by many sigma, and a
 /// smoother that is sure of the old value would take minutes to follow.
 ///
-/// An offset that is wrong by c shows as innovations d = J c + noise, where J is what the estimated velocity
-/// has not followed yet of d(velocity)/d(t_O). The weighted average over the last scans,
-/// sum(J' S^-1 d) / sum(J' S^-1 J), is the change that they ask for. The variance of this change is
-/// 1 / sum(J' S^-1 J), scaled by the scatter of the innovations against S (docs/method.md, eq. 32). Several
-/// averages run side by side, each over half the time of the one before: a long one sees small steps, and a
-/// short one sees a step before the scans from before it are forgotten.
+/// If the offset stepped by c before a scan k, the innovations of k and of the scans after it are
+/// d = c G + noise. G is what the estimated velocity has not followed yet, since k, of
+/// J = d(velocity)/d(t_O). For each k of the last seconds, sum(G' S^-1 d) / sum(G' S^-1 G) is the change that
+/// fits best, and 1 / sum(G' S^-1 G) its variance, scaled by the scatter of the innovations against S. The k
+/// that fits best of all is the first scan after the step (docs/method.md, eq. 32; A. S. Willsky and
+/// H. L. Jones, "A generalized likelihood ratio approach to the detection and estimation of jumps in linear
+/// systems", IEEE Trans. Automatic Control, 1976). Not thread-safe.
 class OffsetStepDetector {
  public:
-  /// `max_time_offset` [s] is the bound of the offset: no step is longer than from bound to bound.
+  /// The offset stays within `max_time_offset` [s].
   OffsetStepDetector(const OffsetStepDetectorOptions& options, double max_time_offset)
-      : options_(options), max_change_(2.0 * max_time_offset) {}
+      : options_(options), max_time_offset_(max_time_offset) {}
 
-  /// True if the offset has stepped; the averages then start again. S is here S_at_offset, without the
-  /// uncertainty of the offset. `R_WR` turns R into W at the scan.
-  bool stepped(const Innovation& innovation, const Eigen::Matrix3d& R_WR);
+  /// If the offset has stepped, returns the step and begins anew. S is here S_at_offset, without the
+  /// uncertainty of the offset. `R_WR` turns R into W at the scan, and `t_O` [s] is the offset before the
+  /// step.
+  std::optional<OffsetStep> stepped(const Innovation& innovation, const Eigen::Matrix3d& R_WR, double t_O);
   /// The window has taken the scan, and its velocity follows it. `J_mean` as in the innovation.
   void follow(const Eigen::Vector3d& J_mean, const OffsetScan& scan);
 
  private:
-  /// Sums over the scans, fading.
-  struct Average {
-    double information = 0.0;  ///< J' S^-1 J
-    double projection = 0.0;   ///< J' S^-1 d
-    double squares = 0.0;      ///< d' S^-1 d
-    double count = 0.0;        ///< 3
-    /// If the offset stepped by one second when this average began, the scans have moved the velocity by
-    /// this, in W [m/s^2].
+  struct Sums {
+    double information = 0.0;  ///< of G' S^-1 G
+    double projection = 0.0;   ///< of G' S^-1 d
+    void operator+=(const Sums& added) {
+      information += added.information;
+      projection += added.projection;
+    }
+  };
+  /// A step just before the scan `first`, as the scans since then see it.
+  struct Candidate {
+    Time first;
+    Sums all, late;        ///< over all of them, and without those of the first second
+    double squares = 0.0;  ///< sum of d' S^-1 d
+    double count = 0.0;    ///< of the components of d
+    /// By this would the scans have moved the velocity, in W, for a step of one second [m/s^2].
     Eigen::Vector3d followed = Eigen::Vector3d::Zero();
   };
-  bool showsStep(const Average& average) const;
+  bool isStep(const Candidate& candidate, double t_O) const;
 
   OffsetStepDetectorOptions options_;  // read-only after construction, as the next
-  double max_change_;                  ///< [s]
-  Time last_;
-  std::array<Average, 4> averages_;  ///< the first over `memory`
+  double max_time_offset_;
+  std::deque<Candidate> candidates_;  ///< of the last `memory`
 };
 
 }  // namespace rio_t

@@ -46,7 +46,7 @@ struct ScanAnswer {
   std::optional<DopplerMeasurement> doppler;  ///< its points, if they and not the velocity count
   std::string rejected_because;               ///< snake case, empty if used; keys of `scans_rejected`
   bool at_rest = false;                       ///< the IMU shows rest, and the points do not deny it
-  bool offset_stepped = false;                ///< t_O stepped before this scan
+  std::optional<OffsetStep> offset_stepped;   ///< shown by the scans so far
   RadarScanTime taken{Time(), 0.0};           ///< with a gain of 0, the scan does not tell the offset
   double offset_information = 0.0;            ///< what the scan tells of the offset, if used [1/s^2]
 };

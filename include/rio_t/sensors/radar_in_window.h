@@ -49,8 +49,10 @@ class RadarInWindow {
   /// Adds the term of a scan that has none; false if the scan is older than the window.
   bool add(FixedLagSmoother& smoother, const RadarVelocityMeasurement& z);
   bool add(FixedLagSmoother& smoother, const DopplerMeasurement& z);
-  /// See OffsetBlocks::step.
-  void stepOffset(FixedLagSmoother& smoother, Time stamp) { offset_->step(smoother, stamp); }
+  /// See OffsetBlocks::step. `newest` is the stamp of the scan that has shown the step.
+  void stepOffset(FixedLagSmoother& smoother, const OffsetStep& step, Time newest) {
+    offset_->step(smoother, step, nodeTime(newest));
+  }
   std::size_t offsetSteps() const { return offset_->steps(); }
 
   double offset() const { return offset_->value(); }  ///< t_O [s]

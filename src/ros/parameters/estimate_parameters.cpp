@@ -75,10 +75,10 @@ void listOffsetSteps(ParameterList& list, OffsetStepDetectorOptions& monitor) {
       "time_offset_step_detection", monitor.enabled,
       "The estimator looks for steps of the offset, as after a restart of the driver. After a step it "
       "estimates the offset again. Set it to false if the offset cannot step.");
-  list.number(
-      "time_offset_step_memory", "s", above(0), monitor.memory,
-      "The detector averages the scans of about this time. A longer time finds smaller steps, but finds them "
-      "later.");
+  list.number("time_offset_step_memory", "s", above(1), monitor.memory,
+              "The detector finds steps that came at most this long ago. A longer time finds smaller steps, "
+              "and steps "
+              "in slower motion.");
   list.number(
       "time_offset_step_significance", "", above(0), monitor.significance,
       "The offset has stepped if the scans ask for a change of this many standard deviations. Raise it if "
