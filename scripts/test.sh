@@ -15,7 +15,9 @@ rm -rf "$build/test_results"
 RIO_T_DATA_DIR=$(realpath -m "${RIO_T_DATA_DIR:-../shared/data}")
 export RIO_T_DATA_DIR
 tested=true  # a program that hangs has no results to count
-(cd "$build" && ctest --output-on-failure) || tested=false
+(cd "$build" && ctest --output-on-failure --parallel "$(nproc)" --exclude-regex _rostest_) || tested=false
+# These run live, each with a roscore and several nodes.
+(cd "$build" && ctest --output-on-failure --tests-regex _rostest_) || tested=false
 # Programs of others, which use what is installed, cannot load libraries with a sanitizer.
 installed=true
 [ -n "${RIO_T_TEST_PRELOAD:-}" ] || scripts/test_install.sh || installed=false

@@ -246,6 +246,18 @@ TEST(Landmarks, MakeUpNoKnowledgeOfTheTilt) {
   }
 }
 
+/// By default the lever arm is estimated. Without turns, nothing tells it.
+TEST(Landmarks, BearALeverArmThatNobodyKnows) {
+  SimulatedRun run("constant_speed", 2, 50.0);
+  run.options.landmarks.enabled = true;
+  run.options.smoother.estimate_extrinsics = EstimateExtrinsics::kLeverArm;
+  run.options.radar.extrinsics_translation_sigma = 0.2;
+  run.run();
+  EXPECT_EQ(outcomeOf(run, 10.0).dropped, 0u);
+  const ScanResult& last = run.results.back();
+  EXPECT_TRUE(last.landmarks && last.landmarks->is_trusted);
+}
+
 /// After a gap of 20 s, some detection lies wherever a landmark might be.
 TEST(Landmarks, AreNotGuessedAfterAGap) {
   for (const std::uint64_t seed : {2, 3, 5, 6}) {

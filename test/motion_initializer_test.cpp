@@ -356,5 +356,15 @@ TEST(Initializer, DoesNotTakeASmoothRideForRest) {
   EXPECT_NE(waiting_for.find("radar"), std::string::npos) << waiting_for;
 }
 
+// As after a jump of the IMU's clock.
+TEST(Initializer, ASmoothRideMayStartAtOnce) {
+  Rig rig("constant_speed", 12, 0.0);
+  rig.options.init_motion_after = 0.0;
+  std::string waiting_for;
+  const auto found = startBy(InitMode::kAuto, rig, &waiting_for);
+  ASSERT_TRUE(found) << waiting_for;
+  EXPECT_EQ(found->first, InitializedFrom::kMotion);
+}
+
 }  // namespace
 }  // namespace rio_t

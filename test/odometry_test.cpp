@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "noise.h"
+#include "rio_t/odometry/batch_odometry.h"
 #include "rio_t/odometry/navigation.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
 #include "simulated_run.h"
@@ -252,6 +253,39 @@ TEST(ClockThatStepsBack, LeavesThePositionUncertainByTheWayMeanwhile) {
   const double before = sigma();
   feed(101.0 - kStep, 101.05);
   EXPECT_NEAR(std::sqrt(sigma() * sigma() - before * before), kSpeed * kStep, 0.02);
+}
+
+TEST(ClockThatStepsBack, LeavesTheBatchUncertainToo) {
+  constexpr double kAt = 30.0;  // [s]
+  const auto sigmaAtEnd = [](double step) {
+    SimulatedRun run("constant_speed", 1, 35.0);
+    const auto stepBack = [&](simulation::SensorData& data) {
+      const auto shift = [&](Time& stamp) {
+        if (run.seconds(stamp) > kAt) stamp = stamp - step;
+      };
+      for (ImuMeasurement& sample : data.imu.samples) shift(sample.time);
+      for (simulation::SimulatedScan& scan : data.scans) {
+        shift(scan.stamp);
+        shift(scan.arrival);
+      }
+    };
+    run.run(stepBack);
+    EXPECT_EQ(run.odometry->faults().count("imu_clock_back"), step > 0.0 ? 1u : 0u);
+    simulation::SensorData data = simulation::simulate(run.motion, run.setup);
+    stepBack(data);
+    BatchOdometry batch(run.options, BatchOptions());
+    auto result = run.results.begin();
+    for (const ImuMeasurement& sample : data.imu.samples) {
+      batch.addImu(sample);
+      for (; result != run.results.end() && result->state.time <= sample.time; ++result)
+        batch.addResult(*result);
+    }
+    const StateCovariance P = batch.solve(*run.odometry->start()).trajectory.back().covariance;
+    return std::sqrt(P(StateBlock::kP, StateBlock::kP));
+  };
+  const double step = 0.1, without = sigmaAtEnd(0.0), with = sigmaAtEnd(step);
+  const double speed = 1.0;  // [m/s] of the motion "constant_speed"
+  EXPECT_NEAR(std::sqrt(with * with - without * without), speed * step, 0.2 * speed * step);
 }
 
 TEST_F(AtRest, UncertaintyGrowsOverAnImuGap) {

@@ -93,6 +93,24 @@ TEST(TwoRadars, AreUsedInTheSameOrderHoweverTheImuComes) {
   }
 }
 
+// So do the scans that still wait when the data end.
+TEST(TwoRadars, AreUsedInTheSameOrderAtTheEnd) {
+  SimulatedRun run = pair("difficult", 1, 20.0);
+  run.run();
+  const Time newest = run.states.back().time;
+  // Both wait for the IMU's margin. The right one's offset is larger, so it was measured first.
+  for (const std::size_t radar : {0u, 1u}) {
+    RadarScan scan;
+    scan.radar = radar;
+    scan.stamp = newest + 0.001;
+    run.odometry->addScan(scan);
+  }
+  std::vector<std::size_t> order;
+  for (const ScanResult& result : run.odometry->finish())
+    if (result.scan.stamp == newest + 0.001) order.push_back(result.scan.radar);
+  EXPECT_EQ(order, (std::vector<std::size_t>{1, 0}));
+}
+
 // At rest nothing tells the offsets: the sigma of each grows by its random walk alone.
 TEST(TwoRadars, TheOffsetsOfBothWander) {
   SimulatedRun run = pair("medium", 1, 50.0);

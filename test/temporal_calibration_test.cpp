@@ -254,6 +254,18 @@ TEST(TemporalCalibration, AStepIsFoundAtAnyRate) {
   }
 }
 
+// With a smaller offset a scan is read later, where the IMU does not reach yet.
+TEST(TemporalCalibration, AStepDoesNotLookAhead) {
+  SimulatedRun run("medium", 2, 40.0, kStart);
+  run.setup.radar.rate = 25.0;
+  run.setup.time_offset.constant = 0.1;
+  run.setup.time_offset.steps = {{35.0, -0.2}};
+  run.run();
+  EXPECT_EQ(run.odometry->faults()["time_offset_step"], 1u);
+  EXPECT_LT(std::abs(offsetAt(run, 40.0).error), 5.0e-3);
+  for (std::size_t k = 1; k < run.states.size(); ++k) ASSERT_LT(run.states[k - 1].time, run.states[k].time);
+}
+
 /// Wild motion whose offset steps by 0.1 s at 45 s, of a run of 50 s.
 SimulatedRun stepOfAShakenRun(std::uint64_t seed, double imu_rate, double vibration) {
   SimulatedRun run("difficult", seed, 50.0, kStart);

@@ -35,6 +35,8 @@ void addTo(Candidate& candidate, const PlacedDetection& seen) {
 
 }  // namespace
 
+Eigen::Vector3d Candidate::position() const { return information().llt().solve(fit_vector.head<3>()); }
+
 bool Candidate::isProven() const {
   if (count < kMinSightings) return false;
   const Eigen::LDLT<Eigen::Matrix4d> factor(fit_information);

@@ -96,7 +96,8 @@ std::optional<LandmarkMap::Prediction> LandmarkMap::predict(const FixedLagSmooth
   prediction.first_landmark = StateBlock::kTangent;
   if (!extrinsics.is_constant) {
     blocks.push_back(&extrinsics);
-    prediction.first_landmark += static_cast<std::size_t>(extrinsics.manifold->tangent());
+    prediction.mounting_columns = extrinsics.manifold->columns();
+    prediction.first_landmark += prediction.mounting_columns.size();
   }
   const std::optional<NodeEstimate> node = smoother.nodeBefore(measured);
   if (!node) return std::nullopt;
@@ -125,9 +126,8 @@ LandmarkMap::Expected LandmarkMap::expected(const Prediction& prediction, const 
   J.setZero();
   J.leftCols<3>() = seen.J_motion.leftCols<3>();
   J.middleCols<3>(StateBlock::kP) = seen.J_motion.middleCols<3>(StateBlock::kPStored);
-  const Eigen::Index calibrated = shared - StateBlock::kTangent;
-  if (calibrated > 0) J.middleCols<3>(StateBlock::kTangent) = seen.J_extrinsics.leftCols<3>();
-  if (calibrated > 3) J.middleCols<3>(StateBlock::kTangent + 3) = seen.J_extrinsics.rightCols<3>();
+  Eigen::Index mounting = StateBlock::kTangent;
+  for (const int stored : prediction.mounting_columns) J.col(mounting++) = seen.J_extrinsics.col(stored);
   J.rightCols<3>() = seen.J_point;
   Eigen::MatrixXd own(shared + 3, shared + 3);
   const Eigen::Index at = shared + 3 * static_cast<Eigen::Index>(column);

@@ -40,6 +40,7 @@ void BatchOdometry::addImu(ImuMeasurement imu) {
         "batch: the IMU's clock jumped or it was silent for longer than max_bridged_imu_gap; "
         "no single graph goes over that: use mode online, or bag_start and bag_duration");
   for (const ImuMeasurement& unseen : verdict.bridge) imu_.add(unseen);
+  if (!imu_.empty()) imu.addLostWay(imu_.newest(), v_W_);
   imu_.add(imu);
 }
 
@@ -47,7 +48,10 @@ void BatchOdometry::addResult(ScanResult result) {
   if (!result.used && result.rejected_because.empty()) return;  // only carries the last poses
   result.scan.points = {};
   result.left_window.clear();
-  if (result.updated) model_error_scale_ = result.model_error_scale;
+  if (result.updated) {
+    model_error_scale_ = result.model_error_scale;
+    v_W_ = result.state.v_W;
+  }
   scans_.push_back(std::move(result));
 }
 
@@ -65,7 +69,6 @@ BatchResult BatchOdometry::solve(const RadarInertialOdometry::Start& start) cons
 
 RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) const {
   RadarVelocityMeasurement z{result.taken, result.ego_velocity.v_R, result.ego_velocity.covariance};
-  z.linear_from_t_O.reset();  // the batch sets its own
   z.covariance.diagonal() +=
       (model_error_scale_ / result.model_error_scale - 1.0) * result.ego_velocity.added_variance;
   return z;

@@ -144,7 +144,7 @@ std::string Estimator::whyNotNow(Time node_time, bool imu_has_ended) const {
   if (node_time < initialized_at_) return "before_initialization";
   if (node_time - imu_.newest() > max_stamp_ahead_) return "stamp_ahead_of_imu";
   if (imu_.covers(imu_has_ended ? node_time : node_time + kImuMargin)) return "";
-  return imu_has_ended ? "imu_not_covering" : "older_than_window";
+  return node_time < imu_.oldest() ? "older_than_window" : "imu_not_covering";
 }
 
 /// Passes the innovations of the scan to health, recovery, the scale of the model errors and the check of the
@@ -296,16 +296,12 @@ void Estimator::startAgain(std::uint64_t clock_restarts) {
   start_.reset();
   imu_.clear();
   if (barometer_) barometer_->startAgain();
-  if (ground_vehicle_)
-    ground_vehicle_.emplace(options_.ground_vehicle, options_.smoother.huber_threshold, imu_);
   // The platform may be moving, so a start in motion need not wait.
   OdometryOptions at_once = options_;
   at_once.init_motion_after = 0.0;
   initializer_ = Initializer(at_once);
   smoother_ = FixedLagSmoother(options_.smoother, options_.imu_noise, g_W_, imu_);
-  model_error_scale_ = ModelErrorScale();
   health_ = RadarsHealth(options_.health, options_.innovation_gate.sigmas, radars_.size());
-  if (landmarks_) landmarks_->forget();
   radar_heard_.reset();
 }
 

@@ -23,9 +23,10 @@ bool Initializer::isMoving(Time from, Time to) const {
 
 bool Initializer::mayStartInMotion() const {
   if (options_.init_mode != InitMode::kAuto) return options_.init_mode == InitMode::kMotion;
+  if (!first_ || *newest_ - *first_ < options_.init_motion_after) return false;
   // Not while a long init_duration is still under way at rest.
-  return first_ && *newest_ - *first_ >= options_.init_motion_after &&
-         (rest_.hasSeenMotion() || isMoving(*newest_ - options_.init_motion_after, *newest_));
+  const double seconds = std::max(options_.init_motion_after, options_.initialization.duration);
+  return rest_.hasSeenMotion() || isMoving(*newest_ - seconds, *newest_);
 }
 
 std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, const ImuBuffer& imu) {

@@ -29,10 +29,7 @@ Navigation::Checked Navigation::add(const ImuMeasurement& imu) {
   samples_ += 1.0;
   for (const ImuMeasurement& each : verdict.bridge) propagator_.add(each);
   const std::optional<NavigationState> before = sample.lost_time > 0.0 ? propagator_.state() : std::nullopt;
-  if (before) {
-    const double lost = sample.lost_time * before->v_W.norm();
-    sample.unseen_velocity_variance = lost * lost / (sample.time - before->time);
-  }
+  if (before) sample.addLostWay(before->time, before->v_W);
   propagator_.add(sample);
   checked.bridge = std::move(verdict.bridge);
   checked.sample = sample;

@@ -18,8 +18,8 @@ struct RadarInertialOdometry::Impl {
         estimator(options, navigation, faults) {}
 
   void takeInbox();
-  /// The end if all must wait.
-  std::vector<RadarScan>::iterator nextReadyScan();
+  /// Takes the next scan that need not wait, if there is one.
+  std::optional<RadarScan> nextScan(bool imu_has_ended);
   void shareStatus();
 
   const OdometryOptions options;
@@ -99,11 +99,9 @@ std::vector<ScanResult> RadarInertialOdometry::process(std::size_t max_scans) {
   m.takeInbox();
   std::vector<ScanResult> results;
   while (results.size() < max_scans) {
-    const auto scan = m.nextReadyScan();
-    if (scan == m.waiting_scans.end()) break;
-    RadarScan next = std::move(*scan);
-    m.waiting_scans.erase(scan);  // even if the estimator throws
-    results.push_back(m.estimator.useScan(std::move(next), false));
+    std::optional<RadarScan> scan = m.nextScan(false);
+    if (!scan) break;
+    results.push_back(m.estimator.useScan(std::move(*scan), false));
   }
   while (m.waiting_scans.size() > m.options.max_queued_scans) {
     ScanResult lost;
@@ -120,8 +118,8 @@ std::vector<ScanResult> RadarInertialOdometry::process(std::size_t max_scans) {
 std::vector<ScanResult> RadarInertialOdometry::finish() {
   Impl& m = *impl_;
   std::vector<ScanResult> results = process();
-  for (RadarScan& scan : m.waiting_scans) results.push_back(m.estimator.useScan(std::move(scan), true));
-  m.waiting_scans.clear();
+  while (std::optional<RadarScan> scan = m.nextScan(true))
+    results.push_back(m.estimator.useScan(std::move(*scan), true));
   m.shareStatus();
   if (!initialized()) return results;
   // The poses still in the window belong to the last scan.
@@ -132,13 +130,16 @@ std::vector<ScanResult> RadarInertialOdometry::finish() {
 
 // The scan that the IMU covered first, however many IMU samples come at once. So the live node and the bag
 // runner use the scans of several radars in the same order.
-std::vector<RadarScan>::iterator RadarInertialOdometry::Impl::nextReadyScan() {
+std::optional<RadarScan> RadarInertialOdometry::Impl::nextScan(bool imu_has_ended) {
   auto first = waiting_scans.end();
   for (auto scan = waiting_scans.begin(); scan != waiting_scans.end(); ++scan) {
-    if (estimator.mustWait(*scan)) continue;
+    if (!imu_has_ended && estimator.mustWait(*scan)) continue;
     if (first == waiting_scans.end() || estimator.nodeTime(*scan) < estimator.nodeTime(*first)) first = scan;
   }
-  return first;
+  if (first == waiting_scans.end()) return std::nullopt;
+  std::optional<RadarScan> scan = std::move(*first);
+  waiting_scans.erase(first);  // even if the estimator throws
+  return scan;
 }
 
 void RadarInertialOdometry::Impl::takeInbox() {

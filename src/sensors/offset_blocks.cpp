@@ -36,14 +36,14 @@ OffsetBlocks::OfScan OffsetBlocks::of(Window& window, Time stamp) {
 }
 
 void OffsetBlocks::step(FixedLagSmoother& smoother, const OffsetStep& step, Time covered) {
-  if (!options_.estimate_time_offset) return;
   ++steps_;
   Window& window = smoother.window();
   Block& before = *epochs_.back().block;
   std::shared_ptr<Block> after = add(window, value() + step.change);
   window.add(std::make_unique<RandomWalkFactor>(Eigen::VectorXd::Constant(1, radar_.time_offset_sigma)),
              {&before, after.get()});
-  // With the old offset they have pulled velocity and biases, and these would pull the new one.
+  // The scans since the step have pulled velocity and biases with the old offset. From now on they tell the
+  // new one.
   for (const auto& term : window.terms()) {
     const bool uses_it = std::find(term->blocks.begin(), term->blocks.end(), &before) != term->blocks.end();
     if (uses_it && term->stamp && *term->stamp >= step.first) window.exchange(*term, before, *after);

@@ -1,5 +1,6 @@
 #include "rio_t/sensors/offset_evidence.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -21,6 +22,16 @@ double correlation(double apart, double half_width) {
 }
 
 }  // namespace
+
+Eigen::Matrix3d OffsetScan::R_WR() const { return (x.q_WI() * T_IR.q_IR).toRotationMatrix(); }
+
+Eigen::Matrix3d OffsetScan::share() const { return predicted * (predicted + measured).inverse(); }
+
+Eigen::Vector3d OffsetScan::follow(const Eigen::Vector3d& J, Eigen::Vector3d& followed) const {
+  Eigen::Vector3d unfollowed = J - R_WR().transpose() * followed;
+  followed += R_WR() * share() * unfollowed;
+  return unfollowed;
+}
 
 bool OffsetDerivative::isCertain() const { return mean.squaredNorm() > kCertain * kCertain * variance; }
 

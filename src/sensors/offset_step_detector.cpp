@@ -62,11 +62,12 @@ std::optional<OffsetStep> OffsetStepDetector::stepped(const Innovation& innovati
   return step;
 }
 
-void OffsetStepDetector::follow(const Eigen::Vector3d& J_mean, const OffsetScan& scan) {
+void OffsetStepDetector::follow(Time stamp, const Eigen::Vector3d& J_mean, const OffsetScan& scan) {
   const Eigen::Matrix3d R_WR = scan.R_WR();
   const Eigen::Matrix3d share_W = R_WR * scan.share() * R_WR.transpose();
   const Eigen::Vector3d J_W = R_WR * J_mean;
-  for (Candidate& candidate : candidates_) candidate.followed += share_W * (J_W - candidate.followed);
+  for (Candidate& candidate : candidates_)
+    if (stamp >= candidate.first) candidate.followed += share_W * (J_W - candidate.followed);
 }
 
 }  // namespace rio_t

@@ -99,7 +99,6 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   if (seen.has_borrowed && answer.at_rest && answer.ego_velocity.inliers.empty()) return reject(not_own);
   informOffset(seen, answer);
   answer.taken.stamp = scan.stamp;
-  answer.taken.linear_from_t_O = std::make_shared<const double>(offset());
   if (isTightlyCoupled() && seen.velocity.status == EgoVelocityStatus::kMoving) {
     answer.doppler = dopplerOf(scan, seen, answer);
     if (!answer.doppler) return reject(not_own);
@@ -110,8 +109,11 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   if (answer.taken.offset_gain > 0.0) d.own = ownInnovation(scan, seen);
   if (d.own) answer.offset_stepped = step_detector_.stepped(*d.own, seen.prediction->scan.R_WR(), offset());
   if (answer.offset_stepped) {
-    in_window_.stepOffset(smoother, *answer.offset_stepped, scan.stamp);
+    const Time covered = nodeTime(scan.stamp);
+    in_window_.stepOffset(smoother, *answer.offset_stepped, covered);
     followOffsetSteps();
+    // A smaller offset reads the scan later, where the IMU may not reach yet.
+    if (nodeTime(scan.stamp) > covered) return reject("imu_not_covering");
   }
   if (d.all &&
       memory_.gate.rejects(options_.gate, *d.all, seen.velocity, seen.tilt_is_known, context.last_used))
@@ -154,11 +156,12 @@ std::optional<Innovation> RadarChannel::ownInnovation(const RadarScan& scan, con
 }
 
 void RadarChannel::learn(const RadarScan& scan, const Seen& seen, const Innovations& d, RadarAnswer& answer) {
-  if (d.own) offset_uncertainty_.add(*d.own);
+  // The innovation of the scan that shows a step is one of the offset before.
+  if (d.own && !answer.offset_stepped) offset_uncertainty_.add(*d.own);
   if (seen.moves) {
     OffsetScan followed = seen.prediction->scan;
     followed.measured = seen.velocity.covariance;
-    step_detector_.follow(offset_widths_.gain() * seen.dv_dt_O.mean, followed);
+    step_detector_.follow(scan.stamp, offset_widths_.gain() * seen.dv_dt_O.mean, followed);
   }
   // A borrowed point must not teach twice.
   if (!seen.is_own || sharesPoints(seen, memory_.learned_at)) return;

@@ -227,7 +227,8 @@ void BatchSmoother::addTerms(const BatchScan& scan, const Graph::Scan& at, doubl
   const std::vector<Block*> blocks = {node.motion, node.biases, at.offset, at.extrinsics};
   // Placed anew where the offset moves, so first order is enough.
   const auto placed = [&](auto z) {
-    if (atMeasurement() || z.offset_gain == 0.0) z.linear_from_t_O = std::make_shared<const double>(t_O);
+    const bool is_linear = atMeasurement() || z.offset_gain == 0.0;
+    z.linear_from_t_O = is_linear ? std::make_shared<const double>(t_O) : nullptr;
     z.slow = at.slow;
     return z;
   };

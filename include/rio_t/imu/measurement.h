@@ -21,6 +21,11 @@ struct ImuMeasurement {
   /// [s] of motion before this sample that no interval of stamps covers: the clock stepped back. The unseen
   /// variances contain what it may have changed.
   double lost_time = 0.0;
+  /// Adds the way in the lost time to the unseen variances. `before` is the time of the sample before, and
+  /// `v_W` the velocity then.
+  void addLostWay(Time before, const Eigen::Vector3d& v_W) {
+    unseen_velocity_variance = (lost_time * v_W).squaredNorm() / (time - before);
+  }
 
   // White noise measured by NoiseSpectrum, as squared densities per axis: that of the samples, and what is
   // left of it in their means.

@@ -44,7 +44,7 @@ struct Candidate {
 
   /// Information of the position, if the point does not slide (s = 0) [1/m^2].
   Eigen::Matrix3d information() const { return fit_information.topLeftCorner<3, 3>(); }
-  Eigen::Vector3d position() const { return information().llt().solve(fit_vector.head<3>()); }  ///< p_W [m]
+  Eigen::Vector3d position() const;  ///< p_W [m]
   double snr_db() const { return snr_sum / static_cast<double>(count); }
   /// Whether the detections tell that it does not slide.
   bool isProven() const;

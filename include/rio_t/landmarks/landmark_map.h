@@ -27,6 +27,7 @@ class LandmarkMap {
   struct Prediction {
     Time measured;
     PredictedState state;  ///< joint with the extrinsics, if they are estimated, and with the landmarks
+    std::vector<int> mounting_columns;   ///< what is estimated of the extrinsics, see Manifold::columns
     std::size_t first_landmark = 0;      ///< column of the first landmark in the covariance
     std::vector<std::size_t> landmarks;  ///< which of them, by the order of columns
   };

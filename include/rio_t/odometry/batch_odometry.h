@@ -26,8 +26,8 @@ class BatchOdometry {
  public:
   BatchOdometry(const OdometryOptions& options, const BatchOptions& batch);
 
-  /// Takes every sample that the online run got, and checks and bridges it in the same way. Throws
-  /// std::runtime_error if the clock of the IMU jumped.
+  /// Takes every sample that the online run got, in turn with its results, and checks and bridges it in the
+  /// same way. Throws std::runtime_error if the clock of the IMU jumped.
   void addImu(ImuMeasurement imu);
   /// The points are not kept.
   void addResult(ScanResult result);
@@ -49,10 +49,11 @@ class BatchOdometry {
   std::vector<NavigationState> trajectory(const BatchSolution& solution) const;
   std::vector<ScanResult> results(const Run& run, const BatchSolution& solution) const;
 
-  OdometryOptions options_;         // read-only after construction
-  BatchOptions batch_;              // read-only after construction
-  Eigen::Vector3d g_W_;             // read-only after construction
-  double model_error_scale_ = 1.0;  ///< of the online run at its end
+  OdometryOptions options_;                        // read-only after construction
+  BatchOptions batch_;                             // read-only after construction
+  Eigen::Vector3d g_W_;                            // read-only after construction
+  double model_error_scale_ = 1.0;                 ///< of the online run at its end
+  Eigen::Vector3d v_W_ = Eigen::Vector3d::Zero();  ///< the newest that it knows
   ImuInputCheck imu_input_check_;
   ImuBuffer imu_;
   std::vector<ScanResult> scans_;

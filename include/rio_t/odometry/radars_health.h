@@ -30,7 +30,7 @@ class RadarsHealth {
   const HealthMonitor& best() const { return monitors_[best_]; }
 
   std::vector<HealthMonitor> monitors_;
-  std::size_t best_ = 0;  ///< of the radars that are heard, the one that agrees best with the estimate
+  std::size_t best_ = 0;  ///< a radar that is heard and does not contradict the estimate, if there is one
 };
 
 }  // namespace rio_t

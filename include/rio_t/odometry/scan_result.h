@@ -24,8 +24,8 @@ struct ScanResult : ScanAnswer {
   std::optional<LandmarkAnswer> landmarks;  ///< if they are on, of a used scan in motion
   double model_error_scale = 1.0;           ///< see ModelErrorScale; in the covariance of ego_velocity
 
-  /// The window was solved again, because the scan was used or the platform is at rest. If not, the following
-  /// members are not set.
+  /// The window was solved again: the scan was used, the platform is at rest, or the constraint of a vehicle
+  /// was added. If not, the members up to solver_termination are not set.
   bool updated = false;
   // The newest state of the window.
   NavigationState state;
@@ -39,6 +39,8 @@ struct ScanResult : ScanAnswer {
   Eigen::Matrix<double, 6, 6> T_IR_covariance = Eigen::Matrix<double, 6, 6>::Zero();
   int solver_iterations = 0;
   SolverTermination solver_termination = SolverTermination::kIterationLimit;
+
+  // Set for each scan.
   Health health = Health::kOk;   ///< after this scan
   bool is_contradicted = false;  ///< diverged, and not only because the velocity is unknown
   bool reinitialized = false;    ///< the estimate was re-initialised before this scan

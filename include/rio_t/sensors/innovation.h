@@ -1,6 +1,5 @@
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include "rio_t/core/time.h"
@@ -20,13 +19,9 @@ struct Innovation {
   Eigen::Vector3d J_after = Eigen::Vector3d::Zero();  ///< from the samples after the scan
   Eigen::Vector3d J_mean = Eigen::Vector3d::Zero();   ///< from both sides
 
-  double squaredSigmas() const { return d.dot(S.ldlt().solve(d)); }
+  double squaredSigmas() const;
   /// The same with `sigma` [m/s] added on each axis of S.
-  Innovation widened(double sigma) const {
-    Innovation wide = *this;
-    wide.S.diagonal().array() += sigma * sigma;
-    return wide;
-  }
+  Innovation widened(double sigma) const;
 };
 
 }  // namespace rio_t

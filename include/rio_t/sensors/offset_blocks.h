@@ -22,7 +22,8 @@ class OffsetBlocks {
   /// Adds the first block to a window that starts.
   Block& start(Window& window, double t_O);
   /// The scans since the step, also those in the window, use a new block. It begins at the offset after the
-  /// step, and time_offset_sigma links it to the old one. The IMU covers the time until `covered`.
+  /// step, and time_offset_sigma links it to the old one. No scan of the window is read later than `covered`:
+  /// the IMU may not reach further.
   void step(FixedLagSmoother& smoother, const OffsetStep& step, Time covered);
   struct OfScan {
     Block* block;

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <Eigen/LU>
 #include <array>
 #include <deque>
 
@@ -46,17 +45,13 @@ struct OffsetScan {
   Eigen::Matrix3d predicted = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d measured = Eigen::Matrix3d::Zero();  ///< covariance in R of the scan's velocity [m^2/s^2]
 
-  Eigen::Matrix3d R_WR() const { return (x.q_WI() * T_IR.q_IR).toRotationMatrix(); }
+  Eigen::Matrix3d R_WR() const;
   /// The share of its innovation by which the estimated velocity follows the scan, in R.
-  Eigen::Matrix3d share() const { return predicted * (predicted + measured).inverse(); }
+  Eigen::Matrix3d share() const;
   /// An offset that is wrong by one second changes the scan's velocity by `J` [m/s^2], in R, and the scans
   /// before have moved the estimated one by `followed` [m/s^2], in W. Returns the difference, and adds the
   /// share of it that this scan moves (Friedland; see CalibrationCheck).
-  Eigen::Vector3d follow(const Eigen::Vector3d& J, Eigen::Vector3d& followed) const {
-    Eigen::Vector3d unfollowed = J - R_WR().transpose() * followed;
-    followed += R_WR() * share() * unfollowed;
-    return unfollowed;
-  }
+  Eigen::Vector3d follow(const Eigen::Vector3d& J, Eigen::Vector3d& followed) const;
 };
 
 /// Tells how much of the derivative with respect to t_O is motion, and how much is noise of the IMU.

@@ -41,8 +41,8 @@ class OffsetStepDetector {
   /// uncertainty of the offset. `R_WR` turns R into W at the scan, and `t_O` [s] is the offset before the
   /// step.
   std::optional<OffsetStep> stepped(const Innovation& innovation, const Eigen::Matrix3d& R_WR, double t_O);
-  /// The window has taken the scan, and its velocity follows it. `J_mean` as in the innovation.
-  void follow(const Eigen::Vector3d& J_mean, const OffsetScan& scan);
+  /// The window has taken the scan, and its velocity follows it. `stamp` and `J_mean` as in the innovation.
+  void follow(Time stamp, const Eigen::Vector3d& J_mean, const OffsetScan& scan);
 
  private:
   struct Sums {
@@ -59,7 +59,7 @@ class OffsetStepDetector {
     Sums all, late;        ///< over all of them, and without those of the first second
     double squares = 0.0;  ///< sum of d' S^-1 d
     double count = 0.0;    ///< of the components of d
-    /// By this would the scans have moved the velocity, in W, for a step of one second [m/s^2].
+    /// How far the scans have moved the velocity, in W, for each second of the step [m/s^2].
     Eigen::Vector3d followed = Eigen::Vector3d::Zero();
   };
   bool isStep(const Candidate& candidate, double t_O) const;

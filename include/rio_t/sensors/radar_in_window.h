@@ -49,9 +49,9 @@ class RadarInWindow {
   /// Adds the term of a scan that has none; false if the scan is older than the window.
   bool add(FixedLagSmoother& smoother, const RadarVelocityMeasurement& z);
   bool add(FixedLagSmoother& smoother, const DopplerMeasurement& z);
-  /// See OffsetBlocks::step. `newest` is the stamp of the scan that has shown the step.
-  void stepOffset(FixedLagSmoother& smoother, const OffsetStep& step, Time newest) {
-    offset_->step(smoother, step, nodeTime(newest));
+  /// See OffsetBlocks::step.
+  void stepOffset(FixedLagSmoother& smoother, const OffsetStep& step, Time covered) {
+    offset_->step(smoother, step, covered);
   }
   std::size_t offsetSteps() const { return offset_->steps(); }
 
