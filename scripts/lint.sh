@@ -5,6 +5,9 @@
 # RIO_T_BUILD_DIR: the folder for the compile commands, else build/lint/.
 set -euo pipefail
 case "${1:-}" in -h | --help) sed -n '2,5s/^# \?//p' "$0"; exit 0 ;; esac
+# As the lists of sources below: from the repository.
+files=()
+for file in "$@"; do files+=("$(realpath --relative-to="$(dirname "$0")/.." "$file")"); done
 cd "$(dirname "$0")/.."
 export PATH=/usr/bin:$PATH
 build=${RIO_T_BUILD_DIR:-build/lint}
@@ -17,9 +20,7 @@ cmake -S . -B "$build" -DCMAKE_EXPORT_COMPILE_COMMANDS=ON -DRIO_T_FUZZ=ON \
 rm -f "$build.log"
 cmake --build "$build" --target rio_t_generate_messages_cpp >/dev/null
 
-if [ $# -gt 0 ]; then
-  files=("$@")
-else
+if [ $# -eq 0 ]; then
   mapfile -t files < <(find include src test fuzz bench -name '*.h' -o -name '*.cpp' | sort)
 fi
 # Sources that this build knows: headers are seen with those that include them.

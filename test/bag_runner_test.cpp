@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "../src/ros/bag/run_log.h"
 #include "rest_bag.h"
 #include "rio_t/core/format.h"
 #include "rio_t/ros/parameters/parameters.h"
@@ -270,11 +271,26 @@ TEST_F(BagRunner, ATrajectoryThatStartsAgainIsDoubtful) {
   writeBag(what);
   EXPECT_NE(run().out.find("verdict"), std::string::npos);
   EXPECT_EQ(contents(out_ + "/summary.yaml").find("name: imu_clock_restart"), std::string::npos);
+  const Outcome batch = run({"--set", "mode=batch"});
+  EXPECT_EQ(batch.status, 0) << batch.err;
   what.jump_at = 8.0;
   // A gap that the odometry bridges is none.
   what.jump = 5.0;
   writeBag(what);
   EXPECT_EQ(run({"--set", "max_bridged_imu_gap=6"}).err, "");
+}
+
+TEST_F(BagRunner, ARunThatWaitsToStartAgainAtItsEndIsSaved) {
+  BagContents what;
+  what.duration = 9.0;
+  what.jump = 5.0;  // at 8 s: too late for another start
+  writeBag(what);
+  const Outcome outcome = run();
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  const std::string yaml = contents(out_ + "/summary.yaml");
+  for (const char* part : {"verdict: doubtful\n", "initialized_from: rest\n", "name: imu_clock_restart"})
+    EXPECT_NE(yaml.find(part), std::string::npos) << part << yaml;
+  EXPECT_NE(contents(out_ + "/trajectory_optimized.txt").find("\n1007.8"), std::string::npos);
 }
 
 TEST_F(BagRunner, TopicsOfABagWithoutLeadingSlashesAreFound) {
@@ -374,6 +390,31 @@ TEST_F(BagRunner, EstimatedExtrinsicsAreWritten) {
   ASSERT_EQ(run().status, 0);
   EXPECT_FALSE(fs::exists(out_ + "/extrinsics.csv"));
   EXPECT_EQ(contents(out_ + "/summary.yaml").find("extrinsics"), std::string::npos);
+}
+
+TEST(RunLog, APathIsAsLongAsWhatWasDriven) {
+  const Config config;
+  RunLog log(config, nullptr, {0.0}, false);
+  const auto leave = [&](double seconds, double x) {
+    ScanResult result;
+    result.left_window.push_back(
+        {Time::fromSeconds(seconds), Eigen::Vector3d(x, 0.0, 0.0), Eigen::Quaterniond::Identity()});
+    log.addResult(result);
+  };
+  const auto length = [&] {
+    RunSummary summary;
+    summary.radars.emplace_back();
+    log.fill(&summary);
+    return summary.path_length_m;
+  };
+  leave(100.0, 0.0);
+  leave(105.0, 4.0);
+  EXPECT_NEAR(length(), 4.0, 1e-12) << "without scans a node comes every 5 s";
+  log.startAgain();
+  leave(105.1, 4.5);  // was still in the window
+  leave(106.0, 0.0);
+  leave(106.1, 0.25);
+  EXPECT_NEAR(length(), 4.75, 1e-12) << "a step across a restart is no way";
 }
 
 TEST(RunOutput, NumbersAreFixed) {

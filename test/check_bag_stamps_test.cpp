@@ -122,7 +122,35 @@ TEST_F(CheckBag, AnOffsetNearItsBoundIsOddAndNamesTheKey) {
                 "radar_stamp_shift"});
   const std::string near = with("near", 0.22);
   expectLine(check(near, false), FindingLevel::kOdd, {"offset", "near or beyond max_time_offset"});
-  expectLine(check(near, false, {"max_time_offset=0.6"}), FindingLevel::kOk, {"offset", "roughly"});
+  const BagCheck wide = check(near, false, {"max_time_offset=0.6"});
+  expectLine(wide, FindingLevel::kOk, {"offset", "roughly"});
+  EXPECT_NEAR(configOf(wide).odometry.radar.time_offset_initial, 0.22, 0.015);
+  const BagCheck narrow = check(near, false, {"max_time_offset=0.1"});
+  EXPECT_NEAR(configOf(narrow).odometry.radar.time_offset_initial, 0.08, 1e-9) << "the largest that is safe";
+}
+
+TEST_F(CheckBag, RadarsOfOneClockGetOneOffset) {
+  const simulation::SimulationOptions plain = setup_;
+  const std::string path = folder_ + "/one_clock.bag", other = folder_ + "/one_clock_right.bag";
+  setup_.time_offset.constant = 0.12;
+  write("medium", 50.0, BagFormat::kIrs, path);
+  setup_.time_offset.constant = 0.09;
+  setup_.T_IR.q_IR = Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitZ()) * setup_.T_IR.q_IR;
+  write("medium", 50.0, BagFormat::kIrs, other);
+  setup_ = plain;
+  {
+    rosbag::Bag both(path, rosbag::bagmode::Append);
+    const rosbag::Bag right(other);
+    rosbag::View view(right, rosbag::TypeQuery("sensor_msgs/PointCloud2"));
+    for (const rosbag::MessageInstance& instance : view) both.write("/right", instance.getTime(), instance);
+  }
+  const Config apart = configOf(check(path, false));
+  ASSERT_EQ(apart.radars.size(), 2u);
+  EXPECT_NE(apart.odometry.radars[0].time_offset_initial, apart.odometry.radars[1].time_offset_initial);
+  const Config shared = configOf(check(path, false, {"time_offset_shared=true"}));
+  ASSERT_EQ(shared.radars.size(), 2u);
+  EXPECT_EQ(shared.odometry.radars[0].time_offset_initial, shared.odometry.radars[1].time_offset_initial);
+  EXPECT_NEAR(shared.odometry.radars[0].time_offset_initial, 0.105, 0.03);
 }
 
 TEST_F(CheckBag, AClockThatJumpsBackHalfwayIsNamed) {
@@ -221,12 +249,39 @@ TEST_F(CheckBag, StampsInBurstsAreNamedAndNoGaps) {
 TEST_F(CheckBag, ABagRecordedTwiceIsReady) {
   Changes changes;
   changes.copies = 2;
-  const BagCheck odd = check(rewritten("twice", changes));
+  changes.keep_triggers = true;
+  const std::string bag = rewritten("twice", changes);
+  const BagCheck odd = check(bag);
   ASSERT_TRUE(odd.ready()) << describeCheck(odd);
   EXPECT_EQ(odd.to_do, "") << describeCheck(odd);
   expectLine(odd, FindingLevel::kOk, {"trial run", "no divergence"});
   expectLine(odd, FindingLevel::kOdd, {"/sensor_platform/imu", "duplicate stamps"});
   expectLine(odd, FindingLevel::kOk, {"/sensor_platform/radar/scan", "duplicate stamps"});
+  // A copy has another arrival, and no trigger of its own.
+  const std::string trigger = "trigger_topic=/sensor_platform/radar/trigger";
+  expectLine(check(bag, true, {"stamp_source=arrival"}), FindingLevel::kOk, {"trial run", "100 %"});
+  expectLine(check(bag, true, {"stamp_source=trigger", trigger}), FindingLevel::kOk, {"trial run", "100 %"});
+}
+
+/// A driver publishes what it filters, too. At rest nothing shows that it is not another radar.
+TEST_F(CheckBag, TwoTopicsOfOneRadarAreOne) {
+  const auto with_filtered = [](const std::string& name, double seconds) {
+    std::string path = folder_ + "/" + name + ".bag";
+    const rosbag::Bag in(bag_);
+    rosbag::Bag out(path, rosbag::bagmode::Write);
+    rosbag::View view(in);
+    const ros::Time end = view.getBeginTime() + ros::Duration(seconds);
+    for (const rosbag::MessageInstance& instance : view) {
+      if (instance.getTime() > end) break;
+      out.write(instance.getTopic(), instance.getTime(), instance);
+      if (instance.isType<sensor_msgs::PointCloud2>()) out.write("/filtered", instance.getTime(), instance);
+    }
+    return path;
+  };
+  expectLine(check(with_filtered("filtered", 50.0), false), FindingLevel::kOdd,
+             {"has the stamps and the mounting of", "one radar"});
+  expectLine(check(with_filtered("filtered_at_rest", 4.5), false), FindingLevel::kOdd,
+             {"has the stamps of", "If these are two radars, record with motion"});
 }
 
 // A driver that gives two scans one stamp: half of them are lost, and that is no matter of the recorder.

@@ -1,12 +1,19 @@
 #include "../src/ros/command_line.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <sstream>
+#include <string>
 
 #include "../src/ros/temporary_folder.h"
 #include "full_disk.h"
@@ -141,6 +148,41 @@ TEST(OptionSet, TheFirstSourceCounts) {
   EXPECT_EQ(x, 1.0);
   EXPECT_EQ(y, 3.0);
   EXPECT_EQ(steps, (std::vector<std::string>{"a", "b"}));
+}
+
+/// What `body` prints on stderr if that is a terminal.
+std::string onTerminal(const std::function<void()>& body) {
+  const int terminal = posix_openpt(O_RDWR | O_NOCTTY);
+  if (terminal < 0 || grantpt(terminal) != 0 || unlockpt(terminal) != 0) return "no terminal";
+  const int end = open(ptsname(terminal), O_RDWR | O_NOCTTY), saved = dup(STDERR_FILENO);
+  dup2(end, STDERR_FILENO);
+  body();
+  dup2(saved, STDERR_FILENO);
+  std::string text;
+  std::array<char, 1000> part = {};
+  pollfd readable{terminal, POLLIN, 0};
+  while (poll(&readable, 1, 200) > 0) {
+    const ssize_t count = read(terminal, part.data(), part.size());
+    if (count <= 0) break;
+    text.append(part.data(), static_cast<std::size_t>(count));
+  }
+  for (const int file : {saved, end, terminal}) close(file);
+  return text;
+}
+
+TEST(ProgressBar, AnErrorGetsALineOfItsOwn) {
+  const std::string failed = onTerminal([] { progressBar("a.bag ")(0.4); });
+  EXPECT_NE(failed.find("a.bag ["), std::string::npos) << failed;
+  EXPECT_EQ(std::count(failed.begin(), failed.end(), '\n'), 1) << failed;
+  EXPECT_EQ(failed.back(), '\n');
+  const std::string finished = onTerminal([] {
+    const std::function<void(double)> bar = progressBar();
+    const std::function<void(double)> copy = bar;  // as the run takes one
+    bar(0.5);
+    copy(1.0);
+  });
+  EXPECT_EQ(std::count(finished.begin(), finished.end(), '\n'), 1) << finished;
+  EXPECT_EQ(finished.back(), '\n');
 }
 
 TEST(SameFile, IsOneWhereverItIsNamedFrom) {

@@ -74,6 +74,12 @@ def test_somebody_elses_launch_file_may_not_misspell_an_argument(tmp_path):
     assert parameters(mine, "mine:=1") == {"/rio_t/config": "irs", "/rio_t/imu_topic": "/i"}
 
 
+def test_two_robots_share_neither_frame_nor_file():
+    given = parameters(LAUNCH / "examples" / "two_robots.launch")
+    for key in ("odom_frame", "base_link_frame", "radar_frame", "trajectory_file"):
+        assert given[f"/robot1/rio_t/{key}"] != given[f"/robot2/rio_t/{key}"], key
+
+
 def test_config_is_a_name_or_a_path_from_where_the_user_stands(tmp_path):
     (tmp_path / "sub").mkdir()
     own = tmp_path / "sub" / "own.yaml"

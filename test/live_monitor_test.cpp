@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <limits>
+#include <map>
 #include <string>
+#include <utility>
 
 #include "rio_t/core/so3.h"
 #include "rio_t/factors/state_block.h"
@@ -66,7 +69,7 @@ class TwoRadarDiagnostics : public testing::Test {
               double turn_sigma = 0.02, double lever_sigma = 0.01) {
     LiveSession::Result result;
     result.result.scan.radar = radar;
-    result.result.scan.stamp = Time::fromSeconds(stamp);
+    result.result.scan.stamp = result.result.state.time = Time::fromSeconds(stamp);
     result.result.used = result.result.updated = true;
     result.result.time_offset = offset;
     result.result.T_IR = T_IR;
@@ -75,6 +78,16 @@ class TwoRadarDiagnostics : public testing::Test {
     result.result.T_IR_covariance.diagonal().tail<3>().setConstant(turn_sigma * turn_sigma);
     result.offset_observable = true;
     monitor.result(result);
+  }
+  void setPublishers(std::map<std::string, std::uint32_t> publishers) {
+    LiveMonitor::RosView view;
+    view.publishers = std::move(publishers);
+    monitor.setRosView(std::move(view));
+  }
+  Status input() {
+    Status status;
+    monitor.describeInput(status, &session);
+    return status;
   }
   Status odometry(const LiveSession& of) {
     Status status;
@@ -121,10 +134,38 @@ TEST_F(TwoRadarDiagnostics, NameTheRadarThatIsSilent) {
   EXPECT_EQ(never.level, DiagnosticStatus::WARN) << "the other one works";
   EXPECT_EQ(never.message, "radar right: no scan yet on /right");
   second(20, 20, 20);
+  EXPECT_EQ(second(20, 0, 0).level, DiagnosticStatus::OK) << "a radar at 1 Hz may miss a second";
   const Status silent = second(20, 0, 0);
   EXPECT_EQ(silent.level, DiagnosticStatus::WARN);
   EXPECT_EQ(silent.message, "radar right is silent, topic /right");
   EXPECT_EQ(second(20, 20, 20).level, DiagnosticStatus::OK);
+}
+
+TEST(LiveMonitor, NamesTheTopicOfTheOnlyRadarThatIsSilent) {
+  LiveMonitor monitor{Config()};
+  monitor.scan();
+  LiveMonitor::Status status;
+  for (int second = 0; second < 3; ++second) {
+    monitor.imu();
+    monitor.imuUsable(Time());
+    monitor.describeInput(status, nullptr);
+    EXPECT_EQ(status.level, second < 2 ? DiagnosticStatus::OK : DiagnosticStatus::WARN) << status.message;
+  }
+  EXPECT_EQ(status.message, "the radar is silent, topic " + Config().radar_topic);
+}
+
+/// The solver does not get at a scan that the IMU does not cover.
+TEST_F(TwoRadarDiagnostics, DoNotBlameTheSolverAloneForScansThatWaitedTooLong) {
+  second(20, 20, 20);
+  monitor.dropped(0, "queue_full");
+  const Status status = second(20, 20, 20);
+  EXPECT_EQ(status.level, DiagnosticStatus::WARN);
+  EXPECT_EQ(
+      status.message,
+      "scans waited too long for the IMU or the solver, and the oldest were dropped (max_queued_scans)");
+  EXPECT_EQ(second(20, 20, 20).level, DiagnosticStatus::OK);
+  monitor.dropped(0, "queue_full");
+  EXPECT_EQ(input().message, "the IMU is silent, topic " + config.imu_topic);
 }
 
 TEST_F(TwoRadarDiagnostics, IsAnErrorIfTheImuFallsSilentOrCannotBeUsed) {
@@ -149,17 +190,14 @@ TEST_F(TwoRadarDiagnostics, IsAnErrorIfTheImuFallsSilentOrCannotBeUsed) {
 }
 
 TEST_F(TwoRadarDiagnostics, AClockThatStandsIsNoFaultOfTheSensors) {
-  const auto input = [this] {
-    Status status;
-    monitor.describeInput(status, &session);
-    return status;
-  };
   second(20, 20, 20);
-  monitor.setClockStands(true);
+  LiveMonitor::RosView view;
+  view.clock_stands = true;
+  monitor.setRosView(view);
   EXPECT_EQ(input().level, DiagnosticStatus::WARN);
   EXPECT_NE(input().message.find("ROS time stands still"), std::string::npos);
   EXPECT_NE(odometry(session).message.find("ROS time stands still"), std::string::npos);
-  monitor.setClockStands(false);
+  monitor.setRosView({});
   EXPECT_EQ(input().message, "the IMU is silent, topic " + config.imu_topic);
 }
 
@@ -266,6 +304,39 @@ TEST_F(TwoRadarDiagnostics, WarnOfARunThatIsDoubtfulForSeconds) {
   EXPECT_EQ(status.message.find("running, but the run is " + value(status, "verdict")), 0U);
 }
 
+/// Too few windows to name a cause.
+TEST_F(TwoRadarDiagnostics, GiveTheNumberThatIsNotGoodIfThereIsNoCause) {
+  LiveSession::Result result;
+  result.result.used = result.result.updated = true;
+  result.result.solver_termination = SolverTermination::kIterationLimit;
+  for (int k = 0; k < 10; ++k) monitor.result(result);
+  for (int k = 0; k < 1000; ++k) imuSample();
+  Status status;
+  for (int k = 0; k < 6; ++k) status = odometry(session);
+  EXPECT_EQ(value(status, "likely_cause_1"), "no likely_cause_1");
+  EXPECT_EQ(value(status, "red_check_1"), "windows_not_converged_share is 1, expected at most 0.3");
+  EXPECT_EQ(status.level, DiagnosticStatus::WARN);
+  EXPECT_EQ(status.message, "running, but the run is doubtful: " + value(status, "red_check_1"));
+}
+
+TEST(LiveMonitor, IsNoBatchWhateverTheFileSays) {
+  Config config;
+  config.mode = RunMode::kBatch;
+  LiveMonitor monitor(config);
+  const LiveSession session(config, config.odometry);
+  LiveSession::Result result;
+  result.result.used = result.result.updated = true;
+  result.result.solver_termination = SolverTermination::kIterationLimit;
+  for (int k = 0; k < 30; ++k) monitor.result(result);
+  LiveMonitor::Status status;
+  monitor.describeOdometry(status, &session);
+  std::string causes;
+  for (const auto& each : status.values)
+    if (each.key.find("likely_cause") == 0) causes += each.value + "\n";
+  EXPECT_NE(causes.find("30 of 30 windows stop before they converge."), std::string::npos) << causes;
+  EXPECT_EQ(causes.find("batch"), std::string::npos) << causes;
+}
+
 TEST_F(TwoRadarDiagnostics, ForgetANoisyImuOnceItIsConfiguredSo) {
   for (int k = 0; k < 30; ++k) feed(0, true);
   LiveSession noisy(config, config.odometry);
@@ -307,12 +378,12 @@ TEST_F(TwoRadarDiagnostics, IsAnErrorWhereNoRadarHasComeYet) {
 
 TEST_F(TwoRadarDiagnostics, NameTheTypeOfATopicThatIsPublishedAsAnother) {
   EXPECT_TRUE(monitor.lacksInput());
-  monitor.setTopicTypes({{config.imu_topic, "std_msgs/Header"},
-                         {"/left", "sensor_msgs/PointCloud2"},
-                         {"/right", "std_msgs/Header"}});
-  Status nothing;
-  monitor.describeInput(nothing, &session);
-  EXPECT_EQ(nothing.message, "no IMU message yet on " + config.imu_topic +
+  LiveMonitor::RosView view;
+  view.topic_types = {{config.imu_topic, "std_msgs/Header"},
+                      {"/left", "sensor_msgs/PointCloud2"},
+                      {"/right", "std_msgs/Header"}};
+  monitor.setRosView(view);
+  EXPECT_EQ(input().message, "no IMU message yet on " + config.imu_topic +
                                  ", which is published as std_msgs/Header, expected sensor_msgs/Imu");
   EXPECT_EQ(second(0, 0, 0).message,
             "radar left: no scan yet on /left; radar right: no scan yet on /right, which is published as "
@@ -321,12 +392,48 @@ TEST_F(TwoRadarDiagnostics, NameTheTypeOfATopicThatIsPublishedAsAnother) {
   EXPECT_FALSE(monitor.lacksInput());
 }
 
+TEST(LiveMonitor, NamesTheTypeOfABarometerThatIsNone) {
+  Config config;
+  config.barometer_topic = "/baro";
+  LiveMonitor monitor(config);
+  monitor.imu();
+  monitor.scan();
+  EXPECT_TRUE(monitor.lacksInput()) << "the type of the topic is wanted";
+  LiveMonitor::RosView view;
+  view.topic_types["/baro"] = "sensor_msgs/Temperature";
+  monitor.setRosView(view);
+  LiveMonitor::Status status;
+  monitor.describeBarometer(status);
+  EXPECT_EQ(status.message,
+            "no pressure yet on /baro, which is published as sensor_msgs/Temperature, expected "
+            "sensor_msgs/FluidPressure");
+  monitor.pressure();
+  EXPECT_FALSE(monitor.lacksInput());
+}
+
+TEST(LiveMonitor, GivesABarometerTwoSecondsForAPressure) {
+  Config config;
+  config.barometer_topic = "/baro";
+  LiveMonitor monitor(config);
+  const auto barometer = [&] {
+    LiveMonitor::Status status;
+    monitor.describeBarometer(status);
+    return status.message;
+  };
+  monitor.pressure();
+  EXPECT_EQ(barometer(), "pressures are coming");
+  EXPECT_EQ(barometer(), "pressures are coming");
+  EXPECT_EQ(barometer(), "the barometer is silent, topic /baro");
+  monitor.pressure();
+  EXPECT_EQ(barometer(), "pressures are coming");
+}
+
 TEST_F(TwoRadarDiagnostics, WarnOfATopicWithTwoPublishers) {
-  monitor.setPublishers({{config.imu_topic, 2}, {"/left", 1}, {"/right", 1}});
+  setPublishers({{config.imu_topic, 2}, {"/left", 1}, {"/right", 1}});
   const Status status = second(20, 20, 20);
   EXPECT_EQ(status.level, DiagnosticStatus::WARN);
   EXPECT_EQ(status.message.find("topic " + config.imu_topic + " has 2 publishers"), 0U) << status.message;
-  monitor.setPublishers({{config.imu_topic, 1}, {"/left", 1}, {"/right", 1}});
+  setPublishers({{config.imu_topic, 1}, {"/left", 1}, {"/right", 1}});
   EXPECT_EQ(second(20, 20, 20).level, DiagnosticStatus::OK);
 }
 
@@ -404,6 +511,40 @@ TEST_F(TwoRadarDiagnostics, HaveATimeOffsetForEachRadar) {
   EXPECT_EQ(fresh.message, "not estimated yet");
 }
 
+TEST(LiveMonitor, TheOffsetOfTheOnlyRadarIsKeptOnceItFallsSilent) {
+  LiveMonitor monitor{Config()};
+  LiveSession::Result result;
+  result.result.used = result.result.updated = true;
+  result.result.state.time = Time::fromSeconds(9.0);
+  result.offset_observable = true;
+  monitor.result(result);
+  const auto offsetAt = [&](double now) {
+    NavigationState newest;
+    newest.time = Time::fromSeconds(now);
+    monitor.odometry(newest, 0.0);
+    LiveMonitor::Status status;
+    monitor.describeTimeOffset(status);
+    return status.message;
+  };
+  EXPECT_EQ(offsetAt(10.7), "observed by the motion now")
+      << "a radar at 1 Hz, whose scan waits for a trigger";
+  EXPECT_EQ(offsetAt(11.1), "kept: no scan of the radar is used now");
+}
+
+TEST(LiveMonitor, SaysThatTheOffsetIsHeld) {
+  Config config;
+  config.odometry.smoother.estimate_time_offset = false;
+  LiveMonitor monitor(config);
+  LiveSession::Result result;
+  result.result.used = result.result.updated = true;
+  result.result.time_offset = config.odometry.smoother.max_time_offset;
+  monitor.result(result);
+  LiveMonitor::Status status;
+  monitor.describeTimeOffset(status);
+  EXPECT_EQ(status.level, DiagnosticStatus::OK);
+  EXPECT_EQ(status.message, "held: estimate_time_offset is false");
+}
+
 TEST_F(TwoRadarDiagnostics, TellTheMountingAgainstWhatWasTold) {
   EXPECT_EQ(extrinsics(1).message, "not estimated yet");
   const Extrinsics turned{kMountings[1].l_I + Eigen::Vector3d(0.0, 0.02, 0.0),
@@ -436,8 +577,8 @@ TEST_F(TwoRadarDiagnostics, WarnOfAMountingFarFromWhatWasTold) {
   update(0, 9.0, 0.0, {kMountings[0].l_I, so3::exp({0.31, 0.0, 0.0}) * kMountings[0].q_IR});
   EXPECT_EQ(extrinsics(0).level, DiagnosticStatus::WARN);
   EXPECT_EQ(extrinsics(0).message,
-            "the estimated rotation of radar left about x differs from the configured one by more than 3 "
-            "extrinsics_rotation_sigma, 17 degrees");
+            "the estimated rotation of radar left about x differs from the configured one by more than three "
+            "sigmas, 17 degrees");
 }
 
 /// What `diagnostics` says of the solver.

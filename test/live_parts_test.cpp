@@ -1,14 +1,23 @@
-// Small parts of the live node: observability of the offset, rates of publication, and a bounded path.
+// Small parts of the live node: observability of the offset, rates of publication, a bounded path, its log.
 #include <gtest/gtest.h>
+#include <ros/console.h>
 
+#include <algorithm>
 #include <cstddef>
+#include <limits>
+#include <memory>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
+#include "../src/ros/live/radar_texts.h"
 #include "rio_t/evaluation/trajectory.h"
 #include "rio_t/odometry/scan_result.h"
 #include "rio_t/ros/live/bounded_trajectory.h"
+#include "rio_t/ros/live/live_log.h"
 #include "rio_t/ros/live/offset_observability.h"
 #include "rio_t/ros/live/publish_rate.h"
+#include "rio_t/ros/live/session.h"
 #include "simulated_run.h"
 
 namespace rio_t {
@@ -116,6 +125,61 @@ TEST(BoundedTrajectory, ThinsOutEvenlyAndReachesFromTheFirstPoseToTheLast) {
 
 TEST(BoundedTrajectory, RefusesACapacityThatCannotHoldBothEnds) {
   EXPECT_THROW(BoundedTrajectory(1), std::invalid_argument);
+}
+
+/// The lines that are logged while it lives.
+class LoggedLines : public ros::console::LogAppender {
+ public:
+  LoggedLines() {
+    ros::console::initialize();  // else the first line would reset the appenders
+    ros::console::register_appender(this);
+  }
+  ~LoggedLines() override { ros::console::deregister_appender(this); }
+  LoggedLines(const LoggedLines&) = delete;
+  LoggedLines& operator=(const LoggedLines&) = delete;
+
+  void log(ros::console::Level /*level*/, const char* text, const char* /*file*/, const char* /*function*/,
+           int /*line*/) override {
+    lines_.emplace_back(text);
+  }
+  const std::vector<std::string>& lines() const { return lines_; }
+
+ private:
+  std::vector<std::string> lines_;
+};
+
+TEST(LiveLog, ADivergenceIsNoFaultOfTheInput) {
+  const Config config;
+  OdometryOptions never_sure = config.odometry;
+  never_sure.health.max_velocity_sigma = 1e-6;
+  const auto session = std::make_shared<LiveSession>(config, never_sure);
+  const auto addImu = [&](double seconds, double rate) {
+    session->addImu({Time::fromSeconds(seconds), {rate, 0.0, 0.0}, {0.0, 0.0, 9.81}});
+  };
+  for (int k = 0; k < 1600; ++k) addImu(0.0025 * k, 0.0);
+  addImu(4.0, std::numeric_limits<double>::quiet_NaN());
+  bool more = false;
+  session->process(&more);
+  ASSERT_EQ(session->odometry().faults().count("diverged"), 1U);
+  LoggedLines logged;
+  LiveLog log("node");
+  log.faults(session);
+  EXPECT_EQ(logged.lines(), std::vector<std::string>{"node: input fault imu_not_finite, 1 so far"});
+}
+
+TEST(LiveTexts, AScanWithoutAStampNamesTheKeyToLookAt) {
+  Config radar;
+  radar.trigger_topic = "/trigger";
+  radar.imu_topic = "/imu";
+  radar.radar_stamp_shift = -0.5;
+  radar.stamp_source = StampSource::kTrigger;
+  EXPECT_EQ(whyNoStamp(radar, "trigger_missing"),
+            "trigger_missing (stamp_source: trigger, trigger_topic: /trigger)");
+  radar.stamp_source = StampSource::kArrival;
+  EXPECT_EQ(whyNoStamp(radar, "imu_missing"), "imu_missing (stamp_source: arrival, imu_topic: /imu)");
+  radar.stamp_source = StampSource::kHeader;
+  EXPECT_EQ(whyNoStamp(radar, "stamp_out_of_range"),
+            "stamp_out_of_range (stamp_source: header, radar_stamp_shift: -0.5)");
 }
 
 }  // namespace

@@ -68,12 +68,13 @@ class PlainBag : public testing::Test {
     rosbag::Bag out(path, rosbag::bagmode::Write);
     rosbag::View view(in);
     for (const rosbag::MessageInstance& instance : view) {
+      const auto recordOf = [&](int copy) { return instance.getTime() + ros::Duration(1e-4 * copy); };
       if (const auto imu = instance.instantiate<sensor_msgs::Imu>()) {
         if (changes.imu && !changes.imu(*imu)) continue;
-        for (int k = 0; k < changes.copies; ++k) out.write(instance.getTopic(), instance.getTime(), *imu);
+        for (int k = 0; k < changes.copies; ++k) out.write(instance.getTopic(), recordOf(k), *imu);
       } else if (const auto cloud = instance.instantiate<sensor_msgs::PointCloud2>()) {
         if (changes.cloud && !changes.cloud(*cloud)) continue;
-        for (int k = 0; k < changes.copies; ++k) out.write(instance.getTopic(), instance.getTime(), *cloud);
+        for (int k = 0; k < changes.copies; ++k) out.write(instance.getTopic(), recordOf(k), *cloud);
       } else if (changes.keep_triggers) {
         out.write(instance.getTopic(), instance.getTime(), instance);
       }

@@ -12,6 +12,8 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from rio_t import programs
+from rio_t.plots import pyplot
+from rio_t.report.figures import draw_ego_velocity
 from rio_t.report.main import CHECKS, main
 from rio_t.rig import radars_of, read_config
 
@@ -103,6 +105,7 @@ def test_animation_covers_the_run(report, run_folder, tmp_path):
 def test_animation_of_another_kind_is_refused(report, run_folder, tmp_path):
     done = report("--output", tmp_path / "out", "--animation", tmp_path / "run.mp4", run_folder)
     assert done.returncode == 1 and "run.mp4: expected a name that ends in .gif" in done.stderr
+    assert (tmp_path / "out" / "report.html").is_file(), "the page does not need it"
 
 
 def test_each_of_two_radars_has_its_sections(report, two_radar_run, simulated_run, tmp_path):
@@ -166,6 +169,34 @@ def test_the_mounting_of_each_radar_comes_from_its_section(programs_folder, tmp_
     assert all(rotation.magnitude() == 0 for _, _, rotation in radars)
 
 
+def test_a_program_may_be_given_from_its_folder(run_folder, simulated_run, programs_folder, monkeypatch, tmp_path, capsys):
+    monkeypatch.chdir(programs_folder)
+    for name in ("evaluate", "./evaluate"):
+        status = main(["--evaluate", name, "--ground-truth", str(simulated_run / "truth.txt"), "--config", "irs",
+                       "--output-dir", str(tmp_path / "out"), str(run_folder)])
+        assert status == 0, capsys.readouterr().err
+
+
+def test_programs_may_be_in_the_current_folder(monkeypatch, tmp_path):
+    (tmp_path / "told").write_text("#!/bin/sh\necho told\n")
+    (tmp_path / "told").chmod(0o755)
+    monkeypatch.chdir(tmp_path)
+    for given in (".", "./", tmp_path):
+        assert programs.output_of(programs.find(["told"], "--programs DIR", given) / "told") == "told\n"
+
+
+def test_scans_that_give_only_points_are_used():
+    scans = 40
+    table = {name: numpy.zeros(scans) for name in ("vx", "vy", "vz")}
+    table.update({name: numpy.full(scans, 0.1) for name in ("sigma_x", "sigma_y", "sigma_z")})
+    table.update(time=0.1 * numpy.arange(scans), points=numpy.full(scans, 9.0), inliers=numpy.full(scans, 7.0),
+                 status=numpy.array(["moving", "points_only", "innovation", "zero_velocity"] * (scans // 4)))
+    figure = draw_ego_velocity(table, None)
+    labels = [text for axes in figure.axes for text in axes.get_legend_handles_labels()[1]]
+    pyplot.close(figure)
+    assert "innovation (10)" in labels and not any("points_only" in label for label in labels)
+
+
 def test_without_truth_nothing_is_evaluated(report, run_folder):
     page = page_of(report(run_folder))
     assert list(figures_of(page)) == [name for name in FIGURES if name != "errors"]
@@ -175,7 +206,8 @@ def test_without_truth_nothing_is_evaluated(report, run_folder):
 
 def test_the_mounting_comes_from_the_configuration(report, run_folder, scripts, tmp_path):
     (tmp_path / "words.yaml").write_text("mounting_yaw_pitch_roll_deg: [10, 0, 0]\n")
-    for config in ("irs", scripts.parent / "config/irs.yaml", tmp_path / "words.yaml"):
+    (tmp_path / "named.yaml").write_text("radars: [left]\nleft: {mounting_yaw_pitch_roll_deg: [10, 0, 0]}\n")
+    for config in ("irs", scripts.parent / "config/irs.yaml", tmp_path / "words.yaml", tmp_path / "named.yaml"):
         assert "mounting from the configuration" in page_of(report("--config", config, run_folder))
 
 

@@ -225,6 +225,17 @@ class SetupTest(tester.LiveTestCase):
                 listener.wait_for_diagnosis("odometry", "diverged", ERROR)
         self.assertIn("/rio_t: diverged: do not trust the estimate", log.read_text())
 
+    def test_the_log_asks_to_stand_still_only_if_the_start_wants_it(self):
+        for mode, wants_rest in (("static", True), ("auto", True), ("motion", False)):
+            log = pathlib.Path(self.path(mode + ".txt"))
+            with open(log, "w") as told, tester.Listener() as listener, tester.Process(
+                    tester.program("rio_t", "rio_t_node"), "__name:=rio_t", "_config:=irs", "_init_mode:=" + mode,
+                    stdout=told, stderr=told):
+                listener.wait_until_heard()
+                tester.call("/rio_t/reset", Empty)
+            self.assertIn("; starts again", log.read_text())
+            self.assertEqual("; starts again, stand still" in log.read_text(), wants_rest, mode)
+
     def test_save_trajectory_answers_with_the_whole_path(self):
         words = ("__name:=rio_t", "_config:=irs", "_trajectory_file:=poses.txt")
         with tester.Listener() as listener, tester.Process(tester.program("rio_t", "rio_t_node"), *words, cwd=self.folder):
@@ -286,6 +297,16 @@ class SetupTest(tester.LiveTestCase):
         self.assertEqual(status, 1, told)
         self.assertIn("use_sim_time is true, but /clock is silent", told)
         self.assertFalse(os.path.exists(kept))
+
+    def test_check_bag_sees_two_publishers_of_a_live_topic(self):
+        rospy.set_param("/use_sim_time", False)
+        words = (shutil.which("rostopic"), "pub", "-r", "20", "/two/imu", "sensor_msgs/Imu", "{}")
+        heard = rospy.Subscriber("/two/imu", Imu, queue_size=1)
+        with tester.Process(*words), tester.Process(*words):
+            tester.wait_for("two publishers", lambda: heard.get_num_connections() == 2)
+            told = tester.run(tester.program("rio_t", "check_bag"), "--live", "--duration", 3).stdout
+        heard.unregister()
+        self.assertIn("Topic /two/imu has messages of 2 publishers by turns", " ".join(told.split()))
 
     @unittest.skipIf(any(name in pathlib.Path("/etc/os-release").read_text() for name in ("bullseye", "jammy")),
                      "the aggregator of Debian 11 and Ubuntu 22.04 does not find its own plugins")

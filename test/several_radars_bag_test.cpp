@@ -73,6 +73,18 @@ TEST_F(TwoRadars, OneNameIsOneRadarAndCarriesNone) {
     EXPECT_EQ(untimed(contents(out_ + "/" + name)), untimed(contents(plain + "/" + name))) << name;
 }
 
+TEST_F(TwoRadars, TheDiagnosisNamesTheSectionOfTheOnlyRadar) {
+  writeBag({});
+  for (const char* mode : {"online", "batch"}) {
+    const Outcome outcome = run({"--set", "radars=[only]", "--set", "only/radar_max_azimuth=0.3", "--set",
+                                 std::string("mode=") + mode});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_NE(outcome.out.find("only/radar_max_azimuth 0.3 rad"), std::string::npos) << mode << outcome.out;
+    EXPECT_TRUE(has("time_offset.csv"));
+    expectInSummary({"\nfinal_offset_s: "});
+  }
+}
+
 TEST_F(TwoRadars, MissingTopicsAndWrongTypesNameTheirRadar) {
   BagContents what;
   what.radar_topics = {"/left"};

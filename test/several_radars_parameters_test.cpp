@@ -63,8 +63,22 @@ TEST(SeveralRadars, ASectionOverridesTheTopLevel) {
 TEST(SeveralRadars, EachHasAFrameOfItsOwn) {
   const std::vector<Config> radars =
       configsOfRadars(fromAssignments(withTwoRadars({"radar_frame=front", "right/radar_frame=other"})));
-  EXPECT_EQ(radars[0].radar_frame, "rio_t_radar_left");
+  EXPECT_EQ(radars[0].radar_frame, "front_left");
   EXPECT_EQ(radars[1].radar_frame, "other");
+}
+
+/// As two_robots.launch sets it beside a file.
+TEST(SeveralRadars, TwoRobotsHaveDifferentFrames) {
+  const auto frames = [](const std::vector<std::string>& more) {
+    std::vector<std::string> result;
+    for (const Config& radar : configsOfRadars(fromAssignments(withTwoRadars(more))))
+      result.push_back(radar.radar_frame);
+    return result;
+  };
+  const std::vector<std::string> usual = {"rio_t_radar_left", "rio_t_radar_right"};
+  const std::vector<std::string> of_robot = {"robot1/radar_left", "robot1/radar_right"};
+  EXPECT_EQ(frames({}), usual);
+  EXPECT_EQ(frames({"radar_frame=robot1/radar"}), of_robot);
 }
 
 TEST(SeveralRadars, SectionsAreNestedKeysOfAFile) {
@@ -169,11 +183,12 @@ TEST(SeveralRadars, ContradictionsNameTheRadar) {
 }
 
 TEST(SeveralRadars, PrintedConfigurationReadsBack) {
-  const Config config = fromAssignments(withTwoRadars(
-      {"radars=[left, right, rear]", "rear/radar_topic=/rear", R"(left/radar_field_x="a \"b")",
-       "left/extrinsics_rotation_xyzw=[0.5, -0.5, 0.5, -0.5]", "left/time_offset_initial=0.1234567890123456",
-       "right/radar_doppler_step=0.125", "radar_min_range=0.9", "right/radar_min_range=0.3",
-       "rear/radar_frame=radar", "estimate_extrinsics=pose", "extrinsics_rotation_sigma=0.2"}));
+  const Config config = fromAssignments(
+      withTwoRadars({"radars=[left, right, rear]", "rear/radar_topic=/rear", R"(left/radar_field_x="a \"b")",
+                     "left/extrinsics_rotation_xyzw=[0.5, -0.5, 0.5, -0.5]",
+                     "left/time_offset_initial=0.1234567890123456", "right/radar_doppler_step=0.125",
+                     "radar_min_range=0.9", "right/radar_min_range=0.3", "radar_frame=robot1/radar",
+                     "rear/radar_frame=radar", "estimate_extrinsics=pose", "extrinsics_rotation_sigma=0.2"}));
   const std::string yaml = toYaml(config);
   EXPECT_TRUE(contains(yaml, "\nradars: [left, right, rear]\n")) << yaml;
   EXPECT_TRUE(contains(yaml,
@@ -186,7 +201,7 @@ TEST(SeveralRadars, PrintedConfigurationReadsBack) {
   ASSERT_EQ(back.radars.size(), 3u);
   EXPECT_EQ(back.radars[0].odometry.radar.time_offset_initial, 0.1234567890123456);
   EXPECT_EQ(back.radars[0].radar_overrides.x, "a \"b");
-  EXPECT_EQ(back.radars[0].radar_frame, "rio_t_radar_left");
+  EXPECT_EQ(back.radars[0].radar_frame, "robot1/radar_left");
   EXPECT_EQ(back.radars[2].radar_frame, "radar");
   EXPECT_EQ(back.odometry.smoother.estimate_extrinsics, EstimateExtrinsics::kPose);
   EXPECT_EQ(back.odometry.radars[1].ego_velocity.min_range, 0.3);

@@ -208,7 +208,7 @@ class TwoRadarsTest(tester.LiveTestCase):
         with tester.Listener(TOPICS) as listener, tester.node("config:=two_radars", "right/radar_doppler_sign:=-1"):
             listener.wait_until_heard()
             with self.feed(listener, self.long_bag):
-                listener.wait_for_diagnosis("extrinsics right", "differs from the configured one by more than 3", WARN)
+                listener.wait_for_diagnosis("extrinsics right", "differs from the configured one by more than three sigmas", WARN)
                 listener.wait_for("the cause", lambda: "The estimated mounting of radar right is turned" in (
                     listener.value("odometry", "likely_cause_1") or ""))
 

@@ -43,6 +43,17 @@ def test_rqt_perspective():
     assert all(isinstance(field(topic), float) for topic in topics)
 
 
+def test_the_aggregator_and_the_docs_know_every_status():
+    source = (SOURCE / "src" / "ros" / "live" / "live_odometry.cpp").read_text()
+    names = re.findall(r'diagnostics_->add\(\s*(?:withName\()?"([^"]+)"', source)
+    assert len(names) == source.count("diagnostics_->add(") > 6
+    analyzers = yaml.safe_load((SOURCE / "config" / "diagnostics" / "aggregator.yaml").read_text())["analyzers"]
+    shown = {start for group in analyzers["rio_t"]["analyzers"].values() for start in group["startswith"]}
+    assert shown == {f"rio_t: {name}" for name in names} | {"rio_t: /"}, "the last one is for the topics"
+    page = (SOURCE / "docs" / "ros.md").read_text()
+    assert not [name for name in names if f"\n| {name} | " not in page]
+
+
 def test_a_field_that_does_not_exist_is_found():
     with pytest.raises((AttributeError, KeyError)):
         field("/rio_t/time_offset/offsett")

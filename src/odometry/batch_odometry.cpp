@@ -32,13 +32,17 @@ BatchOdometry::BatchOdometry(const OdometryOptions& options, const BatchOptions&
       g_W_(0.0, 0.0, -options.gravity),
       imu_input_check_(options.max_imu_gap, options.imu_input_check) {}
 
-void BatchOdometry::addImu(ImuMeasurement imu) {
+void BatchOdometry::addImu(ImuMeasurement imu, bool has_started) {
   const ImuInputCheck::Verdict verdict = imu_input_check_.check(imu);
   if (verdict.decision == ImuInputCheck::Decision::kDrop) return;
-  if (verdict.decision == ImuInputCheck::Decision::kRestart)
-    throw std::runtime_error(
-        "batch: the IMU's clock jumped or it was silent for longer than max_bridged_imu_gap; "
-        "no single graph goes over that: use mode online, or bag_start and bag_duration");
+  if (verdict.decision == ImuInputCheck::Decision::kRestart) {
+    if (has_started)
+      throw std::runtime_error(
+          "batch: the IMU's clock jumped or it was silent for longer than max_bridged_imu_gap; "
+          "no single graph goes over that: use mode online, or bag_start and bag_duration");
+    imu_.clear();
+    scans_.clear();
+  }
   for (const ImuMeasurement& unseen : verdict.bridge) imu_.add(unseen);
   if (!imu_.empty()) imu.addLostWay(imu_.newest(), v_W_);
   imu_.add(imu);

@@ -121,10 +121,11 @@ std::vector<ScanResult> RadarInertialOdometry::finish() {
   while (std::optional<RadarScan> scan = m.nextScan(true))
     results.push_back(m.estimator.useScan(std::move(*scan), true));
   m.shareStatus();
-  if (!initialized()) return results;
   // The poses still in the window belong to the last scan.
-  if (results.empty()) results.emplace_back();
-  for (const StampedPose& pose : m.estimator.remainingPoses()) results.back().left_window.push_back(pose);
+  for (const StampedPose& pose : m.estimator.remainingPoses()) {
+    if (results.empty()) results.emplace_back();
+    results.back().left_window.push_back(pose);
+  }
   return results;
 }
 

@@ -16,7 +16,8 @@ def find(names, option, given=None):
     """Folder that holds the programs: the given one, else beside the script, in a sourced workspace or in the build
     folder. `option` is what the user can give."""
     source = pathlib.Path(__file__).resolve().parents[2]
-    candidates = [given] if given else [
+    # Absolute, because pathlib drops "./", and a name without a folder is looked up in PATH.
+    candidates = [pathlib.Path(given).resolve()] if given else [
         pathlib.Path(sys.argv[0]).resolve().parent,
         *(pathlib.Path(p) / "lib" / "rio_t" for p in os.environ.get("CMAKE_PREFIX_PATH", "").split(":") if p),
         source / os.environ.get("RIO_T_BUILD_DIR", "build") / "devel" / "lib" / "rio_t"]

@@ -10,9 +10,11 @@
 #include <fstream>
 #include <iterator>
 #include <locale>
+#include <memory>
 #include <ostream>
 #include <sstream>
 #include <system_error>
+#include <utility>
 
 #include "rio_t/core/replace_file.h"
 #include "text.h"
@@ -76,7 +78,7 @@ void printHelp(const ProgramText& text, const OptionSet& options, std::ostream& 
 }
 
 /// A line of the progress bar: "[####    ]  40 %, 12 s left".
-std::string progressLine(const std::string& label, double done, double elapsed) {
+std::string progressText(const std::string& label, double done, double elapsed) {
   constexpr int kWidth = 40;
   const auto filled = static_cast<std::size_t>(std::clamp(done, 0.0, 1.0) * kWidth);
   std::ostringstream line;
@@ -89,6 +91,33 @@ std::string progressLine(const std::string& label, double done, double elapsed) 
   }
   return line.str();
 }
+
+/// The line of a progress bar on stderr. It ends with the bar, so an error gets a line of its own.
+class ProgressLine {
+ public:
+  explicit ProgressLine(std::string label) : label_(std::move(label)) {}
+  ~ProgressLine() { end(); }
+  ProgressLine(const ProgressLine&) = delete;
+  ProgressLine& operator=(const ProgressLine&) = delete;
+
+  void show(double done) {
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - started_;
+    // \033[K removes what is left of a longer line.
+    std::fprintf(stderr, "\r%s\033[K", progressText(label_, done, elapsed.count()).c_str());
+    is_open_ = true;
+    if (done >= 1.0) end();
+  }
+
+ private:
+  void end() {
+    if (is_open_) std::fprintf(stderr, "\n");
+    is_open_ = false;
+  }
+
+  const std::string label_;
+  const std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
+  bool is_open_ = false;
+};
 
 /// Copies a file with another content to PATH~, as editors do. Returns the name of the copy, or nothing.
 std::string keepOther(const std::string& path, const std::string& text) {
@@ -312,12 +341,7 @@ void require(const std::vector<std::pair<std::string, bool>>& given_by_name) {
 
 std::function<void(double)> progressBar(const std::string& label) {
   if (isatty(STDERR_FILENO) == 0) return nullptr;
-  return [label, started = std::chrono::steady_clock::now()](double done) {
-    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - started;
-    // \033[K removes what is left of a longer line.
-    std::fprintf(stderr, "\r%s\033[K", progressLine(label, done, elapsed.count()).c_str());
-    if (done >= 1.0) std::fprintf(stderr, "\n");
-  };
+  return [line = std::make_shared<ProgressLine>(label)](double done) { line->show(done); };
 }
 
 }  // namespace rio_t

@@ -64,9 +64,8 @@ MotionState Motion::at(double t) const {
   }
   const PathTime time = pathTime(t);
   MotionState state = path_.at(time.s);
-  // Chain rule, second derivatives first because they need the spline's first ones.
+  // Chain rule, the second derivative first because it needs the spline's first one.
   state.a_W = state.a_W * (time.ds * time.ds) + state.v_W * time.dds;
-  state.alpha_I = state.alpha_I * (time.ds * time.ds) + state.omega_I * time.dds;
   state.v_W *= time.ds;
   state.omega_I *= time.ds;
   return state;

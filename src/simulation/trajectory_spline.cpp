@@ -197,13 +197,8 @@ MotionState TrajectorySpline::at(double t) const {
   // With q = Q / |Q|: omega_I = 2 vec(Q* dQ) / |Q|^2, because the part of dQ along Q only changes the length.
   const Eigen::Quaterniond Q(x.tail<4>().eval());
   const Eigen::Quaterniond dQ(dx.tail<4>().eval());
-  const Eigen::Quaterniond ddQ(ddx.tail<4>().eval());
-  const double norm2 = Q.squaredNorm();
-  const double dnorm2 = 2.0 * Q.coeffs().dot(dQ.coeffs());
   state.q_WI = Q.normalized();
-  state.omega_I = 2.0 * (Q.conjugate() * dQ).vec() / norm2;
-  // vec(dQ* dQ) is zero, so only Q* ddQ and the length remain.
-  state.alpha_I = 2.0 * (Q.conjugate() * ddQ).vec() / norm2 - state.omega_I * (dnorm2 / norm2);
+  state.omega_I = 2.0 * (Q.conjugate() * dQ).vec() / Q.squaredNorm();
   return state;
 }
 

@@ -195,8 +195,8 @@ void printYaml(const std::string& file, double truth, const OffsetError& e) {
   std::printf("  mean_normalised_square: %#.9g\n", e.mean_normalised_square);
 }
 
-void writeErrors(const std::string& file, const Trajectory& truth, const Trajectory& estimate,
-                 double max_difference) {
+/// The content of the file of --errors.
+std::string errorTable(const Trajectory& truth, const Trajectory& estimate, double max_difference) {
   std::ostringstream out;
   out << std::setprecision(9) << "stamp,x,y,z,truth_x,truth_y,truth_z,angle_deg,yaw_deg\n";
   for (const PoseError& e : poseErrors(truth, estimate, Alignment::kOrigin, max_difference)) {
@@ -207,12 +207,13 @@ void writeErrors(const std::string& file, const Trajectory& truth, const Traject
     }
     out << '\n';
   }
-  replaceFile(file, out.str());
+  return out.str();
 }
 
 void run(const Arguments& arguments) {
   // All is computed before anything is written: a failure leaves no half output.
   std::vector<Evaluation> evaluations;
+  std::string errors;
   if (!arguments.trajectories.empty()) {
     const std::string& truth_file = arguments.trajectories.front();
     const Trajectory truth = readTum(truth_file);
@@ -220,6 +221,7 @@ void run(const Arguments& arguments) {
       const std::string& file = arguments.trajectories[i];
       const Trajectory estimate = readTum(file);
       evaluations.push_back(evaluate(truth, truth_file, estimate, file, arguments.max_difference));
+      if (!arguments.errors_file.empty()) errors = errorTable(truth, estimate, arguments.max_difference);
     }
   }
   std::optional<OffsetError> offset;
@@ -232,9 +234,7 @@ void run(const Arguments& arguments) {
     }
   }
 
-  if (!arguments.errors_file.empty())
-    writeErrors(arguments.errors_file, readTum(arguments.trajectories.front()),
-                readTum(arguments.trajectories.back()), arguments.max_difference);
+  if (!arguments.errors_file.empty()) replaceFile(arguments.errors_file, errors);
   if (arguments.yaml) {
     if (!evaluations.empty()) {
       std::printf("ground_truth: %s\nmax_difference_s: %#.9g\nestimates:\n",

@@ -14,7 +14,6 @@ struct MotionState {
   Eigen::Vector3d a_W = Eigen::Vector3d::Zero();             ///< [m/s^2], gravity not included
   Eigen::Quaterniond q_WI = Eigen::Quaterniond::Identity();  ///< turns I into W
   Eigen::Vector3d omega_I = Eigen::Vector3d::Zero();  ///< angular velocity of I against W, in I [rad/s]
-  Eigen::Vector3d alpha_I = Eigen::Vector3d::Zero();  ///< its time derivative [rad/s^2]
 };
 
 struct SplineFitOptions {

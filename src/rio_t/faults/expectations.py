@@ -29,7 +29,6 @@ class Survives:
     position: float
     counted: tuple = ()
     grows: float = None
-    recovers: bool = True
     world_goes_on: bool = True
 
     def words(self):
@@ -38,8 +37,7 @@ class Survives:
             text += f", {self.position:g} m"
         if self.grows:
             text += f", sigma grows {self.grows:g} times"
-        if self.recovers:
-            text += f", recovers in {RECOVERY:g} s"
+        text += f", recovers in {RECOVERY:g} s"
         if self.counted:
             text += ", counts " + " ".join(self.counted)
         return text
@@ -73,8 +71,7 @@ class Survives:
             happened.append(f"sigma times {grown:.1f}")
             if grown < self.grows:
                 wrong.append(f"sigma grew {grown:.1f} times only")
-        over = end + RECOVERY < outcome.length
-        if self.recovers and over:
+        if end + RECOVERY < outcome.length:
             rms = lambda part: numpy.sqrt(numpy.mean(numpy.square(part.velocity))) if len(part.time) else numpy.nan
             recovered = rms(errors.part(end + RECOVERY, numpy.inf))
             usual = rms(outcome.reference.part(end + RECOVERY, numpy.inf)) if outcome.reference is not None else 0.0

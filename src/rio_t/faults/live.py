@@ -198,7 +198,7 @@ def solver_is_slow(live):
         live.happened.append(f"{missed} of {len(stamps)} odometry messages missing")
         live.expect(missed == 0, f"{missed} odometry messages missing")
         live.check_odometry(listener.messages["odom"], 10.0, 38.0, bound=1.0)
-        live.said("the solver falls behind")
+        live.said("scans waited too long for the IMU or the solver")
 
 
 def frozen_for_3s(live):

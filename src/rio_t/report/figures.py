@@ -4,7 +4,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from scipy.spatial.transform import Rotation
 
 from ..plots import legend_above, pyplot, tidy
-from .motion import USED
+from .motion import POINTS_ONLY, USED
 
 TRUTH, ESTIMATE, OPTIMIZED, REJECTED = "#222222", "#1f6fb4", "#e07b00", "#b02a37"
 # Curves lie on each other where the estimate is good: wide below, narrow above.
@@ -174,7 +174,7 @@ def draw_ego_velocity(table, predicted):
         finish_axes(axes[i], f"{'residual' if predicted is not None else 'v'} {axis} [m/s]", legend=i == 0)
     axes[3].plot(t, table["points"], color="#999999", linewidth=0.9, label="points")
     axes[3].plot(t, table["inliers"], color=ESTIMATE, linewidth=1.0, label="inliers")
-    for j, status in enumerate(sorted(set(table["status"][~used]))):
+    for j, status in enumerate(sorted(set(table["status"][~used]) - {POINTS_ONLY})):
         rows = table["status"] == status
         axes[3].plot(t[rows], np.zeros(np.count_nonzero(rows)), "x", color=pyplot.cm.autumn(0.22 * j), markersize=5,
                      label=f"{status} ({np.count_nonzero(rows)})", clip_on=False)

@@ -220,12 +220,16 @@ def add_extrinsics(page, radar, folder):
     page.figure(run_folder.of_radar("extrinsics", radar.name), figures.draw_extrinsics(radar.extrinsics, configured))
 
 
-def configured_mountings(arguments):
-    """Those of --config, by the name of the radar."""
+def configured_mountings(arguments, radars):
+    """Those of --config, by the name of the radar in the run."""
     if not arguments.config:
         return {}
     folder = programs.find(["rio_t_bag"], "--evaluate FILE beside it", arguments.evaluate and arguments.evaluate.parent)
-    return {name: (lever, rotation) for name, lever, rotation in radars_of(read_config(folder, arguments.config))}
+    mountings = {name: (lever, rotation)
+                 for name, lever, rotation in radars_of(read_config(folder, arguments.config))}
+    if len(mountings) == len(radars) == 1:  # a run has no name for its only radar, the configuration may have one
+        return dict(zip((radar.name for radar in radars), mountings.values()))
+    return mountings
 
 
 def mounting(radar, configured):
@@ -264,7 +268,7 @@ def report(arguments):
     """Writes the page; its path."""
     run = read_run(arguments.run, arguments.ground_truth)
     true_offsets = true_offsets_of(run.radars, arguments.true_offset)
-    configured = configured_mountings(arguments)
+    configured = configured_mountings(arguments, run.radars)
     mountings = {radar.name: mounting(radar, configured) for radar in run.radars}
     judge_poses = run.truth and run.estimates
     judge_offset = any(radar.name in true_offsets and radar.offset is not None for radar in run.radars)
@@ -308,11 +312,17 @@ def report(arguments):
     if run.biases is not None:
         page.heading("Biases of the IMU")
         page.figure("biases", figures.draw_biases(run.biases))
+    path = page.write()
     if arguments.animation:
         radar = run.radars[0]
         write_animation(arguments.animation, run.estimates[-1] if run.estimates else None, radar.offset,
                         true_offsets.get(radar.name))
-    return page.write()
+    return path
+
+
+def program_path(text):
+    """pathlib drops "./", and a name without a folder is looked up in PATH."""
+    return pathlib.Path(text).resolve()
 
 
 def finite(text):
@@ -349,7 +359,7 @@ def main(words):
     parser.add_argument("--output-dir", metavar="DIR", type=pathlib.Path, help="where to write (RUN_DIR/report)")
     parser.add_argument("--animation", metavar="FILE.gif", type=pathlib.Path,
                         help="also draw path and time offset of the first radar as a moving picture")
-    parser.add_argument("--evaluate", metavar="FILE", type=pathlib.Path,
+    parser.add_argument("--evaluate", metavar="FILE", type=program_path,
                         help="the program evaluate, if it is not found; rio_t_bag is beside it")
     try:
         print(report(parser.parse_args(words)))

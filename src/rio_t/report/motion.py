@@ -6,7 +6,8 @@ from ..errors import RioTError
 from ..geometry import interpolate, interpolate_rotations
 from ..run_folder import of_radar
 
-USED = ("moving", "zero_velocity")  # status of a scan that entered the estimate
+USED = ("moving", "zero_velocity")  # status of a used scan that has a velocity of its own
+POINTS_ONLY = "points_only"         # of a used scan that has none
 
 
 def motion(t, trajectory):

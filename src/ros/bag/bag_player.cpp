@@ -63,7 +63,10 @@ void BagPlayer::feed(std::vector<RadarScan> scans, std::size_t radar) {
 }
 
 RunSummary BagPlayer::summary(const RunLog& log) const {
-  RunSummary summary(evidence_.evidence(odometry_, odometry_.start()));
+  // None while the odometry waits to start again. The run then still began from something.
+  const std::optional<RadarInertialOdometry::Start> newest = odometry_.start();
+  RunSummary summary(evidence_.evidence(odometry_, newest ? newest : start_));
+  summary.initialized = start_ || odometry_.initialized();
   log.fill(&summary);
   summary.imu_count = imu_count_;
   summary.imu_restarts = imu_restarts_;
@@ -94,8 +97,6 @@ RunSummary BagPlayer::summary(const RunLog& log) const {
     if (!several.empty()) summary.several_publishers.push_back(several);
   }
   summary.diagnosis = diagnose(summary, config_);
-  // Keys and files of the only radar carry no name.
-  if (summary.radars.size() == 1) summary.radars.front().name.clear();
   return summary;
 }
 
@@ -109,11 +110,13 @@ void BagPlayer::addImu(const sensor_msgs::Imu& message, Time record) {
     return;
   }
   const ImuSampleCheck::Verdict checked = imu_check_.check(imu);
-  if (checked.is_restart && odometry_.initialized())
+  if (checked.is_restart && odometry_.initialized()) {
     imu_restarts_.push_back({*checked.before, imu.time, checked.dropped, checked.stamps_went_on});
+    log_->startAgain();
+  }
   if (checked.fault == nullptr) evidence_.addImu(imu.time);
   for (Radar& radar : radars_) radar.stamper.addImu(imu.time, record);
-  if (recorder_ != nullptr) recorder_->addImu(imu);
+  if (recorder_ != nullptr) recorder_->addImu(imu, start_ || odometry_.initialized());
   const std::optional<NavigationState> state = odometry_.addImu(imu);
   if (!state) return;
   evidence_.addState(state->time);

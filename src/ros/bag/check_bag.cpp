@@ -89,13 +89,18 @@ void leaveOutCopies(std::vector<RadarInspection>* radars, const Recording& recor
       const auto both =
           std::count_if(of_a.begin(), of_a.end(), [&](std::int64_t s) { return of_b.count(s) != 0; });
       const double turn = a.search.q_IR.angularDistance(b.search.q_IR);
-      const bool same_mounting = !a.search.enough || !b.search.enough || turn < kFarApart;
+      const bool knows_mounting = a.search.enough && b.search.enough;
       if (of_a.empty() || 10 * static_cast<std::size_t>(both) < 9 * std::min(of_a.size(), of_b.size()) ||
-          !same_mounting)
+          (knows_mounting && turn >= kFarApart))
         continue;
       if (b.points > a.points) std::swap(a, b);
-      check->odd("radar", b.topic + " has the stamps and the mounting of " + a.topic +
-                              ": one radar, so only the topic with more points is used");
+      check->odd("radar",
+                 knows_mounting
+                     ? b.topic + " has the stamps and the mounting of " + a.topic +
+                           ": one radar, so only the topic with more points is used"
+                     : b.topic + " has the stamps of " + a.topic +
+                           ", so only the topic with more points is used. If these are two radars, record "
+                           "with motion, or choose one with --radar-topic");
       radars->erase(radars->begin() + static_cast<std::ptrdiff_t>(k));
     }
   }

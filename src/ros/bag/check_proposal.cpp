@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <boost/algorithm/string.hpp>
 #include <cctype>
+#include <limits>
 #include <set>
 #include <string>
 
@@ -82,6 +83,21 @@ ProposedKeys keysOf(const RadarInspection& radar, const ParameterEntries& config
   return keys;
 }
 
+/// Radars with one clock start from one offset: the one that the bag shows best.
+void shareOffset(const std::vector<RadarInspection>& radars, ProposedConfig* config) {
+  const ProposedKey* best = nullptr;
+  double least_sigma = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < radars.size(); ++k) {
+    const ProposedKey* own = config->radars[k].second.find("time_offset_initial");
+    if (own == nullptr || radars[k].search.offset_sigma >= least_sigma) continue;
+    best = own;
+    least_sigma = radars[k].search.offset_sigma;
+  }
+  if (best == nullptr) return;
+  const ProposedKey shared = *best;
+  for (auto& [name, keys] : config->radars) keys.set(shared.key, shared.value, shared.why);
+}
+
 }  // namespace
 
 ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarInspection>& radars,
@@ -114,6 +130,7 @@ ProposedConfig proposedConfig(const ImuInspection& imu, const std::vector<RadarI
   config.top_level.set("radars", ParameterValue{list});
   for (std::size_t k = 0; k < radars.size(); ++k)
     config.radars.emplace_back(names[k], keysOf(radars[k], configured));
+  if (makeConfig(configured).odometry.smoother.time_offset_shared) shareOffset(radars, &config);
   addConfigured(configured, &config);
   return config;
 }

@@ -15,8 +15,11 @@ struct Trial {
 
   /// Neither copies nor scans before the start count.
   double shareUsed() const {
-    const std::uint64_t duplicates = countOf(summary.scansRejected(), "duplicate_stamp");
-    std::uint64_t judged = summary.scansTotal() - std::min(copies, duplicates);
+    // A copy has the stamp of the other, or another arrival, or no trigger of its own.
+    std::uint64_t rejected = 0;
+    for (const char* reason : {"duplicate_stamp", "scan_repeated", "trigger_missing"})
+      rejected += countOf(summary.scansRejected(), reason);
+    std::uint64_t judged = summary.scansTotal() - std::min(copies, rejected);
     for (const RadarSummary& radar : summary.radars) judged -= radar.scans_before_start;
     return static_cast<double>(summary.scansUsed()) / static_cast<double>(std::max<std::uint64_t>(1, judged));
   }

@@ -27,6 +27,12 @@ void ProposedKeys::remove(const std::string& key) {
       keys_.end());
 }
 
+const ProposedKey* ProposedKeys::find(const std::string& key) const {
+  const auto same =
+      std::find_if(keys_.begin(), keys_.end(), [&](const ProposedKey& each) { return each.key == key; });
+  return same == keys_.end() ? nullptr : &*same;
+}
+
 bool isConfigured(const std::string& key, const ParameterEntries& configured) {
   return std::any_of(configured.begin(), configured.end(),
                      [&](const ParameterEntry& entry) { return entry.key == key; });

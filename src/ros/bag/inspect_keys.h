@@ -24,6 +24,8 @@ class ProposedKeys {
   void set(const std::string& key, const std::string& text, const std::string& why = "");
   void add(const ProposedKeys& other);
   void remove(const std::string& key);
+  /// Null if it is not there; valid until the keys change.
+  const ProposedKey* find(const std::string& key) const;
   const std::vector<ProposedKey>& all() const { return keys_; }
 
  private:

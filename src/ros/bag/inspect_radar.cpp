@@ -289,7 +289,7 @@ void describeMounting(const MountingSearch& search, double largest_offset, Radar
   }
   describeOffset(search, largest_offset, radar);
   constexpr double kKnown = 0.03;  // [s]
-  const double bound = 0.8 * SmootherOptions().max_time_offset;
+  const double bound = 0.8 * largest_offset;
   if (std::abs(search.offset) > 0.8 * CalibrationPrior().time_offset_sigma && search.offset_sigma < kKnown &&
       !radar->isSparse())
     radar->keys.set("time_offset_initial",

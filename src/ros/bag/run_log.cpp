@@ -25,7 +25,6 @@ RunLog::RunLog(const Config& config, RunOutput* output, const std::vector<double
                bool keeps_trajectory)
     : output_(output),
       offset_shared_(config.odometry.smoother.time_offset_shared),
-      max_bridged_gap_(config.odometry.imu_input_check.max_bridged_gap),
       keeps_trajectory_(keeps_trajectory) {
   for (std::size_t k = 0; k < taken_off.size(); ++k) {
     Radar& radar = radars_.emplace_back(
@@ -49,10 +48,14 @@ void RunLog::addResult(ScanResult& result) {
   }
   if (output_ != nullptr) output_->addResult(result);
   for (const StampedPose& pose : result.left_window) {
-    const double step = newest_optimized_ ? pose.time - newest_optimized_->time : 0.0;
-    if (step > 0.0 && step <= max_bridged_gap_)  // else the trajectory starts again
+    if (newest_optimized_ && newest_optimized_->time < pose.time)
       path_length_m_ += (pose.p_W - newest_optimized_->p_W).norm();
     newest_optimized_ = pose;
+  }
+  // The platform did not drive the step across a restart of the IMU's clock.
+  if (starts_again_ && !result.left_window.empty()) {
+    newest_optimized_.reset();
+    starts_again_ = false;
   }
   if (!result.updated) return;
   for (Radar& each : radars_) {

@@ -18,6 +18,8 @@ class RunLog {
          bool keeps_trajectory);
 
   void addState(const NavigationState& state);
+  /// The clock of the IMU jumped: the next optimised poses are the last ones from before.
+  void startAgain() { starts_again_ = true; }
   /// Puts what was taken off the stamps back on.
   void addResult(ScanResult& result);
   /// Sets what the log knows.
@@ -33,13 +35,13 @@ class RunLog {
 
   RunOutput* output_;
   bool offset_shared_;
-  double max_bridged_gap_;  // [s]
   bool keeps_trajectory_;
   std::vector<Radar> radars_;
   Trajectory trajectory_;
   std::optional<Eigen::Vector3d> first_p_W_;
   Eigen::Vector3d last_p_W_ = Eigen::Vector3d::Zero();
-  std::optional<StampedPose> newest_optimized_;
+  std::optional<StampedPose> newest_optimized_;  // none after a restart
+  bool starts_again_ = false;
   double path_length_m_ = 0.0;
 };
 

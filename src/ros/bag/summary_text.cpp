@@ -8,7 +8,7 @@ namespace {
 
 /// `values`: a vector, of Eigen or of the standard library.
 template <typename Values>
-std::vector<std::string> fixedTexts(const Values& values, int decimals) {
+std::vector<std::string> fixedList(const Values& values, int decimals) {
   std::vector<std::string> texts;
   for (std::size_t i = 0; i < static_cast<std::size_t>(values.size()); ++i)
     texts.push_back(fixedText(values[i], decimals));
@@ -63,12 +63,12 @@ void addEstimates(SummaryLines& lines, const RadarSummary& radar) {
   lines.add("final_offset_sigma_s" + suffix, fixedText(radar.final_offset_sigma_s, 9));
   const CalibrationErrors& errors = radar.errors;  // of what is not estimated
   if (errors.turn) {                               // about the axes of the IMU [rad]
-    lines.add("mounting_turn" + suffix, fixedTexts(errors.turn->error, 6));
-    lines.add("mounting_turn_sigma" + suffix, fixedTexts(errors.turn->sigma(), 6));
+    lines.add("mounting_turn" + suffix, fixedList(errors.turn->error, 6));
+    lines.add("mounting_turn_sigma" + suffix, fixedList(errors.turn->sigma(), 6));
   }
   if (errors.lever_arm) {  // along the axes of the IMU [m]
-    lines.add("lever_arm_error" + suffix, fixedTexts(errors.lever_arm->error, 4));
-    lines.add("lever_arm_error_sigma" + suffix, fixedTexts(errors.lever_arm->sigma(), 4));
+    lines.add("lever_arm_error" + suffix, fixedList(errors.lever_arm->error, 4));
+    lines.add("lever_arm_error_sigma" + suffix, fixedList(errors.lever_arm->sigma(), 4));
   }
   lines.add("doppler_scale_error" + suffix, fixedText(errors.scale.error, 4));
   lines.add("doppler_scale_error_sigma" + suffix, fixedText(errors.scale.sigma(), 4));
@@ -78,13 +78,13 @@ void addEstimates(SummaryLines& lines, const RadarSummary& radar) {
   }
   if (!radar.extrinsics) return;
   const ExtrinsicsSummary& extrinsics = *radar.extrinsics;
-  lines.add("configured_extrinsics_translation" + suffix, fixedTexts(extrinsics.configured.l_I, 9));
+  lines.add("configured_extrinsics_translation" + suffix, fixedList(extrinsics.configured.l_I, 9));
   lines.add("configured_extrinsics_rotation_xyzw" + suffix,
-            fixedTexts(extrinsics.configured.q_IR.coeffs(), 9));
-  lines.add("final_extrinsics_translation" + suffix, fixedTexts(extrinsics.T_IR.l_I, 9));
-  lines.add("final_extrinsics_translation_sigma" + suffix, fixedTexts(extrinsics.translationSigma(), 9));
-  lines.add("final_extrinsics_rotation_xyzw" + suffix, fixedTexts(extrinsics.T_IR.q_IR.coeffs(), 9));
-  lines.add("final_extrinsics_rotation_sigma" + suffix, fixedTexts(extrinsics.rotationSigma(), 9));
+            fixedList(extrinsics.configured.q_IR.coeffs(), 9));
+  lines.add("final_extrinsics_translation" + suffix, fixedList(extrinsics.T_IR.l_I, 9));
+  lines.add("final_extrinsics_translation_sigma" + suffix, fixedList(extrinsics.translationSigma(), 9));
+  lines.add("final_extrinsics_rotation_xyzw" + suffix, fixedList(extrinsics.T_IR.q_IR.coeffs(), 9));
+  lines.add("final_extrinsics_rotation_sigma" + suffix, fixedList(extrinsics.rotationSigma(), 9));
 }
 
 void addMeasured(SummaryLines& lines, const RadarSummary& radar) {
@@ -123,8 +123,8 @@ void addGroundVehicle(SummaryLines& lines, const GroundVehicleCounts& vehicle) {
   lines.beginMap("ground_vehicle");
   lines.add("terms_used", vehicle.used);
   lines.add("terms_left_out", vehicle.left_out);
-  lines.add("final_rotation_xyzw", fixedTexts(vehicle.rotation.coeffs(), 9));
-  lines.add("final_rotation_sigma", fixedTexts(vehicle.rotation_sigma, 9));
+  lines.add("final_rotation_xyzw", fixedList(vehicle.rotation.coeffs(), 9));
+  lines.add("final_rotation_sigma", fixedList(vehicle.rotation_sigma, 9));
   lines.add("contradicted", vehicle.contradicted_at.has_value());
   if (vehicle.contradicted_at) lines.add("contradicted_after_s", fixedText(*vehicle.contradicted_at, 3));
   lines.endMap();
@@ -176,7 +176,7 @@ std::string summaryText(const RunSummary& summary, const std::vector<std::string
   for (const RadarSummary& radar : summary.radars) addMeasured(lines, radar);
   for (const RadarSummary& radar : summary.radars) {
     if (radar.pass_offsets_s.empty()) continue;
-    lines.add("pass_offsets_s" + suffixOf(radar.name), fixedTexts(radar.pass_offsets_s, 9));
+    lines.add("pass_offsets_s" + suffixOf(radar.name), fixedList(radar.pass_offsets_s, 9));
   }
   if (summary.batch) {
     lines.add("batch_iterations", summary.batch->iterations);

@@ -428,6 +428,11 @@ std::string describeDropped(const Counts& dropped) {
   return text;
 }
 
+std::string describe(const Check& check) {
+  return check.name + " is " + number(check.value) + ", expected at " +
+         (check.at_least ? "least " : "most ") + number(check.limit);
+}
+
 std::string describeCauses(const Diagnosis& diagnosis) {
   std::string text;
   for (std::size_t i = 0; i < diagnosis.causes.size(); ++i) {
@@ -436,8 +441,7 @@ std::string describeCauses(const Diagnosis& diagnosis) {
   }
   for (const Check& check : diagnosis.checks) {
     if (check.good() || !diagnosis.causes.empty()) continue;  // a cause says it better
-    text += "  " + check.name + " is " + number(check.value) + ", expected at " +
-            (check.at_least ? "least " : "most ") + number(check.limit) + "\n";
+    text += "  " + describe(check) + "\n";
   }
   return text;
 }

@@ -113,6 +113,7 @@ void LiveOdometry::onScan(std::size_t radar, const Event<sensor_msgs::PointCloud
 
 void LiveOdometry::onPressure(const Event<sensor_msgs::FluidPressure>& event) {
   monitor_.pressure();
+  tick_pressure_();
   try {
     const Pressure pressure = toPressure(*event.getConstMessage(), config_.barometer_topic);
     if (const Session now = session_.get()) now->addPressure(pressure);
@@ -143,8 +144,7 @@ void LiveOdometry::account(const std::vector<LiveSession::GivenUp>& given_up) {
     monitor_.dropped(radar, reason);
     const Config& config = radars_[radar].config;
     log_.warn("no stamp for " + config.radar_topic + ": " + reason,
-              beginning(config) + "a scan got no stamp: " + reason + " (stamp_source: " +
-                  toString(config.stamp_source) + ", trigger_topic: " + config.trigger_topic + ")");
+              beginning(config) + "a scan got no stamp: " + whyNoStamp(config, reason));
   }
 }
 

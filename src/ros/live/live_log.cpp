@@ -10,6 +10,19 @@
 #include "radar_texts.h"
 
 namespace rio_t {
+namespace {
+
+/// Whether `health` logs what this counter counts.
+bool isToldByHealth(const std::string& counter) {
+  return counter == "diverged" || counter == "reinitialized" || counter == "ground_vehicle_contradicted";
+}
+
+/// Whether it counts what the estimate does, and no fault of the input.
+bool isOfEstimate(const std::string& counter) {
+  return counter == "time_offset_step" || counter == "landmarks_dropped";
+}
+
+}  // namespace
 
 bool LiveLog::isTimeToTell(const std::string& kind, double period) {
   const auto now = std::chrono::steady_clock::now();
@@ -48,7 +61,6 @@ void LiveLog::status(const LiveMonitor::Status& status) {
 }
 
 void LiveLog::health(const ScanResult& result) {
-  if (result.rejected_because == "queue_full") warn("queue_full", kSolverFallsBehind);
   if (result.reinitialized)
     ROS_WARN_STREAM(name_ << ": re-initialised in motion; position and heading go on");
   if (result.ground_vehicle && result.ground_vehicle->is_contradicted)
@@ -67,7 +79,8 @@ void LiveLog::faults(const std::shared_ptr<LiveSession>& session) {
     faults_told_.clear();
   }
   for (const auto& [fault, count] : session->odometry().faults()) {
-    const std::string kind = "input fault " + fault;
+    if (isToldByHealth(fault)) continue;
+    const std::string kind = (isOfEstimate(fault) ? "counted " : "input fault ") + fault;
     std::uint64_t& told = faults_told_[fault];
     if (count != told && warn(kind, kind + ", " + std::to_string(count) + " so far")) told = count;
   }

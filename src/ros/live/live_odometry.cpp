@@ -102,7 +102,7 @@ LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& p
   showEffectiveParameters(private_node_, config_);
   startSessionWhenReady();
   addDiagnostics();
-  subscribe(configured_);
+  subscribe();
   solver_ = std::thread([this] { solve(); });
   imu_spinner_.emplace(1, &imu_queue_);
   input_spinner_.emplace(1, &input_queue_);
@@ -137,12 +137,12 @@ LiveOdometry::~LiveOdometry() {
   if (solver_.joinable()) solver_.join();
 }
 
-void LiveOdometry::subscribe(const Config& configured) {
+void LiveOdometry::subscribe() {
   const ros::TransportHints fast = ros::TransportHints().tcpNoDelay();
   ros::NodeHandle imu_node = onQueue(node_, &imu_queue_);
   ros::NodeHandle input_node = onQueue(node_, &input_queue_);
   ros::NodeHandle service_node = onQueue(private_node_, &input_queue_);
-  const std::vector<Config> configured_radars = configsOfRadars(configured);
+  const std::vector<Config> configured_radars = configsOfRadars(configured_);
 
   for (std::size_t k = 0; k < radars_.size(); ++k) {
     Radar& radar = radars_[k];
@@ -158,10 +158,10 @@ void LiveOdometry::subscribe(const Config& configured) {
     radar.scans = input_node.subscribe<sensor_msgs::PointCloud2>(configured_radars[k].radar_topic, kScanQueue,
                                                                  scan, ros::VoidConstPtr(), fast);
   }
-  if (!configured.barometer_topic.empty())
+  if (!configured_.barometer_topic.empty())
     barometer_subscriber_ =
-        input_node.subscribe(configured.barometer_topic, kImuQueue, &LiveOdometry::onPressure, this, fast);
-  imu_subscriber_ = imu_node.subscribe(configured.imu_topic, kImuQueue, &LiveOdometry::onImu, this, fast);
+        input_node.subscribe(configured_.barometer_topic, kImuQueue, &LiveOdometry::onPressure, this, fast);
+  imu_subscriber_ = imu_node.subscribe(configured_.imu_topic, kImuQueue, &LiveOdometry::onImu, this, fast);
   reset_server_ = service_node.advertiseService("reset", &LiveOdometry::onReset, this);
   save_server_ = service_node.advertiseService("save_trajectory", &LiveOdometry::onSaveTrajectory, this);
   reconfigure_ =
@@ -186,20 +186,25 @@ void LiveOdometry::addDiagnostics() {
   using Status = LiveMonitor::Status;
   // Before the odometry, which says what is wrong with its IMU.
   diagnostics_->add("input", [this](Status& s) {
+    LiveMonitor::RosView view;
     // Before the monitor is locked: the master may take its time.
-    if (monitor_.lacksInput()) monitor_.setTopicTypes(publishedTypes());
-    std::map<std::string, std::uint32_t> publishers = {
-        {config_.imu_topic, imu_subscriber_.getNumPublishers()}};
-    for (const Radar& radar : radars_) publishers[radar.config.radar_topic] = radar.scans.getNumPublishers();
-    monitor_.setPublishers(publishers);
+    if (monitor_.lacksInput()) view.topic_types = publishedTypes();
+    view.publishers[config_.imu_topic] = imu_subscriber_.getNumPublishers();
+    if (barometer_subscriber_)
+      view.publishers[config_.barometer_topic] = barometer_subscriber_.getNumPublishers();
+    for (const Radar& radar : radars_) {
+      view.publishers[radar.config.radar_topic] = radar.scans.getNumPublishers();
+      if (radar.triggers) view.publishers[radar.config.trigger_topic] = radar.triggers.getNumPublishers();
+    }
     const ros::Time clock = ros::Time::now();
-    monitor_.setClockStands(ros::Time::isSimTime() && !clock.isZero() && clock == last_clock_);
+    view.clock_stands = ros::Time::isSimTime() && !clock.isZero() && clock == last_clock_;
     last_clock_ = clock;
+    monitor_.setRosView(std::move(view));
     monitor_.describeInput(s, session_.get().get());
     const std::chrono::duration<double> ran = std::chrono::steady_clock::now() - began_;
     const bool lacks_clock = ros::Time::isSimTime() && clock.isZero();
     if (lacks_clock && !LiveMonitor::describeMissingClock(s, ran.count())) return;  // nothing to log yet
-    if (s.message != kSolverFallsBehind) log_.status(s);  // else log_.health tells it
+    log_.status(s);
   });
   diagnostics_->add("odometry", [this](Status& s) {
     const Session now = session_.get();
@@ -227,6 +232,7 @@ void LiveOdometry::addDiagnostics() {
                         [this, k](Status& s) { monitor_.describeExtrinsics(s, k); });
   }
   tick_imu_ = topicRate(config_.imu_topic, *diagnostics_);
+  if (!config_.barometer_topic.empty()) tick_pressure_ = topicRate(config_.barometer_topic, *diagnostics_);
   for (Radar& radar : radars_) {
     radar.tick_scan = topicRate(radar.config.radar_topic, *diagnostics_);
     if (radar.config.stamp_source == StampSource::kTrigger)
@@ -302,7 +308,9 @@ void LiveOdometry::startSessionWhenReady() {
 }
 
 void LiveOdometry::reset(const std::string& reason, bool at_once) {
-  ROS_WARN_STREAM(name_ << ": reset: " << reason << "; starts again" << (at_once ? "" : ", stand still"));
+  const InitMode mode = config_.odometry.init_mode;
+  const bool wants_rest = mode == InitMode::kStatic || (mode == InitMode::kAuto && !at_once);
+  ROS_WARN_STREAM(name_ << ": reset: " << reason << "; starts again" << (wants_rest ? ", stand still" : ""));
   // Without a session there is nothing to reset.
   if (session_.get()) {
     OdometryOptions options;

@@ -27,6 +27,9 @@ constexpr std::size_t kVerdictHolds = 5;
 /// No message comes then, and no sensor is at fault.
 constexpr const char* kClockStands =
     "ROS time stands still: /clock is paused, or its publisher has ended (a bag?)";
+/// A scan waits until the IMU covers it, so a pause of the IMU fills the queue, too.
+constexpr const char* kScansWaitedTooLong =
+    "scans waited too long for the IMU or the solver, and the oldest were dropped (max_queued_scans)";
 
 double velocitySigma(const NavigationState& state) {
   return sigmasOf(state.covariance).segment<3>(StateBlock::kV).maxCoeff();
@@ -58,6 +61,7 @@ std::string noisyImu(const MeasuredImuNoise& noise, const ImuNoise& configured) 
 }
 
 LiveMonitor::LiveMonitor(const Config& config) : config_(config), collector_(config) {
+  config_.mode = RunMode::kOnline;  // the mode is for bags
   for (Config& radar : configsOfRadars(config)) radars_.emplace_back(std::move(radar));
 }
 
@@ -197,32 +201,23 @@ void LiveMonitor::setFrames(const std::map<std::string, std::string>& frames) {
 
 bool LiveMonitor::lacksInput() const {
   const std::lock_guard<std::mutex> lock(mutex_);
+  if (!config_.barometer_topic.empty() && barometer_.pressures == 0) return true;
   return imu_.count == 0 || std::any_of(radars_.begin(), radars_.end(), [](const Radar& radar) {
            return radar.scans.count == 0 ||
                   (radar.config.stamp_source == StampSource::kTrigger && radar.triggers.count == 0);
          });
 }
 
-void LiveMonitor::setTopicTypes(const std::map<std::string, std::string>& types) {
+void LiveMonitor::setRosView(RosView view) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  topic_types_ = types;
-}
-
-void LiveMonitor::setPublishers(const std::map<std::string, std::uint32_t>& counts) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  publishers_ = counts;
+  ros_ = std::move(view);
 }
 
 std::string LiveMonitor::wrongType(const std::string& topic, const std::string& expected) const {
-  const auto found = topic_types_.find(topic);
+  const auto found = ros_.topic_types.find(topic);
   // "*": whatever the publisher has.
-  if (found == topic_types_.end() || found->second == expected || found->second == "*") return "";
+  if (found == ros_.topic_types.end() || found->second == expected || found->second == "*") return "";
   return ", which is published as " + found->second + ", expected " + expected;
-}
-
-void LiveMonitor::setClockStands(bool stands) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  clock_stands_ = stands;
 }
 
 void LiveMonitor::tune(const ImuNoise& configured) {
@@ -236,16 +231,25 @@ void LiveMonitor::reconfigured(const std::string& refused_because) {
   refused_because_ = refused_because;
 }
 
-Diagnosis LiveMonitor::addDiagnosis(Status& status, const LiveSession& session) const {
+Diagnosis LiveMonitor::addDiagnosis(Status& status, const LiveSession& session, std::string* why) const {
   RunEvidence evidence = collector_.evidence(session.odometry(), session.start());
   evidence.imu_count = imu_.count - imu_before_session_;
   if (const std::uint64_t all = countOf(imu_dropped_, kImuNotUsable); all > not_usable_before_session_)
     evidence.input_faults[kImuNotUsable] = all - not_usable_before_session_;
   Diagnosis diagnosis = diagnose(evidence, config_);
   if (evidence.initialized) status.add("verdict", toString(diagnosis.verdict));
+  if (!diagnosis.causes.empty())
+    *why = ". Likely cause: " + diagnosis.causes.front().text + " " + diagnosis.causes.front().remedy;
   for (std::size_t i = 0; i < diagnosis.causes.size(); ++i) {
     const Cause& cause = diagnosis.causes[i];
     status.add("likely_cause_" + std::to_string(i + 1), cause.text + " " + cause.remedy);
+  }
+  if (!diagnosis.causes.empty() || !evidence.initialized) return diagnosis;
+  std::size_t red = 0;
+  for (const Check& check : diagnosis.checks) {
+    if (check.good()) continue;
+    if (red == 0) *why = ": " + describe(check);
+    status.add("red_check_" + std::to_string(++red), describe(check));
   }
   return diagnosis;
 }
@@ -265,12 +269,10 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) {
     status.add("reconfigurations", reconfigurations_);
     status.add("last_reconfiguration", refused_because_.empty() ? "done" : "refused: " + refused_because_);
   }
-  const Diagnosis diagnosis = session != nullptr ? addDiagnosis(status, *session) : Diagnosis();
-  std::string likely_cause;
-  if (!diagnosis.causes.empty())
-    likely_cause = ". Likely cause: " + diagnosis.causes.front().text + " " + diagnosis.causes.front().remedy;
+  std::string why;
+  const Diagnosis diagnosis = session != nullptr ? addDiagnosis(status, *session, &why) : Diagnosis();
   calls_not_good_ = initialized && diagnosis.verdict != RunVerdict::kGood ? calls_not_good_ + 1 : 0;
-  if (clock_stands_) {
+  if (ros_.clock_stands) {
     status.summary(DiagnosticStatus::WARN, kClockStands);
     return;
   }
@@ -305,15 +307,13 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) {
                    (config_.odometry.health.on_divergence == OnDivergence::kReinitialize
                         ? "diverged: do not trust the estimate; re-initialising"
                         : "diverged: do not trust the estimate; call ~reset") +
-                       likely_cause);
+                       why);
   } else if (health == Health::kCoasting) {
-    status.summary(DiagnosticStatus::ERROR,
-                   "no scan is used: the IMU alone carries the estimate" + likely_cause);
+    status.summary(DiagnosticStatus::ERROR, "no scan is used: the IMU alone carries the estimate" + why);
   } else if (!last_update_) {
     status.summary(DiagnosticStatus::WARN, "initialised, no scan used yet");
   } else if (calls_not_good_ > kVerdictHolds) {
-    status.summary(DiagnosticStatus::WARN,
-                   "running, but the run is " + toString(diagnosis.verdict) + likely_cause);
+    status.summary(DiagnosticStatus::WARN, "running, but the run is " + toString(diagnosis.verdict) + why);
   } else {
     status.summary(DiagnosticStatus::OK, "running");
   }
@@ -323,7 +323,7 @@ std::optional<LiveMonitor::Finding> LiveMonitor::describeRadar(Status& status, R
                                                                bool initialized) const {
   const Config& config = radar.config;
   const std::string key = prefixOf(radar.config.radar_name);
-  const bool is_silent = radar.scans.isSilent();
+  const bool is_silent = radar.scans.isSilent(kSilentCalls);
   status.add(key + "scans", radar.scans.count);
   status.add(key + "scans_used", radar.used);
   for (const auto& [reason, count] : radar.dropped) status.add(key + "dropped_" + reason, count);
@@ -341,10 +341,8 @@ std::optional<LiveMonitor::Finding> LiveMonitor::describeRadar(Status& status, R
                        wrongType(config.trigger_topic, "std_msgs/Header") +
                        ", and stamp_source is trigger; header and arrival need none"};
   }
-  if (is_silent) {
-    return Finding{DiagnosticStatus::WARN,
-                   called(radar) + " is silent" + (of.empty() ? "" : ", topic " + config.radar_topic)};
-  }
+  if (is_silent)
+    return Finding{DiagnosticStatus::WARN, called(radar) + " is silent, topic " + config.radar_topic};
   // One radar alone is judged with the odometry.
   if (mostly_rejected && radars_.size() > 1) return Finding{DiagnosticStatus::WARN, of + *mostly_rejected};
   return std::nullopt;
@@ -374,11 +372,11 @@ std::optional<std::string> LiveMonitor::judgeUse(Radar& radar, bool initialized)
 
 void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const bool none_came = imu_.isSilent(), none_is_usable = usable_imu_.isSilent();
-  imu_fault_ = clock_stands_    ? ""
-               : none_came      ? "the IMU is silent"
-               : none_is_usable ? "no IMU message can be used (" + why_unusable_ + ")"
-                                : "";
+  const bool none_came = imu_.isSilent(1), none_is_usable = usable_imu_.isSilent(1);
+  imu_fault_ = ros_.clock_stands ? ""
+               : none_came       ? "the IMU is silent"
+               : none_is_usable  ? "no IMU message can be used (" + why_unusable_ + ")"
+                                 : "";
   status.add("imu_messages", imu_.count);
   for (const auto& [reason, count] : imu_dropped_) status.add("dropped_" + reason, count);
   if (session != nullptr) {
@@ -406,14 +404,14 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   if (imu_.count == 0) {
     status.summary(DiagnosticStatus::ERROR, "no IMU message yet on " + config_.imu_topic +
                                                 wrongType(config_.imu_topic, "sensor_msgs/Imu"));
-  } else if (clock_stands_) {
+  } else if (ros_.clock_stands) {
     status.summary(DiagnosticStatus::WARN, kClockStands);
   } else if (!imu_fault_.empty()) {
     status.summary(DiagnosticStatus::ERROR, imu_fault_ + ", topic " + config_.imu_topic);
   } else if (!findings.empty()) {
     status.summary(radars.level, radars.text);
   } else if (queue_full > queue_full_reported_) {
-    status.summary(DiagnosticStatus::WARN, kSolverFallsBehind);
+    status.summary(DiagnosticStatus::WARN, kScansWaitedTooLong);
   } else if (noise.isFarAbove(configured)) {
     status.summary(DiagnosticStatus::WARN, noisyImu(noise, configured));
   } else {
@@ -421,7 +419,7 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
                    radars_.size() == 1 ? "IMU and radar are coming" : "IMU and radars are coming");
   }
   queue_full_reported_ = queue_full;
-  for (const auto& [topic, count] : publishers_) {
+  for (const auto& [topic, count] : ros_.publishers) {
     if (count < 2) continue;
     status.mergeSummary(DiagnosticStatus::WARN,
                         "topic " + topic + " has " + std::to_string(count) +

@@ -24,14 +24,11 @@ void LiveMonitor::pressureDropped(const std::string& why) {
 
 void LiveMonitor::describeBarometer(Status& status) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const Clock::time_point now = Clock::now();
-  const double seconds = std::max(1e-3, std::chrono::duration<double>(now - barometer_.reported).count());
   const std::uint64_t fresh = barometer_.pressures - barometer_.pressures_reported;
   const std::uint64_t fresh_used = barometer_.used - barometer_.used_reported;
-  barometer_.reported = now;
   barometer_.pressures_reported = barometer_.pressures;
   barometer_.used_reported = barometer_.used;
-  status.add("pressure_rate_hz", static_cast<double>(fresh) / seconds);
+  barometer_.silent_calls = fresh == 0 ? barometer_.silent_calls + 1 : 0;
   status.add("pressures", barometer_.pressures);
   status.add("pressures_not_usable", barometer_.not_usable);
   status.add("means_used", barometer_.used);
@@ -45,8 +42,10 @@ void LiveMonitor::describeBarometer(Status& status) {
     status.add("bias_sigma_m", barometer_.last->bias_sigma);
   }
   if (barometer_.pressures == 0) {
-    status.summary(DiagnosticStatus::WARN, "no pressure yet on " + config_.barometer_topic);
-  } else if (fresh == 0) {
+    status.summary(DiagnosticStatus::WARN,
+                   "no pressure yet on " + config_.barometer_topic +
+                       wrongType(config_.barometer_topic, "sensor_msgs/FluidPressure"));
+  } else if (barometer_.silent_calls >= kSilentCalls) {
     status.summary(DiagnosticStatus::WARN, "the barometer is silent, topic " + config_.barometer_topic);
   } else if (barometer_.not_usable == barometer_.pressures) {
     status.summary(DiagnosticStatus::WARN, "no pressure can be used: " + barometer_.why_not_usable);

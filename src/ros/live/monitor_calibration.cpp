@@ -16,8 +16,9 @@ namespace {
 
 using diagnostic_msgs::DiagnosticStatus;
 
-/// [s] A radar that gave no estimate for so long shows nothing now.
-constexpr double kRecent = 1.0;
+/// [s] A radar that gave no estimate for so long shows nothing now. The slowest radars come once a second. A
+/// scan then waits up to 0.5 s for its trigger, and 0.11 s for the IMU. The rest is for transport and solver.
+constexpr double kRecent = 2.0;
 /// The sigma of what the motion shows is below this share of the configured one.
 constexpr double kObserved = 0.5;
 
@@ -40,8 +41,10 @@ std::string axesAbove(const Eigen::Vector3d& numbers, double bound, const std::s
 }  // namespace
 
 bool LiveMonitor::isRecent(const Radar& radar) const {
-  return radar.last_update &&
-         last_update_->result.scan.stamp - radar.last_update->result.scan.stamp < kRecent;
+  if (!radar.last_update) return false;
+  // While ~odom waits for tf there is no newest state.
+  const Time now = newest_state_ ? newest_state_->time : last_update_->result.state.time;
+  return now - radar.last_update->result.state.time < kRecent;
 }
 
 void LiveMonitor::describeTimeOffset(Status& status, std::size_t radar) const {
@@ -57,7 +60,9 @@ void LiveMonitor::describeTimeOffset(Status& status, std::size_t radar) const {
   status.add("sigma_ms", 1e3 * result.time_offset_sigma);
   status.add("observable", observable ? "true" : "false");
   const double bound = config_.odometry.smoother.max_time_offset;
-  if (std::abs(result.time_offset) > 0.99 * bound) {
+  if (!config_.odometry.smoother.estimate_time_offset) {
+    status.summary(DiagnosticStatus::OK, "held: estimate_time_offset is false");
+  } else if (std::abs(result.time_offset) > 0.99 * bound) {
     status.summary(DiagnosticStatus::WARN, "the offset is at its bound max_time_offset");
   } else if (!isRecent(of)) {
     status.summary(DiagnosticStatus::OK, "kept: no scan of " + called(of) + " is used now");
@@ -100,7 +105,7 @@ void LiveMonitor::describeExtrinsics(Status& status, std::size_t radar) const {
   if (!far.empty()) {
     status.summary(DiagnosticStatus::WARN,
                    "the estimated rotation of " + called(of) + " " + far +
-                       " differs from the configured one by more than 3 extrinsics_rotation_sigma, " +
+                       " differs from the configured one by more than three sigmas, " +
                        fixedText(kFarMounting * options.extrinsics_rotation_sigma / kDegree, 0) + " degrees");
   } else if (!kept.empty()) {
     status.summary(DiagnosticStatus::OK, "kept: the motion has not shown the " + kept);

@@ -36,7 +36,8 @@ void record(ros::NodeHandle& node, double duration, rosbag::Bag& bag, std::size_
         ++*without_time;
         return;
       }
-      bag.write(topic, event.getReceiptTime(), event.getConstMessage());
+      // The header names the publisher.
+      bag.write(topic, event.getReceiptTime(), event.getConstMessage(), event.getConnectionHeaderPtr());
       ++*messages;
     };
     constexpr std::uint32_t kQueue = 5000;

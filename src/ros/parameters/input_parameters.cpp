@@ -79,8 +79,8 @@ void listFrames(ParameterList& list, Config& c) {
   list.frame(
       "radar_frame", c.radar_frame,
       "This is the frame in which the live node shows what the radar sees: x forward, y left, z up. With "
-      "several radars the default is rio_t_radar_NAME. No other node may publish a transform of this frame, "
-      "unless publish_radar_tf is false.");
+      "several radars, rio_t appends _NAME to what stands at the top level. No other node may publish a "
+      "transform of this frame, unless publish_radar_tf is false.");
   list.ofRadar(false);
   list.boolean("publish_tf", c.publish_tf,
                "The live node publishes the transform from odom_frame to base_link_frame. Set it to false if "

@@ -210,7 +210,7 @@ Config withoutSection(const Config& top_level, const std::string& name) {
   Config config = top_level;
   config.radars.clear();
   config.radar_name = name;
-  config.radar_frame = "rio_t_radar_" + name;
+  config.radar_frame += "_" + name;
   return config;
 }
 

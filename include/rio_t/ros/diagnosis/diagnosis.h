@@ -66,7 +66,10 @@ std::string describeRestarts(const std::vector<ImuRestart>& restarts, const Conf
 /// Says why the samples of a gap were dropped: "1227 were not finite, ...".
 std::string describeDropped(const Counts& dropped);
 
-/// A line for each cause, and for each check that is not good.
+/// "NAME is VALUE, expected at least LIMIT"
+std::string describe(const Check& check);
+
+/// A line for each cause or, if there is none, for each check that is not good.
 std::string describeCauses(const Diagnosis& diagnosis);
 
 }  // namespace rio_t

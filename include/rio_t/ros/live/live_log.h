@@ -38,7 +38,8 @@ class LiveLog {
   /// Logs a status of the diagnostics, if it is not OK.
   void status(const LiveMonitor::Status& status);
   void health(const ScanResult& result);
-  /// Logs the new faults of the session's input. Call it always from the same thread.
+  /// Logs what the session's counters of faults have counted since the last call, but for what `health` logs.
+  /// Call it always from the same thread.
   void faults(const std::shared_ptr<LiveSession>& session);
   /// Logs the step of a radar's Doppler, if it differs from the one reported.
   void dopplerStep(const Config& radar, const DopplerStep& step, DopplerStep* reported) const;

@@ -76,8 +76,8 @@ class LiveOdometry {
     std::function<void()> tick_scan, tick_trigger;  ///< for the rates in diagnostics
   };
 
-  /// Subscribes to the topics as they were configured.
-  void subscribe(const Config& configured);
+  /// Subscribes to the topics as the user wrote them: ROS would remap resolved ones once more.
+  void subscribe();
   void addDiagnostics();
   void onDiagnosticsTimer();
   /// Changes what may change while the node runs; what is refused stays as it was. Input thread.
@@ -115,7 +115,7 @@ class LiveOdometry {
   BodyFrame frames_;                                        // thread-safe
   std::optional<TfWatch> tf_watch_;                         // thread-safe; none if no tf is published
   std::optional<diagnostic_updater::Updater> diagnostics_;  // input thread, but for ticks
-  std::function<void()> tick_imu_;
+  std::function<void()> tick_imu_, tick_pressure_;
   ros::Time last_clock_;             // of ROS, when `input` was told last; input thread
   std::function<void()> tick_odom_;  // none before the first ~odom; input thread
   std::atomic<std::uint64_t> odom_published_{0};

@@ -2,7 +2,7 @@
 
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
 
-#include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -25,6 +25,15 @@ class LiveMonitor {
  public:
   using Status = diagnostic_updater::DiagnosticStatusWrapper;
 
+  /// What ROS knows about the input.
+  struct RosView {
+    /// Types of what is published, by topic: a topic of a wrong type brings no message. Needed only while
+    /// lacksInput().
+    std::map<std::string, std::string> topic_types;
+    std::map<std::string, std::uint32_t> publishers;  ///< how many there are on each topic of the input
+    bool clock_stands = false;  ///< ROS time comes from /clock, and has stood still since the last view
+  };
+
   /// `config`: with the topics as they are resolved.
   explicit LiveMonitor(const Config& config);
 
@@ -32,7 +41,7 @@ class LiveMonitor {
   void scan(std::size_t radar = 0);
   void trigger(std::size_t radar = 0);
   void zeroTrigger(std::size_t radar);  ///< one with a stamp of zero, which stamps no scan
-  /// A state was ready `latency` seconds after the IMU message came.
+  /// A state was ready `latency` seconds after the callback of its IMU message began.
   void odometry(const NavigationState& state, double latency);
   void imuDropped(const std::string& reason);  ///< a sample that goes no further
   void imuUsable(Time stamp);                  ///< the last message moves the estimate
@@ -49,14 +58,9 @@ class LiveMonitor {
   void waitFor(const std::string& what);
   /// Texts about the frames, by key.
   void setFrames(const std::map<std::string, std::string>& frames);
-  /// Whether nothing came yet on a topic of the IMU or of a radar.
+  /// Whether nothing came yet on a topic of the IMU, of a radar or of the barometer.
   bool lacksInput() const;
-  /// The types of what is published, by topic: a topic of a wrong type brings no message.
-  void setTopicTypes(const std::map<std::string, std::string>& types);
-  /// How many nodes publish on each topic of the IMU and the radars.
-  void setPublishers(const std::map<std::string, std::uint32_t>& counts);
-  /// ROS time comes from /clock, and has stood still since the last call.
-  void setClockStands(bool stands);
+  void setRosView(RosView view);
   void tune(const ImuNoise& configured);  ///< the noise of the IMU as it is configured now
   /// A change of parameters was refused, for that reason; or was made, if it is empty.
   void reconfigured(const std::string& refused_because);
@@ -77,7 +81,6 @@ class LiveMonitor {
   void describeLandmarks(Status& status) const;
 
  private:
-  using Clock = std::chrono::steady_clock;
   struct Latency {
     double worst = 0.0, sum = 0.0;  // [s]
     std::uint64_t count = 0;
@@ -85,16 +88,23 @@ class LiveMonitor {
   };
   struct Counter {
     std::uint64_t count = 0;
-    std::uint64_t reported = 0;  // count when it was last reported
+    std::uint64_t reported = 0;    // count when it was last reported
+    std::size_t silent_calls = 0;  // in a row
 
-    /// Whether nothing came since the last call.
-    bool isSilent() { return std::exchange(reported, count) == count; }
+    /// Whether nothing came before this call and the `calls` - 1 before it.
+    bool isSilent(std::size_t calls) {
+      silent_calls = std::exchange(reported, count) == count ? silent_calls + 1 : 0;
+      return silent_calls >= calls;
+    }
   };
+  /// The calls come once a second. A radar or a barometer may send as seldom, and then misses a call at
+  /// times.
+  static constexpr std::size_t kSilentCalls = 2;
 
   struct Barometer : BarometerCounts {
-    Clock::time_point reported = Clock::now();
     std::uint64_t not_usable = 0, pressures_reported = 0, used_reported = 0;
-    std::string why_not_usable;  ///< of the last one
+    std::size_t silent_calls = 0;  ///< as Counter has it
+    std::string why_not_usable;    ///< of the last one
   };
 
   /// What has become of the scans of a radar.
@@ -125,12 +135,12 @@ class LiveMonitor {
   std::optional<Finding> describeRadar(Status& status, Radar& radar, bool initialized) const;
   /// How few of its last scans were used, and why, if it is less than half.
   static std::optional<std::string> judgeUse(Radar& radar, bool initialized);
-  /// Adds whether the run is good so far and, if not, why.
-  Diagnosis addDiagnosis(Status& status, const LiveSession& session) const;
+  /// Adds whether the run is good so far and, if not, why. Writes the likeliest reason to `why`.
+  Diagnosis addDiagnosis(Status& status, const LiveSession& session, std::string* why) const;
   /// For the end of a message about a topic on which nothing came; empty if its type is right or unknown.
   std::string wrongType(const std::string& topic, const std::string& expected) const;
   static Finding join(const std::vector<Finding>& findings, bool another_works);
-  /// Whether the newest estimate is of a scan of this radar, or nearly so.
+  /// Whether this radar gave an estimate lately.
   bool isRecent(const Radar& radar) const;
 
   mutable std::mutex mutex_;  // guards all that follows
@@ -141,7 +151,6 @@ class LiveMonitor {
   Counter usable_imu_;        ///< messages that move the estimate
   std::string why_unusable_;  ///< of the last other message
   std::string imu_fault_;  ///< why no odometry comes, as of the last call of describeInput; empty: it comes
-  bool clock_stands_ = false;
   std::size_t calls_not_good_ = 0;  ///< of describeOdometry, in which the verdict was not good
   std::uint64_t imu_before_session_ = 0, not_usable_before_session_ = 0;
   Barometer barometer_;
@@ -152,8 +161,8 @@ class LiveMonitor {
   std::deque<SolverTermination> last_terminations_;  // of the last windows, newest last
   std::string last_reset_, waiting_for_, refused_because_;
   std::uint64_t reconfigurations_ = 0;
-  std::map<std::string, std::string> frames_, topic_types_;
-  std::map<std::string, std::uint32_t> publishers_;  // by topic
+  std::map<std::string, std::string> frames_;
+  RosView ros_;
   std::optional<LiveSession::Result> last_update_;
   std::optional<Time> last_used_;                // stamp of the last scan used
   std::optional<NavigationState> newest_state_;  // at the newest IMU sample
@@ -161,10 +170,6 @@ class LiveMonitor {
 
 /// Why an IMU message that cannot be read goes no further. The bag runner names it so, too.
 constexpr const char* kImuNotUsable = "imu_not_usable";
-
-/// The warning for a person whose computer is too slow.
-constexpr const char* kSolverFallsBehind =
-    "the solver falls behind, the oldest scans were dropped (max_queued_scans)";
 
 /// The warning for a person whose IMU is far noisier than the options say.
 std::string noisyImu(const MeasuredImuNoise& noise, const ImuNoise& configured);

@@ -62,7 +62,7 @@ class LiveSession {
     /// one, the stamp.
     Time measured_at;
     Extrinsics T_IR;       ///< of this radar, as they hold now; also where the window was not updated
-    double latency = 0.0;  ///< [s] from the arrival of the scan to now; 0 where that is not known
+    double latency = 0.0;  ///< [s] from when the scan got its stamp to now; 0 where that is not known
   };
   /// Optimisation thread. Uses at most one scan, so that a reset waits for one solution only. `more` tells
   /// whether there may be another.
