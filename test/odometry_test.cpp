@@ -228,6 +228,18 @@ TEST_F(AtRest, AClockThatJumpsStartsTheEstimateAgain) {
   EXPECT_EQ(odometry.faults().at("imu_clock_restart"), 2u);
 }
 
+TEST_F(AtRest, ThePosesFromBeforeAJumpAreNotLostAtTheEnd) {
+  run(104.0);
+  odometry.addScan(restScan(103.95));
+  run(104.1);
+  time += 1000.0;
+  run(time + 0.5);
+  ASSERT_FALSE(odometry.initialized());
+  const std::vector<ScanResult> last = odometry.finish();
+  ASSERT_EQ(last.size(), 1u);
+  EXPECT_FALSE(last[0].left_window.empty());
+}
+
 TEST_F(AtRest, OneStampFarAheadDoesNotSilenceTheImu) {
   run(104.0);
   EXPECT_FALSE(odometry.addImu(restSample(1e6)));

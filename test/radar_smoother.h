@@ -29,7 +29,7 @@ struct RadarSmoother {
   }
   std::optional<RadarVelocityPrediction> predict(Time stamp) const { return radar.predict(states, stamp); }
   /// The offset stepped before the scan stamped `stamp`, which is the newest.
-  void stepOffset(Time stamp) { radar.stepOffset(states, {stamp}, stamp); }
+  void stepOffset(Time stamp) { radar.stepOffset(states, {stamp}, radar.nodeTime(stamp)); }
 
   std::size_t size() const { return states.size(); }
   NodeEstimate node(std::size_t k) const { return states.node(k); }

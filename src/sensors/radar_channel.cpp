@@ -99,6 +99,7 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
   if (seen.has_borrowed && answer.at_rest && answer.ego_velocity.inliers.empty()) return reject(not_own);
   informOffset(seen, answer);
   answer.taken.stamp = scan.stamp;
+  answer.taken.linear_from_t_O = std::make_shared<const double>(offset());
   if (isTightlyCoupled() && seen.velocity.status == EgoVelocityStatus::kMoving) {
     answer.doppler = dopplerOf(scan, seen, answer);
     if (!answer.doppler) return reject(not_own);

@@ -138,7 +138,7 @@ bool RadarInWindow::addTerm(FixedLagSmoother& smoother, Measurement z,
   if (is_estimated) updateSlowMotion(smoother);
   z.slow = slow;
   const OffsetBlocks::OfScan offset = offset_->of(smoother.window(), z.stamp);
-  z.linear_from_t_O = offset.linear_from;
+  if (z.linear_from_t_O) z.linear_from_t_O = offset.linear_from;
   Term& term = smoother.window().add(std::make_unique<Factor>(z, *node->time, model_),
                                      {node, &smoother.biases(), offset.block, extrinsics_.get()}, loss);
   term.stamp = z.stamp;

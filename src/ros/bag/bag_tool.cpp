@@ -20,8 +20,9 @@ const ProgramText kText = {
     "rosrun rio_t rio_t_bag --print-config > all_parameters.yaml\n",
     "The folder gets trajectory.txt, trajectory_optimized.txt (TUM: stamp x y z qx qy qz qw), "
     "navigation.csv,\n"
-    "time_offset.csv, ego_velocity.csv, biases.csv and summary.yaml; and extrinsics.csv if the extrinsics "
-    "are estimated.\n"
+    "time_offset.csv, ego_velocity.csv, biases.csv and summary.yaml; extrinsics.csv if mounting or lever arm "
+    "are estimated;\n"
+    "and barometer.csv, ground_vehicle.csv and map.csv if these aids are on.\n"
     "With several radars the tables of a radar carry its name. docs/parameters.md describes every key.\n"};
 
 struct Arguments {

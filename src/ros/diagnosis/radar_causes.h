@@ -13,7 +13,7 @@
 namespace rio_t {
 
 // A cause shows if it explains at least this share of the evidence. Good runs stay far below: on one real and
-// two simulated bags the gate rejected at most 0.2 % of the scans and the filter no point (docs/tools.md).
+// two simulated bags the gate rejected at most 0.2 % of the scans and the filter no point.
 inline constexpr double kManyScans = 0.3;
 inline constexpr double kManyPoints = 0.6;
 /// Scans before anything is said: two seconds at ten a second.

@@ -218,7 +218,9 @@ void listExtrinsics(ParameterList& list, Config& c) {
       c.estimate_extrinsics,
       "none takes the mounting as it is. rotation estimates the rotation of the radar on the way, and takes "
       "its position as exact. pose estimates its position as well, as far as the platform turns. Use pose "
-      "for a mounting by eye, and none after a calibration. A position that is not given is estimated in any "
+      "for a mounting by eye, keep what calibrate wrote after a calibration, and use none only for a "
+      "mounting "
+      "that is exact. A position that is not given is estimated in any "
       "case. With platform: ground_vehicle, none estimates the rotation, too, but takes it to be right to a "
       "degree (or to extrinsics_rotation_sigma, if that is smaller).");
   list.number(
