@@ -138,6 +138,20 @@ TEST(EgoVelocityRest, ManyPointsAtRestMayReadABinOff) {
   EXPECT_LE(shareDenied(0.0, 500, one_always_off), 0.01);
 }
 
+// A narrow view has few directions, which agree on some motion by chance.
+TEST(EgoVelocityRest, InANarrowViewAFanIsNoMotion) {
+  const auto fan = [](RadarScan& scan, Random& random) {
+    for (RadarPoint& p : scan.points) {
+      p.position_R.x() *= 0.2;
+      p.position_R.z() *= 0.3;
+      // The right half of the view sees the fan.
+      if (p.position_R.x() > 0.1 * p.position_R.y() && random.uniform(0.0, 1.0) < 0.3) p.doppler = 0.125;
+    }
+  };
+  std::printf("denied %.3f\n", shareDenied(0.0, 500, fan));
+  EXPECT_LE(shareDenied(0.0, 500, fan), 0.01);
+}
+
 // A bin of width q hides every velocity below about q/2; the covariance at rest has to admit that.
 TEST(EgoVelocityRest, CoarseDopplerDoesNotFakeRest) {
   EgoVelocityOptions o;

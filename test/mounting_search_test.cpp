@@ -20,6 +20,7 @@ struct Searched {
   DopplerSign sign;
   RangeRatio ratio;
   Eigen::Vector3d error = Eigen::Vector3d::Zero();  // [rad] about the axes of I
+  double lever_arm_nees = 0.0;                      // mean over the axes
 };
 
 /// `doppler_factor`: what the driver makes of the Doppler.
@@ -46,6 +47,8 @@ Searched searchOn(const std::string& motion, std::uint64_t seed, double doppler_
   options.up_I = Eigen::Vector3d::UnitZ();
   result.search = searchMounting(radarVelocities(scans).velocities, track, options);
   result.error = so3::log((result.search.q_IR * T_IR.q_IR.conjugate()).normalized());
+  const Eigen::Vector3d apart = result.search.lever_arm_I - T_IR.l_I;
+  result.lever_arm_nees = apart.cwiseQuotient(result.search.lever_arm_sigma).squaredNorm() / 3.0;
   return result;
 }
 
@@ -53,6 +56,17 @@ Extrinsics tilted(std::uint64_t seed) {
   const double k = static_cast<double>(seed);
   return {{0.1, -0.05, 0.08},
           so3::exp({1.3 * std::sin(k), 2.0 * std::cos(2.0 * k), 2.5 * std::sin(3.0 * k)})};
+}
+
+TEST(MountingSearch, TheLeverArmIsWithinItsSigma) {
+  for (const char* motion : {"medium", "ground_vehicle"}) {
+    double nees = 0.0;
+    constexpr int kSeeds = 6;
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed)
+      nees += searchOn(motion, seed, 1.0, tilted(seed)).lever_arm_nees / kSeeds;
+    std::printf("%s: NEES %.2f\n", motion, nees);
+    EXPECT_LT(nees, 2.0) << motion;
+  }
 }
 
 TEST(MountingSearch, AnyMountingAndSignIsFoundWithinItsSigma) {

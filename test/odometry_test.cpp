@@ -233,7 +233,7 @@ TEST_F(AtRest, ThePosesFromBeforeAJumpAreNotLostAtTheEnd) {
   odometry.addScan(restScan(103.95));
   run(104.1);
   time += 1000.0;
-  run(time + 0.5);
+  run(time + 0.6);
   ASSERT_FALSE(odometry.initialized());
   const std::vector<ScanResult> last = odometry.finish();
   ASSERT_EQ(last.size(), 1u);

@@ -135,7 +135,7 @@ void findNoise(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
 }
 
 void findRest(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
-  constexpr double kStart = 10.0;  // [s] in which rest must begin
+  constexpr double kStart = 10.0;  // [s] in which the rest must be complete
   StaticInitializerOptions options;
   options.max_gravity_error = 2.0;  // what is off by more is reported as such
   StaticInitializer rest(options, kGravity);

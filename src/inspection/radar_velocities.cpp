@@ -66,9 +66,35 @@ constexpr double kMinApart = 0.15, kMaxApart = 0.6;  // [s]
 constexpr double kMaxTurn = 0.12;                    // [rad]
 const double kSameDirection = std::cos(0.14);        // 8 degrees: the noise of an elevation
 
+struct RangedPoint {
+  Eigen::Vector3d u_R;
+  double range, doppler;
+};
+/// A scan for the comparison with others.
+struct RangedScan {
+  Time stamp;
+  std::vector<RangedPoint> points;
+};
+
+std::vector<RangedScan> rangedScans(const std::vector<RadarScan>& scans) {
+  // Every point is compared with every other: a dense cloud shows its sign with a part of its points.
+  constexpr std::size_t kMost = 200;
+  std::vector<RangedScan> result;
+  for (const RadarScan& scan : scans) {
+    result.push_back({scan.stamp, {}});
+    const std::size_t stride = 1 + scan.points.size() / (kMost + 1);
+    for (std::size_t i = 0; i < scan.points.size(); i += stride) {
+      const RadarPoint& point = scan.points[i];
+      const double range = point.position_R.norm();
+      result.back().points.push_back({point.position_R / range, range, point.doppler});
+    }
+  }
+  return result;
+}
+
 /// Calls `compare` with the two scans of each pair, and the time between them [s].
 template <typename Compare>
-void forPairs(const std::vector<RadarScan>& scans, const InertialTrack& track, Compare&& compare) {
+void forPairs(const std::vector<RangedScan>& scans, const InertialTrack& track, Compare&& compare) {
   for (std::size_t i = 0; i < scans.size(); ++i) {
     for (std::size_t k = i + 1; k < scans.size(); ++k) {
       const double apart = scans[k].stamp - scans[i].stamp;
@@ -166,18 +192,17 @@ DopplerSign dopplerSignFromRanges(const std::vector<RadarScan>& scans, const Ine
   DopplerSign result;
   double sum = 0.0, squares = 0.0;
   int pairs = 0;  // of scans that voted
-  forPairs(scans, track, [&](const RadarScan& scan, const RadarScan& later, double apart) {
+  forPairs(rangedScans(scans), track, [&](const RangedScan& scan, const RangedScan& later, double apart) {
     double vote = 0.0;
-    for (const RadarPoint& point : scan.points) {
+    for (const RangedPoint& point : scan.points) {
       const double shift = point.doppler * apart;
       if (std::abs(shift) < kMinShift) continue;
-      const double range = point.position_R.norm();
       double receding = kFar, approaching = kFar;  // nearest match under either sign
-      for (const RadarPoint& other : later.points) {
-        const double other_range = other.position_R.norm();
-        if (point.position_R.dot(other.position_R) < kSameDirection * range * other_range) continue;
-        receding = std::min(receding, std::abs(other_range - range - shift));
-        approaching = std::min(approaching, std::abs(other_range - range + shift));
+      for (const RangedPoint& other : later.points) {
+        if (point.u_R.dot(other.u_R) < kSameDirection) continue;
+        const double change = other.range - point.range;
+        receding = std::min(receding, std::abs(change - shift));
+        approaching = std::min(approaching, std::abs(change + shift));
       }
       vote += approaching - receding;
     }
@@ -203,16 +228,16 @@ RangeRatio rangeRatio(const std::vector<RadarScan>& scans, const InertialTrack& 
   RatioVotes all;
   std::vector<RatioVotes> parts(kParts);
   std::size_t matches = 0;
-  forPairs(scans, track, [&](const RadarScan& scan, const RadarScan& later, double apart) {
-    const auto index = static_cast<std::size_t>(&scan - scans.data());
-    RatioVotes& part = parts[index * kParts / scans.size()];
-    for (const RadarPoint& point : scan.points) {
+  const std::vector<RangedScan> ranged = rangedScans(scans);
+  forPairs(ranged, track, [&](const RangedScan& scan, const RangedScan& later, double apart) {
+    const auto index = static_cast<std::size_t>(&scan - ranged.data());
+    RatioVotes& part = parts[index * kParts / ranged.size()];
+    for (const RangedPoint& point : scan.points) {
       if (std::abs(point.doppler) < large) continue;
-      const double range = point.position_R.norm();
-      for (const RadarPoint& other : later.points) {
-        const double other_range = other.position_R.norm(), change = other_range - range;
+      for (const RangedPoint& other : later.points) {
+        const double change = other.range - point.range;
         if (std::abs(change) < kMinChange) continue;
-        if (point.position_R.dot(other.position_R) < kSameDirection * range * other_range) continue;
+        if (point.u_R.dot(other.u_R) < kSameDirection) continue;
         const double doppler = 0.5 * (point.doppler + other.doppler);  // it may change on the way
         if (std::abs(doppler) < large) continue;
         part.add(change, doppler * apart);

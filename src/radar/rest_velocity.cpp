@@ -119,9 +119,9 @@ bool directionsAgreeOnMotion(const std::vector<RadarDirection>& points, const Eg
   const double explained = b.dot(H.ldlt().solve(b));
   const double freedom = count - 3.0;
   if (!(freedom > 0.0)) return false;
-  // Quantile of the F distribution, within 4 % from 20 degrees of freedom on.
-  const double limit = kDeniesRest / 3.0 * (1.0 + 9.0 / freedom);
-  return explained / 3.0 > limit * (all - explained) / freedom;
+  // The likelihood ratio of a Gaussian scatter that is not known.
+  const double unexplained = std::max(0.0, all - explained);
+  return freedom * std::log1p(explained / unexplained) > kDeniesRest;
 }
 
 std::optional<SlowVelocity> findSlowVelocity(const std::vector<RadarDirection>& points,
