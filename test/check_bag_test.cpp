@@ -175,6 +175,24 @@ TEST_F(CheckBag, ManyEmptyCloudsAreOdd) {
              {"points", "0 /", "40 % of the clouds are empty"});
 }
 
+// Some drivers send clouds of one size, filled up with zeros.
+TEST_F(CheckBag, PointsAtRangeZeroAreNone) {
+  Changes changes;
+  changes.cloud = [](sensor_msgs::PointCloud2& cloud) {
+    sensor_msgs::PointCloud2Modifier modifier(cloud);
+    modifier.resize(modifier.size() + 64);
+    return true;
+  };
+  const auto textOf = [](const BagCheck& check) {
+    const auto found = std::find_if(check.findings.begin(), check.findings.end(),
+                                    [](const Finding& finding) { return finding.subject == "points"; });
+    return found == check.findings.end() ? std::string() : found->text;
+  };
+  const std::string text = textOf(check(bag_, false));
+  EXPECT_FALSE(text.empty());
+  EXPECT_EQ(textOf(check(rewritten("filled_up", changes), false)), text);
+}
+
 TEST_F(CheckBag, ScansBeforeTheStartAreNotMissed) {
   const BagCheck plain = check(bag_);
   const RunSummary summary = run(plain);

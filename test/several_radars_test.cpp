@@ -93,7 +93,7 @@ TEST(TwoRadars, AreUsedInTheSameOrderHoweverTheImuComes) {
   }
 }
 
-// So do the scans that still wait when the data end.
+// When the data end, some scans still wait. They are used in the order of measurement, too.
 TEST(TwoRadars, AreUsedInTheSameOrderAtTheEnd) {
   SimulatedRun run = pair("difficult", 1, 20.0);
   run.run();

@@ -77,7 +77,7 @@ struct RangedScan {
 };
 
 std::vector<RangedScan> rangedScans(const std::vector<RadarScan>& scans) {
-  // Every point is compared with every other: a dense cloud shows its sign with a part of its points.
+  // Each point is compared with each of the other scan. So many show the sign, and more take minutes.
   constexpr std::size_t kMost = 200;
   std::vector<RangedScan> result;
   for (const RadarScan& scan : scans) {

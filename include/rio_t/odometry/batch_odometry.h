@@ -27,8 +27,8 @@ class BatchOdometry {
   BatchOdometry(const OdometryOptions& options, const BatchOptions& batch);
 
   /// Takes every sample that the online run got, in turn with its results, and checks and bridges it in the
-  /// same way. If the clock of the IMU jumped, it forgets all before. Throws std::runtime_error for a jump
-  /// after the online run `has_started`.
+  /// same way. If the clock of the IMU jumps before the online run `has_started`, all samples so far are
+  /// forgotten. Throws std::runtime_error if it jumps later.
   void addImu(ImuMeasurement imu, bool has_started = true);
   /// The points are not kept.
   void addResult(ScanResult result);
