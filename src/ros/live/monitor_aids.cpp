@@ -24,11 +24,9 @@ void LiveMonitor::pressureDropped(const std::string& why) {
 
 void LiveMonitor::describeBarometer(Status& status) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const std::uint64_t fresh = barometer_.pressures - barometer_.pressures_reported;
+  const bool is_silent = barometer_.silence.lasts(barometer_.pressures, kSilentCalls);
   const std::uint64_t fresh_used = barometer_.used - barometer_.used_reported;
-  barometer_.pressures_reported = barometer_.pressures;
   barometer_.used_reported = barometer_.used;
-  barometer_.silent_calls = fresh == 0 ? barometer_.silent_calls + 1 : 0;
   status.add("pressures", barometer_.pressures);
   status.add("pressures_not_usable", barometer_.not_usable);
   status.add("means_used", barometer_.used);
@@ -45,7 +43,7 @@ void LiveMonitor::describeBarometer(Status& status) {
     status.summary(DiagnosticStatus::WARN,
                    "no pressure yet on " + config_.barometer_topic +
                        wrongType(config_.barometer_topic, "sensor_msgs/FluidPressure"));
-  } else if (barometer_.silent_calls >= kSilentCalls) {
+  } else if (is_silent) {
     status.summary(DiagnosticStatus::WARN, "the barometer is silent, topic " + config_.barometer_topic);
   } else if (barometer_.not_usable == barometer_.pressures) {
     status.summary(DiagnosticStatus::WARN, "no pressure can be used: " + barometer_.why_not_usable);

@@ -86,25 +86,29 @@ class LiveMonitor {
     std::uint64_t count = 0;
     void add(double seconds);
   };
+  struct Silence {
+    std::uint64_t reported = 0;  // the count at the last call
+    std::size_t calls = 0;       // in a row, to which the count stood still
+
+    /// Whether it stood still to this call and to the `at_least` - 1 before it.
+    bool lasts(std::uint64_t count, std::size_t at_least) {
+      calls = std::exchange(reported, count) == count ? calls + 1 : 0;
+      return calls >= at_least;
+    }
+  };
   struct Counter {
     std::uint64_t count = 0;
-    std::uint64_t reported = 0;    // count when it was last reported
-    std::size_t silent_calls = 0;  // in a row
-
-    /// Whether nothing came before this call and the `calls` - 1 before it.
-    bool isSilent(std::size_t calls) {
-      silent_calls = std::exchange(reported, count) == count ? silent_calls + 1 : 0;
-      return silent_calls >= calls;
-    }
+    Silence silence;
+    bool isSilent(std::size_t calls) { return silence.lasts(count, calls); }
   };
   /// The calls come once a second. A radar or a barometer may send as seldom, and then misses a call at
   /// times.
   static constexpr std::size_t kSilentCalls = 2;
 
   struct Barometer : BarometerCounts {
-    std::uint64_t not_usable = 0, pressures_reported = 0, used_reported = 0;
-    std::size_t silent_calls = 0;  ///< as Counter has it
-    std::string why_not_usable;    ///< of the last one
+    Silence silence;
+    std::uint64_t not_usable = 0, used_reported = 0;
+    std::string why_not_usable;  ///< of the last one
   };
 
   /// What has become of the scans of a radar.
