@@ -67,26 +67,25 @@ TEST_F(BagRunner, EveryScanIsAccountedFor) {
 }
 
 TEST_F(BagRunner, StepAndSpanOfTheDopplerAreToldWithTheirSources) {
-  const auto told = [&](const DopplerStep& step, const KnownSpan& span, const char* in_summary,
+  const auto told = [&](const KnownDoppler& step, const KnownDoppler& span, const char* in_summary,
                         const char* in_table) {
     RunSummary summary;
     summary.radars.emplace_back();
-    summary.radars.front().doppler_step = step;
-    summary.radars.front().doppler_span = span;
+    summary.radars.front().knowledge = {{}, step, span};
     RunOutput(out_).finish(summary);
     EXPECT_NE(contents(out_ + "/summary.yaml").find(in_summary), std::string::npos) << in_summary;
     EXPECT_NE(describeRun(summary, out_).find(in_table), std::string::npos) << in_table;
   };
-  told({0.125, DopplerStepSource::kUnknown}, {},
+  told({0.125, DopplerSource::kUnknown}, {},
        "radar_doppler_step: 0.125000\nradar_doppler_step_from: unknown\n", "not known");
-  told({0.49, DopplerStepSource::kGiven}, {},
+  told({0.49, DopplerSource::kGiven}, {},
        "radar_doppler_step: 0.490000\nradar_doppler_step_from: given\n", "0.490 m/s, given");
-  told({0.0, DopplerStepSource::kData}, {}, "radar_doppler_step: 0.000000\nradar_doppler_step_from: data\n",
+  told({0.0, DopplerSource::kData}, {}, "radar_doppler_step: 0.000000\nradar_doppler_step_from: data\n",
        "none, from the data");
   told({}, {}, "radar_doppler_span: 0.000000\nradar_doppler_span_from: unknown\n", "none seen");
-  told({}, {4.0, DopplerStepSource::kGiven}, "radar_doppler_span: 4.000000\nradar_doppler_span_from: given\n",
+  told({}, {4.0, DopplerSource::kGiven}, "radar_doppler_span: 4.000000\nradar_doppler_span_from: given\n",
        "4.000 m/s, given");
-  told({}, {3.0, DopplerStepSource::kData}, "radar_doppler_span: 3.000000\nradar_doppler_span_from: data\n",
+  told({}, {3.0, DopplerSource::kData}, "radar_doppler_span: 3.000000\nradar_doppler_span_from: data\n",
        "3.000 m/s, from the data");
 }
 

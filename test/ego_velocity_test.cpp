@@ -136,18 +136,18 @@ void observe(EgoVelocityEstimator& estimator, double step, Random& random) {
 TEST(EgoVelocity, WhatFollowsFromTheStepFollowsIt) {
   Random random(13);
   EgoVelocityEstimator estimator{EgoVelocityOptions()};
-  const auto expect = [&](double step, DopplerStepSource source, double inlier, double zero) {
-    EXPECT_EQ(estimator.dopplerStep().source, source);
+  const auto expect = [&](double step, DopplerSource source, double inlier, double zero) {
+    EXPECT_EQ(estimator.knowledge().doppler_step.source, source);
     EXPECT_NEAR(estimator.options().doppler_quantization, step, 1e-9);
     EXPECT_NEAR(estimator.noise().quantization, step * step / 12.0, 1e-9);
     EXPECT_NEAR(estimator.options().ransac_inlier_threshold, inlier, 1e-9);
     EXPECT_NEAR(estimator.options().zero_velocity_threshold, zero, 1e-9);
   };
-  expect(0.5, DopplerStepSource::kUnknown, 0.25 + 2.5 * 0.035, 0.25);
+  expect(0.5, DopplerSource::kUnknown, 0.25 + 2.5 * 0.035, 0.25);
   observe(estimator, 0.125, random);
-  expect(0.125, DopplerStepSource::kData, 0.15, 0.0625);
+  expect(0.125, DopplerSource::kData, 0.15, 0.0625);
   observe(estimator, 0.0, random);
-  expect(0.0, DopplerStepSource::kData, 2.5 * 0.035, 1.5 * 0.035);
+  expect(0.0, DopplerSource::kData, 2.5 * 0.035, 1.5 * 0.035);
 }
 
 TEST(EgoVelocity, WhatIsGivenDoesNotFollowTheStep) {
@@ -165,7 +165,7 @@ TEST(EgoVelocity, WhatIsGivenDoesNotFollowTheStep) {
   o.doppler_quantization = 0.25;
   EgoVelocityEstimator step(o);
   observe(step, 0.5, random);
-  EXPECT_EQ(step.dopplerStep().source, DopplerStepSource::kGiven);
+  EXPECT_EQ(step.knowledge().doppler_step.source, DopplerSource::kGiven);
   EXPECT_EQ(step.options().doppler_quantization, 0.25);
   EXPECT_NEAR(step.options().ransac_inlier_threshold, 0.125 + 2.5 * 0.035, 1e-9);
 }
@@ -250,10 +250,10 @@ TEST(EgoVelocity, TheSpanShowsInTheScansAlone) {
       for (RadarPoint& p : scan.points) p.doppler = unwrapped(p.doppler, 0.0, span);
       estimator.observe(scan);
       if (i < 5) {
-        EXPECT_EQ(estimator.dopplerSpan().value, 0.0) << "few scans may agree by chance";
+        EXPECT_EQ(estimator.knowledge().doppler_span.value, 0.0) << "few scans may agree by chance";
       }
     }
-    EXPECT_NEAR(estimator.dopplerSpan().value, span, span > 0.0 ? 0.13 : 0.0);
+    EXPECT_NEAR(estimator.knowledge().doppler_span.value, span, span > 0.0 ? 0.13 : 0.0);
     const EgoVelocity e = estimator.estimate(scan);
     EXPECT_EQ(e.status, EgoVelocityStatus::kMoving);
     EXPECT_LT((e.v_R - fast).norm(), 0.3);
@@ -266,7 +266,7 @@ TEST(EgoVelocity, AScanThatComesTwiceDoesNotConfirmItself) {
   RadarScan scan = staticScene({0.3, 2.4, 0.1}, 40, {0.02, 0.03, 0.02, 0.125}, random);
   for (RadarPoint& p : scan.points) p.doppler = unwrapped(p.doppler, 0.0, 3.0);
   for (int i = 0; i < 20; ++i) estimator.observe(scan);
-  EXPECT_EQ(estimator.dopplerSpan().value, 0.0);
+  EXPECT_EQ(estimator.knowledge().doppler_span.value, 0.0);
 }
 
 /// A driver that publishes its last scan again, with a new stamp.

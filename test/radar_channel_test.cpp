@@ -96,7 +96,7 @@ TEST(RadarChannel, AScanThatComesTwiceCountsOnce) {
     EXPECT_EQ(second.rejected_because, "duplicate_stamp");
     EXPECT_FALSE(second.was_predicted || second.innovation || second.alone);
   }
-  EXPECT_EQ(once.channel.noise().doppler, twice.channel.noise().doppler);
+  EXPECT_EQ(once.channel.knowledge().noise.doppler, twice.channel.knowledge().noise.doppler);
   EXPECT_GT(rejected, 0u);
 }
 

@@ -159,8 +159,8 @@ TEST(Aliasing, ShowsItsSpanBeforeAStartInMotion) {
   SimulatedRun run("ground_vehicle", 2, 30.0, 0.0);
   run.setup.radar.doppler_span = 4.0;
   run.run();
-  EXPECT_EQ(run.odometry->radarDopplerSpan().source, DopplerStepSource::kData);
-  EXPECT_NEAR(run.odometry->radarDopplerSpan().value, 4.0, 1e-6);
+  EXPECT_EQ(run.odometry->radarKnowledge().doppler_span.source, DopplerSource::kData);
+  EXPECT_NEAR(run.odometry->radarKnowledge().doppler_span.value, 4.0, 1e-6);
   ASSERT_TRUE(run.odometry->start());
   EXPECT_EQ(run.odometry->start()->from, InitializedFrom::kMotion);
   EXPECT_LT(run.seconds(run.odometry->start()->time), 10.0);

@@ -168,7 +168,7 @@ RadarVelocities radarVelocities(const std::vector<RadarScan>& scans) {
   RadarVelocities result;
   EgoVelocityEstimator estimator(inspectionOptions());
   for (const RadarScan& scan : scans) estimator.observe(scan);  // the step, before the first velocity
-  result.doppler_step = estimator.dopplerStep();
+  result.doppler_step = estimator.knowledge().doppler_step;
   result.has_elevation = hasElevation(scans);
   for (std::size_t next = 0; next < scans.size();) {
     RadarScan group = nextGroup(scans, &next);

@@ -75,10 +75,10 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
   result.left_window = std::exchange(left_between_, {});
   const Time stamp = result.scan.stamp;
   RadarChannel& radar = radars_.at(result.scan.radar);
-  const bool had_span = radar.dopplerSpan().value > 0.0;
+  const bool had_span = radar.knowledge().doppler_span.value > 0.0;
   const bool is_new = radar.observe(result.scan);
   // The velocities so far took the Dopplers with another span, or without one. They are wrong.
-  if ((radar.dopplerSpan().value > 0.0) != had_span) initializer_.forgetVelocities();
+  if ((radar.knowledge().doppler_span.value > 0.0) != had_span) initializer_.forgetVelocities();
   if (!initialized()) {
     result.ego_velocity = radar.velocityOf(result.scan);
     if (is_new) initializer_.addVelocity(result.scan.radar, stamp, result.ego_velocity);
@@ -177,7 +177,7 @@ void Estimator::seeLandmarks(const LandmarkMap::Prediction& expected, const Rada
   Block* node = smoother_.nodeAt(radar.nodeTime(result.scan.stamp));
   if (node == nullptr || answer.at_rest || answer.ego_velocity.status != EgoVelocityStatus::kMoving) return;
   const EgoVelocityOptions& own = options_.ofRadar(result.scan.radar).ego_velocity;
-  const PointVariances& noise = radar.noise();
+  const PointVariances noise = radar.knowledge().noise;
   // The noise that the Dopplers show does not contain how far an echo wanders over an object.
   const double azimuth_sigma = std::max(own.azimuth_sigma, std::sqrt(noise.azimuth));
   const double elevation_sigma = std::max(own.elevation_sigma, std::sqrt(noise.elevation));

@@ -177,16 +177,8 @@ std::optional<RadarInertialOdometry::Start> RadarInertialOdometry::start() const
   return impl_->estimator.start();
 }
 
-PointVariances RadarInertialOdometry::radarNoise(std::size_t radar) const {
-  return impl_->estimator.radar(radar).noise();
-}
-
-DopplerStep RadarInertialOdometry::radarDopplerStep(std::size_t radar) const {
-  return impl_->estimator.radar(radar).dopplerStep();
-}
-
-KnownSpan RadarInertialOdometry::radarDopplerSpan(std::size_t radar) const {
-  return impl_->estimator.radar(radar).dopplerSpan();
+RadarKnowledge RadarInertialOdometry::radarKnowledge(std::size_t radar) const {
+  return impl_->estimator.radar(radar).knowledge();
 }
 
 MeasuredImuNoise RadarInertialOdometry::imuNoise() const { return impl_->navigation.imuNoise(); }

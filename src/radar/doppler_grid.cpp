@@ -106,12 +106,12 @@ std::size_t mostWithin(const Batch& ascending, double width) {
 DopplerGrid::DopplerGrid(double given) {
   if (!(given >= 0.0) || !std::isfinite(given))
     throw std::invalid_argument("Doppler grid: the step must be finite and at least 0 m/s");
-  step_ = given > 0.0 ? DopplerStep{given < kLeastStep ? 0.0 : given, DopplerStepSource::kGiven}
-                      : DopplerStep{kLargestUsualStep, DopplerStepSource::kUnknown};
+  step_ = given > 0.0 ? KnownDoppler{given < kLeastStep ? 0.0 : given, DopplerSource::kGiven}
+                      : KnownDoppler{kLargestUsualStep, DopplerSource::kUnknown};
 }
 
 void DopplerGrid::add(const RadarScan& scan) {
-  if (step_.source == DopplerStepSource::kGiven) return;
+  if (step_.source == DopplerSource::kGiven) return;
   for (const RadarPoint& point : scan.points) {
     const double size = std::abs(point.doppler);
     // Zero is a multiple of every step.
@@ -129,7 +129,7 @@ void DopplerGrid::judge() {
   count_ = 0;
   std::sort(batch_.begin(), batch_.end());
   std::optional<Reading> found;
-  if (step_.source == DopplerStepSource::kData && step_.value > 0.0) {
+  if (step_.source == DopplerSource::kData && step_.value > 0.0) {
     // The known step stays as it is: a misfit that comes near to a multiple must not move it.
     if (countMisfits(batch_, {step_.value, known_at_}) <= kMaxMisfits) {
       without_step_ = 0;
@@ -144,7 +144,7 @@ void DopplerGrid::judge() {
     if (mostWithin(batch_, 4.0 * kRounding) + kMaxMisfits >= kBatch) {
       const double value = batch_[kBatch / 2];
       const bool repeats = mostWithin(batch_, kSame) + kMaxMisfits >= kBatch;
-      if (step_.source == DopplerStepSource::kUnknown && repeats && value < kLargestStep) step_.value = value;
+      if (step_.source == DopplerSource::kUnknown && repeats && value < kLargestStep) step_.value = value;
       count_ = kBatch / 2;
       return;
     }
@@ -156,17 +156,17 @@ void DopplerGrid::judge() {
   }
   if (found) {
     without_step_ = 0;
-    step_ = {found->step, DopplerStepSource::kData};
+    step_ = {found->step, DopplerSource::kData};
     known_at_ = found->known_at;
   } else if (2 * mostWithin(batch_, kSame) < kBatch && ++without_step_ >= kBatchesWithoutStep) {
     // Without steps no value repeats. At rest, among misfits, one step does.
-    step_ = {0.0, DopplerStepSource::kData};
+    step_ = {0.0, DopplerSource::kData};
   }
 }
 
-std::string toString(DopplerStepSource source) {
+std::string toString(DopplerSource source) {
   constexpr const char* kNames[] = {"unknown", "given", "data"};
-  static_assert(std::size(kNames) == static_cast<std::size_t>(DopplerStepSource::kData) + 1);
+  static_assert(std::size(kNames) == static_cast<std::size_t>(DopplerSource::kData) + 1);
   return kNames[static_cast<std::size_t>(source)];
 }
 

@@ -12,8 +12,8 @@ namespace {
 /// Dopplers seen by more, and be a span off to within less.
 constexpr double kClearly = 1.5;
 /// The number of scans that shows a span. The points of one scan share its velocity, so they are one witness.
-/// It is no chance if ten scans more show the span than do not. As many points show that a span is too small:
-/// fewer are errors of the transmission.
+/// It is no chance if ten scans more show the span than do not. As many points show that a span is too small,
+/// but not one now and then: that is an error of the transmission.
 constexpr int kEnough = 10;
 /// [spans] A step may be finer than the noise; it then counts as this.
 constexpr double kFinestStep = 0.05;
@@ -32,6 +32,7 @@ bool DopplerSpan::reachesBothEnds(const std::vector<RadarDirection>& points, dou
 void DopplerSpan::learn(const std::vector<RadarDirection>& points,
                         const std::optional<Eigen::Vector3d>& expected_v_R, double step) {
   if (given_ > 0.0) return;
+  const int outside_before = outside_;
   for (const RadarDirection& p : points) {
     if (std::abs(p.doppler) >= DopplerGrid::kLargestDoppler) continue;
     if (lowest_ <= p.doppler && p.doppler <= highest_) continue;
@@ -40,6 +41,7 @@ void DopplerSpan::learn(const std::vector<RadarDirection>& points,
     highest_ = std::max(highest_, p.doppler);
     outside_ = 0;
   }
+  if (outside_ == outside_before) outside_ = std::max(0, outside_ - 1);
   if (lowest_ > highest_) return;
   possible_ = highest_ - lowest_ + step;
   const double margin = clearly(step);

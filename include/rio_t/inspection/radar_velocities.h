@@ -18,7 +18,7 @@ struct RadarVelocity {
 
 struct RadarVelocities {
   std::vector<RadarVelocity> velocities;  ///< in the order of the scans
-  DopplerStep doppler_step;
+  KnownDoppler doppler_step;
   bool has_elevation = true;
 };
 

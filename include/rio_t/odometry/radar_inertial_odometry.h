@@ -61,12 +61,8 @@ class RadarInertialOdometry {
   /// The time and the prior of the first node; none before initialisation. Only in the thread of `process`.
   using Start = Initialization;
   std::optional<Start> start() const;
-  /// Noise of a radar's points, as learned so far. Call it from the thread that calls `process`.
-  PointVariances radarNoise(std::size_t radar = 0) const;
-  /// Step of a radar's Doppler, as known so far. Call it from the thread that calls `process`.
-  DopplerStep radarDopplerStep(std::size_t radar = 0) const;
-  /// Span of a radar's Doppler, likewise.
-  KnownSpan radarDopplerSpan(std::size_t radar = 0) const;
+  /// What the scans of a radar have shown of it so far. Only in the thread of `process`.
+  RadarKnowledge radarKnowledge(std::size_t radar = 0) const;
   /// Noise of the IMU, measured over the last second. Any thread.
   MeasuredImuNoise imuNoise() const;
   /// Root mean square of it since the first sample. Any thread.

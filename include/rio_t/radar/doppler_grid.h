@@ -8,17 +8,20 @@
 
 namespace rio_t {
 
-/// The source of the Doppler step.
-enum class DopplerStepSource {
-  kUnknown,  ///< not known yet: the largest that it can be
+/// The source of the step or the span of a Doppler.
+enum class DopplerSource {
+  kUnknown,  ///< not known yet
   kGiven,    ///< the user gave it
-  kData,     ///< read off the data; 0 if the data show no step
+  kData,     ///< read off the data; a step of 0 if the data show none
 };
-std::string toString(DopplerStepSource source);  ///< "unknown", "given" or "data"
+std::string toString(DopplerSource source);  ///< "unknown", "given" or "data"
 
-struct DopplerStep {
-  double value = 0.0;  ///< [m/s]; 0: the Doppler has no steps, or so small ones that they do not matter
-  DopplerStepSource source = DopplerStepSource::kUnknown;
+/// The step or the span of a radar's Doppler, as far as it is known.
+struct KnownDoppler {
+  /// [m/s] Step: 0 if the Doppler has none, or so small ones that they do not matter; the largest that it can
+  /// be while it is unknown. Span: 0 if the data show none.
+  double value = 0.0;
+  DopplerSource source = DopplerSource::kUnknown;
 };
 
 /// Reads the step of a radar's Doppler off the data: all values are multiples of it.
@@ -37,7 +40,7 @@ class DopplerGrid {
   /// Takes all points of a scan, wherever they lie. 45 points take 1 us. If the radar has no steps, `add`
   /// tries all candidates again and again: that takes 9 us at 1 m/s and 70 us at 10 m/s.
   void add(const RadarScan& scan);
-  DopplerStep step() const { return step_; }
+  KnownDoppler step() const { return step_; }
 
   /// [m/s] The step while all values are zero: the largest of the usual steps, 0.03 to 0.5. A smaller one
   /// would take a slow motion for rest, and be sure of it.
@@ -51,7 +54,7 @@ class DopplerGrid {
 
   void judge();
 
-  DopplerStep step_;
+  KnownDoppler step_;
   double known_at_ = 1.0;  ///< [steps] of the value that it was read off
   Batch batch_ = {};       ///< sizes of Dopplers [m/s]
   std::size_t count_ = 0;  ///< of `batch_` that are in use

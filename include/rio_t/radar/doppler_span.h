@@ -16,12 +16,6 @@ inline double unwrapped(double doppler, double expected, double span) {
   return span > 0.0 ? doppler + span * std::round((expected - doppler) / span) : doppler;
 }
 
-/// A span as far as it is known.
-struct KnownSpan {
-  double value = 0.0;  ///< [m/s]; 0: the data show none
-  DopplerStepSource source = DopplerStepSource::kUnknown;
-};
-
 /// The span of a radar's Doppler. A Doppler beyond the span comes back on the other side (aliasing).
 ///
 /// If the span is not given, DopplerSpan reads it off the data. A span shows in two ways: no Doppler is
@@ -35,9 +29,9 @@ class DopplerSpan {
   /// would confirm any span that it was fitted with. `step` is that of the Doppler [m/s].
   void learn(const std::vector<RadarDirection>& points, const std::optional<Eigen::Vector3d>& expected_v_R,
              double step);
-  KnownSpan known() const {
-    if (given_ > 0.0) return {given_, DopplerStepSource::kGiven};
-    return found_ ? KnownSpan{possible_, DopplerStepSource::kData} : KnownSpan{};
+  KnownDoppler known() const {
+    if (given_ > 0.0) return {given_, DopplerSource::kGiven};
+    return found_ ? KnownDoppler{possible_, DopplerSource::kData} : KnownDoppler{};
   }
   double value() const { return known().value; }  ///< [m/s] 0: no span is known
   /// Whether a scan can show the span: some of its points read about the lowest Doppler seen, and some about
@@ -56,7 +50,7 @@ class DopplerSpan {
   double judged_ = 0.0;  ///< the span that scans_ is about
   bool found_ = false;
   int scans_ = 0;    ///< by how many more scans showed the span than did not, of late
-  int outside_ = 0;  ///< points that read more than the span that was found
+  int outside_ = 0;  ///< points that read more than the span that was found, of late
 };
 
 }  // namespace rio_t

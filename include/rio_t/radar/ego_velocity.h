@@ -66,6 +66,12 @@ struct EgoVelocityOptions {
   double max_sigma = 0.5;                ///< [m/s] largest axis of the estimate, in motion
 };
 
+/// What the scans of a radar have shown of it so far.
+struct RadarKnowledge {
+  PointVariances noise;
+  KnownDoppler doppler_step, doppler_span;
+};
+
 /// Whether a scan gave a velocity and, if not, why.
 enum class EgoVelocityStatus {
   kMoving,          ///< solved for from the inliers
@@ -145,10 +151,8 @@ class EgoVelocityEstimator {
   void learn(const RadarScan& scan, const EgoVelocity& estimated,
              const std::optional<VelocityPrior>& prior = std::nullopt,
              const DopplerLikelihood* world = nullptr);
-  /// The noise as learned so far.
+  RadarKnowledge knowledge() const { return {noise(), grid_.step(), span_.known()}; }
   const PointVariances& noise() const { return noise_.variances(); }
-  DopplerStep dopplerStep() const { return grid_.step(); }
-  KnownSpan dopplerSpan() const { return span_.known(); }
   /// The options in use. Those that are 0, "from the step", have the values that follow from it.
   const EgoVelocityOptions& options() const { return options_; }
 

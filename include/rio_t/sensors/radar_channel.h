@@ -107,9 +107,7 @@ class RadarChannel {
   double offsetSigma(double variance) const;
   /// One for each block of calibration().
   std::vector<FixedLagSmoother::RandomWalk> randomWalks() const;
-  const PointVariances& noise() const { return estimator_.noise(); }  ///< of the points, as learned so far
-  DopplerStep dopplerStep() const { return estimator_.dopplerStep(); }
-  KnownSpan dopplerSpan() const { return estimator_.dopplerSpan(); }
+  RadarKnowledge knowledge() const { return estimator_.knowledge(); }
 
  private:
   /// Forgets what an earlier window has shown.

@@ -74,9 +74,7 @@ RunSummary BagPlayer::summary(const RunLog& log) const {
   for (std::size_t k = 0; k < radars_.size(); ++k) {
     const Radar& radar = radars_[k];
     RadarSummary& radar_summary = summary.radars[k];
-    radar_summary.noise = odometry_.radarNoise(k);
-    radar_summary.doppler_step = odometry_.radarDopplerStep(k);
-    radar_summary.doppler_span = odometry_.radarDopplerSpan(k);
+    radar_summary.knowledge = odometry_.radarKnowledge(k);
     for (std::size_t i = 0; i < 3; ++i) {
       constexpr std::array<double, 3> kShares = {0.1, 0.5, 0.9};
       radar_summary.points_per_scan[i] = static_cast<std::uint64_t>(quantile(radar.scan_sizes, kShares[i]));

@@ -10,22 +10,22 @@
 namespace rio_t {
 namespace {
 
-std::string describeStep(const DopplerStep& step) {
+std::string describeStep(const KnownDoppler& step) {
   switch (step.source) {
-    case DopplerStepSource::kUnknown:
+    case DopplerSource::kUnknown:
       return "not known: too few points that move; " + fixedText(step.value, 3) + " m/s was taken";
-    case DopplerStepSource::kGiven:
+    case DopplerSource::kGiven:
       return fixedText(step.value, 3) + " m/s, given";
-    case DopplerStepSource::kData:
+    case DopplerSource::kData:
       break;
   }
   return (step.value > 0.0 ? fixedText(step.value, 3) + " m/s" : std::string("none")) + ", from the data";
 }
 
-std::string describeSpan(const KnownSpan& span) {
-  if (span.source == DopplerStepSource::kUnknown) return "none seen";
+std::string describeSpan(const KnownDoppler& span) {
+  if (span.source == DopplerSource::kUnknown) return "none seen";
   return fixedText(span.value, 3) + " m/s, " +
-         (span.source == DopplerStepSource::kGiven ? "given" : "from the data: faster points come back");
+         (span.source == DopplerSource::kGiven ? "given" : "from the data: faster points come back");
 }
 
 /// "3 late, 1 empty"
@@ -64,11 +64,11 @@ void describeRadar(const RadarSummary& radar, const Row& row) {
   row("time offset", fixedText(1e3 * radar.final_offset_s, 2) + " ms, sigma " +
                          fixedText(1e3 * radar.final_offset_sigma_s, 2) + " ms");
   if (radar.extrinsics) describeExtrinsics(*radar.extrinsics, row);
-  row("radar noise", "Doppler " + fixedText(std::sqrt(radar.noise.doppler), 3) + " m/s, azimuth " +
-                         fixedText(std::sqrt(radar.noise.azimuth), 3) + " rad, elevation " +
-                         fixedText(std::sqrt(radar.noise.elevation), 3) + " rad");
-  row("Doppler step", describeStep(radar.doppler_step));
-  row("Doppler span", describeSpan(radar.doppler_span));
+  row("radar noise", "Doppler " + fixedText(std::sqrt(radar.knowledge.noise.doppler), 3) + " m/s, azimuth " +
+                         fixedText(std::sqrt(radar.knowledge.noise.azimuth), 3) + " rad, elevation " +
+                         fixedText(std::sqrt(radar.knowledge.noise.elevation), 3) + " rad");
+  row("Doppler step", describeStep(radar.knowledge.doppler_step));
+  row("Doppler span", describeSpan(radar.knowledge.doppler_span));
 }
 
 void describeAids(const RunSummary& summary, const Row& row) {

@@ -98,7 +98,7 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
                                      : "") +
           ", " + format.power);
   for (const std::string& odd : format.odd) radar->odd("format", odd);
-  const DopplerStep& step = looked.velocities.doppler_step;
+  const KnownDoppler& step = looked.velocities.doppler_step;
   const bool sparse = radar->isSparse();
   constexpr double kManyEmpty = 0.2;  // a radar that leaves out what stands still sees nothing at rest
   const bool often_empty = c.empty > kManyEmpty;

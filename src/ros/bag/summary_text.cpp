@@ -90,14 +90,14 @@ void addEstimates(SummaryLines& lines, const RadarSummary& radar) {
 void addMeasured(SummaryLines& lines, const RadarSummary& radar) {
   const std::string suffix = suffixOf(radar.name);
   lines.beginMap("radar_noise" + suffix);  // standard deviations [m/s, rad, rad]
-  lines.add("doppler", fixedText(std::sqrt(radar.noise.doppler), 4));
-  lines.add("azimuth", fixedText(std::sqrt(radar.noise.azimuth), 4));
-  lines.add("elevation", fixedText(std::sqrt(radar.noise.elevation), 4));
+  lines.add("doppler", fixedText(std::sqrt(radar.knowledge.noise.doppler), 4));
+  lines.add("azimuth", fixedText(std::sqrt(radar.knowledge.noise.azimuth), 4));
+  lines.add("elevation", fixedText(std::sqrt(radar.knowledge.noise.elevation), 4));
   lines.endMap();
-  lines.add("radar_doppler_step" + suffix, fixedText(radar.doppler_step.value, 6));  // [m/s]
-  lines.add("radar_doppler_step_from" + suffix, toString(radar.doppler_step.source));
-  lines.add("radar_doppler_span" + suffix, fixedText(radar.doppler_span.value, 6));  // [m/s]
-  lines.add("radar_doppler_span_from" + suffix, toString(radar.doppler_span.source));
+  lines.add("radar_doppler_step" + suffix, fixedText(radar.knowledge.doppler_step.value, 6));  // [m/s]
+  lines.add("radar_doppler_step_from" + suffix, toString(radar.knowledge.doppler_step.source));
+  lines.add("radar_doppler_span" + suffix, fixedText(radar.knowledge.doppler_span.value, 6));  // [m/s]
+  lines.add("radar_doppler_span_from" + suffix, toString(radar.knowledge.doppler_span.source));
   lines.beginMap("radar_points_per_scan" + suffix);
   lines.add("p10", radar.points_per_scan[0]);
   lines.add("p50", radar.points_per_scan[1]);

@@ -86,26 +86,28 @@ void LiveLog::faults(const std::shared_ptr<LiveSession>& session) {
   }
 }
 
-void LiveLog::dopplerStep(const Config& radar, const DopplerStep& step, DopplerStep* reported) const {
-  if (step.source == DopplerStepSource::kUnknown) return;
-  if (step.source == reported->source && step.value == reported->value) return;
-  *reported = step;
-  const char* from = step.source == DopplerStepSource::kGiven ? "given" : "read off the data";
+void LiveLog::doppler(const Config& radar, const RadarKnowledge& now, RadarKnowledge* reported) const {
+  const auto changed = [](const KnownDoppler& known, const KnownDoppler& before) {
+    return known.source != DopplerSource::kUnknown &&
+           (known.source != before.source || known.value != before.value);
+  };
+  const auto from = [](const KnownDoppler& known) {
+    return known.source == DopplerSource::kGiven ? "given" : "read off the data";
+  };
   const std::string whose = withName(name_ + ": Doppler of radar", radar);
-  if (step.value > 0.0) {
-    ROS_INFO_STREAM(whose << " comes in steps of " << step.value << " m/s, " << from);
-  } else {
-    ROS_INFO_STREAM(whose << " has no steps, " << from);
+  const KnownDoppler& step = now.doppler_step;
+  if (changed(step, reported->doppler_step)) {
+    if (step.value > 0.0) {
+      ROS_INFO_STREAM(whose << " comes in steps of " << step.value << " m/s, " << from(step));
+    } else {
+      ROS_INFO_STREAM(whose << " has no steps, " << from(step));
+    }
   }
-}
-
-void LiveLog::dopplerSpan(const Config& radar, const KnownSpan& span, KnownSpan* reported) const {
-  if (span.source == DopplerStepSource::kUnknown || span.value == reported->value) return;
-  *reported = span;
-  ROS_INFO_STREAM(withName(name_ + ": Doppler of radar", radar)
-                  << " spans " << span.value << " m/s, "
-                  << (span.source == DopplerStepSource::kGiven ? "given" : "read off the data")
-                  << ": faster points come back on the other side");
+  const KnownDoppler& span = now.doppler_span;
+  if (changed(span, reported->doppler_span))
+    ROS_INFO_STREAM(whose << " spans " << span.value << " m/s, " << from(span)
+                          << ": faster points come back on the other side");
+  *reported = now;
 }
 
 }  // namespace rio_t

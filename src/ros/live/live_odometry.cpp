@@ -363,10 +363,9 @@ bool LiveOdometry::onSaveTrajectory(std_srvs::Trigger::Request& /*request*/,
 }
 
 void LiveOdometry::solve() {
-  Session published;                        // whose results ~path holds
-  std::vector<DopplerStep> reported_steps;  // of the radars of that session
-  std::vector<KnownSpan> reported_spans;    // likewise
-  bool has_reported_start = false;          // of that session
+  Session published;                     // whose results ~path holds
+  std::vector<RadarKnowledge> reported;  // of the radars of that session
+  bool has_reported_start = false;       // of that session
   while (true) {
     {
       std::unique_lock<std::mutex> lock(mutex_);
@@ -379,8 +378,7 @@ void LiveOdometry::solve() {
     if (published != now) {
       if (published) publisher_.clear();
       published = now;
-      reported_steps.assign(radars_.size(), DopplerStep());
-      reported_spans.assign(radars_.size(), KnownSpan());
+      reported.assign(radars_.size(), RadarKnowledge());
       has_reported_start = false;
     }
     try {
@@ -404,10 +402,8 @@ void LiveOdometry::solve() {
         ROS_INFO_STREAM(name_ << ": started from " << toString(now->odometry().start()->from) << "; ~odom "
                               << (waiting_for.empty() ? "is published" : "waits for " + waiting_for));
       }
-      for (std::size_t k = 0; k < radars_.size(); ++k) {
-        log_.dopplerStep(radars_[k].config, now->odometry().radarDopplerStep(k), &reported_steps[k]);
-        log_.dopplerSpan(radars_[k].config, now->odometry().radarDopplerSpan(k), &reported_spans[k]);
-      }
+      for (std::size_t k = 0; k < radars_.size(); ++k)
+        log_.doppler(radars_[k].config, now->odometry().radarKnowledge(k), &reported[k]);
       if (more) wakeSolver();  // one scan at a time, so that stopping and resets are heeded between them
     } catch (const std::exception& error) {
       ROS_ERROR_STREAM(name_ << ": the estimator failed: " << error.what());

@@ -61,9 +61,7 @@ struct RadarSummary : RadarEstimate {
   std::array<std::uint64_t, kPointVerdicts> scans_emptied = {};
   double snr_sum_db = 0.0;      ///< over `points`
   double silent_seconds = 0.0;  ///< as RunEvidence::silent_seconds, but without the scans of other radars
-  PointVariances noise;         ///< of its points, as learned; the file has its standard deviations
-  DopplerStep doppler_step;     ///< as known at the end; the file has its source as a key of its own
-  KnownSpan doppler_span;       ///< likewise
+  RadarKnowledge knowledge;     ///< at the end; the file has standard deviations of the noise
   std::array<std::uint64_t, 3> points_per_scan = {};  ///< quantiles of 10, 50 and 90 % of the scans
   std::vector<double> pass_offsets_s;                 ///< after each pass; only with mode refine
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< of the newest mounting from the configured one [rad]

@@ -41,10 +41,8 @@ class LiveLog {
   /// Logs what the session's counters of faults have counted since the last call, but for what `health` logs.
   /// Call it always from the same thread.
   void faults(const std::shared_ptr<LiveSession>& session);
-  /// Logs the step of a radar's Doppler, if it differs from the one reported.
-  void dopplerStep(const Config& radar, const DopplerStep& step, DopplerStep* reported) const;
-  /// Logs that a radar's Doppler has a span, if it differs from the one reported.
-  void dopplerSpan(const Config& radar, const KnownSpan& span, KnownSpan* reported) const;
+  /// Logs the step and the span of a radar's Doppler, if they differ from those reported.
+  void doppler(const Config& radar, const RadarKnowledge& now, RadarKnowledge* reported) const;
 
  private:
   static constexpr double kPeriod = 5.0;  // [s]
