@@ -78,8 +78,8 @@ TEST_F(BagRunner, StepAndSpanOfTheDopplerAreToldWithTheirSources) {
   };
   told({0.125, DopplerSource::kUnknown}, {},
        "radar_doppler_step: 0.125000\nradar_doppler_step_from: unknown\n", "not known");
-  told({0.49, DopplerSource::kGiven}, {},
-       "radar_doppler_step: 0.490000\nradar_doppler_step_from: given\n", "0.490 m/s, given");
+  told({0.49, DopplerSource::kGiven}, {}, "radar_doppler_step: 0.490000\nradar_doppler_step_from: given\n",
+       "0.490 m/s, given");
   told({0.0, DopplerSource::kData}, {}, "radar_doppler_step: 0.000000\nradar_doppler_step_from: data\n",
        "none, from the data");
   told({}, {}, "radar_doppler_span: 0.000000\nradar_doppler_span_from: unknown\n", "none seen");

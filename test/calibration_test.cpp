@@ -20,22 +20,22 @@ TEST(CombineOffset, ThePriorCountsOnce) {
   const OffsetEstimate prior{0.0, 1.0};
   const OffsetEstimate first{4.0 * 2.0 / 5.0, std::sqrt(1.0 / 5.0)};
   const OffsetEstimate second{9.0 * 3.0 / 10.0, std::sqrt(1.0 / 10.0)};
-  const CombinedOffset combined = combine(prior, {first, second});
-  EXPECT_TRUE(combined.agree);
+  const Combined<OffsetEstimate> combined = combine(prior, {first, second});
+  EXPECT_TRUE(combined.agreement.agree());
   EXPECT_NEAR(combined.estimate.t_O, (4.0 * 2.0 + 9.0 * 3.0) / 14.0, 1e-12);
   EXPECT_NEAR(combined.estimate.sigma, std::sqrt(1.0 / 14.0), 1e-12);
 }
 
 TEST(CombineOffset, OneRunStaysAsItIs) {
-  const CombinedOffset combined = combine({0.01, 0.075}, {{0.03, 0.002}});
-  EXPECT_TRUE(combined.agree);
+  const Combined<OffsetEstimate> combined = combine({0.01, 0.075}, {{0.03, 0.002}});
+  EXPECT_TRUE(combined.agreement.agree());
   EXPECT_NEAR(combined.estimate.t_O, 0.03, 1e-12);
   EXPECT_NEAR(combined.estimate.sigma, 0.002, 1e-12);
 }
 
 TEST(CombineOffset, RunsThatDifferGiveTheirMeanAndTheirScatter) {
-  const CombinedOffset combined = combine({0.0, 0.075}, {{0.012, 0.001}, {0.045, 0.001}});
-  EXPECT_FALSE(combined.agree);
+  const Combined<OffsetEstimate> combined = combine({0.0, 0.075}, {{0.012, 0.001}, {0.045, 0.001}});
+  EXPECT_FALSE(combined.agreement.agree());
   EXPECT_NEAR(combined.estimate.t_O, 0.0285, 1e-12);
   // Two numbers 33 ms apart scatter by 33 / sqrt(2); and each has its own sigma.
   EXPECT_NEAR(combined.estimate.sigma, std::sqrt(0.033 * 0.033 / 2.0 + 1e-6), 1e-12);
@@ -44,7 +44,7 @@ TEST(CombineOffset, RunsThatDifferGiveTheirMeanAndTheirScatter) {
 TEST(CombineOffset, TheLimitIsAt2Point6Sigma) {
   // The sigma of the difference is 1.414 ms; the prior hardly matters.
   const auto agree = [](double apart) {
-    return combine({0.0, 1.0}, std::vector<OffsetEstimate>{{0.0, 0.001}, {apart, 0.001}}).agree;
+    return combine({0.0, 1.0}, std::vector<OffsetEstimate>{{0.0, 0.001}, {apart, 0.001}}).agreement.agree();
   };
   EXPECT_TRUE(agree(2.55 * 0.001414));
   EXPECT_FALSE(agree(2.65 * 0.001414));
@@ -52,14 +52,14 @@ TEST(CombineOffset, TheLimitIsAt2Point6Sigma) {
 
 TEST(CombineOffset, ARunThatDidNotObserveItDoesNotDiffer) {
   const OffsetEstimate unobserved{0.0, 0.074};
-  const CombinedOffset combined = combine({0.0, 0.075}, {{0.2, 0.001}, unobserved});
-  EXPECT_TRUE(combined.agree);
+  const Combined<OffsetEstimate> combined = combine({0.0, 0.075}, {{0.2, 0.001}, unobserved});
+  EXPECT_TRUE(combined.agreement.agree());
   EXPECT_NEAR(combined.estimate.t_O, 0.2, 1e-4);
-  EXPECT_FALSE(combine({0.0, 0.075}, {{0.2, 0.001}, unobserved, {0.1, 0.001}}).agree);
+  EXPECT_FALSE(combine({0.0, 0.075}, {{0.2, 0.001}, unobserved, {0.1, 0.001}}).agreement.agree());
 }
 
 TEST(CombineOffset, ARunThatKnowsLessThanWasToldTakesNothingAway) {
-  const CombinedOffset combined = combine({0.0, 0.075}, {{0.02, 0.001}, {0.1, 0.5}});
+  const Combined<OffsetEstimate> combined = combine({0.0, 0.075}, {{0.02, 0.001}, {0.1, 0.5}});
   EXPECT_NEAR(combined.estimate.t_O, 0.02, 1e-12);
   EXPECT_NEAR(combined.estimate.sigma, 0.001, 1e-12);
 }
@@ -100,7 +100,7 @@ class CombineExtrinsics : public testing::Test {
 TEST_F(CombineExtrinsics, OneRunStaysAsItIs) {
   ExtrinsicsEstimate run = estimate({0.05, -0.02, 0.08}, {0.1, 0.2, 0.3}, sigmas(0.01, 0.004));
   run.covariance(0, 4) = run.covariance(4, 0) = 2e-5;
-  const CombinedExtrinsics combined = combine(prior_, {run});
+  const Combined<ExtrinsicsEstimate> combined = combine(prior_, {run});
   EXPECT_LT(combined.estimate.T_IR.q_IR.angularDistance(run.T_IR.q_IR), 1e-12);
   EXPECT_TRUE(combined.estimate.T_IR.l_I.isApprox(run.T_IR.l_I, 1e-12));
   EXPECT_TRUE(combined.estimate.covariance.isApprox(run.covariance, 1e-9));
@@ -109,7 +109,7 @@ TEST_F(CombineExtrinsics, OneRunStaysAsItIs) {
 
 TEST_F(CombineExtrinsics, TwoRunsThatSayTheSameHaveSmallerSigmas) {
   const ExtrinsicsEstimate run = estimate({0.05, -0.02, 0.08}, {0.1, 0.2, 0.3}, sigmas(0.01, 0.004));
-  const CombinedExtrinsics combined = combine(prior_, {run, run});
+  const Combined<ExtrinsicsEstimate> combined = combine(prior_, {run, run});
   // 2 / 0.01^2 - 1 / 0.17^2 and 2 / 0.004^2 - 1 / 0.05^2
   EXPECT_NEAR(std::sqrt(combined.estimate.covariance(1, 1)), 1.0 / std::sqrt(20000.0 - 34.602), 1e-5);
   EXPECT_NEAR(std::sqrt(combined.estimate.covariance(5, 5)), 1.0 / std::sqrt(125000.0 - 400.0), 1e-8);
@@ -124,8 +124,9 @@ TEST_F(CombineExtrinsics, ARunGivesWhatItObserved) {
   Eigen::VectorXd only_x = sigmas(0.17, 0.05), only_y = only_x;
   only_x[0] = 0.001;
   only_y[1] = 0.001;
-  const CombinedExtrinsics combined = combine(prior_, {estimate({0.006, 0.0, 0.0}, {0, 0, 0}, only_x),
-                                                       estimate({0.0, 0.003, 0.0}, {0, 0, 0}, only_y)});
+  const Combined<ExtrinsicsEstimate> combined = combine(
+      prior_,
+      {estimate({0.006, 0.0, 0.0}, {0, 0, 0}, only_x), estimate({0.0, 0.003, 0.0}, {0, 0, 0}, only_y)});
   EXPECT_TRUE(turnOf(combined.estimate).isApprox(Eigen::Vector3d(0.006, 0.003, 0.0), 0.01));
   // The tangents at the two runs differ by half of their turn, which mixes in 3 mrad of what is not known.
   EXPECT_NEAR(std::sqrt(combined.estimate.covariance(0, 0)), 0.001, 2e-4);
@@ -135,7 +136,7 @@ TEST_F(CombineExtrinsics, ARunGivesWhatItObserved) {
 }
 
 TEST_F(CombineExtrinsics, RunsThatDifferWidenTheSigmas) {
-  const CombinedExtrinsics combined =
+  const Combined<ExtrinsicsEstimate> combined =
       combine(prior_, {estimate({0.00, 0, 0}, {0, 0, 0}, sigmas(0.001, 0.05)),
                        estimate({0.02, 0, 0}, {0, 0, 0}, sigmas(0.001, 0.05))});
   // Each is 10 sigma from the mean in one direction of three: chi-squared 200.
@@ -153,7 +154,7 @@ TEST_F(CombineExtrinsics, ARotationAloneHasThreeNumbers) {
   const ExtrinsicsEstimate prior =
       estimate(Eigen::Vector3d::Zero(), {1, 2, 3}, Eigen::Vector3d::Constant(0.17));
   const ExtrinsicsEstimate run = estimate({0.05, 0.0, 0.0}, {1, 2, 3}, Eigen::Vector3d::Constant(0.01));
-  const CombinedExtrinsics combined = combine(prior, {run, run});
+  const Combined<ExtrinsicsEstimate> combined = combine(prior, {run, run});
   EXPECT_EQ(combined.estimate.covariance.rows(), 3);
   EXPECT_EQ(combined.estimate.T_IR.l_I, Eigen::Vector3d(1, 2, 3));
   EXPECT_EQ(combined.agreement.degrees_of_freedom, 3);
@@ -216,7 +217,7 @@ TEST_F(Verdicts, WhatIsNotEstimatedIsSaidSo) {
 
 TEST_F(Verdicts, AnOffsetThatDiffersIsObservedAndSaidToDiffer) {
   const RadarCalibration calibration = calibrate(told_, {{{-0.1, 0.001}, prior_}, {{0.1, 0.001}, prior_}});
-  EXPECT_FALSE(calibration.offsets_agree);
+  EXPECT_FALSE(calibration.offset_agreement.agree());
   EXPECT_EQ(axisOf(calibration, CalibrationAxis::kOffset).verdict, Verdict::kObserved);
   EXPECT_NEAR(calibration.offset.sigma, 0.2 / std::sqrt(2.0), 1e-4);
 }

@@ -14,7 +14,8 @@ TEST(PointFilter, TheFirstFailedTestIsNamed) {
     return PointFilter(o).judge({p, 0.0, snr});
   };
   EXPECT_EQ(judge({0.0, 5.0, 0.0}, 10.0), PointVerdict::kKept);
-  EXPECT_EQ(judge({0.0, 0.0, 0.0}, 10.0), PointVerdict::kNoDirection);
+  EXPECT_EQ(judge({0.0, 0.0, 0.0}, 10.0), PointVerdict::kNoMeasurement);
+  EXPECT_EQ(PointFilter(o).judge({{0.0, 5.0, 0.0}, -999.0, 10.0}), PointVerdict::kNoMeasurement);
   EXPECT_EQ(judge({0.0, 0.1, 0.0}, 10.0), PointVerdict::kTooNear);
   EXPECT_EQ(judge({0.0, 500.0, 0.0}, 0.0), PointVerdict::kTooFar);
   EXPECT_EQ(judge({0.0, 5.0, 0.0}, 0.0), PointVerdict::kTooWeak);

@@ -126,13 +126,13 @@ void calibrateOffset(const OffsetEstimate& configured, const std::vector<RadarCa
   std::vector<OffsetEstimate> offsets;
   offsets.reserve(runs.size());
   for (const RadarCalibrationEstimate& run : runs) offsets.push_back(run.offset);
-  const CombinedOffset combined = combine(configured, offsets);
-  calibration->offsets_agree = combined.agree;
+  const Combined<OffsetEstimate> combined = combine(configured, offsets);
+  calibration->offset_agreement = combined.agreement;
   axis.found = combined.estimate.t_O;
   axis.sigma = combined.estimate.sigma;
   axis.configured_sigma = configured.sigma;
   // Runs that disagree have each observed it.
-  axis.verdict = combined.agree ? verdictOf(axis.sigma, configured.sigma) : Verdict::kObserved;
+  axis.verdict = combined.agreement.agree() ? verdictOf(axis.sigma, configured.sigma) : Verdict::kObserved;
   if (axis.verdict == Verdict::kObserved) calibration->offset = combined.estimate;
 }
 
@@ -149,7 +149,7 @@ void calibrateExtrinsics(const ExtrinsicsEstimate& configured,
   std::vector<ExtrinsicsEstimate> estimates;
   estimates.reserve(runs.size());
   for (const RadarCalibrationEstimate& run : runs) estimates.push_back(run.extrinsics);
-  const CombinedExtrinsics combined = combine(configured, estimates);
+  const Combined<ExtrinsicsEstimate> combined = combine(configured, estimates);
   calibration->extrinsics_agreement = combined.agreement;
 
   const Eigen::Vector3d found = turnBetween(configured.T_IR, combined.estimate.T_IR);
@@ -185,7 +185,7 @@ bool Agreement::agree() const {
 
 double Agreement::widening() const { return agree() ? 1.0 : std::sqrt(chi_squared / degrees_of_freedom); }
 
-Combined combine(const Gaussian& prior, const std::vector<Gaussian>& posteriors) {
+Combined<Gaussian> combine(const Gaussian& prior, const std::vector<Gaussian>& posteriors) {
   if (posteriors.empty()) throw std::invalid_argument("calibration: nothing to combine");
   // In units of the prior's sigma, about its mean: the prior has information 1 in each direction.
   const Eigen::LLT<Eigen::MatrixXd> root(prior.covariance);
@@ -203,7 +203,7 @@ Combined combine(const Gaussian& prior, const std::vector<Gaussian>& posteriors)
       if (direction.information > 0.0)
         sum.add(direction);  // less than the prior is rounding, or a step of the offset
   }
-  Combined result;
+  Combined<Gaussian> result;
   result.agreement = agreementOf(runs, size);
   const double factor = std::pow(result.agreement.widening(), 2);
   const Eigen::MatrixXd covariance = inverse(one + sum.A / factor);
@@ -213,8 +213,8 @@ Combined combine(const Gaussian& prior, const std::vector<Gaussian>& posteriors)
   return result;
 }
 
-CombinedExtrinsics combine(const ExtrinsicsEstimate& prior,
-                           const std::vector<ExtrinsicsEstimate>& posteriors) {
+Combined<ExtrinsicsEstimate> combine(const ExtrinsicsEstimate& prior,
+                                     const std::vector<ExtrinsicsEstimate>& posteriors) {
   if (posteriors.empty()) throw std::invalid_argument("calibration: nothing to combine");
   const ExtrinsicsManifold manifold(prior.covariance.rows() == 3 ? EstimateExtrinsics::kRotation
                                                                  : EstimateExtrinsics::kPose);
@@ -223,20 +223,20 @@ CombinedExtrinsics combine(const ExtrinsicsEstimate& prior,
   tangents.reserve(posteriors.size());
   for (const ExtrinsicsEstimate& posterior : posteriors)
     tangents.push_back(inTangent(manifold, posterior, origin));
-  const Combined combined = combine(inTangent(manifold, prior, origin), tangents);
+  const Combined<Gaussian> combined = combine(inTangent(manifold, prior, origin), tangents);
   Eigen::VectorXd x = origin;
   manifold.plus(origin.data(), combined.estimate.mean.data(), x.data());
   // The step from the first run is small, so its tangent serves at the mean, too.
   return {{toExtrinsics(x.data()), combined.estimate.covariance}, combined.agreement};
 }
 
-CombinedOffset combine(const OffsetEstimate& prior, const std::vector<OffsetEstimate>& posteriors) {
+Combined<OffsetEstimate> combine(const OffsetEstimate& prior, const std::vector<OffsetEstimate>& posteriors) {
   std::vector<Gaussian> gaussians;
   gaussians.reserve(posteriors.size());
   for (const OffsetEstimate& posterior : posteriors) gaussians.push_back(asGaussian(posterior));
-  const Combined combined = combine(asGaussian(prior), gaussians);
-  if (!combined.agreement.agree()) return {scattered(prior.sigma, posteriors), false};
-  return {{combined.estimate.mean[0], std::sqrt(combined.estimate.covariance(0, 0))}, true};
+  const Combined<Gaussian> combined = combine(asGaussian(prior), gaussians);
+  if (!combined.agreement.agree()) return {scattered(prior.sigma, posteriors), combined.agreement};
+  return {{combined.estimate.mean[0], std::sqrt(combined.estimate.covariance(0, 0))}, combined.agreement};
 }
 
 std::string toString(Verdict verdict) {

@@ -34,7 +34,6 @@ void DopplerSpan::learn(const std::vector<RadarDirection>& points,
   if (given_ > 0.0) return;
   const int outside_before = outside_;
   for (const RadarDirection& p : points) {
-    if (std::abs(p.doppler) >= DopplerGrid::kLargestDoppler) continue;
     if (lowest_ <= p.doppler && p.doppler <= highest_) continue;
     if (found_ && ++outside_ < kEnough) continue;
     lowest_ = std::min(lowest_, p.doppler);

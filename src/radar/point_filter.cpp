@@ -46,8 +46,8 @@ PointFilter::PointFilter(const EgoVelocityOptions& o)
 PointVerdict PointFilter::judge(const RadarPoint& point) const {
   const double range = point.position_R.norm();
   // At range zero there is no direction, whatever min_range says. NaN fails every comparison.
-  if (!(range > 0.0) || !std::isfinite(range) || !std::isfinite(point.doppler))
-    return PointVerdict::kNoDirection;
+  if (!(range > 0.0) || !std::isfinite(range) || !(std::abs(point.doppler) < kLargestDoppler))
+    return PointVerdict::kNoMeasurement;
   if (range < min_range_) return PointVerdict::kTooNear;
   if (range > max_range_) return PointVerdict::kTooFar;
   if (!(point.snr_db >= min_snr_db_)) return PointVerdict::kTooWeak;

@@ -29,14 +29,16 @@ struct Agreement {
   double widening() const;
 };
 
+/// An estimate from several runs.
+template <typename Estimate>
 struct Combined {
-  Gaussian estimate;
+  Estimate estimate;
   Agreement agreement;
 };
 
 /// Combines the posteriors of runs that started from the same prior. Each posterior contains the prior, which
 /// must count only once: L = L0 + sum (L_i - L0). If the runs disagree, `widening` lowers the sum.
-Combined combine(const Gaussian& prior, const std::vector<Gaussian>& posteriors);
+Combined<Gaussian> combine(const Gaussian& prior, const std::vector<Gaussian>& posteriors);
 
 /// Extrinsics with their covariance in the tangent of ExtrinsicsManifold: 3x3 of a turn, or 6x6 with lever.
 struct ExtrinsicsEstimate {
@@ -44,14 +46,9 @@ struct ExtrinsicsEstimate {
   Eigen::MatrixXd covariance;
 };
 
-struct CombinedExtrinsics {
-  ExtrinsicsEstimate estimate;
-  Agreement agreement;
-};
-
 /// The same for extrinsics, in the tangent at the first posterior.
-CombinedExtrinsics combine(const ExtrinsicsEstimate& prior,
-                           const std::vector<ExtrinsicsEstimate>& posteriors);
+Combined<ExtrinsicsEstimate> combine(const ExtrinsicsEstimate& prior,
+                                     const std::vector<ExtrinsicsEstimate>& posteriors);
 
 /// Time offset of a radar.
 struct OffsetEstimate {
@@ -59,13 +56,9 @@ struct OffsetEstimate {
   double sigma = 0.0;  ///< [s]
 };
 
-struct CombinedOffset {
-  OffsetEstimate estimate;
-  /// False: each run may have its own offset. The estimate is their mean; its sigma covers their scatter.
-  bool agree = true;
-};
-
-CombinedOffset combine(const OffsetEstimate& prior, const std::vector<OffsetEstimate>& posteriors);
+/// If the runs disagree, each may have its own offset: the estimate is their mean, its sigma covers their
+/// scatter.
+Combined<OffsetEstimate> combine(const OffsetEstimate& prior, const std::vector<OffsetEstimate>& posteriors);
 
 /// A number is observed if its sigma is at most this share of the configured one. The runs then say three
 /// times as much of it as the configuration: 1 / 0.5^2 = 1 + 3. Above that, much of it is the configured
@@ -108,8 +101,7 @@ struct RadarCalibration {
   std::array<AxisCalibration, kCalibrationAxes> axes;  ///< by CalibrationAxis
   OffsetEstimate offset;                               ///< as configured if it is not observed
   Extrinsics T_IR;                                     ///< likewise, each axis by itself
-  bool offsets_agree = true;
-  Agreement extrinsics_agreement;
+  Agreement offset_agreement, extrinsics_agreement;
 
   /// [rad] The largest sigma of a turn of T_IR: as found, or as configured if it is not observed.
   double turnSigma() const { return largestSigma(CalibrationAxis::kTurnX); }

@@ -60,7 +60,12 @@ struct Tuning {
   ImuNoise imu_noise;
   InnovationGateOptions innovation_gate;
 };
-Tuning tuningOf(const OdometryOptions& options);
-void apply(const Tuning& tuning, OdometryOptions& options);
+inline Tuning tuningOf(const OdometryOptions& options) {
+  return {options.imu_noise, options.innovation_gate};
+}
+inline void apply(const Tuning& tuning, OdometryOptions& options) {
+  options.imu_noise = tuning.imu_noise;
+  options.innovation_gate = tuning.innovation_gate;
+}
 
 }  // namespace rio_t

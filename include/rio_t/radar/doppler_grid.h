@@ -45,8 +45,6 @@ class DopplerGrid {
   /// [m/s] The step while all values are zero: the largest of the usual steps, 0.03 to 0.5. A smaller one
   /// would take a slow motion for rest, and be sure of it.
   static constexpr double kLargestUsualStep = 0.5;
-  /// [m/s] A larger value is a mark of the driver, like -999 for "no Doppler".
-  static constexpr double kLargestDoppler = 100.0;
 
  private:
   static constexpr std::size_t kBatch = 16;

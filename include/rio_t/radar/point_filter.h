@@ -13,13 +13,13 @@ namespace rio_t {
 /// The verdict of the filter of the ego-velocity on a point.
 enum class PointVerdict {
   kKept,
-  kNoDirection,  ///< at range zero, or not finite
-  kTooNear,      ///< below min_range
-  kTooFar,       ///< above max_range
-  kTooWeak,      ///< below min_snr_db
-  kBesideView,   ///< beyond max_azimuth
-  kAboveView,    ///< beyond max_elevation, up or down
-  kAmbiguous,    ///< has the range, Doppler and SNR of another point
+  kNoMeasurement,  ///< at range zero, with a Doppler above kLargestDoppler, or not finite
+  kTooNear,        ///< below min_range
+  kTooFar,         ///< above max_range
+  kTooWeak,        ///< below min_snr_db
+  kBesideView,     ///< beyond max_azimuth
+  kAboveView,      ///< beyond max_elevation, up or down
+  kAmbiguous,      ///< has the range, Doppler and SNR of another point
 };
 constexpr std::size_t kPointVerdicts = 8;
 

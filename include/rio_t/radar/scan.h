@@ -17,6 +17,9 @@ struct RadarPoint {
   bool is_ambiguous = false;  ///< the radar could not tell the direction, see markAmbiguous()
 };
 
+/// [m/s] A larger Doppler is a mark of the driver, like -999 for "no Doppler".
+constexpr double kLargestDoppler = 100.0;
+
 /// One scan of the radar. All points are finite (the decoder drops and counts the others).
 struct RadarScan {
   Time stamp;  ///< as stamped, in the IMU clock; measured at stamp - t_O

@@ -55,7 +55,7 @@ std::string remarks(const CalibratedRadar& radar) {
     text += std::string("  The ") + kAxes[axis].name + " is " + fixedText(far, 1) +
             " sigma away from it, by the given sigma: are topic, axes, signs and units right?\n";
   }
-  if (!radar.calibration.offsets_agree) {
+  if (!radar.calibration.offset_agreement.agree()) {
     std::string offsets;
     for (const OffsetEstimate& offset : radar.offsets)
       appendItem(&offsets, fixedText(1e3 * offset.t_O, 2) + " ms");

@@ -83,8 +83,9 @@ class RadarCauses {
     filter(PointVerdict::kAboveView, "points_above_view",
            "higher or lower than " + key_ + "radar_max_elevation " + number(o.max_elevation) + " rad.",
            "The axes of the cloud are probably others: set " + key_ + "radar_axes to rfu or flu.");
-    filter(PointVerdict::kNoDirection, "points_without_direction", "at range zero.",
-           "Check the names of the position fields: " + key_ + "radar_field_x and the next ones.");
+    filter(PointVerdict::kNoMeasurement, "points_without_measurement",
+           "at range zero, or have a Doppler of " + number(kLargestDoppler) + " m/s or more.",
+           "Check the names of the fields: " + key_ + "radar_field_x and the next ones.");
     filter(
         PointVerdict::kAmbiguous, "points_ambiguous",
         "ambiguous: the radar reports one echo at several directions, with the same range, Doppler and SNR.",
