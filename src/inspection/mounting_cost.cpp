@@ -30,23 +30,13 @@ constexpr double kOutlier = 3.0;           // [sigma] from which on a velocity c
 /// A window adds to the mounting its first velocity in G and the gravity in G.
 constexpr Eigen::Index kMounting = kMountingM + kMountingL, kOwn = 6, kUnknowns = kMounting + kOwn;
 
-/// Rows A x = y of one velocity: x = (M, l, v_w, g_w).
+/// Of one velocity: A x = y + w + its own noise, x = (M, l, v_w, g_w). w is the random walk of the IMU's
+/// noise since the beginning of the window.
 struct Rows {
-  MatrixXd A = MatrixXd::Zero(3, kUnknowns);
-  Vector3d y;
+  MatrixXd Ay = MatrixXd::Zero(3, kUnknowns + 1);  ///< A, and y as the last column
+  Matrix3d covariance;                             ///< of its own noise
+  double walked = 0.0;                             ///< variance that w gained since the velocity before
 };
-
-Rows rowsOf(const RadarVelocity& velocity, double offset, Time begin, const InertialTrack& track) {
-  const Time time = velocity.stamp - offset;
-  const Matrix3d R = track.rotation(time).toRotationMatrix();
-  Rows rows;
-  for (int j = 0; j < 3; ++j) rows.A.middleCols<3>(3L * j) = velocity.v_R[j] * R;
-  rows.A.block<3, 3>(0, kMountingM) = -R * so3::hat(track.rate(time));
-  rows.A.block<3, 3>(0, kMounting) = -Matrix3d::Identity();
-  rows.A.block<3, 3>(0, kMounting + 3) = -(time - begin) * Matrix3d::Identity();
-  rows.y = track.impulse(time) - track.impulse(begin);
-  return rows;
-}
 
 /// Covariance of a velocity in G. It is known in R; before M is, its mean stands for all axes.
 Matrix3d covariance(const RadarVelocity& velocity, const Matrix3d& R_GI, const std::optional<Matrix3d>& M) {
@@ -56,32 +46,27 @@ Matrix3d covariance(const RadarVelocity& velocity, const Matrix3d& R_GI, const s
   return model + T * velocity.covariance * T.transpose();
 }
 
-/// All rows of a window, and their covariance: that of each velocity, and the random walk of the IMU's noise
-/// since the beginning, which all later ones share.
-struct WindowRows {
-  MatrixXd A;
-  VectorXd y;
-  MatrixXd covariance;
-};
-
-WindowRows rowsOf(const VelocityWindow& window, double offset, const std::optional<Matrix3d>& M,
-                  const MountingProblem& problem) {
-  const Eigen::Index count = static_cast<Eigen::Index>(window.size());
-  const Time begin = window.front().velocity->stamp - offset;
+std::vector<Rows> rowsOf(const VelocityWindow& window, double offset, const std::optional<Matrix3d>& M,
+                         const MountingProblem& problem) {
   const double density = problem.options.accel_density * problem.options.accel_density;
-  WindowRows all{MatrixXd(3 * count, kUnknowns), VectorXd(3 * count), MatrixXd::Zero(3 * count, 3 * count)};
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const WeightedVelocity& each = window[static_cast<std::size_t>(i)];
-    const Rows rows = rowsOf(*each.velocity, offset, begin, problem.track);
-    all.A.middleRows(3 * i, 3) = rows.A;
-    all.y.segment(3 * i, 3) = rows.y;
-    const Matrix3d R_GI = problem.track.rotation(each.velocity->stamp - offset).toRotationMatrix();
-    all.covariance.block(3 * i, 3 * i, 3, 3) = covariance(*each.velocity, R_GI, M) / each.weight;
-    const double walked = density * (each.velocity->stamp - window.front().velocity->stamp);
-    for (Eigen::Index k = i; k < count; ++k) {
-      all.covariance.block(3 * i, 3 * k, 3, 3).diagonal().array() += walked;
-      if (k != i) all.covariance.block(3 * k, 3 * i, 3, 3).diagonal().array() += walked;
-    }
+  const Time begin = window.front().velocity->stamp - offset;
+  const Vector3d impulse = problem.track.impulse(begin);
+  std::vector<Rows> all;
+  Time last = begin;
+  for (const WeightedVelocity& each : window) {
+    const RadarVelocity& velocity = *each.velocity;
+    const Time time = velocity.stamp - offset;
+    const Matrix3d R = problem.track.rotation(time).toRotationMatrix();
+    Rows rows;
+    for (int j = 0; j < 3; ++j) rows.Ay.middleCols<3>(3L * j) = velocity.v_R[j] * R;
+    rows.Ay.block<3, 3>(0, kMountingM) = -R * so3::hat(problem.track.rate(time));
+    rows.Ay.block<3, 3>(0, kMounting) = -Matrix3d::Identity();
+    rows.Ay.block<3, 3>(0, kMounting + 3) = -(time - begin) * Matrix3d::Identity();
+    rows.Ay.col(kUnknowns) = problem.track.impulse(time) - impulse;
+    rows.covariance = covariance(velocity, R, M) / each.weight;
+    rows.walked = density * std::max(0.0, time - last);  // a few stamps may run back
+    last = time;
+    all.push_back(std::move(rows));
   }
   return all;
 }
@@ -92,17 +77,27 @@ double gravitySigma(Time time, const MountingSearchOptions& options) {
   return std::min(kGravitySigma, std::hypot(kRestGravitySigma, kGravity * tilt));
 }
 
-/// The cost of all unknowns of a window.
+/// The cost of all unknowns of a window. All later velocities share the walk. A Kalman filter of the walk
+/// takes out what the earlier ones tell about it: the innovations are independent. So the cost is that of the
+/// covariance of the whole window, and takes time in proportion to their number, not to its cube.
 Quadratic costOf(const VelocityWindow& window, double offset, const std::optional<Matrix3d>& M,
                  const MountingProblem& problem) {
-  WindowRows rows = rowsOf(window, offset, M, problem);
-  const Eigen::LLT<MatrixXd> root(rows.covariance);
-  root.matrixL().solveInPlace(rows.A);
-  root.matrixL().solveInPlace(rows.y);
+  MatrixXd sum = MatrixXd::Zero(kUnknowns + 1, kUnknowns + 1);
+  MatrixXd walk = MatrixXd::Zero(3, kUnknowns + 1);  // expected, as the rows: of A x, and of y
+  Matrix3d P = Matrix3d::Zero();                     // its covariance
+  for (const Rows& rows : rowsOf(window, offset, M, problem)) {
+    P.diagonal().array() += rows.walked;
+    const Eigen::LLT<Matrix3d> root(P + rows.covariance);
+    MatrixXd innovation = rows.Ay - walk;
+    walk += P * root.solve(innovation);
+    P = P * root.solve(rows.covariance);
+    root.matrixL().solveInPlace(innovation);
+    sum.noalias() += innovation.transpose() * innovation;
+  }
   Quadratic cost(kUnknowns);
-  cost.H.noalias() = rows.A.transpose() * rows.A;
-  cost.b.noalias() = rows.A.transpose() * rows.y;
-  cost.c = rows.y.squaredNorm();
+  cost.H = sum.topLeftCorner(kUnknowns, kUnknowns);
+  cost.b = sum.topRightCorner(kUnknowns, 1);
+  cost.c = sum(kUnknowns, kUnknowns);
   const Time begin = window.front().velocity->stamp - offset;
   const Vector3d g_G = problem.options.gravity_G.value_or(problem.track.gravity(begin, kGravity));
   const double sigma = gravitySigma(begin, problem.options);
@@ -176,12 +171,13 @@ double reweigh(double offset, const Matrix3d& M, const Vector3d& l_I, MountingPr
     const MatrixXd own = cost.H.bottomRightCorner(kOwn, kOwn);
     x.tail(kOwn) =
         own.ldlt().solve(cost.b.tail(kOwn) - cost.H.bottomLeftCorner(kOwn, kMounting) * x.head(kMounting));
-    const WindowRows rows = rowsOf(window, offset, M, *problem);
-    const VectorXd errors = rows.A * x - rows.y;
+    const std::vector<Rows> all = rowsOf(window, offset, M, *problem);
+    double walked = 0.0;
     for (std::size_t i = 0; i < window.size(); ++i) {
-      const auto at = static_cast<Eigen::Index>(3 * i);
-      const Vector3d e = errors.segment(at, 3);
-      const Matrix3d covariance = rows.covariance.block(at, at, 3, 3);
+      const Rows& rows = all[i];
+      walked += rows.walked;
+      const Vector3d e = rows.Ay.leftCols(kUnknowns) * x - rows.Ay.col(kUnknowns);
+      const Matrix3d covariance = rows.covariance + walked * Matrix3d::Identity();
       const double square = e.dot(covariance.ldlt().solve(e)) / 3.0;
       squares.push_back(square);
       window[i].weight = 1.0 / (1.0 + square / (kOutlier * kOutlier));
