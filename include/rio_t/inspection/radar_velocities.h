@@ -36,7 +36,7 @@ struct DopplerSign {
 
 /// Compares the points of scans that lie 0.15 to 0.6 s apart: a range changes as its Doppler says, with the
 /// right sign. It needs neither the axes nor the mounting. Pairs between which the platform turns by more
-/// than 7 degrees do not count.
+/// than 7 degrees do not count. Of a radar with 40 Hz or more, every n-th scan is compared.
 DopplerSign dopplerSignFromRanges(const std::vector<RadarScan>& scans, const InertialTrack& track);
 
 /// By how much the ranges change, divided by what the Doppler says: 1 if it is in m/s.
