@@ -16,12 +16,13 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kGravity = 9.81;    // [m/s^2]
-constexpr double kMeanWidth = 0.2;   // [s] over which a direction of gravity is averaged
-constexpr std::size_t kApart = 3;    // [means] between the two directions that are compared: 0.6 s
+constexpr double kMeanWidth = 0.2;   // [s] over which a direction of gravity is averaged, at least
+constexpr std::size_t kApart = 3;    // [means] between the two directions that are compared: about 0.6 s
 constexpr double kFastest = 9.0;     // [rad/s] 500 deg/s: no platform turns so fast one tenth of its time
 constexpr double kLeastTilt = 0.03;  // [rad] rms of the turns of gravity in 0.6 s that show the unit
 
-/// Means of the specific force, in steps of `kMeanWidth`, and the turn from one to the next, by the gyro.
+/// Means of the specific force, in steps of `kMeanWidth` or, of a slow IMU, a little more, and the turn from
+/// one to the next, by the gyro.
 struct Steps {
   std::vector<Vector3d> force;
   /// Integral of the rates, as written, from the middle of a step to that of the next.
@@ -32,23 +33,26 @@ Steps stepsOf(const std::vector<ImuMeasurement>& imu) {
   Steps steps;
   Vector3d force = Vector3d::Zero(), rate = Vector3d::Zero();
   std::vector<Vector3d> rates;
-  double count = 0.0;
+  std::vector<Time> middles;
+  double count = 0.0, times = 0.0;  // times: sum, from `begin` on
   Time begin = imu.front().time;
   for (const ImuMeasurement& sample : imu) {
     if (sample.time - begin > kMeanWidth && count > 0.0) {
       steps.force.emplace_back(force / count);
       rates.emplace_back(rate / count);
+      middles.push_back(begin + times / count);
       force.setZero();
       rate.setZero();
-      count = 0.0;
+      count = times = 0.0;
       begin = sample.time;
     }
     force += sample.acceleration;
     rate += sample.angular_velocity;
+    times += sample.time - begin;
     count += 1.0;
   }
   for (std::size_t i = 0; i + 1 < rates.size(); ++i)
-    steps.turn.emplace_back(0.5 * kMeanWidth * (rates[i] + rates[i + 1]));
+    steps.turn.emplace_back(0.5 * (middles[i + 1] - middles[i]) * (rates[i] + rates[i + 1]));
   return steps;
 }
 
