@@ -21,6 +21,9 @@ constexpr std::uint64_t kLatencyStream = 24;
 constexpr std::uint64_t kCrowdStream = 25;
 constexpr std::uint64_t kAmbiguousStream = 26;
 
+// [m] Reflectors lie no farther from their station on the level: a little beyond the range of such a radar.
+constexpr double kSceneRadius = 13.0;
+
 void check(const RadarModelOptions& o) {
   const auto require = [](bool ok, const char* what) {
     if (!ok) throw std::invalid_argument(std::string("radar: ") + what);
@@ -139,7 +142,7 @@ class Sensor {
       : motion_(motion),
         options_(setup.radar),
         T_IR_(setup.T_IR),
-        scene_W_(makeScene(motion, seed, options_.points_mean)),
+        scene_(makeScene(motion, seed, options_.points_mean)),
         persons_(makePersons(motion, options_, T_IR_, seed)) {}
 
   // Each point is a ghost with the chance of `ghost_share`.
@@ -220,12 +223,18 @@ class Sensor {
     if (wanted <= 0) return echoes;
     const Eigen::Quaterniond q_RW = frame.middle.q_WR.conjugate();
     const double reach2 = options_.max_range * options_.max_range;
-    for (const Eigen::Vector3d& p_W : scene_W_) {
-      const Eigen::Vector3d d_W = p_W - frame.middle.p_W;
-      if (d_W.squaredNorm() > reach2 || !visible(q_RW * d_W, options_)) continue;
-      // Flatter than the radar equation: far things are larger (walls), and drivers compress.
-      echoes.push_back(
-          {p_W, Eigen::Vector3d::Zero(), 22.0 - 10.0 * std::log10(d_W.norm()) + 6.0 * random.gaussian()});
+    constexpr double kRounding = 1e-3;  // [m] far more than there is
+    const double station_reach = options_.max_range + kSceneRadius + kRounding;
+    for (const Station& station : scene_) {
+      // Else all reflectors of a long path are looked at for each scan.
+      if ((station.p_W - frame.middle.p_W).head<2>().norm() > station_reach) continue;
+      for (const Eigen::Vector3d& p_W : station.reflectors_W) {
+        const Eigen::Vector3d d_W = p_W - frame.middle.p_W;
+        if (d_W.squaredNorm() > reach2 || !visible(q_RW * d_W, options_)) continue;
+        // Flatter than the radar equation: far things are larger (walls), and drivers compress.
+        echoes.push_back(
+            {p_W, Eigen::Vector3d::Zero(), 22.0 - 10.0 * std::log10(d_W.norm()) + 6.0 * random.gaussian()});
+      }
     }
     keepStrongest(echoes, wanted);
     return echoes;
@@ -286,7 +295,7 @@ class Sensor {
   const Motion& motion_;
   const RadarModelOptions& options_;
   const Extrinsics& T_IR_;
-  std::vector<Eigen::Vector3d> scene_W_;
+  std::vector<Station> scene_;
   std::vector<Person> persons_;
 };
 
@@ -318,30 +327,28 @@ Eigen::Vector3d radarVelocity(const MotionState& state, const Extrinsics& T_IR) 
   return T_IR.q_IR.conjugate() * (state.q_WI.conjugate() * state.v_W + state.omega_I.cross(T_IR.l_I));
 }
 
-std::vector<Eigen::Vector3d> makeScene(const Motion& motion, std::uint64_t seed, double points_mean) {
+std::vector<Station> makeScene(const Motion& motion, std::uint64_t seed, double points_mean) {
   constexpr double kStationDistance = 4.0;  // [m]
-  constexpr double kRadius = 13.0;          // [m] a little beyond the range of such a radar
   // About a quarter of them is in view.
   const int per_station = std::max(400, static_cast<int>(std::ceil(8.0 * points_mean)));
   Random random(seed, kSceneStream);
-  std::vector<Eigen::Vector3d> stations;
-  std::vector<Eigen::Vector3d> scene_W;
+  std::vector<Station> scene;
   for (double t = 0.0; t < motion.duration(); t += 0.1) {
     const Eigen::Vector3d p_W = motion.at(t).p_W;
-    const bool covered = std::any_of(stations.begin(), stations.end(), [&](const Eigen::Vector3d& s) {
-      return (s - p_W).head<2>().norm() < kStationDistance;
+    const bool covered = std::any_of(scene.begin(), scene.end(), [&](const Station& s) {
+      return (s.p_W - p_W).head<2>().norm() < kStationDistance;
     });
     if (covered) continue;
-    stations.push_back(p_W);
+    scene.push_back({p_W, {}});
     for (int i = 0; i < per_station; ++i) {
-      const double radius = kRadius * std::sqrt(random.uniform());  // even over the disc
+      const double radius = kSceneRadius * std::sqrt(random.uniform());  // even over the disc
       const double direction = random.uniform(-M_PI, M_PI);
       const double height = random.uniform(-2.0, 3.5);
-      scene_W.emplace_back(
+      scene.back().reflectors_W.emplace_back(
           p_W + Eigen::Vector3d(radius * std::cos(direction), radius * std::sin(direction), height));
     }
   }
-  return scene_W;
+  return scene;
 }
 
 std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarSetup& setup, std::uint64_t seed,

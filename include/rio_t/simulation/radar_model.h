@@ -109,9 +109,15 @@ struct SimulatedScan {
 /// True velocity of the radar in R [m/s]: R_RI (R_IW v_W + omega_I x l).
 Eigen::Vector3d radarVelocity(const MotionState& state, const Extrinsics& T_IR);
 
-/// Static reflectors scattered around the path of `motion`, in W [m], within radar range wherever the path
-/// leads, and dense enough for `points_mean` points a scan.
-std::vector<Eigen::Vector3d> makeScene(const Motion& motion, std::uint64_t seed, double points_mean);
+/// A place on the path, and the static reflectors scattered around it, in W [m].
+struct Station {
+  Eigen::Vector3d p_W;
+  std::vector<Eigen::Vector3d> reflectors_W;
+};
+
+/// Reflectors around the path of `motion`, within radar range wherever the path leads, and dense enough for
+/// `points_mean` points a scan.
+std::vector<Station> makeScene(const Motion& motion, std::uint64_t seed, double points_mean);
 
 /// Scans of a radar carried along `motion`; scans whose measurement time is not inside the motion are left
 /// out. Each scan draws from a sequence of its own, so that a lost scan leaves the others as they are. Throws
