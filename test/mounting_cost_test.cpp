@@ -1,11 +1,10 @@
-// The cost of a mounting against the whole system that it stands for, and the time that the search takes.
+// The cost of a mounting against the whole system that it stands for.
 #include "../src/inspection/mounting_cost.h"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
 #include <cmath>
-#include <ctime>
 #include <vector>
 
 #include "noise.h"
@@ -106,19 +105,6 @@ TEST(MountingCost, IsThatOfAllVelocitiesOfAWindowAtOnce) {
       EXPECT_NEAR(x.dot(cost.H * x) - 2.0 * cost.b.dot(x) + cost.c, whole, 1e-6 * whole) << apart;
     }
   }
-}
-
-/// [s] of the processor
-double searchTime(double radar_rate) {
-  const Recorded recorded = record(radar_rate);
-  const std::clock_t begin = std::clock();
-  EXPECT_TRUE(searchMounting(recorded.velocities, recorded.track, {}).enough);
-  return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
-}
-
-/// With the covariance of a whole window, ten times the velocities take 280 times as long.
-TEST(MountingSearch, TakesTimeInProportionToTheRate) {
-  EXPECT_LT(searchTime(150.0), 25.0 * searchTime(15.0));
 }
 
 }  // namespace

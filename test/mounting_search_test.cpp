@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <ctime>
 
 #include "rio_t/core/angle.h"
 #include "rio_t/core/so3.h"
@@ -160,26 +159,6 @@ TEST(RangeRatio, IsThatOfTheDoppler) {
       EXPECT_LT(found.log_sigma, 0.2) << motion << ", " << factor;
     }
   }
-}
-
-/// Sign and ratio by the ranges at this rate; returns the time that they take [s of the processor].
-double comparisonTime(double radar_rate) {
-  SimulatedRun simulated("medium", 1, 30.0, 3.0);
-  simulated.setup.radar.rate = radar_rate;
-  const simulation::SensorData data = simulation::simulate(simulated.motion, simulated.setup);
-  std::vector<RadarScan> scans;
-  for (const simulation::SimulatedScan& from : data.scans) scans.push_back(SimulatedRun::scan(from));
-  const InertialTrack track(data.imu.samples, Eigen::Vector3d::Zero());
-  const std::clock_t begin = std::clock();
-  EXPECT_EQ(dopplerSignFromRanges(scans, track).sign, 1) << radar_rate;
-  const RangeRatio found = rangeRatio(scans, track);
-  EXPECT_LT(std::abs(std::log(found.ratio)), 3.0 * found.log_sigma) << radar_rate;
-  return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
-}
-
-/// With all pairs, ten times the scans take 70 times as long.
-TEST(RangeRatio, AFastRadarTakesLittleMoreTime) {
-  EXPECT_LT(comparisonTime(120.0), 12.0 * comparisonTime(12.0));
 }
 
 TEST(RangeRatio, RestShowsNothing) {

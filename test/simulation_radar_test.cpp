@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <ctime>
 #include <stdexcept>
 #include <vector>
 
@@ -102,21 +101,6 @@ TEST(RadarModel, ScansArriveWithTheLatency) {
     count += 1.0;
   }
   EXPECT_NEAR(std::sqrt(square / count), 0.01, 5.0 * 0.01 / std::sqrt(2.0 * count));
-}
-
-/// [s of the processor] for a drive along new places all the time
-double scanTime(double duration) {
-  const Motion motion = builtIn("ground_vehicle", 1, duration);
-  RadarSetup setup;
-  setup.radar.rate = 4.0;
-  const std::clock_t begin = std::clock();
-  EXPECT_GT(simulateRadar(motion, setup, 1, Time()).size(), 3.9 * duration);
-  return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
-}
-
-/// If each scan looks at all reflectors of the drive, it takes 140 times as long.
-TEST(RadarModel, ALongDriveTakesTimeInProportionToItsLength) {
-  EXPECT_LT(scanTime(1500.0), 65.0 * scanTime(50.0));
 }
 
 TEST(RadarModel, RefusesOptionsOutOfRange) {
