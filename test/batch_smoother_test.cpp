@@ -280,6 +280,40 @@ TEST_F(Batch, AStepIsFollowedThoughAnotherRadarHasTheNode) {
   EXPECT_NEAR(batch.scans.back().t_O, 0.06, 1e-3);
 }
 
+/// Of two radars with one trigger.
+TEST_F(Batch, RestOfOneNodeCountsOnce) {
+  const SmootherOptions options;
+  const CalibrationPrior radar{skewMounting(), 0.02, 0.02};
+  std::vector<StateCovariance> covariances;
+  for (const bool both : {false, true}) {
+    BatchProblem whole = problem(options, radar);
+    whole.radars = {radar, radar};
+    for (double stamp = 0.7; stamp < kEnd; stamp += 0.1) {
+      for (const std::size_t k : {0, 1}) {
+        BatchScan scan;
+        scan.radar = k;
+        scan.velocity = measurement(stamp, 0.02);
+        scan.stamp = scan.velocity->stamp;
+        if (k == 0 || both) scan.rest_velocity_sigma = 0.01;
+        whole.scans.push_back(scan);
+      }
+    }
+    covariances.push_back(make(options).solve(whole).covariances.back());
+  }
+  EXPECT_LT((covariances[0] - covariances[1]).norm(), 1e-6 * covariances[0].norm());
+}
+
+/// A scan that tells the offset by a part of its derivative only.
+TEST_F(Batch, AScanWithPartOfTheEvidenceConverges) {
+  SmootherOptions options;
+  options.time_offset_model = TimeOffsetModel::kConstantAcceleration;
+  BatchProblem whole = problem(options, {skewMounting(), 0.0, 0.05});
+  addScans(0.7, kEnd, 0.04, whole);
+  for (BatchScan& scan : whole.scans) scan.velocity->offset_gain = 0.3;
+  const BatchSolution solution = make(options).solve(whole);
+  EXPECT_EQ(solution.termination, SolverTermination::kConverged);
+}
+
 TEST_F(Batch, ASharedOffsetBeginsWhereItsPriorIs) {
   SmootherOptions options;
   options.time_offset_shared = true;

@@ -176,6 +176,13 @@ TEST(Diagnosis, TooFewPointsNameThoseThatAreNotFinite) {
              {"too_few_points", "Look at the driver of the radar: 21 more points are not finite"});
 }
 
+TEST(Diagnosis, CloudsOfNothingButPaddingHaveOtherFields) {
+  RunEvidence evidence = withRejected("too_few_points");
+  evidence.radars.front().points = 0;
+  evidence.radars.front().padding = 6400;
+  expectSays(first(evidence), {"All 6400 points are at range zero, or NaN", "radar_field_x"});
+}
+
 TEST(Diagnosis, TooFewPointsSayWhetherTheCloudsAreEmptyOrWhichKeyTookThem) {
   RunEvidence evidence = withRejected("too_few_points");
   RadarSummary& radar = evidence.radars.front();

@@ -255,7 +255,11 @@ TEST_P(Windows, AWrongJacobianIsNoConvergence) {
 
 TEST_P(Windows, TooFewIterationsAreNoConvergence) {
   make(0.05);
-  EXPECT_EQ(solve(window, {1, 1e-2}, GetParam()).termination, SolverTermination::kIterationLimit);
+  const double before = costOf(window);
+  const Solution solution = solve(window, {1, 1e-2}, GetParam());
+  EXPECT_EQ(solution.termination, SolverTermination::kIterationLimit);
+  EXPECT_EQ(solution.iterations, 1);
+  EXPECT_LT(costOf(window), 0.5 * before) << "one iteration is one step";
 }
 
 TEST_P(Windows, AtItsBoundTheOffsetIsHeldAndTheRestIsSolved) {

@@ -166,6 +166,20 @@ TEST(RadarsHealth, IsThatOfTheRadarThatAgrees) {
   }
 }
 
+/// A step of the offset clears what one radar has said. It does not fall silent by that.
+TEST(RadarsHealth, AStepOfTheOffsetDoesNotHandItToARadarThatIsWrong) {
+  RadarsHealth health(HealthOptions(), 4.0, 2);
+  for (double t = 0.0; t < 10.0; t += 0.1) {
+    for (const std::size_t radar : {0, 1})
+      health.of(radar).addInnovation(innovation(at(t), radar == 1 ? 1.0 : 0.1, 0.01));
+    health.judge(at(t), knownState(), 1.0);
+  }
+  EXPECT_FALSE(health.isContradicted());
+  health.of(0).offsetStepped(at(9.9));
+  health.judge(at(9.9), knownState(), 1.0);
+  EXPECT_FALSE(health.isContradicted());
+}
+
 // An IMU gap loses the heading for good, and with it v_W; the motion is known all the same.
 TEST(HealthMonitor, ALostHeadingIsNoDivergence) {
   HealthMonitor monitor(HealthOptions(), 4.0);

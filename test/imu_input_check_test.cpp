@@ -186,6 +186,13 @@ TEST_F(Gate, OneStampAheadIsNoGap) {
   }
 }
 
+/// Within the patience such a stamp is taken. Those that follow are behind it until its time comes.
+TEST_F(Gate, OneStampAheadIsNoStepBack) {
+  EXPECT_EQ(feed(t + 0.3), "imu_gap");
+  for (const double end = t + 0.295; t < end; t += 0.01) feed(t);
+  for (t += 0.01; t < 2.0; t += 0.01) EXPECT_EQ(feed(t), "") << t;
+}
+
 TEST_F(Gate, TheSecondSampleConfirmsALongGap) {
   EXPECT_EQ(feed(2.0), "imu_stamp_jump");
   EXPECT_EQ(decision, Decision::kDrop);

@@ -18,6 +18,7 @@
 #include "rio_t/ros/live/offset_observability.h"
 #include "rio_t/ros/live/publish_rate.h"
 #include "rio_t/ros/live/session.h"
+#include "rio_t/ros/live/topic_rate.h"
 #include "simulated_run.h"
 
 namespace rio_t {
@@ -165,6 +166,23 @@ TEST(LiveLog, ADivergenceIsNoFaultOfTheInput) {
   LiveLog log("node");
   log.faults(session);
   EXPECT_EQ(logged.lines(), std::vector<std::string>{"node: input fault imu_not_finite, 1 so far"});
+}
+
+/// Also if the time of ROS stands still, or goes back because a bag loops.
+TEST(TopicRate, OnlySilenceIsAnError) {
+  TopicRate rate("/imu");
+  const auto levelOfRun = [&rate] {
+    diagnostic_updater::DiagnosticStatusWrapper status;
+    rate.run(status);
+    return static_cast<int>(status.level);
+  };
+  EXPECT_EQ(rate.getName(), "/imu topic status");
+  EXPECT_FALSE(rate.hasTicked());
+  EXPECT_EQ(levelOfRun(), diagnostic_msgs::DiagnosticStatus::ERROR);
+  rate.tick();
+  EXPECT_TRUE(rate.hasTicked());
+  for (int k = 0; k < 4; ++k) EXPECT_EQ(levelOfRun(), diagnostic_msgs::DiagnosticStatus::OK) << k;
+  EXPECT_EQ(levelOfRun(), diagnostic_msgs::DiagnosticStatus::ERROR);
 }
 
 TEST(LiveTexts, AScanWithoutAStampNamesTheKeyToLookAt) {

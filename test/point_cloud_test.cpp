@@ -236,10 +236,16 @@ TEST(PointCloudDecode, ADoubleTooLargeForAFloatIsNotFinite) {
   EXPECT_EQ(decode(m, f).dropped_not_finite, 1u);
 }
 
-TEST(PointCloudDecode, TheOriginIsKept) {
-  PointCloud2 m = irsMessage();
-  std::fill(m.data.begin(), m.data.begin() + 12, std::uint8_t{0});
-  EXPECT_EQ(decode(m, PointCloudFormat()).cloud.size(), 2u);
+/// Drivers fill clouds of a fixed size up with zeros, or with NaN.
+TEST(PointCloudDecode, PaddingIsNoPoint) {
+  for (const std::uint8_t byte : {std::uint8_t{0x00}, std::uint8_t{0xff}}) {
+    PointCloud2 m = irsMessage();
+    std::fill(m.data.begin(), m.data.begin() + 12, byte);
+    const DecodedScan scan = decode(m, PointCloudFormat());
+    EXPECT_EQ(scan.cloud.size(), 1u);
+    EXPECT_EQ(scan.padding, 1u);
+    EXPECT_EQ(scan.dropped_not_finite, 0u);
+  }
 }
 
 // --- To the core and back ---

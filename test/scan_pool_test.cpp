@@ -48,18 +48,6 @@ TEST(ScanPool, OwnPointsComeFirstThenThoseOfTheNewestScans) {
   EXPECT_TRUE(hasPointsOf(filled, 9, scanAt(10.00, 6)));
 }
 
-// Some drivers send clouds of one size, filled up with zeros.
-TEST(ScanPool, PointsAtRangeZeroAreNone) {
-  const auto padded = [](double t) {
-    RadarScan scan = scanAt(t, 6);
-    scan.points.resize(64);
-    return scan;
-  };
-  ScanPool pool;
-  EXPECT_EQ(pool.filled(padded(10.00), steady).points.size(), 64U);
-  EXPECT_EQ(pool.filled(padded(10.05), steady).points.size(), 70U);
-}
-
 TEST(ScanPool, ItFillsUpToTwentyPointsAndNoFurther) {
   ScanPool pool;
   for (const double t : {10.00, 10.05, 10.10}) pool.filled(scanAt(t, 8), steady);

@@ -137,13 +137,14 @@ Solution solveByChain(Window& window, const SolverLimits& limits) {
   Solution solution;
   LinearSystem& system = solution.system;
   double surely_right = kSurelyRight;
-  for (solution.iterations = 1;; ++solution.iterations) {
+  for (int pass = 1;; ++pass) {
+    solution.iterations = std::min(pass, limits.max_iterations);
     system = linearize(window);
     const std::vector<int> held = pushedOutwards(window, system);
     solution.elimination = held.empty() ? eliminationOf(system) : eliminationOf(holding(held, system));
     const double squared_length = solution.elimination.squaredLength();
     const bool is_short = squared_length < limits.short_step;
-    const bool is_last = solution.iterations >= limits.max_iterations;
+    const bool is_last = pass > limits.max_iterations;  // only judges the last step
     bool has_ended = is_last;
     if (is_short || squared_length < surely_right) {
       surely_right = squared_length;  // steps that do not get shorter may go back and forth

@@ -29,6 +29,7 @@ ClockJumpDetector::Verdict ClockJumpDetector::check(Time stamp) {
     verdict = is_gap ? Verdict::kGood : Verdict::kRestart;
   }
   stepped_back_ = verdict == Verdict::kGood ? stepBackBefore(stamp) : 0.0;
+  before_newest_ = verdict == Verdict::kGood ? newest_ : std::nullopt;
   newest_ = stamp;
   elsewhere_since_.reset();
   elsewhere_newest_.reset();
@@ -38,6 +39,8 @@ ClockJumpDetector::Verdict ClockJumpDetector::check(Time stamp) {
 
 double ClockJumpDetector::stepBackBefore(Time stamp) const {
   if (elsewhere_ < 2 || *elsewhere_newest_ > *newest_) return 0.0;
+  // The newest stamp alone was ahead, and those behind it go on from the one before.
+  if (before_newest_ && *elsewhere_since_ > *before_newest_) return 0.0;
   const double interval = (*elsewhere_newest_ - *elsewhere_since_) / (elsewhere_ - 1);
   return stamp - *elsewhere_newest_ < kGoesOn * interval ? stamp - *elsewhere_since_ : 0.0;
 }

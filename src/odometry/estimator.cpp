@@ -116,8 +116,10 @@ void Estimator::putIntoWindow(Time node_time, RadarChannel& radar, ScanResult& r
   result.used = result.updated = answer.rejected_because.empty();
   if (result.used) last_used_ = stamp;
   if (expected && result.used) seeLandmarks(*expected, answer, radar, result);
+  bool rests_now = false;
   if (answer.at_rest) {
     if (Block* node = smoother_.nodeAt(radar.nodeTime(stamp))) {
+      rests_now = *node->time == smoother_.newest().time;  // a late scan tells of a rest that may be over
       result.rest_velocity_sigma = rest->velocity_sigma;
       smoother_.addZeroVelocity(*node, rest->velocity_sigma);
       result.updated = true;
@@ -127,7 +129,7 @@ void Estimator::putIntoWindow(Time node_time, RadarChannel& radar, ScanResult& r
   // works.
   const bool by_radar = result.updated;
   if (result.ground_vehicle) constrainToGround(answer.at_rest, result);
-  if (result.updated) updateWindow(radar, result);
+  if (result.updated) updateWindow(radar, rests_now, result);
   if (by_radar) health_.updated(result.state.time);
   updateHealth();
   if (!result.updated && health_.health() == Health::kDiverged) publishNewest();
@@ -193,7 +195,7 @@ void Estimator::seeLandmarks(const LandmarkMap::Prediction& expected, const Rada
   if (result.landmarks->dropped_map) faults_.count("landmarks_dropped");
 }
 
-void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
+void Estimator::updateWindow(const RadarChannel& radar, bool rests_now, ScanResult& result) {
   const Eigen::Vector3d predicted_W = smoother_.newest().x.v_W();
   const Solution& solution = smoother_.optimize();
   corrected_W_ += smoother_.newest().x.v_W() - predicted_W;
@@ -216,8 +218,8 @@ void Estimator::updateWindow(const RadarChannel& radar, ScanResult& result) {
   for (const StampedPose& left : marginalize()) result.left_window.push_back(left);
   // On a frame that shakes the window believes rest little: the start of a gentle drive must not look like an
   // offset. The published platform stands still.
-  if (result.at_rest) result.state.v_W.setZero();
-  anchor(result.state, result.at_rest);
+  if (rests_now) result.state.v_W.setZero();
+  anchor(result.state, rests_now);
   addHeadingCurvature(result.state);
 }
 
@@ -350,7 +352,9 @@ PoseAnchor Estimator::anchorAt(Time time) const {
   // jump.
   const Time since = std::max(time, smoother_.node(0).time);
   const PredictedState predicted = *smoother_.predict(since, {});
-  NavigationState state = navigationState({since, predicted.x}, predicted.covariance, imu_);
+  const bool is_before = time < since;  // the first node
+  const StateBlock x = is_before ? carried(predicted.x, since, time, imu_, g_W_) : predicted.x;
+  NavigationState state = navigationState({time, x}, predicted.covariance, imu_);
   health_.widen(state);
   const auto E = poseInW(state.q_WI);
   return {state.q_WI, state.p_W, E * state.covariance * E.transpose()};

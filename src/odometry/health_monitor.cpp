@@ -91,9 +91,7 @@ void HealthMonitor::startedAt(Time time) {
   if (diverged_at_) diverged_at_ = time;
 }
 
-bool HealthMonitor::hears(Time now) const {
-  return !entries_.empty() && std::abs(now - latest_) <= options_.window;
-}
+bool HealthMonitor::hears(Time now) const { return latest_ && std::abs(now - *latest_) <= options_.window; }
 
 bool HealthMonitor::wantsReinitialization(Time now) const {
   return options_.on_divergence == OnDivergence::kReinitialize && diverged_at_ &&
@@ -135,7 +133,7 @@ Health HealthMonitor::judge(Time now, const NavigationState& state, double model
 void HealthMonitor::widen(NavigationState& state) const {
   if (!diverged_at_ || mean_square_ == 0.0) return;
   const double square = mean_square_;
-  const double seconds = std::max(1.0, latest_ - contradicted_since_);
+  const double seconds = std::max(1.0, *latest_ - contradicted_since_);
   const auto add = [&](int first, double variance) {
     state.covariance.diagonal().segment<3>(first).array() += variance;
   };

@@ -23,7 +23,7 @@ constexpr double kLargestSquare = 16.0;
 
 void ModelErrorScale::add(Time stamp, double squared_sigmas, double share) {
   const double fade = fading(last_, stamp, kMemory);
-  last_ = stamp;
+  last_ = std::max(last_, stamp);
   information_ = fade * information_ + 1.5 * share * share;
   const double excess = std::clamp(squared_sigmas, 0.0, kLargestSquare) - 3.0;
   // Newton's step takes the curvature where it is: by the expected one, a single outlier would count tenfold.

@@ -76,7 +76,7 @@ double OffsetEvidence::varianceOfChange(Time tau, const OffsetDerivative& deriva
 
 void OffsetEvidence::add(const OffsetScan& scan, const OffsetDerivative& derivative) {
   const double fade = fading(last_, scan.tau, kMemory);
-  last_ = scan.tau;
+  last_ = std::max(last_, scan.tau);
   const Eigen::Matrix3d W = (scan.predicted + scan.measured).inverse();
   const Eigen::Vector3d mean = scan.follow(derivative.mean, mean_);
   const Eigen::Vector3d before = scan.follow(derivative.before, before_);

@@ -15,7 +15,7 @@ constexpr double kMemory = 40.0;
 
 void OffsetUncertainty::add(const Innovation& innovation) {
   const double fade = fading(last_, innovation.stamp, kMemory);
-  last_ = innovation.stamp;
+  last_ = std::max(last_, innovation.stamp);
   const Eigen::Vector3d& d = innovation.d;
   const Eigen::LDLT<Eigen::Matrix3d> weight = innovation.S.ldlt();
   // The window's weights: otherwise a scan that the window ignores would ask for a change for good.

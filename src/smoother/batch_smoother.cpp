@@ -222,13 +222,12 @@ Block* BatchSmoother::offsetOf(const BatchProblem& problem, const BatchScan& sca
 }
 
 void BatchSmoother::addTerms(const BatchScan& scan, const Graph::Scan& at, double t_O, Graph& graph) const {
-  const Graph::Node& node = graph.nodes[at.node];
+  Graph::Node& node = graph.nodes[at.node];
   const Time time = *node.motion->time;
   const std::vector<Block*> blocks = {node.motion, node.biases, at.offset, at.extrinsics};
-  // Placed anew where the offset moves, so first order is enough.
+  // Placed anew where the offset moves, so first order is enough. The other model is linear.
   const auto placed = [&](auto z) {
-    const bool is_linear = atMeasurement() || z.offset_gain == 0.0;
-    z.linear_from_t_O = is_linear ? std::make_shared<const double>(t_O) : nullptr;
+    z.linear_from_t_O = std::make_shared<const double>(t_O);
     z.slow = at.slow;
     return z;
   };
@@ -238,7 +237,8 @@ void BatchSmoother::addTerms(const BatchScan& scan, const Graph::Scan& at, doubl
     graph.window.add(std::make_unique<RadarVelocityFactor>(placed(*scan.velocity), time, model()), blocks,
                      loss_);
   }
-  if (scan.rest_velocity_sigma)
+  // Scans of two radars at the same time share a node, and rest counts once.
+  if (scan.rest_velocity_sigma && !std::exchange(node.rests, true))
     graph.window.add(std::make_unique<ZeroVelocityFactor>(*scan.rest_velocity_sigma), {node.motion});
 }
 

@@ -31,9 +31,9 @@ class ClockJumpDetector {
  private:
   double stepBackBefore(Time stamp) const;
 
-  double max_gap_;   // read-only after construction, as the next
-  double patience_;  // [s]
-  std::optional<Time> newest_;
+  double max_gap_;                              // read-only after construction, as the next
+  double patience_;                             // [s]
+  std::optional<Time> newest_, before_newest_;  // good ones, of one clock
   // The stamps dropped last, each of which goes on from the one before: first, last, count.
   std::optional<Time> elsewhere_since_, elsewhere_newest_;
   int elsewhere_ = 0;

@@ -71,7 +71,8 @@ class Estimator {
   bool tryReinitialize(std::vector<StampedPose>& left);
   PoseAnchor anchorAt(Time time) const;
   void judge(const RadarAnswer& answer, const RadarScan& scan);
-  void updateWindow(const RadarChannel& radar, ScanResult& result);
+  /// `rests_now`: the newest node does.
+  void updateWindow(const RadarChannel& radar, bool rests_now, ScanResult& result);
   void seeLandmarks(const LandmarkMap::Prediction& expected, const RadarAnswer& answer,
                     const RadarChannel& radar, ScanResult& result);
   void publishNewest() { anchor(newestState(smoother_.newestCovariance({})), false); }

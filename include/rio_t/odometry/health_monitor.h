@@ -91,7 +91,7 @@ class HealthMonitor {
   std::deque<Time> steps_;           ///< of the offset, within 20 s of the last
   std::optional<Time> diverged_at_;  ///< start of the divergence, or the last start after it
   Time contradicted_since_;
-  Time latest_;  ///< stamp of the newest entry, also after the entries were cleared
+  std::optional<Time> latest_;  ///< stamp of the newest entry, also after the entries were cleared
   std::optional<Time> misfit_since_;
   double mean_square_ = 0.0;  ///< of d, by the latest scans that had a velocity [m^2/s^2]
   Health health_ = Health::kOk;

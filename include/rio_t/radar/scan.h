@@ -20,7 +20,7 @@ struct RadarPoint {
 /// [m/s] A larger Doppler is a mark of the driver, like -999 for "no Doppler".
 constexpr double kLargestDoppler = 100.0;
 
-/// One scan of the radar. All points are finite (the decoder drops and counts the others).
+/// One scan of the radar. All points are finite, and none is padding (the decoder drops and counts those).
 struct RadarScan {
   Time stamp;  ///< as stamped, in the IMU clock; measured at stamp - t_O
   std::vector<RadarPoint> points;

@@ -94,6 +94,7 @@ class BatchSmoother {
     struct Node {
       Block* motion;
       Block* biases;
+      bool rests = false;  ///< a term says so
     };
     std::vector<Node> nodes;
     std::vector<NodeEstimate> states() const;

@@ -149,6 +149,7 @@ void BagPlayer::addCloud(const sensor_msgs::PointCloud2& message, Time record, s
     return;
   }
   evidence_.addNotFinite(k, decoded.dropped_not_finite);
+  evidence_.addPadding(k, decoded.padding);
   radar.scan_sizes.push_back(static_cast<double>(decoded.cloud.size()));
   try {
     radar.stamper.addScan(message.header.seq, toTime(message.header.stamp), record,

@@ -220,11 +220,7 @@ DecodedClouds decodeAll(const CloudTopic& topic, const PointCloudFormat& format)
     try {
       const DecodedScan decoded = decode(*message, format);
       clouds.scans.push_back(toRadarScan(decoded.cloud, Time()));
-      // Some drivers fill their clouds up with points at range zero.
-      std::vector<RadarPoint>& points = clouds.scans.back().points;
-      points.erase(std::remove_if(points.begin(), points.end(),
-                                  [](const RadarPoint& point) { return point.position_R.isZero(); }),
-                   points.end());
+      clouds.padding += decoded.padding;
       clouds.points_not_finite += decoded.dropped_not_finite;
     } catch (const std::exception&) {
       clouds.scans.emplace_back();

@@ -39,8 +39,9 @@ bool correctAxes(const CloudReport& cloud, bool mirrored, const ParameterEntries
                  FormatProposal* proposal);
 
 struct DecodedClouds {
-  std::vector<RadarScan> scans;       ///< without stamps; what cannot be decoded is empty
-  std::size_t points_not_finite = 0;  ///< left out of the scans
+  std::vector<RadarScan> scans;  ///< without stamps; what cannot be decoded is empty
+  std::size_t padding = 0;       ///< points, left out of the scans, as the next
+  std::size_t points_not_finite = 0;
 };
 
 /// The clouds as the format reads them.

@@ -50,8 +50,9 @@ MountingSearchOptions searchOptions(const ImuInspection& imu, const InertialTrac
 
 struct Looked {
   std::vector<RadarScan> scans;
-  std::size_t points = 0;             // before the scans get their stamps
-  std::size_t points_not_finite = 0;  // besides these
+  std::size_t points = 0;   // before the scans get their stamps
+  std::size_t padding = 0;  // besides these, as the next
+  std::size_t points_not_finite = 0;
   CloudReport cloud;
   RadarVelocities velocities;
   DopplerSign sign;
@@ -64,6 +65,7 @@ Looked look(const Recording& recording, const ImuInspection& imu, const CloudTop
   Looked looked;
   const DecodedClouds decoded = decodeAll(cloud, format);
   for (const RadarScan& scan : decoded.scans) looked.points += scan.points.size();
+  looked.padding = decoded.padding;
   looked.points_not_finite = decoded.points_not_finite;
   looked.scans = stampScans(recording, imu.times, cloud, stamps, decoded.scans);
   looked.cloud = inspectCloud(looked.scans);
@@ -77,12 +79,11 @@ Looked look(const Recording& recording, const ImuInspection& imu, const CloudTop
 
 /// Why the radar cannot be used; empty: it can.
 std::string faultOf(const Looked& looked, const PointCloudFormat& format, const StampProposal& stamps) {
+  if (looked.points == 0 && looked.points_not_finite > 0)
+    return "the position, the power or the field " + format.doppler + " is not finite in every point";
   if (looked.points == 0)
-    return looked.points_not_finite == 0
-               ? "no cloud has a point"
-               : "the position, the power or the field " + format.doppler + " is not finite in every point";
+    return looked.padding > 0 ? "every point is at range zero, or NaN" : "no cloud has a point";
   if (looked.scans.empty()) return "no scan gets a stamp: " + stamps.text;
-  if (looked.cloud.points == 0) return "every point lies at the radar itself";
   if (!looked.cloud.has_doppler) return "the field " + format.doppler + " is zero in every point";
   return "";
 }

@@ -183,6 +183,12 @@ bool isFinite(const RadarPointPcl& p) {
          std::isfinite(p.snr_db);
 }
 
+/// Whether a driver filled its cloud up with this.
+bool isPadding(const std::array<double, 3>& p) {
+  const auto all = [&p](auto is) { return std::all_of(p.begin(), p.end(), is); };
+  return all([](double x) { return x == 0.0; }) || all([](double x) { return std::isnan(x); });
+}
+
 float narrow(double value) {
   // A conversion that overflows is undefined; NaN makes the point drop out.
   if (!(std::abs(value) <= static_cast<double>(std::numeric_limits<float>::max()))) {
@@ -231,6 +237,10 @@ DecodedScan decode(const PointCloud2& message, const PointCloudFormat& format) {
       const std::uint8_t* point = message.data.data() + row * layout.row_step + column * layout.point_step;
       std::array<double, 3> p = {first.read(point), second.read(point), third.read(point)};
       if (!cartesian) p = fromSpherical(p[0], p[1], p[2], format.axes);
+      if (isPadding(p)) {
+        ++scan.padding;
+        continue;
+      }
       if (format.axes == PointAxes::kForwardLeftUp) p = {-p[1], p[0], p[2]};
       RadarPointPcl decoded;
       decoded.x = narrow(p[0]);

@@ -204,6 +204,10 @@ class RadarCauses {
       remedy = "Change " + key.substr(0, key.find(' ')) +
                " if the radar sees well there, or look for a second publisher on " + key_ + "radar_topic.";
     }
+    if (radar_.points == 0 && radar_.padding > 0)
+      remedy = "All " + std::to_string(radar_.padding) +
+               " points are at range zero, or NaN. Check the names of the fields: " + key_ +
+               "radar_field_x and the next ones.";
     if (radar_.points_not_finite > 0)
       remedy = "Look at the driver of the radar: " + std::to_string(radar_.points_not_finite) +
                " more points are not finite. " + remedy;

@@ -13,7 +13,7 @@ namespace rio_t {
 void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
   const auto start = std::chrono::steady_clock::now();
   monitor_.imu();
-  tick_imu_();
+  imu_rate_.tick();
   try {
     const ImuMeasurement imu =
         toImuMeasurement(*event.getConstMessage(), config_.imu_topic, config_.imu_units);
@@ -39,7 +39,7 @@ void LiveOdometry::onImu(const Event<sensor_msgs::Imu>& event) {
     if (const std::optional<NavigationState> state = feed(*now, received)) {
       if (const std::optional<BodyOdometry> body = frames_.place(*now, *state)) {
         session_.speak(Speaker::kNavigation, now, [&] {
-          if (publisher_.odometry(*body)) ++odom_published_;
+          if (publisher_.odometry(*body)) odom_rate_.tick();
           frames_.published(*body);
           monitor_.odometry(*state,
                             std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
@@ -81,21 +81,24 @@ void LiveOdometry::onScan(std::size_t radar, const Event<sensor_msgs::PointCloud
   const sensor_msgs::PointCloud2& message = *event.getConstMessage();
   Radar& from = radars_[radar];
   monitor_.scan(radar);
-  from.tick_scan();
-  std::string what = "cloud_not_usable";  // as the bag runner calls it
+  from.scan_rate->tick();
+  std::string what = "frame_not_usable";
   try {
+    // First of all: a cloud that cannot be read still names its frame, and the other radars wait for it.
+    if (!from.T_IR) lookUpExtrinsics(from, message.header.frame_id);
+    if (!session_.get()) startSessionWhenReady(event.getReceiptTime());
+    what = "cloud_not_usable";  // as the bag runner calls it
     DecodedScan decoded;
     try {
       decoded = decode(message, from.format);
     } catch (const std::exception& error) {
       throw std::runtime_error("topic " + from.config.radar_topic + ": " + error.what());
     }
+    monitor_.padding(radar, decoded.padding);
     if (decoded.dropped_not_finite > 0)
       monitor_.dropped(radar, "points_not_finite", decoded.dropped_not_finite);
-    what = "frame_not_usable";
-    if (!from.T_IR) lookUpExtrinsics(from, message.header.frame_id);
     const Session now = session_.get();
-    if (!now) {
+    if (!now || !from.T_IR) {
       monitor_.dropped(radar, "scan_before_extrinsics");
       return;
     }
@@ -113,7 +116,7 @@ void LiveOdometry::onScan(std::size_t radar, const Event<sensor_msgs::PointCloud
 
 void LiveOdometry::onPressure(const Event<sensor_msgs::FluidPressure>& event) {
   monitor_.pressure();
-  tick_pressure_();
+  pressure_rate_.tick();
   try {
     const Pressure pressure = toPressure(*event.getConstMessage(), config_.barometer_topic);
     if (const Session now = session_.get()) now->addPressure(pressure);
@@ -125,7 +128,7 @@ void LiveOdometry::onPressure(const Event<sensor_msgs::FluidPressure>& event) {
 
 void LiveOdometry::onTrigger(std::size_t radar, const Event<std_msgs::Header>& event) {
   monitor_.trigger(radar);
-  radars_[radar].tick_trigger();
+  radars_[radar].trigger_rate->tick();
   const Session now = session_.get();
   if (!now) return;
   const std_msgs::Header& trigger = *event.getConstMessage();
@@ -150,21 +153,20 @@ void LiveOdometry::account(const std::vector<LiveSession::GivenUp>& given_up) {
 
 void LiveOdometry::lookUpExtrinsics(Radar& radar, const std::string& cloud_frame) {
   const Config& config = radar.config;
-  std::string waiting_for;
   try {
-    radar.T_IR = frames_.radarExtrinsics(config, cloud_frame, &waiting_for);
+    radar.T_IR = frames_.radarExtrinsics(config, cloud_frame, &radar.waiting_for);
   } catch (const std::exception&) {
-    monitor_.waitFor("a frame of the clouds that tf knows" + withName("", config, " of radar "));
+    radar.waiting_for = "a frame of the clouds that tf knows" + withName("", config, " of radar ");
+    monitor_.waitFor(radar.waiting_for);
     throw;
   }
-  if (!radar.T_IR) {
-    monitor_.waitFor(waiting_for);  // the status `odometry` and the log tell it
-    return;
-  }
+  if (!radar.T_IR) return;  // the status `odometry` and the log tell what it waits for
   ROS_INFO_STREAM(name_ << ": " << withName("extrinsics", config) << " from tf " << cloud_frame << " -> "
                         << *frames_.imuFrame() << ": translation [" << radar.T_IR->l_I.transpose()
                         << "], rotation xyzw [" << radar.T_IR->q_IR.coeffs().transpose() << "]");
-  startSessionWhenReady();
+  if (!session_.get()) return;
+  takeExtrinsics();
+  reset("the mounting" + withName("", config, " of radar ") + " is known now");
 }
 
 }  // namespace rio_t

@@ -1,7 +1,6 @@
 #include "rio_t/ros/live/live_odometry.h"
 
 #include <diagnostic_msgs/DiagnosticStatus.h>
-#include <diagnostic_updater/publisher.h>  // Debian 11: only one file may include it
 #include <ros/console.h>
 #include <ros/exceptions.h>
 #include <ros/master.h>
@@ -9,7 +8,6 @@
 #include <algorithm>
 #include <boost/function.hpp>
 #include <filesystem>
-#include <limits>
 #include <utility>
 
 #include "../command_line.h"
@@ -49,19 +47,6 @@ ros::NodeHandle onQueue(ros::NodeHandle node, ros::CallbackQueue* queue) {
   return node;
 }
 
-/// Makes a task of /diagnostics: how often a topic comes. Silence is an error, any rate is right. What it
-/// returns is to be called for each message, by any thread.
-std::function<void()> topicRate(const std::string& topic, diagnostic_updater::Updater& updater) {
-  struct Task {
-    double least = 0.0, most = std::numeric_limits<double>::infinity();  // [Hz]
-    std::optional<diagnostic_updater::HeaderlessTopicDiagnostic> diagnostic;
-  };
-  const auto task = std::make_shared<Task>();
-  task->diagnostic.emplace(topic, updater,
-                           diagnostic_updater::FrequencyStatusParam(&task->least, &task->most, 0.0));
-  return [task] { task->diagnostic->tick(); };
-}
-
 /// The types of what is published, by topic; none without a master.
 std::map<std::string, std::string> publishedTypes() {
   std::map<std::string, std::string> types;
@@ -74,8 +59,14 @@ std::map<std::string, std::string> publishedTypes() {
 
 }  // namespace
 
-LiveOdometry::Radar::Radar(const Config& its_config) : config(its_config), format(pointCloudFormat(config)) {
+LiveOdometry::Radar::Radar(const Config& its_config)
+    : config(its_config),
+      format(pointCloudFormat(config)),
+      scan_rate(std::make_unique<TopicRate>(config.radar_topic)),
+      trigger_rate(std::make_unique<TopicRate>(config.trigger_topic)) {
   if (config.extrinsics_source == ExtrinsicsSource::kParameters) T_IR = config.odometry.radar.T_IR;
+  waiting_for =
+      "the first scan" + withName("", config, " of radar ") + ", whose frame_id names the radar for tf";
 }
 
 LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
@@ -87,6 +78,9 @@ LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& p
       config_(withParameters(withResolvedTopics(configured_, node), {})),
       node_(node),
       private_node_(private_node),
+      imu_rate_(config_.imu_topic),
+      pressure_rate_(config_.barometer_topic),
+      odom_rate_(private_node_.resolveName("odom")),
       monitor_(config_),
       publisher_(config_, onQueue(private_node, &input_queue_)),
       frames_(config_, node, name),
@@ -100,7 +94,7 @@ LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& p
   if (const std::string fault = faultOfOutput(config_.trajectory_file, {}); !fault.empty())
     ROS_WARN_STREAM(name_ << ": ~save_trajectory will fail, trajectory_file " << fault);
   showEffectiveParameters(private_node_, config_);
-  startSessionWhenReady();
+  startSessionWhenReady(ros::Time::now());
   addDiagnostics();
   subscribe();
   solver_ = std::thread([this] { solve(); });
@@ -231,12 +225,11 @@ void LiveOdometry::addDiagnostics() {
       diagnostics_->add(withName("extrinsics", radar),
                         [this, k](Status& s) { monitor_.describeExtrinsics(s, k); });
   }
-  tick_imu_ = topicRate(config_.imu_topic, *diagnostics_);
-  if (!config_.barometer_topic.empty()) tick_pressure_ = topicRate(config_.barometer_topic, *diagnostics_);
+  diagnostics_->add(imu_rate_);
+  if (!config_.barometer_topic.empty()) diagnostics_->add(pressure_rate_);
   for (Radar& radar : radars_) {
-    radar.tick_scan = topicRate(radar.config.radar_topic, *diagnostics_);
-    if (radar.config.stamp_source == StampSource::kTrigger)
-      radar.tick_trigger = topicRate(radar.config.trigger_topic, *diagnostics_);
+    diagnostics_->add(*radar.scan_rate);
+    if (radar.config.stamp_source == StampSource::kTrigger) diagnostics_->add(*radar.trigger_rate);
   }
 }
 
@@ -246,10 +239,8 @@ void LiveOdometry::onDiagnosticsTimer() {
   const std::string source = frames_.source();
   monitor_.setFrames({{"imu_frame", frames_.imuFrame().value_or("")}, {"base_extrinsics_from", source}});
   if (runs && !source.empty()) frames_.stopListening();
-  std::uint64_t published = odom_published_.exchange(0);
   // Before there is an odometry, its silence is no fault.
-  if (published > 0 && !tick_odom_) tick_odom_ = topicRate(private_node_.resolveName("odom"), *diagnostics_);
-  for (; published > 0; --published) tick_odom_();
+  if (odom_rate_.hasTicked() && !std::exchange(tells_odom_rate_, true)) diagnostics_->add(odom_rate_);
   // Not update(), which looks at ROS time: also a clock that stands still is worth a diagnosis.
   diagnostics_->force_update();
   log_.faults(session_.get());
@@ -286,25 +277,28 @@ void LiveOdometry::wakeSolver() {
   work_to_do_.notify_one();
 }
 
-void LiveOdometry::startSessionWhenReady() {
-  std::vector<Extrinsics> T_IR;
-  for (const Radar& radar : radars_) {
-    if (!radar.T_IR) {
-      monitor_.waitFor("the first scan" + withName("", radar.config, " of radar ") +
-                       ", whose frame_id names the radar for tf");
-      return;
-    }
-    T_IR.push_back(*radar.T_IR);
+void LiveOdometry::startSessionWhenReady(const ros::Time& now) {
+  const auto isMounted = [](const Radar& radar) { return radar.T_IR.has_value(); };
+  const auto missing = std::find_if_not(radars_.begin(), radars_.end(), isMounted);
+  if (missing != radars_.end()) {
+    if (!mounted_since_ && std::any_of(radars_.begin(), radars_.end(), isMounted)) mounted_since_ = now;
+    const double waited = mounted_since_ ? (now - *mounted_since_).toSec() : 0.0;
+    if (waited <= config_.odometry.health.coasting_after) return monitor_.waitFor(missing->waiting_for);
+    ROS_WARN_STREAM(name_ << ": starts" << withName("", missing->config, " without radar ")
+                          << ", which waits for " << missing->waiting_for);
   }
-  OdometryOptions options = live_config_.odometry;
-  options.radar.T_IR = T_IR.front();
-  for (std::size_t k = 0; k < options.radars.size(); ++k) options.radars[k].T_IR = T_IR.at(k);
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    options_ = options;
-  }
-  session_.replace(std::make_shared<LiveSession>(config_, options));
+  takeExtrinsics();
+  session_.replace(std::make_shared<LiveSession>(config_, options_));
   monitor_.waitFor("");
+}
+
+void LiveOdometry::takeExtrinsics() {
+  OdometryOptions options = live_config_.odometry;
+  if (radars_.front().T_IR) options.radar.T_IR = *radars_.front().T_IR;
+  for (std::size_t k = 0; k < options.radars.size(); ++k)
+    if (radars_.at(k).T_IR) options.radars[k].T_IR = *radars_[k].T_IR;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  options_ = options;
 }
 
 void LiveOdometry::reset(const std::string& reason, bool at_once) {

@@ -141,6 +141,11 @@ void LiveMonitor::dropped(std::size_t radar, const std::string& reason, std::uin
   }
 }
 
+void LiveMonitor::padding(std::size_t radar, std::uint64_t points) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  collector_.addPadding(radar, points);
+}
+
 void LiveMonitor::result(const LiveSession::Result& result) {
   const std::lock_guard<std::mutex> lock(mutex_);
   Radar& radar = radars_.at(result.result.scan.radar);

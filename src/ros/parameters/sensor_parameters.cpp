@@ -66,9 +66,11 @@ void listConsensus(ParameterList& list, EgoVelocityOptions& radar) {
       "ego_velocity_min_inlier_fraction", "", between(0, 1), radar.min_inlier_fraction,
       "A velocity needs at least this share of the points as inliers, since fewer can agree by chance. Lower "
       "it with care if most points are clutter.");
-  list.number("ego_velocity_prior_min_inlier_fraction", "", between(0, 1), radar.prior_min_inlier_fraction,
-              "If the velocity of the majority contradicts the IMU, this share of the points is enough for a "
-              "velocity that agrees with the IMU.");
+  list.number(
+      "ego_velocity_prior_min_inlier_fraction", "", between(0, 1), radar.prior_min_inlier_fraction,
+      "If the velocity of the majority contradicts the IMU, and this share of the points agrees with "
+      "the IMU, the estimator takes these. ego_velocity_min_inlier_fraction holds for them, too: with "
+      "fewer, the scan gives no velocity.");
 }
 
 void listPointNoise(ParameterList& list, EgoVelocityOptions& radar) {

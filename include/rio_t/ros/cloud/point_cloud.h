@@ -15,12 +15,13 @@ namespace rio_t {
 
 struct DecodedScan {
   pcl::PointCloud<RadarPointPcl> cloud;  ///< finite points, RIO axes
-  std::size_t dropped_not_finite = 0;    ///< points with a NaN or an infinity
+  std::size_t padding = 0;               ///< points at range zero or with no position but NaN; not in `cloud`
+  std::size_t dropped_not_finite = 0;    ///< other points with a NaN or an infinity; likewise
 };
 
 /// Decodes a cloud. No size in the message is trusted: throws std::runtime_error, with the fields received,
 /// the presets known and the one that fits, where a field is missing or the layout does not hold the points
-/// it declares. Points at range zero are kept: they are finite, and the estimator's min_range removes them.
+/// it declares. Some drivers fill their clouds up to a fixed size: that padding is no detection.
 DecodedScan decode(const sensor_msgs::PointCloud2& message, const PointCloudFormat& format);
 
 /// The presets whose fields the cloud has. The field of the power counts even where it is not read: its name

@@ -53,7 +53,8 @@ struct RadarSummary : RadarEstimate {
   Counts scans_rejected;                 ///< by reason
   Counts velocity_status;                ///< of the scans before the start, by EgoVelocityStatus
   std::uint64_t points = 0;              ///< of all scans
-  std::uint64_t points_not_finite = 0;   ///< besides these: the decoder drops them
+  std::uint64_t points_not_finite = 0;   ///< besides these: the decoder drops them, as the next
+  std::uint64_t padding = 0;             ///< points that clouds are filled up with
   std::array<std::uint64_t, kPointVerdicts> points_by_verdict = {};
   std::uint64_t scans_empty = 0;  ///< scans without a point
   /// Scans that had enough points for a velocity, and too few after the filter: by the verdict that took
@@ -171,6 +172,7 @@ class EvidenceCollector {
   void addNotFinite(std::size_t radar, std::uint64_t count) {
     evidence_.radars.at(radar).points_not_finite += count;
   }
+  void addPadding(std::size_t radar, std::uint64_t count) { evidence_.radars.at(radar).padding += count; }
   /// A trigger that was dropped, as its stamp is zero.
   void addZeroTrigger(std::size_t radar) { ++evidence_.radars.at(radar).triggers_zero; }
   /// Only with platform: ground_vehicle.

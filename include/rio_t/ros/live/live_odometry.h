@@ -13,11 +13,9 @@
 #include <std_srvs/Empty.h>
 #include <std_srvs/Trigger.h>
 
-#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
-#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -34,6 +32,7 @@
 #include "rio_t/ros/live/publisher.h"
 #include "rio_t/ros/live/session.h"
 #include "rio_t/ros/live/tf_watch.h"
+#include "rio_t/ros/live/topic_rate.h"
 
 namespace rio_t {
 
@@ -71,9 +70,10 @@ class LiveOdometry {
 
     Config config;  ///< with its topics as they are resolved
     PointCloudFormat format;
-    std::optional<Extrinsics> T_IR;  ///< configured; none until tf has it. Input thread only
+    std::optional<Extrinsics> T_IR;  ///< configured; none until tf has it. Input thread only, as the next
+    std::string waiting_for;         ///< what T_IR waits for
     ros::Subscriber scans, triggers;
-    std::function<void()> tick_scan, tick_trigger;  ///< for the rates in diagnostics
+    std::unique_ptr<TopicRate> scan_rate, trigger_rate;
   };
 
   /// Subscribes to the topics as the user wrote them: ROS would remap resolved ones once more.
@@ -91,8 +91,11 @@ class LiveOdometry {
 
   /// Takes T_IR from tf, once it is there. `cloud_frame`: of the cloud's header.
   void lookUpExtrinsics(Radar& radar, const std::string& cloud_frame);
-  /// Starts the session if T_IR of all radars is known; else says what is waited for.
-  void startSessionWhenReady();
+  /// Starts the session if T_IR of all radars is known, or if one is and the others have been silent since
+  /// for `coasting_after`; else says what is waited for.
+  void startSessionWhenReady(const ros::Time& now);
+  /// Sets options_ to what is configured, with the T_IR that are known.
+  void takeExtrinsics();
   /// After it returns, the node publishes nothing of the old session. Any thread.
   /// `at_once`: does not wait for rest first.
   void reset(const std::string& reason, bool at_once = false);
@@ -109,20 +112,20 @@ class LiveOdometry {
   const Config configured_;  // topics as the user wrote them
   const Config config_;      // topics as they are resolved
   ros::NodeHandle node_, private_node_;
+  TopicRate imu_rate_, pressure_rate_, odom_rate_;  // they tick in any thread
   ros::CallbackQueue imu_queue_, input_queue_;
   LiveMonitor monitor_;                                     // thread-safe
   LivePublisher publisher_;                                 // see there
   BodyFrame frames_;                                        // thread-safe
   std::optional<TfWatch> tf_watch_;                         // thread-safe; none if no tf is published
-  std::optional<diagnostic_updater::Updater> diagnostics_;  // input thread, but for ticks
-  std::function<void()> tick_imu_, tick_pressure_;
-  ros::Time last_clock_;             // of ROS, when `input` was told last; input thread
-  std::function<void()> tick_odom_;  // none before the first ~odom; input thread
-  std::atomic<std::uint64_t> odom_published_{0};
+  std::optional<diagnostic_updater::Updater> diagnostics_;  // input thread
+  ros::Time last_clock_;          // of ROS, when `input` was told last; input thread
+  bool tells_odom_rate_ = false;  // likewise
 
   const std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
-  std::vector<Radar> radars_;  // read-only after construction, but for T_IR
-  CurrentSession session_;     // thread-safe; null until the extrinsics are known
+  std::optional<ros::Time> mounted_since_;  // when the first T_IR came; input thread only
+  std::vector<Radar> radars_;               // read-only after construction, but for T_IR
+  CurrentSession session_;                  // thread-safe; null until the extrinsics are known
 
   std::mutex mutex_;  // guards what follows, held for microseconds
   std::condition_variable work_to_do_;

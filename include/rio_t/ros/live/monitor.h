@@ -48,8 +48,9 @@ class LiveMonitor {
   void imuUnusable(const std::string& why);    ///< it does not
   /// Scans, or points of them, that go no further.
   void dropped(std::size_t radar, const std::string& reason, std::uint64_t count = 1);
-  void pressure();                               ///< a message came
-  void pressureDropped(const std::string& why);  ///< one that cannot be used
+  void padding(std::size_t radar, std::uint64_t points);  ///< that its clouds are filled up with
+  void pressure();                                        ///< a message came
+  void pressureDropped(const std::string& why);           ///< one that cannot be used
   void result(const LiveSession::Result& result);
   /// The session starts again; counters of the node go on.
   void reset(const std::string& reason);
