@@ -181,7 +181,7 @@ TEST(TopicRate, OnlySilenceIsAnError) {
   EXPECT_EQ(levelOfRun(), diagnostic_msgs::DiagnosticStatus::ERROR);
   rate.tick();
   EXPECT_TRUE(rate.hasTicked());
-  for (int k = 0; k < 4; ++k) EXPECT_EQ(levelOfRun(), diagnostic_msgs::DiagnosticStatus::OK) << k;
+  for (int k = 0; k < 5; ++k) EXPECT_EQ(levelOfRun(), diagnostic_msgs::DiagnosticStatus::OK) << k;
   EXPECT_EQ(levelOfRun(), diagnostic_msgs::DiagnosticStatus::ERROR);
 }
 

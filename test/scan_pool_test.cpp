@@ -114,15 +114,5 @@ TEST(ScanPool, WithoutAPredictionNothingIsBorrowed) {
   EXPECT_EQ(pool.filled(scanAt(10.18, 3), lately).points.size(), 9U);
 }
 
-TEST(ScanPool, APointWithoutADirectionIsNotLent) {
-  ScanPool pool;
-  RadarScan scan = scanAt(10.0, 3);
-  scan.points[1].position_R.setZero();
-  pool.filled(scan, steady);
-  const RadarScan filled = pool.filled(scanAt(10.1, 3), steady);
-  EXPECT_EQ(filled.points.size(), 5U);
-  for (const RadarPoint& p : filled.points) EXPECT_TRUE(std::isfinite(p.doppler));
-}
-
 }  // namespace
 }  // namespace rio_t
