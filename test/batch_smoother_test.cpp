@@ -302,17 +302,6 @@ TEST_F(Batch, RestOfOneNodeCountsOnce) {
   EXPECT_LT((covariances[0] - covariances[1]).norm(), 1e-6 * covariances[0].norm());
 }
 
-/// A scan that tells the offset by a part of its derivative only.
-TEST_F(Batch, AScanWithPartOfTheEvidenceConverges) {
-  SmootherOptions options;
-  options.time_offset_model = TimeOffsetModel::kConstantAcceleration;
-  BatchProblem whole = problem(options, {skewMounting(), 0.0, 0.05});
-  addScans(0.7, kEnd, 0.04, whole);
-  for (BatchScan& scan : whole.scans) scan.velocity->offset_gain = 0.3;
-  const BatchSolution solution = make(options).solve(whole);
-  EXPECT_EQ(solution.termination, SolverTermination::kConverged);
-}
-
 TEST_F(Batch, ASharedOffsetBeginsWhereItsPriorIs) {
   SmootherOptions options;
   options.time_offset_shared = true;
