@@ -98,7 +98,8 @@ TEST_F(Batch, EqualsTheFixedLagSmootherThatKeepsEverything) {
         // The time of the window's node: another time splits the IMU's noise in another way.
         scan.t_O = model == TimeOffsetModel::kImu ? scan.stamp - online.radar.nodeTime(scan.stamp) : 0.02;
         // The batch takes the measurement to first order around there.
-        scan.velocity->linear_from_t_O = std::make_shared<const double>(scan.t_O);
+        if (model == TimeOffsetModel::kImu)
+          scan.velocity->linear_from_t_O = std::make_shared<const double>(scan.t_O);
         whole.scans.push_back(scan);
         online.add(*scan.velocity);
         if (scan.rest_velocity_sigma) online.addRest(scan.stamp, *scan.rest_velocity_sigma);

@@ -225,9 +225,10 @@ void BatchSmoother::addTerms(const BatchScan& scan, const Graph::Scan& at, doubl
   Graph::Node& node = graph.nodes[at.node];
   const Time time = *node.motion->time;
   const std::vector<Block*> blocks = {node.motion, node.biases, at.offset, at.extrinsics};
-  // Placed anew where the offset moves, so first order is enough. The other model is linear.
+  // Placed anew where the offset moves, so first order is enough. A gain needs it: it is in the derivative.
   const auto placed = [&](auto z) {
-    z.linear_from_t_O = std::make_shared<const double>(t_O);
+    const bool is_linear = atMeasurement() || z.offset_gain < 1.0;
+    z.linear_from_t_O = is_linear ? std::make_shared<const double>(t_O) : nullptr;
     z.slow = at.slow;
     return z;
   };
