@@ -238,7 +238,8 @@ void LiveOdometry::onDiagnosticsTimer() {
   if (runs) monitor_.waitFor(frames_.waitingFor());
   const std::string source = frames_.source();
   monitor_.setFrames({{"imu_frame", frames_.imuFrame().value_or("")}, {"base_extrinsics_from", source}});
-  if (runs && !source.empty()) frames_.stopListening();
+  if (runs && !source.empty() && std::all_of(radars_.begin(), radars_.end(), Radar::isMounted))
+    frames_.stopListening();
   // Before there is an odometry, its silence is no fault.
   if (odom_rate_.hasTicked() && !std::exchange(tells_odom_rate_, true)) diagnostics_->add(odom_rate_);
   // Not update(), which looks at ROS time: also a clock that stands still is worth a diagnosis.
@@ -278,10 +279,10 @@ void LiveOdometry::wakeSolver() {
 }
 
 void LiveOdometry::startSessionWhenReady(const ros::Time& now) {
-  const auto isMounted = [](const Radar& radar) { return radar.T_IR.has_value(); };
-  const auto missing = std::find_if_not(radars_.begin(), radars_.end(), isMounted);
+  const auto missing = std::find_if_not(radars_.begin(), radars_.end(), Radar::isMounted);
   if (missing != radars_.end()) {
-    if (!mounted_since_ && std::any_of(radars_.begin(), radars_.end(), isMounted)) mounted_since_ = now;
+    if (!mounted_since_ && std::any_of(radars_.begin(), radars_.end(), Radar::isMounted))
+      mounted_since_ = now;
     const double waited = mounted_since_ ? (now - *mounted_since_).toSec() : 0.0;
     if (waited <= config_.odometry.health.coasting_after) return monitor_.waitFor(missing->waiting_for);
     ROS_WARN_STREAM(name_ << ": starts" << withName("", missing->config, " without radar ")

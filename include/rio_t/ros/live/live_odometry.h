@@ -67,6 +67,7 @@ class LiveOdometry {
 
   struct Radar {
     explicit Radar(const Config& its_config);
+    static bool isMounted(const Radar& radar) { return radar.T_IR.has_value(); }
 
     Config config;  ///< with its topics as they are resolved
     PointCloudFormat format;
