@@ -1,5 +1,6 @@
 """The launch files: their arguments, what they refuse, and what they put on the parameter server."""
 import os
+import shutil
 import subprocess
 import xml.etree.ElementTree as ElementTree
 
@@ -131,6 +132,21 @@ def test_examples_refuse_what_the_others_refuse(name, tmp_path):
     assert "mavros.launch has no argument" in roslaunch("--nodes", "rio_t", "mavros.launch", "cnfig:=irs").stderr
     done = roslaunch("--nodes", "rio_t", name, "config:=isr", folder=tmp_path)
     assert "rio_t: config:=isr: there is no file" in done.stderr
+
+
+@pytest.mark.parametrize("with_config", (False, True))
+@pytest.mark.parametrize("name", sorted(file.name for file in (LAUNCH / "examples").glob("*.launch")))
+def test_an_example_that_was_copied_into_another_package_finds_our_configurations(name, with_config, tmp_path):
+    package = tmp_path / "my_robot"
+    (package / "launch").mkdir(parents=True)
+    shutil.copy(LAUNCH / "examples" / name, package / "launch")
+    if with_config:
+        (package / "config").mkdir()
+        (package / "config" / "own.yaml").touch()
+    given = parameters(package / "launch" / name, folder=tmp_path)
+    assert {value for key, value in given.items() if key.endswith("rio_t/config")} == {"irs"}
+    refused = roslaunch("--nodes", package / "launch" / name, "config:=isr", folder=tmp_path).stderr
+    assert "config:=isr: there is no file" in refused and "the package has" in refused and " irs," in refused
 
 
 def test_a_bag_that_is_not_there_is_refused(tmp_path):

@@ -4,14 +4,17 @@ import pathlib
 from xml.etree import ElementTree
 
 
-def version():
-    """That of package.xml, in a clone or beside an installed package."""
+def package_folder():
+    """Where package.xml and config/ of rio_t are: a clone, or share/rio_t of an installed package."""
     here = pathlib.Path(__file__).resolve()
-    for folder in here.parents:
-        for manifest in (folder / "package.xml", folder / "share" / "rio_t" / "package.xml"):
-            if manifest.is_file():
-                return ElementTree.parse(manifest).findtext("version")
-    return "unknown"
+    folders = (folder for parent in here.parents for folder in (parent, parent / "share" / "rio_t"))
+    return next((folder for folder in folders if (folder / "package.xml").is_file()), None)
+
+
+def version():
+    """That of package.xml."""
+    folder = package_folder()
+    return ElementTree.parse(folder / "package.xml").findtext("version") if folder else "unknown"
 
 
 class Parser(argparse.ArgumentParser):

@@ -12,6 +12,7 @@ import pathlib
 import sys
 import xml.etree.ElementTree as ElementTree
 
+from .command_line import package_folder
 from .errors import RioTError
 
 
@@ -72,15 +73,14 @@ def words_of(process):
 def main(arguments):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("config", help="a path, absolute or from where roslaunch was called, or a name of the package's config/")
-    parser.add_argument("launch_folder", type=pathlib.Path, help="where the launch files of the package are")
+    parser.add_argument("launch_folder", type=pathlib.Path, help="where the launch file is")
     parser.add_argument("--bag", default="", help="the bag that is to be played; empty: none")
     options = parser.parse_args(arguments)
     try:
         words = words_of(os.getppid())
         check_arguments(words, options.launch_folder)
         check_player(words)
-        configs = next(folder / "config" for folder in options.launch_folder.resolve().parents if (folder / "config").is_dir())
-        config = config_path(options.config, os.getcwd(), configs)
+        config = config_path(options.config, os.getcwd(), package_folder() / "config")
         if options.bag and not pathlib.Path(options.bag).is_file():
             raise RioTError(f"bag {options.bag}: no such file")
         print(config, end="")

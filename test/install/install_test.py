@@ -2,6 +2,7 @@
 import os
 import pathlib
 import re
+import shutil
 import socket
 import subprocess
 import time
@@ -73,6 +74,12 @@ def test_bag_launch_writes_a_run_and_report_draws_it(ros, bag, tmp_path):
         env={**os.environ, "PWD": str(bag.parent)})
     run("rosrun", "rio_t", "report.py", bag.parent / "out")
     assert (bag.parent / "out/report/report.html").is_file()
+
+
+def test_a_copied_example_finds_our_configurations(tmp_path):
+    (tmp_path / "launch").mkdir()
+    shutil.copy(PREFIX / "share/rio_t/launch/examples/mavros.launch", tmp_path / "launch")
+    assert "/rio_t/config: irs" in run("roslaunch", "--dump-params", tmp_path / "launch/mavros.launch")
 
 
 @pytest.mark.parametrize("arguments, name", [(["nodelet:=false"], "/rio_t"), (["nodelet:=true", "ns:=robot"], "/robot/rio_t")])
