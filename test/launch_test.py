@@ -1,6 +1,7 @@
 """The launch files: their arguments, what they refuse, and what they put on the parameter server."""
 import os
 import shutil
+import socket
 import subprocess
 import xml.etree.ElementTree as ElementTree
 
@@ -158,6 +159,22 @@ def test_a_bag_that_is_not_there_is_refused(tmp_path):
         assert "/rio_t" not in done.stdout
     (tmp_path / "my run.bag").touch()
     assert "/rio_t" in roslaunch("--nodes", "rio_t", "irs.launch", "bag:=my run.bag", folder=tmp_path).stdout
+
+
+def test_bag_launch_knows_the_home_folder(simulated_run, tmp_path, monkeypatch):
+    home, away = tmp_path / "my home", tmp_path / "away"
+    home.mkdir()
+    away.mkdir()
+    (home / "run.bag").symlink_to(simulated_run / "run.bag")
+    shutil.copy(SOURCE / "config" / "irs.yaml", home / "own.yaml")
+    monkeypatch.setenv("HOME", str(home))
+    with socket.socket() as free:
+        free.bind(("localhost", 0))
+        port = free.getsockname()[1]
+    done = roslaunch("-p", port, "rio_t", "bag.launch", "bag:=~/run.bag", "config:=~/own.yaml", "output_dir:=~/2024",
+                     folder=away)
+    assert (home / "2024" / "summary.yaml").is_file(), done.stderr
+    assert not list(away.iterdir())
 
 
 def test_namespace_and_topics_reach_the_node_and_the_bag(tmp_path):

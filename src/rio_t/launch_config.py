@@ -81,7 +81,7 @@ def main(arguments):
         check_arguments(words, options.launch_folder)
         check_player(words)
         config = config_path(options.config, os.getcwd(), package_folder() / "config")
-        if options.bag and not pathlib.Path(options.bag).is_file():
+        if options.bag and not pathlib.Path(os.path.expanduser(options.bag)).is_file():
             raise RioTError(f"bag {options.bag}: no such file")
         print(config, end="")
     except RioTError as error:
