@@ -7,9 +7,10 @@ import unittest
 
 import dynamic_reconfigure.client
 import numpy
+import rosbag
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Header
@@ -297,6 +298,28 @@ class SetupTest(tester.LiveTestCase):
         self.assertEqual(status, 1, told)
         self.assertIn("use_sim_time is true, but /clock is silent", told)
         self.assertFalse(os.path.exists(kept))
+
+    def test_check_bag_keeps_barometer_and_tf_of_live_topics(self):
+        kept, barometer = self.path("aids.bag"), "/sensor_platform/baro"
+        bag = tester.simulate(self.path("barometer.bag"), "--barometer")
+        # Of config/irs.yaml.
+        mounting = TransformStamped(header=Header(frame_id="base_link"), child_frame_id="radar")
+        mounting.transform.translation = Vector3(0.03, 0.03, -0.06)
+        mounting.transform.rotation = Quaternion(0.69946, 0.71461, 0.00723, 0.00524)
+        publisher = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
+        publisher.publish(TFMessage([mounting]))  # before the clock of the bag
+        words = ("--live", "--duration", tester.DEADLINE, "--keep", kept, "--out", self.path("aids.yaml"), "--set",
+                 "barometer_topic=" + barometer, "--set", "extrinsics_source=tf")
+        told = pathlib.Path(self.path("aids.txt"))
+        with open(told, "w") as log, tester.Process(tester.program("rio_t", "check_bag"), *words, stdout=log,
+                                                    stderr=log) as check:
+            with tester.play(bag, (tester.IMU, tester.RADAR, barometer), 4.0) as player:
+                player.wait()
+            self.assertEqual(check.stop(), 0, told.read_text())  # it has heard enough
+        publisher.unregister()
+        with rosbag.Bag(kept) as messages:
+            self.assertLessEqual({barometer, "/tf_static"}, set(messages.get_type_and_topic_info().topics))
+        self.assertIn("barometer_topic: " + barometer, pathlib.Path(self.path("aids.yaml")).read_text())
 
     def test_check_bag_sees_two_publishers_of_a_live_topic(self):
         rospy.set_param("/use_sim_time", False)

@@ -11,6 +11,8 @@
 #include <map>
 #include <set>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
 #include "../bag/bag_file.h"
 
@@ -19,9 +21,15 @@ namespace {
 
 using Event = ros::MessageEvent<topic_tools::ShapeShifter const>;
 
+bool isLatched(const Event& event) {
+  const auto found = event.getConnectionHeader().find("latching");
+  return found != event.getConnectionHeader().end() && found->second == "1";
+}
+
 bool isWanted(const std::string& type) {
-  static const std::set<std::string> wanted = {"sensor_msgs/Imu", "sensor_msgs/PointCloud2",
-                                               "std_msgs/Header"};
+  static const std::set<std::string> wanted = {"sensor_msgs/FluidPressure", "sensor_msgs/Imu",
+                                               "sensor_msgs/PointCloud2", "std_msgs/Header",
+                                               "tf2_msgs/TFMessage"};
   return wanted.count(type) != 0;
 }
 
@@ -29,16 +37,24 @@ bool isWanted(const std::string& type) {
 void record(ros::NodeHandle& node, double duration, rosbag::Bag& bag, std::size_t* messages,
             std::size_t* without_time) {
   std::map<std::string, ros::Subscriber> subscribers;
+  std::vector<std::pair<std::string, Event>> early;
+  // The header names the publisher.
+  const auto write = [&](const std::string& topic, const ros::Time& time, const Event& event) {
+    bag.write(topic, time, event.getConstMessage(), event.getConnectionHeaderPtr());
+    ++*messages;
+  };
   const auto subscribe = [&](const std::string& topic) {
     const boost::function<void(const Event&)> keep = [&, topic](const Event& event) {
       // With use_sim_time there is no time before the first /clock, and a bag takes no message without one.
       if (event.getReceiptTime().isZero()) {
         ++*without_time;
+        if (isLatched(event)) early.emplace_back(topic, event);  // a mounting on /tf_static comes only once
         return;
       }
-      // The header names the publisher.
-      bag.write(topic, event.getReceiptTime(), event.getConstMessage(), event.getConnectionHeaderPtr());
-      ++*messages;
+      for (const auto& [early_topic, early_event] : early)
+        write(early_topic, event.getReceiptTime(), early_event);
+      early.clear();
+      write(topic, event.getReceiptTime(), event);
     };
     constexpr std::uint32_t kQueue = 5000;
     subscribers[topic] = node.subscribe<topic_tools::ShapeShifter>(topic, kQueue, keep);
