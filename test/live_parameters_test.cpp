@@ -83,15 +83,39 @@ TEST(LiveParameters, RefuseWhatTheRegistryRefuses) {
   }
 }
 
-TEST(LiveParameters, LeaveOutKeysThatMayNotChange) {
+/// What is said about a message with one value more than those of today.
+template <typename Parameter, typename Value>
+std::string refusal(std::vector<Parameter> dynamic_reconfigure::Config::*kind, const std::string& name,
+                    const Value& value) {
   dynamic_reconfigure::Config message;
-  dynamic_reconfigure::DoubleParameter window;
-  window.name = "window";
-  window.value = 3.0;
-  message.doubles.push_back(window);
+  Parameter parameter;
+  parameter.name = name;
+  parameter.value = value;
+  (message.*kind).push_back(parameter);
   LiveParameters values;
   values.__fromMessage__(message);
-  EXPECT_TRUE(values.changesFrom(Config()).empty());
+  try {
+    withParameters(Config(), values.changesFrom(Config()));
+    return "nothing";
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+}
+
+TEST(LiveParameters, RefuseKeysThatMayNotChange) {
+  using dynamic_reconfigure::Config;
+  for (const std::string name : {"window", "odom_rat"}) {
+    const std::string told = refusal(&Config::doubles, name, 3.0);
+    EXPECT_NE(told.find("\"" + name + "\" does not change while the node runs; what does: "),
+              std::string::npos)
+        << told;
+    EXPECT_NE(told.find(", odom_rate, "), std::string::npos) << told;
+  }
+}
+
+TEST(LiveParameters, RefuseTextForANumber) {
+  const std::string told = refusal(&dynamic_reconfigure::Config::strs, "odom_rate", "fast");
+  EXPECT_NE(told.find("odom_rate: expected a finite number"), std::string::npos) << told;
 }
 
 }  // namespace

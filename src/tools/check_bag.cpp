@@ -82,7 +82,8 @@ int runLive(rio_t::CheckRequest request, double duration, const std::string& kee
   ros::init(argc, nullptr, "rio_t_check_bag", ros::init_options::AnonymousName);
   std::cerr << "check_bag: listening for " << duration << " s; keep still for 3 s, then move\n";
   if (rio_t::recordTopics(bag, duration) == 0)
-    throw std::runtime_error("--live: no message of an Imu, PointCloud2, Header, FluidPressure or tf topic came");
+    throw std::runtime_error(
+        "--live: no message of an Imu, PointCloud2, Header, FluidPressure or tf topic came");
   return rio_t::runCheck(request, std::cout, std::cerr);
 }
 

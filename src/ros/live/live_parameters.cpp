@@ -1,14 +1,18 @@
 #include "rio_t/ros/live/live_parameters.h"
 
 #include <algorithm>
+#include <boost/algorithm/string/join.hpp>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 #include <variant>
 
 #include "rio_t/ros/parameters/ros_parameters.h"
 
 namespace rio_t {
 namespace {
+
+const char* const kOrigin = "dynamic_reconfigure";
 
 template <typename Parameter, typename Value>
 Parameter parameterOf(const std::string& name, const Value& value) {
@@ -43,10 +47,15 @@ LiveParameters::LiveParameters(const Config& config) {
 }
 
 ParameterEntries LiveParameters::changesFrom(const Config& config) const {
+  std::vector<std::string> faults;
+  for (const std::string& name : unknown_)
+    faults.push_back(kOrigin + (": \"" + name + "\" does not change while the node runs; what does: ") +
+                     boost::algorithm::join(liveKeys(), ", "));
+  if (!faults.empty()) throw ConfigError(std::move(faults));
   const LiveParameters before(config);
   ParameterEntries changes;
   for (const auto& [key, value] : values_)
-    if (value.yaml() != before.values_.at(key).yaml()) changes.push_back({key, value, "dynamic_reconfigure"});
+    if (value.yaml() != before.values_.at(key).yaml()) changes.push_back({key, value, kOrigin});
   return changes;
 }
 
@@ -96,12 +105,17 @@ bool LiveParameters::__fromMessage__(dynamic_reconfigure::Config& message) {
   const auto take = [&](const auto& parameters, auto convert) {
     for (const auto& parameter : parameters) {
       const auto found = values_.find(parameter.name);
-      if (found != values_.end()) found->second.data = convert(parameter.value);
+      if (found == values_.end()) {
+        unknown_.push_back(parameter.name);
+      } else {
+        found->second.data = convert(parameter.value);
+      }
     }
   };
   take(message.bools, [](auto value) { return value != 0; });
   take(message.ints, [](auto value) { return std::int64_t{value}; });
   take(message.doubles, [](double value) { return value; });
+  take(message.strs, [](const std::string& value) { return value; });
   return true;
 }
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "rio_t/ros/parameters/parameters.h"
 
@@ -21,7 +22,8 @@ class LiveParameters {
   LiveParameters() : LiveParameters(Config()) {}
   explicit LiveParameters(const Config& config);
 
-  /// The values that differ from those of `config`, as entries with the origin "dynamic_reconfigure".
+  /// The values that differ from those of `config`, as entries with the origin "dynamic_reconfigure". Throws
+  /// ConfigError if a message had other keys.
   ParameterEntries changesFrom(const Config& config) const;
 
   // The server calls these; it sets their names.
@@ -38,7 +40,7 @@ class LiveParameters {
   void __fromServer__(const ros::NodeHandle& node);
   /// Writes none: the next start would take them for parameters of the user.
   void __toServer__(const ros::NodeHandle&) const {}
-  /// Takes the values of known keys; the kinds of the message decide.
+  /// The kinds of the message decide.
   bool __fromMessage__(dynamic_reconfigure::Config& message);
   void __toMessage__(dynamic_reconfigure::Config& message) const;
   void __toMessage__(dynamic_reconfigure::Config& message, int /*parameters*/, int /*groups*/) const {
@@ -50,6 +52,7 @@ class LiveParameters {
   static LiveParameters endsOfRanges(bool upper);
 
   std::map<std::string, ParameterValue> values_;  // by key
+  std::vector<std::string> unknown_;              // keys of a message that are none of these
 };
 
 }  // namespace rio_t
