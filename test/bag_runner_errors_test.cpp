@@ -76,6 +76,19 @@ TEST_F(BagRunnerErrors, WrongTypesAreNamed) {
               {"/other (ground_truth_topic) is std_msgs/Header"});
 }
 
+TEST_F(BagRunnerErrors, ATopicOfTwoTypesIsRefusedWhicheverBagComesFirst) {
+  writeBag({});
+  const std::string other = folder_ + "/other.bag";
+  rosbag::Bag(other, rosbag::bagmode::Write)
+      .write("/sensor_platform/imu", ros::Time(1200.0), std_msgs::Header());
+  for (const std::vector<std::string>& bags : {std::vector<std::string>{bag_, other}, {other, bag_}}) {
+    expectError(runTool({bags[0], bags[1], "--config", "irs", "--output-dir", out_}),
+                {"topic /sensor_platform/imu (imu_topic) is sensor_msgs/Imu and std_msgs/Header, expected "
+                 "sensor_msgs/Imu\n"});
+    EXPECT_FALSE(fs::exists(out_));
+  }
+}
+
 TEST_F(BagRunnerErrors, AWrongCloudFormatIsNamed) {
   BagContents what;
   what.doppler_field = "speed";

@@ -7,6 +7,7 @@
 #include <boost/algorithm/string/join.hpp>
 #include <filesystem>
 #include <fstream>
+#include <set>
 #include <system_error>
 
 #include "../text.h"
@@ -86,9 +87,11 @@ void Bags::addTo(rosbag::View* view, const std::function<bool(const rosbag::Conn
 std::map<std::string, std::string> Bags::typesByTopic() const {
   rosbag::View all;
   addTo(&all, everyTopic);
-  std::map<std::string, std::string> types;
+  std::map<std::string, std::set<std::string>> found;
   for (const rosbag::ConnectionInfo* connection : all.getConnections())
-    types[connection->topic] = connection->datatype;
+    found[connection->topic].insert(connection->datatype);
+  std::map<std::string, std::string> types;
+  for (const auto& [topic, of_topic] : found) types[topic] = boost::algorithm::join(of_topic, " and ");
   return types;
 }
 
