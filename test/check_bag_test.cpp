@@ -559,7 +559,9 @@ TEST_F(CheckBag, ExitStatusAndFiles) {
   request.out = bag_;
   EXPECT_EQ(runCheck(request, out, err), 2);
   EXPECT_NE(faultOf(request), "");
-  request.out = folder_ + "/my.yaml";
+  request.out = request.rig = folder_ + "/my.yaml";
+  EXPECT_EQ(faultOf(request), "--rig " + request.rig + ": expected another file than that of --out");
+  request.rig.clear();
   request.set = {parseAssignment("bag_duration=40")};  // of this bag alone
   EXPECT_EQ(faultOf(request), "");
   EXPECT_EQ(runCheck(request, out, err), 0) << err.str();

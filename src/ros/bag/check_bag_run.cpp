@@ -62,6 +62,8 @@ std::string faultOf(const CheckRequest& request) {
     const std::string fault = faultOfOutput(file, request.bags);
     if (!fault.empty()) return name + fault;
   }
+  if (isSameFile(request.out, request.rig))
+    return "--rig " + request.rig + ": expected another file than that of --out";
   return "";
 }
 
