@@ -131,6 +131,7 @@ def test_a_pair_of_a_preset_may_be_changed(simulate):
     (RADARS + ("left no-elevation=1",), ("--radar", "left", "no-elevation", "does not take")),
     (RADARS + ("left points=3 points=4",), ("--radar", "left", "points", "more than once")),
     (RADARS + ("left doppler-span=3 doppler-step=0.49",), ("'left'", "doppler-span", "doppler-step")),
+    (RADARS + ("left latency=1e300",), ("'left'", "latency", "at most 1e6 s")),
     (RADARS + ("left", "--radar", "left time-offset=0.1"), ("--radar", "two radars", "'left'")),
     (RADARS + ("Left",), ("'Left'", "lower case")),
     (RADARS + ("time-offset=0.1",), ("'time-offset=0.1'", "lower case")),
@@ -142,6 +143,16 @@ def test_a_bad_option_is_named(simulate, options, named):
     assert bag is None
     for word in named:
         assert word in done.stderr
+
+
+@pytest.mark.parametrize("option, value", [
+    ("imu-rate", "1e15"), ("imu-rate", "1e300"), ("radar-rate", "1e300"), ("barometer-rate", "1e300"),
+    ("ground-truth-rate", "1e300"), ("ground-truth-file-rate", "1e300"), ("duration", "1e300"), ("record-offset", "1e12"),
+    ("record-offset", "-1.7e9")])
+def test_what_would_never_end_or_fit_is_refused(simulate, tmp_path, option, value):
+    done, bag = simulate("--motion", "easy", "--barometer", "--ground-truth", tmp_path / "truth.txt", f"--{option}={value}")
+    assert (done.returncode, bag) == (2, None), done.stderr
+    assert f"--{option}" in done.stderr and "expected" in done.stderr
 
 
 def test_help_tells_of_presets_and_options(simulate):

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "rio_t/simulation/random.h"
+#include "rio_t/simulation/sample_count.h"
 
 namespace rio_t::simulation {
 namespace {
@@ -45,6 +46,7 @@ std::vector<SimulatedPressure> simulateBarometer(const Motion& motion, const Bar
   std::vector<SimulatedPressure> pressures;
   if (!options.enabled) return pressures;
   check(options);
+  checkSampleCount("barometer-rate", options.rate, motion.duration());
   Random random(seed, kBarometerStream);
   const double step = 1.0 / options.rate;
   double drift = 0.0;

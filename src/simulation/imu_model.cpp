@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "rio_t/simulation/random.h"
+#include "rio_t/simulation/sample_count.h"
 
 namespace rio_t::simulation {
 namespace {
@@ -85,6 +86,7 @@ void ImuModelOptions::removeErrors() {
 
 ImuData simulateImu(const Motion& motion, const ImuModelOptions& options, std::uint64_t seed, Time start) {
   check(options);
+  checkSampleCount("imu-rate", options.rate, motion.duration());
   Random bias_random(seed, kBiasStream);
   Random random(seed, kNoiseStream);
   Random dropout_random(seed, kDropoutStream);

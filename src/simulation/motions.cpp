@@ -8,11 +8,13 @@
 #include "rio_t/core/angle.h"
 #include "rio_t/core/so3.h"
 #include "rio_t/simulation/random.h"
+#include "rio_t/simulation/sample_count.h"
 
 namespace rio_t::simulation {
 namespace {
 
 constexpr double kSampleStep = 0.01;  // [s] of the poses that the spline is put through
+static_assert(kLongest == kMostSamples * kSampleStep);
 constexpr std::uint64_t kMotionStream = 1;
 constexpr double kWalkingPace = 1.3;    // [m/s]
 constexpr double kStraightSpeed = 1.0;  // [m/s]
@@ -371,6 +373,8 @@ Motion makeMotion(const MotionRequest& request) {
     throw std::invalid_argument("motion: a duration of " + std::to_string(duration) +
                                 " s leaves less than 5 s between the rests");
   }
+  if (path_duration > kLongest)
+    throw std::invalid_argument(formatted("--duration: %g s; expected at most %g s", duration, kLongest));
 
   Random random(request.seed, kMotionStream);
   const PoseFunction pose_at = poseFunction(request, random, path_duration);

@@ -9,6 +9,7 @@
 #include "rio_t/core/angle.h"
 #include "rio_t/radar/direction.h"
 #include "rio_t/simulation/random.h"
+#include "rio_t/simulation/sample_count.h"
 
 namespace rio_t::simulation {
 namespace {
@@ -33,6 +34,8 @@ void check(const RadarModelOptions& o) {
   require(o.first_trigger >= 0.0, "first trigger cannot be before the start");
   require(o.frame_length >= 0.0, "frame length cannot be negative");
   require(o.latency >= 0.0 && o.latency_sigma >= 0.0, "latency cannot be negative");
+  require(o.latency <= kLongest && o.latency_sigma <= kLongest,
+          "latency and its sigma (latency, latency-sigma) must be at most 1e6 s, the longest motion");
   require(o.points_mean > 0.0 && o.points_sigma >= 0.0 && o.points_max > 0,
           "number of points must be positive");
   require(o.points_mean <= o.points_max,
@@ -355,6 +358,7 @@ std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarSetup&
                                          Time start) {
   const RadarModelOptions& options = setup.radar;
   check(options);
+  checkSampleCount("radar-rate", options.rate, motion.duration());
   const Sensor sensor(motion, setup, seed);
   std::vector<SimulatedScan> scans;
   std::uint32_t seq = 0;

@@ -5,6 +5,7 @@
 
 #include "rio_t/radar/scan.h"
 #include "rio_t/simulation/random.h"
+#include "rio_t/simulation/sample_count.h"
 
 namespace rio_t::simulation {
 namespace {
@@ -40,6 +41,7 @@ SensorData simulate(const Motion& motion, const SimulationOptions& options) {
 
 Trajectory groundTruth(const Motion& motion, double rate, Time start) {
   if (!(rate > 0.0)) throw std::invalid_argument("ground truth: rate must be positive");
+  checkSampleCount("ground-truth-file-rate", rate, motion.duration());
   Trajectory poses;
   const auto count = static_cast<std::size_t>(std::floor(motion.duration() * rate)) + 1;
   for (std::size_t i = 0; i < count; ++i) {

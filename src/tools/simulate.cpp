@@ -151,14 +151,20 @@ void run(Request request) {
   if (request.start_time > kLastStamp)
     throw UsageError("--start-time " + std::to_string(request.start_time) +
                      ": expected at most 4294967295, the last stamp of ROS");
+  // A message of time 0 no bag takes.
+  const double record_start = request.start_time + request.bag.record_offset;
+  if (!(record_start > 0.0 && record_start <= kLastStamp))
+    throw UsageError("--record-offset " + shortText(request.bag.record_offset, 10) +
+                     ": expected a record that starts between 0 and 4294967295 s, got " +
+                     shortText(record_start, 10) + " s");
   request.simulation.start = Time::fromSeconds(request.start_time);
   const Motion motion = motionOf(request);
+  Trajectory truth;
+  if (!request.ground_truth.empty())
+    truth = groundTruth(motion, request.ground_truth_file_rate, request.simulation.start);
   const SensorData data = simulate(motion, request.simulation);
   writeSimulationBag(request.out, motion, data, request.simulation.start, request.bag);
-  if (!request.ground_truth.empty()) {
-    writeTum(request.ground_truth,
-             groundTruth(motion, request.ground_truth_file_rate, request.simulation.start));
-  }
+  if (!request.ground_truth.empty()) writeTum(request.ground_truth, truth);
   printSummary(request, motion, data);
 }
 

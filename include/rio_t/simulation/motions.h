@@ -30,8 +30,8 @@ struct MotionRequest {
 
 /// Builds a built-in motion: the same request gives the same motion. Starts near the origin, IMU level at
 /// rest for all but the tilted hand-held ones. Throws std::invalid_argument for an unknown name (the message
-/// lists the known ones), a duration that leaves less than 5 s between the rests, or a speed that is not
-/// positive or that the motion cannot take.
+/// lists the known ones), a duration that leaves less than 5 s between the rests or is above kLongest, or a
+/// speed that is not positive or that the motion cannot take.
 Motion makeMotion(const MotionRequest& request);
 
 }  // namespace rio_t::simulation

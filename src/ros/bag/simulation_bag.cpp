@@ -20,6 +20,7 @@
 
 #include "bag_file.h"
 #include "rio_t/ros/messages/conversions.h"
+#include "rio_t/simulation/sample_count.h"
 
 namespace rio_t {
 namespace {
@@ -240,6 +241,7 @@ std::vector<Arrival> arrivals(const simulation::Motion& motion, const simulation
 void writeSimulationBag(const std::string& path, const simulation::Motion& motion,
                         const simulation::SensorData& data, Time start, const SimulationBagOptions& options) {
   if (!(options.ground_truth_rate > 0.0)) throw std::invalid_argument("ground truth: rate must be positive");
+  simulation::checkSampleCount("ground-truth-rate", options.ground_truth_rate, motion.duration());
   const std::vector<RadarTrack> radars = tracksOf(data, options.format);
   writeBag(path, [&](rosbag::Bag& bag) {
     for (const Arrival& arrival : arrivals(motion, data, radars, start, options))
