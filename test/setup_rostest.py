@@ -35,7 +35,9 @@ class SetupTest(tester.LiveTestCase):
         super().setUpClass()
         cls.bag = tester.simulate(cls.path("run.bag"))
         cls.imu_stamps = tester.stamps(cls.bag, tester.IMU)
-        cls.scan_stamps = tester.stamps(cls.bag, tester.RADAR)
+        with rosbag.Bag(cls.bag) as messages:
+            scans = [scan for _, scan, _ in messages.read_messages([tester.RADAR])]
+        cls.scan_stamps, cls.scan_sizes = [scan.header.stamp.to_nsec() for scan in scans], [scan.width for scan in scans]
 
     def setUp(self):
         super().setUp()
@@ -48,14 +50,17 @@ class SetupTest(tester.LiveTestCase):
 
     def test_namespace(self):
         """Relative topics, services and parameters lie in the namespace of the node."""
-        parameters = ("config:=irs", "imu_topic:=imu", "radar_topic:=scan")
+        saved = self.path("namespace.txt")
+        parameters = ("config:=irs", "imu_topic:=imu", "radar_topic:=scan", "trajectory_file:=" + saved)
         with tester.Listener(node="/robot/rio_t") as listener, tester.node(*parameters, remap=("__ns:=/robot",)):
             listener.wait_until_heard()
             self.play_whole(listener, {tester.IMU: "/robot/imu", tester.RADAR: "/robot/scan"})
             listener.wait_for_diagnosis("input", "", None)
             self.assertIn("/robot/imu topic status", listener.diagnostics)
             self.assertIn("/robot/scan topic status", listener.diagnostics)
-            self.assertFalse(tester.call("/robot/rio_t/save_trajectory").message == "")
+            response = tester.call("/robot/rio_t/save_trajectory")
+            self.assertTrue(response.success, response.message)
+            self.assertGreater(len(tum.read(saved).positions()), 20)
         # The bag runner reads the same relative names.
         run = tester.run_bag(self.bag, "irs", self.path("relative"), "imu_topic=" + tester.IMU[1:],
                              "radar_topic=" + tester.RADAR[1:])
@@ -91,15 +96,20 @@ class SetupTest(tester.LiveTestCase):
             self.assertLessEqual({m.header.stamp.to_nsec() for m in listener.messages["odom"]}, set(self.imu_stamps))
 
     def test_arrival_stamps(self):
-        with tester.Listener() as listener, tester.node("config:=irs", "stamp_source:=arrival"):
+        with tester.Listener() as listener, tester.node("config:=irs", "stamp_source:=arrival", "correct_stamps:=false"):
             listener.wait_until_heard()
-            self.play_whole(listener, answers={})  # which have the times of arrival
-            listener.wait_for("offsets", lambda: len(listener.messages["time_offset"]) > 20)
-            stamps = [m.header.stamp.to_nsec() for m in listener.messages["time_offset"]]
-            self.assertFalse(set(stamps) & set(self.scan_stamps), "these are the stamps of the headers")
-            nearest = [min(abs(stamp - other) for other in self.scan_stamps) for stamp in stamps]
-            self.assertLess(numpy.median(nearest), 0.5e9)
+            self.play_whole(listener)
+            listener.wait_for_stamp("points", self.scan_stamps[-4])
+            answers = list(listener.messages["points"])
             self.assertIsNone(listener.value("input", "dropped_imu_missing"))
+        # The numbers of points tell which scans these are.
+        sizes = [m.width for m in answers]
+        firsts = [k for k in range(len(self.scan_stamps)) if self.scan_sizes[k:k + len(sizes)] == sizes]
+        self.assertEqual(len(firsts), 1, (sizes, self.scan_sizes))
+        self.assertGreater(len(sizes), 20)
+        delays = [m.header.stamp.to_nsec() - stamp for m, stamp in zip(answers, self.scan_stamps[firsts[0]:])]
+        # Those of `simulate`: a scan arrives after 0.06 s, the IMU after 0.001 s. The median, since a busy machine delivers late.
+        self.assertAlmostEqual(1e-9 * numpy.median(delays), 0.06 - 0.001, delta=0.03)
 
     def test_ti_mmwave(self):
         bag = tester.simulate(self.path("ti.bag"), "--format", "ti_mmwave", "--extrinsics-rotation-xyzw",
@@ -138,13 +148,15 @@ class SetupTest(tester.LiveTestCase):
     def test_unloading_during_long_solves(self):
         """The solver has more to do than time for it; the nodelet goes all the same, and the manager stays."""
         nodelet = tester.program("nodelet", "nodelet")
-        heavy = ("_solver:=ceres", "_window:=30.0", "_max_iterations:=1000", "_max_queued_scans:=20")
+        bag = tester.simulate(self.path("long.bag"), duration=40)
+        heavy = ("_solver:=ceres", "_window:=60.0", "_max_iterations:=1000", "_max_queued_scans:=3")
         with tester.Process(*tester.preloaded(), nodelet, "manager", "__name:=manager") as manager:
             with tester.Listener() as listener, tester.Process(
                     nodelet, "load", "rio_t/RioTNodelet", "manager", "__name:=rio_t", "_config:=irs", *heavy) as loader:
                 listener.wait_until_heard()
-                with tester.play(self.bag, (tester.IMU, tester.RADAR), 10.0):
-                    listener.wait_for("optimised odometry", lambda: len(listener.messages["odom_optimized"]) > 10)
+                with tester.play(bag, (tester.IMU, tester.RADAR), 10.0, "--loop"):
+                    listener.wait_for("scans for which the solver has no time", lambda: listener.value(
+                        "input", "dropped_queue_full") not in (None, "0"))
                     loader.stop()
                     self.assertIsNone(manager.process.poll(), "the manager died")
             with tester.Listener() as listener, tester.Process(nodelet, "load", "rio_t/RioTNodelet", "manager",
@@ -213,7 +225,7 @@ class SetupTest(tester.LiveTestCase):
         text = log.read_text()
         self.assertIn("/rio_t: initialising, waiting for", text)
         self.assertIn("/rio_t: no IMU message yet on /wrong", text)
-        self.assertLess(text.count("no IMU message yet"), 4, "the log repeats each diagnosis")
+        self.assertEqual(text.count("no IMU message yet"), 1, text)  # it repeats a diagnosis after a minute
 
     def test_the_log_says_that_the_estimate_diverged_also_where_no_scan_comes(self):
         log = pathlib.Path(self.path("diverged.txt"))
