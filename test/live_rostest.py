@@ -273,12 +273,12 @@ class LiveTest(tester.LiveTestCase):
         self.assertEqual(outcome.returncode, 1, outcome.stdout)
         self.assertIn("no_such", outcome.stdout)
 
-    def test_launch_file_plays_a_bag_to_the_nodelet(self):
+    def test_launch_file_plays_a_bag_to_the_nodelet_and_ends_with_it(self):
         words = ("--wait", "rio_t", "irs.launch", "bag:=" + self.bag, f"bag_rate:={2.0 / tester.SLOWNESS}",
-                 "nodelet:=true", "launch_prefix:=" + " ".join(tester.preloaded()))
+                 "end_with_bag:=true", "nodelet:=true", "launch_prefix:=" + " ".join(tester.preloaded()))
         with tester.Listener() as listener, tester.Process(shutil.which("roslaunch"), *words) as launch:
-            listener.wait_for_stamp("odom", self.imu_stamps[-1])
-            launch.stop()
+            listener.wait_for_stamp("odom", self.imu_stamps[-1] - 10**9)  # the end of the player ends the nodelet, too
+            self.assertEqual(launch.wait(), 0)
 
 
 if __name__ == "__main__":

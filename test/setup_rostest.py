@@ -11,7 +11,7 @@ import rosbag
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
-from nav_msgs.msg import Odometry
+from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Header
 from std_srvs.srv import Empty
@@ -110,6 +110,32 @@ class SetupTest(tester.LiveTestCase):
         delays = [m.header.stamp.to_nsec() - stamp for m, stamp in zip(answers, self.scan_stamps[firsts[0]:])]
         # Those of `simulate`: a scan arrives after 0.06 s, the IMU after 0.001 s. The median, since a busy machine delivers late.
         self.assertAlmostEqual(1e-9 * numpy.median(delays), 0.06 - 0.001, delta=0.03)
+
+    def test_who_comes_late_gets_the_newest_poses_of_the_path(self):
+        others = {name: kind for name, kind in tester.TOPICS.items() if name != "path"}
+        with tester.Listener(others) as listener, tester.node("config:=irs", "path_max_poses:=10"):
+            listener.wait_until_heard()
+            with tester.feed(listener, self.bag, rate=4.0, duration=7.0) as player:
+                player.wait()
+            optimized = listener.messages["odom_optimized"]
+            newest = optimized[-1].header.stamp
+            path = [pose.header.stamp for pose in rospy.wait_for_message("/rio_t/path", Path, tester.DEADLINE).poses]
+            listener.wait_for_stamp("odom_optimized", path[-1].to_nsec())
+            self.assertGreaterEqual(path[-1], newest)
+            stamps = sorted({m.header.stamp for m in optimized if m.header.stamp <= path[-1]})
+            self.assertGreater(len(stamps), 20)
+            self.assertEqual(path, stamps[-10:])
+
+    def test_aids_say_that_they_are_used(self):
+        bag, barometer = self.path("vehicle.bag"), "/sensor_platform/baro"
+        tester.check(tester.run(tester.program("rio_t", "simulate"), "--motion", "ground_vehicle", "--barometer",
+                                "--static-start", 4, "--duration", 16, "--out", bag))
+        with tester.Listener() as listener, tester.node("config:=irs", "platform:=ground_vehicle",
+                                                        "barometer_topic:=" + barometer):
+            listener.wait_until_heard()
+            with tester.feed(listener, bag, (tester.IMU, tester.RADAR, barometer)):
+                listener.wait_for_diagnosis("barometer", "in use", OK)
+                listener.wait_for_diagnosis("ground vehicle", "the motion agrees", OK)
 
     def test_ti_mmwave(self):
         bag = tester.simulate(self.path("ti.bag"), "--format", "ti_mmwave", "--extrinsics-rotation-xyzw",
