@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "low_passed_axis.h"
 #include "synthetic_motion.h"
 
 namespace rio_t {
@@ -68,6 +69,81 @@ TEST(Saturation, AToldRangeHolds) {
   EXPECT_TRUE(detector.check(imu).accel);
   imu.acceleration.x() = 19.0;
   for (int i = 0; i < 8; ++i) EXPECT_FALSE(detector.check(imu).accel) << "flat, but not at the range";
+}
+
+constexpr double kDegree = M_PI / 180.0;
+
+/// A gyro of 2000 degrees/s and an accelerometer of 16 g. At the top of a swing, readings so close in time
+/// are the same.
+TEST(Saturation, TheTopOfASwingIsNoEndOfTheRangeAtAnyRate) {
+  for (const double rate : {100.0, 200.0, 400.0, 1000.0, 2000.0}) {
+    for (const double size : {1.0, 0.2}) {
+      for (const double noise : {0.005, 0.01}) {
+        LowPassedAxis gyro(rate, 2000.0 * kDegree, noise * kDegree, 1);
+        LowPassedAxis accel(rate, 16.0 * 9.81, 0.03 * noise * 9.81, 2);
+        SaturationDetector detector(0.0, 0.0);
+        int flagged = 0;
+        for (int i = 0; i < 60.0 * rate; ++i) {
+          ImuMeasurement imu;
+          imu.angular_velocity.x() = gyro.next(size);
+          imu.acceleration.x() = accel.next(3.0 * size);
+          imu.time = gyro.time();
+          const auto saturated = detector.check(imu);
+          flagged += saturated.accel || saturated.gyro ? 1 : 0;
+        }
+        EXPECT_EQ(flagged, 0) << rate << " Hz, " << size << ", " << noise;
+      }
+    }
+  }
+}
+
+/// Swings of up to 1.6 ranges, of gyros of 250 and 2000 degrees/s. The first one may hardly touch the end.
+TEST(Saturation, AFlatTopIsFoundAtAnyRate) {
+  for (const double rate : {100.0, 200.0, 400.0, 1000.0, 2000.0}) {
+    for (const double range : {250.0 * kDegree, 2000.0 * kDegree}) {
+      LowPassedAxis gyro(rate, range, 0.005 * kDegree, 3);
+      SaturationDetector detector(0.0, 0.0);
+      int beyond = 0, found = 0, false_alarms = 0;
+      for (int i = 0; i < 60.0 * rate; ++i) {
+        ImuMeasurement imu;
+        imu.angular_velocity.y() = gyro.next(0.6 * range);
+        imu.time = gyro.time();
+        const bool saturated = detector.check(imu).gyro;
+        beyond += gyro.isAtEnd() ? 1 : 0;
+        found += gyro.isAtEnd() && saturated ? 1 : 0;
+        false_alarms += !gyro.isAtEnd() && saturated ? 1 : 0;
+      }
+      ASSERT_GT(beyond, rate) << range;
+      EXPECT_GT(found, 0.95 * beyond) << "of " << beyond << " at " << rate << " Hz, " << range;
+      EXPECT_EQ(false_alarms, 0) << rate << " Hz, " << range;
+    }
+  }
+}
+
+TEST(Saturation, TheEndOfTheRangeIsTheLargestReadingOfASecondAtAnyRate) {
+  for (const double rate : {100.0, 2000.0}) {
+    SaturationDetector detector(0.0, 0.0);
+    ImuMeasurement imu;
+    const auto hold = [&](double reading, double seconds) {
+      bool saturated = false;
+      for (int i = 0; i < seconds * rate; ++i) {
+        imu.time = imu.time + 1.0 / rate;
+        imu.angular_velocity.x() = reading + 0.001 * (i % 3);
+        saturated |= detector.check(imu).gyro;
+      }
+      for (int i = 0; i < 6; ++i) saturated |= detector.check(imu).gyro;
+      return saturated;
+    };
+    EXPECT_FALSE(hold(0.0, 1.0));
+    imu.angular_velocity.x() = 5.0;
+    EXPECT_FALSE(detector.check(imu).gyro);
+    EXPECT_FALSE(hold(0.0, 0.5));
+    imu.angular_velocity.x() = 3.0;
+    for (int i = 0; i < 6; ++i) EXPECT_FALSE(detector.check(imu).gyro) << rate << " Hz";
+    EXPECT_FALSE(hold(0.0, 2.0));
+    imu.angular_velocity.x() = 3.0;
+    for (int i = 0; i < 6; ++i) EXPECT_EQ(detector.check(imu).gyro, i >= 4) << rate << " Hz";
+  }
 }
 
 }  // namespace

@@ -153,7 +153,7 @@ void ImuInputCheck::addLostMotion(double dt, ImuMeasurement& imu) const {
 bool ImuInputCheck::findFrozen(const ImuMeasurement& imu, bool turns) {
   bool is_frozen = false;
   for (int k = 0; k < 3; ++k)  // each axis must see each sample
-    is_frozen |= accel_axes_[static_cast<std::size_t>(k)].isFrozen(imu.acceleration[k], turns);
+    is_frozen |= accel_axes_[static_cast<std::size_t>(k)].isFrozen(imu.time, imu.acceleration[k], turns);
   return is_frozen;
 }
 

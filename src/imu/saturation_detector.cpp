@@ -9,8 +9,11 @@ namespace {
 constexpr int kFlatTop = 5;               // equal readings in a row
 constexpr double kFarAcceleration = 0.5;  // [m/s^2] noise and coarse steps at rest stay below
 constexpr double kFarAngularRate = 0.1;   // [rad/s] likewise
-constexpr int kStretch = 200;             // over which a reading must be the largest, at least
-constexpr double kShareOfRange = 0.999;   // of a range that was configured
+constexpr double kStretch = 1.0;  // [s] over which a reading must be the largest, at least: some swings
+constexpr double kShareOfRange = 0.999;  // of a range that was configured
+/// Smallest steps from the reading before a flat top to it. The smooth top of a swing that stays within one
+/// step for five readings is entered by one, and its noise is then of one step or two.
+constexpr double kSteep = 6.0;
 
 }  // namespace
 
@@ -22,31 +25,43 @@ SaturationDetector::Saturated SaturationDetector::check(const ImuMeasurement& im
   for (int k = 0; k < 3; ++k) {
     const auto i = static_cast<std::size_t>(k);
     // Each axis must see each sample.
-    saturated.accel |= axes_[i].isSaturated(imu.acceleration[k], accel_range_, kFarAcceleration);
-    saturated.gyro |= axes_[i + 3].isSaturated(imu.angular_velocity[k], gyro_range_, kFarAngularRate);
+    saturated.accel |= axes_[i].isSaturated(imu.time, imu.acceleration[k], accel_range_, kFarAcceleration);
+    saturated.gyro |=
+        axes_[i + 3].isSaturated(imu.time, imu.angular_velocity[k], gyro_range_, kFarAngularRate);
   }
   return saturated;
 }
 
-bool SaturationDetector::Axis::isSaturated(double reading, double range, double far_from_first) {
+bool SaturationDetector::Axis::isSaturated(Time time, double reading, double range, double far_from_first) {
   const double size = std::abs(reading);
   if (range > 0.0) return size >= kShareOfRange * range;
   if (!first) first = reading;
-  repeated = last && *last == reading ? repeated + 1 : 1;
-  last = reading;
+  follow(reading);
   if (limit && size > *limit) limit.reset();
   if (limit) return size == *limit;
-  if (stretch++ == kStretch) {
+  if (std::abs(time - stretch_since) >= kStretch) {  // the clock may jump, too
     largest_before = largest;
     largest = 0.0;
-    stretch = 0;
+    stretch_since = time;
   }
   largest = std::max(largest, size);
-  if (repeated < kFlatTop || size < std::max(largest, largest_before) ||
+  if (repeated < kFlatTop || !is_steep || size < std::max(largest, largest_before) ||
       std::abs(reading - *first) < far_from_first)
     return false;
   limit = size;
   return true;
+}
+
+void SaturationDetector::Axis::follow(double reading) {
+  const double step = last ? std::abs(reading - *last) : 0.0;
+  last = reading;
+  if (step == 0.0) {
+    ++repeated;
+    return;
+  }
+  repeated = 1;
+  is_steep = !smallest_step || step >= kSteep * *smallest_step;
+  smallest_step = std::min(step, smallest_step.value_or(step));
 }
 
 }  // namespace rio_t

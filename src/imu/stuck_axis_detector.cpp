@@ -11,35 +11,43 @@ namespace {
 /// [rad/s] No platform that carries a radar turns faster by this within a sample: at 100 Hz that is 200
 /// rad/s^2, at 400 Hz 800 rad/s^2, and a hand that shakes with 3 rad/s at 3 Hz reaches 60 rad/s^2.
 constexpr double kSmallestJump = 2.0;
-constexpr double kHandShakes = 60.0;   // [rad/s^2] that hand
-constexpr double kUnusual = 5.0;       // times the usual jump: more is a jump away, less is noise
-constexpr double kForgetting = 0.999;  // each sample, of the usual jump and the longest run
+constexpr double kHandShakes = 60.0;  // [rad/s^2] that hand
+constexpr double kUnusual = 5.0;      // times the usual jump: more is a jump away, less is noise
+constexpr double kMemory = 10.0;      // [s] of the usual jump and the longest run
 /// Fewer repeats show nothing: a gyro whose noise is one step makes five in a row once in 600 samples.
 constexpr double kFewRepeats = 10.0;
-/// Times the longest run lately. If r in a row come once in the 1000 samples remembered, 3 r come once in
-/// 10^9.
+/// [s] Nor do shorter ones: at the top of a swing of 1 rad/s^3, a reading stays in a step of 0.06 degrees/s
+/// for 0.09 s.
+constexpr double kShortRun = 0.1;
+/// Times the longest run lately. If r in a row come once in the 1000 samples that an IMU of 100 Hz is
+/// remembered for, 3 r come once in 10^9.
 constexpr double kUnusualRun = 3.0;
+
+double fade(double dt) { return std::exp(-std::max(0.0, dt) / kMemory); }
 
 }  // namespace
 
-bool FrozenAxisDetector::isFrozen(double reading, bool turns) {
+bool FrozenAxisDetector::isFrozen(Time time, double reading, bool turns) {
   const bool is_last = last_ && *last_ == reading;
   const bool is_first = !last_;
+  if (longest_run_) *longest_run_ *= fade(time - last_at_);
   last_ = reading;
-  if (longest_run_) *longest_run_ *= kForgetting;
+  last_at_ = time;
   if (is_last) {
     repeats_ += 1.0;
-    is_frozen_ |= turns && longest_run_ && repeats_ > std::max(kFewRepeats, kUnusualRun * *longest_run_);
-  } else if (!is_first) {
-    if (!is_frozen_) longest_run_ = std::max(longest_run_.value_or(0.0), repeats_);
-    repeats_ = 0.0;
-    is_frozen_ = false;
+    is_frozen_ |= turns && longest_run_ && time - run_since_ > kShortRun &&
+                  repeats_ > std::max(kFewRepeats, kUnusualRun * *longest_run_);
+    return is_frozen_;
   }
+  if (!is_first && !is_frozen_) longest_run_ = std::max(longest_run_.value_or(0.0), repeats_);
+  repeats_ = 0.0;
+  run_since_ = time;
+  is_frozen_ = false;
   return is_frozen_;
 }
 
 std::optional<double> StuckAxisDetector::check(Time time, double reading, bool turns, bool is_saturated) {
-  const bool is_frozen = frozen_.isFrozen(reading, turns);
+  const bool is_frozen = frozen_.isFrozen(time, reading, turns);
   const double jump = good_ ? std::abs(reading - *good_) : 0.0;
   // After a jump that no mass makes, the noise of a stuck axis is no motion either.
   const bool stays =
@@ -54,7 +62,7 @@ std::optional<double> StuckAxisDetector::check(Time time, double reading, bool t
     return *good_ * std::exp(-std::max(0.0, time - good_at_) / kMotionCorrelationTime);
   // Over a gap a platform may turn so fast. If the reading repeats, it sticks.
   if (jumps_away) return std::nullopt;
-  if (!stuck_at_) usual_jump_ = std::max(kForgetting * usual_jump_, jump);
+  if (!stuck_at_) usual_jump_ = std::max(fade(time - good_at_) * usual_jump_, jump);
   stuck_at_.reset();
   good_ = reading;
   good_at_ = time;

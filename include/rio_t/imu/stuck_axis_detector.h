@@ -10,16 +10,18 @@ namespace rio_t {
 constexpr double kTurns = 0.1;
 
 /// Follows one axis and finds a reading that freezes: while the IMU turns, it repeats itself to the last bit,
-/// far more often in a row than it did lately. An axis without noise that has never moved is not frozen. Not
-/// thread-safe.
+/// far more often in a row than it did lately, for a tenth of a second or longer. An axis without noise that
+/// has never moved is not frozen. Not thread-safe.
 class FrozenAxisDetector {
  public:
   /// `turns`: whether the IMU does, about any axis. A frozen reading stays so until it changes.
-  bool isFrozen(double reading, bool turns);
+  bool isFrozen(Time time, double reading, bool turns);
 
  private:
   std::optional<double> last_;
+  Time last_at_;
   double repeats_ = 0.0;               ///< of last_
+  Time run_since_;                     ///< its first reading
   std::optional<double> longest_run_;  ///< of repeats lately; none as long as the axis reads one value
   bool is_frozen_ = false;
 };
