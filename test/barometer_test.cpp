@@ -220,6 +220,89 @@ TEST(Barometer, ASilentRadarLeavesNoPressureUnsaid) {
   EXPECT_GT(run.count(20.0, 90.0, is_late), 550);
 }
 
+/// Its means are farther apart than the window is long. After a shock they are used again.
+TEST(Barometer, ASlowOneIsUsedAgainAfterAShock) {
+  DroneRun run(4, 95.0, true);
+  run.setup.barometer.rate = 1.0 / 1.3;
+  run.setup.barometer.noise = 0.3;
+  run.setup.barometer.shocks = {{25.0, 4.0, 100.0}};
+  run.run();
+  EXPECT_GT(run.count(6.0, 25.0, isUsed), 12);
+  EXPECT_GE(run.count(25.0, 29.0, isShock), 2);
+  EXPECT_GT(run.count(75.0, 95.0, isUsed), 12);
+}
+
+TEST(Barometer, ASlowOneShowsASlope) {
+  DroneRun run(4, 95.0, true);
+  run.setup.barometer.rate = 1.0 / 1.3;
+  run.setup.barometer.noise = 0.3;
+  run.run([&](simulation::SensorData& data) {
+    for (simulation::SimulatedPressure& pressure : data.pressures)
+      pressure.pascal += 100.0 * std::clamp((run.seconds(pressure.stamp) - 25.0) / 30.0, 0.0, 1.0);
+  });
+  EXPECT_EQ(run.count(0.0, 25.0, isMoving), 0);
+  EXPECT_GT(run.count(25.0, 55.0, isMoving), 12);
+  EXPECT_EQ(run.count(55.0, 95.0, isStep), 1);
+  EXPECT_GT(run.count(75.0, 95.0, isUsed), 12);
+}
+
+/// The pressure moves, falls silent, and is the old one when it is back.
+TEST(Barometer, ASilenceIsNoRest) {
+  DroneRun run(4, 90.0, true);
+  run.setup.barometer.shocks = {{25.0, 30.0, 36.0}};
+  run.run([&](simulation::SensorData& data) {
+    for (simulation::SimulatedPressure& pressure : data.pressures)
+      if (run.seconds(pressure.stamp) > 27.0 && run.seconds(pressure.stamp) < 80.0) pressure.pascal = 0.0;
+  });
+  EXPECT_GT(run.count(25.0, 27.0, isMoving), 5);
+  EXPECT_GT(run.count(80.0, 84.0, isMoving), 30);
+  EXPECT_EQ(run.count(80.0, 90.0, isStep), 0);
+  EXPECT_GT(run.count(86.0, 90.0, isUsed), 30);
+}
+
+TEST(Barometer, ASampleAfterASilenceTellsNoMore) {
+  DroneRun run(2, 30.0, true);
+  run.run([&](simulation::SensorData& data) {
+    auto& pressures = data.pressures;
+    pressures.erase(std::remove_if(pressures.begin(), pressures.end(),
+                                   [&](const auto& pressure) {
+                                     return std::fmod(run.seconds(pressure.stamp), 5.0) > 3.0;
+                                   }),
+                    pressures.end());
+  });
+  double least = 1.0;
+  for (const ScanResult& result : run.results)
+    for (const BarometerAnswer& mean : result.barometer)
+      if (isUsed(mean)) least = std::min(least, mean.innovation_sigma);
+  EXPECT_GT(least, 0.05 / std::sqrt(0.15));  // at most 0.15 s of the noise of the options
+}
+
+/// The mean sigma [m] of the innovations, with the stamps that `stampOf` gives to the samples by number.
+double innovationSigma(const std::function<double(int)>& stamp_of) {
+  DroneRun run(2, 30.0, true);
+  run.run([&](simulation::SensorData& data) {
+    int k = 0;
+    for (simulation::SimulatedPressure& pressure : data.pressures)
+      pressure.stamp = run.setup.start + stamp_of(k++);
+  });
+  double sum = 0.0, count = 0.0;
+  for (const ScanResult& result : run.results)
+    for (const BarometerAnswer& mean : result.barometer) {
+      if (run.seconds(mean.time) < 10.0) continue;
+      sum += mean.innovation_sigma;
+      count += 1.0;
+    }
+  EXPECT_GT(count, 50.0);
+  return sum / count;
+}
+
+TEST(Barometer, SamplesThatComeInPairsTellAsMuch) {
+  const double regular = innovationSigma([](int k) { return 0.01 + 0.02 * k; });
+  const double pairs = innovationSigma([](int k) { return 0.01 + 0.04 * (k / 2) + 0.001 * (k % 2); });
+  EXPECT_LT(pairs, 1.5 * regular);
+  EXPECT_GT(pairs, regular / 1.5);
+}
+
 TEST(Barometer, OffItTakesNothing) {
   DroneRun without(1, 30.0, false);
   without.run();

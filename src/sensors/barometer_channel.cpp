@@ -28,6 +28,9 @@ constexpr double kBeforeStart = 1.0;
 constexpr double kRecent = 12.0;
 /// [s] A sample stamped further ahead of the IMU has a wrong stamp.
 constexpr double kMaxAhead = 1.0;
+/// Mean spacings that a sample stands for at most. If samples are missing, the next one is not more accurate;
+/// samples that come in pairs are as far apart as this.
+constexpr double kMissing = 2.0;
 /// [m] Sigma of an unknown bias.
 constexpr double kUnknownBias = 100.0;
 /// Means that wait for a node: those of a minute without scans.
@@ -54,15 +57,18 @@ const char* BarometerChannel::add(const Pressure& pressure, Time newest_imu) {
   if (!reference_) reference_ = pressure.pascal;
   const double height = heightOfPressure(pressure.pascal, *reference_, options_.temperature);
   const double since = newest_ ? pressure.time - *newest_ : 0.0;
-  // A missing sample does not make the next one more accurate.
-  const double span = spacing_ > 0.0 ? std::min(since, spacing_) : since;
+  const double span = std::min(since, kMissing * meanSpacing().value_or(since));
   newest_ = pressure.time;
-  spacing_ = since;
   noise_.add(pressure.time, Eigen::Vector3d(height, 0.0, 0.0));
   if (span == 0.0) return nullptr;  // the first one tells no rate
   recent_.push_back({pressure.time, height, span});
   while (pressure.time - recent_.front().time > kRecent) recent_.pop_front();
   return bias_ ? collect(recent_.back()) : nullptr;
+}
+
+std::optional<double> BarometerChannel::meanSpacing() const {
+  if (recent_.size() < 2) return std::nullopt;
+  return (recent_.back().time - recent_.front().time) / static_cast<double>(recent_.size() - 1);
 }
 
 const char* BarometerChannel::collect(const Sample& sample) {
@@ -103,6 +109,7 @@ void BarometerChannel::join(FixedLagSmoother& smoother, Time time, bool at_rest)
   waiting_.clear();
   rejected_since_.reset();
   deviations_.clear();
+  climb_.reset();
   moved_at_.reset();
   Mean at_start;
   for (const Sample& sample : recent_)
@@ -138,23 +145,26 @@ std::vector<BarometerAnswer> BarometerChannel::use(FixedLagSmoother& smoother) {
     late.rejected_because = mean.time() < smoother.node(0).time ? "older_than_window" : "no_node_near";
     answers.push_back(late);
   }
+  // The next mean may come when the node of this one has left the window.
+  climbTo(smoother.newest(), smoother);
   return answers;
 }
 
-std::optional<BarometerChannel::Slope> BarometerChannel::slopeWith(Deviation deviation, double noise,
-                                                                   double span,
-                                                                   const FixedLagSmoother& smoother) {
+void BarometerChannel::climbTo(const NodeEstimate& node, const FixedLagSmoother& smoother) {
   // The two nodes are of one solution: the barometer pulls both. After a silence the last one has left.
-  const auto last = deviations_.empty() ? std::nullopt : smoother.nodeBefore(deviations_.back().node);
-  if (last) {
-    const auto now = smoother.nodeBefore(deviation.node);
-    deviation.path = deviations_.back().path + now->x.p_W().z() - last->x.p_W().z();
-    deviation.height -= deviation.path;
-  } else {
-    deviations_.clear();
-  }
-  deviations_.push_back(deviation);
+  const auto last = climb_ ? smoother.nodeBefore(climb_->node) : std::nullopt;
+  if (!last) deviations_.clear();
+  const double before = last ? climb_->height - last->x.p_W().z() : 0.0;
+  climb_ = Climb{node.time, before + node.x.p_W().z()};
+}
+
+std::optional<BarometerChannel::Slope> BarometerChannel::slopeWith(const Deviation& deviation, double noise,
+                                                                   double span) {
   const double memory = std::cbrt(12.0 * noise * span * std::pow(options_.gate / options_.gate_slope, 2));
+  // What the pressure did in a silence is no slope.
+  if (!deviations_.empty() && deviation.time - deviations_.back().time > memory + kMissing * span)
+    deviations_.clear();
+  deviations_.push_back(deviation);
   while (deviations_.size() > 3 && deviation.time - deviations_[1].time >= memory) deviations_.pop_front();
   if (deviations_.size() < 3 || deviation.time - deviations_.front().time < memory) return std::nullopt;
   Slope slope;
@@ -215,10 +225,11 @@ BarometerAnswer BarometerChannel::use(const Mean& mean, const NodeEstimate& node
     return answer;
   }
   rejected_since_.reset();
+  climbTo(node, smoother);
   const std::optional<Slope> slope =
-      slopeWith({answer.time, node.time, mean.height() - delay * node.x.v_W().z(), 0.0, answer.innovation,
+      slopeWith({answer.time, mean.height() - delay * node.x.v_W().z() - climb_->height, answer.innovation,
                  P(StateBlock::kV + 2, StateBlock::kV + 2)},
-                noise, mean.span, smoother);
+                noise, mean.span);
   const bool is_steep = options_.gate > 0.0 && slope &&
                         std::abs(slope->value) > options_.gate_slope + options_.gate * slope->sigma;
   if (!moved_at_ && is_steep) distrust(answer.time, smoother);

@@ -89,11 +89,15 @@ class BarometerChannel {
   };
   /// A mean against the motion that the radar and the IMU tell.
   struct Deviation {
-    Time time, node;
-    double height = 0.0;             ///< [m] of the mean minus `path`
-    double path = 0.0;               ///< [m] that the nodes have climbed
+    Time time;
+    double height = 0.0;             ///< [m] of the mean above the climb of the nodes
     double innovation = 0.0;         ///< [m]
     double velocity_variance = 0.0;  ///< [m^2/s^2]
+  };
+  /// What the nodes have climbed up to one of them: each step in the solution of its time.
+  struct Climb {
+    Time node;
+    double height = 0.0;  ///< [m]
   };
   /// The straight line through the deviations (docs/method.md, eq. 19i).
   struct Slope {
@@ -101,26 +105,29 @@ class BarometerChannel {
     double innovation = 0.0;          ///< [m] the mean of the deviations' innovations
   };
   static void add(const Sample& sample, Mean& mean);
+  /// [s] of the recent samples; none before the third one.
+  std::optional<double> meanSpacing() const;
   const char* collect(const Sample& sample);
   double variance(const Mean& mean) const;  ///< [m^2]
   void addBias(FixedLagSmoother& smoother, double bias);
   BarometerAnswer use(const Mean& mean, const NodeEstimate& node, FixedLagSmoother& smoother);
   /// None before the deviations last long enough.
-  std::optional<Slope> slopeWith(Deviation deviation, double noise, double span,
-                                 const FixedLagSmoother& smoother);
+  std::optional<Slope> slopeWith(const Deviation& deviation, double noise, double span);
+  /// The climb goes on to a node of the same solution. If the last one has left, all begins anew.
+  void climbTo(const NodeEstimate& node, const FixedLagSmoother& smoother);
   /// The pressure moves since `time`: the window gives up its terms of the barometer.
   void distrust(Time time, FixedLagSmoother& smoother);
 
   BarometerOptions options_;
   std::optional<double> reference_;  ///< the first pressure [Pa]
   std::optional<Time> newest_;
-  double spacing_ = 0.0;  ///< [s] of the newest two samples; 0: not known
   NoiseMeter noise_;
   std::deque<Sample> recent_;
   Mean open_;                 ///< the mean that is being filled
   std::deque<Mean> waiting_;  ///< for a node
   std::shared_ptr<Block> bias_;
   std::optional<Time> rejected_since_;
+  std::optional<Climb> climb_;
   std::deque<Deviation> deviations_;  ///< of the time that the slope needs
   std::optional<Time> moved_at_;      ///< last, since the pressure moves; none while it rests
 };
