@@ -45,3 +45,14 @@ def test_a_folder_that_is_not_there_is_named(scripts, programs_folder, tmp_path)
                         "--programs", programs_folder)
     assert done.returncode == 1
     assert done.stderr == f"draw_rig.py: --out {out}: there is no folder {out.parent}\n"
+
+
+def test_a_mounting_that_comes_from_tf_is_told(scripts, programs_folder, tmp_path):
+    (tmp_path / "my.yaml").write_text("radars: [left, right]\nleft: {radar_topic: /left}\n"
+                                      "right: {radar_topic: /right, extrinsics_source: tf}\n")
+    done = programs.run(sys.executable, scripts / "draw_rig.py", "--config", tmp_path / "my.yaml", "--out",
+                        tmp_path / "rig.png", "--programs", programs_folder)
+    assert done.returncode == 1
+    assert done.stderr == (f"draw_rig.py: --config {tmp_path / 'my.yaml'}: the mounting of right comes from tf "
+                           "(extrinsics_source: tf); expected extrinsics_source: parameters with extrinsics_translation "
+                           "and extrinsics_rotation_xyzw\n")

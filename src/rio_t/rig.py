@@ -27,11 +27,15 @@ def read_config(folder, name_or_path):
 
 
 def radars_of(config):
-    """(name, lever arm, rotation that turns right, forward, up into the axes of the IMU) of each radar."""
+    """(name, lever arm, rotation that turns right, forward, up into the axes of the IMU) of each radar; both None if they
+    come from tf."""
     names = config.get("radars") or [""]
     result = []
     for name in names:
         own = {**config, **(config.get(name) or {})} if name else config
+        if own["extrinsics_source"] == "tf":
+            result.append((str(name), None, None))
+            continue
         result.append((str(name), np.array(own["extrinsics_translation"] or [0, 0, 0], float),
                        Rotation.from_quat(own["extrinsics_rotation_xyzw"])))
     return result
@@ -114,7 +118,13 @@ def main(arguments):
         if not given.out.parent.is_dir():
             raise RioTError(f"--out {given.out}: there is no folder {given.out.parent}")
         folder = programs.find(["rio_t_bag"], "--programs", given.programs)
-        draw(radars_of(read_config(folder, given.config)), given.out)
+        radars = radars_of(read_config(folder, given.config))
+        for name, lever, _ in radars:
+            if lever is None:
+                raise RioTError(f"--config {given.config}: the mounting of {name or 'the radar'} comes from tf "
+                                "(extrinsics_source: tf); expected extrinsics_source: parameters with "
+                                "extrinsics_translation and extrinsics_rotation_xyzw")
+        draw(radars, given.out)
     except (RioTError, OSError, ValueError, KeyError) as error:
         print(f"draw_rig.py: {error}", file=sys.stderr)
         return 1
