@@ -11,10 +11,12 @@ import yaml
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from rio_t import programs
+from rio_t import programs, tum
+from rio_t.faults import injection, stream
 from rio_t.plots import pyplot
-from rio_t.report.figures import draw_ego_velocity
+from rio_t.report.figures import ESTIMATE, draw_ego_velocity, draw_trajectory
 from rio_t.report.main import CHECKS, main
+from rio_t.report.motion import motion, predicted_ego_velocity
 from rio_t.rig import radars_of, read_config
 
 FIGURES = ["trajectory", "errors", "velocity", "time_offset", "ego_velocity", "biases"]
@@ -197,6 +199,94 @@ def test_scans_that_give_only_points_are_used():
     assert "innovation (10)" in labels and not any("points_only" in label for label in labels)
 
 
+def walk(times):
+    """Poses of a smooth walk without turns: 0.5 m/s along x, and 1 m/s at most along y."""
+    position = numpy.stack([0.5 * times, 0.5 * numpy.sin(2 * times), 0 * times], -1)
+    return tum.Trajectory((1e9 * times).astype(numpy.int64), position, numpy.tile([0.0, 0, 0, 1], (len(times), 1)))
+
+
+def test_rest_does_not_change_the_mounting_that_is_fitted():
+    t, rng = numpy.arange(0, 40, 0.05), numpy.random.RandomState(1)
+    moves = numpy.arange(len(t)) % 20 >= 11  # 9 of 20 scans
+    v_I = numpy.where(moves[:, None], rng.normal(size=(len(t), 3)), 0.0)
+    mounting = Rotation.from_euler("xyz", [10, 20, 60], degrees=True)
+    measured = mounting.apply(v_I, inverse=True) + numpy.where(moves[:, None], rng.normal(0, 0.03, (len(t), 3)), 0.0)
+    scans = {"status": numpy.where(moves, "moving", "zero_velocity"), **dict(zip(("vx", "vy", "vz"), measured.T))}
+    predicted, how = predicted_ego_velocity(scans, t, (t, v_I, 0 * v_I), None, "fitted")
+    assert how == "mounting fitted"
+    assert numpy.sqrt(numpy.mean((measured - predicted)[moves] ** 2)) < 0.1
+
+
+def test_sparse_poses_have_no_velocity():
+    for rate, known in ((100, True), (10, True), (5, False), (2, False)):
+        t = numpy.arange(0, 20, 1 / rate)
+        assert (motion(t, walk(t)) is not None) == known, rate
+
+
+def test_a_gap_has_no_velocity():
+    t = numpy.arange(0, 20, 0.02)
+    t = t[(t < 8) | (t > 11)]
+    at, v_I, omega_I = motion(t, walk(t))
+    nothing = numpy.isnan(v_I).any(axis=1)
+    assert nothing.any() and numpy.all(numpy.abs(at[nothing] - 9.5) < 1.6)
+    assert numpy.array_equal(nothing, numpy.isnan(omega_I).any(axis=1))
+    assert v_I[~nothing, 1] == pytest.approx(numpy.cos(2 * at[~nothing]), abs=0.01)
+    scans = {name: numpy.zeros(3) for name in ("vx", "vy", "vz")}
+    mounting = (numpy.zeros(3), Rotation.from_quat([0, 0, 0, 1]))
+    predicted, _ = predicted_ego_velocity(scans, numpy.array([7.0, 9.5, 12.0]), (at, v_I, omega_I), mounting, "known")
+    assert numpy.isnan(predicted[:, 0]).tolist() == [False, True, False]
+
+
+def test_poses_whose_clock_goes_back_have_no_velocity():
+    t = numpy.arange(0, 20, 0.02)
+    assert motion(numpy.where(t > 10, t - 5, t), walk(t)) is None
+
+
+def test_landmarks_do_not_set_the_view():
+    def views(landmarks):
+        figure = draw_trajectory([("online", ESTIMATE, walk(numpy.arange(0, 20, 0.1)).position)], landmarks)
+        figure.canvas.draw()
+        pyplot.close(figure)
+        return [(*axes.get_xlim(), *axes.get_ylim()) for axes in figure.axes]
+    far = numpy.array([-300.0, 300.0])
+    assert views({"x": far, "y": far, "z": far}) == views(None)
+
+
+def test_landmarks_are_drawn_in_their_own_world_only(report, run_folder, simulated_run):
+    (run_folder / "map.csv").write_text("id,x,y,z,sigma,snr_db,sightings\n1,1,2,3,0.1,10,5\n")
+    alone = figures_of(page_of(report(run_folder)))["trajectory"]
+    page = page_of(report("--ground-truth", simulated_run / "truth.txt", run_folder))
+    assert "Without the landmarks" in page
+    (run_folder / "map.csv").unlink()
+    without = page_of(report("--ground-truth", simulated_run / "truth.txt", run_folder))
+    assert figures_of(page)["trajectory"] == figures_of(without)["trajectory"]
+    assert alone != figures_of(page_of(report(run_folder)))["trajectory"]
+
+
+def test_a_run_that_starts_again_is_not_judged(report, simulated_run, programs_folder, tmp_path):
+    messages = stream.read(simulated_run / "run.bag", (("/sensor_platform/imu", "imu"), ("/sensor_platform/radar/scan", "radar")))
+    site = injection.Site(messages[0].record, 14.0, 14.0, None)
+    stream.write(tmp_path / "back.bag", injection.clock_jump(-5.0, record=False)(messages, site))
+    folder = tmp_path / "run"
+    programs.output_of(programs_folder / "rio_t_bag", "--bag", tmp_path / "back.bag", "--config", "irs", "--output-dir", folder)
+    stamps = tum.read(folder / "trajectory.txt").stamp
+    assert (numpy.diff(stamps) < 0).any(), "the test needs stamps that go back"
+    for truth in ([], ["--ground-truth", simulated_run / "truth.txt"]):
+        page = page_of(report(*truth, folder))
+        assert ("Not judged: the estimate starts again" in page) == bool(truth)
+        assert "ATE" not in page and "velocity" not in figures_of(page)
+        assert "Radar minus what" not in page
+
+
+def test_the_tracks_of_a_batch_have_its_name(report, simulated_run, programs_folder, tmp_path):
+    folder, truth = tmp_path / "run", simulated_run / "truth.txt"
+    programs.output_of(programs_folder / "rio_t_bag", "--bag", simulated_run / "run.bag", "--config", "irs", "--output-dir",
+                       folder, "--set", "mode=batch")
+    page = page_of(report("--ground-truth", truth, folder))
+    assert re.search(r'<th class="number">batch, nodes</th><th class="number">batch</th>', page)
+    assert "the whole bag solved at once" in page and "live user" not in page
+
+
 def test_without_truth_nothing_is_evaluated(report, run_folder):
     page = page_of(report(run_folder))
     assert list(figures_of(page)) == [name for name in FIGURES if name != "errors"]
@@ -209,6 +299,18 @@ def test_the_mounting_comes_from_the_configuration(report, run_folder, scripts, 
     (tmp_path / "named.yaml").write_text("radars: [left]\nleft: {mounting_yaw_pitch_roll_deg: [10, 0, 0]}\n")
     for config in ("irs", scripts.parent / "config/irs.yaml", tmp_path / "words.yaml", tmp_path / "named.yaml"):
         assert "mounting from the configuration" in page_of(report("--config", config, run_folder))
+
+
+def test_a_mounting_that_comes_from_tf_is_fitted(report, run_folder, tmp_path):
+    (tmp_path / "tf.yaml").write_text("extrinsics_source: tf\n")
+    page = page_of(report("--config", tmp_path / "tf.yaml", run_folder))
+    assert "mounting fitted to the data, since the configuration takes it from tf" in page
+
+
+def test_the_online_poses_stand_in_for_few_optimised_ones(report, run_folder):
+    poses = run_folder / "trajectory_optimized.txt"
+    poses.write_text("".join(poses.read_text().splitlines(keepends=True)[::3]))
+    assert "Radar minus what the online trajectory predicts" in page_of(report(run_folder))
 
 
 @pytest.mark.parametrize("name, figure", [("time_offset.csv", "time_offset"), ("ego_velocity.csv", "ego_velocity"),

@@ -28,7 +28,8 @@ def thinned(rows, most=4000):
 
 
 def draw_trajectory(tracks, landmarks=None):
-    """`tracks`: (name, colour, n x 3 positions), all in one world frame. `landmarks`: the table map.csv."""
+    """`tracks`: (name, colour, n x 3 positions), all in one world frame. `landmarks`: the table map.csv, in the frame of
+    the estimate."""
     everything = np.concatenate([p for _, _, p in tracks])
     span = np.maximum(np.ptp(everything, axis=0), 0.2)
     # The page is 10 inches wide; each view keeps true proportions.
@@ -41,10 +42,11 @@ def draw_trajectory(tracks, landmarks=None):
         axes[0].plot(p[:, 0], p[:, 1], color=colour, label=name, **STROKES[colour])
         axes[1].plot(p[:, 0], p[:, 2], color=colour, label=name, **STROKES[colour])
     if landmarks is not None and len(landmarks["x"]):
-        # Their frame is that of the estimate; the view stays that of the tracks.
         for axis, v in ((axes[0], "y"), (axes[1], "z")):
+            view = axis.dataLim.frozen()  # stays that of the tracks, also when the aspect is made equal
             axis.plot(landmarks["x"], landmarks[v], ".", color="#8a8f98", markersize=4, label="landmarks",
                       scalex=False, scaley=False, zorder=1)
+            axis.dataLim.set(view)
     name, _, last = tracks[-1]
     start, end = last[0], last[-1]
     for axis, v in ((axes[0], 1), (axes[1], 2)):

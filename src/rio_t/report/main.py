@@ -18,10 +18,17 @@ from ..errors import RioTError
 from ..rig import radars_of, read_config
 from .accuracy import ERRORS, accuracy_rows, offset_rows, run_evaluate
 from .animation import write_animation
-from .motion import extrinsics_in, motion, predicted_ego_velocity
+from .motion import extrinsics_in, motion, predicted_ego_velocity, rises
 from .page import Page
 
-ESTIMATES = (("optimised", figures.OPTIMIZED, "trajectory_optimized.txt"), ("online", figures.ESTIMATE, "trajectory.txt"))
+CAUSAL = "trajectory.txt"
+ESTIMATES = ((figures.OPTIMIZED, "trajectory_optimized.txt"), (figures.ESTIMATE, CAUSAL))
+# By the mode of the run: what the two trajectories are called, and what they are.
+NAMES = {
+    "online": (("optimised", "online"), "online is what a live user gets, optimised what left the smoother's window"),
+    "refine": (("optimised", "last pass"), "last pass is the causal output of the last pass, optimised what left the "
+                                           "smoother's window"),
+    "batch": (("batch, nodes", "batch"), "batch is the whole bag solved at once, nodes its states at the scans")}
 
 
 @dataclasses.dataclass
@@ -50,11 +57,22 @@ class Radar:
 class Run:
     """What is drawn. Tables as those of Radar."""
     origin: int     # [ns] where the seconds of the run begin
-    estimates: list  # Tracks, the online one last
+    estimates: list  # Tracks, that of trajectory.txt last
     truth: Optional[Track]
     radars: list
     biases: Optional[dict]
     landmarks: Optional[dict] = None  # map.csv
+    summary: dict = dataclasses.field(default_factory=dict)  # empty if the run did not finish
+
+    @property
+    def mode(self):
+        return self.summary.get("mode", "online")
+
+    @property
+    def starts_again(self):
+        """The clock of the IMU jumped while the estimate ran, and what comes afterwards has a world of its own. Of such a
+        trajectory rio_t_bag tells no way from end to start."""
+        return "imu_clock_restart" in (self.summary.get("input_faults") or {}) and "end_to_start_3d_m" not in self.summary
 
 
 def timed(table, origin):
@@ -73,8 +91,10 @@ def read_run(folder, truth_file):
         raise RioTError(f"{folder / 'trajectory.txt'}: missing; expected the output folder of rio_t_bag")
     if truth_file and not truth_file.is_file():
         raise RioTError(f"{truth_file}: no such file; expected a trajectory (TUM format)")
+    summary = run_folder.read_yaml(folder / "summary.yaml") if (folder / "summary.yaml").is_file() else {}
+    names, _ = NAMES[summary.get("mode", "online")]
     estimates = [Track(name, colour, folder / file, tum.read(folder / file))
-                 for name, colour, file in ESTIMATES if (folder / file).is_file()]
+                 for name, (colour, file) in zip(names, ESTIMATES) if (folder / file).is_file()]
     estimates = [track for track in estimates if len(track.poses)]
     truth = Track("ground truth", figures.TRUTH, truth_file, tum.read(truth_file)) if truth_file else None
     origin = min((int(track.poses.stamp[0]) for track in estimates), default=0) // 10**9 * 10**9
@@ -90,7 +110,7 @@ def read_run(folder, truth_file):
     radars = [Radar(name, table("time_offset.csv", name), table("ego_velocity.csv", name), table("extrinsics.csv", name))
               for name in run_folder.radars(folder)]
     landmarks = run_folder.read(folder, "map.csv") if has_lines(folder / "map.csv") else None
-    return Run(origin, estimates, truth, radars, table("biases.csv"), landmarks)
+    return Run(origin, estimates, truth, radars, table("biases.csv"), landmarks, summary)
 
 
 CHECKS = {  # name in summary.yaml: for people
@@ -114,13 +134,11 @@ VERDICTS = {
     "bad": "This run is bad: do not trust the estimate."}
 
 
-def add_verdict(page, folder):
+def add_verdict(page, summary):
     """Whether the run is good: the verdict of rio_t_bag with its numbers, and what to change."""
-    path = folder / "summary.yaml"
     page.heading("Is this run good?")
-    if not path.is_file():
+    if not summary:
         return page.verdict("bad", "The run did not finish.")
-    summary = run_folder.read_yaml(path)
     verdict = summary.get("verdict")
     if verdict not in VERDICTS:
         return page.note("This run is of an older version, which gave no verdict.")
@@ -135,10 +153,9 @@ def add_verdict(page, folder):
     return None
 
 
-def add_summary(page, folder):
+def add_summary(page, summary):
     page.heading("Summary")
-    if (folder / "summary.yaml").is_file():
-        summary = run_folder.read_yaml(folder / "summary.yaml")
+    if summary:
         page.table([[key, value] for key, value in summary.items() if key not in ("saved", "checks", "causes")])
     else:
         page.note("No summary.yaml: the run did not finish.")
@@ -146,8 +163,11 @@ def add_summary(page, folder):
 
 def add_accuracy(page, run, program, max_difference):
     """Errors over time: (name, colour, table of `evaluate --errors`)."""
-    page.heading("Accuracy", f"Against {run.truth.file.name}; online is what a live user gets, optimised "
-                             "what left the smoother's window. Definitions as in evo.")
+    if run.starts_again:
+        page.heading("Accuracy", "Not judged: the estimate starts again where the clock of the IMU jumped. Run each part by "
+                                 "itself (bag_start, bag_duration).")
+        return []
+    page.heading("Accuracy", f"Against {run.truth.file.name}; {NAMES[run.mode][1]}. Definitions as in evo.")
     evaluations, errors = [], []
     for track in run.estimates:
         with tempfile.TemporaryDirectory() as scratch:
@@ -156,7 +176,7 @@ def add_accuracy(page, run, program, max_difference):
                 result = run_evaluate(program, run.truth.file, track.file, "--errors", table, "--max-difference",
                                       max_difference)
             except RioTError as error:
-                if track.name == "online":
+                if track.file.name == CAUSAL:
                     raise
                 page.note(str(error))  # few poses: a sparse truth may match none of them
                 continue
@@ -167,7 +187,8 @@ def add_accuracy(page, run, program, max_difference):
 
 
 def add_trajectory(page, run, errors):
-    page.heading("Trajectory")
+    page.heading("Trajectory", "Without the landmarks: they are in the world of the estimate, not in that of the truth."
+                 if errors and run.landmarks is not None else "")
     if errors:
         def positions(table, prefix=""):
             return np.stack([table[prefix + k] for k in "xyz"], -1)
@@ -175,15 +196,19 @@ def add_trajectory(page, run, errors):
         tracks += [(name, colour, positions(table)) for name, colour, table in errors]
     else:
         tracks = [(track.name, track.colour, track.poses.position) for track in run.estimates]
-    page.figure("trajectory", figures.draw_trajectory(tracks, run.landmarks))
+    page.figure("trajectory", figures.draw_trajectory(tracks, None if errors else run.landmarks))
     if errors:
         page.heading("Error over time", "Aligned at the first pose.")
         page.figure("errors", figures.draw_errors(errors))
 
 
 def motions_of(run):
-    """(name, colour, result of motion()): of the truth near the run, and of the best estimate."""
-    motions = [(track.name, track.colour, motion(track.time, track.poses)) for track in run.estimates[:1]]
+    """(name, colour, result of motion()): of the truth near the run, and of the best estimate that is dense enough. Empty
+    if a clock of the run went back."""
+    if not all(rises(track.time) for track in run.estimates):
+        return []
+    motions = [(track.name, track.colour, motion(track.time, track.poses)) for track in run.estimates]
+    motions = [each for each in motions if each[2] is not None][:1]
     if run.truth and run.estimates:
         time, span = run.truth.time, run.estimates[-1].time  # the truth may cover much more
         near = (time >= span[0] - 1) & (time <= span[-1] + 1)
@@ -236,7 +261,12 @@ def mounting(radar, configured):
     """Position of the radar in the IMU frame and R_IR, None if not known, and where that is from."""
     if radar.extrinsics is not None:
         return last_extrinsics(radar.extrinsics), "as estimated at the end"
-    return configured.get(radar.name), "from the configuration"
+    if radar.name not in configured:
+        return None, "fitted to the data; give --config for the true one"
+    lever, rotation = configured[radar.name]
+    if lever is None:
+        return None, "fitted to the data, since the configuration takes it from tf"
+    return (lever, rotation), "from the configuration"
 
 
 def add_ego_velocity(page, radar, motions, extrinsics, source):
@@ -282,8 +312,8 @@ def report(arguments):
         raise RioTError(f"{folder}: cannot be made ({error.strerror})") from None
 
     page = Page(folder, f"rio_t: {arguments.run.resolve().name}")
-    add_verdict(page, arguments.run)
-    add_summary(page, arguments.run)
+    add_verdict(page, run.summary)
+    add_summary(page, run.summary)
     errors = add_accuracy(page, run, program, arguments.max_difference) if judge_poses else []
     for radar in run.radars:
         if radar.name not in true_offsets or radar.offset is None:
