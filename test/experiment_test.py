@@ -9,7 +9,7 @@ import yaml
 
 from rio_t import nees, programs
 from rio_t.errors import RioTError
-from rio_t.experiments import aids, consistency, options, platforms, runner
+from rio_t.experiments import aids, consistency, laboratory, options, platforms, runner, shifts
 from rio_t.experiments.laboratory import Run, Source
 
 MODELS = {"imu", "constant_acceleration"}
@@ -71,6 +71,18 @@ def test_shifts_of_the_stamps_come_back(succeed, tmp_path):
     for fact in ("seeds 1 to 1", "true offset 20 ms", "experiment.sh shifts --shifts 0,5", "shifts.png"):
         assert fact in page
     assert (tmp_path / "shifts.png").stat().st_size > 10000
+
+
+def run_with_points(stamps, points):
+    return Run(0.0, 0.1, {}, {}, {"stamp": stamps, "points": points})
+
+
+def test_scans_are_paired_by_their_points_or_not_at_all():
+    stamps, points = numpy.arange(100) * 10**8, numpy.random.RandomState(1).randint(20, 60, 105)
+    trigger, arrival = run_with_points(stamps, points[:100]), run_with_points(stamps + 560 * 10**6, points[5:])
+    assert shifts.stamps_apart(trigger, arrival) == pytest.approx(60.0)
+    same = run_with_points(stamps, numpy.full(100, 30))
+    assert shifts.stamps_apart(same, run_with_points(stamps + 6 * 10**7, numpy.full(100, 30))) is None
 
 
 def test_passes_come_to_the_delay(succeed, tmp_path):
@@ -190,6 +202,20 @@ def test_aids_tell_their_platform_and_cost(succeed, tmp_path):
         assert numbers(row, "height rms [m]") == pytest.approx(mean, abs=6e-4)
 
 
+def test_the_cost_of_an_aid_is_that_on_the_same_bags():
+    def result(cpu):
+        return Run(0.0, 0.1, {}, {}, {}, cpu=cpu), None
+    assert aids.cost([result(3.0), "it broke", result(5.0)], [result(2.0), result(100.0), "it broke"]) == 1.5
+    assert aids.cost(["it broke"], [result(1.0)]) is None
+
+
+def test_without_ground_truth_the_reason_is_told():
+    with pytest.raises(RioTError, match="^easy, seed 1: no ground truth in the bag; name its topic"):
+        laboratory.need_truth(Source("easy", 1, "easy"), Run(0.0, 0.1, {"end_to_start_3d_m": 0.1}, {}, {}))
+    with pytest.raises(RioTError, match="^walk: the estimate starts again where the clock of the IMU jumped"):
+        laboratory.need_truth(Source("walk"), Run(0.0, 0.1, {"input_faults": {"imu_clock_restart": 1}}, {}, {}))
+
+
 def test_options_reach_the_simulator(succeed, tmp_path):
     sigmas = {}
     for points in (20, 60):
@@ -199,8 +225,10 @@ def test_options_reach_the_simulator(succeed, tmp_path):
 
 
 def test_a_given_bag_is_run(succeed, simulated_run, tmp_path):
-    succeed("table1", "--bag", simulated_run / "run.bag")
-    assert {row["sequence"] for row in rows_of(tmp_path / "table1.csv")} == {"run"}
+    succeed("table1", "--bag", simulated_run / "run.bag", "--set", "time_offset_initial=0.05")
+    rows = {row["method"]: row for row in rows_of(tmp_path / "table1.csv")}
+    assert {row["sequence"] for row in rows.values()} == {"run"}
+    assert rows["LC-RIO"]["offset [ms]"] == "0.00", "LC-RIO holds it at zero"
     assert "bags: run.bag; configuration irs" in (tmp_path / "table1.md").read_text()
 
 
@@ -265,7 +293,8 @@ USAGE = [
 RUNS = [
     (["shifts", "--bag", "absent.bag"], "absent.bag: no such file"),
     (["consistency", "--motion", "easy", "--simulate", "--pionts 3"], "--pionts"),
-    (["consistency", "--motion", "easy", "--seeds", "1", "--set", "wimdow=1"], "wimdow"),
+    *(([name, *SHORT, "--motion", "easy", "--set", "wimdow=1"], "no run has a result: rio_t_bag: --set: unknown parameter \"wimdow\"")
+      for name in ("aids", "consistency", "montecarlo", "platforms")),
     # It ends less than 1 s after its start.
     (["consistency", "--motion", "easy", "--seeds", "1", "--duration", "5.5", "--simulate",
       "--static-start 0 --static-end 0"], "no pose later than 1 s"),

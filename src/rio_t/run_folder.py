@@ -68,6 +68,12 @@ def read_yaml(path):
     return content
 
 
+def starts_again(summary):
+    """The clock of the IMU jumped while the estimate ran: what comes afterwards has a world of its own. Of such a
+    trajectory rio_t_bag tells no way from end to start, and no error."""
+    return "imu_clock_restart" in (summary.get("input_faults") or {}) and "end_to_start_3d_m" not in summary
+
+
 def radars(folder):
     """Names of the radars, in the order of the configuration; [""] for one radar, whose files carry no name."""
     if (folder / "summary.yaml").is_file():

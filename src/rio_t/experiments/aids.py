@@ -43,22 +43,25 @@ def row_of_run(source, aid, result):
                   fixed(run.cpu, 2), "contradicted" if is_contradicted(run) else "", ""]
 
 
-def row_of_group(motion, aid, results, plain_cpu):
+def cost(results, plain):
+    """CPU of the results over that of the plain ones, of the bags of which both ran. None without such a bag."""
+    pairs = [(a[0].cpu, b[0].cpu) for a, b in zip(results, plain) if not isinstance(a, str) and not isinstance(b, str)]
+    return sum(cpu for cpu, _ in pairs) / sum(cpu for _, cpu in pairs) if pairs else None
+
+
+def row_of_group(motion, aid, results, plain):
     good = [result for result in results if not isinstance(result, str)]
     runs = [run for run, _ in good]
-    cpu = sum(run.cpu for run in runs)
     return [motion, aid, len(good), len(results) - len(good), fixed(mean([run.figure("ate_m") for run in runs]), 3),
             fixed(mean([rms(errors) for _, errors in good]), 3),
             fixed(mean([abs(errors[-1]) for _, errors in good]), 3),
-            fixed(cpu / plain_cpu, 2) if plain_cpu else "", sum(map(is_contradicted, runs))]
+            fixed(cost(results, plain), 2), sum(map(is_contradicted, runs))]
 
 
 def run(lab, sources, _):
     keys = [(source, aid) for source in sources for aid in AIDS]
     results = lab.map([(source, 1, one_run_or_fault(AIDS[aid], height_errors)) for source, aid in keys])
     groups = grouped([source for source, _ in keys], [(source.name, aid) for source, aid in keys], results)
-    plain = {motion: sum(result[0].cpu for result in of if not isinstance(result, str))
-             for (motion, aid), of in groups.items() if aid == "none"}
     page = Page("Aids: what the platform cannot do, how high it is")
     page.notes.append("height: of the causal trajectory, from the start; cost: CPU of rio_t_bag over that without aids "
                       "on the same bags")
@@ -66,7 +69,7 @@ def run(lab, sources, _):
                       "contradicts it")
     page.tables.append(Table("aids", "Mean of the runs", [
         "motion", "aid", "runs", "failed", "ATE [m]", "height rms [m]", "height at the end [m]", "cost",
-        "contradicted"], [row_of_group(*key, of, plain[key[0]]) for key, of in groups.items()]))
+        "contradicted"], [row_of_group(*key, of, groups[key[0], "none"]) for key, of in groups.items()]))
     page.tables.append(Table("aids_runs", "Each run", [
         "motion", "seed", "aid", "ATE [m]", "height rms [m]", "height at the end [m]", "CPU [s]", "platform",
         "why there is no result"], [row_of_run(*key, result) for key, result in zip(keys, results)]))

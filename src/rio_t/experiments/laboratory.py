@@ -110,7 +110,8 @@ class Laboratory:
 
     def map(self, work):
         """Results, in order, of `work`: (source, count of runs, function of lab and bag). Side by side; a simulated
-        bag is made for the first that wants it and removed after the last."""
+        bag is made for the first that wants it and removed after the last. Raises if none has more than a line why there
+        is none."""
         for source, _, _ in work:
             source.users += 1
 
@@ -132,12 +133,15 @@ class Laboratory:
                 concurrent.futures.ThreadPoolExecutor(self.options.jobs) as pool:
             futures = [pool.submit(one, source, function) for source, _, function in work]
             try:
-                return [future.result() for future in futures]
+                results = [future.result() for future in futures]
             except BaseException:
                 self.stopped.set()
                 for future in futures:
                     future.cancel()
                 raise
+        if all(isinstance(result, str) for result in results):
+            raise RioTError(f"no run has a result: {results[0]}")
+        return results
 
 
 def rio_t(model, shift=0.0, **more):
@@ -147,7 +151,7 @@ def rio_t(model, shift=0.0, **more):
 
 def lc_rio(shift=0.0):
     """Settings of the same graph with the offset held at zero."""
-    return {"estimate_time_offset": "false", "radar_stamp_shift": seconds(shift)}
+    return {"estimate_time_offset": "false", "time_offset_initial": "0", "radar_stamp_shift": seconds(shift)}
 
 
 def seconds(milliseconds):
@@ -175,9 +179,13 @@ def run_of(result):
 
 
 def need_truth(source, run):
-    if "ate_m" not in run.summary:
-        raise RioTError(f"{source.bag}: no ground truth in the bag; name its topic with "
-                        "--set ground_truth_topic=..., or a TUM file with --set ground_truth=FILE")
+    if "ate_m" in run.summary:
+        return
+    if run_folder.starts_again(run.summary):
+        raise RioTError(f"{source.label}: the estimate starts again where the clock of the IMU jumped, and no truth judges "
+                        "that; run each part by itself (--set bag_start=..., --set bag_duration=...)")
+    raise RioTError(f"{source.label}: no ground truth in the bag; name its topic with "
+                    "--set ground_truth_topic=..., or a TUM file with --set ground_truth=FILE")
 
 
 def grouped(sources, keys, results):

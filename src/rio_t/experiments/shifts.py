@@ -8,8 +8,8 @@ STAMPS = ("trigger", "arrival")
 
 def stamps_apart(trigger, arrival):
     """Mean of arrival minus trigger stamp [ms] of the same scans, which the counts of their points tell. None if the
-    scans cannot be paired."""
-    best, best_share = None, 0.9
+    scans cannot be paired, or in more than one way: the counts hardly vary."""
+    fits = []
     for lag in range(-30, 31):
         a = {key: column[max(0, -lag):] for key, column in trigger.scans.items()}
         b = {key: column[max(0, lag):] for key, column in arrival.scans.items()}
@@ -17,9 +17,9 @@ def stamps_apart(trigger, arrival):
         if size < 20:
             continue
         same = a["points"][:size] == b["points"][:size]
-        if same.mean() > best_share:
-            best, best_share = 1e-6 * (b["stamp"][:size] - a["stamp"][:size])[same].mean(), same.mean()
-    return best
+        if same.mean() > 0.9:
+            fits.append(1e-6 * (b["stamp"][:size] - a["stamp"][:size])[same].mean())
+    return fits[0] if len(fits) == 1 else None
 
 
 def follow(source, model, values, batches):

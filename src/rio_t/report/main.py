@@ -68,12 +68,6 @@ class Run:
     def mode(self):
         return self.summary.get("mode", "online")
 
-    @property
-    def starts_again(self):
-        """The clock of the IMU jumped while the estimate ran, and what comes afterwards has a world of its own. Of such a
-        trajectory rio_t_bag tells no way from end to start."""
-        return "imu_clock_restart" in (self.summary.get("input_faults") or {}) and "end_to_start_3d_m" not in self.summary
-
 
 def timed(table, origin):
     return {**table, "time": 1e-9 * (table["stamp"] - origin)}
@@ -163,7 +157,7 @@ def add_summary(page, summary):
 
 def add_accuracy(page, run, program, max_difference):
     """Errors over time: (name, colour, table of `evaluate --errors`)."""
-    if run.starts_again:
+    if run_folder.starts_again(run.summary):
         page.heading("Accuracy", "Not judged: the estimate starts again where the clock of the IMU jumped. Run each part by "
                                  "itself (bag_start, bag_duration).")
         return []
