@@ -11,7 +11,7 @@ from typing import Optional
 import numpy
 import yaml
 
-from .. import programs
+from .. import programs, run_folder
 from ..errors import RioTError
 from . import cases, injection, judge, stream
 
@@ -101,6 +101,7 @@ def judge_case(folder, bag, case, scratch, keep):
     origin = 1e-9 * next(m for m in messages if m.kind == "imu").stamp
     truth = judge.read_truth(bag.truth) if bag.truth else judge.read_run(usual)
     outcome = judge.read_outcome(scratch / "run", status, errors, truth, origin, case.shift, begin)
+    outcome.usual = run_folder.read_yaml(usual / "summary.yaml")
     outcome.reference = judge.errors_against(truth, judge.read_run(usual), origin)
     outcome.last_imu = 1e-9 * [m for m in faulty if m.kind == "imu"][-1].stamp - case.shift
     outcome.has_truth = bag.truth is not None

@@ -21,7 +21,8 @@ class Survives:
     """Runs to the end with a bounded error, says how sure it is, recovers, and counts what was wrong.
 
     velocity, position: bounds on the error [m/s, m] at any time, against the truth or the fault-free run.
-    counted: patterns of names in summary.yaml (input_faults, scans_rejected), each of which must be there.
+    counted: patterns of names in summary.yaml (input_faults, scans_rejected), each of which must be there, and more often
+        than in the fault-free run.
     grows: the stated uncertainty of the velocity at the end of the fault is at least that many times the one before.
     world_goes_on: false where the estimate starts again, so that positions are not comparable.
     """

@@ -113,15 +113,21 @@ class Outcome:
     last_imu: float = None    # [s] stamp of the last IMU sample, on the time of the bag without fault
     length: float = 0.0       # [s] of the bag without fault
     has_truth: bool = True    # else the fault-free run stands for it
+    usual: dict = dataclasses.field(default_factory=dict)  # summary.yaml of the run without the fault
 
     def counted(self):
-        """Every count of something that went wrong."""
-        counts = dict(self.summary.get("input_faults") or {})
-        for name, count in (self.summary.get("scans_rejected") or {}).items():
-            counts[name] = counts.get(name, 0) + count
-        if self.summary.get("divergences"):
-            counts["diverged"] = self.summary["divergences"]
-        return counts
+        """Every count of something that went wrong, beyond those of the run without the fault."""
+        usual = counts_in(self.usual)
+        return {name: count for name, count in counts_in(self.summary).items() if count > usual.get(name, 0)}
+
+
+def counts_in(summary):
+    counts = dict(summary.get("input_faults") or {})
+    for name, count in (summary.get("scans_rejected") or {}).items():
+        counts[name] = counts.get(name, 0) + count
+    if summary.get("divergences"):
+        counts["diverged"] = summary["divergences"]
+    return counts
 
 
 def files_with_nan(folder):

@@ -56,6 +56,10 @@ def parse(words):
     return parser, arguments
 
 
+def use_for_temporary_files(folder):
+    tempfile.tempdir = folder
+
+
 def run(arguments, bag_cases, live_cases, scratch):
     """Rows of the table: case, bag, what must happen, what happened, [what is wrong]."""
     from .. import programs
@@ -68,7 +72,9 @@ def run(arguments, bag_cases, live_cases, scratch):
         rows.append(row)
         print_result(*row)
 
-    with concurrent.futures.ProcessPoolExecutor(arguments.jobs) as pool:
+    # The processes of a pool end without what genpy has for the end: its folders would stay.
+    with tempfile.TemporaryDirectory(dir=scratch) as temporary, concurrent.futures.ProcessPoolExecutor(
+            arguments.jobs, initializer=use_for_temporary_files, initargs=(temporary,)) as pool:
         tasks = [(case, bag, pool.submit(campaign.run_case, folder, bag, case.name, scratch / bag.name / case.name,
                                          bool(arguments.output_dir)))
                  for bag in bags for case in bag_cases if bag.name == "given" or bag.name in case.bags]
@@ -102,7 +108,7 @@ def run_campaign(arguments, bag_cases, live_cases):
     failed = sum(1 for row in rows if row[-1])
     say(f"{len(rows) - failed} of {len(rows)} cases pass, {time.monotonic() - started:.0f} s"
         + (f"; table in {scratch / 'table.md'}" if arguments.output_dir else ""))
-    return 1 if failed else 0
+    return 1 if failed or not rows else 0
 
 
 def main(words):
@@ -118,10 +124,13 @@ def main(words):
         for case in cases.CASES + live.CASES:
             say(f"{case.name:26}{case.must}")
         return 0
-    if arguments.check:
-        return 0
     bag_cases, live_cases = ([case for case in of if not arguments.only or case.name in arguments.only]
                              for of in (cases.CASES, [] if arguments.no_live or arguments.bag else live.CASES))
+    if not bag_cases and not live_cases:
+        parser.error(f"no case is left: {' and '.join(arguments.only)} run live, and "
+                     f"{'--no-live' if arguments.no_live else '--bag'} leaves out the cases of the live node")
+    if arguments.check:
+        return 0
     try:
         return run_campaign(arguments, bag_cases, live_cases)
     except (RioTError, OSError) as fault:
