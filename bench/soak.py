@@ -63,8 +63,9 @@ def make_bag(path, minutes):
 
 
 def run(bag, minutes, rate):
+    """The record, the last diagnostics, the length of the bag [s] and the exit status of its player."""
     with rosbag.Bag(bag) as data:  # takes its time: before the player runs
-        first_stamp = data.get_start_time()
+        first_stamp, length = data.get_start_time(), data.get_end_time() - data.get_start_time()
     record = []
     with contextlib.ExitStack() as running:
         def start(*words):
@@ -95,9 +96,11 @@ def run(bag, minutes, rate):
                 print(f"\r{seconds / 60.0:6.1f} of {minutes:g} minutes, {record[-1][1]:.1f} MB", end="", file=sys.stderr)
         if progress:
             print(file=sys.stderr)
+        if not record:
+            sys.exit(f"soak.py: the player of the bag ended before it played, exit status {player.returncode}")
         time.sleep(2.0)  # the last diagnostics
-        record.append(sample(node, diagnostics, record[-1][0] + 1e-3))
-        return numpy.array(record), diagnostics.newest
+        record.append(sample(node, diagnostics, max(record[-1][0] + 1e-3, clock.seconds - first_stamp)))
+        return numpy.array(record), diagnostics.newest, length, player.returncode
 
 
 class Clock:
@@ -139,7 +142,7 @@ def draw(record, path):
     figure.savefig(path, dpi=110)
 
 
-def judge(record, newest):
+def judge(record, newest, length, player_status, rate):
     """Prints the numbers; true where all hold."""
     passed = True
 
@@ -148,7 +151,12 @@ def judge(record, newest):
         passed &= good
         print(f"  {name:26s} {text}   " + ("ok" if good else "FAILED"))
 
+    # The player may take the last times with it when it ends: less than a second on the clock of the wall.
+    row("played", f"{record[-1, 0] / 60.0:.1f} of {length / 60.0:.1f} minutes, exit status {player_status}",
+        player_status == 0 and bool(record[-1, 0] >= length - rate))
     after = record[record[:, 0] >= 60.0]
+    if len(after) == 0:
+        return False
     growth = after[-1, 1] - after[0, 1]
     row("memory", f"{after[0, 1]:.1f} MB after a minute, {after[-1, 1]:.1f} MB at the end, {after[:, 1].max():.1f} MB at most",
         growth <= MEMORY_GROWTH_MB)
@@ -175,13 +183,13 @@ def main():
         bag = os.path.join(folder, "soak.bag")
         make_bag(bag, ARGUMENTS.minutes)
         print(f"Playing it at rate {ARGUMENTS.rate:g} ...", flush=True)
-        record, newest = run(bag, ARGUMENTS.minutes, ARGUMENTS.rate)
+        record, newest, *played = run(bag, ARGUMENTS.minutes, ARGUMENTS.rate)
     table, figure = (os.path.join(ARGUMENTS.output_dir, name) for name in ("soak.csv", "soak.png"))
     numpy.savetxt(table, record, fmt="%.4f", delimiter=",",
                   header="data_seconds,memory_mb,imu,imu_latency_sum_ms,updates,scan_latency_sum_ms")
     draw(record, figure)
     print(f"{ARGUMENTS.minutes:g} minutes of data at rate {ARGUMENTS.rate:g}")
-    passed = judge(record, newest)
+    passed = judge(record, newest, *played, ARGUMENTS.rate)
     print(f"  {table}, {figure}")
     sys.exit(0 if passed else 1)
 
