@@ -37,6 +37,8 @@ if [ ! -f "$build/Makefile" ] || [ $# -gt 0 ]; then
   step cmake -S . -B "$build" -DCMAKE_BUILD_TYPE=Release -DCMAKE_INSTALL_PREFIX="$(realpath -m "$build")/install" -DCATKIN_DEVEL_PREFIX="$devel" \
     -DPYTHON_EXECUTABLE=/usr/bin/python3 \
     -DPython3_EXECUTABLE=/usr/bin/python3 -DRIO_T_WERROR="${RIO_T_WERROR:-OFF}" "$@"
+elif [ -n "${RIO_T_WERROR:-}" ] && ! grep -qx "RIO_T_WERROR:BOOL=$RIO_T_WERROR" "$build/CMakeCache.txt"; then
+  step cmake -DRIO_T_WERROR="$RIO_T_WERROR" "$build"
 fi
 make=(cmake --build "$build" --parallel "$(nproc)")
 if $quiet; then step "${make[@]}"; else "${make[@]}"; fi

@@ -16,7 +16,7 @@ cd "$(dirname "$0")/.."
 export PATH=/usr/bin:$PATH
 build=${RIO_T_BUILD_DIR:-build/fuzz}
 scratch=$(mktemp -d)
-trap 'rm -rf "$scratch"' EXIT
+trap 'kill $(jobs -p) 2>/dev/null && wait; rm -rf "$scratch"' EXIT  # with the fuzzers, if it is stopped
 
 scripts/install_dependencies.sh clang-14 libclang-rt-14-dev
 if [ ! -f "$build/Makefile" ]; then
@@ -34,12 +34,12 @@ mkdir -p "$findings"
 # Every key and every word of the configuration, for the parameter files.
 grep -ohE '[A-Za-z_][A-Za-z0-9_/.]+|[-0-9][0-9.e-]*' config/*.yaml | sort -u | sed 's/.*/"&"/' >"$scratch/words"
 
-# fuzz NAME OPTION...: the corpora given follow the one that grows.
+# fuzz NAME OPTION...: becomes the fuzzer. The corpora given follow the one that grows.
 fuzz() {
   local name=$1
   shift
   mkdir -p "$scratch/$name"
-  "$programs/${name}_fuzzer" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=2048 -print_final_stats=1 \
+  exec "$programs/${name}_fuzzer" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=2048 -print_final_stats=1 \
     -artifact_prefix="$findings/$name-" "$scratch/$name" "fuzz/corpus/$name" "$@" >"$scratch/$name.log" 2>&1
 }
 export UBSAN_OPTIONS=print_stacktrace=1

@@ -25,8 +25,12 @@ if [ $# -eq 0 ]; then
 fi
 # Sources that this build knows: headers are seen with those that include them.
 mapfile -t sources < <(printf '%s\n' "${files[@]}" | grep '\.cpp$' | while read -r file; do
-  if grep -q "\"file\": \"$PWD/$file\"" "$build/compile_commands.json"; then echo "$file"; fi
+  if grep -qF "\"file\": \"$PWD/$file\"" "$build/compile_commands.json"; then echo "$file"; fi
 done)
+if [ $# -eq 0 ] && [ ${#sources[@]} -eq 0 ]; then
+  echo "lint.sh: none of ${#files[@]} files is a source that $build knows; expected all" >&2
+  exit 1
+fi
 
 clean=true
 catkin_lint --offline --strict --quiet . 2> >(grep -v 'rosdep\|unknown dependencies' >&2) || clean=false
