@@ -103,9 +103,16 @@ if [ -n "${as_root[*]}" ] && [ -t 0 ]; then
   case "$answer" in y | Y | yes) ;; *) echo "install_dependencies.sh: nothing was installed" >&2; exit 1 ;; esac
 fi
 log=$(mktemp)
-# A fresh machine may still install its updates: apt-get then waits for them [s].
-if ! { "${as_root[@]}" apt-get update && "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
-       apt-get -o DPkg::Lock::Timeout=600 install -y --no-install-recommends "${missing[@]}"; } >"$log" 2>&1; then
+# A fresh machine may still install its updates: apt-get then waits for them [s], but not for their lock on its lists.
+update() {
+  local deadline=$((SECONDS + 600))
+  until "${as_root[@]}" apt-get update >"$log" 2>&1; do
+    grep -q /var/lib/apt/lists/lock "$log" && [ $SECONDS -lt $deadline ] || return 1
+    sleep 1
+  done
+}
+if ! { update && "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+       apt-get -o DPkg::Lock::Timeout=600 install -y --no-install-recommends "${missing[@]}" >>"$log" 2>&1; }; then
   tail -n 20 "$log" >&2
   echo "install_dependencies.sh: apt-get failed, whole log in $log" >&2
   exit 1

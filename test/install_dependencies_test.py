@@ -72,6 +72,24 @@ def test_root_is_told_what_it_installs_and_it_goes_on(machine, name, version):
     assert "apt-get update" in machine.calls and "clang-14" in machine.calls
 
 
+def test_it_waits_for_the_lists_of_another_apt(machine, tmp_path):
+    machine.system("debian", "12")
+    machine.program("sleep", f"touch {tmp_path / 'released'}")
+    machine.program("apt-get", f"""echo apt-get "$@" >>{machine.log}
+[ "$1" != update ] || [ -e {tmp_path / 'released'} ] || {{ echo 'E: Could not get lock /var/lib/apt/lists/lock.' >&2; exit 100; }}""")
+    done = machine.run()
+    assert done.returncode == 0, done.stderr
+    assert machine.calls.count("apt-get update") == 2 and "install -y" in machine.calls
+
+
+def test_it_does_not_wait_for_a_mirror(machine):
+    machine.system("debian", "12")
+    machine.program("apt-get", f'echo apt-get "$@" >>{machine.log}; echo "E: no route to the mirror" >&2; exit 100')
+    done = machine.run()
+    assert done.returncode == 1 and "no route to the mirror" in done.stderr
+    assert machine.calls == "apt-get update\n"
+
+
 def test_nothing_is_done_if_all_is_there(machine):
     machine.system("debian", "12")
     machine.program("dpkg-query", "echo installed")
