@@ -6,12 +6,14 @@ from rio_t import programs, run_folder
 
 @pytest.fixture(name="simulate")
 def simulate_fixture(programs_folder, tmp_path):
-    """Runs `simulate` with these options and returns the process and the bag's bytes, None without a bag."""
+    """Runs `simulate` with these options and returns the process and the bag's bytes, None without a bag. Fails if it
+    `fails` and shall not, or the other way round."""
     bag = tmp_path / "simulated.bag"
 
-    def run(*options):
+    def run(*options, fails=False):
         bag.unlink(missing_ok=True)
         done = programs.run(programs_folder / "simulate", *options, "--out", bag)
+        assert (done.returncode != 0) == fails, done.stderr
         return done, bag.read_bytes() if bag.exists() else None
     return run
 
@@ -55,12 +57,13 @@ def test_ambiguous_points_do_no_harm(simulate, programs_folder, tmp_path):
 
 
 def test_no_program_overwrites_what_it_reads(simulate, programs_folder, simulated_run, tmp_path):
-    done, bag = simulate("--motion", "easy", "--duration", 20, "--ground-truth", tmp_path / "." / "simulated.bag")
+    done, bag = simulate("--motion", "easy", "--duration", 20, "--ground-truth", tmp_path / "." / "simulated.bag",
+                         fails=True)
     assert (done.returncode, bag) == (2, None)
     assert "--ground-truth" in done.stderr and "expected another file" in done.stderr
     trajectory = tmp_path / "trajectory.txt"
     trajectory.write_bytes((simulated_run / "truth.txt").read_bytes())
-    done, _ = simulate("--trajectory", trajectory, "--ground-truth", trajectory)
+    done, _ = simulate("--trajectory", trajectory, "--ground-truth", trajectory, fails=True)
     assert done.returncode == 2 and "expected another file than" in done.stderr
     done = programs.run(programs_folder / "evaluate", simulated_run / "truth.txt", trajectory, "--errors", trajectory)
     assert done.returncode == 2 and "--errors" in done.stderr
@@ -138,7 +141,7 @@ def test_a_pair_of_a_preset_may_be_changed(simulate):
     (RADARS + ("",), ("--radar", "expected a value")),
 ])
 def test_a_bad_option_is_named(simulate, options, named):
-    done, bag = simulate(*options)
+    done, bag = simulate(*options, fails=True)
     assert done.returncode == 2
     assert bag is None
     for word in named:
@@ -170,7 +173,7 @@ def test_a_barometer_and_its_shocks(simulate):
     assert b"sensor_msgs/FluidPressure" in calm and b"sensor_msgs/FluidPressure" not in without
     _, shocked = simulate(*motion, "--barometer", "--pressure-shock", "15,1,100", "--pressure-shock", "20,1,-100")
     assert shocked != calm
-    failed, bag = simulate(*motion, "--pressure-shock", "15,1,100")
+    failed, bag = simulate(*motion, "--pressure-shock", "15,1,100", fails=True)
     assert failed.returncode == 2 and "--pressure-shock needs --barometer" in failed.stderr and bag is None
-    failed, _ = simulate(*motion, "--barometer", "--pressure-shock", "15,0,100")
+    failed, _ = simulate(*motion, "--barometer", "--pressure-shock", "15,0,100", fails=True)
     assert failed.returncode == 2 and "a positive duration" in failed.stderr
