@@ -63,7 +63,7 @@ def make_bag(path, minutes):
 
 
 def run(bag, minutes, rate):
-    """The record, the last diagnostics, the length of the bag [s] and the exit status of its player."""
+    """The record, the last diagnostics and the length of the bag [s]."""
     with rosbag.Bag(bag) as data:  # takes its time: before the player runs
         first_stamp, length = data.get_start_time(), data.get_end_time() - data.get_start_time()
     record = []
@@ -96,11 +96,11 @@ def run(bag, minutes, rate):
                 print(f"\r{seconds / 60.0:6.1f} of {minutes:g} minutes, {record[-1][1]:.1f} MB", end="", file=sys.stderr)
         if progress:
             print(file=sys.stderr)
-        if not record:
-            sys.exit(f"soak.py: the player of the bag ended before it played, exit status {player.returncode}")
+        if player.returncode != 0 or not record:
+            sys.exit(f"soak.py: the player of the bag ended, exit status {player.returncode}")
         time.sleep(2.0)  # the last diagnostics
         record.append(sample(node, diagnostics, max(record[-1][0] + 1e-3, clock.seconds - first_stamp)))
-        return numpy.array(record), diagnostics.newest, length, player.returncode
+        return numpy.array(record), diagnostics.newest, length
 
 
 class Clock:
@@ -142,7 +142,7 @@ def draw(record, path):
     figure.savefig(path, dpi=110)
 
 
-def judge(record, newest, length, player_status, rate):
+def judge(record, newest, length, rate):
     """Prints the numbers; true where all hold."""
     passed = True
 
@@ -152,8 +152,7 @@ def judge(record, newest, length, player_status, rate):
         print(f"  {name:26s} {text}   " + ("ok" if good else "FAILED"))
 
     # The player may take the last times with it when it ends: less than a second on the clock of the wall.
-    row("played", f"{record[-1, 0] / 60.0:.1f} of {length / 60.0:.1f} minutes, exit status {player_status}",
-        player_status == 0 and bool(record[-1, 0] >= length - rate))
+    row("played", f"{record[-1, 0] / 60.0:.1f} of {length / 60.0:.1f} minutes", bool(record[-1, 0] >= length - rate))
     after = record[record[:, 0] >= 60.0]
     if len(after) == 0:
         return False
@@ -183,13 +182,13 @@ def main():
         bag = os.path.join(folder, "soak.bag")
         make_bag(bag, ARGUMENTS.minutes)
         print(f"Playing it at rate {ARGUMENTS.rate:g} ...", flush=True)
-        record, newest, *played = run(bag, ARGUMENTS.minutes, ARGUMENTS.rate)
+        record, newest, length = run(bag, ARGUMENTS.minutes, ARGUMENTS.rate)
     table, figure = (os.path.join(ARGUMENTS.output_dir, name) for name in ("soak.csv", "soak.png"))
     numpy.savetxt(table, record, fmt="%.4f", delimiter=",",
                   header="data_seconds,memory_mb,imu,imu_latency_sum_ms,updates,scan_latency_sum_ms")
     draw(record, figure)
     print(f"{ARGUMENTS.minutes:g} minutes of data at rate {ARGUMENTS.rate:g}")
-    passed = judge(record, newest, *played, ARGUMENTS.rate)
+    passed = judge(record, newest, length, ARGUMENTS.rate)
     print(f"  {table}, {figure}")
     sys.exit(0 if passed else 1)
 

@@ -244,8 +244,7 @@ class SetupTest(tester.LiveTestCase):
         subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, lambda message: seen.extend(
             status for status in message.status if "no IMU message yet on /wrong" in status.message))
         log = pathlib.Path(self.path("node.txt"))
-        with open(log, "w") as told, tester.Process(tester.program("rio_t", "rio_t_node"), "__name:=rio_t", "_config:=irs",
-                                                    "_imu_topic:=/wrong", stdout=told, stderr=told):
+        with open(log, "w") as told, tester.node("config:=irs", "imu_topic:=/wrong", stdout=told, stderr=told):
             tester.wait_for("four diagnoses", lambda: len(seen) >= 4)
         subscriber.unregister()
         text = log.read_text()
@@ -256,9 +255,8 @@ class SetupTest(tester.LiveTestCase):
     def test_the_log_says_that_the_estimate_diverged_also_where_no_scan_comes(self):
         log = pathlib.Path(self.path("diverged.txt"))
         # No state is known so well: it diverges as it starts, at rest, by the IMU alone.
-        with open(log, "w") as told, tester.Listener() as listener, tester.Process(
-                tester.program("rio_t", "rio_t_node"), "__name:=rio_t", "_config:=irs",
-                "_divergence_max_velocity_sigma:=1e-6", stdout=told, stderr=told):
+        with open(log, "w") as told, tester.Listener() as listener, tester.node(
+                "config:=irs", "divergence_max_velocity_sigma:=1e-6", stdout=told, stderr=told):
             listener.wait_until_heard()
             with tester.feed(listener, self.bag, (tester.IMU,)):
                 listener.wait_for_diagnosis("odometry", "diverged", ERROR)
@@ -267,17 +265,15 @@ class SetupTest(tester.LiveTestCase):
     def test_the_log_asks_to_stand_still_only_if_the_start_wants_it(self):
         for mode, wants_rest in (("static", True), ("auto", True), ("motion", False)):
             log = pathlib.Path(self.path(mode + ".txt"))
-            with open(log, "w") as told, tester.Listener() as listener, tester.Process(
-                    tester.program("rio_t", "rio_t_node"), "__name:=rio_t", "_config:=irs", "_init_mode:=" + mode,
-                    stdout=told, stderr=told):
+            with open(log, "w") as told, tester.Listener() as listener, tester.node(
+                    "config:=irs", "init_mode:=" + mode, stdout=told, stderr=told):
                 listener.wait_until_heard()
                 tester.call("/rio_t/reset", Empty)
             self.assertIn("; starts again", log.read_text())
             self.assertEqual("; starts again, stand still" in log.read_text(), wants_rest, mode)
 
     def test_save_trajectory_answers_with_the_whole_path(self):
-        words = ("__name:=rio_t", "_config:=irs", "_trajectory_file:=poses.txt")
-        with tester.Listener() as listener, tester.Process(tester.program("rio_t", "rio_t_node"), *words, cwd=self.folder):
+        with tester.Listener() as listener, tester.node("config:=irs", "trajectory_file:=poses.txt", cwd=self.folder):
             listener.wait_until_heard()
             tester.call("/rio_t/reset", Empty)
             with tester.feed(listener, self.bag):

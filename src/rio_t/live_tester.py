@@ -147,9 +147,10 @@ def call(service, kind=Trigger):
     return rospy.ServiceProxy(service, kind)()
 
 
-def node(*parameters, remap=()):
-    """rio_t_node with private parameters given as "key:=value". `remap`: more words, as "__ns:=/robot"."""
-    return Process(program("rio_t", "rio_t_node"), "__name:=rio_t", *("_" + each for each in parameters), *remap)
+def node(*parameters, remap=(), **options):
+    """rio_t_node with private parameters given as "key:=value". `remap`: more words, as "__ns:=/robot". It must end well."""
+    return Process(program("rio_t", "rio_t_node"), "__name:=rio_t", *("_" + each for each in parameters), *remap, clean=True,
+                   **options)
 
 
 def simulate(out, *words, static_start=4, duration=12):

@@ -10,6 +10,8 @@ import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from roslib.packages import find_node
 
+from .errors import RioTError
+
 SLOWNESS = float(os.environ.get("RIO_T_TEST_SLOWNESS", "1"))  # of the programs as built: sanitizers take time
 DEADLINE = 60.0 * SLOWNESS  # [s] for anything; far more than needed, so that only a fault reaches it
 
@@ -19,23 +21,35 @@ def program(package, name):
 
 
 class Process:
-    """A process that ends with the `with` block, and is asked to before it is made to."""
+    """A process that ends with the `with` block, and is asked to before it is made to. A block without an exception
+    raises one if the process crashed, or failed before it was asked to end. `clean`: also if its status is not 0."""
 
-    def __init__(self, *words, **options):
+    def __init__(self, *words, clean=False, **options):
         self.process = subprocess.Popen([str(word) for word in words], start_new_session=True, **options)
+        self._clean, self._interrupted, self._killed = clean, False, False
 
     def __enter__(self):
         return self
 
-    def __exit__(self, *_):
-        self.stop()
+    def __exit__(self, kind, *_):
+        status = self.stop()
+        asked_to = self._interrupted and not self._clean and (status > 0 or status == -signal.SIGINT)
+        if kind is None and status != 0 and not asked_to and not self._killed:
+            raise RioTError(f"{self.process.args[0]} ended with status {status}")
 
     def wait(self):
         return self.process.wait(DEADLINE)
 
+    def kill(self):
+        """As a crash would end it, which is then no fault."""
+        self._killed = True
+        os.killpg(self.process.pid, signal.SIGKILL)
+        self.wait()
+
     def stop(self):
         """Exit status after an interrupt; raises if it does not end."""
         if self.process.poll() is None:
+            self._interrupted = True
             os.killpg(self.process.pid, signal.SIGINT)
         try:
             return self.process.wait(DEADLINE)

@@ -44,8 +44,7 @@ class Live:
         self.logs = open(self.log, "w")
 
     def node(self, *parameters):
-        return self.tester.Process(self.tester.program("rio_t", "rio_t_node"), "__name:=rio_t", "_config:=" + self.bag.config,
-                                   *("_" + p for p in parameters), stdout=self.logs, stderr=subprocess.STDOUT)
+        return self.tester.node("config:=" + self.bag.config, *parameters, stdout=self.logs, stderr=subprocess.STDOUT)
 
     def player(self, *more, bag=None, rate=RATE):
         return self.tester.play(bag or self.bag.path, (self.tester.IMU, self.tester.RADAR), rate, *more)
@@ -109,8 +108,7 @@ def node_killed(live):
     with live.tester.Listener() as listener, live.node() as first, live.player("--duration=50", rate=2.0) as player:
         listener.wait_until_heard()
         wait_for_time(live, listener, 20.0)
-        os.killpg(first.process.pid, signal.SIGKILL)
-        first.process.wait()
+        first.kill()
         killed_at = live.seconds(listener.messages["odom"][-1])
         with live.node():
             before = len(listener.messages["odom"])
