@@ -274,7 +274,7 @@ def test_a_run_that_starts_again_is_not_judged(report, simulated_run, programs_f
     for truth in ([], ["--ground-truth", simulated_run / "truth.txt"]):
         page = page_of(report(*truth, folder))
         assert ("Not judged: the estimate starts again" in page) == bool(truth)
-        assert "ATE" not in page and "velocity" not in figures_of(page)
+        assert "ATE: position" not in page and "velocity" not in figures_of(page)
         assert "Radar minus what" not in page
 
 
