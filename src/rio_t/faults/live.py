@@ -168,7 +168,8 @@ def scan_stamps_zero(live):
 def radar_blackout(live):
     """no scan for 10 s: diagnostics say so, sigma grows, error < 0.5 m/s 5 s later"""
     bag = live.faulty_bag(injection.radar_blackout, 20.0, 30.0)
-    with live.tester.Listener() as listener, live.node(), live.player(*PLAYED, bag=bag):
+    # The node diagnoses once a second of the wall's clock, and says so at the third time within the blackout.
+    with live.tester.Listener() as listener, live.node(), live.player(*PLAYED, bag=bag, rate=2.0):
         listener.wait_until_heard()
         live.wait(listener, "a diagnosis that the radar is silent",
                   lambda: "radar" in getattr(listener.diagnostics.get("input"), "message", "")
