@@ -78,6 +78,17 @@ TEST(Elimination, WhatIsNotDeterminedIsRefused) {
   window.addNode(Time(), std::make_shared<VectorManifold>(3), Eigen::VectorXd::Zero(3));
   EXPECT_FALSE(Elimination::of(linearize(window)));
   EXPECT_THROW(solve(window, {}), std::runtime_error);
+  // A column that depends on the others leaves rounding on the diagonal.
+  for (int seed = 0; seed < 20; ++seed) {
+    Window dependent;
+    Block& node = dependent.addNode(Time(), std::make_shared<VectorManifold>(3), Eigen::VectorXd::Zero(3));
+    dependent.add(std::make_unique<LinearCost>(5, std::vector<int>{3}, seed), {&node});
+    LinearSystem system = linearize(dependent);
+    auto& Jr = system.rows.front().Jr;
+    ASSERT_TRUE(Elimination::of(system)) << seed;
+    Jr.col(2) = 0.1 * Jr.col(0) + 0.7 * Jr.col(1);
+    EXPECT_FALSE(Elimination::of(system)) << seed;
+  }
 }
 
 TEST(Marginalization, LeavesTheSolutionOfTheRest) {

@@ -72,6 +72,27 @@ TEST_F(Gate, SamplesOutOfPlaceAreDroppedAndTheOthersGoOn) {
   EXPECT_EQ(decision, Decision::kTake);
 }
 
+TEST_F(Gate, RangesThatAreToldBoundTheReadings) {
+  ImuInputCheckOptions options;
+  options.accel_range = 40.0;
+  options.gyro_range = 3.0;
+  gate = ImuInputCheck(0.04, options);
+  const auto fed = [&](double acceleration, double rate) {
+    ImuMeasurement imu = motion.imuSample(t);
+    t += 0.01;
+    imu.acceleration.x() = acceleration;
+    imu.angular_velocity.x() = rate;
+    return feed(imu);
+  };
+  EXPECT_EQ(fed(39.0, 2.9), "");
+  EXPECT_EQ(fed(39.0, 3.1), "imu_saturated");
+  EXPECT_EQ(fed(39.0, 2.9), "");
+  EXPECT_EQ(fed(70.0, 2.9), "imu_saturated") << "the range may be rounded";
+  EXPECT_EQ(decision, Decision::kTake);
+  EXPECT_EQ(fed(90.0, 2.9), "imu_not_plausible");
+  EXPECT_EQ(decision, Decision::kDrop);
+}
+
 /// A driver that could not read its sensor publishes the last sample again.
 TEST_F(Gate, ASampleThatRepeatsIsDropped) {
   ImuMeasurement last = motion.imuSample(1.0);

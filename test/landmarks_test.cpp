@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <random>
 
+#include "noise.h"
 #include "numeric_jacobian.h"
 #include "rio_t/core/so3.h"
 #include "rio_t/landmarks/candidates.h"
@@ -78,21 +78,22 @@ TEST(LandmarkFactor, TheNoiseIsInPolarForm) {
 /// Detections from a radar that goes sideways, `way` [m] in 30 scans.
 class CandidatesTest : public ::testing::Test {
  protected:
-  PlacedDetection seen(double share, double way, const Eigen::Vector3d& p_W) {
+  static PlacedDetection exactly(double share, double way, const Eigen::Vector3d& p_W) {
     PlacedDetection detection;
     const Time time = Time::fromNanoseconds(1'000'000'000) + 3.0 * share;
     detection.radar_W = Eigen::Vector3d(share * way, 0.0, 0.0);
     detection.covariance = Eigen::Vector3d(0.2 * 0.2, 0.05 * 0.05, 0.3 * 0.3).asDiagonal();
-    detection.p_W =
-        p_W + Eigen::Vector3d(0.2 * gauss_(random_), 0.05 * gauss_(random_), 0.3 * gauss_(random_));
+    detection.p_W = p_W;
     detection.snr_db = 20.0;
     detection.time = time;
     detection.sighting.node_time = time;
     return detection;
   }
+  PlacedDetection seen(double share, double way, const Eigen::Vector3d& p_W) {
+    return exactly(share, way, p_W + Eigen::Vector3d(0.2, 0.05, 0.3).cwiseProduct(noise_.vector()));
+  }
   static constexpr int kScans = 30;
-  std::mt19937 random_{7};
-  std::normal_distribution<double> gauss_;
+  Noise noise_;
   Candidates candidates_;
 };
 
@@ -114,8 +115,23 @@ TEST_F(CandidatesTest, AHighlightThatSlidesAlongIsNeverProven) {
 
 TEST_F(CandidatesTest, TwoThingsThatCannotBeToldApartAreNotProven) {
   for (int i = 0; i < kScans; ++i)
-    candidates_.add({seen(i / 30.0, 2.0, {0.0, 5.0, 0.0}), seen(i / 30.0, 2.0, {0.6, 5.05, 0.4})});
+    candidates_.add({seen(i / 30.0, 2.0, {0.0, 5.0, 0.0}), seen(i / 30.0, 2.0, {0.3, 5.02, 0.2})});
   EXPECT_TRUE(candidates_.takeProven({}, 10).empty());
+}
+
+/// Beyond the gate of the first, and not farther than four sigmas.
+TEST_F(CandidatesTest, ASecondThingBesideTheFirstIsNoOutlier) {
+  const auto proven = [](double sigmas, int times) {
+    Candidates candidates;
+    for (int i = 0; i < kScans; ++i) {
+      candidates.add({exactly(i / 30.0, 2.0, {0.0, 5.0, 0.0})});
+      if (i >= kScans - times) candidates.add({exactly(i / 30.0, 2.0, {0.2 * sigmas, 5.0, 0.0})});
+    }
+    return candidates.takeProven({}, 10).size();
+  };
+  EXPECT_EQ(proven(3.7, 1), 1u);
+  EXPECT_EQ(proven(3.7, 2), 0u);
+  EXPECT_EQ(proven(4.3, 2), 1u);
 }
 
 TEST_F(CandidatesTest, NothingBecomesALandmarkBesideAnother) {
@@ -125,12 +141,12 @@ TEST_F(CandidatesTest, NothingBecomesALandmarkBesideAnother) {
 }
 
 TEST_F(CandidatesTest, GhostsFillABoundedListAndProveNothing) {
-  std::uniform_real_distribution<double> anywhere(-10.0, 10.0);
+  Random random(7);
+  const auto anywhere = [&] { return random.uniform(-10.0, 10.0); };
   for (int i = 0; i < 300; ++i) {
     std::vector<PlacedDetection> ghosts;
     ghosts.reserve(40);
-    for (int k = 0; k < 40; ++k)
-      ghosts.push_back(seen(i / 30.0, 1.0, {anywhere(random_), anywhere(random_), anywhere(random_)}));
+    for (int k = 0; k < 40; ++k) ghosts.push_back(seen(i / 30.0, 1.0, {anywhere(), anywhere(), anywhere()}));
     candidates_.add(ghosts);
     candidates_.forgetOld(ghosts.front().time, ghosts.front().time);
     EXPECT_LE(candidates_.size(), Candidates::kMax);
@@ -141,15 +157,13 @@ TEST_F(CandidatesTest, GhostsFillABoundedListAndProveNothing) {
 /// The test draws pairs, some of them by chance. The probability tells the share of true ones, near the
 /// landmark and near the edge of the gate.
 TEST(ProbabilityOfTruth, IsTheShareOfTruePairs) {
-  std::mt19937 random(3);
-  std::normal_distribution<double> gauss;
-  std::uniform_real_distribution<double> even(-4.0, 4.0), share(0.0, 1.0);
+  Random random(3);
   constexpr double kByChance = 0.3;
   constexpr std::size_t kBins = 4;
   std::array<double, kBins> pairs{}, true_pairs{}, expected{};
   for (int i = 0; i < 200000; ++i) {
-    const bool by_chance = share(random) < kByChance;
-    const auto draw = [&] { return by_chance ? even(random) : gauss(random); };
+    const bool by_chance = random.uniform(0.0, 1.0) < kByChance;
+    const auto draw = [&] { return by_chance ? random.uniform(-4.0, 4.0) : random.normal(); };
     double q = Candidates::kGate;
     while (q >= Candidates::kGate) q = Eigen::Vector3d(draw(), draw(), draw()).squaredNorm();
     const auto bin = static_cast<std::size_t>(q / Candidates::kGate * kBins);
@@ -163,6 +177,14 @@ TEST(ProbabilityOfTruth, IsTheShareOfTruePairs) {
   EXPECT_LT(true_pairs.back() / pairs.back(), 0.3);
 }
 
+/// True pairs have a mean of 1, those by chance of 2.27.
+TEST(ShareByChance, IsThatOfTheMeanSquare) {
+  EXPECT_EQ(shareByChance(0.0, 0.0), 0.5) << "nothing is known";
+  EXPECT_NEAR(shareByChance(1.4 * 30.0, 30.0), 0.4 / 1.268, 1e-9);
+  EXPECT_EQ(shareByChance(30.0, 30.0), 0.01);
+  EXPECT_EQ(shareByChance(2.0 * 30.0, 30.0), 0.5);
+}
+
 struct Outcome {
   double rms = 0.0, nees = 0.0;
   double worst = 0.0;  ///< [sigma] of an axis
@@ -173,8 +195,6 @@ struct Outcome {
 Outcome outcomeOf(const SimulatedRun& run, double from) {
   Outcome outcome;
   double count = 0.0;
-  const simulation::MotionState origin = run.motion.at(0.0);
-  std::optional<Eigen::Quaterniond> turn;  // of the truth into W: the estimate begins level, with yaw zero
   for (const ScanResult& result : run.results) {
     if (result.landmarks) {
       outcome.dropped += result.landmarks->dropped_map ? 1 : 0;
@@ -182,12 +202,8 @@ Outcome outcomeOf(const SimulatedRun& run, double from) {
     }
     if (!result.updated) continue;
     const NavigationState& x = result.state;
-    if (!turn) {
-      const Eigen::Vector3d ahead = x.q_WI * (origin.q_WI.conjugate() * Eigen::Vector3d::UnitX());
-      turn = so3::exp({0.0, 0.0, std::atan2(ahead.y(), ahead.x())});
-    }
     if (run.seconds(x.time) < from) continue;
-    const Eigen::Vector3d e = x.p_W - *turn * (run.truth(x).p_W - origin.p_W);
+    const Eigen::Vector3d e = run.wayError(x);
     outcome.rms += e.squaredNorm();
     for (int i = 0; i < 3; ++i) {
       const double square = e[i] * e[i] / x.covariance(StateBlock::kP + i, StateBlock::kP + i);

@@ -20,6 +20,12 @@
 namespace rio_t {
 namespace {
 
+std::string value(const LiveMonitor::Status& status, const std::string& key) {
+  for (const auto& each : status.values)
+    if (each.key == key) return each.value;
+  return "no " + key;
+}
+
 /// What `diagnostics` says of two radars.
 class TwoRadarDiagnostics : public testing::Test {
  protected:
@@ -35,11 +41,6 @@ class TwoRadarDiagnostics : public testing::Test {
       of.addImu({Time::fromSeconds(0.0025 * k), Eigen::Vector3d::Zero(), {0.0, 0.0, 9.81}});
     bool more = false;
     of.process(&more);
-  }
-  static std::string value(const Status& status, const std::string& key) {
-    for (const auto& each : status.values)
-      if (each.key == key) return each.value;
-    return "no " + key;
   }
   void imuSample(Time stamp = Time()) {
     monitor.imu();
@@ -428,6 +429,98 @@ TEST(LiveMonitor, GivesABarometerTwoSecondsForAPressure) {
   EXPECT_EQ(barometer(), "pressures are coming");
 }
 
+TEST(LiveMonitor, TellsWhetherTheBarometerIsOfUse) {
+  Config config;
+  config.barometer_topic = "/baro";
+  LiveMonitor monitor(config);
+  const auto barometer = [&] {
+    LiveMonitor::Status status;
+    monitor.describeBarometer(status);
+    return status;
+  };
+  const auto pressure = [&](const char* rejected_because) {
+    monitor.pressure();
+    LiveSession::Result result;
+    BarometerAnswer& mean = result.result.barometer.emplace_back();
+    mean.height = 2.5;
+    mean.rejected_because = rejected_because;
+    monitor.result(result);
+  };
+  monitor.pressure();
+  monitor.pressureDropped("its unit");
+  EXPECT_EQ(barometer().level, DiagnosticStatus::WARN);
+  EXPECT_EQ(barometer().message, "no pressure can be used: its unit");
+  pressure("");
+  EXPECT_EQ(barometer().level, DiagnosticStatus::OK);
+  EXPECT_EQ(barometer().message, "in use");
+  pressure("gate");
+  const LiveMonitor::Status rejected = barometer();
+  EXPECT_EQ(rejected.level, DiagnosticStatus::WARN);
+  EXPECT_EQ(rejected.message, "no pressure is used now, rejected as gate");
+  EXPECT_EQ(value(rejected, "pressures"), "3");
+  EXPECT_EQ(value(rejected, "pressures_not_usable"), "1");
+  EXPECT_EQ(value(rejected, "means_used"), "1");
+  EXPECT_EQ(value(rejected, "means_rejected_gate"), "1");
+  EXPECT_EQ(value(rejected, "height_m"), "2.5");
+}
+
+TEST(LiveMonitor, TellsWhetherTheMotionIsThatOfAVehicle) {
+  Config config;
+  config.odometry.platform = Platform::kGroundVehicle;
+  LiveMonitor monitor(config);
+  const auto vehicle = [&] {
+    LiveMonitor::Status status;
+    monitor.describeGroundVehicle(status);
+    return status;
+  };
+  EXPECT_EQ(vehicle().message, "no motion judged yet");
+  LiveSession::Result result;
+  GroundVehicleAnswer& answer = result.result.ground_vehicle.emplace();
+  answer.used = true;
+  answer.v_V = {3.0, 0.25, -0.5};
+  monitor.result(result);
+  EXPECT_EQ(vehicle().level, DiagnosticStatus::OK);
+  EXPECT_EQ(vehicle().message, "the motion agrees");
+  EXPECT_EQ(value(vehicle(), "contradiction"), "no contradiction") << "too early";
+  answer.used = false;
+  answer.contradiction = 0.75;
+  answer.is_contradicted = true;
+  monitor.result(result);
+  const LiveMonitor::Status status = vehicle();
+  EXPECT_EQ(status.level, DiagnosticStatus::WARN);
+  EXPECT_EQ(status.message, kGroundVehicleContradicted);
+  EXPECT_EQ(value(status, "terms_used"), "1");
+  EXPECT_EQ(value(status, "terms_left_out"), "1");
+  EXPECT_EQ(value(status, "velocity_sideways_m_s"), "0.25");
+  EXPECT_EQ(value(status, "velocity_upwards_m_s"), "-0.5");
+  EXPECT_EQ(value(status, "contradiction"), "0.75");
+  EXPECT_EQ(value(status, "vehicle_frame_rotation_xyzw"), "[0.000000, 0.000000, 0.000000, 1.000000]");
+}
+
+TEST(LiveMonitor, TellsWhetherTheMapOfLandmarksHelps) {
+  Config config;
+  config.odometry.landmarks.enabled = true;
+  LiveMonitor monitor(config);
+  const auto landmarks = [&] {
+    LiveMonitor::Status status;
+    monitor.describeLandmarks(status);
+    return status;
+  };
+  EXPECT_EQ(landmarks().message, "too few landmarks were seen again, the map waits");
+  LiveSession::Result result;
+  LandmarkAnswer& answer = result.result.landmarks.emplace();
+  answer.map.resize(3);
+  monitor.result(result);
+  answer.is_trusted = true;
+  monitor.result(result);
+  const LiveMonitor::Status status = landmarks();
+  EXPECT_EQ(status.level, DiagnosticStatus::OK);
+  EXPECT_EQ(status.message, "the map helps the estimate");
+  EXPECT_EQ(value(status, "landmarks"), "3");
+  EXPECT_EQ(value(status, "scans"), "2");
+  EXPECT_EQ(value(status, "scans_trusted"), "1");
+}
+
 TEST_F(TwoRadarDiagnostics, WarnOfATopicWithTwoPublishers) {
   setPublishers({{config.imu_topic, 2}, {"/left", 1}, {"/right", 1}});
   const Status status = second(20, 20, 20);
@@ -614,10 +707,7 @@ TEST_F(SolverDiagnostics, WarnWhileMostWindowsEndAtTheBound) {
   expectWarning("11 of the last 20 windows");
   windows(SolverTermination::kConverged, 1);
   EXPECT_EQ(status().level, diagnostic_msgs::DiagnosticStatus::OK);
-  std::string at_bound;
-  for (const auto& value : status().values)
-    if (value.key == "at_bound") at_bound = value.value;
-  EXPECT_EQ(at_bound, "20");
+  EXPECT_EQ(value(status(), "at_bound"), "20");
 }
 
 TEST_F(SolverDiagnostics, WarnOfWhatIsMostFrequent) {

@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
+#include "noise.h"
 #include "rio_t/core/so3.h"
 
 namespace rio_t {
@@ -29,11 +29,10 @@ NavigationState turnedAt30m(double sigma) {
 
 /// Draws headings and returns the mean square of what they take off 30 m [m^2].
 double drawn(double sigma) {
-  std::mt19937 random(1);
-  std::normal_distribution<double> normal(0.0, sigma);
+  Random random(1);
   double sum = 0.0;
   constexpr int kDraws = 100000;
-  for (int i = 0; i < kDraws; ++i) sum += std::pow(30.0 * (1.0 - std::cos(normal(random))), 2);
+  for (int i = 0; i < kDraws; ++i) sum += std::pow(30.0 * (1.0 - std::cos(sigma * random.normal())), 2);
   return sum / kDraws;
 }
 

@@ -66,7 +66,7 @@ TEST_F(AtRest, AScanWaitsUntilTheImuCoversIt) {
   run(104.0);
   odometry.addScan(restScan(104.1));
   EXPECT_TRUE(odometry.process().empty());
-  EXPECT_TRUE(run(104.1).empty());
+  EXPECT_TRUE(run(104.205).empty()) << "the derivative by t_O looks 0.1 s ahead";
   const auto results = run(104.25);
   ASSERT_EQ(results.size(), 1u);
   EXPECT_TRUE(results[0].used) << results[0].rejected_because;
@@ -333,37 +333,46 @@ TEST_F(AtRest, NothingIsLearntOfTheOffset) {
   EXPECT_GE(last.time_offset_sigma, configured.time_offset_sigma * (1.0 - 1e-6));
 }
 
-/// Every tenth scan from 15 s on is wrong by 1.8 m/s, and comes `delay` [s] later than it should: how many of
-/// them were used, of how many.
-std::pair<int, int> wrongScansUsed(double delay) {
+struct LateScans {
+  int wrong = 0, wrong_used = 0;
+  int good = 0, good_used = 0;
+};
+
+/// Every fifth scan from 15 s on comes `delay` [s] later than it should. Half of these are wrong by 1.8 m/s.
+LateScans lateScans(double delay) {
   SimulatedRun run("medium", 3, 40.0, 5.0);
-  std::set<Time> wrong;
+  std::set<Time> wrong, good;
   run.run([&](simulation::SensorData& data) {
-    for (std::size_t i = 150; i < data.scans.size(); i += 10) {
+    for (std::size_t i = 150; i < data.scans.size(); i += 5) {
       simulation::SimulatedScan& scan = data.scans[i];
+      scan.arrival = scan.arrival + delay;
+      if (i % 10 != 0) {
+        good.insert(scan.stamp);
+        continue;
+      }
       for (simulation::SimulatedPoint& point : scan.points)
         point.doppler -= point.position_R.normalized().dot(Eigen::Vector3d(1.2, 1.0, 0.9));
-      scan.arrival = scan.arrival + delay;
       wrong.insert(scan.stamp);
     }
     std::stable_sort(data.scans.begin(), data.scans.end(),
                      [](const auto& a, const auto& b) { return a.arrival < b.arrival; });
   });
-  int used = 0;
-  int all = 0;
+  LateScans late;
   for (const ScanResult& result : run.results) {
-    if (wrong.count(result.scan.stamp) == 0) continue;
-    ++all;
-    used += result.used ? 1 : 0;
+    const int used = result.used ? 1 : 0;
+    if (wrong.count(result.scan.stamp) > 0) ++late.wrong, late.wrong_used += used;
+    if (good.count(result.scan.stamp) > 0) ++late.good, late.good_used += used;
   }
-  return {used, all};
+  return late;
 }
 
 TEST(LateScans, PassTheSameGatesAsPunctualOnes) {
   for (const double delay : {0.0, 0.25, 0.4}) {
-    const auto [used, all] = wrongScansUsed(delay);
-    EXPECT_GT(all, 20);
-    EXPECT_EQ(used, 0) << "of " << all << ", " << delay << " s late";
+    const auto [wrong, wrong_used, good, good_used] = lateScans(delay);
+    EXPECT_GT(wrong, 20);
+    EXPECT_EQ(wrong_used, 0) << "of " << wrong << ", " << delay << " s late";
+    EXPECT_GT(good, 20);
+    EXPECT_GT(good_used, 0.8 * good) << "of " << good << ", " << delay << " s late";
   }
 }
 
@@ -405,12 +414,13 @@ TEST(StuckGyro, CostsLittle) {
         if (t >= 30.0 && t < 30.3) sample.angular_velocity[axis] = 17.4;
       }
     });
-    const double ate = run.rms(10.0, 60.0, [&](const NavigationState& state) {
-      // From the start on, with the heading of the start.
-      const simulation::MotionState origin = run.motion.at(0.0);
-      return ((state.p_W).norm() - (run.truth(state).p_W - origin.p_W).norm());
-    });
-    EXPECT_LT(ate, 0.2) << "axis " << axis;
+    const auto error = [&](const NavigationState& state) { return run.wayError(state).norm(); };
+    EXPECT_LT(run.rms(10.0, 60.0, error), 0.18) << "axis " << axis << ", 0.12 m without the fault";
+    // No sensor gives the heading back: 0.04 to 0.08 rad are lost.
+    const auto turn = [&](const NavigationState& state) {
+      return state.q_WI.angularDistance(run.turnIntoW() * run.truth(state).q_WI);
+    };
+    EXPECT_LT(run.rms(32.0, 60.0, turn), 0.12) << "axis " << axis;
     EXPECT_GT(run.odometry->faults()["imu_stuck"], 50u);
     EXPECT_LT(run.rms(32.0, 60.0, [&](const NavigationState& state) { return run.velocityError(state); }),
               0.1);
@@ -459,14 +469,24 @@ TEST(ImuGap, AtSpeedIsNoDivergence) {
     };
     samples.erase(std::remove_if(samples.begin(), samples.end(), in_gap), samples.end());
   });
+  int states = 0;
   for (const NavigationState& state : run.states) {
     if (run.seconds(state.time) < 18.0 || run.seconds(state.time) > 30.0) continue;
+    ++states;
     ASSERT_GT(std::sqrt(state.covariance(StateBlock::kV + 1, StateBlock::kV + 1)), 2.0);
   }
-  const auto diverged = std::count_if(run.results.begin(), run.results.end(), [&](const ScanResult& result) {
-    return run.seconds(result.scan.stamp) > 17.5 && result.health == Health::kDiverged;
-  });
-  EXPECT_EQ(diverged, 0);
+  EXPECT_GT(states, 2000);
+  EXPECT_LT(run.rms(18.0, 40.0, [&](const NavigationState& state) { return run.velocityError(state); }), 0.1);
+  int scans = 0, used = 0;
+  for (const ScanResult& result : run.results) {
+    const double t = run.seconds(result.scan.stamp);
+    EXPECT_FALSE(t > 17.5 && result.health == Health::kDiverged) << t;
+    if (t < 18.0) continue;
+    ++scans;
+    used += result.used ? 1 : 0;
+  }
+  EXPECT_GT(scans, 200);
+  EXPECT_GT(used, 0.9 * scans);
 }
 
 /// An engine that is off at the end must not make the run look quiet.

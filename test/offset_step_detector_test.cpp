@@ -42,15 +42,17 @@ TEST(OffsetStepDetector, SeesALargeStepSoon) {
 }
 
 /// Scans at `rate` [Hz] of a platform that accelerates evenly; `error(t)` [s] is what their velocities show.
+/// S says `sigma` [m/s].
 template <class Error>
-std::optional<OffsetStep> stepOf(double rate, const Error& error, double t_O = 0.0) {
+std::optional<OffsetStep> stepOf(double rate, const Error& error, double t_O = 0.0, double noise = 0.03,
+                                 double sigma = 0.03) {
   OffsetStepDetector detector(OffsetStepDetectorOptions(), 0.25);
-  const Eigen::Matrix3d S = 0.03 * 0.03 * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d S = sigma * sigma * Eigen::Matrix3d::Identity();
   const Eigen::Vector3d J(1.5, -1.0, 0.5);
   for (int i = 0; i < 20.0 * rate; ++i) {
     const Eigen::Vector3d e(std::sin(2.1 * i * i), std::cos(1.3 * i * i), std::sin(0.7 * i * i + 1.0));
     const Time stamp = Time::fromSeconds(i / rate);
-    const Eigen::Vector3d d = error(i / rate) * J + 0.03 * e;
+    const Eigen::Vector3d d = error(i / rate) * J + noise * e;
     if (const auto step = detector.stepped({stamp, d, S, S, J, J}, Eigen::Matrix3d::Identity(), t_O))
       return step;
   }
@@ -70,6 +72,15 @@ TEST(OffsetStepDetector, TellsWhenAndByHowMuch) {
 TEST(OffsetStepDetector, WhatPassesWithinASecondIsNoStep) {
   for (const double rate : {10.0, 25.0, 50.0})
     EXPECT_FALSE(stepOf(rate, [](double t) { return t > 9.99 && t < 10.9 ? 0.1 : 0.0; })) << rate;
+}
+
+// The scatter of the scans is a hundredth of S here, and any trend would be significant against it. Against a
+// fifth of S, the 70 scans after the first second tell 8.5 ms.
+TEST(OffsetStepDetector, ScansThatHardlyScatterAreNotBelievedAllTheSame) {
+  EXPECT_FALSE(stepOf(
+      10.0, [](double) { return 0.0075; }, 0.0, 0.005, 0.05));
+  EXPECT_TRUE(stepOf(
+      10.0, [](double) { return 0.0095; }, 0.0, 0.005, 0.05));
 }
 
 TEST(OffsetStepDetector, NoStepLeavesTheBounds) {

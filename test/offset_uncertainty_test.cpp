@@ -45,8 +45,9 @@ TEST(OffsetUncertainty, WidensWhereTheScansAskForAChangeAllTheTime) {
   scans.feed(u, 60.0, 0.5 * kPromised, 0.0);
   EXPECT_NEAR(u.sigma(marginal * marginal), marginal, 0.1e-3);
   scans.feed(u, 120.0, 0.5 * kPromised, lag);
-  EXPECT_GT(u.sigma(marginal * marginal), 0.6 * lag);
+  EXPECT_GT(u.sigma(marginal * marginal), 0.8 * lag);
   EXPECT_LT(u.sigma(marginal * marginal), 1.3 * lag);
+  EXPECT_NEAR(u.walk(), lag / std::sqrt(40.0), 0.2 * lag / std::sqrt(40.0)) << "over the memory of 40 s";
 }
 
 }  // namespace

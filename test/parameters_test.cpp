@@ -10,6 +10,7 @@
 #include <set>
 #include <sstream>
 #include <stdexcept>
+#include <tuple>
 
 #include "../src/ros/temporary_folder.h"
 #include "parameter_faults.h"
@@ -35,6 +36,118 @@ TEST(Parameters, EveryKindOfValueIsRead) {
   EXPECT_EQ(config.odometry.smoother.time_offset_model, TimeOffsetModel::kImu);
   EXPECT_EQ(config.odometry.radar.T_IR.l_I, Eigen::Vector3d(1.0, -2.5, 0.3));
   EXPECT_EQ(config.odometry.smoother.time_offset_noise, 1e-4);
+}
+
+/// Keys that no other test sets, each with a value that is not its default.
+TEST(Parameters, EachOfTheseKeysSetsItsMember) {
+  Config c;
+  OdometryOptions& o = c.odometry;
+  EgoVelocityOptions& radar = o.radar.ego_velocity;
+  SmootherOptions& smoother = o.smoother;
+  const std::vector<std::tuple<const char*, double, const double*>> numbers = {
+      {"extrinsics_rotation_noise", 2e-5, &smoother.extrinsics_rotation_noise},
+      {"extrinsics_translation_noise", 3e-5, &smoother.extrinsics_translation_noise},
+      {"imu_gyro_scale_error", 0.01, &o.imu_noise.gyro_scale_error},
+      {"max_imu_gap", 0.05, &o.max_imu_gap},
+      {"imu_jump_patience", 0.6, &o.imu_input_check.jump_patience},
+      {"imu_accel_range", 78.0, &o.imu_input_check.accel_range},
+      {"imu_gyro_range", 17.0, &o.imu_input_check.gyro_range},
+      {"imu_unseen_accel_density", 3.0, &o.imu_input_check.unseen_accel_density},
+      {"imu_unseen_gyro_density", 0.7, &o.imu_input_check.unseen_gyro_density},
+      {"max_radar_gap", 0.8, &o.max_radar_gap},
+      {"init_motion_after", 6.0, &o.init_motion_after},
+      {"init_duration", 4.0, &o.initialization.duration},
+      {"init_max_gyro_std", 0.06, &o.initialization.max_gyro_std},
+      {"init_max_accel_std", 0.7, &o.initialization.max_accel_std},
+      {"init_max_gyro_mean", 0.2, &o.initialization.max_gyro_mean},
+      {"init_max_gravity_error", 0.9, &o.initialization.max_gravity_error},
+      {"init_motion_window", 3.5, &o.motion_initialization.window},
+      {"init_motion_max_gravity_error", 2.5, &o.motion_initialization.max_gravity_error},
+      {"init_motion_max_outlier_fraction", 0.4, &o.motion_initialization.max_outlier_fraction},
+      {"init_motion_sigma_gyro_bias", 0.02, &o.motion_initialization.sigma_gyro_bias},
+      {"init_motion_sigma_accel_bias", 0.3, &o.motion_initialization.sigma_accel_bias},
+      {"rest_window", 0.6, &o.rest.window},
+      {"rest_max_gyro_std", 0.02, &o.rest.max_gyro_std},
+      {"rest_max_accel_std", 0.3, &o.rest.max_accel_std},
+      {"rest_max_rate", 0.004, &o.rest.max_rate},
+      {"rest_max_accel_error", 0.4, &o.rest.max_accel_error},
+      {"rest_max_speed", 0.7, &o.rest.max_speed},
+      {"rest_velocity_sigma", 0.03, &o.rest.velocity_sigma},
+      {"vehicle_frame_rotation_sigma", 0.03, &o.ground_vehicle.rotation_sigma},
+      {"vehicle_start_slope_sigma", 0.005, &o.ground_vehicle.start_slope_sigma},
+      {"vehicle_frame_rotation_noise", 4e-5, &o.ground_vehicle.rotation_noise},
+      {"vehicle_sideways_sigma", 0.06, &o.ground_vehicle.sideways_sigma},
+      {"vehicle_vertical_sigma", 0.07, &o.ground_vehicle.vertical_sigma},
+      {"vehicle_gate", 5.0, &o.ground_vehicle.gate},
+      {"barometer_noise_density", 0.06, &o.barometer.noise_density},
+      {"barometer_drift", 0.007, &o.barometer.drift},
+      {"barometer_temperature", 25.0, &o.barometer.temperature},
+      {"barometer_gate", 5.0, &o.barometer.gate},
+      {"barometer_gate_timeout", 2.0, &o.barometer.gate_timeout},
+      {"barometer_gate_slope", 0.08, &o.barometer.gate_slope},
+      {"radar_max_azimuth", 1.1, &radar.max_azimuth},
+      {"radar_max_elevation", 1.2, &radar.max_elevation},
+      {"zero_velocity_threshold", 0.1, &radar.zero_velocity_threshold},
+      {"zero_velocity_outlier_fraction", 0.35, &radar.zero_velocity_outlier_fraction},
+      {"zero_velocity_sigma", 0.05, &radar.zero_velocity_sigma},
+      {"ransac_inlier_threshold", 0.2, &radar.ransac_inlier_threshold},
+      {"ego_velocity_prior_gate", 5.0, &radar.prior_gate},
+      {"ego_velocity_min_inlier_fraction", 0.5, &radar.min_inlier_fraction},
+      {"ego_velocity_prior_min_inlier_fraction", 0.25, &radar.prior_min_inlier_fraction},
+      {"radar_azimuth_sigma", 0.04, &radar.azimuth_sigma},
+      {"radar_elevation_sigma", 0.06, &radar.elevation_sigma},
+      {"radar_doppler_sigma", 0.07, &radar.doppler_sigma},
+      {"ego_velocity_max_condition_number", 900.0, &radar.max_condition_number},
+      {"ego_velocity_max_sigma", 0.6, &radar.max_sigma},
+      {"time_offset_min_acceleration", 0.3, &smoother.time_offset_min_acceleration},
+      {"time_offset_step_memory", 9.0, &o.offset_step_detector.memory},
+      {"time_offset_step_significance", 7.0, &o.offset_step_detector.significance},
+      {"time_offset_step_min", 0.006, &o.offset_step_detector.min_change},
+      {"huber_threshold", 2.0, &smoother.huber_threshold},
+      {"innovation_model_error", 0.2, &o.innovation_gate.model_error},
+      {"innovation_gate_timeout", 3.5, &o.innovation_gate.timeout},
+      {"prior_sigma_yaw", 0.002, &smoother.prior_sigma_yaw},
+      {"prior_sigma_position", 0.003, &smoother.prior_sigma_position},
+      {"prior_sigma_velocity", 0.04, &smoother.prior_sigma_velocity},
+      {"prior_sigma_gyro_bias", 8e-5, &smoother.prior_sigma_gyro_bias},
+      {"prior_sigma_accel_bias", 0.2, &smoother.prior_sigma_accel_bias},
+      {"reinitialize_after", 6.0, &o.health.reinitialize_after},
+      {"divergence_window", 3.0, &o.health.window},
+      {"divergence_max_contradiction", 0.7, &o.health.max_contradiction},
+      {"divergence_max_velocity_sigma", 2.0, &o.health.max_velocity_sigma},
+      {"coasting_after", 1.5, &o.health.coasting_after},
+      {"radar_range_sigma", 0.06, &o.landmarks.range_sigma},
+      {"tf_rate", 40.0, &c.tf_rate},
+  };
+  for (const auto& [key, value, member] : numbers) {
+    EXPECT_NE(*member, value) << key;
+    c = fromAssignments({std::string(key) + "=" + ParameterValue{value}.yaml()});
+    EXPECT_EQ(*member, value) << key;
+  }
+  c = fromAssignments(
+      {"radar_coordinates=spherical", "radar_field_azimuth=a", "radar_field_elevation=e",
+       "radar_field_range=r", "rest_enabled=false", "vehicle_frame_translation=[0.1, 0.2, 0.3]",
+       "ransac_seed=7", "ego_velocity_min_inliers=6", "ego_velocity_solver=ls",
+       "time_offset_step_detection=false", "max_queued_scans=60", "on_divergence=report", "landmarks_max=25",
+       "base_extrinsics_source=tf", "publish_tf=false", "invert_tf=true", "correct_stamps=false"});
+  EXPECT_EQ(c.radar_overrides.coordinates, PointCoordinates::kSpherical);
+  EXPECT_EQ(c.radar_overrides.azimuth, "a");
+  EXPECT_EQ(c.radar_overrides.elevation, "e");
+  EXPECT_EQ(c.radar_overrides.range, "r");
+  EXPECT_FALSE(o.rest.enabled);
+  EXPECT_EQ(o.ground_vehicle.T_IV.l_I, Eigen::Vector3d(0.1, 0.2, 0.3));
+  EXPECT_EQ(radar.ransac_seed, 7u);
+  EXPECT_EQ(radar.min_inliers, 6u);
+  EXPECT_EQ(radar.solver, EgoVelocitySolver::kLeastSquares);
+  EXPECT_FALSE(o.offset_step_detector.enabled);
+  EXPECT_EQ(o.max_queued_scans, 60u);
+  EXPECT_EQ(o.health.on_divergence, OnDivergence::kReport);
+  EXPECT_EQ(o.landmarks.max_landmarks, 25u);
+  EXPECT_EQ(c.base_extrinsics_source, BaseExtrinsicsSource::kTf);
+  EXPECT_FALSE(c.publish_tf);
+  EXPECT_TRUE(c.publish_radar_tf);
+  EXPECT_TRUE(c.invert_tf);
+  EXPECT_FALSE(c.correct_stamps);
 }
 
 TEST(Parameters, WholeNumbersMayBeWrittenWithAPoint) {

@@ -132,6 +132,26 @@ TEST(RadarChannel, AJumpThatNoPlatformMakesIsRejected) {
   EXPECT_EQ(radar.channel.use(jump, context, radar.smoother).rejected_because, "innovation");
 }
 
+/// The second order of a tilt of 0.1 rad is 0.05 m/s^2 of gravity.
+TEST(RadarChannel, APredictionWithAVagueTiltRejectsNothing) {
+  const auto rejected = [](double tilt_sigma) {
+    OneRadar radar;
+    NodePrior prior =
+        priorAtRest(radar.options.smoother, ImuNoise(), radar.motion.state(0.5), 9.81, 3.0, {skewMounting()});
+    prior.root.J.setIdentity();
+    prior.root.J *= 1e3;
+    prior.root.J.diagonal().segment<3>(StateBlock::kTheta).setConstant(1.0 / tilt_sigma);
+    radar.channel.start(radar.smoother, radar.motion.time(0.5), prior);
+    RadarScan jump = radar.scan(0.6, 30);
+    for (RadarPoint& point : jump.points) point.doppler -= 5.0 * point.position_R.normalized().y();
+    ScanContext context;
+    context.last_used = radar.motion.time(0.5);
+    return radar.channel.use(jump, context, radar.smoother).rejected_because;
+  };
+  EXPECT_EQ(rejected(0.07), "innovation");
+  EXPECT_EQ(rejected(0.15), "");
+}
+
 /// The change of velocity that a borrowed Doppler gets.
 TEST(RadarInWindow, TellsTheVelocityOfTheLastScansInBothModels) {
   for (const TimeOffsetModel model : {TimeOffsetModel::kImu, TimeOffsetModel::kConstantAcceleration}) {

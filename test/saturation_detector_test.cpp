@@ -34,11 +34,18 @@ TEST(Saturation, ARestingSensorWithCoarseStepsIsNotSaturated) {
   SaturationDetector detector(0.0, 0.0);
   ImuMeasurement imu;
   for (int i = 0; i < 1000; ++i) {
-    imu.acceleration = {0.0, 0.01 * (i / 7 % 3), 9.81 + 0.01 * (i / 5 % 2)};
-    imu.angular_velocity = {0.0, 7e-4 * (i / 4 % 3), 0.0};
+    imu.acceleration = {0.0, 0.22 * (i / 7 % 3), 9.81 + 0.01 * (i / 5 % 2)};
+    imu.angular_velocity = {0.0, 0.045 * (i / 6 % 3), 0.0};
     const auto saturated = detector.check(imu);
     ASSERT_FALSE(saturated.accel || saturated.gyro) << i;
   }
+  // Flat tops not far beyond are.
+  imu.acceleration.y() = 0.6;
+  imu.angular_velocity.y() = 0.12;
+  for (int i = 0; i < 4; ++i) EXPECT_FALSE(detector.check(imu).accel);
+  const auto saturated = detector.check(imu);
+  EXPECT_TRUE(saturated.accel);
+  EXPECT_TRUE(saturated.gyro);
 }
 
 TEST(Saturation, ALargerReadingTakesTheLimitBack) {

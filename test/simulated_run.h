@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "rio_t/core/so3.h"
+#include "rio_t/imu/static_initializer.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
 #include "rio_t/simulation/motions.h"
 #include "rio_t/simulation/simulation.h"
@@ -97,6 +99,17 @@ struct SimulatedRun {
     const Eigen::Vector3d a = truth(state).q_WI.conjugate() * Eigen::Vector3d::UnitZ();
     const Eigen::Vector3d b = state.q_WI.conjugate() * Eigen::Vector3d::UnitZ();
     return std::atan2(a.cross(b).norm(), a.dot(b));
+  }
+  /// Turns the truth into W if the motion begins at rest: the heading of the start is that of W.
+  Eigen::Quaterniond turnIntoW() const {
+    const Eigen::Quaterniond q_IW = motion.at(0.0).q_WI.conjugate();
+    const Eigen::Vector3d ahead =
+        levelingRotation(q_IW * Eigen::Vector3d::UnitZ()) * (q_IW * Eigen::Vector3d::UnitX());
+    return so3::exp({0.0, 0.0, std::atan2(ahead.y(), ahead.x())});
+  }
+  /// Error of the way from the start, at rest, in W [m].
+  Eigen::Vector3d wayError(const NavigationState& state) const {
+    return state.p_W - turnIntoW() * (truth(state).p_W - motion.at(0.0).p_W);
   }
   /// Of p_W [m].
   double positionError(const NavigationState& state) const { return (truth(state).p_W - state.p_W).norm(); }

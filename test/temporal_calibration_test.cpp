@@ -109,7 +109,7 @@ TEST(TemporalCalibration, JustInsideTheBoundItIsNoSurer) {
 }
 
 TEST(TemporalCalibration, FarOffsetsAreFoundInOnePass) {
-  double sum = 0.0;
+  double sum = 0.0, position = 0.0;
   int count = 0;
   for (const double truth : {-0.05, 0.1, 0.2}) {
     for (std::uint64_t seed = 1; seed <= 3; ++seed) {
@@ -126,9 +126,12 @@ TEST(TemporalCalibration, FarOffsetsAreFoundInOnePass) {
       std::size_t rejected = 0;
       for (const ScanResult& result : run.results) rejected += result.rejected_because == "innovation";
       EXPECT_LE(rejected, 4u) << "good scans, while the offset was wrong";
+      position += run.rms(0.0, 40.0, [&](const auto& state) { return run.wayError(state).norm(); });
     }
   }
   EXPECT_LT(sum / count, 0.5e-3) << "mean size of the error after ten seconds of motion";
+  // The README says 0.06 m. Here it is 0.054 m; other draws of the noise may give half as much again.
+  EXPECT_LT(position / count, 0.08);
 }
 
 TEST(TemporalCalibration, ASlowDriftIsFollowed) {

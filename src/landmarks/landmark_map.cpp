@@ -65,6 +65,12 @@ double probabilityOfTruth(double squared_sigmas, double by_chance) {
   return true_density / (true_density + chance_density);
 }
 
+double shareByChance(double sum, double pairs) {
+  if (pairs <= 0.0) return kMostPairsByChance;
+  const double share = (sum / pairs - 1.0) / (kMeanSquareByChance - 1.0);
+  return std::clamp(share, kLeastByChance, kMostPairsByChance);
+}
+
 LandmarkMap::LandmarkMap(const LandmarkOptions& options, const Eigen::Vector3d& g_W, const ImuBuffer& imu)
     : options_(options),
       g_W_(g_W),
@@ -212,7 +218,7 @@ LandmarkAnswer LandmarkMap::use(const Prediction& prediction, const std::vector<
   for (const Match& match : association.matches) {
     Landmark& landmark = landmarks_[match.landmark];
     if (is_trusted_) {
-      const double weight = probabilityOfTruth(match.squared_sigmas, shareByChance());
+      const double weight = probabilityOfTruth(match.squared_sigmas, shareByChance(sigmas_, matched_));
       const PolarMeasurement z = weighted(detections[match.detection].z, weight);
       smoother.window().add(std::make_unique<LandmarkFactor>(z, delta, g_W_),
                             {&node, &extrinsics, landmark.block.get()}, loss_);
@@ -284,12 +290,6 @@ bool LandmarkMap::judge(const Prediction& prediction, const Extrinsics& T_IR,
   const bool is_wrong = contradicts();
   if (matched_ >= kProof && matched_ >= kMinShare * in_view_ && !is_wrong) is_trusted_ = true;
   return !is_wrong && vague <= 0.5 * in_view;
-}
-
-double LandmarkMap::shareByChance() const {
-  if (matched_ <= 0.0) return kMostPairsByChance;
-  const double share = (sigmas_ / matched_ - 1.0) / (kMeanSquareByChance - 1.0);
-  return std::clamp(share, kLeastByChance, kMostPairsByChance);
 }
 
 /// With less than the proof, or with hardly any landmark seen again, nothing is known and nothing counts.

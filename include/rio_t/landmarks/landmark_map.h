@@ -15,6 +15,8 @@ namespace rio_t {
 
 /// Probability that a pair within the gate is of one thing, if so many of the pairs match by chance.
 double probabilityOfTruth(double squared_sigmas, double by_chance);
+/// The share of pairs that match by chance; `sum` is over their squared sigmas, divided by 3.
+double shareByChance(double sum, double pairs);
 
 /// Static detections as landmarks: points of the world in the window of the smoother, correlated with all
 /// that is estimated (docs/method.md, section 16). One map for all radars. Not thread-safe.
@@ -87,8 +89,6 @@ class LandmarkMap {
   /// Judges the map by the matches lately. Returns whether it is worth keeping.
   bool judge(const Prediction& prediction, const Extrinsics& T_IR, const Association& association);
   bool contradicts() const;
-  /// The share of the pairs lately that match by chance, by the mean of their squared sigmas.
-  double shareByChance() const;
   std::vector<LandmarkPoint> points() const;
 
   LandmarkOptions options_;  // read-only after construction, as the next three
