@@ -298,7 +298,7 @@ double innovationSigma(const std::function<double(int)>& stamp_of) {
 
 TEST(Barometer, SamplesThatComeInPairsTellAsMuch) {
   const double regular = innovationSigma([](int k) { return 0.01 + 0.02 * k; });
-  const double pairs = innovationSigma([](int k) { return 0.01 + 0.04 * (k / 2) + 0.001 * (k % 2); });
+  const double pairs = innovationSigma([](int k) { return 0.01 + 0.02 * (k - k % 2) + 0.001 * (k % 2); });
   EXPECT_LT(pairs, 1.5 * regular);
   EXPECT_GT(pairs, regular / 1.5);
 }

@@ -50,7 +50,7 @@ TEST(StuckAxisDetector, AReadingThatStaysForATenthOfASecondIsFrozen) {
 /// Feeds an axis at one rate.
 struct FedAxis {
   StuckAxisDetector detector;
-  double rate;
+  double rate = 100.0;
   int count = 0;
   bool check(double reading) {
     return detector.check(Time::fromSeconds(++count / rate), reading, true, false).has_value();
