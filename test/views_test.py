@@ -46,7 +46,8 @@ def test_rqt_perspective():
 def test_the_aggregator_and_the_docs_know_every_status():
     source = (SOURCE / "src" / "ros" / "live" / "live_odometry.cpp").read_text()
     names = re.findall(r'diagnostics_->add\(\s*(?:withName\()?"([^"]+)"', source)
-    assert len(names) == source.count("diagnostics_->add(") > 6
+    rates = re.findall(r'diagnostics_->add\((?:\*radar\.)?\w+_rate_?\)', source)
+    assert len(names) + len(rates) == source.count("diagnostics_->add(") and len(names) > 6 and rates
     analyzers = yaml.safe_load((SOURCE / "config" / "diagnostics" / "aggregator.yaml").read_text())["analyzers"]
     shown = {start for group in analyzers["rio_t"]["analyzers"].values() for start in group["startswith"]}
     assert shown == {f"rio_t: {name}" for name in names} | {"rio_t: /"}, "the last one is for the topics"

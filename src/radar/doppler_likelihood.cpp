@@ -194,7 +194,6 @@ DopplerLikelihood::DopplerLikelihood(const std::vector<RadarDirection>& points, 
     point.half_bin = half_bin_ / sigma;
     point.whole_sigma = whole / sigma;
     point.centre = std::erf(point.half_bin * M_SQRT1_2);
-    point.outlier = noise.outlier_density * 2.0 * half_bin_ / point.centre;
   }
 }
 
