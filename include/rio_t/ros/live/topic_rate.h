@@ -13,7 +13,8 @@
 namespace rio_t {
 
 /// A task of /diagnostics: how often a topic came over the last runs of the task. Silence is an error, any
-/// rate is right. The time is real: that of ROS goes back where a bag loops.
+/// rate is right. The texts are those of diagnostic_updater, but the time is real: that of ROS goes back where
+/// a bag loops.
 class TopicRate final : public diagnostic_updater::DiagnosticTask {
  public:
   explicit TopicRate(const std::string& topic) : DiagnosticTask(topic + " topic status") {}
@@ -31,9 +32,9 @@ class TopicRate final : public diagnostic_updater::DiagnosticTask {
     const std::chrono::duration<double> seconds = now - since;
     using diagnostic_msgs::DiagnosticStatus;
     status.summary(came > 0 ? DiagnosticStatus::OK : DiagnosticStatus::ERROR,
-                   came > 0 ? "messages come" : "no messages");
-    status.add("Messages in window", came);
-    status.add("Window (s)", seconds.count());
+                   came > 0 ? "Desired frequency met" : "No events recorded.");
+    status.add("Events in window", came);
+    status.add("Duration of window (s)", seconds.count());
     status.add("Actual frequency (Hz)", static_cast<double>(came) / seconds.count());
   }
 
