@@ -13,8 +13,8 @@
 namespace rio_t {
 
 /// A task of /diagnostics: how often a topic came over the last runs of the task. Silence is an error, any
-/// rate is right. The texts are those of diagnostic_updater, but the time is real: that of ROS goes back where
-/// a bag loops.
+/// rate is right. The texts are those of diagnostic_updater, but the time is real: that of ROS goes back
+/// where a bag loops.
 class TopicRate final : public diagnostic_updater::DiagnosticTask {
  public:
   explicit TopicRate(const std::string& topic) : DiagnosticTask(topic + " topic status") {}
