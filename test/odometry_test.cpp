@@ -376,6 +376,28 @@ TEST(LateScans, PassTheSameGatesAsPunctualOnes) {
   }
 }
 
+/// The last scan before the start of a motion comes when the platform moves.
+TEST(LateScans, OfARestThatIsOverDoNotStopThePlatform) {
+  SimulatedRun run("medium", 3, 14.0, 8.0);
+  Time late;
+  run.run([&](simulation::SensorData& data) {
+    simulation::SimulatedScan* last = nullptr;
+    for (simulation::SimulatedScan& scan : data.scans)
+      if (run.seconds(scan.stamp) < 7.7) last = &scan;
+    late = last->stamp;
+    last->arrival = late + 0.9;
+    std::stable_sort(data.scans.begin(), data.scans.end(),
+                     [](const auto& a, const auto& b) { return a.arrival < b.arrival; });
+  });
+  const auto result = std::find_if(run.results.begin(), run.results.end(),
+                                   [&](const ScanResult& each) { return each.scan.stamp == late; });
+  ASSERT_NE(result, run.results.end());
+  EXPECT_TRUE(result->at_rest);
+  const double speed = run.truth(result->state).v_W.norm();
+  EXPECT_GT(speed, 0.02);
+  EXPECT_GT(result->state.v_W.norm(), 0.5 * speed);
+}
+
 // Both solvers and both models of the offset, through everything.
 TEST(Solvers, SayTheSame) {
   for (const TimeOffsetModel model : {TimeOffsetModel::kImu, TimeOffsetModel::kConstantAcceleration}) {
