@@ -8,6 +8,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "../src/ros/live/radar_texts.h"
@@ -128,14 +129,14 @@ TEST(BoundedTrajectory, RefusesACapacityThatCannotHoldBothEnds) {
   EXPECT_THROW(BoundedTrajectory(1), std::invalid_argument);
 }
 
-/// The lines that are logged while it lives.
+/// The lines that are logged. Lives for ever: the rosconsole of Debian 11 crashes if it is to let an appender
+/// go.
 class LoggedLines : public ros::console::LogAppender {
  public:
-  LoggedLines() {
-    ros::console::initialize();  // else the first line would reset the appenders
-    ros::console::register_appender(this);
+  static LoggedLines& get() {
+    static auto* const lines = new LoggedLines;
+    return *lines;
   }
-  ~LoggedLines() override { ros::console::deregister_appender(this); }
   LoggedLines(const LoggedLines&) = delete;
   LoggedLines& operator=(const LoggedLines&) = delete;
 
@@ -143,9 +144,15 @@ class LoggedLines : public ros::console::LogAppender {
            int /*line*/) override {
     lines_.emplace_back(text);
   }
-  const std::vector<std::string>& lines() const { return lines_; }
+  /// Since the last call.
+  std::vector<std::string> take() { return std::exchange(lines_, {}); }
 
  private:
+  LoggedLines() {
+    ros::console::initialize();  // else the first line would reset the appenders
+    ros::console::register_appender(this);
+  }
+
   std::vector<std::string> lines_;
 };
 
@@ -162,10 +169,11 @@ TEST(LiveLog, ADivergenceIsNoFaultOfTheInput) {
   bool more = false;
   session->process(&more);
   ASSERT_EQ(session->odometry().faults().count("diverged"), 1U);
-  LoggedLines logged;
+  LoggedLines::get().take();
   LiveLog log("node");
   log.faults(session);
-  EXPECT_EQ(logged.lines(), std::vector<std::string>{"node: input fault imu_not_finite, 1 so far"});
+  EXPECT_EQ(LoggedLines::get().take(),
+            std::vector<std::string>{"node: input fault imu_not_finite, 1 so far"});
 }
 
 /// Also if the time of ROS stands still, or goes back because a bag loops.
