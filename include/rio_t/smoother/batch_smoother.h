@@ -92,8 +92,8 @@ class BatchSmoother {
   struct Graph {
     Window window;
     struct Node {
-      Block* motion;
-      Block* biases;
+      Block* motion = nullptr;
+      Block* biases = nullptr;
       bool rests = false;  ///< a term says so
     };
     std::vector<Node> nodes;
