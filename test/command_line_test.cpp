@@ -154,7 +154,9 @@ TEST(OptionSet, TheFirstSourceCounts) {
 std::string onTerminal(const std::function<void()>& body) {
   const int terminal = posix_openpt(O_RDWR | O_NOCTTY);
   if (terminal < 0 || grantpt(terminal) != 0 || unlockpt(terminal) != 0) return "no terminal";
-  const int end = open(ptsname(terminal), O_RDWR | O_NOCTTY), saved = dup(STDERR_FILENO);
+  std::array<char, 100> name = {};
+  if (ptsname_r(terminal, name.data(), name.size()) != 0) return "no name";
+  const int end = open(name.data(), O_RDWR | O_NOCTTY), saved = dup(STDERR_FILENO);
   dup2(end, STDERR_FILENO);
   body();
   dup2(saved, STDERR_FILENO);
