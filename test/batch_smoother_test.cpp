@@ -280,7 +280,7 @@ TEST_F(Batch, AStepIsFollowedThoughAnotherRadarHasTheNode) {
   EXPECT_NEAR(batch.scans.back().t_O, 0.06, 1e-3);
 }
 
-/// Of two radars with one trigger.
+/// Two radars with one trigger see the same rest.
 TEST_F(Batch, RestOfOneNodeCountsOnce) {
   const SmootherOptions options;
   const CalibrationPrior radar{skewMounting(), 0.02, 0.02};

@@ -224,9 +224,12 @@ TEST(Diagnosis, FilteredPointsNameTheFilterAndTheUnit) {
 
 TEST(Diagnosis, EachFilterHasItsKey) {
   const std::pair<PointVerdict, std::string> filters[] = {
-      {PointVerdict::kTooNear, "radar_min_range"},     {PointVerdict::kTooFar, "radar_max_range"},
-      {PointVerdict::kBesideView, "radar_axes"},       {PointVerdict::kAboveView, "radar_axes"},
-      {PointVerdict::kNoMeasurement, "radar_field_x"}, {PointVerdict::kAmbiguous, "multiObjBeamForming"},
+      {PointVerdict::kTooNear, "radar_min_range"},
+      {PointVerdict::kTooFar, "radar_max_range"},
+      {PointVerdict::kBesideView, "radar_axes"},
+      {PointVerdict::kAboveView, "radar_axes"},
+      {PointVerdict::kNoMeasurement, "radar_field_doppler"},
+      {PointVerdict::kAmbiguous, "multiObjBeamForming"},
   };
   for (const auto& [verdict, key] : filters) {
     RunEvidence evidence = goodRun();

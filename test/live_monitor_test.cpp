@@ -20,6 +20,14 @@
 namespace rio_t {
 namespace {
 
+/// What one of the monitor's tasks of /diagnostics says.
+template <typename Describe>
+LiveMonitor::Status told(LiveMonitor& monitor, Describe describe) {
+  LiveMonitor::Status status;
+  (monitor.*describe)(status);
+  return status;
+}
+
 std::string value(const LiveMonitor::Status& status, const std::string& key) {
   for (const auto& each : status.values)
     if (each.key == key) return each.value;
@@ -416,11 +424,7 @@ TEST(LiveMonitor, GivesABarometerTwoSecondsForAPressure) {
   Config config;
   config.barometer_topic = "/baro";
   LiveMonitor monitor(config);
-  const auto barometer = [&] {
-    LiveMonitor::Status status;
-    monitor.describeBarometer(status);
-    return status.message;
-  };
+  const auto barometer = [&] { return told(monitor, &LiveMonitor::describeBarometer).message; };
   monitor.pressure();
   EXPECT_EQ(barometer(), "pressures are coming");
   EXPECT_EQ(barometer(), "pressures are coming");
@@ -433,11 +437,7 @@ TEST(LiveMonitor, TellsWhetherTheBarometerIsOfUse) {
   Config config;
   config.barometer_topic = "/baro";
   LiveMonitor monitor(config);
-  const auto barometer = [&] {
-    LiveMonitor::Status status;
-    monitor.describeBarometer(status);
-    return status;
-  };
+  const auto barometer = [&] { return told(monitor, &LiveMonitor::describeBarometer); };
   const auto pressure = [&](const char* rejected_because) {
     monitor.pressure();
     LiveSession::Result result;
@@ -468,11 +468,7 @@ TEST(LiveMonitor, TellsWhetherTheMotionIsThatOfAVehicle) {
   Config config;
   config.odometry.platform = Platform::kGroundVehicle;
   LiveMonitor monitor(config);
-  const auto vehicle = [&] {
-    LiveMonitor::Status status;
-    monitor.describeGroundVehicle(status);
-    return status;
-  };
+  const auto vehicle = [&] { return told(monitor, &LiveMonitor::describeGroundVehicle); };
   EXPECT_EQ(vehicle().message, "no motion judged yet");
   LiveSession::Result result;
   GroundVehicleAnswer& answer = result.result.ground_vehicle.emplace();
@@ -501,11 +497,7 @@ TEST(LiveMonitor, TellsWhetherTheMapOfLandmarksHelps) {
   Config config;
   config.odometry.landmarks.enabled = true;
   LiveMonitor monitor(config);
-  const auto landmarks = [&] {
-    LiveMonitor::Status status;
-    monitor.describeLandmarks(status);
-    return status;
-  };
+  const auto landmarks = [&] { return told(monitor, &LiveMonitor::describeLandmarks); };
   EXPECT_EQ(landmarks().message, "too few landmarks were seen again, the map waits");
   LiveSession::Result result;
   LandmarkAnswer& answer = result.result.landmarks.emplace();

@@ -30,8 +30,8 @@ constexpr double kOutlier = 3.0;           // [sigma] from which on a velocity c
 /// A window adds to the mounting its first velocity in G and the gravity in G.
 constexpr Eigen::Index kMounting = kMountingM + kMountingL, kOwn = 6, kUnknowns = kMounting + kOwn;
 
-/// Of one velocity: A x = y + w + its own noise, x = (M, l, v_w, g_w). w is the random walk of the IMU's
-/// noise since the beginning of the window.
+/// A velocity gives three rows, A x = y + w + noise, with x = (M, l, v_w, g_w). The noise is its own; w is
+/// the random walk of the IMU's noise since the beginning of the window.
 struct Rows {
   MatrixXd Ay = MatrixXd::Zero(3, kUnknowns + 1);  ///< A, and y as the last column
   Matrix3d covariance;                             ///< of its own noise

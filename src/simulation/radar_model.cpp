@@ -229,7 +229,7 @@ class Sensor {
     constexpr double kRounding = 1e-3;  // [m] far more than there is
     const double station_reach = options_.max_range + kSceneRadius + kRounding;
     for (const Station& station : scene_) {
-      // Else all reflectors of a long path are looked at for each scan.
+      // The radar sees no reflector of a station that is so far away.
       if ((station.p_W - frame.middle.p_W).head<2>().norm() > station_reach) continue;
       for (const Eigen::Vector3d& p_W : station.reflectors_W) {
         const Eigen::Vector3d d_W = p_W - frame.middle.p_W;

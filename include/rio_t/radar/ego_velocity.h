@@ -66,7 +66,7 @@ struct EgoVelocityOptions {
   double max_sigma = 0.5;                ///< [m/s] largest axis of the estimate, in motion
 };
 
-/// What the scans of a radar have shown of it so far.
+/// What the estimator knows of a radar by its scans so far.
 struct RadarKnowledge {
   PointVariances noise;
   KnownDoppler doppler_step, doppler_span;

@@ -94,7 +94,7 @@ class BarometerChannel {
     double innovation = 0.0;         ///< [m]
     double velocity_variance = 0.0;  ///< [m^2/s^2]
   };
-  /// What the nodes have climbed up to one of them: each step in the solution of its time.
+  /// How far the nodes have climbed until `node`. Each step is between two nodes of one solution.
   struct Climb {
     Time node;
     double height = 0.0;  ///< [m]

@@ -43,7 +43,7 @@ class Bags {
   /// Adds what `query` finds to the view.
   void addTo(rosbag::View* view, const std::function<bool(const rosbag::ConnectionInfo*)>& query,
              const ros::Time& begin = ros::TIME_MIN, const ros::Time& end = ros::TIME_MAX) const;
-  /// Of a topic with several: "A and B", which is none that anybody wants.
+  /// A topic with two types gets "A and B", so that no reader takes it.
   std::map<std::string, std::string> typesByTopic() const;
 
  private:

@@ -84,8 +84,8 @@ class RadarCauses {
            "higher or lower than " + key_ + "radar_max_elevation " + number(o.max_elevation) + " rad.",
            "The axes of the cloud are probably others: set " + key_ + "radar_axes to rfu or flu.");
     filter(PointVerdict::kNoMeasurement, "points_without_measurement",
-           "at range zero, or have a Doppler of " + number(kLargestDoppler) + " m/s or more.",
-           "Check the names of the fields: " + key_ + "radar_field_x and the next ones.");
+           "no measurement: their Doppler is " + number(kLargestDoppler) + " m/s or more.",
+           "Check " + key_ + "radar_field_doppler: is it the Doppler, in m/s?");
     filter(
         PointVerdict::kAmbiguous, "points_ambiguous",
         "ambiguous: the radar reports one echo at several directions, with the same range, Doppler and SNR.",
@@ -183,8 +183,10 @@ class RadarCauses {
       if (emptied[k] == 0) continue;
       others -= std::min(others, emptied[k]);
       const std::string key = keyOf(static_cast<PointVerdict>(k));
-      appendItem(&why, std::to_string(emptied[k]) + " lost their points to " +
-                           (key.empty() ? "a range of zero or to echoes at several directions" : key));
+      appendItem(
+          &why,
+          std::to_string(emptied[k]) + " lost their points to " +
+              (key.empty() ? "Dopplers that are no measurement or to echoes at several directions" : key));
     }
     if (others > 0)
       appendItem(&why, (why.empty() ? "" : "the other " + std::to_string(others) + " have ") +
