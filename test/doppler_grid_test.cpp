@@ -235,10 +235,13 @@ std::vector<RadarDirection> scanOfWalk(const Eigen::Vector3d& v_R, Random& rando
   return points;
 }
 
-/// A walk at up to 2.4 m/s.
-DopplerSpan spanOfWalk() {
+/// A walk at up to 2.4 m/s. The first scan may have errors of the transmission.
+DopplerSpan spanOfWalk(const std::vector<double>& errors = {}) {
   Random random(1);
   DopplerSpan span(0.0);
+  std::vector<RadarDirection> first;
+  for (const double doppler : errors) first.push_back({Eigen::Vector3d::UnitY(), doppler});
+  span.learn(first, std::nullopt, kStep);
   for (int k = 0; k < 20; ++k) {
     const Eigen::Vector3d v_R(0.0, std::min(2.4, 0.5 + 0.2 * k), 0.0);
     span.learn(scanOfWalk(v_R, random), v_R, kStep);
@@ -258,6 +261,11 @@ TEST(DopplerSpan, OneWildDopplerDoesNotEndIt) {
   span.learn(std::vector<RadarDirection>(20, {Eigen::Vector3d::UnitY(), 2.5}),
              Eigen::Vector3d(0.0, -2.5, 0.0), kStep);
   EXPECT_EQ(span.value(), 0.0) << "many show that it was wrong";
+}
+
+TEST(DopplerSpan, WildDopplersBeforeItIsFoundDoNotHideIt) {
+  EXPECT_NEAR(spanOfWalk({60.0}).value(), kSpan, 0.5 * kStep);
+  EXPECT_NEAR(spanOfWalk({60.0, -327.68, 5.0, 7.0}).value(), kSpan, 0.5 * kStep);
 }
 
 TEST(DopplerSpan, ErrorsNowAndThenDoNotAddUp) {

@@ -12,11 +12,19 @@ namespace {
 /// Dopplers seen by more, and be a span off to within less.
 constexpr double kClearly = 1.5;
 /// The number of scans that shows a span. The points of one scan share its velocity, so they are one witness.
-/// It is no chance if ten scans more show the span than do not. As many points show that a span is too small,
-/// but not one now and then: that is an error of the transmission.
-constexpr int kEnough = 10;
+/// It is no chance if ten scans more show the span than do not. As many points reach as far as an end of the
+/// span. As many beyond it show that it is too small, but not one now and then. Fewer are errors of the
+/// transmission.
+constexpr std::size_t kEnough = 10;
 /// [spans] A step may be finer than the noise; it then counts as this.
 constexpr double kFinestStep = 0.05;
+
+/// Keeps the kEnough least values, ascending.
+void keepLeast(double value, std::vector<double>& least) {
+  if (least.size() == kEnough && value >= least.back()) return;
+  least.insert(std::upper_bound(least.begin(), least.end(), value), value);
+  if (least.size() > kEnough) least.pop_back();
+}
 
 }  // namespace
 
@@ -29,18 +37,29 @@ bool DopplerSpan::reachesBothEnds(const std::vector<RadarDirection>& points, dou
          any([high](const RadarDirection& p) { return p.doppler > high; });
 }
 
+/// Takes the points into the range of Dopplers, or drops a span that is too small.
+void DopplerSpan::widen(const std::vector<RadarDirection>& points, double step) {
+  const double margin = clearly(step);
+  int outside = 0;
+  for (const RadarDirection& p : points) {
+    if (found_ && (p.doppler < lowest_ - margin || p.doppler > highest_ + margin)) {
+      ++outside;
+      continue;
+    }
+    keepLeast(p.doppler, least_);
+    keepLeast(-p.doppler, largest_);
+  }
+  outside_ = std::max(0, outside_ + (outside > 0 ? outside : -1));
+  if (outside_ >= static_cast<int>(kEnough)) *this = DopplerSpan(given_);
+  if (least_.size() < kEnough) return;
+  lowest_ = least_.back();
+  highest_ = -largest_.back();
+}
+
 void DopplerSpan::learn(const std::vector<RadarDirection>& points,
                         const std::optional<Eigen::Vector3d>& expected_v_R, double step) {
   if (given_ > 0.0) return;
-  const int outside_before = outside_;
-  for (const RadarDirection& p : points) {
-    if (lowest_ <= p.doppler && p.doppler <= highest_) continue;
-    if (found_ && ++outside_ < kEnough) continue;
-    lowest_ = std::min(lowest_, p.doppler);
-    highest_ = std::max(highest_, p.doppler);
-    outside_ = 0;
-  }
-  if (outside_ == outside_before) outside_ = std::max(0, outside_ - 1);
+  widen(points, step);
   if (lowest_ > highest_) return;
   possible_ = highest_ - lowest_ + step;
   const double margin = clearly(step);
@@ -60,7 +79,7 @@ void DopplerSpan::learn(const std::vector<RadarDirection>& points,
     if (std::abs(std::abs(expected - p.doppler) - possible_) < margin) ++back;
   }
   scans_ = std::max(0, scans_ + (2 * back > beyond ? 1 : -1));
-  found_ = scans_ >= kEnough;
+  found_ = scans_ >= static_cast<int>(kEnough);
 }
 
 }  // namespace rio_t

@@ -19,7 +19,8 @@ inline double unwrapped(double doppler, double expected, double span) {
 /// The span of a radar's Doppler. A Doppler beyond the span comes back on the other side (aliasing).
 ///
 /// If the span is not given, DopplerSpan reads it off the data. A span shows in two ways: no Doppler is
-/// beyond it, and points that must be beyond, by the platform's velocity, are one span off. Not thread-safe.
+/// beyond it, and points that must be beyond, by the platform's velocity, are one span off. A few Dopplers
+/// that are errors of the transmission do not count. Not thread-safe.
 class DopplerSpan {
  public:
   explicit DopplerSpan(double given) : given_(given) {}  ///< [m/s] 0: read it off the data
@@ -42,8 +43,11 @@ class DopplerSpan {
 
  private:
   double clearly(double step) const;  ///< [m/s]
+  void widen(const std::vector<RadarDirection>& points, double step);
 
-  double given_;  // read-only after construction
+  double given_;
+  std::vector<double> least_, largest_;  // the least Dopplers, and the largest negated; both ascending
+  /// The range of the Dopplers, but for a few at either end.
   double lowest_ = std::numeric_limits<double>::infinity();
   double highest_ = -std::numeric_limits<double>::infinity();
   double possible_ = 0.0;
