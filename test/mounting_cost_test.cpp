@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -104,6 +105,26 @@ TEST(MountingCost, IsThatOfAllVelocitiesOfAWindowAtOnce) {
       x << columnsOf(M), l_I;
       EXPECT_NEAR(x.dot(cost.H * x) - 2.0 * cost.b.dot(x) + cost.c, whole, 1e-6 * whole) << apart;
     }
+  }
+}
+
+/// A weight that a round gave must not make the velocity fit better in the next one.
+TEST(MountingCost, AWrongVelocityCountsLessInEachRound) {
+  Recorded recorded = record(15.0);
+  RadarVelocity& wrong = recorded.velocities[recorded.velocities.size() / 2];
+  wrong.v_R += Vector3d(3.0, 0.0, 0.0);
+  MountingProblem problem{recorded.track, {}, windowsOf(recorded.velocities, recorded.track, 0.3)};
+  for (int round = 0; round < 4; ++round) {
+    reweigh(0.0, kR_IR, kLeverArm, &problem);
+    double weight_of_wrong = 1.0, least_of_others = 1.0;
+    for (const VelocityWindow& window : problem.windows) {
+      for (const WeightedVelocity& each : window) {
+        double& weight = each.velocity == &wrong ? weight_of_wrong : least_of_others;
+        weight = std::min(weight, each.weight);
+      }
+    }
+    EXPECT_LT(weight_of_wrong, 0.05) << round;
+    EXPECT_GT(least_of_others, 0.4) << round;
   }
 }
 

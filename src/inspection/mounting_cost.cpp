@@ -177,7 +177,8 @@ double reweigh(double offset, const Matrix3d& M, const Vector3d& l_I, MountingPr
       const Rows& rows = all[i];
       walked += rows.walked;
       const Vector3d e = rows.Ay.leftCols(kUnknowns) * x - rows.Ay.col(kUnknowns);
-      const Matrix3d covariance = rows.covariance + walked * Matrix3d::Identity();
+      // Its own covariance, whatever weight it has had.
+      const Matrix3d covariance = window[i].weight * rows.covariance + walked * Matrix3d::Identity();
       const double square = e.dot(covariance.ldlt().solve(e)) / 3.0;
       squares.push_back(square);
       window[i].weight = 1.0 / (1.0 + square / (kOutlier * kOutlier));
