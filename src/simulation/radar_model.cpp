@@ -7,6 +7,7 @@
 #include <string>
 
 #include "rio_t/core/angle.h"
+#include "rio_t/core/format.h"
 #include "rio_t/radar/direction.h"
 #include "rio_t/simulation/random.h"
 #include "rio_t/simulation/sample_count.h"
@@ -42,9 +43,12 @@ void check(const RadarModelOptions& o) {
           "mean number of points (points) must not be above its limit (points-max)");
   require(o.points_min >= 0 && o.points_min <= o.points_max,
           "fewest points (points-min) must be from 0 to the limit (points-max)");
-  require(o.min_range >= 0.0 && o.max_range > o.min_range, "maximum range must be above the minimum");
-  require(o.fov_azimuth > 0.0 && o.fov_azimuth <= 90.0, "azimuth limit must be in (0, 90] degrees");
-  require(o.fov_elevation > 0.0 && o.fov_elevation <= 90.0, "elevation limit must be in (0, 90] degrees");
+  require(o.min_range >= 0.0 && o.max_range > o.min_range,
+          "maximum range (max-range) must be above the minimum (min-range)");
+  require(o.fov_azimuth > 0.0 && o.fov_azimuth <= 90.0,
+          "azimuth limit (fov-azimuth-deg) must be in (0, 90] degrees");
+  require(o.fov_elevation > 0.0 && o.fov_elevation <= 90.0,
+          "elevation limit (fov-elevation-deg) must be in (0, 90] degrees");
   require(
       o.range_noise >= 0.0 && o.azimuth_noise >= 0.0 && o.elevation_noise >= 0.0 && o.doppler_noise >= 0.0,
       "noise cannot be negative");
@@ -368,6 +372,11 @@ std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarSetup&
     SimulatedScan scan;
     scan.stamp = start + stamp;
     scan.time_offset = setup.time_offset.at(stamp);
+    if (!(std::abs(scan.time_offset) <= motion.duration()))
+      throw std::invalid_argument(
+          formatted("--time-offset, --time-offset-drift, --time-offset-step: together %g s at %g s after the "
+                    "start; expected at most the duration in size, %g s",
+                    scan.time_offset, stamp, motion.duration()));
     scan.measured = scan.stamp - scan.time_offset;
     const double measured = scan.measured - start;
     if (measured < 0.0 || measured > motion.duration()) continue;
@@ -388,6 +397,11 @@ std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarSetup&
     }
     scans.push_back(std::move(scan));
   }
+  if (scans.empty())
+    throw std::invalid_argument(
+        formatted("--first-trigger: %g s; expected a scan that is measured within the duration, %g s, after "
+                  "its --time-offset",
+                  options.first_trigger, motion.duration()));
   return scans;
 }
 

@@ -89,12 +89,8 @@ void printRadar(const std::string& title, const RadarSetup& setup, const std::ve
   std::cout << title << ": " << delivered << " scans of " << scans.size() << " triggers, "
             << std::setprecision(2)
             << (delivered > 0 ? static_cast<double>(points) / static_cast<double>(delivered) : 0.0)
-            << " points each; true time offset: " << std::setprecision(6);
-  if (scans.empty()) {
-    std::cout << "no scan\n";
-    return;
-  }
-  std::cout << scans.front().time_offset << " s";
+            << " points each; true time offset: " << std::setprecision(6) << scans.front().time_offset
+            << " s";
   if (scans.back().time_offset != scans.front().time_offset) {
     std::cout << " at the start, " << scans.back().time_offset << " s at the end";
   }
@@ -149,12 +145,13 @@ void run(Request request) {
   }
   constexpr double kLastStamp = 4294967295.0;  // [s] ROS counts them in 32 bits
   if (request.start_time > kLastStamp)
-    throw UsageError("--start-time " + std::to_string(request.start_time) +
+    throw UsageError("--start-time " + shortText(request.start_time, 12) +
                      ": expected at most 4294967295, the last stamp of ROS");
   // A message of time 0 no bag takes.
   const double record_start = request.start_time + request.bag.record_offset;
-  if (!(record_start > 0.0 && record_start <= kLastStamp))
-    throw UsageError("--record-offset " + shortText(request.bag.record_offset, 10) +
+  if (!(record_start >= 1e-9 && record_start <= kLastStamp))
+    throw UsageError("--record-offset " + shortText(request.bag.record_offset, 10) + " and --start-time " +
+                     shortText(request.start_time, 10) +
                      ": expected a record that starts between 0 and 4294967295 s, got " +
                      shortText(record_start, 10) + " s");
   request.simulation.start = Time::fromSeconds(request.start_time);
