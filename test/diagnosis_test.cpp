@@ -222,6 +222,21 @@ TEST(Diagnosis, FilteredPointsNameTheFilterAndTheUnit) {
   EXPECT_EQ(diagnose(evidence, config).verdict, RunVerdict::kBad);
 }
 
+/// Such scans say "at rest", which the IMU contradicts little while the step of the Doppler is not known.
+TEST(Diagnosis, ADopplerFieldOfZerosIsNamedOnceThePlatformMoves) {
+  RunEvidence evidence = goodRun();
+  RadarSummary& radar = evidence.radars.front();
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood) << "it stands still";
+  radar.scans_fast = 100;
+  expectSays(first(evidence),
+             {"doppler_zero: All 10000 points have a Doppler of zero, and the platform moved "
+              "at more than 0.5 m/s for 100 scans.",
+              "Check radar_field_doppler"});
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
+  radar.points_of_doppler = 1;
+  EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
+}
+
 TEST(Diagnosis, EachFilterHasItsKey) {
   const std::pair<PointVerdict, std::string> filters[] = {
       {PointVerdict::kTooNear, "radar_min_range"},

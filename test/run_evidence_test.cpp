@@ -102,5 +102,22 @@ TEST(EvidenceCollector, ScansWithoutPointsAreCountedByTheirReason) {
   EXPECT_EQ(radar.points, 10U);
 }
 
+TEST(EvidenceCollector, DopplersAndFastMotionAreCounted) {
+  const Config config;
+  EvidenceCollector collector(config);
+  ScanResult result;
+  result.used = result.updated = true;
+  RadarPoint still, moving;
+  moving.doppler = -0.125;
+  result.scan.points = {still, moving, still};
+  result.state.v_W = {0.3, 0.0, -0.3};  // a radar with a large step may not show it
+  collector.add(result);
+  result.state.v_W = {0.4, 0.0, -0.4};
+  collector.add(result);
+  const RunEvidence evidence = collector.evidence(RadarInertialOdometry(config.odometry), std::nullopt);
+  EXPECT_EQ(evidence.radars.front().points_of_doppler, 2U);
+  EXPECT_EQ(evidence.radars.front().scans_fast, 1U);
+}
+
 }  // namespace
 }  // namespace rio_t

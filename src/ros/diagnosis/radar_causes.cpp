@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "rio_t/core/angle.h"
+#include "rio_t/radar/doppler_grid.h"
 
 namespace rio_t {
 namespace {
@@ -19,6 +20,7 @@ class RadarCauses {
   void add() {
     if (radar_.scans_total < kEnoughScans) return;
     addNotFinite();
+    addZeroDoppler();
     addPointFilter();
     addStamps();
     addVelocities();
@@ -42,6 +44,18 @@ class RadarCauses {
           outOf(radar_.points_not_finite, pointsReceived(radar_), "points") + of_ +
               " have a position, a Doppler or a power that is not finite.",
           "Look for what the driver of the radar writes there, and check the " + key_ + "radar_field_ keys.");
+  }
+
+  /// Such scans say that the platform stands still, within a step of the Doppler that they do not show. So
+  /// the IMU contradicts them little.
+  void addZeroDoppler() {
+    if (radar_.points_of_doppler > 0 || radar_.scans_fast < kEnoughScans) return;
+    cause("doppler_zero", 1.0,
+          "All " + std::to_string(radar_.points) + " points" + of_ +
+              " have a Doppler of zero, and the platform moved at more than " +
+              number(DopplerGrid::kLargestUsualStep) + " m/s for " + std::to_string(radar_.scans_fast) +
+              " scans.",
+          "Check " + key_ + "radar_field_doppler, and whether the driver of the radar fills this field.");
   }
 
   /// A reason why scans were rejected, or gave no velocity before the start.

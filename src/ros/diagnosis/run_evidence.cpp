@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "rio_t/odometry/body_odometry.h"
+#include "rio_t/radar/doppler_grid.h"
 
 namespace rio_t {
 
@@ -39,6 +40,7 @@ void EvidenceCollector::add(const ScanResult& result) {
   for (const RadarPoint& point : result.scan.points) {
     ++radar.points;
     radar.snr_sum_db += point.snr_db;
+    if (point.doppler != 0.0) ++radar.points_of_doppler;
     ++of_scan[static_cast<std::size_t>(filter.judge(point))];
   }
   addPoints(of_scan, &radar);
@@ -63,6 +65,7 @@ void EvidenceCollector::add(const ScanResult& result) {
     ++radar.scans_rejected[result.rejected_because];
   }
   if (!result.updated) return;
+  if (result.state.v_W.norm() > DopplerGrid::kLargestUsualStep) ++radar.scans_fast;
   radar.turn = turnBetween(result.configured_T_IR, result.T_IR);
   radar.errors = result.errors;
   evidence_.heading_sigma = sigmasOf(bodyOdometry(result.state, 0.0).pose_covariance)[5];

@@ -60,7 +60,10 @@ struct RadarSummary : RadarEstimate {
   /// Scans that had enough points for a velocity, and too few after the filter: by the verdict that took
   /// most.
   std::array<std::uint64_t, kPointVerdicts> scans_emptied = {};
-  double snr_sum_db = 0.0;      ///< over `points`
+  double snr_sum_db = 0.0;              ///< over `points`
+  std::uint64_t points_of_doppler = 0;  ///< of `points`, those whose Doppler is not zero
+  /// Scans after which the estimate moved faster than the Doppler of a usual radar rounds to zero.
+  std::uint64_t scans_fast = 0;
   double silent_seconds = 0.0;  ///< as RunEvidence::silent_seconds, but without the scans of other radars
   RadarKnowledge knowledge;     ///< at the end; the file has standard deviations of the noise
   std::array<std::uint64_t, 3> points_per_scan = {};  ///< quantiles of 10, 50 and 90 % of the scans
