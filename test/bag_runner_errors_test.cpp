@@ -195,6 +195,7 @@ TEST_F(BagRunnerErrors, NoDataInThePartPlayedIsNamed) {
     bag.write("/other", ros::Time(1200.0), late);
   }
   expectError(run({"--set", "bag_start=50"}), {"no messages on topic /sensor_platform/imu"});
+  expectError(run({"--set", "bag_start=1e300"}), {"bag_start (1e+300 s) is after its end ("});
 }
 
 TEST_F(BagRunnerErrors, NeverInitialisedSaysWhatItWaitedFor) {
@@ -266,6 +267,8 @@ TEST_F(BagRunnerErrors, AnOutputFolderThatCannotBeIsNamed) {
   expectError(run(), {"output folder", folder_ + "/file"});
   out_ = folder_ + "/file/below";
   expectError(run(), {"output folder", folder_ + "/file/below"});
+  out_ = folder_ + "/" + std::string(300, 'x');
+  expectError(run(), {"output folder " + out_ + ": cannot be made (File name too long)"});
 }
 
 TEST_F(BagRunnerErrors, AFullDiskIsNotBlamedOnTheBag) {

@@ -78,6 +78,12 @@ TEST(Offset, ConvergenceCanBeLeftOut) {
   EXPECT_EQ(offsetError(samples, 0.0, 1.5).rmse, 0.0);
   EXPECT_THROW(offsetError(samples, 0.0, 3.0), std::invalid_argument);
   EXPECT_THROW(offsetError({}, 0.0), std::invalid_argument);
+  try {
+    offsetError(samples, 0.0, 1e300);
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "no time offset remains after the first 1e+300 s of 3 samples");
+  }
 }
 
 /// The sigma of an offset that is not estimated is zero.

@@ -119,6 +119,12 @@ TEST(Tum, MissingFileIsNamed) {
   } catch (const std::runtime_error& error) {
     EXPECT_TRUE(contains(error.what(), "no/such/file.txt")) << error.what();
   }
+  try {
+    readTum("/");
+    FAIL() << "no exception";
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "/: expected a trajectory file (TUM format), this is a folder");
+  }
   EXPECT_THROW(writeTum("no/such/folder/file.txt", helix()), std::runtime_error);
 }
 

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "rio_t/core/format.h"
 #include "rio_t/evaluation/trajectory.h"
 
 namespace rio_t {
@@ -96,8 +97,8 @@ OffsetError offsetError(const std::vector<OffsetSample>& samples, double true_of
     result.mean_normalised_square += normalised * normalised;
   }
   if (result.samples == 0) {
-    throw std::invalid_argument("no time offset remains after the first " + std::to_string(skip) + " s of " +
-                                std::to_string(samples.size()) + " samples");
+    throw std::invalid_argument(
+        formatted("no time offset remains after the first %g s of %zu samples", skip, samples.size()));
   }
   const double n = static_cast<double>(result.samples);
   result.mean /= n;

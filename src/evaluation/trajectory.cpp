@@ -5,6 +5,7 @@
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <sstream>
@@ -124,6 +125,8 @@ Trajectory readTum(std::istream& in, const std::string& name) {
 }
 
 Trajectory readTum(const std::string& path) {
+  if (std::filesystem::is_directory(path))
+    throw std::runtime_error(path + ": expected a trajectory file (TUM format), this is a folder");
   std::ifstream file(path);
   if (!file) throw std::runtime_error(path + ": cannot be opened; expected a trajectory file (TUM format)");
   return readTum(file, path);

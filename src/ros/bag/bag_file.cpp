@@ -129,8 +129,8 @@ std::pair<ros::Time, ros::Time> playedSpan(const Bags& bags, const Config& confi
   bags.addTo(&all, everyTopic);
   const double length = (all.getEndTime() - all.getBeginTime()).toSec();
   if (config.bag_start > length) {
-    throw bagError(bags.name(), "bag_start (" + std::to_string(config.bag_start) + " s) is after its end (" +
-                                    std::to_string(length) + " s)");
+    throw bagError(bags.name(), "bag_start (" + shortText(config.bag_start, 6) + " s) is after its end (" +
+                                    shortText(length, 6) + " s)");
   }
   const ros::Time begin = all.getBeginTime() + ros::Duration(config.bag_start);
   const bool to_end = config.bag_duration <= 0.0 || config.bag_start + config.bag_duration >= length;

@@ -149,7 +149,8 @@ FolderLock::~FolderLock() {
 RunOutput::RunOutput(const std::string& folder, const RunFiles& files) : folder_(folder), files_(files) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  if (!std::filesystem::is_directory(folder)) {
+  std::error_code unknown;  // for a name that is too long
+  if (!std::filesystem::is_directory(folder, unknown)) {
     throw OutputError("output folder " + folder + ": cannot be made (" +
                       (error ? error.message() : "a file of that name exists") + ")");
   }
