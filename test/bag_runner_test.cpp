@@ -43,6 +43,28 @@ TEST_F(BagRunner, AtRestItStaysAndWritesEveryFile) {
   EXPECT_NEAR(static_cast<double>(std::count(navigation.begin(), navigation.end(), '\n')), 51.0, 2.0);
 }
 
+TEST_F(BagRunner, TheSmallestAndTheLargestSigmasGiveNumbers) {
+  writeBag({4.0});
+  int runs = 0;
+  for (const ParameterDescription& about : parameterDescriptions()) {
+    if (about.type != "number" || about.key.find("sigma") == std::string::npos) continue;
+    for (const double end : {about.min, about.max}) {
+      BagRun bag_run{{bag_}, "", Config{}, nullptr};
+      try {
+        bag_run.config = withParameters(Config{}, {{about.key, {end}, "test"}});
+      } catch (const ConfigError&) {
+        continue;  // the end does not belong to the range, or is no number
+      }
+      SCOPED_TRACE(about.key + " " + std::to_string(end));
+      const RunSummary summary = runBag(bag_run);
+      ++runs;
+      EXPECT_TRUE(std::isfinite(summary.path_length_m));
+      EXPECT_LT(summary.path_length_m, 0.05);
+    }
+  }
+  EXPECT_GT(runs, 30);
+}
+
 TEST_F(BagRunner, EveryScanIsAccountedFor) {
   writeBag({});
   BagRun bag_run{{bag_}, out_, Config{}, nullptr};

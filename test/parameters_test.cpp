@@ -312,6 +312,51 @@ TEST(Parameters, ContradictionsAreRefused) {
   EXPECT_NO_THROW(fromAssignments({"radar_topic=/a", "trigger_topic=/a"})) << "no trigger is read";
 }
 
+/// The weights of the graph, one divided by a sigma, would overflow or leave no digits to the others.
+TEST(Parameters, SigmasThatNoSystemOfDoublesHoldsAreRefused) {
+  for (const char* key : {"prior_sigma_yaw",
+                          "prior_sigma_position",
+                          "prior_sigma_velocity",
+                          "prior_sigma_gyro_bias",
+                          "prior_sigma_accel_bias",
+                          "init_motion_sigma_gyro_bias",
+                          "init_motion_sigma_accel_bias",
+                          "rest_velocity_sigma",
+                          "zero_velocity_sigma",
+                          "time_offset_sigma",
+                          "time_offset_noise",
+                          "radar_range_sigma",
+                          "vehicle_frame_rotation_sigma",
+                          "vehicle_frame_rotation_noise",
+                          "vehicle_sideways_sigma",
+                          "vehicle_vertical_sigma",
+                          "barometer_drift",
+                          "extrinsics_rotation_sigma",
+                          "extrinsics_rotation_noise",
+                          "extrinsics_translation_noise"}) {
+    for (const char* value : {"5e-324", "1e-10", "1e4", "1e154"}) {
+      EXPECT_TRUE(contains(faultOf(std::string(key) + "=" + value), "of at least 1.0e-09 and at most "))
+          << key << " " << value;
+    }
+  }
+  for (const char* key : {"radar_doppler_sigma", "innovation_model_error"})
+    EXPECT_TRUE(contains(faultOf(std::string(key) + "=1e4"), "of at least 0 and at most 1000")) << key;
+  EXPECT_TRUE(contains(faultOf("ego_velocity_added_sigma=[0, 0, 1e154]"), "at most 1000"));
+}
+
+TEST(Parameters, ZeroCountsWhereItHasAMeaningOfItsOwn) {
+  for (const char* assignment :
+       {"extrinsics_translation_sigma=1e-12", "vehicle_start_slope_sigma=1e-12", "radar_doppler_span=1e-12"})
+    EXPECT_TRUE(contains(faultOf(assignment), "of 0, or of at least ")) << assignment;
+  EXPECT_NO_THROW(fromAssignments(
+      {"extrinsics_translation_sigma=0", "vehicle_start_slope_sigma=0", "radar_doppler_span=0.0"}));
+}
+
+TEST(Parameters, WholeNumbersSayWhereTheyEnd) {
+  EXPECT_TRUE(contains(faultOf("max_queued_scans=3000000000"), "of at least 1 and at most 2147483647"));
+  EXPECT_NO_THROW(fromAssignments({"ransac_seed=2147483647"}));
+}
+
 /// The estimate would explode.
 TEST(Parameters, NoisesThatNoSensorHasAreRefused) {
   for (const char* key :

@@ -9,10 +9,6 @@
 namespace rio_t {
 namespace {
 
-/// [m/s] A smaller step counts as none. Its sigma, step / sqrt(12), adds 1.4 % to a noise of 0.035 m/s.
-constexpr double kLeastStep = 0.02;
-/// [m/s] A larger step counts as none: the radar would measure a Doppler in 1 ms (at 77 GHz).
-constexpr double kLargestStep = 2.0;
 /// [steps] The driver may round or convert a value; it changes the value by up to this much. A value of a
 /// radar without steps is so near to a multiple once in 500 times.
 constexpr double kRounding = 1e-3;
@@ -72,7 +68,7 @@ std::optional<Reading> explain(const Batch& ascending, const Reading& start) {
 template <typename Batch>
 bool isNeeded(const Batch& values, const Reading& reading) {
   const std::size_t misfits = countMisfits(values, reading);
-  for (double times = 2.0; times * reading.step < kLargestStep; times += 1.0) {
+  for (double times = 2.0; times * reading.step < DopplerGrid::kLargestStep; times += 1.0) {
     const Reading larger{times * reading.step, std::max(1.0, reading.known_at / times)};
     if (countMisfits(values, larger) <= misfits + kMaxMisfits) return false;
   }
@@ -82,7 +78,7 @@ bool isNeeded(const Batch& values, const Reading& reading) {
 /// The largest step above `least` [m/s] that explains the values and that `base` is a multiple of.
 template <typename Batch>
 std::optional<Reading> largestStep(const Batch& ascending, const Reading& base, double least) {
-  double parts = std::max(1.0, std::ceil(base.step / kLargestStep));
+  double parts = std::max(1.0, std::ceil(base.step / DopplerGrid::kLargestStep));
   for (; base.step / parts > least; parts += 1.0) {
     const auto found = explain(ascending, {base.step / parts, base.known_at * parts});
     if (found && isNeeded(ascending, *found)) return found;

@@ -45,6 +45,10 @@ class DopplerGrid {
   /// [m/s] The step while all values are zero: the largest of the usual steps, 0.03 to 0.5. A smaller one
   /// would take a slow motion for rest, and be sure of it.
   static constexpr double kLargestUsualStep = 0.5;
+  /// [m/s] A smaller step counts as none. Its sigma, step / sqrt(12), adds 1.4 % to a noise of 0.035 m/s.
+  static constexpr double kLeastStep = 0.02;
+  /// [m/s] A larger step counts as none: the radar would measure a Doppler in 1 ms (at 77 GHz).
+  static constexpr double kLargestStep = 2.0;
 
  private:
   static constexpr std::size_t kBatch = 16;

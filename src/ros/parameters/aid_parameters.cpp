@@ -23,20 +23,20 @@ void listAids(ParameterList& list, Config& c) {
       "vehicle_frame_translation", "m", between(-100, 100), vehicle.T_IV.l_I,
       "This point of the vehicle, in the IMU frame, moves only forward. It is the centre of the axle that "
       "does not steer.");
-  list.number("vehicle_frame_rotation_sigma", "rad", above(0, M_PI), vehicle.rotation_sigma,
+  list.number("vehicle_frame_rotation_sigma", "rad", sigma(M_PI), vehicle.rotation_sigma,
               "The rotation that you give has this standard deviation about each axis.");
   list.number(
-      "vehicle_start_slope_sigma", "rad", atLeast(0), vehicle.start_slope_sigma,
+      "vehicle_start_slope_sigma", "rad", zeroOr(kLeastSigma, M_PI), vehicle.start_slope_sigma,
       "The ground slopes by this standard deviation where the vehicle starts at rest. The estimator levels "
       "the vehicle frame with it. The default is a floor in a building. Raise it outdoors. 0 means that the "
       "slope is unknown.");
-  list.number("vehicle_frame_rotation_noise", "rad/sqrt(s)", above(0), vehicle.rotation_noise,
+  list.number("vehicle_frame_rotation_noise", "rad/sqrt(s)", sigma(), vehicle.rotation_noise,
               "The rotation may wander by this random walk about each axis, for example if a load or a "
               "bracket moves.");
-  list.number("vehicle_sideways_sigma", "m/s", above(0), vehicle.sideways_sigma,
+  list.number("vehicle_sideways_sigma", "m/s", sigma(), vehicle.sideways_sigma,
               "This is the standard deviation of the sideways velocity of the point. Raise it if the wheels "
               "slip.");
-  list.number("vehicle_vertical_sigma", "m/s", above(0), vehicle.vertical_sigma,
+  list.number("vehicle_vertical_sigma", "m/s", sigma(), vehicle.vertical_sigma,
               "This is the standard deviation of the upward velocity of the point. Raise it for bumps and "
               "soft springs.");
   list.number("vehicle_gate", "", above(0), vehicle.gate,
@@ -51,7 +51,7 @@ void listAids(ParameterList& list, Config& c) {
       "clock. If it is empty, there is no barometer.");
   list.number("barometer_noise_density", "m/sqrt(Hz)", above(0, 100), barometer.noise_density,
               "This is the white noise of the height. The estimator takes more if the samples show more.");
-  list.number("barometer_drift", "m/sqrt(s)", above(0), barometer.drift,
+  list.number("barometer_drift", "m/sqrt(s)", sigma(), barometer.drift,
               "The bias of the height wanders by this random walk, since the weather and the temperature of "
               "the sensor change. Raise it for flights of an hour.");
   list.number("barometer_temperature", "deg C", between(-60, 60), barometer.temperature,

@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include "parameter_sections.h"
 
 namespace rio_t {
@@ -39,7 +41,7 @@ void listGate(ParameterList& list, InnovationGateOptions& gate) {
       "A scan is rejected as an outlier if its velocity is farther from the prediction than this many "
       "standard deviations. 3 to 6 are typical. 0 takes every scan.");
   list.number(
-      "innovation_model_error", "m/s", atLeast(0), gate.model_error,
+      "innovation_model_error", "m/s", between(0, kLargestSigma), gate.model_error,
       "The gate adds this to the standard deviation of the prediction, along each axis. It stands for small "
       "errors of the mounting and of the IMU's scale. Raise it for a platform that is faster than 10 m/s.");
   list.number("innovation_gate_timeout", "s", above(0), gate.timeout,
@@ -49,23 +51,23 @@ void listGate(ParameterList& list, InnovationGateOptions& gate) {
 
 void listPriors(ParameterList& list, SmootherOptions& smoother) {
   list.number(
-      "prior_sigma_yaw", "rad", above(0), smoother.prior_sigma_yaw,
+      "prior_sigma_yaw", "rad", sigma(M_PI), smoother.prior_sigma_yaw,
       "The yaw of the first state has this standard deviation. It is small, since the first yaw defines the "
       "world frame.");
   list.number(
-      "prior_sigma_position", "m", above(0), smoother.prior_sigma_position,
+      "prior_sigma_position", "m", sigma(), smoother.prior_sigma_position,
       "The position of the first state has this standard deviation. It is small, since the first position "
       "defines the world frame.");
   list.number(
-      "prior_sigma_velocity", "m/s", above(0), smoother.prior_sigma_velocity,
+      "prior_sigma_velocity", "m/s", sigma(), smoother.prior_sigma_velocity,
       "The velocity of the first state has this standard deviation after a start at rest. Raise it if the "
       "platform sways while it rests, as a boat does.");
   list.number(
-      "prior_sigma_gyro_bias", "rad/s", above(0), smoother.prior_sigma_gyro_bias,
+      "prior_sigma_gyro_bias", "rad/s", sigma(), smoother.prior_sigma_gyro_bias,
       "The gyro bias of the first state has this standard deviation, in addition to the noise of the mean at "
       "rest. Take the in-run bias stability of the data sheet: 7e-5 is 14 deg/h.");
   list.number(
-      "prior_sigma_accel_bias", "m/s^2", above(0), smoother.prior_sigma_accel_bias,
+      "prior_sigma_accel_bias", "m/s^2", sigma(), smoother.prior_sigma_accel_bias,
       "The accelerometer bias of the first state has this standard deviation. Divided by gravity, it is also "
       "the standard deviation of roll and pitch. 0.05 to 0.3 are typical of a MEMS.");
 }
@@ -134,11 +136,11 @@ void listStart(ParameterList& list, Config& c) {
       "init_motion_max_outlier_fraction", "", between(0, 1), motion.max_outlier_fraction,
       "A start in motion is refused if more than this share of the radar velocities does not fit the IMU.");
   list.number(
-      "init_motion_sigma_gyro_bias", "rad/s", above(0), motion.sigma_gyro_bias,
+      "init_motion_sigma_gyro_bias", "rad/s", sigma(), motion.sigma_gyro_bias,
       "A start in motion takes the gyro bias as zero with this standard deviation on each axis. Raise it for "
       "a cheap gyro with a larger bias.");
   list.number(
-      "init_motion_sigma_accel_bias", "m/s^2", above(0), motion.sigma_accel_bias,
+      "init_motion_sigma_accel_bias", "m/s^2", sigma(), motion.sigma_accel_bias,
       "A start in motion takes the accelerometer bias as zero with this standard deviation on each axis.");
 
   RestOptions& rest = c.odometry.rest;
@@ -162,7 +164,7 @@ void listStart(ParameterList& list, Config& c) {
   list.number("rest_max_speed", "m/s", above(0), rest.max_speed,
               "If the estimated speed is larger than this, a still IMU shows a smooth ride, not rest.");
   list.number(
-      "rest_velocity_sigma", "m/s", above(0), rest.velocity_sigma,
+      "rest_velocity_sigma", "m/s", sigma(), rest.velocity_sigma,
       "The zero velocity at rest has this standard deviation on each axis, plus what the platform may have "
       "gained within rest_window, by the acceleration that the IMU shows. Raise it for a hand that holds "
       "still, or a platform that may creep by some cm/s.");
@@ -190,12 +192,12 @@ void listTimeOffset(ParameterList& list, Config& c) {
       "The estimate of the offset starts here. A positive offset means that the stamps are late. Set "
       "it to what an earlier run or `calibrate` found; zero works for offsets of up to 0.2 s.");
   list.number(
-      "time_offset_sigma", "s", above(0), c.odometry.radar.time_offset_sigma,
+      "time_offset_sigma", "s", sigma(), c.odometry.radar.time_offset_sigma,
       "The estimate of the offset starts with this standard deviation. Lower it after a calibration. Raise "
       "it if you raise max_time_offset.");
   list.ofRadar(false);
   list.number(
-      "time_offset_noise", "s/sqrt(s)", above(0), smoother.time_offset_noise,
+      "time_offset_noise", "s/sqrt(s)", sigma(), smoother.time_offset_noise,
       "The offset may wander by this random walk. The estimator raises the random walk if the scans keep "
       "asking for a change, as they do if clocks drift.");
   list.number(
@@ -252,7 +254,7 @@ void listHealthAndLandmarks(ParameterList& list, Config& c) {
   list.integer("landmarks_max", between(1, 100), landmarks.max_landmarks,
                "The window holds at most this many landmarks at once. The cost grows faster than their "
                "number.");
-  list.number("radar_range_sigma", "m", above(0), landmarks.range_sigma,
+  list.number("radar_range_sigma", "m", sigma(), landmarks.range_sigma,
               "The range of a point has this noise. Only landmarks use it. If the value is too small, the "
               "map contradicts itself, and the estimator drops the map (landmarks_dropped).");
 }

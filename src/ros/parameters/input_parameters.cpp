@@ -224,20 +224,20 @@ void listExtrinsics(ParameterList& list, Config& c) {
       "case. With platform: ground_vehicle, none estimates the rotation, too, but takes it to be right to a "
       "degree (or to extrinsics_rotation_sigma, if that is smaller).");
   list.number(
-      "extrinsics_rotation_sigma", "rad", above(0, M_PI), c.extrinsics_rotation_sigma,
+      "extrinsics_rotation_sigma", "rad", sigma(M_PI), c.extrinsics_rotation_sigma,
       "The estimate of the rotation starts with this standard deviation about each axis. 0.17 rad (10 "
       "degrees) suits a mounting by eye, 0.02 rad a mounting from a drawing.");
   list.ofRadar(true);
   list.number(
-      "extrinsics_translation_sigma", "m", between(0, 100), c.lever_arm_sigma,
+      "extrinsics_translation_sigma", "m", zeroOr(kLeastSigma, 100), c.lever_arm_sigma,
       "The estimate of the position starts with this standard deviation along each axis. 0 means 0.05 "
       "m if extrinsics_translation is given, and 0.5 m if it is not.");
   list.ofRadar(false);
   list.number(
-      "extrinsics_rotation_noise", "rad/sqrt(s)", above(0), smoother.extrinsics_rotation_noise,
+      "extrinsics_rotation_noise", "rad/sqrt(s)", sigma(), smoother.extrinsics_rotation_noise,
       "The rotation may wander by this random walk about each axis. Raise it for a mounting that bends or "
       "slips.");
-  list.number("extrinsics_translation_noise", "m/sqrt(s)", above(0), smoother.extrinsics_translation_noise,
+  list.number("extrinsics_translation_noise", "m/sqrt(s)", sigma(), smoother.extrinsics_translation_noise,
               "The position may wander by this random walk along each axis.");
 }
 

@@ -67,6 +67,7 @@ std::string numberText(double value) {
 }
 
 bool Range::contains(double x) const {
+  if (or_zero && x == 0.0) return true;
   return (min_open ? x > min : x >= min) && (max_open ? x < max : x <= max) && std::isfinite(x);
 }
 
@@ -76,7 +77,7 @@ std::string Range::text() const {
   if (std::isfinite(max)) {
     text += (text.empty() ? "" : " and") + std::string(max_open ? " below " : " at most ") + boundText(max);
   }
-  return text;
+  return (or_zero ? " of 0, or" : "") + text;
 }
 
 const Parameter* ParameterList::find(const std::string& key) const {
@@ -87,8 +88,9 @@ const Parameter* ParameterList::find(const std::string& key) const {
 
 void ParameterList::number(const std::string& key, const std::string& unit, Range range, double& member,
                            const std::string& text) {
-  bind({key, "number", unit, "a finite number" + range.text(), text, range.min, range.max}, member,
-       [range](const ParameterValue& value) {
+  bind({key, "number", unit, "a finite number" + range.text(), text, range.or_zero ? 0.0 : range.min,
+        range.max},
+       member, [range](const ParameterValue& value) {
          const std::optional<double> x = asNumber(value);
          return x && range.contains(*x) ? x : std::nullopt;
        });

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -28,6 +29,7 @@ struct Range {
   double max = std::numeric_limits<double>::infinity();
   bool min_open = false;
   bool max_open = false;
+  bool or_zero = false;  ///< zero is in it, too
 
   bool contains(double x) const;  ///< false for NaN and the infinities
   std::string text() const;       ///< " above 0 and at most 1", empty for all numbers
@@ -117,13 +119,13 @@ std::optional<double> asNumber(const ParameterValue& value);
 
 template <typename Integer>
 void ParameterList::integer(const std::string& key, Range range, Integer& member, const std::string& text) {
+  range.max = std::min<double>(range.max, std::numeric_limits<int>::max());  // the member may have 32 bits
   bind(
       {key, "integer", "", "a whole number" + range.text(), text, range.min, range.max}, member,
       [range](const ParameterValue& value) -> std::optional<Integer> {
         // YAML and the parameter server may hold 2000.0 for 2000.
         const std::optional<double> x = asNumber(value);
         if (!x || !range.contains(*x) || std::trunc(*x) != *x) return std::nullopt;
-        if (std::abs(*x) > std::numeric_limits<int>::max()) return std::nullopt;  // it may have 32 bits
         return static_cast<Integer>(*x);
       },
       [](Integer value) { return ParameterValue{static_cast<std::int64_t>(value)}; });

@@ -12,6 +12,14 @@ inline Range above(double min, double max) { return {min, max, true, false}; }
 inline Range between(double min, double max) { return {min, max, false, false}; }
 inline Range inside(double min, double max) { return {min, max, true, true}; }
 inline Range below(double min, double max) { return {min, max, false, true}; }  ///< min itself counts
+inline Range zeroOr(double min, double max) { return {min, max, false, false, true}; }
+
+/// The ends of a standard deviation, in SI units. The rows of a system of doubles are divided by them. A
+/// double has 15 digits: that these ends are 12 digits apart leaves three to the numbers themselves. Squares
+/// stay finite.
+constexpr double kLeastSigma = 1e-9;
+constexpr double kLargestSigma = 1e3;
+inline Range sigma(double max = kLargestSigma) { return between(kLeastSigma, max); }
 
 void listMessages(ParameterList& list, Config& config);
 void listFrames(ParameterList& list, Config& config);

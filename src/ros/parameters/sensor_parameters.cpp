@@ -1,6 +1,8 @@
 #include <cmath>
 
 #include "parameter_sections.h"
+#include "rio_t/radar/doppler_grid.h"
+#include "rio_t/radar/scan.h"
 
 namespace rio_t {
 namespace {
@@ -32,7 +34,7 @@ void listStandstill(ParameterList& list, EgoVelocityOptions& radar) {
               "A scan counts as standstill if at most this share of its Dopplers is larger than "
               "zero_velocity_threshold. Raise it if many things move around a platform that stands.");
   list.number(
-      "zero_velocity_sigma", "m/s", above(0), radar.zero_velocity_sigma,
+      "zero_velocity_sigma", "m/s", sigma(), radar.zero_velocity_sigma,
       "The velocity of a scan at standstill has this standard deviation per axis. The estimator adds the "
       "motion that a step of the Doppler can hide.");
 }
@@ -88,20 +90,20 @@ void listPointNoise(ParameterList& list, EgoVelocityOptions& radar) {
       "radar_elevation_sigma", "rad", below(0, 0.5), radar.elevation_sigma,
       "The elevation of a point has this noise at the start. eiv learns it on the way. 0.03 to 0.1 rad are "
       "typical of small radars, which have few antennas above each other.");
-  list.number("radar_doppler_sigma", "m/s", atLeast(0), radar.doppler_sigma,
+  list.number("radar_doppler_sigma", "m/s", between(0, kLargestSigma), radar.doppler_sigma,
               "The Doppler of a point has this noise at the start, in addition to the rounding to "
               "radar_doppler_step. eiv learns it on the way.");
   list.number(
-      "radar_doppler_span", "m/s", atLeast(0), radar.doppler_span,
+      "radar_doppler_span", "m/s", zeroOr(DopplerGrid::kLeastStep, 2.0 * kLargestDoppler), radar.doppler_span,
       "The radar measures Dopplers over this span, from the lowest to the highest. A faster point appears at "
       "the other end of the span (aliasing). 0 reads the span off the data. Set it if you know it and drive "
       "faster than half of it.");
   list.number(
-      "radar_doppler_step", "m/s", atLeast(0), radar.doppler_quantization,
+      "radar_doppler_step", "m/s", between(0, DopplerGrid::kLargestStep), radar.doppler_quantization,
       "The radar gives the Doppler in steps of this size. 0 reads it off the data. Any other value below "
       "0.02 means no steps. Set it if you know it and the bag is short.");
   list.vector3(
-      "ego_velocity_added_sigma", "m/s", atLeast(0), radar.added_sigma,
+      "ego_velocity_added_sigma", "m/s", between(0, kLargestSigma), radar.added_sigma,
       "The estimator adds this standard deviation (right, forward, up) in quadrature to that of the velocity "
       "of a scan. It stands for errors that the points share, such as multipath and slow objects. This is "
       "the start value: the estimator scales it by what the scans show.");
