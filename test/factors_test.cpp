@@ -10,7 +10,7 @@
 #include "rio_t/core/so3.h"
 #include "rio_t/factors/imu_factor.h"
 #include "rio_t/factors/motion_manifold.h"
-#include "rio_t/factors/offset_derivative.h"
+#include "rio_t/factors/radar_motion.h"
 #include "rio_t/factors/radar_velocity_factor.h"
 #include "rio_t/factors/random_walk_factor.h"
 #include "rio_t/factors/zero_velocity_factor.h"

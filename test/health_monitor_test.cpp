@@ -7,7 +7,6 @@
 
 #include "rio_t/core/so3.h"
 #include "rio_t/factors/state_block.h"
-#include "rio_t/odometry/radars_health.h"
 #include "simulated_run.h"
 
 namespace rio_t {

@@ -12,7 +12,6 @@
 #include "rio_t/imu/error_step.h"
 #include "rio_t/imu/input_check.h"
 #include "rio_t/imu/noise_meter.h"
-#include "rio_t/imu/noise_spectrum.h"
 #include "rio_t/imu/preintegration.h"
 #include "rio_t/imu/rest_detector.h"
 #include "rio_t/imu/static_initializer.h"

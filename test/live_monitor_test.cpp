@@ -12,7 +12,7 @@
 
 #include "rio_t/core/so3.h"
 #include "rio_t/factors/state_block.h"
-#include "rio_t/graph/solver_termination.h"
+#include "rio_t/graph/solver.h"
 #include "rio_t/ros/live/monitor.h"
 #include "rio_t/ros/live/session.h"
 #include "two_radars_config.h"

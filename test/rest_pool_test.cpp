@@ -1,7 +1,7 @@
 // The scans since the IMU came to rest.
-#include "rio_t/sensors/rest_pool.h"
-
 #include <gtest/gtest.h>
+
+#include "rio_t/sensors/scan_pool.h"
 
 namespace rio_t {
 namespace {

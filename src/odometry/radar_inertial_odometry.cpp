@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "rio_t/odometry/estimator.h"
-#include "rio_t/odometry/fault_counters.h"
 #include "rio_t/odometry/navigation.h"
 
 namespace rio_t {

@@ -6,8 +6,8 @@
 
 #include "direction_noise.h"
 #include "doppler_bin.h"
-#include "likeliest_velocity.h"
 #include "residual_moments.h"
+#include "velocity_solver.h"
 
 namespace rio_t {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "consensus.h"
 #include "direction_noise.h"
-#include "likeliest_velocity.h"
+#include "velocity_solver.h"
 
 namespace rio_t {
 namespace {

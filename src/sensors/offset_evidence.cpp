@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rio_t/core/fading.h"
-
 namespace rio_t {
 namespace {
 

@@ -3,8 +3,6 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
-#include "rio_t/core/fading.h"
-
 namespace rio_t {
 namespace {
 

@@ -6,7 +6,7 @@
 
 #include "rio_t/core/so3.h"
 #include "rio_t/factors/imu_factor.h"
-#include "rio_t/factors/offset_derivative.h"
+#include "rio_t/factors/radar_motion.h"
 
 namespace rio_t {
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "rio_t/factors/imu_factor.h"
-#include "rio_t/factors/offset_derivative.h"
+#include "rio_t/factors/radar_motion.h"
 #include "rio_t/factors/zero_velocity_factor.h"
 
 namespace rio_t {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rio_t/factors/offset_derivative.h"
+#include "rio_t/factors/radar_motion.h"
 #include "rio_t/imu/turning_axes.h"
 
 namespace rio_t {

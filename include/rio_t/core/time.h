@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -34,5 +35,11 @@ class Time {
   explicit constexpr Time(std::int64_t ns) : ns_(ns) {}
   std::int64_t ns_ = 0;
 };
+
+/// A sum that forgets with the time constant `memory` [s] is multiplied by this factor from `last` to `now`.
+/// The factor is 1 for data that come late, and it is never zero.
+inline double fading(Time last, Time now, double memory) {
+  return std::exp(-std::clamp(now - last, 0.0, 10.0 * memory) / memory);
+}
 
 }  // namespace rio_t

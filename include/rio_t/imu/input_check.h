@@ -11,7 +11,7 @@
 #include "rio_t/imu/gap_bridge.h"
 #include "rio_t/imu/measurement.h"
 #include "rio_t/imu/noise.h"
-#include "rio_t/imu/noise_spectrum.h"
+#include "rio_t/imu/noise_meter.h"
 #include "rio_t/imu/saturation_detector.h"
 #include "rio_t/imu/stuck_axis_detector.h"
 

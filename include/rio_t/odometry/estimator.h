@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,12 +10,11 @@
 #include "rio_t/imu/buffer.h"
 #include "rio_t/landmarks/landmark_map.h"
 #include "rio_t/odometry/calibration_check.h"
-#include "rio_t/odometry/fault_counters.h"
+#include "rio_t/odometry/health_monitor.h"
 #include "rio_t/odometry/initializer.h"
 #include "rio_t/odometry/model_error_scale.h"
 #include "rio_t/odometry/navigation.h"
 #include "rio_t/odometry/options.h"
-#include "rio_t/odometry/radars_health.h"
 #include "rio_t/odometry/scan_result.h"
 #include "rio_t/sensors/barometer_channel.h"
 #include "rio_t/sensors/ground_vehicle_channel.h"
@@ -21,6 +22,23 @@
 #include "rio_t/smoother/fixed_lag_smoother.h"
 
 namespace rio_t {
+
+/// Counts faults of the input by name. Thread-safe.
+class FaultCounters {
+ public:
+  void count(const std::string& name) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++counts_[name];
+  }
+  std::map<std::string, std::uint64_t> get() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return counts_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<std::string, std::uint64_t> counts_;  // guarded by mutex_
+};
 
 /// The paper's optimisation thread: from scans and checked IMU samples to the newest optimised state, which
 /// anchors the navigation. Not thread-safe.

@@ -8,7 +8,7 @@
 #include "rio_t/factors/radar_velocity_factor.h"
 #include "rio_t/imu/buffer.h"
 #include "rio_t/imu/noise.h"
-#include "rio_t/imu/start_wait.h"
+#include "rio_t/imu/static_initializer.h"
 #include "rio_t/odometry/model_error_scale.h"
 #include "rio_t/radar/ego_velocity.h"
 #include "rio_t/smoother/node_prior.h"

@@ -12,7 +12,6 @@
 #include "rio_t/radar/doppler_span.h"
 #include "rio_t/radar/point_noise.h"
 #include "rio_t/radar/scan.h"
-#include "rio_t/radar/velocity_prior.h"
 
 namespace rio_t {
 

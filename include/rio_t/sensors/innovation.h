@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include "rio_t/core/time.h"
@@ -19,9 +20,13 @@ struct Innovation {
   Eigen::Vector3d J_after = Eigen::Vector3d::Zero();  ///< from the samples after the scan
   Eigen::Vector3d J_mean = Eigen::Vector3d::Zero();   ///< from both sides
 
-  double squaredSigmas() const;
+  double squaredSigmas() const { return d.dot(S.ldlt().solve(d)); }
   /// The same with `sigma` [m/s] added on each axis of S.
-  Innovation widened(double sigma) const;
+  Innovation widened(double sigma) const {
+    Innovation wide = *this;
+    wide.S.diagonal().array() += sigma * sigma;
+    return wide;
+  }
 };
 
 }  // namespace rio_t

@@ -5,7 +5,7 @@
 #include <deque>
 
 #include "rio_t/core/time.h"
-#include "rio_t/factors/offset_derivative.h"
+#include "rio_t/factors/radar_motion.h"
 #include "rio_t/factors/state_block.h"
 #include "rio_t/imu/buffer.h"
 #include "rio_t/radar/extrinsics.h"

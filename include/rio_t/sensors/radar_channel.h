@@ -9,7 +9,6 @@
 #include "rio_t/sensors/offset_step_detector.h"
 #include "rio_t/sensors/offset_uncertainty.h"
 #include "rio_t/sensors/radar_in_window.h"
-#include "rio_t/sensors/rest_pool.h"
 #include "rio_t/sensors/scan_pool.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
 #include "rio_t/smoother/options.h"

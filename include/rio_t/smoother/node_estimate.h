@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "rio_t/core/time.h"
-#include "rio_t/factors/slow_motion.h"
+#include "rio_t/factors/radar_velocity_model.h"
 #include "rio_t/factors/state_block.h"
 #include "rio_t/imu/buffer.h"
 
