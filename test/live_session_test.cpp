@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "rio_t/radar/scan.h"
-#include "rio_t/ros/live/current_session.h"
 #include "rio_t/ros/live/session.h"
 #include "two_radars_config.h"
 

@@ -1,5 +1,6 @@
 #include "rio_t/ros/live/session.h"
 
+#include <stdexcept>
 #include <utility>
 
 namespace rio_t {
@@ -8,6 +9,40 @@ namespace {
 constexpr std::size_t kMaxScansInFlight = 1000;  // bounds the memory of arrivals
 
 }  // namespace
+
+void OffsetObservability::add(const ScanResult& result) {
+  const Time stamp = result.scan.stamp;
+  if (result.used) samples_.push_back({stamp, result.offset_information});
+  while (!samples_.empty() && stamp - samples_.front().stamp > kWindow) samples_.pop_front();
+}
+
+bool OffsetObservability::observable() const {
+  double information = 0.0;
+  for (const Sample& sample : samples_) information += sample.information;
+  return information * kMaxSigma * kMaxSigma > 1.0;
+}
+
+BoundedTrajectory::BoundedTrajectory(std::size_t capacity) : capacity_(capacity) {
+  if (capacity < 2) throw std::invalid_argument("BoundedTrajectory: expected a capacity of at least 2");
+}
+
+void BoundedTrajectory::add(const StampedPose& pose) {
+  last_ = pose;
+  if (count_++ % stride_ != 0) return;
+  if (kept_.size() == capacity_) {
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < kept_.size(); k += 2) kept_[kept++] = kept_[k];
+    kept_.resize(kept);
+    stride_ *= 2;
+  }
+  if (lastIsKept()) kept_.push_back(pose);
+}
+
+Trajectory BoundedTrajectory::poses() const {
+  Trajectory all = kept_;
+  if (count_ > 0 && !lastIsKept()) all.push_back(last_);
+  return all;
+}
 
 LiveSession::LiveSession(const Config& config, const OdometryOptions& options)
     : gyro_density_(options.imu_noise.gyro_density), odometry_(options) {

@@ -25,7 +25,6 @@
 #include <vector>
 
 #include "rio_t/ros/live/body_frame.h"
-#include "rio_t/ros/live/current_session.h"
 #include "rio_t/ros/live/live_log.h"
 #include "rio_t/ros/live/live_parameters.h"
 #include "rio_t/ros/live/monitor.h"

@@ -7,17 +7,41 @@
 #include <tf2_ros/transform_broadcaster.h>
 
 #include <atomic>
+#include <cmath>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "rio_t/core/time.h"
 #include "rio_t/odometry/body_odometry.h"
-#include "rio_t/ros/live/publish_rate.h"
 #include "rio_t/ros/live/session.h"
 #include "rio_t/ros/parameters/config.h"
 
 namespace rio_t {
+
+/// Thins out a stream by its stamps: the first message of each period is published. The periods count from
+/// the epoch, so the same stamps give the same choice, whenever one starts. `set` may be called from any
+/// thread, `isDue` from one.
+class PublishRate {
+ public:
+  explicit PublishRate(double hz) : hz_(hz) {}
+  void set(double hz) { hz_ = hz; }  ///< [Hz] 0: every message
+
+  bool isDue(Time stamp) {
+    const double hz = hz_;
+    if (hz <= 0.0) return true;
+    const double period = std::floor(stamp.seconds() * hz);
+    if (period == last_) return false;
+    last_ = period;
+    return true;
+  }
+
+ private:
+  std::atomic<double> hz_;
+  double last_ = std::numeric_limits<double>::quiet_NaN();  ///< period of the last message; NaN equals none
+};
 
 /// Everything that the live node says, as messages. `odometry` belongs to the IMU thread, `result` and
 /// `clear` to the optimisation thread, `tune` to any. Topics of one radar are in its name's namespace, if

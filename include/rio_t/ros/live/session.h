@@ -1,9 +1,13 @@
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <cstddef>
+#include <deque>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -13,11 +17,52 @@
 #include "rio_t/evaluation/trajectory.h"
 #include "rio_t/odometry/body_odometry.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
+#include "rio_t/odometry/scan_result.h"
 #include "rio_t/ros/cloud/stamping.h"
-#include "rio_t/ros/live/bounded_trajectory.h"
-#include "rio_t/ros/live/offset_observability.h"
 
 namespace rio_t {
+
+/// Whether the motion of the last second tells the time offset: its scans alone, without what was known
+/// before, would give the offset to kMaxSigma. At constant velocity they do not, however small the
+/// estimate's own sigma.
+class OffsetObservability {
+ public:
+  void add(const ScanResult& result);
+  bool observable() const;
+
+ private:
+  static constexpr double kWindow = 1.0;     // [s]
+  static constexpr double kMaxSigma = 0.02;  // [s] a fifth of a radar period: better than not knowing
+
+  struct Sample {
+    Time stamp;
+    double information = 0.0;  // [1/s^2]
+  };
+  std::deque<Sample> samples_;  // oldest first
+};
+
+/// A trajectory of bounded memory that always reaches from the first pose to the last: once `capacity` poses
+/// are kept, every second one goes, and from then on only every second (fourth, ...) is kept.
+class BoundedTrajectory {
+ public:
+  /// `capacity` must be at least 2; throws std::invalid_argument.
+  explicit BoundedTrajectory(std::size_t capacity);
+
+  void add(const StampedPose& pose);
+  /// The poses kept, and the last one added in any case.
+  Trajectory poses() const;
+  /// One pose in so many is kept: 1, 2, 4, ...
+  std::size_t stride() const { return stride_; }
+
+ private:
+  bool lastIsKept() const { return (count_ - 1) % stride_ == 0; }
+
+  std::size_t capacity_;  // read-only after construction
+  Trajectory kept_;
+  std::size_t stride_ = 1;
+  std::size_t count_ = 0;  ///< poses added
+  StampedPose last_;
+};
 
 /// All that one run of the estimator remembers. A reset takes a new one, so nothing of the old can leak into
 /// it.
@@ -123,6 +168,43 @@ class LiveSession {
   mutable std::mutex trajectory_mutex_;
   BoundedTrajectory left_window_{kMaxPoses};  // guarded by trajectory_mutex_, as the next
   std::optional<StampedPose> newest_;
+};
+
+/// Which session of the live node is the current one, and the promise that nothing of an old one is said once
+/// it has been replaced. Thread-safe.
+class CurrentSession {
+ public:
+  using Session = std::shared_ptr<LiveSession>;
+  /// Who publishes. Each has a lock of its own, so that neither waits for the other.
+  enum class Speaker { kNavigation, kOptimisation };
+
+  /// Null before there is one.
+  Session get() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return session_;
+  }
+
+  /// Waits for those who are speaking; after it no one speaks for the old session, which is returned. Not to
+  /// be called by a speaker while it speaks.
+  Session replace(Session fresh) {
+    const std::scoped_lock lock(speaking_[0], speaking_[1], mutex_);
+    std::swap(session_, fresh);
+    return fresh;
+  }
+
+  /// Calls say() if `session` still is the current one, which it then stays until say() returns; else false.
+  template <typename Say>
+  bool speak(Speaker speaker, const Session& session, Say&& say) {
+    const std::lock_guard<std::mutex> lock(speaking_[static_cast<std::size_t>(speaker)]);
+    if (get() != session) return false;
+    say();
+    return true;
+  }
+
+ private:
+  std::array<std::mutex, 2> speaking_;  // by Speaker
+  mutable std::mutex mutex_;            // held for nanoseconds
+  Session session_;                     // guarded by mutex_; changes with both of speaking_ held too
 };
 
 }  // namespace rio_t
