@@ -1,5 +1,3 @@
-#include "contradictions.h"
-
 #include <cmath>
 
 #include "../text.h"

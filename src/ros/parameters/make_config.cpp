@@ -3,7 +3,6 @@
 #include <utility>
 
 #include "../text.h"
-#include "contradictions.h"
 #include "mounting_parameters.h"
 #include "parameter_list.h"
 #include "rio_t/ros/parameters/parameters.h"
