@@ -3,8 +3,7 @@
 #include <algorithm>
 
 #include "../text.h"
-#include "imu_causes.h"
-#include "radar_causes.h"
+#include "causes.h"
 #include "rio_t/core/angle.h"
 #include "rio_t/core/so3.h"
 #include "rio_t/ros/parameters/parameters.h"

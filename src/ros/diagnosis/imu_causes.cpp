@@ -1,9 +1,7 @@
-#include "imu_causes.h"
-
 #include <algorithm>
 #include <string>
 
-#include "radar_causes.h"
+#include "causes.h"
 
 namespace rio_t {
 namespace {

@@ -1,7 +1,6 @@
-#include "radar_causes.h"
-
 #include <algorithm>
 
+#include "causes.h"
 #include "rio_t/core/angle.h"
 #include "rio_t/radar/doppler_grid.h"
 
@@ -68,7 +67,8 @@ class RadarCauses {
   }
 
   void addPointFilter() {
-    const EgoVelocityOptions& o = config_.odometry.radar.ego_velocity;
+    const std::string other_axes =
+        "The axes of the cloud are probably others: set " + key_ + "radar_axes to rfu or flu.";
     const auto filter = [&](PointVerdict verdict, const std::string& name, const std::string& are,
                             const std::string& remedy) {
       const std::uint64_t taken = pointsOf(radar_, verdict);
@@ -77,26 +77,21 @@ class RadarCauses {
       cause(name, share, outOf(taken, radar_.points, "points") + of_ + " are " + are, remedy);
     };
     filter(PointVerdict::kTooWeak, "points_too_weak",
-           "below " + key_ + "radar_min_snr_db " + number(o.min_snr_db) + " dB: their mean is " +
+           "below " + keyOf(PointVerdict::kTooWeak) + ": their mean is " +
                number(radar_.snr_sum_db / static_cast<double>(std::max<std::uint64_t>(1, radar_.points))) +
                " dB, and " + powerReader() + " reads the power as " +
                toString(pointCloudFormat(config_).power_unit) + ".",
            "Set " + key_ +
                "radar_power_unit to the unit of your driver (not_snr if it is no SNR), or lower " + key_ +
                "radar_min_snr_db.");
-    filter(PointVerdict::kTooNear, "points_too_near",
-           "nearer than " + key_ + "radar_min_range " + number(o.min_range) + " m.",
+    filter(PointVerdict::kTooNear, "points_too_near", "nearer than " + keyOf(PointVerdict::kTooNear) + ".",
            "Lower " + key_ + "radar_min_range, and check the unit of the positions.");
-    filter(PointVerdict::kTooFar, "points_too_far",
-           "farther than " + key_ + "radar_max_range " + number(o.max_range) + " m.",
+    filter(PointVerdict::kTooFar, "points_too_far", "farther than " + keyOf(PointVerdict::kTooFar) + ".",
            "Raise " + key_ + "radar_max_range, and check the unit of the positions.");
     filter(PointVerdict::kBesideView, "points_beside_view",
-           "farther than " + key_ + "radar_max_azimuth " + number(o.max_azimuth) +
-               " rad to either side of forward.",
-           "The axes of the cloud are probably others: set " + key_ + "radar_axes to rfu or flu.");
+           "farther than " + keyOf(PointVerdict::kBesideView) + " to either side of forward.", other_axes);
     filter(PointVerdict::kAboveView, "points_above_view",
-           "higher or lower than " + key_ + "radar_max_elevation " + number(o.max_elevation) + " rad.",
-           "The axes of the cloud are probably others: set " + key_ + "radar_axes to rfu or flu.");
+           "higher or lower than " + keyOf(PointVerdict::kAboveView) + ".", other_axes);
     filter(PointVerdict::kNoMeasurement, "points_without_measurement",
            "no measurement: their Doppler is " + number(kLargestDoppler) + " m/s or more.",
            "Check " + key_ + "radar_field_doppler: is it the Doppler, in m/s?");
