@@ -116,17 +116,9 @@ std::vector<RadarTrack> tracksOf(const simulation::SensorData& data, BagFormat f
   return tracks;
 }
 
-std_msgs::Header headerOf(std::uint32_t seq, Time stamp, const std::string& frame) {
-  std_msgs::Header header;
-  header.seq = seq;
-  header.stamp = toRosTime(stamp);
-  header.frame_id = frame;
-  return header;
-}
-
 sensor_msgs::Imu imuMessage(const ImuMeasurement& sample, std::uint32_t seq, double orientation_covariance) {
   sensor_msgs::Imu message;
-  message.header = headerOf(seq, sample.time, "base_link");
+  message.header = toHeader(sample.time, "base_link", seq);
   message.orientation_covariance[0] = orientation_covariance;
   tf2::toMsg(sample.angular_velocity, message.angular_velocity);
   tf2::toMsg(sample.acceleration, message.linear_acceleration);
@@ -135,7 +127,7 @@ sensor_msgs::Imu imuMessage(const ImuMeasurement& sample, std::uint32_t seq, dou
 
 sensor_msgs::FluidPressure pressureMessage(const simulation::SimulatedPressure& sample, std::uint32_t seq) {
   sensor_msgs::FluidPressure message;
-  message.header = headerOf(seq, sample.stamp, "base_link");
+  message.header = toHeader(sample.stamp, "base_link", seq);
   message.fluid_pressure = sample.pascal;
   return message;
 }
@@ -173,7 +165,7 @@ sensor_msgs::PointCloud2 scanMessage(const SimulatedScan& scan, const Layout& la
 
 geometry_msgs::PoseStamped poseMessage(const simulation::MotionState& state, Time time, std::uint32_t seq) {
   geometry_msgs::PoseStamped message;
-  message.header = headerOf(seq, time, "world");
+  message.header = toHeader(time, "world", seq);
   message.pose.position = tf2::toMsg(state.p_W);
   message.pose.orientation = tf2::toMsg(state.q_WI);
   return message;
@@ -181,7 +173,7 @@ geometry_msgs::PoseStamped poseMessage(const simulation::MotionState& state, Tim
 
 geometry_msgs::TwistStamped twistMessage(const simulation::MotionState& state, Time time, std::uint32_t seq) {
   geometry_msgs::TwistStamped message;
-  message.header = headerOf(seq, time, "world");
+  message.header = toHeader(time, "world", seq);
   tf2::toMsg(state.v_W, message.twist.linear);
   tf2::toMsg(state.q_WI * state.omega_I, message.twist.angular);
   return message;
@@ -226,7 +218,7 @@ std::vector<Arrival> arrivals(const simulation::Motion& motion, const simulation
     const Layout& layout = radar.layout;
     for (const SimulatedScan& scan : *radar.scans) {
       add(scan.stamp + kImuLatency, layout.trigger_topic,
-          [&scan, &layout] { return headerOf(scan.seq, scan.stamp, layout.trigger_frame); });
+          [&scan, &layout] { return toHeader(scan.stamp, layout.trigger_frame, scan.seq); });
       if (scan.delivered)
         add(scan.arrival, layout.scan_topic, [&scan, &layout] { return scanMessage(scan, layout); });
     }

@@ -22,8 +22,7 @@ void publish(const ros::Publisher& publisher, Message message) {
 void publishCloud(const ros::Publisher& publisher, const RadarScan& scan,
                   const std::vector<std::size_t>& indices, const std::string& frame, Time stamp) {
   sensor_msgs::PointCloud2 cloud = toPointCloud2(scan, indices);
-  cloud.header.stamp = toRosTime(stamp);
-  cloud.header.frame_id = frame;
+  cloud.header = toHeader(stamp, frame);
   publish(publisher, std::move(cloud));
 }
 
@@ -104,8 +103,7 @@ void LivePublisher::result(const LiveSession::Result& live, const Frames& frames
   if (map_ && result.landmarks && frames.world) map(result.landmarks->map, *frames.world, result.state.time);
   publish(imu_bias_, toImuBias(result.state, frames.imu));
   TimeOffset offset;
-  offset.header.stamp = toRosTime(result.scan.stamp);
-  offset.header.frame_id = radar.frame;
+  offset.header = toHeader(result.scan.stamp, radar.frame);
   offset.offset = result.time_offset;
   offset.sigma = result.time_offset_sigma;
   offset.observable = static_cast<std::uint8_t>(live.offset_observable);
@@ -141,8 +139,7 @@ void LivePublisher::radarFrame(Radar& radar, const LiveSession::Result& live, co
 
 void LivePublisher::map(const std::vector<LandmarkPoint>& points, const WorldInOdom& T_OW, Time stamp) {
   sensor_msgs::PointCloud2 cloud = toPointCloud2(points, T_OW);
-  cloud.header.stamp = toRosTime(stamp);
-  cloud.header.frame_id = config_.odom_frame;
+  cloud.header = toHeader(stamp, config_.odom_frame);
   publish(*map_, std::move(cloud));
 }
 

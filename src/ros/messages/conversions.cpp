@@ -32,6 +32,14 @@ ros::Time toRosTime(Time time) {
   return {static_cast<std::uint32_t>(ns / kSecond), static_cast<std::uint32_t>(ns % kSecond)};
 }
 
+std_msgs::Header toHeader(Time stamp, const std::string& frame, std::uint32_t seq) {
+  std_msgs::Header header;
+  header.seq = seq;
+  header.stamp = toRosTime(stamp);
+  header.frame_id = frame;
+  return header;
+}
+
 ImuMeasurement toImuMeasurement(const sensor_msgs::Imu& message, const std::string& topic,
                                 const ImuUnits& units) {
   ImuMeasurement imu;
@@ -54,8 +62,7 @@ Pressure toPressure(const sensor_msgs::FluidPressure& message, const std::string
 nav_msgs::Odometry toOdometry(const BodyOdometry& body, const std::string& odom_frame,
                               const std::string& base_link_frame) {
   nav_msgs::Odometry message;
-  message.header.stamp = toRosTime(body.time);
-  message.header.frame_id = odom_frame;
+  message.header = toHeader(body.time, odom_frame);
   message.child_frame_id = base_link_frame;
   message.pose.pose.position = tf2::toMsg(body.p_O);
   message.pose.pose.orientation = tf2::toMsg(body.q_OB);
@@ -69,8 +76,7 @@ nav_msgs::Odometry toOdometry(const BodyOdometry& body, const std::string& odom_
 geometry_msgs::TransformStamped toTransform(const BodyOdometry& body, const std::string& odom_frame,
                                             const std::string& base_link_frame, bool inverted) {
   geometry_msgs::TransformStamped transform;
-  transform.header.stamp = toRosTime(body.time);
-  transform.header.frame_id = inverted ? base_link_frame : odom_frame;
+  transform.header = toHeader(body.time, inverted ? base_link_frame : odom_frame);
   transform.child_frame_id = inverted ? odom_frame : base_link_frame;
   const Eigen::Quaterniond q = inverted ? body.q_OB.conjugate() : body.q_OB;
   tf2::toMsg(inverted ? Eigen::Vector3d(-(q * body.p_O)) : body.p_O, transform.transform.translation);
@@ -82,8 +88,7 @@ geometry_msgs::TwistWithCovarianceStamped toTwist(const Eigen::Vector3d& v_R,
                                                   const Eigen::Matrix3d& covariance, Time stamp,
                                                   const std::string& radar_frame) {
   geometry_msgs::TwistWithCovarianceStamped message;
-  message.header.stamp = toRosTime(stamp);
-  message.header.frame_id = radar_frame;
+  message.header = toHeader(stamp, radar_frame);
   const Eigen::Matrix3d axes = fluFromRfu().toRotationMatrix();
   tf2::toMsg(Eigen::Vector3d(axes * v_R), message.twist.twist.linear);
   Covariance6 both = kUnknownVariance * Covariance6::Identity();
@@ -94,8 +99,7 @@ geometry_msgs::TwistWithCovarianceStamped toTwist(const Eigen::Vector3d& v_R,
 
 ImuBias toImuBias(const NavigationState& state, const std::string& imu_frame) {
   ImuBias message;
-  message.header.stamp = toRosTime(state.time);
-  message.header.frame_id = imu_frame;
+  message.header = toHeader(state.time, imu_frame);
   const auto sigmas = sigmasOf(state.covariance);
   for (int axis = 0; axis < 3; ++axis) {
     const auto k = static_cast<std::size_t>(axis);
@@ -128,8 +132,7 @@ ImuInBody toImuInBody(const geometry_msgs::Transform& T_base_imu) {
 geometry_msgs::PoseWithCovarianceStamped toPose(const Extrinsics& T_IR, const Covariance6& covariance,
                                                 Time stamp, const std::string& imu_frame) {
   geometry_msgs::PoseWithCovarianceStamped message;
-  message.header.stamp = toRosTime(stamp);
-  message.header.frame_id = imu_frame;
+  message.header = toHeader(stamp, imu_frame);
   message.pose.pose.position = tf2::toMsg(T_IR.l_I);
   message.pose.pose.orientation = tf2::toMsg(T_IR.q_IR);
   assign(covariance, &message.pose.covariance);

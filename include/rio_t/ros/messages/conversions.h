@@ -7,6 +7,7 @@
 #include <sensor_msgs/FluidPressure.h>
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/PointCloud2.h>
+#include <std_msgs/Header.h>
 
 #include <string>
 #include <vector>
@@ -30,6 +31,8 @@ sensor_msgs::PointCloud2 toPointCloud2(const std::vector<LandmarkPoint>& map, co
 Time toTime(const ros::Time& time);
 /// Throws std::runtime_error for a time that ROS cannot hold (negative, or after 2106).
 ros::Time toRosTime(Time time);
+/// Throws likewise.
+std_msgs::Header toHeader(Time stamp, const std::string& frame, std::uint32_t seq = 0);
 /// In m/s^2 and rad/s; `units` are those of the driver. Throws std::runtime_error, naming `topic`, if the
 /// stamp in the header is zero.
 ImuMeasurement toImuMeasurement(const sensor_msgs::Imu& message, const std::string& topic,
