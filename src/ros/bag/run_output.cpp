@@ -21,19 +21,6 @@ namespace {
 constexpr std::size_t kBufferSize = 1 << 18;
 constexpr double kNavigationPeriod = 0.0999;  // [s] between lines of navigation.csv
 
-const char* const kNavigationHeader =
-    "stamp,vx,vy,vz,sigma_px,sigma_py,sigma_pz,sigma_rx,sigma_ry,sigma_rz,sigma_vx,sigma_vy,sigma_vz\n";
-const char* const kBiasesHeader = "stamp,bgx,bgy,bgz,bax,bay,baz\n";
-const char* const kTimeOffsetHeader = "stamp,offset_s,sigma_s\n";
-const char* const kEgoVelocityHeader = "stamp,vx,vy,vz,sigma_x,sigma_y,sigma_z,inliers,points,status\n";
-const char* const kBarometerHeader =
-    "stamp,height,innovation,innovation_sigma,bias,bias_sigma,samples,status\n";
-const char* const kGroundVehicleHeader =
-    "stamp,vx,vy,vz,sigmas,qx,qy,qz,qw,sigma_rx,sigma_ry,sigma_rz,status\n";
-const char* const kMapHeader = "id,x,y,z,sigma,snr_db,sightings\n";
-const char* const kExtrinsicsHeader =
-    "stamp,x,y,z,qx,qy,qz,qw,sigma_x,sigma_y,sigma_z,sigma_rx,sigma_ry,sigma_rz\n";
-
 /// The files of the run before, as its summary names them.
 std::vector<std::string> savedBefore(const std::string& folder) {
   try {
@@ -54,17 +41,26 @@ std::string statusOf(const ScanResult& result) {
 
 std::vector<RunFile> RunFiles::all() const {
   std::vector<RunFile> files = {
-      {"trajectory.txt", ""}, {"trajectory_optimized.txt", ""}, {"navigation.csv", kNavigationHeader}};
+      {"trajectory.txt", ""},
+      {"trajectory_optimized.txt", ""},
+      {"navigation.csv",
+       "stamp,vx,vy,vz,sigma_px,sigma_py,sigma_pz,sigma_rx,sigma_ry,sigma_rz,sigma_vx,sigma_vy,sigma_vz\n"}};
   for (const std::string& radar : radars) {
     const std::string end = suffixOf(radar) + ".csv";
-    files.push_back({"time_offset" + end, kTimeOffsetHeader});
-    files.push_back({"ego_velocity" + end, kEgoVelocityHeader});
-    if (extrinsics) files.push_back({"extrinsics" + end, kExtrinsicsHeader});
+    files.push_back({"time_offset" + end, "stamp,offset_s,sigma_s\n"});
+    files.push_back({"ego_velocity" + end, "stamp,vx,vy,vz,sigma_x,sigma_y,sigma_z,inliers,points,status\n"});
+    if (extrinsics)
+      files.push_back({"extrinsics" + end,
+                       "stamp,x,y,z,qx,qy,qz,qw,sigma_x,sigma_y,sigma_z,sigma_rx,sigma_ry,sigma_rz\n"});
   }
-  if (barometer) files.push_back({"barometer.csv", kBarometerHeader});
-  if (ground_vehicle) files.push_back({"ground_vehicle.csv", kGroundVehicleHeader});
-  if (map) files.push_back({"map.csv", kMapHeader});
-  files.push_back({"biases.csv", kBiasesHeader});
+  if (barometer)
+    files.push_back(
+        {"barometer.csv", "stamp,height,innovation,innovation_sigma,bias,bias_sigma,samples,status\n"});
+  if (ground_vehicle)
+    files.push_back(
+        {"ground_vehicle.csv", "stamp,vx,vy,vz,sigmas,qx,qy,qz,qw,sigma_rx,sigma_ry,sigma_rz,status\n"});
+  if (map) files.push_back({"map.csv", "id,x,y,z,sigma,snr_db,sightings\n"});
+  files.push_back({"biases.csv", "stamp,bgx,bgy,bgz,bax,bay,baz\n"});
   return files;
 }
 
