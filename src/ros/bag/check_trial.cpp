@@ -80,8 +80,8 @@ std::string verdictText(const Diagnosis& diagnosis) {
 
 void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
   if (!trial.failure.empty()) {
-    check->tell(FindingLevel::kMissing, "trial run", trial.failure);
-    check->to_do = "See the lines marked odd; then record again, at rest for 3 s and then in motion.";
+    check->missing("trial run", trial.failure,
+                   "See the lines marked odd; then record again, at rest for 3 s and then in motion.");
     return;
   }
   const RunSummary& s = trial.summary;
@@ -93,10 +93,9 @@ void tellTrial(const Trial& trial, const std::string& note, BagCheck* check) {
     if (s.diagnosis.verdict != RunVerdict::kGood) check->odd("trial run", verdictText(s.diagnosis));
     return;
   }
-  check->tell(FindingLevel::kMissing, "trial run",
-              divergencesText(s) + ", at the end " + toString(s.health) + "; " + numbers);
+  check->missing("trial run", divergencesText(s) + ", at the end " + toString(s.health) + "; " + numbers,
+                 "The odometry does not run well with what the bag shows. Look at the odd lines.");
   check->odd("trial run", verdictText(s.diagnosis));
-  check->to_do = "The odometry does not run well with what the bag shows. Look at the odd lines.";
   const std::vector<Cause>& causes = s.diagnosis.causes;
   if (causes.empty() || causes.front().remedy_is_check_bag)
     check->to_do +=

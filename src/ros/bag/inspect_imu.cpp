@@ -134,11 +134,9 @@ void describeUnits(ImuInspection* imu) {
   }
   for (const std::string& fault : {r.acceleration_fault, r.rate_fault}) {
     if (fault.empty()) continue;
-    imu->tell(FindingLevel::kMissing, "IMU",
-              fault + " (median size as written " + fixedText(r.written_norm, 2) + ")");
-    imu->to_do =
-        "Set the IMU driver to raw acceleration in m/s^2 and angular velocity in rad/s, with the axes of "
-        "one right-handed frame, and record again.";
+    imu->missing("IMU", fault + " (median size as written " + fixedText(r.written_norm, 2) + ")",
+                 "Set the IMU driver to raw acceleration in m/s^2 and angular velocity in rad/s, with the "
+                 "axes of one right-handed frame, and record again.");
   }
 }
 
@@ -173,8 +171,8 @@ void describeUp(ImuInspection* imu) {
   const Eigen::Quaterniond q_BI = axis.z() < 0.0
                                       ? Eigen::Quaterniond(0.0, 1.0, 0.0, 0.0)
                                       : Eigen::Quaterniond::FromTwoVectors(axis, Eigen::Vector3d::UnitZ());
-  imu->tell(
-      FindingLevel::kOdd, "IMU axes",
+  imu->odd(
+      "IMU axes",
       "gravity is on " + axisName(*up) +
           ". Either z of the IMU is not up: then the odometry is right, but rviz shows base_link tilted, "
           "since it is the IMU by default. Give base_link by tf, or set base_extrinsics_rotation_xyzw: [" +
@@ -210,9 +208,9 @@ void describe(ImuInspection* imu) {
   const ImuReport& r = imu->report;
   const std::size_t samples = imu->samples.size() + r.not_finite + r.repeated;
   if (10 * r.not_finite > samples) {  // the rest of the report would be of what is left
-    imu->tell(FindingLevel::kMissing, "IMU",
-              std::to_string(r.not_finite) + " of " + std::to_string(samples) + " samples are not finite");
-    imu->to_do = "Correct the IMU driver, which writes NaN or infinity, and record again.";
+    imu->missing("IMU",
+                 std::to_string(r.not_finite) + " of " + std::to_string(samples) + " samples are not finite",
+                 "Correct the IMU driver, which writes NaN or infinity, and record again.");
     return;
   }
   describeUnits(imu);
@@ -263,8 +261,8 @@ ImuInspection inspectImuTopic(const ImuTopic& topic) {
   const std::string fault = faultOf(written);
   if (!fault.empty()) {
     describeRate(written, &imu);
-    imu.tell(FindingLevel::kMissing, "IMU stamps", fault + "; rio_t needs the time of each sample");
-    imu.to_do = "Let the IMU driver set header.stamp, and record again.";
+    imu.missing("IMU stamps", fault + "; rio_t needs the time of each sample",
+                "Let the IMU driver set header.stamp, and record again.");
     return imu;
   }
   StampedInOrder order = stampedInOrder(topic);

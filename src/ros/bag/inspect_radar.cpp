@@ -119,13 +119,13 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
   const double not_finite = static_cast<double>(looked.points_not_finite);
   const double share_not_finite = not_finite / (not_finite + static_cast<double>(c.points));
   if (share_not_finite > kOnePercent)
-    radar->tell(FindingLevel::kOdd, "points",
-                fixedText(100.0 * share_not_finite, 0) +
-                    " % have a position, a Doppler or a power that is not finite: look for what the driver "
-                    "writes there");
+    radar->odd("points",
+               fixedText(100.0 * share_not_finite, 0) +
+                   " % have a position, a Doppler or a power that is not finite: look for what the driver "
+                   "writes there");
   if (c.ambiguous > kOnePercent)
-    radar->tell(
-        FindingLevel::kOk, "points",
+    radar->ok(
+        "points",
         fixedText(100.0 * c.ambiguous, 0) +
             " % have the range, Doppler and SNR of another point: one echo at several directions, left out");
   if (!looked.velocities.has_elevation)
@@ -173,10 +173,9 @@ void describeSign(const Looked& looked, const FormatProposal& format, const ImuR
     radar->keys.set("radar_doppler_sign", ParameterValue{std::int64_t{-1}},
                     field + " is positive for approaching targets.");
   } else {
-    radar->tell(
-        FindingLevel::kOk, "Doppler",
-        field + " is positive for receding targets" +
-            (evidence.empty() ? " (assumed: the motion does not show it)" : ", shown by " + evidence));
+    radar->ok("Doppler",
+              field + " is positive for receding targets" +
+                  (evidence.empty() ? " (assumed: the motion does not show it)" : ", shown by " + evidence));
   }
 }
 
@@ -242,10 +241,9 @@ void describeOffset(const MountingSearch& search, double largest, RadarInspectio
 
 void describeMounting(const MountingSearch& search, double largest_offset, RadarInspection* radar) {
   if (!search.enough) {
-    radar->tell(
-        FindingLevel::kOdd, "mounting",
-        "not found: less than 3 s with motion and two velocities a second; the radar is taken to look "
-        "forward. Record with motion, or set mounting_yaw_pitch_roll_deg by hand");
+    radar->odd("mounting",
+               "not found: less than 3 s with motion and two velocities a second; the radar is taken to look "
+               "forward. Record with motion, or set mounting_yaw_pitch_roll_deg by hand");
     radar->keys.set("mounting_yaw_pitch_roll_deg", listOf({0.0, 0.0, 0.0}),
                     "Assumed: the bag does not show it. Yaw left, pitch up, roll right side down.");
     return;
@@ -328,17 +326,16 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
   const StreamTiming timing = inspectTiming(cloud.times);
   FormatProposal format = proposeFormat(cloud, configured);
   if (!format.fault.empty()) {
-    radar.tell(FindingLevel::kMissing, "radar", cloud.topic + ": " + format.fault);
-    radar.to_do = format.to_do;
+    radar.missing("radar", cloud.topic + ": " + format.fault, format.to_do);
     return radar;
   }
   const StampProposal stamps = proposeStamps(recording, imu.times, cloud, configured);
   const InertialTrack track(imu.samples, imu.report.rest_rate);
   Looked looked = look(recording, imu, cloud, stamps, format.format, track);
   if (const std::string fault = faultOf(looked, format.format, stamps); !fault.empty()) {
-    radar.tell(FindingLevel::kMissing, "radar", cloud.topic + ": " + fault);
-    if (looked.scans.empty())
-      radar.to_do = "Set stamp_source to header or to arrival, or leave it out: check_bag then chooses.";
+    const char* const to_do =
+        "Set stamp_source to header or to arrival, or leave it out: check_bag then chooses.";
+    radar.missing("radar", cloud.topic + ": " + fault, looked.scans.empty() ? to_do : "");
     return radar;
   }
   // If the ranges say nothing, a radar that looks along another axis and a contrary sign are one fault, not
