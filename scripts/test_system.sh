@@ -37,7 +37,8 @@ fi
 cp /etc/hosts /etc/resolv.conf "$root/etc/"
 echo "127.0.0.1 localhost $(hostname)" >>"$root/etc/hosts"
 
-# In namespaces of its own: all mounts and processes end with it, whatever happens.
+# In namespaces of its own: all mounts and processes end with unshare, on Ctrl-C too. From elsewhere, stop unshare with
+# kill -KILL: it ignores a plain kill, and goes on if only this script is killed.
 inside=(unshare --mount --pid --fork --kill-child -- bash -euc '
   root=$1 source=$2 data=$3
   shift 3
