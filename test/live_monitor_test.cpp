@@ -20,7 +20,7 @@
 namespace rio_t {
 namespace {
 
-/// What one of the monitor's tasks of /diagnostics says.
+/// Returns the status that one of the monitor's tasks puts into /diagnostics.
 template <typename Describe>
 LiveMonitor::Status told(LiveMonitor& monitor, Describe describe) {
   LiveMonitor::Status status;

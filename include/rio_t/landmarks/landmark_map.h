@@ -1,38 +1,17 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "rio_t/landmarks/candidates.h"
+#include "rio_t/landmarks/landmark_answer.h"
+#include "rio_t/landmarks/options.h"
 #include "rio_t/smoother/fixed_lag_smoother.h"
 
 namespace rio_t {
-
-/// A landmark as results show it.
-struct LandmarkPoint {
-  Eigen::Vector3d p_W = Eigen::Vector3d::Zero();  ///< [m]
-  double sigma = 0.0;                             ///< [m] root of the trace of its covariance
-  double snr_db = 0.0;                            ///< mean
-  std::uint64_t id = 0;                           ///< counts up; never used again
-  std::uint64_t sightings = 0;
-};
-
-/// The map's answer to a scan.
-struct LandmarkAnswer {
-  bool is_trusted = false;   ///< enough landmarks were seen again: the map has terms in the window
-  bool dropped_map = false;  ///< map and estimate contradicted each other
-  std::vector<LandmarkPoint> map;
-};
-
-struct LandmarkOptions {
-  bool enabled = false;
-  std::size_t max_landmarks = 24;  ///< in the window at once; the cost grows with the square and more
-  double range_sigma = 0.05;       ///< [m] of a point; the noise of its angles is what PointNoise learns
-};
 
 /// Probability that a pair within the gate is of one thing, if so many of the pairs match by chance.
 double probabilityOfTruth(double squared_sigmas, double by_chance);

@@ -6,7 +6,7 @@
 #include "rio_t/imu/noise.h"
 #include "rio_t/imu/rest_detector.h"
 #include "rio_t/imu/static_initializer.h"
-#include "rio_t/landmarks/landmark_map.h"
+#include "rio_t/landmarks/options.h"
 #include "rio_t/odometry/health_monitor.h"
 #include "rio_t/odometry/motion_initializer.h"
 #include "rio_t/sensors/barometer_channel.h"

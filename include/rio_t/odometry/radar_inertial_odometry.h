@@ -61,7 +61,7 @@ class RadarInertialOdometry {
   /// The time and the prior of the first node; none before initialisation. Only in the thread of `process`.
   using Start = Initialization;
   std::optional<Start> start() const;
-  /// What is known of a radar by its scans so far. Call it from the thread that calls `process`.
+  /// Returns what the scans of a radar have shown so far. Call it from the thread that calls `process`.
   RadarKnowledge radarKnowledge(std::size_t radar = 0) const;
   /// Noise of the IMU, measured over the last second. Any thread.
   MeasuredImuNoise imuNoise() const;

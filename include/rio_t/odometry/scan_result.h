@@ -5,7 +5,7 @@
 
 #include "rio_t/core/pose.h"
 #include "rio_t/graph/solver.h"
-#include "rio_t/landmarks/landmark_map.h"
+#include "rio_t/landmarks/landmark_answer.h"
 #include "rio_t/odometry/calibration_check.h"
 #include "rio_t/odometry/health_monitor.h"
 #include "rio_t/odometry/navigation_state.h"

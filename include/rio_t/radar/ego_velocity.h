@@ -12,6 +12,7 @@
 #include "rio_t/radar/doppler_span.h"
 #include "rio_t/radar/point_noise.h"
 #include "rio_t/radar/scan.h"
+#include "rio_t/radar/velocity_prior.h"
 
 namespace rio_t {
 
@@ -65,7 +66,7 @@ struct EgoVelocityOptions {
   double max_sigma = 0.5;                ///< [m/s] largest axis of the estimate, in motion
 };
 
-/// What the estimator knows of a radar by its scans so far.
+/// The scans of a radar have shown this so far.
 struct RadarKnowledge {
   PointVariances noise;
   KnownDoppler doppler_step, doppler_span;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "rio_t/radar/scan.h"
+#include "rio_t/radar/velocity_prior.h"
 
 namespace rio_t {
 

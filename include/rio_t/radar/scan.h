@@ -40,10 +40,4 @@ struct RadarDirection {
   std::size_t index = 0;  ///< into the scan's points
 };
 
-/// Velocity expected before the scan, e.g. from the IMU.
-struct VelocityPrior {
-  Eigen::Vector3d v_R = Eigen::Vector3d::Zero();         ///< radar velocity, radar frame [m/s]
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< [m^2/s^2], positive definite
-};
-
 }  // namespace rio_t

@@ -175,7 +175,7 @@ SortedEntries sortedEntries(const ParameterEntries& entries, const ParameterList
 /// The radar's configuration before its section is read: two radars share all but the frame.
 Config withoutSection(const Config& top_level, const std::string& name);
 
-/// What single values cannot show: one line for each contradiction between them.
+/// Returns one line for each contradiction between values that are valid one by one.
 std::vector<std::string> contradictions(const Config& config);
 
 }  // namespace rio_t

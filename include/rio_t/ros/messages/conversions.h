@@ -15,7 +15,7 @@
 #include "rio_t/ImuBias.h"
 #include "rio_t/imu/measurement.h"
 #include "rio_t/imu/units.h"
-#include "rio_t/landmarks/landmark_map.h"
+#include "rio_t/landmarks/landmark_answer.h"
 #include "rio_t/odometry/body_odometry.h"
 #include "rio_t/odometry/navigation_state.h"
 #include "rio_t/odometry/options.h"
