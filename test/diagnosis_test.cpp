@@ -237,6 +237,23 @@ TEST(Diagnosis, ADopplerFieldOfZerosIsNamedOnceThePlatformMoves) {
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kGood);
 }
 
+TEST(Diagnosis, AStepThatTheDopplersDoNotHaveIsNamed) {
+  RunEvidence evidence = goodRun();
+  RadarKnowledge& knowledge = evidence.radars.front().knowledge;
+  knowledge.read_doppler_step = {0.125, DopplerSource::kData};
+  const auto verdict = [&](double given) {
+    knowledge.doppler_step = {given, DopplerSource::kGiven};
+    return diagnose(evidence, Config{}).verdict;
+  };
+  for (const double fits : {0.0, 0.03, 0.125, 0.13}) EXPECT_EQ(verdict(fits), RunVerdict::kGood) << fits;
+  EXPECT_EQ(verdict(0.25), RunVerdict::kDoubtful);
+  expectSays(first(evidence), {"doppler_step_far: The Dopplers are multiples of 0.125 m/s, and "
+                               "radar_doppler_step says 0.25 m/s.",
+                               "Set radar_doppler_step: 0"});
+  knowledge.read_doppler_step = {0.0, DopplerSource::kData};  // it may be the resolution
+  EXPECT_EQ(verdict(0.25), RunVerdict::kGood);
+}
+
 TEST(Diagnosis, EachFilterHasItsKey) {
   const std::pair<PointVerdict, std::string> filters[] = {
       {PointVerdict::kTooNear, "radar_min_range"},

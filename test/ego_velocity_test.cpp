@@ -166,6 +166,8 @@ TEST(EgoVelocity, WhatIsGivenDoesNotFollowTheStep) {
   EgoVelocityEstimator step(o);
   observe(step, 0.5, random);
   EXPECT_EQ(step.knowledge().doppler_step.source, DopplerSource::kGiven);
+  EXPECT_EQ(step.knowledge().read_doppler_step.source, DopplerSource::kData);
+  EXPECT_NEAR(step.knowledge().read_doppler_step.value, 0.5, 1e-9);
   EXPECT_EQ(step.options().doppler_quantization, 0.25);
   EXPECT_NEAR(step.options().ransac_inlier_threshold, 0.125 + 2.5 * 0.035, 1e-9);
 }

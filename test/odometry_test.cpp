@@ -228,6 +228,16 @@ TEST_F(AtRest, AClockThatJumpsStartsTheEstimateAgain) {
   EXPECT_EQ(odometry.faults().at("imu_clock_restart"), 2u);
 }
 
+TEST_F(AtRest, AScanThatWaitsForAClockThatEndedIsGivenUp) {
+  run(104.0);
+  odometry.addScan(restScan(104.05));
+  time -= 50.0;
+  const std::vector<ScanResult> results = run(time + 0.6);
+  ASSERT_EQ(results.size(), 1u);
+  // Its velocity must not go to the start on the new clock.
+  EXPECT_EQ(results[0].rejected_because, "imu_not_covering");
+}
+
 TEST_F(AtRest, ThePosesFromBeforeAJumpAreNotLostAtTheEnd) {
   run(104.0);
   odometry.addScan(restScan(103.95));

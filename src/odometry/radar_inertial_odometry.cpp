@@ -16,7 +16,10 @@ struct RadarInertialOdometry::Impl {
         navigation(options, Eigen::Vector3d(0.0, 0.0, -options.gravity)),
         estimator(options, navigation, faults) {}
 
-  void takeInbox();
+  /// Returns the results of the scans that waited for a clock of the IMU that has ended.
+  std::vector<ScanResult> takeInbox();
+  /// The IMU that they wait for will not come.
+  std::vector<ScanResult> useWaitingScans();
   /// Takes the next scan that need not wait, if there is one.
   std::optional<RadarScan> nextScan(bool imu_has_ended);
   void shareStatus();
@@ -95,8 +98,7 @@ void RadarInertialOdometry::tune(const Tuning& tuning) {
 
 std::vector<ScanResult> RadarInertialOdometry::process(std::size_t max_scans) {
   Impl& m = *impl_;
-  m.takeInbox();
-  std::vector<ScanResult> results;
+  std::vector<ScanResult> results = m.takeInbox();
   while (results.size() < max_scans) {
     std::optional<RadarScan> scan = m.nextScan(false);
     if (!scan) break;
@@ -117,8 +119,7 @@ std::vector<ScanResult> RadarInertialOdometry::process(std::size_t max_scans) {
 std::vector<ScanResult> RadarInertialOdometry::finish() {
   Impl& m = *impl_;
   std::vector<ScanResult> results = process();
-  while (std::optional<RadarScan> scan = m.nextScan(true))
-    results.push_back(m.estimator.useScan(std::move(*scan), true));
+  for (ScanResult& last : m.useWaitingScans()) results.push_back(std::move(last));
   m.shareStatus();
   // The poses still in the window belong to the last scan.
   for (const StampedPose& pose : m.estimator.remainingPoses()) {
@@ -142,7 +143,15 @@ std::optional<RadarScan> RadarInertialOdometry::Impl::nextScan(bool imu_has_ende
   return scan;
 }
 
-void RadarInertialOdometry::Impl::takeInbox() {
+std::vector<ScanResult> RadarInertialOdometry::Impl::useWaitingScans() {
+  std::vector<ScanResult> results;
+  while (std::optional<RadarScan> scan = nextScan(true))
+    results.push_back(estimator.useScan(std::move(*scan), true));
+  return results;
+}
+
+std::vector<ScanResult> RadarInertialOdometry::Impl::takeInbox() {
+  std::vector<ScanResult> results;
   Inbox taken;
   {
     const std::lock_guard<std::mutex> lock(inbox_mutex);
@@ -150,12 +159,16 @@ void RadarInertialOdometry::Impl::takeInbox() {
     std::swap(taken, inbox);
   }
   if (taken.tuning) estimator.tune(*taken.tuning);
+  if (estimator.clockRestarts() != taken.clock_restarts) {
+    results = useWaitingScans();  // they belong to the clock before
+    estimator.startAgain(taken.clock_restarts);
+  }
   const bool scan_came = !taken.scans.empty();
   for (RadarScan& scan : taken.scans) waiting_scans.push_back(std::move(scan));
-  if (estimator.clockRestarts() != taken.clock_restarts) estimator.startAgain(taken.clock_restarts);
   estimator.addImu(taken.imu);
   for (const Pressure& pressure : taken.pressures) estimator.addPressure(pressure);
   estimator.keepUp(scan_came, waiting_scans);
+  return results;
 }
 
 void RadarInertialOdometry::Impl::shareStatus() {

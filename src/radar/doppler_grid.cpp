@@ -102,12 +102,10 @@ std::size_t mostWithin(const Batch& ascending, double width) {
 DopplerGrid::DopplerGrid(double given) {
   if (!(given >= 0.0) || !std::isfinite(given))
     throw std::invalid_argument("Doppler grid: the step must be finite and at least 0 m/s");
-  step_ = given > 0.0 ? KnownDoppler{given < kLeastStep ? 0.0 : given, DopplerSource::kGiven}
-                      : KnownDoppler{kLargestUsualStep, DopplerSource::kUnknown};
+  if (given > 0.0) given_ = KnownDoppler{given < kLeastStep ? 0.0 : given, DopplerSource::kGiven};
 }
 
 void DopplerGrid::add(const RadarScan& scan) {
-  if (step_.source == DopplerSource::kGiven) return;
   for (const RadarPoint& point : scan.points) {
     const double size = std::abs(point.doppler);
     // Zero is a multiple of every step.
@@ -116,7 +114,7 @@ void DopplerGrid::add(const RadarScan& scan) {
     if (++count_ < kBatch) continue;
     judge();
     // Values without a step take the longest search: one batch a scan is enough.
-    if (step_.value == 0.0) return;
+    if (read_.value == 0.0) return;
   }
 }
 
@@ -125,14 +123,14 @@ void DopplerGrid::judge() {
   count_ = 0;
   std::sort(batch_.begin(), batch_.end());
   std::optional<Reading> found;
-  if (step_.source == DopplerSource::kData && step_.value > 0.0) {
+  if (read_.source == DopplerSource::kData && read_.value > 0.0) {
     // The known step stays as it is: a misfit that comes near to a multiple must not move it.
-    if (countMisfits(batch_, {step_.value, known_at_}) <= kMaxMisfits) {
+    if (countMisfits(batch_, {read_.value, known_at_}) <= kMaxMisfits) {
       without_step_ = 0;
       return;
     }
     // Perhaps all values so far were multiples of two steps, or three.
-    found = largestStep(batch_, {step_.value, known_at_}, kLeastStep);
+    found = largestStep(batch_, {read_.value, known_at_}, kLeastStep);
   }
   if (!found) {
     // If all values are the same, nobody knows how many steps that value is. Half of the batch waits for
@@ -140,7 +138,7 @@ void DopplerGrid::judge() {
     if (mostWithin(batch_, 4.0 * kRounding) + kMaxMisfits >= kBatch) {
       const double value = batch_[kBatch / 2];
       const bool repeats = mostWithin(batch_, kSame) + kMaxMisfits >= kBatch;
-      if (step_.source == DopplerSource::kUnknown && repeats && value < kLargestStep) step_.value = value;
+      if (read_.source == DopplerSource::kUnknown && repeats && value < kLargestStep) read_.value = value;
       count_ = kBatch / 2;
       return;
     }
@@ -152,11 +150,11 @@ void DopplerGrid::judge() {
   }
   if (found) {
     without_step_ = 0;
-    step_ = {found->step, DopplerSource::kData};
+    read_ = {found->step, DopplerSource::kData};
     known_at_ = found->known_at;
   } else if (2 * mostWithin(batch_, kSame) < kBatch && ++without_step_ >= kBatchesWithoutStep) {
     // Without steps no value repeats. At rest, among misfits, one step does.
-    step_ = {0.0, DopplerSource::kData};
+    read_ = {0.0, DopplerSource::kData};
   }
 }
 

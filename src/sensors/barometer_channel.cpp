@@ -57,7 +57,7 @@ const char* BarometerChannel::add(const Pressure& pressure, Time newest_imu) {
   if (!reference_) reference_ = pressure.pascal;
   const double height = heightOfPressure(pressure.pascal, *reference_, options_.temperature);
   const double since = newest_ ? pressure.time - *newest_ : 0.0;
-  const double span = std::min(since, kMissing * meanSpacing().value_or(since));
+  const double span = std::min(since, kMissing * meanSpacing().value_or(kMeanSpan));
   newest_ = pressure.time;
   noise_.add(pressure.time, Eigen::Vector3d(height, 0.0, 0.0));
   if (span == 0.0) return nullptr;  // the first one tells no rate

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <string>
 
 #include "rio_t/radar/scan.h"
@@ -33,14 +34,16 @@ struct KnownDoppler {
 /// section 9.7). The answer depends only on the values and their order. Not thread-safe.
 class DopplerGrid {
  public:
-  /// `given` is the step [m/s]. 0: DopplerGrid reads the step off the data; any other value below 0.02: the
+  /// `given` is the step [m/s] that holds. 0: the one that the data show; any other value below 0.02: the
   /// radar has none. Throws std::invalid_argument if it is negative or not finite.
   explicit DopplerGrid(double given);
 
   /// Takes all points of a scan, wherever they lie. 45 points take 1 us. If the radar has no steps, `add`
   /// tries all candidates again and again: that takes 9 us at 1 m/s and 70 us at 10 m/s.
   void add(const RadarScan& scan);
-  KnownDoppler step() const { return step_; }
+  KnownDoppler step() const { return given_.value_or(read_); }
+  /// As the data show it, even if another one is given.
+  KnownDoppler read() const { return read_; }
 
   /// [m/s] The step while all values are zero: the largest of the usual steps, 0.03 to 0.5. A smaller one
   /// would take a slow motion for rest, and be sure of it.
@@ -56,7 +59,8 @@ class DopplerGrid {
 
   void judge();
 
-  KnownDoppler step_;
+  std::optional<KnownDoppler> given_;  // read-only after construction
+  KnownDoppler read_{kLargestUsualStep, DopplerSource::kUnknown};
   double known_at_ = 1.0;  ///< [steps] of the value that it was read off
   Batch batch_ = {};       ///< sizes of Dopplers [m/s]
   std::size_t count_ = 0;  ///< of `batch_` that are in use

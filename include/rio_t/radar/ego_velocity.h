@@ -70,6 +70,7 @@ struct EgoVelocityOptions {
 struct RadarKnowledge {
   PointVariances noise;
   KnownDoppler doppler_step, doppler_span;
+  KnownDoppler read_doppler_step;  ///< as the data show it, even if another one is given
 };
 
 /// Whether a scan gave a velocity and, if not, why.
@@ -151,7 +152,7 @@ class EgoVelocityEstimator {
   void learn(const RadarScan& scan, const EgoVelocity& estimated,
              const std::optional<VelocityPrior>& prior = std::nullopt,
              const DopplerLikelihood* world = nullptr);
-  RadarKnowledge knowledge() const { return {noise(), grid_.step(), span_.known()}; }
+  RadarKnowledge knowledge() const { return {noise(), grid_.step(), span_.known(), grid_.read()}; }
   const PointVariances& noise() const { return noise_.variances(); }
   /// The options in use. Those that are 0, "from the step", have the values that follow from it.
   const EgoVelocityOptions& options() const { return options_; }

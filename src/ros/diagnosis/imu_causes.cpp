@@ -28,7 +28,8 @@ constexpr ImuFault kImuFaults[] = {
     {"imu_repeated", 1, "IMU samples have the values of the sample before, although the IMU turns.",
      "Let the driver of the IMU publish a sample only if it has read a new one."},
     {"imu_stamp_jump", 1, "IMU samples are stamped far ahead of the one before.",
-     "Look at the clock of the driver. For an IMU with pauses, raise imu_jump_patience."},
+     "Look at the clock of the driver. For an IMU with pauses, raise imu_jump_patience and "
+     "max_bridged_imu_gap above them."},
     {"imu_stuck", 1, "IMU samples have an axis that stays at one reading.",
      "Look at the cable and the driver of the IMU: one of its axes fails."}};
 

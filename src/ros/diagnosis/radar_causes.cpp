@@ -20,6 +20,7 @@ class RadarCauses {
     if (radar_.scans_total < kEnoughScans) return;
     addNotFinite();
     addZeroDoppler();
+    addStep();
     addPointFilter();
     addStamps();
     addVelocities();
@@ -55,6 +56,19 @@ class RadarCauses {
               number(DopplerGrid::kLargestUsualStep) + " m/s for " + std::to_string(radar_.scans_fast) +
               " scans.",
           "Check " + key_ + "radar_field_doppler, and whether the driver of the radar fills this field.");
+  }
+
+  /// Too large a step takes slow motion for rest, and moving objects for the static world.
+  void addStep() {
+    const KnownDoppler& used = radar_.knowledge.doppler_step;
+    const KnownDoppler& read = radar_.knowledge.read_doppler_step;
+    if (used.source != DopplerSource::kGiven || read.source != DopplerSource::kData) return;
+    constexpr double kOther = 1.5;  // a wrong step is at least two of the true ones, and none may be rounded
+    if (read.value == 0.0 || used.value < kOther * read.value) return;
+    cause("doppler_step_far", 1.0 - read.value / used.value,
+          "The Dopplers" + of_ + " are multiples of " + shortText(read.value, 3) + " m/s, and " + key_ +
+              "radar_doppler_step says " + number(used.value) + " m/s.",
+          "Set " + key_ + "radar_doppler_step: 0, and the step is read off the data.");
   }
 
   /// A reason why scans were rejected, or gave no velocity before the start.
