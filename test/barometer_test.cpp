@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "batch_of.h"
 #include "numeric_jacobian.h"
 #include "rio_t/factors/barometer_factor.h"
 #include "rio_t/sensors/barometer_channel.h"
@@ -95,6 +96,23 @@ TEST(Barometer, HoldsTheHeightOfADrone) {
   EXPECT_EQ(with.count(0.0, 120.0, isShock), 0);
   EXPECT_LT(with.heightRms(60.0, 120.0), 0.15);
   EXPECT_LT(with.heightRms(60.0, 120.0), without.heightRms(60.0, 120.0));
+}
+
+TEST(Barometer, TheBatchHoldsTheHeightThroughAStepOfThePressure) {
+  const auto heightRms = [](bool barometer, double step) {
+    DroneRun run(3, 90.0, barometer);
+    run.setup.barometer.shocks = {{50.0, 1e3, step}};
+    run.run();
+    const BatchResult batch = batchOf(run);
+    EXPECT_TRUE(batch.solution.converged());
+    EXPECT_EQ(batch.solution.barometer_bias.has_value(), barometer);
+    run.states = batch.trajectory;
+    return run.heightRms(6.0, 90.0);
+  };
+  const double with = heightRms(true, 0.0);
+  EXPECT_LT(with, 0.1);
+  EXPECT_LT(with, heightRms(false, 0.0));
+  EXPECT_LT(heightRms(true, 100.0), with + 0.1) << "8 m by the pressure";
 }
 
 TEST(Barometer, ShocksOfThePressureDoNoHarm) {

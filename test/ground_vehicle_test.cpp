@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "batch_of.h"
 #include "numeric_jacobian.h"
 #include "rio_t/core/so3.h"
 #include "rio_t/factors/ground_vehicle_factor.h"
@@ -79,6 +80,29 @@ TEST(GroundVehicle, AKartKeepsItsHeight) {
     EXPECT_LT(with.heightRms(), 0.15) << seed;
     EXPECT_FALSE(with.contradictedAt()) << seed;
   }
+}
+
+TEST(GroundVehicle, TheBatchKnowsThatTheKartStaysOnTheGround) {
+  const auto heightRms = [](bool constrained) {
+    VehicleRun run("kart", 4, 60.0, constrained);
+    run.takeKart();
+    run.run();
+    const BatchResult batch = batchOf(run);
+    EXPECT_TRUE(batch.solution.converged());
+    EXPECT_EQ(batch.solution.T_IV.has_value(), constrained);
+    run.states = batch.trajectory;
+    return run.heightRms();
+  };
+  const double with = heightRms(true);
+  EXPECT_LT(with, 0.15);
+  EXPECT_LT(with, 0.5 * heightRms(false));
+}
+
+TEST(GroundVehicle, TheBatchOfADroneIsFree) {
+  VehicleRun run("drone", 1, 40.0, true);
+  run.run();
+  ASSERT_TRUE(run.contradictedAt());
+  EXPECT_FALSE(batchOf(run).solution.T_IV);
 }
 
 TEST(GroundVehicle, ADroneIsToldWithinTenSecondsAndNotHarmed) {

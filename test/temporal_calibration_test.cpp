@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "rio_t/odometry/batch_odometry.h"
+#include "batch_of.h"
 #include "simulated_run.h"
 
 namespace rio_t {
@@ -333,15 +333,6 @@ TEST(TemporalCalibration, WhatAStepHasPulledDoesNotPullTheNewOffset) {
   }
   EXPECT_LT(std::sqrt(squares), 8.0e-3);
   EXPECT_LT(in_sigmas, 3.0);
-}
-
-/// Whole-trajectory batch over the scans of an online run.
-BatchResult batchOf(const SimulatedRun& run) {
-  BatchOdometry batch(run.options, BatchOptions());
-  for (const ImuMeasurement& sample : simulation::simulate(run.motion, run.setup).imu.samples)
-    batch.addImu(sample);
-  for (const ScanResult& result : run.results) batch.addResult(result);
-  return batch.solve(*run.odometry->start());
 }
 
 TEST(TemporalCalibration, TheBatchKnowsWhenTheOffsetStepped) {

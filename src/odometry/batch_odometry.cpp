@@ -94,6 +94,9 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
   problem.prior = start.prior;
   problem.radar = start.radar;
   for (std::size_t k = 0; k < options_.radarCount(); ++k) problem.radars.push_back(options_.ofRadar(k));
+  problem.vehicle = vehicle(start);
+  problem.heights = heights();
+  problem.barometer_drift = options_.barometer.drift;
   problem.guess.push_back({start.time, start.prior.x0});
   std::vector<std::deque<Time>> steps(problem.radars.size());  // the stamps of the first scans after them
   for (const ScanResult& result : scans_)
@@ -112,10 +115,38 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
       scan.offset_stepped = true;
     if (result.at_rest) scan.rest_velocity_sigma = result.rest_velocity_sigma;
     if (result.used) setMeasurement(result, scan);
+    scan.moves_as_vehicle = result.ground_vehicle && result.ground_vehicle->used;
     problem.scans.push_back(scan);
     run.source.push_back(i);
   }
   return run;
+}
+
+std::optional<BatchVehicle> BatchOdometry::vehicle(const RadarInertialOdometry::Start& start) const {
+  // A platform that proved to be no vehicle never was one.
+  const auto contradicts = [](const ScanResult& result) {
+    return result.ground_vehicle && result.ground_vehicle->is_contradicted;
+  };
+  if (options_.platform != Platform::kGroundVehicle || std::any_of(scans_.begin(), scans_.end(), contradicts))
+    return std::nullopt;
+  const GroundVehicleOptions& o = options_.ground_vehicle;
+  const double slope_sigma = start.from == InitializedFrom::kRest ? o.start_slope_sigma : 0.0;
+  return BatchVehicle{o.T_IV, o.rotation_sigma, slope_sigma, {o.sideways_sigma, o.vertical_sigma}};
+}
+
+std::vector<BatchHeight> BatchOdometry::heights() const {
+  std::vector<BatchHeight> heights;
+  for (const ScanResult& result : scans_) {
+    for (const BarometerAnswer& mean : result.barometer) {
+      if (mean.rejected_because.empty())
+        heights.push_back({mean.time, mean.height + mean.bias, mean.noise_sigma, mean.stepped});
+      // The pressure moved before it was noticed, as BarometerChannel does.
+      while (mean.rejected_because == "pressure_moves" && !heights.empty() &&
+             mean.time - heights.back().time < options_.smoother.window)
+        heights.pop_back();
+    }
+  }
+  return heights;
 }
 
 std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solution) const {

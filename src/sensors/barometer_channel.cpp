@@ -31,8 +31,6 @@ constexpr double kMaxAhead = 1.0;
 /// Mean spacings that a sample stands for at most. If samples are missing, the next one is not more accurate;
 /// samples that come in pairs are as far apart as this.
 constexpr double kMissing = 2.0;
-/// [m] Sigma of an unknown bias.
-constexpr double kUnknownBias = 100.0;
 /// Means that wait for a node: those of a minute without scans.
 constexpr std::size_t kMaxWaiting = 600;
 
@@ -100,7 +98,7 @@ void BarometerChannel::addBias(FixedLagSmoother& smoother, double bias) {
   if (bias_ && window.has(*bias_)) bias_->is_retired = true;
   bias_ = window.addCalibration(std::make_shared<VectorManifold>(1), Eigen::VectorXd::Constant(1, bias));
   addPrior(window, {bias_.get()},
-           {Eigen::MatrixXd::Constant(1, 1, 1.0 / kUnknownBias), Eigen::VectorXd::Zero(1)});
+           {Eigen::MatrixXd::Constant(1, 1, 1.0 / kUnknownBarometerBias), Eigen::VectorXd::Zero(1)});
   smoother.settle();
 }
 
@@ -213,6 +211,7 @@ BarometerAnswer BarometerChannel::use(const Mean& mean, const NodeEstimate& node
   answer.bias = bias_->x[0];
   answer.bias_sigma = std::sqrt(std::max(0.0, P(StateBlock::kTangent, StateBlock::kTangent)));
   answer.height = mean.height() - answer.bias;
+  answer.noise_sigma = std::sqrt(noise);
   answer.innovation = answer.height - (predicted->x.p_W().z() + delay * predicted->x.v_W().z());
   const double variance_of_prediction = std::max(0.0, (J * P * J.transpose())(0, 0));
   answer.innovation_sigma = std::sqrt(variance_of_prediction + noise);

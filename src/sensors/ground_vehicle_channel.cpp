@@ -14,9 +14,6 @@ namespace {
 constexpr double kSpacing = 0.1;
 /// [s] A longer pause of the scans does not count as judged motion.
 constexpr double kMaxSpan = 0.5;
-/// [s] The gyro is averaged over so long to either side of a node, so that vibration does not act on the
-/// lever of the point.
-constexpr double kGyroHalfWidth = 0.05;
 /// [s] of motion that is judged, and the mean of min(1, squared sigmas / gate^2) above which it is not that
 /// of the vehicle (docs/method.md, section 5.9).
 constexpr double kJudgedMotion = 5.0;
@@ -47,7 +44,7 @@ void GroundVehicleChannel::join(FixedLagSmoother& smoother, bool at_rest) {
 }
 
 Eigen::Vector3d GroundVehicleChannel::omegaAt(Time time) const {
-  return imu_->mean(time, kGyroHalfWidth).angular_velocity;
+  return imu_->mean(time, kVehicleGyroHalfWidth).angular_velocity;
 }
 
 std::optional<GroundVehicleAnswer> GroundVehicleChannel::judge(const FixedLagSmoother& smoother, Time time) {

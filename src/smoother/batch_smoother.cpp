@@ -10,6 +10,8 @@
 #include <utility>
 
 #include "rio_t/core/so3.h"
+#include "rio_t/factors/barometer_factor.h"
+#include "rio_t/factors/ground_vehicle_factor.h"
 #include "rio_t/factors/imu_factor.h"
 #include "rio_t/factors/random_walk_factor.h"
 #include "rio_t/factors/zero_velocity_factor.h"
@@ -133,6 +135,51 @@ void BatchSmoother::start(const BatchProblem& problem, const StateBlock& x,
   for (std::size_t k = 0; k < mounting.size(); ++k)
     if (is_estimated) graph.extrinsics[k]->x = stored(mounting[k]);
   for (Block* offset : offsets) graph.clocks.push_back({offset});
+  if (problem.vehicle) addVehicle(*problem.vehicle, graph);
+}
+
+void BatchSmoother::addVehicle(const BatchVehicle& vehicle, Graph& graph) const {
+  const auto manifold = std::make_shared<ExtrinsicsManifold>(EstimateExtrinsics::kRotation);
+  graph.vehicle = graph.window.addCalibration(manifold, stored(vehicle.T_IV)).get();
+  const Eigen::Vector3d weights = Eigen::Vector3d::Constant(1.0 / vehicle.rotation_sigma);
+  addPrior(graph.window, {graph.vehicle}, {weights.asDiagonal(), Eigen::Vector3d::Zero()});
+  if (vehicle.start_slope_sigma > 0.0)
+    graph.window.add(std::make_unique<LevelGroundFactor>(vehicle.start_slope_sigma),
+                     {graph.nodes.front().motion, graph.vehicle});
+}
+
+void BatchSmoother::constrain(const BatchVehicle& vehicle, Graph& graph) const {
+  Graph::Node& node = graph.nodes.back();
+  if (std::exchange(node.moves_as_vehicle, true)) return;  // the scan of another radar told it
+  const Eigen::Vector3d omega_I = imu_->mean(*node.motion->time, kVehicleGyroHalfWidth).angular_velocity;
+  graph.window.add(std::make_unique<GroundVehicleFactor>(omega_I, vehicle.sigmas),
+                   {node.motion, node.biases, graph.vehicle}, loss_);
+}
+
+void BatchSmoother::addHeights(const BatchProblem& problem, Graph& graph) {
+  const auto manifold = std::make_shared<VectorManifold>(1);
+  const std::vector<NodeEstimate> states = graph.states();
+  Block*& bias = graph.barometer_bias;
+  for (const BatchHeight& mean : problem.heights) {
+    const std::size_t k = nearestNode(states, mean.time);
+    const Time time = states[k].time;
+    const bool is_unknown = bias == nullptr || mean.stepped;
+    if (is_unknown || *bias->time < time) {
+      const Eigen::VectorXd guess = Eigen::VectorXd::Constant(1, mean.height - states[k].x.p_W().z());
+      Block& next = graph.window.addNode(time, manifold, guess);
+      if (is_unknown) {
+        addPrior(graph.window, {&next},
+                 {Eigen::MatrixXd::Constant(1, 1, 1.0 / kUnknownBarometerBias), Eigen::VectorXd::Zero(1)});
+      } else {
+        const double sigma = problem.barometer_drift * std::sqrt(time - *bias->time);
+        graph.window.add(std::make_unique<RandomWalkFactor>(Eigen::VectorXd::Constant(1, sigma)),
+                         {bias, &next});
+      }
+      bias = &next;
+    }
+    graph.window.add(std::make_unique<BarometerFactor>(mean.height, mean.time - time, mean.sigma),
+                     {graph.nodes[k].motion, bias});
+  }
 }
 
 std::vector<NodeEstimate> BatchSmoother::Graph::states() const {
@@ -171,7 +218,9 @@ BatchSmoother::Graph BatchSmoother::place(const BatchProblem& problem, const std
     graph.scans[i] = {graph.nodes.size() - 1, offset, graph.extrinsics[scan.radar],
                       is_estimated ? std::make_shared<SlowMotion>() : nullptr};
     addTerms(scan, graph.scans[i], t_O[i], graph);
+    if (problem.vehicle && scan.moves_as_vehicle) constrain(*problem.vehicle, graph);
   }
+  addHeights(problem, graph);
   if (!is_estimated) return graph;
   const std::vector<NodeEstimate> nodes = graph.states();
   std::vector<std::vector<SlowMotion*>> motions(graph.extrinsics.size());
@@ -322,6 +371,8 @@ void BatchSmoother::read(const Graph& graph, BatchSolution& solution) {
   for (const Graph::Scan& scan : graph.scans) solution.scans.push_back({scan.node, scan.offset->x[0], {}});
   solution.extrinsics.clear();
   for (const Block* block : graph.extrinsics) solution.extrinsics.push_back(toExtrinsics(block->x.data()));
+  if (graph.vehicle != nullptr) solution.T_IV = toExtrinsics(graph.vehicle->x.data());
+  if (graph.barometer_bias != nullptr) solution.barometer_bias = graph.barometer_bias->x[0];
 }
 
 void BatchSmoother::readCovariances(const Graph& graph, const Solution& solved, const BlockCovariances& P,
@@ -340,6 +391,11 @@ void BatchSmoother::readCovariances(const Graph& graph, const Solution& solved, 
   for (const Block* block : graph.extrinsics)
     solution.extrinsics_covariances.push_back(block->is_constant ? Eigen::MatrixXd()
                                                                  : P[index.at(block)].at(index.at(block)));
+  const auto sigmasOf = [&](const Block* block) -> Eigen::VectorXd {
+    return P[index.at(block)].at(index.at(block)).diagonal().cwiseSqrt();
+  };
+  if (graph.vehicle != nullptr) solution.q_IV_sigma = sigmasOf(graph.vehicle);
+  if (graph.barometer_bias != nullptr) solution.barometer_bias_sigma = sigmasOf(graph.barometer_bias)[0];
 }
 
 }  // namespace rio_t

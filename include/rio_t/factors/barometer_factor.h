@@ -6,6 +6,9 @@
 
 namespace rio_t {
 
+/// [m] Sigma of an unknown bias.
+constexpr double kUnknownBarometerBias = 100.0;
+
 /// A mean of heights by the pressure, above the place of the first pressure, off by a bias (docs/method.md,
 /// section 5.10): residual (p_W,z + delay v_W,z + bias - height) / sigma. Blocks: motion, bias [m].
 class BarometerFactor final : public ceres::SizedCostFunction<1, StateBlock::kMotion, 1> {

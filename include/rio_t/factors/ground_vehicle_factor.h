@@ -20,6 +20,10 @@ struct VehicleVelocity {
 /// `T_IV`: q_IV, and p_IV, the point in I [m]. `omega_I` is what the gyro reads [rad/s], bias included.
 VehicleVelocity vehicleVelocity(const StateView& x, const Extrinsics& T_IV, const Eigen::Vector3d& omega_I);
 
+/// [s] The gyro is averaged over so long to either side of a node, so that vibration does not act on the
+/// lever of the point.
+constexpr double kVehicleGyroHalfWidth = 0.05;
+
 /// A wheeled vehicle moves neither sideways nor up (docs/method.md, section 5.9): residual (v_V,y, v_V,z),
 /// each over its sigma. Blocks: motion, biases, vehicle frame (ExtrinsicsBlock, its lever arm held).
 class GroundVehicleFactor final

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "rio_t/imu/input_check.h"
@@ -45,6 +46,10 @@ class BatchOdometry {
 
   RadarVelocityMeasurement measurement(const ScanResult& result) const;
   Run makeRun(const RadarInertialOdometry::Start& start) const;
+  /// None if the platform is free, or was not the vehicle that the options say.
+  std::optional<BatchVehicle> vehicle(const RadarInertialOdometry::Start& start) const;
+  /// The means of the pressures that the online run used.
+  std::vector<BatchHeight> heights() const;
   /// Sets what the scan gives to the graph.
   void setMeasurement(const ScanResult& result, BatchScan& scan) const;
   std::vector<NavigationState> trajectory(const BatchSolution& solution) const;

@@ -41,6 +41,7 @@ struct BarometerAnswer {
   Time time;                      ///< mean of the samples
   int samples = 0;                ///< in the mean
   double height = 0.0;            ///< [m] above the start, by the bias before this mean
+  double noise_sigma = 0.0;       ///< [m] of the mean
   double innovation = 0.0;        ///< [m] measured minus predicted
   double innovation_sigma = 0.0;  ///< [m]
   double bias = 0.0;              ///< [m]

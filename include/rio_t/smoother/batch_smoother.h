@@ -29,6 +29,7 @@ struct BatchScan {
   std::optional<RadarVelocityMeasurement> velocity;
   std::optional<DopplerMeasurement> doppler;  ///< instead of the velocity; neither: the scan is not used
   std::optional<double> rest_velocity_sigma;  ///< [m/s] set if the platform is at rest
+  bool moves_as_vehicle = false;              ///< the constraint of the vehicle holds at its node
   bool offset_stepped = false;                ///< t_O may have stepped since the scan before
 
   /// Null if the scan is not used.
@@ -38,12 +39,31 @@ struct BatchScan {
   }
 };
 
+/// A vehicle on wheels, as for GroundVehicleFactor.
+struct BatchVehicle {
+  Extrinsics T_IV;              ///< the vehicle frame, as configured
+  double rotation_sigma = 0.0;  ///< [rad] prior on its rotation, about each axis
+  /// [rad] of the ground at the first node, as for LevelGroundFactor; 0: not known
+  double start_slope_sigma = 0.0;
+  Eigen::Vector2d sigmas;  ///< [m/s] sideways and vertical
+};
+
+/// A mean of heights by the pressure, as for BarometerFactor.
+struct BatchHeight {
+  Time time;
+  double height = 0.0, sigma = 0.0;  ///< [m]
+  bool stepped = false;              ///< the bias may have stepped since the mean before
+};
+
 struct BatchProblem {
   Time start;             ///< of the first node
   NodePrior prior;        ///< on it, and on the calibration of `radar`
   std::size_t radar = 0;  ///< which one the prior knows
   std::vector<CalibrationPrior> radars;
   std::vector<BatchScan> scans;
+  std::optional<BatchVehicle> vehicle;
+  std::vector<BatchHeight> heights;  ///< in order of time
+  double barometer_drift = 0.0;      ///< [m/sqrt(s)] random walk of their bias
   /// Initial states in order of time, at least one. The IMU carries them to the nodes.
   std::vector<NodeEstimate> guess;
 };
@@ -62,6 +82,12 @@ struct BatchSolution {
   std::vector<Extrinsics> extrinsics;  ///< of each radar
   /// Of each radar, in the tangent of ExtrinsicsManifold; empty where the extrinsics are not estimated.
   std::vector<Eigen::MatrixXd> extrinsics_covariances;
+  /// The frame of the vehicle, if there is one, and the sigmas of its rotation [rad] about the axes of I.
+  std::optional<Extrinsics> T_IV;
+  Eigen::Vector3d q_IV_sigma = Eigen::Vector3d::Zero();
+  /// [m] The last bias of the barometer, if there is one, and its sigma.
+  std::optional<double> barometer_bias;
+  double barometer_bias_sigma = 0.0;
   LinearSystem system;  ///< at the solution, without its blocks
   int iterations = 0;   ///< of the solver, all placements together
   int placements = 0;   ///< how often the nodes were placed
@@ -72,6 +98,7 @@ struct BatchSolution {
 /// The graph of FixedLagSmoother over all the data at once, with the same factors and nothing marginalised.
 /// Each scan has its own t_O, as in the paper (eq. 8-10), so that the offset may drift over the run. Each
 /// block of biases holds for SmootherOptions::window seconds, and a random walk links it to the next. The
+/// bias of a barometer walks from mean to mean; the frame of a vehicle is one block for the whole run. The
 /// solver stops when the next step is shorter than a hundredth of a standard deviation in every direction.
 /// The solution stands if that step moves no block by more than a tenth of its standard deviation.
 /// With the imu model a node stands at the time of measurement of its scan. If the offset moves, the nodes
@@ -94,7 +121,8 @@ class BatchSmoother {
     struct Node {
       Block* motion = nullptr;
       Block* biases = nullptr;
-      bool rests = false;  ///< a term says so
+      // A term says so:
+      bool rests = false, moves_as_vehicle = false;
     };
     std::vector<Node> nodes;
     std::vector<NodeEstimate> states() const;
@@ -105,7 +133,9 @@ class BatchSmoother {
       std::shared_ptr<SlowMotion> slow;  ///< null if the mounting is not estimated
     };
     std::vector<Scan> scans;
-    std::vector<Block*> extrinsics;  ///< by radar
+    std::vector<Block*> extrinsics;   ///< by radar
+    Block* vehicle = nullptr;         ///< its frame, if there is one
+    Block* barometer_bias = nullptr;  ///< the newest, if there is one
     struct Clock {
       Block* offset = nullptr;  ///< the newest
       bool stepped = false;     ///< since the newest
@@ -124,6 +154,12 @@ class BatchSmoother {
   Block* offsetOf(const BatchProblem& problem, const BatchScan& scan, double t_O, Graph& graph) const;
   /// Adds what a scan shows: its points or its velocity, and rest.
   void addTerms(const BatchScan& scan, const Graph::Scan& at, double t_O, Graph& graph) const;
+  /// Adds the frame of the vehicle, which stands at the first node.
+  void addVehicle(const BatchVehicle& vehicle, Graph& graph) const;
+  /// The vehicle moves as such at the last node.
+  void constrain(const BatchVehicle& vehicle, Graph& graph) const;
+  /// Adds the means of the pressures to the nodes that are near.
+  static void addHeights(const BatchProblem& problem, Graph& graph);
   Block& addOffset(Window& window, Time time, double t_O) const;
   /// Biases that hold from `since` on. The time of the block is their end, `window` later.
   Block& addBiases(Window& window, Time since, const StateBlock& x) const;

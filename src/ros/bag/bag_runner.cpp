@@ -160,6 +160,18 @@ class BagJob {
     return finish(play(player, run_.config, log, 0.0, 1.0), log, output_.get());
   }
 
+  /// What the batch says of the vehicle and of the barometer. Which terms count, the online run has said.
+  static void addAids(const BatchSolution& solution, RunSummary* summary) {
+    if (summary->ground_vehicle && solution.T_IV) {
+      summary->ground_vehicle->rotation = solution.T_IV->q_IR;
+      summary->ground_vehicle->rotation_sigma = solution.q_IV_sigma;
+    }
+    if (summary->barometer && solution.barometer_bias) {
+      summary->barometer->bias = *solution.barometer_bias;
+      summary->barometer->bias_sigma = solution.barometer_bias_sigma;
+    }
+  }
+
   RunSummary batch() {
     const OdometryOptions& options = run_.config.odometry;
     BatchOptions batch_options;
@@ -179,13 +191,8 @@ class BagJob {
     summary.batch =
         BatchSummary{result.solution.iterations, result.solution.placements, result.solution.converged()};
     summary.solver_terminations = {{toString(result.solution.termination), 1}};
+    addAids(result.solution, &summary);
     summary.diagnosis = diagnose(summary, run_.config);
-    if (summary.barometer || summary.ground_vehicle)
-      summary.warnings.insert(
-          summary.warnings.begin(),
-          "mode: batch uses neither the barometer nor platform: ground_vehicle; the online run does");
-    summary.barometer.reset();
-    summary.ground_vehicle.reset();
     return finish(std::move(summary), log, output_.get());
   }
 
