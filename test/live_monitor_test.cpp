@@ -548,6 +548,48 @@ TEST_F(TwoRadarDiagnostics, NameTheRadarThatIsMostlyRejected) {
   EXPECT_EQ(status.level, DiagnosticStatus::OK);
 }
 
+/// A cloud that cannot be read is nothing to "IMU and radar are coming".
+TEST_F(TwoRadarDiagnostics, NameWhyTheScansOfTheOnlyRadarAreMostlyRejected) {
+  LiveMonitor one{Config()};
+  Status status;
+  for (int k = 0; k < 5; ++k) {
+    one.imu();
+    one.imuUsable(Time());
+    for (int i = 0; i < 10; ++i) {
+      one.scan();
+      one.dropped(0, "cloud_not_usable");
+    }
+    status = Status();
+    one.describeInput(status, &session);
+  }
+  EXPECT_EQ(status.level, DiagnosticStatus::WARN);
+  EXPECT_EQ(status.message, "0 of the last 40 scans were used, rejected mostly as cloud_not_usable");
+}
+
+/// What was wrong earlier in the run may be over.
+TEST_F(TwoRadarDiagnostics, SayWhatBecomesOfTheScansNowWhileTheImuCarriesTheEstimate) {
+  for (int k = 0; k < 30; ++k) feed(0, false);
+  second(20, 20, 20);
+  for (int k = 0; k < 12; ++k) {
+    monitor.scan(0);
+    monitor.dropped(0, "cloud_not_usable");
+  }
+  imuSample();
+  input();
+  rest(session, 4, 7);
+  const Status status = odometry(session);
+  EXPECT_EQ(value(status, "health"), "coasting");
+  EXPECT_EQ(status.message,
+            "no scan is used: the IMU alone carries the estimate; radar left: 0 of the last 12 scans were "
+            "used, rejected mostly as cloud_not_usable; no scan comes on /right");
+}
+
+TEST_F(TwoRadarDiagnostics, AreNoWarningBeforeTheFirstScanOfARunIsUsed) {
+  const Status status = odometry(session);
+  EXPECT_EQ(status.level, DiagnosticStatus::OK);
+  EXPECT_EQ(status.message, "initialised, no scan used yet");
+}
+
 TEST_F(TwoRadarDiagnostics, DoNotJudgeScansThatCameBeforeTheStart) {
   for (int k = 0; k < 20; ++k) {
     imuSample();

@@ -314,9 +314,12 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) {
                         : "diverged: do not trust the estimate; call ~reset") +
                        why);
   } else if (health == Health::kCoasting) {
-    status.summary(DiagnosticStatus::ERROR, "no scan is used: the IMU alone carries the estimate" + why);
+    // Once a scan was used, the causes are of the whole run, and may be over.
+    status.summary(DiagnosticStatus::ERROR, "no scan is used: the IMU alone carries the estimate" +
+                                                (last_used_ ? whyCoasting() : why));
   } else if (!last_update_) {
-    status.summary(DiagnosticStatus::WARN, "initialised, no scan used yet");
+    // No fault yet: the first scan of a run is used some moments after its start.
+    status.summary(DiagnosticStatus::OK, "initialised, no scan used yet");
   } else if (calls_not_good_ > kVerdictHolds) {
     status.summary(DiagnosticStatus::WARN, "running, but the run is " + toString(diagnosis.verdict) + why);
   } else {
@@ -348,9 +351,35 @@ std::optional<LiveMonitor::Finding> LiveMonitor::describeRadar(Status& status, R
   }
   if (is_silent)
     return Finding{DiagnosticStatus::WARN, called(radar) + " is silent, topic " + config.radar_topic};
-  // One radar alone is judged with the odometry.
-  if (mostly_rejected && radars_.size() > 1) return Finding{DiagnosticStatus::WARN, of + *mostly_rejected};
+  if (mostly_rejected) return Finding{DiagnosticStatus::WARN, of + *mostly_rejected};
   return std::nullopt;
+}
+
+std::string LiveMonitor::useBetween(const Account& then, const Account& now) {
+  std::pair<std::string, std::uint64_t> most;
+  for (const auto& [reason, count] : now.dropped) {
+    if (isBeforeExtrinsics(reason) || reason == "points_not_finite") continue;  // the latter counts points
+    const std::uint64_t fresh = count - countOf(then.dropped, reason);
+    if (fresh > most.second) most = {reason, fresh};
+  }
+  return std::to_string(now.used - then.used) + " of the last " + std::to_string(now.usable - then.usable) +
+         " scans were used" + (most.first.empty() ? "" : ", rejected mostly as " + most.first);
+}
+
+std::string LiveMonitor::whyCoasting() const {
+  std::string why;
+  for (const Radar& radar : radars_) {
+    if (radar.accounts.empty()) continue;
+    const Account& now = radar.accounts.back();
+    const auto since = std::find_if(radar.accounts.begin(), radar.accounts.end(),
+                                    [&](const Account& then) { return then.used == now.used; });
+    const std::string of = radars_.size() == 1 ? "" : called(radar) + ": ";
+    appendItem(&why,
+               now.usable > since->usable ? of + useBetween(*since, now)
+                                          : "no scan comes on " + radar.config.radar_topic,
+               "; ");
+  }
+  return why.empty() ? "" : "; " + why;
 }
 
 std::optional<std::string> LiveMonitor::judgeUse(Radar& radar, bool initialized) {
@@ -365,14 +394,7 @@ std::optional<std::string> LiveMonitor::judgeUse(Radar& radar, bool initialized)
   const Account& now = radar.accounts.back();
   const std::uint64_t used = now.used - then.used;
   if (now.usable < then.usable + kInputsJudged || 2 * used >= now.usable - then.usable) return std::nullopt;
-  std::pair<std::string, std::uint64_t> most;
-  for (const auto& [reason, count] : now.dropped) {
-    if (isBeforeExtrinsics(reason) || reason == "points_not_finite") continue;  // the latter counts points
-    const std::uint64_t fresh = count - countOf(then.dropped, reason);
-    if (fresh > most.second) most = {reason, fresh};
-  }
-  return std::to_string(used) + " of the last " + std::to_string(now.usable - then.usable) +
-         " scans were used" + (most.first.empty() ? "" : ", rejected mostly as " + most.first);
+  return useBetween(then, now);
 }
 
 void LiveMonitor::describeInput(Status& status, const LiveSession* session) {

@@ -140,6 +140,10 @@ class LiveMonitor {
   std::optional<Finding> describeRadar(Status& status, Radar& radar, bool initialized) const;
   /// How few of its last scans were used, and why, if it is less than half.
   static std::optional<std::string> judgeUse(Radar& radar, bool initialized);
+  /// How many scans were used between these accounts, and why the others mostly were not.
+  static std::string useBetween(const Account& then, const Account& now);
+  /// What became of each radar's scans since the last one that was used; begins with "; ".
+  std::string whyCoasting() const;
   /// Adds whether the run is good so far and, if not, why. Writes the likeliest reason to `why`.
   Diagnosis addDiagnosis(Status& status, const LiveSession& session, std::string* why) const;
   /// For the end of a message about a topic on which nothing came; empty if its type is right or unknown.
