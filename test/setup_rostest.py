@@ -3,11 +3,13 @@
 import os
 import pathlib
 import shutil
+import signal
 import unittest
 
 import dynamic_reconfigure.client
 import numpy
 import rosbag
+import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
@@ -286,6 +288,15 @@ class SetupTest(tester.LiveTestCase):
         self.assertIn(" poses in " + os.path.realpath(self.path("poses.txt")), response.message)
         self.assertIn("all since the last reset", response.message)
         self.assertTrue(os.path.isfile(self.path("poses.txt")))
+
+    def test_sigterm_ends_the_node_in_order(self):
+        """As docker stop, systemd and kill end it: the master forgets its services."""
+        with tester.node("config:=irs") as node:
+            tester.call("/rio_t/reset", Empty)
+            node.process.send_signal(signal.SIGTERM)
+            self.assertEqual(node.wait(), 0)
+        with self.assertRaises(rosgraph.MasterException):
+            rosgraph.Master("/test").lookupService("/rio_t/reset")
 
     def test_a_topic_of_a_wrong_type_is_told(self):
         publisher = rospy.Publisher("/odd/imu", Header, queue_size=1)

@@ -2,6 +2,7 @@
 #include <ros/ros.h>
 
 #include <algorithm>
+#include <csignal>
 #include <exception>
 #include <iostream>
 #include <string>
@@ -36,6 +37,9 @@ int spin() {
   // Outside of try: the console goes with the last handle, and the message would be lost.
   const ros::NodeHandle node;
   const ros::NodeHandle private_node("~");
+  // roscpp ends with an interrupt alone. Docker, systemd and kill send this: without an end in order the
+  // master keeps our topics and services.
+  std::signal(SIGTERM, [](int) { ros::requestShutdown(); });
   try {
     const rio_t::LiveOdometry odometry(node, private_node, ros::this_node::getName());
     ros::spin();
