@@ -369,10 +369,12 @@ std::string LiveMonitor::useBetween(const Account& then, const Account& now) {
 std::string LiveMonitor::whyCoasting() const {
   std::string why;
   for (const Radar& radar : radars_) {
-    if (radar.accounts.empty()) continue;
+    const auto since = std::find_if(radar.accounts.begin(), radar.accounts.end(), [&](const Account& then) {
+      return then.used == radar.accounts.back().used;
+    });
+    // One was used in the last second.
+    if (since == radar.accounts.end() || std::next(since) == radar.accounts.end()) continue;
     const Account& now = radar.accounts.back();
-    const auto since = std::find_if(radar.accounts.begin(), radar.accounts.end(),
-                                    [&](const Account& then) { return then.used == now.used; });
     const std::string of = radars_.size() == 1 ? "" : called(radar) + ": ";
     appendItem(&why,
                now.usable > since->usable ? of + useBetween(*since, now)
