@@ -16,6 +16,8 @@
 namespace rio_t {
 namespace {
 
+bool everyTopic(const rosbag::ConnectionInfo* /*connection*/) { return true; }
+
 /// For reading. Throws bagError where that cannot be.
 void openBag(const std::string& path, rosbag::Bag* bag) {
   namespace fs = std::filesystem;
@@ -48,8 +50,6 @@ std::runtime_error bagError(const std::string& bag, const std::exception& thrown
   return bagError(bag,
                   is_of_bytes ? std::string("perhaps it is damaged (") + thrown.what() + ")" : thrown.what());
 }
-
-bool everyTopic(const rosbag::ConnectionInfo* /*connection*/) { return true; }
 
 void writeBag(const std::string& path, const std::function<void(rosbag::Bag&)>& write) {
   std::unique_ptr<rosbag::Bag> bag;
@@ -95,6 +95,13 @@ std::map<std::string, std::string> Bags::typesByTopic() const {
   return types;
 }
 
+std::pair<ros::Time, ros::Time> Bags::span() const {
+  rosbag::View all;
+  addTo(&all, everyTopic);
+  if (all.size() == 0) throw bagError(name_, "it holds no messages");
+  return {all.getBeginTime(), all.getEndTime()};
+}
+
 std::string topicsText(const std::map<std::string, std::string>& types) {
   std::string text;
   for (const auto& [topic, type] : types) appendItem(&text, topic + " (" + type + ")");
@@ -125,16 +132,15 @@ void checkTopics(const std::string& bag, const std::map<std::string, std::string
 }
 
 std::pair<ros::Time, ros::Time> playedSpan(const Bags& bags, const Config& config) {
-  rosbag::View all;
-  bags.addTo(&all, everyTopic);
-  const double length = (all.getEndTime() - all.getBeginTime()).toSec();
+  const auto [first, last] = bags.span();
+  const double length = (last - first).toSec();
   if (config.bag_start > length) {
     throw bagError(bags.name(), "bag_start (" + shortText(config.bag_start, 6) + " s) is after its end (" +
                                     shortText(length, 6) + " s)");
   }
-  const ros::Time begin = all.getBeginTime() + ros::Duration(config.bag_start);
+  const ros::Time begin = first + ros::Duration(config.bag_start);
   const bool to_end = config.bag_duration <= 0.0 || config.bag_start + config.bag_duration >= length;
-  return {begin, to_end ? all.getEndTime() : begin + ros::Duration(config.bag_duration)};
+  return {begin, to_end ? last : begin + ros::Duration(config.bag_duration)};
 }
 
 Trajectory readPoses(const Bags& bags, const std::string& topic) {

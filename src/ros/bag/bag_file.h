@@ -25,9 +25,6 @@ std::runtime_error bagError(const std::string& bag, const std::string& what);
 /// the bag may be damaged.
 std::runtime_error bagError(const std::string& bag, const std::exception& thrown);
 
-/// Finds all, as a query of Bags::addTo().
-bool everyTopic(const rosbag::ConnectionInfo* connection);
-
 /// Makes a bag, which `write` fills. If that fails, there is no file, and what it throws names the bag if the
 /// bag is to blame.
 void writeBag(const std::string& path, const std::function<void(rosbag::Bag&)>& write);
@@ -45,6 +42,8 @@ class Bags {
              const ros::Time& begin = ros::TIME_MIN, const ros::Time& end = ros::TIME_MAX) const;
   /// A topic with two types gets "A and B", so that no reader takes it.
   std::map<std::string, std::string> typesByTopic() const;
+  /// The record times of the first and the last message. Throws bagError if there is none.
+  std::pair<ros::Time, ros::Time> span() const;
 
  private:
   std::string name_;

@@ -82,11 +82,8 @@ std::vector<std::vector<std::string>> recordingsOf(std::vector<std::string> path
   };
   std::vector<Part> parts;
   for (std::string& path : paths) {
-    const Bags bag({path});
-    rosbag::View all;
-    bag.addTo(&all, everyTopic);
-    if (all.size() == 0) throw bagError(path, "it holds no messages");
-    parts.push_back({std::move(path), all.getBeginTime(), all.getEndTime()});
+    const auto [begin, end] = Bags({path}).span();
+    parts.push_back({std::move(path), begin, end});
   }
   std::stable_sort(parts.begin(), parts.end(),
                    [](const Part& a, const Part& b) { return a.begin < b.begin; });
@@ -106,13 +103,10 @@ Recording readRecording(const std::vector<std::string>& paths, const CheckReques
   recording.bags = paths;
   const Bags bags(paths);
   recording.types = bags.typesByTopic();
-  rosbag::View all;
-  bags.addTo(&all, everyTopic);
-  if (all.size() == 0) throw bagError(bags.name(), "it holds no messages");
-  recording.length = (all.getEndTime() - all.getBeginTime()).toSec();
+  const auto [first, last] = bags.span();
+  recording.length = (last - first).toSec();
   recording.read = request.duration > 0.0 ? std::min(request.duration, recording.length) : recording.length;
-  const ros::Time end = recording.read < recording.length ? all.getBeginTime() + ros::Duration(recording.read)
-                                                          : all.getEndTime();
+  const ros::Time end = recording.read < recording.length ? first + ros::Duration(recording.read) : last;
   const std::string imu_topic = topicOfBag(request.imu_topic, recording.types);
   std::vector<std::string> radar_topics;
   for (const std::string& topic : request.radar_topics)
@@ -125,7 +119,7 @@ Recording readRecording(const std::vector<std::string>& paths, const CheckReques
     return type == kTypes[2];
   };
   rosbag::View view;
-  bags.addTo(&view, is_wanted, all.getBeginTime(), end);
+  bags.addTo(&view, is_wanted, first, end);
   try {
     readMessages(view, request.set, &recording);
   } catch (const std::exception& error) {
