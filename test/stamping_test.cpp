@@ -90,12 +90,12 @@ TEST(Stamping, AShiftedStampThatNoMessageCanHoldIsGivenUp) {
   const std::vector<RadarScan> scans = below.take();
   ASSERT_EQ(scans.size(), 1u);
   EXPECT_EQ(scans[0].stamp, Time::fromSeconds(0.5));
-  EXPECT_EQ(below.givenUp().at("stamp_out_of_range"), 1u);
+  EXPECT_EQ(below.takeGivenUp().at("stamp_out_of_range"), 1u);
   with_shift.shift = 2e9;
   ScanStamper above(with_shift);
   above.addScan(1, Time::fromSeconds(3e9), recordTime(0), RadarScan());
   EXPECT_TRUE(above.take().empty());
-  EXPECT_EQ(above.givenUp().at("stamp_out_of_range"), 1u);
+  EXPECT_EQ(above.takeGivenUp().at("stamp_out_of_range"), 1u);
 }
 
 TEST(Stamping, ZeroHeaderStampIsRefusedWithTheOtherSources) {
@@ -112,7 +112,7 @@ TEST(Stamping, ZeroHeaderStampIsRefusedWithTheOtherSources) {
   EXPECT_TRUE(stamper.take().empty());
   stamper.addScan(2, imuTime(1), recordTime(1), RadarScan());
   EXPECT_EQ(stamper.take().size(), 1u);
-  EXPECT_TRUE(stamper.givenUp().empty());
+  EXPECT_TRUE(stamper.takeGivenUp().empty());
 }
 
 TEST(Stamping, ZeroTriggerStampIsRefusedWithTopicAndKey) {
@@ -128,7 +128,7 @@ TEST(Stamping, ZeroTriggerStampIsRefusedWithTopicAndKey) {
   stamper.addTrigger(8, imuTime(0.1), recordTime(0.1));
   stamper.addScan(8, Time(), recordTime(0.12), RadarScan());
   EXPECT_EQ(seconds(stamper.finish()), std::vector<double>({0.1}));
-  EXPECT_EQ(stamper.givenUp().at("trigger_missing"), 1u);
+  EXPECT_EQ(stamper.takeGivenUp().at("trigger_missing"), 1u);
 }
 
 TEST(Stamping, ArrivalIsCarriedOverByTheFastestImuMessage) {
@@ -157,7 +157,7 @@ TEST(Stamping, ArrivalWithoutImuIsGivenUpAtTheEnd) {
   ScanStamper stamper(options(StampSource::kArrival));
   stamper.addScan(1, Time(), recordTime(0), RadarScan());
   EXPECT_TRUE(stamper.finish().empty());
-  EXPECT_EQ(stamper.givenUp().at("imu_missing"), 1u);
+  EXPECT_EQ(stamper.takeGivenUp().at("imu_missing"), 1u);
 }
 
 TEST(Stamping, TriggerOfTheSameSeqWinsOverALaterOne) {
@@ -166,7 +166,7 @@ TEST(Stamping, TriggerOfTheSameSeqWinsOverALaterOne) {
   const std::vector<double> stamps = seconds(runTriggers(stamper, 0.126, 7, false));
   ASSERT_EQ(stamps.size(), 20u);
   for (int k = 0; k < 20; ++k) EXPECT_NEAR(stamps[k], 0.1 * k, 1e-9);
-  EXPECT_TRUE(stamper.givenUp().empty());
+  EXPECT_TRUE(stamper.takeGivenUp().empty());
 }
 
 TEST(Stamping, ShiftIsAddedToTriggerStamps) {
@@ -183,7 +183,7 @@ TEST(Stamping, ALostTriggerCostsItsScanOnly) {
   const std::vector<double> stamps = seconds(runTriggers(stamper, 0.126, 7, false, 9));
   ASSERT_EQ(stamps.size(), 19u);
   for (const double stamp : stamps) EXPECT_GT(std::abs(stamp - 0.9), 0.01);
-  EXPECT_EQ(stamper.givenUp().at("trigger_missing"), 1u);
+  EXPECT_EQ(stamper.takeGivenUp().at("trigger_missing"), 1u);
 }
 
 TEST(Stamping, AScanWhoseTriggerCameBeforeTheBagIsGivenUpNotMispaired) {
@@ -193,7 +193,7 @@ TEST(Stamping, AScanWhoseTriggerCameBeforeTheBagIsGivenUpNotMispaired) {
   EXPECT_TRUE(stamper.take().empty());
   stamper.addScan(8, Time(), recordTime(0.12), RadarScan());
   EXPECT_EQ(seconds(stamper.take()), std::vector<double>({0.1}));
-  EXPECT_EQ(stamper.givenUp().at("trigger_missing"), 1u);
+  EXPECT_EQ(stamper.takeGivenUp().at("trigger_missing"), 1u);
 }
 
 TEST(Stamping, ATriggerThatComesAfterItsScanIsWaitedFor) {
@@ -207,7 +207,7 @@ TEST(Stamping, ATriggerThatComesAfterItsScanIsWaitedFor) {
   stamper.addTrigger(8, imuTime(0.1), recordTime(0.15));
   EXPECT_EQ(seconds(stamper.take()), std::vector<double>({0.1}));
   EXPECT_TRUE(stamper.finish().empty());
-  EXPECT_TRUE(stamper.givenUp().empty());
+  EXPECT_TRUE(stamper.takeGivenUp().empty());
 }
 
 // As a live node may hand them over: the trigger was received in time, but its thread was late.
@@ -223,7 +223,7 @@ TEST(Stamping, ATriggerIsNotGivenUpWhileTheImuRunsAhead) {
   }
   stamper.addTrigger(8, imuTime(0.1), recordTime(0.1));
   EXPECT_EQ(seconds(stamper.take()), std::vector<double>{0.1});
-  EXPECT_TRUE(stamper.givenUp().empty());
+  EXPECT_TRUE(stamper.takeGivenUp().empty());
 }
 
 TEST(Stamping, ATriggerThatComes100MsAfterItsScanIsItsTriggerOnceTheyCountAlike) {
@@ -287,7 +287,7 @@ TEST(Stamping, HeaderFartherThanHalfAPeriodFromEveryTriggerIsGivenUp) {
   ScanStamper stamper(options(StampSource::kTrigger));
   const std::vector<double> stamps = seconds(runTriggers(stamper, 0.05, 4000, true, 9));
   EXPECT_EQ(stamps.size(), 19u);
-  EXPECT_EQ(stamper.givenUp().at("trigger_missing"), 1u);
+  EXPECT_EQ(stamper.takeGivenUp().at("trigger_missing"), 1u);
 }
 
 TEST(Stamping, SeqsThatDoNotCountAreNotMatched) {
@@ -316,22 +316,22 @@ TEST(Stamping, ATriggerNodeThatStartsAnewIsFollowedAfterAFewScans) {
   }
   append(stamper.finish(), &all);
   EXPECT_EQ(all.size(), 36u);
-  EXPECT_EQ(stamper.givenUp().at("trigger_missing"), 4u);
+  EXPECT_EQ(stamper.takeGivenUp().at("trigger_missing"), 4u);
   EXPECT_NEAR(all.back().stamp - imuTime(0), 3.9, 1e-9);
 }
 
 TEST(Stamping, NoTriggerAtAllGivesUpEveryScanAndHoldsFew) {
   ScanStamper stamper(options(StampSource::kTrigger));
+  std::uint64_t given_up = 0;
   for (std::uint64_t k = 0; k < 300; ++k) {
     stamper.addScan(static_cast<std::uint32_t>(k), Time(), recordTime(0.1 * static_cast<double>(k)),
                     RadarScan());
     EXPECT_TRUE(stamper.take().empty());
-    const auto& given_up = stamper.givenUp();
-    const std::uint64_t held = k + 1 - (given_up.empty() ? 0 : given_up.at("trigger_missing"));
-    EXPECT_LE(held, 10u);
+    given_up += stamper.takeGivenUp()["trigger_missing"];
+    EXPECT_LE(k + 1 - given_up, 10u);
   }
   EXPECT_TRUE(stamper.finish().empty());
-  EXPECT_EQ(stamper.givenUp().at("trigger_missing"), 300u);
+  EXPECT_EQ(given_up + stamper.takeGivenUp()["trigger_missing"], 300u);
 }
 
 TEST(Stamping, HeldScansAreBounded) {
@@ -339,9 +339,9 @@ TEST(Stamping, HeldScansAreBounded) {
   few.max_held = 3;
   ScanStamper stamper(few);
   for (int k = 0; k < 10; ++k) stamper.addScan(0, Time(), recordTime(k), RadarScan());
-  EXPECT_EQ(stamper.givenUp().at("too_many_held"), 7u);
+  EXPECT_EQ(stamper.takeGivenUp().at("too_many_held"), 7u);
   EXPECT_TRUE(stamper.finish().empty());
-  EXPECT_EQ(stamper.givenUp().at("imu_missing"), 3u);
+  EXPECT_EQ(stamper.takeGivenUp().at("imu_missing"), 3u);
 }
 
 }  // namespace

@@ -52,7 +52,8 @@ void BagPlayer::finish() {
   for (std::size_t k = 0; k < radars_.size(); ++k) feed(radars_[k].stamper.finish(), k);
   for (ScanResult& result : odometry_.finish()) account(result);
   for (std::size_t k = 0; k < radars_.size(); ++k)
-    for (const auto& [reason, count] : radars_[k].stamper.givenUp()) evidence_.addDropped(k, reason, count);
+    for (const auto& [reason, count] : radars_[k].stamper.takeGivenUp())
+      evidence_.addDropped(k, reason, count);
 }
 
 void BagPlayer::feed(std::vector<RadarScan> scans, std::size_t radar) {

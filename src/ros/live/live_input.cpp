@@ -143,8 +143,8 @@ void LiveOdometry::onTrigger(std::size_t radar, const Event<std_msgs::Header>& e
 }
 
 void LiveOdometry::account(const std::vector<LiveSession::GivenUp>& given_up) {
-  for (const auto& [radar, reason] : given_up) {
-    monitor_.dropped(radar, reason);
+  for (const auto& [radar, reason, count] : given_up) {
+    monitor_.dropped(radar, reason, count);
     const Config& config = radars_[radar].config;
     log_.warn("no stamp for " + config.radar_topic + ": " + reason,
               beginning(config) + "a scan got no stamp: " + whyNoStamp(config, reason));

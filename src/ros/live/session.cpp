@@ -47,7 +47,7 @@ Trajectory BoundedTrajectory::poses() const {
 LiveSession::LiveSession(const Config& config, const OdometryOptions& options)
     : gyro_density_(options.imu_noise.gyro_density), odometry_(options) {
   for (const Config& radar : configsOfRadars(config)) {
-    stampers_.push_back({ScanStamper(stampingOptions(radar)), {}});
+    stampers_.emplace_back(stampingOptions(radar));
     radars_.push_back({OffsetObservability(), options.ofRadar(radars_.size()).T_IR, std::nullopt});
   }
 }
@@ -63,21 +63,21 @@ std::optional<NavigationState> LiveSession::addImu(const ImuMeasurement& imu) {
 
 std::vector<LiveSession::GivenUp> LiveSession::stampWithImu(Time stamp, Time record) {
   const std::lock_guard<std::mutex> lock(stamper_mutex_);
-  for (Stamper& radar : stampers_) radar.stamper.addImu(stamp, record);
+  for (ScanStamper& stamper : stampers_) stamper.addImu(stamp, record);
   return takeStamped();
 }
 
 std::vector<LiveSession::GivenUp> LiveSession::addTrigger(std::size_t radar, std::uint32_t seq, Time stamp,
                                                           Time record) {
   const std::lock_guard<std::mutex> lock(stamper_mutex_);
-  stampers_.at(radar).stamper.addTrigger(seq, stamp, record);
+  stampers_.at(radar).addTrigger(seq, stamp, record);
   return takeStamped();
 }
 
 std::vector<LiveSession::GivenUp> LiveSession::addScan(std::uint32_t seq, Time header_stamp, Time record,
                                                        RadarScan scan) {
   const std::lock_guard<std::mutex> lock(stamper_mutex_);
-  ScanStamper& stamper = stampers_.at(scan.radar).stamper;
+  ScanStamper& stamper = stampers_.at(scan.radar);
   stamper.addScan(seq, header_stamp, record, std::move(scan));
   return takeStamped();
 }
@@ -85,15 +85,13 @@ std::vector<LiveSession::GivenUp> LiveSession::addScan(std::uint32_t seq, Time h
 std::vector<LiveSession::GivenUp> LiveSession::takeStamped() {
   std::vector<GivenUp> given_up;
   for (std::size_t radar = 0; radar < stampers_.size(); ++radar) {
-    Stamper& from = stampers_[radar];
-    for (RadarScan& scan : from.stamper.take()) {
+    for (RadarScan& scan : stampers_[radar].take()) {
       if (arrivals_.size() >= kMaxScansInFlight) arrivals_.clear();
       arrivals_[{scan.radar, scan.stamp.nanoseconds()}] = Clock::now();
       odometry_.addScan(std::move(scan));
     }
-    for (const auto& [reason, count] : from.stamper.givenUp())
-      for (std::uint64_t& reported = from.given_up[reason]; reported < count; ++reported)
-        given_up.push_back({radar, reason});
+    for (const auto& [reason, count] : stampers_[radar].takeGivenUp())
+      given_up.push_back({radar, reason, count});
   }
   return given_up;
 }

@@ -76,8 +76,9 @@ class ScanStamper {
   /// At the end of the data: decides what is held with what there is.
   std::vector<RadarScan> finish();
 
-  /// Scans given up: "trigger_missing", "imu_missing", "too_many_held" or "stamp_out_of_range".
-  const std::map<std::string, std::uint64_t>& givenUp() const { return given_up_; }
+  /// How many scans were given up since the last call, by reason: "trigger_missing", "imu_missing",
+  /// "too_many_held" or "stamp_out_of_range".
+  std::map<std::string, std::uint64_t> takeGivenUp() { return std::exchange(given_up_, {}); }
 
  private:
   struct Trigger {

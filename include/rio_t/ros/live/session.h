@@ -72,10 +72,11 @@ class LiveSession {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// A scan that gets no stamp.
+  /// Scans that get no stamp.
   struct GivenUp {
     std::size_t radar = 0;
     std::string reason;
+    std::uint64_t count = 0;
   };
 
   /// `options` is config.odometry with the extrinsics that hold. Radars are counted as in configsOfRadars.
@@ -131,11 +132,6 @@ class LiveSession {
   void setWorld(const WorldInOdom& T_OW);
 
  private:
-  /// A radar's way from messages to stamped scans.
-  struct Stamper {
-    ScanStamper stamper;
-    std::map<std::string, std::uint64_t> given_up;  ///< what was reported so far
-  };
   /// What the results of one radar leave behind.
   struct Radar {
     OffsetObservability observability;
@@ -155,7 +151,7 @@ class LiveSession {
   std::uint64_t imu_count_ = 0;
 
   std::mutex stamper_mutex_;
-  std::vector<Stamper> stampers_;  // by radar; guarded by stamper_mutex_
+  std::vector<ScanStamper> stampers_;  // by radar; guarded by stamper_mutex_
 
   std::map<ScanKey, Clock::time_point> arrivals_;  // guarded by stamper_mutex_
 
