@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -276,17 +275,20 @@ TEST_F(CheckBag, WhatIsToldStandsInTheConfiguration) {
 }
 
 TEST_F(CheckBag, WhatCannotBeToldIsRefused) {
-  const auto refused = [](const std::string& assignment, int status, const std::string& part) {
+  const auto faultOf = [](const std::string& assignment) -> std::string {
     CheckRequest request;
     request.bags = {bag_};
     request.set = {parseAssignment(assignment)};
-    std::ostringstream out, err;
-    EXPECT_EQ(runCheck(request, out, err), status) << assignment;
-    EXPECT_NE(err.str().find(part), std::string::npos) << err.str();
+    try {
+      validate(request);
+    } catch (const std::exception& error) {
+      return error.what();
+    }
+    return "";
   };
-  refused("radar_topic=/scan", 2, "expected --radar-topic");
-  refused("left/radar_field_x=X", 2, "left/radar_field_x");
-  refused("radar_feild_x=X", 1, "radar_feild_x");
+  EXPECT_NE(faultOf("radar_topic=/scan").find("expected --radar-topic"), std::string::npos);
+  EXPECT_NE(faultOf("left/radar_field_x=X").find("left/radar_field_x"), std::string::npos);
+  EXPECT_NE(faultOf("radar_feild_x=X").find("radar_feild_x"), std::string::npos);
 }
 
 TEST_F(CheckBag, AnImuWhoseZIsNotUpIsNamed) {

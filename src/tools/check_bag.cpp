@@ -76,15 +76,14 @@ int runLive(rio_t::CheckRequest request, double duration, const std::string& kee
   request.bags = {bag};
   request.bags_go_away = keep.empty();
   request.duration = 0.0;
-  const std::string fault = rio_t::faultOf(request);
-  if (!fault.empty()) throw rio_t::UsageError(fault);
+  rio_t::validate(request);
   int argc = 0;
   ros::init(argc, nullptr, "rio_t_check_bag", ros::init_options::AnonymousName);
   std::cerr << "check_bag: listening for " << duration << " s; keep still for 3 s, then move\n";
   if (rio_t::recordTopics(bag, duration) == 0)
     throw std::runtime_error(
         "--live: no message of an Imu, PointCloud2, Header, FluidPressure or tf topic came");
-  return rio_t::runCheck(request, std::cout, std::cerr);
+  return rio_t::runCheck(request, std::cout);
 }
 
 int run(Arguments arguments) {
@@ -95,7 +94,7 @@ int run(Arguments arguments) {
   constexpr double kListen = 30.0;  // [s]
   if (arguments.live) return runLive(request, arguments.duration.value_or(kListen), arguments.keep);
   request.duration = arguments.duration.value_or(request.duration);
-  return rio_t::runCheck(request, std::cout, std::cerr);
+  return rio_t::runCheck(request, std::cout);
 }
 
 }  // namespace

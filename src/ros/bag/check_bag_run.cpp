@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <boost/algorithm/string/replace.hpp>
 #include <boost/process.hpp>
-#include <exception>
 #include <filesystem>
 #include <optional>
 #include <ostream>
@@ -44,71 +43,60 @@ std::string word(const std::string& path) {
 
 }  // namespace
 
-std::string faultOf(const CheckRequest& request) {
-  if (request.bags.empty()) return "expected a bag (see --help)";
+void validate(const CheckRequest& request) {
+  require({{"BAG", !request.bags.empty()}});
   for (const ParameterEntry& entry : request.set) {
     if (entry.key == "imu_topic" || entry.key == "radar_topic")
-      return "--set " + entry.key + ": expected --" +
-             boost::algorithm::replace_all_copy(entry.key, "_", "-") + ", which chooses the topic";
+      throw UsageError("--set " + entry.key + ": expected --" +
+                       boost::algorithm::replace_all_copy(entry.key, "_", "-") + ", which chooses the topic");
     if (entry.key == "radars" || entry.key.find('/') != std::string::npos)
-      return "--set " + entry.key +
-             ": expected a key of every radar, since the bag names the radars; --radar-topic looks at one "
-             "alone";
+      throw UsageError("--set " + entry.key +
+                       ": expected a key of every radar, since the bag names the radars; --radar-topic looks "
+                       "at one alone");
   }
   makeConfig(request.set);
   for (const auto& [name, file] :
        {std::make_pair("--out ", request.out), std::make_pair("--rig ", request.rig)}) {
     if (file.empty()) continue;
     const std::string fault = faultOfOutput(file, request.bags);
-    if (!fault.empty()) return name + fault;
+    if (!fault.empty()) throw UsageError(name + fault);
   }
   if (isSameFile(request.out, request.rig))
-    return "--rig " + request.rig + ": expected another file than that of --out";
-  return "";
+    throw UsageError("--rig " + request.rig + ": expected another file than that of --out");
 }
 
-int runCheck(const CheckRequest& request, std::ostream& out, std::ostream& err) {
+int runCheck(const CheckRequest& request, std::ostream& out) {
+  validate(request);
   std::optional<BagCheck> best;
   bool all_ready = true;
-  try {
-    const std::string fault = faultOf(request);
-    if (!fault.empty()) {
-      err << "check_bag: " << fault << "\n";
-      return kExitUsage;
-    }
-    const std::vector<std::vector<std::string>> recordings = recordingsOf(request.bags);
-    for (const std::vector<std::string>& bags : recordings) {
-      const BagCheck check = checkBag(bags, request);
-      out << describeCheck(check) << std::flush;
-      all_ready = all_ready && check.ready() && check.to_do.empty();
-      if (check.ready() && (!best || check.quality > best->quality)) best = check;
-    }
-    if (!best) {
-      out << "Not ready: no configuration is written.\n";
-      return kExitFailed;
-    }
-    if (recordings.size() > 1)
-      out << "The configuration is that of " << best->bags.front() << ", which shows most.\n";
-    if (request.out.empty()) {
-      out << "\n" << best->yaml;
-    } else {
-      const std::string kept = writeFile(request.out, best->yaml);
-      out << "Written to " << request.out << (kept.empty() ? "" : " (what was there is now " + kept + ")")
-          << ". Next: rosrun rio_t rio_t_bag";
-      for (const std::string& bag : best->bags)
-        out << " --bag " << (request.bags_go_away ? "BAG" : word(bag));
-      out << " --config " << word(request.out) << " --output-dir results\n";
-    }
-    if (!request.rig.empty()) {
-      const TemporaryFolder folder;
-      const std::string yaml = folder.path() + "/rig.yaml";
-      writeFile(yaml, best->yaml);
-      drawRig(yaml, request.rig);
-      out << "The rig is drawn in " << request.rig << "\n";
-    }
-  } catch (const std::exception& error) {
-    err << "check_bag: " << error.what() << "\n";
+  const std::vector<std::vector<std::string>> recordings = recordingsOf(request.bags);
+  for (const std::vector<std::string>& bags : recordings) {
+    const BagCheck check = checkBag(bags, request);
+    out << describeCheck(check) << std::flush;
+    all_ready = all_ready && check.ready() && check.to_do.empty();
+    if (check.ready() && (!best || check.quality > best->quality)) best = check;
+  }
+  if (!best) {
+    out << "Not ready: no configuration is written.\n";
     return kExitFailed;
+  }
+  if (recordings.size() > 1)
+    out << "The configuration is that of " << best->bags.front() << ", which shows most.\n";
+  if (request.out.empty()) {
+    out << "\n" << best->yaml;
+  } else {
+    const std::string kept = writeFile(request.out, best->yaml);
+    out << "Written to " << request.out << (kept.empty() ? "" : " (what was there is now " + kept + ")")
+        << ". Next: rosrun rio_t rio_t_bag";
+    for (const std::string& bag : best->bags) out << " --bag " << (request.bags_go_away ? "BAG" : word(bag));
+    out << " --config " << word(request.out) << " --output-dir results\n";
+  }
+  if (!request.rig.empty()) {
+    const TemporaryFolder folder;
+    const std::string yaml = folder.path() + "/rig.yaml";
+    writeFile(yaml, best->yaml);
+    drawRig(yaml, request.rig);
+    out << "The rig is drawn in " << request.rig << "\n";
   }
   return all_ready ? kExitOk : kExitFailed;
 }

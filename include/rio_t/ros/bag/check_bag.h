@@ -69,11 +69,11 @@ BagCheck checkBag(const std::vector<std::string>& bags, const CheckRequest& requ
 /// The report for people.
 std::string describeCheck(const BagCheck& check);
 
-/// Why the request cannot be met; empty: it can. Throws ConfigError for parameters that are wrong.
-std::string faultOf(const CheckRequest& request);
+/// Throws std::invalid_argument if the request cannot be met, and ConfigError for parameters that are wrong.
+void validate(const CheckRequest& request);
 
 /// Checks all bags, prints the reports and writes the files. Returns the exit status: 0 ready, 1 something is
-/// missing, 2 what was asked for is wrong.
-int runCheck(const CheckRequest& request, std::ostream& out, std::ostream& err);
+/// missing. Throws as validate(), and std::runtime_error for files that cannot be read or written.
+int runCheck(const CheckRequest& request, std::ostream& out);
 
 }  // namespace rio_t
