@@ -23,8 +23,4 @@ class Publishers {
   std::uint64_t turns_ = 0;
 };
 
-/// What to do about them.
-inline constexpr const char* kSeveralPublishersRemedy =
-    "Stop one of them, or remap it to a topic of its own.";
-
 }  // namespace rio_t

@@ -88,8 +88,7 @@ std::string stampText(Time time) { return fixedText(time.seconds(), 3) + " s"; }
 /// It is certain, and it explains whatever else there is.
 void addPublishers(const RunEvidence& evidence, std::vector<Cause>* causes) {
   for (const std::string& text : evidence.several_publishers)
-    causes->push_back(
-        {"several_publishers", text, "Stop one of them, or remap it to a topic of its own.", 1.0});
+    causes->push_back({"several_publishers", text, kSeveralPublishersRemedy, 1.0});
 }
 
 void addStart(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {

@@ -198,6 +198,9 @@ class EvidenceCollector {
   RunEvidence evidence_;
 };
 
+/// What to do about several publishers of a topic.
+constexpr const char* kSeveralPublishersRemedy = "Stop one of them, or remap it to a topic of its own.";
+
 /// The warning for a person whose platform is no ground vehicle.
 constexpr const char* kGroundVehicleContradicted =
     "the motion contradicted platform: ground_vehicle, and the constraint is switched off until the "
