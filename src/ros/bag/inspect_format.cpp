@@ -159,14 +159,10 @@ void resolve(FormatProposal* proposal) {
 /// The unit in which the median is a usual signal to noise ratio, 5 to 60 dB.
 PowerUnit unitOf(double median, PowerUnit of_preset) {
   constexpr double kLeast = 5.0, kMost = 60.0;
-  const auto usual = [&](double db) { return db >= kLeast && db <= kMost; };
-  const double linear = median > 0.0 ? 10.0 * std::log10(median) : 0.0;
-  if (of_preset == PowerUnit::kSnrDb && usual(median)) return of_preset;
-  if (of_preset == PowerUnit::kSnrDeciDb && usual(0.1 * median)) return of_preset;
-  if (of_preset == PowerUnit::kSnrLinear && usual(linear)) return of_preset;
-  if (usual(median)) return PowerUnit::kSnrDb;
-  if (usual(0.1 * median)) return PowerUnit::kSnrDeciDb;
-  if (usual(linear)) return PowerUnit::kSnrLinear;
+  for (const PowerUnit unit : {of_preset, PowerUnit::kSnrDb, PowerUnit::kSnrDeciDb, PowerUnit::kSnrLinear}) {
+    const double db = toDecibel(median, unit);
+    if (db >= kLeast && db <= kMost) return unit;
+  }
   return PowerUnit::kNotSnr;
 }
 

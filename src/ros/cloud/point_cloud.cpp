@@ -162,21 +162,6 @@ std::array<double, 3> fromSpherical(double azimuth, double elevation, double ran
                                            : std::array<double, 3>{lateral, forward, up};
 }
 
-double toDecibel(double power, PowerUnit unit) {
-  switch (unit) {
-    case PowerUnit::kSnrDb:
-      return power;
-    case PowerUnit::kSnrDeciDb:
-      return 0.1 * power;
-    case PowerUnit::kSnrLinear:
-      // No power at all is a very weak point, not a broken one.
-      return 10.0 * std::log10(std::max(power, 1e-30));
-    case PowerUnit::kNotSnr:
-      break;
-  }
-  return static_cast<double>(kUnknownSnrDb);
-}
-
 bool isFinite(const RadarPointPcl& p) {
   // After the narrowing to float: a double of 1e300 would else pass.
   return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z) && std::isfinite(p.doppler) &&
@@ -198,6 +183,21 @@ float narrow(double value) {
 }
 
 }  // namespace
+
+double toDecibel(double power, PowerUnit unit) {
+  switch (unit) {
+    case PowerUnit::kSnrDb:
+      return power;
+    case PowerUnit::kSnrDeciDb:
+      return 0.1 * power;
+    case PowerUnit::kSnrLinear:
+      // No power at all is a very weak point, not a broken one.
+      return 10.0 * std::log10(std::max(power, 1e-30));
+    case PowerUnit::kNotSnr:
+      break;
+  }
+  return static_cast<double>(kUnknownSnrDb);
+}
 
 std::vector<std::string> fittingPresets(const PointCloud2& message) {
   std::vector<std::string> fitting;

@@ -24,6 +24,9 @@ struct DecodedScan {
 /// it declares. Some drivers fill their clouds up to a fixed size: that padding is no detection.
 DecodedScan decode(const sensor_msgs::PointCloud2& message, const PointCloudFormat& format);
 
+/// What a power in that unit says as signal to noise [dB]; kUnknownSnrDb if it says nothing.
+double toDecibel(double power, PowerUnit unit);
+
 /// The presets whose fields the cloud has. The field of the power counts even where it is not read: its name
 /// tells drivers apart.
 std::vector<std::string> fittingPresets(const sensor_msgs::PointCloud2& message);
