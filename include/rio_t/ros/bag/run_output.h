@@ -107,22 +107,7 @@ class FolderLock {
   int descriptor_;
 };
 
-/// The files of a run: trajectory.txt and trajectory_optimized.txt (TUM), navigation.csv, biases.csv,
-/// summary.yaml; of each radar time_offset.csv, ego_velocity.csv and, if they are estimated, extrinsics.csv.
-/// With several radars these carry their names: time_offset_left.csv. The same calls write the same bytes.
-///
-/// navigation.csv has the velocity that goes with trajectory.txt, and how sure the estimate is of itself, ten
-/// times a second: v_W [m/s], and standard deviations of p_W [m], of a rotation about the axes of W [rad],
-/// and of v_W [m/s].
-///
-/// barometer.csv has the means of the pressures: height above the start by the bias before, innovation and
-/// its sigma, bias and its sigma [m], samples in the mean, and what became of it. ground_vehicle.csv has the
-/// predicted velocity of the point in the vehicle frame [m/s], how many sigmas it contradicts the constraint,
-/// and the rotation of the vehicle frame with its sigmas about the axes of I [rad]. Both only where they are
-/// on.
-///
-/// extrinsics.csv has T_IR, and standard deviations of its translation [m] and of a turn about the axes of
-/// the IMU [rad]; zero where it is not estimated.
+/// The files of a run: docs/ros.md (Outputs) says what is in them. The same calls write the same bytes.
 class RunOutput {
  public:
   /// Makes the folder and opens the files. Throws OutputError naming what cannot be written, or if another
