@@ -176,6 +176,7 @@ std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement&
   result.time = samples_.back().time;
   result.q_WI = levelingRotation(rest.accel.mean);
   result.b_g = rest.gyro.mean;
+  result.f_I = rest.accel.mean;
   result.b_a = rest.accel.mean * ((rest.accel.mean.norm() - gravity_) / rest.accel.mean.norm());
   result.duration = collected;
   waiting_for_ = {};

@@ -154,14 +154,7 @@ void findRest(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
     report->rest = found->duration;
     report->rest_begin = std::max(0.0, found->time - begin - found->duration);
     report->rest_rate = found->b_g;
-    Vector3d sum = Vector3d::Zero();
-    double count = 0.0;
-    for (const ImuMeasurement& each : imu) {
-      if (each.time < found->time - found->duration || found->time < each.time) continue;
-      sum += each.acceleration;
-      count += 1.0;
-    }
-    if (count > 0.0) report->rest_acceleration = sum / count;
+    report->rest_acceleration = found->f_I;
     return;
   }
 }
