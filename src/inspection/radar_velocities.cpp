@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "rio_t/core/quantile.h"
 #include "rio_t/radar/direction.h"
 #include "rio_t/radar/ego_velocity.h"
 #include "rio_t/sensors/scan_pool.h"
@@ -123,10 +125,7 @@ double largeDoppler(const std::vector<RadarScan>& scans) {
   std::vector<double> dopplers;
   for (const RadarScan& scan : scans)
     for (const RadarPoint& point : scan.points) dopplers.push_back(std::abs(point.doppler));
-  if (dopplers.empty()) return 0.0;
-  const auto high = dopplers.begin() + static_cast<std::ptrdiff_t>(dopplers.size() * 9 / 10);
-  std::nth_element(dopplers.begin(), high, dopplers.end());
-  return 0.5 * *high;
+  return 0.5 * quantile(std::move(dopplers), 0.9);
 }
 
 /// How many matches agree on a ratio, over the logarithm of the ratio, for both signs.
