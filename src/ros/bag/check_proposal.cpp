@@ -2,7 +2,6 @@
 #include <boost/algorithm/string.hpp>
 #include <cctype>
 #include <limits>
-#include <set>
 #include <string>
 
 #include "../parameters/parameter_list.h"
@@ -16,16 +15,12 @@ namespace {
 std::vector<std::string> radarNames(const std::vector<RadarInspection>& radars) {
   std::vector<std::vector<std::string>> words;
   for (const RadarInspection& radar : radars) {
-    std::string topic = boost::algorithm::to_lower_copy(radar.topic);
-    for (char& c : topic) {
-      if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = ' ';
-    }
-    words.emplace_back();
-    boost::algorithm::split(words.back(), topic, boost::algorithm::is_any_of(" "),
+    const std::string topic = boost::algorithm::to_lower_copy(radar.topic);
+    boost::algorithm::split(words.emplace_back(), topic, !boost::algorithm::is_alnum(),
                             boost::algorithm::token_compress_on);
   }
-  std::set<std::string> keys = {"radars"};
-  for (const ParameterDescription& about : parameterDescriptions()) keys.insert(about.key);
+  Config any;
+  const ParameterList keys = parametersOf(any);
   std::vector<std::string> names;
   for (std::size_t k = 0; k < radars.size(); ++k) {
     std::string name;
@@ -38,8 +33,8 @@ std::vector<std::string> radarNames(const std::vector<RadarInspection>& radars) 
     // A name that YAML takes for a number or a truth value is none.
     const bool is_text = !name.empty() && std::isalpha(static_cast<unsigned char>(name.front())) != 0 &&
                          std::holds_alternative<std::string>(parsePlainScalar(name).data);
-    const bool taken = std::find(names.begin(), names.end(), name) != names.end() || keys.count(name) != 0 ||
-                       isReserved(name);
+    const bool taken = std::find(names.begin(), names.end(), name) != names.end() ||
+                       keys.find(name) != nullptr || isReserved(name);
     names.push_back(!is_text || taken ? "" : name);
   }
   std::size_t number = 0;
@@ -53,17 +48,16 @@ std::vector<std::string> radarNames(const std::vector<RadarInspection>& radars) 
 
 /// The keys of clouds are in `radars` already: with them the clouds were read.
 void addConfigured(const ParameterEntries& configured, ProposedConfig* config) {
-  const std::vector<ParameterDescription> about = parameterDescriptions();
+  Config any;
+  const ParameterList list = parametersOf(any);
   for (const ParameterEntry& entry : configured) {
     if (isCloudKey(entry.key) || isOfOneBag(entry.key)) continue;
     const auto set = [&](ProposedKeys* keys) {
       if (entry.key == "extrinsics_rotation_xyzw") keys->remove("mounting_yaw_pitch_roll_deg");
       keys->set(entry.key, entry.value, "Given by --set.");
     };
-    const bool of_radar = std::any_of(about.begin(), about.end(), [&](const ParameterDescription& each) {
-      return each.key == entry.key && each.of_radar;
-    });
-    if (!of_radar || config->radars.empty()) {
+    const Parameter* const parameter = list.find(entry.key);
+    if (parameter == nullptr || !parameter->description.of_radar || config->radars.empty()) {
       set(&config->top_level);
       continue;
     }
