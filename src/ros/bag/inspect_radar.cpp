@@ -148,12 +148,12 @@ void describeSign(const Looked& looked, const FormatProposal& format, const ImuR
                   RadarInspection* radar) {
   const MountingSearch& search = looked.search;
   const std::string field = format.format.doppler;
-  const std::string by_ranges =
-      looked.sign.sign == 0 ? "" : "ranges (" + fixedText(std::abs(looked.sign.significance), 0) + " sigma)";
-  const bool imu_knows = search.enough && search.sign_significance > 25.0;
-  const std::string by_imu =
-      imu_knows ? "the IMU (" + fixedText(std::sqrt(search.sign_significance), 0) + " sigma)" : "";
-  const std::string evidence = by_ranges + (by_ranges.empty() || by_imu.empty() ? "" : " and ") + by_imu;
+  std::string evidence;
+  if (looked.sign.sign != 0)
+    appendItem(&evidence, "ranges (" + fixedText(std::abs(looked.sign.significance), 0) + " sigma)");
+  if (search.enough && search.sign_significance > 25.0)
+    appendItem(&evidence, "the IMU (" + fixedText(std::sqrt(search.sign_significance), 0) + " sigma)",
+               " and ");
   if (search.mirrored) {
     radar->odd(
         "axes",
@@ -204,8 +204,8 @@ std::string turnText(const Eigen::Matrix3d& turn) {
   for (int k = 0; k < 3; ++k) {
     int axis = 0;
     turn.col(k).cwiseAbs().maxCoeff(&axis);
-    text += (k == 0 ? "" : ", ") + std::string(names[static_cast<std::size_t>(k)]) + " = " +
-            (turn(axis, k) < 0.0 ? "-" : "+") + "xyz"[axis];
+    appendItem(&text, std::string(names[static_cast<std::size_t>(k)]) + " = " +
+                          (turn(axis, k) < 0.0 ? "-" : "+") + "xyz"[axis]);
   }
   return text;
 }
@@ -269,8 +269,7 @@ void describeMounting(const MountingSearch& search, double largest_offset, Radar
   const Eigen::Vector3d& l = search.lever_arm_I;
   const Eigen::Vector3d& l_sigma = search.lever_arm_sigma;
   std::string text;
-  for (int k = 0; k < 3; ++k)
-    text += (k == 0 ? "" : ", ") + fixedText(l[k], 2) + " +- " + fixedText(l_sigma[k], 2);
+  for (int k = 0; k < 3; ++k) appendItem(&text, fixedText(l[k], 2) + " +- " + fixedText(l_sigma[k], 2));
   // If the scans have few points, the lever arm may be as wrong as the mounting.
   const bool is_known = l_sigma.maxCoeff() < kUnmeasuredLeverArm && !radar->isSparse();
   radar->ok("lever arm",
