@@ -21,11 +21,9 @@ double written(double value, double configured, double per) {
   return value == configured ? configured : rounded(value, per);
 }
 
-template <typename Vector>
-ParameterValue writtenList(const Vector& values, const Vector& configured, double per) {
-  std::vector<double> list;
-  for (Eigen::Index i = 0; i < values.size(); ++i) list.push_back(written(values[i], configured[i], per));
-  return listOf(list);
+ParameterValue writtenList(Eigen::VectorXd values, const Eigen::VectorXd& configured, double per) {
+  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = written(values[i], configured[i], per);
+  return listOf(values);
 }
 
 /// The keys of a radar that are calibrated.

@@ -244,7 +244,7 @@ void describeMounting(const MountingSearch& search, double largest_offset, Radar
     radar->odd("mounting",
                "not found: less than 3 s with motion and two velocities a second; the radar is taken to look "
                "forward. Record with motion, or set mounting_yaw_pitch_roll_deg by hand");
-    radar->keys.set("mounting_yaw_pitch_roll_deg", listOf({0.0, 0.0, 0.0}),
+    radar->keys.set("mounting_yaw_pitch_roll_deg", listOf(Eigen::Vector3d::Zero()),
                     "Assumed: the bag does not show it. Yaw left, pitch up, roll right side down.");
     return;
   }
@@ -263,7 +263,7 @@ void describeMounting(const MountingSearch& search, double largest_offset, Radar
               "yaw " + fixedText(yaw, 1) + ", pitch " + fixedText(pitch, 1) + ", roll " + fixedText(roll, 1) +
                   " deg (radar's " + turnText(nearestTurn(search.q_IR.toRotationMatrix())) +
                   " of the IMU); " + sure);
-  radar->keys.set("mounting_yaw_pitch_roll_deg", listOf({yaw, pitch, roll}),
+  radar->keys.set("mounting_yaw_pitch_roll_deg", listOf(Eigen::Vector3d(yaw, pitch, roll)),
                   "Yaw left, pitch up, roll right side down, seen from x forward, y left, z up of the IMU. " +
                       sure + ".");
   const Eigen::Vector3d& l = search.lever_arm_I;
@@ -277,8 +277,7 @@ void describeMounting(const MountingSearch& search, double largest_offset, Radar
                 (is_known ? "the estimate starts there" : "too vague, the estimate starts at zero") +
                 ", unless you give it; measure it with a tape");
   if (is_known) {
-    radar->keys.set("extrinsics_translation",
-                    listOf({rounded(l.x(), 100.0), rounded(l.y(), 100.0), rounded(l.z(), 100.0)}),
+    radar->keys.set("extrinsics_translation", listOf(l.unaryExpr([](double x) { return rounded(x, 100.0); })),
                     "Origin of the radar in the IMU frame, roughly [m]. Measure it with a tape.");
     const double least = CalibrationPrior().extrinsics_translation_sigma;
     radar->keys.set("extrinsics_translation_sigma",

@@ -31,6 +31,12 @@ std::optional<std::vector<double>> asNumbers(const ParameterValue& value, std::s
   return numbers;
 }
 
+std::optional<Eigen::Vector3d> asVector3(const ParameterValue& value, const Range& range) {
+  const auto x = asNumbers(value, 3, range);
+  if (!x) return std::nullopt;
+  return Eigen::Vector3d(x->data());
+}
+
 /// Topics, frames and file names have no use for line breaks and the like, and must not break a line of what
 /// is written for people.
 bool isOneLine(const std::string& text) {
@@ -109,15 +115,7 @@ void ParameterList::vector3(const std::string& key, const std::string& unit, Ran
   bind(
       {key, "list", unit, "a list of 3 finite numbers" + (each.empty() ? "" : ", each" + each), text,
        range.min, range.max},
-      member,
-      [range](const ParameterValue& value) -> std::optional<Eigen::Vector3d> {
-        const auto x = asNumbers(value, 3, range);
-        if (!x) return std::nullopt;
-        return Eigen::Vector3d(x->data());
-      },
-      [](const Eigen::Vector3d& v) {
-        return listOf({v.x(), v.y(), v.z()});
-      });
+      member, [range](const ParameterValue& value) { return asVector3(value, range); }, listOf);
 }
 
 void ParameterList::rotation(const std::string& key, Eigen::Quaterniond& member, const std::string& text) {
@@ -131,9 +129,7 @@ void ParameterList::rotation(const std::string& key, Eigen::Quaterniond& member,
         // People type fewer digits than a double has; an exact quaternion stays as it is.
         return std::abs(q.norm() - 1.0) < 1e-15 ? q : q.normalized();
       },
-      [](const Eigen::Quaterniond& q) {
-        return listOf({q.x(), q.y(), q.z(), q.w()});
-      });
+      [](const Eigen::Quaterniond& q) { return listOf(q.coeffs()); });
 }
 
 void ParameterList::vector3OrEmpty(const std::string& key, const std::string& unit, Range range,
@@ -144,14 +140,10 @@ void ParameterList::vector3OrEmpty(const std::string& key, const std::string& un
       [range](const ParameterValue& value) -> std::optional<Vector> {
         const auto* list = std::get_if<ParameterValue::List>(&value.data);
         if (list != nullptr && list->empty()) return Vector();
-        const auto x = asNumbers(value, 3, range);
-        if (!x) return std::nullopt;
-        return Vector(Eigen::Vector3d(x->data()));
+        const Vector x = asVector3(value, range);
+        return x ? std::make_optional(x) : std::nullopt;
       },
-      [](const Vector& v) {
-        if (!v) return ParameterValue{ParameterValue::List{}};
-        return listOf({v->x(), v->y(), v->z()});
-      });
+      [](const Vector& v) { return v ? listOf(*v) : ParameterValue{ParameterValue::List{}}; });
 }
 
 void ParameterList::text(const std::string& key, std::string& member, const std::string& text) {

@@ -161,9 +161,9 @@ std::string ParameterValue::describe() const {
   return std::visit(Describe{}, data);
 }
 
-ParameterValue listOf(const std::vector<double>& numbers) {
-  ParameterValue::List list(numbers.size());
-  for (std::size_t i = 0; i < numbers.size(); ++i) list[i].data = numbers[i];
+ParameterValue listOf(const Eigen::VectorXd& numbers) {
+  ParameterValue::List list;
+  for (Eigen::Index i = 0; i < numbers.size(); ++i) list.emplace_back().data = numbers[i];
   return {std::move(list)};
 }
 

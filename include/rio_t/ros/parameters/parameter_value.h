@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <iosfwd>
 #include <string>
@@ -24,7 +25,7 @@ struct ParameterValue {
   std::string yaml() const;
 };
 
-ParameterValue listOf(const std::vector<double>& numbers);
+ParameterValue listOf(const Eigen::VectorXd& numbers);
 
 /// What plain (unquoted) YAML text stands for: truth value, integer, number, nothing, else text.
 ParameterValue parsePlainScalar(const std::string& text);
