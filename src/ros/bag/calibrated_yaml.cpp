@@ -55,13 +55,13 @@ ProposedKeys calibratedKeys(const RadarCalibration& calibration, const Config& c
 std::string header(const BagCalibration& calibration, const std::string& name) {
   std::string text =
       "Written by rio_t calibrate. It is ready for --config of rio_t_bag, and for the live node.\n";
-  text += "It holds the keys of " + oneLine(name) +
+  text += "It holds the keys of " + name +
           " and of --set, without those of one bag. The comments of that file are not repeated here.\n"
           "Bags that count:\n";
   for (const CalibrationBag& bag : calibration.bags)
-    if (bag.failure.empty()) text += "  " + oneLine(bag.path) + "\n";
+    if (bag.failure.empty()) text += "  " + bag.path + "\n";
   for (const CalibrationBag& bag : calibration.bags)
-    if (!bag.failure.empty()) text += "This one failed and does not count: " + oneLine(bag.path) + "\n";
+    if (!bag.failure.empty()) text += "This one failed and does not count: " + bag.path + "\n";
   text +=
       "Turns are about the axes of the IMU, from the mounting that was given. What is not observed stays "
       "as given.\n";

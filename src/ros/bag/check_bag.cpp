@@ -41,7 +41,7 @@ ImuInspection chooseImu(const Recording& recording, BagCheck* check) {
 }
 
 std::string header(const Recording& recording) {
-  return "Written by rio_t check_bag from " + oneLine(boost::algorithm::join(recording.bags, ", ")) +
+  return "Written by rio_t check_bag from " + boost::algorithm::join(recording.bags, ", ") +
          ".\nIt has the keys that differ from the defaults; config/estimator.yaml lists all."
          "\nRun: rosrun rio_t rio_t_bag --bag BAG --config THIS_FILE --output-dir results";
 }

@@ -56,11 +56,6 @@ std::string commented(const std::string& text, const std::string& indent) {
   return result;
 }
 
-std::string oneLine(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', '?');
-  return text;
-}
-
 std::string toYaml(const ProposedKeys& keys, const std::string& indent) {
   std::string text;
   for (const ProposedKey& key : keys.all()) {

@@ -49,7 +49,6 @@ double rounded(double value, double per);
 
 /// Each line of `text` as a comment; a file name may hold what would end one.
 std::string commented(const std::string& text, const std::string& indent);
-std::string oneLine(std::string text);
 
 /// All keys, one a line, each after its reason as a comment.
 std::string toYaml(const ProposedKeys& keys, const std::string& indent);
