@@ -161,10 +161,9 @@ void findRest(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
 
 }  // namespace
 
-ImuReport inspectImu(const std::vector<ImuMeasurement>& written, std::vector<ImuMeasurement>* samples) {
+ImuReport inspectImu(const std::vector<ImuMeasurement>& written) {
   ImuReport report;
-  std::vector<ImuMeasurement>& imu = *samples;
-  imu.clear();
+  std::vector<ImuMeasurement>& imu = report.samples;
   std::vector<double> norms, rates;
   for (const ImuMeasurement& sample : written) {
     if (!sample.acceleration.allFinite() || !sample.angular_velocity.allFinite()) {

@@ -11,6 +11,7 @@ namespace rio_t {
 
 /// An IMU as a recording shows it. All values are in m/s^2 and rad/s, but for those marked "as written".
 struct ImuReport {
+  std::vector<ImuMeasurement> samples;  ///< those that are finite and do not repeat the one before
   std::size_t not_finite = 0;
   double written_norm = 0.0;  ///< median of |acceleration|, as written
   ImuUnits units;             ///< found
@@ -32,8 +33,7 @@ struct ImuReport {
   std::size_t repeated = 0;  ///< samples with the values of the one before, although the IMU turns
 };
 
-/// `written`: as the driver writes them, in the order of time; times must rise. `samples` gets those that are
-/// finite and do not repeat the one before, in m/s^2 and rad/s.
-ImuReport inspectImu(const std::vector<ImuMeasurement>& written, std::vector<ImuMeasurement>* samples);
+/// `written`: as the driver writes them, in the order of time; times must rise.
+ImuReport inspectImu(const std::vector<ImuMeasurement>& written);
 
 }  // namespace rio_t

@@ -206,7 +206,7 @@ void describeNoise(ImuInspection* imu) {
 
 void describe(ImuInspection* imu) {
   const ImuReport& r = imu->report;
-  const std::size_t samples = imu->samples.size() + r.not_finite + r.repeated;
+  const std::size_t samples = r.samples.size() + r.not_finite + r.repeated;
   if (10 * r.not_finite > samples) {  // the rest of the report would be of what is left
     imu->missing("IMU",
                  std::to_string(r.not_finite) + " of " + std::to_string(samples) + " samples are not finite",
@@ -271,7 +271,7 @@ ImuInspection inspectImuTopic(const ImuTopic& topic) {
   describeRate(timing, &imu);
   describeOrder(order, written.messages, &imu);
   imu.times = std::move(order.kept.times);
-  imu.report = inspectImu(order.kept.written, &imu.samples);
+  imu.report = inspectImu(order.kept.written);
   describe(&imu);
   return imu;
 }

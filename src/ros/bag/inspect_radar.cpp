@@ -328,7 +328,7 @@ RadarInspection inspectRadar(const Recording& recording, const ImuInspection& im
     return radar;
   }
   const StampProposal stamps = proposeStamps(recording, imu.times, cloud, configured);
-  const InertialTrack track(imu.samples, imu.report.rest_rate);
+  const InertialTrack track(imu.report.samples, imu.report.rest_rate);
   Looked looked = look(recording, imu, cloud, stamps, format.format, track);
   if (const std::string fault = faultOf(looked, format.format, stamps); !fault.empty()) {
     const char* const to_do =

@@ -22,7 +22,6 @@ struct ImuInspection : Findings {
   std::string topic;
   std::vector<MessageTimes> times;  ///< of the samples whose stamps are in place
   ImuReport report;
-  std::vector<ImuMeasurement> samples;  ///< those that are finite, in m/s^2 and rad/s, stamps rising
   ProposedKeys keys;
 };
 ImuInspection inspectImuTopic(const ImuTopic& topic);
