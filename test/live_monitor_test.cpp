@@ -401,6 +401,21 @@ TEST_F(TwoRadarDiagnostics, NameTheTypeOfATopicThatIsPublishedAsAnother) {
   EXPECT_FALSE(monitor.lacksInput());
 }
 
+/// The name of the topic is the first thing that is wrong with a new radar.
+TEST_F(TwoRadarDiagnostics, NameTheTopicsOfTheRightTypeIfNobodyPublishesTheConfiguredOne) {
+  LiveMonitor::RosView view;
+  view.topic_types = {{"/driver/cloud", "sensor_msgs/PointCloud2"},
+                      {"/lidar", "sensor_msgs/PointCloud2"},
+                      {"/left", "sensor_msgs/PointCloud2"},
+                      {"/driver/imu", "sensor_msgs/Imu"}};
+  monitor.setRosView(view);
+  EXPECT_EQ(input().message, "no IMU message yet on " + config.imu_topic +
+                                 ", which nobody publishes; topics of type sensor_msgs/Imu: /driver/imu");
+  EXPECT_EQ(second(0, 0, 0).message,
+            "radar left: no scan yet on /left; radar right: no scan yet on /right, which nobody publishes; "
+            "topics of type sensor_msgs/PointCloud2: /driver/cloud, /left, /lidar");
+}
+
 TEST(LiveMonitor, NamesTheTypeOfABarometerThatIsNone) {
   Config config;
   config.barometer_topic = "/baro";
@@ -584,6 +599,19 @@ TEST_F(TwoRadarDiagnostics, SayWhatBecomesOfTheScansNowWhileTheImuCarriesTheEsti
   EXPECT_EQ(status.message,
             "no scan is used: the IMU alone carries the estimate; radar left: 0 of the last 12 scans were "
             "used, rejected mostly as cloud_not_usable; no scan comes on /right");
+}
+
+/// An IMU that is doubtful, too, keeps no scans away.
+TEST_F(TwoRadarDiagnostics, NameTheTopicsOfTheScansThatNeverCame) {
+  for (int k = 0; k < 1000; ++k) monitor.imuDropped(kImuNotUsable);
+  second(0, 0, 0);
+  second(0, 0, 0);
+  rest(session, 4, 7);
+  const Status status = odometry(session);
+  EXPECT_NE(value(status, "likely_cause_1"), "no likely_cause_1");
+  EXPECT_EQ(status.message,
+            "no scan is used: the IMU alone carries the estimate; no scan comes on /left; no scan comes on "
+            "/right");
 }
 
 TEST_F(TwoRadarDiagnostics, AreNoWarningBeforeTheFirstScanOfARunIsUsed) {

@@ -47,13 +47,14 @@ ros::NodeHandle onQueue(ros::NodeHandle node, ros::CallbackQueue* queue) {
   return node;
 }
 
-/// The types of what is published, by topic; none without a master.
-std::map<std::string, std::string> publishedTypes() {
+/// The types of what is published, by topic, but for what is below `ours`; none without a master.
+std::map<std::string, std::string> publishedTypes(const std::string& ours) {
   std::map<std::string, std::string> types;
   ros::master::V_TopicInfo topics;
   // getTopics alone would wait for a master that is gone.
   if (!ros::master::check() || !ros::master::getTopics(topics)) return types;
-  for (const ros::master::TopicInfo& topic : topics) types[topic.name] = topic.datatype;
+  for (const ros::master::TopicInfo& topic : topics)
+    if (topic.name.rfind(ours + "/", 0) != 0) types[topic.name] = topic.datatype;
   return types;
 }
 
@@ -182,7 +183,7 @@ void LiveOdometry::addDiagnostics() {
   diagnostics_->add("input", [this](Status& s) {
     LiveMonitor::RosView view;
     // Before the monitor is locked: the master may take its time.
-    if (monitor_.lacksInput()) view.topic_types = publishedTypes();
+    if (monitor_.lacksInput()) view.topic_types = publishedTypes(private_node_.getNamespace());
     view.publishers[config_.imu_topic] = imu_subscriber_.getNumPublishers();
     if (barometer_subscriber_)
       view.publishers[config_.barometer_topic] = barometer_subscriber_.getNumPublishers();

@@ -218,11 +218,17 @@ void LiveMonitor::setRosView(RosView view) {
   ros_ = std::move(view);
 }
 
-std::string LiveMonitor::wrongType(const std::string& topic, const std::string& expected) const {
+std::string LiveMonitor::whatIsPublished(const std::string& topic, const std::string& expected) const {
   const auto found = ros_.topic_types.find(topic);
-  // "*": whatever the publisher has.
-  if (found == ros_.topic_types.end() || found->second == expected || found->second == "*") return "";
-  return ", which is published as " + found->second + ", expected " + expected;
+  if (found != ros_.topic_types.end()) {
+    // "*": whatever the publisher has.
+    if (found->second == expected || found->second == "*") return "";
+    return ", which is published as " + found->second + ", expected " + expected;
+  }
+  std::string others;
+  for (const auto& [other, type] : ros_.topic_types)
+    if (type == expected) appendItem(&others, other);
+  return others.empty() ? "" : ", which nobody publishes; topics of type " + expected + ": " + others;
 }
 
 void LiveMonitor::tune(const ImuNoise& configured) {
@@ -243,7 +249,12 @@ Diagnosis LiveMonitor::addDiagnosis(Status& status, const LiveSession& session, 
     evidence.input_faults[kImuNotUsable] = all - not_usable_before_session_;
   Diagnosis diagnosis = diagnose(evidence, config_);
   if (evidence.initialized) status.add("verdict", toString(diagnosis.verdict));
-  if (!diagnosis.causes.empty())
+  const auto came = [](const RadarSummary& radar) { return radar.scans_total > 0; };
+  const bool none_came = std::none_of(evidence.radars.begin(), evidence.radars.end(), came);
+  // Nothing else that is wrong keeps the scans away.
+  if (none_came)
+    *why = whyCoasting();
+  else if (!diagnosis.causes.empty())
     *why = ". Likely cause: " + diagnosis.causes.front().text + " " + diagnosis.causes.front().remedy;
   for (std::size_t i = 0; i < diagnosis.causes.size(); ++i) {
     const Cause& cause = diagnosis.causes[i];
@@ -253,7 +264,7 @@ Diagnosis LiveMonitor::addDiagnosis(Status& status, const LiveSession& session, 
   std::size_t red = 0;
   for (const Check& check : diagnosis.checks) {
     if (check.good()) continue;
-    if (red == 0) *why = ": " + describe(check);
+    if (red == 0 && !none_came) *why = ": " + describe(check);
     status.add("red_check_" + std::to_string(++red), describe(check));
   }
   return diagnosis;
@@ -341,12 +352,13 @@ std::optional<LiveMonitor::Finding> LiveMonitor::describeRadar(Status& status, R
   const std::optional<std::string> mostly_rejected = judgeUse(radar, initialized);
   const std::string of = radars_.size() == 1 ? "" : called(radar) + ": ";
   if (radar.scans.count == 0)
-    return Finding{DiagnosticStatus::ERROR, of + "no scan yet on " + config.radar_topic +
-                                                wrongType(config.radar_topic, "sensor_msgs/PointCloud2")};
+    return Finding{DiagnosticStatus::ERROR,
+                   of + "no scan yet on " + config.radar_topic +
+                       whatIsPublished(config.radar_topic, "sensor_msgs/PointCloud2")};
   if (wants_trigger && radar.triggers.count == 0) {
     return Finding{DiagnosticStatus::ERROR,
                    of + "no trigger yet on " + config.trigger_topic +
-                       wrongType(config.trigger_topic, "std_msgs/Header") +
+                       whatIsPublished(config.trigger_topic, "std_msgs/Header") +
                        ", and stamp_source is trigger; header and arrival need none"};
   }
   if (is_silent)
@@ -432,7 +444,7 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
 
   if (imu_.count == 0) {
     status.summary(DiagnosticStatus::ERROR, "no IMU message yet on " + config_.imu_topic +
-                                                wrongType(config_.imu_topic, "sensor_msgs/Imu"));
+                                                whatIsPublished(config_.imu_topic, "sensor_msgs/Imu"));
   } else if (ros_.clock_stands) {
     status.summary(DiagnosticStatus::WARN, kClockStands);
   } else if (!imu_fault_.empty()) {

@@ -42,7 +42,7 @@ void LiveMonitor::describeBarometer(Status& status) {
   if (barometer_.pressures == 0) {
     status.summary(DiagnosticStatus::WARN,
                    "no pressure yet on " + config_.barometer_topic +
-                       wrongType(config_.barometer_topic, "sensor_msgs/FluidPressure"));
+                       whatIsPublished(config_.barometer_topic, "sensor_msgs/FluidPressure"));
   } else if (is_silent) {
     status.summary(DiagnosticStatus::WARN, "the barometer is silent, topic " + config_.barometer_topic);
   } else if (barometer_.not_usable == barometer_.pressures) {

@@ -27,7 +27,7 @@ class LiveMonitor {
 
   /// What ROS knows about the input.
   struct RosView {
-    /// Types of what is published, by topic: a topic of a wrong type brings no message. Needed only while
+    /// Types of what others publish, by topic: a topic of a wrong type brings no message. Needed only while
     /// lacksInput().
     std::map<std::string, std::string> topic_types;
     std::map<std::string, std::uint32_t> publishers;  ///< how many there are on each topic of the input
@@ -146,8 +146,9 @@ class LiveMonitor {
   std::string whyCoasting() const;
   /// Adds whether the run is good so far and, if not, why. Writes the likeliest reason to `why`.
   Diagnosis addDiagnosis(Status& status, const LiveSession& session, std::string* why) const;
-  /// For the end of a message about a topic on which nothing came; empty if its type is right or unknown.
-  std::string wrongType(const std::string& topic, const std::string& expected) const;
+  /// For the end of a message about a topic on which nothing came: its type, if it is wrong; if nobody
+  /// publishes it, the topics of the right type.
+  std::string whatIsPublished(const std::string& topic, const std::string& expected) const;
   static Finding join(const std::vector<Finding>& findings, bool another_works);
   /// Whether this radar gave an estimate lately.
   bool isRecent(const Radar& radar) const;
