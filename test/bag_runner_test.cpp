@@ -93,7 +93,7 @@ TEST_F(BagRunner, StepAndSpanOfTheDopplerAreToldWithTheirSources) {
                         const char* in_table) {
     RunSummary summary;
     summary.radars.emplace_back();
-    summary.radars.front().knowledge = {{}, step, span};
+    summary.radars.front().knowledge = {{}, step, span, {}};
     RunOutput(out_).finish(summary);
     EXPECT_NE(contents(out_ + "/summary.yaml").find(in_summary), std::string::npos) << in_summary;
     EXPECT_NE(describeRun(summary, out_).find(in_table), std::string::npos) << in_table;
