@@ -1,7 +1,6 @@
 #pragma once
 
 #include "rio_t/odometry/batch_odometry.h"
-#include "rio_t/simulation/simulation.h"
 #include "simulated_run.h"
 
 namespace rio_t {
@@ -9,8 +8,7 @@ namespace rio_t {
 /// Whole-trajectory batch over the scans of an online run.
 inline BatchResult batchOf(const SimulatedRun& run) {
   BatchOdometry batch(run.options, BatchOptions());
-  for (const ImuMeasurement& sample : simulation::simulate(run.motion, run.setup).imu.samples)
-    batch.addImu(sample);
+  batch.addImu(run.taken);
   for (const ScanResult& result : run.results) batch.addResult(result);
   return batch.solve(*run.odometry->start());
 }

@@ -72,7 +72,7 @@ struct SimulatedRun {
     auto pressure = data.pressures.begin();
     std::size_t count = 0;
     for (const ImuMeasurement& sample : data.imu.samples) {
-      if (const auto state = odometry->addImu(sample)) states.push_back(*state);
+      if (const auto state = odometry->addImu(sample, &taken)) states.push_back(*state);
       for (; pressure != data.pressures.end() && pressure->stamp <= sample.time; ++pressure)
         odometry->addPressure({pressure->stamp, pressure->pascal});
       for (; next != arrivals.end() && next->scan->arrival <= sample.time; ++next) {
@@ -138,6 +138,7 @@ struct SimulatedRun {
   std::size_t samples_per_process = 1;  ///< IMU samples between two calls of process()
   OdometryOptions options;
   std::optional<RadarInertialOdometry> odometry;
+  std::vector<ImuMeasurement> taken;    ///< samples of the IMU, with bridges
   std::vector<NavigationState> states;  ///< causal, one for each sample
   std::vector<ScanResult> results;
 };

@@ -27,35 +27,26 @@ StateBlock stateBlock(const NavigationState& state) {
 }  // namespace
 
 BatchOdometry::BatchOdometry(const OdometryOptions& options, const BatchOptions& batch)
-    : options_(options),
-      batch_(batch),
-      g_W_(0.0, 0.0, -options.gravity),
-      imu_input_check_(options.max_imu_gap, options.imu_input_check) {}
+    : options_(options), batch_(batch), g_W_(0.0, 0.0, -options.gravity) {}
 
-void BatchOdometry::addImu(ImuMeasurement imu, bool has_started) {
-  const ImuInputCheck::Verdict verdict = imu_input_check_.check(imu);
-  if (verdict.decision == ImuInputCheck::Decision::kDrop) return;
-  if (verdict.decision == ImuInputCheck::Decision::kRestart) {
-    if (has_started)
-      throw std::runtime_error(
-          "batch: the IMU's clock jumped or it was silent for longer than max_bridged_imu_gap; "
-          "no single graph goes over that: use mode online, or bag_start and bag_duration");
-    imu_.clear();
-    scans_.clear();
-  }
-  for (const ImuMeasurement& unseen : verdict.bridge) imu_.add(unseen);
-  if (!imu_.empty()) imu.addLostWay(imu_.newest(), v_W_);
-  imu_.add(imu);
+void BatchOdometry::addImu(const std::vector<ImuMeasurement>& taken) {
+  for (const ImuMeasurement& sample : taken) imu_.add(sample);
+}
+
+void BatchOdometry::startAgain(bool has_started) {
+  if (has_started)
+    throw std::runtime_error(
+        "batch: the IMU's clock jumped or it was silent for longer than max_bridged_imu_gap; "
+        "no single graph goes over that: use mode online, or bag_start and bag_duration");
+  imu_.clear();
+  scans_.clear();
 }
 
 void BatchOdometry::addResult(ScanResult result) {
   if (!result.used && result.rejected_because.empty()) return;  // only carries the last poses
   result.scan.points = {};
   result.left_window.clear();
-  if (result.updated) {
-    model_error_scale_ = result.model_error_scale;
-    v_W_ = result.state.v_W;
-  }
+  if (result.updated) model_error_scale_ = result.model_error_scale;
   scans_.push_back(std::move(result));
 }
 

@@ -31,8 +31,8 @@ Navigation::Checked Navigation::add(const ImuMeasurement& imu) {
   const std::optional<NavigationState> before = sample.lost_time > 0.0 ? propagator_.state() : std::nullopt;
   if (before) sample.addLostWay(before->time, before->v_W);
   propagator_.add(sample);
-  checked.bridge = std::move(verdict.bridge);
-  checked.sample = sample;
+  checked.taken = std::move(verdict.bridge);
+  checked.taken.push_back(sample);
   checked.state = propagator_.state();
   if (checked.state) addHeadingCurvature(*checked.state);
   return checked;

@@ -59,11 +59,13 @@ RadarInertialOdometry::~RadarInertialOdometry() = default;
 RadarInertialOdometry::RadarInertialOdometry(RadarInertialOdometry&&) noexcept = default;
 RadarInertialOdometry& RadarInertialOdometry::operator=(RadarInertialOdometry&&) noexcept = default;
 
-std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasurement& imu) {
+std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasurement& imu,
+                                                             std::vector<ImuMeasurement>* taken) {
   Impl& m = *impl_;
   Navigation::Checked checked = m.navigation.add(imu);
   for (const char* fault : checked.faults) m.faults.count(fault);
-  if (!checked.sample) return std::nullopt;
+  if (checked.taken.empty()) return std::nullopt;
+  if (taken != nullptr) taken->insert(taken->end(), checked.taken.begin(), checked.taken.end());
   const std::lock_guard<std::mutex> lock(m.inbox_mutex);
   if (m.inbox.clock_restarts != checked.clock_restarts) {
     m.inbox.clock_restarts = checked.clock_restarts;
@@ -71,8 +73,7 @@ std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasuremen
     m.inbox.pressures.clear();
     m.status.initialized = false;
   }
-  m.inbox.imu.insert(m.inbox.imu.end(), checked.bridge.begin(), checked.bridge.end());
-  m.inbox.imu.push_back(*checked.sample);
+  m.inbox.imu.insert(m.inbox.imu.end(), checked.taken.begin(), checked.taken.end());
   return checked.state;
 }
 

@@ -81,13 +81,11 @@ RadarState radarState(const MotionState& imu, const Extrinsics& T_IR) {
 // Not elevationOf(), which rounds another way: the same seed must give the same bag for good.
 double elevation(const Eigen::Vector3d& p_R) { return std::atan2(p_R.z(), std::hypot(p_R.x(), p_R.y())); }
 
-Eigen::Vector3d fromPolar(double range, double az, double el) { return range * directionOf(az, el); }
-
 /// A point at this range, anywhere in the view.
 Eigen::Vector3d anywhere(double range, const RadarModelOptions& o, Random& random) {
   const double az = o.fov_azimuth * kDegree * random.uniform(-1.0, 1.0);
   const double el = o.fov_elevation * kDegree * random.uniform(-1.0, 1.0);
-  return fromPolar(range, az, o.measures_elevation ? el : 0.0);
+  return range * directionOf(az, o.measures_elevation ? el : 0.0);
 }
 
 bool visible(const Eigen::Vector3d& p_R, const RadarModelOptions& o) {
@@ -115,7 +113,7 @@ Person makePerson(const RadarState& radar, double from, double until, Random& ra
   person.until = until;
   const double elevation = random.uniform(-10.0, 10.0) * kDegree;
   const double azimuth = random.uniform(-40.0, 40.0) * kDegree;
-  person.p_W = radar.p_W + radar.q_WR * fromPolar(random.uniform(2.5, 6.0), azimuth, elevation);
+  person.p_W = radar.p_W + radar.q_WR * (random.uniform(2.5, 6.0) * directionOf(azimuth, elevation));
   const double heading = random.uniform(-M_PI, M_PI);
   person.v_W = random.uniform(0.7, 1.6) * Eigen::Vector3d(std::cos(heading), std::sin(heading), 0.0);
   return person;
@@ -281,7 +279,7 @@ class Sensor {
     const double range = std::max(options_.min_range, p_R.norm() + options_.range_noise * random.gaussian());
     const double az = azimuthOf(seen_R) + options_.azimuth_noise * kDegree * random.gaussian();
     const double el = elevation(seen_R) + options_.elevation_noise * kDegree * random.gaussian();
-    point.position_R = fromPolar(range, az, options_.measures_elevation ? el : 0.0);
+    point.position_R = range * directionOf(az, options_.measures_elevation ? el : 0.0);
     point.doppler = reported(trueDoppler(frame, echo) + options_.doppler_noise * random.gaussian());
     point.snr_db = std::max(6.0, echo.snr_db);
     point.noise_db = 40.0 + 2.0 * random.gaussian();

@@ -4,7 +4,6 @@
 #include <optional>
 #include <vector>
 
-#include "rio_t/imu/input_check.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
 #include "rio_t/smoother/batch_smoother.h"
 
@@ -27,10 +26,11 @@ class BatchOdometry {
  public:
   BatchOdometry(const OdometryOptions& options, const BatchOptions& batch);
 
-  /// Takes every sample that the online run got, in turn with its results, and checks and bridges it in the
-  /// same way. If the clock of the IMU jumps before the online run `has_started`, all samples so far are
-  /// forgotten. Throws std::runtime_error if it jumps later.
-  void addImu(ImuMeasurement imu, bool has_started = true);
+  /// The samples that the online run has taken, with its bridges (see RadarInertialOdometry::addImu).
+  void addImu(const std::vector<ImuMeasurement>& taken);
+  /// Call it first if the clock of the IMU jumped before them. All samples so far are forgotten. Throws
+  /// std::runtime_error if the online run `has_started`.
+  void startAgain(bool has_started);
   /// The points are not kept.
   void addResult(ScanResult result);
 
@@ -55,12 +55,10 @@ class BatchOdometry {
   std::vector<NavigationState> trajectory(const BatchSolution& solution) const;
   std::vector<ScanResult> results(const Run& run, const BatchSolution& solution) const;
 
-  OdometryOptions options_;                        // read-only after construction
-  BatchOptions batch_;                             // read-only after construction
-  Eigen::Vector3d g_W_;                            // read-only after construction
-  double model_error_scale_ = 1.0;                 ///< of the online run at its end
-  Eigen::Vector3d v_W_ = Eigen::Vector3d::Zero();  ///< the newest that it knows
-  ImuInputCheck imu_input_check_;
+  OdometryOptions options_;         // read-only after construction
+  BatchOptions batch_;              // read-only after construction
+  Eigen::Vector3d g_W_;             // read-only after construction
+  double model_error_scale_ = 1.0;  ///< of the online run at its end
   ImuBuffer imu_;
   std::vector<ScanResult> scans_;
 };

@@ -19,10 +19,9 @@ class Navigation {
 
   /// The result of one sample.
   struct Checked {
-    std::vector<ImuMeasurement> bridge;    ///< over the gap before the sample
-    std::optional<ImuMeasurement> sample;  ///< none if it was dropped
-    std::vector<const char*> faults;       ///< names for FaultCounters
-    std::uint64_t clock_restarts = 0;      ///< how often the clock of the IMU has jumped so far
+    std::vector<ImuMeasurement> taken;  ///< the sample, after a bridge over a gap before it; or none
+    std::vector<const char*> faults;    ///< names for FaultCounters
+    std::uint64_t clock_restarts = 0;   ///< how often the clock of the IMU has jumped so far
     /// As published, at the sample; none before the first anchor.
     std::optional<NavigationState> state;
   };

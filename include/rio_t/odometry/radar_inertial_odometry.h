@@ -32,7 +32,9 @@ class RadarInertialOdometry {
   /// initialisation. Drops samples that are out of order or not finite, and counts them in `faults()`. Counts
   /// gaps and saturated samples, too, and widens the uncertainty over them (see ImuInputCheck). If the IMU's
   /// clock jumps, everything starts again with an initialisation.
-  std::optional<NavigationState> addImu(const ImuMeasurement& imu);
+  /// Appends what the estimate takes to `taken`, if given: the sample, after a bridge over a gap before it.
+  std::optional<NavigationState> addImu(const ImuMeasurement& imu,
+                                        std::vector<ImuMeasurement>* taken = nullptr);
 
   /// Queues a scan. It waits until the IMU covers its time of measurement. Throws std::invalid_argument for a
   /// radar that the options do not have.

@@ -109,14 +109,16 @@ void BagPlayer::addImu(const sensor_msgs::Imu& message, Time record) {
     return;
   }
   const ImuSampleCheck::Verdict checked = imu_check_.check(imu);
+  if (checked.is_restart && recorder_ != nullptr) recorder_->startAgain(start_ || odometry_.initialized());
   if (checked.is_restart && odometry_.initialized()) {
     imu_restarts_.push_back({*checked.before, imu.time, checked.dropped, checked.stamps_went_on});
     log_->startAgain();
   }
   if (checked.fault == nullptr) evidence_.addImu(imu.time);
   for (Radar& radar : radars_) radar.stamper.addImu(imu.time, record);
-  if (recorder_ != nullptr) recorder_->addImu(imu, start_ || odometry_.initialized());
-  const std::optional<NavigationState> state = odometry_.addImu(imu);
+  std::vector<ImuMeasurement> taken;
+  const std::optional<NavigationState> state = odometry_.addImu(imu, &taken);
+  if (recorder_ != nullptr) recorder_->addImu(taken);
   if (!state) return;
   evidence_.addState(state->time);
   log_->addState(*state);

@@ -69,16 +69,6 @@ std::string LiveMonitor::called(const Radar& radar) {
   return radar.config.radar_name.empty() ? "the radar" : "radar " + radar.config.radar_name;
 }
 
-LiveMonitor::Finding LiveMonitor::join(const std::vector<Finding>& findings, bool another_works) {
-  Finding all;
-  for (const Finding& finding : findings) {
-    appendItem(&all.text, finding.text, "; ");
-    all.level = std::max(all.level, finding.level);
-  }
-  if (another_works) all.level = std::min(all.level, std::uint8_t{DiagnosticStatus::WARN});
-  return all;
-}
-
 void LiveMonitor::Latency::add(double seconds) {
   worst = std::max(worst, seconds);
   sum += seconds;
@@ -206,7 +196,7 @@ void LiveMonitor::setFrames(const std::map<std::string, std::string>& frames) {
 
 bool LiveMonitor::lacksInput() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!config_.barometer_topic.empty() && barometer_.pressures == 0) return true;
+  if (!config_.barometer_topic.empty() && barometer_.messages.count == 0) return true;
   return imu_.count == 0 || std::any_of(radars_.begin(), radars_.end(), [](const Radar& radar) {
            return radar.scans.count == 0 ||
                   (radar.config.stamp_source == StampSource::kTrigger && radar.triggers.count == 0);
@@ -432,15 +422,18 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
   status.add("imu_gyro_noise_measured", noise.gyro_density);
 
   const bool initialized = session != nullptr && session->odometry().initialized();
-  std::vector<Finding> findings;
+  Finding radars;
+  bool one_works = false;
   std::uint64_t queue_full = 0;
   for (Radar& radar : radars_) {
     const std::optional<Finding> finding = describeRadar(status, radar, initialized);
-    if (finding) findings.push_back(*finding);
+    one_works = one_works || !finding;
+    if (finding) appendItem(&radars.text, finding->text, "; ");
+    if (finding) radars.level = std::max(radars.level, finding->level);
     queue_full += countOf(radar.dropped, "queue_full");
   }
   // What one radar lacks is no error while another works.
-  const Finding radars = join(findings, findings.size() < radars_.size());
+  if (one_works) radars.level = std::min(radars.level, std::uint8_t{DiagnosticStatus::WARN});
 
   if (imu_.count == 0) {
     status.summary(DiagnosticStatus::ERROR, "no IMU message yet on " + config_.imu_topic +
@@ -449,7 +442,7 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
     status.summary(DiagnosticStatus::WARN, kClockStands);
   } else if (!imu_fault_.empty()) {
     status.summary(DiagnosticStatus::ERROR, imu_fault_ + ", topic " + config_.imu_topic);
-  } else if (!findings.empty()) {
+  } else if (!radars.text.empty()) {
     status.summary(radars.level, radars.text);
   } else if (queue_full > queue_full_reported_) {
     status.summary(DiagnosticStatus::WARN, kScansWaitedTooLong);

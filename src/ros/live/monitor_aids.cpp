@@ -13,7 +13,7 @@ using diagnostic_msgs::DiagnosticStatus;
 
 void LiveMonitor::pressure() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  ++barometer_.pressures;
+  ++barometer_.messages.count;
 }
 
 void LiveMonitor::pressureDropped(const std::string& why) {
@@ -24,10 +24,10 @@ void LiveMonitor::pressureDropped(const std::string& why) {
 
 void LiveMonitor::describeBarometer(Status& status) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const bool is_silent = barometer_.silence.lasts(barometer_.pressures, kSilentCalls);
+  const bool is_silent = barometer_.messages.isSilent(kSilentCalls);
   const std::uint64_t fresh_used = barometer_.used - barometer_.used_reported;
   barometer_.used_reported = barometer_.used;
-  status.add("pressures", barometer_.pressures);
+  status.add("pressures", barometer_.messages.count);
   status.add("pressures_not_usable", barometer_.not_usable);
   status.add("means_used", barometer_.used);
   for (const auto& [reason, count] : barometer_.rejected) status.add("means_rejected_" + reason, count);
@@ -39,13 +39,13 @@ void LiveMonitor::describeBarometer(Status& status) {
     status.add("bias_m", barometer_.last->bias);
     status.add("bias_sigma_m", barometer_.last->bias_sigma);
   }
-  if (barometer_.pressures == 0) {
+  if (barometer_.messages.count == 0) {
     status.summary(DiagnosticStatus::WARN,
                    "no pressure yet on " + config_.barometer_topic +
                        whatIsPublished(config_.barometer_topic, "sensor_msgs/FluidPressure"));
   } else if (is_silent) {
     status.summary(DiagnosticStatus::WARN, "the barometer is silent, topic " + config_.barometer_topic);
-  } else if (barometer_.not_usable == barometer_.pressures) {
+  } else if (barometer_.not_usable == barometer_.messages.count) {
     status.summary(DiagnosticStatus::WARN, "no pressure can be used: " + barometer_.why_not_usable);
   } else if (fresh_used == 0 && barometer_.last && !barometer_.last->rejected_because.empty()) {
     status.summary(DiagnosticStatus::WARN,

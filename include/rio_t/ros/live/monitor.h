@@ -87,27 +87,23 @@ class LiveMonitor {
     std::uint64_t count = 0;
     void add(double seconds);
   };
-  struct Silence {
+  struct Counter {
+    std::uint64_t count = 0;
     std::uint64_t reported = 0;  // the count at the last call
     std::size_t calls = 0;       // in a row, to which the count stood still
 
     /// Whether it stood still to this call and to the `at_least` - 1 before it.
-    bool lasts(std::uint64_t count, std::size_t at_least) {
+    bool isSilent(std::size_t at_least) {
       calls = std::exchange(reported, count) == count ? calls + 1 : 0;
       return calls >= at_least;
     }
-  };
-  struct Counter {
-    std::uint64_t count = 0;
-    Silence silence;
-    bool isSilent(std::size_t calls) { return silence.lasts(count, calls); }
   };
   /// The calls come once a second. A radar or a barometer may send as seldom, and then misses a call at
   /// times.
   static constexpr std::size_t kSilentCalls = 2;
 
   struct Barometer : BarometerCounts {
-    Silence silence;
+    Counter messages;
     std::uint64_t not_usable = 0, used_reported = 0;
     std::string why_not_usable;  ///< of the last one
   };
@@ -149,7 +145,6 @@ class LiveMonitor {
   /// For the end of a message about a topic on which nothing came: its type, if it is wrong; if nobody
   /// publishes it, the topics of the right type.
   std::string whatIsPublished(const std::string& topic, const std::string& expected) const;
-  static Finding join(const std::vector<Finding>& findings, bool another_works);
   /// Whether this radar gave an estimate lately.
   bool isRecent(const Radar& radar) const;
 
