@@ -110,10 +110,11 @@ void ImuPropagator::add(const ImuMeasurement& imu) {
   (this->*original)(imu);
 }
 
-std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasurement& imu) {
+std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasurement& imu,
+                                                             std::vector<ImuMeasurement>* taken) {
   static const auto original = libraryFunction(&RadarInertialOdometry::addImu);
   const Scope scope(Stage::kPipeline);
-  return (this->*original)(imu);
+  return (this->*original)(imu, taken);
 }
 
 std::vector<ScanResult> RadarInertialOdometry::process(std::size_t max_scans) {
