@@ -581,7 +581,7 @@ TEST_F(TwoRadarDiagnostics, NameWhyTheScansOfTheOnlyRadarAreMostlyRejected) {
   EXPECT_EQ(status.message, "0 of the last 40 scans were used, rejected mostly as cloud_not_usable");
 }
 
-/// What was wrong earlier in the run may be over.
+/// A fault from earlier in the run may be over.
 TEST_F(TwoRadarDiagnostics, SayWhatBecomesOfTheScansNowWhileTheImuCarriesTheEstimate) {
   for (int k = 0; k < 30; ++k) feed(0, false);
   second(20, 20, 20);

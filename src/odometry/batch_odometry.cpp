@@ -131,7 +131,7 @@ std::vector<BatchHeight> BatchOdometry::heights() const {
     for (const BarometerAnswer& mean : result.barometer) {
       if (mean.rejected_because.empty())
         heights.push_back({mean.time, mean.height + mean.bias, mean.noise_sigma, mean.stepped});
-      // The pressure moved before it was noticed, as BarometerChannel does.
+      // BarometerChannel has removed these means from its window: the pressure moved before that showed.
       while (mean.rejected_because == "pressure_moves" && !heights.empty() &&
              mean.time - heights.back().time < options_.smoother.window)
         heights.pop_back();

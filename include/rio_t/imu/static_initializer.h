@@ -37,8 +37,8 @@ struct StaticInitialization {
   Eigen::Quaterniond q_WI = Eigen::Quaterniond::Identity();  ///< levelled, yaw zero
   Eigen::Vector3d b_g = Eigen::Vector3d::Zero();             ///< mean gyro [rad/s]
   Eigen::Vector3d f_I = Eigen::Vector3d::Zero();             ///< mean specific force [m/s^2]
-  /// What of f_I is beyond gravity [m/s^2]: the part of the bias along the vertical. The horizontal
-  /// part cannot be distinguished from a tilt.
+  /// The vertical part of the bias [m/s^2]: f_I without gravity. The horizontal part cannot be distinguished
+  /// from a tilt.
   Eigen::Vector3d b_a = Eigen::Vector3d::Zero();
   double duration = 0.0;  ///< [s]
 };

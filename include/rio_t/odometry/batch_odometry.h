@@ -26,7 +26,7 @@ class BatchOdometry {
  public:
   BatchOdometry(const OdometryOptions& options, const BatchOptions& batch);
 
-  /// The samples that the online run has taken, with its bridges (see RadarInertialOdometry::addImu).
+  /// Adds the samples that the online run has taken, with its bridges (see RadarInertialOdometry::addImu).
   void addImu(const std::vector<ImuMeasurement>& taken);
   /// Call it first if the clock of the IMU jumped before them. All samples so far are forgotten. Throws
   /// std::runtime_error if the online run `has_started`.

@@ -121,8 +121,7 @@ class BatchSmoother {
     struct Node {
       Block* motion = nullptr;
       Block* biases = nullptr;
-      // A term says so:
-      bool rests = false, moves_as_vehicle = false;
+      bool rests = false, moves_as_vehicle = false;  ///< a term says so
     };
     std::vector<Node> nodes;
     std::vector<NodeEstimate> states() const;
@@ -156,7 +155,7 @@ class BatchSmoother {
   void addTerms(const BatchScan& scan, const Graph::Scan& at, double t_O, Graph& graph) const;
   /// Adds the frame of the vehicle, which stands at the first node.
   void addVehicle(const BatchVehicle& vehicle, Graph& graph) const;
-  /// The vehicle moves as such at the last node.
+  /// Constrains the last node to a motion of the vehicle.
   void constrain(const BatchVehicle& vehicle, Graph& graph) const;
   /// Adds the means of the pressures to the nodes that are near.
   static void addHeights(const BatchProblem& problem, Graph& graph);

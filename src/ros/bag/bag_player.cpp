@@ -117,7 +117,7 @@ void BagPlayer::addImu(const sensor_msgs::Imu& message, Time record) {
   if (checked.fault == nullptr) evidence_.addImu(imu.time);
   for (Radar& radar : radars_) radar.stamper.addImu(imu.time, record);
   std::vector<ImuMeasurement> taken;
-  const std::optional<NavigationState> state = odometry_.addImu(imu, &taken);
+  const std::optional<NavigationState> state = odometry_.addImu(imu, recorder_ == nullptr ? nullptr : &taken);
   if (recorder_ != nullptr) recorder_->addImu(taken);
   if (!state) return;
   evidence_.addState(state->time);

@@ -160,7 +160,8 @@ class BagJob {
     return finish(play(player, run_.config, log, 0.0, 1.0), log, output_.get());
   }
 
-  /// What the batch says of the vehicle and of the barometer. Which terms count, the online run has said.
+  /// Replaces what the online run estimated by what the batch did. The counts are those of the online run,
+  /// which chose the terms.
   static void addAids(const BatchSolution& solution, RunSummary* summary) {
     if (summary->ground_vehicle && solution.T_IV) {
       summary->ground_vehicle->rotation = solution.T_IV->q_IR;

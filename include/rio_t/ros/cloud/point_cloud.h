@@ -24,7 +24,7 @@ struct DecodedScan {
 /// it declares. Some drivers fill their clouds up to a fixed size: that padding is no detection.
 DecodedScan decode(const sensor_msgs::PointCloud2& message, const PointCloudFormat& format);
 
-/// What a power in that unit says as signal to noise [dB]; kUnknownSnrDb if it says nothing.
+/// Converts a power in that unit to a signal to noise ratio [dB]; kUnknownSnrDb if the unit is of no ratio.
 double toDecibel(double power, PowerUnit unit);
 
 /// The presets whose fields the cloud has. The field of the power counts even where it is not read: its name

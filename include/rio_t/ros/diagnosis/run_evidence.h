@@ -198,7 +198,7 @@ class EvidenceCollector {
   RunEvidence evidence_;
 };
 
-/// What to do about several publishers of a topic.
+/// The remedy for a topic that has several publishers.
 constexpr const char* kSeveralPublishersRemedy = "Stop one of them, or remap it to a topic of its own.";
 
 /// The warning for a person whose platform is no ground vehicle.

@@ -136,9 +136,9 @@ class LiveMonitor {
   std::optional<Finding> describeRadar(Status& status, Radar& radar, bool initialized) const;
   /// How few of its last scans were used, and why, if it is less than half.
   static std::optional<std::string> judgeUse(Radar& radar, bool initialized);
-  /// How many scans were used between these accounts, and why the others mostly were not.
+  /// Says how many scans were used between these accounts, and why most others were not.
   static std::string useBetween(const Account& then, const Account& now);
-  /// What became of each radar's scans since the last one that was used; begins with "; ".
+  /// Says for each radar why its scans are not used any more; begins with "; ".
   std::string whyCoasting() const;
   /// Adds whether the run is good so far and, if not, why. Writes the likeliest reason to `why`.
   Diagnosis addDiagnosis(Status& status, const LiveSession& session, std::string* why) const;
