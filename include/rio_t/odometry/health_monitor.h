@@ -31,7 +31,8 @@ struct HealthOptions {
   /// [s] of divergence. For this long the IMU alone is better than a radar that contradicts it, e.g. in front
   /// of a bus that passes.
   double reinitialize_after = 5.0;
-  double window = 2.0;  ///< [s] of scans that are judged
+  /// [s] of scans that are judged. A crowd may fill the view for 2 s; users want to know a divergence within 5.
+  double window = 4.0;
   /// Mean over the window of min(1, d' S^-1 d / gate^2): the share of scans that contradict the prediction.
   double max_contradiction = 0.65;
   double max_velocity_sigma = 1.0;  ///< [m/s] of an axis of I
