@@ -235,6 +235,9 @@ std::vector<RadarDirection> scanOfWalk(const Eigen::Vector3d& v_R, Random& rando
   return points;
 }
 
+/// The velocity is `v_R`, and none fits the Dopplers as they read.
+TwoReadings wrapping(const Eigen::Vector3d& v_R) { return {Eigen::Vector3d::Zero(), v_R}; }
+
 /// A walk at up to 2.4 m/s. The first scan may have errors of the transmission.
 DopplerSpan spanOfWalk(const std::vector<double>& errors = {}) {
   Random random(1);
@@ -244,7 +247,7 @@ DopplerSpan spanOfWalk(const std::vector<double>& errors = {}) {
   span.learn(first, std::nullopt, kStep);
   for (int k = 0; k < 20; ++k) {
     const Eigen::Vector3d v_R(0.0, std::min(2.4, 0.5 + 0.2 * k), 0.0);
-    span.learn(scanOfWalk(v_R, random), v_R, kStep);
+    span.learn(scanOfWalk(v_R, random), wrapping(v_R), kStep);
   }
   return span;
 }
@@ -256,10 +259,10 @@ TEST(DopplerSpan, IsFoundInAWalk) {
 
 TEST(DopplerSpan, OneWildDopplerDoesNotEndIt) {
   DopplerSpan span = spanOfWalk();
-  span.learn({{Eigen::Vector3d::UnitY(), 60.0}}, Eigen::Vector3d(0.0, 1.0, 0.0), kStep);
+  span.learn({{Eigen::Vector3d::UnitY(), 60.0}}, wrapping({0.0, 1.0, 0.0}), kStep);
   EXPECT_NEAR(span.value(), kSpan, 0.5 * kStep);
-  span.learn(std::vector<RadarDirection>(20, {Eigen::Vector3d::UnitY(), 2.5}),
-             Eigen::Vector3d(0.0, -2.5, 0.0), kStep);
+  span.learn(std::vector<RadarDirection>(20, {Eigen::Vector3d::UnitY(), 2.5}), wrapping({0.0, -2.5, 0.0}),
+             kStep);
   EXPECT_EQ(span.value(), 0.0) << "many show that it was wrong";
 }
 
@@ -271,7 +274,7 @@ TEST(DopplerSpan, WildDopplersBeforeItIsFoundDoNotHideIt) {
 TEST(DopplerSpan, ErrorsNowAndThenDoNotAddUp) {
   DopplerSpan span = spanOfWalk();
   for (int k = 0; k < 100; ++k)
-    span.learn({{Eigen::Vector3d::UnitY(), k % 2 == 0 ? 60.0 : 1.0}}, Eigen::Vector3d(0.0, 1.0, 0.0), kStep);
+    span.learn({{Eigen::Vector3d::UnitY(), k % 2 == 0 ? 60.0 : 1.0}}, wrapping({0.0, 1.0, 0.0}), kStep);
   EXPECT_NEAR(span.value(), kSpan, 0.5 * kStep);
 }
 
@@ -280,10 +283,10 @@ TEST(DopplerSpan, IsNotShownByAFewScans) {
   Random random(2);
   DopplerSpan span(0.0);
   const Eigen::Vector3d v_R(0.0, 2.4, 0.0);
-  for (int k = 0; k < 5; ++k) span.learn(scanOfWalk(v_R, random), v_R, kStep);
+  for (int k = 0; k < 5; ++k) span.learn(scanOfWalk(v_R, random), wrapping(v_R), kStep);
   EXPECT_EQ(span.value(), 0.0);
   // A velocity that fits the wrapped Dopplers as they read.
-  for (int k = 0; k < 50; ++k) span.learn(scanOfWalk(v_R, random), Eigen::Vector3d(0.0, -0.6, 0.0), kStep);
+  for (int k = 0; k < 50; ++k) span.learn(scanOfWalk(v_R, random), wrapping({0.0, -0.6, 0.0}), kStep);
   EXPECT_EQ(span.value(), 0.0);
   EXPECT_NEAR(span.possible(), kSpan, 0.5 * kStep);
 }

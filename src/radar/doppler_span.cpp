@@ -56,8 +56,8 @@ void DopplerSpan::widen(const std::vector<RadarDirection>& points, double step) 
   highest_ = -largest_.back();
 }
 
-void DopplerSpan::learn(const std::vector<RadarDirection>& points,
-                        const std::optional<Eigen::Vector3d>& expected_v_R, double step) {
+void DopplerSpan::learn(const std::vector<RadarDirection>& points, const std::optional<TwoReadings>& before,
+                        double step) {
   if (given_ > 0.0) return;
   widen(points, step);
   if (lowest_ > highest_) return;
@@ -69,16 +69,21 @@ void DopplerSpan::learn(const std::vector<RadarDirection>& points,
     scans_ = 0;
     found_ = false;
   }
-  if (found_ || !expected_v_R) return;
-  std::size_t beyond = 0;  // points whose Doppler must lie beyond those seen
-  std::size_t back = 0;    // of these, the ones that are a span off
+  if (found_ || !before) return;
+  std::size_t beyond = 0;    // points whose Doppler must lie beyond those seen
+  std::size_t back = 0;      // of these, the ones that are a span off
+  std::size_t as_read = 0;   // points that the Dopplers of the scan before explain as they read
+  std::size_t wrapping = 0;  // points that they explain if they may come back
   for (const RadarDirection& p : points) {
-    const double expected = -p.u_R.dot(*expected_v_R);
+    if (std::abs(p.doppler + p.u_R.dot(before->as_read)) < margin) ++as_read;
+    const double expected = -p.u_R.dot(before->wrapping);
+    const bool fits = std::abs(unwrapped(p.doppler, expected, possible_) - expected) < margin;
+    if (fits) ++wrapping;
     if (expected > lowest_ - margin && expected < highest_ + margin) continue;
     ++beyond;
     if (std::abs(std::abs(expected - p.doppler) - possible_) < margin) ++back;
   }
-  scans_ = std::max(0, scans_ + (2 * back > beyond ? 1 : -1));
+  scans_ = std::max(0, scans_ + (2 * back > beyond && wrapping > as_read ? 1 : -1));
   found_ = scans_ >= static_cast<int>(kEnough);
 }
 

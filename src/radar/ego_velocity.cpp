@@ -142,10 +142,14 @@ bool EgoVelocityEstimator::observe(const RadarScan& scan) {
 /// Needs no estimate: before the start there is none, and one that took wrapped Dopplers at face value would
 /// never show the span.
 void EgoVelocityEstimator::learnSpan(const std::vector<RadarDirection>& points) {
-  span_.learn(points, std::exchange(last_v_R_, std::nullopt), options_.doppler_quantization);
+  span_.learn(points, std::exchange(before_, std::nullopt), options_.doppler_quantization);
   const bool may_show = span_.value() == 0.0 && span_.reachesBothEnds(points, options_.doppler_quantization);
   if (!may_show || points.size() < 3 || mostReadZero(points, options_)) return;
-  last_v_R_ = ransac(points, options_, ransac_iterations_, span_.possible());
+  const std::optional<Eigen::Vector3d> as_read = ransac(points, options_, ransac_iterations_, 0.0);
+  if (!as_read) return;
+  const std::optional<Eigen::Vector3d> wrapping =
+      ransac(points, options_, ransac_iterations_, span_.possible());
+  if (wrapping) before_ = TwoReadings{*as_read, *wrapping};
 }
 
 EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,

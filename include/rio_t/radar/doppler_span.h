@@ -16,19 +16,26 @@ inline double unwrapped(double doppler, double expected, double span) {
   return span > 0.0 ? doppler + span * std::round((expected - doppler) / span) : doppler;
 }
 
+/// Velocities of a scan by its points alone, in R [m/s].
+struct TwoReadings {
+  Eigen::Vector3d as_read;   ///< with the Dopplers as they read
+  Eigen::Vector3d wrapping;  ///< with Dopplers that may have come back from beyond the possible span
+};
+
 /// The span of a radar's Doppler. A Doppler beyond the span comes back on the other side (aliasing).
 ///
-/// If the span is not given, DopplerSpan reads it off the data. A span shows in two ways: no Doppler is
-/// beyond it, and points that must be beyond, by the platform's velocity, are one span off. A few Dopplers
-/// that are errors of the transmission do not count. Not thread-safe.
+/// If the span is not given, DopplerSpan reads it off the data. A span shows in three ways: no Doppler is
+/// beyond it; points that must be beyond, by the platform's velocity, are one span off; and no velocity
+/// explains as many points as they read. A few Dopplers that are errors of the transmission do not count.
+/// Not thread-safe.
 class DopplerSpan {
  public:
   explicit DopplerSpan(double given) : given_(given) {}  ///< [m/s] 0: read it off the data
 
-  /// Takes the points of a scan. `expected_v_R` is its velocity as the scan before it shows it, with Dopplers
-  /// modulo `possible` [m/s]; none: unknown, or at rest. The velocity must know nothing of the points, which
-  /// would confirm any span that it was fitted with. `step` is that of the Doppler [m/s].
-  void learn(const std::vector<RadarDirection>& points, const std::optional<Eigen::Vector3d>& expected_v_R,
+  /// Takes the points of a scan. `before` are the velocities of the scan before it; none: unknown, or at
+  /// rest. They must know nothing of the points, which would confirm any span that they were fitted with.
+  /// `step` is that of the Doppler [m/s].
+  void learn(const std::vector<RadarDirection>& points, const std::optional<TwoReadings>& before,
              double step);
   KnownDoppler known() const {
     if (given_ > 0.0) return {given_, DopplerSource::kGiven};

@@ -164,9 +164,9 @@ class EgoVelocityEstimator {
   int ransac_iterations_;     // read-only after construction
   DopplerGrid grid_;
   DopplerSpan span_;
-  RadarScan observed_;                       ///< the last one: what comes twice is one witness
-  std::optional<Eigen::Vector3d> last_v_R_;  ///< of that scan by its points alone, modulo the possible span
-  EgoVelocityOptions options_;               // given_, with what follows from the step
+  RadarScan observed_;                 ///< the last one: what comes twice is one witness
+  std::optional<TwoReadings> before_;  ///< of that scan, if it may show the span
+  EgoVelocityOptions options_;         // given_, with what follows from the step
   PointNoise noise_;
 };
 
