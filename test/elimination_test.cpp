@@ -153,12 +153,12 @@ TEST(Marginalization, KeepsWhatIsHardlyKnown) {
   EXPECT_NEAR(std::sqrt(linearized(window).elimination.covariance({0})(0, 0)), kSigma, 1e-3 * kSigma);
 }
 
-TEST(SquareRoot, CompressedSaysTheSame) {
+TEST(SquareRoot, WidenedByNothingSaysTheSame) {
   SquareRoot rows{Eigen::MatrixXd(11, 8), Eigen::VectorXd(11)};
   for (int i = 0; i < rows.J.size(); ++i) rows.J(i) = wave(5 + i);
   rows.J.col(3) *= 1e6;  // as different as metres and biases
   for (int i = 0; i < rows.r0.size(); ++i) rows.r0(i) = wave(40 + i);
-  const SquareRoot root = compressed(rows);
+  const SquareRoot root = widened(rows, Eigen::VectorXd::Zero(rows.J.cols()));
   ASSERT_EQ(root.J.rows(), 8);
   const Eigen::VectorXd scale = rows.J.colwise().norm().cwiseInverse();
   const Eigen::MatrixXd J = rows.J * scale.asDiagonal(), again = root.J * scale.asDiagonal();
@@ -170,7 +170,7 @@ TEST(SquareRoot, LeavesTheUnknownFree) {
   SquareRoot rows{Eigen::MatrixXd::Zero(6, 4), Eigen::VectorXd::Zero(6)};
   rows.J(1, 2) = 2.0;
   rows.r0(1) = 0.5;
-  const SquareRoot root = compressed(rows);
+  const SquareRoot root = widened(rows, Eigen::VectorXd::Zero(rows.J.cols()));
   EXPECT_LT((root.J.transpose() * root.J - rows.J.transpose() * rows.J).norm(), 1e-12);
   EXPECT_LT((root.J.transpose() * root.r0 - rows.J.transpose() * rows.r0).norm(), 1e-12);
 }

@@ -329,8 +329,6 @@ std::vector<std::map<int, Eigen::MatrixXd>> Elimination::covariances() const {
   return P;
 }
 
-SquareRoot compressed(const SquareRoot& rows) { return widened(rows, Eigen::VectorXd::Zero(rows.J.cols())); }
-
 SquareRoot eliminateFirst(const LinearSystem& system, int count) {
   BlockElimination elimination(system);
   for (int i = 0; i < count; ++i)

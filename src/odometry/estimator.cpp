@@ -100,7 +100,9 @@ void Estimator::putIntoWindow(Time node_time, RadarChannel& radar, ScanResult& r
   const Time stamp = result.scan.stamp;
   result.model_error_scale = model_error_scale_.value();
   smoother_.setImuNoise(imuNoise());
-  const std::optional<Rest> rest = findRest(imu_, node_time, restContext(), options_.rest);
+  const StateBlock x = smoother_.newest().x;
+  const std::optional<Rest> rest =
+      findRest(imu_, node_time, {x.q_WI(), x.v_W(), x.b_g(), x.b_a(), g_W_}, options_.rest);
   const bool is_still = rest && !rest->shakes;
   const bool has_diverged = health_.health() == Health::kDiverged;
   // These come before the radar adds its node, because a new node has no estimate yet.
@@ -392,11 +394,6 @@ std::vector<StampedPose> Estimator::remainingPoses() {
   std::vector<StampedPose> poses = std::exchange(left_between_, {});
   for (std::size_t k = 0; k < smoother_.size(); ++k) poses.push_back(pose(smoother_.node(k)));
   return poses;
-}
-
-RestContext Estimator::restContext() const {
-  const StateBlock x = smoother_.newest().x;
-  return {x.q_WI(), x.v_W(), x.b_g(), x.b_a(), g_W_};
 }
 
 NavigationState Estimator::newestState(const StateCovariance& covariance) const {

@@ -53,7 +53,7 @@ NodePrior priorAtRest(const SmootherOptions& options, const ImuNoise& noise, con
   J.middleCols<3>(S::kBa).setIdentity();
   add(J, 0, sigma);
   known.r0.setZero(known.J.rows());
-  return {x, radar.time_offset_initial, radar.T_IR, compressed(known)};
+  return {x, radar.time_offset_initial, radar.T_IR, widened(known, Eigen::VectorXd::Zero(size))};
 }
 
 }  // namespace rio_t

@@ -37,12 +37,10 @@ struct SquareRoot {
   Eigen::MatrixXd J;
   Eigen::VectorXd r0;
 };
-/// Returns rows with the same J'J and J'r0, as many as J has columns.
-SquareRoot compressed(const SquareRoot& rows);
 /// Eliminates the first `count` blocks and returns the rows that remain, about the other blocks. Throws
 /// std::runtime_error if the rows do not determine the first ones.
 SquareRoot eliminateFirst(const LinearSystem& system, int count);
-/// Returns rows about x' = x + w, where w is a random walk with these variances. A variance of 0: no walk.
+/// Returns rows about x' = x + w, as many as x has numbers. w is a random walk with these variances; 0: none.
 SquareRoot widened(const SquareRoot& known, const Eigen::VectorXd& variances);
 
 }  // namespace rio_t

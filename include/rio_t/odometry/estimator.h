@@ -98,7 +98,6 @@ class Estimator {
   std::vector<StampedPose> marginalize();
   /// Adds the term that was judged, unless the platform is at rest.
   void constrainToGround(bool at_rest, ScanResult& result);
-  RestContext restContext() const;
   /// Sees that the scans begin or cease to contradict the estimate.
   void followContradiction(bool was_contradicted);
   ImuNoise imuNoise() const { return options_.imu_noise.scaled(model_error_scale_.value()); }
