@@ -57,17 +57,12 @@ bool DopplerFactor::Evaluate(double const* const* parameters, double* residuals,
   const Eigen::Vector3d r = solveTransposed(U, cost.gradient);
   Eigen::Map<Eigen::Vector4d>{residuals} << r, std::sqrt(std::max(0.0, 2.0 * cost.value - r.squaredNorm()));
   if (jacobians == nullptr) return true;
-  if (jacobians[0] != nullptr)
-    Eigen::Map<MotionJacobian<4>>{jacobians[0]} << U * predicted.J_motion, MotionJacobian<1>::Zero();
-  if (jacobians[1] != nullptr)
-    Eigen::Map<BiasJacobian<4>>{jacobians[1]} << U * predicted.J_biases, BiasJacobian<1>::Zero();
-  if (jacobians[2] != nullptr) {
-    Eigen::Map<Eigen::Vector4d> J(jacobians[2]);
-    J << U * predicted.dv_dt_O, 0.0;
-  }
-  if (jacobians[3] != nullptr)
-    Eigen::Map<ExtrinsicsJacobian<4>>{jacobians[3]} << U * predicted.J_extrinsics,
-        ExtrinsicsJacobian<1>::Zero();
+  Eigen::Matrix<double, 4, 3> by_v_R;
+  by_v_R << U, Eigen::RowVector3d::Zero();  // the misfit does not depend on it
+  store(by_v_R * predicted.J_motion, jacobians[0]);
+  store(by_v_R * predicted.J_biases, jacobians[1]);
+  store(by_v_R * predicted.dv_dt_O, jacobians[2]);
+  store(by_v_R * predicted.J_extrinsics, jacobians[3]);
   return true;
 }
 

@@ -29,13 +29,9 @@ bool GroundVehicleFactor::Evaluate(double const* const* parameters, double* resi
       vehicleVelocity(StateView(parameters[0], parameters[1]), toExtrinsics(parameters[2]), omega_I_);
   Eigen::Map<Eigen::Vector2d>{residuals} = weights_.cwiseProduct(velocity.v_V.tail<2>());
   if (jacobians == nullptr) return true;
-  if (jacobians[0] != nullptr)
-    Eigen::Map<MotionJacobian<2>>{jacobians[0]} = weights_.asDiagonal() * velocity.J_motion.bottomRows<2>();
-  if (jacobians[1] != nullptr)
-    Eigen::Map<BiasJacobian<2>>{jacobians[1]} = weights_.asDiagonal() * velocity.J_biases.bottomRows<2>();
-  if (jacobians[2] != nullptr)
-    Eigen::Map<ExtrinsicsJacobian<2>>{jacobians[2]} =
-        weights_.asDiagonal() * velocity.J_frame.bottomRows<2>();
+  store(weights_.asDiagonal() * velocity.J_motion.bottomRows<2>(), jacobians[0]);
+  store(weights_.asDiagonal() * velocity.J_biases.bottomRows<2>(), jacobians[1]);
+  store(weights_.asDiagonal() * velocity.J_frame.bottomRows<2>(), jacobians[2]);
   return true;
 }
 
@@ -46,16 +42,8 @@ bool LevelGroundFactor::Evaluate(double const* const* parameters, double* residu
   Eigen::Map<Eigen::Vector2d>{residuals} = weight_ * (R_VI * up_I).head<2>();
   if (jacobians == nullptr) return true;
   const Eigen::Matrix<double, 2, 3> turned = weight_ * (R_VI * so3::hat(up_I)).topRows<2>();
-  if (jacobians[0] != nullptr) {
-    Eigen::Map<MotionJacobian<2>> J(jacobians[0]);
-    J.setZero();
-    J.leftCols<3>() = turned;
-  }
-  if (jacobians[1] != nullptr) {
-    Eigen::Map<ExtrinsicsJacobian<2>> J(jacobians[1]);
-    J.setZero();
-    J.leftCols<3>() = turned;
-  }
+  store((MotionJacobian<2>() << turned, Eigen::Matrix<double, 2, 7>::Zero()).finished(), jacobians[0]);
+  store((ExtrinsicsJacobian<2>() << turned, Eigen::Matrix<double, 2, 4>::Zero()).finished(), jacobians[1]);
   return true;
 }
 

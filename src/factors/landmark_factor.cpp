@@ -64,11 +64,9 @@ bool LandmarkFactor::Evaluate(double const* const* parameters, double* residuals
   const PolarResidual residual = noise_.at(seen.p_R);
   Eigen::Map<Eigen::Vector3d>{residuals} = residual.value;
   if (jacobians == nullptr) return true;
-  if (jacobians[0] != nullptr) Eigen::Map<MotionJacobian<3>>{jacobians[0]} = residual.J * seen.J_motion;
-  if (jacobians[1] != nullptr)
-    Eigen::Map<ExtrinsicsJacobian<3>>{jacobians[1]} = residual.J * seen.J_extrinsics;
-  if (jacobians[2] != nullptr)
-    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>{jacobians[2]} = residual.J * seen.J_point;
+  store(residual.J * seen.J_motion, jacobians[0]);
+  store(residual.J * seen.J_extrinsics, jacobians[1]);
+  store(residual.J * seen.J_point, jacobians[2]);
   return true;
 }
 

@@ -15,11 +15,10 @@ bool RadarVelocityFactor::Evaluate(double const* const* parameters, double* resi
   const PredictedVelocity predicted = model_.at(parameters, jacobians != nullptr);
   Eigen::Map<Eigen::Vector3d>{residuals} = whitening_ * (predicted.v_R - z_R_);
   if (jacobians == nullptr) return true;
-  if (jacobians[0] != nullptr) Eigen::Map<MotionJacobian<3>>{jacobians[0]} = whitening_ * predicted.J_motion;
-  if (jacobians[1] != nullptr) Eigen::Map<BiasJacobian<3>>{jacobians[1]} = whitening_ * predicted.J_biases;
-  if (jacobians[2] != nullptr) Eigen::Map<Eigen::Vector3d>{jacobians[2]} = whitening_ * predicted.dv_dt_O;
-  if (jacobians[3] != nullptr)
-    Eigen::Map<ExtrinsicsJacobian<3>>{jacobians[3]} = whitening_ * predicted.J_extrinsics;
+  store(whitening_ * predicted.J_motion, jacobians[0]);
+  store(whitening_ * predicted.J_biases, jacobians[1]);
+  store(whitening_ * predicted.dv_dt_O, jacobians[2]);
+  store(whitening_ * predicted.J_extrinsics, jacobians[3]);
   return true;
 }
 

@@ -93,4 +93,12 @@ using MotionJacobian = Eigen::Matrix<double, N, StateBlock::kMotion, Eigen::RowM
 template <int N>
 using BiasJacobian = Eigen::Matrix<double, N, StateBlock::kBiases, Eigen::RowMajor>;
 
+/// Writes the derivative by a block by rows, as the solver wants it, unless the solver does not ask: null.
+template <typename Derivative>
+void store(const Eigen::MatrixBase<Derivative>& J, double* stored) {
+  constexpr int kRows = Derivative::RowsAtCompileTime, kColumns = Derivative::ColsAtCompileTime;
+  constexpr int kOrder = kColumns == 1 ? Eigen::ColMajor : Eigen::RowMajor;  // Eigen knows no column by rows
+  if (stored != nullptr) Eigen::Map<Eigen::Matrix<double, kRows, kColumns, kOrder>>{stored} = J;
+}
+
 }  // namespace rio_t
