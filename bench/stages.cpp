@@ -110,11 +110,10 @@ void ImuPropagator::add(const ImuMeasurement& imu) {
   (this->*original)(imu);
 }
 
-std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasurement& imu,
-                                                             std::vector<ImuMeasurement>* taken) {
+Navigation::Checked RadarInertialOdometry::addImu(const ImuMeasurement& imu) {
   static const auto original = libraryFunction(&RadarInertialOdometry::addImu);
   const Scope scope(Stage::kPipeline);
-  return (this->*original)(imu, taken);
+  return (this->*original)(imu);
 }
 
 std::vector<ScanResult> RadarInertialOdometry::process(std::size_t max_scans) {

@@ -37,7 +37,7 @@ class AtRest : public ::testing::Test {
   std::vector<ScanResult> run(double until) {
     std::vector<ScanResult> results;
     for (; time < until - 1e-6; time += 0.005) {
-      if (const auto state = odometry.addImu(restSample(time))) states.push_back(*state);
+      if (const auto state = odometry.addImu(restSample(time)).state) states.push_back(*state);
       for (ScanResult& result : odometry.process()) results.push_back(std::move(result));
     }
     return results;
@@ -153,11 +153,11 @@ TEST_F(AtRest, TooManyWaitingScansAreReportedNotLost) {
 
 TEST_F(AtRest, BadImuSamplesAreDroppedAndCounted) {
   run(104.0);
-  EXPECT_FALSE(odometry.addImu(restSample(103.0)));
+  EXPECT_FALSE(odometry.addImu(restSample(103.0)).state);
   ImuMeasurement bad = restSample(time);
   bad.acceleration.x() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(odometry.addImu(bad));
-  EXPECT_TRUE(odometry.addImu(restSample(time + 0.5)));
+  EXPECT_FALSE(odometry.addImu(bad).state);
+  EXPECT_TRUE(odometry.addImu(restSample(time + 0.5)).state);
   const auto faults = odometry.faults();
   EXPECT_EQ(faults.at("imu_out_of_order"), 1u);
   EXPECT_EQ(faults.at("imu_not_finite"), 1u);
@@ -252,8 +252,8 @@ TEST_F(AtRest, ThePosesFromBeforeAJumpAreNotLostAtTheEnd) {
 
 TEST_F(AtRest, OneStampFarAheadDoesNotSilenceTheImu) {
   run(104.0);
-  EXPECT_FALSE(odometry.addImu(restSample(1e6)));
-  EXPECT_TRUE(odometry.addImu(restSample(time)));
+  EXPECT_FALSE(odometry.addImu(restSample(1e6)).state);
+  EXPECT_TRUE(odometry.addImu(restSample(time)).state);
   EXPECT_EQ(odometry.faults().at("imu_stamp_jump"), 1u);
 }
 
@@ -307,8 +307,8 @@ TEST(ClockThatStepsBack, LeavesTheBatchUncertainToo) {
 TEST_F(AtRest, UncertaintyGrowsOverAnImuGap) {
   run(104.0);
   const StateCovariance before = states.back().covariance;
-  EXPECT_FALSE(odometry.addImu(restSample(time + 0.995))) << "it may be a stamp out of place";
-  const auto after = odometry.addImu(restSample(time + 1.0));
+  EXPECT_FALSE(odometry.addImu(restSample(time + 0.995)).state) << "it may be a stamp out of place";
+  const auto after = odometry.addImu(restSample(time + 1.0)).state;
   ASSERT_TRUE(after);
   // Half a radian and metres a second may have come together in a second.
   EXPECT_GT(std::sqrt(after->covariance(0, 0)), 0.3);

@@ -72,7 +72,9 @@ struct SimulatedRun {
     auto pressure = data.pressures.begin();
     std::size_t count = 0;
     for (const ImuMeasurement& sample : data.imu.samples) {
-      if (const auto state = odometry->addImu(sample, &taken)) states.push_back(*state);
+      const Navigation::Checked checked = odometry->addImu(sample);
+      taken.insert(taken.end(), checked.taken.begin(), checked.taken.end());
+      if (checked.state) states.push_back(*checked.state);
       for (; pressure != data.pressures.end() && pressure->stamp <= sample.time; ++pressure)
         odometry->addPressure({pressure->stamp, pressure->pascal});
       for (; next != arrivals.end() && next->scan->arrival <= sample.time; ++next) {

@@ -76,11 +76,14 @@ ImuInputCheck::ImuInputCheck(double max_gap, const ImuInputCheckOptions& options
       saturation_(options.accel_range, options.gyro_range) {}
 
 ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
-  const ImuSampleCheck::Verdict sample = samples_.check(imu);
-  if (sample.fault != nullptr) return {Decision::kDrop, {sample.fault}};
-  Verdict verdict;
+  Verdict verdict{samples_.check(imu)};
+  const ImuSampleCheck::Verdict& sample = verdict.sample;
+  if (sample.fault != nullptr) {
+    verdict.faults = {sample.fault};
+    return verdict;
+  }
   if (sample.is_restart) {
-    verdict = {Decision::kRestart, {"imu_clock_restart"}};
+    verdict.faults = {"imu_clock_restart"};
     bridge_.reset();
     accel_axes_ = {};
     gyro_axes_ = {};

@@ -147,7 +147,7 @@ void findRest(const std::vector<ImuMeasurement>& imu, ImuReport* report) {
   ImuInputCheck check(0.04, {});  // measures the noise, which a vibrating frame has at rest, too
   for (ImuMeasurement sample : imu) {
     if (sample.time - begin > kStart) return;
-    if (check.check(sample).decision == ImuInputCheck::Decision::kDrop) continue;
+    if (check.check(sample).sample.fault != nullptr) continue;
     const auto found = rest.add(sample);
     if (!found) continue;
     report->rests_at_start = true;

@@ -17,13 +17,14 @@ Navigation::Checked Navigation::add(const ImuMeasurement& imu) {
   ImuMeasurement sample = imu;
   ImuInputCheck::Verdict verdict = input_check_.check(sample);
   Checked checked;
+  checked.sample = std::move(verdict.sample);
   checked.faults = std::move(verdict.faults);
-  if (verdict.decision == ImuInputCheck::Decision::kRestart) {
+  if (checked.sample.is_restart) {
     propagator_ = ImuPropagator(imu_noise_, g_W_);
     ++clock_restarts_;
   }
   checked.clock_restarts = clock_restarts_;
-  if (verdict.decision == ImuInputCheck::Decision::kDrop) return checked;
+  if (checked.sample.fault != nullptr) return checked;
   accel_noises_ += sample.accel_noise;
   gyro_noises_ += sample.gyro_noise;
   samples_ += 1.0;

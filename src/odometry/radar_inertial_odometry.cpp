@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "rio_t/odometry/estimator.h"
-#include "rio_t/odometry/navigation.h"
 
 namespace rio_t {
 
@@ -59,13 +58,11 @@ RadarInertialOdometry::~RadarInertialOdometry() = default;
 RadarInertialOdometry::RadarInertialOdometry(RadarInertialOdometry&&) noexcept = default;
 RadarInertialOdometry& RadarInertialOdometry::operator=(RadarInertialOdometry&&) noexcept = default;
 
-std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasurement& imu,
-                                                             std::vector<ImuMeasurement>* taken) {
+Navigation::Checked RadarInertialOdometry::addImu(const ImuMeasurement& imu) {
   Impl& m = *impl_;
   Navigation::Checked checked = m.navigation.add(imu);
   for (const char* fault : checked.faults) m.faults.count(fault);
-  if (checked.taken.empty()) return std::nullopt;
-  if (taken != nullptr) taken->insert(taken->end(), checked.taken.begin(), checked.taken.end());
+  if (checked.taken.empty()) return checked;
   const std::lock_guard<std::mutex> lock(m.inbox_mutex);
   if (m.inbox.clock_restarts != checked.clock_restarts) {
     m.inbox.clock_restarts = checked.clock_restarts;
@@ -74,7 +71,7 @@ std::optional<NavigationState> RadarInertialOdometry::addImu(const ImuMeasuremen
     m.status.initialized = false;
   }
   m.inbox.imu.insert(m.inbox.imu.end(), checked.taken.begin(), checked.taken.end());
-  return checked.state;
+  return checked;
 }
 
 void RadarInertialOdometry::addScan(RadarScan scan) {

@@ -82,13 +82,8 @@ class ImuSampleCheck {
 /// than over a long one. So the density of a gap is the full one times min(1, T / kMotionCorrelationTime).
 class ImuInputCheck {
  public:
-  enum class Decision {
-    kTake,
-    kDrop,
-    kRestart,  ///< take it and forget all before: the clock jumped, or the gap was too long
-  };
   struct Verdict {
-    Decision decision = Decision::kTake;
+    ImuSampleCheck::Verdict sample = {};
     /// Snake case: "imu_not_finite", "imu_not_plausible", "imu_repeated", "imu_out_of_order",
     /// "imu_stamp_jump", "imu_clock_restart", "imu_clock_back", "imu_gap", "imu_saturated", "imu_stuck".
     std::vector<const char*> faults = {};

@@ -19,6 +19,7 @@ class Navigation {
 
   /// The result of one sample.
   struct Checked {
+    ImuSampleCheck::Verdict sample;
     std::vector<ImuMeasurement> taken;  ///< the sample, after a bridge over a gap before it; or none
     std::vector<const char*> faults;    ///< names for FaultCounters
     std::uint64_t clock_restarts = 0;   ///< how often the clock of the IMU has jumped so far

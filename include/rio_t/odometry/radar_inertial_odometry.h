@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "rio_t/odometry/initializer.h"
-#include "rio_t/odometry/navigation_state.h"
+#include "rio_t/odometry/navigation.h"
 #include "rio_t/odometry/options.h"
 #include "rio_t/odometry/scan_result.h"
 
@@ -28,13 +28,11 @@ class RadarInertialOdometry {
   RadarInertialOdometry(RadarInertialOdometry&&) noexcept;
   RadarInertialOdometry& operator=(RadarInertialOdometry&&) noexcept;
 
-  /// State at this sample, carried from the newest optimised state: what a live user gets. None before
-  /// initialisation. Drops samples that are out of order or not finite, and counts them in `faults()`. Counts
-  /// gaps and saturated samples, too, and widens the uncertainty over them (see ImuInputCheck). If the IMU's
-  /// clock jumps, everything starts again with an initialisation.
-  /// Appends what the estimate takes to `taken`, if given: the sample, after a bridge over a gap before it.
-  std::optional<NavigationState> addImu(const ImuMeasurement& imu,
-                                        std::vector<ImuMeasurement>* taken = nullptr);
+  /// Returns what the estimate takes, and the state at this sample, carried from the newest optimised state:
+  /// what a live user gets. Drops samples that are out of order or not finite, and counts them in `faults()`.
+  /// Counts gaps and saturated samples, too, and widens the uncertainty over them (see ImuInputCheck). If the
+  /// IMU's clock jumps, everything starts again with an initialisation.
+  Navigation::Checked addImu(const ImuMeasurement& imu);
 
   /// Queues a scan. It waits until the IMU covers its time of measurement. Throws std::invalid_argument for a
   /// radar that the options do not have.

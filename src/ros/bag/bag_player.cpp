@@ -10,12 +10,7 @@
 
 namespace rio_t {
 BagPlayer::BagPlayer(const Config& config, RunLog* log, BatchOdometry* recorder)
-    : config_(config),
-      odometry_(config.odometry),
-      log_(log),
-      recorder_(recorder),
-      evidence_(config),
-      imu_check_(config.odometry.imu_input_check) {
+    : config_(config), odometry_(config.odometry), log_(log), recorder_(recorder), evidence_(config) {
   if (config.odometry.use_barometer) barometer_.emplace();
   for (const Config& radar : configsOfRadars(config)) radars_.emplace_back(radar);
 }
@@ -108,20 +103,20 @@ void BagPlayer::addImu(const sensor_msgs::Imu& message, Time record) {
     notUsable("imu_not_usable", config_.imu_topic, error.what());
     return;
   }
-  const ImuSampleCheck::Verdict checked = imu_check_.check(imu);
-  if (checked.is_restart && recorder_ != nullptr) recorder_->startAgain(start_ || odometry_.initialized());
-  if (checked.is_restart && odometry_.initialized()) {
-    imu_restarts_.push_back({*checked.before, imu.time, checked.dropped, checked.stamps_went_on});
+  const bool was_initialized = odometry_.initialized();
+  const Navigation::Checked checked = odometry_.addImu(imu);
+  const ImuSampleCheck::Verdict& sample = checked.sample;
+  if (sample.is_restart && recorder_ != nullptr) recorder_->startAgain(start_ || was_initialized);
+  if (sample.is_restart && was_initialized) {
+    imu_restarts_.push_back({*sample.before, imu.time, sample.dropped, sample.stamps_went_on});
     log_->startAgain();
   }
-  if (checked.fault == nullptr) evidence_.addImu(imu.time);
+  if (sample.fault == nullptr) evidence_.addImu(imu.time);
   for (Radar& radar : radars_) radar.stamper.addImu(imu.time, record);
-  std::vector<ImuMeasurement> taken;
-  const std::optional<NavigationState> state = odometry_.addImu(imu, recorder_ == nullptr ? nullptr : &taken);
-  if (recorder_ != nullptr) recorder_->addImu(taken);
-  if (!state) return;
-  evidence_.addState(state->time);
-  log_->addState(*state);
+  if (recorder_ != nullptr) recorder_->addImu(checked.taken);
+  if (!checked.state) return;
+  evidence_.addState(checked.state->time);
+  log_->addState(*checked.state);
 }
 
 void BagPlayer::addTrigger(const std_msgs::Header& message, Time record, std::size_t radar) {

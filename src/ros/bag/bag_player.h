@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "publishers.h"
-#include "rio_t/imu/input_check.h"
 #include "rio_t/odometry/batch_odometry.h"
 #include "rio_t/odometry/radar_inertial_odometry.h"
 #include "rio_t/ros/cloud/point_cloud.h"
@@ -68,7 +67,6 @@ class BagPlayer {
   BatchOdometry* recorder_;
   std::optional<RadarInertialOdometry::Start> start_;
   EvidenceCollector evidence_;
-  ImuSampleCheck imu_check_;  // answers as the odometry's own
   std::vector<ImuRestart> imu_restarts_;
   std::uint64_t imu_count_ = 0;
   std::optional<BarometerCounts> barometer_;  // if there is one

@@ -58,7 +58,7 @@ std::optional<NavigationState> LiveSession::addImu(const ImuMeasurement& imu) {
   const double seconds = imu.time - *first_imu_;
   if (seconds > 0.0) imu_rate_ = static_cast<double>(imu_count_) / seconds;
   ++imu_count_;
-  return odometry_.addImu(imu);
+  return odometry_.addImu(imu).state;
 }
 
 std::vector<LiveSession::GivenUp> LiveSession::stampWithImu(Time stamp, Time record) {
