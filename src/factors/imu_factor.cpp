@@ -37,32 +37,25 @@ bool ImuFactor::Evaluate(double const* const* parameters, double* residuals, dou
 
   using S = StateBlock;
   const Eigen::Matrix3d Jr_inv = so3::rightJacobianInverse(e_R);
-  if (jacobians[0] != nullptr) {
-    MotionJacobian<9> E = MotionJacobian<9>::Zero();
-    E.block<3, 3>(0, S::kQStored) = -Jr_inv * (j.q_WI.conjugate() * i.q_WI).toRotationMatrix();
-    E.block<3, 3>(3, S::kQStored) = so3::hat(p_I);
-    E.block<3, 3>(3, S::kPStored) = -R_i_T;
-    E.block<3, 3>(3, S::kVStored) = -T * R_i_T;
-    E.block<3, 3>(6, S::kQStored) = so3::hat(v_I);
-    E.block<3, 3>(6, S::kVStored) = -R_i_T;
-    Eigen::Map<MotionJacobian<9>>{jacobians[0]} = whitening_.lazyProduct(E);
-  }
-  if (jacobians[1] != nullptr) {
-    MotionJacobian<9> E = MotionJacobian<9>::Zero();
-    E.block<3, 3>(0, S::kQStored) = Jr_inv;
-    E.block<3, 3>(3, S::kPStored) = R_i_T;
-    E.block<3, 3>(6, S::kVStored) = R_i_T;
-    Eigen::Map<MotionJacobian<9>>{jacobians[1]} = whitening_.lazyProduct(E);
-  }
-  if (jacobians[2] != nullptr) {
-    BiasJacobian<9> E;
-    E << -Jr_inv * so3::exp(e_R).toRotationMatrix().transpose() * so3::rightJacobian(dR_correction) *
-             d.dR_dbg,
-        Eigen::Matrix3d::Zero(),  //
-        -d.dp_dbg, -d.dp_dba,     //
-        -d.dv_dbg, -d.dv_dba;
-    Eigen::Map<BiasJacobian<9>>{jacobians[2]} = whitening_.lazyProduct(E);
-  }
+  MotionJacobian<9> by_i = MotionJacobian<9>::Zero(), by_j = MotionJacobian<9>::Zero();
+  by_i.block<3, 3>(0, S::kQStored) = -Jr_inv * (j.q_WI.conjugate() * i.q_WI).toRotationMatrix();
+  by_i.block<3, 3>(3, S::kQStored) = so3::hat(p_I);
+  by_i.block<3, 3>(3, S::kPStored) = -R_i_T;
+  by_i.block<3, 3>(3, S::kVStored) = -T * R_i_T;
+  by_i.block<3, 3>(6, S::kQStored) = so3::hat(v_I);
+  by_i.block<3, 3>(6, S::kVStored) = -R_i_T;
+  by_j.block<3, 3>(0, S::kQStored) = Jr_inv;
+  by_j.block<3, 3>(3, S::kPStored) = R_i_T;
+  by_j.block<3, 3>(6, S::kVStored) = R_i_T;
+  BiasJacobian<9> by_biases;
+  by_biases << -Jr_inv * so3::exp(e_R).toRotationMatrix().transpose() * so3::rightJacobian(dR_correction) *
+                   d.dR_dbg,
+      Eigen::Matrix3d::Zero(),  //
+      -d.dp_dbg, -d.dp_dba,     //
+      -d.dv_dbg, -d.dv_dba;
+  store(whitening_.lazyProduct(by_i), jacobians[0]);
+  store(whitening_.lazyProduct(by_j), jacobians[1]);
+  store(whitening_.lazyProduct(by_biases), jacobians[2]);
   return true;
 }
 

@@ -20,12 +20,10 @@ class BarometerFactor final : public ceres::SizedCostFunction<1, StateBlock::kMo
     const MotionView x(parameters[0]);
     residuals[0] = weight_ * (x.p_W.z() + delay_ * x.v_W.z() + parameters[1][0] - height_);
     if (jacobians == nullptr) return true;
-    if (jacobians[0] != nullptr) {
-      Eigen::Map<MotionJacobian<1>> J(jacobians[0]);
-      J.setZero();
-      J(StateBlock::kPStored + 2) = weight_;
-      J(StateBlock::kVStored + 2) = weight_ * delay_;
-    }
+    MotionJacobian<1> J = MotionJacobian<1>::Zero();
+    J[StateBlock::kPStored + 2] = weight_;
+    J[StateBlock::kVStored + 2] = weight_ * delay_;
+    store(J, jacobians[0]);
     if (jacobians[1] != nullptr) jacobians[1][0] = weight_;
     return true;
   }
