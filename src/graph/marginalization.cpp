@@ -90,6 +90,11 @@ Term& addPrior(Window& window, const std::vector<Block*>& blocks, const SquareRo
   return window.add(std::make_unique<PriorTerm>(std::move(manifolds), std::move(x0), root), blocks);
 }
 
+Term& addPrior(Window& window, Block& block, const Eigen::VectorXd& sigmas) {
+  return addPrior(window, {&block},
+                  {sigmas.cwiseInverse().asDiagonal(), Eigen::VectorXd::Zero(sigmas.size())});
+}
+
 void marginalize(Window& window, std::vector<const Block*> leaving, const std::vector<Walk>& walks) {
   std::vector<const Term*> terms;
   std::vector<Block*> touched;

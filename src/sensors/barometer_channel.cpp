@@ -97,8 +97,7 @@ void BarometerChannel::addBias(FixedLagSmoother& smoother, double bias) {
   Window& window = smoother.window();
   if (bias_ && window.has(*bias_)) bias_->is_retired = true;
   bias_ = window.addCalibration(std::make_shared<VectorManifold>(1), Eigen::VectorXd::Constant(1, bias));
-  addPrior(window, {bias_.get()},
-           {Eigen::MatrixXd::Constant(1, 1, 1.0 / kUnknownBarometerBias), Eigen::VectorXd::Zero(1)});
+  addPrior(window, *bias_, Eigen::VectorXd::Constant(1, kUnknownBarometerBias));
   smoother.settle();
 }
 
@@ -126,21 +125,20 @@ void BarometerChannel::join(FixedLagSmoother& smoother, Time time, bool at_rest)
 std::vector<BarometerAnswer> BarometerChannel::use(FixedLagSmoother& smoother) {
   std::vector<BarometerAnswer> answers;
   if (!bias_) return answers;
+  const std::vector<NodeEstimate> nodes = smoother.nodes();
   while (!waiting_.empty()) {
     const Mean mean = waiting_.front();
-    if (mean.time() > smoother.newest().time) break;  // a node may still come nearer
-    std::size_t nearest = smoother.size() - 1;
-    const auto distance = [&](std::size_t k) { return std::abs(smoother.node(k).time - mean.time()); };
-    while (nearest > 0 && distance(nearest - 1) < distance(nearest)) --nearest;
+    if (mean.time() > nodes.back().time) break;  // a node may still come nearer
     waiting_.pop_front();
-    if (distance(nearest) <= kNear) {
-      answers.push_back(use(mean, smoother.node(nearest), smoother));
+    const NodeEstimate& nearest = nodes[nearestNode(nodes, mean.time())];
+    if (std::abs(nearest.time - mean.time()) <= kNear) {
+      answers.push_back(use(mean, nearest, smoother));
       continue;
     }
     BarometerAnswer late;
     late.time = mean.time();
     late.samples = mean.count;
-    late.rejected_because = mean.time() < smoother.node(0).time ? "older_than_window" : "no_node_near";
+    late.rejected_because = mean.time() < nodes.front().time ? "older_than_window" : "no_node_near";
     answers.push_back(late);
   }
   // The next mean may come when the node of this one has left the window.

@@ -122,12 +122,9 @@ void BatchSmoother::start(const BatchProblem& problem, const StateBlock& x,
       if (is_estimated) known.push_back(&extrinsics);
       continue;
     }
-    const auto add = [&](Block& block, const Eigen::VectorXd& sigma) {
-      addPrior(window, {&block}, {sigma.cwiseInverse().asDiagonal(), Eigen::VectorXd::Zero(sigma.size())});
-    };
     if (!options_.time_offset_shared)
-      add(*offsets[k], Eigen::VectorXd::Constant(1, problem.radars[k].time_offset_sigma));
-    if (is_estimated) add(extrinsics, extrinsicsSigmas(options_, problem.radars[k]));
+      addPrior(window, *offsets[k], Eigen::VectorXd::Constant(1, problem.radars[k].time_offset_sigma));
+    if (is_estimated) addPrior(window, extrinsics, extrinsicsSigmas(options_, problem.radars[k]));
   }
   addPrior(window, known, problem.prior.root);
   motion.x = storedMotion(x);
@@ -141,8 +138,7 @@ void BatchSmoother::start(const BatchProblem& problem, const StateBlock& x,
 void BatchSmoother::addVehicle(const BatchVehicle& vehicle, Graph& graph) const {
   const auto manifold = std::make_shared<ExtrinsicsManifold>(EstimateExtrinsics::kRotation);
   graph.vehicle = graph.window.addCalibration(manifold, stored(vehicle.T_IV)).get();
-  const Eigen::Vector3d weights = Eigen::Vector3d::Constant(1.0 / vehicle.rotation_sigma);
-  addPrior(graph.window, {graph.vehicle}, {weights.asDiagonal(), Eigen::Vector3d::Zero()});
+  addPrior(graph.window, *graph.vehicle, Eigen::Vector3d::Constant(vehicle.rotation_sigma));
   if (vehicle.start_slope_sigma > 0.0)
     graph.window.add(std::make_unique<LevelGroundFactor>(vehicle.start_slope_sigma),
                      {graph.nodes.front().motion, graph.vehicle});
@@ -168,8 +164,7 @@ void BatchSmoother::addHeights(const BatchProblem& problem, Graph& graph) {
       const Eigen::VectorXd guess = Eigen::VectorXd::Constant(1, mean.height - states[k].x.p_W().z());
       Block& next = graph.window.addNode(time, manifold, guess);
       if (is_unknown) {
-        addPrior(graph.window, {&next},
-                 {Eigen::MatrixXd::Constant(1, 1, 1.0 / kUnknownBarometerBias), Eigen::VectorXd::Zero(1)});
+        addPrior(graph.window, next, Eigen::VectorXd::Constant(1, kUnknownBarometerBias));
       } else {
         const double sigma = problem.barometer_drift * std::sqrt(time - *bias->time);
         graph.window.add(std::make_unique<RandomWalkFactor>(Eigen::VectorXd::Constant(1, sigma)),
