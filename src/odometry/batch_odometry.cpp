@@ -62,19 +62,14 @@ BatchResult BatchOdometry::solve(const RadarInertialOdometry::Start& start) cons
   return batch;
 }
 
-RadarVelocityMeasurement BatchOdometry::measurement(const ScanResult& result) const {
-  RadarVelocityMeasurement z{result.taken, result.ego_velocity.v_R, result.ego_velocity.covariance};
-  z.covariance.diagonal() +=
-      (model_error_scale_ / result.model_error_scale - 1.0) * result.ego_velocity.added_variance;
-  return z;
-}
-
 void BatchOdometry::setMeasurement(const ScanResult& result, BatchScan& scan) const {
+  const double rescaled = model_error_scale_ / result.model_error_scale;
   if (result.doppler) {
     scan.doppler = result.doppler;
-    scan.doppler->shared_variances *= model_error_scale_ / result.model_error_scale;
+    scan.doppler->shared_variances *= rescaled;
   } else {
-    scan.velocity = measurement(result);
+    scan.velocity = {result.taken, result.ego_velocity.v_R, result.ego_velocity.covariance};
+    scan.velocity->covariance.diagonal() += (rescaled - 1.0) * result.ego_velocity.added_variance;
   }
 }
 

@@ -44,7 +44,6 @@ class BatchOdometry {
     std::vector<std::size_t> source;
   };
 
-  RadarVelocityMeasurement measurement(const ScanResult& result) const;
   Run makeRun(const RadarInertialOdometry::Start& start) const;
   /// None if the platform is free, or was not the vehicle that the options say.
   std::optional<BatchVehicle> vehicle(const RadarInertialOdometry::Start& start) const;
