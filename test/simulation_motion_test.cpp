@@ -71,9 +71,9 @@ TEST(TrajectorySpline, DerivativesAreThoseOfItsPose) {
 }
 
 TEST(TrajectorySpline, AccelerationsAreContinuousAcrossKnots) {
-  SplineFitOptions options;
-  const TrajectorySpline spline(wiggle(20.0, 5.0), options);
-  for (double knot = options.knot_spacing; knot < 4.9; knot += options.knot_spacing) {
+  const TrajectorySpline spline(wiggle(20.0, 5.0));
+  constexpr double kSpacing = TrajectorySpline::kKnotSpacing;
+  for (double knot = kSpacing; knot < 4.9; knot += kSpacing) {
     const double eps = 1e-9;
     const MotionState left = spline.at(knot - eps), right = spline.at(knot + eps);
     EXPECT_LT((left.a_W - right.a_W).norm(), 1e-6) << knot;

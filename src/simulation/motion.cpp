@@ -20,16 +20,14 @@ double rampCost(const MotionRestOptions& rest) {
 
 }  // namespace
 
-double Motion::durationWithRest(double path_duration, const MotionRestOptions& rest) {
-  return path_duration + rest.static_start + rest.static_end + rampCost(rest);
-}
-
 double Motion::pathDuration(double duration, const MotionRestOptions& rest) {
   return duration - rest.static_start - rest.static_end - rampCost(rest);
 }
 
 Motion::Motion(TrajectorySpline path, const MotionRestOptions& rest)
-    : path_(std::move(path)), rest_(rest), duration_(durationWithRest(path_.duration(), rest)) {
+    : path_(std::move(path)),
+      rest_(rest),
+      duration_(path_.duration() + rest.static_start + rest.static_end + rampCost(rest)) {
   if (rest.static_start < 0.0 || rest.static_end < 0.0) {
     throw std::invalid_argument("motion: rest at start and end cannot be negative");
   }

@@ -328,10 +328,6 @@ void RadarModelOptions::removeErrors() {
   ghost_share = ambiguous_share = moving_share = dropout_share = latency_sigma = 0.0;
 }
 
-Eigen::Vector3d radarVelocity(const MotionState& state, const Extrinsics& T_IR) {
-  return T_IR.q_IR.conjugate() * (state.q_WI.conjugate() * state.v_W + state.omega_I.cross(T_IR.l_I));
-}
-
 std::vector<Station> makeScene(const Motion& motion, std::uint64_t seed, double points_mean) {
   constexpr double kStationDistance = 4.0;  // [m]
   // About a quarter of them is in view.
@@ -382,7 +378,8 @@ std::vector<SimulatedScan> simulateRadar(const Motion& motion, const RadarSetup&
     Random latency_random(seed, kLatencyStream, k);
     scan.arrival =
         scan.stamp + std::max(0.0, options.latency + options.latency_sigma * latency_random.gaussian());
-    scan.v_R = radarVelocity(motion.at(measured), setup.T_IR);
+    const RadarState radar = radarState(motion.at(measured), setup.T_IR);
+    scan.v_R = radar.q_WR.conjugate() * radar.v_W;
     Random dropout_random(seed, kDropoutStream, k);
     scan.delivered = !inAnyOf(options.blackouts, stamp) && !dropout_random.chance(options.dropout_share);
     if (scan.delivered) {

@@ -49,8 +49,8 @@ struct Segment {
   double u;
 };
 
-Segment locate(double t, double knot_spacing, int segments) {
-  const double s = t / knot_spacing;
+Segment locate(double t, int segments) {
+  const double s = t / TrajectorySpline::kKnotSpacing;
   const int index = std::clamp(static_cast<int>(std::floor(s)), 0, segments - 1);
   return {index, s - index};
 }
@@ -96,7 +96,7 @@ class BandMatrix {
 
 // Integral over one segment of the products of the third derivatives (by time) of the weights. They are
 // polynomials of degree 4, for which three Gauss points are exact.
-Eigen::Matrix<double, kOrder, kOrder> jerkProducts(double knot_spacing) {
+Eigen::Matrix<double, kOrder, kOrder> jerkProducts() {
   Eigen::Matrix<double, kOrder, kOrder> products = Eigen::Matrix<double, kOrder, kOrder>::Zero();
   const double offset = 0.5 * std::sqrt(0.6);
   const std::array<double, 3> nodes = {0.5 - offset, 0.5, 0.5 + offset};
@@ -105,7 +105,7 @@ Eigen::Matrix<double, kOrder, kOrder> jerkProducts(double knot_spacing) {
     const Weights w = basisDerivative(3, nodes[g]);
     products += node_weights[g] * w * w.transpose();
   }
-  return products / std::pow(knot_spacing, 5);
+  return products / std::pow(TrajectorySpline::kKnotSpacing, 5);
 }
 
 // Poses as vectors, quaternions with the sign that keeps neighbours close.
@@ -135,32 +135,29 @@ std::vector<Vector7d> poseVectors(const Trajectory& poses) {
 
 }  // namespace
 
-TrajectorySpline::TrajectorySpline(const Trajectory& poses, const SplineFitOptions& options)
-    : knot_spacing_(options.knot_spacing) {
+TrajectorySpline::TrajectorySpline(const Trajectory& poses, const SplineFitOptions& options) {
   // The penalty leaves parabolas free, which take three poses to fix; the fourth is one to smooth.
   if (poses.size() < 4) {
     throw std::invalid_argument("trajectory: " + std::to_string(poses.size()) +
                                 " poses, a spline needs four or more");
   }
-  if (!(options.knot_spacing > 0.0) || !(options.cutoff > 0.0)) {
-    throw std::invalid_argument("spline: knot spacing and cut-off frequency must be positive");
-  }
+  if (!(options.cutoff > 0.0)) throw std::invalid_argument("spline: the cut-off frequency must be positive");
   const std::vector<Vector7d> vectors = poseVectors(poses);
   duration_ = poses.back().time - poses.front().time;
-  const int segments = std::max(1, static_cast<int>(std::ceil(duration_ / knot_spacing_)));
+  const int segments = std::max(1, static_cast<int>(std::ceil(duration_ / kKnotSpacing)));
   const int size = segments + kSplineDegree;
 
   BandMatrix normal(size);
   coefficients_.setZero(7, size);
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    const Segment s = locate(poses[i].time - poses.front().time, knot_spacing_, segments);
+    const Segment s = locate(poses[i].time - poses.front().time, segments);
     const Weights w = uniformBasis(kSplineDegree, s.u);
     normal.add(s.index, w * w.transpose());
     coefficients_.middleCols<kOrder>(s.index) += vectors[i] * w.transpose();
   }
   const double pose_rate = static_cast<double>(poses.size() - 1) / duration_;
   const double penalty = pose_rate / std::pow(2.0 * M_PI * options.cutoff, 6);
-  const Eigen::Matrix<double, kOrder, kOrder> jerk = penalty * jerkProducts(knot_spacing_);
+  const Eigen::Matrix<double, kOrder, kOrder> jerk = penalty * jerkProducts();
   for (int s = 0; s < segments; ++s) normal.add(s, jerk);
   normal.solve(coefficients_);
   if (!coefficients_.allFinite())
@@ -184,11 +181,11 @@ MotionState TrajectorySpline::at(double t) const {
     throw std::out_of_range("spline: time " + std::to_string(t) + " s is outside [0, " +
                             std::to_string(duration_) + "]");
   }
-  const Segment s = locate(t, knot_spacing_, static_cast<int>(coefficients_.cols()) - kSplineDegree);
+  const Segment s = locate(t, static_cast<int>(coefficients_.cols()) - kSplineDegree);
   const auto active = coefficients_.middleCols<kOrder>(s.index);
   const Vector7d x = active * uniformBasis(kSplineDegree, s.u);
-  const Vector7d dx = active * basisDerivative(1, s.u) / knot_spacing_;
-  const Vector7d ddx = active * basisDerivative(2, s.u) / (knot_spacing_ * knot_spacing_);
+  const Vector7d dx = active * basisDerivative(1, s.u) / kKnotSpacing;
+  const Vector7d ddx = active * basisDerivative(2, s.u) / (kKnotSpacing * kKnotSpacing);
 
   MotionState state;
   state.p_W = x.head<3>();

@@ -29,8 +29,7 @@ class Motion {
   const TrajectorySpline& path() const { return path_; }
   const MotionRestOptions& rest() const { return rest_; }
 
-  /// Duration of a motion whose spline lasts `path_duration` seconds, and the other way round.
-  static double durationWithRest(double path_duration, const MotionRestOptions& rest);
+  /// Duration of the spline of a motion that lasts `duration` seconds.
   static double pathDuration(double duration, const MotionRestOptions& rest);
 
  private:

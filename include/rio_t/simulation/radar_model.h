@@ -106,9 +106,6 @@ struct SimulatedScan {
   std::vector<SimulatedPoint> points;             ///< empty if not delivered
 };
 
-/// True velocity of the radar in R [m/s]: R_RI (R_IW v_W + omega_I x l).
-Eigen::Vector3d radarVelocity(const MotionState& state, const Extrinsics& T_IR);
-
 /// A place on the path, and the static reflectors scattered around it, in W [m].
 struct Station {
   Eigen::Vector3d p_W;

@@ -17,7 +17,6 @@ struct MotionState {
 };
 
 struct SplineFitOptions {
-  double knot_spacing = 0.05;  ///< [s]
   /// Half-power frequency of the smoothing [Hz]: faster motion, as motion-capture noise, does not pass.
   double cutoff = 5.0;
 };
@@ -31,7 +30,9 @@ struct SplineFitOptions {
 /// "Flexible Smoothing with B-splines and Penalties", 1996).
 class TrajectorySpline {
  public:
-  /// Throws std::invalid_argument for fewer than four poses, stamps that do not increase, options that are
+  static constexpr double kKnotSpacing = 0.05;  ///< [s]
+
+  /// Throws std::invalid_argument for fewer than four poses, stamps that do not increase, a cutoff that is
   /// not positive, or neighbouring poses more than 90 degrees apart.
   explicit TrajectorySpline(const Trajectory& poses, const SplineFitOptions& options = SplineFitOptions{});
 
@@ -47,7 +48,6 @@ class TrajectorySpline {
  private:
   // All read-only after construction.
   double duration_ = 0.0;
-  double knot_spacing_;
   Eigen::Matrix<double, 7, Eigen::Dynamic> coefficients_;  // p_W, then q_WI as x y z w
   double position_residual_ = 0.0;
   double rotation_residual_ = 0.0;
