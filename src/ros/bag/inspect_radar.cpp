@@ -67,7 +67,7 @@ Looked look(const Recording& recording, const ImuInspection& imu, const CloudTop
   for (const RadarScan& scan : decoded.scans) looked.points += scan.points.size();
   looked.padding = decoded.padding;
   looked.points_not_finite = decoded.points_not_finite;
-  looked.scans = stampScans(recording, imu.times, cloud, stamps, decoded.scans);
+  looked.scans = stampScans(recording, imu.times, cloud, stamps.options, decoded.scans);
   looked.cloud = inspectCloud(looked.scans);
   looked.velocities = radarVelocities(looked.scans);
   looked.sign = dopplerSignFromRanges(looked.scans, track);

@@ -43,10 +43,10 @@ const HeaderTopic* triggerOf(const Recording& recording, const std::vector<Messa
     if (!timing.stampsAreUsable()) continue;
     const std::optional<StreamDelay> delay = delayAgainstImu(topic.times, imu);
     if (delay && (delay->median > kLargestDelay || delay->median < -bound)) continue;
-    StampProposal stamps;
-    stamps.source = StampSource::kTrigger;
-    stamps.trigger_topic = topic.topic;
-    const std::size_t stamped = stampScans(recording, imu, cloud, stamps, empty).size();
+    StampingOptions options;
+    options.source = StampSource::kTrigger;
+    options.trigger_topic = topic.topic;
+    const std::size_t stamped = stampScans(recording, imu, cloud, options, empty).size();
     const std::size_t words = sharedWords(topic.topic, cloud.topic);
     if (10 * stamped < 8 * cloud.messages.size()) continue;
     if (best != nullptr && (words < shared || (words == shared && stamped <= most))) continue;
@@ -63,18 +63,19 @@ StampProposal proposeStamps(const Recording& recording, const std::vector<Messag
                             const CloudTopic& cloud, const ParameterEntries& configured) {
   const Config known = makeConfig(configured);
   StampProposal proposal;
-  proposal.shift = known.radar_stamp_shift;
+  StampingOptions& options = proposal.options;
+  options.shift = known.radar_stamp_shift;
   if (isConfigured("stamp_source", configured)) {
-    proposal.source = known.stamp_source;
-    proposal.trigger_topic = topicOfBag(known.trigger_topic, recording.types);
+    options.source = known.stamp_source;
+    options.trigger_topic = topicOfBag(known.trigger_topic, recording.types);
     proposal.text = "as configured, stamp_source: " + toString(known.stamp_source);
     return proposal;
   }
   const StreamTiming timing = inspectTiming(cloud.times);
   const std::optional<StreamDelay> known_delay = delayAgainstImu(cloud.times, imu);
   StreamDelay delay = known_delay.value_or(StreamDelay());
-  delay.median -= proposal.shift;
-  delay.most -= proposal.shift;
+  delay.median -= options.shift;
+  delay.most -= options.shift;
   const double bound = known.odometry.smoother.max_time_offset;
   std::string fault;
   if (timing.zero == timing.messages) {
@@ -115,14 +116,14 @@ StampProposal proposeStamps(const Recording& recording, const std::vector<Messag
     return proposal;
   }
   if (const HeaderTopic* trigger = triggerOf(recording, imu, cloud, bound)) {
-    proposal.source = StampSource::kTrigger;
-    proposal.trigger_topic = trigger->topic;
+    options.source = StampSource::kTrigger;
+    options.trigger_topic = trigger->topic;
     proposal.keys.set("stamp_source", "trigger", "By itself " + fault + ".");
     proposal.keys.set("trigger_topic", trigger->topic);
     proposal.text = "stamps of the trigger " + trigger->topic;
     proposal.odd.push_back(fault + "; stamp_source: trigger takes those of " + trigger->topic);
   } else {
-    proposal.source = StampSource::kArrival;
+    options.source = StampSource::kArrival;
     proposal.keys.set("stamp_source", "arrival",
                       "By itself " + fault + ". The delay is part of the time offset, which is estimated.");
     proposal.text = "stamps from the arrival";
@@ -133,17 +134,12 @@ StampProposal proposeStamps(const Recording& recording, const std::vector<Messag
 }
 
 std::vector<RadarScan> stampScans(const Recording& recording, const std::vector<MessageTimes>& imu,
-                                  const CloudTopic& cloud, const StampProposal& stamps,
+                                  const CloudTopic& cloud, const StampingOptions& options,
                                   const std::vector<RadarScan>& scans) {
-  StampingOptions options;
-  options.source = stamps.source;
-  options.shift = stamps.shift;
-  options.radar_topic = cloud.topic;
-  options.trigger_topic = stamps.trigger_topic;
   ScanStamper stamper(options);
   const HeaderTopic* trigger = nullptr;
   for (const HeaderTopic& topic : recording.headers) {
-    if (stamps.source == StampSource::kTrigger && topic.topic == stamps.trigger_topic) trigger = &topic;
+    if (options.source == StampSource::kTrigger && topic.topic == options.trigger_topic) trigger = &topic;
   }
   const auto add = [](const auto& message) {
     try {

@@ -13,9 +13,7 @@ namespace rio_t {
 /// Where the stamps of a radar come from, and the scans with them.
 struct StampProposal {
   ProposedKeys keys;
-  StampSource source = StampSource::kHeader;
-  std::string trigger_topic;
-  double shift = 0.0;            ///< [s] added to every stamp
+  StampingOptions options;
   std::string text;              ///< what the stamps are like, as one phrase
   std::vector<std::string> odd;  ///< sentences
 };
@@ -27,7 +25,7 @@ StampProposal proposeStamps(const Recording& recording, const std::vector<Messag
 
 /// Stamps scans as the programs would. `scans`: one for each message of the topic.
 std::vector<RadarScan> stampScans(const Recording& recording, const std::vector<MessageTimes>& imu,
-                                  const CloudTopic& cloud, const StampProposal& stamps,
+                                  const CloudTopic& cloud, const StampingOptions& options,
                                   const std::vector<RadarScan>& scans);
 
 }  // namespace rio_t

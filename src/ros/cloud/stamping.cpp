@@ -64,7 +64,7 @@ void ScanStamper::see(Time record) {
 void ScanStamper::followStepBack(Time record) {
   const double step = record - *newest_imu_record_;
   const auto carryOver = [&](auto& each) {
-    if (each.record - record > options_.max_delay) each.record = each.record + step;
+    if (each.record - record > kMaxDelay) each.record = each.record + step;
   };
   for (Held& scan : held_) carryOver(scan);
   for (Trigger& trigger : triggers_) carryOver(trigger);
@@ -74,7 +74,7 @@ void ScanStamper::followStepBack(Time record) {
 
 void ScanStamper::addImu(Time stamp, Time record) {
   // Samples come in their own order. Scans and triggers may be handed over late, which is no step.
-  if (newest_imu_record_ && record - *newest_imu_record_ < -options_.max_delay) followStepBack(record);
+  if (newest_imu_record_ && record - *newest_imu_record_ < -kMaxDelay) followStepBack(record);
   newest_imu_record_ = record;
   see(record);
   clocks_.add(stamp, record);
@@ -102,7 +102,7 @@ void ScanStamper::addScan(std::uint32_t seq, Time header_stamp, Time record, Rad
         "trigger (with trigger_topic) or to arrival");
   }
   held_.push_back({seq, header_stamp, record, std::move(scan)});
-  if (held_.size() > options_.max_held) giveUp("too_many_held");
+  if (held_.size() > kMaxHeld) giveUp("too_many_held");
 }
 
 void ScanStamper::giveUp(const std::string& reason) {
@@ -152,10 +152,10 @@ ScanStamper::Decision ScanStamper::stampFront(Time* stamp) {
 ScanStamper::Trigger* ScanStamper::triggerOfSeq(const Held& scan) {
   Trigger* found = nullptr;
   // A busy machine delivers connections in any order. Once the two count alike, the seq is enough.
-  const double overtake = counting_ == Counting::kAlike ? options_.max_delay : options_.max_overtake;
+  const double overtake = counting_ == Counting::kAlike ? kMaxDelay : kMaxOvertake;
   for (Trigger& trigger : triggers_) {
     const double delay = scan.record - trigger.record;
-    if (trigger.seq != scan.seq || delay < -overtake || delay > options_.max_delay) continue;
+    if (trigger.seq != scan.seq || delay < -overtake || delay > kMaxDelay) continue;
     if (found != nullptr) {  // a seq that does not count, e.g. always zero
       counting_ = Counting::kUnlike;
       return nullptr;
@@ -178,7 +178,7 @@ ScanStamper::Decision ScanStamper::stampFromTrigger(const Held& scan, Time* stam
     // The threads of a busy node may hand over the IMU, the scan and its trigger in another order than they
     // came. Triggers keep their own order, so a later one says that the scan's will not come.
     const bool later_came = !triggers_.empty() && triggers_.back().seq > scan.seq;
-    const double patience = later_came ? options_.max_overtake : options_.max_delay;
+    const double patience = later_came ? kMaxOvertake : kMaxDelay;
     if (!finishing_ && now_ - scan.record <= patience) return Decision::kWait;
     if (counting_ == Counting::kAlike && ++unmatched_ < kUnmatchedMeansUnlike) return Decision::kGiveUp;
     if (counting_ == Counting::kUnknown && !finishing_) {
@@ -187,7 +187,7 @@ ScanStamper::Decision ScanStamper::stampFromTrigger(const Held& scan, Time* stam
       const bool later_matches = std::any_of(
           held_.begin() + 1, held_.end(), [&](const Held& later) { return triggerOfSeq(later) != nullptr; });
       if (later_matches) return Decision::kGiveUp;
-      if (now_ - *first_record_ <= options_.max_delay + options_.max_overtake) return Decision::kWait;
+      if (now_ - *first_record_ <= kMaxDelay + kMaxOvertake) return Decision::kWait;
     }
     counting_ = Counting::kUnlike;
   }
@@ -208,7 +208,7 @@ ScanStamper::Decision ScanStamper::stampFromTriggerTime(const Held& scan, Time* 
   if (scan.header_stamp == Time()) {
     for (Trigger& trigger : triggers_) {
       const double delay = scan.record - trigger.record;
-      if (delay >= 0.0 && delay <= options_.max_delay) best = &trigger;
+      if (delay >= 0.0 && delay <= kMaxDelay) best = &trigger;
     }
   } else {
     const auto distance = [&](const Trigger& trigger) { return std::abs(trigger.stamp - scan.header_stamp); };
@@ -216,7 +216,7 @@ ScanStamper::Decision ScanStamper::stampFromTriggerTime(const Held& scan, Time* 
       if (best == nullptr || distance(trigger) < distance(*best)) best = &trigger;
     }
     const std::optional<double> period = triggerPeriod();
-    const bool waited = finishing_ || now_ - scan.record > options_.max_delay;
+    const bool waited = finishing_ || now_ - scan.record > kMaxDelay;
     if (!period && !waited) return Decision::kWait;
     if (best != nullptr && period && distance(*best) > 0.5 * *period) {
       const bool later_seen = triggers_.back().stamp > scan.header_stamp;

@@ -39,9 +39,6 @@ struct StampingOptions {
   double shift = 0.0;       ///< [s] added to every stamp
   std::string radar_topic;  ///< for messages to people, as the next
   std::string trigger_topic;
-  double max_delay = 0.5;      ///< [s] from a trigger to its scan, both as recorded
-  double max_overtake = 0.05;  ///< [s] that a trigger may be recorded after its scan
-  std::size_t max_held = 50;   ///< scans that may wait
 };
 StampingOptions stampingOptions(const Config& config);
 
@@ -52,16 +49,20 @@ StampingOptions stampingOptions(const Config& config);
 /// header: the stamp of the cloud.
 /// arrival: the time of receipt, carried over by ClockMap.
 /// trigger: the stamp of the scan's trigger, found
-///  - by `seq`, where one trigger with the scan's seq was recorded between `max_delay` before the scan and
-///    `max_overtake` after it (`max_delay` after it, once triggers and scans are known to count alike);
+///  - by `seq`, where one trigger with the scan's seq was recorded between kMaxDelay before the scan and
+///    kMaxOvertake after it (kMaxDelay after it, once triggers and scans are known to count alike);
 ///  - else, once it is clear that the two do not count alike, by time: the trigger nearest to the header's
 ///    stamp, within half a trigger period; where that stamp is zero, the latest recorded before the scan.
-///  A scan waits `max_delay` for its trigger, and `max_overtake` once a later trigger came.
+///  A scan waits kMaxDelay for its trigger, and kMaxOvertake once a later trigger came.
 ///  A scan that cannot be decided yet is held, and those after it wait with it, so that order is kept.
 ///  One whose trigger never comes is given up and counted; no trigger serves two scans.
 /// A scan is given up, too, if its shifted stamp is below zero or later than a message can hold.
 class ScanStamper {
  public:
+  static constexpr double kMaxDelay = 0.5;      ///< [s] from a trigger to its scan, both as recorded
+  static constexpr double kMaxOvertake = 0.05;  ///< [s] that a trigger may be recorded after its scan
+  static constexpr std::size_t kMaxHeld = 50;   ///< scans that may wait
+
   explicit ScanStamper(StampingOptions options);
 
   void addImu(Time stamp, Time record);
