@@ -16,8 +16,7 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr double kMinDuration = 3.0;  // [s] of motion, below which nothing is said
-constexpr double kMaxOffset = kMaxSearchedOffset;
+constexpr double kMinDuration = 3.0;    // [s] of motion, below which nothing is said
 constexpr double kOffsetStep = 0.01;    // [s]
 constexpr double kLevelSigma = 0.17;    // [rad] of the roll, if nothing else is known
 constexpr double kAheadSigma = 0.5;     // [rad] of the pitch, likewise
@@ -237,13 +236,13 @@ const std::array<Matrix3d, 24>& axisTurns() {
 MountingSearch searchMounting(const std::vector<RadarVelocity>& velocities, const InertialTrack& track,
                               const MountingSearchOptions& options) {
   MountingSearch result;
-  MountingProblem problem{track, options, windowsOf(velocities, track, kMaxOffset + 0.05)};
+  MountingProblem problem{track, options, windowsOf(velocities, track, kMaxSearchedOffset + 0.05)};
   result.enough = durationOf(problem.windows) >= kMinDuration;
   if (!result.enough) return result;
 
   // The first round looks at all offsets, the later ones around the bottom, with the noise as it was found.
   constexpr int kRounds = 3, kNear = 5;
-  const int steps = static_cast<int>(std::lround(kMaxOffset / kOffsetStep));
+  const int steps = static_cast<int>(std::lround(kMaxSearchedOffset / kOffsetStep));
   int middle = 0;
   double scale = 1.0;
   std::optional<Matrix3d> M;

@@ -5,6 +5,7 @@
 #include <set>
 #include <utility>
 
+#include "../command_line.h"
 #include "rio_t/factors/extrinsics_manifold.h"
 #include "rio_t/ros/bag/bag_runner.h"
 #include "rio_t/smoother/node_prior.h"
@@ -75,7 +76,7 @@ BagCalibration calibrateFromBags(const CalibrationRun& run) {
     CalibrationBag& bag = result.bags.emplace_back();
     bag.path = run.bags[i];
     try {
-      const auto progress = run.progress ? run.progress(bag.path) : nullptr;
+      const auto progress = run.shows_progress ? progressBar(bag.path + " ") : nullptr;
       RunSummary summary = runBag({{bag.path}, folders[i], config, progress});
       bag.warnings = summary.warnings;
       bag.failure = failureOf(summary);

@@ -77,8 +77,7 @@ int run(const Arguments& arguments, std::ostream& out, std::ostream& err) {
   checkConfig(config);
 
   const BagCalibration calibration =
-      calibrateFromBags({arguments.bags, arguments.output_folder, config,
-                         [](const std::string& bag) { return progressBar(bag + " "); }});
+      calibrateFromBags({arguments.bags, arguments.output_folder, config, true});
   for (const CalibrationBag& bag : calibration.bags) {
     for (const std::string& warning : bag.warnings)
       err << "calibrate: warning: bag " << bag.path << ": " << warning << "\n";

@@ -15,10 +15,6 @@
 namespace rio_t {
 namespace {
 
-void append(const std::vector<Finding>& from, std::vector<Finding>* to) {
-  to->insert(to->end(), from.begin(), from.end());
-}
-
 /// The IMU that can be used, with the most samples; if none can be used, one that says why. There is at least
 /// one. The report names the others.
 ImuInspection chooseImu(const Recording& recording, BagCheck* check) {
@@ -153,7 +149,7 @@ BagCheck checkRecording(const Recording& recording, const CheckRequest& request)
     return check;
   }
   const ImuInspection imu = chooseImu(recording, &check);
-  append(imu.findings, &check.findings);
+  check.findings.insert(check.findings.end(), imu.findings.begin(), imu.findings.end());
   if (!imu.to_do.empty()) {
     check.to_do = imu.to_do;
     return check;
@@ -162,7 +158,7 @@ BagCheck checkRecording(const Recording& recording, const CheckRequest& request)
   std::string to_do;
   for (const CloudTopic& cloud : recording.clouds) {
     RadarInspection radar = inspectRadar(recording, imu, cloud, request.set);
-    append(radar.findings, &check.findings);
+    check.findings.insert(check.findings.end(), radar.findings.begin(), radar.findings.end());
     if (to_do.find(radar.to_do) == std::string::npos) appendItem(&to_do, radar.to_do, " ");
     if (radar.usable) radars.push_back(std::move(radar));
   }

@@ -1,21 +1,13 @@
 #include "publishers.h"
 
-#include <algorithm>
+#include <boost/algorithm/string/join.hpp>
 #include <set>
-
-#include "../text.h"
 
 namespace rio_t {
 namespace {
 
 constexpr std::uint64_t kEnoughMessages = 10, kEnoughTurns = 20;
 constexpr std::size_t kMostPublishers = 16;  // a frame_id may count on from message to message
-
-std::string listed(const std::set<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) appendItem(&text, name, " and ");
-  return text;
-}
 
 }  // namespace
 
@@ -40,9 +32,10 @@ std::string Publishers::describeSeveral(const std::string& topic) const {
   if (turns_ < kEnoughTurns || callers_with_frames.size() < 2) return "";
   const std::string text =
       callers.size() > 1
-          ? std::to_string(callers.size()) + " publishers by turns: " + listed(callers_with_frames)
-          : std::to_string(frames.size()) +
-                " frame_ids by turns, and so of several publishers: " + listed(frames);
+          ? std::to_string(callers.size()) +
+                " publishers by turns: " + boost::algorithm::join(callers_with_frames, " and ")
+          : std::to_string(frames.size()) + " frame_ids by turns, and so of several publishers: " +
+                boost::algorithm::join(frames, " and ");
   return "Topic " + topic + " has messages of " + text + ". rio_t takes them for one sensor.";
 }
 

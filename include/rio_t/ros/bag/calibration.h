@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <iosfwd>
 #include <string>
 #include <vector>
@@ -15,8 +14,7 @@ struct CalibrationRun {
   std::vector<std::string> bags;  ///< paths
   std::string output_folder;      ///< gets a folder with the files of each bag's run; empty: no files
   Config config;                  ///< what is configured
-  /// Makes BagRun::progress for a bag; may be empty.
-  std::function<std::function<void(double)>(const std::string& bag)> progress;
+  bool shows_progress = false;    ///< by a bar for each bag
 };
 
 /// The outcome of one bag.
