@@ -166,7 +166,7 @@ TEST_F(CombineExtrinsics, NothingToCombineIsRefused) {
 
 class Verdicts : public CombineExtrinsics {
  protected:
-  const RadarCalibrationEstimate told_{{0.0, 0.08}, prior_};
+  const OffsetEstimate told_{0.0, 0.08};
 };
 
 TEST_F(Verdicts, HalfOfTheSigmaToldIsTheLimit) {
@@ -175,7 +175,7 @@ TEST_F(Verdicts, HalfOfTheSigmaToldIsTheLimit) {
   found[2] = 0.0851;
   found[5] = 0.026;  // of 0.05
   const RadarCalibration calibration =
-      calibrate(told_, {{{0.03, 0.041}, estimate({0.02, 0.03, 0.04}, {0.01, 0.02, 0.03}, found)}});
+      calibrate(told_, prior_, {{0.03, 0.041}}, {estimate({0.02, 0.03, 0.04}, {0.01, 0.02, 0.03}, found)});
   const auto verdict = [&](CalibrationAxis axis) { return axisOf(calibration, axis).verdict; };
   EXPECT_EQ(verdict(CalibrationAxis::kOffset), Verdict::kNotObserved);
   EXPECT_EQ(verdict(CalibrationAxis::kTurnX), Verdict::kObserved);
@@ -196,7 +196,7 @@ TEST_F(Verdicts, HalfOfTheSigmaToldIsTheLimit) {
 }
 
 TEST_F(Verdicts, NothingObservedIsAsToldToTheLastDigit) {
-  const RadarCalibration calibration = calibrate(told_, {{{0.0, 0.08}, prior_}, {{0.0, 0.08}, prior_}});
+  const RadarCalibration calibration = calibrate(told_, prior_, {told_, told_}, {prior_, prior_});
   EXPECT_EQ(calibration.T_IR.q_IR.coeffs(), kConfigured.coeffs());
   for (const AxisCalibration& axis : calibration.axes) EXPECT_EQ(axis.verdict, Verdict::kNotObserved);
   EXPECT_NEAR(axisOf(calibration, CalibrationAxis::kLeverY).sigma, 0.05, 1e-9);
@@ -205,9 +205,8 @@ TEST_F(Verdicts, NothingObservedIsAsToldToTheLastDigit) {
 TEST_F(Verdicts, WhatIsNotEstimatedIsSaidSo) {
   const ExtrinsicsEstimate told =
       estimate(Eigen::Vector3d::Zero(), {1, 2, 3}, Eigen::Vector3d::Constant(0.17));
-  const RadarCalibration calibration =
-      calibrate({{0.02, 0.0}, told},
-                {{{0.02, 0.0}, estimate({0.1, 0, 0}, {1, 2, 3}, Eigen::Vector3d::Constant(0.01))}});
+  const RadarCalibration calibration = calibrate(
+      {0.02, 0.0}, told, {{0.02, 0.0}}, {estimate({0.1, 0, 0}, {1, 2, 3}, Eigen::Vector3d::Constant(0.01))});
   EXPECT_EQ(axisOf(calibration, CalibrationAxis::kOffset).verdict, Verdict::kNotEstimated);
   EXPECT_EQ(axisOf(calibration, CalibrationAxis::kLeverY).verdict, Verdict::kNotEstimated);
   EXPECT_EQ(axisOf(calibration, CalibrationAxis::kLeverY).found, 2.0);
@@ -216,7 +215,8 @@ TEST_F(Verdicts, WhatIsNotEstimatedIsSaidSo) {
 }
 
 TEST_F(Verdicts, AnOffsetThatDiffersIsObservedAndSaidToDiffer) {
-  const RadarCalibration calibration = calibrate(told_, {{{-0.1, 0.001}, prior_}, {{0.1, 0.001}, prior_}});
+  const RadarCalibration calibration =
+      calibrate(told_, prior_, {{-0.1, 0.001}, {0.1, 0.001}}, {prior_, prior_});
   EXPECT_FALSE(calibration.offset_agreement.agree());
   EXPECT_EQ(axisOf(calibration, CalibrationAxis::kOffset).verdict, Verdict::kObserved);
   EXPECT_NEAR(calibration.offset.sigma, 0.2 / std::sqrt(2.0), 1e-4);

@@ -117,16 +117,13 @@ OffsetEstimate scattered(double configured_sigma, const std::vector<OffsetEstima
   return result;
 }
 
-void calibrateOffset(const OffsetEstimate& configured, const std::vector<RadarCalibrationEstimate>& runs,
+void calibrateOffset(const OffsetEstimate& configured, const std::vector<OffsetEstimate>& runs,
                      RadarCalibration* calibration) {
   AxisCalibration& axis = calibration->axes[static_cast<std::size_t>(CalibrationAxis::kOffset)];
   axis.configured = axis.found = configured.t_O;
   calibration->offset = configured;
   if (configured.sigma == 0.0) return;
-  std::vector<OffsetEstimate> offsets;
-  offsets.reserve(runs.size());
-  for (const RadarCalibrationEstimate& run : runs) offsets.push_back(run.offset);
-  const Combined<OffsetEstimate> combined = combine(configured, offsets);
+  const Combined<OffsetEstimate> combined = combine(configured, runs);
   calibration->offset_agreement = combined.agreement;
   axis.found = combined.estimate.t_O;
   axis.sigma = combined.estimate.sigma;
@@ -136,8 +133,8 @@ void calibrateOffset(const OffsetEstimate& configured, const std::vector<RadarCa
   if (axis.verdict == Verdict::kObserved) calibration->offset = combined.estimate;
 }
 
-void calibrateExtrinsics(const ExtrinsicsEstimate& configured,
-                         const std::vector<RadarCalibrationEstimate>& runs, RadarCalibration* calibration) {
+void calibrateExtrinsics(const ExtrinsicsEstimate& configured, const std::vector<ExtrinsicsEstimate>& runs,
+                         RadarCalibration* calibration) {
   constexpr auto kTurn = static_cast<std::size_t>(CalibrationAxis::kTurnX);
   constexpr auto kLever = static_cast<std::size_t>(CalibrationAxis::kLeverX);
   calibration->T_IR = configured.T_IR;
@@ -146,10 +143,7 @@ void calibrateExtrinsics(const ExtrinsicsEstimate& configured,
     lever.configured = lever.found = configured.T_IR.l_I[static_cast<Eigen::Index>(i)];
   }
   if (configured.covariance.rows() == 0) return;
-  std::vector<ExtrinsicsEstimate> estimates;
-  estimates.reserve(runs.size());
-  for (const RadarCalibrationEstimate& run : runs) estimates.push_back(run.extrinsics);
-  const Combined<ExtrinsicsEstimate> combined = combine(configured, estimates);
+  const Combined<ExtrinsicsEstimate> combined = combine(configured, runs);
   calibration->extrinsics_agreement = combined.agreement;
 
   const Eigen::Vector3d found = turnBetween(configured.T_IR, combined.estimate.T_IR);
@@ -267,11 +261,12 @@ double AxisCalibration::farFromConfigured() const {
   return verdict == Verdict::kNotEstimated ? 0.0 : std::abs(found - configured) / configured_sigma;
 }
 
-RadarCalibration calibrate(const RadarCalibrationEstimate& configured,
-                           const std::vector<RadarCalibrationEstimate>& runs) {
+RadarCalibration calibrate(const OffsetEstimate& offset, const ExtrinsicsEstimate& mounting,
+                           const std::vector<OffsetEstimate>& offsets,
+                           const std::vector<ExtrinsicsEstimate>& mountings) {
   RadarCalibration calibration;
-  calibrateOffset(configured.offset, runs, &calibration);
-  calibrateExtrinsics(configured.extrinsics, runs, &calibration);
+  calibrateOffset(offset, offsets, &calibration);
+  calibrateExtrinsics(mounting, mountings, &calibration);
   return calibration;
 }
 

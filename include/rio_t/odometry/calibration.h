@@ -90,13 +90,6 @@ struct AxisCalibration {
   double farFromConfigured() const;
 };
 
-/// Calibration of a radar: as the user configured it, or as one run found it. A sigma of zero says that the
-/// run did not estimate the number.
-struct RadarCalibrationEstimate {
-  OffsetEstimate offset;
-  ExtrinsicsEstimate extrinsics;
-};
-
 struct RadarCalibration {
   std::array<AxisCalibration, kCalibrationAxes> axes;  ///< by CalibrationAxis
   OffsetEstimate offset;                               ///< as configured if it is not observed
@@ -111,8 +104,10 @@ struct RadarCalibration {
   double largestSigma(CalibrationAxis first) const;  ///< of three axes
 };
 
-/// `runs`: at least one.
-RadarCalibration calibrate(const RadarCalibrationEstimate& configured,
-                           const std::vector<RadarCalibrationEstimate>& runs);
+/// `offset` and `mounting` are as configured, `offsets` and `mountings` as the runs found them, at least one.
+/// A sigma of zero says that the number is not estimated.
+RadarCalibration calibrate(const OffsetEstimate& offset, const ExtrinsicsEstimate& mounting,
+                           const std::vector<OffsetEstimate>& offsets,
+                           const std::vector<ExtrinsicsEstimate>& mountings);
 
 }  // namespace rio_t

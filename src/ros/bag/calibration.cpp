@@ -27,18 +27,6 @@ Config batchConfig(const Config& config) {
   return batch;
 }
 
-RadarCalibrationEstimate configuredOf(const Config& radar) {
-  const SmootherOptions& smoother = radar.odometry.smoother;
-  const CalibrationPrior& prior = radar.odometry.radar;
-  return {{prior.time_offset_initial, smoother.estimate_time_offset ? prior.time_offset_sigma : 0.0},
-          {prior.T_IR, extrinsicsSigmas(smoother, prior).cwiseAbs2().asDiagonal()}};
-}
-
-RadarCalibrationEstimate foundOf(const RadarSummary& radar, EstimateExtrinsics estimated) {
-  return {{radar.final_offset_s, radar.final_offset_sigma_s},
-          {radar.extrinsics->T_IR, tangentCovariance(radar.extrinsics->covariance, estimated)}};
-}
-
 /// A folder for each bag, named after it: FOLDER/run, FOLDER/run_2.
 std::vector<std::string> foldersOf(const CalibrationRun& run) {
   std::vector<std::string> folders;
@@ -90,12 +78,18 @@ BagCalibration calibrateFromBags(const CalibrationRun& run) {
   for (std::size_t k = 0; k < radars.size(); ++k) {
     CalibratedRadar& radar = result.radars.emplace_back();
     radar.name = radars[k].radar_name;
-    std::vector<RadarCalibrationEstimate> found;
+    const SmootherOptions& smoother = radars[k].odometry.smoother;
+    const CalibrationPrior& prior = radars[k].odometry.radar;
+    std::vector<ExtrinsicsEstimate> mountings;
     for (const RunSummary& summary : summaries) {
-      found.push_back(foundOf(summary.radars[k], config.odometry.smoother.estimate_extrinsics));
-      radar.offsets.push_back(found.back().offset);
+      const RadarSummary& found = summary.radars[k];
+      radar.offsets.push_back({found.final_offset_s, found.final_offset_sigma_s});
+      mountings.push_back({found.extrinsics->T_IR,
+                           tangentCovariance(found.extrinsics->covariance, smoother.estimate_extrinsics)});
     }
-    radar.calibration = calibrate(configuredOf(radars[k]), found);
+    radar.calibration = calibrate(
+        {prior.time_offset_initial, smoother.estimate_time_offset ? prior.time_offset_sigma : 0.0},
+        {prior.T_IR, extrinsicsSigmas(smoother, prior).cwiseAbs2().asDiagonal()}, radar.offsets, mountings);
   }
   return result;
 }
