@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <sstream>
 
 #include "rio_t/odometry/radar_inertial_odometry.h"
 #include "rio_t/ros/parameters/parameters.h"
@@ -16,10 +15,7 @@ void require(bool holds, const char* what) {
   std::abort();
 }
 
-rio_t::ParameterEntries read(const std::string& yaml) {
-  std::istringstream stream(yaml);
-  return rio_t::readParameters(stream, "file");
-}
+rio_t::ParameterEntries read(const std::string& yaml) { return rio_t::readParameters(yaml, "file"); }
 
 }  // namespace
 

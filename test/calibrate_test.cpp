@@ -281,13 +281,12 @@ TEST_F(Calibrate, EachOfTwoRadarsHasItsSection) {
 }
 
 TEST(CalibratedYaml, ARadarThatWasTakenOutHasNoSection) {
-  std::istringstream file(
-      "radars: [left, right]\nleft: {radar_topic: /left}\nright: {radar_topic: /right}\n");
-  ParameterEntries entries = readParameters(file, "FILE");
+  ParameterEntries entries = readParameters(
+      "radars: [left, right]\nleft: {radar_topic: /left}\nright: {radar_topic: /right}\n", "FILE");
   entries.push_back(parseAssignment("radars=[left]"));
   BagCalibration calibration;
   calibration.radars.emplace_back().name = "left";
-  std::istringstream yaml(calibratedYaml(calibration, makeConfig(entries), entries, "FILE"));
+  const std::string yaml = calibratedYaml(calibration, makeConfig(entries), entries, "FILE");
   const Config config = makeConfig(readParameters(yaml, "calibrated"));
   ASSERT_EQ(config.radars.size(), 1u);
   EXPECT_EQ(config.radars[0].radar_topic, "/left");

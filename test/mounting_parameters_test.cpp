@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
-#include <sstream>
 
 #include "rio_t/radar/mounting.h"
 #include "rio_t/ros/messages/conversions.h"
@@ -81,8 +80,7 @@ TEST(MountingParameters, BothWaysAtOnceAreAFaultThatNamesBoth) {
 
 /// As a file with these lines, and the assignments on top.
 Config fromFile(const std::string& lines, const std::vector<std::string>& assignments) {
-  std::istringstream yaml(lines);
-  ParameterEntries entries = readParameters(yaml, "my.yaml");
+  ParameterEntries entries = readParameters(lines, "my.yaml");
   for (const std::string& each : assignments) entries.push_back(parseAssignment(each));
   return makeConfig(entries);
 }
@@ -198,8 +196,7 @@ TEST(MountingParameters, EachRadarHasItsOwn) {
 
 TEST(MountingParameters, WhatIsPrintedReadsBackAsTheSameRotation) {
   const Config config = from({"radar_format=coloradar", "mounting_yaw_pitch_roll_deg=[12, -34, 56]"});
-  std::istringstream yaml(toYaml(config));
-  const Config back = makeConfig(readParameters(yaml, "printed"));
+  const Config back = makeConfig(readParameters(toYaml(config), "printed"));
   EXPECT_LT(back.odometry.radar.T_IR.q_IR.angularDistance(config.odometry.radar.T_IR.q_IR), 1e-9);
   EXPECT_EQ(toYaml(back), toYaml(config));
 }

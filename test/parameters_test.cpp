@@ -8,7 +8,6 @@
 #include <fstream>
 #include <optional>
 #include <set>
-#include <sstream>
 #include <stdexcept>
 #include <tuple>
 
@@ -291,9 +290,8 @@ TEST(Parameters, UnknownKeysAreErrorsWithTheNearestKey) {
 }
 
 TEST(Parameters, ATabThatIndentsIsNamed) {
-  std::istringstream yaml("radars: [left]\nleft:\n\tradar_topic: left\n");
   try {
-    readParameters(yaml, "my.yaml");
+    readParameters("radars: [left]\nleft:\n\tradar_topic: left\n", "my.yaml");
     FAIL();
   } catch (const std::runtime_error& error) {
     EXPECT_TRUE(contains(error.what(), "a tab cannot indent: use spaces")) << error.what();

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <cstdlib>
 #include <functional>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -91,10 +90,7 @@ class PlainBag : public testing::Test {
     return checkBag({bag}, request);
   }
 
-  static Config configOf(const BagCheck& check) {
-    std::istringstream yaml(check.yaml);
-    return makeConfig(readParameters(yaml, "my.yaml"));
-  }
+  static Config configOf(const BagCheck& check) { return makeConfig(readParameters(check.yaml, "my.yaml")); }
 
   /// Runs the odometry with what was written, as a user would.
   static RunSummary run(const BagCheck& check) {

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -59,8 +58,7 @@ TEST(RosParameters, AListOfTheCommandLineArrivesAsText) {
 }
 
 TEST(RosParameters, TheServerReplacesTheMountingOfTheFileInEitherWay) {
-  std::istringstream yaml("extrinsics_rotation_xyzw: [0, 0, 0, 1]\n");
-  ParameterEntries entries = readParameters(yaml, "my.yaml");
+  ParameterEntries entries = readParameters("extrinsics_rotation_xyzw: [0, 0, 0, 1]\n", "my.yaml");
   XmlRpc::XmlRpcValue map;
   for (int k = 0; k < 3; ++k) map["mounting_yaw_pitch_roll_deg"][k] = 60 * k;
   for (ParameterEntry& entry : toParameterEntries(map, "/rio_t")) entries.push_back(std::move(entry));
@@ -101,8 +99,7 @@ TEST(RosParameters, WhatANodeShowsIsTheConfigurationItRan) {
   map["radar_topic"] = std::string("/left");  // the section of left is empty
   map["right"]["radar_topic"] = std::string("/right");
   const Config config = makeConfig(toParameterEntries(map, "/rio_t"));
-  std::istringstream yaml(toYaml(config));
-  XmlRpc::XmlRpcValue shown = toXmlRpc(readParameters(yaml, "shown"));
+  XmlRpc::XmlRpcValue shown = toXmlRpc(readParameters(toYaml(config), "shown"));
   EXPECT_EQ(toYaml(makeConfig(toParameterEntries(shown, "/rio_t/effective"))), toYaml(config));
   EXPECT_EQ(static_cast<double&>(shown["right"]["radar_min_range"]), 1.5);
   EXPECT_EQ(shown["left"].getType(), XmlRpc::XmlRpcValue::TypeStruct);

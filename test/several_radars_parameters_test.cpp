@@ -236,8 +236,8 @@ TEST(SeveralRadars, AValueThatEachSectionHidesIsRefused) {
       << "either key turns the radar";
   EXPECT_TRUE(with("mounting_yaw_pitch_roll_deg=[0, 0, 180]").empty()) << "the right radar takes it";
   // As roslaunch radar_topic:=/c sets it beside a file. One file may hold both levels.
-  std::istringstream file("radars: [left]\nradar_topic: /c\nleft: {radar_topic: /a}\n");
-  ParameterEntries entries = readParameters(file, "FILE");
+  ParameterEntries entries =
+      readParameters("radars: [left]\nradar_topic: /c\nleft: {radar_topic: /a}\n", "FILE");
   EXPECT_NO_THROW(makeConfig(entries));
   entries.push_back({"radar_topic", {std::string("/d")}, kParameterServer + "/rio_t/radar_topic"});
   EXPECT_THROW(makeConfig(entries), ConfigError);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
 namespace rio_t {
 
@@ -78,8 +77,7 @@ std::string toYaml(const ProposedConfig& proposed, const std::string& header) {
 }
 
 Config readBack(const std::string& yaml) {
-  std::istringstream stream(yaml);
-  return makeConfig(readParameters(stream, "proposed configuration"));
+  return makeConfig(readParameters(yaml, "proposed configuration"));
 }
 
 }  // namespace rio_t

@@ -147,25 +147,25 @@ void ParameterList::vector3OrEmpty(const std::string& key, const std::string& un
 }
 
 void ParameterList::text(const std::string& key, std::string& member, const std::string& text) {
-  addText(key, member, text, false, [](const std::string& given) { return given; });
+  addText(key, member, text, false);
 }
 
 void ParameterList::textOrEmpty(const std::string& key, std::string& member, const std::string& text) {
-  addText(key, member, text, true, [](const std::string& given) { return given; });
+  addText(key, member, text, true);
 }
 
 void ParameterList::frame(const std::string& key, std::string& member, const std::string& text) {
-  addText(key, member, text, false, withoutSlash);
+  addText(key, member, text, false, true);
 }
 
 void ParameterList::addText(const std::string& key, std::string& member, const std::string& text,
-                            bool may_be_empty, const std::function<std::string(const std::string&)>& kept) {
+                            bool may_be_empty, bool is_frame) {
   bind({key, "text", "", std::string("one line of text, ") + (may_be_empty ? "may be" : "not") + " empty",
         text},
-       member, [may_be_empty, kept](const ParameterValue& value) -> std::optional<std::string> {
+       member, [may_be_empty, is_frame](const ParameterValue& value) -> std::optional<std::string> {
          const bool nothing = std::holds_alternative<std::monostate>(value.data);  // `key:` and no more
          const std::string* given = std::get_if<std::string>(&value.data);
-         const std::string x = given == nullptr ? "" : kept(*given);
+         const std::string x = given == nullptr ? "" : is_frame ? withoutSlash(*given) : *given;
          if ((given == nullptr && !nothing) || (x.empty() && !may_be_empty) || !isOneLine(x))
            return std::nullopt;
          return x;

@@ -82,9 +82,8 @@ class ParameterList {
   const Parameter* find(const std::string& key) const;  ///< null for a key that does not exist
 
  private:
-  /// `kept`: turns a text into that which is kept.
   void addText(const std::string& key, std::string& member, const std::string& text, bool may_be_empty,
-               const std::function<std::string(const std::string&)>& kept);
+               bool is_frame = false);
   /// Adds a parameter that sets `member` to what `read` makes of a value, unless that is nothing. `about` has
   /// no group, `of_radar` and `first` yet.
   template <typename T, typename Read, typename Show>

@@ -7,8 +7,7 @@ namespace rio_t {
 
 inline Range anyNumber() { return {}; }
 inline Range atLeast(double min) { return {min, anyNumber().max, false, false}; }
-inline Range above(double min) { return {min, anyNumber().max, true, false}; }
-inline Range above(double min, double max) { return {min, max, true, false}; }
+inline Range above(double min, double max = anyNumber().max) { return {min, max, true, false}; }
 inline Range between(double min, double max) { return {min, max, false, false}; }
 inline Range inside(double min, double max) { return {min, max, true, true}; }
 inline Range below(double min, double max) { return {min, max, false, true}; }  ///< min itself counts

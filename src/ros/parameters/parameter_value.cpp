@@ -199,19 +199,18 @@ ParameterEntries readParameterFile(const std::string& path) {
   std::ifstream file(path);
   if (!file)
     throw std::runtime_error(path + ": cannot be read; expected a YAML file with one `key: value` a line");
-  return readParameters(file, path);
+  return readParameters({std::istreambuf_iterator<char>(file), {}}, path);
 }
 
-ParameterEntries readParameters(std::istream& yaml, const std::string& name) {
-  const std::string text{std::istreambuf_iterator<char>(yaml), std::istreambuf_iterator<char>()};
+ParameterEntries readParameters(const std::string& yaml, const std::string& name) {
   YAML::Node root;
   try {
-    std::istringstream stream(text);
+    std::istringstream stream(yaml);
     YAML::Parser parser(stream);
     Progress progress;
     while (parser.HandleNextDocument(progress)) {
     }
-    for (const YAML::Node& document : YAML::LoadAll(text)) {
+    for (const YAML::Node& document : YAML::LoadAll(yaml)) {
       if (document.IsNull()) continue;
       if (!root.IsNull())
         throw std::runtime_error(name + ":" + std::to_string(document.Mark().line + 1) +
@@ -220,7 +219,7 @@ ParameterEntries readParameters(std::istream& yaml, const std::string& name) {
     }
   } catch (const YAML::Exception& error) {
     throw std::runtime_error(name + ":" + std::to_string(error.mark.line + 1) + ": not YAML (" + error.msg +
-                             hintOfTab(text, error.mark.line) + "); expected one `key: value` a line");
+                             hintOfTab(yaml, error.mark.line) + "); expected one `key: value` a line");
   }
   if (root.IsNull()) return {};
   if (!root.IsMap()) throw std::runtime_error(name + ":1: expected one `key: value` a line");

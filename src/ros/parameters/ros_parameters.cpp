@@ -4,7 +4,6 @@
 #include <ros/param.h>
 
 #include <limits>
-#include <sstream>
 #include <stdexcept>
 
 #include "parameter_list.h"
@@ -133,9 +132,8 @@ Config configFromRos(const ros::NodeHandle& private_node) {
 }
 
 void showEffectiveParameters(const ros::NodeHandle& private_node, const Config& config) {
-  std::istringstream yaml(toYaml(config));
   private_node.deleteParam(kEffective);
-  private_node.setParam(kEffective, toXmlRpc(readParameters(yaml, "the effective parameters")));
+  private_node.setParam(kEffective, toXmlRpc(readParameters(toYaml(config), "the effective parameters")));
 }
 
 }  // namespace rio_t

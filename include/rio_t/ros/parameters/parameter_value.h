@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <iosfwd>
 #include <string>
 #include <variant>
 #include <vector>
@@ -46,8 +45,8 @@ bool isOfServer(const ParameterEntry& entry);
 /// Reads a YAML file, flat but for the sections of radars; throws std::runtime_error with one line naming
 /// file, line and what was expected.
 ParameterEntries readParameterFile(const std::string& path);
-/// The same of an open stream; `name` stands for the file in messages.
-ParameterEntries readParameters(std::istream& yaml, const std::string& name);
+/// The same of a text; `name` stands for the file in messages.
+ParameterEntries readParameters(const std::string& yaml, const std::string& name);
 
 /// Reads `key=value` with the value as YAML (`--set`); throws std::invalid_argument.
 ParameterEntry parseAssignment(const std::string& text);
