@@ -116,14 +116,13 @@ void doubtMirrored(const std::vector<RadarInspection>& radars, BagCheck* check) 
 
 /// Before all else: with two nodes on one topic, all that follows misleads. Returns whether there are any.
 bool nameSeveralPublishers(const Recording& recording, BagCheck* check) {
-  const std::size_t before = check->findings.size();
   const auto name = [check](const std::string& subject, const auto& topic) {
     const std::string several = topic.publishers.describeSeveral(topic.topic);
     if (!several.empty()) check->odd(subject, several + " " + kSeveralPublishersRemedy);
   };
   for (const ImuTopic& topic : recording.imus) name("IMU", topic);
   for (const CloudTopic& topic : recording.clouds) name("radar", topic);
-  return check->findings.size() > before;
+  return !check->findings.empty();
 }
 
 std::string levelText(FindingLevel level) {
@@ -132,85 +131,81 @@ std::string levelText(FindingLevel level) {
   return kNames[static_cast<std::size_t>(level)];
 }
 
-BagCheck checkRecording(const Recording& recording, const CheckRequest& request) {
-  BagCheck check;
-  check.bags = recording.bags;
+void checkRecording(const Recording& recording, const CheckRequest& request, BagCheck* check) {
   if (recording.read < recording.length)
-    check.ok("bag", "the first " + fixedText(recording.read, 0) + " of " + fixedText(recording.length, 0) +
-                        " s were read (--duration)");
+    check->ok("bag", "the first " + fixedText(recording.read, 0) + " of " + fixedText(recording.length, 0) +
+                         " s were read (--duration)");
   if (recording.imus.empty()) {
-    check.missing(
+    check->missing(
         "IMU",
         "the bag has no topic " + (request.imu_topic.empty() ? "" : request.imu_topic + " ") +
             "of type sensor_msgs/Imu; it has " + topicsText(recording.types),
         !request.imu_topic.empty() && hasType(recording, "sensor_msgs/Imu")
             ? "Choose a topic of that type which the bag has with --imu-topic, or leave the option out."
             : "Record the IMU, too: 100 Hz or more, with raw acceleration and angular velocity.");
-    return check;
+    return;
   }
-  const ImuInspection imu = chooseImu(recording, &check);
-  check.findings.insert(check.findings.end(), imu.findings.begin(), imu.findings.end());
+  const ImuInspection imu = chooseImu(recording, check);
+  check->findings.insert(check->findings.end(), imu.findings.begin(), imu.findings.end());
   if (!imu.to_do.empty()) {
-    check.to_do = imu.to_do;
-    return check;
+    check->to_do = imu.to_do;
+    return;
   }
   std::vector<RadarInspection> radars;
   std::string to_do;
   for (const CloudTopic& cloud : recording.clouds) {
     RadarInspection radar = inspectRadar(recording, imu, cloud, request.set);
-    check.findings.insert(check.findings.end(), radar.findings.begin(), radar.findings.end());
+    check->findings.insert(check->findings.end(), radar.findings.begin(), radar.findings.end());
     if (to_do.find(radar.to_do) == std::string::npos) appendItem(&to_do, radar.to_do, " ");
     if (radar.usable) radars.push_back(std::move(radar));
   }
   if (radars.empty()) {
     if (recording.clouds.empty()) {
-      missRadar(request.radar_topics, recording, &check);
+      missRadar(request.radar_topics, recording, check);
     } else {
-      check.to_do =
+      check->to_do =
           to_do.empty()
               ? "Use a radar driver that publishes positions and Doppler as sensor_msgs/PointCloud2."
               : to_do;
     }
-    return check;
+    return;
   }
   // A cloud of another sensor beside a radar that works is no reason to stop.
-  for (Finding& finding : check.findings) {
+  for (Finding& finding : check->findings) {
     if (finding.level == FindingLevel::kMissing) finding.level = FindingLevel::kOdd;
   }
   for (const std::string& topic : request.radar_topics)
-    if (!hasCloud(recording, topicOfBag(topic, recording.types))) missRadar({topic}, recording, &check);
-  leaveOutCopies(&radars, recording, &check);
+    if (!hasCloud(recording, topicOfBag(topic, recording.types))) missRadar({topic}, recording, check);
+  leaveOutCopies(&radars, recording, check);
   for (const RadarInspection& radar : radars) {
-    if (radar.search.enough) check.quality += 1.0 / radar.search.rotation_sigma.norm();
+    if (radar.search.enough) check->quality += 1.0 / radar.search.rotation_sigma.norm();
   }
   const ProposedConfig config = proposedConfig(imu, radars, request.set);
   if (request.try_out) {
-    chooseByTrial(recording, header(recording), config, &check);
-    doubtMirrored(radars, &check);
+    chooseByTrial(recording, header(recording), config, check);
+    doubtMirrored(radars, check);
   } else {
-    check.yaml = toYaml(config, header(recording));
-    readBack(check.yaml);
+    check->yaml = toYaml(config, header(recording));
+    readBack(check->yaml);
   }
   const bool all_found = std::all_of(radars.begin(), radars.end(),
                                      [](const RadarInspection& each) { return each.search.enough; });
-  if (!all_found && !isMountingConfigured(request.set) && check.to_do.empty())
-    check.to_do =
+  if (!all_found && !isMountingConfigured(request.set) && check->to_do.empty())
+    check->to_do =
         "The mounting is a guess. Record with motion for 3 s or more, or give it: --set "
         "mounting_yaw_pitch_roll_deg=[YAW,PITCH,ROLL] (docs/your_sensors.md, section 3).";
-  return check;
 }
 
 }  // namespace
 
 BagCheck checkBag(const std::vector<std::string>& bags, const CheckRequest& request) {
   const Recording recording = readRecording(bags, request);
-  BagCheck check = checkRecording(recording, request);
-  BagCheck named;
-  if (nameSeveralPublishers(recording, &named)) {
-    check.findings.insert(check.findings.begin(), named.findings.begin(), named.findings.end());
-    if (!check.to_do.empty())
-      check.to_do = "First give each publisher of a topic a topic of its own. " + check.to_do;
-  }
+  BagCheck check;
+  check.bags = recording.bags;
+  const bool has_several_publishers = nameSeveralPublishers(recording, &check);
+  checkRecording(recording, request, &check);
+  if (has_several_publishers && !check.to_do.empty())
+    check.to_do = "First give each publisher of a topic a topic of its own. " + check.to_do;
   return check;
 }
 

@@ -216,6 +216,7 @@ DecodedClouds decodeAll(const CloudTopic& topic, const PointCloudFormat& format)
     try {
       const DecodedScan decoded = decode(*message, format);
       clouds.scans.push_back(toRadarScan(decoded.cloud, Time()));
+      clouds.points += decoded.cloud.size();
       clouds.padding += decoded.padding;
       clouds.points_not_finite += decoded.dropped_not_finite;
     } catch (const std::exception&) {

@@ -40,6 +40,7 @@ bool correctAxes(const CloudReport& cloud, bool mirrored, const ParameterEntries
 
 struct DecodedClouds {
   std::vector<RadarScan> scans;  ///< without stamps; what cannot be decoded is empty
+  std::size_t points = 0;        ///< in the scans
   std::size_t padding = 0;       ///< points, left out of the scans, as the next
   std::size_t points_not_finite = 0;
 };

@@ -48,11 +48,8 @@ MountingSearchOptions searchOptions(const ImuInspection& imu, const InertialTrac
   return options;
 }
 
-struct Looked {
-  std::vector<RadarScan> scans;
-  std::size_t points = 0;   // before the scans get their stamps
-  std::size_t padding = 0;  // besides these, as the next
-  std::size_t points_not_finite = 0;
+/// The clouds, counted as they came. The scans that got a stamp have it.
+struct Looked : DecodedClouds {
   CloudReport cloud;
   RadarVelocities velocities;
   DopplerSign sign;
@@ -63,11 +60,8 @@ struct Looked {
 Looked look(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud,
             const StampProposal& stamps, const PointCloudFormat& format, const InertialTrack& track) {
   Looked looked;
-  const DecodedClouds decoded = decodeAll(cloud, format);
-  for (const RadarScan& scan : decoded.scans) looked.points += scan.points.size();
-  looked.padding = decoded.padding;
-  looked.points_not_finite = decoded.points_not_finite;
-  looked.scans = stampScans(recording, imu.times, cloud, stamps.options, decoded.scans);
+  static_cast<DecodedClouds&>(looked) = decodeAll(cloud, format);
+  looked.scans = stampScans(recording, imu.times, cloud, stamps.options, looked.scans);
   looked.cloud = inspectCloud(looked.scans);
   looked.velocities = radarVelocities(looked.scans);
   looked.sign = dopplerSignFromRanges(looked.scans, track);

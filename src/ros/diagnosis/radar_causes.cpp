@@ -288,7 +288,7 @@ class RadarCauses {
               fixedTexts(radar_.errors.lever_arm->error, 3, ", ") +
               " m along x, y, z of the IMU, with sigmas of " +
               fixedTexts(radar_.errors.lever_arm->sigma(), 3) + ".",
-          "Set estimate_extrinsics: pose, or correct " + leverArmKey() +
+          "Set estimate_extrinsics: pose, or correct " + keyOrTf("extrinsics_translation") +
               ": `rosrun rio_t calibrate` finds it.");
   }
 
@@ -324,17 +324,11 @@ class RadarCauses {
           true);
   }
 
-  /// The key, or the tf, that gives the rotation of the radar.
-  std::string mountingKey() const {
-    if (config_.extrinsics_source == ExtrinsicsSource::kTf) return "the tf of the cloud in the IMU";
-    return key_ + "extrinsics_rotation_xyzw, order x, y, z, w";
+  /// The key, or the tf, that gives the mounting of the radar.
+  std::string keyOrTf(const std::string& key) const {
+    return config_.extrinsics_source == ExtrinsicsSource::kTf ? "the tf of the cloud in the IMU" : key_ + key;
   }
-
-  /// The key, or the tf, that gives the position of the radar.
-  std::string leverArmKey() const {
-    if (config_.extrinsics_source == ExtrinsicsSource::kTf) return "the tf of the cloud in the IMU";
-    return key_ + "extrinsics_translation";
-  }
+  std::string mountingKey() const { return keyOrTf("extrinsics_rotation_xyzw, order x, y, z, w"); }
 
   static std::string degrees(const Eigen::Vector3d& turn) {
     return fixedTexts(turn / kDegree, 0, ", ") + " degrees about x, y, z of the IMU";
