@@ -31,7 +31,7 @@ TI_TRIGGER = "/sensor_platform/radar_right/trigger"
 
 
 class SetupTest(tester.LiveTestCase):
-    namespaces = ("/rio_t", "/robot", "/diagnostic_aggregator")
+    namespaces = ("/rio_t", "/rio_t_2", "/robot", "/diagnostic_aggregator")
 
     @classmethod
     def setUpClass(cls):
@@ -86,8 +86,32 @@ class SetupTest(tester.LiveTestCase):
         transform.transform.rotation.w = 1.0
         with tester.Listener() as listener, tester.node("config:=irs"):
             other.publish(TFMessage([transform]))
-            listener.wait_for_diagnosis("odometry", f"to the same frame as rio_t, {rospy.get_name()} (from map)", WARN)
+            listener.wait_for_diagnosis("odometry", f"base_link from {rospy.get_name()} (below map)", WARN)
         other.unregister()
+
+    def test_another_robot_that_has_our_radar_frame_is_told(self):
+        other = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
+        transform = TransformStamped(header=Header(frame_id="other/base_link"), child_frame_id="rio_t_radar")
+        transform.transform.rotation.w = 1.0
+        other.publish(TFMessage([transform]))
+        with tester.Listener() as listener, tester.node("config:=irs"):
+            listener.wait_for_diagnosis("odometry", f"rio_t_radar from {rospy.get_name()} (below other/base_link)", WARN)
+        other.unregister()
+
+    def test_another_nodelet_of_the_manager_that_has_our_frame_is_told(self):
+        """Both publish under the name of the manager."""
+        nodelet = tester.program("nodelet", "nodelet")
+        def load(name):
+            return tester.Process(nodelet, "load", "rio_t/RioTNodelet", "manager", "__name:=" + name, "_config:=irs")
+        with tester.Process(*tester.preloaded(), nodelet, "manager", "__name:=manager"), tester.Listener() as listener:
+            with load("rio_t"):
+                listener.wait_until_heard()
+                with tester.feed(listener, self.bag):
+                    listener.wait_for("tf", lambda: len(listener.tf) > 50)
+                    listener.diagnostics.clear()
+                    listener.wait_for_diagnosis("odometry", "running", OK)  # our own tf is not that of another
+                with load("rio_t_2"), tester.feed(listener, self.bag):
+                    listener.wait_for_diagnosis("odometry", "base_link from another nodelet of /manager (below odom)", WARN)
 
     def test_wall_time(self):
         rospy.set_param("/use_sim_time", False)

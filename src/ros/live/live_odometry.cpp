@@ -47,6 +47,15 @@ ros::NodeHandle onQueue(ros::NodeHandle node, ros::CallbackQueue* queue) {
   return node;
 }
 
+/// The frames that the node places in tf.
+TfWatch::Frames placedFrames(const Config& config) {
+  TfWatch::Frames frames;
+  if (config.publish_tf) frames.body = config.invert_tf ? config.odom_frame : config.base_link_frame;
+  if (!config.publish_radar_tf) return frames;
+  for (const Config& radar : configsOfRadars(config)) frames.radars.insert(radar.radar_frame);
+  return frames;
+}
+
 /// The types of what is published, by topic, but for what is below `ours`; none without a master.
 std::map<std::string, std::string> publishedTypes(const std::string& ours) {
   std::map<std::string, std::string> types;
@@ -89,9 +98,9 @@ LiveOdometry::LiveOdometry(const ros::NodeHandle& node, const ros::NodeHandle& p
       live_config_(config_),
       imu_check_(options_.imu_input_check) {
   for (const Config& radar : configsOfRadars(config_)) radars_.emplace_back(radar);
-  if (config_.publish_tf)
-    tf_watch_.emplace(onQueue(node, &input_queue_),
-                      config_.invert_tf ? config_.odom_frame : config_.base_link_frame);
+  if (config_.publish_tf || config_.publish_radar_tf)
+    tf_watch_.emplace(onQueue(node, &input_queue_), placedFrames(config_),
+                      [this] { return publisher_.tfSent(); });
   if (const std::string fault = faultOfOutput(config_.trajectory_file, {}); !fault.empty())
     ROS_WARN_STREAM(name_ << ": ~save_trajectory will fail, trajectory_file " << fault);
   showEffectiveParameters(private_node_, config_);
@@ -206,9 +215,10 @@ void LiveOdometry::addDiagnostics() {
     monitor_.describeOdometry(s, now.get());
     if (const std::string others = tf_watch_ ? tf_watch_->others() : ""; !others.empty())
       s.mergeSummary(diagnostic_msgs::DiagnosticStatus::WARN,
-                     "others publish tf to the same frame as rio_t, " + others +
-                         ", and it jumps between them: stop them, set publish_tf: false, or leave the tf out "
-                         "of the bag that is played (bag_topics)");
+                     "others publish tf to frames of rio_t, which jump between them: " + others +
+                         ". Stop them, name other frames (odom_frame, base_link_frame, radar_frame), set "
+                         "publish_tf or publish_radar_tf to false, or leave the tf out of the bag that is "
+                         "played (bag_topics)");
     log_.status(s);  // a divergence, too: log_.health tells it only while scans come
   });
   if (!config_.barometer_topic.empty())

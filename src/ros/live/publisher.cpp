@@ -75,8 +75,10 @@ void LivePublisher::tune(const Config& config) {
 }
 
 bool LivePublisher::odometry(const BodyOdometry& body) {
-  if (tf_ && tf_rate_.isDue(body.time))
+  if (tf_ && tf_rate_.isDue(body.time)) {
+    ++tf_sent_;
     tf_->sendTransform(toTransform(body, config_.odom_frame, config_.base_link_frame, config_.invert_tf));
+  }
   if (!odom_rate_.isDue(body.time)) return false;
   publish(odom_, toOdometry(body, config_.odom_frame, config_.base_link_frame));
   return true;

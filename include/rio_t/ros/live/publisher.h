@@ -8,6 +8,7 @@
 
 #include <atomic>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <mutex>
 #include <optional>
@@ -54,6 +55,8 @@ class LivePublisher {
 
   /// ~odom and tf, each at its rate. Whether ~odom was published.
   bool odometry(const BodyOdometry& body);
+  /// How often the tf of the body was published, the one that is being published included. Any thread.
+  std::uint64_t tfSent() const { return tf_sent_; }
 
   /// The frames that a result is published in.
   struct Frames {
@@ -97,8 +100,9 @@ class LivePublisher {
   // None where they are not wanted. One for each thread: they share nothing.
   std::optional<tf2_ros::TransformBroadcaster> tf_, radar_tf_;
   std::optional<tf2_ros::StaticTransformBroadcaster> static_tf_;
-  std::mutex path_mutex_;        // never held while something is published
-  nav_msgs::Path path_message_;  // guarded by path_mutex_
+  std::atomic<std::uint64_t> tf_sent_{0};  // by tf_
+  std::mutex path_mutex_;                  // never held while something is published
+  nav_msgs::Path path_message_;            // guarded by path_mutex_
 };
 
 }  // namespace rio_t
