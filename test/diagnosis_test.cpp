@@ -349,6 +349,28 @@ TEST(Diagnosis, AClockOfTheRadarThatIsBehindIsNamed) {
                                "stamp_source: arrival", "radar_stamp_shift"});
 }
 
+/// The IMU counts seconds from the boot of its computer, and the radar those of the calendar.
+TEST(Diagnosis, AClockOfTheRadarThatIsAheadIsNamedAlsoForTheScansBeforeTheStart) {
+  const Config config;
+  EvidenceCollector collector(config);
+  collector.addImu(Time::fromSeconds(100.0));
+  ScanResult result;
+  result.scan.stamp = Time::fromSeconds(1.7e9);
+  result.rejected_because = "before_initialization";
+  for (int k = 0; k < 30; ++k) collector.add(result);
+  collector.addState(Time::fromSeconds(103.0));
+  result.rejected_because = "stamp_ahead_of_imu";
+  for (int k = 0; k < 10; ++k) collector.add(result);
+  const RadarInertialOdometry odometry(config.odometry);
+  RunEvidence evidence = collector.evidence(odometry, std::nullopt);
+  evidence.initialized = true;
+  ASSERT_EQ(diagnose(evidence, config).causes.size(), 1u);
+  expectSays(first(evidence),
+             {"stamp_ahead_of_imu: 40 of 40 scans are stamped ahead of the newest IMU sample, "
+              "by up to 1699999900.0 s",
+              "stamp_source: arrival"});
+}
+
 TEST(Diagnosis, TheOffsetAtItsBoundIsNamed) {
   RunEvidence evidence = goodRun();
   evidence.solver_terminations = {{"at_bound", 150}, {"converged", 30}};

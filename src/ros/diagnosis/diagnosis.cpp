@@ -50,7 +50,7 @@ double usedShare(const RunEvidence& evidence) {
 double lateStart(const RunEvidence& evidence) {
   std::uint64_t before_start = 0, all = 0;
   for (const RadarSummary& radar : evidence.radars) {
-    before_start += radar.scans_before_start - radar.scans_before_imu;
+    before_start += radar.scans_before_start - radar.scans_before_imu - radar.scans_ahead_at_start;
     all += radar.scans_total;
   }
   return all < kEnoughScans ? 0.0 : shareOf(before_start, all);

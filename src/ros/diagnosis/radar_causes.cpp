@@ -133,7 +133,14 @@ class RadarCauses {
                 " are stamped before the first IMU sample, the first of them by " +
                 fixedText(radar_.seconds_before_imu, 1) + " s.",
             other);
-    scans("stamp_ahead_of_imu", "are stamped ahead of the newest IMU sample.", other);
+    const std::uint64_t ahead =
+        countOf(radar_.scans_rejected, "stamp_ahead_of_imu") + radar_.scans_ahead_at_start;
+    if (const double share = shareOf(ahead, radar_.scans_total); share >= kManyScans)
+      cause("stamp_ahead_of_imu", share,
+            outOf(ahead, radar_.scans_total, "scans") + of_ +
+                " are stamped ahead of the newest IMU sample, by up to " +
+                fixedText(radar_.seconds_ahead_of_imu, 1) + " s.",
+            other);
     scans("older_than_window", "are stamped before the IMU samples that are kept.", other);
     scans("imu_not_covering", "are stamped at a time without IMU samples.", other);
     const double zero_triggers = shareOf(radar_.triggers_zero, radar_.scans_total);

@@ -44,8 +44,13 @@ void EvidenceCollector::add(const ScanResult& result) {
     ++of_scan[static_cast<std::size_t>(filter.judge(point))];
   }
   addPoints(of_scan, &radar);
-  if (result.rejected_because == "before_initialization") {
+  const double ahead = newest_imu_ ? result.scan.stamp - *newest_imu_ : 0.0;
+  const bool is_before_start = result.rejected_because == "before_initialization";
+  if (is_before_start || result.rejected_because == "stamp_ahead_of_imu")
+    radar.seconds_ahead_of_imu = std::max(radar.seconds_ahead_of_imu, ahead);
+  if (is_before_start) {
     ++radar.scans_before_start;
+    if (ahead > 0.0) ++radar.scans_ahead_at_start;  // it would have waited, if it were not far ahead
     if (oldest_imu_ && result.scan.stamp < *oldest_imu_ && ++radar.scans_before_imu == 1)
       radar.seconds_before_imu = *oldest_imu_ - result.scan.stamp;
     ++radar.scans_rejected[result.rejected_because];

@@ -46,15 +46,17 @@ struct RadarSummary : RadarEstimate {
   std::string name;               ///< empty if there is but one
   std::uint64_t scans_total = 0;  ///< received
   std::uint64_t scans_used = 0;
-  std::uint64_t triggers_zero = 0;       ///< trigger messages with a stamp of zero
-  std::uint64_t scans_before_start = 0;  ///< before the estimate was initialised
-  std::uint64_t scans_before_imu = 0;    ///< of these, stamped before the oldest IMU sample
-  double seconds_before_imu = 0.0;       ///< by how much, of the first of them
-  Counts scans_rejected;                 ///< by reason
-  Counts velocity_status;                ///< of the scans before the start, by EgoVelocityStatus
-  std::uint64_t points = 0;              ///< of all scans
-  std::uint64_t points_not_finite = 0;   ///< besides these: the decoder drops them, as the next
-  std::uint64_t padding = 0;             ///< points that clouds are filled up with
+  std::uint64_t triggers_zero = 0;         ///< trigger messages with a stamp of zero
+  std::uint64_t scans_before_start = 0;    ///< before the estimate was initialised
+  std::uint64_t scans_before_imu = 0;      ///< of these, stamped before the oldest IMU sample
+  double seconds_before_imu = 0.0;         ///< by how much, of the first of them
+  std::uint64_t scans_ahead_at_start = 0;  ///< of scans_before_start, stamped ahead of the newest IMU sample
+  double seconds_ahead_of_imu = 0.0;       ///< by how much scans were, at most; also after the start
+  Counts scans_rejected;                   ///< by reason
+  Counts velocity_status;                  ///< of the scans before the start, by EgoVelocityStatus
+  std::uint64_t points = 0;                ///< of all scans
+  std::uint64_t points_not_finite = 0;     ///< besides these: the decoder drops them, as the next
+  std::uint64_t padding = 0;               ///< points that clouds are filled up with
   std::array<std::uint64_t, kPointVerdicts> points_by_verdict = {};
   std::uint64_t scans_empty = 0;  ///< scans without a point
   /// Scans that had enough points for a velocity, and too few after the filter: by the verdict that took
