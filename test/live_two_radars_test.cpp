@@ -445,6 +445,22 @@ TEST_F(TwoRadarDiagnostics, SayWhatBecomesOfTheScansNowWhileTheImuCarriesTheEsti
             "used, rejected mostly as cloud_not_usable; no scan comes on /right");
 }
 
+TEST_F(TwoRadarDiagnostics, SayThatScansAreUsedLate) {
+  NavigationState newest;
+  newest.time = Time::fromSeconds(7.0);
+  monitor.odometry(newest, 0.0);
+  second(20, 20, 20);  // stamped before 0.5 s
+  rest(session, 4, 7);
+  Status status = odometry(session);
+  EXPECT_EQ(value(status, "health"), "coasting");
+  EXPECT_EQ(status.level, DiagnosticStatus::ERROR);
+  EXPECT_EQ(status.message.find("scans are used 6.6 s after their stamps"), 0U) << status.message;
+  newest.time = Time::fromSeconds(8.5);
+  monitor.odometry(newest, 0.0);
+  status = odometry(session);
+  EXPECT_EQ(status.message.find("no scan is used"), 0U) << "they have stopped: " << status.message;
+}
+
 /// An IMU that is doubtful, too, keeps no scans away.
 TEST_F(TwoRadarDiagnostics, NameTheTopicsOfTheScansThatNeverCame) {
   for (int k = 0; k < 1000; ++k) monitor.imuDropped(kImuNotUsable);

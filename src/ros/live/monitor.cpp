@@ -144,6 +144,7 @@ void LiveMonitor::result(const LiveSession::Result& result) {
   if (result.result.used) {
     ++radar.used;
     last_used_ = result.result.scan.stamp;
+    age_of_used_ = newest_state_ ? newest_state_->time - *last_used_ : 0.0;
   } else if (!result.result.rejected_because.empty()) {
     ++radar.dropped[result.result.rejected_because];
     // Once the estimate runs, such a scan has a stamp of another clock.
@@ -176,6 +177,7 @@ void LiveMonitor::reset(const std::string& reason) {
   last_terminations_.clear();
   last_update_.reset();
   last_used_.reset();
+  age_of_used_ = 0.0;
   newest_state_.reset();
   barometer_.last.reset();
   for (Radar& radar : radars_) {
@@ -314,6 +316,12 @@ void LiveMonitor::describeOdometry(Status& status, const LiveSession* session) {
                         ? "diverged: do not trust the estimate; re-initialising"
                         : "diverged: do not trust the estimate; call ~reset") +
                        why);
+  } else if (health == Health::kCoasting && usesScansLate()) {
+    status.summary(DiagnosticStatus::ERROR,
+                   "scans are used " + fixedText(age_of_used_, 1) +
+                       " s after their stamps, and the IMU alone carries the estimate from there: they come "
+                       "late, their clock is behind that of the IMU, or the solver is slow "
+                       "(scan_to_optimised_mean_ms of the status solver)");
   } else if (health == Health::kCoasting) {
     // Once a scan was used, the causes are of the whole run, and may be over.
     status.summary(DiagnosticStatus::ERROR, "no scan is used: the IMU alone carries the estimate" +
@@ -384,6 +392,13 @@ std::string LiveMonitor::whyCoasting() const {
                "; ");
   }
   return why.empty() ? "" : "; " + why;
+}
+
+bool LiveMonitor::usesScansLate() const {
+  const double coasting_after = config_.odometry.health.coasting_after;
+  if (!last_used_ || !newest_state_ || age_of_used_ <= coasting_after) return false;
+  const double since_use = newest_state_->time - *last_used_ - age_of_used_;
+  return since_use <= coasting_after;
 }
 
 std::optional<std::string> LiveMonitor::judgeUse(Radar& radar, bool initialized) {

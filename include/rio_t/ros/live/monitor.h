@@ -140,6 +140,8 @@ class LiveMonitor {
   static std::string useBetween(const Account& then, const Account& now);
   /// Says for each radar why its scans are not used any more; begins with "; ".
   std::string whyCoasting() const;
+  /// Whether scans are used, and each is then too old to count as one.
+  bool usesScansLate() const;
   /// Adds whether the run is good so far and, if not, why. Writes the likeliest reason to `why`.
   Diagnosis addDiagnosis(Status& status, const LiveSession& session, std::string* why) const;
   /// For the end of a message about a topic on which nothing came: its type, if it is wrong; if nobody
@@ -170,6 +172,7 @@ class LiveMonitor {
   RosView ros_;
   std::optional<LiveSession::Result> last_update_;
   std::optional<Time> last_used_;                // stamp of the last scan used
+  double age_of_used_ = 0.0;                     // [s] of that scan, when it was used
   std::optional<NavigationState> newest_state_;  // at the newest IMU sample
 };
 
