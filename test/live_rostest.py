@@ -110,8 +110,11 @@ class LiveTest(tester.LiveTestCase):
             self.assertGreater(len(shown), 0.9 * len(periods))
             self.assertLessEqual(len(said), len(periods))
             for message in shown[::10]:
-                self.assertEqual(said[message.header.stamp.to_nsec()].transform.translation.x,
-                                 message.pose.pose.position.x)
+                pose, transform = message.pose.pose, said[message.header.stamp.to_nsec()].transform
+                for told, shown_as, names in ((pose.position, transform.translation, "xyz"),
+                                              (pose.orientation, transform.rotation, "xyzw")):
+                    for name in names:
+                        self.assertEqual(getattr(told, name), getattr(shown_as, name))
             listener.wait_for_diagnosis("odometry", "running", OK)
             listener.wait_for("no scan was lost", lambda: listener.value("input", "scans") == str(len(self.scan_stamps)))
             self.assertIsNone(listener.value("input", "dropped_queue_full"))
