@@ -291,5 +291,21 @@ TEST(DopplerSpan, IsNotShownByAFewScans) {
   EXPECT_NEAR(span.possible(), kSpan, 0.5 * kStep);
 }
 
+/// A straight drive before a radar of few bins: the velocity forward fits the Dopplers as they read, and one
+/// backward fits them if they may wrap around.
+TEST(DopplerSpan, IsNotShownByDopplersThatFitAsTheyRead) {
+  constexpr double kBin = 0.476;
+  const auto ahead = [](double doppler) {
+    return std::vector<RadarDirection>(10, {Eigen::Vector3d::UnitY(), doppler});
+  };
+  DopplerSpan span(0.0);
+  span.learn(ahead(0.0), std::nullopt, kBin);
+  span.learn(ahead(-3.0 * kBin), std::nullopt, kBin);
+  const TwoReadings before{{0.0, 2.0 * kBin, 0.0}, {0.0, -2.0 * kBin, 0.0}};
+  for (int k = 0; k < 50; ++k) span.learn(ahead(-2.0 * kBin), before, kBin);
+  EXPECT_NEAR(span.possible(), 4.0 * kBin, 1e-9);
+  EXPECT_EQ(span.value(), 0.0);
+}
+
 }  // namespace
 }  // namespace rio_t

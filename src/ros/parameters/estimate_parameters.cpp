@@ -230,10 +230,11 @@ void listHealthAndLandmarks(ParameterList& list, Config& c) {
       "reinitialize_after", "s", atLeast(0), health.reinitialize_after,
       "The estimator re-initialises after this time of divergence. Until then the IMU alone is better than a "
       "radar that contradicts it, as in front of a bus that passes.");
-  list.number("divergence_window", "s", above(0, 60), health.window,
-              "The health is judged by the scans of this time. A longer time bears a crowd that fills the view for "
-              "longer, and tells a divergence later: after two thirds of this time if all scans contradict the "
-              "estimate.");
+  list.number(
+      "divergence_window", "s", above(0, 60), health.window,
+      "The health is judged by the scans of this time. A longer time bears a crowd that fills the view for "
+      "longer, and tells a divergence later: after two thirds of this time if all scans contradict the "
+      "estimate.");
   list.number(
       "divergence_max_contradiction", "", inside(0, 1), health.max_contradiction,
       "The estimate diverged if the mean contradiction of the scans in divergence_window is larger than "
