@@ -48,8 +48,9 @@ MountingSearchOptions searchOptions(const ImuInspection& imu, const InertialTrac
   return options;
 }
 
-/// The clouds, counted as they came. The scans that got a stamp have it.
-struct Looked : DecodedClouds {
+struct Looked {
+  DecodedClouds clouds;
+  std::vector<RadarScan> scans;  // those that get a stamp
   CloudReport cloud;
   RadarVelocities velocities;
   DopplerSign sign;
@@ -60,8 +61,8 @@ struct Looked : DecodedClouds {
 Looked look(const Recording& recording, const ImuInspection& imu, const CloudTopic& cloud,
             const StampProposal& stamps, const PointCloudFormat& format, const InertialTrack& track) {
   Looked looked;
-  static_cast<DecodedClouds&>(looked) = decodeAll(cloud, format);
-  looked.scans = stampScans(recording, imu.times, cloud, stamps.options, looked.scans);
+  looked.clouds = decodeAll(cloud, format);
+  looked.scans = stampScans(recording, imu.times, cloud, stamps.options, looked.clouds.scans);
   looked.cloud = inspectCloud(looked.scans);
   looked.velocities = radarVelocities(looked.scans);
   looked.sign = dopplerSignFromRanges(looked.scans, track);
@@ -73,10 +74,10 @@ Looked look(const Recording& recording, const ImuInspection& imu, const CloudTop
 
 /// Why the radar cannot be used; empty: it can.
 std::string faultOf(const Looked& looked, const PointCloudFormat& format, const StampProposal& stamps) {
-  if (looked.points == 0 && looked.points_not_finite > 0)
+  if (looked.clouds.points == 0 && looked.clouds.points_not_finite > 0)
     return "the position, the power or the field " + format.doppler + " is not finite in every point";
-  if (looked.points == 0)
-    return looked.padding > 0 ? "every point is at range zero, or NaN" : "no cloud has a point";
+  if (looked.clouds.points == 0)
+    return looked.clouds.padding > 0 ? "every point is at range zero, or NaN" : "no cloud has a point";
   if (looked.scans.empty()) return "no scan gets a stamp: " + stamps.text;
   if (!looked.cloud.has_doppler) return "the field " + format.doppler + " is zero in every point";
   return "";
@@ -110,7 +111,7 @@ void describeCloud(const Looked& looked, const FormatProposal& format, const Str
   constexpr double kIncredible = 500.0;  // [m] farther than radars see
   if (c.range_99 > kIncredible)
     radar->odd("points", "the ranges reach " + fixedText(c.range_99, 0) + " m: are the positions in m?");
-  const double not_finite = static_cast<double>(looked.points_not_finite);
+  const double not_finite = static_cast<double>(looked.clouds.points_not_finite);
   const double share_not_finite = not_finite / (not_finite + static_cast<double>(c.points));
   if (share_not_finite > kOnePercent)
     radar->odd("points",
