@@ -19,7 +19,7 @@ constexpr double kCheckEvery = 0.1;
 /// [s] Rest that ends counts from here on: tilt and gyro bias are then known to twice the sigma of 4 s.
 constexpr double kShortest = 1.0;
 
-struct Statistics {
+struct MeanAndStd {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   Eigen::Vector3d std = Eigen::Vector3d::Zero();
 };
@@ -50,12 +50,12 @@ Eigen::Vector3d variancesOf(const std::vector<Eigen::Vector3d>& values, const Ei
 }
 
 /// Mean of the samples, and spread of the means over kMean without the white noise that is left in them.
-Statistics statistics(const std::vector<ImuMeasurement>& samples, Eigen::Vector3d ImuMeasurement::*member,
+MeanAndStd statistics(const std::vector<ImuMeasurement>& samples, Eigen::Vector3d ImuMeasurement::*member,
                       double ImuMeasurement::*squared_density) {
   double density = 0.0;
   for (const ImuMeasurement& sample : samples) density += sample.*squared_density;
   density /= static_cast<double>(samples.size());
-  Statistics result;
+  MeanAndStd result;
   result.mean = meanOf(samples.begin(), samples.end(), member);
   const Eigen::Vector3d variances = variancesOf(meansOf(samples.begin(), samples.end(), member), result.mean);
   result.std = (variances.array() - density / kMean).max(0.0).sqrt();
@@ -63,7 +63,7 @@ Statistics statistics(const std::vector<ImuMeasurement>& samples, Eigen::Vector3
 }
 
 struct RestStatistics {
-  Statistics gyro, accel;
+  MeanAndStd gyro, accel;
   double mean_size = 0.0;  // [m/s^2] mean of the specific force's norm
 };
 
@@ -79,8 +79,8 @@ RestStatistics statistics(const std::vector<ImuMeasurement>& samples) {
 /// Why the samples do not show a platform at rest; nothing if they do.
 std::optional<StartWait> noRestBecause(const RestStatistics& rest, const StaticInitializerOptions& options,
                                        double gravity) {
-  const Statistics& gyro = rest.gyro;
-  const Statistics& accel = rest.accel;
+  const MeanAndStd& gyro = rest.gyro;
+  const MeanAndStd& accel = rest.accel;
   const auto moving = [](std::string text) { return StartWait{StartObstacle::kMotion, std::move(text)}; };
   // In any motion of people and drones the accelerometer reads gravity on average. If not, units are wrong.
   if (std::abs(rest.mean_size - gravity) > kWrongUnits * gravity) {

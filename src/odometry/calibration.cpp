@@ -37,8 +37,8 @@ struct Direction {
 };
 
 /// Cost 0.5 x' A x - b' x.
-struct Quadratic {
-  explicit Quadratic(Eigen::Index size)
+struct InformationSum {
+  explicit InformationSum(Eigen::Index size)
       : A(Eigen::MatrixXd::Zero(size, size)), b(Eigen::VectorXd::Zero(size)) {}
   void add(const Direction& direction) {
     A += direction.information * direction.unit * direction.unit.transpose();
@@ -64,7 +64,7 @@ Agreement agreementOf(const std::vector<std::vector<Direction>>& runs, Eigen::In
   // A run that observes a direction adds at least so much information.
   constexpr double kLeast = 1.0 / (kObservedSigmaShare * kObservedSigmaShare) - 1.0;
   constexpr double kRounding = 1e-6;
-  Quadratic sum(size);
+  InformationSum sum(size);
   Agreement agreement;
   for (const std::vector<Direction>& run : runs) {
     for (const Direction& direction : run) {
@@ -189,7 +189,7 @@ Combined<Gaussian> combine(const Gaussian& prior, const std::vector<Gaussian>& p
   const Eigen::Index size = prior.mean.size();
   const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(size, size);
   std::vector<std::vector<Direction>> runs;
-  Quadratic sum(size);
+  InformationSum sum(size);
   for (const Gaussian& posterior : posteriors) {
     const Eigen::MatrixXd L_i = inverse(whitened(whitened(posterior.covariance).transpose()));
     runs.push_back(directionsOf(L_i - one, L_i * whitened(posterior.mean - prior.mean)));
