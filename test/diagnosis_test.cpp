@@ -124,10 +124,10 @@ TEST(Diagnosis, AWrongScaleOfTheDopplerIsNoGoodRun) {
                                "IMU feels.",
                                "radar_format", "radar_field_doppler", "in m/s"});
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
-  // It explains a mounting that seems turned a little, and an offset at its bound.
+  // It explains a mounting that seems turned a little, and an offset that comes to its bound.
   evidence.radars.front().errors.turn =
       VectorError{Eigen::Vector3d(0.0, 0.1, 0.0), 1e-4 * Eigen::Matrix3d::Identity()};
-  evidence.solver_terminations = {{"at_bound", 178}, {"converged", 2}};
+  evidence.solver_terminations = {{"at_bound", 60}, {"converged", 120}};
   expectSays(first(evidence), {"doppler_scale: "});
   evidence.radars.front().errors.scale = {-0.2, 0.0};
   evidence.radars.front().errors.turn->error.y() = 1.0;  // the better explanation
@@ -379,6 +379,16 @@ TEST(Diagnosis, TheOffsetAtItsBoundIsNamed) {
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kDoubtful);
 }
 
+TEST(Diagnosis, AnOffsetBeyondItsBoundLooksLikeAWrongScale) {
+  RunEvidence evidence = goodRun();
+  evidence.radars.front().errors.scale = {-1.0, 1e-6};
+  evidence.solver_terminations = {{"at_bound", 150}, {"converged", 30}};
+  expectSays(first(evidence), {"offset_at_bound: "});
+  evidence.solver_terminations = {{"at_bound", 110}, {"converged", 70}};
+  expectSays(first(evidence), {"doppler_scale: "});
+  EXPECT_EQ(diagnose(evidence, Config{}).causes.at(1).name, "offset_at_bound");
+}
+
 TEST(Diagnosis, ABatchThatDidNotConvergeIsDoubtful) {
   RunEvidence evidence = goodRun();
   Config config;
@@ -416,6 +426,14 @@ TEST(Diagnosis, ADivergenceIsBadIfItLastsAndDoubtfulIfNot) {
   evidence.scans_diverged = 1;
   evidence.health = Health::kDiverged;
   EXPECT_EQ(diagnose(evidence, Config{}).verdict, RunVerdict::kBad);
+  // Others explain more, but this is why the run is bad.
+  RadarSummary& radar = evidence.radars.front();
+  radar.errors.scale = {-1.0, 1e-6};
+  radar.errors.turn = VectorError{Eigen::Vector3d(0.0, 1.0, 0.0), 1e-4 * Eigen::Matrix3d::Identity()};
+  evidence.solver_terminations = {{"at_bound", 110}, {"converged", 70}};
+  const std::vector<Cause> causes = diagnose(evidence, Config{}).causes;
+  ASSERT_EQ(causes.size(), 3U);
+  EXPECT_EQ(causes.back().name, "diverged");
 }
 
 TEST(Diagnosis, AContradictionNamesCheckBagAndAMountingThatIsNotGiven) {

@@ -13,6 +13,9 @@ namespace {
 
 // As kManyScans.
 constexpr double kManyWindows = 0.3;
+/// An offset of 0.3 to 0.5 s left 85 % of the windows at the bound, and then looks like a wrong scale of the
+/// Doppler. A wrong scale of 0.28 to 3.6 left at most 61 % there.
+constexpr double kMostWindows = 0.75;
 constexpr double kFewScansUsed = 0.5;
 constexpr double kLateStart = 0.5;
 constexpr double kMostlySilent = 0.5;
@@ -132,26 +135,21 @@ void addOffset(const RunEvidence& evidence, const Config& config, std::vector<Ca
   const Windows windows = windowsOf(evidence);
   const double share = shareOf(windows.at_bound, windows.all);
   if (share < kManyWindows || windows.all < kEnoughScans) return;
+  const double explained = share > kMostWindows ? 1.0 : share;
   const double bound = config.odometry.smoother.max_time_offset;
   causes->push_back({"offset_at_bound",
                      outOf(windows.at_bound, windows.all, "windows") +
                          " end with the time offset at its bound, max_time_offset " + number(bound) + " s.",
                      "Raise max_time_offset, subtract a known delay with radar_stamp_shift, or set "
                      "stamp_source: arrival. A wrong mounting can have the same effect.",
-                     share});
-  // A mounting that is far off drives the offset there: the farthest one explains these windows, too. So does
-  // the scale of a Doppler that is farther off.
-  const auto farthest = [&](const char* name) {
-    Cause* result = nullptr;
-    for (Cause& each : *causes)
-      if (each.name == name && (result == nullptr || each.share > result->share)) result = &each;
-    return result;
-  };
-  Cause* mounting = farthest("mounting_far");
-  Cause* scale = farthest("doppler_scale");
-  if (scale != nullptr && (mounting == nullptr || scale->share > mounting->share))
-    scale->share = std::max(scale->share, share);
-  if (mounting != nullptr) mounting->share = std::max(mounting->share, share);
+                     explained});
+  // A mounting that is far off drives the offset there: the farthest one explains these windows, too.
+  Cause* mounting = nullptr;
+  for (Cause& each : *causes) {
+    const bool is_farthest = mounting == nullptr || each.share > mounting->share;
+    if (each.name == "mounting_far" && is_farthest) mounting = &each;
+  }
+  if (mounting != nullptr) mounting->share = std::max(mounting->share, explained);
 }
 
 void addOffsetSteps(const RunEvidence& evidence, const Config& config, std::vector<Cause>* causes) {
@@ -387,7 +385,14 @@ Diagnosis diagnose(const RunEvidence& evidence, const Config& config) {
   // Stable: of causes that explain the same, the one nearer to the sensor comes first.
   std::stable_sort(result.causes.begin(), result.causes.end(),
                    [](const Cause& a, const Cause& b) { return a.share > b.share; });
-  if (result.causes.size() > kMostCauses) result.causes.resize(kMostCauses);
+  if (result.causes.size() > kMostCauses) {
+    // A run that ends diverged is bad for that reason, so this one stays.
+    const auto last = result.causes.begin() + (kMostCauses - 1);
+    const auto diverged =
+        std::find_if(last, result.causes.end(), [](const Cause& cause) { return cause.name == "diverged"; });
+    if (evidence.health == Health::kDiverged && diverged != result.causes.end()) std::swap(*last, *diverged);
+    result.causes.resize(kMostCauses);
+  }
   result.checks = checksOf(evidence, config, radars);
   result.verdict = verdictOf(evidence, result);
   return result;
