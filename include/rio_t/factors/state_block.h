@@ -95,7 +95,8 @@ using BiasJacobian = Eigen::Matrix<double, N, StateBlock::kBiases, Eigen::RowMaj
 
 /// Writes the derivative by a block by rows, as the solver wants it, unless the solver does not ask: null.
 template <typename Derivative>
-void store(const Eigen::MatrixBase<Derivative>& J, double* stored) {
+void store(const Eigen::MatrixBase<Derivative>& J,
+           double* stored) {  // NOLINT(readability-non-const-parameter): the map writes to it
   constexpr int kRows = Derivative::RowsAtCompileTime, kColumns = Derivative::ColsAtCompileTime;
   constexpr int kOrder = kColumns == 1 ? Eigen::ColMajor : Eigen::RowMajor;  // Eigen knows no column by rows
   if (stored != nullptr) Eigen::Map<Eigen::Matrix<double, kRows, kColumns, kOrder>>{stored} = J;

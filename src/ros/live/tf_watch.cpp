@@ -22,7 +22,7 @@ TfWatch::TfWatch(ros::NodeHandle node, Frames frames, std::function<std::uint64_
 }
 
 void TfWatch::add(const Event& event, bool is_static) {
-  const std::string publisher = event.getPublisherName();
+  const std::string& publisher = event.getPublisherName();
   const bool has_our_name = publisher == ros::this_node::getName();
   for (const geometry_msgs::TransformStamped& transform : event.getConstMessage()->transforms) {
     const std::string child = withoutSlash(transform.child_frame_id);
