@@ -25,9 +25,9 @@ struct TwoReadings {
 /// The span of a radar's Doppler. A Doppler beyond the span comes back on the other side (aliasing).
 ///
 /// If the span is not given, DopplerSpan reads it off the data. A span shows in three ways: no Doppler is
-/// beyond it; points that must be beyond, by the platform's velocity, are one span off; and no velocity
-/// explains as many points as they read. A few Dopplers that are errors of the transmission do not count.
-/// Not thread-safe.
+/// beyond it; points that must be beyond, by the platform's velocity, are one span off; and the Dopplers fit
+/// a velocity better if they may wrap around than as they read. A few Dopplers that are errors of the
+/// transmission do not count. Not thread-safe.
 class DopplerSpan {
  public:
   explicit DopplerSpan(double given) : given_(given) {}  ///< [m/s] 0: read it off the data
