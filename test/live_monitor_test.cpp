@@ -35,6 +35,29 @@ TEST(LiveMonitor, NamesTheTopicOfTheOnlyRadarThatIsSilent) {
   EXPECT_EQ(status.message, "the radar is silent, topic " + Config().radar_topic);
 }
 
+/// A node whose sensors stamp with their uptime works, but others look for its tf at the ROS time of today.
+TEST(LiveMonitor, WarnsOfStampsThatCountFromTheStartOfTheImu) {
+  const Time today = Time::fromSeconds(1.8e9), uptime = Time::fromSeconds(1234.0);
+  const auto status_of = [](Time stamp, Time now) {
+    LiveMonitor monitor{Config()};
+    monitor.scan();
+    monitor.imu();
+    monitor.imuUsable(stamp);
+    LiveMonitor::RosView view;
+    view.now = now;
+    monitor.setRosView(view);
+    LiveMonitor::Status status;
+    monitor.describeInput(status, nullptr);
+    return status;
+  };
+  const LiveMonitor::Status status = status_of(uptime, today);
+  EXPECT_EQ(status.level, DiagnosticStatus::WARN);
+  EXPECT_EQ(status.message.find("topic " + Config().imu_topic + " has stamps of the year 1970 (1234 s"), 0U)
+      << status.message;
+  EXPECT_EQ(status_of(today, today).level, DiagnosticStatus::OK);
+  EXPECT_EQ(status_of(uptime, uptime).level, DiagnosticStatus::OK) << "a simulation begins at 0";
+}
+
 TEST(LiveMonitor, IsNoBatchWhateverTheFileSays) {
   Config config;
   config.mode = RunMode::kBatch;

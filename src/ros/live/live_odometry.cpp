@@ -13,6 +13,7 @@
 #include "../command_line.h"
 #include "radar_texts.h"
 #include "rio_t/evaluation/trajectory.h"
+#include "rio_t/ros/messages/conversions.h"
 #include "rio_t/ros/parameters/ros_parameters.h"
 
 namespace rio_t {
@@ -201,6 +202,7 @@ void LiveOdometry::addDiagnostics() {
       if (radar.triggers) view.publishers[radar.config.trigger_topic] = radar.triggers.getNumPublishers();
     }
     const ros::Time clock = ros::Time::now();
+    view.now = toTime(clock);
     view.clock_stands = ros::Time::isSimTime() && !clock.isZero() && clock == last_clock_;
     last_clock_ = clock;
     monitor_.setRosView(std::move(view));

@@ -24,6 +24,8 @@ constexpr std::size_t kInputsJudged = 4;
 /// Calls of describeOdometry, seconds that is, after which a verdict that is not good is a warning: one bad
 /// second early in a run is a large share of it.
 constexpr std::size_t kVerdictHolds = 5;
+/// 2007-01-01. ROS began in that year, so no ROS time is earlier, but for that of a simulation.
+constexpr Time kBeginOfRos = Time::fromNanoseconds(1'167'609'600'000'000'000);
 /// No message comes then, and no sensor is at fault.
 constexpr const char* kClockStands =
     "ROS time stands still: /clock is paused, or its publisher has ended (a bag?)";
@@ -110,6 +112,7 @@ void LiveMonitor::imuDropped(const std::string& reason) {
 void LiveMonitor::imuUsable(Time stamp) {
   const std::lock_guard<std::mutex> lock(mutex_);
   ++usable_imu_.count;
+  imu_stamp_ = stamp;
   collector_.addImu(stamp);
 }
 
@@ -475,6 +478,12 @@ void LiveMonitor::describeInput(Status& status, const LiveSession* session) {
                             " publishers, and rio_t takes them for one sensor: stop one of them, or remap it "
                             "to a topic of its own");
   }
+  if (imu_stamp_ && *imu_stamp_ < kBeginOfRos && ros_.now >= kBeginOfRos)
+    status.mergeSummary(
+        DiagnosticStatus::WARN,
+        "topic " + config_.imu_topic + " has stamps of the year 1970 (" + fixedText(*imu_stamp_ - Time(), 0) +
+            " s, the uptime of a sensor?), and so have ~odom and tf: other nodes look for them "
+            "at the ROS time of today. Let the driver stamp with ROS time");
 }
 
 bool LiveMonitor::describeMissingClock(Status& status, double seconds) {

@@ -31,6 +31,7 @@ class LiveMonitor {
     /// lacksInput().
     std::map<std::string, std::string> topic_types;
     std::map<std::string, std::uint32_t> publishers;  ///< how many there are on each topic of the input
+    Time now;                                         ///< ROS time
     bool clock_stands = false;  ///< ROS time comes from /clock, and has stood still since the last view
   };
 
@@ -155,8 +156,9 @@ class LiveMonitor {
   std::vector<Radar> radars_;
   EvidenceCollector collector_;  // since the session started
   Counter imu_;
-  Counter usable_imu_;        ///< messages that move the estimate
-  std::string why_unusable_;  ///< of the last other message
+  Counter usable_imu_;             ///< messages that move the estimate
+  std::optional<Time> imu_stamp_;  ///< of the last of them
+  std::string why_unusable_;       ///< of the last other message
   std::string imu_fault_;  ///< why no odometry comes, as of the last call of describeInput; empty: it comes
   std::size_t calls_not_good_ = 0;  ///< of describeOdometry, in which the verdict was not good
   std::uint64_t imu_before_session_ = 0, not_usable_before_session_ = 0;
