@@ -172,7 +172,7 @@ TEST(Barometer, APressureThatComesBackSlowlyDoesNoHarm) {
   EXPECT_EQ(door.steps, 0);
   const Disturbed bell =
       disturbed([](double t) { return thrice([](double s) { return std::exp(-0.125 * s * s); }, t); });
-  EXPECT_LT(bell.harm, 0.25);
+  EXPECT_LT(bell.harm, 0.16);  // 0.19 if only the line through all of the memory is looked at
   EXPECT_EQ(bell.steps, 0);
 }
 

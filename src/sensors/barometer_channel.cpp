@@ -154,31 +154,33 @@ void BarometerChannel::climbTo(const NodeEstimate& node, const FixedLagSmoother&
   climb_ = Climb{node.time, before + node.x.p_W().z()};
 }
 
-std::optional<BarometerChannel::Slope> BarometerChannel::slopeWith(const Deviation& deviation, double noise,
-                                                                   double span) {
+BarometerChannel::Slope BarometerChannel::slopeWith(const Deviation& deviation, double noise, double span) {
   const double memory = std::cbrt(12.0 * noise * span * std::pow(options_.gate / options_.gate_slope, 2));
   // The pressure may have changed in a silence, so the line begins anew.
   if (!deviations_.empty() && deviation.time - deviations_.back().time > memory + kMissing * span)
     deviations_.clear();
   deviations_.push_back(deviation);
   while (deviations_.size() > 3 && deviation.time - deviations_[1].time >= memory) deviations_.pop_front();
-  if (deviations_.size() < 3 || deviation.time - deviations_.front().time < memory) return std::nullopt;
   Slope slope;
-  double mean_time = 0.0, velocity_variance = 0.0;  // the time counts from the newest
-  for (const Deviation& each : deviations_) {
-    const double weight = 1.0 / static_cast<double>(deviations_.size());
-    mean_time += weight * (each.time - deviation.time);
-    velocity_variance += weight * each.velocity_variance;
-    slope.innovation += weight * each.innovation;
+  double n = 0.0, times = 0.0, heights = 0.0, squares = 0.0, products = 0.0, velocity_variances = 0.0;
+  double innovations = 0.0;
+  for (auto each = deviations_.rbegin(); each != deviations_.rend(); ++each) {
+    const double dt = each->time - deviation.time;
+    n += 1.0;
+    times += dt;
+    heights += each->height;
+    squares += dt * dt;
+    products += dt * each->height;
+    velocity_variances += each->velocity_variance;
+    innovations += each->innovation;
+    if (n < 3.0) continue;
+    const double square = squares - times * times / n;
+    slope.value = (products - times * heights / n) / square;
+    const double sigma = std::sqrt(noise / square + velocity_variances / n);
+    if (std::abs(slope.value) > options_.gate_slope + options_.gate * sigma) slope.is_steep = true;
   }
-  double square = 0.0, product = 0.0;
-  for (const Deviation& each : deviations_) {
-    const double dt = each.time - deviation.time - mean_time;
-    square += dt * dt;
-    product += dt * each.height;
-  }
-  slope.value = product / square;
-  slope.sigma = std::sqrt(noise / square + velocity_variance);
+  slope.innovation = innovations / n;
+  slope.is_whole = n >= 3.0 && deviation.time - deviations_.front().time >= memory;
   return slope;
 }
 
@@ -223,23 +225,20 @@ BarometerAnswer BarometerChannel::use(const Mean& mean, const NodeEstimate& node
   }
   rejected_since_.reset();
   climbTo(node, smoother);
-  const std::optional<Slope> slope =
-      slopeWith({answer.time, mean.height() - delay * node.x.v_W().z() - climb_->height, answer.innovation,
-                 P(StateBlock::kV + 2, StateBlock::kV + 2)},
-                noise, mean.span);
-  const bool is_steep = options_.gate > 0.0 && slope &&
-                        std::abs(slope->value) > options_.gate_slope + options_.gate * slope->sigma;
-  if (!moved_at_ && is_steep) distrust(answer.time, smoother);
+  const Slope slope = slopeWith({answer.time, mean.height() - delay * node.x.v_W().z() - climb_->height,
+                                 answer.innovation, P(StateBlock::kV + 2, StateBlock::kV + 2)},
+                                noise, mean.span);
+  if (!moved_at_ && options_.gate > 0.0 && slope.is_steep) distrust(answer.time, smoother);
   if (moved_at_) {
-    if (!slope || std::abs(slope->value) > options_.gate_slope) moved_at_ = answer.time;
+    if (!slope.is_whole || std::abs(slope.value) > options_.gate_slope) moved_at_ = answer.time;
     if (answer.time - *moved_at_ < options_.gate_timeout) {
       answer.rejected_because = "pressure_moves";
       return answer;
     }
     moved_at_.reset();
     const double sigma = std::sqrt(variance_of_prediction + noise / static_cast<double>(deviations_.size()));
-    answer.stepped = std::abs(slope->innovation) > options_.gate * sigma;
-    if (answer.stepped) addBias(smoother, answer.bias + slope->innovation);
+    answer.stepped = std::abs(slope.innovation) > options_.gate * sigma;
+    if (answer.stepped) addBias(smoother, answer.bias + slope.innovation);
   }
   smoother.window().add(std::make_unique<BarometerFactor>(mean.height(), delay, std::sqrt(noise)),
                         {smoother.nodeAt(node.time), bias_.get()});

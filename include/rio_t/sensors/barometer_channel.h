@@ -102,8 +102,10 @@ class BarometerChannel {
   };
   /// The straight line through the deviations (docs/method.md, eq. 19i).
   struct Slope {
-    double value = 0.0, sigma = 0.0;  ///< [m/s]
-    double innovation = 0.0;          ///< [m] the mean of the deviations' innovations
+    double value = 0.0;       ///< [m/s]
+    double innovation = 0.0;  ///< [m] the mean of the deviations' innovations
+    bool is_whole = false;    ///< the deviations last long enough for both
+    bool is_steep = false;    ///< this line, or one through only the newest deviations
   };
   static void add(const Sample& sample, Mean& mean);
   /// [s] of the recent samples; none before the third one.
@@ -112,8 +114,7 @@ class BarometerChannel {
   double variance(const Mean& mean) const;  ///< [m^2]
   void addBias(FixedLagSmoother& smoother, double bias);
   BarometerAnswer use(const Mean& mean, const NodeEstimate& node, FixedLagSmoother& smoother);
-  /// None before the deviations last long enough.
-  std::optional<Slope> slopeWith(const Deviation& deviation, double noise, double span);
+  Slope slopeWith(const Deviation& deviation, double noise, double span);
   /// The climb goes on to a node of the same solution. If the last one has left, all begins anew.
   void climbTo(const NodeEstimate& node, const FixedLagSmoother& smoother);
   /// The pressure moves since `time`: the window gives up its terms of the barometer.
