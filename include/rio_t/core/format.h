@@ -14,7 +14,7 @@ std::string formatted(const char* text, Values... values) {
   return line;
 }
 
-/// Appends a number by its digits: the last `decimals` of them (at most 18) stand after the point.
+/// Appends the decimal number `digits` / 10^`decimals`, with at most 18 decimals.
 void appendDecimal(std::string* text, bool is_negative, std::uint64_t digits, int decimals);
 /// Appends `value` with that many decimals (at most 12), with a point whatever the locale; ".nan",
 /// ".inf", "-.inf" as in YAML. Never minus zero.

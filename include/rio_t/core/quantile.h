@@ -6,7 +6,7 @@
 
 namespace rio_t {
 
-/// The value that a share of the values does not exceed; 0 for none.
+/// The `share` quantile of the values by nearest rank, such as 0.5 for the median; 0 if there are none.
 inline double quantile(std::vector<double> values, double share) {
   if (values.empty()) return 0.0;
   const double last = static_cast<double>(values.size() - 1);

@@ -14,7 +14,7 @@ inline bool isWrittenInPlace(const std::string& path) {
   return std::filesystem::exists(status) && !std::filesystem::is_regular_file(status);
 }
 
-/// Writes the text beside what is there and renames it, so that a full disk does not take the old file.
+/// Writes the text to a temporary file and renames it, so that a full disk does not destroy the old file.
 /// Throws std::runtime_error.
 inline void replaceFile(const std::string& path, const std::string& text) {
   const bool in_place = isWrittenInPlace(path);

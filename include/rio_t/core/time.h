@@ -36,8 +36,8 @@ class Time {
   std::int64_t ns_ = 0;
 };
 
-/// A sum that forgets with the time constant `memory` [s] is multiplied by this factor from `last` to `now`.
-/// The factor is 1 for data that come late, and it is never zero.
+/// Factor by which an exponentially fading sum with the time constant `memory` [s] decays from `last` to
+/// `now`. It is 1 for data that come late, and never zero.
 inline double fading(Time last, Time now, double memory) {
   return std::exp(-std::clamp(now - last, 0.0, 10.0 * memory) / memory);
 }
