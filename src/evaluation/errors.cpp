@@ -73,13 +73,13 @@ Eigen::Matrix3d leastSquaresRotation(const Points& truth, const Points& estimate
   if (d[1] <= 1e-12 * d[0] || d[0] <= 0.0) {
     throw std::invalid_argument("SE3 alignment needs three matched positions that are not on a line");
   }
-  // The last axis is turned over where the best orthogonal matrix would be a reflection.
+  // If the best orthogonal matrix is a reflection, the last axis is flipped.
   Eigen::Vector3d sign = Eigen::Vector3d::Ones();
   if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0) sign.z() = -1.0;
   return svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
 }
 
-/// The same with a rotation about z only.
+/// As leastSquaresRotation, with a rotation about z only.
 Eigen::Matrix3d leastSquaresYaw(const Points& truth, const Points& estimate) {
   const double along = truth.row(0).dot(estimate.row(0)) + truth.row(1).dot(estimate.row(1));
   const double across = truth.row(1).dot(estimate.row(0)) - truth.row(0).dot(estimate.row(1));
@@ -119,7 +119,7 @@ std::vector<Pair> consecutivePairs(const std::vector<double>& lengths, double de
   return pairs;
 }
 
-/// From every pose to the first of those nearest to `delta` further on.
+/// Pairs every pose with the pose nearest to `delta` further on. Of equally near ones it takes the first.
 std::vector<Pair> allPairs(const std::vector<double>& lengths, double delta) {
   std::vector<double> at(lengths.size());
   std::partial_sum(lengths.begin(), lengths.end(), at.begin());
@@ -198,8 +198,8 @@ RelativeError relativeError(const Trajectory& truth, const Trajectory& estimate,
   if (!(options.delta > 0.0)) throw std::invalid_argument("relative error: delta must be greater than zero");
   const std::vector<Match> matches = requireMatches(truth, estimate, max_difference);
   const std::vector<double> lengths = steps(estimate, matches, options.unit);
-  // Stamps are whole nanoseconds: half of one absorbs the rounding of sums, or equal periods would make
-  // unequal pieces. Metres are compared as they are, as evo does.
+  // Half a nanosecond absorbs the rounding of sums of stamps. Otherwise equal periods could give pieces of
+  // unequal length. Metres are compared without tolerance, as in evo.
   const double delta = options.unit == DeltaUnit::kSeconds ? options.delta - 0.5e-9 : options.delta;
   const std::vector<Pair> pairs =
       options.all_pairs ? allPairs(lengths, options.delta) : consecutivePairs(lengths, delta);

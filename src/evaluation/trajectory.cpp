@@ -23,13 +23,14 @@ constexpr const char* kLineFormat = "`stamp x y z qx qy qz qw` (8 numbers, separ
   throw std::runtime_error(name + ":" + std::to_string(line) + ": " + what);
 }
 
-/// Nothing if the line holds no pose.
-bool parseLine(const std::string& line, StampedPose& pose) {
+/// None if the line is blank or a comment.
+std::optional<StampedPose> parseLine(const std::string& line) {
   std::istringstream words(line);
   std::vector<std::string> fields;
   for (std::string word; words >> word;) fields.push_back(word);
-  if (fields.empty() || fields.front().front() == '#') return false;
+  if (fields.empty() || fields.front().front() == '#') return std::nullopt;
   if (fields.size() != 8) throw std::invalid_argument("found " + std::to_string(fields.size()) + " fields");
+  StampedPose pose;
   pose.time = parseTime(fields[0]);
   std::array<double, 7> v{};
   for (std::size_t i = 0; i < v.size(); ++i) {
@@ -43,7 +44,7 @@ bool parseLine(const std::string& line, StampedPose& pose) {
     throw std::invalid_argument("the quaternion has norm " + std::to_string(pose.q_WI.norm()) + ", not 1");
   }
   pose.q_WI.normalize();
-  return true;
+  return pose;
 }
 
 bool isDigit(char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; }
@@ -109,16 +110,17 @@ Trajectory readTum(std::istream& in, const std::string& name) {
   std::size_t number = 0;
   for (std::string line; std::getline(in, line);) {
     ++number;
-    StampedPose pose;
+    std::optional<StampedPose> pose;
     try {
-      if (!parseLine(line, pose)) continue;
+      pose = parseLine(line);
     } catch (const std::invalid_argument& error) {
       fail(name, number, std::string(error.what()) + "; expected " + kLineFormat);
     }
-    if (!trajectory.empty() && pose.time <= trajectory.back().time) {
+    if (!pose) continue;
+    if (!trajectory.empty() && pose->time <= trajectory.back().time) {
       fail(name, number, "the stamp does not come after the one before it; expected increasing stamps");
     }
-    trajectory.push_back(pose);
+    trajectory.push_back(*pose);
   }
   if (in.bad()) throw std::runtime_error(name + ": cannot be read to the end");
   return trajectory;

@@ -30,12 +30,12 @@ struct RigidTransform {
   Eigen::Vector3d t_T = Eigen::Vector3d::Zero();
 };
 
-/// Transform that aligns the estimate to the truth over `matches`: one for kOrigin, two with horizontal
-/// distance for kYaw, three that are not on a line for kSe3. Throws std::invalid_argument otherwise.
+/// Transform that aligns the estimate to the truth. Throws std::invalid_argument if there are too few
+/// matches: kOrigin needs one, kYaw two with horizontal distance, kSe3 three that are not on a line.
 RigidTransform alignment(const Trajectory& truth, const Trajectory& estimate,
                          const std::vector<Match>& matches, Alignment kind);
 
-/// Error of one matched pose after alignment; what the statistics are made of, for plots.
+/// Error of one matched pose after alignment.
 struct PoseError {
   Time time;                ///< of the estimate
   Eigen::Vector3d p_T;      ///< estimate, moved into the world of the truth [m]
@@ -64,9 +64,9 @@ enum class DeltaUnit { kMetres, kSeconds };
 struct RelativeErrorOptions {
   double delta = 1.0;  ///< length of a piece, > 0 [m or s]; metres are travelled by the estimate
   DeltaUnit unit = DeltaUnit::kMetres;
-  /// false: pieces follow each other, each ends with the first pose at or beyond `delta`; the first starts
-  /// where `delta` was first reached (evo's convention). true: from every pose to the one nearest to `delta`
-  /// further on, if that is within a tenth of `delta`.
+  /// false (evo's convention): each piece ends with the first pose at or beyond `delta`, and the next piece
+  /// begins there. The first piece begins where the path first reaches `delta`. true: a piece begins at every
+  /// pose and ends at the pose nearest to `delta` further on, if that is within a tenth of `delta`.
   bool all_pairs = false;
 };
 
@@ -83,7 +83,7 @@ RelativeError relativeError(const Trajectory& truth, const Trajectory& estimate,
                             const RelativeErrorOptions& options = RelativeErrorOptions{},
                             double max_difference = kDefaultMaxDifference);
 
-/// Error of the last matched pose with the first ones aligned, and per metre of the truth's path.
+/// Error of the last matched pose after alignment of the first, in total and per metre of the true path.
 struct Drift {
   double path_m = 0.0;  ///< length of the truth's path between the first and last match
   double final_m = 0.0;

@@ -22,13 +22,13 @@ std::vector<OffsetSample> readTimeOffsets(const std::string& path);
 /// The same from a stream; `name` stands for the file in messages.
 std::vector<OffsetSample> readTimeOffsets(std::istream& in, const std::string& name);
 
-/// How far the estimates are from a constant true offset, and whether their sigma tells so. Honest,
-/// independent Gaussian estimates have shares of 0.683, 0.954 and 0.997 and a mean normalised square of 1.
-/// Estimates of a filter are correlated in time, so one run scatters widely about these; far off them on many
-/// runs means a wrong sigma.
+/// Error of the estimates against a constant true offset, and whether their sigmas are consistent with it.
+/// Independent Gaussian estimates with correct sigmas have shares of 0.683, 0.954 and 0.997 and a mean
+/// normalised square of 1. Estimates of a filter are correlated in time, so one run scatters widely about
+/// these values. Only if many runs are far from them, the sigma is wrong.
 struct OffsetError {
   std::size_t samples = 0;
-  std::size_t with_sigma = 0;  ///< of them; an offset that is not estimated has a sigma of 0, and no shares
+  std::size_t with_sigma = 0;  ///< samples with sigma > 0: only these count in the shares and the mean square
   double mean = 0.0;           ///< estimate minus truth [s]
   double rmse = 0.0;           ///< [s]
   double max = 0.0;            ///< largest magnitude [s]

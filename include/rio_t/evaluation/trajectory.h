@@ -15,7 +15,7 @@ namespace rio_t {
 /// of them, and none is copied while it grows.
 using Trajectory = std::deque<StampedPose>;
 
-/// Whether `q` may stand for a rotation: rounding in a file changes its norm by less than 1 %. False for NaN.
+/// Whether the norm of `q` is within 1 % of 1, as that of a rotation rounded in a file. False for NaN.
 bool isUnit(const Eigen::Quaterniond& q);
 
 /// Reads a TUM trajectory: `stamp x y z qx qy qz qw` a line, seconds and metres; `#` comments and blank lines
@@ -27,23 +27,22 @@ Trajectory readTum(std::istream& in, const std::string& name);
 
 /// Writes the format above, stamps with nine decimals. Throws std::runtime_error if it cannot write.
 void writeTum(const std::string& path, const Trajectory& trajectory);
-/// One line of it, for programs that write as they go.
+/// Appends one line of this format.
 void appendTumLine(std::string* text, const StampedPose& pose);
 
 /// Exact time of a decimal text such as `1700000010.012222` or `1.700000010012222e+09`, rounded to the
 /// nearest nanosecond. Never goes through double. Throws std::invalid_argument if the text is no such number.
 Time parseTime(const std::string& text);
-/// Its inverse: seconds with nine decimals, exact.
+/// The inverse of parseTime: seconds with nine decimals, exact.
 std::string formatTime(Time time);
-/// The finite number that the whole text stands for; none if it is no such text.
+/// The finite number in the text; none if the whole text is not one.
 std::optional<double> finiteNumber(const std::string& text);
 
-/// Largest difference of the stamps of two poses that are compared, by default [s]. It is evo's default, so
-/// that figures agree with evo's without options on either side; the nearest pose wins anyhow, so it only
-/// matters in gaps and at the ends.
+/// Largest difference of the stamps of two matched poses [s]. This is evo's default, so that figures agree
+/// with evo's. The nearest pose is matched anyway, so the limit matters only in gaps and at the ends.
 constexpr double kDefaultMaxDifference = 0.01;
 
-/// Positions of two poses of (about) the same time in their trajectories.
+/// Indices of two poses with (about) the same time in their trajectories.
 struct Match {
   std::size_t truth = 0;
   std::size_t estimate = 0;
