@@ -6,11 +6,11 @@
 namespace rio_t {
 namespace {
 
-/// [sigma] of a point. As near as this, an expansion to second order is as good as the points themselves: it
-/// leaves out (e / sigma)^3 / 6.
+/// [sigma of a point] Within this distance e, an expansion of second order replaces the points. Its error is
+/// about (e / sigma)^3 / 6.
 constexpr double kNear = 0.1;
-/// Expansions until the shared error stands. With a few less, the cost depended on where the last one was,
-/// and a batch of the real bag did not converge.
+/// Limit of the expansions that find the shared error. With a few less, the cost depended on where the last
+/// expansion was, and a batch of the real bag did not converge.
 constexpr int kMaxExpansions = 20;
 
 VelocityCost moved(const VelocityCost& cost, const Eigen::Vector3d& by) {
@@ -18,10 +18,9 @@ VelocityCost moved(const VelocityCost& cost, const Eigen::Vector3d& by) {
   return {cost.value + cost.gradient.dot(by) + 0.5 * by.dot(H_by), cost.gradient + H_by, cost.information};
 }
 
-/// withSharedError with Huber's loss on the shared error: beyond `threshold` sigma, so that its variances
-/// grow with it.
-VelocityCost withTails(const VelocityCost& cost, const Eigen::Vector3d& variances, double threshold,
-                       Eigen::Vector3d& error) {
+/// As withSharedError, with Huber's loss: beyond `threshold` sigma, the variances grow with the shared error.
+VelocityCost withRobustSharedError(const VelocityCost& cost, const Eigen::Vector3d& variances,
+                                   double threshold, Eigen::Vector3d& error) {
   double scale = 1.0;
   for (int i = 0;; ++i) {
     VelocityCost result = withSharedError(cost, scale * variances, &error);
@@ -42,8 +41,8 @@ VelocityCost DopplerFactor::costAt(const Eigen::Vector3d& v_R) const {
   Eigen::Vector3d error = Eigen::Vector3d::Zero();
   if (!expansion_.v_R.allFinite()) expansion_ = {v_R, points_->at(v_R)};
   for (int i = 0;; ++i) {
-    VelocityCost cost =
-        withTails(moved(expansion_.cost, v_R - expansion_.v_R), shared_variances_, huber_threshold_, error);
+    VelocityCost cost = withRobustSharedError(moved(expansion_.cost, v_R - expansion_.v_R), shared_variances_,
+                                              huber_threshold_, error);
     const Eigen::Vector3d away = v_R + error - expansion_.v_R;
     if (away.norm() < kNear * points_->smallestSigma() || i == kMaxExpansions) return cost;
     expansion_ = {v_R + error, points_->at(v_R + error)};

@@ -6,11 +6,11 @@
 
 namespace rio_t {
 
-/// [m] Sigma of an unknown bias.
+/// [m] Prior sigma of the bias, which is unknown at the start and after a step.
 constexpr double kUnknownBarometerBias = 100.0;
 
-/// A mean of heights by the pressure, above the place of the first pressure, off by a bias (docs/method.md,
-/// section 5.10): residual (p_W,z + delay v_W,z + bias - height) / sigma. Blocks: motion, bias [m].
+/// A mean of barometric heights above the place of the first pressure, with a bias (docs/method.md, section
+/// 5.10): residual (p_W,z + delay v_W,z + bias - height) / sigma. Blocks: motion, bias [m].
 class BarometerFactor final : public ceres::SizedCostFunction<1, StateBlock::kMotion, 1> {
  public:
   /// `height` [m] is the mean over samples whose mean time is `delay` [s] after the state. `sigma` [m].

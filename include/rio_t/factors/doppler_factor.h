@@ -20,11 +20,11 @@ struct DopplerMeasurement : RadarScanTime {
 };
 
 /// The Doppler of each point of a scan, tightly coupled (docs/method.md, section 5.7). Any number of points
-/// counts, in a plane or not. Blocks: motion at `state_time`, biases, t_O, extrinsics.
+/// is useful, in a plane or not. Blocks: motion at `state_time`, biases, t_O, extrinsics.
 ///
-/// A residual a point, and all depend on the state through one velocity. So QR leaves three rows that depend
-/// on it, and one that is the misfit: the same cost, gradient and J'J as with a row for each point. The loss
-/// is in the rows.
+/// All points depend on the state only through the velocity of the radar. So three rows that depend on this
+/// velocity and one row with the remaining misfit have the same cost, gradient and J'J as a row for each
+/// point. They include the robust loss.
 class DopplerFactor final : public ceres::SizedCostFunction<4, StateBlock::kMotion, StateBlock::kBiases, 1,
                                                             ExtrinsicsBlock::kSize> {
  public:
@@ -46,7 +46,7 @@ class DopplerFactor final : public ceres::SizedCostFunction<4, StateBlock::kMoti
     Eigen::Vector3d v_R;
     VelocityCost cost;
   };
-  /// The last one, which stands for velocities near it: a cache, not for two threads.
+  /// The last expansion. It serves for velocities near it. This cache is not for two threads.
   mutable Expansion expansion_ = {Eigen::Vector3d::Constant(std::nan("")), {}};
 };
 

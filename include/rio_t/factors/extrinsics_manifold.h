@@ -16,7 +16,7 @@ enum class EstimateExtrinsics {
 };
 bool estimatesTurn(EstimateExtrinsics estimate);
 bool estimatesLeverArm(EstimateExtrinsics estimate);
-/// The part that is estimated of six numbers: turn, then lever arm.
+/// The estimated part of the six numbers of a pose: turn, then lever arm.
 Eigen::VectorXd estimatedPart(const Eigen::Matrix<double, 6, 1>& of_pose, EstimateExtrinsics estimate);
 
 /// Extrinsics as a block: q_IR as x, y, z, w, then l_I.
@@ -24,15 +24,15 @@ struct ExtrinsicsBlock {
   static constexpr int kSize = 7;
   static constexpr int kLever = 4;  ///< first number of l_I
 };
-/// By rows, as Ceres writes it, for the block as stored. The first three columns are the turn.
+/// Derivative with respect to the stored block, row-major as in Ceres. The first three columns are the turn.
 template <int Rows>
 using ExtrinsicsJacobian = Eigen::Matrix<double, Rows, ExtrinsicsBlock::kSize, Eigen::RowMajor>;
 
 Extrinsics toExtrinsics(const double* stored);
 Eigen::VectorXd stored(const Extrinsics& T_IR);
 
-/// Extrinsics as a Manifold. The tangent is what is estimated of a turn about the axes of I [rad], q_IR <-
-/// Exp(turn) q_IR, and of the change of l_I [m]. So a covariance is in I, as in ROS messages.
+/// Extrinsics as a Manifold. The tangent is a turn about the axes of I [rad], q_IR <- Exp(turn) q_IR, then
+/// the change of l_I [m]; only the estimated part of these. So a covariance is in I, as in ROS messages.
 class ExtrinsicsManifold final : public Manifold {
  public:
   /// With kNone the block has to be constant; it still has the tangent of a pose.
@@ -45,10 +45,10 @@ class ExtrinsicsManifold final : public Manifold {
   bool has_turn_, has_lever_arm_;
 };
 
-/// Covariance in the order of ROS, translation [m^2] then turn [rad^2], of that of the tangent; zero where
-/// nothing is estimated. `tangent` is empty for kNone.
+/// Converts the covariance of the tangent to the order of ROS: translation [m^2], then turn [rad^2]. What is
+/// not estimated is zero. `tangent` is empty for kNone.
 Eigen::Matrix<double, 6, 6> extrinsicsCovariance(const Eigen::MatrixXd& tangent, EstimateExtrinsics estimate);
-/// The way back: empty for kNone.
+/// The inverse of extrinsicsCovariance; empty for kNone.
 Eigen::MatrixXd tangentCovariance(const Eigen::Matrix<double, 6, 6>& ros, EstimateExtrinsics estimate);
 
 }  // namespace rio_t

@@ -20,8 +20,7 @@ struct VehicleVelocity {
 /// `T_IV`: q_IV, and p_IV, the point in I [m]. `omega_I` is what the gyro reads [rad/s], bias included.
 VehicleVelocity vehicleVelocity(const StateView& x, const Extrinsics& T_IV, const Eigen::Vector3d& omega_I);
 
-/// [s] The gyro is averaged over so long to either side of a node, so that vibration does not act on the
-/// lever of the point.
+/// [s] The gyro is averaged over this time to either side of a node. A vibration would act on the lever arm.
 constexpr double kVehicleGyroHalfWidth = 0.05;
 
 /// A wheeled vehicle moves neither sideways nor up (docs/method.md, section 5.9): residual (v_V,y, v_V,z),
@@ -44,7 +43,7 @@ class GroundVehicleFactor final
 class LevelGroundFactor final
     : public ceres::SizedCostFunction<2, StateBlock::kMotion, ExtrinsicsBlock::kSize> {
  public:
-  /// `slope_sigma` [rad] of the ground, along and across.
+  /// `slope_sigma`: sigma of the slope of the ground, along and across [rad].
   explicit LevelGroundFactor(double slope_sigma) : weight_(1.0 / slope_sigma) {}
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
 

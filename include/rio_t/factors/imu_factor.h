@@ -30,7 +30,7 @@ class ImuFactor final
 /// Mean of state j given state i. The caller integrates `delta` at the biases of state i.
 StateBlock predict(const StateBlock& state_i, const ImuDelta& delta, const Eigen::Vector3d& g_W);
 
-/// `x` at `from`, carried by the IMU to `to`, forwards or backwards, at its own biases.
+/// Integrates the IMU from the state `x` at `from` to `to`, forwards or backwards, with the biases of `x`.
 StateBlock carried(const StateBlock& x, Time from, Time to, const ImuBuffer& imu, const Eigen::Vector3d& g_W);
 
 /// How an error of state i, biases included, propagates to the predicted motion j: d_j = A d_i + noise with

@@ -19,8 +19,8 @@ struct PolarMeasurement {
   double elevation_sigma = 0.0;                          ///< [rad]
 };
 
-/// Whitened residual of a point that is predicted at `predicted_R` [m], and its derivative by that point:
-/// range, and the two angles on the plane across the measured ray, each over its sigma.
+/// Whitened residual of a predicted point: range, and the two angles on the plane across the measured ray,
+/// each over its sigma. J is the derivative by the point.
 struct PolarResidual {
   Eigen::Vector3d value;
   Eigen::Matrix3d J;
@@ -51,9 +51,8 @@ SeenPoint seenFrom(const MotionView& x, const ImuDelta& delta, const Eigen::Vect
 
 /// A landmark seen in a scan (docs/method.md, section 16). Blocks: motion, extrinsics, landmark.
 ///
-/// The time of measurement is that of the moment when the scan came: the offset hardly moves within a window,
-/// and a position tells less of it than a velocity. The way from the state to that time, mostly below 5 ms,
-/// is integrated once.
+/// The time of measurement is fixed when the scan comes: the offset hardly changes within a window, and a
+/// position says less about it than a velocity. So the IMU is integrated once, mostly over less than 5 ms.
 class LandmarkFactor final
     : public ceres::SizedCostFunction<3, StateBlock::kMotion, ExtrinsicsBlock::kSize, 3> {
  public:

@@ -9,9 +9,9 @@
 
 namespace rio_t {
 
-/// Half of the times over which the derivative with respect to t_O may average the IMU [s]. A vibration at 8
-/// Hz and above hardly moves a radar and must not count as acceleration. Motion at 2 Hz, as of people, loses
-/// 13 % in the first (docs/method.md, section 5.3). The wider ones are for an IMU that vibrates.
+/// Half widths of the means of the IMU in the derivative with respect to t_O [s]. A vibration at 8 Hz and
+/// above hardly moves a radar and must not count as acceleration. The first mean damps motion at 2 Hz, as of
+/// people, by 13 % (docs/method.md, section 5.3). The wider ones are for an IMU that vibrates.
 constexpr std::array<double, 3> kOffsetHalfWidths = {0.1, 0.2, 0.4};
 constexpr double kOffsetHalfWidth = kOffsetHalfWidths.front();
 constexpr double kMaxOffsetHalfWidth = kOffsetHalfWidths.back();
@@ -20,7 +20,7 @@ constexpr double kMaxOffsetHalfWidth = kOffsetHalfWidths.back();
 /// with respect to t_O has the opposite sign (docs/method.md, eq. 18).
 struct VelocityRate {
   Eigen::Vector3d a_I = Eigen::Vector3d::Zero();  ///< [m/s^2]
-  double variance = 0.0;                          ///< per axis, of the IMU's noise in it [m^2/s^4]
+  double variance = 0.0;                          ///< of the IMU's noise in a_I, per axis [m^2/s^4]
 };
 
 /// a_c - omega x v_I + alpha x l, from the mean of the IMU around the time of measurement. `v_I` [m/s] and
@@ -35,7 +35,7 @@ enum class TimeOffsetModel {
 };
 
 /// Motion of the radar at the time of measurement of a scan, and how it depends on the state and on t_O.
-/// Everything that a radar sees of its motion is a projection of this: a velocity, or the Doppler of a point.
+/// The velocity of a scan and the Doppler of a point are projections of it.
 struct RadarMotion {
   Eigen::Vector3d v_I = Eigen::Vector3d::Zero();  ///< velocity of the radar's origin, in I at that time [m/s]
   MotionJacobian<3> J_motion = MotionJacobian<3>::Zero();  ///< of v_I
@@ -61,7 +61,7 @@ struct RadarMotionModel {
   ///   v_I = R_IW v_W + (omega - b_g) x l_I - t_O a_c,   a_c = a - b_a + R_IW g_W,
   /// with omega at the stamp, and for a the mean around it.
   /// `l_I` is the radar in I [m]; `mean` is the mean of the IMU at meanTime.
-  /// Without `mean` the derivatives of kImu stay zero, and kConstantAcceleration takes that over
+  /// If `mean` is null, kImu leaves the derivatives zero, and kConstantAcceleration takes the mean over
   /// kOffsetHalfWidth to either side.
   RadarMotion at(const StateView& x, Time state_time, Time stamp, double t_O, const Eigen::Vector3d& l_I,
                  const ImuMean* mean) const;

@@ -14,8 +14,8 @@ namespace rio_t {
 
 /// Mean motion around a scan, for the derivatives with respect to the mounting (docs/method.md, section 5.8).
 ///
-/// The estimated velocity and the gyro hold noise that changes from scan to scan. In a derivative this noise
-/// looks like motion that shows the mounting, and the factor would take it for information.
+/// The estimated velocity and the gyro contain noise that changes from scan to scan. In a derivative, this
+/// noise would look like motion that shows the mounting, and the factor would claim information from it.
 struct SlowMotion {
   Extrinsics T_IR;                                    ///< mounting from which the factor is linear
   Eigen::Vector3d v_R = Eigen::Vector3d::Zero();      ///< velocity of the radar, in R [m/s]
@@ -26,14 +26,14 @@ struct SlowMotion {
 /// When a scan was taken.
 struct RadarScanTime {
   Time stamp;  ///< measured at stamp - t_O
-  /// Share of the derivative with respect to t_O that is motion and not noise of the IMU, see OffsetEvidence.
+  /// Factor on the derivative with respect to t_O: the share that is not noise of the IMU (OffsetEvidence).
   double offset_gain = 1.0;
   double offset_half_width = kOffsetHalfWidth;  ///< of the mean in that derivative [s]
   /// SlowMotion averages over this time to either side [s]. It is the longest if the scan shows no motion.
   double slow_half_width = kMaxOffsetHalfWidth;
-  /// If set, the motion is taken at this t_O [s], and to first order from there. Exactly at each t_O, the
-  /// noise of the IMU over a shift raises the cost whatever the direction of the shift. With a gain of 0, the
-  /// scan does not tell the offset. May change between two solves, not during one, as the next.
+  /// If set, the motion is linear in t_O about this value [s]. If each t_O integrated the IMU anew, the noise
+  /// of the IMU would raise the cost for a shift in either direction. With an offset_gain of 0, the motion
+  /// does not depend on t_O. This value and the next may change between two solves, but not during one.
   std::shared_ptr<const double> linear_from_t_O = nullptr;
   /// If set, the velocity is linear in the mounting, with the derivatives that this motion gives.
   std::shared_ptr<const SlowMotion> slow = nullptr;

@@ -6,8 +6,8 @@
 
 namespace rio_t {
 
-/// A block changes slowly: residual (x_k - x_k-1) / sigma, for each of its numbers. The offset (paper eq.
-/// 8-10) and the biases of a batch. Blocks: x_k-1, x_k.
+/// A block changes slowly: residual (x_k - x_k-1) / sigma, for each of its numbers. A batch uses it for the
+/// offset (paper eq. 8-10) and the biases. Blocks: x_k-1, x_k.
 class RandomWalkFactor final : public ceres::CostFunction {
  public:
   /// `sigmas`: standard deviations of the change.

@@ -76,8 +76,8 @@ using StateCovariance = Eigen::Matrix<double, StateBlock::kTangent, StateBlock::
 /// theta is split in W into a turn about the vertical, psi z_W, and a tilt about a horizontal axis, beta:
 ///   R_WI <- Exp(psi z_W) Exp(beta) R_WI
 ///   v_W  <- Exp(psi z_W) (v_W + dv - psi z_W x v_W)
-/// To first order this is R_WI Exp(theta) and v_W + dv. Whatever the state, a turn of the world about the
-/// vertical adds to psi and psi z_W x v_W and changes nothing else (docs/method.md, eq. 5).
+/// To first order this is R_WI Exp(theta) and v_W + dv. At any state, a turn of the world about the vertical
+/// adds psi to the turn and psi z_W x v_W to dv, and changes nothing else (docs/method.md, eq. 5).
 void boxplus(const double* x, const double* delta, double* x_plus_delta);
 /// y [-] x: the tangent that takes x to y.
 StateTangent boxminus(const double* y, const double* x);
@@ -93,12 +93,12 @@ using MotionJacobian = Eigen::Matrix<double, N, StateBlock::kMotion, Eigen::RowM
 template <int N>
 using BiasJacobian = Eigen::Matrix<double, N, StateBlock::kBiases, Eigen::RowMajor>;
 
-/// Writes the derivative by a block by rows, as the solver wants it, unless the solver does not ask: null.
+/// Writes the derivative by a block row-major, as the solver wants it. A null `stored` asks for nothing.
 template <typename Derivative>
 void store(const Eigen::MatrixBase<Derivative>& J,
            double* stored) {  // NOLINT(readability-non-const-parameter): the map writes to it
   constexpr int kRows = Derivative::RowsAtCompileTime, kColumns = Derivative::ColsAtCompileTime;
-  constexpr int kOrder = kColumns == 1 ? Eigen::ColMajor : Eigen::RowMajor;  // Eigen knows no column by rows
+  constexpr int kOrder = kColumns == 1 ? Eigen::ColMajor : Eigen::RowMajor;  // Eigen has no row-major columns
   if (stored != nullptr) Eigen::Map<Eigen::Matrix<double, kRows, kColumns, kOrder>>{stored} = J;
 }
 
