@@ -9,17 +9,17 @@
 namespace rio_t {
 namespace {
 
-/// Rounding leaves some 1e-15 of a column that the rows do not determine.
-constexpr double kNothing = 1e-14;
+/// If less than this share of a column is left, the rows do not determine it. Rounding leaves some 1e-15.
+constexpr double kUndetermined = 1e-14;
 
-/// Zeros behind the last column of a tableau: the last part of a row that is reflected may reach into them.
+/// Columns of zeros behind the last column of a tableau: reflections take several columns at once.
 constexpr Eigen::Index kPadding = 3;
 
 RowMatrix zeroTableau(Eigen::Index rows, Eigen::Index columns) {
   return RowMatrix::Zero(rows, columns + kPadding);
 }
 
-/// Householder reflections of the rows of a tableau. Keeps its memory.
+/// Householder reflections of the rows of a tableau. Reuses its memory.
 class Reflections {
  public:
   /// Clears the columns from `first` to `end` below the diagonal. Passes over rows with a zero in the column:
@@ -139,7 +139,7 @@ class BlockElimination {
           result.Jr.block(0, starts_[at], own, width).colwise().squaredNorm();
     }
     for (Eigen::Index k = 0; k < own; ++k)
-      if (!(std::abs(result.Jr(k, k)) > kNothing * std::sqrt(squares_[firsts_[i] + k]))) return false;
+      if (!(std::abs(result.Jr(k, k)) > kUndetermined * std::sqrt(squares_[firsts_[i] + k]))) return false;
     keepRest(own, last, result);
     return true;
   }
@@ -204,15 +204,15 @@ class BlockElimination {
     return row;
   }
 
-  /// Keeps the rows below the first `own`. As many as the next block has columns wait for it, the others for
-  /// the block after it. No more wait than have columns: in a batch they would pile up.
+  /// Passes on the rows below the first `own`. As many rows as the next block has columns wait for that
+  /// block, the others for the block after it. The rows are first reduced to as many as there are columns;
+  /// otherwise they would pile up in a batch.
   void keepRest(Eigen::Index own, Eigen::Index last, LinearRows& result) {
     if (columns_.size() == 1) return;
     const Eigen::Index next = columns_.size() > 2 ? starts_[2] : last;
     reflections_.triangularise(own, result.Jr.rows() > last ? last : next, result.Jr);
     const Eigen::Index rows = std::min(result.Jr.rows(), last);
-    // They come before the others that wait. Those of the next block are triangular, so few of them are
-    // reflected.
+    // These rows come first in the tableau of their block. They are triangular there, so few are reflected.
     const int* const blocks = result.blocks.data();
     const int* const end = blocks + result.blocks.size();
     wait(blocks + 1, end, result.Jr, own, std::min(next, rows) - own, own);

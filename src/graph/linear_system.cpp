@@ -10,10 +10,10 @@
 namespace rio_t {
 namespace {
 
-/// Evaluates terms. Keeps its memory from term to term.
+/// Evaluates terms. Reuses its memory from term to term.
 class Evaluation {
  public:
-  /// The rows of a term; the index of a block that is not solved for is -1.
+  /// The rows of a term. `indices` of its blocks: -1 for a block that is not solved for.
   LinearRows rowsOf(const Term& term, const std::vector<int>& indices) {
     const Eigen::Index rows = term.cost->num_residuals();
     if (numbers_.size() < term.blocks.size()) numbers_.resize(term.blocks.size());

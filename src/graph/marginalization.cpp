@@ -26,10 +26,10 @@ PriorTerm::PriorTerm(std::vector<std::shared_ptr<const Manifold>> manifolds, std
     first_.push_back(first);
     first += manifold->tangent();
   }
-  holdPointsBySight();
+  referPointsToNode();
 }
 
-void PriorTerm::holdPointsBySight() {
+void PriorTerm::referPointsToNode() {
   for (std::size_t i = 0; i < manifolds_.size(); ++i)
     if (manifolds_[i]->isPoint()) points_.push_back(i);
   if (points_.empty()) return;

@@ -13,8 +13,8 @@
 namespace rio_t {
 namespace {
 
-/// With this radius of the trust region a step is that of Gauss-Newton. A window that starts near its
-/// solution begins so: with the default radius the weakly observable directions (offset, biases) take a dozen
+/// With this radius of the trust region, Ceres begins with Gauss-Newton steps. A window starts near its
+/// solution. With the default radius, the weakly observable directions (offset, biases) take a dozen
 /// iterations instead of two or three.
 constexpr double kGaussNewtonRadius = 1e12;
 
@@ -22,7 +22,7 @@ bool isBeyondBound(const Block& block) {
   return !block.is_constant && std::isfinite(block.bound) && std::abs(block.x[0]) > block.bound;
 }
 
-/// Stops Ceres after a short step, and where a block is beyond its bound: there the factors say nothing new.
+/// Stops Ceres after a short step, or if a block is beyond its bound, where the factors do not change.
 class StopEarly final : public ceres::IterationCallback {
  public:
   StopEarly(const Window& window, double short_step) : window_(window), short_step_(short_step) {}
@@ -41,7 +41,7 @@ class StopEarly final : public ceres::IterationCallback {
   double short_step_;
 };
 
-/// The blocks that stand at their bound, with the cost falling outwards.
+/// Indices of the blocks that are at their bound and whose cost decreases outwards.
 std::vector<int> pushedOutwards(const Window& window, const LinearSystem& system) {
   std::vector<int> result;
   for (std::size_t i = 0; i < system.blocks.size(); ++i) {
@@ -64,7 +64,7 @@ LinearSystem holding(const std::vector<int>& held, LinearSystem system) {
   return system;
 }
 
-/// Length of the undamped step given that some blocks are held.
+/// Squared length of the undamped step if the blocks `held` do not move.
 double squaredLength(const Solution& solution, const std::vector<int>& held) {
   if (held.empty()) return solution.elimination.squaredLength();
   return eliminationOf(holding(held, solution.system)).squaredLength();
@@ -85,14 +85,14 @@ ceres::Solver::Options solverOptions() {
 }
 
 /// The smallest share of a step that is tried if the whole step raises the cost. A lost tilt makes steps of a
-/// radian: the graph is not linear over them, but their direction is right. Damping makes them too short.
+/// radian. The graph is not linear over them, but their direction is right. Damping makes them too short.
 constexpr double kShortestShare = 0.06;
-/// A step shorter than a tenth of a sigma is taken without comparing costs: rounding exceeds its gain.
+/// [sigma^2] A step with a smaller squared length is taken without comparing costs: its gain is rounding.
 constexpr double kSurelyRight = 1e-2;
 /// Squared length [sigma^2] of the longest step after which the solver may stop.
 constexpr double kLongestLastStep = 1.0;
 
-/// Moves all blocks by `share` of the step, no farther than to their bounds. Whether one was stopped there.
+/// Moves all blocks by `share` of the step, at most to their bounds. Returns whether a bound stopped one.
 bool take(const std::vector<Eigen::VectorXd>& step, double share, Window& window) {
   bool stopped = false;
   for (std::size_t i = 0; i < step.size(); ++i) {
@@ -111,7 +111,7 @@ struct TakenStep {
   bool is_whole;  ///< neither a share of the step nor stopped at a bound
 };
 
-/// Takes the step or a share of it; none where none lowers the cost.
+/// Takes the step, or the first smaller share of it that lowers the cost. None if no share lowers it.
 std::optional<TakenStep> lowerCost(const std::vector<Eigen::VectorXd>& step, double cost_before,
                                    Window& window) {
   std::vector<Eigen::VectorXd> before;
@@ -125,9 +125,9 @@ std::optional<TakenStep> lowerCost(const std::vector<Eigen::VectorXd>& step, dou
   return std::nullopt;
 }
 
-/// Squared length of the next step, after a whole step whose cost differs by `unforeseen` from what the
-/// linear system promised. The difference grows with the cube of the step, so the slope that is left along it
-/// is three times as large. Infinite after a step of more than a sigma: slope across it may be left, too.
+/// Predicts the squared length of the next step. The cost after a whole step is off the linear prediction by
+/// `unforeseen`. This difference grows with the cube of the step, so the slope that is left along the step is
+/// three times as large. Infinite after a step of more than a sigma: slope across it may be left, too.
 double squaredLengthLeft(double unforeseen, double squared_length) {
   if (squared_length > kLongestLastStep) return std::numeric_limits<double>::infinity();
   return 9.0 * unforeseen * unforeseen / squared_length;
@@ -147,7 +147,7 @@ Solution solveByChain(Window& window, const SolverLimits& limits) {
     const bool is_last = pass > limits.max_iterations;  // only judges the last step
     bool has_ended = is_last;
     if (is_short || squared_length < surely_right) {
-      surely_right = squared_length;  // steps that do not get shorter may go back and forth
+      surely_right = squared_length;  // the next one must be shorter, or steps may oscillate
       const bool stopped_at_bound = take(solution.elimination.delta(), 1.0, window);
       if (is_short && !stopped_at_bound) {
         solution.termination = held.empty() ? SolverTermination::kConverged : SolverTermination::kAtBound;

@@ -90,8 +90,8 @@ void Window::remove(const Block& block) {
   const auto touches = [&](const std::unique_ptr<Term>& term) {
     return std::find(term->blocks.begin(), term->blocks.end(), &block) != term->blocks.end();
   };
-  // Ceres would remove these terms in the order of their addresses. Then the order of those that stay, and
-  // with it the rounding of every sum, would depend on where the memory lies.
+  // Ceres would remove these terms in the order of their addresses. Then the order of the other terms, and
+  // the rounding of every sum, would depend on the addresses.
   for (const auto& term : terms_)
     if (touches(term)) problem_->RemoveResidualBlock(term->in_problem);
   terms_.erase(std::remove_if(terms_.begin(), terms_.end(), touches), terms_.end());

@@ -24,8 +24,8 @@ class Elimination {
   std::vector<std::map<int, Eigen::MatrixXd>> covariances() const;
 
  private:
-  /// The rows of each block: R_ii, then R_ij for the later blocks j that they have, then the right side z.
-  /// More rows may follow, and columns of zeros.
+  /// The rows of each block: R_ii, then R_ij for the later blocks j that they depend on, then the right side
+  /// z. Unused rows and columns of zeros may follow.
   std::vector<LinearRows> R_;
   std::vector<Eigen::Index> tangents_;
   std::vector<Eigen::VectorXd> delta_;
@@ -40,7 +40,7 @@ struct SquareRoot {
 /// Eliminates the first `count` blocks and returns the rows that remain, about the other blocks. Throws
 /// std::runtime_error if the rows do not determine the first ones.
 SquareRoot eliminateFirst(const LinearSystem& system, int count);
-/// Returns rows about x' = x + w, as many as x has numbers. w is a random walk with these variances; 0: none.
+/// Returns rows about x' = x + w, as many as x has numbers. w is a random walk with these variances (or 0).
 SquareRoot widened(const SquareRoot& known, const Eigen::VectorXd& variances);
 
 }  // namespace rio_t

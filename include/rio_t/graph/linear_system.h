@@ -16,14 +16,14 @@ struct LinearRows {
   RowMatrix Jr;             ///< the tangents of `blocks`, one after the other, and r in the last column
 };
 
-/// The linearised graph: the least squares of all rows, in the tangents of `blocks`. It keeps the rows and
-/// not the normal equations J'J. Nothing observes position and heading, so they may be known a billion times
-/// worse than an IMU term knows their changes. The squares of both do not fit into the digits of a double.
+/// The linearised graph: the least squares of all rows, in the tangents of `blocks`. It keeps the rows
+/// instead of the normal equations J'J, for precision. Nothing observes position and heading, so their sigmas
+/// may be a billion times those of their changes in an IMU term. A double cannot hold the squares of both.
 struct LinearSystem {
   std::vector<const Block*> blocks;
   std::vector<Eigen::Index> tangents;  ///< dimension of each block
   std::vector<LinearRows> rows;
-  std::vector<bool> is_held;  ///< blocks that are not solved for: no row has them
+  std::vector<bool> is_held;  ///< blocks that are not solved for and appear in no row
   double cost = 0.0;          ///< half the sum of squares, after the loss
 
   int indexOf(const Block& block) const;  ///< -1 if it is not among them

@@ -16,7 +16,7 @@ struct PointFromNode {
   Eigen::Matrix3d J_point;  ///< derivative of p by the point in W
 };
 
-/// How a block of parameters moves: x [+] delta, with `size()` stored numbers and `tangent()` directions.
+/// How a block of parameters changes: x [+] delta, with `size()` stored numbers and `tangent()` directions.
 ///
 /// A cost function writes the derivative with respect to direction i into the stored column `columns()[i]`,
 /// and zero into the other columns. So no factor needs the derivatives of a quaternion.
@@ -33,7 +33,7 @@ class Manifold {
   /// Derivative of y [-] x with respect to the tangent at y.
   virtual Eigen::MatrixXd minusJacobian(const double* y, const double* x) const = 0;
 
-  /// Whether the block is a point of the world. A prior holds it where a node sees it (PriorTerm).
+  /// Whether the block is a point of the world. A prior refers it to the axes of a node (PriorTerm).
   virtual bool isPoint() const { return false; }
   /// A point of the world as the node x sees it; none if the block has no pose.
   virtual std::optional<PointFromNode> see(const double* /*x*/, const double* /*point*/) const {
@@ -48,7 +48,7 @@ class Manifold {
   std::vector<int> columns_;  // read-only after construction
 };
 
-/// `size` numbers that add up, such as a time offset or a point.
+/// A plain vector of `size` numbers, such as a time offset or a point.
 class VectorManifold : public Manifold {
  public:
   explicit VectorManifold(int size) : Manifold(size, allColumns(size)) {}

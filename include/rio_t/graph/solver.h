@@ -20,10 +20,10 @@ inline bool isConverged(SolverTermination termination) {
   return termination == SolverTermination::kConverged || termination == SolverTermination::kAtBound;
 }
 
-/// In snake case; keys of `solver_terminations`.
+/// In snake case, as in `solver_terminations` of summary.yaml.
 std::string toString(SolverTermination termination);
 
-/// Both minimise the same window with the same cost functions.
+/// Which algorithm minimises the cost of a window. The cost functions are the same.
 enum class WindowSolver {
   kChain,  ///< Gauss-Newton with the block elimination of elimination.h
   kCeres,  ///< ceres::Solve, several times slower
@@ -40,8 +40,8 @@ struct Solution {
   int iterations = 0;
   SolverTermination termination = SolverTermination::kIterationLimit;
   bool converged() const { return isConverged(termination); }
-  LinearSystem system;      ///< at the solution, or one step before it over which it holds
-  Elimination elimination;  ///< of it
+  LinearSystem system;      ///< at the solution, or one short step before it
+  Elimination elimination;  ///< of `system`
 };
 
 /// Moves the blocks to the minimum of the cost. Holds a block that would cross its bound at the bound. Throws
@@ -49,13 +49,12 @@ struct Solution {
 ///
 /// kChain: Gauss-Newton from the current values. If a step does not lower the cost, the solver tries a half
 /// of it and less. It has converged when the step is short; it still takes that step. It has also converged
-/// when the cost after a whole step is near enough to what the linear system promised (docs/method.md,
-/// eq. 23c).
-/// kCeres: ceres::Solve on the problem that lives as long as the window. Ceres also reports convergence when
-/// its trust region made a step short. So the step of Gauss-Newton at its solution decides why it ended.
+/// when the cost after a whole step is close to the prediction of the linear system (docs/method.md, eq.
+/// 23c). kCeres: ceres::Solve on the problem of the window. Ceres also reports convergence if its trust
+/// region made a step short. So the Gauss-Newton step at its solution decides the reported termination.
 Solution solve(Window& window, const SolverLimits& limits, WindowSolver solver = WindowSolver::kChain);
 
-/// The same without moving any block: no iterations.
+/// The linear system at the current values and its elimination. Moves no block.
 Solution linearized(const Window& window);
 
 }  // namespace rio_t

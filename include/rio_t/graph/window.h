@@ -29,8 +29,8 @@ struct Block {
   Block(const Block&) = delete;
   Block& operator=(const Block&) = delete;
 
-  /// Nodes have one. A batch gives one to its offsets and biases, too: it sets their place in the order.
-  /// Other calibration holds at all times and has none.
+  /// Time of a node. In a batch, the blocks of offsets and biases have a time, too, which orders them. Other
+  /// calibration holds at all times and has none.
   std::optional<Time> time;
   std::shared_ptr<const Manifold> manifold;
   std::vector<double> storage;
@@ -45,7 +45,7 @@ struct Term {
   std::unique_ptr<ceres::CostFunction> cost;
   std::shared_ptr<ceres::LossFunction> loss;  ///< null: none
   std::vector<Block*> blocks;                 ///< in the order of the cost function
-  std::optional<Time> stamp = {};             ///< of a scan
+  std::optional<Time> stamp = {};             ///< of the scan that gave the term, if one did
   ceres::ResidualBlockId in_problem = nullptr;
 };
 
@@ -59,14 +59,14 @@ class Window {
   Window& operator=(Window&&) noexcept;
 
   Block& addNode(Time time, std::shared_ptr<const Manifold> manifold, const Eigen::VectorXd& x);
-  /// Shared, so that its owner can ask later whether the window still has it.
+  /// Returns a shared pointer, so that the owner can ask later whether the window still has the block.
   std::shared_ptr<Block> addCalibration(std::shared_ptr<const Manifold> manifold, const Eigen::VectorXd& x);
   Term& add(std::unique_ptr<ceres::CostFunction> cost, std::vector<Block*> blocks,
             std::shared_ptr<ceres::LossFunction> loss = nullptr);
   void remove(const Term& term);
-  /// The term takes `to` in the place of `from`.
+  /// Replaces the block `from` of the term by `to`.
   void exchange(Term& term, const Block& from, Block& to);
-  /// The block and the terms on it.
+  /// Removes the block and the terms on it.
   void remove(const Block& block);
   void setConstant(Block& block, bool is_constant);
   bool has(const Block& block) const;
