@@ -128,7 +128,7 @@ TEST(Preintegration, CovarianceIsThatOfStepsFromSampleToSample) {
   imu.forEachInterval(motion.time(0.0), motion.time(0.5),
                       [&](double dt, const auto& gyro, const auto& accel, const auto& later) {
                         const Eigen::Vector3d omega = gyro - motion.b_g, a = accel - motion.b_a;
-                        SamplesInOne one;
+                        SampleSum one;
                         one.add(delta.dR, dt, omega, a, noise.gyroVariance(later), noise.accelVariance(later),
                                 0.0);
                         delta.step(dt, omega, a);

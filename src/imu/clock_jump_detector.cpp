@@ -5,8 +5,8 @@
 namespace rio_t {
 namespace {
 
-/// [intervals] A stamp goes on from a run of stamps if it follows as they follow each other. If n >= 2
-/// messages were overtaken by others, n + 1 intervals follow them.
+/// [intervals] A stamp goes on from a run of stamps if it follows within this time. After n >= 2 messages
+/// that others overtook, the next stamp is n + 1 intervals later.
 constexpr double kGoesOn = 2.0;
 
 }  // namespace
@@ -39,7 +39,7 @@ ClockJumpDetector::Verdict ClockJumpDetector::check(Time stamp) {
 
 double ClockJumpDetector::stepBackBefore(Time stamp) const {
   if (elsewhere_ < 2 || *elsewhere_newest_ > *newest_) return 0.0;
-  // The newest stamp alone was ahead, and those behind it go on from the one before.
+  // Only the newest stamp was ahead. The stamps behind it go on from the one before it.
   if (before_newest_ && *elsewhere_since_ > *before_newest_) return 0.0;
   const double interval = (*elsewhere_newest_ - *elsewhere_since_) / (elsewhere_ - 1);
   return stamp - *elsewhere_newest_ < kGoesOn * interval ? stamp - *elsewhere_since_ : 0.0;

@@ -9,9 +9,9 @@ namespace rio_t {
 namespace {
 
 constexpr double kStep = 0.02;        // [s] between samples that are made up
-constexpr double kGravityTime = 1.5;  // [s] of acceleration that show gravity: a few swings of the motion
+constexpr double kGravityTime = 1.5;  // [s] over which gravity is averaged: a few swings of the motion
 
-/// sinh(a) / sinh(b) for 0 <= a <= b, b > 0; each by itself overflows from 711 on, a gap of six minutes.
+/// sinh(a) / sinh(b) for 0 <= a <= b, b > 0. sinh() overflows from 711 on, which is a gap of six minutes.
 double sinhRatio(double a, double b) { return std::exp(a - b) * std::expm1(-2.0 * a) / std::expm1(-2.0 * b); }
 
 }  // namespace
@@ -36,7 +36,7 @@ std::vector<ImuMeasurement> GapBridge::until(const ImuMeasurement& next) const {
   const auto before = [&](int i) { return sinhRatio((steps - i) * step, steps * step); };
   const auto after = [&](int i) { return sinhRatio(i * step, steps * step); };
 
-  // How the platform turns, and gravity with it.
+  // Turns gravity with the platform.
   std::vector<ImuMeasurement> bridge;
   ImuMeasurement imu = next;
   imu.is_bridge = true;

@@ -28,13 +28,13 @@ const char* ImuSampleCheck::faultOfValues(const ImuMeasurement& imu) const {
   return imu.acceleration.cwiseAbs().maxCoeff() > most_acceleration_ ? "imu_not_plausible" : nullptr;
 }
 
-// If the IMU turns, gravity moves in it, so no two samples are the same. At rest an IMU without noise repeats
-// itself; some simulators have one.
+// If the IMU turns, gravity moves in it, so no two samples are the same. At rest an IMU without noise, as in
+// some simulators, repeats itself.
 bool ImuSampleCheck::repeats(const ImuMeasurement& imu) {
-  const bool is_new =
-      !new_ || new_->angular_velocity != imu.angular_velocity || new_->acceleration != imu.acceleration;
-  if (is_new) new_ = imu;
-  return !is_new && new_->time < imu.time && imu.angular_velocity.norm() > kTurns;
+  const bool is_new = !distinct_ || distinct_->angular_velocity != imu.angular_velocity ||
+                      distinct_->acceleration != imu.acceleration;
+  if (is_new) distinct_ = imu;
+  return !is_new && distinct_->time < imu.time && imu.angular_velocity.norm() > kTurns;
 }
 
 ImuSampleCheck::Verdict ImuSampleCheck::check(const ImuMeasurement& imu) {
@@ -45,9 +45,9 @@ ImuSampleCheck::Verdict ImuSampleCheck::check(const ImuMeasurement& imu) {
   verdict.fault = faultOfValues(imu);
   if (verdict.fault == nullptr && repeats(imu)) {
     verdict.repeats = true;
-    // For so long, a bridged gap is better than the old values. Then they are taken: the IMU of a simulator
-    // may repeat itself for ever.
-    if (imu.time - new_->time < kMotionCorrelationTime) verdict.fault = "imu_repeated";
+    // Up to this time, a bridged gap is better than the repeated values. Afterwards they are taken: the IMU
+    // of a simulator may repeat itself for ever.
+    if (imu.time - distinct_->time < kMotionCorrelationTime) verdict.fault = "imu_repeated";
   }
   if (verdict.fault == nullptr) {
     const ClockJumpDetector::Verdict stamp = stamps_.check(imu.time);
@@ -102,22 +102,22 @@ ImuInputCheck::Verdict ImuInputCheck::check(ImuMeasurement& imu) {
     verdict.faults.push_back("imu_clock_back");
     addLostMotion(gap, imu);
   }
-  // The interval before and the one after a saturated sample both hide something. So do those of a repeat
-  // that is taken.
-  const SaturationDetector::Saturated hides =
+  // A saturated sample hides motion in the intervals before and after it. So does a repeat that is taken.
+  const SaturationDetector::Saturated hidden =
       sample.repeats ? SaturationDetector::Saturated{true, true} : saturation_.check(imu);
-  if (hides.accel || hides.gyro) verdict.faults.push_back(sample.repeats ? "imu_repeated" : "imu_saturated");
-  if (hides.gyro || hid_.gyro) raise(imu.unseen_gyro_variance, options_.unseen_gyro_density);
-  if (hides.accel || hid_.accel) raise(imu.unseen_accel_variance, options_.unseen_accel_density);
-  hid_ = hides;
+  if (hidden.accel || hidden.gyro)
+    verdict.faults.push_back(sample.repeats ? "imu_repeated" : "imu_saturated");
+  if (hidden.gyro || hidden_before_.gyro) raise(imu.unseen_gyro_variance, options_.unseen_gyro_density);
+  if (hidden.accel || hidden_before_.accel) raise(imu.unseen_accel_variance, options_.unseen_accel_density);
+  hidden_before_ = hidden;
   const bool turns = imu.angular_velocity.norm() > kTurns;
-  const bool accel_sticks = findFrozen(imu, turns) && !hides.accel;
-  const bool gyro_sticks = replaceStuck(imu, turns, hides.gyro);
+  const bool accel_sticks = findFrozen(imu, turns) && !hidden.accel;
+  const bool gyro_sticks = replaceStuck(imu, turns, hidden.gyro);
   if (accel_sticks || gyro_sticks) verdict.faults.push_back("imu_stuck");
   if (accel_sticks) raise(imu.unseen_accel_variance, options_.unseen_accel_density);
   if (gyro_sticks) raise(imu.unseen_gyro_variance, options_.unseen_gyro_density);
   // Motion over a long gap would look like noise.
-  if (hides.accel || hides.gyro || accel_sticks || gyro_sticks || gap > kMotionCorrelationTime ||
+  if (hidden.accel || hidden.gyro || accel_sticks || gyro_sticks || gap > kMotionCorrelationTime ||
       imu.lost_time > 0.0) {
     accel_noise_.interrupt();
     gyro_noise_.interrupt();
@@ -140,8 +140,8 @@ MeasuredImuNoise ImuInputCheck::noise() const {
   return {std::sqrt(accel_noise_.squaredDensity()), std::sqrt(gyro_noise_.squaredDensity())};
 }
 
-// As over a gap, the motion is about that at its end, and deviates from it by the unseen motion. But nothing
-// covers a gap of the stamps, so the first part counts, too.
+// The motion in the lost time is about that of this sample, and deviates from it as over a gap. No interval
+// covers the lost time, so the motion counts, too, and not only the deviation.
 void ImuInputCheck::addLostMotion(double dt, ImuMeasurement& imu) const {
   const double lost = imu.lost_time;
   const double share = std::min(1.0, lost / kMotionCorrelationTime);

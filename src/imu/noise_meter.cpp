@@ -6,7 +6,7 @@
 namespace rio_t {
 namespace {
 
-/// [s] Between the scans of a slow radar. Means over longer times show motion rather than noise.
+/// [s] Longest spacing of the means, that of a slow radar. Longer means show motion rather than noise.
 constexpr double kLongest = 0.1;
 
 /// A square counts at most this many times the mean: four sigma. A knock is not noise, and a vibration that
@@ -44,7 +44,7 @@ double NoiseMeter::add(Time time, const Eigen::Vector3d& value) {
   spacing_ = (last_[4].time - last_[0].time) / 4.0;
   const Eigen::Vector3d shown = squaredDensities(spacing_);
   const double mean = squaredDensity();
-  // A signal that stood still to the last bit has no mean to compare with.
+  // Without a mean to compare with, as after a constant signal, every square counts in full.
   const bool can_tell = mean > kNothing && isSettled();
   const Eigen::Vector3d squares = can_tell ? shown.cwiseMin(kLargestSquare * mean).eval() : shown;
   const double fade = std::exp(-(time - last_[3].time) / memory());

@@ -42,7 +42,7 @@ Preintegration preintegrate(const ImuBuffer& buffer, Time from, Time to, const E
   Preintegration result;
   result.b_g = b_g;
   result.b_a = b_a;
-  SamplesInOne samples;
+  SampleSum samples;
   buffer.forEachInterval(from, to, [&](double dt, const auto& gyro, const auto& accel, const auto& later) {
     const Eigen::Vector3d omega = gyro - b_g;
     const Eigen::Vector3d a = accel - b_a;

@@ -38,7 +38,7 @@ std::optional<Deviation> deviationFromRest(const ImuBuffer& imu, Time time, cons
     d.count += 1.0;
     is_measured &= !sample.is_bridge;
   });
-  if (!is_measured || d.count < 10.0) return std::nullopt;  // too few to speak of a spread
+  if (!is_measured || d.count < 10.0) return std::nullopt;  // too few for a standard deviation
   d.gyro /= d.count;
   d.accel /= d.count;
   d.gyro_variance = gyro_square / d.count - d.gyro.cwiseAbs2();
@@ -55,7 +55,7 @@ std::optional<Rest> findRest(const ImuBuffer& imu, Time time, const RestContext&
   Rest rest;
   rest.shakes = d->gyro_variance.maxCoeff() >= options.max_gyro_std * options.max_gyro_std ||
                 d->accel_variance.maxCoeff() >= options.max_accel_std * options.max_accel_std;
-  // Sigma of a mean over independent samples; a line of vibration averages out faster.
+  // Three sigmas of a mean over independent samples. A vibration of one frequency averages out faster.
   const auto left = [&](const Eigen::Vector3d& variance) {
     return rest.shakes ? 3.0 * std::sqrt(variance.sum() / d->count) : 0.0;
   };

@@ -9,10 +9,10 @@ namespace {
 constexpr int kFlatTop = 5;               // equal readings in a row
 constexpr double kFarAcceleration = 0.5;  // [m/s^2] noise and coarse steps at rest stay below
 constexpr double kFarAngularRate = 0.1;   // [rad/s] likewise
-constexpr double kStretch = 1.0;  // [s] over which a reading must be the largest, at least: some swings
-constexpr double kShareOfRange = 0.999;  // of a range that was configured
-/// Smallest steps from the reading before a flat top to it. The smooth top of a swing that stays within one
-/// step for five readings is entered by one, and its noise is then of one step or two.
+constexpr double kStretch = 1.0;  // [s] A flat top is the largest reading of at least this time: some swings
+constexpr double kShareOfRange = 0.999;  // of a configured range: from here on, a reading is saturated
+/// [smallest steps of the axis] A flat top is reached by at least this step. The smooth top of a swing that
+/// repeats a reading five times is reached by one smallest step, and by a few with noise.
 constexpr double kSteep = 6.0;
 
 }  // namespace

@@ -9,14 +9,14 @@
 namespace rio_t {
 namespace {
 
-constexpr double kWrongUnits = 0.4;  // of gravity that the mean accelerometer is off
+constexpr double kWrongUnits = 0.4;  // share of gravity by which the mean accelerometer is off
 
 /// [s] An engine that idles at 600 turns a minute or more does not move the mean over this time.
 constexpr double kMean = 0.1;
-/// [s] Rest ends if the mean over so long differs from that before.
+/// [s] Rest ends if the mean over this time differs from the mean before.
 constexpr double kNewest = 0.5;
 constexpr double kCheckEvery = 0.1;
-/// [s] Rest that ends counts from here on: tilt and gyro bias are then known to twice the sigma of 4 s.
+/// [s] Shortest rest that counts if it ends. The sigmas of tilt and gyro bias are then twice those of 4 s.
 constexpr double kShortest = 1.0;
 
 struct MeanAndStd {
@@ -32,7 +32,7 @@ Eigen::Vector3d meanOf(Samples first, Samples last, Eigen::Vector3d ImuMeasureme
   return sum / static_cast<double>(last - first);
 }
 
-/// The means over kMean, one after the other; what is left at the end is not a whole one.
+/// The means over successive stretches of kMean. The incomplete last stretch is left out.
 std::vector<Eigen::Vector3d> meansOf(Samples first, Samples last, Eigen::Vector3d ImuMeasurement::*member) {
   std::vector<Eigen::Vector3d> means;
   for (auto next = first; next != last; ++next) {
@@ -49,7 +49,7 @@ Eigen::Vector3d variancesOf(const std::vector<Eigen::Vector3d>& values, const Ei
   return squares / static_cast<double>(values.size());
 }
 
-/// Mean of the samples, and spread of the means over kMean without the white noise that is left in them.
+/// Mean of the samples, and standard deviation of the means over kMean without their white noise.
 MeanAndStd statistics(const std::vector<ImuMeasurement>& samples, Eigen::Vector3d ImuMeasurement::*member,
                       double ImuMeasurement::*squared_density) {
   double density = 0.0;
@@ -144,7 +144,7 @@ std::optional<StaticInitialization> StaticInitializer::add(const ImuMeasurement&
   if (!samples_.empty() && imu.time - samples_.back().time > kNewest) samples_.clear();
   samples_.push_back(imu);
   const bool is_ending = endsNow();
-  if (is_ending) {  // What went before is rest all the same.
+  if (is_ending) {  // the samples before kNewest are still rest
     while (imu.time - samples_.back().time < kNewest) samples_.pop_back();
   }
   const double collected = samples_.back().time - samples_.front().time;

@@ -8,19 +8,18 @@
 namespace rio_t {
 namespace {
 
-/// [rad/s] No platform that carries a radar turns faster by this within a sample: at 100 Hz that is 200
-/// rad/s^2, at 400 Hz 800 rad/s^2, and a hand that shakes with 3 rad/s at 3 Hz reaches 60 rad/s^2.
+/// [rad/s] No platform that carries a radar changes its rate by so much within a sample: at 100 Hz that is
+/// 200 rad/s^2, at 400 Hz 800 rad/s^2. A hand that shakes with 3 rad/s at 3 Hz reaches 60 rad/s^2.
 constexpr double kSmallestJump = 2.0;
-constexpr double kHandShakes = 60.0;  // [rad/s^2] that hand
-constexpr double kUnusual = 5.0;      // times the usual jump: more is a jump away, less is noise
+constexpr double kHandShakes = 60.0;  // [rad/s^2] of that hand
+constexpr double kUnusual = 5.0;      // [usual jumps] above this a reading jumps away, below it is noise
 constexpr double kMemory = 10.0;      // [s] of the usual jump and the longest run
-/// Fewer repeats show nothing: a gyro whose noise is one step makes five in a row once in 600 samples.
+/// Fewer repeats show nothing: if the noise of a gyro is one step, five in a row come once in 600 samples.
 constexpr double kFewRepeats = 10.0;
-/// [s] Nor do shorter ones: at the top of a swing of 1 rad/s^3, a reading stays in a step of 0.06 degrees/s
-/// for 0.09 s.
+/// [s] A shorter run of repeats shows nothing: at the top of a swing of 1 rad/s^3, a reading stays in a step
+/// of 0.06 degrees/s for 0.09 s.
 constexpr double kShortRun = 0.1;
-/// Times the longest run lately. If r in a row come once in the 1000 samples that an IMU of 100 Hz is
-/// remembered for, 3 r come once in 10^9.
+/// [longest recent runs] If r repeats come once in the 1000 samples of kMemory, 3 r come once in 10^9.
 constexpr double kUnusualRun = 3.0;
 
 double fade(double dt) { return std::exp(-std::max(0.0, dt) / kMemory); }
@@ -60,7 +59,7 @@ std::optional<double> StuckAxisDetector::check(Time time, double reading, bool t
   }
   if (stays || freezes || (jumps_away && is_impossible_))
     return *good_ * std::exp(-std::max(0.0, time - good_at_) / kMotionCorrelationTime);
-  // Over a gap a platform may turn so fast. If the reading repeats, it sticks.
+  // Over a gap the rate of a platform may change so much. Only if the reading then repeats, it sticks.
   if (jumps_away) return std::nullopt;
   if (!stuck_at_) usual_jump_ = std::max(fade(time - good_at_) * usual_jump_, jump);
   stuck_at_.reset();

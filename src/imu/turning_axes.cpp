@@ -5,8 +5,8 @@
 namespace rio_t {
 namespace {
 
-/// Noise alone does not reach so many of its sigmas as rms over a window, which has two or three independent
-/// means.
+/// [sigma] An axis turns if the rms of its means exceeds this. A window has two or three independent means,
+/// and noise alone does not reach it with these.
 constexpr double kTurning = 3.0;
 
 }  // namespace

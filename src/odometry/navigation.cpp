@@ -30,7 +30,7 @@ Navigation::Checked Navigation::add(const ImuMeasurement& imu) {
   samples_ += 1.0;
   for (const ImuMeasurement& each : verdict.bridge) propagator_.add(each);
   const std::optional<NavigationState> before = sample.lost_time > 0.0 ? propagator_.state() : std::nullopt;
-  if (before) sample.addLostWay(before->time, before->v_W);
+  if (before) sample.setUnseenDistance(before->time, before->v_W);
   propagator_.add(sample);
   checked.taken = std::move(verdict.bridge);
   checked.taken.push_back(sample);

@@ -9,12 +9,12 @@ namespace rio_t {
 
 /// Mean of the IMU around a time, in I, biases included. The weights fall linearly to zero on both sides.
 struct ImuMean {
-  double duration = 0.0;       ///< of an even mean with the same noise [s]
-  double half_duration = 0.0;  ///< of either side; 0 where there is only one [s]
+  double duration = 0.0;       ///< of an unweighted mean with the same noise [s]
+  double half_duration = 0.0;  ///< mean length of both sides; 0 if there is only one [s]
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();      ///< [rad/s]
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();          ///< specific force [m/s^2]
-  Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();  ///< of that mean [rad/s^2]
-  /// Squared density of noise and unseen motion; over the duration, it is the variance of the mean [rad^2/s].
+  Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();  ///< [rad/s^2]
+  /// Squared density of noise and unseen motion [rad^2/s]. Divided by `duration`: the variance of the mean.
   double gyro_variance = 0.0;
   double accel_variance = 0.0;  ///< likewise [m^2/s^3]
 };
@@ -41,8 +41,8 @@ class ImuBuffer {
   ImuMean mean(Time time, double half_width) const;
 
   /// Calls step(dt, angular_velocity, acceleration, later) for each interval between samples from `from` to
-  /// `to`, with the mean of both ends and the later end, whose noise is that of the interval. The ends at
-  /// `from` and `to` are interpolated. Goes backwards with dt < 0 if `to` < `from`.
+  /// `to`, with the mean readings of both ends. `later` is the later end, which has the noise of the
+  /// interval. The ends at `from` and `to` are interpolated. Goes backwards with dt < 0 if `to` < `from`.
   template <typename Step>
   void forEachInterval(Time from, Time to, Step&& step) const;
 

@@ -6,10 +6,10 @@
 
 namespace rio_t {
 
-/// Follows the stamps of a sensor and distinguishes a sample out of place, which stands alone, from a clock
-/// that jumped, after which the stamps go on from the new time. After a gap longer than `patience`, the
-/// first stamp is dropped and the second confirms the gap: if the first one alone were wrong, all that follow
-/// would be behind it until the clock seems to have jumped. Not thread-safe.
+/// Follows the stamps of a sensor. Distinguishes a single wrong stamp from a clock that jumped, after which
+/// the stamps go on from the new time. After a gap longer than `patience`, the first stamp is dropped and the
+/// second confirms the gap. After a single wrong stamp ahead, all later stamps would be behind it until the
+/// clock seems to have jumped. Not thread-safe.
 class ClockJumpDetector {
  public:
   enum class Verdict {
@@ -24,8 +24,7 @@ class ClockJumpDetector {
   Verdict check(Time stamp);
   /// The newest good stamp.
   const std::optional<Time>& newest() const { return newest_; }
-  /// [s] by which the clock had stepped back before the newest good stamp; 0 if it had not. The stamps that
-  /// were behind belong to that time, and nothing that came with them was used.
+  /// [s] by which the clock had stepped back before the newest good stamp; else 0. Its samples were dropped.
   double steppedBack() const { return stepped_back_; }
 
  private:
@@ -34,7 +33,7 @@ class ClockJumpDetector {
   double max_gap_;                              // read-only after construction, as the next
   double patience_;                             // [s]
   std::optional<Time> newest_, before_newest_;  // good ones, of one clock
-  // The stamps dropped last, each of which goes on from the one before: first, last, count.
+  // The newest run of dropped stamps that go on from each other: first, last, count.
   std::optional<Time> elsewhere_since_, elsewhere_newest_;
   int elsewhere_ = 0;
   double stepped_back_ = 0.0;  // [s]

@@ -6,18 +6,17 @@
 
 namespace rio_t {
 
-/// Collects the samples of kCovarianceStep. The covariance takes one step for all of them: a platform hardly
-/// turns in that time.
-struct SamplesInOne {
+/// Sums the samples of kCovarianceStep. The covariance takes one step for them: platforms hardly turn in it.
+struct SampleSum {
   static constexpr double kCovarianceStep = 0.01;  // [s]
 
   double dt = 0.0;                                        ///< [s]
-  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();  ///< attitude of I at their begin
-  Eigen::Vector3d angle = Eigen::Vector3d::Zero();        ///< turned by, in I [rad]
+  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();  ///< attitude of I before them
+  Eigen::Vector3d angle = Eigen::Vector3d::Zero();        ///< integral of the angular rate, in I [rad]
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();     ///< integral of the specific force, in I [m/s]
   double gyro_variance = 0.0;                             ///< of `angle`, per axis [rad^2]
   double accel_variance = 0.0;                            ///< of `velocity`, per axis [m^2/s^2]
-  double position_variance = 0.0;                         ///< beside that of the velocity, per axis [m^2]
+  double position_variance = 0.0;                         ///< besides that by the velocity, per axis [m^2]
 
   /// `now` is the attitude before the sample; rates without biases; squared densities of their noise.
   void add(const Eigen::Quaterniond& now, double step, const Eigen::Vector3d& omega, const Eigen::Vector3d& a,
@@ -33,8 +32,8 @@ struct SamplesInOne {
   bool isWhole() const { return dt >= kCovarianceStep; }
 };
 
-/// How the errors of orientation (right perturbation), position and velocity, and of the biases where they
-/// are among the columns, go over one IMU step with midpoint rotation: P <- A P A', A the identity but for
+/// Propagates the errors of orientation (right perturbation), position, velocity and, if P has them, of the
+/// biases over one IMU step with midpoint rotation: P <- A P A', where A is the identity but for
 ///   theta <- A_tt theta - dt b_g,   v <- v + A_vt theta - dt R b_a,   p <- p + A_vt theta dt / 2 + v dt
 /// (docs/method.md, section 4; Forster et al., eq. 59-63). The order is theta, p, v[, b_g, b_a].
 ///
@@ -45,7 +44,7 @@ struct ErrorStep {
   Eigen::Matrix3d A_vt;  ///< -dt R hat(a) Exp(-omega dt / 2)
   Eigen::Matrix3d R;     ///< at the middle of the step
 
-  explicit ErrorStep(const SamplesInOne& samples) : dt(samples.dt) {
+  explicit ErrorStep(const SampleSum& samples) : dt(samples.dt) {
     const Eigen::Quaterniond half = so3::exp(0.5 * samples.angle);
     const Eigen::Matrix3d half_T = half.toRotationMatrix().transpose();
     A_tt = half_T * half_T;
@@ -77,10 +76,10 @@ struct ErrorStep {
   }
 };
 
-/// Takes `samples` into the covariance P of the errors of ErrorStep, with the noise of the IMU, and starts
-/// anew. The caller adds that of the biases.
+/// Propagates the covariance P of ErrorStep over `samples`, adds the noise of the IMU and clears `samples`.
+/// The caller adds the random walk of the biases.
 template <int Size>
-void propagateCovariance(SamplesInOne& samples, Eigen::Matrix<double, Size, Size>& P) {
+void propagateCovariance(SampleSum& samples, Eigen::Matrix<double, Size, Size>& P) {
   if (samples.dt == 0.0) return;
   constexpr int kTheta = 0, kP = 3, kV = 6;
   ErrorStep(samples).propagate(P);

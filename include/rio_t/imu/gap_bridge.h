@@ -14,8 +14,8 @@ namespace rio_t {
 /// the platform by its last rate times the gap. Gravity then has a wrong direction and throws the velocity
 /// off by 10 m/s each second. Platforms turn to and fro instead. The expectation of a stationary Gauss-Markov
 /// signal of correlation time tau, given its values r_0 and r_1 at both ends of a gap of T, is
-///   r(t) = (r_0 sinh((T - t) / tau) + r_1 sinh(t / tau)) / sinh(T / tau),
-/// the straight line for T << tau, and nothing but gravity in the middle of T >> tau.
+///   r(t) = (r_0 sinh((T - t) / tau) + r_1 sinh(t / tau)) / sinh(T / tau).
+/// This is the straight line for T << tau. For T >> tau, only gravity is left in the middle of the gap.
 class GapBridge {
  public:
   /// Takes a sample, to know gravity in the IMU frame within about 1 m/s^2 when a gap begins.
@@ -25,12 +25,12 @@ class GapBridge {
   /// Samples between the last one taken and `next`, without those two. `is_bridge` is set, and the noise is
   /// that of `next`. None before the first sample.
   std::vector<ImuMeasurement> until(const ImuMeasurement& next) const;
-  /// The accelerometer would read this now without motion [m/s^2], in the IMU frame.
+  /// Reading of the accelerometer at rest in the current attitude [m/s^2], in the IMU frame.
   const Eigen::Vector3d& gravity() const { return gravity_I_; }
 
  private:
   std::optional<ImuMeasurement> newest_;
-  Eigen::Vector3d gravity_I_ = Eigen::Vector3d::Zero();  ///< reading at rest [m/s^2]
+  Eigen::Vector3d gravity_I_ = Eigen::Vector3d::Zero();
 };
 
 }  // namespace rio_t

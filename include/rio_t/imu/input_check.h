@@ -22,7 +22,7 @@ struct ImuInputCheckOptions {
   double jump_patience = 0.5;    ///< [s] of stamps at another time, after which the clock has jumped
   double accel_range = 0.0;      ///< [m/s^2] largest reading of an axis; 0: found from flat tops
   double gyro_range = 0.0;       ///< [rad/s] likewise
-  /// Motion that the IMU does not see, in gaps and beyond its range, as white noise: people and drones.
+  /// Motion that the IMU misses in gaps and beyond its range, as white noise. For people and drones.
   double unseen_accel_density = 2.0;  ///< [m/s^2/sqrt(Hz)]
   double unseen_gyro_density = 0.5;   ///< [rad/s/sqrt(Hz)]
 };
@@ -32,14 +32,14 @@ struct MeasuredImuNoise {
   double accel_density = 0.0;  ///< [m/s^2/sqrt(Hz)]
   double gyro_density = 0.0;   ///< [rad/s/sqrt(Hz)]
 
-  /// Three times the densities of the options, or more: no honest guess is so far off.
+  /// Whether a density is more than three times the configured one. A sensible configuration is nearer.
   bool isFarAbove(const ImuNoise& configured) const {
     return accel_density > 3.0 * configured.accel_density || gyro_density > 3.0 * configured.gyro_density;
   }
 };
 
-/// Says which IMU samples the estimate takes, and after which of them it starts again. ImuInputCheck does as
-/// it says. Who needs the same answers beside the odometry has one of its own. Not thread-safe.
+/// Decides which IMU samples the estimator takes, and after which of them it starts again. ImuInputCheck uses
+/// it. Code outside the odometry that needs the same decisions has its own instance. Not thread-safe.
 class ImuSampleCheck {
  public:
   struct Verdict {
@@ -50,10 +50,10 @@ class ImuSampleCheck {
     bool repeats = false;        ///< the sample is the one before, with a new stamp
     bool is_restart = false;     ///< the clock jumped, or the gap was too long: forget all before
     double stepped_back = 0.0;   ///< [s] by which the clock had stepped back before this sample
-    std::optional<Time> before;  ///< stamp of the newest sample taken before; none of the first sample
-    // Only of a restart:
+    std::optional<Time> before;  ///< stamp of the newest sample taken before; none for the first sample
+    // Set only at a restart:
     std::map<std::string, std::uint64_t> dropped = {};  ///< samples since `before`, by fault
-    /// No stamp jumped: samples came all the time, and none of them could be used.
+    /// No stamp jumped: samples came all the time, but none of them could be used.
     bool stamps_went_on = false;
   };
 
@@ -68,11 +68,10 @@ class ImuSampleCheck {
 
   double most_acceleration_, max_gap_;  // [m/s^2], [s] read-only after construction
   ClockJumpDetector stamps_;
-  std::optional<ImuMeasurement> new_;  // the newest that did not repeat the one before
-  // These describe the samples that came after the newest one that was taken.
-  std::map<std::string, std::uint64_t> dropped_;
-  std::optional<Time> latest_;  // stamp, of that one, too
-  double longest_step_ = 0.0;   // [s] from one stamp to the next
+  std::optional<ImuMeasurement> distinct_;        // the newest that did not repeat the one before
+  std::optional<Time> latest_;                    // stamp of the last sample, dropped or not
+  std::map<std::string, std::uint64_t> dropped_;  // since the newest sample that was taken
+  double longest_step_ = 0.0;                     // [s] from one stamp to the next, since that sample
 };
 
 /// Checks IMU samples. It drops those that cannot be used, writes into the others how much of the motion they
@@ -98,8 +97,8 @@ class ImuInputCheck {
   MeasuredImuNoise noise() const;
 
  private:
-  /// Tells the sample of the motion that is lost because the clock stepped back before it, `dt` [s] after the
-  /// sample before.
+  /// Adds to the sample the variance of the motion that is lost because the clock stepped back before it.
+  /// `dt` [s]: since the sample before.
   void addLostMotion(double dt, ImuMeasurement& imu) const;
   /// Whether an axis of the accelerometer is frozen.
   bool findFrozen(const ImuMeasurement& imu, bool turns);
@@ -114,7 +113,7 @@ class ImuInputCheck {
   std::array<StuckAxisDetector, 3> gyro_axes_;
   GapBridge bridge_;
   NoiseSpectrum accel_noise_, gyro_noise_;
-  SaturationDetector::Saturated hid_;  // what the sample before did not show
+  SaturationDetector::Saturated hidden_before_;  // whether the sample before hid motion
 };
 
 }  // namespace rio_t

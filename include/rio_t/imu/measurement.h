@@ -17,13 +17,13 @@ struct ImuMeasurement {
   // white noise per axis. They add to those of ImuNoise; see ImuInputCheck.
   double unseen_gyro_variance = 0.0;      ///< [rad^2/s]
   double unseen_accel_variance = 0.0;     ///< [m^2/s^3]
-  double unseen_velocity_variance = 0.0;  ///< [m^2/s], of a velocity that the position alone misses
+  double unseen_velocity_variance = 0.0;  ///< [m^2/s] of a velocity that only the position misses
   /// [s] of motion before this sample that no interval of stamps covers: the clock stepped back. The unseen
   /// variances contain what it may have changed.
   double lost_time = 0.0;
-  /// Adds the way in the lost time to the unseen variances. `before` is the time of the sample before, and
-  /// `v_W` the velocity then.
-  void addLostWay(Time before, const Eigen::Vector3d& v_W) {
+  /// Sets the unseen variance of the distance in the lost time. `before` is the time of the sample before,
+  /// and `v_W` the velocity then.
+  void setUnseenDistance(Time before, const Eigen::Vector3d& v_W) {
     unseen_velocity_variance = (lost_time * v_W).squaredNorm() / (time - before);
   }
 

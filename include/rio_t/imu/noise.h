@@ -21,7 +21,7 @@ struct ImuNoise {
   double gyro_random_walk = 4.0e-6;   ///< [rad/s^2/sqrt(Hz)]
   double gyro_scale_error = 0.0;      ///< sigma of the gyro's scale, as a share of the rate
 
-  /// With the variance of the accelerometer times `model_error_scale`, see ModelErrorScale.
+  /// Multiplies the variance of the accelerometer by `model_error_scale`, see ModelErrorScale.
   ImuNoise scaled(double model_error_scale) const {
     ImuNoise noise = *this;
     noise.accel_density *= std::sqrt(model_error_scale);
@@ -29,8 +29,8 @@ struct ImuNoise {
   }
 
   /// Squared densities of integrated samples for the interval that ends with `imu`: the larger of option and
-  /// measurement, plus the hidden motion of the interval and, of a gyro, the error of its scale. A vibrating
-  /// frame is noisier than a data sheet.
+  /// measurement, plus the unseen motion and, for the gyro, the error of its scale. On a vibrating frame an
+  /// IMU is noisier than its data sheet says.
   double accelVariance(const ImuMeasurement& imu) const {
     return std::max(accel_density * accel_density, imu.accel_mean_noise) + imu.unseen_accel_variance;
   }

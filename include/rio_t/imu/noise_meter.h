@@ -10,29 +10,30 @@ namespace rio_t {
 
 /// Measures the white noise of a three-axis signal from the signal itself, at rest and in motion.
 ///
-/// A platform moves smoothly from sample to sample; noise and vibration do not. Of five samples, one linear
-/// combination is free of every cubic in time (the fourth divided difference; docs/method.md, eq. 11b). Noise
-/// alone is left in it, whatever the spacing of the samples. Not thread-safe.
+/// A platform moves smoothly from sample to sample; noise and vibration do not. The fourth divided difference
+/// of five samples removes every cubic in time (docs/method.md, eq. 11b). Only noise is left in it, whatever
+/// the spacing of the samples. Not thread-safe.
 class NoiseMeter {
  public:
-  /// Takes one sample [unit] at `time`; times must rise. Returns the squared density that is too large for
-  /// noise and does not count, of the noisiest axis [unit^2/Hz]: a knock. Over the five samples that see a
-  /// single wrong value, its integral is the square of what the value adds to the integral of the signal.
+  /// Takes one sample [unit] at `time`; times must increase. Returns the part of the squared density that is
+  /// too large for noise and does not count, of the noisiest axis [unit^2/Hz]: a knock. Five differences
+  /// contain a single wrong value. The integral of the returned density over them is the square of what the
+  /// value adds to the integral of the signal.
   double add(Time time, const Eigen::Vector3d& value);
   /// Squared density of the noisiest axis over the last second, or 25 samples [unit^2/Hz]; 0 before the first
   /// five samples.
   double squaredDensity() const { return weight_ > 0.0 ? squares_.maxCoeff() / weight_ : 0.0; }
   double spacing() const { return spacing_; }  ///< of the samples [s]
-  /// Whether the density is a mean over at least half of that time.
+  /// Whether the density is a mean over at least half of the averaging time.
   bool isSettled() const { return weight_ * spacing_ > memory() / 2.0; }
-  /// Begins a new run of five, e.g. after a wrong sample.
+  /// Begins again with five new samples, e.g. after a wrong one.
   void interrupt() { count_ = 0; }
 
  private:
   /// [s] over which the noise is averaged: long against a footstep, short against a change of speed of a
   /// motor.
   static constexpr double kMemory = 1.0;
-  /// [samples] A slow sensor needs more time: fewer squares have no mean.
+  /// [samples] The mean is over at least so many: a slow sensor needs more time.
   static constexpr double kFewest = 25.0;
   double memory() const { return std::max(kMemory, kFewest * spacing_); }
 
@@ -56,7 +57,7 @@ class NoiseMeter {
 /// out. Motion has more. Preintegration uses the smallest density (docs/method.md, 4.3). Not thread-safe.
 class NoiseSpectrum {
  public:
-  /// As in NoiseMeter; the knock is that of the samples.
+  /// As in NoiseMeter. Returns the knock at the rate of the samples.
   double add(Time time, const Eigen::Vector3d& value);
   void interrupt();
   double squaredDensity() const { return rates_.front().meter.squaredDensity(); }  ///< of the samples

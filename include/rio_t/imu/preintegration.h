@@ -27,7 +27,7 @@ struct ImuDelta {
   void step(double step_dt, const Eigen::Vector3d& omega, const Eigen::Vector3d& a);
 };
 
-/// From `from` to `to`, forwards or backwards, at these biases, without covariance.
+/// Integrates the IMU from `from` to `to`, forwards or backwards, at these biases, without covariance.
 ImuDelta integrate(const ImuBuffer& imu, Time from, Time to, const Eigen::Vector3d& b_g,
                    const Eigen::Vector3d& b_a);
 
@@ -40,7 +40,7 @@ struct Preintegration {
   Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
 };
 
-/// Integrates the IMU from `from` to `to` (later). `buffer` must cover both.
+/// The same with covariance, for `to` later than `from`. `buffer` must cover both.
 Preintegration preintegrate(const ImuBuffer& buffer, Time from, Time to, const Eigen::Vector3d& b_g,
                             const Eigen::Vector3d& b_a, const ImuNoise& noise);
 

@@ -15,7 +15,7 @@ struct RestOptions {
   double max_rate = 3.0e-3;      ///< [rad/s] mean gyro without bias
   double max_accel_error = 0.1;  ///< [m/s^2] mean accelerometer without bias and gravity
   double max_speed = 0.1;        ///< [m/s] estimated; above it, stillness is a smooth ride
-  /// [m/s] per axis, of the zero velocity: about as slow as a platform may creep unseen by radar and IMU.
+  /// [m/s] of the zero velocity, per axis. At about this speed a platform may creep unseen by radar and IMU.
   double velocity_sigma = 0.01;
 };
 
@@ -30,10 +30,10 @@ struct RestContext {
 
 /// Rest over a window, as the IMU shows it.
 struct Rest {
-  /// The IMU vibrates, as with an engine that idles. Only a radar that sees no motion makes this a rest.
+  /// The IMU vibrates, as with an engine that idles. Then it is a rest only if a radar sees no motion.
   bool shakes = false;
-  /// [m/s] per axis, of the zero velocity. With the mean acceleration that is not explained, the platform may
-  /// have set off within the window.
+  /// [m/s] of the zero velocity, per axis. It includes the unexplained mean acceleration over the window: the
+  /// platform may just have set off.
   double velocity_sigma = 0.0;
 };
 
@@ -42,8 +42,8 @@ struct Rest {
 ///
 /// The IMU sees rest that a radar cannot see: a Doppler bin hides slow motion, and a moving object can fill
 /// the view. The IMU alone cannot distinguish rest from uniform motion, hence the context. A hand that holds
-/// still turns by some mrad/s, more than the gyro bias is known at the start. So rest on the way does not
-/// inform the bias.
+/// still turns by some mrad/s, which is more than the sigma of the gyro bias after the start. So rest during
+/// a run gives no measurement of the bias.
 std::optional<Rest> findRest(const ImuBuffer& imu, Time time, const RestContext& context,
                              const RestOptions& options);
 

@@ -10,10 +10,10 @@ namespace rio_t {
 
 /// Finds samples at the end of the range of an IMU. Not thread-safe.
 ///
-/// If the options do not give the range, a flat top shows it: an axis reads its largest value of a second or
-/// two, of either sign, five times in a row, far from its first reading. It comes there by a step that is
-/// several times its smallest one: at the smooth top of a swing, a fast IMU repeats a reading, too. That
-/// value then is the end of the range until a sample exceeds it.
+/// If the options do not give the range, a flat top shows it. An axis then reads its largest value of the
+/// last second or two, of either sign, five times in a row, far from its first reading. It reached this value
+/// by a large step: at the smooth top of a swing, a fast IMU repeats a reading, too, but reaches it by small
+/// steps. The value is the end of the range until a sample exceeds it.
 class SaturationDetector {
  public:
   /// Largest readings [m/s^2, rad/s]; 0: not known.

@@ -11,7 +11,7 @@ namespace rio_t {
 
 /// Why the estimate has not started.
 enum class StartObstacle {
-  kTooFewData,     ///< nothing stands against it so far
+  kTooFewData,     ///< nothing speaks against a start so far
   kMotion,         ///< the platform does not rest
   kWrongGravity,   ///< the mean accelerometer does not read gravity
   kContradiction,  ///< radar and IMU contradict each other
@@ -43,8 +43,8 @@ struct StaticInitialization {
   double duration = 0.0;  ///< [s]
 };
 
-/// Waits for `duration` seconds of rest. If the platform sets off earlier, a second of rest before is enough:
-/// a smooth start must not pass for rest. Any mounting (gravity on any axis).
+/// Waits for `duration` seconds of rest. If the platform sets off earlier, it uses the rest before, if that
+/// lasted a second: a smooth start must not count as rest. Works with any mounting (gravity on any axis).
 class StaticInitializer {
  public:
   StaticInitializer(const StaticInitializerOptions& options, double gravity);
@@ -55,7 +55,8 @@ class StaticInitializer {
   bool hasSeenMotion() const { return has_seen_motion_; }
 
  private:
-  /// Whether the newest samples show a platform that sets off: a fifth of max_accel_std, and more than noise.
+  /// Whether the platform sets off: the newest mean acceleration differs from the mean before by more than
+  /// noise and a fifth of max_accel_std.
   bool endsNow();
 
   StaticInitializerOptions options_;  // read-only after construction

@@ -6,7 +6,7 @@
 
 namespace rio_t {
 
-/// [rad/s] No bias of a gyro is as large: the IMU turns.
+/// [rad/s] Above this rate the IMU turns: no bias of a gyro is as large.
 constexpr double kTurns = 0.1;
 
 /// Follows one axis and finds a reading that freezes: while the IMU turns, it repeats itself to the last bit,
@@ -14,14 +14,14 @@ constexpr double kTurns = 0.1;
 /// has never moved is not frozen. Not thread-safe.
 class FrozenAxisDetector {
  public:
-  /// `turns`: whether the IMU does, about any axis. A frozen reading stays so until it changes.
+  /// `turns`: whether the IMU turns, about any axis. An axis stays frozen until its reading changes.
   bool isFrozen(Time time, double reading, bool turns);
 
  private:
   std::optional<double> last_;
   Time last_at_;
   double repeats_ = 0.0;               ///< of last_
-  Time run_since_;                     ///< its first reading
+  Time run_since_;                     ///< time of the first of these readings
   std::optional<double> longest_run_;  ///< of repeats lately; none as long as the axis reads one value
   bool is_frozen_ = false;
 };
@@ -31,15 +31,15 @@ class FrozenAxisDetector {
 /// freezes. Not thread-safe.
 class StuckAxisDetector {
  public:
-  /// Takes a reading [rad/s]. None if it may be used. Otherwise the most likely reading: the last good one,
-  /// fading with the correlation time of the motion. If an axis is at the end of its range, none freezes.
+  /// Takes a reading [rad/s]. Returns none if it may be used. Otherwise returns the most likely reading: the
+  /// last good one, fading with the correlation time of the motion. A saturated gyro does not freeze.
   std::optional<double> check(Time time, double reading, bool turns, bool is_saturated);
 
  private:
   std::optional<double> good_;  ///< the last reading that was used
   Time good_at_;
   std::optional<double> stuck_at_;  ///< the reading that jumped away or froze, while it repeats
-  bool is_impossible_ = false;      ///< that jump, for any mass
+  bool is_impossible_ = false;      ///< whether no mass can make that jump
   double usual_jump_ = 0.0;         ///< largest between neighbours lately [rad/s]
   FrozenAxisDetector frozen_;
 };

@@ -4,7 +4,7 @@
 
 namespace rio_t {
 
-/// The axes about which a platform turns, as the means of its gyro say. About the others there is only
+/// Finds the axes about which a platform turns from means of its gyro. About the other axes there is only
 /// noise, which would look like a turn that shows the lever arm (docs/method.md, section 5.8).
 class TurningAxes {
  public:
@@ -13,7 +13,7 @@ class TurningAxes {
     squares_ += omega * omega.transpose();
     noise_ += variance;
   }
-  /// Projects on these axes.
+  /// Projection onto these axes.
   Eigen::Matrix3d projection() const;
 
  private:

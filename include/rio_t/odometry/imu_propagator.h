@@ -39,7 +39,7 @@ class ImuPropagator {
   Eigen::Vector3d g_W_;  // read-only after construction
   std::deque<ImuMeasurement> history_;
   std::optional<NavigationState> state_;
-  SamplesInOne samples_;                 ///< since the time of the covariance
+  SampleSum samples_;                    ///< since the time of the covariance
   std::optional<NavigationState> rest_;  ///< the anchor, if the platform was at rest there
 };
 
