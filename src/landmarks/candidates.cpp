@@ -7,12 +7,12 @@
 namespace rio_t {
 namespace {
 
-/// A second thing nearer than this, squared and in sigmas of one detection, could be taken for the first.
+/// [sigma^2 of one detection] A second point nearer than this could be confused with the first.
 constexpr double kApart = 16.0;
 
 /// [1] Sigma of s below which 0 and 1 are five sigmas apart.
 constexpr double kMaxSlideSigma = 0.2;
-/// (m, s) has four unknowns; as many detections again are witnesses. Two ghosts far apart would fit any s.
+/// Twice the four unknowns of (m, s): two ghosts far apart would fit any s.
 constexpr std::size_t kMinSightings = 8;
 /// [sigma] of s: a twentieth of the static points lies beyond.
 constexpr double kMaxSlide = 2.0;
@@ -109,7 +109,7 @@ std::vector<Candidate> Candidates::takeProven(const std::vector<Eigen::Vector3d>
                                               std::size_t count) {
   std::vector<std::size_t> proven;
   for (std::size_t k = 0; k < candidates_.size() && proven.size() < count; ++k) {
-    // A landmark needs a sighting that places it.
+    // A landmark needs a sighting that determines its position.
     if (candidates_[k].sightings.empty() || !candidates_[k].isProven()) continue;
     if (isAlone(k, landmarks_W)) proven.push_back(k);
   }

@@ -9,36 +9,38 @@
 namespace rio_t {
 namespace {
 
-/// Beyond this, squared and in sigmas, a detection is of something else: 1 in 100 000 of the true pairs.
+/// [sigma^2] A detection beyond this is of something else: only 1 in 100 000 true pairs lies beyond.
 constexpr double kElsewhere = 25.9;
-/// A second explanation must be this much less likely, as twice the logarithm of the ratio: 20 times.
+/// Competing pairs must be 20 times less likely: twice the logarithm of that.
 constexpr double kClearly = 6.0;
 /// [sigma] of Cauchy's loss: a match at the gate counts 0.6 of its weight.
 constexpr double kLoss = 4.0;
-/// [s] unseen; then a landmark makes room for a new one, if there is none else.
+/// [s] If the map is full, a landmark that is unseen for this time makes room for a new one.
 constexpr double kLongUnseen = 30.0;
-/// Pairs that match by chance are even over the gate, so the mean of their squared sigmas is 3/5 of it; that
-/// of true ones is 3. This is the first mean over the second.
+/// False pairs are uniform over the gate, so the mean of their squared sigmas is 3/5 of it. The mean of true
+/// pairs is 3. This is the ratio of both.
 constexpr double kMeanSquareByChance = Candidates::kGate / 5.0;
-/// Half way between, the map contradicts the estimate. 100 matches tell it to 0.08.
+/// Half way between the means of true and false pairs. Above it, the map contradicts the estimate. 100
+/// matches show the mean with a sigma of 0.08.
 constexpr double kMaxMeanSquare = 0.5 * (1.0 + kMeanSquareByChance);
-/// The share of pairs by chance lies between these. The gate leaves out a hundredth of the true pairs, so the
-/// map cannot tell a smaller share. With half of them the guard drops the map.
+/// Bounds on the share of false pairs. The gate leaves out a hundredth of the true pairs, so the map cannot
+/// measure a smaller share. With a share of half, kMaxMeanSquare drops the map.
 constexpr double kLeastByChance = 0.01, kMostPairsByChance = 0.5;
-/// The number of matches that the map needs before it is trusted: they tell that mean to 0.15.
+/// The number of matches that the map needs before it is trusted: they show the mean with a sigma of 0.15.
 constexpr double kProof = 30.0;
-/// A reflector in view shows itself at least so often. In a scene full of highlights that come and go, hardly
-/// any landmark is seen again.
+/// A reflector is seen in at least this share of the scans that have it in view. In a scene full of
+/// highlights that come and go, hardly any landmark is seen again.
 constexpr double kMinShare = 0.1;
 /// Time constant of the fading sums, in scans.
 constexpr double kMemory = 100.0;
 /// In view: within this of the middle of the field of view, as the cosine.
 constexpr double kCosView = 0.707;
 
-/// Detections in the gate by chance. In a room a landmark shows itself in 0.2 to 0.4 of the scans.
+/// [detections] If more false ones are expected in its gate, a landmark is vague. In a room a landmark is
+/// seen in 0.2 to 0.4 of the scans.
 constexpr double kMostByChance = 0.5;
 
-/// [m^3] within which a detection passes the gate, if its own noise does not count.
+/// [m^3] in which a detection passes the gate, without its own noise.
 double gateVolume(const Eigen::Matrix3d& covariance) {
   return 4.0 / 3.0 * M_PI * std::pow(Candidates::kGate, 1.5) *
          std::sqrt(std::max(0.0, covariance.determinant()));
@@ -47,7 +49,7 @@ double gateVolume(const Eigen::Matrix3d& covariance) {
 /// [m^3] that a radar sees to this range.
 double viewVolume(double range) { return 2.0 / 3.0 * M_PI * (1.0 - kCosView) * range * range * range; }
 
-/// The measurement with so much of its information.
+/// The measurement with its information multiplied by `weight`.
 PolarMeasurement weighted(PolarMeasurement z, double weight) {
   const double wider = 1.0 / std::sqrt(weight);
   z.range_sigma *= wider;
@@ -292,7 +294,7 @@ bool LandmarkMap::judge(const Prediction& prediction, const Extrinsics& T_IR,
   return !is_wrong && vague <= 0.5 * in_view;
 }
 
-/// With less than the proof, or with hardly any landmark seen again, nothing is known and nothing counts.
+/// Whether the matches do not fit the map, or a trusted map is hardly seen any more.
 bool LandmarkMap::contradicts() const {
   if (matched_ >= kProof && sigmas_ > kMaxMeanSquare * matched_) return true;
   return is_trusted_ && in_view_ > kProof / kMinShare && matched_ < 0.5 * kMinShare * in_view_;
@@ -338,7 +340,7 @@ void LandmarkMap::promote(FixedLagSmoother& smoother, Time now) {
     landmark.point.id = next_id_++;
     landmark.point.sightings = candidate.count;
     landmark.point.snr_db = candidate.snr_db();
-    // One sighting only places the landmark. Several also tell how the platform moved.
+    // One sighting only places the landmark. More also constrain the motion, as only a trusted map may.
     for (auto sighting = candidate.sightings.rbegin(); sighting != candidate.sightings.rend(); ++sighting) {
       Block* node = smoother.nodeAt(sighting->node_time);
       smoother.window().add(std::make_unique<LandmarkFactor>(sighting->z, sighting->delta, g_W_),

@@ -28,11 +28,11 @@ struct Sighting {
 /// exponentially distributed (Swerling), and 10 log10 of that has this standard deviation.
 constexpr double kEchoScatter = 5.57;
 
-/// A thing that may become a landmark: detections that lie on one point.
+/// Detections of one point that may become a landmark.
 ///
-/// A highlight on a wall slides along with the radar, and what hangs on the platform moves with it. So the
-/// detections are fitted by p = m + s d, with d the way of the radar since the first of them, across the ray:
-/// s is 0 for a point of the world, and up to 1 for one that slides.
+/// A highlight on a wall slides along with the radar, and a part of the platform moves with it. So the
+/// detections are fitted by p = m + s d, where d is the motion of the radar since the first of them, across
+/// the ray: s is 0 for a static point, and up to 1 for one that slides.
 struct Candidate {
   std::vector<Sighting> sightings;  ///< those of the window, in the order of time
   Time last_seen;
@@ -46,7 +46,7 @@ struct Candidate {
   Eigen::Matrix3d information() const { return fit_information.topLeftCorner<3, 3>(); }
   Eigen::Vector3d position() const;  ///< p_W [m]
   double snr_db() const { return snr_sum / static_cast<double>(count); }
-  /// Whether the detections tell that it does not slide.
+  /// Whether the detections show that the point does not slide.
   bool isProven() const;
 };
 
@@ -60,7 +60,7 @@ struct PlacedDetection {
   Sighting sighting;
 };
 
-/// At most kMax candidates; one that is not seen for kMaxUnseen goes. Not thread-safe.
+/// At most kMax candidates. One that is not seen for kMaxUnseen is dropped. Not thread-safe.
 class Candidates {
  public:
   /// chi-squared of 3 degrees of freedom: 1 % of the true pairs of detections and points lie beyond.
@@ -75,7 +75,7 @@ class Candidates {
   void forgetOld(Time now, Time oldest_node);
   void clear() { candidates_.clear(); }
   std::size_t size() const { return candidates_.size(); }
-  /// Those that have proved static and that nothing else can be taken for, at most `count`; they leave.
+  /// Removes and returns proven candidates, at most `count`. No other candidate or landmark is near them.
   std::vector<Candidate> takeProven(const std::vector<Eigen::Vector3d>& landmarks_W, std::size_t count);
 
  private:

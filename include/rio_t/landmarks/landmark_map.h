@@ -13,9 +13,9 @@
 
 namespace rio_t {
 
-/// Probability that a pair within the gate is of one thing, if so many of the pairs match by chance.
+/// Probability that a pair within the gate is true, if the share `by_chance` of the pairs is false.
 double probabilityOfTruth(double squared_sigmas, double by_chance);
-/// The share of pairs that match by chance; `sum` is over their squared sigmas, divided by 3.
+/// The share of false pairs. `sum` is over the squared sigmas of all pairs, divided by 3.
 double shareByChance(double sum, double pairs);
 
 /// Static detections as landmarks: points of the world in the window of the smoother, correlated with all
@@ -29,18 +29,18 @@ class LandmarkMap {
   struct Prediction {
     Time measured;
     PredictedState state;  ///< joint with the extrinsics, if they are estimated, and with the landmarks
-    std::vector<int> mounting_columns;   ///< what is estimated of the extrinsics, see Manifold::columns
+    std::vector<int> mounting_columns;   ///< Manifold::columns of the extrinsics, if they are estimated
     std::size_t first_landmark = 0;      ///< column of the first landmark in the covariance
-    std::vector<std::size_t> landmarks;  ///< which of them, by the order of columns
+    std::vector<std::size_t> landmarks;  ///< their indices, in the order of the columns
   };
   /// Call it before the terms of the scan go into the window. None if the time is before the window.
   std::optional<Prediction> predict(const FixedLagSmoother& smoother, Time measured,
                                     const Block& extrinsics) const;
-  /// Associates the detections, adds the terms of those that match, and lets landmarks come and go. The
-  /// window must be optimised afterwards. `node` is the one of the scan.
+  /// Associates the detections, adds the terms of those that match, and adds and drops landmarks. The window
+  /// must be optimised afterwards. `node` is that of the scan.
   LandmarkAnswer use(const Prediction& prediction, const std::vector<Detection>& detections, Block& node,
                      Block& extrinsics, FixedLagSmoother& smoother);
-  /// The window has started again, without landmarks.
+  /// Clears the map, since the window has started again without landmarks.
   void forget();
 
  private:
@@ -60,7 +60,7 @@ class LandmarkMap {
     std::vector<Match> matches;
     std::vector<std::size_t> free;       ///< detections far from every landmark
     std::vector<std::size_t> conflicts;  ///< landmarks with a detection just beyond the gate, and no match
-    /// By column of the prediction: its place is so uncertain that some detection is in the gate by chance.
+    /// Per predicted landmark: its position is so uncertain that false detections are likely in the gate.
     std::vector<bool> is_vague;
   };
   Association associate(const Prediction& prediction, const Extrinsics& T_IR,
@@ -86,7 +86,7 @@ class LandmarkMap {
   void dropUseless(const Eigen::Vector3d& p_W);
   void makeRoom(Time now);
   void promote(FixedLagSmoother& smoother, Time now);
-  /// Judges the map by the matches lately. Returns whether it is worth keeping.
+  /// Judges the map by the recent matches. Returns false if the map must be dropped.
   bool judge(const Prediction& prediction, const Extrinsics& T_IR, const Association& association);
   bool contradicts() const;
   std::vector<LandmarkPoint> points() const;
@@ -100,8 +100,8 @@ class LandmarkMap {
   Candidates candidates_;
   std::uint64_t next_id_ = 0;
   double reach_ = 0.0;                    ///< [m] of the farthest static detection so far
-  double in_view_ = 0.0, matched_ = 0.0;  ///< lately: landmarks in view, those of them that were seen
-  double sigmas_ = 0.0;                   ///< squared sigmas of these over 3
+  double in_view_ = 0.0, matched_ = 0.0;  ///< fading sums: landmarks in view, and matches
+  double sigmas_ = 0.0;                   ///< fading sum of the matches' squared sigmas over 3
   bool is_trusted_ = false;
 };
 
