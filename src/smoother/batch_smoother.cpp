@@ -21,26 +21,27 @@
 namespace rio_t {
 namespace {
 
-/// Squared length of the step that is left, in standard deviations, below which the solver stops.
+/// [sigma^2] The solver stops if the squared length of the next step is below this.
 constexpr double kConverged = 1e-4;
-/// Likewise, of its part in each block: the solution stands, even if the solver cannot do better.
+/// [sigma^2] If the part of this step in each block is below this, the solution is accepted even if the
+/// solver did not stop by itself.
 constexpr double kNear = 1e-2;
 
 using BlockCovariances = std::vector<std::map<int, Eigen::MatrixXd>>;
 
-/// Whether the step that is left moves every block by less than a tenth of its standard deviation.
-bool isNear(const Solution& solved, const BlockCovariances& P) {
+/// Whether the next step moves every block by less than a tenth of its standard deviation.
+bool isNextStepSmall(const Solution& solved, const BlockCovariances& P) {
   const std::vector<Eigen::VectorXd>& delta = solved.elimination.delta();
   for (std::size_t i = 0; i < delta.size(); ++i) {
-    if (delta[i].isZero(0.0)) continue;  // also where it is held
+    if (delta[i].isZero(0.0)) continue;  // as that of a held block, whose covariance is zero
     const Eigen::MatrixXd& P_ii = P[i].at(static_cast<int>(i));
     if (delta[i].dot(P_ii.ldlt().solve(delta[i])) > kNear) return false;
   }
   return true;
 }
 
-/// The same of the offsets and of those by which the nodes were placed.
-bool isNear(const BatchSolution& solution, const std::vector<double>& placed_by) {
+/// Whether every offset is within a tenth of its standard deviation of the one that placed its node.
+bool areOffsetsNear(const BatchSolution& solution, const std::vector<double>& placed_by) {
   for (std::size_t i = 0; i < placed_by.size(); ++i) {
     const BatchSolution::Scan& scan = solution.scans[i];
     const double variance = scan.covariance(StateBlock::kTangent, StateBlock::kTangent);
@@ -54,7 +55,7 @@ bool isNear(const BatchSolution& solution, const std::vector<double>& placed_by)
 /// velocity.
 constexpr double kLinear = 0.01;
 
-/// If the offsets may take only this share of their move, they only swing from placement to placement.
+/// If the offsets may take only this share of their move, they oscillate from placement to placement.
 constexpr double kLeastShare = 0.01;
 
 /// Joint covariance of some blocks that the elimination connects.
@@ -69,7 +70,7 @@ Eigen::MatrixXd jointCovariance(const BlockCovariances& P, const std::vector<int
     for (const int j : blocks) {
       const Eigen::Index columns = P[j].at(j).rows();
       const auto& from = P[std::min(i, j)];
-      const auto found = from.find(std::max(i, j));  // none where a block is known
+      const auto found = from.find(std::max(i, j));  // none if one of them is held
       if (found != from.end() && i <= j) {
         result.block(row, column, rows, columns) = found->second;
         result.block(column, row, columns, rows) = found->second.transpose();
@@ -146,7 +147,7 @@ void BatchSmoother::addVehicle(const BatchVehicle& vehicle, Graph& graph) const 
 
 void BatchSmoother::constrain(const BatchVehicle& vehicle, Graph& graph) const {
   Graph::Node& node = graph.nodes.back();
-  if (std::exchange(node.moves_as_vehicle, true)) return;  // the scan of another radar told it
+  if (std::exchange(node.moves_as_vehicle, true)) return;  // by the scan of another radar
   const Eigen::Vector3d omega_I = imu_->mean(*node.motion->time, kVehicleGyroHalfWidth).angular_velocity;
   graph.window.add(std::make_unique<GroundVehicleFactor>(omega_I, vehicle.sigmas),
                    {node.motion, node.biases, graph.vehicle}, loss_);
@@ -269,7 +270,8 @@ void BatchSmoother::addTerms(const BatchScan& scan, const Graph::Scan& at, doubl
   Graph::Node& node = graph.nodes[at.node];
   const Time time = *node.motion->time;
   const std::vector<Block*> blocks = {node.motion, node.biases, at.offset, at.extrinsics};
-  // Placed anew where the offset moves, so first order is enough. A gain needs it: it is in the derivative.
+  // First order in t_O is enough, since nodes are placed again if the offset moves. A gain below 1 needs
+  // first order, since it multiplies the derivative.
   const auto placed = [&](auto z) {
     const bool is_linear = atMeasurement() || z.offset_gain < 1.0;
     z.linear_from_t_O = is_linear ? std::make_shared<const double>(t_O) : nullptr;
@@ -295,7 +297,7 @@ Block& BatchSmoother::addOffset(Window& window, Time time, double t_O) const {
 }
 
 Block& BatchSmoother::addBiases(Window& window, Time since, const StateBlock& x) const {
-  // Eliminated after the nodes that have them, but for the last one: so few rows fill up.
+  // With this time, they are eliminated after all but the last of their nodes. This keeps the fill-in small.
   return window.addNode(since + options_.window, bias_manifold_, storedBiases(x));
 }
 
@@ -326,20 +328,22 @@ BatchSolution BatchSmoother::solve(const BatchProblem& problem) const {
       moved = std::max(moved, std::abs(solution.scans[i].t_O - t_O[i]));
     const bool offsets_hold = !atMeasurement() || moved <= batch_.placement_tolerance;
     const bool placed = offsets_hold && mountingsHold(graph, solved, linear_from);
-    const bool swings = share < kLeastShare;
-    if (placed || swings || solution.iterations >= batch_.max_iterations) {
+    const bool oscillates = share < kLeastShare;
+    if (placed || oscillates || solution.iterations >= batch_.max_iterations) {
       const BlockCovariances P = solved.elimination.covariances();
       readCovariances(graph, solved, P, solution);
       solution.termination = solved.termination;
-      if (!solved.converged() && isNear(solved, P)) solution.termination = SolverTermination::kConverged;
-      if (solution.converged() && !placed && !isNear(solution, t_O))
-        solution.termination = swings ? SolverTermination::kNoDecrease : SolverTermination::kIterationLimit;
+      if (!solved.converged() && isNextStepSmall(solved, P))
+        solution.termination = SolverTermination::kConverged;
+      if (solution.converged() && !placed && !areOffsetsNear(solution, t_O))
+        solution.termination =
+            oscillates ? SolverTermination::kNoDecrease : SolverTermination::kIterationLimit;
       solution.system = std::move(solved.system);
       solution.system.blocks.clear();  // they go with the graph
       return solution;
     }
     if (offsets_hold) continue;
-    // The nodes of a sparse radar may swing: placed late, its offset comes out early, and then late again.
+    // The offset of a sparse radar may oscillate: nodes that are placed late make it early, and the reverse.
     if (moved > 0.5 * moved_before) share *= 0.5;
     moved_before = moved;
     for (std::size_t i = 0; i < t_O.size(); ++i) t_O[i] += share * (solution.scans[i].t_O - t_O[i]);

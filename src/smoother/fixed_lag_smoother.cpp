@@ -111,8 +111,8 @@ std::optional<PredictedState> FixedLagSmoother::predict(Time time,
 }
 
 double minNodeSpacing(TimeOffsetModel model) {
-  // The factor of the imu model bridges the rest exactly. That of the other model leaves it out, up to 1 cm/s
-  // in hard motion. With a spacing of 0.1 ms, rounding made the sigma of the position a third too small.
+  // The factor of the imu model integrates from node to scan. That of the other model does not, which costs
+  // up to 1 cm/s. With a spacing of 0.1 ms, rounding made the sigma of the position a third too small.
   return model == TimeOffsetModel::kImu ? 0.005 : 0.001;
 }
 
@@ -203,8 +203,7 @@ std::vector<NodeEstimate> FixedLagSmoother::marginalize(const std::vector<Random
 }
 
 Time FixedLagSmoother::imuNeededSince() const {
-  // Offsets move a radar factor's time by at most the bound to either side of its stamp, and the stamp lies
-  // within the bound of the node.
+  // The time of measurement is within max_time_offset of the stamp, and the stamp is within it of the node.
   return nodes_.front().time() - (2.0 * options_.max_time_offset + kMaxOffsetHalfWidth);
 }
 

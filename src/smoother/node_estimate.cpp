@@ -31,8 +31,8 @@ SlowMotion slowMotion(const std::vector<NodeEstimate>& nodes, std::size_t k, dou
   for (std::size_t i = k; i-- > 0 && add(nodes[i]);) continue;
   SlowMotion slow;
   slow.T_IR = linear_from;
-  // The IMU reaches kOffsetHalfWidth past the newest node. It may reach further, but then the order of the
-  // messages would change the result.
+  // The IMU reaches at least kOffsetHalfWidth past the newest node. With later samples, the result would
+  // depend on the order of the messages.
   const double reached = nodes.back().time + kOffsetHalfWidth - time;
   const ImuMean mean = imu.mean(time, std::min(half_width, reached));
   slow.omega_I = mean.angular_velocity - nodes[k].x.b_g();

@@ -33,19 +33,19 @@ NodePrior priorAtRest(const SmootherOptions& options, const ImuNoise& noise, con
   };
   const auto addVector = [&](int first, double sigma) { add(Eigen::Matrix3d::Identity(), first, sigma); };
 
-  // Theta lives in I, yaw is about the vertical of W.
+  // Theta is in I, yaw is about the vertical of W.
   const Eigen::Matrix3d R_WI = x.q_WI().toRotationMatrix();
   add(R_WI.row(2), S::kTheta, options.prior_sigma_yaw);
   addVector(S::kP, options.prior_sigma_position);
   addVector(S::kV, options.prior_sigma_velocity);
-  // A mean over T seconds leaves density / sqrt(T), besides what the bias does by itself.
+  // A mean over T seconds leaves density / sqrt(T). The gyro bias also has its own instability.
   const double root_T = std::sqrt(duration);
   addVector(S::kBg, std::hypot(options.prior_sigma_gyro_bias, noise.gyro_density / root_T));
   addVector(S::kBa, options.prior_sigma_accel_bias);
   for (Eigen::Index k = 0; k < calibration.size(); ++k)
     add(Eigen::MatrixXd::Identity(1, 1), S::kTangent + k, calibration[k]);
 
-  // The mean accelerometer, R_IW (0, 0, g) + b_a: also the platform may have gained velocity meanwhile.
+  // The mean of the accelerometer measures R_IW (0, 0, g) + b_a. The platform may have gained some velocity.
   const double gained = std::sqrt(2.0) * options.prior_sigma_velocity / duration;
   const double sigma = std::hypot(noise.accel_density / root_T, gained);
   Eigen::Matrix<double, 3, S::kTangent> J = Eigen::Matrix<double, 3, S::kTangent>::Zero();

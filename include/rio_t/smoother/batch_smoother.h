@@ -29,7 +29,7 @@ struct BatchScan {
   std::optional<RadarVelocityMeasurement> velocity;
   std::optional<DopplerMeasurement> doppler;  ///< instead of the velocity; neither: the scan is not used
   std::optional<double> rest_velocity_sigma;  ///< [m/s] set if the platform is at rest
-  bool moves_as_vehicle = false;              ///< the constraint of the vehicle holds at its node
+  bool moves_as_vehicle = false;              ///< its node gets the constraint of the vehicle
   bool offset_stepped = false;                ///< t_O may have stepped since the scan before
 
   /// Null if the scan is not used.
@@ -48,7 +48,7 @@ struct BatchVehicle {
   Eigen::Vector2d sigmas;  ///< [m/s] sideways and vertical
 };
 
-/// A mean of heights by the pressure, as for BarometerFactor.
+/// A mean of barometric heights, as for BarometerFactor.
 struct BatchHeight {
   Time time;
   double height = 0.0, sigma = 0.0;  ///< [m]
@@ -57,13 +57,13 @@ struct BatchHeight {
 
 struct BatchProblem {
   Time start;             ///< of the first node
-  NodePrior prior;        ///< on it, and on the calibration of `radar`
-  std::size_t radar = 0;  ///< which one the prior knows
+  NodePrior prior;        ///< on the first node, and on the calibration of `radar`
+  std::size_t radar = 0;  ///< index of the radar in `prior`
   std::vector<CalibrationPrior> radars;
   std::vector<BatchScan> scans;
   std::optional<BatchVehicle> vehicle;
   std::vector<BatchHeight> heights;  ///< in order of time
-  double barometer_drift = 0.0;      ///< [m/sqrt(s)] random walk of their bias
+  double barometer_drift = 0.0;      ///< [m/sqrt(s)] random walk of the bias of `heights`
   /// Initial states in order of time, at least one. The IMU carries them to the nodes.
   std::vector<NodeEstimate> guess;
 };
@@ -80,7 +80,7 @@ struct BatchSolution {
   std::vector<StateCovariance> covariances;  ///< marginal, of each node
   std::vector<Scan> scans;
   std::vector<Extrinsics> extrinsics;  ///< of each radar
-  /// Of each radar, in the tangent of ExtrinsicsManifold; empty where the extrinsics are not estimated.
+  /// Of each radar, in the tangent of ExtrinsicsManifold; empty if the extrinsics are not estimated.
   std::vector<Eigen::MatrixXd> extrinsics_covariances;
   /// The frame of the vehicle, if there is one, and the sigmas of its rotation [rad] about the axes of I.
   std::optional<Extrinsics> T_IV;
@@ -100,9 +100,9 @@ struct BatchSolution {
 /// block of biases holds for SmootherOptions::window seconds, and a random walk links it to the next. The
 /// bias of a barometer walks from mean to mean; the frame of a vehicle is one block for the whole run. The
 /// solver stops when the next step is shorter than a hundredth of a standard deviation in every direction.
-/// The solution stands if that step moves no block by more than a tenth of its standard deviation.
-/// With the imu model a node stands at the time of measurement of its scan. If the offset moves, the nodes
-/// are placed again (docs/method.md, section 10).
+/// The solution counts as converged if that step moves no block by more than a tenth of its standard
+/// deviation. With the imu model a node is at the time of measurement of its scan. If the offset moves, the
+/// nodes are placed again (docs/method.md, section 10).
 class BatchSmoother {
  public:
   /// `imu` must outlive the smoother. It must cover all scans, with max_time_offset to either side if
@@ -121,7 +121,7 @@ class BatchSmoother {
     struct Node {
       Block* motion = nullptr;
       Block* biases = nullptr;
-      bool rests = false, moves_as_vehicle = false;  ///< a term says so
+      bool rests = false, moves_as_vehicle = false;  ///< whether the node has these terms
     };
     std::vector<Node> nodes;
     std::vector<NodeEstimate> states() const;
@@ -137,9 +137,9 @@ class BatchSmoother {
     Block* barometer_bias = nullptr;  ///< the newest, if there is one
     struct Clock {
       Block* offset = nullptr;  ///< the newest
-      bool stepped = false;     ///< since the newest
+      bool stepped = false;     ///< t_O may have stepped since then
     };
-    std::vector<Clock> clocks;  ///< by radar; the first is that of all if the offset is shared
+    std::vector<Clock> clocks;  ///< by radar; if the offset is shared, all use the first
   };
   /// The solver starts from the nodes and extrinsics of `guess`, and the factors are linear in the mounting
   /// from there.
@@ -151,19 +151,19 @@ class BatchSmoother {
   void addNode(Time time, const StateBlock& x, Graph& graph) const;
   /// Returns the offset of a scan at the last node. Adds one if the newest belongs to an earlier node.
   Block* offsetOf(const BatchProblem& problem, const BatchScan& scan, double t_O, Graph& graph) const;
-  /// Adds what a scan shows: its points or its velocity, and rest.
+  /// Adds the terms of a scan: of its points or its velocity, and of rest.
   void addTerms(const BatchScan& scan, const Graph::Scan& at, double t_O, Graph& graph) const;
-  /// Adds the frame of the vehicle, which stands at the first node.
+  /// Adds the frame of the vehicle and its level start at the first node.
   void addVehicle(const BatchVehicle& vehicle, Graph& graph) const;
-  /// Constrains the last node to a motion of the vehicle.
+  /// Constrains the last node to the motion of a vehicle.
   void constrain(const BatchVehicle& vehicle, Graph& graph) const;
-  /// Adds the means of the pressures to the nodes that are near.
+  /// Adds the barometric heights, each to its nearest node.
   static void addHeights(const BatchProblem& problem, Graph& graph);
   Block& addOffset(Window& window, Time time, double t_O) const;
   /// Biases that hold from `since` on. The time of the block is their end, `window` later.
   Block& addBiases(Window& window, Time since, const StateBlock& x) const;
-  /// Whether no mounting is turned by more than a standard deviation from where the factors are linear. A
-  /// smaller turn is noise: to follow it would add it up.
+  /// Whether each mounting is within a standard deviation of where its factors are linear. A smaller turn is
+  /// noise, which would add up if the nodes were placed again for it.
   static bool mountingsHold(const Graph& graph, const Solution& solved,
                             const std::vector<Extrinsics>& linear_from);
   /// Sets nodes, scans and extrinsics of the solution, without covariances.

@@ -15,7 +15,7 @@
 
 namespace rio_t {
 
-/// [s] A scan as near as this to a node shares it: an IMU factor over no time would have infinite weight.
+/// [s] A scan this near to a node shares the node: an IMU factor over no time would have infinite weight.
 double minNodeSpacing(TimeOffsetModel model);
 
 /// A state carried to a time, with the joint covariance of it and of calibration blocks, in this order.
@@ -24,9 +24,9 @@ struct PredictedState {
   Eigen::MatrixXd covariance;
 };
 
-/// The states of the last `window` seconds, linked by the IMU; what leaves is marginalised. Sensors add their
-/// terms and calibration blocks to its window (paper, Fig. 2). All nodes share one block of
-/// biases. It walks when a node leaves, as calibration does.
+/// The states of the last `window` seconds, linked by the IMU. Older states are marginalised. Sensors add
+/// their terms and calibration blocks to its window (paper, Fig. 2). All nodes share one block of biases.
+/// When a node leaves, biases and calibration get the random walk of its interval.
 ///
 /// Nodes are in the order of their times, whatever the order of arrival. Not thread-safe.
 class FixedLagSmoother {
@@ -35,32 +35,32 @@ class FixedLagSmoother {
   FixedLagSmoother(const SmootherOptions& options, const ImuNoise& noise, const Eigen::Vector3d& g_W,
                    const ImuBuffer& imu);
 
-  /// Sets the noise of the IMU for the factors, and for the walk of the biases, to come.
+  /// Sets the noise of the IMU for all later factors and random walks.
   void setImuNoise(const ImuNoise& noise);
   /// Starts, or starts again, with one node and biases that have no prior yet. The caller adds calibration
   /// blocks and priors and then calls `settle`.
   Block& start(Time time, const StateBlock& x0);
-  /// Computes the covariances without a solve: after a start, and after a calibration block came.
+  /// Computes the covariances without a solve: after a start, and after a calibration block was added.
   void settle() { solution_ = linearized(window_); }
   bool started() const { return !nodes_.empty(); }
 
   Window& window() { return window_; }
   /// The biases that all nodes share. Only after start.
   Block& biases() { return *biases_; }
-  /// The node at `time`, created if none is near. Null if `time` is before the window. The IMU must cover
-  /// `time`.
+  /// The node at `time`, or within minNodeSpacing of it; created if there is none. Null if `time` is before
+  /// the window. The IMU must cover `time`.
   Block* nodeAt(Time time);
   /// The state at `time`, carried there from the newest node before it. None if `time` is before the window.
   std::optional<PredictedState> predict(Time time, const std::vector<const Block*>& calibration) const;
   /// The newest node that is not later than `time`. None if `time` is before the window.
   std::optional<NodeEstimate> nodeBefore(Time time) const;
-  /// Prior on calibration blocks that join a running window, with the sigmas of their tangents. It does not
-  /// constrain the newest node, but leaves the window with it; from then on the blocks walk.
+  /// Adds a prior on calibration blocks that join a running window, with the sigmas of their tangents. It
+  /// does not constrain the newest node, but leaves the window with it. From then on the blocks walk.
   void addCalibrationPrior(std::vector<Block*> calibration, const Eigen::VectorXd& sigmas);
-  /// The platform is at rest at a node; `velocity_sigma` [m/s] per axis.
+  /// Constrains a node to rest; `velocity_sigma` [m/s] per axis.
   void addZeroVelocity(Block& node, double velocity_sigma);
 
-  /// The position has drifted by this variance per axis [m^2]. It counts from the next `marginalize` on.
+  /// Adds a drift of the position with this variance per axis [m^2], from the next `marginalize` on.
   void addDrift(double variance) { drifted_ += variance; }
 
   const Solution& optimize();
@@ -96,7 +96,7 @@ class FixedLagSmoother {
   void linkToPrevious(std::size_t k);
   Eigen::MatrixXd covarianceOf(const Block& node, const std::vector<const Block*>& calibration) const;
   std::vector<const Block*> leavingWith(const Block& node) const;
-  /// From `node` to `to`. A scan needs the same one for its prediction and for its node.
+  /// From `node` to `to`. Cached, since a scan needs the same one for its prediction and for its node.
   const Preintegration& preintegrateFrom(const Node& node, Time to) const;
 
   SmootherOptions options_;  // read-only after construction, as g_W_, imu_ and the manifolds
@@ -107,7 +107,7 @@ class FixedLagSmoother {
   Window window_;
   std::shared_ptr<Block> biases_;
   std::vector<Node> nodes_;
-  double drifted_ = 0.0;  ///< [m^2] that no prior contains yet
+  double drifted_ = 0.0;  ///< [m^2] drift that no prior contains yet
   Solution solution_;     ///< of the last solve
   struct LastPreintegration {
     Time from, to;

@@ -20,13 +20,12 @@ struct NodeEstimate {
 std::size_t nearestNode(const std::vector<NodeEstimate>& nodes, Time time);
 
 /// Mean motion around the node k of `nodes`, in the order of their times. The weights fall linearly to zero
-/// at `half_width` [s] to either side, as those of ImuBuffer::mean. `T_IR` is the mounting that belongs to
-/// the nodes: together they give the velocity that the radar measures. The factor is linear from
-/// `linear_from`.
+/// at `half_width` [s] to either side, as those of ImuBuffer::mean. `T_IR` is the mounting that was estimated
+/// with the nodes. The factor is linear from `linear_from`.
 SlowMotion slowMotion(const std::vector<NodeEstimate>& nodes, std::size_t k, double half_width,
                       const ImuBuffer& imu, const Extrinsics& T_IR, const Extrinsics& linear_from);
 
-/// Keeps the angular velocity about the axes about which the platform turns in these motions.
+/// Projects the angular velocities onto the axes about which the platform turns in these motions.
 void keepTurns(const std::vector<SlowMotion*>& motions);
 
 }  // namespace rio_t

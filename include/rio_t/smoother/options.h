@@ -22,9 +22,9 @@ struct SmootherOptions {
 
   bool estimate_time_offset = true;  ///< false: LC-RIO, offset fixed at time_offset_initial
   TimeOffsetModel time_offset_model = TimeOffsetModel::kImu;
-  double time_offset_noise = 2.0e-5;  ///< [s/sqrt(s)] random walk of the offset, while it is constant
-  /// [m/s^2] A scan with less acceleration does not tell the offset: at rest and at constant velocity it
-  /// shows only noise.
+  double time_offset_noise = 2.0e-5;  ///< [s/sqrt(s)] random walk of the offset between its steps
+  /// [m/s^2] A scan with less acceleration gives no information about the offset: at rest and at constant
+  /// velocity the derivative is only noise.
   double time_offset_min_acceleration = 0.2;
   double max_time_offset = 0.25;    ///< [s] bound on |t_O|
   bool time_offset_shared = false;  ///< all radars have one clock and so one t_O
