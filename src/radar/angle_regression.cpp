@@ -30,8 +30,8 @@ AngleRegression::AngleRegression(const std::vector<double>& measured, double noi
   if (!std::isfinite(spread.variance)) return;
   const double within = varianceWithin(measured, scan_mean_, spread);
   share_ = trueShare(within, noise);
-  // The mean of true^2 grows with a measured angle by the third moment over `within`, the square of the
-  // expected angle by share^2 of that. Noise without skewness leaves the third moment as it is.
+  // The mean of true^2 grows with the measured angle by the third moment over `within`. The square of the
+  // expected angle grows by share^2 times that. Noise without skewness does not change the third moment.
   growth_ = (1.0 - square(share_)) * spread.skewness * std::sqrt(within);
   const double of_means = spread.variance - spread.within + spread.within / n;
   const double mean_share = trueShare(of_means, noise / n);

@@ -6,9 +6,10 @@
 
 namespace rio_t {
 
-/// The true angles of the points of a scan, by linear regression on the measured ones: a point is expected
-/// between where it was measured and the mean of its scan, and this mean between where it was measured and
-/// that of earlier scans. The error of an expected angle does not correlate with it (docs/method.md, 5.7).
+/// The expected true angles of the points of a scan, by linear regression on the measured ones. The expected
+/// angle of a point is between its measured angle and the mean of the scan. The expected mean of a scan is
+/// between its measured mean and that of earlier scans. The error of an expected angle does not correlate
+/// with it (docs/method.md, 5.7).
 class AngleRegression {
  public:
   /// `measured` are the angles of the scan [rad], at least one. `noise` is the variance of one [rad^2].
@@ -24,7 +25,7 @@ class AngleRegression {
   double mean_ = 0.0;  // expected
   double share_ = 1.0;
   double remaining_ = 0.0;
-  double growth_ = 0.0;  // of the squares that `expected` leaves out, by the measured angle [rad]
+  double growth_ = 0.0;  // derivative of the squared error of `expected` by the measured angle [rad]
 };
 
 }  // namespace rio_t

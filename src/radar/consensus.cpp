@@ -14,7 +14,7 @@
 namespace rio_t {
 namespace {
 
-constexpr int kSides[] = {0, -1, 1};  // [spans] that a Doppler may have come back from
+constexpr int kSides[] = {0, -1, 1};  // [spans] by which a Doppler may have wrapped around
 
 /// Draws of indices without std::uniform_int_distribution, whose results differ between standard libraries.
 class IndexDraw {

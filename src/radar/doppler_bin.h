@@ -38,9 +38,9 @@ inline DopplerDensity dopplerDensity(double e, double variance, double quantizat
   return {value, value * 0.5 * (e * e - whole) / (whole * whole)};
 }
 
-/// Fisher information of a Doppler about `variance`, the mean over where in its bin the velocity may lie. A
-/// bin that is wider than the noise informs near its edges only: the integral over z of z^2 phi(z)^2 / (8
-/// Phi(z) Phi(-z)) is 0.276.
+/// Fisher information of a Doppler about `variance`, averaged over the place of the velocity in the bin. A
+/// bin that is wider than the noise has information near its edges only: the integral over z of z^2 phi(z)^2
+/// / (8 Phi(z) Phi(-z)) is 0.276.
 inline double varianceInformation(double variance, double quantization) {
   const double half_bin = std::sqrt(3.0 * quantization);
   const double sigma = std::sqrt(variance);

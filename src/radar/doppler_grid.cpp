@@ -9,13 +9,13 @@
 namespace rio_t {
 namespace {
 
-/// [steps] The driver may round or convert a value; it changes the value by up to this much. A value of a
-/// radar without steps is so near to a multiple once in 500 times.
+/// [steps] Rounding and conversion by the driver change a value by up to this. A value of a radar without
+/// steps is so near to a multiple once in 500 times.
 constexpr double kRounding = 1e-3;
-/// [steps] The tolerance of a value grows with the value. A value that needs a larger tolerance than this, 20
-/// times the value that the step was read off, is a misfit.
+/// [steps] The tolerance of a value grows with the value. A value that needs a larger tolerance than this is
+/// a misfit. It is 20 times the value that the step was read off.
 constexpr double kMaxTolerance = 0.02;
-/// Two values that differ by this share are the same: floats, or computed from floats.
+/// Two values that differ by less than this share are the same up to the rounding of floats.
 constexpr double kSame = 1e-6;
 /// The number of misfits (values that are no multiples) that a batch of 16 may have. If every fiftieth value
 /// of a radar is a misfit, one batch in 270 has more, and four in a row never have. If every twentieth is,
@@ -129,12 +129,12 @@ void DopplerGrid::judge() {
       without_step_ = 0;
       return;
     }
-    // Perhaps all values so far were multiples of two steps, or three.
+    // Perhaps the true step is a half of the known one, or a third, and so on.
     found = largestStep(batch_, {read_.value, known_at_}, kLeastStep);
   }
   if (!found) {
-    // If all values are the same, nobody knows how many steps that value is. Half of the batch waits for
-    // another value. Until then the step is taken as the largest that it can be.
+    // If all values are the same, they do not show how many steps the value is. The detector keeps half of
+    // the batch and waits for another value. Until then the step is the largest possible one.
     if (mostWithin(batch_, 4.0 * kRounding) + kMaxMisfits >= kBatch) {
       const double value = batch_[kBatch / 2];
       const bool repeats = mostWithin(batch_, kSame) + kMaxMisfits >= kBatch;
@@ -153,7 +153,7 @@ void DopplerGrid::judge() {
     read_ = {found->step, DopplerSource::kData};
     known_at_ = found->known_at;
   } else if (2 * mostWithin(batch_, kSame) < kBatch && ++without_step_ >= kBatchesWithoutStep) {
-    // Without steps no value repeats. At rest, among misfits, one step does.
+    // Without steps, no value repeats. At rest, the value of one step repeats, even among misfits.
     read_ = {0.0, DopplerSource::kData};
   }
 }

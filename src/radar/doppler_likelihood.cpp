@@ -53,9 +53,8 @@ Residual coarseResidual(double z, double half, double centre, double outlier) {
   return {std::copysign(value, z), (density(size - half) - density(size + half)) / ((bin + floor) * value)};
 }
 
-/// Whether the points surely show by themselves how far an angle spreads, and that its noise is a small part.
-/// `angles` are the measured ones, `noise` is their variance. The variance of n samples has a relative
-/// standard deviation of sqrt(2 / n).
+/// Whether the measured `angles` of a scan surely spread much more than by their noise. `noise` is its
+/// variance. The variance of n samples has a relative standard deviation of sqrt(2 / n).
 bool showsSpread(const std::vector<double>& angles, double noise) {
   const auto n = static_cast<double>(angles.size());
   const double mean = std::accumulate(angles.begin(), angles.end(), 0.0) / n;
@@ -64,7 +63,7 @@ bool showsSpread(const std::vector<double>& angles, double noise) {
   return squares / n * (1.0 - kSurely * std::sqrt(2.0 / n)) > kSpreads * noise;
 }
 
-/// The directions that the measured angles lead us to expect. The Dopplers have no part in them.
+/// The expected true directions, given the measured angles but not the Dopplers.
 struct ExpectedDirections {
   PointVariances shown;                 ///< noise that `u_R` still has
   std::vector<Eigen::Vector3d> u_R;     ///< expected
@@ -72,11 +71,11 @@ struct ExpectedDirections {
   std::vector<double> variances;        ///< of the residuals, without `shown` [m^2/s^2]
 };
 
-// The noise of an angle is in the measured direction and in the residual. Two ways undo what this does:
-// - Many points show by themselves how far they spread. Then the sigma of a residual grows with the velocity,
-//   and its derivative undoes it (`shown`: errors in variables).
-// - Few points do not. Then the true angle is expected nearer to the mean than the measured one, by what
-//   earlier scans have shown (`left`, after the regression). The error of this angle is not in the direction.
+// The noise of an angle is in both the direction and the residual, which biases the velocity. Corrections:
+// - Many points show their spread by themselves. Then the sigma of a residual grows with the velocity, and
+//   its derivative corrects the bias (`shown`: errors in variables).
+// - Few points do not. Then the expected angle is nearer to the mean than the measured one, by regression on
+//   earlier scans. Its error (`left`) does not correlate with the expected direction.
 ExpectedDirections expectedDirections(const std::vector<RadarDirection>& points, const Eigen::Vector3d& v_R,
                                       const PointVariances& noise) {
   const std::vector<double> azimuths = anglesOf(points, azimuthOf);
@@ -118,9 +117,9 @@ ExpectedDirections expectedDirections(const std::vector<RadarDirection>& points,
     result.variances.push_back(residualVariance(Angles(result.u_R.back()), v_R, left));
     mean_variance += result.variances.back() / static_cast<double>(points.size());
   }
-  // Without bins this is least squares, and all points have the same variance: the regression is right for
-  // all of them together, not at each measured angle, and weights that differ with the angle would prefer
-  // some. Bins wider than the noise bound the velocity by their edges, as sharp as the noise of a point.
+  // Without wide bins this is least squares, and all points get the same variance: the regression is right
+  // over all points, but not at each angle, so the weights must not depend on the angle. Bins wider than the
+  // noise bound the velocity by their edges, which are as sharp as the noise of each point.
   if (3.0 * noise.quantization <= mean_variance) result.variances.assign(points.size(), mean_variance);
   return result;
 }
@@ -210,8 +209,8 @@ double DopplerLikelihood::residual(std::size_t i, const Eigen::Vector3d& v_R,
   return r.value;
 }
 
-// The error of rounding has the variance q^2/12, and the points that read one bin share it. Of a bin of half
-// width h, the likelihood is flat but for the share s/h near its edges, where J'J tells.
+// The error of rounding has the variance q^2/12, and all points that read one bin share it. Within a bin of
+// half width h, the likelihood is flat except for the share s/h near the edges, which J'J has.
 Eigen::Matrix3d DopplerLikelihood::binInformation() const {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   if (!(half_bin_ > smallest_sigma_)) return information;

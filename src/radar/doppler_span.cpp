@@ -8,13 +8,12 @@
 namespace rio_t {
 namespace {
 
-/// [steps] Rounding and the noise of a direction may move a point by this much. A point must lie beyond the
-/// Dopplers seen by more, and be a span off to within less.
+/// [steps] Rounding and the noise of a direction may move a point by this much. So a point is beyond the
+/// Dopplers seen if it exceeds them by more, and it is one span off to within less.
 constexpr double kClearly = 1.5;
-/// The number of scans that shows a span. The points of one scan share its velocity, so they are one witness.
-/// It is no chance if ten scans more show the span than do not. As many points reach as far as an end of the
-/// span. As many beyond it show that it is too small, but not one now and then. Fewer are errors of the
-/// transmission.
+/// A span is found if so many scans more show it than do not. The points of one scan share its velocity, so
+/// they count once. An end of the span is where so many points have been: fewer may be errors of the
+/// transmission. So many points beyond it in a short time show that the span is too small.
 constexpr std::size_t kEnough = 10;
 /// [spans] A step may be finer than the noise; it then counts as this.
 constexpr double kFinestStep = 0.05;
@@ -37,7 +36,7 @@ bool DopplerSpan::reachesBothEnds(const std::vector<RadarDirection>& points, dou
          any([high](const RadarDirection& p) { return p.doppler > high; });
 }
 
-/// Takes the points into the range of Dopplers, or drops a span that is too small.
+/// Extends the range of Dopplers by the points, or drops a span that is too small.
 void DopplerSpan::widen(const std::vector<RadarDirection>& points, double step) {
   const double margin = clearly(step);
   int outside = 0;
@@ -72,8 +71,8 @@ void DopplerSpan::learn(const std::vector<RadarDirection>& points, const std::op
   if (found_ || !before) return;
   std::size_t beyond = 0;    // points whose Doppler must lie beyond those seen
   std::size_t back = 0;      // of these, the ones that are a span off
-  std::size_t as_read = 0;   // points that the Dopplers of the scan before explain as they read
-  std::size_t wrapping = 0;  // points that they explain if they may come back
+  std::size_t as_read = 0;   // points that the scan before explains as they read
+  std::size_t wrapping = 0;  // points that the scan before explains if they may have wrapped around
   for (const RadarDirection& p : points) {
     if (std::abs(p.doppler + p.u_R.dot(before->as_read)) < margin) ++as_read;
     const double expected = -p.u_R.dot(before->wrapping);

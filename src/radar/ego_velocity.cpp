@@ -13,7 +13,7 @@
 namespace rio_t {
 namespace {
 
-constexpr double kTellsSide = 1.0 / 12.0;  // [spans] a quarter at three sigma
+constexpr double kTellsSide = 1.0 / 12.0;  // [spans] sigma of a prior that unwraps: a quarter at three sigma
 constexpr double kAgrees = 3.0;            // [sigma] of a point
 
 std::vector<RadarDirection> filter(const RadarScan& scan, const EgoVelocityOptions& o) {
@@ -58,8 +58,8 @@ VelocitySolution solveMotion(const std::vector<RadarDirection>& points, const Po
                                                       : solveLikelihood(inliers, noise, first.v_R, o);
 }
 
-/// `result`, whose points are given, with the solution; or with why it does not count. `valid` is its status
-/// if it does. A rest may be as vague as the bins make it; a motion may not.
+/// Completes `result`, which has its points: with the solution and the status `valid`, or with the reason why
+/// the solution is refused. `max_sigma` holds for motion only: bins may leave more at rest.
 EgoVelocity concluded(EgoVelocity result, const std::vector<RadarDirection>& inliers,
                       const VelocitySolution& solution, EgoVelocityStatus valid,
                       const EgoVelocityOptions& o) {
@@ -73,9 +73,9 @@ EgoVelocity concluded(EgoVelocity result, const std::vector<RadarDirection>& inl
     result.v_R = solution.v_R;
     result.covariance = solution.covariance;
     result.covariance.diagonal() += result.added_variance;
-    const bool is_vague =
+    const bool is_uncertain =
         valid == EgoVelocityStatus::kMoving && largestSigma(result.covariance) > o.max_sigma;
-    result.status = is_vague ? EgoVelocityStatus::kSigmaTooLarge : valid;
+    result.status = is_uncertain ? EgoVelocityStatus::kSigmaTooLarge : valid;
   }
   return result;
 }
@@ -100,8 +100,8 @@ PointVariances startNoise(const EgoVelocityOptions& o) {
   return noise;
 }
 
-/// The options with the step that holds, and with the thresholds that were left to it (0).
-/// - Inlier: the step rounds by up to half of itself; 2.5 sigma keep 99 % of the noise besides.
+/// The options with the step in use. Thresholds that are 0 follow from it:
+/// - Inlier: rounding moves a Doppler by up to half a step, and 2.5 sigma keep 99 % of the noise.
 /// - Zero: within the zero bin. If the noise is larger than that, 1.5 sigma keep 87 % of the points at rest,
 ///   and zero_velocity_outlier_fraction of them may lie beyond.
 /// A sigma of 0 counts as PointNoise::kMinStartDopplerSigma.
@@ -139,8 +139,8 @@ bool EgoVelocityEstimator::observe(const RadarScan& scan) {
   return true;
 }
 
-/// Needs no estimate: before the start there is none, and one that took wrapped Dopplers at face value would
-/// never show the span.
+/// Uses no estimate of the smoother: before the start there is none, and one that took wrapped Dopplers at
+/// face value would never show the span.
 void EgoVelocityEstimator::learnSpan(const std::vector<RadarDirection>& points) {
   span_.learn(points, std::exchange(before_, std::nullopt), options_.doppler_quantization);
   const bool may_show = span_.value() == 0.0 && span_.reachesBothEnds(points, options_.doppler_quantization);
@@ -225,7 +225,7 @@ EgoVelocity EgoVelocityEstimator::around(const RadarScan& scan, const VelocityPr
 
 EgoVelocity EgoVelocityEstimator::staticWorld(const RadarScan& scan, const EgoVelocity& estimated,
                                               const std::optional<VelocityPrior>& prior) const {
-  // Around the velocity of the scan itself, such a threshold reaches the points that read the next bin.
+  // With a threshold of a step or more, the inliers of the scan include points that read the next bin.
   const bool reaches_next_bin = options_.ransac_inlier_threshold >= options_.doppler_quantization;
   if (!prior || reaches_next_bin) return estimated;
   const EgoVelocity predicted = around(scan, *prior);

@@ -14,8 +14,8 @@ namespace {
 
 /// The noise at the start counts as n points, whose residuals show nothing but that noise.
 constexpr double kStartPoints = 10.0;
-/// [scans] that PointNoise remembers, 100 s at 10 Hz. At a walk they show the elevation noise, which shows
-/// least, to 3 %.
+/// [scans] that PointNoise remembers, 100 s at 10 Hz. At a walk they show the noise of the elevation, the
+/// least observable one, to 3 %.
 constexpr double kMemory = 1000.0;
 /// [scans] over which changes of the spread of the directions show: a platform turns within seconds.
 constexpr double kViewMemory = 100.0;
@@ -31,8 +31,8 @@ constexpr double kMinStartAngleSigma = 0.01;  // [rad]
 /// [m^2/s^2] Variance of a residual; it bounds the weights if there is no noise at all.
 constexpr double kMinVariance = 1e-4;
 
-/// Share of a new scan in what is known, after n scans.
-double forgotten(double scans) { return std::max(1.0 / kMemory, 1.0 / (scans + 1.0)); }
+/// Weight of a new scan among all, after n scans.
+double weightOfNewScan(double scans) { return std::max(1.0 / kMemory, 1.0 / (scans + 1.0)); }
 
 /// Variance of the logarithm of a variance that has n degrees of freedom: trigamma of half of them.
 double varianceOfLogarithm(double freedom) {
@@ -99,7 +99,7 @@ void PointNoise::learn(const std::vector<RadarDirection>& points, const DopplerL
   const Eigen::Matrix3d covariance = velocity.information.inverse();
 
   ++scans_;
-  const double share = forgotten(scans_);
+  const double share = weightOfNewScan(scans_);
   information_ *= 1.0 - share;
   information_vector_ *= 1.0 - share;
   const auto count = static_cast<double>(points.size());
@@ -118,7 +118,8 @@ void PointNoise::learn(const std::vector<RadarDirection>& points, const DopplerL
     };
     const DopplerDensity density = densityAt(residual);
     const double probability = density.value / (density.value + variances_.outlier_density);
-    // A fit hides some of the noise. So this is a mean over the velocities left open, by three points.
+    // The fit absorbs some of the noise. So the slope is averaged over the uncertainty of the velocity, by a
+    // quadrature with three points.
     const double open = std::sqrt(std::max(0.0, 3.0 * p.u_R.dot(covariance * p.u_R)));
     const double slope =
         (slopeOf(densityAt(residual - open)) + 4.0 * slopeOf(density) + slopeOf(densityAt(residual + open))) /
@@ -140,7 +141,7 @@ void PointNoise::learn(const std::vector<RadarDirection>& points, const DopplerL
   // All points of a scan count alike. A weight that differs with the direction would depend on its noise.
   const double faster = mean_squared_speed_ > 0.0 ? squared_speed / mean_squared_speed_ : 1.0;
   const double weight = informationAbout({1.0, faster * mean_shares_[1], faster * mean_shares_[2]});
-  // An angle has no more noise than spread.
+  // The noise of an angle is at most its spread.
   PointVariances possible = variances_;
   possible.azimuth = std::min(possible.azimuth, possible.azimuths.variance);
   possible.elevation = std::min(possible.elevation, possible.elevations.variance);
@@ -167,7 +168,7 @@ void PointNoise::solve() {
   const Eigen::Vector3d most =
       Eigen::Vector3d(kMaxDopplerSigma, kMaxAngleSigma, kMaxAngleSigma).cwiseAbs2().cwiseMax(start_);
   Eigen::Vector3d x = vectorOf(variances_);
-  // A start that is too small must not count for more because of that.
+  // A start that is too small must not get a larger weight because of that.
   const Eigen::Vector3d start_information =
       0.5 * kStartPoints * x.cwiseMax(start_).cwiseMax(least).cwiseAbs2().cwiseInverse();
   Eigen::Matrix3d A = information_;

@@ -10,7 +10,7 @@ namespace {
 
 using Complex = std::complex<double>;
 
-/// [rad^2] Less noise counts as this: its share is a quotient of two that vanish.
+/// [rad^2] Lower limit of the variance of an angle: without noise, its share would be 0 / 0.
 constexpr double kLeastVariance = 1e-6;
 
 /// e^(k s / 2) for a variance s and k = q^2 + 2 p q, |q| <= 1 with |p| <= 3 or |q| <= 2 with |p| <= 2.

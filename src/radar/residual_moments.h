@@ -13,8 +13,8 @@ namespace rio_t {
 ///
 /// The squares are summed with three weights, which tell the three variances apart: one, and the squares of
 /// the derivatives of the radial speed by azimuth (over the cosine of the elevation) and by elevation. These
-/// derivatives are known at the measured direction only, and its noise is also in r. What a sum is on average
-/// follows from the measured directions alone, for angles with normal noise exactly (docs/method.md, 9.2).
+/// derivatives are known at the measured direction only, and its noise is also in r. The expected sums follow
+/// from the measured directions alone, exactly for angles with normal noise (docs/method.md, 9.2).
 class ResidualMoments {
  public:
   /// `v_R` [m/s] is the radar's velocity.
@@ -22,10 +22,10 @@ class ResidualMoments {
 
   /// The weights of a point with the measured direction `u_R`.
   Eigen::Vector3d weights(const Eigen::Vector3d& u_R) const;
-  /// Counts such a point as `share` of one.
+  /// Adds a point with the weight `share`.
   void add(const Eigen::Vector3d& u_R, double share);
-  /// Row i times the variances is the expected sum of weight i times r^2. The angles are not linear in their
-  /// variances; it holds at those of `noise`.
+  /// Row i times the variances is the expected sum of weight i times r^2. This sum is not linear in the
+  /// variances of the angles, so the rows are exact at those of `noise`.
   Eigen::Matrix3d shares(const PointVariances& noise) const;
 
  private:

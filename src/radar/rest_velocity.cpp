@@ -13,8 +13,8 @@
 namespace rio_t {
 namespace {
 
-/// Twice the log-likelihood ratio of a slow motion to rest: once in 1000 scans at rest (chi-squared, 3
-/// degrees of freedom).
+/// Twice the log-likelihood ratio of a slow motion to rest. At rest, one scan in 1000 exceeds it
+/// (chi-squared, 3 degrees of freedom).
 constexpr double kDeniesRest = 16.3;
 /// [rad] 15 degrees, the beam of a radar with few antennas: the echoes of one object lie within it.
 constexpr double kCellWidth = 0.26;
@@ -31,9 +31,9 @@ std::vector<RadarDirection> slowerThan(double limit, const std::vector<RadarDire
   return slow;
 }
 
-/// Minus the log-likelihood of rest if some of the points read the bin beside zero for reasons of their own,
-/// on either side. DopplerLikelihood takes the points as independent, so it holds that so many of them cannot
-/// be wrong by chance.
+/// Minus the log-likelihood of a rest at which a share of the points reads the bin beside zero, on either
+/// side, as echoes do that move by themselves. In DopplerLikelihood, points err independently, so many of
+/// them would never read that bin by chance.
 double restWithPointsBeside(const std::vector<RadarDirection>& points, const EgoVelocityOptions& o) {
   const auto n = static_cast<double>(points.size());
   const auto beside = static_cast<double>(

@@ -8,7 +8,7 @@
 
 namespace rio_t {
 
-/// Enough points read zero for a platform at rest: `zero_velocity_outlier_fraction` of them may read more.
+/// Whether enough points read zero for a platform at rest: `zero_velocity_outlier_fraction` may read more.
 bool mostReadZero(const std::vector<RadarDirection>& points, const EgoVelocityOptions& options);
 
 /// The points that read zero.

@@ -13,8 +13,8 @@ namespace rio_t {
 namespace {
 
 constexpr int kMaxIterations = 10;
-/// A step that promises to lower the cost by less is the last one: a tenth of a sigma, over which the
-/// likelihood is quadratic.
+/// If the next step is expected to lower the cost by less than this, it is the last one. It is then a tenth
+/// of a sigma, over which the likelihood is quadratic.
 constexpr double kLittleProgress = 0.5e-2;
 
 VelocityCost costAt(const Eigen::Vector3d& v_R, const DopplerLikelihood& likelihood,
@@ -57,7 +57,7 @@ LikeliestVelocity findLikeliest(const DopplerLikelihood& likelihood,
                                 const std::optional<VelocityPrior>& prior, const Eigen::Vector3d& v_R) {
   Eigen::Vector3d best_R = v_R;
   VelocityCost cost = costAt(v_R, likelihood, prior);
-  // At first a step may be as long as one point allows.
+  // At first a step may be about as long as the sigma of one point.
   double damping = 1.0 / (square(likelihood.halfBin()) / 3.0 + square(likelihood.smallestSigma()));
   for (int i = 0; i < kMaxIterations; ++i) {
     Eigen::Matrix3d damped = cost.information;
@@ -111,8 +111,8 @@ VelocitySolution solveLeastSquares(const std::vector<RadarDirection>& points,
 VelocitySolution solveLikelihood(const std::vector<RadarDirection>& points, const PointVariances& noise,
                                  const Eigen::Vector3d& v_R, const EgoVelocityOptions& options) {
   PointVariances known = noise;
-  known.outlier_density = kMinOutlierDensity;  // RANSAC has left them out
-  // The scan alone tells how far it spreads: an object in a corner of the view must not pass for the world.
+  known.outlier_density = kMinOutlierDensity;  // RANSAC has removed the outliers
+  // The spread is that of this scan alone, or an object in a corner of the view could pass for the world.
   known.azimuths = spreadOf(anglesOf(points, azimuthOf));
   known.elevations = spreadOf(anglesOf(points, elevationOf));
   const LikeliestVelocity likeliest = findLikeliest(DopplerLikelihood(points, v_R, known), std::nullopt, v_R);

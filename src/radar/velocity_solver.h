@@ -16,7 +16,7 @@ struct LikeliestVelocity {
   Eigen::Matrix3d information;  ///< of the points, of their bins and of the prior; may be singular
 };
 
-/// The likeliest velocity of a scan whose `prior`, if any, knows nothing of it. The search begins at `v_R`.
+/// The likeliest velocity of a scan and an independent `prior`, if any. The search begins at `v_R`.
 LikeliestVelocity findLikeliest(const DopplerLikelihood& likelihood,
                                 const std::optional<VelocityPrior>& prior, const Eigen::Vector3d& v_R);
 
@@ -33,8 +33,8 @@ double largestSigma(const Eigen::Matrix3d& covariance);
 VelocitySolution solveLeastSquares(const std::vector<RadarDirection>& points,
                                    const EgoVelocityOptions& options);
 
-/// The likeliest velocity; see DopplerLikelihood. The search begins at `v_R`. Residuals larger than `noise`
-/// promises widen the covariance.
+/// The likeliest velocity; see DopplerLikelihood. The search begins at `v_R`. Residuals that are larger than
+/// `noise` predicts widen the covariance.
 VelocitySolution solveLikelihood(const std::vector<RadarDirection>& points, const PointVariances& noise,
                                  const Eigen::Vector3d& v_R, const EgoVelocityOptions& options);
 

@@ -9,7 +9,7 @@ namespace rio_t {
 // elevation is positive up [rad].
 inline double azimuthOf(const Eigen::Vector3d& p_R) { return std::atan2(p_R.x(), p_R.y()); }
 inline double elevationOf(const Eigen::Vector3d& p_R) { return std::atan2(p_R.z(), p_R.head<2>().norm()); }
-/// The unit vector.
+/// Unit vector of a direction.
 inline Eigen::Vector3d directionOf(double azimuth, double elevation) {
   return {std::cos(elevation) * std::sin(azimuth), std::cos(elevation) * std::cos(azimuth),
           std::sin(elevation)};

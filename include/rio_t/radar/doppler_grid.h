@@ -19,8 +19,8 @@ std::string toString(DopplerSource source);  ///< "unknown", "given" or "data"
 
 /// The step or the span of a radar's Doppler, as far as it is known.
 struct KnownDoppler {
-  /// [m/s] Step: 0 if the Doppler has none, or so small ones that they do not matter; the largest that it can
-  /// be while it is unknown. Span: 0 if the data show none.
+  /// [m/s] A step: 0 if the Doppler has none, or negligible ones; the largest possible one while it is
+  /// unknown. A span: 0 if the data show none.
   double value = 0.0;
   DopplerSource source = DopplerSource::kUnknown;
 };
@@ -34,8 +34,8 @@ struct KnownDoppler {
 /// section 9.7). The answer depends only on the values and their order. Not thread-safe.
 class DopplerGrid {
  public:
-  /// `given` is the step [m/s] that holds. 0: the one that the data show; any other value below 0.02: the
-  /// radar has none. Throws std::invalid_argument if it is negative or not finite.
+  /// `given` [m/s] is the step. 0: the data show it; another value below 0.02: the radar has none. Throws
+  /// std::invalid_argument if it is negative or not finite.
   explicit DopplerGrid(double given);
 
   /// Takes all points of a scan, wherever they lie. 45 points take 1 us. If the radar has no steps, `add`
@@ -45,8 +45,8 @@ class DopplerGrid {
   /// As the data show it, even if another one is given.
   KnownDoppler read() const { return read_; }
 
-  /// [m/s] The step while all values are zero: the largest of the usual steps, 0.03 to 0.5. A smaller one
-  /// would take a slow motion for rest, and be sure of it.
+  /// [m/s] The step while all values are zero: the largest of the usual steps, 0.03 to 0.5. With a smaller
+  /// one, a slow motion would look like certain rest.
   static constexpr double kLargestUsualStep = 0.5;
   /// [m/s] A smaller step counts as none. Its sigma, step / sqrt(12), adds 1.4 % to a noise of 0.035 m/s.
   static constexpr double kLeastStep = 0.02;
@@ -61,8 +61,8 @@ class DopplerGrid {
 
   std::optional<KnownDoppler> given_;  // read-only after construction
   KnownDoppler read_{kLargestUsualStep, DopplerSource::kUnknown};
-  double known_at_ = 1.0;  ///< [steps] of the value that it was read off
-  Batch batch_ = {};       ///< sizes of Dopplers [m/s]
+  double known_at_ = 1.0;  ///< [steps] value that the step was read off
+  Batch batch_ = {};       ///< absolute Dopplers [m/s]
   std::size_t count_ = 0;  ///< of `batch_` that are in use
   int without_step_ = 0;   ///< batches in a row
 };

@@ -15,8 +15,8 @@ struct VelocityCost {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< J'J; may be singular
 };
 
-/// The same cost if the points share an error of the velocity, at its minimum over this error. `variances`
-/// [m^2/s^2] are those of the error's axes. `error` receives the error at the minimum [m/s], if given.
+/// The minimum of the cost over an error of the velocity that all points share. `variances` [m^2/s^2] are
+/// those of the error along its axes. `error` receives the error at the minimum [m/s], if given.
 VelocityCost withSharedError(const VelocityCost& cost, const Eigen::Vector3d& variances,
                              Eigen::Vector3d* error = nullptr);
 
@@ -34,8 +34,9 @@ Eigen::Vector3d solveTransposed(const Eigen::Matrix3d& U, const Eigen::Vector3d&
 /// probability, the point is an outlier, and its Doppler can be anything.
 /// - Bin: a bin wider than the noise bounds the velocity along the ray and does not pull it to the centre.
 /// - Noise of the direction: it widens the sigma of a residual, and it shortens the velocity of plain least
-///   squares. Many points undo the latter by the derivative of that sigma (total least squares); few points
-///   by a direction between the measured one and the mean of earlier scans (regression calibration).
+///   squares. With many points, the derivative of that sigma corrects the velocity (total least squares).
+///   With few points, the direction is taken between the measured one and the mean of earlier scans
+///   (regression calibration).
 /// - Outliers: the residual is bounded, so that an outlier has no weight (a redescending loss).
 class DopplerLikelihood {
  public:
@@ -52,15 +53,15 @@ class DopplerLikelihood {
   std::size_t size() const { return points_.size(); }
   double smallestSigma() const { return smallest_sigma_; }  ///< of a point, without the bin [m/s]
   double halfBin() const { return half_bin_; }              ///< [m/s]
-  const Eigen::Vector3d& about() const { return about_; }   ///< where it was set up [m/s]
+  const Eigen::Vector3d& about() const { return about_; }   ///< `v_R` of the constructor [m/s]
 
  private:
   struct Point {
     Eigen::Vector3d u_R = Eigen::Vector3d::Zero();
     double doppler = 0.0;
-    Eigen::Matrix3d spread;  ///< v' spread v: variance of the residual by the direction's noise, if it grows
-    double fixed_variance = 0.0;  ///< [m^2/s^2] the rest of it, with the bin
-    double outlier = 0.0;         ///< density of outliers over that of the static world, at its largest
+    Eigen::Matrix3d spread;       ///< v' spread v: part of the residual's variance that grows with v
+    double fixed_variance = 0.0;  ///< [m^2/s^2] the rest of the variance, with the bin
+    double outlier = 0.0;         ///< density of outliers over the largest density of a static point
     // The next three describe a bin that is wider than the noise. Their unit is the sigma of the noise at the
     // first velocity, but for `centre`.
     double half_bin = 0.0;     ///< half its width; 0 if the noise is wider

@@ -19,7 +19,7 @@ inline double unwrapped(double doppler, double expected, double span) {
 /// Velocities of a scan by its points alone, in R [m/s].
 struct TwoReadings {
   Eigen::Vector3d as_read;   ///< with the Dopplers as they read
-  Eigen::Vector3d wrapping;  ///< with Dopplers that may have come back from beyond the possible span
+  Eigen::Vector3d wrapping;  ///< with Dopplers that may have wrapped around the possible span
 };
 
 /// The span of a radar's Doppler. A Doppler beyond the span comes back on the other side (aliasing).
@@ -33,8 +33,8 @@ class DopplerSpan {
   explicit DopplerSpan(double given) : given_(given) {}  ///< [m/s] 0: read it off the data
 
   /// Takes the points of a scan. `before` are the velocities of the scan before it; none: unknown, or at
-  /// rest. They must know nothing of the points, which would confirm any span that they were fitted with.
-  /// `step` is that of the Doppler [m/s].
+  /// rest. They must not come from `points`, which would confirm any span that they were fitted with. `step`
+  /// is that of the Doppler [m/s].
   void learn(const std::vector<RadarDirection>& points, const std::optional<TwoReadings>& before,
              double step);
   KnownDoppler known() const {
@@ -43,9 +43,9 @@ class DopplerSpan {
   }
   double value() const { return known().value; }  ///< [m/s] 0: no span is known
   /// Whether a scan can show the span: some of its points read about the lowest Doppler seen, and some about
-  /// the highest. The world comes back at one end where it leaves at the other.
+  /// the highest. Dopplers that leave the span at one end come back at the other.
   bool reachesBothEnds(const std::vector<RadarDirection>& points, double step) const;
-  /// [m/s] The span if there is one: that of the Dopplers seen. 0: none was seen.
+  /// [m/s] The span if there is one: the range of the Dopplers seen. 0 before that is known.
   double possible() const { return given_ > 0.0 ? given_ : possible_; }
 
  private:
@@ -60,8 +60,8 @@ class DopplerSpan {
   double possible_ = 0.0;
   double judged_ = 0.0;  ///< the span that scans_ is about
   bool found_ = false;
-  int scans_ = 0;    ///< by how many more scans showed the span than did not, of late
-  int outside_ = 0;  ///< points that read more than the span that was found, of late
+  int scans_ = 0;    ///< recent scans that showed the span, minus those that did not
+  int outside_ = 0;  ///< recent points beyond the span that was found
 };
 
 }  // namespace rio_t

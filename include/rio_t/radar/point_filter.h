@@ -25,7 +25,7 @@ constexpr std::size_t kPointVerdicts = 8;
 
 /// Marks the points that have the same range, Doppler and SNR as another. A radar reports one echo at several
 /// directions if the spectrum of its angles has more than one peak, and no point tells which one is right.
-/// Marks none if three points or more all have the same SNR: it then tells nothing.
+/// Marks none if three points or more all have the same SNR: the driver then gives no real SNR.
 void markAmbiguous(std::vector<RadarPoint>& points);
 
 /// Judges points by the options of the ego-velocity.
@@ -37,7 +37,7 @@ class PointFilter {
 
  private:
   double min_range_, max_range_, min_snr_db_;  // read-only after construction, as the next
-  double cos_azimuth_, sin_elevation_;         // of the largest ones
+  double cos_azimuth_, sin_elevation_;         // of the largest angles
 };
 
 }  // namespace rio_t

@@ -13,8 +13,8 @@ namespace rio_t {
 
 class DopplerLikelihood;
 
-/// [s/m] Bounds of the density of the outliers, per point: 1 in 200 and every other one over 5 m/s. With a
-/// larger density, points would pass for outliers for long after their noise has grown.
+/// [s/m] Bounds of the density of the outliers, per point: 1 point in 200, and every other point, over 5 m/s.
+/// With a larger density, points would count as outliers long after their noise has grown.
 constexpr double kMinOutlierDensity = 0.001;
 constexpr double kMaxOutlierDensity = 0.1;
 
@@ -24,18 +24,18 @@ struct AngleSpread {
   double variance = std::numeric_limits<double>::infinity();  ///< about it
   double within = std::numeric_limits<double>::infinity();    ///< about the mean of their scan
   double skewness = 0.0;                                      ///< likewise, the mean cube over within^(3/2)
-  /// For the variance of a scan, earlier scans count as so many squares: few if the scans differ.
+  /// Degrees of freedom with which earlier scans predict the variance of one scan: few if the scans differ.
   double within_freedom = std::numeric_limits<double>::infinity();
 };
 
-/// Noise of a point, independent from point to point, and what points to expect.
+/// Noise of a point, independent from point to point, with the density of outliers and the spread of angles.
 struct PointVariances {
   double doppler = 0.0;       ///< [m^2/s^2] besides the quantisation
   double azimuth = 0.0;       ///< [rad^2]
   double elevation = 0.0;     ///< [rad^2]
   double quantization = 0.0;  ///< [m^2/s^2] of the Doppler: step^2 / 12
-  /// [s/m] Density of Dopplers that are not of the static world, per point. It begins with the largest, every
-  /// other point over 5 m/s: until scans have shown better, few points must not be sure of anything.
+  /// [s/m] Density of Dopplers that are not of the static world, per point. It begins with the largest, so
+  /// that few points do not claim much before scans have shown the density.
   double outlier_density = kMaxOutlierDensity;
   AngleSpread azimuths, elevations;
 };
@@ -51,8 +51,8 @@ class PointNoise {
   explicit PointNoise(const PointVariances& start);
 
   /// Learns from a scan. `points` passed the filter; `world` is the likelihood of those that look static.
-  /// `learn` also takes the other points, as far as they may belong to the static world: otherwise the known
-  /// noise would cut off its own tails. `prior`, if any, knows nothing of this scan.
+  /// `learn` weighs every point by the probability that it is static. The inliers alone would cut off the
+  /// tails of the noise. `prior`, if any, is independent of this scan.
   void learn(const std::vector<RadarDirection>& points, const DopplerLikelihood& world,
              const std::optional<VelocityPrior>& prior);
   /// Learns how far the directions of a scan spread, moving or not. `points` passed the filter.

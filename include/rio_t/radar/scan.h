@@ -17,14 +17,14 @@ struct RadarPoint {
   bool is_ambiguous = false;  ///< the radar could not tell the direction, see markAmbiguous()
 };
 
-/// [m/s] A larger Doppler is a mark of the driver, like -999 for "no Doppler".
+/// [m/s] A larger Doppler is a special value of the driver, like -999 for "no Doppler".
 constexpr double kLargestDoppler = 100.0;
 
 /// One scan of the radar. All points are finite, and none is padding (the decoder drops and counts those).
 struct RadarScan {
   Time stamp;  ///< as stamped, in the IMU clock; measured at stamp - t_O
   std::vector<RadarPoint> points;
-  std::size_t radar = 0;  ///< which one it is from, see Estimator
+  std::size_t radar = 0;  ///< index of its radar, see Estimator
 };
 
 /// Whether a radar may have this name. Keys, topics and files contain it.
