@@ -20,7 +20,7 @@ constexpr double kLeastPressure = 30e3;
 constexpr double kMostPressure = 115e3;
 /// [s] of samples in a mean. Shorter means cost more terms and tell no more, because the noise is white.
 constexpr double kMeanSpan = 0.1;
-/// [s] A node as near as this stands for a mean: at 1 m/s^2 the height then deviates by 5 mm.
+/// [s] A mean joins a node that is this near: at 1 m/s^2 the height then deviates by 5 mm.
 constexpr double kNear = 0.1;
 /// [s] of samples before a start at rest: the shortest rest from which the estimate starts.
 constexpr double kBeforeStart = 1.0;
@@ -28,8 +28,8 @@ constexpr double kBeforeStart = 1.0;
 constexpr double kRecent = 12.0;
 /// [s] A sample stamped further ahead of the IMU has a wrong stamp.
 constexpr double kMaxAhead = 1.0;
-/// Mean spacings that a sample stands for at most. If samples are missing, the next one is not more accurate;
-/// samples that come in pairs are as far apart as this.
+/// [mean spacings] A sample stands for at most this time. If samples are missing, the next one is not more
+/// accurate. Samples that come in pairs are this far apart.
 constexpr double kMissing = 2.0;
 /// Means that wait for a node: those of a minute without scans.
 constexpr std::size_t kMaxWaiting = 600;
@@ -185,7 +185,7 @@ BarometerChannel::Slope BarometerChannel::slopeWith(const Deviation& deviation, 
 }
 
 void BarometerChannel::distrust(Time time, FixedLagSmoother& smoother) {
-  // The pressure went astray before it was noticed: what the window still holds must not pull.
+  // The pressure moved before this was noticed, so its terms in the window are suspect.
   std::vector<const Term*> suspects;
   for (const auto& term : smoother.window().terms())
     if (dynamic_cast<const BarometerFactor*>(term->cost.get()) != nullptr) suspects.push_back(term.get());

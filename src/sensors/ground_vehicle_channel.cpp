@@ -10,12 +10,12 @@
 namespace rio_t {
 namespace {
 
-/// [s] A bump or a slip lasts about so long. Terms nearer to each other would count it twice.
+/// [s] A bump or a slip lasts about this time. Terms nearer to each other would count it twice.
 constexpr double kSpacing = 0.1;
-/// [s] A longer pause of the scans does not count as judged motion.
+/// [s] A longer pause between scans counts as this much judged motion.
 constexpr double kMaxSpan = 0.5;
-/// [s] of motion that is judged, and the mean of min(1, squared sigmas / gate^2) above which it is not that
-/// of the vehicle (docs/method.md, section 5.9).
+/// [s] of motion that is judged, and the mean of min(1, squared sigmas / gate^2) above which the motion is
+/// not that of a vehicle (docs/method.md, section 5.9).
 constexpr double kJudgedMotion = 5.0;
 constexpr double kMaxContradiction = 0.5;
 
@@ -72,7 +72,7 @@ std::optional<GroundVehicleAnswer> GroundVehicleChannel::judge(const FixedLagSmo
   const double gate_square = options_.gate * options_.gate;
   answer.used = answer.squared_sigmas <= gate_square;
 
-  // At this speed, could any direction of motion contradict the constraint? If not, the motion is not judged.
+  // Motion is judged only if, at this speed, some direction of motion would contradict the constraint.
   const bool could_contradict = velocity.v_V.squaredNorm() > gate_square * S.diagonal().maxCoeff();
   const double span = judged_at_ ? std::clamp(time - *judged_at_, 0.0, kMaxSpan) : 0.0;
   judged_at_ = time;

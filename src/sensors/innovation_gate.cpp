@@ -5,7 +5,7 @@
 namespace rio_t {
 namespace {
 
-constexpr double kUnanimousTime = 0.5;  // [s] of scans that are unanimous: one may be chance
+constexpr double kUnanimousTime = 0.5;  // [s] of unanimous scans: a single one may be chance
 
 }  // namespace
 
@@ -15,7 +15,7 @@ bool InnovationGate::rejects(const InnovationGateOptions& options, const Innovat
   const Time stamp = innovation.stamp;
   if (gate == 0.0 || innovation.widened(options.model_error).squaredSigmas() <= gate * gate) return false;
   if (!tilt_is_known) return false;
-  // Ghosts agree by chance on some velocity now and then, but seldom most of them.
+  // A few ghosts agree on a velocity by chance now and then, but seldom most points.
   if (std::abs(stamp - last_used) > options.timeout && hasMajority(velocity)) return false;
   if (!isUnanimous(velocity)) {
     unanimous_since_.reset();

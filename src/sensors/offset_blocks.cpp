@@ -42,7 +42,7 @@ void OffsetBlocks::step(FixedLagSmoother& smoother, const OffsetStep& step, Time
   std::shared_ptr<Block> after = add(window, value() + step.change);
   window.add(std::make_unique<RandomWalkFactor>(Eigen::VectorXd::Constant(1, radar_.time_offset_sigma)),
              {&before, after.get()});
-  // The scans since the step have pulled velocity and biases with the old offset. From now on they tell the
+  // The scans since the step have pulled velocity and biases with the old offset. From now on they use the
   // new one.
   for (const auto& term : window.terms()) {
     const bool uses_it = std::find(term->blocks.begin(), term->blocks.end(), &before) != term->blocks.end();

@@ -7,7 +7,7 @@
 namespace rio_t {
 namespace {
 
-/// [s] The sums forget after this time: another kind of motion has other accelerations and vibrations.
+/// [s] The sums fade with this time constant: another kind of motion has other accelerations and vibrations.
 constexpr double kMemory = 20.0;
 /// [sigma] Noise of the IMU alone exceeds this once in 70,000 scans (chi-squared, 3 degrees of freedom).
 constexpr double kCertain = 5.0;
@@ -40,7 +40,7 @@ OffsetDerivative offsetDerivative(const ImuBuffer& imu, Time tau, const StateBlo
   const auto rateOf = [&](const ImuMean& mean) {
     return velocityRate(mean, x.b_g(), x.b_a(), q_IW * x.v_W(), q_IW * g_W, T_IR.l_I);
   };
-  // A mean around a time without samples would move to the next sample, and take in some of the other side.
+  // The means of each side must not reach beyond the samples: they would then take in some of the other side.
   const auto quarter = [&](double reach) { return 0.5 * std::clamp(reach, 0.0, half_width); };
   const double before = quarter(tau - imu.oldest());
   const double after = quarter(imu.newest() - tau);
@@ -93,7 +93,7 @@ void OffsetEvidence::add(const OffsetScan& scan, const OffsetDerivative& derivat
 }
 
 double OffsetEvidence::gain() const {
-  // The motion less one sigma: noise alone is seldom above zero then, and only a little.
+  // The motion minus one sigma: noise alone then seldom exceeds zero, and only a little.
   const double sure = motion_ - std::sqrt(motion_variance_);
   return sure > 0.0 && all_ > 0.0 ? std::min(1.0, sure / all_) : 0.0;
 }
@@ -103,8 +103,7 @@ void OffsetWidths::add(const OffsetScan& scan) {
     std::deque<OffsetScan>& waiting = widths_[i].waiting;
     const double half_width = kOffsetHalfWidths[i];
     waiting.push_back(scan);
-    // The IMU reaches kOffsetHalfWidth past a scan. It may reach further, but then the order of the messages
-    // would change the result.
+    // The IMU reaches kOffsetHalfWidth past a scan. With later samples, the order of messages would matter.
     const double left = half_width - kOffsetHalfWidth;
     for (; !waiting.empty() && scan.tau - waiting.front().tau >= left; waiting.pop_front()) {
       const OffsetScan& next = waiting.front();

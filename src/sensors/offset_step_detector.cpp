@@ -7,10 +7,10 @@
 namespace rio_t {
 namespace {
 
-/// [s] A person who walks by may pull the velocity for this long, and to the estimate it looks like a step.
-/// After a step, the innovations ask for the same change in every scan.
+/// [s] A person who walks by may pull the velocity for this long, which looks like a step. After a true step,
+/// every later scan shows the same change.
 constexpr double kPull = 1.0;
-constexpr double kMinScatter = 0.2;  // of the variance: fewer scans than it seems may agree by chance
+constexpr double kMinScatter = 0.2;  // share of the variance: a few scans may scatter less by chance
 
 }  // namespace
 
@@ -52,7 +52,7 @@ std::optional<OffsetStep> OffsetStepDetector::stepped(const Innovation& innovati
     candidate.squares += squares;
     candidate.count += 3.0;
     const double fit = candidate.all.projection * candidate.all.projection / candidate.all.information;
-    if (!(fit > best_fit)) continue;  // nor without information
+    if (!(fit > best_fit)) continue;  // also if there is no information
     best_fit = fit;
     best = &candidate;
   }

@@ -6,7 +6,7 @@
 namespace rio_t {
 namespace {
 
-/// [s] Over this time a drift of 2 ms a minute asks for 1.3 ms, more than the scatter of 400 scans.
+/// [s] Over this time a drift of 2 ms a minute adds up to 1.3 ms, more than the scatter of 400 scans.
 constexpr double kMemory = 40.0;
 
 }  // namespace
@@ -16,7 +16,7 @@ void OffsetUncertainty::add(const Innovation& innovation) {
   last_ = std::max(last_, innovation.stamp);
   const Eigen::Vector3d& d = innovation.d;
   const Eigen::LDLT<Eigen::Matrix3d> weight = innovation.S.ldlt();
-  // The window's weights: otherwise a scan that the window ignores would ask for a change for good.
+  // The weights are those of the window: a scan that the window ignores would show a change for ever.
   const double length = std::sqrt(d.dot(weight.solve(d)));
   const double share = huber_threshold_ > 0.0 && length > huber_threshold_ ? huber_threshold_ / length : 1.0;
   const Eigen::Vector3d weighted_J = weight.solve(innovation.J_after);

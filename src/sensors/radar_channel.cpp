@@ -14,7 +14,7 @@ constexpr double kMaxTiltSigma = 0.1;
 /// [m/s] Sigma of a velocity that no point of a scan sees.
 constexpr double kUnseen = 100.0;
 
-/// How many of `some` are not in `others`; both ascend.
+/// Counts the elements of `some` that are not in `others`; both ascend.
 std::size_t countOthers(const std::vector<std::size_t>& some, const std::vector<std::size_t>& others) {
   return static_cast<std::size_t>(std::count_if(some.begin(), some.end(), [&](std::size_t index) {
     return !std::binary_search(others.begin(), others.end(), index);
@@ -32,7 +32,7 @@ EgoVelocity withOwnPoints(EgoVelocity velocity, const RadarScan& scan) {
   return velocity;
 }
 
-/// With the errors that the options tell multiplied by `factor` in their variance.
+/// Multiplies the added variance by `factor`.
 EgoVelocity scaled(EgoVelocity velocity, double factor) {
   velocity.covariance.diagonal() += (factor - 1.0) * velocity.added_variance;
   velocity.added_variance *= factor;
@@ -89,7 +89,7 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
     return answer;
   };
   followOffsetSteps();
-  // Before its points count a second time, for health or in a pool.
+  // This comes first, so that no point counts twice for health or in a pool.
   if (in_window_.has(scan.stamp) || memory_.judged_at == scan.stamp) return reject("duplicate_stamp");
   memory_.judged_at = scan.stamp;
   Seen seen = see(scan, context, smoother, answer);
@@ -113,7 +113,7 @@ RadarAnswer RadarChannel::use(const RadarScan& scan, const ScanContext& context,
     const Time covered = nodeTime(scan.stamp);
     in_window_.stepOffset(smoother, *answer.offset_stepped, covered);
     followOffsetSteps();
-    // A smaller offset reads the scan later, where the IMU may not reach yet.
+    // With a smaller offset the scan was measured later, where the IMU may not reach yet.
     if (nodeTime(scan.stamp) > covered) return reject("imu_not_covering");
   }
   if (d.all &&
@@ -157,14 +157,14 @@ std::optional<Innovation> RadarChannel::ownInnovation(const RadarScan& scan, con
 }
 
 void RadarChannel::learn(const RadarScan& scan, const Seen& seen, const Innovations& d, RadarAnswer& answer) {
-  // The innovation of the scan that shows a step is one of the offset before.
+  // The innovation of the scan that shows a step refers to the offset before the step.
   if (d.own && !answer.offset_stepped) offset_uncertainty_.add(*d.own);
   if (seen.moves) {
     OffsetScan followed = seen.prediction->scan;
     followed.measured = seen.velocity.covariance;
     step_detector_.follow(scan.stamp, offset_widths_.gain() * seen.dv_dt_O.mean, followed);
   }
-  // A borrowed point must not teach twice.
+  // A borrowed point must not count twice.
   if (!seen.is_own || sharesPoints(seen, memory_.learned_at)) return;
   if (seen.canBeJudged()) {
     const OffsetScan& predicted = seen.prediction->scan;
@@ -199,8 +199,8 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
 
   std::optional<VelocityPrior> expected = seen.prior;
   if (context.has_diverged) expected.reset();
-  // Few and coarse points agree with many velocities: they must not all side with a prediction that is a
-  // little wrong.
+  // Few and coarse points agree with many velocities. The wider prior keeps them from all agreeing with a
+  // prediction that is a little wrong.
   const double sigma = options_.gate.model_error;
   if (expected && seen.has_borrowed) expected->covariance.diagonal().array() += sigma * sigma;
   answer.ego_velocity = measure(seen.pooled, expected, scale);
@@ -224,7 +224,7 @@ RadarChannel::Seen RadarChannel::see(const RadarScan& scan, const ScanContext& c
 bool RadarChannel::confirmsRest(const Rest& rest, const RadarScan& scan, double scale, Seen& seen) {
   const EgoVelocity alone = measure(seen.pooled, std::nullopt, scale);
   bool confirms = rest.shakes ? alone.status == EgoVelocityStatus::kZeroVelocity : !alone.denies_rest;
-  // Few points show soon that a platform sets off, many show how slowly it creeps.
+  // Few points show early that a platform sets off. Many points show a slow creep.
   for (std::size_t enough = RestPool::kMost / 16; confirms && enough <= RestPool::kMost; enough *= 4) {
     RadarScan filled = memory_.rest_pool.filled(scan, enough);
     confirms = !estimator_.deniesRest(filled);
@@ -285,8 +285,8 @@ Innovation RadarChannel::innovation(Time stamp, const VelocityPrior& prior, cons
   result.S = prior.covariance + measured.covariance;
   if (seen == nullptr || !seen->prediction) return result;
   result.S_at_offset = seen->prediction->scan.predicted + measured.covariance;
-  // A step of the offset looks like model errors, and raises their scale. Without their part, the scans after
-  // a step keep their weight.
+  // A step of the offset looks like model errors and raises their scale. S_at_offset leaves them out, so that
+  // the scans after a step keep their weight.
   result.S_at_offset.diagonal() -= measured.added_variance;
   result.J_after = offset_widths_.gain() * seen->dv_dt_O.after;
   result.J_mean = offset_widths_.gain() * seen->dv_dt_O.mean;
@@ -296,12 +296,11 @@ Innovation RadarChannel::innovation(Time stamp, const VelocityPrior& prior, cons
 void RadarChannel::judge(const RadarScan& scan, const VelocityPrior& prior, bool had_prior, double scale,
                          RadarAnswer& answer) const {
   const EgoVelocity& measured = answer.ego_velocity;
-  // If few points agree, they may be those that side with a wrong prediction. The velocity is measured again
-  // without it.
+  // If few points agree, they may be those that fit a wrong prediction. So it is measured again without one.
   const EgoVelocity alone =
       hasMajority(measured) || !had_prior ? measured : measure(scan, std::nullopt, scale);
   if (!hasMajority(alone)) return;
-  // A crowd may outnumber the static world. What then sides with the prediction alone is its witness: noise
+  // A crowd may outnumber the static world. Points that agree with the prediction only then confirm it: noise
   // does not give so many of them.
   const bool is_outvoted =
       countOthers(measured.inliers, alone.inliers) >= options_.radar.ego_velocity.min_inliers;
@@ -315,7 +314,7 @@ double RadarChannel::offsetSigma(double variance) const {
   const SmootherOptions& o = options_.smoother;
   if (!o.estimate_time_offset) return 0.0;
   const double sigma = offset_uncertainty_.sigma(variance);
-  // If the bound is within a sigma, the truth may lie anywhere beyond, whatever the curvature of the cost.
+  // If the bound is within a sigma, the true offset may lie anywhere beyond it, whatever the curvature.
   return std::abs(offset()) + sigma >= o.max_time_offset ? std::max(sigma, o.max_time_offset) : sigma;
 }
 

@@ -104,7 +104,7 @@ std::optional<Eigen::Vector3d> RadarInWindow::velocityAt(const FixedLagSmoother&
   const Time time = nodeTime(stamp);
   const std::optional<NodeEstimate> node = smoother.nodeBefore(time);
   if (!node) return std::nullopt;
-  // One acceleration alone does not carry a state from its node to the scan.
+  // The model of constant acceleration does not carry a state from its node to the scan.
   const StateBlock x = carried(node->x, node->time, time, *model_.imu, model_.g_W);
   const Extrinsics T_IR = extrinsics();
   return T_IR.R_RI() * model_.at(StateView(x), time, stamp, offset(), T_IR.l_I, nullptr).v_I;

@@ -17,8 +17,8 @@ struct BarometerOptions {
   double noise_density = 0.05;
   double drift = 0.005;       ///< [m/sqrt(s)] random walk of the bias: weather, and warmth of the sensor
   double gate = 4.0;          ///< [sigma] a mean farther from the estimate is rejected; 0: no gate
-  double gate_timeout = 1.0;  ///< [s] of rejected means show that the pressure moves; of rest, that it rests
-  double gate_slope = 0.07;   ///< [m/s] between barometer and radar, for which the radar may be to blame
+  double gate_timeout = 1.0;  ///< [s] of rejected means: the pressure moves; of means without slope: it rests
+  double gate_slope = 0.07;   ///< [m/s] between barometer and radar; up to this it may be the radar's error
   double temperature = 15.0;  ///< [deg C] of the air at the start
 };
 
@@ -52,10 +52,10 @@ struct BarometerAnswer {
 
 /// A barometer, from pressures to the window (docs/method.md, section 5.10). Not thread-safe.
 ///
-/// Means over a tenth of a second join the nearest node, as heights off by a bias that walks. A mean that
+/// Means over a tenth of a second join the nearest node, as heights with a bias that walks. A mean that
 /// contradicts the estimate is rejected: doors and rotors shock the pressure. If the means contradict it for
-/// `gate_timeout`, or slope against the motion, the pressure moves. No mean is used until it rests. If it
-/// then rests elsewhere, the bias is estimated again: the height goes on as it is.
+/// `gate_timeout`, or slope against the motion, the pressure moves. Then no mean is used until the pressure
+/// rests. If it rests at another value, the bias is estimated again, so that the height does not jump.
 class BarometerChannel {
  public:
   explicit BarometerChannel(const BarometerOptions& options) : options_(options) {}
@@ -63,9 +63,9 @@ class BarometerChannel {
   /// Why a pressure cannot be used, as a fault in snake case; null if it was taken. `newest_imu` is the time
   /// of the newest sample of the IMU.
   const char* add(const Pressure& pressure, Time newest_imu);
-  /// Joins a window that begins at `time`. The pressures of the last second at rest say where the start is.
+  /// Joins a window that begins at `time`. At rest, the last second of pressures gives the bias.
   void join(FixedLagSmoother& smoother, Time time, bool at_rest);
-  /// Adds the terms of the means that a solved node is near to.
+  /// Adds a term for each mean that is near a solved node.
   std::vector<BarometerAnswer> use(FixedLagSmoother& smoother);
   /// The walk of the bias; none before the window has one.
   std::vector<FixedLagSmoother::RandomWalk> randomWalks() const;
@@ -88,7 +88,7 @@ class BarometerChannel {
     Time time() const { return first + time_sum / count; }
     double height() const { return height_sum / count; }
   };
-  /// A mean against the motion that the radar and the IMU tell.
+  /// Deviation of a mean from the motion by radar and IMU.
   struct Deviation {
     Time time;
     double height = 0.0;             ///< [m] of the mean above the climb of the nodes
@@ -115,9 +115,9 @@ class BarometerChannel {
   void addBias(FixedLagSmoother& smoother, double bias);
   BarometerAnswer use(const Mean& mean, const NodeEstimate& node, FixedLagSmoother& smoother);
   Slope slopeWith(const Deviation& deviation, double noise, double span);
-  /// The climb goes on to a node of the same solution. If the last one has left, all begins anew.
+  /// Continues the climb to `node`. If the last node has left the window, climb and deviations begin anew.
   void climbTo(const NodeEstimate& node, const FixedLagSmoother& smoother);
-  /// The pressure moves since `time`: the window gives up its terms of the barometer.
+  /// Removes the terms of the barometer from the window, since the pressure moves at `time`.
   void distrust(Time time, FixedLagSmoother& smoother);
 
   BarometerOptions options_;
@@ -131,7 +131,7 @@ class BarometerChannel {
   std::optional<Time> rejected_since_;
   std::optional<Climb> climb_;
   std::deque<Deviation> deviations_;  ///< of the time that the slope needs
-  std::optional<Time> moved_at_;      ///< last, since the pressure moves; none while it rests
+  std::optional<Time> moved_at_;      ///< when the pressure moved last; none while it rests
 };
 
 }  // namespace rio_t

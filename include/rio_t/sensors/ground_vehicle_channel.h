@@ -29,7 +29,7 @@ struct GroundVehicleOptions {
   double rotation_noise = 1.0e-5;  ///< [rad/sqrt(s)] its random walk, about each axis
   double sideways_sigma = 0.05;    ///< [m/s] of the velocity of the point
   double vertical_sigma = 0.03;    ///< [m/s] likewise
-  double gate = 4.0;               ///< [sigma] a velocity that contradicts the constraint more is left out
+  double gate = 4.0;               ///< [sigma] a velocity farther from the constraint gets no term
 };
 
 /// The channel's answer at one time.
@@ -56,10 +56,10 @@ class GroundVehicleChannel {
   /// Joins a window that begins with one node: adds the vehicle frame as configured, with its prior;
   /// `at_rest`: the vehicle stands on the ground there.
   void join(FixedLagSmoother& smoother, bool at_rest);
-  /// Compares the estimate at `time` with the constraint. None if the constraint is
-  /// off, or was judged less than a tenth of a second ago. Before the terms of that time are added.
+  /// Compares the estimate at `time` with the constraint. Call it before the terms of that time are added.
+  /// None if the constraint is off, or was judged less than a tenth of a second ago.
   std::optional<GroundVehicleAnswer> judge(const FixedLagSmoother& smoother, Time time);
-  /// Adds the term that `judge` found to agree. Whether it did.
+  /// Adds the term if `judge` found that it agrees. Returns whether it did.
   bool add(const GroundVehicleAnswer& answer, FixedLagSmoother& smoother) const;
   std::vector<FixedLagSmoother::RandomWalk> randomWalks() const;
 

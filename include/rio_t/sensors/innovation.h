@@ -14,14 +14,14 @@ struct Innovation {
   Eigen::Vector3d d = Eigen::Vector3d::Zero();      ///< measured minus predicted velocity, in R [m/s]
   Eigen::Matrix3d S = Eigen::Matrix3d::Identity();  ///< covariance of d [m^2/s^2]
   Eigen::Matrix3d S_at_offset = Eigen::Matrix3d::Identity();  ///< the same if the offset were known
-  // The change of the velocity with t_O [m/s^2]. The noise of the IMU before the scan is also in d. So d goes
-  // with J_after, whose noise is none of it, or with J_mean less what the estimate has followed of it, in
-  // which this noise cancels (docs/method.md, eq. 18h).
+  // Derivative of the velocity with respect to t_O [m/s^2]. d contains the noise of the IMU before the scan.
+  // So d must be combined with J_after, which does not contain it, or with the part of J_mean that the
+  // estimate has not followed, in which it cancels (docs/method.md, eq. 18h).
   Eigen::Vector3d J_after = Eigen::Vector3d::Zero();  ///< from the samples after the scan
   Eigen::Vector3d J_mean = Eigen::Vector3d::Zero();   ///< from both sides
 
   double squaredSigmas() const { return d.dot(S.ldlt().solve(d)); }
-  /// The same with `sigma` [m/s] added on each axis of S.
+  /// The same with `sigma` [m/s] added to each axis of S.
   Innovation widened(double sigma) const {
     Innovation wide = *this;
     wide.S.diagonal().array() += sigma * sigma;

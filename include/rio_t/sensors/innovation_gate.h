@@ -15,13 +15,13 @@ struct InnovationGateOptions {
   /// [m/s] Added to the sigma of each axis of the innovation, for gate and health only. It stands for small
   /// errors of the extrinsics and of the IMU's scale.
   double model_error = 0.1;
-  /// [s] without a used scan; then the gate lets in the next one of which most points agree.
+  /// [s] without a used scan; then the gate accepts the next one in which most points agree.
   double timeout = 3.0;
 };
 
 /// Rejects velocities that contradict the prediction (docs/method.md, eq. 30). The gate opens if the
-/// prediction itself may be wrong; otherwise a prediction that one wrong scan spoilt would reject every
-/// correct one. Not thread-safe.
+/// prediction itself may be wrong. Otherwise, after a wrong scan was accepted, the gate might reject all
+/// correct ones. Not thread-safe.
 class InnovationGate {
  public:
   /// Whether to reject a scan of that `velocity`. The gate is open if `tilt_is_known` is false (the
@@ -30,7 +30,7 @@ class InnovationGate {
   /// (nearly all points of each agree) it is open, too.
   bool rejects(const InnovationGateOptions& options, const Innovation& innovation,
                const EgoVelocity& velocity, bool tilt_is_known, Time last_used);
-  /// The scan was used.
+  /// Call it if the scan was used.
   void used() { unanimous_since_.reset(); }
 
  private:

@@ -13,7 +13,7 @@ namespace rio_t {
 /// The time offset t_O of a radar, or of all radars if they share it, in the window of the smoother.
 ///
 /// The paper has one t_O per node and a factor that keeps it constant (eq. 8-10). One block whose prior fades
-/// by the random walk says the same with fewer unknowns (docs/method.md, section 6.2). After a step of the
+/// by the random walk does the same with fewer unknowns (docs/method.md, section 6.2). After a step of the
 /// offset, a new block takes over. Not thread-safe.
 class OffsetBlocks {
  public:
@@ -21,9 +21,9 @@ class OffsetBlocks {
 
   /// Adds the first block to a window that starts.
   Block& start(Window& window, double t_O);
-  /// The scans since the step, also those in the window, use a new block. It begins at the offset after the
-  /// step, and time_offset_sigma links it to the old one. No scan of the window is read later than `covered`:
-  /// the IMU may not reach further.
+  /// Adds a new block for the scans since the step, also for those in the window. It begins at the offset
+  /// after the step, and time_offset_sigma links it to the old one. No scan of the window is evaluated later
+  /// than `covered`, since the IMU may not reach further.
   void step(FixedLagSmoother& smoother, const OffsetStep& step, Time covered);
   struct OfScan {
     Block* block;

@@ -24,7 +24,7 @@ struct OffsetDerivative {
       Eigen::Vector3d::Zero();  ///< angular velocity of I, in I, over the same time [rad/s]
   double omega_variance = 0.0;  ///< of its noise, about each axis [rad^2/s^2]
 
-  /// The mean exceeds five sigma of its noise, so it is motion.
+  /// Whether the mean exceeds five sigma of its noise, so that it is surely motion.
   bool isCertain() const;
 };
 
@@ -38,7 +38,7 @@ struct OffsetScan {
   Time tau;      ///< of measurement, as predicted
   StateBlock x;  ///< predicted at tau
   Extrinsics T_IR;
-  /// Covariance in R of the error that tilt and accelerometer bias give to every derivative [m^2/s^4].
+  /// Covariance in R of the error that tilt and accelerometer bias add to every derivative [m^2/s^4].
   Eigen::Matrix3d shared = Eigen::Matrix3d::Zero();
   /// Covariance in R of the predicted velocity if t_O were known [m^2/s^2]. Zero: the prediction does not
   /// follow the scans.
@@ -46,24 +46,24 @@ struct OffsetScan {
   Eigen::Matrix3d measured = Eigen::Matrix3d::Zero();  ///< covariance in R of the scan's velocity [m^2/s^2]
 
   Eigen::Matrix3d R_WR() const;
-  /// The share of its innovation by which the estimated velocity follows the scan, in R.
+  /// The share of the innovation by which the scan corrects the estimated velocity, in R.
   Eigen::Matrix3d share() const;
-  /// An offset that is wrong by one second changes the scan's velocity by `J` [m/s^2], in R, and the scans
-  /// before have moved the estimated one by `followed` [m/s^2], in W. Returns the difference, and adds the
-  /// share of it that this scan moves (Friedland; see CalibrationCheck).
+  /// If the offset is wrong by one second, this changes the scan's velocity by `J` [m/s^2], in R, and the
+  /// scans before have moved the estimated one by `followed` [m/s^2], in W. Returns the difference, and adds
+  /// to `followed` what this scan moves (Friedland; see CalibrationCheck).
   Eigen::Vector3d follow(const Eigen::Vector3d& J, Eigen::Vector3d& followed) const;
 };
 
-/// Tells how much of the derivative with respect to t_O is motion, and how much is noise of the IMU.
+/// Finds how much of the derivative with respect to t_O is motion, and how much is noise of the IMU. In a
+/// factor, noise in the derivative would look like information about t_O.
 ///
-/// The factor takes noise in the derivative for information about t_O, which no scan has. If the offset is
-/// wrong, the estimated velocity follows the radar. So a scan tells the offset by what the derivative has
-/// changed since the scans that the estimate followed, and noise changes faster than motion. The rest is
-/// about these changes. If a derivative is far beyond the known noise, the noise of its change is known, too.
-/// For smaller ones, OffsetEvidence compares the time before a scan with the time after it: motion is the
-/// same in both, noise is not. So the mean of before' W after is the square of the motion, whatever the
-/// noise. The gain is the share of this square in mean' W mean. If the factor shortens the derivative J by
-/// the gain, J'J is what the scans know (docs/method.md, section 5.3). Not thread-safe.
+/// If the offset is wrong, the estimated velocity follows the radar. So a scan shows the offset only by the
+/// change of the derivative since the scans before, and noise changes faster than motion. All sums are over
+/// these changes. If a derivative is far beyond its known noise, OffsetEvidence subtracts the noise of the
+/// change. For smaller ones, it compares the time before a scan with the time after it: motion is the same in
+/// both, noise is independent. So the mean of before' W after is the square of the motion, whatever the
+/// noise. The gain is the share of this square in mean' W mean. If the gain multiplies the derivative J, J'J
+/// is the information that the scans really have (docs/method.md, section 5.3). Not thread-safe.
 class OffsetEvidence {
  public:
   void add(const OffsetScan& scan, const OffsetDerivative& derivative);
@@ -83,16 +83,16 @@ class OffsetEvidence {
   double varianceOfChange(Time tau, const OffsetDerivative& derivative, double share);
 
   // If the offset is wrong by one second, the scans have moved the estimated velocity by this, in W [m/s^2]:
-  // as the mean says, and as each side says.
+  // by the derivative over both sides, and over each side.
   Eigen::Vector3d mean_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d before_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d after_ = Eigen::Vector3d::Zero();
-  double constant_ = 0.0;       ///< share of a constant error by which they have moved it
+  double constant_ = 0.0;       ///< share of a constant error that the estimated velocity has followed
   double noise_ = 0.0;          ///< variance of the noise in mean_ [m^2/s^4]
   std::deque<Followed> scans_;  ///< whose means overlap the newest
   Time last_;
-  double motion_ = 0.0;           ///< sum of before' W after, less what errors of the state add, fading
-  double motion_variance_ = 0.0;  ///< of it
+  double motion_ = 0.0;           ///< sum of before' W after, minus what errors of the state add, fading
+  double motion_variance_ = 0.0;  ///< of motion_
   double all_ = 0.0;              ///< sum of mean' W mean, fading
 };
 
@@ -102,10 +102,10 @@ class OffsetWidths {
  public:
   /// `imu` must outlive it. `g_W` is gravity in W [m/s^2].
   OffsetWidths(const ImuBuffer& imu, const Eigen::Vector3d& g_W) : imu_(&imu), g_W_(g_W) {}
-  /// The scan counts when a later one shows that the IMU covers the mean around it.
+  /// Each scan counts once a later scan shows that the IMU covers the mean around it.
   void add(const OffsetScan& scan);
   void clear() { widths_ = {}; }
-  /// The derivative over the best width. Its mean takes the samples that exist.
+  /// The derivative over the best width, as far as the samples reach.
   OffsetDerivative derivative(const OffsetScan& scan) const;
   double gain() const { return widths_[best()].evidence.gain(); }
 

@@ -11,8 +11,8 @@ namespace rio_t {
 
 struct OffsetStepDetectorOptions {
   bool enabled = true;
-  double memory = 8.0;         ///< [s] how long ago a step may have been that is found
-  double significance = 6.0;   ///< [sigma] of the change that the innovations ask for
+  double memory = 8.0;         ///< [s] an older step is not found any more
+  double significance = 6.0;   ///< [sigma] of the change that fits the innovations
   double min_change = 5.0e-3;  ///< [s] the random walk of the offset follows smaller steps
 };
 
@@ -41,7 +41,7 @@ class OffsetStepDetector {
   /// uncertainty of the offset. `R_WR` turns R into W at the scan, and `t_O` [s] is the offset before the
   /// step.
   std::optional<OffsetStep> stepped(const Innovation& innovation, const Eigen::Matrix3d& R_WR, double t_O);
-  /// The window has taken the scan, and its velocity follows it. `stamp` and `J_mean` as in the innovation.
+  /// Call it if the window has taken the scan and follows its velocity. `stamp`, `J_mean`: of the innovation.
   void follow(Time stamp, const Eigen::Vector3d& J_mean, const OffsetScan& scan);
 
  private:
@@ -56,7 +56,7 @@ class OffsetStepDetector {
   /// A step just before the scan `first`, as the scans since then see it.
   struct Candidate {
     Time first;
-    Sums all, late;        ///< over all of them, and without those of the first second
+    Sums all, late;        ///< over all these scans, and without those of the first second
     double squares = 0.0;  ///< sum of d' S^-1 d
     double count = 0.0;    ///< of the components of d
     /// How far the scans have moved the velocity, in W, for each second of the step [m/s^2].

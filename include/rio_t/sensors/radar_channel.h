@@ -15,7 +15,7 @@
 
 namespace rio_t {
 
-/// The options that each radar has for itself.
+/// The options of one radar.
 struct RadarOptions : CalibrationPrior {
   EgoVelocityOptions ego_velocity;
 };
@@ -30,8 +30,8 @@ struct RadarChannelOptions {
 /// What the estimator knows when a scan comes.
 struct ScanContext {
   std::optional<Rest> rest;        ///< as the IMU shows it at the time of measurement
-  bool has_diverged = false;       ///< RANSAC gets no prior
-  bool is_contradicted = false;    ///< see HealthMonitor: no velocity is found around the prediction
+  bool has_diverged = false;       ///< then RANSAC gets no prior
+  bool is_contradicted = false;    ///< see HealthMonitor; then no velocity is computed around the prediction
   double model_error_scale = 1.0;  ///< see ModelErrorScale
   Time last_used;                  ///< stamp of the last scan that any radar gave to the window
 };
@@ -46,8 +46,8 @@ struct ScanAnswer {
   std::string rejected_because;               ///< snake case, empty if used; keys of `scans_rejected`
   bool at_rest = false;                       ///< the IMU shows rest, and the points do not deny it
   std::optional<OffsetStep> offset_stepped;   ///< shown by the scans so far
-  RadarScanTime taken{Time(), 0.0};           ///< with a gain of 0, the scan does not tell the offset
-  double offset_information = 0.0;            ///< what the scan tells of the offset, if used [1/s^2]
+  RadarScanTime taken{Time(), 0.0};           ///< with a gain of 0, the scan does not inform the offset
+  double offset_information = 0.0;            ///< of the scan about the offset, if used [1/s^2]
 };
 
 /// The innovation of a scan that went into the window.
@@ -59,12 +59,12 @@ struct UsedInnovation : Innovation {
   double omega_variance = 0.0;                          ///< of its noise, about each axis [rad^2/s^2]
 };
 
-/// The channel's answer to a scan. All else that reports a scan reads this value.
+/// The channel's answer to a scan. All reports about the scan are made from this value.
 struct RadarAnswer : ScanAnswer {
   bool was_predicted = false;  ///< if not, neither `innovation` nor what follows is set
-  /// The velocity of `innovation` for a re-initialisation, with its sigmas before any scale. None if the
-  /// points that agree are no majority, are outvoted by witnesses of the prediction, or are partly those of
-  /// the last one.
+  /// The velocity behind `innovation`, for a re-initialisation. Its sigmas are without model_error_scale.
+  /// None if its inliers are no majority, if the prediction explains other points that are no chance, or if
+  /// it has points of the last such velocity.
   std::optional<EgoVelocity> alone;
   /// Set if the scan was used, the radar moves, most points agree on its velocity, and the prediction is
   /// linear.
@@ -73,16 +73,15 @@ struct RadarAnswer : ScanAnswer {
 
 /// One radar, from scan to window: ego-velocity, decisions, time offset. Not thread-safe.
 ///
-/// docs/method.md, section 7.2, has the decisions in their order. All judge the innovation of the scan
-/// against the prediction of IMU and window; at rest, against zero.
+/// docs/method.md, section 7.2, has the decisions in their order. All use the innovation of the scan against
+/// the prediction of IMU and window; at rest, against zero.
 class RadarChannel {
  public:
-  /// `imu` must outlive the channel. `offset` is what the radars that share t_O have in common, or null.
+  /// `imu` must outlive the channel. `offset` is null if the radars do not share t_O.
   RadarChannel(const RadarChannelOptions& options, const Eigen::Vector3d& g_W, const ImuBuffer& imu,
                std::shared_ptr<OffsetBlocks> offset);
 
-  /// Takes what a scan shows of the radar itself. Once per scan, first of all. False: it repeats the last
-  /// one.
+  /// Learns about the radar. Call it once per scan, first of all. False: the scan repeats the last one.
   bool observe(const RadarScan& scan) { return estimator_.observe(scan); }
   /// Velocity of a scan from its points alone, for the time before there is a state.
   EgoVelocity velocityOf(const RadarScan& scan) const { return estimator_.estimate(scan); }
@@ -111,11 +110,11 @@ class RadarChannel {
  private:
   /// Forgets what an earlier window has shown.
   void forget();
-  /// Forgets what scans have shown of the offset: its new block does not lag.
+  /// Starts the step detector and the lag of the offset anew.
   void forgetOffset();
-  /// Does so if the offset stepped. Another radar that shares it may have seen the step.
+  /// Calls forgetOffset if the offset stepped. Another radar that shares it may have seen the step.
   void followOffsetSteps();
-  /// What a scan shows, before anything is decided.
+  /// A scan with its prediction and its velocity, before the decisions.
   struct Seen {
     std::optional<RadarVelocityPrediction> prediction;
     std::optional<VelocityPrior> prior;  ///< the prediction; at rest, zero
@@ -127,35 +126,34 @@ class RadarChannel {
     bool moves = false;
     OffsetDerivative dv_dt_O;  ///< if it moves, of the predicted velocity with respect to t_O
     bool tilt_is_known = false;
-    /// A minority that sides with the prediction has more noise than its covariance says.
+    /// A minority that agrees with the prediction has more noise than its covariance says.
     bool canBeJudged() const { return moves && tilt_is_known && hasMajority(velocity); }
   };
   struct Innovations {
-    std::optional<Innovation> all;  ///< of all points, borrowed ones too
-    std::optional<Innovation> own;  ///< of the scan's own points, if they tell the offset
+    std::optional<Innovation> all;  ///< of all points, also the borrowed ones
+    std::optional<Innovation> own;  ///< of the scan's own points, if they inform the offset
   };
-  /// Also sets what the answer says of velocity, rest and health.
+  /// Also sets velocity, rest and the members for health in the answer.
   Seen see(const RadarScan& scan, const ScanContext& context, const FixedLagSmoother& smoother,
            RadarAnswer& answer);
-  /// Whether the points do not deny a rest that the IMU shows. If many scans together show a creep, `seen`
+  /// Whether the points confirm a rest that the IMU shows. If many scans together show a creep, `seen`
   /// borrows their points.
   bool confirmsRest(const Rest& rest, const RadarScan& scan, double scale, Seen& seen);
-  /// See OffsetEvidence; 0: the scan does not tell the offset. Sets `seen.dv_dt_O`.
+  /// See OffsetEvidence; 0: the scan does not inform the offset. Sets `seen.dv_dt_O`.
   double offsetGain(Seen& seen);
-  /// Sets what the scan tells of the offset.
+  /// Sets the members of the answer about the offset.
   void informOffset(Seen& seen, RadarAnswer& answer);
   /// Makes the term of the scan's own points. None if no point is of the static world.
   std::optional<DopplerMeasurement> dopplerOf(const RadarScan& scan, const Seen& seen,
                                               const RadarAnswer& answer) const;
-  /// Computes Innovations::own of a scan that tells the offset. None if it cannot be judged.
+  /// Computes Innovations::own of a scan that informs the offset. None if it cannot be judged.
   std::optional<Innovation> ownInnovation(const RadarScan& scan, const Seen& seen) const;
   /// Learns the lag of the offset and the noise of the points from a scan that was used.
   void learn(const RadarScan& scan, const Seen& seen, const Innovations& d, RadarAnswer& answer);
-  /// What of the scan goes into the window: its own points, which are the inliers, and the velocity at which
-  /// their likelihood is set up.
+  /// The part of the scan for the window: its own inliers, and the velocity at which their likelihood begins.
   EgoVelocity staticWorld(const RadarScan& scan, const Seen& seen) const;
   bool isTightlyCoupled() const { return options_.smoother.radar_factor == RadarFactor::kDoppler; }
-  /// Whether a scan shares points with the one at `before`.
+  /// Whether a scan has borrowed points that the scan at `before` had, too.
   static bool sharesPoints(const Seen& seen, const std::optional<Time>& before);
   EgoVelocity measure(const RadarScan& scan, const std::optional<VelocityPrior>& prior, double scale) const;
   /// The velocity that the inliers among the scan's own points show around the prediction. Directions that
@@ -164,27 +162,26 @@ class RadarChannel {
   /// If `seen` is null, S_at_offset and the changes with t_O are not set.
   Innovation innovation(Time stamp, const VelocityPrior& prior, const EgoVelocity& measured,
                         const Seen* seen) const;
-  /// Sets what health and a re-initialisation get from the scan. `had_prior`: its velocity was measured with
-  /// one.
+  /// Sets RadarAnswer::innovation and RadarAnswer::alone. `had_prior`: RANSAC used a prior for the velocity.
   void judge(const RadarScan& scan, const VelocityPrior& prior, bool had_prior, double scale,
              RadarAnswer& answer) const;
 
   RadarChannelOptions options_;  // changed by setGate() alone
   EgoVelocityEstimator estimator_;
   RadarInWindow in_window_;
-  /// The channel remembers this of the scans of one window. A new window forgets it.
+  /// State that a new window clears.
   struct Memory {
     ScanPool pool;
     RestPool rest_pool;
     std::optional<Time> judged_at;             ///< the last scan, used or not
-    std::optional<Time> learned_at, alone_at;  ///< of the points: those borrowed count once
+    std::optional<Time> learned_at, alone_at;  ///< scans that used their points: a borrowed one counts once
     InnovationGate gate;
   };
   Memory memory_;
   OffsetWidths offset_widths_;
   OffsetStepDetector step_detector_;
   OffsetUncertainty offset_uncertainty_;
-  std::size_t offset_steps_ = 0;  ///< those that the last two know of
+  std::size_t offset_steps_ = 0;  ///< steps that the two members above know of
 };
 
 }  // namespace rio_t

@@ -21,7 +21,7 @@ namespace rio_t {
 /// Predicted velocity of a scan.
 struct RadarVelocityPrediction {
   VelocityPrior velocity;   ///< with all uncertainties
-  OffsetScan scan;          ///< without what is measured
+  OffsetScan scan;          ///< without `measured`
   double tilt_sigma = 0.0;  ///< of roll and pitch, the larger [rad]
 };
 
@@ -63,9 +63,9 @@ class RadarInWindow {
   Block& extrinsicsBlock() const { return *extrinsics_; }
 
  private:
-  /// Adds the block to a window that starts. Returns it if it is estimated.
+  /// Adds the block to a window that starts. Returns it, or nothing if it is not estimated.
   std::vector<Block*> addExtrinsics(Window& window, const Extrinsics& T_IR);
-  /// Sets the slow motion of all scans anew, with all the scans that came after them.
+  /// Computes the slow motion of all scans again, with the scans that came after them.
   void updateSlowMotion(const FixedLagSmoother& smoother);
   template <class Factor, class Measurement>
   bool addTerm(FixedLagSmoother& smoother, Measurement z, const std::shared_ptr<ceres::LossFunction>& loss);

@@ -42,7 +42,7 @@ class RestPool {
   /// [points] They show a creep at a third of a Doppler bin (*ManyPointsTellACreepOfAThirdOfABin*).
   static constexpr std::size_t kMost = 500;
 
-  /// `slow`: a scan without the points that no platform at rest sees.
+  /// `slow`: see EgoVelocityEstimator::slowPoints.
   void add(const RadarScan& slow);
   /// The points of the scan, followed by those of the newest scans that were added, until there are `enough`.
   RadarScan filled(const RadarScan& scan, std::size_t enough) const;
