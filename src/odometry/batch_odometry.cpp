@@ -109,7 +109,7 @@ BatchOdometry::Run BatchOdometry::makeRun(const RadarInertialOdometry::Start& st
 }
 
 std::optional<BatchVehicle> BatchOdometry::vehicle(const RadarInertialOdometry::Start& start) const {
-  // A platform that proved to be no vehicle never was one.
+  // If the motion contradicted the vehicle at any time, the batch does not use the constraint.
   const auto contradicts = [](const ScanResult& result) {
     return result.ground_vehicle && result.ground_vehicle->is_contradicted;
   };
@@ -126,7 +126,7 @@ std::vector<BatchHeight> BatchOdometry::heights() const {
     for (const BarometerAnswer& mean : result.barometer) {
       if (mean.rejected_because.empty())
         heights.push_back({mean.time, mean.height + mean.bias, mean.noise_sigma, mean.stepped});
-      // BarometerChannel has removed these means from its window: the pressure moved before that showed.
+      // BarometerChannel has removed these means from its window, too, since the pressure may have moved.
       while (mean.rejected_because == "pressure_moves" && !heights.empty() &&
              mean.time - heights.back().time < options_.smoother.window)
         heights.pop_back();
@@ -141,8 +141,8 @@ std::vector<NavigationState> BatchOdometry::trajectory(const BatchSolution& solu
   for (std::size_t k = 0; k + 1 < nodes.size(); ++k) {
     const NodeEstimate& node = nodes[k];
     const NodeEstimate& next = nodes[k + 1];
-    // The distance by which the IMU alone misses the next node is spread over the way to it, with the biases
-    // of its factor.
+    // The IMU alone misses the next node. This error is spread linearly over the time between the nodes. The
+    // biases are those of the IMU factor.
     StateBlock x = node.x;
     x.b_g() = next.x.b_g();
     x.b_a() = next.x.b_a();

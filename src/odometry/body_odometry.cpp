@@ -11,7 +11,7 @@ namespace {
 using S = StateBlock;
 using Jacobian = Eigen::Matrix<double, 6, S::kTangent>;
 
-/// The turn about z in q (swing and twist): what is left of it is a turn about a horizontal axis.
+/// The turn about z in q (swing and twist). The rest of q is a turn about a horizontal axis.
 Eigen::Quaterniond turnAboutZ(const Eigen::Quaterniond& q) {
   constexpr double kUndefined = 1e-6;  // both vanish if q turns z upside down
   if (std::hypot(q.w(), q.z()) < kUndefined) return Eigen::Quaterniond::Identity();

@@ -29,7 +29,7 @@ Eigen::MatrixXd inverse(const Eigen::MatrixXd& positive_definite) {
   return factor.solve(Eigen::MatrixXd::Identity(positive_definite.rows(), positive_definite.cols()));
 }
 
-/// What a run says about one direction, in units of the prior's sigma: cost 0.5 information x^2 - pull x.
+/// A run's information about a direction, in units of the prior's sigma: cost 0.5 information x^2 - pull x.
 struct Direction {
   Eigen::VectorXd unit;
   double information;  // 1: as much as the prior
@@ -59,7 +59,7 @@ std::vector<Direction> directionsOf(const Eigen::MatrixXd& A, const Eigen::Vecto
   return directions;
 }
 
-/// Chi-squared of the runs about their common minimum, in what each has observed.
+/// Chi-squared of the runs about their common minimum, over the directions that each has observed.
 Agreement agreementOf(const std::vector<std::vector<Direction>>& runs, Eigen::Index size) {
   // A run that observes a direction adds at least so much information.
   constexpr double kLeast = 1.0 / (kObservedSigmaShare * kObservedSigmaShare) - 1.0;
@@ -75,7 +75,7 @@ Agreement agreementOf(const std::vector<std::vector<Direction>>& runs, Eigen::In
     }
   }
   for (const Direction& direction : directionsOf(sum.A, sum.b)) {
-    if (direction.information < kRounding * kLeast) continue;  // nobody observed it
+    if (direction.information < kRounding * kLeast) continue;  // no run observed it
     agreement.chi_squared -= direction.pull * direction.pull / direction.information;
     --agreement.degrees_of_freedom;
   }
@@ -100,7 +100,7 @@ Verdict verdictOf(double sigma, double configured_sigma) {
   return sigma <= kObservedSigmaShare * configured_sigma ? Verdict::kObserved : Verdict::kNotObserved;
 }
 
-/// The mean over the runs that observed it. Each run may have another, and so may the next.
+/// The mean over the runs that observed the offset. Each run has its own, and the sigma covers them.
 OffsetEstimate scattered(double configured_sigma, const std::vector<OffsetEstimate>& runs) {
   std::vector<OffsetEstimate> observed;
   for (const OffsetEstimate& run : runs)
@@ -147,7 +147,7 @@ void calibrateExtrinsics(const ExtrinsicsEstimate& configured, const std::vector
   calibration->extrinsics_agreement = combined.agreement;
 
   const Eigen::Vector3d found = turnBetween(configured.T_IR, combined.estimate.T_IR);
-  Eigen::Vector3d unobserved = Eigen::Vector3d::Zero();  // its part
+  Eigen::Vector3d unobserved = Eigen::Vector3d::Zero();  // the part of `found` about unobserved axes
   bool any_observed = false;
   for (Eigen::Index i = 0; i < configured.covariance.rows(); ++i) {
     const std::size_t first = i < 3 ? kTurn : kLever;
@@ -166,7 +166,7 @@ void calibrateExtrinsics(const ExtrinsicsEstimate& configured, const std::vector
       unobserved[k] = axis.found;
     }
   }
-  // Taken back about the axes of I. The other turns keep what the runs found, also to second order.
+  // Takes back the unobserved turns. The other turns keep what the runs found, also to second order.
   if (any_observed)
     calibration->T_IR.q_IR = (so3::exp(-unobserved) * combined.estimate.T_IR.q_IR).normalized();
 }

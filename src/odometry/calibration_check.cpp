@@ -9,8 +9,8 @@
 namespace rio_t {
 namespace {
 
-/// An innovation counts at most as so many sigma (Huber, "Robust Estimation of a Location Parameter", 1964):
-/// it may be an outlier.
+/// [sigma] An innovation counts at most as this: it may be an outlier (Huber, "Robust Estimation of a
+/// Location Parameter", 1964).
 constexpr double kLongest = 4.0;
 
 // The errors of a radar, by their first column.
@@ -20,24 +20,24 @@ Eigen::Index firstOf(std::size_t radar) { return kErrors * static_cast<Eigen::In
 
 }  // namespace
 
-double VectorError::sigmas(double told_sigma) const {
-  const Eigen::Matrix3d told = told_sigma * told_sigma * Eigen::Matrix3d::Identity();
-  return std::sqrt(error.dot((covariance + told).ldlt().solve(error)));
+double VectorError::sigmas(double tolerance) const {
+  const Eigen::Matrix3d added = tolerance * tolerance * Eigen::Matrix3d::Identity();
+  return std::sqrt(error.dot((covariance + added).ldlt().solve(error)));
 }
 
 double ScalarError::sigma() const { return std::sqrt(variance); }
 
-double ScalarError::sigmas(double told_sigma) const {
-  return std::abs(error) / std::hypot(sigma(), told_sigma);
+double ScalarError::sigmas(double tolerance) const {
+  return std::abs(error) / std::hypot(sigma(), tolerance);
 }
 
-// The prior: a turn of a radian, beyond which nothing here is linear, a lever arm of a metre, a scale that is
-// off by itself, an offset of a second.
+// All prior sigmas are 1: a turn of a radian, beyond which nothing here is linear, a lever arm of a metre, a
+// scale that is wrong by 100 %, an offset of a second.
 CalibrationCheck::CalibrationCheck(std::size_t radars)
     : dv_W_(Eigen::MatrixXd::Zero(3, firstOf(radars))),
       information_(Eigen::MatrixXd::Identity(dv_W_.cols(), dv_W_.cols())),
       score_(Eigen::VectorXd::Zero(dv_W_.cols())),
-      alike_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(radars))),
+      score_bias_(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(radars))),
       turning_(radars) {}
 
 void CalibrationCheck::add(std::size_t radar, const UsedInnovation& innovation) {
@@ -49,8 +49,8 @@ void CalibrationCheck::add(std::size_t radar, const UsedInnovation& innovation) 
   TurningAxes& turning = turning_[radar];
   turning.add(innovation.omega_R, innovation.omega_variance);
   own.middleCols<3>(kLeverArm) += so3::hat(turning.projection() * innovation.omega_R);
-  // The noise of v_R and that of the prediction are also in d, and would look like a scale. The error of
-  // their mean, weighted as the window weighs them, does not depend on d if P and S are right.
+  // The noise of v_R and that of the prediction v_R - d are also in d, and would look like a scale. The error
+  // of their weighted mean does not depend on d if P and S are right.
   const Eigen::LDLT<Eigen::Matrix3d> S(innovation.S);
   const Eigen::Vector3d weighted_d = S.solve(innovation.d);
   const Eigen::Vector3d correction = innovation.predicted * weighted_d;
@@ -60,7 +60,7 @@ void CalibrationCheck::add(std::size_t radar, const UsedInnovation& innovation) 
   const double weight = std::min(1.0, kLongest / std::sqrt(innovation.squaredSigmas()));
   information_ += weight * J.transpose() * weighted;
   score_ += weight * weighted.transpose() * innovation.d;
-  alike_[static_cast<Eigen::Index>(radar)] +=
+  score_bias_[static_cast<Eigen::Index>(radar)] +=
       weight *
       std::min(correction.dot(weighted_d), S.solve(innovation.predicted).trace());  // a fault makes d large
   dv_W_ += innovation.R_WR * innovation.predicted * weighted;
@@ -72,7 +72,7 @@ CalibrationErrors CalibrationCheck::errorsOf(std::size_t radar, const Extrinsics
   const Eigen::VectorXd errors = P * score_;
   Eigen::MatrixXd covariance = P;
   for (std::size_t k = 0; k < turning_.size(); ++k) {
-    const Eigen::VectorXd bias = alike_[static_cast<Eigen::Index>(k)] * P.col(firstOf(k) + kScale);
+    const Eigen::VectorXd bias = score_bias_[static_cast<Eigen::Index>(k)] * P.col(firstOf(k) + kScale);
     covariance += bias * bias.transpose();
   }
 

@@ -11,8 +11,8 @@
 namespace rio_t {
 namespace {
 
-/// The IMU must be this far past a scan's node [s]: the derivative with respect to t_O looks so far ahead,
-/// and the factor's time may still move a little.
+/// The IMU must be this far past a scan's node [s]: the derivative with respect to t_O averages so far ahead,
+/// and the time of the factor may still move a little.
 constexpr double kImuMargin = kOffsetHalfWidth + 0.01;
 /// [s] A scan stamped further ahead of the newest IMU sample has a wrong stamp, unless the IMU is in a gap
 /// that will be bridged.
@@ -68,7 +68,7 @@ Estimator::Estimator(const OdometryOptions& options, Navigation& navigation, Fau
   if (options.landmarks.enabled) landmarks_.emplace(options.landmarks, g_W_, imu_);
 }
 
-/// One scan: before the start, it helps to find the start. Then it goes into the window, if its time allows.
+/// Before the start, the scan helps to find the start. Then it goes into the window, if its time allows.
 ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
   ScanResult result;
   result.scan = std::move(scan);
@@ -77,7 +77,7 @@ ScanResult Estimator::useScan(RadarScan scan, bool imu_has_ended) {
   RadarChannel& radar = radars_.at(result.scan.radar);
   const bool had_span = radar.knowledge().doppler_span.value > 0.0;
   const bool is_new = radar.observe(result.scan);
-  // The velocities so far took the Dopplers with another span, or without one. They are wrong.
+  // The velocities so far are wrong: they were computed without the span, or with a wrong one.
   if ((radar.knowledge().doppler_span.value > 0.0) != had_span) initializer_.forgetVelocities();
   if (!initialized()) {
     result.ego_velocity = radar.velocityOf(result.scan);
@@ -175,7 +175,7 @@ void Estimator::judge(const RadarAnswer& answer, const RadarScan& scan) {
   model_error_scale_.add(scan.stamp, answer.used->squaredSigmas(), share);
 }
 
-/// Leaves out scans at rest: they repeat the errors of one scan.
+/// Skips scans at rest, since they repeat the errors of one scan.
 void Estimator::seeLandmarks(const LandmarkMap::Prediction& expected, const RadarAnswer& answer,
                              const RadarChannel& radar, ScanResult& result) {
   Block* node = smoother_.nodeAt(radar.nodeTime(result.scan.stamp));
@@ -218,8 +218,8 @@ void Estimator::updateWindow(const RadarChannel& radar, bool rests_now, ScanResu
   if (options_.smoother.estimate_time_offset) result.errors.offset.reset();
   result.T_IR_covariance = extrinsicsCovariance(covariance.bottomRightCorner(estimated, estimated), estimate);
   for (const StampedPose& left : marginalize()) result.left_window.push_back(left);
-  // On a frame that shakes the window believes rest little: the start of a gentle drive must not look like an
-  // offset. The published platform stands still.
+  // On a frame that shakes, the zero velocity has a large sigma in the window: the start of a gentle drive
+  // must not look like an offset. The published velocity is zero.
   if (rests_now) result.state.v_W.setZero();
   anchor(result.state, rests_now);
   addHeadingCurvature(result.state);
@@ -271,7 +271,7 @@ void Estimator::addPressure(const Pressure& pressure) {
 
 void Estimator::keepUp(bool scan_came, const std::vector<RadarScan>& waiting) {
   if (imu_.empty()) return;
-  // By the IMU's clock at the arrival of scans: the scans' own stamps may be wrong.
+  // A gap is measured by the IMU's clock at the arrival of scans, since their stamps may be wrong.
   if (scan_came || !radar_heard_) {
     radar_heard_ = imu_.newest();
     radar_is_silent_ = false;
@@ -354,7 +354,7 @@ PoseAnchor Estimator::anchorAt(Time time) const {
   // jump.
   const Time since = std::max(time, smoother_.node(0).time);
   const PredictedState predicted = *smoother_.predict(since, {});
-  const bool is_before = time < since;  // the first node
+  const bool is_before = time < since;  // earlier than the first node
   const StateBlock x = is_before ? carried(predicted.x, since, time, imu_, g_W_) : predicted.x;
   NavigationState state = navigationState({time, x}, predicted.covariance, imu_);
   health_.widen(state);
@@ -373,8 +373,8 @@ Health Estimator::updateHealth() {
   return now;
 }
 
-/// If the estimate was wrong, the scans have moved its velocity by the error; if it was right, by nothing.
-/// The position has drifted by that error, and no scan moves it back.
+/// If the estimate was wrong, the scans have corrected its velocity by the error; if it was right, by
+/// nothing. The position has drifted with this error of the velocity, and no scan corrects the position.
 void Estimator::followContradiction(bool was_contradicted) {
   const bool is_contradicted = health_.isContradicted();
   if (is_contradicted && !was_contradicted) {

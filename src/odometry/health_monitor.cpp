@@ -12,18 +12,18 @@ namespace {
 
 constexpr double kDefaultGate = 4.0;     // [sigma]
 constexpr std::size_t kMinScans = 8;     // fewer prove nothing
-constexpr double kMinSpan = 0.7;         // of the window, that they must reach over
+constexpr double kMinSpan = 0.7;         // share of the window that they must cover
 constexpr std::size_t kMaxScans = 1000;  // bounds the memory
-constexpr double kStepsApart = 20.0;     // [s] nearer, a step of the offset explains nothing
-constexpr std::size_t kFalseSteps = 3;   // so near each other, no offset steps: a driver restarts once
+constexpr double kStepsApart = 20.0;     // [s] an earlier next step of the offset explains no contradiction
+constexpr std::size_t kFalseSteps = 3;   // within kStepsApart they are a divergence: a driver restarts once
 constexpr double kMaxSpeed = 200.0;      // [m/s] no platform with such a radar
 /// The bound on the scale of the squares. Turned axes give 50 and more. The worst good platform, a kart with
 /// sparse radars, gives 16 for a second and then less than 10.
 constexpr double kMaxModelErrorScale = 25.0;
-constexpr double kMetresPerSecond2 = 10;  // an attitude that is off by x turns x g into velocity each second
+constexpr double kAboutGravity = 10;  // [m/s^2] a tilt error x changes the velocity by x g each second
 
-/// Variance of the velocity in I [m^2/s^2]. A heading that was lost in an IMU gap makes v_W vague for good
-/// and is no divergence. An error delta of the state gives the velocity error R_IW (delta_v + A delta_theta).
+/// Variance of the velocity in I [m^2/s^2]. A heading that an IMU gap lost makes v_W uncertain for good. It
+/// is no divergence. An error delta of the state gives the velocity error R_IW (delta_v + A delta_theta).
 Eigen::Vector3d bodyVelocityVariance(const NavigationState& state) {
   using S = StateBlock;
   const Eigen::Matrix3d R_WI = state.q_WI.toRotationMatrix();
@@ -78,7 +78,7 @@ std::optional<double> HealthMonitor::contradiction() const {
 }
 
 void HealthMonitor::offsetStepped(Time stamp) {
-  // A divergence makes false steps, one after the other: they must not hide it.
+  // A divergence causes false steps, one after the other. They must not hide the divergence.
   if (steps_.empty() || std::abs(stamp - steps_.back()) > kStepsApart) entries_.clear();
   steps_.push_back(stamp);
   while (std::abs(stamp - steps_.front()) > kStepsApart) steps_.pop_front();
@@ -111,7 +111,7 @@ Health HealthMonitor::judge(Time now, const NavigationState& state, double model
       contradicted_since_ = entries_.front().stamp;
     } else if (diverged_at_ && *share < 0.5 * options_.max_contradiction) {
       diverged_at_.reset();
-      steps_.clear();  // made by the divergence
+      steps_.clear();  // the divergence caused them
     }
   }
   const double variance = bodyVelocityVariance(state).maxCoeff();
@@ -139,7 +139,7 @@ void HealthMonitor::widen(NavigationState& state) const {
   };
   add(StateBlock::kV, square);
   add(StateBlock::kP, square * seconds * seconds);
-  add(StateBlock::kTheta, square / (kMetresPerSecond2 * kMetresPerSecond2));
+  add(StateBlock::kTheta, square / (kAboutGravity * kAboutGravity));
 }
 
 RadarsHealth::RadarsHealth(const HealthOptions& options, double gate, std::size_t radars)
@@ -159,7 +159,7 @@ void RadarsHealth::startedAt(Time time) {
 
 Health RadarsHealth::judge(Time now, const NavigationState& state, double model_error_scale) {
   for (HealthMonitor& monitor : monitors_) monitor.judge(now, state, model_error_scale);
-  // A radar that is silent says nothing, neither good nor bad.
+  // A silent radar neither confirms nor contradicts the estimate.
   const auto isBetter = [&](const HealthMonitor& a, const HealthMonitor& b) {
     if (a.hears(now) != b.hears(now)) return a.hears(now);
     return !a.isContradicted() && b.isContradicted();

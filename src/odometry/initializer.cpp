@@ -24,7 +24,7 @@ bool Initializer::isMoving(Time from, Time to) const {
 bool Initializer::mayStartInMotion() const {
   if (options_.init_mode != InitMode::kAuto) return options_.init_mode == InitMode::kMotion;
   if (!first_ || *newest_ - *first_ < options_.init_motion_after) return false;
-  // Not while a long init_duration is still under way at rest.
+  // A start at rest with a long init_duration may still be under way.
   const double seconds = std::max(options_.init_motion_after, options_.initialization.duration);
   return rest_.hasSeenMotion() || isMoving(*newest_ - seconds, *newest_);
 }
@@ -85,7 +85,7 @@ StartWait Initializer::waitingFor() const {
   if (radar_contradicts_rest_) wait.text += " (the IMU seemed at rest, but the radar saw motion)";
   if (!mayStartInMotion()) return wait;
   wait.text += "; or " + motion.text;
-  // This one says the most: it names gravity and mounting.
+  // This obstacle is the most useful one: its text names gravity and mounting.
   if (motion.obstacle == StartObstacle::kContradiction) wait.obstacle = motion.obstacle;
   return wait;
 }

@@ -22,20 +22,20 @@
 namespace rio_t {
 namespace {
 
-constexpr double kMinSpan = 0.8;              // of the window, that the velocities must reach over
-constexpr std::size_t kMinVelocities = 8;     // 6 unknowns to start with, and witnesses
+constexpr double kMinSpan = 0.8;              // share of the window that the velocities must cover
+constexpr std::size_t kMinVelocities = 8;     // the line has 6 unknowns
 constexpr std::size_t kMaxVelocities = 1000;  // bounds the memory
-constexpr double kMaxLatency = 1.0;           // [s] of a scan, that the IMU is kept for
+constexpr double kMaxLatency = 1.0;           // [s] of a scan; the IMU is kept for this time
 constexpr int kMaxIterations = 15;
-constexpr int kMaxRounds = 10;         // of finding the state and which scans tell the offset
-constexpr double kOffsetHolds = 1e-3;  // [s] from which the derivatives by the offset are as good
+constexpr int kMaxRounds = 10;         // each finds the state, and then which scans inform the offset
+constexpr double kOffsetHolds = 1e-3;  // [s] a smaller change of the offset does not change its derivatives
 constexpr double kConverged = 1.0e-4;  // [sigma]
 constexpr double kOutlier = 4.0;       // [sigma]
-constexpr int kScaleRounds = 3;        // of finding the state and the size of the errors around it
+constexpr int kScaleRounds = 3;        // each finds the state, and then the scale of the errors
 constexpr double kUnknowns = 7.0;      // that the velocities determine: velocity, gravity in I, t_O
 
-/// Whether no gain differs by more than 0.01, which changes nothing.
-bool isNear(const std::vector<double>& a, const std::vector<double>& b) {
+/// Whether all gains are within 0.01 of each other. A smaller difference does not matter.
+bool areNear(const std::vector<double>& a, const std::vector<double>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), [](double x, double y) { return std::abs(x - y) < 0.01; });
 }
 
@@ -89,7 +89,7 @@ std::optional<Initialization> MotionInitializer::solve(const ImuBuffer& imu,
   if (velocities_.empty() || imu.empty()) return std::nullopt;
   const auto outOfReach = [&](const Velocity& z) { return std::abs(z.stamp - imu.newest()) > imuHistory(); };
   velocities_.erase(std::remove_if(velocities_.begin(), velocities_.end(), outOfReach), velocities_.end());
-  // Any offset within the bound must be covered by the IMU.
+  // The IMU must cover the time of measurement for any offset within the bound.
   const Time covered = imu.newest() - smoother_.max_time_offset;
   const auto after = std::upper_bound(velocities_.begin(), velocities_.end(), covered,
                                       [](Time t, const Velocity& z) { return t < z.stamp; });
@@ -249,7 +249,7 @@ std::optional<double> MotionInitializer::refine(const Velocities& velocities, Ti
 
   std::vector<CarriedCovariance> covariances;
   for (const Velocity& z : velocities) covariances.push_back(carriedCovariance(z, time, imu, scale.value()));
-  // Which scans tell the offset depends on the state, and the state on them.
+  // The state determines which scans inform the offset, and these scans determine the state.
   std::vector<const Term*> terms;
   OffsetGains offset_gains;
   double linear_from = offset->x[0];  // [s]
@@ -258,7 +258,7 @@ std::optional<double> MotionInitializer::refine(const Velocities& velocities, Ti
         offset_gains, offsetGains(velocities, time, imu, stateOf(motion, *biases), offset->x[0]));
     const std::vector<double>& gains = offset_gains.gains;
     const bool holds = std::abs(offset->x[0] - linear_from) < kOffsetHolds;
-    if (round > 0 && holds && isNear(gains, last.gains)) break;
+    if (round > 0 && holds && areNear(gains, last.gains)) break;
     linear_from = offset->x[0];
     for (const Term* term : terms) window.remove(*term);
     terms.clear();
@@ -293,7 +293,7 @@ std::optional<double> MotionInitializer::refine(const Velocities& velocities, Ti
   }
   const SquareRoot root = eliminateFirst(linearize(window), 0);
   prior = {stateOf(motion, *biases), offset->x[0], toExtrinsics(extrinsics->x.data()), root};
-  // The solution is drawn towards the velocities: what is left scatters less.
+  // The solution fits the velocities, so their residuals scatter less than their errors.
   const double left = 3.0 * n / (3.0 * n - kUnknowns);
   for (std::size_t i = 0; i < velocities.size(); ++i) scale.add(time, left * mean_square, mean_share);
   return outliers;

@@ -5,7 +5,7 @@
 namespace rio_t {
 namespace {
 
-/// Derivative of the heading by theta, which lives in I.
+/// Derivative of the heading by theta, which is in I.
 Eigen::RowVector3d headingByTheta(const Eigen::Quaterniond& q_WI) { return q_WI.toRotationMatrix().row(2); }
 
 }  // namespace
@@ -43,7 +43,7 @@ void addHeadingCurvature(NavigationState& state) {
   for (const int first : {0, 3})
     shorten.segment<3>(first) =
         Eigen::Vector3d::UnitZ().cross(with_heading.segment<3>(S::kP + first) / variance);
-  // The mean square of psi^2 / 2, and not beyond that of 1 - cos(psi) for any psi.
+  // The mean square of psi^2 / 2, but at most that of 1 - cos(psi) over all psi.
   state.covariance.block<6, 6>(S::kP, S::kP) +=
       std::min(0.75 * variance * variance, 1.5) * shorten * shorten.transpose();
 }

@@ -15,9 +15,9 @@ struct RadarInertialOdometry::Impl {
         navigation(options, Eigen::Vector3d(0.0, 0.0, -options.gravity)),
         estimator(options, navigation, faults) {}
 
-  /// Returns the results of the scans that waited for a clock of the IMU that has ended.
+  /// Hands the inbox to the estimator. Returns the results of scans that waited for a clock that has jumped.
   std::vector<ScanResult> takeInbox();
-  /// The IMU that they wait for will not come.
+  /// Uses the waiting scans as far as possible, since the IMU that they wait for will not come.
   std::vector<ScanResult> useWaitingScans();
   /// Takes the next scan that need not wait, if there is one.
   std::optional<RadarScan> nextScan(bool imu_has_ended);
@@ -32,7 +32,7 @@ struct RadarInertialOdometry::Impl {
     std::vector<ImuMeasurement> imu;
     std::vector<RadarScan> scans;
     std::vector<Pressure> pressures;
-    std::uint64_t clock_restarts = 0;  ///< `imu` is from after that many
+    std::uint64_t clock_restarts = 0;  ///< of the IMU's clock, before the samples in `imu`
     std::optional<Tuning> tuning;
   };
   // Status of the estimator; guarded by inbox_mutex, too.
@@ -127,8 +127,8 @@ std::vector<ScanResult> RadarInertialOdometry::finish() {
   return results;
 }
 
-// The scan that the IMU covered first, however many IMU samples come at once. So the live node and the bag
-// runner use the scans of several radars in the same order.
+// Takes the scan that the IMU covered first, also if many IMU samples came at once. So the live node and the
+// bag runner use the scans of several radars in the same order.
 std::optional<RadarScan> RadarInertialOdometry::Impl::nextScan(bool imu_has_ended) {
   auto first = waiting_scans.end();
   for (auto scan = waiting_scans.begin(); scan != waiting_scans.end(); ++scan) {

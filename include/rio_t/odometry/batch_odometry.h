@@ -28,10 +28,10 @@ class BatchOdometry {
 
   /// Adds the samples that the online run has taken, with its bridges (see RadarInertialOdometry::addImu).
   void addImu(const std::vector<ImuMeasurement>& taken);
-  /// Call it first if the clock of the IMU jumped before them. All samples so far are forgotten. Throws
-  /// std::runtime_error if the online run `has_started`.
+  /// Call it before addImu if the clock of the IMU jumped before the samples. Drops all samples so far.
+  /// Throws std::runtime_error if the online run `has_started`.
   void startAgain(bool has_started);
-  /// The points are not kept.
+  /// Adds the result of a scan, without its points.
   void addResult(ScanResult result);
 
   /// `start`: of the online run. Throws std::runtime_error if no scan was used.
@@ -45,11 +45,11 @@ class BatchOdometry {
   };
 
   Run makeRun(const RadarInertialOdometry::Start& start) const;
-  /// None if the platform is free, or was not the vehicle that the options say.
+  /// None if the platform is free, or if its motion contradicted the constraint of the vehicle.
   std::optional<BatchVehicle> vehicle(const RadarInertialOdometry::Start& start) const;
   /// The means of the pressures that the online run used.
   std::vector<BatchHeight> heights() const;
-  /// Sets what the scan gives to the graph.
+  /// Sets the measurement of `scan`.
   void setMeasurement(const ScanResult& result, BatchScan& scan) const;
   std::vector<NavigationState> trajectory(const BatchSolution& solution) const;
   std::vector<ScanResult> results(const Run& run, const BatchSolution& solution) const;

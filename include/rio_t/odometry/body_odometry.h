@@ -36,15 +36,15 @@ struct BodyOdometry {
 struct WorldInOdom {
   Eigen::Vector3d p_O = Eigen::Vector3d::Zero();             ///< origin of W in O [m]
   Eigen::Quaterniond q_OW = Eigen::Quaterniond::Identity();  ///< a turn about z
-  /// How well T_OW is known: of the position of `anchor_O` [m], then of the yaw [rad].
+  /// Covariance of T_OW: of the position of `anchor_O` [m], then of the yaw [rad].
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
-  Eigen::Vector3d anchor_O = Eigen::Vector3d::Zero();  ///< the point about which the yaw is not known [m]
+  Eigen::Vector3d anchor_O = Eigen::Vector3d::Zero();  ///< an error of the yaw turns W about this point [m]
 };
 
-/// Places W so that the body, whose IMU starts at `start`, is where `last` says: at the same position, with
-/// the same yaw. Roll and pitch are those of `start`, since gravity shows them. The uncertainty of `last`
-/// stays. A default-constructed `last` lets O begin at the body: at the origin, turned from the axes of O by
-/// roll and pitch alone. If the body hangs upside down, the yaw is not defined, and W keeps its own.
+/// Places W so that the body, whose IMU starts at `start`, has the position and the yaw of `last`. Roll and
+/// pitch are those of `start`, since gravity shows them. The uncertainty of `last` stays. With a
+/// default-constructed `last`, the body begins at the origin of O with yaw zero. If the body hangs upside
+/// down, the yaw is not defined, and W keeps its own.
 WorldInOdom placeWorld(const StampedPose& start, const ImuInBody& T_BI, const BodyOdometry& last = {});
 
 /// The odometry of a body that is fixed to the IMU. `rate_sigma`: white noise of a gyro sample [rad/s].

@@ -18,14 +18,14 @@ struct Gaussian {
   Eigen::MatrixXd covariance;
 };
 
-/// Whether several runs say the same. A direction counts for a run that observed it.
+/// Whether several runs agree. A direction counts only for the runs that observed it.
 struct Agreement {
   double chi_squared = 0.0;    ///< of the runs about their common mean
   int degrees_of_freedom = 0;  ///< 0: no direction was observed by two runs, and nothing can disagree
 
-  /// chi_squared is as likely as 2.6 sigma or less of one number: beyond it lies one case in a hundred.
+  /// Whether chi_squared is at most as unlikely as 2.6 sigma of one number, which is one case in a hundred.
   bool agree() const;
-  /// Factor on the sigmas of the runs with which chi_squared would be what is expected; 1 if they agree.
+  /// Factor on the sigmas of the runs that gives chi_squared its expected value; 1 if they agree.
   double widening() const;
 };
 
@@ -60,9 +60,8 @@ struct OffsetEstimate {
 /// scatter.
 Combined<OffsetEstimate> combine(const OffsetEstimate& prior, const std::vector<OffsetEstimate>& posteriors);
 
-/// A number is observed if its sigma is at most this share of the configured one. The runs then say three
-/// times as much of it as the configuration: 1 / 0.5^2 = 1 + 3. Above that, much of it is the configured
-/// number.
+/// A number is observed if its sigma is at most this share of the configured one. The runs then have three
+/// times the information of the configuration: 1 / 0.5^2 = 1 + 3. Above it, the configuration dominates.
 inline constexpr double kObservedSigmaShare = 0.5;
 
 enum class Verdict {
@@ -86,7 +85,7 @@ struct AxisCalibration {
   double configured_sigma = 0.0;  ///< zero: not estimated
   Verdict verdict = Verdict::kNotEstimated;
 
-  /// In sigmas of what was configured; 0 if it is not estimated.
+  /// |found - configured| in configured sigmas; 0 if it is not estimated.
   double farFromConfigured() const;
 };
 

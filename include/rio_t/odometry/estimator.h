@@ -40,8 +40,8 @@ class FaultCounters {
   std::map<std::string, std::uint64_t> counts_;  // guarded by mutex_
 };
 
-/// The paper's optimisation thread: from scans and checked IMU samples to the newest optimised state, which
-/// anchors the navigation. Not thread-safe.
+/// The paper's optimisation thread: takes scans and checked IMU samples, and anchors the navigation at the
+/// newest optimised state. Not thread-safe.
 class Estimator {
  public:
   /// `navigation` and `faults` must outlive the estimator.
@@ -49,21 +49,20 @@ class Estimator {
   Estimator(const Estimator&) = delete;  // its parts refer to its IMU buffer
   Estimator& operator=(const Estimator&) = delete;
 
-  /// Samples that Navigation checked, in time order.
+  /// Adds samples that Navigation checked, in time order.
   void addImu(const std::vector<ImuMeasurement>& samples);
-  /// In effect for the next scan.
+  /// Changes options from the next scan on.
   void tune(const Tuning& tuning);
-  /// In the order of arrival; counts what cannot be used in the faults.
+  /// Adds a pressure, in the order of arrival. Counts one that cannot be used in the faults.
   void addPressure(const Pressure& pressure);
-  /// The IMU's clock jumped. No earlier data can be related to later data, so the state is dropped. The poses
-  /// of the window go to the next result.
+  /// Call it if the IMU's clock jumped. No earlier data can be related to later data, so the state is
+  /// dropped. The poses of the window go to the next result.
   void startAgain(std::uint64_t clock_restarts);
   std::uint64_t clockRestarts() const { return clock_restarts_; }
-  /// Call it after addImu. Counts times without radar, and moves the window on if no scan does; `waiting`
-  /// are the scans that come next.
+  /// Call it after addImu. Counts gaps of the radar. Moves the window if no scan does. `waiting`: next scans.
   void keepUp(bool scan_came, const std::vector<RadarScan>& waiting);
 
-  /// When the scan was measured, as known so far.
+  /// Estimated time of the scan's node.
   Time nodeTime(const RadarScan& scan) const;
   /// Whether the IMU that covers the scan may still come.
   bool mustWait(const RadarScan& scan) const;
@@ -81,7 +80,7 @@ class Estimator {
  private:
   /// Empty, or why the scan of a node at that time cannot be used now.
   std::string whyNotNow(Time node_time, bool imu_has_ended) const;
-  /// Adds what radar and aids say of a scan at `node_time`, solves the window and judges its health.
+  /// Adds the terms of radar and aids for a scan at `node_time`, solves the window and judges the health.
   void putIntoWindow(Time node_time, RadarChannel& radar, ScanResult& result);
   void tryInitialize(const ImuMeasurement& sample);
   /// Starts a window.
@@ -89,7 +88,7 @@ class Estimator {
   bool tryReinitialize(std::vector<StampedPose>& left);
   PoseAnchor anchorAt(Time time) const;
   void judge(const RadarAnswer& answer, const RadarScan& scan);
-  /// `rests_now`: the newest node does.
+  /// `rests_now`: the platform is at rest at the newest node.
   void updateWindow(const RadarChannel& radar, bool rests_now, ScanResult& result);
   void seeLandmarks(const LandmarkMap::Prediction& expected, const RadarAnswer& answer,
                     const RadarChannel& radar, ScanResult& result);
@@ -98,7 +97,7 @@ class Estimator {
   std::vector<StampedPose> marginalize();
   /// Adds the term that was judged, unless the platform is at rest.
   void constrainToGround(bool at_rest, ScanResult& result);
-  /// Sees that the scans begin or cease to contradict the estimate.
+  /// Adds a drift of the position if the scans cease to contradict the estimate.
   void followContradiction(bool was_contradicted);
   ImuNoise imuNoise() const { return options_.imu_noise.scaled(model_error_scale_.value()); }
   NavigationState newestState(const StateCovariance& covariance) const;
@@ -126,7 +125,7 @@ class Estimator {
   StartWait waiting_for_;
   Time initialized_at_;
   Time last_used_;                         ///< stamp of the last scan that went into the window
-  std::vector<StampedPose> left_between_;  ///< left the window between two results; for the next one
+  std::vector<StampedPose> left_between_;  ///< poses that left the window since the last result
   std::uint64_t clock_restarts_ = 0;
   std::optional<Time> radar_heard_;  ///< time of the IMU when the last scan came
   bool radar_is_silent_ = false;

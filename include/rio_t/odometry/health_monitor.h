@@ -31,7 +31,7 @@ struct HealthOptions {
   /// [s] of divergence. For this long the IMU alone is better than a radar that contradicts it, e.g. in front
   /// of a bus that passes.
   double reinitialize_after = 5.0;
-  /// [s] of scans that are judged. A crowd may fill the view for 2 s; users want to know a divergence within 5.
+  /// [s] of scans that are judged. A crowd may fill the view for 2 s; a divergence must show within 5 s.
   double window = 4.0;
   /// Mean over the window of min(1, d' S^-1 d / gate^2): the share of scans that contradict the prediction.
   double max_contradiction = 0.65;
@@ -42,32 +42,32 @@ struct HealthOptions {
 /// Judges the estimate by the innovations of one radar (docs/method.md, section 12). Not thread-safe.
 class HealthMonitor {
  public:
-  /// `gate` [sigma]: a scan as far as this from the prediction contradicts it fully; 0: 4.
+  /// `gate` [sigma]: a scan this far from the prediction contradicts it fully; 0 stands for 4.
   HealthMonitor(const HealthOptions& options, double gate);
   void setGate(double gate);  ///< for the scans to come
 
   /// Takes a scan whose points agree on a velocity without the prediction.
   void addInnovation(const Innovation& innovation);
-  /// Takes a scan whose points do not agree, or side with the prediction. It contradicts nothing, and it does
-  /// not end a divergence.
+  /// Takes a scan whose points do not agree, or agree only with the prediction. It contradicts nothing, and
+  /// it does not end a divergence.
   void addUndecided(Time stamp) {
     if (!diverged_at_) add({stamp, 0.0, std::nullopt});
   }
-  /// The window was updated at `time`.
+  /// Call it when the window was updated at `time`.
   void updated(Time time) { last_update_ = time; }
-  /// The time offset stepped before the scan `stamp`. One step explains the contradictions before it, so they
-  /// no longer count. Three steps within 20 s are a divergence: no offset steps so often.
+  /// Call it if the time offset stepped before the scan `stamp`. One step explains the contradictions before
+  /// it, so they no longer count. Three steps within 20 s are a divergence: no offset steps so often.
   void offsetStepped(Time stamp);
-  /// The estimate was initialised or re-initialised at `time`. After a divergence the next scans must agree
-  /// before it is trusted.
+  /// Call it if the estimate was initialised or re-initialised at `time`. After a divergence the next scans
+  /// must agree before it is trusted.
   void startedAt(Time time);
 
-  /// Judges at `now`; `state` is what is published. `model_error_scale` is that of ModelErrorScale: where the
-  /// models are wrong by five of their sigmas for a whole window, the input is not what the options say.
+  /// Judges the published `state` at `now`. `model_error_scale` is that of ModelErrorScale: if the models are
+  /// wrong by five of their sigmas for a whole window, the input does not match the options.
   Health judge(Time now, const NavigationState& state, double model_error_scale = 1.0);
   Health health() const { return health_; }
-  /// Whether the scans contradict the estimate, so that it must not predict them. An estimate that only does
-  /// not know its velocity says so by its covariance.
+  /// Whether the scans contradict the estimate, so that it must not predict them. False if only the velocity
+  /// is unknown, since the covariance shows that.
   bool isContradicted() const { return is_contradicted_; }
   /// Whether a scan came within the window before `now`.
   bool hears(Time now) const;
@@ -101,8 +101,8 @@ class HealthMonitor {
   bool is_contradicted_ = false;
 };
 
-/// Judges the estimate by the innovations of all radars. Where one radar agrees with the estimate, the
-/// estimate is right, and a radar that contradicts it fails. Not thread-safe.
+/// Judges the estimate by the innovations of all radars. If one radar agrees with the estimate, the estimate
+/// is right, and a radar that contradicts it is faulty. Not thread-safe.
 class RadarsHealth {
  public:
   /// `gate`: see HealthMonitor.

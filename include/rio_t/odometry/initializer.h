@@ -10,8 +10,8 @@
 
 namespace rio_t {
 
-/// Finds the first state by `init_mode`: from rest if IMU and radar see some, else from motion. After a
-/// divergence it finds a new one in motion. Not thread-safe.
+/// Finds the first state by `init_mode`: from rest if IMU and radar see rest, else from motion. After a
+/// divergence it finds a new state in motion. Not thread-safe.
 class Initializer {
  public:
   explicit Initializer(const OdometryOptions& options);
@@ -22,7 +22,7 @@ class Initializer {
   /// The state of a platform that moves, at a pose that is known; see MotionInitializer.
   std::optional<Initialization> findInMotion(const ImuBuffer& imu,
                                              const std::function<PoseAnchor(Time)>& anchorAt);
-  /// Forgets the velocities: no scan counts twice.
+  /// Forgets the velocities, so that no scan counts twice.
   void forgetVelocities();
   void setImuNoise(const ImuNoise& noise);
   /// Velocity of a scan of a radar, measured without a prediction.

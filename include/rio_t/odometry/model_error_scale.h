@@ -4,10 +4,10 @@
 
 namespace rio_t {
 
-/// Scale of the model errors against the options. NoiseMeter and PointNoise measure the noise of IMU and
-/// points. The rest is scale and misalignment of the IMU, and what the points of a scan share; the options
-/// `imu_accel_noise_density` and `ego_velocity_added_sigma` stand for it. This factor multiplies both
-/// squares, such that the innovations of the radar are as large as their covariances say: the variance factor
+/// Scale of the model errors relative to the options. NoiseMeter and PointNoise measure the noise of IMU and
+/// points. The other errors are scale and misalignment of the IMU, and errors that the points of a scan
+/// share; the options `imu_accel_noise_density` and `ego_velocity_added_sigma` stand for these. This factor
+/// multiplies both squares, so that the innovations of the radar match their covariances: the variance factor
 /// of adjustment theory (Mikhail and Ackermann, Observations and Least Squares, 1976) for a part of the
 /// noise, by Fisher scoring, one innovation a step (docs/method.md, eq. 32a). Not thread-safe.
 class ModelErrorScale {

@@ -44,7 +44,7 @@ std::string toString(InitializedFrom from);  ///< "rest" or "motion"
 struct Initialization {
   Time time;              ///< of the state; in motion, the newest velocity's stamp
   NodePrior prior;        ///< on the state and on the calibration of `radar`, correlations included
-  std::size_t radar = 0;  ///< whose velocities it is from; the first, from rest
+  std::size_t radar = 0;  ///< the radar whose velocities were used; the first if `from` rest
   InitializedFrom from = InitializedFrom::kRest;
   ModelErrorScale model_error_scale;  ///< of the velocities around it
 };
@@ -54,8 +54,8 @@ struct Initialization {
 /// Let dR, dv integrate the IMU from the state's time to a scan T later (T <= 0), and v_k be the velocity of
 /// I, in I, that the scan shows. Then dR v_k - dv = v_I + g_I T: a straight line over T whose slope is the
 /// gravity in I. From there a least squares with the factor of the smoother finds roll, pitch, velocity,
-/// biases and t_O together. It finds t_O if the motion shows it; if not, an unknown t_O widens the rest. The
-/// smoother must not use the same scans again. Not thread-safe.
+/// biases and t_O together. It finds t_O if the motion shows it; if not, the unknown t_O widens the other
+/// covariances. The smoother must not use the same scans again. Not thread-safe.
 class MotionInitializer {
  public:
   MotionInitializer(const OdometryOptions& options, const CalibrationPrior& radar);

@@ -20,7 +20,7 @@ class Navigation {
   /// The result of one sample.
   struct Checked {
     ImuSampleCheck::Verdict sample;
-    std::vector<ImuMeasurement> taken;  ///< the sample, after a bridge over a gap before it; or none
+    std::vector<ImuMeasurement> taken;  ///< the bridge over a gap before the sample, then the sample; or none
     std::vector<const char*> faults;    ///< names for FaultCounters
     std::uint64_t clock_restarts = 0;   ///< how often the clock of the IMU has jumped so far
     /// As published, at the sample; none before the first anchor.
@@ -36,7 +36,7 @@ class Navigation {
   /// At the newest sample. Its covariance is linear in the heading (without docs/method.md, eq. 34a).
   std::optional<NavigationState> state() const;
   MeasuredImuNoise imuNoise() const;       ///< over the last second
-  MeasuredImuNoise imuNoiseOfRun() const;  ///< root mean square of it since the first sample
+  MeasuredImuNoise imuNoiseOfRun() const;  ///< root mean square since the first sample
 
  private:
   const ImuNoise imu_noise_;

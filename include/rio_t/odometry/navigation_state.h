@@ -27,8 +27,8 @@ NavigationState navigationState(const NodeEstimate& node, const StateCovariance&
 /// d(heading, p_W) / d(state): the turn about the vertical of W [rad], and the position [m].
 Eigen::Matrix<double, 4, StateBlock::kTangent> poseInW(const Eigen::Quaterniond& q_WI);
 
-/// A heading that is wrong by a radian also shortens the way and the velocity. Adds the variance of that to
-/// the covariance (docs/method.md, eq. 34a).
+/// A heading that is wrong by a radian also shortens the path and the velocity. Adds the variance of this
+/// second-order error to the covariance (docs/method.md, eq. 34a).
 void addHeadingCurvature(NavigationState& state);
 
 }  // namespace rio_t

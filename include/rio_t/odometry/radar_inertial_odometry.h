@@ -17,10 +17,10 @@ namespace rio_t {
 
 /// The whole pipeline: IMU and scans in, odometry and time offset out.
 ///
-/// Two halves that may run in two threads. `addImu` is the navigation half: it carries the newest optimised
-/// state forward and never waits for the solver. `process` is the optimisation half. In one thread, call
-/// `process` after each `addImu` and each `addScan`; then the same input gives the same output, bit for bit.
-/// `addImu` and `addScan` may be called from different threads, `process` from one thread at a time.
+/// It has two halves that may run in two threads. `addImu` is the navigation half: it carries the newest
+/// optimised state forward and never waits for the solver. `process` is the optimisation half. In one thread,
+/// call `process` after each `addImu` and each `addScan`; then the same input gives the same output, bit for
+/// bit. `addImu` and `addScan` may be called from different threads, `process` from one thread at a time.
 class RadarInertialOdometry {
  public:
   explicit RadarInertialOdometry(const OdometryOptions& options);
@@ -28,10 +28,10 @@ class RadarInertialOdometry {
   RadarInertialOdometry(RadarInertialOdometry&&) noexcept;
   RadarInertialOdometry& operator=(RadarInertialOdometry&&) noexcept;
 
-  /// Returns what the estimate takes, and the state at this sample, carried from the newest optimised state:
-  /// what a live user gets. Drops samples that are out of order or not finite, and counts them in `faults()`.
-  /// Counts gaps and saturated samples, too, and widens the uncertainty over them (see ImuInputCheck). If the
-  /// IMU's clock jumps, everything starts again with an initialisation.
+  /// Returns the samples that the estimator takes, and the state at this sample, carried from the newest
+  /// optimised state, as a live user gets it. Drops samples that are out of order or not finite, and counts
+  /// them in `faults()`. Counts gaps and saturated samples, too, and widens the uncertainty over them (see
+  /// ImuInputCheck). If the IMU's clock jumps, everything starts again with an initialisation.
   Navigation::Checked addImu(const ImuMeasurement& imu);
 
   /// Queues a scan. It waits until the IMU covers its time of measurement. Throws std::invalid_argument for a
@@ -65,9 +65,9 @@ class RadarInertialOdometry {
   RadarKnowledge radarKnowledge(std::size_t radar = 0) const;
   /// Noise of the IMU, measured over the last second. Any thread.
   MeasuredImuNoise imuNoise() const;
-  /// Root mean square of it since the first sample. Any thread.
+  /// Root mean square of this noise since the first sample. Any thread.
   MeasuredImuNoise imuNoiseOfRun() const;
-  /// While not initialised. Any thread.
+  /// What a start waits for, while not initialised. Any thread.
   StartWait waitingFor() const;
   /// Faults of the input so far, by name in snake case, e.g. "imu_out_of_order", "imu_not_finite", "imu_gap".
   std::map<std::string, std::uint64_t> faults() const;

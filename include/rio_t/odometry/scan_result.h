@@ -33,7 +33,7 @@ struct ScanResult : ScanAnswer {
   double time_offset_sigma = 0.0;  ///< [s]
   Extrinsics T_IR;                 ///< of this radar
   Extrinsics configured_T_IR;      ///< the mounting of the options
-  CalibrationErrors errors;        ///< of what is not estimated, as the scans say
+  CalibrationErrors errors;        ///< of the calibration that is not estimated
   /// Covariance of T_IR, if it is estimated; zero if not. Translation of the radar in I [m], then turn about
   /// the axes of I [rad]: the order of ROS.
   Eigen::Matrix<double, 6, 6> T_IR_covariance = Eigen::Matrix<double, 6, 6>::Zero();
