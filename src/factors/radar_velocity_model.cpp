@@ -32,7 +32,7 @@ PredictedVelocity RadarVelocityModel::at(double const* const* parameters, bool d
   if (scan_.slow) {
     by_turn = so3::hat(scan_.slow->v_R) * R_RI;
     by_lever = R_RI * so3::hat(scan_.slow->omega_I);
-    turn = so3::log(mounting.q_IR * T_IR.q_IR.conjugate());
+    turn = turnBetween(T_IR, mounting);
     predicted.v_R += by_turn * turn + by_lever * (mounting.l_I - T_IR.l_I);
   }
   if (!derivatives) return predicted;

@@ -80,24 +80,23 @@ void PriorTerm::addPoints(double const* const* parameters, double* residuals, do
   }
 }
 
-Term& addPrior(Window& window, const std::vector<Block*>& blocks, const SquareRoot& root) {
+void addPrior(Window& window, const std::vector<Block*>& blocks, const SquareRoot& root) {
   std::vector<std::shared_ptr<const Manifold>> manifolds;
   std::vector<Eigen::VectorXd> x0;
   for (const Block* block : blocks) {
     manifolds.push_back(block->manifold);
     x0.emplace_back(block->x);
   }
-  return window.add(std::make_unique<PriorTerm>(std::move(manifolds), std::move(x0), root), blocks);
+  window.add(std::make_unique<PriorTerm>(std::move(manifolds), std::move(x0), root), blocks);
 }
 
-Term& addPrior(Window& window, Block& block, const Eigen::VectorXd& sigmas) {
-  return addPrior(window, {&block},
-                  {sigmas.cwiseInverse().asDiagonal(), Eigen::VectorXd::Zero(sigmas.size())});
+void addPrior(Window& window, Block& block, const Eigen::VectorXd& sigmas) {
+  addPrior(window, {&block}, {sigmas.cwiseInverse().asDiagonal(), Eigen::VectorXd::Zero(sigmas.size())});
 }
 
 void marginalize(Window& window, std::vector<const Block*> leaving, const std::vector<Walk>& walks) {
   std::vector<const Term*> terms;
-  std::vector<Block*> touched;
+  std::vector<const Block*> touched;
   for (const auto& term : window.terms()) {
     const bool touches = std::any_of(term->blocks.begin(), term->blocks.end(),
                                      [&](const Block* block) { return contains(leaving, block); });
@@ -108,9 +107,7 @@ void marginalize(Window& window, std::vector<const Block*> leaving, const std::v
   std::vector<const Block*> order = leaving;
   std::vector<Block*> kept;
   for (const auto& block : window.blocks()) {
-    if (block->is_constant || contains(leaving, block.get()) ||
-        std::find(touched.begin(), touched.end(), block.get()) == touched.end())
-      continue;
+    if (block->is_constant || contains(leaving, block.get()) || !contains(touched, block.get())) continue;
     kept.push_back(block.get());
     order.push_back(block.get());
   }

@@ -59,15 +59,16 @@ Elimination eliminationOf(const LinearSystem& system) {
   return std::move(*elimination);
 }
 
-LinearSystem holding(const std::vector<int>& held, LinearSystem system) {
+/// The same if the blocks `held` do not move.
+Elimination eliminationOf(LinearSystem system, const std::vector<int>& held) {
   for (const int i : held) system.hold(i);
-  return system;
+  return eliminationOf(system);
 }
 
 /// Squared length of the undamped step if the blocks `held` do not move.
 double squaredLength(const Solution& solution, const std::vector<int>& held) {
   if (held.empty()) return solution.elimination.squaredLength();
-  return eliminationOf(holding(held, solution.system)).squaredLength();
+  return eliminationOf(solution.system, held).squaredLength();
 }
 
 ceres::Solver::Options solverOptions() {
@@ -141,7 +142,7 @@ Solution solveByChain(Window& window, const SolverLimits& limits) {
     solution.iterations = std::min(pass, limits.max_iterations);
     system = linearize(window);
     const std::vector<int> held = pushedOutwards(window, system);
-    solution.elimination = held.empty() ? eliminationOf(system) : eliminationOf(holding(held, system));
+    solution.elimination = held.empty() ? eliminationOf(system) : eliminationOf(system, held);
     const double squared_length = solution.elimination.squaredLength();
     const bool is_short = squared_length < limits.short_step;
     const bool is_last = pass > limits.max_iterations;  // only judges the last step

@@ -217,7 +217,7 @@ void Estimator::updateWindow(const RadarChannel& radar, bool rests_now, ScanResu
   if (estimatesLeverArm(estimate)) result.errors.lever_arm.reset();
   if (options_.smoother.estimate_time_offset) result.errors.offset.reset();
   result.T_IR_covariance = extrinsicsCovariance(covariance.bottomRightCorner(estimated, estimated), estimate);
-  for (const StampedPose& left : marginalize()) result.left_window.push_back(left);
+  marginalize(result.left_window);
   // On a frame that shakes, the zero velocity has a large sigma in the window: the start of a gentle drive
   // must not look like an offset. The published velocity is zero.
   if (rests_now) result.state.v_W.setZero();
@@ -225,8 +225,7 @@ void Estimator::updateWindow(const RadarChannel& radar, bool rests_now, ScanResu
   addHeadingCurvature(result.state);
 }
 
-std::vector<StampedPose> Estimator::marginalize() {
-  std::vector<StampedPose> left;
+void Estimator::marginalize(std::vector<StampedPose>& left) {
   std::vector<FixedLagSmoother::RandomWalk> walks;
   const auto addWalksOf = [&](const auto& channel) {
     for (const FixedLagSmoother::RandomWalk& walk : channel.randomWalks()) addWalk(walks, walk);
@@ -235,7 +234,6 @@ std::vector<StampedPose> Estimator::marginalize() {
   if (ground_vehicle_) addWalksOf(*ground_vehicle_);
   if (barometer_) addWalksOf(*barometer_);
   for (const NodeEstimate& node : smoother_.marginalize(walks)) left.push_back(pose(node));
-  return left;
 }
 
 Time Estimator::nodeTime(const RadarScan& scan) const { return radars_.at(scan.radar).nodeTime(scan.stamp); }
@@ -286,7 +284,7 @@ void Estimator::keepUp(bool scan_came, const std::vector<RadarScan>& waiting) {
   if (precedes_all && time - smoother_.newest().time >= kSilentStep) {
     smoother_.nodeAt(time);
     smoother_.optimize();
-    for (const StampedPose& left : marginalize()) left_between_.push_back(left);
+    marginalize(left_between_);
   }
   const bool keep_for_recovery = options_.health.on_divergence == OnDivergence::kReinitialize;
   const Time needed = smoother_.imuNeededSince();
@@ -341,8 +339,8 @@ bool Estimator::tryReinitialize(std::vector<StampedPose>& left) {
   const std::optional<Initialization> found =
       initializer_.findInMotion(imu_, [this](Time time) { return anchorAt(time); });
   if (!found) return false;
-  for (std::size_t k = 0; k < smoother_.size(); ++k)
-    if (smoother_.node(k).time < found->time) left.push_back(pose(smoother_.node(k)));
+  for (const NodeEstimate& node : smoother_.nodes())
+    if (node.time < found->time) left.push_back(pose(node));
   begin(*found);
   updateHealth();
   faults_.count("reinitialized");
@@ -392,7 +390,7 @@ void Estimator::anchor(const NavigationState& state, bool at_rest) {
 
 std::vector<StampedPose> Estimator::remainingPoses() {
   std::vector<StampedPose> poses = std::exchange(left_between_, {});
-  for (std::size_t k = 0; k < smoother_.size(); ++k) poses.push_back(pose(smoother_.node(k)));
+  for (const NodeEstimate& node : smoother_.nodes()) poses.push_back(pose(node));
   return poses;
 }
 

@@ -34,13 +34,14 @@ double multipleOf(double step, double known_at, double value) {
   return tolerance <= kMaxTolerance && std::abs(steps - multiple) <= tolerance ? multiple : 0.0;
 }
 
+using Batch = DopplerGrid::Batch;
+
 /// A step [m/s] and the multiple that it was read off.
 struct Reading {
   double step = 0.0;
   double known_at = 1.0;
 };
 
-template <typename Batch>
 std::size_t countMisfits(const Batch& values, const Reading& reading) {
   return static_cast<std::size_t>(std::count_if(values.begin(), values.end(), [&](double value) {
     return multipleOf(reading.step, reading.known_at, value) == 0.0;
@@ -51,7 +52,6 @@ std::size_t countMisfits(const Batch& values, const Reading& reading) {
 ///
 /// The values ascend, and each larger multiple gives a better step. Only the first value of a multiple
 /// counts: a step that followed each would creep through values that lie close together.
-template <typename Batch>
 std::optional<Reading> explain(const Batch& ascending, const Reading& start) {
   Reading reading = start;
   std::size_t misfits = 0;
@@ -65,7 +65,6 @@ std::optional<Reading> explain(const Batch& ascending, const Reading& start) {
 
 /// Whether more than kMaxMisfits values are multiples of this step and not of a step 2, 3, ... times as
 /// large. A smaller step always explains a few more values by chance.
-template <typename Batch>
 bool isNeeded(const Batch& values, const Reading& reading) {
   const std::size_t misfits = countMisfits(values, reading);
   for (double times = 2.0; times * reading.step < DopplerGrid::kLargestStep; times += 1.0) {
@@ -76,7 +75,6 @@ bool isNeeded(const Batch& values, const Reading& reading) {
 }
 
 /// The largest step above `least` [m/s] that explains the values and that `base` is a multiple of.
-template <typename Batch>
 std::optional<Reading> largestStep(const Batch& ascending, const Reading& base, double least) {
   double parts = std::max(1.0, std::ceil(base.step / DopplerGrid::kLargestStep));
   for (; base.step / parts > least; parts += 1.0) {
@@ -87,7 +85,6 @@ std::optional<Reading> largestStep(const Batch& ascending, const Reading& base, 
 }
 
 /// The largest number of values that lie within `width` of each other, a share of the value.
-template <typename Batch>
 std::size_t mostWithin(const Batch& ascending, double width) {
   std::size_t most = 0;
   for (auto first = ascending.begin(); first != ascending.end(); ++first) {

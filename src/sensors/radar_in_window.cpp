@@ -20,18 +20,19 @@ RadarInWindow::RadarInWindow(const SmootherOptions& options, const CalibrationPr
       extrinsics_manifold_(std::make_shared<ExtrinsicsManifold>(options.estimate_extrinsics)),
       offset_(std::move(offset)) {}
 
-std::vector<Block*> RadarInWindow::addExtrinsics(Window& window, const Extrinsics& T_IR) {
+void RadarInWindow::addExtrinsics(Window& window, const Extrinsics& T_IR, std::vector<Block*>& estimated) {
   scans_.clear();
   extrinsics_ = window.addCalibration(extrinsics_manifold_, stored(T_IR));
-  if (options_.estimate_extrinsics != EstimateExtrinsics::kNone) return {extrinsics_.get()};
-  window.setConstant(*extrinsics_, true);
-  return {};
+  if (options_.estimate_extrinsics == EstimateExtrinsics::kNone)
+    window.setConstant(*extrinsics_, true);
+  else
+    estimated.push_back(extrinsics_.get());
 }
 
 void RadarInWindow::start(FixedLagSmoother& smoother, Time time, const NodePrior& prior) {
   Block& node = smoother.start(time, prior.x0);
   std::vector<Block*> blocks = {&node, &smoother.biases(), &offset_->start(smoother.window(), prior.t_O0)};
-  for (Block* block : addExtrinsics(smoother.window(), prior.T_IR0)) blocks.push_back(block);
+  addExtrinsics(smoother.window(), prior.T_IR0, blocks);
   addPrior(smoother.window(), blocks, prior.root);
   smoother.settle();
 }
@@ -40,7 +41,7 @@ void RadarInWindow::join(FixedLagSmoother& smoother) {
   Window& window = smoother.window();
   std::vector<Block*> blocks;
   if (!options_.time_offset_shared) blocks.push_back(&offset_->start(window, radar_.time_offset_initial));
-  for (Block* block : addExtrinsics(window, radar_.T_IR)) blocks.push_back(block);
+  addExtrinsics(window, radar_.T_IR, blocks);
   const Eigen::VectorXd sigmas =
       options_.time_offset_shared ? extrinsicsSigmas(options_, radar_) : calibrationSigmas(options_, radar_);
   if (!blocks.empty()) smoother.addCalibrationPrior(std::move(blocks), sigmas);

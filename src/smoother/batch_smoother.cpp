@@ -9,7 +9,6 @@
 #include <unordered_map>
 #include <utility>
 
-#include "rio_t/core/so3.h"
 #include "rio_t/factors/barometer_factor.h"
 #include "rio_t/factors/ground_vehicle_factor.h"
 #include "rio_t/factors/imu_factor.h"
@@ -69,9 +68,8 @@ Eigen::MatrixXd jointCovariance(const BlockCovariances& P, const std::vector<int
     Eigen::Index column = 0;
     for (const int j : blocks) {
       const Eigen::Index columns = P[j].at(j).rows();
-      const auto& from = P[std::min(i, j)];
-      const auto found = from.find(std::max(i, j));  // none if one of them is held
-      if (found != from.end() && i <= j) {
+      const auto found = P[i].find(j);  // none if j < i, or if one of them is held
+      if (found != P[i].end()) {
         result.block(row, column, rows, columns) = found->second;
         result.block(column, row, columns, rows) = found->second.transpose();
       }
@@ -355,8 +353,7 @@ bool BatchSmoother::mountingsHold(const Graph& graph, const Solution& solved,
   for (std::size_t k = 0; k < linear_from.size(); ++k) {
     const Block& block = *graph.extrinsics[k];
     if (block.is_constant) continue;
-    const Eigen::Vector3d turn =
-        so3::log(toExtrinsics(block.x.data()).q_IR * linear_from[k].q_IR.conjugate());
+    const Eigen::Vector3d turn = turnBetween(linear_from[k], toExtrinsics(block.x.data()));
     if (turn.norm() <= kLinear) continue;
     const Eigen::MatrixXd P = solved.elimination.covariance({solved.system.indexOf(block)});
     if (turn.dot(P.topLeftCorner<3, 3>().ldlt().solve(turn)) > 1.0) return false;
@@ -387,14 +384,15 @@ void BatchSmoother::readCovariances(const Graph& graph, const Solution& solved, 
     if (!scan.extrinsics->is_constant) blocks.push_back(index.at(scan.extrinsics));
     solution.scans[i].covariance = jointCovariance(P, blocks);
   }
-  for (const Block* block : graph.extrinsics)
-    solution.extrinsics_covariances.push_back(block->is_constant ? Eigen::MatrixXd()
-                                                                 : P[index.at(block)].at(index.at(block)));
-  const auto sigmasOf = [&](const Block* block) -> Eigen::VectorXd {
-    return P[index.at(block)].at(index.at(block)).diagonal().cwiseSqrt();
+  const auto covarianceOf = [&](const Block* block) {
+    const int i = index.at(block);
+    return P[i].at(i);
   };
-  if (graph.vehicle != nullptr) solution.q_IV_sigma = sigmasOf(graph.vehicle);
-  if (graph.barometer_bias != nullptr) solution.barometer_bias_sigma = sigmasOf(graph.barometer_bias)[0];
+  for (const Block* block : graph.extrinsics)
+    solution.extrinsics_covariances.push_back(block->is_constant ? Eigen::MatrixXd() : covarianceOf(block));
+  if (graph.vehicle != nullptr) solution.q_IV_sigma = covarianceOf(graph.vehicle).diagonal().cwiseSqrt();
+  if (graph.barometer_bias != nullptr)
+    solution.barometer_bias_sigma = std::sqrt(covarianceOf(graph.barometer_bias)(0, 0));
 }
 
 }  // namespace rio_t

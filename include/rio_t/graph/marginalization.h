@@ -38,9 +38,9 @@ class PriorTerm final : public ceres::CostFunction {
 };
 
 /// Adds a prior on `blocks` around their current values.
-Term& addPrior(Window& window, const std::vector<Block*>& blocks, const SquareRoot& root);
+void addPrior(Window& window, const std::vector<Block*>& blocks, const SquareRoot& root);
 /// The same on one block, with the sigmas of its tangent.
-Term& addPrior(Window& window, Block& block, const Eigen::VectorXd& sigmas);
+void addPrior(Window& window, Block& block, const Eigen::VectorXd& sigmas);
 
 /// Random walk of a block. It lowers the information that the prior has about the block.
 struct Walk {

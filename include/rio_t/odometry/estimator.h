@@ -94,7 +94,8 @@ class Estimator {
                     const RadarChannel& radar, ScanResult& result);
   void publishNewest() { anchor(newestState(smoother_.newestCovariance({})), false); }
   void anchor(const NavigationState& state, bool at_rest);
-  std::vector<StampedPose> marginalize();
+  /// The poses that leave the window go to `left`.
+  void marginalize(std::vector<StampedPose>& left);
   /// Adds the term that was judged, unless the platform is at rest.
   void constrainToGround(bool at_rest, ScanResult& result);
   /// Adds a drift of the position if the scans cease to contradict the estimate.

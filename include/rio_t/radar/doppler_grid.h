@@ -53,10 +53,10 @@ class DopplerGrid {
   /// [m/s] A larger step counts as none: the radar would measure a Doppler in 1 ms (at 77 GHz).
   static constexpr double kLargestStep = 2.0;
 
- private:
   static constexpr std::size_t kBatch = 16;
   using Batch = std::array<double, kBatch>;
 
+ private:
   void judge();
 
   std::optional<KnownDoppler> given_;  // read-only after construction

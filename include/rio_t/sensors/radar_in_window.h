@@ -63,8 +63,8 @@ class RadarInWindow {
   Block& extrinsicsBlock() const { return *extrinsics_; }
 
  private:
-  /// Adds the block to a window that starts. Returns it, or nothing if it is not estimated.
-  std::vector<Block*> addExtrinsics(Window& window, const Extrinsics& T_IR);
+  /// Adds the block to a window that starts, and to `estimated` if it is estimated.
+  void addExtrinsics(Window& window, const Extrinsics& T_IR, std::vector<Block*>& estimated);
   /// Computes the slow motion of all scans again, with the scans that came after them.
   void updateSlowMotion(const FixedLagSmoother& smoother);
   template <class Factor, class Measurement>
