@@ -16,33 +16,28 @@ ClockJumpDetector::Verdict ClockJumpDetector::check(Time stamp) {
   Verdict verdict = Verdict::kGood;
   if (newest_ && (step <= 0.0 || step > std::min(patience_, max_gap_))) {
     verdict = step > 0.0 ? Verdict::kAhead : Verdict::kBehind;
-    const double onward = elsewhere_newest_ ? stamp - *elsewhere_newest_ : 0.0;
+    const double onward = elsewhere_ ? stamp - elsewhere_->newest : 0.0;
     const bool goes_on = 0.0 < onward && onward <= max_gap_;
-    if (!goes_on) {
-      elsewhere_since_ = stamp;
-      elsewhere_ = 0;
-    }
-    elsewhere_newest_ = stamp;
-    ++elsewhere_;
+    if (!goes_on) elsewhere_ = StampRun{stamp, stamp};
+    elsewhere_->newest = stamp;
+    ++elsewhere_->count;
     const bool is_gap = goes_on && step > 0.0 && step <= max_gap_;
-    if (!is_gap && stamp - *elsewhere_since_ < patience_) return verdict;
+    if (!is_gap && stamp - elsewhere_->first < patience_) return verdict;
     verdict = is_gap ? Verdict::kGood : Verdict::kRestart;
   }
   stepped_back_ = verdict == Verdict::kGood ? stepBackBefore(stamp) : 0.0;
   before_newest_ = verdict == Verdict::kGood ? newest_ : std::nullopt;
   newest_ = stamp;
-  elsewhere_since_.reset();
-  elsewhere_newest_.reset();
-  elsewhere_ = 0;
+  elsewhere_.reset();
   return verdict;
 }
 
 double ClockJumpDetector::stepBackBefore(Time stamp) const {
-  if (elsewhere_ < 2 || *elsewhere_newest_ > *newest_) return 0.0;
+  if (!elsewhere_ || elsewhere_->count < 2 || elsewhere_->newest > *newest_) return 0.0;
   // Only the newest stamp was ahead. The stamps behind it go on from the one before it.
-  if (before_newest_ && *elsewhere_since_ > *before_newest_) return 0.0;
-  const double interval = (*elsewhere_newest_ - *elsewhere_since_) / (elsewhere_ - 1);
-  return stamp - *elsewhere_newest_ < kGoesOn * interval ? stamp - *elsewhere_since_ : 0.0;
+  if (before_newest_ && elsewhere_->first > *before_newest_) return 0.0;
+  const double interval = (elsewhere_->newest - elsewhere_->first) / (elsewhere_->count - 1);
+  return stamp - elsewhere_->newest < kGoesOn * interval ? stamp - elsewhere_->first : 0.0;
 }
 
 }  // namespace rio_t

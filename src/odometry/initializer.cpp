@@ -35,8 +35,7 @@ std::optional<Initialization> Initializer::add(const ImuMeasurement& newest, con
   if (options_.init_mode != InitMode::kMotion) {
     const std::optional<StaticInitialization> rest = rest_.add(newest);
     // A smooth ride looks like rest to the IMU, and like motion to the radar.
-    radar_contradicts_rest_ =
-        rest ? isMoving(rest->time - rest->duration, rest->time) : radar_contradicts_rest_;
+    if (rest) radar_contradicts_rest_ = isMoving(rest->time - rest->duration, rest->time);
     if (rest && !radar_contradicts_rest_) {
       StateBlock x;
       x.q_WI() = rest->q_WI;

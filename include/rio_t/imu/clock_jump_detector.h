@@ -28,15 +28,18 @@ class ClockJumpDetector {
   double steppedBack() const { return stepped_back_; }
 
  private:
+  /// Stamps that go on from each other.
+  struct StampRun {
+    Time first, newest;
+    int count = 0;
+  };
   double stepBackBefore(Time stamp) const;
 
   double max_gap_;                              // read-only after construction, as the next
   double patience_;                             // [s]
   std::optional<Time> newest_, before_newest_;  // good ones, of one clock
-  // The newest run of dropped stamps that go on from each other: first, last, count.
-  std::optional<Time> elsewhere_since_, elsewhere_newest_;
-  int elsewhere_ = 0;
-  double stepped_back_ = 0.0;  // [s]
+  std::optional<StampRun> elsewhere_;           // the newest run of dropped stamps
+  double stepped_back_ = 0.0;                   // [s]
 };
 
 }  // namespace rio_t
