@@ -54,7 +54,7 @@ Eigen::MatrixXd MotionManifold::minusJacobian(const double* y, const double* x) 
   const Eigen::Vector3d theta_W = thetaInW(to, from);
   const Eigen::Vector3d tilt_W = {theta_W.x(), theta_W.y(), 0.0};
   const Eigen::Matrix3d turn = so3::exp(theta_W.z() * z_W).toRotationMatrix();
-  // The columns say how R_WI(y) = turn Exp(tilt_W) R_WI(x) turns in W with tilt x, tilt y and the turn.
+  // The columns: how R_WI(y) = turn Exp(tilt_W) R_WI(x) turns in W if tilt x, tilt y or the turn changes.
   Eigen::Matrix3d turned_W = turn * so3::rightJacobian(-tilt_W);
   turned_W.col(2) = z_W;
   const Eigen::Matrix3d J_theta_W = turned_W.inverse() * to.q_WI.toRotationMatrix();

@@ -36,7 +36,7 @@ std::vector<RadarChannel> radarChannels(const OdometryOptions& options, const Ei
   return channels;
 }
 
-/// Radars that share a block walk once, as far as the one that walks farthest.
+/// Adds a walk. If radars share a block, it gets only one walk, the largest.
 void addWalk(std::vector<FixedLagSmoother::RandomWalk>& walks, const FixedLagSmoother::RandomWalk& walk) {
   for (FixedLagSmoother::RandomWalk& other : walks) {
     if (other.block != walk.block) continue;
@@ -121,7 +121,7 @@ void Estimator::putIntoWindow(Time node_time, RadarChannel& radar, ScanResult& r
   bool rests_now = false;
   if (answer.at_rest) {
     if (Block* node = smoother_.nodeAt(radar.nodeTime(stamp))) {
-      rests_now = *node->time == smoother_.newest().time;  // a late scan tells of a rest that may be over
+      rests_now = *node->time == smoother_.newest().time;  // a late scan shows a rest that may be over
       result.rest_velocity_sigma = rest->velocity_sigma;
       smoother_.addZeroVelocity(*node, rest->velocity_sigma);
       result.updated = true;
@@ -185,7 +185,7 @@ void Estimator::seeLandmarks(const LandmarkMap::Prediction& expected, const Rada
   // The noise that the Dopplers show does not contain how far an echo wanders over an object.
   const double azimuth_sigma = std::max(own.azimuth_sigma, std::sqrt(noise.azimuth));
   const double elevation_sigma = std::max(own.elevation_sigma, std::sqrt(noise.elevation));
-  constexpr double kMinLevel = 0.5;  // steeper than 60 degrees, an azimuth says little
+  constexpr double kMinLevel = 0.5;  // steeper than 60 degrees, an azimuth is hardly defined
   std::vector<Detection> detections;
   for (const std::size_t i : answer.ego_velocity.inliers) {
     const RadarPoint& point = result.scan.points[i];

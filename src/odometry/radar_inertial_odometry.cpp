@@ -153,7 +153,7 @@ std::vector<ScanResult> RadarInertialOdometry::Impl::takeInbox() {
   Inbox taken;
   {
     const std::lock_guard<std::mutex> lock(inbox_mutex);
-    taken.clock_restarts = inbox.clock_restarts;  // goes on counting
+    taken.clock_restarts = inbox.clock_restarts;  // keeps its count
     std::swap(taken, inbox);
   }
   if (taken.tuning) estimator.tune(*taken.tuning);

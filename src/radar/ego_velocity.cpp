@@ -164,7 +164,7 @@ EgoVelocity EgoVelocityEstimator::estimate(const RadarScan& scan,
   };
   if (points.size() < 3) return refused(EgoVelocityStatus::kTooFewPoints);
 
-  // A prior that is off by a quarter of the span does not tell on which side a Doppler belongs.
+  // A prior that is off by a quarter of the span does not show on which side a Doppler belongs.
   const double span = span_.value();
   const bool tells_side = prior && largestSigma(prior->covariance) < kTellsSide * span;
   if (tells_side) unwrap(points, prior->v_R, span);

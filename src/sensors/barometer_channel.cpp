@@ -18,7 +18,7 @@ constexpr double kFreezing = 273.15;          // [K]
 /// [Pa] The pressures 9 km above and 1 km below the sea. People are nowhere else.
 constexpr double kLeastPressure = 30e3;
 constexpr double kMostPressure = 115e3;
-/// [s] of samples in a mean. Shorter means cost more terms and tell no more, because the noise is white.
+/// [s] of samples in a mean. Shorter means need more terms without more information: the noise is white.
 constexpr double kMeanSpan = 0.1;
 /// [s] A mean joins a node that is this near: at 1 m/s^2 the height then deviates by 5 mm.
 constexpr double kNear = 0.1;
@@ -58,7 +58,7 @@ const char* BarometerChannel::add(const Pressure& pressure, Time newest_imu) {
   const double span = std::min(since, kMissing * meanSpacing().value_or(kMeanSpan));
   newest_ = pressure.time;
   noise_.add(pressure.time, Eigen::Vector3d(height, 0.0, 0.0));
-  if (span == 0.0) return nullptr;  // the first one tells no rate
+  if (span == 0.0) return nullptr;  // one sample gives no rate
   recent_.push_back({pressure.time, height, span});
   while (pressure.time - recent_.front().time > kRecent) recent_.pop_front();
   return bias_ ? collect(recent_.back()) : nullptr;

@@ -44,7 +44,7 @@ struct PredictedVelocity {
   Eigen::Vector3d v_R;         ///< [m/s]
   MotionJacobian<3> J_motion;  ///< as StateBlock stores it
   BiasJacobian<3> J_biases;
-  Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();  ///< zero if the scan does not tell the offset [m/s^2]
+  Eigen::Vector3d dv_dt_O = Eigen::Vector3d::Zero();  ///< zero if offset_gain is 0 [m/s^2]
   ExtrinsicsJacobian<3> J_extrinsics;                 ///< as ExtrinsicsBlock stores it
 };
 

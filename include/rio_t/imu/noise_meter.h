@@ -67,7 +67,7 @@ class NoiseSpectrum {
  private:
   struct Rate {
     NoiseMeter meter;
-    bool has_first = false;  ///< of the two whose mean goes to the next rate
+    bool has_first = false;  ///< its mean with the next sample goes to the next rate
     Time first_time;
     Eigen::Vector3d first = Eigen::Vector3d::Zero();
   };

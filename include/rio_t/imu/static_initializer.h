@@ -20,7 +20,7 @@ enum class StartObstacle {
 /// An initialiser returns this while it has not started the estimate.
 struct StartWait {
   StartObstacle obstacle = StartObstacle::kTooFewData;
-  std::string text;  ///< tells people what the initialiser waits for
+  std::string text;  ///< what the initialiser waits for, for people
 };
 
 struct StaticInitializerOptions {

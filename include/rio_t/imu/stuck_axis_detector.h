@@ -10,7 +10,7 @@ namespace rio_t {
 constexpr double kTurns = 0.1;
 
 /// Follows one axis and finds a reading that freezes: while the IMU turns, it repeats itself to the last bit,
-/// far more often in a row than it did lately, for a tenth of a second or longer. An axis without noise that
+/// far more often in a row than recently, for a tenth of a second or longer. An axis without noise that
 /// has never moved is not frozen. Not thread-safe.
 class FrozenAxisDetector {
  public:
@@ -22,7 +22,7 @@ class FrozenAxisDetector {
   Time last_at_;
   double repeats_ = 0.0;               ///< of last_
   Time run_since_;                     ///< time of the first of these readings
-  std::optional<double> longest_run_;  ///< of repeats lately; none as long as the axis reads one value
+  std::optional<double> longest_run_;  ///< of recent repeats; none while the axis has read only one value
   bool is_frozen_ = false;
 };
 
@@ -40,7 +40,7 @@ class StuckAxisDetector {
   Time good_at_;
   std::optional<double> stuck_at_;  ///< the reading that jumped away or froze, while it repeats
   bool is_impossible_ = false;      ///< whether no mass can make that jump
-  double usual_jump_ = 0.0;         ///< largest between neighbours lately [rad/s]
+  double usual_jump_ = 0.0;         ///< largest recent one between neighbours [rad/s]
   FrozenAxisDetector frozen_;
 };
 

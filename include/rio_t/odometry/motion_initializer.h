@@ -101,7 +101,7 @@ class MotionInitializer {
   std::optional<double> refine(const Velocities& velocities, Time time, const ImuBuffer& imu,
                                ModelErrorScale& scale, NodePrior& prior) const;
   struct OffsetGains {
-    std::vector<double> gains;  ///< of OffsetEvidence; 0: the velocity says nothing about the offset
+    std::vector<double> gains;             ///< of OffsetEvidence; 0: the velocity does not inform the offset
     double half_width = kOffsetHalfWidth;  ///< of the mean of the IMU in the derivative [s]
   };
   OffsetGains offsetGains(const Velocities& velocities, Time time, const ImuBuffer& imu, const StateBlock& x,

@@ -67,7 +67,7 @@ class RadarInertialOdometry {
   MeasuredImuNoise imuNoise() const;
   /// Root mean square of this noise since the first sample. Any thread.
   MeasuredImuNoise imuNoiseOfRun() const;
-  /// What a start waits for, while not initialised. Any thread.
+  /// Why there is no state yet, while not initialised. Any thread.
   StartWait waitingFor() const;
   /// Faults of the input so far, by name in snake case, e.g. "imu_out_of_order", "imu_not_finite", "imu_gap".
   std::map<std::string, std::uint64_t> faults() const;

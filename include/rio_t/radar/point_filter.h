@@ -24,7 +24,7 @@ enum class PointVerdict {
 constexpr std::size_t kPointVerdicts = 8;
 
 /// Marks the points that have the same range, Doppler and SNR as another. A radar reports one echo at several
-/// directions if the spectrum of its angles has more than one peak, and no point tells which one is right.
+/// directions if the spectrum of its angles has more than one peak, and nothing shows which one is right.
 /// Marks none if three points or more all have the same SNR: the driver then gives no real SNR.
 void markAmbiguous(std::vector<RadarPoint>& points);
 

@@ -89,7 +89,7 @@ class OffsetEvidence {
   Eigen::Vector3d after_ = Eigen::Vector3d::Zero();
   double constant_ = 0.0;       ///< share of a constant error that the estimated velocity has followed
   double noise_ = 0.0;          ///< variance of the noise in mean_ [m^2/s^4]
-  std::deque<Followed> scans_;  ///< whose means overlap the newest
+  std::deque<Followed> scans_;  ///< scans whose means overlap the newest one
   Time last_;
   double motion_ = 0.0;           ///< sum of before' W after, minus what errors of the state add, fading
   double motion_variance_ = 0.0;  ///< of motion_

@@ -22,7 +22,7 @@ struct OffsetStep {
 };
 
 /// Detects steps of the time offset. A driver that restarts may change the offset by many sigma, and a
-/// smoother that is sure of the old value would take minutes to follow.
+/// smoother with a small sigma of the old value would take minutes to follow.
 ///
 /// If the offset stepped by c before a scan k, the innovations of k and of the scans after it are
 /// d = c G + noise. G is what the estimated velocity has not followed yet, since k, of

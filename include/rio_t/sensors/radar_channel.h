@@ -27,7 +27,7 @@ struct RadarChannelOptions {
   SmootherOptions smoother;
 };
 
-/// What the estimator knows when a scan comes.
+/// Knowledge of the estimator when a scan comes.
 struct ScanContext {
   std::optional<Rest> rest;        ///< as the IMU shows it at the time of measurement
   bool has_diverged = false;       ///< then RANSAC gets no prior

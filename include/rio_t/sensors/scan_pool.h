@@ -35,7 +35,7 @@ class ScanPool {
 /// The scans since the IMU came to rest.
 ///
 /// A platform that creeps leaves most points of a scan in the Doppler bin around zero, and its IMU shows no
-/// motion either. Its velocity is the same in all these scans, so their points tell together what those of
+/// motion either. Its velocity is the same in all these scans, so their points together show what those of
 /// one scan do not. Not thread-safe.
 class RestPool {
  public:

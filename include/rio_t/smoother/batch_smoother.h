@@ -21,7 +21,7 @@ struct BatchOptions {
   double placement_tolerance = 1.0e-4;
 };
 
-/// What one scan gives to the graph.
+/// Input of one scan to the graph.
 struct BatchScan {
   Time stamp;
   std::size_t radar = 0;

@@ -25,7 +25,7 @@ struct NodePrior {
 };
 
 /// Prior on the first state after `duration` seconds at rest. Yaw and position define W. The mean of the
-/// accelerometer is gravity plus b_a, so tilt and b_a are known far better together than each by itself
+/// accelerometer is gravity plus b_a, so tilt and b_a are known far better jointly than each by itself
 /// (docs/method.md, eq. 7a). `gravity` [m/s^2].
 NodePrior priorAtRest(const SmootherOptions& options, const ImuNoise& noise, const StateBlock& x,
                       double gravity, double duration, const CalibrationPrior& radar);

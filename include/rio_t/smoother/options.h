@@ -7,7 +7,7 @@
 
 namespace rio_t {
 
-/// What a scan gives to the window.
+/// The kind of term that a scan adds to the window.
 enum class RadarFactor {
   kVelocity,  ///< the ego-velocity of the scan (the paper)
   kDoppler,   ///< the Doppler of each point, tightly coupled
