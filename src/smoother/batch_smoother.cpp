@@ -32,7 +32,7 @@ using BlockCovariances = std::vector<std::map<int, Eigen::MatrixXd>>;
 bool isNextStepSmall(const Solution& solved, const BlockCovariances& P) {
   const std::vector<Eigen::VectorXd>& delta = solved.elimination.delta();
   for (std::size_t i = 0; i < delta.size(); ++i) {
-    if (delta[i].isZero(0.0)) continue;  // as that of a held block, whose covariance is zero
+    if (delta[i].isZero(0.0)) continue;  // as that of a held block
     const Eigen::MatrixXd& P_ii = P[i].at(static_cast<int>(i));
     if (delta[i].dot(P_ii.ldlt().solve(delta[i])) > kNear) return false;
   }
