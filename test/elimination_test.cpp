@@ -53,6 +53,20 @@ TEST(Elimination, CovariancesAreThoseOfTheDenseInverse) {
   }
 }
 
+TEST(Elimination, AHeldBlockHasNoErrorAndTakesNoStep) {
+  const LinearWindow linear(5);
+  LinearSystem system = linearize(linear.window);
+  system.hold(5);  // the calibration
+  const auto elimination = Elimination::of(system);
+  ASSERT_TRUE(elimination);
+  EXPECT_TRUE(elimination->delta()[5].isZero(0.0));
+  EXPECT_GT(elimination->squaredLength(), 0.0);
+  const Eigen::MatrixXd P = elimination->covariance({2, 5});
+  EXPECT_GT(P.topLeftCorner(3, 3).diagonal().minCoeff(), 0.0);
+  EXPECT_TRUE(P.rightCols(2).isZero(0.0)) << P;
+  EXPECT_TRUE(elimination->covariances()[5].at(5).isZero(0.0));
+}
+
 /// An outlier has hardly any derivative. Its square underflows.
 TEST(Elimination, ATinyDerivativeCountsAsNone) {
   for (const double tiny : {1e-150, 1e-160, 1e-170, 1e-300}) {

@@ -247,7 +247,7 @@ std::optional<Elimination> Elimination::of(const LinearSystem& system) {
     const Eigen::Index size = system.tangents[i];
     if (system.is_held[i]) {
       R = {{static_cast<int>(i)}, zeroTableau(size, size + 1)};
-      R.Jr.topLeftCorner(size, size).setIdentity();
+      R.Jr.diagonal().head(size).setConstant(std::numeric_limits<double>::infinity());  // no error, no step
     }
     const auto z = R.Jr.col(R.Jr.cols() - kPadding - 1).head(size);
     result.squared_length_ += z.squaredNorm();

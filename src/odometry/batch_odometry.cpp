@@ -195,8 +195,7 @@ std::vector<ScanResult> BatchOdometry::results(const Run& run, const BatchSoluti
     result.T_IR_covariance = extrinsicsCovariance(solution.extrinsics_covariances[result.scan.radar],
                                                   options_.smoother.estimate_extrinsics);
     result.solver_termination = solution.termination;
-    result.time_offset_sigma =
-        options_.smoother.estimate_time_offset ? std::sqrt(solved.covariance(kState, kState)) : 0.0;
+    result.time_offset_sigma = std::sqrt(solved.covariance(kState, kState));
   }
   std::vector<std::size_t> order(results.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
